@@ -1,0 +1,1 @@
+//! Uniform grid whose crowded cells are refined by octrees, with a per-ray mailbox.

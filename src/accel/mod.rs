@@ -1,0 +1,95 @@
+//! What does this ray hit? Shapes in, hits out; nothing here knows of materials, files, threads or printing.
+//!
+//! # The hit contract
+//! Hits are ordered by (t, prim). Every structure gives, for every ray, the same hits bit for bit as
+//! [`none`](none::Unculled), which tests everything: the verdict of each shape's test is exact for the `f32` ray and
+//! vertices (`math::triangle`), t is a pure function of (ray, prim), and culling is conservative by the margins that
+//! `math::bounds` derives.
+//!
+//! Rays come in waves: slices of rays in, slices of answers out. Behind the interface a structure may trace them one by
+//! one, with many in flight, or as packets, with the same bits in the answer.
+
+pub mod grid;
+pub mod none;
+pub mod probe;
+pub mod shapes;
+
+pub use probe::{NoProbe, Probe, RayCounts};
+pub use shapes::{BitSet, Shapes, SpherePrim};
+
+use crate::math::Vec3;
+
+/// The prim id of "nothing": the answer of a ray that misses, and the `exclude` of a ray that excludes nothing.
+pub const NO_PRIM: u32 = u32::MAX;
+
+/// One ray, in the centred frame of its [`Shapes`]. `dir` need not be of unit length; t counts in its lengths.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Start.
+    pub origin: Vec3,
+    /// Hits count from here, inclusive.
+    pub t_min: f32,
+    /// Direction, any finite length but zero.
+    pub dir: Vec3,
+    /// Hits count up to here, inclusive; may be infinite.
+    pub t_max: f32,
+    /// A prim that cannot be hit: the planar one the ray starts on; or [`NO_PRIM`].
+    pub exclude: u32,
+    /// The sample that owns the ray; no structure looks at it.
+    pub sample: u32,
+}
+
+/// Where a ray meets a shape. Geometry only: the caller looks up what it is made of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Distance in lengths of the ray's direction; infinite for a miss.
+    pub t: f32,
+    /// Barycentric weight of the triangle's second corner; 0 for other shapes.
+    pub u: f32,
+    /// Barycentric weight of the triangle's third corner; 0 for other shapes.
+    pub v: f32,
+    /// What was hit, an index over all shapes (see [`Shapes`]), or [`NO_PRIM`].
+    pub prim: u32,
+}
+
+impl Hit {
+    /// No hit.
+    pub const MISS: Self = Self { t: f32::INFINITY, u: 0.0, v: 0.0, prim: NO_PRIM };
+
+    /// Whether anything was hit.
+    pub fn is_some(&self) -> bool {
+        self.prim != NO_PRIM
+    }
+
+    /// Whether this hit comes before `other`: smaller t, or the lower prim at equal t.
+    pub fn before(&self, other: &Self) -> bool {
+        self.t < other.t || (self.t == other.t && self.prim < other.prim)
+    }
+}
+
+/// One way of answering what rays hit. Built once, then only read.
+///
+/// Slices in one call have equal lengths.
+pub trait Accel: Sync {
+    /// What a query writes to (stack, mailbox): one per worker, reused for every wave.
+    type Scratch: Send;
+
+    /// A fresh scratch value.
+    fn scratch(&self) -> Self::Scratch;
+
+    /// The first hit of each ray in `t_min..=t_max`; [`Hit::MISS`] where there is none.
+    fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P);
+
+    /// Whether anything *opaque* lies in `t_min..=t_max` of each ray.
+    fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut Self::Scratch, probe: &mut P);
+
+    /// The first hit of each ray that comes after `after` in the order (t, prim), up to `t_max`.
+    fn next<P: Probe>(
+        &self,
+        rays: &[Ray],
+        after: &[Hit],
+        hits: &mut [Hit],
+        scratch: &mut Self::Scratch,
+        probe: &mut P,
+    );
+}

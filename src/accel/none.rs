@@ -1,0 +1,1 @@
+//! No culling: every ray against every shape. The specification of every other structure.

@@ -1,0 +1,1 @@
+//! Words -> jobs -> messages and exit codes.

@@ -1,0 +1,33 @@
+//! Linear pixels <-> files: tone mapping, PNG, EXR with layers, JPEG, WebP, metadata, difference metrics.
+//!
+//! Knows nothing of scenes or rays.
+
+/// A rendered picture: linear Rec. 709, rows from the top.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Picture {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Beauty: RGBA, colour premultiplied by alpha; `width × height` values.
+    pub beauty: Vec<[f32; 4]>,
+    /// What else was asked for (`--layers`).
+    pub layers: Option<Layers>,
+}
+
+/// Per-pixel facts beside the beauty; each array is empty or `width × height` long.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Layers {
+    /// Surface colour without light, linear, averaged over the samples.
+    pub albedo: Vec<[f32; 3]>,
+    /// World-space unit shading normal, averaged over the samples; zero where nothing was hit.
+    pub normal: Vec<[f32; 3]>,
+    /// World-space position of the pixel's first sample that hit; zero where nothing was hit.
+    pub position: Vec<[f32; 3]>,
+    /// Distance along the view axis of the pixel's first sample that hit; infinite where nothing was hit.
+    pub depth: Vec<f32>,
+    /// Prim id of that sample; `u32::MAX` where nothing was hit.
+    pub prim: Vec<u32>,
+    /// Instance id of that sample (spheres and planes count on after the instances); `u32::MAX` where nothing was hit.
+    pub instance: Vec<u32>,
+}

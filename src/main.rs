@@ -1,0 +1,3 @@
+//! The `meshray` command.
+
+fn main() {}

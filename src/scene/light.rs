@@ -1,0 +1,59 @@
+//! Lights without extent.
+
+use crate::math::{DVec3, Vec3};
+
+/// A light in world space.
+#[derive(Clone, Debug)]
+pub struct Light {
+    /// Name in the file, or an empty string.
+    pub name: String,
+    /// Linear colour × intensity. Candela for point and spot lights with [`Falloff::InverseSquare`], lux for
+    /// directional ones, plain radiance-like factors for [`Falloff::None`] as the founding texts use.
+    pub intensity: Vec3,
+    /// Where from.
+    pub kind: LightKind,
+    /// Whether surfaces throw shadows from it.
+    pub shadows: bool,
+}
+
+/// Position and shape of a light.
+#[derive(Clone, Copy, Debug)]
+pub enum LightKind {
+    /// Shines from a point in every direction.
+    Point {
+        /// World position.
+        position: DVec3,
+        /// How it weakens.
+        falloff: Falloff,
+    },
+    /// Shines along one direction from infinitely far.
+    Directional {
+        /// Unit vector along which the light travels.
+        direction: DVec3,
+    },
+    /// A point light limited to a cone.
+    Spot {
+        /// World position.
+        position: DVec3,
+        /// Unit vector along the axis, away from the light.
+        direction: DVec3,
+        /// Half angle where it starts to fade, radians.
+        inner: f64,
+        /// Half angle where it ends, radians.
+        outer: f64,
+        /// How it weakens.
+        falloff: Falloff,
+    },
+}
+
+/// How light weakens with distance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Falloff {
+    /// Not at all (the founding texts, MTL viewers).
+    None,
+    /// 1/d², windowed to end at `range` as KHR_lights_punctual recommends.
+    InverseSquare {
+        /// Distance where it ends; infinite when the file gives none.
+        range: f64,
+    },
+}

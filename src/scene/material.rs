@@ -1,0 +1,232 @@
+//! How a surface answers to light. Factors are linear; maps multiply them.
+
+use crate::math::{Vec2, Vec3};
+
+/// A material. `base_color`, alpha, emission and the normal are common to every [`Surface`] model.
+#[derive(Clone, Debug)]
+pub struct Material {
+    /// Name in the file, or an empty string.
+    pub name: String,
+    /// Base (glTF) or diffuse (`Kd`) colour, linear.
+    pub base_color: Vec3,
+    /// Opacity factor, 0 clear … 1 solid; what it does depends on `alpha_mode`.
+    pub opacity: f32,
+    /// sRGB map multiplied into `base_color`; its alpha multiplies `opacity`.
+    pub base_color_map: Option<TextureRef>,
+    /// Extra opacity map (`map_d`), the red channel, linear.
+    pub opacity_map: Option<TextureRef>,
+    /// What the opacity means.
+    pub alpha_mode: AlphaMode,
+    /// Whether the back of a face is drawn; a back face shades with its normal turned round.
+    pub double_sided: bool,
+    /// Emitted radiance, linear, strength included.
+    pub emission: Vec3,
+    /// sRGB map multiplied into `emission`.
+    pub emission_map: Option<TextureRef>,
+    /// Tangent-space normal map, linear.
+    pub normal_map: Option<TextureRef>,
+    /// Multiplies x and y of the normal map.
+    pub normal_scale: f32,
+    /// Height map (`bump`), red channel, linear.
+    pub bump_map: Option<TextureRef>,
+    /// Height of the bump map's white, in texture units (`-bm`).
+    pub bump_scale: f32,
+    /// Ambient occlusion map, red channel, linear; darkens ambient and environment light only.
+    pub occlusion_map: Option<TextureRef>,
+    /// 0: occlusion map ignored … 1: fully applied.
+    pub occlusion_strength: f32,
+    /// The reflection model.
+    pub surface: Surface,
+}
+
+/// The reflection model of a [`Material`].
+#[derive(Clone, Debug)]
+pub enum Surface {
+    /// glTF 2.0 metallic-roughness (its Appendix B), with specular, ior and transmission extensions.
+    MetalRough(MetalRough),
+    /// Phong as in MTL and the founding texts.
+    Phong(Phong),
+    /// KHR_materials_unlit: the base colour, unlit.
+    Unlit,
+}
+
+/// Parameters of the glTF metallic-roughness model.
+#[derive(Clone, Debug)]
+pub struct MetalRough {
+    /// 0 dielectric … 1 metal. A glTF that does not say is 1.
+    pub metallic: f32,
+    /// Perceptual roughness, 0 … 1.
+    pub roughness: f32,
+    /// Linear map: green × roughness, blue × metallic.
+    pub metal_rough_map: Option<TextureRef>,
+    /// KHR_materials_specular: strength of the dielectric reflection.
+    pub specular: f32,
+    /// Linear map, alpha channel × `specular`.
+    pub specular_map: Option<TextureRef>,
+    /// Colour of the dielectric reflection at normal incidence, linear, may exceed 1.
+    pub specular_color: Vec3,
+    /// sRGB map × `specular_color`.
+    pub specular_color_map: Option<TextureRef>,
+    /// Index of refraction, at least 1, or 0 for the extension's "no Fresnel" special case.
+    pub ior: f32,
+    /// KHR_materials_transmission: 0 opaque … 1 all light that is not reflected passes.
+    pub transmission: f32,
+    /// Linear map, red channel × `transmission`.
+    pub transmission_map: Option<TextureRef>,
+    /// Whether light bends and travels inside (a closed volume); without KHR_materials_volume glTF glass is thin: rays
+    /// pass straight on.
+    pub thick: bool,
+}
+
+/// Parameters of the Phong model: `I = Ia Ka + Σ I (Kd N·L + Ks cosⁿα) + mirror + transmission`.
+///
+/// The diffuse colour is [`Material::base_color`].
+#[derive(Clone, Debug)]
+pub struct Phong {
+    /// `Ka`, linear; multiplied with the scene's ambient light.
+    pub ambient: Vec3,
+    /// sRGB map × `ambient`.
+    pub ambient_map: Option<TextureRef>,
+    /// `Ks`, linear.
+    pub specular: Vec3,
+    /// sRGB map × `specular`.
+    pub specular_map: Option<TextureRef>,
+    /// `Ns`, the exponent n.
+    pub shininess: f32,
+    /// Linear map, red channel × `shininess`.
+    pub shininess_map: Option<TextureRef>,
+    /// Weight of the mirror-reflected ray, linear; zero: no mirror.
+    pub mirror: Vec3,
+    /// Weight of the refracted ray (`Tf`), linear; zero: none.
+    pub transmission: Vec3,
+    /// `Ni`, index of refraction of the inside; 1 lets rays pass straight.
+    pub ior: f32,
+    /// Whether Fresnel balances mirror and transmission (`illum` 5, 7).
+    pub fresnel: bool,
+}
+
+/// What opacity does.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum AlphaMode {
+    /// Opacity is ignored.
+    #[default]
+    Opaque,
+    /// Solid where opacity ≥ cutoff, else absent.
+    Mask {
+        /// The threshold.
+        cutoff: f32,
+    },
+    /// Composited over what lies behind.
+    Blend,
+}
+
+/// Which texture, through which coordinates.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TextureRef {
+    /// Index into [`super::Scene::textures`].
+    pub texture: u32,
+    /// Which set of [`super::Mesh::uvs`].
+    pub uv_set: u32,
+    /// Moves the coordinates before the lookup.
+    pub transform: UvTransform,
+}
+
+/// `uv' = offset + rotation · (scale · uv)`, as KHR_texture_transform.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UvTransform {
+    /// Added last.
+    pub offset: Vec2,
+    /// Radians; the matrix of the extension's text.
+    pub rotation: f32,
+    /// Applied first.
+    pub scale: Vec2,
+}
+
+impl Default for UvTransform {
+    fn default() -> Self {
+        Self { offset: Vec2::ZERO, rotation: 0.0, scale: Vec2::ONE }
+    }
+}
+
+impl Default for MetalRough {
+    /// glTF's defaults: all metal, fully rough.
+    fn default() -> Self {
+        Self {
+            metallic: 1.0,
+            roughness: 1.0,
+            metal_rough_map: None,
+            specular: 1.0,
+            specular_map: None,
+            specular_color: Vec3::ONE,
+            specular_color_map: None,
+            ior: 1.5,
+            transmission: 0.0,
+            transmission_map: None,
+            thick: false,
+        }
+    }
+}
+
+impl Default for Phong {
+    fn default() -> Self {
+        Self {
+            ambient: Vec3::ZERO,
+            ambient_map: None,
+            specular: Vec3::ZERO,
+            specular_map: None,
+            shininess: 1.0,
+            shininess_map: None,
+            mirror: Vec3::ZERO,
+            transmission: Vec3::ZERO,
+            ior: 1.0,
+            fresnel: false,
+        }
+    }
+}
+
+impl Default for Material {
+    /// glTF's default material: white, all metal, fully rough, opaque, one-sided.
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            base_color: Vec3::ONE,
+            opacity: 1.0,
+            base_color_map: None,
+            opacity_map: None,
+            alpha_mode: AlphaMode::Opaque,
+            double_sided: false,
+            emission: Vec3::ZERO,
+            emission_map: None,
+            normal_map: None,
+            normal_scale: 1.0,
+            bump_map: None,
+            bump_scale: 1.0,
+            occlusion_map: None,
+            occlusion_strength: 1.0,
+            surface: Surface::MetalRough(MetalRough::default()),
+        }
+    }
+}
+
+impl Material {
+    /// The material of geometry that names none: light grey, matt, seen from both sides.
+    pub fn plain() -> Self {
+        Self {
+            name: "plain".into(),
+            base_color: Vec3::splat(0.6),
+            double_sided: true,
+            surface: Surface::MetalRough(MetalRough { metallic: 0.0, roughness: 0.7, ..MetalRough::default() }),
+            ..Self::default()
+        }
+    }
+
+    /// Whether a hit always stops light and sight: what `accel` calls *opaque*.
+    pub fn is_opaque(&self) -> bool {
+        let passes_light = match &self.surface {
+            Surface::MetalRough(m) => m.transmission > 0.0,
+            Surface::Phong(p) => p.transmission.max_element() > 0.0,
+            Surface::Unlit => false,
+        };
+        self.alpha_mode == AlphaMode::Opaque && !passes_light
+    }
+}

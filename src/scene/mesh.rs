@@ -1,0 +1,80 @@
+//! Geometry: indexed triangles (and whole n-gons), spheres, planes, and where they stand.
+
+use crate::math::{DAffine3, DVec3, Vec2, Vec3, Vec4};
+
+/// One run of faces that share a material: a glTF primitive, or an OBJ `o`/`g`/`usemtl` run.
+///
+/// Vertex arrays are empty or as long as `positions`.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Name in the file, or an empty string.
+    pub name: String,
+    /// Index into [`super::Scene::materials`].
+    pub material: u32,
+    /// Vertices, object space.
+    pub positions: Vec<Vec3>,
+    /// Unit shading normals; empty: faces are flat.
+    pub normals: Vec<Vec3>,
+    /// Unit tangents with handedness in `w`; empty unless a normal map needs them.
+    pub tangents: Vec<Vec4>,
+    /// Vertex colours, linear RGBA, multiplied into the base colour; empty: white.
+    pub colors: Vec<Vec4>,
+    /// Texture coordinate sets (`TEXCOORD_0`, `TEXCOORD_1`, …), v pointing down as in glTF.
+    pub uvs: Vec<Vec<Vec2>>,
+    /// Corners of each triangle, indices into the vertex arrays, counter-clockwise seen from the front.
+    pub triangles: Vec<[u32; 3]>,
+    /// The face of the file each triangle was cut from; empty: triangle i is face i.
+    pub face_of_triangle: Vec<u32>,
+    /// Planar n-gons kept whole (`--polygons whole`).
+    pub polygons: Vec<Polygon>,
+    /// Corners of all polygons, indices into the vertex arrays.
+    pub polygon_corners: Vec<u32>,
+}
+
+/// A planar n-gon: a run of [`Mesh::polygon_corners`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Polygon {
+    /// First corner.
+    pub first: u32,
+    /// Number of corners, at least 3.
+    pub len: u32,
+    /// The face of the file this is.
+    pub face: u32,
+}
+
+/// A mesh placed in the world.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// Name of the node or object.
+    pub name: String,
+    /// Index into [`super::Scene::meshes`].
+    pub mesh: u32,
+    /// From object space to world space, composed in `f64`.
+    pub world_from_object: DAffine3,
+}
+
+/// A sphere in world space.
+#[derive(Clone, Debug)]
+pub struct Sphere {
+    /// Name in the scene file, or an empty string.
+    pub name: String,
+    /// Centre, world space.
+    pub center: DVec3,
+    /// Radius, greater than 0.
+    pub radius: f64,
+    /// Index into [`super::Scene::materials`].
+    pub material: u32,
+}
+
+/// An unbounded plane: all points p with `normal · p == offset`.
+#[derive(Clone, Debug)]
+pub struct Plane {
+    /// Name in the scene file, or an empty string.
+    pub name: String,
+    /// Unit normal, world space; points to the front side.
+    pub normal: DVec3,
+    /// Distance of the plane from the world's origin along `normal`.
+    pub offset: f64,
+    /// Index into [`super::Scene::materials`].
+    pub material: u32,
+}

@@ -1,0 +1,82 @@
+//! What is to be drawn, as plain data: flat arrays and `u32` indices, no behaviour beyond lookup.
+//!
+//! A [`Scene`] keeps each object in its own space; positions are `f32` there, while everything that places objects in
+//! the world is `f64`. Units are metres, angles radians, colours linear Rec. 709, unless a field says otherwise.
+
+pub mod camera;
+pub mod light;
+pub mod material;
+pub mod mesh;
+pub mod texture;
+
+pub use camera::{Camera, Projection};
+pub use light::{Falloff, Light, LightKind};
+pub use material::{AlphaMode, Material, MetalRough, Phong, Surface, TextureRef, UvTransform};
+pub use mesh::{Instance, Mesh, Plane, Polygon, Sphere};
+pub use texture::{Bitmap, Filter, Mipmaps, Pixels, Sampler, Texture, Wrap};
+
+use crate::math::Vec3;
+
+/// A whole scene. Indices in its parts point into the arrays here.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// Geometry, each in its own object space.
+    pub meshes: Vec<Mesh>,
+    /// Where meshes stand in the world.
+    pub instances: Vec<Instance>,
+    /// Spheres, in world space.
+    pub spheres: Vec<Sphere>,
+    /// Unbounded planes, in world space.
+    pub planes: Vec<Plane>,
+    /// Materials; every mesh, sphere and plane names one.
+    pub materials: Vec<Material>,
+    /// Textures: a bitmap and how to read it.
+    pub textures: Vec<Texture>,
+    /// Decoded pictures.
+    pub bitmaps: Vec<Bitmap>,
+    /// Lights, in world space.
+    pub lights: Vec<Light>,
+    /// Cameras the file brought, in world space.
+    pub cameras: Vec<Camera>,
+    /// Ambient light: radiance from everywhere, multiplied by a material's ambient colour.
+    pub ambient: Vec3,
+    /// What rays that leave the scene see.
+    pub environment: Environment,
+    /// What primary rays that hit nothing show; `None` when the file does not say.
+    pub background: Option<Background>,
+    /// Which axis of the file points up.
+    pub up: UpAxis,
+}
+
+/// What secondary rays that leave the scene see, and diffuse light from afar.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Environment {
+    /// Nothing: black.
+    #[default]
+    Black,
+    /// The same radiance from every direction.
+    Constant(Vec3),
+    /// The built-in studio, a formula (see `render::studio`).
+    Studio,
+}
+
+/// What a primary ray that hits nothing shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Background {
+    /// Alpha 0.
+    Transparent,
+    /// One colour, linear.
+    Color(Vec3),
+    /// The environment, as reflected rays see it.
+    Environment,
+}
+
+/// The axis that points up in the file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum UpAxis {
+    /// +Y, as glTF says and most OBJ exporters do.
+    #[default]
+    Y,
+    /// +Z, as CAD programs and scanners write.
+    Z,
+}

@@ -1,0 +1,87 @@
+//! Pictures that cover surfaces.
+
+/// A bitmap and how to read between and beyond its texels.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Texture {
+    /// Index into [`super::Scene::bitmaps`].
+    pub bitmap: u32,
+    /// Wrap and filter.
+    pub sampler: Sampler,
+}
+
+/// How texels are found from coordinates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sampler {
+    /// Beyond 0…1 along u.
+    pub wrap_u: Wrap,
+    /// Beyond 0…1 along v.
+    pub wrap_v: Wrap,
+    /// When a texel covers more than a pixel.
+    pub magnify: Filter,
+    /// When a pixel covers more than a texel.
+    pub minify: Filter,
+    /// Whether smaller copies are used when minifying.
+    pub mipmaps: Mipmaps,
+}
+
+/// What coordinates outside 0…1 mean.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wrap {
+    /// The picture repeats.
+    #[default]
+    Repeat,
+    /// Every second copy is mirrored.
+    Mirror,
+    /// The border texel goes on.
+    Clamp,
+}
+
+/// What lies between texel centres.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Filter {
+    /// Bilinear.
+    #[default]
+    Linear,
+    /// The nearest texel.
+    Nearest,
+}
+
+/// How the smaller copies of a bitmap are read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mipmaps {
+    /// Not at all.
+    None,
+    /// The nearest level.
+    Nearest,
+    /// Between the two nearest levels (trilinear).
+    #[default]
+    Linear,
+}
+
+/// A decoded picture, rows from the top.
+#[derive(Clone, Debug, Default)]
+pub struct Bitmap {
+    /// Where it came from, for messages.
+    pub name: String,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Texels, row by row; `width × height` of them.
+    pub pixels: Pixels,
+}
+
+/// Texels as the file stored them; whether 8-bit values are sRGB or linear is decided by the slot that reads them.
+#[derive(Clone, Debug)]
+pub enum Pixels {
+    /// 8 bits a channel, RGBA.
+    Rgba8(Vec<[u8; 4]>),
+    /// 16 bits a channel, RGBA.
+    Rgba16(Vec<[u16; 4]>),
+}
+
+impl Default for Pixels {
+    fn default() -> Self {
+        Self::Rgba8(Vec::new())
+    }
+}
