@@ -84,12 +84,5 @@ pub trait Accel: Sync {
     fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut Self::Scratch, probe: &mut P);
 
     /// The first hit of each ray that comes after `after` in the order (t, prim), up to `t_max`.
-    fn next<P: Probe>(
-        &self,
-        rays: &[Ray],
-        after: &[Hit],
-        hits: &mut [Hit],
-        scratch: &mut Self::Scratch,
-        probe: &mut P,
-    );
+    fn next<P: Probe>(&self, rays: &[Ray], after: &[Hit], hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P);
 }

@@ -24,7 +24,12 @@ pub struct Diagnostic {
 
 impl Diagnostic {
     /// A message met once.
-    pub fn new(code: &'static str, file: impl Into<PathBuf>, place: impl Into<String>, text: impl Into<String>) -> Self {
+    pub fn new(
+        code: &'static str,
+        file: impl Into<PathBuf>,
+        place: impl Into<String>,
+        text: impl Into<String>,
+    ) -> Self {
         Self { code, file: file.into(), place: place.into(), text: text.into(), remedy: String::new(), count: 1 }
     }
 

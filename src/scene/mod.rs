@@ -4,12 +4,14 @@
 //! the world is `f64`. Units are metres, angles radians, colours linear Rec. 709, unless a field says otherwise.
 
 pub mod camera;
+pub mod hints;
 pub mod light;
 pub mod material;
 pub mod mesh;
 pub mod texture;
 
 pub use camera::{Camera, Projection};
+pub use hints::RenderHints;
 pub use light::{Falloff, Light, LightKind};
 pub use material::{AlphaMode, Material, MetalRough, Phong, Surface, TextureRef, UvTransform};
 pub use mesh::{Instance, Mesh, Plane, Polygon, Sphere};
@@ -46,6 +48,8 @@ pub struct Scene {
     pub background: Option<Background>,
     /// Which axis of the file points up.
     pub up: UpAxis,
+    /// Render settings that a scene file asks for.
+    pub hints: RenderHints,
 }
 
 /// What secondary rays that leave the scene see, and diffuse light from afar.
