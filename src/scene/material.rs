@@ -76,6 +76,8 @@ pub struct MetalRough {
     /// Whether light bends and travels inside (a closed volume); without KHR_materials_volume glTF glass is thin: rays
     /// pass straight on.
     pub thick: bool,
+    /// How strongly `ior` depends on the wavelength: 20 / Abbe number, as KHR_materials_dispersion; 0: not at all.
+    pub dispersion: f32,
 }
 
 /// Parameters of the Phong model: `I = Ia Ka + Σ I (Kd N·L + Ks cosⁿα) + mirror + transmission`.
@@ -103,6 +105,8 @@ pub struct Phong {
     pub ior: f32,
     /// Whether Fresnel balances mirror and transmission (`illum` 5, 7).
     pub fresnel: bool,
+    /// How strongly `ior` depends on the wavelength: 20 / Abbe number, as KHR_materials_dispersion; 0: not at all.
+    pub dispersion: f32,
 }
 
 /// What opacity does.
@@ -163,6 +167,7 @@ impl Default for MetalRough {
             transmission: 0.0,
             transmission_map: None,
             thick: false,
+            dispersion: 0.0,
         }
     }
 }
@@ -180,6 +185,7 @@ impl Default for Phong {
             transmission: Vec3::ZERO,
             ior: 1.0,
             fresnel: false,
+            dispersion: 0.0,
         }
     }
 }
