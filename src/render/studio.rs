@@ -1,1 +1,324 @@
-//! (to be written)
+//! The built-in studio: what rays that leave the scene see when nobody brought an environment.
+//!
+//! A neutral room as photographers light small things: a light dome that falls off to a darker floor, a large soft box
+//! overhead in front, a strip to the left, a panel to the right and a rim light behind. Everything is a formula of
+//! constant time, smooth, and known at every blur, so that rough metals see the same room as mirrors:
+//!
+//! - [`radiance`]: the room itself, for mirrors and the background.
+//! - [`blurred`]: the mean around a mirror direction as wide as a roughness makes it.
+//! - [`diffuse`]: the cosine-weighted mean over a hemisphere, from spherical harmonics up to band 4
+//!   (Ramamoorthi, Hanrahan, *An Efficient Representation for Irradiance Environment Maps*, 2001).
+//!
+//! The room stands in a frame whose +Y is up and whose +Z is in front, where glTF models look; [`from_world`] turns
+//! directions of scenes with another up axis into it. It does not follow the camera: the default lights do.
+
+use crate::math::Vec3;
+use crate::scene::UpAxis;
+use std::sync::LazyLock;
+
+/// Turns a world direction of a scene with up axis `up` into the studio's frame.
+#[inline]
+pub fn from_world(up: UpAxis, dir: Vec3) -> Vec3 {
+    match up {
+        UpAxis::Y => dir,
+        UpAxis::Z => Vec3::new(dir.x, dir.z, -dir.y),
+    }
+}
+
+/// Linear radiance seen along the unit vector `dir` of the studio's frame.
+#[inline]
+pub fn radiance(dir: Vec3) -> Vec3 {
+    Vec3::splat(room(dir, 0.0))
+}
+
+/// Mean radiance around the unit mirror direction `dir` for a perceptual roughness of 0 (just [`radiance`]) … 1.
+#[inline]
+pub fn blurred(dir: Vec3, roughness: f32) -> Vec3 {
+    let alpha = roughness.clamp(0.0, 1.0) * roughness.clamp(0.0, 1.0);
+    let sharp = room(dir, alpha);
+    // The widest lobes reach over a hemisphere, which the boxes' flat coordinates cannot follow.
+    Vec3::splat(sharp + (mean_over_hemisphere(dir) - sharp) * (alpha * WIDEST_IS_DIFFUSE))
+}
+
+/// Cosine-weighted mean radiance over the hemisphere around the unit vector `normal`: irradiance / π.
+#[inline]
+pub fn diffuse(normal: Vec3) -> Vec3 {
+    Vec3::splat(mean_over_hemisphere(normal))
+}
+
+/// Share of the diffuse mean in the lobe of roughness 1.
+const WIDEST_IS_DIFFUSE: f32 = 0.75;
+
+/// Spread (in direction cosines) that a lobe of width `alpha` adds to every edge of the room.
+const SPREAD_PER_ALPHA: f32 = 0.9;
+
+/// Radiance of the dome overhead, at the horizon, and of the floor below.
+const ZENITH: f32 = 0.30;
+const HORIZON: f32 = 0.27;
+const NADIR: f32 = 0.10;
+
+/// Softness (in direction cosines) of the line between wall and floor.
+const FLOOR_EDGE: f32 = 0.22;
+
+/// A rectangular light, as seen from the middle of the room: flat coordinates are direction cosines along `right` and
+/// `up`, which with `toward` are perpendicular unit vectors.
+struct SoftBox {
+    toward: Vec3,
+    right: Vec3,
+    up: Vec3,
+    /// Half its sides.
+    half: (f32, f32),
+    /// Softness of its edges.
+    edge: f32,
+    /// Radiance added in its middle.
+    radiance: f32,
+}
+
+static BOXES: LazyLock<[SoftBox; 4]> = LazyLock::new(|| {
+    [
+        // Key, overhead in front; left strip; right panel; rim behind.
+        SoftBox::new(Vec3::new(-0.35, 0.80, 0.55), (0.36, 0.26), 0.05, 2.2),
+        SoftBox::new(Vec3::new(-0.95, 0.22, 0.25), (0.11, 0.42), 0.05, 1.3),
+        SoftBox::new(Vec3::new(0.93, 0.30, 0.35), (0.24, 0.34), 0.06, 0.9),
+        SoftBox::new(Vec3::new(0.40, 0.50, -0.80), (0.38, 0.16), 0.06, 1.5),
+    ]
+});
+
+impl SoftBox {
+    fn new(toward: Vec3, half: (f32, f32), edge: f32, radiance: f32) -> Self {
+        let toward = toward.normalize();
+        let right = Vec3::Y.cross(toward).normalize();
+        Self { toward, right, up: toward.cross(right), half, edge, radiance }
+    }
+
+    /// Its light along `dir`, every edge softened by `blur` more.
+    fn along(&self, dir: Vec3, blur: f32) -> f32 {
+        let edge = (self.edge * self.edge + blur * blur).sqrt();
+        let (x, y, z) = (dir.dot(self.right), dir.dot(self.up), dir.dot(self.toward));
+        // The flat coordinates see the back of the room mirrored: fade it out around the edge of sight.
+        let front = step(z, edge.max(0.1));
+        self.radiance * front * slab(x, self.half.0, edge) * slab(y, self.half.1, edge)
+    }
+}
+
+/// The room along `dir`, blurred by a lobe of width `alpha`.
+fn room(dir: Vec3, alpha: f32) -> f32 {
+    let blur = SPREAD_PER_ALPHA * alpha;
+    // Walls brighten slowly to the ceiling; the floor is darker.
+    let dome = HORIZON + (ZENITH - HORIZON) * dir.y;
+    let above = step(dir.y, (FLOOR_EDGE * FLOOR_EDGE + blur * blur).sqrt());
+    let mut sum = NADIR + (dome - NADIR) * above;
+    for light in BOXES.iter() {
+        sum += light.along(dir, blur);
+    }
+    sum
+}
+
+/// A smooth step from 0 to 1 at `x` = 0, `width` wide: x/√(1+x²), whose slow ends are like those of a rough lobe.
+fn step(x: f32, width: f32) -> f32 {
+    0.5 + 0.5 * x / (width * width + x * x).sqrt()
+}
+
+/// 1 for |x| < `half`, with smooth edges; its integral over x is 2·`half` for every width.
+fn slab(x: f32, half: f32, width: f32) -> f32 {
+    step(x + half, width) - step(x - half, width)
+}
+
+/// Number of harmonics: bands 0, 1, 2 and 4 (the cosine has no band 3).
+const HARMONICS: usize = 18;
+
+/// Projection of the room on the harmonics, times the cosine lobe's own factor for each band over π.
+static COEFFICIENTS: LazyLock<[f32; HARMONICS]> = LazyLock::new(|| {
+    // The cosine lobe's factors over π for bands 0, 1, 2, 4.
+    let lobe = |i: usize| [1.0, 2.0 / 3.0, 0.25, -1.0 / 24.0][band(i)];
+    let mut sums = [0.0f64; HARMONICS];
+    for (dir, solid_angle) in directions(96) {
+        let light = f64::from(room(dir, 0.0)) * solid_angle;
+        for (sum, harmonic) in sums.iter_mut().zip(harmonics(dir)) {
+            *sum += f64::from(harmonic) * light;
+        }
+    }
+    std::array::from_fn(|i| narrow(sums[i] * lobe(i)))
+});
+
+/// Which of the four bands harmonic `i` belongs to.
+fn band(i: usize) -> usize {
+    [1, 4, 9].iter().filter(|&&first| i >= first).count()
+}
+
+fn mean_over_hemisphere(normal: Vec3) -> f32 {
+    let mut sum = 0.0;
+    for (harmonic, coefficient) in harmonics(normal).iter().zip(COEFFICIENTS.iter()) {
+        sum += harmonic * coefficient;
+    }
+    sum.max(0.0)
+}
+
+/// Real spherical harmonics of bands 0, 1, 2 and 4 at a unit vector.
+#[expect(clippy::excessive_precision, reason = "square roots of rationals over π, as tables give them")]
+fn harmonics(d: Vec3) -> [f32; HARMONICS] {
+    let Vec3 { x, y, z } = d;
+    let (xx, yy, zz) = (x * x, y * y, z * z);
+    [
+        0.282_094_79,
+        0.488_602_51 * x,
+        0.488_602_51 * y,
+        0.488_602_51 * z,
+        1.092_548_43 * x * y,
+        1.092_548_43 * y * z,
+        1.092_548_43 * x * z,
+        0.315_391_57 * (3.0 * zz - 1.0),
+        0.546_274_22 * (xx - yy),
+        2.503_342_94 * x * y * (xx - yy),
+        1.770_130_77 * y * z * (3.0 * xx - yy),
+        0.946_174_70 * x * y * (7.0 * zz - 1.0),
+        0.669_046_54 * y * z * (7.0 * zz - 3.0),
+        0.105_785_55 * (35.0 * zz * zz - 30.0 * zz + 3.0),
+        0.669_046_54 * x * z * (7.0 * zz - 3.0),
+        0.473_087_35 * (xx - yy) * (7.0 * zz - 1.0),
+        1.770_130_77 * x * z * (xx - 3.0 * yy),
+        0.625_835_74 * (xx * (xx - 3.0 * yy) - yy * (3.0 * xx - yy)),
+    ]
+}
+
+/// The sphere cut into `rows × 2·rows` cells of nearly equal size: the middle of each and its solid angle.
+fn directions(rows: u32) -> impl Iterator<Item = (Vec3, f64)> {
+    use std::f64::consts::PI;
+    let step = PI / f64::from(rows);
+    (0..rows).flat_map(move |i| {
+        // The exact area of a ring, at the direction in its middle.
+        let (top, polar) = (step * f64::from(i), step * (f64::from(i) + 0.5));
+        let ring = libm::cos(top) - libm::cos(top + step);
+        (0..2 * rows).map(move |j| {
+            let azimuth = step * (f64::from(j) + 0.5);
+            let (sin, cos) = (libm::sin(polar), libm::cos(polar));
+            let dir = Vec3::new(narrow(sin * libm::cos(azimuth)), narrow(cos), narrow(sin * libm::sin(azimuth)));
+            (dir, ring * step)
+        })
+    })
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "pixels are f32")]
+fn narrow(x: f64) -> f32 {
+    x as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A few dozen directions spread over the sphere.
+    fn probes() -> impl Iterator<Item = Vec3> {
+        directions(6).map(|(dir, _)| dir)
+    }
+
+    /// The mean of the room under a weight of the direction.
+    fn mean(rows: u32, weight: impl Fn(Vec3) -> f64) -> f64 {
+        let (mut sum, mut total) = (0.0, 0.0);
+        for (dir, solid_angle) in directions(rows) {
+            let w = weight(dir) * solid_angle;
+            sum += w * f64::from(radiance(dir).x);
+            total += w;
+        }
+        sum / total
+    }
+
+    #[test]
+    fn the_harmonics_are_orthonormal() {
+        let mut products = [[0.0f64; HARMONICS]; HARMONICS];
+        for (dir, solid_angle) in directions(64) {
+            let h = harmonics(dir);
+            for i in 0..HARMONICS {
+                for j in 0..HARMONICS {
+                    products[i][j] += f64::from(h[i]) * f64::from(h[j]) * solid_angle;
+                }
+            }
+        }
+        for (i, row) in products.iter().enumerate() {
+            for (j, product) in row.iter().enumerate() {
+                assert!((product - f64::from(u8::from(i == j))).abs() < 1e-2, "{i} {j}: {product}");
+            }
+        }
+    }
+
+    #[test]
+    fn diffuse_is_the_cosine_weighted_mean_of_the_room() {
+        let mut sum = 0.0;
+        for normal in probes() {
+            let integral = mean(128, |dir| f64::from(dir.dot(normal)).max(0.0));
+            let formula = f64::from(diffuse(normal).x);
+            let error = (formula / integral - 1.0).abs();
+            assert!(error < 0.03, "{normal}: {formula} for {integral}");
+            sum += error / 72.0;
+        }
+        assert!(sum < 0.01, "off by {sum} on average");
+    }
+
+    /// The lobe that image-based lighting filters with: GGX seen along its own normal, weighted by the cosine.
+    fn lobe(mirror: Vec3, roughness: f32) -> impl Fn(Vec3) -> f64 {
+        let alpha2 = f64::from(roughness).powi(4);
+        move |dir| {
+            let cos = f64::from(dir.dot(mirror)).max(0.0);
+            let cos2_half = 0.5 * (1.0 + cos);
+            let d = cos2_half * (alpha2 - 1.0) + 1.0;
+            alpha2 / (d * d) * cos
+        }
+    }
+
+    #[test]
+    fn a_blurred_room_is_near_the_mean_over_a_rough_lobe() {
+        for roughness in [0.3, 0.5, 0.7, 1.0] {
+            let (mut worst, mut sum) = (0.0f64, 0.0);
+            for mirror in probes() {
+                let integral = mean(96, lobe(mirror, roughness));
+                let error = (f64::from(blurred(mirror, roughness).x) / integral - 1.0).abs();
+                worst = worst.max(error);
+                sum += error / 72.0;
+            }
+            assert!(worst < 0.35 && sum < 0.10, "roughness {roughness}: off by {sum} on average, {worst} at worst");
+        }
+    }
+
+    #[test]
+    fn no_roughness_is_no_blur() {
+        for dir in probes() {
+            assert_eq!(blurred(dir, 0.0), radiance(dir));
+        }
+    }
+
+    #[test]
+    fn blurring_keeps_the_room_as_bright_as_it_is() {
+        let whole = mean(64, |_| 1.0);
+        for roughness in [0.2, 0.4, 0.6, 0.8, 1.0] {
+            let blurred: f64 = directions(64).map(|(d, a)| f64::from(blurred(d, roughness).x) * a).sum();
+            let ratio = blurred / (4.0 * std::f64::consts::PI) / whole;
+            assert!((ratio - 1.0).abs() < 0.08, "roughness {roughness}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn the_room_is_never_black_and_a_mirror_sees_contrast_in_it() {
+        let (mut lo, mut hi) = (f32::INFINITY, 0.0f32);
+        for (dir, _) in directions(48) {
+            let value = radiance(dir).x;
+            (lo, hi) = (lo.min(value), hi.max(value));
+        }
+        assert!(lo > 0.05 && hi / lo > 10.0 && hi < 4.0, "{lo} … {hi}");
+    }
+
+    #[test]
+    fn white_paint_stays_below_white_in_the_room_alone() {
+        for normal in probes() {
+            let value = diffuse(normal).x;
+            assert!((0.1..0.6).contains(&value), "{normal}: {value}");
+        }
+    }
+
+    #[test]
+    fn up_is_bright_whichever_axis_is_up() {
+        assert_eq!(from_world(UpAxis::Z, Vec3::Z), Vec3::Y);
+        // A Z-up model looks along −y; the studio's front is +z.
+        assert_eq!(from_world(UpAxis::Z, Vec3::NEG_Y), Vec3::Z);
+        assert!(diffuse(Vec3::Y).x > 2.0 * diffuse(Vec3::NEG_Y).x);
+    }
+}

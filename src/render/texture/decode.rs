@@ -1,0 +1,86 @@
+//! Stored texels -> linear numbers.
+//!
+//! The sRGB curve of IEC 61966-2-1, tabulated once for every stored value, so that a lookup is exact and costs no power.
+
+use super::ColorSpace;
+use crate::math::Vec4;
+use crate::scene::{Bitmap, Pixels};
+use std::sync::LazyLock;
+
+/// Linear value of each 8-bit sRGB value.
+static SRGB8: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| linear_from_srgb(i as f64 / 255.0)));
+
+/// Each 8-bit value divided by 255.
+static UNIT8: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| narrow(i as f64 / 255.0)));
+
+/// Linear value of each 16-bit sRGB value; made when the first such bitmap is read.
+static SRGB16: LazyLock<Vec<f32>> =
+    LazyLock::new(|| (0..=u16::MAX).map(|i| linear_from_srgb(f64::from(i) / 65535.0)).collect());
+
+/// The curve for one channel, 0…1 to 0…1.
+fn linear_from_srgb(s: f64) -> f32 {
+    narrow(if s <= 0.04045 { s / 12.92 } else { libm::pow((s + 0.055) / 1.055, 2.4) })
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "texels are f32")]
+fn narrow(x: f64) -> f32 {
+    x as f32
+}
+
+/// Linear RGBA of texel `index` (row by row) of `bitmap`; opaque white where there is none. Alpha is never curved.
+#[inline]
+pub(super) fn texel(bitmap: &Bitmap, space: ColorSpace, index: usize) -> Vec4 {
+    match &bitmap.pixels {
+        Pixels::Rgba8(texels) => texels.get(index).map_or(Vec4::ONE, |&texel| decode8(texel, space)),
+        Pixels::Rgba16(texels) => texels.get(index).map_or(Vec4::ONE, |&texel| decode16(texel, space)),
+    }
+}
+
+#[inline]
+fn decode8([r, g, b, a]: [u8; 4], space: ColorSpace) -> Vec4 {
+    let color = if space == ColorSpace::Srgb { &*SRGB8 } else { &*UNIT8 };
+    let color = |c: u8| color[usize::from(c)];
+    Vec4::new(color(r), color(g), color(b), UNIT8[usize::from(a)])
+}
+
+#[inline]
+fn decode16([r, g, b, a]: [u16; 4], space: ColorSpace) -> Vec4 {
+    let unit = |c: u16| f32::from(c) / 65535.0;
+    match space {
+        ColorSpace::Linear => Vec4::new(unit(r), unit(g), unit(b), unit(a)),
+        ColorSpace::Srgb => {
+            let color = |c: u16| SRGB16[usize::from(c)];
+            Vec4::new(color(r), color(g), color(b), unit(a))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_curve_meets_its_published_values() {
+        assert_eq!((SRGB8[0], SRGB8[255]), (0.0, 1.0));
+        // The middle grey of the standard, and both sides of the joint between line and power.
+        assert!((SRGB8[188] - 0.502_886).abs() < 1e-6);
+        assert!((SRGB8[10] - 0.003_035_27).abs() < 1e-8 && (SRGB8[11] - 0.003_346_536).abs() < 1e-8);
+    }
+
+    #[test]
+    fn eight_and_sixteen_bits_of_one_colour_decode_alike() {
+        for i in 0..=255u8 {
+            let wide = u16::from(i) * 257;
+            for space in [ColorSpace::Srgb, ColorSpace::Linear] {
+                let (a, b) = (decode8([i, i, i, i], space), decode16([wide; 4], space));
+                assert!((a - b).abs().max_element() < 1e-7, "{i} {space:?}: {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn alpha_is_linear_in_both_spaces() {
+        assert_eq!(decode8([0, 0, 0, 51], ColorSpace::Srgb).w, 0.2);
+        assert_eq!(decode8([0, 0, 0, 51], ColorSpace::Linear).w, 0.2);
+    }
+}

@@ -1,0 +1,215 @@
+//! Looking up textures: wrap, filter, and the right sharpness for the size of a pixel.
+//!
+//! Bitmaps stay as they were stored; texels are decoded when read ([`decode`]), and smaller copies exist only once a lookup
+//! needs them ([`pyramid`]). A footprint longer than wide is covered by several probes along its longer axis, the way of
+//! EXT_texture_filter_anisotropic (after McCormack, Perry, Farkas, Jouppi, *Feline*, 1999).
+//!
+//! Every lookup is a pure function of the scene and its arguments: no state, no order, the same bits on every thread.
+
+mod decode;
+mod pyramid;
+
+use crate::math::{Vec2, Vec4};
+use crate::scene::{Bitmap, Filter, Mipmaps, Pixels, Sampler, Scene, Texture, Wrap};
+use pyramid::Pyramid;
+
+/// What the numbers of a bitmap mean; the slot that reads it decides.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ColorSpace {
+    /// Colours: red, green and blue follow the sRGB curve, alpha is linear and weights them in smaller copies.
+    Srgb,
+    /// Data: four independent linear channels.
+    Linear,
+}
+
+/// At most this many probes cover a long footprint.
+const MAX_PROBES: f32 = 8.0;
+
+/// All textures of a scene, ready to be read.
+#[derive(Debug)]
+pub struct TextureStore<'a> {
+    textures: &'a [Texture],
+    bitmaps: Vec<Source<'a>>,
+}
+
+/// A bitmap and its smaller copies in both colour spaces.
+#[derive(Debug)]
+struct Source<'a> {
+    bitmap: &'a Bitmap,
+    srgb: Pyramid,
+    linear: Pyramid,
+}
+
+impl<'a> TextureStore<'a> {
+    /// Makes the scene's textures readable; copies and computes nothing.
+    pub fn new(scene: &'a Scene) -> Self {
+        let source = |bitmap| Source { bitmap, srgb: Pyramid::new(bitmap), linear: Pyramid::new(bitmap) };
+        Self { textures: &scene.textures, bitmaps: scene.bitmaps.iter().map(source).collect() }
+    }
+
+    /// Columns and rows of a texture's bitmap; (1, 1) for a texture that does not exist.
+    pub fn size(&self, texture: u32) -> Vec2 {
+        self.find(texture).map_or(Vec2::ONE, |(_, source)| pixels(size_of(source.bitmap)))
+    }
+
+    /// Linear RGBA (straight alpha) of `texture` around `uv`.
+    ///
+    /// `duvdx` and `duvdy` span the footprint: how `uv` changes from this sample to the next along two directions; zero
+    /// gives the magnification filter. A texture that does not exist or is empty is opaque white. Values that are not
+    /// finite are safe: such a `uv` counts as 0, such a footprint as unbounded.
+    pub fn sample(&self, texture: u32, space: ColorSpace, uv: Vec2, duvdx: Vec2, duvdy: Vec2) -> Vec4 {
+        let Some((sampler, source)) = self.find(texture) else { return Vec4::ONE };
+        let pyramid = if space == ColorSpace::Srgb { &source.srgb } else { &source.linear };
+        let lookup = Lookup { bitmap: source.bitmap, pyramid, space, sampler };
+        lookup.filtered(uv, duvdx, duvdy)
+    }
+
+    fn find(&self, texture: u32) -> Option<(Sampler, &Source<'a>)> {
+        let texture = self.textures.get(texture as usize)?;
+        let source = self.bitmaps.get(texture.bitmap as usize)?;
+        is_whole(source.bitmap).then_some((texture.sampler, source))
+    }
+}
+
+/// Whether there is anything to read, and as much as width and height promise.
+fn is_whole(bitmap: &Bitmap) -> bool {
+    let texels = match &bitmap.pixels {
+        Pixels::Rgba8(texels) => texels.len(),
+        Pixels::Rgba16(texels) => texels.len(),
+    };
+    texels > 0 && texels as u64 == u64::from(bitmap.width) * u64::from(bitmap.height)
+}
+
+fn size_of(bitmap: &Bitmap) -> (usize, usize) {
+    pyramid::size(bitmap, 0)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "bitmaps have far fewer than 2^24 columns or rows")]
+fn pixels((width, height): (usize, usize)) -> Vec2 {
+    Vec2::new(width as f32, height as f32)
+}
+
+/// One bitmap, read in one way.
+#[derive(Clone, Copy)]
+struct Lookup<'a> {
+    bitmap: &'a Bitmap,
+    pyramid: &'a Pyramid,
+    space: ColorSpace,
+    sampler: Sampler,
+}
+
+impl Lookup<'_> {
+    /// The mean over a footprint.
+    fn filtered(&self, uv: Vec2, duvdx: Vec2, duvdy: Vec2) -> Vec4 {
+        // The footprint's axes in texels.
+        let texels = pixels(size_of(self.bitmap));
+        let (dx, dy) = ((duvdx * texels).length(), (duvdy * texels).length());
+        let (major, minor, axis) = if dx >= dy { (dx, dy, duvdx) } else { (dy, dx, duvdy) };
+        if major <= 1.0 {
+            return self.level(uv, 0, self.sampler.magnify);
+        }
+        if !(major.is_finite() && minor.is_finite()) {
+            return self.at_sharpness(uv, f32::INFINITY);
+        }
+
+        // As many probes as the footprint is longer than wide; files that ask for nearest texels get one.
+        let probes = match self.sampler.minify {
+            Filter::Nearest => 1.0,
+            Filter::Linear => (major / minor.max(1.0)).ceil().clamp(1.0, MAX_PROBES),
+        };
+        let lod = libm::log2f(major / probes);
+        let mut sum = Vec4::ZERO;
+        let mut k = 0.5;
+        while k < probes {
+            sum += self.at_sharpness(uv + axis * (k / probes - 0.5), lod);
+            k += 1.0;
+        }
+        sum / probes
+    }
+
+    /// A lookup where a probe covers 2^`lod` texels.
+    fn at_sharpness(&self, uv: Vec2, lod: f32) -> Vec4 {
+        let Sampler { magnify, minify, mipmaps, .. } = self.sampler;
+        if lod <= 0.0 {
+            return self.level(uv, 0, magnify);
+        }
+        let top = self.pyramid.top();
+        match mipmaps {
+            Mipmaps::None => self.level(uv, 0, minify),
+            Mipmaps::Nearest => self.level(uv, whole(lod + 0.5).min(top), minify),
+            Mipmaps::Linear => {
+                let lower = whole(lod);
+                if lower >= top {
+                    return self.level(uv, top, minify);
+                }
+                let (a, b) = (self.level(uv, lower, minify), self.level(uv, lower + 1, minify));
+                a + (b - a) * (lod - lod.floor())
+            }
+        }
+    }
+
+    /// A lookup in one level.
+    fn level(&self, uv: Vec2, level: usize, filter: Filter) -> Vec4 {
+        let (width, height) = pyramid::size(self.bitmap, level);
+        let x = Axis::new(uv.x, width, self.sampler.wrap_u, filter);
+        let y = Axis::new(uv.y, height, self.sampler.wrap_v, filter);
+        let texel = |x, y| self.pyramid.texel(self.bitmap, self.space, level, x, y);
+        if filter == Filter::Nearest {
+            return texel(x.near, y.near);
+        }
+        let upper = texel(x.near, y.near) * (1.0 - x.share) + texel(x.far, y.near) * x.share;
+        let lower = texel(x.near, y.far) * (1.0 - x.share) + texel(x.far, y.far) * x.share;
+        upper * (1.0 - y.share) + lower * y.share
+    }
+}
+
+/// The two texels next to a coordinate along one axis, and the share of the second.
+struct Axis {
+    near: usize,
+    far: usize,
+    share: f32,
+}
+
+impl Axis {
+    /// Coordinate `c` (0…1 over `len` texels, centres at halves) with its wrap; 0 stands in for one that is not finite.
+    fn new(c: f32, len: usize, wrap: Wrap, filter: Filter) -> Self {
+        let c = if c.is_finite() { c } else { 0.0 };
+        let period = match wrap {
+            Wrap::Repeat => c - c.floor(),
+            Wrap::Mirror => c - 2.0 * (c * 0.5).floor(),
+            Wrap::Clamp => c.clamp(0.0, 1.0),
+        };
+        let half = if filter == Filter::Linear { 0.5 } else { 0.0 };
+        let place = period * pixels((len, 0)).x - half;
+        let below = place.floor();
+        let near = signed(below);
+        Self { near: wrapped(near, len, wrap), far: wrapped(near + 1, len, wrap), share: place - below }
+    }
+}
+
+/// The texel that stands at place `i` of a row that goes on for ever.
+fn wrapped(i: i64, len: usize, wrap: Wrap) -> usize {
+    let last = i64::try_from(len).unwrap_or(i64::MAX) - 1;
+    let inside = match wrap {
+        Wrap::Repeat => i.rem_euclid(last + 1),
+        Wrap::Mirror => {
+            let back_and_forth = i.rem_euclid(2 * (last + 1));
+            back_and_forth.min(2 * last + 1 - back_and_forth)
+        }
+        Wrap::Clamp => i.clamp(0, last),
+    };
+    usize::try_from(inside).unwrap_or(0)
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "the cast saturates, which is what a huge level or place needs")]
+fn signed(x: f32) -> i64 {
+    x as i64
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "x is not negative; the cast saturates")]
+fn whole(x: f32) -> usize {
+    x as usize
+}
+
+#[cfg(test)]
+mod tests;

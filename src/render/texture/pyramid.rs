@@ -1,0 +1,192 @@
+//! Ever smaller copies of a bitmap (Williams, *Pyramidal Parametrics*, 1983), each made when a lookup first needs it.
+//!
+//! Each level is half the one before, rounded down, and each of its texels is the mean over exactly the area it covers:
+//! where a side is odd, texels that straddle a border count with the fraction that lies inside. Means are taken of linear
+//! values. Colours (sRGB slots) are weighted by alpha, so that what hides under transparent texels does not bleed out.
+
+use super::{ColorSpace, decode};
+use crate::math::Vec4;
+use crate::scene::Bitmap;
+use std::sync::OnceLock;
+
+/// The levels above a bitmap, for one colour space. Level 0 is the bitmap itself and not stored here.
+#[derive(Debug)]
+pub(super) struct Pyramid {
+    above: Vec<OnceLock<Level>>,
+}
+
+/// One smaller copy: linear RGBA, straight alpha, 16 bits a channel.
+///
+/// A step of 1/65535 is a twentieth of the darkest step of an 8-bit sRGB file.
+#[derive(Debug)]
+struct Level {
+    width: usize,
+    texels: Vec<[u16; 4]>,
+}
+
+impl Pyramid {
+    /// A pyramid with nothing made yet.
+    pub(super) fn new(bitmap: &Bitmap) -> Self {
+        let longest = bitmap.width.max(bitmap.height).max(1);
+        Self { above: (0..longest.ilog2()).map(|_| OnceLock::new()).collect() }
+    }
+
+    /// The highest level, a single texel; 0 for a bitmap of one texel.
+    pub(super) fn top(&self) -> usize {
+        self.above.len()
+    }
+
+    /// Texel (`x`, `y`) of `level`, made if it is not there; both must lie inside [`size`].
+    #[inline]
+    pub(super) fn texel(&self, bitmap: &Bitmap, space: ColorSpace, level: usize, x: usize, y: usize) -> Vec4 {
+        if level == 0 {
+            return decode::texel(bitmap, space, y * bitmap.width as usize + x);
+        }
+        self.level(bitmap, space, level).texel(x, y)
+    }
+
+    /// Level `level` > 0. It depends on the bitmap alone, so it does not matter which thread makes it.
+    fn level(&self, bitmap: &Bitmap, space: ColorSpace, level: usize) -> &Level {
+        self.above[level - 1].get_or_init(|| {
+            let from = size(bitmap, level - 1);
+            let to = size(bitmap, level);
+            if level == 1 {
+                halve(from, to, space, |x, y| decode::texel(bitmap, space, y * from.0 + x))
+            } else {
+                let below = self.level(bitmap, space, level - 1);
+                halve(from, to, space, |x, y| below.texel(x, y))
+            }
+        })
+    }
+}
+
+/// Columns and rows of a level.
+#[inline]
+pub(super) fn size(bitmap: &Bitmap, level: usize) -> (usize, usize) {
+    ((bitmap.width as usize >> level).max(1), (bitmap.height as usize >> level).max(1))
+}
+
+impl Level {
+    #[inline]
+    fn texel(&self, x: usize, y: usize) -> Vec4 {
+        let texel = self.texels[y * self.width + x].map(|c| f32::from(c) / 65535.0);
+        Vec4::from_array(texel)
+    }
+}
+
+/// The next smaller copy of a picture of size `from`.
+fn halve(from: (usize, usize), to: (usize, usize), space: ColorSpace, texel: impl Fn(usize, usize) -> Vec4) -> Level {
+    let columns: Vec<Span> = (0..to.0).map(|x| Span::new(x, from.0, to.0)).collect();
+    let mut texels = Vec::with_capacity(to.0 * to.1);
+    for y in 0..to.1 {
+        let rows = Span::new(y, from.1, to.1);
+        for columns in &columns {
+            texels.push(quantized(mean(columns, &rows, space, &texel)));
+        }
+    }
+    Level { width: to.0, texels }
+}
+
+/// Which texels of the finer level one texel covers along one axis, and the share of each.
+struct Span {
+    first: usize,
+    count: usize,
+    shares: [f32; 3],
+}
+
+impl Span {
+    /// Texel `i` of `to` covers `i·from/to … (i+1)·from/to`, at most three texels as `from/to` is at most 3.
+    #[expect(clippy::cast_precision_loss, reason = "texel counts are far below 2^24")]
+    fn new(i: usize, from: usize, to: usize) -> Self {
+        let (start, end) = (i * from, (i + 1) * from);
+        let first = start / to;
+        let count = end.div_ceil(to) - first;
+        let mut shares = [0.0; 3];
+        for (k, share) in shares.iter_mut().enumerate().take(count) {
+            let covered = end.min((first + k + 1) * to) - start.max((first + k) * to);
+            *share = covered as f32 / from as f32;
+        }
+        Self { first, count, shares }
+    }
+}
+
+/// The mean of a block of texels.
+fn mean(columns: &Span, rows: &Span, space: ColorSpace, texel: &impl Fn(usize, usize) -> Vec4) -> Vec4 {
+    let (mut plain, mut weighted) = (Vec4::ZERO, Vec4::ZERO);
+    for (j, row_share) in rows.shares.iter().enumerate().take(rows.count) {
+        for (i, column_share) in columns.shares.iter().enumerate().take(columns.count) {
+            let value = texel(columns.first + i, rows.first + j) * (row_share * column_share);
+            let alpha = value.w / (row_share * column_share);
+            plain += value;
+            weighted += value * alpha;
+        }
+    }
+    // Where everything is clear there is no weight to go by, and where everything is solid the two means are one.
+    if space == ColorSpace::Linear || plain.w <= 0.0 || plain.w >= 1.0 {
+        return plain;
+    }
+    (weighted / plain.w).truncate().extend(plain.w)
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0…65535")]
+fn quantized(v: Vec4) -> [u16; 4] {
+    v.to_array().map(|c| (c.clamp(0.0, 1.0) * 65535.0 + 0.5) as u16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Pixels;
+
+    fn bitmap(width: u32, height: u32, texel: impl Fn(u32, u32) -> [u8; 4]) -> Bitmap {
+        let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| texel(x, y)).collect();
+        Bitmap { name: String::new(), width, height, pixels: Pixels::Rgba8(texels) }
+    }
+
+    fn top_of(bitmap: &Bitmap, space: ColorSpace) -> Vec4 {
+        let pyramid = Pyramid::new(bitmap);
+        pyramid.texel(bitmap, space, pyramid.top(), 0, 0)
+    }
+
+    #[test]
+    fn the_top_is_the_mean_of_the_whole_picture_whatever_its_sides() {
+        for (width, height) in [(1, 1), (2, 2), (3, 3), (5, 7), (13, 1), (1, 6), (16, 9), (31, 33)] {
+            let picture = bitmap(width, height, |x, y| [(x * 7 + y * 31) as u8, (x * y) as u8, 200, 255]);
+            let Pixels::Rgba8(texels) = &picture.pixels else { unreachable!() };
+            let sum = |c: usize| texels.iter().map(|t| f64::from(t[c]) / 255.0).sum::<f64>() / texels.len() as f64;
+            let top = top_of(&picture, ColorSpace::Linear);
+            for c in 0..4 {
+                let error = (f64::from(top[c]) - sum(c)).abs();
+                assert!(error < 6.0 / 65535.0, "{width}x{height} channel {c}: off by {error}");
+            }
+        }
+    }
+
+    #[test]
+    fn colours_are_averaged_as_light_not_as_stored_numbers() {
+        let checker = bitmap(8, 8, |x, y| [if (x + y) % 2 == 0 { 255 } else { 0 }, 0, 0, 255]);
+        assert!((top_of(&checker, ColorSpace::Srgb).x - 0.5).abs() < 1e-4);
+    }
+
+    #[test]
+    fn clear_texels_do_not_stain_their_neighbours() {
+        // Red leaves cut out of clear black.
+        let leaves = bitmap(4, 4, |x, _| if x % 2 == 0 { [255, 0, 0, 255] } else { [0, 0, 0, 0] });
+        let top = top_of(&leaves, ColorSpace::Srgb);
+        assert!((top - Vec4::new(1.0, 0.0, 0.0, 0.5)).abs().max_element() < 1e-4, "{top}");
+        // In a linear slot the channels have nothing to do with each other.
+        assert!((top_of(&leaves, ColorSpace::Linear).x - 0.5).abs() < 1e-4);
+    }
+
+    #[test]
+    fn shares_of_a_texel_add_up_to_one() {
+        for from in 1..40 {
+            let to = (from / 2).max(1);
+            let spans: Vec<_> = (0..to).map(|i| Span::new(i, from, to)).collect();
+            for span in &spans {
+                assert!((span.shares.iter().sum::<f32>() - 1.0).abs() < 1e-6);
+                assert!((1..=3).contains(&span.count) && span.first + span.count <= from);
+            }
+        }
+    }
+}

@@ -1,0 +1,176 @@
+use super::*;
+use crate::scene::{Bitmap, Texture};
+use proptest::prelude::*;
+
+/// A scene with one bitmap and one texture on it.
+fn scene(width: u32, height: u32, sampler: Sampler, texel: impl Fn(u32, u32) -> [u8; 4]) -> Scene {
+    let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| texel(x, y)).collect();
+    let bitmap = Bitmap { name: String::new(), width, height, pixels: Pixels::Rgba8(texels) };
+    Scene { textures: vec![Texture { bitmap: 0, sampler }], bitmaps: vec![bitmap], ..Scene::default() }
+}
+
+fn grey(value: u8) -> [u8; 4] {
+    [value, value, value, 255]
+}
+
+fn look(scene: &Scene, u: f32, v: f32, footprint: f32) -> f32 {
+    let (dx, dy) = (Vec2::new(footprint, 0.0), Vec2::new(0.0, footprint));
+    TextureStore::new(scene).sample(0, ColorSpace::Linear, Vec2::new(u, v), dx, dy).x
+}
+
+fn close(a: f32, b: f32) -> bool {
+    (a - b).abs() < 1e-4
+}
+
+#[test]
+fn a_texel_shows_its_own_value_at_its_centre() {
+    let scene = scene(4, 2, Sampler::default(), |x, y| grey((x * 10 + y * 100) as u8));
+    for (x, y) in [(0, 0), (3, 0), (1, 1)] {
+        let (u, v) = ((x as f32 + 0.5) / 4.0, (y as f32 + 0.5) / 2.0);
+        assert!(close(look(&scene, u, v, 0.0) * 255.0, (x * 10 + y * 100) as f32));
+    }
+}
+
+#[test]
+fn linear_is_halfway_between_two_centres_and_nearest_jumps_there() {
+    let ramp = |x: u32, _: u32| grey(if x == 0 { 0 } else { 255 });
+    let linear = scene(2, 1, Sampler { wrap_u: Wrap::Clamp, ..Sampler::default() }, ramp);
+    assert!(close(look(&linear, 0.5, 0.5, 0.0), 0.5));
+    let nearest = scene(2, 1, Sampler { magnify: Filter::Nearest, ..Sampler::default() }, ramp);
+    assert_eq!((look(&nearest, 0.499, 0.5, 0.0), look(&nearest, 0.501, 0.5, 0.0)), (0.0, 1.0));
+}
+
+#[test]
+fn beyond_the_border_each_wrap_shows_what_it_promises() {
+    // Texels 0, 100, 200; where each wrap lands one and a half texels beyond each border.
+    let expected = [(Wrap::Repeat, [100.0, 100.0]), (Wrap::Mirror, [100.0, 100.0]), (Wrap::Clamp, [0.0, 200.0])];
+    for (wrap, [left, right]) in expected {
+        let sampler = Sampler { wrap_u: wrap, magnify: Filter::Nearest, ..Sampler::default() };
+        let scene = scene(3, 1, sampler, |x, _| grey((x * 100) as u8));
+        let at = |texels: f32| look(&scene, texels / 3.0, 0.5, 0.0) * 255.0;
+        assert!(close(at(-1.5), left) && close(at(4.5), right), "{wrap:?}: {} {}", at(-1.5), at(4.5));
+    }
+    // Just outside the left border: repeat sees the last texel, mirror and clamp the first.
+    for (wrap, value) in [(Wrap::Repeat, 200.0), (Wrap::Mirror, 0.0), (Wrap::Clamp, 0.0)] {
+        let sampler = Sampler { wrap_u: wrap, magnify: Filter::Nearest, ..Sampler::default() };
+        let scene = scene(3, 1, sampler, |x, _| grey((x * 100) as u8));
+        assert!(close(look(&scene, -0.1, 0.5, 0.0) * 255.0, value), "{wrap:?}");
+    }
+}
+
+#[test]
+fn a_seam_blends_across_a_repeating_border_and_not_across_a_clamped_one() {
+    let ends = |x: u32, _: u32| grey(if x == 0 { 255 } else { 0 });
+    let at_border = |wrap| look(&scene(4, 1, Sampler { wrap_u: wrap, ..Sampler::default() }, ends), 0.0, 0.5, 0.0);
+    assert!(close(at_border(Wrap::Repeat), 0.5));
+    assert!(close(at_border(Wrap::Clamp), 1.0) && close(at_border(Wrap::Mirror), 1.0));
+}
+
+#[test]
+fn a_large_footprint_sees_the_mean_and_none_asks_for_no_mean() {
+    let checker = |x: u32, y: u32| grey(if (x + y).is_multiple_of(2) { 255 } else { 0 });
+    let mipmapped = scene(16, 16, Sampler::default(), checker);
+    for footprint in [0.25, 1.0, 40.0, f32::INFINITY, f32::NAN] {
+        assert!(close(look(&mipmapped, 0.3, 0.7, footprint), 0.5), "{footprint}");
+    }
+    let sampler = Sampler { minify: Filter::Nearest, mipmaps: Mipmaps::None, ..Sampler::default() };
+    let sharp = look(&scene(16, 16, sampler, checker), 0.3, 0.7, 0.25);
+    assert!(sharp == 0.0 || sharp == 1.0);
+}
+
+#[test]
+fn nearest_mipmap_takes_one_whole_level() {
+    // Level 0 of columns 0 and 255 alternating is sharp, level 1 is their mean, and nothing lies between.
+    let sampler = Sampler { mipmaps: Mipmaps::Nearest, minify: Filter::Nearest, ..Sampler::default() };
+    let columns = scene(8, 8, sampler, |x, _| grey(if x % 2 == 0 { 255 } else { 0 }));
+    assert_eq!(look(&columns, 1.2 / 8.0, 0.5, 1.3 / 8.0), 0.0);
+    assert!(close(look(&columns, 1.2 / 8.0, 0.5, 1.5 / 8.0), 0.5));
+}
+
+#[test]
+fn a_long_footprint_stays_sharp_across_its_short_axis() {
+    // Rows alternate; the footprint is 8 texels long along the rows and less than one across them.
+    let rows = scene(64, 64, Sampler::default(), |_, y| grey(if y % 2 == 0 { 255 } else { 0 }));
+    let store = TextureStore::new(&rows);
+    let centre = Vec2::new(0.5, 10.5 / 64.0);
+    let (along, across) = (Vec2::new(8.0 / 64.0, 0.0), Vec2::new(0.0, 0.5 / 64.0));
+    assert!(close(store.sample(0, ColorSpace::Linear, centre, along, across).x, 1.0));
+    assert!(close(store.sample(0, ColorSpace::Linear, centre, across, along).x, 1.0));
+    // The same footprint turned covers as many bright rows as dark ones.
+    let turned = store.sample(0, ColorSpace::Linear, centre, Vec2::new(0.0, 8.0 / 64.0), Vec2::new(0.5 / 64.0, 0.0));
+    assert!((turned.x - 0.5).abs() < 0.05, "{turned}");
+}
+
+#[test]
+fn what_is_missing_is_white() {
+    let empty = Scene {
+        textures: vec![
+            Texture { bitmap: 0, sampler: Sampler::default() },
+            Texture { bitmap: 7, sampler: Sampler::default() },
+        ],
+        bitmaps: vec![Bitmap { width: 4, height: 4, ..Bitmap::default() }],
+        ..Scene::default()
+    };
+    let store = TextureStore::new(&empty);
+    for texture in [0, 1, 9] {
+        assert_eq!(store.sample(texture, ColorSpace::Srgb, Vec2::ZERO, Vec2::X, Vec2::Y), Vec4::ONE);
+        assert_eq!(store.size(texture), Vec2::ONE);
+    }
+}
+
+#[test]
+fn all_threads_read_the_same_bits() {
+    let scene = scene(33, 17, Sampler::default(), |x, y| [(x * 7) as u8, (y * 13) as u8, (x * y) as u8, (x + y) as u8]);
+    let read = |store: &TextureStore| -> Vec<[u32; 4]> {
+        let at = |i: u32| {
+            let t = i as f32 * 0.37;
+            let (dx, dy) = (Vec2::new(t * 0.01, 0.001 * t), Vec2::new(0.0, 0.02));
+            store.sample(0, ColorSpace::Srgb, Vec2::new(t, 1.7 * t), dx, dy).to_array().map(f32::to_bits)
+        };
+        (0..200).map(at).collect()
+    };
+    let alone = read(&TextureStore::new(&scene));
+    let shared = TextureStore::new(&scene);
+    std::thread::scope(|threads| {
+        let workers: Vec<_> = (0..4).map(|_| threads.spawn(|| read(&shared))).collect();
+        for worker in workers {
+            assert_eq!(worker.join().ok().as_ref(), Some(&alone));
+        }
+    });
+}
+
+fn any_float() -> impl Strategy<Value = f32> {
+    prop_oneof![
+        -3.0f32..3.0,
+        any::<f32>(),
+        Just(f32::NAN),
+        Just(f32::INFINITY),
+        Just(f32::MAX),
+        Just(-f32::MAX),
+        Just(-0.0f32),
+        Just(1.0f32)
+    ]
+}
+
+proptest! {
+    #[test]
+    fn every_lookup_lies_between_the_darkest_and_the_brightest_texel(
+        (width, height) in (1u32..9, 1u32..9),
+        (wraps, filters) in (0usize..9, 0usize..12),
+        (u, v, a, b, c, d) in (any_float(), any_float(), any_float(), any_float(), any_float(), any_float()),
+    ) {
+        let wrap = [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp];
+        let filter = [Filter::Linear, Filter::Nearest];
+        let sampler = Sampler {
+            wrap_u: wrap[wraps % 3],
+            wrap_v: wrap[wraps / 3],
+            magnify: filter[filters % 2],
+            minify: filter[filters / 2 % 2],
+            mipmaps: [Mipmaps::None, Mipmaps::Nearest, Mipmaps::Linear][filters / 4],
+        };
+        let scene = scene(width, height, sampler, |x, y| grey(50 + ((x * 5 + y * 11) % 100) as u8));
+        let store = TextureStore::new(&scene);
+        let color = store.sample(0, ColorSpace::Linear, Vec2::new(u, v), Vec2::new(a, b), Vec2::new(c, d));
+        prop_assert!(color.x >= 50.0 / 255.0 - 1e-4 && color.x <= 150.0 / 255.0 + 1e-4, "{color}");
+    }
+}
