@@ -70,7 +70,7 @@ pub enum LoadError {
     #[error("{what}: {source}")]
     Read {
         /// What was being read.
-        what: Diagnostic,
+        what: Box<Diagnostic>,
         /// What the system said.
         source: std::io::Error,
     },

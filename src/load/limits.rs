@@ -16,3 +16,55 @@ impl Default for Limits {
         Self { memory: 8 << 30, file: 4 << 30, image_pixels: 1 << 28 }
     }
 }
+
+/// Memory that may still be taken.
+///
+/// Loaders ask before they allocate anything whose size a file decides; a file of a few bytes cannot make them
+/// allocate gigabytes beyond the limit.
+#[derive(Clone, Copy, Debug)]
+pub struct Budget {
+    total: u64,
+    left: u64,
+}
+
+/// The request that did not fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{asked} bytes are needed where {left} of {total} are left")]
+pub struct OverBudget {
+    /// Bytes asked for.
+    pub asked: u64,
+    /// Bytes that were left.
+    pub left: u64,
+    /// The whole budget.
+    pub total: u64,
+}
+
+impl Budget {
+    /// A budget of [`Limits::memory`] bytes.
+    pub fn new(limits: &Limits) -> Self {
+        Self { total: limits.memory, left: limits.memory }
+    }
+
+    /// Takes `count` elements of `size` bytes, or says why not.
+    pub fn take(&mut self, count: u64, size: u64) -> Result<(), OverBudget> {
+        let asked = count.saturating_mul(size);
+        let over = OverBudget { asked, left: self.left, total: self.total };
+        self.left = self.left.checked_sub(asked).ok_or(over)?;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_budget_is_spent_once_and_never_overflows() {
+        let mut budget = Budget::new(&Limits { memory: 100, ..Limits::default() });
+        assert!(budget.take(6, 10).is_ok());
+        assert_eq!(budget.take(6, 10), Err(OverBudget { asked: 60, left: 40, total: 100 }));
+        assert!(budget.take(u64::MAX, u64::MAX).is_err());
+        assert!(budget.take(4, 10).is_ok());
+        assert!(budget.take(1, 1).is_err());
+    }
+}

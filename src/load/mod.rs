@@ -3,6 +3,7 @@
 //! Files a user gives are not trusted: other files they name are read only below [`LoadOptions::root`], sizes are
 //! checked before memory is taken, and whatever is broken ends in a [`LoadError`] or in a warning, never in a panic.
 
+mod detect;
 pub mod diagnostic;
 pub mod gltf;
 pub mod limits;
@@ -15,6 +16,7 @@ pub use diagnostic::{Diagnostic, LoadError, Warnings};
 pub use limits::Limits;
 
 use crate::scene::{Scene, UpAxis};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// How to load.
@@ -90,12 +92,69 @@ pub struct Facts {
     pub max_rounding: f64,
     /// Every file read: the model first, then buffers, images, MTLs. For the input hash and `inspect`.
     pub files: Vec<PathBuf>,
-    /// xxh3-128 of the bytes of all files in `files`, in that order.
+    /// xxh3-128 of the xxh3-128 hashes of all files in `files`, in that order (see [`paths::Resolver::finish`]).
     pub hash: u128,
 }
 
+/// A file in memory, with the name it was read from.
+#[derive(Clone, Debug, Default)]
+pub struct Source {
+    /// Where it came from; a name without a folder such as `-` for standard input.
+    pub path: PathBuf,
+    /// Its bytes.
+    pub bytes: Vec<u8>,
+}
+
+impl Source {
+    /// Whether it came from standard input.
+    pub fn is_stdin(&self) -> bool {
+        self.path == Path::new("-")
+    }
+}
+
 /// Loads a model or scene file.
+///
+/// # Errors
+/// [`LoadError::Read`] when the file itself cannot be read, [`LoadError::Input`] when what it holds cannot be drawn.
+/// A file that is right but holds nothing to draw is `Ok` with an empty scene.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
-    let _ = (path, options);
-    Err(Diagnostic::new("unsupported-format", path, "", "no loader yet").into())
+    load_source(&read_source(path, &options.limits)?, options)
+}
+
+/// Loads a model or scene from memory. Files it names are looked up beside `name`; for `-` in
+/// [`LoadOptions::root`], or else in the current folder.
+pub fn load_bytes(name: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Loaded, LoadError> {
+    load_source(&Source { path: name.into(), bytes }, options)
+}
+
+fn load_source(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
+    match detect::detect(source)? {
+        detect::Format::Gltf => gltf::load(source, options),
+        detect::Format::Obj => obj::load(source, options),
+        detect::Format::SceneFile => scene_file::load(source, options),
+    }
+}
+
+/// Reads the model file itself, which may lie anywhere.
+fn read_source(path: &Path, limits: &Limits) -> Result<Source, LoadError> {
+    let what = || Box::new(Diagnostic::new("file-unreadable", path, "", "cannot be read"));
+    let fault = |source| LoadError::Read { what: what(), source };
+    let too_large = |bytes: u64| {
+        let text = format!("{bytes} bytes where {} are allowed", limits.file);
+        LoadError::from(Diagnostic::new("file-too-large", path, "", text))
+    };
+    let file = std::fs::File::open(path).map_err(fault)?;
+    let meta = file.metadata().map_err(fault)?;
+    if meta.is_dir() {
+        return Err(Diagnostic::new("file-not-plain", path, "", "is a folder").remedy("name a file in it").into());
+    }
+    if meta.len() > limits.file {
+        return Err(too_large(meta.len()));
+    }
+    let mut bytes = Vec::new();
+    file.take(limits.file.saturating_add(1)).read_to_end(&mut bytes).map_err(fault)?;
+    if bytes.len() as u64 > limits.file {
+        return Err(too_large(bytes.len() as u64));
+    }
+    Ok(Source { path: path.into(), bytes })
 }

@@ -1,1 +1,305 @@
-//! (to be written)
+//! Which files a model may name, and which were read.
+//!
+//! A glTF or MTL names other files, and whoever wrote it is not trusted: files are read only below a root folder, after
+//! symbolic links are resolved, and never from a network. Everything read is listed and hashed, so that a picture can
+//! say exactly what it was made from.
+
+use super::{Diagnostic, LoadOptions, Source};
+use percent_encoding::percent_decode_str;
+use std::collections::HashMap;
+use std::fs;
+use std::io::{self, Read};
+use std::path::{Component, Path, PathBuf};
+use xxhash_rust::xxh3::xxh3_128;
+
+/// Reads the files that a model names.
+#[derive(Clone, Debug)]
+pub struct Resolver {
+    /// Folder that relative names start from.
+    base: PathBuf,
+    /// Nothing outside this folder is read; canonical.
+    root: PathBuf,
+    max_bytes: u64,
+    read: Vec<(PathBuf, u128)>,
+    /// Canonical path -> index into `read`.
+    known: HashMap<PathBuf, usize>,
+}
+
+/// Why a named file was not read.
+#[derive(Debug, thiserror::Error)]
+pub enum FileFault {
+    /// It lies outside the root.
+    #[error("'{name}' lies outside the model's folder, where nothing is read")]
+    Outside {
+        /// As written in the model.
+        name: String,
+        /// The `--root` that would allow it.
+        root: PathBuf,
+    },
+    /// There is no such file.
+    #[error("'{0}' is not there")]
+    Missing(String),
+    /// It is a folder, a device or the like.
+    #[error("'{0}' is not a plain file")]
+    NotAFile(String),
+    /// It is larger than [`super::Limits::file`].
+    #[error("'{name}' has {bytes} bytes where {limit} are allowed")]
+    TooLarge {
+        /// As written in the model.
+        name: String,
+        /// Its size.
+        bytes: u64,
+        /// The limit.
+        limit: u64,
+    },
+    /// The name is a URI of another machine or an unknown scheme.
+    #[error("'{0}' is not a relative file name, and nothing is fetched from elsewhere")]
+    Scheme(String),
+    /// The name cannot be a URI or file name.
+    #[error("'{0}' is not a valid URI")]
+    BadUri(String),
+    /// The system refused.
+    #[error("'{name}': {source}")]
+    Io {
+        /// As written in the model.
+        name: String,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+impl FileFault {
+    /// This fault as a message about `place` in `file`.
+    pub fn diagnose(&self, file: &Path, place: &str) -> Diagnostic {
+        let (code, remedy) = match self {
+            Self::Outside { root, .. } => ("file-outside-root", format!("allow it with --root '{}'", root.display())),
+            Self::Missing(_) => ("file-missing", "put it beside the model".into()),
+            Self::NotAFile(_) => ("file-not-plain", String::new()),
+            Self::TooLarge { .. } => ("file-too-large", String::new()),
+            Self::Scheme(_) => ("uri-scheme", "download it and name it by a relative path".into()),
+            Self::BadUri(_) => ("uri-invalid", String::new()),
+            Self::Io { .. } => ("file-unreadable", String::new()),
+        };
+        Diagnostic::new(code, file, place, self.to_string()).remedy(remedy)
+    }
+}
+
+impl Resolver {
+    /// A resolver for what `source` names; `source` itself is the first file read.
+    ///
+    /// Relative names start from the folder of `source`; where `source` has none (standard input), from the root, or
+    /// else from the current folder.
+    pub fn new(source: &Source, options: &LoadOptions) -> Self {
+        let current = || PathBuf::from(".");
+        let folder = source.path.parent().filter(|p| !p.as_os_str().is_empty());
+        let base = match folder {
+            Some(folder) => folder.to_path_buf(),
+            None if source.is_stdin() => options.root.clone().unwrap_or_else(current),
+            None => current(),
+        };
+        let base = base.canonicalize().unwrap_or(base);
+        let root = options.root.clone().unwrap_or_else(|| base.clone());
+        let root = root.canonicalize().unwrap_or(root);
+        let mut resolver = Self { base, root, max_bytes: options.limits.file, read: Vec::new(), known: HashMap::new() };
+        let canonical = source.path.canonicalize().unwrap_or_else(|_| source.path.clone());
+        resolver.note(canonical, source.path.clone(), &source.bytes);
+        resolver
+    }
+
+    /// Reads a file that a URI reference (RFC 3986) names: percent escapes are decoded, schemes refused.
+    ///
+    /// `data:` URIs are not for this.
+    pub fn read_uri(&mut self, uri: &str) -> Result<Vec<u8>, FileFault> {
+        let name = file_name_of_uri(uri)?;
+        match self.read_file(Path::new(&name)) {
+            // Exporters write names with a literal '%' unescaped often enough.
+            Err(FileFault::Missing(_)) if name != uri => self.read_file(Path::new(uri)),
+            other => other,
+        }
+    }
+
+    /// Reads a file named by a path, relative to the model or absolute.
+    pub fn read_file(&mut self, name: &Path) -> Result<Vec<u8>, FileFault> {
+        let shown = || name.to_string_lossy().into_owned();
+        let io = |source| FileFault::Io { name: shown(), source };
+        let path = self.resolve(name)?;
+        let file = fs::File::open(&path).map_err(io)?;
+        let meta = file.metadata().map_err(io)?;
+        if !meta.is_file() {
+            return Err(FileFault::NotAFile(shown()));
+        }
+        let too_large = |bytes| FileFault::TooLarge { name: shown(), bytes, limit: self.max_bytes };
+        if meta.len() > self.max_bytes {
+            return Err(too_large(meta.len()));
+        }
+        let mut bytes = Vec::new();
+        file.take(self.max_bytes.saturating_add(1)).read_to_end(&mut bytes).map_err(io)?;
+        if bytes.len() as u64 > self.max_bytes {
+            return Err(too_large(bytes.len() as u64));
+        }
+        self.note(path, self.base.join(name), &bytes);
+        Ok(bytes)
+    }
+
+    /// The canonical path of an existing file below the root.
+    fn resolve(&self, name: &Path) -> Result<PathBuf, FileFault> {
+        let shown = name.to_string_lossy().into_owned();
+        if name.as_os_str().is_empty() || shown.contains('\0') {
+            return Err(FileFault::BadUri(shown));
+        }
+        let outside = |path: &Path| FileFault::Outside { name: shown.clone(), root: common_folder(&self.root, path) };
+        let wanted = self.base.join(name);
+        match wanted.canonicalize() {
+            Ok(path) if path.starts_with(&self.root) => Ok(path),
+            Ok(path) => Err(outside(&path)),
+            // Whether a file outside the root exists is nobody's business.
+            Err(_) if !lexical(&wanted).starts_with(&self.root) => Err(outside(&lexical(&wanted))),
+            Err(e) if e.kind() == io::ErrorKind::NotFound => Err(FileFault::Missing(shown)),
+            Err(source) => Err(FileFault::Io { name: shown, source }),
+        }
+    }
+
+    fn note(&mut self, canonical: PathBuf, shown: PathBuf, bytes: &[u8]) {
+        self.known.entry(canonical).or_insert_with(|| {
+            self.read.push((shown, xxh3_128(bytes)));
+            self.read.len() - 1
+        });
+    }
+
+    /// Adds the files of a model that was loaded on behalf of this one.
+    pub fn absorb(&mut self, files: &[PathBuf], hash: u128) {
+        let rest = files.iter().skip(1).map(|f| (f.clone(), 0));
+        self.read.extend(files.first().map(|f| (f.clone(), hash)));
+        self.read.extend(rest);
+    }
+
+    /// Every file read, in the order first read, and the xxh3-128 of their xxh3-128 hashes (little-endian) in that
+    /// order.
+    pub fn finish(self) -> (Vec<PathBuf>, u128) {
+        let hashes: Vec<u8> = self.read.iter().flat_map(|(_, hash)| hash.to_le_bytes()).collect();
+        (self.read.into_iter().map(|(path, _)| path).collect(), xxh3_128(&hashes))
+    }
+}
+
+/// The file name that a relative URI reference stands for.
+fn file_name_of_uri(uri: &str) -> Result<String, FileFault> {
+    let scheme = uri.split_once(':').map(|(scheme, _)| scheme);
+    let is_scheme = |s: &str| {
+        s.starts_with(|c: char| c.is_ascii_alphabetic())
+            && s.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
+    };
+    if scheme.is_some_and(is_scheme) || uri.starts_with("//") {
+        return Err(FileFault::Scheme(shorten(uri)));
+    }
+    percent_decode_str(uri).decode_utf8().map(|s| s.into_owned()).map_err(|_| FileFault::BadUri(shorten(uri)))
+}
+
+/// The beginning of a text that may be megabytes long.
+pub(crate) fn shorten(text: &str) -> String {
+    const KEPT: usize = 80;
+    if text.chars().nth(KEPT).is_none() { text.into() } else { text.chars().take(KEPT).chain(['…']).collect() }
+}
+
+/// `path` with `.` and `..` taken out by text alone.
+fn lexical(path: &Path) -> PathBuf {
+    let mut out = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir => {
+                out.pop();
+            }
+            other => out.push(other),
+        }
+    }
+    out
+}
+
+/// The innermost folder that holds both.
+fn common_folder(folder: &Path, file: &Path) -> PathBuf {
+    let both = folder.components().zip(file.parent().unwrap_or(file).components());
+    both.take_while(|(a, b)| a == b).map(|(a, _)| a).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A folder `model/` with a file, and a secret beside it.
+    fn folder() -> tempfile::TempDir {
+        let dir = tempfile::tempdir().unwrap();
+        fs::create_dir(dir.path().join("model")).unwrap();
+        fs::write(dir.path().join("model/a b.bin"), b"inside").unwrap();
+        fs::write(dir.path().join("model/100%.bin"), b"percent").unwrap();
+        fs::write(dir.path().join("model/❤.bin"), b"heart").unwrap();
+        fs::write(dir.path().join("secret.bin"), b"outside").unwrap();
+        dir
+    }
+
+    fn resolver(dir: &Path, options: &LoadOptions) -> Resolver {
+        Resolver::new(&Source { path: dir.join("model/m.gltf"), bytes: b"m".to_vec() }, options)
+    }
+
+    #[test]
+    fn escaped_unescaped_and_unicode_names_are_found() {
+        let dir = folder();
+        let mut r = resolver(dir.path(), &LoadOptions::default());
+        for uri in ["a%20b.bin", "a b.bin", "./a b.bin", "../model/a%20b.bin"] {
+            assert_eq!(r.read_uri(uri).unwrap(), b"inside", "{uri}");
+        }
+        assert_eq!(r.read_uri("100%25.bin").unwrap(), b"percent");
+        assert_eq!(r.read_uri("100%.bin").unwrap(), b"percent");
+        assert_eq!(r.read_uri("%E2%9D%A4.bin").unwrap(), b"heart");
+        assert_eq!(r.finish().0.len(), 4, "the model and three files, each once");
+    }
+
+    #[test]
+    fn files_outside_the_root_are_refused_with_the_root_that_would_work() {
+        let dir = folder();
+        let secret = dir.path().join("secret.bin").to_string_lossy().into_owned();
+        for name in ["../secret.bin", "..%2Fsecret.bin", "../no-such-file", secret.as_str()] {
+            let fault = resolver(dir.path(), &LoadOptions::default()).read_uri(name).unwrap_err();
+            let FileFault::Outside { root, .. } = fault else { panic!("{name}: {fault}") };
+            let mut wider = resolver(dir.path(), &LoadOptions { root: Some(root), ..LoadOptions::default() });
+            assert!(!matches!(wider.read_uri(name), Err(FileFault::Outside { .. })), "{name}");
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_symbolic_link_does_not_lead_out() {
+        let dir = folder();
+        std::os::unix::fs::symlink(dir.path().join("secret.bin"), dir.path().join("model/link.bin")).unwrap();
+        let fault = resolver(dir.path(), &LoadOptions::default()).read_uri("link.bin").unwrap_err();
+        assert!(matches!(fault, FileFault::Outside { .. }), "{fault}");
+    }
+
+    #[test]
+    fn networks_folders_and_large_files_are_refused() {
+        let dir = folder();
+        let mut options = LoadOptions::default();
+        options.limits.file = 3;
+        let mut r = resolver(dir.path(), &options);
+        assert!(matches!(r.read_uri("https://example.org/a.bin"), Err(FileFault::Scheme(_))));
+        assert!(matches!(r.read_uri("//example.org/a.bin"), Err(FileFault::Scheme(_))));
+        assert!(matches!(r.read_uri("."), Err(FileFault::NotAFile(_))));
+        assert!(matches!(r.read_uri(""), Err(FileFault::BadUri(_))));
+        assert!(matches!(r.read_uri("%FF"), Err(FileFault::BadUri(_))));
+        assert!(matches!(r.read_uri("a b.bin"), Err(FileFault::TooLarge { bytes: 6, limit: 3, .. })));
+        assert!(matches!(r.read_uri("none.bin"), Err(FileFault::Missing(_))));
+    }
+
+    #[test]
+    fn the_hash_changes_with_any_file_read() {
+        let dir = folder();
+        let hash = || {
+            let mut r = resolver(dir.path(), &LoadOptions::default());
+            r.read_uri("a b.bin").unwrap();
+            r.finish().1
+        };
+        let before = hash();
+        assert_eq!(before, hash());
+        fs::write(dir.path().join("model/a b.bin"), b"changed").unwrap();
+        assert_ne!(before, hash());
+    }
+}

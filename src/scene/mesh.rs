@@ -43,6 +43,11 @@ pub struct Polygon {
 }
 
 /// A mesh placed in the world.
+///
+/// A mirrored instance (negative determinant) shows the same front faces as an unmirrored one, as glTF demands: whoever
+/// puts its triangles into world space exchanges their second and third corner. Normals go by the inverse transpose of
+/// the matrix, tangents by the matrix itself, and the sign of a tangent's `w` turns over with the mirror. A loader
+/// hands over meshes untouched by this.
 #[derive(Clone, Debug)]
 pub struct Instance {
     /// Name of the node or object.

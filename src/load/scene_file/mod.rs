@@ -96,3 +96,11 @@
 //! fov = 50                      # vertical; default 45
 //! # or ortho = 10               # height seen by parallel rays
 //! ```
+
+use super::{Diagnostic, LoadError, LoadOptions, Loaded, Source};
+
+/// Loads a scene file.
+pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
+    let _ = options;
+    Err(Diagnostic::new("unsupported-format", &source.path, "", "no loader yet").into())
+}

@@ -1,0 +1,152 @@
+//! What kind of file this is: by its content, then by its extension.
+//!
+//! Kinds that cannot be read are named, so that the user knows what to do.
+
+use super::{Diagnostic, Source};
+
+/// The kinds of file that can be loaded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Format {
+    Gltf,
+    Obj,
+    SceneFile,
+}
+
+/// Beginnings of files, and what they are.
+const FOREIGN: &[(&[u8], &str)] = &[
+    (b"ply\n", "a PLY file"),
+    (b"ply\r", "a PLY file"),
+    (b"solid ", "an STL file"),
+    (b"Kaydara FBX Binary", "an FBX file"),
+    (b"; FBX", "an FBX file"),
+    (b"BLENDER", "a Blender file"),
+    (b"PXR-USDC", "a USD file"),
+    (b"#usda", "a USD file"),
+    (b"#VRML", "a VRML file"),
+    (b"#X3D", "an X3D file"),
+    (b"OFF\n", "an OFF file"),
+    (b"xof ", "a DirectX file"),
+    (b"DRACO", "a bare Draco mesh"),
+    (b"# vtk", "a VTK file"),
+    (b"PK\x03\x04", "a zip archive"),
+    (b"\x1f\x8b", "a gzip archive"),
+    (b"\x28\xb5\x2f\xfd", "a zstd archive"),
+    (b"7z\xbc\xaf", "a 7z archive"),
+    (b"Rar!", "a RAR archive"),
+    (b"\x89PNG", "a PNG picture"),
+    (b"\xff\xd8\xff", "a JPEG picture"),
+    (b"%PDF", "a PDF document"),
+    (b"\x7fELF", "a program"),
+    (b"b3dm", "a 3D Tiles file"),
+    (b"version https://git-lfs", "a Git LFS pointer, not the file itself"),
+];
+
+/// Extensions of kinds that have no sure beginning.
+const FOREIGN_EXTENSIONS: &[(&str, &str)] = &[
+    ("stl", "an STL file"),
+    ("ply", "a PLY file"),
+    ("fbx", "an FBX file"),
+    ("dae", "a COLLADA file"),
+    ("3ds", "a 3D Studio file"),
+    ("max", "a 3ds Max file"),
+    ("c4d", "a Cinema 4D file"),
+    ("usd", "a USD file"),
+    ("usdz", "a USD archive"),
+    ("abc", "an Alembic file"),
+    ("step", "a STEP file"),
+    ("stp", "a STEP file"),
+    ("iges", "an IGES file"),
+    ("3mf", "a 3MF archive"),
+    ("off", "an OFF file"),
+    ("lwo", "a LightWave file"),
+    ("mtl", "a material library, not a model"),
+    ("bin", "a binary buffer, not a model"),
+];
+
+/// Names the kind of `source`, or says what it is instead.
+pub(super) fn detect(source: &Source) -> Result<Format, Diagnostic> {
+    let bytes = source.bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&source.bytes);
+    let text = bytes.trim_ascii_start();
+    let extension = source.path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+
+    if bytes.starts_with(b"glTF") {
+        return Ok(Format::Gltf);
+    }
+    if let Some((_, kind)) = FOREIGN.iter().find(|(start, _)| bytes.starts_with(start)) {
+        return Err(foreign(source, kind));
+    }
+    if text.starts_with(b"<") {
+        return Err(foreign(source, if has(text, b"<COLLADA") { "a COLLADA file" } else { "an XML or HTML file" }));
+    }
+    match extension.as_str() {
+        "gltf" | "glb" => return Ok(Format::Gltf),
+        "obj" => return Ok(Format::Obj),
+        "toml" => return Ok(Format::SceneFile),
+        _ => {}
+    }
+    if text.starts_with(b"{") {
+        return Ok(Format::Gltf);
+    }
+    if let Some((_, kind)) = FOREIGN_EXTENSIONS.iter().find(|(e, _)| *e == extension) {
+        return Err(foreign(source, kind));
+    }
+    by_lines(text).ok_or_else(|| foreign(source, if bytes.is_empty() { "empty" } else { "of an unknown kind" }))
+}
+
+fn foreign(source: &Source, kind: &str) -> Diagnostic {
+    let remedy =
+        if kind.ends_with("archive") { "unpack it first" } else { "meshray reads .glb, .gltf, .obj and .toml scenes" };
+    Diagnostic::new("unsupported-format", &source.path, "", format!("this is {kind}")).remedy(remedy)
+}
+
+fn has(bytes: &[u8], part: &[u8]) -> bool {
+    bytes.windows(part.len()).take(4096).any(|w| w == part)
+}
+
+/// Tells OBJ from a scene file by the first line that can only be one of them.
+fn by_lines(text: &[u8]) -> Option<Format> {
+    const OBJ: [&[u8]; 9] = [b"v", b"vt", b"vn", b"f", b"o", b"g", b"usemtl", b"mtllib", b"s"];
+    for line in text.split(|&b| b == b'\n' || b == b'\r').take(1000) {
+        let line = line.trim_ascii();
+        let word = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
+        let is_obj = OBJ.contains(&word) && !line.contains(&b'=');
+        match line.first() {
+            None | Some(b'#') => {}
+            Some(b'[') => return Some(Format::SceneFile),
+            Some(_) if is_obj => return Some(Format::Obj),
+            Some(_) if line.contains(&b'=') => return Some(Format::SceneFile),
+            Some(_) => return None,
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(name: &str, bytes: &[u8]) -> Result<Format, String> {
+        detect(&Source { path: name.into(), bytes: bytes.to_vec() }).map_err(|d| d.to_string())
+    }
+
+    #[test]
+    fn content_comes_before_the_extension() {
+        assert_eq!(of("a.obj", b"glTF\x02\0\0\0"), Ok(Format::Gltf));
+        assert_eq!(of("-", b"\xef\xbb\xbf { \"asset\": {} }"), Ok(Format::Gltf));
+        assert_eq!(of("-", b"# a cube\r\nmtllib c.mtl\r\nv 0 0 0"), Ok(Format::Obj));
+        assert_eq!(of("-", b"# a scene\n[camera]\n"), Ok(Format::SceneFile));
+        assert_eq!(of("-", b"background = 'white'\n"), Ok(Format::SceneFile));
+        assert!(of("a.obj", b"PK\x03\x04...").unwrap_err().contains("a zip archive; unpack it first"));
+        assert!(of("a.gltf", b"version https://git-lfs.github.com/spec/v1").unwrap_err().contains("Git LFS"));
+    }
+
+    #[test]
+    fn the_extension_decides_where_content_cannot() {
+        assert_eq!(of("a.obj", b""), Ok(Format::Obj));
+        assert_eq!(of("a.GLB", b""), Ok(Format::Gltf));
+        assert_eq!(of("a.toml", b"# nothing yet"), Ok(Format::SceneFile));
+        assert!(of("a.stl", &[0; 84]).unwrap_err().starts_with("a.stl: this is an STL file; meshray reads"));
+        assert!(of("a", b"").unwrap_err().contains("this is empty"));
+        assert!(of("a", b"hello").unwrap_err().contains("unknown kind"));
+    }
+}
