@@ -1,6 +1,32 @@
 //! Linear pixels <-> files: tone mapping, PNG, EXR with layers, JPEG, WebP, metadata, difference metrics.
 //!
-//! Knows nothing of scenes or rays.
+//! [`encode`] turns a [`Picture`] into the bytes of a file, [`write_atomic`] puts them on the disk, [`read_metadata`] tells
+//! how a picture was made. Knows nothing of scenes or rays.
+
+mod develop;
+pub mod diff;
+mod encode;
+mod error;
+mod exif;
+mod exr;
+mod kind;
+pub mod metadata;
+mod output;
+mod photo;
+mod png;
+pub mod read;
+pub mod srgb;
+pub mod tone;
+mod write;
+
+pub use encode::encode;
+pub use error::ImageError;
+pub use kind::FileKind;
+pub use metadata::{Metadata, read_metadata, was_written_by_meshray};
+pub use output::{ExrSamples, Output, PngDepth};
+pub use read::{decode, read_picture};
+pub use tone::ToneMap;
+pub use write::write_atomic;
 
 /// A rendered picture: linear Rec. 709, rows from the top.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,0 +1,320 @@
+//! OpenEXR files: scene-linear Rec. 709, premultiplied alpha, one part, ZIP-compressed scan lines.
+//!
+//! | channel | type | what |
+//! |---|---|---|
+//! | `R G B A` | half or float | beauty |
+//! | `albedo.R albedo.G albedo.B` | half or float | surface colour without light |
+//! | `N.X N.Y N.Z` | half or float | unit shading normal, world space |
+//! | `P.X P.Y P.Z` | float | position, world space |
+//! | `Z` | float | distance along the view axis; infinite where nothing was hit |
+//! | `id.prim id.instance` | uint | prim and instance; 4294967295 where nothing was hit |
+//!
+//! Layers are name prefixes within one flat part, no name is a bare number, and the beauty has the plain names: that
+//! is what compositing programs and libraries agree on. Equal pictures and metadata give equal bytes.
+
+use super::metadata::MAX_TEXT;
+use super::{ExrSamples, FileKind, ImageError, Layers, Metadata, Output, Picture};
+use ::exr::image::{Blocks, Encoding, FlatSamples, Image, Layer};
+use ::exr::meta::MetaData;
+use ::exr::meta::attribute::{AttributeValue, Chromaticities, LineOrder, Text};
+use ::exr::prelude::{
+    AnyChannel, AnyChannels, Compression, LayerAttributes, ReadChannels, ReadLayers, SmallVec, Vec2, WritableImage, f16,
+};
+use std::io::{BufRead, Cursor};
+
+/// Red, green, blue and white of Rec. 709 (ITU-R BT.709, 1990) in CIE x, y.
+const REC_709: Chromaticities = Chromaticities {
+    red: Vec2(0.64, 0.33),
+    green: Vec2(0.30, 0.60),
+    blue: Vec2(0.15, 0.06),
+    white: Vec2(0.3127, 0.3290),
+};
+
+/// The bytes of an EXR file.
+pub(super) fn encode(picture: &Picture, output: &Output, metadata: &Metadata) -> Result<Vec<u8>, ImageError> {
+    let channels = AnyChannels::sort(channels(picture, output));
+    let encoding =
+        Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
+    let mut attributes = LayerAttributes::default();
+    if !metadata.is_empty() {
+        attributes.software_name = Some(text(&metadata.software()));
+    }
+    for (key, value) in metadata.iter() {
+        attributes.other.insert(text(key), AttributeValue::Text(text(value)));
+    }
+    let size = (picture.width as usize, picture.height as usize);
+    let mut image = Image::from_layer(Layer::new(size, attributes, encoding, channels));
+    image.attributes.chromaticities = Some(REC_709);
+
+    let mut file = Cursor::new(Vec::new());
+    // The encoder would start threads of its own, as many as there are cores.
+    let one_thread = rayon::current_num_threads() == 1;
+    let writer = if one_thread { image.write().non_parallel() } else { image.write() };
+    writer.to_buffered(&mut file).map_err(|e| ImageError::encode(FileKind::Exr, e))?;
+    let mut bytes = file.into_inner();
+    sort_attributes(&mut bytes)
+        .ok_or_else(|| ImageError::encode(FileKind::Exr, "the encoder's header is not understood"))?;
+    Ok(bytes)
+}
+
+fn text(s: &str) -> Text {
+    Text::from_slice_unchecked(s.as_bytes())
+}
+
+fn channels(picture: &Picture, output: &Output) -> SmallVec<[AnyChannel<FlatSamples>; 4]> {
+    let floats = |name: &str, values: Vec<f32>| AnyChannel::new(text(name), FlatSamples::F32(values));
+    let color = |name: &str, values: Vec<f32>| match output.exr_samples {
+        ExrSamples::Float => floats(name, values),
+        ExrSamples::Half => AnyChannel::new(text(name), FlatSamples::F16(values.into_iter().map(half).collect())),
+    };
+    let ids = |name: &str, values: &[u32]| AnyChannel::new(text(name), FlatSamples::U32(values.to_vec()));
+
+    let mut list = SmallVec::new();
+    for (i, name) in ["R", "G", "B", "A"].into_iter().enumerate() {
+        let values = picture.beauty.iter().map(|&p| over(p, output.background)[i]);
+        list.push(color(name, values.collect()));
+    }
+    let Some(layers) = &picture.layers else { return list };
+    let axis = |values: &[[f32; 3]], i: usize| values.iter().map(|v| v[i]).collect::<Vec<f32>>();
+    for i in 0..3 {
+        if !layers.albedo.is_empty() {
+            list.push(color(["albedo.R", "albedo.G", "albedo.B"][i], axis(&layers.albedo, i)));
+        }
+        if !layers.normal.is_empty() {
+            list.push(color(["N.X", "N.Y", "N.Z"][i], axis(&layers.normal, i)));
+        }
+        if !layers.position.is_empty() {
+            list.push(floats(["P.X", "P.Y", "P.Z"][i], axis(&layers.position, i)));
+        }
+    }
+    if !layers.depth.is_empty() {
+        list.push(floats("Z", layers.depth.clone()));
+    }
+    if !layers.prim.is_empty() {
+        list.push(ids("id.prim", &layers.prim));
+    }
+    if !layers.instance.is_empty() {
+        list.push(ids("id.instance", &layers.instance));
+    }
+    list
+}
+
+/// The nearest half; light beyond the largest half becomes that, as infinities spread through every later filter.
+fn half(x: f32) -> f16 {
+    f16::from_f32(if x.is_finite() { x.clamp(-65_504.0, 65_504.0) } else { x })
+}
+
+/// A premultiplied pixel over a background.
+fn over(pixel: [f32; 4], background: Option<[f32; 3]>) -> [f32; 4] {
+    let Some([r, g, b]) = background else { return pixel };
+    let through = 1.0 - pixel[3];
+    [pixel[0] + r * through, pixel[1] + g * through, pixel[2] + b * through, 1.0]
+}
+
+/// Puts the header's attributes into the order of their names. The encoder keeps ours in a hash map, whose order
+/// changes from run to run; the length stays, so that the offsets of the pixels stay right.
+fn sort_attributes(file: &mut [u8]) -> Option<()> {
+    /// Magic number and version.
+    const HEAD: usize = 8;
+    let word = |at: usize| file[at..].iter().position(|&b| b == 0).map(|len| at + len + 1);
+    let mut attributes = Vec::new();
+    let mut at = HEAD;
+    while *file.get(at)? != 0 {
+        let size_at = word(word(at)?)?;
+        let size = i32::from_le_bytes(file.get(size_at..size_at + 4)?.try_into().ok()?);
+        let end = size_at + 4 + usize::try_from(size).ok()?;
+        attributes.push(file.get(at..end)?.to_vec());
+        at = end;
+    }
+    // Names end in a zero byte, so that comparing whole attributes compares names first.
+    attributes.sort();
+    file.get_mut(HEAD..at)?.copy_from_slice(&attributes.concat());
+    Some(())
+}
+
+/// Our entries among the attributes of the first part.
+pub(super) fn read_metadata(file: impl BufRead) -> Result<Metadata, ImageError> {
+    let meta = MetaData::read_from_buffered(file, false).map_err(|e| ImageError::decode(FileKind::Exr, e))?;
+    let mut metadata = Metadata::default();
+    for header in meta.headers.iter().take(1) {
+        for (key, value) in header.own_attributes.other.iter().chain(&header.shared_attributes.other) {
+            if let AttributeValue::Text(value) = value
+                && value.as_slice().len() <= MAX_TEXT
+            {
+                metadata.insert(&String::from_utf8_lossy(key.as_slice()), &String::from_utf8_lossy(value.as_slice()));
+            }
+        }
+    }
+    Ok(metadata)
+}
+
+/// Reads the first part of an EXR: beauty, and the layers that have the names of this module; at most `max_pixels`.
+pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Picture, ImageError> {
+    let fail = |e: ::exr::error::Error| ImageError::decode(FileKind::Exr, e);
+    let meta = MetaData::read_from_buffered(bytes, false).map_err(fail)?;
+    for header in &meta.headers {
+        let side = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+        let Vec2(width, height) = header.layer_size;
+        super::read::check_size(FileKind::Exr, side(width), side(height), max_pixels)?;
+        if header.deep {
+            return Err(ImageError::decode(FileKind::Exr, "deep pixels are not supported"));
+        }
+    }
+    let image = ::exr::image::read::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .non_parallel()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(fail)?;
+    let layer = &image.layer_data;
+    let Vec2(width, height) = layer.size;
+    let channels = Channels { list: &layer.channel_data.list, len: width * height };
+    let as_u32 = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+    let picture =
+        Picture { width: as_u32(width), height: as_u32(height), beauty: channels.beauty(), layers: channels.layers() };
+    Ok(picture)
+}
+
+/// The channels of a part, found by name.
+struct Channels<'a> {
+    list: &'a [AnyChannel<FlatSamples>],
+    len: usize,
+}
+
+impl Channels<'_> {
+    fn find(&self, name: &str) -> Option<&FlatSamples> {
+        let named = |c: &&AnyChannel<FlatSamples>| c.name.as_slice() == name.as_bytes();
+        // Subsampled channels have fewer values and are passed over.
+        self.list.iter().find(named).map(|c| &c.sample_data).filter(|s| s.len() == self.len)
+    }
+
+    fn floats(&self, name: &str) -> Option<Vec<f32>> {
+        self.find(name).map(|samples| samples.values_as_f32().collect())
+    }
+
+    fn ids(&self, name: &str) -> Vec<u32> {
+        match self.find(name) {
+            Some(FlatSamples::U32(ids)) => ids.clone(),
+            _ => Vec::new(),
+        }
+    }
+
+    fn beauty(&self) -> Vec<[f32; 4]> {
+        let or = |name: &str, default: f32| self.floats(name).unwrap_or_else(|| vec![default; self.len]);
+        let (r, g, b, a) = (or("R", 0.0), or("G", 0.0), or("B", 0.0), or("A", 1.0));
+        (0..self.len).map(|i| [r[i], g[i], b[i], a[i]]).collect()
+    }
+
+    fn triples(&self, names: [&str; 3]) -> Vec<[f32; 3]> {
+        let [Some(x), Some(y), Some(z)] = names.map(|name| self.floats(name)) else { return Vec::new() };
+        (0..self.len).map(|i| [x[i], y[i], z[i]]).collect()
+    }
+
+    fn layers(&self) -> Option<Layers> {
+        let layers = Layers {
+            albedo: self.triples(["albedo.R", "albedo.G", "albedo.B"]),
+            normal: self.triples(["N.X", "N.Y", "N.Z"]),
+            position: self.triples(["P.X", "P.Y", "P.Z"]),
+            depth: self.floats("Z").unwrap_or_default(),
+            prim: self.ids("id.prim"),
+            instance: self.ids("id.instance"),
+        };
+        (layers != Layers::default()).then_some(layers)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn picture() -> Picture {
+        let n = 35_u32;
+        let triple = |k: f32| (0..n).map(|i| [i as f32 * k, -k, 1.0 / (i + 1) as f32]).collect::<Vec<_>>();
+        let layers = Layers {
+            albedo: triple(0.1),
+            normal: triple(0.2),
+            position: triple(1e7 + 0.5),
+            depth: (0..n).map(|i| if i == 3 { f32::INFINITY } else { i as f32 * 1.000_1 }).collect(),
+            prim: (0..n).map(|i| if i == 3 { u32::MAX } else { 16_777_217 + i }).collect(),
+            instance: (0..n).collect(),
+        };
+        let beauty = (0..n).map(|i| [i as f32 * 0.123, 1e-3, 70_000.0, 0.7]).collect();
+        Picture { width: 7, height: 5, beauty, layers: Some(layers) }
+    }
+
+    fn output(exr_samples: ExrSamples) -> Output {
+        Output { exr_samples, exposure: 3.0, ..Output::default() }
+    }
+
+    #[test]
+    fn floats_and_ids_come_back_bit_for_bit_whatever_the_tone_map_and_exposure() {
+        let bytes = encode(&picture(), &output(ExrSamples::Float), &Metadata::new()).unwrap();
+        assert_eq!(decode(&bytes, 35).unwrap(), picture());
+    }
+
+    #[test]
+    fn halves_are_near_and_never_infinite() {
+        let bytes = encode(&picture(), &output(ExrSamples::Half), &Metadata::new()).unwrap();
+        let back = decode(&bytes, 35).unwrap();
+        for (a, b) in picture().beauty.iter().zip(&back.beauty) {
+            assert!((a[0] - b[0]).abs() <= a[0] * 0.000_5 && b[2] == 65_504.0, "{a:?} {b:?}");
+        }
+        let (was, is) = (picture().layers.unwrap(), back.layers.unwrap());
+        assert_eq!((was.position, was.depth, was.prim), (is.position, is.depth, is.prim));
+    }
+
+    #[test]
+    fn channels_have_the_names_and_types_other_programs_read() {
+        let bytes = encode(&picture(), &output(ExrSamples::Half), &Metadata::default()).unwrap();
+        let meta = MetaData::read_from_buffered(bytes.as_slice(), true).unwrap();
+        assert_eq!(meta.headers.len(), 1);
+        let header = &meta.headers[0];
+        let listed: Vec<String> =
+            header.channels.list.iter().map(|c| format!("{}:{:?}", c.name, c.sample_type)).collect();
+        let expected = "A:F16 B:F16 G:F16 N.X:F16 N.Y:F16 N.Z:F16 P.X:F32 P.Y:F32 P.Z:F32 R:F16 Z:F32 albedo.B:F16 \
+                        albedo.G:F16 albedo.R:F16 id.instance:U32 id.prim:U32";
+        assert_eq!(listed.join(" "), expected);
+        assert_eq!(header.compression, Compression::ZIP16);
+        assert!(header.own_attributes.software_name.is_none());
+    }
+
+    #[test]
+    fn equal_pictures_are_equal_files() {
+        let metadata = Metadata::new()
+            .with(Metadata::INPUT, "a")
+            .with(Metadata::INPUT_HASH, "b")
+            .with(Metadata::SETTINGS, "c")
+            .with(Metadata::COUNTS, "d");
+        let encode = || encode(&picture(), &output(ExrSamples::Float), &metadata).unwrap();
+        let first = encode();
+        for _ in 0..8 {
+            assert!(encode() == first);
+        }
+        assert_eq!(decode(&first, 35).unwrap(), picture());
+    }
+
+    #[test]
+    fn a_background_is_laid_behind_in_linear_light() {
+        let picture = Picture { width: 1, height: 1, beauty: vec![[2.0, 0.0, 0.25, 0.5]], layers: None };
+        let output = Output { background: Some([1.0, 0.5, 0.0]), ..output(ExrSamples::Float) };
+        let bytes = encode(&picture, &output, &Metadata::default()).unwrap();
+        assert_eq!(decode(&bytes, 1).unwrap().beauty, vec![[2.5, 0.25, 0.25, 1.0]]);
+    }
+
+    #[test]
+    fn broken_files_are_errors_and_large_ones_refused() {
+        let bytes = encode(&picture(), &output(ExrSamples::Half), &Metadata::new()).unwrap();
+        assert!(decode(&bytes, 34).unwrap_err().to_string().contains("7×5"));
+        for cut in 0..bytes.len() {
+            assert!(decode(&bytes[..cut], 1000).is_err(), "cut at {cut}");
+        }
+        for at in 0..bytes.len() {
+            let mut copy = bytes.clone();
+            copy[at] ^= 0x41;
+            let _ = decode(&copy, 1000);
+        }
+    }
+}

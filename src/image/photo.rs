@@ -1,0 +1,115 @@
+//! JPEG (lossy, opaque) and WebP (lossless) files, 8-bit sRGB.
+
+use super::develop::{Raster, raster};
+use super::{FileKind, ImageError, Metadata, Output, Picture, exif};
+use ::image::codecs::jpeg::JpegEncoder;
+use ::image::codecs::webp::WebPEncoder;
+use ::image::{ExtendedColorType, ImageEncoder};
+
+/// Largest side of a JPEG and of a WebP file: what their size fields hold.
+const JPEG_SIDE: u32 = 65_535;
+const WEBP_SIDE: u32 = 16_384;
+/// Room for EXIF in a JPEG's APP1 segment: 65 535 bytes less the length field and the six letters before it.
+const JPEG_EXIF: usize = 65_535 - 2 - 6;
+
+/// The bytes of a JPEG file; transparent pictures are laid on white when no background is given.
+pub(super) fn encode_jpeg(picture: &Picture, output: &Output, metadata: &Metadata) -> Result<Vec<u8>, ImageError> {
+    fits(picture, FileKind::Jpeg, JPEG_SIDE)?;
+    let exif = exif::write(metadata);
+    if exif.len() > JPEG_EXIF {
+        return Err(ImageError::MetadataTooLong { kind: FileKind::Jpeg, len: exif.len(), limit: JPEG_EXIF });
+    }
+    let opaque = Output { background: output.background.or(Some([1.0; 3])), ..output.clone() };
+    let mut file = Vec::new();
+    let encoder = JpegEncoder::new_with_quality(&mut file, output.jpeg_quality.clamp(1, 100));
+    finish(encoder, &raster(picture, &opaque), exif, FileKind::Jpeg)?;
+    Ok(file)
+}
+
+/// The bytes of a lossless WebP file.
+pub(super) fn encode_webp(picture: &Picture, output: &Output, metadata: &Metadata) -> Result<Vec<u8>, ImageError> {
+    fits(picture, FileKind::Webp, WEBP_SIDE)?;
+    let mut file = Vec::new();
+    let encoder = WebPEncoder::new_lossless(&mut file);
+    finish(encoder, &raster(picture, output), exif::write(metadata), FileKind::Webp)?;
+    Ok(file)
+}
+
+fn finish(
+    mut encoder: impl ImageEncoder,
+    raster: &Raster<u8>,
+    exif: Vec<u8>,
+    kind: FileKind,
+) -> Result<(), ImageError> {
+    if !exif.is_empty() {
+        encoder.set_exif_metadata(exif).map_err(|e| ImageError::encode(kind, e))?;
+    }
+    let color = if raster.channels == 4 { ExtendedColorType::Rgba8 } else { ExtendedColorType::Rgb8 };
+    encoder.write_image(&raster.samples, raster.width, raster.height, color).map_err(|e| ImageError::encode(kind, e))
+}
+
+fn fits(picture: &Picture, kind: FileKind, limit: u32) -> Result<(), ImageError> {
+    let (width, height) = (picture.width, picture.height);
+    if width > limit || height > limit {
+        return Err(ImageError::TooLarge { kind, width, height, limit });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::ToneMap;
+    use ::image::ImageFormat;
+
+    fn picture() -> Picture {
+        let beauty = (0..64 * 48).map(|i| if i % 64 < 32 { [0.5, 0.0, 0.0, 1.0] } else { [0.0; 4] }).collect();
+        Picture { width: 64, height: 48, beauty, layers: None }
+    }
+
+    fn output() -> Output {
+        Output { tone_map: ToneMap::None, ..Output::default() }
+    }
+
+    #[test]
+    fn webp_gives_back_every_code() {
+        let bytes = encode_webp(&picture(), &output(), &Metadata::new()).unwrap();
+        let back = ::image::load_from_memory_with_format(&bytes, ImageFormat::WebP).unwrap().to_rgba8();
+        assert_eq!(back.get_pixel(3, 7).0, [188, 0, 0, 255]);
+        assert_eq!(back.get_pixel(60, 7).0, [0, 0, 0, 0]);
+    }
+
+    #[test]
+    fn jpeg_lays_a_transparent_picture_on_white_or_what_is_asked() {
+        for (background, right) in [(None, [255, 255, 255]), (Some([0.0, 0.0, 1.0]), [0, 0, 255])] {
+            let output = Output { background, ..output() };
+            let bytes = encode_jpeg(&picture(), &output, &Metadata::new()).unwrap();
+            let back = ::image::load_from_memory_with_format(&bytes, ImageFormat::Jpeg).unwrap().to_rgb8();
+            let near = |x: u32, want: [u8; 3]| {
+                let got = back.get_pixel(x, 20).0;
+                assert!((0..3).all(|i| got[i].abs_diff(want[i]) <= 6), "{got:?} for {want:?}");
+            };
+            near(3, [188, 0, 0]);
+            near(60, right);
+        }
+    }
+
+    #[test]
+    fn lower_quality_makes_smaller_files() {
+        let size = |jpeg_quality| {
+            let output = Output { jpeg_quality, ..output() };
+            encode_jpeg(&picture(), &output, &Metadata::default()).unwrap().len()
+        };
+        assert!(size(20) < size(98));
+    }
+
+    #[test]
+    fn sizes_the_format_cannot_hold_are_refused_with_a_remedy() {
+        let wide = Picture { width: 16_385, height: 1, beauty: vec![[0.0; 4]; 16_385], layers: None };
+        let message = encode_webp(&wide, &output(), &Metadata::default()).unwrap_err().to_string();
+        assert!(message.contains("16385×1") && message.contains(".png"), "{message}");
+        let long = Metadata::new().with(Metadata::COUNTS, "x".repeat(70_000));
+        let message = encode_jpeg(&picture(), &output(), &long).unwrap_err().to_string();
+        assert!(message.contains("metadata"), "{message}");
+    }
+}

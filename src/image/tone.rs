@@ -1,0 +1,199 @@
+//! Tone mapping: scene light (0 to infinity) to display light (0 to 1), both linear Rec. 709.
+//!
+//! Curves: *PBR Neutral* (Khronos Group, 2024), which keeps base colours as they are up to 0.8 and fades highlights to
+//! white; *Reinhard* on luminance (Reinhard, Stark, Shirley, Ferwerda, "Photographic Tone Reproduction for Digital
+//! Images", 2002); *ACES* as fitted by Stephen Hill (2016) to the reference rendering and Rec. 709 output transforms.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// Curve from scene light to display light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum ToneMap {
+    /// Clipped at 1.
+    None,
+    /// Luminance L becomes L / (1 + L).
+    Reinhard,
+    /// Filmic: more contrast, coloured highlights turn white.
+    Aces,
+    /// Colours true up to 0.8, soft highlights.
+    #[default]
+    Neutral,
+}
+
+/// Largest light that is told apart; keeps infinities out of the curves, where they would turn into NaN.
+const BRIGHTEST: f32 = 1e12;
+
+/// Luminance weights of linear Rec. 709.
+pub const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
+
+impl ToneMap {
+    /// Every curve.
+    pub const ALL: [Self; 4] = [Self::None, Self::Reinhard, Self::Aces, Self::Neutral];
+
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Reinhard => "reinhard",
+            Self::Aces => "aces",
+            Self::Neutral => "neutral",
+        }
+    }
+
+    /// Display light of a straight (not premultiplied) colour, each channel 0..=1; NaN and negative light are black.
+    pub fn map(self, color: [f32; 3]) -> [f32; 3] {
+        let light = color.map(|c| if c > 0.0 { c.min(BRIGHTEST) } else { 0.0 });
+        let display = match self {
+            Self::None => light,
+            Self::Reinhard => reinhard(light),
+            Self::Aces => aces(light),
+            Self::Neutral => neutral(light),
+        };
+        display.map(|c| c.clamp(0.0, 1.0))
+    }
+}
+
+fn reinhard(color: [f32; 3]) -> [f32; 3] {
+    let scale = 1.0 / (1.0 + luminance(color));
+    color.map(|c| c * scale)
+}
+
+/// Linear Rec. 709 luminance.
+pub fn luminance(color: [f32; 3]) -> f32 {
+    dot(LUMINANCE, color)
+}
+
+fn aces(color: [f32; 3]) -> [f32; 3] {
+    // Rec. 709 into the rendering space of the fit, and back; rows sum to 1, so that grey stays grey.
+    const TO_FIT: [[f32; 3]; 3] =
+        [[0.59719, 0.35458, 0.04823], [0.07600, 0.90834, 0.01566], [0.02840, 0.13383, 0.83777]];
+    const FROM_FIT: [[f32; 3]; 3] =
+        [[1.60475, -0.53108, -0.07367], [-0.10208, 1.10813, -0.00605], [-0.00327, -0.07276, 1.07602]];
+    let fitted = TO_FIT.map(|row| {
+        let v = dot(row, color);
+        (v * (v + 0.024_578_6) - 0.000_090_537) / (v * (0.983_729 * v + 0.432_951) + 0.238_081)
+    });
+    FROM_FIT.map(|row| dot(row, fitted))
+}
+
+fn neutral(color: [f32; 3]) -> [f32; 3] {
+    /// Reflectance of a dielectric at normal incidence: the curve takes this much off, so that a base colour lit fully
+    /// comes out as itself.
+    const F90_OFFSET: f32 = 0.04;
+    /// Below this everything is kept, above it compressed.
+    const START: f32 = 0.8 - F90_OFFSET;
+    /// How fast compressed colours fade to white.
+    const DESATURATION: f32 = 0.15;
+
+    let darkest = color[0].min(color[1]).min(color[2]);
+    let offset = if darkest < 2.0 * F90_OFFSET { darkest - 6.25 * darkest * darkest } else { F90_OFFSET };
+    let color = color.map(|c| c - offset);
+    let peak = color[0].max(color[1]).max(color[2]);
+    if peak < START {
+        return color;
+    }
+    let room = 1.0 - START;
+    let new_peak = 1.0 - room * room / (peak + room - START);
+    let white = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
+    color.map(|c| {
+        let compressed = c * (new_peak / peak);
+        compressed * (1.0 - white) + new_peak * white
+    })
+}
+
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+impl fmt::Display for ToneMap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for ToneMap {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let known = || Self::ALL.map(Self::name).join(", ");
+        Self::ALL.into_iter().find(|t| t.name() == name).ok_or_else(|| format!("not one of {}", known()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn close(a: [f32; 3], b: [f32; 3], tolerance: f32) -> bool {
+        (0..3).all(|i| (a[i] - b[i]).abs() <= tolerance)
+    }
+
+    #[test]
+    fn neutral_keeps_a_lit_base_colour_but_for_the_dielectric_sheen() {
+        assert!(close(ToneMap::Neutral.map([0.5, 0.3, 0.2]), [0.46, 0.26, 0.16], 1e-6));
+        // With one black channel nothing is taken off.
+        assert!(close(ToneMap::Neutral.map([0.5, 0.0, 0.2]), [0.5, 0.0, 0.2], 1e-6));
+    }
+
+    /// By hand from the published formula: x = 1: offset 0.04, peak 0.96, 1 - 0.24²/0.44; x = 4: 1 - 0.24²/3.44.
+    #[test]
+    fn neutral_compresses_white_as_published() {
+        assert!(close(ToneMap::Neutral.map([1.0; 3]), [1.0 - 0.0576 / 0.44; 3], 1e-6));
+        assert!(close(ToneMap::Neutral.map([4.0; 3]), [1.0 - 0.0576 / 3.44; 3], 1e-6));
+    }
+
+    /// By hand: (2, 0, 0): no offset, peak 2, new peak 1 - 0.0576/1.48 = 0.961081, white 1 - 1/(0.15·1.038919 + 1).
+    #[test]
+    fn neutral_fades_a_bright_red_towards_white() {
+        let white = 1.0 - 1.0 / (0.15 * 1.038_919 + 1.0);
+        assert!(close(ToneMap::Neutral.map([2.0, 0.0, 0.0]), [0.961_081, 0.961_081 * white, 0.961_081 * white], 1e-5));
+    }
+
+    #[test]
+    fn neutral_is_smooth_where_compression_begins() {
+        let (below, above) = (ToneMap::Neutral.map([0.799_99; 3]), ToneMap::Neutral.map([0.800_01; 3]));
+        assert!(close(below, above, 3e-5));
+    }
+
+    #[test]
+    fn aces_keeps_grey_grey_and_black_black() {
+        let grey = ToneMap::Aces.map([0.18; 3]);
+        assert!((grey[0] - grey[1]).abs() < 1e-4 && (grey[1] - grey[2]).abs() < 1e-4, "{grey:?}");
+        // The fit at 0.18 by hand: (0.18·0.2045786 - 0.000090537) / (0.18·(0.983729·0.18 + 0.432951) + 0.238081).
+        assert!(close(grey, [0.105_65; 3], 2e-4), "{grey:?}");
+        assert_eq!(ToneMap::Aces.map([0.0; 3]), [0.0; 3]);
+    }
+
+    #[test]
+    fn reinhard_halves_white() {
+        assert!(close(ToneMap::Reinhard.map([1.0; 3]), [0.5; 3], 1e-6));
+    }
+
+    #[test]
+    fn every_curve_rises_and_stays_in_range_whatever_comes_in() {
+        for curve in ToneMap::ALL {
+            let mut last = -1.0;
+            for step in 0..2000 {
+                let x = (step as f32 * 0.02 - 20.0).exp2();
+                let y = curve.map([x; 3])[1];
+                assert!(y >= last - 1e-6 && y <= 1.0, "{curve} at {x}: {y} after {last}");
+                last = y;
+            }
+            for odd in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, f32::MAX] {
+                for color in [[odd; 3], [odd, 0.2, 0.0], [0.0, 0.1, odd]] {
+                    let out = curve.map(color);
+                    assert!(out.iter().all(|c| (0.0..=1.0).contains(c)), "{curve} of {color:?}: {out:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn names_are_read_back() {
+        for curve in ToneMap::ALL {
+            assert_eq!(curve.name().parse(), Ok(curve));
+        }
+        assert!("filmic".parse::<ToneMap>().unwrap_err().contains("neutral"));
+    }
+}

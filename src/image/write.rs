@@ -1,0 +1,172 @@
+//! Writing a file so that nobody ever finds half of one under its name.
+
+use std::fs::{self, Permissions};
+use std::io::{self, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+/// Writes `bytes` to a temporary file in the same folder and renames it to `path`. On failure nothing is left.
+///
+/// A file that is replaced keeps its permissions, a new one gets the usual ones; a link stays and the file it points
+/// to is replaced. What is no regular file (`/dev/stdout`, a pipe) is written straight. `fsync` waits until the bytes
+/// are on the disk, so that they survive a power cut.
+///
+/// # Errors
+/// What the system says, with the remedy where the folder is missing, `path` is a folder, or the file is read-only.
+pub fn write_atomic(path: &Path, bytes: &[u8], fsync: bool) -> io::Result<()> {
+    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let old = match fs::metadata(&target) {
+        Ok(old) if old.is_dir() => return Err(fault(ErrorKind::IsADirectory, "is a folder; name a file in it")),
+        Ok(old) if !old.is_file() => return fs::write(&target, bytes),
+        Ok(old) if old.permissions().readonly() => {
+            return Err(fault(ErrorKind::PermissionDenied, "exists and is read-only; name another file"));
+        }
+        Ok(old) => Some(old.permissions()),
+        Err(e) if e.kind() == ErrorKind::NotFound => None,
+        Err(e) => return Err(e),
+    };
+    let folder = folder_of(&target);
+    if !folder.is_dir() {
+        let text = format!("folder {} does not exist; create it first", folder.display());
+        return Err(io::Error::new(ErrorKind::NotFound, text));
+    }
+    write_and_rename(&target, &folder, old, bytes, fsync)
+}
+
+fn write_and_rename(
+    target: &Path,
+    folder: &Path,
+    old: Option<Permissions>,
+    bytes: &[u8],
+    fsync: bool,
+) -> io::Result<()> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".meshray-");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // What creating a file asks for; the umask takes its part. Temporary files are private otherwise.
+        builder.permissions(Permissions::from_mode(0o666));
+    }
+    let mut file = builder.tempfile_in(folder)?;
+    file.write_all(bytes)?;
+    if let Some(permissions) = old {
+        file.as_file().set_permissions(permissions)?;
+    }
+    if fsync {
+        file.as_file().sync_all()?;
+    }
+    file.persist(target).map_err(|e| e.error)?;
+    if fsync && cfg!(unix) {
+        // The new name itself.
+        fs::File::open(folder)?.sync_all()?;
+    }
+    Ok(())
+}
+
+/// The folder a path lies in; that of a bare file name is the current one.
+fn folder_of(path: &Path) -> PathBuf {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
+        _ => PathBuf::from("."),
+    }
+}
+
+fn fault(kind: ErrorKind, text: &str) -> io::Error {
+    io::Error::new(kind, text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(dir: &Path) -> Vec<String> {
+        let mut names: Vec<String> =
+            fs::read_dir(dir).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_file_is_made_and_replaced_and_nothing_else_is_left() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        for (bytes, fsync) in [(b"one".as_slice(), false), (b"two, longer", true), (b"", false)] {
+            write_atomic(&path, bytes, fsync).unwrap();
+            assert_eq!(fs::read(&path).unwrap(), bytes);
+        }
+        assert_eq!(names(dir.path()), ["a.png"]);
+    }
+
+    #[test]
+    fn a_missing_folder_is_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let fault = write_atomic(&dir.path().join("out/a.png"), b"x", false).unwrap_err();
+        assert_eq!(fault.kind(), ErrorKind::NotFound);
+        assert!(fault.to_string().contains("out does not exist"), "{fault}");
+    }
+
+    #[test]
+    fn a_folder_is_not_replaced_and_a_failed_rename_leaves_nothing() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        fs::create_dir(&path).unwrap();
+        assert!(write_atomic(&path, b"x", false).unwrap_err().to_string().contains("is a folder"));
+        assert!(write_and_rename(&path, dir.path(), None, b"x", false).is_err());
+        assert_eq!(names(dir.path()), ["a.png"]);
+    }
+
+    #[test]
+    fn a_bare_name_lies_in_the_current_folder() {
+        assert_eq!(folder_of(Path::new("a.png")), Path::new("."));
+        assert_eq!(folder_of(Path::new("b/a.png")), Path::new("b"));
+    }
+
+    #[cfg(unix)]
+    mod unix {
+        use super::*;
+        use std::os::unix::fs::{PermissionsExt, symlink};
+
+        fn mode(path: &Path) -> u32 {
+            fs::metadata(path).unwrap().permissions().mode() & 0o777
+        }
+
+        #[test]
+        fn permissions_are_the_usual_ones_or_those_of_the_replaced_file() {
+            let dir = tempfile::tempdir().unwrap();
+            let (usual, ours) = (dir.path().join("usual"), dir.path().join("ours"));
+            fs::write(&usual, "x").unwrap();
+            write_atomic(&ours, b"x", false).unwrap();
+            assert_eq!(mode(&ours), mode(&usual));
+            fs::set_permissions(&ours, Permissions::from_mode(0o640)).unwrap();
+            write_atomic(&ours, b"y", false).unwrap();
+            assert_eq!(mode(&ours), 0o640);
+        }
+
+        #[test]
+        fn a_read_only_file_stays() {
+            let dir = tempfile::tempdir().unwrap();
+            let path = dir.path().join("a.png");
+            fs::write(&path, "old").unwrap();
+            fs::set_permissions(&path, Permissions::from_mode(0o444)).unwrap();
+            assert!(write_atomic(&path, b"new", false).unwrap_err().to_string().contains("read-only"));
+            assert_eq!(fs::read(&path).unwrap(), b"old");
+        }
+
+        #[test]
+        fn a_link_stays_a_link() {
+            let dir = tempfile::tempdir().unwrap();
+            let (real, link) = (dir.path().join("real.png"), dir.path().join("link.png"));
+            fs::write(&real, "old").unwrap();
+            symlink(&real, &link).unwrap();
+            write_atomic(&link, b"new", false).unwrap();
+            assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+            assert_eq!(fs::read(&real).unwrap(), b"new");
+        }
+
+        #[test]
+        fn a_device_is_written_straight() {
+            write_atomic(Path::new("/dev/null"), b"x", false).unwrap();
+            assert!(!fs::metadata("/dev/null").unwrap().is_file());
+        }
+    }
+}
