@@ -5,4 +5,5 @@
 
 pub use glam::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Vec2, Vec3, Vec4};
 
+pub mod ear_clip;
 pub mod frame;

@@ -1,0 +1,557 @@
+//! Cuts polygons into triangles by ear clipping with exact signs.
+//!
+//! G. H. Meisters, "Polygons Have Ears", 1975; signs by J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic
+//! and Fast Robust Geometric Predicates", 1997 (the crate `robust`).
+//!
+//! The polygon is seen along the axis of its Newell normal's largest component. An ear is cut only where no other
+//! corner lies in it or on its diagonal, so corners on straight runs stay corners of some triangle and no T-junction
+//! arises. A polygon with n corners whose boundary does not cross itself, bridges to holes included, gives n − 2
+//! triangles of positive area. Spikes that stick out are dropped first. Where no ear is left, three fallbacks follow:
+//! straight corners are cut off with triangles of no area; a polygon that crosses itself loses its first convex corner whatever lies inside;
+//! after [`MAX_FORCED`] of those the rest becomes a fan. Every corner is still used, what is covered twice or lost
+//! there is undefined.
+
+use super::{DVec2, DVec3};
+use robust::{Coord, orient2d};
+use std::collections::VecDeque;
+
+/// Corners cut off by force before a polygon that crosses itself is finished as a fan; bounds the time.
+pub const MAX_FORCED: u32 = 64;
+
+/// What kind of polygon it turned out to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// Every triangle is an ear: the boundary does not cross itself.
+    Exact,
+    /// It has spikes or no area: some triangles have no area.
+    Degenerate,
+    /// It crosses itself: the triangles are a guess.
+    Crossing,
+}
+
+/// Twice the area of the polygon along its mean normal (M. Newell), counter-clockwise positive; zero when it has none.
+pub fn newell(points: &[DVec3]) -> DVec3 {
+    let Some((&first, &last)) = points.first().zip(points.last()) else { return DVec3::ZERO };
+    // Relative to one corner, so that far coordinates do not cancel.
+    let cross = |a: DVec3, b: DVec3| (a - first).cross(b - first);
+    points.windows(2).map(|w| cross(w[0], w[1])).sum::<DVec3>() + cross(last, first)
+}
+
+/// The cutter; keeps its buffers from polygon to polygon.
+#[derive(Debug, Default)]
+pub struct EarClipper {
+    flat: Vec<Coord<f64>>,
+    prev: Vec<u32>,
+    next: Vec<u32>,
+    /// Whether a corner is strictly convex; others can block ears.
+    convex: Vec<bool>,
+    alive: Vec<bool>,
+    /// Corners that are not convex, ordered along the longer side.
+    blockers: Vec<u32>,
+    along_y: bool,
+    /// Corners to look at, with the value of `ticket` that makes the entry valid.
+    queue: VecDeque<(u32, u32)>,
+    ticket: Vec<u32>,
+    left: usize,
+}
+
+impl EarClipper {
+    /// Appends triangles of corner numbers of `points` to `out`, wound as the polygon is.
+    ///
+    /// Coordinates must be finite. Corners equal to the one before them are left out; triangles with two equal corners
+    /// are never made.
+    pub fn cut(&mut self, points: &[DVec3], out: &mut Vec<[u32; 3]>) -> Outcome {
+        let ring = distinct_neighbours(points);
+        match ring.len() {
+            0..3 => Outcome::Degenerate,
+            3 => {
+                out.push([ring[0], ring[1], ring[2]]);
+                Outcome::Exact
+            }
+            _ => {
+                let normal = any_normal(points);
+                self.flat.clear();
+                self.flat.extend(points.iter().map(|&p| project(p, normal)));
+                match convex_quad(&self.flat, points, &ring) {
+                    Some(pair) => {
+                        out.extend(pair);
+                        Outcome::Exact
+                    }
+                    None => self.clip(&ring, out),
+                }
+            }
+        }
+    }
+
+    fn clip(&mut self, ring: &[u32], out: &mut Vec<[u32; 3]>) -> Outcome {
+        self.link(ring);
+        let mut outcome = Outcome::Exact;
+        let mut forced = 0;
+        loop {
+            // Cut ears until none is left that a neighbour's ear has not disturbed, then look at every corner once.
+            self.clip_queued(out);
+            if self.left <= 3 {
+                return self.finish(outcome, out);
+            }
+            self.queue_all();
+            if self.clip_queued(out) {
+                continue;
+            }
+
+            // No ear is left: straight corners and spikes, then a corner by force.
+            if self.clip_straight(out) {
+                outcome = outcome.max(Outcome::Degenerate);
+            } else {
+                outcome = Outcome::Crossing;
+                forced += 1;
+                let i = self.first(|c, i| c.convex[i as usize]).or_else(|| self.first(|_, _| true));
+                match i {
+                    Some(i) if forced <= MAX_FORCED => self.remove(i, out),
+                    _ => return self.fan(out),
+                }
+            }
+        }
+    }
+
+    /// Makes the linked ring and the list of blockers.
+    fn link(&mut self, ring: &[u32]) {
+        let n = self.flat.len();
+        for list in [&mut self.prev, &mut self.next, &mut self.ticket] {
+            list.clear();
+            list.resize(n, 0);
+        }
+        self.alive.clear();
+        self.alive.resize(n, false);
+        self.convex.clear();
+        self.convex.resize(n, false);
+        self.left = ring.len();
+        let followers = ring.iter().cycle().skip(1);
+        for (&i, &j) in ring.iter().zip(followers) {
+            self.next[i as usize] = j;
+            self.prev[j as usize] = i;
+            self.alive[i as usize] = true;
+        }
+        self.drop_antennas(ring);
+        for &i in ring {
+            self.convex[i as usize] = self.alive[i as usize] && self.turn(i) > 0.0;
+        }
+        self.sort_blockers(ring);
+        self.queue.clear();
+        self.queue_all();
+    }
+
+    /// Takes out tips whose two neighbours are in one place, unless they point into the polygon (a slit).
+    fn drop_antennas(&mut self, ring: &[u32]) {
+        for &start in ring {
+            let mut tip = start;
+            while self.left > 3 && self.alive[tip as usize] {
+                let (a, b) = (self.prev[tip as usize], self.next[tip as usize]);
+                if self.flat[a as usize] != self.flat[b as usize] || self.points_inwards(tip) {
+                    break;
+                }
+                // What remains at the antenna's foot is one corner, perhaps the tip of a longer antenna.
+                let after = self.next[b as usize];
+                self.next[a as usize] = after;
+                self.prev[after as usize] = a;
+                self.alive[tip as usize] = false;
+                self.alive[b as usize] = false;
+                self.left -= 2;
+                tip = a;
+            }
+        }
+    }
+
+    /// Whether the tip of a spike lies in the angle at its foot that is inside the polygon.
+    fn points_inwards(&self, tip: u32) -> bool {
+        let foot = self.prev[tip as usize];
+        let (before, after) = (self.prev[foot as usize], self.next[self.next[tip as usize] as usize]);
+        let (left_of_first, left_of_second) = (self.sign(before, foot, tip) > 0.0, self.sign(foot, after, tip) > 0.0);
+        if self.sign(before, foot, after) > 0.0 {
+            left_of_first && left_of_second
+        } else {
+            self.flat[before as usize] != self.flat[after as usize] && (left_of_first || left_of_second)
+        }
+    }
+
+    fn sort_blockers(&mut self, ring: &[u32]) {
+        let (mut lo, mut hi) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        for &i in ring {
+            let p = self.flat[i as usize];
+            (lo, hi) = (lo.min(DVec2::new(p.x, p.y)), hi.max(DVec2::new(p.x, p.y)));
+        }
+        self.along_y = hi.y - lo.y > hi.x - lo.x;
+        self.blockers.clear();
+        self.blockers.extend(ring.iter().filter(|&&i| self.alive[i as usize] && !self.convex[i as usize]));
+        let mut blockers = std::mem::take(&mut self.blockers);
+        blockers.sort_by(|&a, &b| self.along(a).total_cmp(&self.along(b)));
+        self.blockers = blockers;
+    }
+
+    /// Coordinate along the longer side.
+    fn along(&self, i: u32) -> f64 {
+        let p = self.flat[i as usize];
+        if self.along_y { p.y } else { p.x }
+    }
+
+    /// Positive where the boundary turns left at corner i.
+    fn turn(&self, i: u32) -> f64 {
+        self.sign(self.prev[i as usize], i, self.next[i as usize])
+    }
+
+    fn sign(&self, a: u32, b: u32, c: u32) -> f64 {
+        orient2d(self.flat[a as usize], self.flat[b as usize], self.flat[c as usize])
+    }
+
+    fn queue_all(&mut self) {
+        for i in 0..self.flat.len() {
+            if self.alive[i] {
+                #[expect(clippy::cast_possible_truncation, reason = "corner numbers are u32")]
+                self.enqueue(i as u32);
+            }
+        }
+    }
+
+    fn enqueue(&mut self, i: u32) {
+        self.ticket[i as usize] += 1;
+        self.queue.push_back((i, self.ticket[i as usize]));
+    }
+
+    /// Cuts every ear the queue leads to; whether there was one.
+    ///
+    /// The neighbours of a cut ear go to the end of the queue, which keeps triangles from becoming a fan of slivers.
+    fn clip_queued(&mut self, out: &mut Vec<[u32; 3]>) -> bool {
+        let before = self.left;
+        while let Some((i, ticket)) = self.queue.pop_front() {
+            if self.left > 3 && self.alive[i as usize] && ticket == self.ticket[i as usize] && self.is_ear(i) {
+                self.remove(i, out);
+            }
+        }
+        self.left < before
+    }
+
+    fn is_ear(&self, i: u32) -> bool {
+        if !self.convex[i as usize] {
+            return false;
+        }
+        let (p, n) = (self.prev[i as usize], self.next[i as usize]);
+        let corners = [p, i, n];
+        let lo = corners.iter().map(|&c| self.along(c)).fold(f64::INFINITY, f64::min);
+        let hi = corners.iter().map(|&c| self.along(c)).fold(f64::NEG_INFINITY, f64::max);
+        let first = self.blockers.partition_point(|&q| self.along(q) < lo);
+        let near = self.blockers[first..].iter().take_while(|&&q| self.along(q) <= hi);
+        !near.into_iter().any(|&q| self.alive[q as usize] && !self.convex[q as usize] && self.blocks(q, corners))
+    }
+
+    /// Whether corner q lies in the closed triangle, but not in the place of one of its corners (the two sides of a
+    /// bridge to a hole share places).
+    fn blocks(&self, q: u32, [a, b, c]: [u32; 3]) -> bool {
+        let same_place = |i: u32| self.flat[i as usize] == self.flat[q as usize];
+        self.sign(a, b, q) >= 0.0
+            && self.sign(b, c, q) >= 0.0
+            && self.sign(c, a, q) >= 0.0
+            && !(same_place(a) || same_place(b) || same_place(c))
+    }
+
+    /// Takes corner i out of the ring and makes its triangle, unless two of its corners are in one place.
+    fn remove(&mut self, i: u32, out: &mut Vec<[u32; 3]>) {
+        let (p, n) = (self.prev[i as usize], self.next[i as usize]);
+        self.emit([p, i, n], out);
+        self.next[p as usize] = n;
+        self.prev[n as usize] = p;
+        self.alive[i as usize] = false;
+        self.left -= 1;
+        for k in [p, n] {
+            self.convex[k as usize] = self.turn(k) > 0.0;
+            self.enqueue(k);
+        }
+    }
+
+    fn emit(&self, t: [u32; 3], out: &mut Vec<[u32; 3]>) {
+        let [a, b, c] = t.map(|i| self.flat[i as usize]);
+        if a != b && b != c && c != a {
+            out.push(t);
+        }
+    }
+
+    /// Takes every straight corner and spike out of the ring; whether there was one.
+    fn clip_straight(&mut self, out: &mut Vec<[u32; 3]>) -> bool {
+        let before = self.left;
+        for i in 0..self.flat.len() {
+            #[expect(clippy::cast_possible_truncation, reason = "corner numbers are u32")]
+            let i = i as u32;
+            if self.left > 3 && self.alive[i as usize] && self.turn(i) == 0.0 {
+                self.remove(i, out);
+            }
+        }
+        self.left < before
+    }
+
+    /// The first corner left that is as wanted.
+    fn first(&self, wanted: impl Fn(&Self, u32) -> bool) -> Option<u32> {
+        #[expect(clippy::cast_possible_truncation, reason = "corner numbers are u32")]
+        (0..self.flat.len() as u32).find(|&i| self.alive[i as usize] && wanted(self, i))
+    }
+
+    /// The last triangle.
+    fn finish(&self, outcome: Outcome, out: &mut Vec<[u32; 3]>) -> Outcome {
+        let Some(i) = self.first(|_, _| true) else { return outcome };
+        self.emit([self.prev[i as usize], i, self.next[i as usize]], out);
+        match self.turn(i) {
+            turn if turn > 0.0 => outcome,
+            0.0 => outcome.max(Outcome::Degenerate),
+            _ => Outcome::Crossing,
+        }
+    }
+
+    /// What is left of a hopeless polygon.
+    fn fan(&self, out: &mut Vec<[u32; 3]>) -> Outcome {
+        if let Some(apex) = self.first(|_, _| true) {
+            let mut i = self.next[apex as usize];
+            while self.next[i as usize] != apex {
+                self.emit([apex, i, self.next[i as usize]], out);
+                i = self.next[i as usize];
+            }
+        }
+        Outcome::Crossing
+    }
+}
+
+impl Outcome {
+    /// The worse of both.
+    fn max(self, other: Self) -> Self {
+        if matches!(self, Self::Crossing) { self } else { other }
+    }
+}
+
+/// Corner numbers without those in the place of the corner before them.
+fn distinct_neighbours(points: &[DVec3]) -> Vec<u32> {
+    let before = points.iter().cycle().skip(points.len().saturating_sub(1));
+    #[expect(clippy::cast_possible_truncation, reason = "corner numbers are u32")]
+    let distinct = points.iter().zip(before).enumerate().filter(|(_, (p, q))| p != q).map(|(i, _)| i as u32);
+    distinct.collect()
+}
+
+/// The Newell normal; where loops cancel each other, that of the largest corner triangle; for a straight polygon the
+/// axis along which it is shortest.
+fn any_normal(points: &[DVec3]) -> DVec3 {
+    let normal = newell(points);
+    if normal != DVec3::ZERO {
+        return normal;
+    }
+    let corner = |w: &[DVec3]| (w[1] - w[0]).cross(w[2] - w[0]);
+    let corners = points.windows(3).map(corner).filter(|&c| c != DVec3::ZERO);
+    corners.max_by(|a, b| a.length_squared().total_cmp(&b.length_squared())).unwrap_or_else(|| {
+        let box_of = |pick: fn(DVec3, DVec3) -> DVec3| points.iter().copied().reduce(pick).unwrap_or_default();
+        let size = box_of(DVec3::max) - box_of(DVec3::min);
+        if size.x <= size.y && size.x <= size.z {
+            DVec3::X
+        } else if size.y <= size.z {
+            DVec3::Y
+        } else {
+            DVec3::Z
+        }
+    })
+}
+
+/// Drops the axis of the normal's largest component, so that counter-clockwise stays counter-clockwise.
+fn project(p: DVec3, normal: DVec3) -> Coord<f64> {
+    let size = normal.abs();
+    let (x, y, towards) = if size.x >= size.y && size.x >= size.z {
+        (p.y, p.z, normal.x)
+    } else if size.y >= size.z {
+        (p.z, p.x, normal.y)
+    } else {
+        (p.x, p.y, normal.z)
+    };
+    if towards < 0.0 { Coord { x: y, y: x } } else { Coord { x, y } }
+}
+
+/// A strictly convex quad is cut along its shorter diagonal; at equal length along the one from its first corner.
+fn convex_quad(flat: &[Coord<f64>], points: &[DVec3], ring: &[u32]) -> Option<[[u32; 3]; 2]> {
+    let &[a, b, c, d] = ring else { return None };
+    let at = |i: u32| flat[i as usize];
+    let left = |i, j, k| orient2d(at(i), at(j), at(k)) > 0.0;
+    if !(left(a, b, c) && left(b, c, d) && left(c, d, a) && left(d, a, b)) {
+        return None;
+    }
+    let length = |i: u32, j: u32| points[i as usize].distance_squared(points[j as usize]);
+    Some(if length(b, d) < length(a, c) { [[a, b, d], [b, c, d]] } else { [[a, b, c], [a, c, d]] })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::HashMap;
+
+    fn plane(points: &[(i32, i32)]) -> Vec<DVec3> {
+        points.iter().map(|&(x, y)| DVec3::new(f64::from(x), f64::from(y), 0.0)).collect()
+    }
+
+    fn cut(points: &[DVec3]) -> (Vec<[u32; 3]>, Outcome) {
+        let mut out = Vec::new();
+        let outcome = EarClipper::default().cut(points, &mut out);
+        (out, outcome)
+    }
+
+    fn area2(points: &[DVec3], t: [u32; 3]) -> f64 {
+        let [a, b, c] = t.map(|i| points[i as usize]);
+        (b - a).cross(c - a).z
+    }
+
+    /// Exact for small integers: all areas positive, their sum the polygon's, n − 2 triangles, every side of the
+    /// polygon the side of exactly one triangle, every other side shared by two.
+    fn assert_exact(points: &[DVec3]) {
+        let (triangles, outcome) = cut(points);
+        assert_eq!(outcome, Outcome::Exact, "{points:?}");
+        assert_eq!(triangles.len(), points.len() - 2);
+        assert!(triangles.iter().all(|&t| area2(points, t) > 0.0), "{triangles:?}");
+        assert_eq!(triangles.iter().map(|&t| area2(points, t)).sum::<f64>(), newell(points).z);
+        let mut sides: HashMap<(u32, u32), i32> = HashMap::new();
+        for [a, b, c] in triangles {
+            [(a, b), (b, c), (c, a)].iter().for_each(|&s| *sides.entry(s).or_default() += 1);
+        }
+        let n = points.len() as u32;
+        for (&(a, b), &count) in &sides {
+            let boundary = (a + 1) % n == b;
+            assert_eq!(count, 1);
+            assert_eq!(sides.contains_key(&(b, a)), !boundary, "side {a}-{b} of {points:?}");
+        }
+    }
+
+    #[test]
+    fn a_concave_arrow_is_cut_inside_its_notch() {
+        assert_exact(&plane(&[(0, 0), (4, 0), (1, 1), (0, 4)]));
+        assert_exact(&plane(&[(0, 4), (0, 0), (4, 0), (1, 1)]));
+        assert_exact(&plane(&[(0, 0), (5, 0), (5, 5), (4, 1), (3, 5), (2, 1), (1, 5)]));
+    }
+
+    #[test]
+    fn corners_on_straight_sides_stay_corners() {
+        assert_exact(&plane(&[(0, 0), (1, 0), (2, 0), (3, 0), (0, 3)]));
+        assert_exact(&plane(&[(0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (0, 1)]));
+        assert_exact(&plane(&[(0, 0), (1, 0), (2, 0), (2, 2)]));
+    }
+
+    #[test]
+    fn a_hole_joined_by_a_bridge_stays_open() {
+        let square = [(0, 0), (6, 0), (6, 6), (0, 6), (0, 0), (2, 2), (2, 4), (4, 4), (4, 2), (2, 2)];
+        assert_exact(&plane(&square));
+        // The bridge may touch the hole's ring anywhere, and two holes may share the place of one corner.
+        let two = [
+            (0, 0),
+            (9, 0),
+            (9, 9),
+            (0, 9),
+            (0, 0),
+            (1, 5),
+            (1, 6),
+            (2, 6),
+            (2, 5),
+            (1, 5),
+            (0, 0),
+            (5, 1),
+            (5, 2),
+            (6, 2),
+            (6, 1),
+            (5, 1),
+        ];
+        assert_exact(&plane(&two));
+    }
+
+    #[test]
+    fn spikes_and_repeated_corners_are_cut_off() {
+        let (triangles, outcome) = cut(&plane(&[(0, 0), (4, 0), (9, 0), (4, 0), (4, 4), (0, 4)]));
+        assert_ne!(outcome, Outcome::Crossing);
+        let points = plane(&[(0, 0), (4, 0), (9, 0), (4, 0), (4, 4), (0, 4)]);
+        assert_eq!(triangles.iter().map(|&t| area2(&points, t)).sum::<f64>(), 32.0);
+
+        let repeated = plane(&[(0, 0), (0, 0), (4, 0), (4, 4), (4, 4), (0, 4), (0, 0)]);
+        let (triangles, outcome) = cut(&repeated);
+        assert_eq!((triangles.len(), outcome), (2, Outcome::Exact));
+    }
+
+    #[test]
+    fn a_polygon_without_area_keeps_its_distinct_corners_and_is_told() {
+        let (triangles, outcome) = cut(&plane(&[(0, 0), (1, 0), (2, 0), (3, 0)]));
+        assert_eq!(outcome, Outcome::Degenerate);
+        for corner in 0..4 {
+            assert!(triangles.iter().flatten().any(|&c| c == corner), "{triangles:?}");
+        }
+        assert_eq!(cut(&plane(&[(1, 1), (1, 1), (1, 1), (1, 1)])).0, [[0u32; 3]; 0]);
+        assert_eq!(cut(&plane(&[(0, 0), (1, 1), (0, 0), (1, 1)])).0, [[0u32; 3]; 0]);
+        assert_eq!(cut(&[]).0, [[0u32; 3]; 0]);
+    }
+
+    #[test]
+    fn a_polygon_that_crosses_itself_still_ends_and_is_told() {
+        assert_eq!(cut(&plane(&[(0, 0), (4, 4), (4, 0), (0, 4)])).1, Outcome::Crossing);
+        let knot: Vec<_> = (0..2000).map(|i| (i * 7919 % 1009, i * 104_729 % 997)).collect();
+        let (triangles, outcome) = cut(&plane(&knot));
+        assert_eq!(outcome, Outcome::Crossing);
+        assert!(triangles.len() > 1000);
+    }
+
+    #[test]
+    fn a_warped_quad_is_cut_along_the_shorter_diagonal_and_a_tie_at_its_first_corner() {
+        let warped = |z: f64| [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, z), DVec3::Y];
+        assert_eq!(cut(&warped(0.5)).0, [[0, 1, 3], [1, 2, 3]]);
+        assert_eq!(cut(&warped(0.0)).0, [[0, 1, 2], [0, 2, 3]]);
+    }
+
+    #[test]
+    fn a_polygon_seen_along_any_axis_from_either_side_keeps_its_winding() {
+        let flat = plane(&[(0, 0), (4, 0), (1, 1), (0, 4)]);
+        let turns: [fn(DVec3) -> DVec3; 3] = [|p| p, |p| DVec3::new(p.z, p.x, p.y), |p| DVec3::new(p.y, p.z, p.x)];
+        for turn in turns {
+            let mut points: Vec<_> = flat.iter().map(|&p| turn(p)).collect();
+            for _ in 0..2 {
+                let normal = newell(&points);
+                let (triangles, outcome) = cut(&points);
+                assert_eq!(outcome, Outcome::Exact);
+                for t in triangles {
+                    let [a, b, c] = t.map(|i| points[i as usize]);
+                    assert!((b - a).cross(c - a).dot(normal) > 0.0);
+                }
+                points.reverse();
+            }
+        }
+    }
+
+    #[test]
+    fn a_comb_of_ten_thousand_teeth_is_cut_in_a_moment() {
+        let teeth = (0..10_000).flat_map(|i| [(i * 2, if i % 3 == 0 { 1000 } else { 900 }), (i * 2 + 1, 1)]);
+        let mut points: Vec<_> = [(20_000, 0), (-1, 0)].into_iter().collect();
+        points.extend(teeth);
+        points.reverse();
+        assert_exact(&plane(&points));
+    }
+
+    proptest! {
+        /// Corners sorted around the origin make a polygon that does not cross itself; straight runs are frequent on
+        /// so coarse a lattice.
+        #[test]
+        fn polygons_around_a_point_are_cut_exactly(corners in prop::collection::vec((-6i32..7, -6i32..7), 3..40)) {
+            let mut by_angle: Vec<(i32, i32)> = corners.into_iter().filter(|&c| c != (0, 0)).collect();
+            by_angle.sort_by(|a, b| f64::from(a.1).atan2(f64::from(a.0)).total_cmp(&f64::from(b.1).atan2(f64::from(b.0))));
+            by_angle.dedup_by(|a, b| a.0 * b.1 == a.1 * b.0 && a.0 * b.0 + a.1 * b.1 > 0);
+            // The origin must lie inside: neighbours less than half a turn apart.
+            let n = by_angle.len();
+            let turns_left = |i: usize| {
+                let (a, b) = (by_angle[i], by_angle[(i + 1) % n]);
+                a.0 * b.1 - a.1 * b.0 > 0
+            };
+            prop_assume!(n >= 4 && (0..n).all(turns_left));
+            assert_exact(&plane(&by_angle));
+        }
+
+        #[test]
+        fn any_ring_of_points_ends_without_a_triangle_of_equal_corners(
+            corners in prop::collection::vec((-3i32..4, -3i32..4, -1i32..2), 0..30)
+        ) {
+            let points: Vec<_> = corners.iter().map(|&(x, y, z)| DVec3::new(f64::from(x), f64::from(y), f64::from(z))).collect();
+            let (triangles, _) = cut(&points);
+            prop_assert!(triangles.len() <= points.len().saturating_sub(2));
+        }
+    }
+}
