@@ -4,6 +4,9 @@
 //! the world is `f64`. Units are metres, angles radians, colours linear Rec. 709, unless a field says otherwise.
 
 pub mod camera;
+pub mod default_light;
+pub mod features;
+pub mod framing;
 pub mod hints;
 pub mod light;
 pub mod material;

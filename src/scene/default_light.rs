@@ -1,0 +1,136 @@
+//! Light for scenes that bring none, so that a bare mesh looks right.
+//!
+//! The key and fill lights belong to the camera: whatever side is seen, it is lit from the upper left and softened
+//! from the right, and nothing is lit from behind only. The studio around it all (`render::studio`) stays with the model.
+
+use super::{Camera, Environment, Light, LightKind, Scene, Surface};
+use crate::math::{DVec3, Vec3};
+
+/// What [`add_if_missing`] did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DefaultLight {
+    /// Key, fill and studio were added.
+    Added,
+    /// The scene has its own light.
+    NotMissing,
+    /// The scene file asked for none.
+    NotWanted,
+    /// Nothing in the scene answers to light.
+    NotNeeded,
+}
+
+/// Illuminance of the key and fill lights on a face turned to them, lux; white paint returns a π-th of it.
+const KEY: f32 = 1.15;
+const FILL: f32 = 0.35;
+
+/// Where they stand, in camera space: +x right, +y up, +z towards the viewer.
+const KEY_FROM: DVec3 = DVec3::new(-0.55, 0.75, 0.65);
+const FILL_FROM: DVec3 = DVec3::new(0.85, 0.15, 0.55);
+
+/// Adds key, fill and studio, as seen from `camera`, to a scene without any light.
+///
+/// Light is a lamp, an ambient term or an environment; a material that glows is not. A scene whose every material is
+/// unlit needs none. The fill throws no shadows: it stands for light from all over that side.
+pub fn add_if_missing(scene: &mut Scene, camera: &Camera) -> DefaultLight {
+    if scene.hints.default_light == Some(false) {
+        return DefaultLight::NotWanted;
+    }
+    let own_environment = !matches!(scene.environment, Environment::Black | Environment::Studio);
+    if !scene.lights.is_empty() || scene.ambient != Vec3::ZERO || own_environment {
+        return DefaultLight::NotMissing;
+    }
+    if !scene.materials.is_empty() && scene.materials.iter().all(|m| matches!(m.surface, Surface::Unlit)) {
+        return DefaultLight::NotNeeded;
+    }
+    scene.lights = vec![lamp("key", KEY, KEY_FROM, true, camera), lamp("fill", FILL, FILL_FROM, false, camera)];
+    scene.environment = Environment::Studio;
+    DefaultLight::Added
+}
+
+/// A directional light that comes from `from` in camera space.
+fn lamp(name: &str, lux: f32, from: DVec3, shadows: bool, camera: &Camera) -> Light {
+    let travels = camera.world_from_camera.transform_vector3(-from).normalize_or(DVec3::NEG_Y);
+    Light {
+        name: name.into(),
+        intensity: Vec3::splat(lux),
+        kind: LightKind::Directional { direction: travels },
+        shadows,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::DAffine3;
+    use crate::scene::{Material, Projection};
+
+    fn behind() -> Camera {
+        // Stands at −z and looks along +z.
+        let world_from_camera = DAffine3::from_rotation_y(std::f64::consts::PI);
+        Camera {
+            name: String::new(),
+            projection: Projection::Orthographic { x_mag: 1.0, y_mag: 1.0 },
+            world_from_camera,
+        }
+    }
+
+    #[test]
+    fn the_seen_side_is_lit_wherever_the_camera_stands() {
+        let mut scene = Scene { materials: vec![Material::plain()], ..Scene::default() };
+        assert_eq!(add_if_missing(&mut scene, &behind()), DefaultLight::Added);
+        assert_eq!((scene.lights.len(), scene.environment), (2, Environment::Studio));
+        for light in &scene.lights {
+            let LightKind::Directional { direction } = light.kind else { panic!("a default light is directional") };
+            assert!(direction.dot(DVec3::Z) > 0.3, "{}", light.name);
+        }
+    }
+
+    #[test]
+    fn scenes_with_light_of_their_own_keep_it_alone() {
+        let lamp = lamp("own", 1.0, DVec3::Z, true, &behind());
+        let mut own = [
+            Scene { lights: vec![lamp], ..Scene::default() },
+            Scene { ambient: Vec3::splat(0.2), ..Scene::default() },
+            Scene { environment: Environment::Constant(Vec3::ONE), ..Scene::default() },
+        ];
+        for scene in &mut own {
+            let lights = scene.lights.len();
+            assert_eq!(add_if_missing(scene, &behind()), DefaultLight::NotMissing);
+            assert_eq!(scene.lights.len(), lights);
+        }
+    }
+
+    #[test]
+    fn unlit_scenes_and_scenes_that_want_darkness_get_nothing() {
+        let unlit = Material { surface: Surface::Unlit, ..Material::default() };
+        let mut scene = Scene { materials: vec![unlit], ..Scene::default() };
+        assert_eq!(add_if_missing(&mut scene, &behind()), DefaultLight::NotNeeded);
+        let mut scene = Scene::default();
+        scene.hints.default_light = Some(false);
+        assert_eq!(add_if_missing(&mut scene, &behind()), DefaultLight::NotWanted);
+        assert!(scene.lights.is_empty() && scene.environment == Environment::Black);
+    }
+
+    #[test]
+    fn white_paint_in_the_default_light_is_bright_and_not_blown_out() {
+        let mut scene = Scene::default();
+        add_if_missing(&mut scene, &behind());
+        let (mut brightest, mut facing) = (0.0f32, 0.0);
+        for i in 0..2000u32 {
+            // Directions on a spiral over the sphere.
+            let (y, turn) = (1.0 - f64::from(2 * i + 1) / 2000.0, f64::from(i) * 2.399_963);
+            let r = (1.0 - y * y).sqrt();
+            let normal = DVec3::new(r * libm::cos(turn), y, r * libm::sin(turn));
+            let mut paint = crate::render::studio::diffuse(normal.as_vec3()).x;
+            for light in &scene.lights {
+                let LightKind::Directional { direction } = light.kind else { continue };
+                paint += light.intensity.x * (-direction.dot(normal)).max(0.0) as f32 / std::f32::consts::PI;
+            }
+            brightest = brightest.max(paint);
+            if normal.dot(DVec3::NEG_Z) > 0.99 {
+                facing = paint;
+            }
+        }
+        assert!(brightest < 0.95 && (0.45..0.8).contains(&facing), "{brightest}, {facing} facing the eye");
+    }
+}

@@ -1,0 +1,246 @@
+//! The box of the model without its strays: parts so few, so small and so far away that nobody meant them to be seen.
+
+use crate::math::DVec3;
+use crate::scene::Scene;
+
+/// What there is to see.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Least corner of the box of the model; world space, finite.
+    pub lo: DVec3,
+    /// Greatest corner.
+    pub hi: DVec3,
+    /// Faces and spheres left out as strays.
+    pub strays: u64,
+    /// Box of everything, strays too; equal to `lo`, `hi` when there are none.
+    pub whole: (DVec3, DVec3),
+}
+
+/// Strays together own at most this share of the area …
+const STRAY_AREA: f64 = 0.01;
+/// … and at most this share of the faces …
+const STRAY_COUNT: f64 = 0.1;
+/// … and lie beyond an empty gap of at least this share of the model's size.
+const GAP: f64 = 0.5;
+
+/// Slices a box is cut into along each axis to look for gaps.
+const SLICES: usize = 256;
+
+/// Facing is told apart from not facing by this much: closed bodies, whose faces cancel, face no way.
+pub(super) const AWAY: f64 = -0.1;
+
+impl Bounds {
+    /// The middle of the box.
+    pub fn center(&self) -> DVec3 {
+        self.lo * 0.5 + self.hi * 0.5
+    }
+
+    /// Half the diagonal, greater than 0.
+    pub fn radius(&self) -> f64 {
+        let radius = (self.hi - self.lo).length() * 0.5;
+        if radius > 0.0 && radius.is_finite() { radius } else { 1.0 }
+    }
+
+    /// Whether a point of the model lies in the box.
+    pub(super) fn contains(&self, p: DVec3) -> bool {
+        p.cmpge(self.lo).all() && p.cmple(self.hi).all()
+    }
+}
+
+/// Finds the box of the model.
+///
+/// Space is cut into slices along each axis. Where an empty gap at least half as long as the model parts off an end
+/// with hardly any faces and area, that end is stray; the search goes on in what is left until nothing more comes off.
+/// Whatever is connected to the model, however thin, is part of it. A scene with nothing bounded gets the unit box
+/// around the origin.
+pub fn robust_bounds(scene: &Scene) -> Bounds {
+    let Some(whole) = hull(scene, |_| true) else {
+        let unit = (DVec3::splat(-0.5), DVec3::splat(0.5));
+        return Bounds { lo: unit.0, hi: unit.1, strays: 0, whole: unit };
+    };
+    let mut bounds = Bounds { lo: whole.0, hi: whole.1, strays: 0, whole };
+    // Each round zooms in by up to SLICES; the range of f64 needs far fewer than this many.
+    for _ in 0..128 {
+        let slices = Slices::new(scene, &bounds);
+        let Some(core) = slices.core() else { break };
+        let kept = |part: &Part| bounds.contains(part.center) && slices.lies_in(&core, part.center);
+        let Some((lo, hi)) = hull(scene, kept) else { break };
+        if (lo, hi) == (bounds.lo, bounds.hi) {
+            break;
+        }
+        (bounds.lo, bounds.hi) = (lo, hi);
+    }
+    visit(scene, |part| bounds.strays += u64::from(!bounds.contains(part.lo) || !bounds.contains(part.hi)));
+    bounds
+}
+
+/// The mean direction of all faces weighted by area: length 1 for a card, 0 for a closed body.
+pub(super) fn facing(scene: &Scene) -> DVec3 {
+    let (mut sum, mut area) = (DVec3::ZERO, 0.0);
+    visit(scene, |part| {
+        sum += part.normal;
+        area += part.normal.length();
+    });
+    if area > 0.0 { sum / area } else { DVec3::ZERO }
+}
+
+/// A face or sphere.
+struct Part {
+    lo: DVec3,
+    hi: DVec3,
+    center: DVec3,
+    /// As long as the area.
+    normal: DVec3,
+    area: f64,
+}
+
+/// Box of the parts that `keep` wants; `None` when there are none.
+fn hull(scene: &Scene, keep: impl Fn(&Part) -> bool) -> Option<(DVec3, DVec3)> {
+    let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    visit(scene, |part| {
+        if keep(&part) {
+            (lo, hi) = (lo.min(part.lo), hi.max(part.hi));
+        }
+    });
+    lo.cmple(hi).all().then_some((lo, hi))
+}
+
+/// Calls `f` for every face and sphere with finite corners.
+fn visit(scene: &Scene, mut f: impl FnMut(Part)) {
+    let mut face = |a: DVec3, b: DVec3, c: DVec3, box_of: (DVec3, DVec3)| {
+        if box_of.0.is_finite() && box_of.1.is_finite() {
+            let normal = (b - a).cross(c - a) * 0.5;
+            f(Part { lo: box_of.0, hi: box_of.1, center: (a + b + c) / 3.0, normal, area: normal.length() });
+        }
+    };
+    for instance in &scene.instances {
+        let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
+        let corner = |i: u32| {
+            let p = mesh.positions.get(i as usize).copied().unwrap_or_default();
+            instance.world_from_object.transform_point3(p.as_dvec3())
+        };
+        for triangle in &mesh.triangles {
+            let [a, b, c] = triangle.map(corner);
+            face(a, b, c, (a.min(b).min(c), a.max(b).max(c)));
+        }
+        // A polygon counts as the fan of triangles around its first corner.
+        for polygon in &mesh.polygons {
+            let run = polygon.first as usize..(polygon.first + polygon.len) as usize;
+            let corners = mesh.polygon_corners.get(run).unwrap_or_default();
+            for pair in corners.windows(2).skip(1) {
+                let [a, b, c] = [corners[0], pair[0], pair[1]].map(corner);
+                face(a, b, c, (a.min(b).min(c), a.max(b).max(c)));
+            }
+        }
+    }
+    for sphere in &scene.spheres {
+        let (lo, hi) = (sphere.center - sphere.radius, sphere.center + sphere.radius);
+        let area = 4.0 * std::f64::consts::PI * sphere.radius * sphere.radius;
+        f(Part { lo, hi, center: sphere.center, normal: DVec3::ZERO, area });
+    }
+}
+
+/// How much of the model lies in each slice along each axis.
+struct Slices {
+    lo: DVec3,
+    width: DVec3,
+    /// Per axis and slice: whether a part reaches in.
+    covered: [[bool; SLICES]; 3],
+    /// Per axis and slice: area and number of the parts with their centre there.
+    area: [[f64; SLICES]; 3],
+    count: [[u64; SLICES]; 3],
+}
+
+impl Slices {
+    /// Cuts the box of `bounds` and sorts the parts inside into its slices.
+    fn new(scene: &Scene, bounds: &Bounds) -> Self {
+        let width = (bounds.hi - bounds.lo) / SLICES as f64;
+        let mut slices = Self {
+            lo: bounds.lo,
+            width,
+            covered: [[false; SLICES]; 3],
+            area: [[0.0; SLICES]; 3],
+            count: [[0; SLICES]; 3],
+        };
+        visit(scene, |part| {
+            if bounds.contains(part.center) {
+                slices.add(&part);
+            }
+        });
+        slices
+    }
+
+    fn add(&mut self, part: &Part) {
+        for axis in 0..3 {
+            let (first, last) = (self.slice(axis, part.lo[axis]), self.slice(axis, part.hi[axis]));
+            self.covered[axis][first..=last].fill(true);
+            let middle = self.slice(axis, part.center[axis]);
+            self.area[axis][middle] += part.area;
+            self.count[axis][middle] += 1;
+        }
+    }
+
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the slices there are")]
+    fn slice(&self, axis: usize, x: f64) -> usize {
+        if self.width[axis] <= 0.0 {
+            return 0;
+        }
+        ((x - self.lo[axis]) / self.width[axis]).clamp(0.0, (SLICES - 1) as f64) as usize
+    }
+
+    /// First and last slice along each axis without the ends that come off; `None` when nothing comes off.
+    ///
+    /// Slices, not coordinates: beside a stray at 1e20 the model's own box could not be told from its centre.
+    fn core(&self) -> Option<[(usize, usize); 3]> {
+        let size = (0..3).map(|axis| self.size(axis)).fold(0.0, f64::max);
+        let kept = [0, 1, 2].map(|axis| {
+            let last = SLICES - 1 - self.cut(axis, size, |i| SLICES - 1 - i);
+            (self.cut(axis, size, |i| i), last)
+        });
+        (kept != [(0, SLICES - 1); 3]).then_some(kept)
+    }
+
+    fn lies_in(&self, core: &[(usize, usize); 3], p: DVec3) -> bool {
+        (0..3).all(|axis| (core[axis].0..=core[axis].1).contains(&self.slice(axis, p[axis])))
+    }
+
+    /// Length along `axis` of the middle 98 % of the area, to a slice.
+    fn size(&self, axis: usize) -> f64 {
+        let total: f64 = self.area[axis].iter().sum();
+        let reach = |from_end: fn(usize) -> usize| {
+            let mut sum = 0.0;
+            (0..SLICES).map(from_end).find(|&i| {
+                sum += self.area[axis][i];
+                sum > total * STRAY_AREA
+            })
+        };
+        match (reach(|i| i), reach(|i| SLICES - 1 - i)) {
+            (Some(first), Some(last)) if last >= first => self.width[axis] * (last + 1 - first) as f64,
+            _ => self.width[axis] * SLICES as f64,
+        }
+    }
+
+    /// How many slices come off one end of `axis`; `from_end` numbers them from there.
+    fn cut(&self, axis: usize, size: f64, from_end: impl Fn(usize) -> usize) -> usize {
+        let total_area: f64 = self.area[axis].iter().sum();
+        let total_count: u64 = self.count[axis].iter().sum();
+        let (mut area, mut count, mut gap, mut cut) = (0.0, 0, 0usize, 0);
+        for i in 0..SLICES {
+            let slice = from_end(i);
+            if self.covered[axis][slice] {
+                if gap as f64 * self.width[axis] >= GAP * size && gap > 0 {
+                    cut = i;
+                }
+                gap = 0;
+            } else {
+                gap += 1;
+            }
+            area += self.area[axis][slice];
+            count += self.count[axis][slice];
+            if area > STRAY_AREA * total_area || count as f64 > STRAY_COUNT * total_count as f64 {
+                break;
+            }
+        }
+        cut
+    }
+}

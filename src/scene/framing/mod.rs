@@ -1,0 +1,180 @@
+//! Choosing a camera for a scene that brings none: from which side, how far away, and of what.
+//!
+//! [`robust_bounds`] finds the model and leaves stray geometry out, [`NamedView`] and [`default_direction`] say from where
+//! to look, and [`frame`] steps back just far enough. The result is an ordinary [`Camera`], as if the file had brought it.
+
+mod bounds;
+mod fit;
+
+pub use bounds::{Bounds, robust_bounds};
+pub use fit::{FrameLens, frame};
+
+use super::{Camera, Scene, UpAxis};
+use crate::math::DVec3;
+use std::fmt;
+use std::str::FromStr;
+
+/// Vertical field of view when nothing else is asked for, radians (30°: a portrait lens, little distortion).
+pub const DEFAULT_FOV: f64 = std::f64::consts::PI / 6.0;
+
+/// The sides a model can be seen from. Its front is +Z in a Y-up scene, as glTF says, and −Y in a Z-up one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum NamedView {
+    /// Sees the front.
+    Front,
+    /// Sees the back.
+    Back,
+    /// Sees the model's −X side.
+    Left,
+    /// Sees the model's +X side.
+    Right,
+    /// Sees it from above, the front at the bottom of the picture.
+    Top,
+    /// Sees it from below, the front at the top of the picture.
+    Bottom,
+    /// Sees the front, +X and upper sides at equal angles.
+    Iso,
+}
+
+impl NamedView {
+    /// All of them, in the order help texts list them.
+    pub const ALL: [Self; 7] = [Self::Front, Self::Back, Self::Left, Self::Right, Self::Top, Self::Bottom, Self::Iso];
+
+    /// The word for it on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Front => "front",
+            Self::Back => "back",
+            Self::Left => "left",
+            Self::Right => "right",
+            Self::Top => "top",
+            Self::Bottom => "bottom",
+            Self::Iso => "iso",
+        }
+    }
+
+    /// Where it looks from.
+    pub fn direction(self, up: UpAxis) -> Direction {
+        let (from, top) = match self {
+            Self::Front => (DVec3::Z, DVec3::Y),
+            Self::Back => (DVec3::NEG_Z, DVec3::Y),
+            Self::Left => (DVec3::NEG_X, DVec3::Y),
+            Self::Right => (DVec3::X, DVec3::Y),
+            Self::Top => (DVec3::Y, DVec3::NEG_Z),
+            Self::Bottom => (DVec3::NEG_Y, DVec3::Z),
+            Self::Iso => (DVec3::ONE, DVec3::Y),
+        };
+        Direction::new(up, from, top)
+    }
+}
+
+impl fmt::Display for NamedView {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for NamedView {
+    type Err = UnknownView;
+
+    fn from_str(name: &str) -> Result<Self, UnknownView> {
+        Self::ALL.into_iter().find(|view| view.name() == name).ok_or_else(|| UnknownView(name.into()))
+    }
+}
+
+/// No view has this name.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no view is called '{0}': it is one of front, back, left, right, top, bottom, iso")]
+pub struct UnknownView(String);
+
+/// From where to look, and what is up in the picture; world space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Direction {
+    /// Unit vector from the model to the eye.
+    pub from: DVec3,
+    /// Towards the top of the picture.
+    pub up: DVec3,
+}
+
+impl Direction {
+    /// A direction given in a Y-up frame whose front is +Z, for a scene with up axis `up`.
+    fn new(up: UpAxis, from: DVec3, top: DVec3) -> Self {
+        Self { from: in_world(up, from.normalize_or(DVec3::Z)), up: in_world(up, top) }
+    }
+
+    /// `azimuth` from the front towards +X and `elevation` above the horizon, radians.
+    pub fn around(up: UpAxis, azimuth: f64, elevation: f64) -> Self {
+        let (flat, height) = (libm::cos(elevation), libm::sin(elevation));
+        let from = DVec3::new(flat * libm::sin(azimuth), height, flat * libm::cos(azimuth));
+        Self::new(up, from, DVec3::Y)
+    }
+}
+
+/// Where the default view stands: to the right of the front and a little above.
+const AZIMUTH: f64 = 28.0;
+const ELEVATION: f64 = 18.0;
+
+/// How thin a model is seen face on (thickness / middle extent), and how thick one is seen from the default side.
+const CARD: f64 = 0.04;
+const SOLID: f64 = 0.4;
+
+/// Elevation from which models flatter than high are seen: terrain, floor plans.
+const LANDSCAPE_ELEVATION: f64 = 38.0;
+
+/// From where a model looks good when nobody says.
+///
+/// A three-quarter view, slightly from above. Cards, panels and rows of test objects are looked at face on, from the side
+/// their faces turn to, and things between card and solid from in between; a model that is flat on the ground is seen
+/// from higher up.
+pub fn default_direction(scene: &Scene, bounds: &Bounds) -> Direction {
+    // The model's extents in the Y-up frame.
+    let extent = in_studio(scene.up, bounds.hi - bounds.lo).abs();
+    let (x, y, z) = (extent.x, extent.y, extent.z);
+    let turn = |thin: f64, other: f64| ((thin / other - CARD) / (SOLID - CARD)).clamp(0.0, 1.0);
+    let (azimuth, elevation) = (AZIMUTH.to_radians(), ELEVATION.to_radians());
+
+    if z <= x.min(y) {
+        let turned = turn(z, x.min(y));
+        let front = bounds::facing(scene).dot(in_world(scene.up, DVec3::Z)) >= bounds::AWAY;
+        let side = if front { 0.0 } else { std::f64::consts::PI };
+        Direction::around(scene.up, side + azimuth * turned, elevation * turned)
+    } else if x < y.min(z) && turn(x, y.min(z)) == 0.0 {
+        let right = bounds::facing(scene).dot(in_world(scene.up, DVec3::X)) >= bounds::AWAY;
+        if right { NamedView::Right.direction(scene.up) } else { NamedView::Left.direction(scene.up) }
+    } else if y < x.min(z) {
+        let flat = 1.0 - turn(y, x.min(z));
+        let high = LANDSCAPE_ELEVATION.to_radians();
+        Direction::around(scene.up, azimuth, elevation + (high - elevation) * flat)
+    } else {
+        Direction::around(scene.up, azimuth, elevation)
+    }
+}
+
+/// The camera of a picture nobody directed: the one the scene file chose, else the first of the file, else
+/// [`default_direction`] framed for a picture of `aspect` width / height.
+pub fn default_camera(scene: &Scene, bounds: &Bounds, aspect: f64) -> Camera {
+    let chosen = scene.hints.camera.unwrap_or(0) as usize;
+    scene.cameras.get(chosen).cloned().unwrap_or_else(|| {
+        let lens = FrameLens::Perspective { y_fov: DEFAULT_FOV };
+        frame(scene, bounds, default_direction(scene, bounds), lens, aspect)
+    })
+}
+
+/// From the Y-up, front-+Z frame to the world.
+fn in_world(up: UpAxis, v: DVec3) -> DVec3 {
+    match up {
+        UpAxis::Y => v,
+        UpAxis::Z => DVec3::new(v.x, -v.z, v.y),
+    }
+}
+
+/// From the world to the Y-up, front-+Z frame.
+fn in_studio(up: UpAxis, v: DVec3) -> DVec3 {
+    match up {
+        UpAxis::Y => v,
+        UpAxis::Z => DVec3::new(v.x, v.z, -v.y),
+    }
+}
+
+#[cfg(test)]
+mod tests;
