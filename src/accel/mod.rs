@@ -9,13 +9,22 @@
 //! Rays come in waves: slices of rays in, slices of answers out. Behind the interface a structure may trace them one by
 //! one, with many in flight, or as packets, with the same bits in the answer.
 
+pub mod any;
 pub mod grid;
 pub mod none;
 pub mod probe;
+pub mod query;
+pub mod refine;
 pub mod shapes;
+pub mod stats;
 
+pub use any::{AccelKind, AnyAccel};
+pub use grid::{GridOctree, GridParams};
+pub use none::Unculled;
 pub use probe::{NoProbe, Probe, RayCounts};
+pub use refine::Refined;
 pub use shapes::{BitSet, Shapes, SpherePrim};
+pub use stats::StructureStats;
 
 use crate::math::Vec3;
 

@@ -1,1 +1,40 @@
 //! No culling: every ray against every shape. The specification of every other structure.
+
+use super::query::{Culling, Goal, Query};
+use super::{Probe, Shapes, StructureStats};
+
+/// Tests everything.
+#[derive(Clone, Copy, Debug)]
+pub struct Unculled<'a> {
+    shapes: &'a Shapes,
+}
+
+impl<'a> Unculled<'a> {
+    /// Nothing to build.
+    pub fn new(shapes: &'a Shapes) -> Self {
+        Self { shapes }
+    }
+
+    /// All zero but the references: every prim is listed once.
+    pub fn summary(&self) -> StructureStats {
+        StructureStats { n_oiv: u64::from(self.shapes.bounded()), ..StructureStats::default() }
+    }
+}
+
+impl Culling for Unculled<'_> {
+    type Scratch = ();
+
+    fn shapes(&self) -> &Shapes {
+        self.shapes
+    }
+
+    fn new_scratch(&self) {}
+
+    fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, (): &mut (), probe: &mut P) {
+        for prim in 0..self.shapes.bounded() {
+            if query.test(prim, probe) {
+                return;
+            }
+        }
+    }
+}

@@ -2,7 +2,11 @@
 //!
 //! Prim ids run over all kinds: first the triangles, then the polygons, then the spheres, then the planes.
 
-use crate::math::Vec3;
+use crate::math::aabb::Aabb;
+use crate::math::polygon::{self, Polygon};
+use crate::math::shear::RaySpace;
+use crate::math::triangle::{self, Triangle};
+use crate::math::{Vec3, plane, sphere};
 
 /// Everything that can be hit.
 #[derive(Clone, Debug, Default)]
@@ -67,4 +71,79 @@ impl Shapes {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
+
+    /// Prims that have bounds: all but the planes. They come first.
+    pub fn bounded(&self) -> u32 {
+        index(self.triangles.len() + self.polygons.len() + self.spheres.len())
+    }
+
+    /// What prim `prim` is.
+    #[inline]
+    pub fn prim(&self, prim: u32) -> Prim<'_> {
+        let mut i = prim as usize;
+        if i < self.triangles.len() {
+            return Prim::Triangle(self.triangles[i].map(|v| self.vertices[v as usize]));
+        }
+        i -= self.triangles.len();
+        if i < self.polygons.len() {
+            let (first, len) = self.polygons[i];
+            let corners = &self.polygon_corners[first as usize..(first + len) as usize];
+            return Prim::Polygon(Polygon { vertices: &self.vertices, corners });
+        }
+        i -= self.polygons.len();
+        match self.spheres.get(i) {
+            Some(&sphere) => Prim::Sphere(sphere),
+            None => {
+                let (normal, offset) = self.planes[i - self.spheres.len()];
+                Prim::Plane(normal, offset)
+            }
+        }
+    }
+
+    /// Where the line through the ray meets prim `prim`: up to two distances, NaN for "not". The one test that every
+    /// structure uses, a function of ray and prim alone. With `ahead`, negative distances may be left out.
+    #[inline]
+    pub fn distances(&self, prim: u32, ray: &RaySpace, ahead: bool) -> [f32; 2] {
+        match self.prim(prim) {
+            Prim::Triangle(corners) => one(triangle::intersect(ray, &corners)),
+            Prim::Polygon(polygon) => one(polygon::intersect(ray, polygon)),
+            Prim::Sphere(s) => sphere::intersect(ray, s.center, s.radius, ahead).unwrap_or([f32::NAN; 2]),
+            Prim::Plane(normal, offset) => one(plane::intersect(ray, normal, offset)),
+        }
+    }
+
+    /// The smallest box around prim `prim`, which is not a plane; a sphere's is rounded outwards.
+    pub fn bounds(&self, prim: u32) -> Aabb {
+        match self.prim(prim) {
+            Prim::Triangle(corners) => Aabb::around(corners),
+            Prim::Polygon(polygon) => Aabb::around(polygon.points()),
+            Prim::Sphere(s) => {
+                Aabb { lo: (s.center - s.radius).map(f32::next_down), hi: (s.center + s.radius).map(f32::next_up) }
+            }
+            Prim::Plane(..) => Aabb { lo: Vec3::NEG_INFINITY, hi: Vec3::INFINITY },
+        }
+    }
+}
+
+/// One prim.
+#[derive(Clone, Copy, Debug)]
+pub enum Prim<'a> {
+    /// Three corners.
+    Triangle(Triangle),
+    /// A planar n-gon.
+    Polygon(Polygon<'a>),
+    /// A sphere.
+    Sphere(SpherePrim),
+    /// An unbounded plane: unit normal n, offset d, n·p = d.
+    Plane(Vec3, f32),
+}
+
+#[inline]
+fn one(t: Option<f32>) -> [f32; 2] {
+    [t.unwrap_or(f32::NAN), f32::NAN]
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "loading refuses scenes with 2^32 - 1 prims or vertices")]
+fn index(i: usize) -> u32 {
+    i as u32
 }

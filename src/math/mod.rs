@@ -5,5 +5,14 @@
 
 pub use glam::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Vec2, Vec3, Vec4};
 
+pub mod aabb;
+pub mod bounds;
 pub mod ear_clip;
+pub mod expansion;
 pub mod frame;
+pub mod plane;
+pub mod polygon;
+pub mod quotient;
+pub mod shear;
+pub mod sphere;
+pub mod triangle;

@@ -1,0 +1,106 @@
+//! The choice of a structure: the enum meets the user, the trait meets the ray.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::{GridOctree, GridParams, Shapes, StructureStats, Unculled};
+
+/// Which structure culls.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum AccelKind {
+    /// Every ray against every shape.
+    None,
+    /// A uniform grid, its crowded cells refined by octrees.
+    #[default]
+    GridOctree,
+}
+
+impl AccelKind {
+    /// Every kind, in the order of the help text.
+    pub const ALL: [Self; 2] = [Self::None, Self::GridOctree];
+
+    /// As typed and printed.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::GridOctree => "grid-octree",
+        }
+    }
+}
+
+impl fmt::Display for AccelKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A name that no structure has.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no structure is named {0:?}; there are: none, grid-octree")]
+pub struct UnknownAccel(String);
+
+impl FromStr for AccelKind {
+    type Err = UnknownAccel;
+
+    fn from_str(name: &str) -> Result<Self, UnknownAccel> {
+        Self::ALL.into_iter().find(|k| k.name() == name).ok_or_else(|| UnknownAccel(name.into()))
+    }
+}
+
+/// A built structure. Match once per image; each variant implements [`Accel`](super::Accel).
+#[derive(Clone, Debug)]
+pub enum AnyAccel<'a> {
+    /// [`AccelKind::None`].
+    None(Unculled<'a>),
+    /// [`AccelKind::GridOctree`].
+    GridOctree(GridOctree<'a>),
+}
+
+impl<'a> AnyAccel<'a> {
+    /// Builds a structure over `shapes`; `params` only matter to kinds with a grid.
+    pub fn build(kind: AccelKind, shapes: &'a Shapes, params: &GridParams) -> Self {
+        match kind {
+            AccelKind::None => Self::None(Unculled::new(shapes)),
+            AccelKind::GridOctree => Self::GridOctree(GridOctree::build(shapes, params)),
+        }
+    }
+
+    /// Which kind it is.
+    pub fn kind(&self) -> AccelKind {
+        match self {
+            Self::None(_) => AccelKind::None,
+            Self::GridOctree(_) => AccelKind::GridOctree,
+        }
+    }
+
+    /// What it is made of.
+    pub fn summary(&self) -> StructureStats {
+        match self {
+            Self::None(a) => a.summary(),
+            Self::GridOctree(a) => a.summary(),
+        }
+    }
+
+    /// Visits everything and proves that no hit can be lost; the error says which prim and cell disagree, and how.
+    pub fn check(&self) -> Result<StructureStats, String> {
+        match self {
+            Self::None(a) => Ok(a.summary()),
+            Self::GridOctree(a) => a.check(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_is_found_by_its_name() {
+        for kind in AccelKind::ALL {
+            assert_eq!(kind.name().parse(), Ok(kind));
+        }
+        let error = "gird".parse::<AccelKind>().map_err(|e| e.to_string());
+        let names = AccelKind::ALL.map(AccelKind::name).join(", ");
+        assert_eq!(error, Err(format!("no structure is named \"gird\"; there are: {names}")));
+    }
+}

@@ -1,0 +1,78 @@
+//! The winner's data, computed once in `f64` and with a bound of its error.
+
+use super::shapes::Prim;
+use super::{Hit, Ray, Shapes};
+use crate::math::bounds::{POSITION_T, U32, U64};
+use crate::math::shear::RaySpace;
+use crate::math::{DVec3, Vec3, plane, polygon, sphere, triangle};
+
+/// Where and how a surface was hit, in the frame of the shapes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refined {
+    /// The point.
+    pub position: Vec3,
+    /// How far, on each axis, `position` may be from the exact point.
+    pub error: Vec3,
+    /// Unit geometric normal: the side from which a face runs counter-clockwise, outwards for a sphere. Zero for a face
+    /// without area.
+    pub normal: Vec3,
+    /// Barycentric weight of the second corner; 0 but for triangles.
+    pub u: f32,
+    /// Barycentric weight of the third corner; 0 but for triangles.
+    pub v: f32,
+}
+
+impl Shapes {
+    /// Position, error bound, normal and weights of a hit that a query of these shapes found on `ray`.
+    pub fn refine(&self, ray: &Ray, hit: &Hit) -> Refined {
+        let Some(space) = RaySpace::new(ray.origin, ray.dir) else {
+            return Refined { position: ray.origin, error: Vec3::ZERO, normal: Vec3::ZERO, u: 0.0, v: 0.0 };
+        };
+        let on_ray = |t: f64| Located::on_ray(ray, t);
+        let (located, normal) = match self.prim(hit.prim) {
+            Prim::Triangle(corners) => (on_ray(triangle::distance_f64(&space, &corners)), triangle::normal(&corners)),
+            Prim::Polygon(p) => (on_ray(polygon::distance_f64(&space, p).unwrap_or(f64::from(hit.t))), p.normal()),
+            Prim::Plane(normal, offset) => (on_ray(plane::distance_f64(&space, normal, offset)), normal),
+            Prim::Sphere(s) => {
+                let p = Located::on_ray(ray, f64::from(hit.t));
+                let (arm, normal) = sphere::project(p.position, s.center, s.radius);
+                let position = s.center.as_dvec3() + arm;
+                // One rounding of the sum, three of the arm.
+                let error = (position.abs() + arm.abs() * 3.0) * U64;
+                (Located { position, error }, normal.as_vec3())
+            }
+        };
+        let (position, error) = located.rounded();
+        Refined { position, error, normal, u: hit.u, v: hit.v }
+    }
+
+    /// Weights of the second and third corner where the ray hits triangle `prim`; 0 for other prims.
+    pub(super) fn barycentrics(&self, prim: u32, ray: &RaySpace) -> (f32, f32) {
+        match self.prim(prim) {
+            Prim::Triangle(corners) => triangle::barycentrics(ray, &corners),
+            _ => (0.0, 0.0),
+        }
+    }
+}
+
+/// A point and a bound of its error on each axis.
+struct Located {
+    position: DVec3,
+    error: DVec3,
+}
+
+impl Located {
+    /// o + t d for a t with a relative error of [`POSITION_T`]: one rounding of the product, one of the sum.
+    fn on_ray(ray: &Ray, t: f64) -> Self {
+        let step = ray.dir.as_dvec3() * t;
+        let position = ray.origin.as_dvec3() + step;
+        Self { position, error: step.abs() * (POSITION_T + U64) + position.abs() * U64 }
+    }
+
+    /// Rounded to `f32`, with the rounding added to the error: u of the position, or half the smallest number.
+    fn rounded(&self) -> (Vec3, Vec3) {
+        let position = self.position.as_vec3();
+        let error = self.error + position.as_dvec3().abs() * f64::from(U32) + f64::from(f32::from_bits(1));
+        (position, error.as_vec3().map(f32::next_up))
+    }
+}

@@ -1,0 +1,80 @@
+//! Quotients rounded to the nearest `f32`, and the filter that makes exactness cheap.
+//!
+//! A distance t = numerator/denominator of a planar prim is *defined* as the exact quotient, rounded once. So it is a
+//! function of ray and prim alone: no structure, kernel or order of corners can change a bit of it.
+
+use super::bounds::EXACT_QUOTIENT;
+use super::expansion::Expansion;
+
+/// A computed number and a bound of its absolute error.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounded {
+    /// What was computed.
+    pub value: f64,
+    /// |value − exact| is at most this.
+    pub error: f64,
+}
+
+impl Bounded {
+    /// The quotient and a bound of its relative error, or `None` where the denominator's sign is not certain.
+    pub fn over(self, denominator: Self) -> Option<(f64, f64)> {
+        let relative = denominator.error / denominator.value.abs();
+        // Also false for 0/0.
+        if relative < 0.25 {
+            let t = self.value / denominator.value;
+            // (n + e)/(d (1 + r)): r ≤ 1/4 grows to at most 4/3 r; one rounding of the quotient.
+            let error = (self.error / self.value.abs()).max(0.0) * 1.5 + relative * 1.5 + f64::EPSILON;
+            (error < 0.25).then_some((t, error))
+        } else {
+            None
+        }
+    }
+}
+
+/// The `f32` nearest to every number within `t` (1 ± `error`), or `None` if there is more than one.
+pub fn nearest(t: f64, error: f64) -> Option<f32> {
+    let spread = t.abs() * (error * 1.001);
+    let (lo, hi) = (round(t - spread), round(t + spread));
+    (lo.to_bits() == hi.to_bits()).then_some(lo)
+}
+
+/// `numerator` / `denominator` to a relative error of [`EXACT_QUOTIENT`].
+pub fn approximate<const N: usize>(numerator: &Expansion<N>, denominator: &Expansion<96>) -> f64 {
+    numerator.approximate() / denominator.approximate()
+}
+
+/// `numerator` / `denominator`, correctly rounded; the denominator is not zero. `M` ≥ `N` + 192.
+pub fn rounded<const N: usize, const M: usize>(numerator: &Expansion<N>, denominator: &Expansion<96>) -> f32 {
+    let t = approximate(numerator, denominator);
+    let (lo, hi) = (round(t - t.abs() * EXACT_QUOTIENT), round(t + t.abs() * EXACT_QUOTIENT));
+    if lo.to_bits() == hi.to_bits() {
+        return lo;
+    }
+    // Between two neighbours: on which side of their midpoint lies numerator/denominator?
+    let middle = middle(lo, hi);
+    let mut above = Expansion::<M>::ZERO;
+    for &x in numerator.terms() {
+        above.add(x);
+    }
+    above.add_product(denominator.terms(), &[middle], -1.0);
+    match above.sign() * denominator.sign() {
+        1 => hi,
+        -1 => lo,
+        _ => round(middle),
+    }
+}
+
+/// Nearest `f32`, ties to even; but a negative number never becomes zero, so that what lies behind a ray stays there.
+#[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what this does")]
+pub fn round(t: f64) -> f32 {
+    let r = t as f32;
+    if t < 0.0 && r == 0.0 { -f32::from_bits(1) } else { r }
+}
+
+/// The midpoint of two neighbouring floats; beyond the largest float stands 2¹²⁸.
+fn middle(lo: f32, hi: f32) -> f64 {
+    let widen = |x: f32| {
+        if x.is_infinite() { f64::from(x.signum()) * 2.0 * (1u128 << 127) as f64 } else { f64::from(x) }
+    };
+    (widen(lo) + widen(hi)) / 2.0
+}

@@ -1,0 +1,150 @@
+//! The watertight ray/triangle test with exact verdicts.
+//!
+//! Sheared ray space (see [`shear`](super::shear)): a triangle is hit when its three edge values all are ≥ 0 or all
+//! ≤ 0 (an edge or corner belongs to every triangle it bounds) and not all are zero. The sign of an edge value is taken
+//! from `f32` when it exceeds its proven error, else from `f64`, else from exact sums. A ray in the triangle's plane and a
+//! triangle without area have three zero edge values or two signs: they are never hit, and no NaN arises.
+
+use super::bounds::{EDGE_OVERFLOW, EXACT_QUOTIENT, PLANE_TERMS_F64, POSITION_T, edge_error_f32};
+use super::expansion::{Expansion, cross, difference, dot, dot_f32};
+use super::quotient::{Bounded, approximate, nearest, rounded};
+use super::shear::RaySpace;
+use super::{DVec3, Vec3};
+
+/// Three corners.
+pub type Triangle = [Vec3; 3];
+
+/// The distance at which the line through the ray meets the triangle, exact and rounded once; negative behind the
+/// origin. `None`: it does not, exactly.
+#[inline]
+pub fn intersect(ray: &RaySpace, triangle: &Triangle) -> Option<f32> {
+    is_hit(ray, triangle).then(|| distance(ray, triangle))
+}
+
+/// Whether the line through the ray meets the triangle: the exact verdict.
+#[inline]
+pub fn is_hit(ray: &RaySpace, triangle: &Triangle) -> bool {
+    let [a, b, c] = triangle.map(|p| p - ray.origin);
+    let shear = |p: Vec3| (p[ray.x] - ray.shear.0 * p[ray.z], p[ray.y] - ray.shear.1 * p[ray.z]);
+    let ((ax, ay), (bx, by), (cx, cy)) = (shear(a), shear(b), shear(c));
+    let u = cx * by - cy * bx;
+    let v = ax * cy - ay * cx;
+    let w = bx * ay - by * ax;
+
+    let reach = largest3(largest(a), largest(b), largest(c));
+    let spread = largest3(greater(ax.abs(), ay.abs()), greater(bx.abs(), by.abs()), greater(cx.abs(), cy.abs()));
+    let error = edge_error_f32(reach, spread);
+    let (low, high) = (smaller(u, smaller(v, w)), greater(u, greater(v, w)));
+
+    // Overflow makes the bound too large or NaN, and the comparisons false.
+    if error < EDGE_OVERFLOW {
+        if low < -error && high > error {
+            return false;
+        }
+        if low > error || high < -error {
+            return true;
+        }
+    }
+    is_hit_near_edge(ray, triangle)
+}
+
+/// The verdict where `f32` cannot tell.
+#[cold]
+#[inline(never)]
+fn is_hit_near_edge(ray: &RaySpace, &[a, b, c]: &Triangle) -> bool {
+    let first = ray.edge_sign(b, c);
+    let second = ray.edge_sign(c, a);
+    if first * second < 0 {
+        return false;
+    }
+    let third = ray.edge_sign(a, b);
+    let agree = first * third >= 0 && second * third >= 0;
+    agree && (first, second, third) != (0, 0, 0)
+}
+
+/// Exact t = n·(a − o) / n·d with n = (b − a) × (c − a), correctly rounded. The triangle must be hit.
+fn distance(ray: &RaySpace, triangle: &Triangle) -> f32 {
+    let fast = plane_quotient(ray, triangle).and_then(|(t, error)| nearest(t, error));
+    fast.unwrap_or_else(|| {
+        let (numerator, denominator) = exact_plane_terms(ray, triangle);
+        rounded::<192, 384>(&numerator, &denominator)
+    })
+}
+
+/// As [`intersect`]'s distance of a triangle that is hit, to a relative error of [`POSITION_T`].
+pub fn distance_f64(ray: &RaySpace, triangle: &Triangle) -> f64 {
+    const { assert!(EXACT_QUOTIENT < POSITION_T) };
+    match plane_quotient(ray, triangle) {
+        Some((t, error)) if error < POSITION_T => t,
+        _ => {
+            let (numerator, denominator) = exact_plane_terms(ray, triangle);
+            approximate(&numerator, &denominator)
+        }
+    }
+}
+
+/// t in `f64` and a bound of its relative error, where there is one.
+fn plane_quotient(ray: &RaySpace, &[a, b, c]: &Triangle) -> Option<(f64, f64)> {
+    let (origin, dir, a) = (ray.origin.as_dvec3(), ray.dir.as_dvec3(), a.as_dvec3());
+    let (e1, e2) = (b.as_dvec3() - a, c.as_dvec3() - a);
+    let normal = e1.cross(e2);
+    let sizes = magnitude_cross(e1.abs(), e2.abs());
+    let to_plane = a - origin;
+    let term = |v: DVec3| Bounded { value: normal.dot(v), error: sizes.dot(v.abs()) * PLANE_TERMS_F64 };
+    term(to_plane).over(term(dir))
+}
+
+/// |p| × |q| with sums for differences: bounds what rounding can do to the cross product.
+fn magnitude_cross(p: DVec3, q: DVec3) -> DVec3 {
+    DVec3::new(p.y * q.z + p.z * q.y, p.z * q.x + p.x * q.z, p.x * q.y + p.y * q.x)
+}
+
+#[cold]
+#[inline(never)]
+fn exact_plane_terms(ray: &RaySpace, &[a, b, c]: &Triangle) -> (Expansion<192>, Expansion<96>) {
+    let (a, b, c) = (a.to_array(), b.to_array(), c.to_array());
+    let normal = cross(&difference(b, a), &difference(c, a));
+    (dot(&normal, &difference(a, ray.origin.to_array())), dot_f32(&normal, ray.dir.to_array()))
+}
+
+/// Weights of the second and third corner where the ray meets a triangle that it hits, each in 0..=1.
+pub fn barycentrics(ray: &RaySpace, triangle: &Triangle) -> (f32, f32) {
+    let t = distance_f64(ray, triangle);
+    let [a, b, c] = triangle.map(|p| p.as_dvec3());
+    let p = ray.origin.as_dvec3() + ray.dir.as_dvec3() * t;
+    let normal = (b - a).cross(c - a);
+    // Areas in the plane of the triangle, so that a grazing ray is no worse than another.
+    let area = normal.length_squared();
+    let weight = |from: DVec3, to: DVec3| normal.dot((to - from).cross(p - from)) / area;
+    #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what this does")]
+    let clamp = |x: f64| if x > 0.0 { x.min(1.0) as f32 } else { 0.0 };
+    let (u, v) = (clamp(weight(c, a)), clamp(weight(a, b)));
+    if u + v > 1.0 { (u, 1.0 - u) } else { (u, v) }
+}
+
+/// Unit normal, towards the side from which the corners run counter-clockwise; zero for a triangle without area.
+pub fn normal(triangle: &Triangle) -> Vec3 {
+    let [a, b, c] = triangle.map(|p| p.as_dvec3());
+    (b - a).cross(c - a).normalize_or_zero().as_vec3()
+}
+
+#[inline]
+fn largest(p: Vec3) -> f32 {
+    greater(p.x.abs(), greater(p.y.abs(), p.z.abs()))
+}
+
+#[inline]
+fn largest3(a: f32, b: f32, c: f32) -> f32 {
+    greater(a, greater(b, c))
+}
+
+/// One instruction, unlike `f32::max`; takes the second operand when one is NaN.
+#[inline]
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+#[inline]
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
