@@ -149,7 +149,7 @@ mod tests {
     }
 
     fn hostile() -> impl Strategy<Value = f32> {
-        (any::<i32>(), -140i32..100).prop_map(|(m, e)| m as f32 * 2f32.powi(e.max(-120)) * 2f32.powi(e.min(-120) + 120))
+        (any::<i32>(), -149i32..96).prop_map(|(m, e)| m as f32 * 2f32.powi(e.max(-120)) * 2f32.powi(e.min(-120) + 120))
     }
 
     proptest! {
