@@ -10,6 +10,7 @@ pub mod limits;
 pub mod obj;
 pub mod paths;
 pub mod scene_file;
+pub mod suggest;
 pub mod texture;
 
 pub use diagnostic::{Diagnostic, LoadError, Warnings};

@@ -122,7 +122,7 @@ impl Resolver {
     pub fn read_file(&mut self, name: &Path) -> Result<Vec<u8>, FileFault> {
         let shown = || name.to_string_lossy().into_owned();
         let io = |source| FileFault::Io { name: shown(), source };
-        let path = self.resolve(name)?;
+        let path = self.locate(name)?;
         let file = fs::File::open(&path).map_err(io)?;
         let meta = file.metadata().map_err(io)?;
         if !meta.is_file() {
@@ -141,8 +141,13 @@ impl Resolver {
         Ok(bytes)
     }
 
+    /// Nothing outside this folder is read; canonical.
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
     /// The canonical path of an existing file below the root.
-    fn resolve(&self, name: &Path) -> Result<PathBuf, FileFault> {
+    pub fn locate(&self, name: &Path) -> Result<PathBuf, FileFault> {
         let shown = name.to_string_lossy().into_owned();
         if name.as_os_str().is_empty() || shown.contains('\0') {
             return Err(FileFault::BadUri(shown));

@@ -226,6 +226,29 @@ impl Material {
         }
     }
 
+    /// Every slot that can hold a texture.
+    pub fn textures_mut(&mut self) -> Vec<&mut Option<TextureRef>> {
+        let mut slots = vec![
+            &mut self.base_color_map,
+            &mut self.opacity_map,
+            &mut self.emission_map,
+            &mut self.normal_map,
+            &mut self.bump_map,
+            &mut self.occlusion_map,
+        ];
+        match &mut self.surface {
+            Surface::MetalRough(m) => slots.extend([
+                &mut m.metal_rough_map,
+                &mut m.specular_map,
+                &mut m.specular_color_map,
+                &mut m.transmission_map,
+            ]),
+            Surface::Phong(p) => slots.extend([&mut p.ambient_map, &mut p.specular_map, &mut p.shininess_map]),
+            Surface::Unlit => {}
+        }
+        slots
+    }
+
     /// Whether a hit always stops light and sight: what `accel` calls *opaque*.
     pub fn is_opaque(&self) -> bool {
         let passes_light = match &self.surface {

@@ -4,12 +4,15 @@
 //! the world is `f64`. Units are metres, angles radians, colours linear Rec. 709, unless a field says otherwise.
 
 pub mod camera;
+pub mod color;
 pub mod default_light;
 pub mod features;
 pub mod framing;
 pub mod hints;
+pub mod ior;
 pub mod light;
 pub mod material;
+pub mod merge;
 pub mod mesh;
 pub mod texture;
 

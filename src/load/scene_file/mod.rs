@@ -10,8 +10,7 @@
 //! ```toml
 //! up = "y"                      # or "z"; default "y"
 //! background = "white"          # colour, "transparent" or "environment"
-//! environment = "studio"        # what rays that leave see: "studio", "black" or a colour. Default: "studio" when the
-//!                               # file has no light at all, else "black"
+//! environment = "studio"        # what rays that leave see: "studio", "black" or a colour; default "black"
 //!
 //! [render]                      # defaults that the command line overrides; every key optional
 //! size = [800, 600]
@@ -20,7 +19,7 @@
 //! cutoff = 0.002                # weight where a branch ends
 //! tone_map = "none"             # none, reinhard, aces, neutral
 //! exposure = 0.0                # stops
-//! default_light = false         # whether a scene without lights gets some; default true
+//! default_light = false         # whether a scene without any light gets lamps and the studio; default true
 //!
 //! [materials.red]               # Phong is the default model
 //! model = "phong"
@@ -32,6 +31,7 @@
 //! transmission = 0.0            # colour: weight of the refracted ray, default 0
 //! ior = 1.0                     # number, or a name: "air", "water", "crown glass", "diamond", ...; default 1
 //! fresnel = false               # whether Fresnel balances mirror and transmission
+//! dispersion = 0.0              # 20 / Abbe number, default 0
 //! opacity = 1.0                 # below 1: composited over what lies behind
 //! emission = 0                  # colour
 //! double_sided = true           # default true
@@ -44,13 +44,13 @@
 //! transmission = 0.0            # default 0
 //! ior = 1.5                     # as above
 //! thick = true                  # whether rays bend; default true
-//! # opacity, emission, double_sided as above
+//! # dispersion, opacity, emission, double_sided as above
 //!
 //! [materials.sticker]
 //! model = "unlit"
 //! color = "white"               # opacity, double_sided as above
 //!
-//! [[models]]                    # glTF, OBJ or another scene file, relative to this file
+//! [[models]]                    # glTF or OBJ, relative to this file
 //! file = "bunny.obj"
 //! material = "red"              # optional: replaces every material of the model
 //! up = "z"                      # optional: overrides the model's up axis
@@ -80,13 +80,21 @@
 //! kind = "point"                # point, directional, spot, ambient
 //! color = "white"               # default white
 //! intensity = 1.0               # factor, default 1
-//! position = [0, 10, 0]         # point, spot
-//! direction = [0, -1, 0]        # directional, spot: where the light goes
-//! inner = 20                    # spot: half angle where it starts to fade, default 0
-//! outer = 30                    # spot: half angle where it ends, default 45
-//! falloff = "none"              # point, spot: "none" or "inverse-square"; default "none"
+//! position = [0, 10, 0]
+//! falloff = "inverse-square"    # or "none", the default
 //! range = 20                    # inverse-square: where it ends; default nowhere
 //! shadows = true                # default true
+//!
+//! [[lights]]
+//! kind = "spot"                 # as a point light, and:
+//! position = [0, 10, 0]
+//! direction = [0, -1, 0]        # where the light goes; so for directional lights, which have no position
+//! inner = 20                    # half angle where it starts to fade, default 0
+//! outer = 30                    # half angle where it ends, default 45
+//!
+//! [[lights]]
+//! kind = "ambient"              # has color and intensity only
+//! color = 0.2
 //!
 //! [[cameras]]                   # the first is used unless the command line names another
 //! name = "front"
@@ -97,10 +105,220 @@
 //! # or ortho = 10               # height seen by parallel rays
 //! ```
 
-use super::{Diagnostic, LoadError, LoadOptions, Loaded, Source};
+mod materials;
+mod reader;
+mod shapes;
+mod view;
 
-/// Loads a scene file.
+use self::reader::{Faults, Table, color, string, word};
+use super::paths::Resolver;
+use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
+use crate::math::DVec3;
+use crate::scene::{Background, Environment, Material, Scene, UpAxis};
+use std::path::Path;
+use toml::de::{DeTable, DeValue};
+
+const UP: [(&str, UpAxis); 2] = [("y", UpAxis::Y), ("z", UpAxis::Z)];
+
+/// Loads a scene file and the models it names.
+///
+/// # Errors
+/// Every fault of the file with its line and column, or those of a model.
 pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
-    let _ = options;
-    Err(Diagnostic::new("unsupported-format", &source.path, "", "no loader yet").into())
+    let text = match std::str::from_utf8(&source.bytes) {
+        Ok(text) => text.strip_prefix('\u{feff}').unwrap_or(text).to_owned(),
+        Err(e) => {
+            let text = format!("byte {} is not UTF-8 text", e.valid_up_to());
+            return Err(Diagnostic::new("scene-syntax", &source.path, "", text).remedy("save it as UTF-8").into());
+        }
+    };
+    let faults = Faults::new(source.path.clone(), text);
+    let (root, syntax) = DeTable::parse_recoverable(faults.text());
+    for error in &syntax {
+        faults.note("scene-syntax", &error.span().unwrap_or(0..0), error.message().replace('\n', ", "), "");
+    }
+    if !syntax.is_empty() {
+        return Err(faults.into_result().err().unwrap_or_else(|| Diagnostic::default().into()));
+    }
+    let parsed = parse(&faults, root.get_ref(), options);
+    let resolver = Resolver::new(source, options);
+    drop(root);
+    faults.into_result()?;
+    assemble(parsed, resolver, source, options)
 }
+
+/// What the text says, before any model is read.
+struct Parsed {
+    scene: Scene,
+    models: Vec<Model>,
+}
+
+/// One `[[models]]` entry.
+struct Model {
+    file: String,
+    place: String,
+    up: Option<UpAxis>,
+    material: Option<u32>,
+    world_from_model: crate::math::DAffine3,
+}
+
+fn parse<'a>(faults: &'a Faults, root: &'a DeTable<'a>, options: &LoadOptions) -> Parsed {
+    let root = Table::new(faults, "the scene", 0..0, root);
+    let mut scene = Scene { up: root.get("up", word(&UP)).or(options.up).unwrap_or_default(), ..Scene::default() };
+    scene.up = options.up.unwrap_or(scene.up);
+    scene.background = root.get("background", background);
+    scene.environment = root.get("environment", environment).unwrap_or_default();
+    scene.hints = root.table("render", "[render]").map(view::hints).unwrap_or_default();
+
+    if let Some(materials) = root.table("materials", "[materials]") {
+        let read = |(name, table): (String, Table)| materials::material(&name, table);
+        scene.materials = materials.named("material").into_iter().map(read).collect();
+    }
+    let mut models = Vec::new();
+    for table in root.tables("models", "model") {
+        models.extend(model(faults, &mut scene, table));
+    }
+    for table in root.tables("meshes", "mesh") {
+        let material = material_of(&mut scene, &table);
+        if let Some((mesh, mut instance)) = shapes::mesh(table, material) {
+            instance.mesh = count(scene.meshes.len());
+            scene.meshes.push(mesh);
+            scene.instances.push(instance);
+        }
+    }
+    for table in root.tables("spheres", "sphere") {
+        let material = material_of(&mut scene, &table);
+        scene.spheres.extend(shapes::sphere(table, material));
+    }
+    for table in root.tables("planes", "plane") {
+        let material = material_of(&mut scene, &table);
+        scene.planes.extend(shapes::plane(table, material));
+    }
+    for table in root.tables("lights", "light") {
+        match view::light(table) {
+            Some(view::Lit::Light(light)) => scene.lights.push(light),
+            Some(view::Lit::Ambient(radiance)) => scene.ambient += radiance,
+            None => {}
+        }
+    }
+    let up = if scene.up == UpAxis::Z { DVec3::Z } else { DVec3::Y };
+    for table in root.tables("cameras", "camera") {
+        scene.cameras.extend(view::camera(table, up));
+    }
+    scene.hints.camera = (!scene.cameras.is_empty()).then_some(0);
+    root.finish();
+    Parsed { scene, models }
+}
+
+fn model(faults: &Faults, scene: &mut Scene, table: Table) -> Option<Model> {
+    let file = table.need("file", string);
+    let place = faults.place(table.place_of("file").start);
+    let material = table.has("material").then(|| material_of(scene, &table));
+    let up = table.get("up", word(&UP));
+    let world_from_model = shapes::transform(&table);
+    table.finish();
+    Some(Model { file: file?, place, up, material, world_from_model })
+}
+
+/// The index of the material a shape names; one that names none gets the plain one.
+fn material_of(scene: &mut Scene, table: &Table) -> u32 {
+    let named = table.get("material", |value| {
+        let name = string(value)?;
+        if let Some(i) = scene.materials.iter().position(|m| m.name == name) {
+            return Ok(i);
+        }
+        let known = || scene.materials.iter().map(|m| m.name.as_str());
+        let near = super::suggest::nearest(&name, known());
+        let hint = near.map_or_else(|| super::suggest::list(known()), |near| format!("did you mean `{near}`?"));
+        Err(format!("is `{name}`, but no [materials.{name}] is there; {hint}"))
+    });
+    if let Some(i) = named {
+        return count(i);
+    }
+    let plain = scene.materials.iter().position(|m| m.name == "plain").unwrap_or_else(|| {
+        scene.materials.push(Material::plain());
+        scene.materials.len() - 1
+    });
+    count(plain)
+}
+
+fn background(value: &DeValue) -> Result<Background, String> {
+    match value.as_str() {
+        Some("transparent") => Ok(Background::Transparent),
+        Some("environment" | "env") => Ok(Background::Environment),
+        _ => color(value).map(Background::Color),
+    }
+}
+
+fn environment(value: &DeValue) -> Result<Environment, String> {
+    match value.as_str() {
+        Some("studio") => Ok(Environment::Studio),
+        Some("black") => Ok(Environment::Black),
+        _ => color(value).map(Environment::Constant),
+    }
+}
+
+/// Reads the models and puts everything together.
+fn assemble(
+    parsed: Parsed,
+    mut resolver: Resolver,
+    source: &Source,
+    options: &LoadOptions,
+) -> Result<Loaded, LoadError> {
+    let Parsed { mut scene, models } = parsed;
+    let mut warnings = Warnings::default();
+    let mut facts = Facts { format: "meshray scene".into(), ..Facts::default() };
+    facts.faces = scene.meshes.iter().map(faces).sum();
+    for model in models {
+        let mut part = read_model(&model, &mut resolver, source, options)?;
+        part.warnings.into_iter().for_each(|w| warnings.push(w));
+        facts.faces += part.facts.faces;
+        facts.dropped.extend(part.facts.dropped);
+        facts.points_and_lines += part.facts.points_and_lines;
+        facts.extensions.extend(part.facts.extensions);
+        facts.max_rounding = facts.max_rounding.max(part.facts.max_rounding);
+        if let Some(material) = model.material {
+            // Meshes count on from this scene's materials once they are appended, so the override comes after.
+            let first = scene.meshes.len();
+            scene.append(std::mem::take(&mut part.scene), &model.world_from_model);
+            scene.meshes[first..].iter_mut().for_each(|m| m.material = material);
+        } else {
+            scene.append(std::mem::take(&mut part.scene), &model.world_from_model);
+        }
+    }
+    (facts.files, facts.hash) = resolver.finish();
+    Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
+}
+
+fn faces(mesh: &crate::scene::Mesh) -> u64 {
+    mesh.face_of_triangle.last().map_or(0, |&last| u64::from(last) + 1)
+}
+
+fn read_model(
+    model: &Model,
+    resolver: &mut Resolver,
+    source: &Source,
+    options: &LoadOptions,
+) -> Result<Loaded, LoadError> {
+    let path = resolver
+        .locate(Path::new(&model.file))
+        .map_err(|fault| LoadError::from(fault.diagnose(&source.path, &model.place)))?;
+    let options = LoadOptions { root: Some(resolver.root().to_path_buf()), up: model.up, ..options.clone() };
+    let model_source = super::read_source(&path, &options.limits)?;
+    // Asked before it is read, or a file that names itself would never end.
+    if matches!(super::detect::detect(&model_source)?, super::detect::Format::SceneFile) {
+        let text = format!("`{}` is a scene file, and scene files do not nest", model.file);
+        return Err(Diagnostic::new("scene-nested", &source.path, &model.place, text).remedy("name a model").into());
+    }
+    let loaded = super::load_source(&model_source, &options)?;
+    resolver.absorb(&loaded.facts.files, loaded.facts.hash);
+    Ok(loaded)
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "a scene file is far smaller than 2^32 lines")]
+fn count(n: usize) -> u32 {
+    n as u32
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,285 @@
+//! What was typed: syntax only. What it means together is decided in [`super::job`].
+
+use super::parse;
+use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// Render downloaded meshes (glTF 2.0, OBJ) into pictures, on any CPU.
+#[derive(Debug, Parser)]
+#[command(
+    name = "meshray",
+    version,
+    long_version = super::version::LONG,
+    max_term_width = 100,
+    subcommand_required = true,
+    arg_required_else_help = true,
+    after_help = "`meshray MODEL` is short for `meshray render MODEL`.\n\
+                  Exit codes: 0 done, 1 could not do it, 2 bad command line, 3 bad input, 130 interrupted."
+)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Render models into pictures
+    #[command(after_help = RENDER_EXAMPLES)]
+    Render(Box<RenderArgs>),
+    /// Say what a file holds: sizes, faults, materials, cameras, lights, extensions
+    Inspect(InspectArgs),
+    /// Print a completion script for a shell
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page (roff)
+    Man,
+}
+
+const RENDER_EXAMPLES: &str = "\
+Examples:
+  meshray render ship.glb                            writes ship.png
+  meshray render *.obj -o 'thumbs/{stem}.png' --size 256x256
+  meshray render ship.glb --view front --view iso -o '{stem}-{view}.exr' --layers
+  curl -s https://example.org/ship.glb | meshray render - -o - > ship.png
+  meshray render --again ship.png                    renders that picture again";
+
+/// What `meshray render` was given.
+#[derive(Debug, Clone, Args)]
+pub struct RenderArgs {
+    /// Models (.glb, .gltf, .obj) or scene files (.toml); `-` reads standard input
+    #[arg(value_name = "INPUT", required_unless_present = "again")]
+    pub inputs: Vec<PathBuf>,
+
+    /// Where to write: a file (png, exr, jpg, webp by its ending), a folder, `-`, or a template with {dir} {stem}
+    /// {view} {frame:04}
+    ///
+    /// Without it the picture goes to STEM.png in the current folder, replacing only a picture that meshray wrote. A
+    /// name given here replaces whatever is there.
+    #[arg(short, long, value_name = "PATH", help_heading = "Output", allow_hyphen_values = true)]
+    pub output: Option<String>,
+    /// Columns and rows of the picture [default: 1024x768]
+    #[arg(long, value_name = "WxH", value_parser = parse::size, help_heading = "Output")]
+    pub size: Option<(u32, u32)>,
+    /// File type when the name does not say, as with `-o -`
+    #[arg(long, value_name = "TYPE", value_enum, help_heading = "Output", hide_short_help = true)]
+    pub format: Option<FileType>,
+    /// Bits a channel of a PNG
+    #[arg(long, value_name = "8|16", value_parser = parse::bits, help_heading = "Output", hide_short_help = true)]
+    pub bits: Option<u8>,
+    /// Store EXR colours as 16-bit floats (default)
+    #[arg(long, help_heading = "Output", hide_short_help = true, conflicts_with = "float")]
+    pub half: bool,
+    /// Store EXR colours as 32-bit floats
+    #[arg(long, help_heading = "Output", hide_short_help = true)]
+    pub float: bool,
+    /// Add layers to an EXR: albedo, N, P, Z, prim and instance ids
+    #[arg(long, help_heading = "Output", hide_short_help = true)]
+    pub layers: bool,
+    /// How linear light becomes display colour: none, reinhard, aces or neutral [default: neutral]
+    #[arg(long, value_name = "NAME", help_heading = "Output", hide_short_help = true)]
+    pub tone_map: Option<String>,
+    /// Brighter (+) or darker (-) by this many stops
+    #[arg(long, value_name = "STOPS", value_parser = parse::exposure, help_heading = "Output", allow_hyphen_values = true)]
+    pub exposure: Option<f32>,
+    /// Put all inputs into one scene and one picture
+    #[arg(long, help_heading = "Output")]
+    pub merge: bool,
+    /// On Ctrl-C keep the tiles that are done as NAME.partial.png
+    #[arg(long, help_heading = "Output", hide_short_help = true)]
+    pub keep_partial: bool,
+    /// Repeat a picture with the settings it carries; refuses when the input has changed
+    #[arg(long, value_name = "PICTURE", help_heading = "Output", hide_short_help = true)]
+    pub again: Option<PathBuf>,
+
+    /// Named view; repeat for several pictures: front, back, left, right, top, bottom, iso
+    #[arg(long, value_name = "NAME", action = ArgAction::Append, value_delimiter = ',', help_heading = "Camera")]
+    pub view: Vec<String>,
+    /// A camera of the file, by name or number from 0; repeat for several pictures
+    #[arg(long, value_name = "NAME", action = ArgAction::Append, help_heading = "Camera")]
+    pub camera: Vec<String>,
+    /// Camera position
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::vec3, help_heading = "Camera", hide_short_help = true, allow_hyphen_values = true)]
+    pub eye: Option<[f64; 3]>,
+    /// Point the camera looks at [default: middle of the model]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::vec3, help_heading = "Camera", hide_short_help = true, allow_hyphen_values = true)]
+    pub at: Option<[f64; 3]>,
+    /// Direction that is up in the picture [default: the up axis]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::vec3, help_heading = "Camera", hide_short_help = true, allow_hyphen_values = true)]
+    pub up_vector: Option<[f64; 3]>,
+    /// Vertical field of view, degrees
+    #[arg(long, value_name = "DEGREES", value_parser = parse::fov, help_heading = "Camera", hide_short_help = true)]
+    pub fov: Option<f64>,
+    /// Parallel rays, seeing HEIGHT units [default: what the model needs]
+    #[arg(long, value_name = "HEIGHT", num_args = 0..=1, default_missing_value = "auto", value_parser = parse::ortho,
+          require_equals = true, conflicts_with = "fov", help_heading = "Camera", hide_short_help = true)]
+    pub ortho: Option<parse::Ortho>,
+    /// Axis that points up in the file [default: what the file says, or a guess]
+    #[arg(long, value_name = "AXIS", value_enum, help_heading = "Camera")]
+    pub up: Option<Axis>,
+
+    /// #rrggbb, a colour name, r,g,b (linear, 0 to 1), `transparent`, or `env`: what reflections see
+    #[arg(long, value_name = "COLOR", value_parser = parse::background, help_heading = "Light and background")]
+    pub background: Option<parse::Back>,
+
+    /// Rays a pixel [default: 4]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536), help_heading = "Quality")]
+    pub samples: Option<u32>,
+    /// Bounces after the eye ray [default: what the scene needs]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=64), help_heading = "Quality")]
+    pub depth: Option<u32>,
+    /// Weight below which a branch of the ray tree ends [default: 0.001953125]
+    #[arg(long, value_name = "WEIGHT", value_parser = parse::cutoff, help_heading = "Quality", hide_short_help = true)]
+    pub cutoff: Option<f32>,
+    /// Seed of every random choice
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Quality", hide_short_help = true)]
+    pub seed: u64,
+
+    /// Which scene of a glTF file, by name or number from 0
+    #[arg(long, value_name = "NAME", help_heading = "Loading", hide_short_help = true)]
+    pub scene: Option<String>,
+    /// What becomes of OBJ faces with more than three corners
+    #[arg(long, value_name = "HOW", value_enum, default_value_t, help_heading = "Loading", hide_short_help = true)]
+    pub polygons: PolygonsArg,
+    /// Understand MTL files as exporters mean them, or to the letter
+    #[arg(long, value_name = "HOW", value_enum, default_value_t, help_heading = "Loading", hide_short_help = true)]
+    pub mtl: MtlArg,
+    /// Read other files only below this folder [default: the model's folder]
+    #[arg(long, value_name = "DIR", help_heading = "Loading", hide_short_help = true)]
+    pub root: Option<PathBuf>,
+    /// Refuse inputs that need more memory than this, such as 2G or 500M
+    #[arg(long, value_name = "SIZE", value_parser = parse::bytes, help_heading = "Loading", hide_short_help = true)]
+    pub max_memory: Option<u64>,
+    /// Draw the background when the file holds nothing to draw
+    #[arg(long, help_heading = "Loading", hide_short_help = true)]
+    pub allow_empty: bool,
+    /// Treat warnings as errors: no picture, exit code 3
+    #[arg(long, help_heading = "Loading", hide_short_help = true)]
+    pub strict: bool,
+
+    /// Structure that finds what rays hit; the picture is the same with each
+    #[arg(long, value_name = "NAME", value_parser = parse::accel(), default_value = parse::DEFAULT_ACCEL,
+          help_heading = "Structure", hide_short_help = true)]
+    pub accel: crate::accel::AccelKind,
+    #[command(flatten)]
+    pub grid: GridArgs,
+
+    /// Threads to use; 0: all
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=1024), help_heading = "Run")]
+    pub threads: u16,
+    /// Print times and counts: a timed run, then a counted one
+    #[arg(long, value_name = "FORMAT", value_enum, help_heading = "Run")]
+    pub stats: Option<StatsFormat>,
+    /// Write the statistics to a file instead of standard output
+    #[arg(long, value_name = "PATH", help_heading = "Run", hide_short_help = true)]
+    pub stats_file: Option<PathBuf>,
+    /// How messages are written to standard error
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t, help_heading = "Run", hide_short_help = true)]
+    pub messages: MessageFormat,
+    /// Only warnings and errors
+    #[arg(short, long, help_heading = "Run")]
+    pub quiet: bool,
+}
+
+/// Parameters of the grid.
+#[derive(Debug, Clone, Default, Args)]
+pub struct GridArgs {}
+
+/// What `meshray inspect` was given.
+#[derive(Debug, Clone, Args)]
+pub struct InspectArgs {
+    /// A model or scene file; `-` reads standard input
+    #[arg(value_name = "FILE")]
+    pub input: PathBuf,
+    /// Print JSON (schema `meshray-inspect/1`)
+    #[arg(long)]
+    pub json: bool,
+    /// Which scene of a glTF file, by name or number from 0
+    #[arg(long, value_name = "NAME")]
+    pub scene: Option<String>,
+    /// What becomes of OBJ faces with more than three corners
+    #[arg(long, value_name = "HOW", value_enum, default_value_t)]
+    pub polygons: PolygonsArg,
+    /// Understand MTL files as exporters mean them, or to the letter
+    #[arg(long, value_name = "HOW", value_enum, default_value_t)]
+    pub mtl: MtlArg,
+    /// Axis that points up in the file
+    #[arg(long, value_name = "AXIS", value_enum)]
+    pub up: Option<Axis>,
+    /// Read other files only below this folder [default: the model's folder]
+    #[arg(long, value_name = "DIR")]
+    pub root: Option<PathBuf>,
+    /// Refuse inputs that need more memory than this, such as 2G or 500M
+    #[arg(long, value_name = "SIZE", value_parser = parse::bytes)]
+    pub max_memory: Option<u64>,
+    /// Exit with code 3 when there are warnings
+    #[arg(long)]
+    pub strict: bool,
+    /// How messages are written to standard error
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub messages: MessageFormat,
+}
+
+/// Types of picture files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum FileType {
+    /// PNG, 8 or 16 bits
+    Png,
+    /// OpenEXR, linear
+    Exr,
+    /// JPEG
+    Jpg,
+    /// WebP, lossless
+    Webp,
+}
+
+/// An up axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Axis {
+    /// +Y, as glTF and most OBJ exporters
+    Y,
+    /// +Z, as CAD programs and scanners
+    Z,
+}
+
+/// `--polygons`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum PolygonsArg {
+    /// Cut into triangles
+    #[default]
+    Cut,
+    /// Planar ones stay whole
+    Whole,
+}
+
+/// `--mtl`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum MtlArg {
+    /// Replace values that exporters write carelessly, with a warning each
+    #[default]
+    Guess,
+    /// What the text says
+    Literal,
+}
+
+/// `--stats`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum StatsFormat {
+    /// For people
+    Text,
+    /// For programs (schema `meshray-stats/1`)
+    Json,
+}
+
+/// `--messages`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum MessageFormat {
+    /// For people
+    #[default]
+    Text,
+    /// One JSON object a line
+    Json,
+}

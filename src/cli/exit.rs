@@ -1,0 +1,50 @@
+//! Exit codes. They tell a script whether trying again can help.
+
+use std::process::ExitCode;
+
+/// How a command ended, from best to worst.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Exit {
+    /// 0: done.
+    #[default]
+    Done,
+    /// 1: could not do it (I/O, memory): a retry may help.
+    Failed,
+    /// 3: the input is bad, unsupported or empty: a retry is useless.
+    Input,
+    /// 2: the command line is wrong.
+    Usage,
+    /// 130: interrupted.
+    Interrupted,
+}
+
+impl Exit {
+    /// The number the system sees.
+    pub fn code(self) -> u8 {
+        match self {
+            Self::Done => 0,
+            Self::Failed => 1,
+            Self::Usage => 2,
+            Self::Input => 3,
+            Self::Interrupted => 130,
+        }
+    }
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit.code())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_batch_ends_with_the_worst_of_its_files() {
+        let ends = [Exit::Done, Exit::Input, Exit::Failed, Exit::Done];
+        assert_eq!(ends.into_iter().max(), Some(Exit::Input));
+        assert_eq!(Exit::Interrupted.max(Exit::Input).code(), 130);
+    }
+}

@@ -1,0 +1,146 @@
+//! Messages: one line each to stderr, as text or as JSON objects.
+//!
+//! The JSON form is one object a line: `{"severity","code","file","place","text","remedy","count"}`; `severity` is
+//! `error`, `warning` or `info`, codes are stable. stdout is never written here.
+
+use crate::load::{Diagnostic, LoadError};
+use indicatif::MultiProgress;
+use std::io::Write;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// How messages look.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Format {
+    /// For people.
+    #[default]
+    Text,
+    /// For programs.
+    Json,
+}
+
+/// How bad a message is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    /// What was asked for did not happen.
+    Error,
+    /// It happened, but not quite as the input says.
+    Warning,
+    /// A fact worth knowing; `--quiet` drops it.
+    Info,
+}
+
+impl Severity {
+    /// The word in messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Error => "error",
+            Self::Warning => "warning",
+            Self::Info => "info",
+        }
+    }
+}
+
+/// Where messages go, and how many of them were warnings.
+#[derive(Debug, Default)]
+pub struct Messages {
+    format: Format,
+    quiet: bool,
+    warnings: AtomicU32,
+    /// Bars on the same terminal; they step aside while a line is written.
+    pub(super) bars: MultiProgress,
+}
+
+impl Messages {
+    /// Messages in a format; `quiet` drops facts, never errors and warnings.
+    pub fn new(format: Format, quiet: bool) -> Self {
+        Self { format, quiet, ..Self::default() }
+    }
+
+    /// Writes one message.
+    pub fn say(&self, severity: Severity, message: &Diagnostic) {
+        if severity == Severity::Warning {
+            self.warnings.fetch_add(message.count.max(1), Ordering::Relaxed);
+        }
+        if severity == Severity::Info && self.quiet {
+            return;
+        }
+        let line = line(self.format, severity, message);
+        // Nobody left to read stderr is no reason to stop.
+        self.bars.suspend(|| drop(writeln!(std::io::stderr(), "{line}")));
+    }
+
+    /// Writes an error that is no file's fault.
+    pub fn error(&self, code: &'static str, text: impl Into<String>, remedy: impl Into<String>) {
+        self.say(Severity::Error, &Diagnostic::new(code, "", "", text).remedy(remedy));
+    }
+
+    /// Writes a fact.
+    pub fn info(&self, code: &'static str, text: impl Into<String>) {
+        self.say(Severity::Info, &Diagnostic::new(code, "", "", text));
+    }
+
+    /// Writes every fault that kept a file from being loaded.
+    pub fn load_error(&self, error: &LoadError) {
+        match error {
+            LoadError::Read { what, source } => {
+                let text = if what.text.is_empty() { source.to_string() } else { format!("{}: {source}", what.text) };
+                self.say(Severity::Error, &Diagnostic { text, ..what.clone() });
+            }
+            LoadError::Input(faults) => faults.iter().for_each(|fault| self.say(Severity::Error, fault)),
+        }
+    }
+
+    /// Warnings so far, each counted as often as it was met.
+    pub fn warnings(&self) -> u32 {
+        self.warnings.load(Ordering::Relaxed)
+    }
+}
+
+fn line(format: Format, severity: Severity, message: &Diagnostic) -> String {
+    match format {
+        Format::Text if severity == Severity::Info => message.to_string(),
+        Format::Text => format!("{}: {message}", severity.name()),
+        Format::Json => serde_json::json!({
+            "severity": severity.name(),
+            "code": message.code,
+            "file": message.file.to_string_lossy(),
+            "place": message.place,
+            "text": message.text,
+            "remedy": message.remedy,
+            "count": message.count,
+        })
+        .to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fault() -> Diagnostic {
+        Diagnostic::new("obj-index", "a \"b\"\n.obj", "118", "index 91, but only 88 exist").remedy("export it again")
+    }
+
+    #[test]
+    fn a_message_is_one_line_whatever_the_file_is_called() {
+        let text = line(Format::Text, Severity::Error, &fault());
+        assert_eq!(text, "error: a \"b\"\u{fffd}.obj:118: index 91, but only 88 exist; export it again");
+    }
+
+    #[test]
+    fn a_json_message_is_one_object_on_one_line() {
+        let text = line(Format::Json, Severity::Warning, &fault());
+        assert!(!text.contains('\n'));
+        let back: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!((&back["code"], &back["place"], &back["file"]), (&"obj-index".into(), &"118".into(), &"a \"b\"\n.obj".into()));
+        assert_eq!(back["remedy"], "export it again");
+    }
+
+    #[test]
+    fn warnings_are_counted_as_often_as_they_were_met() {
+        let messages = Messages::new(Format::Text, true);
+        messages.say(Severity::Warning, &Diagnostic { count: 3, ..fault() });
+        messages.say(Severity::Error, &fault());
+        assert_eq!(messages.warnings(), 3);
+    }
+}

@@ -1,0 +1,184 @@
+//! Where pictures go: templates, default names, and names that would collide.
+//!
+//! Templates know `{dir}` (the input's folder), `{stem}` (its name without extension), `{view}` and `{frame}` (number
+//! of the picture in this run, from 1; `{frame:04}` pads it with zeros). `{{` and `}}` are plain braces.
+
+use crate::load::suggest::nearest;
+use std::collections::HashMap;
+use std::path::{Component, Path, PathBuf};
+
+/// What a template is filled with.
+#[derive(Clone, Debug)]
+pub struct Facts<'a> {
+    /// The input, or `-`.
+    pub input: &'a Path,
+    /// Name of the view or camera.
+    pub view: &'a str,
+    /// Number of the picture, from 1.
+    pub frame: u32,
+}
+
+const FIELDS: [&str; 4] = ["dir", "stem", "view", "frame"];
+
+/// The input's name without folder and extension; `stdin` for `-`.
+pub fn stem(input: &Path) -> String {
+    if input == Path::new("-") {
+        return "stdin".into();
+    }
+    input.file_stem().map_or_else(|| "picture".into(), |s| s.to_string_lossy().into_owned())
+}
+
+/// Fills a template. Errors name the unknown field.
+pub fn fill(template: &str, facts: &Facts) -> Result<PathBuf, String> {
+    let mut name = String::new();
+    let mut rest = template;
+    while let Some(at) = rest.find(['{', '}']) {
+        name.push_str(&rest[..at]);
+        let tail = &rest[at..];
+        if let Some(after) = tail.strip_prefix("{{").or_else(|| tail.strip_prefix("}}")) {
+            name.push_str(&tail[..1]);
+            rest = after;
+        } else if let Some((field, after)) = tail.strip_prefix('{').and_then(|t| t.split_once('}')) {
+            name.push_str(&value(field, facts)?);
+            rest = after;
+        } else {
+            return Err(format!("`{template}`: a brace without its partner; write {{{{ or }}}} for a plain brace"));
+        }
+    }
+    name.push_str(rest);
+    Ok(PathBuf::from(name))
+}
+
+fn value(field: &str, facts: &Facts) -> Result<String, String> {
+    let (name, width) = field.split_once(':').unwrap_or((field, ""));
+    if name != "frame" && !width.is_empty() {
+        return Err(format!("`{{{field}}}`: only {{frame}} takes a width, as in {{frame:04}}"));
+    }
+    match name {
+        "dir" => Ok(folder(facts.input)),
+        "stem" => Ok(stem(facts.input)),
+        "view" => Ok(facts.view.replace(['/', '\\', '\0'], "_")),
+        "frame" => {
+            let width: usize = if width.is_empty() { 0 } else { width.parse().map_err(|_| bad_width(field))? };
+            if width > 20 { Err(bad_width(field)) } else { Ok(format!("{:0width$}", facts.frame)) }
+        }
+        _ => {
+            let hint = nearest(name, FIELDS).map_or_else(String::new, |n| format!("; did you mean {{{n}}}?"));
+            Err(format!("`{{{field}}}` is no field of a name; there are {{dir}} {{stem}} {{view}} {{frame:04}}{hint}"))
+        }
+    }
+}
+
+fn bad_width(field: &str) -> String {
+    format!("`{{{field}}}`: the width is a number from 1 to 20, as in {{frame:04}}")
+}
+
+fn folder(input: &Path) -> String {
+    match input.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent.to_string_lossy().into_owned(),
+        _ => ".".into(),
+    }
+}
+
+/// The template that is used when none is given, or when only a folder is.
+pub fn default_template(folder: Option<&str>, several_views: bool, extension: &str) -> String {
+    let name = if several_views { "{stem}-{view}" } else { "{stem}" };
+    match folder {
+        Some(folder) => format!("{}/{name}.{extension}", escape(folder.trim_end_matches('/'))),
+        None => format!("{name}.{extension}"),
+    }
+}
+
+fn escape(plain: &str) -> String {
+    plain.replace('{', "{{").replace('}', "}}")
+}
+
+/// The first two of `names` that are one file, as indices.
+pub fn collision(names: &[PathBuf]) -> Option<(usize, usize)> {
+    let mut seen = HashMap::new();
+    names.iter().enumerate().find_map(|(i, name)| seen.insert(identity(name), i).map(|earlier| (earlier, i)))
+}
+
+/// One spelling for every way of writing the path of one file; the file itself need not exist.
+pub fn identity(name: &Path) -> PathBuf {
+    let parent = name.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let parent = parent.canonicalize().unwrap_or_else(|_| lexical(parent));
+    parent.join(name.file_name().unwrap_or_default())
+}
+
+fn lexical(path: &Path) -> PathBuf {
+    let mut clean = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir if clean.file_name().is_some() => {
+                clean.pop();
+            }
+            other => clean.push(other),
+        }
+    }
+    clean
+}
+
+/// `shot.png` -> `shot.partial.png`.
+pub fn partial(name: &Path) -> PathBuf {
+    let extension = name.extension().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();
+    name.with_extension(format!("partial.{extension}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn facts(input: &str) -> Facts<'_> {
+        Facts { input: Path::new(input), view: "front", frame: 7 }
+    }
+
+    #[test]
+    fn every_field_is_filled() {
+        let name = fill("{dir}/{stem}-{view}.{frame:04}.{frame}.png", &facts("a/b/ship.v2.obj")).unwrap();
+        assert_eq!(name, Path::new("a/b/ship.v2-front.0007.7.png"));
+        assert_eq!(fill("{dir}/x", &facts("ship.obj")).unwrap(), Path::new("./x"));
+        assert_eq!(fill("{stem}.png", &facts("-")).unwrap(), Path::new("stdin.png"));
+    }
+
+    #[test]
+    fn doubled_braces_are_plain_ones() {
+        assert_eq!(fill("{{{stem}}}.png", &facts("a.obj")).unwrap(), Path::new("{a}.png"));
+    }
+
+    #[test]
+    fn an_unknown_field_names_the_nearest() {
+        let error = fill("{steam}.png", &facts("a.obj")).unwrap_err();
+        assert!(error.contains("did you mean {stem}?"), "{error}");
+        assert!(fill("{stem.png", &facts("a.obj")).is_err());
+        assert!(fill("{frame:9999}", &facts("a.obj")).is_err());
+        assert!(fill("{stem:04}", &facts("a.obj")).is_err());
+    }
+
+    #[test]
+    fn a_camera_name_cannot_lead_out_of_the_folder() {
+        let facts = Facts { view: "../../etc/x", ..facts("a.obj") };
+        assert_eq!(fill("{view}.png", &facts).unwrap(), Path::new(".._.._etc_x.png"));
+    }
+
+    #[test]
+    fn two_spellings_of_one_file_collide() {
+        let names = ["a.png", "b.png", "./nowhere/../a.png"].map(PathBuf::from);
+        assert_eq!(collision(&names), None, "nowhere/.. is no folder, so nobody can say where it leads");
+        let names = ["a.png", "b.png", "src/../a.png"].map(PathBuf::from);
+        assert_eq!(collision(&names), Some((0, 2)));
+        assert_eq!(collision(&[PathBuf::from("a.png"), PathBuf::from("b.png")]), None);
+    }
+
+    #[test]
+    fn a_folder_with_braces_is_taken_literally() {
+        let template = default_template(Some("{x}/"), true, "exr");
+        assert_eq!(fill(&template, &facts("a.obj")).unwrap(), Path::new("{x}/a-front.exr"));
+    }
+
+    #[test]
+    fn a_partial_picture_keeps_its_type() {
+        assert_eq!(partial(Path::new("a/b.exr")), Path::new("a/b.partial.exr"));
+    }
+}

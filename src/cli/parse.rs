@@ -1,0 +1,168 @@
+//! The words of single flags: sizes, vectors, angles, colours. Errors say what would be right.
+
+use crate::accel::AccelKind;
+use crate::math::Vec3;
+use crate::scene::Background;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+
+/// Longest side of a picture.
+pub const MAX_SIDE: u32 = 65_535;
+
+/// The structure used when none is named.
+pub const DEFAULT_ACCEL: &str = "grid-octree";
+
+/// `--background` as typed.
+pub type Back = Background;
+
+/// `--ortho` as typed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Ortho {
+    /// Framed like the perspective camera would be.
+    Auto,
+    /// World units from the lower to the upper edge.
+    Height(f64),
+}
+
+/// Columns and rows, each 1 to [`MAX_SIDE`].
+pub fn size(text: &str) -> Result<(u32, u32), String> {
+    let side = |s: &str| s.trim().parse::<u32>().ok().filter(|n| (1..=MAX_SIDE).contains(n));
+    let (w, h) = text.split_once(['x', 'X', '×']).ok_or("write width x height, such as 800x600")?;
+    match (side(w), side(h)) {
+        (Some(w), Some(h)) => Ok((w, h)),
+        _ => Err(format!("width and height are whole numbers from 1 to {MAX_SIDE}, such as 800x600")),
+    }
+}
+
+/// Three finite numbers.
+pub fn vec3(text: &str) -> Result<[f64; 3], String> {
+    let parts: Option<Vec<f64>> = text.split(',').map(|p| finite(p).ok()).collect();
+    parts.and_then(|p| <[f64; 3]>::try_from(p).ok()).ok_or_else(|| "write three numbers, such as 1,0.5,-2".into())
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    text.trim().parse::<f64>().ok().filter(|n| n.is_finite()).ok_or_else(|| "write a number".into())
+}
+
+fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
+    let n = finite(text)?;
+    if (low..=high).contains(&n) { Ok(n) } else { Err(format!("write a number from {low} to {high}")) }
+}
+
+/// Degrees.
+pub fn fov(text: &str) -> Result<f64, String> {
+    within(text, 0.1, 170.0)
+}
+
+/// Stops.
+#[expect(clippy::cast_possible_truncation, reason = "the range fits f32")]
+pub fn exposure(text: &str) -> Result<f32, String> {
+    within(text, -30.0, 30.0).map(|n| n as f32)
+}
+
+/// A weight.
+#[expect(clippy::cast_possible_truncation, reason = "the range fits f32")]
+pub fn cutoff(text: &str) -> Result<f32, String> {
+    within(text, 0.0, 1.0).map(|n| n as f32)
+}
+
+/// A height, or `auto`.
+pub fn ortho(text: &str) -> Result<Ortho, String> {
+    if text == "auto" {
+        return Ok(Ortho::Auto);
+    }
+    let height = finite(text)?;
+    if height > 0.0 { Ok(Ortho::Height(height)) } else { Err("the height must be above 0".into()) }
+}
+
+/// 8 or 16.
+pub fn bits(text: &str) -> Result<u8, String> {
+    match text {
+        "8" => Ok(8),
+        "16" => Ok(16),
+        _ => Err("a PNG has 8 or 16 bits a channel; EXR stores floats".into()),
+    }
+}
+
+/// Bytes with an optional binary suffix: `500M`, `2G`, `2GiB`.
+pub fn bytes(text: &str) -> Result<u64, String> {
+    let wrong = || "write a size such as 500M or 2G".to_owned();
+    let digits = text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
+    let number: u64 = text[..digits].parse().map_err(|_| wrong())?;
+    let suffix = text[digits..].to_ascii_uppercase();
+    let shift = match suffix.trim_end_matches('B').trim_end_matches('I') {
+        "" => 0,
+        "K" => 10,
+        "M" => 20,
+        "G" => 30,
+        "T" => 40,
+        _ => return Err(wrong()),
+    };
+    number.checked_mul(1 << shift).filter(|&n| n > 0).ok_or_else(wrong)
+}
+
+/// A colour, `transparent` or `env`.
+pub fn background(text: &str) -> Result<Back, String> {
+    match text {
+        "transparent" => Ok(Background::Transparent),
+        "env" | "environment" => Ok(Background::Environment),
+        _ => crate::scene::color::parse(text)
+            .map(Background::Color)
+            .map_err(|wrong| format!("{wrong}; or `transparent`, or `env`")),
+    }
+}
+
+/// The names of all structures.
+pub fn accel() -> impl TypedValueParser<Value = AccelKind> {
+    let parse = |name: String| name.parse::<AccelKind>().map_err(|e| e.to_string());
+    PossibleValuesParser::new(AccelKind::ALL.iter().map(AccelKind::name)).try_map(parse)
+}
+
+/// As `glam` wants it.
+pub fn dvec(v: [f64; 3]) -> crate::math::DVec3 {
+    v.into()
+}
+
+/// A linear colour as settings text that [`background`] reads back exactly.
+pub fn color_text(c: Vec3) -> String {
+    format!("{},{},{}", c.x, c.y, c.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_have_two_sides_of_at_least_one() {
+        assert_eq!(size("800x600"), Ok((800, 600)));
+        assert_eq!(size("1X65535"), Ok((1, 65535)));
+        for wrong in ["800", "0x5", "5x0", "x", "-1x5", "65536x1", "1.5x2", "99999999999x1"] {
+            assert!(size(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn vectors_have_three_finite_parts() {
+        assert_eq!(vec3("-1, 2.5,3e2"), Ok([-1.0, 2.5, 300.0]));
+        for wrong in ["1,2", "1,2,3,4", "1,2,nan", "inf,0,0", ""] {
+            assert!(vec3(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn memory_sizes_take_binary_suffixes() {
+        assert_eq!(bytes("500"), Ok(500));
+        assert_eq!(bytes("2G"), Ok(2 << 30));
+        assert_eq!(bytes("3MiB"), Ok(3 << 20));
+        for wrong in ["", "G", "0", "2X", "99999999999T", "-1"] {
+            assert!(bytes(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_background_survives_being_written_down() {
+        let Ok(Background::Color(c)) = background("#336699") else { panic!("no colour") };
+        assert_eq!(background(&color_text(c)), Ok(Background::Color(c)));
+        assert_eq!(background("env"), Ok(Background::Environment));
+        assert!(background("purplish").unwrap_err().contains("transparent"));
+    }
+}

@@ -1,0 +1,141 @@
+//! What the user sees while waiting: a bar on a terminal, a plain line every few seconds elsewhere, nothing with
+//! `--quiet`.
+//!
+//! The bar runs over load → build → render. Only the render has a known length, so only it has a time to go.
+
+use super::interrupt;
+use super::message::Messages;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+/// Lines that are not a terminal's come this far apart.
+const LINE_EVERY: Duration = Duration::from_secs(5);
+
+/// The progress of one picture.
+pub struct Progress<'a> {
+    how: How<'a>,
+    /// Whether a signal ends the render so that its tiles can be kept.
+    cancellable: bool,
+}
+
+enum How<'a> {
+    Silent,
+    Bar { bar: ProgressBar, messages: &'a Messages },
+    Lines { name: String, messages: &'a Messages, stage: Mutex<Stage> },
+}
+
+struct Stage {
+    started: Instant,
+    last_line: Instant,
+}
+
+impl<'a> Progress<'a> {
+    /// Progress of the picture of `name`.
+    pub fn new(name: &str, messages: &'a Messages, silent: bool, cancellable: bool) -> Self {
+        use std::io::IsTerminal;
+        let now = Instant::now();
+        let how = if silent {
+            How::Silent
+        } else if std::io::stderr().is_terminal() {
+            let bar = messages.bars.add(ProgressBar::new_spinner());
+            bar.set_prefix(name.to_owned());
+            How::Bar { bar, messages }
+        } else {
+            How::Lines { name: name.into(), messages, stage: Mutex::new(Stage { started: now, last_line: now }) }
+        };
+        Self { how, cancellable }
+    }
+
+    /// A stage of unknown length begins: `loading`, `building`.
+    pub fn stage(&self, what: &str) {
+        match &self.how {
+            How::Silent => {}
+            How::Bar { bar, .. } => {
+                bar.set_style(style("{spinner} {prefix}: {msg} {elapsed}"));
+                bar.set_message(what.to_owned());
+                bar.enable_steady_tick(Duration::from_millis(120));
+            }
+            How::Lines { .. } => {}
+        }
+    }
+
+    /// The render begins.
+    pub fn render(&self) {
+        match &self.how {
+            How::Silent => {}
+            How::Bar { bar, .. } => {
+                bar.disable_steady_tick();
+                bar.reset_eta();
+                bar.set_style(style("{prefix}: rendering [{wide_bar}] {percent:>3} %  {elapsed} (ETA {eta})"));
+            }
+            How::Lines { stage, .. } => {
+                if let Ok(mut stage) = stage.lock() {
+                    stage.started = Instant::now();
+                }
+            }
+        }
+    }
+
+    /// Nothing more to show.
+    pub fn finish(&self) {
+        if let How::Bar { bar, messages } = &self.how {
+            bar.finish_and_clear();
+            messages.bars.remove(bar);
+        }
+    }
+}
+
+impl Drop for Progress<'_> {
+    fn drop(&mut self) {
+        self.finish();
+    }
+}
+
+impl crate::render::Progress for Progress<'_> {
+    fn tiles(&self, done: usize, total: usize) {
+        match &self.how {
+            How::Silent => {}
+            How::Bar { bar, .. } => {
+                bar.set_length(total as u64);
+                // Workers report out of order; the bar never goes back.
+                if done as u64 > bar.position() {
+                    bar.set_position(done as u64);
+                }
+            }
+            How::Lines { name, messages, stage } => {
+                // Whoever finds another worker writing has nothing to add.
+                let Ok(mut stage) = stage.try_lock() else { return };
+                if stage.last_line.elapsed() >= LINE_EVERY && done < total {
+                    stage.last_line = Instant::now();
+                    messages.info("progress", plain_line(name, done, total, stage.started.elapsed()));
+                }
+            }
+        }
+    }
+
+    fn cancelled(&self) -> bool {
+        self.cancellable && interrupt::raised()
+    }
+}
+
+fn plain_line(name: &str, done: usize, total: usize, elapsed: Duration) -> String {
+    let left = elapsed.as_secs_f64() * (total - done) as f64 / done.max(1) as f64;
+    format!("{name}: rendering, {} % done, about {left:.0} s left", 100 * done / total.max(1))
+}
+
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_left_is_extrapolated_from_the_tiles_done() {
+        let line = plain_line("a.obj", 25, 100, Duration::from_secs(10));
+        assert_eq!(line, "a.obj: rendering, 25 % done, about 30 s left");
+        assert!(plain_line("a.obj", 0, 0, Duration::ZERO).contains("0 %"));
+    }
+}

@@ -1,0 +1,12 @@
+//! What `--version` says.
+
+/// Version and features of this build.
+pub const LONG: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    "\ninput: glTF 2.0 (.glb, .gltf), Wavefront OBJ + MTL, meshray scenes (.toml)",
+    "\noutput: PNG, OpenEXR, JPEG, WebP",
+    "\nfeatures: cli",
+);
+
+/// Version alone.
+pub const SHORT: &str = env!("CARGO_PKG_VERSION");

@@ -1,0 +1,143 @@
+use super::*;
+use crate::math::{DAffine3, Vec3};
+use crate::scene::{AlphaMode, Falloff, LightKind, Projection, Surface};
+
+fn load_text(text: &str) -> Result<Loaded, LoadError> {
+    let source = Source { path: "dir/test.toml".into(), bytes: text.into() };
+    load(&source, &LoadOptions::default())
+}
+
+fn faults(text: &str) -> Vec<String> {
+    match load_text(text) {
+        Err(LoadError::Input(list)) => list.iter().map(ToString::to_string).collect(),
+        other => panic!("expected faults, got {other:?}"),
+    }
+}
+
+#[test]
+fn the_schema_in_the_module_head_is_read_without_a_fault() {
+    let head = include_str!("mod.rs");
+    let block = head.split("```toml\n").nth(1).unwrap().split("//! ```").next().unwrap();
+    let text: String = block.lines().map(|l| l.trim_start_matches("//!").trim_start()).collect::<Vec<_>>().join("\n");
+    // The model it names is not there, and that is all that is wrong.
+    let errors = faults(&text);
+    assert!(errors.len() == 1 && errors[0].contains("bunny.obj"), "{errors:#?}");
+    let without = text.replace("[[models]]", "[[unused]]");
+    let (start, end) = (without.find("[[unused]]").unwrap(), without.find("[[meshes]]").unwrap());
+    let scene = load_text(&format!("{}{}", &without[..start], &without[end..])).unwrap().scene;
+    assert_eq!((scene.materials.len(), scene.spheres.len(), scene.planes.len()), (3, 1, 1));
+    assert_eq!((scene.meshes[0].triangles.len(), scene.cameras.len(), scene.lights.len()), (2, 1, 2));
+    assert_eq!((scene.hints.size, scene.hints.depth), (Some((800, 600)), Some(1)));
+}
+
+#[test]
+fn an_unknown_key_names_the_nearest_with_its_line_and_column() {
+    let errors = faults("[materials.red]\n  difuse = 1\n[[spheres]]\ncenter=[0,0,0]\nradius=1\nmatreial='red'\n");
+    assert_eq!(
+        errors,
+        [
+            "dir/test.toml:2:3: unknown key `difuse` in material; did you mean `diffuse`?",
+            "dir/test.toml:6:1: unknown key `matreial` in sphere; did you mean `material`?",
+        ]
+    );
+}
+
+#[test]
+fn broken_syntax_says_where() {
+    let errors = faults("up = \"y\"\n[[spheres]\n");
+    assert!(errors[0].starts_with("dir/test.toml:2:"), "{errors:?}");
+    assert!(load_text("\u{feff}up = 'y'").is_ok());
+    assert!(load(&Source { path: "x.toml".into(), bytes: vec![0xff] }, &LoadOptions::default()).is_err());
+}
+
+#[test]
+fn wrong_values_say_what_would_be_right() {
+    for (text, said) in [
+        ("up = 'x'", "none of `y`, `z`"),
+        ("background = 'wite'", "no colour"),
+        ("[[spheres]]\ncenter=[0,0]\nradius=1", "must have 3 numbers, not 2"),
+        ("[[spheres]]\ncenter=[0,0,0]\nradius=-1", "must be above 0"),
+        ("[[spheres]]\ncenter=[0,0,inf]\nradius=1", "finite"),
+        ("[[spheres]]\nradius=1", "no `center`"),
+        ("[[spheres]]\ncenter=[0,0,0]\nradius=1\nmaterial='x'", "no [materials.x]"),
+        ("spheres = 3", "list of tables"),
+        ("[materials]\nred = 1", "not a material table"),
+        ("[materials.g]\nmetallic = 1", "add model = \"pbr\""),
+        ("[materials.g]\nior = 'unobtainium'", "no known substance"),
+        ("[[planes]]\nnormal=[0,0,0]", "must have a length"),
+        ("[[lights]]\nkind='lamp'", "none of `point`"),
+        ("[[lights]]\nkind='point'\nposition=[0,0,0]\nrange=3", "inverse-square"),
+        ("[[lights]]\nkind='spot'\nposition=[0,0,0]\ndirection=[0,1,0]\ninner=50\nouter=20", "above `outer`"),
+        ("[[cameras]]\neye=[0,0,0]", "looks nowhere"),
+        ("[[cameras]]\neye=[0,0,1]\nfov=20\northo=3", "not both"),
+        ("[[meshes]]\npositions=[[0,0,0]]\nfaces=[[0,0,7]]", "corner 7, but only 1 positions"),
+        ("[[meshes]]\npositions=[[0,0,0]]\nfaces=[[0,0]]", "has 2 corners"),
+        ("[[meshes]]\npositions=[]\nfaces=[]\nscale=0", "must not be 0"),
+        ("[render]\nsize=[0,1]", "1 to 65535"),
+        ("[render]\ndepth=1.5", "whole number"),
+        ("[[models]]\nfile='../../etc/passwd'", "outside"),
+        ("[[models]]\nfile='http://example.org/a.glb'", "a.glb"),
+    ] {
+        let errors = faults(text);
+        assert!(errors.iter().any(|e| e.contains(said)), "{text}: {errors:?}");
+    }
+}
+
+#[test]
+fn all_faults_are_told_in_the_order_of_the_file() {
+    let errors = faults("[[spheres]]\nradius=1\n[materials.a]\nx=1\n[[planes]]\n");
+    let lines: Vec<_> = errors.iter().map(|e| e.split(':').nth(1).unwrap().to_owned()).collect();
+    assert_eq!(lines, ["1", "4", "5"]);
+}
+
+#[test]
+fn transforms_act_in_the_order_scale_rotate_translate() {
+    let at = |keys: &str| {
+        let text = format!("[[meshes]]\npositions=[[1,0,0]]\nfaces=[]\n{keys}");
+        load_text(&text).unwrap().scene.instances[0].world_from_object.transform_point3(DVec3::X)
+    };
+    let steps = at("scale=2\nrotate=[0,90,0]\ntranslate=[0,1,0]");
+    assert!(steps.abs_diff_eq(DVec3::new(0.0, 1.0, -2.0), 1e-12), "{steps}");
+    assert!(at("rotate={axis=[0,0,2],angle=90}").abs_diff_eq(DVec3::Y, 1e-12));
+    assert_eq!(at("matrix=[[1,0,0,5],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"), DVec3::new(6.0, 0.0, 0.0));
+    // About x, then y: z goes to -y and stays there.
+    let text = "[[meshes]]\npositions=[]\nfaces=[]\nrotate=[90,90,0]";
+    let place = load_text(text).unwrap().scene.instances[0].world_from_object;
+    assert!(place.transform_vector3(DVec3::Z).abs_diff_eq(DVec3::NEG_Y, 1e-12));
+}
+
+#[test]
+fn colours_are_linear_numbers_or_srgb_words() {
+    let text = "[materials.a]\ndiffuse=[0.5,0.25,0.125]\nspecular=0.5\nmirror='#ffffff'\nior='water'\nopacity=0.5";
+    let material = load_text(text).unwrap().scene.materials.remove(0);
+    assert_eq!(material.base_color, Vec3::new(0.5, 0.25, 0.125));
+    assert_eq!(material.alpha_mode, AlphaMode::Blend);
+    let Surface::Phong(phong) = material.surface else { panic!("not Phong") };
+    assert_eq!((phong.ambient, phong.specular), (material.base_color, Vec3::splat(0.5)));
+    assert_eq!((phong.mirror, phong.ior), (Vec3::ONE, 1.33));
+}
+
+#[test]
+fn lights_and_cameras_come_out_in_radians_and_world_space() {
+    let text = "[[lights]]\nkind='spot'\nposition=[0,1,0]\ndirection=[0,-3,0]\nouter=90\nintensity=2\n\
+                [[lights]]\nkind='ambient'\ncolor=0.2\n\
+                [[cameras]]\neye=[0,0,25]\nfov=50\n[[cameras]]\neye=[0,9,0]\northo=4";
+    let scene = load_text(text).unwrap().scene;
+    let LightKind::Spot { direction, outer, falloff, .. } = scene.lights[0].kind else { panic!("not a spot") };
+    assert_eq!((direction, falloff), (DVec3::NEG_Y, Falloff::None));
+    assert!((outer - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
+    assert_eq!((scene.lights[0].intensity, scene.ambient), (Vec3::splat(2.0), Vec3::splat(0.2)));
+    assert_eq!(scene.cameras[0].world_from_camera, DAffine3::from_translation(DVec3::new(0.0, 0.0, 25.0)));
+    // Straight down: up lies along the view, and the camera still stands on three axes.
+    assert!((scene.cameras[1].world_from_camera.matrix3.determinant() - 1.0).abs() < 1e-12);
+    assert_eq!(scene.cameras[1].projection, Projection::Orthographic { x_mag: 2.0, y_mag: 2.0 });
+}
+
+#[test]
+fn a_scene_file_that_names_itself_ends_in_a_message() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.toml");
+    std::fs::write(&path, "[[models]]\nfile = \"a.toml\"\n").unwrap();
+    let error = crate::load::load(&path, &LoadOptions::default()).unwrap_err().to_string();
+    assert!(error.contains("a.toml:2:8") && error.contains("do not nest"), "{error}");
+}
