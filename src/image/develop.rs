@@ -1,7 +1,8 @@
 //! Linear pixels -> coded samples for display formats: un-premultiply, expose, tone map, lay the background behind,
 //! apply the sRGB curve. Rows are independent, so threads do not show in the result.
 
-use super::{Output, Picture, srgb};
+use super::srgb::{self, Codes};
+use super::{Output, Picture};
 use rayon::prelude::*;
 
 /// Coded samples, rows from the top, 3 (opaque) or 4 channels each pixel; alpha is straight.
@@ -20,29 +21,37 @@ pub(super) struct Raster<T> {
 pub(super) trait Sample: Copy + Default + Eq + Send + Sync {
     /// The largest code.
     const MAX: Self;
-    /// sRGB code of linear light.
-    fn color(linear: f32) -> Self;
+    /// The table of its sRGB codes.
+    fn codes() -> &'static Codes;
+    /// A code of that table.
+    fn narrow(code: u16) -> Self;
     /// Code of a coverage 0..=1; not on the sRGB curve.
     fn alpha(coverage: f32) -> Self;
 }
 
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in range, and the cast maps NaN to 0")]
 impl Sample for u8 {
     const MAX: Self = Self::MAX;
-    fn color(linear: f32) -> Self {
-        srgb::encode8(linear)
+    fn codes() -> &'static Codes {
+        srgb::codes8()
     }
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped; the cast maps NaN to 0")]
+    fn narrow(code: u16) -> Self {
+        code as Self
+    }
     fn alpha(coverage: f32) -> Self {
         (coverage.clamp(0.0, 1.0) * 255.0 + 0.5) as Self
     }
 }
 
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in range, and the cast maps NaN to 0")]
 impl Sample for u16 {
     const MAX: Self = Self::MAX;
-    fn color(linear: f32) -> Self {
-        srgb::encode16(linear)
+    fn codes() -> &'static Codes {
+        srgb::codes16()
     }
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped; the cast maps NaN to 0")]
+    fn narrow(code: u16) -> Self {
+        code
+    }
     fn alpha(coverage: f32) -> Self {
         (coverage.clamp(0.0, 1.0) * 65_535.0 + 0.5) as Self
     }
@@ -53,16 +62,20 @@ pub(super) fn raster<T: Sample>(picture: &Picture, output: &Output) -> Raster<T>
     let developer = Developer::new(output);
     let opaque = output.background.is_some() || picture.beauty.par_iter().all(|p| T::alpha(p[3]) == T::MAX);
     let channels = if opaque { 3 } else { 4 };
+    let codes = T::codes();
     let width = picture.width as usize;
     let mut samples = vec![T::default(); picture.beauty.len() * channels];
     let rows = samples.par_chunks_mut((width * channels).max(1)).zip(picture.beauty.par_chunks(width.max(1)));
     rows.for_each(|(out, row)| {
+        let mut last = ([f32::NAN; 4], [T::default(); 4]);
         for (coded, &pixel) in out.chunks_exact_mut(channels).zip(row) {
-            let [r, g, b, a] = developer.pixel(pixel);
-            coded[..3].copy_from_slice(&[r, g, b].map(T::color));
-            if let Some(alpha) = coded.get_mut(3) {
-                *alpha = T::alpha(a);
+            // Large parts of a picture are one colour.
+            if pixel != last.0 {
+                let [r, g, b, a] = developer.pixel(pixel);
+                let [r, g, b] = [r, g, b].map(|c| T::narrow(codes.code(c)));
+                last = (pixel, [r, g, b, T::alpha(a)]);
             }
+            coded.copy_from_slice(&last.1[..channels]);
         }
     });
     Raster { width: picture.width, height: picture.height, channels: if opaque { 3 } else { 4 }, samples }
@@ -85,7 +98,8 @@ impl<'a> Developer<'a> {
         let coverage = if coverage > 0.0 { coverage.min(1.0) } else { 0.0 };
         // Light without coverage (a glint on clear glass) adds to what is behind it; straight alpha cannot hold it.
         let weight = if coverage > 0.0 { coverage } else { 1.0 };
-        let color = self.output.tone_map.map([r, g, b].map(|c| c / weight * self.gain));
+        let scale = self.gain / weight;
+        let color = self.output.tone_map.map([r, g, b].map(|c| c * scale));
         match self.output.background {
             None if coverage > 0.0 => [color[0], color[1], color[2], coverage],
             None => [0.0; 4],

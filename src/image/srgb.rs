@@ -28,17 +28,27 @@ pub fn decode16(code: u16) -> f32 {
 
 /// The 8-bit code nearest to linear light; below 0 and NaN are 0, above 1 is 255.
 pub fn encode8(linear: f32) -> u8 {
-    static CODES: LazyLock<Codes> = LazyLock::new(|| Codes::new(255, 16));
     #[expect(clippy::cast_possible_truncation, reason = "the table was built for codes up to 255")]
     {
-        CODES.code(linear) as u8
+        codes8().code(linear) as u8
     }
 }
 
 /// The 16-bit code nearest to linear light; below 0 and NaN are 0, above 1 is 65 535.
 pub fn encode16(linear: f32) -> u16 {
+    codes16().code(linear)
+}
+
+/// The table of 8-bit codes, for loops that should not look for it again and again.
+pub(super) fn codes8() -> &'static Codes {
+    static CODES: LazyLock<Codes> = LazyLock::new(|| Codes::new(255, 16));
+    &CODES
+}
+
+/// The table of 16-bit codes.
+pub(super) fn codes16() -> &'static Codes {
     static CODES: LazyLock<Codes> = LazyLock::new(|| Codes::new(65_535, 12));
-    CODES.code(linear)
+    &CODES
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what this does")]
@@ -47,43 +57,53 @@ fn narrow(x: f64) -> f32 {
 }
 
 /// Where each code begins, and a way to get near without a search.
-struct Codes {
-    /// `begin[c]` is the smallest linear value of code `c`; `begin[0]` is minus infinity.
+pub(super) struct Codes {
+    /// `begin[c]` is the smallest linear value of code `c`; `begin[0]` is minus infinity, one past the last is infinity.
     begin: Vec<f32>,
-    /// Code of the first value of each bucket; a bucket is the values that share their leading bits.
-    first: Vec<u16>,
-    /// Leading bits of the first bucket.
-    low: u32,
+    /// The linear values that share their leading bits, from `lowest` to 1.
+    buckets: Vec<Bucket>,
+    /// First value of the first bucket; its code is 0.
+    lowest: f32,
     /// Bits below a bucket's leading ones.
     shift: u32,
+}
+
+struct Bucket {
+    /// Code of its first value.
+    code: u16,
+    /// Where the next code begins.
+    next: f32,
 }
 
 impl Codes {
     fn new(max: u16, shift: u32) -> Self {
         let mut begin = vec![f32::NEG_INFINITY];
         begin.extend((1..=max).map(|c| round_up(decode((f64::from(c) - 0.5) / f64::from(max)))));
+        begin.push(f32::INFINITY);
         let low = begin[1].to_bits() >> shift;
-        let high = begin[usize::from(max)].to_bits() >> shift;
-        let first = (low..=high)
-            .map(|bucket| {
-                let value = f32::from_bits(bucket << shift);
-                u16::try_from(begin.partition_point(|&b| b <= value) - 1).unwrap_or(max)
-            })
-            .collect();
-        Self { begin, first, low, shift }
+        let high = 1.0_f32.to_bits() >> shift;
+        let bucket = |bits: u32| {
+            let value = f32::from_bits(bits << shift);
+            let next = begin.partition_point(|&b| b <= value);
+            Bucket { code: u16::try_from(next - 1).unwrap_or(max), next: begin[next] }
+        };
+        let buckets = (low..=high).map(bucket).collect();
+        Self { begin, buckets, lowest: f32::from_bits(low << shift), shift }
     }
 
-    fn code(&self, linear: f32) -> u16 {
-        let max = self.begin.len() - 1;
-        if linear < self.begin[1] || linear.is_nan() {
-            return 0;
-        }
-        let bucket = ((linear.to_bits() >> self.shift) - self.low) as usize;
-        let mut code = self.first.get(bucket).map_or(max, |&c| usize::from(c));
-        while code < max && linear >= self.begin[code + 1] {
+    /// The code nearest to linear light.
+    #[inline]
+    pub(super) fn code(&self, linear: f32) -> u16 {
+        // Comparisons that NaN fails, each one instruction.
+        let linear = if linear > self.lowest { linear } else { self.lowest };
+        let linear = if linear < 1.0 { linear } else { 1.0 };
+        let bucket = &self.buckets[((linear.to_bits() - self.lowest.to_bits()) >> self.shift) as usize];
+        // A bucket of the 8-bit table holds at most one step: an addition does what a branch would have to guess.
+        let mut code = bucket.code + u16::from(linear >= bucket.next);
+        while linear >= self.begin[usize::from(code) + 1] {
             code += 1;
         }
-        u16::try_from(code).unwrap_or(u16::MAX)
+        code
     }
 }
 

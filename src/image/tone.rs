@@ -43,15 +43,21 @@ impl ToneMap {
 
     /// Display light of a straight (not premultiplied) colour, each channel 0..=1; NaN and negative light are black.
     pub fn map(self, color: [f32; 3]) -> [f32; 3] {
-        let light = color.map(|c| if c > 0.0 { c.min(BRIGHTEST) } else { 0.0 });
+        let light = color.map(|c| within(c, BRIGHTEST));
         let display = match self {
             Self::None => light,
             Self::Reinhard => reinhard(light),
             Self::Aces => aces(light),
             Self::Neutral => neutral(light),
         };
-        display.map(|c| c.clamp(0.0, 1.0))
+        display.map(|c| within(c, 1.0))
     }
+}
+
+/// `x` held in 0..=most; NaN becomes 0. Written so that each comparison is one instruction.
+fn within(x: f32, most: f32) -> f32 {
+    let x = if x > 0.0 { x } else { 0.0 };
+    if x < most { x } else { most }
 }
 
 fn reinhard(color: [f32; 3]) -> [f32; 3] {
