@@ -1,14 +1,37 @@
 //! Rays -> linear pixels: waves per tile, Whitted shading, lights and shadows, optics, pixel sampling.
+//!
+//! [`render`] cuts the picture into tiles ([`tile`]); one thread traces a tile's trees of rays in waves ([`whitted`],
+//! [`wave`]): eye rays, then the shadow rays of what they hit ([`shadow`]), then reflected and refracted rays,
+//! generation by generation. A hit becomes a [`surface`] once, its material is evaluated in [`shade`], and [`optics`]
+//! says where light goes from there.
+//!
+//! The pixels are the same bits for every structure and every number of threads: structures give equal hits, sums run
+//! in a fixed order within a tile, and transcendental functions are the crate's own.
 
+mod context;
+mod layers;
+pub mod optics;
+mod pixel;
+mod shade;
+mod shadow;
 pub mod studio;
+mod surface;
 pub mod texture;
+mod tile;
 pub mod view;
+mod wave;
+mod whitted;
 pub mod world;
 
 pub use view::View;
 pub use world::{PrimSource, World};
 
-use crate::accel::RayCounts;
+use crate::accel::{Accel, AnyAccel, NoProbe, Probe, RayCounts};
+use crate::image::Picture;
+use crate::scene::Scene;
+use context::Context;
+use texture::TextureStore;
+use whitted::ByClass;
 
 /// What to render and how well.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,4 +69,82 @@ pub struct ClassCounts {
     pub reflected: RayCounts,
     /// Refracted or passed through.
     pub refracted: RayCounts,
+}
+
+/// What to render, and with what.
+#[derive(Clone, Copy)]
+pub struct Job<'a> {
+    /// The scene as loaded.
+    pub scene: &'a Scene,
+    /// The same scene placed for tracing.
+    pub world: &'a World,
+    /// The structure built over `world.shapes`.
+    pub accel: &'a AnyAccel<'a>,
+    /// The scene's textures.
+    pub textures: &'a TextureStore<'a>,
+    /// The eye.
+    pub view: &'a View,
+    /// Size and quality.
+    pub settings: &'a Settings,
+}
+
+/// Hears how far rendering has come, and may end it. Called from all threads.
+pub trait Progress: Sync {
+    /// `done` of `total` tiles are finished.
+    fn tiles(&self, done: usize, total: usize);
+    /// Whether to stop; asked between waves.
+    fn cancelled(&self) -> bool;
+}
+
+/// Nobody listens.
+impl Progress for () {
+    fn tiles(&self, _done: usize, _total: usize) {}
+    fn cancelled(&self) -> bool {
+        false
+    }
+}
+
+/// What came of a [`Job`].
+#[derive(Clone, Debug)]
+pub struct Rendered {
+    /// The picture; tiles that were not finished are transparent black.
+    pub picture: Picture,
+    /// Zero unless counted.
+    pub counts: ClassCounts,
+    /// The maximum depth used.
+    pub depth: u32,
+    /// False when rendering was cancelled before the end.
+    pub complete: bool,
+}
+
+/// Renders on all threads of the current rayon pool.
+pub fn render(job: &Job, progress: &dyn Progress) -> Rendered {
+    dispatch::<NoProbe>(job, progress).0
+}
+
+/// Renders and counts; slower, same pixels.
+pub fn render_counted(job: &Job, progress: &dyn Progress) -> Rendered {
+    let (mut rendered, counts) = dispatch::<RayCounts>(job, progress);
+    for c in counts {
+        rendered.counts.primary += c.primary;
+        rendered.counts.shadow += c.shadow;
+        rendered.counts.reflected += c.reflected;
+        rendered.counts.refracted += c.refracted;
+    }
+    rendered
+}
+
+/// The only place here that knows which structure was asked for.
+fn dispatch<P: Probe>(job: &Job, progress: &dyn Progress) -> (Rendered, Vec<ByClass<P>>) {
+    match job.accel {
+        AnyAccel::None(accel) => render_with(job, accel, progress),
+        AnyAccel::GridOctree(accel) => render_with(job, accel, progress),
+    }
+}
+
+fn render_with<A: Accel, P: Probe>(job: &Job, accel: &A, progress: &dyn Progress) -> (Rendered, Vec<ByClass<P>>) {
+    let settings = job.settings;
+    let context = Context::new(job.scene, job.world, job.textures, settings.depth, settings.cutoff);
+    let (picture, counts, complete) = tile::render_tiles(&context, accel, job.view, settings, progress);
+    (Rendered { picture, counts: ClassCounts::default(), depth: context.depth, complete }, counts)
 }

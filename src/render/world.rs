@@ -3,8 +3,9 @@
 
 use crate::accel::{BitSet, Shapes, SpherePrim};
 use crate::math::frame::snapped_center;
-use crate::math::{DAffine3, DVec3};
-use crate::scene::Scene;
+use crate::math::{DAffine3, DMat3, DVec3, Vec3};
+use crate::scene::{Mesh, Scene};
+use rayon::prelude::*;
 
 /// A [`Scene`] flattened for tracing. World position = `center` + position in [`Shapes`].
 #[derive(Clone, Debug)]
@@ -19,6 +20,28 @@ pub struct World {
     first_triangle: Vec<u32>,
     /// First polygon (counted from 0) of each instance, and one past the last.
     first_polygon: Vec<u32>,
+    placements: Vec<Placement>,
+}
+
+/// How an instance turns directions.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Placement {
+    /// Takes tangents to world space; lengths change.
+    pub world_from_object: DMat3,
+    /// Takes normals to world space; lengths change. The inverse transpose of `world_from_object` up to a factor.
+    pub normal_from_object: DMat3,
+    /// Whether the instance is mirrored: its faces keep the corner order of the file, so their winding is turned round.
+    pub mirrored: bool,
+}
+
+impl Placement {
+    fn new(m: DMat3) -> Self {
+        let mirrored = m.determinant() < 0.0;
+        // The cofactors are det · (inverse transpose) and exist for flattened instances too.
+        let cofactors = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
+        let normal_from_object = if mirrored { cofactors * -1.0 } else { cofactors };
+        Self { world_from_object: m, normal_from_object, mirrored }
+    }
 }
 
 /// What a prim came from; indices into the arrays of [`Scene`].
@@ -57,7 +80,8 @@ impl World {
             let mesh = &scene.meshes[instance.mesh as usize];
             let base = index(shapes.vertices.len());
             let to_frame = centered(&instance.world_from_object, center);
-            shapes.vertices.extend(mesh.positions.iter().map(|p| to_frame.transform_point3(p.as_dvec3()).as_vec3()));
+            let place = |p: &Vec3| to_frame.transform_point3(p.as_dvec3()).as_vec3();
+            shapes.vertices.par_extend(mesh.positions.par_iter().with_min_len(PARALLEL_RUN).map(place));
             first_triangle.push(index(shapes.triangles.len()));
             shapes.triangles.extend(mesh.triangles.iter().map(|t| t.map(|i| i + base)));
             first_polygon.push(index(shapes.polygons.len()));
@@ -79,7 +103,8 @@ impl World {
             shapes.planes = scene.planes.iter().map(plane).collect();
         }
 
-        let mut world = Self { center, bounds, shapes, first_triangle, first_polygon };
+        let placements = scene.instances.iter().map(|i| Placement::new(i.world_from_object.matrix3)).collect();
+        let mut world = Self { center, bounds, shapes, first_triangle, first_polygon, placements };
         world.shapes.opaque = world.opaque_bits(scene);
         world
     }
@@ -113,6 +138,11 @@ impl World {
         }
     }
 
+    /// How instance `instance` turns directions.
+    pub(crate) fn placement(&self, instance: u32) -> &Placement {
+        &self.placements[instance as usize]
+    }
+
     fn opaque_bits(&self, scene: &Scene) -> BitSet {
         let opaque: Vec<bool> = scene.materials.iter().map(crate::scene::Material::is_opaque).collect();
         let mut bits = BitSet::filled(self.shapes.len(), true);
@@ -131,25 +161,96 @@ fn centered(world_from_object: &DAffine3, center: DVec3) -> DAffine3 {
     DAffine3 { matrix3: world_from_object.matrix3, translation: world_from_object.translation - center }
 }
 
+/// Vertices or faces that are worth a thread's while.
+const PARALLEL_RUN: usize = 1 << 14;
+
 /// Box of all instances' vertices that a face uses, and of the spheres.
 fn bounds(scene: &Scene) -> (DVec3, DVec3) {
-    let mut lo = DVec3::INFINITY;
-    let mut hi = DVec3::NEG_INFINITY;
-    for instance in &scene.instances {
-        let mesh = &scene.meshes[instance.mesh as usize];
-        let corners = mesh.triangles.iter().flatten().chain(&mesh.polygon_corners);
-        for &i in corners {
-            let p = instance.world_from_object.transform_point3(mesh.positions[i as usize].as_dvec3());
-            (lo, hi) = (lo.min(p), hi.max(p));
-        }
-    }
-    for s in &scene.spheres {
-        (lo, hi) = (lo.min(s.center - s.radius), hi.max(s.center + s.radius));
-    }
-    (lo, hi)
+    let instances = scene.instances.iter().map(|i| mesh_bounds(&scene.meshes[i.mesh as usize], &i.world_from_object));
+    let spheres = scene.spheres.iter().map(|s| (s.center - s.radius, s.center + s.radius));
+    instances.chain(spheres).fold(NO_BOX, join)
+}
+
+const NO_BOX: (DVec3, DVec3) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+
+fn join(a: (DVec3, DVec3), b: (DVec3, DVec3)) -> (DVec3, DVec3) {
+    (a.0.min(b.0), a.1.max(b.1))
+}
+
+fn mesh_bounds(mesh: &Mesh, world_from_object: &DAffine3) -> (DVec3, DVec3) {
+    let grow = |(lo, hi): (DVec3, DVec3), i: u32| {
+        let p = world_from_object.transform_point3(mesh.positions[i as usize].as_dvec3());
+        (lo.min(p), hi.max(p))
+    };
+    let run = |t: &[[u32; 3]]| t.iter().flatten().copied().fold(NO_BOX, grow);
+    let triangles = mesh.triangles.par_chunks(PARALLEL_RUN).map(run).reduce(|| NO_BOX, join);
+    mesh.polygon_corners.iter().copied().fold(triangles, grow)
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "loading refuses scenes with 2^32 - 1 prims or vertices")]
 fn index(i: usize) -> u32 {
     i as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{AlphaMode, Instance, Material, Polygon, Sphere};
+
+    fn triangle(material: u32) -> Mesh {
+        Mesh { material, positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]], ..Mesh::default() }
+    }
+
+    fn placed(mesh: u32, world_from_object: DAffine3) -> Instance {
+        Instance { name: String::new(), mesh, world_from_object }
+    }
+
+    fn two_triangles_a_polygon_and_a_sphere() -> Scene {
+        let mut quad = triangle(1);
+        quad.polygon_corners = vec![0, 1, 2];
+        quad.polygons = vec![Polygon { first: 0, len: 3, face: 1 }];
+        let far = DAffine3::from_translation(DVec3::splat(1e7));
+        let sphere = Sphere { name: String::new(), center: DVec3::splat(1e7 + 8.0), radius: 1.0, material: 0 };
+        Scene {
+            meshes: vec![triangle(0), quad],
+            instances: vec![placed(0, far), placed(1, far)],
+            spheres: vec![sphere],
+            materials: vec![Material::plain(), Material { alpha_mode: AlphaMode::Blend, ..Material::plain() }],
+            ..Scene::default()
+        }
+    }
+
+    #[test]
+    fn prims_lead_back_to_where_they_came_from() {
+        let scene = two_triangles_a_polygon_and_a_sphere();
+        let world = World::new(&scene);
+        assert_eq!(world.source(0), PrimSource::Triangle { instance: 0, triangle: 0 });
+        assert_eq!(world.source(1), PrimSource::Triangle { instance: 1, triangle: 0 });
+        assert_eq!(world.source(2), PrimSource::Polygon { instance: 1, polygon: 0 });
+        assert_eq!(world.source(3), PrimSource::Sphere(0));
+        assert_eq!((0..4).map(|p| world.shapes.opaque.get(p)).collect::<Vec<_>>(), [true, false, false, true]);
+    }
+
+    #[test]
+    fn coordinates_far_from_the_origin_lose_nothing() {
+        let world = World::new(&two_triangles_a_polygon_and_a_sphere());
+        let corner = |i: usize| world.center + world.shapes.vertices[i].as_dvec3();
+        assert_eq!(corner(0), DVec3::splat(1e7));
+        assert_eq!(corner(1), DVec3::splat(1e7) + DVec3::X);
+        assert_eq!(world.bounds, (DVec3::splat(1e7), DVec3::splat(1e7 + 9.0)));
+    }
+
+    #[test]
+    fn normals_stay_perpendicular_to_faces_under_uneven_scale_and_mirroring() {
+        for scale in [DVec3::new(1.0, 4.0, 0.5), DVec3::new(-1.0, 4.0, 0.5)] {
+            let m = DMat3::from_rotation_x(0.3) * DMat3::from_diagonal(scale);
+            let placement = Placement::new(m);
+            let (a, b) = (DVec3::new(1.0, 2.0, 3.0), DVec3::new(-2.0, 1.0, 0.5));
+            let normal = placement.normal_from_object * a.cross(b);
+            assert!(normal.dot(m * a).abs() < 1e-12 && normal.dot(m * b).abs() < 1e-12);
+            // The outside stays the outside: a point in front of the face is in front of its image.
+            assert!(normal.dot(m * a.cross(b)) > 0.0);
+            assert_eq!(placement.mirrored, scale.x < 0.0);
+        }
+    }
 }

@@ -68,8 +68,8 @@ pub struct Features {
     present: BTreeSet<Feature>,
 }
 
-/// Perceptual roughness up to which the renderer follows reflected rays instead of the blurred environment.
-pub const SMOOTH: f32 = 0.2;
+/// Perceptual roughness below which the renderer follows reflected rays, not only the blurred environment.
+pub const SMOOTH: f32 = 0.35;
 
 impl Feature {
     /// All of them, in the order they are listed.

@@ -8,7 +8,8 @@ pub struct Light {
     /// Name in the file, or an empty string.
     pub name: String,
     /// Linear colour × intensity. Candela for point and spot lights with [`Falloff::InverseSquare`], lux for
-    /// directional ones, plain radiance-like factors for [`Falloff::None`] as the founding texts use.
+    /// directional ones, plain radiance-like factors for [`Falloff::None`] as the founding texts use: such a light of
+    /// strength 1 shows a white matt surface that faces it as 1, and so does a directional light of π lux.
     pub intensity: Vec3,
     /// Where from.
     pub kind: LightKind,

@@ -1,0 +1,112 @@
+//! What every ray of an image shares: the scene, its lights and sky in the centred frame, and the limits of the trees.
+
+use super::shade::{Band, LocalLight, Sky, bands};
+use super::texture::TextureStore;
+use super::world::World;
+use crate::math::Vec3;
+use crate::scene::features::{Feature, Features};
+use crate::scene::{AlphaMode, Background, Material, Scene};
+
+/// Shared by all workers, computed once per image.
+pub(crate) struct Context<'a> {
+    pub scene: &'a Scene,
+    pub world: &'a World,
+    pub textures: &'a TextureStore<'a>,
+    pub sky: Sky,
+    pub lights: Vec<LocalLight>,
+    /// Parts of the spectrum; empty unless a material disperses light.
+    pub bands: Vec<Band>,
+    /// Whether anything but opaque surfaces can stand before a light.
+    pub has_filters: bool,
+    /// Whether the environment is what is seen behind the scene.
+    pub shows_environment: bool,
+    /// Bounces after the eye ray.
+    pub depth: u32,
+    /// Branches whose largest weight is below this end.
+    pub cutoff: f32,
+}
+
+impl<'a> Context<'a> {
+    pub(crate) fn new(
+        scene: &'a Scene,
+        world: &'a World,
+        textures: &'a TextureStore<'a>,
+        depth: Option<u32>,
+        cutoff: f32,
+    ) -> Self {
+        let features = Features::of(scene);
+        let needs = |any: &[Feature]| any.iter().any(|&f| features.has(f));
+        Self {
+            scene,
+            world,
+            textures,
+            sky: Sky::new(scene),
+            lights: scene.lights.iter().map(|l| LocalLight::new(l, world.center)).collect(),
+            bands: if needs(&[Feature::Dispersion]) { bands() } else { Vec::new() },
+            has_filters: needs(&[Feature::Mask, Feature::Blend, Feature::ThinTransmission, Feature::Refraction]),
+            shows_environment: scene.background == Some(Background::Environment),
+            depth: depth.unwrap_or_else(|| auto_depth(&features)),
+            cutoff,
+        }
+    }
+
+    /// Whether a branch of this weight is worth its rays.
+    pub(crate) fn is_alive(&self, weight: Vec3) -> bool {
+        weight.max_element() >= self.cutoff.max(f32::MIN_POSITIVE)
+    }
+}
+
+/// Bounces that a scene needs: none without mirrors or glass, a few between mirrors, more where every object is entered
+/// and left.
+fn auto_depth(features: &Features) -> u32 {
+    const GLASS: u32 = 12;
+    const MIRRORS: u32 = 5;
+    if features.has(Feature::Refraction) || features.has(Feature::ThinTransmission) {
+        GLASS
+    } else if features.has(Feature::Mirrors) {
+        MIRRORS
+    } else {
+        0
+    }
+}
+
+/// Whether the material is there at all where its opacity is `opacity`, and how much of it is seen.
+pub(crate) fn coverage(material: &Material, opacity: f32) -> f32 {
+    match material.alpha_mode {
+        AlphaMode::Opaque => 1.0,
+        AlphaMode::Mask { cutoff } => f32::from(u8::from(opacity >= cutoff)),
+        AlphaMode::Blend => opacity.clamp(0.0, 1.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::DVec3;
+    use crate::scene::{MetalRough, Phong, Sphere, Surface};
+
+    fn scene_of(surface: Surface) -> Scene {
+        let sphere = Sphere { name: String::new(), center: DVec3::ZERO, radius: 1.0, material: 0 };
+        Scene { materials: vec![Material { surface, ..Material::plain() }], spheres: vec![sphere], ..Scene::default() }
+    }
+
+    #[test]
+    fn the_depth_follows_from_the_materials() {
+        let matt = Phong::default();
+        let mirror = Phong { mirror: Vec3::splat(0.5), ..Phong::default() };
+        let glass = MetalRough { transmission: 0.5, ..MetalRough::default() };
+        assert_eq!(auto_depth(&Features::of(&scene_of(Surface::Phong(matt)))), 0);
+        assert_eq!(auto_depth(&Features::of(&scene_of(Surface::Phong(mirror)))), 5);
+        assert_eq!(auto_depth(&Features::of(&scene_of(Surface::MetalRough(glass)))), 12);
+        assert_eq!(auto_depth(&Features::default()), 0);
+    }
+
+    #[test]
+    fn opacity_covers_as_the_alpha_mode_says() {
+        let with = |alpha_mode| Material { alpha_mode, ..Material::plain() };
+        assert_eq!(coverage(&with(AlphaMode::Opaque), 0.2), 1.0);
+        assert_eq!(coverage(&with(AlphaMode::Mask { cutoff: 0.5 }), 0.5), 1.0);
+        assert_eq!(coverage(&with(AlphaMode::Mask { cutoff: 0.5 }), 0.49), 0.0);
+        assert_eq!(coverage(&with(AlphaMode::Blend), 0.2), 0.2);
+    }
+}

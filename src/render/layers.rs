@@ -1,0 +1,88 @@
+//! What a picture tells besides its colours: albedo, normal, position, depth and ids of the first surface seen.
+
+use super::surface::Surface;
+use crate::accel::NO_PRIM;
+use crate::image::Layers;
+use crate::math::{DVec3, Vec3};
+
+/// The first surface of one sample.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Facts {
+    albedo: Vec3,
+    normal: Vec3,
+    /// World space.
+    position: DVec3,
+    prim: u32,
+    instance: u32,
+}
+
+impl Facts {
+    /// Nothing was hit.
+    pub(crate) const NONE: Self =
+        Self { albedo: Vec3::ZERO, normal: Vec3::ZERO, position: DVec3::ZERO, prim: NO_PRIM, instance: NO_PRIM };
+
+    pub(crate) fn new(surface: &Surface, albedo: Vec3, center: DVec3) -> Self {
+        Self {
+            albedo,
+            normal: surface.normal,
+            position: center + surface.position.as_dvec3(),
+            prim: surface.target.prim,
+            instance: surface.target.instance,
+        }
+    }
+
+    pub(crate) fn is_some(&self) -> bool {
+        self.prim != NO_PRIM
+    }
+}
+
+/// The layers of one pixel.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LayerPixel {
+    albedo: Vec3,
+    normal: Vec3,
+    position: Vec3,
+    depth: f32,
+    prim: u32,
+    instance: u32,
+}
+
+impl LayerPixel {
+    /// From the samples of a pixel; depth counts from `eye` along the unit vector `forward`.
+    #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "layers are f32")]
+    pub(crate) fn new(samples: &[Facts], eye: DVec3, forward: DVec3) -> Self {
+        let share = 1.0 / samples.len().max(1) as f32;
+        let first = samples.iter().find(|f| f.is_some());
+        let normal: Vec3 = samples.iter().map(|f| f.normal).sum();
+        Self {
+            albedo: samples.iter().map(|f| f.albedo).sum::<Vec3>() * share,
+            normal: normal * share,
+            position: first.map_or(Vec3::ZERO, |f| f.position.as_vec3()),
+            depth: first.map_or(f32::INFINITY, |f| (f.position - eye).dot(forward) as f32),
+            prim: first.map_or(NO_PRIM, |f| f.prim),
+            instance: first.map_or(NO_PRIM, |f| f.instance),
+        }
+    }
+
+    /// Writes this into pixel `i` of `layers`, whose arrays are all long enough.
+    pub(crate) fn store(&self, layers: &mut Layers, i: usize) {
+        layers.albedo[i] = self.albedo.to_array();
+        layers.normal[i] = self.normal.to_array();
+        layers.position[i] = self.position.to_array();
+        layers.depth[i] = self.depth;
+        layers.prim[i] = self.prim;
+        layers.instance[i] = self.instance;
+    }
+}
+
+/// Layers of `pixels` pixels in which nothing was hit.
+pub(crate) fn empty(pixels: usize) -> Layers {
+    Layers {
+        albedo: vec![[0.0; 3]; pixels],
+        normal: vec![[0.0; 3]; pixels],
+        position: vec![[0.0; 3]; pixels],
+        depth: vec![f32::INFINITY; pixels],
+        prim: vec![NO_PRIM; pixels],
+        instance: vec![NO_PRIM; pixels],
+    }
+}

@@ -1,0 +1,194 @@
+//! What light does at a smooth boundary: reflect, refract, how much of each, and how the index depends on the wavelength.
+//!
+//! Pure functions of directions and indices of refraction; which surface they belong to is the caller's business.
+//! Directions are unit vectors along the ray; `normal` is a unit vector turned against the incident direction.
+
+use crate::math::{DVec3, Vec3};
+
+/// Indices of refraction by name, for the yellow sodium line.
+pub const INDICES: [(&str, f64); 11] = [
+    ("air", 1.00029),
+    ("water", 1.33),
+    ("crown glass", 1.52),
+    ("dense glass", 1.66),
+    ("crystal glass", 2.0),
+    ("quartz", 1.46),
+    ("sapphire", 1.77),
+    ("diamond", 2.417),
+    ("iodine crystal", 3.34),
+    ("polystyrene", 1.55),
+    ("ethyl alcohol", 1.36),
+];
+
+/// The index of a material of [`INDICES`], or `None` for a name that is not there.
+pub fn index_of(name: &str) -> Option<f64> {
+    INDICES.iter().find(|(known, _)| *known == name).map(|&(_, index)| index)
+}
+
+/// Mirror direction R = I − 2 (I·N) N; either side of the normal will do.
+pub fn reflect(incident: Vec3, normal: Vec3) -> Vec3 {
+    incident - 2.0 * incident.dot(normal) * normal
+}
+
+/// Refracted direction T = η I + (η cos θi − cos θt) N with η = ηi/ηt; `None` under total internal reflection.
+///
+/// One of the founding texts writes the inverse ratio; Snell's law sin θi / sin θt = ηt / ηi fixes it. The sine comes
+/// from |I × N| and everything is `f64`, because 1 − cos² loses half the digits near the critical angle.
+pub fn refract(incident: Vec3, normal: Vec3, n_i: f64, n_t: f64) -> Option<Vec3> {
+    let (i, n) = (unit(incident)?, unit(normal)?);
+    let eta = n_i / n_t;
+    let sin_t = eta * i.cross(n).length();
+    // At equality the refracted ray would run in the surface and carry nothing: total reflection as well.
+    if sin_t >= 1.0 {
+        return None;
+    }
+    let cos_t = ((1.0 - sin_t) * (1.0 + sin_t)).sqrt();
+    let cos_i = -i.dot(n);
+    Some(unit_f32(eta * i + (eta * cos_i - cos_t) * n))
+}
+
+/// Share of unpolarised light that a smooth dielectric boundary reflects (Fresnel); 1 under total internal reflection.
+///
+/// `cos_i` is the cosine on the incident side, 0 … 1.
+pub fn fresnel_dielectric(cos_i: f64, n_i: f64, n_t: f64) -> f64 {
+    let cos_i = cos_i.clamp(0.0, 1.0);
+    let sin_t = n_i / n_t * ((1.0 - cos_i) * (1.0 + cos_i)).sqrt();
+    if sin_t >= 1.0 {
+        return 1.0;
+    }
+    let cos_t = ((1.0 - sin_t) * (1.0 + sin_t)).sqrt();
+    let across = (n_i * cos_i - n_t * cos_t) / (n_i * cos_i + n_t * cos_t);
+    let along = (n_t * cos_i - n_i * cos_t) / (n_t * cos_i + n_i * cos_t);
+    0.5 * (across * across + along * along)
+}
+
+/// Schlick's approximation, "An Inexpensive BRDF Model for Physically-based Rendering" (1994), with its value at
+/// grazing angles given.
+pub fn fresnel_schlick(f0: Vec3, f90: f32, cosine: f32) -> Vec3 {
+    let m = (1.0 - cosine).clamp(0.0, 1.0);
+    let m2 = m * m;
+    f0 + (Vec3::splat(f90) - f0) * (m2 * m2 * m)
+}
+
+/// The smallest angle of incidence, radians, that reflects totally; `None` when the second medium is not the thinner.
+pub fn critical_angle(n_i: f64, n_t: f64) -> Option<f64> {
+    (n_t < n_i).then(|| libm::asin(n_t / n_i))
+}
+
+/// The index at a wavelength in nanometres: Cauchy's equation through `n_d` with the Abbe number 20 / `dispersion`, as
+/// KHR_materials_dispersion fixes its constants; at least 1.
+pub fn dispersed_index(n_d: f64, dispersion: f64, wavelength: f64) -> f64 {
+    (n_d + (n_d - 1.0) * dispersion / 20.0 * (523_655.0 / (wavelength * wavelength) - 1.5168)).max(1.0)
+}
+
+fn unit(v: Vec3) -> Option<DVec3> {
+    v.as_dvec3().try_normalize()
+}
+
+fn unit_f32(v: DVec3) -> Vec3 {
+    v.normalize_or_zero().as_vec3()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A ray that comes down at `degrees` from the normal +z.
+    fn incoming(degrees: f64) -> Vec3 {
+        let a = degrees.to_radians();
+        DVec3::new(libm::sin(a), 0.0, -libm::cos(a)).as_vec3()
+    }
+
+    fn degrees_from(axis: Vec3, v: Vec3) -> f64 {
+        let (a, v) = (axis.as_dvec3(), v.as_dvec3().normalize());
+        libm::atan2(a.cross(v).length(), a.dot(v)).to_degrees()
+    }
+
+    #[test]
+    fn critical_angles_come_out_to_the_minute() {
+        let expected = [
+            ("water", "air", 48, 46),
+            ("crown glass", "air", 41, 9),
+            ("crown glass", "water", 61, 3),
+            ("diamond", "air", 24, 27),
+            ("sapphire", "air", 34, 25),
+        ];
+        for (from, to, degrees, minutes) in expected {
+            let (n_i, n_t) = (index_of(from).expect(from), index_of(to).expect(to));
+            let angle = critical_angle(n_i, n_t).expect("denser to thinner").to_degrees();
+            assert_eq!((angle * 60.0).round(), f64::from(degrees * 60 + minutes), "{from} to {to}: {angle}");
+        }
+        assert_eq!(critical_angle(1.0, 1.5), None);
+    }
+
+    #[test]
+    fn eleven_materials_are_known_by_name() {
+        assert_eq!(INDICES.len(), 11);
+        assert_eq!(index_of("diamond"), Some(2.417));
+        assert_eq!(index_of("kryptonite"), None);
+    }
+
+    #[test]
+    fn a_mirror_turns_the_normal_part_only() {
+        assert_eq!(reflect(Vec3::new(0.6, 0.0, -0.8), Vec3::Z), Vec3::new(0.6, 0.0, 0.8));
+        assert_eq!(reflect(Vec3::new(0.6, 0.0, -0.8), Vec3::NEG_Z), Vec3::new(0.6, 0.0, 0.8));
+    }
+
+    #[test]
+    fn light_entering_glass_bends_towards_the_normal() {
+        let t = refract(incoming(45.0), Vec3::Z, 1.0, 1.5).expect("no total reflection from thin to dense");
+        assert!((degrees_from(Vec3::NEG_Z, t) - 28.1255).abs() < 1e-4);
+        assert!((t.length() - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn equal_indices_leave_the_direction() {
+        let i = incoming(70.0);
+        assert!((refract(i, Vec3::Z, 1.3, 1.3).expect("same medium") - i).length() < 1e-6);
+    }
+
+    #[test]
+    fn total_reflection_begins_at_the_critical_angle() {
+        for (n_i, n_t) in [(1.33, 1.00029), (2.417, 1.00029), (1.52, 1.33)] {
+            let critical = critical_angle(n_i, n_t).expect("denser to thinner").to_degrees();
+            assert!(refract(incoming(critical - 1e-4), Vec3::Z, n_i, n_t).is_some());
+            assert!(refract(incoming(critical + 1e-4), Vec3::Z, n_i, n_t).is_none());
+            assert_eq!(fresnel_dielectric(libm::cos((critical + 1e-4).to_radians()), n_i, n_t), 1.0);
+        }
+    }
+
+    #[test]
+    fn fresnel_has_its_textbook_values() {
+        assert!((fresnel_dielectric(1.0, 1.0, 1.5) - 0.04).abs() < 1e-15);
+        assert!((fresnel_dielectric(0.0, 1.0, 1.5) - 1.0).abs() < 1e-15);
+        // At Brewster's angle half of what is reflected across the plane of incidence remains.
+        let brewster = libm::atan(1.5);
+        let across = (1.0f64 - 2.25) / (1.0 + 2.25);
+        assert!((fresnel_dielectric(libm::cos(brewster), 1.0, 1.5) - 0.5 * across * across).abs() < 1e-14);
+    }
+
+    #[test]
+    fn fresnel_is_the_same_in_both_directions() {
+        let cos_i = 0.6f64;
+        let sin_t = 0.8 / 1.5f64;
+        let cos_t = (1.0 - sin_t * sin_t).sqrt();
+        let there = fresnel_dielectric(cos_i, 1.0, 1.5);
+        assert!((there - fresnel_dielectric(cos_t, 1.5, 1.0)).abs() < 1e-14);
+    }
+
+    #[test]
+    fn schlick_meets_both_ends() {
+        let f0 = Vec3::new(0.04, 0.5, 1.0);
+        assert_eq!(fresnel_schlick(f0, 0.9, 1.0), f0);
+        assert_eq!(fresnel_schlick(f0, 0.9, 0.0), Vec3::splat(0.9));
+    }
+
+    #[test]
+    fn blue_bends_more_than_red() {
+        // Crown glass, Abbe number 64.2: n_F − n_C = (n_d − 1) / V.
+        let at = |nm| dispersed_index(1.5168, 20.0 / 64.2, nm);
+        assert!((at(587.56) - 1.5168).abs() < 1e-5);
+        assert!((at(486.13) - at(656.27) - 0.5168 / 64.2).abs() < 1e-5);
+        assert_eq!(dispersed_index(1.5, 0.0, 400.0), 1.5);
+    }
+}

@@ -1,0 +1,179 @@
+//! Lights as the points they shine on see them: direction, strength, and the way a shadow ray has to go.
+//!
+//! Two units meet here. The founding texts give a light a factor I, which is what a white matt surface facing it shows;
+//! glTF gives candela and lux, of which such a surface shows the π-th part. Both become a *strength* in the first unit,
+//! so that a Phong and a metallic-roughness surface of one colour look alike under any light.
+
+use crate::math::{DVec3, Vec3};
+use crate::scene::{Falloff, Light, LightKind};
+use std::f32::consts::PI;
+
+/// A light in the centred frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LocalLight {
+    intensity: Vec3,
+    pub shadows: bool,
+    shape: Shape,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Shape {
+    /// Unit vector towards the light.
+    Directional(Vec3),
+    Point {
+        position: Vec3,
+        falloff: Falloff,
+        cone: Option<Cone>,
+    },
+}
+
+/// The cone of a spot light, as a line in the cosine from its axis (KHR_lights_punctual).
+#[derive(Clone, Copy, Debug)]
+struct Cone {
+    axis: Vec3,
+    scale: f32,
+    offset: f32,
+}
+
+/// The light that arrives at a point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Incident {
+    /// Unit vector towards the light.
+    pub to_light: Vec3,
+    /// Where a shadow ray ends (centred frame); `None`: nowhere.
+    pub position: Option<Vec3>,
+    strength: Vec3,
+}
+
+impl Incident {
+    /// Radiance of a white matt surface that faces the light: the founding texts' I.
+    pub(crate) fn strength(&self) -> Vec3 {
+        self.strength
+    }
+
+    /// Irradiance on a surface that faces the light, lux: π times the strength.
+    pub(crate) fn irradiance(&self) -> Vec3 {
+        self.strength * PI
+    }
+}
+
+impl LocalLight {
+    pub(crate) fn new(light: &Light, center: DVec3) -> Self {
+        let point =
+            |position: DVec3, falloff, cone| Shape::Point { position: (position - center).as_vec3(), falloff, cone };
+        let shape = match light.kind {
+            LightKind::Directional { direction } => Shape::Directional(unit(-direction)),
+            LightKind::Point { position, falloff } => point(position, falloff, None),
+            LightKind::Spot { position, direction, inner, outer, falloff } => {
+                point(position, falloff, Some(Cone::new(unit(direction), inner, outer)))
+            }
+        };
+        Self { intensity: light.intensity, shadows: light.shadows, shape }
+    }
+
+    /// What arrives at `position` when nothing is in the way; `None` where nothing does.
+    pub(crate) fn incident(&self, position: Vec3) -> Option<Incident> {
+        let (to_light, share, end) = match self.shape {
+            Shape::Directional(to_light) => (to_light, 1.0 / PI, None),
+            Shape::Point { position: light, falloff, cone } => {
+                let way = light - position;
+                let to_light = way.try_normalize()?;
+                let share = weaken(falloff, way.length()) * cone.map_or(1.0, |c| c.share(-to_light));
+                (to_light, share, Some(light))
+            }
+        };
+        let strength = (self.intensity * share).min(Vec3::splat(f32::MAX));
+        (strength.max_element() > 0.0).then_some(Incident { to_light, position: end, strength })
+    }
+}
+
+/// What turns a light's intensity into its strength at `distance`: candela into lux over π; factors stay.
+#[expect(clippy::cast_possible_truncation, reason = "ranges are lengths like any other")]
+fn weaken(falloff: Falloff, distance: f32) -> f32 {
+    let Falloff::InverseSquare { range } = falloff else { return 1.0 };
+    let squared = (distance * distance).max(f32::MIN_POSITIVE);
+    let part = distance / range as f32;
+    let window = if part > 0.0 { (1.0 - part * part * part * part).clamp(0.0, 1.0) } else { 1.0 };
+    window / squared / PI
+}
+
+impl Cone {
+    /// `inner` and `outer` are half angles in radians.
+    #[expect(clippy::cast_possible_truncation, reason = "cosines")]
+    fn new(axis: Vec3, inner: f64, outer: f64) -> Self {
+        let (inner, outer) = (libm::cos(inner) as f32, libm::cos(outer) as f32);
+        let scale = 1.0 / (inner - outer).max(1e-3);
+        Self { axis, scale, offset: -outer * scale }
+    }
+
+    /// The share of light that leaves along the unit vector `dir`: the square of the fade over the angle's cosine.
+    fn share(&self, dir: Vec3) -> f32 {
+        let fade = (self.axis.dot(dir) * self.scale + self.offset).clamp(0.0, 1.0);
+        fade * fade
+    }
+}
+
+fn unit(v: DVec3) -> Vec3 {
+    v.try_normalize().unwrap_or(DVec3::Z).as_vec3()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn light(kind: LightKind) -> LocalLight {
+        LocalLight::new(
+            &Light { name: String::new(), intensity: Vec3::splat(8.0), kind, shadows: true },
+            DVec3::new(1e7, 0.0, 0.0),
+        )
+    }
+
+    fn at_height(height: f64) -> DVec3 {
+        DVec3::new(1e7, 0.0, height)
+    }
+
+    #[test]
+    fn a_point_light_weakens_with_the_square_of_the_distance_unless_told_otherwise() {
+        let square = Falloff::InverseSquare { range: f64::INFINITY };
+        let near = light(LightKind::Point { position: at_height(2.0), falloff: square });
+        let incident = near.incident(Vec3::ZERO).expect("light arrives");
+        assert!((incident.irradiance() - Vec3::splat(2.0)).length() < 1e-6);
+        assert_eq!(incident.to_light, Vec3::Z);
+        let constant = light(LightKind::Point { position: at_height(2.0), falloff: Falloff::None });
+        let incident = constant.incident(Vec3::ZERO).expect("light arrives");
+        assert_eq!(incident.strength(), Vec3::splat(8.0));
+    }
+
+    #[test]
+    fn a_range_ends_the_light_smoothly() {
+        let falloff = Falloff::InverseSquare { range: 4.0 };
+        let lamp = light(LightKind::Point { position: at_height(2.0), falloff });
+        let incident = lamp.incident(Vec3::ZERO).expect("light arrives");
+        assert!((incident.irradiance() - Vec3::splat(2.0 * (1.0 - 1.0 / 16.0))).length() < 1e-6);
+        assert!(lamp.incident(Vec3::NEG_Z * 2.0).is_none());
+    }
+
+    #[test]
+    fn a_spot_fades_between_its_two_angles() {
+        let kind = LightKind::Spot {
+            position: at_height(1.0),
+            direction: DVec3::NEG_Z,
+            inner: 0.0,
+            outer: std::f64::consts::FRAC_PI_3,
+            falloff: Falloff::None,
+        };
+        let spot = light(kind);
+        let along = |tan: f32| spot.incident(Vec3::new(tan, 0.0, 0.0)).map(|i| i.strength().x);
+        assert_eq!(along(0.0), Some(8.0));
+        // 45° from the axis: the cosine has come (cos 45° − cos 60°) / (1 − cos 60°) of its way.
+        let fade = (0.5f32.sqrt() - 0.5) / 0.5;
+        assert!((along(1.0).expect("inside the cone") - 8.0 * fade * fade).abs() < 1e-5);
+        assert_eq!(along(2.0), None);
+    }
+
+    #[test]
+    fn a_light_at_the_point_itself_gives_nothing() {
+        let kind = LightKind::Point { position: at_height(0.0), falloff: Falloff::None };
+        assert!(light(kind).incident(Vec3::ZERO).is_none());
+    }
+}

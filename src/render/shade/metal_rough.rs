@@ -1,0 +1,418 @@
+//! glTF's metallic-roughness model (glTF 2.0, Appendix B) with the specular, ior and transmission extensions.
+//!
+//! Lights are seen through the microfacet model: GGX distribution, height-correlated Smith masking, Schlick's Fresnel.
+//! The surroundings are seen by one mirror ray where the surface is smooth, and by a lookup of the environment, as wide
+//! as the roughness makes it, where it is rough; in between the two are mixed, so that no edge shows. A lookup sends no
+//! ray: what stands in its way is known from the occlusion map only. Light passes rough glass unscattered apart from a
+//! part that is looked up; lights themselves are not seen through rough glass.
+
+use super::{Balance, Reader, Sky};
+use crate::math::Vec3;
+use crate::render::optics::{fresnel_dielectric, fresnel_schlick, reflect};
+use crate::render::surface::Surface;
+use crate::render::wave::Crossing;
+use crate::scene::MetalRough;
+use std::f32::consts::PI;
+
+/// Below this roughness the surroundings are seen by a ray alone …
+const MIRROR_ROUGHNESS: f32 = 0.1;
+/// … and above this one by a lookup alone.
+const MATT_ROUGHNESS: f32 = crate::scene::features::SMOOTH;
+/// Above this roughness the lookup has its largest part in what is seen through glass.
+const FROSTED_ROUGHNESS: f32 = 0.6;
+/// That part; the rest goes straight through, so that glass never hides what it holds.
+const FROSTED_SHARE: f32 = 0.75;
+/// Highlights of lights without extent are never narrower than this roughness makes them.
+const NARROWEST_HIGHLIGHT: f32 = 0.045;
+
+/// The model's parameters at one point.
+#[derive(Clone, Debug)]
+pub(crate) struct MetalRoughMatter {
+    base: Vec3,
+    metallic: f32,
+    roughness: f32,
+    /// Reflection of the dielectric part, face on and grazing.
+    f0: Vec3,
+    f90: f32,
+    /// Share of the light entering the dielectric part that passes through instead of being scattered.
+    transmission: f32,
+    occlusion: f32,
+    pub ior: f32,
+    pub thick: bool,
+    pub dispersion: f32,
+}
+
+/// `metallic` with its map.
+pub(super) fn metallic_at(m: &MetalRough, reader: &Reader) -> f32 {
+    (m.metallic * reader.linear(m.metal_rough_map.as_ref()).z).clamp(0.0, 1.0)
+}
+
+impl MetalRoughMatter {
+    pub(super) fn new(m: &MetalRough, base: Vec3, occlusion: f32, reader: &Reader) -> Self {
+        let map = reader.linear(m.metal_rough_map.as_ref());
+        let specular = m.specular * reader.linear(m.specular_map.as_ref()).w;
+        let color = m.specular_color * reader.srgb(m.specular_color_map.as_ref());
+        let at_normal = (m.ior - 1.0) / (m.ior + 1.0);
+        Self {
+            base: base.max(Vec3::ZERO),
+            metallic: (m.metallic * map.z).clamp(0.0, 1.0),
+            roughness: (m.roughness * map.y).clamp(0.0, 1.0),
+            f0: (color * (at_normal * at_normal)).clamp(Vec3::ZERO, Vec3::ONE) * specular,
+            f90: specular,
+            transmission: (m.transmission * reader.linear(m.transmission_map.as_ref()).x).clamp(0.0, 1.0),
+            occlusion: occlusion.clamp(0.0, 1.0),
+            ior: m.ior,
+            thick: m.thick,
+            dispersion: m.dispersion,
+        }
+    }
+
+    /// Reflectance of the dielectric and of the metal part by Schlick's formula.
+    fn fresnel(&self, cosine: f32) -> (Vec3, Vec3) {
+        (fresnel_schlick(self.f0, self.f90, cosine), fresnel_schlick(self.base, 1.0, cosine))
+    }
+
+    /// Colour of the light that is scattered under the surface, before what the surface reflects is taken off.
+    fn scattered(&self) -> Vec3 {
+        self.base * ((1.0 - self.metallic) * (1.0 - self.transmission))
+    }
+
+    /// BRDF × N·L; all unit vectors, away from the surface.
+    pub(super) fn lit(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
+        let (n_l, n_v) = (normal.dot(to_light), normal.dot(view));
+        if n_l <= 0.0 || n_v <= 0.0 {
+            return Vec3::ZERO;
+        }
+        let half = (view + to_light).normalize_or(normal);
+        let (dielectric, metal) = self.fresnel(view.dot(half));
+        let r = self.roughness.max(NARROWEST_HIGHLIGHT);
+        let lobe = ggx(normal, half, r * r) * visibility(n_l, n_v, r * r);
+        let diffuse = self.scattered() * ((1.0 - dielectric.max_element()) / PI);
+        let specular = dielectric.lerp(metal, self.metallic) * lobe;
+        (diffuse + specular) * n_l
+    }
+
+    /// The surroundings without a ray: scattered and looked-up mirrored light.
+    pub(super) fn ambient(&self, surface: &Surface, sky: &Sky, ambient: Vec3) -> Vec3 {
+        let n_v = surface.normal.dot(surface.view).clamp(0.0, 1.0);
+        let looked_up = 1.0 - self.traced(surface.front);
+        let seen = albedo(self.roughness, n_v);
+        let (dielectric, metal) = (self.f0 * seen.0 + self.f90 * seen.1, self.base * seen.0 + seen.1);
+
+        let taken = self.fresnel(n_v).0.lerp(dielectric, looked_up).max_element();
+        let diffuse = self.scattered() * (1.0 - taken).max(0.0) * self.occlusion;
+        let mut sum = diffuse * (sky.diffuse(surface.normal) + ambient);
+        if looked_up > 0.0 {
+            let mirrored = above(reflect(-surface.view, surface.normal), surface.geometric);
+            let light = sky.blurred(mirrored, self.roughness) + ambient;
+            sum += dielectric.lerp(metal, self.metallic) * light * (looked_up * self.open(n_v));
+        }
+        let frosted = self.frosted(surface.front);
+        if frosted > 0.0 {
+            let light = sky.blurred(-surface.view, self.roughness) + ambient;
+            sum += self.passed(1.0 - taken) * light * frosted;
+        }
+        sum
+    }
+
+    /// Weights of the mirror ray and of the ray that passes through.
+    pub(super) fn balance(&self, cosine: f32, crossing: &Crossing) -> Balance {
+        let (mut dielectric, metal) = self.fresnel(cosine);
+        let mut open = 1.0 - dielectric.max_element();
+        let inside = crossing.n_i > crossing.n_t;
+        if self.transmission > 0.0 && self.thick {
+            let share = fresnel_dielectric(f64::from(cosine), f64::from(crossing.n_i), f64::from(crossing.n_t));
+            #[expect(clippy::cast_possible_truncation, reason = "a share of light")]
+            let share = share as f32;
+            // Inside, what is turned back belongs to the light that was let in.
+            dielectric = if inside { Vec3::splat(share) } else { Vec3::splat(share * self.f90) };
+            open = 1.0 - dielectric.max_element();
+        }
+        Balance {
+            reflected: dielectric.lerp(metal, self.metallic) * self.traced(!inside),
+            refracted: self.passed(open) * (1.0 - self.frosted(!inside)),
+        }
+    }
+
+    /// What passes through of the light along one direction when `open` of it enters.
+    fn passed(&self, open: f32) -> Vec3 {
+        self.base * (self.transmission * (1.0 - self.metallic) * open.max(0.0))
+    }
+
+    /// Share of the mirrored surroundings that a ray brings in. From inside there is no environment to look up.
+    fn traced(&self, outside: bool) -> f32 {
+        if outside { 1.0 - smoothstep(MIRROR_ROUGHNESS, MATT_ROUGHNESS, self.roughness) } else { 1.0 }
+    }
+
+    /// Share of the light passing through that is looked up instead.
+    fn frosted(&self, outside: bool) -> f32 {
+        let see_through = self.transmission > 0.0 && outside;
+        if see_through { FROSTED_SHARE * smoothstep(0.0, FROSTED_ROUGHNESS, self.roughness) } else { 0.0 }
+    }
+
+    /// Share of the mirrored surroundings that the occlusion map leaves open: less where few directions are open and the
+    /// lobe is wide (S. Lagarde, C. de Rousiers, "Moving Frostbite to Physically Based Rendering", 2014).
+    fn open(&self, n_v: f32) -> f32 {
+        if self.occlusion >= 1.0 {
+            return 1.0;
+        }
+        let exponent = libm::exp2f(-16.0 * self.roughness - 1.0);
+        (libm::powf(n_v + self.occlusion, exponent) - 1.0 + self.occlusion).clamp(0.0, 1.0)
+    }
+}
+
+/// `dir`, mirrored to the front of a surface when a shading normal has sent it behind.
+pub(crate) fn above(dir: Vec3, geometric: Vec3) -> Vec3 {
+    let height = dir.dot(geometric);
+    if height < 0.0 { dir - 2.0 * height * geometric } else { dir }
+}
+
+/// Trowbridge and Reitz's distribution of facets (GGX), `alpha` the square of the roughness.
+fn ggx(normal: Vec3, half: Vec3, alpha: f32) -> f32 {
+    let n_h = normal.dot(half).clamp(0.0, 1.0);
+    // 1 − (N·H)² as |N × H|², which keeps its digits in a narrow highlight.
+    let sine_squared = normal.cross(half).length_squared();
+    let a2 = alpha * alpha;
+    let f = n_h * n_h * a2 + sine_squared;
+    a2 / (PI * f * f)
+}
+
+/// Smith's height-correlated masking and shadowing over 4 N·L N·V (E. Heitz, "Understanding the Masking-Shadowing
+/// Function", 2014).
+fn visibility(n_l: f32, n_v: f32, alpha: f32) -> f32 {
+    let a2 = alpha * alpha;
+    let view = n_l * (n_v * n_v * (1.0 - a2) + a2).sqrt();
+    let light = n_v * (n_l * n_l * (1.0 - a2) + a2).sqrt();
+    0.5 / (view + light)
+}
+
+/// Directional albedo of the microfacet lobe as (scale of f0, scale of f90), the split sum of B. Karis, "Real Shading in
+/// Unreal Engine 4" (2013): rows by roughness 0 … 1, columns by the square root of N·V.
+const ALBEDO: [[(f32, f32); 9]; 9] = [
+    [
+        (0.000, 1.000),
+        (0.076, 0.924),
+        (0.276, 0.724),
+        (0.531, 0.469),
+        (0.763, 0.237),
+        (0.916, 0.084),
+        (0.984, 0.016),
+        (0.999, 0.001),
+        (1.000, 0.000),
+    ],
+    [
+        (0.197, 0.774),
+        (0.166, 0.716),
+        (0.298, 0.664),
+        (0.536, 0.455),
+        (0.762, 0.235),
+        (0.915, 0.084),
+        (0.983, 0.016),
+        (0.999, 0.001),
+        (1.000, 0.000),
+    ],
+    [
+        (0.472, 0.508),
+        (0.446, 0.487),
+        (0.450, 0.432),
+        (0.574, 0.342),
+        (0.757, 0.204),
+        (0.901, 0.081),
+        (0.973, 0.018),
+        (0.993, 0.001),
+        (0.996, 0.000),
+    ],
+    [
+        (0.669, 0.313),
+        (0.654, 0.301),
+        (0.642, 0.264),
+        (0.667, 0.208),
+        (0.753, 0.137),
+        (0.859, 0.065),
+        (0.930, 0.018),
+        (0.965, 0.002),
+        (0.976, 0.000),
+    ],
+    [
+        (0.790, 0.192),
+        (0.777, 0.183),
+        (0.762, 0.158),
+        (0.751, 0.122),
+        (0.761, 0.081),
+        (0.801, 0.042),
+        (0.852, 0.015),
+        (0.891, 0.002),
+        (0.916, 0.000),
+    ],
+    [
+        (0.860, 0.122),
+        (0.844, 0.115),
+        (0.818, 0.096),
+        (0.780, 0.072),
+        (0.752, 0.047),
+        (0.744, 0.025),
+        (0.753, 0.010),
+        (0.772, 0.002),
+        (0.796, 0.000),
+    ],
+    [
+        (0.899, 0.082),
+        (0.878, 0.076),
+        (0.832, 0.062),
+        (0.768, 0.044),
+        (0.716, 0.028),
+        (0.675, 0.015),
+        (0.646, 0.006),
+        (0.631, 0.001),
+        (0.627, 0.000),
+    ],
+    [
+        (0.921, 0.060),
+        (0.891, 0.054),
+        (0.821, 0.042),
+        (0.735, 0.028),
+        (0.658, 0.017),
+        (0.590, 0.009),
+        (0.534, 0.004),
+        (0.488, 0.001),
+        (0.452, 0.000),
+    ],
+    [
+        (0.933, 0.047),
+        (0.893, 0.041),
+        (0.795, 0.030),
+        (0.686, 0.019),
+        (0.587, 0.011),
+        (0.499, 0.005),
+        (0.423, 0.002),
+        (0.360, 0.001),
+        (0.307, 0.000),
+    ],
+];
+
+/// [`ALBEDO`] between its entries, off by at most 0.05.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "both coordinates lie in 0 … 8")]
+fn albedo(roughness: f32, n_v: f32) -> (f32, f32) {
+    let (y, x) = (roughness.clamp(0.0, 1.0) * 8.0, n_v.clamp(0.0, 1.0).sqrt() * 8.0);
+    let (row, column) = ((y as usize).min(7), (x as usize).min(7));
+    let (y, x) = (y - row as f32, x - column as f32);
+    let mix = |a: (f32, f32), b: (f32, f32), t: f32| (a.0 + (b.0 - a.0) * t, a.1 + (b.1 - a.1) * t);
+    let along = |row: &[(f32, f32); 9]| mix(row[column], row[column + 1], x);
+    mix(along(&ALBEDO[row]), along(&ALBEDO[row + 1]), y)
+}
+
+fn smoothstep(from: f32, to: f32, x: f32) -> f32 {
+    let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::wave::{Media, Medium};
+
+    fn matter() -> MetalRoughMatter {
+        MetalRoughMatter {
+            base: Vec3::new(0.8, 0.4, 0.2),
+            metallic: 0.0,
+            roughness: 0.5,
+            f0: Vec3::splat(0.04),
+            f90: 1.0,
+            transmission: 0.0,
+            occlusion: 1.0,
+            ior: 1.5,
+            thick: false,
+            dispersion: 0.0,
+        }
+    }
+
+    fn at(degrees: f32) -> Vec3 {
+        let (sin, cos) = libm::sincosf(degrees.to_radians());
+        Vec3::new(sin, 0.0, cos)
+    }
+
+    /// ∫ BRDF N·L over the hemisphere by midpoints.
+    fn reflected_in_all(m: &MetalRoughMatter, view: Vec3) -> Vec3 {
+        let (rows, columns) = (400u16, 200u16);
+        let mut sum = Vec3::ZERO;
+        for i in 0..rows {
+            for j in 0..columns {
+                let theta = (f32::from(i) + 0.5) / f32::from(rows) * PI / 2.0;
+                let phi = (f32::from(j) + 0.5) / f32::from(columns) * 2.0 * PI;
+                let (st, ct) = libm::sincosf(theta);
+                let (sp, cp) = libm::sincosf(phi);
+                sum += m.lit(Vec3::Z, view, Vec3::new(st * cp, st * sp, ct)) * st;
+            }
+        }
+        sum * (PI / 2.0 / f32::from(rows)) * (2.0 * PI / f32::from(columns))
+    }
+
+    #[test]
+    fn the_tabulated_albedo_is_that_of_the_lobe() {
+        for (roughness, degrees) in [(0.3, 0.0), (0.5, 45.0), (0.5, 80.0), (0.8, 60.0), (1.0, 20.0)] {
+            let white = MetalRoughMatter { base: Vec3::ONE, metallic: 1.0, roughness, ..matter() };
+            let black = MetalRoughMatter { base: Vec3::ZERO, ..white.clone() };
+            let (sum, bias) = (reflected_in_all(&white, at(degrees)).x, reflected_in_all(&black, at(degrees)).x);
+            let known = albedo(roughness, at(degrees).z);
+            assert!((known.0 - (sum - bias)).abs() < 0.05, "{roughness} at {degrees}: {}, {known:?}", sum - bias);
+            assert!((known.1 - bias).abs() < 0.05, "{roughness} at {degrees}: {bias}, {known:?}");
+        }
+    }
+
+    #[test]
+    fn no_more_light_leaves_than_arrives() {
+        // Nearer to grazing the model itself gives off a little too much.
+        for roughness in [0.2, 0.5, 1.0] {
+            for degrees in [0.0, 30.0, 50.0] {
+                let white = MetalRoughMatter { base: Vec3::ONE, roughness, ..matter() };
+                let all = reflected_in_all(&white, at(degrees)).max_element();
+                assert!(all < 1.01, "{roughness} at {degrees}: {all}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_matt_dielectric_is_lambertian_but_for_its_sheen() {
+        let dull = MetalRoughMatter { f0: Vec3::ZERO, f90: 0.0, ..matter() };
+        assert!((dull.lit(Vec3::Z, at(-20.0), at(60.0)) - dull.base * 0.5 / PI).length() < 1e-6);
+    }
+
+    #[test]
+    fn seen_and_lit_can_change_places() {
+        let m = MetalRoughMatter { metallic: 0.4, ..matter() };
+        let (a, b) = (at(25.0), at(-65.0));
+        let there = m.lit(Vec3::Z, a, b) / b.z;
+        let back = m.lit(Vec3::Z, b, a) / a.z;
+        assert!((there - back).length() < 1e-5);
+    }
+
+    #[test]
+    fn a_mirror_of_metal_has_the_color_of_its_base() {
+        let metal = MetalRoughMatter { metallic: 1.0, roughness: 0.0, ..matter() };
+        let outside = Media::default().cross(Medium { material: 0, ior: 1.0 }, true);
+        assert_eq!(metal.balance(1.0, &outside).reflected, metal.base);
+        assert_eq!(metal.balance(1.0, &outside).refracted, Vec3::ZERO);
+        assert_eq!(MetalRoughMatter { roughness: 0.5, ..metal }.balance(1.0, &outside).reflected, Vec3::ZERO);
+    }
+
+    #[test]
+    fn clear_glass_splits_all_light_between_both_rays() {
+        let glass = MetalRoughMatter { base: Vec3::ONE, roughness: 0.0, transmission: 1.0, thick: true, ..matter() };
+        let into = Media::default().cross(Medium { material: 0, ior: 1.5 }, true);
+        let out = into.beyond.cross(Medium { material: 0, ior: 1.5 }, false);
+        for crossing in [into, out] {
+            for cosine in [0.1, 0.5, 0.8, 1.0] {
+                let balance = glass.balance(cosine, &crossing);
+                assert!((balance.reflected + balance.refracted - Vec3::ONE).length() < 1e-6);
+            }
+        }
+        assert_eq!(glass.balance(0.1, &out).refracted, Vec3::ZERO, "total reflection");
+    }
+
+    #[test]
+    fn a_mirrored_direction_never_goes_into_the_surface() {
+        let dir = above(Vec3::new(0.6, 0.0, -0.8), Vec3::Z);
+        assert_eq!(dir, Vec3::new(0.6, 0.0, 0.8));
+        assert_eq!(above(dir, Vec3::Z), dir);
+    }
+}

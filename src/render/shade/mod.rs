@@ -1,0 +1,182 @@
+//! What a surface does with light: the material at a point, evaluated from factors, maps and vertex colours.
+//!
+//! Shading models answer two questions here: how a light's arrival is seen ([`Matter::lit`], [`Matter::lit_through`]),
+//! and how much of what lies in the mirrored and refracted direction is seen ([`Matter::balance`]). Which rays are
+//! sent, and what they find, is the tracer's business.
+
+mod light;
+mod metal_rough;
+mod phong;
+mod sky;
+mod spectrum;
+
+pub(crate) use light::{Incident, LocalLight};
+pub(crate) use metal_rough::{MetalRoughMatter, above};
+pub(crate) use phong::PhongMatter;
+pub(crate) use sky::Sky;
+pub(crate) use spectrum::{Band, bands};
+
+use super::context::coverage;
+use super::surface::{Footprint, Patch, Surface};
+use super::texture::{ColorSpace, TextureStore};
+use super::wave::Crossing;
+use crate::math::{Vec3, Vec4};
+use crate::scene::{Material, Surface as Reflection, TextureRef};
+
+/// The material at one point of a surface.
+pub(crate) struct Matter {
+    pub emission: Vec3,
+    pub model: Model,
+}
+
+/// The reflection model at one point.
+pub(crate) enum Model {
+    Unlit(Vec3),
+    Phong(PhongMatter),
+    MetalRough(MetalRoughMatter),
+}
+
+/// Weights of the secondary rays of a point.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Balance {
+    pub reflected: Vec3,
+    pub refracted: Vec3,
+}
+
+/// Reads the maps of one point.
+pub(crate) struct Reader<'a> {
+    pub store: &'a TextureStore<'a>,
+    pub patch: Option<&'a Patch<'a>>,
+    pub footprint: &'a Footprint,
+}
+
+impl Reader<'_> {
+    /// The map's linear RGBA; white where there is no map, or nothing to read it with.
+    fn read(&self, map: Option<&TextureRef>, space: ColorSpace) -> Vec4 {
+        match (map, self.patch) {
+            (Some(map), Some(patch)) => patch.texel(map, space, self.store, self.footprint),
+            _ => Vec4::ONE,
+        }
+    }
+
+    fn srgb(&self, map: Option<&TextureRef>) -> Vec3 {
+        self.read(map, ColorSpace::Srgb).truncate()
+    }
+
+    fn linear(&self, map: Option<&TextureRef>) -> Vec4 {
+        self.read(map, ColorSpace::Linear)
+    }
+
+    /// Base colour and opacity: factors × maps × vertex colour.
+    pub(crate) fn base(&self, material: &Material) -> Vec4 {
+        let map = self.read(material.base_color_map.as_ref(), ColorSpace::Srgb);
+        let opacity_map = self.linear(material.opacity_map.as_ref()).x;
+        let vertex = self.patch.map_or(Vec4::ONE, Patch::color);
+        let base = material.base_color.extend(material.opacity * opacity_map) * map * vertex;
+        if base.is_finite() { base } else { Vec4::ONE }
+    }
+}
+
+impl Matter {
+    /// The material at `surface`, whose base colour has been read already.
+    pub(crate) fn new(surface: &Surface, base: Vec3, store: &TextureStore) -> Self {
+        let material = surface.target.material;
+        let reader = Reader { store, patch: surface.patch.as_ref(), footprint: &surface.footprint };
+        let emission = material.emission * reader.srgb(material.emission_map.as_ref());
+        let model = match &material.surface {
+            Reflection::Unlit => Model::Unlit(base),
+            Reflection::Phong(phong) => Model::Phong(PhongMatter::new(phong, base, &reader)),
+            Reflection::MetalRough(m) => {
+                let shade = reader.linear(material.occlusion_map.as_ref()).x;
+                let occlusion = 1.0 + material.occlusion_strength * (shade - 1.0);
+                Model::MetalRough(MetalRoughMatter::new(m, base, occlusion, &reader))
+            }
+        };
+        Self { emission, model }
+    }
+
+    /// What is seen of the light that arrives from everywhere, without a ray.
+    pub(crate) fn ambient(&self, surface: &Surface, sky: &Sky, ambient: Vec3) -> Vec3 {
+        match &self.model {
+            Model::Unlit(color) => *color,
+            Model::Phong(m) => m.ambient * ambient + m.diffuse * sky.diffuse(surface.normal),
+            Model::MetalRough(m) => m.ambient(surface, sky, ambient),
+        }
+    }
+
+    /// What is seen of a light on the viewer's side of the surface.
+    pub(crate) fn lit(&self, normal: Vec3, view: Vec3, light: &Incident) -> Vec3 {
+        match &self.model {
+            Model::Unlit(_) => Vec3::ZERO,
+            Model::Phong(m) => m.lit(normal, view, light.to_light) * light.strength(),
+            Model::MetalRough(m) => m.lit(normal, view, light.to_light) * light.irradiance(),
+        }
+    }
+
+    /// What is seen of a light on the other side of the surface.
+    pub(crate) fn lit_through(&self, normal: Vec3, view: Vec3, light: &Incident, crossing: &Crossing) -> Vec3 {
+        match &self.model {
+            Model::Phong(m) => m.lit_through(normal, view, light.to_light, crossing) * light.strength(),
+            _ => Vec3::ZERO,
+        }
+    }
+
+    /// How much of the mirrored and of the refracted direction is seen; `cosine` is that of the view.
+    pub(crate) fn balance(&self, cosine: f32, crossing: &Crossing) -> Balance {
+        match &self.model {
+            Model::Unlit(_) => Balance::default(),
+            Model::Phong(m) => m.balance(cosine, crossing),
+            Model::MetalRough(m) => m.balance(cosine, crossing),
+        }
+    }
+
+    /// Index of refraction of the inside (1: rays pass straight on), and its dispersion.
+    pub(crate) fn refraction(&self) -> (f32, f32) {
+        match &self.model {
+            Model::Phong(m) if m.ior > 0.0 => (m.ior, m.dispersion),
+            Model::MetalRough(m) if m.thick && m.ior > 0.0 => (m.ior, m.dispersion),
+            _ => (1.0, 0.0),
+        }
+    }
+}
+
+/// The share of light that a surface lets through to a point in its shadow: filtered by its colour.
+///
+/// An absent texel lets everything through, one of a see-through material what its opacity and its colour leave.
+pub(crate) fn shadow_filter(material: &Material, reader: &Reader) -> Vec3 {
+    let base = reader.base(material);
+    let solid = coverage(material, base.w);
+    let passed = match &material.surface {
+        Reflection::Unlit => Vec3::ZERO,
+        Reflection::Phong(m) => m.transmission,
+        Reflection::MetalRough(m) if m.transmission > 0.0 => {
+            let share = m.transmission * reader.linear(m.transmission_map.as_ref()).x;
+            base.truncate() * (share * (1.0 - metal_rough::metallic_at(m, reader)))
+        }
+        Reflection::MetalRough(_) => Vec3::ZERO,
+    };
+    Vec3::splat(1.0 - solid) + passed.clamp(Vec3::ZERO, Vec3::ONE) * solid
+}
+
+/// Whether rays can enter a material, so that its back faces are seen from inside.
+pub(crate) fn lets_light_in(material: &Material) -> bool {
+    match &material.surface {
+        Reflection::MetalRough(m) => m.transmission > 0.0,
+        Reflection::Phong(p) => p.transmission.max_element() > 0.0,
+        Reflection::Unlit => false,
+    }
+}
+
+/// How much of a light a smooth surface shows near the line where its true shape turns away from it: 1 away from that
+/// line, 0 on it, so that the facets of the mesh do not cut the shading off.
+///
+/// M. J.-Y. Chiang, Y. K. Li, B. Burley, "Taming the Shadow Terminator" (2019). 1 everywhere on flat faces.
+pub(crate) fn terminator(geometric: Vec3, shading: Vec3, to_light: Vec3) -> f32 {
+    let agreement = shading.dot(to_light) * shading.dot(geometric);
+    let g = geometric.dot(to_light) / agreement;
+    // Not a number or negative where the shading normal turns away from the light: such light is not seen anyway.
+    if !(0.0..1.0).contains(&g) {
+        return 1.0;
+    }
+    ((1.0 - g) * g + 1.0) * g
+}

@@ -1,0 +1,176 @@
+//! Phong's model with the extensions of the founding texts: I = Ia Ka + Σ I (Kd N·L + Ks cosⁿα) + mirror + transmission.
+//!
+//! B. T. Phong, "Illumination for Computer Generated Pictures" (1975); T. Whitted, "An Improved Illumination Model for
+//! Shaded Display" (1980). Nothing is divided by π: a light of strength 1 shows a white surface that faces it as 1.
+
+use super::{Balance, Reader};
+use crate::math::Vec3;
+use crate::render::optics::{fresnel_dielectric, fresnel_schlick, reflect};
+use crate::render::wave::Crossing;
+use crate::scene::Phong;
+
+/// Phong's parameters at one point.
+#[derive(Clone, Debug)]
+pub(crate) struct PhongMatter {
+    pub ambient: Vec3,
+    pub diffuse: Vec3,
+    pub specular: Vec3,
+    pub shininess: f32,
+    pub mirror: Vec3,
+    pub transmission: Vec3,
+    pub ior: f32,
+    pub fresnel: bool,
+    pub dispersion: f32,
+}
+
+impl PhongMatter {
+    pub(super) fn new(phong: &Phong, diffuse: Vec3, reader: &Reader) -> Self {
+        Self {
+            ambient: phong.ambient * reader.srgb(phong.ambient_map.as_ref()),
+            diffuse,
+            specular: phong.specular * reader.srgb(phong.specular_map.as_ref()),
+            shininess: (phong.shininess * reader.linear(phong.shininess_map.as_ref()).x).max(0.0),
+            mirror: phong.mirror,
+            transmission: phong.transmission,
+            ior: phong.ior,
+            fresnel: phong.fresnel,
+            dispersion: phong.dispersion,
+        }
+    }
+
+    /// Kd N·L + Ks cosⁿα with α between the view and the mirrored light; all unit vectors, away from the surface.
+    pub(super) fn lit(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
+        let cosine = normal.dot(to_light);
+        if cosine <= 0.0 {
+            return Vec3::ZERO;
+        }
+        let highlight = view.dot(reflect(-to_light, normal)).max(0.0);
+        self.diffuse * cosine + self.specular * libm::powf(highlight, self.shininess)
+    }
+
+    /// Kt (N·H′)ⁿ for a light seen through the surface: the analogue of Blinn's highlight for the refracted direction.
+    ///
+    /// H′ = ±(ηv V + ηl L)/|·| is the normal of the facets that refract the light to the viewer (B. Walter et al.,
+    /// "Microfacet Models for Refraction through Rough Surfaces", 2007). Where the indices are equal every facet passes
+    /// light straight on, so nothing is scattered.
+    pub(super) fn lit_through(&self, normal: Vec3, view: Vec3, to_light: Vec3, crossing: &Crossing) -> Vec3 {
+        let opposite = normal.dot(to_light) < 0.0 && normal.dot(view) > 0.0;
+        if !opposite || crossing.n_i == crossing.n_t || self.transmission == Vec3::ZERO {
+            return Vec3::ZERO;
+        }
+        let facet = (crossing.n_i * view + crossing.n_t * to_light).normalize_or_zero();
+        self.transmission * libm::powf(normal.dot(facet).abs(), self.shininess)
+    }
+
+    /// Without Fresnel the weights are the material's own, and total reflection adds what cannot pass to the mirror.
+    /// With it an opaque surface reflects more at grazing angles (Schlick), and a transparent one splits the light by
+    /// the exact formula for dielectrics.
+    pub(super) fn balance(&self, cosine: f32, crossing: &Crossing) -> Balance {
+        let share = fresnel_dielectric(f64::from(cosine), f64::from(crossing.n_i), f64::from(crossing.n_t));
+        #[expect(clippy::cast_possible_truncation, reason = "a share of light")]
+        let share = share as f32;
+        let transparent = self.transmission != Vec3::ZERO;
+        match (self.fresnel, transparent) {
+            (false, true) if share == 1.0 && crossing.n_i > crossing.n_t => {
+                Balance { reflected: (self.mirror + self.transmission).min(Vec3::ONE), refracted: Vec3::ZERO }
+            }
+            (false, _) => Balance { reflected: self.mirror, refracted: self.transmission },
+            (true, false) if self.mirror == Vec3::ZERO => Balance::default(),
+            (true, false) => Balance { reflected: fresnel_schlick(self.mirror, 1.0, cosine), refracted: Vec3::ZERO },
+            (true, true) => {
+                // Inside, what is turned back has been let in before and is not the mirror's to weaken.
+                let inside = crossing.n_i > crossing.n_t;
+                let mirror = if inside { self.mirror.max(self.transmission) } else { self.mirror };
+                Balance { reflected: mirror * share, refracted: self.transmission * (1.0 - share) }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::wave::{Media, Medium};
+
+    fn matter() -> PhongMatter {
+        PhongMatter {
+            ambient: Vec3::ZERO,
+            diffuse: Vec3::new(0.5, 0.25, 0.0),
+            specular: Vec3::splat(0.5),
+            shininess: 2.0,
+            mirror: Vec3::splat(0.25),
+            transmission: Vec3::splat(0.75),
+            ior: 1.5,
+            fresnel: false,
+            dispersion: 0.0,
+        }
+    }
+
+    fn at(degrees: f32) -> Vec3 {
+        let (sin, cos) = libm::sincosf(degrees.to_radians());
+        Vec3::new(sin, 0.0, cos)
+    }
+
+    fn into_glass() -> Crossing {
+        Media::default().cross(Medium { material: 0, ior: 1.5 }, true)
+    }
+
+    #[test]
+    fn diffuse_and_specular_follow_their_cosines() {
+        // Light at 60°, seen from 30° on the other side: α = 30°.
+        let seen = matter().lit(Vec3::Z, at(-30.0), at(60.0));
+        let (diffuse, highlight) = (0.5, 0.75);
+        assert!((seen - (matter().diffuse * diffuse + Vec3::splat(0.5 * highlight))).length() < 1e-6);
+    }
+
+    #[test]
+    fn a_light_below_the_horizon_gives_no_highlight() {
+        assert_eq!(matter().lit(Vec3::Z, at(-85.0), at(95.0)), Vec3::ZERO);
+    }
+
+    #[test]
+    fn a_highlight_seen_from_behind_the_mirrored_light_is_clamped_to_zero() {
+        let seen = matter().lit(Vec3::Z, at(80.0), at(80.0));
+        assert!((seen - matter().diffuse * at(80.0).z).length() < 1e-6);
+    }
+
+    #[test]
+    fn a_light_seen_through_peaks_in_the_refracted_direction() {
+        let through = |light: f32| matter().lit_through(Vec3::Z, at(-40.0), at(light), &into_glass()).x;
+        // Snell: the light that reaches 40° outside travels 180° + asin(sin 40° / 1.5) inside.
+        let refracted = 180.0 - libm::asinf(libm::sinf(40f32.to_radians()) / 1.5).to_degrees();
+        assert!((through(refracted) - 0.75).abs() < 1e-5);
+        assert!(through(refracted - 10.0) < 0.75 && through(refracted + 10.0) < 0.75);
+        assert_eq!(through(20.0), 0.0, "a light on the viewer's side is not seen through");
+        let same = Media::default().cross(Medium { material: 0, ior: 1.0 }, true);
+        assert_eq!(matter().lit_through(Vec3::Z, at(-40.0), at(160.0), &same), Vec3::ZERO);
+    }
+
+    #[test]
+    fn without_fresnel_the_weights_are_the_materials() {
+        let balance = matter().balance(0.3, &into_glass());
+        assert_eq!(balance, Balance { reflected: Vec3::splat(0.25), refracted: Vec3::splat(0.75) });
+    }
+
+    #[test]
+    fn total_reflection_loses_nothing() {
+        let out = into_glass().beyond.cross(Medium { material: 0, ior: 1.5 }, false);
+        for fresnel in [false, true] {
+            let glass = PhongMatter { fresnel, mirror: Vec3::ZERO, transmission: Vec3::ONE, ..matter() };
+            assert_eq!(glass.balance(0.1, &out), Balance { reflected: Vec3::ONE, refracted: Vec3::ZERO });
+        }
+    }
+
+    #[test]
+    fn fresnel_shares_the_light_between_mirror_and_transmission() {
+        let glass = PhongMatter { fresnel: true, mirror: Vec3::ONE, transmission: Vec3::ONE, ..matter() };
+        for cosine in [0.05, 0.4, 1.0] {
+            let balance = glass.balance(cosine, &into_glass());
+            assert!((balance.reflected + balance.refracted - Vec3::ONE).length() < 1e-6);
+        }
+        assert!((glass.balance(1.0, &into_glass()).reflected.x - 0.04).abs() < 1e-6);
+        let lacquer = PhongMatter { transmission: Vec3::ZERO, fresnel: true, ..matter() };
+        assert_eq!(lacquer.balance(1.0, &into_glass()).reflected, Vec3::splat(0.25));
+        assert_eq!(lacquer.balance(0.0, &into_glass()).reflected, Vec3::ONE);
+    }
+}

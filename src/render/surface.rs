@@ -1,0 +1,369 @@
+//! From a hit to the surface there: position with its error, normals, and the coordinates textures are read with.
+//!
+//! Evaluated once, for the hit that counts. Nothing here knows of light; materials are only asked for their normal and
+//! bump maps. Whatever a file gives, normals come out finite and of unit length.
+
+use super::texture::{ColorSpace, TextureStore};
+use super::world::{Placement, PrimSource, World};
+use crate::accel::{Hit, NO_PRIM, Ray};
+use crate::math::bounds::offset_origin;
+use crate::math::{Vec2, Vec3, Vec4};
+use crate::scene::{Material, Mesh, Scene, TextureRef};
+
+/// What was hit, before anything about it is computed.
+#[derive(Clone, Copy)]
+pub(crate) struct Target<'a> {
+    pub prim: u32,
+    /// Instances first, then spheres, then planes.
+    pub instance: u32,
+    pub material_id: u32,
+    pub material: &'a Material,
+    mesh: Option<(&'a Mesh, &'a Placement)>,
+    source: PrimSource,
+}
+
+impl<'a> Target<'a> {
+    pub(crate) fn new(scene: &'a Scene, world: &'a World, prim: u32) -> Self {
+        let source = world.source(prim);
+        let of_instance = |instance: u32| {
+            let mesh = &scene.meshes[scene.instances[instance as usize].mesh as usize];
+            (instance, mesh.material, Some((mesh, world.placement(instance))))
+        };
+        let (instance, material_id, mesh) = match source {
+            PrimSource::Triangle { instance, .. } | PrimSource::Polygon { instance, .. } => of_instance(instance),
+            PrimSource::Sphere(i) => (id(scene.instances.len()) + i, scene.spheres[i as usize].material, None),
+            PrimSource::Plane(i) => {
+                let first = id(scene.instances.len() + scene.spheres.len());
+                (first + i, scene.planes[i as usize].material, None)
+            }
+        };
+        let material = &scene.materials[material_id as usize];
+        Self { prim, instance, material_id, material, mesh, source }
+    }
+
+    /// Whether a ray that leaves the surface cannot meet it again.
+    fn is_planar(&self) -> bool {
+        !matches!(self.source, PrimSource::Sphere(_))
+    }
+
+    /// The part of the mesh around a hit; `None` on spheres and planes, which have no texture coordinates.
+    ///
+    /// `u`, `v` are the weights of a triangle's second and third corner, `position` is in the centred frame.
+    pub(crate) fn patch(&self, world: &World, u: f32, v: f32, position: Vec3) -> Option<Patch<'a>> {
+        let (mesh, placement) = self.mesh?;
+        let (corners, weights) = match self.source {
+            PrimSource::Triangle { triangle, .. } => (mesh.triangles[triangle as usize], [1.0 - u - v, u, v]),
+            _ => fan_triangle(mesh, world, self.prim, self.source, position),
+        };
+        let vertices = self.vertices(world, corners, mesh);
+        Some(Patch { mesh, placement, corners, weights, vertices })
+    }
+
+    /// World positions (centred frame) of mesh vertices.
+    fn vertices(&self, world: &World, corners: [u32; 3], mesh: &Mesh) -> [Vec3; 3] {
+        let shapes = &world.shapes;
+        match self.source {
+            PrimSource::Triangle { .. } => shapes.triangles[self.prim as usize].map(|i| shapes.vertices[i as usize]),
+            _ => {
+                let (first, _) = shapes.polygons[self.prim as usize - shapes.triangles.len()];
+                let (own_first, _) = polygon_run(mesh, self.source);
+                let base = shapes.polygon_corners[first as usize] - mesh.polygon_corners[own_first as usize];
+                corners.map(|i| shapes.vertices[(i + base) as usize])
+            }
+        }
+    }
+}
+
+/// First corner and length of a polygon in its mesh.
+fn polygon_run(mesh: &Mesh, source: PrimSource) -> (u32, u32) {
+    let PrimSource::Polygon { polygon, .. } = source else { return (0, 0) };
+    let p = mesh.polygons[polygon as usize];
+    (p.first, p.len)
+}
+
+/// The triangle of a polygon's fan that `position` lies in, or lies least outside of, and its weights there.
+///
+/// For attributes that are affine over the polygon, as projected coordinates are, any triangle gives the same answer.
+fn fan_triangle(mesh: &Mesh, world: &World, prim: u32, source: PrimSource, position: Vec3) -> ([u32; 3], [f32; 3]) {
+    let shapes = &world.shapes;
+    let (first, len) = polygon_run(mesh, source);
+    let (world_first, _) = shapes.polygons[prim as usize - shapes.triangles.len()];
+    let corner = |i: u32| shapes.vertices[shapes.polygon_corners[(world_first + i) as usize] as usize];
+    let mut best = ([first; 3], [1.0, 0.0, 0.0], f32::NEG_INFINITY);
+    for i in 1..len.saturating_sub(1) {
+        let gradients = Gradients::new([corner(0), corner(i), corner(i + 1)]);
+        let offset = position - corner(0);
+        let (u, v) = (gradients.second.dot(offset), gradients.third.dot(offset));
+        let weights = [1.0 - u - v, u, v];
+        let inside = weights[0].min(u).min(v);
+        if inside > best.2 {
+            best = ([first, first + i, first + i + 1], weights, inside);
+        }
+    }
+    (best.0.map(|i| mesh.polygon_corners[i as usize]), best.1)
+}
+
+/// How the weights of a triangle's second and third corner grow along its plane, per world unit.
+#[derive(Clone, Copy)]
+struct Gradients {
+    second: Vec3,
+    third: Vec3,
+}
+
+impl Gradients {
+    /// Zero for a triangle without area.
+    fn new([a, b, c]: [Vec3; 3]) -> Self {
+        let (e1, e2) = (b - a, c - a);
+        let normal = e1.cross(e2);
+        let inverse = 1.0 / normal.length_squared();
+        if !inverse.is_finite() {
+            return Self { second: Vec3::ZERO, third: Vec3::ZERO };
+        }
+        Self { second: e2.cross(normal) * inverse, third: normal.cross(e1) * inverse }
+    }
+}
+
+/// The part of a mesh around a hit: three corners and their weights.
+#[derive(Clone, Copy)]
+pub(crate) struct Patch<'a> {
+    mesh: &'a Mesh,
+    placement: &'a Placement,
+    corners: [u32; 3],
+    weights: [f32; 3],
+    vertices: [Vec3; 3],
+}
+
+/// The two axes, world space, of the ellipse in which a ray's cone meets a surface; one pixel each.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Footprint {
+    along: Vec3,
+    across: Vec3,
+}
+
+impl Footprint {
+    /// Cone of diameter `width` along the unit vector `dir` on a surface with unit normal `normal`.
+    ///
+    /// After T. Akenine-Möller et al., "Improved Shader and Texture Level of Detail Using Ray Cones" (2021).
+    pub(crate) fn new(dir: Vec3, normal: Vec3, width: f32) -> Self {
+        // A grazing cone covers unboundedly much; beyond this the texture is at its smallest copy anyway.
+        const LONGEST: f32 = 1e4;
+        let axis = |v: Vec3| {
+            let seen = (v - dir.dot(v) * dir).length();
+            v * (width / seen.max(1.0 / LONGEST))
+        };
+        let slope = dir - normal.dot(dir) * normal;
+        let along = slope.try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
+        Self { along: axis(along), across: axis(normal.cross(along)) }
+    }
+}
+
+/// Texture coordinates at a point and their change along both axes of a [`Footprint`].
+#[derive(Clone, Copy)]
+struct Coordinates {
+    uv: Vec2,
+    along: Vec2,
+    across: Vec2,
+    /// Change along the second and third corner's edge.
+    edges: [Vec2; 2],
+}
+
+impl Patch<'_> {
+    fn mix<T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>>(&self, values: &[T]) -> Option<T> {
+        let [a, b, c] = self.corners.map(|i| values.get(i as usize).copied());
+        Some(a? * self.weights[0] + b? * self.weights[1] + c? * self.weights[2])
+    }
+
+    /// Vertex colour, linear RGBA; white when the mesh has none.
+    pub(crate) fn color(&self) -> Vec4 {
+        self.mix(&self.mesh.colors).unwrap_or(Vec4::ONE)
+    }
+
+    /// The texture at this point, linear RGBA.
+    pub(crate) fn texel(&self, map: &TextureRef, space: ColorSpace, store: &TextureStore, print: &Footprint) -> Vec4 {
+        let at = self.coordinates(map, print);
+        store.sample(map.texture, space, at.uv, at.along, at.across)
+    }
+
+    fn coordinates(&self, map: &TextureRef, print: &Footprint) -> Coordinates {
+        let Some(set) = self.mesh.uvs.get(map.uv_set as usize) else {
+            return Coordinates { uv: Vec2::ZERO, along: Vec2::ZERO, across: Vec2::ZERO, edges: [Vec2::ZERO; 2] };
+        };
+        let turn = Turn::new(map);
+        let [a, b, c] = self.corners.map(|i| set.get(i as usize).map_or(Vec2::ZERO, |&uv| turn.apply(uv)));
+        let edges = [b - a, c - a];
+        let gradients = Gradients::new(self.vertices);
+        let change = |v: Vec3| edges[0] * gradients.second.dot(v) + edges[1] * gradients.third.dot(v);
+        let uv = a * self.weights[0] + b * self.weights[1] + c * self.weights[2] + map.transform.offset;
+        Coordinates { uv, along: change(print.along), across: change(print.across), edges }
+    }
+
+    /// Interpolated shading normal, world space, on the side of the mesh's own normals.
+    fn normal(&self) -> Option<Vec3> {
+        let n = self.mix(&self.mesh.normals)?.as_dvec3();
+        let n = (self.placement.normal_from_object * n).try_normalize()?.as_vec3();
+        n.is_finite().then_some(n)
+    }
+
+    /// Tangent and bitangent, unit and perpendicular to `normal`: those of the mesh, or those of the coordinates.
+    fn tangents(&self, normal: Vec3, map: &TextureRef, print: &Footprint) -> Option<(Vec3, Vec3)> {
+        let given = self.mix(&self.mesh.tangents).and_then(|t| {
+            let along = (self.placement.world_from_object * t.truncate().as_dvec3()).as_vec3();
+            // A mirrored instance turns the frame's handedness round.
+            let sign = if (t.w < 0.0) == self.placement.mirrored { 1.0 } else { -1.0 };
+            Some((perpendicular(along, normal)?, sign))
+        });
+        let (tangent, sign) = given.or_else(|| self.tangent_of_coordinates(normal, map, print))?;
+        Some((tangent, normal.cross(tangent) * sign))
+    }
+
+    /// The direction in which u grows, and the handedness that makes the bitangent point against v, which runs down.
+    fn tangent_of_coordinates(&self, normal: Vec3, map: &TextureRef, print: &Footprint) -> Option<(Vec3, f32)> {
+        let [a, b] = self.coordinates(map, print).edges;
+        let (e1, e2) = (self.vertices[1] - self.vertices[0], self.vertices[2] - self.vertices[0]);
+        let area = a.x * b.y - b.x * a.y;
+        if area == 0.0 {
+            return None;
+        }
+        let along_u = (e1 * b.y - e2 * a.y) * area.signum();
+        let along_v = (e2 * a.x - e1 * b.x) * area.signum();
+        let tangent = perpendicular(along_u, normal)?;
+        let sign = if normal.cross(tangent).dot(along_v) <= 0.0 { 1.0 } else { -1.0 };
+        Some((tangent, sign))
+    }
+
+    /// The normal as the material's normal map turns it.
+    fn normal_mapped(
+        &self,
+        normal: Vec3,
+        material: &Material,
+        store: &TextureStore,
+        print: &Footprint,
+    ) -> Option<Vec3> {
+        let map = material.normal_map.as_ref()?;
+        let texel = self.texel(map, ColorSpace::Linear, store, print).truncate() * 2.0 - 1.0;
+        let (tangent, bitangent) = self.tangents(normal, map, print)?;
+        let scale = material.normal_scale;
+        (tangent * (texel.x * scale) + bitangent * (texel.y * scale) + normal * texel.z).try_normalize()
+    }
+
+    /// The normal as the material's bump map turns it: by the slope of the heights, from differences one texel wide.
+    ///
+    /// J. F. Blinn, "Simulation of Wrinkled Surfaces" (1978), with heights in units of the texture's side.
+    fn bumped(&self, normal: Vec3, material: &Material, store: &TextureStore, print: &Footprint) -> Option<Vec3> {
+        let map = material.bump_map.as_ref()?;
+        let (tangent, bitangent) = self.tangents(normal, map, print)?;
+        let at = self.coordinates(map, print);
+        let height = |uv: Vec2| store.sample(map.texture, ColorSpace::Linear, uv, at.along, at.across).x;
+        let texel = Vec2::ONE / store.size(map.texture).max(Vec2::ONE);
+        let rise = |d: Vec2, width: f32| (height(at.uv + d) - height(at.uv - d)) / width;
+        let du = rise(Vec2::new(0.5 * texel.x, 0.0), texel.x) * material.bump_scale;
+        let dv = rise(Vec2::new(0.0, 0.5 * texel.y), texel.y) * material.bump_scale;
+        // v runs down, against the bitangent.
+        (normal - tangent * du + bitangent * dv).try_normalize()
+    }
+}
+
+/// The linear part of a texture transform; the offset is added once, after interpolation.
+struct Turn {
+    x_axis: Vec2,
+    y_axis: Vec2,
+}
+
+impl Turn {
+    fn new(map: &TextureRef) -> Self {
+        let t = &map.transform;
+        let (sin, cos) = if t.rotation == 0.0 { (0.0, 1.0) } else { libm::sincosf(t.rotation) };
+        Self { x_axis: Vec2::new(cos, -sin) * t.scale.x, y_axis: Vec2::new(sin, cos) * t.scale.y }
+    }
+
+    fn apply(&self, uv: Vec2) -> Vec2 {
+        self.x_axis * uv.x + self.y_axis * uv.y
+    }
+}
+
+/// `v` without its part along `normal`, of unit length.
+fn perpendicular(v: Vec3, normal: Vec3) -> Option<Vec3> {
+    (v - normal * normal.dot(v)).try_normalize()
+}
+
+/// A point of a surface, as seen along a ray. Positions in the centred frame, directions in world space.
+pub(crate) struct Surface<'a> {
+    pub target: Target<'a>,
+    pub patch: Option<Patch<'a>>,
+    pub footprint: Footprint,
+    pub position: Vec3,
+    /// Absolute error bound of `position`, per axis.
+    pub error: Vec3,
+    /// Unit normal of the shape itself, turned to the side the ray comes from.
+    pub geometric: Vec3,
+    /// Unit normal for shading, never turned away from the ray.
+    pub normal: Vec3,
+    /// Unit vector back along the ray.
+    pub view: Vec3,
+    /// Whether the front of the face was hit.
+    pub front: bool,
+}
+
+impl<'a> Surface<'a> {
+    /// The surface at `hit` of `ray` whose cone is `width` wide there.
+    pub(crate) fn new(world: &World, target: Target<'a>, ray: &Ray, hit: &Hit, width: f32) -> Self {
+        let refined = world.shapes.refine(ray, hit);
+        let view = -ray.dir.try_normalize().unwrap_or(Vec3::Z);
+        let patch = target.patch(world, refined.u, refined.v, refined.position);
+
+        // The winding in the world is turned round in mirrored instances; the file's front stays the front.
+        let mirrored = patch.as_ref().is_some_and(|p| p.placement.mirrored);
+        let winding = if refined.normal.is_normalized() { refined.normal } else { view };
+        let outward = if mirrored { -winding } else { winding };
+        let front = outward.dot(view) >= 0.0;
+        let geometric = if front { outward } else { -outward };
+        let footprint = Footprint::new(-view, geometric, width);
+        let (position, error) = (refined.position, refined.error);
+        Self { target, patch, footprint, position, error, geometric, normal: geometric, view, front }
+    }
+
+    /// Finds the shading normal: interpolated, turned by normal and bump map, and to the side of the ray.
+    ///
+    /// The geometric normal decides the side, so normals that a file gives against its own winding still light the
+    /// face that is seen.
+    pub(crate) fn shade_smoothly(&mut self, store: &TextureStore) {
+        let Some(patch) = &self.patch else { return };
+        let material = self.target.material;
+        let own = patch.normal().unwrap_or(if self.front { self.geometric } else { -self.geometric });
+        let side = if own.dot(self.geometric) < 0.0 { -1.0 } else { 1.0 };
+        let mapped = patch.normal_mapped(own, material, store, &self.footprint).unwrap_or(own);
+        let bumped = patch.bumped(mapped, material, store, &self.footprint).unwrap_or(mapped);
+        self.normal = facing(bumped * side, self.view);
+    }
+
+    /// A ray from here along `dir` (of any length) up to `t_max`; it starts outside the error of the position, on the
+    /// side it goes to, and cannot meet the flat face it starts on.
+    pub(crate) fn ray(&self, dir: Vec3, t_max: f32, sample: u32) -> Ray {
+        let origin = self.origin(dir);
+        let exclude = if self.target.is_planar() { self.target.prim } else { NO_PRIM };
+        Ray { origin, t_min: 0.0, dir, t_max, exclude, sample }
+    }
+
+    /// Where rays towards `dir` start.
+    pub(crate) fn origin(&self, dir: Vec3) -> Vec3 {
+        offset_origin(self.position, self.error, self.geometric, dir)
+    }
+}
+
+/// `normal`, turned just far enough that `view` sees its front.
+///
+/// Interpolated and mapped normals may point away at silhouettes; unturned they would make black rims.
+fn facing(normal: Vec3, view: Vec3) -> Vec3 {
+    /// Cosine that a turned normal keeps with the view.
+    const GRAZING: f32 = 1e-2;
+    let cosine = normal.dot(view);
+    if cosine >= GRAZING {
+        return normal;
+    }
+    (normal + view * (GRAZING - cosine)).try_normalize().unwrap_or(view)
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "loading refuses scenes with 2^32 - 1 things of a kind")]
+fn id(i: usize) -> u32 {
+    i as u32
+}

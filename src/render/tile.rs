@@ -1,0 +1,231 @@
+//! The picture in tiles: each is one unit of work for one thread, and threads take the next tile when they are done.
+//!
+//! Nothing a tile computes depends on another tile or on the thread, so that every number of threads gives the same
+//! bits.
+
+use super::context::Context;
+use super::layers::{self, Facts, LayerPixel};
+use super::pixel::sample_offsets;
+use super::view::View;
+use super::wave::{Media, Path};
+use super::whitted::{ByClass, Sample, Tracer, WAVE_LIMIT};
+use super::{Progress, Settings};
+use crate::accel::{Accel, NO_PRIM, Probe, Ray};
+use crate::image::Picture;
+use crate::math::{DVec3, Vec3};
+use crate::scene::Background;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Columns and rows of a tile.
+const TILE: u32 = 32;
+/// An eye farther from the scene than this many of its diagonals starts its rays just before the scene.
+const FAR: f64 = 4.0;
+
+/// A part of the picture: pixels `x0..x1` of rows `y0..y1`.
+#[derive(Clone, Copy, Debug)]
+struct Tile {
+    x0: u32,
+    y0: u32,
+    x1: u32,
+    y1: u32,
+}
+
+/// What came of a tile, row by row.
+struct TilePixels {
+    tile: Tile,
+    beauty: Vec<[f32; 4]>,
+    layers: Vec<LayerPixel>,
+}
+
+/// What all tiles share.
+struct Frame<'a> {
+    view: &'a View,
+    settings: &'a Settings,
+    offsets: Vec<(f64, f64)>,
+    /// Sharpness of one sample relative to a pixel.
+    sample_width: f32,
+    scene: Ball,
+    background: Option<Vec3>,
+}
+
+/// A ball around everything bounded, world space. `None`-like (infinite) when eye rays must not be shortened.
+#[derive(Clone, Copy)]
+struct Ball {
+    center: DVec3,
+    radius: f64,
+}
+
+/// Renders every tile; the picture, the counts of all threads, and whether nothing was cut short by the user.
+pub(crate) fn render_tiles<A: Accel, P: Probe>(
+    context: &Context,
+    accel: &A,
+    view: &View,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> (Picture, Vec<ByClass<P>>, bool) {
+    let frame = Frame::new(context, view, settings);
+    let tiles = tiles(settings.width, settings.height);
+    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+
+    // Every thread takes tiles in order until none is left.
+    let work = |_: rayon::BroadcastContext| {
+        let mut tracer = Tracer::<A, P>::new(context, accel);
+        let mut finished = Vec::new();
+        while let Some(&tile) = tiles.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let Some(pixels) = frame.render(&mut tracer, tile, &|| progress.cancelled()) else { break };
+            finished.push(pixels);
+            progress.tiles(done.fetch_add(1, Ordering::Relaxed) + 1, tiles.len());
+        }
+        (finished, tracer.counts)
+    };
+    let results = rayon::broadcast(work);
+
+    let mut picture = empty_picture(settings);
+    let mut counts = Vec::new();
+    let mut complete = 0;
+    for (finished, counted) in results {
+        complete += finished.len();
+        finished.iter().for_each(|pixels| pixels.store(&mut picture));
+        counts.push(counted);
+    }
+    (picture, counts, complete == tiles.len())
+}
+
+fn tiles(width: u32, height: u32) -> Vec<Tile> {
+    let starts = |end: u32| (0..end).step_by(TILE as usize);
+    let tile = |x0: u32, y0: u32| Tile {
+        x0,
+        y0,
+        x1: x0.saturating_add(TILE).min(width),
+        y1: y0.saturating_add(TILE).min(height),
+    };
+    starts(height).flat_map(|y0| starts(width).map(move |x0| tile(x0, y0))).collect()
+}
+
+fn empty_picture(settings: &Settings) -> Picture {
+    let pixels = settings.width as usize * settings.height as usize;
+    Picture {
+        width: settings.width,
+        height: settings.height,
+        beauty: vec![[0.0; 4]; pixels],
+        layers: settings.layers.then(|| layers::empty(pixels)),
+    }
+}
+
+impl TilePixels {
+    fn store(&self, picture: &mut Picture) {
+        let Tile { x0, y0, x1, y1 } = self.tile;
+        let places = (y0..y1).flat_map(|y| (x0..x1).map(move |x| (x, y)));
+        for (k, (x, y)) in places.enumerate() {
+            let i = y as usize * picture.width as usize + x as usize;
+            picture.beauty[i] = self.beauty[k];
+            if let (Some(layers), Some(pixel)) = (&mut picture.layers, self.layers.get(k)) {
+                pixel.store(layers, i);
+            }
+        }
+    }
+}
+
+impl<'a> Frame<'a> {
+    #[expect(clippy::cast_precision_loss, reason = "sample counts are small")]
+    fn new(context: &Context, view: &'a View, settings: &'a Settings) -> Self {
+        let offsets = sample_offsets(settings.samples);
+        let background = match context.scene.background {
+            Some(Background::Color(color)) => Some(color),
+            _ => None,
+        };
+        let sample_width = 1.0 / (offsets.len() as f32).sqrt();
+        Self { view, settings, offsets, sample_width, scene: Ball::new(context), background }
+    }
+
+    /// Renders one tile; `None` when cancelled.
+    fn render<A: Accel, P: Probe>(
+        &self,
+        tracer: &mut Tracer<A, P>,
+        tile: Tile,
+        cancelled: &dyn Fn() -> bool,
+    ) -> Option<TilePixels> {
+        let places: Vec<_> = (tile.y0..tile.y1).flat_map(|y| (tile.x0..tile.x1).map(move |x| (x, y))).collect();
+        let mut done = TilePixels { tile, beauty: Vec::with_capacity(places.len()), layers: Vec::new() };
+        let per_pixel = self.offsets.len();
+
+        // All samples of a pixel are traced together, and of as many pixels as fit a wave.
+        for places in places.chunks((WAVE_LIMIT / per_pixel).max(1)) {
+            tracer.reset(places.len() * per_pixel, self.settings.layers);
+            let corners = places.iter().flat_map(|&(x, y)| self.offsets.iter().map(move |&(dx, dy)| (x, y, dx, dy)));
+            for (sample, (x, y, dx, dy)) in (0u32..).zip(corners) {
+                let (ray, path) = self.eye_ray(tracer.center(), f64::from(x) + dx, f64::from(y) + dy, sample);
+                tracer.start(ray, path);
+            }
+            if cancelled() || !tracer.trace(cancelled) {
+                return None;
+            }
+            done.beauty.extend(tracer.samples.chunks(per_pixel).map(|s| resolve(s, self.background)));
+            let layer = |f: &[Facts]| LayerPixel::new(f, self.view.eye, self.view.forward);
+            done.layers.extend(tracer.facts.chunks(per_pixel).map(layer));
+        }
+        Some(done)
+    }
+
+    /// The ray through (x, y) of the picture, started before the scene when the eye is far away, in the centred frame.
+    #[expect(clippy::cast_possible_truncation, reason = "widths are estimates")]
+    fn eye_ray(&self, center: DVec3, x: f64, y: f64, sample: u32) -> (Ray, Path) {
+        let eye = self.view.primary(x, y, self.settings.width, self.settings.height);
+        let skipped = self.scene.distance_before(eye.origin, eye.dir);
+        let origin = (eye.origin - center + eye.dir * skipped).as_vec3();
+        let dir = eye.dir.as_vec3();
+        let path = Path {
+            weight: Vec3::ONE,
+            depth: 0,
+            straight: true,
+            band: None,
+            media: Media::default(),
+            cone_width: (eye.cone_width + eye.cone_spread * skipped as f32) * self.sample_width,
+            cone_spread: eye.cone_spread * self.sample_width,
+        };
+        (Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude: NO_PRIM, sample }, path)
+    }
+}
+
+impl Ball {
+    /// Around the scene's box; unbounded planes may lie anywhere before it, so that nothing can be skipped.
+    fn new(context: &Context) -> Self {
+        let (lo, hi) = context.world.bounds;
+        let radius = 0.5 * (hi - lo).length();
+        let usable = context.scene.planes.is_empty() && radius.is_finite();
+        Self { center: lo * 0.5 + hi * 0.5, radius: if usable { radius } else { f64::INFINITY } }
+    }
+
+    /// How much of a ray can be skipped because all of it lies before the ball, seen from far away.
+    fn distance_before(&self, origin: DVec3, dir: DVec3) -> f64 {
+        let to_center = self.center - origin;
+        let far = to_center.length() > 2.0 * self.radius * FAR + self.radius;
+        // Twice the radius leaves room for the rounding of the start.
+        let skipped = to_center.dot(dir) - 2.0 * self.radius;
+        if far && skipped > 0.0 && skipped.is_finite() { skipped } else { 0.0 }
+    }
+}
+
+/// A pixel from its samples: premultiplied RGBA.
+///
+/// Alpha is one minus the share of the background that shows through. Coloured glass lets it through by channels; there
+/// is one alpha, so before a known background colour the least channel is left to the image writer and what the others
+/// show more is added here, and without one their mean is left to it.
+#[expect(clippy::cast_precision_loss, reason = "sample counts are small")]
+fn resolve(samples: &[Sample], background: Option<Vec3>) -> [f32; 4] {
+    let share = 1.0 / samples.len().max(1) as f32;
+    let mut color = samples.iter().map(|s| s.radiance).sum::<Vec3>() * share;
+    let through = (samples.iter().map(|s| s.through).sum::<Vec3>() * share).clamp(Vec3::ZERO, Vec3::ONE);
+    let clear = match background {
+        Some(background) => {
+            let least = through.min_element();
+            color += (through - Vec3::splat(least)) * background;
+            least
+        }
+        None if through.x == through.y && through.y == through.z => through.x,
+        None => through.element_sum() / 3.0,
+    };
+    // A sum of finite parts can still overflow.
+    let color = if color.is_finite() { color } else { color.min(Vec3::splat(f32::MAX)).max(Vec3::ZERO) };
+    color.extend(1.0 - clear).to_array()
+}

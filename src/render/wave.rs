@@ -1,0 +1,239 @@
+//! Rays on their way: what a ray carries besides its geometry, and the queues that turn trees of rays into waves.
+//!
+//! There is no recursion and no allocation per ray: shading pushes children into queues, and each queue is drained in
+//! slices of rays of one class. The queues are buffers of one worker, reused from tile to tile.
+
+use crate::accel::{Hit, Ray};
+use crate::math::Vec3;
+
+/// Why a ray was sent; counts are kept apart by class.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum RayClass {
+    /// From the eye.
+    Primary,
+    /// Off a surface.
+    Reflected,
+    /// Bent by a surface, or passed straight through it.
+    Refracted,
+}
+
+impl RayClass {
+    /// In the order in which queues are drained.
+    pub(crate) const ALL: [Self; 3] = [Self::Primary, Self::Reflected, Self::Refracted];
+}
+
+/// What a ray carries besides its geometry; the sample it belongs to is in [`Ray::sample`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Path {
+    /// Product of the weights from the eye to here.
+    pub weight: Vec3,
+    /// Bounces since the eye.
+    pub depth: u32,
+    /// Whether the ray still runs along the line of sight, so that what lies behind shows through.
+    pub straight: bool,
+    /// The part of the spectrum this ray carries, once dispersion has split it.
+    pub band: Option<u8>,
+    /// What the ray is inside of.
+    pub media: Media,
+    /// Width of the cone around the ray at its start: the part of the picture it stands for.
+    pub cone_width: f32,
+    /// Growth of that width for each unit of length.
+    pub cone_spread: f32,
+}
+
+/// One substance a ray is inside of.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Medium {
+    /// Index into the scene's materials.
+    pub material: u32,
+    /// Index of refraction.
+    pub ior: f32,
+}
+
+/// The substances a ray is inside of, the innermost last.
+///
+/// After C. M. Schmidt and B. Budge, "Simple Nested Dielectrics in Ray Traced Images" (2002), with the most recently
+/// entered substance as the one that counts. A substance that was never entered may be left (an open mesh, an eye
+/// inside glass), and the oldest is forgotten when there are more than fit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Media {
+    len: u8,
+    items: [Medium; Self::CAPACITY],
+}
+
+/// What happens to a ray at the boundary of a substance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Crossing {
+    /// Index on the side the ray comes from.
+    pub n_i: f32,
+    /// Index on the other side.
+    pub n_t: f32,
+    /// What a ray that goes through is inside of afterwards.
+    pub beyond: Media,
+}
+
+impl Media {
+    const CAPACITY: usize = 4;
+    /// Index of empty space.
+    const OUTSIDE: f32 = 1.0;
+
+    fn ior(&self) -> f32 {
+        self.items[..self.len as usize].last().map_or(Self::OUTSIDE, |m| m.ior)
+    }
+
+    fn enter(&mut self, medium: Medium) {
+        if self.len as usize == Self::CAPACITY {
+            self.items.copy_within(1.., 0);
+            self.len -= 1;
+        }
+        self.items[self.len as usize] = medium;
+        self.len += 1;
+    }
+
+    /// The indices on both sides of the surface of `medium`, and the media beyond it.
+    pub(crate) fn cross(&self, medium: Medium, entering: bool) -> Crossing {
+        let mut beyond = *self;
+        if entering {
+            beyond.enter(medium);
+            return Crossing { n_i: self.ior(), n_t: medium.ior, beyond };
+        }
+        let inside = &self.items[..self.len as usize];
+        let Some(at) = inside.iter().rposition(|m| m.material == medium.material) else {
+            return Crossing { n_i: medium.ior, n_t: self.ior(), beyond };
+        };
+        beyond.items.copy_within(at + 1.., at);
+        beyond.len -= 1;
+        Crossing { n_i: self.ior(), n_t: beyond.ior(), beyond }
+    }
+}
+
+/// Rays of one class that wait to be traced.
+#[derive(Debug, Default)]
+pub(crate) struct Queue {
+    rays: Vec<Ray>,
+    paths: Vec<Path>,
+    /// The hit after which the search goes on; [`Hit::MISS`] for rays that start.
+    after: Vec<Hit>,
+}
+
+impl Queue {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.rays.is_empty()
+    }
+
+    /// Adds a ray; it goes on behind `after`, or starts when that is [`Hit::MISS`].
+    pub(crate) fn push(&mut self, ray: Ray, path: Path, after: Hit) {
+        self.rays.push(ray);
+        self.paths.push(path);
+        self.after.push(after);
+    }
+
+    /// Moves the last rays, at most `limit`, into `wave`.
+    ///
+    /// Taking from the end bounds the memory that trees with many branches need: a slice is traced down to its leaves
+    /// before the rays in front of it.
+    pub(crate) fn take(&mut self, wave: &mut Wave, limit: usize) {
+        let start = self.rays.len().saturating_sub(limit);
+        wave.clear();
+        wave.rays.extend(self.rays.drain(start..));
+        wave.paths.extend(self.paths.drain(start..));
+        wave.after.extend(self.after.drain(start..));
+        wave.hits.resize(wave.rays.len(), Hit::MISS);
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.rays.clear();
+        self.paths.clear();
+        self.after.clear();
+    }
+}
+
+/// Rays of one class that are traced together, and what they hit.
+#[derive(Debug, Default)]
+pub(crate) struct Wave {
+    pub rays: Vec<Ray>,
+    pub paths: Vec<Path>,
+    pub after: Vec<Hit>,
+    pub hits: Vec<Hit>,
+}
+
+impl Wave {
+    fn clear(&mut self) {
+        self.rays.clear();
+        self.paths.clear();
+        self.after.clear();
+        self.hits.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::NO_PRIM;
+
+    const GLASS: Medium = Medium { material: 1, ior: 1.5 };
+    const WATER: Medium = Medium { material: 2, ior: 1.33 };
+
+    fn indices(c: &Crossing) -> (f32, f32) {
+        (c.n_i, c.n_t)
+    }
+
+    #[test]
+    fn a_glass_of_water_is_crossed_with_the_right_indices() {
+        let into_glass = Media::default().cross(GLASS, true);
+        let into_water = into_glass.beyond.cross(WATER, true);
+        let out_of_water = into_water.beyond.cross(WATER, false);
+        let out_of_glass = out_of_water.beyond.cross(GLASS, false);
+        assert_eq!(indices(&into_glass), (1.0, 1.5));
+        assert_eq!(indices(&into_water), (1.5, 1.33));
+        assert_eq!(indices(&out_of_water), (1.33, 1.5));
+        assert_eq!(indices(&out_of_glass), (1.5, 1.0));
+        assert_eq!(out_of_glass.beyond.len, 0);
+    }
+
+    #[test]
+    fn leaving_the_outer_of_two_overlapping_substances_bends_nothing() {
+        let both = Media::default().cross(GLASS, true).beyond.cross(WATER, true).beyond;
+        let out = both.cross(GLASS, false);
+        assert_eq!(indices(&out), (1.33, 1.33));
+        assert_eq!(indices(&out.beyond.cross(WATER, false)), (1.33, 1.0));
+    }
+
+    #[test]
+    fn a_substance_that_was_never_entered_can_be_left() {
+        assert_eq!(indices(&Media::default().cross(GLASS, false)), (1.5, 1.0));
+    }
+
+    #[test]
+    fn more_substances_than_fit_forget_the_oldest() {
+        let mut media = Media::default();
+        for material in 0..6 {
+            media = media.cross(Medium { material, ior: 2.0 + material as f32 }, true).beyond;
+        }
+        assert_eq!(media.items.map(|m| m.material), [2, 3, 4, 5]);
+    }
+
+    #[test]
+    fn a_queue_gives_its_last_rays_first_and_keeps_the_rest() {
+        let (mut queue, mut wave) = (Queue::default(), Wave::default());
+        let path = Path {
+            weight: Vec3::ONE,
+            depth: 0,
+            straight: true,
+            band: None,
+            media: Media::default(),
+            cone_width: 0.0,
+            cone_spread: 0.0,
+        };
+        for sample in 0..5 {
+            let ray = Ray { origin: Vec3::ZERO, t_min: 0.0, dir: Vec3::Z, t_max: 1.0, exclude: NO_PRIM, sample };
+            queue.push(ray, path, Hit::MISS);
+        }
+        queue.take(&mut wave, 3);
+        assert_eq!(wave.rays.iter().map(|r| r.sample).collect::<Vec<_>>(), [2, 3, 4]);
+        assert_eq!(wave.hits.len(), 3);
+        queue.take(&mut wave, 3);
+        assert_eq!(wave.rays.iter().map(|r| r.sample).collect::<Vec<_>>(), [0, 1]);
+        assert!(queue.is_empty());
+    }
+}

@@ -1,0 +1,350 @@
+//! Whitted's ray tracer: a tree of reflected, refracted and shadow rays behind every point of the picture, grown wave
+//! by wave instead of by recursion.
+//!
+//! T. Whitted, "An Improved Illumination Model for Shaded Display" (1980). A branch ends where its ray leaves the scene
+//! (it sees the background or the environment), where the product of its weights falls below the cutoff, or at the
+//! maximum depth; a branch that is cut adds black, and the test comes before a secondary ray is set up. Depth counts
+//! bounces after the eye ray. Going straight on through a material that is absent, blended or seen from its invisible
+//! back is no bounce.
+
+use super::context::{Context, coverage};
+use super::layers::Facts;
+use super::optics::{dispersed_index, reflect, refract};
+use super::shade::{Matter, Reader, above, lets_light_in, terminator};
+use super::shadow::Shadows;
+use super::surface::{Surface, Target};
+use super::wave::{Crossing, Medium, Path, Queue, RayClass, Wave};
+use crate::accel::{Accel, Hit, Probe, Ray};
+use crate::math::{DVec3, Vec3};
+
+/// Rays traced together at most; bounds the memory of a worker.
+pub(crate) const WAVE_LIMIT: usize = 1 << 13;
+/// Shadow rays that wait at most.
+const SHADOW_LIMIT: usize = 1 << 14;
+/// A shadow ray to a point ends this far before it, in its own length: more than the rounding of its start.
+const BEFORE_LIGHT: f32 = 1.0 - 4.0 * f32::EPSILON;
+
+/// What a sample of the picture has gathered.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Sample {
+    pub radiance: Vec3,
+    /// Share of the background that shows through.
+    pub through: Vec3,
+}
+
+/// One value for each class of rays.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct ByClass<P> {
+    pub primary: P,
+    pub shadow: P,
+    pub reflected: P,
+    pub refracted: P,
+}
+
+impl<P> ByClass<P> {
+    fn of(&mut self, class: RayClass) -> &mut P {
+        match class {
+            RayClass::Primary => &mut self.primary,
+            RayClass::Reflected => &mut self.reflected,
+            RayClass::Refracted => &mut self.refracted,
+        }
+    }
+}
+
+/// One worker: its buffers are reused from tile to tile.
+pub(crate) struct Tracer<'a, A: Accel, P> {
+    context: &'a Context<'a>,
+    accel: &'a A,
+    scratch: A::Scratch,
+    /// Rays that start, by class.
+    starting: [Queue; 3],
+    /// Rays that go on behind a hit, by class.
+    continuing: [Queue; 3],
+    wave: Wave,
+    shadows: Shadows,
+    pub samples: Vec<Sample>,
+    /// Facts of the first surface of each sample; empty unless layers are wanted.
+    pub facts: Vec<Facts>,
+    pub counts: ByClass<P>,
+}
+
+impl<'a, A: Accel, P: Probe> Tracer<'a, A, P> {
+    pub(crate) fn new(context: &'a Context<'a>, accel: &'a A) -> Self {
+        Self {
+            context,
+            accel,
+            scratch: accel.scratch(),
+            starting: Default::default(),
+            continuing: Default::default(),
+            wave: Wave::default(),
+            shadows: Shadows::default(),
+            samples: Vec::new(),
+            facts: Vec::new(),
+            counts: ByClass::default(),
+        }
+    }
+
+    /// What is subtracted from world positions.
+    pub(crate) fn center(&self) -> DVec3 {
+        self.context.world.center
+    }
+
+    /// Prepares for `samples` samples, whose eye rays [`Self::start`] adds.
+    pub(crate) fn reset(&mut self, samples: usize, facts: bool) {
+        self.starting.iter_mut().chain(&mut self.continuing).for_each(Queue::clear);
+        self.shadows.clear();
+        self.samples.clear();
+        self.samples.resize(samples, Sample::default());
+        self.facts.clear();
+        self.facts.resize(if facts { samples } else { 0 }, Facts::NONE);
+    }
+
+    /// Adds an eye ray.
+    pub(crate) fn start(&mut self, ray: Ray, path: Path) {
+        self.starting[RayClass::Primary as usize].push(ray, path, Hit::MISS);
+    }
+
+    /// Traces all trees to their leaves; false when `cancelled` said to stop before the end.
+    pub(crate) fn trace(&mut self, cancelled: &dyn Fn() -> bool) -> bool {
+        while let Some(class) = self.next_wave() {
+            if cancelled() {
+                return false;
+            }
+            let wave = std::mem::take(&mut self.wave);
+            for i in 0..wave.rays.len() {
+                let (ray, path, hit) = (&wave.rays[i], &wave.paths[i], &wave.hits[i]);
+                if hit.is_some() { self.shade(class, ray, path, hit) } else { self.leave(ray, path) }
+            }
+            self.wave = wave;
+            self.trace_shadows();
+        }
+        true
+    }
+
+    /// Takes the next wave and finds its hits. Rays that go on come before rays that start a deeper generation.
+    fn next_wave(&mut self) -> Option<RayClass> {
+        let (wave, scratch) = (&mut self.wave, &mut self.scratch);
+        for class in RayClass::ALL {
+            let queue = &mut self.continuing[class as usize];
+            if !queue.is_empty() {
+                queue.take(wave, WAVE_LIMIT);
+                self.accel.next(&wave.rays, &wave.after, &mut wave.hits, scratch, self.counts.of(class));
+                return Some(class);
+            }
+        }
+        for class in RayClass::ALL {
+            let queue = &mut self.starting[class as usize];
+            if !queue.is_empty() {
+                queue.take(wave, WAVE_LIMIT);
+                self.accel.closest(&wave.rays, &mut wave.hits, scratch, self.counts.of(class));
+                return Some(class);
+            }
+        }
+        None
+    }
+
+    fn trace_shadows(&mut self) {
+        if self.shadows.len() == 0 {
+            return;
+        }
+        let samples = &mut self.samples;
+        let arrive = |sample: u32, light: Vec3| samples[sample as usize].radiance += light;
+        self.shadows.trace(self.context, self.accel, &mut self.scratch, &mut self.counts.shadow, arrive);
+    }
+
+    /// A ray that met nothing: the background shows where the line of sight is straight, else the environment is seen.
+    fn leave(&mut self, ray: &Ray, path: &Path) {
+        let sample = &mut self.samples[ray.sample as usize];
+        if path.straight && !self.context.shows_environment {
+            sample.through += path.weight;
+        } else {
+            let dir = ray.dir.try_normalize().unwrap_or(Vec3::Z);
+            sample.radiance += path.weight * self.context.sky.radiance(dir);
+        }
+    }
+
+    /// Adds what the surface at `hit` shows by itself, and queues the rays that find the rest.
+    fn shade(&mut self, class: RayClass, ray: &Ray, path: &Path, hit: &Hit) {
+        let context = self.context;
+        let target = Target::new(context.scene, context.world, hit.prim);
+        let material = target.material;
+        let width = path.cone_width + path.cone_spread * hit.t;
+        let mut surface = Surface::new(context.world, target, ray, hit, width);
+
+        // Pass what is not there: backs of one-sided faces, absent texels, and part of what is blended.
+        if !surface.front && !material.double_sided && !lets_light_in(material) {
+            return self.continuing[class as usize].push(*ray, *path, *hit);
+        }
+        let reader = Reader { store: context.textures, patch: surface.patch.as_ref(), footprint: &surface.footprint };
+        let base = reader.base(material);
+        let covered = coverage(material, base.w);
+        if covered < 1.0 {
+            self.go_on(class, ray, path, hit, covered);
+        }
+        if covered <= 0.0 {
+            return;
+        }
+
+        // Local colour: emitted, from everywhere, from each light.
+        surface.shade_smoothly(context.textures);
+        self.note(ray, path, &surface, base.truncate());
+        let matter = Matter::new(&surface, base.truncate(), context.textures);
+        let point = Point {
+            ray,
+            hit,
+            width,
+            surface: &surface,
+            matter: &matter,
+            path: Path { weight: path.weight * covered, ..*path },
+        };
+        let everywhere = matter.emission + matter.ambient(&surface, &context.sky, context.scene.ambient);
+        let crossing = point.crossing(context, path.band);
+        self.add(ray.sample, point.path.weight * everywhere);
+        self.light(&point, &crossing);
+
+        if path.depth < context.depth {
+            self.reflect_and_refract(&point, &crossing);
+        }
+    }
+
+    /// Goes on behind a surface that covers only a part.
+    fn go_on(&mut self, class: RayClass, ray: &Ray, path: &Path, hit: &Hit, covered: f32) {
+        let weight = path.weight * (1.0 - covered);
+        let class = if covered > 0.0 { RayClass::Refracted } else { class };
+        if self.context.is_alive(weight) {
+            self.continuing[class as usize].push(*ray, Path { weight, ..*path }, *hit);
+        }
+    }
+
+    /// Remembers the first surface of a sample for the layers.
+    fn note(&mut self, ray: &Ray, path: &Path, surface: &Surface, albedo: Vec3) {
+        let Some(facts) = self.facts.get_mut(ray.sample as usize) else { return };
+        if path.straight && !facts.is_some() {
+            *facts = Facts::new(surface, albedo, self.context.world.center);
+        }
+    }
+
+    fn add(&mut self, sample: u32, radiance: Vec3) {
+        if radiance.is_finite() {
+            self.samples[sample as usize].radiance += radiance;
+        }
+    }
+
+    /// Direct light: lights without shadows at once, the others when their shadow rays have come through.
+    fn light(&mut self, point: &Point, crossing: &Crossing) {
+        let surface = point.surface;
+        for light in &self.context.lights {
+            let Some(incident) = light.incident(surface.position) else { continue };
+            let to_light = incident.to_light;
+            let seen = if surface.geometric.dot(to_light) > 0.0 {
+                let smooth = terminator(surface.geometric, surface.normal, to_light);
+                point.matter.lit(surface.normal, surface.view, &incident) * smooth
+            } else {
+                point.matter.lit_through(surface.normal, surface.view, &incident, crossing)
+            };
+            let radiance = point.path.weight * seen;
+            if !(radiance.is_finite() && radiance.max_element() > 0.0) {
+                continue;
+            }
+            if !light.shadows {
+                self.add(point.ray.sample, radiance);
+                continue;
+            }
+            let (dir, end) = match incident.position {
+                Some(position) => (position - surface.origin(to_light), BEFORE_LIGHT),
+                None => (to_light, f32::INFINITY),
+            };
+            self.shadows.push(surface.ray(dir, end, point.ray.sample), radiance);
+        }
+        if self.shadows.len() >= SHADOW_LIMIT {
+            self.trace_shadows();
+        }
+    }
+
+    /// Queues the secondary rays of a point that have enough weight.
+    fn reflect_and_refract(&mut self, point: &Point, crossing: &Crossing) {
+        let balance = point.balance(crossing);
+        self.send_reflected(point, point.path.weight * balance.reflected, point.path.band);
+
+        let (_, dispersion) = point.matter.refraction();
+        let weight = point.path.weight * balance.refracted;
+        if dispersion <= 0.0 || point.path.band.is_some() || !self.context.is_alive(weight) {
+            return self.send_refracted(point, weight, crossing, point.path.band);
+        }
+        // White light splits: each part of the spectrum has its own index from here on.
+        for (i, band) in (0u8..).zip(&self.context.bands) {
+            let crossing = point.crossing(self.context, Some(i));
+            let weight = point.path.weight * point.balance(&crossing).refracted * band.color;
+            self.send_refracted(point, weight, &crossing, Some(i));
+        }
+    }
+
+    fn send_reflected(&mut self, point: &Point, weight: Vec3, band: Option<u8>) {
+        if !self.context.is_alive(weight) {
+            return;
+        }
+        let surface = point.surface;
+        let dir = above(reflect(-surface.view, surface.normal), surface.geometric);
+        let path = Path { band, ..point.bounced(weight) };
+        let ray = surface.ray(dir, f32::INFINITY, point.ray.sample);
+        self.starting[RayClass::Reflected as usize].push(ray, path, Hit::MISS);
+    }
+
+    fn send_refracted(&mut self, point: &Point, weight: Vec3, crossing: &Crossing, band: Option<u8>) {
+        if !self.context.is_alive(weight) {
+            return;
+        }
+        // Equal indices leave the ray as it is: the same ray goes on behind this hit.
+        if crossing.n_i == crossing.n_t {
+            let path = Path { weight, band, depth: point.path.depth + 1, media: crossing.beyond, ..point.path };
+            return self.continuing[RayClass::Refracted as usize].push(*point.ray, path, *point.hit);
+        }
+        let surface = point.surface;
+        let (n_i, n_t) = (f64::from(crossing.n_i), f64::from(crossing.n_t));
+        let Some(bent) = refract(-surface.view, surface.normal, n_i, n_t) else {
+            // Total reflection by a hair that the balance did not see.
+            return self.send_reflected(point, weight, band);
+        };
+        let dir = above(bent, -surface.geometric);
+        let path = Path { band, media: crossing.beyond, ..point.bounced(weight) };
+        let ray = surface.ray(dir, f32::INFINITY, point.ray.sample);
+        self.starting[RayClass::Refracted as usize].push(ray, path, Hit::MISS);
+    }
+}
+
+/// A shaded point and the ray that found it.
+struct Point<'a> {
+    ray: &'a Ray,
+    hit: &'a Hit,
+    /// The ray so far, its weight that of the surface.
+    path: Path,
+    /// Width of the ray's cone here.
+    width: f32,
+    surface: &'a Surface<'a>,
+    matter: &'a Matter,
+}
+
+impl Point<'_> {
+    /// The indices on both sides for light of `band`.
+    fn crossing(&self, context: &Context, band: Option<u8>) -> Crossing {
+        let (ior, dispersion) = self.matter.refraction();
+        let band = band.and_then(|i| context.bands.get(usize::from(i)));
+        let ior = match band {
+            #[expect(clippy::cast_possible_truncation, reason = "indices are given in f32")]
+            Some(b) if dispersion > 0.0 => {
+                dispersed_index(f64::from(ior), f64::from(dispersion), f64::from(b.wavelength)) as f32
+            }
+            _ => ior,
+        };
+        self.path.media.cross(Medium { material: self.surface.target.material_id, ior }, self.surface.front)
+    }
+
+    fn balance(&self, crossing: &Crossing) -> super::shade::Balance {
+        self.matter.balance(self.surface.normal.dot(self.surface.view), crossing)
+    }
+
+    /// What a ray that starts here carries.
+    fn bounced(&self, weight: Vec3) -> Path {
+        Path { weight, depth: self.path.depth + 1, straight: false, cone_width: self.width, ..self.path }
+    }
+}
