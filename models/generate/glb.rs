@@ -147,7 +147,8 @@ impl Glb {
         container(file.to_string().into_bytes(), self.bin)
     }
 
-    fn declare(&mut self, extension: &str) {
+    /// Names an extension that is used.
+    pub(crate) fn declare(&mut self, extension: &str) {
         if !self.extensions.iter().any(|name| name == extension) {
             self.extensions.push(extension.into());
         }

@@ -23,6 +23,7 @@ fn floor(glb: &mut Glb) -> usize {
     });
     let mirrored = json!({ "magFilter": 9729, "minFilter": 9987, "wrapS": 33648, "wrapT": 33648 });
     let texture = glb.texture("image/png", &bytes, mirrored);
+    glb.declare("KHR_texture_transform");
     let material = glb.material(json!({
         "name": "tile",
         "pbrMetallicRoughness": {
@@ -31,8 +32,7 @@ fn floor(glb: &mut Glb) -> usize {
                 "extensions": { "KHR_texture_transform": { "offset": [1.0, 1.0], "scale": [8.0, 8.0] } }
             },
             "metallicFactor": 0, "roughnessFactor": 0.3
-        },
-        "extensions": { "KHR_texture_transform": {} }
+        }
     }));
     let geometry = glb.geometry(&block(DVec3::new(1.6, 0.05, 1.3)));
     let mesh = glb.mesh("tile", &geometry, material);
