@@ -17,6 +17,8 @@ pub mod query;
 pub mod refine;
 pub mod shapes;
 pub mod stats;
+#[cfg(test)]
+mod tests;
 
 pub use any::{AccelKind, AnyAccel};
 pub use grid::{GridOctree, GridParams};

@@ -1,49 +1,67 @@
 //! Uniform grid whose crowded cells are refined by octrees, with a per-ray mailbox.
+//!
+//! A grid of cells as near to cubes as possible lies over the shapes ([`lattice`]); every cell lists the prims whose
+//! surface touches it, padded ([`overlap`], [`build`]). Where a list is so long that smaller cells are expected to pay, the
+//! cell becomes an octree ([`octree`]). A ray visits cells in order and stops behind the first hit that nothing can precede
+//! ([`walk`]); the mailbox saves repeated tests of prims listed in several cells ([`mailbox`]).
 
+mod build;
+mod check;
+pub mod lattice;
+pub mod mailbox;
+mod octree;
+pub mod overlap;
 pub mod params;
+mod walk;
+
+use std::marker::PhantomData;
 
 pub use params::GridParams;
 
+use self::lattice::Lattice;
+use self::mailbox::{Mailbox, Stamps};
+use self::octree::Cells;
 use super::query::{Culling, Goal, Query};
-use super::{Probe, Shapes, StructureStats};
+use super::{Probe, Shapes};
 
-/// The grid.
+/// Marks an entry that is an octree node; the other bits are its index.
+const NODE: u32 = 1 << 31;
+
+/// The cell that lists nothing.
+const EMPTY: u32 = 0;
+
+/// The grid. `M` is the kind of mailbox.
 #[derive(Clone, Debug)]
-pub struct GridOctree<'a> {
+pub struct GridOctree<'a, M = Stamps> {
     shapes: &'a Shapes,
+    lattice: Lattice,
+    /// One entry for each top cell: a cell, or an octree's root marked [`NODE`].
+    top: Vec<u32>,
+    cells: Cells,
+    mailbox: PhantomData<fn() -> M>,
 }
 
-impl<'a> GridOctree<'a> {
-    /// Builds it.
-    pub fn build(shapes: &'a Shapes, _params: &GridParams) -> Self {
-        Self { shapes }
-    }
-
-    /// What it is made of.
-    pub fn summary(&self) -> StructureStats {
-        StructureStats::default()
-    }
-
-    /// Proves that no hit can be lost.
-    pub fn check(&self) -> Result<StructureStats, String> {
-        Ok(self.summary())
+impl<'a, M: Mailbox> GridOctree<'a, M> {
+    /// Builds it over the bounded prims; the same for every number of threads.
+    pub fn build(shapes: &'a Shapes, params: &GridParams) -> Self {
+        let lattice = Lattice::new(shapes, params);
+        let (top, cells) = build::build(shapes, &lattice, params);
+        Self { shapes, lattice, top, cells, mailbox: PhantomData }
     }
 }
 
-impl Culling for GridOctree<'_> {
-    type Scratch = ();
+impl<M: Mailbox> Culling for GridOctree<'_, M> {
+    type Scratch = M;
 
     fn shapes(&self) -> &Shapes {
         self.shapes
     }
 
-    fn new_scratch(&self) {}
+    fn new_scratch(&self) -> M {
+        M::new(self.shapes.bounded())
+    }
 
-    fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, (): &mut (), probe: &mut P) {
-        for prim in 0..self.shapes.bounded() {
-            if query.test(prim, probe) {
-                return;
-            }
-        }
+    fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, mailbox: &mut M, probe: &mut P) {
+        self.walk_cells(query, mailbox, probe);
     }
 }

@@ -1,0 +1,128 @@
+//! Where the cells lie: the map from the shapes' frame to a lattice of finest cells.
+//!
+//! All of building and walking happens in units of the finest cell an octree can reach, as integers where cells are
+//! meant and as `f64` where points are. A top cell is 2^levels finest cells wide, the cell of an octree node half of its
+//! parent's.
+
+use super::GridParams;
+use crate::accel::Shapes;
+use crate::math::aabb::Aabb;
+use crate::math::bounds::{CELL_PAD, CELL_PAD_PER_CELL};
+use crate::math::{DVec3, Vec3};
+
+/// Most finest cells along an axis: keeps [`Lattice::pad`] below an eighth of a cell.
+const MAX_FINE: u32 = 1 << 16;
+
+/// Box, resolution and depth of a grid.
+#[derive(Clone, Debug)]
+pub struct Lattice {
+    /// Corner of the first cell.
+    pub lo: DVec3,
+    /// Finest cells per unit of length on each axis.
+    pub scale: DVec3,
+    /// Top cells on each axis.
+    pub dims: [u32; 3],
+    /// Levels an octree below a top cell may have.
+    pub levels: u32,
+}
+
+impl Lattice {
+    /// Cells as near to cubes as possible, `density` of them for each of the bounded prims.
+    ///
+    /// J. Cleary, G. Wyvill, *Analysis of an Algorithm for Fast Ray Tracing Using Uniform Space Subdivision*, 1988.
+    pub fn new(shapes: &Shapes, params: &GridParams) -> Self {
+        let prims = shapes.bounded();
+        let bounds = (0..prims).fold(Aabb::EMPTY, |b, p| b.union(shapes.bounds(p)));
+        let (lo, hi) = if bounds.is_empty() { (Vec3::ZERO, Vec3::ONE) } else { (bounds.lo, bounds.hi) };
+        let (lo, hi) = (lo.as_dvec3(), hi.as_dvec3());
+
+        // A flat or line-like scene gets a thin box, one that is a point a small one: no side is zero.
+        let longest = (hi - lo).max_element();
+        let longest = if longest > 0.0 { longest } else { lo.abs().max_element().max(f64::from(f32::MIN_POSITIVE)) };
+        let extent = (hi - lo).max(DVec3::splat(longest / 1024.0));
+
+        let per_length = libm::cbrt(params.density * f64::from(prims) / (extent / longest).element_product()) / longest;
+        let most = f64::from(params.max_resolution);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 1..=1024 before")]
+        let dims = (extent * per_length).to_array().map(|n| n.round().clamp(1.0, most) as u32);
+        let most = dims.into_iter().fold(1, u32::max);
+        let levels = params.max_depth.min((MAX_FINE / most).ilog2());
+
+        // Outside stays more than the padding of any cell, so that only rays that pass the content meet the box.
+        let margin = extent / 256.0;
+        let fine = DVec3::from_array(dims.map(|n| f64::from(n << levels)));
+        Self { lo: (lo + hi) / 2.0 - extent / 2.0 - margin, scale: fine / (extent + margin * 2.0), dims, levels }
+    }
+
+    /// Finest cells on each axis.
+    pub fn fine_dims(&self) -> [u32; 3] {
+        self.dims.map(|n| n << self.levels)
+    }
+
+    /// How far beyond a cell prims are still listed in it, in finest cells.
+    pub fn pad(&self) -> f64 {
+        let [x, y, z] = self.fine_dims();
+        CELL_PAD + f64::from(x.max(y).max(z)) * CELL_PAD_PER_CELL
+    }
+
+    /// A point in units of finest cells.
+    pub fn place(&self, p: Vec3) -> DVec3 {
+        (p.as_dvec3() - self.lo) * self.scale
+    }
+
+    /// The top cells that meet a box in finest cells: first and last on each axis.
+    pub fn top_range(&self, lo: DVec3, hi: DVec3) -> ([u32; 3], [u32; 3]) {
+        let side = f64::from(1u32 << self.levels);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "`as` saturates; clamped to the grid"
+        )]
+        let cell = |x: f64, axis: usize| ((x / side) as u32).min(self.dims[axis] - 1);
+        ([0, 1, 2].map(|k| cell(lo[k], k)), [0, 1, 2].map(|k| cell(hi[k], k)))
+    }
+
+    /// A top cell as a cube of finest cells.
+    pub fn top_cube(&self, cell: [u32; 3]) -> Cube {
+        Cube { lo: cell.map(|c| c << self.levels), level: self.levels }
+    }
+
+    /// Index of a top cell.
+    pub fn top_index(&self, [x, y, z]: [u32; 3]) -> usize {
+        (z as usize * self.dims[1] as usize + y as usize) * self.dims[0] as usize + x as usize
+    }
+
+    /// Top cell of an index.
+    pub fn top_cell(&self, index: usize) -> [u32; 3] {
+        let (nx, ny) = (self.dims[0] as usize, self.dims[1] as usize);
+        #[expect(clippy::cast_possible_truncation, reason = "remainders and quotients below the dims")]
+        [index % nx, index / nx % ny, index / nx / ny].map(|i| i as u32)
+    }
+
+    /// Number of top cells.
+    pub fn top_len(&self) -> usize {
+        self.dims.iter().map(|&n| n as usize).product()
+    }
+}
+
+/// A cube of finest cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cube {
+    /// Smallest corner.
+    pub lo: [u32; 3],
+    /// log2 of the side.
+    pub level: u32,
+}
+
+impl Cube {
+    /// The eighth `octant` (bit k set: the upper half on axis k).
+    pub fn octant(self, octant: u32) -> Self {
+        let level = self.level - 1;
+        Self { lo: [0, 1, 2].map(|k| self.lo[k] + ((octant >> k & 1) << level)), level }
+    }
+
+    /// Side in finest cells.
+    pub fn side(self) -> f64 {
+        f64::from(1u32 << self.level)
+    }
+}

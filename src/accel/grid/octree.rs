@@ -1,0 +1,158 @@
+//! Cells and octree nodes as flat arrays, and the splitting of crowded cells.
+
+use super::lattice::{Cube, Lattice};
+use super::overlap::Overlap;
+use super::{EMPTY, GridParams, NODE};
+use crate::accel::Shapes;
+
+/// All cells with their lists, and the octree nodes between the top grid and them.
+#[derive(Clone, Debug)]
+pub(super) struct Cells {
+    /// The eight entries of each node: another node, marked [`NODE`], or a cell.
+    pub nodes: Vec<[u32; 8]>,
+    /// First reference of each cell, and one past the last.
+    first: Vec<u32>,
+    /// Prims, ascending within a cell.
+    pub refs: Vec<u32>,
+}
+
+/// Where a part's nodes and cells went when it was appended.
+pub(super) struct Moved {
+    node: u32,
+    cell: u32,
+}
+
+impl Moved {
+    /// An entry of the part as one of the whole.
+    pub(super) fn entry(&self, entry: u32) -> u32 {
+        match entry {
+            EMPTY => EMPTY,
+            e if e & NODE != 0 => e + self.node,
+            e => e + self.cell,
+        }
+    }
+}
+
+impl Cells {
+    /// Only the empty cell.
+    pub(super) fn new() -> Self {
+        Self { nodes: Vec::new(), first: vec![0, 0], refs: Vec::new() }
+    }
+
+    /// The prims of a cell.
+    #[inline]
+    pub(super) fn list(&self, cell: u32) -> &[u32] {
+        &self.refs[self.first[cell as usize] as usize..self.first[cell as usize + 1] as usize]
+    }
+
+    /// Number of different cells; all empty ones are cell 0.
+    pub(super) fn len(&self) -> usize {
+        self.first.len() - 1
+    }
+
+    /// Bytes of the arrays.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&*self.nodes) + size_of_val(&*self.first) + size_of_val(&*self.refs)
+    }
+
+    fn push_cell(&mut self, prims: impl IntoIterator<Item = u32>) -> u32 {
+        let before = self.refs.len();
+        self.refs.extend(prims);
+        if self.refs.len() == before {
+            return EMPTY;
+        }
+        self.first.push(index(self.refs.len()));
+        index(self.len() - 1)
+    }
+
+    /// Adds what another builder made.
+    pub(super) fn append(&mut self, part: Self) -> Moved {
+        let moved = Moved { node: index(self.nodes.len()), cell: index(self.len() - 1) };
+        let refs = index(self.refs.len());
+        self.nodes.extend(part.nodes.iter().map(|node| node.map(|e| moved.entry(e))));
+        self.first.extend(part.first[2..].iter().map(|f| f + refs));
+        self.refs.extend(part.refs);
+        moved
+    }
+}
+
+/// Turns lists of top cells into cells or octrees.
+pub(super) struct Refiner<'a> {
+    shapes: &'a Shapes,
+    lattice: &'a Lattice,
+    step_cost: f64,
+    cells: Cells,
+}
+
+impl<'a> Refiner<'a> {
+    pub(super) fn new(shapes: &'a Shapes, lattice: &'a Lattice, params: &GridParams) -> Self {
+        Self { shapes, lattice, step_cost: params.step_cost, cells: Cells::new() }
+    }
+
+    pub(super) fn into_cells(self) -> Cells {
+        self.cells
+    }
+
+    /// The entry for a top cell with these prims.
+    pub(super) fn cell(&mut self, cube: Cube, prims: &[u32]) -> u32 {
+        if cube.level == 0 || !self.could_pay(prims.len()) {
+            return self.cells.push_cell(prims.iter().copied());
+        }
+        let overlaps: Vec<Overlap> = prims.iter().map(|&p| Overlap::new(self.shapes, p, self.lattice)).collect();
+        let members: Vec<u32> = (0..index(prims.len())).collect();
+        self.split(cube, &members, &Crowd { prims, overlaps: &overlaps })
+    }
+
+    /// Splits the cube if that is expected to pay, and each octant in turn.
+    fn split(&mut self, cube: Cube, members: &[u32], crowd: &Crowd) -> u32 {
+        let leaf = |cells: &mut Cells| cells.push_cell(members.iter().map(|&m| crowd.prims[m as usize]));
+        if cube.level == 0 || !self.could_pay(members.len()) {
+            return leaf(&mut self.cells);
+        }
+        let masks: Vec<u8> = members.iter().map(|&m| crowd.octants(m, cube)).collect();
+        let listed: u32 = masks.iter().map(|m| m.count_ones()).sum();
+        if !self.pays(members.len(), listed) {
+            return leaf(&mut self.cells);
+        }
+
+        let node = self.cells.nodes.len();
+        self.cells.nodes.push([EMPTY; 8]);
+        let mut inside = Vec::with_capacity(members.len());
+        for octant in 0..8 {
+            inside.clear();
+            inside.extend(members.iter().zip(&masks).filter(|(_, m)| *m >> octant & 1 == 1).map(|(&m, _)| m));
+            self.cells.nodes[node][octant as usize] = self.split(cube.octant(octant), &inside, crowd);
+        }
+        index(node) | NODE
+    }
+
+    /// A ray through a cube meets each octant with probability 1/4 (the ratio of their surfaces): expected cost of the
+    /// octants against that of the whole. It also ends splitting where octants keep nearly all prims.
+    fn pays(&self, prims: usize, listed: u32) -> bool {
+        0.25 * (8.0 * self.step_cost + f64::from(listed)) < self.step_cost + prims as f64
+    }
+
+    /// Whether splitting pays if no prim is listed twice.
+    fn could_pay(&self, prims: usize) -> bool {
+        prims > 1 && self.pays(prims, index(prims))
+    }
+}
+
+/// The prims of one top cell.
+struct Crowd<'a> {
+    prims: &'a [u32],
+    overlaps: &'a [Overlap],
+}
+
+impl Crowd<'_> {
+    /// One bit for each octant of the cube that member `m` belongs to.
+    fn octants(&self, m: u32, cube: Cube) -> u8 {
+        let overlap = &self.overlaps[m as usize];
+        (0..8).filter(|&o| overlap.test(cube.octant(o))).fold(0, |mask, o| mask | 1 << o)
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "2³² references would be 16 GB; prims and cells are fewer")]
+fn index(i: usize) -> u32 {
+    i as u32
+}

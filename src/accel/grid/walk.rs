@@ -1,0 +1,240 @@
+//! The way of a ray through the cells.
+//!
+//! The top grid is crossed by the 3D-DDA of J. Amanatides, A. Woo, *A Fast Voxel Traversal Algorithm for Ray Tracing*,
+//! 1987, with one change: the distance to the next plane is computed from the plane's integer each time and never
+//! accumulated, so that errors do not grow along the ray. Inside a refined cell the octants are visited in order along the
+//! ray without a stack: the next finest cell is known as an integer, and its octant is found from the top cell down.
+//!
+//! # Why no hit is lost
+//! Exit distances split the ray into intervals; the cell visited in an interval holds the ray there up to the error of
+//! computing positions in `f64`, at most an eighth of [`CELL_PAD`](crate::math::bounds::CELL_PAD) for origins within
+//! [`RAY_CELLS`]. Prims are listed in every cell that they touch within the padding, so a hit with exact distance t is
+//! tested at the latest in the cell of t's interval. The walk ends behind a cell when no later hit can come before the
+//! best one: when that lies, by [`WALK_MARGIN`], before the exit. A hit found beyond the exit is kept but is not final.
+
+use super::lattice::Lattice;
+use super::mailbox::Mailbox;
+use super::{EMPTY, GridOctree, NODE};
+use crate::accel::Probe;
+use crate::accel::query::{Goal, Query};
+use crate::math::bounds::{RAY_CELLS, WALK_MARGIN};
+
+/// A ray in units of finest cells; t is the same as outside.
+struct Track {
+    origin: [f64; 3],
+    dir: [f64; 3],
+    inv_dir: [f64; 3],
+    /// Whether it runs towards larger coordinates.
+    forwards: [bool; 3],
+}
+
+impl Track {
+    /// `None`: the origin is too far away to know the ray's cells.
+    fn new<G: Goal>(lattice: &Lattice, query: &Query<G>) -> Option<Self> {
+        let origin = lattice.place(query.ray.origin);
+        // A ray along a plane never meets it: 10¹²⁰ times any distance is beyond every t, and no NaN arises. Smaller
+        // components than this do not occur: 2⁻¹⁴⁹ of an f32 times at least 2⁻¹²⁹ cells per unit.
+        let dir = (query.ray.dir.as_dvec3() * lattice.scale).map(|d| if d == 0.0 { 1e-120 } else { d });
+        (origin.abs().max_element() < RAY_CELLS).then(|| Self {
+            origin: origin.to_array(),
+            dir: dir.to_array(),
+            inv_dir: dir.recip().to_array(),
+            forwards: dir.to_array().map(|d| d > 0.0),
+        })
+    }
+
+    /// The distance to a plane between cells.
+    #[inline]
+    fn meets(&self, axis: usize, plane: u32) -> f64 {
+        (f64::from(plane) - self.origin[axis]) * self.inv_dir[axis]
+    }
+
+    /// Coordinate at distance t as a finest cell in `lo..=hi`.
+    #[inline]
+    fn cell_at(&self, axis: usize, t: f64, lo: u32, hi: u32) -> u32 {
+        let x = self.origin[axis] + self.dir[axis] * t;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` saturates, NaN is 0")]
+        (x as u32).clamp(lo, hi)
+    }
+
+    /// The part of `from..=to` inside the grid's box.
+    fn span(&self, fine: [u32; 3], from: f64, to: f64) -> Option<(f64, f64)> {
+        let (mut near, mut far) = (from, to);
+        for (k, end) in fine.into_iter().enumerate() {
+            let (a, b) = (self.meets(k, 0), self.meets(k, end));
+            let (first, last) = if self.forwards[k] { (a, b) } else { (b, a) };
+            near = near.max(first);
+            far = far.min(last);
+        }
+        (near <= far).then_some((near, far))
+    }
+}
+
+/// The axis of the smallest of three distances, and that distance.
+#[inline]
+fn first_exit(t: [f64; 3]) -> (usize, f64) {
+    let axis = if t[0] < t[1] {
+        if t[0] < t[2] { 0 } else { 2 }
+    } else if t[1] < t[2] {
+        1
+    } else {
+        2
+    };
+    (axis, t[axis])
+}
+
+/// The distance up to which cells must be visited for hits up to `reach`.
+#[inline]
+fn limit<G: Goal>(query: &Query<G>) -> f64 {
+    let reach = f64::from(query.reach());
+    reach + reach.abs() * WALK_MARGIN
+}
+
+impl<M: Mailbox> GridOctree<'_, M> {
+    /// Visits the cells along the ray in order.
+    pub(super) fn walk_cells<G: Goal, P: Probe>(&self, query: &mut Query<G>, mailbox: &mut M, probe: &mut P) {
+        mailbox.next_ray();
+        let Some(track) = Track::new(&self.lattice, query) else {
+            self.test_all(query, probe);
+            return;
+        };
+        // A hit at t_min may lie half an ulp before it.
+        let from = f64::from(query.t_min);
+        let Some((mut enter, _)) = track.span(self.lattice.fine_dims(), from - from.abs() * WALK_MARGIN, limit(query))
+        else {
+            return;
+        };
+
+        let levels = self.lattice.levels;
+        let dims = self.lattice.dims;
+        let mut cell = [0, 1, 2].map(|k| track.cell_at(k, enter, 0, (dims[k] << levels) - 1) >> levels);
+        let exit = |k: usize, cell: u32| track.meets(k, (cell + u32::from(track.forwards[k])) << levels);
+        let mut exits = [exit(0, cell[0]), exit(1, cell[1]), exit(2, cell[2])];
+        loop {
+            let (axis, leave) = first_exit(exits);
+            let entry = self.top[self.lattice.top_index(cell)];
+            let done = if entry & NODE == 0 {
+                self.visit(entry, query, mailbox, probe) || limit(query) < leave
+            } else {
+                self.walk_octants(entry, cell, enter, &track, query, mailbox, probe)
+            };
+            if done {
+                return;
+            }
+
+            let (next, outside) = if track.forwards[axis] {
+                (cell[axis] + 1, cell[axis] + 1 == dims[axis])
+            } else {
+                (cell[axis].wrapping_sub(1), cell[axis] == 0)
+            };
+            if outside {
+                return;
+            }
+            cell[axis] = next;
+            exits[axis] = exit(axis, next);
+            enter = leave;
+        }
+    }
+
+    /// Visits the cells below one top cell; whether the query is answered.
+    #[expect(clippy::too_many_arguments, reason = "the state of the walk it is a part of")]
+    fn walk_octants<G: Goal, P: Probe>(
+        &self,
+        root: u32,
+        top: [u32; 3],
+        enter: f64,
+        track: &Track,
+        query: &mut Query<G>,
+        mailbox: &mut M,
+        probe: &mut P,
+    ) -> bool {
+        let levels = self.lattice.levels;
+        let mut at = [0, 1, 2].map(|k| {
+            let lo = top[k] << levels;
+            track.cell_at(k, enter, lo, lo + (1 << levels) - 1)
+        });
+        loop {
+            let (cell, level) = self.descend(root, at, probe);
+            if self.visit(cell, query, mailbox, probe) {
+                return true;
+            }
+            let lo = at.map(|i| i >> level << level);
+            let side = 1u32 << level;
+            let plane = [0, 1, 2].map(|k| if track.forwards[k] { lo[k] + side } else { lo[k] });
+            let (axis, leave) = first_exit([0, 1, 2].map(|k| track.meets(k, plane[k])));
+            if limit(query) < leave {
+                return true;
+            }
+
+            // Never back: the lower bound of each coordinate's range is where it is, so that the walk ends.
+            for k in 0..3 {
+                if k == axis {
+                    continue;
+                }
+                at[k] = if track.forwards[k] {
+                    track.cell_at(k, leave, at[k], lo[k] + (side - 1))
+                } else {
+                    track.cell_at(k, leave, lo[k], at[k])
+                };
+            }
+            let Some(next) = (if track.forwards[axis] { Some(plane[axis]) } else { plane[axis].checked_sub(1) }) else {
+                return false;
+            };
+            if next >> levels != top[axis] {
+                return false;
+            }
+            at[axis] = next;
+        }
+    }
+
+    /// The cell that holds finest cell `at`, and its level.
+    #[inline]
+    fn descend<P: Probe>(&self, root: u32, at: [u32; 3], probe: &mut P) -> (u32, u32) {
+        let mut entry = root;
+        let mut level = self.lattice.levels;
+        while entry & NODE != 0 {
+            probe.step();
+            level -= 1;
+            let octant = (at[0] >> level & 1) | (at[1] >> level & 1) << 1 | (at[2] >> level & 1) << 2;
+            entry = self.cells.nodes[(entry & !NODE) as usize][octant as usize];
+        }
+        (entry, level)
+    }
+
+    /// Tests the prims of a cell; whether the query is answered.
+    #[inline]
+    fn visit<G: Goal, P: Probe>(&self, cell: u32, query: &mut Query<G>, mailbox: &mut M, probe: &mut P) -> bool {
+        probe.step();
+        probe.cell(cell == EMPTY);
+        for &prim in self.cells.list(cell) {
+            if !mailbox.first_visit(prim) {
+                probe.repeat_skipped();
+            } else if query.test(prim, probe) {
+                return true;
+            }
+        }
+        false
+    }
+
+    fn test_all<G: Goal, P: Probe>(&self, query: &mut Query<G>, probe: &mut P) {
+        for prim in 0..self.shapes.bounded() {
+            if query.test(prim, probe) {
+                return;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_smallest_exit_is_found_for_every_order() {
+        for t in [[1.0, 2.0, 3.0], [2.0, 1.0, 3.0], [3.0, 2.0, 1.0], [2.0, 3.0, 1.0], [3.0, 1.0, 2.0], [1.0, 3.0, 2.0]]
+        {
+            assert_eq!(first_exit(t).1, 1.0);
+        }
+        assert_eq!(first_exit([f64::INFINITY, 4.0, f64::INFINITY]), (1, 4.0));
+    }
+}

@@ -1,0 +1,138 @@
+//! What every structure must do.
+
+mod scenes;
+mod watertight;
+
+use super::grid::mailbox::{NoMailbox, Stamps};
+use super::*;
+use scenes::{all, broken_rays, rays};
+
+const PARAMS: [GridParams; 4] = [
+    GridParams { density: 1.0, max_resolution: 256, max_depth: 8, step_cost: 2.0 },
+    GridParams { density: 4.0, max_resolution: 64, max_depth: 0, step_cost: 2.0 },
+    GridParams { density: 0.01, max_resolution: 1, max_depth: 7, step_cost: 0.3 },
+    GridParams { density: 0.3, max_resolution: 4, max_depth: 10, step_cost: 1.0 },
+];
+
+/// All hits of the three queries, as bits.
+fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<[u32; 9]> {
+    let mut scratch = accel.scratch();
+    let mut first = vec![Hit::MISS; rays.len()];
+    let mut blocked = vec![false; rays.len()];
+    let mut second = first.clone();
+    accel.closest(rays, &mut first, &mut scratch, &mut NoProbe);
+    accel.occluded(rays, &mut blocked, &mut scratch, &mut NoProbe);
+    accel.next(rays, &first, &mut second, &mut scratch, &mut NoProbe);
+    let bits = |h: &Hit| [h.t.to_bits(), h.u.to_bits(), h.v.to_bits(), h.prim];
+    let row = |((a, b), c): ((&Hit, &bool), &Hit)| {
+        let ([t, u, v, p], [t2, u2, v2, p2]) = (bits(a), bits(c));
+        [t, u, v, p, u32::from(*b), t2, u2, v2, p2]
+    };
+    first.iter().zip(&blocked).zip(&second).map(row).collect()
+}
+
+#[test]
+fn every_structure_agrees_with_brute_force_bit_for_bit() {
+    for (name, shapes) in all() {
+        let rays = rays(&shapes, 40);
+        let expected = answers(&Unculled::new(&shapes), &rays);
+        for params in &PARAMS {
+            let grid = GridOctree::<Stamps>::build(&shapes, params);
+            assert!(grid.check().is_ok(), "{name}: {:?}", grid.check());
+            let plain = GridOctree::<NoMailbox>::build(&shapes, params);
+            for got in [answers(&grid, &rays), answers(&plain, &rays)] {
+                for ((ray, got), expected) in rays.iter().zip(&got).zip(&expected) {
+                    assert_eq!(got, expected, "{name}, {params:?}, {ray:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn scenes_are_hit_at_all() {
+    for (name, shapes) in all() {
+        let rays = rays(&shapes, 40);
+        let hits = answers(&Unculled::new(&shapes), &rays).iter().filter(|a| a[3] != NO_PRIM).count();
+        let solid = !["empty", "a point", "a line"].contains(&name);
+        assert_eq!(hits > rays.len() / 10, solid, "{name}: {hits} of {}", rays.len());
+    }
+}
+
+#[test]
+fn rays_that_are_not_numbers_or_go_nowhere_miss() {
+    let shapes = scenes::mix();
+    let rays = broken_rays();
+    let grid: GridOctree = GridOctree::build(&shapes, &GridParams::default());
+    for answer in answers(&grid, &rays).into_iter().chain(answers(&Unculled::new(&shapes), &rays)) {
+        assert_eq!((answer[3], answer[4], answer[8]), (NO_PRIM, 0, NO_PRIM));
+    }
+}
+
+#[test]
+fn among_copies_of_a_triangle_the_lowest_is_hit_and_the_next_follow_in_order() {
+    let shapes = scenes::copies(100);
+    let grid: GridOctree = GridOctree::build(&shapes, &GridParams::default());
+    let ray = [scenes::ray(Vec3::new(0.4, 0.3, 1.0), Vec3::NEG_Z)];
+    let (mut scratch, mut hit) = (grid.scratch(), [Hit::MISS]);
+    grid.closest(&ray, &mut hit, &mut scratch, &mut NoProbe);
+    for prim in 0..100 {
+        assert_eq!(hit[0].prim, prim);
+        let after = hit;
+        grid.next(&ray, &after, &mut hit, &mut scratch, &mut NoProbe);
+    }
+    assert_eq!(hit[0], Hit::MISS);
+}
+
+#[test]
+fn a_sphere_is_left_behind_where_it_was_entered() {
+    let mut shapes = Shapes { spheres: vec![SpherePrim { center: Vec3::ZERO, radius: 1.0 }], ..Shapes::default() };
+    shapes.opaque = BitSet::filled(1, true);
+    let grid: GridOctree = GridOctree::build(&shapes, &GridParams::default());
+    let ray = [scenes::ray(Vec3::new(0.0, 0.0, 4.0), Vec3::NEG_Z)];
+    let (mut scratch, mut first, mut second) = (grid.scratch(), [Hit::MISS], [Hit::MISS]);
+    grid.closest(&ray, &mut first, &mut scratch, &mut NoProbe);
+    grid.next(&ray, &first, &mut second, &mut scratch, &mut NoProbe);
+    assert_eq!((first[0].t, second[0].t), (3.0, 5.0));
+}
+
+#[test]
+fn the_exact_mailbox_tests_each_prim_once_and_saves_the_rest() {
+    for (name, shapes) in all() {
+        let rays: Vec<Ray> = rays(&shapes, 30).into_iter().map(|r| Ray { exclude: NO_PRIM, ..r }).collect();
+        let params = GridParams { step_cost: 0.5, ..GridParams::default() };
+        let with = GridOctree::<Stamps>::build(&shapes, &params);
+        let without = GridOctree::<NoMailbox>::build(&shapes, &params);
+        let (mut kept, mut all_tests) = (with.scratch(), without.scratch());
+        for ray in &rays {
+            let (mut a, mut b) = (RayCounts::default(), RayCounts::default());
+            with.closest(&[*ray], &mut [Hit::MISS], &mut kept, &mut a);
+            without.closest(&[*ray], &mut [Hit::MISS], &mut all_tests, &mut b);
+            assert_eq!(a.n_it + a.n_mb, b.n_it, "{name}: tests and saved tests are the references seen");
+            assert!(a.n_it <= shapes.len() as u64, "{name}: {} tests of {} prims", a.n_it, shapes.len());
+            assert_eq!((b.n_mb, a.n_ts, a.queries), (0, b.n_ts, 1));
+        }
+    }
+}
+
+#[test]
+fn a_ray_through_empty_space_counts_cells_but_no_tests() {
+    let shapes = scenes::star(24, 16);
+    let grid: GridOctree = GridOctree::build(&shapes, &GridParams::default());
+    let mut counts = RayCounts::default();
+    let short = Ray { t_max: 0.5, ..scenes::ray(Vec3::ZERO, Vec3::new(0.3, 0.2, 0.1)) };
+    grid.closest(&[short], &mut [Hit::MISS], &mut grid.scratch(), &mut counts);
+    assert_eq!((counts.queries, counts.found, counts.n_it, counts.n_bit), (1, 0, 0, 0));
+    assert!(counts.n_ets >= 1 && counts.n_ets == counts.n_eets && counts.n_ts >= counts.n_ets);
+}
+
+#[test]
+fn a_structure_does_not_depend_on_the_number_of_threads() {
+    let shapes = scenes::soup(9000, 0.1);
+    let build = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.map(|p| p.install(|| format!("{:?}", GridOctree::<Stamps>::build(&shapes, &GridParams::default()))))
+    };
+    let texts = [1, 2, 7].map(|threads| build(threads).unwrap_or_default());
+    assert!(!texts[0].is_empty() && texts[0] == texts[1] && texts[0] == texts[2]);
+}
