@@ -12,10 +12,13 @@ mod context;
 mod layers;
 pub mod optics;
 mod pixel;
+mod seam;
 mod shade;
 mod shadow;
 pub mod studio;
 mod surface;
+#[cfg(test)]
+mod tests;
 pub mod texture;
 mod tile;
 pub mod view;

@@ -1,6 +1,7 @@
 //! Shadow rays: one for each light that a point could see, traced in waves.
 
 use super::context::Context;
+use super::seam::is_same_crossing;
 use super::shade::{Reader, shadow_filter};
 use super::surface::{Footprint, Target};
 use crate::accel::{Accel, Hit, Probe, Ray};
@@ -12,7 +13,10 @@ pub(crate) struct Shadows {
     rays: Vec<Ray>,
     light: Vec<Vec3>,
     blocked: Vec<bool>,
+    /// The hit that each ray has passed last.
     after: Vec<Hit>,
+    /// The same for the rays that go on, while they are picked out.
+    kept: Vec<Hit>,
     hits: Vec<Hit>,
 }
 
@@ -54,12 +58,12 @@ impl Shadows {
         let blocked = std::mem::take(&mut self.blocked);
         self.keep(|i, _, _| !blocked[i]);
         self.blocked = blocked;
+        self.after.clear();
         self.hits.clear();
         self.hits.resize(self.rays.len(), Hit::MISS);
         accel.closest(&self.rays, &mut self.hits, scratch, probe);
         while !self.rays.is_empty() {
             self.filter(context, &mut arrive);
-            std::mem::swap(&mut self.after, &mut self.hits);
             self.hits.clear();
             self.hits.resize(self.rays.len(), Hit::MISS);
             accel.next(&self.rays, &self.after, &mut self.hits, scratch, probe);
@@ -70,24 +74,27 @@ impl Shadows {
     /// Hands over the light of rays that met nothing more, weakens that of the others, and drops those it leaves dark.
     fn filter(&mut self, context: &Context, arrive: &mut impl FnMut(u32, Vec3)) {
         let hits = std::mem::take(&mut self.hits);
-        self.after.clear();
         let after = std::mem::take(&mut self.after);
-        let mut kept = after;
+        let mut kept = std::mem::take(&mut self.kept);
         self.keep(|i, ray, light| {
             let hit = &hits[i];
             if !hit.is_some() {
                 arrive(ray.sample, *light);
                 return false;
             }
-            *light *= filter_at(context, ray, hit);
+            if !after.get(i).is_some_and(|before| is_same_crossing(&context.world.shapes, ray, before, hit)) {
+                *light *= filter_at(context, ray, hit);
+            }
             let goes_on = light.max_element() > 0.0;
             if goes_on {
                 kept.push(*hit);
             }
             goes_on
         });
-        self.after = hits;
-        self.hits = kept;
+        self.after = kept;
+        self.kept = after;
+        self.kept.clear();
+        self.hits = hits;
     }
 
     /// Drops the rays for which `wanted` (index, ray, light) is false; the others keep their order.

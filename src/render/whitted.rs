@@ -10,6 +10,7 @@
 use super::context::{Context, coverage};
 use super::layers::Facts;
 use super::optics::{dispersed_index, reflect, refract};
+use super::seam::is_same_crossing;
 use super::shade::{Matter, Reader, above, lets_light_in, terminator};
 use super::shadow::Shadows;
 use super::surface::{Surface, Target};
@@ -113,7 +114,13 @@ impl<'a, A: Accel, P: Probe> Tracer<'a, A, P> {
             let wave = std::mem::take(&mut self.wave);
             for i in 0..wave.rays.len() {
                 let (ray, path, hit) = (&wave.rays[i], &wave.paths[i], &wave.hits[i]);
-                if hit.is_some() { self.shade(class, ray, path, hit) } else { self.leave(ray, path) }
+                if !hit.is_some() {
+                    self.leave(ray, path);
+                } else if is_same_crossing(&self.context.world.shapes, ray, &wave.after[i], hit) {
+                    self.continuing[class as usize].push(*ray, *path, *hit);
+                } else {
+                    self.shade(class, ray, path, hit);
+                }
             }
             self.wave = wave;
             self.trace_shadows();

@@ -1,0 +1,151 @@
+//! Refracted rays: directions, total reflection, nesting, dispersion.
+
+use super::*;
+use crate::math::Vec4;
+use crate::render::optics;
+use crate::scene::{Environment, MetalRough};
+
+fn glass(ior: f32) -> Material {
+    material(Vec3::ZERO, Phong { transmission: Vec3::ONE, ior, ..phong() })
+}
+
+/// A square that faces +z whose red is (x + half) / (2 half): what is seen of it tells where it was met.
+fn ruler(z: f32, half: f32) -> Mesh {
+    let red = |p: &Vec3| {
+        Vec4::new((p.x + half) / (2.0 * half), (p.x + half) / (2.0 * half), (p.x + half) / (2.0 * half), 1.0)
+    };
+    let mesh = square(z, half);
+    Mesh { colors: mesh.positions.iter().map(red).collect(), ..mesh }
+}
+
+/// Looks at the origin from `degrees` beside the z axis, towards +x.
+fn aslant(degrees: f64) -> Stage {
+    let a = degrees.to_radians();
+    let eye = DVec3::new(-libm::sin(a), 0.0, libm::cos(a)) * 10.0;
+    stage(View::look_at(eye, DVec3::ZERO, DVec3::Y, Lens::orthographic(1.0)))
+}
+
+#[test]
+fn a_slab_leaves_the_direction_and_shifts_the_ray_by_the_textbook_amount() {
+    let (degrees, thickness, ior) = (50.0f64, 0.75, 1.5);
+    let mut s = aslant(degrees);
+    s.square(0.0, 9.0, glass(1.5)).square(-0.75, 9.0, glass(1.5));
+    // The lower face of the slab points down, so that it is left there.
+    s.scene.meshes[1].triangles.iter_mut().for_each(|t| t.swap(0, 1));
+    s.scene.meshes[1].material = 0;
+    s.mesh(ruler(-2.0, 4.0), DAffine3::IDENTITY, unlit(Vec3::ONE));
+    let tangent = |sine: f64| sine / (1.0 - sine * sine).sqrt();
+    let sine = libm::sin(degrees.to_radians());
+    let x = thickness * tangent(sine / ior) + (2.0 - thickness) * tangent(sine);
+    assert!((f64::from(s.color().x) - (x + 4.0) / 8.0).abs() < 1e-6);
+}
+
+#[test]
+fn beyond_the_critical_angle_everything_is_reflected() {
+    let critical = optics::critical_angle(1.5, 1.0).unwrap_or_default().to_degrees();
+    // The eye is inside the glass that fills z > 0: its surface faces down.
+    let inside = |degrees: f64| {
+        let mut s = aslant(degrees);
+        s.square(0.0, 9.0, glass(1.5));
+        s.scene.meshes[0].triangles.iter_mut().for_each(|t| t.swap(0, 1));
+        s.plane(DVec3::Z, -3.0, unlit(Vec3::X)).plane(DVec3::Z, 20.0, unlit(Vec3::Y));
+        s.color()
+    };
+    assert_eq!(inside(critical - 0.1), Vec3::X);
+    assert_eq!(inside(critical + 0.1), Vec3::Y);
+}
+
+#[test]
+fn fresnel_shares_light_between_both_branches() {
+    let mut s = aslant(60.0);
+    let both = Phong { transmission: Vec3::ONE, mirror: Vec3::ONE, ior: 1.5, fresnel: true, ..phong() };
+    s.square(0.0, 9.0, material(Vec3::ZERO, both));
+    s.plane(DVec3::Z, -3.0, unlit(Vec3::X)).plane(DVec3::Z, 20.0, unlit(Vec3::Y));
+    let share = optics::fresnel_dielectric(0.5, 1.0, 1.5) as f32;
+    assert_near(s.color(), Vec3::new(1.0 - share, share, 0.0), 1e-5);
+    let counts = s.render().counts;
+    assert_eq!((counts.primary.queries, counts.reflected.queries, counts.refracted.queries), (1, 1, 1));
+}
+
+#[test]
+fn a_glass_ball_gathers_light_at_its_focus() {
+    // Paraxial rays through a ball of index 1.5 meet at 1.5 radii from its centre.
+    let mut s = looking_down(5.0);
+    s.view = View::look_at(DVec3::new(0.02, 0.0, 5.0), DVec3::new(0.02, 0.0, 0.0), DVec3::Y, Lens::orthographic(1e-6));
+    s.sphere(DVec3::ZERO, 1.0, glass(1.5)).mesh(ruler(-1.5, 0.02), DAffine3::IDENTITY, unlit(Vec3::ONE));
+    assert!((s.color().x - 0.5).abs() < 0.01, "{}", s.color().x);
+    // Both surfaces bend: a ball that only bent once would show the ruler elsewhere.
+    assert_eq!(s.render().counts.refracted.queries, 2);
+}
+
+#[test]
+fn an_air_bubble_in_glass_is_entered_and_left_with_the_indices_turned_round() {
+    let mut s = aslant(30.0);
+    // Glass of two faces with a slab of air in it; directions before and after agree whatever lies between.
+    for (z, material, down) in [(0.0, 0, false), (-0.5, 1, false), (-1.0, 1, true), (-1.5, 0, true)] {
+        s.square(z, 9.0, glass(if material == 0 { 1.5 } else { 1.0 }));
+        let mesh = s.scene.meshes.len() - 1;
+        s.scene.meshes[mesh].material = material;
+        if down {
+            s.scene.meshes[mesh].triangles.iter_mut().for_each(|t| t.swap(0, 1));
+        }
+    }
+    s.scene.materials[1] = glass(1.0);
+    s.mesh(ruler(-2.0, 4.0), DAffine3::IDENTITY, unlit(Vec3::ONE));
+    let tangent = |sine: f64| sine / (1.0 - sine * sine).sqrt();
+    let x = tangent(0.5) + tangent(0.5 / 1.5);
+    assert!((f64::from(s.color().x) - (x + 4.0) / 8.0).abs() < 1e-6);
+}
+
+#[test]
+fn thick_gltf_glass_bends_and_thin_glass_does_not() {
+    let pane = |thick: bool| {
+        let mut s = aslant(50.0);
+        let m = MetalRough { transmission: 1.0, metallic: 0.0, roughness: 0.0, thick, ..MetalRough::default() };
+        s.square(0.0, 9.0, Material { surface: Reflection::MetalRough(m), ..Material::default() });
+        s.mesh(ruler(-1.0, 4.0), DAffine3::IDENTITY, unlit(Vec3::ONE));
+        s.color().x
+    };
+    let sine = libm::sin(50f64.to_radians());
+    let tangent = |sine: f64| sine / (1.0 - sine * sine).sqrt();
+    let open = 1.0 - optics::fresnel_dielectric(libm::cos(50f64.to_radians()), 1.0, 1.5);
+    assert!((f64::from(pane(true)) - open * (tangent(sine / 1.5) + 4.0) / 8.0).abs() < 1e-5);
+    let schlick = 0.04 + 0.96 * libm::pow(1.0 - libm::cos(50f64.to_radians()), 5.0);
+    assert!((f64::from(pane(false)) - (1.0 - schlick) * (tangent(sine) + 4.0) / 8.0).abs() < 1e-5);
+}
+
+#[test]
+fn a_prism_splits_white_light_and_bends_blue_more() {
+    let split = |dispersion: f32| {
+        let mut s = aslant(60.0);
+        let prism = Phong { transmission: Vec3::ONE, ior: 1.6, dispersion, ..phong() };
+        s.square(0.0, 9.0, material(Vec3::ZERO, prism));
+        s.mesh(ruler(-3.0, 9.0), DAffine3::IDENTITY, unlit(Vec3::ONE));
+        (s.color(), s.render().counts.refracted.queries)
+    };
+    let (color, rays) = split(0.0);
+    assert!(color.x == color.z && rays == 1);
+    let (color, rays) = split(0.5);
+    // Blue is bent towards the normal, so it meets the ruler nearer the middle.
+    assert!(color.z < color.y && color.y < color.x && rays == 12, "{color} {rays}");
+}
+
+#[test]
+fn a_white_scene_seen_through_a_prism_stays_white() {
+    let mut s = aslant(30.0);
+    let prism = Phong { transmission: Vec3::ONE, ior: 1.6, dispersion: 0.5, ..phong() };
+    s.square(0.0, 9.0, material(Vec3::ZERO, prism));
+    s.scene.environment = Environment::Constant(Vec3::ONE);
+    assert_near(s.color(), Vec3::ONE, 1e-5);
+}
+
+#[test]
+fn a_light_behind_frosted_phong_glass_shines_through() {
+    let mut s = looking_down(5.0);
+    let frosted = Phong { transmission: Vec3::splat(0.5), ior: 1.5, shininess: 4.0, ..phong() };
+    s.square(0.0, 9.0, material(Vec3::ZERO, frosted)).lamp(DVec3::Z * -3.0, 0.8);
+    assert_near(s.color(), Vec3::splat(0.4), 1e-5);
+    s.scene.lights[0].kind = LightKind::Point { position: DVec3::new(3.0, 0.0, -3.0), falloff: Falloff::None };
+    let beside = s.color().x;
+    assert!(beside > 0.0 && beside < 0.4);
+}

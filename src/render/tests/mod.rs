@@ -1,0 +1,133 @@
+//! Whole small pictures with analytic answers.
+
+mod bits;
+mod glass;
+mod light;
+mod mirrors;
+mod see_through;
+mod sight;
+
+use super::texture::TextureStore;
+use super::view::{Lens, View};
+use super::{Job, Rendered, Settings, World, render_counted};
+use crate::accel::{AccelKind, AnyAccel, GridParams};
+use crate::math::{DAffine3, DVec3, Vec3};
+use crate::scene::{
+    Falloff, Instance, Light, LightKind, Material, Mesh, Phong, Plane, Scene, Sphere, Surface as Reflection,
+};
+
+/// A scene under construction and how to look at it.
+struct Stage {
+    scene: Scene,
+    view: View,
+    settings: Settings,
+}
+
+/// One pixel that looks along −z from +`distance` with parallel rays.
+fn looking_down(distance: f64) -> Stage {
+    let eye = DVec3::Z * distance;
+    let view = View::look_at(eye, DVec3::ZERO, DVec3::Y, Lens::orthographic(1.0));
+    stage(view)
+}
+
+fn stage(view: View) -> Stage {
+    let settings = Settings { width: 1, height: 1, samples: 1, cutoff: 0.0, ..Settings::default() };
+    Stage { scene: Scene::default(), view, settings }
+}
+
+/// A Phong surface that shows nothing until told otherwise.
+fn phong() -> Phong {
+    Phong::default()
+}
+
+fn material(base_color: Vec3, phong: Phong) -> Material {
+    Material { base_color, double_sided: true, surface: Reflection::Phong(phong), ..Material::default() }
+}
+
+fn unlit(color: Vec3) -> Material {
+    Material { base_color: color, double_sided: true, surface: Reflection::Unlit, ..Material::default() }
+}
+
+impl Stage {
+    fn add_material(&mut self, material: Material) -> u32 {
+        self.scene.materials.push(material);
+        self.scene.materials.len() as u32 - 1
+    }
+
+    fn sphere(&mut self, center: DVec3, radius: f64, material: Material) -> &mut Self {
+        let material = self.add_material(material);
+        self.scene.spheres.push(Sphere { name: String::new(), center, radius, material });
+        self
+    }
+
+    fn plane(&mut self, normal: DVec3, offset: f64, material: Material) -> &mut Self {
+        let material = self.add_material(material);
+        self.scene.planes.push(Plane { name: String::new(), normal, offset, material });
+        self
+    }
+
+    /// A mesh in its place; its material index is filled in.
+    fn mesh(&mut self, mesh: Mesh, world_from_object: DAffine3, material: Material) -> &mut Self {
+        let material = self.add_material(material);
+        self.scene.meshes.push(Mesh { material, ..mesh });
+        let mesh = self.scene.meshes.len() as u32 - 1;
+        self.scene.instances.push(Instance { name: String::new(), mesh, world_from_object });
+        self
+    }
+
+    /// A square of side 2·`half` that faces +z at height `z`.
+    fn square(&mut self, z: f32, half: f32, material: Material) -> &mut Self {
+        self.mesh(square(z, half), DAffine3::IDENTITY, material)
+    }
+
+    /// A lamp of strength `intensity` that does not weaken.
+    fn lamp(&mut self, position: DVec3, intensity: f32) -> &mut Self {
+        let kind = LightKind::Point { position, falloff: Falloff::None };
+        let intensity = Vec3::splat(intensity);
+        self.scene.lights.push(Light { name: String::new(), intensity, kind, shadows: true });
+        self
+    }
+
+    fn render_by(&self, kind: AccelKind) -> Rendered {
+        let world = World::new(&self.scene);
+        let accel = AnyAccel::build(kind, &world.shapes, &GridParams::default());
+        let textures = TextureStore::new(&self.scene);
+        let job = Job {
+            scene: &self.scene,
+            world: &world,
+            accel: &accel,
+            textures: &textures,
+            view: &self.view,
+            settings: &self.settings,
+        };
+        render_counted(&job, &())
+    }
+
+    fn render(&self) -> Rendered {
+        self.render_by(AccelKind::None)
+    }
+
+    /// Colour of the first pixel.
+    fn color(&self) -> Vec3 {
+        Vec3::from_slice(&self.render().picture.beauty[0])
+    }
+
+    /// Alpha of the first pixel.
+    fn alpha(&self) -> f32 {
+        self.render().picture.beauty[0][3]
+    }
+}
+
+fn square(z: f32, half: f32) -> Mesh {
+    let corner = |x: f32, y: f32| Vec3::new(x * half, y * half, z);
+    Mesh {
+        positions: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
+    }
+}
+
+#[track_caller]
+fn assert_near(a: Vec3, b: Vec3, tolerance: f32) {
+    assert!((a - b).length() <= tolerance, "{a} is not within {tolerance} of {b}");
+}
