@@ -1,3 +1,7 @@
-//! The `meshray` command.
+//! The `meshray` command: parse, run, exit code. Everything else is in the library.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    meshray::cli::run(std::env::args_os()).into()
+}

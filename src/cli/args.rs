@@ -16,7 +16,7 @@ use std::path::PathBuf;
     after_help = "`meshray MODEL` is short for `meshray render MODEL`.\n\
                   Exit codes: 0 done, 1 could not do it, 2 bad command line, 3 bad input, 130 interrupted."
 )]
-pub struct Cli {
+pub(super) struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
@@ -24,7 +24,7 @@ pub struct Cli {
 
 /// The commands.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub(super) enum Command {
     /// Render models into pictures
     #[command(after_help = RENDER_EXAMPLES)]
     Render(Box<RenderArgs>),
@@ -49,7 +49,7 @@ Examples:
 
 /// What `meshray render` was given.
 #[derive(Debug, Clone, Args)]
-pub struct RenderArgs {
+pub(super) struct RenderArgs {
     /// Models (.glb, .gltf, .obj) or scene files (.toml); `-` reads standard input
     #[arg(value_name = "INPUT", required_unless_present = "again")]
     pub inputs: Vec<PathBuf>,
@@ -92,7 +92,11 @@ pub struct RenderArgs {
     #[arg(long, help_heading = "Output", hide_short_help = true)]
     pub keep_partial: bool,
     /// Repeat a picture with the settings it carries; refuses when the input has changed
-    #[arg(long, value_name = "PICTURE", help_heading = "Output", hide_short_help = true)]
+    #[arg(long, value_name = "PICTURE", help_heading = "Output", hide_short_help = true, conflicts_with_all = [
+        "size", "format", "bits", "half", "float", "layers", "tone_map", "exposure", "merge", "view", "camera", "eye",
+        "at", "up_vector", "fov", "ortho", "up", "background", "samples", "depth", "cutoff", "seed", "scene",
+        "polygons", "mtl", "allow_empty", "accel",
+    ])]
     pub again: Option<PathBuf>,
 
     /// Named view; repeat for several pictures: front, back, left, right, top, bottom, iso
@@ -164,6 +168,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "NAME", value_parser = parse::accel(), default_value = parse::DEFAULT_ACCEL,
           help_heading = "Structure", hide_short_help = true)]
     pub accel: crate::accel::AccelKind,
+    /// Parameters of the grid
     #[command(flatten)]
     pub grid: GridArgs,
 
@@ -186,11 +191,24 @@ pub struct RenderArgs {
 
 /// Parameters of the grid.
 #[derive(Debug, Clone, Default, Args)]
-pub struct GridArgs {}
+pub(super) struct GridArgs {
+    /// Cells of the grid per shape [default: 1]
+    #[arg(long, value_name = "RATIO", help_heading = "Structure", hide_short_help = true)]
+    pub grid_density: Option<f64>,
+    /// Most cells of the grid along an axis [default: 256]
+    #[arg(long, value_name = "N", help_heading = "Structure", hide_short_help = true)]
+    pub grid_resolution: Option<u32>,
+    /// Most octree levels below a crowded cell; 0: a plain grid [default: 8]
+    #[arg(long, value_name = "N", help_heading = "Structure", hide_short_help = true)]
+    pub octree_depth: Option<u32>,
+    /// Cost of visiting a cell, counted in tests; cells are split when that should pay [default: 2]
+    #[arg(long, value_name = "COST", help_heading = "Structure", hide_short_help = true)]
+    pub step_cost: Option<f64>,
+}
 
 /// What `meshray inspect` was given.
 #[derive(Debug, Clone, Args)]
-pub struct InspectArgs {
+pub(super) struct InspectArgs {
     /// A model or scene file; `-` reads standard input
     #[arg(value_name = "FILE")]
     pub input: PathBuf,
@@ -225,7 +243,7 @@ pub struct InspectArgs {
 
 /// Types of picture files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum FileType {
+pub(super) enum FileType {
     /// PNG, 8 or 16 bits
     Png,
     /// OpenEXR, linear
@@ -238,7 +256,7 @@ pub enum FileType {
 
 /// An up axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Axis {
+pub(super) enum Axis {
     /// +Y, as glTF and most OBJ exporters
     Y,
     /// +Z, as CAD programs and scanners
@@ -247,7 +265,7 @@ pub enum Axis {
 
 /// `--polygons`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum PolygonsArg {
+pub(super) enum PolygonsArg {
     /// Cut into triangles
     #[default]
     Cut,
@@ -257,7 +275,7 @@ pub enum PolygonsArg {
 
 /// `--mtl`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum MtlArg {
+pub(super) enum MtlArg {
     /// Replace values that exporters write carelessly, with a warning each
     #[default]
     Guess,
@@ -267,7 +285,7 @@ pub enum MtlArg {
 
 /// `--stats`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum StatsFormat {
+pub(super) enum StatsFormat {
     /// For people
     Text,
     /// For programs (schema `meshray-stats/1`)
@@ -276,7 +294,7 @@ pub enum StatsFormat {
 
 /// `--messages`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum MessageFormat {
+pub(super) enum MessageFormat {
     /// For people
     #[default]
     Text,

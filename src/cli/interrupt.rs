@@ -12,7 +12,7 @@ static RAISED: AtomicBool = AtomicBool::new(false);
 static SOMETHING_TO_SAVE: AtomicBool = AtomicBool::new(false);
 
 /// Installs the handler. Where the system refuses one, signals keep their usual effect.
-pub fn install() {
+pub(super) fn install() {
     let _ = ctrlc::set_handler(|| {
         let second = RAISED.swap(true, Ordering::SeqCst);
         if second || !SOMETHING_TO_SAVE.load(Ordering::SeqCst) {
@@ -24,17 +24,17 @@ pub fn install() {
 }
 
 /// Whether a signal came.
-pub fn raised() -> bool {
+pub(super) fn raised() -> bool {
     RAISED.load(Ordering::SeqCst)
 }
 
 /// While the value lives, the first signal only raises the flag.
 #[must_use]
-pub struct Guard(());
+pub(super) struct Guard(());
 
 impl Guard {
     /// Starts to guard.
-    pub fn new() -> Self {
+    pub(super) fn new() -> Self {
         SOMETHING_TO_SAVE.store(true, Ordering::SeqCst);
         Self(())
     }

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 /// How messages look.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Format {
+pub(super) enum Format {
     /// For people.
     #[default]
     Text,
@@ -20,7 +20,7 @@ pub enum Format {
 
 /// How bad a message is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Severity {
+pub(super) enum Severity {
     /// What was asked for did not happen.
     Error,
     /// It happened, but not quite as the input says.
@@ -31,7 +31,7 @@ pub enum Severity {
 
 impl Severity {
     /// The word in messages.
-    pub fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             Self::Error => "error",
             Self::Warning => "warning",
@@ -42,7 +42,7 @@ impl Severity {
 
 /// Where messages go, and how many of them were warnings.
 #[derive(Debug, Default)]
-pub struct Messages {
+pub(super) struct Messages {
     format: Format,
     quiet: bool,
     warnings: AtomicU32,
@@ -52,12 +52,12 @@ pub struct Messages {
 
 impl Messages {
     /// Messages in a format; `quiet` drops facts, never errors and warnings.
-    pub fn new(format: Format, quiet: bool) -> Self {
+    pub(super) fn new(format: Format, quiet: bool) -> Self {
         Self { format, quiet, ..Self::default() }
     }
 
     /// Writes one message.
-    pub fn say(&self, severity: Severity, message: &Diagnostic) {
+    pub(super) fn say(&self, severity: Severity, message: &Diagnostic) {
         if severity == Severity::Warning {
             self.warnings.fetch_add(message.count.max(1), Ordering::Relaxed);
         }
@@ -70,28 +70,28 @@ impl Messages {
     }
 
     /// Writes an error that is no file's fault.
-    pub fn error(&self, code: &'static str, text: impl Into<String>, remedy: impl Into<String>) {
+    pub(super) fn error(&self, code: &'static str, text: impl Into<String>, remedy: impl Into<String>) {
         self.say(Severity::Error, &Diagnostic::new(code, "", "", text).remedy(remedy));
     }
 
     /// Writes a fact.
-    pub fn info(&self, code: &'static str, text: impl Into<String>) {
+    pub(super) fn info(&self, code: &'static str, text: impl Into<String>) {
         self.say(Severity::Info, &Diagnostic::new(code, "", "", text));
     }
 
     /// Writes every fault that kept a file from being loaded.
-    pub fn load_error(&self, error: &LoadError) {
+    pub(super) fn load_error(&self, error: &LoadError) {
         match error {
             LoadError::Read { what, source } => {
                 let text = if what.text.is_empty() { source.to_string() } else { format!("{}: {source}", what.text) };
-                self.say(Severity::Error, &Diagnostic { text, ..what.clone() });
+                self.say(Severity::Error, &Diagnostic { text, ..(**what).clone() });
             }
             LoadError::Input(faults) => faults.iter().for_each(|fault| self.say(Severity::Error, fault)),
         }
     }
 
     /// Warnings so far, each counted as often as it was met.
-    pub fn warnings(&self) -> u32 {
+    pub(super) fn warnings(&self) -> u32 {
         self.warnings.load(Ordering::Relaxed)
     }
 }
@@ -132,7 +132,10 @@ mod tests {
         let text = line(Format::Json, Severity::Warning, &fault());
         assert!(!text.contains('\n'));
         let back: serde_json::Value = serde_json::from_str(&text).unwrap();
-        assert_eq!((&back["code"], &back["place"], &back["file"]), (&"obj-index".into(), &"118".into(), &"a \"b\"\n.obj".into()));
+        assert_eq!(
+            (&back["code"], &back["place"], &back["file"]),
+            (&"obj-index".into(), &"118".into(), &"a \"b\"\n.obj".into())
+        );
         assert_eq!(back["remedy"], "export it again");
     }
 

@@ -1,1 +1,132 @@
-//! Words -> jobs -> messages and exit codes.
+//! Words -> jobs -> messages and exit codes: the command line.
+//!
+//! [`args`] is what was typed, [`job`] what that means once everything is checked; one file per command does the work.
+//! Only this module prints. stdout carries only what was asked for, everything else goes to stderr.
+
+mod again;
+mod args;
+mod camera;
+mod exit;
+mod inspect;
+mod interrupt;
+mod job;
+mod message;
+mod output_name;
+mod parse;
+mod picture;
+mod progress;
+mod read;
+mod render;
+mod shell;
+mod stats;
+mod version;
+
+pub use exit::Exit;
+
+use args::{Cli, Command, RenderArgs};
+use clap::{CommandFactory, Parser};
+use message::{Messages, Severity};
+use std::ffi::OsString;
+use std::io::{self, Write};
+use std::path::Path;
+
+/// Runs the command line `words`, whose first is the program's name.
+pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
+    let cli = match Cli::try_parse_from(with_render(words.into_iter().collect())) {
+        Ok(cli) => cli,
+        Err(e) => {
+            let exit = if e.use_stderr() { Exit::Usage } else { Exit::Done };
+            let _ = e.print();
+            return exit;
+        }
+    };
+    interrupt::install();
+    match cli.command {
+        Command::Render(args) => render_command(&args),
+        Command::Inspect(args) => inspect::run(&args),
+        Command::Completions { shell } => shell::completions(shell),
+        Command::Man => shell::man(),
+    }
+}
+
+fn render_command(typed: &RenderArgs) -> Exit {
+    let messages = Messages::new(typed.messages.into(), typed.quiet);
+    let mut expected_hash = None;
+    let mut args = typed.clone();
+    if let Some(picture) = &typed.again {
+        match again::repeat(picture, typed) {
+            Ok(repeat) => {
+                repeat.warning.iter().for_each(|w| messages.say(Severity::Warning, w));
+                args = repeat.args;
+                expected_hash = Some(repeat.hash);
+            }
+            Err(fault) => {
+                messages.say(Severity::Error, &fault);
+                return Exit::Failed;
+            }
+        }
+    }
+    match job::RenderJob::new(&args) {
+        Ok(job) => render::run(&job::RenderJob { expected_hash, ..job }, &messages),
+        Err(job::Wrong(text)) => {
+            messages.error("usage", text, "");
+            Exit::Usage
+        }
+    }
+}
+
+/// Lets `meshray MODEL` stand for `meshray render MODEL`: when the first word is no command but looks like a file.
+fn with_render(mut words: Vec<OsString>) -> Vec<OsString> {
+    let Some(first) = words.get(1).and_then(|w| w.to_str()) else { return words };
+    let is_command = Cli::command().get_subcommands().any(|c| c.get_name() == first) || first == "help";
+    let is_file = !first.starts_with('-') && (first.contains(['.', '/', '\\']) || Path::new(first).exists());
+    if !is_command && (is_file || first == "-") {
+        words.insert(1, "render".into());
+    }
+    words
+}
+
+/// Writes to stdout; a reader that has enough is no fault.
+fn print(text: &str) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        result => result,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn a_model_alone_is_rendered() {
+        let words = |line: &str| line.split(' ').map(OsString::from).collect::<Vec<_>>();
+        assert_eq!(with_render(words("meshray a.glb -q")), words("meshray render a.glb -q"));
+        assert_eq!(with_render(words("meshray inspect a.glb")), words("meshray inspect a.glb"));
+        assert_eq!(with_render(words("meshray --help")), words("meshray --help"));
+        assert_eq!(with_render(words("meshray rendr")), words("meshray rendr"));
+        assert_eq!(with_render(words("meshray -")), words("meshray render -"));
+    }
+
+    #[test]
+    fn the_short_help_shows_at_most_fifteen_flags() {
+        let help = Cli::command().find_subcommand_mut("render").unwrap().render_help().to_string();
+        let flags = help.lines().filter(|l| l.trim_start().starts_with('-')).count();
+        assert!(flags <= 15, "{flags} flags\n{help}");
+    }
+
+    #[test]
+    fn every_flag_has_a_heading() {
+        let command = Cli::command();
+        let render = command.find_subcommand("render").unwrap();
+        for flag in render.get_opts() {
+            assert!(flag.get_help_heading().is_some(), "{:?}", flag.get_long());
+        }
+    }
+}

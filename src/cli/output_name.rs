@@ -9,7 +9,7 @@ use std::path::{Component, Path, PathBuf};
 
 /// What a template is filled with.
 #[derive(Clone, Debug)]
-pub struct Facts<'a> {
+pub(super) struct Facts<'a> {
     /// The input, or `-`.
     pub input: &'a Path,
     /// Name of the view or camera.
@@ -21,7 +21,7 @@ pub struct Facts<'a> {
 const FIELDS: [&str; 4] = ["dir", "stem", "view", "frame"];
 
 /// The input's name without folder and extension; `stdin` for `-`.
-pub fn stem(input: &Path) -> String {
+pub(super) fn stem(input: &Path) -> String {
     if input == Path::new("-") {
         return "stdin".into();
     }
@@ -29,7 +29,7 @@ pub fn stem(input: &Path) -> String {
 }
 
 /// Fills a template. Errors name the unknown field.
-pub fn fill(template: &str, facts: &Facts) -> Result<PathBuf, String> {
+pub(super) fn fill(template: &str, facts: &Facts) -> Result<PathBuf, String> {
     let mut name = String::new();
     let mut rest = template;
     while let Some(at) = rest.find(['{', '}']) {
@@ -81,7 +81,7 @@ fn folder(input: &Path) -> String {
 }
 
 /// The template that is used when none is given, or when only a folder is.
-pub fn default_template(folder: Option<&str>, several_views: bool, extension: &str) -> String {
+pub(super) fn default_template(folder: Option<&str>, several_views: bool, extension: &str) -> String {
     let name = if several_views { "{stem}-{view}" } else { "{stem}" };
     match folder {
         Some(folder) => format!("{}/{name}.{extension}", escape(folder.trim_end_matches('/'))),
@@ -94,13 +94,13 @@ fn escape(plain: &str) -> String {
 }
 
 /// The first two of `names` that are one file, as indices.
-pub fn collision(names: &[PathBuf]) -> Option<(usize, usize)> {
+pub(super) fn collision(names: &[PathBuf]) -> Option<(usize, usize)> {
     let mut seen = HashMap::new();
     names.iter().enumerate().find_map(|(i, name)| seen.insert(identity(name), i).map(|earlier| (earlier, i)))
 }
 
 /// One spelling for every way of writing the path of one file; the file itself need not exist.
-pub fn identity(name: &Path) -> PathBuf {
+pub(super) fn identity(name: &Path) -> PathBuf {
     let parent = name.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let parent = parent.canonicalize().unwrap_or_else(|_| lexical(parent));
     parent.join(name.file_name().unwrap_or_default())
@@ -121,7 +121,7 @@ fn lexical(path: &Path) -> PathBuf {
 }
 
 /// `shot.png` -> `shot.partial.png`.
-pub fn partial(name: &Path) -> PathBuf {
+pub(super) fn partial(name: &Path) -> PathBuf {
     let extension = name.extension().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();
     name.with_extension(format!("partial.{extension}"))
 }

@@ -6,17 +6,17 @@ use crate::scene::Background;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 /// Longest side of a picture.
-pub const MAX_SIDE: u32 = 65_535;
+pub(super) const MAX_SIDE: u32 = 65_535;
 
 /// The structure used when none is named.
-pub const DEFAULT_ACCEL: &str = "grid-octree";
+pub(super) const DEFAULT_ACCEL: &str = "grid-octree";
 
 /// `--background` as typed.
-pub type Back = Background;
+pub(super) type Back = Background;
 
 /// `--ortho` as typed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Ortho {
+pub(super) enum Ortho {
     /// Framed like the perspective camera would be.
     Auto,
     /// World units from the lower to the upper edge.
@@ -24,7 +24,7 @@ pub enum Ortho {
 }
 
 /// Columns and rows, each 1 to [`MAX_SIDE`].
-pub fn size(text: &str) -> Result<(u32, u32), String> {
+pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
     let side = |s: &str| s.trim().parse::<u32>().ok().filter(|n| (1..=MAX_SIDE).contains(n));
     let (w, h) = text.split_once(['x', 'X', '×']).ok_or("write width x height, such as 800x600")?;
     match (side(w), side(h)) {
@@ -34,7 +34,7 @@ pub fn size(text: &str) -> Result<(u32, u32), String> {
 }
 
 /// Three finite numbers.
-pub fn vec3(text: &str) -> Result<[f64; 3], String> {
+pub(super) fn vec3(text: &str) -> Result<[f64; 3], String> {
     let parts: Option<Vec<f64>> = text.split(',').map(|p| finite(p).ok()).collect();
     parts.and_then(|p| <[f64; 3]>::try_from(p).ok()).ok_or_else(|| "write three numbers, such as 1,0.5,-2".into())
 }
@@ -49,24 +49,24 @@ fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
 }
 
 /// Degrees.
-pub fn fov(text: &str) -> Result<f64, String> {
+pub(super) fn fov(text: &str) -> Result<f64, String> {
     within(text, 0.1, 170.0)
 }
 
 /// Stops.
 #[expect(clippy::cast_possible_truncation, reason = "the range fits f32")]
-pub fn exposure(text: &str) -> Result<f32, String> {
+pub(super) fn exposure(text: &str) -> Result<f32, String> {
     within(text, -30.0, 30.0).map(|n| n as f32)
 }
 
 /// A weight.
 #[expect(clippy::cast_possible_truncation, reason = "the range fits f32")]
-pub fn cutoff(text: &str) -> Result<f32, String> {
+pub(super) fn cutoff(text: &str) -> Result<f32, String> {
     within(text, 0.0, 1.0).map(|n| n as f32)
 }
 
 /// A height, or `auto`.
-pub fn ortho(text: &str) -> Result<Ortho, String> {
+pub(super) fn ortho(text: &str) -> Result<Ortho, String> {
     if text == "auto" {
         return Ok(Ortho::Auto);
     }
@@ -75,7 +75,7 @@ pub fn ortho(text: &str) -> Result<Ortho, String> {
 }
 
 /// 8 or 16.
-pub fn bits(text: &str) -> Result<u8, String> {
+pub(super) fn bits(text: &str) -> Result<u8, String> {
     match text {
         "8" => Ok(8),
         "16" => Ok(16),
@@ -84,7 +84,7 @@ pub fn bits(text: &str) -> Result<u8, String> {
 }
 
 /// Bytes with an optional binary suffix: `500M`, `2G`, `2GiB`.
-pub fn bytes(text: &str) -> Result<u64, String> {
+pub(super) fn bytes(text: &str) -> Result<u64, String> {
     let wrong = || "write a size such as 500M or 2G".to_owned();
     let digits = text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
     let number: u64 = text[..digits].parse().map_err(|_| wrong())?;
@@ -101,7 +101,7 @@ pub fn bytes(text: &str) -> Result<u64, String> {
 }
 
 /// A colour, `transparent` or `env`.
-pub fn background(text: &str) -> Result<Back, String> {
+pub(super) fn background(text: &str) -> Result<Back, String> {
     match text {
         "transparent" => Ok(Background::Transparent),
         "env" | "environment" => Ok(Background::Environment),
@@ -112,18 +112,13 @@ pub fn background(text: &str) -> Result<Back, String> {
 }
 
 /// The names of all structures.
-pub fn accel() -> impl TypedValueParser<Value = AccelKind> {
+pub(super) fn accel() -> impl TypedValueParser<Value = AccelKind> {
     let parse = |name: String| name.parse::<AccelKind>().map_err(|e| e.to_string());
-    PossibleValuesParser::new(AccelKind::ALL.iter().map(AccelKind::name)).try_map(parse)
-}
-
-/// As `glam` wants it.
-pub fn dvec(v: [f64; 3]) -> crate::math::DVec3 {
-    v.into()
+    PossibleValuesParser::new(AccelKind::ALL.map(AccelKind::name)).try_map(parse)
 }
 
 /// A linear colour as settings text that [`background`] reads back exactly.
-pub fn color_text(c: Vec3) -> String {
+pub(super) fn color_text(c: Vec3) -> String {
     format!("{},{},{}", c.x, c.y, c.z)
 }
 

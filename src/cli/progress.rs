@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 const LINE_EVERY: Duration = Duration::from_secs(5);
 
 /// The progress of one picture.
-pub struct Progress<'a> {
+pub(super) struct Progress<'a> {
     how: How<'a>,
     /// Whether a signal ends the render so that its tiles can be kept.
     cancellable: bool,
@@ -32,7 +32,7 @@ struct Stage {
 
 impl<'a> Progress<'a> {
     /// Progress of the picture of `name`.
-    pub fn new(name: &str, messages: &'a Messages, silent: bool, cancellable: bool) -> Self {
+    pub(super) fn new(name: &str, messages: &'a Messages, silent: bool, cancellable: bool) -> Self {
         use std::io::IsTerminal;
         let now = Instant::now();
         let how = if silent {
@@ -48,7 +48,7 @@ impl<'a> Progress<'a> {
     }
 
     /// A stage of unknown length begins: `loading`, `building`.
-    pub fn stage(&self, what: &str) {
+    pub(super) fn stage(&self, what: &str) {
         match &self.how {
             How::Silent => {}
             How::Bar { bar, .. } => {
@@ -61,7 +61,7 @@ impl<'a> Progress<'a> {
     }
 
     /// The render begins.
-    pub fn render(&self) {
+    pub(super) fn render(&self) {
         match &self.how {
             How::Silent => {}
             How::Bar { bar, .. } => {
@@ -78,7 +78,7 @@ impl<'a> Progress<'a> {
     }
 
     /// Nothing more to show.
-    pub fn finish(&self) {
+    pub(super) fn finish(&self) {
         if let How::Bar { bar, messages } = &self.how {
             bar.finish_and_clear();
             messages.bars.remove(bar);

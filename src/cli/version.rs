@@ -1,7 +1,7 @@
 //! What `--version` says.
 
 /// Version and features of this build.
-pub const LONG: &str = concat!(
+pub(super) const LONG: &str = concat!(
     env!("CARGO_PKG_VERSION"),
     "\ninput: glTF 2.0 (.glb, .gltf), Wavefront OBJ + MTL, meshray scenes (.toml)",
     "\noutput: PNG, OpenEXR, JPEG, WebP",
@@ -9,4 +9,4 @@ pub const LONG: &str = concat!(
 );
 
 /// Version alone.
-pub const SHORT: &str = env!("CARGO_PKG_VERSION");
+pub(super) const SHORT: &str = env!("CARGO_PKG_VERSION");

@@ -1,7 +1,7 @@
 //! `[[lights]]`, `[[cameras]]` and `[render]`.
 
 use super::reader::{Table, boolean, color, direction, number, numbers, positive, string, vec, whole, within, word};
-use crate::math::{DAffine3, DMat3, DVec3, Vec3};
+use crate::math::{DVec3, Vec3};
 use crate::scene::{Camera, Falloff, Light, LightKind, Projection, RenderHints};
 
 #[derive(Clone, Copy)]
@@ -88,15 +88,7 @@ pub(super) fn camera(table: Table, up: DVec3) -> Option<Camera> {
         None => Projection::Perspective { y_fov: fov.unwrap_or(45.0).to_radians(), aspect: None },
     };
     table.finish();
-    Some(Camera { name, projection, world_from_camera: look_at(eye?, at, up) })
-}
-
-/// A camera looks along its −z; when `up` lies along the view, another axis stands in for it.
-fn look_at(eye: DVec3, at: DVec3, up: DVec3) -> DAffine3 {
-    let z = (eye - at).try_normalize().unwrap_or(DVec3::Z);
-    let side = |up: DVec3| up.cross(z).try_normalize().filter(|_| up.dot(z).abs() < 0.999_999);
-    let x = side(up).or_else(|| side(DVec3::NEG_Z)).unwrap_or(DVec3::X);
-    DAffine3 { matrix3: DMat3::from_cols(x, z.cross(x), z), translation: eye }
+    Some(Camera { name, projection, world_from_camera: Camera::look_at(eye?, at, up) })
 }
 
 /// Reads `[render]`.

@@ -1,0 +1,273 @@
+//! `--again`: the settings a picture carries, and how they become a command line once more.
+//!
+//! Settings are stored as the flags that repeat them, with the values that were used (an `auto` depth as the depth it
+//! became). A picture may come from a stranger, so only flags that shape pixels are taken from it: never names of
+//! outputs, folders or limits.
+
+use super::args::{Cli, Command, RenderArgs};
+use super::camera::{Choice, LensChoice};
+use super::job::{Batch, RenderJob, Shot};
+use super::parse;
+use super::picture::Effective;
+use super::stats::Counted;
+use crate::image::{ExrSamples, FileKind, Metadata, PngDepth, read_metadata};
+use crate::load::{Diagnostic, Loaded, MtlMode, Polygons};
+use crate::math::DVec3;
+use crate::scene::{Background, UpAxis};
+use clap::Parser;
+use serde_json::{Map, Value};
+use std::path::{Path, PathBuf};
+
+/// The flags that a picture may bring along.
+const FLAGS: [&str; 26] = [
+    "size",
+    "samples",
+    "depth",
+    "cutoff",
+    "seed",
+    "view",
+    "camera",
+    "eye",
+    "at",
+    "up-vector",
+    "fov",
+    "ortho",
+    "up",
+    "background",
+    "tone-map",
+    "exposure",
+    "bits",
+    "float",
+    "layers",
+    "merge",
+    "format",
+    "scene",
+    "polygons",
+    "mtl",
+    "accel",
+    "allow-empty",
+];
+
+/// What there is to say about the making of a picture.
+pub(super) struct Facts<'a> {
+    /// The whole job.
+    pub job: &'a RenderJob,
+    /// The inputs.
+    pub batch: &'a Batch,
+    /// The picture.
+    pub shot: &'a Shot,
+    /// Settings as used.
+    pub effective: &'a Effective,
+    /// Depth as used.
+    pub depth: u32,
+    /// What was loaded.
+    pub loaded: &'a Loaded,
+}
+
+impl Facts<'_> {
+    /// Names of the inputs as typed.
+    pub(super) fn inputs(&self) -> Vec<String> {
+        self.batch.inputs.iter().map(|i| i.to_string_lossy().into_owned()).collect()
+    }
+
+    /// Hash of everything read.
+    pub(super) fn hash(&self) -> String {
+        format!("{:032x}", self.loaded.facts.hash)
+    }
+
+    fn settings(&self) -> Map<String, Value> {
+        let (settings, output) = (&self.effective.settings, &self.effective.output);
+        let load = &self.job.load;
+        let mut flags = Map::new();
+        let mut set = |flag: &str, value: String| drop(flags.insert(flag.into(), Value::String(value)));
+        set("size", format!("{}x{}", settings.width, settings.height));
+        set("samples", settings.samples.to_string());
+        set("depth", self.depth.to_string());
+        set("cutoff", settings.cutoff.to_string());
+        set("seed", settings.seed.to_string());
+        match &self.shot.choice {
+            Choice::Default => {}
+            Choice::Named(view) => set("view", view.name().into()),
+            Choice::Camera(name) => set("camera", name.clone()),
+            Choice::Free { eye, at, up } => {
+                set("eye", vector(*eye));
+                at.iter().for_each(|at| set("at", vector(*at)));
+                up.iter().for_each(|up| set("up-vector", vector(*up)));
+            }
+        }
+        match self.job.look.lens {
+            Some(LensChoice::Fov(radians)) => set("fov", radians.to_degrees().to_string()),
+            Some(LensChoice::Ortho(height)) => set("ortho", height.map_or("auto".into(), |h| h.to_string())),
+            None => {}
+        }
+        match load.up {
+            Some(UpAxis::Y) => set("up", "y".into()),
+            Some(UpAxis::Z) => set("up", "z".into()),
+            None => {}
+        }
+        match self.job.look.background {
+            Some(Background::Transparent) => set("background", "transparent".into()),
+            Some(Background::Environment) => set("background", "env".into()),
+            Some(Background::Color(color)) => set("background", parse::color_text(color)),
+            None => {}
+        }
+        set("tone-map", output.tone_map.name().into());
+        set("exposure", output.exposure.to_string());
+        set("format", self.shot.kind.extension().into());
+        if self.shot.kind == FileKind::Png && output.png_depth == PngDepth::Sixteen {
+            set("bits", "16".into());
+        }
+        load.scene.iter().for_each(|scene| set("scene", scene.clone()));
+        if load.polygons == Polygons::Whole {
+            set("polygons", "whole".into());
+        }
+        if load.mtl == MtlMode::Literal {
+            set("mtl", "literal".into());
+        }
+        set("accel", self.job.accel.name().into());
+        let switches = [
+            ("float", self.shot.kind == FileKind::Exr && output.exr_samples == ExrSamples::Float),
+            ("layers", settings.layers),
+            ("merge", self.batch.inputs.len() > 1),
+            ("allow-empty", self.job.allow_empty),
+        ];
+        flags.extend(switches.into_iter().filter(|(_, on)| *on).map(|(flag, _)| (flag.into(), Value::Bool(true))));
+        flags
+    }
+}
+
+fn vector(v: DVec3) -> String {
+    format!("{},{},{}", v.x, v.y, v.z)
+}
+
+/// What a finished picture says about itself.
+pub(super) fn metadata(facts: &Facts, counted: Option<&Counted>) -> Metadata {
+    let metadata = Metadata::new()
+        .with(Metadata::SETTINGS, Value::Object(facts.settings()).to_string())
+        .with(Metadata::INPUT, Value::from(facts.inputs()).to_string())
+        .with(Metadata::INPUT_HASH, facts.hash());
+    match counted {
+        Some(counted) => metadata.with(Metadata::COUNTS, counted.json().to_string()),
+        None => metadata,
+    }
+}
+
+/// What `--again` found out.
+pub(super) struct Repeat {
+    /// The command line that repeats the picture.
+    pub args: RenderArgs,
+    /// The hash its inputs must have.
+    pub hash: String,
+    /// Said when another version of meshray wrote it.
+    pub warning: Option<Diagnostic>,
+}
+
+/// The command line that made `picture`, with what `typed` adds: inputs, output, and how to run.
+pub(super) fn repeat(picture: &Path, typed: &RenderArgs) -> Result<Repeat, Diagnostic> {
+    let fault = |text: String| Diagnostic::new("again", picture, "", text);
+    let metadata = read_metadata(picture).map_err(|e| fault(e.to_string()))?;
+    let metadata = metadata.ok_or_else(|| fault("was not written by meshray".into()))?;
+    let entry = |key| metadata.get(key).ok_or_else(|| fault(format!("carries no {key}; it cannot be repeated")));
+    let settings: Map<String, Value> =
+        serde_json::from_str(entry(Metadata::SETTINGS)?).map_err(|e| fault(format!("{}: {e}", Metadata::SETTINGS)))?;
+    let inputs: Vec<String> =
+        serde_json::from_str(entry(Metadata::INPUT)?).map_err(|e| fault(format!("{}: {e}", Metadata::INPUT)))?;
+    let hash = entry(Metadata::INPUT_HASH)?.to_owned();
+
+    let inputs: Vec<PathBuf> =
+        if typed.inputs.is_empty() { inputs.into_iter().map(Into::into).collect() } else { typed.inputs.clone() };
+    if typed.inputs.is_empty() && inputs.iter().any(|i| i == Path::new("-")) {
+        return Err(fault("was made from standard input".into()).remedy("name the model, or `-`, before --again"));
+    }
+    let args = parse_settings(&settings).map_err(fault)?;
+    let warning = entry(Metadata::VERSION).ok().filter(|v| *v != super::version::SHORT).map(|version| {
+        let text =
+            format!("written by meshray {version}; this is {}, which may draw it otherwise", super::version::SHORT);
+        Diagnostic::new("again-version", picture, "", text)
+    });
+    Ok(Repeat { args: with_typed(args, inputs, typed), hash, warning })
+}
+
+fn parse_settings(settings: &Map<String, Value>) -> Result<RenderArgs, String> {
+    let mut words = vec!["meshray".to_owned(), "render".to_owned()];
+    for (flag, value) in settings {
+        if !FLAGS.contains(&flag.as_str()) {
+            return Err(format!("carries a setting '{flag}' that is not known here"));
+        }
+        match value {
+            Value::String(text) => words.push(format!("--{flag}={text}")),
+            Value::Bool(true) => words.push(format!("--{flag}")),
+            _ => return Err(format!("carries a setting '{flag}' that makes no sense")),
+        }
+    }
+    // The real inputs follow; the parser only wants one to be there.
+    words.push("input".into());
+    match Cli::try_parse_from(words).map(|cli| cli.command) {
+        Ok(Command::Render(args)) => Ok(*args),
+        Ok(_) => Err("carries no settings of a picture".into()),
+        Err(e) => Err(format!("carries settings that are not understood: {}", e.kind())),
+    }
+}
+
+/// Pixels from the picture, everything else as typed now.
+fn with_typed(pixels: RenderArgs, inputs: Vec<PathBuf>, typed: &RenderArgs) -> RenderArgs {
+    RenderArgs {
+        inputs,
+        again: None,
+        output: typed.output.clone(),
+        root: typed.root.clone(),
+        max_memory: typed.max_memory,
+        keep_partial: typed.keep_partial,
+        strict: typed.strict,
+        grid: typed.grid.clone(),
+        threads: typed.threads,
+        stats: typed.stats,
+        stats_file: typed.stats_file.clone(),
+        messages: typed.messages,
+        quiet: typed.quiet,
+        ..pixels
+    }
+}
+
+/// Refuses inputs that are not those of the picture.
+pub(super) fn check_hash(expected: &str, loaded: &Loaded, file: &Path) -> Result<(), Diagnostic> {
+    let found = format!("{:032x}", loaded.facts.hash);
+    if found == expected {
+        return Ok(());
+    }
+    let text = format!("has changed since the picture was made: hash {found}, the picture's is {expected}");
+    Err(Diagnostic::new("again-hash", file, "", text).remedy("name the file that was rendered then"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn every_flag_a_picture_may_bring_is_a_flag() {
+        let command = Cli::command();
+        let render = command.find_subcommand("render").unwrap();
+        for flag in FLAGS {
+            assert!(render.get_arguments().any(|a| a.get_long() == Some(flag)), "{flag}");
+        }
+    }
+
+    #[test]
+    fn settings_from_a_stranger_cannot_name_outputs_or_folders() {
+        for flag in ["output", "root", "stats-file", "max-memory", "again"] {
+            let settings = Map::from_iter([(flag.to_owned(), Value::String("/etc".into()))]);
+            assert!(parse_settings(&settings).unwrap_err().contains(flag));
+        }
+    }
+
+    #[test]
+    fn settings_are_read_back_as_they_were_stored() {
+        let stored =
+            serde_json::json!({"size": "64x32", "eye": "-1,2,3.5", "ortho": "2.5", "layers": true, "camera": "-x"});
+        let args = parse_settings(stored.as_object().unwrap()).unwrap();
+        assert_eq!((args.size, args.eye), (Some((64, 32)), Some([-1.0, 2.0, 3.5])));
+        assert_eq!((args.ortho, args.layers), (Some(parse::Ortho::Height(2.5)), true));
+        assert_eq!(args.camera, ["-x"]);
+    }
+}

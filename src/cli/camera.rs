@@ -1,0 +1,184 @@
+//! From what the user chose to a camera in the scene.
+
+use super::parse::Ortho;
+use crate::load::Diagnostic;
+use crate::load::suggest::{list, nearest};
+use crate::math::DVec3;
+use crate::scene::framing::{self, Bounds, DEFAULT_FOV, FrameLens, NamedView, frame};
+use crate::scene::{Camera, Projection, Scene, UpAxis};
+use std::path::Path;
+
+/// Where a picture is seen from, as chosen.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Choice {
+    /// The file's camera, or else a good side.
+    Default,
+    /// A side of the model.
+    Named(NamedView),
+    /// A camera of the file, by name or number from 0.
+    Camera(String),
+    /// A place of the user's.
+    Free {
+        /// Camera position.
+        eye: DVec3,
+        /// What it looks at; `None`: the middle of the model.
+        at: Option<DVec3>,
+        /// Up in the picture; `None`: the scene's up axis.
+        up: Option<DVec3>,
+    },
+}
+
+impl Choice {
+    /// The word for it in file names and messages.
+    pub(super) fn name(&self) -> String {
+        match self {
+            Self::Default => "default".into(),
+            Self::Named(view) => view.name().into(),
+            Self::Camera(name) => name.clone(),
+            Self::Free { .. } => "eye".into(),
+        }
+    }
+}
+
+/// `--fov` or `--ortho`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum LensChoice {
+    /// Vertical field of view, radians.
+    Fov(f64),
+    /// Parallel rays over a height, or over what the model needs.
+    Ortho(Option<f64>),
+}
+
+impl LensChoice {
+    /// From what was typed: degrees, a height.
+    pub(super) fn new(fov: Option<f64>, ortho: Option<Ortho>) -> Option<Self> {
+        match ortho {
+            Some(Ortho::Auto) => Some(Self::Ortho(None)),
+            Some(Ortho::Height(height)) => Some(Self::Ortho(Some(height))),
+            None => fov.map(|degrees| Self::Fov(degrees.to_radians())),
+        }
+    }
+
+    fn framing(self) -> FrameLens {
+        match self {
+            Self::Fov(y_fov) => FrameLens::Perspective { y_fov },
+            Self::Ortho(_) => FrameLens::Orthographic,
+        }
+    }
+
+    /// The lens itself; `model` is the height that shows the whole model.
+    fn projection(self, aspect: f64, model: f64) -> Projection {
+        match self {
+            Self::Fov(y_fov) => Projection::Perspective { y_fov, aspect: None },
+            Self::Ortho(height) => {
+                let y_mag = height.unwrap_or(model) * 0.5;
+                Projection::Orthographic { x_mag: y_mag * aspect, y_mag }
+            }
+        }
+    }
+}
+
+/// The camera of a choice, and a phrase that says which it is. `aspect` is width / height of the picture.
+pub(super) fn camera(
+    choice: &Choice,
+    lens: Option<LensChoice>,
+    scene: &Scene,
+    bounds: &Bounds,
+    aspect: f64,
+    file: &Path,
+) -> Result<(Camera, String), Diagnostic> {
+    let model_height = 2.0 * bounds.radius();
+    let (mut camera, phrase) = match choice {
+        Choice::Default if scene.cameras.is_empty() => {
+            let direction = framing::default_direction(scene, bounds);
+            (frame(scene, bounds, direction, framing_lens(lens), aspect), "default view".to_owned())
+        }
+        Choice::Default => {
+            let camera = framing::default_camera(scene, bounds, aspect);
+            let phrase = format!("camera {} of the file", quoted(&camera.name));
+            (camera, phrase)
+        }
+        Choice::Named(view) => {
+            let direction = view.direction(scene.up);
+            (frame(scene, bounds, direction, framing_lens(lens), aspect), format!("{view} view"))
+        }
+        Choice::Camera(name) => (find(name, scene, file)?.clone(), format!("camera {}", quoted(name))),
+        Choice::Free { eye, at, up } => {
+            let upright = if scene.up == UpAxis::Z { DVec3::Z } else { DVec3::Y };
+            let world_from_camera = Camera::look_at(*eye, at.unwrap_or(bounds.center()), up.unwrap_or(upright));
+            let lens = lens.unwrap_or(LensChoice::Fov(DEFAULT_FOV));
+            let projection = lens.projection(aspect, model_height);
+            (Camera { name: String::new(), projection, world_from_camera }, "given eye".to_owned())
+        }
+    };
+    // Framed cameras have the chosen lens already, but for a height of the user's own.
+    let framed = matches!(choice, Choice::Named(_)) || (*choice == Choice::Default && scene.cameras.is_empty());
+    match lens {
+        Some(LensChoice::Ortho(None)) | Some(LensChoice::Fov(_)) if framed => {}
+        Some(lens) => camera.projection = lens.projection(aspect, model_height),
+        None => {}
+    }
+    Ok((camera, phrase))
+}
+
+fn framing_lens(lens: Option<LensChoice>) -> FrameLens {
+    lens.map_or(FrameLens::Perspective { y_fov: DEFAULT_FOV }, LensChoice::framing)
+}
+
+fn quoted(name: &str) -> String {
+    if name.is_empty() { "without a name".into() } else { format!("'{name}'") }
+}
+
+fn find<'s>(name: &str, scene: &'s Scene, file: &Path) -> Result<&'s Camera, Diagnostic> {
+    let by_name = scene.cameras.iter().find(|c| c.name == name);
+    let by_number = || name.parse::<usize>().ok().and_then(|i| scene.cameras.get(i));
+    by_name.or_else(by_number).ok_or_else(|| {
+        let names = || scene.cameras.iter().map(|c| c.name.as_str());
+        let text = format!("no camera is called '{name}'");
+        let remedy = if scene.cameras.is_empty() {
+            "the file has no cameras; use --view or --eye".to_owned()
+        } else if let Some(near) = nearest(name, names().filter(|n| !n.is_empty())) {
+            format!("did you mean '{near}'? there are, from 0: {}", list(names()))
+        } else {
+            format!("there are, from 0: {}", list(names()))
+        };
+        Diagnostic::new("camera-unknown", file, "", text).remedy(remedy)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::DAffine3;
+    use crate::scene::framing::robust_bounds;
+
+    fn scene() -> Scene {
+        let camera = |name: &str| Camera {
+            name: name.into(),
+            projection: Projection::Perspective { y_fov: 1.0, aspect: None },
+            world_from_camera: DAffine3::IDENTITY,
+        };
+        Scene { cameras: vec![camera("Front"), camera("")], ..Scene::default() }
+    }
+
+    fn pick(choice: Choice, lens: Option<LensChoice>) -> Result<(Camera, String), Diagnostic> {
+        let scene = scene();
+        camera(&choice, lens, &scene, &robust_bounds(&scene), 2.0, Path::new("a.glb"))
+    }
+
+    #[test]
+    fn a_camera_is_found_by_name_or_number() {
+        assert_eq!(pick(Choice::Camera("Front".into()), None).unwrap().1, "camera 'Front'");
+        assert!(pick(Choice::Camera("1".into()), None).is_ok());
+        let error = pick(Choice::Camera("Frnt".into()), None).unwrap_err().to_string();
+        assert_eq!(error, "a.glb: no camera is called 'Frnt'; did you mean 'Front'? there are, from 0: `Front`, ``");
+    }
+
+    #[test]
+    fn the_chosen_lens_replaces_the_files() {
+        let (camera, _) = pick(Choice::Default, Some(LensChoice::Fov(0.5))).unwrap();
+        assert_eq!(camera.projection, Projection::Perspective { y_fov: 0.5, aspect: None });
+        let (camera, _) = pick(Choice::Named(NamedView::Top), Some(LensChoice::Ortho(Some(3.0)))).unwrap();
+        assert_eq!(camera.projection, Projection::Orthographic { x_mag: 3.0, y_mag: 1.5 });
+    }
+}

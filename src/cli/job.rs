@@ -1,0 +1,435 @@
+//! What is to be done, checked: everything that can be known to be wrong before any work is told here.
+
+use super::args::{Axis, FileType, MessageFormat, MtlArg, PolygonsArg, RenderArgs, StatsFormat};
+use super::camera::{Choice, LensChoice};
+use super::message;
+use super::output_name::{self, Facts};
+use super::parse::Back;
+use crate::accel::{AccelKind, GridParams};
+use crate::image::{ExrSamples, FileKind, PngDepth, ToneMap};
+use crate::load::{Limits, LoadOptions, MtlMode, Polygons};
+use crate::scene::UpAxis;
+use crate::scene::framing::NamedView;
+use std::path::{Path, PathBuf};
+
+/// A command line that cannot be carried out: one line, exit code 2.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Wrong(pub String);
+
+fn wrong<T>(text: impl Into<String>) -> Result<T, Wrong> {
+    Err(Wrong(text.into()))
+}
+
+/// Everything `meshray render` is to do.
+#[derive(Clone, Debug)]
+pub(super) struct RenderJob {
+    /// One scene each, in the order given.
+    pub batches: Vec<Batch>,
+    /// How to load.
+    pub load: LoadOptions,
+    /// What the command line says about the picture; the rest comes from the scene or the defaults.
+    pub look: Look,
+    /// Which structure.
+    pub accel: AccelKind,
+    /// Its parameters.
+    pub grid: GridParams,
+    /// 0: all.
+    pub threads: usize,
+    /// Statistics, if wanted.
+    pub stats: Option<Stats>,
+    /// Only warnings and errors.
+    pub quiet: bool,
+    /// Warnings are errors.
+    pub strict: bool,
+    /// Nothing to draw is no error.
+    pub allow_empty: bool,
+    /// Keep the tiles that are done on Ctrl-C.
+    pub keep_partial: bool,
+    /// The hash that the inputs must have (`--again`), in hexadecimal.
+    pub expected_hash: Option<String>,
+}
+
+/// One scene and the pictures of it.
+#[derive(Clone, Debug)]
+pub(super) struct Batch {
+    /// Files that make the scene; `-` is standard input.
+    pub inputs: Vec<PathBuf>,
+    /// At least one.
+    pub shots: Vec<Shot>,
+}
+
+/// One picture.
+#[derive(Clone, Debug)]
+pub(super) struct Shot {
+    /// Seen from where.
+    pub choice: Choice,
+    /// Written to where.
+    pub target: Target,
+    /// As what.
+    pub kind: FileKind,
+}
+
+/// Where a picture goes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Target {
+    /// Standard output.
+    Stdout,
+    /// A file that is replaced whatever it holds.
+    Named(PathBuf),
+    /// A file of our own choosing: only a picture that meshray wrote is replaced.
+    Default(PathBuf),
+}
+
+impl Target {
+    /// The file, if it is one.
+    pub(super) fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Stdout => None,
+            Self::Named(path) | Self::Default(path) => Some(path),
+        }
+    }
+}
+
+/// What the command line says about the picture; `None`: nothing.
+#[derive(Clone, Debug)]
+pub(super) struct Look {
+    /// Columns and rows.
+    pub size: Option<(u32, u32)>,
+    /// Rays a pixel.
+    pub samples: Option<u32>,
+    /// Bounces after the eye ray.
+    pub depth: Option<u32>,
+    /// Weight where a branch ends.
+    pub cutoff: Option<f32>,
+    /// Seed of every random stream.
+    pub seed: u64,
+    /// Field of view or parallel rays.
+    pub lens: Option<LensChoice>,
+    /// Behind everything.
+    pub background: Option<Back>,
+    /// Curve from scene light to display light.
+    pub tone_map: Option<ToneMap>,
+    /// Stops.
+    pub exposure: Option<f32>,
+    /// Bits of a PNG sample.
+    pub png: PngDepth,
+    /// Numbers in an EXR.
+    pub exr: ExrSamples,
+    /// Layers beside the beauty.
+    pub layers: bool,
+}
+
+/// Statistics and where they go.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Stats {
+    /// For people or programs.
+    pub format: StatsFormat,
+    /// `None`: standard output.
+    pub file: Option<PathBuf>,
+}
+
+impl RenderJob {
+    /// Checks what was typed. Touches no file.
+    pub(super) fn new(args: &RenderArgs) -> Result<Self, Wrong> {
+        check_flags(args)?;
+        let choices = choices(args)?;
+        let batches = batches(args, &choices)?;
+        let stats = stats(args);
+        let to_stdout = batches.iter().flat_map(|b| &b.shots).any(|s| s.target == Target::Stdout);
+        if to_stdout && stats.as_ref().is_some_and(|s| s.file.is_none()) {
+            return wrong("the picture goes to standard output, so the statistics cannot; add --stats-file PATH");
+        }
+        Ok(Self {
+            load: load_options(args),
+            look: look(args)?,
+            grid: grid(args)?,
+            accel: args.accel,
+            threads: usize::from(args.threads),
+            stats,
+            quiet: args.quiet,
+            strict: args.strict,
+            allow_empty: args.allow_empty,
+            keep_partial: args.keep_partial,
+            expected_hash: None,
+            batches,
+        })
+    }
+}
+
+fn check_flags(args: &RenderArgs) -> Result<(), Wrong> {
+    if args.inputs.iter().filter(|i| i.as_path() == Path::new("-")).count() > 1 {
+        return wrong("standard input (`-`) can be read only once");
+    }
+    if args.inputs.is_empty() {
+        return wrong("no input; name a model");
+    }
+    if args.eye.is_none() && (args.at.is_some() || args.up_vector.is_some()) {
+        return wrong("--at and --up-vector belong to --eye; say where the camera stands");
+    }
+    if args.eye.is_some() && args.eye == args.at {
+        return wrong("--eye and --at are one point, so the camera looks nowhere");
+    }
+    if args.eye.is_some() && !(args.view.is_empty() && args.camera.is_empty()) {
+        return wrong("--eye places the camera, so --view and --camera cannot; use one of them");
+    }
+    if args.merge && args.scene.is_some() {
+        return wrong("--scene chooses a scene of one file and cannot be used with --merge");
+    }
+    if args.stats_file.is_some() && args.stats.is_none() {
+        return wrong("--stats-file needs --stats text or --stats json");
+    }
+    Ok(())
+}
+
+/// Every view that was asked for; one default when none was.
+fn choices(args: &RenderArgs) -> Result<Vec<Choice>, Wrong> {
+    if let Some(eye) = args.eye {
+        let (at, up) = (args.at.map(Into::into), args.up_vector.map(Into::into));
+        return Ok(vec![Choice::Free { eye: eye.into(), at, up }]);
+    }
+    let mut choices = Vec::new();
+    for name in &args.view {
+        let view = name.parse::<NamedView>().map_err(|unknown| {
+            let near = crate::load::suggest::nearest(name, NamedView::ALL.map(NamedView::name));
+            Wrong(near.map_or(unknown.to_string(), |near| format!("{unknown}; did you mean {near}?")))
+        })?;
+        choices.push(Choice::Named(view));
+    }
+    choices.extend(args.camera.iter().map(|name| Choice::Camera(name.clone())));
+    if choices.is_empty() {
+        choices.push(Choice::Default);
+    }
+    Ok(choices)
+}
+
+fn batches(args: &RenderArgs, choices: &[Choice]) -> Result<Vec<Batch>, Wrong> {
+    let groups: Vec<Vec<PathBuf>> =
+        if args.merge { vec![args.inputs.clone()] } else { args.inputs.iter().map(|i| vec![i.clone()]).collect() };
+    let mut batches = Vec::new();
+    let mut frame = 0;
+    for inputs in groups {
+        let mut shots = Vec::new();
+        for choice in choices {
+            frame += 1;
+            let facts = Facts { input: &inputs[0], view: &choice.name(), frame };
+            let (target, kind) = target(args, &facts, choices.len() > 1)?;
+            shots.push(Shot { choice: choice.clone(), target, kind });
+        }
+        batches.push(Batch { inputs, shots });
+    }
+    refuse_collisions(&batches)?;
+    Ok(batches)
+}
+
+fn target(args: &RenderArgs, facts: &Facts, several_views: bool) -> Result<(Target, FileKind), Wrong> {
+    let format = args.format.map(FileKind::from);
+    let extension = format.unwrap_or(FileKind::Png).extension();
+    let template = match args.output.as_deref() {
+        Some("-") => return Ok((Target::Stdout, format.unwrap_or(FileKind::Png))),
+        Some("") => return wrong("-o needs a name"),
+        Some(folder) if folder.ends_with('/') || Path::new(folder).is_dir() => {
+            output_name::default_template(Some(folder), several_views, extension)
+        }
+        Some(template) => template.to_owned(),
+        None => output_name::default_template(None, several_views, extension),
+    };
+    let path = output_name::fill(&template, facts).map_err(Wrong)?;
+    let kind = match format {
+        Some(kind) => kind,
+        None => FileKind::from_path(&path).map_err(|e| Wrong(format!("{e}, or say --format")))?,
+    };
+    let target = if args.output.is_some() { Target::Named(path) } else { Target::Default(path) };
+    Ok((target, kind))
+}
+
+fn refuse_collisions(batches: &[Batch]) -> Result<(), Wrong> {
+    let shots: Vec<(&Path, &Shot)> =
+        batches.iter().flat_map(|b| b.shots.iter().map(|s| (b.inputs[0].as_path(), s))).collect();
+    let to_stdout = shots.iter().filter(|(_, s)| s.target == Target::Stdout).count();
+    if to_stdout > 1 {
+        return wrong(format!("{to_stdout} pictures cannot all go to standard output; use -o '{{stem}}-{{view}}.png'"));
+    }
+    let names: Vec<PathBuf> = shots.iter().filter_map(|(_, s)| s.target.path().map(Path::to_path_buf)).collect();
+    let Some((a, b)) = output_name::collision(&names) else { return Ok(()) };
+    let what = |i: usize| match &shots[i].1.choice {
+        Choice::Default => format!("{}", shots[i].0.display()),
+        choice => format!("{} ({})", shots[i].0.display(), choice.name()),
+    };
+    wrong(format!(
+        "{} and {} would both be written to {}; use {{dir}}, {{stem}}, {{view}} or {{frame:04}} in -o",
+        what(a),
+        what(b),
+        names[b].display()
+    ))
+}
+
+fn load_options(args: &RenderArgs) -> LoadOptions {
+    LoadOptions {
+        root: args.root.clone(),
+        limits: limits(args.max_memory),
+        polygons: args.polygons.into(),
+        mtl: args.mtl.into(),
+        scene: args.scene.clone(),
+        up: args.up.map(Into::into),
+    }
+}
+
+/// The usual limits, none of them above `memory`.
+pub(super) fn limits(memory: Option<u64>) -> Limits {
+    let usual = Limits::default();
+    let Some(memory) = memory else { return usual };
+    Limits { memory, file: usual.file.min(memory), image_pixels: usual.image_pixels.min(memory / 4) }
+}
+
+fn look(args: &RenderArgs) -> Result<Look, Wrong> {
+    let tone_map = match &args.tone_map {
+        Some(name) => Some(name.parse::<ToneMap>().map_err(|e| Wrong(e.to_string()))?),
+        None => None,
+    };
+    Ok(Look {
+        size: args.size,
+        samples: args.samples,
+        depth: args.depth,
+        cutoff: args.cutoff,
+        seed: args.seed,
+        lens: LensChoice::new(args.fov, args.ortho),
+        background: args.background,
+        tone_map,
+        exposure: args.exposure,
+        png: if args.bits == Some(16) { PngDepth::Sixteen } else { PngDepth::Eight },
+        exr: if args.float { ExrSamples::Float } else { ExrSamples::Half },
+        layers: args.layers,
+    })
+}
+
+fn grid(args: &RenderArgs) -> Result<GridParams, Wrong> {
+    let usual = GridParams::default();
+    let grid = GridParams {
+        density: args.grid.grid_density.unwrap_or(usual.density),
+        max_resolution: args.grid.grid_resolution.unwrap_or(usual.max_resolution),
+        max_depth: args.grid.octree_depth.unwrap_or(usual.max_depth),
+        step_cost: args.grid.step_cost.unwrap_or(usual.step_cost),
+    };
+    grid.validate().map_err(|e| Wrong(e.to_string()))?;
+    Ok(grid)
+}
+
+fn stats(args: &RenderArgs) -> Option<Stats> {
+    let file = args.stats_file.clone().filter(|f| f.as_path() != Path::new("-"));
+    args.stats.map(|format| Stats { format, file })
+}
+
+impl From<FileType> for FileKind {
+    fn from(typed: FileType) -> Self {
+        match typed {
+            FileType::Png => Self::Png,
+            FileType::Exr => Self::Exr,
+            FileType::Jpg => Self::Jpeg,
+            FileType::Webp => Self::Webp,
+        }
+    }
+}
+
+impl From<Axis> for UpAxis {
+    fn from(typed: Axis) -> Self {
+        match typed {
+            Axis::Y => Self::Y,
+            Axis::Z => Self::Z,
+        }
+    }
+}
+
+impl From<PolygonsArg> for Polygons {
+    fn from(typed: PolygonsArg) -> Self {
+        match typed {
+            PolygonsArg::Cut => Self::Cut,
+            PolygonsArg::Whole => Self::Whole,
+        }
+    }
+}
+
+impl From<MtlArg> for MtlMode {
+    fn from(typed: MtlArg) -> Self {
+        match typed {
+            MtlArg::Guess => Self::Guess,
+            MtlArg::Literal => Self::Literal,
+        }
+    }
+}
+
+impl From<MessageFormat> for message::Format {
+    fn from(typed: MessageFormat) -> Self {
+        match typed {
+            MessageFormat::Text => Self::Text,
+            MessageFormat::Json => Self::Json,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::args::{Cli, Command};
+    use clap::Parser;
+
+    fn job(line: &str) -> Result<RenderJob, Wrong> {
+        let words = ["meshray", "render"].into_iter().chain(line.split(' '));
+        match Cli::try_parse_from(words).unwrap().command {
+            Command::Render(args) => RenderJob::new(&args),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn outputs(line: &str) -> Vec<Target> {
+        job(line).unwrap().batches.into_iter().flat_map(|b| b.shots).map(|s| s.target).collect()
+    }
+
+    #[test]
+    fn pictures_go_to_the_current_folder_under_the_stem() {
+        assert_eq!(outputs("some/where/a.glb"), [Target::Default("a.png".into())]);
+        assert_eq!(outputs("a.glb b.obj -o {stem}.exr"), ["a.exr", "b.exr"].map(|n| Target::Named(n.into())));
+        assert_eq!(outputs("a.glb -o out/"), [Target::Named("out/a.png".into())]);
+        assert_eq!(outputs("a.glb --format exr"), [Target::Default("a.exr".into())]);
+        assert_eq!(outputs("a.glb -o -"), [Target::Stdout]);
+    }
+
+    #[test]
+    fn several_views_are_told_apart_by_name() {
+        let expected = ["a-front.png", "a-iso.png", "a-Left eye.png"].map(|n| Target::Default(n.into()));
+        let words = ["meshray", "render", "a.glb", "--view", "front,iso", "--camera", "Left eye"];
+        let Command::Render(args) = Cli::try_parse_from(words).unwrap().command else { panic!("not render") };
+        let job = RenderJob::new(&args).unwrap();
+        assert_eq!(job.batches[0].shots.iter().map(|s| s.target.clone()).collect::<Vec<_>>(), expected);
+    }
+
+    #[test]
+    fn two_pictures_of_one_name_are_refused_before_any_work() {
+        for line in ["x/a.obj y/a.glb", "a.obj b.obj -o c.png", "a.obj --view front,back -o a.png", "a.obj ./a.obj"] {
+            let Wrong(text) = job(line).unwrap_err();
+            assert!(text.contains("would both be written to"), "{line}: {text}");
+        }
+        assert!(job("x/a.obj y/a.glb -o {frame:04}.png").is_ok());
+        assert!(job("x/a.obj y/a.glb --merge").is_ok());
+        assert!(job("a.obj b.obj -o -").is_err());
+    }
+
+    #[test]
+    fn contradictions_are_refused() {
+        for line in [
+            "a.obj --at 0,0,0",
+            "a.obj --eye 1,1,1 --at 1,1,1",
+            "a.obj --eye 1,1,1 --view front",
+            "a.obj --view frnt",
+            "- -",
+            "a.obj -o picture.tif",
+            "a.obj -o -  --stats json".replace("  ", " ").as_str(),
+            "a.obj --stats-file s.json",
+            "a.obj --grid-density 0",
+            "a.obj --tone-map filmic",
+        ] {
+            assert!(job(line).is_err(), "{line}");
+        }
+        let Wrong(text) = job("a.obj --view frnt").unwrap_err();
+        assert!(text.ends_with("did you mean front?"), "{text}");
+    }
+}

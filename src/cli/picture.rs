@@ -1,0 +1,145 @@
+//! One picture: the settings that apply after command line, scene file and defaults are laid over each other, and its
+//! way into a file.
+
+use super::interrupt;
+use super::job::{Look, Shot, Target};
+use crate::image::{Metadata, Output, Picture, ToneMap, encode, write_atomic};
+use crate::load::Diagnostic;
+use crate::render::Settings;
+use crate::scene::{Background, Environment, RenderHints, Scene};
+use std::io::{self, Write};
+
+/// What applies to one picture.
+#[derive(Clone, Debug)]
+pub(super) struct Effective {
+    /// For the renderer.
+    pub settings: Settings,
+    /// For the encoder; its background is filled in when it is written.
+    pub output: Output,
+}
+
+impl Effective {
+    /// The command line first, then the scene file, then the defaults.
+    pub(super) fn new(look: &Look, hints: &RenderHints) -> Result<Self, String> {
+        let usual = Settings::default();
+        let (width, height) = look.size.or(hints.size).unwrap_or((usual.width, usual.height));
+        let hinted = hints.tone_map.as_deref().map(str::parse::<ToneMap>).transpose().map_err(|e| e.to_string())?;
+        Ok(Self {
+            settings: Settings {
+                width,
+                height,
+                samples: look.samples.or(hints.samples).unwrap_or(usual.samples),
+                depth: look.depth.or(hints.depth),
+                cutoff: look.cutoff.or(hints.cutoff).unwrap_or(usual.cutoff),
+                seed: look.seed,
+                layers: look.layers,
+            },
+            output: Output {
+                tone_map: look.tone_map.or(hinted).unwrap_or_default(),
+                exposure: look.exposure.or(hints.exposure).unwrap_or(0.0),
+                png_depth: look.png,
+                exr_samples: look.exr,
+                ..Output::default()
+            },
+        })
+    }
+}
+
+/// What is behind everything: as typed, as the file says, or what reflections see; black where there is nothing.
+pub(super) fn background(look: &Look, scene: &Scene) -> Background {
+    look.background.or(scene.background).unwrap_or(match scene.environment {
+        Environment::Black => Background::Color(crate::math::Vec3::ZERO),
+        Environment::Constant(_) | Environment::Studio => Background::Environment,
+    })
+}
+
+/// A fault when the picture alone needs more than the memory that is allowed.
+pub(super) fn too_large(effective: &Effective, limit: u64) -> Option<Diagnostic> {
+    let settings = &effective.settings;
+    // Beauty, its tiles and the encoder's copy; layers beside it.
+    let per_pixel = 16 * 3 + if settings.layers { 48 } else { 0 };
+    let need = u64::from(settings.width) * u64::from(settings.height) * per_pixel;
+    (need > limit).then(|| {
+        let text =
+            format!("a {}×{} picture needs {need} bytes where {limit} are allowed", settings.width, settings.height);
+        Diagnostic::new("picture-too-large", "", "", text).remedy("choose a smaller --size or raise --max-memory")
+    })
+}
+
+/// Why a picture was not written.
+pub(super) enum WriteError {
+    /// Whoever read standard output has enough; that is no fault.
+    BrokenPipe,
+    /// Anything else.
+    Fault(Diagnostic),
+}
+
+/// Encodes the picture and puts it where it belongs.
+pub(super) fn write(
+    shot: &Shot,
+    picture: &Picture,
+    effective: &Effective,
+    background: Option<Background>,
+    metadata: &Metadata,
+) -> Result<(), WriteError> {
+    let mut output = effective.output.clone();
+    if let Some(Background::Color(color)) = background {
+        output.background = Some(color.to_array());
+    }
+    let name = shot.target.path().unwrap_or(std::path::Path::new("-"));
+    let fault = |text: String| WriteError::Fault(Diagnostic::new("output-unwritable", name, "", text));
+    let bytes = encode(picture, shot.kind, &output, metadata).map_err(|e| fault(e.to_string()))?;
+    let _guard = interrupt::Guard::new();
+    match &shot.target {
+        Target::Stdout => {
+            let mut out = io::stdout().lock();
+            out.write_all(&bytes).and_then(|()| out.flush()).map_err(|e| match e.kind() {
+                io::ErrorKind::BrokenPipe => WriteError::BrokenPipe,
+                _ => fault(e.to_string()),
+            })
+        }
+        Target::Named(path) | Target::Default(path) => {
+            write_atomic(path, &bytes, false).map_err(|e| fault(e.to_string()))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::{ExrSamples, PngDepth};
+
+    fn look() -> Look {
+        Look {
+            size: None,
+            samples: None,
+            depth: None,
+            cutoff: None,
+            seed: 0,
+            lens: None,
+            background: None,
+            tone_map: None,
+            exposure: None,
+            png: PngDepth::Eight,
+            exr: ExrSamples::Half,
+            layers: false,
+        }
+    }
+
+    #[test]
+    fn the_command_line_overrides_the_scene_file_which_overrides_the_defaults() {
+        let hints =
+            RenderHints { depth: Some(5), samples: Some(9), tone_map: Some("aces".into()), ..Default::default() };
+        let effective = Effective::new(&Look { depth: Some(1), ..look() }, &hints).unwrap();
+        assert_eq!((effective.settings.depth, effective.settings.samples), (Some(1), 9));
+        assert_eq!((effective.settings.width, effective.output.tone_map), (1024, ToneMap::Aces));
+    }
+
+    #[test]
+    fn a_picture_beyond_the_memory_allowed_is_refused() {
+        let big = Effective::new(&Look { size: Some((65_535, 65_535)), ..look() }, &RenderHints::default()).unwrap();
+        assert!(too_large(&big, 8 << 30).is_some());
+        let usual = Effective::new(&look(), &RenderHints::default()).unwrap();
+        assert!(too_large(&usual, 8 << 30).is_none());
+    }
+}

@@ -1,0 +1,64 @@
+//! Inputs -> one scene, from files or standard input.
+
+use super::exit::Exit;
+use crate::load::{Diagnostic, LoadError, LoadOptions, Loaded, load, load_bytes};
+use crate::math::DAffine3;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use xxhash_rust::xxh3::xxh3_128;
+
+/// Loads every input and puts all into the first one's scene.
+pub(super) fn scene(inputs: &[PathBuf], options: &LoadOptions) -> Result<Loaded, LoadError> {
+    let mut parts = inputs.iter().map(|input| one(input, options));
+    let Some(first) = parts.next() else { return Ok(Loaded::default()) };
+    let mut whole = first?;
+    if inputs.len() == 1 {
+        return Ok(whole);
+    }
+    let mut hashes = whole.facts.hash.to_le_bytes().to_vec();
+    for part in parts {
+        let part = part?;
+        hashes.extend(part.facts.hash.to_le_bytes());
+        append(&mut whole, part);
+    }
+    whole.facts.hash = xxh3_128(&hashes);
+    Ok(whole)
+}
+
+fn append(whole: &mut Loaded, part: Loaded) {
+    whole.scene.append(part.scene, &DAffine3::IDENTITY);
+    whole.warnings.extend(part.warnings);
+    let (facts, more) = (&mut whole.facts, part.facts);
+    facts.faces += more.faces;
+    facts.dropped.extend(more.dropped);
+    facts.points_and_lines += more.points_and_lines;
+    facts.extensions.extend(more.extensions);
+    facts.max_rounding = facts.max_rounding.max(more.max_rounding);
+    facts.files.extend(more.files);
+}
+
+fn one(input: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
+    if input != Path::new("-") {
+        return load(input, options);
+    }
+    let limit = options.limits.file;
+    let mut bytes = Vec::new();
+    let read = std::io::stdin().lock().take(limit.saturating_add(1)).read_to_end(&mut bytes);
+    read.map_err(|source| LoadError::Read {
+        what: Box::new(Diagnostic::new("file-unreadable", "-", "", "standard input cannot be read")),
+        source,
+    })?;
+    if bytes.len() as u64 > limit {
+        let text = format!("more than the {limit} bytes that are allowed");
+        return Err(Diagnostic::new("file-too-large", "-", "", text).remedy("raise --max-memory").into());
+    }
+    load_bytes(input, bytes, options)
+}
+
+/// Whether trying again can help.
+pub(super) fn exit_of(error: &LoadError) -> Exit {
+    match error {
+        LoadError::Read { .. } => Exit::Failed,
+        LoadError::Input(_) => Exit::Input,
+    }
+}

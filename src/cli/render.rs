@@ -1,0 +1,305 @@
+//! `meshray render`: load, build, render, write; one batch after the other, going on where one fails.
+
+use super::camera;
+use super::exit::Exit;
+use super::job::{Batch, RenderJob, Shot, Target};
+use super::message::{Messages, Severity};
+use super::picture::{self, Effective};
+use super::progress::Progress;
+use super::stats::{self, PictureStats, Times};
+use super::{again, interrupt, output_name, read};
+use crate::accel::AnyAccel;
+use crate::image::was_written_by_meshray;
+use crate::load::{Diagnostic, Loaded};
+use crate::render::texture::TextureStore;
+use crate::render::{Job, Rendered, View, World};
+use crate::scene::framing::{Bounds, robust_bounds};
+use crate::scene::{default_light, default_light::DefaultLight};
+use std::path::Path;
+use std::time::Instant;
+
+/// Does the whole job and tells how it ended: as its worst picture.
+pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
+    let pool = match rayon::ThreadPoolBuilder::new().num_threads(job.threads).build() {
+        Ok(pool) => pool,
+        Err(e) => {
+            messages.error("threads", format!("cannot start {} threads: {e}", job.threads), "ask for fewer");
+            return Exit::Failed;
+        }
+    };
+    let mut worst = Exit::Done;
+    let mut done = Vec::new();
+    for batch in &job.batches {
+        let exit = pool.install(|| render_batch(job, batch, messages, &mut done));
+        worst = worst.max(exit);
+        if interrupt::raised() {
+            return Exit::Interrupted;
+        }
+    }
+    if job.batches.len() > 1 {
+        let (pictures, scenes) = (done.len(), job.batches.len());
+        messages.info("batch", format!("{pictures} pictures of {scenes} inputs, {} warnings", messages.warnings()));
+    }
+    worst.max(stats::report(job, &done, messages))
+}
+
+/// One scene and its pictures.
+fn render_batch(job: &RenderJob, batch: &Batch, messages: &Messages, done: &mut Vec<PictureStats>) -> Exit {
+    let mut worst = Exit::Done;
+    let mut shots = Vec::new();
+    for shot in &batch.shots {
+        match check_target(&shot.target, &batch.inputs) {
+            Ok(()) => shots.push(shot),
+            Err(fault) => {
+                messages.say(Severity::Error, &fault);
+                worst = Exit::Failed;
+            }
+        }
+    }
+    if shots.is_empty() {
+        return worst;
+    }
+    let name = batch.inputs[0].display().to_string();
+    let progress = Progress::new(&name, messages, job.quiet, job.keep_partial);
+    match prepare(job, batch, messages, &progress) {
+        Ok(mut ready) => {
+            for shot in shots {
+                worst = worst.max(render_shot(job, batch, shot, &mut ready, messages, &progress, done));
+                if interrupt::raised() {
+                    return Exit::Interrupted;
+                }
+            }
+            worst
+        }
+        Err(exit) => worst.max(exit),
+    }
+}
+
+/// Whether a picture may go there. Asked before any work is done for it.
+fn check_target(target: &Target, inputs: &[std::path::PathBuf]) -> Result<(), Diagnostic> {
+    let Some(path) = target.path() else {
+        use std::io::IsTerminal;
+        let text = "standard output is a terminal, which shows no pictures";
+        let fault = Diagnostic::new("output-terminal", "", "", text).remedy("redirect it, or name a file with -o");
+        return if std::io::stdout().is_terminal() { Err(fault) } else { Ok(()) };
+    };
+    let fault = |code, text: &str, remedy: &str| Err(Diagnostic::new(code, path, "", text).remedy(remedy));
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        return fault("output-folder", "its folder is not there", "create it, or name another with -o");
+    }
+    if path.is_dir() {
+        return fault("output-is-folder", "is a folder", "write a / behind it to put the picture into it");
+    }
+    if inputs.iter().any(|input| output_name::identity(input) == output_name::identity(path)) {
+        return fault("output-is-input", "is the input itself", "name another file with -o");
+    }
+    if matches!(target, Target::Default(_)) && path.exists() && !was_written_by_meshray(path) {
+        return fault("output-not-ours", "exists and is no picture that meshray wrote", "name the output with -o");
+    }
+    Ok(())
+}
+
+/// A scene that can be rendered.
+struct Ready {
+    loaded: Loaded,
+    world: World,
+    bounds: Bounds,
+    load_seconds: f64,
+}
+
+fn prepare(job: &RenderJob, batch: &Batch, messages: &Messages, progress: &Progress) -> Result<Ready, Exit> {
+    let start = Instant::now();
+    progress.stage("loading");
+    let loaded = read::scene(&batch.inputs, &job.load).map_err(|error| {
+        messages.load_error(&error);
+        read::exit_of(&error)
+    })?;
+    loaded.warnings.iter().for_each(|w| messages.say(Severity::Warning, w));
+    if job.strict && !loaded.warnings.is_empty() {
+        let count = loaded.warnings.len();
+        let text = format!("not rendered: --strict, and there are {count} kinds of warnings");
+        messages.say(Severity::Error, &Diagnostic::new("strict", &batch.inputs[0], "", text));
+        return Err(Exit::Input);
+    }
+    if let Some(expected) = &job.expected_hash {
+        again::check_hash(expected, &loaded, &batch.inputs[0]).map_err(|fault| {
+            messages.say(Severity::Error, &fault);
+            Exit::Failed
+        })?;
+    }
+    let world = World::new(&loaded.scene);
+    if world.shapes.is_empty() && !job.allow_empty {
+        messages.say(Severity::Error, &nothing_to_draw(&loaded, &batch.inputs[0]));
+        return Err(Exit::Input);
+    }
+    let bounds = robust_bounds(&loaded.scene);
+    Ok(Ready { loaded, world, bounds, load_seconds: start.elapsed().as_secs_f64() })
+}
+
+fn nothing_to_draw(loaded: &Loaded, file: &Path) -> Diagnostic {
+    let facts = &loaded.facts;
+    let held = match (facts.points_and_lines, facts.dropped.iter().map(|(_, n)| n).sum::<u64>()) {
+        (0, 0) => "nothing to draw: it holds no faces".to_owned(),
+        (n, 0) => format!("nothing to draw: it holds only {n} points and lines"),
+        (0, n) => format!("nothing to draw: all of its {n} faces had to be dropped"),
+        (p, n) => format!("nothing to draw: only {p} points and lines, and {n} faces that had to be dropped"),
+    };
+    Diagnostic::new("nothing-to-draw", file, "", held).remedy("--allow-empty draws the background")
+}
+
+fn render_shot(
+    job: &RenderJob,
+    batch: &Batch,
+    shot: &Shot,
+    ready: &mut Ready,
+    messages: &Messages,
+    progress: &Progress,
+    done: &mut Vec<PictureStats>,
+) -> Exit {
+    let Ready { loaded, world, bounds, load_seconds } = ready;
+    let file = &batch.inputs[0];
+    let fail = |fault: &Diagnostic, exit| {
+        messages.say(Severity::Error, fault);
+        exit
+    };
+    if let Some(fault) = overwrites_a_source(&shot.target, loaded) {
+        return fail(&fault, Exit::Failed);
+    }
+    let effective = match Effective::new(&job.look, &loaded.scene.hints) {
+        Ok(effective) => effective,
+        Err(text) => return fail(&Diagnostic::new("scene-value", file, "", text), Exit::Input),
+    };
+    if let Some(fault) = picture::too_large(&effective, job.load.limits.memory) {
+        return fail(&fault, Exit::Failed);
+    }
+
+    // The eye, then the light that belongs to it: each view has its own.
+    let aspect = f64::from(effective.settings.width) / f64::from(effective.settings.height);
+    let (camera, view_phrase) = match camera::camera(&shot.choice, job.look.lens, &loaded.scene, bounds, aspect, file) {
+        Ok(found) => found,
+        Err(fault) => return fail(&fault, Exit::Input),
+    };
+    let (lights, environment) = (loaded.scene.lights.clone(), loaded.scene.environment);
+    let background = loaded.scene.background;
+    let light = default_light::add_if_missing(&mut loaded.scene, &camera);
+    loaded.scene.background = Some(picture::background(&job.look, &loaded.scene));
+    let view = View::from_camera(&camera);
+
+    let mut times = Times { load: *load_seconds, ..Times::default() };
+    progress.stage("building");
+    let start = Instant::now();
+    let accel = AnyAccel::build(job.accel, &world.shapes, &job.grid);
+    let textures = TextureStore::new(&loaded.scene);
+    times.build = start.elapsed().as_secs_f64();
+
+    let work = Job {
+        scene: &loaded.scene,
+        world,
+        accel: &accel,
+        textures: &textures,
+        view: &view,
+        settings: &effective.settings,
+    };
+    let rendered = trace(job, &work, progress, &mut times);
+    progress.finish();
+    if !rendered.complete {
+        return keep_partial(shot, &rendered, &effective, loaded, messages);
+    }
+    let counted = job.stats.is_some().then(|| stats::count(&work, &rendered, &accel, messages));
+
+    let facts = again::Facts { job, batch, shot, effective: &effective, depth: rendered.depth, loaded };
+    let metadata = again::metadata(&facts, counted.as_ref());
+    let start = Instant::now();
+    let written = picture::write(shot, &rendered.picture, &effective, loaded.scene.background, &metadata);
+    times.write = start.elapsed().as_secs_f64();
+    let exit = match written {
+        Ok(()) => {
+            let summary = Summary { shot, effective: &effective, loaded, bounds, view: &view_phrase, light };
+            summary.say(&rendered, &times, messages);
+            let stats = PictureStats::new(&facts, &view_phrase, times, world, accel.summary(), counted);
+            done.push(stats);
+            Exit::Done
+        }
+        Err(picture::WriteError::BrokenPipe) => Exit::Done,
+        Err(picture::WriteError::Fault(fault)) => fail(&fault, Exit::Failed),
+    };
+    // The next view starts from the scene as it was loaded; it has been loaded already, too.
+    loaded.scene.lights = lights;
+    loaded.scene.environment = environment;
+    loaded.scene.background = background;
+    *load_seconds = 0.0;
+    exit
+}
+
+fn trace(job: &RenderJob, work: &Job, progress: &Progress, times: &mut Times) -> Rendered {
+    progress.render();
+    let _guard = job.keep_partial.then(interrupt::Guard::new);
+    let start = Instant::now();
+    let rendered = crate::render::render(work, progress);
+    times.render = start.elapsed().as_secs_f64();
+    rendered
+}
+
+/// A picture must never replace a texture of its own model.
+fn overwrites_a_source(target: &Target, loaded: &Loaded) -> Option<Diagnostic> {
+    let path = target.path()?;
+    let target = output_name::identity(path);
+    let same = loaded.facts.files.iter().any(|file| output_name::identity(file) == target);
+    same.then(|| {
+        Diagnostic::new("output-is-input", path, "", "is a file that the model uses").remedy("name another with -o")
+    })
+}
+
+fn keep_partial(shot: &Shot, rendered: &Rendered, effective: &Effective, loaded: &Loaded, messages: &Messages) -> Exit {
+    let Some(path) = shot.target.path() else { return Exit::Interrupted };
+    let path = output_name::partial(path);
+    let partial = Shot { target: Target::Named(path.clone()), ..shot.clone() };
+    // Without settings in it nobody will take it for a finished picture.
+    let metadata = crate::image::Metadata::new();
+    match picture::write(&partial, &rendered.picture, effective, loaded.scene.background, &metadata) {
+        Ok(()) => messages.info("partial", format!("interrupted; the tiles that were done are in {}", path.display())),
+        Err(picture::WriteError::Fault(fault)) => messages.say(Severity::Error, &fault),
+        Err(picture::WriteError::BrokenPipe) => {}
+    }
+    Exit::Interrupted
+}
+
+/// The lines at the end of a picture.
+struct Summary<'a> {
+    shot: &'a Shot,
+    effective: &'a Effective,
+    loaded: &'a Loaded,
+    bounds: &'a Bounds,
+    view: &'a str,
+    light: DefaultLight,
+}
+
+impl Summary<'_> {
+    fn say(&self, rendered: &Rendered, times: &Times, messages: &Messages) {
+        let name = self.shot.target.path().map_or("standard output".into(), |p| p.display().to_string());
+        messages.info("picture", format!("{name}: {}", self.picture(rendered)));
+        messages.info("times", format!("{name}: {}", times.line(&self.effective.settings)));
+    }
+
+    fn picture(&self, rendered: &Rendered) -> String {
+        let settings = &self.effective.settings;
+        let mut parts = vec![
+            format!("{}×{}", settings.width, settings.height),
+            format!("{} samples a pixel", settings.samples),
+            format!("depth {}{}", rendered.depth, if settings.depth.is_none() { " (auto)" } else { "" }),
+            self.view.to_owned(),
+        ];
+        if let Some(reason) = &self.loaded.facts.up_reason {
+            let axis = if self.loaded.scene.up == crate::scene::UpAxis::Z { "+Z" } else { "+Y" };
+            parts.push(format!("{axis} up ({reason})"));
+        }
+        if self.light == DefaultLight::Added {
+            parts.push("studio light".into());
+        }
+        if self.bounds.strays > 0 {
+            parts.push(format!("framing leaves out {} far-off faces", self.bounds.strays));
+        }
+        parts.join(", ")
+    }
+}

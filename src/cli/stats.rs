@@ -1,0 +1,271 @@
+//! `--stats`: what pictures cost, as a table or as JSON.
+//!
+//! # Schema `meshray-stats/1`
+//! One JSON object: `schema`, `version` (of meshray), and `pictures`, a list with one object for each picture written:
+//!
+//! | key | what |
+//! |---|---|
+//! | `inputs`, `output`, `input_hash` | files as typed (`-`: standard streams); xxh3-128 of what was read, hexadecimal |
+//! | `width`, `height`, `samples`, `depth`, `cutoff`, `seed`, `view`, `accel`, `threads` | settings that were used |
+//! | `seconds` | of the timed run: `load`, `build`, `render`, `write`; `load` is 0 for further views of one input |
+//! | `scene` | `triangles`, `polygons`, `spheres`, `planes`, `vertices`, `materials`, `textures`, `lights` |
+//! | `structure` | V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`; `bytes` and `depth` |
+//! | `counts` | for each ray class `primary`, `shadow`, `reflected`, `refracted`, and `all`: exact `rays`, `hits`, `tests`, `steps`, `cells`, `empty_cells`, `volume_tests`, `tests_saved`; and per ray `n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`; `culled` = 1 − n_it / N |
+//! | `counted_seconds` | time of the second run that counted; never compare it with `seconds` |
+//! | `rounding` | largest displacement of a vertex by rounding, world units |
+//!
+//! Keys are only ever added; a change of meaning gets another schema name.
+
+use super::again::Facts;
+use super::args::StatsFormat;
+use super::exit::Exit;
+use super::job::RenderJob;
+use super::message::Messages;
+use crate::accel::{AnyAccel, RayCounts, StructureStats};
+use crate::render::{ClassCounts, Job, Rendered, Settings, World};
+use serde_json::{Value, json};
+use std::io;
+use std::time::Instant;
+
+/// Seconds of the stages.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Times {
+    /// Reading and decoding; 0 when an earlier picture has paid for it.
+    pub load: f64,
+    /// The structure.
+    pub build: f64,
+    /// Rays.
+    pub render: f64,
+    /// Encoding and writing.
+    pub write: f64,
+}
+
+impl Times {
+    /// One line for people.
+    pub(super) fn line(&self, settings: &Settings) -> String {
+        let eye_rays = f64::from(settings.width) * f64::from(settings.height) * f64::from(settings.samples);
+        format!(
+            "load {}, build {}, render {}, write {}; {} eye rays",
+            seconds(self.load),
+            seconds(self.build),
+            seconds(self.render),
+            seconds(self.write),
+            short(eye_rays)
+        )
+    }
+}
+
+fn seconds(s: f64) -> String {
+    match s {
+        s if s < 0.0995 => format!("{:.0} ms", s * 1e3),
+        s if s < 9.95 => format!("{s:.2} s"),
+        s => format!("{s:.1} s"),
+    }
+}
+
+fn short(n: f64) -> String {
+    match n {
+        n if n >= 1e9 => format!("{:.2} G", n / 1e9),
+        n if n >= 1e6 => format!("{:.2} M", n / 1e6),
+        n if n >= 1e4 => format!("{:.1} k", n / 1e3),
+        n => format!("{n:.0}"),
+    }
+}
+
+/// A counted run.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Counted {
+    /// By ray class.
+    pub counts: ClassCounts,
+    /// Its own time.
+    pub seconds: f64,
+    /// Prims of all kinds.
+    pub prims: u64,
+}
+
+/// Renders once more, counting; complains when the pixels differ, because then the counts belong to another picture.
+pub(super) fn count(work: &Job, timed: &Rendered, accel: &AnyAccel, messages: &Messages) -> Counted {
+    let start = Instant::now();
+    let counted = crate::render::render_counted(work, &());
+    if counted.picture != timed.picture {
+        let text = format!("the counted run with {} gave other pixels than the timed one", accel.kind());
+        messages.error("counts-differ", text, "please report it with the model");
+    }
+    let prims = work.world.shapes.len() as u64;
+    Counted { counts: counted.counts, seconds: start.elapsed().as_secs_f64(), prims }
+}
+
+impl Counted {
+    /// By ray class and together.
+    pub(super) fn json(&self) -> Value {
+        let mut all = RayCounts::default();
+        let mut classes = serde_json::Map::new();
+        for (name, counts) in self.classes() {
+            all += *counts;
+            classes.insert(name.into(), class_json(counts, self.prims));
+        }
+        classes.insert("all".into(), class_json(&all, self.prims));
+        Value::Object(classes)
+    }
+
+    fn classes(&self) -> [(&'static str, &RayCounts); 4] {
+        let c = &self.counts;
+        [("primary", &c.primary), ("shadow", &c.shadow), ("reflected", &c.reflected), ("refracted", &c.refracted)]
+    }
+}
+
+fn class_json(c: &RayCounts, prims: u64) -> Value {
+    let per_ray = |n: u64| if c.queries == 0 { 0.0 } else { n as f64 / c.queries as f64 };
+    json!({
+        "rays": c.queries, "hits": c.found, "tests": c.n_it, "steps": c.n_ts, "cells": c.n_ets,
+        "empty_cells": c.n_eets, "volume_tests": c.n_bit, "tests_saved": c.n_mb,
+        "n_it": per_ray(c.n_it), "n_ts": per_ray(c.n_ts), "n_ets": per_ray(c.n_ets),
+        "n_eets": per_ray(c.n_eets), "n_bit": per_ray(c.n_bit), "n_mb": per_ray(c.n_mb),
+        "culled": if prims == 0 { 0.0 } else { 1.0 - per_ray(c.n_it) / prims as f64 },
+    })
+}
+
+/// Everything about one picture.
+pub(super) struct PictureStats {
+    json: Value,
+    counted: Option<Counted>,
+}
+
+impl PictureStats {
+    /// Gathers it.
+    pub(super) fn new(
+        facts: &Facts,
+        view: &str,
+        times: Times,
+        world: &World,
+        structure: StructureStats,
+        counted: Option<Counted>,
+    ) -> Self {
+        let settings = &facts.effective.settings;
+        let (scene, shapes) = (&facts.loaded.scene, &world.shapes);
+        let json = json!({
+            "inputs": facts.inputs(),
+            "output": facts.shot.target.path().map_or("-".into(), |p| p.to_string_lossy()),
+            "input_hash": facts.hash(),
+            "width": settings.width, "height": settings.height, "samples": settings.samples, "depth": facts.depth,
+            "cutoff": settings.cutoff, "seed": settings.seed, "view": view, "accel": facts.job.accel.name(),
+            "threads": rayon::current_num_threads(),
+            "seconds": { "load": times.load, "build": times.build, "render": times.render, "write": times.write },
+            "scene": {
+                "triangles": shapes.triangles.len(), "polygons": shapes.polygons.len(),
+                "spheres": shapes.spheres.len(), "planes": shapes.planes.len(), "vertices": shapes.vertices.len(),
+                "materials": scene.materials.len(), "textures": scene.textures.len(), "lights": scene.lights.len(),
+            },
+            "structure": {
+                "n_in": structure.n_in, "n_v": structure.n_v, "n_ev": structure.n_ev, "n_oiv": structure.n_oiv,
+                "bytes": structure.bytes, "depth": structure.depth,
+            },
+            "counts": counted.as_ref().map(Counted::json),
+            "counted_seconds": counted.as_ref().map(|c| c.seconds),
+            "rounding": facts.loaded.facts.max_rounding,
+        });
+        Self { json, counted }
+    }
+
+    fn text(&self) -> String {
+        let get = |key: &str| &self.json[key];
+        let number = |group: &str, key: &str| self.json[group][key].as_f64().unwrap_or(0.0);
+        let mut lines = vec![format!(
+            "{}  {}×{}  {} samples  depth {}  {}  {} threads",
+            get("output").as_str().unwrap_or_default(),
+            get("width"),
+            get("height"),
+            get("samples"),
+            get("depth"),
+            get("accel").as_str().unwrap_or_default(),
+            get("threads"),
+        )];
+        let times = ["load", "build", "render", "write"].map(|k| format!("{k} {}", seconds(number("seconds", k))));
+        lines.push(format!("  time       {}", times.join("  ")));
+        let shapes = ["triangles", "polygons", "spheres", "planes"];
+        let shapes = shapes.map(|k| (number("scene", k), k)).into_iter().filter(|(n, _)| *n > 0.0);
+        let shapes: Vec<String> = shapes.map(|(n, k)| format!("{} {k}", short(n))).collect();
+        lines.push(format!("  scene      {}", shapes.join("  ")));
+        let names = ["n_in", "n_v", "n_ev", "n_oiv", "bytes"].map(|k| format!("{k} {}", short(number("structure", k))));
+        lines.push(format!("  structure  {}", names.join("  ")));
+        if let Some(counted) = &self.counted {
+            lines.extend(count_table(counted));
+        }
+        lines.join("\n")
+    }
+}
+
+fn count_table(counted: &Counted) -> Vec<String> {
+    let mut lines = vec![format!(
+        "  {:<10} {:>12} {:>12} {:>9} {:>9} {:>9} {:>9} {:>9}",
+        "counts", "rays", "hits", "n_it", "n_ts", "n_ets", "n_eets", "n_mb"
+    )];
+    let mut all = RayCounts::default();
+    let mut row = |name: &str, c: &RayCounts| {
+        let per_ray = |n: u64| n as f64 / c.queries.max(1) as f64;
+        lines.push(format!(
+            "  {name:<10} {:>12} {:>12} {:>9.3} {:>9.3} {:>9.3} {:>9.3} {:>9.3}",
+            c.queries,
+            c.found,
+            per_ray(c.n_it),
+            per_ray(c.n_ts),
+            per_ray(c.n_ets),
+            per_ray(c.n_eets),
+            per_ray(c.n_mb),
+        ));
+    };
+    for (name, counts) in counted.classes().into_iter().filter(|(_, c)| c.queries > 0) {
+        all += *counts;
+        row(name, counts);
+    }
+    row("all", &all);
+    lines
+}
+
+/// Prints or writes the statistics of all pictures, if they were asked for.
+pub(super) fn report(job: &RenderJob, pictures: &[PictureStats], messages: &Messages) -> Exit {
+    let Some(wanted) = &job.stats else { return Exit::Done };
+    let text = match wanted.format {
+        StatsFormat::Json => document(pictures),
+        StatsFormat::Text => pictures.iter().map(PictureStats::text).collect::<Vec<_>>().join("\n") + "\n",
+    };
+    let result = match &wanted.file {
+        None => super::print(&text),
+        Some(path) => crate::image::write_atomic(path, text.as_bytes(), false)
+            .map_err(|e| io::Error::new(e.kind(), format!("{}: {e}", path.display()))),
+    };
+    match result {
+        Ok(()) => Exit::Done,
+        Err(e) => {
+            messages.error("stats-unwritable", format!("the statistics could not be written: {e}"), "");
+            Exit::Failed
+        }
+    }
+}
+
+fn document(pictures: &[PictureStats]) -> String {
+    let list: Vec<&Value> = pictures.iter().map(|p| &p.json).collect();
+    let all = json!({ "schema": "meshray-stats/1", "version": super::version::SHORT, "pictures": list });
+    serde_json::to_string_pretty(&all).unwrap_or_default() + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_have_units_that_fit() {
+        assert_eq!([0.0012, 0.0994, 0.5, 12.34].map(seconds), ["1 ms", "99 ms", "0.50 s", "12.3 s"]);
+        assert_eq!([12.0, 12_345.0, 3_145_728.0].map(short), ["12", "12.3 k", "3.15 M"]);
+    }
+
+    #[test]
+    fn counts_per_ray_are_totals_divided_by_the_rays_asked() {
+        let primary = RayCounts { queries: 4, found: 2, n_it: 10, ..RayCounts::default() };
+        let counts = ClassCounts { primary, shadow: primary, ..ClassCounts::default() };
+        let json = Counted { counts, seconds: 0.0, prims: 10 }.json();
+        assert_eq!((&json["primary"]["n_it"], &json["all"]["tests"]), (&2.5.into(), &20.into()));
+        assert_eq!(json["all"]["culled"], 0.75);
+        assert_eq!(json["reflected"]["n_it"], 0.0, "no ray is no division by zero");
+    }
+}
