@@ -1,29 +1,9 @@
 //! What light does at a smooth boundary: reflect, refract, how much of each, and how the index depends on the wavelength.
 //!
 //! Pure functions of directions and indices of refraction; which surface they belong to is the caller's business.
-//! Directions are unit vectors along the ray; `normal` is a unit vector turned against the incident direction.
+//! Indices by name are in [`crate::scene::ior`]. Directions are unit vectors along the ray; `normal` is a unit vector turned against the incident direction.
 
 use crate::math::{DVec3, Vec3};
-
-/// Indices of refraction by name, for the yellow sodium line.
-pub const INDICES: [(&str, f64); 11] = [
-    ("air", 1.00029),
-    ("water", 1.33),
-    ("crown glass", 1.52),
-    ("dense glass", 1.66),
-    ("crystal glass", 2.0),
-    ("quartz", 1.46),
-    ("sapphire", 1.77),
-    ("diamond", 2.417),
-    ("iodine crystal", 3.34),
-    ("polystyrene", 1.55),
-    ("ethyl alcohol", 1.36),
-];
-
-/// The index of a material of [`INDICES`], or `None` for a name that is not there.
-pub fn index_of(name: &str) -> Option<f64> {
-    INDICES.iter().find(|(known, _)| *known == name).map(|&(_, index)| index)
-}
 
 /// Mirror direction R = I − 2 (I·N) N; either side of the normal will do.
 pub fn reflect(incident: Vec3, normal: Vec3) -> Vec3 {
@@ -92,6 +72,7 @@ fn unit_f32(v: DVec3) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::ior::by_name;
 
     /// A ray that comes down at `degrees` from the normal +z.
     fn incoming(degrees: f64) -> Vec3 {
@@ -114,18 +95,11 @@ mod tests {
             ("sapphire", "air", 34, 25),
         ];
         for (from, to, degrees, minutes) in expected {
-            let (n_i, n_t) = (index_of(from).expect(from), index_of(to).expect(to));
+            let (n_i, n_t) = (by_name(from).expect(from), by_name(to).expect(to));
             let angle = critical_angle(n_i, n_t).expect("denser to thinner").to_degrees();
             assert_eq!((angle * 60.0).round(), f64::from(degrees * 60 + minutes), "{from} to {to}: {angle}");
         }
         assert_eq!(critical_angle(1.0, 1.5), None);
-    }
-
-    #[test]
-    fn eleven_materials_are_known_by_name() {
-        assert_eq!(INDICES.len(), 11);
-        assert_eq!(index_of("diamond"), Some(2.417));
-        assert_eq!(index_of("kryptonite"), None);
     }
 
     #[test]

@@ -44,7 +44,9 @@ pub(super) fn light(table: Table) -> Option<Lit> {
     };
     let shadows = table.get("shadows", boolean).unwrap_or(true);
     table.finish();
-    place.map(|kind| Lit::Light(Light { name, intensity, kind, shadows }))
+    // Directional lights are kept in lux, of which a white matt surface shows the π-th part; files give what it shows.
+    let lux = if matches!(kind, Some(Kind::Directional)) { std::f32::consts::PI } else { 1.0 };
+    place.map(|kind| Lit::Light(Light { name, intensity: intensity * lux, kind, shadows }))
 }
 
 fn spot(table: &Table) -> Option<LightKind> {
