@@ -10,6 +10,9 @@ pub mod bounds;
 pub mod ear_clip;
 pub mod expansion;
 pub mod frame;
+pub mod moller_trumbore;
+#[cfg(test)]
+mod oracle;
 pub mod plane;
 pub mod polygon;
 pub mod quotient;

@@ -16,7 +16,7 @@ pub struct GridParams {
 
 impl Default for GridParams {
     fn default() -> Self {
-        Self { density: 1.0, max_resolution: 256, max_depth: 8, step_cost: 2.0 }
+        Self { density: 0.25, max_resolution: 256, max_depth: 8, step_cost: 4.0 }
     }
 }
 
