@@ -1,0 +1,35 @@
+//! A picture carries what repeats it.
+
+use super::program::{CUBE, Folder};
+
+#[test]
+fn a_picture_is_repeated_byte_for_byte() {
+    for extension in ["png", "exr"] {
+        let folder = Folder::with_cube();
+        let (first, second) = (format!("first.{extension}"), format!("second.{extension}"));
+        let settings =
+            ["--view", "iso", "--exposure", "0.5", "--tone-map", "aces", "--seed", "7", "--background", "#204060"];
+        folder.render(&[&["cube.obj", "-o", &first], settings.as_slice()].concat()).ends(0);
+        folder.run(&["render", "--again", &first, "-o", &second]).ends(0);
+        assert!(folder.read(&first) == folder.read(&second), "{extension}");
+    }
+}
+
+#[test]
+fn another_input_under_the_same_name_is_refused() {
+    let folder = Folder::with_cube();
+    folder.render(&["cube.obj"]).ends(0);
+    let before = folder.read("cube.png");
+    let folder = folder.file("cube.obj", CUBE.replace("v 1 1 1\n", "v 1 1 2\n"));
+    folder.run(&["render", "--again", "cube.png", "-o", "again.png"]).ends(3).says(&["cube.obj"]);
+    assert!(!folder.has("again.png") && folder.read("cube.png") == before);
+}
+
+#[test]
+fn a_picture_without_settings_cannot_be_repeated() {
+    let folder = Folder::with_cube().file("foreign.png", b"\x89PNG\r\n\x1a\n".as_slice());
+    for name in ["foreign.png", "cube.obj"] {
+        folder.run(&["render", "--again", name]).ends(3).says(&[name]);
+    }
+    folder.run(&["render", "--again", "missing.png"]).ends(1).says(&["missing.png"]);
+}

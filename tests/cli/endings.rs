@@ -1,0 +1,117 @@
+//! Exit codes, and what is left behind by each ending.
+
+use super::program::{BROKEN_GLB, Folder, NOTHING_TO_DRAW, cube_without_its_materials};
+
+#[test]
+fn a_model_becomes_a_picture_of_its_name_and_nothing_else_happens() {
+    let folder = Folder::with_cube();
+    let run = folder.render(&["cube.obj"]).ends(0);
+    assert!(run.stdout.is_empty());
+    assert_eq!(folder.names(), ["cube.obj", "cube.png"]);
+    let picture = super::program::picture(&folder.path("cube.png"));
+    assert_eq!((picture.width, picture.height), (32, 24));
+    let dark = picture.beauty.iter().filter(|p| p[0] < 0.9).count();
+    assert!(dark > 40, "the cube must show: {dark} pixels differ from the background");
+}
+
+#[test]
+fn the_word_render_may_be_left_out() {
+    let folder = Folder::with_cube();
+    folder.run(&["cube.obj", "--size", "32x24", "--samples", "1"]).ends(0);
+    assert!(folder.has("cube.png"));
+}
+
+#[test]
+fn several_files_give_one_picture_each() {
+    let folder = Folder::with_cube().file("sub/other.obj", super::program::CUBE);
+    folder.render(&["cube.obj", "sub/other.obj"]).ends(0);
+    assert!(folder.has("cube.png") && folder.has("other.png"), "{:?}", folder.names());
+}
+
+#[test]
+fn merged_files_give_one_picture() {
+    let folder = Folder::with_cube().file("other.obj", super::program::CUBE);
+    folder.render(&["--merge", "cube.obj", "other.obj", "-o", "both.png"]).ends(0);
+    assert_eq!(folder.names(), ["both.png", "cube.obj", "other.obj"]);
+}
+
+#[test]
+fn a_missing_file_ends_in_1_as_a_retry_may_help() {
+    let folder = Folder::new();
+    let run = folder.render(&["ship.glb"]).ends(1).says(&["ship.glb"]);
+    assert_eq!(run.errors().len(), 1, "{}", run.stderr);
+    assert!(folder.names().is_empty());
+}
+
+#[test]
+fn a_broken_file_ends_in_3_with_its_name_and_no_picture() {
+    let folder = Folder::new().file("ship.glb", BROKEN_GLB);
+    folder.render(&["ship.glb"]).ends(3).says(&["error: ship.glb"]);
+    assert_eq!(folder.names(), ["ship.glb"]);
+}
+
+#[test]
+fn a_file_of_another_kind_ends_in_3() {
+    for (name, content) in
+        [("ship.stl", b"solid x\nendsolid x\n".as_slice()), ("ship.glb", b""), ("ship.gltf", b"\0\xff")]
+    {
+        let folder = Folder::new().file(name, content);
+        folder.render(&[name]).ends(3).says(&[name]);
+        assert_eq!(folder.names(), [name]);
+    }
+}
+
+#[test]
+fn a_batch_goes_on_after_a_bad_file_and_ends_as_badly_as_its_worst() {
+    let folder = Folder::with_cube().file("broken.glb", BROKEN_GLB);
+    folder.render(&["broken.glb", "cube.obj"]).ends(3).says(&["broken.glb"]);
+    assert!(folder.has("cube.png") && !folder.has("broken.png"), "{:?}", folder.names());
+}
+
+#[test]
+fn points_and_lines_only_are_nothing_to_draw() {
+    let folder = Folder::new().file("dots.obj", NOTHING_TO_DRAW);
+    let run = folder.render(&["dots.obj"]).ends(3).says(&["dots.obj", "--allow-empty"]);
+    assert_eq!(run.errors().len(), 1, "{}", run.stderr);
+    assert_eq!(folder.names(), ["dots.obj"]);
+}
+
+#[test]
+fn an_empty_scene_is_drawn_when_that_is_allowed() {
+    let folder = Folder::new().file("dots.obj", NOTHING_TO_DRAW);
+    folder.render(&["--allow-empty", "--background", "#ff0000", "dots.obj"]).ends(0);
+    let picture = super::program::picture(&folder.path("dots.png"));
+    assert!(picture.beauty.iter().all(|p| *p == [1.0, 0.0, 0.0, 1.0]));
+}
+
+#[test]
+fn warnings_do_not_stop_a_picture_unless_strict() {
+    let folder = Folder::new().file("cube.obj", cube_without_its_materials());
+    folder.render(&["cube.obj"]).ends(0).says(&["warning: ", "nowhere.mtl"]);
+    assert!(folder.has("cube.png"));
+    let folder = Folder::new().file("cube.obj", cube_without_its_materials());
+    folder.render(&["--strict", "cube.obj"]).ends(3).says(&["nowhere.mtl"]);
+    assert!(!folder.has("cube.png"));
+}
+
+#[test]
+fn a_wrong_command_line_ends_in_2_and_names_the_nearest_word() {
+    let folder = Folder::with_cube();
+    folder.render(&["cube.obj", "--sampels", "4"]).ends(2).says(&["--sampels", "--samples"]);
+    folder.run(&["rendr", "cube.obj"]).ends(2).says(&["render"]);
+    folder.render(&["cube.obj", "--accel", "grid-octre"]).ends(2).says(&["grid-octree"]);
+    for wrong in
+        [["--size", "0x4"], ["--samples", "0"], ["--fov", "400"], ["--view", "sideways"], ["--tone-map", "film"]]
+    {
+        folder.run(&["render", "cube.obj", wrong[0], wrong[1]]).ends(2).says(&[wrong[0]]);
+    }
+    folder.run(&["render"]).ends(2);
+    assert_eq!(folder.names(), ["cube.obj"]);
+}
+
+#[test]
+fn an_unknown_picture_type_is_told_before_anything_is_loaded() {
+    // The input does not exist: had it been opened first, that would be the error.
+    let run = Folder::new().render(&["missing.obj", "-o", "out.tif"]).ends(2).says(&[".png", ".exr", ".webp"]);
+    assert!(!run.stderr.contains("missing.obj"), "{}", run.stderr);
+}

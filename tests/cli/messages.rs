@@ -1,0 +1,53 @@
+//! What goes to stderr, in which form.
+
+use super::program::{BROKEN_GLB, Folder, cube_without_its_materials};
+use serde_json::Value;
+
+#[test]
+fn json_messages_are_one_object_a_line_with_stable_fields() {
+    let folder = Folder::new().file("broken.glb", BROKEN_GLB).file("cube.obj", cube_without_its_materials());
+    let run = folder.render(&["--messages", "json", "broken.glb", "cube.obj"]).ends(3);
+    let messages: Vec<Value> = run.stderr.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    for message in &messages {
+        for field in ["code", "file", "place", "text", "remedy"] {
+            assert!(message[field].is_string(), "{field} of {message}");
+        }
+        assert!(!message["code"].as_str().unwrap().is_empty(), "{message}");
+    }
+    let of = |file: &str, severity: &str| {
+        messages
+            .iter()
+            .any(|m| m["file"] == file && m["severity"] == severity && !m["text"].as_str().unwrap().is_empty())
+    };
+    assert!(of("broken.glb", "error") && of("cube.obj", "warning"), "{}", run.stderr);
+}
+
+#[test]
+fn quiet_says_nothing_when_all_is_well() {
+    let run = Folder::with_cube().render(&["--quiet", "cube.obj"]).ends(0);
+    assert_eq!(run.stderr, "");
+}
+
+#[test]
+fn quiet_still_tells_warnings() {
+    let folder = Folder::new().file("cube.obj", cube_without_its_materials());
+    folder.render(&["--quiet", "cube.obj"]).ends(0).says(&["nowhere.mtl"]);
+}
+
+#[test]
+fn no_bar_and_no_colour_reach_a_pipe() {
+    for colour in ["0", "1"] {
+        let folder = Folder::with_cube();
+        let mut program = folder.program(&["render", "--size", "32x24", "cube.obj"]);
+        let run = super::program::Run::of(program.env("CLICOLOR_FORCE", colour)).ends(0);
+        assert!(!run.stderr.contains(['\r', '\u{1b}']), "{:?}", run.stderr);
+    }
+}
+
+#[test]
+fn a_file_name_cannot_write_to_the_terminal() {
+    let name = "bad\u{1b}[31m\nname.obj";
+    let folder = Folder::new().file(name, "f 1 2 3\n");
+    let run = folder.render(&[name]).ends(3);
+    assert!(!run.stderr.contains('\u{1b}') && run.errors().len() == 1, "{:?}", run.stderr);
+}

@@ -1,0 +1,10 @@
+//! The program from outside: what scripts and people rely on.
+
+mod again;
+mod endings;
+mod interrupt;
+mod messages;
+mod other_commands;
+mod output;
+mod program;
+mod same_pixels;

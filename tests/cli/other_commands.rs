@@ -1,0 +1,58 @@
+//! `inspect`, statistics, help, version, completions, manual page.
+
+use super::program::{BROKEN_GLB, Folder};
+use serde_json::Value;
+
+#[test]
+fn inspect_tells_what_a_file_holds() {
+    let folder = Folder::with_cube();
+    let run = folder.run(&["inspect", "cube.obj"]).ends(0);
+    assert!(run.text().contains("12"), "a cube has 12 triangles:\n{}", run.text());
+    let run = folder.run(&["inspect", "--json", "cube.obj"]).ends(0);
+    let report: Value = serde_json::from_str(run.text()).unwrap();
+    assert!(report["schema"].as_str().unwrap().starts_with("meshray-inspect/"), "{report}");
+    assert_eq!(folder.names(), ["cube.obj"]);
+}
+
+#[test]
+fn inspect_refuses_what_cannot_be_read() {
+    let folder = Folder::new().file("broken.glb", BROKEN_GLB);
+    folder.run(&["inspect", "broken.glb"]).ends(3).says(&["broken.glb"]);
+    folder.run(&["inspect", "missing.glb"]).ends(1).says(&["missing.glb"]);
+}
+
+#[test]
+fn statistics_are_json_with_a_schema_and_exact_counts() {
+    let folder = Folder::with_cube();
+    let counts = |threads: &str| {
+        let run = folder.render(&["cube.obj", "--stats", "json", "--threads", threads]).ends(0);
+        let stats: Value = serde_json::from_str(run.text()).unwrap();
+        assert!(stats["schema"].as_str().unwrap().starts_with("meshray-stats/"), "{stats}");
+        stats["counts"].clone()
+    };
+    let one = counts("1");
+    assert!(one.is_object(), "{one}");
+    assert_eq!(one, counts("3"), "counts do not depend on threads");
+}
+
+#[test]
+fn the_short_help_has_at_most_15_flags_and_the_long_one_all() {
+    let folder = Folder::new();
+    let flags = |help: &str| help.lines().filter(|line| line.trim_start().starts_with('-')).count();
+    let short = folder.run(&["render", "-h"]).ends(0);
+    assert!((5..=15).contains(&flags(short.text())), "{}", short.text());
+    let long = folder.run(&["render", "--help"]).ends(0);
+    for flag in ["--eye", "--tone-map", "--accel", "--messages", "--again", "--max-memory", "--layers", "--seed"] {
+        assert!(long.text().contains(flag), "{flag}");
+    }
+}
+
+#[test]
+fn version_completions_and_manual_go_to_standard_output() {
+    let folder = Folder::new();
+    assert!(folder.run(&["--version"]).ends(0).text().contains(env!("CARGO_PKG_VERSION")));
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        assert!(folder.run(&["completions", shell]).ends(0).text().contains("tone-map"), "{shell}");
+    }
+    assert!(folder.run(&["man"]).ends(0).text().contains(".TH meshray"));
+}

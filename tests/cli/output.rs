@@ -1,0 +1,119 @@
+//! Where pictures go, of which type, and what may be replaced.
+
+use super::program::{CUBE, Folder, Run, picture};
+
+#[test]
+fn the_extension_chooses_the_type() {
+    let magics: [(&str, &[u8]); 5] = [
+        ("a.png", b"\x89PNG"),
+        ("a.exr", &[0x76, 0x2f, 0x31, 0x01]),
+        ("a.jpg", &[0xff, 0xd8, 0xff]),
+        ("a.jpeg", &[0xff, 0xd8, 0xff]),
+        ("a.webp", b"RIFF"),
+    ];
+    let folder = Folder::with_cube();
+    for (name, magic) in magics {
+        folder.render(&["cube.obj", "-o", name]).ends(0);
+        assert!(folder.read(name).starts_with(magic), "{name}");
+    }
+}
+
+#[test]
+fn a_default_name_replaces_only_a_picture_that_meshray_wrote() {
+    let folder = Folder::with_cube().file("cube.png", "precious");
+    let run = folder.render(&["cube.obj"]).says(&["cube.png", "-o"]);
+    assert!(matches!(run.code, Some(1..=3)), "{:?}", run.code);
+    assert_eq!(folder.read("cube.png"), b"precious");
+
+    folder.render(&["cube.obj", "-o", "cube.png"]).ends(0);
+    assert!(folder.read("cube.png").starts_with(b"\x89PNG"));
+    folder.render(&["cube.obj", "--exposure", "-1"]).ends(0);
+    assert_eq!(folder.names(), ["cube.obj", "cube.png"]);
+}
+
+#[test]
+fn two_inputs_with_one_name_are_an_error_before_any_work() {
+    let folder = Folder::new().file("a/cube.obj", CUBE).file("b/cube.obj", CUBE);
+    folder.render(&["a/cube.obj", "b/cube.obj"]).ends(2).says(&["cube.png", "a/cube.obj", "b/cube.obj"]);
+    folder.render(&["a/cube.obj", "b/cube.obj", "-o", "one.png"]).ends(2);
+    assert_eq!(folder.names(), ["a", "b"]);
+    folder.render(&["a/cube.obj", "b/cube.obj", "-o", "{dir}/{stem}.png"]).ends(0);
+    assert!(folder.has("a/cube.png") && folder.has("b/cube.png"));
+}
+
+#[test]
+fn a_missing_folder_is_told_and_nothing_is_left() {
+    let folder = Folder::with_cube();
+    let run = folder.render(&["cube.obj", "-o", "nowhere/cube.png"]).says(&["nowhere"]);
+    assert!(matches!(run.code, Some(1 | 2)), "{:?}", run.code);
+    assert_eq!(folder.names(), ["cube.obj"]);
+}
+
+#[test]
+fn standard_output_carries_the_picture_and_nothing_else() {
+    let folder = Folder::with_cube();
+    let run = folder.render(&["cube.obj", "-o", "-"]).ends(0);
+    let picture = meshray::image::decode(&run.stdout, 1000).unwrap();
+    assert_eq!((picture.width, picture.height), (32, 24));
+    folder.render(&["cube.obj", "-o", "file.png"]).ends(0);
+    assert!(run.stdout == folder.read("file.png"), "the same bytes as in a file");
+    let run = folder.render(&["cube.obj", "-o", "-", "--format", "exr"]).ends(0);
+    assert!(run.stdout.starts_with(&[0x76, 0x2f, 0x31, 0x01]));
+    assert_eq!(folder.names(), ["cube.obj", "file.png"]);
+}
+
+#[test]
+fn standard_input_is_read_for_a_dash() {
+    let folder = Folder::with_cube();
+    let arguments = ["render", "--size", "32x24", "--samples", "1", "-", "-o", "-"];
+    let run = Run::of(folder.program(&arguments).write_stdin(CUBE)).ends(0);
+    folder.render(&["cube.obj"]).ends(0);
+    let (piped, filed) = (meshray::image::decode(&run.stdout, 1000).unwrap(), picture(&folder.path("cube.png")));
+    assert_eq!(piped, filed);
+}
+
+#[test]
+fn several_views_give_several_files() {
+    let folder = Folder::with_cube();
+    folder.render(&["cube.obj", "--view", "front", "--view", "top", "-o", "{stem}-{view}.png"]).ends(0);
+    assert_eq!(folder.names(), ["cube-front.png", "cube-top.png", "cube.obj"]);
+    folder.render(&["cube.obj", "--view", "front,top", "-o", "one.png"]).ends(2);
+}
+
+#[test]
+fn a_transparent_background_is_clear_and_a_white_one_white() {
+    let folder = Folder::with_cube();
+    let corner = |background: &str| {
+        folder.render(&["cube.obj", "--background", background, "-o", "out.png"]).ends(0);
+        picture(&folder.path("out.png")).beauty[0]
+    };
+    assert_eq!(corner("transparent"), [0.0; 4]);
+    assert_eq!(corner("white"), [1.0; 4]);
+    assert_eq!(corner("#0000ff"), [0.0, 0.0, 1.0, 1.0]);
+}
+
+#[test]
+fn an_exr_has_layers_when_they_are_asked_for() {
+    let folder = Folder::with_cube();
+    folder.render(&["cube.obj", "-o", "a.exr", "--background", "transparent"]).ends(0);
+    assert_eq!(picture(&folder.path("a.exr")).layers, None);
+    folder.render(&["cube.obj", "-o", "b.exr", "--layers", "--float", "--background", "transparent"]).ends(0);
+    let with = picture(&folder.path("b.exr"));
+    let layers = with.layers.unwrap();
+    let middle = 12 * 32 + 16;
+    assert!(layers.depth[middle].is_finite() && layers.depth[0].is_infinite());
+    assert!(layers.prim[middle] < 12 && layers.prim[0] == u32::MAX);
+    assert_eq!((layers.instance[middle], layers.instance[0]), (0, u32::MAX));
+    let normal = layers.normal[middle];
+    assert!((normal.iter().map(|c| c * c).sum::<f32>() - 1.0).abs() < 1e-4, "{normal:?}");
+    let onto_the_cube = layers.position[middle].iter().fold(0.0_f32, |m, c| m.max(c.abs()));
+    assert!((onto_the_cube - 1.0).abs() < 1e-4, "{:?}", layers.position[middle]);
+}
+
+#[test]
+fn sixteen_bits_are_written_when_asked_for() {
+    let folder = Folder::with_cube();
+    folder.render(&["cube.obj", "--bits", "16"]).ends(0);
+    // Byte 24 of a PNG is the depth of its samples.
+    assert_eq!(folder.read("cube.png")[24], 16);
+}

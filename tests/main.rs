@@ -1,0 +1,10 @@
+//! Everything that is tested from outside: the program's behaviour as a black box, and pictures against stored ones.
+//!
+//! One binary, so that it is linked once; every module is a subject.
+
+#![expect(clippy::unwrap_used, clippy::expect_used, reason = "in a test a panic is the answer")]
+#![expect(unreachable_pub, reason = "nobody uses a test binary as a library")]
+
+mod common;
+mod golden;
+
