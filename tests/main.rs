@@ -2,9 +2,13 @@
 //!
 //! One binary, so that it is linked once; every module is a subject.
 
-#![expect(clippy::unwrap_used, clippy::expect_used, reason = "in a test a panic is the answer")]
-#![expect(unreachable_pub, reason = "nobody uses a test binary as a library")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::print_stdout,
+    reason = "a test answers by panics and prints"
+)]
+#![allow(unreachable_pub, reason = "nobody uses a test binary as a library")]
 
 mod common;
 mod golden;
-

@@ -1,10 +1,66 @@
-//! What several subjects need: the repository, and little scenes.
+//! What several subjects need: the repository and its models, pictures of scenes.
+
+#![allow(dead_code, reason = "which of it is used depends on the features that are built")]
 
 pub mod stage;
 
-use std::path::Path;
+use meshray::accel::{AccelKind, AnyAccel, GridParams};
+use meshray::image::Picture;
+use meshray::render::texture::TextureStore;
+use meshray::render::{Job, Settings, View, World, render};
+use meshray::scene::{Background, Scene, default_light, framing};
+use std::path::{Path, PathBuf};
 
 /// The repository.
 pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Every model and scene file in `models/` that can be rendered by itself, sorted by name.
+pub fn models() -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut folders = vec![root().join("models")];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+            if path.is_dir() {
+                folders.push(path);
+            } else if ["obj", "glb", "gltf", "toml"].contains(&extension) {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    assert!(!found.is_empty(), "models/ holds no models");
+    found
+}
+
+/// A picture of a loaded scene as a user gets it who asks for nothing: framed and lit, on nothing, one sample a pixel,
+/// with layers. `None`: the scene holds nothing to draw.
+pub fn still(mut scene: Scene, kind: AccelKind, width: u32, height: u32) -> Option<Picture> {
+    let bounds = framing::robust_bounds(&scene);
+    let camera = framing::default_camera(&scene, &bounds, f64::from(width) / f64::from(height));
+    default_light::add_if_missing(&mut scene, &camera);
+    scene.background = Some(Background::Transparent);
+    let world = World::new(&scene);
+    if world.shapes.is_empty() {
+        return None;
+    }
+    let accel = AnyAccel::build(kind, &world.shapes, &GridParams::default());
+    let textures = TextureStore::new(&scene);
+    let view = View::from_camera(&camera);
+    let settings = Settings { width, height, samples: 1, layers: true, ..Settings::default() };
+    let job =
+        Job { scene: &scene, world: &world, accel: &accel, textures: &textures, view: &view, settings: &settings };
+    Some(render(&job, &()).picture)
+}
+
+/// Pixels and layers as bits, so that zeros of both signs and NaN are told apart.
+pub fn bits(picture: &Picture) -> Vec<u32> {
+    let layers = picture.layers.as_ref().expect("the picture has layers");
+    let colors = picture.beauty.iter().flatten();
+    let triples = layers.albedo.iter().chain(&layers.normal).chain(&layers.position).flatten();
+    let floats = colors.chain(triples).chain(&layers.depth).map(|c| c.to_bits());
+    floats.chain(layers.prim.iter().copied()).chain(layers.instance.iter().copied()).collect()
 }

@@ -455,7 +455,7 @@ fn golden_a_concave_polygon_stays_whole() {
     let mut stage = flat();
     let material = stage.material(unlit(BLUE));
     // A star of ten corners around a hole that the crossing test must leave out: an arrow cut into its side.
-    let radius = |i: u8| if i % 2 == 0 { 0.95_f32 } else { 0.35 };
+    let radius = |i: u8| if i.is_multiple_of(2) { 0.95_f32 } else { 0.35 };
     let angle = |i: u8| f32::from(i) * std::f32::consts::TAU / 10.0;
     let positions: Vec<Vec3> =
         (0..10).map(|i| Vec3::new(-angle(i).sin() * radius(i), angle(i).cos() * radius(i), 0.0)).collect();
