@@ -180,3 +180,21 @@ pub(crate) fn terminator(geometric: Vec3, shading: Vec3, to_light: Vec3) -> f32 
     }
     ((1.0 - g) * g + 1.0) * g
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shading_fades_out_smoothly_where_the_true_surface_turns_away() {
+        let lean = |degrees: f32| {
+            let (sin, cos) = libm::sincosf(degrees.to_radians());
+            Vec3::new(sin, 0.0, cos)
+        };
+        let shading = lean(20.0);
+        let seen: Vec<f32> = (0..=8).map(|i| terminator(Vec3::Z, shading, lean(50.0 + 5.0 * i as f32))).collect();
+        assert_eq!(seen[0], 1.0, "far from the line nothing changes");
+        assert!(seen.windows(2).all(|w| w[1] <= w[0]) && seen[7] < 0.5 && seen[8] < 1e-4, "{seen:?}");
+        assert_eq!(terminator(Vec3::Z, Vec3::Z, lean(89.0)), 1.0, "flat faces keep their shading");
+    }
+}
