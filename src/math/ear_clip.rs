@@ -70,16 +70,42 @@ impl EarClipper {
             }
             _ => {
                 let normal = any_normal(points);
-                self.flat.clear();
-                self.flat.extend(points.iter().map(|&p| project(p, normal)));
-                match convex_quad(&self.flat, points, &ring) {
-                    Some(pair) => {
-                        out.extend(pair);
-                        Outcome::Exact
-                    }
-                    None => self.clip(&ring, out),
+                let start = out.len();
+                let outcome = self.cut_seen(points, &ring, |p| project(p, normal), out);
+                if outcome != Outcome::Crossing {
+                    return outcome;
                 }
+                // A warped face may cross itself seen along an axis and not along its normal. There coordinates are
+                // rounded, which bends straight runs, but a warped face has none.
+                let (first, second) = normal.normalize().any_orthonormal_pair();
+                let first_try = out.split_off(start);
+                let along_normal = |p: DVec3| Coord { x: p.dot(first), y: p.dot(second) };
+                let outcome = self.cut_seen(points, &ring, along_normal, out);
+                if outcome == Outcome::Crossing {
+                    out.truncate(start);
+                    out.extend(first_try);
+                }
+                outcome
             }
+        }
+    }
+
+    /// Cuts the polygon as it looks from one side.
+    fn cut_seen(
+        &mut self,
+        points: &[DVec3],
+        ring: &[u32],
+        see: impl Fn(DVec3) -> Coord<f64>,
+        out: &mut Vec<[u32; 3]>,
+    ) -> Outcome {
+        self.flat.clear();
+        self.flat.extend(points.iter().map(|&p| see(p)));
+        match convex_quad(&self.flat, points, ring) {
+            Some(pair) => {
+                out.extend(pair);
+                Outcome::Exact
+            }
+            None => self.clip(ring, out),
         }
     }
 
@@ -497,6 +523,16 @@ mod tests {
         let warped = |z: f64| [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, z), DVec3::Y];
         assert_eq!(cut(&warped(0.5)).0, [[0, 1, 3], [1, 2, 3]]);
         assert_eq!(cut(&warped(0.0)).0, [[0, 1, 2], [0, 2, 3]]);
+    }
+
+    #[test]
+    fn a_warped_quad_that_crosses_itself_along_an_axis_is_cut_as_its_normal_sees_it() {
+        let points = [(2.0, 3.0, 0.0), (6.0, 5.0, 3.0), (4.0, 0.0, 0.0), (5.0, 2.0, 4.0)].map(DVec3::from);
+        let ring = distinct_neighbours(&points);
+        let along_axis = |p: DVec3| project(p, newell(&points));
+        let outcome = EarClipper::default().cut_seen(&points, &ring, along_axis, &mut Vec::new());
+        assert_eq!(outcome, Outcome::Crossing);
+        assert_ne!(cut(&points).1, Outcome::Crossing);
     }
 
     #[test]

@@ -1,9 +1,140 @@
-//! (to be written)
+//! Wavefront OBJ and MTL -> [`Scene`](crate::scene::Scene).
+//!
+//! The text goes through [`statements`] (lines, numbers, names, faces; every error with its line), then through `tobj`
+//! ([`soup`]), is centred in `f64` and rounded ([`place`]), and becomes one mesh and one instance for each run of faces
+//! with the same object, group and material ([`assemble`]). Materials come from MTL files ([`mtl`]).
+//!
+//! What the text leaves open is decided so: faces without normals are flat unless a smoothing group says otherwise;
+//! vertex colours are sRGB-coded, MTL colours linear; the fourth number of a vertex is a weight for rational curves and
+//! ignored; every surface is seen from both sides; a face whose normals point to its back is turned round.
 
-use super::{Diagnostic, LoadError, LoadOptions, Loaded, Source};
+mod assemble;
+mod color;
+mod encoding;
+mod lines;
+mod number;
+mod pairs;
+mod place;
+mod smooth;
+mod soup;
+mod statements;
+mod up;
 
-/// Loads the OBJ loader.
+use super::limits::Budget;
+use super::paths::Resolver;
+use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
+use crate::math::DAffine3;
+use crate::scene::{Instance, Material, Mesh, Scene};
+use assemble::Assembled;
+use statements::Statements;
+use std::path::Path;
+
+/// Loads an OBJ file and the MTL files and pictures it names.
+///
+/// # Errors
+/// When a face refers to what is not there, or memory would exceed [`super::Limits`]. A file without faces is an empty
+/// scene.
 pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
-    let _ = options;
-    Err(Diagnostic::new("unsupported-format", &source.path, "", "no loader yet").into())
+    let file = source.path.as_path();
+    let mut warnings = Warnings::default();
+    let mut budget = Budget::new(&options.limits);
+    let resolver = Resolver::new(source, options);
+
+    // Geometry.
+    let mut statements = statements::read(&encoding::to_ascii_superset(&source.bytes), file)?;
+    statements.odd.warn(file, &mut warnings);
+    bytes_to_units(&mut statements, file, &mut warnings);
+    let soup = soup::read(&mut statements, file, &mut budget)?;
+    let placed = place::place(&soup.positions);
+    let flatness = assemble::flatness(&placed.positions, statements.places);
+    let mut assembled = assemble::assemble(&statements, &soup, &placed, options.polygons, flatness);
+    drop(soup);
+    warn_of_faces(&assembled, file, &mut warnings);
+    if statements.faces.is_empty() {
+        let text = format!("{} vertices and no face: there is nothing to draw", statements.counts[0]);
+        warnings.push(Diagnostic::new("obj-no-faces", file, "", text));
+    }
+
+    // Which way is up, and where everything stands.
+    let meshes = std::mem::take(&mut assembled.meshes);
+    let shapes: Vec<&Mesh> = meshes.iter().map(|(_, mesh)| mesh).collect();
+    let (guessed, reason) = up::guess(&statements.comments, &shapes, placed.center);
+    let mut scene = Scene { up: options.up.unwrap_or(guessed), materials: vec![Material::plain()], ..Scene::default() };
+    for (_, mesh) in meshes {
+        let index = scene.meshes.len() as u32;
+        let world_from_object = DAffine3::from_translation(placed.center);
+        scene.instances.push(Instance { name: mesh.name.clone(), mesh: index, world_from_object });
+        scene.meshes.push(mesh);
+    }
+
+    let (files, hash) = resolver.finish();
+    let facts = Facts {
+        format: "Wavefront OBJ".into(),
+        generator: generator(&statements.comments),
+        faces: assembled.faces,
+        dropped: dropped(&statements, &assembled),
+        points_and_lines: u64::from(statements.odd.points.count) + u64::from(statements.odd.lines.count),
+        up_reason: options.up.is_none().then_some(reason),
+        max_rounding: placed.max_rounding,
+        files,
+        hash,
+        ..Facts::default()
+    };
+    Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
 }
+
+/// Vertex colours written as 0 … 255 become 0 … 1.
+fn bytes_to_units(statements: &mut Statements, file: &Path, warnings: &mut Warnings) {
+    if color::are_bytes(&statements.colors) {
+        for color in statements.colors.iter_mut().filter(|c| **c != [1.0; 3]) {
+            *color = color.map(|c| c / 255.0);
+        }
+        let text = "vertex colours above 1 are taken as 0 … 255";
+        warnings.push(Diagnostic::new("obj-color-bytes", file, "", text));
+    }
+}
+
+fn warn_of_faces(assembled: &Assembled, file: &Path, warnings: &mut Warnings) {
+    let mut warn = |code, (count, line): (u64, u32), text: &str| {
+        if count > 0 {
+            let count = u32::try_from(count).unwrap_or(u32::MAX);
+            warnings.push(Diagnostic { count, ..Diagnostic::new(code, file, line.to_string(), text) });
+        }
+    };
+    warn("obj-not-finite", assembled.not_finite, "a face is dropped: a corner is not a finite number, or over 1e18");
+    warn("obj-equal-corners", assembled.collapsed, "a face is dropped: it has fewer than 3 different corners");
+    warn("obj-crossing-face", assembled.crossing, "a face crosses itself; it is cut as well as can be");
+    warn("obj-turned-face", assembled.turned, "a face is wound against its normals; it is turned round");
+}
+
+fn dropped(statements: &Statements, assembled: &Assembled) -> Vec<(String, u64)> {
+    let reasons = [
+        ("fewer than 3 corners", u64::from(statements.odd.few_corners.count)),
+        ("a corner that is not finite", assembled.not_finite.0),
+        ("fewer than 3 different corners", assembled.collapsed.0),
+    ];
+    reasons.into_iter().filter(|r| r.1 > 0).map(|(reason, count)| (reason.into(), count)).collect()
+}
+
+/// The comment by which a program names itself, if any.
+fn generator(comments: &[String]) -> String {
+    const WORDS: [&str; 12] = [
+        "export",
+        "generated",
+        "created",
+        "written",
+        "converted",
+        "blender",
+        "rhino",
+        "maya",
+        "3ds",
+        "max2obj",
+        "zbrush",
+        "freecad",
+    ];
+    let names_a_program = |c: &&String| WORDS.iter().any(|w| c.to_lowercase().contains(w));
+    comments.iter().find(names_a_program).cloned().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests;

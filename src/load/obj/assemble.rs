@@ -1,0 +1,301 @@
+//! Faces -> meshes: one for each run of faces that share object, group and material.
+
+use super::pairs::Pairs;
+use super::place::Placed;
+use super::smooth::{Smooth, smooth};
+use super::soup::{Corner, NONE, Soup};
+use super::statements::{Face, Statements};
+use crate::load::Polygons;
+use crate::math::ear_clip::{EarClipper, Outcome, newell};
+use crate::math::{DVec3, Vec2, Vec3};
+use crate::scene::{Mesh, Polygon};
+
+/// The meshes of a file, and what became of its faces.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Assembled {
+    /// One for each of [`Statements::runs`] that has anything to draw: its index, and the mesh without a material.
+    pub meshes: Vec<(u32, Mesh)>,
+    /// Faces drawn.
+    pub faces: u64,
+    /// Faces with a corner that is no finite number: how many, and the line of the first.
+    pub not_finite: (u64, u32),
+    /// Faces with fewer than three different corners.
+    pub collapsed: (u64, u32),
+    /// Faces whose boundary crosses itself.
+    pub crossing: (u64, u32),
+    /// Faces turned round to agree with their normals.
+    pub turned: (u64, u32),
+}
+
+/// Builds the meshes. `flatness`: how far corners may lie from the plane of a face that is kept whole.
+pub(super) fn assemble(
+    statements: &Statements,
+    soup: &Soup,
+    placed: &Placed,
+    polygons: Polygons,
+    flatness: f64,
+) -> Assembled {
+    let mut out = Assembled::default();
+    let faces = keep(statements, soup, &placed.positions, &mut out);
+    let smooth = smooth(soup, &placed.positions, &faces);
+    let flatness = (polygons == Polygons::Whole).then_some(flatness);
+    let mut builder = Builder {
+        soup,
+        smooth: &smooth,
+        positions: &placed.positions,
+        flatness,
+        vertices: Pairs::new(soup.positions.len()),
+        clipper: EarClipper::default(),
+        ring: Vec::new(),
+        indices: Vec::new(),
+        cut: Vec::new(),
+        mesh: Mesh::default(),
+    };
+    for (run, range) in by_run(&faces, statements.runs.len()) {
+        let mesh = builder.build(&range, name(statements, run), &mut out);
+        if !mesh.triangles.is_empty() || !mesh.polygons.is_empty() {
+            out.meshes.push((run, mesh));
+        }
+    }
+    out
+}
+
+/// The faces that can be drawn, with their first corners.
+fn keep(statements: &Statements, soup: &Soup, positions: &[Vec3], out: &mut Assembled) -> Vec<(Face, u32)> {
+    let mut first = 0;
+    let mut kept = Vec::with_capacity(statements.faces.len());
+    for face in &statements.faces {
+        let range = first as usize..(first + face.arity) as usize;
+        let place = |c: &Corner| positions[c.position as usize];
+        let corners = soup.corners.get(range).unwrap_or_default();
+        if !corners.iter().all(|c| place(c).is_finite()) {
+            count(&mut out.not_finite, face);
+        } else if !has_three_places(corners.iter().map(place)) {
+            count(&mut out.collapsed, face);
+        } else if !corners.is_empty() {
+            kept.push((*face, first));
+        }
+        first += face.arity;
+    }
+    kept
+}
+
+fn has_three_places(mut places: impl Iterator<Item = Vec3>) -> bool {
+    let Some(a) = places.next() else { return false };
+    let Some(b) = places.find(|&p| p != a) else { return false };
+    places.any(|p| p != a && p != b)
+}
+
+fn count((number, line): &mut (u64, u32), face: &Face) {
+    if *number == 0 {
+        *line = face.line;
+    }
+    *number += 1;
+}
+
+/// Faces sorted by run, in the file's order within each.
+fn by_run(faces: &[(Face, u32)], runs: usize) -> Vec<(u32, Vec<(Face, u32)>)> {
+    let mut sizes = vec![0usize; runs];
+    faces.iter().for_each(|(face, _)| sizes[face.run as usize] += 1);
+    let mut out: Vec<_> = (0..).zip(sizes).map(|(run, size)| (run, Vec::with_capacity(size))).collect();
+    faces.iter().for_each(|face| out[face.0.run as usize].1.push(*face));
+    out
+}
+
+/// `object/group`, whichever there is.
+fn name(statements: &Statements, run: u32) -> String {
+    let run = statements.runs[run as usize];
+    let name = |id: u32| statements.names[id as usize].as_str();
+    match (name(run.object), name(run.group)) {
+        (object, "") => object.into(),
+        ("", group) => group.into(),
+        (object, group) if object == group => object.into(),
+        (object, group) => format!("{object}/{group}"),
+    }
+}
+
+/// The corners of a face in [`Soup::corners`].
+fn range(&(face, first): &(Face, u32)) -> std::ops::Range<usize> {
+    first as usize..(first + face.arity) as usize
+}
+
+/// What makes a vertex besides its position: texture coordinate and normal, each an index or [`NONE`].
+type Key = (u32, u32);
+
+struct Builder<'a> {
+    soup: &'a Soup,
+    smooth: &'a Smooth,
+    positions: &'a [Vec3],
+    /// Set when planar polygons stay whole.
+    flatness: Option<f64>,
+    vertices: Pairs<Key>,
+    clipper: EarClipper,
+    /// Corners of the face at hand: places, vertices of the mesh, and the triangles cut.
+    ring: Vec<DVec3>,
+    indices: Vec<u32>,
+    cut: Vec<[u32; 3]>,
+    mesh: Mesh,
+}
+
+impl Builder<'_> {
+    fn build(&mut self, faces: &[(Face, u32)], name: String, out: &mut Assembled) -> Mesh {
+        self.mesh = Mesh { name, ..Mesh::default() };
+        self.vertices.clear();
+        let shaded = faces.iter().any(|f| range(f).any(|at| self.normal_number(at) != NONE));
+        for face in faces {
+            self.face(face, shaded, out);
+        }
+        self.fill(faces, shaded);
+        // Triangle i is face i: nothing to say.
+        if self.mesh.face_of_triangle.iter().zip(0..).all(|(&face, i)| face == i) {
+            self.mesh.face_of_triangle.clear();
+        }
+        std::mem::take(&mut self.mesh)
+    }
+
+    /// The normal of a corner: the file's, counted first, or that of a smoothing group, counted on.
+    fn normal_number(&self, at: usize) -> u32 {
+        match (self.soup.corners[at].normal, self.smooth.of_corner.get(at)) {
+            (NONE, Some(&smooth)) if smooth != NONE => self.first_smooth() + smooth,
+            (normal, _) => normal,
+        }
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "numbers of normals were checked to fit when read")]
+    fn first_smooth(&self) -> u32 {
+        self.soup.normals.len() as u32
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "numbers of normals were checked to fit when read")]
+    fn first_flat(&self) -> u32 {
+        self.first_smooth() + self.smooth.normals.len() as u32
+    }
+
+    fn face(&mut self, face: &(Face, u32), shaded: bool, out: &mut Assembled) {
+        self.ring.clear();
+        self.indices.clear();
+        for at in range(face) {
+            let Corner { position, uv, .. } = self.soup.corners[at];
+            let normal = match self.normal_number(at) {
+                // A flat face among shaded ones carries its own normal.
+                NONE if shaded => self.first_flat() + face.0.number,
+                normal => normal,
+            };
+            self.ring.push(self.positions[position as usize].as_dvec3());
+            self.indices.push(self.vertices.number(position, (uv, normal)));
+        }
+        if self.turn_to_normals(face) {
+            count(&mut out.turned, &face.0);
+        }
+        if self.flatness.is_some_and(|flatness| self.ring.len() > 3 && is_flat(&self.ring, flatness)) {
+            self.keep_whole(face.0.number);
+            out.faces += 1;
+            return;
+        }
+
+        self.cut.clear();
+        match self.clipper.cut(&self.ring, &mut self.cut) {
+            Outcome::Crossing => count(&mut out.crossing, &face.0),
+            Outcome::Exact | Outcome::Degenerate => {}
+        }
+        if self.cut.is_empty() {
+            return count(&mut out.collapsed, &face.0);
+        }
+        let vertex = |i: u32| self.indices[i as usize];
+        self.mesh.triangles.extend(self.cut.iter().map(|t| t.map(vertex)));
+        self.mesh.face_of_triangle.extend(self.cut.iter().map(|_| face.0.number));
+        out.faces += 1;
+    }
+
+    /// Reverses the face when the normals the file gives point to its back.
+    ///
+    /// Which side is the front decides on which side of the glass a ray is; where winding and normals disagree,
+    /// whoever wrote the file has looked at the normals.
+    fn turn_to_normals(&mut self, face: &(Face, u32)) -> bool {
+        let given = |at: usize| match self.soup.corners[at].normal {
+            NONE => DVec3::ZERO,
+            normal => self.soup.normals[normal as usize].as_dvec3(),
+        };
+        let sum: DVec3 = range(face).map(given).sum();
+        let wrong = sum != DVec3::ZERO && newell(&self.ring).dot(sum) < 0.0;
+        if wrong {
+            self.ring.reverse();
+            self.indices.reverse();
+        }
+        wrong
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "corners were checked to fit when read")]
+    fn keep_whole(&mut self, face: u32) {
+        let first = self.mesh.polygon_corners.len() as u32;
+        let before = |i: usize| self.ring[(i + self.ring.len() - 1) % self.ring.len()];
+        let distinct = (0..self.ring.len()).filter(|&i| self.ring[i] != before(i));
+        self.mesh.polygon_corners.extend(distinct.map(|i| self.indices[i]));
+        let len = self.mesh.polygon_corners.len() as u32 - first;
+        self.mesh.polygons.push(Polygon { first, len, face });
+    }
+
+    /// Fills the vertex arrays that the triangles point into.
+    fn fill(&mut self, faces: &[(Face, u32)], shaded: bool) {
+        let Self { vertices, soup, positions, mesh, .. } = self;
+        mesh.positions = vertices.iter().map(|(p, _)| positions[p as usize]).collect();
+        if vertices.iter().any(|(_, (uv, _))| uv != NONE) {
+            // v points up in OBJ and down in our scenes.
+            let uv = |(_, (uv, _)): (u32, Key)| match soup.uvs.get(uv as usize) {
+                Some(uv) => crate::math::DVec2::new(uv.x, 1.0 - uv.y).as_vec2(),
+                None => Vec2::ZERO,
+            };
+            mesh.uvs = vec![vertices.iter().map(uv).collect()];
+        }
+        if vertices.iter().any(|(p, _)| soup.colors.get(p as usize).is_some_and(|&c| c != [1.0; 3])) {
+            mesh.colors = vertices.iter().map(|(p, _)| super::color::linear(soup.colors[p as usize])).collect();
+        }
+        if shaded {
+            self.fill_normals(faces);
+        }
+    }
+
+    fn fill_normals(&mut self, faces: &[(Face, u32)]) {
+        let (first_smooth, first_flat) = (self.first_smooth(), self.first_flat());
+        let mut normals: Vec<Vec3> = Vec::with_capacity(self.vertices.len());
+        for (_, (_, number)) in self.vertices.iter() {
+            normals.push(if number < first_smooth {
+                self.soup.normals[number as usize]
+            } else if number < first_flat {
+                self.smooth.normals[(number - first_smooth) as usize]
+            } else {
+                self.flat_normal(faces, number - first_flat)
+            });
+        }
+        self.mesh.normals = normals;
+    }
+
+    /// The normal of a face of this mesh; +z for one without area, where it is never seen.
+    fn flat_normal(&self, faces: &[(Face, u32)], number: u32) -> Vec3 {
+        let Ok(i) = faces.binary_search_by_key(&number, |f| f.0.number) else { return Vec3::Z };
+        let place = |c: &Corner| self.positions[c.position as usize].as_dvec3();
+        let ring: Vec<DVec3> = self.soup.corners[range(&faces[i])].iter().map(place).collect();
+        newell(&ring).try_normalize().unwrap_or(DVec3::Z).as_vec3()
+    }
+}
+
+/// Whether all corners lie within `flatness` of the plane through their mean.
+fn is_flat(ring: &[DVec3], flatness: f64) -> bool {
+    let Some(normal) = newell(ring).try_normalize() else { return false };
+    #[expect(clippy::cast_precision_loss, reason = "corners of one face")]
+    let mean = ring.iter().sum::<DVec3>() / ring.len() as f64;
+    ring.iter().all(|&p| (p - mean).dot(normal).abs() <= flatness)
+}
+
+/// How far corners of a planar face may lie from its plane: half a unit of the file's last digit, or four units of
+/// rounding of the largest coordinate, whichever is larger.
+///
+/// Digits so coarse that half a unit would bend a face visibly (over 2⁻¹² of the model's size) were not rounded but
+/// typed: such coordinates are exact.
+pub(super) fn flatness(positions: &[Vec3], places: i32) -> f64 {
+    let finite = positions.iter().filter(|p| p.is_finite());
+    let largest = f64::from(finite.fold(0.0f32, |m, p| m.max(p.abs().max_element())));
+    let digit = 0.5 * libm::exp10(-f64::from(places));
+    let rounding = 4.0 * f64::from(f32::EPSILON) / 2.0 * largest;
+    if digit <= 2.0 * largest / 4096.0 { digit.max(rounding) } else { rounding }
+}

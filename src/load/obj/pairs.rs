@@ -1,0 +1,70 @@
+//! Numbers pairs of (position, something) as they are met: how corners become vertices without hashing.
+
+/// A table from (position, key) to 0, 1, 2, …
+///
+/// Keys of one position form a chain, short because few different corners meet in one place.
+#[derive(Debug)]
+pub(super) struct Pairs<K> {
+    /// First entry of each position's chain.
+    head: Vec<u32>,
+    /// Position, key, and the next entry of the chain.
+    entries: Vec<(u32, K, u32)>,
+}
+
+const END: u32 = u32::MAX;
+
+impl<K: Copy + PartialEq> Pairs<K> {
+    /// An empty table for positions below `positions`.
+    pub(super) fn new(positions: usize) -> Self {
+        Self { head: vec![END; positions], entries: Vec::new() }
+    }
+
+    /// The number of a pair; a new one gets the next number.
+    pub(super) fn number(&mut self, position: u32, key: K) -> u32 {
+        let mut at = self.head[position as usize];
+        while at != END {
+            let (_, known, next) = self.entries[at as usize];
+            if known == key {
+                return at;
+            }
+            at = next;
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "there are fewer pairs than corners, which fit into u32")]
+        let new = self.entries.len() as u32;
+        self.entries.push((position, key, self.head[position as usize]));
+        self.head[position as usize] = new;
+        new
+    }
+
+    /// Every pair, in the order of the numbers.
+    pub(super) fn iter(&self) -> impl Iterator<Item = (u32, K)> {
+        self.entries.iter().map(|&(position, key, _)| (position, key))
+    }
+
+    /// How many pairs there are.
+    pub(super) fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// Forgets all pairs, in time proportional to their number.
+    pub(super) fn clear(&mut self) {
+        for (position, ..) in self.entries.drain(..) {
+            self.head[position as usize] = END;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_pairs_share_a_number_until_the_table_is_cleared() {
+        let mut pairs = Pairs::new(3);
+        let numbers: Vec<_> = [(2, 'a'), (0, 'a'), (2, 'b'), (2, 'a')].map(|(p, k)| pairs.number(p, k)).into();
+        assert_eq!(numbers, [0, 1, 2, 0]);
+        assert_eq!(pairs.iter().collect::<Vec<_>>(), [(2, 'a'), (0, 'a'), (2, 'b')]);
+        pairs.clear();
+        assert_eq!((pairs.len(), pairs.number(2, 'b')), (0, 0));
+    }
+}

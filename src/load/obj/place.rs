@@ -1,0 +1,57 @@
+//! Coordinates in `f64` -> a centre in `f64` and coordinates around it in `f32`.
+
+use crate::math::frame::snapped_center;
+use crate::math::{DVec3, Vec3};
+
+/// Rounded positions, relative to `center`.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Placed {
+    pub center: DVec3,
+    /// Not finite where the file's are not, or are too large.
+    pub positions: Vec<Vec3>,
+    /// Largest distance between a position and its rounded one.
+    pub max_rounding: f64,
+}
+
+/// Larger coordinates count as infinite, so that sums and products of a few of them stay within `f32`'s range.
+const LARGEST: f64 = 1e18;
+
+/// Subtracts the centre of all finite positions in `f64`, then rounds.
+pub(super) fn place(positions: &[DVec3]) -> Placed {
+    let usable = |p: &&DVec3| p.is_finite() && p.abs().max_element() <= LARGEST;
+    let lo = positions.iter().filter(usable).fold(DVec3::INFINITY, |lo, &p| lo.min(p));
+    let hi = positions.iter().filter(usable).fold(DVec3::NEG_INFINITY, |hi, &p| hi.max(p));
+    let center = snapped_center(lo, hi);
+    let mut max_rounding = 0.0f64;
+    let round = |p: &DVec3| {
+        if !usable(&p) {
+            return Vec3::NAN;
+        }
+        let exact = *p - center;
+        let rounded = exact.as_vec3();
+        max_rounding = max_rounding.max(rounded.as_dvec3().distance(exact));
+        rounded
+    };
+    let positions = positions.iter().map(round).collect();
+    Placed { center, positions, max_rounding }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounding_is_measured_and_relative_to_the_center() {
+        let far = [DVec3::new(1e7, 0.0, 0.0), DVec3::new(1e7 + 0.1, 1.0, 0.0)];
+        let placed = place(&far);
+        assert!((placed.center.x - 1e7).abs() < 1.0);
+        assert!(placed.max_rounding > 0.0 && placed.max_rounding < 1e-8, "{}", placed.max_rounding);
+    }
+
+    #[test]
+    fn positions_out_of_range_do_not_move_the_center() {
+        let placed = place(&[DVec3::ZERO, DVec3::ONE, DVec3::splat(1e300), DVec3::NAN]);
+        assert!(placed.center.abs().max_element() <= 1.0);
+        assert!(placed.positions[2].is_nan() && placed.positions[3].is_nan());
+    }
+}

@@ -1,0 +1,116 @@
+//! Which axis points up: OBJ does not say.
+//!
+//! The default is +Y. +Z is chosen only on evidence: a comment that says so, a comment of a program known to write +Z,
+//! or a model that stands on z = 0 with a flat bottom there, reaches to both sides of y = 0, and is not a thin plate
+//! (which may as well lean against a wall).
+
+use crate::math::DVec3;
+use crate::scene::{Mesh, UpAxis};
+
+/// Programs that write +Z unless told otherwise, as their comments name them, in lower case.
+const Z_WRITERS: [&str; 13] = [
+    "freecad",
+    "openscad",
+    "tinkercad",
+    "solidworks",
+    "cadquery",
+    "cloudcompare",
+    "metashape",
+    "photoscan",
+    "opendronemap",
+    "contextcapture",
+    "realitycapture",
+    "pix4d",
+    "qgis",
+];
+
+/// Guesses from the comments, then from the shape; the text says why.
+pub(super) fn guess(comments: &[String], meshes: &[&Mesh], center: DVec3) -> (UpAxis, String) {
+    for comment in comments {
+        let text = comment.to_lowercase().replace([' ', '-', '_', ':', '=', '+'], "");
+        for (axis, said) in [(UpAxis::Z, "zup"), (UpAxis::Z, "upaxisz"), (UpAxis::Y, "yup"), (UpAxis::Y, "upaxisy")] {
+            if text.contains(said) {
+                return (axis, format!("a comment says so: '{comment}'"));
+            }
+        }
+    }
+    let writes_z = |c: &&String| Z_WRITERS.iter().any(|w| c.to_lowercase().contains(w));
+    if let Some(comment) = comments.iter().find(writes_z) {
+        return (UpAxis::Z, format!("written by a program that uses +Z: '{comment}'"));
+    }
+    if stands_on_z(meshes, center) {
+        return (UpAxis::Z, "it stands on z = 0 with a flat bottom there".into());
+    }
+    (UpAxis::Y, "OBJ does not say, and nothing speaks for +Z".into())
+}
+
+/// Whether the shape is that of something standing on z = 0 and not on, or behind, y = 0.
+fn stands_on_z(meshes: &[&Mesh], center: DVec3) -> bool {
+    /// Relative size of what counts as touching.
+    const TOUCH: f64 = 1e-4;
+    /// A bottom has at least this share of the whole surface.
+    const BOTTOM: f64 = 0.02;
+    let points = meshes.iter().flat_map(|m| &m.positions).map(|p| p.as_dvec3() + center);
+    let (lo, hi) = points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)));
+    let size = hi - lo;
+    let touch = TOUCH * size.max_element();
+    let both_sides = lo.y < -0.25 * size.y && hi.y > 0.25 * size.y;
+    let on_zero = lo.z.abs() <= touch && size.z >= 0.25 * size.x.max(size.y);
+    if !(both_sides && on_zero) {
+        return false;
+    }
+
+    let (mut whole, mut on_z, mut on_y) = (0.0, 0.0, 0.0);
+    for mesh in meshes {
+        for t in &mesh.triangles {
+            let [a, b, c] = t.map(|i| mesh.positions[i as usize].as_dvec3() + center);
+            let area = (b - a).cross(c - a).length();
+            let highest = a.max(b).max(c);
+            whole += area;
+            on_z += if highest.z <= lo.z + touch { area } else { 0.0 };
+            on_y += if highest.y <= lo.y + touch { area } else { 0.0 };
+        }
+    }
+    on_z >= BOTTOM * whole && on_y < 0.25 * on_z
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+
+    fn up(comments: &[&str], mesh: &Mesh) -> UpAxis {
+        let comments: Vec<_> = comments.iter().map(|&c| c.to_owned()).collect();
+        guess(&comments, &[mesh], DVec3::ZERO).0
+    }
+
+    /// A pyramid with its square bottom at height 0 of axis `up`, and its mirror image.
+    fn pyramid(up: usize) -> Mesh {
+        let corners = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [0.0, 0.0, 2.0]];
+        let turn = |[a, b, c]: [f32; 3]| if up == 2 { Vec3::new(a, b, c) } else { Vec3::new(b, c, a) };
+        let triangles = vec![[0, 2, 1], [0, 3, 2], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]];
+        Mesh { positions: corners.map(turn).to_vec(), triangles, ..Mesh::default() }
+    }
+
+    #[test]
+    fn comments_decide_first() {
+        assert_eq!(up(&["Exported, Up Axis: Z"], &pyramid(1)), UpAxis::Z);
+        assert_eq!(up(&["y-up"], &pyramid(2)), UpAxis::Y);
+        assert_eq!(up(&["FreeCAD v0.21"], &pyramid(1)), UpAxis::Z);
+        assert_eq!(up(&["Blender v2.9 OBJ File"], &pyramid(1)), UpAxis::Y);
+    }
+
+    #[test]
+    fn a_flat_bottom_on_the_ground_decides_next() {
+        assert_eq!(up(&[], &pyramid(2)), UpAxis::Z);
+        assert_eq!(up(&[], &pyramid(1)), UpAxis::Y);
+    }
+
+    #[test]
+    fn without_evidence_y_is_up() {
+        let mut raised = pyramid(2);
+        raised.positions.iter_mut().for_each(|p| p.z += 0.5);
+        assert_eq!(up(&[], &raised), UpAxis::Y);
+        assert_eq!(up(&[], &Mesh::default()), UpAxis::Y);
+    }
+}
