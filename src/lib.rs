@@ -1,4 +1,73 @@
-//! meshray renders the mesh files people download (glTF 2.0, OBJ) into pictures, on any CPU.
+//! meshray renders the mesh files people download (glTF 2.0, OBJ) into pictures, on any CPU, and tells what the picture
+//! cost. It is a Whitted ray tracer (T. Whitted, "An Improved Illumination Model for Shaded Display", 1980) whose work is
+//! cut by a uniform grid with octrees in crowded cells and a per-ray mailbox; every way of culling gives the same hits as
+//! testing everything, bit for bit.
+//!
+//! # The way of the data
+//! A file becomes a [`scene::Scene`] and warnings ([`load`]). [`render::World`] places its shapes in one centred `f32`
+//! frame; a structure over them ([`accel`]) answers what rays hit. [`render`] sends rays through it in waves, tile by
+//! tile, and gives linear pixels, which [`image`] turns into a PNG, EXR, JPEG or WebP.
+//!
+//! ```text
+//! file --load--> Scene --World--> shapes --accel--> structure --render--> linear pixels --image--> file
+//! ```
+//!
+//! # Example
+//! ```
+//! use meshray::accel::{AccelKind, AnyAccel, GridParams};
+//! use meshray::image::{FileKind, Metadata, Output};
+//! use meshray::load::{LoadOptions, load_bytes};
+//! use meshray::render::texture::TextureStore;
+//! use meshray::render::{Job, Settings, View, World, render};
+//! use meshray::scene::{default_light, framing};
+//!
+//! // Usually `load::load("ship.glb".as_ref(), ..)`; this is a scene file with one red sphere.
+//! let text = b"[materials.red]\ndiffuse = 'red'\n[[spheres]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = 'red'\n";
+//! let mut scene = load_bytes("ball.toml".as_ref(), text.to_vec(), &LoadOptions::default())?.scene;
+//!
+//! // A camera that sees all of it, and light where the file brings none.
+//! let settings = Settings { width: 64, height: 48, ..Settings::default() };
+//! let bounds = framing::robust_bounds(&scene);
+//! let camera = framing::default_camera(&scene, &bounds, 64.0 / 48.0);
+//! default_light::add_if_missing(&mut scene, &camera);
+//!
+//! let world = World::new(&scene);
+//! let job = Job {
+//!     scene: &scene,
+//!     world: &world,
+//!     accel: &AnyAccel::build(AccelKind::default(), &world.shapes, &GridParams::default()),
+//!     textures: &TextureStore::new(&scene),
+//!     view: &View::from_camera(&camera),
+//!     settings: &settings,
+//! };
+//! let picture = render(&job, &()).picture;
+//! let [red, green, _, alpha] = picture.beauty[24 * 64 + 32];
+//! assert!(alpha == 1.0 && red > 2.0 * green, "the middle shows the sphere");
+//!
+//! let png = meshray::image::encode(&picture, FileKind::Png, &Output::default(), &Metadata::new())?;
+//! assert!(png.starts_with(b"\x89PNG"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Modules
+//! | module | knows |
+//! |---|---|
+//! | [`math`] | only numbers: error bounds, rays against triangle, polygon, sphere, plane, box |
+//! | [`scene`] | plain data with indices; which features a scene needs, default camera and light |
+//! | [`load`] | files -> scene and warnings: glTF, OBJ + MTL, scene files |
+//! | [`accel`] | shapes -> what does this ray hit: `none`, `grid-octree`; counts |
+//! | [`mod@render`] | rays -> linear pixels: waves, shading models, lights and shadows, optics, textures |
+//! | [`image`] | linear pixels <-> files: tone mapping, formats, metadata, differences |
+//! | `cli` | words -> jobs -> messages and exit codes (feature `cli`) |
+//!
+//! `scene` and `accel` use `math`; `load` uses `scene`; `render` uses `scene`, `accel` and `image`; `cli` uses all. `accel`
+//! sees shapes only: another renderer could use it as it is.
+//!
+//! # What a caller can rely on
+//! - The same scene and settings give the same pixels for every structure and number of threads.
+//! - Files are not trusted: other files they name are read only below a root folder, sizes are checked before memory is
+//!   taken, and broken input ends in a [`load::LoadError`] with place and remedy.
+//! - Nothing but `cli` prints; warnings are values.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic"))]
 

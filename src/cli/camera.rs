@@ -95,7 +95,7 @@ pub(super) fn camera(
         }
         Choice::Default => {
             let camera = framing::default_camera(scene, bounds, aspect);
-            let phrase = format!("camera {} of the file", quoted(&camera.name));
+            let phrase = format!("the file's camera {}", quoted(&camera.name)).trim_end().to_owned();
             (camera, phrase)
         }
         Choice::Named(view) => {
@@ -126,7 +126,7 @@ fn framing_lens(lens: Option<LensChoice>) -> FrameLens {
 }
 
 fn quoted(name: &str) -> String {
-    if name.is_empty() { "without a name".into() } else { format!("'{name}'") }
+    if name.is_empty() { String::new() } else { format!("'{name}'") }
 }
 
 fn find<'s>(name: &str, scene: &'s Scene, file: &Path) -> Result<&'s Camera, Diagnostic> {

@@ -1,0 +1,51 @@
+//! `meshray inspect`: what a file holds, as aligned text or as JSON.
+//!
+//! # Schema `meshray-inspect/1`
+//! One JSON object. `file`, `format`, `generator`, `hash`, `files` (all that were read); `triangles`, `polygons`,
+//! `faces`, `spheres`, `planes`, `meshes`, `instances`, `materials`; `bounds` (`lo`, `hi`, metres) and `framed` (the same
+//! without strays) with `strays`; `units`, `up`, `up_reason`; `topology` (`corners`, `edges`, `open`, `non_manifold`,
+//! `duplicates`, `degenerate`; equal positions count as one corner); `dropped` (by reason); `points_and_lines`;
+//! `textures` (`name`, `width`, `height`); `missing` (files that were named but not found); `extensions` (`name`,
+//! `required`, `supported`); `scenes`, `scene`; `cameras`, `lights` (`name`, `kind`); `features` (needed) and
+//! `left_out`; `memory` (bytes: `scene`, `structure`); `max_rounding`; `warnings` (messages). Keys are only ever added.
+
+mod report;
+mod topology;
+
+use super::args::InspectArgs;
+use super::exit::Exit;
+use super::message::{Messages, Severity};
+use super::{job, print, read};
+use crate::load::LoadOptions;
+use std::slice;
+
+/// Loads the file and prints what was found.
+pub(super) fn run(args: &InspectArgs) -> Exit {
+    let messages = Messages::new(args.messages.into(), false);
+    let options = LoadOptions {
+        root: args.root.clone(),
+        limits: job::limits(args.max_memory),
+        polygons: args.polygons.into(),
+        mtl: args.mtl.into(),
+        scene: args.scene.clone(),
+        up: args.up.map(Into::into),
+    };
+    let loaded = match read::scene(slice::from_ref(&args.input), &options) {
+        Ok(loaded) => loaded,
+        Err(error) => {
+            messages.load_error(&error);
+            return read::exit_of(&error);
+        }
+    };
+    loaded.warnings.iter().for_each(|w| messages.say(Severity::Warning, w));
+    let report = report::Report::new(&args.input, &loaded);
+    let text = if args.json { report.json() } else { report.text() };
+    match print(&text) {
+        Err(e) => {
+            messages.error("output-unwritable", format!("standard output: {e}"), "");
+            Exit::Failed
+        }
+        Ok(()) if args.strict && !loaded.warnings.is_empty() => Exit::Input,
+        Ok(()) => Exit::Done,
+    }
+}

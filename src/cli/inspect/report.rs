@@ -1,0 +1,337 @@
+//! The findings of `meshray inspect`, gathered once and shown twice: as text and as JSON.
+
+use super::topology::Topology;
+use crate::accel::{AccelKind, AnyAccel, GridParams};
+use crate::load::Loaded;
+use crate::math::{DVec3, Vec2, Vec3, Vec4};
+use crate::render::World;
+use crate::scene::features::Features;
+use crate::scene::framing::{Bounds, robust_bounds};
+use crate::scene::{LightKind, Mesh, Pixels, Projection, Scene, UpAxis};
+use serde_json::{Value, json};
+use std::mem::size_of;
+use std::path::Path;
+
+/// Everything there is to say about a file.
+pub(super) struct Report<'a> {
+    file: &'a Path,
+    loaded: &'a Loaded,
+    world: World,
+    bounds: Bounds,
+    topology: Topology,
+    features: Features,
+    scene_bytes: u64,
+    structure_bytes: u64,
+}
+
+/// Longest list of names that the text shows in full.
+const SHOWN: usize = 8;
+
+impl<'a> Report<'a> {
+    /// Looks the scene through; builds the default structure to know its size.
+    pub(super) fn new(file: &'a Path, loaded: &'a Loaded) -> Self {
+        let scene = &loaded.scene;
+        let world = World::new(scene);
+        let structure = AnyAccel::build(AccelKind::default(), &world.shapes, &GridParams::default()).summary();
+        Self {
+            file,
+            loaded,
+            bounds: robust_bounds(scene),
+            topology: Topology::of(&world.shapes),
+            features: Features::of(scene),
+            scene_bytes: scene_bytes(scene, &world),
+            structure_bytes: structure.bytes,
+            world,
+        }
+    }
+
+    /// Aligned lines of `what  value`.
+    pub(super) fn text(&self) -> String {
+        let mut lines = Lines::default();
+        self.identity(&mut lines);
+        self.contents(&mut lines);
+        self.place(&mut lines);
+        self.faults(&mut lines);
+        self.names(&mut lines);
+        self.costs(&mut lines);
+        lines.text
+    }
+
+    fn identity(&self, lines: &mut Lines) {
+        let facts = &self.loaded.facts;
+        lines.add("file", self.file.display().to_string());
+        lines.add("format", facts.format.clone());
+        lines.add("generator", facts.generator.clone());
+        if facts.scenes.len() > 1 {
+            let marked = facts.scenes.iter().enumerate().map(|(i, name)| {
+                let mark = if i == facts.scene_index { " (this one)" } else { "" };
+                format!("{i} '{name}'{mark}")
+            });
+            lines.add("scenes", shorten(marked));
+        }
+    }
+
+    fn contents(&self, lines: &mut Lines) {
+        let (scene, shapes, facts) = (&self.loaded.scene, &self.world.shapes, &self.loaded.facts);
+        lines.add("faces", grouped(facts.faces));
+        lines.add("triangles", grouped(shapes.triangles.len() as u64));
+        lines.count("polygons", shapes.polygons.len() as u64, "kept whole");
+        lines.count("spheres", shapes.spheres.len() as u64, "");
+        lines.count("planes", shapes.planes.len() as u64, "");
+        let instances = scene.instances.len() + scene.spheres.len() + scene.planes.len();
+        lines.add("objects", format!("{} of {} meshes", grouped(instances as u64), grouped(scene.meshes.len() as u64)));
+        lines.add("materials", shorten(scene.materials.iter().map(|m| label(&m.name))));
+        lines.count("points, lines", facts.points_and_lines, "skipped");
+    }
+
+    fn place(&self, lines: &mut Lines) {
+        let (lo, hi) = self.world.bounds;
+        if lo.cmple(hi).all() {
+            lines.add("bounds", format!("{} to {}", vector(lo), vector(hi)));
+            lines.add("size", format!("{} {}", vector(hi - lo), self.units()));
+        }
+        if self.bounds.strays > 0 {
+            let framed = format!("{} to {}", vector(self.bounds.lo), vector(self.bounds.hi));
+            lines.add("framed", format!("{framed}, without {} far-off faces", grouped(self.bounds.strays)));
+        }
+        let reason = self.loaded.facts.up_reason.as_ref().map(|r| format!(" ({r})")).unwrap_or_default();
+        lines.add("up", format!("{}{reason}", self.up()));
+        lines.add("rounding", format!("at most {:.3e} to single precision", self.loaded.facts.max_rounding));
+    }
+
+    fn faults(&self, lines: &mut Lines) {
+        let topology = &self.topology;
+        let edges = [(topology.open, "open"), (topology.non_manifold, "non-manifold")];
+        let found: Vec<String> =
+            edges.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{} {what}", grouped(*n))).collect();
+        let state = if topology.edges == 0 { String::new() } else { format!(", {}", or_closed(&found)) };
+        lines.add("edges", format!("{}{state}", grouped(topology.edges)));
+        lines.count("duplicates", topology.duplicates, "faces with the corners of another");
+        lines.count("degenerate", topology.degenerate, "faces with two corners in one place");
+        for (reason, count) in &self.loaded.facts.dropped {
+            lines.count("dropped", *count, reason);
+        }
+        lines.add("missing", shorten(self.missing().into_iter()));
+    }
+
+    fn names(&self, lines: &mut Lines) {
+        let scene = &self.loaded.scene;
+        let extension = |(name, required, supported): &(String, bool, bool)| {
+            let required = if *required { ", required" } else { "" };
+            format!("{name} ({}{required})", if *supported { "supported" } else { "not supported" })
+        };
+        lines.add("extensions", shorten(self.loaded.facts.extensions.iter().map(extension)));
+        lines.add("cameras", shorten(scene.cameras.iter().map(|c| format!("{} ({})", label(&c.name), lens(c)))));
+        lines.add("lights", shorten(scene.lights.iter().map(|l| format!("{} ({})", label(&l.name), kind(l)))));
+        let bitmaps = scene.bitmaps.iter().map(|b| format!("{} {}×{}", label(&b.name), b.width, b.height));
+        lines.add("images", shorten(bitmaps));
+        lines.add("needs", self.features.present().map(|f| f.name()).collect::<Vec<_>>().join(", "));
+        lines.add("left out", self.features.absent().map(|f| f.name()).collect::<Vec<_>>().join(", "));
+    }
+
+    fn costs(&self, lines: &mut Lines) {
+        let memory = format!("{} scene, {} structure", bytes(self.scene_bytes), bytes(self.structure_bytes));
+        lines.add("memory", format!("about {memory}"));
+        let facts = &self.loaded.facts;
+        lines.add("files", shorten(facts.files.iter().map(|f| f.display().to_string())));
+        lines.add("hash", format!("{:032x}", facts.hash));
+        lines.count("warnings", self.loaded.warnings.iter().map(|w| u64::from(w.count)).sum(), "");
+    }
+
+    /// One JSON object (see the module's head).
+    pub(super) fn json(&self) -> String {
+        let (scene, shapes, facts) = (&self.loaded.scene, &self.world.shapes, &self.loaded.facts);
+        let named = |name: &str, kind: &str| json!({ "name": name, "kind": kind });
+        let hull = |lo: DVec3, hi: DVec3| match lo.cmple(hi).all() {
+            true => json!({ "lo": lo.to_array(), "hi": hi.to_array() }),
+            false => Value::Null,
+        };
+        let topology = &self.topology;
+        let value = json!({
+            "schema": "meshray-inspect/1",
+            "file": self.file.to_string_lossy(), "format": facts.format, "generator": facts.generator,
+            "hash": format!("{:032x}", facts.hash),
+            "files": facts.files.iter().map(|f| f.to_string_lossy()).collect::<Vec<_>>(),
+            "triangles": shapes.triangles.len(), "polygons": shapes.polygons.len(), "faces": facts.faces,
+            "spheres": shapes.spheres.len(), "planes": shapes.planes.len(),
+            "meshes": scene.meshes.len(), "instances": scene.instances.len(),
+            "materials": scene.materials.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(),
+            "bounds": hull(self.world.bounds.0, self.world.bounds.1),
+            "framed": hull(self.bounds.lo, self.bounds.hi), "strays": self.bounds.strays,
+            "units": self.units(), "up": self.up(), "up_reason": facts.up_reason,
+            "topology": {
+                "corners": topology.corners, "edges": topology.edges, "open": topology.open,
+                "non_manifold": topology.non_manifold, "duplicates": topology.duplicates,
+                "degenerate": topology.degenerate,
+            },
+            "dropped": facts.dropped.iter().map(|(why, n)| json!({ "reason": why, "count": n })).collect::<Vec<_>>(),
+            "points_and_lines": facts.points_and_lines,
+            "textures": scene.bitmaps.iter()
+                .map(|b| json!({ "name": b.name, "width": b.width, "height": b.height })).collect::<Vec<_>>(),
+            "missing": self.missing(),
+            "extensions": facts.extensions.iter()
+                .map(|(n, r, s)| json!({ "name": n, "required": r, "supported": s })).collect::<Vec<_>>(),
+            "scenes": facts.scenes, "scene": facts.scene_index,
+            "cameras": scene.cameras.iter().map(|c| named(&c.name, lens(c))).collect::<Vec<_>>(),
+            "lights": scene.lights.iter().map(|l| named(&l.name, kind(l))).collect::<Vec<_>>(),
+            "features": self.features.present().map(|f| f.name()).collect::<Vec<_>>(),
+            "left_out": self.features.absent().map(|f| f.name()).collect::<Vec<_>>(),
+            "memory": { "scene": self.scene_bytes, "structure": self.structure_bytes },
+            "max_rounding": facts.max_rounding,
+            "warnings": self.loaded.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        });
+        serde_json::to_string_pretty(&value).unwrap_or_default() + "\n"
+    }
+
+    fn units(&self) -> &'static str {
+        if self.loaded.facts.format.starts_with("glTF") { "metres (as glTF says)" } else { "units (taken as metres)" }
+    }
+
+    fn up(&self) -> &'static str {
+        match self.loaded.scene.up {
+            UpAxis::Y => "+Y",
+            UpAxis::Z => "+Z",
+        }
+    }
+
+    /// What was named but not there.
+    fn missing(&self) -> Vec<String> {
+        let missing = self.loaded.warnings.iter().filter(|w| w.code.contains("missing"));
+        missing.map(|w| w.text.clone()).collect()
+    }
+}
+
+/// Lines with their labels in one column; empty values leave no line.
+#[derive(Default)]
+struct Lines {
+    text: String,
+}
+
+impl Lines {
+    fn add(&mut self, label: &str, value: impl AsRef<str>) {
+        let value: String = value.as_ref().chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();
+        if !value.is_empty() {
+            self.text.push_str(&format!("{label:<14} {value}\n"));
+        }
+    }
+
+    fn count(&mut self, label: &str, n: u64, what: &str) {
+        if n > 0 {
+            self.add(label, format!("{} {what}", grouped(n)).trim_end());
+        }
+    }
+}
+
+fn label(name: &str) -> String {
+    if name.is_empty() { "(no name)".into() } else { format!("'{name}'") }
+}
+
+fn or_closed(found: &[String]) -> String {
+    if found.is_empty() { "closed".into() } else { found.join(", ") }
+}
+
+fn shorten(names: impl ExactSizeIterator<Item = String>) -> String {
+    let count = names.len();
+    let shown = names.take(SHOWN).collect::<Vec<_>>().join(", ");
+    if count > SHOWN { format!("{shown}, … ({count} in all)") } else { shown }
+}
+
+fn lens(camera: &crate::scene::Camera) -> &'static str {
+    match camera.projection {
+        Projection::Perspective { .. } => "perspective",
+        Projection::Orthographic { .. } => "orthographic",
+    }
+}
+
+fn kind(light: &crate::scene::Light) -> &'static str {
+    match light.kind {
+        LightKind::Point { .. } => "point",
+        LightKind::Directional { .. } => "directional",
+        LightKind::Spot { .. } => "spot",
+    }
+}
+
+/// Digits in threes: `1 234 567`.
+fn grouped(n: u64) -> String {
+    let digits = n.to_string();
+    let groups: Vec<&str> = digits.as_bytes().rchunks(3).rev().filter_map(|c| std::str::from_utf8(c).ok()).collect();
+    groups.join(" ")
+}
+
+fn bytes(n: u64) -> String {
+    match n {
+        n if n >= 1 << 30 => format!("{:.1} GiB", n as f64 / f64::from(1 << 30)),
+        n if n >= 1 << 20 => format!("{:.1} MiB", n as f64 / f64::from(1 << 20)),
+        n => format!("{:.1} KiB", n as f64 / 1024.0),
+    }
+}
+
+fn vector(v: DVec3) -> String {
+    let part = |x: f64| if x == 0.0 || (1e-3..1e6).contains(&x.abs()) { format!("{x:.4}") } else { format!("{x:.4e}") };
+    format!("({}, {}, {})", part(v.x), part(v.y), part(v.z))
+}
+
+/// Bytes of the large arrays of the scene and of its flattened form.
+fn scene_bytes(scene: &Scene, world: &World) -> u64 {
+    let mesh = |m: &Mesh| {
+        m.positions.len() * size_of::<Vec3>()
+            + m.normals.len() * size_of::<Vec3>()
+            + (m.tangents.len() + m.colors.len()) * size_of::<Vec4>()
+            + m.uvs.iter().map(|set| set.len() * size_of::<Vec2>()).sum::<usize>()
+            + m.triangles.len() * size_of::<[u32; 3]>()
+            + (m.face_of_triangle.len() + m.polygon_corners.len()) * size_of::<u32>()
+    };
+    let pixels = |p: &Pixels| match p {
+        Pixels::Rgba8(texels) => texels.len() * 4,
+        Pixels::Rgba16(texels) => texels.len() * 8,
+    };
+    let shapes = &world.shapes;
+    let flat = shapes.vertices.len() * size_of::<Vec3>() + shapes.triangles.len() * size_of::<[u32; 3]>();
+    let meshes: usize = scene.meshes.iter().map(mesh).sum();
+    (meshes + scene.bitmaps.iter().map(|b| pixels(&b.pixels)).sum::<usize>() + flat) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::load::{LoadOptions, load_bytes};
+
+    fn report_of(text: &str) -> Value {
+        let loaded = load_bytes(Path::new("a.toml"), text.into(), &LoadOptions::default()).unwrap();
+        serde_json::from_str(&Report::new(Path::new("a.toml"), &loaded).json()).unwrap()
+    }
+
+    #[test]
+    fn a_square_and_a_sphere_are_counted() {
+        let report = report_of(
+            "[[meshes]]\npositions=[[0,0,0],[2,0,0],[2,1,0],[0,1,0]]\nfaces=[[0,1,2,3]]\n\
+             [[spheres]]\ncenter=[0,0,5]\nradius=1\n[[lights]]\nname='lamp'\nkind='point'\nposition=[0,9,0]",
+        );
+        assert_eq!((&report["faces"], &report["triangles"], &report["spheres"]), (&1.into(), &2.into(), &1.into()));
+        assert_eq!((&report["topology"]["edges"], &report["topology"]["open"]), (&5.into(), &4.into()));
+        assert_eq!(report["bounds"]["hi"], serde_json::json!([2.0, 1.0, 6.0]));
+        assert_eq!(report["lights"][0], serde_json::json!({ "name": "lamp", "kind": "point" }));
+    }
+
+    #[test]
+    fn an_empty_scene_has_no_bounds() {
+        let report = report_of("up = 'z'");
+        assert_eq!((&report["bounds"], &report["up"]), (&Value::Null, &"+Z".into()));
+    }
+
+    #[test]
+    fn the_text_has_its_values_in_one_column() {
+        let text =
+            "[[spheres]]\ncenter=[0,0,5]\nradius=1\nmaterial='a\tb'\n[materials.\"a\\tb\"]\n".replace('\t', "\\t");
+        let text = text.replace("material='a\\tb'", "material=\"a\\tb\"");
+        let loaded = load_bytes(Path::new("a.toml"), text.into(), &LoadOptions::default()).unwrap();
+        let shown = Report::new(Path::new("a.toml"), &loaded).text();
+        assert!(shown.lines().all(|l| l.as_bytes()[14] == b' ' && !l.contains('\t')), "{shown}");
+        assert!(shown.contains("spheres        1\n"), "{shown}");
+    }
+
+    #[test]
+    fn large_numbers_are_grouped() {
+        assert_eq!([0, 999, 1000, 1_234_567].map(grouped), ["0", "999", "1 000", "1 234 567"]);
+    }
+}
