@@ -6,11 +6,12 @@
 
 use super::args::{Cli, Command, RenderArgs};
 use super::camera::{Choice, LensChoice};
+use super::exit::Exit;
 use super::job::{Batch, RenderJob, Shot};
 use super::parse;
 use super::picture::Effective;
 use super::stats::Counted;
-use crate::image::{ExrSamples, FileKind, Metadata, PngDepth, read_metadata};
+use crate::image::{ExrSamples, FileKind, ImageError, Metadata, PngDepth, read_metadata};
 use crate::load::{Diagnostic, Loaded, MtlMode, Polygons};
 use crate::math::DVec3;
 use crate::scene::{Background, UpAxis};
@@ -163,9 +164,18 @@ pub(super) struct Repeat {
 }
 
 /// The command line that made `picture`, with what `typed` adds: inputs, output, and how to run.
-pub(super) fn repeat(picture: &Path, typed: &RenderArgs) -> Result<Repeat, Diagnostic> {
+///
+/// The error says how the command ends.
+pub(super) fn repeat(picture: &Path, typed: &RenderArgs) -> Result<Repeat, (Diagnostic, Exit)> {
+    let metadata = read_metadata(picture).map_err(|error| match error {
+        ImageError::Read { source, .. } => (Diagnostic::new("again", picture, "", source.to_string()), Exit::Failed),
+        other => (Diagnostic::new("again", picture, "", other.to_string()), Exit::Input),
+    })?;
+    repeat_from(metadata, picture, typed).map_err(|fault| (fault, Exit::Input))
+}
+
+fn repeat_from(metadata: Option<Metadata>, picture: &Path, typed: &RenderArgs) -> Result<Repeat, Diagnostic> {
     let fault = |text: String| Diagnostic::new("again", picture, "", text);
-    let metadata = read_metadata(picture).map_err(|e| fault(e.to_string()))?;
     let metadata = metadata.ok_or_else(|| fault("was not written by meshray".into()))?;
     let entry = |key| metadata.get(key).ok_or_else(|| fault(format!("carries no {key}; it cannot be repeated")));
     let settings: Map<String, Value> =

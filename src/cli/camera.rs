@@ -11,7 +11,7 @@ use std::path::Path;
 /// Where a picture is seen from, as chosen.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Choice {
-    /// The file's camera, or else a good side.
+    /// The first camera of a scene file, or else a good side.
     Default,
     /// A side of the model.
     Named(NamedView),
@@ -89,9 +89,9 @@ pub(super) fn camera(
 ) -> Result<(Camera, String), Diagnostic> {
     let model_height = 2.0 * bounds.radius();
     let (mut camera, phrase) = match choice {
-        Choice::Default if scene.cameras.is_empty() => {
+        Choice::Default if scene.hints.camera.is_none() => {
             let direction = framing::default_direction(scene, bounds);
-            (frame(scene, bounds, direction, framing_lens(lens), aspect), "default view".to_owned())
+            (frame(scene, bounds, direction, framing_lens(lens), aspect), default_phrase(scene))
         }
         Choice::Default => {
             let camera = framing::default_camera(scene, bounds, aspect);
@@ -112,13 +112,26 @@ pub(super) fn camera(
         }
     };
     // Framed cameras have the chosen lens already, but for a height of the user's own.
-    let framed = matches!(choice, Choice::Named(_)) || (*choice == Choice::Default && scene.cameras.is_empty());
+    let framed = matches!(choice, Choice::Named(_)) || (*choice == Choice::Default && scene.hints.camera.is_none());
     match lens {
         Some(LensChoice::Ortho(None)) | Some(LensChoice::Fov(_)) if framed => {}
         Some(lens) => camera.projection = lens.projection(aspect, model_height),
         None => {}
     }
     Ok((camera, phrase))
+}
+
+/// Says that the file brings cameras, because nothing in the picture does.
+fn default_phrase(scene: &Scene) -> String {
+    match scene.cameras.as_slice() {
+        [] => "default view".into(),
+        [one] => format!("default view (--camera {} is the file's own)", shell_word(&one.name)),
+        more => format!("default view (the file has {} cameras; --camera 0 is the first)", more.len()),
+    }
+}
+
+fn shell_word(name: &str) -> String {
+    if name.is_empty() { "0".into() } else { format!("'{name}'") }
 }
 
 fn framing_lens(lens: Option<LensChoice>) -> FrameLens {
@@ -150,6 +163,7 @@ fn find<'s>(name: &str, scene: &'s Scene, file: &Path) -> Result<&'s Camera, Dia
 mod tests {
     use super::*;
     use crate::math::DAffine3;
+    use crate::scene::RenderHints;
     use crate::scene::framing::robust_bounds;
 
     fn scene() -> Scene {
@@ -158,7 +172,8 @@ mod tests {
             projection: Projection::Perspective { y_fov: 1.0, aspect: None },
             world_from_camera: DAffine3::IDENTITY,
         };
-        Scene { cameras: vec![camera("Front"), camera("")], ..Scene::default() }
+        let hints = RenderHints { camera: Some(0), ..RenderHints::default() };
+        Scene { cameras: vec![camera("Front"), camera("")], hints, ..Scene::default() }
     }
 
     fn pick(choice: Choice, lens: Option<LensChoice>) -> Result<(Camera, String), Diagnostic> {
@@ -172,6 +187,14 @@ mod tests {
         assert!(pick(Choice::Camera("1".into()), None).is_ok());
         let error = pick(Choice::Camera("Frnt".into()), None).unwrap_err().to_string();
         assert_eq!(error, "a.glb: no camera is called 'Frnt'; did you mean 'Front'? there are, from 0: `Front`, ``");
+    }
+
+    #[test]
+    fn cameras_of_a_model_wait_until_they_are_named() {
+        let scene = Scene { hints: RenderHints::default(), ..scene() };
+        let (_, phrase) =
+            camera(&Choice::Default, None, &scene, &robust_bounds(&scene), 1.0, Path::new("a.glb")).unwrap();
+        assert_eq!(phrase, "default view (the file has 2 cameras; --camera 0 is the first)");
     }
 
     #[test]

@@ -191,7 +191,8 @@ fn choices(args: &RenderArgs) -> Result<Vec<Choice>, Wrong> {
     for name in &args.view {
         let view = name.parse::<NamedView>().map_err(|unknown| {
             let near = crate::load::suggest::nearest(name, NamedView::ALL.map(NamedView::name));
-            Wrong(near.map_or(unknown.to_string(), |near| format!("{unknown}; did you mean {near}?")))
+            let hint = near.map_or(String::new(), |near| format!("; did you mean {near}?"));
+            Wrong(format!("--view: {unknown}{hint}"))
         })?;
         choices.push(Choice::Named(view));
     }
@@ -283,7 +284,7 @@ pub(super) fn limits(memory: Option<u64>) -> Limits {
 
 fn look(args: &RenderArgs) -> Result<Look, Wrong> {
     let tone_map = match &args.tone_map {
-        Some(name) => Some(name.parse::<ToneMap>().map_err(|e| Wrong(e.to_string()))?),
+        Some(name) => Some(name.parse::<ToneMap>().map_err(|e| Wrong(format!("--tone-map: {e}")))?),
         None => None,
     };
     Ok(Look {

@@ -60,9 +60,9 @@ fn render_command(typed: &RenderArgs) -> Exit {
                 args = repeat.args;
                 expected_hash = Some(repeat.hash);
             }
-            Err(fault) => {
+            Err((fault, exit)) => {
                 messages.say(Severity::Error, &fault);
-                return Exit::Failed;
+                return exit;
             }
         }
     }

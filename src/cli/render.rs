@@ -125,7 +125,7 @@ fn prepare(job: &RenderJob, batch: &Batch, messages: &Messages, progress: &Progr
     if let Some(expected) = &job.expected_hash {
         again::check_hash(expected, &loaded, &batch.inputs[0]).map_err(|fault| {
             messages.say(Severity::Error, &fault);
-            Exit::Failed
+            Exit::Input
         })?;
     }
     let world = World::new(&loaded.scene);

@@ -1,10 +1,11 @@
 //! `--stats`: what pictures cost, as a table or as JSON.
 //!
 //! # Schema `meshray-stats/1`
-//! One JSON object: `schema`, `version` (of meshray), and `pictures`, a list with one object for each picture written:
+//! One JSON object a line for each picture written:
 //!
 //! | key | what |
 //! |---|---|
+//! | `schema`, `version` | `meshray-stats/1`; version of meshray |
 //! | `inputs`, `output`, `input_hash` | files as typed (`-`: standard streams); xxh3-128 of what was read, hexadecimal |
 //! | `width`, `height`, `samples`, `depth`, `cutoff`, `seed`, `view`, `accel`, `threads` | settings that were used |
 //! | `seconds` | of the timed run: `load`, `build`, `render`, `write`; `load` is 0 for further views of one input |
@@ -144,6 +145,7 @@ impl PictureStats {
         let settings = &facts.effective.settings;
         let (scene, shapes) = (&facts.loaded.scene, &world.shapes);
         let json = json!({
+            "schema": "meshray-stats/1", "version": super::version::SHORT,
             "inputs": facts.inputs(),
             "output": facts.shot.target.path().map_or("-".into(), |p| p.to_string_lossy()),
             "input_hash": facts.hash(),
@@ -226,7 +228,7 @@ fn count_table(counted: &Counted) -> Vec<String> {
 pub(super) fn report(job: &RenderJob, pictures: &[PictureStats], messages: &Messages) -> Exit {
     let Some(wanted) = &job.stats else { return Exit::Done };
     let text = match wanted.format {
-        StatsFormat::Json => document(pictures),
+        StatsFormat::Json => pictures.iter().map(|p| format!("{}\n", p.json)).collect(),
         StatsFormat::Text => pictures.iter().map(PictureStats::text).collect::<Vec<_>>().join("\n") + "\n",
     };
     let result = match &wanted.file {
@@ -241,12 +243,6 @@ pub(super) fn report(job: &RenderJob, pictures: &[PictureStats], messages: &Mess
             Exit::Failed
         }
     }
-}
-
-fn document(pictures: &[PictureStats]) -> String {
-    let list: Vec<&Value> = pictures.iter().map(|p| &p.json).collect();
-    let all = json!({ "schema": "meshray-stats/1", "version": super::version::SHORT, "pictures": list });
-    serde_json::to_string_pretty(&all).unwrap_or_default() + "\n"
 }
 
 #[cfg(test)]

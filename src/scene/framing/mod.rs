@@ -150,11 +150,13 @@ pub fn default_direction(scene: &Scene, bounds: &Bounds) -> Direction {
     }
 }
 
-/// The camera of a picture nobody directed: the one the scene file chose, else the first of the file, else
-/// [`default_direction`] framed for a picture of `aspect` width / height.
+/// The camera of a picture nobody directed: the one the scene file chose, else [`default_direction`] framed for a picture
+/// of `aspect` width / height.
+///
+/// Cameras of a model are left alone: they were placed for other pictures, and often see little of it.
 pub fn default_camera(scene: &Scene, bounds: &Bounds, aspect: f64) -> Camera {
-    let chosen = scene.hints.camera.unwrap_or(0) as usize;
-    scene.cameras.get(chosen).cloned().unwrap_or_else(|| {
+    let chosen = scene.hints.camera.and_then(|i| scene.cameras.get(i as usize));
+    chosen.cloned().unwrap_or_else(|| {
         let lens = FrameLens::Perspective { y_fov: DEFAULT_FOV };
         frame(scene, bounds, default_direction(scene, bounds), lens, aspect)
     })
