@@ -166,12 +166,13 @@ pub(super) struct Repeat {
 /// The command line that made `picture`, with what `typed` adds: inputs, output, and how to run.
 ///
 /// The error says how the command ends.
-pub(super) fn repeat(picture: &Path, typed: &RenderArgs) -> Result<Repeat, (Diagnostic, Exit)> {
+pub(super) fn repeat(picture: &Path, typed: &RenderArgs) -> Result<Repeat, (Box<Diagnostic>, Exit)> {
+    let refuse = |text: String, exit| (Box::new(Diagnostic::new("again", picture, "", text)), exit);
     let metadata = read_metadata(picture).map_err(|error| match error {
-        ImageError::Read { source, .. } => (Diagnostic::new("again", picture, "", source.to_string()), Exit::Failed),
-        other => (Diagnostic::new("again", picture, "", other.to_string()), Exit::Input),
+        ImageError::Read { source, .. } => refuse(source.to_string(), Exit::Failed),
+        other => refuse(other.to_string(), Exit::Input),
     })?;
-    repeat_from(metadata, picture, typed).map_err(|fault| (fault, Exit::Input))
+    repeat_from(metadata, picture, typed).map_err(|fault| (Box::new(fault), Exit::Input))
 }
 
 fn repeat_from(metadata: Option<Metadata>, picture: &Path, typed: &RenderArgs) -> Result<Repeat, Diagnostic> {

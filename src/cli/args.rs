@@ -1,6 +1,8 @@
 //! What was typed: syntax only. What it means together is decided in [`super::job`].
 
 use super::parse;
+use crate::image::ToneMap;
+use crate::scene::framing::NamedView;
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -79,9 +81,9 @@ pub(super) struct RenderArgs {
     /// Add layers to an EXR: albedo, N, P, Z, prim and instance ids
     #[arg(long, help_heading = "Output", hide_short_help = true)]
     pub layers: bool,
-    /// How linear light becomes display colour: none, reinhard, aces or neutral [default: neutral]
-    #[arg(long, value_name = "NAME", help_heading = "Output", hide_short_help = true)]
-    pub tone_map: Option<String>,
+    /// How linear light becomes display colour [default: neutral]
+    #[arg(long, value_name = "NAME", value_parser = parse::tone_map(), help_heading = "Output", hide_short_help = true)]
+    pub tone_map: Option<ToneMap>,
     /// Brighter (+) or darker (-) by this many stops
     #[arg(long, value_name = "STOPS", value_parser = parse::exposure, help_heading = "Output", allow_hyphen_values = true)]
     pub exposure: Option<f32>,
@@ -99,9 +101,10 @@ pub(super) struct RenderArgs {
     ])]
     pub again: Option<PathBuf>,
 
-    /// Named view; repeat for several pictures: front, back, left, right, top, bottom, iso
-    #[arg(long, value_name = "NAME", action = ArgAction::Append, value_delimiter = ',', help_heading = "Camera")]
-    pub view: Vec<String>,
+    /// Side of the model; repeat for several pictures
+    #[arg(long, value_name = "NAME", value_parser = parse::view(), action = ArgAction::Append, value_delimiter = ',',
+          help_heading = "Camera")]
+    pub view: Vec<NamedView>,
     /// A camera of the file, by name or number from 0; repeat for several pictures
     #[arg(long, value_name = "NAME", action = ArgAction::Append, help_heading = "Camera")]
     pub camera: Vec<String>,

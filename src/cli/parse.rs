@@ -1,8 +1,10 @@
 //! The words of single flags: sizes, vectors, angles, colours. Errors say what would be right.
 
 use crate::accel::AccelKind;
+use crate::image::ToneMap;
 use crate::math::Vec3;
 use crate::scene::Background;
+use crate::scene::framing::NamedView;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 /// Longest side of a picture.
@@ -115,6 +117,18 @@ pub(super) fn background(text: &str) -> Result<Back, String> {
 pub(super) fn accel() -> impl TypedValueParser<Value = AccelKind> {
     let parse = |name: String| name.parse::<AccelKind>().map_err(|e| e.to_string());
     PossibleValuesParser::new(AccelKind::ALL.map(AccelKind::name)).try_map(parse)
+}
+
+/// The names of all tone maps.
+pub(super) fn tone_map() -> impl TypedValueParser<Value = ToneMap> {
+    let parse = |name: String| name.parse::<ToneMap>().map_err(|e| e.to_string());
+    PossibleValuesParser::new(ToneMap::ALL.map(ToneMap::name)).try_map(parse)
+}
+
+/// The names of all views.
+pub(super) fn view() -> impl TypedValueParser<Value = NamedView> {
+    let parse = |name: String| name.parse::<NamedView>().map_err(|e| e.to_string());
+    PossibleValuesParser::new(NamedView::ALL.map(NamedView::name)).try_map(parse)
 }
 
 /// A linear colour as settings text that [`background`] reads back exactly.
