@@ -11,6 +11,7 @@ pub mod obj;
 pub mod paths;
 pub mod scene_file;
 pub mod suggest;
+pub mod tangents;
 pub mod texture;
 
 pub use diagnostic::{Diagnostic, LoadError, Warnings};
@@ -81,6 +82,8 @@ pub struct Facts {
     pub dropped: Vec<(String, u64)>,
     /// Points and lines skipped.
     pub points_and_lines: u64,
+    /// Animations in the file; none is played.
+    pub animations: u64,
     /// glTF extensions used: (name, required by the file, supported by us).
     pub extensions: Vec<(String, bool, bool)>,
     /// Names of the scenes in the file; the loaded one is `scene_index`.

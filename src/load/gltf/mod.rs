@@ -1,9 +1,307 @@
-//! (to be written)
+//! glTF 2.0, core and the extensions that a still picture shows, from `.gltf` or GLB.
+//!
+//! A file goes through four gates. [`container`] finds the JSON and the binary chunk; [`version`] and [`extensions`]
+//! say early what cannot be drawn at all; [`schema`] checks every value and index, so that the typed document of the
+//! `gltf` crate can be built; [`attributes`], [`graph`] and [`links`] check what parts mean together. Only then is data
+//! read ([`accessor`], [`mesh`], [`images`]), each piece with its own bounds. What becomes of a fault is a table
+//! ([`codes`]).
+//!
+//! Animations are not played: nodes, morph weights and skins are drawn in their rest pose.
 
-use super::{Diagnostic, LoadError, LoadOptions, Loaded, Source};
+mod accessor;
+mod attributes;
+mod bounds;
+mod buffers;
+pub mod codes;
+mod container;
+mod document;
+mod extensions;
+mod faces;
+mod graph;
+mod images;
+mod links;
+mod material;
+mod mesh;
+mod placed;
+mod report;
+mod scene;
+mod schema;
+mod schema_tables;
+mod skin;
+#[cfg(test)]
+mod tests;
+mod textures;
+mod version;
 
-/// Loads the glTF loader.
+use super::limits::Budget;
+use super::paths::Resolver;
+use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source};
+use crate::math::DAffine3;
+use crate::scene::{Instance, Material, Scene};
+use accessor::Reader;
+use buffers::Buffers;
+use document::Document;
+use graph::Graph;
+use images::Images;
+use mesh::{Job, Needs, Read};
+use rayon::prelude::*;
+use report::Report;
+use scene::Placed;
+use textures::Textures;
+
+/// Loads a glTF 2.0 file.
+///
+/// # Errors
+/// What the table in [`codes`] refuses, all faults of one stage at once.
 pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
-    let _ = options;
-    Err(Diagnostic::new("unsupported-format", &source.path, "", "no loader yet").into())
+    let mut report = Report::new(&source.path);
+    let loaded = Loading { source, options, report: &mut report }.run()?;
+    let warnings = report.warnings.into_vec();
+    Ok(Loaded { warnings, ..loaded })
+}
+
+struct Loading<'a> {
+    source: &'a Source,
+    options: &'a LoadOptions,
+    report: &'a mut Report,
+}
+
+/// Materials in use, and how the file's numbers lead to them.
+struct Palette<'a> {
+    materials: Vec<Material>,
+    needs: Vec<Needs>,
+    /// For each material of the file, and last for the default one, its index here.
+    index: Vec<Option<u32>>,
+    textures: Textures<'a>,
+}
+
+impl Loading<'_> {
+    fn run(&mut self) -> Result<Loaded, LoadError> {
+        let file = &self.source.path;
+        let container = container::split(&self.source.bytes, self.report);
+        let container = self.passed(container)?;
+        let value = document::parse(container.json, self.report);
+        let value = self.passed(value)?;
+        let right_version = version::check(&value, self.report).then_some(());
+        self.passed(right_version)?;
+        let extensions = extensions::Lists::of(&value);
+        extensions.check(file, self.report);
+        self.report.check()?;
+        schema::check(&value, self.report);
+        self.report.check()?;
+        attributes::check(&value, self.report);
+        let graph = Graph::new(&value, self.report);
+        let document = document::typed(value, self.report);
+        let document = self.passed(document)?;
+        links::check(&document.root, self.report);
+        self.report.check()?;
+
+        let mut facts = facts(&document, container.binary);
+        facts.extensions = extensions.facts();
+        let scene = self.build(&document, &graph, container.bin, &mut facts)?;
+        Ok(Loaded { scene, facts, warnings: Vec::new() })
+    }
+
+    /// The value, unless the report refuses the file or there is none.
+    fn passed<T>(&mut self, value: Option<T>) -> Result<T, LoadError> {
+        self.report.check()?;
+        value
+            .ok_or_else(|| Diagnostic::new("gltf-unreadable", &self.source.path, "", "this is no glTF 2.0 file").into())
+    }
+
+    fn build(
+        &mut self,
+        document: &Document,
+        graph: &Graph,
+        bin: Option<&[u8]>,
+        facts: &mut Facts,
+    ) -> Result<Scene, LoadError> {
+        let (root, file) = (&document.root, self.source.path.as_path());
+        let mut resolver = Resolver::new(self.source, self.options);
+        let buffers = Buffers::load(root, bin, file, &mut resolver, self.report);
+        let reader = Reader { root, buffers: &buffers };
+        facts.scene_index = scene::choose(root, self.options.scene.as_deref(), file)?;
+        let mut budget = Budget::new(&self.options.limits);
+        self.check_budget(reader, &mut budget)?;
+        bounds::check(reader, self.report);
+        let placed = scene::walk(reader, graph, facts.scene_index, self.report);
+        let skins = skin::joint_matrices(reader, graph, self.report);
+        let palette = self.palette(document, &placed);
+
+        let drawn_images = palette.textures.images.clone();
+        let images = Images::load(root, &buffers, &drawn_images, file, &mut resolver, self.report);
+        self.charge(reader, &placed, &mut budget)?;
+        let mut pictures = Report::new(file);
+        let (reads, bitmaps) = rayon::join(
+            || read_meshes(reader, &placed, &skins, &palette, file),
+            || images.decode(root, &drawn_images, file, &self.options.limits, &mut budget, &mut pictures),
+        );
+        let mut scene = Scene { cameras: placed.cameras, lights: placed.lights, ..Scene::default() };
+        self.assemble(&mut scene, &placed.draws, reads, facts)?;
+        self.report.merge(pictures);
+        scene.materials = palette.materials;
+        (scene.textures, scene.bitmaps) = textures::keep_decoded(&mut scene.materials, palette.textures.list, bitmaps);
+        scene.up = self.options.up.unwrap_or_default();
+        (facts.files, facts.hash) = resolver.finish();
+        Ok(scene)
+    }
+
+    /// Refuses a file whose accessors are larger than memory allows, before any is read.
+    fn check_budget(&self, reader: Reader, budget: &mut Budget) -> Result<(), LoadError> {
+        // Zeros need no bytes in the file, so that only the budget bounds them.
+        let zeros = reader.root.accessors.iter().filter(|a| a.buffer_view.is_none()).map(|a| a.count.0);
+        let largest = zeros.max().unwrap_or(0);
+        let mut trial = *budget;
+        trial.take(largest, 64).map_err(|over| self.too_large(over))
+    }
+
+    /// Charges what the primitives will take.
+    fn charge(&self, reader: Reader, placed: &Placed, budget: &mut Budget) -> Result<(), LoadError> {
+        let primitives =
+            placed.variants.iter().filter_map(|v| reader.root.meshes.get(v.mesh)).flat_map(|m| &m.primitives);
+        let bytes = primitives.map(|p| mesh::cost(reader, p)).fold(0, u64::saturating_add);
+        budget.take(bytes, 1).map_err(|over| self.too_large(over))
+    }
+
+    fn too_large(&self, over: super::limits::OverBudget) -> LoadError {
+        let fault = Diagnostic::new("out-of-memory-limit", &self.source.path, "", format!("too large: {over}"));
+        fault.remedy("allow more with --max-memory").into()
+    }
+
+    /// Converts the materials that drawn primitives name.
+    fn palette<'a>(&mut self, document: &'a Document, placed: &Placed) -> Palette<'a> {
+        let root = &document.root;
+        let default = root.materials.len();
+        let mut palette = Palette {
+            materials: Vec::new(),
+            needs: Vec::new(),
+            index: vec![None; default + 1],
+            textures: Textures::new(root),
+        };
+        let drawn = placed.variants.iter().filter(|v| v.drawn).filter_map(|v| root.meshes.get(v.mesh));
+        for primitive in drawn.flat_map(|mesh| &mesh.primitives) {
+            let i = primitive.material.map_or(default, |m| m.value());
+            if palette.index.get(i).is_none_or(Option::is_some) {
+                continue;
+            }
+            let mut material = match root.materials.get(i) {
+                Some(source) => material::convert(i, source, &mut palette.textures, self.report),
+                None => Material { name: "default".into(), ..Material::default() },
+            };
+            palette.index[i] = u32::try_from(palette.materials.len()).ok();
+            palette.needs.push(material::needs(&mut material));
+            palette.materials.push(material);
+        }
+        palette
+    }
+
+    /// Puts what was read into the scene.
+    fn assemble(
+        &mut self,
+        scene: &mut Scene,
+        draws: &[scene::Draw],
+        reads: Vec<Vec<(Option<Read>, Report)>>,
+        facts: &mut Facts,
+    ) -> Result<(), LoadError> {
+        let mut dropped = faces::Dropped::default();
+        // For each variant, its meshes and where a skin has put them.
+        let mut parts: Vec<Vec<(u32, Option<DAffine3>)>> = Vec::new();
+        for primitives in reads {
+            let mut part = Vec::new();
+            for (read, report) in primitives {
+                self.report.merge(report);
+                let Some(read) = read else { continue };
+                facts.points_and_lines += read.points_and_lines;
+                dropped.not_finite += read.dropped.not_finite;
+                dropped.degenerate += read.dropped.degenerate;
+                if !read.mesh.triangles.is_empty() {
+                    facts.faces += read.mesh.triangles.len() as u64;
+                    part.push((scene.meshes.len() as u32, read.center.map(DAffine3::from_translation)));
+                    scene.meshes.push(read.mesh);
+                }
+            }
+            parts.push(part);
+        }
+        self.report.check()?;
+        for draw in draws {
+            let place = |&(mesh, posed): &(u32, Option<DAffine3>)| Instance {
+                name: draw.name.clone(),
+                mesh,
+                world_from_object: posed.unwrap_or(draw.world),
+            };
+            scene.instances.extend(parts.get(draw.variant).into_iter().flatten().map(place));
+        }
+        self.tell_dropped(dropped, facts);
+        Ok(())
+    }
+
+    fn tell_dropped(&mut self, dropped: faces::Dropped, facts: &mut Facts) {
+        let reasons = [
+            ("a corner that is not finite", "face-not-finite", dropped.not_finite),
+            ("two corners in one place", "face-degenerate", dropped.degenerate),
+        ];
+        let file = &self.source.path;
+        for (reason, code, count) in reasons.into_iter().filter(|r| r.2 > 0) {
+            facts.dropped.push((reason.into(), count));
+            let mut warning = Diagnostic::new(code, file, "", format!("a face with {reason} is left out"));
+            warning.count = u32::try_from(count).unwrap_or(u32::MAX);
+            self.report.warnings.push(warning);
+        }
+        if facts.points_and_lines > 0 {
+            let text = format!("{} points and lines are not drawn", facts.points_and_lines);
+            self.report.warnings.push(Diagnostic::new("points-and-lines", file, "", text));
+        }
+    }
+}
+
+/// Reads every primitive of every variant, in parallel; the order of results is that of the file.
+fn read_meshes(
+    reader: Reader,
+    placed: &Placed,
+    skins: &[Option<Vec<crate::math::DMat4>>],
+    palette: &Palette,
+    file: &std::path::Path,
+) -> Vec<Vec<(Option<Read>, Report)>> {
+    let root = reader.root;
+    let read_one = |variant: &scene::Variant, k: usize, primitive: &gltf::json::mesh::Primitive, name: &str| {
+        let mut report = Report::new(file);
+        let material = primitive.material.map_or(root.materials.len(), |m| m.value());
+        let material = palette.index.get(material).copied().flatten().filter(|_| variant.drawn);
+        let needs = material.and_then(|m| palette.needs.get(m as usize)).cloned().unwrap_or_default();
+        let job = Job {
+            primitive,
+            place: format!("meshes[{}].primitives[{k}]", variant.mesh),
+            name: name.to_owned(),
+            weights: &variant.weights,
+            joints: variant.skin.and_then(|s| skins.get(s)).and_then(Option::as_deref),
+            needs,
+            drawn: variant.drawn,
+        };
+        let mut read = mesh::read(reader, &job, &mut report).filter(|_| variant.drawn);
+        if let (Some(read), Some(material)) = (&mut read, material) {
+            read.mesh.material = material;
+        }
+        (read, report)
+    };
+    let variants = placed.variants.par_iter();
+    variants
+        .map(|variant| {
+            let Some(mesh) = root.meshes.get(variant.mesh) else { return Vec::new() };
+            let name = mesh.name.as_deref().unwrap_or_default();
+            let primitives = mesh.primitives.par_iter().enumerate();
+            primitives.map(|(k, primitive)| read_one(variant, k, primitive, name)).collect()
+        })
+        .collect()
+}
+
+fn facts(document: &Document, binary: bool) -> Facts {
+    let root = &document.root;
+    let version = &root.asset.version;
+    Facts {
+        format: format!("glTF {version}{}", if binary { " (binary)" } else { "" }),
+        generator: root.asset.generator.clone().unwrap_or_default(),
+        scenes: scene::names(root),
+        animations: document.animations as u64,
+        ..Facts::default()
+    }
 }

@@ -1,0 +1,308 @@
+//! Reads accessors: every component type, normalised or not, interleaved, sparse, or without a view (zeros).
+//!
+//! Sizes have been checked against the views by [`super::links`] where the file declares them; here every byte is
+//! looked up with bounds, so that a buffer shorter than declared ends in a message.
+
+use super::buffers::Buffers;
+use crate::load::Diagnostic;
+use gltf::json::accessor::{Accessor, ComponentType, Type};
+use gltf::json::validation::Checked;
+use gltf::json::{Index, Root, buffer};
+
+/// Reads accessors of one document.
+#[derive(Clone, Copy)]
+pub(super) struct Reader<'a> {
+    pub(super) root: &'a Root,
+    pub(super) buffers: &'a Buffers<'a>,
+}
+
+/// The smallest and largest value of up to 16 components.
+pub(super) type Extent = [(f64, f64); 16];
+
+/// Why an accessor could not be read.
+#[derive(Debug)]
+pub(super) enum Unreadable {
+    /// The file never says where the bytes are.
+    Nowhere(Diagnostic),
+    /// The buffer could not be read.
+    Buffer(Diagnostic),
+    /// The data ends too early, or the sparse part points outside.
+    Data(super::codes::Code, String),
+    /// An unknown component type or shape.
+    Unknown,
+}
+
+/// How the elements of an accessor lie in memory.
+#[derive(Clone, Copy)]
+pub(super) struct Format {
+    pub(super) component: ComponentType,
+    pub(super) shape: Type,
+    pub(super) normalized: bool,
+}
+
+impl Format {
+    /// The format of an accessor; `None` for types that glTF 2.0 does not know.
+    pub(super) fn of(accessor: &Accessor) -> Option<Self> {
+        let (Checked::Valid(component), Checked::Valid(shape)) = (accessor.component_type, accessor.type_) else {
+            return None;
+        };
+        Some(Self { component: component.0, shape, normalized: accessor.normalized })
+    }
+
+    /// Number of components.
+    pub(super) fn width(self) -> usize {
+        self.shape.multiplicity()
+    }
+
+    /// Bytes of one component.
+    pub(super) fn component_size(self) -> usize {
+        self.component.size()
+    }
+
+    /// Where component `k` lies in an element: columns of matrices start at multiples of four bytes.
+    fn offset(self, k: usize) -> usize {
+        let rows = self.rows();
+        (k / rows) * self.column_size() + (k % rows) * self.component_size()
+    }
+
+    fn rows(self) -> usize {
+        match self.shape {
+            Type::Mat2 => 2,
+            Type::Mat3 => 3,
+            Type::Mat4 => 4,
+            _ => self.width(),
+        }
+    }
+
+    fn is_matrix(self) -> bool {
+        matches!(self.shape, Type::Mat2 | Type::Mat3 | Type::Mat4)
+    }
+
+    fn column_size(self) -> usize {
+        let size = self.rows() * self.component_size();
+        if self.is_matrix() { size.next_multiple_of(4) } else { size }
+    }
+
+    /// Bytes of one element, packed.
+    pub(super) fn size(self) -> usize {
+        self.width() / self.rows() * self.column_size()
+    }
+}
+
+/// Where a run of elements lies.
+struct Run<'a> {
+    bytes: &'a [u8],
+    stride: usize,
+    format: Format,
+}
+
+impl<'a> Run<'a> {
+    /// The elements, each with at least the bytes it needs.
+    fn elements(&self, count: usize) -> impl Iterator<Item = &'a [u8]> {
+        let (bytes, stride, size) = (self.bytes, self.stride, self.format.size());
+        (0..count).map_while(move |i| bytes.get(i.checked_mul(stride)?..)?.get(..size))
+    }
+}
+
+impl<'a> Reader<'a> {
+    /// Reads floats, `N` to an element; integers are normalised when the accessor says so.
+    pub(super) fn floats<const N: usize>(&self, index: Index<Accessor>) -> Result<Vec<[f32; N]>, Unreadable> {
+        self.elements(index, [0.0; N], |element, format| {
+            std::array::from_fn(|k| if k < format.width() { float(element, format, k) } else { 0.0 })
+        })
+    }
+
+    /// Reads scalars or vectors of unsigned integers.
+    pub(super) fn integers<const N: usize>(&self, index: Index<Accessor>) -> Result<Vec<[u32; N]>, Unreadable> {
+        self.elements(index, [0; N], |element, format| {
+            std::array::from_fn(|k| if k < format.width() { integer(element, format, k) } else { 0 })
+        })
+    }
+
+    /// The smallest and largest value of each component, not normalised, numbers that are not finite left out.
+    ///
+    /// Small sparse accessors are read whole; `None` for large ones, and for those that hold only zeros.
+    pub(super) fn extent(&self, index: Index<Accessor>) -> Option<Result<Extent, Unreadable>> {
+        /// Elements of a sparse accessor worth reading only to be checked.
+        const SMALL: u64 = 1 << 16;
+        let accessor = self.root.accessors.get(index.value())?;
+        let format = Format::of(accessor)?;
+        match (&accessor.sparse, accessor.buffer_view) {
+            (Some(_), _) if accessor.count.0 <= SMALL => {
+                let values = self.elements(index, [0.0; 16], |element, format| raws(element, format));
+                Some(values.map(|values| extent_of(values.into_iter(), format)))
+            }
+            (None, Some(view)) => {
+                let count = usize::try_from(accessor.count.0).ok()?;
+                let run = self.run(view, accessor.byte_offset.unwrap_or_default().0, format, true);
+                Some(run.map(|run| extent_of(run.elements(count).map(|element| raws(element, format)), format)))
+            }
+            _ => None,
+        }
+    }
+
+    fn elements<T: Copy>(
+        &self,
+        index: Index<Accessor>,
+        zero: T,
+        read: impl Fn(&[u8], Format) -> T,
+    ) -> Result<Vec<T>, Unreadable> {
+        let accessor = self.root.accessors.get(index.value()).ok_or(Unreadable::Unknown)?;
+        let format = Format::of(accessor).ok_or(Unreadable::Unknown)?;
+        let count = usize::try_from(accessor.count.0).map_err(|_| Unreadable::Unknown)?;
+        let mut values = match accessor.buffer_view {
+            Some(view) => {
+                let run = self.run(view, accessor.byte_offset.unwrap_or_default().0, format, true)?;
+                let values: Vec<T> = run.elements(count).map(|element| read(element, format)).collect();
+                if values.len() < count {
+                    return Err(short(count, values.len()));
+                }
+                values
+            }
+            None => vec![zero; count],
+        };
+        if let Some(sparse) = &accessor.sparse {
+            self.replace(&mut values, sparse, format, read)?;
+        }
+        Ok(values)
+    }
+
+    /// Puts the values of a sparse part in place.
+    fn replace<T: Copy>(
+        &self,
+        values: &mut [T],
+        sparse: &gltf::json::accessor::sparse::Sparse,
+        format: Format,
+        read: impl Fn(&[u8], Format) -> T,
+    ) -> Result<(), Unreadable> {
+        let Checked::Valid(component) = sparse.indices.component_type else { return Err(Unreadable::Unknown) };
+        let index_format = Format { component: component.0, shape: Type::Scalar, normalized: false };
+        let count = usize::try_from(sparse.count.0).map_err(|_| Unreadable::Unknown)?;
+        let indices = self.run(sparse.indices.buffer_view, sparse.indices.byte_offset.0, index_format, false)?;
+        let elements = self.run(sparse.values.buffer_view, sparse.values.byte_offset.0, format, false)?;
+        let mut done = 0;
+        for (index, element) in indices.elements(count).zip(elements.elements(count)) {
+            let index = integer(index, index_format, 0) as usize;
+            let length = values.len();
+            let slot = values.get_mut(index).ok_or_else(|| {
+                let text = format!("sparse index {index}, but only {length} elements exist");
+                Unreadable::Data(super::codes::Code::AccessorSparseIndexOob, text)
+            })?;
+            *slot = read(element, format);
+            done += 1;
+        }
+        if done < count { Err(short(count, done)) } else { Ok(()) }
+    }
+
+    fn run(
+        &self,
+        view: Index<buffer::View>,
+        offset: u64,
+        format: Format,
+        strided: bool,
+    ) -> Result<Run<'a>, Unreadable> {
+        let view = self.root.buffer_views.get(view.value()).ok_or(Unreadable::Unknown)?;
+        let bytes = match self.buffers.view(view) {
+            Ok(bytes) => bytes,
+            Err(Some(why)) => return Err(Unreadable::Buffer(why)),
+            Err(None) => return Err(self.buffers.nowhere(view).map_or(Unreadable::Unknown, Unreadable::Nowhere)),
+        };
+        let offset = usize::try_from(offset).unwrap_or(usize::MAX);
+        let stride = view.byte_stride.map_or(0, |stride| stride.0);
+        let stride = if strided && stride > 0 { stride } else { format.size() };
+        Ok(Run { bytes: bytes.get(offset..).unwrap_or_default(), stride, format })
+    }
+}
+
+fn short(count: usize, found: usize) -> Unreadable {
+    let text = format!("{count} elements are declared, the data ends after {found}");
+    Unreadable::Data(super::codes::Code::AccessorTooLong, text)
+}
+
+/// `N` bytes of an element; zeros past its end, where nobody reads.
+fn bytes<const N: usize>(element: &[u8], at: usize) -> [u8; N] {
+    element.get(at..at + N).and_then(|b| b.try_into().ok()).unwrap_or([0; N])
+}
+
+/// Component `k` as a float, by the conversions of glTF 2.0 §3.11.
+fn float(element: &[u8], format: Format, k: usize) -> f32 {
+    let at = format.offset(k);
+    let scale = |value: f32, largest: f32| if format.normalized { (value / largest).max(-1.0) } else { value };
+    match format.component {
+        ComponentType::F32 => f32::from_le_bytes(bytes(element, at)),
+        ComponentType::I8 => scale(f32::from(i8::from_le_bytes(bytes(element, at))), 127.0),
+        ComponentType::U8 => scale(f32::from(u8::from_le_bytes(bytes(element, at))), 255.0),
+        ComponentType::I16 => scale(f32::from(i16::from_le_bytes(bytes(element, at))), 32767.0),
+        ComponentType::U16 => scale(f32::from(u16::from_le_bytes(bytes(element, at))), 65535.0),
+        ComponentType::U32 => u32::from_le_bytes(bytes(element, at)) as f32,
+    }
+}
+
+/// All components as stored.
+fn raws(element: &[u8], format: Format) -> [f64; 16] {
+    std::array::from_fn(|k| if k < format.width() { raw(element, format, k) } else { 0.0 })
+}
+
+fn extent_of(elements: impl Iterator<Item = [f64; 16]>, format: Format) -> Extent {
+    let mut extent = [(f64::INFINITY, f64::NEG_INFINITY); 16];
+    for element in elements {
+        for ((lo, hi), value) in extent.iter_mut().zip(element).take(format.width()).filter(|(_, v)| v.is_finite()) {
+            (*lo, *hi) = (lo.min(value), hi.max(value));
+        }
+    }
+    extent
+}
+
+/// Component `k` as stored.
+fn raw(element: &[u8], format: Format, k: usize) -> f64 {
+    match format.component {
+        ComponentType::U32 => f64::from(integer(element, format, k)),
+        _ => f64::from(float(element, Format { normalized: false, ..format }, k)),
+    }
+}
+
+/// Component `k` as an unsigned integer; signed and floating ones are not indices and give zero.
+fn integer(element: &[u8], format: Format, k: usize) -> u32 {
+    let at = format.offset(k);
+    match format.component {
+        ComponentType::U8 => u32::from(u8::from_le_bytes(bytes(element, at))),
+        ComponentType::U16 => u32::from(u16::from_le_bytes(bytes(element, at))),
+        ComponentType::U32 => u32::from_le_bytes(bytes(element, at)),
+        ComponentType::I8 | ComponentType::I16 | ComponentType::F32 => 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn format(component: ComponentType, shape: Type, normalized: bool) -> Format {
+        Format { component, shape, normalized }
+    }
+
+    #[test]
+    fn normalised_integers_reach_exactly_their_ends() {
+        let at = |component, bytes: &[u8]| float(bytes, format(component, Type::Scalar, true), 0);
+        assert_eq!(at(ComponentType::I8, &[0x80]), -1.0);
+        assert_eq!(at(ComponentType::I8, &[0x81]), -1.0);
+        assert_eq!(at(ComponentType::I8, &[127]), 1.0);
+        assert_eq!(at(ComponentType::U8, &[255]), 1.0);
+        assert_eq!(at(ComponentType::U8, &[51]), 0.2);
+        assert_eq!(at(ComponentType::I16, &[0x00, 0x80]), -1.0);
+        assert_eq!(at(ComponentType::I16, &[0xff, 0x7f]), 1.0);
+        assert_eq!(at(ComponentType::U16, &[0xff, 0xff]), 1.0);
+        assert_eq!(float(&[0x80], format(ComponentType::I8, Type::Scalar, false), 0), -128.0);
+    }
+
+    #[test]
+    fn matrix_columns_start_at_multiples_of_four_bytes() {
+        let small = format(ComponentType::U8, Type::Mat2, false);
+        assert_eq!((small.size(), small.offset(1), small.offset(2), small.offset(3)), (8, 1, 4, 5));
+        let three = format(ComponentType::U8, Type::Mat3, false);
+        assert_eq!((three.size(), three.offset(3), three.offset(8)), (12, 4, 10));
+        let half = format(ComponentType::U16, Type::Mat3, false);
+        assert_eq!((half.size(), half.offset(3), half.offset(6)), (24, 8, 16));
+        assert_eq!(format(ComponentType::F32, Type::Mat4, false).size(), 64);
+        assert_eq!(format(ComponentType::U8, Type::Vec3, false).size(), 3);
+    }
+}

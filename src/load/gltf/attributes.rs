@@ -1,0 +1,372 @@
+//! What the primitives of meshes say about their accessors, checked before any data is read.
+//!
+//! Looks at the JSON itself: the typed document knows only attribute names that mean something.
+
+use super::codes::Code;
+use super::document::is_semantic;
+use super::report::Report;
+use super::schema::whole;
+use serde_json::{Map, Value};
+use std::collections::HashMap;
+
+/// Checks every primitive.
+pub(super) fn check(root: &Value, report: &mut Report) {
+    let quantized = list(root, "extensionsUsed").iter().any(|e| e == "KHR_mesh_quantization");
+    let mut check = Check { root, quantized, views: HashMap::new(), report };
+    for (i, mesh) in list(root, "meshes").iter().enumerate() {
+        let targets: Vec<usize> = list(mesh, "primitives").iter().map(|p| list(p, "targets").len()).collect();
+        for (k, primitive) in list(mesh, "primitives").iter().enumerate() {
+            let place = format!("meshes[{i}].primitives[{k}]");
+            check.primitive(primitive, &place);
+            if targets[k] != targets[0] {
+                let text = format!("{} morph targets, but the first primitive has {}", targets[k], targets[0]);
+                check.report.add(Code::MeshPrimitivesUnequalTargetsCount, place, text);
+            }
+        }
+        let weights = mesh.get("weights").and_then(Value::as_array).map(Vec::len);
+        if let Some(weights) = weights.filter(|&w| targets.first().is_some_and(|&t| t != w)) {
+            let text = format!("{weights} weights for {} morph targets", targets[0]);
+            check.report.add(Code::MeshInvalidWeightsCount, format!("meshes[{i}].weights"), text);
+        }
+    }
+}
+
+/// An accessor as far as a primitive cares.
+struct Shape<'a> {
+    index: u64,
+    component: u64,
+    kind: &'a str,
+    normalized: bool,
+    count: u64,
+    offset: u64,
+    view: Option<(usize, &'a Value)>,
+    bounded: bool,
+}
+
+/// What a buffer view is used for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Usage {
+    /// Attributes; the accessor that was first.
+    Vertices(u64),
+    Indices,
+}
+
+struct Check<'a> {
+    root: &'a Value,
+    quantized: bool,
+    views: HashMap<usize, Usage>,
+    report: &'a mut Report,
+}
+
+impl<'a> Check<'a> {
+    fn primitive(&mut self, primitive: &'a Value, place: &str) {
+        let empty = Map::new();
+        let attributes = primitive.get("attributes").and_then(Value::as_object).unwrap_or(&empty);
+        let at = format!("{place}.attributes");
+        if !attributes.is_empty() && !attributes.contains_key("POSITION") {
+            self.report.add(Code::MeshPrimitiveNoPosition, &at, "there are no positions");
+        }
+        if attributes.contains_key("TANGENT") && !attributes.contains_key("NORMAL") {
+            self.report.add(
+                Code::MeshPrimitiveTangentWithoutNormal,
+                format!("{at}.TANGENT"),
+                "tangents without normals",
+            );
+        }
+        self.sets(attributes, &at);
+        let mut vertices = None;
+        for (name, index) in attributes {
+            let place = format!("{at}.{}", crate::load::paths::shorten(name));
+            let Some(shape) = self.shape(index) else { continue };
+            self.attribute(name, &shape, &place, false);
+            match vertices {
+                None => vertices = Some(shape.count),
+                Some(count) if count != shape.count => {
+                    let text = format!("{} elements where other attributes have {count}", shape.count);
+                    self.report.add(Code::MeshPrimitiveUnequalAccessorCount, place, text);
+                }
+                Some(_) => {}
+            }
+        }
+        let corners = self.indices(primitive, place).or(vertices);
+        self.mode(primitive, corners, place);
+        for (k, target) in list(primitive, "targets").iter().enumerate() {
+            self.target(target, attributes, vertices, &format!("{place}.targets[{k}]"));
+        }
+        self.material(primitive, attributes, place);
+    }
+
+    /// Numbered sets must be 0, 1, 2, …, and joints go with weights.
+    fn sets(&mut self, attributes: &Map<String, Value>, at: &str) {
+        let mut counts = Vec::new();
+        for prefix in ["TEXCOORD_", "COLOR_", "JOINTS_", "WEIGHTS_"] {
+            let known = attributes.keys().filter(|name| is_semantic(name));
+            let sets: Vec<u16> = known.filter_map(|name| name.strip_prefix(prefix)?.parse().ok()).collect();
+            if sets.iter().max().is_some_and(|&max| usize::from(max) + 1 != sets.len()) {
+                let text = format!("the {prefix} sets are not numbered 0, 1, 2, …");
+                self.report.add(Code::MeshPrimitiveIndexedSemanticContinuity, at, text);
+            }
+            counts.push(sets.len());
+        }
+        if counts[2] != counts[3] {
+            let text = format!("{} sets of joints, {} of weights", counts[2], counts[3]);
+            self.report.add(Code::MeshPrimitiveJointsWeightsMismatch, at, text);
+        }
+    }
+
+    fn attribute(&mut self, name: &str, shape: &Shape, place: &str, morph: bool) {
+        if shape.component == 5125 {
+            self.report.add(
+                Code::MeshPrimitiveAttributesAccessorUnsignedInt,
+                place,
+                "32-bit integers are no vertex data",
+            );
+        } else if name.starts_with('_') {
+        } else if !is_semantic(name) {
+            let text = format!("'{}' is no attribute", crate::load::paths::shorten(name));
+            self.report.add(Code::MeshPrimitiveInvalidAttribute, place, text);
+            return;
+        } else {
+            self.format(name, shape, place, morph);
+        }
+        if name == "POSITION" && !shape.bounded {
+            self.report.add(Code::MeshPrimitivePositionAccessorWithoutBounds, place, "positions without min and max");
+        }
+        self.layout(shape, place);
+    }
+
+    fn format(&mut self, name: &str, shape: &Shape, place: &str, morph: bool) {
+        let fit = fit(name, shape, morph);
+        if fit == Fit::Core || (fit == Fit::Quantized && self.quantized) {
+            return;
+        }
+        let norm = if shape.normalized { ", normalized" } else { "" };
+        let text = format!("{name} cannot be {} of {}{norm}", shape.kind, component_name(shape.component));
+        if name == "POSITION" && !morph && fit == Fit::No {
+            self.report.add(Code::MeshPrimitiveAttributesAccessorInvalidFormat, place, text);
+        } else {
+            self.report.warn(Code::MeshPrimitiveAttributesAccessorInvalidFormat, place, text);
+        }
+    }
+
+    /// Alignment, stride and target of the view.
+    fn layout(&mut self, shape: &Shape, place: &str) {
+        let Some((index, view)) = shape.view else { return };
+        let stride = view.get("byteStride").and_then(whole);
+        let start = view.get("byteOffset").and_then(whole).unwrap_or(0);
+        let packed = shape.width() * component_size(shape.component);
+        if (start.wrapping_add(shape.offset)) % 4 != 0 || stride.unwrap_or(packed) % 4 != 0 {
+            self.report.add(
+                Code::MeshPrimitiveAccessorUnaligned,
+                place,
+                "elements do not start at multiples of 4 bytes",
+            );
+        }
+        if view.get("target").and_then(whole) == Some(34963) {
+            self.report.add(Code::BufferViewTargetOverride, place, "vertices in a view of indices");
+        }
+        match self.views.insert(index, Usage::Vertices(shape.index)) {
+            Some(Usage::Indices) => {
+                self.report.add(Code::BufferViewTargetOverride, place, "its view holds indices as well");
+            }
+            Some(Usage::Vertices(other)) if other != shape.index && stride.is_none() => {
+                let text = "several attributes share a view without a stride";
+                self.report.add(Code::MeshPrimitiveAccessorWithoutByteStride, place, text);
+            }
+            _ => {}
+        }
+    }
+
+    /// Checks the indices and says how many there are.
+    fn indices(&mut self, primitive: &'a Value, place: &str) -> Option<u64> {
+        let place = format!("{place}.indices");
+        let shape = self.shape(primitive.get("indices")?)?;
+        if shape.kind != "SCALAR" || ![5121, 5123, 5125].contains(&shape.component) || shape.normalized {
+            let text = format!("indices cannot be {} of {}", shape.kind, component_name(shape.component));
+            self.report.add(Code::MeshPrimitiveIndicesAccessorInvalidFormat, &place, text);
+        }
+        if let Some((index, view)) = shape.view {
+            if view.get("byteStride").is_some() {
+                self.report.add(
+                    Code::MeshPrimitiveIndicesAccessorWithByteStride,
+                    &place,
+                    "a stride on a view of indices",
+                );
+            }
+            let other = matches!(self.views.insert(index, Usage::Indices), Some(Usage::Vertices(_)));
+            if other || view.get("target").and_then(whole) == Some(34962) {
+                self.report.add(Code::BufferViewTargetOverride, &place, "indices in a view of vertices");
+            }
+        }
+        Some(shape.count)
+    }
+
+    fn mode(&mut self, primitive: &Value, corners: Option<u64>, place: &str) {
+        let mode = primitive.get("mode").map_or(Some(4), whole).unwrap_or(4);
+        let Some(count) = corners else { return };
+        let fits = match mode {
+            1 => count >= 2 && count % 2 == 0,
+            2 | 3 => count >= 2,
+            4 => count >= 3 && count % 3 == 0,
+            5 | 6 => count >= 3,
+            _ => true,
+        };
+        if !fits {
+            let text = format!("{count} corners do not make whole faces in mode {mode}");
+            self.report.add(Code::MeshPrimitiveIncompatibleMode, place, text);
+        }
+    }
+
+    fn target(&mut self, target: &'a Value, base: &Map<String, Value>, vertices: Option<u64>, place: &str) {
+        for (name, index) in target.as_object().into_iter().flatten() {
+            let place = format!("{place}.{}", crate::load::paths::shorten(name));
+            let morphable = !["JOINTS_", "WEIGHTS_"].iter().any(|p| name.starts_with(p));
+            if !name.starts_with('_') && !(is_semantic(name) && morphable) {
+                let text = format!("'{}' is no attribute that can be morphed", crate::load::paths::shorten(name));
+                self.report.add(Code::MeshPrimitiveInvalidAttribute, &place, text);
+            } else if !base.contains_key(name) {
+                let text = format!("the primitive has no {}", crate::load::paths::shorten(name));
+                self.report.add(Code::MeshPrimitiveMorphTargetNoBaseAccessor, &place, text);
+            }
+            let Some(shape) = self.shape(index) else { continue };
+            if is_semantic(name) {
+                self.attribute(name, &shape, &place, true);
+            }
+            if vertices.is_some_and(|count| count != shape.count) {
+                let text = format!("{} elements for {} vertices", shape.count, vertices.unwrap_or(0));
+                self.report.add(Code::MeshPrimitiveMorphTargetInvalidAttributeCount, place, text);
+            }
+        }
+    }
+
+    /// Whether the primitive has what its material's maps need.
+    fn material(&mut self, primitive: &Value, attributes: &Map<String, Value>, place: &str) {
+        let place = format!("{place}.material");
+        let index = primitive.get("material").and_then(whole).and_then(|i| usize::try_from(i).ok());
+        let Some(material) = index.and_then(|i| list(self.root, "materials").get(i)) else { return };
+        let mut slots = Vec::new();
+        texture_slots(material, &mut slots);
+        for (name, set) in slots {
+            if !attributes.contains_key(&format!("TEXCOORD_{set}")) {
+                let text = format!("the {name} of its material needs TEXCOORD_{set}");
+                self.report.add(Code::MeshPrimitiveTooFewTexcoords, &place, text);
+            }
+        }
+        let extension = |name: &str| material.get("extensions").and_then(|e| e.get(name));
+        let oriented = extension("KHR_materials_anisotropy").is_some()
+            || extension("KHR_materials_clearcoat").is_some_and(|c| c.get("clearcoatNormalTexture").is_some());
+        if oriented && !attributes.contains_key("TANGENT") && material.get("normalTexture").is_none() {
+            self.report.add(
+                Code::MeshPrimitiveNoTangentSpace,
+                &place,
+                "its material needs tangents, and there are none",
+            );
+        }
+    }
+
+    fn shape(&self, index: &Value) -> Option<Shape<'a>> {
+        let index = whole(index)?;
+        let accessor = list(self.root, "accessors").get(usize::try_from(index).ok()?)?;
+        let number = |name| accessor.get(name).and_then(whole);
+        let view = number("bufferView").and_then(|i| usize::try_from(i).ok());
+        Some(Shape {
+            index,
+            component: number("componentType")?,
+            kind: accessor.get("type")?.as_str()?,
+            normalized: accessor.get("normalized").and_then(Value::as_bool).unwrap_or(false),
+            count: number("count")?,
+            offset: number("byteOffset").unwrap_or(0),
+            view: view.and_then(|i| Some((i, list(self.root, "bufferViews").get(i)?))),
+            bounded: accessor.get("min").is_some() && accessor.get("max").is_some(),
+        })
+    }
+}
+
+impl Shape<'_> {
+    fn width(&self) -> u64 {
+        match self.kind {
+            "VEC2" => 2,
+            "VEC3" => 3,
+            "VEC4" | "MAT2" => 4,
+            "MAT3" => 9,
+            "MAT4" => 16,
+            _ => 1,
+        }
+    }
+}
+
+/// How an attribute's format stands to the rules.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Fit {
+    /// glTF 2.0 allows it.
+    Core,
+    /// KHR_mesh_quantization allows it.
+    Quantized,
+    No,
+}
+
+fn fit(name: &str, shape: &Shape, morph: bool) -> Fit {
+    const FLOAT: u64 = 5126;
+    let (component, normalized) = (shape.component, shape.normalized);
+    let float = component == FLOAT && !normalized;
+    let unsigned = component == 5121 || component == 5123;
+    let signed = component == 5120 || component == 5122;
+    let small = signed || unsigned;
+    let (right, core, quantized) = match name.split('_').next().unwrap_or(name) {
+        "POSITION" => (shape.kind == "VEC3", float, if morph { signed } else { small }),
+        "NORMAL" => (shape.kind == "VEC3", float, signed && normalized),
+        "TANGENT" => (shape.kind == if morph { "VEC3" } else { "VEC4" }, float, signed && normalized),
+        "TEXCOORD" => {
+            (shape.kind == "VEC2", float || (unsigned && normalized) || (morph && signed && normalized), small)
+        }
+        "COLOR" => {
+            let core = float || (unsigned && normalized) || (morph && signed && normalized);
+            (shape.kind == "VEC3" || shape.kind == "VEC4", core, false)
+        }
+        "JOINTS" => (shape.kind == "VEC4", unsigned && !normalized, false),
+        "WEIGHTS" => (shape.kind == "VEC4", float || (unsigned && normalized), false),
+        _ => (true, true, true),
+    };
+    match (right, core, quantized) {
+        (true, true, _) => Fit::Core,
+        (true, false, true) => Fit::Quantized,
+        _ => Fit::No,
+    }
+}
+
+/// Every map of a material, extensions included, with its texture coordinate set.
+fn texture_slots<'a>(value: &'a Value, out: &mut Vec<(&'a str, u64)>) {
+    for (name, value) in value.as_object().into_iter().flatten() {
+        if name.ends_with("Texture") && value.get("index").is_some() {
+            let moved = value.pointer("/extensions/KHR_texture_transform/texCoord");
+            let set = moved.or_else(|| value.get("texCoord")).and_then(whole).unwrap_or(0);
+            out.push((name, set));
+        } else if name != "extras" {
+            texture_slots(value, out);
+        }
+    }
+}
+
+fn component_size(component: u64) -> u64 {
+    match component {
+        5120 | 5121 => 1,
+        5122 | 5123 => 2,
+        _ => 4,
+    }
+}
+
+fn component_name(component: u64) -> &'static str {
+    match component {
+        5120 => "signed bytes",
+        5121 => "unsigned bytes",
+        5122 => "signed shorts",
+        5123 => "unsigned shorts",
+        5125 => "unsigned ints",
+        5126 => "floats",
+        _ => "an unknown type",
+    }
+}
+
+fn list<'a>(value: &'a Value, name: &str) -> &'a [Value] {
+    value.get(name).and_then(Value::as_array).map_or(&[], Vec::as_slice)
+}

@@ -1,0 +1,167 @@
+//! The bytes that buffers and buffer views stand for.
+
+use super::codes::Code;
+use super::report::Report;
+use crate::load::Diagnostic;
+use crate::load::paths::{Resolver, shorten};
+use base64::Engine as _;
+use base64::alphabet;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+use gltf::json::{Root, buffer};
+use std::borrow::Cow;
+use std::path::Path;
+
+/// The bytes of every buffer, or why they are not there.
+pub(super) struct Buffers<'a> {
+    root: &'a Root,
+    slots: Vec<Slot<'a>>,
+}
+
+enum Slot<'a> {
+    Bytes(Cow<'a, [u8]>),
+    /// Nothing says where the bytes are; right as long as nobody needs them.
+    Nowhere(Diagnostic),
+    Failed(Diagnostic),
+}
+
+impl<'a> Buffers<'a> {
+    /// Finds all buffers. One that cannot be read is a warning until something needs it.
+    pub(super) fn load(
+        root: &'a Root,
+        bin: Option<&'a [u8]>,
+        file: &Path,
+        resolver: &mut Resolver,
+        report: &mut Report,
+    ) -> Self {
+        let slots = (root.buffers.iter().enumerate())
+            .map(|(i, buffer)| load_one(i, buffer, bin, file, resolver, report))
+            .collect();
+        Self { root, slots }
+    }
+
+    /// The bytes of a view, as far as they are there.
+    ///
+    /// # Errors
+    /// Why there are none. `None`: the file never says where they are.
+    pub(super) fn view(&self, view: &buffer::View) -> Result<&[u8], Option<Diagnostic>> {
+        let bytes = match self.slots.get(view.buffer.value()) {
+            Some(Slot::Bytes(bytes)) => bytes,
+            Some(Slot::Failed(why)) => return Err(Some(why.clone())),
+            Some(Slot::Nowhere(_)) | None => return Err(None),
+        };
+        // A view may not look past the declared length, even where the data goes on.
+        let declared = self.root.buffers.get(view.buffer.value()).map_or(0, |b| b.byte_length.0);
+        let end = clamp(declared, bytes.len());
+        let offset = clamp(view.byte_offset.unwrap_or_default().0, end);
+        let length = clamp(view.byte_length.0, end - offset);
+        Ok(&bytes[offset..offset + length])
+    }
+
+    /// Tells of buffers that nothing says the whereabouts of; for whoever needs one.
+    pub(super) fn nowhere(&self, view: &buffer::View) -> Option<Diagnostic> {
+        match self.slots.get(view.buffer.value()) {
+            Some(Slot::Nowhere(why)) => Some(why.clone()),
+            _ => None,
+        }
+    }
+}
+
+/// The smaller one, as a position in memory.
+fn clamp(wanted: u64, end: usize) -> usize {
+    usize::try_from(wanted).map_or(end, |wanted| wanted.min(end))
+}
+
+fn load_one<'a>(
+    i: usize,
+    buffer: &buffer::Buffer,
+    bin: Option<&'a [u8]>,
+    file: &Path,
+    resolver: &mut Resolver,
+    report: &mut Report,
+) -> Slot<'a> {
+    let place = format!("buffers[{i}]");
+    let bytes = match (&buffer.uri, bin) {
+        (None, Some(bin)) if i == 0 => Cow::Borrowed(bin),
+        (None, _) => {
+            let text = "its bytes are needed, but it has neither a uri nor a binary chunk";
+            return Slot::Nowhere(Diagnostic::new(Code::BufferMissingGlbData.name(), file, place, text));
+        }
+        (Some(uri), _) if is_data(uri) => match decode_data(uri) {
+            Ok(bytes) => Cow::Owned(bytes),
+            Err(why) => {
+                let text = format!("'{}' is no data URI: {why}", shorten(uri));
+                report.add(Code::InvalidUri, format!("{place}.uri"), text.clone());
+                return Slot::Failed(Diagnostic::new(Code::InvalidUri.name(), file, format!("{place}.uri"), text));
+            }
+        },
+        (Some(uri), _) => match resolver.read_uri(uri) {
+            Ok(bytes) => Cow::Owned(bytes),
+            Err(why) => {
+                let fault = why.diagnose(file, &format!("{place}.uri"));
+                report.warnings.push(fault.clone());
+                return Slot::Failed(fault);
+            }
+        },
+    };
+    let declared = buffer.byte_length.0;
+    if (bytes.len() as u64) < declared {
+        let text = format!("{declared} bytes are declared, {} are there", bytes.len());
+        report.add(Code::BufferByteLengthMismatch, place, text);
+    }
+    Slot::Bytes(bytes)
+}
+
+/// Whether a URI holds its data itself.
+pub(super) fn is_data(uri: &str) -> bool {
+    uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:"))
+}
+
+/// Decodes a `data:` URI (RFC 2397), base64 or percent-encoded, with or without padding.
+pub(super) fn decode_data(uri: &str) -> Result<Vec<u8>, String> {
+    const LENIENT: GeneralPurpose = GeneralPurpose::new(
+        &alphabet::STANDARD,
+        GeneralPurposeConfig::new()
+            .with_decode_padding_mode(DecodePaddingMode::Indifferent)
+            .with_decode_allow_trailing_bits(true),
+    );
+    let (kind, data) = uri.get(5..).and_then(|rest| rest.split_once(',')).ok_or("there is no comma")?;
+    let raw: Cow<[u8]> =
+        if data.contains('%') { percent_encoding::percent_decode_str(data).into() } else { data.as_bytes().into() };
+    let is_base64 = kind.rsplit(';').next().is_some_and(|last| last.trim().eq_ignore_ascii_case("base64"));
+    if !is_base64 {
+        return Ok(raw.into_owned());
+    }
+    let decoded = if raw.iter().any(u8::is_ascii_whitespace) {
+        LENIENT.decode(raw.iter().copied().filter(|b| !b.is_ascii_whitespace()).collect::<Vec<_>>())
+    } else {
+        LENIENT.decode(&raw)
+    };
+    decoded.map_err(|e| e.to_string())
+}
+
+/// The media type of a `data:` URI.
+pub(super) fn media_type(uri: &str) -> &str {
+    let head = uri.get(5..).and_then(|rest| rest.split(',').next()).unwrap_or_default();
+    head.split(';').next().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn data_uris_may_be_base64_or_percent_encoded() {
+        for uri in [
+            "data:application/octet-stream;base64,AQID/w==",
+            "data:;base64,AQID/w",
+            "DATA:a/b;base64,AQID%2Fw==",
+            "data:a/b;charset=x;base64,AQ ID/w==",
+            "data:,%01%02%03%FF",
+        ] {
+            assert_eq!(decode_data(uri).unwrap(), [1, 2, 3, 255], "{uri}");
+        }
+        assert!(decode_data("data:").is_err());
+        assert!(decode_data("data:;base64,a*b=").is_err());
+        assert_eq!(media_type("data:image/png;base64,AA"), "image/png");
+    }
+}

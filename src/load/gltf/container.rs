@@ -1,0 +1,190 @@
+//! A glTF file as JSON text and one binary chunk: either a `.gltf`, or a GLB container split into its chunks.
+
+use super::codes::Code;
+use super::report::Report;
+
+const JSON: u32 = u32::from_le_bytes(*b"JSON");
+const BIN: u32 = u32::from_le_bytes(*b"BIN\0");
+const HEADER: usize = 12;
+
+/// The parts of a file.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Container<'a> {
+    /// JSON text, without a byte-order mark.
+    pub(super) json: &'a [u8],
+    /// What the first buffer holds, if the file is a GLB that has it.
+    pub(super) bin: Option<&'a [u8]>,
+    /// Whether it is a GLB.
+    pub(super) binary: bool,
+}
+
+/// Splits a file; `None` when that cannot be done, with the reason in `report`.
+pub(super) fn split<'a>(bytes: &'a [u8], report: &mut Report) -> Option<Container<'a>> {
+    let (json, bin, binary) = if bytes.starts_with(b"glTF") {
+        let (json, bin) = split_glb(bytes, report)?;
+        (json, bin, true)
+    } else if report_foreign(bytes, report) {
+        return None;
+    } else {
+        (bytes, None, false)
+    };
+    Some(Container { json: skip_mark(json, report), bin, binary })
+}
+
+/// A file that is neither: an empty `.glb`, or anything with a wrong name.
+fn report_foreign(bytes: &[u8], report: &mut Report) -> bool {
+    if bytes.len() < 4 && b"glTF".starts_with(bytes) {
+        report.add(Code::GlbUnexpectedEndOfHeader, "", format!("a file of {} bytes holds no scene", bytes.len()));
+        return true;
+    }
+    false
+}
+
+fn skip_mark<'a>(json: &'a [u8], report: &mut Report) -> &'a [u8] {
+    let Some(rest) = json.strip_prefix(b"\xef\xbb\xbf") else { return json };
+    report.warn(Code::InvalidJson, "", "the JSON starts with a byte-order mark, which is skipped");
+    rest
+}
+
+fn split_glb<'a>(bytes: &'a [u8], report: &mut Report) -> Option<(&'a [u8], Option<&'a [u8]>)> {
+    let (Some(version), Some(length)) = (word(bytes, 4), word(bytes, 8)) else {
+        report.add(Code::GlbUnexpectedEndOfHeader, "", format!("the header of 12 bytes ends after {}", bytes.len()));
+        return None;
+    };
+    if version != 2 {
+        let remedy = if version == 1 { ": this is glTF 1.0; convert it to glTF 2.0" } else { "" };
+        report.add(Code::GlbInvalidVersion, "", format!("GLB version {version} where 2 is understood{remedy}"));
+        return None;
+    }
+    let length = length as usize;
+    if length <= HEADER {
+        report.add(Code::GlbLengthTooSmall, "", format!("a declared length of {length} bytes holds no chunk"));
+        return None;
+    }
+    if length != bytes.len() {
+        let text = format!("the header declares {length} bytes, the file has {}", bytes.len());
+        report.add(Code::GlbLengthMismatch, "", text);
+    }
+    chunks(bytes.get(HEADER..length.min(bytes.len())).unwrap_or_default(), report)
+}
+
+/// Walks the chunks behind the header.
+fn chunks<'a>(mut rest: &'a [u8], report: &mut Report) -> Option<(&'a [u8], Option<&'a [u8]>)> {
+    let (mut json, mut bin) = (None, None);
+    for number in 0.. {
+        if rest.is_empty() {
+            break;
+        }
+        let place = format!("chunk {number}");
+        let (Some(length), Some(kind)) = (word(rest, 0), word(rest, 4)) else {
+            // Zeros behind the last chunk are padding of the file, not the start of another.
+            if number > 0 && rest.iter().all(|&b| b == 0 || b == b' ') {
+                break;
+            }
+            report.add(
+                Code::GlbUnexpectedEndOfChunkHeader,
+                place,
+                format!("its header of 8 bytes ends after {}", rest.len()),
+            );
+            return None;
+        };
+        let length = length as usize;
+        if number == 0 && kind != JSON {
+            report.add(Code::GlbUnexpectedFirstChunk, place, format!("its type is {kind:#010x}, not JSON"));
+            return None;
+        }
+        let Some(data) = rest.get(8..length.saturating_add(8)) else {
+            let text =
+                format!("it should have {length} bytes, only {} are there; the file was cut off", rest.len() - 8);
+            report.add(Code::GlbChunkTooBig, place, text);
+            return None;
+        };
+        rest = rest.get(8 + length..).unwrap_or_default();
+        check_chunk(kind, length, number, &place, report);
+        let slot = match kind {
+            JSON => &mut json,
+            BIN => &mut bin,
+            _ => continue,
+        };
+        match slot {
+            Some(_) => report.add(Code::GlbDuplicateChunk, place, "a second chunk of its type is skipped"),
+            None => *slot = Some(data),
+        }
+    }
+    json.map(|json| (json, bin))
+}
+
+fn check_chunk(kind: u32, length: usize, number: usize, place: &str, report: &mut Report) {
+    if length % 4 != 0 {
+        report.add(Code::GlbChunkLengthUnaligned, place, format!("its length {length} is no multiple of 4"));
+    }
+    if length == 0 && kind != BIN {
+        report.add(Code::GlbEmptyChunk, place, "it is empty");
+    }
+    if kind == BIN && number != 1 {
+        report.add(Code::GlbUnexpectedBinChunk, place, "the binary chunk is not the second one");
+    }
+}
+
+fn word(bytes: &[u8], at: usize) -> Option<u32> {
+    let four = bytes.get(at..at + 4)?;
+    Some(u32::from_le_bytes(four.try_into().ok()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    fn glb(chunks: &[(&[u8; 4], &[u8])]) -> Vec<u8> {
+        let body: Vec<u8> = chunks
+            .iter()
+            .flat_map(|(kind, data)| {
+                (data.len() as u32).to_le_bytes().into_iter().chain(**kind).chain(data.iter().copied())
+            })
+            .collect();
+        let head = b"glTF".iter().copied().chain(2u32.to_le_bytes()).chain((body.len() as u32 + 12).to_le_bytes());
+        head.chain(body).collect()
+    }
+
+    /// The JSON and binary parts, and the names of all messages.
+    fn split_all(bytes: &[u8]) -> (Option<(String, Option<Vec<u8>>)>, Vec<&'static str>) {
+        let mut report = Report::new(Path::new("a.glb"));
+        let parts = split(bytes, &mut report)
+            .map(|c| (String::from_utf8_lossy(c.json).into_owned(), c.bin.map(<[u8]>::to_vec)));
+        let mut names: Vec<_> = report.warnings.clone().into_vec().iter().map(|w| w.code).collect();
+        if let Err(crate::load::LoadError::Input(faults)) = report.check() {
+            names.extend(faults.iter().map(|f| f.code));
+        }
+        (parts, names)
+    }
+
+    #[test]
+    fn a_glb_splits_into_json_and_binary_and_skips_unknown_chunks() {
+        let (parts, names) = split_all(&glb(&[(b"JSON", b"{}  "), (b"XTRA", b"...."), (b"BIN\0", b"1234")]));
+        assert_eq!(parts, Some(("{}  ".into(), Some(b"1234".to_vec()))));
+        assert_eq!(names, ["gltf-glb-unexpected-bin-chunk"]);
+    }
+
+    #[test]
+    fn every_way_to_cut_a_glb_short_is_a_message() {
+        let whole = glb(&[(b"JSON", b"{}  "), (b"BIN\0", b"1234")]);
+        for length in 0..whole.len() {
+            let (parts, names) = split_all(&whole[..length]);
+            // Cut between the two chunks, the JSON is still whole.
+            assert_eq!(parts.is_some(), length == 24, "{length}");
+            assert!(!names.is_empty(), "{length}");
+        }
+    }
+
+    #[test]
+    fn a_byte_order_mark_and_odd_lengths_are_warned_about() {
+        assert_eq!(split_all(b"\xef\xbb\xbf{}").0, Some(("{}".into(), None)));
+        let mut odd = glb(&[(b"JSON", b"{} ")]);
+        assert_eq!(split_all(&odd).1, ["gltf-glb-chunk-length-unaligned"]);
+        odd[8] += 1;
+        assert!(split_all(&odd).1.contains(&"gltf-glb-length-mismatch"));
+        odd[4] = 1;
+        assert_eq!(split_all(&odd), (None, vec!["gltf-glb-invalid-version"]));
+    }
+}

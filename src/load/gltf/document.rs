@@ -1,0 +1,141 @@
+//! JSON text -> the typed document of the `gltf` crate, after the schema check.
+//!
+//! The crate's own validation is not used: it refuses legal files and panics on some broken ones. Its structs are
+//! plain data; everything that could panic on access (`Checked::unwrap`, indexing) is avoided throughout this loader.
+
+use super::codes::Code;
+use super::report::Report;
+use super::schema;
+use gltf::json::Root;
+use serde_json::{Map, Number, Value};
+
+/// A document whose types and indices are right.
+pub(super) struct Document {
+    pub(super) root: Root,
+    /// How many animations the file has; they are not kept.
+    pub(super) animations: usize,
+}
+
+/// Parses and checks JSON; `None` when that is impossible, with the reason in `report`.
+pub(super) fn parse(json: &[u8], report: &mut Report) -> Option<Value> {
+    let text = match std::str::from_utf8(json) {
+        Ok(text) => text,
+        Err(e) => {
+            report.add(Code::InvalidJson, "", format!("the JSON is not UTF-8 at byte {}", e.valid_up_to()));
+            return None;
+        }
+    };
+    // GLB pads its JSON with spaces; some exporters use zeros.
+    match serde_json::from_str(text.trim_end_matches('\0')) {
+        Ok(value) => Some(value),
+        Err(e) => {
+            let place = if e.line() > 1 { e.line().to_string() } else { String::new() };
+            report.add(Code::InvalidJson, place, format!("the JSON cannot be read: {e}"));
+            None
+        }
+    }
+}
+
+/// Turns checked JSON into the typed document; images that broke the schema become empty ones.
+pub(super) fn typed(mut value: Value, report: &mut Report) -> Option<Document> {
+    let animations = value.get("animations").and_then(Value::as_array).map_or(0, Vec::len);
+    simplify(&mut value);
+    let map = value.as_object_mut()?;
+    map.remove("animations");
+    each(map, "scenes", |scene| {
+        scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
+    });
+    each(map, "meshes", |mesh| each(mesh, "primitives", |primitive| known_attributes(primitive)));
+    if let Some(lights) = map.get_mut("extensions").and_then(|e| e.get_mut("KHR_lights_punctual")) {
+        lights
+            .as_object_mut()
+            .into_iter()
+            .for_each(|lights| each(lights, "lights", |light| drop(light.remove("extensions"))));
+    }
+    let views = map.get("bufferViews").and_then(Value::as_array).map_or(0, Vec::len);
+    let images = map.get_mut("images").and_then(Value::as_array_mut).into_iter().flatten();
+    images.filter(|image| !is_image(image, views)).for_each(|image| *image = Value::Object(Map::new()));
+    match serde_json::from_value(value) {
+        Ok(root) => Some(Document { root, animations }),
+        Err(e) => {
+            report.refuse(Code::TypeMismatch, "", format!("the JSON is not glTF 2.0: {e}"));
+            None
+        }
+    }
+}
+
+/// Whether an image entry has the right types and refers to what is there.
+fn is_image(value: &Value, views: usize) -> bool {
+    let text = |name| value.get(name).is_none_or(Value::is_string);
+    let view = |v: &Value| schema::whole(v).is_some_and(|index| index < views as u64);
+    value.is_object() && text("uri") && text("mimeType") && text("name") && value.get("bufferView").is_none_or(view)
+}
+
+/// Does something to each object in a list.
+fn each(map: &mut Map<String, Value>, list: &str, change: impl FnMut(&mut Map<String, Value>)) {
+    let elements = map.get_mut(list).and_then(Value::as_array_mut).into_iter().flatten();
+    elements.filter_map(Value::as_object_mut).for_each(change);
+}
+
+/// Takes out `extras`, which the typed structs cannot hold inside extensions, and writes whole numbers as such, where a
+/// file may say `1.0`.
+fn simplify(value: &mut Value) {
+    match value {
+        Value::Object(map) => {
+            map.remove("extras");
+            map.values_mut().for_each(simplify);
+        }
+        Value::Array(list) => list.iter_mut().for_each(simplify),
+        Value::Number(number) if number.is_f64() => {
+            if let Some(whole) = schema::whole(value) {
+                *value = Value::Number(Number::from(whole));
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Keeps the attributes whose names mean something; `TEXCOORD_01` would be taken for `TEXCOORD_1`.
+fn known_attributes(primitive: &mut Map<String, Value>) {
+    let clean = |attributes: &mut Map<String, Value>| attributes.retain(|name, _| is_semantic(name));
+    primitive.get_mut("attributes").and_then(Value::as_object_mut).into_iter().for_each(clean);
+    let targets = primitive.get_mut("targets").and_then(Value::as_array_mut).into_iter().flatten();
+    targets.filter_map(Value::as_object_mut).for_each(clean);
+}
+
+/// Whether this is the name of an attribute that glTF defines.
+pub(super) fn is_semantic(name: &str) -> bool {
+    let set = |rest: &str| rest == "0" || (!rest.starts_with('0') && rest.parse::<u16>().is_ok());
+    let sets = ["TEXCOORD_", "COLOR_", "JOINTS_", "WEIGHTS_"];
+    ["POSITION", "NORMAL", "TANGENT"].contains(&name)
+        || sets.iter().any(|prefix| name.strip_prefix(prefix).is_some_and(set))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn whole_numbers_may_be_written_as_floats_and_extras_anywhere() {
+        let json =
+            br#"{"asset": {"version": "2.0"}, "scene": 0.0, "scenes": [{"nodes": [1e0]}], "nodes": [{}, {"extras": 3}],
+            "materials": [{"extensions": {"KHR_materials_ior": {"ior": 2, "extras": {"a": 1}}}}]}"#;
+        let mut report = Report::new(Path::new("a.gltf"));
+        let value = parse(json, &mut report).unwrap();
+        schema::check(&value, &mut report);
+        let document = typed(value, &mut report).unwrap();
+        report.check().unwrap();
+        assert_eq!(document.root.scenes[0].nodes[0].value(), 1);
+    }
+
+    #[test]
+    fn only_defined_attribute_names_are_kept() {
+        for good in ["POSITION", "TEXCOORD_0", "TEXCOORD_12", "JOINTS_1"] {
+            assert!(is_semantic(good), "{good}");
+        }
+        for bad in ["position", "TEXCOORD", "TEXCOORD_", "TEXCOORD_00", "TEXCOORD_01", "TEXCOORD_-1", "_CUSTOM"] {
+            assert!(!is_semantic(bad), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! Which extensions are understood, and what is said about the others.
+
+use super::codes::Code;
+use super::report::Report;
+use crate::load::Diagnostic;
+use crate::load::paths::shorten;
+use serde_json::Value;
+use std::path::Path;
+
+/// Understood completely, as far as a still picture shows.
+const SUPPORTED: &[&str] = &[
+    "EXT_mesh_gpu_instancing",
+    "EXT_texture_webp",
+    "KHR_lights_punctual",
+    "KHR_materials_dispersion",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_mesh_quantization",
+    "KHR_node_visibility",
+    "KHR_texture_transform",
+];
+
+/// Not understood, and no picture shows it.
+const HARMLESS: &[&str] = &[
+    "AGI_articulations",
+    "AGI_stk_metadata",
+    "CESIUM_primitive_outline",
+    "EXT_mesh_features",
+    "EXT_structural_metadata",
+    "FB_geometry_metadata",
+    "FB_ngon_encoding",
+    "GOOGLE_backgrounds",
+    "KHR_animation_pointer",
+    "KHR_audio_emitter",
+    "KHR_interactivity",
+    "KHR_materials_variants",
+    "KHR_node_hoverability",
+    "KHR_node_selectability",
+    "KHR_physics_rigid_bodies",
+    "KHR_xmp",
+    "KHR_xmp_json_ld",
+    "MSFT_lod",
+    "MSFT_packing_normalRoughnessMetallic",
+    "MSFT_packing_occlusionRoughnessMetallic",
+    "VRM",
+    "VRMC_springBone",
+    "VRMC_vrm",
+];
+
+/// What to do about an extension that is required and not understood.
+fn remedy(name: &str) -> &'static str {
+    match name {
+        "KHR_draco_mesh_compression" => "decompress it (gltf-pipeline, gltf-transform) or export it without Draco",
+        "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
+            "decompress it (gltf-transform) or export it without meshopt compression"
+        }
+        "KHR_texture_basisu" => "convert its KTX2 textures to PNG or JPEG (gltf-transform), or export it with those",
+        "KHR_techniques_webgl" => "export it with metallic-roughness materials",
+        _ if name.starts_with("KHR_materials_") => {
+            "export it without, or take it out of extensionsRequired to draw it without"
+        }
+        _ => "export it without",
+    }
+}
+
+/// Whether a still is drawn as this extension says.
+fn is_supported(name: &str) -> bool {
+    SUPPORTED.contains(&name)
+}
+
+/// The extensions a file names.
+pub(super) struct Lists {
+    used: Vec<String>,
+    required: Vec<String>,
+}
+
+impl Lists {
+    /// Reads them from JSON that nothing has checked yet.
+    pub(super) fn of(root: &Value) -> Self {
+        let list = |name: &str| {
+            let words = root.get(name).and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str);
+            words.map(str::to_owned).collect::<Vec<_>>()
+        };
+        Self { used: list("extensionsUsed"), required: list("extensionsRequired") }
+    }
+
+    /// Each extension once: name, whether required, whether supported.
+    pub(super) fn facts(&self) -> Vec<(String, bool, bool)> {
+        let mut facts: Vec<(String, bool, bool)> = Vec::new();
+        for name in self.used.iter().chain(&self.required) {
+            if facts.iter().all(|(known, ..)| known != name) {
+                facts.push((name.clone(), self.required.contains(name), is_supported(name)));
+            }
+        }
+        facts
+    }
+
+    /// Refuses what is required and not understood; names in one warning what is only used and changes the look.
+    pub(super) fn check(&self, file: &Path, report: &mut Report) {
+        let mut ignored = Vec::new();
+        for (name, required, supported) in self.facts() {
+            if supported || HARMLESS.contains(&name.as_str()) {
+                continue;
+            }
+            let name = shorten(&name);
+            if required {
+                let text = format!("{name} is required to draw this file and not supported");
+                let fault = Diagnostic::new("gltf-extension-required", file, "extensionsRequired", text);
+                report.fault(fault.remedy(remedy(&name)));
+            } else if !has_stand_in(&name) {
+                ignored.push(name);
+            }
+        }
+        if !ignored.is_empty() {
+            let text = format!("drawn without {}", ignored.join(", "));
+            report.warnings.push(Diagnostic::new("gltf-extensions-ignored", file, "extensionsUsed", text));
+        }
+        self.check_lists(report);
+    }
+
+    fn check_lists(&self, report: &mut Report) {
+        for (i, name) in self.required.iter().enumerate().filter(|(_, name)| !self.used.contains(name)) {
+            let text = format!("{} is required but not in extensionsUsed", shorten(name));
+            report.add(Code::UnusedExtensionRequired, format!("extensionsRequired[{i}]"), text);
+        }
+        const QUANTIZATION: &str = "KHR_mesh_quantization";
+        let used = self.used.iter().position(|name| name == QUANTIZATION);
+        if let Some(i) = used.filter(|_| !self.required.iter().any(|name| name == QUANTIZATION)) {
+            let text = format!("{QUANTIZATION} is used but not required");
+            report.add(Code::NonRequiredExtension, format!("extensionsUsed[{i}]"), text);
+        }
+    }
+}
+
+/// Extensions with a stand-in in the file, which tell for themselves where the stand-in is missing.
+fn has_stand_in(name: &str) -> bool {
+    matches!(
+        name,
+        "KHR_draco_mesh_compression"
+            | "EXT_meshopt_compression"
+            | "KHR_meshopt_compression"
+            | "KHR_texture_basisu"
+            | "MSFT_texture_dds"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn messages(root: &Value) -> (Vec<String>, Vec<String>) {
+        let mut report = Report::new(Path::new("a.gltf"));
+        Lists::of(root).check(Path::new("a.gltf"), &mut report);
+        let warnings = report.warnings.clone().into_vec().iter().map(ToString::to_string).collect();
+        match report.check() {
+            Err(crate::load::LoadError::Input(faults)) => (faults.iter().map(ToString::to_string).collect(), warnings),
+            _ => (Vec::new(), warnings),
+        }
+    }
+
+    #[test]
+    fn what_is_required_and_unknown_is_one_line_with_a_remedy() {
+        let both = json!(["KHR_draco_mesh_compression", "KHR_materials_ior"]);
+        let (faults, warnings) = messages(&json!({"extensionsUsed": both, "extensionsRequired": both}));
+        assert_eq!(faults.len(), 1);
+        assert!(
+            faults[0].starts_with("a.gltf:extensionsRequired: KHR_draco_mesh_compression is required"),
+            "{}",
+            faults[0]
+        );
+        assert!(faults[0].contains("; decompress it"));
+        assert!(warnings.is_empty());
+    }
+
+    #[test]
+    fn what_is_only_used_is_one_warning_and_nothing_when_harmless() {
+        let used = json!(["KHR_materials_sheen", "KHR_xmp", "KHR_materials_clearcoat", "KHR_texture_transform"]);
+        let (faults, warnings) = messages(&json!({ "extensionsUsed": used }));
+        assert!(faults.is_empty());
+        assert_eq!(warnings, ["a.gltf:extensionsUsed: drawn without KHR_materials_sheen, KHR_materials_clearcoat"]);
+    }
+}

@@ -1,0 +1,216 @@
+//! Corners -> triangles, and meshes without what cannot be drawn.
+
+use crate::math::{Vec2, Vec3, Vec4};
+use crate::scene::Mesh;
+use gltf::json::mesh::Mode;
+
+/// The triangles of a primitive as glTF 2.0 §3.7.2.1 orders their corners.
+///
+/// `None` for points and lines. Corners left over make no face.
+pub(super) fn triangles(mode: Mode, corners: &[u32]) -> Option<Vec<[u32; 3]>> {
+    let mut triangles: Vec<[u32; 3]> = Vec::new();
+    match mode {
+        Mode::Triangles => triangles.extend(corners.chunks_exact(3).map(|t| [t[0], t[1], t[2]])),
+        Mode::TriangleStrip => {
+            let strip = corners.windows(3).enumerate();
+            triangles.extend(strip.map(|(i, t)| if i % 2 == 0 { [t[0], t[1], t[2]] } else { [t[0], t[2], t[1]] }));
+        }
+        Mode::TriangleFan => {
+            let Some((&first, rest)) = corners.split_first() else { return Some(triangles) };
+            triangles.extend(rest.windows(2).map(|t| [t[0], t[1], first]));
+        }
+        Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => return None,
+    }
+    Some(triangles)
+}
+
+/// How many points or lines a primitive has.
+pub(super) fn points_and_lines(mode: Mode, corners: usize) -> u64 {
+    let count = match mode {
+        Mode::Points | Mode::LineLoop => corners,
+        Mode::Lines => corners / 2,
+        _ => corners.saturating_sub(1),
+    };
+    count as u64
+}
+
+/// Faces left out of a mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Dropped {
+    /// With a corner that is not a finite place.
+    pub(super) not_finite: u64,
+    /// With two corners in one place.
+    pub(super) degenerate: u64,
+}
+
+/// Leaves out faces that cannot be drawn, and the vertices that no face needs any more.
+///
+/// `joined` says that repeated indices join strips and are no fault.
+pub(super) fn clean(mesh: &mut Mesh, joined: bool) -> Dropped {
+    let mut dropped = Dropped::default();
+    let mut faces = Vec::new();
+    let mut kept = Vec::with_capacity(mesh.triangles.len());
+    for (face, triangle) in mesh.triangles.iter().enumerate() {
+        let p = triangle.map(|v| mesh.positions.get(v as usize).copied().unwrap_or(Vec3::NAN));
+        let [a, b, c] = *triangle;
+        if !p.iter().all(|p| p.is_finite()) {
+            dropped.not_finite += 1;
+        } else if p[0] == p[1] || p[1] == p[2] || p[2] == p[0] {
+            let joint = joined && (a == b || b == c || c == a);
+            dropped.degenerate += u64::from(!joint);
+        } else {
+            kept.push(*triangle);
+            faces.push(face as u32);
+        }
+    }
+    if kept.len() < mesh.triangles.len() {
+        mesh.face_of_triangle = faces;
+        mesh.triangles = kept;
+    }
+    compact(mesh);
+    dropped
+}
+
+/// Takes out vertices that no triangle uses.
+fn compact(mesh: &mut Mesh) {
+    let mut used = vec![false; mesh.positions.len()];
+    for &vertex in mesh.triangles.iter().flatten() {
+        used[vertex as usize] = true;
+    }
+    if used.iter().all(|&used| used) {
+        return;
+    }
+    let mut next = 0;
+    let place: Vec<u32> = used.iter().map(|&used| (next, next += u32::from(used)).0).collect();
+    for vertex in mesh.triangles.iter_mut().flatten() {
+        *vertex = place[*vertex as usize];
+    }
+    fn keep<T>(values: &mut Vec<T>, used: &[bool]) {
+        let mut used = used.iter();
+        values.retain(|_| used.next().copied().unwrap_or(false));
+    }
+    keep(&mut mesh.positions, &used);
+    keep(&mut mesh.normals, &used);
+    keep(&mut mesh.tangents, &used);
+    keep(&mut mesh.colors, &used);
+    mesh.uvs.iter_mut().for_each(|uvs| keep(uvs, &used));
+}
+
+/// What was odd about directions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Odd {
+    /// Some were not of unit length.
+    pub(super) length: bool,
+    /// Some had no direction at all.
+    pub(super) none: bool,
+    /// Some signs were neither 1 nor −1.
+    pub(super) sign: bool,
+}
+
+/// Normals and tangents in 8 bits, normalised, are off by less.
+const UNIT: f32 = 0.02;
+
+/// Makes normals unit; those without a direction become the mean of the faces around them.
+pub(super) fn repair_normals(mesh: &mut Mesh) -> Odd {
+    let mut odd = Odd::default();
+    for normal in &mut mesh.normals {
+        let length = normal.length();
+        odd.length |= (length - 1.0).abs() > UNIT;
+        *normal = normal.try_normalize().unwrap_or_else(|| {
+            odd.none = true;
+            Vec3::ZERO
+        });
+    }
+    if odd.none {
+        let mut sums = vec![Vec3::ZERO; mesh.normals.len()];
+        for t in &mesh.triangles {
+            let [a, b, c] = t.map(|v| mesh.positions[v as usize]);
+            let area = (b - a).cross(c - a);
+            t.iter().for_each(|&v| sums[v as usize] += area);
+        }
+        let missing = mesh.normals.iter_mut().zip(sums).filter(|(normal, _)| **normal == Vec3::ZERO);
+        missing.for_each(|(normal, sum)| *normal = sum.normalize_or(Vec3::Z));
+    }
+    odd
+}
+
+/// Makes tangents unit and their signs 1 or −1; `none` tells that they had better be made anew.
+pub(super) fn repair_tangents(tangents: &mut [Vec4]) -> Odd {
+    let mut odd = Odd::default();
+    for tangent in tangents {
+        let direction = tangent.truncate();
+        odd.length |= (direction.length() - 1.0).abs() > UNIT;
+        odd.sign |= tangent.w.abs() != 1.0;
+        odd.none |= direction.try_normalize().is_none();
+        *tangent = direction.normalize_or(Vec3::X).extend(if tangent.w < 0.0 { -1.0 } else { 1.0 });
+    }
+    odd
+}
+
+/// Brings colours into 0…1; whether any was outside.
+pub(super) fn clamp_colors(colors: &mut [Vec4]) -> bool {
+    let mut outside = false;
+    for color in colors {
+        let inside = color.to_array().map(|c| if c.is_nan() { 1.0 } else { c.clamp(0.0, 1.0) });
+        outside |= inside != color.to_array();
+        *color = Vec4::from(inside);
+    }
+    outside
+}
+
+/// Makes texture coordinates finite; whether any was not.
+pub(super) fn finite_uvs(uvs: &mut [Vec2]) -> bool {
+    let mut odd = false;
+    for uv in uvs.iter_mut().filter(|uv| !uv.is_finite()) {
+        odd = true;
+        *uv = Vec2::ZERO;
+    }
+    odd
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strips_turn_every_second_face_and_fans_share_their_first_corner() {
+        let corners = [10, 11, 12, 13, 14];
+        assert_eq!(triangles(Mode::Triangles, &corners), Some(vec![[10, 11, 12]]));
+        assert_eq!(triangles(Mode::TriangleStrip, &corners), Some(vec![[10, 11, 12], [11, 13, 12], [12, 13, 14]]));
+        assert_eq!(triangles(Mode::TriangleFan, &corners), Some(vec![[11, 12, 10], [12, 13, 10], [13, 14, 10]]));
+        assert_eq!(triangles(Mode::TriangleFan, &[]), Some(vec![]));
+        assert_eq!(triangles(Mode::LineStrip, &corners), None);
+        assert_eq!(
+            [Mode::Points, Mode::Lines, Mode::LineLoop, Mode::LineStrip].map(|m| points_and_lines(m, 5)),
+            [5, 2, 5, 4]
+        );
+    }
+
+    #[test]
+    fn faces_without_area_or_place_go_and_take_their_vertices_along() {
+        let mut mesh = Mesh {
+            positions: vec![Vec3::NAN, Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::X],
+            normals: vec![Vec3::X, Vec3::Y, Vec3::Z, Vec3::Z, Vec3::Z],
+            triangles: vec![[0, 1, 2], [1, 2, 4], [1, 2, 3], [1, 1, 2]],
+            ..Mesh::default()
+        };
+        assert_eq!(clean(&mut mesh, true), Dropped { not_finite: 1, degenerate: 1 });
+        assert_eq!(mesh.triangles, [[0, 1, 2]]);
+        assert_eq!(mesh.face_of_triangle, [2]);
+        assert_eq!(mesh.positions, [Vec3::ZERO, Vec3::X, Vec3::Y]);
+        assert_eq!(mesh.normals, [Vec3::Y, Vec3::Z, Vec3::Z]);
+    }
+
+    #[test]
+    fn normals_become_unit_and_missing_ones_come_from_the_faces() {
+        let mut mesh = Mesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+            normals: vec![Vec3::new(0.0, 2.0, 0.0), Vec3::ZERO, Vec3::NAN],
+            triangles: vec![[0, 1, 2]],
+            ..Mesh::default()
+        };
+        let odd = repair_normals(&mut mesh);
+        assert!(odd.length && odd.none);
+        assert_eq!(mesh.normals, [Vec3::Y, Vec3::Z, Vec3::Z]);
+    }
+}

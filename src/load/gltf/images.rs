@@ -1,0 +1,184 @@
+//! The encoded pictures of a file: found, checked against what is declared of them, decoded where they are drawn.
+
+use super::buffers::{Buffers, decode_data, is_data, media_type};
+use super::codes::Code;
+use super::report::Report;
+use crate::load::limits::{Budget, Limits};
+use crate::load::paths::Resolver;
+use crate::load::texture::{Encoded, decode_all};
+use crate::scene::Bitmap;
+use ::image::{ImageFormat, guess_format};
+use gltf::json::{Index, Root, image::Image, texture::Texture};
+use std::borrow::Cow;
+use std::path::Path;
+
+/// The bytes of every image that is drawn or lies in the file itself.
+pub(super) struct Images<'a> {
+    bytes: Vec<Option<Cow<'a, [u8]>>>,
+}
+
+impl<'a> Images<'a> {
+    /// Finds the bytes; other files are read only for images that are drawn or declare their type.
+    pub(super) fn load(
+        root: &Root,
+        buffers: &'a Buffers<'a>,
+        drawn: &[usize],
+        file: &Path,
+        resolver: &mut Resolver,
+        report: &mut Report,
+    ) -> Self {
+        let mut images = Self { bytes: Vec::new() };
+        for (i, image) in root.images.iter().enumerate() {
+            let mut find = Find { root, buffers, file, resolver, report, drawn: drawn.contains(&i) };
+            let bytes = find.bytes(i, image);
+            if let Some(bytes) = &bytes {
+                check_kind(root, i, image, bytes, report);
+            }
+            images.bytes.push(bytes);
+        }
+        check_textures(root, &images, report);
+        images
+    }
+
+    /// Decodes the images with these indices.
+    pub(super) fn decode(
+        &self,
+        root: &Root,
+        drawn: &[usize],
+        file: &Path,
+        limits: &Limits,
+        budget: &mut Budget,
+        report: &mut Report,
+    ) -> Vec<Option<Bitmap>> {
+        let (mut encoded, mut places) = (Vec::new(), Vec::new());
+        for (k, &i) in drawn.iter().enumerate() {
+            let Some(bytes) = self.bytes.get(i).and_then(Option::as_deref) else { continue };
+            let name = root.images.get(i).map(|image| name_of(i, image)).unwrap_or_default();
+            encoded.push(Encoded { name, place: format!("images[{i}]"), bytes: Cow::Borrowed(bytes) });
+            places.push(k);
+        }
+        let bitmaps = decode_all(&encoded, file, limits, budget, &mut report.warnings);
+        let mut out: Vec<Option<Bitmap>> = drawn.iter().map(|_| None).collect();
+        places.into_iter().zip(bitmaps).for_each(|(k, bitmap)| out[k] = bitmap);
+        out
+    }
+}
+
+/// Where the bytes of one image are looked for.
+struct Find<'a, 'b> {
+    root: &'b Root,
+    buffers: &'a Buffers<'a>,
+    file: &'b Path,
+    resolver: &'b mut Resolver,
+    report: &'b mut Report,
+    drawn: bool,
+}
+
+impl<'a> Find<'a, '_> {
+    fn bytes(&mut self, i: usize, image: &Image) -> Option<Cow<'a, [u8]>> {
+        match (&image.uri, image.buffer_view) {
+            (Some(uri), _) if is_data(uri) => self.data(i, uri).map(Cow::Owned),
+            (Some(uri), _) if self.drawn || image.mime_type.is_some() => match self.resolver.read_uri(uri) {
+                Ok(bytes) => Some(Cow::Owned(bytes)),
+                Err(why) => {
+                    self.report.warnings.push(why.diagnose(self.file, &format!("images[{i}].uri")));
+                    None
+                }
+            },
+            (None, Some(view)) => {
+                let view = self.root.buffer_views.get(view.value())?;
+                let bytes = self.buffers.view(view).ok().map(Cow::Borrowed);
+                if bytes.is_none() && self.drawn {
+                    self.report.add(Code::ImageDataInvalid, format!("images[{i}]"), "its bytes are not there");
+                }
+                bytes
+            }
+            _ => None,
+        }
+    }
+
+    fn data(&mut self, i: usize, uri: &str) -> Option<Vec<u8>> {
+        let place = format!("images[{i}].uri");
+        let kind = media_type(uri);
+        if !kind.is_empty() && !kind.starts_with("image/") && kind != "application/octet-stream" || kind == "image/gif"
+        {
+            self.report.add(Code::InvalidUri, &place, format!("a data URI of type '{kind}' is no glTF image"));
+        }
+        match decode_data(uri) {
+            Ok(bytes) => Some(bytes),
+            Err(why) => {
+                self.report.add(Code::InvalidUri, place, format!("it is no data URI: {why}"));
+                None
+            }
+        }
+    }
+}
+
+fn name_of(i: usize, image: &Image) -> String {
+    let uri = image.uri.as_ref().filter(|uri| !is_data(uri));
+    uri.or(image.name.as_ref()).filter(|n| !n.is_empty()).cloned().unwrap_or_else(|| format!("images[{i}]"))
+}
+
+/// The media type that bytes turn out to have, of those that glTF files hold.
+fn kind_of(bytes: &[u8]) -> Option<&'static str> {
+    match guess_format(bytes) {
+        Ok(ImageFormat::Png) => Some("image/png"),
+        Ok(ImageFormat::Jpeg) => Some("image/jpeg"),
+        Ok(ImageFormat::WebP) => Some("image/webp"),
+        _ if bytes.starts_with(b"\xabKTX 20\xbb") => Some("image/ktx2"),
+        _ if bytes.starts_with(b"DDS ") => Some("image/vnd-ms.dds"),
+        _ => None,
+    }
+}
+
+/// Compares what an image says of itself with its bytes.
+fn check_kind(root: &Root, i: usize, image: &Image, bytes: &[u8], report: &mut Report) {
+    let place = format!("images[{i}]");
+    let Some(kind) = kind_of(bytes) else {
+        return report.add(Code::ImageUnrecognizedFormat, place, "its bytes are no image of a known kind");
+    };
+    let declared = image.mime_type.as_ref().map(|m| m.0.as_str());
+    let of_uri = image.uri.as_deref().filter(|uri| is_data(uri)).map(media_type).filter(|m| m.starts_with("image/"));
+    if let Some(other) = declared.into_iter().chain(of_uri).find(|d| *d != kind && *d != "image/gif") {
+        let text = format!("declared as {}, its bytes are {kind}", crate::load::paths::shorten(other));
+        report.add(Code::ImageMimeTypeInvalid, &place, text);
+    }
+    if kind == "image/webp" && !root.extensions_used.iter().any(|e| e == "EXT_texture_webp") {
+        report.add(Code::ImageNonEnabledMimeType, place, "WebP needs EXT_texture_webp, which is not declared");
+    }
+}
+
+/// Checks that each way to name an image leads to one of its kind.
+fn check_textures(root: &Root, images: &Images, report: &mut Report) {
+    let kind = |i: usize| images.bytes.get(i).and_then(Option::as_deref).and_then(kind_of);
+    for (i, texture) in root.textures.iter().enumerate() {
+        let webp = extension_source(texture, "EXT_texture_webp");
+        let plain = kind(texture.source.value()).filter(|k| !["image/png", "image/jpeg"].contains(k));
+        if let Some(kind) = plain {
+            report.add(
+                Code::TextureInvalidImageMimeType,
+                format!("textures[{i}].source"),
+                format!("{kind} needs an extension"),
+            );
+        }
+        if let Some(kind) = webp.and_then(kind).filter(|k| *k != "image/webp") {
+            let place = format!("textures[{i}].extensions.EXT_texture_webp.source");
+            report.add(Code::TextureInvalidImageMimeType, place, format!("{kind} is no WebP"));
+        }
+    }
+}
+
+fn extension_source(texture: &Texture, name: &str) -> Option<usize> {
+    let extensions = texture.extensions.as_ref()?;
+    let source = super::schema::whole(extensions.others.get(name)?.get("source")?)?;
+    usize::try_from(source).ok()
+}
+
+/// The image that a texture shows: WebP where the file offers it, then the plain one, then what cannot be decoded.
+pub(super) fn image_of(root: &Root, texture: Index<Texture>) -> Option<usize> {
+    let texture = root.textures.get(texture.value())?;
+    let plain = Some(texture.source.value()).filter(|&i| i < root.images.len());
+    extension_source(texture, "EXT_texture_webp")
+        .or(plain)
+        .or_else(|| ["KHR_texture_basisu", "MSFT_texture_dds"].iter().find_map(|name| extension_source(texture, name)))
+}

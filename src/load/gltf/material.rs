@@ -1,0 +1,172 @@
+//! Materials: metallic-roughness with its extensions, and unlit.
+
+use super::codes::Code;
+use super::mesh::Needs;
+use super::report::Report;
+use super::textures::{Textures, maps};
+use crate::math::Vec3;
+use crate::scene::{AlphaMode, Material, MetalRough, Surface};
+use gltf::json;
+use gltf::json::material as source;
+use gltf::json::validation::Checked;
+use serde_json::Value;
+
+/// Converts a material; its maps are noted in `textures`.
+pub(super) fn convert(i: usize, source: &json::Material, textures: &mut Textures, report: &mut Report) -> Material {
+    let pbr = &source.pbr_metallic_roughness;
+    let [r, g, b, a] = pbr.base_color_factor.0.map(|c| within(c, 0.0, 1.0, 1.0));
+    let mut material = Material {
+        name: source.name.clone().unwrap_or_default(),
+        base_color: Vec3::new(r, g, b),
+        opacity: a,
+        base_color_map: textures.info(pbr.base_color_texture.as_ref()),
+        alpha_mode: alpha_mode(source),
+        double_sided: source.double_sided,
+        ..Material::default()
+    };
+    let extensions = source.extensions.as_ref();
+    if extensions.is_some_and(|e| e.unlit.is_some()) {
+        material.surface = Surface::Unlit;
+        return material;
+    }
+    lit(source, &mut material, textures);
+    material.surface = Surface::MetalRough(match specular_glossiness(source) {
+        Some(extension) => from_specular_glossiness(i, extension, &mut material, textures, report),
+        None => metal_rough(source, textures),
+    });
+    material
+}
+
+/// What vertices need for a material's maps.
+pub(super) fn needs(material: &mut Material) -> Needs {
+    let tangents = material.normal_map.as_ref().map(|map| map.uv_set);
+    let mut uv_sets: Vec<u32> = maps(material).into_iter().flatten().map(|map| map.uv_set).collect();
+    uv_sets.sort_unstable();
+    uv_sets.dedup();
+    Needs { uv_sets, tangents }
+}
+
+/// `value` in `low..=high`; `otherwise` when it is not a number.
+fn within(value: f32, low: f32, high: f32, otherwise: f32) -> f32 {
+    if value.is_nan() { otherwise } else { value.clamp(low, high) }
+}
+
+fn alpha_mode(source: &json::Material) -> AlphaMode {
+    match source.alpha_mode {
+        Checked::Valid(source::AlphaMode::Mask) => {
+            AlphaMode::Mask { cutoff: source.alpha_cutoff.map_or(0.5, |c| within(c.0, 0.0, f32::MAX, 0.5)) }
+        }
+        Checked::Valid(source::AlphaMode::Blend) => AlphaMode::Blend,
+        Checked::Valid(source::AlphaMode::Opaque) | Checked::Invalid => AlphaMode::Opaque,
+    }
+}
+
+/// Emission, normal and occlusion.
+fn lit(source: &json::Material, material: &mut Material, textures: &mut Textures) {
+    let strength = source.extensions.as_ref().and_then(|e| e.emissive_strength.as_ref());
+    let strength = strength.map_or(1.0, |s| within(s.emissive_strength.0, 0.0, f32::MAX, 1.0));
+    material.emission = Vec3::from(source.emissive_factor.0.map(|c| within(c, 0.0, 1.0, 0.0) * strength));
+    material.emission_map = textures.info(source.emissive_texture.as_ref());
+    if let Some(normal) = &source.normal_texture {
+        material.normal_map = textures.of(
+            normal.index,
+            normal.tex_coord,
+            transform(normal.extensions.as_ref().map(|e| &e.others)).as_ref(),
+        );
+        material.normal_scale = if normal.scale.is_finite() { normal.scale } else { 1.0 };
+    }
+    if let Some(occlusion) = &source.occlusion_texture {
+        let others = occlusion.extensions.as_ref().map(|e| &e.others);
+        material.occlusion_map = textures.of(occlusion.index, occlusion.tex_coord, transform(others).as_ref());
+        material.occlusion_strength = within(occlusion.strength.0, 0.0, 1.0, 1.0);
+    }
+}
+
+/// KHR_texture_transform on slots where the typed document keeps it untyped.
+fn transform(others: Option<&serde_json::Map<String, Value>>) -> Option<json::extensions::texture::TextureTransform> {
+    let value = others?.get("KHR_texture_transform")?;
+    serde_json::from_value(value.clone()).ok()
+}
+
+fn metal_rough(source: &json::Material, textures: &mut Textures) -> MetalRough {
+    let pbr = &source.pbr_metallic_roughness;
+    let mut surface = MetalRough {
+        metallic: within(pbr.metallic_factor.0, 0.0, 1.0, 1.0),
+        roughness: within(pbr.roughness_factor.0, 0.0, 1.0, 1.0),
+        metal_rough_map: textures.info(pbr.metallic_roughness_texture.as_ref()),
+        ..MetalRough::default()
+    };
+    let Some(extensions) = &source.extensions else { return surface };
+    if let Some(specular) = &extensions.specular {
+        surface.specular = within(specular.specular_factor.0, 0.0, 1.0, 1.0);
+        surface.specular_map = textures.info(specular.specular_texture.as_ref());
+        surface.specular_color = Vec3::from(specular.specular_color_factor.0.map(|c| within(c, 0.0, f32::MAX, 1.0)));
+        surface.specular_color_map = textures.info(specular.specular_color_texture.as_ref());
+    }
+    if let Some(ior) = &extensions.ior {
+        // Below 1 only the special case 0 means something.
+        surface.ior = if ior.ior.0 == 0.0 { 0.0 } else { within(ior.ior.0, 1.0, f32::MAX, 1.5) };
+    }
+    if let Some(transmission) = &extensions.transmission {
+        surface.transmission = within(transmission.transmission_factor.0, 0.0, 1.0, 0.0);
+        surface.transmission_map = textures.info(transmission.transmission_texture.as_ref());
+    }
+    let number = |extension: &str, name: &str| {
+        let value = extensions.others.get(extension)?.get(name)?.as_f64()?;
+        Some(value as f32)
+    };
+    surface.thick = number("KHR_materials_volume", "thicknessFactor").is_some_and(|t| t > 0.0);
+    surface.dispersion =
+        number("KHR_materials_dispersion", "dispersion").map_or(0.0, |d| within(d, 0.0, f32::MAX, 0.0));
+    surface
+}
+
+/// The extension's object, when the material says nothing in metallic-roughness terms.
+fn specular_glossiness(source: &json::Material) -> Option<&Value> {
+    let pbr = &source.pbr_metallic_roughness;
+    let silent = pbr.base_color_texture.is_none()
+        && pbr.metallic_roughness_texture.is_none()
+        && pbr.base_color_factor.0 == [1.0; 4]
+        && (pbr.metallic_factor.0, pbr.roughness_factor.0) == (1.0, 1.0);
+    let value = source.extensions.as_ref()?.others.get("KHR_materials_pbrSpecularGlossiness")?;
+    silent.then_some(value)
+}
+
+/// KHR_materials_pbrSpecularGlossiness as a dielectric whose reflection has the given colour at normal incidence, the
+/// way KHR_materials_ior describes for its special index 0. Gloss maps are read as constant.
+fn from_specular_glossiness(
+    i: usize,
+    extension: &Value,
+    material: &mut Material,
+    textures: &mut Textures,
+    report: &mut Report,
+) -> MetalRough {
+    let number = |name: &str, k: Option<usize>| {
+        let value = extension.get(name)?;
+        let value = k.map_or(Some(value), |k| value.get(k))?.as_f64()?;
+        Some(within(value as f32, 0.0, 1.0, 1.0))
+    };
+    let color = |name: &str| Vec3::from([0, 1, 2].map(|k| number(name, Some(k)).unwrap_or(1.0)));
+    let mut map = |name: &str| {
+        let info: Option<json::texture::Info> =
+            extension.get(name).and_then(|v| serde_json::from_value(v.clone()).ok());
+        textures.info(info.as_ref())
+    };
+    material.base_color = color("diffuseFactor");
+    material.opacity = number("diffuseFactor", Some(3)).unwrap_or(1.0);
+    material.base_color_map = map("diffuseTexture");
+    let specular_color_map = map("specularGlossinessTexture");
+    if specular_color_map.is_some() {
+        let text = "the gloss in the alpha of specularGlossinessTexture is drawn as constant";
+        let place = format!("materials[{i}].extensions.KHR_materials_pbrSpecularGlossiness");
+        report.warn(Code::IncompleteExtensionSupport, place, text);
+    }
+    MetalRough {
+        metallic: 0.0,
+        roughness: 1.0 - number("glossinessFactor", None).unwrap_or(1.0),
+        specular_color: color("specularFactor"),
+        specular_color_map,
+        ior: 0.0,
+        ..MetalRough::default()
+    }
+}

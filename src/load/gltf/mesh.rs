@@ -1,0 +1,320 @@
+//! One primitive of a mesh -> a [`Mesh`] of the scene: morphed, posed by its skin, cleaned.
+
+use super::accessor::{Format, Reader, Unreadable};
+use super::codes::Code;
+use super::faces::{self, Dropped};
+use super::report::Report;
+use super::skin::{self, Influences};
+use crate::load::tangents;
+use crate::math::{DMat4, DVec3, Vec2, Vec3, Vec4};
+use crate::scene::Mesh;
+use gltf::json::Index;
+use gltf::json::accessor::{Accessor, ComponentType, Type};
+use gltf::json::mesh::{Mode, MorphTarget, Primitive, Semantic};
+use gltf::json::validation::Checked;
+
+/// What to read and how.
+pub(super) struct Job<'a> {
+    pub(super) primitive: &'a Primitive,
+    /// JSON path of the primitive.
+    pub(super) place: String,
+    pub(super) name: String,
+    /// Weights of the morph targets; missing ones are zero.
+    pub(super) weights: &'a [f32],
+    /// Matrices of the skin's joints.
+    pub(super) joints: Option<&'a [DMat4]>,
+    pub(super) needs: Needs,
+    /// Whether anything of it is drawn; if not it is read only to be checked.
+    pub(super) drawn: bool,
+}
+
+/// What the material reads of the vertices.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Needs {
+    /// Texture coordinate sets.
+    pub(super) uv_sets: Vec<u32>,
+    /// The set that a normal map is laid out by.
+    pub(super) tangents: Option<u32>,
+}
+
+/// What a primitive gave.
+#[derive(Default)]
+pub(super) struct Read {
+    pub(super) mesh: Mesh,
+    /// Where the mesh stands when a skin has placed it.
+    pub(super) center: Option<DVec3>,
+    pub(super) dropped: Dropped,
+    pub(super) points_and_lines: u64,
+}
+
+/// Reads one primitive; `None` when there is nothing to draw in it.
+pub(super) fn read(reader: Reader, job: &Job, report: &mut Report) -> Option<Read> {
+    let Checked::Valid(mode) = job.primitive.mode else { return None };
+    let mut task = Task { reader, job, report };
+    task.run(mode)
+}
+
+/// Bytes that reading a primitive takes, by the declared counts.
+pub(super) fn cost(reader: Reader, primitive: &Primitive) -> u64 {
+    let of = |index: &Index<Accessor>| {
+        let accessor = reader.root.accessors.get(index.value());
+        accessor.map_or(0, |a| a.count.0.saturating_mul(16))
+    };
+    let targets = primitive.targets.iter().flatten();
+    let morphs = targets.flat_map(|t| [t.positions, t.normals, t.tangents].into_iter().flatten());
+    let all = primitive.attributes.values().copied().chain(primitive.indices).chain(morphs);
+    all.map(|index| of(&index)).fold(0, u64::saturating_add)
+}
+
+struct Task<'a, 'b> {
+    reader: Reader<'a>,
+    job: &'b Job<'b>,
+    report: &'b mut Report,
+}
+
+impl Task<'_, '_> {
+    fn run(&mut self, mode: Mode) -> Option<Read> {
+        let positions = self.attribute(Semantic::Positions)?;
+        let mut mesh = Mesh { name: self.job.name.clone(), ..Mesh::default() };
+        mesh.positions = self.floats::<3>(positions, "attributes.POSITION")?.into_iter().map(Vec3::from).collect();
+        let corners = self.corners(mesh.positions.len())?;
+        let Some(triangles) = faces::triangles(mode, &corners) else {
+            return Some(Read { points_and_lines: faces::points_and_lines(mode, corners.len()), ..Read::default() });
+        };
+        drop(corners);
+        mesh.triangles = triangles;
+        self.attributes(&mut mesh);
+        self.morph(&mut mesh);
+        let center = self.pose(&mut mesh);
+        let dropped = faces::clean(&mut mesh, mode == Mode::TriangleStrip);
+        self.directions(&mut mesh);
+        Some(Read { mesh, center, dropped, points_and_lines: 0 })
+    }
+
+    /// The accessor of an attribute, when its format can be read.
+    fn attribute(&self, semantic: Semantic) -> Option<Index<Accessor>> {
+        let index = self.job.primitive.attributes.get(&Checked::Valid(semantic.clone())).copied()?;
+        let format = self.reader.root.accessors.get(index.value()).and_then(Format::of)?;
+        is_readable(&semantic, format).then_some(index)
+    }
+
+    fn place(&self, part: &str) -> String {
+        format!("{}.{part}", self.job.place)
+    }
+
+    /// Unwraps what was read; what cannot be read refuses the file, unless nobody would see it.
+    fn sort_out<T>(&mut self, result: Result<T, Unreadable>, part: &str) -> Option<T> {
+        let place = self.place(part);
+        match result {
+            Ok(values) => return Some(values),
+            Err(Unreadable::Nowhere(why)) if self.job.drawn => self.report.fault(why),
+            Err(Unreadable::Nowhere(_) | Unreadable::Unknown) => {}
+            Err(Unreadable::Buffer(why)) => self.report.fault(why),
+            Err(Unreadable::Data(code, text)) => self.report.add(code, place, text),
+        }
+        None
+    }
+
+    fn floats<const N: usize>(&mut self, index: Index<Accessor>, part: &str) -> Option<Vec<[f32; N]>> {
+        let result = self.reader.floats::<N>(index);
+        self.sort_out(result, part)
+    }
+
+    /// The vertices of all corners.
+    fn corners(&mut self, vertices: usize) -> Option<Vec<u32>> {
+        let Some(index) = self.job.primitive.indices else {
+            return Some((0..u32::try_from(vertices).ok()?).collect());
+        };
+        let format = self.reader.root.accessors.get(index.value()).and_then(Format::of)?;
+        if format.shape != Type::Scalar || !is_unsigned(format.component) {
+            return None;
+        }
+        let result = self.reader.integers::<1>(index);
+        let corners: Vec<u32> = self.sort_out(result, "indices")?.into_iter().map(|[i]| i).collect();
+        let restart = match format.component {
+            ComponentType::U8 => 0xff,
+            ComponentType::U16 => 0xffff,
+            _ => u32::MAX,
+        };
+        let Some(at) = corners.iter().position(|&c| c as usize >= vertices || c == restart) else {
+            return Some(corners);
+        };
+        let (code, text) = if corners[at] == restart {
+            let text = format!("index {restart} at position {at} asks for a restart, which glTF forbids");
+            (Code::AccessorIndexPrimitiveRestart, text)
+        } else {
+            let text = format!("index {} at position {at}, but only {vertices} vertices exist", corners[at]);
+            (Code::AccessorIndexOob, text)
+        };
+        let place = self.place("indices");
+        self.report.add(code, place, text);
+        None
+    }
+
+    /// Reads what goes with the positions; arrays of another length were refused before.
+    fn attributes(&mut self, mesh: &mut Mesh) {
+        let count = mesh.positions.len();
+        if mesh.positions.iter().any(|p| !p.is_finite()) {
+            let place = self.place("attributes.POSITION");
+            self.report.add(Code::AccessorInvalidFloat, place, "positions that are not finite numbers");
+        }
+        if let Some(index) = self.attribute(Semantic::Normals) {
+            let normals = self.floats::<3>(index, "attributes.NORMAL").filter(|n| n.len() == count);
+            mesh.normals = normals.into_iter().flatten().map(Vec3::from).collect();
+        }
+        let wanted = (self.job.needs.tangents.is_some() || !self.job.drawn) && !mesh.normals.is_empty();
+        if let Some(index) = self.attribute(Semantic::Tangents).filter(|_| wanted) {
+            let tangents = self.floats::<4>(index, "attributes.TANGENT").filter(|t| t.len() == count);
+            mesh.tangents = tangents.into_iter().flatten().map(Vec4::from).collect();
+        }
+        self.colors(mesh, count);
+        self.uvs(mesh, count);
+    }
+
+    fn colors(&mut self, mesh: &mut Mesh, count: usize) {
+        let Some(index) = self.attribute(Semantic::Colors(0)) else { return };
+        let opaque =
+            self.reader.root.accessors.get(index.value()).is_some_and(|a| a.type_ == Checked::Valid(Type::Vec3));
+        let colors = self.floats::<4>(index, "attributes.COLOR_0").filter(|c| c.len() == count);
+        let color = |[r, g, b, a]: [f32; 4]| Vec4::new(r, g, b, if opaque { 1.0 } else { a });
+        mesh.colors = colors.into_iter().flatten().map(color).collect();
+        if faces::clamp_colors(&mut mesh.colors) {
+            let place = self.place("attributes.COLOR_0");
+            self.report.add(Code::AccessorNonClamped, place, "colours outside 0…1");
+        }
+    }
+
+    fn uvs(&mut self, mesh: &mut Mesh, count: usize) {
+        let sets: Vec<u32> = if self.job.drawn { self.job.needs.uv_sets.clone() } else { (0..8).collect() };
+        for set in sets {
+            let Some(index) = self.attribute(Semantic::TexCoords(set)) else { continue };
+            let part = format!("attributes.TEXCOORD_{set}");
+            let uvs = self.floats::<2>(index, &part).filter(|uvs| uvs.len() == count);
+            let mut uvs: Vec<Vec2> = uvs.into_iter().flatten().map(Vec2::from).collect();
+            if faces::finite_uvs(&mut uvs) {
+                let place = self.place(&part);
+                self.report.add(Code::AccessorInvalidFloat, place, "texture coordinates that are not finite numbers");
+            }
+            // Attribute names end well before this could be large.
+            let slot = set as usize;
+            if mesh.uvs.len() <= slot {
+                mesh.uvs.resize(slot + 1, Vec::new());
+            }
+            mesh.uvs[slot] = uvs;
+        }
+    }
+
+    /// Adds the morph targets that have weight.
+    fn morph(&mut self, mesh: &mut Mesh) {
+        let primitive = self.job.primitive;
+        for (k, target) in primitive.targets.iter().flatten().enumerate() {
+            let weight = self.job.weights.get(k).copied().unwrap_or(0.0);
+            if weight != 0.0 || !self.job.drawn {
+                self.add_target(mesh, target, k, weight);
+            }
+        }
+    }
+
+    fn add_target(&mut self, mesh: &mut Mesh, target: &MorphTarget, k: usize, weight: f32) {
+        let count = mesh.positions.len();
+        let parts = [(target.positions, "POSITION"), (target.normals, "NORMAL"), (target.tangents, "TANGENT")];
+        for (index, name) in parts {
+            let semantic = if name == "POSITION" { Semantic::Positions } else { Semantic::Normals };
+            let readable = |index: &Index<Accessor>| {
+                let format = self.reader.root.accessors.get(index.value()).and_then(Format::of);
+                format.is_some_and(|format| is_readable(&semantic, format))
+            };
+            let Some(index) = index.filter(readable) else { continue };
+            let part = format!("targets[{k}].{name}");
+            let Some(deltas) = self.floats::<3>(index, &part).filter(|d| d.len() == count) else { continue };
+            let deltas = deltas.into_iter().map(|d| Vec3::from(d) * weight);
+            match name {
+                "POSITION" => mesh.positions.iter_mut().zip(deltas).for_each(|(p, d)| *p += d),
+                "NORMAL" => mesh.normals.iter_mut().zip(deltas).for_each(|(n, d)| *n += d),
+                _ => mesh.tangents.iter_mut().zip(deltas).for_each(|(t, d)| *t += d.extend(0.0)),
+            }
+        }
+        // Sums of unit vectors are no longer unit; that is no fault of the file.
+        if weight != 0.0 {
+            mesh.normals.iter_mut().for_each(|n| *n = n.try_normalize().unwrap_or(*n));
+            let unit = |t: &mut Vec4| *t = t.truncate().try_normalize().map_or(*t, |d| d.extend(t.w));
+            mesh.tangents.iter_mut().for_each(unit);
+        }
+    }
+
+    /// Places a skinned mesh by its joints.
+    fn pose(&mut self, mesh: &mut Mesh) -> Option<DVec3> {
+        let matrices = self.job.joints?;
+        let mut influences = Influences::default();
+        for set in 0.. {
+            let (Some(joints), Some(weights)) =
+                (self.attribute(Semantic::Joints(set)), self.attribute(Semantic::Weights(set)))
+            else {
+                break;
+            };
+            let result = self.reader.integers::<4>(joints);
+            influences.joints.push(self.sort_out(result, &format!("attributes.JOINTS_{set}"))?);
+            influences.weights.push(self.floats::<4>(weights, &format!("attributes.WEIGHTS_{set}"))?);
+        }
+        if influences.joints.is_empty() {
+            return None;
+        }
+        let (center, odd) = skin::pose(mesh, &influences, matrices);
+        let faults = [
+            (odd.outside, Code::AccessorJointsIndexOob, "attributes.JOINTS_0", "joints that the skin does not have"),
+            (odd.negative, Code::AccessorWeightsNegative, "attributes.WEIGHTS_0", "negative weights"),
+            (odd.unequal, Code::AccessorWeightsNonNormalized, "attributes.WEIGHTS_0", "weights that do not sum to 1"),
+        ];
+        for (_, code, part, text) in faults.into_iter().filter(|f| f.0) {
+            let place = self.place(part);
+            self.report.add(code, place, text);
+        }
+        Some(center)
+    }
+
+    /// Repairs normals and tangents, and makes tangents where a normal map needs them.
+    fn directions(&mut self, mesh: &mut Mesh) {
+        let normals = faces::repair_normals(mesh);
+        if normals.length || normals.none {
+            let text = if normals.none { "normals without a direction" } else { "normals that are not of unit length" };
+            let place = self.place("attributes.NORMAL");
+            self.report.add(Code::AccessorVector3NonUnit, place, text);
+        }
+        let tangents = faces::repair_tangents(&mut mesh.tangents);
+        let place = self.place("attributes.TANGENT");
+        if tangents.length {
+            self.report.add(Code::AccessorVector3NonUnit, &place, "tangents that are not of unit length");
+        }
+        if tangents.sign {
+            self.report.add(Code::AccessorInvalidSign, &place, "tangents whose w is neither 1 nor -1");
+        }
+        if tangents.none {
+            mesh.tangents.clear();
+        }
+        if let Some(set) = self.job.needs.tangents.filter(|_| mesh.tangents.is_empty()) {
+            tangents::generate(mesh, set);
+        }
+    }
+}
+
+fn is_unsigned(component: ComponentType) -> bool {
+    matches!(component, ComponentType::U8 | ComponentType::U16 | ComponentType::U32)
+}
+
+/// Whether an attribute makes sense in this format; [`super::attributes`] told the user of those that do not.
+fn is_readable(semantic: &Semantic, format: Format) -> bool {
+    let (float, unsigned) = (format.component == ComponentType::F32, is_unsigned(format.component));
+    let small = format.component != ComponentType::U32;
+    match semantic {
+        Semantic::Positions => format.shape == Type::Vec3 && small,
+        Semantic::Normals => format.shape == Type::Vec3 && (float || (format.normalized && !unsigned)),
+        Semantic::Tangents => format.shape == Type::Vec4 && (float || (format.normalized && !unsigned)),
+        Semantic::Colors(_) => {
+            matches!(format.shape, Type::Vec3 | Type::Vec4) && (float || (format.normalized && unsigned && small))
+        }
+        Semantic::TexCoords(_) => format.shape == Type::Vec2 && small,
+        Semantic::Joints(_) => format.shape == Type::Vec4 && unsigned && small,
+        Semantic::Weights(_) => format.shape == Type::Vec4 && (float || (format.normalized && unsigned && small)),
+        Semantic::Extras(_) => false,
+    }
+}

@@ -1,0 +1,106 @@
+//! What nodes place in the world besides meshes: cameras and lights.
+
+use super::codes::Code;
+use super::report::Report;
+use crate::math::{DAffine3, DMat3, DVec3, Vec3};
+use crate::scene::{Camera, Falloff, Light, LightKind, Projection};
+use gltf::json::extensions::scene::khr_lights_punctual as punctual;
+use gltf::json::validation::Checked;
+use gltf::json::{Root, scene::Node};
+
+/// The camera of a node; `None` when it shows nothing.
+pub(super) fn camera(root: &Root, node: &Node, world: DAffine3, report: &mut Report) -> Option<Camera> {
+    let index = node.camera?.value();
+    let source = root.cameras.get(index)?;
+    let projection = match (source.type_, &source.perspective, &source.orthographic) {
+        (Checked::Valid(gltf::json::camera::Type::Perspective), Some(p), _) => {
+            let (y_fov, aspect) = (f64::from(p.yfov), p.aspect_ratio.map(f64::from));
+            let usable = y_fov > 0.0 && y_fov < std::f64::consts::PI;
+            let aspect = aspect.filter(|a| *a > 0.0 && a.is_finite());
+            usable.then_some(Projection::Perspective { y_fov, aspect })
+        }
+        (Checked::Valid(gltf::json::camera::Type::Orthographic), _, Some(o)) => {
+            let (x_mag, y_mag) = (f64::from(o.xmag).abs(), f64::from(o.ymag).abs());
+            let usable = x_mag > 0.0 && y_mag > 0.0 && x_mag.is_finite() && y_mag.is_finite();
+            usable.then_some(Projection::Orthographic { x_mag, y_mag })
+        }
+        _ => None,
+    };
+    let placed = projection.zip(rigid(world));
+    if placed.is_none() {
+        report.warn(
+            Code::ValueNotInRange,
+            format!("cameras[{index}]"),
+            "the camera cannot show anything and is left out",
+        );
+    }
+    let (projection, world_from_camera) = placed?;
+    Some(Camera { name: name(&source.name, node), projection, world_from_camera })
+}
+
+/// A transform without scale, shear and mirror: the axes looked along and upwards are kept.
+fn rigid(world: DAffine3) -> Option<DAffine3> {
+    let back = world.matrix3.z_axis.try_normalize()?;
+    let up = world.matrix3.y_axis;
+    let up = (up - back * up.dot(back)).try_normalize()?;
+    let rigid = DAffine3::from_mat3_translation(DMat3::from_cols(up.cross(back), up, back), world.translation);
+    rigid.is_finite().then_some(rigid)
+}
+
+/// The light of a node.
+pub(super) fn light(root: &Root, node: &Node, world: DAffine3, report: &mut Report) -> Option<Light> {
+    let index = node.extensions.as_ref()?.khr_lights_punctual.as_ref()?.light.value();
+    let source = root.extensions.as_ref()?.khr_lights_punctual.as_ref()?.lights.get(index)?;
+    let place = format!("extensions.KHR_lights_punctual.lights[{index}]");
+    let intensity = if source.intensity.is_finite() { source.intensity.max(0.0) } else { 1.0 };
+    let color = Vec3::from(source.color.map(|c| if c.is_finite() { c.max(0.0) } else { 1.0 }));
+    let position = world.translation;
+    let direction = (-world.matrix3.z_axis).try_normalize().unwrap_or(DVec3::NEG_Z);
+    let range = source.range.map(f64::from).filter(|r| *r > 0.0).unwrap_or(f64::INFINITY);
+    let falloff = Falloff::InverseSquare { range };
+    if !position.is_finite() || !direction.is_finite() {
+        report.warn(Code::AccessorInvalidFloat, place, "the light stands nowhere and is left out");
+        return None;
+    }
+    let kind = match (&source.type_, &source.spot) {
+        (Checked::Valid(punctual::Type::Directional), _) => LightKind::Directional { direction },
+        (Checked::Valid(punctual::Type::Point), _) => LightKind::Point { position, falloff },
+        (Checked::Valid(punctual::Type::Spot), Some(spot)) => {
+            let (inner, outer) = cone(spot);
+            LightKind::Spot { position, direction, inner, outer, falloff }
+        }
+        // The schema check has told of it.
+        _ => return None,
+    };
+    Some(Light { name: name(&source.name, node), intensity: color * intensity, kind, shadows: true })
+}
+
+/// The angles of a cone, 0 ≤ inner ≤ outer ≤ π/2.
+fn cone(spot: &punctual::Spot) -> (f64, f64) {
+    let angle = |value: f32, otherwise: f64| {
+        let value = f64::from(value);
+        if value.is_nan() { otherwise } else { value.clamp(0.0, std::f64::consts::FRAC_PI_2) }
+    };
+    let outer = angle(spot.outer_cone_angle, std::f64::consts::FRAC_PI_4);
+    (angle(spot.inner_cone_angle, 0.0).min(outer), outer)
+}
+
+/// The name of a thing, or else of the node that holds it.
+fn name(own: &Option<String>, node: &Node) -> String {
+    own.as_ref().filter(|n| !n.is_empty()).or(node.name.as_ref()).cloned().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::DQuat;
+
+    #[test]
+    fn cameras_lose_scale_and_mirror_but_keep_where_they_look() {
+        let turn = DQuat::from_rotation_y(0.5);
+        let scaled = DAffine3::from_scale_rotation_translation(DVec3::new(-3.0, 2.0, 5.0), turn, DVec3::X);
+        let expected = DAffine3::from_rotation_translation(turn, DVec3::X);
+        assert!(rigid(scaled).unwrap().abs_diff_eq(expected, 1e-12));
+        assert!(rigid(DAffine3::from_scale(DVec3::ZERO)).is_none());
+    }
+}

@@ -1,0 +1,289 @@
+//! Checks the JSON against the glTF 2.0 schema: types, required properties, ranges, lists, and every index.
+//!
+//! The rules are data ([`super::schema_tables`]); this walks them beside the JSON. What the walk has passed can be
+//! turned into typed structs, and no index in it points outside. What properties mean together is not checked here.
+
+use super::codes::Code;
+use super::report::Report;
+use super::schema_tables::{EXTENSIONS, ROOT};
+use crate::load::paths::shorten;
+use serde_json::Value;
+use std::fmt::Write as _;
+
+/// The rules for one kind of JSON object.
+pub(super) struct Object {
+    pub(super) name: &'static str,
+    pub(super) properties: &'static [Property],
+}
+
+/// A named value in an object.
+pub(super) struct Property {
+    pub(super) name: &'static str,
+    pub(super) kind: Kind,
+    pub(super) required: bool,
+}
+
+/// What a value must be.
+pub(super) enum Kind {
+    Any,
+    Bool,
+    Text,
+    /// A finite number in a closed range; `open` excludes the lower end.
+    Number {
+        min: f64,
+        max: f64,
+        open: bool,
+    },
+    /// A whole number in a closed range.
+    Integer {
+        min: u64,
+        max: u64,
+    },
+    /// The position in a list of the root (`"KHR_lights_punctual"`: in its list of lights).
+    Index(&'static str),
+    /// The position in a list of the object that the walk is in, two levels up.
+    AnyIndex,
+    OneOf(&'static [u64]),
+    Word(&'static [&'static str]),
+    List {
+        of: &'static Kind,
+        min: usize,
+        max: usize,
+        unique: bool,
+    },
+    Object(&'static Object),
+    /// An object with names of its own.
+    Map(&'static Kind),
+}
+
+/// An extension's object: where it may stand and what is in it.
+pub(super) struct Extension {
+    pub(super) name: &'static str,
+    /// Names of [`Object`]s that may carry it.
+    pub(super) on: &'static [&'static str],
+    pub(super) object: &'static Object,
+}
+
+/// Checks the whole document.
+pub(super) fn check(root: &Value, report: &mut Report) {
+    let used = strings(root.get("extensionsUsed"));
+    let mut walk = Walk { root, used, path: String::new(), report };
+    walk.object(root, &ROOT);
+}
+
+fn strings(list: Option<&Value>) -> Vec<&str> {
+    list.and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str).collect()
+}
+
+struct Walk<'a> {
+    root: &'a Value,
+    used: Vec<&'a str>,
+    /// Where the walk is, as a JSON path.
+    path: String,
+    report: &'a mut Report,
+}
+
+impl<'a> Walk<'a> {
+    fn fault(&mut self, code: Code, text: impl Into<String>) {
+        self.report.add(code, self.path.as_str(), text);
+    }
+
+    /// Does something one property or element deeper.
+    fn at(&mut self, step: impl std::fmt::Display, visit: impl FnOnce(&mut Self)) {
+        let length = self.path.len();
+        // Writing to a string cannot fail.
+        let _ = write!(self.path, "{step}");
+        visit(self);
+        self.path.truncate(length);
+    }
+
+    fn member(&mut self, name: &str, visit: impl FnOnce(&mut Self)) {
+        let dot = if self.path.is_empty() { "" } else { "." };
+        self.at(format_args!("{dot}{}", shorten(name)), visit);
+    }
+
+    fn object(&mut self, value: &'a Value, rules: &'static Object) {
+        let Some(map) = value.as_object() else { return self.wrong_type(value, "an object") };
+        for property in rules.properties {
+            match map.get(property.name) {
+                Some(value) => self.member(property.name, |walk| walk.value(value, &property.kind)),
+                None if property.required => {
+                    self.fault(Code::UndefinedProperty, format!("'{}' is missing", property.name));
+                }
+                None => {}
+            }
+        }
+        if let Some(extensions) = map.get("extensions") {
+            self.member("extensions", |walk| walk.extensions(extensions, rules.name));
+        }
+    }
+
+    fn extensions(&mut self, value: &'a Value, on: &str) {
+        let Some(map) = value.as_object() else { return self.wrong_type(value, "an object") };
+        for (name, value) in map {
+            self.member(name, |walk| walk.extension(name, value, on));
+        }
+    }
+
+    fn extension(&mut self, name: &str, value: &'a Value, on: &str) {
+        if !value.is_object() {
+            return self.wrong_type(value, "an object");
+        }
+        if !self.used.contains(&name) {
+            self.fault(Code::UndeclaredExtension, format!("'{}' is not in extensionsUsed", shorten(name)));
+        }
+        let mut known = EXTENSIONS.iter().filter(|e| e.name == name).peekable();
+        if known.peek().is_none() {
+            return;
+        }
+        match known.find(|e| e.on.contains(&on)) {
+            Some(extension) => self.object(value, extension.object),
+            None => self.fault(Code::UnexpectedExtensionObject, format!("{name} has no meaning on {on}")),
+        }
+    }
+
+    fn value(&mut self, value: &'a Value, kind: &'static Kind) {
+        match kind {
+            Kind::Any => {}
+            Kind::Bool => self.expect(value.is_boolean(), value, "true or false"),
+            Kind::Text => self.expect(value.is_string(), value, "a text"),
+            Kind::Number { min, max, open } => self.number(value, *min, *max, *open),
+            Kind::Integer { min, max } => self.integer(value, *min, *max),
+            Kind::Index(list) => self.index(value, list),
+            Kind::AnyIndex => self.expect(whole(value).is_some(), value, "an index"),
+            Kind::OneOf(allowed) => self.one_of(value, allowed),
+            Kind::Word(allowed) => self.word(value, allowed),
+            Kind::List { of, min, max, unique } => self.list(value, of, *min..=*max, *unique),
+            Kind::Object(rules) => self.object(value, rules),
+            Kind::Map(kind) => self.map(value, kind),
+        }
+    }
+
+    fn expect(&mut self, right: bool, value: &Value, what: &str) {
+        if !right {
+            self.wrong_type(value, what);
+        }
+    }
+
+    fn wrong_type(&mut self, value: &Value, what: &str) {
+        self.fault(Code::TypeMismatch, format!("{} where {what} should be", show(value)));
+    }
+
+    fn number(&mut self, value: &Value, min: f64, max: f64, open: bool) {
+        let Some(number) = value.as_f64() else { return self.wrong_type(value, "a number") };
+        let inside = if open { number > min } else { number >= min } && number <= max && number.is_finite();
+        if !inside {
+            let bounds = match (min.is_finite(), max.is_finite()) {
+                (_, false) if open => format!("above {min}"),
+                (_, false) => format!("at least {min}"),
+                (false, _) => format!("at most {max}"),
+                _ => format!("{min} to {max}"),
+            };
+            self.fault(Code::ValueNotInRange, format!("{number} where {bounds} is allowed"));
+        }
+    }
+
+    fn integer(&mut self, value: &Value, min: u64, max: u64) {
+        match (whole(value), value.as_f64()) {
+            (Some(number), _) if (min..=max).contains(&number) => {}
+            (Some(number), _) => {
+                let bounds = if max == u64::MAX { format!("at least {min}") } else { format!("{min} to {max}") };
+                self.fault(Code::ValueNotInRange, format!("{number} where {bounds} is allowed"));
+            }
+            // A size below zero has no nearest meaning.
+            (None, Some(number)) if number < 0.0 && number.fract() == 0.0 => {
+                self.report.refuse(Code::ValueNotInRange, self.path.as_str(), format!("{number} is negative"));
+            }
+            (None, _) => self.wrong_type(value, "a whole number"),
+        }
+    }
+
+    fn index(&mut self, value: &Value, list: &str) {
+        let Some(index) = whole(value) else {
+            return self.fault(Code::InvalidIndex, format!("{} where an index should be", show(value)));
+        };
+        let target = match list {
+            "KHR_lights_punctual" => self.root.pointer("/extensions/KHR_lights_punctual/lights"),
+            "KHR_materials_variants" => self.root.pointer("/extensions/KHR_materials_variants/variants"),
+            list => self.root.get(list),
+        };
+        let count = target.and_then(Value::as_array).map_or(0, Vec::len) as u64;
+        if index >= count {
+            self.fault(Code::UnresolvedReference, format!("index {index}, but only {count} {list} exist"));
+        }
+    }
+
+    fn one_of(&mut self, value: &Value, allowed: &[u64]) {
+        match whole(value) {
+            None => self.wrong_type(value, "a whole number"),
+            Some(number) if allowed.contains(&number) => {}
+            Some(number) => self.fault(Code::ValueNotInList, format!("{number} where one of {allowed:?} should be")),
+        }
+    }
+
+    fn word(&mut self, value: &Value, allowed: &[&str]) {
+        match value.as_str() {
+            None => self.wrong_type(value, "a text"),
+            Some(word) if allowed.contains(&word) => {}
+            Some(word) => {
+                self.fault(
+                    Code::ValueNotInList,
+                    format!("'{}' where one of {} should be", shorten(word), allowed.join(", ")),
+                );
+            }
+        }
+    }
+
+    fn list(&mut self, value: &'a Value, of: &'static Kind, length: std::ops::RangeInclusive<usize>, unique: bool) {
+        let Some(list) = value.as_array() else { return self.wrong_type(value, "a list") };
+        if list.is_empty() && *length.start() > 0 {
+            return self.fault(Code::EmptyEntity, "an empty list");
+        }
+        if !length.contains(&list.len()) {
+            let text = format!("{} elements where {} to {} are allowed", list.len(), length.start(), length.end());
+            self.fault(Code::ArrayLengthNotInList, text);
+        }
+        let mut seen = std::collections::HashSet::new();
+        for (i, element) in list.iter().enumerate() {
+            self.at(format_args!("[{i}]"), |walk| {
+                walk.value(element, of);
+                if unique && !seen.insert(key(element)) {
+                    walk.fault(Code::DuplicateElements, format!("{} again", show(element)));
+                }
+            });
+        }
+    }
+
+    fn map(&mut self, value: &'a Value, kind: &'static Kind) {
+        let Some(map) = value.as_object() else { return self.wrong_type(value, "an object") };
+        if map.is_empty() {
+            self.fault(Code::EmptyEntity, "an empty object");
+        }
+        for (name, value) in map {
+            self.member(name, |walk| walk.value(value, kind));
+        }
+    }
+}
+
+/// What decides whether two elements are the same.
+fn key(value: &Value) -> String {
+    whole(value).map_or_else(|| value.to_string(), |n| n.to_string())
+}
+
+/// A whole number, however it is written (`1`, `1.0`, `10e-1`).
+pub(super) fn whole(value: &Value) -> Option<u64> {
+    /// Above 2⁵³ a double does not say which whole number is meant.
+    const LARGEST: f64 = 9_007_199_254_740_992.0;
+    let exact = |f: f64| (f.fract() == 0.0 && (0.0..=LARGEST).contains(&f)).then_some(f as u64);
+    value.as_u64().or_else(|| value.as_f64().and_then(exact))
+}
+
+/// A value in a message.
+fn show(value: &Value) -> String {
+    match value {
+        Value::Object(_) => "an object".into(),
+        Value::Array(_) => "a list".into(),
+        Value::String(text) => format!("'{}'", shorten(text)),
+        other => other.to_string(),
+    }
+}

@@ -1,0 +1,177 @@
+//! Skinned meshes in their rest pose, by linear blend skinning.
+//!
+//! A skinned mesh stands where its joints put it: the node that holds it has no say. The static picture uses the
+//! joints' places as the nodes give them; animation is not played.
+
+use super::accessor::{Format, Reader, Unreadable};
+use super::codes::Code;
+use super::graph::Graph;
+use super::links::is_bind_matrix;
+use super::report::Report;
+use crate::math::frame::snapped_center;
+use crate::math::{DMat3, DMat4, DVec3, Vec3, Vec4};
+use crate::scene::Mesh;
+use gltf::json::Root;
+
+/// For each skin, the matrices from mesh space to world space of its joints; `None`: the skin cannot be used.
+pub(super) fn joint_matrices(reader: Reader, graph: &Graph, report: &mut Report) -> Vec<Option<Vec<DMat4>>> {
+    let root = reader.root;
+    (0..root.skins.len())
+        .map(|i| {
+            check_skeleton(root, graph, i, report);
+            matrices_of(reader, graph, i, report)
+        })
+        .collect()
+}
+
+fn matrices_of(reader: Reader, graph: &Graph, i: usize, report: &mut Report) -> Option<Vec<DMat4>> {
+    let skin = reader.root.skins.get(i)?;
+    let joints: Vec<DMat4> =
+        skin.joints.iter().map(|joint| graph.world.get(joint.value()).copied().unwrap_or_default().into()).collect();
+    let Some(index) = skin.inverse_bind_matrices else { return Some(joints) };
+    let place = format!("skins[{i}].inverseBindMatrices");
+    let format = reader.root.accessors.get(index.value()).and_then(Format::of)?;
+    if !is_bind_matrix(format) {
+        return None;
+    }
+    let inverse = match reader.floats::<16>(index) {
+        Ok(inverse) => inverse,
+        Err(Unreadable::Nowhere(_) | Unreadable::Unknown) => return None,
+        Err(Unreadable::Buffer(why)) => {
+            report.warnings.push(why);
+            return None;
+        }
+        Err(Unreadable::Data(code, text)) => {
+            report.warn(code, place, text);
+            return None;
+        }
+    };
+    if inverse.iter().any(|m| [m[3], m[7], m[11], m[15]] != [0.0, 0.0, 0.0, 1.0]) {
+        report.add(Code::AccessorInvalidIbm, place, "the last row of a matrix is not 0 0 0 1");
+    }
+    let bind = |m: &[f32; 16]| {
+        let mut m = DMat4::from_cols_array(&m.map(f64::from));
+        (m.x_axis.w, m.y_axis.w, m.z_axis.w, m.w_axis.w) = (0.0, 0.0, 0.0, 1.0);
+        m
+    };
+    (inverse.len() >= joints.len()).then(|| joints.iter().zip(&inverse).map(|(joint, m)| *joint * bind(m)).collect())
+}
+
+/// The joints of a skin should hang on one node, and `skeleton` should be such a node.
+fn check_skeleton(root: &Root, graph: &Graph, i: usize, report: &mut Report) {
+    let Some(skin) = root.skins.get(i) else { return };
+    let mut common: Option<Vec<usize>> = None;
+    for joint in &skin.joints {
+        let chain: Vec<usize> = graph.ancestors(joint.value()).collect();
+        common = Some(match common {
+            None => chain,
+            Some(known) => known.into_iter().filter(|node| chain.contains(node)).collect(),
+        });
+    }
+    let Some(common) = common else { return };
+    if common.is_empty() {
+        report.add(Code::SkinNoCommonRoot, format!("skins[{i}].joints"), "the joints hang on no common node");
+    } else if let Some(skeleton) = skin.skeleton.filter(|s| !common.contains(&s.value())) {
+        let text = format!("node {} is above not every joint", skeleton.value());
+        report.add(Code::SkinSkeletonInvalid, format!("skins[{i}].skeleton"), text);
+    }
+}
+
+/// Joints and weights of every vertex, any number of sets of four.
+#[derive(Default)]
+pub(super) struct Influences {
+    pub(super) joints: Vec<Vec<[u32; 4]>>,
+    pub(super) weights: Vec<Vec<[f32; 4]>>,
+}
+
+/// What was odd about the influences of a mesh.
+#[derive(Default)]
+pub(super) struct Oddities {
+    pub(super) outside: bool,
+    pub(super) negative: bool,
+    pub(super) unequal: bool,
+}
+
+impl Influences {
+    /// The blend of matrices at a vertex; without any influence, the first joint's.
+    fn blend(&self, vertex: usize, matrices: &[DMat4], odd: &mut Oddities) -> DMat4 {
+        let (mut sum, mut total) = (DMat4::ZERO, 0.0);
+        for (joints, weights) in self.joints.iter().zip(&self.weights) {
+            let (Some(joints), Some(weights)) = (joints.get(vertex), weights.get(vertex)) else { continue };
+            for (&joint, &weight) in joints.iter().zip(weights) {
+                odd.negative |= weight < 0.0;
+                // Not a number counts as none.
+                if !(weight > 0.0 && weight.is_finite()) {
+                    continue;
+                }
+                match matrices.get(joint as usize) {
+                    Some(matrix) => {
+                        sum += *matrix * f64::from(weight);
+                        total += f64::from(weight);
+                    }
+                    None => odd.outside = true,
+                }
+            }
+        }
+        /// Eight 8-bit weights may be off by half a step each.
+        const WHOLE: f64 = 0.02;
+        odd.unequal |= (total - 1.0).abs() > WHOLE;
+        if total > 0.0 { sum * (1.0 / total) } else { matrices.first().copied().unwrap_or(DMat4::IDENTITY) }
+    }
+}
+
+/// Puts a mesh into its rest pose; returns the place that its positions are relative to.
+pub(super) fn pose(mesh: &mut Mesh, influences: &Influences, matrices: &[DMat4]) -> (DVec3, Oddities) {
+    let mut odd = Oddities::default();
+    let mut placed = Vec::with_capacity(mesh.positions.len());
+    let mut mirrored = 0usize;
+    for (vertex, position) in mesh.positions.iter().enumerate() {
+        let matrix = influences.blend(vertex, matrices, &mut odd);
+        placed.push(matrix.transform_point3(position.as_dvec3()));
+        let linear = DMat3::from_mat4(matrix);
+        mirrored += usize::from(linear.determinant() < 0.0);
+        if let Some(normal) = mesh.normals.get_mut(vertex) {
+            *normal = unit(linear.inverse().transpose() * normal.as_dvec3(), *normal);
+        }
+        if let Some(tangent) = mesh.tangents.get_mut(vertex) {
+            let direction = unit(linear * tangent.truncate().as_dvec3(), tangent.truncate());
+            *tangent = direction.extend(tangent.w);
+        }
+    }
+    // Joints that mirror turn faces inside out; glTF wants fronts to stay fronts.
+    if 2 * mirrored > mesh.positions.len() {
+        mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        mesh.tangents.iter_mut().for_each(|t| *t = Vec4::new(t.x, t.y, t.z, -t.w));
+    }
+    let finite = || placed.iter().filter(|p| p.is_finite());
+    let lo = finite().fold(DVec3::INFINITY, |lo, p| lo.min(*p));
+    let hi = finite().fold(DVec3::NEG_INFINITY, |hi, p| hi.max(*p));
+    let center = snapped_center(lo, hi);
+    mesh.positions = placed.iter().map(|p| (*p - center).as_vec3()).collect();
+    (center, odd)
+}
+
+fn unit(v: DVec3, otherwise: Vec3) -> Vec3 {
+    v.try_normalize().map_or(otherwise, DVec3::as_vec3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::DAffine3;
+
+    #[test]
+    fn a_vertex_between_two_joints_goes_half_way_with_each() {
+        let mut mesh = Mesh { positions: vec![Vec3::ZERO, Vec3::X], normals: vec![Vec3::Z; 2], ..Mesh::default() };
+        let influences = Influences {
+            joints: vec![vec![[0, 1, 9, 0], [1, 0, 0, 0]]],
+            weights: vec![vec![[0.5, 0.5, 0.25, 0.0], [2.0, -1.0, 0.0, 0.0]]],
+        };
+        let matrices = [DMat4::IDENTITY, DAffine3::from_translation(DVec3::new(0.0, 2.0, 0.0)).into()];
+        let (center, odd) = pose(&mut mesh, &influences, &matrices);
+        let at = |i: usize| mesh.positions[i].as_dvec3() + center;
+        assert_eq!(at(0), DVec3::new(0.0, 1.0, 0.0));
+        assert_eq!(at(1), DVec3::new(1.0, 2.0, 0.0));
+        assert!(odd.outside && odd.negative && odd.unequal);
+    }
+}

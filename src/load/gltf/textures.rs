@@ -1,0 +1,157 @@
+//! Texture slots of materials -> textures of the scene, each image once.
+
+use super::images::image_of;
+use crate::math::Vec2;
+use crate::scene::{Bitmap, Filter, Material, Mipmaps, Sampler, Surface, Texture, TextureRef, UvTransform, Wrap};
+use gltf::json::extensions::texture::TextureTransform;
+use gltf::json::texture::{self, MagFilter, MinFilter, WrappingMode};
+use gltf::json::validation::Checked;
+use gltf::json::{Index, Root};
+
+/// Collects the textures that materials show.
+pub(super) struct Textures<'a> {
+    root: &'a Root,
+    /// Textures of the scene; `bitmap` is an index into `images`.
+    pub(super) list: Vec<Texture>,
+    /// Images of the file, in the order of bitmaps.
+    pub(super) images: Vec<usize>,
+}
+
+impl<'a> Textures<'a> {
+    pub(super) fn new(root: &'a Root) -> Self {
+        Self { root, list: Vec::new(), images: Vec::new() }
+    }
+
+    /// The texture of a slot; `None` when it names no image.
+    pub(super) fn of(
+        &mut self,
+        index: Index<texture::Texture>,
+        uv_set: u32,
+        transform: Option<&TextureTransform>,
+    ) -> Option<TextureRef> {
+        let image = image_of(self.root, index)?;
+        let sampler = self.root.textures.get(index.value())?.sampler;
+        let sampler = sampler.and_then(|s| self.root.samplers.get(s.value())).map(sampler_of).unwrap_or_default();
+        let bitmap = position_or_push(&mut self.images, image);
+        let texture = position_or_push(&mut self.list, Texture { bitmap, sampler });
+        let uv_set = transform.and_then(|t| t.tex_coord).unwrap_or(uv_set);
+        Some(TextureRef { texture, uv_set, transform: transform.map(transform_of).unwrap_or_default() })
+    }
+
+    /// The texture of a plain slot.
+    pub(super) fn info(&mut self, info: Option<&texture::Info>) -> Option<TextureRef> {
+        let info = info?;
+        let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
+        self.of(info.index, info.tex_coord, transform)
+    }
+}
+
+fn position_or_push<T: PartialEq>(list: &mut Vec<T>, value: T) -> u32 {
+    let position = list.iter().position(|known| *known == value).unwrap_or_else(|| {
+        list.push(value);
+        list.len() - 1
+    });
+    // A file would have to be larger than any limit to name so many.
+    u32::try_from(position).unwrap_or(u32::MAX)
+}
+
+/// KHR_texture_transform as one of ours; numbers that are not finite change nothing.
+pub(super) fn transform_of(transform: &TextureTransform) -> UvTransform {
+    let finite = |v: Vec2, otherwise: Vec2| if v.is_finite() { v } else { otherwise };
+    UvTransform {
+        offset: finite(Vec2::from(transform.offset.0), Vec2::ZERO),
+        rotation: if transform.rotation.0.is_finite() { transform.rotation.0 } else { 0.0 },
+        scale: finite(Vec2::from(transform.scale.0), Vec2::ONE),
+    }
+}
+
+fn sampler_of(sampler: &texture::Sampler) -> Sampler {
+    let wrap = |mode: Checked<WrappingMode>| match mode {
+        Checked::Valid(WrappingMode::ClampToEdge) => Wrap::Clamp,
+        Checked::Valid(WrappingMode::MirroredRepeat) => Wrap::Mirror,
+        Checked::Valid(WrappingMode::Repeat) | Checked::Invalid => Wrap::Repeat,
+    };
+    let magnify = match sampler.mag_filter {
+        Some(Checked::Valid(MagFilter::Nearest)) => Filter::Nearest,
+        _ => Filter::Linear,
+    };
+    let (minify, mipmaps) = match sampler.min_filter {
+        Some(Checked::Valid(filter)) => match filter {
+            MinFilter::Nearest => (Filter::Nearest, Mipmaps::None),
+            MinFilter::Linear => (Filter::Linear, Mipmaps::None),
+            MinFilter::NearestMipmapNearest => (Filter::Nearest, Mipmaps::Nearest),
+            MinFilter::LinearMipmapNearest => (Filter::Linear, Mipmaps::Nearest),
+            MinFilter::NearestMipmapLinear => (Filter::Nearest, Mipmaps::Linear),
+            MinFilter::LinearMipmapLinear => (Filter::Linear, Mipmaps::Linear),
+        },
+        _ => (Filter::Linear, Mipmaps::Linear),
+    };
+    Sampler { wrap_u: wrap(sampler.wrap_s), wrap_v: wrap(sampler.wrap_t), magnify, minify, mipmaps }
+}
+
+/// Every map of a material.
+pub(super) fn maps(material: &mut Material) -> Vec<&mut Option<TextureRef>> {
+    let mut maps = vec![
+        &mut material.base_color_map,
+        &mut material.opacity_map,
+        &mut material.emission_map,
+        &mut material.normal_map,
+        &mut material.bump_map,
+        &mut material.occlusion_map,
+    ];
+    match &mut material.surface {
+        Surface::MetalRough(m) => maps.extend([
+            &mut m.metal_rough_map,
+            &mut m.specular_map,
+            &mut m.specular_color_map,
+            &mut m.transmission_map,
+        ]),
+        Surface::Phong(p) => maps.extend([&mut p.ambient_map, &mut p.specular_map, &mut p.shininess_map]),
+        Surface::Unlit => {}
+    }
+    maps
+}
+
+/// Keeps only textures whose image could be decoded, and points materials at what is left.
+pub(super) fn keep_decoded(
+    materials: &mut [Material],
+    textures: Vec<Texture>,
+    bitmaps: Vec<Option<Bitmap>>,
+) -> (Vec<Texture>, Vec<Bitmap>) {
+    let mut next = 0;
+    let number = |there: bool, next: &mut u32| there.then(|| (*next, *next += 1).0);
+    let new_bitmap: Vec<_> = bitmaps.iter().map(|b| number(b.is_some(), &mut next)).collect();
+    let bitmap_of = |t: &Texture| new_bitmap.get(t.bitmap as usize).copied().flatten();
+    next = 0;
+    let new_texture: Vec<_> = textures.iter().map(|t| number(bitmap_of(t).is_some(), &mut next)).collect();
+    for map in materials.iter_mut().flat_map(maps) {
+        *map =
+            map.take().and_then(|r| Some(TextureRef { texture: new_texture.get(r.texture as usize).copied()??, ..r }));
+    }
+    let kept = textures.iter().filter_map(|t| Some(Texture { bitmap: bitmap_of(t)?, ..t.clone() })).collect();
+    (kept, bitmaps.into_iter().flatten().collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn maps_whose_image_is_lost_are_left_out_and_the_others_renumbered() {
+        let reference = |texture| Some(TextureRef { texture, uv_set: 0, transform: UvTransform::default() });
+        let mut materials = [Material {
+            base_color_map: reference(0),
+            normal_map: reference(1),
+            emission_map: reference(2),
+            ..Material::default()
+        }];
+        let texture = |bitmap, wrap_u| Texture { bitmap, sampler: Sampler { wrap_u, ..Sampler::default() } };
+        let textures = vec![texture(0, Wrap::Repeat), texture(1, Wrap::Repeat), texture(1, Wrap::Clamp)];
+        let (textures, bitmaps) = keep_decoded(&mut materials, textures, vec![None, Some(Bitmap::default())]);
+        assert_eq!((textures.len(), bitmaps.len()), (2, 1));
+        assert!(textures.iter().all(|t| t.bitmap == 0));
+        assert!(materials[0].base_color_map.is_none());
+        assert_eq!(materials[0].normal_map.as_ref().unwrap().texture, 0);
+        assert_eq!(materials[0].emission_map.as_ref().unwrap().texture, 1);
+    }
+}

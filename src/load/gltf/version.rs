@@ -1,0 +1,87 @@
+//! Which glTF this is: versions other than 2 are named before anything else is looked at.
+
+use super::codes::Code;
+use super::report::Report;
+use serde_json::Value;
+
+/// Checks `asset.version` and `asset.minVersion`; false when the rest need not be looked at.
+pub(super) fn check(root: &Value, report: &mut Report) -> bool {
+    if !root.is_object() {
+        report.add(Code::TypeMismatch, "", "the JSON is not an object; this is no glTF file");
+        return false;
+    }
+    let Some(version) = root.pointer("/asset/version") else { return !is_version_one(root, report) };
+    let Some(version) = version.as_str() else { return true };
+    match numbers(version) {
+        // The files of glTF 1.0's time were as free with this as with the rest.
+        None if version.starts_with("1.") || version == "1" => one(version, Code::PatternMismatch, report),
+        None => {
+            let text = format!("version '{}' is not of the form 2.0", crate::load::paths::shorten(version));
+            report.add(Code::PatternMismatch, "asset.version", text);
+            false
+        }
+        Some((1, _)) => one(version, Code::UnknownAssetMajorVersion, report),
+        Some((2, minor)) => {
+            if minor > 0 {
+                report.add(
+                    Code::UnknownAssetMinorVersion,
+                    "asset.version",
+                    format!("glTF {version} is read as glTF 2.0"),
+                );
+            }
+            minimum(root, (2, minor), report)
+        }
+        Some(_) => {
+            let text = format!("this is glTF {version}; only glTF 2 can be read");
+            report.add(Code::UnknownAssetMajorVersion, "asset.version", text);
+            false
+        }
+    }
+}
+
+/// Checks `minVersion`; false when it asks for more than there is.
+fn minimum(root: &Value, version: (u32, u32), report: &mut Report) -> bool {
+    let Some(text) = root.pointer("/asset/minVersion").and_then(Value::as_str) else { return true };
+    let Some(minimum) = numbers(text) else {
+        report.add(Code::PatternMismatch, "asset.minVersion", "it is not of the form 2.0");
+        return false;
+    };
+    if minimum > version {
+        let text = format!("minVersion {text} is above the version");
+        report.add(Code::AssetMinVersionGreaterThanVersion, "asset.minVersion", text);
+    }
+    if minimum.0 != 2 {
+        let text = format!("the file needs glTF {text}; only glTF 2 can be read");
+        report.refuse(Code::UnknownAssetMajorVersion, "asset.minVersion", text);
+        return false;
+    }
+    if minimum.1 > 0 {
+        report.add(Code::UnknownAssetMinorVersion, "asset.minVersion", format!("glTF {text} is read as glTF 2.0"));
+    }
+    true
+}
+
+fn one(version: &str, code: Code, report: &mut Report) -> bool {
+    let version = crate::load::paths::shorten(version);
+    let text =
+        format!("this is glTF {version}, which is not supported; convert it to glTF 2.0 (gltf-pipeline, Blender)");
+    report.add(code, "asset.version", text);
+    false
+}
+
+/// A file without a version that has what only glTF 1.0 had.
+fn is_version_one(root: &Value, report: &mut Report) -> bool {
+    let maps = ["buffers", "bufferViews", "accessors", "meshes", "nodes", "scenes", "techniques", "shaders"];
+    let old = maps.iter().any(|name| root.get(name).is_some_and(Value::is_object));
+    if old {
+        one("1.0", Code::UnknownAssetMajorVersion, report);
+    }
+    old
+}
+
+/// `2.0` as (2, 0).
+fn numbers(version: &str) -> Option<(u32, u32)> {
+    let digits = |s: &str| s.bytes().all(|b| b.is_ascii_digit()).then(|| s.parse().ok()).flatten();
+    let (major, minor) = version.split_once('.')?;
+    Some((digits(major)?, digits(minor)?))
+}
