@@ -193,6 +193,9 @@ fn file_name_of_uri(uri: &str) -> Result<String, FileFault> {
         s.starts_with(|c: char| c.is_ascii_alphabetic())
             && s.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
     };
+    if uri.starts_with(':') {
+        return Err(FileFault::BadUri(shorten(uri)));
+    }
     if scheme.is_some_and(is_scheme) || uri.starts_with("//") {
         return Err(FileFault::Scheme(shorten(uri)));
     }
@@ -289,6 +292,7 @@ mod tests {
         assert!(matches!(r.read_uri("//example.org/a.bin"), Err(FileFault::Scheme(_))));
         assert!(matches!(r.read_uri("."), Err(FileFault::NotAFile(_))));
         assert!(matches!(r.read_uri(""), Err(FileFault::BadUri(_))));
+        assert!(matches!(r.read_uri(":"), Err(FileFault::BadUri(_))));
         assert!(matches!(r.read_uri("%FF"), Err(FileFault::BadUri(_))));
         assert!(matches!(r.read_uri("a b.bin"), Err(FileFault::TooLarge { bytes: 6, limit: 3, .. })));
         assert!(matches!(r.read_uri("none.bin"), Err(FileFault::Missing(_))));

@@ -3,7 +3,7 @@
 use super::codes::Code;
 use super::report::Report;
 use crate::load::Diagnostic;
-use crate::load::paths::{Resolver, shorten};
+use crate::load::paths::{FileFault, Resolver, shorten};
 use base64::Engine as _;
 use base64::alphabet;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
@@ -19,7 +19,7 @@ pub(super) struct Buffers<'a> {
 
 enum Slot<'a> {
     Bytes(Cow<'a, [u8]>),
-    /// Nothing says where the bytes are; right as long as nobody needs them.
+    /// Nothing says where the bytes are, which the format allows; whatever needs them is left out.
     Nowhere(Diagnostic),
     Failed(Diagnostic),
 }
@@ -83,8 +83,8 @@ fn load_one<'a>(
     let bytes = match (&buffer.uri, bin) {
         (None, Some(bin)) if i == 0 => Cow::Borrowed(bin),
         (None, _) => {
-            let text = "its bytes are needed, but it has neither a uri nor a binary chunk";
-            return Slot::Nowhere(Diagnostic::new(Code::BufferMissingGlbData.name(), file, place, text));
+            let text = "nothing says where its bytes are; what needs them is left out";
+            return Slot::Nowhere(Diagnostic::new("gltf-buffer-nowhere", file, place, text));
         }
         (Some(uri), _) if is_data(uri) => match decode_data(uri) {
             Ok(bytes) => Cow::Owned(bytes),
@@ -98,7 +98,10 @@ fn load_one<'a>(
             Ok(bytes) => Cow::Owned(bytes),
             Err(why) => {
                 let fault = why.diagnose(file, &format!("{place}.uri"));
-                report.warnings.push(fault.clone());
+                match why {
+                    FileFault::BadUri(_) => report.add(Code::InvalidUri, fault.place.clone(), fault.text.clone()),
+                    _ => report.warnings.push(fault.clone()),
+                }
                 return Slot::Failed(fault);
             }
         },

@@ -78,17 +78,19 @@ impl Task<'_, '_> {
         let mut mesh = Mesh { name: self.job.name.clone(), ..Mesh::default() };
         mesh.positions = self.floats::<3>(positions, "attributes.POSITION")?.into_iter().map(Vec3::from).collect();
         let corners = self.corners(mesh.positions.len())?;
-        let Some(triangles) = faces::triangles(mode, &corners) else {
-            return Some(Read { points_and_lines: faces::points_and_lines(mode, corners.len()), ..Read::default() });
-        };
+        let triangles = faces::triangles(mode, &corners);
+        let points_and_lines = if triangles.is_some() { 0 } else { faces::points_and_lines(mode, corners.len()) };
         drop(corners);
-        mesh.triangles = triangles;
+        mesh.triangles = triangles.unwrap_or_default();
         self.attributes(&mut mesh);
         self.morph(&mut mesh);
+        self.directions(&mut mesh);
         let center = self.pose(&mut mesh);
         let dropped = faces::clean(&mut mesh, mode == Mode::TriangleStrip);
-        self.directions(&mut mesh);
-        Some(Read { mesh, center, dropped, points_and_lines: 0 })
+        if let Some(set) = self.job.needs.tangents.filter(|_| mesh.tangents.is_empty()) {
+            tangents::generate(&mut mesh, set);
+        }
+        Some(Read { mesh, center, dropped, points_and_lines })
     }
 
     /// The accessor of an attribute, when its format can be read.
@@ -107,7 +109,7 @@ impl Task<'_, '_> {
         let place = self.place(part);
         match result {
             Ok(values) => return Some(values),
-            Err(Unreadable::Nowhere(why)) if self.job.drawn => self.report.fault(why),
+            Err(Unreadable::Nowhere(why)) if self.job.drawn => self.report.warnings.push(why),
             Err(Unreadable::Nowhere(_) | Unreadable::Unknown) => {}
             Err(Unreadable::Buffer(why)) => self.report.fault(why),
             Err(Unreadable::Data(code, text)) => self.report.add(code, place, text),
@@ -158,7 +160,7 @@ impl Task<'_, '_> {
             let place = self.place("attributes.POSITION");
             self.report.add(Code::AccessorInvalidFloat, place, "positions that are not finite numbers");
         }
-        if let Some(index) = self.attribute(Semantic::Normals) {
+        if let Some(index) = self.attribute(Semantic::Normals).filter(|&i| !self.is_blank(i)) {
             let normals = self.floats::<3>(index, "attributes.NORMAL").filter(|n| n.len() == count);
             mesh.normals = normals.into_iter().flatten().map(Vec3::from).collect();
         }
@@ -242,6 +244,11 @@ impl Task<'_, '_> {
         }
     }
 
+    /// Whether an accessor is all zeros because nothing was written, which no direction and no weight can be.
+    fn is_blank(&self, index: Index<Accessor>) -> bool {
+        self.reader.root.accessors.get(index.value()).is_some_and(|a| a.buffer_view.is_none() && a.sparse.is_none())
+    }
+
     /// Places a skinned mesh by its joints.
     fn pose(&mut self, mesh: &mut Mesh) -> Option<DVec3> {
         let matrices = self.job.joints?;
@@ -252,6 +259,9 @@ impl Task<'_, '_> {
             else {
                 break;
             };
+            if self.is_blank(weights) {
+                break;
+            }
             let result = self.reader.integers::<4>(joints);
             influences.joints.push(self.sort_out(result, &format!("attributes.JOINTS_{set}"))?);
             influences.weights.push(self.floats::<4>(weights, &format!("attributes.WEIGHTS_{set}"))?);
@@ -272,7 +282,7 @@ impl Task<'_, '_> {
         Some(center)
     }
 
-    /// Repairs normals and tangents, and makes tangents where a normal map needs them.
+    /// Repairs normals and tangents.
     fn directions(&mut self, mesh: &mut Mesh) {
         let normals = faces::repair_normals(mesh);
         if normals.length || normals.none {
@@ -290,9 +300,6 @@ impl Task<'_, '_> {
         }
         if tangents.none {
             mesh.tangents.clear();
-        }
-        if let Some(set) = self.job.needs.tangents.filter(|_| mesh.tangents.is_empty()) {
-            tangents::generate(mesh, set);
         }
     }
 }

@@ -117,6 +117,9 @@ impl Loading<'_> {
         facts: &mut Facts,
     ) -> Result<Scene, LoadError> {
         let (root, file) = (&document.root, self.source.path.as_path());
+        if bin.is_none() && facts.format.ends_with("(binary)") {
+            self.check_chunk(root);
+        }
         let mut resolver = Resolver::new(self.source, self.options);
         let buffers = Buffers::load(root, bin, file, &mut resolver, self.report);
         let reader = Reader { root, buffers: &buffers };
@@ -144,6 +147,14 @@ impl Loading<'_> {
         scene.up = self.options.up.unwrap_or_default();
         (facts.files, facts.hash) = resolver.finish();
         Ok(scene)
+    }
+
+    /// In a GLB, a first buffer without a uri is the binary chunk, which must be there when it is needed.
+    fn check_chunk(&mut self, root: &gltf::json::Root) {
+        let nowhere = root.buffers.first().is_some_and(|buffer| buffer.uri.is_none());
+        if nowhere && root.buffer_views.iter().any(|view| view.buffer.value() == 0) {
+            self.report.add(codes::Code::BufferMissingGlbData, "buffers[0]", "the file has no binary chunk for it");
+        }
     }
 
     /// Refuses a file whose accessors are larger than memory allows, before any is read.

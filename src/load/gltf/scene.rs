@@ -107,7 +107,8 @@ fn place_mesh(reader: Reader, i: usize, node: &Node, world: DAffine3, placed: &m
         None => draw(world),
         Some(attributes) => match copies(reader, attributes) {
             Ok(copies) => copies.into_iter().for_each(|local| draw(world * local)),
-            Err(Unreadable::Buffer(why) | Unreadable::Nowhere(why)) => report.fault(why),
+            Err(Unreadable::Buffer(why)) => report.fault(why),
+            Err(Unreadable::Nowhere(why)) => report.warnings.push(why),
             Err(Unreadable::Data(code, text)) => report.add(code, format!("nodes[{i}]"), text),
             Err(Unreadable::Unknown) => draw(world),
         },

@@ -5,7 +5,7 @@
 
 use super::codes::Code;
 use super::report::Report;
-use super::schema_tables::{EXTENSIONS, ROOT};
+use super::schema_tables::{EXTENSION_WORDS, EXTENSIONS, ROOT};
 use crate::load::paths::shorten;
 use serde_json::Value;
 use std::fmt::Write as _;
@@ -41,7 +41,7 @@ pub(super) enum Kind {
     },
     /// The position in a list of the root (`"KHR_lights_punctual"`: in its list of lights).
     Index(&'static str),
-    /// The position in a list of the object that the walk is in, two levels up.
+    /// The position in a list near by, which is checked apart.
     AnyIndex,
     OneOf(&'static [u64]),
     Word(&'static [&'static str]),
@@ -69,6 +69,21 @@ pub(super) fn check(root: &Value, report: &mut Report) {
     let used = strings(root.get("extensionsUsed"));
     let mut walk = Walk { root, used, path: String::new(), report };
     walk.object(root, &ROOT);
+    channels(root, report);
+}
+
+/// Channels of animations refer to the samplers beside them.
+fn channels(root: &Value, report: &mut Report) {
+    let list = |value: &Value, name: &str| value.get(name).and_then(Value::as_array).cloned().unwrap_or_default();
+    for (i, animation) in list(root, "animations").iter().enumerate() {
+        let samplers = list(animation, "samplers").len() as u64;
+        for (k, channel) in list(animation, "channels").iter().enumerate() {
+            if let Some(sampler) = channel.get("sampler").and_then(whole).filter(|&s| s >= samplers) {
+                let text = format!("index {sampler}, but only {samplers} samplers exist");
+                report.add(Code::UnresolvedReference, format!("animations[{i}].channels[{k}].sampler"), text);
+            }
+        }
+    }
 }
 
 fn strings(list: Option<&Value>) -> Vec<&str> {
@@ -225,6 +240,7 @@ impl<'a> Walk<'a> {
         match value.as_str() {
             None => self.wrong_type(value, "a text"),
             Some(word) if allowed.contains(&word) => {}
+            Some(word) if EXTENSION_WORDS.iter().any(|(w, e)| *w == word && self.used.contains(e)) => {}
             Some(word) => {
                 self.fault(
                     Code::ValueNotInList,

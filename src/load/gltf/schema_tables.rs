@@ -139,10 +139,7 @@ static CHANNEL: Object =
 
 static TARGET: Object = Object {
     name: "a channel target",
-    properties: &[
-        may("node", Index("nodes")),
-        need("path", Word(&["translation", "rotation", "scale", "weights", "pointer"])),
-    ],
+    properties: &[may("node", Index("nodes")), need("path", Word(&["translation", "rotation", "scale", "weights"]))],
 };
 
 static ANIMATION_SAMPLER: Object = Object {
@@ -178,10 +175,7 @@ static IMAGE: Object = Object {
     name: "an image",
     properties: &[
         may("uri", Text),
-        may(
-            "mimeType",
-            Word(&["image/jpeg", "image/png", "image/webp", "image/ktx2", "image/vnd-ms.dds", "image/avif"]),
-        ),
+        may("mimeType", Word(&["image/jpeg", "image/png"])),
         may("bufferView", Index("bufferViews")),
         may("name", Text),
     ],
@@ -288,6 +282,15 @@ static TEXTURE: Object = Object {
     name: "a texture",
     properties: &[may("sampler", Index("samplers")), may("source", Index("images")), may("name", Text)],
 };
+
+/// Words that an extension adds where the core allows others.
+pub(super) static EXTENSION_WORDS: &[(&str, &str)] = &[
+    ("image/avif", "EXT_texture_avif"),
+    ("image/ktx2", "KHR_texture_basisu"),
+    ("image/vnd-ms.dds", "MSFT_texture_dds"),
+    ("image/webp", "EXT_texture_webp"),
+    ("pointer", "KHR_animation_pointer"),
+];
 
 /// The extensions whose contents are known.
 pub(super) static EXTENSIONS: &[Extension] = &[

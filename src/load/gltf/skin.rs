@@ -30,9 +30,13 @@ fn matrices_of(reader: Reader, graph: &Graph, i: usize, report: &mut Report) -> 
         skin.joints.iter().map(|joint| graph.world.get(joint.value()).copied().unwrap_or_default().into()).collect();
     let Some(index) = skin.inverse_bind_matrices else { return Some(joints) };
     let place = format!("skins[{i}].inverseBindMatrices");
-    let format = reader.root.accessors.get(index.value()).and_then(Format::of)?;
-    if !is_bind_matrix(format) {
+    let accessor = reader.root.accessors.get(index.value())?;
+    if !is_bind_matrix(Format::of(accessor)?) {
         return None;
+    }
+    // Matrices that nobody wrote are no matrices.
+    if accessor.buffer_view.is_none() && accessor.sparse.is_none() {
+        return Some(joints);
     }
     let inverse = match reader.floats::<16>(index) {
         Ok(inverse) => inverse,
