@@ -129,7 +129,7 @@ impl<'a> Reader<'a> {
         let format = Format::of(accessor)?;
         match (&accessor.sparse, accessor.buffer_view) {
             (Some(_), _) if accessor.count.0 <= SMALL => {
-                let values = self.elements(index, [0.0; 16], |element, format| raws(element, format));
+                let values = self.elements(index, [0.0; 16], raws);
                 Some(values.map(|values| extent_of(values.into_iter(), format)))
             }
             (None, Some(view)) => {

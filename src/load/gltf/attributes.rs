@@ -221,7 +221,7 @@ impl<'a> Check<'a> {
         for (name, index) in target.as_object().into_iter().flatten() {
             let place = format!("{place}.{}", crate::load::paths::shorten(name));
             let morphable = !["JOINTS_", "WEIGHTS_"].iter().any(|p| name.starts_with(p));
-            if !name.starts_with('_') && !(is_semantic(name) && morphable) {
+            if !(name.starts_with('_') || is_semantic(name) && morphable) {
                 let text = format!("'{}' is no attribute that can be morphed", crate::load::paths::shorten(name));
                 self.report.add(Code::MeshPrimitiveInvalidAttribute, &place, text);
             } else if !base.contains_key(name) {

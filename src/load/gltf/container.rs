@@ -115,7 +115,7 @@ fn chunks<'a>(mut rest: &'a [u8], report: &mut Report) -> Option<(&'a [u8], Opti
 }
 
 fn check_chunk(kind: u32, length: usize, number: usize, place: &str, report: &mut Report) {
-    if length % 4 != 0 {
+    if !length.is_multiple_of(4) {
         report.add(Code::GlbChunkLengthUnaligned, place, format!("its length {length} is no multiple of 4"));
     }
     if length == 0 && kind != BIN {
@@ -147,8 +147,10 @@ mod tests {
         head.chain(body).collect()
     }
 
+    type Parts = (String, Option<Vec<u8>>);
+
     /// The JSON and binary parts, and the names of all messages.
-    fn split_all(bytes: &[u8]) -> (Option<(String, Option<Vec<u8>>)>, Vec<&'static str>) {
+    fn split_all(bytes: &[u8]) -> (Option<Parts>, Vec<&'static str>) {
         let mut report = Report::new(Path::new("a.glb"));
         let parts = split(bytes, &mut report)
             .map(|c| (String::from_utf8_lossy(c.json).into_owned(), c.bin.map(<[u8]>::to_vec)));

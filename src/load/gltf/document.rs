@@ -45,7 +45,7 @@ pub(super) fn typed(mut value: Value, report: &mut Report) -> Option<Document> {
     each(map, "scenes", |scene| {
         scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
     });
-    each(map, "meshes", |mesh| each(mesh, "primitives", |primitive| known_attributes(primitive)));
+    each(map, "meshes", |mesh| each(mesh, "primitives", known_attributes));
     if let Some(lights) = map.get_mut("extensions").and_then(|e| e.get_mut("KHR_lights_punctual")) {
         lights
             .as_object_mut()

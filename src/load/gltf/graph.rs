@@ -162,7 +162,7 @@ fn compose(parents: &[Option<usize>], local: &[DAffine3]) -> Vec<DAffine3> {
         }
         let mut above = next.and_then(|n| world[n]).unwrap_or(DAffine3::IDENTITY);
         while let Some(node) = chain.pop() {
-            above = above * local[node];
+            above *= local[node];
             world[node] = Some(above);
         }
     }

@@ -109,14 +109,14 @@ fn stride_of(view: &buffer::View, format: Format, place: &str, report: &mut Repo
 fn alignment(view: &buffer::View, offset: u64, format: Format, place: &str, report: &mut Report) {
     let size = format.component_size() as u64;
     let total = offset.wrapping_add(view.byte_offset.unwrap_or_default().0);
-    if offset % size != 0 {
+    if !offset.is_multiple_of(size) {
         let text = format!("byteOffset {offset} is no multiple of the component's {size} bytes");
         report.add(Code::AccessorOffsetAlignment, format!("{place}.byteOffset"), text);
-    } else if total % size != 0 {
+    } else if !total.is_multiple_of(size) {
         let text = format!("it starts at byte {total}, no multiple of the component's {size} bytes");
         report.add(Code::AccessorTotalOffsetAlignment, place, text);
     }
-    if matches!(format.shape, Type::Mat2 | Type::Mat3 | Type::Mat4) && total % 4 != 0 {
+    if matches!(format.shape, Type::Mat2 | Type::Mat3 | Type::Mat4) && !total.is_multiple_of(4) {
         report.add(Code::AccessorMatrixAlignment, place, format!("matrices start at byte {total}, no multiple of 4"));
     }
 }
