@@ -21,7 +21,7 @@ pub(super) fn build(shapes: &Shapes, lattice: &Lattice, params: &GridParams) -> 
     let parts: Vec<(Vec<u32>, Cells)> = runs
         .into_par_iter()
         .map(|start| {
-            let mut refiner = Refiner::new(shapes, lattice, params);
+            let mut refiner = Refiner::new(shapes, lattice, params, lists.prims.len());
             let end = (start + RUN).min(lattice.top_len());
             let entries = (start..end).map(|i| refiner.cell(lattice.top_cube(lattice.top_cell(i)), lists.of(i)));
             (entries.collect(), refiner.into_cells())

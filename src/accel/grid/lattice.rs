@@ -8,10 +8,13 @@ use super::GridParams;
 use crate::accel::Shapes;
 use crate::math::aabb::Aabb;
 use crate::math::bounds::{CELL_PAD, CELL_PAD_PER_CELL};
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, Vec3, Vec3Swizzles as _};
 
 /// Most finest cells along an axis: keeps [`Lattice::pad`] below an eighth of a cell.
 const MAX_FINE: u32 = 1 << 16;
+
+/// References a prim may have in the top grid on average, roughly.
+const TOP_REFERENCES: f64 = 6.0;
 
 /// Box, resolution and depth of a grid.
 #[derive(Clone, Debug)]
@@ -41,10 +44,21 @@ impl Lattice {
         let longest = if longest > 0.0 { longest } else { lo.abs().max_element().max(f64::from(f32::MIN_POSITIVE)) };
         let extent = (hi - lo).max(DVec3::splat(longest / 1024.0));
 
-        let per_length = libm::cbrt(params.density * f64::from(prims) / (extent / longest).element_product()) / longest;
-        let most = f64::from(params.max_resolution);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 1..=1024 before")]
-        let dims = (extent * per_length).to_array().map(|n| n.round().clamp(1.0, most) as u32);
+        let sizes = Sizes::of(shapes);
+        let cube_root = libm::cbrt(params.density * f64::from(prims) / (extent / longest).element_product()) / longest;
+        let resolution = |factor: f64| {
+            let most = f64::from(params.max_resolution);
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 1..=1024 before")]
+            (extent * cube_root * factor).to_array().map(|n| n.round().clamp(1.0, most) as u32)
+        };
+        // Large overlapping prims are listed in many cells each: then the cells must be larger.
+        let most_references = f64::from(prims) * TOP_REFERENCES;
+        let mut factor = 1.0;
+        let mut dims = resolution(factor);
+        while dims != [1; 3] && sizes.references(dims, extent) > most_references {
+            factor *= 0.75;
+            dims = resolution(factor);
+        }
         let most = dims.into_iter().fold(1, u32::max);
         let levels = params.max_depth.min((MAX_FINE / most).ilog2());
 
@@ -102,6 +116,33 @@ impl Lattice {
     /// Number of top cells.
     pub fn top_len(&self) -> usize {
         self.dims.iter().map(|&n| n as usize).product()
+    }
+}
+
+/// Sums over the boxes of all prims, from which the references of any resolution follow at once.
+#[derive(Default)]
+struct Sizes {
+    prims: f64,
+    /// Sum of the sides.
+    sides: DVec3,
+    /// Sum of the areas of the faces across each axis.
+    faces: DVec3,
+}
+
+impl Sizes {
+    fn of(shapes: &Shapes) -> Self {
+        (0..shapes.bounded()).fold(Self::default(), |sum, prim| {
+            let b = shapes.bounds(prim);
+            let e = b.hi.as_dvec3() - b.lo.as_dvec3();
+            Self { prims: sum.prims + 1.0, sides: sum.sides + e, faces: sum.faces + e.yzx() * e.zxy() }
+        })
+    }
+
+    /// A surface of a × b × c cells meets about 1 + (a + b + c) + (a b + b c + c a)/2 of them.
+    fn references(&self, dims: [u32; 3], extent: DVec3) -> f64 {
+        let per_length = DVec3::from_array(dims.map(f64::from)) / extent;
+        let faces = self.faces.dot(per_length.yzx() * per_length.zxy());
+        self.prims + self.sides.dot(per_length) + 0.5 * faces
     }
 }
 

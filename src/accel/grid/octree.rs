@@ -5,6 +5,12 @@ use super::overlap::Overlap;
 use super::{EMPTY, GridParams, NODE};
 use crate::accel::Shapes;
 
+/// References there may be for each prim, in all cells together, beside [`FREE_REFERENCES`].
+const REFERENCES: f64 = 12.0;
+
+/// References that even a scene of few prims may have.
+const FREE_REFERENCES: f64 = 1024.0;
+
 /// All cells with their lists, and the octree nodes between the top grid and them.
 #[derive(Clone, Debug)]
 pub(super) struct Cells {
@@ -81,12 +87,15 @@ pub(super) struct Refiner<'a> {
     shapes: &'a Shapes,
     lattice: &'a Lattice,
     step_cost: f64,
+    /// How much the number of references may grow below the top cells.
+    growth: f64,
     cells: Cells,
 }
 
 impl<'a> Refiner<'a> {
-    pub(super) fn new(shapes: &'a Shapes, lattice: &'a Lattice, params: &GridParams) -> Self {
-        Self { shapes, lattice, step_cost: params.step_cost, cells: Cells::new() }
+    pub(super) fn new(shapes: &'a Shapes, lattice: &'a Lattice, params: &GridParams, listed: usize) -> Self {
+        let growth = (f64::from(shapes.bounded()) * REFERENCES + FREE_REFERENCES) / listed.max(1) as f64;
+        Self { shapes, lattice, step_cost: params.step_cost, growth, cells: Cells::new() }
     }
 
     pub(super) fn into_cells(self) -> Cells {
@@ -100,18 +109,22 @@ impl<'a> Refiner<'a> {
         }
         let overlaps: Vec<Overlap> = prims.iter().map(|&p| Overlap::new(self.shapes, p, self.lattice)).collect();
         let members: Vec<u32> = (0..index(prims.len())).collect();
-        self.split(cube, &members, &Crowd { prims, overlaps: &overlaps })
+        self.split(cube, &members, self.growth, &Crowd { prims, overlaps: &overlaps })
     }
 
     /// Splits the cube if that is expected to pay, and each octant in turn.
-    fn split(&mut self, cube: Cube, members: &[u32], crowd: &Crowd) -> u32 {
+    ///
+    /// `growth` is how many references the cell may turn into for each that it has. A split uses it up by as much as it
+    /// lists prims more often, on every path alike; so prims that no split can part end in one list, not in millions.
+    fn split(&mut self, cube: Cube, members: &[u32], growth: f64, crowd: &Crowd) -> u32 {
         let leaf = |cells: &mut Cells| cells.push_cell(members.iter().map(|&m| crowd.prims[m as usize]));
         if cube.level == 0 || !self.could_pay(members.len()) {
             return leaf(&mut self.cells);
         }
         let masks: Vec<u8> = members.iter().map(|&m| crowd.octants(m, cube)).collect();
         let listed: u32 = masks.iter().map(|m| m.count_ones()).sum();
-        if !self.pays(members.len(), listed) {
+        let growth = growth * members.len() as f64 / f64::from(listed.max(1));
+        if growth < 1.0 || !self.pays(members.len(), listed) {
             return leaf(&mut self.cells);
         }
 
@@ -121,7 +134,7 @@ impl<'a> Refiner<'a> {
         for octant in 0..8 {
             inside.clear();
             inside.extend(members.iter().zip(&masks).filter(|(_, m)| *m >> octant & 1 == 1).map(|(&m, _)| m));
-            self.cells.nodes[node][octant as usize] = self.split(cube.octant(octant), &inside, crowd);
+            self.cells.nodes[node][octant as usize] = self.split(cube.octant(octant), &inside, growth, crowd);
         }
         index(node) | NODE
     }

@@ -8,9 +8,9 @@ use super::*;
 use scenes::{all, broken_rays, rays};
 
 const PARAMS: [GridParams; 4] = [
-    GridParams { density: 1.0, max_resolution: 256, max_depth: 8, step_cost: 2.0 },
+    GridParams { density: 0.25, max_resolution: 256, max_depth: 8, step_cost: 4.0 },
     GridParams { density: 4.0, max_resolution: 64, max_depth: 0, step_cost: 2.0 },
-    GridParams { density: 0.01, max_resolution: 1, max_depth: 7, step_cost: 0.3 },
+    GridParams { density: 0.01, max_resolution: 1, max_depth: 7, step_cost: 0.5 },
     GridParams { density: 0.3, max_resolution: 4, max_depth: 10, step_cost: 1.0 },
 ];
 
@@ -124,6 +124,15 @@ fn a_ray_through_empty_space_counts_cells_but_no_tests() {
     grid.closest(&[short], &mut [Hit::MISS], &mut grid.scratch(), &mut counts);
     assert_eq!((counts.queries, counts.found, counts.n_it, counts.n_bit), (1, 0, 0, 0));
     assert!(counts.n_ets >= 1 && counts.n_ets == counts.n_eets && counts.n_ts >= counts.n_ets);
+}
+
+#[test]
+fn prims_that_cannot_be_parted_do_not_fill_the_memory() {
+    let shapes = scenes::copies(3000);
+    for params in &PARAMS {
+        let stats = GridOctree::<Stamps>::build(&shapes, params).summary();
+        assert!(stats.n_oiv <= 14 * 3000, "{stats:?}");
+    }
 }
 
 #[test]
