@@ -8,6 +8,7 @@
 //! The pixels are the same bits for every structure and every number of threads: structures give equal hits, sums run
 //! in a fixed order within a tile, and transcendental functions are the crate's own.
 
+mod asking;
 mod context;
 mod layers;
 pub mod optics;
@@ -95,7 +96,7 @@ pub struct Job<'a> {
 pub trait Progress: Sync {
     /// `done` of `total` tiles are finished.
     fn tiles(&self, done: usize, total: usize);
-    /// Whether to stop; asked between waves.
+    /// Whether to stop; asked every few hundred rays.
     fn cancelled(&self) -> bool;
 }
 

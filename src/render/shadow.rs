@@ -1,5 +1,6 @@
 //! Shadow rays: one for each light that a point could see, traced in waves.
 
+use super::asking::Asking;
 use super::context::Context;
 use super::seam::is_same_crossing;
 use super::shade::{Reader, shadow_filter};
@@ -40,14 +41,13 @@ impl Shadows {
     pub(crate) fn trace<A: Accel, P: Probe>(
         &mut self,
         context: &Context,
-        accel: &A,
-        scratch: &mut A::Scratch,
+        asking: &mut Asking<A>,
         probe: &mut P,
         mut arrive: impl FnMut(u32, Vec3),
     ) {
         self.blocked.clear();
         self.blocked.resize(self.rays.len(), false);
-        accel.occluded(&self.rays, &mut self.blocked, scratch, probe);
+        asking.occluded(&self.rays, &mut self.blocked, probe);
         if !context.has_filters {
             let open = self.rays.iter().zip(&self.light).zip(&self.blocked).filter(|(_, blocked)| !**blocked);
             open.for_each(|((ray, light), _)| arrive(ray.sample, *light));
@@ -61,12 +61,12 @@ impl Shadows {
         self.after.clear();
         self.hits.clear();
         self.hits.resize(self.rays.len(), Hit::MISS);
-        accel.closest(&self.rays, &mut self.hits, scratch, probe);
+        asking.closest(&self.rays, &mut self.hits, probe);
         while !self.rays.is_empty() {
             self.filter(context, &mut arrive);
             self.hits.clear();
             self.hits.resize(self.rays.len(), Hit::MISS);
-            accel.next(&self.rays, &self.after, &mut self.hits, scratch, probe);
+            asking.next(&self.rays, &self.after, &mut self.hits, probe);
         }
         self.clear();
     }

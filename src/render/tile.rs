@@ -69,10 +69,10 @@ pub(crate) fn render_tiles<A: Accel, P: Probe>(
 
     // Every thread takes tiles in order until none is left.
     let work = |_: rayon::BroadcastContext| {
-        let mut tracer = Tracer::<A, P>::new(context, accel);
+        let mut tracer = Tracer::<A, P>::new(context, accel, progress);
         let mut finished = Vec::new();
         while let Some(&tile) = tiles.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let Some(pixels) = frame.render(&mut tracer, tile, &|| progress.cancelled()) else { break };
+            let Some(pixels) = frame.render(&mut tracer, tile) else { break };
             finished.push(pixels);
             progress.tiles(done.fetch_add(1, Ordering::Relaxed) + 1, tiles.len());
         }
@@ -139,12 +139,7 @@ impl<'a> Frame<'a> {
     }
 
     /// Renders one tile; `None` when cancelled.
-    fn render<A: Accel, P: Probe>(
-        &self,
-        tracer: &mut Tracer<A, P>,
-        tile: Tile,
-        cancelled: &dyn Fn() -> bool,
-    ) -> Option<TilePixels> {
+    fn render<A: Accel, P: Probe>(&self, tracer: &mut Tracer<A, P>, tile: Tile) -> Option<TilePixels> {
         let places: Vec<_> = (tile.y0..tile.y1).flat_map(|y| (tile.x0..tile.x1).map(move |x| (x, y))).collect();
         let mut done = TilePixels { tile, beauty: Vec::with_capacity(places.len()), layers: Vec::new() };
         let per_pixel = self.offsets.len();
@@ -157,7 +152,7 @@ impl<'a> Frame<'a> {
                 let (ray, path) = self.eye_ray(tracer.center(), f64::from(x) + dx, f64::from(y) + dy, sample);
                 tracer.start(ray, path);
             }
-            if cancelled() || !tracer.trace(cancelled) {
+            if !tracer.trace() {
                 return None;
             }
             done.beauty.extend(tracer.samples.chunks(per_pixel).map(|s| resolve(s, self.background)));

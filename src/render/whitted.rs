@@ -7,6 +7,8 @@
 //! bounces after the eye ray. Going straight on through a material that is absent, blended or seen from its invisible
 //! back is no bounce.
 
+use super::Progress;
+use super::asking::Asking;
 use super::context::{Context, coverage};
 use super::layers::Facts;
 use super::optics::{dispersed_index, reflect, refract};
@@ -55,8 +57,7 @@ impl<P> ByClass<P> {
 /// One worker: its buffers are reused from tile to tile.
 pub(crate) struct Tracer<'a, A: Accel, P> {
     context: &'a Context<'a>,
-    accel: &'a A,
-    scratch: A::Scratch,
+    asking: Asking<'a, A>,
     /// Rays that start, by class.
     starting: [Queue; 3],
     /// Rays that go on behind a hit, by class.
@@ -70,11 +71,10 @@ pub(crate) struct Tracer<'a, A: Accel, P> {
 }
 
 impl<'a, A: Accel, P: Probe> Tracer<'a, A, P> {
-    pub(crate) fn new(context: &'a Context<'a>, accel: &'a A) -> Self {
+    pub(crate) fn new(context: &'a Context<'a>, accel: &'a A, progress: &'a dyn Progress) -> Self {
         Self {
             context,
-            accel,
-            scratch: accel.scratch(),
+            asking: Asking::new(accel, progress),
             starting: Default::default(),
             continuing: Default::default(),
             wave: Wave::default(),
@@ -105,10 +105,10 @@ impl<'a, A: Accel, P: Probe> Tracer<'a, A, P> {
         self.starting[RayClass::Primary as usize].push(ray, path, Hit::MISS);
     }
 
-    /// Traces all trees to their leaves; false when `cancelled` said to stop before the end.
-    pub(crate) fn trace(&mut self, cancelled: &dyn Fn() -> bool) -> bool {
+    /// Traces all trees to their leaves; false when the user gave up before the end.
+    pub(crate) fn trace(&mut self) -> bool {
         while let Some(class) = self.next_wave() {
-            if cancelled() {
+            if self.asking.cancelled {
                 return false;
             }
             let wave = std::mem::take(&mut self.wave);
@@ -125,17 +125,17 @@ impl<'a, A: Accel, P: Probe> Tracer<'a, A, P> {
             self.wave = wave;
             self.trace_shadows();
         }
-        true
+        !self.asking.cancelled
     }
 
     /// Takes the next wave and finds its hits. Rays that go on come before rays that start a deeper generation.
     fn next_wave(&mut self) -> Option<RayClass> {
-        let (wave, scratch) = (&mut self.wave, &mut self.scratch);
+        let wave = &mut self.wave;
         for class in RayClass::ALL {
             let queue = &mut self.continuing[class as usize];
             if !queue.is_empty() {
                 queue.take(wave, WAVE_LIMIT);
-                self.accel.next(&wave.rays, &wave.after, &mut wave.hits, scratch, self.counts.of(class));
+                self.asking.next(&wave.rays, &wave.after, &mut wave.hits, self.counts.of(class));
                 return Some(class);
             }
         }
@@ -143,7 +143,7 @@ impl<'a, A: Accel, P: Probe> Tracer<'a, A, P> {
             let queue = &mut self.starting[class as usize];
             if !queue.is_empty() {
                 queue.take(wave, WAVE_LIMIT);
-                self.accel.closest(&wave.rays, &mut wave.hits, scratch, self.counts.of(class));
+                self.asking.closest(&wave.rays, &mut wave.hits, self.counts.of(class));
                 return Some(class);
             }
         }
@@ -156,7 +156,7 @@ impl<'a, A: Accel, P: Probe> Tracer<'a, A, P> {
         }
         let samples = &mut self.samples;
         let arrive = |sample: u32, light: Vec3| samples[sample as usize].radiance += light;
-        self.shadows.trace(self.context, self.accel, &mut self.scratch, &mut self.counts.shadow, arrive);
+        self.shadows.trace(self.context, &mut self.asking, &mut self.counts.shadow, arrive);
     }
 
     /// A ray that met nothing: the background shows where the line of sight is straight, else the environment is seen.

@@ -1,0 +1,58 @@
+//! Asking a structure what rays hit, in slices, so that a user who gives up need not wait for a whole wave.
+
+use super::Progress;
+use crate::accel::{Accel, Hit, Probe, Ray};
+
+/// Rays asked of the structure at once: enough for packets, few enough for brute force over a large scene to stop within
+/// a second.
+const SLICE: usize = 256;
+
+/// A structure, one worker's scratch for it, and whoever may end the work.
+pub(crate) struct Asking<'a, A: Accel> {
+    accel: &'a A,
+    scratch: A::Scratch,
+    progress: &'a dyn Progress,
+    /// Set once the user has given up; answers after that mean nothing.
+    pub cancelled: bool,
+}
+
+impl<'a, A: Accel> Asking<'a, A> {
+    pub(crate) fn new(accel: &'a A, progress: &'a dyn Progress) -> Self {
+        Self { accel, scratch: accel.scratch(), progress, cancelled: false }
+    }
+
+    /// The first hit of each ray.
+    pub(crate) fn closest<P: Probe>(&mut self, rays: &[Ray], hits: &mut [Hit], probe: &mut P) {
+        for (rays, hits) in rays.chunks(SLICE).zip(hits.chunks_mut(SLICE)) {
+            if self.gives_up() {
+                return;
+            }
+            self.accel.closest(rays, hits, &mut self.scratch, probe);
+        }
+    }
+
+    /// Whether anything opaque is hit by each ray.
+    pub(crate) fn occluded<P: Probe>(&mut self, rays: &[Ray], blocked: &mut [bool], probe: &mut P) {
+        for (rays, blocked) in rays.chunks(SLICE).zip(blocked.chunks_mut(SLICE)) {
+            if self.gives_up() {
+                return;
+            }
+            self.accel.occluded(rays, blocked, &mut self.scratch, probe);
+        }
+    }
+
+    /// The first hit of each ray behind `after`.
+    pub(crate) fn next<P: Probe>(&mut self, rays: &[Ray], after: &[Hit], hits: &mut [Hit], probe: &mut P) {
+        for ((rays, after), hits) in rays.chunks(SLICE).zip(after.chunks(SLICE)).zip(hits.chunks_mut(SLICE)) {
+            if self.gives_up() {
+                return;
+            }
+            self.accel.next(rays, after, hits, &mut self.scratch, probe);
+        }
+    }
+
+    fn gives_up(&mut self) -> bool {
+        self.cancelled |= self.progress.cancelled();
+        self.cancelled
+    }
+}
