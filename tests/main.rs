@@ -11,6 +11,6 @@
 #![allow(unreachable_pub, reason = "nobody uses a test binary as a library")]
 
 mod common;
-mod gltf_models;
 mod golden;
+mod sweep;
 mod validator;

@@ -1,40 +1,129 @@
-//! Every model somebody else made, in one process: loads, renders small, and stays sane.
+//! Every model and broken file that others made, in one process: loads, renders small, and stays sane.
 //!
-//! Runs only when `MESHRAY_SHARED` names the folder that holds `models/`; it says how many files it saw.
+//! Runs only when `MESHRAY_SHARED` names the folder that holds `models/`; it says how many files it saw, what they were
+//! warned about and what was refused.
 
-use meshray::accel::{AccelKind, AnyAccel};
+use crate::common::still;
+use meshray::accel::AccelKind;
 use meshray::image::Picture;
 use meshray::load::{LoadError, LoadOptions, Loaded, load};
-use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 const SIZE: u32 = 64;
-const TIME_LIMIT: Duration = Duration::from_secs(20);
-/// Part of the pixels a picture of a framed model covers at least.
+
+/// No file may take longer than this to load and render.
+const TIME_LIMIT: Duration = Duration::from_secs(60);
+
+/// Part of the pixels that a picture of a framed model covers at least.
 const MIN_COVERAGE: f64 = 0.05;
 
-fn shared_models() -> Option<PathBuf> {
-    let folder = std::env::var_os("MESHRAY_SHARED").map(|s| PathBuf::from(s).join("models"));
-    if folder.is_none() {
-        println!("MESHRAY_SHARED is not set: 0 shared models");
-    }
-    folder
-}
+/// Models that cover less for a good reason.
+const THIN: &[(&str, &str)] = &[
+    ("assimp/number_formats.obj", "its corners lie on one line"),
+    ("assimp/regr_3429812.obj", "a strip 8 times as long as wide, seen askew"),
+    ("tinyobjloader/issue-319-002.obj", "three faces of a building, far apart"),
+    ("tinyobjloader/leading-decimal-dot-issue-201.obj", "a triangle 70 times as long as wide"),
+    ("tinyobjloader/leading-zero-in-exponent-notation-issue-210.obj", "a triangle 70 times as long as wide"),
+];
 
 /// What became of one file.
-#[derive(Debug)]
 enum Outcome {
-    /// A picture, with its coverage (0 … 1) and the number of warnings.
-    Drawn { coverage: f64, warnings: usize },
-    /// Loaded, but there is nothing to draw.
+    /// A picture: its coverage (0 … 1) and the warnings.
+    Drawn { coverage: f64, warnings: Vec<String> },
+    /// It holds nothing to draw, and says so.
     Empty,
     /// Refused with this message.
     Refused(String),
-    /// A panic, a NaN, or no answer in time: always a fault of ours.
+    /// A panic, a value that is not a number, no answer in time: always a fault of ours.
     Broken(String),
+}
+
+#[test]
+fn shared_models_are_drawn() {
+    let Some(folder) = shared_models() else { return };
+    let mut files = find(&folder);
+    files.retain(|f| !f.starts_with(folder.join("invalid")));
+    let (mut drawn, mut warned, mut empty, mut refused) = (0, 0, 0, 0);
+    let mut failures = Vec::new();
+    for file in &files {
+        let name = file.strip_prefix(&folder).unwrap_or(file).display().to_string();
+        let start = Instant::now();
+        match try_file(file) {
+            Outcome::Drawn { coverage, warnings } => {
+                drawn += 1;
+                warned += usize::from(!warnings.is_empty());
+                println!("{name}: {:.0} % covered, {:.0?}", coverage * 100.0, start.elapsed());
+                warnings.iter().for_each(|w| println!("    {w}"));
+                if coverage < MIN_COVERAGE && !THIN.iter().any(|(thin, _why)| name.ends_with(thin)) {
+                    failures.push(format!("{name}: covers {:.1} % of the pixels", coverage * 100.0));
+                }
+            }
+            Outcome::Empty => {
+                empty += 1;
+                println!("{name}: nothing to draw");
+            }
+            Outcome::Refused(message) => {
+                refused += 1;
+                println!("{message}");
+                if !message.contains("is required to draw this file") {
+                    failures.push(format!("{name}: refused: {message}"));
+                }
+            }
+            Outcome::Broken(how) => failures.push(format!("{name}: {how}")),
+        }
+    }
+    println!("{} models: {drawn} drawn, {warned} of them warned, {empty} empty, {refused} refused", files.len());
+    assert!(drawn > 0, "no models under {}", folder.display());
+    assert!(failures.is_empty(), "{} models fail:\n{}", failures.len(), failures.join("\n"));
+}
+
+#[test]
+fn shared_broken_files_end_in_a_message() {
+    let Some(folder) = shared_models() else { return };
+    let files = find(&folder.join("invalid"));
+    let (mut drawn, mut empty, mut refused) = (0, 0, 0);
+    let mut failures = Vec::new();
+    for file in &files {
+        match try_file(file) {
+            Outcome::Drawn { .. } => drawn += 1,
+            Outcome::Empty => empty += 1,
+            Outcome::Refused(message) if message.trim().is_empty() => {
+                failures.push(format!("{}: mute", file.display()))
+            }
+            Outcome::Refused(_) => refused += 1,
+            Outcome::Broken(how) => failures.push(format!("{}: {how}", file.display())),
+        }
+    }
+    println!("{} broken files: {refused} refused, {drawn} drawn all the same, {empty} empty", files.len());
+    assert!(failures.is_empty(), "{} files fail:\n{}", failures.len(), failures.join("\n"));
+}
+
+fn shared_models() -> Option<PathBuf> {
+    let shared = std::env::var_os("MESHRAY_SHARED").map(PathBuf::from);
+    if shared.is_none() {
+        println!("MESHRAY_SHARED is not set: 0 shared models");
+    }
+    shared.map(|shared| shared.join("models"))
+}
+
+/// All model files below `folder`, sorted.
+fn find(folder: &Path) -> Vec<PathBuf> {
+    let (mut found, mut folders) = (Vec::new(), vec![folder.to_owned()]);
+    while let Some(folder) = folders.pop() {
+        for path in std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()) {
+            let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+            if path.is_dir() {
+                folders.push(path);
+            } else if ["gltf", "glb", "obj"].contains(&extension.as_str()) {
+                found.push(path);
+            }
+        }
+    }
+    found.sort();
+    found
 }
 
 /// Loads and renders one file on a thread of its own, so that a hang is an answer too.
@@ -43,33 +132,55 @@ fn try_file(path: &Path) -> Outcome {
     let file = path.to_owned();
     std::thread::spawn(move || {
         let outcome = catch_unwind(AssertUnwindSafe(|| draw(&file)));
-        // The receiver is gone when the time limit has passed.
-        let _ = sender.send(outcome.unwrap_or_else(|cause| Outcome::Broken(format!("panic: {}", panic_text(&*cause)))));
+        // Nobody listens any more when the time limit has passed.
+        let _ = sender.send(outcome.unwrap_or_else(|_| Outcome::Broken("panic".into())));
     });
     receiver.recv_timeout(TIME_LIMIT).unwrap_or_else(|_| Outcome::Broken(format!("no answer in {TIME_LIMIT:?}")))
 }
 
-fn panic_text(cause: &(dyn std::any::Any + Send)) -> String {
-    let text = cause.downcast_ref::<&str>().map(|s| (*s).to_owned());
-    text.or_else(|| cause.downcast_ref::<String>().cloned()).unwrap_or_default()
-}
-
 fn draw(path: &Path) -> Outcome {
-    let Loaded { scene, warnings, .. } = match load(path, &LoadOptions::default()) {
+    let loaded = match load(path, &LoadOptions::default()) {
         Ok(loaded) => loaded,
         Err(LoadError::Read { what, source }) => return Outcome::Refused(format!("{what}: {source}")),
         Err(LoadError::Input(faults)) => return Outcome::Refused(faults[0].to_string()),
     };
-    let Some(picture) = crate::common::still(scene, AccelKind::GridOctree, SIZE, SIZE) else {
+    if let Err(what) = check(&loaded) {
+        return Outcome::Broken(format!("wrong {what}"));
+    }
+    let Some(picture) = still(loaded.scene, AccelKind::GridOctree, SIZE, SIZE) else {
         return Outcome::Empty;
     };
     if picture.beauty.iter().flatten().any(|v| !v.is_finite()) {
         return Outcome::Broken("a pixel is not a number".into());
     }
-    Outcome::Drawn { coverage: coverage(&picture), warnings: warnings.len() }
+    let warnings = loaded.warnings.iter().map(ToString::to_string).collect();
+    Outcome::Drawn { coverage: coverage(&picture), warnings }
 }
 
+/// Part of the pixels where a surface is seen, however transparent it is.
 fn coverage(picture: &Picture) -> f64 {
-    let covered = picture.beauty.iter().filter(|p| p[3] > 0.5).count();
-    covered as f64 / picture.beauty.len() as f64
+    let seen = picture.layers.iter().flat_map(|layers| &layers.prim).filter(|&&prim| prim != u32::MAX).count();
+    seen as f64 / picture.beauty.len() as f64
+}
+
+/// Checks that every index in a scene leads somewhere, and that numbers are numbers.
+fn check(loaded: &Loaded) -> Result<(), String> {
+    let scene = &loaded.scene;
+    let ensure = |right: bool, what: &str| if right { Ok(()) } else { Err(what.to_owned()) };
+    for mesh in &scene.meshes {
+        let count = mesh.positions.len();
+        let fits = |length: usize| length == 0 || length == count;
+        ensure((mesh.material as usize) < scene.materials.len(), "material")?;
+        ensure(mesh.triangles.iter().flatten().all(|&v| (v as usize) < count), "corner")?;
+        ensure(mesh.positions.iter().all(|p| p.is_finite()), "position")?;
+        ensure(fits(mesh.normals.len()) && fits(mesh.tangents.len()) && fits(mesh.colors.len()), "length")?;
+        ensure(mesh.uvs.iter().all(|uvs| fits(uvs.len())), "uv length")?;
+        ensure(mesh.normals.iter().all(|n| (n.length() - 1.0).abs() < 1e-4), "normal")?;
+        ensure(mesh.tangents.iter().all(|t| (t.truncate().length() - 1.0).abs() < 1e-4), "tangent")?;
+    }
+    ensure(scene.instances.iter().all(|i| (i.mesh as usize) < scene.meshes.len()), "instance")?;
+    ensure(scene.instances.iter().all(|i| i.world_from_object.is_finite()), "place")?;
+    ensure(scene.textures.iter().all(|t| (t.bitmap as usize) < scene.bitmaps.len()), "bitmap")?;
+    let maps = scene.materials.iter().flat_map(|m| [&m.base_color_map, &m.normal_map, &m.emission_map]);
+    ensure(maps.flatten().all(|r| (r.texture as usize) < scene.textures.len()), "texture")
 }
