@@ -59,7 +59,8 @@ fn render_batch(job: &RenderJob, batch: &Batch, messages: &Messages, done: &mut 
     if shots.is_empty() {
         return worst;
     }
-    let name = batch.inputs[0].display().to_string();
+    // The bar needs the room that folders would take.
+    let name = batch.inputs[0].file_name().unwrap_or(batch.inputs[0].as_os_str()).to_string_lossy();
     let progress = Progress::new(&name, messages, job.quiet, job.keep_partial);
     match prepare(job, batch, messages, &progress) {
         Ok(mut ready) => {
@@ -277,9 +278,10 @@ struct Summary<'a> {
 
 impl Summary<'_> {
     fn say(&self, rendered: &Rendered, times: &Times, messages: &Messages) {
-        let name = self.shot.target.path().map_or("standard output".into(), |p| p.display().to_string());
-        messages.info("picture", format!("{name}: {}", self.picture(rendered)));
-        messages.info("times", format!("{name}: {}", times.line(&self.effective.settings)));
+        let name = self.shot.target.path().unwrap_or(Path::new("-"));
+        let say = |code, text: String| messages.say(Severity::Info, &Diagnostic::new(code, name, "", text));
+        say("picture", self.picture(rendered));
+        say("times", times.line(&self.effective.settings));
     }
 
     fn picture(&self, rendered: &Rendered) -> String {
