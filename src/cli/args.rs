@@ -81,10 +81,10 @@ pub(super) struct RenderArgs {
     /// Add layers to an EXR: albedo, N, P, Z, prim and instance ids
     #[arg(long, help_heading = "Output", hide_short_help = true)]
     pub layers: bool,
-    /// How linear light becomes display colour [default: neutral]
+    /// How linear light becomes display colour; EXR stays linear [default: neutral]
     #[arg(long, value_name = "NAME", value_parser = parse::tone_map(), help_heading = "Output", hide_short_help = true)]
     pub tone_map: Option<ToneMap>,
-    /// Brighter (+) or darker (-) by this many stops
+    /// Brighter (+) or darker (-) by this many stops (not EXR)
     #[arg(long, value_name = "STOPS", value_parser = parse::exposure, help_heading = "Output", allow_hyphen_values = true)]
     pub exposure: Option<f32>,
     /// Put all inputs into one scene and one picture

@@ -210,7 +210,20 @@ fn batches(args: &RenderArgs, choices: &[Choice]) -> Result<Vec<Batch>, Wrong> {
         batches.push(Batch { inputs, shots });
     }
     refuse_collisions(&batches)?;
+    check_kinds(args, &batches)?;
     Ok(batches)
+}
+
+/// Flags that only one type of file can honour.
+fn check_kinds(args: &RenderArgs, batches: &[Batch]) -> Result<(), Wrong> {
+    let all = |kind| batches.iter().flat_map(|b| &b.shots).all(|s| s.kind == kind);
+    if (args.layers || args.float || args.half) && !all(FileKind::Exr) {
+        return wrong("--layers, --half and --float belong to EXR; use -o NAME.exr or --format exr");
+    }
+    if args.bits == Some(16) && !all(FileKind::Png) {
+        return wrong("--bits 16 belongs to PNG; an EXR stores floats, the other types 8 bits");
+    }
+    Ok(())
 }
 
 fn target(args: &RenderArgs, facts: &Facts, several_views: bool) -> Result<(Target, FileKind), Wrong> {
@@ -412,6 +425,8 @@ mod tests {
             "a.obj -o -  --stats json".replace("  ", " ").as_str(),
             "a.obj --stats-file s.json",
             "a.obj --grid-density 0",
+            "a.obj --layers",
+            "a.obj -o a.jpg --bits 16",
         ] {
             assert!(job(line).is_err(), "{line}");
         }

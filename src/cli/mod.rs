@@ -3,6 +3,7 @@
 //! [`args`] is what was typed, [`job`] what that means once everything is checked; one file per command does the work.
 //! Only this module prints. stdout carries only what was asked for, everything else goes to stderr.
 
+mod accident;
 mod again;
 mod args;
 mod camera;
@@ -41,6 +42,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
         }
     };
     interrupt::install();
+    accident::install();
     match cli.command {
         Command::Render(args) => render_command(&args),
         Command::Inspect(args) => inspect::run(&args),

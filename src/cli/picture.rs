@@ -45,10 +45,14 @@ impl Effective {
     }
 }
 
-/// What is behind everything: as typed, as the file says, or what reflections see; black where there is nothing.
+/// Behind a scene without environment when nobody says: about as dark as the studio's backdrop, so that neither black
+/// nor white things vanish before it.
+const BACKDROP: crate::math::Vec3 = crate::math::Vec3::splat(0.07);
+
+/// What is behind everything: as typed, as the file says, or what reflections see; dark grey where they see nothing.
 pub(super) fn background(look: &Look, scene: &Scene) -> Background {
     look.background.or(scene.background).unwrap_or(match scene.environment {
-        Environment::Black => Background::Color(crate::math::Vec3::ZERO),
+        Environment::Black => Background::Color(BACKDROP),
         Environment::Constant(_) | Environment::Studio => Background::Environment,
     })
 }

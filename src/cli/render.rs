@@ -7,7 +7,7 @@ use super::message::{Messages, Severity};
 use super::picture::{self, Effective};
 use super::progress::Progress;
 use super::stats::{self, PictureStats, Times};
-use super::{again, interrupt, output_name, read};
+use super::{accident, again, interrupt, output_name, read};
 use crate::accel::AnyAccel;
 use crate::image::was_written_by_meshray;
 use crate::load::{Diagnostic, Loaded};
@@ -30,7 +30,9 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
     let mut worst = Exit::Done;
     let mut done = Vec::new();
     for batch in &job.batches {
-        let exit = pool.install(|| render_batch(job, batch, messages, &mut done));
+        let name = batch.inputs[0].display().to_string();
+        let work = || pool.install(|| render_batch(job, batch, messages, &mut done));
+        let exit = accident::guard(&name, messages, work);
         worst = worst.max(exit);
         if interrupt::raised() {
             return Exit::Interrupted;

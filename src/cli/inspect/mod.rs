@@ -15,13 +15,17 @@ mod topology;
 use super::args::InspectArgs;
 use super::exit::Exit;
 use super::message::{Messages, Severity};
-use super::{job, print, read};
+use super::{accident, job, print, read};
 use crate::load::LoadOptions;
 use std::slice;
 
 /// Loads the file and prints what was found.
 pub(super) fn run(args: &InspectArgs) -> Exit {
     let messages = Messages::new(args.messages.into(), false);
+    accident::guard(&args.input.display().to_string(), &messages, || inspect(args, &messages))
+}
+
+fn inspect(args: &InspectArgs, messages: &Messages) -> Exit {
     let options = LoadOptions {
         root: args.root.clone(),
         limits: job::limits(args.max_memory),

@@ -9,7 +9,7 @@
 //!
 //! ```toml
 //! up = "y"                      # or "z"; default "y"
-//! background = "white"          # colour, "transparent" or "environment"
+//! background = "white"          # colour, "transparent" or "environment"; default: the environment, dark grey if black
 //! environment = "studio"        # what rays that leave see: "studio", "black" or a colour; default "black"
 //!
 //! [render]                      # defaults that the command line overrides; every key optional
