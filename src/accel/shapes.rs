@@ -82,7 +82,7 @@ impl Shapes {
     pub fn prim(&self, prim: u32) -> Prim<'_> {
         let mut i = prim as usize;
         if i < self.triangles.len() {
-            return Prim::Triangle(self.triangles[i].map(|v| self.vertices[v as usize]));
+            return Prim::Triangle(self.corners(self.triangles[i]));
         }
         i -= self.triangles.len();
         if i < self.polygons.len() {
@@ -100,10 +100,23 @@ impl Shapes {
         }
     }
 
+    #[inline]
+    fn corners(&self, [a, b, c]: [u32; 3]) -> Triangle {
+        [self.vertices[a as usize], self.vertices[b as usize], self.vertices[c as usize]]
+    }
+
     /// Where the line through the ray meets prim `prim`: up to two distances, NaN for "not". The one test that every
     /// structure uses, a function of ray and prim alone. With `ahead`, negative distances may be left out.
     #[inline]
     pub fn distances(&self, prim: u32, ray: &RaySpace, ahead: bool) -> [f32; 2] {
+        match self.triangles.get(prim as usize) {
+            Some(&corners) => one(triangle::intersect(ray, &self.corners(corners))),
+            None => self.other_distances(prim, ray, ahead),
+        }
+    }
+
+    #[inline(never)]
+    fn other_distances(&self, prim: u32, ray: &RaySpace, ahead: bool) -> [f32; 2] {
         match self.prim(prim) {
             Prim::Triangle(corners) => one(triangle::intersect(ray, &corners)),
             Prim::Polygon(polygon) => one(polygon::intersect(ray, polygon)),

@@ -24,8 +24,25 @@ pub fn intersect(ray: &RaySpace, triangle: &Triangle) -> Option<f32> {
 /// Whether the line through the ray meets the triangle: the exact verdict.
 #[inline]
 pub fn is_hit(ray: &RaySpace, triangle: &Triangle) -> bool {
-    let [a, b, c] = triangle.map(|p| p - ray.origin);
-    let shear = |p: Vec3| (p[ray.x] - ray.shear.0 * p[ray.z], p[ray.y] - ray.shear.1 * p[ray.z]);
+    match ray.z {
+        0 => is_hit_along::<0>(ray, triangle),
+        1 => is_hit_along::<1>(ray, triangle),
+        _ => is_hit_along::<2>(ray, triangle),
+    }
+}
+
+/// [`is_hit`] for a ray whose largest component is along axis `Z`: coordinates are then picked without looking them up.
+#[inline]
+fn is_hit_along<const Z: usize>(ray: &RaySpace, triangle: &Triangle) -> bool {
+    let [a, b, c] = [triangle[0] - ray.origin, triangle[1] - ray.origin, triangle[2] - ray.origin];
+    let shear = |p: Vec3| {
+        let (x, y, z) = match Z {
+            0 => (p.y, p.z, p.x),
+            1 => (p.z, p.x, p.y),
+            _ => (p.x, p.y, p.z),
+        };
+        (x - ray.shear.0 * z, y - ray.shear.1 * z)
+    };
     let ((ax, ay), (bx, by), (cx, cy)) = (shear(a), shear(b), shear(c));
     let u = cx * by - cy * bx;
     let v = ax * cy - ay * cx;

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::lattice::Lattice;
 use super::octree::{Cells, Refiner};
-use super::overlap::Overlap;
+use super::overlap::{Overlap, padded_box};
 use super::{EMPTY, GridParams};
 use crate::accel::Shapes;
 
@@ -59,7 +59,7 @@ fn top_lists(shapes: &Shapes, lattice: &Lattice) -> Lists {
         .map(|run| {
             let mut pairs = Vec::with_capacity(run.len() * 2);
             for &prim in run {
-                top_cells(&Overlap::new(shapes, prim, lattice), lattice, |cell| pairs.push((cell, prim)));
+                top_cells(shapes, prim, lattice, |cell| pairs.push((cell, prim)));
             }
             pairs
         })
@@ -83,15 +83,20 @@ fn top_lists(shapes: &Shapes, lattice: &Lattice) -> Lists {
 }
 
 /// Calls `found` with the index of each top cell that the prim belongs to.
-fn top_cells(overlap: &Overlap, lattice: &Lattice, mut found: impl FnMut(u32)) {
-    let (from, to) = lattice.top_range(overlap.lo, overlap.hi);
-    let single = from == to;
+fn top_cells(shapes: &Shapes, prim: u32, lattice: &Lattice, mut found: impl FnMut(u32)) {
+    #[expect(clippy::cast_possible_truncation, reason = "at most 1024³ = 2³⁰ cells")]
+    let mut found = |cell| found(lattice.top_index(cell) as u32);
+    let (lo, hi) = padded_box(shapes, prim, lattice);
+    let (from, to) = lattice.top_range(lo, hi);
+    if from == to {
+        return found(from);
+    }
+    let overlap = Overlap::new(shapes, prim, lattice);
     for z in from[2]..=to[2] {
         for y in from[1]..=to[1] {
             for x in from[0]..=to[0] {
-                if single || overlap.test(lattice.top_cube([x, y, z])) {
-                    #[expect(clippy::cast_possible_truncation, reason = "at most 1024³ = 2³⁰ cells")]
-                    found(lattice.top_index([x, y, z]) as u32);
+                if overlap.test(lattice.top_cube([x, y, z])) {
+                    found([x, y, z]);
                 }
             }
         }

@@ -4,6 +4,7 @@ use super::lattice::{Cube, Lattice};
 use super::overlap::Overlap;
 use super::{EMPTY, GridParams, NODE};
 use crate::accel::Shapes;
+use crate::math::DVec3;
 
 /// References there may be for each prim, in all cells together, beside [`FREE_REFERENCES`].
 const REFERENCES: f64 = 12.0;
@@ -158,10 +159,22 @@ struct Crowd<'a> {
 }
 
 impl Crowd<'_> {
-    /// One bit for each octant of the cube that member `m` belongs to.
+    /// One bit for each octant of the cube that member `m` belongs to; it is known to belong to the cube.
     fn octants(&self, m: u32, cube: Cube) -> u8 {
         let overlap = &self.overlaps[m as usize];
-        (0..8).filter(|&o| overlap.test(cube.octant(o))).fold(0, |mask, o| mask | 1 << o)
+        let half = cube.octant(7).lo;
+        let middle = DVec3::new(f64::from(half[0]), f64::from(half[1]), f64::from(half[2]));
+
+        // The octants that its box meets; where that is a single one, it holds all of the prim inside the cube.
+        let (below, above) = (overlap.lo.cmple(middle).bitmask(), middle.cmple(overlap.hi).bitmask());
+        let meets = |axis: usize, lower: u8| {
+            (if below >> axis & 1 == 1 { lower } else { 0 }) | (if above >> axis & 1 == 1 { !lower } else { 0 })
+        };
+        let candidates = meets(0, 0b0101_0101) & meets(1, 0b0011_0011) & meets(2, 0b0000_1111);
+        if candidates.is_power_of_two() {
+            return candidates;
+        }
+        (0..8).filter(|&o| candidates >> o & 1 == 1 && overlap.test(cube.octant(o))).fold(0, |mask, o| mask | 1 << o)
     }
 }
 

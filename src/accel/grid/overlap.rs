@@ -36,23 +36,25 @@ impl Overlap {
     /// Prepares bounded prim `prim`.
     pub fn new(shapes: &Shapes, prim: u32, lattice: &Lattice) -> Self {
         let pad = lattice.pad();
-        let bounds = shapes.bounds(prim);
+        let (lo, hi) = padded_box(shapes, prim, lattice);
         let surface = match shapes.prim(prim) {
             Prim::Triangle(corners) => triangle(corners.map(|p| lattice.place(p)), lattice),
             Prim::Polygon(p) => polygon(p, lattice),
             Prim::Sphere(s) => sphere(s, lattice),
             Prim::Plane(..) => Surface::Polygon { plane: Slab::default() },
         };
-        Self { pad, lo: lattice.place(bounds.lo) - pad, hi: lattice.place(bounds.hi) + pad, surface }
+        Self { pad, lo, hi, surface }
     }
 
     /// Whether the prim's surface meets the cube, padded.
     pub fn test(&self, cube: Cube) -> bool {
-        let lo = DVec3::from_array(cube.lo.map(f64::from));
+        let lo = DVec3::new(f64::from(cube.lo[0]), f64::from(cube.lo[1]), f64::from(cube.lo[2]));
         let side = cube.side();
-        self.lo.cmple(lo + side).all()
-            && lo.cmple(self.hi).all()
-            && self.surface_meets(lo - self.pad, side + 2.0 * self.pad)
+        let hi = lo + side;
+        // A prim inside the cube meets it: most do, and need no more.
+        let inside = lo.cmple(self.lo).all() && self.hi.cmple(hi).all();
+        let apart = !(self.lo.cmple(hi).all() && lo.cmple(self.hi).all());
+        inside || (!apart && self.surface_meets(lo - self.pad, side + 2.0 * self.pad))
     }
 
     fn surface_meets(&self, lo: DVec3, side: f64) -> bool {
@@ -68,6 +70,12 @@ impl Overlap {
             }
         }
     }
+}
+
+/// Box of bounded prim `prim` in finest cells, padded: lower and upper corner.
+pub fn padded_box(shapes: &Shapes, prim: u32, lattice: &Lattice) -> (DVec3, DVec3) {
+    let (bounds, pad) = (shapes.bounds(prim), lattice.pad());
+    (lattice.place(bounds.lo) - pad, lattice.place(bounds.hi) + pad)
 }
 
 /// All points between two parallel planes.

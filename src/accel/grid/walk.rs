@@ -107,18 +107,29 @@ impl<M: Mailbox> GridOctree<'_, M> {
 
         let levels = self.lattice.levels;
         let dims = self.lattice.dims;
-        let mut cell = [0, 1, 2].map(|k| track.cell_at(k, enter, 0, (dims[k] << levels) - 1) >> levels);
+        let first = |k: usize| track.cell_at(k, enter, 0, (dims[k] << levels) - 1) >> levels;
+        let mut cell = [first(0), first(1), first(2)];
         let exit = |k: usize, cell: u32| track.meets(k, (cell + u32::from(track.forwards[k])) << levels);
         let mut exits = [exit(0, cell[0]), exit(1, cell[1]), exit(2, cell[2])];
+        let mut end = limit(query);
         loop {
             let (axis, leave) = first_exit(exits);
             let entry = self.top[self.lattice.top_index(cell)];
-            let done = if entry & NODE == 0 {
-                self.visit(entry, query, mailbox, probe) || limit(query) < leave
+            if entry == EMPTY {
+                probe.step();
+                probe.cell(true);
             } else {
-                self.walk_octants(entry, cell, enter, &track, query, mailbox, probe)
-            };
-            if done {
+                let answered = if entry & NODE == 0 {
+                    self.visit(entry, query, mailbox, probe)
+                } else {
+                    self.walk_octants(entry, cell, enter, &track, query, mailbox, probe)
+                };
+                if answered {
+                    return;
+                }
+                end = limit(query);
+            }
+            if end < leave {
                 return;
             }
 
@@ -149,20 +160,30 @@ impl<M: Mailbox> GridOctree<'_, M> {
         probe: &mut P,
     ) -> bool {
         let levels = self.lattice.levels;
-        let mut at = [0, 1, 2].map(|k| {
+        let first = |k: usize| {
             let lo = top[k] << levels;
             track.cell_at(k, enter, lo, lo + (1 << levels) - 1)
-        });
+        };
+        let mut at = [first(0), first(1), first(2)];
+        let mut end = limit(query);
         loop {
             let (cell, level) = self.descend(root, at, probe);
-            if self.visit(cell, query, mailbox, probe) {
-                return true;
+            if cell == EMPTY {
+                probe.step();
+                probe.cell(true);
+            } else {
+                if self.visit(cell, query, mailbox, probe) {
+                    return true;
+                }
+                end = limit(query);
             }
-            let lo = at.map(|i| i >> level << level);
             let side = 1u32 << level;
-            let plane = [0, 1, 2].map(|k| if track.forwards[k] { lo[k] + side } else { lo[k] });
-            let (axis, leave) = first_exit([0, 1, 2].map(|k| track.meets(k, plane[k])));
-            if limit(query) < leave {
+            let lo = [at[0] >> level << level, at[1] >> level << level, at[2] >> level << level];
+            let exit = |k: usize| lo[k] + if track.forwards[k] { side } else { 0 };
+            let plane = [exit(0), exit(1), exit(2)];
+            let (axis, leave) =
+                first_exit([track.meets(0, plane[0]), track.meets(1, plane[1]), track.meets(2, plane[2])]);
+            if end < leave {
                 return true;
             }
 
@@ -201,11 +222,11 @@ impl<M: Mailbox> GridOctree<'_, M> {
         (entry, level)
     }
 
-    /// Tests the prims of a cell; whether the query is answered.
+    /// Tests the prims of a cell that has some; whether the query is answered.
     #[inline]
     fn visit<G: Goal, P: Probe>(&self, cell: u32, query: &mut Query<G>, mailbox: &mut M, probe: &mut P) -> bool {
         probe.step();
-        probe.cell(cell == EMPTY);
+        probe.cell(false);
         for &prim in self.cells.list(cell) {
             if !mailbox.first_visit(prim) {
                 probe.repeat_skipped();
