@@ -159,21 +159,18 @@ struct Crowd<'a> {
 }
 
 impl Crowd<'_> {
-    /// One bit for each octant of the cube that member `m` belongs to; it is known to belong to the cube.
+    /// One bit for each octant of the cube that member `m` belongs to.
     fn octants(&self, m: u32, cube: Cube) -> u8 {
         let overlap = &self.overlaps[m as usize];
         let half = cube.octant(7).lo;
         let middle = DVec3::new(f64::from(half[0]), f64::from(half[1]), f64::from(half[2]));
 
-        // The octants that its box meets; where that is a single one, it holds all of the prim inside the cube.
+        // Most prims are small: their box meets one octant or two.
         let (below, above) = (overlap.lo.cmple(middle).bitmask(), middle.cmple(overlap.hi).bitmask());
         let meets = |axis: usize, lower: u8| {
             (if below >> axis & 1 == 1 { lower } else { 0 }) | (if above >> axis & 1 == 1 { !lower } else { 0 })
         };
         let candidates = meets(0, 0b0101_0101) & meets(1, 0b0011_0011) & meets(2, 0b0000_1111);
-        if candidates.is_power_of_two() {
-            return candidates;
-        }
         (0..8).filter(|&o| candidates >> o & 1 == 1 && overlap.test(cube.octant(o))).fold(0, |mask, o| mask | 1 << o)
     }
 }
