@@ -32,7 +32,7 @@ fn glass(name: &str, color: [f64; 3], ior: f64, thickness: f64) -> Value {
 
 fn tile(glb: &mut Glb) -> usize {
     let bytes = png(64, 64, |u, v| {
-        let dark = ((u * 16.0) as u32 + (v * 16.0) as u32).is_multiple_of(2);
+        let dark = ((u * 8.0) as u32 + (v * 8.0) as u32).is_multiple_of(2);
         if dark { [0.30, 0.33, 0.38] } else { [0.90, 0.88, 0.83] }
     });
     let sharp = json!({ "magFilter": 9728, "minFilter": 9987, "wrapS": 10497, "wrapT": 10497 });
@@ -41,7 +41,7 @@ fn tile(glb: &mut Glb) -> usize {
         "name": "tile",
         "pbrMetallicRoughness": { "baseColorTexture": { "index": texture }, "metallicFactor": 0, "roughnessFactor": 0.6 }
     }));
-    let geometry = glb.geometry(&block(DVec3::new(1.6, 0.05, 1.2)));
+    let geometry = glb.geometry(&block(DVec3::new(1.6, 0.05, 1.2)).mapped_from_above(1.2));
     let mesh = glb.mesh("tile", &geometry, material);
     glb.place("tile", mesh, [0.0, -0.05, 0.0])
 }

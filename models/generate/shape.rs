@@ -41,9 +41,15 @@ impl Shape {
         self
     }
 
-    /// Texture coordinates from above: one repeat in `size`.
+    /// Texture coordinates from above, one repeat in `size`, going on down the sides as if they were folded out.
     pub(crate) fn mapped_from_above(mut self, size: f32) -> Self {
-        self.uvs = self.positions.iter().map(|p| [p[0] / size + 0.5, p[2] / size + 0.5]).collect();
+        let top = self.positions.iter().map(|p| p[1]).fold(f32::NEG_INFINITY, f32::max);
+        let folded_out = |&[x, y, z]: &[f32; 3]| {
+            let reach = (x * x + z * z).sqrt();
+            let scale = if reach > 0.0 { (1.0 + (top - y) / reach) / size } else { 0.0 };
+            [x * scale + 0.5, z * scale + 0.5]
+        };
+        self.uvs = self.positions.iter().map(folded_out).collect();
         self
     }
 

@@ -44,7 +44,7 @@ fn gold_knot(glb: &mut Glb) -> usize {
     let geometry = glb.geometry(&knot(2.0, 3.0, 0.62, 0.135, 24, 180).plain());
     let mesh = glb.mesh("knot", &geometry, gold);
     glb.node(json!({
-        "name": "knot", "mesh": mesh, "translation": [0.12, 0.0, -0.38],
+        "name": "knot", "mesh": mesh, "translation": [-0.16, 0.0, -0.42],
         "rotation": [0.0, sin(0.12), 0.0, cos(0.12)]
     }))
 }
@@ -96,7 +96,7 @@ fn vase(glb: &mut Glb) -> usize {
         .lathe(48);
     let geometry = glb.geometry(&shape);
     let mesh = glb.mesh("vase", &geometry, glaze);
-    glb.place("vase", mesh, [0.98, 0.0, -0.05])
+    glb.place("vase", mesh, [0.98, 0.0, -0.32])
 }
 
 /// A glass ball in front, a copper ball, and a small one of white porcelain.
@@ -120,9 +120,9 @@ fn balls(glb: &mut Glb) -> Vec<usize> {
         "pbrMetallicRoughness": { "baseColorFactor": [0.88, 0.87, 0.84, 1.0], "metallicFactor": 0, "roughnessFactor": 0.08 }
     }));
     let stand = [
-        ("glass ball", glass, 0.34, (-0.62, 0.52)),
-        ("copper ball", copper, 0.25, (0.30, 0.72)),
-        ("porcelain ball", porcelain, 0.16, (-0.13, 0.98)),
+        ("glass ball", glass, 0.34, (-0.72, 0.46)),
+        ("copper ball", copper, 0.25, (0.42, 0.62)),
+        ("porcelain ball", porcelain, 0.16, (-0.08, 1.0)),
     ];
     stand
         .into_iter()

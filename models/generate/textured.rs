@@ -34,7 +34,7 @@ fn floor(glb: &mut Glb) -> usize {
             "metallicFactor": 0, "roughnessFactor": 0.3
         }
     }));
-    let geometry = glb.geometry(&block(DVec3::new(1.6, 0.05, 1.3)));
+    let geometry = glb.geometry(&block(DVec3::new(1.6, 0.05, 1.3)).mapped_from_above(2.6));
     let mesh = glb.mesh("tile", &geometry, material);
     glb.place("tile", mesh, [0.0, -0.05, 0.0])
 }

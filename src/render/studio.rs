@@ -53,8 +53,8 @@ const WIDEST_IS_DIFFUSE: f32 = 0.75;
 const SPREAD_PER_ALPHA: f32 = 0.9;
 
 /// Radiance of the dome overhead, at the horizon, and of the floor below.
-const ZENITH: f32 = 0.30;
-const HORIZON: f32 = 0.27;
+const ZENITH: f32 = 0.32;
+const HORIZON: f32 = 0.29;
 const NADIR: f32 = 0.10;
 
 /// Softness (in direction cosines) of the line between wall and floor.
@@ -77,7 +77,7 @@ struct SoftBox {
 static BOXES: LazyLock<[SoftBox; 4]> = LazyLock::new(|| {
     [
         // Key, overhead in front; left strip; right panel; rim behind.
-        SoftBox::new(Vec3::new(-0.35, 0.80, 0.55), (0.36, 0.26), 0.05, 2.2),
+        SoftBox::new(Vec3::new(-0.35, 0.80, 0.55), (0.36, 0.26), 0.05, 2.1),
         SoftBox::new(Vec3::new(-0.95, 0.22, 0.25), (0.11, 0.42), 0.05, 1.3),
         SoftBox::new(Vec3::new(0.93, 0.30, 0.35), (0.24, 0.34), 0.06, 0.9),
         SoftBox::new(Vec3::new(0.40, 0.50, -0.80), (0.38, 0.16), 0.06, 1.5),
@@ -310,7 +310,7 @@ mod tests {
     fn white_paint_stays_below_white_in_the_room_alone() {
         for normal in probes() {
             let value = diffuse(normal).x;
-            assert!((0.1..0.6).contains(&value), "{normal}: {value}");
+            assert!((0.1..0.65).contains(&value), "{normal}: {value}");
         }
     }
 

@@ -2,8 +2,12 @@
 //!
 //! The key and fill lights belong to the camera: whatever side is seen, it is lit from the upper left and softened
 //! from the right, and nothing is lit from behind only. The studio around it all (`render::studio`) stays with the model.
+//!
+//! A file with lamps of its own keeps them as they are, without key and fill. Whether the studio surrounds them is the
+//! loader's choice: glTF has no word for surroundings, so it does there and metals are not black; a scene file says.
 
-use super::{Camera, Environment, Light, LightKind, Scene, Surface};
+use super::features::{Feature, Features};
+use super::{Camera, Environment, Light, LightKind, Scene};
 use crate::math::{DVec3, Vec3};
 
 /// What [`add_if_missing`] did.
@@ -20,16 +24,16 @@ pub enum DefaultLight {
 }
 
 /// Illuminance of the key and fill lights on a face turned to them, lux; white paint returns a π-th of it.
-const KEY: f32 = 1.15;
+const KEY: f32 = 1.4;
 const FILL: f32 = 0.35;
 
 /// Where they stand, in camera space: +x right, +y up, +z towards the viewer.
-const KEY_FROM: DVec3 = DVec3::new(-0.55, 0.75, 0.65);
+const KEY_FROM: DVec3 = DVec3::new(-0.5, 0.62, 0.75);
 const FILL_FROM: DVec3 = DVec3::new(0.85, 0.15, 0.55);
 
 /// Adds key, fill and studio, as seen from `camera`, to a scene without any light.
 ///
-/// Light is a lamp, an ambient term or an environment; a material that glows is not. A scene whose every material is
+/// Light is a lamp, an ambient term or an environment; a material that glows is not. A scene in which everything is
 /// unlit needs none. The fill throws no shadows: it stands for light from all over that side.
 pub fn add_if_missing(scene: &mut Scene, camera: &Camera) -> DefaultLight {
     if scene.hints.default_light == Some(false) {
@@ -39,7 +43,8 @@ pub fn add_if_missing(scene: &mut Scene, camera: &Camera) -> DefaultLight {
     if !scene.lights.is_empty() || scene.ambient != Vec3::ZERO || own_environment {
         return DefaultLight::NotMissing;
     }
-    if !scene.materials.is_empty() && scene.materials.iter().all(|m| matches!(m.surface, Surface::Unlit)) {
+    let features = Features::of(scene);
+    if features.has(Feature::Unlit) && !features.has(Feature::MetalRough) && !features.has(Feature::Phong) {
         return DefaultLight::NotNeeded;
     }
     scene.lights = vec![lamp("key", KEY, KEY_FROM, true, camera), lamp("fill", FILL, FILL_FROM, false, camera)];
@@ -62,7 +67,7 @@ fn lamp(name: &str, lux: f32, from: DVec3, shadows: bool, camera: &Camera) -> Li
 mod tests {
     use super::*;
     use crate::math::DAffine3;
-    use crate::scene::{Material, Projection};
+    use crate::scene::{Material, Projection, Sphere, Surface};
 
     fn behind() -> Camera {
         // Stands at −z and looks along +z.
@@ -103,7 +108,9 @@ mod tests {
     #[test]
     fn unlit_scenes_and_scenes_that_want_darkness_get_nothing() {
         let unlit = Material { surface: Surface::Unlit, ..Material::default() };
-        let mut scene = Scene { materials: vec![unlit], ..Scene::default() };
+        let ball = Sphere { name: String::new(), center: DVec3::ZERO, radius: 1.0, material: 0 };
+        // The second material is there, but on nothing.
+        let mut scene = Scene { materials: vec![unlit, Material::plain()], spheres: vec![ball], ..Scene::default() };
         assert_eq!(add_if_missing(&mut scene, &behind()), DefaultLight::NotNeeded);
         let mut scene = Scene::default();
         scene.hints.default_light = Some(false);
@@ -131,6 +138,6 @@ mod tests {
                 facing = paint;
             }
         }
-        assert!(brightest < 0.95 && (0.45..0.8).contains(&facing), "{brightest}, {facing} facing the eye");
+        assert!(brightest < 1.0 && (0.45..0.8).contains(&facing), "{brightest}, {facing} facing the eye");
     }
 }

@@ -69,7 +69,7 @@ pub struct Features {
 }
 
 /// Perceptual roughness below which the renderer follows reflected rays, not only the blurred environment.
-pub const SMOOTH: f32 = 0.35;
+pub const SMOOTH: f32 = 0.2;
 
 impl Feature {
     /// All of them, in the order they are listed.
@@ -209,7 +209,7 @@ impl Features {
                 self.add_if(true, Feature::MetalRough);
                 self.add_if(maps.iter().any(|map| map.is_some()), Feature::Textures);
                 // A map can only lower the factor, so a rough factor may still hide smooth spots.
-                self.add_if(pbr.roughness <= SMOOTH || pbr.metal_rough_map.is_some(), Feature::Mirrors);
+                self.add_if(pbr.roughness < SMOOTH || pbr.metal_rough_map.is_some(), Feature::Mirrors);
                 if pbr.transmission > 0.0 {
                     self.add_if(true, if pbr.thick { Feature::Refraction } else { Feature::ThinTransmission });
                     self.add_if(pbr.thick && pbr.dispersion > 0.0, Feature::Dispersion);

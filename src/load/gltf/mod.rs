@@ -37,7 +37,7 @@ use super::limits::Budget;
 use super::paths::Resolver;
 use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source};
 use crate::math::DAffine3;
-use crate::scene::{Instance, Material, Scene};
+use crate::scene::{Environment, Instance, Material, Scene};
 use accessor::Reader;
 use buffers::Buffers;
 use document::Document;
@@ -139,7 +139,9 @@ impl Loading<'_> {
             || read_meshes(reader, &placed, &skins, &palette, file),
             || images.decode(root, &drawn_images, file, &self.options.limits, &mut budget, &mut pictures),
         );
-        let mut scene = Scene { cameras: placed.cameras, lights: placed.lights, ..Scene::default() };
+        // glTF has no word for surroundings: its lights come on top of whatever the viewer puts around the model.
+        let environment = Environment::Studio;
+        let mut scene = Scene { cameras: placed.cameras, lights: placed.lights, environment, ..Scene::default() };
         self.assemble(&mut scene, &placed.draws, reads, facts)?;
         self.report.merge(pictures);
         scene.materials = palette.materials;
