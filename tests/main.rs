@@ -10,7 +10,10 @@
 )]
 #![allow(unreachable_pub, reason = "nobody uses a test binary as a library")]
 
+#[cfg(feature = "cli")]
+mod cli;
 mod common;
 mod golden;
+mod models;
 mod sweep;
 mod validator;

@@ -123,7 +123,8 @@ impl FromStr for ToneMap {
 
     fn from_str(name: &str) -> Result<Self, String> {
         let known = || Self::ALL.map(Self::name).join(", ");
-        Self::ALL.into_iter().find(|t| t.name() == name).ok_or_else(|| format!("not one of {}", known()))
+        let unknown = || format!("no tone map is called '{name}': it is one of {}", known());
+        Self::ALL.into_iter().find(|t| t.name() == name).ok_or_else(unknown)
     }
 }
 

@@ -21,7 +21,7 @@ fn another_input_under_the_same_name_is_refused() {
     folder.render(&["cube.obj"]).ends(0);
     let before = folder.read("cube.png");
     let folder = folder.file("cube.obj", CUBE.replace("v 1 1 1\n", "v 1 1 2\n"));
-    folder.run(&["render", "--again", "cube.png", "-o", "again.png"]).ends(3).says(&["cube.obj"]);
+    folder.run(&["render", "--again", "cube.png", "-o", "again.png"]).ends(3).says(&["cube.obj", "hash"]);
     assert!(!folder.has("again.png") && folder.read("cube.png") == before);
 }
 

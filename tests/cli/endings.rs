@@ -1,6 +1,6 @@
 //! Exit codes, and what is left behind by each ending.
 
-use super::program::{BROKEN_GLB, Folder, NOTHING_TO_DRAW, cube_without_its_materials};
+use super::program::{BROKEN_GLB, Folder, NOTHING_TO_DRAW, cube_with_a_bad_face};
 
 #[test]
 fn a_model_becomes_a_picture_of_its_name_and_nothing_else_happens() {
@@ -86,11 +86,11 @@ fn an_empty_scene_is_drawn_when_that_is_allowed() {
 
 #[test]
 fn warnings_do_not_stop_a_picture_unless_strict() {
-    let folder = Folder::new().file("cube.obj", cube_without_its_materials());
-    folder.render(&["cube.obj"]).ends(0).says(&["warning: ", "nowhere.mtl"]);
+    let folder = Folder::new().file("cube.obj", cube_with_a_bad_face());
+    folder.render(&["cube.obj"]).ends(0).says(&["warning: cube.obj"]);
     assert!(folder.has("cube.png"));
-    let folder = Folder::new().file("cube.obj", cube_without_its_materials());
-    folder.render(&["--strict", "cube.obj"]).ends(3).says(&["nowhere.mtl"]);
+    let folder = Folder::new().file("cube.obj", cube_with_a_bad_face());
+    folder.render(&["--strict", "cube.obj"]).ends(3).says(&["cube.obj"]);
     assert!(!folder.has("cube.png"));
 }
 
@@ -101,9 +101,10 @@ fn a_wrong_command_line_ends_in_2_and_names_the_nearest_word() {
     folder.run(&["rendr", "cube.obj"]).ends(2).says(&["render"]);
     folder.render(&["cube.obj", "--accel", "grid-octre"]).ends(2).says(&["grid-octree"]);
     for wrong in
-        [["--size", "0x4"], ["--samples", "0"], ["--fov", "400"], ["--view", "sideways"], ["--tone-map", "film"]]
+        ["--size=0x4", "--samples=0", "--fov=400", "--view=sideways", "--tone-map=film", "--background=purplish"]
     {
-        folder.run(&["render", "cube.obj", wrong[0], wrong[1]]).ends(2).says(&[wrong[0]]);
+        let value = wrong.split_once('=').unwrap().1;
+        folder.run(&["render", "cube.obj", wrong]).ends(2).says(&[value]);
     }
     folder.run(&["render"]).ends(2);
     assert_eq!(folder.names(), ["cube.obj"]);

@@ -1,11 +1,11 @@
 //! What goes to stderr, in which form.
 
-use super::program::{BROKEN_GLB, Folder, cube_without_its_materials};
+use super::program::{BROKEN_GLB, Folder, cube_with_a_bad_face};
 use serde_json::Value;
 
 #[test]
 fn json_messages_are_one_object_a_line_with_stable_fields() {
-    let folder = Folder::new().file("broken.glb", BROKEN_GLB).file("cube.obj", cube_without_its_materials());
+    let folder = Folder::new().file("broken.glb", BROKEN_GLB).file("cube.obj", cube_with_a_bad_face());
     let run = folder.render(&["--messages", "json", "broken.glb", "cube.obj"]).ends(3);
     let messages: Vec<Value> = run.stderr.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     for message in &messages {
@@ -30,8 +30,8 @@ fn quiet_says_nothing_when_all_is_well() {
 
 #[test]
 fn quiet_still_tells_warnings() {
-    let folder = Folder::new().file("cube.obj", cube_without_its_materials());
-    folder.render(&["--quiet", "cube.obj"]).ends(0).says(&["nowhere.mtl"]);
+    let folder = Folder::new().file("cube.obj", cube_with_a_bad_face());
+    folder.render(&["--quiet", "cube.obj"]).ends(0).says(&["warning: cube.obj"]);
 }
 
 #[test]

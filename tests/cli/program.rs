@@ -10,9 +10,9 @@ pub const CUBE: &str = "\
 v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1
 f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 
-/// The same cube, but its material library is missing: a warning.
-pub fn cube_without_its_materials() -> String {
-    format!("mtllib nowhere.mtl\nusemtl red\n{CUBE}")
+/// The same cube with one more face, which has no area and is dropped: a warning.
+pub fn cube_with_a_bad_face() -> String {
+    format!("{CUBE}f 1 1 2\n")
 }
 
 /// Points and lines only.
