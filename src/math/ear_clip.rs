@@ -7,7 +7,8 @@
 //! corner lies in it or on its diagonal, so corners on straight runs stay corners of some triangle and no T-junction
 //! arises. A polygon with n corners whose boundary does not cross itself, bridges to holes included, gives n − 2
 //! triangles of positive area. Spikes that stick out are dropped first. Where no ear is left, three fallbacks follow:
-//! straight corners are cut off with triangles of no area; a polygon that crosses itself loses its first convex corner whatever lies inside;
+//! straight corners are cut off with triangles of no area; a quad that crosses itself is cut along its shorter diagonal
+//! like every warped quad; a larger polygon that crosses itself loses its first convex corner whatever lies inside;
 //! after [`MAX_FORCED`] of those the rest becomes a fan. Every corner is still used, what is covered twice or lost
 //! there is undefined.
 
@@ -83,7 +84,10 @@ impl EarClipper {
                 let outcome = self.cut_seen(points, &ring, along_normal, out);
                 if outcome == Outcome::Crossing {
                     out.truncate(start);
-                    out.extend(first_try);
+                    match shorter_diagonal(points, &ring) {
+                        Some(pair) => out.extend(pair),
+                        None => out.extend(first_try),
+                    }
                 }
                 outcome
             }
@@ -400,6 +404,11 @@ fn convex_quad(flat: &[Coord<f64>], points: &[DVec3], ring: &[u32]) -> Option<[[
     if !(left(a, b, c) && left(b, c, d) && left(c, d, a) && left(d, a, b)) {
         return None;
     }
+    shorter_diagonal(points, ring)
+}
+
+fn shorter_diagonal(points: &[DVec3], ring: &[u32]) -> Option<[[u32; 3]; 2]> {
+    let &[a, b, c, d] = ring else { return None };
     let length = |i: u32, j: u32| points[i as usize].distance_squared(points[j as usize]);
     Some(if length(b, d) < length(a, c) { [[a, b, d], [b, c, d]] } else { [[a, b, c], [a, c, d]] })
 }

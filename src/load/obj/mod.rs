@@ -12,6 +12,7 @@ mod assemble;
 mod color;
 mod encoding;
 mod lines;
+mod mtl;
 mod number;
 mod pairs;
 mod place;
@@ -23,8 +24,8 @@ mod up;
 use super::limits::Budget;
 use super::paths::Resolver;
 use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
-use crate::math::DAffine3;
-use crate::scene::{Instance, Material, Mesh, Scene};
+use crate::math::{DAffine3, DVec3};
+use crate::scene::{Instance, Mesh, Scene, UpAxis};
 use assemble::Assembled;
 use statements::Statements;
 use std::path::Path;
@@ -38,7 +39,7 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
     let file = source.path.as_path();
     let mut warnings = Warnings::default();
     let mut budget = Budget::new(&options.limits);
-    let resolver = Resolver::new(source, options);
+    let mut resolver = Resolver::new(source, options);
 
     // Geometry.
     let mut statements = statements::read(&encoding::to_ascii_superset(&source.bytes), file)?;
@@ -55,17 +56,15 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
         warnings.push(Diagnostic::new("obj-no-faces", file, "", text));
     }
 
-    // Which way is up, and where everything stands.
-    let meshes = std::mem::take(&mut assembled.meshes);
-    let shapes: Vec<&Mesh> = meshes.iter().map(|(_, mesh)| mesh).collect();
-    let (guessed, reason) = up::guess(&statements.comments, &shapes, placed.center);
-    let mut scene = Scene { up: options.up.unwrap_or(guessed), materials: vec![Material::plain()], ..Scene::default() };
-    for (_, mesh) in meshes {
-        let index = scene.meshes.len() as u32;
-        let world_from_object = DAffine3::from_translation(placed.center);
-        scene.instances.push(Instance { name: mesh.name.clone(), mesh: index, world_from_object });
-        scene.meshes.push(mesh);
-    }
+    // Which way is up, what everything is made of, and where it stands.
+    let (runs, meshes): (Vec<u32>, Vec<Mesh>) = std::mem::take(&mut assembled.meshes).into_iter().unzip();
+    let (guessed, reason) = up::guess(&statements.comments, &meshes, placed.center);
+    let name = |run: &u32| statements.runs[*run as usize].material.map(|id| statements.names[id as usize].as_str());
+    let names: Vec<Option<&str>> = runs.iter().map(name).collect();
+    let mut reading =
+        mtl::Reading { file, options, resolver: &mut resolver, budget: &mut budget, warnings: &mut warnings };
+    let materials = mtl::load(&statements.libraries, &names, &mut reading);
+    let scene = scene(meshes, materials, placed.center, options.up.unwrap_or(guessed));
 
     let (files, hash) = resolver.finish();
     let facts = Facts {
@@ -81,6 +80,21 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
         ..Facts::default()
     };
     Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
+}
+
+/// One instance of each mesh, moved to where the file has it.
+fn scene(mut meshes: Vec<Mesh>, materials: mtl::Materials, center: DVec3, up: UpAxis) -> Scene {
+    let mtl::Materials { materials, textures, bitmaps, of_name } = materials;
+    for (mesh, material) in meshes.iter_mut().zip(of_name) {
+        mesh.material = material;
+        if materials.get(material as usize).is_some_and(|m| m.normal_map.is_some()) {
+            super::tangents::generate(mesh, 0);
+        }
+    }
+    let world_from_object = DAffine3::from_translation(center);
+    let instance = |(mesh, m): (u32, &Mesh)| Instance { name: m.name.clone(), mesh, world_from_object };
+    let instances = (0..).zip(&meshes).map(instance).collect();
+    Scene { meshes, instances, materials, textures, bitmaps, up, ..Scene::default() }
 }
 
 /// Vertex colours written as 0 … 255 become 0 … 1.
@@ -136,5 +150,7 @@ fn generator(comments: &[String]) -> String {
     comments.iter().find(names_a_program).cloned().unwrap_or_default()
 }
 
+#[cfg(test)]
+mod fuzz;
 #[cfg(test)]
 mod tests;

@@ -25,7 +25,7 @@ const Z_WRITERS: [&str; 13] = [
 ];
 
 /// Guesses from the comments, then from the shape; the text says why.
-pub(super) fn guess(comments: &[String], meshes: &[&Mesh], center: DVec3) -> (UpAxis, String) {
+pub(super) fn guess(comments: &[String], meshes: &[Mesh], center: DVec3) -> (UpAxis, String) {
     for comment in comments {
         let text = comment.to_lowercase().replace([' ', '-', '_', ':', '=', '+'], "");
         for (axis, said) in [(UpAxis::Z, "zup"), (UpAxis::Z, "upaxisz"), (UpAxis::Y, "yup"), (UpAxis::Y, "upaxisy")] {
@@ -45,7 +45,7 @@ pub(super) fn guess(comments: &[String], meshes: &[&Mesh], center: DVec3) -> (Up
 }
 
 /// Whether the shape is that of something standing on z = 0 and not on, or behind, y = 0.
-fn stands_on_z(meshes: &[&Mesh], center: DVec3) -> bool {
+fn stands_on_z(meshes: &[Mesh], center: DVec3) -> bool {
     /// Relative size of what counts as touching.
     const TOUCH: f64 = 1e-4;
     /// A bottom has at least this share of the whole surface.
@@ -81,7 +81,7 @@ mod tests {
 
     fn up(comments: &[&str], mesh: &Mesh) -> UpAxis {
         let comments: Vec<_> = comments.iter().map(|&c| c.to_owned()).collect();
-        guess(&comments, &[mesh], DVec3::ZERO).0
+        guess(&comments, std::slice::from_ref(mesh), DVec3::ZERO).0
     }
 
     /// A pyramid with its square bottom at height 0 of axis `up`, and its mirror image.

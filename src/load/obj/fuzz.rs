@@ -1,0 +1,104 @@
+//! Texts that nobody wrote: whatever comes in, the loader ends with a scene that holds together or with an error.
+
+use super::*;
+use crate::load::Polygons;
+use proptest::prelude::*;
+
+/// Words that OBJ and MTL texts are made of, and what breaks them.
+const WORDS: [&str; 44] = [
+    "v", "vt", "vn", "f", "l", "p", "o", "g", "s", "usemtl", "mtllib", "#", "\\", "0", "1", "2", "3", "4", "-1", "-2",
+    "5/1", "1/2/3", "2//1", "-1/-1/-1", "0.5", "1e300", "-1e-300", "nan", "1.#IND", "1,5", "3.1+e2", "off", "name",
+    "\n", "\n", "\r", "\r\n", "\t", "newmtl", "Kd", "map_Kd", "d", "-s", "\u{e4}",
+];
+
+fn text() -> impl Strategy<Value = String> {
+    let word = prop::sample::select(&WORDS[..]);
+    prop::collection::vec(word, 0..120).prop_map(|words| words.join(" "))
+}
+
+/// Vertices on a coarse lattice and faces of any corners: concave, crossing, collapsed, with and without normals.
+fn mesh() -> impl Strategy<Value = String> {
+    let vertex = (-2i32..3, -2i32..3, -1i32..2);
+    let corner = (1usize..8, 0usize..3, 0usize..3);
+    let face = (prop::collection::vec(corner, 1..9), 0u32..3);
+    (prop::collection::vec(vertex, 7..8), prop::collection::vec(face, 0..12)).prop_map(|(vertices, faces)| {
+        let mut text: String = vertices.iter().map(|(x, y, z)| format!("v {x} {y} {z}\n")).collect();
+        text += "vt 0 0\nvt 1 0.5\nvn 0 0 1\nvn 1 0 0\n";
+        for (corners, group) in faces {
+            text += &format!("s {group}\nusemtl m{group}\nf");
+            let or_none = |i: usize| if i == 0 { String::new() } else { i.to_string() };
+            text.extend(corners.iter().map(|&(v, vt, vn)| format!(" {v}/{}/{}", or_none(vt), or_none(vn))));
+            text.push('\n');
+        }
+        text
+    })
+}
+
+/// Every index points at something, every array is empty or full, every number is finite.
+fn assert_sound(loaded: &Loaded) {
+    let scene = &loaded.scene;
+    assert_eq!(scene.meshes.len(), scene.instances.len());
+    let mut faces = 0u64;
+    for mesh in &scene.meshes {
+        let n = mesh.positions.len();
+        assert!((mesh.material as usize) < scene.materials.len());
+        assert!(mesh.triangles.iter().flatten().chain(&mesh.polygon_corners).all(|&i| (i as usize) < n));
+        assert!(mesh.positions.iter().all(|p| p.is_finite()));
+        assert!(mesh.normals.is_empty() || mesh.normals.len() == n);
+        assert!(mesh.normals.iter().all(|v| (v.length() - 1.0).abs() < 1e-4), "{:?}", mesh.normals);
+        assert!(mesh.uvs.iter().all(|uvs| uvs.len() == n && uvs.iter().all(|uv| uv.is_finite())));
+        assert!(mesh.colors.is_empty() || mesh.colors.len() == n);
+        assert!(mesh.face_of_triangle.is_empty() || mesh.face_of_triangle.len() == mesh.triangles.len());
+        for t in &mesh.triangles {
+            let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
+            assert!(a != b && b != c && c != a);
+        }
+        let mut numbers: Vec<u32> = match mesh.face_of_triangle.is_empty() {
+            true => (0..mesh.triangles.len() as u32).collect(),
+            false => mesh.face_of_triangle.clone(),
+        };
+        numbers.dedup();
+        faces += (numbers.len() + mesh.polygons.len()) as u64;
+        assert!(mesh.polygons.iter().all(|p| p.len >= 3 && (p.first + p.len) as usize <= mesh.polygon_corners.len()));
+    }
+    assert_eq!(faces, loaded.facts.faces);
+}
+
+fn check(text: &str) {
+    for polygons in [Polygons::Cut, Polygons::Whole] {
+        let options = LoadOptions { polygons, ..LoadOptions::default() };
+        let source = Source { path: "fuzz.obj".into(), bytes: text.as_bytes().to_vec() };
+        if let Ok(loaded) = load(&source, &options) {
+            assert_sound(&loaded);
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn any_text_ends_in_a_sound_scene_or_an_error(text in text()) {
+        check(&text);
+    }
+
+    #[test]
+    fn any_mesh_ends_in_a_sound_scene(text in mesh()) {
+        check(&text);
+        let source = Source { path: "fuzz.obj".into(), bytes: text.into_bytes() };
+        prop_assert!(load(&source, &LoadOptions::default()).is_ok());
+    }
+
+    #[test]
+    fn any_bytes_end_in_a_sound_scene_or_an_error(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        let source = Source { path: "fuzz.obj".into(), bytes };
+        if let Ok(loaded) = load(&source, &LoadOptions::default()) {
+            assert_sound(&loaded);
+        }
+    }
+
+    #[test]
+    fn any_library_is_read(text in text(), tail in any::<Vec<u8>>()) {
+        let mut bytes = format!("newmtl a\n{text}").into_bytes();
+        bytes.extend(tail);
+        prop_assert!(!mtl::parse_names(&bytes).is_empty());
+    }
+}

@@ -1,0 +1,195 @@
+//! Finds the files that OBJ and MTL texts name: libraries and pictures.
+//!
+//! Names come from other machines: with backslashes, with folders that were not shipped, in another case, and several
+//! on one line although names may hold spaces. A file found elsewhere than its name says costs a warning; everything is
+//! read through the [`Resolver`], so nothing outside the root is.
+
+use crate::load::paths::{FileFault, Resolver};
+use std::path::{Path, PathBuf};
+
+/// Reads files by careless names.
+pub(super) struct Finder<'a> {
+    pub resolver: &'a mut Resolver,
+    /// Folder of the model.
+    pub base: PathBuf,
+}
+
+/// A file that was found.
+#[derive(Debug)]
+pub(super) struct Found {
+    /// Path relative to the model's folder, or absolute.
+    pub path: PathBuf,
+    pub bytes: Vec<u8>,
+    /// Whether it lies elsewhere than its name says.
+    pub guessed: bool,
+}
+
+/// Files of one folder that are looked through for a name in another case; bounds the time.
+const LISTED: usize = 10_000;
+
+impl Finder<'_> {
+    /// Reads `name`, looking in `folders` (relative to the model's), first as written, then by the last part of its
+    /// name alone, then in any case. The fault is that of the name as written.
+    pub(super) fn read(&mut self, name: &str, folders: &[&Path]) -> Result<Found, FileFault> {
+        let slashed = name.replace('\\', "/");
+        let mut fault = None;
+        for folder in folders {
+            for name in [name, &slashed] {
+                match self.resolver.read_file(&folder.join(name)) {
+                    Ok(bytes) => return Ok(Found { path: folder.join(name), bytes, guessed: false }),
+                    Err(e) => fault = fault.or(Some(e)),
+                }
+            }
+        }
+        self.elsewhere(&slashed, folders).ok_or_else(|| match fault {
+            // As written, not with the folder it was looked for in.
+            Some(FileFault::Missing(_)) | None => FileFault::Missing(name.into()),
+            Some(fault) => fault,
+        })
+    }
+
+    fn elsewhere(&mut self, name: &str, folders: &[&Path]) -> Option<Found> {
+        let last = Path::new(name).file_name()?.to_str()?;
+        for folder in folders {
+            let path = folder.join(last);
+            if let Ok(bytes) = self.resolver.read_file(&path) {
+                return Some(Found { path, bytes, guessed: true });
+            }
+        }
+        for folder in folders {
+            if let Some(path) = self.in_any_case(folder, last)
+                && let Ok(bytes) = self.resolver.read_file(&path)
+            {
+                return Some(Found { path, bytes, guessed: true });
+            }
+        }
+        None
+    }
+
+    /// The first file of a folder, by name, whose name differs only in case.
+    fn in_any_case(&self, folder: &Path, name: &str) -> Option<PathBuf> {
+        let entries = std::fs::read_dir(self.base.join(folder)).ok()?.take(LISTED).flatten();
+        let names = entries.filter_map(|e| e.file_name().into_string().ok());
+        names.filter(|n| n.eq_ignore_ascii_case(name)).min().map(|n| folder.join(n))
+    }
+
+    /// Reads the libraries of one `mtllib` statement: one name with spaces, or several names.
+    pub(super) fn libraries(&mut self, names: &str) -> Vec<Result<Found, FileFault>> {
+        let here = [Path::new("")];
+        let unescaped = names.replace("\\ ", " ");
+        if let Ok(found) = self.as_written(unquote(&unescaped)) {
+            return vec![Ok(found)];
+        }
+        // As many words as make the name of a file, or as few as end like one.
+        let words: Vec<String> = words(names);
+        let mut out = Vec::new();
+        let mut start = 0;
+        while start < words.len() {
+            let name = |end: usize| words[start..end].join(" ");
+            let longest = (start + 1..=words.len()).rev().take(WORDS);
+            let found = longest.map(|end| (end, self.as_written(&name(end)))).find(|(_, file)| file.is_ok());
+            let end = match found {
+                Some((end, file)) => {
+                    out.push(file);
+                    end
+                }
+                None => {
+                    let ends_like_one = |&end: &usize| words[end - 1].to_lowercase().ends_with(".mtl");
+                    let end = (start + 1..=words.len()).find(ends_like_one).unwrap_or(words.len());
+                    out.push(self.read(&name(end), &here));
+                    end
+                }
+            };
+            start = end;
+        }
+        out
+    }
+
+    fn as_written(&mut self, name: &str) -> Result<Found, FileFault> {
+        let path = PathBuf::from(name.replace('\\', "/"));
+        Ok(Found { bytes: self.resolver.read_file(&path)?, path, guessed: false })
+    }
+}
+
+/// Words of one `mtllib` statement that are tried as one name; bounds the time.
+const WORDS: usize = 32;
+
+/// Words between white space; a backslash keeps the space after it, quotes keep the spaces between them.
+fn words(names: &str) -> Vec<String> {
+    let mut out = vec![String::new()];
+    let mut quoted = false;
+    let mut chars = names.chars().peekable();
+    while let Some(c) = chars.next() {
+        let word = out.last_mut();
+        match (c, word) {
+            ('"', _) => quoted = !quoted,
+            ('\\', Some(word)) if chars.peek() == Some(&' ') => word.extend(chars.next()),
+            (c, Some(word)) if quoted || !c.is_whitespace() => word.push(c),
+            _ => out.push(String::new()),
+        }
+    }
+    out.retain(|word| !word.is_empty());
+    out
+}
+
+fn unquote(name: &str) -> &str {
+    name.strip_prefix('"').and_then(|n| n.strip_suffix('"')).unwrap_or(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::load::{LoadOptions, Source};
+    use std::fs;
+
+    fn with_files<T>(files: &[&str], run: impl FnOnce(&mut Finder) -> T) -> T {
+        let dir = tempfile::tempdir().unwrap();
+        for file in files {
+            let path = dir.path().join(file);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, file.as_bytes()).unwrap();
+        }
+        let source = Source { path: dir.path().join("m.obj"), bytes: Vec::new() };
+        let mut resolver = Resolver::new(&source, &LoadOptions::default());
+        run(&mut Finder { resolver: &mut resolver, base: dir.path().into() })
+    }
+
+    fn libraries(files: &[&str], names: &str) -> Vec<String> {
+        let shown = |found: Result<Found, FileFault>| match found {
+            Ok(found) => String::from_utf8(found.bytes).unwrap(),
+            Err(fault) => fault.to_string(),
+        };
+        with_files(files, |finder| finder.libraries(names).into_iter().map(shown).collect())
+    }
+
+    #[test]
+    fn one_statement_may_name_several_libraries_with_or_without_spaces() {
+        let files = ["a.mtl", "b c.mtl", "d/e.mtl"];
+        assert_eq!(libraries(&files, "a.mtl"), ["a.mtl"]);
+        assert_eq!(libraries(&files, "b c.mtl"), ["b c.mtl"]);
+        assert_eq!(libraries(&files, "a.mtl b c.mtl d/e.mtl"), ["a.mtl", "b c.mtl", "d/e.mtl"]);
+        assert_eq!(libraries(&files, "\"b c.mtl\" a.mtl"), ["b c.mtl", "a.mtl"]);
+        assert_eq!(libraries(&files, "b\\ c.mtl"), ["b c.mtl"]);
+        assert_eq!(libraries(&files, "d\\e.mtl"), ["d/e.mtl"]);
+        assert_eq!(libraries(&files, "no such.mtl a.mtl"), ["'no such.mtl' is not there", "a.mtl"]);
+        assert_eq!(libraries(&files, "lost"), ["'lost' is not there"]);
+        assert!(libraries(&files, "").is_empty());
+    }
+
+    #[test]
+    fn files_are_found_by_their_last_name_and_in_another_case() {
+        let read = |name: &str| {
+            with_files(&["maps/Wood.PNG", "here.png"], |finder| {
+                let found = finder.read(name, &[Path::new("maps"), Path::new("")]);
+                found.map(|f| (f.path.to_string_lossy().into_owned(), f.guessed)).map_err(|e| e.to_string())
+            })
+        };
+        assert_eq!(read("Wood.PNG"), Ok(("maps/Wood.PNG".into(), false)));
+        assert_eq!(read("wood.png"), Ok(("maps/Wood.PNG".into(), true)));
+        assert_eq!(read("C:\\Users\\me\\wood.png"), Ok(("maps/Wood.PNG".into(), true)));
+        assert_eq!(read("..\\maps\\Wood.PNG"), Ok(("maps/../maps/Wood.PNG".into(), false)));
+        assert_eq!(read("/else/where/here.png"), Ok(("here.png".into(), true)));
+        assert_eq!(read("tex\\none.png"), Err("'tex\\none.png' is not there".into()));
+        assert!(read("/etc/hostname").unwrap_err().contains("outside"));
+    }
+}

@@ -1,0 +1,417 @@
+//! A material as written -> a material as it is drawn.
+//!
+//! MTL has many careless writers. Under [`MtlMode::Guess`] the values that no one can have meant are replaced, each with
+//! a counted warning; under [`MtlMode::Literal`] the text counts. Both agree on this: colours are linear (the founding
+//! texts know nothing else, and Blender writes them so) and pictures sRGB-coded; surfaces are seen from both sides;
+//! `illum` 3 and above mirror by `Ks`, of these 4, 6, 7 and 9 are transparent, 5 and 7 have Fresnel's balance; a
+//! material with fields of physically based rendering (`Pr`, `Pm`, …) is one, and its `Ks` is not used.
+//!
+//! The numbers come first ([`Meaning`]), then the pictures ([`super::textures`]): what a factor means may depend on
+//! whether its map could be read.
+
+use super::parse::{Mtl, Slot};
+use crate::load::{Diagnostic, MtlMode, Warnings};
+use crate::math::Vec3;
+use crate::scene::{AlphaMode, Material, MetalRough, Phong, Surface};
+use std::path::Path;
+
+/// Diffuse colour of a material that gives none: that of [`Material::plain`].
+const NO_DIFFUSE: f32 = 0.6;
+/// Exponent of a highlight whose width nobody gave: that of a satin finish.
+const NO_SHININESS: f64 = 32.0;
+/// Index of refraction of glass nobody gave one for.
+const NO_IOR: f64 = 1.5;
+
+/// Gathers the numbers of one material.
+pub(super) struct Meaning<'a> {
+    pub mtl: &'a Mtl,
+    pub mode: MtlMode,
+    /// Where warnings say it was.
+    pub file: &'a Path,
+    pub warnings: &'a mut Warnings,
+    /// Whether the picture of a slot could be read.
+    pub has_map: &'a dyn Fn(Slot) -> bool,
+    /// Whether every material in use has an opacity of 0.
+    pub all_invisible: bool,
+}
+
+impl Meaning<'_> {
+    /// The material, without its maps.
+    pub(super) fn material(&mut self) -> Material {
+        let illum = self.illum();
+        let opacity = self.opacity();
+        let glass = self.glass(illum, opacity);
+        let passed = self.passed(glass, opacity);
+        let kd = self.diffuse();
+        let physical = self.mtl.is_physical();
+        let surface = if physical {
+            Surface::MetalRough(self.metal_rough(glass, passed))
+        } else if illum == 0 {
+            Surface::Unlit
+        } else {
+            Surface::Phong(self.phong(illum, kd, passed))
+        };
+        // Of glass, what does not pass is scattered; a physically based model finds that share itself.
+        let kept = if glass && !physical && self.mtl.d.is_some() { opacity } else { 1.0 };
+        let blended = !glass && opacity < 1.0;
+        Material {
+            name: self.mtl.name.clone(),
+            base_color: kd * kept,
+            opacity: if glass { 1.0 } else { opacity },
+            alpha_mode: if blended { AlphaMode::Blend } else { AlphaMode::Opaque },
+            double_sided: true,
+            emission: self.under_map(Slot::Emission, self.mtl.ke, Vec3::ZERO, "Ke"),
+            surface,
+            ..Material::default()
+        }
+    }
+
+    fn guessing(&self) -> bool {
+        self.mode == MtlMode::Guess
+    }
+
+    fn warn(&mut self, code: &'static str, text: &str) {
+        let line = self.mtl.line.to_string();
+        self.warnings.push(Diagnostic::new(code, self.file, line, text).remedy("--mtl literal follows the text"));
+    }
+
+    fn illum(&mut self) -> i32 {
+        match self.mtl.illum {
+            Some(0) if self.guessing() => {
+                self.warn("mtl-constant", "illum 0 (constant colour) is shaded like illum 1");
+                1
+            }
+            Some(illum) => illum,
+            None => 2,
+        }
+    }
+
+    fn diffuse(&mut self) -> Vec3 {
+        let missing_map = self.mtl.map(Slot::Diffuse).is_some() && !(self.has_map)(Slot::Diffuse);
+        let black = self.mtl.kd.is_some_and(|kd| kd == [0.0; 3]);
+        if missing_map && black && self.guessing() {
+            self.warn("mtl-black-under-map", "a colour of 0 under a map that cannot be read counts as grey");
+            return Vec3::splat(NO_DIFFUSE);
+        }
+        if self.mtl.kd.is_none() && !(self.has_map)(Slot::Diffuse) && self.guessing() {
+            self.warn("mtl-no-diffuse", "a material without Kd is grey");
+        }
+        let default = if (self.has_map)(Slot::Diffuse) { Vec3::ONE } else { Vec3::splat(NO_DIFFUSE) };
+        self.under_map(Slot::Diffuse, self.mtl.kd, default, "Kd")
+    }
+
+    /// A factor; black under a map counts as white, because many programs write 0 when the map replaces the colour.
+    fn under_map(&mut self, slot: Slot, factor: Option<[f64; 3]>, default: Vec3, name: &str) -> Vec3 {
+        let mapped = (self.has_map)(slot);
+        match factor {
+            Some([0.0, 0.0, 0.0]) if mapped && self.guessing() => {
+                self.warn("mtl-black-under-map", &format!("{name} 0 under a map counts as 1"));
+                Vec3::ONE
+            }
+            Some(factor) => color(factor),
+            None if mapped => Vec3::ONE,
+            None => default,
+        }
+    }
+
+    /// `d`, or 1 − `Tr`, 0 … 1.
+    fn opacity(&mut self) -> f32 {
+        let (d, tr) = (self.mtl.d, self.mtl.tr);
+        let opacity = match (d, tr) {
+            (Some(d), Some(tr)) if (d + tr - 1.0).abs() > 0.01 => {
+                self.warn("mtl-tr-contradicts-d", "Tr is not 1 - d; d counts");
+                d
+            }
+            (None, Some(tr)) if tr >= 1.0 && self.guessing() => {
+                self.warn("mtl-tr-as-opacity", "Tr 1 without d would hide the surface; it counts as opacity");
+                1.0
+            }
+            (Some(d), _) => d,
+            (None, Some(tr)) => 1.0 - tr,
+            (None, None) => 1.0,
+        };
+        let mapped = (self.has_map)(Slot::Dissolve) || (self.has_map)(Slot::Transparency);
+        if opacity <= 0.0 && self.guessing() && (self.all_invisible || mapped) {
+            self.warn("mtl-invisible", "d 0 would hide everything, or a map; it counts as 1");
+            return 1.0;
+        }
+        number(opacity.clamp(0.0, 1.0))
+    }
+
+    /// Whether light is refracted.
+    fn glass(&mut self, illum: i32, opacity: f32) -> bool {
+        let asked = matches!(illum, 4 | 6 | 7 | 9);
+        // White lets everything pass and black nothing, and opaque materials are written with either.
+        let filters = self.mtl.tf.is_some_and(|tf| tf != [1.0; 3] && tf != [0.0; 3]);
+        let passes = opacity < 1.0 || filters;
+        if self.guessing() {
+            let refracts = matches!(illum, 6 | 7) && self.mtl.tf.is_some_and(|tf| tf != [0.0; 3]);
+            if asked && !passes && !refracts {
+                self.warn("mtl-opaque-glass", "illum asks for glass, but d is 1 and Tf filters nothing: it is opaque");
+            }
+            filters || (asked && (passes || refracts))
+        } else {
+            asked || filters
+        }
+    }
+
+    /// Weight of the refracted ray: what `Tf` lets through of what `d` leaves.
+    fn passed(&self, glass: bool, opacity: f32) -> Vec3 {
+        if !glass {
+            return Vec3::ZERO;
+        }
+        let filter = self.mtl.tf.map_or(Vec3::ONE, color).clamp(Vec3::ZERO, Vec3::ONE);
+        let open = if opacity < 1.0 { 1.0 - opacity } else { 1.0 };
+        filter * open
+    }
+
+    fn ior(&mut self, glass: bool) -> f32 {
+        match self.mtl.ni {
+            Some(ni) if ni > 0.0 => number(ni.clamp(0.001, 10.0)),
+            _ if glass && self.guessing() => {
+                self.warn("mtl-no-ior", "glass without Ni has an index of refraction of 1.5");
+                number(NO_IOR)
+            }
+            _ => 1.0,
+        }
+    }
+
+    fn phong(&mut self, illum: i32, kd: Vec3, transmission: Vec3) -> Phong {
+        let glass = transmission != Vec3::ZERO;
+        let ks = self.under_map(Slot::Specular, self.mtl.ks, Vec3::ZERO, "Ks");
+        let mirrors = (3..=9).contains(&illum);
+        if mirrors && ks == Vec3::ZERO && !glass && self.guessing() {
+            self.warn("mtl-black-mirror", "illum asks for a mirror, but Ks is 0: there is none");
+        }
+        let (specular, shininess) = self.highlight(illum, ks);
+        let fresnel = matches!(illum, 5 | 7);
+        // Fresnel's balance needs something to balance: glass mirrors what it does not let through.
+        let mirror = if mirrors && glass && fresnel && ks == Vec3::ZERO && self.guessing() { transmission } else { ks };
+        Phong {
+            ambient: self.ambient(kd),
+            specular,
+            shininess,
+            mirror: if mirrors { mirror } else { Vec3::ZERO },
+            transmission,
+            ior: self.ior(glass),
+            fresnel,
+            ..Phong::default()
+        }
+    }
+
+    /// `Ka` is what most programs write without looking: 0, 1, or a copy of `Kd`.
+    fn ambient(&mut self, kd: Vec3) -> Vec3 {
+        let ka = self.mtl.ka.map(color);
+        if !self.guessing() {
+            return ka.unwrap_or(Vec3::ZERO);
+        }
+        if ka.is_some_and(|ka| ka != kd) {
+            self.warn("mtl-ambient", "Ka is not used; ambient light sees Kd");
+        }
+        kd
+    }
+
+    fn highlight(&mut self, illum: i32, ks: Vec3) -> (Vec3, f32) {
+        if illum <= 1 || ks == Vec3::ZERO {
+            return (Vec3::ZERO, 1.0);
+        }
+        match self.mtl.ns {
+            Some(ns) if ns > 0.0 => (ks, number(ns)),
+            Some(_) if self.guessing() => {
+                self.warn("mtl-flat-highlight", "Ns 0 would spread the highlight over everything; there is none");
+                (Vec3::ZERO, 1.0)
+            }
+            None if self.guessing() => {
+                self.warn("mtl-no-shininess", "Ks without Ns has an exponent of 32");
+                (ks, number(NO_SHININESS))
+            }
+            ns => (ks, number(ns.unwrap_or(1.0).max(0.0))),
+        }
+    }
+
+    /// A physically based material. Roughness that is not given comes from `Ns`, as the width of the highlight
+    /// (B. Walter et al., "Microfacet Models for Refraction through Rough Surfaces", 2007: α² = 2 / (n + 2)).
+    fn metal_rough(&mut self, glass: bool, passed: Vec3) -> MetalRough {
+        let packed = (self.has_map)(Slot::OcclusionRoughMetal);
+        let roughness = match self.mtl.pr {
+            Some(0.0) if self.guessing() && ((self.has_map)(Slot::Roughness) || packed) => 1.0,
+            Some(pr) => pr,
+            None if (self.has_map)(Slot::Roughness) || packed => 1.0,
+            None => self.mtl.ns.map_or(0.5, |ns| libm::pow(2.0 / (ns.max(0.0) + 2.0), 0.25)),
+        };
+        let metallic = match self.mtl.pm {
+            Some(0.0) if self.guessing() && ((self.has_map)(Slot::Metallic) || packed) => 1.0,
+            Some(pm) => pm,
+            None if (self.has_map)(Slot::Metallic) || packed => 1.0,
+            None => 0.0,
+        };
+        let ior = self.ior(glass);
+        MetalRough {
+            metallic: number(metallic.clamp(0.0, 1.0)),
+            roughness: number(roughness.clamp(0.0, 1.0)),
+            // 1 is what programs write that have no such field; a dielectric without reflection is not meant.
+            ior: if ior > 1.0 { ior } else { number(NO_IOR) },
+            transmission: passed.max_element(),
+            thick: glass,
+            ..MetalRough::default()
+        }
+    }
+}
+
+/// A colour, never negative.
+pub(super) fn color(c: [f64; 3]) -> Vec3 {
+    Vec3::from(c.map(number)).max(Vec3::ZERO)
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant; values were finite f64s")]
+fn number(x: f64) -> f32 {
+    (x as f32).clamp(-f32::MAX, f32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::parse::parse;
+    use super::*;
+
+    fn of(text: &str, mode: MtlMode, maps: &[Slot]) -> (Material, Vec<&'static str>) {
+        let mut warnings = Warnings::default();
+        let mtl = parse(format!("newmtl m\n{text}").as_bytes(), Path::new("m.mtl"), &mut warnings).remove(0);
+        let has_map = |slot| maps.contains(&slot);
+        let mut meaning = Meaning {
+            mtl: &mtl,
+            mode,
+            file: Path::new("m.mtl"),
+            warnings: &mut warnings,
+            has_map: &has_map,
+            all_invisible: false,
+        };
+        let material = meaning.material();
+        (material, warnings.into_vec().iter().map(|w| w.code).collect())
+    }
+
+    fn guess(text: &str) -> (Material, Vec<&'static str>) {
+        of(text, MtlMode::Guess, &[])
+    }
+
+    fn literal(text: &str) -> Material {
+        of(text, MtlMode::Literal, &[]).0
+    }
+
+    fn phong(material: &Material) -> &Phong {
+        match &material.surface {
+            Surface::Phong(phong) => phong,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_plain_diffuse_material_is_phong_seen_from_both_sides() {
+        let (m, warnings) = guess("Kd 0.5 0.25 0\nillum 1\nKs 1 1 1\nNs 10");
+        assert_eq!((m.base_color, m.opacity, m.alpha_mode), (Vec3::new(0.5, 0.25, 0.0), 1.0, AlphaMode::Opaque));
+        assert!(m.double_sided && warnings.is_empty());
+        let p = phong(&m);
+        assert_eq!(
+            (p.ambient, p.specular, p.mirror, p.transmission),
+            (m.base_color, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO)
+        );
+    }
+
+    #[test]
+    fn ambient_is_guessed_from_the_diffuse_color_and_literal_is_ka() {
+        let (m, warnings) = guess("Ka 1 1 1\nKd 0.5 0 0");
+        assert_eq!((phong(&m).ambient, warnings), (Vec3::new(0.5, 0.0, 0.0), vec!["mtl-ambient"]));
+        assert_eq!(phong(&literal("Ka 1 1 1\nKd 0.5 0 0")).ambient, Vec3::ONE);
+    }
+
+    #[test]
+    fn dissolve_blends_unless_illum_or_a_filter_makes_it_glass() {
+        let (m, warnings) = guess("Kd 1 1 1\nd 0.25\nillum 2");
+        assert_eq!((m.opacity, m.alpha_mode, warnings.len()), (0.25, AlphaMode::Blend, 0));
+        assert_eq!(phong(&m).transmission, Vec3::ZERO);
+
+        let (m, _) = guess("Kd 1 1 1\nd 0.25\nillum 6\nNi 1.52\nKs 0.1 0.1 0.1\nNs 9");
+        assert_eq!((m.opacity, m.alpha_mode, m.base_color), (1.0, AlphaMode::Opaque, Vec3::splat(0.25)));
+        let p = phong(&m);
+        assert_eq!((p.transmission, p.mirror, p.ior, p.fresnel), (Vec3::splat(0.75), Vec3::splat(0.1), 1.52, false));
+
+        let (m, _) = guess("Kd 0 0 0\nTf 1 0.5 0\nillum 2\nNi 1.5");
+        assert_eq!(phong(&m).transmission, Vec3::new(1.0, 0.5, 0.0));
+        assert_eq!(phong(&m).mirror, Vec3::ZERO);
+        let (m, warnings) = guess("Kd 0 0 0\nTf 1 0.5 0\nillum 7\nd 0.5");
+        assert_eq!((phong(&m).transmission, phong(&m).ior), (Vec3::new(0.5, 0.25, 0.0), 1.5));
+        assert_eq!(warnings, ["mtl-no-ior"]);
+    }
+
+    #[test]
+    fn opaque_filters_of_careless_exporters_make_no_glass() {
+        for text in ["Kd 1 1 1\nTf 1 1 1\nillum 2", "Kd 1 1 1\nTf 0 0 0\nillum 2", "Kd 1 1 1\nd 1\nTr 0\nillum 4"] {
+            assert_eq!(phong(&guess(text).0).transmission, Vec3::ZERO, "{text}");
+        }
+        assert_eq!(guess("Kd 1 1 1\nKs 1\nNs 9\nillum 7").1, ["mtl-opaque-glass"]);
+        assert_ne!(phong(&literal("Kd 1 1 1\nillum 7\nTf 0.5")).transmission, Vec3::ZERO);
+    }
+
+    #[test]
+    fn only_illum_and_specular_together_make_a_mirror() {
+        let mirror = |illum: i32, ks: f64| {
+            let (m, warnings) = guess(&format!("Kd 0 0 0\nKs {ks} {ks} {ks}\nNs 50\nillum {illum}"));
+            (phong(&m).mirror, phong(&m).fresnel, warnings)
+        };
+        assert_eq!(mirror(2, 1.0), (Vec3::ZERO, false, vec![]));
+        assert_eq!(mirror(3, 0.5), (Vec3::splat(0.5), false, vec![]));
+        assert_eq!(mirror(5, 0.5), (Vec3::splat(0.5), true, vec![]));
+        assert_eq!(mirror(8, 0.5), (Vec3::splat(0.5), false, vec![]));
+        assert_eq!(mirror(3, 0.0), (Vec3::ZERO, false, vec!["mtl-black-mirror"]));
+    }
+
+    #[test]
+    fn tr_is_the_rest_of_d_and_d_wins() {
+        assert_eq!(guess("Kd 1\nTr 0.25").0.opacity, 0.75);
+        let (m, warnings) = guess("Kd 1\nd 0.75\nTr 0.5");
+        assert_eq!((m.opacity, warnings), (0.75, vec!["mtl-tr-contradicts-d"]));
+        let (m, warnings) = guess("Kd 1\nTr 1");
+        assert_eq!((m.opacity, warnings), (1.0, vec!["mtl-tr-as-opacity"]));
+        assert_eq!(literal("Kd 1\nTr 1").opacity, 0.0);
+    }
+
+    #[test]
+    fn black_under_a_map_is_white_and_under_a_lost_one_grey() {
+        let (m, warnings) = of("Kd 0 0 0\nmap_Kd a.png", MtlMode::Guess, &[Slot::Diffuse]);
+        assert_eq!((m.base_color, warnings), (Vec3::ONE, vec!["mtl-black-under-map"]));
+        let (m, _) = of("Kd 0 0 0\nmap_Kd a.png", MtlMode::Guess, &[]);
+        assert_eq!(m.base_color, Vec3::splat(NO_DIFFUSE));
+        assert_eq!(of("Kd 0 0 0\nmap_Kd a.png", MtlMode::Literal, &[Slot::Diffuse]).0.base_color, Vec3::ZERO);
+        assert_eq!(of("Ke 0 0 0\nKd 1\nmap_Ke a.png", MtlMode::Guess, &[Slot::Emission]).0.emission, Vec3::ONE);
+        assert_eq!(of("map_Kd a.png", MtlMode::Guess, &[Slot::Diffuse]).0.base_color, Vec3::ONE);
+        assert_eq!(guess("Ns 1").1, ["mtl-no-diffuse"]);
+    }
+
+    #[test]
+    fn a_highlight_without_width_is_none_and_without_exponent_satin() {
+        let (m, warnings) = guess("Kd 1\nKs 1\nNs 0\nillum 2");
+        assert_eq!((phong(&m).specular, warnings), (Vec3::ZERO, vec!["mtl-flat-highlight"]));
+        let (m, warnings) = guess("Kd 1\nKs 1");
+        assert_eq!((phong(&m).shininess, warnings), (32.0, vec!["mtl-no-shininess"]));
+        assert_eq!(phong(&literal("Kd 1\nKs 1\nNs 0")).shininess, 0.0);
+    }
+
+    #[test]
+    fn physical_fields_make_a_metal_rough_material() {
+        let (m, warnings) = guess("Kd 1 0 0\nPr 0.25\nPm 0.75\nNi 1.45\nKs 0.5 0.5 0.5");
+        let Surface::MetalRough(s) = &m.surface else { panic!() };
+        assert_eq!((s.roughness, s.metallic, s.ior, s.transmission), (0.25, 0.75, 1.45, 0.0));
+        assert!(warnings.is_empty());
+        let (m, _) = guess("Kd 1 1 1\nPr 0\nd 0.1\nillum 9\nNi 1.5");
+        let Surface::MetalRough(s) = &m.surface else { panic!() };
+        assert!((s.transmission - 0.9).abs() < 1e-6 && s.thick && m.base_color == Vec3::ONE);
+        let (m, _) = guess("Kd 1\nPm 1\nNs 98");
+        let Surface::MetalRough(s) = &m.surface else { panic!() };
+        assert!((s.roughness - 0.02f32.sqrt().sqrt()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn illum_0_is_constant_only_literally() {
+        assert!(matches!(literal("Kd 1\nillum 0").surface, Surface::Unlit));
+        assert_eq!(guess("Kd 1\nillum 0").1, ["mtl-constant"]);
+    }
+}

@@ -1,0 +1,224 @@
+//! MTL files -> the materials, textures and bitmaps that a model uses.
+//!
+//! Own code, because `tobj` stops at `Kd 0.5`, takes two file names for one, and leaves map options to its caller.
+
+mod library;
+mod meaning;
+mod options;
+mod parse;
+mod pictures;
+mod textures;
+
+use super::lines::without_comment;
+use crate::load::limits::{Budget, Limits};
+use crate::load::paths::{Resolver, shorten};
+use crate::load::{Diagnostic, LoadOptions, MtlMode, Warnings};
+use crate::scene::{Bitmap, Material, Texture};
+use library::{Finder, Found};
+use meaning::Meaning;
+use parse::{Mtl, Slot};
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+use textures::{Library, Mapper, Textures};
+
+/// What a model's surfaces are made of.
+#[derive(Debug, Default)]
+pub(super) struct Materials {
+    pub materials: Vec<Material>,
+    pub textures: Vec<Texture>,
+    pub bitmaps: Vec<Bitmap>,
+    /// Index into `materials` for each name asked for.
+    pub of_name: Vec<u32>,
+}
+
+/// Everything that reading files needs.
+pub(super) struct Reading<'a> {
+    /// The model.
+    pub file: &'a Path,
+    pub options: &'a LoadOptions,
+    pub resolver: &'a mut Resolver,
+    pub budget: &'a mut Budget,
+    pub warnings: &'a mut Warnings,
+}
+
+/// A library that was read.
+struct Read {
+    /// For messages.
+    file: PathBuf,
+    /// Relative to the model's.
+    folder: PathBuf,
+    materials: Vec<Mtl>,
+}
+
+/// Reads what `mtllib` statements (`libraries`, with their lines) name and makes the materials called `names`; `None`
+/// is a run before any `usemtl`.
+pub(super) fn load(libraries: &[(u32, String)], names: &[Option<&str>], reading: &mut Reading) -> Materials {
+    let mut read = read_libraries(libraries, reading);
+    if read.is_empty() && names.iter().any(Option::is_some) {
+        read.extend(library_beside(reading));
+    }
+    let found: Vec<Option<(usize, usize)>> = {
+        let known = index(&read);
+        names.iter().map(|name| name.and_then(|name| lookup(&known, name))).collect()
+    };
+    warn_of_undefined(names, &found, reading);
+
+    // Pictures of the materials in use, library by library.
+    let used: Vec<(usize, usize)> = first_of_each(found.iter().flatten().copied());
+    let mut textures = Textures::default();
+    for (number, library) in read.iter().enumerate() {
+        let materials = used.iter().filter(|u| u.0 == number).map(|u| &library.materials[u.1]);
+        let of = Library { number, file: &library.file, folder: &library.folder };
+        let mut finder = Finder { resolver: reading.resolver, base: folder_of(reading.file) };
+        let limits: (&Limits, &mut Budget) = (&reading.options.limits, reading.budget);
+        textures.read(&of, materials, reading.options.mtl, &mut finder, limits, reading.warnings);
+    }
+
+    // The materials themselves.
+    let invisible = |&(l, m): &(usize, usize)| read[l].materials[m].d == Some(0.0);
+    let all_invisible = !used.is_empty() && used.iter().all(invisible) && found.iter().all(Option::is_some);
+    let mut out = Materials::default();
+    let mut made: HashMap<(usize, usize), u32> = HashMap::new();
+    let mut plain: HashMap<&str, u32> = HashMap::new();
+    for (name, found) in names.iter().zip(found) {
+        let next = u32::try_from(out.materials.len()).unwrap_or(u32::MAX);
+        let index = match found {
+            Some(at) => *made.entry(at).or_insert_with(|| {
+                out.materials.push(make(&read, at, all_invisible, &mut textures, reading));
+                next
+            }),
+            None => *plain.entry(name.unwrap_or_default()).or_insert_with(|| {
+                out.materials.push(plain_material(name.unwrap_or_default()));
+                next
+            }),
+        };
+        out.of_name.push(index);
+    }
+    (out.textures, out.bitmaps) = textures.finish();
+    out
+}
+
+fn read_libraries(libraries: &[(u32, String)], reading: &mut Reading) -> Vec<Read> {
+    let mut out = Vec::new();
+    let mut seen = HashSet::new();
+    for (line, names) in libraries {
+        let mut finder = Finder { resolver: reading.resolver, base: folder_of(reading.file) };
+        let mut found = finder.libraries(names);
+        let cut = String::from_utf8_lossy(without_comment(names.as_bytes())).into_owned();
+        if cut != *names && !found.iter().all(Result::is_ok) {
+            found = finder.libraries(&cut);
+        }
+        for file in found {
+            match file {
+                Ok(file) if seen.insert(file.path.clone()) => out.push(read_library(file, *line, names, reading)),
+                Ok(_) => {}
+                Err(fault) => {
+                    let warning = fault.diagnose(reading.file, &line.to_string());
+                    let text = format!("material library {}", warning.text);
+                    reading.warnings.push(Diagnostic { text, ..warning });
+                }
+            }
+        }
+    }
+    out
+}
+
+fn read_library(found: Found, line: u32, names: &str, reading: &mut Reading) -> Read {
+    if found.guessed {
+        let text = format!("material library '{}' is taken from '{}'", shorten(names), found.path.display());
+        reading.warnings.push(Diagnostic::new("mtl-file-elsewhere", reading.file, line.to_string(), text));
+    }
+    let file = folder_of(reading.file).join(&found.path);
+    let materials = parse::parse(&found.bytes, &file, reading.warnings);
+    let folder = found.path.parent().map(Path::to_path_buf).unwrap_or_default();
+    Read { file, folder, materials }
+}
+
+/// The library of the model's own name, for models that use materials but name no library that is there.
+fn library_beside(reading: &mut Reading) -> Option<Read> {
+    if reading.options.mtl == MtlMode::Literal {
+        return None;
+    }
+    let name = Path::new(reading.file.file_name()?).with_extension("mtl");
+    let bytes = reading.resolver.read_file(&name).ok()?;
+    let text = format!("no material library was found by name; '{}' lies beside and is used", name.display());
+    reading.warnings.push(Diagnostic::new("mtl-beside-model", reading.file, "", text));
+    Some(read_library(Found { path: name, bytes, guessed: false }, 0, "", reading))
+}
+
+fn folder_of(file: &Path) -> PathBuf {
+    file.parent().map(Path::to_path_buf).unwrap_or_default()
+}
+
+/// Materials by name, as written and without what looks like a comment; the first of a name counts, as the OBJ text
+/// says of several libraries.
+fn index(read: &[Read]) -> HashMap<&[u8], (usize, usize)> {
+    let mut known: HashMap<&[u8], (usize, usize)> = HashMap::new();
+    let all = || read.iter().enumerate().flat_map(|(l, read)| read.materials.iter().enumerate().map(move |m| (l, m)));
+    for (l, (m, mtl)) in all() {
+        known.entry(mtl.name.as_bytes()).or_insert((l, m));
+    }
+    for (l, (m, mtl)) in all() {
+        known.entry(without_comment(mtl.name.as_bytes())).or_insert((l, m));
+    }
+    known
+}
+
+fn lookup(known: &HashMap<&[u8], (usize, usize)>, name: &str) -> Option<(usize, usize)> {
+    known.get(name.as_bytes()).or_else(|| known.get(without_comment(name.as_bytes()))).copied()
+}
+
+fn first_of_each<T: Copy + Eq + std::hash::Hash>(items: impl Iterator<Item = T>) -> Vec<T> {
+    let mut seen = HashSet::new();
+    items.filter(|&item| seen.insert(item)).collect()
+}
+
+/// One warning for all names that no library defines. A `usemtl` without a name asks for no material.
+fn warn_of_undefined(names: &[Option<&str>], found: &[Option<(usize, usize)>], reading: &mut Reading) {
+    /// Names that are listed.
+    const LISTED: usize = 4;
+    let lost = names.iter().zip(found).filter(|(_, found)| found.is_none()).filter_map(|(name, _)| *name);
+    let lost = first_of_each(lost.filter(|name| !name.is_empty()));
+    if lost.is_empty() {
+        return;
+    }
+    let mut list = lost.iter().take(LISTED).map(|n| format!("'{}'", shorten(n))).collect::<Vec<_>>().join(", ");
+    if lost.len() > LISTED {
+        list += ", …";
+    }
+    let are = if lost.len() == 1 { "material is" } else { "materials are" };
+    let text = format!("{} {are} not defined and drawn plain: {list}", lost.len());
+    reading.warnings.push(Diagnostic::new("mtl-undefined-material", reading.file, "", text));
+}
+
+fn plain_material(name: &str) -> Material {
+    let plain = Material::plain();
+    if name.is_empty() { plain } else { Material { name: name.into(), ..plain } }
+}
+
+fn make(
+    read: &[Read],
+    (l, m): (usize, usize),
+    all_invisible: bool,
+    textures: &mut Textures,
+    reading: &mut Reading,
+) -> Material {
+    let library = Library { number: l, file: &read[l].file, folder: &read[l].folder };
+    let (mtl, mode) = (&read[l].materials[m], reading.options.mtl);
+    let has_map = |slot: Slot| textures.picture(l, mtl, slot).is_some();
+    let mut meaning =
+        Meaning { mtl, mode, file: library.file, warnings: reading.warnings, has_map: &has_map, all_invisible };
+    let mut material = meaning.material();
+    Mapper { textures, library: &library, mtl, mode, warnings: reading.warnings }.apply(&mut material);
+    material
+}
+
+/// Names of the materials in a text.
+#[cfg(test)]
+pub(super) fn parse_names(text: &[u8]) -> Vec<String> {
+    let materials = parse::parse(text, Path::new("m.mtl"), &mut Warnings::default());
+    materials.into_iter().map(|m| m.name).collect()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,293 @@
+//! MTL text -> materials as written, before anything is made of them.
+
+use super::options::{self, Map};
+use crate::load::obj::encoding::{decode_name, to_ascii_superset};
+use crate::load::obj::lines::{Lines, keyword, words};
+use crate::load::obj::number;
+use crate::load::paths::shorten;
+use crate::load::{Diagnostic, Warnings};
+use std::path::Path;
+
+/// A material as written; `None`: not said.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Mtl {
+    pub name: String,
+    /// Line of its `newmtl`.
+    pub line: u32,
+    pub ka: Option<[f64; 3]>,
+    pub kd: Option<[f64; 3]>,
+    pub ks: Option<[f64; 3]>,
+    pub ke: Option<[f64; 3]>,
+    pub tf: Option<[f64; 3]>,
+    pub ns: Option<f64>,
+    pub ni: Option<f64>,
+    pub d: Option<f64>,
+    pub tr: Option<f64>,
+    pub illum: Option<i32>,
+    pub pr: Option<f64>,
+    pub pm: Option<f64>,
+    /// Fields of physically based materials that are not drawn: sheen, clear coat, anisotropy.
+    pub unsupported: Vec<(u32, &'static str)>,
+    pub maps: Vec<(Slot, Map)>,
+}
+
+/// What a map changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Slot {
+    Ambient,
+    Diffuse,
+    Specular,
+    Emission,
+    Shininess,
+    Dissolve,
+    Transparency,
+    Bump,
+    Normal,
+    Roughness,
+    Metallic,
+    /// Occlusion, roughness, metal in red, green, blue.
+    OcclusionRoughMetal,
+}
+
+/// Map statements, in lower case.
+const MAPS: [(&[u8], Slot); 17] = [
+    (b"map_ka", Slot::Ambient),
+    (b"map_kd", Slot::Diffuse),
+    (b"map_ks", Slot::Specular),
+    (b"map_ke", Slot::Emission),
+    (b"map_ns", Slot::Shininess),
+    (b"map_d", Slot::Dissolve),
+    (b"map_opacity", Slot::Dissolve),
+    (b"map_tr", Slot::Transparency),
+    (b"map_bump", Slot::Bump),
+    (b"bump", Slot::Bump),
+    (b"norm", Slot::Normal),
+    (b"map_norm", Slot::Normal),
+    (b"map_normal", Slot::Normal),
+    (b"map_kn", Slot::Normal),
+    (b"map_pr", Slot::Roughness),
+    (b"map_pm", Slot::Metallic),
+    (b"map_orm", Slot::OcclusionRoughMetal),
+];
+
+/// Fields and maps that are known and not drawn.
+const UNSUPPORTED: [(&[u8], &str); 16] = [
+    (b"ps", "sheen (Ps)"),
+    (b"pc", "clear coat (Pc)"),
+    (b"pcr", "clear coat (Pcr)"),
+    (b"aniso", "anisotropy (aniso)"),
+    (b"anisor", "anisotropy (anisor)"),
+    (b"map_ps", "sheen (map_Ps)"),
+    (b"map_pc", "clear coat (map_Pc)"),
+    (b"map_pcr", "clear coat (map_Pcr)"),
+    (b"map_aniso", "anisotropy (map_aniso)"),
+    (b"map_anisor", "anisotropy (map_anisor)"),
+    (b"disp", "displacement (disp)"),
+    (b"map_disp", "displacement (map_disp)"),
+    (b"decal", "a decal (decal)"),
+    (b"refl", "a reflection map (refl)"),
+    (b"map_refl", "a reflection map (map_refl)"),
+    (b"map_rma", "a packed map (map_RMA)"),
+];
+
+/// Statements that change nothing in our pictures.
+const SILENT: [&[u8]; 4] = [b"sharpness", b"map_aat", b"km", b"ke_strength"];
+
+impl Mtl {
+    /// The last map of a slot.
+    pub(super) fn map(&self, slot: Slot) -> Option<&Map> {
+        self.maps.iter().rev().find(|(s, _)| *s == slot).map(|(_, map)| map)
+    }
+
+    /// Whether any field or map of physically based materials is there. A normal map alone says nothing about
+    /// roughness or metal and does not count.
+    pub(super) fn is_physical(&self) -> bool {
+        let of_pbr = |what: &str| ["sheen", "clear", "aniso", "a packed"].iter().any(|start| what.starts_with(start));
+        self.pr.or(self.pm).is_some()
+            || [Slot::Roughness, Slot::Metallic, Slot::OcclusionRoughMetal].iter().any(|&s| self.map(s).is_some())
+            || self.unsupported.iter().any(|(_, what)| of_pbr(what))
+    }
+}
+
+/// Reads all materials of `text`; what cannot be read costs a warning about `file`.
+pub(super) fn parse(text: &[u8], file: &Path, warnings: &mut Warnings) -> Vec<Mtl> {
+    let text = to_ascii_superset(text);
+    let mut lines = Lines::new(&text);
+    let mut parser = Parser { file, line: 0, warnings };
+    let mut out: Vec<Mtl> = Vec::new();
+    while let Some((line, text)) = lines.next() {
+        let (word, rest) = keyword(text);
+        parser.line = line;
+        if word.eq_ignore_ascii_case(b"newmtl") {
+            out.push(Mtl { name: decode_name(rest), line, ..Mtl::default() });
+        } else if word[0] != b'#'
+            && let Some(material) = out.last_mut()
+        {
+            parser.field(material, &word.to_ascii_lowercase(), rest);
+        }
+    }
+    out
+}
+
+struct Parser<'a> {
+    file: &'a Path,
+    line: u32,
+    warnings: &'a mut Warnings,
+}
+
+impl Parser<'_> {
+    fn field(&mut self, m: &mut Mtl, word: &[u8], rest: &[u8]) {
+        match word {
+            b"ka" => m.ka = self.color(rest).or(m.ka),
+            b"kd" => m.kd = self.color(rest).or(m.kd),
+            b"ks" => m.ks = self.color(rest).or(m.ks),
+            b"ke" => m.ke = self.color(rest).or(m.ke),
+            b"tf" | b"kt" => m.tf = self.color(rest).or(m.tf),
+            b"ns" => m.ns = self.number(rest).or(m.ns),
+            b"ni" => m.ni = self.number(rest).or(m.ni),
+            b"d" => m.d = self.dissolve(rest).or(m.d),
+            b"tr" => m.tr = self.number(rest).or(m.tr),
+            #[expect(clippy::cast_possible_truncation, reason = "saturates")]
+            b"illum" => m.illum = self.number(rest).map(|n| n as i32).or(m.illum),
+            b"pr" => m.pr = self.number(rest).or(m.pr),
+            b"pm" => m.pm = self.number(rest).or(m.pm),
+            _ if SILENT.contains(&word) => {}
+            _ => self.map_or_unknown(m, word, rest),
+        }
+    }
+
+    fn map_or_unknown(&mut self, m: &mut Mtl, word: &[u8], rest: &[u8]) {
+        if let Some((_, slot)) = MAPS.iter().find(|(name, _)| *name == word) {
+            match options::parse(rest, self.line) {
+                Some(map) => {
+                    for option in &map.ignored {
+                        self.warn("mtl-map-option", format!("the option '{option}' of a map is ignored"));
+                    }
+                    m.maps.push((*slot, map));
+                }
+                None => self.warn("mtl-map-without-file", format!("'{}' names no file", decode_name(word))),
+            }
+        } else if let Some((_, what)) = UNSUPPORTED.iter().find(|(name, _)| *name == word) {
+            // Exporters write zeros for what a material does not have.
+            let zero = words(rest).next().and_then(|w| number::check(w).word.parse::<f64>().ok()) == Some(0.0);
+            if !zero {
+                self.warn("mtl-unsupported", format!("{what} is not drawn"));
+            }
+            m.unsupported.push((self.line, what));
+        } else {
+            self.warn("mtl-unknown-statement", format!("'{}' is not an MTL statement", shorten(&decode_name(word))));
+        }
+    }
+
+    /// `r [g b]`, `xyz x [y z]` or `spectral file [factor]`.
+    fn color(&mut self, rest: &[u8]) -> Option<[f64; 3]> {
+        let mut words = words(rest).peekable();
+        let kind = words.next_if(|w| matches!(*w, b"spectral" | b"xyz"));
+        if kind == Some(b"spectral") {
+            self.warn("mtl-spectral", "a spectral curve (.rfl) is not read; the colour counts as not given".into());
+            return None;
+        }
+        let numbers: Vec<f64> = words.take(3).map_while(|w| number::check(w).word.parse().ok()).collect();
+        let first = numbers.first().copied().filter(|n| n.is_finite());
+        let Some(first) = first else {
+            self.warn("mtl-bad-number", format!("'{}' is not a colour", shorten(&decode_name(rest))));
+            return None;
+        };
+        let or_first = |i: usize| numbers.get(i).copied().filter(|n| n.is_finite()).unwrap_or(first);
+        let color = [first, or_first(1), or_first(2)];
+        if kind.is_some() {
+            self.warn("mtl-xyz", "a CIE XYZ colour is converted to Rec. 709".into());
+            return Some(rec709(color));
+        }
+        Some(color)
+    }
+
+    fn number(&mut self, rest: &[u8]) -> Option<f64> {
+        let value = words(rest).next().and_then(|w| number::check(w).word.parse().ok()).filter(|n: &f64| n.is_finite());
+        if value.is_none() {
+            self.warn("mtl-bad-number", format!("'{}' is not a number", shorten(&decode_name(rest))));
+        }
+        value
+    }
+
+    /// `factor`, or `-halo factor`, which fades towards the silhouette.
+    fn dissolve(&mut self, rest: &[u8]) -> Option<f64> {
+        match rest.strip_prefix(b"-halo") {
+            Some(rest) => {
+                self.warn("mtl-halo", "'d -halo' is drawn without its halo".into());
+                self.number(rest)
+            }
+            None => self.number(rest),
+        }
+    }
+
+    fn warn(&mut self, code: &'static str, text: String) {
+        self.warnings.push(Diagnostic::new(code, self.file, self.line.to_string(), text));
+    }
+}
+
+/// CIE XYZ -> linear Rec. 709, D65 white (IEC 61966-2-1); negative parts are out of gamut and cut.
+fn rec709([x, y, z]: [f64; 3]) -> [f64; 3] {
+    let rgb = [
+        3.240_454_2 * x - 1.537_138_5 * y - 0.498_531_4 * z,
+        -0.969_266_0 * x + 1.876_010_8 * y + 0.041_556_0 * z,
+        0.055_643_4 * x - 0.204_025_9 * y + 1.057_225_2 * z,
+    ];
+    rgb.map(|c| c.max(0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(text: &str) -> (Vec<Mtl>, Vec<Diagnostic>) {
+        let mut warnings = Warnings::default();
+        (parse(text.as_bytes(), Path::new("m.mtl"), &mut warnings), warnings.into_vec())
+    }
+
+    #[test]
+    fn every_number_is_read_whatever_the_case_of_its_name() {
+        let text = "newmtl a b\n\tKa .1 .2 .3 # c\nkd 0.5\nKS 1 0\nNs 10\nNI 1.5\nd 0.5\nTr 0.25\nillum 7\nTf 1 1 0\nPr .1\nPm 1";
+        let (materials, warnings) = of(text);
+        let m = &materials[0];
+        assert_eq!((m.name.as_str(), m.line), ("a b", 1));
+        assert_eq!((m.ka, m.kd, m.ks), (Some([0.1, 0.2, 0.3]), Some([0.5; 3]), Some([1.0, 0.0, 1.0])));
+        assert_eq!((m.ns, m.ni, m.d, m.tr, m.illum), (Some(10.0), Some(1.5), Some(0.5), Some(0.25), Some(7)));
+        assert_eq!((m.tf, m.pr, m.pm), (Some([1.0, 1.0, 0.0]), Some(0.1), Some(1.0)));
+        assert!(m.is_physical() && warnings.is_empty(), "{warnings:?}");
+    }
+
+    #[test]
+    fn what_cannot_be_read_or_drawn_is_a_counted_warning_and_nothing_else() {
+        let text = "Kd 9 9 9\nnewmtl a\nKd spectral x.rfl 1\nKs xyz 0.9505 1 1.089\nNs x\nd -halo 0.5\nmap_Kd\nfoo 1\nfoo 2\n\
+                    refl -type sphere a.png\nPs 0\nPc 0.5\nmap_Ks -type cube_top a.png";
+        let (materials, warnings) = of(text);
+        let m = &materials[0];
+        assert_eq!((m.kd, m.ns, m.d), (None, None, Some(0.5)));
+        assert!(m.ks.unwrap().iter().all(|c| (c - 1.0).abs() < 1e-3), "{:?}", m.ks);
+        let codes: Vec<_> = warnings.iter().map(|w| (w.code, w.count)).collect();
+        assert_eq!(
+            codes,
+            [
+                ("mtl-spectral", 1),
+                ("mtl-xyz", 1),
+                ("mtl-bad-number", 1),
+                ("mtl-halo", 1),
+                ("mtl-map-without-file", 1),
+                ("mtl-unknown-statement", 2),
+                ("mtl-unsupported", 1),
+                ("mtl-unsupported", 1),
+                ("mtl-map-option", 1),
+            ]
+        );
+    }
+
+    #[test]
+    fn maps_go_to_their_slots_and_the_last_one_counts() {
+        let (materials, _) = of("newmtl a\nmap_Kd 1.png\nMap_KD 2.png\nbump -bm 2 b.png\nnorm n.png\nmap_d d.png");
+        let m = &materials[0];
+        assert_eq!(m.map(Slot::Diffuse).unwrap().file, "2.png");
+        assert_eq!(m.map(Slot::Bump).unwrap().bump, Some(2.0));
+        assert!(m.map(Slot::Normal).is_some() && m.map(Slot::Dissolve).is_some() && !m.is_physical());
+    }
+}

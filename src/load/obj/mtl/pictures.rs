@@ -1,0 +1,244 @@
+//! Pictures that maps name -> bitmaps of the scene, and those made from them: one channel, two in one, opaque.
+//!
+//! Our materials read fixed channels (opacity and shininess red, roughness green, metal blue); MTL names a picture, and
+//! perhaps a channel, for each.
+
+use super::options::Channel;
+use crate::scene::{Bitmap, Pixels};
+use std::collections::HashMap;
+
+/// What is taken from a picture; numbers are indices into [`Pictures::sources`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Take {
+    /// All of it.
+    Whole(usize),
+    /// Its colour; alpha 1.
+    Opaque(usize),
+    /// One channel in all of red, green, blue; alpha 1.
+    Channel(usize, Channel),
+    /// 1 − one channel.
+    Inverse(usize, Channel),
+    /// Roughness in green, metal in blue, 1 where there is none.
+    RoughMetal(Option<(usize, Channel)>, Option<(usize, Channel)>),
+}
+
+/// How a picture uses its alpha channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Alpha {
+    /// 1 everywhere.
+    Solid,
+    /// 0 everywhere: a channel nobody looked at.
+    Clear,
+    /// Something in between.
+    Used,
+}
+
+/// Decoded pictures and the bitmaps made of them.
+#[derive(Debug, Default)]
+pub(super) struct Pictures {
+    sources: Vec<Bitmap>,
+    known: HashMap<Take, u32>,
+    made: Vec<Made>,
+}
+
+/// A bitmap for the scene: a picture as it is, which is not copied, or one made of pictures.
+#[derive(Debug)]
+enum Made {
+    Source(usize),
+    New(Bitmap),
+}
+
+impl Pictures {
+    /// Adds a decoded picture; its number.
+    pub(super) fn add(&mut self, bitmap: Bitmap) -> usize {
+        self.sources.push(bitmap);
+        self.sources.len() - 1
+    }
+
+    /// Index into [`Self::finish`]'s bitmaps of what is taken; made when first asked for.
+    pub(super) fn take(&mut self, take: Take) -> u32 {
+        if let Some(&known) = self.known.get(&take) {
+            return known;
+        }
+        let made = match take {
+            Take::Whole(i) => Made::Source(i),
+            Take::Opaque(i) => Made::New(self.map(i, |[r, g, b, _]| [r, g, b, 1.0])),
+            Take::Channel(i, channel) => Made::New(self.map(i, |p| grey(pick(p, channel)))),
+            Take::Inverse(i, channel) => Made::New(self.map(i, |p| grey(1.0 - pick(p, channel)))),
+            Take::RoughMetal(rough, metal) => Made::New(self.rough_metal(rough, metal)),
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "a handful of pictures for each material")]
+        let index = self.made.len() as u32;
+        self.made.push(made);
+        self.known.insert(take, index);
+        index
+    }
+
+    /// The bitmaps that were taken.
+    pub(super) fn finish(mut self) -> Vec<Bitmap> {
+        let bitmap = |made| match made {
+            Made::Source(i) => std::mem::take(&mut self.sources[i]),
+            Made::New(bitmap) => bitmap,
+        };
+        self.made.into_iter().map(bitmap).collect()
+    }
+
+    /// How picture i uses its alpha channel.
+    pub(super) fn alpha(&self, i: usize) -> Alpha {
+        let (mut lowest, mut highest) = (1.0f32, 0.0f32);
+        each(&self.sources[i], |p| (lowest, highest) = (lowest.min(p[3]), highest.max(p[3])));
+        if lowest == 1.0 {
+            Alpha::Solid
+        } else if highest == 0.0 {
+            Alpha::Clear
+        } else {
+            Alpha::Used
+        }
+    }
+
+    /// Whether red, green and blue are equal everywhere.
+    pub(super) fn is_grey(&self, i: usize) -> bool {
+        let mut grey = true;
+        each(&self.sources[i], |p| grey &= p[0] == p[1] && p[1] == p[2]);
+        grey
+    }
+
+    /// Whether nine in ten texels are unit vectors that point out of the surface: a normal map.
+    pub(super) fn is_normal_map(&self, i: usize) -> bool {
+        let (mut unit, mut all) = (0u64, 0u64);
+        each(&self.sources[i], |[r, g, b, _]| {
+            let n = crate::math::Vec3::new(r, g, b) * 2.0 - 1.0;
+            unit += u64::from((n.length() - 1.0).abs() < 0.1 && n.z > 0.0);
+            all += 1;
+        });
+        unit * 10 >= all * 9
+    }
+
+    fn map(&self, i: usize, change: impl Fn([f32; 4]) -> [f32; 4]) -> Bitmap {
+        let Bitmap { name, width, height, pixels } = &self.sources[i];
+        let pixels = match pixels {
+            Pixels::Rgba8(texels) => Pixels::Rgba8(texels.iter().map(|&t| to8(change(from8(t)))).collect()),
+            Pixels::Rgba16(texels) => Pixels::Rgba16(texels.iter().map(|&t| to16(change(from16(t)))).collect()),
+        };
+        Bitmap { name: name.clone(), width: *width, height: *height, pixels }
+    }
+
+    /// The smaller picture is repeated texel by texel to the larger one's size.
+    fn rough_metal(&self, rough: Option<(usize, Channel)>, metal: Option<(usize, Channel)>) -> Bitmap {
+        let sizes = [rough, metal].into_iter().flatten().map(|(i, _)| (self.sources[i].width, self.sources[i].height));
+        let (width, height) = sizes.fold((1, 1), |(w, h), (x, y)| (w.max(x), h.max(y)));
+        let read = |source: Option<(usize, Channel)>, x: u32, y: u32| match source {
+            Some((i, channel)) => {
+                let bitmap = &self.sources[i];
+                let scaled = |at: u32, of: u32, to: u32| u64::from(at) * u64::from(to) / u64::from(of);
+                let at = scaled(y, height, bitmap.height) * u64::from(bitmap.width) + scaled(x, width, bitmap.width);
+                #[expect(clippy::cast_possible_truncation, reason = "an index into texels in memory")]
+                texel(bitmap, at as usize).map_or(1.0, |p| pick(p, channel))
+            }
+            None => 1.0,
+        };
+        let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        let pixels = texels.map(|(x, y)| to8([1.0, read(rough, x, y), read(metal, x, y), 1.0])).collect();
+        let names = [rough, metal].into_iter().flatten().map(|(i, _)| self.sources[i].name.as_str());
+        Bitmap { name: names.collect::<Vec<_>>().join(" + "), width, height, pixels: Pixels::Rgba8(pixels) }
+    }
+}
+
+fn texel(bitmap: &Bitmap, at: usize) -> Option<[f32; 4]> {
+    match &bitmap.pixels {
+        Pixels::Rgba8(texels) => texels.get(at).map(|&t| from8(t)),
+        Pixels::Rgba16(texels) => texels.get(at).map(|&t| from16(t)),
+    }
+}
+
+fn each(bitmap: &Bitmap, mut look: impl FnMut([f32; 4])) {
+    match &bitmap.pixels {
+        Pixels::Rgba8(texels) => texels.iter().for_each(|&t| look(from8(t))),
+        Pixels::Rgba16(texels) => texels.iter().for_each(|&t| look(from16(t))),
+    }
+}
+
+fn pick([r, g, b, a]: [f32; 4], channel: Channel) -> f32 {
+    match channel {
+        Channel::Red => r,
+        Channel::Green => g,
+        Channel::Blue => b,
+        Channel::Alpha => a,
+        // Rec. 709 weights on the values as stored: scalar maps are data, not light.
+        Channel::Luminance => 0.2126 * r + 0.7152 * g + 0.0722 * b,
+    }
+}
+
+fn grey(value: f32) -> [f32; 4] {
+    [value, value, value, 1.0]
+}
+
+fn from8(texel: [u8; 4]) -> [f32; 4] {
+    texel.map(|c| f32::from(c) / 255.0)
+}
+
+fn from16(texel: [u16; 4]) -> [f32; 4] {
+    texel.map(|c| f32::from(c) / 65535.0)
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 … 255 after clamping")]
+fn to8(texel: [f32; 4]) -> [u8; 4] {
+    texel.map(|c| (c.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 … 65535 after clamping")]
+fn to16(texel: [f32; 4]) -> [u16; 4] {
+    texel.map(|c| (c.clamp(0.0, 1.0) * 65535.0 + 0.5) as u16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pictures(bitmaps: &[(u32, u32, &[[u8; 4]])]) -> Pictures {
+        let mut out = Pictures::default();
+        for &(width, height, texels) in bitmaps {
+            out.add(Bitmap { name: "p".into(), width, height, pixels: Pixels::Rgba8(texels.to_vec()) });
+        }
+        out
+    }
+
+    fn texels(pictures: Pictures) -> Vec<Vec<[u8; 4]>> {
+        let texels = |bitmap: Bitmap| match bitmap.pixels {
+            Pixels::Rgba8(texels) => texels,
+            Pixels::Rgba16(_) => Vec::new(),
+        };
+        pictures.finish().into_iter().map(texels).collect()
+    }
+
+    #[test]
+    fn channels_move_to_where_materials_read_them() {
+        let mut p = pictures(&[(1, 1, &[[10, 20, 30, 40]])]);
+        let takes = [
+            (Take::Whole(0), [10, 20, 30, 40]),
+            (Take::Opaque(0), [10, 20, 30, 255]),
+            (Take::Channel(0, Channel::Alpha), [40, 40, 40, 255]),
+            (Take::Inverse(0, Channel::Green), [235, 235, 235, 255]),
+            (Take::RoughMetal(Some((0, Channel::Red)), None), [255, 10, 255, 255]),
+        ];
+        for (i, (take, _)) in (0..).zip(takes) {
+            assert_eq!((p.take(take), p.take(take)), (i, i), "made once");
+        }
+        assert_eq!(texels(p), takes.map(|(_, expected)| vec![expected]));
+    }
+
+    #[test]
+    fn roughness_and_metal_of_different_sizes_share_a_bitmap() {
+        let mut p = pictures(&[(2, 1, &[[1; 4], [2; 4]]), (1, 2, &[[3; 4], [4; 4]])]);
+        p.take(Take::RoughMetal(Some((0, Channel::Red)), Some((1, Channel::Red))));
+        assert_eq!(texels(p), [[[255, 1, 3, 255], [255, 2, 3, 255], [255, 1, 4, 255], [255, 2, 4, 255]]]);
+    }
+
+    #[test]
+    fn pictures_are_recognised_by_their_texels() {
+        let p = pictures(&[(1, 1, &[[127, 127, 255, 255]]), (2, 1, &[[90; 4], [9, 9, 9, 0]]), (1, 1, &[[1, 2, 3, 0]])]);
+        assert!(p.is_normal_map(0) && !p.is_normal_map(1));
+        assert!(p.is_grey(1) && !p.is_grey(2));
+        assert_eq!([0, 1, 2].map(|i| p.alpha(i)), [Alpha::Solid, Alpha::Used, Alpha::Clear]);
+    }
+}

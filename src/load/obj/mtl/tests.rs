@@ -1,0 +1,172 @@
+//! OBJ, MTL and pictures in a folder, through the whole loader.
+
+use crate::load::{LoadOptions, Loaded, MtlMode, Source};
+use crate::math::{Vec2, Vec3};
+use crate::scene::{AlphaMode, Material, Pixels, Surface, TextureRef, Wrap};
+use std::fs;
+use std::path::Path;
+
+const OBJ: &str = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl a\nf 1/1 2/2 3/3\n";
+
+fn png(path: &Path, texel: [u8; 4]) {
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    ::image::RgbaImage::from_pixel(2, 2, ::image::Rgba(texel)).save(path).unwrap();
+}
+
+/// Loads `obj` beside `m.mtl` and pictures of one colour.
+fn load(obj: &str, mtl: &str, pictures: &[(&str, [u8; 4])], mode: MtlMode) -> Loaded {
+    let dir = tempfile::tempdir().unwrap();
+    fs::write(dir.path().join("m.mtl"), mtl).unwrap();
+    for (name, texel) in pictures {
+        png(&dir.path().join(name), *texel);
+    }
+    let source = Source { path: dir.path().join("m.obj"), bytes: obj.as_bytes().to_vec() };
+    crate::load::obj::load(&source, &LoadOptions { mtl: mode, ..LoadOptions::default() }).unwrap()
+}
+
+fn guess(mtl: &str, pictures: &[(&str, [u8; 4])]) -> (Loaded, Material) {
+    let loaded = load(OBJ, mtl, pictures, MtlMode::Guess);
+    let material = loaded.scene.materials[loaded.scene.meshes[0].material as usize].clone();
+    (loaded, material)
+}
+
+fn texel(loaded: &Loaded, map: Option<&TextureRef>) -> [u8; 4] {
+    let texture = &loaded.scene.textures[map.unwrap().texture as usize];
+    match &loaded.scene.bitmaps[texture.bitmap as usize].pixels {
+        Pixels::Rgba8(texels) => texels[0],
+        Pixels::Rgba16(_) => panic!(),
+    }
+}
+
+fn codes(loaded: &Loaded) -> Vec<&str> {
+    loaded.warnings.iter().map(|w| w.code).collect()
+}
+
+#[test]
+fn maps_come_with_their_options_and_every_file_is_listed() {
+    let mtl = "newmtl a\nKd 1 1 1\nmap_Kd -s 2 3 1 -o 0.25 0.5 -clamp on tex/wood map.png\n";
+    let (loaded, m) = guess(mtl, &[("tex/wood map.png", [1, 2, 3, 255])]);
+    let map = m.base_color_map.as_ref().unwrap();
+    assert_eq!(map.transform.scale, Vec2::new(2.0, 3.0));
+    assert_eq!(map.transform.offset, Vec2::new(0.25, 1.0 - 3.0 - 0.5));
+    assert_eq!(loaded.scene.textures[map.texture as usize].sampler.wrap_u, Wrap::Clamp);
+    assert_eq!(texel(&loaded, Some(map)), [1, 2, 3, 255]);
+    assert_eq!((loaded.warnings.len(), loaded.facts.files.len()), (0, 3));
+}
+
+#[test]
+fn a_missing_picture_is_a_warning_and_its_material_plain() {
+    let (loaded, m) = guess("newmtl a\nKd 0 0 0\nmap_Kd maps\\none.png\n", &[]);
+    assert!(m.base_color_map.is_none() && m.base_color.min_element() > 0.3);
+    assert_eq!(codes(&loaded), ["file-missing", "mtl-black-under-map"]);
+    assert!(loaded.warnings[0].to_string().contains("m.mtl:3: picture 'maps\\none.png' is not there"));
+}
+
+#[test]
+fn a_missing_library_is_a_warning_and_its_materials_are_plain_with_their_names() {
+    let obj = OBJ.replace("m.mtl", "none.mtl").replace("usemtl a", "usemtl red wall");
+    let loaded = load(&obj, "", &[], MtlMode::Literal);
+    assert_eq!(codes(&loaded), ["file-missing", "mtl-undefined-material"]);
+    assert_eq!(loaded.scene.materials[0].name, "red wall");
+    assert_eq!(loaded.scene.materials[0].base_color, Material::plain().base_color);
+}
+
+#[test]
+fn a_library_of_the_models_name_is_used_when_none_is_named() {
+    let obj = OBJ.replace("mtllib m.mtl\n", "");
+    let loaded = load(&obj, "newmtl a\nKd 1 0 0", &[], MtlMode::Guess);
+    assert_eq!(codes(&loaded), ["mtl-beside-model"]);
+    assert_eq!(loaded.scene.materials[0].base_color, Vec3::X);
+    assert_eq!(codes(&load(&obj, "newmtl a\nKd 1 0 0", &[], MtlMode::Literal)), ["mtl-undefined-material"]);
+}
+
+#[test]
+fn names_with_spaces_signs_and_comments_meet() {
+    for (newmtl, usemtl) in
+        [("red wall", "red wall"), ("C#1", "C#1"), ("a # x", "a"), ("a", "a # y"), ("#3", "#3"), ("", "")]
+    {
+        let obj = OBJ.replace("usemtl a", &format!("usemtl {usemtl}"));
+        let loaded = load(&obj, &format!("newmtl {newmtl}\nKd 1 0 0"), &[], MtlMode::Guess);
+        assert_eq!(loaded.scene.materials[0].base_color, Vec3::X, "{newmtl} {usemtl} {:?}", loaded.warnings);
+    }
+}
+
+#[test]
+fn the_first_definition_counts_and_unused_ones_cost_nothing() {
+    let mtl = "newmtl a\nKd 1 0 0\nnewmtl a\nKd 0 1 0\nnewmtl b\nmap_Kd none.png";
+    let loaded = load(OBJ, mtl, &[], MtlMode::Guess);
+    assert_eq!((loaded.scene.materials.len(), loaded.warnings.len()), (1, 0));
+    assert_eq!(loaded.scene.materials[0].base_color, Vec3::X);
+}
+
+#[test]
+fn map_d_makes_a_surface_see_through_by_brightness_channel_or_alpha() {
+    let opacity = |options: &str, d: [u8; 4], kd: [u8; 4]| {
+        let mtl = format!("newmtl a\nKd 1 1 1\nmap_Kd k.png\nmap_d {options} d.png");
+        let (loaded, m) = guess(&mtl, &[("k.png", kd), ("d.png", d)]);
+        assert_eq!(m.alpha_mode, AlphaMode::Blend);
+        assert_eq!(texel(&loaded, m.base_color_map.as_ref())[3], 255, "the diffuse map's own alpha is not used twice");
+        texel(&loaded, m.opacity_map.as_ref())[0]
+    };
+    assert_eq!(opacity("", [90, 90, 90, 255], [1, 2, 3, 77]), 90);
+    assert_eq!(opacity("", [1, 2, 3, 60], [1, 2, 3, 255]), 60);
+    assert_eq!(opacity("-imfchan g", [1, 2, 3, 60], [1, 2, 3, 255]), 2);
+
+    let (loaded, m) = guess("newmtl a\nKd 1 1 1\nmap_Kd k.png\nmap_d k.png", &[("k.png", [1, 2, 3, 60])]);
+    assert_eq!((m.alpha_mode, m.opacity_map), (AlphaMode::Blend, None));
+    assert_eq!(texel(&loaded, m.base_color_map.as_ref())[3], 60);
+    let (loaded, m) = guess("newmtl a\nKd 1 1 1\nmap_Tr t.png", &[("t.png", [200; 4])]);
+    assert_eq!(texel(&loaded, m.opacity_map.as_ref())[0], 55);
+}
+
+#[test]
+fn the_alpha_of_a_diffuse_map_is_used_only_by_guess_and_never_where_it_is_0_everywhere() {
+    let mtl = "newmtl a\nKd 1 1 1\nmap_Kd k.png";
+    let (loaded, m) = guess(mtl, &[("k.png", [1, 2, 3, 60])]);
+    assert_eq!((m.alpha_mode, codes(&loaded)), (AlphaMode::Blend, vec!["mtl-diffuse-alpha"]));
+    assert_eq!(guess(mtl, &[("k.png", [1, 2, 3, 0])]).1.alpha_mode, AlphaMode::Opaque);
+    let literal = load(OBJ, mtl, &[("k.png", [1, 2, 3, 60])], MtlMode::Literal);
+    assert_eq!(literal.scene.materials[0].alpha_mode, AlphaMode::Opaque);
+}
+
+#[test]
+fn a_normal_map_written_as_bump_map_is_known_by_its_texels() {
+    let mtl = "newmtl a\nKd 1 1 1\nbump -bm 0.5 b.png";
+    let (loaded, m) = guess(mtl, &[("b.png", [128, 128, 255, 255])]);
+    assert!(m.bump_map.is_none() && m.normal_map.is_some());
+    assert_eq!((m.normal_scale, codes(&loaded)), (0.5, vec!["mtl-normal-as-bump"]));
+    let (loaded, m) = guess(mtl, &[("b.png", [128; 4])]);
+    assert!(m.bump_map.is_some() && m.normal_map.is_none());
+    assert_eq!((m.bump_scale, codes(&loaded)), (0.5 / 64.0, vec!["mtl-bump-height"]));
+    let literal = load(OBJ, mtl, &[("b.png", [128, 128, 255, 255])], MtlMode::Literal);
+    assert_eq!(literal.scene.materials[0].bump_scale, 0.5);
+}
+
+#[test]
+fn roughness_and_metal_maps_share_one_texture() {
+    let mtl = "newmtl a\nKd 1 1 1\nPr 0\nPm 1\nmap_Pr r.png\nmap_Pm m.png\nnorm n.png";
+    let (loaded, m) = guess(mtl, &[("r.png", [50; 4]), ("m.png", [70; 4]), ("n.png", [128, 128, 255, 255])]);
+    let Surface::MetalRough(s) = &m.surface else { panic!() };
+    assert_eq!((s.roughness, s.metallic), (1.0, 1.0));
+    assert_eq!(texel(&loaded, s.metal_rough_map.as_ref())[1..3], [50, 70]);
+    assert!(m.normal_map.is_some());
+    let mesh = &loaded.scene.meshes[0];
+    assert_eq!(mesh.tangents.len(), mesh.positions.len(), "a normal map needs tangents");
+}
+
+#[test]
+fn everything_invisible_is_opaque_but_a_single_hidden_part_stays_hidden() {
+    let both = "newmtl a\nKd 1 1 1\nd 0\nnewmtl b\nKd 1 1 1\nd 0";
+    let (loaded, m) = guess(both, &[]);
+    assert_eq!((m.opacity, codes(&loaded)), (1.0, vec!["mtl-invisible"]));
+    let two = format!("{OBJ}usemtl b\nf 1 2 3");
+    let loaded = load(&two, "newmtl a\nKd 1\nd 0\nnewmtl b\nKd 1\n", &[], MtlMode::Guess);
+    assert_eq!(loaded.scene.materials.iter().map(|m| m.opacity).collect::<Vec<_>>(), [0.0, 1.0]);
+}
+
+#[test]
+fn files_outside_the_models_folder_are_refused_with_the_root_that_would_do() {
+    let (loaded, _) = guess("newmtl a\nKd 1 1 1\nmap_Kd /etc/hostname", &[]);
+    assert_eq!(codes(&loaded), ["file-outside-root"]);
+    assert!(loaded.warnings[0].remedy.contains("--root"));
+}

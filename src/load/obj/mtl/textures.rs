@@ -1,0 +1,284 @@
+//! Maps of materials -> textures of the scene.
+
+use super::library::Finder;
+use super::options::{Channel, Map};
+use super::parse::{Mtl, Slot};
+use super::pictures::{Alpha, Pictures, Take};
+use crate::load::limits::{Budget, Limits};
+use crate::load::texture::{Encoded, decode_all};
+use crate::load::{Diagnostic, MtlMode, Warnings};
+use crate::math::Vec2;
+use crate::scene::{AlphaMode, Bitmap, Material, Sampler, Surface, Texture, TextureRef, UvTransform, Wrap};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// Height of a bump map's white over its black, in sides of the picture, where `-bm` is 1 or not given.
+///
+/// The MTL text gives no unit. A whole side would make cliffs of every map; 1/64 is the relief of rough plaster on a
+/// square metre.
+const BUMP_HEIGHT: f64 = 1.0 / 64.0;
+
+/// All pictures that materials use, and the textures made of them.
+#[derive(Debug, Default)]
+pub(super) struct Textures {
+    /// (Library, name as written) -> the picture's number, if it could be read.
+    known: HashMap<(usize, String), Option<usize>>,
+    pictures: Pictures,
+    textures: Vec<Texture>,
+}
+
+/// A library whose materials are used.
+pub(super) struct Library<'a> {
+    /// Which one.
+    pub number: usize,
+    /// Its path for messages.
+    pub file: &'a Path,
+    /// Its folder, relative to the model's.
+    pub folder: &'a Path,
+}
+
+/// Maps that are drawn. Ambient light sees the diffuse map unless the text counts.
+fn is_drawn(slot: Slot, mode: MtlMode) -> bool {
+    slot != Slot::Ambient || mode == MtlMode::Literal
+}
+
+impl Textures {
+    /// Reads and decodes every picture that `materials` of one library name.
+    pub(super) fn read<'m>(
+        &mut self,
+        library: &Library,
+        materials: impl Iterator<Item = &'m Mtl>,
+        mode: MtlMode,
+        finder: &mut Finder,
+        (limits, budget): (&Limits, &mut Budget),
+        warnings: &mut Warnings,
+    ) {
+        let mut images: Vec<Encoded> = Vec::new();
+        let mut names: Vec<(usize, String)> = Vec::new();
+        let mut by_path: HashMap<PathBuf, usize> = HashMap::new();
+        let maps = materials.flat_map(|m| &m.maps).filter(|(slot, _)| is_drawn(*slot, mode));
+        for (_, map) in maps {
+            let key = (library.number, map.file.clone());
+            if self.known.contains_key(&key) {
+                continue;
+            }
+            self.known.insert(key.clone(), None);
+            let place = map.line.to_string();
+            match finder.read(&map.file, &[library.folder, Path::new("")]) {
+                Ok(found) => {
+                    if found.guessed {
+                        let text = format!("picture '{}' is taken from '{}'", map.file, found.path.display());
+                        warnings.push(Diagnostic::new("mtl-file-elsewhere", library.file, place.clone(), text));
+                    }
+                    let image = *by_path.entry(found.path.clone()).or_insert(images.len());
+                    if image == images.len() {
+                        let name = found.path.to_string_lossy().into_owned();
+                        images.push(Encoded { name, place, bytes: found.bytes.into() });
+                    }
+                    names.push((image, map.file.clone()));
+                }
+                Err(fault) => {
+                    let warning = fault.diagnose(library.file, &place);
+                    let text = format!("picture {}; the material is drawn without it", warning.text);
+                    warnings.push(Diagnostic { text, ..warning });
+                }
+            }
+        }
+        let decoded = decode_all(&images, library.file, limits, budget, warnings);
+        let numbers: Vec<_> = decoded.into_iter().map(|b: Option<Bitmap>| b.map(|b| self.pictures.add(b))).collect();
+        for (image, name) in names {
+            self.known.insert((library.number, name), numbers[image]);
+        }
+    }
+
+    /// The picture of a slot, if it could be read.
+    pub(super) fn picture(&self, library: usize, mtl: &Mtl, slot: Slot) -> Option<usize> {
+        self.known.get(&(library, mtl.map(slot)?.file.clone())).copied().flatten()
+    }
+
+    /// Textures and bitmaps for the scene.
+    pub(super) fn finish(self) -> (Vec<Texture>, Vec<Bitmap>) {
+        (self.textures, self.pictures.finish())
+    }
+
+    /// A texture that shows `take` as the options of `map` say.
+    fn texture(&mut self, take: Take, map: &Map) -> TextureRef {
+        let bitmap = self.pictures.take(take);
+        let wrap = if map.clamp { Wrap::Clamp } else { Wrap::Repeat };
+        let wanted = Texture { bitmap, sampler: Sampler { wrap_u: wrap, wrap_v: wrap, ..Sampler::default() } };
+        let known = self.textures.iter().position(|t| *t == wanted);
+        let index = known.unwrap_or_else(|| {
+            self.textures.push(wanted);
+            self.textures.len() - 1
+        });
+        // v' = s (1 − v) + o with v pointing up is 1 − v' = s v + 1 − s − o with v pointing down.
+        let (scale, offset) = (map.scale, map.offset);
+        let transform = UvTransform {
+            offset: crate::math::DVec2::new(offset.x, 1.0 - scale.y - offset.y).as_vec2(),
+            rotation: 0.0,
+            scale: Vec2::new(scale.as_vec2().x, scale.as_vec2().y),
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "a handful of textures for each material")]
+        let texture = index as u32;
+        TextureRef { texture, uv_set: 0, transform }
+    }
+}
+
+/// Gives one material its maps.
+pub(super) struct Mapper<'a> {
+    pub textures: &'a mut Textures,
+    pub library: &'a Library<'a>,
+    pub mtl: &'a Mtl,
+    pub mode: MtlMode,
+    pub warnings: &'a mut Warnings,
+}
+
+impl Mapper<'_> {
+    pub(super) fn apply(&mut self, material: &mut Material) {
+        self.opacity(material);
+        material.emission_map = self.whole(Slot::Emission);
+        self.relief(material);
+        let packed = self.whole(Slot::OcclusionRoughMetal);
+        let rough_metal = packed.clone().or_else(|| self.rough_metal());
+        let ambient =
+            if self.mode == MtlMode::Literal { self.whole(Slot::Ambient) } else { material.base_color_map.clone() };
+        let base_is_black = material.base_color == crate::math::Vec3::ZERO;
+        match &mut material.surface {
+            Surface::MetalRough(m) => m.metal_rough_map = rough_metal,
+            Surface::Phong(p) => {
+                p.ambient_map = if base_is_black { None } else { ambient };
+                p.specular_map = self.whole(Slot::Specular);
+                p.shininess_map = self.scalar(Slot::Shininess);
+            }
+            Surface::Unlit => {}
+        }
+        material.occlusion_map = packed;
+    }
+
+    fn picture(&self, slot: Slot) -> Option<(&Map, usize)> {
+        let map = self.mtl.map(slot).filter(|_| is_drawn(slot, self.mode))?;
+        Some((map, self.textures.picture(self.library.number, self.mtl, slot)?))
+    }
+
+    fn whole(&mut self, slot: Slot) -> Option<TextureRef> {
+        let (map, picture) = self.picture(slot)?;
+        let map = map.clone();
+        self.options(&map);
+        Some(self.textures.texture(Take::Whole(picture), &map))
+    }
+
+    /// A map of one number: the channel asked for, or the brightness.
+    fn scalar(&mut self, slot: Slot) -> Option<TextureRef> {
+        let (map, picture) = self.picture(slot)?;
+        let map = map.clone();
+        self.options(&map);
+        let take = self.brightness(picture, map.channel);
+        Some(self.textures.texture(take, &map))
+    }
+
+    fn brightness(&self, picture: usize, channel: Option<Channel>) -> Take {
+        match channel {
+            None | Some(Channel::Luminance | Channel::Red) if self.textures.pictures.is_grey(picture) => {
+                Take::Whole(picture)
+            }
+            None => Take::Channel(picture, Channel::Luminance),
+            Some(channel) => Take::Channel(picture, channel),
+        }
+    }
+
+    /// The diffuse map, and what says where the surface is: its alpha channel, or a map of its own.
+    fn opacity(&mut self, material: &mut Material) {
+        let diffuse = self.picture(Slot::Diffuse).map(|(map, picture)| (map.clone(), picture));
+        let alpha = diffuse.as_ref().map_or(Alpha::Solid, |(_, picture)| self.textures.pictures.alpha(*picture));
+        let (dissolve, by_diffuse) = self.dissolve(diffuse.as_ref().map(|d| d.1));
+        if let Some((take, map)) = dissolve {
+            material.opacity_map = Some(self.textures.texture(take, &map));
+            material.alpha_mode = AlphaMode::Blend;
+        }
+        let own_map = material.opacity_map.is_some();
+        let guessed = self.mode == MtlMode::Guess && alpha == Alpha::Used && !own_map && !by_diffuse;
+        if guessed {
+            self.guess("mtl-diffuse-alpha", "the alpha channel of map_Kd is used, although there is no map_d");
+        }
+        if by_diffuse || guessed {
+            material.alpha_mode = AlphaMode::Blend;
+        }
+        if let Some((map, picture)) = diffuse {
+            self.options(&map);
+            let solid = alpha == Alpha::Solid || by_diffuse || guessed || material.alpha_mode == AlphaMode::Opaque;
+            let take = if solid { Take::Whole(picture) } else { Take::Opaque(picture) };
+            material.base_color_map = Some(self.textures.texture(take, &map));
+        }
+    }
+
+    /// What `map_d` or `map_Tr` show, or whether it is the alpha channel of the diffuse map.
+    fn dissolve(&mut self, diffuse: Option<usize>) -> (Option<(Take, Map)>, bool) {
+        if let Some((map, picture)) = self.picture(Slot::Dissolve) {
+            let map = map.clone();
+            self.options(&map);
+            let has_alpha = self.textures.pictures.alpha(picture) == Alpha::Used;
+            let guess = map.channel.is_none() && has_alpha && self.mode == MtlMode::Guess;
+            let channel = if guess { Some(Channel::Alpha) } else { map.channel };
+            if diffuse == Some(picture) && channel == Some(Channel::Alpha) {
+                return (None, true);
+            }
+            if guess {
+                self.guess("mtl-map-alpha", "map_d has an alpha channel, which is used instead of its brightness");
+            }
+            return (Some((self.brightness(picture, channel), map)), false);
+        }
+        let Some((map, picture)) = self.picture(Slot::Transparency) else { return (None, false) };
+        let map = map.clone();
+        (Some((Take::Inverse(picture, map.channel.unwrap_or(Channel::Luminance)), map)), false)
+    }
+
+    /// Normal and bump maps. Many programs write normal maps as bump maps; their texels tell.
+    fn relief(&mut self, material: &mut Material) {
+        #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
+        let strength = |map: &Map| map.bump.unwrap_or(1.0) as f32;
+        if let Some((map, picture)) = self.picture(Slot::Normal) {
+            let map = map.clone();
+            material.normal_scale = strength(&map);
+            material.normal_map = Some(self.textures.texture(Take::Whole(picture), &map));
+        }
+        let Some((map, picture)) = self.picture(Slot::Bump) else { return };
+        let map = map.clone();
+        self.options(&map);
+        let guessing = self.mode == MtlMode::Guess;
+        if guessing && material.normal_map.is_none() && self.textures.pictures.is_normal_map(picture) {
+            self.guess("mtl-normal-as-bump", "a bump map is a normal map by its texels and used as one");
+            material.normal_scale = strength(&map);
+            material.normal_map = Some(self.textures.texture(Take::Whole(picture), &map));
+            return;
+        }
+        if guessing {
+            self.guess("mtl-bump-height", "the height of a bump map has no unit; white is 1/64 of its side at -bm 1");
+        }
+        let take = self.brightness(picture, map.channel);
+        #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
+        let unit = if guessing { BUMP_HEIGHT as f32 } else { 1.0 };
+        material.bump_scale = strength(&map) * unit;
+        material.bump_map = Some(self.textures.texture(take, &map));
+    }
+
+    /// Roughness and metal in one texture; both go by the options of the first there is.
+    fn rough_metal(&mut self) -> Option<TextureRef> {
+        let channel = |(map, picture): (&Map, usize)| (picture, map.channel.unwrap_or(Channel::Luminance));
+        let (rough, metal) = (self.picture(Slot::Roughness), self.picture(Slot::Metallic));
+        let map = rough.or(metal)?.0.clone();
+        let take = Take::RoughMetal(rough.map(channel), metal.map(channel));
+        Some(self.textures.texture(take, &map))
+    }
+
+    fn options(&mut self, map: &Map) {
+        if let Some((base, gain)) = map.base_gain {
+            let text = format!("the option '-mm {base} {gain}' of a map is ignored");
+            self.warnings.push(Diagnostic::new("mtl-map-option", self.library.file, map.line.to_string(), text));
+        }
+    }
+
+    fn guess(&mut self, code: &'static str, text: &str) {
+        let warning = Diagnostic::new(code, self.library.file, self.mtl.line.to_string(), text);
+        self.warnings.push(warning.remedy("--mtl literal follows the text"));
+    }
+}
