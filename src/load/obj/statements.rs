@@ -195,7 +195,9 @@ impl<'a> Reader<'a> {
             b"mtllib" => self.out.libraries.push((self.line, decode_name(rest))),
             b"l" => self.out.odd.lines.note(self.line, word),
             b"p" => words(rest).for_each(|_| self.out.odd.points.note(self.line, word)),
-            _ if word[0] == b'#' => self.comment(text),
+            // Continued blank lines leave no word.
+            b"" => {}
+            _ if word.starts_with(b"#") => self.comment(text),
             _ if CURVES.contains(&word) => self.out.odd.curves.note(self.line, word),
             _ if SILENT.contains(&word) => {}
             _ => self.out.odd.unknown.note(self.line, word),

@@ -120,7 +120,8 @@ pub(super) fn parse(text: &[u8], file: &Path, warnings: &mut Warnings) -> Vec<Mt
         parser.line = line;
         if word.eq_ignore_ascii_case(b"newmtl") {
             out.push(Mtl { name: decode_name(rest), line, ..Mtl::default() });
-        } else if word[0] != b'#'
+        } else if !word.is_empty()
+            && !word.starts_with(b"#")
             && let Some(material) = out.last_mut()
         {
             parser.field(material, &word.to_ascii_lowercase(), rest);
