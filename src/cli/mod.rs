@@ -1,6 +1,6 @@
 //! Words -> jobs -> messages and exit codes: the command line.
 //!
-//! [`args`] is what was typed, [`job`] what that means once everything is checked; one file per command does the work.
+//! `args` is what was typed, `job` what that means once everything is checked; one file per command does the work.
 //! Only this module prints. stdout carries only what was asked for, everything else goes to stderr.
 
 mod accident;

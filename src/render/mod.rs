@@ -1,8 +1,8 @@
 //! Rays -> linear pixels: waves per tile, Whitted shading, lights and shadows, optics, pixel sampling.
 //!
-//! [`render`] cuts the picture into tiles ([`tile`]); one thread traces a tile's trees of rays in waves ([`whitted`],
-//! [`wave`]): eye rays, then the shadow rays of what they hit ([`shadow`]), then reflected and refracted rays,
-//! generation by generation. A hit becomes a [`surface`] once, its material is evaluated in [`shade`], and [`optics`]
+//! [`render`] cuts the picture into tiles (`tile`); one thread traces a tile's trees of rays in waves (`whitted`,
+//! `wave`): eye rays, then the shadow rays of what they hit (`shadow`), then reflected and refracted rays,
+//! generation by generation. A hit becomes a `surface` once, its material is evaluated in `shade`, and [`optics`]
 //! says where light goes from there.
 //!
 //! The pixels are the same bits for every structure and every number of threads: structures give equal hits, sums run

@@ -1,9 +1,9 @@
 //! glTF 2.0, core and the extensions that a still picture shows, from `.gltf` or GLB.
 //!
-//! A file goes through four gates. [`container`] finds the JSON and the binary chunk; [`version`] and [`extensions`]
-//! say early what cannot be drawn at all; [`schema`] checks every value and index, so that the typed document of the
-//! `gltf` crate can be built; [`attributes`], [`graph`] and [`links`] check what parts mean together. Only then is data
-//! read ([`accessor`], [`mesh`], [`images`]), each piece with its own bounds. What becomes of a fault is a table
+//! A file goes through four gates. `container` finds the JSON and the binary chunk; `version` and `extensions`
+//! say early what cannot be drawn at all; `schema` checks every value and index, so that the typed document of the
+//! `gltf` crate can be built; `attributes`, `graph` and `links` check what parts mean together. Only then is data
+//! read (`accessor`, `mesh`, `images`), each piece with its own bounds. What becomes of a fault is a table
 //! ([`codes`]).
 //!
 //! Animations are not played: nodes, morph weights and skins are drawn in their rest pose.

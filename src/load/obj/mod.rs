@@ -1,8 +1,8 @@
-//! Wavefront OBJ and MTL -> [`Scene`](crate::scene::Scene).
+//! Wavefront OBJ and MTL -> scene.
 //!
-//! The text goes through [`statements`] (lines, numbers, names, faces; every error with its line), then through `tobj`
-//! ([`soup`]), is centred in `f64` and rounded ([`place`]), and becomes one mesh and one instance for each run of faces
-//! with the same object, group and material ([`assemble`]). Materials come from MTL files ([`mtl`]).
+//! The text goes through `statements` (lines, numbers, names, faces; every error with its line), then through `tobj`
+//! (`soup`), is centred in `f64` and rounded (`place`), and becomes one mesh and one instance for each run of faces
+//! with the same object, group and material (`assemble`). Materials come from MTL files (`mtl`).
 //!
 //! What the text leaves open is decided so: faces without normals are flat unless a smoothing group says otherwise;
 //! vertex colours are sRGB-coded, MTL colours linear; the fourth number of a vertex is a weight for rational curves and

@@ -1,7 +1,7 @@
 //! Looking up textures: wrap, filter, and the right sharpness for the size of a pixel.
 //!
-//! Bitmaps stay as they were stored; texels are decoded when read ([`decode`]), and smaller copies exist only once a lookup
-//! needs them ([`pyramid`]). A footprint longer than wide is covered by several probes along its longer axis, the way of
+//! Bitmaps stay as they were stored; texels are decoded when read (`decode`), and smaller copies exist only once a lookup
+//! needs them (`pyramid`). A footprint longer than wide is covered by several probes along its longer axis, the way of
 //! EXT_texture_filter_anisotropic (after McCormack, Perry, Farkas, Jouppi, *Feline*, 1999).
 //!
 //! Every lookup is a pure function of the scene and its arguments: no state, no order, the same bits on every thread.
