@@ -4,6 +4,7 @@
 //! looked up with bounds, so that a buffer shorter than declared ends in a message.
 
 use super::buffers::Buffers;
+use super::sparse::{Replaced, Replacements};
 use crate::load::Diagnostic;
 use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::Checked;
@@ -14,19 +15,28 @@ use gltf::json::{Index, Root, buffer};
 pub(super) struct Reader<'a> {
     pub(super) root: &'a Root,
     pub(super) buffers: &'a Buffers<'a>,
+    pub(super) replacements: &'a Replacements,
+}
+
+/// Which elements of an accessor to read.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Pick<'a> {
+    All,
+    /// These, ascending and each once.
+    Only(&'a [u32]),
 }
 
 /// The smallest and largest value of up to 16 components.
 pub(super) type Extent = [(f64, f64); 16];
 
 /// Why an accessor could not be read.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) enum Unreadable {
     /// The file never says where the bytes are.
     Nowhere(Diagnostic),
     /// The buffer could not be read.
     Buffer(Diagnostic),
-    /// The data ends too early, or the sparse part points outside.
+    /// The data ends too early.
     Data(super::codes::Code, String),
     /// An unknown component type or shape.
     Unknown,
@@ -90,33 +100,80 @@ impl Format {
 }
 
 /// Where a run of elements lies.
-struct Run<'a> {
+pub(super) struct Run<'a> {
     bytes: &'a [u8],
     stride: usize,
     format: Format,
 }
 
 impl<'a> Run<'a> {
+    /// Elements one after the other, from byte `offset` of a view on.
+    pub(super) fn packed(
+        root: &Root,
+        buffers: &'a Buffers,
+        view: Index<buffer::View>,
+        offset: u64,
+        format: Format,
+    ) -> Result<Self, Unreadable> {
+        let view = root.buffer_views.get(view.value()).ok_or(Unreadable::Unknown)?;
+        let bytes = match buffers.view(view) {
+            Ok(bytes) => bytes,
+            Err(Some(why)) => return Err(Unreadable::Buffer(why)),
+            Err(None) => return Err(buffers.nowhere(view).map_or(Unreadable::Unknown, Unreadable::Nowhere)),
+        };
+        let offset = usize::try_from(offset).unwrap_or(usize::MAX);
+        Ok(Self { bytes: bytes.get(offset..).unwrap_or_default(), stride: format.size(), format })
+    }
+
+    /// The same with the stride that the view says.
+    fn strided(self, root: &Root, view: Index<buffer::View>) -> Self {
+        let stride = root.buffer_views.get(view.value()).and_then(|view| view.byte_stride).map_or(0, |s| s.0);
+        Self { stride: if stride > 0 { stride } else { self.stride }, ..self }
+    }
+
+    /// The bytes of element `i`, if they are all there.
+    fn element(&self, i: usize) -> Option<&'a [u8]> {
+        self.bytes.get(i.checked_mul(self.stride)?..)?.get(..self.format.size())
+    }
+
     /// The elements, each with at least the bytes it needs.
-    fn elements(&self, count: usize) -> impl Iterator<Item = &'a [u8]> {
-        let (bytes, stride, size) = (self.bytes, self.stride, self.format.size());
-        (0..count).map_while(move |i| bytes.get(i.checked_mul(stride)?..)?.get(..size))
+    pub(super) fn elements(&self, count: usize) -> impl Iterator<Item = &'a [u8]> {
+        (0..count).map_while(|i| self.element(i))
+    }
+
+    /// How many whole elements there are.
+    fn len(&self) -> usize {
+        let rest = self.bytes.len().checked_sub(self.format.size());
+        rest.map_or(0, |rest| rest / self.stride.max(1) + 1)
     }
 }
 
 impl<'a> Reader<'a> {
     /// Reads floats, `N` to an element; integers are normalised when the accessor says so.
-    pub(super) fn floats<const N: usize>(&self, index: Index<Accessor>) -> Result<Vec<[f32; N]>, Unreadable> {
-        self.elements(index, [0.0; N], |element, format| {
+    pub(super) fn floats<const N: usize>(
+        &self,
+        index: Index<Accessor>,
+        pick: Pick,
+    ) -> Result<Vec<[f32; N]>, Unreadable> {
+        self.elements(index, pick, [0.0; N], |element, format| {
             std::array::from_fn(|k| if k < format.width() { float(element, format, k) } else { 0.0 })
         })
     }
 
     /// Reads scalars or vectors of unsigned integers.
-    pub(super) fn integers<const N: usize>(&self, index: Index<Accessor>) -> Result<Vec<[u32; N]>, Unreadable> {
-        self.elements(index, [0; N], |element, format| {
+    pub(super) fn integers<const N: usize>(
+        &self,
+        index: Index<Accessor>,
+        pick: Pick,
+    ) -> Result<Vec<[u32; N]>, Unreadable> {
+        self.elements(index, pick, [0; N], |element, format| {
             std::array::from_fn(|k| if k < format.width() { integer(element, format, k) } else { 0 })
         })
+    }
+
+    /// How many elements an accessor declares.
+    pub(super) fn count(&self, index: Index<Accessor>) -> u64 {
+        self.root.accessors.get(index.value()).map_or(0, |accessor| accessor.count.0)
     }
 
     /// The smallest and largest value of each component, not normalised, numbers that are not finite left out.
@@ -129,12 +186,12 @@ impl<'a> Reader<'a> {
         let format = Format::of(accessor)?;
         match (&accessor.sparse, accessor.buffer_view) {
             (Some(_), _) if accessor.count.0 <= SMALL => {
-                let values = self.elements(index, [0.0; 16], raws);
+                let values = self.elements(index, Pick::All, [0.0; 16], raws);
                 Some(values.map(|values| extent_of(values.into_iter(), format)))
             }
             (None, Some(view)) => {
                 let count = usize::try_from(accessor.count.0).ok()?;
-                let run = self.run(view, accessor.byte_offset.unwrap_or_default().0, format, true);
+                let run = self.run(view, accessor, format);
                 Some(run.map(|run| extent_of(run.elements(count).map(|element| raws(element, format)), format)))
             }
             _ => None,
@@ -144,74 +201,60 @@ impl<'a> Reader<'a> {
     fn elements<T: Copy>(
         &self,
         index: Index<Accessor>,
+        pick: Pick,
         zero: T,
         read: impl Fn(&[u8], Format) -> T,
     ) -> Result<Vec<T>, Unreadable> {
         let accessor = self.root.accessors.get(index.value()).ok_or(Unreadable::Unknown)?;
         let format = Format::of(accessor).ok_or(Unreadable::Unknown)?;
         let count = usize::try_from(accessor.count.0).map_err(|_| Unreadable::Unknown)?;
+        let wanted = match pick {
+            Pick::All => count,
+            Pick::Only(list) => list.len(),
+        };
         let mut values = match accessor.buffer_view {
             Some(view) => {
-                let run = self.run(view, accessor.byte_offset.unwrap_or_default().0, format, true)?;
-                let values: Vec<T> = run.elements(count).map(|element| read(element, format)).collect();
-                if values.len() < count {
-                    return Err(short(count, values.len()));
+                let run = self.run(view, accessor, format)?;
+                let read = |element| read(element, format);
+                let values: Vec<T> = match pick {
+                    Pick::All => run.elements(count).map(read).collect(),
+                    Pick::Only(list) => list.iter().map_while(|&i| run.element(i as usize)).map(read).collect(),
+                };
+                if values.len() < wanted {
+                    return Err(short(count, run.len()));
                 }
                 values
             }
-            None => vec![zero; count],
+            None => vec![zero; wanted],
         };
         if let Some(sparse) = &accessor.sparse {
-            self.replace(&mut values, sparse, format, read)?;
+            let replaced = self.replacements.of(index.value())?;
+            let new =
+                Run::packed(self.root, self.buffers, sparse.values.buffer_view, sparse.values.byte_offset.0, format)?;
+            let lost = || short(replaced.len(), new.len());
+            for (slot, replaced) in hits(replaced, pick) {
+                let element = new.element(replaced.value as usize).ok_or_else(lost)?;
+                values.get_mut(slot).into_iter().for_each(|value| *value = read(element, format));
+            }
         }
         Ok(values)
     }
 
-    /// Puts the values of a sparse part in place.
-    fn replace<T: Copy>(
-        &self,
-        values: &mut [T],
-        sparse: &gltf::json::accessor::sparse::Sparse,
-        format: Format,
-        read: impl Fn(&[u8], Format) -> T,
-    ) -> Result<(), Unreadable> {
-        let Checked::Valid(component) = sparse.indices.component_type else { return Err(Unreadable::Unknown) };
-        let index_format = Format { component: component.0, shape: Type::Scalar, normalized: false };
-        let count = usize::try_from(sparse.count.0).map_err(|_| Unreadable::Unknown)?;
-        let indices = self.run(sparse.indices.buffer_view, sparse.indices.byte_offset.0, index_format, false)?;
-        let elements = self.run(sparse.values.buffer_view, sparse.values.byte_offset.0, format, false)?;
-        let mut done = 0;
-        for (index, element) in indices.elements(count).zip(elements.elements(count)) {
-            let index = integer(index, index_format, 0) as usize;
-            let length = values.len();
-            let slot = values.get_mut(index).ok_or_else(|| {
-                let text = format!("sparse index {index}, but only {length} elements exist");
-                Unreadable::Data(super::codes::Code::AccessorSparseIndexOob, text)
-            })?;
-            *slot = read(element, format);
-            done += 1;
-        }
-        if done < count { Err(short(count, done)) } else { Ok(()) }
+    fn run(&self, view: Index<buffer::View>, accessor: &Accessor, format: Format) -> Result<Run<'a>, Unreadable> {
+        let offset = accessor.byte_offset.unwrap_or_default().0;
+        Ok(Run::packed(self.root, self.buffers, view, offset, format)?.strided(self.root, view))
     }
+}
 
-    fn run(
-        &self,
-        view: Index<buffer::View>,
-        offset: u64,
-        format: Format,
-        strided: bool,
-    ) -> Result<Run<'a>, Unreadable> {
-        let view = self.root.buffer_views.get(view.value()).ok_or(Unreadable::Unknown)?;
-        let bytes = match self.buffers.view(view) {
-            Ok(bytes) => bytes,
-            Err(Some(why)) => return Err(Unreadable::Buffer(why)),
-            Err(None) => return Err(self.buffers.nowhere(view).map_or(Unreadable::Unknown, Unreadable::Nowhere)),
-        };
-        let offset = usize::try_from(offset).unwrap_or(usize::MAX);
-        let stride = view.byte_stride.map_or(0, |stride| stride.0);
-        let stride = if strided && stride > 0 { stride } else { format.size() };
-        Ok(Run { bytes: bytes.get(offset..).unwrap_or_default(), stride, format })
-    }
+/// The replaced elements among those that are read, and where each stands among these.
+fn hits<'a>(replaced: &'a [Replaced], pick: Pick<'a>) -> impl Iterator<Item = (usize, &'a Replaced)> {
+    let (list, all) = match pick {
+        Pick::All => (&[][..], replaced),
+        Pick::Only(list) => (list, &[][..]),
+    };
+    let found = |element: u32| replaced.binary_search_by_key(&element, |r| r.element).ok().map(|at| &replaced[at]);
+    let picked = list.iter().enumerate().filter_map(move |(slot, &element)| Some((slot, found(element)?)));
+    all.iter().map(|r| (r.element as usize, r)).chain(picked)
 }
 
 fn short(count: usize, found: usize) -> Unreadable {
@@ -262,7 +305,7 @@ fn raw(element: &[u8], format: Format, k: usize) -> f64 {
 }
 
 /// Component `k` as an unsigned integer; signed and floating ones are not indices and give zero.
-fn integer(element: &[u8], format: Format, k: usize) -> u32 {
+pub(super) fn integer(element: &[u8], format: Format, k: usize) -> u32 {
     let at = format.offset(k);
     match format.component {
         ComponentType::U8 => u32::from(u8::from_le_bytes(bytes(element, at))),

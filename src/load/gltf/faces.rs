@@ -34,6 +34,33 @@ pub(super) fn points_and_lines(mode: Mode, corners: usize) -> u64 {
     count as u64
 }
 
+/// Numbers corners among the vertices in use and gives those, ascending; `None`: all `vertices` are in use.
+///
+/// Takes time and memory for the corners, however large the pool of vertices is. Every corner is below `vertices`.
+pub(super) fn gather(corners: &mut [u32], vertices: u64) -> Option<Vec<u32>> {
+    /// Up to so many vertices for each corner, a table of the vertices is quicker than sorting the corners.
+    const DENSE: u64 = 2;
+    if vertices <= DENSE.saturating_mul(corners.len() as u64) {
+        // As large as a list in memory, so that it fits.
+        let mut places = vec![u32::MAX; vertices as usize];
+        corners.iter().for_each(|&corner| places[corner as usize] = 0);
+        let used: Vec<u32> = (0..).zip(&places).filter(|(_, place)| **place == 0).map(|(vertex, _)| vertex).collect();
+        if used.len() == places.len() {
+            return None;
+        }
+        (0..).zip(&used).for_each(|(place, &vertex)| places[vertex as usize] = place);
+        corners.iter_mut().for_each(|corner| *corner = places[*corner as usize]);
+        return Some(used);
+    }
+    let mut used = corners.to_vec();
+    used.sort_unstable();
+    used.dedup();
+    // Found, because the list was made of them.
+    let place = |corner: u32| used.partition_point(|&vertex| vertex < corner) as u32;
+    corners.iter_mut().for_each(|corner| *corner = place(*corner));
+    Some(used)
+}
+
 /// Faces left out of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Dropped {
@@ -184,6 +211,19 @@ mod tests {
             [Mode::Points, Mode::Lines, Mode::LineLoop, Mode::LineStrip].map(|m| points_and_lines(m, 5)),
             [5, 2, 5, 4]
         );
+    }
+
+    #[test]
+    fn vertices_in_use_are_gathered_alike_from_small_and_large_pools() {
+        for vertices in [10, u64::from(u32::MAX)] {
+            let mut corners = [9, 2, 5, 5, 2, 9];
+            assert_eq!(gather(&mut corners, vertices), Some(vec![2, 5, 9]), "{vertices}");
+            assert_eq!(corners, [2, 0, 1, 1, 0, 2], "{vertices}");
+        }
+        let mut corners = [2, 0, 1];
+        assert_eq!(gather(&mut corners, 3), None);
+        assert_eq!(corners, [2, 0, 1]);
+        assert_eq!(gather(&mut [], 3), Some(vec![]));
     }
 
     #[test]

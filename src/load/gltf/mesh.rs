@@ -1,6 +1,6 @@
 //! One primitive of a mesh -> a [`Mesh`] of the scene: morphed, posed by its skin, cleaned.
 
-use super::accessor::{Format, Reader, Unreadable};
+use super::accessor::{Format, Pick, Reader, Unreadable};
 use super::codes::Code;
 use super::faces::{self, Dropped};
 use super::report::Report;
@@ -50,34 +50,54 @@ pub(super) struct Read {
 /// Reads one primitive; `None` when there is nothing to draw in it.
 pub(super) fn read(reader: Reader, job: &Job, report: &mut Report) -> Option<Read> {
     let Checked::Valid(mode) = job.primitive.mode else { return None };
-    let mut task = Task { reader, job, report };
+    let mut task = Task { reader, job, report, used: None };
     task.run(mode)
 }
 
 /// Bytes that reading a primitive takes, by the declared counts.
-pub(super) fn cost(reader: Reader, primitive: &Primitive) -> u64 {
-    let of = |index: &Index<Accessor>| {
-        let accessor = reader.root.accessors.get(index.value());
-        accessor.map_or(0, |a| a.count.0.saturating_mul(16))
-    };
+///
+/// Of a pool of vertices only those are read that the indices name, so that there are at most as many as indices.
+pub(super) fn cost(reader: Reader, primitive: &Primitive, name: &str) -> u64 {
+    /// A value of a vertex, at most four floats.
+    const VALUE: u64 = 16;
+    let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+    let vertices = positions.map_or(0, |&index| reader.count(index));
+    let corners = primitive.indices.map_or(vertices, |index| reader.count(index));
+    let used = vertices.min(corners);
     let targets = primitive.targets.iter().flatten();
-    let morphs = targets.flat_map(|t| [t.positions, t.normals, t.tangents].into_iter().flatten());
-    let all = primitive.attributes.values().copied().chain(primitive.indices).chain(morphs);
-    all.map(|index| of(&index)).fold(0, u64::saturating_add)
+    let morphs = targets.flat_map(|t| [t.positions, t.normals, t.tangents].into_iter().flatten()).count();
+    let values = (primitive.attributes.len() + morphs) as u64;
+    let per_corner = match primitive.mode {
+        // Nearly every corner starts a face of three.
+        Checked::Valid(Mode::TriangleStrip | Mode::TriangleFan) => 36,
+        _ => 24,
+    };
+    let fixed = (size_of::<Read>() + name.len()) as u64;
+    let bytes = used.saturating_mul(values * VALUE).saturating_add(corners.saturating_mul(per_corner));
+    bytes.saturating_add(fixed)
 }
 
 struct Task<'a, 'b> {
     reader: Reader<'a>,
     job: &'b Job<'b>,
     report: &'b mut Report,
+    /// The vertices that the indices name, when these are not all.
+    used: Option<Vec<u32>>,
 }
 
 impl Task<'_, '_> {
     fn run(&mut self, mode: Mode) -> Option<Read> {
         let positions = self.attribute(Semantic::Positions)?;
         let mut mesh = Mesh { name: self.job.name.clone(), ..Mesh::default() };
+        let corners = match self.job.primitive.indices {
+            Some(index) => Some(self.corners(index, self.reader.count(positions))?),
+            None => None,
+        };
         mesh.positions = self.floats::<3>(positions, "attributes.POSITION")?.into_iter().map(Vec3::from).collect();
-        let corners = self.corners(mesh.positions.len())?;
+        let corners = match corners {
+            Some(corners) => corners,
+            None => (0..u32::try_from(mesh.positions.len()).ok()?).collect(),
+        };
         let triangles = faces::triangles(mode, &corners);
         let points_and_lines = if triangles.is_some() { 0 } else { faces::points_and_lines(mode, corners.len()) };
         drop(corners);
@@ -118,27 +138,30 @@ impl Task<'_, '_> {
     }
 
     fn floats<const N: usize>(&mut self, index: Index<Accessor>, part: &str) -> Option<Vec<[f32; N]>> {
-        let result = self.reader.floats::<N>(index);
+        let result = self.reader.floats::<N>(index, self.pick());
         self.sort_out(result, part)
     }
 
-    /// The vertices of all corners.
-    fn corners(&mut self, vertices: usize) -> Option<Vec<u32>> {
-        let Some(index) = self.job.primitive.indices else {
-            return Some((0..u32::try_from(vertices).ok()?).collect());
-        };
+    /// The vertices to read.
+    fn pick(&self) -> Pick<'_> {
+        self.used.as_deref().map_or(Pick::All, Pick::Only)
+    }
+
+    /// The vertex of every corner, numbered among those in use.
+    fn corners(&mut self, index: Index<Accessor>, vertices: u64) -> Option<Vec<u32>> {
         let format = self.reader.root.accessors.get(index.value()).and_then(Format::of)?;
         if format.shape != Type::Scalar || !is_unsigned(format.component) {
             return None;
         }
-        let result = self.reader.integers::<1>(index);
-        let corners: Vec<u32> = self.sort_out(result, "indices")?.into_iter().map(|[i]| i).collect();
+        let result = self.reader.integers::<1>(index, Pick::All);
+        let mut corners: Vec<u32> = self.sort_out(result, "indices")?.into_iter().map(|[i]| i).collect();
         let restart = match format.component {
             ComponentType::U8 => 0xff,
             ComponentType::U16 => 0xffff,
             _ => u32::MAX,
         };
-        let Some(at) = corners.iter().position(|&c| c as usize >= vertices || c == restart) else {
+        let Some(at) = corners.iter().position(|&c| u64::from(c) >= vertices || c == restart) else {
+            self.used = faces::gather(&mut corners, vertices);
             return Some(corners);
         };
         let (code, text) = if corners[at] == restart {
@@ -262,7 +285,7 @@ impl Task<'_, '_> {
             if self.is_blank(weights) {
                 break;
             }
-            let result = self.reader.integers::<4>(joints);
+            let result = self.reader.integers::<4>(joints, self.pick());
             influences.joints.push(self.sort_out(result, &format!("attributes.JOINTS_{set}"))?);
             influences.weights.push(self.floats::<4>(weights, &format!("attributes.WEIGHTS_{set}"))?);
         }

@@ -28,6 +28,7 @@ mod scene;
 mod schema;
 mod schema_tables;
 mod skin;
+mod sparse;
 #[cfg(test)]
 mod tests;
 mod textures;
@@ -47,6 +48,7 @@ use mesh::{Job, Needs, Read};
 use rayon::prelude::*;
 use report::Report;
 use scene::Placed;
+use sparse::Replacements;
 use textures::Textures;
 
 /// Loads a glTF 2.0 file.
@@ -122,9 +124,11 @@ impl Loading<'_> {
         }
         let mut resolver = Resolver::new(self.source, self.options);
         let buffers = Buffers::load(root, bin, file, &mut resolver, self.report);
-        let reader = Reader { root, buffers: &buffers };
-        facts.scene_index = scene::choose(root, self.options.scene.as_deref(), file)?;
         let mut budget = Budget::new(&self.options.limits);
+        let replacements = Replacements::load(root, &buffers, &mut budget, self.report);
+        let replacements = replacements.map_err(|over| self.too_large(over))?;
+        let reader = Reader { root, buffers: &buffers, replacements: &replacements };
+        facts.scene_index = scene::choose(root, self.options.scene.as_deref(), file)?;
         self.check_budget(reader, &mut budget)?;
         bounds::check(reader, self.report);
         let placed = scene::walk(reader, graph, facts.scene_index, self.report);
@@ -170,9 +174,9 @@ impl Loading<'_> {
 
     /// Charges what the primitives will take.
     fn charge(&self, reader: Reader, placed: &Placed, budget: &mut Budget) -> Result<(), LoadError> {
-        let primitives =
-            placed.variants.iter().filter_map(|v| reader.root.meshes.get(v.mesh)).flat_map(|m| &m.primitives);
-        let bytes = primitives.map(|p| mesh::cost(reader, p)).fold(0, u64::saturating_add);
+        let meshes = placed.variants.iter().filter_map(|v| reader.root.meshes.get(v.mesh));
+        let primitives = meshes.flat_map(|m| m.primitives.iter().map(|p| (p, m.name.as_deref().unwrap_or_default())));
+        let bytes = primitives.map(|(p, name)| mesh::cost(reader, p, name)).fold(0, u64::saturating_add);
         budget.take(bytes, 1).map_err(|over| self.too_large(over))
     }
 

@@ -1,6 +1,6 @@
 //! Which scene of the file is drawn, and what stands where in it.
 
-use super::accessor::{Reader, Unreadable};
+use super::accessor::{Pick, Reader, Unreadable};
 use super::codes::Code;
 use super::graph::Graph;
 use super::placed;
@@ -141,9 +141,9 @@ fn instancing(node: &Node) -> Option<&Map<String, Value>> {
 /// Where the copies stand in the space of their node.
 fn copies(reader: Reader, attributes: &Map<String, Value>) -> Result<Vec<DAffine3>, Unreadable> {
     let index = |name: &str| attributes.get(name).and_then(whole).and_then(|i| u32::try_from(i).ok()).map(Index::new);
-    let translations = index("TRANSLATION").map(|i| reader.floats::<3>(i)).transpose()?;
-    let rotations = index("ROTATION").map(|i| reader.floats::<4>(i)).transpose()?;
-    let scales = index("SCALE").map(|i| reader.floats::<3>(i)).transpose()?;
+    let translations = index("TRANSLATION").map(|i| reader.floats::<3>(i, Pick::All)).transpose()?;
+    let rotations = index("ROTATION").map(|i| reader.floats::<4>(i, Pick::All)).transpose()?;
+    let scales = index("SCALE").map(|i| reader.floats::<3>(i, Pick::All)).transpose()?;
     let lengths =
         [translations.as_ref().map(Vec::len), rotations.as_ref().map(Vec::len), scales.as_ref().map(Vec::len)];
     let count = lengths.into_iter().flatten().min().ok_or(Unreadable::Unknown)?;

@@ -3,7 +3,7 @@
 //! A skinned mesh stands where its joints put it: the node that holds it has no say. The static picture uses the
 //! joints' places as the nodes give them; animation is not played.
 
-use super::accessor::{Format, Reader, Unreadable};
+use super::accessor::{Format, Pick, Reader, Unreadable};
 use super::codes::Code;
 use super::graph::Graph;
 use super::links::is_bind_matrix;
@@ -38,7 +38,12 @@ fn matrices_of(reader: Reader, graph: &Graph, i: usize, report: &mut Report) -> 
     if accessor.buffer_view.is_none() && accessor.sparse.is_none() {
         return Some(joints);
     }
-    let inverse = match reader.floats::<16>(index) {
+    // Only what the joints need: many skins may share one long list of matrices.
+    let wanted: Vec<u32> = (0..u32::try_from(joints.len()).ok()?).collect();
+    if accessor.count.0 < joints.len() as u64 {
+        return None;
+    }
+    let inverse = match reader.floats::<16>(index, Pick::Only(&wanted)) {
         Ok(inverse) => inverse,
         Err(Unreadable::Nowhere(_) | Unreadable::Unknown) => return None,
         Err(Unreadable::Buffer(why)) => {
@@ -58,7 +63,7 @@ fn matrices_of(reader: Reader, graph: &Graph, i: usize, report: &mut Report) -> 
         (m.x_axis.w, m.y_axis.w, m.z_axis.w, m.w_axis.w) = (0.0, 0.0, 0.0, 1.0);
         m
     };
-    (inverse.len() >= joints.len()).then(|| joints.iter().zip(&inverse).map(|(joint, m)| *joint * bind(m)).collect())
+    Some(joints.iter().zip(&inverse).map(|(joint, m)| *joint * bind(m)).collect())
 }
 
 /// The joints of a skin should hang on one node, and `skeleton` should be such a node.

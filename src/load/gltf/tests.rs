@@ -224,7 +224,7 @@ fn a_sparse_index_past_the_end_is_refused() {
     file.root["accessors"][positions]["sparse"] = json!({"count": 1,
         "indices": {"bufferView": indices, "componentType": 5123}, "values": {"bufferView": values}});
     file.primitive(json!({"attributes": {"POSITION": positions}}));
-    assert!(file.fault().contains("sparse index 9, but only 3 elements exist"));
+    assert!(file.fault().contains("accessors[0].sparse.indices: index 9 at position 0, but only 3 elements exist"));
 }
 
 #[test]
@@ -245,6 +245,76 @@ fn huge_counts_are_refused_before_memory_is_taken() {
     file.primitive(json!({"attributes": {"POSITION": positions}}));
     let options = LoadOptions { limits: Limits { memory: 10, ..Limits::default() }, ..LoadOptions::default() };
     assert!(load_bytes(Path::new("a.gltf"), file.gltf(), &options).is_err());
+}
+
+#[test]
+fn primitives_that_share_a_pool_of_vertices_take_only_their_own() {
+    const POOL: usize = 50_000;
+    let mut file = Builder::new();
+    let values: Vec<f32> = (0..POOL).flat_map(|i| [i as f32, (i % 2) as f32, (i % 3) as f32]).collect();
+    let positions = file.floats("VEC3", &values);
+    let normals = file.floats("VEC3", &[0., 0., 1.].repeat(POOL));
+    let corners = |i: usize| [i * 7 + 5, i * 7 + 1, 3 * i + 20_000];
+    let primitives: Vec<Value> = (0..400)
+        .map(|i| {
+            let indices = file.shorts(&corners(i).map(|c| c as u16));
+            json!({"attributes": {"POSITION": positions, "NORMAL": normals}, "indices": indices})
+        })
+        .collect();
+    file.set("meshes", json!([{ "primitives": primitives }]));
+    // Whole pools would take 400 · 50 000 · 32 bytes.
+    let options = LoadOptions { limits: Limits { memory: 64 << 20, ..Limits::default() }, ..LoadOptions::default() };
+    let scene = load_bytes(Path::new("a.glb"), file.glb(), &options).unwrap().scene;
+    assert_eq!(scene.meshes.len(), 400);
+    for (i, mesh) in scene.meshes.iter().enumerate() {
+        let x: Vec<f32> = mesh.triangles[0].iter().map(|&v| mesh.positions[v as usize].x).collect();
+        assert_eq!(x, corners(i).map(|c| c as f32), "{i}");
+        assert_eq!((mesh.positions.len(), mesh.normals.len()), (3, 3));
+        assert!(mesh.positions.capacity() < 100, "{i}");
+    }
+}
+
+#[test]
+fn replaced_elements_are_found_among_the_vertices_in_use() {
+    let mut file = Builder::new();
+    let positions = file.floats("VEC3", &[0.0; 60]);
+    let indices = file.view(&[3, 7, 15, 19], &[]);
+    let values: Vec<u8> =
+        [1., 0., 0., 9., 9., 9., 0., 1., 0., 8., 8., 8.].into_iter().flat_map(f32::to_le_bytes).collect();
+    let values = file.view(&values, &[]);
+    file.root["accessors"][positions]["sparse"] = json!({"count": 4,
+        "indices": {"bufferView": indices, "componentType": 5121}, "values": {"bufferView": values}});
+    let corners = file.shorts(&[4, 3, 15]);
+    file.primitive(json!({"attributes": {"POSITION": positions}, "indices": corners}));
+    let mesh = &file.load().scene.meshes[0];
+    assert_eq!(mesh.triangles[0].map(|v| mesh.positions[v as usize]), [Vec3::ZERO, Vec3::X, Vec3::Y]);
+}
+
+#[test]
+fn sparse_indices_that_do_not_increase_are_told_and_the_last_value_counts() {
+    for (elements, at) in [([1, 2, 1], 2), ([2, 1, 1], 1)] {
+        let mut file = Builder::new();
+        let positions = file.triangle();
+        let indices = file.view(&elements, &[]);
+        let values: Vec<u8> = elements
+            .iter()
+            .zip(1u8..)
+            .flat_map(|(_, i)| [f32::from(i), 0., 0.])
+            .collect::<Vec<_>>()
+            .into_iter()
+            .flat_map(f32::to_le_bytes)
+            .collect();
+        let values = file.view(&values, &[]);
+        file.root["accessors"][positions]["sparse"] = json!({"count": 3,
+            "indices": {"bufferView": indices, "componentType": 5121}, "values": {"bufferView": values}});
+        file.primitive(json!({"attributes": {"POSITION": positions}}));
+        let loaded = file.load();
+        assert_eq!(codes(&loaded), ["gltf-accessor-sparse-indices-non-increasing"]);
+        let text = loaded.warnings.iter().map(ToString::to_string).find(|w| w.contains("sparse")).unwrap();
+        let told = format!("a.gltf:accessors[0].sparse.indices: index 1 at position {at} follows 2");
+        assert!(text.starts_with(&told), "{text}");
+        assert_eq!(loaded.scene.meshes[0].positions[1], Vec3::X * 3.0);
+    }
 }
 
 #[test]
