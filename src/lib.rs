@@ -1,7 +1,7 @@
 //! meshray renders the mesh files people download (glTF 2.0, OBJ) into pictures, on any CPU, and tells what the picture
 //! cost. It is a Whitted ray tracer (T. Whitted, "An Improved Illumination Model for Shaded Display", 1980) whose work is
-//! cut by a uniform grid with octrees in crowded cells and a per-ray mailbox; every way of culling gives the same hits as
-//! testing everything, bit for bit.
+//! cut by a uniform grid with octrees in crowded cells; every way of culling gives the same hits as testing everything, bit
+//! for bit.
 //!
 //! # The way of the data
 //! A file becomes a [`scene::Scene`] and warnings ([`load`]). [`render::World`] places its shapes in one centred `f32`
@@ -55,7 +55,7 @@
 //! | [`math`] | only numbers: error bounds, rays against triangle, polygon, sphere, plane, box |
 //! | [`scene`] | plain data with indices; which features a scene needs, default camera and light |
 //! | [`load`] | files -> scene and warnings: glTF, OBJ + MTL, scene files |
-//! | [`accel`] | shapes -> what does this ray hit: `none`, `grid-octree`; counts |
+//! | [`accel`] | shapes -> what does this ray hit: `none`, `grid-octree`, `fast-octree`, `fast-bvh`; counts |
 //! | [`mod@render`] | rays -> linear pixels: waves, shading models, lights and shadows, optics, textures |
 //! | [`image`] | linear pixels <-> files: tone mapping, formats, metadata, differences |
 //! | `cli` | words -> jobs -> messages and exit codes (feature `cli`) |

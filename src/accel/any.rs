@@ -3,27 +3,41 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::{GridOctree, GridParams, Shapes, StructureStats, Unculled};
+use super::{GridOctree, GridParams, Shapes, Splitting, StructureStats, Unculled, Wide};
 
 /// Which structure culls.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum AccelKind {
     /// Every ray against every shape.
     None,
-    /// A uniform grid, its crowded cells refined by octrees.
-    #[default]
+    /// A uniform grid, its crowded cells refined by octrees, with a mailbox.
     GridOctree,
+    /// The same cuts as boxes in nodes of eight.
+    FastOctree,
+    /// Boxes in nodes of eight, cut by surface area.
+    FastBvh,
+}
+
+impl Default for AccelKind {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
 }
 
 impl AccelKind {
+    /// The one that is used when none is named.
+    pub const DEFAULT: Self = Self::FastOctree;
+
     /// Every kind, in the order of the help text.
-    pub const ALL: [Self; 2] = [Self::None, Self::GridOctree];
+    pub const ALL: [Self; 4] = [Self::None, Self::GridOctree, Self::FastOctree, Self::FastBvh];
 
     /// As typed and printed.
-    pub fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::None => "none",
             Self::GridOctree => "grid-octree",
+            Self::FastOctree => "fast-octree",
+            Self::FastBvh => "fast-bvh",
         }
     }
 }
@@ -36,7 +50,7 @@ impl fmt::Display for AccelKind {
 
 /// A name that no structure has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no structure is named {0:?}; there are: none, grid-octree")]
+#[error("no structure is named {0:?}; there are: none, grid-octree, fast-octree, fast-bvh")]
 pub struct UnknownAccel(String);
 
 impl FromStr for AccelKind {
@@ -54,6 +68,8 @@ pub enum AnyAccel<'a> {
     None(Unculled<'a>),
     /// [`AccelKind::GridOctree`].
     GridOctree(GridOctree<'a>),
+    /// [`AccelKind::FastOctree`] or [`AccelKind::FastBvh`].
+    Wide(Wide<'a>),
 }
 
 impl<'a> AnyAccel<'a> {
@@ -62,6 +78,8 @@ impl<'a> AnyAccel<'a> {
         match kind {
             AccelKind::None => Self::None(Unculled::new(shapes)),
             AccelKind::GridOctree => Self::GridOctree(GridOctree::build(shapes, params)),
+            AccelKind::FastOctree => Self::Wide(Wide::build(shapes, Splitting::Octree)),
+            AccelKind::FastBvh => Self::Wide(Wide::build(shapes, Splitting::SurfaceArea)),
         }
     }
 
@@ -70,6 +88,10 @@ impl<'a> AnyAccel<'a> {
         match self {
             Self::None(_) => AccelKind::None,
             Self::GridOctree(_) => AccelKind::GridOctree,
+            Self::Wide(a) => match a.splitting() {
+                Splitting::Octree => AccelKind::FastOctree,
+                Splitting::SurfaceArea => AccelKind::FastBvh,
+            },
         }
     }
 
@@ -78,6 +100,7 @@ impl<'a> AnyAccel<'a> {
         match self {
             Self::None(a) => a.summary(),
             Self::GridOctree(a) => a.summary(),
+            Self::Wide(a) => a.summary(),
         }
     }
 
@@ -86,6 +109,7 @@ impl<'a> AnyAccel<'a> {
         match self {
             Self::None(a) => Ok(a.summary()),
             Self::GridOctree(a) => a.check(),
+            Self::Wide(a) => a.check(),
         }
     }
 }

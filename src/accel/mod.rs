@@ -18,7 +18,8 @@ pub mod refine;
 pub mod shapes;
 pub mod stats;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
+pub mod wide;
 
 pub use any::{AccelKind, AnyAccel};
 pub use grid::{GridOctree, GridParams};
@@ -27,6 +28,7 @@ pub use probe::{NoProbe, Probe, RayCounts};
 pub use refine::Refined;
 pub use shapes::{BitSet, Shapes, SpherePrim};
 pub use stats::StructureStats;
+pub use wide::{Splitting, Wide};
 
 use crate::math::Vec3;
 

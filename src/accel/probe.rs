@@ -14,10 +14,12 @@ pub trait Probe: Default + Send {
     fn cell(&mut self, _empty: bool) {}
     /// One ray/prim test (n_it).
     fn prim_test(&mut self) {}
+    /// So many ray/prim tests at once.
+    fn prim_tests(&mut self, _count: u32) {}
     /// A test the mailbox saved (n_mb).
     fn repeat_skipped(&mut self) {}
-    /// One ray/volume test (n_bit).
-    fn volume_test(&mut self) {}
+    /// So many ray/volume tests at once (n_bit).
+    fn volume_tests(&mut self, _count: usize) {}
     /// The query found a hit.
     fn found(&mut self) {}
 }
@@ -63,11 +65,14 @@ impl Probe for RayCounts {
     fn prim_test(&mut self) {
         self.n_it += 1;
     }
+    fn prim_tests(&mut self, count: u32) {
+        self.n_it += u64::from(count);
+    }
     fn repeat_skipped(&mut self) {
         self.n_mb += 1;
     }
-    fn volume_test(&mut self) {
-        self.n_bit += 1;
+    fn volume_tests(&mut self, count: usize) {
+        self.n_bit += count as u64;
     }
     fn found(&mut self) {
         self.found += 1;

@@ -5,6 +5,9 @@
 
 use super::{Accel, Hit, NO_PRIM, Probe, Ray, Shapes};
 use crate::math::shear::RaySpace;
+use crate::math::simd::LANES;
+use crate::math::triangle;
+use crate::math::triangles::Verdicts;
 
 /// A structure: it names the prims that a ray may hit.
 pub trait Culling: Sync {
@@ -77,6 +80,50 @@ impl<'a, G: Goal> Query<'a, G> {
             }
         }
         self.reach() < self.t_min
+    }
+
+    /// Takes the verdicts of a block's first `count` lanes, decides those that are open, and tells whether the query is
+    /// answered. The same hits as [`Self::test`] for each of them.
+    #[inline(always)]
+    pub fn test_block<P: Probe>(
+        &mut self,
+        prims: &[u32; LANES],
+        count: u32,
+        verdicts: Verdicts,
+        probe: &mut P,
+    ) -> bool {
+        probe.prim_tests(count);
+        let mut open = (verdicts.hit | verdicts.unsure) & ((1 << count) - 1);
+        while open != 0 {
+            let lane = open.trailing_zeros() as usize % LANES;
+            open &= open - 1;
+            let certain = verdicts.hit >> lane & 1 == 1;
+            if self.take(prims[lane], certain) {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Offers the hit with a triangle that is hit for certain, or may be.
+    #[inline(never)]
+    fn take(&mut self, prim: u32, certain: bool) -> bool {
+        if prim == self.exclude || !self.goal.wants(self.shapes, prim) {
+            return false;
+        }
+        let corners = self.shapes.triangle(prim);
+        if certain || triangle::is_hit_near_edge(&self.ray, &corners) {
+            let t = triangle::distance(&self.ray, &corners);
+            if t >= self.t_min && t <= self.t_max {
+                self.goal.offer(t, prim);
+            }
+        }
+        self.reach() < self.t_min
+    }
+
+    /// What is asked about.
+    pub fn shapes(&self) -> &'a Shapes {
+        self.shapes
     }
 }
 

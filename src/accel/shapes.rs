@@ -105,6 +105,12 @@ impl Shapes {
         [self.vertices[a as usize], self.vertices[b as usize], self.vertices[c as usize]]
     }
 
+    /// The corners of triangle `prim`.
+    #[inline]
+    pub fn triangle(&self, prim: u32) -> Triangle {
+        self.corners(self.triangles[prim as usize])
+    }
+
     /// Where the line through the ray meets prim `prim`: up to two distances, NaN for "not". The one test that every
     /// structure uses, a function of ray and prim alone. With `ahead`, negative distances may be left out.
     #[inline]

@@ -1,6 +1,7 @@
 //! What was typed: syntax only. What it means together is decided in [`super::job`].
 
 use super::parse;
+use crate::accel::{AccelKind, GridParams};
 use crate::image::ToneMap;
 use crate::scene::framing::NamedView;
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
@@ -168,9 +169,9 @@ pub(super) struct RenderArgs {
     pub strict: bool,
 
     /// Structure that finds what rays hit; the picture is the same with each
-    #[arg(long, value_name = "NAME", value_parser = parse::accel(), default_value = parse::DEFAULT_ACCEL,
+    #[arg(long, value_name = "NAME", value_parser = parse::accel(), default_value = AccelKind::DEFAULT.name(),
           help_heading = "Structure", hide_short_help = true)]
-    pub accel: crate::accel::AccelKind,
+    pub accel: AccelKind,
     /// Parameters of the grid
     #[command(flatten)]
     pub grid: GridArgs,
@@ -192,21 +193,25 @@ pub(super) struct RenderArgs {
     pub quiet: bool,
 }
 
-/// Parameters of the grid.
-#[derive(Debug, Clone, Default, Args)]
+/// Parameters of `grid-octree`.
+#[derive(Debug, Clone, Args)]
 pub(super) struct GridArgs {
-    /// Cells of the grid per shape [default: 1]
-    #[arg(long, value_name = "RATIO", help_heading = "Structure", hide_short_help = true)]
-    pub grid_density: Option<f64>,
-    /// Most cells of the grid along an axis [default: 256]
-    #[arg(long, value_name = "N", help_heading = "Structure", hide_short_help = true)]
-    pub grid_resolution: Option<u32>,
-    /// Most octree levels below a crowded cell; 0: a plain grid [default: 8]
-    #[arg(long, value_name = "N", help_heading = "Structure", hide_short_help = true)]
-    pub octree_depth: Option<u32>,
-    /// Cost of visiting a cell, counted in tests; cells are split when that should pay [default: 2]
-    #[arg(long, value_name = "COST", help_heading = "Structure", hide_short_help = true)]
-    pub step_cost: Option<f64>,
+    /// Cells of the grid per shape
+    #[arg(long, value_name = "RATIO", default_value_t = GridParams::DEFAULT.density,
+          help_heading = "Structure", hide_short_help = true)]
+    pub grid_density: f64,
+    /// Most cells of the grid along an axis
+    #[arg(long, value_name = "N", default_value_t = GridParams::DEFAULT.max_resolution,
+          help_heading = "Structure", hide_short_help = true)]
+    pub grid_resolution: u32,
+    /// Most octree levels below a crowded cell; 0: a plain grid
+    #[arg(long, value_name = "N", default_value_t = GridParams::DEFAULT.max_depth,
+          help_heading = "Structure", hide_short_help = true)]
+    pub octree_depth: u32,
+    /// Cost of visiting a cell, counted in tests; cells are split when that should pay
+    #[arg(long, value_name = "COST", default_value_t = GridParams::DEFAULT.step_cost,
+          help_heading = "Structure", hide_short_help = true)]
+    pub step_cost: f64,
 }
 
 /// What `meshray inspect` was given.

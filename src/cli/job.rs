@@ -304,12 +304,11 @@ fn look(args: &RenderArgs) -> Look {
 }
 
 fn grid(args: &RenderArgs) -> Result<GridParams, Wrong> {
-    let usual = GridParams::default();
     let grid = GridParams {
-        density: args.grid.grid_density.unwrap_or(usual.density),
-        max_resolution: args.grid.grid_resolution.unwrap_or(usual.max_resolution),
-        max_depth: args.grid.octree_depth.unwrap_or(usual.max_depth),
-        step_cost: args.grid.step_cost.unwrap_or(usual.step_cost),
+        density: args.grid.grid_density,
+        max_resolution: args.grid.grid_resolution,
+        max_depth: args.grid.octree_depth,
+        step_cost: args.grid.step_cost,
     };
     grid.validate().map_err(|e| Wrong(e.to_string()))?;
     Ok(grid)

@@ -10,9 +10,6 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 /// Longest side of a picture.
 pub(super) const MAX_SIDE: u32 = 65_535;
 
-/// The structure used when none is named.
-pub(super) const DEFAULT_ACCEL: &str = "grid-octree";
-
 /// `--background` as typed.
 pub(super) type Back = Background;
 

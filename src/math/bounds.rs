@@ -4,6 +4,7 @@
 //! n such factors (N. Higham, *Accuracy and Stability of Numerical Algorithms*, 2002, lemma 3.1).
 
 use super::Vec3;
+use super::simd::Simd;
 
 /// Unit roundoff of `f32`: 2⁻²⁴.
 pub const U32: f32 = f32::EPSILON / 2.0;
@@ -40,6 +41,17 @@ pub const EDGE_OVERFLOW: f32 = (1u128 << 100) as f32;
 pub fn edge_error_f32(reach: f32, spread: f32) -> f32 {
     let e = 4.0 * U32 * reach + U32 * spread;
     (4.0 * e * spread + 2.0 * e * e + 4.0 * U32 * spread * spread) * SLACK + EDGE_UNDERFLOW
+}
+
+/// [`edge_error_f32`] in eight lanes.
+#[inline(always)]
+pub fn edge_error_lanes<S: Simd>(s: S, reach: S::Lanes, spread: S::Lanes) -> S::Lanes {
+    let e = s.add(s.mul(s.splat(4.0 * U32), reach), s.mul(s.splat(U32), spread));
+    let four = s.splat(4.0);
+    let first = s.mul(s.mul(four, e), spread);
+    let second = s.mul(s.mul(s.splat(2.0), e), e);
+    let third = s.mul(s.mul(s.splat(4.0 * U32), spread), spread);
+    s.add(s.mul(s.add(s.add(first, second), third), s.splat(SLACK)), s.splat(EDGE_UNDERFLOW))
 }
 
 /// As [`edge_error_f32`] for the same computation in `f64`, where nothing made of `f32` inputs over- or underflows.
@@ -83,6 +95,18 @@ pub const RAY_CELLS: f64 = (1u64 << 38) as f64;
 /// Widening of a slab distance so that a box is never missed: 3 roundings at either end.
 /// (T. Ize, *Robust BVH Ray Traversal*, 2013.)
 pub const SLAB: f64 = 2.0 * 3.0 * U64 / (1.0 - 3.0 * U64);
+
+/// What a distance to a box's plane in `f32`, fl(fl(plane − origin) · fl(1/d)), may be off, relative: 3 roundings. The
+/// entry of a ray that meets the box then exceeds its exit by less than twice that of either, in size; doubled again
+/// for the rounding of the comparison itself. Underflow adds less than [`f32::MIN_POSITIVE`].
+pub const SLAB_F32: f32 = 4.0 * gamma(3);
+
+/// How far beyond the end of a ray's range a box of `f32` planes must still be entered: its entry errs by 3 u, and t by
+/// what [`WALK_MARGIN`] says.
+pub const BOX_MARGIN: f32 = SLAB_F32 + WALK_MARGIN as f32;
+
+/// Scenes and rays with coordinates beyond this are not culled by boxes in `f32`: up to here differences do not overflow.
+pub const BOX_COORDINATES: f32 = f32::MAX / 4.0;
 
 /// The start of a secondary ray: outside the box `position ± error` on the side of the surface that `dir` leaves to.
 ///

@@ -17,5 +17,7 @@ pub mod plane;
 pub mod polygon;
 pub mod quotient;
 pub mod shear;
+pub mod simd;
 pub mod sphere;
 pub mod triangle;
+pub mod triangles;

@@ -65,10 +65,10 @@ fn is_hit_along<const Z: usize>(ray: &RaySpace, triangle: &Triangle) -> bool {
     is_hit_near_edge(ray, triangle)
 }
 
-/// The verdict where `f32` cannot tell.
+/// As [`is_hit`], for triangles about which `f32` cannot tell.
 #[cold]
 #[inline(never)]
-fn is_hit_near_edge(ray: &RaySpace, &[a, b, c]: &Triangle) -> bool {
+pub fn is_hit_near_edge(ray: &RaySpace, &[a, b, c]: &Triangle) -> bool {
     let first = ray.edge_sign(b, c);
     let second = ray.edge_sign(c, a);
     if first * second < 0 {
@@ -80,7 +80,7 @@ fn is_hit_near_edge(ray: &RaySpace, &[a, b, c]: &Triangle) -> bool {
 }
 
 /// Exact t = n·(a − o) / n·d with n = (b − a) × (c − a), correctly rounded. The triangle must be hit.
-fn distance(ray: &RaySpace, triangle: &Triangle) -> f32 {
+pub fn distance(ray: &RaySpace, triangle: &Triangle) -> f32 {
     let fast = plane_quotient(ray, triangle).and_then(|(t, error)| nearest(t, error));
     fast.unwrap_or_else(|| {
         let (numerator, denominator) = exact_plane_terms(ray, triangle);

@@ -143,6 +143,7 @@ fn dispatch<P: Probe>(job: &Job, progress: &dyn Progress) -> (Rendered, Vec<ByCl
     match job.accel {
         AnyAccel::None(accel) => render_with(job, accel, progress),
         AnyAccel::GridOctree(accel) => render_with(job, accel, progress),
+        AnyAccel::Wide(accel) => render_with(job, accel, progress),
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::program::{Folder, picture};
 use crate::common::{bits, models};
+use meshray::accel::AccelKind;
 
 /// Renders with each structure and number of threads and compares the bits.
 fn all_agree(folder: &Folder, input: &str, size: &str, structures: &[&str]) {
@@ -23,11 +24,12 @@ fn all_agree(folder: &Folder, input: &str, size: &str, structures: &[&str]) {
 /// here, and the others through the library, smaller (`models`).
 #[test]
 fn every_model_gives_the_same_bits_with_every_structure_and_any_threads() {
-    let structures: &[&str] = if cfg!(debug_assertions) { &["grid-octree"] } else { &["grid-octree", "none"] };
+    let all = AccelKind::ALL.map(AccelKind::name);
+    let affordable: Vec<_> = all.into_iter().filter(|&name| !cfg!(debug_assertions) || name != "none").collect();
     let folder = Folder::with_cube();
-    all_agree(&folder, "cube.obj", "80x60", &["grid-octree", "none"]);
+    all_agree(&folder, "cube.obj", "80x60", &all);
     for input in models() {
-        all_agree(&folder, input.to_str().unwrap(), "80x60", structures);
+        all_agree(&folder, input.to_str().unwrap(), "80x60", &affordable);
     }
 }
 

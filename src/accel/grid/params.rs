@@ -16,7 +16,7 @@ pub struct GridParams {
 
 impl Default for GridParams {
     fn default() -> Self {
-        Self { density: 0.25, max_resolution: 256, max_depth: 8, step_cost: 4.0 }
+        Self::DEFAULT
     }
 }
 
@@ -30,6 +30,9 @@ pub struct ParamError {
 }
 
 impl GridParams {
+    /// What suits most meshes.
+    pub const DEFAULT: Self = Self { density: 0.25, max_resolution: 256, max_depth: 8, step_cost: 4.0 };
+
     /// Whether every parameter is within its range.
     pub fn validate(&self) -> Result<(), ParamError> {
         let check = |name, value: f64, ok: bool, range| ok.then_some(()).ok_or(ParamError { name, value, range });

@@ -1,10 +1,11 @@
 //! What every structure must do.
 
-mod scenes;
+pub(crate) mod scenes;
 mod watertight;
 
 use super::grid::mailbox::{NoMailbox, Stamps};
 use super::*;
+use crate::math::simd::Level;
 use scenes::{all, broken_rays, rays};
 
 const PARAMS: [GridParams; 4] = [
@@ -31,8 +32,14 @@ fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<[u32; 9]> {
     first.iter().zip(&blocked).zip(&second).map(row).collect()
 }
 
+fn assert_same(what: &str, rays: &[Ray], got: &[[u32; 9]], expected: &[[u32; 9]]) {
+    for ((ray, got), expected) in rays.iter().zip(got).zip(expected) {
+        assert_eq!(got, expected, "{what}, {ray:?}");
+    }
+}
+
 #[test]
-fn every_structure_agrees_with_brute_force_bit_for_bit() {
+fn every_grid_agrees_with_brute_force_bit_for_bit() {
     for (name, shapes) in all() {
         let rays = rays(&shapes, 40);
         let expected = answers(&Unculled::new(&shapes), &rays);
@@ -41,11 +48,55 @@ fn every_structure_agrees_with_brute_force_bit_for_bit() {
             assert!(grid.check().is_ok(), "{name}: {:?}", grid.check());
             let plain = GridOctree::<NoMailbox>::build(&shapes, params);
             for got in [answers(&grid, &rays), answers(&plain, &rays)] {
-                for ((ray, got), expected) in rays.iter().zip(&got).zip(&expected) {
-                    assert_eq!(got, expected, "{name}, {params:?}, {ray:?}");
-                }
+                assert_same(&format!("{name}, {params:?}"), &rays, &got, &expected);
             }
         }
+    }
+}
+
+#[test]
+fn every_wide_tree_agrees_with_brute_force_bit_for_bit_on_every_instruction_set() {
+    for (name, shapes) in all() {
+        let rays = rays(&shapes, 100);
+        let expected = answers(&Unculled::new(&shapes), &rays);
+        for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
+            let tree = Wide::build(&shapes, splitting);
+            assert!(tree.check().is_ok(), "{name}: {:?}", tree.check());
+            for level in Level::all() {
+                let got = answers(&tree.clone().at_level(level), &rays);
+                assert_same(&format!("{name}, {splitting:?}, {}", level.name()), &rays, &got, &expected);
+            }
+        }
+    }
+}
+
+#[test]
+fn counts_of_a_wide_tree_do_not_depend_on_the_instruction_set() {
+    let shapes = scenes::soup(700, 0.4);
+    let rays = rays(&shapes, 100);
+    let count = |level| {
+        let tree = Wide::build(&shapes, Splitting::Octree).at_level(level);
+        let mut counts = RayCounts::default();
+        tree.closest(&rays, &mut vec![Hit::MISS; rays.len()], &mut tree.scratch(), &mut counts);
+        counts
+    };
+    let expected = count(Level::PORTABLE);
+    assert!(expected.n_it > 1000 && expected.n_bit == 8 * (expected.n_ts - expected.n_ets), "{expected:?}");
+    Level::all().into_iter().for_each(|level| assert_eq!(count(level), expected, "{}", level.name()));
+}
+
+#[test]
+fn a_wide_tree_culls_nearly_everything_and_lists_each_prim_once() {
+    let shapes = scenes::star(100, 50);
+    let rays = rays(&shapes, 20);
+    for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
+        let tree = Wide::build(&shapes, splitting);
+        let mut counts = RayCounts::default();
+        tree.closest(&rays, &mut vec![Hit::MISS; rays.len()], &mut tree.scratch(), &mut counts);
+        assert!(counts.n_it * 50 < counts.queries * shapes.len() as u64, "{splitting:?}: {counts:?}");
+        let stats = tree.summary();
+        assert_eq!(stats.n_oiv, u64::from(shapes.bounded()));
+        assert!(stats.n_v < stats.n_oiv / 4 && stats.depth < 12 && stats.n_ev == 0, "{splitting:?}: {stats:?}");
     }
 }
 
@@ -64,7 +115,9 @@ fn rays_that_are_not_numbers_or_go_nowhere_miss() {
     let shapes = scenes::mix();
     let rays = broken_rays();
     let grid: GridOctree = GridOctree::build(&shapes, &GridParams::default());
-    for answer in answers(&grid, &rays).into_iter().chain(answers(&Unculled::new(&shapes), &rays)) {
+    let tree = Wide::build(&shapes, Splitting::Octree);
+    let all = [answers(&grid, &rays), answers(&tree, &rays), answers(&Unculled::new(&shapes), &rays)];
+    for answer in all.into_iter().flatten() {
         assert_eq!((answer[3], answer[4], answer[8]), (NO_PRIM, 0, NO_PRIM));
     }
 }
@@ -140,7 +193,9 @@ fn a_structure_does_not_depend_on_the_number_of_threads() {
     let shapes = scenes::soup(9000, 0.1);
     let build = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        pool.map(|p| p.install(|| format!("{:?}", GridOctree::<Stamps>::build(&shapes, &GridParams::default()))))
+        let grid = || format!("{:?}", GridOctree::<Stamps>::build(&shapes, &GridParams::default()));
+        let trees = || [Splitting::Octree, Splitting::SurfaceArea].map(|s| format!("{:?}", Wide::build(&shapes, s)));
+        pool.map(|p| p.install(|| grid() + &trees().concat()))
     };
     let texts = [1, 2, 7].map(|threads| build(threads).unwrap_or_default());
     assert!(!texts[0].is_empty() && texts[0] == texts[1] && texts[0] == texts[2]);

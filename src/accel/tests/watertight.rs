@@ -19,14 +19,36 @@ fn aimed(shapes: &Shapes, n: usize) -> Vec<Ray> {
     rays
 }
 
+fn assert_nothing_escapes(shapes: &Shapes, rays: &[Ray]) {
+    let found = |accel: &dyn Fn(&mut [Hit])| {
+        let mut hits = vec![Hit::MISS; rays.len()];
+        accel(&mut hits);
+        hits
+    };
+    let grid: GridOctree = GridOctree::build(shapes, &GridParams::default());
+    let trees = [Splitting::Octree, Splitting::SurfaceArea].map(|s| Wide::build(shapes, s));
+    let answers = [
+        found(&|hits| grid.closest(rays, hits, &mut grid.scratch(), &mut NoProbe)),
+        found(&|hits| trees[0].closest(rays, hits, &mut trees[0].scratch(), &mut NoProbe)),
+        found(&|hits| trees[1].closest(rays, hits, &mut trees[1].scratch(), &mut NoProbe)),
+    ];
+    for (structure, hits) in answers.iter().enumerate() {
+        let escaped: Vec<_> = rays.iter().zip(hits).filter(|(_, h)| !h.is_some()).collect();
+        assert!(
+            escaped.is_empty(),
+            "{} of {} through structure {structure}: {:?}",
+            escaped.len(),
+            rays.len(),
+            escaped[0]
+        );
+    }
+}
+
 #[test]
 fn no_ray_aimed_at_corners_and_edges_escapes_from_a_closed_mesh() {
     let shapes = star(100, 50);
     let rays = aimed(&shapes, 10_000);
-    let grid: GridOctree = GridOctree::build(&shapes, &GridParams::default());
-    let mut hits = vec![Hit::MISS; rays.len()];
-    grid.closest(&rays, &mut hits, &mut grid.scratch(), &mut NoProbe);
-    assert_eq!(hits.iter().filter(|h| !h.is_some()).count(), 0, "of {} rays", rays.len());
+    assert_nothing_escapes(&shapes, &rays);
 }
 
 #[test]
@@ -57,10 +79,5 @@ fn no_ray_through_a_corner_or_edge_of_a_lattice_escapes() {
         }
     }
     rays.retain(|r| r.dir != Vec3::ZERO);
-    let grid: GridOctree = GridOctree::build(&shapes, &GridParams::default());
-    let mut hits = vec![Hit::MISS; rays.len()];
-    grid.closest(&rays, &mut hits, &mut grid.scratch(), &mut NoProbe);
-    for (ray, hit) in rays.iter().zip(&hits) {
-        assert!(hit.is_some(), "{ray:?}");
-    }
+    assert_nothing_escapes(&shapes, &rays);
 }

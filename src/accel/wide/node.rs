@@ -1,0 +1,167 @@
+//! Nodes, blocks and runs as flat arrays.
+
+use crate::accel::NO_PRIM;
+use crate::math::aabb::Aabb;
+use crate::math::simd::{LANES, Row};
+use crate::math::triangles::{Corners8, NO_CORNERS};
+
+/// Eight children: their boxes and what they are.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Node {
+    /// By axis, lower and upper plane, child.
+    pub planes: [[Row; 2]; 3],
+    /// Packed [`Child`]ren.
+    pub children: [u32; LANES],
+}
+
+impl Node {
+    /// No child.
+    pub(super) const EMPTY: Self =
+        Self { planes: [[[f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]]; 3], children: [Child::NOTHING; LANES] };
+
+    pub(super) fn set(&mut self, slot: usize, bounds: &Aabb, child: Child) {
+        for (rows, (lo, hi)) in self.planes.iter_mut().zip(bounds.lo.to_array().into_iter().zip(bounds.hi.to_array())) {
+            rows[0][slot] = lo;
+            rows[1][slot] = hi;
+        }
+        self.children[slot] = child.pack();
+    }
+
+    /// The box of a child; empty where there is none.
+    pub(super) fn bounds(&self, slot: usize) -> Aabb {
+        let corner = |side: usize| [0, 1, 2].map(|k: usize| self.planes[k][side][slot]).into();
+        Aabb { lo: corner(0), hi: corner(1) }
+    }
+}
+
+/// What a slot of a node leads to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Child {
+    /// Index into [`Tree::nodes`].
+    Node(u32),
+    /// Index into [`Tree::blocks`], and how many of its lanes hold a triangle.
+    Block(u32, u32),
+    /// Index into [`Tree::runs`].
+    Run(u32),
+}
+
+impl Child {
+    /// A block without triangles: where an empty slot leads.
+    pub(super) const NOTHING: u32 = Self::LEAF;
+    const LEAF: u32 = 1 << 31;
+    const COUNT: u32 = 27;
+    /// A count that no block has marks a run.
+    const RUN: u32 = 15;
+
+    fn pack(self) -> u32 {
+        match self {
+            Self::Node(i) => i,
+            Self::Block(i, count) => Self::LEAF | count << Self::COUNT | i,
+            Self::Run(i) => Self::LEAF | Self::RUN << Self::COUNT | i,
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn unpack(word: u32) -> Self {
+        let (count, index) = (word >> Self::COUNT & 15, word & ((1 << Self::COUNT) - 1));
+        match (word & Self::LEAF, count) {
+            (0, _) => Self::Node(word),
+            (_, Self::RUN) => Self::Run(index),
+            _ => Self::Block(index, count),
+        }
+    }
+
+    /// The same child after its tree was appended to another.
+    fn moved(word: u32, by: &Offsets) -> u32 {
+        let moved = match Self::unpack(word) {
+            Self::Node(i) => Self::Node(i + by.nodes),
+            Self::Block(_, 0) => return word,
+            Self::Block(i, count) => Self::Block(i + by.blocks, count),
+            Self::Run(i) => Self::Run(i + by.runs),
+        };
+        moved.pack()
+    }
+}
+
+/// Up to eight triangles side by side.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Block {
+    pub corners: Corners8,
+    /// The triangle in each lane; [`NO_PRIM`] behind the last.
+    pub prims: [u32; LANES],
+}
+
+impl Block {
+    pub(super) const EMPTY: Self = Self { corners: NO_CORNERS, prims: [NO_PRIM; LANES] };
+}
+
+/// Everything in arrays.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tree {
+    /// The first is the root; there is none when there are no bounded prims.
+    pub nodes: Vec<Node>,
+    pub blocks: Vec<Block>,
+    /// Other prims than triangles: (first, number) in [`Self::prims`].
+    pub runs: Vec<(u32, u32)>,
+    pub prims: Vec<u32>,
+    /// Largest coordinate of a box, in size.
+    pub extent: f32,
+}
+
+struct Offsets {
+    nodes: u32,
+    blocks: u32,
+    runs: u32,
+}
+
+impl Tree {
+    /// Adds what another builder made; its root is the child that is returned.
+    pub(super) fn append(&mut self, part: Self) -> Child {
+        let by =
+            Offsets { nodes: index(self.nodes.len()), blocks: index(self.blocks.len()), runs: index(self.runs.len()) };
+        let moved = |node: Node| Node { children: node.children.map(|c| Child::moved(c, &by)), ..node };
+        let prims = index(self.prims.len());
+        self.nodes.extend(part.nodes.into_iter().map(moved));
+        self.blocks.extend(part.blocks);
+        self.runs.extend(part.runs.into_iter().map(|(first, len)| (first + prims, len)));
+        self.prims.extend(part.prims);
+        Child::Node(by.nodes)
+    }
+
+    /// Bytes of the arrays.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&*self.nodes) + size_of_val(&*self.blocks) + size_of_val(&*self.runs) + size_of_val(&*self.prims)
+    }
+
+    /// The prims of a run.
+    #[inline]
+    pub(super) fn run(&self, run: u32) -> &[u32] {
+        let (first, len) = self.runs[run as usize];
+        &self.prims[first as usize..(first + len) as usize]
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "fewer than the prims, which u32 counts")]
+pub(super) fn index(i: usize) -> u32 {
+    i as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn children_are_packed_and_unpacked() {
+        for child in [Child::Node(0), Child::Node(7_000_000), Child::Block(3, 8), Child::Block(9, 1), Child::Run(5)] {
+            assert_eq!(Child::unpack(child.pack()), child);
+        }
+        assert_eq!(Child::unpack(Child::NOTHING), Child::Block(0, 0));
+    }
+
+    #[test]
+    fn nodes_and_blocks_fill_cache_lines() {
+        assert_eq!((size_of::<Node>(), size_of::<Block>()), (256, 320));
+    }
+}

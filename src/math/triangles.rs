@@ -1,0 +1,180 @@
+//! Eight triangles against one ray: the filter of [`triangle`](super::triangle) in eight lanes.
+//!
+//! Edge values and their bound are computed as there, operation by operation; what the bound cannot decide is left to
+//! the exact form. Verdicts are exact, so it does not matter which of the two found them.
+
+use super::Vec3;
+use super::bounds::{EDGE_OVERFLOW, edge_error_lanes};
+use super::shear::RaySpace;
+use super::simd::{LANES, Row, Simd};
+
+/// Corners of eight triangles, by corner and axis.
+pub type Corners8 = [[Row; 3]; 3];
+
+/// Lanes without a triangle: a NaN in every corner.
+pub const NO_CORNERS: Corners8 = [[[f32::NAN; LANES]; 3]; 3];
+
+/// Puts a triangle into one lane.
+pub fn set_corners(corners: &mut Corners8, lane: usize, triangle: &[Vec3; 3]) {
+    for (rows, corner) in corners.iter_mut().zip(triangle) {
+        for (row, x) in rows.iter_mut().zip(corner.to_array()) {
+            row[lane] = x;
+        }
+    }
+}
+
+/// A ray ready to be tested against blocks.
+#[derive(Clone, Copy)]
+pub struct RayLanes<S: Simd> {
+    /// Axes in sheared order: x, y, z.
+    axes: [usize; 3],
+    /// Origin along these axes.
+    origin: [S::Lanes; 3],
+    shear: [S::Lanes; 2],
+}
+
+/// Which lanes are hit; a bit of neither mask is a certain miss.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Verdicts {
+    /// The line through the ray meets the triangle for certain.
+    pub hit: u32,
+    /// Only exact arithmetic can tell. Lanes without a triangle are among these.
+    pub unsure: u32,
+}
+
+impl<S: Simd> RayLanes<S> {
+    /// Spreads a ray over the lanes.
+    #[inline(always)]
+    pub fn new(s: S, ray: &RaySpace) -> Self {
+        let axes = [ray.x, ray.y, ray.z];
+        Self { axes, origin: axes.map(|k| s.splat(ray.origin[k])), shear: [s.splat(ray.shear.0), s.splat(ray.shear.1)] }
+    }
+
+    /// Tests eight triangles.
+    #[inline(always)]
+    pub fn verdicts(&self, s: S, corners: &Corners8) -> Verdicts {
+        let [a, b, c] = [self.relative(s, &corners[0]), self.relative(s, &corners[1]), self.relative(s, &corners[2])];
+        let ([ax, ay], [bx, by], [cx, cy]) = (self.sheared(s, a), self.sheared(s, b), self.sheared(s, c));
+        let u = s.sub(s.mul(cx, by), s.mul(cy, bx));
+        let v = s.sub(s.mul(ax, cy), s.mul(ay, cx));
+        let w = s.sub(s.mul(bx, ay), s.mul(by, ax));
+
+        let reach = s.greater(largest3(s, a), s.greater(largest3(s, b), largest3(s, c)));
+        let spread = s.greater(largest2(s, ax, ay), s.greater(largest2(s, bx, by), largest2(s, cx, cy)));
+        let error = edge_error_lanes(s, reach, spread);
+        let negative = s.sub(s.splat(0.0), error);
+        let (low, high) = (s.smaller(u, s.smaller(v, w)), s.greater(u, s.greater(v, w)));
+
+        // Overflow makes the bound too large or NaN, and the comparisons false.
+        let sound = s.less(error, s.splat(EDGE_OVERFLOW));
+        let miss = s.less(low, negative) & s.less(error, high);
+        let hit = (s.less(error, low) | s.less(high, negative)) & sound;
+        Verdicts { hit, unsure: !(hit | miss & sound) & 0xff }
+    }
+
+    /// A corner relative to the origin, in sheared order.
+    #[inline(always)]
+    fn relative(&self, s: S, corner: &[Row; 3]) -> [S::Lanes; 3] {
+        let [x, y, z] = self.axes;
+        [
+            s.sub(s.load(&corner[x]), self.origin[0]),
+            s.sub(s.load(&corner[y]), self.origin[1]),
+            s.sub(s.load(&corner[z]), self.origin[2]),
+        ]
+    }
+
+    #[inline(always)]
+    fn sheared(&self, s: S, [x, y, z]: [S::Lanes; 3]) -> [S::Lanes; 2] {
+        [s.sub(x, s.mul(self.shear[0], z)), s.sub(y, s.mul(self.shear[1], z))]
+    }
+}
+
+#[inline(always)]
+fn largest2<S: Simd>(s: S, x: S::Lanes, y: S::Lanes) -> S::Lanes {
+    s.greater(s.abs(x), s.abs(y))
+}
+
+#[inline(always)]
+fn largest3<S: Simd>(s: S, [x, y, z]: [S::Lanes; 3]) -> S::Lanes {
+    s.greater(s.abs(x), largest2(s, y, z))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::simd::{Kernel, Level};
+    use super::super::triangle;
+    use super::*;
+    use crate::accel::tests::scenes::Random;
+
+    struct Test<'a>(&'a RaySpace, &'a Corners8);
+
+    impl Kernel for Test<'_> {
+        type Output = Verdicts;
+
+        #[inline(always)]
+        fn run<S: Simd>(self, s: S) -> Verdicts {
+            RayLanes::new(s, self.0).verdicts(s, self.1)
+        }
+    }
+
+    /// Triangles of all sizes, rays at random and at corners and edges, scaled by 2^exponent.
+    fn each_case(exponent: i32, mut check: impl FnMut(&RaySpace, &[[Vec3; 3]; LANES], &Corners8)) {
+        let mut random = Random(7);
+        let scale = 2.0f32.powi(exponent);
+        for case in 0..600 {
+            let triangles: [[Vec3; 3]; LANES] = std::array::from_fn(|_| {
+                let (place, size) = (random.cube(), random.unit() * random.unit());
+                std::array::from_fn(|_| (place + random.cube() * size) * scale)
+            });
+            let mut corners = NO_CORNERS;
+            (0..LANES).for_each(|lane| set_corners(&mut corners, lane, &triangles[lane]));
+            let [a, b, _] = triangles[random.below(LANES)];
+            let target = [random.cube() * scale, a, a + (b - a) * random.unit(), (a + b) * 0.5][case % 4];
+            let origin = if case % 5 == 0 { Vec3::ZERO } else { random.cube() * 4.0 * scale };
+            if let Some(ray) = RaySpace::new(origin, target - origin) {
+                check(&ray, &triangles, &corners);
+            }
+        }
+    }
+
+    #[test]
+    fn certain_verdicts_of_eight_lanes_are_those_of_the_exact_test() {
+        for exponent in [-120, -60, -30, 0, 30, 60, 120] {
+            let (mut hits, mut misses, mut cases) = (0, 0, 0);
+            each_case(exponent, |ray, triangles, corners| {
+                let verdicts = Level::PORTABLE.run(Test(ray, corners));
+                assert_eq!(verdicts.hit & verdicts.unsure, 0);
+                for (lane, triangle) in triangles.iter().enumerate() {
+                    let exact = triangle::is_hit(ray, triangle);
+                    cases += 1;
+                    hits += verdicts.hit >> lane & 1;
+                    misses += 1 - ((verdicts.hit | verdicts.unsure) >> lane & 1);
+                    assert!(verdicts.unsure >> lane & 1 == 1 || exact == (verdicts.hit >> lane & 1 == 1));
+                }
+            });
+            if exponent.abs() <= 30 {
+                assert!(hits > 10 && hits + misses > cases * 8 / 10, "2^{exponent}: {hits} + {misses} of {cases}");
+            }
+        }
+    }
+
+    #[test]
+    fn every_level_gives_the_same_masks() {
+        for exponent in [-120, 0, 100] {
+            each_case(exponent, |ray, _, corners| {
+                let expected = Level::PORTABLE.run(Test(ray, corners));
+                for level in Level::all() {
+                    assert_eq!(level.run(Test(ray, corners)), expected, "{}", level.name());
+                }
+            });
+        }
+    }
+
+    #[test]
+    fn empty_lanes_are_never_certain() {
+        let mut corners = NO_CORNERS;
+        set_corners(&mut corners, 2, &[Vec3::X, Vec3::Y, Vec3::NEG_ONE]);
+        let ray = RaySpace::new(Vec3::new(0.0, 0.0, 5.0), Vec3::NEG_Z).map(|r| Level::PORTABLE.run(Test(&r, &corners)));
+        assert_eq!(ray, Some(Verdicts { hit: 0b100, unsure: 0b1111_1011 }));
+    }
+}
