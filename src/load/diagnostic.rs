@@ -1,5 +1,6 @@
 //! What loading has to tell: one fault or warning is a value with a place, the numbers and a remedy. Only `cli` prints.
 
+use std::collections::HashMap;
 use std::fmt;
 use std::path::PathBuf;
 
@@ -92,29 +93,119 @@ impl From<Diagnostic> for LoadError {
     }
 }
 
-/// Gathers warnings; equal (code, file, text) are counted, not repeated.
+/// Gathers warnings; those of one kind are counted, not repeated.
+///
+/// Of one code, only so many kinds are kept; the others become one last warning of that code, which counts them. So
+/// neither memory nor the list grows with the number of warnings.
 #[derive(Clone, Debug, Default)]
 pub struct Warnings {
-    list: Vec<Diagnostic>,
+    list: Vec<(Kind, Diagnostic)>,
+    /// Where each kind is in the list.
+    known: HashMap<Kind, usize>,
+    /// How many kinds of each code are kept.
+    kinds: HashMap<&'static str, usize>,
 }
 
+/// What is told once: a code, a file, and what tells kinds of one code apart.
+type Kind = (&'static str, PathBuf, String);
+
 impl Warnings {
-    /// Adds one, or counts it when an equal one is there.
+    /// Kinds of one code that are kept.
+    const KEPT: usize = 20;
+
+    /// Adds one, or counts it when one with the same code, file and text is there.
     pub fn push(&mut self, warning: Diagnostic) {
-        let same = |w: &&mut Diagnostic| w.code == warning.code && w.text == warning.text && w.file == warning.file;
-        match self.list.iter_mut().find(same) {
-            Some(known) => known.count += warning.count,
-            None => self.list.push(warning),
+        let kind = warning.text.clone();
+        self.push_kind(warning, kind);
+    }
+
+    /// Adds one, or counts it when one with the same code, file and `kind` is there, whatever their texts say.
+    pub fn push_kind(&mut self, warning: Diagnostic, kind: String) {
+        let kind = (warning.code, warning.file.clone(), kind);
+        if let Some(&at) = self.known.get(&kind) {
+            return self.count(at, warning.count);
         }
+        let kept = self.kinds.entry(warning.code).or_default();
+        *kept += 1;
+        if *kept <= Self::KEPT {
+            return self.keep(kind, warning);
+        }
+        // The name of no kind: texts have no control characters that matter.
+        let rest = (warning.code, PathBuf::new(), "\0".to_owned());
+        match self.known.get(&rest) {
+            Some(&at) => self.count(at, warning.count),
+            None => {
+                let text = "more of this kind are not listed";
+                self.keep(
+                    rest,
+                    Diagnostic { text: text.into(), remedy: String::new(), place: String::new(), ..warning },
+                );
+            }
+        }
+    }
+
+    fn keep(&mut self, kind: Kind, warning: Diagnostic) {
+        self.known.insert(kind.clone(), self.list.len());
+        self.list.push((kind, warning));
+    }
+
+    fn count(&mut self, at: usize, more: u32) {
+        let known = &mut self.list[at].1;
+        known.count = known.count.saturating_add(more);
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
     }
 
     /// All of them, in the order first met.
     pub fn into_vec(self) -> Vec<Diagnostic> {
-        self.list
+        self.list.into_iter().map(|(_, warning)| warning).collect()
     }
 
     /// Adds those of another.
     pub fn extend(&mut self, other: Self) {
-        other.list.into_iter().for_each(|w| self.push(w));
+        other.list.into_iter().for_each(|((_, _, kind), warning)| self.push_kind(warning, kind));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn warning(code: &'static str, text: String) -> Diagnostic {
+        Diagnostic::new(code, "a.obj", "1", text)
+    }
+
+    #[test]
+    fn equal_warnings_are_counted_and_the_first_place_is_kept() {
+        let mut warnings = Warnings::default();
+        warnings.push(warning("a", "x".into()));
+        warnings.push(Diagnostic { place: "2".into(), count: u32::MAX, ..warning("a", "x".into()) });
+        warnings.push(warning("b", "x".into()));
+        warnings.push_kind(warning("b", "y".into()), "x".into());
+        let list = warnings.into_vec();
+        assert_eq!(list.iter().map(|w| (w.code, w.count)).collect::<Vec<_>>(), [("a", u32::MAX), ("b", 2)]);
+        assert_eq!(list[0].place, "1");
+    }
+
+    #[test]
+    fn of_one_code_so_many_kinds_are_listed_and_the_others_counted() {
+        let mut warnings = Warnings::default();
+        for i in 0..100_000 {
+            let mut one = Warnings::default();
+            one.push(warning("a", format!("text {i}")));
+            warnings.extend(one);
+        }
+        let mut twice = warnings.clone();
+        twice.extend(warnings.clone());
+        assert!(warnings.known.len() <= Warnings::KEPT + 1, "memory does not grow");
+        let list = warnings.into_vec();
+        assert_eq!(list.len(), Warnings::KEPT + 1);
+        let last = list.last().unwrap().to_string();
+        assert_eq!(last, "a.obj: more of this kind are not listed (×99980)");
+        let total: u32 = twice.into_vec().iter().map(|w| w.count).sum();
+        assert_eq!(total, 200_000);
     }
 }

@@ -1,7 +1,7 @@
 //! Pictures that cover surfaces.
 
 /// A bitmap and how to read between and beyond its texels.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Texture {
     /// Index into [`super::Scene::bitmaps`].
     pub bitmap: u32,
@@ -10,7 +10,7 @@ pub struct Texture {
 }
 
 /// How texels are found from coordinates.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Sampler {
     /// Beyond 0…1 along u.
     pub wrap_u: Wrap,
@@ -25,7 +25,7 @@ pub struct Sampler {
 }
 
 /// What coordinates outside 0…1 mean.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Wrap {
     /// The picture repeats.
     #[default]
@@ -37,7 +37,7 @@ pub enum Wrap {
 }
 
 /// What lies between texel centres.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Filter {
     /// Bilinear.
     #[default]
@@ -47,7 +47,7 @@ pub enum Filter {
 }
 
 /// How the smaller copies of a bitmap are read.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Mipmaps {
     /// Not at all.
     None,

@@ -12,7 +12,7 @@ use std::collections::HashMap;
 /// Checks every primitive.
 pub(super) fn check(root: &Value, report: &mut Report) {
     let quantized = list(root, "extensionsUsed").iter().any(|e| e == "KHR_mesh_quantization");
-    let mut check = Check { root, quantized, views: HashMap::new(), report };
+    let mut check = Check { root, quantized, views: HashMap::new(), maps: HashMap::new(), report };
     for (i, mesh) in list(root, "meshes").iter().enumerate() {
         let targets: Vec<usize> = list(mesh, "primitives").iter().map(|p| list(p, "targets").len()).collect();
         for (k, primitive) in list(mesh, "primitives").iter().enumerate() {
@@ -51,10 +51,19 @@ enum Usage {
     Indices,
 }
 
+/// Maps of one material that are laid out by the same texture coordinates.
+struct Layout<'a> {
+    /// `TEXCOORD_1`.
+    coordinates: String,
+    names: Vec<&'a str>,
+}
+
 struct Check<'a> {
     root: &'a Value,
     quantized: bool,
     views: HashMap<usize, Usage>,
+    /// What the maps of each material need, as far as somebody asked.
+    maps: HashMap<usize, Vec<Layout<'a>>>,
     report: &'a mut Report,
 }
 
@@ -244,13 +253,11 @@ impl<'a> Check<'a> {
         let place = format!("{place}.material");
         let index = primitive.get("material").and_then(whole).and_then(|i| usize::try_from(i).ok());
         let Some(material) = index.and_then(|i| list(self.root, "materials").get(i)) else { return };
-        let mut slots = Vec::new();
-        texture_slots(material, &mut slots);
-        for (name, set) in slots {
-            if !attributes.contains_key(&format!("TEXCOORD_{set}")) {
-                let text = format!("the {name} of its material needs TEXCOORD_{set}");
-                self.report.add(Code::MeshPrimitiveTooFewTexcoords, &place, text);
-            }
+        let layouts = self.maps.entry(index.unwrap_or_default()).or_insert_with(|| layouts(material));
+        // The first that is missing is enough, and bounds the work by the number of attributes.
+        if let Some(layout) = layouts.iter().find(|layout| !attributes.contains_key(&layout.coordinates)) {
+            let text = format!("the {} of its material needs {}", layout.names.join(", "), layout.coordinates);
+            self.report.add(Code::MeshPrimitiveTooFewTexcoords, &place, text);
         }
         let extension = |name: &str| material.get("extensions").and_then(|e| e.get(name));
         let oriented = extension("KHR_materials_anisotropy").is_some()
@@ -332,6 +339,20 @@ fn fit(name: &str, shape: &Shape, morph: bool) -> Fit {
         (true, false, true) => Fit::Quantized,
         _ => Fit::No,
     }
+}
+
+/// The maps of a material by their texture coordinates.
+fn layouts<'a>(material: &'a Value) -> Vec<Layout<'a>> {
+    /// Names of maps in one message; materials have no more.
+    const LISTED: usize = 20;
+    let mut slots = Vec::new();
+    texture_slots(material, &mut slots);
+    slots.sort_by_key(|slot| slot.1);
+    let layout = |slots: &[(&'a str, u64)]| Layout {
+        coordinates: format!("TEXCOORD_{}", slots[0].1),
+        names: slots.iter().take(LISTED).map(|slot| slot.0).collect(),
+    };
+    slots.chunk_by(|a, b| a.1 == b.1).map(layout).collect()
 }
 
 /// Every map of a material, extensions included, with its texture coordinate set.

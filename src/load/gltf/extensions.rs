@@ -5,6 +5,7 @@ use super::report::Report;
 use crate::load::Diagnostic;
 use crate::load::paths::shorten;
 use serde_json::Value;
+use std::collections::HashSet;
 use std::path::Path;
 
 /// Understood completely, as far as a still picture shows.
@@ -67,6 +68,9 @@ fn remedy(name: &str) -> &'static str {
     }
 }
 
+/// Names in one message before the rest is only counted.
+const LISTED: usize = 20;
+
 /// Whether a still is drawn as this extension says.
 fn is_supported(name: &str) -> bool {
     SUPPORTED.contains(&name)
@@ -90,13 +94,10 @@ impl Lists {
 
     /// Each extension once: name, whether required, whether supported.
     pub(super) fn facts(&self) -> Vec<(String, bool, bool)> {
-        let mut facts: Vec<(String, bool, bool)> = Vec::new();
-        for name in self.used.iter().chain(&self.required) {
-            if facts.iter().all(|(known, ..)| known != name) {
-                facts.push((name.clone(), self.required.contains(name), is_supported(name)));
-            }
-        }
-        facts
+        let required: HashSet<&String> = self.required.iter().collect();
+        let mut seen = HashSet::new();
+        let each_once = self.used.iter().chain(&self.required).filter(|name| seen.insert(*name));
+        each_once.map(|name| (name.clone(), required.contains(name), is_supported(name))).collect()
     }
 
     /// Refuses what is required and not understood; names in one warning what is only used and changes the look.
@@ -116,14 +117,18 @@ impl Lists {
             }
         }
         if !ignored.is_empty() {
-            let text = format!("drawn without {}", ignored.join(", "));
+            let more = ignored.len().saturating_sub(LISTED);
+            ignored.truncate(LISTED);
+            let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
+            let text = format!("drawn without {}{rest}", ignored.join(", "));
             report.warnings.push(Diagnostic::new("gltf-extensions-ignored", file, "extensionsUsed", text));
         }
         self.check_lists(report);
     }
 
     fn check_lists(&self, report: &mut Report) {
-        for (i, name) in self.required.iter().enumerate().filter(|(_, name)| !self.used.contains(name)) {
+        let used: HashSet<&String> = self.used.iter().collect();
+        for (i, name) in self.required.iter().enumerate().filter(|(_, name)| !used.contains(name)) {
             let text = format!("{} is required but not in extensionsUsed", shorten(name));
             report.add(Code::UnusedExtensionRequired, format!("extensionsRequired[{i}]"), text);
         }
@@ -183,5 +188,17 @@ mod tests {
         let (faults, warnings) = messages(&json!({ "extensionsUsed": used }));
         assert!(faults.is_empty());
         assert_eq!(warnings, ["a.gltf:extensionsUsed: drawn without KHR_materials_sheen, KHR_materials_clearcoat"]);
+    }
+
+    #[test]
+    fn a_hundred_thousand_names_are_told_in_a_few_lines() {
+        let names: Vec<String> = (0..100_000).map(|i| format!("MANY_{i}")).collect();
+        let (_, warnings) = messages(&json!({ "extensionsUsed": names }));
+        assert_eq!(warnings.len(), 1);
+        assert!(warnings[0].ends_with("MANY_19 and 99980 more"), "{}", warnings[0]);
+        let (faults, warnings) = messages(&json!({ "extensionsRequired": names }));
+        assert_eq!((faults.len(), warnings.len()), (21, 1));
+        assert!(faults[20].ends_with("99980 more faults"), "{}", faults[20]);
+        assert!(warnings[0].contains("MANY_0 is required but not in extensionsUsed (×100000)"), "{}", warnings[0]);
     }
 }

@@ -5,11 +5,16 @@ use super::report::Report;
 use super::schema::whole;
 use crate::math::{DAffine3, DMat3, DMat4, DQuat, DVec3};
 use serde_json::Value;
+use std::ops::Range;
 
 /// Parents and places of all nodes, in a scene or not.
 pub(super) struct Graph {
     /// The parent of each node.
     parents: Vec<Option<usize>>,
+    /// Nodes numbered so that what hangs on a node has the numbers of this range, the node itself the first.
+    family: Vec<Range<usize>>,
+    /// Where the numbers of each tree end, ascending.
+    tree_ends: Vec<usize>,
     /// From node to world space.
     pub(super) world: Vec<DAffine3>,
 }
@@ -24,7 +29,11 @@ impl Graph {
         refuse_loops(&parents, report);
         let local: Vec<_> = nodes.iter().enumerate().map(|(i, node)| local(i, node, report)).collect();
         check_scenes(root, &parents, report);
-        Self { world: compose(&parents, &local), parents }
+        let order = order(&parents);
+        let family = families(&parents, &order);
+        let tops = order.iter().filter(|&&node| parents[node].is_none());
+        let tree_ends = tops.map(|&node| family[node].end).collect();
+        Self { world: compose(&parents, &order, &local), family, tree_ends, parents }
     }
 
     /// Nodes without a parent.
@@ -32,14 +41,23 @@ impl Graph {
         (0..self.parents.len()).filter(|&i| self.parents[i].is_none())
     }
 
-    /// The parent of a node.
-    pub(super) fn parent(&self, node: usize) -> Option<usize> {
-        self.parents.get(node).copied().flatten()
+    /// The smallest range of numbers that holds all of some nodes; `None` when there are none.
+    pub(super) fn span(&self, nodes: impl Iterator<Item = usize>) -> Option<Range<usize>> {
+        let numbers = nodes.filter_map(|node| Some(self.family.get(node)?.start));
+        numbers.fold(None, |span: Option<Range<usize>>, n| {
+            Some(span.map_or(n..n + 1, |s| s.start.min(n)..s.end.max(n + 1)))
+        })
     }
 
-    /// The chain from a node up, itself first.
-    pub(super) fn ancestors(&self, node: usize) -> impl Iterator<Item = usize> + '_ {
-        std::iter::successors(Some(node), |&n| self.parent(n))
+    /// Whether everything in a span hangs on this node, or is it.
+    pub(super) fn holds(&self, node: usize, span: &Range<usize>) -> bool {
+        self.family.get(node).is_some_and(|family| family.start <= span.start && span.end <= family.end)
+    }
+
+    /// Whether everything in a span hangs on one node.
+    pub(super) fn is_one_tree(&self, span: &Range<usize>) -> bool {
+        let tree = self.tree_ends.partition_point(|&end| end <= span.start);
+        self.tree_ends.get(tree).is_some_and(|&end| span.end <= end)
     }
 }
 
@@ -149,24 +167,52 @@ fn numbers<const N: usize>(node: &Value, name: &str) -> Option<[f64; N]> {
     list.try_into().ok()
 }
 
-/// World transforms; parents before children, without recursion, however deep the hierarchy is.
-fn compose(parents: &[Option<usize>], local: &[DAffine3]) -> Vec<DAffine3> {
-    let mut world: Vec<Option<DAffine3>> = vec![None; local.len()];
-    let mut chain = Vec::new();
-    for start in 0..local.len() {
+/// All nodes, parents before their children; found without recursion, however deep the hierarchy is.
+///
+/// Where a loop is entered does not matter: it has refused the file already.
+fn order(parents: &[Option<usize>]) -> Vec<usize> {
+    let mut seen = vec![false; parents.len()];
+    let (mut order, mut chain) = (Vec::with_capacity(parents.len()), Vec::new());
+    for start in 0..parents.len() {
         let mut next = Some(start);
-        // The limit ends loops, which have refused the file already.
-        while let Some(node) = next.filter(|&n| world[n].is_none() && chain.len() <= local.len()) {
+        while let Some(node) = next.filter(|&n| !std::mem::replace(&mut seen[n], true)) {
             chain.push(node);
             next = parents[node];
         }
-        let mut above = next.and_then(|n| world[n]).unwrap_or(DAffine3::IDENTITY);
-        while let Some(node) = chain.pop() {
-            above *= local[node];
-            world[node] = Some(above);
+        order.extend(chain.drain(..).rev());
+    }
+    order
+}
+
+/// World transforms.
+fn compose(parents: &[Option<usize>], order: &[usize], local: &[DAffine3]) -> Vec<DAffine3> {
+    let mut world = local.to_vec();
+    for &node in order {
+        if let Some(parent) = parents[node] {
+            world[node] = world[parent] * local[node];
         }
     }
-    world.into_iter().map(Option::unwrap_or_default).collect()
+    world
+}
+
+/// Numbers the nodes so that every node and what hangs on it have numbers in a row.
+fn families(parents: &[Option<usize>], order: &[usize]) -> Vec<Range<usize>> {
+    let mut sizes = vec![1; parents.len()];
+    for &node in order.iter().rev() {
+        if let Some(parent) = parents[node] {
+            sizes[parent] += sizes[node];
+        }
+    }
+    // Where the next child of a node starts; the last one is for nodes without a parent.
+    let mut free = vec![0; parents.len() + 1];
+    let mut families = vec![0..0; parents.len()];
+    for &node in order {
+        let start = &mut free[parents[node].unwrap_or(parents.len())];
+        families[node] = *start..*start + sizes[node];
+        *start += sizes[node];
+        free[node] = families[node].start + 1;
+    }
+    families
 }
 
 #[cfg(test)]
@@ -180,7 +226,7 @@ mod tests {
         let graph = Graph::new(&json!({ "nodes": nodes }), &mut report);
         let mut codes: Vec<String> = report.warnings.clone().into_vec().iter().map(|w| w.code.to_string()).collect();
         if let Err(crate::load::LoadError::Input(faults)) = report.check() {
-            codes.extend(faults.iter().map(|f| format!("{} {}", f.code, f.place)));
+            codes.extend(faults.iter().map(|f| format!("{} {} ×{}", f.code, f.place, f.count)));
         }
         (graph, codes)
     }
@@ -195,15 +241,28 @@ mod tests {
         assert!(codes.is_empty(), "{codes:?}");
         assert_eq!(graph.world[0].transform_point3(DVec3::X), DVec3::new(6378139.0625, 0.0, -2.0));
         assert_eq!(graph.roots().collect::<Vec<_>>(), [2]);
-        assert_eq!(graph.ancestors(0).collect::<Vec<_>>(), [0, 1, 2]);
+    }
+
+    #[test]
+    fn what_hangs_on_a_node_is_known_by_a_range_of_numbers() {
+        let (graph, _) = graph(json!([{"children": [3, 1]}, {"children": [4]}, {"children": [5]}, {}, {}, {}]));
+        let span = |nodes: &[usize]| graph.span(nodes.iter().copied()).unwrap();
+        for (node, under) in [(0, &[0, 1, 3, 4][..]), (1, &[1, 4]), (2, &[2, 5]), (3, &[3]), (4, &[4]), (5, &[5])] {
+            for other in 0..6 {
+                assert_eq!(graph.holds(node, &span(&[other])), under.contains(&other), "{node} {other}");
+            }
+        }
+        assert!(graph.is_one_tree(&span(&[3, 4])) && !graph.holds(1, &span(&[3, 4])));
+        assert!(!graph.is_one_tree(&span(&[3, 5])));
+        assert!(graph.span([].into_iter()).is_none());
     }
 
     #[test]
     fn loops_and_second_parents_are_refused() {
         let (_, codes) = graph(json!([{"children": [1]}, {"children": [2]}, {"children": [0]}, {"children": [3]}]));
-        assert_eq!(codes, ["gltf-node-loop nodes[0]", "gltf-node-loop nodes[3]"]);
+        assert_eq!(codes, ["gltf-node-loop nodes[0] ×2"]);
         let (_, codes) = graph(json!([{"children": [2]}, {"children": [2]}, {}]));
-        assert_eq!(codes, ["gltf-node-parent-override nodes[1].children[0]"]);
+        assert_eq!(codes, ["gltf-node-parent-override nodes[1].children[0] ×1"]);
     }
 
     #[test]

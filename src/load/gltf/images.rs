@@ -10,6 +10,7 @@ use crate::scene::Bitmap;
 use ::image::{ImageFormat, guess_format};
 use gltf::json::{Index, Root, image::Image, texture::Texture};
 use std::borrow::Cow;
+use std::collections::HashSet;
 use std::path::Path;
 
 /// The bytes of every image that is drawn or lies in the file itself.
@@ -28,6 +29,7 @@ impl<'a> Images<'a> {
         report: &mut Report,
     ) -> Self {
         let mut images = Self { bytes: Vec::new() };
+        let drawn: HashSet<usize> = drawn.iter().copied().collect();
         for (i, image) in root.images.iter().enumerate() {
             let mut find = Find { root, buffers, file, resolver, report, drawn: drawn.contains(&i) };
             let bytes = find.bytes(i, image);

@@ -251,6 +251,10 @@ fn lights(root: &Root, report: &mut Report) {
 }
 
 fn nodes(root: &Root, report: &mut Report) {
+    let has_joints = |p: &gltf::json::mesh::Primitive| {
+        p.attributes.keys().any(|k| matches!(k, Checked::Valid(gltf::json::mesh::Semantic::Joints(_))))
+    };
+    let skinned: Vec<bool> = root.meshes.iter().map(|mesh| mesh.primitives.iter().all(has_joints)).collect();
     for (i, node) in root.nodes.iter().enumerate() {
         let place = format!("nodes[{i}]");
         for (name, there) in [("skin", node.skin.is_some()), ("weights", node.weights.is_some())] {
@@ -258,16 +262,14 @@ fn nodes(root: &Root, report: &mut Report) {
                 report.add(Code::UnsatisfiedDependency, format!("{place}.{name}"), format!("{name} without a mesh"));
             }
         }
-        let Some(mesh) = node.mesh.and_then(|mesh| root.meshes.get(mesh.value())) else { continue };
+        let Some(index) = node.mesh.map(|mesh| mesh.value()) else { continue };
+        let Some(mesh) = root.meshes.get(index) else { continue };
         let targets = mesh.primitives.first().and_then(|p| p.targets.as_ref()).map_or(0, Vec::len);
         if let Some(weights) = node.weights.as_ref().filter(|w| w.len() != targets) {
             let text = format!("{} weights for {targets} morph targets", weights.len());
             report.add(Code::NodeWeightsInvalid, format!("{place}.weights"), text);
         }
-        let skinned = |p: &gltf::json::mesh::Primitive| {
-            p.attributes.keys().any(|k| matches!(k, Checked::Valid(gltf::json::mesh::Semantic::Joints(_))))
-        };
-        if node.skin.is_some() && !mesh.primitives.iter().all(skinned) {
+        if node.skin.is_some() && skinned.get(index) == Some(&false) {
             report.add(Code::NodeSkinWithNonSkinnedMesh, &place, "a skin on a mesh without joints");
         }
     }

@@ -233,7 +233,7 @@ impl Task<'_, '_> {
     fn morph(&mut self, mesh: &mut Mesh) {
         let primitive = self.job.primitive;
         for (k, target) in primitive.targets.iter().flatten().enumerate() {
-            let weight = self.job.weights.get(k).copied().unwrap_or(0.0);
+            let weight = self.job.weights.get(k).copied().filter(|w| w.is_finite()).unwrap_or(0.0);
             if weight != 0.0 || !self.job.drawn {
                 self.add_target(mesh, target, k, weight);
             }

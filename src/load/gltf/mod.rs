@@ -42,6 +42,8 @@ use crate::scene::{Environment, Instance, Material, Scene};
 use accessor::Reader;
 use buffers::Buffers;
 use document::Document;
+use gltf::json::Root;
+use gltf::json::mesh as source;
 use graph::Graph;
 use images::Images;
 use mesh::{Job, Needs, Read};
@@ -131,7 +133,8 @@ impl Loading<'_> {
         facts.scene_index = scene::choose(root, self.options.scene.as_deref(), file)?;
         self.check_budget(reader, &mut budget)?;
         bounds::check(reader, self.report);
-        let placed = scene::walk(reader, graph, facts.scene_index, self.report);
+        let placed = scene::walk(reader, graph, facts.scene_index, &mut budget, self.report);
+        let placed = placed.map_err(|over| self.too_large(over))?;
         let skins = skin::joint_matrices(reader, graph, self.report);
         let palette = self.palette(document, &placed);
 
@@ -146,7 +149,7 @@ impl Loading<'_> {
         // glTF has no word for surroundings: its lights come on top of whatever the viewer puts around the model.
         let environment = Environment::Studio;
         let mut scene = Scene { cameras: placed.cameras, lights: placed.lights, environment, ..Scene::default() };
-        self.assemble(&mut scene, &placed.draws, reads, facts)?;
+        self.assemble(&mut scene, root, &placed.draws, reads, facts)?;
         self.report.merge(pictures);
         scene.materials = palette.materials;
         (scene.textures, scene.bitmaps) = textures::keep_decoded(&mut scene.materials, palette.textures.list, bitmaps);
@@ -156,7 +159,7 @@ impl Loading<'_> {
     }
 
     /// In a GLB, a first buffer without a uri is the binary chunk, which must be there when it is needed.
-    fn check_chunk(&mut self, root: &gltf::json::Root) {
+    fn check_chunk(&mut self, root: &Root) {
         let nowhere = root.buffers.first().is_some_and(|buffer| buffer.uri.is_none());
         if nowhere && root.buffer_views.iter().any(|view| view.buffer.value() == 0) {
             self.report.add(codes::Code::BufferMissingGlbData, "buffers[0]", "the file has no binary chunk for it");
@@ -216,6 +219,7 @@ impl Loading<'_> {
     fn assemble(
         &mut self,
         scene: &mut Scene,
+        root: &Root,
         draws: &[scene::Draw],
         reads: Vec<Vec<(Option<Read>, Report)>>,
         facts: &mut Facts,
@@ -241,8 +245,9 @@ impl Loading<'_> {
         }
         self.report.check()?;
         for draw in draws {
+            let name = root.nodes.get(draw.node).and_then(|node| node.name.as_ref());
             let place = |&(mesh, posed): &(u32, Option<DAffine3>)| Instance {
-                name: draw.name.clone(),
+                name: name.cloned().unwrap_or_default(),
                 mesh,
                 world_from_object: posed.unwrap_or(draw.world),
             };
@@ -280,7 +285,7 @@ fn read_meshes(
     file: &std::path::Path,
 ) -> Vec<Vec<(Option<Read>, Report)>> {
     let root = reader.root;
-    let read_one = |variant: &scene::Variant, k: usize, primitive: &gltf::json::mesh::Primitive, name: &str| {
+    let read_one = |variant: &scene::Variant, k: usize, primitive: &source::Primitive, mesh: &source::Mesh| {
         let mut report = Report::new(file);
         let material = primitive.material.map_or(root.materials.len(), |m| m.value());
         let material = palette.index.get(material).copied().flatten().filter(|_| variant.drawn);
@@ -288,8 +293,8 @@ fn read_meshes(
         let job = Job {
             primitive,
             place: format!("meshes[{}].primitives[{k}]", variant.mesh),
-            name: name.to_owned(),
-            weights: &variant.weights,
+            name: mesh.name.clone().unwrap_or_default(),
+            weights: variant.weights.as_deref().or(mesh.weights.as_deref()).unwrap_or_default(),
             joints: variant.skin.and_then(|s| skins.get(s)).and_then(Option::as_deref),
             needs,
             drawn: variant.drawn,
@@ -304,9 +309,8 @@ fn read_meshes(
     variants
         .map(|variant| {
             let Some(mesh) = root.meshes.get(variant.mesh) else { return Vec::new() };
-            let name = mesh.name.as_deref().unwrap_or_default();
             let primitives = mesh.primitives.par_iter().enumerate();
-            primitives.map(|(k, primitive)| read_one(variant, k, primitive, name)).collect()
+            primitives.map(|(k, primitive)| read_one(variant, k, primitive, mesh)).collect()
         })
         .collect()
 }

@@ -11,14 +11,13 @@ const SHOWN: usize = 20;
 #[derive(Clone, Debug)]
 pub(super) struct Report {
     file: PathBuf,
-    faults: Vec<Diagnostic>,
-    hidden: usize,
+    faults: Warnings,
     pub(super) warnings: Warnings,
 }
 
 impl Report {
     pub(super) fn new(file: &Path) -> Self {
-        Self { file: file.into(), faults: Vec::new(), hidden: 0, warnings: Warnings::default() }
+        Self { file: file.into(), faults: Warnings::default(), warnings: Warnings::default() }
     }
 
     /// Files a fault under its code's verdict at `place`.
@@ -32,7 +31,9 @@ impl Report {
 
     /// Files a fault that refuses the file whatever the table says of the milder cases of its code.
     pub(super) fn refuse(&mut self, code: Code, place: impl AsRef<str>, text: impl Into<String>) {
-        self.fault(Diagnostic::new(code.name(), &self.file, place.as_ref(), text));
+        let fault = Diagnostic::new(code.name(), &self.file, place.as_ref(), text);
+        let kind = kind(&fault);
+        self.faults.push_kind(fault, kind);
     }
 
     /// Files a fault as a warning, whatever the table says of the graver cases of its code.
@@ -40,22 +41,18 @@ impl Report {
         let warning = Diagnostic::new(code.name(), &self.file, place.as_ref(), text);
         let why = code.row().why;
         let remedy = if code.row().verdict == Verdict::Warn { why } else { "" };
-        self.warnings.push(warning.remedy(remedy));
+        let kind = kind(&warning);
+        self.warnings.push_kind(warning.remedy(remedy), kind);
     }
 
     /// Files a fault made elsewhere.
     pub(super) fn fault(&mut self, fault: Diagnostic) {
-        if self.faults.len() < SHOWN {
-            self.faults.push(fault);
-        } else {
-            self.hidden += 1;
-        }
+        self.faults.push(fault);
     }
 
     /// Takes over what another part found.
     pub(super) fn merge(&mut self, other: Self) {
-        other.faults.into_iter().for_each(|fault| self.fault(fault));
-        self.hidden += other.hidden;
+        self.faults.extend(other.faults);
         self.warnings.extend(other.warnings);
     }
 
@@ -64,10 +61,72 @@ impl Report {
         if self.faults.is_empty() {
             return Ok(());
         }
-        if self.hidden > 0 {
-            let text = format!("{} more faults", self.hidden);
-            self.faults.push(Diagnostic::new("gltf-more-faults", &self.file, "", text));
+        let mut faults = std::mem::take(&mut self.faults).into_vec();
+        let rest = faults.split_off(SHOWN.min(faults.len()));
+        if !rest.is_empty() {
+            let hidden: u64 = rest.iter().map(|fault| u64::from(fault.count)).sum();
+            faults.push(Diagnostic::new("gltf-more-faults", &self.file, "", format!("{hidden} more faults")));
         }
-        Err(LoadError::Input(std::mem::take(&mut self.faults)))
+        Err(LoadError::Input(faults))
+    }
+}
+
+/// What a message says without its numbers: the same fault of another node, with another value, is of the same kind.
+fn kind(message: &Diagnostic) -> String {
+    let mut kind = String::with_capacity(message.place.len() + message.text.len());
+    for part in [&message.place, &message.text] {
+        let (mut quoted, mut number) = (false, false);
+        for c in part.chars() {
+            quoted ^= c == '\'';
+            let goes_on = number && matches!(c, '.' | 'e' | '-' | '+');
+            if quoted || !(c.is_ascii_digit() || goes_on) {
+                number = false;
+                kind.push(c);
+            } else if !number {
+                number = true;
+                kind.push('#');
+            }
+        }
+        kind.push(' ');
+    }
+    kind
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_same_fault_elsewhere_or_with_other_numbers_is_counted() {
+        let mut report = Report::new(Path::new("a.gltf"));
+        for i in 0..1000 {
+            let text = format!("the rotation has length {:.6}, not 1", 2.0 + f64::from(i));
+            report.add(Code::RotationNonUnit, format!("nodes[{i}].rotation"), text);
+            report.add(Code::InvalidIndex, format!("nodes[{i}].mesh"), format!("-{i}.5e-7 where an index should be"));
+        }
+        report.add(Code::InvalidIndex, "nodes[5].mesh", "'5' where an index should be");
+        report.add(Code::InvalidIndex, "nodes[5].mesh", "'6' where an index should be");
+        let Err(LoadError::Input(faults)) = report.check() else { panic!("no faults") };
+        let lines: Vec<String> = report.warnings.into_vec().iter().chain(&faults).map(ToString::to_string).collect();
+        assert_eq!(
+            lines,
+            [
+                "a.gltf:nodes[0].rotation: the rotation has length 2.000000, not 1 (×1000); the rotation is made unit",
+                "a.gltf:nodes[0].mesh: -0.5e-7 where an index should be (×1000)",
+                "a.gltf:nodes[5].mesh: '5' where an index should be",
+                "a.gltf:nodes[5].mesh: '6' where an index should be",
+            ]
+        );
+    }
+
+    #[test]
+    fn faults_of_many_kinds_end_in_one_line_that_counts_the_rest() {
+        let mut report = Report::new(Path::new("a.gltf"));
+        let codes = [Code::InvalidIndex, Code::TypeMismatch];
+        for name in (0..60).map(|i| format!("'{i}'")) {
+            codes.into_iter().for_each(|code| report.add(code, "nodes[0]", name.as_str()));
+        }
+        let Err(LoadError::Input(faults)) = report.check() else { panic!("no faults") };
+        assert_eq!((faults.len(), faults[SHOWN].text.as_str()), (SHOWN + 1, "100 more faults"));
     }
 }

@@ -7,17 +7,20 @@ use super::placed;
 use super::report::Report;
 use super::schema::whole;
 use crate::load::Diagnostic;
+use crate::load::limits::{Budget, OverBudget};
 use crate::math::{DAffine3, DQuat, DVec3};
-use crate::scene::{Camera, Light};
-use gltf::json::{Index, Root, scene::Node};
+use crate::scene::{Camera, Instance, Light};
+use gltf::json::{Index, Root, accessor::Accessor, mesh::Mesh, scene::Node};
 use serde_json::{Map, Value};
+use std::collections::HashMap;
 use std::path::Path;
 
 /// A mesh in one shape: morphed by these weights, posed by this skin.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(super) struct Variant {
     pub(super) mesh: usize,
-    pub(super) weights: Vec<f32>,
+    /// Weights of a node; `None`: those of the mesh count.
+    pub(super) weights: Option<Vec<f32>>,
     pub(super) skin: Option<usize>,
     /// Whether the scene shows it; others are only checked.
     pub(super) drawn: bool,
@@ -25,7 +28,8 @@ pub(super) struct Variant {
 
 /// A variant in its place.
 pub(super) struct Draw {
-    pub(super) name: String,
+    /// The node that shows it.
+    pub(super) node: usize,
     pub(super) variant: usize,
     pub(super) world: DAffine3,
 }
@@ -44,6 +48,9 @@ pub(super) fn names(root: &Root) -> Vec<String> {
     root.scenes.iter().map(|scene| scene.name.clone().unwrap_or_default()).collect()
 }
 
+/// Scenes in one message before the rest is only counted.
+const LISTED: usize = 20;
+
 /// The scene that is asked for by index or name; without a wish, the default one, or else the first.
 pub(super) fn choose(root: &Root, wish: Option<&str>, file: &Path) -> Result<usize, Diagnostic> {
     let Some(wish) = wish else { return Ok(root.scene.map_or(0, |scene| scene.value())) };
@@ -51,15 +58,28 @@ pub(super) fn choose(root: &Root, wish: Option<&str>, file: &Path) -> Result<usi
     let by_index = wish.parse().ok().filter(|&i: &usize| i < root.scenes.len());
     by_name.or(by_index).ok_or_else(|| {
         let shown = |(i, name): (usize, String)| if name.is_empty() { i.to_string() } else { format!("{i} '{name}'") };
-        let list: Vec<String> = names(root).into_iter().enumerate().map(shown).collect();
+        let list: Vec<String> = names(root).into_iter().enumerate().take(LISTED).map(shown).collect();
         let text = format!("there is no scene '{wish}'");
-        let remedy = if list.is_empty() { "the file has none".into() } else { format!("it has {}", list.join(", ")) };
+        let remedy = match root.scenes.len().saturating_sub(LISTED) {
+            _ if list.is_empty() => "the file has none".into(),
+            0 => format!("it has {}", list.join(", ")),
+            more => format!("it has {} and {more} more", list.join(", ")),
+        };
         Diagnostic::new("gltf-no-such-scene", file, "scenes", text).remedy(remedy)
     })
 }
 
 /// Walks the nodes of a scene; a file without scenes shows all its nodes.
-pub(super) fn walk(reader: Reader, graph: &Graph, scene: usize, report: &mut Report) -> Placed {
+///
+/// # Errors
+/// When the scene would take more than is left of `budget`.
+pub(super) fn walk(
+    reader: Reader,
+    graph: &Graph,
+    scene: usize,
+    budget: &mut Budget,
+    report: &mut Report,
+) -> Result<Placed, OverBudget> {
     let root = reader.root;
     let mut stack: Vec<usize> = match root.scenes.get(scene) {
         Some(scene) => scene.nodes.iter().map(|node| node.value()).collect(),
@@ -67,7 +87,7 @@ pub(super) fn walk(reader: Reader, graph: &Graph, scene: usize, report: &mut Rep
     };
     stack.reverse();
     let mut seen = vec![false; root.nodes.len()];
-    let mut placed = Placed::default();
+    let mut walk = Walk { reader, placed: Placed::default(), known: HashMap::new(), budget, report };
     while let Some(i) = stack.pop() {
         let Some(node) = root.nodes.get(i).filter(|node| is_visible(node)) else { continue };
         if std::mem::replace(&mut seen[i], true) {
@@ -75,43 +95,79 @@ pub(super) fn walk(reader: Reader, graph: &Graph, scene: usize, report: &mut Rep
         }
         stack.extend(node.children.iter().flatten().rev().map(|child| child.value()));
         let world = graph.world.get(i).copied().unwrap_or_default();
-        placed.cameras.extend(placed::camera(root, node, world, report));
-        placed.lights.extend(placed::light(root, node, world, report));
-        place_mesh(reader, i, node, world, &mut placed, report);
+        let camera = placed::camera(root, node, world, walk.report);
+        walk.placed.cameras.extend(camera);
+        let light = placed::light(root, node, world, walk.report);
+        walk.placed.lights.extend(light);
+        walk.mesh(i, node, world)?;
     }
+    let mut placed = walk.placed;
     unused(root, &mut placed);
-    placed
+    Ok(placed)
 }
 
-fn place_mesh(reader: Reader, i: usize, node: &Node, world: DAffine3, placed: &mut Placed, report: &mut Report) {
-    let Some(mesh) = node.mesh else { return };
-    let defaults = || reader.root.meshes.get(mesh.value()).and_then(|mesh| mesh.weights.clone());
-    let mut weights = node.weights.clone().or_else(defaults).unwrap_or_default();
-    weights.iter_mut().filter(|w| !w.is_finite()).for_each(|w| *w = 0.0);
-    let skin = node.skin.map(|skin| skin.value());
-    let variant = Variant { mesh: mesh.value(), weights, skin, drawn: true };
-    let known = placed.variants.iter().position(|v| *v == variant);
-    let variant = known.unwrap_or_else(|| {
-        placed.variants.push(variant);
-        placed.variants.len() - 1
-    });
-    let name = node.name.clone().unwrap_or_default();
-    let mut draw = |world: DAffine3| {
-        if world.is_finite() {
-            placed.draws.push(Draw { name: name.clone(), variant, world });
-        } else {
-            report.warn(Code::AccessorInvalidFloat, format!("nodes[{i}]"), "a node without a finite place is left out");
+/// What makes a variant: mesh, skin, and the bits of weights that are not those of the mesh.
+type Kind = (usize, Option<usize>, Option<Vec<u32>>);
+
+struct Walk<'a, 'b> {
+    reader: Reader<'a>,
+    placed: Placed,
+    /// Where each variant is in the list.
+    known: HashMap<Kind, usize>,
+    budget: &'b mut Budget,
+    report: &'b mut Report,
+}
+
+impl Walk<'_, '_> {
+    /// Places the mesh of a node, or its copies.
+    fn mesh(&mut self, i: usize, node: &Node, world: DAffine3) -> Result<(), OverBudget> {
+        let Some(mesh) = node.mesh.and_then(|mesh| self.reader.root.meshes.get(mesh.value())) else { return Ok(()) };
+        let Some(variant) = self.variant(node, mesh) else { return Ok(()) };
+        let copies = match instancing(node) {
+            None => Ok(vec![DAffine3::IDENTITY]),
+            Some(attributes) => {
+                let copies = Copies::of(attributes);
+                self.budget.take(copies.bytes(self.reader), 1)?;
+                copies.read(self.reader)
+            }
+        };
+        let copies = copies.unwrap_or_else(|why| self.without_copies(i, why));
+        let name = node.name.as_ref().map_or(0, String::len);
+        let instances = mesh.primitives.len().saturating_mul(size_of::<Instance>() + name);
+        self.budget.take(copies.len() as u64, (size_of::<Draw>().saturating_add(instances)) as u64)?;
+        for local in copies {
+            let world = world * local;
+            if world.is_finite() {
+                self.placed.draws.push(Draw { node: i, variant, world });
+            } else {
+                let text = "a node without a finite place is left out";
+                self.report.warn(Code::AccessorInvalidFloat, format!("nodes[{i}]"), text);
+            }
         }
-    };
-    match instancing(node) {
-        None => draw(world),
-        Some(attributes) => match copies(reader, attributes) {
-            Ok(copies) => copies.into_iter().for_each(|local| draw(world * local)),
-            Err(Unreadable::Buffer(why)) => report.fault(why),
-            Err(Unreadable::Nowhere(why)) => report.warnings.push(why),
-            Err(Unreadable::Data(code, text)) => report.add(code, format!("nodes[{i}]"), text),
-            Err(Unreadable::Unknown) => draw(world),
-        },
+        Ok(())
+    }
+
+    /// What is drawn when the places of copies cannot be read.
+    fn without_copies(&mut self, i: usize, why: Unreadable) -> Vec<DAffine3> {
+        match why {
+            Unreadable::Unknown => return vec![DAffine3::IDENTITY],
+            Unreadable::Buffer(why) => self.report.fault(why),
+            Unreadable::Nowhere(why) => self.report.warnings.push(why),
+            Unreadable::Data(code, text) => self.report.add(code, format!("nodes[{i}]"), text),
+        }
+        Vec::new()
+    }
+
+    /// The variant that a node shows.
+    fn variant(&mut self, node: &Node, mesh: &Mesh) -> Option<usize> {
+        let (index, skin) = (node.mesh?.value(), node.skin.map(|skin| skin.value()));
+        let weights = node.weights.as_ref().filter(|own| mesh.weights.as_ref() != Some(*own));
+        let bits = weights.map(|weights| weights.iter().map(|w| w.to_bits()).collect());
+        let variants = &mut self.placed.variants;
+        Some(*self.known.entry((index, skin, bits)).or_insert_with(|| {
+            variants.push(Variant { mesh: index, weights: weights.cloned(), skin, drawn: true });
+            variants.len() - 1
+        }))
     }
 }
 
@@ -122,7 +178,7 @@ fn unused(root: &Root, placed: &mut Placed) {
         shown.get_mut(variant.mesh).into_iter().for_each(|shown| *shown = true);
     }
     let hidden = shown.iter().enumerate().filter(|(_, shown)| !**shown);
-    let variant = |(mesh, _)| Variant { mesh, weights: Vec::new(), skin: None, drawn: false };
+    let variant = |(mesh, _)| Variant { mesh, weights: None, skin: None, drawn: false };
     placed.variants.extend(hidden.map(variant));
 }
 
@@ -138,21 +194,42 @@ fn instancing(node: &Node) -> Option<&Map<String, Value>> {
     extension.get("attributes")?.as_object()
 }
 
-/// Where the copies stand in the space of their node.
-fn copies(reader: Reader, attributes: &Map<String, Value>) -> Result<Vec<DAffine3>, Unreadable> {
-    let index = |name: &str| attributes.get(name).and_then(whole).and_then(|i| u32::try_from(i).ok()).map(Index::new);
-    let translations = index("TRANSLATION").map(|i| reader.floats::<3>(i, Pick::All)).transpose()?;
-    let rotations = index("ROTATION").map(|i| reader.floats::<4>(i, Pick::All)).transpose()?;
-    let scales = index("SCALE").map(|i| reader.floats::<3>(i, Pick::All)).transpose()?;
-    let lengths =
-        [translations.as_ref().map(Vec::len), rotations.as_ref().map(Vec::len), scales.as_ref().map(Vec::len)];
-    let count = lengths.into_iter().flatten().min().ok_or(Unreadable::Unknown)?;
-    let copy = |k: usize| {
-        let translation = translations.as_ref().map_or(DVec3::ZERO, |t| DVec3::from(t[k].map(f64::from)));
-        let scale = scales.as_ref().map_or(DVec3::ONE, |s| DVec3::from(s[k].map(f64::from)));
-        let rotation = rotations.as_ref().map_or(DQuat::IDENTITY, |r| DQuat::from_array(r[k].map(f64::from)));
-        let rotation = if rotation.length() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY };
-        DAffine3::from_scale_rotation_translation(scale, rotation, translation)
-    };
-    Ok((0..count).map(copy).collect())
+/// The accessors of EXT_mesh_gpu_instancing.
+struct Copies {
+    translations: Option<Index<Accessor>>,
+    rotations: Option<Index<Accessor>>,
+    scales: Option<Index<Accessor>>,
+}
+
+impl Copies {
+    fn of(attributes: &Map<String, Value>) -> Self {
+        let index =
+            |name: &str| attributes.get(name).and_then(whole).and_then(|i| u32::try_from(i).ok()).map(Index::new);
+        Self { translations: index("TRANSLATION"), rotations: index("ROTATION"), scales: index("SCALE") }
+    }
+
+    /// Bytes that reading them takes.
+    fn bytes(&self, reader: Reader) -> u64 {
+        let parts = [self.translations, self.rotations, self.scales].into_iter().flatten();
+        let counts = parts.map(|index| reader.count(index)).fold(0, u64::saturating_add);
+        counts.saturating_mul((size_of::<[f32; 4]>() + size_of::<DAffine3>()) as u64)
+    }
+
+    /// Where the copies stand in the space of their node.
+    fn read(&self, reader: Reader) -> Result<Vec<DAffine3>, Unreadable> {
+        let translations = self.translations.map(|i| reader.floats::<3>(i, Pick::All)).transpose()?;
+        let rotations = self.rotations.map(|i| reader.floats::<4>(i, Pick::All)).transpose()?;
+        let scales = self.scales.map(|i| reader.floats::<3>(i, Pick::All)).transpose()?;
+        let lengths =
+            [translations.as_ref().map(Vec::len), rotations.as_ref().map(Vec::len), scales.as_ref().map(Vec::len)];
+        let count = lengths.into_iter().flatten().min().ok_or(Unreadable::Unknown)?;
+        let copy = |k: usize| {
+            let translation = translations.as_ref().map_or(DVec3::ZERO, |t| DVec3::from(t[k].map(f64::from)));
+            let scale = scales.as_ref().map_or(DVec3::ONE, |s| DVec3::from(s[k].map(f64::from)));
+            let rotation = rotations.as_ref().map_or(DQuat::IDENTITY, |r| DQuat::from_array(r[k].map(f64::from)));
+            let rotation = if rotation.length() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY };
+            DAffine3::from_scale_rotation_translation(scale, rotation, translation)
+        };
+        Ok((0..count).map(copy).collect())
+    }
 }

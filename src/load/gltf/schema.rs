@@ -8,6 +8,7 @@ use super::report::Report;
 use super::schema_tables::{EXTENSION_WORDS, EXTENSIONS, ROOT};
 use crate::load::paths::shorten;
 use serde_json::Value;
+use std::collections::HashSet;
 use std::fmt::Write as _;
 
 /// The rules for one kind of JSON object.
@@ -74,7 +75,9 @@ pub(super) fn check(root: &Value, report: &mut Report) {
 
 /// Channels of animations refer to the samplers beside them.
 fn channels(root: &Value, report: &mut Report) {
-    let list = |value: &Value, name: &str| value.get(name).and_then(Value::as_array).cloned().unwrap_or_default();
+    fn list<'a>(value: &'a Value, name: &str) -> &'a [Value] {
+        value.get(name).and_then(Value::as_array).map_or(&[], Vec::as_slice)
+    }
     for (i, animation) in list(root, "animations").iter().enumerate() {
         let samplers = list(animation, "samplers").len() as u64;
         for (k, channel) in list(animation, "channels").iter().enumerate() {
@@ -86,13 +89,13 @@ fn channels(root: &Value, report: &mut Report) {
     }
 }
 
-fn strings(list: Option<&Value>) -> Vec<&str> {
+fn strings(list: Option<&Value>) -> HashSet<&str> {
     list.and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str).collect()
 }
 
 struct Walk<'a> {
     root: &'a Value,
-    used: Vec<&'a str>,
+    used: HashSet<&'a str>,
     /// Where the walk is, as a JSON path.
     path: String,
     report: &'a mut Report,
@@ -144,7 +147,7 @@ impl<'a> Walk<'a> {
         if !value.is_object() {
             return self.wrong_type(value, "an object");
         }
-        if !self.used.contains(&name) {
+        if !self.used.contains(name) {
             self.fault(Code::UndeclaredExtension, format!("'{}' is not in extensionsUsed", shorten(name)));
         }
         let mut known = EXTENSIONS.iter().filter(|e| e.name == name).peekable();
@@ -259,7 +262,7 @@ impl<'a> Walk<'a> {
             let text = format!("{} elements where {} to {} are allowed", list.len(), length.start(), length.end());
             self.fault(Code::ArrayLengthNotInList, text);
         }
-        let mut seen = std::collections::HashSet::new();
+        let mut seen = HashSet::new();
         for (i, element) in list.iter().enumerate() {
             self.at(format_args!("[{i}]"), |walk| {
                 walk.value(element, of);

@@ -69,18 +69,10 @@ fn matrices_of(reader: Reader, graph: &Graph, i: usize, report: &mut Report) -> 
 /// The joints of a skin should hang on one node, and `skeleton` should be such a node.
 fn check_skeleton(root: &Root, graph: &Graph, i: usize, report: &mut Report) {
     let Some(skin) = root.skins.get(i) else { return };
-    let mut common: Option<Vec<usize>> = None;
-    for joint in &skin.joints {
-        let chain: Vec<usize> = graph.ancestors(joint.value()).collect();
-        common = Some(match common {
-            None => chain,
-            Some(known) => known.into_iter().filter(|node| chain.contains(node)).collect(),
-        });
-    }
-    let Some(common) = common else { return };
-    if common.is_empty() {
+    let Some(span) = graph.span(skin.joints.iter().map(|joint| joint.value())) else { return };
+    if !graph.is_one_tree(&span) {
         report.add(Code::SkinNoCommonRoot, format!("skins[{i}].joints"), "the joints hang on no common node");
-    } else if let Some(skeleton) = skin.skeleton.filter(|s| !common.contains(&s.value())) {
+    } else if let Some(skeleton) = skin.skeleton.filter(|s| !graph.holds(s.value(), &span)) {
         let text = format!("node {} is above not every joint", skeleton.value());
         report.add(Code::SkinSkeletonInvalid, format!("skins[{i}].skeleton"), text);
     }

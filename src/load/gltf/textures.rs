@@ -7,6 +7,8 @@ use gltf::json::extensions::texture::TextureTransform;
 use gltf::json::texture::{self, MagFilter, MinFilter, WrappingMode};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
+use std::collections::HashMap;
+use std::hash::Hash;
 
 /// Collects the textures that materials show.
 pub(super) struct Textures<'a> {
@@ -15,11 +17,15 @@ pub(super) struct Textures<'a> {
     pub(super) list: Vec<Texture>,
     /// Images of the file, in the order of bitmaps.
     pub(super) images: Vec<usize>,
+    /// Where each is in its list.
+    known_textures: HashMap<Texture, u32>,
+    known_images: HashMap<usize, u32>,
 }
 
 impl<'a> Textures<'a> {
     pub(super) fn new(root: &'a Root) -> Self {
-        Self { root, list: Vec::new(), images: Vec::new() }
+        let (known_textures, known_images) = (HashMap::new(), HashMap::new());
+        Self { root, list: Vec::new(), images: Vec::new(), known_textures, known_images }
     }
 
     /// The texture of a slot; `None` when it names no image.
@@ -32,8 +38,8 @@ impl<'a> Textures<'a> {
         let image = image_of(self.root, index)?;
         let sampler = self.root.textures.get(index.value())?.sampler;
         let sampler = sampler.and_then(|s| self.root.samplers.get(s.value())).map(sampler_of).unwrap_or_default();
-        let bitmap = position_or_push(&mut self.images, image);
-        let texture = position_or_push(&mut self.list, Texture { bitmap, sampler });
+        let bitmap = number_of(image, &mut self.images, &mut self.known_images);
+        let texture = number_of(Texture { bitmap, sampler }, &mut self.list, &mut self.known_textures);
         let uv_set = transform.and_then(|t| t.tex_coord).unwrap_or(uv_set);
         Some(TextureRef { texture, uv_set, transform: transform.map(transform_of).unwrap_or_default() })
     }
@@ -46,13 +52,13 @@ impl<'a> Textures<'a> {
     }
 }
 
-fn position_or_push<T: PartialEq>(list: &mut Vec<T>, value: T) -> u32 {
-    let position = list.iter().position(|known| *known == value).unwrap_or_else(|| {
-        list.push(value);
-        list.len() - 1
-    });
-    // A file would have to be larger than any limit to name so many.
-    u32::try_from(position).unwrap_or(u32::MAX)
+/// The place of a value in a list, at whose end a new one goes.
+fn number_of<T: Clone + Eq + Hash>(value: T, list: &mut Vec<T>, known: &mut HashMap<T, u32>) -> u32 {
+    *known.entry(value).or_insert_with_key(|value| {
+        list.push(value.clone());
+        // A file would have to be larger than any limit to name so many.
+        u32::try_from(list.len() - 1).unwrap_or(u32::MAX)
+    })
 }
 
 /// KHR_texture_transform as one of ours; numbers that are not finite change nothing.
@@ -153,5 +159,23 @@ mod tests {
         assert!(materials[0].base_color_map.is_none());
         assert_eq!(materials[0].normal_map.as_ref().unwrap().texture, 0);
         assert_eq!(materials[0].emission_map.as_ref().unwrap().texture, 1);
+    }
+
+    #[test]
+    fn a_hundred_thousand_textures_are_each_found_again() {
+        const MANY: u32 = 100_000;
+        let all = |one: &dyn Fn(u32) -> serde_json::Value| (0..MANY).map(one).collect::<Vec<_>>();
+        let root = serde_json::from_value(serde_json::json!({
+            "asset": {"version": "2.0"},
+            "images": all(&|_| serde_json::json!({})),
+            "textures": all(&|i| serde_json::json!({"source": i})),
+        }));
+        let root = root.unwrap();
+        let mut textures = Textures::new(&root);
+        for i in (0..MANY).chain((0..MANY).rev()) {
+            let found = textures.of(Index::new(i), 0, None).unwrap();
+            assert_eq!(found.texture, i);
+        }
+        assert_eq!((textures.list.len(), textures.images.len()), (MANY as usize, MANY as usize));
     }
 }
