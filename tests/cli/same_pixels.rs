@@ -27,9 +27,9 @@ fn every_model_gives_the_same_bits_with_every_structure_and_any_threads() {
     let all = AccelKind::ALL.map(AccelKind::name);
     let affordable: Vec<_> = all.into_iter().filter(|&name| !cfg!(debug_assertions) || name != "none").collect();
     let folder = Folder::with_cube();
-    all_agree(&folder, "cube.obj", "80x60", &all);
+    all_agree(&folder, "cube.obj", "48x36", &all);
     for input in models() {
-        all_agree(&folder, input.to_str().unwrap(), "80x60", &affordable);
+        all_agree(&folder, input.to_str().unwrap(), "48x36", &affordable);
     }
 }
 
