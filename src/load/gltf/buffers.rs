@@ -3,12 +3,14 @@
 use super::codes::Code;
 use super::report::Report;
 use crate::load::Diagnostic;
+use crate::load::limits::{Budget, OverBudget};
 use crate::load::paths::{FileFault, Resolver, shorten};
 use base64::Engine as _;
 use base64::alphabet;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use gltf::json::{Root, buffer};
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::path::Path;
 
 /// The bytes of every buffer, or why they are not there.
@@ -19,6 +21,8 @@ pub(super) struct Buffers<'a> {
 
 enum Slot<'a> {
     Bytes(Cow<'a, [u8]>),
+    /// Those of another buffer, which names the same file.
+    Same(usize),
     /// Nothing says where the bytes are, which the format allows; whatever needs them is left out.
     Nowhere(Diagnostic),
     Failed(Diagnostic),
@@ -31,12 +35,46 @@ impl<'a> Buffers<'a> {
         bin: Option<&'a [u8]>,
         file: &Path,
         resolver: &mut Resolver,
+        budget: &mut Budget,
         report: &mut Report,
     ) -> Self {
-        let slots = (root.buffers.iter().enumerate())
-            .map(|(i, buffer)| load_one(i, buffer, bin, file, resolver, report))
-            .collect();
-        Self { root, slots }
+        let mut buffers = Self { root, slots: Vec::with_capacity(root.buffers.len()) };
+        let mut known: HashMap<&str, usize> = HashMap::new();
+        let mut find = Find { bin, file, resolver, budget, report };
+        for (i, buffer) in root.buffers.iter().enumerate() {
+            let named = buffer.uri.as_deref().filter(|uri| !is_data(uri));
+            let slot = match named.and_then(|uri| known.get(uri)) {
+                Some(&other) => Slot::Same(other),
+                None => find.one(i, buffer),
+            };
+            // What was looked for once is not looked for again, found or not.
+            named.into_iter().for_each(|uri| _ = known.entry(uri).or_insert(i));
+            buffers.slots.push(slot);
+            if let Some(bytes) = buffers.bytes(i) {
+                check_length(i, buffer, bytes, find.report);
+            }
+        }
+        buffers
+    }
+
+    /// Bytes of all buffers, each file counted once.
+    pub(super) fn len(&self) -> u64 {
+        let bytes = |slot: &Slot| if let Slot::Bytes(bytes) = slot { bytes.len() as u64 } else { 0 };
+        self.slots.iter().map(bytes).sum()
+    }
+
+    fn slot(&self, i: usize) -> Option<&Slot<'a>> {
+        match self.slots.get(i) {
+            Some(Slot::Same(other)) => self.slots.get(*other),
+            slot => slot,
+        }
+    }
+
+    fn bytes(&self, i: usize) -> Option<&[u8]> {
+        match self.slot(i) {
+            Some(Slot::Bytes(bytes)) => Some(bytes),
+            _ => None,
+        }
     }
 
     /// The bytes of a view, as far as they are there.
@@ -44,10 +82,10 @@ impl<'a> Buffers<'a> {
     /// # Errors
     /// Why there are none. `None`: the file never says where they are.
     pub(super) fn view(&self, view: &buffer::View) -> Result<&[u8], Option<Diagnostic>> {
-        let bytes = match self.slots.get(view.buffer.value()) {
+        let bytes = match self.slot(view.buffer.value()) {
             Some(Slot::Bytes(bytes)) => bytes,
             Some(Slot::Failed(why)) => return Err(Some(why.clone())),
-            Some(Slot::Nowhere(_)) | None => return Err(None),
+            Some(Slot::Nowhere(_) | Slot::Same(_)) | None => return Err(None),
         };
         // A view may not look past the declared length, even where the data goes on.
         let declared = self.root.buffers.get(view.buffer.value()).map_or(0, |b| b.byte_length.0);
@@ -71,47 +109,76 @@ fn clamp(wanted: u64, end: usize) -> usize {
     usize::try_from(wanted).map_or(end, |wanted| wanted.min(end))
 }
 
-fn load_one<'a>(
-    i: usize,
-    buffer: &buffer::Buffer,
+/// Where the bytes of buffers are looked for.
+struct Find<'a, 'b> {
     bin: Option<&'a [u8]>,
-    file: &Path,
-    resolver: &mut Resolver,
-    report: &mut Report,
-) -> Slot<'a> {
-    let place = format!("buffers[{i}]");
-    let bytes = match (&buffer.uri, bin) {
-        (None, Some(bin)) if i == 0 => Cow::Borrowed(bin),
-        (None, _) => {
-            let text = "nothing says where its bytes are; what needs them is left out";
-            return Slot::Nowhere(Diagnostic::new("gltf-buffer-nowhere", file, place, text));
+    file: &'b Path,
+    resolver: &'b mut Resolver,
+    budget: &'b mut Budget,
+    report: &'b mut Report,
+}
+
+impl<'a> Find<'a, '_> {
+    fn one(&mut self, i: usize, buffer: &buffer::Buffer) -> Slot<'a> {
+        let place = format!("buffers[{i}]");
+        match (&buffer.uri, self.bin) {
+            (None, Some(bin)) if i == 0 => Slot::Bytes(Cow::Borrowed(bin)),
+            (None, _) => {
+                let text = "nothing says where its bytes are; what needs them is left out";
+                Slot::Nowhere(Diagnostic::new("gltf-buffer-nowhere", self.file, place, text))
+            }
+            (Some(uri), _) if is_data(uri) => self.data(uri, &format!("{place}.uri")),
+            (Some(uri), _) => self.named(uri, &format!("{place}.uri")),
         }
-        (Some(uri), _) if is_data(uri) => match decode_data(uri) {
-            Ok(bytes) => Cow::Owned(bytes),
+    }
+
+    fn data(&mut self, uri: &str, place: &str) -> Slot<'a> {
+        // Decoded, it is no longer than written.
+        if let Err(over) = self.budget.take(uri.len() as u64, 1) {
+            return self.too_large(place, over);
+        }
+        match decode_data(uri) {
+            Ok(bytes) => Slot::Bytes(Cow::Owned(bytes)),
             Err(why) => {
                 let text = format!("'{}' is no data URI: {why}", shorten(uri));
-                report.add(Code::InvalidUri, format!("{place}.uri"), text.clone());
-                return Slot::Failed(Diagnostic::new(Code::InvalidUri.name(), file, format!("{place}.uri"), text));
+                self.report.add(Code::InvalidUri, place, text.clone());
+                Slot::Failed(Diagnostic::new(Code::InvalidUri.name(), self.file, place, text))
             }
-        },
-        (Some(uri), _) => match resolver.read_uri(uri) {
-            Ok(bytes) => Cow::Owned(bytes),
+        }
+    }
+
+    fn named(&mut self, uri: &str, place: &str) -> Slot<'a> {
+        match self.resolver.read_uri(uri) {
+            Ok(bytes) => match self.budget.take(bytes.len() as u64, 1) {
+                Ok(()) => Slot::Bytes(Cow::Owned(bytes)),
+                Err(over) => self.too_large(place, over),
+            },
             Err(why) => {
-                let fault = why.diagnose(file, &format!("{place}.uri"));
+                let fault = why.diagnose(self.file, place);
                 match why {
-                    FileFault::BadUri(_) => report.add(Code::InvalidUri, fault.place.clone(), fault.text.clone()),
-                    _ => report.warnings.push(fault.clone()),
+                    FileFault::BadUri(_) => self.report.add(Code::InvalidUri, &fault.place, fault.text.clone()),
+                    _ => self.report.warnings.push(fault.clone()),
                 }
-                return Slot::Failed(fault);
+                Slot::Failed(fault)
             }
-        },
-    };
+        }
+    }
+
+    fn too_large(&mut self, place: &str, over: OverBudget) -> Slot<'a> {
+        let fault =
+            Diagnostic::new("out-of-memory-limit", self.file, place, format!("the buffer is too large: {over}"));
+        let fault = fault.remedy("allow more with --max-memory");
+        self.report.warnings.push(fault.clone());
+        Slot::Failed(fault)
+    }
+}
+
+fn check_length(i: usize, buffer: &buffer::Buffer, bytes: &[u8], report: &mut Report) {
     let declared = buffer.byte_length.0;
     if (bytes.len() as u64) < declared {
         let text = format!("{declared} bytes are declared, {} are there", bytes.len());
-        report.add(Code::BufferByteLengthMismatch, place, text);
+        report.add(Code::BufferByteLengthMismatch, format!("buffers[{i}]"), text);
     }
-    Slot::Bytes(bytes)
 }
 
 /// Whether a URI holds its data itself.

@@ -6,6 +6,7 @@
 use super::codes::Code;
 use super::report::Report;
 use super::schema;
+use super::weight::{DEEPEST, Weight};
 use gltf::json::Root;
 use serde_json::{Map, Number, Value};
 
@@ -14,6 +15,14 @@ pub(super) struct Document {
     pub(super) root: Root,
     /// How many animations the file has; they are not kept.
     pub(super) animations: usize,
+}
+
+/// Refuses JSON that is nested deeper than the parser goes.
+pub(super) fn check_depth(weight: &Weight, report: &mut Report) {
+    if weight.depth > DEEPEST {
+        let text = format!("the JSON cannot be read: it is nested {} deep where {DEEPEST} are allowed", weight.depth);
+        report.add(Code::InvalidJson, "", text);
+    }
 }
 
 /// Parses and checks JSON; `None` when that is impossible, with the reason in `report`.

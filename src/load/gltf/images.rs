@@ -3,6 +3,7 @@
 use super::buffers::{Buffers, decode_data, is_data, media_type};
 use super::codes::Code;
 use super::report::Report;
+use crate::load::Diagnostic;
 use crate::load::limits::{Budget, Limits};
 use crate::load::paths::Resolver;
 use crate::load::texture::{Encoded, decode_all};
@@ -10,12 +11,14 @@ use crate::scene::Bitmap;
 use ::image::{ImageFormat, guess_format};
 use gltf::json::{Index, Root, image::Image, texture::Texture};
 use std::borrow::Cow;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 /// The bytes of every image that is drawn or lies in the file itself.
 pub(super) struct Images<'a> {
     bytes: Vec<Option<Cow<'a, [u8]>>>,
+    /// Images that name the same file as an earlier one, which holds the bytes.
+    same: HashMap<usize, usize>,
 }
 
 impl<'a> Images<'a> {
@@ -26,20 +29,35 @@ impl<'a> Images<'a> {
         drawn: &[usize],
         file: &Path,
         resolver: &mut Resolver,
+        budget: &mut Budget,
         report: &mut Report,
     ) -> Self {
-        let mut images = Self { bytes: Vec::new() };
+        let mut images = Self { bytes: Vec::new(), same: HashMap::new() };
         let drawn: HashSet<usize> = drawn.iter().copied().collect();
+        let mut known: HashMap<&str, usize> = HashMap::new();
         for (i, image) in root.images.iter().enumerate() {
-            let mut find = Find { root, buffers, file, resolver, report, drawn: drawn.contains(&i) };
-            let bytes = find.bytes(i, image);
-            if let Some(bytes) = &bytes {
+            let named = image.uri.as_deref().filter(|uri| !is_data(uri));
+            let drawn = drawn.contains(&i);
+            if let Some(&other) = named.and_then(|uri| known.get(uri)) {
+                images.same.insert(i, other);
+                images.bytes.push(None);
+            } else {
+                let mut find = Find { root, buffers, file, resolver, budget, report, drawn };
+                images.bytes.push(find.bytes(i, image));
+                // What was looked for once is not looked for again, found or not.
+                known.extend(named.filter(|_| is_wanted(image, drawn)).map(|uri| (uri, i)));
+            }
+            if let Some(bytes) = images.of(i) {
                 check_kind(root, i, image, bytes, report);
             }
-            images.bytes.push(bytes);
         }
         check_textures(root, &images, report);
         images
+    }
+
+    /// The bytes of an image.
+    fn of(&self, i: usize) -> Option<&[u8]> {
+        self.bytes.get(self.same.get(&i).copied().unwrap_or(i)).and_then(Option::as_deref)
     }
 
     /// Decodes the images with these indices.
@@ -54,7 +72,7 @@ impl<'a> Images<'a> {
     ) -> Vec<Option<Bitmap>> {
         let (mut encoded, mut places) = (Vec::new(), Vec::new());
         for (k, &i) in drawn.iter().enumerate() {
-            let Some(bytes) = self.bytes.get(i).and_then(Option::as_deref) else { continue };
+            let Some(bytes) = self.of(i) else { continue };
             let name = root.images.get(i).map(|image| name_of(i, image)).unwrap_or_default();
             encoded.push(Encoded { name, place: format!("images[{i}]"), bytes: Cow::Borrowed(bytes) });
             places.push(k);
@@ -72,6 +90,7 @@ struct Find<'a, 'b> {
     buffers: &'a Buffers<'a>,
     file: &'b Path,
     resolver: &'b mut Resolver,
+    budget: &'b mut Budget,
     report: &'b mut Report,
     drawn: bool,
 }
@@ -80,8 +99,8 @@ impl<'a> Find<'a, '_> {
     fn bytes(&mut self, i: usize, image: &Image) -> Option<Cow<'a, [u8]>> {
         match (&image.uri, image.buffer_view) {
             (Some(uri), _) if is_data(uri) => self.data(i, uri).map(Cow::Owned),
-            (Some(uri), _) if self.drawn || image.mime_type.is_some() => match self.resolver.read_uri(uri) {
-                Ok(bytes) => Some(Cow::Owned(bytes)),
+            (Some(uri), _) if is_wanted(image, self.drawn) => match self.resolver.read_uri(uri) {
+                Ok(bytes) => self.fits(i, bytes.len()).then_some(Cow::Owned(bytes)),
                 Err(why) => {
                     self.report.warnings.push(why.diagnose(self.file, &format!("images[{i}].uri")));
                     None
@@ -99,12 +118,24 @@ impl<'a> Find<'a, '_> {
         }
     }
 
+    /// Whether so many bytes may still be taken; else the image is left out with a warning.
+    fn fits(&mut self, i: usize, bytes: usize) -> bool {
+        let Err(over) = self.budget.take(bytes as u64, 1) else { return true };
+        let text = format!("the image is too large: {over}");
+        let warning = Diagnostic::new("out-of-memory-limit", self.file, format!("images[{i}]"), text);
+        self.report.warnings.push(warning.remedy("allow more with --max-memory"));
+        false
+    }
+
     fn data(&mut self, i: usize, uri: &str) -> Option<Vec<u8>> {
         let place = format!("images[{i}].uri");
         let kind = media_type(uri);
         if !kind.is_empty() && !kind.starts_with("image/") && kind != "application/octet-stream" || kind == "image/gif"
         {
             self.report.add(Code::InvalidUri, &place, format!("a data URI of type '{kind}' is no glTF image"));
+        }
+        if !self.fits(i, uri.len()) {
+            return None;
         }
         match decode_data(uri) {
             Ok(bytes) => Some(bytes),
@@ -114,6 +145,11 @@ impl<'a> Find<'a, '_> {
             }
         }
     }
+}
+
+/// Whether another file is worth reading: to be drawn, or to be compared with the type that is declared.
+fn is_wanted(image: &Image, drawn: bool) -> bool {
+    drawn || image.mime_type.is_some()
 }
 
 fn name_of(i: usize, image: &Image) -> String {
@@ -152,7 +188,7 @@ fn check_kind(root: &Root, i: usize, image: &Image, bytes: &[u8], report: &mut R
 
 /// Checks that each way to name an image leads to one of its kind.
 fn check_textures(root: &Root, images: &Images, report: &mut Report) {
-    let kind = |i: usize| images.bytes.get(i).and_then(Option::as_deref).and_then(kind_of);
+    let kind = |i: usize| images.of(i).and_then(kind_of);
     for (i, texture) in root.textures.iter().enumerate() {
         let webp = extension_source(texture, "EXT_texture_webp");
         let plain = kind(texture.source.value()).filter(|k| !["image/png", "image/jpeg"].contains(k));

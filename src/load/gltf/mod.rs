@@ -33,6 +33,7 @@ mod sparse;
 mod tests;
 mod textures;
 mod version;
+mod weight;
 
 use super::limits::Budget;
 use super::paths::Resolver;
@@ -52,6 +53,7 @@ use report::Report;
 use scene::Placed;
 use sparse::Replacements;
 use textures::Textures;
+use weight::Weight;
 
 /// Loads a glTF 2.0 file.
 ///
@@ -84,6 +86,12 @@ impl Loading<'_> {
         let file = &self.source.path;
         let container = container::split(&self.source.bytes, self.report);
         let container = self.passed(container)?;
+        let mut budget = Budget::new(&self.options.limits);
+        self.take(&mut budget, self.source.bytes.len() as u64, "the file")?;
+        let weight = Weight::of(container.json);
+        document::check_depth(&weight, self.report);
+        self.report.check()?;
+        self.take(&mut budget, weight.bytes(), "the JSON, once it is parsed,")?;
         let value = document::parse(container.json, self.report);
         let value = self.passed(value)?;
         let right_version = version::check(&value, self.report).then_some(());
@@ -93,6 +101,7 @@ impl Loading<'_> {
         self.report.check()?;
         schema::check(&value, self.report);
         self.report.check()?;
+        self.take(&mut budget, weight::typed(&value), "the document")?;
         attributes::check(&value, self.report);
         let graph = Graph::new(&value, self.report);
         let document = document::typed(value, self.report);
@@ -102,7 +111,7 @@ impl Loading<'_> {
 
         let mut facts = facts(&document, container.binary);
         facts.extensions = extensions.facts();
-        let scene = self.build(&document, &graph, container.bin, &mut facts)?;
+        let scene = self.build(&document, &graph, container.bin, &mut budget, &mut facts)?;
         Ok(Loaded { scene, facts, warnings: Vec::new() })
     }
 
@@ -118,6 +127,7 @@ impl Loading<'_> {
         document: &Document,
         graph: &Graph,
         bin: Option<&[u8]>,
+        budget: &mut Budget,
         facts: &mut Facts,
     ) -> Result<Scene, LoadError> {
         let (root, file) = (&document.root, self.source.path.as_path());
@@ -125,26 +135,25 @@ impl Loading<'_> {
             self.check_chunk(root);
         }
         let mut resolver = Resolver::new(self.source, self.options);
-        let buffers = Buffers::load(root, bin, file, &mut resolver, self.report);
-        let mut budget = Budget::new(&self.options.limits);
-        let replacements = Replacements::load(root, &buffers, &mut budget, self.report);
-        let replacements = replacements.map_err(|over| self.too_large(over))?;
+        let buffers = Buffers::load(root, bin, file, &mut resolver, budget, self.report);
+        let replacements = Replacements::load(root, &buffers, budget, self.report);
+        let replacements = replacements.map_err(|over| self.too_large("what sparse accessors replace", over))?;
         let reader = Reader { root, buffers: &buffers, replacements: &replacements };
         facts.scene_index = scene::choose(root, self.options.scene.as_deref(), file)?;
-        self.check_budget(reader, &mut budget)?;
+        self.check_budget(reader, *budget)?;
         bounds::check(reader, self.report);
-        let placed = scene::walk(reader, graph, facts.scene_index, &mut budget, self.report);
-        let placed = placed.map_err(|over| self.too_large(over))?;
+        let placed = scene::walk(reader, graph, facts.scene_index, budget, self.report);
+        let placed = placed.map_err(|over| self.too_large("what the nodes show", over))?;
         let skins = skin::joint_matrices(reader, graph, self.report);
         let palette = self.palette(document, &placed);
 
         let drawn_images = palette.textures.images.clone();
-        let images = Images::load(root, &buffers, &drawn_images, file, &mut resolver, self.report);
-        self.charge(reader, &placed, &mut budget)?;
+        let images = Images::load(root, &buffers, &drawn_images, file, &mut resolver, budget, self.report);
+        self.charge(reader, &placed, budget)?;
         let mut pictures = Report::new(file);
         let (reads, bitmaps) = rayon::join(
             || read_meshes(reader, &placed, &skins, &palette, file),
-            || images.decode(root, &drawn_images, file, &self.options.limits, &mut budget, &mut pictures),
+            || images.decode(root, &drawn_images, file, &self.options.limits, budget, &mut pictures),
         );
         // glTF has no word for surroundings: its lights come on top of whatever the viewer puts around the model.
         let environment = Environment::Studio;
@@ -167,12 +176,11 @@ impl Loading<'_> {
     }
 
     /// Refuses a file whose accessors are larger than memory allows, before any is read.
-    fn check_budget(&self, reader: Reader, budget: &mut Budget) -> Result<(), LoadError> {
+    fn check_budget(&self, reader: Reader, mut budget: Budget) -> Result<(), LoadError> {
         // Zeros need no bytes in the file, so that only the budget bounds them.
         let zeros = reader.root.accessors.iter().filter(|a| a.buffer_view.is_none()).map(|a| a.count.0);
         let largest = zeros.max().unwrap_or(0);
-        let mut trial = *budget;
-        trial.take(largest, 64).map_err(|over| self.too_large(over))
+        self.take(&mut budget, largest.saturating_mul(64), "an accessor")
     }
 
     /// Charges what the primitives will take.
@@ -180,11 +188,17 @@ impl Loading<'_> {
         let meshes = placed.variants.iter().filter_map(|v| reader.root.meshes.get(v.mesh));
         let primitives = meshes.flat_map(|m| m.primitives.iter().map(|p| (p, m.name.as_deref().unwrap_or_default())));
         let bytes = primitives.map(|(p, name)| mesh::cost(reader, p, name)).fold(0, u64::saturating_add);
-        budget.take(bytes, 1).map_err(|over| self.too_large(over))
+        self.take(budget, bytes, "what the meshes hold")
     }
 
-    fn too_large(&self, over: super::limits::OverBudget) -> LoadError {
-        let fault = Diagnostic::new("out-of-memory-limit", &self.source.path, "", format!("too large: {over}"));
+    /// Takes bytes for something, or refuses the file.
+    fn take(&self, budget: &mut Budget, bytes: u64, what: &str) -> Result<(), LoadError> {
+        budget.take(bytes, 1).map_err(|over| self.too_large(what, over))
+    }
+
+    fn too_large(&self, what: &str, over: super::limits::OverBudget) -> LoadError {
+        let text = format!("{what} is too large: {over}");
+        let fault = Diagnostic::new("out-of-memory-limit", &self.source.path, "", text);
         fault.remedy("allow more with --max-memory").into()
     }
 

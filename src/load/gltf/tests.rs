@@ -1,6 +1,7 @@
 //! Whole files, made in memory, one feature each.
 
 mod large;
+mod memory;
 
 use crate::load::{Limits, LoadError, LoadOptions, Loaded, load_bytes};
 use crate::math::{DVec3, Vec2, Vec3, Vec4};

@@ -99,3 +99,18 @@ fn copies_of_a_large_mesh_are_refused_before_memory_is_taken() {
     file.set("scenes", json!([{"nodes": all(|i| json!(i))}]));
     assert!(file.fault().contains("too large"), "{}", file.fault());
 }
+
+#[test]
+fn bounds_of_accessors_that_lie_over_each_other_are_compared_for_some_of_them() {
+    let mut file = Builder::new();
+    file.floats("VEC3", &[0.0; 9000]);
+    let accessor = json!({"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3000, "min": [1, 0, 0]});
+    file.set("accessors", all(|_| accessor.clone()));
+    file.set("nodes", json!([]));
+    file.set("scenes", json!([]));
+    file.root.as_object_mut().unwrap().remove("scene");
+    let loaded = file.load();
+    let compared: u32 = loaded.warnings.iter().map(|warning| warning.count).sum();
+    // Twice the buffer and 2²⁸ bytes, of 3.6·10⁹.
+    assert_eq!(compared, ((1 << 28) + 2 * 36_000) / 36_000);
+}

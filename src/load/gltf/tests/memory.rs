@@ -1,0 +1,87 @@
+//! Files that would take more memory than is allowed, or more stack than there is: one line, before it is taken.
+
+use super::*;
+
+fn limited(memory: u64) -> LoadOptions {
+    LoadOptions { limits: Limits { memory, ..Limits::default() }, ..LoadOptions::default() }
+}
+
+/// The one line that refuses a file.
+fn refused(path: &Path, bytes: &[u8], memory: u64) -> String {
+    match load_bytes(path, bytes.to_vec(), &limited(memory)) {
+        Err(LoadError::Input(faults)) if faults.len() == 1 => faults[0].to_string(),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn parsed_json_is_charged_before_it_is_parsed() {
+    let digits = vec!["0"; 100_000].join(",");
+    let text = format!(r#"{{"asset": {{"version": "2.0"}}, "extras": [{digits}]}}"#);
+    assert!(load_bytes(Path::new("a.gltf"), text.clone().into_bytes(), &limited(50 << 20)).is_ok());
+    let message = refused(Path::new("a.gltf"), text.as_bytes(), 5 << 20);
+    assert!(message.starts_with("a.gltf: the JSON, once it is parsed, is too large: "), "{message}");
+    assert!(message.ends_with("; allow more with --max-memory"), "{message}");
+    let message = refused(Path::new("a.gltf"), text.as_bytes(), 100_000);
+    assert!(message.starts_with("a.gltf: the file is too large: "), "{message}");
+}
+
+#[test]
+fn empty_objects_are_charged_for_what_they_become() {
+    let objects = vec!["{}"; 100_000].join(",");
+    let text = format!(r#"{{"asset": {{"version": "2.0"}}, "materials": [{objects}]}}"#);
+    let message = refused(Path::new("a.gltf"), text.as_bytes(), 150 << 20);
+    assert!(message.starts_with("a.gltf: the document is too large: "), "{message}");
+}
+
+#[test]
+fn deep_nesting_is_one_line_wherever_it_is() {
+    for (open, close) in [("[", "]"), ("{\"a\":", "}")] {
+        for (depth, closed) in [(130, true), (1_000_000, true), (1_000_000, false)] {
+            let close = if closed { close.repeat(depth) } else { String::new() };
+            let text = format!(r#"{{"asset": {{"version": "2.0"}}, "extras": {}0{close}}}"#, open.repeat(depth));
+            let message = refused(Path::new("a.gltf"), text.as_bytes(), 8 << 30);
+            let told =
+                format!("a.gltf: the JSON cannot be read: it is nested {} deep where 127 are allowed", depth + 1);
+            assert_eq!(message, told);
+        }
+    }
+}
+
+#[test]
+fn a_file_that_is_named_many_times_is_read_and_charged_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut file = Builder::new();
+    let positions = file.triangle();
+    file.primitive(json!({"attributes": {"POSITION": positions}}));
+    let mut bytes = std::mem::take(&mut file.bytes);
+    bytes.resize(1 << 20, 0);
+    std::fs::write(folder.path().join("b.bin"), bytes).unwrap();
+    file.set("buffers", (0..100).map(|_| json!({"uri": "b.bin", "byteLength": 1 << 20})).collect());
+    file.set("images", (0..100).map(|_| json!({"uri": "b.bin", "mimeType": "image/png"})).collect());
+    file.root["bufferViews"][0]["buffer"] = json!(99);
+    let path = folder.path().join("a.gltf");
+    let loaded = load_bytes(&path, file.gltf(), &limited(4 << 20)).unwrap();
+    assert_eq!(loaded.scene.meshes[0].positions, [Vec3::ZERO, Vec3::X, Vec3::Y]);
+    assert_eq!(loaded.facts.files.len(), 2);
+    let message = refused(&path, &file.gltf(), 1 << 20);
+    assert!(message.contains("buffers[0].uri: the buffer is too large: 1048576 bytes are needed"), "{message}");
+}
+
+#[test]
+fn data_in_the_file_is_charged_before_it_is_decoded() {
+    let mut file = Builder::new();
+    let (positions, indices) = (file.floats("VEC3", &[0.0; 300_000]), file.shorts(&[0, 1, 2]));
+    file.primitive(json!({"attributes": {"POSITION": positions}, "indices": indices}));
+    let bytes = file.gltf();
+    let message = refused(Path::new("a.gltf"), &bytes, 5 * bytes.len() as u64 / 2);
+    assert!(message.contains("buffers[0].uri: the buffer is too large"), "{message}");
+
+    let mut file = Builder::new();
+    let positions = file.triangle();
+    file.primitive(json!({"attributes": {"POSITION": positions}}));
+    file.set("images", json!([{"uri": format!("data:image/png;base64,{}", "A".repeat(1 << 20))}]));
+    let bytes = file.gltf();
+    let loaded = load_bytes(Path::new("a.gltf"), bytes.clone(), &limited(5 * bytes.len() as u64 / 2)).unwrap();
+    assert_eq!(codes(&loaded), ["out-of-memory-limit"]);
+}
