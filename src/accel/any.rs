@@ -1,9 +1,11 @@
-//! The choice of a structure: the enum meets the user, the trait meets the ray.
+//! The choice of a structure and a test: the enums meet the user, the traits meet the ray.
 
 use std::fmt;
 use std::str::FromStr;
 
-use super::{GridOctree, GridParams, Shapes, Splitting, StructureStats, Unculled, Wide};
+use super::intersector::{IntersectorKind, MollerTrumbore, MollerTrumboreDouble, Watertight, WatertightDouble};
+use super::query::{Culling, Tested};
+use super::{Accel, GridOctree, GridParams, Hit, Probe, Ray, Shapes, Splitting, StructureStats, Unculled, Wide};
 
 /// Which structure culls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -61,34 +63,62 @@ impl FromStr for AccelKind {
     }
 }
 
-/// A built structure. Match once per image; each variant implements [`Accel`](super::Accel).
+/// A built structure of any kind, and the test that it is asked with.
+///
+/// The choice is looked up once for each slice of rays, and everything behind it is compiled for it.
 #[derive(Clone, Debug)]
-pub enum AnyAccel<'a> {
-    /// [`AccelKind::None`].
+pub struct AnyAccel<'a> {
+    structure: Structure<'a>,
+    test: IntersectorKind,
+}
+
+#[derive(Clone, Debug)]
+enum Structure<'a> {
     None(Unculled<'a>),
-    /// [`AccelKind::GridOctree`].
     GridOctree(GridOctree<'a>),
-    /// [`AccelKind::FastOctree`] or [`AccelKind::FastBvh`].
     Wide(Wide<'a>),
 }
 
+/// What a walk through [`AnyAccel`] writes to.
+#[derive(Clone, Debug)]
+pub struct AnyScratch(Scratch);
+
+#[derive(Clone, Debug)]
+enum Scratch {
+    None,
+    GridOctree(<GridOctree<'static> as Culling>::Scratch),
+    Wide(<Wide<'static> as Culling>::Scratch),
+}
+
+/// A question that can be asked of any structure.
+trait Question {
+    fn ask<A: Accel>(self, accel: &A, scratch: &mut A::Scratch);
+}
+
 impl<'a> AnyAccel<'a> {
-    /// Builds a structure over `shapes`; `params` only matter to kinds with a grid.
+    /// Builds a structure over `shapes`, asked with the exact test; `params` only matter to kinds with a grid.
     pub fn build(kind: AccelKind, shapes: &'a Shapes, params: &GridParams) -> Self {
-        match kind {
-            AccelKind::None => Self::None(Unculled::new(shapes)),
-            AccelKind::GridOctree => Self::GridOctree(GridOctree::build(shapes, params)),
-            AccelKind::FastOctree => Self::Wide(Wide::build(shapes, Splitting::Octree)),
-            AccelKind::FastBvh => Self::Wide(Wide::build(shapes, Splitting::SurfaceArea)),
-        }
+        let structure = match kind {
+            AccelKind::None => Structure::None(Unculled::new(shapes)),
+            AccelKind::GridOctree => Structure::GridOctree(GridOctree::build(shapes, params)),
+            AccelKind::FastOctree => Structure::Wide(Wide::build(shapes, Splitting::Octree)),
+            AccelKind::FastBvh => Structure::Wide(Wide::build(shapes, Splitting::SurfaceArea)),
+        };
+        Self { structure, test: IntersectorKind::Exact }
+    }
+
+    /// The same structure asked with another test.
+    #[must_use]
+    pub fn tested_by(self, test: IntersectorKind) -> Self {
+        Self { test, ..self }
     }
 
     /// Which kind it is.
     pub fn kind(&self) -> AccelKind {
-        match self {
-            Self::None(_) => AccelKind::None,
-            Self::GridOctree(_) => AccelKind::GridOctree,
-            Self::Wide(a) => match a.splitting() {
+        match &self.structure {
+            Structure::None(_) => AccelKind::None,
+            Structure::GridOctree(_) => AccelKind::GridOctree,
+            Structure::Wide(a) => match a.splitting() {
                 Splitting::Octree => AccelKind::FastOctree,
                 Splitting::SurfaceArea => AccelKind::FastBvh,
             },
@@ -97,20 +127,104 @@ impl<'a> AnyAccel<'a> {
 
     /// What it is made of.
     pub fn summary(&self) -> StructureStats {
-        match self {
-            Self::None(a) => a.summary(),
-            Self::GridOctree(a) => a.summary(),
-            Self::Wide(a) => a.summary(),
+        match &self.structure {
+            Structure::None(a) => a.summary(),
+            Structure::GridOctree(a) => a.summary(),
+            Structure::Wide(a) => a.summary(),
         }
     }
 
     /// Visits everything and proves that no hit can be lost; the error says which prim and cell disagree, and how.
     pub fn check(&self) -> Result<StructureStats, String> {
-        match self {
-            Self::None(a) => Ok(a.summary()),
-            Self::GridOctree(a) => a.check(),
-            Self::Wide(a) => a.check(),
+        match &self.structure {
+            Structure::None(a) => Ok(a.summary()),
+            Structure::GridOctree(a) => a.check(),
+            Structure::Wide(a) => a.check(),
         }
+    }
+
+    fn ask(&self, question: impl Question, AnyScratch(scratch): &mut AnyScratch) {
+        match (&self.structure, scratch) {
+            (Structure::None(a), _) => self.ask_tested(question, a, &mut ()),
+            (Structure::GridOctree(a), Scratch::GridOctree(scratch)) => self.ask_tested(question, a, scratch),
+            (Structure::Wide(a), Scratch::Wide(scratch)) => self.ask_tested(question, a, scratch),
+            // Scratch of another structure: a fresh one does.
+            (Structure::GridOctree(a), _) => self.ask_tested(question, a, &mut a.new_scratch()),
+            (Structure::Wide(a), _) => self.ask_tested(question, a, &mut a.new_scratch()),
+        }
+    }
+
+    fn ask_tested<C: Culling>(&self, question: impl Question, accel: &C, scratch: &mut C::Scratch) {
+        match self.test {
+            IntersectorKind::Exact => question.ask(accel, scratch),
+            IntersectorKind::Watertight => question.ask(&Tested::<Watertight, _>::new(accel), scratch),
+            IntersectorKind::WatertightDouble => question.ask(&Tested::<WatertightDouble, _>::new(accel), scratch),
+            IntersectorKind::MollerTrumbore => question.ask(&Tested::<MollerTrumbore, _>::new(accel), scratch),
+            IntersectorKind::MollerTrumboreDouble => {
+                question.ask(&Tested::<MollerTrumboreDouble, _>::new(accel), scratch);
+            }
+        }
+    }
+}
+
+impl Accel for AnyAccel<'_> {
+    type Scratch = AnyScratch;
+
+    fn scratch(&self) -> AnyScratch {
+        AnyScratch(match &self.structure {
+            Structure::None(_) => Scratch::None,
+            Structure::GridOctree(a) => Scratch::GridOctree(a.new_scratch()),
+            Structure::Wide(a) => Scratch::Wide(a.new_scratch()),
+        })
+    }
+
+    fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut AnyScratch, probe: &mut P) {
+        self.ask(FirstHits { rays, hits, probe }, scratch);
+    }
+
+    fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut AnyScratch, probe: &mut P) {
+        self.ask(Blocked { rays, blocked, probe }, scratch);
+    }
+
+    fn next<P: Probe>(&self, rays: &[Ray], after: &[Hit], hits: &mut [Hit], scratch: &mut AnyScratch, probe: &mut P) {
+        self.ask(NextHits { rays, after, hits, probe }, scratch);
+    }
+}
+
+struct FirstHits<'q, P> {
+    rays: &'q [Ray],
+    hits: &'q mut [Hit],
+    probe: &'q mut P,
+}
+
+impl<P: Probe> Question for FirstHits<'_, P> {
+    fn ask<A: Accel>(self, accel: &A, scratch: &mut A::Scratch) {
+        accel.closest(self.rays, self.hits, scratch, self.probe);
+    }
+}
+
+struct Blocked<'q, P> {
+    rays: &'q [Ray],
+    blocked: &'q mut [bool],
+    probe: &'q mut P,
+}
+
+impl<P: Probe> Question for Blocked<'_, P> {
+    fn ask<A: Accel>(self, accel: &A, scratch: &mut A::Scratch) {
+        accel.occluded(self.rays, self.blocked, scratch, self.probe);
+    }
+}
+
+struct NextHits<'q, P> {
+    rays: &'q [Ray],
+    after: &'q [Hit],
+    hits: &'q mut [Hit],
+    probe: &'q mut P,
+}
+
+impl<P: Probe> Question for NextHits<'_, P> {
+    fn ask<A: Accel>(self, accel: &A, scratch: &mut A::Scratch) {
+        accel.next(self.rays, self.after, self.hits, scratch, self.probe);
     }
 }
 

@@ -11,6 +11,7 @@
 
 pub mod any;
 pub mod grid;
+pub mod intersector;
 pub mod none;
 pub mod probe;
 pub mod query;
@@ -23,8 +24,10 @@ pub mod wide;
 
 pub use any::{AccelKind, AnyAccel};
 pub use grid::{GridOctree, GridParams};
+pub use intersector::{Intersector, IntersectorKind};
 pub use none::Unculled;
 pub use probe::{NoProbe, Probe, RayCounts};
+pub use query::Tested;
 pub use refine::Refined;
 pub use shapes::{BitSet, Shapes, SpherePrim};
 pub use stats::StructureStats;

@@ -3,6 +3,9 @@
 //! A structure only decides which prims a ray is tested against ([`Culling`]); tests, order and counting happen here, so
 //! that no two structures can differ in them.
 
+use std::marker::PhantomData;
+
+use super::intersector::{Exact, Intersector};
 use super::{Accel, Hit, NO_PRIM, Probe, Ray, Shapes};
 use crate::math::shear::RaySpace;
 use crate::math::simd::LANES;
@@ -24,8 +27,11 @@ pub trait Culling: Sync {
     fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, scratch: &mut Self::Scratch, probe: &mut P);
 }
 
-/// What a query looks for.
+/// What a query looks for, and with which test.
 pub trait Goal {
+    /// The test of triangles.
+    type Test: Intersector;
+
     /// Whether a hit with `prim` would matter at all.
     fn wants(&self, _shapes: &Shapes, _prim: u32) -> bool {
         true
@@ -40,7 +46,7 @@ pub trait Goal {
 
 /// One ray under way.
 #[derive(Clone, Debug)]
-pub struct Query<'a, G> {
+pub struct Query<'a, G: Goal> {
     /// The ray in sheared space.
     pub ray: RaySpace,
     /// Hits count from here.
@@ -48,6 +54,7 @@ pub struct Query<'a, G> {
     t_max: f32,
     exclude: u32,
     shapes: &'a Shapes,
+    prepared: <G::Test as Intersector>::Prepared,
     goal: G,
 }
 
@@ -58,7 +65,8 @@ impl<'a, G: Goal> Query<'a, G> {
         let t_max = ray.t_max.min(f32::MAX);
         let space = RaySpace::new(ray.origin, ray.dir)?;
         let usable = ray.t_min <= t_max && !ray.t_max.is_nan();
-        usable.then_some(Self { ray: space, t_min: ray.t_min, t_max, exclude: ray.exclude, shapes, goal })
+        let prepared = G::Test::prepare(&space);
+        usable.then_some(Self { ray: space, t_min: ray.t_min, t_max, exclude: ray.exclude, shapes, prepared, goal })
     }
 
     /// Hits beyond this distance do not matter; shrinks as hits are found.
@@ -74,16 +82,31 @@ impl<'a, G: Goal> Query<'a, G> {
             return false;
         }
         probe.prim_test();
-        for t in self.shapes.distances(prim, &self.ray, self.t_min >= 0.0) {
-            if t >= self.t_min && t <= self.t_max {
-                self.goal.offer(t, prim);
+        match self.shapes.triangles.get(prim as usize) {
+            Some(&corners) => {
+                if let Some(t) = G::Test::distance(&self.prepared, &self.ray, &self.shapes.corners(corners)) {
+                    self.offer(t, prim);
+                }
+            }
+            None => {
+                for t in self.shapes.other_distances(prim, &self.ray, self.t_min >= 0.0) {
+                    self.offer(t, prim);
+                }
             }
         }
         self.reach() < self.t_min
     }
 
+    /// Hands on a hit within the range; a NaN is none.
+    #[inline]
+    fn offer(&mut self, t: f32, prim: u32) {
+        if t >= self.t_min && t <= self.t_max {
+            self.goal.offer(t, prim);
+        }
+    }
+
     /// Takes the verdicts of a block's first `count` lanes, decides those that are open, and tells whether the query is
-    /// answered. The same hits as [`Self::test`] for each of them.
+    /// answered. The same hits as [`Self::test`] for each of them, if the test is exact.
     #[inline(always)]
     pub fn test_block<P: Probe>(
         &mut self,
@@ -113,10 +136,7 @@ impl<'a, G: Goal> Query<'a, G> {
         }
         let corners = self.shapes.triangle(prim);
         if certain || triangle::is_hit_near_edge(&self.ray, &corners) {
-            let t = triangle::distance(&self.ray, &corners);
-            if t >= self.t_min && t <= self.t_max {
-                self.goal.offer(t, prim);
-            }
+            self.offer(triangle::distance(&self.ray, &corners), prim);
         }
         self.reach() < self.t_min
     }
@@ -128,11 +148,14 @@ impl<'a, G: Goal> Query<'a, G> {
 }
 
 /// The first hit.
-struct Closest {
+struct Closest<I> {
     best: (f32, u32),
+    test: PhantomData<I>,
 }
 
-impl Goal for Closest {
+impl<I: Intersector> Goal for Closest<I> {
+    type Test = I;
+
     #[inline]
     fn offer(&mut self, t: f32, prim: u32) {
         if (t, prim) < self.best {
@@ -146,11 +169,14 @@ impl Goal for Closest {
 }
 
 /// Whether anything opaque is hit.
-struct Occluded {
+struct Occluded<I> {
     found: bool,
+    test: PhantomData<I>,
 }
 
-impl Goal for Occluded {
+impl<I: Intersector> Goal for Occluded<I> {
+    type Test = I;
+
     #[inline]
     fn wants(&self, shapes: &Shapes, prim: u32) -> bool {
         shapes.opaque.get(prim)
@@ -166,12 +192,14 @@ impl Goal for Occluded {
 }
 
 /// The first hit after another.
-struct Next {
+struct Next<I> {
     after: (f32, u32),
-    closest: Closest,
+    closest: Closest<I>,
 }
 
-impl Goal for Next {
+impl<I: Intersector> Goal for Next<I> {
+    type Test = I;
+
     #[inline]
     fn offer(&mut self, t: f32, prim: u32) {
         if (t, prim) > self.after {
@@ -184,7 +212,9 @@ impl Goal for Next {
     }
 }
 
-const NOTHING: Closest = Closest { best: (f32::INFINITY, NO_PRIM) };
+impl<I> Closest<I> {
+    const NOTHING: Self = Self { best: (f32::INFINITY, NO_PRIM), test: PhantomData };
+}
 
 impl<C: Culling> Accel for C {
     type Scratch = C::Scratch;
@@ -194,17 +224,11 @@ impl<C: Culling> Accel for C {
     }
 
     fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = answer(self, ray, NOTHING, scratch, probe).map_or(Hit::MISS, |q| finish(&q, q.goal.best));
-            count_found(hit.is_some(), probe);
-        }
+        closest::<Exact, _, _>(self, rays, hits, scratch, probe);
     }
 
     fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut Self::Scratch, probe: &mut P) {
-        for (ray, blocked) in rays.iter().zip(blocked) {
-            *blocked = answer(self, ray, Occluded { found: false }, scratch, probe).is_some_and(|q| q.goal.found);
-            count_found(*blocked, probe);
-        }
+        occluded::<Exact, _, _>(self, rays, blocked, scratch, probe);
     }
 
     fn next<P: Probe>(
@@ -215,12 +239,93 @@ impl<C: Culling> Accel for C {
         scratch: &mut Self::Scratch,
         probe: &mut P,
     ) {
-        for ((ray, after), hit) in rays.iter().zip(after).zip(hits) {
-            let rest = Ray { t_min: ray.t_min.max(after.t), ..*ray };
-            let goal = Next { after: (after.t, after.prim), closest: NOTHING };
-            *hit = answer(self, &rest, goal, scratch, probe).map_or(Hit::MISS, |q| finish(&q, q.goal.closest.best));
-            count_found(hit.is_some(), probe);
-        }
+        next::<Exact, _, _>(self, rays, after, hits, scratch, probe);
+    }
+}
+
+/// A structure whose triangles are tested by `I` instead of exactly.
+#[derive(Clone, Copy, Debug)]
+pub struct Tested<'a, I, C> {
+    structure: &'a C,
+    test: PhantomData<I>,
+}
+
+impl<'a, I: Intersector, C: Culling> Tested<'a, I, C> {
+    /// The same structure with another test.
+    pub fn new(structure: &'a C) -> Self {
+        Self { structure, test: PhantomData }
+    }
+}
+
+impl<I: Intersector, C: Culling> Accel for Tested<'_, I, C> {
+    type Scratch = C::Scratch;
+
+    fn scratch(&self) -> Self::Scratch {
+        self.structure.new_scratch()
+    }
+
+    fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
+        closest::<I, _, _>(self.structure, rays, hits, scratch, probe);
+    }
+
+    fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut Self::Scratch, probe: &mut P) {
+        occluded::<I, _, _>(self.structure, rays, blocked, scratch, probe);
+    }
+
+    fn next<P: Probe>(
+        &self,
+        rays: &[Ray],
+        after: &[Hit],
+        hits: &mut [Hit],
+        scratch: &mut Self::Scratch,
+        probe: &mut P,
+    ) {
+        next::<I, _, _>(self.structure, rays, after, hits, scratch, probe);
+    }
+}
+
+fn closest<I: Intersector, C: Culling, P: Probe>(
+    structure: &C,
+    rays: &[Ray],
+    hits: &mut [Hit],
+    scratch: &mut C::Scratch,
+    probe: &mut P,
+) {
+    for (ray, hit) in rays.iter().zip(hits) {
+        let query = answer(structure, ray, Closest::<I>::NOTHING, scratch, probe);
+        *hit = query.map_or(Hit::MISS, |q| finish(&q, q.goal.best));
+        count_found(hit.is_some(), probe);
+    }
+}
+
+fn occluded<I: Intersector, C: Culling, P: Probe>(
+    structure: &C,
+    rays: &[Ray],
+    blocked: &mut [bool],
+    scratch: &mut C::Scratch,
+    probe: &mut P,
+) {
+    for (ray, blocked) in rays.iter().zip(blocked) {
+        let goal = Occluded::<I> { found: false, test: PhantomData };
+        *blocked = answer(structure, ray, goal, scratch, probe).is_some_and(|q| q.goal.found);
+        count_found(*blocked, probe);
+    }
+}
+
+fn next<I: Intersector, C: Culling, P: Probe>(
+    structure: &C,
+    rays: &[Ray],
+    after: &[Hit],
+    hits: &mut [Hit],
+    scratch: &mut C::Scratch,
+    probe: &mut P,
+) {
+    for ((ray, after), hit) in rays.iter().zip(after).zip(hits) {
+        let rest = Ray { t_min: ray.t_min.max(after.t), ..*ray };
+        let goal = Next { after: (after.t, after.prim), closest: Closest::<I>::NOTHING };
+        let query = answer(structure, &rest, goal, scratch, probe);
+        *hit = query.map_or(Hit::MISS, |q| finish(&q, q.goal.closest.best));
+        count_found(hit.is_some(), probe);
     }
 }
 

@@ -101,7 +101,7 @@ impl Shapes {
     }
 
     #[inline]
-    fn corners(&self, [a, b, c]: [u32; 3]) -> Triangle {
+    pub(super) fn corners(&self, [a, b, c]: [u32; 3]) -> Triangle {
         [self.vertices[a as usize], self.vertices[b as usize], self.vertices[c as usize]]
     }
 
@@ -111,18 +111,10 @@ impl Shapes {
         self.corners(self.triangles[prim as usize])
     }
 
-    /// Where the line through the ray meets prim `prim`: up to two distances, NaN for "not". The one test that every
-    /// structure uses, a function of ray and prim alone. With `ahead`, negative distances may be left out.
-    #[inline]
-    pub fn distances(&self, prim: u32, ray: &RaySpace, ahead: bool) -> [f32; 2] {
-        match self.triangles.get(prim as usize) {
-            Some(&corners) => one(triangle::intersect(ray, &self.corners(corners))),
-            None => self.other_distances(prim, ray, ahead),
-        }
-    }
-
+    /// Where the line through the ray meets prim `prim`, which is no triangle: up to two distances, NaN for "not". A
+    /// function of ray and prim alone. With `ahead`, negative distances may be left out.
     #[inline(never)]
-    fn other_distances(&self, prim: u32, ray: &RaySpace, ahead: bool) -> [f32; 2] {
+    pub(super) fn other_distances(&self, prim: u32, ray: &RaySpace, ahead: bool) -> [f32; 2] {
         match self.prim(prim) {
             Prim::Triangle(corners) => one(triangle::intersect(ray, &corners)),
             Prim::Polygon(polygon) => one(polygon::intersect(ray, polygon)),

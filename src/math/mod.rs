@@ -21,3 +21,4 @@ pub mod simd;
 pub mod sphere;
 pub mod triangle;
 pub mod triangles;
+pub mod watertight;

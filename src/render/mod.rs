@@ -30,7 +30,7 @@ pub mod world;
 pub use view::View;
 pub use world::{PrimSource, World};
 
-use crate::accel::{Accel, AnyAccel, NoProbe, Probe, RayCounts};
+use crate::accel::{AnyAccel, NoProbe, Probe, RayCounts};
 use crate::image::Picture;
 use crate::scene::Scene;
 use context::Context;
@@ -123,12 +123,12 @@ pub struct Rendered {
 
 /// Renders on all threads of the current rayon pool.
 pub fn render(job: &Job, progress: &dyn Progress) -> Rendered {
-    dispatch::<NoProbe>(job, progress).0
+    render_with::<NoProbe>(job, progress).0
 }
 
 /// Renders and counts; slower, same pixels.
 pub fn render_counted(job: &Job, progress: &dyn Progress) -> Rendered {
-    let (mut rendered, counts) = dispatch::<RayCounts>(job, progress);
+    let (mut rendered, counts) = render_with::<RayCounts>(job, progress);
     for c in counts {
         rendered.counts.primary += c.primary;
         rendered.counts.shadow += c.shadow;
@@ -138,18 +138,9 @@ pub fn render_counted(job: &Job, progress: &dyn Progress) -> Rendered {
     rendered
 }
 
-/// The only place here that knows which structure was asked for.
-fn dispatch<P: Probe>(job: &Job, progress: &dyn Progress) -> (Rendered, Vec<ByClass<P>>) {
-    match job.accel {
-        AnyAccel::None(accel) => render_with(job, accel, progress),
-        AnyAccel::GridOctree(accel) => render_with(job, accel, progress),
-        AnyAccel::Wide(accel) => render_with(job, accel, progress),
-    }
-}
-
-fn render_with<A: Accel, P: Probe>(job: &Job, accel: &A, progress: &dyn Progress) -> (Rendered, Vec<ByClass<P>>) {
+fn render_with<P: Probe>(job: &Job, progress: &dyn Progress) -> (Rendered, Vec<ByClass<P>>) {
     let settings = job.settings;
     let context = Context::new(job.scene, job.world, job.textures, settings.depth, settings.cutoff);
-    let (picture, counts, complete) = tile::render_tiles(&context, accel, job.view, settings, progress);
+    let (picture, counts, complete) = tile::render_tiles(&context, job.accel, job.view, settings, progress);
     (Rendered { picture, counts: ClassCounts::default(), depth: context.depth, complete }, counts)
 }

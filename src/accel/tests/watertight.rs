@@ -81,3 +81,18 @@ fn no_ray_through_a_corner_or_edge_of_a_lattice_escapes() {
     rays.retain(|r| r.dir != Vec3::ZERO);
     assert_nothing_escapes(&shapes, &rays);
 }
+
+#[test]
+fn only_the_test_that_is_not_watertight_loses_rays_at_corners() {
+    let shapes = star(100, 50);
+    let rays = aimed(&shapes, 10_000);
+    let missed = |test| {
+        let accel = AnyAccel::build(AccelKind::DEFAULT, &shapes, &GridParams::DEFAULT).tested_by(test);
+        let mut hits = vec![Hit::MISS; rays.len()];
+        accel.closest(&rays, &mut hits, &mut accel.scratch(), &mut NoProbe);
+        hits.iter().filter(|h| !h.is_some()).count()
+    };
+    let missed = IntersectorKind::ALL.map(missed);
+    assert_eq!(missed[..3], [0, 0, 0], "exact, watertight, watertight-double");
+    assert!(missed[3] > 10 && missed[4] > 10, "{missed:?}: the comparison would show nothing");
+}

@@ -7,8 +7,8 @@
 //! constrains nothing on its axis, and with coordinates beyond [`BOX_COORDINATES`] every prim is tested.
 
 use super::node::{Child, Node, Tree};
-use crate::accel::Probe;
 use crate::accel::query::{Goal, Query};
+use crate::accel::{Intersector, Probe};
 use crate::math::Vec3;
 use crate::math::bounds::{BOX_COORDINATES, BOX_MARGIN, SLAB_F32};
 use crate::math::simd::{Kernel, LANES, Simd};
@@ -26,7 +26,7 @@ struct Entry {
 pub struct Stack(Vec<Entry>);
 
 /// One query under way.
-pub(super) struct Walk<'w, 'q, G, P> {
+pub(super) struct Walk<'w, 'q, G: Goal, P> {
     pub tree: &'w Tree,
     pub query: &'w mut Query<'q, G>,
     pub stack: &'w mut Stack,
@@ -75,8 +75,13 @@ impl<G: Goal, P: Probe> Kernel for Walk<'_, '_, G, P> {
                     probe.step();
                     probe.cell(false);
                     let block = &tree.blocks[block as usize];
-                    let verdicts = lanes.verdicts(s, &block.corners);
-                    if query.test_block(&block.prims, count, verdicts, probe) {
+                    let answered = if G::Test::EXACT {
+                        let verdicts = lanes.verdicts(s, &block.corners);
+                        query.test_block(&block.prims, count, verdicts, probe)
+                    } else {
+                        block.prims[..count as usize].iter().any(|&prim| query.test(prim, probe))
+                    };
+                    if answered {
                         return;
                     }
                     limit = widened(query.reach());

@@ -1,0 +1,187 @@
+//! Which ray/triangle test decides: the exact one, or one of those it is compared with.
+//!
+//! Only the exact test gives the same hits with every structure; the others are there so that their speed and error can
+//! be measured on a user's own mesh.
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::math::moller_trumbore;
+use crate::math::shear::RaySpace;
+use crate::math::triangle::{self, Triangle};
+use crate::math::watertight::{Shear, edges, edges_checked};
+
+/// A ray/triangle test.
+pub trait Intersector: Copy + Send + Sync {
+    /// Whether its verdicts and distances are those of exact arithmetic, so that a filter may decide for it.
+    const EXACT: bool = false;
+
+    /// What the tests of one ray share.
+    type Prepared: Copy + fmt::Debug;
+
+    /// Prepares a ray.
+    fn prepare(ray: &RaySpace) -> Self::Prepared;
+
+    /// The distance at which the line through the ray meets the triangle, if it does.
+    fn distance(prepared: &Self::Prepared, ray: &RaySpace, triangle: &Triangle) -> Option<f32>;
+}
+
+/// Exact verdicts, distances rounded once.
+#[derive(Clone, Copy, Debug)]
+pub struct Exact;
+
+impl Intersector for Exact {
+    const EXACT: bool = true;
+    type Prepared = ();
+
+    #[inline]
+    fn prepare(_: &RaySpace) {}
+
+    #[inline]
+    fn distance((): &(), ray: &RaySpace, triangle: &Triangle) -> Option<f32> {
+        triangle::intersect(ray, triangle)
+    }
+}
+
+/// Woop, Benthin and Wald's test in `f32`.
+#[derive(Clone, Copy, Debug)]
+pub struct Watertight;
+
+impl Intersector for Watertight {
+    type Prepared = Shear<f32>;
+
+    #[inline]
+    fn prepare(ray: &RaySpace) -> Shear<f32> {
+        Shear::new(ray)
+    }
+
+    #[inline]
+    fn distance(shear: &Shear<f32>, ray: &RaySpace, triangle: &Triangle) -> Option<f32> {
+        shear.intersect(ray, triangle, edges_checked)
+    }
+}
+
+/// Woop, Benthin and Wald's test in `f64`.
+#[derive(Clone, Copy, Debug)]
+pub struct WatertightDouble;
+
+impl Intersector for WatertightDouble {
+    type Prepared = Shear<f64>;
+
+    #[inline]
+    fn prepare(ray: &RaySpace) -> Shear<f64> {
+        Shear::new(ray)
+    }
+
+    #[inline]
+    fn distance(shear: &Shear<f64>, ray: &RaySpace, triangle: &Triangle) -> Option<f32> {
+        shear.intersect(ray, triangle, edges).map(narrow)
+    }
+}
+
+/// Möller and Trumbore's test in `f32`.
+#[derive(Clone, Copy, Debug)]
+pub struct MollerTrumbore;
+
+impl Intersector for MollerTrumbore {
+    type Prepared = ();
+
+    #[inline]
+    fn prepare(_: &RaySpace) {}
+
+    #[inline]
+    fn distance((): &(), ray: &RaySpace, triangle: &Triangle) -> Option<f32> {
+        moller_trumbore::single(ray.origin, ray.dir, *triangle).map(|(t, ..)| t)
+    }
+}
+
+/// Möller and Trumbore's test in `f64`.
+#[derive(Clone, Copy, Debug)]
+pub struct MollerTrumboreDouble;
+
+impl Intersector for MollerTrumboreDouble {
+    type Prepared = ();
+
+    #[inline]
+    fn prepare(_: &RaySpace) {}
+
+    #[inline]
+    fn distance((): &(), ray: &RaySpace, triangle: &Triangle) -> Option<f32> {
+        moller_trumbore::double(ray.origin, ray.dir, triangle).map(|(t, ..)| narrow(t))
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what this does")]
+fn narrow(t: f64) -> f32 {
+    t as f32
+}
+
+/// The choice of an [`Intersector`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum IntersectorKind {
+    /// [`Exact`].
+    #[default]
+    Exact,
+    /// [`Watertight`].
+    Watertight,
+    /// [`WatertightDouble`].
+    WatertightDouble,
+    /// [`MollerTrumbore`].
+    MollerTrumbore,
+    /// [`MollerTrumboreDouble`].
+    MollerTrumboreDouble,
+}
+
+impl IntersectorKind {
+    /// Every kind, in the order of the help text.
+    pub const ALL: [Self; 5] =
+        [Self::Exact, Self::Watertight, Self::WatertightDouble, Self::MollerTrumbore, Self::MollerTrumboreDouble];
+
+    /// As typed and printed.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Exact => "exact",
+            Self::Watertight => "watertight",
+            Self::WatertightDouble => "watertight-double",
+            Self::MollerTrumbore => "moller-trumbore",
+            Self::MollerTrumboreDouble => "moller-trumbore-double",
+        }
+    }
+}
+
+impl fmt::Display for IntersectorKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A name that no intersector has.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "no intersector is named {0:?}; there are: exact, watertight, watertight-double, moller-trumbore, \
+     moller-trumbore-double"
+)]
+pub struct UnknownIntersector(String);
+
+impl FromStr for IntersectorKind {
+    type Err = UnknownIntersector;
+
+    fn from_str(name: &str) -> Result<Self, UnknownIntersector> {
+        Self::ALL.into_iter().find(|k| k.name() == name).ok_or_else(|| UnknownIntersector(name.into()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_is_found_by_its_name() {
+        for kind in IntersectorKind::ALL {
+            assert_eq!(kind.name().parse(), Ok(kind));
+        }
+        let error = "woop".parse::<IntersectorKind>().map_err(|e| e.to_string());
+        let names = IntersectorKind::ALL.map(IntersectorKind::name).join(", ");
+        assert_eq!(error, Err(format!("no intersector is named \"woop\"; there are: {names}")));
+    }
+}
