@@ -43,14 +43,6 @@ struct Shape<'a> {
     bounded: bool,
 }
 
-/// What a buffer view is used for.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Usage {
-    /// Attributes; the accessor that was first.
-    Vertices(u64),
-    Indices,
-}
-
 /// Maps of one material that are laid out by the same texture coordinates.
 struct Layout<'a> {
     /// `TEXCOORD_1`.
@@ -61,7 +53,8 @@ struct Layout<'a> {
 struct Check<'a> {
     root: &'a Value,
     quantized: bool,
-    views: HashMap<usize, Usage>,
+    /// The attribute that came first in each buffer view.
+    views: HashMap<usize, u64>,
     /// What the maps of each material need, as far as somebody asked.
     maps: HashMap<usize, Vec<Layout<'a>>>,
     report: &'a mut Report,
@@ -174,15 +167,10 @@ impl<'a> Check<'a> {
         if view.get("target").and_then(whole) == Some(34963) {
             self.report.add(Code::BufferViewTargetOverride, place, "vertices in a view of indices");
         }
-        match self.views.insert(index, Usage::Vertices(shape.index)) {
-            Some(Usage::Indices) => {
-                self.report.add(Code::BufferViewTargetOverride, place, "its view holds indices as well");
-            }
-            Some(Usage::Vertices(other)) if other != shape.index && stride.is_none() => {
-                let text = "several attributes share a view without a stride";
-                self.report.add(Code::MeshPrimitiveAccessorWithoutByteStride, place, text);
-            }
-            _ => {}
+        let first = *self.views.entry(index).or_insert(shape.index);
+        if first != shape.index && stride.is_none() {
+            let text = "several attributes share a view without a stride";
+            self.report.add(Code::MeshPrimitiveAccessorWithoutByteStride, place, text);
         }
     }
 
@@ -194,7 +182,7 @@ impl<'a> Check<'a> {
             let text = format!("indices cannot be {} of {}", shape.kind, component_name(shape.component));
             self.report.add(Code::MeshPrimitiveIndicesAccessorInvalidFormat, &place, text);
         }
-        if let Some((index, view)) = shape.view {
+        if let Some((_, view)) = shape.view {
             if view.get("byteStride").is_some() {
                 self.report.add(
                     Code::MeshPrimitiveIndicesAccessorWithByteStride,
@@ -202,8 +190,7 @@ impl<'a> Check<'a> {
                     "a stride on a view of indices",
                 );
             }
-            let other = matches!(self.views.insert(index, Usage::Indices), Some(Usage::Vertices(_)));
-            if other || view.get("target").and_then(whole) == Some(34962) {
+            if view.get("target").and_then(whole) == Some(34962) {
                 self.report.add(Code::BufferViewTargetOverride, &place, "indices in a view of vertices");
             }
         }

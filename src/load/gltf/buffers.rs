@@ -133,6 +133,11 @@ impl<'a> Find<'a, '_> {
     }
 
     fn data(&mut self, uri: &str, place: &str) -> Slot<'a> {
+        let kind = media_type(uri);
+        if !["", "application/octet-stream", "application/gltf-buffer"].contains(&kind) {
+            let text = format!("a data URI of type '{}' where bytes should be", shorten(kind));
+            self.report.add(Code::BufferDataUriMimeTypeInvalid, place, text);
+        }
         // Decoded, it is no longer than written.
         if let Err(over) = self.budget.take(uri.len() as u64, 1) {
             return self.too_large(place, over);

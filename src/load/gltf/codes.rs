@@ -37,6 +37,9 @@ macro_rules! codes {
         #[expect(missing_docs, reason = "each is explained by its row in the table")]
         pub enum Code { $($code),* }
 
+        #[cfg(test)]
+        const NAMES_OF_CODES: &[&str] = &[$(stringify!($code)),*];
+
         /// Every row, in the order of [`Code`].
         pub const TABLE: &[Row] = &[$(Row { khronos: $khronos, verdict: Verdict::$verdict, why: $why }),*];
     };
@@ -51,7 +54,7 @@ codes! {
     GlbUnexpectedEndOfHeader "GLB_UNEXPECTED_END_OF_HEADER" Refuse "the file was cut off";
     GlbUnexpectedEndOfChunkHeader "GLB_UNEXPECTED_END_OF_CHUNK_HEADER" Refuse "the file was cut off";
     GlbUnexpectedEndOfChunkData "GLB_UNEXPECTED_END_OF_CHUNK_DATA" Refuse "the file was cut off";
-    GlbChunkTooBig "GLB_CHUNK_TOO_BIG" Refuse "the file was cut off";
+    GlbChunkTooBig "GLB_CHUNK_TOO_BIG" Refuse "where the chunk ends is unknown";
     GlbChunkLengthUnaligned "GLB_CHUNK_LENGTH_UNALIGNED" Warn "the chunk can be read as it is";
     GlbEmptyChunk "GLB_EMPTY_CHUNK" Warn "an empty chunk holds nothing to miss";
     GlbEmptyBinChunk "GLB_EMPTY_BIN_CHUNK" Accept "an empty chunk holds nothing to miss";
@@ -270,6 +273,48 @@ mod tests {
             assert!(TABLE[..i].iter().all(|other| other.khronos != row.khronos), "{} twice", row.khronos);
         }
         assert_eq!(Code::UnresolvedReference.name(), "gltf-unresolved-reference");
+    }
+
+    #[test]
+    fn what_is_refused_or_warned_about_is_looked_for() {
+        /// Found by parts that have names of their own for it, or as a case of another code.
+        const ELSEWHERE: &[(Code, &str)] = &[
+            (Code::GlbInvalidMagic, "`detect` says what the file is instead"),
+            (Code::IoError, "file-missing, file-unreadable and others, from `paths`"),
+            (Code::NonRelativeUri, "uri-scheme, from `paths`"),
+            (Code::ImageUnexpectedEos, "image-unusable, from `texture`"),
+            (Code::ArrayTypeMismatch, "a type mismatch of an element"),
+        ];
+        let sources = [
+            include_str!("attributes.rs"),
+            include_str!("bounds.rs"),
+            include_str!("buffers.rs"),
+            include_str!("container.rs"),
+            include_str!("document.rs"),
+            include_str!("extensions.rs"),
+            include_str!("graph.rs"),
+            include_str!("images.rs"),
+            include_str!("links.rs"),
+            include_str!("mesh.rs"),
+            include_str!("mod.rs"),
+            include_str!("placed.rs"),
+            include_str!("schema.rs"),
+            include_str!("skin.rs"),
+            include_str!("sparse.rs"),
+            include_str!("usage.rs"),
+            include_str!("version.rs"),
+        ];
+        let text: String =
+            sources.iter().map(|source| source.split("#[cfg(test)]\nmod tests {").next().unwrap()).collect();
+        let told: Vec<&str> = text.split("Code::").skip(1).collect();
+        let rows = NAMES_OF_CODES.iter().zip(TABLE).filter(|(_, row)| row.verdict != Verdict::Accept);
+        let wrong = rows.filter(|(name, row)| {
+            let ends = |rest: &str| !rest.starts_with(|c: char| c.is_alphanumeric());
+            let used = told.iter().any(|rest| rest.strip_prefix(**name).is_some_and(ends));
+            used == ELSEWHERE.iter().any(|(code, _why)| code.row().khronos == row.khronos)
+        });
+        let wrong: Vec<&str> = wrong.map(|(name, _)| *name).collect();
+        assert!(wrong.is_empty(), "rules in name only, or told after all: {wrong:?}");
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use super::codes::Code;
 use super::report::Report;
+use std::cmp::Ordering;
 
 const JSON: u32 = u32::from_le_bytes(*b"JSON");
 const BIN: u32 = u32::from_le_bytes(*b"BIN\0");
@@ -61,15 +62,18 @@ fn split_glb<'a>(bytes: &'a [u8], report: &mut Report) -> Option<(&'a [u8], Opti
         report.add(Code::GlbLengthTooSmall, "", format!("a declared length of {length} bytes holds no chunk"));
         return None;
     }
-    if length != bytes.len() {
-        let text = format!("the header declares {length} bytes, the file has {}", bytes.len());
-        report.add(Code::GlbLengthMismatch, "", text);
+    let text = format!("the header declares {length} bytes, the file has {}", bytes.len());
+    match length.cmp(&bytes.len()) {
+        Ordering::Greater => report.add(Code::GlbLengthMismatch, "", text),
+        Ordering::Less => report.add(Code::GlbExtraData, "", text),
+        Ordering::Equal => {}
     }
-    chunks(bytes.get(HEADER..length.min(bytes.len())).unwrap_or_default(), report)
+    let missing = length.saturating_sub(bytes.len());
+    chunks(bytes.get(HEADER..length.min(bytes.len())).unwrap_or_default(), missing, report)
 }
 
-/// Walks the chunks behind the header.
-fn chunks<'a>(mut rest: &'a [u8], report: &mut Report) -> Option<(&'a [u8], Option<&'a [u8]>)> {
+/// Walks the chunks behind the header; `missing` bytes are declared after the end of the file.
+fn chunks<'a>(mut rest: &'a [u8], missing: usize, report: &mut Report) -> Option<(&'a [u8], Option<&'a [u8]>)> {
     let (mut json, mut bin) = (None, None);
     for number in 0.. {
         if rest.is_empty() {
@@ -94,9 +98,14 @@ fn chunks<'a>(mut rest: &'a [u8], report: &mut Report) -> Option<(&'a [u8], Opti
             return None;
         }
         let Some(data) = rest.get(8..length.saturating_add(8)) else {
-            let text =
-                format!("it should have {length} bytes, only {} are there; the file was cut off", rest.len() - 8);
-            report.add(Code::GlbChunkTooBig, place, text);
+            let there = rest.len() - 8;
+            if length <= there.saturating_add(missing) {
+                let text = format!("it should have {length} bytes, only {there} are there; the file was cut off");
+                report.add(Code::GlbUnexpectedEndOfChunkData, place, text);
+            } else {
+                let text = format!("it should have {length} bytes, the header leaves room for {}", there + missing);
+                report.add(Code::GlbChunkTooBig, place, text);
+            }
             return None;
         };
         rest = rest.get(8 + length..).unwrap_or_default();
@@ -180,12 +189,25 @@ mod tests {
     }
 
     #[test]
+    fn a_chunk_that_is_cut_off_is_told_from_one_that_its_header_has_no_room_for() {
+        let whole = glb(&[(b"JSON", b"{}  "), (b"BIN\0", b"1234")]);
+        let cut = ["gltf-glb-length-mismatch", "gltf-glb-unexpected-end-of-chunk-data"];
+        assert_eq!(split_all(&whole[..whole.len() - 1]).1, cut);
+        let mut large = whole;
+        large[24] += 4;
+        assert_eq!(split_all(&large).1, ["gltf-glb-chunk-too-big"]);
+    }
+
+    #[test]
     fn a_byte_order_mark_and_odd_lengths_are_warned_about() {
         assert_eq!(split_all(b"\xef\xbb\xbf{}").0, Some(("{}".into(), None)));
         let mut odd = glb(&[(b"JSON", b"{} ")]);
         assert_eq!(split_all(&odd).1, ["gltf-glb-chunk-length-unaligned"]);
         odd[8] += 1;
         assert!(split_all(&odd).1.contains(&"gltf-glb-length-mismatch"));
+        odd[8] -= 2;
+        assert!(split_all(&odd).1.contains(&"gltf-glb-extra-data"));
+        odd[8] += 1;
         odd[4] = 1;
         assert_eq!(split_all(&odd), (None, vec!["gltf-glb-invalid-version"]));
     }

@@ -56,8 +56,16 @@ impl Graph {
 
     /// Whether everything in a span hangs on one node.
     pub(super) fn is_one_tree(&self, span: &Range<usize>) -> bool {
-        let tree = self.tree_ends.partition_point(|&end| end <= span.start);
-        self.tree_ends.get(tree).is_some_and(|&end| span.end <= end)
+        self.tree_ends.get(self.tree_at(span.start)).is_some_and(|&end| span.end <= end)
+    }
+
+    /// A number for the tree that a node is in.
+    pub(super) fn tree(&self, node: usize) -> usize {
+        self.family.get(node).map_or(usize::MAX, |family| self.tree_at(family.start))
+    }
+
+    fn tree_at(&self, number: usize) -> usize {
+        self.tree_ends.partition_point(|&end| end <= number)
     }
 }
 

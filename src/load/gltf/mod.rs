@@ -2,7 +2,7 @@
 //!
 //! A file goes through four gates. `container` finds the JSON and the binary chunk; `version` and `extensions`
 //! say early what cannot be drawn at all; `schema` checks every value and index, so that the typed document of the
-//! `gltf` crate can be built; `attributes`, `graph` and `links` check what parts mean together. Only then is data
+//! `gltf` crate can be built; `attributes`, `usage`, `graph` and `links` check what parts mean together. Only then is data
 //! read (`accessor`, `mesh`, `images`), each piece with its own bounds. What becomes of a fault is a table
 //! ([`codes`]).
 //!
@@ -32,6 +32,7 @@ mod sparse;
 #[cfg(test)]
 mod tests;
 mod textures;
+mod usage;
 mod version;
 mod weight;
 
@@ -103,6 +104,7 @@ impl Loading<'_> {
         self.report.check()?;
         self.take(&mut budget, weight::typed(&value), "the document")?;
         attributes::check(&value, self.report);
+        usage::check(&value, self.report);
         let graph = Graph::new(&value, self.report);
         let document = document::typed(value, self.report);
         let document = self.passed(document)?;
@@ -145,6 +147,7 @@ impl Loading<'_> {
         let placed = scene::walk(reader, graph, facts.scene_index, budget, self.report);
         let placed = placed.map_err(|over| self.too_large("what the nodes show", over))?;
         let skins = skin::joint_matrices(reader, graph, self.report);
+        skin::check_scene(root, graph, facts.scene_index, &placed.draws, self.report);
         let palette = self.palette(document, &placed);
 
         let drawn_images = palette.textures.images.clone();

@@ -8,10 +8,12 @@ use super::codes::Code;
 use super::graph::Graph;
 use super::links::is_bind_matrix;
 use super::report::Report;
+use super::scene::Draw;
 use crate::math::frame::snapped_center;
 use crate::math::{DMat3, DMat4, DVec3, Vec3, Vec4};
 use crate::scene::Mesh;
-use gltf::json::Root;
+use gltf::json::{Root, Skin};
+use std::collections::HashSet;
 
 /// For each skin, the matrices from mesh space to world space of its joints; `None`: the skin cannot be used.
 pub(super) fn joint_matrices(reader: Reader, graph: &Graph, report: &mut Report) -> Vec<Option<Vec<DMat4>>> {
@@ -64,6 +66,22 @@ fn matrices_of(reader: Reader, graph: &Graph, i: usize, report: &mut Report) -> 
         m
     };
     Some(joints.iter().zip(&inverse).map(|(joint, m)| *joint * bind(m)).collect())
+}
+
+/// The joints of what a scene shows should stand in that scene.
+pub(super) fn check_scene(root: &Root, graph: &Graph, scene: usize, draws: &[Draw], report: &mut Report) {
+    let Some(scene) = root.scenes.get(scene) else { return };
+    let trees: HashSet<usize> = scene.nodes.iter().map(|node| graph.tree(node.value())).collect();
+    let elsewhere = |skin: &Skin| skin.joints.iter().any(|joint| !trees.contains(&graph.tree(joint.value())));
+    let elsewhere: Vec<bool> = root.skins.iter().map(elsewhere).collect();
+    let mut nodes: Vec<usize> = draws.iter().map(|draw| draw.node).collect();
+    nodes.dedup();
+    for i in nodes {
+        let skin = root.nodes.get(i).and_then(|node| node.skin);
+        if skin.is_some_and(|skin| elsewhere.get(skin.value()) == Some(&true)) {
+            report.add(Code::NodeSkinNoScene, format!("nodes[{i}].skin"), "its joints are not in the scene");
+        }
+    }
 }
 
 /// The joints of a skin should hang on one node, and `skeleton` should be such a node.

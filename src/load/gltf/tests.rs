@@ -628,6 +628,65 @@ fn a_skinned_mesh_stands_where_its_joints_put_it() {
 }
 
 #[test]
+fn a_mirrored_node_leaves_its_mesh_alone_and_mirroring_joints_turn_theirs() {
+    let mut file = Builder::new();
+    let positions = file.triangle();
+    let joints = file.accessor(&[0; 12], 5121, "VEC4", 3, false);
+    let weights = file.floats("VEC4", &[1., 0., 0., 0.].repeat(3));
+    file.primitive(json!({"attributes": {"POSITION": positions, "JOINTS_0": joints, "WEIGHTS_0": weights}}));
+    file.set("nodes", json!([{"mesh": 0, "scale": [-1, 1, 1]}, {"mesh": 0, "skin": 0}, {"scale": [-1, 1, 1]}]));
+    file.set("skins", json!([{"joints": [2]}]));
+    file.set("scenes", json!([{"nodes": [0, 1, 2]}]));
+    let scene = file.load().scene;
+    let determinant = |i: usize| scene.instances[i].world_from_object.matrix3.determinant();
+    assert_eq!((determinant(0), determinant(1)), (-1.0, 1.0));
+    assert_eq!((&scene.meshes[0].triangles[..], &scene.meshes[1].triangles[..]), (&[[0, 1, 2]][..], &[[0, 2, 1]][..]));
+}
+
+#[test]
+fn a_skin_whose_joints_are_not_in_the_scene_is_drawn_with_a_warning() {
+    let mut file = Builder::new();
+    let positions = file.triangle();
+    let joints = file.accessor(&[0; 12], 5121, "VEC4", 3, false);
+    let weights = file.floats("VEC4", &[1., 0., 0., 0.].repeat(3));
+    file.primitive(json!({"attributes": {"POSITION": positions, "JOINTS_0": joints, "WEIGHTS_0": weights}}));
+    file.set("nodes", json!([{"mesh": 0, "skin": 0}, {"children": [2]}, {"translation": [1, 0, 5]}]));
+    file.set("skins", json!([{"joints": [2]}]));
+    file.set("scenes", json!([{"nodes": [0, 1]}]));
+    assert!(codes(&file.load()).is_empty());
+    file.set("scenes", json!([{"nodes": [0]}, {"nodes": [0, 1]}]));
+    let loaded = file.load();
+    assert_eq!(codes(&loaded), ["gltf-node-skin-no-scene"]);
+    assert_eq!(loaded.scene.instances[0].world_from_object.translation.z, 5.0);
+}
+
+#[test]
+fn data_that_is_used_for_two_things_is_read_twice_with_a_warning() {
+    let mut file = Builder::new();
+    let positions = file.triangle();
+    let indices = file.shorts(&[0, 1, 2]);
+    file.root["accessors"][indices]["bufferView"] = json!(0);
+    // The first three shorts of the positions are zeros and stand for one corner.
+    file.root["accessors"][indices]["count"] = json!(2);
+    file.primitive(json!({"attributes": {"POSITION": positions}, "indices": indices, "mode": 3}));
+    assert_eq!(codes(&file.load()), ["gltf-buffer-view-target-override", "points-and-lines"]);
+    file.primitive(json!({"attributes": {"POSITION": positions, "_CUSTOM": indices}, "indices": indices}));
+    assert!(file.fault().contains("2 elements where other attributes have 3"));
+}
+
+#[test]
+fn a_buffer_of_another_media_type_is_read_with_a_warning() {
+    let mut file = Builder::new();
+    let positions = file.triangle();
+    file.primitive(json!({"attributes": {"POSITION": positions}}));
+    let text = String::from_utf8(file.gltf()).unwrap();
+    let loaded = load(text.replace("data:application/octet-stream", "data:text/plain").as_bytes());
+    assert_eq!(codes(&loaded), ["gltf-buffer-data-uri-mime-type-invalid"]);
+    assert_eq!(loaded.scene.meshes.len(), 1);
+    assert!(codes(&load(text.replace("data:application/octet-stream", "data:").as_bytes())).is_empty());
+}
+
+#[test]
 fn instances_of_the_gpu_and_hidden_nodes_are_understood() {
     let mut file = Builder::new();
     let positions = file.triangle();

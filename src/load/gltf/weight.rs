@@ -12,10 +12,12 @@ pub(super) const DEEPEST: usize = 127;
 /// What a JSON text holds, counted without parsing it. Text that is no JSON gives some counts as well.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Weight {
-    /// Lists and objects.
-    containers: u64,
-    /// Values at most: what stands between commas, and what each container holds.
+    lists: u64,
+    objects: u64,
+    /// Values at most: what stands between commas, and what each list or object holds.
     values: u64,
+    /// Values with a name.
+    members: u64,
     /// Bytes in strings.
     text: u64,
     /// Containers within containers.
@@ -37,11 +39,12 @@ impl Weight {
             match byte {
                 b'"' => quoted = true,
                 b',' => weight.values += 1,
+                b':' => weight.members += 1,
                 b'{' | b'[' => {
                     depth += 1;
                     weight.depth = weight.depth.max(depth);
-                    weight.containers += 1;
                     weight.values += 1;
+                    *if byte == b'[' { &mut weight.lists } else { &mut weight.objects } += 1;
                 }
                 b'}' | b']' => depth = depth.saturating_sub(1),
                 _ => {}
@@ -55,9 +58,15 @@ impl Weight {
     /// Lists grow by doubling and start with four places; a member of an object has a name, a hash and a place in a
     /// table beside its value.
     pub(super) fn bytes(&self) -> u64 {
-        const PLACE: u64 = (size_of::<Value>() + size_of::<String>() + 4 * size_of::<usize>()) as u64;
-        let places = self.values.saturating_mul(2).saturating_add(self.containers.saturating_mul(4));
-        places.saturating_mul(PLACE).saturating_add(self.text)
+        const VALUE: u64 = size_of::<Value>() as u64;
+        const NAME: u64 = (size_of::<String>() + 4 * size_of::<usize>()) as u64;
+        let parts = [
+            (2 * self.values + 4 * self.lists, VALUE),
+            (2 * self.members, NAME),
+            (4 * self.objects, VALUE + NAME),
+            (self.text, 1),
+        ];
+        parts.into_iter().map(|(count, size)| count.saturating_mul(size)).fold(0, u64::saturating_add)
     }
 }
 
@@ -124,7 +133,7 @@ mod tests {
     #[test]
     fn brackets_and_commas_in_strings_do_not_count() {
         let weight = Weight::of(br#"{"a[[[,,": "]\"[,\\", "b": [1, [2]]}"#);
-        assert_eq!(weight, Weight { containers: 3, values: 6, text: 17, depth: 3 });
+        assert_eq!(weight, Weight { lists: 2, objects: 1, values: 6, members: 2, text: 17, depth: 3 });
         assert_eq!(Weight::of(b"]]]}}[").depth, 1);
         assert_eq!(Weight::of(b"\"[[[").depth, 0);
     }
