@@ -44,10 +44,12 @@ pub struct Polygon {
 
 /// A mesh placed in the world.
 ///
-/// A mirrored instance (negative determinant) shows the same front faces as an unmirrored one, as glTF demands: whoever
-/// puts its triangles into world space exchanges their second and third corner. Normals go by the inverse transpose of
-/// the matrix, tangents by the matrix itself, and the sign of a tangent's `w` turns over with the mirror. A loader
-/// hands over meshes untouched by this.
+/// A mirrored instance (negative determinant) shows the same front faces as an unmirrored one, as glTF demands. Its
+/// triangles keep the corner order of the mesh in world space as well, so that their winding is turned round there:
+/// whoever asks which side is the front has to turn the answer round for a mirrored instance, as the renderer does.
+/// Normals go by the inverse transpose of the matrix, tangents by the matrix itself, and the sign of a tangent's `w`
+/// turns over with the mirror. Loaders hand over meshes untouched by this; only where the joints of a skin mirror, which
+/// no instance can say, the posed mesh comes with its corners exchanged already.
 #[derive(Clone, Debug)]
 pub struct Instance {
     /// Name of the node or object.
