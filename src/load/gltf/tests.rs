@@ -2,6 +2,7 @@
 
 mod large;
 mod memory;
+mod mutated;
 
 use crate::load::{Limits, LoadError, LoadOptions, Loaded, load_bytes};
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
