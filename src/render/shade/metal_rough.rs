@@ -3,9 +3,11 @@
 //! Lights are seen through the microfacet model: GGX distribution, height-correlated Smith masking, Schlick's Fresnel.
 //! The surroundings are seen by one mirror ray where the surface is smooth, and by a lookup of the environment, as wide
 //! as the roughness makes it, where it is rough; in between the two are mixed, so that no edge shows. A lookup sends no
-//! ray: what stands in its way is known from the occlusion map only. Light passes rough glass unscattered apart from a
-//! part that is looked up; lights themselves are not seen through rough glass.
+//! ray: what stands in its way is known from the occlusion map only. Metals give all of it back, after several bounces
+//! between their facets if need be; of lights they show the first bounce, as the model says. Light passes rough glass
+//! unscattered apart from a part that is looked up; lights themselves are not seen through rough glass.
 
+use super::facets::{albedo, rebound};
 use super::{Balance, Reader, Sky};
 use crate::math::Vec3;
 use crate::render::optics::{fresnel_dielectric, fresnel_schlick, reflect};
@@ -106,6 +108,11 @@ impl MetalRoughMatter {
             let mirrored = above(reflect(-surface.view, surface.normal), surface.geometric);
             let light = sky.blurred(mirrored, self.roughness) + ambient;
             sum += dielectric.lerp(metal, self.metallic) * light * (looked_up * self.open(n_v));
+            if self.metallic > 0.0 {
+                let light = sky.diffuse(surface.normal) + ambient;
+                let rebound = rebound(self.roughness, self.base, n_v);
+                sum += rebound * light * (self.metallic * looked_up * self.occlusion);
+            }
         }
         let frosted = self.frosted(surface.front);
         if frosted > 0.0 {
@@ -186,121 +193,6 @@ fn visibility(n_l: f32, n_v: f32, alpha: f32) -> f32 {
     0.5 / (view + light)
 }
 
-/// Directional albedo of the microfacet lobe as (scale of f0, scale of f90), the split sum of B. Karis, "Real Shading in
-/// Unreal Engine 4" (2013): rows by roughness 0 … 1, columns by the square root of N·V.
-const ALBEDO: [[(f32, f32); 9]; 9] = [
-    [
-        (0.000, 1.000),
-        (0.076, 0.924),
-        (0.276, 0.724),
-        (0.531, 0.469),
-        (0.763, 0.237),
-        (0.916, 0.084),
-        (0.984, 0.016),
-        (0.999, 0.001),
-        (1.000, 0.000),
-    ],
-    [
-        (0.197, 0.774),
-        (0.166, 0.716),
-        (0.298, 0.664),
-        (0.536, 0.455),
-        (0.762, 0.235),
-        (0.915, 0.084),
-        (0.983, 0.016),
-        (0.999, 0.001),
-        (1.000, 0.000),
-    ],
-    [
-        (0.472, 0.508),
-        (0.446, 0.487),
-        (0.450, 0.432),
-        (0.574, 0.342),
-        (0.757, 0.204),
-        (0.901, 0.081),
-        (0.973, 0.018),
-        (0.993, 0.001),
-        (0.996, 0.000),
-    ],
-    [
-        (0.669, 0.313),
-        (0.654, 0.301),
-        (0.642, 0.264),
-        (0.667, 0.208),
-        (0.753, 0.137),
-        (0.859, 0.065),
-        (0.930, 0.018),
-        (0.965, 0.002),
-        (0.976, 0.000),
-    ],
-    [
-        (0.790, 0.192),
-        (0.777, 0.183),
-        (0.762, 0.158),
-        (0.751, 0.122),
-        (0.761, 0.081),
-        (0.801, 0.042),
-        (0.852, 0.015),
-        (0.891, 0.002),
-        (0.916, 0.000),
-    ],
-    [
-        (0.860, 0.122),
-        (0.844, 0.115),
-        (0.818, 0.096),
-        (0.780, 0.072),
-        (0.752, 0.047),
-        (0.744, 0.025),
-        (0.753, 0.010),
-        (0.772, 0.002),
-        (0.796, 0.000),
-    ],
-    [
-        (0.899, 0.082),
-        (0.878, 0.076),
-        (0.832, 0.062),
-        (0.768, 0.044),
-        (0.716, 0.028),
-        (0.675, 0.015),
-        (0.646, 0.006),
-        (0.631, 0.001),
-        (0.627, 0.000),
-    ],
-    [
-        (0.921, 0.060),
-        (0.891, 0.054),
-        (0.821, 0.042),
-        (0.735, 0.028),
-        (0.658, 0.017),
-        (0.590, 0.009),
-        (0.534, 0.004),
-        (0.488, 0.001),
-        (0.452, 0.000),
-    ],
-    [
-        (0.933, 0.047),
-        (0.893, 0.041),
-        (0.795, 0.030),
-        (0.686, 0.019),
-        (0.587, 0.011),
-        (0.499, 0.005),
-        (0.423, 0.002),
-        (0.360, 0.001),
-        (0.307, 0.000),
-    ],
-];
-
-/// [`ALBEDO`] between its entries, off by at most 0.05.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "both coordinates lie in 0 … 8")]
-fn albedo(roughness: f32, n_v: f32) -> (f32, f32) {
-    let (y, x) = (roughness.clamp(0.0, 1.0) * 8.0, n_v.clamp(0.0, 1.0).sqrt() * 8.0);
-    let (row, column) = ((y as usize).min(7), (x as usize).min(7));
-    let (y, x) = (y - row as f32, x - column as f32);
-    let mix = |a: (f32, f32), b: (f32, f32), t: f32| (a.0 + (b.0 - a.0) * t, a.1 + (b.1 - a.1) * t);
-    let along = |row: &[(f32, f32); 9]| mix(row[column], row[column + 1], x);
-    mix(along(&ALBEDO[row]), along(&ALBEDO[row + 1]), y)
-}
-
 fn smoothstep(from: f32, to: f32, x: f32) -> f32 {
     let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
@@ -350,8 +242,8 @@ mod tests {
     #[test]
     fn the_tabulated_albedo_is_that_of_the_lobe() {
         for (roughness, degrees) in [(0.3, 0.0), (0.5, 45.0), (0.5, 80.0), (0.8, 60.0), (1.0, 20.0)] {
-            let white = MetalRoughMatter { base: Vec3::ONE, metallic: 1.0, roughness, ..matter() };
-            let black = MetalRoughMatter { base: Vec3::ZERO, ..white.clone() };
+            let white = MetalRoughMatter { f0: Vec3::ONE, base: Vec3::ZERO, roughness, ..matter() };
+            let black = MetalRoughMatter { f0: Vec3::ZERO, ..white.clone() };
             let (sum, bias) = (reflected_in_all(&white, at(degrees)).x, reflected_in_all(&black, at(degrees)).x);
             let known = albedo(roughness, at(degrees).z);
             assert!((known.0 - (sum - bias)).abs() < 0.05, "{roughness} at {degrees}: {}, {known:?}", sum - bias);

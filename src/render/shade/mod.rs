@@ -4,6 +4,7 @@
 //! and how much of what lies in the mirrored and refracted direction is seen ([`Matter::balance`]). Which rays are
 //! sent, and what they find, is the tracer's business.
 
+mod facets;
 mod light;
 mod metal_rough;
 mod phong;

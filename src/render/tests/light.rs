@@ -106,7 +106,9 @@ fn the_unseen_back_of_a_face_blocks_light() {
 
 #[test]
 fn white_in_a_furnace_is_as_bright_as_the_furnace() {
-    for (metallic, roughness) in [(0.0, 0.05), (0.0, 0.2), (0.0, 0.6), (0.0, 1.0), (1.0, 0.0)] {
+    for (metallic, roughness) in
+        [(0.0, 0.05), (0.0, 0.2), (0.0, 0.6), (0.0, 1.0), (1.0, 0.0), (1.0, 0.15), (1.0, 0.5), (1.0, 1.0)]
+    {
         let mut s = looking_down(5.0);
         let model = MetalRough { metallic, roughness, ..MetalRough::default() };
         let surface = Reflection::MetalRough(model);

@@ -1,0 +1,174 @@
+//! How much even light from all around the microfacets of a rough surface send back: directly ([`albedo`]), and after
+//! several bounces between them ([`rebound`]).
+
+use crate::math::Vec3;
+
+/// Directional albedo of the microfacet lobe as (scale of f0, scale of f90), the split sum of B. Karis, "Real Shading in
+/// Unreal Engine 4" (2013): rows by roughness 0 … 1, columns by the square root of N·V.
+const ALBEDO: [[(f32, f32); 9]; 9] = [
+    [
+        (0.000, 1.000),
+        (0.076, 0.924),
+        (0.276, 0.724),
+        (0.531, 0.469),
+        (0.763, 0.237),
+        (0.916, 0.084),
+        (0.984, 0.016),
+        (0.999, 0.001),
+        (1.000, 0.000),
+    ],
+    [
+        (0.197, 0.774),
+        (0.166, 0.716),
+        (0.298, 0.664),
+        (0.536, 0.455),
+        (0.762, 0.235),
+        (0.915, 0.084),
+        (0.983, 0.016),
+        (0.999, 0.001),
+        (1.000, 0.000),
+    ],
+    [
+        (0.472, 0.508),
+        (0.446, 0.487),
+        (0.450, 0.432),
+        (0.574, 0.342),
+        (0.757, 0.204),
+        (0.901, 0.081),
+        (0.973, 0.018),
+        (0.993, 0.001),
+        (0.996, 0.000),
+    ],
+    [
+        (0.669, 0.313),
+        (0.654, 0.301),
+        (0.642, 0.264),
+        (0.667, 0.208),
+        (0.753, 0.137),
+        (0.859, 0.065),
+        (0.930, 0.018),
+        (0.965, 0.002),
+        (0.976, 0.000),
+    ],
+    [
+        (0.790, 0.192),
+        (0.777, 0.183),
+        (0.762, 0.158),
+        (0.751, 0.122),
+        (0.761, 0.081),
+        (0.801, 0.042),
+        (0.852, 0.015),
+        (0.891, 0.002),
+        (0.916, 0.000),
+    ],
+    [
+        (0.860, 0.122),
+        (0.844, 0.115),
+        (0.818, 0.096),
+        (0.780, 0.072),
+        (0.752, 0.047),
+        (0.744, 0.025),
+        (0.753, 0.010),
+        (0.772, 0.002),
+        (0.796, 0.000),
+    ],
+    [
+        (0.899, 0.082),
+        (0.878, 0.076),
+        (0.832, 0.062),
+        (0.768, 0.044),
+        (0.716, 0.028),
+        (0.675, 0.015),
+        (0.646, 0.006),
+        (0.631, 0.001),
+        (0.627, 0.000),
+    ],
+    [
+        (0.921, 0.060),
+        (0.891, 0.054),
+        (0.821, 0.042),
+        (0.735, 0.028),
+        (0.658, 0.017),
+        (0.590, 0.009),
+        (0.534, 0.004),
+        (0.488, 0.001),
+        (0.452, 0.000),
+    ],
+    [
+        (0.933, 0.047),
+        (0.893, 0.041),
+        (0.795, 0.030),
+        (0.686, 0.019),
+        (0.587, 0.011),
+        (0.499, 0.005),
+        (0.423, 0.002),
+        (0.360, 0.001),
+        (0.307, 0.000),
+    ],
+];
+
+/// [`ALBEDO`] at any roughness and N·V between its entries, off by at most 0.05.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "both coordinates lie in 0 … 8")]
+pub(super) fn albedo(roughness: f32, n_v: f32) -> (f32, f32) {
+    let (y, x) = (roughness.clamp(0.0, 1.0) * 8.0, n_v.clamp(0.0, 1.0).sqrt() * 8.0);
+    let (row, column) = ((y as usize).min(7), (x as usize).min(7));
+    let (y, x) = (y - row as f32, x - column as f32);
+    let mix = |a: (f32, f32), b: (f32, f32), t: f32| (a.0 + (b.0 - a.0) * t, a.1 + (b.1 - a.1) * t);
+    let along = |row: &[(f32, f32); 9]| mix(row[column], row[column + 1], x);
+    mix(along(&ALBEDO[row]), along(&ALBEDO[row + 1]), y)
+}
+
+/// Mean of a white lobe's albedo over the hemisphere, weighted by the cosine, for roughness 0, 1/8, … 1: the integral
+/// of 2 E(μ) μ over [`ALBEDO`]'s rows.
+const MEAN_ALBEDO: [f32; 9] = [1.000, 0.999, 0.987, 0.951, 0.883, 0.781, 0.657, 0.529, 0.410];
+
+/// [`MEAN_ALBEDO`] at any roughness.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "lies in 0 … 8")]
+fn mean_albedo(roughness: f32) -> f32 {
+    let y = roughness.clamp(0.0, 1.0) * 8.0;
+    let row = (y as usize).min(7);
+    MEAN_ALBEDO[row] + (MEAN_ALBEDO[row + 1] - MEAN_ALBEDO[row]) * (y - row as f32)
+}
+
+/// Share of even light from all around that leaves a metal at N·V after more than one bounce between its facets.
+///
+/// The microfacet model follows light to one facet only and so loses what meets a second: two thirds on the roughest
+/// metal. This is what it loses, coloured once more by each bounce (C. Fdez-Agüera, "A Multiple-Scattering Microfacet
+/// Model for Real-Time Image-Based Lighting", 2019); `f0` is the metal's colour face on.
+pub(super) fn rebound(roughness: f32, f0: Vec3, n_v: f32) -> Vec3 {
+    let mean = mean_albedo(roughness);
+    // The mean of Schlick's reflectance over the hemisphere.
+    let f0 = f0.min(Vec3::ONE);
+    let once = f0 + (Vec3::ONE - f0) / 21.0;
+    let color = once * once * mean / (Vec3::ONE - once * (1.0 - mean));
+    let (scale, bias) = albedo(roughness, n_v);
+    color * (1.0 - scale - bias).max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mean_albedo_is_that_of_the_table() {
+        for (i, known) in (0u8..).zip(MEAN_ALBEDO) {
+            let at = |step: u16| {
+                let mu = (f32::from(step) + 0.5) / 4000.0;
+                let (scale, bias) = albedo(f32::from(i) / 8.0, mu);
+                f64::from((scale + bias) * mu)
+            };
+            let mean = (0..4000).map(at).sum::<f64>() * 2.0 / 4000.0;
+            assert!((mean - f64::from(known)).abs() < 1e-3, "{i}: {mean} for {known}");
+        }
+    }
+
+    #[test]
+    fn white_metal_sends_everything_back_and_colours_deepen() {
+        for roughness in [0.0, 0.3, 0.6, 1.0] {
+            let (scale, bias) = albedo(roughness, 0.7);
+            assert!((rebound(roughness, Vec3::ONE, 0.7).x + scale + bias - 1.0).abs() < 1e-6);
+        }
+        let gold = rebound(0.8, Vec3::new(1.0, 0.7, 0.3), 0.7);
+        assert!(gold.y / gold.x < 0.7 && gold.z / gold.y < 0.3 / 0.7, "{gold}");
+    }
+}
