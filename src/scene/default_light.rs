@@ -19,7 +19,7 @@ pub enum DefaultLight {
     NotMissing,
     /// The scene file asked for none.
     NotWanted,
-    /// Nothing in the scene answers to light.
+    /// Nothing in the scene answers to light: the studio was added as a backdrop.
     NotNeeded,
 }
 
@@ -34,7 +34,7 @@ const FILL_FROM: DVec3 = DVec3::new(0.85, 0.15, 0.55);
 /// Adds key, fill and studio, as seen from `camera`, to a scene without any light.
 ///
 /// Light is a lamp, an ambient term or an environment; a material that glows is not. A scene in which everything is
-/// unlit needs none. The fill throws no shadows: it stands for light from all over that side.
+/// unlit needs no lamps and gets the studio alone, to be seen before the same backdrop as others. The fill throws no shadows: it stands for light from all over that side.
 pub fn add_if_missing(scene: &mut Scene, camera: &Camera) -> DefaultLight {
     if scene.hints.default_light == Some(false) {
         return DefaultLight::NotWanted;
@@ -45,6 +45,7 @@ pub fn add_if_missing(scene: &mut Scene, camera: &Camera) -> DefaultLight {
     }
     let features = Features::of(scene);
     if features.has(Feature::Unlit) && !features.has(Feature::MetalRough) && !features.has(Feature::Phong) {
+        scene.environment = Environment::Studio;
         return DefaultLight::NotNeeded;
     }
     scene.lights = vec![lamp("key", KEY, KEY_FROM, true, camera), lamp("fill", FILL, FILL_FROM, false, camera)];
@@ -106,12 +107,13 @@ mod tests {
     }
 
     #[test]
-    fn unlit_scenes_and_scenes_that_want_darkness_get_nothing() {
+    fn unlit_scenes_get_the_studio_alone_and_scenes_that_want_darkness_nothing() {
         let unlit = Material { surface: Surface::Unlit, ..Material::default() };
         let ball = Sphere { name: String::new(), center: DVec3::ZERO, radius: 1.0, material: 0 };
         // The second material is there, but on nothing.
         let mut scene = Scene { materials: vec![unlit, Material::plain()], spheres: vec![ball], ..Scene::default() };
         assert_eq!(add_if_missing(&mut scene, &behind()), DefaultLight::NotNeeded);
+        assert!(scene.lights.is_empty() && scene.environment == Environment::Studio);
         let mut scene = Scene::default();
         scene.hints.default_light = Some(false);
         assert_eq!(add_if_missing(&mut scene, &behind()), DefaultLight::NotWanted);
