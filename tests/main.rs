@@ -13,6 +13,7 @@
 #[cfg(feature = "cli")]
 mod cli;
 mod common;
+mod far_away;
 mod golden;
 mod models;
 mod sweep;
