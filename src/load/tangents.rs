@@ -20,17 +20,64 @@ pub fn generate(mesh: &mut Mesh, uv_set: u32) {
     if mesh.normals.is_empty() {
         flatten(mesh);
     }
+    let uvs = &mesh.uvs[set];
+    let (calm, crowded) = sort_out(mesh, uvs);
     let mut corners = vec![[Vec4::X; 3]; mesh.triangles.len()];
-    let mut view = View { mesh, uvs: &mesh.uvs[set], corners: &mut corners };
+    let mut view = View { mesh, uvs, faces: &calm, corners: &mut corners };
     // The error type has no values.
     let _ = bevy_mikktspace::generate_tangents(&mut view);
+    for face in crowded {
+        corners[face as usize] = [of_face(mesh.triangles[face as usize], mesh, uvs); 3];
+    }
     split(mesh, &corners);
+}
+
+/// Faces that the generator takes, and those around a vertex where too many meet for it.
+///
+/// The generator goes around a vertex by recursion and compares every face there with every other. It takes vertices
+/// for one when they are equal in all that it sees.
+fn sort_out(mesh: &Mesh, uvs: &[Vec2]) -> (Vec<u32>, Vec<u32>) {
+    /// Far more than meet at the tip of a finely turned cone.
+    const CROWD: u32 = 1000;
+    let all = 0..mesh.triangles.len() as u32;
+    if mesh.triangles.len() as u64 <= u64::from(CROWD) {
+        return (all.collect(), Vec::new());
+    }
+    let mut faces_of = vec![0; mesh.positions.len()];
+    mesh.triangles.iter().flatten().for_each(|&vertex| faces_of[vertex as usize] += 1);
+    let seen = |vertex: usize| {
+        let ([x, y, z], [nx, ny, nz]) = (mesh.positions[vertex].to_array(), mesh.normals[vertex].to_array());
+        // Zeros of both signs are equal.
+        [x, y, z, nx, ny, nz, uvs[vertex].x, uvs[vertex].y].map(|value| (value + 0.0).to_bits())
+    };
+    let mut faces_at: HashMap<[u32; 8], u32> = HashMap::with_capacity(mesh.positions.len());
+    for (vertex, faces) in faces_of.iter().enumerate() {
+        *faces_at.entry(seen(vertex)).or_default() += faces;
+    }
+    if faces_at.values().all(|&faces| faces <= CROWD) {
+        return (all.collect(), Vec::new());
+    }
+    let is_calm = |vertex: &u32| faces_at[&seen(*vertex as usize)] <= CROWD;
+    all.partition(|&face| mesh.triangles[face as usize].iter().all(is_calm))
+}
+
+/// The tangent of one face by itself, as the generator would begin with.
+fn of_face(triangle: [u32; 3], mesh: &Mesh, uvs: &[Vec2]) -> Vec4 {
+    let [a, b, c] = triangle.map(|vertex| mesh.positions[vertex as usize]);
+    // Green of a normal map points up, where v points down.
+    let [u, v, w] = triangle.map(|vertex| Vec2::new(1.0, -1.0) * uvs[vertex as usize]);
+    let (along, across) = (v - u, w - u);
+    let area = along.perp_dot(across);
+    let direction = ((b - a) * across.y - (c - a) * along.y) * area.signum();
+    direction.try_normalize().unwrap_or(Vec3::X).extend(if area < 0.0 { -1.0 } else { 1.0 })
 }
 
 /// What the generator sees.
 struct View<'a> {
     mesh: &'a Mesh,
     uvs: &'a [Vec2],
+    /// The faces that it is given.
+    faces: &'a [u32],
     corners: &'a mut [[Vec4; 3]],
 }
 
@@ -49,13 +96,13 @@ impl Ops for LibmOps {
 
 impl View<'_> {
     fn vertex(&self, face: usize, corner: usize) -> usize {
-        self.mesh.triangles[face][corner] as usize
+        self.mesh.triangles[self.faces[face] as usize][corner] as usize
     }
 }
 
 impl Geometry<LibmOps> for View<'_> {
     fn num_faces(&self) -> usize {
-        self.mesh.triangles.len()
+        self.faces.len()
     }
 
     fn num_vertices_of_face(&self, _face: usize) -> usize {
@@ -81,7 +128,7 @@ impl Geometry<LibmOps> for View<'_> {
         let tangent = Vec4::from(tangent.tangent_encoded());
         // Where coordinates do not vary there is no direction; any one will do.
         if tangent.is_finite() && tangent.truncate().length_squared() > 0.0 {
-            self.corners[face][corner] = tangent;
+            self.corners[self.faces[face] as usize][corner] = tangent;
         }
     }
 }
@@ -182,5 +229,28 @@ mod tests {
         let mut bare = Mesh { uvs: Vec::new(), ..square() };
         generate(&mut bare, 0);
         assert!(bare.tangents.is_empty());
+    }
+
+    /// A disc of many triangles around one vertex, or around as many equal ones; u to the right, v down.
+    fn disc(faces: u32, welded: bool) -> Mesh {
+        let rim = (0..=faces).map(|k| f64::from(k) * std::f64::consts::TAU / f64::from(faces));
+        let rim = rim.map(|angle| Vec3::new(angle.cos() as f32, angle.sin() as f32, 0.0));
+        let mut positions: Vec<Vec3> = rim.collect();
+        let center = positions.len() as u32;
+        positions.resize(positions.len() + if welded { 1 } else { faces as usize }, Vec3::ZERO);
+        let uvs = positions.iter().map(|p| Vec2::new(p.x, -p.y)).collect();
+        let triangles = (0..faces).map(|k| [center + if welded { 0 } else { k }, k, k + 1]).collect();
+        Mesh { normals: vec![Vec3::Z; positions.len()], positions, uvs: vec![uvs], triangles, ..Mesh::default() }
+    }
+
+    #[test]
+    fn where_very_many_faces_meet_each_has_its_own_tangent() {
+        for (faces, welded) in [(200, true), (50_000, true), (50_000, false)] {
+            let mut mesh = disc(faces, welded);
+            generate(&mut mesh, 0);
+            assert_eq!(mesh.tangents.len(), mesh.positions.len());
+            let off = |t: &Vec4| (*t - Vec4::new(1.0, 0.0, 0.0, 1.0)).length();
+            assert!(mesh.tangents.iter().all(|t| off(t) < 2e-2), "{faces}");
+        }
     }
 }

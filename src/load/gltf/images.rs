@@ -34,6 +34,7 @@ impl<'a> Images<'a> {
     ) -> Self {
         let mut images = Self { bytes: Vec::new(), same: HashMap::new() };
         let drawn: HashSet<usize> = drawn.iter().copied().collect();
+        let webp = root.extensions_used.iter().any(|e| e == "EXT_texture_webp");
         let mut known: HashMap<&str, usize> = HashMap::new();
         for (i, image) in root.images.iter().enumerate() {
             let named = image.uri.as_deref().filter(|uri| !is_data(uri));
@@ -48,7 +49,7 @@ impl<'a> Images<'a> {
                 known.extend(named.filter(|_| is_wanted(image, drawn)).map(|uri| (uri, i)));
             }
             if let Some(bytes) = images.of(i) {
-                check_kind(root, i, image, bytes, report);
+                check_kind(webp, i, image, bytes, report);
             }
         }
         check_textures(root, &images, report);
@@ -170,7 +171,9 @@ fn kind_of(bytes: &[u8]) -> Option<&'static str> {
 }
 
 /// Compares what an image says of itself with its bytes.
-fn check_kind(root: &Root, i: usize, image: &Image, bytes: &[u8], report: &mut Report) {
+///
+/// `webp` says that the file declares the extension for it.
+fn check_kind(webp: bool, i: usize, image: &Image, bytes: &[u8], report: &mut Report) {
     let place = format!("images[{i}]");
     let Some(kind) = kind_of(bytes) else {
         return report.add(Code::ImageUnrecognizedFormat, place, "its bytes are no image of a known kind");
@@ -181,7 +184,7 @@ fn check_kind(root: &Root, i: usize, image: &Image, bytes: &[u8], report: &mut R
         let text = format!("declared as {}, its bytes are {kind}", crate::load::paths::shorten(other));
         report.add(Code::ImageMimeTypeInvalid, &place, text);
     }
-    if kind == "image/webp" && !root.extensions_used.iter().any(|e| e == "EXT_texture_webp") {
+    if kind == "image/webp" && !webp {
         report.add(Code::ImageNonEnabledMimeType, place, "WebP needs EXT_texture_webp, which is not declared");
     }
 }

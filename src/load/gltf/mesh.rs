@@ -57,7 +57,8 @@ pub(super) fn read(reader: Reader, job: &Job, report: &mut Report) -> Option<Rea
 /// Bytes that reading a primitive takes, by the declared counts.
 ///
 /// Of a pool of vertices only those are read that the indices name, so that there are at most as many as indices.
-pub(super) fn cost(reader: Reader, primitive: &Primitive, name: &str) -> u64 {
+/// `mapped` says that a normal map wants tangents.
+pub(super) fn cost(reader: Reader, primitive: &Primitive, name: &str, mapped: bool) -> u64 {
     /// A value of a vertex, at most four floats.
     const VALUE: u64 = 16;
     let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
@@ -67,13 +68,21 @@ pub(super) fn cost(reader: Reader, primitive: &Primitive, name: &str) -> u64 {
     let targets = primitive.targets.iter().flatten();
     let morphs = targets.flat_map(|t| [t.positions, t.normals, t.tangents].into_iter().flatten()).count();
     let values = (primitive.attributes.len() + morphs) as u64;
-    let per_corner = match primitive.mode {
+    let faces = match primitive.mode {
         // Nearly every corner starts a face of three.
         Checked::Valid(Mode::TriangleStrip | Mode::TriangleFan) => 36,
         _ => 24,
     };
-    let fixed = (size_of::<Read>() + name.len()) as u64;
-    let bytes = used.saturating_mul(values * VALUE).saturating_add(corners.saturating_mul(per_corner));
+    // What the generator notes of a corner, which may become a vertex of its own.
+    let tangents = if mapped { 256 + values * VALUE } else { 0 };
+    let set = |semantic: &Checked<Semantic>| match semantic {
+        Checked::Valid(Semantic::TexCoords(set)) => Some(*set as usize + 1),
+        _ => None,
+    };
+    // Sets of texture coordinates stand at their number, and those before it are empty.
+    let sets = primitive.attributes.keys().filter_map(set).max().unwrap_or(0);
+    let fixed = (size_of::<Read>() + name.len() + sets * size_of::<Vec<Vec2>>()) as u64;
+    let bytes = used.saturating_mul(values * VALUE).saturating_add(corners.saturating_mul(faces + tangents));
     bytes.saturating_add(fixed)
 }
 

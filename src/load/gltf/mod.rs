@@ -82,6 +82,20 @@ struct Palette<'a> {
     textures: Textures<'a>,
 }
 
+impl Palette<'_> {
+    /// The material that a primitive shows; `None` when it is not drawn.
+    fn material(&self, variant: &scene::Variant, primitive: &source::Primitive) -> Option<u32> {
+        // The default material is the last.
+        let i = primitive.material.map_or(self.index.len().checked_sub(1)?, |m| m.value());
+        self.index.get(i).copied().flatten().filter(|_| variant.drawn)
+    }
+
+    /// What that material reads of the vertices.
+    fn needs(&self, variant: &scene::Variant, primitive: &source::Primitive) -> Option<&Needs> {
+        self.needs.get(self.material(variant, primitive)? as usize)
+    }
+}
+
 impl Loading<'_> {
     fn run(&mut self) -> Result<Loaded, LoadError> {
         let file = &self.source.path;
@@ -152,7 +166,7 @@ impl Loading<'_> {
 
         let drawn_images = palette.textures.images.clone();
         let images = Images::load(root, &buffers, &drawn_images, file, &mut resolver, budget, self.report);
-        self.charge(reader, &placed, budget)?;
+        self.charge(reader, &placed, &palette, budget)?;
         let mut pictures = Report::new(file);
         let (reads, bitmaps) = rayon::join(
             || read_meshes(reader, &placed, &skins, &palette, file),
@@ -187,11 +201,14 @@ impl Loading<'_> {
     }
 
     /// Charges what the primitives will take.
-    fn charge(&self, reader: Reader, placed: &Placed, budget: &mut Budget) -> Result<(), LoadError> {
-        let meshes = placed.variants.iter().filter_map(|v| reader.root.meshes.get(v.mesh));
-        let primitives = meshes.flat_map(|m| m.primitives.iter().map(|p| (p, m.name.as_deref().unwrap_or_default())));
-        let bytes = primitives.map(|(p, name)| mesh::cost(reader, p, name)).fold(0, u64::saturating_add);
-        self.take(budget, bytes, "what the meshes hold")
+    fn charge(&self, reader: Reader, placed: &Placed, palette: &Palette, budget: &mut Budget) -> Result<(), LoadError> {
+        let cost = |variant: &scene::Variant, mesh: &source::Mesh, primitive: &source::Primitive| {
+            let mapped = palette.needs(variant, primitive).is_some_and(|needs| needs.tangents.is_some());
+            mesh::cost(reader, primitive, mesh.name.as_deref().unwrap_or_default(), mapped)
+        };
+        let meshes = placed.variants.iter().filter_map(|v| Some((v, reader.root.meshes.get(v.mesh)?)));
+        let costs = meshes.flat_map(|(v, mesh)| mesh.primitives.iter().map(move |p| cost(v, mesh, p)));
+        self.take(budget, costs.fold(0, u64::saturating_add), "what the meshes hold")
     }
 
     /// Takes bytes for something, or refuses the file.
@@ -304,9 +321,8 @@ fn read_meshes(
     let root = reader.root;
     let read_one = |variant: &scene::Variant, k: usize, primitive: &source::Primitive, mesh: &source::Mesh| {
         let mut report = Report::new(file);
-        let material = primitive.material.map_or(root.materials.len(), |m| m.value());
-        let material = palette.index.get(material).copied().flatten().filter(|_| variant.drawn);
-        let needs = material.and_then(|m| palette.needs.get(m as usize)).cloned().unwrap_or_default();
+        let material = palette.material(variant, primitive);
+        let needs = palette.needs(variant, primitive).cloned().unwrap_or_default();
         let job = Job {
             primitive,
             place: format!("meshes[{}].primitives[{k}]", variant.mesh),

@@ -85,3 +85,26 @@ fn data_in_the_file_is_charged_before_it_is_decoded() {
     let loaded = load_bytes(Path::new("a.gltf"), bytes.clone(), &limited(5 * bytes.len() as u64 / 2)).unwrap();
     assert_eq!(codes(&loaded), ["out-of-memory-limit"]);
 }
+
+#[test]
+fn sets_of_texture_coordinates_and_tangents_are_charged() {
+    let mut file = Builder::new();
+    let positions = file.triangle();
+    let uvs = file.floats("VEC2", &[0., 0., 1., 0., 0., 1.]);
+    let primitive = json!({"attributes": {"POSITION": positions, "TEXCOORD_65535": uvs}});
+    file.set("meshes", json!([{"primitives": vec![primitive; 10]}]));
+    assert!(load_bytes(Path::new("a.gltf"), file.gltf(), &limited(20 << 20)).is_ok());
+    let message = refused(Path::new("a.gltf"), &file.gltf(), 10 << 20);
+    assert!(message.starts_with("a.gltf: what the meshes hold is too large: "), "{message}");
+
+    let mut file = Builder::new();
+    let (positions, uvs) = (file.floats("VEC3", &[0.0; 9000]), file.floats("VEC2", &[0.0; 6000]));
+    file.primitive(json!({"attributes": {"POSITION": positions, "TEXCOORD_0": uvs}, "material": 0}));
+    file.set("images", json!([{"uri": picture()}]));
+    file.set("textures", json!([{"source": 0}]));
+    for (map, fits) in [("emissiveTexture", true), ("normalTexture", false)] {
+        file.set("materials", json!([{map: {"index": 0}}]));
+        let loaded = load_bytes(Path::new("a.gltf"), file.gltf(), &limited(800_000));
+        assert_eq!(loaded.is_ok(), fits, "{loaded:?}");
+    }
+}
