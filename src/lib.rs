@@ -72,6 +72,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic"))]
 
 pub mod accel;
+pub mod bench;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod image;

@@ -20,7 +20,7 @@ use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
 /// The flags that a picture may bring along.
-const FLAGS: [&str; 26] = [
+const FLAGS: [&str; 27] = [
     "size",
     "samples",
     "depth",
@@ -46,6 +46,7 @@ const FLAGS: [&str; 26] = [
     "polygons",
     "mtl",
     "accel",
+    "intersector",
     "allow-empty",
 ];
 
@@ -126,6 +127,7 @@ impl Facts<'_> {
             set("mtl", "literal".into());
         }
         set("accel", self.job.accel.name().into());
+        set("intersector", self.job.intersector.name().into());
         let switches = [
             ("float", self.shot.kind == FileKind::Exr && output.exr_samples == ExrSamples::Float),
             ("layers", settings.layers),

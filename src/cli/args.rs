@@ -1,7 +1,7 @@
 //! What was typed: syntax only. What it means together is decided in [`super::job`].
 
 use super::parse;
-use crate::accel::{AccelKind, GridParams};
+use crate::accel::{AccelKind, GridParams, IntersectorKind};
 use crate::image::ToneMap;
 use crate::scene::framing::NamedView;
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
@@ -98,7 +98,7 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "PICTURE", help_heading = "Output", hide_short_help = true, conflicts_with_all = [
         "size", "format", "bits", "half", "float", "layers", "tone_map", "exposure", "merge", "view", "camera", "eye",
         "at", "up_vector", "fov", "ortho", "up", "background", "samples", "depth", "cutoff", "seed", "scene",
-        "polygons", "mtl", "allow_empty", "accel",
+        "polygons", "mtl", "allow_empty", "accel", "intersector",
     ])]
     pub again: Option<PathBuf>,
 
@@ -172,6 +172,10 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "NAME", value_parser = parse::accel(), default_value = AccelKind::DEFAULT.name(),
           help_heading = "Structure", hide_short_help = true)]
     pub accel: AccelKind,
+    /// Test of rays against triangles; all but `exact` are there to be compared with it
+    #[arg(long, value_name = "NAME", value_parser = parse::intersector(), default_value = IntersectorKind::Exact.name(),
+          help_heading = "Structure", hide_short_help = true)]
+    pub intersector: IntersectorKind,
     /// Parameters of the grid
     #[command(flatten)]
     pub grid: GridArgs,

@@ -5,7 +5,7 @@ use super::camera::{Choice, LensChoice};
 use super::message;
 use super::output_name::{self, Facts};
 use super::parse::Back;
-use crate::accel::{AccelKind, GridParams};
+use crate::accel::{AccelKind, GridParams, IntersectorKind};
 use crate::image::{ExrSamples, FileKind, PngDepth, ToneMap};
 use crate::load::{Limits, LoadOptions, MtlMode, Polygons};
 use crate::scene::UpAxis;
@@ -30,6 +30,8 @@ pub(super) struct RenderJob {
     pub look: Look,
     /// Which structure.
     pub accel: AccelKind,
+    /// Which ray/triangle test.
+    pub intersector: IntersectorKind,
     /// Its parameters.
     pub grid: GridParams,
     /// 0: all.
@@ -143,6 +145,7 @@ impl RenderJob {
             look: look(args),
             grid: grid(args)?,
             accel: args.accel,
+            intersector: args.intersector,
             threads: usize::from(args.threads),
             stats,
             quiet: args.quiet,

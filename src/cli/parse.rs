@@ -1,6 +1,6 @@
 //! The words of single flags: sizes, vectors, angles, colours. Errors say what would be right.
 
-use crate::accel::AccelKind;
+use crate::accel::{AccelKind, IntersectorKind};
 use crate::image::ToneMap;
 use crate::math::Vec3;
 use crate::scene::Background;
@@ -114,6 +114,12 @@ pub(super) fn background(text: &str) -> Result<Back, String> {
 pub(super) fn accel() -> impl TypedValueParser<Value = AccelKind> {
     let parse = |name: String| name.parse::<AccelKind>().map_err(|e| e.to_string());
     PossibleValuesParser::new(AccelKind::ALL.map(AccelKind::name)).try_map(parse)
+}
+
+/// The names of all ray/triangle tests.
+pub(super) fn intersector() -> impl TypedValueParser<Value = IntersectorKind> {
+    let parse = |name: String| name.parse::<IntersectorKind>().map_err(|e| e.to_string());
+    PossibleValuesParser::new(IntersectorKind::ALL.map(IntersectorKind::name)).try_map(parse)
 }
 
 /// The names of all tone maps.

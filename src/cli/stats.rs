@@ -7,7 +7,7 @@
 //! |---|---|
 //! | `schema`, `version` | `meshray-stats/1`; version of meshray |
 //! | `inputs`, `output`, `input_hash` | files as typed (`-`: standard streams); xxh3-128 of what was read, hexadecimal |
-//! | `width`, `height`, `samples`, `depth`, `cutoff`, `seed`, `view`, `accel`, `threads` | settings that were used |
+//! | `width`, `height`, `samples`, `depth`, `cutoff`, `seed`, `view`, `accel`, `intersector`, `threads` | settings that were used |
 //! | `seconds` | of the timed run: `load`, `build`, `render`, `write`; `load` is 0 for further views of one input |
 //! | `scene` | `triangles`, `polygons`, `spheres`, `planes`, `vertices`, `materials`, `textures`, `lights` |
 //! | `structure` | V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`; `bytes` and `depth` |
@@ -151,6 +151,7 @@ impl PictureStats {
             "input_hash": facts.hash(),
             "width": settings.width, "height": settings.height, "samples": settings.samples, "depth": facts.depth,
             "cutoff": settings.cutoff, "seed": settings.seed, "view": view, "accel": facts.job.accel.name(),
+            "intersector": facts.job.intersector.name(),
             "threads": rayon::current_num_threads(),
             "seconds": { "load": times.load, "build": times.build, "render": times.render, "write": times.write },
             "scene": {

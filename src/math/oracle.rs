@@ -1,58 +1,18 @@
 //! The tests' judge: the same questions answered in rational numbers, without any rounding.
 
-use dashu::base::{Abs, Sign};
+use dashu::base::Abs;
 use dashu::integer::IBig;
 use dashu::rational::RBig;
 use proptest::prelude::*;
 
+use super::rational::{self, cross, dot, exact, minus, point, sign};
 use super::shear::RaySpace;
 use super::triangle::{self, Triangle};
 use super::{Vec3, plane, quotient};
 
-type Exact3 = [RBig; 3];
-
-fn exact(x: f32) -> RBig {
-    RBig::try_from(x).unwrap_or_default()
-}
-
-fn point(p: Vec3) -> Exact3 {
-    p.to_array().map(exact)
-}
-
-fn minus(a: &Exact3, b: &Exact3) -> Exact3 {
-    [0, 1, 2].map(|k| &a[k] - &b[k])
-}
-
-fn cross(a: &Exact3, b: &Exact3) -> Exact3 {
-    [0, 1, 2].map(|k| {
-        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-        &a[i] * &b[j] - &a[j] * &b[i]
-    })
-}
-
-fn dot(a: &Exact3, b: &Exact3) -> RBig {
-    (0..3).fold(RBig::ZERO, |s, k| s + &a[k] * &b[k])
-}
-
-fn sign(x: &RBig) -> i32 {
-    if x.is_zero() {
-        0
-    } else if x.sign() == Sign::Positive {
-        1
-    } else {
-        -1
-    }
-}
-
-/// Where the line meets the triangle, boundary included; `None` also for lines in its plane.
+/// Where the line meets the triangle, from numbers in `f32`.
 fn hit(origin: Vec3, dir: Vec3, triangle: &Triangle) -> Option<RBig> {
-    let (o, d) = (point(origin), point(dir));
-    let [a, b, c] = triangle.map(|p| minus(&point(p), &o));
-    let signs = [(&b, &c), (&c, &a), (&a, &b)].map(|(p, q)| sign(&dot(&d, &cross(p, q))));
-    let normal = cross(&minus(&b, &a), &minus(&c, &a));
-    let slope = dot(&normal, &d);
-    let inside = signs.iter().all(|&s| s >= 0) || signs.iter().all(|&s| s <= 0);
-    (inside && !slope.is_zero()).then(|| dot(&normal, &a) / slope)
+    rational::hit(&point(origin), &point(dir), triangle)
 }
 
 /// Whether `t` is a float nearest to `exact`.

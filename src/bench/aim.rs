@@ -1,0 +1,138 @@
+//! Rays that are hard on a mesh.
+
+use super::random::Random;
+use crate::accel::{NO_PRIM, Ray, Shapes};
+use crate::math::Vec3;
+use crate::math::triangle::{self, Triangle};
+
+/// What rays are aimed at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Aim {
+    /// A corner of a triangle.
+    Corners,
+    /// The middle of an edge.
+    EdgeMiddles,
+    /// Any point of an edge.
+    Edges,
+    /// Along the plane of a triangle, through it.
+    InPlane,
+    /// A triangle, at an angle of 10⁻¹ to 10⁻⁷ to its plane.
+    Grazing,
+    /// Anywhere in the box of the mesh.
+    Random,
+}
+
+impl Aim {
+    /// Every kind.
+    pub const ALL: [Self; 6] =
+        [Self::Corners, Self::EdgeMiddles, Self::Edges, Self::InPlane, Self::Grazing, Self::Random];
+
+    /// As printed.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Corners => "corners",
+            Self::EdgeMiddles => "edge middles",
+            Self::Edges => "edges",
+            Self::InPlane => "in plane",
+            Self::Grazing => "grazing",
+            Self::Random => "random",
+        }
+    }
+}
+
+/// Makes rays for one set of triangles, in the frame of its vertices.
+#[derive(Clone, Debug)]
+pub struct Aimer<'a> {
+    shapes: &'a Shapes,
+    middle: Vec3,
+    /// Half the diagonal of the mesh.
+    reach: f32,
+    random: Random,
+}
+
+impl<'a> Aimer<'a> {
+    /// `None` without triangles.
+    pub fn new(shapes: &'a Shapes, seed: u64) -> Option<Self> {
+        if shapes.triangles.is_empty() {
+            return None;
+        }
+        let corners = shapes.triangles.iter().flatten().map(|&i| shapes.vertices[i as usize]);
+        let (lo, hi) = corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
+        let reach = (hi * 0.5 - lo * 0.5).length();
+        Some(Self { shapes, middle: lo * 0.5 + hi * 0.5, reach, random: Random::new(seed) })
+    }
+
+    /// `count` rays.
+    pub fn rays(&mut self, aim: Aim, count: usize) -> Vec<Ray> {
+        (0..count).map(|i| self.ray(aim, i)).collect()
+    }
+
+    fn ray(&mut self, aim: Aim, i: usize) -> Ray {
+        let t = self.shapes.triangle(u32::try_from(self.random.below(self.shapes.triangles.len())).unwrap_or(0));
+        let [a, b, c] = t;
+        let (r, s) = (self.random.unit(), self.random.unit());
+        let at = |target: Vec3, origin: Vec3| ray(origin, target - origin);
+        match aim {
+            Aim::Corners => at(a, self.start(i)),
+            Aim::EdgeMiddles => at((a + b) * 0.5, self.start(i)),
+            Aim::Edges => at(a + (b - a) * r, self.start(i)),
+            Aim::InPlane => {
+                let dir = (b - a) * (r - 0.5) + (c - a) * (s - 0.5);
+                ray(inside(&t, r, s) - dir * self.strides(dir), dir)
+            }
+            Aim::Grazing => {
+                let tilt = libm::powf(10.0, -1.0 - 6.0 * self.random.unit());
+                let along = ((b - a) * (r - 0.5) + (c - a) * (s - 0.5)).normalize_or(Vec3::X);
+                let dir = along + triangle::normal(&t) * tilt;
+                ray(inside(&t, s, r) - dir * self.reach, dir)
+            }
+            Aim::Random => at(self.middle + self.random.cube() * self.reach, self.start(i)),
+        }
+    }
+
+    /// Inside the mesh's box and outside of it in turn.
+    fn start(&mut self, i: usize) -> Vec3 {
+        let distance = if i.is_multiple_of(2) { 0.5 } else { 2.5 };
+        self.middle + self.random.direction() * (distance * self.reach)
+    }
+
+    /// How many times `dir` the mesh is long.
+    fn strides(&self, dir: Vec3) -> f32 {
+        let strides = self.reach / dir.length();
+        if strides.is_finite() { strides } else { 1.0 }
+    }
+}
+
+/// A point of the triangle, r and s in 0..1.
+fn inside(&[a, b, c]: &Triangle, r: f32, s: f32) -> Vec3 {
+    let (r, s) = if r + s > 1.0 { (1.0 - r, 1.0 - s) } else { (r, s) };
+    a + (b - a) * r + (c - a) * s
+}
+
+fn ray(origin: Vec3, dir: Vec3) -> Ray {
+    Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude: NO_PRIM, sample: 0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::oracle::Oracle;
+
+    #[test]
+    fn rays_of_every_kind_are_finite_and_most_pass_near_the_mesh() {
+        let shapes = crate::accel::tests::scenes::star(24, 16);
+        let oracle = Oracle::new(&shapes);
+        let mut aimer = Aimer::new(&shapes, 1).unwrap();
+        for aim in Aim::ALL {
+            let rays = aimer.rays(aim, 200);
+            assert!(rays.iter().all(|r| r.origin.is_finite() && r.dir.is_finite() && r.dir != Vec3::ZERO));
+            let hits = rays.iter().filter(|r| oracle.nearest(r).is_some()).count();
+            assert!(hits > 100, "{}: {hits} hits", aim.name());
+        }
+    }
+
+    #[test]
+    fn nothing_can_be_aimed_at_without_triangles() {
+        assert!(Aimer::new(&Shapes::default(), 1).is_none());
+    }
+}

@@ -1,0 +1,6 @@
+//! Measures and compares, and prints nothing: rays that are hard on a mesh, exact answers, and what came out.
+
+pub mod aim;
+pub mod oracle;
+pub mod random;
+pub mod verify;

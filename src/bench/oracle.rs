@@ -1,0 +1,231 @@
+//! What a ray really hits: exact for the `f32` ray and triangles, from all of them, by arithmetic of its own.
+//!
+//! Every triangle is looked at in `f64` with bounds of its own; where those cannot tell, rational numbers decide
+//! ([`rational`](crate::math::rational)). To be affordable on large meshes, runs of triangles are skipped when the ray
+//! misses their box by more than a millionth of its size: nothing else is shared with the structures that it judges.
+
+use dashu::rational::RBig;
+
+use crate::accel::{Ray, Shapes};
+use crate::math::rational::{exact, hit, point};
+use crate::math::triangle::Triangle;
+use crate::math::{DVec3, Vec3};
+
+/// Triangles in one run.
+const RUN: usize = 32;
+
+/// Error of a sum of products of differences in `f64`, relative to the sum of its terms' sizes: fewer than 16 roundings.
+const DOUBT: f64 = 16.0 * f64::EPSILON;
+
+/// How much larger a run's box is taken to be, relative to its own and the ray's coordinates.
+const ROOM: f64 = 1e-6;
+
+/// The nearest hit.
+#[derive(Clone, Debug)]
+pub struct Truth {
+    /// The triangle; the lowest of those at the same distance.
+    pub prim: u32,
+    /// Its distance, to a relative error of 2⁻⁴⁰.
+    pub t: f64,
+}
+
+/// Judges rays over one set of triangles; other prims are not seen.
+#[derive(Clone, Debug)]
+pub struct Oracle<'a> {
+    shapes: &'a Shapes,
+    boxes: Vec<(DVec3, DVec3)>,
+}
+
+/// A hit that may be the nearest.
+struct Candidate {
+    prim: u32,
+    t: f64,
+    /// |t − exact| is at most this.
+    error: f64,
+}
+
+impl<'a> Oracle<'a> {
+    /// Over all triangles.
+    pub fn new(shapes: &'a Shapes) -> Self {
+        let corner = |i: u32| shapes.vertices[i as usize].as_dvec3();
+        let grow = |(lo, hi): (DVec3, DVec3), p: DVec3| (lo.min(p), hi.max(p));
+        let of_run = |run: &[[u32; 3]]| {
+            let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+            run.iter().flatten().map(|&i| corner(i)).fold(none, grow)
+        };
+        Self { shapes, boxes: shapes.triangles.chunks(RUN).map(of_run).collect() }
+    }
+
+    /// The nearest hit in the ray's range.
+    pub fn nearest(&self, ray: &Ray) -> Option<Truth> {
+        let mut best: Option<Candidate> = None;
+        for (run, (lo, hi)) in self.boxes.iter().enumerate() {
+            let limit = best.as_ref().map_or(f64::INFINITY, |b| b.t + b.error);
+            if !may_meet(*lo, *hi, ray, limit) {
+                continue;
+            }
+            let first = run * RUN;
+            for prim in first..(first + RUN).min(self.shapes.triangles.len()) {
+                let prim = u32::try_from(prim).unwrap_or(u32::MAX);
+                if prim == ray.exclude {
+                    continue;
+                }
+                if let Some(found) = self.candidate(ray, prim)
+                    && best.as_ref().is_none_or(|b| self.before(ray, &found, b))
+                {
+                    best = Some(found);
+                }
+            }
+        }
+        best.map(|b| Truth { prim: b.prim, t: b.t })
+    }
+
+    /// The distance at which the ray, within its range, meets one triangle.
+    pub fn meets(&self, ray: &Ray, prim: u32) -> Option<f64> {
+        self.candidate(ray, prim).map(|c| c.t)
+    }
+
+    fn before(&self, ray: &Ray, a: &Candidate, b: &Candidate) -> bool {
+        let gap = a.t - b.t;
+        if gap.abs() > a.error + b.error {
+            return gap < 0.0;
+        }
+        (self.exactly(ray, a.prim), a.prim) < (self.exactly(ray, b.prim), b.prim)
+    }
+
+    fn exactly(&self, ray: &Ray, prim: u32) -> Option<RBig> {
+        hit(&point(ray.origin), &point(ray.dir), &self.shapes.triangle(prim))
+    }
+
+    fn candidate(&self, ray: &Ray, prim: u32) -> Option<Candidate> {
+        let triangle = self.shapes.triangle(prim);
+        let verdict = in_f64(ray, &triangle);
+        match verdict {
+            Verdict::Miss => None,
+            Verdict::Hit { t, error } if certainly_within(ray, t, error) => Some(Candidate { prim, t, error }),
+            _ => {
+                let t = self.exactly(ray, prim)?;
+                let within = t >= exact(ray.t_min) && (ray.t_max.is_infinite() || t <= exact(ray.t_max));
+                let t = t.to_f64().value();
+                within.then_some(Candidate { prim, t, error: t.abs() * f64::EPSILON })
+            }
+        }
+    }
+}
+
+/// Whether t is within the range, and not near its ends.
+fn certainly_within(ray: &Ray, t: f64, error: f64) -> bool {
+    t - error > f64::from(ray.t_min) && t + error < f64::from(ray.t_max)
+}
+
+enum Verdict {
+    Hit { t: f64, error: f64 },
+    Miss,
+    Unknown,
+}
+
+fn in_f64(ray: &Ray, triangle: &Triangle) -> Verdict {
+    let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
+    let [a, b, c] = triangle.map(|p| p.as_dvec3() - o);
+    // The volumes that the line cuts off beyond each edge, doubled and redoubled: their signs say on which side it passes.
+    let sides = [(b, c), (c, a), (a, b)].map(|(p, q)| bounded_dot(p, q, d));
+    let certain = |s: &(f64, f64), sign: f64| s.0 * sign > s.1;
+    if sides.iter().any(|s| certain(s, 1.0)) && sides.iter().any(|s| certain(s, -1.0)) {
+        return Verdict::Miss;
+    }
+    let inside = sides.iter().all(|s| certain(s, 1.0)) || sides.iter().all(|s| certain(s, -1.0));
+    let (top, bottom) = (bounded_dot(b - a, c - a, a), bounded_dot(b - a, c - a, d));
+    let doubt = top.1 / top.0.abs() + bottom.1 / bottom.0.abs();
+    // Also false for NaN.
+    if inside && doubt < 1e-13 {
+        let t = top.0 / bottom.0;
+        return Verdict::Hit { t, error: t.abs() * (2.0 * doubt + f64::EPSILON) };
+    }
+    Verdict::Unknown
+}
+
+/// (p × q) · v and a bound of its error.
+fn bounded_dot(p: DVec3, q: DVec3, v: DVec3) -> (f64, f64) {
+    let sizes = DVec3::new(
+        (p.y * q.z).abs() + (p.z * q.y).abs(),
+        (p.z * q.x).abs() + (p.x * q.z).abs(),
+        (p.x * q.y).abs() + (p.y * q.x).abs(),
+    );
+    (p.cross(q).dot(v), sizes.dot(v.abs()) * DOUBT)
+}
+
+/// Whether the ray may meet the box before `limit`.
+fn may_meet(lo: DVec3, hi: DVec3, ray: &Ray, limit: f64) -> bool {
+    let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
+    let room = (o.abs().max(lo.abs()).max(hi.abs()).max_element()) * ROOM + f64::from(f32::MIN_POSITIVE);
+    let (mut near, mut far) = (f64::from(ray.t_min), f64::from(ray.t_max));
+    for k in 0..3 {
+        let (a, b) = (lo[k] - room - o[k], hi[k] + room - o[k]);
+        if d[k] == 0.0 {
+            if a > 0.0 || b < 0.0 {
+                return false;
+            }
+            continue;
+        }
+        let (a, b) = (a / d[k], b / d[k]);
+        near = near.max(a.min(b));
+        far = far.min(a.max(b));
+    }
+    near <= far && near <= limit
+}
+
+/// How far `t` is from `truth`, in units in the last place of the nearest `f32`.
+pub fn ulps(t: f32, truth: f64) -> f64 {
+    #[expect(clippy::cast_possible_truncation, reason = "the float whose spacing is wanted")]
+    let nearest = (truth as f32).abs();
+    let spacing = f64::from(nearest.next_up()) - f64::from(nearest);
+    (f64::from(t) - truth).abs() / spacing
+}
+
+/// The exact place of a hit.
+pub fn place(ray: &Ray, triangle: &Triangle) -> Option<[RBig; 3]> {
+    let (o, d) = (point(ray.origin), point(ray.dir));
+    let t = hit(&o, &d, triangle)?;
+    Some(crate::math::rational::along(&o, &d, &t))
+}
+
+/// Whether a ray from an exact place meets a triangle within 0 ≤ t < `end`.
+pub fn meets_from(origin: &[RBig; 3], dir: Vec3, triangle: &Triangle, end: &RBig) -> bool {
+    hit(origin, &point(dir), triangle).is_some_and(|t| t >= RBig::ZERO && t < *end)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::tests::scenes;
+    use crate::accel::{Accel, Hit, NoProbe, Unculled};
+
+    #[test]
+    fn the_oracle_and_brute_force_find_the_same_first_hits() {
+        for (name, shapes) in scenes::all() {
+            let triangles = Shapes { polygons: Vec::new(), spheres: Vec::new(), planes: Vec::new(), ..shapes };
+            let oracle = Oracle::new(&triangles);
+            let brute = Unculled::new(&triangles);
+            for ray in scenes::rays(&triangles, 12) {
+                let mut hit = [Hit::MISS];
+                brute.closest(&[ray], &mut hit, &mut (), &mut NoProbe);
+                let truth = oracle.nearest(&ray);
+                // Distances beyond the largest float are hits in rational numbers only.
+                let far = truth.as_ref().is_some_and(|t| t.t > f64::from(f32::MAX));
+                assert!(far || hit[0].is_some() == truth.is_some(), "{name} {ray:?} {truth:?} {hit:?}");
+                if let Some(truth) = truth.filter(|_| !far) {
+                    // By definition a negative distance never rounds to zero.
+                    let tiny = truth.t < 0.0 && truth.t > -f64::from(f32::MIN_POSITIVE);
+                    assert!(tiny || ulps(hit[0].t, truth.t) <= 0.501, "{name} {ray:?} {truth:?} {hit:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_ulp_is_the_spacing_of_floats() {
+        assert_eq!(ulps(1.0, 1.0), 0.0);
+        assert_eq!(ulps(1.0f32.next_up(), 1.0), 1.0);
+        assert_eq!(ulps(4.0, 4.0 + f64::from(f32::EPSILON)), 0.25);
+    }
+}

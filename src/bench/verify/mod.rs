@@ -1,0 +1,211 @@
+//! How far a mesh's hits can be trusted: every ray/triangle test through every structure, judged by exact arithmetic.
+//!
+//! The mesh is taken as it is, scaled, and moved far from the origin in two ways ([`variation`]). For each, rays are
+//! aimed at what is hard ([`aim`](crate::bench::aim)), the oracle says what they hit
+//! ([`oracle`](crate::bench::oracle)), and answers are counted against that ([`tally`]).
+
+pub mod spawned;
+pub mod tally;
+pub mod variation;
+
+use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
+
+use self::spawned::{Spawned, spawned};
+use self::tally::Tally;
+use self::variation::Variation;
+use super::aim::{Aim, Aimer};
+use super::oracle::{Oracle, Truth};
+use crate::accel::{Accel, AccelKind, AnyAccel, GridParams, Hit, IntersectorKind, NoProbe, Ray};
+use crate::scene::Scene;
+
+/// What is to be done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Plan {
+    /// Rays of each [`Aim`] for each variation, at least 1.
+    pub rays: usize,
+    /// Changes the rays.
+    pub seed: u64,
+    /// Ray/triangle tests that structures without culling may take for each row; they get as few rays as that allows.
+    pub brute_tests: usize,
+}
+
+impl Default for Plan {
+    fn default() -> Self {
+        Self { rays: 2000, seed: 0, brute_tests: 200_000_000 }
+    }
+}
+
+/// One intersector through one structure over one variation.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// The test of triangles.
+    pub test: IntersectorKind,
+    /// The structure.
+    pub accel: AccelKind,
+    /// What came out for each [`Aim`], in their order.
+    pub tallies: Vec<Tally>,
+}
+
+impl Row {
+    /// All aims together.
+    pub fn total(&self) -> Tally {
+        self.tallies.iter().fold(Tally::default(), |sum, t| sum + *t)
+    }
+}
+
+/// All rows of one variation.
+#[derive(Clone, Debug)]
+pub struct Section {
+    /// What was done to the mesh.
+    pub variation: &'static str,
+    /// How far, or how much.
+    pub amount: f64,
+    /// Triangles that rounding left without area, though they had some.
+    pub collapsed: usize,
+    /// Rows by intersector, then structure.
+    pub rows: Vec<Row>,
+    /// Rays of the exact test about which two structures gave different bits.
+    pub disagreements: usize,
+    /// Secondary rays of the exact test.
+    pub spawned: Spawned,
+}
+
+/// What a test costs.
+#[derive(Clone, Copy, Debug)]
+pub struct Cost {
+    /// The test of triangles.
+    pub test: IntersectorKind,
+    /// Time of one ray in the default structure on one thread, median of [`PASSES`] passes over the rays of the unchanged mesh.
+    pub per_ray: Duration,
+}
+
+/// Everything that was found.
+#[derive(Clone, Debug)]
+pub struct Findings {
+    /// Triangles of the mesh; other prims are not judged.
+    pub triangles: usize,
+    /// Spheres, polygons and planes, which were left out.
+    pub others: usize,
+    /// One for each variation, the unchanged mesh first.
+    pub sections: Vec<Section>,
+    /// One for each intersector.
+    pub costs: Vec<Cost>,
+}
+
+/// Times each test is measured.
+pub const PASSES: usize = 5;
+
+impl Findings {
+    /// All rays of a test through the default structure, over all variations.
+    pub fn total(&self, test: IntersectorKind) -> Tally {
+        let rows = self.sections.iter().flat_map(|s| &s.rows);
+        let rows = rows.filter(|r| r.test == test && r.accel == AccelKind::DEFAULT);
+        rows.fold(Tally::default(), |sum, r| sum + r.total())
+    }
+
+    /// Whether the default test made no error, in any structure.
+    pub fn trusted(&self) -> bool {
+        self.sections.iter().all(|s| {
+            let exact = s.rows.iter().filter(|r| r.test == IntersectorKind::Exact);
+            s.disagreements == 0 && s.spawned.is_clean() && exact.map(Row::total).all(|t| t.is_clean())
+        })
+    }
+}
+
+/// Judges a scene. `done` is told of each variation; `None` when it says to stop, or without triangles.
+pub fn verify(scene: &Scene, plan: &Plan, mut go_on: impl FnMut(usize, usize) -> bool) -> Option<Findings> {
+    let variations = variation::all(scene);
+    let original = variations.first()?;
+    let triangles = original.shapes.triangles.len();
+    let mut findings = Findings { triangles, others: original.others, sections: Vec::new(), costs: Vec::new() };
+    Aimer::new(&original.shapes, plan.seed)?;
+    for (i, variation) in variations.iter().enumerate() {
+        if !go_on(i, variations.len()) {
+            return None;
+        }
+        findings.sections.push(section(variation, plan)?);
+    }
+    findings.costs = costs(original, plan)?;
+    Some(findings)
+}
+
+fn section(variation: &Variation, plan: &Plan) -> Option<Section> {
+    let shapes = &variation.shapes;
+    let mut aimer = Aimer::new(shapes, plan.seed)?;
+    let oracle = Oracle::new(shapes);
+    let sets: Vec<Vec<Ray>> = Aim::ALL.iter().map(|&aim| aimer.rays(aim, plan.rays)).collect();
+    let truths: Vec<Vec<Option<Truth>>> =
+        sets.iter().map(|rays| rays.par_iter().map(|ray| oracle.nearest(ray)).collect()).collect();
+
+    let mut rows = Vec::new();
+    let mut disagreements = 0;
+    let structures = AccelKind::ALL.map(|kind| AnyAccel::build(kind, shapes, &GridParams::DEFAULT));
+    for test in IntersectorKind::ALL {
+        let mut first: Vec<Vec<Hit>> = Vec::new();
+        for accel in structures.iter().rev() {
+            let accel = accel.clone().tested_by(test);
+            let affordable = match accel.kind() {
+                AccelKind::None => (plan.brute_tests / shapes.triangles.len().max(1) / Aim::ALL.len()).max(1),
+                _ => plan.rays,
+            };
+            let answers: Vec<Vec<Hit>> = sets.iter().map(|rays| hits(&accel, take(rays, affordable))).collect();
+            let judge = |i: usize| Tally::of(&oracle, &sets[i], &truths[i], &answers[i]);
+            let tallies = (0..sets.len()).map(judge).collect();
+            rows.push(Row { test, accel: accel.kind(), tallies });
+            if first.is_empty() {
+                first = answers;
+            } else if test == IntersectorKind::Exact {
+                let pairs = first.iter().zip(&answers).flat_map(|(a, b)| a.iter().zip(b));
+                disagreements += pairs.filter(|(a, b)| bits(a) != bits(b)).count();
+            }
+        }
+    }
+    let spawned = spawned(shapes, &structures, &oracle, &sets, plan.seed);
+    let Variation { name, amount, collapsed, .. } = *variation;
+    Some(Section { variation: name, amount, collapsed, rows, disagreements, spawned })
+}
+
+fn take(rays: &[Ray], count: usize) -> &[Ray] {
+    &rays[..rays.len().min(count)]
+}
+
+fn bits(hit: &Hit) -> [u32; 4] {
+    [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.prim]
+}
+
+/// First hits, by all threads.
+fn hits(accel: &AnyAccel, rays: &[Ray]) -> Vec<Hit> {
+    let slice = |rays: &[Ray]| {
+        let mut hits = vec![Hit::MISS; rays.len()];
+        accel.closest(rays, &mut hits, &mut accel.scratch(), &mut NoProbe);
+        hits
+    };
+    rays.par_chunks(256).flat_map_iter(slice).collect()
+}
+
+/// Times of the tests on the same rays, one thread, pass by pass in turn.
+fn costs(variation: &Variation, plan: &Plan) -> Option<Vec<Cost>> {
+    let shapes = &variation.shapes;
+    let mut aimer = Aimer::new(shapes, plan.seed)?;
+    let rays: Vec<Ray> = Aim::ALL.iter().flat_map(|&aim| aimer.rays(aim, plan.rays)).collect();
+    let accel = AnyAccel::build(AccelKind::DEFAULT, shapes, &GridParams::DEFAULT);
+    let accels = IntersectorKind::ALL.map(|test| (test, accel.clone().tested_by(test)));
+    let mut scratch = accel.scratch();
+    let mut answers = vec![Hit::MISS; rays.len()];
+    let mut times = vec![Vec::new(); accels.len()];
+    for _ in 0..PASSES {
+        for ((_, accel), times) in accels.iter().zip(&mut times) {
+            let start = Instant::now();
+            accel.closest(&rays, &mut answers, &mut scratch, &mut NoProbe);
+            times.push(start.elapsed());
+        }
+    }
+    let count = u32::try_from(rays.len()).unwrap_or(u32::MAX).max(1);
+    let cost = |((test, _), mut times): (&(IntersectorKind, AnyAccel), Vec<Duration>)| {
+        times.sort_unstable();
+        Cost { test: *test, per_ray: times[times.len() / 2] / count }
+    };
+    Some(accels.iter().zip(times).map(cost).collect())
+}
