@@ -84,6 +84,7 @@ fn kind(message: &Diagnostic) -> String {
                 kind.push(c);
             } else if !number {
                 number = true;
+                kind.truncate(kind.strip_suffix('-').unwrap_or(&kind).len());
                 kind.push('#');
             }
         }
@@ -102,7 +103,8 @@ mod tests {
         for i in 0..1000 {
             let text = format!("the rotation has length {:.6}, not 1", 2.0 + f64::from(i));
             report.add(Code::RotationNonUnit, format!("nodes[{i}].rotation"), text);
-            report.add(Code::InvalidIndex, format!("nodes[{i}].mesh"), format!("-{i}.5e-7 where an index should be"));
+            let number = ["0.5", "-3", "-1e-9", "7"][i as usize % 4];
+            report.add(Code::InvalidIndex, format!("nodes[{i}].mesh"), format!("{number} where an index should be"));
         }
         report.add(Code::InvalidIndex, "nodes[5].mesh", "'5' where an index should be");
         report.add(Code::InvalidIndex, "nodes[5].mesh", "'6' where an index should be");
@@ -112,7 +114,7 @@ mod tests {
             lines,
             [
                 "a.gltf:nodes[0].rotation: the rotation has length 2.000000, not 1 (×1000); the rotation is made unit",
-                "a.gltf:nodes[0].mesh: -0.5e-7 where an index should be (×1000)",
+                "a.gltf:nodes[0].mesh: 0.5 where an index should be (×1000)",
                 "a.gltf:nodes[5].mesh: '5' where an index should be",
                 "a.gltf:nodes[5].mesh: '6' where an index should be",
             ]

@@ -64,6 +64,7 @@ fn a_file_that_is_named_many_times_is_read_and_charged_once() {
     let loaded = load_bytes(&path, file.gltf(), &limited(4 << 20)).unwrap();
     assert_eq!(loaded.scene.meshes[0].positions, [Vec3::ZERO, Vec3::X, Vec3::Y]);
     assert_eq!(loaded.facts.files.len(), 2);
+    assert!(!codes(&loaded).contains(&"out-of-memory-limit"), "{:?}", loaded.warnings);
     let message = refused(&path, &file.gltf(), 1 << 20);
     assert!(message.contains("buffers[0].uri: the buffer is too large: 1048576 bytes are needed"), "{message}");
 }
