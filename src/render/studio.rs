@@ -1,7 +1,8 @@
 //! The built-in studio: what rays that leave the scene see when nobody brought an environment.
 //!
-//! A neutral room as photographers light small things: a light dome that falls off to a darker floor, a large soft box
-//! overhead in front, a strip to the left, a panel to the right and a rim light behind. Everything is a formula of
+//! A neutral room as photographers light small things: a light dome that falls off to a darker floor and a dark backdrop,
+//! a large soft box overhead in front, a strip to the left, a panel to the right and a rim light behind. Who looks at the
+//! front of a model sees it before the backdrop, from which dark and white things stand out. Everything is a formula of
 //! constant time, smooth, and known at every blur, so that rough metals see the same room as mirrors:
 //!
 //! - [`radiance`]: the room itself, for mirrors and the background.
@@ -57,6 +58,12 @@ const ZENITH: f32 = 0.32;
 const HORIZON: f32 = 0.29;
 const NADIR: f32 = 0.10;
 
+/// Share of the dome's light that the backdrop behind the model swallows, where its edge lies on −z, and how soft (both
+/// in direction cosines) it is.
+const BACKDROP: f32 = 0.6;
+const BACKDROP_FROM: f32 = 0.2;
+const BACKDROP_EDGE: f32 = 0.45;
+
 /// Softness (in direction cosines) of the line between wall and floor.
 const FLOOR_EDGE: f32 = 0.22;
 
@@ -80,7 +87,7 @@ static BOXES: LazyLock<[SoftBox; 4]> = LazyLock::new(|| {
         SoftBox::new(Vec3::new(-0.35, 0.80, 0.55), (0.36, 0.26), 0.05, 2.1),
         SoftBox::new(Vec3::new(-0.95, 0.22, 0.25), (0.11, 0.42), 0.05, 1.3),
         SoftBox::new(Vec3::new(0.93, 0.30, 0.35), (0.24, 0.34), 0.06, 0.9),
-        SoftBox::new(Vec3::new(0.40, 0.50, -0.80), (0.38, 0.16), 0.06, 1.5),
+        SoftBox::new(Vec3::new(0.40, 0.72, -0.70), (0.38, 0.18), 0.06, 1.5),
     ]
 });
 
@@ -104,9 +111,11 @@ impl SoftBox {
 /// The room along `dir`, blurred by a lobe of width `alpha`.
 fn room(dir: Vec3, alpha: f32) -> f32 {
     let blur = SPREAD_PER_ALPHA * alpha;
-    // Walls brighten slowly to the ceiling; the floor is darker.
-    let dome = HORIZON + (ZENITH - HORIZON) * dir.y;
-    let above = step(dir.y, (FLOOR_EDGE * FLOOR_EDGE + blur * blur).sqrt());
+    // Walls brighten slowly to the ceiling; the floor and the wall behind are darker.
+    let soft = |edge: f32| (edge * edge + blur * blur).sqrt();
+    let swallowed = BACKDROP * step(-dir.z - BACKDROP_FROM, soft(BACKDROP_EDGE));
+    let dome = (HORIZON + (ZENITH - HORIZON) * dir.y) * (1.0 - swallowed);
+    let above = step(dir.y, soft(FLOOR_EDGE));
     let mut sum = NADIR + (dome - NADIR) * above;
     for light in BOXES.iter() {
         sum += light.along(dir, blur);
@@ -304,6 +313,14 @@ mod tests {
             (lo, hi) = (lo.min(value), hi.max(value));
         }
         assert!(lo > 0.05 && hi / lo > 10.0 && hi < 4.0, "{lo} … {hi}");
+    }
+
+    #[test]
+    fn the_backdrop_is_darker_than_what_lights_the_front() {
+        for tilt in [-0.3f32, 0.0, 0.3] {
+            let backdrop = radiance(Vec3::new(0.0, tilt, -1.0).normalize()).x;
+            assert!(diffuse(Vec3::Z).x > 2.0 * backdrop, "{tilt}: {backdrop}");
+        }
     }
 
     #[test]
