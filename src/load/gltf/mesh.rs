@@ -18,7 +18,7 @@ pub(super) struct Job<'a> {
     pub(super) primitive: &'a Primitive,
     /// JSON path of the primitive.
     pub(super) place: String,
-    pub(super) name: String,
+    pub(super) name: &'a str,
     /// Weights of the morph targets; missing ones are zero.
     pub(super) weights: &'a [f32],
     /// Matrices of the skin's joints.
@@ -35,6 +35,17 @@ pub(super) struct Needs {
     pub(super) uv_sets: Vec<u32>,
     /// The set that a normal map is laid out by.
     pub(super) tangents: Option<u32>,
+}
+
+impl Job<'_> {
+    fn weight(&self, target: usize) -> f32 {
+        self.weights.get(target).copied().filter(|w| w.is_finite()).unwrap_or(0.0)
+    }
+
+    /// Whether a morph target is read: it has weight, or nothing is drawn and all is only checked.
+    fn reads_target(&self, target: usize) -> bool {
+        self.weight(target) != 0.0 || !self.drawn
+    }
 }
 
 /// What a primitive gave.
@@ -57,32 +68,32 @@ pub(super) fn read(reader: Reader, job: &Job, report: &mut Report) -> Option<Rea
 /// Bytes that reading a primitive takes, by the declared counts.
 ///
 /// Of a pool of vertices only those are read that the indices name, so that there are at most as many as indices.
-/// `mapped` says that a normal map wants tangents.
-pub(super) fn cost(reader: Reader, primitive: &Primitive, name: &str, mapped: bool) -> u64 {
+pub(super) fn cost(reader: Reader, job: &Job) -> u64 {
     /// A value of a vertex, at most four floats.
     const VALUE: u64 = 16;
+    let primitive = job.primitive;
     let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
     let vertices = positions.map_or(0, |&index| reader.count(index));
     let corners = primitive.indices.map_or(vertices, |index| reader.count(index));
     let used = vertices.min(corners);
-    let targets = primitive.targets.iter().flatten();
-    let morphs = targets.flat_map(|t| [t.positions, t.normals, t.tangents].into_iter().flatten()).count();
-    let values = (primitive.attributes.len() + morphs) as u64;
+    let targets = primitive.targets.iter().flatten().enumerate().filter(|(k, _)| job.reads_target(*k));
+    let morphs = targets.flat_map(|(_, t)| [t.positions, t.normals, t.tangents].into_iter().flatten()).count() as u64;
+    let values = primitive.attributes.len() as u64;
     let faces = match primitive.mode {
         // Nearly every corner starts a face of three.
         Checked::Valid(Mode::TriangleStrip | Mode::TriangleFan) => 36,
         _ => 24,
     };
     // What the generator notes of a corner, which may become a vertex of its own.
-    let tangents = if mapped { 256 + values * VALUE } else { 0 };
+    let tangents = if job.needs.tangents.is_some() { 256 + values * VALUE } else { 0 };
     let set = |semantic: &Checked<Semantic>| match semantic {
         Checked::Valid(Semantic::TexCoords(set)) => Some(*set as usize + 1),
         _ => None,
     };
     // Sets of texture coordinates stand at their number, and those before it are empty.
     let sets = primitive.attributes.keys().filter_map(set).max().unwrap_or(0);
-    let fixed = (size_of::<Read>() + name.len() + sets * size_of::<Vec<Vec2>>()) as u64;
-    let bytes = used.saturating_mul(values * VALUE).saturating_add(corners.saturating_mul(faces + tangents));
+    let fixed = (size_of::<Read>() + job.name.len() + sets * size_of::<Vec<Vec2>>()) as u64;
+    let bytes = used.saturating_mul((values + morphs) * VALUE).saturating_add(corners.saturating_mul(faces + tangents));
     bytes.saturating_add(fixed)
 }
 
@@ -97,7 +108,7 @@ struct Task<'a, 'b> {
 impl Task<'_, '_> {
     fn run(&mut self, mode: Mode) -> Option<Read> {
         let positions = self.attribute(Semantic::Positions)?;
-        let mut mesh = Mesh { name: self.job.name.clone(), ..Mesh::default() };
+        let mut mesh = Mesh { name: self.job.name.into(), ..Mesh::default() };
         let corners = match self.job.primitive.indices {
             Some(index) => Some(self.corners(index, self.reader.count(positions))?),
             None => None,
@@ -242,9 +253,8 @@ impl Task<'_, '_> {
     fn morph(&mut self, mesh: &mut Mesh) {
         let primitive = self.job.primitive;
         for (k, target) in primitive.targets.iter().flatten().enumerate() {
-            let weight = self.job.weights.get(k).copied().filter(|w| w.is_finite()).unwrap_or(0.0);
-            if weight != 0.0 || !self.job.drawn {
-                self.add_target(mesh, target, k, weight);
+            if self.job.reads_target(k) {
+                self.add_target(mesh, target, k, self.job.weight(k));
             }
         }
     }

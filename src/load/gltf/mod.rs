@@ -39,7 +39,7 @@ mod weight;
 use super::limits::Budget;
 use super::paths::Resolver;
 use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source};
-use crate::math::DAffine3;
+use crate::math::{DAffine3, DMat4};
 use crate::scene::{Environment, Instance, Material, Scene};
 use accessor::Reader;
 use buffers::Buffers;
@@ -90,9 +90,25 @@ impl Palette<'_> {
         self.index.get(i).copied().flatten().filter(|_| variant.drawn)
     }
 
-    /// What that material reads of the vertices.
-    fn needs(&self, variant: &scene::Variant, primitive: &source::Primitive) -> Option<&Needs> {
-        self.needs.get(self.material(variant, primitive)? as usize)
+    /// What to read of a primitive, the `k`th of its mesh.
+    fn job<'a>(
+        &self,
+        variant: &'a scene::Variant,
+        mesh: &'a source::Mesh,
+        k: usize,
+        primitive: &'a source::Primitive,
+        skins: &'a [Option<Vec<DMat4>>],
+    ) -> Job<'a> {
+        let needs = self.material(variant, primitive).and_then(|material| self.needs.get(material as usize));
+        Job {
+            primitive,
+            place: format!("meshes[{}].primitives[{k}]", variant.mesh),
+            name: mesh.name.as_deref().unwrap_or_default(),
+            weights: variant.weights.as_deref().or(mesh.weights.as_deref()).unwrap_or_default(),
+            joints: variant.skin.and_then(|s| skins.get(s)).and_then(Option::as_deref),
+            needs: needs.cloned().unwrap_or_default(),
+            drawn: variant.drawn,
+        }
     }
 }
 
@@ -166,7 +182,7 @@ impl Loading<'_> {
 
         let drawn_images = palette.textures.images.clone();
         let images = Images::load(root, &buffers, &drawn_images, file, &mut resolver, budget, self.report);
-        self.charge(reader, &placed, &palette, budget)?;
+        self.charge(reader, &placed, &skins, &palette, budget)?;
         let mut pictures = Report::new(file);
         let (reads, bitmaps) = rayon::join(
             || read_meshes(reader, &placed, &skins, &palette, file),
@@ -201,13 +217,17 @@ impl Loading<'_> {
     }
 
     /// Charges what the primitives will take.
-    fn charge(&self, reader: Reader, placed: &Placed, palette: &Palette, budget: &mut Budget) -> Result<(), LoadError> {
-        let cost = |variant: &scene::Variant, mesh: &source::Mesh, primitive: &source::Primitive| {
-            let mapped = palette.needs(variant, primitive).is_some_and(|needs| needs.tangents.is_some());
-            mesh::cost(reader, primitive, mesh.name.as_deref().unwrap_or_default(), mapped)
-        };
+    fn charge(
+        &self,
+        reader: Reader,
+        placed: &Placed,
+        skins: &[Option<Vec<DMat4>>],
+        palette: &Palette,
+        budget: &mut Budget,
+    ) -> Result<(), LoadError> {
         let meshes = placed.variants.iter().filter_map(|v| Some((v, reader.root.meshes.get(v.mesh)?)));
-        let costs = meshes.flat_map(|(v, mesh)| mesh.primitives.iter().map(move |p| cost(v, mesh, p)));
+        let primitives = meshes.flat_map(|(v, mesh)| mesh.primitives.iter().enumerate().map(move |p| (v, mesh, p)));
+        let costs = primitives.map(|(v, mesh, (k, p))| mesh::cost(reader, &palette.job(v, mesh, k, p, skins)));
         self.take(budget, costs.fold(0, u64::saturating_add), "what the meshes hold")
     }
 
@@ -314,26 +334,16 @@ impl Loading<'_> {
 fn read_meshes(
     reader: Reader,
     placed: &Placed,
-    skins: &[Option<Vec<crate::math::DMat4>>],
+    skins: &[Option<Vec<DMat4>>],
     palette: &Palette,
     file: &std::path::Path,
 ) -> Vec<Vec<(Option<Read>, Report)>> {
     let root = reader.root;
     let read_one = |variant: &scene::Variant, k: usize, primitive: &source::Primitive, mesh: &source::Mesh| {
         let mut report = Report::new(file);
-        let material = palette.material(variant, primitive);
-        let needs = palette.needs(variant, primitive).cloned().unwrap_or_default();
-        let job = Job {
-            primitive,
-            place: format!("meshes[{}].primitives[{k}]", variant.mesh),
-            name: mesh.name.clone().unwrap_or_default(),
-            weights: variant.weights.as_deref().or(mesh.weights.as_deref()).unwrap_or_default(),
-            joints: variant.skin.and_then(|s| skins.get(s)).and_then(Option::as_deref),
-            needs,
-            drawn: variant.drawn,
-        };
+        let job = palette.job(variant, mesh, k, primitive, skins);
         let mut read = mesh::read(reader, &job, &mut report).filter(|_| variant.drawn);
-        if let (Some(read), Some(material)) = (&mut read, material) {
+        if let (Some(read), Some(material)) = (&mut read, palette.material(variant, primitive)) {
             read.mesh.material = material;
         }
         (read, report)

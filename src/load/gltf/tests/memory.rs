@@ -109,3 +109,15 @@ fn sets_of_texture_coordinates_and_tangents_are_charged() {
         assert_eq!(loaded.is_ok(), fits, "{loaded:?}");
     }
 }
+
+#[test]
+fn morph_targets_without_weight_cost_nothing() {
+    let mut file = Builder::new();
+    let positions = file.floats("VEC3", &[0.0; 9000]);
+    let targets = vec![json!({"POSITION": positions}); 100];
+    let primitive = json!({"attributes": {"POSITION": positions}, "targets": targets});
+    for (weight, fits) in [(0, true), (1, false)] {
+        file.set("meshes", json!([{"primitives": [primitive], "weights": vec![weight; 100]}]));
+        assert_eq!(load_bytes(Path::new("a.gltf"), file.gltf(), &limited(2_000_000)).is_ok(), fits, "{weight}");
+    }
+}
