@@ -1,6 +1,7 @@
 //! What is behind a model when nobody says.
 
 use super::program::{CUBE, Folder, picture};
+use meshray::image::diff::{as_is, look};
 
 /// A triangle in a glTF file, with this material.
 fn triangle(material: &str) -> String {
@@ -17,6 +18,8 @@ fn triangle(material: &str) -> String {
 }
 
 const LIT: &str = r#"{"pbrMetallicRoughness":{"metallicFactor":0}}"#;
+/// What a material without any word is: white metal, as rough as can be.
+const METAL: &str = "{}";
 const UNLIT: &str = r#"{"extensions":{"KHR_materials_unlit":{}}}"#;
 const GLOWING: &str = r#"{"emissiveFactor":[1,1,1],"pbrMetallicRoughness":{"baseColorFactor":[0,0,0,1]}}"#;
 
@@ -46,4 +49,20 @@ fn an_unlit_obj_stands_before_the_same_backdrop_as_a_lit_one() {
         .file("unlit.obj", with("unlit"));
     let lit = top(&folder, &["lit.obj", "--mtl", "literal"]);
     assert_eq!(top(&folder, &["unlit.obj", "--mtl", "literal"]), lit);
+}
+
+#[test]
+fn metal_is_neither_dark_nor_blown_out_and_stands_out_from_the_backdrop() {
+    let folder = Folder::new().file("metal.gltf", triangle(METAL));
+    for view in ["front", "iso"] {
+        let render = |background: &[&str]| {
+            folder.render(&[&["metal.gltf", "--view", view, "-o", "out.png"], background].concat()).ends(0);
+            picture(&folder.path("out.png"))
+        };
+        let alone = look(&render(&["--background", "transparent"]), &as_is());
+        assert!((0.2..0.7).contains(&alone.mean_luminance) && alone.clipped < 0.01, "{view}: {alone:?}");
+        let whole = render(&[]);
+        let (metal, behind) = (whole.beauty[12 * 32 + 16][0], whole.beauty[0][0]);
+        assert!(metal > 3.0 * behind, "{view}: {metal} before {behind}");
+    }
 }
