@@ -1,13 +1,15 @@
 //! What a ray really hits: exact for the `f32` ray and triangles, from all of them, by arithmetic of its own.
 //!
-//! Every triangle is looked at in `f64` with bounds of its own; where those cannot tell, rational numbers decide
-//! ([`rational`](crate::math::rational)). To be affordable on large meshes, runs of triangles are skipped when the ray
+//! Every triangle is looked at in `f64` with bounds of its own; where those cannot tell, adaptive predicates and rational
+//! numbers decide ([`rational`](crate::math::rational)). To be affordable on large meshes, runs of triangles are skipped when the ray
 //! misses their box by more than a millionth of its size: nothing else is shared with the structures that it judges.
+
+use std::collections::HashSet;
 
 use dashu::rational::RBig;
 
 use crate::accel::{Ray, Shapes};
-use crate::math::rational::{exact, hit, point};
+use crate::math::rational::{cross, exact, hit, minus, point};
 use crate::math::triangle::Triangle;
 use crate::math::{DVec3, Vec3};
 
@@ -33,6 +35,8 @@ pub struct Truth {
 #[derive(Clone, Debug)]
 pub struct Oracle<'a> {
     shapes: &'a Shapes,
+    /// Triangles with an area, in runs of neighbours; no ray hits one without. Of copies only the lowest.
+    prims: Vec<u32>,
     boxes: Vec<(DVec3, DVec3)>,
 }
 
@@ -47,29 +51,29 @@ struct Candidate {
 impl<'a> Oracle<'a> {
     /// Over all triangles.
     pub fn new(shapes: &'a Shapes) -> Self {
-        let corner = |i: u32| shapes.vertices[i as usize].as_dvec3();
+        let all = 0..u32::try_from(shapes.triangles.len()).unwrap_or(u32::MAX);
+        let mut seen = HashSet::new();
+        let mut prims: Vec<u32> = all.filter(|&prim| has_area(&shapes.triangle(prim))).collect();
+        prims.retain(|&prim| seen.insert(corners(&shapes.triangle(prim))));
+        sort_by_place(&mut prims, shapes);
         let grow = |(lo, hi): (DVec3, DVec3), p: DVec3| (lo.min(p), hi.max(p));
-        let of_run = |run: &[[u32; 3]]| {
+        let of_run = |run: &[u32]| {
             let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-            run.iter().flatten().map(|&i| corner(i)).fold(none, grow)
+            run.iter().flat_map(|&prim| shapes.triangle(prim)).map(|p| p.as_dvec3()).fold(none, grow)
         };
-        Self { shapes, boxes: shapes.triangles.chunks(RUN).map(of_run).collect() }
+        let boxes = prims.chunks(RUN).map(of_run).collect();
+        Self { shapes, prims, boxes }
     }
 
     /// The nearest hit in the ray's range.
     pub fn nearest(&self, ray: &Ray) -> Option<Truth> {
         let mut best: Option<Candidate> = None;
-        for (run, (lo, hi)) in self.boxes.iter().enumerate() {
+        for (run, (lo, hi)) in self.prims.chunks(RUN).zip(&self.boxes) {
             let limit = best.as_ref().map_or(f64::INFINITY, |b| b.t + b.error);
             if !may_meet(*lo, *hi, ray, limit) {
                 continue;
             }
-            let first = run * RUN;
-            for prim in first..(first + RUN).min(self.shapes.triangles.len()) {
-                let prim = u32::try_from(prim).unwrap_or(u32::MAX);
-                if prim == ray.exclude {
-                    continue;
-                }
+            for &prim in run.iter().filter(|&&prim| prim != ray.exclude) {
                 if let Some(found) = self.candidate(ray, prim)
                     && best.as_ref().is_none_or(|b| self.before(ray, &found, b))
                 {
@@ -113,6 +117,40 @@ impl<'a> Oracle<'a> {
     }
 }
 
+/// The same for all triangles with these corners, in any order.
+fn corners(triangle: &Triangle) -> [[u32; 3]; 3] {
+    // Adding 0 makes one zero of two.
+    let mut corners = triangle.map(|p| (p + 0.0).to_array().map(f32::to_bits));
+    corners.sort_unstable();
+    corners
+}
+
+/// Puts triangles near each other side by side: by cells of a grid, along a curve of G. Morton (1966).
+fn sort_by_place(prims: &mut [u32], shapes: &Shapes) {
+    let middle = |prim: u32| shapes.triangle(prim).into_iter().map(|p| p.as_dvec3()).sum::<DVec3>() / 3.0;
+    let (lo, hi) = prims
+        .iter()
+        .map(|&prim| middle(prim))
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)));
+    let cell = |prim: u32| {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` saturates, NaN is 0")]
+        let place = ((middle(prim) - lo) / (hi - lo) * 1023.0).to_array().map(|x| x as u32);
+        (0..10).fold(0u32, |code, bit| code | (0..3).fold(0, |c, k| c | (place[k] >> bit & 1) << (3 * bit + k)))
+    };
+    prims.sort_by_cached_key(|&prim| cell(prim));
+}
+
+/// Whether the corners do not lie on one line, exactly.
+fn has_area(triangle: &Triangle) -> bool {
+    let [a, b, c] = triangle.map(|p| p.as_dvec3());
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z];
+    let certain = axes.into_iter().map(|v| bounded_dot(b - a, c - a, v)).any(|(value, error)| value.abs() > error);
+    certain || {
+        let [a, b, c] = triangle.map(point);
+        cross(&minus(&b, &a), &minus(&c, &a)).iter().any(|x| !x.is_zero())
+    }
+}
+
 /// Whether t is within the range, and not near its ends.
 fn certainly_within(ray: &Ray, t: f64, error: f64) -> bool {
     t - error > f64::from(ray.t_min) && t + error < f64::from(ray.t_max)
@@ -133,7 +171,13 @@ fn in_f64(ray: &Ray, triangle: &Triangle) -> Verdict {
     if sides.iter().any(|s| certain(s, 1.0)) && sides.iter().any(|s| certain(s, -1.0)) {
         return Verdict::Miss;
     }
-    let inside = sides.iter().all(|s| certain(s, 1.0)) || sides.iter().all(|s| certain(s, -1.0));
+    let mut inside = sides.iter().all(|s| certain(s, 1.0)) || sides.iter().all(|s| certain(s, -1.0));
+    if !inside && let Some(signs) = exact_signs(o, d, triangle) {
+        inside = signs.iter().all(|&s| s >= 0.0) || signs.iter().all(|&s| s <= 0.0);
+        if !inside {
+            return Verdict::Miss;
+        }
+    }
     let (top, bottom) = (bounded_dot(b - a, c - a, a), bounded_dot(b - a, c - a, d));
     let doubt = top.1 / top.0.abs() + bottom.1 / bottom.0.abs();
     // Also false for NaN.
@@ -142,6 +186,18 @@ fn in_f64(ray: &Ray, triangle: &Triangle) -> Verdict {
         return Verdict::Hit { t, error: t.abs() * (2.0 * doubt + f64::EPSILON) };
     }
     Verdict::Unknown
+}
+
+/// On which side of the ray each edge passes, by J. R. Shewchuk's adaptive predicate (1997), where the ray's second point
+/// can be given in `f64`.
+fn exact_signs(o: DVec3, d: DVec3, triangle: &Triangle) -> Option<[f64; 3]> {
+    let end = o + d;
+    if end - o != d || end - d != o {
+        return None;
+    }
+    let coord = |p: DVec3| robust::Coord3D { x: p.x, y: p.y, z: p.z };
+    let [a, b, c] = triangle.map(|p| coord(p.as_dvec3()));
+    Some([(b, c), (c, a), (a, b)].map(|(p, q)| robust::orient3d(coord(o), coord(end), p, q)))
 }
 
 /// (p × q) · v and a bound of its error.

@@ -2,6 +2,7 @@
 
 use super::parse;
 use crate::accel::{AccelKind, GridParams, IntersectorKind};
+use crate::bench::verify::Plan;
 use crate::image::ToneMap;
 use crate::scene::framing::NamedView;
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
@@ -33,6 +34,8 @@ pub(super) enum Command {
     Render(Box<RenderArgs>),
     /// Say what a file holds: sizes, faults, materials, cameras, lights, extensions
     Inspect(InspectArgs),
+    /// Judge how far a mesh's hits can be trusted: rays aimed at what is hard, against exact arithmetic
+    Verify(VerifyArgs),
     /// Print a completion script for a shell
     Completions {
         /// The shell
@@ -221,12 +224,43 @@ pub(super) struct GridArgs {
 /// What `meshray inspect` was given.
 #[derive(Debug, Clone, Args)]
 pub(super) struct InspectArgs {
-    /// A model or scene file; `-` reads standard input
-    #[arg(value_name = "FILE")]
-    pub input: PathBuf,
+    /// What to look into.
+    #[command(flatten)]
+    pub model: ModelArgs,
     /// Print JSON (schema `meshray-inspect/1`)
     #[arg(long)]
     pub json: bool,
+    /// Exit with code 3 when there are warnings
+    #[arg(long)]
+    pub strict: bool,
+}
+
+/// What `meshray verify` was given.
+#[derive(Debug, Clone, Args)]
+pub(super) struct VerifyArgs {
+    /// What to judge.
+    #[command(flatten)]
+    pub model: ModelArgs,
+    /// Rays of each kind for each place and size of the mesh
+    #[arg(long, value_name = "N", default_value_t = Plan::DEFAULT.rays, value_parser = parse::positive)]
+    pub rays: usize,
+    /// Other numbers give other rays
+    #[arg(long, value_name = "N", default_value_t = Plan::DEFAULT.seed)]
+    pub seed: u64,
+    /// Print JSON (schema `meshray-verify/1`)
+    #[arg(long)]
+    pub json: bool,
+    /// Only warnings and errors on standard error
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// One model and how to load it.
+#[derive(Debug, Clone, Args)]
+pub(super) struct ModelArgs {
+    /// A model or scene file; `-` reads standard input
+    #[arg(value_name = "FILE")]
+    pub input: PathBuf,
     /// Which scene of a glTF file, by name or number from 0
     #[arg(long, value_name = "NAME")]
     pub scene: Option<String>,
@@ -245,9 +279,6 @@ pub(super) struct InspectArgs {
     /// Refuse inputs that need more memory than this, such as 2G or 500M
     #[arg(long, value_name = "SIZE", value_parser = parse::bytes)]
     pub max_memory: Option<u64>,
-    /// Exit with code 3 when there are warnings
-    #[arg(long)]
-    pub strict: bool,
     /// How messages are written to standard error
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub messages: MessageFormat,

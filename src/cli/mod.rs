@@ -20,6 +20,8 @@ mod read;
 mod render;
 mod shell;
 mod stats;
+mod text;
+mod verify;
 mod version;
 
 pub use exit::Exit;
@@ -46,6 +48,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
     match cli.command {
         Command::Render(args) => render_command(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Verify(args) => verify::run(&args),
         Command::Completions { shell } => shell::completions(shell),
         Command::Man => shell::man(),
     }

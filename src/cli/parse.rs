@@ -82,6 +82,11 @@ pub(super) fn bits(text: &str) -> Result<u8, String> {
     }
 }
 
+/// A number of things, at least one.
+pub(super) fn positive(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|&n| n > 0).ok_or_else(|| "write a number from 1".into())
+}
+
 /// Bytes with an optional binary suffix: `500M`, `2G`, `2GiB`.
 pub(super) fn bytes(text: &str) -> Result<u64, String> {
     let wrong = || "write a size such as 500M or 2G".to_owned();

@@ -1,10 +1,14 @@
 //! Inputs -> one scene, from files or standard input.
 
+use super::args::ModelArgs;
 use super::exit::Exit;
+use super::job;
+use super::message::{Messages, Severity};
 use crate::load::{Diagnostic, LoadError, LoadOptions, Loaded, load, load_bytes};
 use crate::math::DAffine3;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::slice;
 use xxhash_rust::xxh3::xxh3_128;
 
 /// Loads every input and puts all into the first one's scene.
@@ -23,6 +27,24 @@ pub(super) fn scene(inputs: &[PathBuf], options: &LoadOptions) -> Result<Loaded,
     }
     whole.facts.hash = xxh3_128(&hashes);
     Ok(whole)
+}
+
+/// Loads one model and says what there is to warn of; a failure is said too.
+pub(super) fn model(args: &ModelArgs, messages: &Messages) -> Result<Loaded, Exit> {
+    let options = LoadOptions {
+        root: args.root.clone(),
+        limits: job::limits(args.max_memory),
+        polygons: args.polygons.into(),
+        mtl: args.mtl.into(),
+        scene: args.scene.clone(),
+        up: args.up.map(Into::into),
+    };
+    let loaded = scene(slice::from_ref(&args.input), &options).map_err(|error| {
+        messages.load_error(&error);
+        exit_of(&error)
+    })?;
+    loaded.warnings.iter().for_each(|w| messages.say(Severity::Warning, w));
+    Ok(loaded)
 }
 
 fn append(whole: &mut Loaded, part: Loaded) {

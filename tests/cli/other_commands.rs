@@ -56,3 +56,22 @@ fn version_completions_and_manual_go_to_standard_output() {
     }
     assert!(folder.run(&["man"]).ends(0).text().contains(".TH meshray"));
 }
+
+#[test]
+fn verify_judges_a_mesh_and_trusts_the_exact_test() {
+    let folder = Folder::with_cube();
+    let run = folder.run(&["verify", "cube.obj", "--rays", "40", "--json"]);
+    let report: Value = serde_json::from_str(run.ends(0).text()).unwrap();
+    assert_eq!((&report["schema"], &report["trusted"]), (&"meshray-verify/1".into(), &true.into()));
+    assert_eq!((&report["triangles"], report["variations"].as_array().unwrap().len()), (&12.into(), 11));
+
+    let text = folder.run(&["verify", "cube.obj", "--rays", "40", "--quiet"]).ends(0);
+    assert!(text.text().contains("Choose ") && text.errors().is_empty());
+}
+
+#[test]
+fn verify_needs_triangles() {
+    let folder = Folder::new().file("ball.toml", "[[spheres]]\ncenter=[0,0,0]\nradius=1\n");
+    folder.run(&["verify", "ball.toml"]).ends(3).says(&["ball.toml", "no triangles"]);
+    folder.run(&["verify", "ball.toml", "--rays", "0"]).ends(2).says(&["from 1"]);
+}

@@ -11,6 +11,8 @@ const SCALES: [i32; 2] = [-20, 20];
 /// How far the mesh is moved, in units of the file.
 const DISTANCES: [f64; 4] = [1e3, 1e5, 1e7, 1e9];
 
+const IN_F32: &str = "moved in f32";
+
 /// Direction of the move: no axis, and not of unit length.
 const AWAY: DVec3 = DVec3::new(1.0, 0.7, 1.3);
 
@@ -50,7 +52,7 @@ pub fn all(scene: &Scene) -> Vec<Variation> {
     }
     for distance in DISTANCES {
         let by = (AWAY * distance).as_vec3();
-        all.push(made("moved in f32", distance, with_vertices(&original, |p| p + by)));
+        all.push(made(IN_F32, distance, with_vertices(&original, |p| p + by)));
     }
     all
 }
@@ -105,7 +107,7 @@ mod tests {
         for v in &all {
             let exact = extent(v) == extent(&all[0]);
             match v.name {
-                "moved in f32" if v.amount >= 1e9 => assert_eq!((exact, v.collapsed), (false, 2)),
+                IN_F32 if v.amount >= 1e9 => assert_eq!((exact, v.collapsed), (false, 2)),
                 "moved before centring" if v.amount <= 1e7 => {
                     assert!((extent(v).1 - extent(&all[0]).1).abs().max_element() < 1e-6);
                     assert_eq!(v.collapsed, 0);

@@ -14,35 +14,21 @@ mod topology;
 
 use super::args::InspectArgs;
 use super::exit::Exit;
-use super::message::{Messages, Severity};
-use super::{accident, job, print, read};
-use crate::load::LoadOptions;
-use std::slice;
+use super::message::Messages;
+use super::{accident, print, read};
 
 /// Loads the file and prints what was found.
 pub(super) fn run(args: &InspectArgs) -> Exit {
-    let messages = Messages::new(args.messages.into(), false);
-    accident::guard(&args.input.display().to_string(), &messages, || inspect(args, &messages))
+    let messages = Messages::new(args.model.messages.into(), false);
+    accident::guard(&args.model.input.display().to_string(), &messages, || inspect(args, &messages))
 }
 
 fn inspect(args: &InspectArgs, messages: &Messages) -> Exit {
-    let options = LoadOptions {
-        root: args.root.clone(),
-        limits: job::limits(args.max_memory),
-        polygons: args.polygons.into(),
-        mtl: args.mtl.into(),
-        scene: args.scene.clone(),
-        up: args.up.map(Into::into),
-    };
-    let loaded = match read::scene(slice::from_ref(&args.input), &options) {
+    let loaded = match read::model(&args.model, messages) {
         Ok(loaded) => loaded,
-        Err(error) => {
-            messages.load_error(&error);
-            return read::exit_of(&error);
-        }
+        Err(exit) => return exit,
     };
-    loaded.warnings.iter().for_each(|w| messages.say(Severity::Warning, w));
-    let report = report::Report::new(&args.input, &loaded);
+    let report = report::Report::new(&args.model.input, &loaded);
     let text = if args.json { report.json() } else { report.text() };
     match print(&text) {
         Err(e) => {

@@ -1,5 +1,6 @@
 //! The findings of `meshray inspect`, gathered once and shown twice: as text and as JSON.
 
+use super::super::text::grouped;
 use super::topology::Topology;
 use crate::accel::{AccelKind, AnyAccel, GridParams};
 use crate::load::Loaded;
@@ -251,13 +252,6 @@ fn kind(light: &crate::scene::Light) -> &'static str {
     }
 }
 
-/// Digits in threes: `1 234 567`.
-fn grouped(n: u64) -> String {
-    let digits = n.to_string();
-    let groups: Vec<&str> = digits.as_bytes().rchunks(3).rev().filter_map(|c| std::str::from_utf8(c).ok()).collect();
-    groups.join(" ")
-}
-
 fn bytes(n: u64) -> String {
     match n {
         n if n >= 1 << 30 => format!("{:.1} GiB", n as f64 / f64::from(1 << 30)),
@@ -328,10 +322,5 @@ mod tests {
         let shown = Report::new(Path::new("a.toml"), &loaded).text();
         assert!(shown.lines().all(|l| l.as_bytes()[14] == b' ' && !l.contains('\t')), "{shown}");
         assert!(shown.contains("spheres        1\n"), "{shown}");
-    }
-
-    #[test]
-    fn large_numbers_are_grouped() {
-        assert_eq!([0, 999, 1000, 1_234_567].map(grouped), ["0", "999", "1 000", "1 234 567"]);
     }
 }

@@ -1,0 +1,56 @@
+//! `meshray verify`: how far a mesh's hits can be trusted, as text or as JSON.
+//!
+//! # Schema `meshray-verify/1`
+//! One JSON object: `version`, `file`, `hash`, `triangles`, `others` (prims that were not judged), `rays` (of each kind,
+//! for each variation), `seed`; `variations`, each with `what`, `amount`, `collapsed` (triangles that rounding left without area), `disagreements` (rays about which two structures differ), `spawned` (`rays`, `self_hits`, `leaks`,
+//! `false_shadows`) and `rows`; a row has `intersector`, `accel` and, for `all` rays and for each kind of `aims`, `rays`,
+//! `hits`, `missed`, `false_hits`, `wrong_order` (numbers of rays) and `t_ulps_max`, `t_ulps_rms`; `costs`
+//! (`intersector`, `ns_per_ray`); `choose` (an intersector), `trusted`. Keys are only ever added.
+
+mod report;
+
+use super::args::VerifyArgs;
+use super::exit::Exit;
+use super::message::Messages;
+use super::{accident, print, read};
+use crate::bench::verify::{Plan, verify};
+
+/// Loads the file, judges it and prints what was found.
+pub(super) fn run(args: &VerifyArgs) -> Exit {
+    let messages = Messages::new(args.model.messages.into(), args.quiet);
+    accident::guard(&args.model.input.display().to_string(), &messages, || judge(args, &messages))
+}
+
+fn judge(args: &VerifyArgs, messages: &Messages) -> Exit {
+    let loaded = match read::model(&args.model, messages) {
+        Ok(loaded) => loaded,
+        Err(exit) => return exit,
+    };
+    let name = args.model.input.display().to_string();
+    let plan = Plan { rays: args.rays, seed: args.seed, ..Plan::DEFAULT };
+    let go_on = |done: usize, of: usize| {
+        messages.info("progress", format!("{name}: place and size {} of {of}", done + 1));
+        true
+    };
+    let Some(findings) = verify(&loaded.scene, &plan, go_on) else {
+        messages.error("nothing-to-verify", format!("{name}: no triangles to aim at"), "give a file with a mesh");
+        return Exit::Input;
+    };
+    let report = report::Report { name: &name, hash: loaded.facts.hash, plan: &plan, findings: &findings };
+    let text = if args.json { report.json() } else { report.text() };
+    match print(&text) {
+        Err(e) => {
+            messages.error("output-unwritable", format!("standard output: {e}"), "");
+            Exit::Failed
+        }
+        Ok(()) if findings.trusted() => Exit::Done,
+        Ok(()) => {
+            messages.error(
+                "hits-not-exact",
+                format!("{name}: the exact test or a structure gave a wrong hit"),
+                "please report it with the file",
+            );
+            Exit::Failed
+        }
+    }
+}

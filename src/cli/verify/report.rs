@@ -1,0 +1,276 @@
+//! The findings of `meshray verify`, shown as text and as JSON.
+
+use super::super::text::grouped;
+use crate::accel::{AccelKind, IntersectorKind};
+use crate::bench::aim::Aim;
+use crate::bench::verify::tally::{Rate, Tally};
+use crate::bench::verify::{Findings, Plan, Row, Section};
+use serde_json::{Value, json};
+use std::fmt::Write;
+
+/// What there is to show.
+pub(super) struct Report<'a> {
+    /// The file as typed.
+    pub name: &'a str,
+    /// Of everything that was read.
+    pub hash: u128,
+    /// What was asked for.
+    pub plan: &'a Plan,
+    /// What came out.
+    pub findings: &'a Findings,
+}
+
+impl Report<'_> {
+    /// Tables and a verdict.
+    pub(super) fn text(&self) -> String {
+        let mut text = String::new();
+        // Writing to a string cannot fail.
+        let _ = self.write(&mut text);
+        text
+    }
+
+    fn write(&self, out: &mut String) -> std::fmt::Result {
+        let f = self.findings;
+        let rays = self.plan.rays * Aim::ALL.len();
+        let aims = Aim::ALL.map(Aim::name).join(", ");
+        writeln!(out, "{}: {} triangles", self.name, count(f.triangles))?;
+        if f.others > 0 {
+            writeln!(out, "{} polygons, spheres and planes are not judged", count(f.others))?;
+        }
+        writeln!(out, "{} rays for each place and size, {} each at: {aims}", count(rays), count(self.plan.rays))?;
+        writeln!(out, "wrong answers per million rays, by exact arithmetic; < n: none seen, fewer than n at 95 %")?;
+        for section in &f.sections {
+            write_section(out, section)?;
+        }
+        self.write_aims(out)?;
+        self.write_costs(out)?;
+        writeln!(out)?;
+        writeln!(out, "{}", self.verdict())
+    }
+
+    /// Where the tests fail: the default structure, all places and sizes together.
+    fn write_aims(&self, out: &mut String) -> std::fmt::Result {
+        writeln!(
+            out,
+            "\nmissed per million, by what was aimed at, all places and sizes together, {}",
+            AccelKind::DEFAULT
+        )?;
+        write!(out, "  {:24}", "intersector")?;
+        Aim::ALL.iter().try_for_each(|aim| write!(out, "{:>14}", aim.name()))?;
+        writeln!(out)?;
+        for test in IntersectorKind::ALL {
+            write!(out, "  {test:24}")?;
+            for aim in 0..Aim::ALL.len() {
+                let tally = self.by_aim(test, aim);
+                write!(out, "{:>14}", rate(tally.missed, tally.rays))?;
+            }
+            writeln!(out)?;
+        }
+        Ok(())
+    }
+
+    fn by_aim(&self, test: IntersectorKind, aim: usize) -> Tally {
+        let rows = self.findings.sections.iter().flat_map(|s| &s.rows);
+        let rows = rows.filter(|r| r.test == test && r.accel == AccelKind::DEFAULT);
+        rows.fold(Tally::default(), |sum, r| sum + r.tallies[aim])
+    }
+
+    fn write_costs(&self, out: &mut String) -> std::fmt::Result {
+        writeln!(
+            out,
+            "\ntime of these rays on one thread, {}, against {}",
+            AccelKind::DEFAULT,
+            IntersectorKind::Exact
+        )?;
+        for cost in &self.findings.costs {
+            writeln!(
+                out,
+                "  {:24}{:>10.0} ns a ray {:>8.2}",
+                cost.test.name(),
+                cost.per_ray.as_secs_f64() * 1e9,
+                self.ratio(cost.test)
+            )?;
+        }
+        Ok(())
+    }
+
+    /// Time of a test over that of the exact one.
+    fn ratio(&self, test: IntersectorKind) -> f64 {
+        let time = |test| {
+            let cost = self.findings.costs.iter().find(|c| c.test == test);
+            cost.map_or(f64::NAN, |c| c.per_ray.as_secs_f64())
+        };
+        time(test) / time(IntersectorKind::Exact)
+    }
+
+    /// The least costly test without a wrong answer; the exact one where none is.
+    fn choice(&self) -> IntersectorKind {
+        let clean = IntersectorKind::ALL.into_iter().filter(|&t| self.findings.total(t).is_clean());
+        clean.min_by(|&a, &b| self.ratio(a).total_cmp(&self.ratio(b))).unwrap_or_default()
+    }
+
+    fn verdict(&self) -> String {
+        let choice = self.choice();
+        let total = self.findings.total(choice);
+        let other = IntersectorKind::MollerTrumbore;
+        let compared = self.findings.total(other);
+        format!(
+            "Choose {choice} for this mesh: {} wrong answers in {} rays ({} per million); {other} gave {} ({} per million) \
+             in {:.2} times its time.",
+            count(total.wrong()),
+            count(total.rays),
+            rate(total.wrong(), total.rays),
+            count(compared.wrong()),
+            rate(compared.wrong(), compared.rays),
+            self.ratio(other) / self.ratio(choice),
+        )
+    }
+
+    /// One line.
+    pub(super) fn json(&self) -> String {
+        let f = self.findings;
+        let costs: Vec<Value> = f
+            .costs
+            .iter()
+            .map(|c| json!({ "intersector": c.test.name(), "ns_per_ray": c.per_ray.as_secs_f64() * 1e9 }))
+            .collect();
+        let value = json!({
+            "schema": "meshray-verify/1", "version": env!("CARGO_PKG_VERSION"), "file": self.name,
+            "hash": format!("{:032x}", self.hash), "triangles": f.triangles, "others": f.others,
+            "rays": self.plan.rays, "seed": self.plan.seed,
+            "variations": f.sections.iter().map(section_json).collect::<Vec<_>>(),
+            "costs": costs, "choose": self.choice().name(), "trusted": f.trusted(),
+        });
+        format!("{value}\n")
+    }
+}
+
+fn write_section(out: &mut String, section: &Section) -> std::fmt::Result {
+    let amount = if section.amount == 0.0 { String::new() } else { format!(" by {:e}", section.amount) };
+    writeln!(out, "\n{}{amount}", section.variation)?;
+    if section.collapsed > 0 {
+        writeln!(out, "  {} triangles collapsed by rounding", count(section.collapsed))?;
+    }
+    let title = ["rays", "missed", "false", "wrong order", "t max ulp", "t rms ulp"];
+    write!(out, "  {:24}{:12}", "intersector", "accel")?;
+    title.iter().try_for_each(|t| write!(out, "{t:>12}"))?;
+    writeln!(out)?;
+    for row in &section.rows {
+        let t = row.total();
+        let rates = [t.missed, t.false_hits, t.wrong_order].map(|n| rate(n, t.rays));
+        write!(out, "  {:24}{:12}{:>12}", row.test.name(), row.accel.name(), count(t.rays))?;
+        rates.iter().try_for_each(|r| write!(out, "{r:>12}"))?;
+        writeln!(out, "{:>12}{:>12}", short(t.max_ulps), short(t.rms_ulps()))?;
+    }
+    let s = &section.spawned;
+    writeln!(
+        out,
+        "  exact: {} rays differ between structures; of {} shadow rays {} hit their own surface, {} leaked, {} were stopped \
+         by nothing",
+        count(section.disagreements),
+        count(s.rays),
+        count(s.self_hits),
+        count(s.leaks),
+        count(s.false_shadows)
+    )
+}
+
+fn section_json(section: &Section) -> Value {
+    let s = &section.spawned;
+    json!({
+        "what": section.variation, "amount": section.amount, "collapsed": section.collapsed,
+        "disagreements": section.disagreements,
+        "spawned": {
+            "rays": s.rays, "self_hits": s.self_hits, "leaks": s.leaks, "false_shadows": s.false_shadows,
+        },
+        "rows": section.rows.iter().map(row_json).collect::<Vec<_>>(),
+    })
+}
+
+fn row_json(row: &Row) -> Value {
+    let aims = Aim::ALL.iter().zip(&row.tallies).map(|(aim, t)| (aim.name().to_owned(), tally_json(t)));
+    json!({
+        "intersector": row.test.name(), "accel": row.accel.name(), "all": tally_json(&row.total()),
+        "aims": aims.collect::<serde_json::Map<_, _>>(),
+    })
+}
+
+fn tally_json(t: &Tally) -> Value {
+    json!({
+        "rays": t.rays, "hits": t.hits, "missed": t.missed, "false_hits": t.false_hits, "wrong_order": t.wrong_order,
+        "t_ulps_max": t.max_ulps, "t_ulps_rms": t.rms_ulps(),
+    })
+}
+
+fn count(n: usize) -> String {
+    grouped(n as u64)
+}
+
+/// Per million.
+fn rate(n: usize, rays: usize) -> String {
+    match Rate::new(n, rays) {
+        Rate::Seen(rate) => short(rate),
+        Rate::Below(bound) => format!("< {}", short(bound)),
+    }
+}
+
+/// Three digits or so.
+fn short(x: f64) -> String {
+    match x {
+        x if x >= 1e6 => format!("{x:.1e}"),
+        x if x >= 100.0 || x == 0.0 => format!("{x:.0}"),
+        x if x >= 1.0 => format!("{x:.1}"),
+        x => format!("{x:.2}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::verify::verify;
+    use crate::load::{LoadOptions, load_bytes};
+
+    /// A closed box, twisted so that no face lies along an axis.
+    const BOX: &str = "[[meshes]]\npositions=[[0,0,0],[2,0.1,0],[2,1,0.2],[0,1,0],[0.1,0,1],[2,0,1.1],[2,1.3,1],[0,1,1]]\n\
+                       faces=[[0,2,1],[0,3,2],[4,5,6],[4,6,7],[0,1,5],[0,5,4],[3,7,6],[3,6,2],[0,4,7],[0,7,3],[1,2,6],[1,6,5]]\n";
+
+    fn findings(plan: &Plan) -> Findings {
+        let loaded = load_bytes("box.toml".as_ref(), BOX.into(), &LoadOptions::default()).unwrap();
+        verify(&loaded.scene, plan, |_, _| true).unwrap()
+    }
+
+    #[test]
+    fn the_exact_test_is_clean_everywhere_and_the_others_are_not() {
+        let plan = Plan { rays: 300, ..Plan::DEFAULT };
+        let findings = findings(&plan);
+        assert!(findings.trusted());
+        let exact = findings.total(IntersectorKind::Exact);
+        assert!(exact.is_clean() && exact.max_ulps <= 0.5 && exact.hits > exact.rays / 2, "{exact:?}");
+        assert!(findings.total(IntersectorKind::MollerTrumbore).missed > 0);
+        assert!(findings.sections.iter().all(|s| s.rows.len() == 20) && findings.sections[0].spawned.rays > 100);
+
+        let report = Report { name: "box.toml", hash: 7, plan: &plan, findings: &findings };
+        let text = report.text();
+        assert!(
+            text.contains("as it is") && text.contains("moved in f32 by 1e9") && text.contains("Choose "),
+            "{text}"
+        );
+        let json: Value = serde_json::from_str(&report.json()).unwrap();
+        assert_eq!(
+            (&json["triangles"], &json["trusted"], &json["hash"]),
+            (&12.into(), &true.into(), &format!("{:032x}", 7).into())
+        );
+        assert_eq!(json["variations"][0]["rows"][0]["aims"]["corners"]["rays"], 300);
+    }
+
+    #[test]
+    fn a_judge_can_be_stopped() {
+        let loaded = load_bytes("box.toml".as_ref(), BOX.into(), &LoadOptions::default()).unwrap();
+        assert!(verify(&loaded.scene, &Plan::DEFAULT, |done, _| done < 1).is_none());
+    }
+
+    #[test]
+    fn rates_say_how_much_is_known() {
+        assert_eq!([rate(0, 12_000), rate(3, 12_000), rate(0, 3_000_000)], ["< 250", "250", "< 1.0"]);
+    }
+}
