@@ -71,15 +71,15 @@ fn remedy(name: &str) -> &'static str {
 /// Names in one message before the rest is only counted.
 const LISTED: usize = 20;
 
-/// Whether a still is drawn as this extension says.
-fn is_supported(name: &str) -> bool {
-    SUPPORTED.contains(&name)
-}
+/// A closed volume that bends light and may absorb it.
+const VOLUME: &str = "KHR_materials_volume";
 
 /// The extensions a file names.
 pub(super) struct Lists {
     used: Vec<String>,
     required: Vec<String>,
+    /// Whether no volume absorbs light: then its boundary is all there is to KHR_materials_volume.
+    clear_volumes: bool,
 }
 
 impl Lists {
@@ -89,7 +89,10 @@ impl Lists {
             let words = root.get(name).and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str);
             words.map(str::to_owned).collect::<Vec<_>>()
         };
-        Self { used: list("extensionsUsed"), required: list("extensionsRequired") }
+        let materials = root.get("materials").and_then(Value::as_array).into_iter().flatten();
+        let mut volumes = materials.filter_map(|m| m.get("extensions")?.get(VOLUME));
+        let clear_volumes = volumes.all(|v| v.get("attenuationDistance").is_none());
+        Self { used: list("extensionsUsed"), required: list("extensionsRequired"), clear_volumes }
     }
 
     /// Each extension once: name, whether required, whether supported.
@@ -97,7 +100,12 @@ impl Lists {
         let required: HashSet<&String> = self.required.iter().collect();
         let mut seen = HashSet::new();
         let each_once = self.used.iter().chain(&self.required).filter(|name| seen.insert(*name));
-        each_once.map(|name| (name.clone(), required.contains(name), is_supported(name))).collect()
+        each_once.map(|name| (name.clone(), required.contains(name), self.is_supported(name))).collect()
+    }
+
+    /// Whether a still is drawn as this extension says.
+    fn is_supported(&self, name: &str) -> bool {
+        SUPPORTED.contains(&name) || (name == VOLUME && self.clear_volumes)
     }
 
     /// Refuses what is required and not understood; names in one warning what is only used and changes the look.
@@ -180,6 +188,17 @@ mod tests {
         );
         assert!(faults[0].contains("; decompress it"));
         assert!(warnings.is_empty());
+    }
+
+    #[test]
+    fn a_volume_is_warned_of_only_where_it_absorbs_light() {
+        let with = |volume: Value| {
+            let materials = json!([{ "extensions": { "KHR_materials_volume": volume } }]);
+            messages(&json!({ "extensionsUsed": ["KHR_materials_volume"], "materials": materials })).1
+        };
+        assert_eq!(with(json!({ "thicknessFactor": 0.5 })), Vec::<String>::new());
+        let absorbing = with(json!({ "thicknessFactor": 0.5, "attenuationDistance": 0.1 }));
+        assert_eq!(absorbing, ["a.gltf:extensionsUsed: drawn without KHR_materials_volume"]);
     }
 
     #[test]
