@@ -165,4 +165,40 @@ mod tests {
         assert!((at(486.13) - at(656.27) - 0.5168 / 64.2).abs() < 1e-5);
         assert_eq!(dispersed_index(1.5, 0.0, 400.0), 1.5);
     }
+
+    /// Angle in degrees from the point opposite the sun at which light leaves a drop that it entered at `impact` radii from
+    /// the middle: refracted, reflected inside, refracted.
+    fn rainbow_angle(impact: f32, n_air: f64, n_drop: f64) -> Option<f64> {
+        let sunlight = Vec3::NEG_Z;
+        let entry = Vec3::new(impact, 0.0, (1.0 - impact * impact).sqrt());
+        let inside = refract(sunlight, entry, n_air, n_drop)?;
+        // A chord of the unit sphere is as long as twice the cosine at its ends.
+        let across = |from: Vec3, dir: Vec3| (from - 2.0 * from.dot(dir) * dir).normalize();
+        let back = across(entry, inside);
+        let reflected = reflect(inside, back);
+        let exit = across(back, reflected);
+        let out = refract(reflected, -exit, n_drop, n_air)?;
+        Some(degrees_from(-sunlight, out))
+    }
+
+    #[test]
+    fn a_drop_makes_a_rainbow_with_red_outside() {
+        let (air, water) = (by_name("air").expect("air"), by_name("water").expect("water"));
+        let brightest = |n: f64| {
+            let angles = (1..2000).filter_map(|i| rainbow_angle(i as f32 / 2000.0, air, n));
+            angles.fold(0.0, f64::max)
+        };
+        // R. Descartes, 1637: the light gathers where the angle 4 θt − 2 θi is stationary, at cos² θi = (n² − 1) / 3.
+        let stationary = |n: f64| {
+            let ratio = n / air;
+            let theta_i = libm::acos(((ratio * ratio - 1.0) / 3.0).sqrt());
+            (4.0 * libm::asin(libm::sin(theta_i) / ratio) - 2.0 * theta_i).to_degrees()
+        };
+        let (red, violet) = (dispersed_index(water, 20.0 / 55.8, 656.3), dispersed_index(water, 20.0 / 55.8, 404.7));
+        for n in [red, water, violet] {
+            assert!((brightest(n) - stationary(n)).abs() < 1e-3, "{n}: {} for {}", brightest(n), stationary(n));
+        }
+        assert!((42.0..43.0).contains(&brightest(red)), "{}", brightest(red));
+        assert!((1.0..2.5).contains(&(brightest(red) - brightest(violet))), "{}", brightest(violet));
+    }
 }
