@@ -117,14 +117,15 @@ mod tests {
         }
     }
 
-    /// Triangles of all sizes, rays at random and at corners and edges, scaled by 2^exponent.
-    fn each_case(exponent: i32, mut check: impl FnMut(&RaySpace, &[[Vec3; 3]; LANES], &Corners8)) {
+    /// Triangles of all sizes, rays at random and at corners and edges, scaled by 2^exponent; the triangles themselves
+    /// smaller by 2^smaller.
+    fn each_case(exponent: i32, smaller: i32, mut check: impl FnMut(&RaySpace, &[[Vec3; 3]; LANES], &Corners8)) {
         let mut random = Random(7);
-        let scale = 2.0f32.powi(exponent);
+        let (scale, shrink) = (2.0f32.powi(exponent), 2.0f32.powi(-smaller));
         for case in 0..600 {
             let triangles: [[Vec3; 3]; LANES] = std::array::from_fn(|_| {
                 let (place, size) = (random.cube(), random.unit() * random.unit());
-                std::array::from_fn(|_| (place + random.cube() * size) * scale)
+                std::array::from_fn(|_| (place + random.cube() * size * shrink) * scale)
             });
             let mut corners = NO_CORNERS;
             (0..LANES).for_each(|lane| set_corners(&mut corners, lane, &triangles[lane]));
@@ -141,11 +142,12 @@ mod tests {
     fn certain_verdicts_of_eight_lanes_are_those_of_the_exact_test() {
         for exponent in [-120, -60, -30, 0, 30, 60, 120] {
             let (mut hits, mut misses, mut cases) = (0, 0, 0);
-            each_case(exponent, |ray, triangles, corners| {
+            each_case(exponent, 0, |ray, triangles, corners| {
                 let verdicts = Level::PORTABLE.run(Test(ray, corners));
                 assert_eq!(verdicts.hit & verdicts.unsure, 0);
                 for (lane, triangle) in triangles.iter().enumerate() {
-                    let exact = triangle::is_hit(ray, triangle);
+                    let exact = triangle::is_hit_near_edge(ray, triangle);
+                    assert_eq!(exact, triangle::is_hit(ray, triangle), "2^{exponent}");
                     cases += 1;
                     hits += verdicts.hit >> lane & 1;
                     misses += 1 - ((verdicts.hit | verdicts.unsure) >> lane & 1);
@@ -158,10 +160,30 @@ mod tests {
         }
     }
 
+    /// Small triangles seen from far away, so small that the terms of the bound itself are rounded to nothing.
+    #[test]
+    fn verdicts_hold_where_edge_values_are_the_smallest_numbers() {
+        let mut certain = 0;
+        for exponent in -70..-54 {
+            for smaller in [4, 8, 12] {
+                each_case(exponent, smaller, |ray, triangles, corners| {
+                    let verdicts = Level::PORTABLE.run(Test(ray, corners));
+                    for (lane, triangle) in triangles.iter().enumerate() {
+                        let exact = triangle::is_hit_near_edge(ray, triangle);
+                        assert_eq!(exact, triangle::is_hit(ray, triangle), "2^{exponent} 2^-{smaller}");
+                        certain += 1 - (verdicts.unsure >> lane & 1);
+                        assert!(verdicts.unsure >> lane & 1 == 1 || exact == (verdicts.hit >> lane & 1 == 1));
+                    }
+                });
+            }
+        }
+        assert!(certain > 1000, "{certain}");
+    }
+
     #[test]
     fn every_level_gives_the_same_masks() {
         for exponent in [-120, 0, 100] {
-            each_case(exponent, |ray, _, corners| {
+            each_case(exponent, 0, |ray, _, corners| {
                 let expected = Level::PORTABLE.run(Test(ray, corners));
                 for level in Level::all() {
                     assert_eq!(level.run(Test(ray, corners)), expected, "{}", level.name());
