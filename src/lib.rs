@@ -52,16 +52,17 @@
 //! # Modules
 //! | module | knows |
 //! |---|---|
-//! | [`math`] | only numbers: error bounds, rays against triangle, polygon, sphere, plane, box |
+//! | [`math`] | only numbers: error bounds, eight lanes at once, rays against triangle, polygon, sphere, plane, box |
 //! | [`scene`] | plain data with indices; which features a scene needs, default camera and light |
 //! | [`load`] | files -> scene and warnings: glTF, OBJ + MTL, scene files |
 //! | [`accel`] | shapes -> what does this ray hit: `none`, `grid-octree`, `fast-octree`, `fast-bvh`; counts |
 //! | [`mod@render`] | rays -> linear pixels: waves, shading models, lights and shadows, optics, textures |
 //! | [`image`] | linear pixels <-> files: tone mapping, formats, metadata, differences |
+//! | [`bench`] | measures and compares: hard rays, exact answers, what came out |
 //! | `cli` | words -> jobs -> messages and exit codes (feature `cli`) |
 //!
-//! `scene` and `accel` use `math`; `load` uses `scene`; `render` uses `scene`, `accel` and `image`; `cli` uses all. `accel`
-//! sees shapes only: another renderer could use it as it is.
+//! `scene` and `accel` use `math`; `load` uses `scene`; `render` uses `scene`, `accel` and `image`; `bench` uses
+//! `render`, `accel` and `scene`; `cli` uses all. `accel` sees shapes only: another renderer could use it as it is.
 //!
 //! # What a caller can rely on
 //! - The same scene and settings give the same pixels for every structure and number of threads.

@@ -1,8 +1,8 @@
 //! Rays that are hard on a mesh.
 
-use super::random::Random;
 use crate::accel::{NO_PRIM, Ray, Shapes};
 use crate::math::Vec3;
+use crate::math::random::Random;
 use crate::math::triangle::{self, Triangle};
 
 /// What rays are aimed at.

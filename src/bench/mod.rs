@@ -2,5 +2,4 @@
 
 pub mod aim;
 pub mod oracle;
-pub mod random;
 pub mod verify;

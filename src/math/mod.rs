@@ -16,6 +16,7 @@ mod oracle;
 pub mod plane;
 pub mod polygon;
 pub mod quotient;
+pub mod random;
 pub mod rational;
 pub mod shear;
 pub mod simd;

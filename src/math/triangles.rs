@@ -101,10 +101,10 @@ fn largest3<S: Simd>(s: S, [x, y, z]: [S::Lanes; 3]) -> S::Lanes {
 
 #[cfg(test)]
 mod tests {
+    use super::super::random::Random;
     use super::super::simd::{Kernel, Level};
     use super::super::triangle;
     use super::*;
-    use crate::accel::tests::scenes::Random;
 
     struct Test<'a>(&'a RaySpace, &'a Corners8);
 
@@ -120,7 +120,7 @@ mod tests {
     /// Triangles of all sizes, rays at random and at corners and edges, scaled by 2^exponent; the triangles themselves
     /// smaller by 2^smaller.
     fn each_case(exponent: i32, smaller: i32, mut check: impl FnMut(&RaySpace, &[[Vec3; 3]; LANES], &Corners8)) {
-        let mut random = Random(7);
+        let mut random = Random::new(7);
         let (scale, shrink) = (2.0f32.powi(exponent), 2.0f32.powi(-smaller));
         for case in 0..600 {
             let triangles: [[Vec3; 3]; LANES] = std::array::from_fn(|_| {

@@ -2,33 +2,7 @@
 
 use crate::accel::{BitSet, NO_PRIM, Ray, Shapes, SpherePrim};
 use crate::math::Vec3;
-
-/// G. Steele, D. Lea, C. Flood, *SplitMix*, 2014.
-pub(crate) struct Random(pub u64);
-
-impl Random {
-    pub(crate) fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// 0 ≤ x < 1.
-    pub(crate) fn unit(&mut self) -> f32 {
-        (self.next() >> 40) as f32 / (1u32 << 24) as f32
-    }
-
-    pub(crate) fn below(&mut self, n: usize) -> usize {
-        (self.next() % n.max(1) as u64) as usize
-    }
-
-    /// In the cube −1..1.
-    pub(crate) fn cube(&mut self) -> Vec3 {
-        Vec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
-    }
-}
+use crate::math::random::Random;
 
 pub(crate) fn mesh(vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Shapes {
     seal(Shapes { vertices, triangles, ..Shapes::default() })
@@ -45,7 +19,7 @@ fn seal(mut shapes: Shapes) -> Shapes {
 
 /// Triangles anywhere, of many sizes.
 pub(crate) fn soup(n: u32, size: f32) -> Shapes {
-    let mut r = Random(1);
+    let mut r = Random::new(1);
     let mut vertices = Vec::new();
     for _ in 0..n {
         let center = r.cube();
@@ -59,7 +33,7 @@ pub(crate) fn soup(n: u32, size: f32) -> Shapes {
 
 /// A closed star-shaped mesh around the origin, of random radius 1 to 1.2.
 pub(crate) fn star(columns: u32, rows: u32) -> Shapes {
-    let mut r = Random(2);
+    let mut r = Random::new(2);
     let mut vertices = vec![Vec3::Y, Vec3::NEG_Y];
     for row in 1..rows {
         let polar = std::f32::consts::PI * row as f32 / rows as f32;
@@ -102,7 +76,7 @@ pub(crate) fn fan(n: u32) -> Shapes {
 
 /// Axis-parallel unit squares on an integer lattice: faces in cell planes, corners at lattice points.
 pub(crate) fn lattice(n: u32) -> Shapes {
-    let mut r = Random(3);
+    let mut r = Random::new(3);
     let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
     for _ in 0..n {
         let axis = r.below(3);
@@ -119,7 +93,7 @@ pub(crate) fn lattice(n: u32) -> Shapes {
 
 /// Triangles, concave polygons, spheres and planes together.
 pub(crate) fn mix() -> Shapes {
-    let mut r = Random(4);
+    let mut r = Random::new(4);
     let mut shapes = soup(60, 0.5);
     for _ in 0..40 {
         let (center, u, v) = (r.cube(), r.cube() * 0.3, r.cube() * 0.3);
@@ -194,7 +168,7 @@ pub(crate) fn all() -> Vec<(&'static str, Shapes)> {
 
 /// `n` rays of each kind that is hard on a scene.
 pub(crate) fn rays(shapes: &Shapes, n: usize) -> Vec<Ray> {
-    let mut r = Random(5);
+    let mut r = Random::new(5);
     let fallback = [Vec3::ZERO, Vec3::X, Vec3::Y];
     let (lo, hi) =
         shapes.vertices.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));

@@ -1,12 +1,13 @@
 //! Closed meshes let nothing out.
 
-use super::scenes::{Random, ray, star};
+use super::scenes::{ray, star};
 use crate::accel::*;
 use crate::math::Vec3;
+use crate::math::random::Random;
 
 /// Rays from inside towards corners, edge midpoints and edge points of a closed mesh.
 fn aimed(shapes: &Shapes, n: usize) -> Vec<Ray> {
-    let mut r = Random(6);
+    let mut r = Random::new(6);
     let mut rays = Vec::new();
     for _ in 0..n {
         let origin = r.cube() * 0.5;

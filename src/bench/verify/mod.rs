@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use self::spawned::{Spawned, spawned};
 use self::tally::Tally;
-use self::variation::Variation;
+use self::variation::{Variation, Variations};
 use super::aim::{Aim, Aimer};
 use super::oracle::{Oracle, Truth};
 use crate::accel::{Accel, AccelKind, AnyAccel, GridParams, Hit, IntersectorKind, NoProbe, Ray};
@@ -117,18 +117,18 @@ impl Findings {
 
 /// Judges a scene. `done` is told of each variation; `None` when it says to stop, or without triangles.
 pub fn verify(scene: &Scene, plan: &Plan, mut go_on: impl FnMut(usize, usize) -> bool) -> Option<Findings> {
-    let variations = variation::all(scene);
-    let original = variations.first()?;
+    let variations = Variations::new(scene);
+    let original = variations.get(0);
     let triangles = original.shapes.triangles.len();
     let mut findings = Findings { triangles, others: original.others, sections: Vec::new(), costs: Vec::new() };
     Aimer::new(&original.shapes, plan.seed)?;
-    for (i, variation) in variations.iter().enumerate() {
-        if !go_on(i, variations.len()) {
+    for i in 0..Variations::COUNT {
+        if !go_on(i, Variations::COUNT) {
             return None;
         }
-        findings.sections.push(section(variation, plan)?);
+        findings.sections.push(section(&variations.get(i), plan)?);
     }
-    findings.costs = costs(original, plan)?;
+    findings.costs = costs(&original, plan)?;
     Some(findings)
 }
 

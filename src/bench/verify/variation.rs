@@ -5,16 +5,34 @@ use crate::math::{DVec3, Vec3};
 use crate::render::World;
 use crate::scene::Scene;
 
-/// Powers of two by which the mesh is scaled; that changes no digit of any number.
-const SCALES: [i32; 2] = [-20, 20];
-
-/// How far the mesh is moved, in units of the file.
-const DISTANCES: [f64; 4] = [1e3, 1e5, 1e7, 1e9];
-
-const IN_F32: &str = "moved in f32";
-
-/// Direction of the move: no axis, and not of unit length.
+/// Direction of a move: no axis, and not of unit length.
 const AWAY: DVec3 = DVec3::new(1.0, 0.7, 1.3);
+
+/// What is done to the mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Change {
+    None,
+    /// By a power of two, which changes no digit of any number.
+    Scaled(i32),
+    /// In units of the file, by the transforms, before the scene is centred.
+    MovedBeforeCentring(f64),
+    /// In units of the file, in the stored vertices.
+    MovedInF32(f64),
+}
+
+const CHANGES: [Change; 11] = [
+    Change::None,
+    Change::Scaled(-20),
+    Change::Scaled(20),
+    Change::MovedBeforeCentring(1e3),
+    Change::MovedBeforeCentring(1e5),
+    Change::MovedBeforeCentring(1e7),
+    Change::MovedBeforeCentring(1e9),
+    Change::MovedInF32(1e3),
+    Change::MovedInF32(1e5),
+    Change::MovedInF32(1e7),
+    Change::MovedInF32(1e9),
+];
 
 /// The mesh after something was done to it.
 #[derive(Clone, Debug)]
@@ -31,39 +49,60 @@ pub struct Variation {
     pub others: usize,
 }
 
-/// Every variation, the unchanged mesh first.
-pub fn all(scene: &Scene) -> Vec<Variation> {
-    let world = World::new(scene);
-    let others = world.shapes.len() - world.shapes.triangles.len();
-    let original = only_triangles(&world.shapes);
-    let proper = distinct(&original);
-    let made = |name, amount, shapes: Shapes| {
-        let collapsed = proper.saturating_sub(distinct(&shapes));
-        Variation { name, amount, shapes, collapsed, others }
-    };
-    let mut all = vec![made("as it is", 0.0, original.clone())];
-    for power in SCALES {
-        let factor = libm::scalbnf(1.0, power);
-        all.push(made("scaled", f64::from(factor), with_vertices(&original, |p| p * factor)));
-    }
-    for distance in DISTANCES {
-        let moved = only_triangles(&World::new(&moved(scene, AWAY * distance)).shapes);
-        all.push(made("moved before centring", distance, moved));
-    }
-    for distance in DISTANCES {
-        let by = (AWAY * distance).as_vec3();
-        all.push(made(IN_F32, distance, with_vertices(&original, |p| p + by)));
-    }
-    all
+/// Makes the variations of a scene, one at a time: each is as large as the mesh.
+#[derive(Clone, Debug)]
+pub struct Variations {
+    /// What stands where, without textures and lights.
+    scene: Scene,
+    original: Shapes,
+    others: usize,
 }
 
-/// The scene somewhere else: transforms are composed in `f64`.
-fn moved(scene: &Scene, by: DVec3) -> Scene {
-    let mut moved = scene.clone();
-    moved.instances.iter_mut().for_each(|i| i.world_from_object.translation += by);
-    moved.spheres.clear();
-    moved.planes.clear();
-    moved
+impl Variations {
+    /// How many there are.
+    pub const COUNT: usize = CHANGES.len();
+
+    /// Of a scene.
+    pub fn new(scene: &Scene) -> Self {
+        let shapes = World::new(scene).shapes;
+        let Scene { meshes, instances, materials, .. } = scene;
+        Self {
+            scene: Scene {
+                meshes: meshes.clone(),
+                instances: instances.clone(),
+                materials: materials.clone(),
+                ..Scene::default()
+            },
+            original: only_triangles(&shapes),
+            others: shapes.len() - shapes.triangles.len(),
+        }
+    }
+
+    /// Variation `i`, less than [`Self::COUNT`]; the first is the unchanged mesh.
+    pub fn get(&self, i: usize) -> Variation {
+        let original = &self.original;
+        let (name, amount, shapes) = match CHANGES[i] {
+            Change::None => ("as it is", 0.0, original.clone()),
+            Change::Scaled(power) => {
+                let factor = libm::scalbnf(1.0, power);
+                ("scaled", f64::from(factor), with_vertices(original, |p| p * factor))
+            }
+            Change::MovedBeforeCentring(distance) => ("moved before centring", distance, self.moved(AWAY * distance)),
+            Change::MovedInF32(distance) => {
+                let by = (AWAY * distance).as_vec3();
+                ("moved in f32", distance, with_vertices(original, |p| p + by))
+            }
+        };
+        let collapsed = distinct(original).saturating_sub(distinct(&shapes));
+        Variation { name, amount, shapes, collapsed, others: self.others }
+    }
+
+    /// The triangles of the scene somewhere else: transforms are composed in `f64`.
+    fn moved(&self, by: DVec3) -> Shapes {
+        let mut scene = self.scene.clone();
+        scene.instances.iter_mut().for_each(|i| i.world_from_object.translation += by);
+        only_triangles(&World::new(&scene).shapes)
+    }
 }
 
 fn only_triangles(shapes: &Shapes) -> Shapes {
@@ -98,16 +137,16 @@ mod tests {
 
     #[test]
     fn moving_before_centring_loses_nothing_and_moving_in_f32_does() {
-        let all = all(&scene());
+        let variations = Variations::new(&scene());
+        let all: Vec<Variation> = (0..Variations::COUNT).map(|i| variations.get(i)).collect();
         let extent = |v: &Variation| {
             let p = &v.shapes.vertices;
             (p[1] - p[0], p[3] - p[0])
         };
-        assert_eq!(all.len(), 1 + 2 + 4 + 4);
         for v in &all {
             let exact = extent(v) == extent(&all[0]);
             match v.name {
-                IN_F32 if v.amount >= 1e9 => assert_eq!((exact, v.collapsed), (false, 2)),
+                "moved in f32" if v.amount >= 1e9 => assert_eq!((exact, v.collapsed), (false, 2)),
                 "moved before centring" if v.amount <= 1e7 => {
                     assert!((extent(v).1 - extent(&all[0]).1).abs().max_element() < 1e-6);
                     assert_eq!(v.collapsed, 0);

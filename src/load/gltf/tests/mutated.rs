@@ -2,6 +2,7 @@
 //! scene that makes sense or in a message, and stays within its memory.
 
 use super::*;
+use crate::math::random::Random;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 
@@ -9,23 +10,6 @@ use std::path::PathBuf;
 const CASES: u64 = 30;
 
 const MEMORY: u64 = 1 << 28;
-
-/// SplitMix64 (Steele, Lea, Flood 2014).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, end: usize) -> usize {
-        (self.next() % end.max(1) as u64) as usize
-    }
-}
 
 fn models() -> Vec<(PathBuf, Vec<u8>)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("models");
@@ -41,7 +25,7 @@ fn try_all(name: &str, mutate: impl Fn(&[u8], &mut Random) -> Vec<u8>) {
     let (mut loaded, mut refused) = (0, 0);
     for (path, bytes) in models() {
         for case in 0..CASES {
-            let mut random = Random(case);
+            let mut random = Random::new(case);
             let broken = mutate(&bytes, &mut random);
             let result = catch_unwind(AssertUnwindSafe(|| try_one(&path, broken)));
             match result.unwrap_or_else(|_| panic!("{name}, case {case} of {}", path.display())) {
@@ -98,7 +82,7 @@ fn files_with_wrong_bytes_end_in_a_scene_or_a_message() {
         for _ in 0..=random.below(4) {
             let end = ends[random.below(2)];
             let at = random.below(end);
-            bytes[at] = if random.below(2) == 0 { bytes[at] ^ 1 << random.below(8) } else { random.next() as u8 };
+            bytes[at] = if random.below(2) == 0 { bytes[at] ^ 1 << random.below(8) } else { random.bits() as u8 };
         }
         bytes
     });

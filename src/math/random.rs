@@ -1,6 +1,6 @@
 //! Numbers that look random and are the same in every run.
 
-use crate::math::Vec3;
+use super::Vec3;
 
 /// G. Steele, D. Lea, C. Flood, *Fast Splittable Pseudorandom Number Generators* (SplitMix), 2014.
 #[derive(Clone, Debug)]
