@@ -58,7 +58,7 @@
 //! | [`accel`] | shapes -> what does this ray hit: `none`, `grid-octree`, `fast-octree`, `fast-bvh`; counts |
 //! | [`mod@render`] | rays -> linear pixels: waves, shading models, lights and shadows, optics, textures |
 //! | [`image`] | linear pixels <-> files: tone mapping, formats, metadata, differences |
-//! | [`bench`] | measures and compares: hard rays, exact answers, what came out |
+//! | [`mod@bench`] | measures and compares: hard rays, exact answers, what came out |
 //! | `cli` | words -> jobs -> messages and exit codes (feature `cli`) |
 //!
 //! `scene` and `accel` use `math`; `load` uses `scene`; `render` uses `scene`, `accel` and `image`; `bench` uses
