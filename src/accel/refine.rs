@@ -3,6 +3,7 @@
 use super::shapes::Prim;
 use super::{Hit, Ray, Shapes};
 use crate::math::bounds::{POSITION_T, U32, U64};
+use crate::math::inset::inset;
 use crate::math::shear::RaySpace;
 use crate::math::{DVec3, Vec3, plane, polygon, sphere, triangle};
 
@@ -11,7 +12,10 @@ use crate::math::{DVec3, Vec3, plane, polygon, sphere, triangle};
 pub struct Refined {
     /// The point.
     pub position: Vec3,
-    /// How far, on each axis, `position` may be from the exact point.
+    /// Where secondary rays start, but for the offset from the surface: `position`, or a place of the same face that
+    /// keeps away from its edges ([`inset`]).
+    pub start: Vec3,
+    /// How far, on each axis, `position` and `start` may be from exact points of the surface.
     pub error: Vec3,
     /// Unit geometric normal: the side from which a face runs counter-clockwise, outwards for a sphere. Zero for a face
     /// without area.
@@ -26,7 +30,8 @@ impl Shapes {
     /// Position, error bound, normal and weights of a hit that a query of these shapes found on `ray`.
     pub fn refine(&self, ray: &Ray, hit: &Hit) -> Refined {
         let Some(space) = RaySpace::new(ray.origin, ray.dir) else {
-            return Refined { position: ray.origin, error: Vec3::ZERO, normal: Vec3::ZERO, u: 0.0, v: 0.0 };
+            let position = ray.origin;
+            return Refined { position, start: position, error: Vec3::ZERO, normal: Vec3::ZERO, u: 0.0, v: 0.0 };
         };
         let on_ray = |t: f64| Located::on_ray(ray, t);
         let (located, normal) = match self.prim(hit.prim) {
@@ -43,7 +48,15 @@ impl Shapes {
             }
         };
         let (position, error) = located.rounded();
-        Refined { position, error, normal, u: hit.u, v: hit.v }
+        let mut refined = Refined { position, start: position, error, normal, u: hit.u, v: hit.v };
+        if let Prim::Triangle(corners) = self.prim(hit.prim) {
+            let way = inset(&corners, (hit.u, hit.v), error.max_element());
+            if way != DVec3::ZERO {
+                let (start, error) = located.moved(way).rounded();
+                refined = Refined { start, error: error.max(refined.error), ..refined };
+            }
+        }
+        refined
     }
 
     /// Weights of the second and third corner where the ray hits triangle `prim`; 0 for other prims.
@@ -67,6 +80,11 @@ impl Located {
         let step = ray.dir.as_dvec3() * t;
         let position = ray.origin.as_dvec3() + step;
         Self { position, error: step.abs() * (POSITION_T + U64) + position.abs() * U64 }
+    }
+
+    /// Moved by a way whose rounding is far below that of a position in `f32`.
+    fn moved(&self, way: DVec3) -> Self {
+        Self { position: self.position + way, error: self.error }
     }
 
     /// Rounded to `f32`, with the rounding added to the error: u of the position, or half the smallest number.

@@ -89,6 +89,18 @@ impl<'a> Oracle<'a> {
         self.candidate(ray, prim).map(|c| c.t)
     }
 
+    /// At least the triangles within `radius` of a point, in the maximum norm.
+    pub fn near(&self, point: Vec3, radius: f32) -> impl Iterator<Item = u32> {
+        let (p, radius) = (point.as_dvec3(), f64::from(radius));
+        let touches = move |lo: DVec3, hi: DVec3| (lo - radius).cmple(p).all() && (hi + radius).cmpge(p).all();
+        let runs = self.prims.chunks(RUN).zip(&self.boxes).filter(move |(_, (lo, hi))| touches(*lo, *hi));
+        runs.flat_map(|(run, _)| run).copied().filter(move |&prim| {
+            let corners = self.shapes.triangle(prim).map(Vec3::as_dvec3);
+            let (lo, hi) = corners.iter().fold((corners[0], corners[0]), |(lo, hi), &c| (lo.min(c), hi.max(c)));
+            touches(lo, hi)
+        })
+    }
+
     fn before(&self, ray: &Ray, a: &Candidate, b: &Candidate) -> bool {
         let gap = a.t - b.t;
         if gap.abs() > a.error + b.error {
@@ -245,9 +257,9 @@ pub fn place(ray: &Ray, triangle: &Triangle) -> Option<[RBig; 3]> {
     Some(crate::math::rational::along(&o, &d, &t))
 }
 
-/// Whether a ray from an exact place meets a triangle within 0 ≤ t < `end`.
-pub fn meets_from(origin: &[RBig; 3], dir: Vec3, triangle: &Triangle, end: &RBig) -> bool {
-    hit(origin, &point(dir), triangle).is_some_and(|t| t >= RBig::ZERO && t < *end)
+/// The distance, within 0 ≤ t < `end`, at which a ray from an exact place meets a triangle.
+pub fn meets_from(origin: &[RBig; 3], dir: Vec3, triangle: &Triangle, end: &RBig) -> Option<RBig> {
+    hit(origin, &point(dir), triangle).filter(|t| *t >= RBig::ZERO && t < end)
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ pub mod bounds;
 pub mod ear_clip;
 pub mod expansion;
 pub mod frame;
+pub mod inset;
 pub mod moller_trumbore;
 #[cfg(test)]
 mod oracle;

@@ -292,7 +292,9 @@ pub(crate) struct Surface<'a> {
     pub patch: Option<Patch<'a>>,
     pub footprint: Footprint,
     pub position: Vec3,
-    /// Absolute error bound of `position`, per axis.
+    /// Where secondary rays start, but for the offset along the normal.
+    start: Vec3,
+    /// Absolute error bound of `position` and `start`, per axis.
     pub error: Vec3,
     /// Unit normal of the shape itself, turned to the side the ray comes from.
     pub geometric: Vec3,
@@ -318,8 +320,8 @@ impl<'a> Surface<'a> {
         let front = outward.dot(view) >= 0.0;
         let geometric = if front { outward } else { -outward };
         let footprint = Footprint::new(-view, geometric, width);
-        let (position, error) = (refined.position, refined.error);
-        Self { target, patch, footprint, position, error, geometric, normal: geometric, view, front }
+        let (position, start, error) = (refined.position, refined.start, refined.error);
+        Self { target, patch, footprint, position, start, error, geometric, normal: geometric, view, front }
     }
 
     /// Finds the shading normal: interpolated, turned by normal and bump map, and to the side of the ray.
@@ -346,7 +348,7 @@ impl<'a> Surface<'a> {
 
     /// Where rays towards `dir` start.
     pub(crate) fn origin(&self, dir: Vec3) -> Vec3 {
-        offset_origin(self.position, self.error, self.geometric, dir)
+        offset_origin(self.start, self.error, self.geometric, dir)
     }
 }
 

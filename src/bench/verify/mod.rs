@@ -61,6 +61,8 @@ pub struct Section {
     pub variation: &'static str,
     /// How far, or how much.
     pub amount: f64,
+    /// Whether the frame is centred, as the scenes that are rendered are.
+    pub centred: bool,
     /// Triangles that rounding left without area, though they had some.
     pub collapsed: usize,
     /// Rows by intersector, then structure.
@@ -104,13 +106,14 @@ impl Findings {
         rows.fold(Tally::default(), |sum, r| sum + r.total())
     }
 
-    /// Whether the default test made no error, in any structure. Hits of a start's own surface are no error of the test:
-    /// within the rounding of its start a ray may lie beyond an edge, on the other side of the next face.
+    /// Whether the default test made no error, in any structure, and no secondary ray started on the wrong side of a
+    /// face. Starts are judged where the frame is centred: elsewhere a mesh may be smaller than their rounding.
     pub fn trusted(&self) -> bool {
         self.sections.iter().all(|s| {
             let exact = s.rows.iter().filter(|r| r.test == IntersectorKind::Exact);
             let shadows = (s.spawned.leaks, s.spawned.false_shadows) == (0, 0);
-            s.disagreements == 0 && shadows && exact.map(Row::total).all(|t| t.is_clean())
+            let starts = !s.centred || (s.spawned.self_hits, s.spawned.slips) == (0, 0);
+            s.disagreements == 0 && shadows && starts && exact.map(Row::total).all(|t| t.is_clean())
         })
     }
 }
@@ -167,8 +170,8 @@ fn section(variation: &Variation, plan: &Plan) -> Option<Section> {
         }
     }
     let spawned = spawned(shapes, &structures, &oracle, &sets, plan.seed);
-    let Variation { name, amount, collapsed, .. } = *variation;
-    Some(Section { variation: name, amount, collapsed, rows, disagreements, spawned })
+    let Variation { name, amount, centred, collapsed, .. } = *variation;
+    Some(Section { variation: name, amount, centred, collapsed, rows, disagreements, spawned })
 }
 
 fn take(rays: &[Ray], count: usize) -> &[Ray] {

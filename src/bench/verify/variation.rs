@@ -41,6 +41,8 @@ pub struct Variation {
     pub name: &'static str,
     /// How far, or how much; 0 for nothing.
     pub amount: f64,
+    /// Whether the frame is centred, as the scenes that are rendered are.
+    pub centred: bool,
     /// Its triangles alone.
     pub shapes: Shapes,
     /// Triangles that rounding left without three different corners, though they had them.
@@ -94,7 +96,8 @@ impl Variations {
             }
         };
         let collapsed = distinct(original).saturating_sub(distinct(&shapes));
-        Variation { name, amount, shapes, collapsed, others: self.others }
+        let centred = !matches!(CHANGES[i], Change::MovedInF32(_));
+        Variation { name, amount, centred, shapes, collapsed, others: self.others }
     }
 
     /// The triangles of the scene somewhere else: transforms are composed in `f64`.

@@ -164,11 +164,12 @@ fn write_section(out: &mut String, section: &Section) -> std::fmt::Result {
     let s = &section.spawned;
     writeln!(
         out,
-        "  exact: {} rays differ between structures; of {} shadow rays {} hit their own surface, {} leaked, {} were stopped \
-         by nothing",
+        "  exact: {} rays differ between structures; of {} shadow rays {} hit their own surface, {} slipped past a face \
+         beside it, {} leaked, {} were stopped by nothing",
         count(section.disagreements),
         count(s.rays),
         count(s.self_hits),
+        count(s.slips),
         count(s.leaks),
         count(s.false_shadows)
     )
@@ -180,7 +181,7 @@ fn section_json(section: &Section) -> Value {
         "what": section.variation, "amount": section.amount, "collapsed": section.collapsed,
         "disagreements": section.disagreements,
         "spawned": {
-            "rays": s.rays, "self_hits": s.self_hits, "leaks": s.leaks, "false_shadows": s.false_shadows,
+            "rays": s.rays, "self_hits": s.self_hits, "slips": s.slips, "leaks": s.leaks, "false_shadows": s.false_shadows,
         },
         "rows": section.rows.iter().map(row_json).collect::<Vec<_>>(),
     })

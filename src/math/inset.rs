@@ -1,0 +1,103 @@
+//! Starts of secondary rays kept away from the edges of the face they start on.
+//!
+//! A start in `f32` lies beside the exact hit by some roundings, and near an edge it could lie beyond the face that
+//! rises there: inside the solid, where a ray that should be free is stopped at once, or outside a closed room, where a
+//! ray that should be stopped is free. A start that is a few roundings further inside its own face lies on the right side
+//! of every face that meets it at an edge or corner, unless the angle between them is below [`EDGE_ROOM`]'s.
+
+use super::bounds::EDGE_ROOM;
+use super::triangle::Triangle;
+use super::{DVec3, Vec3};
+
+/// How far a hit of weights `u`, `v` of the second and third corner is to be moved along its triangle, so that its
+/// distance from each edge is at least [`EDGE_ROOM`] times `error`, the uncertainty of its position, or as large as a
+/// narrow triangle has room for. Zero but for hits that near an edge.
+#[inline]
+pub fn inset(triangle: &Triangle, (u, v): (f32, f32), error: f32) -> DVec3 {
+    let [a, b, c] = triangle.map(Vec3::as_dvec3);
+    let weights = [1.0 - f64::from(u) - f64::from(v), f64::from(u), f64::from(v)];
+    let room = f64::from(error) * EDGE_ROOM;
+    let area2 = (b - a).cross(c - a).length_squared();
+    let edges2 = [(c - b).length_squared(), (a - c).length_squared(), (b - a).length_squared()];
+    // The weight of a corner times the height over the opposite edge, 2 area / |edge|, is the distance from that edge.
+    let is_near = |k: usize| weights[k] * weights[k] * area2 < room * room * edges2[k];
+    if area2 == 0.0 || !(is_near(0) || is_near(1) || is_near(2)) {
+        return DVec3::ZERO;
+    }
+    moved_inwards([a, b, c], weights, edges2.map(|e| room * (e / area2).sqrt()), room)
+}
+
+/// The way from the place of weights `w` to one where each weight is at least as large as in `least`.
+#[cold]
+fn moved_inwards([a, b, c]: [DVec3; 3], w: [f64; 3], least: [f64; 3], room: f64) -> DVec3 {
+    /// A triangle that is too narrow for the room gives what it has: least weights above this would leave no place.
+    const WIDE: f64 = 0.25;
+    /// At a sharp corner there is room only far from it: a start goes no further than so many times the room.
+    const FAR: f64 = 16.0;
+    let raised: [f64; 3] = std::array::from_fn(|k| w[k].max(least[k].min(WIDE)));
+    let largest = (0..3).fold(0, |best, k| if raised[k] > raised[best] { k } else { best });
+    let mut change: [f64; 3] = std::array::from_fn(|k| raised[k] - w[k]);
+    // The other two weights are at most one half and what they were raised to, so this one stays the largest.
+    change[largest] -= raised.iter().sum::<f64>() - 1.0;
+    let way = (b - a) * change[1] + (c - a) * change[2];
+    let length = way.length();
+    if length > FAR * room { way * (FAR * room / length) } else { way }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::Random;
+
+    fn distances(triangle: &Triangle, p: DVec3) -> [f64; 3] {
+        let [a, b, c] = triangle.map(Vec3::as_dvec3);
+        let normal = (b - a).cross(c - a).normalize();
+        [(b, c), (c, a), (a, b)].map(|(from, to)| normal.cross(to - from).normalize().dot(p - from))
+    }
+
+    #[test]
+    fn a_start_near_an_edge_or_corner_moves_inwards_and_stays_in_its_plane() {
+        let mut random = Random::new(5);
+        let mut moved = 0;
+        for i in 0..3000 {
+            let triangle: Triangle = std::array::from_fn(|_| random.cube());
+            let error = 1e-7f32;
+            // On an edge, near one, at a corner.
+            let (u, v) = match i % 3 {
+                0 => (random.unit(), 0.0),
+                1 => (random.unit() * 1e-6, random.unit() * 1e-6),
+                _ => (1.0, 0.0),
+            };
+            let way = inset(&triangle, (u, v), error);
+            let [a, b, c] = triangle.map(Vec3::as_dvec3);
+            let p = a + (b - a) * f64::from(u) + (c - a) * f64::from(v) + way;
+            let room = f64::from(error) * EDGE_ROOM;
+            let normal = (b - a).cross(c - a).normalize();
+            assert!(normal.dot(way).abs() < 1e-15);
+            assert!(way.length() <= 16.01 * room);
+            if way.length() < 15.9 * room {
+                let nearest = distances(&triangle, p).into_iter().fold(f64::INFINITY, f64::min);
+                assert!(nearest > 0.999 * room, "{triangle:?} {u} {v}: {nearest}");
+                moved += 1;
+            }
+        }
+        assert!(moved > 2900, "{moved}");
+    }
+
+    #[test]
+    fn a_start_within_its_face_does_not_move() {
+        let triangle = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        assert_eq!(inset(&triangle, (0.3, 0.3), 1e-7), DVec3::ZERO);
+    }
+
+    #[test]
+    fn a_narrow_triangle_gives_the_room_it_has() {
+        let strip = [Vec3::ZERO, Vec3::new(4e-6, 0.0, 0.0), Vec3::new(0.0, 4e-6, 0.0)];
+        let p = inset(&strip, (0.5, 0.5), 1e-7);
+        let weight = 1.0 - (p.x + p.y + 4e-6) / 4e-6;
+        assert!((weight - 0.25).abs() < 1e-6, "{p} {weight}");
+        assert_eq!(inset(&[Vec3::ONE; 3], (0.5, 0.25), 1e-7), DVec3::ZERO);
+        let needle = [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1e-9, 0.0)];
+        assert!(inset(&needle, (0.0, 0.0), 1e-7).length() < 1e-7 * EDGE_ROOM * 16.01);
+    }
+}
