@@ -44,6 +44,14 @@ impl AccelKind {
     }
 }
 
+impl AccelKind {
+    /// Whether a ray may be tested against a large part of the prims: where many rays are asked, such a structure gets
+    /// a sample of them.
+    pub fn is_slow(self) -> bool {
+        matches!(self, Self::None)
+    }
+}
+
 impl fmt::Display for AccelKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
@@ -111,6 +119,15 @@ impl<'a> AnyAccel<'a> {
     #[must_use]
     pub fn tested_by(self, test: IntersectorKind) -> Self {
         Self { test, ..self }
+    }
+
+    /// What it culls.
+    pub fn shapes(&self) -> &Shapes {
+        match &self.structure {
+            Structure::None(s) => s.shapes(),
+            Structure::GridOctree(s) => s.shapes(),
+            Structure::Wide(s) => s.shapes(),
+        }
     }
 
     /// Which kind it is.

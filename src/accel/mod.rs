@@ -31,7 +31,7 @@ pub use query::Tested;
 pub use refine::Refined;
 pub use shapes::{BitSet, Shapes, SpherePrim};
 pub use stats::StructureStats;
-pub use wide::{Splitting, Wide};
+pub use wide::{Listed, Splitting, Wide};
 
 use crate::math::Vec3;
 

@@ -62,6 +62,12 @@ impl<'a> Aimer<'a> {
         Some(Self { shapes, middle: lo * 0.5 + hi * 0.5, reach, random: Random::new(seed) })
     }
 
+    /// The same with other rays.
+    #[must_use]
+    pub fn reseeded(&self, seed: u64) -> Self {
+        Self { random: Random::new(seed), ..*self }
+    }
+
     /// `count` rays.
     pub fn rays(&mut self, aim: Aim, count: usize) -> Vec<Ray> {
         (0..count).map(|i| self.ray(aim, i)).collect()

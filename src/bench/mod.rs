@@ -2,4 +2,5 @@
 
 pub mod aim;
 pub mod oracle;
+pub mod star;
 pub mod verify;

@@ -31,37 +31,9 @@ pub(crate) fn soup(n: u32, size: f32) -> Shapes {
     mesh(vertices, (0..n).map(|i| [i * 3, i * 3 + 1, i * 3 + 2]).collect())
 }
 
-/// A closed star-shaped mesh around the origin, of random radius 1 to 1.2.
+/// [`bench::star`](crate::bench::star) with prims that let light through.
 pub(crate) fn star(columns: u32, rows: u32) -> Shapes {
-    let mut r = Random::new(2);
-    let mut vertices = vec![Vec3::Y, Vec3::NEG_Y];
-    for row in 1..rows {
-        let polar = std::f32::consts::PI * row as f32 / rows as f32;
-        for column in 0..columns {
-            let turn = std::f32::consts::TAU * column as f32 / columns as f32;
-            let d = Vec3::new(polar.sin() * turn.cos(), polar.cos(), polar.sin() * turn.sin());
-            vertices.push(d * (1.0 + 0.2 * r.unit()));
-        }
-    }
-    let at = |row: u32, column: u32| match row {
-        0 => 0,
-        _ if row == rows => 1,
-        _ => 2 + (row - 1) * columns + column % columns,
-    };
-    let mut triangles = Vec::new();
-    for row in 0..rows {
-        for column in 0..columns {
-            let [a, b] = [at(row, column), at(row, column + 1)];
-            let [c, d] = [at(row + 1, column), at(row + 1, column + 1)];
-            if row > 0 {
-                triangles.push([a, b, c]);
-            }
-            if row + 1 < rows {
-                triangles.push([b, d, c]);
-            }
-        }
-    }
-    mesh(vertices, triangles)
+    seal(crate::bench::star::star(columns, rows))
 }
 
 /// `n` triangles around one corner.

@@ -12,10 +12,12 @@
 
 mod build;
 mod check;
+mod listed;
 mod node;
 mod split;
 mod walk;
 
+pub use listed::Listed;
 pub use split::Splitting;
 
 use self::node::Tree;
