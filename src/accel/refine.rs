@@ -2,7 +2,7 @@
 
 use super::shapes::Prim;
 use super::{Hit, Ray, Shapes};
-use crate::math::bounds::{POSITION_T, U32, U64};
+use crate::math::bounds::{POSITION_T, U32, U64, offset_origin};
 use crate::math::inset::inset;
 use crate::math::shear::RaySpace;
 use crate::math::{DVec3, Vec3, plane, polygon, sphere, triangle};
@@ -24,6 +24,14 @@ pub struct Refined {
     pub u: f32,
     /// Barycentric weight of the third corner; 0 but for triangles.
     pub v: f32,
+}
+
+impl Refined {
+    /// Where a secondary ray towards `dir` (of any length) starts: outside the error of the position, on the side of the
+    /// surface that it leaves to.
+    pub fn origin(&self, dir: Vec3) -> Vec3 {
+        offset_origin(self.start, self.error, self.normal, dir)
+    }
 }
 
 impl Shapes {

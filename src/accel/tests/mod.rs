@@ -1,6 +1,7 @@
 //! What every structure must do.
 
 pub(crate) mod scenes;
+mod starts;
 mod watertight;
 
 use super::grid::mailbox::{NoMailbox, Stamps};

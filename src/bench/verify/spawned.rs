@@ -10,7 +10,6 @@ use crate::accel::refine::Refined;
 use crate::accel::{Accel, AnyAccel, Hit, NoProbe, Ray, Shapes};
 use crate::bench::oracle::{Oracle, meets_from, place};
 use crate::math::Vec3;
-use crate::math::bounds::offset_origin;
 use crate::math::random::Random;
 
 /// A start's own error this many times over is beside it: what is hit within it may be the surface itself.
@@ -83,14 +82,7 @@ fn spawn(
     let hit = hit.first().filter(|h| h.is_some())?;
     let refined = shapes.refine(ray, hit);
     let dir = random.direction();
-    let away = Ray {
-        origin: offset_origin(refined.start, refined.error, refined.normal, dir),
-        t_min: 0.0,
-        dir,
-        t_max: f32::INFINITY,
-        exclude: hit.prim,
-        sample: 0,
-    };
+    let away = Ray { origin: refined.origin(dir), t_min: 0.0, dir, t_max: f32::INFINITY, exclude: hit.prim, sample: 0 };
     let mut blocked = [false];
     accel.occluded(&[away], &mut blocked, scratch, &mut NoProbe);
     let beside = Beside::new(hit.prim, place(ray, &shapes.triangle(hit.prim))?, &refined, dir)?;
