@@ -19,47 +19,65 @@ pub const fn gamma(n: u32) -> f32 {
 }
 
 /// Covers second-order terms and the rounding of the bound itself wherever a first-order bound is scaled by it: those
-/// add fewer than 20 roundings, 20 u < 2⁻¹⁰.
+/// add fewer than 20 roundings, 20 u < 2⁻¹⁰. No bound of its own: it makes proofs of those that it is part of.
 const SLACK: f32 = 1.0 + 1.0 / 1024.0;
 
-/// Larger than every absolute error that underflow adds to an `f32` edge value, 2⁻¹²⁰.
-///
-/// Each product that underflows errs by at most 2⁻¹⁵⁰, and a shear product that does is multiplied by the spread M. For
-/// M ≤ 2²⁷ that stays below 2⁻¹²⁰; for larger M it is below the slack of the 4 u M² term.
-const EDGE_UNDERFLOW: f32 = f32::MIN_POSITIVE * 64.0;
+/// What the filter of the triangle test allows for in an edge value of sheared ray space, computed in `f32`.
+#[derive(Clone, Copy, Debug)]
+pub struct EdgeMargins {
+    /// The unit roundoff that the bound is made of.
+    pub rounding: f32,
+    /// More than every absolute error that underflow adds.
+    pub underflow: f32,
+    /// From this bound up an edge value may have overflowed.
+    pub overflow: f32,
+}
 
-/// From here up an `f32` edge value may have overflowed: its products are below 2¹²⁸ while [`edge_error_f32`] stays
-/// below this, since M² ≥ 2¹²⁷ makes the bound at least 4 u M² ≥ 2¹⁰⁵.
-pub const EDGE_OVERFLOW: f32 = (1u128 << 100) as f32;
+impl EdgeMargins {
+    /// The margins of the library, from this derivation.
+    ///
+    /// D ≥ |a − o| of the corners in the maximum norm, M ≥ their sheared |x'|, |y'|. With s = d_x/d_z, |s| ≤ 1: fl(a − o)
+    /// errs by u D, fl(s) by u, their product by u, the subtraction by u M. So a sheared corner is displaced by at most
+    /// e = 4 u D + u M, and fl(fl(Cx·By) − fl(Cy·Bx)) by 4 e M + 2 e² + 4 u M². With d = u (2 D + M) that is less than
+    /// 8 d (M + d).
+    ///
+    /// *Underflow.* Each product that underflows errs by at most 2⁻¹⁵⁰; one of the shear moves a corner by as much, which
+    /// counts M-fold. Those of the edge value and of the bound's own terms sum to 2⁻¹⁵⁰ (8 M + 12) at most: below 2⁻¹⁴⁵ for
+    /// M ≤ 1, and below the slack of the M² term for larger M. The smallest normal number is more, and quick to add.
+    ///
+    /// *Overflow.* While the bound is below 2¹⁰⁰, M² is below 2¹²², and no product has overflowed.
+    pub const DERIVED: Self =
+        Self { rounding: U32 * SLACK, underflow: f32::MIN_POSITIVE, overflow: (1u128 << 100) as f32 };
 
-/// How far an edge value in sheared ray space, computed in `f32`, may be from its exact value.
-///
-/// `reach` D ≥ |a − o| of the corners in the maximum norm, `spread` M ≥ their sheared |x'|, |y'|.
-/// With s = d_x/d_z, |s| ≤ 1: fl(a − o) errs by u D, fl(s) by u, their product by u, the subtraction by u M. So a sheared
-/// corner is displaced by at most e = 4 u D + u M, and fl(fl(Cx·By) − fl(Cy·Bx)) by 4 e M + 2 e² + 4 u M².
+    /// How far an edge value may be from its exact value; `reach` is D, `spread` M.
+    #[inline(always)]
+    pub fn error(&self, reach: f32, spread: f32) -> f32 {
+        let displaced = 8.0 * self.rounding * (reach + reach + spread);
+        displaced * (spread + 0.125 * displaced) + self.underflow
+    }
+
+    /// [`Self::error`] in eight lanes.
+    #[inline(always)]
+    pub fn error_lanes<S: Simd>(&self, s: S, reach: S::Lanes, spread: S::Lanes) -> S::Lanes {
+        let displaced = s.mul(s.splat(8.0 * self.rounding), s.add(s.add(reach, reach), spread));
+        let product = s.mul(displaced, s.add(spread, s.mul(s.splat(0.125), displaced)));
+        s.add(product, s.splat(self.underflow))
+    }
+}
+
+/// The unit roundoff that the bound of an edge value in `f64` is made of.
+pub const EDGE_ROUNDING_F64: f64 = U64 * SLACK as f64;
+
+/// As [`EdgeMargins::error`] for the same computation in `f64`, where nothing made of `f32` inputs over- or underflows.
 #[inline]
-pub fn edge_error_f32(reach: f32, spread: f32) -> f32 {
-    let e = 4.0 * U32 * reach + U32 * spread;
-    (4.0 * e * spread + 2.0 * e * e + 4.0 * U32 * spread * spread) * SLACK + EDGE_UNDERFLOW
+pub fn edge_error_f64(reach: f64, spread: f64, rounding: f64) -> f64 {
+    let displaced = 8.0 * rounding * (2.0 * reach + spread);
+    displaced * (spread + 0.125 * displaced)
 }
 
-/// [`edge_error_f32`] in eight lanes.
-#[inline(always)]
-pub fn edge_error_lanes<S: Simd>(s: S, reach: S::Lanes, spread: S::Lanes) -> S::Lanes {
-    let e = s.add(s.mul(s.splat(4.0 * U32), reach), s.mul(s.splat(U32), spread));
-    let four = s.splat(4.0);
-    let first = s.mul(s.mul(four, e), spread);
-    let second = s.mul(s.mul(s.splat(2.0), e), e);
-    let third = s.mul(s.mul(s.splat(4.0 * U32), spread), spread);
-    s.add(s.mul(s.add(s.add(first, second), third), s.splat(SLACK)), s.splat(EDGE_UNDERFLOW))
-}
-
-/// As [`edge_error_f32`] for the same computation in `f64`, where nothing made of `f32` inputs over- or underflows.
-#[inline]
-pub fn edge_error_f64(reach: f64, spread: f64) -> f64 {
-    let e = 4.0 * U64 * reach + U64 * spread;
-    (4.0 * e * spread + 2.0 * e * e + 4.0 * U64 * spread * spread) * SLACK as f64
-}
+/// How far the sheared height y' of a corner, computed in `f64`, may be from its exact value, relative to D: displaced as
+/// in [`EdgeMargins::DERIVED`] by 4 u D + u M with M ≤ 2 D, and 1 u for second-order terms.
+pub const HEIGHT_F64: f64 = 7.0 * U64;
 
 /// Relative to the sum of the absolute values of its terms, how far n·a (n = e₁ × e₂; e₁, e₂, a rounded differences)
 /// is from exact in `f64`: 2 differences, product, subtraction, difference, product and 2 sums, 8 roundings.
@@ -77,20 +95,21 @@ pub const POSITION_T: f64 = 1.0 / (1u64 << 40) as f64;
 /// cell, and its rounded t may be half an ulp (u) lower. Doubled twice for spheres, whose t is not correctly rounded.
 pub const WALK_MARGIN: f64 = 4.0 * U32 as f64;
 
-/// How much larger than its content, in finest cells, a cell is taken to be when prims are listed in it, beside
-/// [`CELL_PAD_PER_CELL`] for each finest cell across the grid.
-///
-/// The walk places the ray with an error: plane and origin to cell units 2 u R, exit position 8 u R, membership 8 u R,
-/// displacement of the tested corners 4 u R, together at most 22 u R < R 2⁻¹⁹ for a walk in `f32`. The constant part
-/// keeps prims that lie in a cell's face out of harm for small R and covers [`RAY_CELLS`].
-pub const CELL_PAD: f64 = 1.0 / 512.0;
-
-/// See [`CELL_PAD`]: 2⁻¹⁹.
-pub const CELL_PAD_PER_CELL: f64 = 1.0 / 524_288.0;
-
-/// Rays whose origin is further than this many finest cells from the grid's corner are answered without culling: up to
-/// here the position of a walk in `f64` errs by at most 8 · 2⁻⁵³ · 2³⁸ = 2⁻¹² cells, an eighth of [`CELL_PAD`].
+/// Rays whose origin is further than this many finest cells from the grid's corner are answered without culling.
 pub const RAY_CELLS: f64 = (1u64 << 38) as f64;
+
+/// How much larger than it is, in finest cells, a cell is taken to be when prims are listed in it: 2⁻⁹.
+///
+/// The walk places a ray in `f64`. With O the distance of its origin and R that of the cell from the grid's corner: the
+/// origin is placed with 2 roundings, 2 u O; a plane is met after 4 more on their difference, 4 u (O + R); a coordinate at
+/// a distance has an error of 4 u (O + R) + u R. So where the walk takes the exact ray to be in a cell, it is within
+/// 6 u O + 4 u R of it. O is below [`RAY_CELLS`], R at most 2¹⁶, and deciding which cells a prim touches errs by 2⁻⁴⁸ R: with
+/// all that the walk may be wrong by 7 u O. The test of a prim that is not exact may add what is left of 64 u O.
+pub const CELL_PAD: f64 = 64.0 * U64 * RAY_CELLS;
+
+/// How much larger than its content the grid is on each side, relative to its extent: 2⁻⁸. Even with one cell on an axis
+/// that is more than [`CELL_PAD`], so that a ray that meets the content passes through the grid whatever is rounded.
+pub const GRID_ROOM: f64 = 1.0 / 256.0;
 
 /// Widening of a slab distance so that a box is never missed: 3 roundings at either end.
 /// (T. Ize, *Robust BVH Ray Traversal*, 2013.)
@@ -98,12 +117,16 @@ pub const SLAB: f64 = 2.0 * 3.0 * U64 / (1.0 - 3.0 * U64);
 
 /// What a distance to a box's plane in `f32`, fl(fl(plane − origin) · fl(1/d)), may be off, relative: 3 roundings. The
 /// entry of a ray that meets the box then exceeds its exit by less than twice that of either, in size; doubled again
-/// for the rounding of the comparison itself. Underflow adds less than [`f32::MIN_POSITIVE`].
+/// for the rounding of the comparison itself.
 pub const SLAB_F32: f32 = 4.0 * gamma(3);
 
 /// How far beyond the end of a ray's range a box of `f32` planes must still be entered: its entry errs by 3 u, and t by
 /// what [`WALK_MARGIN`] says.
 pub const BOX_MARGIN: f32 = SLAB_F32 + WALK_MARGIN as f32;
+
+/// What underflow adds to a distance to a box's plane and to the margins above: a few times 2⁻¹⁵⁰, each. The smallest
+/// normal number is more, and quick to add.
+pub const BOX_UNDERFLOW: f32 = f32::MIN_POSITIVE;
 
 /// Scenes and rays with coordinates beyond this are not culled by boxes in `f32`: up to here differences do not overflow.
 pub const BOX_COORDINATES: f32 = f32::MAX / 4.0;

@@ -4,7 +4,7 @@
 //! sheared coordinates, so a mesh becomes one planar drawing without gaps. What differs: the sign of every edge value is
 //! exact for the `f32` ray and corners, so that it does not depend on how it was computed.
 
-use super::bounds::edge_error_f64;
+use super::bounds::{EDGE_ROUNDING_F64, HEIGHT_F64, edge_error_f64};
 use super::expansion::{Expansion, cross, difference, dot_f32};
 use super::{DVec3, Vec3};
 
@@ -51,13 +51,20 @@ impl RaySpace {
     }
 
     /// The exact sign of x'ₚ y'_q − y'ₚ x'_q: on which side of the ray the edge from `p` to `q` passes.
+    #[inline]
     pub fn edge_sign(&self, p: Vec3, q: Vec3) -> i32 {
+        self.edge_sign_within(p, q, EDGE_ROUNDING_F64)
+    }
+
+    /// [`Self::edge_sign`], in `f64` where that is certain for this unit roundoff.
+    #[inline]
+    fn edge_sign_within(&self, p: Vec3, q: Vec3, rounding: f64) -> i32 {
         let (a, b) = (self.relative(p), self.relative(q));
         let ((ax, ay), (bx, by)) = (self.shear64(a), self.shear64(b));
         let reach = a.abs().max_element().max(b.abs().max_element());
         let spread = ax.abs().max(ay.abs()).max(bx.abs()).max(by.abs());
         let edge = ax * by - ay * bx;
-        if edge.abs() > edge_error_f64(reach, spread) {
+        if edge.abs() > edge_error_f64(reach, spread, rounding) {
             return if edge > 0.0 { 1 } else { -1 };
         }
         self.edge_sign_exact(p, q)
@@ -72,11 +79,17 @@ impl RaySpace {
     }
 
     /// The exact sign of y' of a corner.
+    #[inline]
     pub fn height_sign(&self, p: Vec3) -> i32 {
+        self.height_sign_within(p, HEIGHT_F64)
+    }
+
+    /// [`Self::height_sign`], in `f64` where that is certain for this relative error.
+    #[inline]
+    fn height_sign_within(&self, p: Vec3, error: f64) -> i32 {
         let a = self.relative(p);
         let (_, y) = self.shear64(a);
-        // The displacement of a sheared corner, as in `edge_error_f64`: 4 u D + u M, M ≤ 2 D.
-        if y.abs() > 7.0 * super::bounds::U64 * a.abs().max_element() {
+        if y.abs() > error * a.abs().max_element() {
             return if y > 0.0 { 1 } else { -1 };
         }
         self.height_sign_exact(p)
@@ -93,5 +106,33 @@ impl RaySpace {
 
     fn direction_sign(&self) -> i32 {
         if self.dir[self.z] > 0.0 { 1 } else { -1 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::random::Random;
+    use super::*;
+
+    /// Signs of edges and heights that are wrong when `f64` is believed beyond these errors; the rays pass exactly through
+    /// the corners.
+    fn wrong(rounding: f64, height: f64) -> [usize; 2] {
+        let mut random = Random::new(8);
+        let mut point = || (random.cube() * 50.0).round() * 0.1;
+        let (mut edges, mut heights) = (0, 0);
+        for _ in 0..2000 {
+            let (o, p, q) = (point(), point(), point());
+            let Some(ray) = RaySpace::new(o, p - o) else { continue };
+            edges += usize::from(ray.edge_sign_within(p, q, rounding) != ray.edge_sign_exact(p, q));
+            heights += usize::from(ray.height_sign_within(p, height) != ray.height_sign_exact(p));
+        }
+        [edges, heights]
+    }
+
+    #[test]
+    fn the_margins_of_signs_in_double_precision_are_needed() {
+        assert_eq!(wrong(EDGE_ROUNDING_F64, HEIGHT_F64), [0, 0]);
+        let [edges, heights] = wrong(0.0, 0.0);
+        assert!(edges > 0 && heights > 0, "{edges}, {heights}: nothing goes wrong without them");
     }
 }

@@ -5,7 +5,7 @@
 //! from `f32` when it exceeds its proven error, else from `f64`, else from exact sums. A ray in the triangle's plane and a
 //! triangle without area have three zero edge values or two signs: they are never hit, and no NaN arises.
 
-use super::bounds::{EDGE_OVERFLOW, EXACT_QUOTIENT, PLANE_TERMS_F64, POSITION_T, edge_error_f32};
+use super::bounds::{EXACT_QUOTIENT, EdgeMargins, PLANE_TERMS_F64, POSITION_T};
 use super::expansion::{Expansion, cross, difference, dot, dot_f32};
 use super::quotient::{Bounded, approximate, nearest, rounded};
 use super::shear::RaySpace;
@@ -50,11 +50,11 @@ fn is_hit_along<const Z: usize>(ray: &RaySpace, triangle: &Triangle) -> bool {
 
     let reach = largest3(largest(a), largest(b), largest(c));
     let spread = largest3(greater(ax.abs(), ay.abs()), greater(bx.abs(), by.abs()), greater(cx.abs(), cy.abs()));
-    let error = edge_error_f32(reach, spread);
+    let error = EdgeMargins::DERIVED.error(reach, spread);
     let (low, high) = (smaller(u, smaller(v, w)), greater(u, greater(v, w)));
 
     // Overflow makes the bound too large or NaN, and the comparisons false.
-    if error < EDGE_OVERFLOW {
+    if error < EdgeMargins::DERIVED.overflow {
         if low < -error && high > error {
             return false;
         }
@@ -91,8 +91,13 @@ pub fn distance(ray: &RaySpace, triangle: &Triangle) -> f32 {
 /// As [`intersect`]'s distance of a triangle that is hit, to a relative error of [`POSITION_T`].
 pub fn distance_f64(ray: &RaySpace, triangle: &Triangle) -> f64 {
     const { assert!(EXACT_QUOTIENT < POSITION_T) };
+    distance_within(ray, triangle, POSITION_T)
+}
+
+/// The distance of a triangle that is hit, to a relative error of `enough`, which is more than [`EXACT_QUOTIENT`].
+fn distance_within(ray: &RaySpace, triangle: &Triangle, enough: f64) -> f64 {
     match plane_quotient(ray, triangle) {
-        Some((t, error)) if error < POSITION_T => t,
+        Some((t, error)) if error < enough => t,
         _ => {
             let (numerator, denominator) = exact_plane_terms(ray, triangle);
             approximate(&numerator, &denominator)
@@ -164,4 +169,37 @@ fn greater(a: f32, b: f32) -> f32 {
 #[inline]
 fn smaller(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::random::Random;
+    use super::super::rational::{hit, point};
+    use super::*;
+
+    /// The largest relative error of distances that are taken from `f64` where its bound is below `enough`, of triangles
+    /// seen nearly edge on.
+    fn worst(enough: f64) -> f64 {
+        let mut random = Random::new(10);
+        let mut worst = 0.0f64;
+        for _ in 0..300 {
+            let (a, e1, e2) = (random.cube(), random.cube(), random.cube());
+            let triangle = [a, a + e1, a + e2];
+            let dir = e1 * random.unit() - e2 * random.unit() + random.cube() * 1e-7;
+            let origin = a + (e1 + e2) * 0.3 - dir * 2.0;
+            let Some(ray) = RaySpace::new(origin, dir) else { continue };
+            if let Some(t) = hit(&point(origin), &point(dir), &triangle).map(|t| t.to_f64().value())
+                && t != 0.0
+            {
+                worst = worst.max((distance_within(&ray, &triangle, enough) / t - 1.0).abs());
+            }
+        }
+        worst
+    }
+
+    #[test]
+    fn a_distance_that_places_a_hit_is_as_good_as_it_is_said_to_be() {
+        assert!(worst(POSITION_T) < POSITION_T);
+        assert!(worst(f64::INFINITY) > POSITION_T, "nothing goes wrong without the limit");
+    }
 }

@@ -4,7 +4,7 @@
 //! the exact form. Verdicts are exact, so it does not matter which of the two found them.
 
 use super::Vec3;
-use super::bounds::{EDGE_OVERFLOW, edge_error_lanes};
+use super::bounds::EdgeMargins;
 use super::shear::RaySpace;
 use super::simd::{LANES, Row, Simd};
 
@@ -53,6 +53,12 @@ impl<S: Simd> RayLanes<S> {
     /// Tests eight triangles.
     #[inline(always)]
     pub fn verdicts(&self, s: S, corners: &Corners8) -> Verdicts {
+        self.verdicts_within(s, corners, EdgeMargins::DERIVED)
+    }
+
+    /// [`Self::verdicts`] by given margins.
+    #[inline(always)]
+    fn verdicts_within(&self, s: S, corners: &Corners8, margins: EdgeMargins) -> Verdicts {
         let [a, b, c] = [self.relative(s, &corners[0]), self.relative(s, &corners[1]), self.relative(s, &corners[2])];
         let ([ax, ay], [bx, by], [cx, cy]) = (self.sheared(s, a), self.sheared(s, b), self.sheared(s, c));
         let u = s.sub(s.mul(cx, by), s.mul(cy, bx));
@@ -61,12 +67,12 @@ impl<S: Simd> RayLanes<S> {
 
         let reach = s.greater(largest3(s, a), s.greater(largest3(s, b), largest3(s, c)));
         let spread = s.greater(largest2(s, ax, ay), s.greater(largest2(s, bx, by), largest2(s, cx, cy)));
-        let error = edge_error_lanes(s, reach, spread);
+        let error = margins.error_lanes(s, reach, spread);
         let negative = s.sub(s.splat(0.0), error);
         let (low, high) = (s.smaller(u, s.smaller(v, w)), s.greater(u, s.greater(v, w)));
 
         // Overflow makes the bound too large or NaN, and the comparisons false.
-        let sound = s.less(error, s.splat(EDGE_OVERFLOW));
+        let sound = s.less(error, s.splat(margins.overflow));
         let miss = s.less(low, negative) & s.less(error, high);
         let hit = (s.less(error, low) | s.less(high, negative)) & sound;
         Verdicts { hit, unsure: !(hit | miss & sound) & 0xff }
@@ -178,6 +184,47 @@ mod tests {
             }
         }
         assert!(certain > 1000, "{certain}");
+    }
+
+    struct Within<'a>(&'a RaySpace, &'a Corners8, EdgeMargins);
+
+    impl Kernel for Within<'_> {
+        type Output = Verdicts;
+
+        #[inline(always)]
+        fn run<S: Simd>(self, s: S) -> Verdicts {
+            RayLanes::new(s, self.0).verdicts_within(s, self.1, self.2)
+        }
+    }
+
+    /// Verdicts that are called certain by these margins, and are wrong, of numbers around 2^exponent.
+    fn wrong(margins: EdgeMargins, exponents: std::ops::Range<i32>) -> u32 {
+        let mut wrong = 0;
+        for exponent in exponents {
+            each_case(exponent, 0, |ray, triangles, corners| {
+                let verdicts = Level::best().run(Within(ray, corners, margins));
+                for (lane, triangle) in
+                    triangles.iter().enumerate().filter(|(lane, _)| verdicts.unsure >> lane & 1 == 0)
+                {
+                    let exact = triangle::is_hit_near_edge(ray, triangle);
+                    wrong += u32::from(exact != (verdicts.hit >> lane & 1 == 1));
+                }
+            });
+        }
+        wrong
+    }
+
+    #[test]
+    fn every_margin_of_an_edge_value_is_needed() {
+        let derived = EdgeMargins::DERIVED;
+        for (name, shrunk, exponents) in [
+            ("rounding", EdgeMargins { rounding: 0.0, ..derived }, 0..4),
+            ("underflow", EdgeMargins { underflow: 0.0, ..derived }, -70..-58),
+            ("overflow", EdgeMargins { overflow: f32::INFINITY, ..derived }, 60..76),
+        ] {
+            assert_eq!(wrong(derived, exponents.clone()), 0, "{name}");
+            assert!(wrong(shrunk, exponents) > 0, "{name}: nothing goes wrong without it");
+        }
     }
 
     #[test]

@@ -75,6 +75,7 @@ pub fn edges_checked(corners: [[f32; 3]; 3]) -> [f32; 3] {
 
 #[cfg(test)]
 mod tests {
+    use super::super::random::Random;
     use super::*;
 
     fn both(origin: Vec3, dir: Vec3, t: &Triangle) -> [Option<f64>; 2] {
@@ -103,5 +104,32 @@ mod tests {
             let inside = (1..100).contains(&i);
             assert!(!inside || (0..2).all(|k| one[k].is_some() || other[k].is_some()), "{target}");
         }
+    }
+
+    /// G12 (fused edges).
+    #[test]
+    fn fused_edge_values_have_wrong_signs_and_let_rays_through() {
+        fn fused([a, b, c]: [[f32; 3]; 3]) -> [f32; 3] {
+            let edge = |p: [f32; 3], q: [f32; 3]| p[0].mul_add(q[1], -(p[1] * q[0]));
+            [edge(c, b), edge(a, c), edge(b, a)]
+        }
+        let escaped = |edges: fn([[f32; 3]; 3]) -> [f32; 3]| {
+            let mut random = Random::new(11);
+            let mut escaped = 0;
+            for _ in 0..4000 {
+                let (a, b, origin) =
+                    (random.cube() * 0.1, random.cube() * 0.1 + Vec3::X, random.cube() + Vec3::Z * 4.0);
+                let (c, d) = (Vec3::new(0.5, 1.0, random.unit()), Vec3::new(0.5, -1.0, random.unit()));
+                // Through the edge of both triangles.
+                let target = a + (b - a) * (0.25 + 0.5 * random.unit());
+                let Some(ray) = RaySpace::new(origin, target - origin) else { continue };
+                let shear = Shear::<f32>::new(&ray);
+                escaped +=
+                    usize::from([[a, b, c], [b, a, d]].iter().all(|t| shear.intersect(&ray, t, edges).is_none()));
+            }
+            escaped
+        };
+        assert_eq!(escaped(edges_checked), 0);
+        assert!(escaped(fused) > 0, "fused edge values are as good");
     }
 }

@@ -7,14 +7,35 @@
 use super::GridParams;
 use crate::accel::Shapes;
 use crate::math::aabb::Aabb;
-use crate::math::bounds::{CELL_PAD, CELL_PAD_PER_CELL};
+use crate::math::bounds::{CELL_PAD, GRID_ROOM, RAY_CELLS, WALK_MARGIN};
 use crate::math::{DVec3, Vec3, Vec3Swizzles as _};
 
-/// Most finest cells along an axis: keeps [`Lattice::pad`] below an eighth of a cell.
+/// Most finest cells along an axis, R in the derivation of [`CELL_PAD`].
 const MAX_FINE: u32 = 1 << 16;
 
 /// References a prim may have in the top grid on average, roughly.
 const TOP_REFERENCES: f64 = 6.0;
+
+/// What building and walking allow for; lengths in finest cells.
+#[derive(Clone, Copy, Debug)]
+pub struct CellMargins {
+    /// How far beyond a cell prims are still listed in it.
+    pub pad: f64,
+    /// How much larger than its content the grid is on each side, relative to its extent.
+    pub room: f64,
+    /// How far behind the best hit cells are still visited, relative to its distance.
+    pub lag: f64,
+    /// How far from the grid's corner a ray may start that is led through cells.
+    pub ray_cells: f64,
+    /// Whether the walk through octants is kept from leaving a cell but through the face it meets first.
+    pub guarded: bool,
+}
+
+impl CellMargins {
+    /// Those that `math::bounds` derives.
+    pub const DERIVED: Self =
+        Self { pad: CELL_PAD, room: GRID_ROOM, lag: WALK_MARGIN, ray_cells: RAY_CELLS, guarded: true };
+}
 
 /// Box, resolution and depth of a grid.
 #[derive(Clone, Debug)]
@@ -27,13 +48,15 @@ pub struct Lattice {
     pub dims: [u32; 3],
     /// Levels an octree below a top cell may have.
     pub levels: u32,
+    /// What is allowed for.
+    pub margins: CellMargins,
 }
 
 impl Lattice {
     /// Cells as near to cubes as possible, `density` of them for each of the bounded prims.
     ///
     /// J. Cleary, G. Wyvill, *Analysis of an Algorithm for Fast Ray Tracing Using Uniform Space Subdivision*, 1988.
-    pub fn new(shapes: &Shapes, params: &GridParams) -> Self {
+    pub fn new(shapes: &Shapes, params: &GridParams, margins: CellMargins) -> Self {
         let prims = shapes.bounded();
         let bounds = (0..prims).fold(Aabb::EMPTY, |b, p| b.union(shapes.bounds(p)));
         let (lo, hi) = if bounds.is_empty() { (Vec3::ZERO, Vec3::ONE) } else { (bounds.lo, bounds.hi) };
@@ -62,21 +85,14 @@ impl Lattice {
         let most = dims.into_iter().fold(1, u32::max);
         let levels = params.max_depth.min((MAX_FINE / most).ilog2());
 
-        // Outside stays more than the padding of any cell, so that only rays that pass the content meet the box.
-        let margin = extent / 256.0;
+        let room = extent * margins.room;
         let fine = DVec3::from_array(dims.map(|n| f64::from(n << levels)));
-        Self { lo: (lo + hi) / 2.0 - extent / 2.0 - margin, scale: fine / (extent + margin * 2.0), dims, levels }
+        Self { lo: (lo + hi) / 2.0 - extent / 2.0 - room, scale: fine / (extent + room * 2.0), dims, levels, margins }
     }
 
     /// Finest cells on each axis.
     pub fn fine_dims(&self) -> [u32; 3] {
         self.dims.map(|n| n << self.levels)
-    }
-
-    /// How far beyond a cell prims are still listed in it, in finest cells.
-    pub fn pad(&self) -> f64 {
-        let [x, y, z] = self.fine_dims();
-        CELL_PAD + f64::from(x.max(y).max(z)) * CELL_PAD_PER_CELL
     }
 
     /// A point in units of finest cells.

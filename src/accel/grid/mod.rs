@@ -9,6 +9,8 @@ mod build;
 mod check;
 pub mod lattice;
 pub mod mailbox;
+#[cfg(test)]
+mod margins;
 mod octree;
 pub mod overlap;
 pub mod params;
@@ -18,7 +20,7 @@ use std::marker::PhantomData;
 
 pub use params::GridParams;
 
-use self::lattice::Lattice;
+use self::lattice::{CellMargins, Lattice};
 use self::mailbox::{Mailbox, Stamps};
 use self::octree::Cells;
 use super::query::{Culling, Goal, Query};
@@ -44,7 +46,12 @@ pub struct GridOctree<'a, M = Stamps> {
 impl<'a, M: Mailbox> GridOctree<'a, M> {
     /// Builds it over the bounded prims; the same for every number of threads.
     pub fn build(shapes: &'a Shapes, params: &GridParams) -> Self {
-        let lattice = Lattice::new(shapes, params);
+        Self::build_within(shapes, params, CellMargins::DERIVED)
+    }
+
+    /// [`Self::build`] by given margins.
+    pub(super) fn build_within(shapes: &'a Shapes, params: &GridParams, margins: CellMargins) -> Self {
+        let lattice = Lattice::new(shapes, params, margins);
         let (top, cells) = build::build(shapes, &lattice, params);
         Self { shapes, lattice, top, cells, mailbox: PhantomData }
     }

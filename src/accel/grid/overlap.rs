@@ -4,7 +4,7 @@
 //! the triangle, its plane, and its three edges in each of the three projections; the same answer as the separating axes
 //! of T. Akenine-Möller, 2001, but with all that depends on the triangle alone computed once.
 //!
-//! Every comparison is in favour of overlap by the padding of [`Lattice::pad`]. Rounding here is far below that: points
+//! Every comparison is in favour of overlap by the padding of [`CellMargins`](super::lattice::CellMargins). Rounding here is far below that: points
 //! and edge values err by at most 2⁻⁴⁸ R cells; only a plane's normal may err more, and has its own slack.
 
 use super::lattice::{Cube, Lattice};
@@ -35,7 +35,7 @@ enum Surface {
 impl Overlap {
     /// Prepares bounded prim `prim`.
     pub fn new(shapes: &Shapes, prim: u32, lattice: &Lattice) -> Self {
-        let pad = lattice.pad();
+        let pad = lattice.margins.pad;
         let (lo, hi) = padded_box(shapes, prim, lattice);
         let surface = match shapes.prim(prim) {
             Prim::Triangle(corners) => triangle(corners.map(|p| lattice.place(p)), lattice),
@@ -74,7 +74,7 @@ impl Overlap {
 
 /// Box of bounded prim `prim` in finest cells, padded: lower and upper corner.
 pub fn padded_box(shapes: &Shapes, prim: u32, lattice: &Lattice) -> (DVec3, DVec3) {
-    let (bounds, pad) = (shapes.bounds(prim), lattice.pad());
+    let (bounds, pad) = (shapes.bounds(prim), lattice.margins.pad);
     (lattice.place(bounds.lo) - pad, lattice.place(bounds.hi) + pad)
 }
 

@@ -7,17 +7,16 @@
 //!
 //! # Why no hit is lost
 //! Exit distances split the ray into intervals; the cell visited in an interval holds the ray there up to the error of
-//! computing positions in `f64`, at most an eighth of [`CELL_PAD`](crate::math::bounds::CELL_PAD) for origins within
-//! [`RAY_CELLS`]. Prims are listed in every cell that they touch within the padding, so a hit with exact distance t is
+//! computing positions in `f64`, less than an eighth of [`CELL_PAD`](crate::math::bounds::CELL_PAD) for origins within
+//! [`RAY_CELLS`](crate::math::bounds::RAY_CELLS). Prims are listed in every cell that they touch within the padding, so a hit with exact distance t is
 //! tested at the latest in the cell of t's interval. The walk ends behind a cell when no later hit can come before the
-//! best one: when that lies, by [`WALK_MARGIN`], before the exit. A hit found beyond the exit is kept but is not final.
+//! best one: when that lies, by [`WALK_MARGIN`](crate::math::bounds::WALK_MARGIN), before the exit. A hit found beyond the exit is kept but is not final.
 
 use super::lattice::Lattice;
 use super::mailbox::Mailbox;
 use super::{EMPTY, GridOctree, NODE};
 use crate::accel::Probe;
 use crate::accel::query::{Goal, Query};
-use crate::math::bounds::{RAY_CELLS, WALK_MARGIN};
 
 /// A ray in units of finest cells; t is the same as outside.
 struct Track {
@@ -35,7 +34,7 @@ impl Track {
         // A ray along a plane never meets it: 10¹²⁰ times any distance is beyond every t, and no NaN arises. Smaller
         // components than this do not occur: 2⁻¹⁴⁹ of an f32 times at least 2⁻¹²⁹ cells per unit.
         let dir = (query.ray.dir.as_dvec3() * lattice.scale).map(|d| if d == 0.0 { 1e-120 } else { d });
-        (origin.abs().max_element() < RAY_CELLS).then(|| Self {
+        (origin.abs().max_element() < lattice.margins.ray_cells).then(|| Self {
             origin: origin.to_array(),
             dir: dir.to_array(),
             inv_dir: dir.recip().to_array(),
@@ -83,14 +82,14 @@ fn first_exit(t: [f64; 3]) -> (usize, f64) {
     (axis, t[axis])
 }
 
-/// The distance up to which cells must be visited for hits up to `reach`.
-#[inline]
-fn limit<G: Goal>(query: &Query<G>) -> f64 {
-    let reach = f64::from(query.reach());
-    reach + reach.abs() * WALK_MARGIN
-}
-
 impl<M: Mailbox> GridOctree<'_, M> {
+    /// The distance up to which cells must be visited for hits within the query's reach.
+    #[inline]
+    fn limit<G: Goal>(&self, query: &Query<G>) -> f64 {
+        let reach = f64::from(query.reach());
+        reach + reach.abs() * self.lattice.margins.lag
+    }
+
     /// Visits the cells along the ray in order.
     pub(super) fn walk_cells<G: Goal, P: Probe>(&self, query: &mut Query<G>, mailbox: &mut M, probe: &mut P) {
         mailbox.next_ray();
@@ -100,8 +99,8 @@ impl<M: Mailbox> GridOctree<'_, M> {
         };
         // A hit at t_min may lie half an ulp before it.
         let from = f64::from(query.t_min);
-        let Some((mut enter, _)) = track.span(self.lattice.fine_dims(), from - from.abs() * WALK_MARGIN, limit(query))
-        else {
+        let from = from - from.abs() * self.lattice.margins.lag;
+        let Some((mut enter, _)) = track.span(self.lattice.fine_dims(), from, self.limit(query)) else {
             return;
         };
 
@@ -111,7 +110,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
         let mut cell = [first(0), first(1), first(2)];
         let exit = |k: usize, cell: u32| track.meets(k, (cell + u32::from(track.forwards[k])) << levels);
         let mut exits = [exit(0, cell[0]), exit(1, cell[1]), exit(2, cell[2])];
-        let mut end = limit(query);
+        let mut end = self.limit(query);
         loop {
             let (axis, leave) = first_exit(exits);
             let entry = self.top[self.lattice.top_index(cell)];
@@ -127,7 +126,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
                 if answered {
                     return;
                 }
-                end = limit(query);
+                end = self.limit(query);
             }
             if end < leave {
                 return;
@@ -165,7 +164,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
             track.cell_at(k, enter, lo, lo + (1 << levels) - 1)
         };
         let mut at = [first(0), first(1), first(2)];
-        let mut end = limit(query);
+        let mut end = self.limit(query);
         loop {
             let (cell, level) = self.descend(root, at, probe);
             if cell == EMPTY {
@@ -175,7 +174,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
                 if self.visit(cell, query, mailbox, probe) {
                     return true;
                 }
-                end = limit(query);
+                end = self.limit(query);
             }
             let side = 1u32 << level;
             let lo = [at[0] >> level << level, at[1] >> level << level, at[2] >> level << level];
@@ -187,16 +186,17 @@ impl<M: Mailbox> GridOctree<'_, M> {
                 return true;
             }
 
-            // Never back: the lower bound of each coordinate's range is where it is, so that the walk ends.
+            // Never back, so that the walk ends, and not out of the cell.
             for k in 0..3 {
                 if k == axis {
                     continue;
                 }
-                at[k] = if track.forwards[k] {
-                    track.cell_at(k, leave, at[k], lo[k] + (side - 1))
-                } else {
-                    track.cell_at(k, leave, lo[k], at[k])
+                let (first, last) = match (self.lattice.margins.guarded, track.forwards[k]) {
+                    (true, true) => (at[k], lo[k] + (side - 1)),
+                    (true, false) => (lo[k], at[k]),
+                    (false, _) => (0, u32::MAX),
                 };
+                at[k] = track.cell_at(k, leave, first, last);
             }
             let Some(next) = (if track.forwards[axis] { Some(plane[axis]) } else { plane[axis].checked_sub(1) }) else {
                 return false;

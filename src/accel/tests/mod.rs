@@ -17,7 +17,7 @@ const PARAMS: [GridParams; 4] = [
 ];
 
 /// All hits of the three queries, as bits.
-fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<[u32; 9]> {
+pub(crate) fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<[u32; 9]> {
     let mut scratch = accel.scratch();
     let mut first = vec![Hit::MISS; rays.len()];
     let mut blocked = vec![false; rays.len()];
@@ -31,6 +31,12 @@ fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<[u32; 9]> {
         [t, u, v, p, u32::from(*b), t2, u2, v2, p2]
     };
     first.iter().zip(&blocked).zip(&second).map(row).collect()
+}
+
+/// How many rays are answered otherwise than by brute force.
+pub(crate) fn wrong<A: Accel>(accel: &A, shapes: &Shapes, rays: &[Ray]) -> usize {
+    let expected = answers(&Unculled::new(shapes), rays);
+    answers(accel, rays).iter().zip(&expected).filter(|(got, expected)| got != expected).count()
 }
 
 fn assert_same(what: &str, rays: &[Ray], got: &[[u32; 9]], expected: &[[u32; 9]]) {

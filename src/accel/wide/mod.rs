@@ -13,6 +13,8 @@
 mod build;
 mod check;
 mod listed;
+#[cfg(test)]
+mod margins;
 mod node;
 mod split;
 mod walk;
@@ -20,8 +22,10 @@ mod walk;
 pub use listed::Listed;
 pub use split::Splitting;
 
+use std::marker::PhantomData;
+
 use self::node::Tree;
-use self::walk::{Stack, Walk};
+use self::walk::{BoxMargins, Derived, Stack, Walk};
 use super::query::{Culling, Goal, Query};
 use super::{Probe, Shapes};
 use crate::math::simd::Level;
@@ -47,6 +51,12 @@ impl<'a> Wide<'a> {
         Self { level, ..self }
     }
 
+    /// Walks by given margins.
+    #[inline]
+    fn walk_within<B: BoxMargins, G: Goal, P: Probe>(&self, query: &mut Query<G>, stack: &mut Stack, probe: &mut P) {
+        self.level.run(Walk { tree: &self.tree, query, stack, probe, margins: PhantomData::<B> });
+    }
+
     /// How the scene was cut.
     pub fn splitting(&self) -> Splitting {
         self.splitting
@@ -65,6 +75,6 @@ impl Culling for Wide<'_> {
     }
 
     fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, stack: &mut Stack, probe: &mut P) {
-        self.level.run(Walk { tree: &self.tree, query, stack, probe });
+        self.walk_within::<Derived, _, _>(query, stack, probe);
     }
 }

@@ -2,17 +2,36 @@
 //!
 //! # Why no hit is lost
 //! A prim lies in the boxes above it, exactly: they are made of its own `f32` coordinates. The distances to a box's planes
-//! err by [`SLAB_F32`] at most, relative, so a box is entered whenever the exact ray meets it within its range, widened
-//! by [`BOX_MARGIN`]. Only where that holds are boxes asked at all: a direction whose reciprocal is not a normal number
+//! err by [`SLAB_F32`] at most, relative, and [`BOX_UNDERFLOW`], so a box is entered whenever the exact ray meets it within
+//! its range, widened by [`BOX_MARGIN`]. Only where that holds are boxes asked at all: a direction whose reciprocal is not a normal number
 //! constrains nothing on its axis, and with coordinates beyond [`BOX_COORDINATES`] every prim is tested.
+
+use std::marker::PhantomData;
 
 use super::node::{Child, Node, Tree};
 use crate::accel::query::{Goal, Query};
 use crate::accel::{Intersector, Probe};
 use crate::math::Vec3;
-use crate::math::bounds::{BOX_COORDINATES, BOX_MARGIN, SLAB_F32};
+use crate::math::bounds::{BOX_COORDINATES, BOX_MARGIN, BOX_UNDERFLOW, SLAB_F32};
 use crate::math::simd::{Kernel, LANES, Simd};
 use crate::math::triangles::RayLanes;
+
+/// What a walk allows for.
+pub(in crate::accel) trait BoxMargins {
+    /// Relative error of a distance to a plane.
+    const SLAB: f32 = SLAB_F32;
+    /// How far beyond the ray's range boxes are entered, relative.
+    const RANGE: f32 = BOX_MARGIN;
+    /// What underflow adds to either.
+    const UNDERFLOW: f32 = BOX_UNDERFLOW;
+    /// Largest coordinate with which boxes are asked.
+    const COORDINATES: f32 = BOX_COORDINATES;
+}
+
+/// The margins that `math::bounds` derives.
+pub(in crate::accel) struct Derived;
+
+impl BoxMargins for Derived {}
 
 /// A child still to be visited, and the distance at which the ray enters its box.
 #[derive(Clone, Copy, Debug)]
@@ -26,38 +45,40 @@ struct Entry {
 pub struct Stack(Vec<Entry>);
 
 /// One query under way.
-pub(super) struct Walk<'w, 'q, G: Goal, P> {
+pub(super) struct Walk<'w, 'q, G: Goal, P, B> {
     pub tree: &'w Tree,
     pub query: &'w mut Query<'q, G>,
     pub stack: &'w mut Stack,
     pub probe: &'w mut P,
+    pub margins: PhantomData<B>,
 }
 
 /// A ray ready to be tested against boxes.
-struct Slabs<S: Simd> {
+struct Slabs<S: Simd, B> {
     origin: [S::Lanes; 3],
     inverse: [S::Lanes; 3],
     /// Which plane of each axis comes first: 1 where the ray runs backwards.
     first: [usize; 3],
     from: f32,
+    margins: PhantomData<B>,
 }
 
-impl<G: Goal, P: Probe> Kernel for Walk<'_, '_, G, P> {
+impl<G: Goal, P: Probe, B: BoxMargins> Kernel for Walk<'_, '_, G, P, B> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Self { tree, query, stack: Stack(stack), probe } = self;
+        let Self { tree, query, stack: Stack(stack), probe, .. } = self;
         if tree.nodes.is_empty() {
             return;
         }
         let far_out = query.ray.origin.abs().max_element().max(tree.extent);
-        if far_out > BOX_COORDINATES {
+        if far_out > B::COORDINATES {
             return test_all(query, probe);
         }
-        let slabs = Slabs::new(s, query.ray.origin, query.ray.dir, query.t_min);
+        let slabs = Slabs::<S, B>::new(s, query.ray.origin, query.ray.dir, query.t_min);
         let lanes = RayLanes::new(s, &query.ray);
-        let mut limit = widened(query.reach());
+        let mut limit = widened::<B>(query.reach());
         let mut child = 0;
         stack.clear();
         loop {
@@ -84,7 +105,7 @@ impl<G: Goal, P: Probe> Kernel for Walk<'_, '_, G, P> {
                     if answered {
                         return;
                     }
-                    limit = widened(query.reach());
+                    limit = widened::<B>(query.reach());
                 }
                 Child::Run(run) => {
                     probe.step();
@@ -94,7 +115,7 @@ impl<G: Goal, P: Probe> Kernel for Walk<'_, '_, G, P> {
                             return;
                         }
                     }
-                    limit = widened(query.reach());
+                    limit = widened::<B>(query.reach());
                 }
             }
             loop {
@@ -110,8 +131,8 @@ impl<G: Goal, P: Probe> Kernel for Walk<'_, '_, G, P> {
 
 /// The distance up to which boxes must be entered for hits up to `reach`.
 #[inline(always)]
-fn widened(reach: f32) -> f32 {
-    reach + reach.abs() * BOX_MARGIN + f32::MIN_POSITIVE
+fn widened<B: BoxMargins>(reach: f32) -> f32 {
+    reach + reach.abs() * B::RANGE + B::UNDERFLOW
 }
 
 #[cold]
@@ -124,7 +145,7 @@ fn test_all<G: Goal, P: Probe>(query: &mut Query<G>, probe: &mut P) {
     }
 }
 
-impl<S: Simd> Slabs<S> {
+impl<S: Simd, B: BoxMargins> Slabs<S, B> {
     #[inline(always)]
     fn new(s: S, origin: Vec3, dir: Vec3, t_min: f32) -> Self {
         let inverse = dir.to_array().map(|d| {
@@ -136,7 +157,8 @@ impl<S: Simd> Slabs<S> {
             origin: [s.splat(origin.x), s.splat(origin.y), s.splat(origin.z)],
             inverse: [s.splat(inverse[0]), s.splat(inverse[1]), s.splat(inverse[2])],
             first: dir.to_array().map(|d| usize::from(d.is_sign_negative())),
-            from: t_min - t_min.abs() * BOX_MARGIN - f32::MIN_POSITIVE,
+            from: t_min - t_min.abs() * B::RANGE - B::UNDERFLOW,
+            margins: PhantomData,
         }
     }
 
@@ -151,7 +173,7 @@ impl<S: Simd> Slabs<S> {
             near = s.greater(s.mul(s.sub(s.load(first), self.origin[k]), self.inverse[k]), near);
             far = s.smaller(s.mul(s.sub(s.load(last), self.origin[k]), self.inverse[k]), far);
         }
-        let slack = s.add(s.mul(s.abs(far), s.splat(SLAB_F32)), s.splat(f32::MIN_POSITIVE));
+        let slack = s.add(s.mul(s.abs(far), s.splat(B::SLAB)), s.splat(B::UNDERFLOW));
         (near, s.at_most(near, s.add(far, slack)))
     }
 

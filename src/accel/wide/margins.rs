@@ -1,0 +1,108 @@
+//! Each margin of the walk is needed: with the derived ones every answer is that of brute force, and without any one of
+//! them some are not.
+
+use std::marker::PhantomData;
+
+use super::walk::{BoxMargins, Derived, Stack};
+use super::{Splitting, Wide};
+use crate::accel::query::{Culling, Goal, Query};
+use crate::accel::tests::scenes::{far_rays, lattice, mesh, moved, ray, rays, soup};
+use crate::accel::tests::wrong;
+use crate::accel::{Probe, Ray, Shapes};
+use crate::math::Vec3;
+use crate::math::random::Random;
+
+/// A tree walked by other margins.
+struct Walked<'a, B>(Wide<'a>, PhantomData<fn() -> B>);
+
+impl<B: BoxMargins> Culling for Walked<'_, B> {
+    type Scratch = Stack;
+
+    fn shapes(&self) -> &Shapes {
+        self.0.shapes()
+    }
+
+    fn new_scratch(&self) -> Stack {
+        self.0.new_scratch()
+    }
+
+    fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, stack: &mut Stack, probe: &mut P) {
+        self.0.walk_within::<B, _, _>(query, stack, probe);
+    }
+}
+
+struct NoSlab;
+impl BoxMargins for NoSlab {
+    const SLAB: f32 = 0.0;
+}
+
+struct NoRange;
+impl BoxMargins for NoRange {
+    const RANGE: f32 = 0.0;
+}
+
+struct NoUnderflow;
+impl BoxMargins for NoUnderflow {
+    const UNDERFLOW: f32 = 0.0;
+}
+
+struct AnyCoordinates;
+impl BoxMargins for AnyCoordinates {
+    const COORDINATES: f32 = f32::INFINITY;
+}
+
+fn wrong_with<B: BoxMargins>(shapes: &Shapes, rays: &[Ray]) -> usize {
+    [Splitting::Octree, Splitting::SurfaceArea]
+        .map(|s| wrong(&Walked::<B>(Wide::build(shapes, s), PhantomData), shapes, rays))
+        .iter()
+        .sum()
+}
+
+/// Nothing is wrong with the derived margins, something is with the others.
+fn assert_needed<B: BoxMargins>(shapes: &Shapes, rays: &[Ray]) {
+    assert_eq!(wrong_with::<Derived>(shapes, rays), 0, "as derived");
+    assert!(wrong_with::<B>(shapes, rays) > 0, "nothing goes wrong without it");
+}
+
+#[test]
+fn without_the_error_of_distances_rays_through_edges_of_boxes_miss_what_is_inside() {
+    let shapes = lattice(250);
+    let rays = rays(&shapes, 40);
+    assert_needed::<NoSlab>(&shapes, &rays);
+}
+
+#[test]
+fn boxes_behind_the_best_hit_may_hold_another_as_near() {
+    let shapes = soup(700, 0.4);
+    let rays = far_rays(&shapes, 300, 1e4..1e7);
+    assert_needed::<NoRange>(&shapes, &rays);
+}
+
+/// Rays through corners of boxes, so fast that distances have few bits left.
+#[test]
+fn among_the_smallest_numbers_distances_to_boxes_underflow() {
+    let mut r = Random::new(15);
+    let scale = 1.0 / 1024.0;
+    let shapes = moved(lattice(250), scale, Vec3::ZERO);
+    let aim = |_| {
+        let origin = (r.cube() * 8.0).round() * scale;
+        let target = shapes.vertices[r.below(shapes.vertices.len())];
+        // Exactly along the way to the corner: its distance is 1 / (m 2¹²⁰).
+        let m = 2.0 * (r.unit() * 2048.0).floor() + 1.0;
+        ray(origin, (target - origin) * m * 2.0f32.powi(120))
+    };
+    let rays: Vec<Ray> = (0..3000).map(aim).filter(|r| r.dir != Vec3::ZERO).collect();
+    assert_needed::<NoUnderflow>(&shapes, &rays);
+}
+
+/// Differences of coordinates near the largest float are infinite, and so are the distances made of them.
+#[test]
+fn boxes_near_the_largest_float_are_not_asked() {
+    let at = |x: f32, y: f32| [Vec3::new(x, y - 1e37, -1e37), Vec3::new(x, y + 1e37, -1e37), Vec3::new(x, y, 1e37)];
+    let faces: Vec<[Vec3; 3]> = (0..40).map(|i| at(3e38 - 1e37 * (i % 16) as f32, 3e37 * (i % 5) as f32)).collect();
+    let shapes = mesh(faces.concat(), (0..40).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect());
+    let start = Vec3::new(-3e38, 0.0, 0.0);
+    let rays: Vec<Ray> =
+        (0..5).map(|i| Ray { t_max: 20.0, ..ray(start + Vec3::Y * (3e37 * i as f32), Vec3::X * 5e37) }).collect();
+    assert_needed::<AnyCoordinates>(&shapes, &rays);
+}
