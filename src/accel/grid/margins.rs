@@ -4,8 +4,8 @@
 use super::lattice::CellMargins;
 use super::mailbox::Stamps;
 use super::{GridOctree, GridParams};
-use crate::accel::tests::scenes::{far_rays, mesh, ray, soup};
-use crate::accel::tests::wrong;
+use crate::accel::tests::scenes::{mesh, ray, soup};
+use crate::accel::tests::{far_rays, wrong};
 use crate::accel::{Accel as _, Hit, Probe, Ray, Shapes};
 use crate::math::Vec3;
 use crate::math::random::Random;
@@ -13,7 +13,8 @@ use crate::math::random::Random;
 const DERIVED: CellMargins = CellMargins::DERIVED;
 
 /// Eight cells on each axis, no octrees.
-const EIGHT: GridParams = GridParams { density: 64.0, max_resolution: 8, max_depth: 0, step_cost: 1.0 };
+pub(in crate::accel) const EIGHT: GridParams =
+    GridParams { density: 64.0, max_resolution: 8, max_depth: 0, step_cost: 1.0 };
 
 fn wrong_with(margins: CellMargins, params: &GridParams, shapes: &Shapes, rays: &[Ray]) -> usize {
     wrong(&GridOctree::<Stamps>::build_within(shapes, params, margins), shapes, rays)
@@ -25,21 +26,26 @@ fn assert_needed(name: &str, shrunk: CellMargins, params: &GridParams, shapes: &
     assert!(wrong_with(shrunk, params, shapes, rays) > 0, "{name}: nothing goes wrong with {shrunk:?}");
 }
 
-/// Faces in the planes between the cells of [`EIGHT`], and rays along diagonals of these planes through the cells' corners.
+/// Width of the cells of [`EIGHT`] over a content of size 1.
 ///
-/// Over a content of size 1 the grid begins at −1/256, and a cell is 129/1024 wide: all of that is exact in `f32`, while
-/// the scale, 1024/129, is not.
-fn faces_between_cells() -> (Shapes, Vec<Ray>) {
+/// It and the grid's beginning at −1/256, and so the planes between cells, are exact in `f32`, while the scale is not.
+pub(in crate::accel) const WIDTH: f32 = 129.0 / 1024.0;
+
+/// The plane before cell `k` of [`EIGHT`] over the unit cube.
+pub(in crate::accel) fn plane(k: usize) -> f32 {
+    k as f32 * WIDTH - 1.0 / 256.0
+}
+
+/// Faces in the planes between the cells of [`EIGHT`], and rays along diagonals of these planes through the cells' corners.
+pub(in crate::accel) fn faces_between_cells() -> (Shapes, Vec<Ray>) {
     let mut r = Random::new(13);
-    let plane = |k: usize| k as f32 * (129.0 / 1024.0) - 1.0 / 256.0;
     let corner = |r: &mut Random| Vec3::from_array([0, 1, 2].map(|_| plane(1 + r.below(7))));
-    let width = 129.0 / 1024.0;
     let mut vertices =
         vec![Vec3::ZERO, Vec3::X * 0.01, Vec3::Y * 0.01, Vec3::ONE, Vec3::ONE - 0.01, Vec3::new(1.0, 0.99, 1.0)];
     let mut triangles = vec![[0, 1, 2], [3, 4, 5]];
     for i in 0..60 {
         let (at, base) = (corner(&mut r), vertices.len() as u32);
-        let sign = |bit: usize| if i >> bit & 1 == 0 { width } else { -width };
+        let sign = |bit: usize| if i >> bit & 1 == 0 { WIDTH } else { -WIDTH };
         let [u, v] = [(Vec3::X, Vec3::Y), (Vec3::Y, Vec3::Z), (Vec3::Z, Vec3::X)]
             .map(|(a, b)| [a * sign(0), b * sign(1)])[i % 3];
         vertices.extend([at, at + u, at + v]);
@@ -50,7 +56,7 @@ fn faces_between_cells() -> (Shapes, Vec<Ray>) {
         let at = corner(&mut r);
         let dir = Vec3::from_array([0, 1, 2].map(|_| [-1.0f32, 0.0, 1.0, 1.0, -1.0][r.below(5)]));
         if dir != Vec3::ZERO {
-            rays.extend([ray(at, dir), ray(at - dir * (3.0 * width), dir)]);
+            rays.extend([ray(at, dir), ray(at - dir * (3.0 * WIDTH), dir)]);
         }
     }
     (mesh(vertices, triangles), rays)

@@ -10,7 +10,7 @@ mod check;
 pub mod lattice;
 pub mod mailbox;
 #[cfg(test)]
-mod margins;
+pub(super) mod margins;
 mod octree;
 pub mod overlap;
 pub mod params;

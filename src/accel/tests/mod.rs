@@ -1,11 +1,13 @@
 //! What every structure must do.
 
+mod catalogue;
 pub(crate) mod scenes;
 mod starts;
 mod watertight;
 
 use super::grid::mailbox::{NoMailbox, Stamps};
 use super::*;
+use crate::math::random::Random;
 use crate::math::simd::Level;
 use scenes::{all, broken_rays, rays};
 
@@ -37,6 +39,20 @@ pub(crate) fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<[u32; 9]> {
 pub(crate) fn wrong<A: Accel>(accel: &A, shapes: &Shapes, rays: &[Ray]) -> usize {
     let expected = answers(&Unculled::new(shapes), rays);
     answers(accel, rays).iter().zip(&expected).filter(|(got, expected)| got != expected).count()
+}
+
+/// `n` rays that start so many times the size of a mesh away from it, at every distance alike, towards its corners.
+pub(crate) fn far_rays(shapes: &Shapes, n: usize, times: std::ops::Range<f32>) -> Vec<Ray> {
+    let mut r = Random::new(12);
+    let size = shapes.vertices.iter().fold(0.0, |m: f32, v| m.max(v.abs().max_element()));
+    let (near, far) = (libm::log2f(times.start), libm::log2f(times.end));
+    (0..n)
+        .map(|_| {
+            let target = shapes.vertices[r.below(shapes.vertices.len())];
+            let origin = r.direction() * (libm::exp2f(near + (far - near) * r.unit()) * size);
+            scenes::ray(origin, target - origin)
+        })
+        .collect()
 }
 
 fn assert_same(what: &str, rays: &[Ray], got: &[[u32; 9]], expected: &[[u32; 9]]) {

@@ -193,20 +193,6 @@ pub(crate) fn rays(shapes: &Shapes, n: usize) -> Vec<Ray> {
     rays
 }
 
-/// `n` rays that start so many times the size of a mesh away from it, at every distance alike, towards its corners.
-pub(crate) fn far_rays(shapes: &Shapes, n: usize, times: std::ops::Range<f32>) -> Vec<Ray> {
-    let mut r = Random::new(12);
-    let size = shapes.vertices.iter().fold(0.0, |m: f32, v| m.max(v.abs().max_element()));
-    let (near, far) = (libm::log2f(times.start), libm::log2f(times.end));
-    (0..n)
-        .map(|_| {
-            let target = shapes.vertices[r.below(shapes.vertices.len())];
-            let origin = r.direction() * (libm::exp2f(near + (far - near) * r.unit()) * size);
-            ray(origin, target - origin)
-        })
-        .collect()
-}
-
 pub(crate) fn ray(origin: Vec3, dir: Vec3) -> Ray {
     Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude: NO_PRIM, sample: 0 }
 }
