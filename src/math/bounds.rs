@@ -111,6 +111,11 @@ pub const CELL_PAD: f64 = 64.0 * U64 * RAY_CELLS;
 /// that is more than [`CELL_PAD`], so that a ray that meets the content passes through the grid whatever is rounded.
 pub const GRID_ROOM: f64 = 1.0 / 256.0;
 
+/// What a walk through cells takes for a zero in the direction, in finest cells: no plane is met along such an axis, for
+/// 10¹²⁰ times any distance is beyond every t, and no NaN arises. Smaller numbers do not occur: 2⁻¹⁴⁹ of an `f32` times
+/// at least 2⁻¹²⁹ cells per unit.
+pub const NO_SLOPE: f64 = 1e-120;
+
 /// Widening of a slab distance so that a box is never missed: 3 roundings at either end.
 /// (T. Ize, *Robust BVH Ray Traversal*, 2013.)
 pub const SLAB: f64 = 2.0 * 3.0 * U64 / (1.0 - 3.0 * U64);

@@ -45,8 +45,17 @@ pub fn approximate<const N: usize>(numerator: &Expansion<N>, denominator: &Expan
 
 /// `numerator` / `denominator`, correctly rounded; the denominator is not zero. `M` ≥ `N` + 192.
 pub fn rounded<const N: usize, const M: usize>(numerator: &Expansion<N>, denominator: &Expansion<96>) -> f32 {
+    rounded_within::<N, M>(numerator, denominator, EXACT_QUOTIENT)
+}
+
+/// [`rounded`] where `doubt` is the relative error of [`approximate`].
+fn rounded_within<const N: usize, const M: usize>(
+    numerator: &Expansion<N>,
+    denominator: &Expansion<96>,
+    doubt: f64,
+) -> f32 {
     let t = approximate(numerator, denominator);
-    let (lo, hi) = (round(t - t.abs() * EXACT_QUOTIENT), round(t + t.abs() * EXACT_QUOTIENT));
+    let (lo, hi) = (round(t - t.abs() * doubt), round(t + t.abs() * doubt));
     if lo.to_bits() == hi.to_bits() {
         return lo;
     }
@@ -77,4 +86,24 @@ fn middle(lo: f32, hi: f32) -> f64 {
         if x.is_infinite() { f64::from(x.signum()) * 2.0 * (1u128 << 127) as f64 } else { f64::from(x) }
     };
     (widen(lo) + widen(hi)) / 2.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 3 (1 + 2⁻²⁴) + 2⁻⁸⁰ over 3: just above the middle between 1 and the next float.
+    fn above_the_middle(doubt: f64) -> f32 {
+        let (mut numerator, mut denominator) = (Expansion::<8>::ZERO, Expansion::<96>::ZERO);
+        numerator.add(3.0 * (1.0 + f64::from(f32::EPSILON) / 2.0));
+        numerator.add(2f64.powi(-80));
+        denominator.add(3.0);
+        rounded_within::<8, 200>(&numerator, &denominator, doubt)
+    }
+
+    #[test]
+    fn a_quotient_just_above_a_middle_is_rounded_up_and_would_not_be_without_the_margin() {
+        assert_eq!(above_the_middle(EXACT_QUOTIENT), 1f32.next_up());
+        assert_eq!(above_the_middle(0.0), 1.0);
+    }
 }

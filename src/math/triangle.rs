@@ -81,7 +81,7 @@ pub fn is_hit_near_edge(ray: &RaySpace, &[a, b, c]: &Triangle) -> bool {
 
 /// Exact t = n·(a − o) / n·d with n = (b − a) × (c − a), correctly rounded. The triangle must be hit.
 pub fn distance(ray: &RaySpace, triangle: &Triangle) -> f32 {
-    let fast = plane_quotient(ray, triangle).and_then(|(t, error)| nearest(t, error));
+    let fast = plane_quotient(ray, triangle, PLANE_TERMS_F64).and_then(|(t, error)| nearest(t, error));
     fast.unwrap_or_else(|| {
         let (numerator, denominator) = exact_plane_terms(ray, triangle);
         rounded::<192, 384>(&numerator, &denominator)
@@ -96,7 +96,7 @@ pub fn distance_f64(ray: &RaySpace, triangle: &Triangle) -> f64 {
 
 /// The distance of a triangle that is hit, to a relative error of `enough`, which is more than [`EXACT_QUOTIENT`].
 fn distance_within(ray: &RaySpace, triangle: &Triangle, enough: f64) -> f64 {
-    match plane_quotient(ray, triangle) {
+    match plane_quotient(ray, triangle, PLANE_TERMS_F64) {
         Some((t, error)) if error < enough => t,
         _ => {
             let (numerator, denominator) = exact_plane_terms(ray, triangle);
@@ -105,14 +105,15 @@ fn distance_within(ray: &RaySpace, triangle: &Triangle, enough: f64) -> f64 {
     }
 }
 
-/// t in `f64` and a bound of its relative error, where there is one.
-fn plane_quotient(ray: &RaySpace, &[a, b, c]: &Triangle) -> Option<(f64, f64)> {
+/// t in `f64` and a bound of its relative error, where there is one; `terms` is the relative error of both its terms.
+#[inline]
+fn plane_quotient(ray: &RaySpace, &[a, b, c]: &Triangle, terms: f64) -> Option<(f64, f64)> {
     let (origin, dir, a) = (ray.origin.as_dvec3(), ray.dir.as_dvec3(), a.as_dvec3());
     let (e1, e2) = (b.as_dvec3() - a, c.as_dvec3() - a);
     let normal = e1.cross(e2);
     let sizes = magnitude_cross(e1.abs(), e2.abs());
     let to_plane = a - origin;
-    let term = |v: DVec3| Bounded { value: normal.dot(v), error: sizes.dot(v.abs()) * PLANE_TERMS_F64 };
+    let term = |v: DVec3| Bounded { value: normal.dot(v), error: sizes.dot(v.abs()) * terms };
     term(to_plane).over(term(dir))
 }
 
@@ -177,24 +178,46 @@ mod tests {
     use super::super::rational::{hit, point};
     use super::*;
 
-    /// The largest relative error of distances that are taken from `f64` where its bound is below `enough`, of triangles
-    /// seen nearly edge on.
-    fn worst(enough: f64) -> f64 {
+    /// Triangles seen nearly edge on, by rays that hit them.
+    fn each_grazing(mut check: impl FnMut(&RaySpace, &Triangle)) {
         let mut random = Random::new(10);
-        let mut worst = 0.0f64;
-        for _ in 0..300 {
+        for _ in 0..400 {
             let (a, e1, e2) = (random.cube(), random.cube(), random.cube());
             let triangle = [a, a + e1, a + e2];
             let dir = e1 * random.unit() - e2 * random.unit() + random.cube() * 1e-7;
             let origin = a + (e1 + e2) * 0.3 - dir * 2.0;
-            let Some(ray) = RaySpace::new(origin, dir) else { continue };
-            if let Some(t) = hit(&point(origin), &point(dir), &triangle).map(|t| t.to_f64().value())
-                && t != 0.0
-            {
-                worst = worst.max((distance_within(&ray, &triangle, enough) / t - 1.0).abs());
+            if let Some(ray) = RaySpace::new(origin, dir).filter(|ray| is_hit(ray, &triangle)) {
+                check(&ray, &triangle);
             }
         }
+    }
+
+    /// The largest relative error of distances that are taken from `f64` where its bound is below `enough`.
+    fn worst(enough: f64) -> f64 {
+        let mut worst = 0.0f64;
+        each_grazing(|ray, triangle| {
+            let exact = hit(&point(ray.origin), &point(ray.dir), triangle).map_or(f64::NAN, |t| t.to_f64().value());
+            worst = worst.max((distance_within(ray, triangle, enough) / exact - 1.0).abs());
+        });
         worst
+    }
+
+    /// How often the nearest float is taken from `f64` and is not the nearest.
+    fn wrongly_rounded(terms: f64) -> usize {
+        let mut wrong = 0;
+        each_grazing(|ray, triangle| {
+            let (numerator, denominator) = exact_plane_terms(ray, triangle);
+            let exact = rounded::<192, 384>(&numerator, &denominator);
+            let fast = plane_quotient(ray, triangle, terms).and_then(|(t, error)| nearest(t, error));
+            wrong += usize::from(fast.is_some_and(|t| t.to_bits() != exact.to_bits()));
+        });
+        wrong
+    }
+
+    #[test]
+    fn a_rounded_distance_is_the_nearest_and_would_not_be_without_the_bound_of_its_terms() {
+        assert_eq!(wrongly_rounded(PLANE_TERMS_F64), 0);
+        assert!(wrongly_rounded(0.0) > 0);
     }
 
     #[test]

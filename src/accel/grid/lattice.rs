@@ -7,7 +7,7 @@
 use super::GridParams;
 use crate::accel::Shapes;
 use crate::math::aabb::Aabb;
-use crate::math::bounds::{CELL_PAD, GRID_ROOM, RAY_CELLS, WALK_MARGIN};
+use crate::math::bounds::{CELL_PAD, GRID_ROOM, NO_SLOPE, RAY_CELLS, WALK_MARGIN};
 use crate::math::{DVec3, Vec3, Vec3Swizzles as _};
 
 /// Most finest cells along an axis, R in the derivation of [`CELL_PAD`].
@@ -27,14 +27,22 @@ pub struct CellMargins {
     pub lag: f64,
     /// How far from the grid's corner a ray may start that is led through cells.
     pub ray_cells: f64,
+    /// What a zero in a direction is replaced by.
+    pub no_slope: f64,
     /// Whether the walk through octants is kept from leaving a cell but through the face it meets first.
     pub guarded: bool,
 }
 
 impl CellMargins {
     /// Those that `math::bounds` derives.
-    pub const DERIVED: Self =
-        Self { pad: CELL_PAD, room: GRID_ROOM, lag: WALK_MARGIN, ray_cells: RAY_CELLS, guarded: true };
+    pub const DERIVED: Self = Self {
+        pad: CELL_PAD,
+        room: GRID_ROOM,
+        lag: WALK_MARGIN,
+        ray_cells: RAY_CELLS,
+        no_slope: NO_SLOPE,
+        guarded: true,
+    };
 }
 
 /// Box, resolution and depth of a grid.

@@ -71,6 +71,12 @@ fn without_padding_rays_through_corners_of_cells_miss_what_lies_in_their_faces()
     }
 }
 
+#[test]
+fn a_zero_in_a_direction_that_stays_zero_loses_what_lies_in_the_planes_of_cells() {
+    let (shapes, rays) = faces_between_cells();
+    assert_needed("no slope", CellMargins { no_slope: 0.0, ..DERIVED }, &EIGHT, &shapes, &rays);
+}
+
 /// A grid exactly as large as its content is missed by rays that only touch it.
 #[test]
 fn without_room_around_the_content_rays_through_its_corners_miss_it() {

@@ -31,9 +31,8 @@ impl Track {
     /// `None`: the origin is too far away to know the ray's cells.
     fn new<G: Goal>(lattice: &Lattice, query: &Query<G>) -> Option<Self> {
         let origin = lattice.place(query.ray.origin);
-        // A ray along a plane never meets it: 10¹²⁰ times any distance is beyond every t, and no NaN arises. Smaller
-        // components than this do not occur: 2⁻¹⁴⁹ of an f32 times at least 2⁻¹²⁹ cells per unit.
-        let dir = (query.ray.dir.as_dvec3() * lattice.scale).map(|d| if d == 0.0 { 1e-120 } else { d });
+        let along = query.ray.dir.as_dvec3() * lattice.scale;
+        let dir = along.map(|d| if d == 0.0 { lattice.margins.no_slope } else { d });
         (origin.abs().max_element() < lattice.margins.ray_cells).then(|| Self {
             origin: origin.to_array(),
             dir: dir.to_array(),

@@ -1,8 +1,8 @@
 //! The test catalogue: what has gone wrong in ray tracers, each case against an oracle of its own and with every structure.
 //!
 //! Letters: C connectivity, D degenerate input, G grids, P precision; each test names its own. Counts are small so that
-//! all of it takes seconds; with the environment variable `MESHRAY_LONG=1` they are those of the full catalogue, which
-//! want a release build.
+//! all of it takes seconds; with the environment variable `MESHRAY_LONG=1` they are those of the full catalogue, for a
+//! release build: `MESHRAY_LONG=1 cargo test --release --lib catalogue`.
 
 mod connectivity;
 mod degenerate;
