@@ -4,6 +4,7 @@ use dashu::base::Abs;
 use dashu::integer::IBig;
 use dashu::rational::RBig;
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 
 use super::rational::{self, cross, dot, exact, minus, point, sign};
 use super::shear::RaySpace;
@@ -58,8 +59,11 @@ fn aimed() -> impl Strategy<Value = (Vec3, Vec3, Triangle)> {
     })
 }
 
+/// The same cases in every run; with `MESHRAY_LONG=1` a hundred times as many.
 fn config() -> ProptestConfig {
-    ProptestConfig { cases: 3000, failure_persistence: None, ..ProptestConfig::default() }
+    let cases = if std::env::var("MESHRAY_LONG").is_ok_and(|v| v == "1") { 300_000 } else { 3000 };
+    let rng_seed = RngSeed::Fixed(3);
+    ProptestConfig { cases, rng_seed, failure_persistence: None, ..ProptestConfig::default() }
 }
 
 proptest! {
