@@ -102,9 +102,9 @@ pub const RAY_CELLS: f64 = (1u64 << 38) as f64;
 ///
 /// The walk places a ray in `f64`. With O the distance of its origin and R that of the cell from the grid's corner: the
 /// origin is placed with 2 roundings, 2 u O; a plane is met after 4 more on their difference, 4 u (O + R); a coordinate at
-/// a distance has an error of 4 u (O + R) + u R. So where the walk takes the exact ray to be in a cell, it is within
-/// 6 u O + 4 u R of it. O is below [`RAY_CELLS`], R at most 2¹⁶, and deciding which cells a prim touches errs by 2⁻⁴⁸ R: with
-/// all that the walk may be wrong by 7 u O. The test of a prim that is not exact may add what is left of 64 u O.
+/// a distance has an error of 4 u O + 5 u R. So where the walk takes the exact ray to be in a cell, it is within
+/// 6 u O + 5 u R of it. O is below [`RAY_CELLS`], R at most 2¹⁶, and deciding which cells a prim touches errs by 2⁻⁴⁸ R:
+/// together less than 7 u [`RAY_CELLS`]. What is left of 64 is for the tests of prims that are not exact.
 pub const CELL_PAD: f64 = 64.0 * U64 * RAY_CELLS;
 
 /// How much larger than its content the grid is on each side, relative to its extent: 2⁻⁸. Even with one cell on an axis
