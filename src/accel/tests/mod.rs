@@ -161,6 +161,17 @@ fn among_copies_of_a_triangle_the_lowest_is_hit_and_the_next_follow_in_order() {
 }
 
 #[test]
+fn a_direction_too_small_for_boxes_finds_its_way_without_triangles() {
+    let spheres = vec![SpherePrim { center: Vec3::ZERO, radius: 1.0 }];
+    let shapes = Shapes { spheres, opaque: BitSet::filled(1, true), ..Shapes::default() };
+    let rays =
+        [scenes::ray(Vec3::new(0.0, 0.0, 2e-39), Vec3::splat(1e-39)), scenes::ray(Vec3::ONE, Vec3::splat(-1e-39))];
+    let tree = Wide::build(&shapes, Splitting::Octree);
+    assert!(tree.check().is_ok());
+    assert_eq!(answers(&tree, &rays), answers(&Unculled::new(&shapes), &rays));
+}
+
+#[test]
 fn a_sphere_is_left_behind_where_it_was_entered() {
     let mut shapes = Shapes { spheres: vec![SpherePrim { center: Vec3::ZERO, radius: 1.0 }], ..Shapes::default() };
     shapes.opaque = BitSet::filled(1, true);

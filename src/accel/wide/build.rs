@@ -35,6 +35,10 @@ pub(super) fn build(shapes: &Shapes, splitting: Splitting) -> Tree {
     let all = parts.iter().fold(Aabb::EMPTY, |b, p| b.union(p.bounds));
     let mut tree = Tree { extent: all.lo.abs().max(all.hi.abs()).max_element(), ..Tree::default() };
     Builder { shapes, splitting }.node(parts, &mut tree);
+    if tree.blocks.is_empty() {
+        // Empty slots lead to block 0, and a ray that no box can turn away goes there too.
+        tree.blocks.push(Block::EMPTY);
+    }
     tree
 }
 
