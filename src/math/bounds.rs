@@ -91,8 +91,14 @@ pub const EXACT_QUOTIENT: f64 = 10.0 * U64;
 /// hit by 2⁻¹⁶ of the rounding of its position to `f32`.
 pub const POSITION_T: f64 = 1.0 / (1u64 << 40) as f64;
 
+/// How far off the mantle a point projected onto a cone may be on each axis, relative to the length of its axis plus its
+/// radius there: the unit axis errs by 4 u, the direction away from it by as much beside that, which leaves the point on
+/// the mantle of a cone turned by 8 u; place, radius and sum add 6 u.
+pub const CONE_PROJECTION: f64 = 16.0 * U64;
+
 /// What the walk through cells may lag behind, relative to t: a prim not seen yet has an exact t beyond the exit of the
-/// cell, and its rounded t may be half an ulp (u) lower. Doubled twice for spheres, whose t is not correctly rounded.
+/// cell, and its rounded t may be half an ulp (u) lower. Doubled twice for
+/// spheres and cones, whose t is not correctly rounded.
 pub const WALK_MARGIN: f64 = 4.0 * U32 as f64;
 
 /// Rays whose origin is further than this many finest cells from the grid's corner are answered without culling.

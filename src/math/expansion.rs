@@ -114,7 +114,7 @@ pub fn dot(n: &[Expansion<16>; 3], p: &Exact3) -> Expansion<192> {
 }
 
 /// a + b = sum + error exactly (Knuth).
-fn two_sum(a: f64, b: f64) -> (f64, f64) {
+pub(super) fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let b_part = sum - a;
     let a_part = sum - b_part;
@@ -122,7 +122,7 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
 }
 
 /// a · b = product + error exactly (Veltkamp's split, Dekker's product; no fused operation is needed).
-fn two_product(a: f64, b: f64) -> (f64, f64) {
+pub(super) fn two_product(a: f64, b: f64) -> (f64, f64) {
     let product = a * b;
     let (a_hi, a_lo) = split(a);
     let (b_hi, b_lo) = split(b);

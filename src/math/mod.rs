@@ -7,6 +7,7 @@ pub use glam::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, Vec2, Vec3, Vec3Swiz
 
 pub mod aabb;
 pub mod bounds;
+pub mod cone;
 pub mod ear_clip;
 pub mod expansion;
 pub mod frame;
@@ -19,6 +20,7 @@ pub mod polygon;
 pub mod quotient;
 pub mod random;
 pub mod rational;
+pub mod real;
 pub mod shear;
 pub mod simd;
 pub mod sphere;
