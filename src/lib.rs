@@ -52,7 +52,7 @@
 //! # Modules
 //! | module | knows |
 //! |---|---|
-//! | [`math`] | only numbers: error bounds, eight lanes at once, rays against triangle, polygon, sphere, plane, box |
+//! | [`math`] | only numbers: error bounds, eight lanes at once, rays against triangle, polygon, sphere, cone, plane, box |
 //! | [`scene`] | plain data with indices; which features a scene needs, default camera and light |
 //! | [`load`] | files -> scene and warnings: glTF, OBJ + MTL, scene files |
 //! | [`accel`] | shapes -> what does this ray hit: `none`, `grid-octree`, `fast-octree`, `fast-bvh`; counts |

@@ -34,6 +34,7 @@ pub use stats::StructureStats;
 pub use wide::{Listed, Splitting, Wide};
 
 use crate::math::Vec3;
+pub use crate::math::cone::Cone;
 
 /// The prim id of "nothing": the answer of a ray that misses, and the `exclude` of a ray that excludes nothing.
 pub const NO_PRIM: u32 = u32::MAX;

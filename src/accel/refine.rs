@@ -2,10 +2,10 @@
 
 use super::shapes::Prim;
 use super::{Hit, Ray, Shapes};
-use crate::math::bounds::{POSITION_T, U32, U64, offset_origin};
+use crate::math::bounds::{CONE_PROJECTION, POSITION_T, U32, U64, offset_origin};
 use crate::math::inset::inset;
 use crate::math::shear::RaySpace;
-use crate::math::{DVec3, Vec3, plane, polygon, sphere, triangle};
+use crate::math::{DVec3, Vec3, cone, plane, polygon, sphere, triangle};
 
 /// Where and how a surface was hit, in the frame of the shapes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,8 +17,8 @@ pub struct Refined {
     pub start: Vec3,
     /// How far, on each axis, `position` and `start` may be from exact points of the surface.
     pub error: Vec3,
-    /// Unit geometric normal: the side from which a face runs counter-clockwise, outwards for a sphere. Zero for a face
-    /// without area.
+    /// Unit geometric normal: the side from which a face runs counter-clockwise, outwards for a sphere or cone.
+    /// Zero for a face without area.
     pub normal: Vec3,
     /// Barycentric weight of the second corner; 0 but for triangles.
     pub u: f32,
@@ -53,6 +53,15 @@ impl Shapes {
                 // One rounding of the sum, three of the arm.
                 let error = (position.abs() + arm.abs() * 3.0) * U64;
                 (Located { position, error }, normal.as_vec3())
+            }
+            Prim::Cone(c) => {
+                // The root that was rounded to the hit's: on a flat cone a rounded t would slide along the mantle.
+                let roots = cone::distances(&space, c, false).into_iter().filter(|t| !t.is_nan());
+                let off = |t: &f64| (t - f64::from(hit.t)).abs();
+                let t = roots.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(f64::from(hit.t));
+                let (arm, size, normal) = c.project(Located::on_ray(ray, t).position);
+                let position = c.base.as_dvec3() + arm;
+                (Located { position, error: position.abs() * U64 + CONE_PROJECTION * size }, normal.as_vec3())
             }
         };
         let (position, error) = located.rounded();

@@ -1,8 +1,10 @@
 //! The shapes a structure culls: flat arrays in one centred `f32` frame.
 //!
-//! Prim ids run over all kinds: first the triangles, then the polygons, then the spheres, then the planes.
+//! Prim ids run over all kinds: first the triangles, then the polygons, then the spheres, then the
+//! cones, then the planes.
 
 use crate::math::aabb::Aabb;
+use crate::math::cone::{self, Cone};
 use crate::math::polygon::{self, Polygon};
 use crate::math::shear::RaySpace;
 use crate::math::triangle::{self, Triangle};
@@ -21,6 +23,8 @@ pub struct Shapes {
     pub polygon_corners: Vec<u32>,
     /// Spheres.
     pub spheres: Vec<SpherePrim>,
+    /// Cones and cylinders, open at both ends.
+    pub cones: Vec<Cone>,
     /// Unbounded planes (unit normal n, offset d: n·p = d); tested before every structure.
     pub planes: Vec<(Vec3, f32)>,
     /// One bit per prim: a hit always stops light.
@@ -64,7 +68,7 @@ impl BitSet {
 impl Shapes {
     /// Number of prims of all kinds.
     pub fn len(&self) -> usize {
-        self.triangles.len() + self.polygons.len() + self.spheres.len() + self.planes.len()
+        self.bounded() as usize + self.planes.len()
     }
 
     /// Whether there is nothing to hit.
@@ -74,7 +78,7 @@ impl Shapes {
 
     /// Prims that have bounds: all but the planes. They come first.
     pub fn bounded(&self) -> u32 {
-        index(self.triangles.len() + self.polygons.len() + self.spheres.len())
+        index(self.triangles.len() + self.polygons.len() + self.spheres.len() + self.cones.len())
     }
 
     /// What prim `prim` is.
@@ -91,13 +95,15 @@ impl Shapes {
             return Prim::Polygon(Polygon { vertices: &self.vertices, corners });
         }
         i -= self.polygons.len();
-        match self.spheres.get(i) {
-            Some(&sphere) => Prim::Sphere(sphere),
-            None => {
-                let (normal, offset) = self.planes[i - self.spheres.len()];
-                Prim::Plane(normal, offset)
-            }
+        if let Some(&sphere) = self.spheres.get(i) {
+            return Prim::Sphere(sphere);
         }
+        i -= self.spheres.len();
+        if let Some(cone) = self.cones.get(i) {
+            return Prim::Cone(cone);
+        }
+        let (normal, offset) = self.planes[i - self.cones.len()];
+        Prim::Plane(normal, offset)
     }
 
     #[inline]
@@ -119,11 +125,12 @@ impl Shapes {
             Prim::Triangle(corners) => one(triangle::intersect(ray, &corners)),
             Prim::Polygon(polygon) => one(polygon::intersect(ray, polygon)),
             Prim::Sphere(s) => sphere::intersect(ray, s.center, s.radius, ahead).unwrap_or([f32::NAN; 2]),
+            Prim::Cone(cone) => cone::intersect(ray, cone, ahead),
             Prim::Plane(normal, offset) => one(plane::intersect(ray, normal, offset)),
         }
     }
 
-    /// The smallest box around prim `prim`, which is not a plane; a sphere's is rounded outwards.
+    /// The smallest box around prim `prim`, which is not a plane; those of spheres and cones are rounded outwards.
     pub fn bounds(&self, prim: u32) -> Aabb {
         match self.prim(prim) {
             Prim::Triangle(corners) => Aabb::around(corners),
@@ -131,6 +138,7 @@ impl Shapes {
             Prim::Sphere(s) => {
                 Aabb { lo: (s.center - s.radius).map(f32::next_down), hi: (s.center + s.radius).map(f32::next_up) }
             }
+            Prim::Cone(cone) => cone.bounds(),
             Prim::Plane(..) => Aabb { lo: Vec3::NEG_INFINITY, hi: Vec3::INFINITY },
         }
     }
@@ -145,6 +153,8 @@ pub enum Prim<'a> {
     Polygon(Polygon<'a>),
     /// A sphere.
     Sphere(SpherePrim),
+    /// The mantle of a truncated cone; a cylinder has equal radii.
+    Cone(&'a Cone),
     /// An unbounded plane: unit normal n, offset d, n·p = d.
     Plane(Vec3, f32),
 }

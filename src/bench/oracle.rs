@@ -271,7 +271,8 @@ mod tests {
     #[test]
     fn the_oracle_and_brute_force_find_the_same_first_hits() {
         for (name, shapes) in scenes::all() {
-            let triangles = Shapes { polygons: Vec::new(), spheres: Vec::new(), planes: Vec::new(), ..shapes };
+            let triangles =
+                Shapes { polygons: Vec::new(), spheres: Vec::new(), cones: Vec::new(), planes: Vec::new(), ..shapes };
             let oracle = Oracle::new(&triangles);
             let brute = Unculled::new(&triangles);
             for ray in scenes::rays(&triangles, 12) {

@@ -9,7 +9,7 @@
 //! | `inputs`, `output`, `input_hash` | files as typed (`-`: standard streams); xxh3-128 of what was read, hexadecimal |
 //! | `width`, `height`, `samples`, `depth`, `cutoff`, `seed`, `view`, `accel`, `intersector`, `threads` | settings that were used |
 //! | `seconds` | of the timed run: `load`, `build`, `render`, `write`; `load` is 0 for further views of one input |
-//! | `scene` | `triangles`, `polygons`, `spheres`, `planes`, `vertices`, `materials`, `textures`, `lights` |
+//! | `scene` | `triangles`, `polygons`, `spheres`, `cones` (cylinders too), `planes`, `vertices`, `materials`, `textures`, `lights` |
 //! | `structure` | V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`; `bytes` and `depth` |
 //! | `counts` | for each ray class `primary`, `shadow`, `reflected`, `refracted`, and `all`: exact `rays`, `hits`, `tests`, `steps`, `cells`, `empty_cells`, `volume_tests`, `tests_saved`; and per ray `n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`; `culled` = 1 − n_it / N |
 //! | `counted_seconds` | time of the second run that counted; never compare it with `seconds` |
@@ -156,7 +156,8 @@ impl PictureStats {
             "seconds": { "load": times.load, "build": times.build, "render": times.render, "write": times.write },
             "scene": {
                 "triangles": shapes.triangles.len(), "polygons": shapes.polygons.len(),
-                "spheres": shapes.spheres.len(), "planes": shapes.planes.len(), "vertices": shapes.vertices.len(),
+                "spheres": shapes.spheres.len(), "cones": shapes.cones.len(), "planes": shapes.planes.len(),
+                "vertices": shapes.vertices.len(),
                 "materials": scene.materials.len(), "textures": scene.textures.len(), "lights": scene.lights.len(),
             },
             "structure": {
@@ -185,7 +186,7 @@ impl PictureStats {
         )];
         let times = ["load", "build", "render", "write"].map(|k| format!("{k} {}", seconds(number("seconds", k))));
         lines.push(format!("  time       {}", times.join("  ")));
-        let shapes = ["triangles", "polygons", "spheres", "planes"];
+        let shapes = ["triangles", "polygons", "spheres", "cones", "planes"];
         let shapes = shapes.map(|k| (number("scene", k), k)).into_iter().filter(|(n, _)| *n > 0.0);
         let shapes: Vec<String> = shapes.map(|(n, k)| format!("{} {k}", short(n))).collect();
         lines.push(format!("  scene      {}", shapes.join("  ")));

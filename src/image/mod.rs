@@ -54,6 +54,6 @@ pub struct Layers {
     pub depth: Vec<f32>,
     /// Prim id of that sample; `u32::MAX` where nothing was hit.
     pub prim: Vec<u32>,
-    /// Instance id of that sample (spheres and planes count on after the instances); `u32::MAX` where nothing was hit.
+    /// Instance id of that sample (spheres, cones and planes count on after the instances); `u32::MAX` where nothing was hit.
     pub instance: Vec<u32>,
 }

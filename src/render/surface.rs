@@ -14,7 +14,7 @@ use crate::scene::{Material, Mesh, Scene, TextureRef};
 #[derive(Clone, Copy)]
 pub(crate) struct Target<'a> {
     pub prim: u32,
-    /// Instances first, then spheres, then planes.
+    /// Instances first, then spheres, then cones, then planes.
     pub instance: u32,
     pub material_id: u32,
     pub material: &'a Material,
@@ -32,8 +32,12 @@ impl<'a> Target<'a> {
         let (instance, material_id, mesh) = match source {
             PrimSource::Triangle { instance, .. } | PrimSource::Polygon { instance, .. } => of_instance(instance),
             PrimSource::Sphere(i) => (id(scene.instances.len()) + i, scene.spheres[i as usize].material, None),
-            PrimSource::Plane(i) => {
+            PrimSource::Cone(i) => {
                 let first = id(scene.instances.len() + scene.spheres.len());
+                (first + i, scene.cones[i as usize].material, None)
+            }
+            PrimSource::Plane(i) => {
+                let first = id(scene.instances.len() + scene.spheres.len() + scene.cones.len());
                 (first + i, scene.planes[i as usize].material, None)
             }
         };
@@ -43,10 +47,10 @@ impl<'a> Target<'a> {
 
     /// Whether a ray that leaves the surface cannot meet it again.
     fn is_planar(&self) -> bool {
-        !matches!(self.source, PrimSource::Sphere(_))
+        !matches!(self.source, PrimSource::Sphere(_) | PrimSource::Cone(_))
     }
 
-    /// The part of the mesh around a hit; `None` on spheres and planes, which have no texture coordinates.
+    /// The part of the mesh around a hit; `None` on spheres, cones and planes, which have no texture coordinates.
     ///
     /// `u`, `v` are the weights of a triangle's second and third corner, `position` is in the centred frame.
     pub(crate) fn patch(&self, world: &World, u: f32, v: f32, position: Vec3) -> Option<Patch<'a>> {

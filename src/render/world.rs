@@ -1,7 +1,7 @@
 //! The scene as the structures see it: every instance's shapes in one centred `f32` frame, and the way back from a prim
 //! to what it came from.
 
-use crate::accel::{BitSet, Shapes, SpherePrim};
+use crate::accel::{BitSet, Cone, Shapes, SpherePrim};
 use crate::math::frame::snapped_center;
 use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 use crate::scene::{Mesh, Scene};
@@ -63,6 +63,8 @@ pub enum PrimSource {
     },
     /// Index into `scene.spheres`.
     Sphere(u32),
+    /// Index into `scene.cones`.
+    Cone(u32),
     /// Index into `scene.planes`.
     Plane(u32),
 }
@@ -99,6 +101,13 @@ impl World {
                 radius: s.radius as f32,
             };
             shapes.spheres = scene.spheres.iter().map(sphere).collect();
+            let cone = |c: &crate::scene::Cone| Cone {
+                base: (c.base - center).as_vec3(),
+                base_radius: c.base_radius as f32,
+                apex: (c.apex - center).as_vec3(),
+                apex_radius: c.apex_radius as f32,
+            };
+            shapes.cones = scene.cones.iter().map(cone).collect();
             let plane = |p: &crate::scene::Plane| (p.normal.as_vec3(), (p.offset - p.normal.dot(center)) as f32);
             shapes.planes = scene.planes.iter().map(plane).collect();
         }
@@ -112,7 +121,7 @@ impl World {
     /// What prim `prim` came from.
     pub fn source(&self, prim: u32) -> PrimSource {
         let (triangles, polygons) = (index(self.shapes.triangles.len()), index(self.shapes.polygons.len()));
-        let spheres = index(self.shapes.spheres.len());
+        let (spheres, cones) = (index(self.shapes.spheres.len()), index(self.shapes.cones.len()));
         let owner = |first: &[u32], i: u32| index(first.partition_point(|&f| f <= i) - 1);
         if prim < triangles {
             let instance = owner(&self.first_triangle, prim);
@@ -122,8 +131,10 @@ impl World {
             PrimSource::Polygon { instance, polygon: prim - triangles - self.first_polygon[instance as usize] }
         } else if prim < triangles + polygons + spheres {
             PrimSource::Sphere(prim - triangles - polygons)
+        } else if prim < triangles + polygons + spheres + cones {
+            PrimSource::Cone(prim - triangles - polygons - spheres)
         } else {
-            PrimSource::Plane(prim - triangles - polygons - spheres)
+            PrimSource::Plane(prim - triangles - polygons - spheres - cones)
         }
     }
 
@@ -134,6 +145,7 @@ impl World {
                 scene.meshes[scene.instances[instance as usize].mesh as usize].material
             }
             PrimSource::Sphere(i) => scene.spheres[i as usize].material,
+            PrimSource::Cone(i) => scene.cones[i as usize].material,
             PrimSource::Plane(i) => scene.planes[i as usize].material,
         }
     }
@@ -164,11 +176,12 @@ fn centered(world_from_object: &DAffine3, center: DVec3) -> DAffine3 {
 /// Vertices or faces that are worth a thread's while.
 const PARALLEL_RUN: usize = 1 << 14;
 
-/// Box of all instances' vertices that a face uses, and of the spheres.
+/// Box of all instances' vertices that a face uses, and of the spheres and cones.
 fn bounds(scene: &Scene) -> (DVec3, DVec3) {
     let instances = scene.instances.iter().map(|i| mesh_bounds(&scene.meshes[i.mesh as usize], &i.world_from_object));
     let spheres = scene.spheres.iter().map(|s| (s.center - s.radius, s.center + s.radius));
-    instances.chain(spheres).fold(NO_BOX, join)
+    let cones = scene.cones.iter().map(crate::scene::Cone::bounds);
+    instances.chain(spheres).chain(cones).fold(NO_BOX, join)
 }
 
 const NO_BOX: (DVec3, DVec3) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -195,7 +208,7 @@ fn index(i: usize) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{AlphaMode, Instance, Material, Polygon, Sphere};
+    use crate::scene::{AlphaMode, Cone, Instance, Material, Plane, Polygon, Sphere};
 
     fn triangle(material: u32) -> Mesh {
         Mesh { material, positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]], ..Mesh::default() }
@@ -205,16 +218,20 @@ mod tests {
         Instance { name: String::new(), mesh, world_from_object }
     }
 
-    fn two_triangles_a_polygon_and_a_sphere() -> Scene {
+    fn one_of_each_kind() -> Scene {
         let mut quad = triangle(1);
         quad.polygon_corners = vec![0, 1, 2];
         quad.polygons = vec![Polygon { first: 0, len: 3, face: 1 }];
         let far = DAffine3::from_translation(DVec3::splat(1e7));
         let sphere = Sphere { name: String::new(), center: DVec3::splat(1e7 + 8.0), radius: 1.0, material: 0 };
+        let (base, apex) = (DVec3::splat(1e7 + 2.0), DVec3::splat(1e7 + 3.0));
+        let tip = Cone { name: String::new(), base, base_radius: 1.0, apex, apex_radius: 0.0, material: 1 };
         Scene {
             meshes: vec![triangle(0), quad],
             instances: vec![placed(0, far), placed(1, far)],
             spheres: vec![sphere],
+            cones: vec![tip],
+            planes: vec![Plane { name: String::new(), normal: DVec3::Y, offset: 1e7 - 1.0, material: 1 }],
             materials: vec![Material::plain(), Material { alpha_mode: AlphaMode::Blend, ..Material::plain() }],
             ..Scene::default()
         }
@@ -222,18 +239,20 @@ mod tests {
 
     #[test]
     fn prims_lead_back_to_where_they_came_from() {
-        let scene = two_triangles_a_polygon_and_a_sphere();
+        let scene = one_of_each_kind();
         let world = World::new(&scene);
         assert_eq!(world.source(0), PrimSource::Triangle { instance: 0, triangle: 0 });
         assert_eq!(world.source(1), PrimSource::Triangle { instance: 1, triangle: 0 });
         assert_eq!(world.source(2), PrimSource::Polygon { instance: 1, polygon: 0 });
         assert_eq!(world.source(3), PrimSource::Sphere(0));
-        assert_eq!((0..4).map(|p| world.shapes.opaque.get(p)).collect::<Vec<_>>(), [true, false, false, true]);
+        assert_eq!((world.source(4), world.source(5)), (PrimSource::Cone(0), PrimSource::Plane(0)));
+        let opaque: Vec<bool> = (0..6).map(|p| world.shapes.opaque.get(p)).collect();
+        assert_eq!(opaque, [true, false, false, true, false, false]);
     }
 
     #[test]
     fn coordinates_far_from_the_origin_lose_nothing() {
-        let world = World::new(&two_triangles_a_polygon_and_a_sphere());
+        let world = World::new(&one_of_each_kind());
         let corner = |i: usize| world.center + world.shapes.vertices[i].as_dvec3();
         assert_eq!(corner(0), DVec3::splat(1e7));
         assert_eq!(corner(1), DVec3::splat(1e7) + DVec3::X);

@@ -1,6 +1,6 @@
 //! What a scene needs, so that nothing else is paid for.
 //!
-//! Only what can be seen counts: materials that no face, sphere or plane names bring no features. The renderer leaves out
+//! Only what can be seen counts: materials that no face, sphere, cone or plane names bring no features. The renderer leaves out
 //! the work of absent features; `inspect` lists both halves.
 
 use super::{AlphaMode, LightKind, Material, Mesh, Phong, Scene, Surface};
@@ -16,6 +16,8 @@ pub enum Feature {
     Polygons,
     /// Spheres.
     Spheres,
+    /// Cones and cylinders.
+    Cones,
     /// Unbounded planes.
     Planes,
     /// Meshes placed more than once.
@@ -73,10 +75,11 @@ pub const SMOOTH: f32 = 0.2;
 
 impl Feature {
     /// All of them, in the order they are listed.
-    pub const ALL: [Self; 25] = [
+    pub const ALL: [Self; 26] = [
         Self::Triangles,
         Self::Polygons,
         Self::Spheres,
+        Self::Cones,
         Self::Planes,
         Self::Instances,
         Self::SmoothNormals,
@@ -107,6 +110,7 @@ impl Feature {
             Self::Triangles => "triangles",
             Self::Polygons => "polygons",
             Self::Spheres => "spheres",
+            Self::Cones => "cones",
             Self::Planes => "planes",
             Self::Instances => "instances",
             Self::SmoothNormals => "smooth normals",
@@ -189,6 +193,7 @@ impl Features {
             self.add_if(mesh.colors.iter().any(|c| c.to_array() != [1.0; 4]), Feature::VertexColors);
         }
         self.add_if(!scene.spheres.is_empty(), Feature::Spheres);
+        self.add_if(!scene.cones.is_empty(), Feature::Cones);
         self.add_if(!scene.planes.is_empty(), Feature::Planes);
     }
 
@@ -264,7 +269,8 @@ fn used_materials(scene: &Scene) -> BTreeSet<u32> {
     let placed = scene.instances.iter().filter_map(|instance| scene.meshes.get(instance.mesh as usize));
     let meshes = placed.filter(|mesh| has_faces(mesh)).map(|mesh| mesh.material);
     let spheres = scene.spheres.iter().map(|sphere| sphere.material);
-    meshes.chain(spheres).chain(scene.planes.iter().map(|plane| plane.material)).collect()
+    let cones = scene.cones.iter().map(|cone| cone.material);
+    meshes.chain(spheres).chain(cones).chain(scene.planes.iter().map(|plane| plane.material)).collect()
 }
 
 #[cfg(test)]

@@ -7,7 +7,8 @@ impl Scene {
     /// Adds all of `part`, placed by `world_from_part`; a part whose up axis differs is turned upright first.
     ///
     /// Ambient light, environment, background and hints stay this scene's own. Indices of `part` move up; those of
-    /// this scene stay valid. Spheres keep their shape: of a scale they take the mean.
+    /// this scene stay valid. Spheres, and the radii of cones, take the mean of a
+    /// scale.
     pub fn append(&mut self, part: Self, world_from_part: &DAffine3) {
         let place = *world_from_part * upright(part.up, self.up);
         let [meshes, materials, textures, bitmaps] =
@@ -37,6 +38,12 @@ impl Scene {
             s.radius *= scale;
             s.material += materials;
             s
+        }));
+        self.cones.extend(part.cones.into_iter().map(|mut c| {
+            (c.base, c.apex) = (place.transform_point3(c.base), place.transform_point3(c.apex));
+            (c.base_radius, c.apex_radius) = (c.base_radius * scale, c.apex_radius * scale);
+            c.material += materials;
+            c
         }));
         self.planes.extend(part.planes.into_iter().map(|mut p| {
             let point = place.transform_point3(p.normal * p.offset);

@@ -1,4 +1,4 @@
-//! Geometry: indexed triangles (and whole n-gons), spheres, planes, and where they stand.
+//! Geometry: indexed triangles (and whole n-gons), spheres, cones, planes, and where they stand.
 
 use crate::math::{DAffine3, DVec3, Vec2, Vec3, Vec4};
 
@@ -71,6 +71,33 @@ pub struct Sphere {
     pub radius: f64,
     /// Index into [`super::Scene::materials`].
     pub material: u32,
+}
+
+/// The mantle of a truncated cone in world space, open at both ends; a cylinder where the radii are equal.
+#[derive(Clone, Debug)]
+pub struct Cone {
+    /// Name in the scene file, or an empty string.
+    pub name: String,
+    /// Centre of one end, world space.
+    pub base: DVec3,
+    /// Radius there; 0 or more, and not 0 at both ends.
+    pub base_radius: f64,
+    /// Centre of the other end, elsewhere than `base`.
+    pub apex: DVec3,
+    /// Radius there.
+    pub apex_radius: f64,
+    /// Index into [`super::Scene::materials`].
+    pub material: u32,
+}
+
+impl Cone {
+    /// Least and greatest corner of its box: a circle of radius r across the unit axis a reaches r √(1 − aₖ²).
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        let axis = (self.apex - self.base).normalize_or_zero();
+        let reach = (DVec3::ONE - axis * axis).max(DVec3::ZERO).map(f64::sqrt);
+        let (base, apex) = (reach * self.base_radius, reach * self.apex_radius);
+        ((self.base - base).min(self.apex - apex), (self.base + base).max(self.apex + apex))
+    }
 }
 
 /// An unbounded plane: all points p with `normal · p == offset`.

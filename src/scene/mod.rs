@@ -20,7 +20,7 @@ pub use camera::{Camera, Projection};
 pub use hints::RenderHints;
 pub use light::{Falloff, Light, LightKind};
 pub use material::{AlphaMode, Material, MetalRough, Phong, Surface, TextureRef, UvTransform};
-pub use mesh::{Instance, Mesh, Plane, Polygon, Sphere};
+pub use mesh::{Cone, Instance, Mesh, Plane, Polygon, Sphere};
 pub use texture::{Bitmap, Filter, Mipmaps, Pixels, Sampler, Texture, Wrap};
 
 use crate::math::Vec3;
@@ -34,9 +34,11 @@ pub struct Scene {
     pub instances: Vec<Instance>,
     /// Spheres, in world space.
     pub spheres: Vec<Sphere>,
+    /// Cones and cylinders, in world space.
+    pub cones: Vec<Cone>,
     /// Unbounded planes, in world space.
     pub planes: Vec<Plane>,
-    /// Materials; every mesh, sphere and plane names one.
+    /// Materials; every mesh, sphere, cone and plane names one.
     pub materials: Vec<Material>,
     /// Textures: a bitmap and how to read it.
     pub textures: Vec<Texture>,

@@ -11,6 +11,7 @@ use super::lattice::{Cube, Lattice};
 use crate::accel::shapes::{Prim, Shapes, SpherePrim};
 use crate::math::DVec3;
 use crate::math::bounds::U64;
+use crate::math::cone::{Cone, Profile};
 use crate::math::polygon::Polygon;
 
 /// A prim ready to be compared with cubes.
@@ -30,6 +31,7 @@ enum Surface {
     Triangle { plane: Slab, edges: [Edge; 9] },
     Polygon { plane: Slab },
     Sphere { center: DVec3, radius: f64, cell: DVec3 },
+    Cone { base: DVec3, profile: Profile, cell: DVec3 },
 }
 
 impl Overlap {
@@ -41,6 +43,7 @@ impl Overlap {
             Prim::Triangle(corners) => triangle(corners.map(|p| lattice.place(p)), lattice),
             Prim::Polygon(p) => polygon(p, lattice),
             Prim::Sphere(s) => sphere(s, lattice),
+            Prim::Cone(c) => cone(c, lattice),
             Prim::Plane(..) => Surface::Polygon { plane: Slab::default() },
         };
         Self { pad, lo, hi, surface }
@@ -67,6 +70,17 @@ impl Overlap {
                 let nearest = lo.max(-hi).max(DVec3::ZERO).length();
                 let farthest = lo.abs().max(hi.abs()).length();
                 nearest <= *radius && *radius <= farthest
+            }
+            Surface::Cone { base, profile, cell } => {
+                // The ball around the cube, in units of length: no corner is further from the middle. Its slack of 2⁻²⁰
+                // of itself is far above the rounding of the distance, u of the cone's size: a finest cell is at least
+                // 2⁻²⁰ of that.
+                let half = *cell * (side * 0.5);
+                let middle = lo * *cell + half - *base;
+                let s = middle.dot(profile.axis);
+                let across = (middle - profile.axis * s).length();
+                let apart = profile.distance(s, across) > half.length() * (1.0 + 1.0 / f64::from(1u32 << 20));
+                !apart
             }
         }
     }
@@ -152,6 +166,11 @@ fn polygon(polygon: Polygon, lattice: &Lattice) -> Surface {
 fn sphere(s: SpherePrim, lattice: &Lattice) -> Surface {
     let center = s.center.as_dvec3() - lattice.lo;
     Surface::Sphere { center, radius: f64::from(s.radius), cell: lattice.scale.recip() }
+}
+
+fn cone(c: &Cone, lattice: &Lattice) -> Surface {
+    let base = c.base.as_dvec3() - lattice.lo;
+    Surface::Cone { base, profile: Profile::new(c), cell: lattice.scale.recip() }
 }
 
 /// Finest cells across the grid on its longest axis.

@@ -1,6 +1,7 @@
 //! What every structure must do.
 
 mod catalogue;
+mod cones;
 pub(crate) mod scenes;
 mod starts;
 mod watertight;
@@ -8,6 +9,7 @@ mod watertight;
 use super::grid::mailbox::{NoMailbox, Stamps};
 use super::*;
 use crate::math::random::Random;
+use crate::math::shear::RaySpace;
 use crate::math::simd::Level;
 use scenes::{all, broken_rays, rays};
 

@@ -1,7 +1,8 @@
 //! Generated shapes and rays, the same in every run.
 
-use crate::accel::{BitSet, NO_PRIM, Ray, Shapes, SpherePrim};
+use crate::accel::{BitSet, Cone, NO_PRIM, Ray, Shapes, SpherePrim};
 use crate::math::Vec3;
+use crate::math::aabb::Aabb;
 use crate::math::random::Random;
 
 pub(crate) fn mesh(vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Shapes {
@@ -63,7 +64,7 @@ pub(crate) fn lattice(n: u32) -> Shapes {
     mesh(vertices, triangles)
 }
 
-/// Triangles, concave polygons, spheres and planes together.
+/// Triangles, concave polygons, spheres, cones and planes together.
 pub(crate) fn mix() -> Shapes {
     let mut r = Random::new(4);
     let mut shapes = soup(60, 0.5);
@@ -78,7 +79,31 @@ pub(crate) fn mix() -> Shapes {
     for i in 0..40 {
         shapes.spheres.push(SpherePrim { center: r.cube(), radius: 0.02 + 0.01 * i as f32 });
     }
+    for i in 0..40 {
+        let apex_radius = [0.0, 0.02, 0.005 * i as f32][i % 3];
+        let (base, apex) = (r.cube(), r.cube());
+        shapes.cones.push(Cone { base, base_radius: 0.005 * i as f32 + 0.001, apex, apex_radius });
+    }
     shapes.planes = vec![(Vec3::Y, -1.5), (Vec3::new(0.6, 0.0, -0.8), -2.0)];
+    seal(shapes)
+}
+
+/// Cones and cylinders alone: in the axes and across, from needles to discs, around one another, and one huge.
+pub(crate) fn pipes() -> Shapes {
+    let mut r = Random::new(6);
+    let mut shapes = Shapes::default();
+    let mut add = |base, base_radius, apex, apex_radius| {
+        shapes.cones.push(Cone { base, base_radius, apex, apex_radius });
+    };
+    for i in 0..120 {
+        let (base, size) = (r.cube(), 0.3 * r.unit() * r.unit());
+        let mut axis = Vec3::ZERO;
+        axis[i % 3] = 0.5;
+        let apex = base + if i % 2 == 0 { axis } else { r.cube() * r.unit() };
+        add(base, size, apex, [size, 0.0, size * r.unit()][i % 3]);
+        add(base, size * 2.0, base.lerp(apex, 1e-3), size * r.unit());
+    }
+    add(Vec3::new(-9.0, 0.1, -8.0), 0.7, Vec3::new(9.0, -0.2, 8.0), 3.0);
     seal(shapes)
 }
 
@@ -103,6 +128,10 @@ pub(crate) fn moved(mut shapes: Shapes, scale: f32, offset: Vec3) -> Shapes {
     }
     for s in &mut shapes.spheres {
         (s.center, s.radius) = (s.center * scale + offset, s.radius * scale);
+    }
+    for c in &mut shapes.cones {
+        (c.base, c.base_radius) = (c.base * scale + offset, c.base_radius * scale);
+        (c.apex, c.apex_radius) = (c.apex * scale + offset, c.apex_radius * scale);
     }
     shapes
 }
@@ -129,6 +158,9 @@ pub(crate) fn all() -> Vec<(&'static str, Shapes)> {
         ("fan", fan(17)),
         ("lattice", lattice(250)),
         ("mix", mix()),
+        ("pipes", pipes()),
+        ("pipes far away", moved(pipes(), 1.0, far * 1e3)),
+        ("tiny pipes", moved(pipes(), 1e-38, Vec3::ZERO)),
         ("huge and tiny", huge_and_tiny()),
         ("far away", moved(star(16, 12), 1.0, far * 1e3)),
         ("very far away", moved(soup(200, 0.6), 1.0, far * 1e5)),
@@ -142,13 +174,18 @@ pub(crate) fn all() -> Vec<(&'static str, Shapes)> {
 pub(crate) fn rays(shapes: &Shapes, n: usize) -> Vec<Ray> {
     let mut r = Random::new(5);
     let fallback = [Vec3::ZERO, Vec3::X, Vec3::Y];
-    let (lo, hi) =
-        shapes.vertices.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    let ends = shapes.cones.iter().flat_map(|c| [c.base, c.apex]);
+    let Aabb { lo, hi } = Aabb::around(shapes.vertices.iter().copied().chain(ends));
     let (lo, hi) = if lo.x <= hi.x { (lo, hi) } else { (Vec3::NEG_ONE, Vec3::ONE) };
     let (middle, half) = (lo * 0.5 + hi * 0.5, (hi * 0.5 - lo * 0.5).max(Vec3::splat(1e-44)));
+    // Of a cone: a point of its rim, its apex and one beside it.
+    let of_cone = |c: &Cone| {
+        let out = (c.apex - c.base).any_orthonormal_vector();
+        [c.base + out * c.base_radius, c.apex, c.apex + out * c.apex_radius]
+    };
     let corners = |r: &mut Random| match shapes.triangles.get(r.below(shapes.triangles.len())) {
         Some(t) => t.map(|i| shapes.vertices[i as usize]),
-        None => fallback,
+        None => shapes.cones.get(r.below(shapes.cones.len())).map_or(fallback, of_cone),
     };
     let signs = |r: &mut Random| [1.0f32, -1.0, 0.0, -0.0][r.below(4)];
 

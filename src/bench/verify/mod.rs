@@ -87,7 +87,7 @@ pub struct Cost {
 pub struct Findings {
     /// Triangles of the mesh; other prims are not judged.
     pub triangles: usize,
-    /// Spheres, polygons and planes, which were left out.
+    /// Spheres, cones, polygons and planes, which were left out.
     pub others: usize,
     /// One for each variation, the unchanged mesh first.
     pub sections: Vec<Section>,

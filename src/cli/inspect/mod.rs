@@ -2,7 +2,7 @@
 //!
 //! # Schema `meshray-inspect/1`
 //! One JSON object. `file`, `format`, `generator`, `hash`, `files` (all that were read); `triangles`, `polygons`,
-//! `faces`, `spheres`, `planes`, `meshes`, `instances`, `materials`; `bounds` (`lo`, `hi`, metres) and `framed` (the same
+//! `faces`, `spheres`, `cones` (cylinders too), `planes`, `meshes`, `instances`, `materials`; `bounds` (`lo`, `hi`, metres) and `framed` (the same
 //! without strays) with `strays`; `units`, `up`, `up_reason`; `topology` (`corners`, `edges`, `open`, `non_manifold`,
 //! `duplicates`, `degenerate`; equal positions count as one corner); `dropped` (by reason); `points_and_lines`;
 //! `textures` (`name`, `width`, `height`); `missing` (files that were named but not found); `extensions` (`name`,

@@ -78,8 +78,9 @@ impl<'a> Report<'a> {
         lines.add("triangles", grouped(shapes.triangles.len() as u64));
         lines.count("polygons", shapes.polygons.len() as u64, "kept whole");
         lines.count("spheres", shapes.spheres.len() as u64, "");
+        lines.count("cones", shapes.cones.len() as u64, "or cylinders");
         lines.count("planes", shapes.planes.len() as u64, "");
-        let instances = scene.instances.len() + scene.spheres.len() + scene.planes.len();
+        let instances = scene.instances.len() + scene.spheres.len() + scene.cones.len() + scene.planes.len();
         lines.add("objects", format!("{} of {} meshes", grouped(instances as u64), grouped(scene.meshes.len() as u64)));
         lines.add("materials", shorten(scene.materials.iter().map(|m| label(&m.name))));
         lines.count("points, lines", facts.points_and_lines, "skipped");
@@ -154,7 +155,7 @@ impl<'a> Report<'a> {
             "hash": format!("{:032x}", facts.hash),
             "files": facts.files.iter().map(|f| f.to_string_lossy()).collect::<Vec<_>>(),
             "triangles": shapes.triangles.len(), "polygons": shapes.polygons.len(), "faces": facts.faces,
-            "spheres": shapes.spheres.len(), "planes": shapes.planes.len(),
+            "spheres": shapes.spheres.len(), "cones": shapes.cones.len(), "planes": shapes.planes.len(),
             "meshes": scene.meshes.len(), "instances": scene.instances.len(),
             "materials": scene.materials.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(),
             "bounds": hull(self.world.bounds.0, self.world.bounds.1),

@@ -35,7 +35,7 @@ impl Report<'_> {
         let aims = Aim::ALL.map(Aim::name).join(", ");
         writeln!(out, "{}: {} triangles", self.name, count(f.triangles))?;
         if f.others > 0 {
-            writeln!(out, "{} polygons, spheres and planes are not judged", count(f.others))?;
+            writeln!(out, "{} polygons, spheres, cones and planes are not judged", count(f.others))?;
         }
         writeln!(out, "{} rays for each place and size, {} each at: {aims}", count(rays), count(self.plan.rays))?;
         writeln!(out, "wrong answers per million rays, by exact arithmetic; < n: none seen, fewer than n at 95 %")?;

@@ -10,7 +10,7 @@ pub struct Bounds {
     pub lo: DVec3,
     /// Greatest corner.
     pub hi: DVec3,
-    /// Faces and spheres left out as strays.
+    /// Faces, spheres and cones left out as strays.
     pub strays: u64,
     /// Box of everything, strays too; equal to `lo`, `hi` when there are none.
     pub whole: (DVec3, DVec3),
@@ -84,7 +84,7 @@ pub(super) fn facing(scene: &Scene) -> DVec3 {
     if area > 0.0 { sum / area } else { DVec3::ZERO }
 }
 
-/// A face or sphere.
+/// A face, sphere or cone.
 struct Part {
     lo: DVec3,
     hi: DVec3,
@@ -105,7 +105,7 @@ fn hull(scene: &Scene, keep: impl Fn(&Part) -> bool) -> Option<(DVec3, DVec3)> {
     lo.cmple(hi).all().then_some((lo, hi))
 }
 
-/// Calls `f` for every face and sphere with finite corners.
+/// Calls `f` for every face, sphere and cone with finite corners.
 fn visit(scene: &Scene, mut f: impl FnMut(Part)) {
     let mut face = |a: DVec3, b: DVec3, c: DVec3, box_of: (DVec3, DVec3)| {
         if box_of.0.is_finite() && box_of.1.is_finite() {
@@ -137,6 +137,13 @@ fn visit(scene: &Scene, mut f: impl FnMut(Part)) {
         let (lo, hi) = (sphere.center - sphere.radius, sphere.center + sphere.radius);
         let area = 4.0 * std::f64::consts::PI * sphere.radius * sphere.radius;
         f(Part { lo, hi, center: sphere.center, normal: DVec3::ZERO, area });
+    }
+    for cone in &scene.cones {
+        let ((lo, hi), length, dr) =
+            (cone.bounds(), cone.base.distance(cone.apex), cone.base_radius - cone.apex_radius);
+        let slant = (length * length + dr * dr).sqrt();
+        let area = std::f64::consts::PI * (cone.base_radius + cone.apex_radius) * slant;
+        f(Part { lo, hi, center: (lo + hi) * 0.5, normal: DVec3::ZERO, area });
     }
 }
 

@@ -77,6 +77,14 @@ impl Extremes {
         for sphere in scene.spheres.iter().filter(|sphere| bounds.contains(sphere.center)) {
             extremes.add(camera_from_world * (sphere.center - center), sphere.radius);
         }
+        for cone in &scene.cones {
+            let (lo, hi) = cone.bounds();
+            if bounds.contains((lo + hi) * 0.5) {
+                // Balls around the ends hold the mantle; those of a wide flat one reach too far.
+                extremes.add(camera_from_world * (cone.base - center), cone.base_radius);
+                extremes.add(camera_from_world * (cone.apex - center), cone.apex_radius);
+            }
+        }
         if extremes.near == f64::NEG_INFINITY {
             extremes.add(DVec3::ZERO, bounds.radius());
         }
