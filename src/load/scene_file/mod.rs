@@ -71,6 +71,19 @@
 //! radius = 1
 //! material = "gold"
 //!
+//! [[cones]]                     # the mantle alone, open at both ends
+//! base = [0, 0, 0]              # centre of one end
+//! base_radius = 1               # 0 or more
+//! apex = [0, 2, 0]              # centre of the other end
+//! apex_radius = 0.5             # default 0: a tip
+//! material = "gold"
+//!
+//! [[cylinders]]                 # open at both ends as well
+//! base = [0, 0, 0]
+//! top = [0, 2, 0]               # centre of the other end
+//! radius = 1
+//! material = "gold"
+//!
 //! [[planes]]                    # unbounded
 //! normal = [0, 1, 0]
 //! point = [0, -1, 0]            # any point on it; default the origin
@@ -190,6 +203,14 @@ fn parse<'a>(faults: &'a Faults, root: &'a DeTable<'a>, options: &LoadOptions) -
     for table in root.tables("spheres", "sphere") {
         let material = material_of(&mut scene, &table);
         scene.spheres.extend(shapes::sphere(table, material));
+    }
+    for table in root.tables("cones", "cone") {
+        let material = material_of(&mut scene, &table);
+        scene.cones.extend(shapes::cone(table, material));
+    }
+    for table in root.tables("cylinders", "cylinder") {
+        let material = material_of(&mut scene, &table);
+        scene.cones.extend(shapes::cylinder(table, material));
     }
     for table in root.tables("planes", "plane") {
         let material = material_of(&mut scene, &table);

@@ -204,6 +204,12 @@ pub(super) fn positive(value: &DeValue) -> Result<f64, String> {
     if n > 0.0 { Ok(n) } else { Err(format!("is {n}, but must be above 0")) }
 }
 
+/// A finite number, 0 or above.
+pub(super) fn not_negative(value: &DeValue) -> Result<f64, String> {
+    let n = number(value)?;
+    if n >= 0.0 { Ok(n) } else { Err(format!("is {n}, but must not be below 0")) }
+}
+
 /// A whole number in a range.
 pub(super) fn whole(low: u32, high: u32) -> impl Fn(&DeValue) -> Result<u32, String> {
     move |value| {

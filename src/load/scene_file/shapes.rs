@@ -1,9 +1,9 @@
-//! `[[meshes]]`, `[[spheres]]`, `[[planes]]` and the transform keys.
+//! `[[meshes]]`, `[[spheres]]`, `[[cones]]`, `[[cylinders]]`, `[[planes]]` and the transform keys.
 
-use super::reader::{Table, direction, each, number, numbers, positive, string, vec};
+use super::reader::{Table, direction, each, not_negative, number, numbers, positive, string, vec};
 use crate::math::ear_clip::EarClipper;
 use crate::math::{DAffine3, DMat3, DQuat, DVec3};
-use crate::scene::{Instance, Mesh, Plane, Sphere};
+use crate::scene::{Cone, Instance, Mesh, Plane, Sphere};
 use toml::de::DeValue;
 
 /// Reads one inline mesh; the instance's `mesh` index is left 0 for the caller.
@@ -62,6 +62,39 @@ pub(super) fn sphere(table: Table, material: u32) -> Option<Sphere> {
     let radius = table.need("radius", positive);
     table.finish();
     Some(Sphere { name, center: center?, radius: radius?, material })
+}
+
+/// Reads one cone.
+pub(super) fn cone(table: Table, material: u32) -> Option<Cone> {
+    let name = table.get("name", string).unwrap_or_default();
+    let (base, apex) = ends(&table, "base", "apex");
+    let base_radius = table.need("base_radius", not_negative);
+    let apex_radius = table.get("apex_radius", not_negative).unwrap_or(0.0);
+    if base_radius == Some(0.0) && apex_radius == 0.0 {
+        let at = table.place_of("base_radius");
+        table.note(&at, "both radii are 0, which leaves a line", "make one larger");
+    }
+    table.finish();
+    Some(Cone { name, base: base?, base_radius: base_radius?, apex: apex?, apex_radius, material })
+}
+
+/// Reads one cylinder: a cone with equal radii.
+pub(super) fn cylinder(table: Table, material: u32) -> Option<Cone> {
+    let name = table.get("name", string).unwrap_or_default();
+    let (base, top) = ends(&table, "base", "top");
+    let radius = table.need("radius", positive);
+    table.finish();
+    Some(Cone { name, base: base?, base_radius: radius?, apex: top?, apex_radius: radius?, material })
+}
+
+/// The two ends of an axis; they must differ.
+fn ends(table: &Table, first: &'static str, second: &'static str) -> (Option<DVec3>, Option<DVec3>) {
+    let (a, b) = (table.need(first, vec), table.need(second, vec));
+    if a.is_some() && a == b {
+        let at = table.place_of(second);
+        table.note(&at, format!("`{first}` and `{second}` are the same point"), "move one of them");
+    }
+    (a, b)
 }
 
 /// Reads one plane.

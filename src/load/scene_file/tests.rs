@@ -26,6 +26,10 @@ fn the_schema_in_the_module_head_is_read_without_a_fault() {
     let (start, end) = (without.find("[[unused]]").unwrap(), without.find("[[meshes]]").unwrap());
     let scene = load_text(&format!("{}{}", &without[..start], &without[end..])).unwrap().scene;
     assert_eq!((scene.materials.len(), scene.spheres.len(), scene.planes.len()), (3, 1, 1));
+    assert_eq!(
+        scene.cones.iter().map(|c| (c.base_radius, c.apex_radius)).collect::<Vec<_>>(),
+        [(1.0, 0.5), (1.0, 1.0)]
+    );
     assert_eq!((scene.meshes[0].triangles.len(), scene.cameras.len(), scene.lights.len()), (2, 1, 2));
     assert_eq!((scene.hints.size, scene.hints.depth), (Some((800, 600)), Some(1)));
 }
@@ -61,6 +65,14 @@ fn wrong_values_say_what_would_be_right() {
         ("[[spheres]]\nradius=1", "no `center`"),
         ("[[spheres]]\ncenter=[0,0,0]\nradius=1\nmaterial='x'", "no [materials.x]"),
         ("spheres = 3", "list of tables"),
+        ("[[cones]]\nbase=[0,0,0]\napex=[0,1,0]\nbase_radius=-1", "is -1, but must not be below 0"),
+        ("[[cones]]\nbase=[0,0,0]\napex=[0,1,0]\nbase_radius=0", "both radii are 0"),
+        ("[[cones]]\nbase=[0,1,0]\napex=[0,1,0]\nbase_radius=1", "test.toml:3:6: `base` and `apex` are the same point"),
+        ("[[cones]]\nbase=[0,1,0]\nbase_radius=1", "this cone has no `apex`"),
+        ("[[cone]]\nbase=[0,1,0]", "unknown key `cone` in the scene; did you mean `cones`?"),
+        ("[[cylinders]]\nbase=[0,0,0]\ntop=[0,1,0]\nradius=0", "must be above 0"),
+        ("[[cylinders]]\nbase=[0,0,0]\ntop=[0,0,0]\nradius=1", "`base` and `top` are the same point"),
+        ("[[cylinders]]\nbase=[0,0,0]\ntop=[0,1,0]\nradius=1\napex_radius=1", "unknown key `apex_radius` in cylinder"),
         ("[materials]\nred = 1", "not a material table"),
         ("[materials.g]\nmetallic = 1", "add model = \"pbr\""),
         ("[materials.g]\nior = 'unobtainium'", "no known substance"),
