@@ -1,13 +1,25 @@
 //! Ray against a whole planar n-gon, concave and self-intersecting ones included (even–odd).
 //!
+//! # Boundary
 //! The crossing test of E. Haines, *Point in Polygon Strategies*, Graphics Gems IV, 1994, on exact signs in sheared ray
 //! space: the ray is the origin there, and the edges that cross the positive x' axis are counted. A corner on the axis
 //! counts as above it and a crossing at the origin does not count, so that in a mesh of polygons every ray belongs to
-//! exactly one of those that share an edge or corner.
+//! exactly one of those that share an edge or corner. Which one follows from the ray alone: the side x' > 0, and y' ≥ 0 at
+//! a corner, where x', y' are the two axes after the direction's largest. So an edge or corner of a single polygon may or
+//! may not be hit, unlike a triangle's, which always is; a corner that is listed twice, a spike (a–b–a) and an edge run
+//! through twice change nothing.
+//!
+//! # Distance
+//! It is that of the plane through the first corner with Newell's normal, exact and rounded once, like a triangle's. A
+//! polygon whose areas cancel (an even bow-tie) has no normal and is hit only where its plane is parallel to two axes.
 
-use super::quotient::round;
+use dashu::rational::RBig;
+
+use super::bounds::{POSITION_T, U64};
+use super::quotient::{Bounded, nearest};
+use super::rational::{cross, dot, minus, point, sign};
 use super::shear::RaySpace;
-use super::{DVec3, Vec3};
+use super::{DVec3, Vec3, Vec3Swizzles};
 
 /// The corners of one polygon: a run of indices into an array of vertices.
 #[derive(Clone, Copy, Debug)]
@@ -47,9 +59,24 @@ impl<'a> Polygon<'a> {
     }
 }
 
-/// The distance at which the line through the ray meets the polygon.
+/// The distance at which the line through the ray meets the polygon; exact, rounded once.
+///
+/// It is defined as N·(p₀ − o) / N·d, with the first corner p₀ and Newell's normal N of the `f32` corners, moved into the
+/// polygon's box: where the corners are off the plane by rounding, a grazing ray could else hit far beyond them.
 pub fn intersect(ray: &RaySpace, polygon: Polygon) -> Option<f32> {
-    if is_inside(ray, polygon) { distance_f64(ray, polygon).map(round) } else { None }
+    if !is_inside(ray, polygon) {
+        return None;
+    }
+    let near = quotient(ray, polygon).and_then(|(t, error)| nearest(t, error));
+    near.or_else(|| exact_distance(ray, polygon).map(|t| never_zero_behind(&t)))
+}
+
+/// As [`intersect`]'s distance of a polygon that is hit, to a relative error of [`POSITION_T`].
+pub fn distance_f64(ray: &RaySpace, polygon: Polygon) -> Option<f64> {
+    match quotient(ray, polygon) {
+        Some((t, error)) if error < POSITION_T => Some(t),
+        _ => exact_distance(ray, polygon).map(|t| t.to_f64().value()),
+    }
 }
 
 /// Whether the line through the ray passes inside the polygon: exact, half-open.
@@ -66,25 +93,71 @@ fn is_inside(ray: &RaySpace, polygon: Polygon) -> bool {
     inside
 }
 
-/// Where the line meets the plane through the first corner with Newell's normal, kept inside the polygon's box: where
-/// the corners are off the plane by rounding, a grazing ray could else hit far beyond them.
-pub fn distance_f64(ray: &RaySpace, polygon: Polygon) -> Option<f64> {
+/// The distance in `f64` and a bound of its relative error; `None` where it cannot be told whether the box moves it.
+fn quotient(ray: &RaySpace, polygon: Polygon) -> Option<(f64, f64)> {
     let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
-    let normal = polygon.newell();
+    let (lo, hi) = polygon.bounds();
+    let flat = (0..3).find(|&k| lo[k] == hi[k] && d[k] != 0.0);
+    if let Some(k) = flat {
+        // In an axis-parallel plane nothing is left to choose. One rounding of the difference, one of the quotient.
+        return Some(((f64::from(lo[k]) - o[k]) / d[k], 4.0 * U64));
+    }
+
+    // Differences and products err by 4 u, a sum of n terms by n u; then 2 more for the difference and product, 2 for
+    // the sum.
     let first = polygon.points().next()?.as_dvec3();
-    let slope = normal.dot(d);
-    if slope == 0.0 {
+    let terms = |p: Vec3| (p.as_dvec3() - first).abs();
+    let sizes: DVec3 = polygon.edges().map(|(p, q)| twisted(terms(p), terms(q))).sum();
+    let doubt = (polygon.corners.len() as f64 + 12.0) * U64;
+    let (normal, to_first) = (polygon.newell(), first - o);
+    let numerator = Bounded { value: normal.dot(to_first), error: doubt * sizes.dot(to_first.abs()) };
+    let denominator = Bounded { value: normal.dot(d), error: doubt * sizes.dot(d.abs()) };
+    let (t, error) = numerator.over(denominator)?;
+
+    let room = 4.0 * U64 + error * 1.01;
+    let inside = |k: usize| {
+        let (a, b) = ((f64::from(lo[k]) - o[k]) / d[k], (f64::from(hi[k]) - o[k]) / d[k]);
+        let (enter, leave) = (a.min(b), a.max(b));
+        let slack = room * (t.abs() + enter.abs().max(leave.abs()));
+        t - enter > slack && leave - t > slack
+    };
+    (0..3).all(|k| d[k] == 0.0 || inside(k)).then_some((t, error))
+}
+
+/// a × b with a sum in place of each difference: bounds the sizes of a cross product's terms.
+fn twisted(a: DVec3, b: DVec3) -> DVec3 {
+    a.yzx() * b.zxy() + a.zxy() * b.yzx()
+}
+
+/// The distance in rational numbers; `None` for a line along the plane.
+#[cold]
+fn exact_distance(ray: &RaySpace, polygon: Polygon) -> Option<RBig> {
+    let (o, d) = (point(ray.origin), point(ray.dir));
+    let first = point(polygon.points().next()?);
+    let none = [RBig::ZERO, RBig::ZERO, RBig::ZERO];
+    let normal = polygon.edges().fold(none, |[x, y, z], (p, q)| {
+        let [a, b, c] = cross(&minus(&point(p), &first), &minus(&point(q), &first));
+        [x + a, y + b, z + c]
+    });
+    let slope = dot(&normal, &d);
+    if slope.is_zero() {
         return None;
     }
-    let mut t = normal.dot(first - o) / slope;
+    let mut t = dot(&normal, &minus(&first, &o)) / slope;
     let (lo, hi) = polygon.bounds();
-    for k in 0..3 {
-        if d[k] != 0.0 {
-            let (a, b) = ((f64::from(lo[k]) - o[k]) / d[k], (f64::from(hi[k]) - o[k]) / d[k]);
-            t = t.max(a.min(b)).min(a.max(b));
-        }
+    let (lo, hi) = (point(lo), point(hi));
+    for k in (0..3).filter(|&k| !d[k].is_zero()) {
+        let (a, b) = ((&lo[k] - &o[k]) / &d[k], (&hi[k] - &o[k]) / &d[k]);
+        let (enter, leave) = if a <= b { (a, b) } else { (b, a) };
+        t = t.max(enter).min(leave);
     }
     Some(t)
+}
+
+/// As [`round`](super::quotient::round), of a rational number.
+fn never_zero_behind(t: &RBig) -> f32 {
+    let rounded = t.to_f32().value();
+    if sign(t) < 0 && rounded == 0.0 { -f32::from_bits(1) } else { rounded }
 }
 
 #[cfg(test)]

@@ -3,6 +3,13 @@
 //! After E. Haines, J. Günther, T. Akenine-Möller, *Precision Improvements for Ray/Sphere Intersection*, Ray Tracing
 //! Gems, 2019, chapter 7: the discriminant is r² − |f − (f·d) d|², from the point of the line nearest to the centre,
 //! instead of the difference B² − C of two large squares; and the smaller root comes from the larger one.
+//!
+//! # Error
+//! With the unit u of `f64`, f the way to the centre and r the radius, f − (f·d) d errs by 8 u |f|, so the discriminant
+//! by e = 20 u r |f|, its root by the lesser of e/√disc and √e, and the rest by a few u |f|. Where t |d| ≥ r/4 this
+//! is below 2⁻²² t even at a tangent: t is within 8 ulp of `f32`. Nearer to the origin the error is absolute:
+//! 2⁻²³ r at a tangent, 2⁻³⁷ r where the line passes the centre at less than 0.9999995 r. The verdict errs only where
+//! the line passes the rim at less than e.
 
 use super::quotient::round;
 use super::shear::RaySpace;

@@ -54,7 +54,7 @@ fn rays_that_leave_a_cone_do_not_meet_it_where_they_start() {
             for _ in 0..4 {
                 let dir = r.cube();
                 let slope = dir.dot(refined.normal);
-                let origin = offset_origin(refined.position, refined.error, refined.normal, dir);
+                let origin = offset_origin(refined.start, refined.error, refined.normal, dir);
                 let Some(space) = RaySpace::new(origin, dir) else { continue };
                 let ahead = shapes.other_distances(0, &space, true).into_iter().filter(|t| *t >= 0.0).count();
                 // The solid is convex: outwards nothing, inwards the other side at most.

@@ -1,15 +1,10 @@
 use super::*;
+use crate::math::oracle::{root, ulps};
 use crate::math::rational::{along, cross, dot, exact, minus, point};
-use dashu::base::{Abs, SquareRoot, UnsignedAbs};
+use dashu::base::Abs;
 use dashu::integer::IBig;
 use dashu::rational::RBig;
 use proptest::prelude::*;
-
-/// The root of x ≥ 0 to a relative error of 2⁻⁴⁰⁰; exact for the square of a rational number.
-fn root(x: &RBig) -> RBig {
-    let square = (x.numerator() * IBig::from(x.denominator().clone())) << 800;
-    RBig::from_parts(IBig::from(square.unsigned_abs().sqrt()), x.denominator().clone() << 400)
-}
 
 /// Where the line meets the mantle, in rational numbers; `None` for a line in the mantle.
 fn oracle(o: Vec3, d: Vec3, cone: &Cone) -> Option<Vec<RBig>> {
@@ -41,13 +36,6 @@ fn oracle(o: Vec3, d: Vec3, cone: &Cone) -> Option<Vec<RBig>> {
         s >= -&room && s <= h2.clone() + &room
     };
     Some(candidates.into_iter().filter(on_mantle).collect())
-}
-
-/// How many ulp (`f32`) `t` is from `exact`.
-fn ulps(t: f32, exact_t: &RBig) -> f64 {
-    let size = exact_t.to_f32().value().abs();
-    let ulp = f64::from(size.next_up()) - f64::from(size);
-    ((exact(t) - exact_t).abs() / RBig::try_from(ulp).unwrap()).to_f64().value()
 }
 
 /// Panics unless all hits of the line are those of rational numbers; the largest error in ulp.
@@ -212,7 +200,7 @@ fn the_tip_is_hit_from_every_side() {
 }
 
 #[test]
-fn thin_and_thick_ones_from_far_and_near_are_within_8_ulp() {
+fn p9_thin_ones_far_away_and_wide_ones_nearby_are_within_8_ulp() {
     let thin = |apex_radius| Cone {
         base: Vec3::new(1e5, 0.0, -1.0),
         base_radius: 1e-3,
