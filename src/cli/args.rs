@@ -56,7 +56,7 @@ Examples:
 /// What `meshray render` was given.
 #[derive(Debug, Clone, Args)]
 pub(super) struct RenderArgs {
-    /// Models (.glb, .gltf, .obj) or scene files (.toml); `-` reads standard input
+    /// Models (.glb, .gltf, .obj, .nff) or scene files (.toml); `-` reads standard input
     #[arg(value_name = "INPUT", required_unless_present = "again")]
     pub inputs: Vec<PathBuf>,
 

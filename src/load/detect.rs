@@ -8,6 +8,7 @@ use super::{Diagnostic, Source};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Format {
     Gltf,
+    Nff,
     Obj,
     SceneFile,
 }
@@ -80,6 +81,7 @@ pub(super) fn detect(source: &Source) -> Result<Format, Diagnostic> {
     }
     match extension.as_str() {
         "gltf" | "glb" => return Ok(Format::Gltf),
+        "nff" => return Ok(Format::Nff),
         "obj" => return Ok(Format::Obj),
         "toml" => return Ok(Format::SceneFile),
         _ => {}
@@ -94,8 +96,11 @@ pub(super) fn detect(source: &Source) -> Result<Format, Diagnostic> {
 }
 
 fn foreign(source: &Source, kind: &str) -> Diagnostic {
-    let remedy =
-        if kind.ends_with("archive") { "unpack it first" } else { "meshray reads .glb, .gltf, .obj and .toml scenes" };
+    let remedy = if kind.ends_with("archive") {
+        "unpack it first"
+    } else {
+        "meshray reads .glb, .gltf, .obj, .nff and .toml scenes"
+    };
     Diagnostic::new("unsupported-format", &source.path, "", format!("this is {kind}")).remedy(remedy)
 }
 
@@ -103,16 +108,20 @@ fn has(bytes: &[u8], part: &[u8]) -> bool {
     bytes.windows(part.len()).take(4096).any(|w| w == part)
 }
 
-/// Tells OBJ from a scene file by the first line that can only be one of them.
+/// Tells OBJ, NFF and a scene file apart by the first line that can only be one of them.
 fn by_lines(text: &[u8]) -> Option<Format> {
     const OBJ: [&[u8]; 9] = [b"v", b"vt", b"vn", b"f", b"o", b"g", b"usemtl", b"mtllib", b"s"];
     for line in text.split(|&b| b == b'\n' || b == b'\r').take(1000) {
         let line = line.trim_ascii();
         let word = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
+        // An NFF begins with its view, which is a line of its own, or its background.
+        let words = line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty()).count();
+        let is_nff = matches!((word, words), (b"v", 1) | (b"b", 4)) || line.starts_with(b"v from");
         let is_obj = OBJ.contains(&word) && !line.contains(&b'=');
         match line.first() {
             None | Some(b'#') => {}
             Some(b'[') => return Some(Format::SceneFile),
+            Some(_) if is_nff => return Some(Format::Nff),
             Some(_) if is_obj => return Some(Format::Obj),
             Some(_) if line.contains(&b'=') => return Some(Format::SceneFile),
             Some(_) => return None,
@@ -134,6 +143,8 @@ mod tests {
         assert_eq!(of("a.obj", b"glTF\x02\0\0\0"), Ok(Format::Gltf));
         assert_eq!(of("-", b"\xef\xbb\xbf { \"asset\": {} }"), Ok(Format::Gltf));
         assert_eq!(of("-", b"# a cube\r\nmtllib c.mtl\r\nv 0 0 0"), Ok(Format::Obj));
+        assert_eq!(of("-", b"# balls\nb 0.1 0.2 0.3\nv\nfrom 1 2 3"), Ok(Format::Nff));
+        assert_eq!(of("-", b"v\nfrom 1 2 3\n"), Ok(Format::Nff));
         assert_eq!(of("-", b"# a scene\n[camera]\n"), Ok(Format::SceneFile));
         assert_eq!(of("-", b"background = 'white'\n"), Ok(Format::SceneFile));
         assert!(of("a.obj", b"PK\x03\x04...").unwrap_err().contains("a zip archive; unpack it first"));
@@ -143,6 +154,7 @@ mod tests {
     #[test]
     fn the_extension_decides_where_content_cannot() {
         assert_eq!(of("a.obj", b""), Ok(Format::Obj));
+        assert_eq!(of("a.nff", b"s 0 0 0 1"), Ok(Format::Nff));
         assert_eq!(of("a.GLB", b""), Ok(Format::Gltf));
         assert_eq!(of("a.toml", b"# nothing yet"), Ok(Format::SceneFile));
         assert!(of("a.stl", &[0; 84]).unwrap_err().starts_with("a.stl: this is an STL file; meshray reads"));

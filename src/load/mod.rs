@@ -7,6 +7,7 @@ mod detect;
 pub mod diagnostic;
 pub mod gltf;
 pub mod limits;
+pub mod nff;
 pub mod obj;
 pub mod paths;
 pub mod scene_file;
@@ -28,7 +29,7 @@ pub struct LoadOptions {
     pub root: Option<PathBuf>,
     /// Bounds on memory and sizes.
     pub limits: Limits,
-    /// What becomes of OBJ faces with more than three corners.
+    /// What becomes of OBJ and NFF faces with more than three corners.
     pub polygons: Polygons,
     /// How MTL text is understood.
     pub mtl: MtlMode,
@@ -38,7 +39,7 @@ pub struct LoadOptions {
     pub up: Option<UpAxis>,
 }
 
-/// What becomes of OBJ faces with more than three corners.
+/// What becomes of OBJ and NFF faces with more than three corners.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Polygons {
     /// Cut into triangles by exact ear clipping.
@@ -72,7 +73,7 @@ pub struct Loaded {
 /// What loading found out besides the scene.
 #[derive(Clone, Debug, Default)]
 pub struct Facts {
-    /// `glTF 2.0 (binary)`, `Wavefront OBJ`, `meshray scene`.
+    /// `glTF 2.0 (binary)`, `Wavefront OBJ`, `NFF`, `meshray scene`.
     pub format: String,
     /// Program that wrote the file, if it says.
     pub generator: String,
@@ -134,6 +135,7 @@ pub fn load_bytes(name: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<
 fn load_source(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
     match detect::detect(source)? {
         detect::Format::Gltf => gltf::load(source, options),
+        detect::Format::Nff => nff::load(source, options),
         detect::Format::Obj => obj::load(source, options),
         detect::Format::SceneFile => scene_file::load(source, options),
     }

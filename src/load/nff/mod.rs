@@ -1,0 +1,236 @@
+//! Neutral File Format (E. Haines, *A Proposal for Standard Graphics Environments*, 1987) -> scene.
+//!
+//! | statement | meaning |
+//! |---|---|
+//! | `v from x y z at x y z up x y z angle a hither h resolution w h` | the camera; `a` is the whole angle of view, degrees |
+//! | `b r g b` | background |
+//! | `l x y z [r g b]` | a point light that does not fade |
+//! | `f r g b Kd Ks shine T ior` | material of what follows |
+//! | `p n`, then n times `x y z` | polygon |
+//! | `pp n`, then n times `x y z nx ny nz` | polygon with a normal for each corner |
+//! | `s x y z r` | sphere |
+//! | `c x y z r x y z r` | cone or cylinder, open at both ends |
+//!
+//! What the text leaves open is decided so: colours are linear; diffuse and ambient colour are the colour times Kd,
+//! highlight Ks, mirror the colour times Ks, transmission the colour times T; every surface is seen from both sides,
+//! so the sign of a radius means nothing; n lights and the ambient light are each as strong as √n / 2n, as the text
+//! suggests; rays that leave see the background. Polygons of one material become one mesh.
+
+mod faces;
+mod words;
+
+use super::paths::Resolver;
+use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
+use crate::math::{DVec3, Vec3};
+use crate::scene::{
+    Background, Camera, Cone, Environment, Falloff, Light, LightKind, Material, Phong, Projection, RenderHints, Scene,
+    Sphere, Surface, UpAxis,
+};
+use faces::Faces;
+use words::Words;
+
+/// Loads an NFF file.
+///
+/// # Errors
+/// At the first statement that is not NFF, with its line. A file without shapes is an empty scene.
+pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
+    let text = String::from_utf8_lossy(&source.bytes);
+    let mut reader = Reader {
+        words: Words::new(&source.path, text.trim_start_matches('\u{feff}')),
+        scene: Scene::default(),
+        material: None,
+        faces: Faces::new(options.polygons),
+        flat: 0,
+    };
+    reader.statements()?;
+
+    let mut warnings = Warnings::default();
+    let dropped = reader.flat + reader.faces.dropped;
+    if dropped > 0 {
+        let text = format!("{dropped} shapes without extent are left out");
+        warnings.push(Diagnostic::new("nff-no-extent", &source.path, "", text));
+    }
+    let Reader { mut scene, faces, .. } = reader;
+    let face_count = faces.count;
+    let max_rounding = faces.finish(&mut scene);
+    finish(&mut scene, options);
+    let (files, hash) = Resolver::new(source, options).finish();
+    let dropped = if dropped > 0 { vec![("without extent".into(), dropped)] } else { Vec::new() };
+    let facts =
+        Facts { format: "NFF".into(), faces: face_count, dropped, max_rounding, files, hash, ..Facts::default() };
+    Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
+}
+
+/// What hangs on the whole file: strength of lights, what is around, and which way is up.
+fn finish(scene: &mut Scene, options: &LoadOptions) {
+    let lights = scene.lights.len() as f32;
+    if lights > 0.0 {
+        let strength = lights.sqrt() / (2.0 * lights);
+        scene.lights.iter_mut().for_each(|light| light.intensity *= strength);
+        scene.ambient = Vec3::splat(strength);
+    }
+    if let Some(Background::Color(color)) = scene.background {
+        scene.environment = Environment::Constant(color);
+    }
+    scene.up = options.up.unwrap_or(scene.up);
+    // The text's own depth, the eye ray counted: 5.
+    scene.hints.depth = Some(4);
+    scene.hints.tone_map = Some("none".into());
+}
+
+struct Reader<'a> {
+    words: Words<'a>,
+    scene: Scene,
+    /// The material of what follows.
+    material: Option<u32>,
+    faces: Faces,
+    /// Spheres and cones without extent.
+    flat: u64,
+}
+
+impl Reader<'_> {
+    fn statements(&mut self) -> Result<(), Diagnostic> {
+        while let Some(word) = self.words.next() {
+            match word {
+                "v" => self.view()?,
+                "b" => self.scene.background = Some(Background::Color(self.words.point("b")?.as_vec3())),
+                "l" => self.light()?,
+                "f" => self.fill()?,
+                "p" => self.polygon("p", false)?,
+                "pp" => self.polygon("pp", true)?,
+                "s" => self.sphere()?,
+                "c" => self.cone()?,
+                _ => {
+                    let text = format!("`{word}` is no statement");
+                    return Err(self.words.fault(text, "NFF has v, b, l, f, p, pp, s and c"));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn view(&mut self) -> Result<(), Diagnostic> {
+        let (mut eye, mut at, mut up, mut angle, mut size) = (DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, 45.0, None);
+        while let Some(key @ ("from" | "at" | "up" | "angle" | "hither" | "resolution")) = self.words.peek() {
+            self.words.next();
+            match key {
+                "from" => eye = self.words.point(key)?,
+                "at" => at = self.words.point(key)?,
+                "up" => up = self.words.point(key)?,
+                "angle" => angle = self.words.number(key)?,
+                // A near distance, for programs that cannot see closer.
+                "hither" => _ = self.words.number(key)?,
+                _ => size = Some((self.words.whole(key, 1)?, self.words.whole(key, 1)?)),
+            }
+        }
+        if !(angle > 0.0 && angle < 180.0) {
+            return Err(self
+                .words
+                .fault(format!("`angle` is {angle}"), "give it more than 0 and less than 180 degrees"));
+        }
+        if eye == at {
+            return Err(self.words.fault("`from` and `at` are the same point", "move one of them"));
+        }
+        self.scene.cameras = vec![Camera {
+            name: String::new(),
+            projection: Projection::Perspective { y_fov: angle.to_radians(), aspect: None },
+            world_from_camera: Camera::look_at(eye, at, up),
+        }];
+        self.scene.hints = RenderHints { size, camera: Some(0), ..RenderHints::default() };
+        self.scene.up = if up.z.abs() > up.y.abs() { UpAxis::Z } else { UpAxis::Y };
+        Ok(())
+    }
+
+    fn light(&mut self) -> Result<(), Diagnostic> {
+        let position = self.words.point("l")?;
+        let colored = self.words.peek().is_some_and(|word| word.parse::<f64>().is_ok());
+        let intensity = if colored { self.words.point("l")?.as_vec3() } else { Vec3::ONE };
+        let kind = LightKind::Point { position, falloff: Falloff::None };
+        self.scene.lights.push(Light { name: String::new(), intensity, kind, shadows: true });
+        Ok(())
+    }
+
+    fn fill(&mut self) -> Result<(), Diagnostic> {
+        let [r, g, b, kd, ks, shine, t, ior] = self.words.numbers::<8>("f")?;
+        let name = [r, g, b, kd, ks, shine, t, ior].map(|x| x.to_string()).join(" ");
+        let known = self.scene.materials.iter().position(|m| m.name == name);
+        let id = known.unwrap_or_else(|| {
+            let color = DVec3::new(r, g, b);
+            let [diffuse, mirror, transmission] =
+                [color * kd, color * ks, color * t].map(|c| c.max(DVec3::ZERO).as_vec3());
+            #[expect(clippy::cast_possible_truncation, reason = "materials are f32")]
+            let phong = Phong {
+                ambient: diffuse,
+                specular: Vec3::splat(ks.max(0.0) as f32),
+                shininess: shine.max(0.0) as f32,
+                mirror,
+                transmission,
+                // The index of what is opaque means nothing, and is often 0.
+                ior: if t > 0.0 && ior >= 1.0 { ior as f32 } else { 1.0 },
+                ..Phong::default()
+            };
+            self.scene.materials.push(Material {
+                name,
+                base_color: diffuse,
+                surface: Surface::Phong(phong),
+                ..Material::plain()
+            });
+            self.scene.materials.len() - 1
+        });
+        self.material = Some(index(id));
+        Ok(())
+    }
+
+    /// The material of what follows; a plain one where the file has named none yet.
+    fn material(&mut self) -> u32 {
+        if self.material.is_none() {
+            self.scene.materials.push(Material::plain());
+        }
+        *self.material.get_or_insert(index(self.scene.materials.len() - 1))
+    }
+
+    fn polygon(&mut self, of: &str, smooth: bool) -> Result<(), Diagnostic> {
+        let corners = self.words.whole(of, 3)?;
+        let (mut points, mut normals) = (Vec::new(), Vec::new());
+        for _ in 0..corners {
+            points.push(self.words.point(of)?);
+            if smooth {
+                normals.push(self.words.point(of)?);
+            }
+        }
+        let material = self.material();
+        self.faces.add(material, &points, &normals);
+        Ok(())
+    }
+
+    fn sphere(&mut self) -> Result<(), Diagnostic> {
+        let (center, radius) = (self.words.point("s")?, self.words.number("s")?.abs());
+        let material = self.material();
+        if radius > 0.0 {
+            self.scene.spheres.push(Sphere { name: String::new(), center, radius, material });
+        } else {
+            self.flat += 1;
+        }
+        Ok(())
+    }
+
+    fn cone(&mut self) -> Result<(), Diagnostic> {
+        let (base, base_radius) = (self.words.point("c")?, self.words.number("c")?.abs());
+        let (apex, apex_radius) = (self.words.point("c")?, self.words.number("c")?.abs());
+        let material = self.material();
+        if base != apex && base_radius.max(apex_radius) > 0.0 {
+            self.scene.cones.push(Cone { name: String::new(), base, base_radius, apex, apex_radius, material });
+        } else {
+            self.flat += 1;
+        }
+        Ok(())
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "files are far smaller than 2^32 statements")]
+fn index(i: usize) -> u32 {
+    i as u32
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,93 @@
+use super::*;
+use crate::load::Polygons;
+
+fn load_text(text: &str) -> Result<Loaded, LoadError> {
+    load(&Source { path: "a.nff".into(), bytes: text.into() }, &LoadOptions::default())
+}
+
+fn scene(text: &str) -> Scene {
+    load_text(text).unwrap().scene
+}
+
+const VIEW: &str = "v\nfrom 2 1 3\nat 0 0 0\nup 0 0 1\nangle 45\nhither 0.01\nresolution 512 256\n";
+
+#[test]
+fn every_statement_is_read() {
+    let text = format!(
+        "# a comment\nb 0.1 0.2 0.3\n{VIEW}l 4 3 2\nl 1 -4 4 1 0 0\nf 1 0.5 0 0.5 0.25 30 0 0\n\
+         p 4\n0 0 0\n1 0 0\n1 1 0\n0 1 0\ns 0 0 1 0.5\nc 0 0 0 1 0 0 2 0\n\
+         f 1 1 1 0 0.1 9 0.8 1.5\npp 3\n0 0 0 0 0 2\n1 0 0 0 1 1\n0 1 0 1 0 0\nc 0 0 0 -1\n0 0 2 -1\n"
+    );
+    let loaded = load_text(&text).unwrap();
+    let scene = &loaded.scene;
+    assert_eq!((scene.lights.len(), scene.spheres.len(), scene.cones.len(), scene.meshes.len()), (2, 1, 2, 2));
+    assert_eq!((scene.meshes[0].triangles.len(), scene.meshes[0].normals.len()), (2, 0));
+    assert_eq!((scene.meshes[1].triangles.len(), scene.meshes[1].normals[0]), (1, Vec3::Z));
+    assert_eq!((scene.cones[0].apex_radius, scene.cones[1].base_radius, scene.cones[1].material), (0.0, 1.0, 1));
+    assert_eq!(scene.background, Some(Background::Color(Vec3::new(0.1, 0.2, 0.3))));
+    assert_eq!((scene.hints.size, scene.hints.camera, scene.up), (Some((512, 256)), Some(0), UpAxis::Z));
+    assert_eq!((loaded.facts.faces, loaded.facts.format.as_str()), (2, "NFF"));
+    assert!(loaded.warnings.is_empty());
+}
+
+#[test]
+fn a_fill_becomes_phong_with_mirror_and_glass() {
+    let scene = scene(
+        "f 1 0.5 0 0.5 0.25 30 0 0\ns 0 0 0 1\nf 1 1 1 0 0.1 9 0.8 1.5\ns 0 0 0 2\nf 1 0.5 0 0.5 0.25 30 0 0\ns 0 0 0 3\n",
+    );
+    assert_eq!(scene.spheres.iter().map(|s| s.material).collect::<Vec<_>>(), [0, 1, 0]);
+    let phong = |i: usize| match &scene.materials[i].surface {
+        Surface::Phong(phong) => phong.clone(),
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(scene.materials[0].base_color, Vec3::new(0.5, 0.25, 0.0));
+    assert_eq!((phong(0).mirror, phong(0).specular), (Vec3::new(0.25, 0.125, 0.0), Vec3::splat(0.25)));
+    assert_eq!((phong(0).ior, phong(1).ior, phong(1).transmission), (1.0, 1.5, Vec3::splat(0.8)));
+}
+
+#[test]
+fn lights_and_the_ambient_term_get_weaker_the_more_there_are() {
+    let scene = scene("l 1 2 3\nl 1 2 3\nl 1 2 3\nl 1 2 3 0 1 0\n");
+    assert_eq!((scene.ambient, scene.lights[3].intensity), (Vec3::splat(0.25), Vec3::new(0.0, 0.25, 0.0)));
+}
+
+#[test]
+fn what_is_wrong_is_told_with_its_line() {
+    for (text, said) in [
+        ("b 0 0 0\n\nq 3\n", "a.nff:3: `q` is no statement; NFF has v, b, l, f, p, pp, s and c"),
+        ("s 0 0 0 one\n", "a.nff:1: `one` is no number, in `s`"),
+        ("s 0 0\n0 nan\n", "a.nff:2: `nan` is no number, in `s`"),
+        ("p 4\n0 0 0\n1 0 0\n", "a.nff:3: the file ends inside `p`, where a number should follow"),
+        ("p 2\n0 0 0\n1 0 0\n", "a.nff:1: `p` has 2, which is no whole number from 3 to 1000000"),
+        ("v from 0 0 0 at 0 0 0", "are the same point"),
+        ("v from 0 0 1 angle 190", "`angle` is 190; give it more than 0 and less than 180 degrees"),
+    ] {
+        let error = load_text(text).unwrap_err().to_string();
+        assert!(error.contains(said), "{text}: {error}");
+    }
+}
+
+#[test]
+fn shapes_without_extent_are_left_out_and_counted() {
+    let loaded = load_text("s 0 0 0 0\nc 0 0 0 1 0 0 0 2\np 3\n0 0 0\n1 1 1\n2 2 2\ns 0 0 0 1\n").unwrap();
+    assert_eq!((loaded.scene.spheres.len(), loaded.scene.cones.len(), loaded.scene.meshes.len()), (1, 0, 0));
+    assert!(loaded.warnings[0].to_string().contains("3 shapes without extent"));
+}
+
+#[test]
+fn a_concave_polygon_is_cut_or_stays_whole() {
+    let text = "p 5\n0 0 0\n4 0 0\n4 4 0\n2 1 0\n0 4 0\n";
+    let cut = scene(text);
+    assert_eq!((cut.meshes[0].triangles.len(), cut.meshes[0].polygons.len()), (3, 0));
+    let options = LoadOptions { polygons: Polygons::Whole, ..LoadOptions::default() };
+    let whole = load(&Source { path: "a.nff".into(), bytes: text.into() }, &options).unwrap().scene;
+    assert_eq!((whole.meshes[0].triangles.len(), whole.meshes[0].polygons[0].len), (0, 5));
+}
+
+#[test]
+fn equal_corners_are_shared_and_far_ones_keep_their_digits() {
+    let far = scene("p 3\n1e7 0 0\n1e7 1 0\n1e7 0 0.125\np 3\n1e7 1 0\n1e7 0 0\n1e7 0 -0.125\n");
+    let (mesh, place) = (&far.meshes[0], far.instances[0].world_from_object);
+    assert_eq!((mesh.positions.len(), mesh.triangles.len()), (4, 2));
+    assert_eq!(place.transform_point3(mesh.positions[2].as_dvec3()), DVec3::new(1e7, 0.0, 0.125));
+}
