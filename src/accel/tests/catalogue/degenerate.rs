@@ -158,8 +158,9 @@ fn polygons_of_every_shape_are_hit_where_the_even_odd_rule_says() {
 #[test]
 fn a_warped_quad_is_hit_on_one_of_the_triangles_beside_its_shorter_diagonal() {
     let mut r = Random::new(33);
+    // Moved so little that they stay convex: a concave one has no choice.
     for _ in 0..count(40, 4000) {
-        let at = |x: f32, y: f32, r: &mut Random| Vec3::new(x, y, 0.0) + r.cube() * 0.3;
+        let at = |x: f32, y: f32, r: &mut Random| Vec3::new(x, y, 0.0) + r.cube() * 0.2;
         let quad = [at(0.0, 0.0, &mut r), at(1.0, 0.0, &mut r), at(1.0, 1.0, &mut r), at(0.0, 1.0, &mut r)];
         let mut cut = Vec::new();
         EarClipper::default().cut(&quad.map(Vec3::as_dvec3), &mut cut);
