@@ -86,3 +86,25 @@ fn a_refined_hit_lies_on_the_mantle_within_its_error() {
         }
     }
 }
+
+#[test]
+fn what_projecting_rounds_is_part_of_the_error() {
+    // A large tilted cylinder that passes through the origin exactly: there the position's own rounding is next to
+    // nothing, and what was rounded on the way is all there is.
+    let at = |x: f32, z: f32| Vec3::new(x, 0.0, z) * 16384.0;
+    let cone = Cone { base: at(-7.0, -1.0), base_radius: 81920.0, apex: at(-1.0, 7.0), apex_radius: 81920.0 };
+    let shapes = Shapes { cones: vec![cone], opaque: BitSet::filled(1, true), ..Shapes::default() };
+    let mut r = Random::new(10);
+    let rays: Vec<Ray> = (0..200).map(|_| (r.cube(), r.cube() * 1e-6)).map(|(o, to)| scenes::ray(o, to - o)).collect();
+    let mut hits = vec![Hit::MISS; rays.len()];
+    Unculled::new(&shapes).closest(&rays, &mut hits, &mut Unculled::new(&shapes).scratch(), &mut NoProbe);
+    for (ray, hit) in rays.iter().zip(&hits) {
+        let refined = shapes.refine(ray, hit);
+        let p = refined.position.as_dvec3();
+        assert!(p.length() < 1e-4, "{p}");
+        // The distance from the axis less the radius, where outwards is (4, 0, −3) / 5.
+        let out = (4.0 * p.x - 3.0 * p.z) / 5.0;
+        let off = (out + p.y * p.y / (2.0 * 81920.0)).abs();
+        assert!(off <= refined.error.as_dvec3().length(), "{off:e} of {}", refined.error);
+    }
+}
