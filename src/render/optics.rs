@@ -201,4 +201,111 @@ mod tests {
         assert!((42.0..43.0).contains(&brightest(red)), "{}", brightest(red));
         assert!((1.0..2.5).contains(&(brightest(red) - brightest(violet))), "{}", brightest(violet));
     }
+
+    /// S8 (critical angle): whether η |I × N| / (|I| |N|) ≥ 1, in rational numbers, and how far its square is from 1.
+    fn exact_total_reflection(i: Vec3, n: Vec3, n_i: f64, n_t: f64) -> (bool, f64) {
+        use crate::math::rational::{cross, dot, point};
+        use dashu::rational::RBig;
+        let (i, n) = (point(i), point(n));
+        let ratio = RBig::try_from(n_i).expect("finite") / RBig::try_from(n_t).expect("finite");
+        let c = cross(&i, &n);
+        let square = &ratio * &ratio * dot(&c, &c) / (dot(&i, &i) * dot(&n, &n));
+        let off = &square - RBig::ONE;
+        (square >= RBig::ONE, off.to_f64().value().abs())
+    }
+
+    #[test]
+    fn total_reflection_is_decided_as_exact_arithmetic_does_but_within_four_ulp_of_the_critical_angle() {
+        let mut random = crate::math::random::Random::new(3);
+        let (mut near, mut total) = (0, 0);
+        for (n_i, n_t) in [(1.33, 1.00029), (2.417, 1.00029), (1.52, 1.33), (1.5, 1.0)] {
+            let critical = critical_angle(n_i, n_t).expect("denser to thinner");
+            for k in 3..=12 {
+                for _ in 0..40 {
+                    let side = if random.unit() < 0.5 { -1.0 } else { 1.0 };
+                    let angle = critical * (1.0 + side * libm::pow(10.0, -f64::from(k)));
+                    let turn = f64::from(random.unit()) * std::f64::consts::TAU;
+                    let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+                    let normal = random.direction();
+                    let (n, across) = (normal.as_dvec3(), normal.any_orthonormal_vector().as_dvec3());
+                    let along = across * libm::cos(turn) + n.cross(across) * libm::sin(turn);
+                    let incident = (along * sin - n * cos).as_vec3();
+                    let (expected, off) = exact_total_reflection(incident, normal, n_i, n_t);
+                    // The square of a sine that is 4 ulp off.
+                    if off > 8.0 * f64::EPSILON {
+                        assert_eq!(refract(incident, normal, n_i, n_t).is_none(), expected, "{n_i} {n_t} {off:e}");
+                        near += usize::from(off < 1e-7);
+                        total += usize::from(expected);
+                    }
+                }
+            }
+        }
+        assert!(near > 300 && total > 300, "{near} near the angle, {total} reflected");
+    }
+
+    #[test]
+    fn what_is_not_reflected_is_transmitted_and_more_is_reflected_at_a_flatter_angle() {
+        for (n_i, n_t) in [(1.0, 1.5), (1.5, 1.0), (1.00029, 2.417), (1.33, 1.52)] {
+            let mut last = 0.0;
+            for step in 0..=1000 {
+                let cos_i = 1.0 - f64::from(step) / 1000.0;
+                let reflected = fresnel_dielectric(cos_i, n_i, n_t);
+                let sin_t = n_i / n_t * ((1.0 - cos_i) * (1.0 + cos_i)).sqrt();
+                if sin_t < 1.0 && cos_i > 0.0 {
+                    // A. Fresnel's amplitudes of the transmitted wave, 1823.
+                    let cos_t = ((1.0 - sin_t) * (1.0 + sin_t)).sqrt();
+                    let across = 2.0 * n_i * cos_i / (n_i * cos_i + n_t * cos_t);
+                    let along = 2.0 * n_i * cos_i / (n_t * cos_i + n_i * cos_t);
+                    let transmitted = n_t * cos_t / (n_i * cos_i) * 0.5 * (across * across + along * along);
+                    assert!((reflected + transmitted - 1.0).abs() <= 4.0 * f64::EPSILON, "{n_i} {n_t} {cos_i}");
+                }
+                // Up to rounding where it is flat.
+                if n_i < n_t {
+                    let brewster = libm::cos(libm::atan(n_t / n_i));
+                    assert!(cos_i > brewster || reflected >= last, "{n_i} {n_t} {cos_i}");
+                }
+                assert!((0.0..=1.0).contains(&reflected));
+                last = reflected;
+            }
+            assert_eq!(last, 1.0);
+        }
+    }
+
+    /// S11 (prism): the deviation by two refractions at the angle of least deviation is 2 asin(n sin A/2) − A.
+    #[test]
+    fn a_prism_of_bk7_spreads_the_spectrum_as_sellmeiers_equation_says() {
+        // W. Sellmeier's equation (1871) with the constants that SCHOTT publishes for N-BK7; wavelength in micrometres.
+        let index = |nm: f64| {
+            let l2 = nm * nm * 1e-6;
+            let terms =
+                [(1.039_612_12, 0.006_000_698_67), (0.231_792_344, 0.020_017_914_4), (1.010_469_45, 103.560_653)];
+            (1.0 + terms.iter().map(|(b, c)| b * l2 / (l2 - c)).sum::<f64>()).sqrt()
+        };
+        let (f, d, c) = (index(486.13), index(587.56), index(656.27));
+        assert!((f - 1.52238).abs() < 1e-5 && (d - 1.5168).abs() < 1e-5 && (c - 1.51432).abs() < 1e-5, "{f} {d} {c}");
+        let apex = 60f64.to_radians();
+        let through = |n: f64| {
+            let half = apex / 2.0;
+            let theta = libm::asin(n * libm::sin(half));
+            // Faces that lean to either side of the vertical by half the apex angle.
+            let face = |side: f64| DVec3::new(side * libm::cos(half), libm::sin(half), 0.0).as_vec3();
+            let (entry, exit) = (face(-1.0), face(1.0));
+            let rise = theta - half;
+            let incident = DVec3::new(libm::cos(rise), libm::sin(rise), 0.0).as_vec3();
+            let inside = refract(incident, entry, 1.0, n).expect("into the denser medium");
+            let out = refract(inside, -exit, n, 1.0).expect("below the critical angle");
+            (degrees_from(incident, out).to_radians(), 2.0 * theta - apex)
+        };
+        for n in [f, d, c] {
+            let (found, expected) = through(n);
+            assert!((found - expected).abs() < 1e-6, "{n}: {found} for {expected}");
+        }
+        let spread = (through(f).0 - through(c).0, through(f).1 - through(c).1);
+        assert!((spread.0 - spread.1).abs() < 1e-6, "{spread:?}");
+        // Cauchy's equation by the Abbe number, which pictures use, stays near it over the visible spectrum.
+        let abbe = (d - 1.0) / (f - c);
+        let off = |nm: f64| (dispersed_index(d, 20.0 / abbe, nm) - index(nm)).abs();
+        let worst = (40..=70).map(|x| off(f64::from(x) * 10.0)).fold(0.0, f64::max);
+        assert!(worst < 1e-3, "{worst}");
+    }
 }

@@ -149,3 +149,74 @@ fn a_light_behind_frosted_phong_glass_shines_through() {
     let beside = s.color().x;
     assert!(beside > 0.0 && beside < 0.4);
 }
+
+/// S7 (stack of plates): every pane is entered and left, and the ray comes out shifted but not turned.
+#[test]
+fn a_hundred_plates_of_glass_shift_a_ray_and_leave_its_direction() {
+    let (degrees, ior, step) = (50.0f64, 1.5f64, 1e-3);
+    let sine = libm::sin(degrees.to_radians());
+    let tangent = |sine: f64| sine / (1.0 - sine * sine).sqrt();
+    let at_wall = |wall: f32| {
+        let mut s = aslant(degrees);
+        // A plate from each even height to the odd one below it.
+        for interface in 0..200u16 {
+            s.square(-f32::from(interface) * step as f32, 9.0, glass(ior as f32));
+            if interface % 2 == 1 {
+                s.scene.meshes[usize::from(interface)].triangles.iter_mut().for_each(|t| t.swap(0, 1));
+            }
+            s.scene.meshes[usize::from(interface)].material = 0;
+        }
+        s.mesh(ruler(wall, 16.0), DAffine3::IDENTITY, unlit(Vec3::ONE));
+        s.settings.depth = Some(200);
+        assert_eq!(s.render().counts.refracted.queries, 200);
+        f64::from(s.color().x) * 32.0 - 16.0
+    };
+    let expected = |wall: f64| 0.1 * tangent(sine / ior) + (wall - 0.1) * tangent(sine);
+    let (near, far) = (at_wall(-1.0), at_wall(-9.0));
+    // Colours tell places to 2⁻²⁴ of 32.
+    assert!((near - expected(1.0)).abs() < 1e-5, "{near} for {}", expected(1.0));
+    let ulp = f64::from(f32::EPSILON);
+    assert!((far - near - 8.0 * tangent(sine)).abs() < 200.0 * ulp * 8.0, "{far} {near}");
+}
+
+/// S12 (nesting): water in a glass shell in air, each boundary with the indices of its two sides.
+#[test]
+fn water_within_glass_bends_as_snells_law_says_at_every_boundary() {
+    // Layers that fill the space between spheres of radius 2 and 1 and the inner one. A ray beside the middle.
+    let impact = 0.6f64;
+    let mut s = looking_down(5.0);
+    let (eye, at) = (DVec3::new(impact, 0.0, 5.0), DVec3::new(impact, 0.0, 0.0));
+    s.view = View::look_at(eye, at, DVec3::Y, Lens::orthographic(1e-6));
+    s.sphere(DVec3::ZERO, 2.0, glass(1.5)).sphere(DVec3::ZERO, 1.0, glass(1.33));
+    s.mesh(ruler(-6.0, 8.0), DAffine3::IDENTITY, unlit(Vec3::ONE));
+    // n r sin θ is constant along the way through spheres around one centre (P. Bouguer, 1729).
+    let angle = |n: f64, r: f64| libm::asin(impact / (n * r));
+    let turned = 2.0 * (angle(1.0, 2.0) - angle(1.5, 2.0) + angle(1.5, 1.0) - angle(1.33, 1.0));
+    // The way is symmetric: it comes out at distance `impact` from the line through the centre turned by that angle.
+    let (sin, cos) = (libm::sin(turned), libm::cos(turned));
+    let x = (impact - 6.0 * sin) / cos;
+    let found = f64::from(s.color().x) * 16.0 - 8.0;
+    assert!((found - x).abs() < 1e-4, "{found} for {x}");
+    assert_eq!(s.render().counts.refracted.queries, 4);
+}
+
+/// S15 (furnace): what smooth glass and mirrors reflect and transmit adds up to what there is.
+#[test]
+fn glass_and_mirrors_in_an_evenly_bright_room_cannot_be_seen() {
+    let both = Phong { transmission: Vec3::ONE, mirror: Vec3::ONE, ior: 1.5, fresnel: true, ..phong() };
+    let mut s = looking_down(5.0);
+    s.view = View::look_at(DVec3::new(0.3, 0.1, 5.0), DVec3::new(0.3, 0.1, 0.0), DVec3::Y, Lens::orthographic(3.0));
+    s.sphere(DVec3::ZERO, 1.0, material(Vec3::ZERO, both));
+    s.sphere(DVec3::new(1.2, 0.5, -2.0), 0.8, material(Vec3::ZERO, Phong { mirror: Vec3::ONE, ..phong() }));
+    s.scene.environment = Environment::Constant(Vec3::ONE);
+    let depth = 64;
+    s.settings = Settings { depth: Some(depth), width: 16, height: 16, ..s.settings };
+    let rendered = s.render();
+    assert!(rendered.counts.refracted.queries > 500);
+    let seen: Vec<_> = rendered.picture.beauty.iter().filter(|p| p[3] > 0.0).collect();
+    assert!(seen.len() > 100);
+    for pixel in seen {
+        // What is still inside after so many bounces, where it grazes the ball, is left in the dark.
+        assert_near(Vec3::from_slice(pixel), Vec3::ONE, 1e-6 * depth as f32);
+    }
+}

@@ -104,3 +104,31 @@ fn rays_leave_a_mirror_that_stands_far_from_the_origin() {
     assert_eq!(picture.beauty[40], [1.0, 0.0, 0.0, 1.0], "the bead in the middle");
     assert_eq!(picture.beauty[0], [0.5, 0.5, 0.5, 1.0], "the mirror does not see itself");
 }
+
+/// S6 (drift): between two mirrors a ray comes along by the same step at each of fifty bounces.
+#[test]
+fn fifty_bounces_between_mirrors_do_not_drift() {
+    use crate::math::Vec4;
+    let (bounces, rise) = (50u16, 0.4f64);
+    let view =
+        View::look_at(DVec3::new(0.0, 0.0, 0.5), DVec3::new(1.0, 0.0, 0.5 + rise), DVec3::Y, Lens::orthographic(1e-6));
+    let mut s = stage(view);
+    s.square(0.0, 400.0, mirror(1.0)).square(1.0, 400.0, mirror(1.0));
+    // A wall across the way, lit by its height: bounces lie 1/rise apart, the first after half of that.
+    let wall = (f64::from(bounces) + 0.3) / rise;
+    let corner = |y: f32, z: f32| (Vec3::new(wall as f32, y, z), Vec4::new(z, z, z, 1.0));
+    let (positions, colors) =
+        [(-1.0, 0.0), (1.0, 0.0), (1.0, 1.0), (-1.0, 1.0)].map(|(y, z)| corner(y, z)).into_iter().unzip();
+    let mesh = Mesh { positions, colors, triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() };
+    s.mesh(mesh, DAffine3::IDENTITY, material(Vec3::ONE, phong()));
+    s.scene.materials[2] = Material { surface: Reflection::Unlit, ..s.scene.materials[2].clone() };
+    s.settings.depth = Some(60);
+    // Unfolded, the way is straight: its height is folded into 0..1.
+    let height = (0.5 + rise * f64::from(wall as f32)) % 2.0;
+    let expected = if height > 1.0 { 2.0 - height } else { height };
+    let found = f64::from(s.color().x);
+    assert_eq!(s.render().counts.reflected.queries, u64::from(bounces));
+    // 8 ulp of the largest coordinate on the way, for each bounce, and the direction's rounding over the whole way.
+    let ulp = f64::from(f32::EPSILON) * wall;
+    assert!((found - expected).abs() < 8.0 * 50.0 * ulp, "{found} for {expected}");
+}
