@@ -4,7 +4,8 @@
 //! numbers decide ([`rational`](crate::math::rational)). To be affordable on large meshes, runs of triangles are skipped when the ray
 //! misses their box by more than a millionth of its size: nothing else is shared with the structures that it judges.
 
-use std::collections::HashSet;
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 use dashu::rational::RBig;
 
@@ -37,6 +38,8 @@ pub struct Oracle<'a> {
     shapes: &'a Shapes,
     /// Triangles with an area, in runs of neighbours; no ray hits one without. Of copies only the lowest.
     prims: Vec<u32>,
+    /// The second lowest copy of triangles that have copies: it is hit by rays that exclude the lowest.
+    second: HashMap<u32, u32>,
     boxes: Vec<(DVec3, DVec3)>,
 }
 
@@ -52,9 +55,18 @@ impl<'a> Oracle<'a> {
     /// Over all triangles.
     pub fn new(shapes: &'a Shapes) -> Self {
         let all = 0..u32::try_from(shapes.triangles.len()).unwrap_or(u32::MAX);
-        let mut seen = HashSet::new();
         let mut prims: Vec<u32> = all.filter(|&prim| has_area(&shapes.triangle(prim))).collect();
-        prims.retain(|&prim| seen.insert(corners(&shapes.triangle(prim))));
+        let (mut lowest, mut second) = (HashMap::new(), HashMap::new());
+        prims.retain(|&prim| match lowest.entry(corners(&shapes.triangle(prim))) {
+            Entry::Vacant(place) => {
+                place.insert(prim);
+                true
+            }
+            Entry::Occupied(first) => {
+                second.entry(*first.get()).or_insert(prim);
+                false
+            }
+        });
         sort_by_place(&mut prims, shapes);
         let grow = |(lo, hi): (DVec3, DVec3), p: DVec3| (lo.min(p), hi.max(p));
         let of_run = |run: &[u32]| {
@@ -62,7 +74,7 @@ impl<'a> Oracle<'a> {
             run.iter().flat_map(|&prim| shapes.triangle(prim)).map(|p| p.as_dvec3()).fold(none, grow)
         };
         let boxes = prims.chunks(RUN).map(of_run).collect();
-        Self { shapes, prims, boxes }
+        Self { shapes, prims, second, boxes }
     }
 
     /// The nearest hit in the ray's range.
@@ -80,6 +92,11 @@ impl<'a> Oracle<'a> {
                     best = Some(found);
                 }
             }
+        }
+        if let Some(found) = self.second.get(&ray.exclude).and_then(|&prim| self.candidate(ray, prim))
+            && best.as_ref().is_none_or(|b| self.before(ray, &found, b))
+        {
+            best = Some(found);
         }
         best.map(|b| Truth { prim: b.prim, t: b.t })
     }
@@ -289,6 +306,16 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_ray_that_excludes_a_triangle_hits_its_copy() {
+        let shapes = scenes::copies(3);
+        let oracle = Oracle::new(&shapes);
+        let target = shapes.triangle(0).into_iter().sum::<Vec3>() / 3.0;
+        let ray = scenes::ray(target + Vec3::new(0.1, 0.2, 3.0), Vec3::new(-0.1, -0.2, -3.0));
+        let hit = |exclude| oracle.nearest(&Ray { exclude, ..ray }).map(|t| t.prim);
+        assert_eq!([hit(crate::accel::NO_PRIM), hit(0), hit(1)], [Some(0), Some(1), Some(0)]);
     }
 
     #[test]
