@@ -1,7 +1,8 @@
 //! What the user sees while waiting: a bar on a terminal, a plain line every few seconds elsewhere, nothing with
 //! `--quiet`.
 //!
-//! The bar runs over load → build → render. Only the render has a known length, so only it has a time to go.
+//! The bar runs over load → build → render, or over the parts of what is measured. Only work of known length has a time
+//! to go.
 
 use super::interrupt;
 use super::message::Messages;
@@ -26,6 +27,7 @@ enum How<'a> {
 }
 
 struct Stage {
+    doing: &'static str,
     started: Instant,
     last_line: Instant,
 }
@@ -42,7 +44,11 @@ impl<'a> Progress<'a> {
             bar.set_prefix(name.to_owned());
             How::Bar { bar, messages }
         } else {
-            How::Lines { name: name.into(), messages, stage: Mutex::new(Stage { started: now, last_line: now }) }
+            How::Lines {
+                name: name.into(),
+                messages,
+                stage: Mutex::new(Stage { doing: "", started: now, last_line: now }),
+            }
         };
         Self { how, cancellable }
     }
@@ -60,18 +66,41 @@ impl<'a> Progress<'a> {
         }
     }
 
-    /// The render begins.
-    pub(super) fn render(&self) {
+    /// Work of known length begins: `rendering`, `judging`; [`Self::advance`] tells how far it is.
+    pub(super) fn begin(&self, doing: &'static str) {
         match &self.how {
             How::Silent => {}
             How::Bar { bar, .. } => {
                 bar.disable_steady_tick();
                 bar.reset_eta();
-                bar.set_style(style("{prefix}: rendering [{wide_bar}] {percent:>3} %  {elapsed} (ETA {eta})"));
+                bar.set_message(doing);
+                bar.set_style(style("{prefix}: {msg} [{wide_bar}] {percent:>3} %  {elapsed} (ETA {eta})"));
             }
             How::Lines { stage, .. } => {
                 if let Ok(mut stage) = stage.lock() {
-                    stage.started = Instant::now();
+                    (stage.doing, stage.started) = (doing, Instant::now());
+                }
+            }
+        }
+    }
+
+    /// So many of `total` parts are done.
+    pub(super) fn advance(&self, done: usize, total: usize) {
+        match &self.how {
+            How::Silent => {}
+            How::Bar { bar, .. } => {
+                bar.set_length(total as u64);
+                // Workers report out of order; the bar never goes back.
+                if done as u64 > bar.position() {
+                    bar.set_position(done as u64);
+                }
+            }
+            How::Lines { name, messages, stage } => {
+                // Whoever finds another worker writing has nothing to add.
+                let Ok(mut stage) = stage.try_lock() else { return };
+                if stage.last_line.elapsed() >= LINE_EVERY && done < total {
+                    stage.last_line = Instant::now();
+                    messages.info("progress", plain_line(name, stage.doing, done, total, stage.started.elapsed()));
                 }
             }
         }
@@ -94,24 +123,7 @@ impl Drop for Progress<'_> {
 
 impl crate::render::Progress for Progress<'_> {
     fn tiles(&self, done: usize, total: usize) {
-        match &self.how {
-            How::Silent => {}
-            How::Bar { bar, .. } => {
-                bar.set_length(total as u64);
-                // Workers report out of order; the bar never goes back.
-                if done as u64 > bar.position() {
-                    bar.set_position(done as u64);
-                }
-            }
-            How::Lines { name, messages, stage } => {
-                // Whoever finds another worker writing has nothing to add.
-                let Ok(mut stage) = stage.try_lock() else { return };
-                if stage.last_line.elapsed() >= LINE_EVERY && done < total {
-                    stage.last_line = Instant::now();
-                    messages.info("progress", plain_line(name, done, total, stage.started.elapsed()));
-                }
-            }
-        }
+        self.advance(done, total);
     }
 
     fn cancelled(&self) -> bool {
@@ -119,9 +131,9 @@ impl crate::render::Progress for Progress<'_> {
     }
 }
 
-fn plain_line(name: &str, done: usize, total: usize, elapsed: Duration) -> String {
+fn plain_line(name: &str, doing: &str, done: usize, total: usize, elapsed: Duration) -> String {
     let left = elapsed.as_secs_f64() * (total - done) as f64 / done.max(1) as f64;
-    format!("{name}: rendering, {} % done, about {left:.0} s left", 100 * done / total.max(1))
+    format!("{name}: {doing}, {} % done, about {left:.0} s left", 100 * done / total.max(1))
 }
 
 fn style(template: &str) -> ProgressStyle {
@@ -134,8 +146,8 @@ mod tests {
 
     #[test]
     fn the_time_left_is_extrapolated_from_the_tiles_done() {
-        let line = plain_line("a.obj", 25, 100, Duration::from_secs(10));
+        let line = plain_line("a.obj", "rendering", 25, 100, Duration::from_secs(10));
         assert_eq!(line, "a.obj: rendering, 25 % done, about 30 s left");
-        assert!(plain_line("a.obj", 0, 0, Duration::ZERO).contains("0 %"));
+        assert!(plain_line("a.obj", "rendering", 0, 0, Duration::ZERO).contains("0 %"));
     }
 }

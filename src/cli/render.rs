@@ -236,7 +236,7 @@ fn render_shot(
 }
 
 fn trace(job: &RenderJob, work: &Job, progress: &Progress, times: &mut Times) -> Rendered {
-    progress.render();
+    progress.begin("rendering");
     let _guard = job.keep_partial.then(interrupt::Guard::new);
     let start = Instant::now();
     let rendered = crate::render::render(work, progress);

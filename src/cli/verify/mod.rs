@@ -2,8 +2,8 @@
 //!
 //! # Schema `meshray-verify/1`
 //! One JSON object: `version`, `file`, `hash`, `triangles`, `others` (prims that were not judged), `rays` (of each kind,
-//! for each variation), `seed`; `variations`, each with `what`, `amount`, `collapsed` (triangles that rounding left without area), `disagreements` (rays about which two structures differ), `spawned` (`rays`, `self_hits`, `leaks`,
-//! `false_shadows`) and `rows`; a row has `intersector`, `accel` and, for `all` rays and for each kind of `aims`, `rays`,
+//! for each variation), `seed`; `variations`, each with `what`, `amount`, `collapsed` (triangles that rounding left without area), `disagreements` (rays about which two structures differ), `spawned` (`rays`, `self_hits`, `slips`,
+//! `leaks`, `false_shadows`) and `rows`; a row has `intersector`, `accel` and, for `all` rays and for each kind of `aims`, `rays`,
 //! `hits`, `missed`, `false_hits`, `wrong_order` (numbers of rays) and `t_ulps_max`, `t_ulps_rms`; `costs`
 //! (`intersector`, `ns_per_ray`); `choose` (an intersector), `trusted`. Keys are only ever added.
 
@@ -12,6 +12,7 @@ mod report;
 use super::args::VerifyArgs;
 use super::exit::Exit;
 use super::message::Messages;
+use super::progress::Progress;
 use super::{accident, print, read};
 use crate::bench::verify::{Plan, verify};
 
@@ -28,11 +29,15 @@ fn judge(args: &VerifyArgs, messages: &Messages) -> Exit {
     };
     let name = args.model.input.display().to_string();
     let plan = Plan { rays: args.rays, seed: args.seed, ..Plan::DEFAULT };
+    let progress = Progress::new(&name, messages, args.quiet, false);
+    progress.begin("judging");
     let go_on = |done: usize, of: usize| {
-        messages.info("progress", format!("{name}: place and size {} of {of}", done + 1));
+        progress.advance(done, of);
         true
     };
-    let Some(findings) = verify(&loaded.scene, &plan, go_on) else {
+    let findings = verify(&loaded.scene, &plan, go_on);
+    progress.finish();
+    let Some(findings) = findings else {
         messages.error("nothing-to-verify", format!("{name}: no triangles to aim at"), "give a file with a mesh");
         return Exit::Input;
     };

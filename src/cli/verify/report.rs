@@ -38,6 +38,15 @@ impl Report<'_> {
             writeln!(out, "{} polygons, spheres, cones and planes are not judged", count(f.others))?;
         }
         writeln!(out, "{} rays for each place and size, {} each at: {aims}", count(rays), count(self.plan.rays))?;
+        let structures: Vec<&str> =
+            f.sections.first().into_iter().flat_map(|s| &s.rows).map(|r| r.accel.name()).collect();
+        let mut named: Vec<&str> = Vec::new();
+        structures.into_iter().for_each(|s| {
+            if !named.contains(&s) {
+                named.push(s)
+            }
+        });
+        writeln!(out, "through {}; those that came out the same share a line", named.join(", "))?;
         writeln!(out, "wrong answers per million rays, by exact arithmetic; < n: none seen, fewer than n at 95 %")?;
         for section in &f.sections {
             write_section(out, section)?;
@@ -151,13 +160,12 @@ fn write_section(out: &mut String, section: &Section) -> std::fmt::Result {
         writeln!(out, "  {} triangles collapsed by rounding", count(section.collapsed))?;
     }
     let title = ["rays", "missed", "false", "wrong order", "t max ulp", "t rms ulp"];
-    write!(out, "  {:24}{:12}", "intersector", "accel")?;
+    write!(out, "  {:24}{:16}", "intersector", "accel")?;
     title.iter().try_for_each(|t| write!(out, "{t:>12}"))?;
     writeln!(out)?;
-    for row in &section.rows {
-        let t = row.total();
+    for (rows, t) in alike(&section.rows) {
         let rates = [t.missed, t.false_hits, t.wrong_order].map(|n| rate(n, t.rays));
-        write!(out, "  {:24}{:12}{:>12}", row.test.name(), row.accel.name(), count(t.rays))?;
+        write!(out, "  {:24}{:16}{:>12}", rows[0].test.name(), label(&rows), count(t.rays))?;
         rates.iter().try_for_each(|r| write!(out, "{r:>12}"))?;
         writeln!(out, "{:>12}{:>12}", short(t.max_ulps), short(t.rms_ulps()))?;
     }
@@ -173,6 +181,28 @@ fn write_section(out: &mut String, section: &Section) -> std::fmt::Result {
         count(s.leaks),
         count(s.false_shadows)
     )
+}
+
+/// Rows of one test that came out the same in several structures, together: most do.
+fn alike(rows: &[Row]) -> Vec<(Vec<&Row>, Tally)> {
+    let mut groups: Vec<(Vec<&Row>, Tally)> = Vec::new();
+    for row in rows {
+        let same =
+            |(others, _): &&mut (Vec<&Row>, Tally)| others[0].test == row.test && others[0].tallies == row.tallies;
+        match groups.iter_mut().find(same) {
+            Some((others, _)) => others.push(row),
+            None => groups.push((vec![row], row.total())),
+        }
+    }
+    groups
+}
+
+/// What a group of rows is called.
+fn label(rows: &[&Row]) -> String {
+    match rows {
+        [row] => row.accel.name().to_owned(),
+        rows => format!("{} structures", rows.len()),
+    }
 }
 
 fn section_json(section: &Section) -> Value {
