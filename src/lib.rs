@@ -14,7 +14,7 @@
 //!
 //! # Example
 //! ```
-//! use meshray::accel::{AccelKind, AnyAccel, GridParams};
+//! use meshray::accel::{AccelKind, AnyAccel, AccelParams};
 //! use meshray::image::{FileKind, Metadata, Output};
 //! use meshray::load::{LoadOptions, load_bytes};
 //! use meshray::render::texture::TextureStore;
@@ -35,7 +35,7 @@
 //! let job = Job {
 //!     scene: &scene,
 //!     world: &world,
-//!     accel: &AnyAccel::build(AccelKind::default(), &world.shapes, &GridParams::default()),
+//!     accel: &AnyAccel::build(AccelKind::default(), &world.shapes, &AccelParams::DEFAULT),
 //!     textures: &TextureStore::new(&scene),
 //!     view: &View::from_camera(&camera),
 //!     settings: &settings,
@@ -55,7 +55,7 @@
 //! | [`math`] | only numbers: error bounds, eight lanes at once, rays against triangle, polygon, sphere, cone, plane, box |
 //! | [`scene`] | plain data with indices; which features a scene needs, default camera and light |
 //! | [`load`] | files -> scene and warnings: glTF, OBJ + MTL, scene files |
-//! | [`accel`] | shapes -> what does this ray hit: `none`, `grid-octree`, `fast-octree`, `fast-bvh`; counts |
+//! | [`accel`] | shapes -> what does this ray hit: `none`, `bvh`, `grid`, `grid-octree`, `octree`, `fast-octree`, `fast-bvh`; counts |
 //! | [`mod@render`] | rays -> linear pixels: waves, shading models, lights and shadows, optics, textures |
 //! | [`image`] | linear pixels <-> files: tone mapping, formats, metadata, differences |
 //! | [`mod@bench`] | measures and compares: hard rays, exact answers, what came out |

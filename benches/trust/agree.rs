@@ -2,7 +2,7 @@
 
 use std::ops::Add;
 
-use meshray::accel::{Accel, AccelKind, AnyAccel, GridParams, Hit, Listed, NoProbe, Ray, Shapes};
+use meshray::accel::{Accel, AccelKind, AccelParams, AnyAccel, Hit, Listed, NoProbe, Ray, Shapes};
 use meshray::bench::aim::{Aim, Aimer};
 use meshray::load::{LoadOptions, load};
 use meshray::render::World;
@@ -80,7 +80,7 @@ fn print(name: &str, triangles: usize, c: Count) {
 
 fn model(shapes: &Shapes, rays: f64, tests: f64) -> Count {
     let Some(aimer) = Aimer::new(shapes, 0) else { return Count::default() };
-    let fast = [AccelKind::FastOctree, AccelKind::FastBvh].map(|k| AnyAccel::build(k, shapes, &GridParams::DEFAULT));
+    let fast = [AccelKind::FastOctree, AccelKind::FastBvh].map(|k| AnyAccel::build(k, shapes, &AccelParams::DEFAULT));
     let brute = Listed::new(shapes);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` saturates")]
     let tasks = (rays / (SLICE * Aim::ALL.len()) as f64).ceil() as usize;

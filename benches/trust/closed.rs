@@ -1,6 +1,6 @@
 //! Rays from inside a closed mesh, aimed where tests fail: none may get out.
 
-use meshray::accel::{Accel, AccelKind, AnyAccel, GridParams, Hit, NO_PRIM, NoProbe, Ray, Shapes};
+use meshray::accel::{Accel, AccelKind, AccelParams, AnyAccel, Hit, NO_PRIM, NoProbe, Ray, Shapes};
 use meshray::bench::star::star;
 use meshray::math::random::Random;
 use meshray::math::{DAffine3, DVec3, Vec3};
@@ -44,7 +44,7 @@ fn scene(mesh: &Shapes, by: DVec3) -> Scene {
 fn place(name: &str, shapes: &Shapes, center: Vec3, rays: f64) -> bool {
     let mut clean = true;
     for kind in AccelKind::ALL {
-        let accel = AnyAccel::build(kind, shapes, &GridParams::DEFAULT);
+        let accel = AnyAccel::build(kind, shapes, &AccelParams::DEFAULT);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` saturates")]
         let count = if kind.is_slow() { FEW } else { rays as u32 };
         let escapes: [usize; 4] = std::array::from_fn(|aim| escapes(&accel, shapes, center, aim, count / 4));

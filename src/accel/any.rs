@@ -1,19 +1,26 @@
 //! The choice of a structure and a test: the enums meet the user, the traits meet the ray.
 
+use std::any::Any;
 use std::fmt;
 use std::str::FromStr;
 
 use super::intersector::{IntersectorKind, MollerTrumbore, MollerTrumboreDouble, Watertight, WatertightDouble};
 use super::query::{Culling, Tested};
-use super::{Accel, GridOctree, GridParams, Hit, Probe, Ray, Shapes, Splitting, StructureStats, Unculled, Wide};
+use super::{Accel, AccelParams, Bvh, GridOctree, Hit, Probe, Ray, Shapes, Splitting, StructureStats, Unculled, Wide};
 
 /// Which structure culls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum AccelKind {
     /// Every ray against every shape.
     None,
+    /// A binary hierarchy of boxes.
+    Bvh,
+    /// A uniform grid with a mailbox.
+    Grid,
     /// A uniform grid, its crowded cells refined by octrees, with a mailbox.
     GridOctree,
+    /// One cell refined by an octree, with a mailbox.
+    Octree,
     /// The same cuts as boxes in nodes of eight.
     FastOctree,
     /// Boxes in nodes of eight, cut by surface area.
@@ -31,20 +38,22 @@ impl AccelKind {
     pub const DEFAULT: Self = Self::FastOctree;
 
     /// Every kind, in the order of the help text.
-    pub const ALL: [Self; 4] = [Self::None, Self::GridOctree, Self::FastOctree, Self::FastBvh];
+    pub const ALL: [Self; 7] =
+        [Self::None, Self::Bvh, Self::Grid, Self::GridOctree, Self::Octree, Self::FastOctree, Self::FastBvh];
 
     /// As typed and printed.
     pub const fn name(self) -> &'static str {
         match self {
             Self::None => "none",
+            Self::Bvh => "bvh",
+            Self::Grid => "grid",
             Self::GridOctree => "grid-octree",
+            Self::Octree => "octree",
             Self::FastOctree => "fast-octree",
             Self::FastBvh => "fast-bvh",
         }
     }
-}
 
-impl AccelKind {
     /// Whether a ray may be tested against a large part of the prims: where many rays are asked, such a structure gets
     /// a sample of them.
     pub fn is_slow(self) -> bool {
@@ -60,7 +69,7 @@ impl fmt::Display for AccelKind {
 
 /// A name that no structure has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no structure is named {0:?}; there are: none, grid-octree, fast-octree, fast-bvh")]
+#[error("no structure is named {0:?}; there are: {names}", names = AccelKind::ALL.map(AccelKind::name).join(", "))]
 pub struct UnknownAccel(String);
 
 impl FromStr for AccelKind {
@@ -76,6 +85,7 @@ impl FromStr for AccelKind {
 /// The choice is looked up once for each slice of rays, and everything behind it is compiled for it.
 #[derive(Clone, Debug)]
 pub struct AnyAccel<'a> {
+    kind: AccelKind,
     structure: Structure<'a>,
     test: IntersectorKind,
 }
@@ -83,20 +93,26 @@ pub struct AnyAccel<'a> {
 #[derive(Clone, Debug)]
 enum Structure<'a> {
     None(Unculled<'a>),
-    GridOctree(GridOctree<'a>),
+    Bvh(Bvh<'a>),
+    Grid(GridOctree<'a>),
     Wide(Wide<'a>),
 }
 
-/// What a walk through [`AnyAccel`] writes to.
-#[derive(Clone, Debug)]
-pub struct AnyScratch(Scratch);
-
-#[derive(Clone, Debug)]
-enum Scratch {
-    None,
-    GridOctree(<GridOctree<'static> as Culling>::Scratch),
-    Wide(<Wide<'static> as Culling>::Scratch),
+/// Evaluates an expression for whatever structure there is.
+macro_rules! whichever {
+    ($structure:expr, $a:ident => $value:expr) => {
+        match $structure {
+            Structure::None($a) => $value,
+            Structure::Bvh($a) => $value,
+            Structure::Grid($a) => $value,
+            Structure::Wide($a) => $value,
+        }
+    };
 }
+
+/// What a walk through [`AnyAccel`] writes to.
+#[derive(Debug)]
+pub struct AnyScratch(Box<dyn Any + Send>);
 
 /// A question that can be asked of any structure.
 trait Question {
@@ -104,15 +120,18 @@ trait Question {
 }
 
 impl<'a> AnyAccel<'a> {
-    /// Builds a structure over `shapes`, asked with the exact test; `params` only matter to kinds with a grid.
-    pub fn build(kind: AccelKind, shapes: &'a Shapes, params: &GridParams) -> Self {
+    /// Builds a structure over `shapes`, asked with the exact test.
+    pub fn build(kind: AccelKind, shapes: &'a Shapes, params: &AccelParams) -> Self {
         let structure = match kind {
             AccelKind::None => Structure::None(Unculled::new(shapes)),
-            AccelKind::GridOctree => Structure::GridOctree(GridOctree::build(shapes, params)),
+            AccelKind::Bvh => Structure::Bvh(Bvh::build(shapes, params.bvh_leaf_size())),
+            AccelKind::Grid | AccelKind::GridOctree | AccelKind::Octree => {
+                Structure::Grid(GridOctree::build(shapes, &params.grid(kind)).with_mailbox(params.mailbox))
+            }
             AccelKind::FastOctree => Structure::Wide(Wide::build(shapes, Splitting::Octree)),
             AccelKind::FastBvh => Structure::Wide(Wide::build(shapes, Splitting::SurfaceArea)),
         };
-        Self { structure, test: IntersectorKind::Exact }
+        Self { kind, structure, test: IntersectorKind::Exact }
     }
 
     /// The same structure asked with another test.
@@ -123,51 +142,33 @@ impl<'a> AnyAccel<'a> {
 
     /// What it culls.
     pub fn shapes(&self) -> &Shapes {
-        match &self.structure {
-            Structure::None(s) => s.shapes(),
-            Structure::GridOctree(s) => s.shapes(),
-            Structure::Wide(s) => s.shapes(),
-        }
+        whichever!(&self.structure, a => a.shapes())
     }
 
     /// Which kind it is.
     pub fn kind(&self) -> AccelKind {
-        match &self.structure {
-            Structure::None(_) => AccelKind::None,
-            Structure::GridOctree(_) => AccelKind::GridOctree,
-            Structure::Wide(a) => match a.splitting() {
-                Splitting::Octree => AccelKind::FastOctree,
-                Splitting::SurfaceArea => AccelKind::FastBvh,
-            },
-        }
+        self.kind
     }
 
     /// What it is made of.
     pub fn summary(&self) -> StructureStats {
-        match &self.structure {
-            Structure::None(a) => a.summary(),
-            Structure::GridOctree(a) => a.summary(),
-            Structure::Wide(a) => a.summary(),
-        }
+        whichever!(&self.structure, a => a.summary())
     }
 
     /// Visits everything and proves that no hit can be lost; the error says which prim and cell disagree, and how.
     pub fn check(&self) -> Result<StructureStats, String> {
-        match &self.structure {
-            Structure::None(a) => Ok(a.summary()),
-            Structure::GridOctree(a) => a.check(),
-            Structure::Wide(a) => a.check(),
-        }
+        whichever!(&self.structure, a => a.check())
     }
 
-    fn ask(&self, question: impl Question, AnyScratch(scratch): &mut AnyScratch) {
-        match (&self.structure, scratch) {
-            (Structure::None(a), _) => self.ask_tested(question, a, &mut ()),
-            (Structure::GridOctree(a), Scratch::GridOctree(scratch)) => self.ask_tested(question, a, scratch),
-            (Structure::Wide(a), Scratch::Wide(scratch)) => self.ask_tested(question, a, scratch),
+    fn ask(&self, question: impl Question, scratch: &mut AnyScratch) {
+        whichever!(&self.structure, a => self.ask_with(question, a, scratch));
+    }
+
+    fn ask_with<C: Culling<Scratch: 'static>>(&self, question: impl Question, accel: &C, scratch: &mut AnyScratch) {
+        match scratch.0.downcast_mut() {
+            Some(scratch) => self.ask_tested(question, accel, scratch),
             // Scratch of another structure: a fresh one does.
-            (Structure::GridOctree(a), _) => self.ask_tested(question, a, &mut a.new_scratch()),
-            (Structure::Wide(a), _) => self.ask_tested(question, a, &mut a.new_scratch()),
+            None => self.ask_tested(question, accel, &mut accel.new_scratch()),
         }
     }
 
@@ -187,12 +188,9 @@ impl<'a> AnyAccel<'a> {
 impl Accel for AnyAccel<'_> {
     type Scratch = AnyScratch;
 
+    #[expect(clippy::unit_arg, reason = "the scratch of some is the unit")]
     fn scratch(&self) -> AnyScratch {
-        AnyScratch(match &self.structure {
-            Structure::None(_) => Scratch::None,
-            Structure::GridOctree(a) => Scratch::GridOctree(a.new_scratch()),
-            Structure::Wide(a) => Scratch::Wide(a.new_scratch()),
-        })
+        AnyScratch(whichever!(&self.structure, a => Box::new(a.new_scratch())))
     }
 
     fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut AnyScratch, probe: &mut P) {

@@ -10,22 +10,28 @@
 //! one, with many in flight, or as packets, with the same bits in the answer.
 
 pub mod any;
+pub mod bvh;
 pub mod grid;
 pub mod intersector;
 pub mod none;
+pub mod params;
 pub mod probe;
 pub mod query;
 pub mod refine;
 pub mod shapes;
+pub mod slabs;
 pub mod stats;
 #[cfg(test)]
 pub(crate) mod tests;
 pub mod wide;
 
 pub use any::{AccelKind, AnyAccel};
+pub use bvh::Bvh;
+pub use grid::mailbox::MailboxKind;
 pub use grid::{GridOctree, GridParams};
 pub use intersector::{Intersector, IntersectorKind};
 pub use none::Unculled;
+pub use params::AccelParams;
 pub use probe::{NoProbe, Probe, RayCounts};
 pub use query::Tested;
 pub use refine::Refined;

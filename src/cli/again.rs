@@ -11,6 +11,7 @@ use super::job::{Batch, RenderJob, Shot};
 use super::parse;
 use super::picture::Effective;
 use super::stats::Counted;
+use crate::accel::MailboxKind;
 use crate::image::{ExrSamples, FileKind, ImageError, Metadata, PngDepth, read_metadata};
 use crate::load::{Diagnostic, Loaded, MtlMode, Polygons};
 use crate::math::DVec3;
@@ -20,7 +21,7 @@ use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
 /// The flags that a picture may bring along.
-const FLAGS: [&str; 27] = [
+const FLAGS: [&str; 33] = [
     "size",
     "samples",
     "depth",
@@ -47,6 +48,12 @@ const FLAGS: [&str; 27] = [
     "mtl",
     "accel",
     "intersector",
+    "grid-density",
+    "grid-resolution",
+    "max-depth",
+    "step-cost",
+    "leaf-size",
+    "mailbox",
     "allow-empty",
 ];
 
@@ -128,6 +135,15 @@ impl Facts<'_> {
         }
         set("accel", self.job.accel.name().into());
         set("intersector", self.job.intersector.name().into());
+        let params = &self.job.params;
+        params.density.iter().for_each(|n| set("grid-density", n.to_string()));
+        params.max_resolution.iter().for_each(|n| set("grid-resolution", n.to_string()));
+        params.max_depth.iter().for_each(|n| set("max-depth", n.to_string()));
+        params.step_cost.iter().for_each(|n| set("step-cost", n.to_string()));
+        params.leaf_size.iter().for_each(|n| set("leaf-size", n.to_string()));
+        if params.mailbox != MailboxKind::default() {
+            set("mailbox", params.mailbox.name().into());
+        }
         let switches = [
             ("float", self.shot.kind == FileKind::Exr && output.exr_samples == ExrSamples::Float),
             ("layers", settings.layers),
@@ -232,7 +248,6 @@ fn with_typed(pixels: RenderArgs, inputs: Vec<PathBuf>, typed: &RenderArgs) -> R
         max_memory: typed.max_memory,
         keep_partial: typed.keep_partial,
         strict: typed.strict,
-        grid: typed.grid.clone(),
         threads: typed.threads,
         stats: typed.stats,
         stats_file: typed.stats_file.clone(),

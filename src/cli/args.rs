@@ -1,7 +1,7 @@
 //! What was typed: syntax only. What it means together is decided in [`super::job`].
 
 use super::parse;
-use crate::accel::{AccelKind, GridParams, IntersectorKind};
+use crate::accel::{AccelKind, IntersectorKind, MailboxKind};
 use crate::bench::verify::Plan;
 use crate::image::ToneMap;
 use crate::scene::framing::NamedView;
@@ -179,9 +179,9 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "NAME", value_parser = parse::intersector(), default_value = IntersectorKind::Exact.name(),
           help_heading = "Structure", hide_short_help = true)]
     pub intersector: IntersectorKind,
-    /// Parameters of the grid
+    /// Parameters of the structure
     #[command(flatten)]
-    pub grid: GridArgs,
+    pub params: AccelArgs,
 
     /// Threads to use; 0: all
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=1024), help_heading = "Run")]
@@ -200,25 +200,28 @@ pub(super) struct RenderArgs {
     pub quiet: bool,
 }
 
-/// Parameters of `grid-octree`.
+/// Parameters of the structures; what is left out follows from the kind of structure.
 #[derive(Debug, Clone, Args)]
-pub(super) struct GridArgs {
-    /// Cells of the grid per shape
-    #[arg(long, value_name = "RATIO", default_value_t = GridParams::DEFAULT.density,
+pub(super) struct AccelArgs {
+    /// Cells of the grid per shape [default: 0.25 where crowded cells are refined, 4 for `grid`]
+    #[arg(long, value_name = "RATIO", help_heading = "Structure", hide_short_help = true)]
+    pub grid_density: Option<f64>,
+    /// Most cells of the grid along an axis [default: 256]
+    #[arg(long, value_name = "N", help_heading = "Structure", hide_short_help = true)]
+    pub grid_resolution: Option<u32>,
+    /// Most octree levels below a cell of the grid [default: 8; 10 for `octree`]
+    #[arg(long, value_name = "N", help_heading = "Structure", hide_short_help = true)]
+    pub max_depth: Option<u32>,
+    /// Cost of visiting a cell, counted in tests; cells are split when that should pay [default: 4]
+    #[arg(long, value_name = "COST", help_heading = "Structure", hide_short_help = true)]
+    pub step_cost: Option<f64>,
+    /// Most shapes in a leaf [default: 2 for `bvh`; octrees go by --step-cost]
+    #[arg(long, value_name = "N", help_heading = "Structure", hide_short_help = true)]
+    pub leaf_size: Option<u32>,
+    /// What a ray remembers of the shapes it met, so that they are tested once (grids and octrees)
+    #[arg(long, value_name = "KIND", value_parser = parse::mailbox(), default_value = MailboxKind::Exact.name(),
           help_heading = "Structure", hide_short_help = true)]
-    pub grid_density: f64,
-    /// Most cells of the grid along an axis
-    #[arg(long, value_name = "N", default_value_t = GridParams::DEFAULT.max_resolution,
-          help_heading = "Structure", hide_short_help = true)]
-    pub grid_resolution: u32,
-    /// Most octree levels below a crowded cell; 0: a plain grid
-    #[arg(long, value_name = "N", default_value_t = GridParams::DEFAULT.max_depth,
-          help_heading = "Structure", hide_short_help = true)]
-    pub octree_depth: u32,
-    /// Cost of visiting a cell, counted in tests; cells are split when that should pay
-    #[arg(long, value_name = "COST", default_value_t = GridParams::DEFAULT.step_cost,
-          help_heading = "Structure", hide_short_help = true)]
-    pub step_cost: f64,
+    pub mailbox: MailboxKind,
 }
 
 /// What `meshray inspect` was given.

@@ -1,11 +1,11 @@
 //! What is to be done, checked: everything that can be known to be wrong before any work is told here.
 
-use super::args::{Axis, FileType, MessageFormat, MtlArg, PolygonsArg, RenderArgs, StatsFormat};
+use super::args::{AccelArgs, Axis, FileType, MessageFormat, MtlArg, PolygonsArg, RenderArgs, StatsFormat};
 use super::camera::{Choice, LensChoice};
 use super::message;
 use super::output_name::{self, Facts};
 use super::parse::Back;
-use crate::accel::{AccelKind, GridParams, IntersectorKind};
+use crate::accel::{AccelKind, AccelParams, IntersectorKind};
 use crate::image::{ExrSamples, FileKind, PngDepth, ToneMap};
 use crate::load::{Limits, LoadOptions, MtlMode, Polygons};
 use crate::scene::UpAxis;
@@ -33,7 +33,7 @@ pub(super) struct RenderJob {
     /// Which ray/triangle test.
     pub intersector: IntersectorKind,
     /// Its parameters.
-    pub grid: GridParams,
+    pub params: AccelParams,
     /// 0: all.
     pub threads: usize,
     /// Statistics, if wanted.
@@ -143,7 +143,7 @@ impl RenderJob {
         Ok(Self {
             load: load_options(args),
             look: look(args),
-            grid: grid(args)?,
+            params: params(&args.params)?,
             accel: args.accel,
             intersector: args.intersector,
             threads: usize::from(args.threads),
@@ -306,15 +306,17 @@ fn look(args: &RenderArgs) -> Look {
     }
 }
 
-fn grid(args: &RenderArgs) -> Result<GridParams, Wrong> {
-    let grid = GridParams {
-        density: args.grid.grid_density,
-        max_resolution: args.grid.grid_resolution,
-        max_depth: args.grid.octree_depth,
-        step_cost: args.grid.step_cost,
+fn params(args: &AccelArgs) -> Result<AccelParams, Wrong> {
+    let params = AccelParams {
+        density: args.grid_density,
+        max_resolution: args.grid_resolution,
+        max_depth: args.max_depth,
+        step_cost: args.step_cost,
+        leaf_size: args.leaf_size,
+        mailbox: args.mailbox,
     };
-    grid.validate().map_err(|e| Wrong(e.to_string()))?;
-    Ok(grid)
+    params.validate().map_err(|e| Wrong(e.to_string()))?;
+    Ok(params)
 }
 
 fn stats(args: &RenderArgs) -> Option<Stats> {

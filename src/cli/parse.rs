@@ -1,6 +1,6 @@
 //! The words of single flags: sizes, vectors, angles, colours. Errors say what would be right.
 
-use crate::accel::{AccelKind, IntersectorKind};
+use crate::accel::{AccelKind, IntersectorKind, MailboxKind};
 use crate::image::ToneMap;
 use crate::math::Vec3;
 use crate::scene::Background;
@@ -119,6 +119,12 @@ pub(super) fn background(text: &str) -> Result<Back, String> {
 pub(super) fn accel() -> impl TypedValueParser<Value = AccelKind> {
     let parse = |name: String| name.parse::<AccelKind>().map_err(|e| e.to_string());
     PossibleValuesParser::new(AccelKind::ALL.map(AccelKind::name)).try_map(parse)
+}
+
+/// The names of all mailboxes.
+pub(super) fn mailbox() -> impl TypedValueParser<Value = MailboxKind> {
+    let parse = |name: String| name.parse::<MailboxKind>().map_err(|e| e.to_string());
+    PossibleValuesParser::new(MailboxKind::ALL.map(MailboxKind::name)).try_map(parse)
 }
 
 /// The names of all ray/triangle tests.

@@ -192,7 +192,7 @@ fn render_shot(
     let mut times = Times { load: *load_seconds, ..Times::default() };
     progress.stage("building");
     let start = Instant::now();
-    let accel = AnyAccel::build(job.accel, &world.shapes, &job.grid).tested_by(job.intersector);
+    let accel = AnyAccel::build(job.accel, &world.shapes, &job.params).tested_by(job.intersector);
     let textures = TextureStore::new(&loaded.scene);
     times.build = start.elapsed().as_secs_f64();
 

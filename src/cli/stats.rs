@@ -8,6 +8,7 @@
 //! | `schema`, `version` | `meshray-stats/1`; version of meshray |
 //! | `inputs`, `output`, `input_hash` | files as typed (`-`: standard streams); xxh3-128 of what was read, hexadecimal |
 //! | `width`, `height`, `samples`, `depth`, `cutoff`, `seed`, `view`, `accel`, `intersector`, `threads` | settings that were used |
+//! | `parameters` | of the structure, as used: `leaf_size` (`null`: by step cost); of grids and octrees `grid_density`, `grid_resolution`, `max_depth`, `step_cost`, `mailbox` as well |
 //! | `seconds` | of the timed run: `load`, `build`, `render`, `write`; `load` is 0 for further views of one input |
 //! | `scene` | `triangles`, `polygons`, `spheres`, `cones` (cylinders too), `planes`, `vertices`, `materials`, `textures`, `lights` |
 //! | `structure` | V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`; `bytes` and `depth` |
@@ -22,7 +23,7 @@ use super::args::StatsFormat;
 use super::exit::Exit;
 use super::job::RenderJob;
 use super::message::Messages;
-use crate::accel::{AnyAccel, RayCounts, StructureStats};
+use crate::accel::{AccelKind, AccelParams, AnyAccel, RayCounts, StructureStats};
 use crate::render::{ClassCounts, Job, Rendered, Settings, World};
 use serde_json::{Value, json};
 use std::io;
@@ -126,6 +127,21 @@ fn class_json(c: &RayCounts, prims: u64) -> Value {
     })
 }
 
+/// What the parameters of a structure were, those that it has.
+fn parameters(kind: AccelKind, params: &AccelParams) -> Value {
+    match kind {
+        AccelKind::Bvh => json!({ "leaf_size": params.bvh_leaf_size() }),
+        AccelKind::Grid | AccelKind::GridOctree | AccelKind::Octree => {
+            let grid = params.grid(kind);
+            json!({
+                "grid_density": grid.density, "grid_resolution": grid.max_resolution, "max_depth": grid.max_depth,
+                "step_cost": grid.step_cost, "leaf_size": grid.leaf_size, "mailbox": params.mailbox.name(),
+            })
+        }
+        _ => json!({}),
+    }
+}
+
 /// Everything about one picture.
 pub(super) struct PictureStats {
     json: Value,
@@ -152,6 +168,7 @@ impl PictureStats {
             "width": settings.width, "height": settings.height, "samples": settings.samples, "depth": facts.depth,
             "cutoff": settings.cutoff, "seed": settings.seed, "view": view, "accel": facts.job.accel.name(),
             "intersector": facts.job.intersector.name(),
+            "parameters": parameters(facts.job.accel, &facts.job.params),
             "threads": rayon::current_num_threads(),
             "seconds": { "load": times.load, "build": times.build, "render": times.render, "write": times.write },
             "scene": {

@@ -37,13 +37,15 @@ impl Aabb {
 
     /// The part of t_min..=t_max inside the box, widened by the rounding of its own arithmetic so that it holds every
     /// point of the box on the ray. `inv_dir` is 1/dir in `f64`, where the reciprocal of no `f32` overflows but zero's.
-    pub fn span(&self, origin: Vec3, inv_dir: DVec3, t_min: f32, t_max: f32) -> Option<(f64, f64)> {
+    #[inline]
+    pub fn span(&self, origin: Vec3, inv_dir: DVec3, t_min: f64, t_max: f64) -> Option<(f64, f64)> {
         self.span_within(origin, inv_dir, t_min, t_max, SLAB)
     }
 
     /// [`Self::span`] for a given relative error of a distance.
-    fn span_within(&self, origin: Vec3, inv_dir: DVec3, t_min: f32, t_max: f32, slab: f64) -> Option<(f64, f64)> {
-        let (mut near, mut far) = (f64::from(t_min), f64::from(t_max));
+    #[inline]
+    fn span_within(&self, origin: Vec3, inv_dir: DVec3, t_min: f64, t_max: f64, slab: f64) -> Option<(f64, f64)> {
+        let (mut near, mut far) = (t_min, t_max);
         for k in 0..3 {
             let backwards = inv_dir[k].is_sign_negative();
             let (first, last) = if backwards { (self.hi[k], self.lo[k]) } else { (self.lo[k], self.hi[k]) };
@@ -65,7 +67,7 @@ mod tests {
     const UNIT: Aabb = Aabb { lo: Vec3::ZERO, hi: Vec3::ONE };
 
     fn hits(o: Vec3, d: Vec3) -> bool {
-        UNIT.span(o, d.as_dvec3().recip(), 0.0, f32::INFINITY).is_some()
+        UNIT.span(o, d.as_dvec3().recip(), 0.0, f64::INFINITY).is_some()
     }
 
     #[test]
@@ -106,7 +108,7 @@ mod tests {
             let bounds = Aabb { lo, hi: lo + size };
             let corner = Vec3::new(bounds.hi.x, bounds.lo.y, bounds.hi.z);
             let inv_dir = (corner - origin).as_dvec3().recip();
-            bounds.span_within(origin, inv_dir, 0.0, f32::INFINITY, slab).is_none()
+            bounds.span_within(origin, inv_dir, 0.0, f64::INFINITY, slab).is_none()
         };
         (0..2000).filter(misses_a_corner).count()
     }
@@ -120,6 +122,6 @@ mod tests {
     #[test]
     fn an_empty_box_is_never_hit() {
         assert!(Aabb::EMPTY.is_empty());
-        assert!(Aabb::EMPTY.span(Vec3::ZERO, DVec3::ONE, 0.0, f32::INFINITY).is_none());
+        assert!(Aabb::EMPTY.span(Vec3::ZERO, DVec3::ONE, 0.0, f64::INFINITY).is_none());
     }
 }

@@ -4,7 +4,7 @@
 
 pub mod stage;
 
-use meshray::accel::{AccelKind, AnyAccel, GridParams};
+use meshray::accel::{AccelKind, AccelParams, AnyAccel};
 use meshray::image::Picture;
 use meshray::render::texture::TextureStore;
 use meshray::render::{Job, Settings, View, World, render};
@@ -47,7 +47,7 @@ pub fn still(mut scene: Scene, kind: AccelKind, width: u32, height: u32) -> Opti
     if world.shapes.is_empty() {
         return None;
     }
-    let accel = AnyAccel::build(kind, &world.shapes, &GridParams::default());
+    let accel = AnyAccel::build(kind, &world.shapes, &AccelParams::DEFAULT);
     let textures = TextureStore::new(&scene);
     let view = View::from_camera(&camera);
     let settings = Settings { width, height, samples: 1, layers: true, ..Settings::default() };

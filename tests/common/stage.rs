@@ -1,6 +1,6 @@
 //! Little scenes built in code, and their pictures: a stage is set with a few calls and rendered through the library.
 
-use meshray::accel::{AccelKind, AnyAccel, GridParams};
+use meshray::accel::{AccelKind, AccelParams, AnyAccel};
 use meshray::image::Picture;
 use meshray::math::{DAffine3, DVec3, Vec2, Vec3};
 use meshray::render::texture::TextureStore;
@@ -112,7 +112,7 @@ impl Stage {
 
     pub fn render_with(&self, kind: AccelKind) -> Picture {
         let world = World::new(&self.scene);
-        let accel = AnyAccel::build(kind, &world.shapes, &GridParams::default());
+        let accel = AnyAccel::build(kind, &world.shapes, &AccelParams::DEFAULT);
         let textures = TextureStore::new(&self.scene);
         let job = Job {
             scene: &self.scene,

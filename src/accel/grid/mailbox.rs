@@ -3,31 +3,67 @@
 //! After J. Amanatides, A. Woo, 1987, and B. Arnaldi, T. Priol, K. Bouatouch, 1987; the memory belongs to the worker, not
 //! to the prim, so that threads do not meet.
 
+use std::fmt;
+use std::str::FromStr;
+
+use crate::accel::NO_PRIM;
+
+/// The choice of a [`Mailbox`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum MailboxKind {
+    /// Nothing is remembered.
+    None,
+    /// [`Stamps`].
+    #[default]
+    Exact,
+    /// [`Hashed`].
+    Hashed,
+}
+
+impl MailboxKind {
+    /// Every kind, in the order of the help text.
+    pub const ALL: [Self; 3] = [Self::None, Self::Exact, Self::Hashed];
+
+    /// As typed and printed.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Exact => "exact",
+            Self::Hashed => "hashed",
+        }
+    }
+}
+
+impl fmt::Display for MailboxKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A name that no mailbox has.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no mailbox is named {0:?}; there are: none, exact, hashed")]
+pub struct UnknownMailbox(String);
+
+impl FromStr for MailboxKind {
+    type Err = UnknownMailbox;
+
+    fn from_str(name: &str) -> Result<Self, UnknownMailbox> {
+        Self::ALL.into_iter().find(|k| k.name() == name).ok_or_else(|| UnknownMailbox(name.into()))
+    }
+}
+
 /// Remembers which prims the current ray has met.
 ///
 /// Answering "first visit" too often only wastes a test. Answering "seen" for a prim that this ray has not met loses a
 /// hit, and no kind may do it.
 pub trait Mailbox: Send {
-    /// For prims `0..prims`.
-    fn new(prims: u32) -> Self;
+    /// For prims `0..prims`. `kind` is for one that can be any.
+    fn new(kind: MailboxKind, prims: u32) -> Self;
     /// Forgets everything.
     fn next_ray(&mut self);
     /// Whether the current ray meets `prim` for the first time, as far as is known.
     fn first_visit(&mut self, prim: u32) -> bool;
-}
-
-/// Remembers nothing.
-#[derive(Clone, Copy, Debug)]
-pub struct NoMailbox;
-
-impl Mailbox for NoMailbox {
-    fn new(_prims: u32) -> Self {
-        Self
-    }
-    fn next_ray(&mut self) {}
-    fn first_visit(&mut self, _prim: u32) -> bool {
-        true
-    }
 }
 
 /// Exact: one stamp per prim, current if it equals the ray's number.
@@ -38,7 +74,7 @@ pub struct Stamps {
 }
 
 impl Mailbox for Stamps {
-    fn new(prims: u32) -> Self {
+    fn new(_: MailboxKind, prims: u32) -> Self {
         Self { stamp: vec![0; prims as usize], ray: 0 }
     }
 
@@ -57,13 +93,102 @@ impl Mailbox for Stamps {
     }
 }
 
+/// Places of [`Hashed`].
+const PLACES: usize = 64;
+
+/// A few places, one for each remainder of the prim's number: what comes later pushes out what was there. It forgets, but
+/// it takes no memory per prim. (I. Wald, *Realtime Ray Tracing and Interactive Global Illumination*, 2004; C. Benthin,
+/// *Realtime Ray Tracing on Current CPU Architectures*, 2006.)
+#[derive(Clone, Debug)]
+pub struct Hashed {
+    last: [u32; PLACES],
+}
+
+impl Mailbox for Hashed {
+    fn new(_: MailboxKind, _prims: u32) -> Self {
+        Self { last: [NO_PRIM; PLACES] }
+    }
+
+    #[inline]
+    fn next_ray(&mut self) {
+        self.last = [NO_PRIM; PLACES];
+    }
+
+    #[inline]
+    fn first_visit(&mut self, prim: u32) -> bool {
+        std::mem::replace(&mut self.last[prim as usize % PLACES], prim) != prim
+    }
+}
+
+/// Any of them, looked up at every visit.
+#[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one for each worker")]
+pub enum AnyMailbox {
+    /// Nothing is remembered.
+    None,
+    /// Exact.
+    Exact(Stamps),
+    /// Small.
+    Hashed(Hashed),
+}
+
+impl Mailbox for AnyMailbox {
+    fn new(kind: MailboxKind, prims: u32) -> Self {
+        match kind {
+            MailboxKind::None => Self::None,
+            MailboxKind::Exact => Self::Exact(Stamps::new(kind, prims)),
+            MailboxKind::Hashed => Self::Hashed(Hashed::new(kind, prims)),
+        }
+    }
+
+    #[inline]
+    fn next_ray(&mut self) {
+        match self {
+            Self::None => {}
+            Self::Exact(stamps) => stamps.next_ray(),
+            Self::Hashed(hashed) => hashed.next_ray(),
+        }
+    }
+
+    #[inline]
+    fn first_visit(&mut self, prim: u32) -> bool {
+        match self {
+            Self::None => true,
+            Self::Exact(stamps) => stamps.first_visit(prim),
+            Self::Hashed(hashed) => hashed.first_visit(prim),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
+    fn every_kind_is_found_by_its_name() {
+        for kind in MailboxKind::ALL {
+            assert_eq!(kind.name().parse(), Ok(kind));
+        }
+        let error = "lossy".parse::<MailboxKind>().map_err(|e| e.to_string());
+        let names = MailboxKind::ALL.map(MailboxKind::name).join(", ");
+        assert_eq!(error, Err(format!("no mailbox is named \"lossy\"; there are: {names}")));
+    }
+
+    #[test]
+    fn a_hashed_mailbox_forgets_a_prim_when_another_takes_its_place_and_everything_with_the_ray() {
+        let mut hashed = Hashed::new(MailboxKind::Hashed, 1000);
+        hashed.next_ray();
+        assert!(hashed.first_visit(3) && hashed.first_visit(4));
+        assert!(!hashed.first_visit(3) && !hashed.first_visit(4));
+        assert!(hashed.first_visit(3 + 64) && hashed.first_visit(3), "one pushes out the other");
+        assert!(!hashed.first_visit(4));
+        hashed.next_ray();
+        assert!(hashed.first_visit(4));
+    }
+
+    #[test]
     fn a_prim_is_new_once_to_every_ray() {
-        let mut stamps = Stamps::new(3);
+        let mut stamps = Stamps::new(MailboxKind::Exact, 3);
         for _ in 0..3 {
             stamps.next_ray();
             assert!(stamps.first_visit(2) && stamps.first_visit(0));
@@ -73,7 +198,7 @@ mod tests {
 
     #[test]
     fn an_old_stamp_does_not_come_back_when_the_numbers_wrap() {
-        let mut stamps = Stamps::new(2);
+        let mut stamps = Stamps::new(MailboxKind::Exact, 2);
         stamps.next_ray();
         assert!(stamps.first_visit(0));
         stamps.ray = u32::MAX;

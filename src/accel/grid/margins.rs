@@ -2,7 +2,6 @@
 //! any one of them some are not.
 
 use super::lattice::CellMargins;
-use super::mailbox::Stamps;
 use super::{GridOctree, GridParams};
 use crate::accel::tests::scenes::{mesh, ray, soup};
 use crate::accel::tests::{far_rays, wrong};
@@ -14,10 +13,10 @@ const DERIVED: CellMargins = CellMargins::DERIVED;
 
 /// Eight cells on each axis, no octrees.
 pub(in crate::accel) const EIGHT: GridParams =
-    GridParams { density: 64.0, max_resolution: 8, max_depth: 0, step_cost: 1.0 };
+    GridParams { density: 64.0, max_resolution: 8, max_depth: 0, step_cost: 1.0, leaf_size: None };
 
 fn wrong_with(margins: CellMargins, params: &GridParams, shapes: &Shapes, rays: &[Ray]) -> usize {
-    wrong(&GridOctree::<Stamps>::build_within(shapes, params, margins), shapes, rays)
+    wrong(&<GridOctree>::build_within(shapes, params, margins), shapes, rays)
 }
 
 /// Nothing is wrong with the derived margins, something is with the others.
@@ -140,7 +139,7 @@ impl Probe for Patience {
 fn walk_octants(guarded: bool) {
     let (shapes, rays) = faces_between_cells();
     let params = GridParams { max_resolution: 1, max_depth: 3, step_cost: 0.1, ..EIGHT };
-    let grid = GridOctree::<Stamps>::build_within(&shapes, &params, CellMargins { guarded, ..DERIVED });
+    let grid = <GridOctree>::build_within(&shapes, &params, CellMargins { guarded, ..DERIVED });
     for ray in rays {
         grid.closest(&[ray], &mut [Hit::MISS], &mut grid.scratch(), &mut Patience::default());
     }

@@ -21,7 +21,7 @@ use std::marker::PhantomData;
 pub use params::GridParams;
 
 use self::lattice::{CellMargins, Lattice};
-use self::mailbox::{Mailbox, Stamps};
+use self::mailbox::{AnyMailbox, Mailbox, MailboxKind};
 use self::octree::Cells;
 use super::query::{Culling, Goal, Query};
 use super::{Probe, Shapes};
@@ -34,13 +34,14 @@ const EMPTY: u32 = 0;
 
 /// The grid. `M` is the kind of mailbox.
 #[derive(Clone, Debug)]
-pub struct GridOctree<'a, M = Stamps> {
+pub struct GridOctree<'a, M = AnyMailbox> {
     shapes: &'a Shapes,
     lattice: Lattice,
     /// One entry for each top cell: a cell, or an octree's root marked [`NODE`].
     top: Vec<u32>,
     cells: Cells,
-    mailbox: PhantomData<fn() -> M>,
+    mailbox: MailboxKind,
+    scratch: PhantomData<fn() -> M>,
 }
 
 impl<'a, M: Mailbox> GridOctree<'a, M> {
@@ -49,11 +50,17 @@ impl<'a, M: Mailbox> GridOctree<'a, M> {
         Self::build_within(shapes, params, CellMargins::DERIVED)
     }
 
+    /// With another mailbox than the exact one.
+    #[must_use]
+    pub fn with_mailbox(self, mailbox: MailboxKind) -> Self {
+        Self { mailbox, ..self }
+    }
+
     /// [`Self::build`] by given margins.
     pub(super) fn build_within(shapes: &'a Shapes, params: &GridParams, margins: CellMargins) -> Self {
         let lattice = Lattice::new(shapes, params, margins);
         let (top, cells) = build::build(shapes, &lattice, params);
-        Self { shapes, lattice, top, cells, mailbox: PhantomData }
+        Self { shapes, lattice, top, cells, mailbox: MailboxKind::default(), scratch: PhantomData }
     }
 }
 
@@ -65,7 +72,7 @@ impl<M: Mailbox> Culling for GridOctree<'_, M> {
     }
 
     fn new_scratch(&self) -> M {
-        M::new(self.shapes.bounded())
+        M::new(self.mailbox, self.shapes.bounded())
     }
 
     fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, mailbox: &mut M, probe: &mut P) {

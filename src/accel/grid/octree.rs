@@ -88,6 +88,7 @@ pub(super) struct Refiner<'a> {
     shapes: &'a Shapes,
     lattice: &'a Lattice,
     step_cost: f64,
+    leaf_size: Option<u32>,
     /// How much the number of references may grow below the top cells.
     growth: f64,
     cells: Cells,
@@ -96,7 +97,8 @@ pub(super) struct Refiner<'a> {
 impl<'a> Refiner<'a> {
     pub(super) fn new(shapes: &'a Shapes, lattice: &'a Lattice, params: &GridParams, listed: usize) -> Self {
         let growth = (f64::from(shapes.bounded()) * REFERENCES + FREE_REFERENCES) / listed.max(1) as f64;
-        Self { shapes, lattice, step_cost: params.step_cost, growth, cells: Cells::new() }
+        let GridParams { step_cost, leaf_size, .. } = *params;
+        Self { shapes, lattice, step_cost, leaf_size, growth, cells: Cells::new() }
     }
 
     pub(super) fn into_cells(self) -> Cells {
@@ -141,8 +143,12 @@ impl<'a> Refiner<'a> {
     }
 
     /// A ray through a cube meets each octant with probability 1/4 (the ratio of their surfaces): expected cost of the
-    /// octants against that of the whole. It also ends splitting where octants keep nearly all prims.
+    /// octants against that of the whole. It also ends splitting where octants keep nearly all prims. With a leaf size,
+    /// being more than that is reason enough (A. Glassner, *Space Subdivision for Fast Ray Tracing*, 1984).
     fn pays(&self, prims: usize, listed: u32) -> bool {
+        if let Some(leaf_size) = self.leaf_size {
+            return prims > leaf_size as usize;
+        }
         0.25 * (8.0 * self.step_cost + f64::from(listed)) < self.step_cost + prims as f64
     }
 

@@ -1,6 +1,6 @@
 //! How fine the grid and its octrees are.
 
-/// Parameters of [`GridOctree`](super::GridOctree); the default suits meshes.
+/// Parameters of [`GridOctree`](super::GridOctree), all settled; the default suits meshes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GridParams {
     /// Cells of the top grid per prim, more than 0 and at most 64. (J. Cleary, G. Wyvill, 1988: the resolution follows
@@ -12,6 +12,9 @@ pub struct GridParams {
     pub max_depth: u32,
     /// Cost of visiting a cell in prim tests, 0.1 to 100: a cell is split when that is expected to pay.
     pub step_cost: f64,
+    /// Instead of the step cost: every cell that lists more prims is split, as deep as `max_depth` allows and as long as
+    /// the references of all cells stay a small multiple of the prims.
+    pub leaf_size: Option<u32>,
 }
 
 impl Default for GridParams {
@@ -31,11 +34,17 @@ pub struct ParamError {
 
 impl GridParams {
     /// What suits most meshes.
-    pub const DEFAULT: Self = Self { density: 0.25, max_resolution: 256, max_depth: 8, step_cost: 4.0 };
+    pub const DEFAULT: Self =
+        Self { density: 0.25, max_resolution: 256, max_depth: 8, step_cost: 4.0, leaf_size: None };
+
+    /// A grid without octrees, which has to be finer.
+    pub const UNIFORM: Self = Self { density: 4.0, max_depth: 0, ..Self::DEFAULT };
+
+    /// One cell that becomes an octree.
+    pub const OCTREE: Self = Self { max_resolution: 1, max_depth: 10, ..Self::DEFAULT };
 
     /// Whether every parameter is within its range.
     pub fn validate(&self) -> Result<(), ParamError> {
-        let check = |name, value: f64, ok: bool, range| ok.then_some(()).ok_or(ParamError { name, value, range });
         let density = self.density;
         check("grid density", density, density > 0.0 && density <= 64.0, "more than 0 and at most 64")?;
         let resolution = self.max_resolution;
@@ -44,6 +53,11 @@ impl GridParams {
         let cost = self.step_cost;
         check("step cost", cost, (0.1..=100.0).contains(&cost), "0.1 to 100")
     }
+}
+
+/// An error that names the parameter, unless it is all right.
+pub(in crate::accel) fn check(name: &'static str, value: f64, ok: bool, range: &'static str) -> Result<(), ParamError> {
+    ok.then_some(()).ok_or(ParamError { name, value, range })
 }
 
 #[cfg(test)]

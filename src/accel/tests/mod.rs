@@ -2,11 +2,12 @@
 
 mod catalogue;
 mod cones;
+mod hierarchy;
+mod mailbox;
 pub(crate) mod scenes;
 mod starts;
 mod watertight;
 
-use super::grid::mailbox::{NoMailbox, Stamps};
 use super::*;
 use crate::math::random::Random;
 use crate::math::shear::RaySpace;
@@ -14,10 +15,10 @@ use crate::math::simd::Level;
 use scenes::{all, broken_rays, rays};
 
 const PARAMS: [GridParams; 4] = [
-    GridParams { density: 0.25, max_resolution: 256, max_depth: 8, step_cost: 4.0 },
-    GridParams { density: 4.0, max_resolution: 64, max_depth: 0, step_cost: 2.0 },
-    GridParams { density: 0.01, max_resolution: 1, max_depth: 7, step_cost: 0.5 },
-    GridParams { density: 0.3, max_resolution: 4, max_depth: 10, step_cost: 1.0 },
+    GridParams { density: 0.25, max_resolution: 256, max_depth: 8, step_cost: 4.0, leaf_size: None },
+    GridParams { density: 4.0, max_resolution: 64, max_depth: 0, step_cost: 2.0, leaf_size: None },
+    GridParams { density: 0.01, max_resolution: 1, max_depth: 7, step_cost: 0.5, leaf_size: None },
+    GridParams { density: 0.3, max_resolution: 4, max_depth: 10, step_cost: 1.0, leaf_size: None },
 ];
 
 /// All hits of the three queries, as bits.
@@ -64,14 +65,28 @@ fn assert_same(what: &str, rays: &[Ray], got: &[[u32; 9]], expected: &[[u32; 9]]
 }
 
 #[test]
+fn every_kind_of_structure_agrees_with_brute_force_bit_for_bit() {
+    for (name, shapes) in all() {
+        let rays = rays(&shapes, 30);
+        let expected = answers(&Unculled::new(&shapes), &rays);
+        for kind in AccelKind::ALL {
+            let accel = AnyAccel::build(kind, &shapes, &AccelParams::DEFAULT);
+            assert!(accel.check().is_ok(), "{name}, {kind}: {:?}", accel.check());
+            let rays = if kind.is_slow() { &rays[..rays.len() / 4] } else { &rays };
+            assert_same(&format!("{name}, {kind}"), rays, &answers(&accel, rays), &expected);
+        }
+    }
+}
+
+#[test]
 fn every_grid_agrees_with_brute_force_bit_for_bit() {
     for (name, shapes) in all() {
         let rays = rays(&shapes, 40);
         let expected = answers(&Unculled::new(&shapes), &rays);
         for params in &PARAMS {
-            let grid = GridOctree::<Stamps>::build(&shapes, params);
+            let grid = <GridOctree>::build(&shapes, params);
             assert!(grid.check().is_ok(), "{name}: {:?}", grid.check());
-            let plain = GridOctree::<NoMailbox>::build(&shapes, params);
+            let plain = grid.clone().with_mailbox(MailboxKind::None);
             for got in [answers(&grid, &rays), answers(&plain, &rays)] {
                 assert_same(&format!("{name}, {params:?}"), &rays, &got, &expected);
             }
@@ -186,25 +201,6 @@ fn a_sphere_is_left_behind_where_it_was_entered() {
 }
 
 #[test]
-fn the_exact_mailbox_tests_each_prim_once_and_saves_the_rest() {
-    for (name, shapes) in all() {
-        let rays: Vec<Ray> = rays(&shapes, 30).into_iter().map(|r| Ray { exclude: NO_PRIM, ..r }).collect();
-        let params = GridParams { step_cost: 0.5, ..GridParams::default() };
-        let with = GridOctree::<Stamps>::build(&shapes, &params);
-        let without = GridOctree::<NoMailbox>::build(&shapes, &params);
-        let (mut kept, mut all_tests) = (with.scratch(), without.scratch());
-        for ray in &rays {
-            let (mut a, mut b) = (RayCounts::default(), RayCounts::default());
-            with.closest(&[*ray], &mut [Hit::MISS], &mut kept, &mut a);
-            without.closest(&[*ray], &mut [Hit::MISS], &mut all_tests, &mut b);
-            assert_eq!(a.n_it + a.n_mb, b.n_it, "{name}: tests and saved tests are the references seen");
-            assert!(a.n_it <= shapes.len() as u64, "{name}: {} tests of {} prims", a.n_it, shapes.len());
-            assert_eq!((b.n_mb, a.n_ts, a.queries), (0, b.n_ts, 1));
-        }
-    }
-}
-
-#[test]
 fn a_ray_through_empty_space_counts_cells_but_no_tests() {
     let shapes = scenes::star(24, 16);
     let grid: GridOctree = GridOctree::build(&shapes, &GridParams::default());
@@ -219,7 +215,7 @@ fn a_ray_through_empty_space_counts_cells_but_no_tests() {
 fn prims_that_cannot_be_parted_do_not_fill_the_memory() {
     let shapes = scenes::copies(3000);
     for params in &PARAMS {
-        let stats = GridOctree::<Stamps>::build(&shapes, params).summary();
+        let stats = <GridOctree>::build(&shapes, params).summary();
         assert!(stats.n_oiv <= 14 * 3000, "{stats:?}");
     }
 }
@@ -229,9 +225,8 @@ fn a_structure_does_not_depend_on_the_number_of_threads() {
     let shapes = scenes::soup(9000, 0.1);
     let build = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let grid = || format!("{:?}", GridOctree::<Stamps>::build(&shapes, &GridParams::default()));
-        let trees = || [Splitting::Octree, Splitting::SurfaceArea].map(|s| format!("{:?}", Wide::build(&shapes, s)));
-        pool.map(|p| p.install(|| grid() + &trees().concat()))
+        let built = |kind| format!("{:?}", AnyAccel::build(kind, &shapes, &AccelParams::DEFAULT));
+        pool.map(|p| p.install(|| AccelKind::ALL.map(built).concat()))
     };
     let texts = [1, 2, 7].map(|threads| build(threads).unwrap_or_default());
     assert!(!texts[0].is_empty() && texts[0] == texts[1] && texts[0] == texts[2]);

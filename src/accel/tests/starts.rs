@@ -1,7 +1,7 @@
 //! Rays that start on a surface: they neither hit what they start on nor slip through what is beside it.
 
 use super::scenes::{mesh, ray};
-use crate::accel::{Accel, AccelKind, AnyAccel, BitSet, GridParams, Hit, NoProbe, Ray, Shapes};
+use crate::accel::{Accel, AccelKind, AccelParams, AnyAccel, BitSet, Hit, NoProbe, Ray, Shapes};
 use crate::math::Vec3;
 use crate::math::random::Random;
 use crate::math::triangle;
@@ -14,7 +14,7 @@ struct Surface<'a> {
 
 impl<'a> Surface<'a> {
     fn new(shapes: &'a Shapes) -> Self {
-        Self { shapes, accel: AnyAccel::build(AccelKind::DEFAULT, shapes, &GridParams::DEFAULT) }
+        Self { shapes, accel: AnyAccel::build(AccelKind::DEFAULT, shapes, &AccelParams::DEFAULT) }
     }
 
     fn closest(&self, ray: &Ray) -> Hit {

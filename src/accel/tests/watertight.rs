@@ -88,7 +88,7 @@ fn only_the_test_that_is_not_watertight_loses_rays_at_corners() {
     let shapes = star(100, 50);
     let rays = aimed(&shapes, 10_000);
     let missed = |test| {
-        let accel = AnyAccel::build(AccelKind::DEFAULT, &shapes, &GridParams::DEFAULT).tested_by(test);
+        let accel = AnyAccel::build(AccelKind::DEFAULT, &shapes, &AccelParams::DEFAULT).tested_by(test);
         let mut hits = vec![Hit::MISS; rays.len()];
         accel.closest(&rays, &mut hits, &mut accel.scratch(), &mut NoProbe);
         hits.iter().filter(|h| !h.is_some()).count()

@@ -16,7 +16,7 @@ mod listed;
 #[cfg(test)]
 mod margins;
 mod node;
-mod split;
+pub(super) mod split;
 mod walk;
 
 pub use listed::Listed;

@@ -15,7 +15,7 @@ pub enum Splitting {
 
 /// A prim on its way into the tree.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Item {
+pub(in crate::accel) struct Item {
     pub bounds: Aabb,
     pub prim: u32,
     /// Finest octree cell of the box's middle.
@@ -24,7 +24,7 @@ pub(super) struct Item {
 
 /// A cut: items before `at` have the first box, the others the second.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Cut {
+pub(in crate::accel) struct Cut {
     pub at: usize,
     pub bounds: [Aabb; 2],
 }
@@ -50,7 +50,7 @@ pub(super) fn area(b: &Aabb) -> f32 {
 
 impl Splitting {
     /// Cuts at least two items in two, both parts not empty, and puts them in order.
-    pub(super) fn cut(self, items: &mut [Item]) -> Cut {
+    pub(in crate::accel) fn cut(self, items: &mut [Item]) -> Cut {
         let found = match self {
             Self::Octree => cut_at_dyadic_plane(items),
             Self::SurfaceArea => cut_by_area(items),

@@ -17,7 +17,7 @@ use self::tally::Tally;
 use self::variation::{Variation, Variations};
 use super::aim::{Aim, Aimer};
 use super::oracle::{Oracle, Truth};
-use crate::accel::{Accel, AccelKind, AnyAccel, GridParams, Hit, IntersectorKind, NoProbe, Ray};
+use crate::accel::{Accel, AccelKind, AccelParams, AnyAccel, Hit, IntersectorKind, NoProbe, Ray};
 use crate::scene::Scene;
 
 /// What is to be done.
@@ -148,13 +148,13 @@ fn section(variation: &Variation, plan: &Plan) -> Option<Section> {
 
     let mut rows = Vec::new();
     let mut disagreements = 0;
-    let structures = AccelKind::ALL.map(|kind| AnyAccel::build(kind, shapes, &GridParams::DEFAULT));
+    let structures = AccelKind::ALL.map(|kind| AnyAccel::build(kind, shapes, &AccelParams::DEFAULT));
     for test in IntersectorKind::ALL {
         let mut first: Vec<Vec<Hit>> = Vec::new();
-        for accel in structures.iter().rev() {
+        for accel in structures.iter().rev().filter(|a| is_judged(test, a.kind())) {
             let accel = accel.clone().tested_by(test);
             let affordable = match accel.kind() {
-                AccelKind::None => (plan.brute_tests / shapes.triangles.len().max(1) / Aim::ALL.len()).max(1),
+                kind if kind.is_slow() => (plan.brute_tests / shapes.triangles.len().max(1) / Aim::ALL.len()).max(1),
                 _ => plan.rays,
             };
             let answers: Vec<Vec<Hit>> = sets.iter().map(|rays| hits(&accel, take(rays, affordable))).collect();
@@ -172,6 +172,12 @@ fn section(variation: &Variation, plan: &Plan) -> Option<Section> {
     let spawned = spawned(shapes, &structures, &oracle, &sets, plan.seed);
     let Variation { name, amount, centred, collapsed, .. } = *variation;
     Some(Section { variation: name, amount, centred, collapsed, rows, disagreements, spawned })
+}
+
+/// The exact test is judged through every structure. The others are through the default one and without any: they may
+/// answer differently through each, and there are many.
+fn is_judged(test: IntersectorKind, kind: AccelKind) -> bool {
+    test == IntersectorKind::Exact || matches!(kind, AccelKind::DEFAULT | AccelKind::None)
 }
 
 fn take(rays: &[Ray], count: usize) -> &[Ray] {
@@ -197,7 +203,7 @@ fn costs(variation: &Variation, plan: &Plan) -> Option<Vec<Cost>> {
     let shapes = &variation.shapes;
     let mut aimer = Aimer::new(shapes, plan.seed)?;
     let rays: Vec<Ray> = Aim::ALL.iter().flat_map(|&aim| aimer.rays(aim, plan.rays)).collect();
-    let accel = AnyAccel::build(AccelKind::DEFAULT, shapes, &GridParams::DEFAULT);
+    let accel = AnyAccel::build(AccelKind::DEFAULT, shapes, &AccelParams::DEFAULT);
     let accels = IntersectorKind::ALL.map(|test| (test, accel.clone().tested_by(test)));
     let mut scratch = accel.scratch();
     let mut answers = vec![Hit::MISS; rays.len()];

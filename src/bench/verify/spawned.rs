@@ -141,13 +141,13 @@ impl Beside {
 mod tests {
     use super::*;
     use crate::accel::tests::scenes;
-    use crate::accel::{AccelKind, BitSet, GridParams};
+    use crate::accel::{AccelKind, AccelParams, BitSet};
     use crate::bench::aim::{Aim, Aimer};
 
     /// All counts for rays from hits of every aim on a closed mesh.
     fn counts(mut shapes: Shapes) -> Spawned {
         shapes.opaque = BitSet::filled(shapes.len(), true);
-        let structures = [AnyAccel::build(AccelKind::DEFAULT, &shapes, &GridParams::DEFAULT)];
+        let structures = [AnyAccel::build(AccelKind::DEFAULT, &shapes, &AccelParams::DEFAULT)];
         let mut aimer = Aimer::new(&shapes, 1).unwrap();
         let sets: Vec<_> = Aim::ALL.iter().map(|&aim| aimer.rays(aim, 400)).collect();
         spawned(&shapes, &structures, &Oracle::new(&shapes), &sets, 1)

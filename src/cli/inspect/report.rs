@@ -2,7 +2,7 @@
 
 use super::super::text::grouped;
 use super::topology::Topology;
-use crate::accel::{AccelKind, AnyAccel, GridParams};
+use crate::accel::{AccelKind, AccelParams, AnyAccel};
 use crate::load::Loaded;
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
 use crate::render::World;
@@ -33,7 +33,7 @@ impl<'a> Report<'a> {
     pub(super) fn new(file: &'a Path, loaded: &'a Loaded) -> Self {
         let scene = &loaded.scene;
         let world = World::new(scene);
-        let structure = AnyAccel::build(AccelKind::default(), &world.shapes, &GridParams::default()).summary();
+        let structure = AnyAccel::build(AccelKind::default(), &world.shapes, &AccelParams::DEFAULT).summary();
         Self {
             file,
             loaded,

@@ -57,7 +57,7 @@ fn every_structure_gives_the_same_bits() {
 fn counting_changes_no_bit() {
     let s = busy();
     let world = World::new(&s.scene);
-    let accel = AnyAccel::build(AccelKind::None, &world.shapes, &GridParams::default());
+    let accel = AnyAccel::build(AccelKind::None, &world.shapes, &AccelParams::DEFAULT);
     let textures = TextureStore::new(&s.scene);
     let job = Job {
         scene: &s.scene,

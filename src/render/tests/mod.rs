@@ -10,7 +10,7 @@ mod sight;
 use super::texture::TextureStore;
 use super::view::{Lens, View};
 use super::{Job, Rendered, Settings, World, render_counted};
-use crate::accel::{AccelKind, AnyAccel, GridParams};
+use crate::accel::{AccelKind, AccelParams, AnyAccel};
 use crate::math::{DAffine3, DVec3, Vec3};
 use crate::scene::{
     Falloff, Instance, Light, LightKind, Material, Mesh, Phong, Plane, Scene, Sphere, Surface as Reflection,
@@ -90,7 +90,7 @@ impl Stage {
 
     fn render_by(&self, kind: AccelKind) -> Rendered {
         let world = World::new(&self.scene);
-        let accel = AnyAccel::build(kind, &world.shapes, &GridParams::default());
+        let accel = AnyAccel::build(kind, &world.shapes, &AccelParams::DEFAULT);
         let textures = TextureStore::new(&self.scene);
         let job = Job {
             scene: &self.scene,

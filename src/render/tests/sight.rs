@@ -68,7 +68,7 @@ fn a_cancelled_picture_says_that_it_is_not_complete() {
     }
     let s = bumpy();
     let world = World::new(&s.scene);
-    let accel = AnyAccel::build(AccelKind::None, &world.shapes, &GridParams::default());
+    let accel = AnyAccel::build(AccelKind::None, &world.shapes, &AccelParams::DEFAULT);
     let textures = TextureStore::new(&s.scene);
     let settings = Settings { width: 64, height: 64, ..s.settings.clone() };
     let job =

@@ -3,7 +3,6 @@
 
 use super::super::scenes::{all, huge_and_tiny, lattice, mesh, mix, moved, ray, rays, soup, star};
 use super::*;
-use crate::accel::grid::mailbox::Stamps;
 use crate::accel::grid::margins::{EIGHT, WIDTH, faces_between_cells, plane};
 use crate::math::random::Random;
 
@@ -119,7 +118,7 @@ fn a_face_between_cells_is_hit_from_both_sides_and_by_ranges_that_end_on_it() {
 #[test]
 fn a_face_just_beside_a_plane_between_cells_is_listed_on_both_sides() {
     let mut shapes = square_between_cells();
-    let listed = |shapes: &Shapes| GridOctree::<Stamps>::build(shapes, &EIGHT).summary().n_oiv;
+    let listed = |shapes: &Shapes| <GridOctree>::build(shapes, &EIGHT).summary().n_oiv;
     let both = listed(&shapes);
     let shift =
         |shapes: &mut Shapes, by: f32| shapes.vertices[6..].iter_mut().for_each(|v| v.x = plane(4) + by * WIDTH);

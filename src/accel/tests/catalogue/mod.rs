@@ -29,7 +29,7 @@ fn count(short: usize, long: usize) -> usize {
 /// Calls `check` with every structure over the shapes.
 fn with_every_kind(shapes: &Shapes, mut check: impl FnMut(AccelKind, &AnyAccel)) {
     for kind in AccelKind::ALL {
-        check(kind, &AnyAccel::build(kind, shapes, &GridParams::DEFAULT));
+        check(kind, &AnyAccel::build(kind, shapes, &AccelParams::DEFAULT));
     }
 }
 

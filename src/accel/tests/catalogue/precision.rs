@@ -155,7 +155,7 @@ fn tests_in_double_precision_hit_the_same_prims_away_from_edges() {
     let rays: Vec<Ray> = (0..count(4000, 4_000_000)).map(|_| towards(r.direction() * 3.0, r.cube())).collect();
     let [exact, others @ ..] =
         [IntersectorKind::Exact, IntersectorKind::WatertightDouble, IntersectorKind::MollerTrumboreDouble].map(
-            |test| closest(&AnyAccel::build(AccelKind::DEFAULT, &shapes, &GridParams::DEFAULT).tested_by(test), &rays),
+            |test| closest(&AnyAccel::build(AccelKind::DEFAULT, &shapes, &AccelParams::DEFAULT).tested_by(test), &rays),
         );
     for other in others {
         for ((ray, a), b) in rays.iter().zip(&exact).zip(&other) {

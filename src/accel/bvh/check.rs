@@ -1,0 +1,52 @@
+//! Proof that a built hierarchy can lose no hit, and its sizes.
+
+use super::Bvh;
+use super::tree::Below;
+use crate::accel::StructureStats;
+use crate::math::aabb::Aabb;
+
+impl Bvh<'_> {
+    /// Sizes, counted by visiting every node. Cells are leaves.
+    pub fn summary(&self) -> StructureStats {
+        let mut stats = StructureStats { bytes: self.tree.bytes() as u64, ..StructureStats::default() };
+        if self.shapes.bounded() > 0 {
+            self.tree.each(0, 0, &mut |_, depth, below| match below {
+                Below::Children(_) => stats.n_in += 1,
+                Below::Leaf(prims) => {
+                    stats.n_v += 1;
+                    stats.n_oiv += prims.len() as u64;
+                    stats.depth = stats.depth.max(depth);
+                }
+            });
+        }
+        stats
+    }
+
+    /// Visits everything: each bounded prim is in one leaf, and the box of every node holds all that is below it.
+    pub fn check(&self) -> Result<StructureStats, String> {
+        let mut leaves = vec![0u32; self.shapes.bounded() as usize];
+        let mut failure = None;
+        if self.shapes.bounded() > 0 {
+            self.tree.each(0, 0, &mut |node, _, below| {
+                let content = match below {
+                    Below::Children(children) => {
+                        children.into_iter().fold(Aabb::EMPTY, |b, c| b.union(*self.tree.bounds(c)))
+                    }
+                    Below::Leaf(prims) => prims.iter().fold(Aabb::EMPTY, |b, &p| {
+                        leaves[p as usize] += 1;
+                        b.union(self.shapes.bounds(p))
+                    }),
+                };
+                let bounds = *self.tree.bounds(node);
+                if bounds.union(content) != bounds {
+                    failure = Some(format!("node {node} is {bounds:?}, below it is {content:?}"));
+                }
+            });
+        }
+        match (failure, leaves.iter().position(|&n| n != 1)) {
+            (Some(message), _) => Err(message),
+            (None, Some(prim)) => Err(format!("prim {prim} is in {} leaves", leaves[prim])),
+            (None, None) => Ok(self.summary()),
+        }
+    }
+}

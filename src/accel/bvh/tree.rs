@@ -1,0 +1,168 @@
+//! Nodes as one flat array, from the root down, and the way of a ray through them.
+
+use super::super::query::{Goal, Query};
+use super::super::slabs::{BoxRay, limit};
+use super::super::wide::Splitting;
+use super::super::wide::split::Item;
+use crate::accel::Probe;
+use crate::math::aabb::Aabb;
+
+/// Prims that are worth a thread's while.
+const PARALLEL: usize = 4096;
+
+/// A box and what is in it.
+#[derive(Clone, Copy, Debug)]
+pub struct Node {
+    /// Holds everything below.
+    pub bounds: Aabb,
+    /// Of a leaf the first of its prims; of another node its second child, the first follows the node itself.
+    at: u32,
+    /// Prims of a leaf, at least 1; 0: no leaf.
+    count: u32,
+}
+
+/// What a node leads to.
+#[derive(Clone, Copy, Debug)]
+pub enum Below<'a> {
+    /// The prims of a leaf.
+    Leaf(&'a [u32]),
+    /// Two nodes.
+    Children([u32; 2]),
+}
+
+/// A tree, or several of them in a row.
+#[derive(Clone, Debug, Default)]
+pub struct Tree {
+    nodes: Vec<Node>,
+    prims: Vec<u32>,
+}
+
+/// Nodes still to be visited with the distances at which the ray enters them, the nearest last.
+#[derive(Clone, Debug, Default)]
+pub struct Stack(Vec<(f64, u32)>);
+
+impl Tree {
+    /// Adds the tree over some prims, at least one; its root. The same for every number of threads.
+    pub(in crate::accel) fn add(&mut self, items: &mut [Item], leaf_size: usize) -> u32 {
+        let root = index(self.nodes.len());
+        let bounds = items.iter().fold(Aabb::EMPTY, |b, i| b.union(i.bounds));
+        self.grow(items, bounds, leaf_size.max(1));
+        root
+    }
+
+    fn grow(&mut self, items: &mut [Item], bounds: Aabb, leaf_size: usize) {
+        let node = self.nodes.len();
+        if items.len() <= leaf_size {
+            let first = index(self.prims.len());
+            self.prims.extend(items.iter().map(|i| i.prim));
+            self.prims[first as usize..].sort_unstable();
+            self.nodes.push(Node { bounds, at: first, count: index(items.len()) });
+            return;
+        }
+        self.nodes.push(Node { bounds, at: 0, count: 0 });
+        let large = items.len() > PARALLEL;
+        let cut = Splitting::SurfaceArea.cut(items);
+        let [first, second] = cut.bounds;
+        let (left, right) = items.split_at_mut(cut.at);
+        if large {
+            let build = |items: &mut [Item], bounds| {
+                let mut tree = Self::default();
+                tree.grow(items, bounds, leaf_size);
+                tree
+            };
+            let (left, right) = rayon::join(|| build(left, first), || build(right, second));
+            self.append(left);
+            self.nodes[node].at = index(self.nodes.len());
+            self.append(right);
+        } else {
+            self.grow(left, first, leaf_size);
+            self.nodes[node].at = index(self.nodes.len());
+            self.grow(right, second, leaf_size);
+        }
+    }
+
+    /// Adds all nodes of another; how far they moved.
+    pub(in crate::accel) fn append(&mut self, part: Self) -> u32 {
+        let (nodes, prims) = (index(self.nodes.len()), index(self.prims.len()));
+        let moved = |n: Node| Node { at: n.at + if n.count == 0 { nodes } else { prims }, ..n };
+        self.nodes.extend(part.nodes.into_iter().map(moved));
+        self.prims.extend(part.prims);
+        nodes
+    }
+
+    /// The box of a node.
+    pub fn bounds(&self, node: u32) -> &Aabb {
+        &self.nodes[node as usize].bounds
+    }
+
+    /// What is below a node.
+    #[inline]
+    pub fn below(&self, node: u32) -> Below<'_> {
+        let Node { at, count, .. } = self.nodes[node as usize];
+        match count {
+            0 => Below::Children([node + 1, at]),
+            _ => Below::Leaf(&self.prims[at as usize..(at + count) as usize]),
+        }
+    }
+
+    /// Bytes of the arrays.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.nodes) + size_of_val(&*self.prims)
+    }
+
+    /// Calls `found` with each node below one, itself included, and its depth below that.
+    pub fn each<'t>(&'t self, node: u32, depth: u32, found: &mut impl FnMut(u32, u32, Below<'t>)) {
+        let below = self.below(node);
+        found(node, depth, below);
+        if let Below::Children(children) = below {
+            children.into_iter().for_each(|child| self.each(child, depth + 1, found));
+        }
+    }
+
+    /// Leads a ray from a root to the leaves whose boxes it enters, nearer ones first; whether `visit`, which tests the
+    /// prims of a leaf, answered the query.
+    #[inline]
+    pub fn walk<G: Goal, P: Probe>(
+        &self,
+        root: u32,
+        ray: &BoxRay,
+        query: &mut Query<G>,
+        Stack(stack): &mut Stack,
+        probe: &mut P,
+        mut visit: impl FnMut(&[u32], &mut Query<G>, &mut P) -> bool,
+    ) -> bool {
+        let mut end = limit(query);
+        stack.clear();
+        probe.volume_tests(1);
+        stack.extend(ray.enters(self.bounds(root), end).map(|near| (near, root)));
+        while let Some((near, node)) = stack.pop() {
+            if near > end {
+                continue;
+            }
+            probe.step();
+            match self.below(node) {
+                Below::Leaf(prims) => {
+                    probe.cell(false);
+                    if visit(prims, query, probe) {
+                        return true;
+                    }
+                    end = limit(query);
+                }
+                Below::Children([first, second]) => {
+                    probe.volume_tests(2);
+                    let near = |child| ray.enters(self.bounds(child), end).map(|near| (near, child));
+                    match (near(first), near(second)) {
+                        (Some(a), Some(b)) => stack.extend(if a.0 <= b.0 { [b, a] } else { [a, b] }),
+                        (a, b) => stack.extend(a.or(b)),
+                    }
+                }
+            }
+        }
+        false
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "nodes and references are fewer than 2³²")]
+fn index(i: usize) -> u32 {
+    i as u32
+}
