@@ -1,6 +1,15 @@
-//! Measures and compares, and prints nothing: rays that are hard on a mesh, exact answers, and what came out.
+//! Measures and compares, and prints nothing: rays that are hard on a mesh, exact answers, and what came out; the rays of
+//! a real picture through every structure, and what they cost there.
 
 pub mod aim;
+pub mod clock;
+pub mod compare;
+pub mod machine;
 pub mod oracle;
+pub mod rays;
+pub mod replay;
+pub mod report;
 pub mod star;
+#[cfg(test)]
+mod tests;
 pub mod verify;

@@ -36,6 +36,8 @@ pub(super) enum Command {
     Inspect(InspectArgs),
     /// Judge how far a mesh's hits can be trusted: rays aimed at what is hard, against exact arithmetic
     Verify(VerifyArgs),
+    /// Compare structures on a model: the same rays through each, whether the hits are the same, what they cost
+    Bench(Box<BenchArgs>),
     /// Print a completion script for a shell
     Completions {
         /// The shell
@@ -258,12 +260,83 @@ pub(super) struct VerifyArgs {
     pub quiet: bool,
 }
 
+/// What `meshray bench` was given.
+#[derive(Debug, Clone, Args)]
+pub(super) struct BenchArgs {
+    /// Models or scene files, one after the other
+    #[arg(value_name = "FILE", required = true)]
+    pub inputs: Vec<PathBuf>,
+    /// How to load them.
+    #[command(flatten)]
+    pub load: LoadArgs,
+
+    /// Structures to compare, such as `grid-octree,fast-bvh` [default: all]
+    #[arg(long, value_name = "NAMES", value_parser = parse::accel(), value_delimiter = ',', help_heading = "Structure")]
+    pub accel: Vec<AccelKind>,
+    /// Parameters of the structures
+    #[command(flatten)]
+    pub params: AccelArgs,
+
+    /// Columns and rows of the picture whose rays are recorded
+    #[arg(long, value_name = "WxH", value_parser = parse::size, default_value = "256x192", help_heading = "Rays")]
+    pub size: (u32, u32),
+    /// Rays a pixel
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536), default_value_t = 1,
+          help_heading = "Rays")]
+    pub samples: u32,
+    /// Bounces after the eye ray [default: what the scene needs]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=64), help_heading = "Rays")]
+    pub depth: Option<u32>,
+    /// Side of the model
+    #[arg(long, value_name = "NAME", value_parser = parse::view(), help_heading = "Rays", conflicts_with_all = ["camera", "eye"])]
+    pub view: Option<NamedView>,
+    /// A camera of the file, by name or number from 0
+    #[arg(long, value_name = "NAME", help_heading = "Rays", conflicts_with = "eye")]
+    pub camera: Option<String>,
+    /// Camera position
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::vec3, help_heading = "Rays", allow_hyphen_values = true)]
+    pub eye: Option<[f64; 3]>,
+    /// Point the camera looks at [default: middle of the model]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::vec3, help_heading = "Rays", allow_hyphen_values = true, requires = "eye")]
+    pub at: Option<[f64; 3]>,
+    /// Rays of each class at most; of more an even sample is taken
+    #[arg(long, value_name = "N", default_value_t = crate::bench::compare::Plan::RAYS, value_parser = parse::positive, help_heading = "Rays")]
+    pub rays: usize,
+    /// Other numbers give other diffuse rays and samples
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Rays")]
+    pub seed: u64,
+
+    /// Timed passes; 0: counts only, which are the same on every machine
+    #[arg(long, value_name = "N", default_value_t = crate::bench::compare::Plan::PASSES, help_heading = "Run")]
+    pub passes: usize,
+    /// Threads that build and trace
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Run")]
+    pub threads: u16,
+    /// Ray/prim tests of each class that a slow structure may take in a pass; it gets as few rays as that allows
+    #[arg(long, value_name = "N", default_value_t = crate::bench::compare::Plan::SLOW_TESTS, help_heading = "Run")]
+    pub slow_tests: u64,
+    /// Write a report too, after each structure; what kind the ending says: json, csv, md, html
+    #[arg(long, value_name = "PATH", action = ArgAction::Append, help_heading = "Run")]
+    pub report: Vec<PathBuf>,
+    /// Only the tables, warnings and errors
+    #[arg(short, long, help_heading = "Run")]
+    pub quiet: bool,
+}
+
 /// One model and how to load it.
 #[derive(Debug, Clone, Args)]
 pub(super) struct ModelArgs {
     /// A model or scene file; `-` reads standard input
     #[arg(value_name = "FILE")]
     pub input: PathBuf,
+    /// How.
+    #[command(flatten)]
+    pub load: LoadArgs,
+}
+
+/// How to load a model that is not rendered.
+#[derive(Debug, Clone, Args)]
+pub(super) struct LoadArgs {
     /// Which scene of a glTF file, by name or number from 0
     #[arg(long, value_name = "NAME")]
     pub scene: Option<String>,

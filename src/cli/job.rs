@@ -306,7 +306,8 @@ fn look(args: &RenderArgs) -> Look {
     }
 }
 
-fn params(args: &AccelArgs) -> Result<AccelParams, Wrong> {
+/// The parameters of structures, checked.
+pub(super) fn params(args: &AccelArgs) -> Result<AccelParams, Wrong> {
     let params = AccelParams {
         density: args.grid_density,
         max_resolution: args.grid_resolution,

@@ -6,6 +6,7 @@
 mod accident;
 mod again;
 mod args;
+mod bench;
 mod camera;
 mod exit;
 mod inspect;
@@ -48,6 +49,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
     match cli.command {
         Command::Render(args) => render_command(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Bench(args) => bench::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Completions { shell } => shell::completions(shell),
         Command::Man => shell::man(),

@@ -1,6 +1,6 @@
 //! Inputs -> one scene, from files or standard input.
 
-use super::args::ModelArgs;
+use super::args::{LoadArgs, ModelArgs};
 use super::exit::Exit;
 use super::job;
 use super::message::{Messages, Severity};
@@ -31,6 +31,11 @@ pub(super) fn scene(inputs: &[PathBuf], options: &LoadOptions) -> Result<Loaded,
 
 /// Loads one model and says what there is to warn of; a failure is said too.
 pub(super) fn model(args: &ModelArgs, messages: &Messages) -> Result<Loaded, Exit> {
+    one_model(&args.input, &args.load, messages)
+}
+
+/// The same for a command that takes several.
+pub(super) fn one_model(input: &PathBuf, args: &LoadArgs, messages: &Messages) -> Result<Loaded, Exit> {
     let options = LoadOptions {
         root: args.root.clone(),
         limits: job::limits(args.max_memory),
@@ -39,7 +44,7 @@ pub(super) fn model(args: &ModelArgs, messages: &Messages) -> Result<Loaded, Exi
         scene: args.scene.clone(),
         up: args.up.map(Into::into),
     };
-    let loaded = scene(slice::from_ref(&args.input), &options).map_err(|error| {
+    let loaded = scene(slice::from_ref(input), &options).map_err(|error| {
         messages.load_error(&error);
         exit_of(&error)
     })?;

@@ -1,7 +1,8 @@
 //! Asking a structure what rays hit, in slices, so that a user who gives up need not wait for a whole wave.
 
 use super::Progress;
-use crate::accel::{Accel, Hit, Probe, Ray};
+use super::observer::{Observer, Question};
+use crate::accel::{Accel, Hit, Ray};
 
 /// Rays asked of the structure at once: enough for packets, few enough for brute force over a large scene to stop within
 /// a second.
@@ -22,31 +23,34 @@ impl<'a, A: Accel> Asking<'a, A> {
     }
 
     /// The first hit of each ray.
-    pub(crate) fn closest<P: Probe>(&mut self, rays: &[Ray], hits: &mut [Hit], probe: &mut P) {
+    pub(crate) fn closest<P: Observer>(&mut self, rays: &[Ray], hits: &mut [Hit], probe: &mut P) {
         for (rays, hits) in rays.chunks(SLICE).zip(hits.chunks_mut(SLICE)) {
             if self.gives_up() {
                 return;
             }
+            probe.asked(Question::Closest, rays, &[]);
             self.accel.closest(rays, hits, &mut self.scratch, probe);
         }
     }
 
     /// Whether anything opaque is hit by each ray.
-    pub(crate) fn occluded<P: Probe>(&mut self, rays: &[Ray], blocked: &mut [bool], probe: &mut P) {
+    pub(crate) fn occluded<P: Observer>(&mut self, rays: &[Ray], blocked: &mut [bool], probe: &mut P) {
         for (rays, blocked) in rays.chunks(SLICE).zip(blocked.chunks_mut(SLICE)) {
             if self.gives_up() {
                 return;
             }
+            probe.asked(Question::Occluded, rays, &[]);
             self.accel.occluded(rays, blocked, &mut self.scratch, probe);
         }
     }
 
     /// The first hit of each ray behind `after`.
-    pub(crate) fn next<P: Probe>(&mut self, rays: &[Ray], after: &[Hit], hits: &mut [Hit], probe: &mut P) {
+    pub(crate) fn next<P: Observer>(&mut self, rays: &[Ray], after: &[Hit], hits: &mut [Hit], probe: &mut P) {
         for ((rays, after), hits) in rays.chunks(SLICE).zip(after.chunks(SLICE)).zip(hits.chunks_mut(SLICE)) {
             if self.gives_up() {
                 return;
             }
+            probe.asked(Question::Next, rays, after);
             self.accel.next(rays, after, hits, &mut self.scratch, probe);
         }
     }

@@ -11,6 +11,7 @@
 mod asking;
 mod context;
 mod layers;
+mod observer;
 pub mod optics;
 mod pixel;
 mod seam;
@@ -27,13 +28,15 @@ mod wave;
 mod whitted;
 pub mod world;
 
+pub use observer::{Asked, Question, Tape};
 pub use view::View;
 pub use world::{PrimSource, World};
 
-use crate::accel::{AnyAccel, NoProbe, Probe, RayCounts};
+use crate::accel::{AnyAccel, NoProbe, RayCounts};
 use crate::image::Picture;
 use crate::scene::Scene;
 use context::Context;
+use observer::Observer;
 use texture::TextureStore;
 use whitted::ByClass;
 
@@ -138,7 +141,36 @@ pub fn render_counted(job: &Job, progress: &dyn Progress) -> Rendered {
     rendered
 }
 
-fn render_with<P: Probe>(job: &Job, progress: &dyn Progress) -> (Rendered, Vec<ByClass<P>>) {
+/// Renders on one thread and keeps the rays: of each class at most [`Tape::LIMIT`] for each question. `None` when a thread
+/// cannot be started or the rendering was cancelled.
+pub fn render_recorded(job: &Job, progress: &dyn Progress) -> Option<(Rendered, Recording)> {
+    // One thread takes the tiles in order, so that the rays come in the same order in every run.
+    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().ok()?;
+    let (rendered, mut tapes) = alone.install(|| render_with::<Tape>(job, progress));
+    let tapes = tapes.pop().filter(|_| rendered.complete)?;
+    let ByClass { primary, shadow, reflected, refracted } = tapes;
+    let mut recording = Recording { primary, shadow, reflected, refracted };
+    let batches = tile::batches(job.settings);
+    for tape in [&mut recording.primary, &mut recording.shadow, &mut recording.reflected, &mut recording.refracted] {
+        tape.name_pixels(&batches);
+    }
+    Some((rendered, recording))
+}
+
+/// The rays of a rendering, by class; the `sample` of each is its pixel, counted row by row.
+#[derive(Clone, Debug, Default)]
+pub struct Recording {
+    /// From the eye.
+    pub primary: Tape,
+    /// To the lights.
+    pub shadow: Tape,
+    /// Reflected.
+    pub reflected: Tape,
+    /// Refracted or passed through.
+    pub refracted: Tape,
+}
+
+fn render_with<P: Observer>(job: &Job, progress: &dyn Progress) -> (Rendered, Vec<ByClass<P>>) {
     let settings = job.settings;
     let context = Context::new(job.scene, job.world, job.textures, settings.depth, settings.cutoff);
     let (picture, counts, complete) = tile::render_tiles(&context, job.accel, job.view, settings, progress);

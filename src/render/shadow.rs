@@ -2,10 +2,11 @@
 
 use super::asking::Asking;
 use super::context::Context;
+use super::observer::Observer;
 use super::seam::is_same_crossing;
 use super::shade::{Reader, shadow_filter};
 use super::surface::{Footprint, Target};
-use crate::accel::{Accel, Hit, Probe, Ray};
+use crate::accel::{Accel, Hit, Ray};
 use crate::math::Vec3;
 
 /// Shadow rays that wait, each with the light it lets through. Buffers of one worker.
@@ -38,7 +39,7 @@ impl Shadows {
     }
 
     /// Traces all rays and hands what arrives to `arrive`, as (sample, light) in an order that is always the same.
-    pub(crate) fn trace<A: Accel, P: Probe>(
+    pub(crate) fn trace<A: Accel, P: Observer>(
         &mut self,
         context: &Context,
         asking: &mut Asking<A>,

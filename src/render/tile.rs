@@ -5,12 +5,13 @@
 
 use super::context::Context;
 use super::layers::{self, Facts, LayerPixel};
+use super::observer::Observer;
 use super::pixel::sample_offsets;
 use super::view::View;
 use super::wave::{Media, Path};
 use super::whitted::{ByClass, Sample, Tracer, WAVE_LIMIT};
 use super::{Progress, Settings};
-use crate::accel::{Accel, NO_PRIM, Probe, Ray};
+use crate::accel::{Accel, NO_PRIM, Ray};
 use crate::image::Picture;
 use crate::math::{DVec3, Vec3};
 use crate::scene::Background;
@@ -56,7 +57,7 @@ struct Ball {
 }
 
 /// Renders every tile; the picture, the counts of all threads, and whether nothing was cut short by the user.
-pub(crate) fn render_tiles<A: Accel, P: Probe>(
+pub(crate) fn render_tiles<A: Accel, P: Observer>(
     context: &Context,
     accel: &A,
     view: &View,
@@ -89,6 +90,24 @@ pub(crate) fn render_tiles<A: Accel, P: Probe>(
         counts.push(counted);
     }
     (picture, counts, complete == tiles.len())
+}
+
+/// Pixels whose samples are traced together at most.
+fn batch_pixels(samples: usize) -> usize {
+    (WAVE_LIMIT / samples).max(1)
+}
+
+/// The pixel (row by row, from 0) of each sample of each batch, in the order in which a single thread renders them.
+pub(crate) fn batches(settings: &Settings) -> Vec<Vec<u32>> {
+    let samples = sample_offsets(settings.samples).len();
+    let mut batches = Vec::new();
+    for tile in tiles(settings.width, settings.height) {
+        let places = (tile.y0..tile.y1).flat_map(|y| (tile.x0..tile.x1).map(move |x| y * settings.width + x));
+        let places: Vec<u32> = places.collect();
+        let repeat = |run: &[u32]| run.iter().flat_map(|&pixel| std::iter::repeat_n(pixel, samples)).collect();
+        batches.extend(places.chunks(batch_pixels(samples)).map(repeat));
+    }
+    batches
 }
 
 fn tiles(width: u32, height: u32) -> Vec<Tile> {
@@ -139,13 +158,13 @@ impl<'a> Frame<'a> {
     }
 
     /// Renders one tile; `None` when cancelled.
-    fn render<A: Accel, P: Probe>(&self, tracer: &mut Tracer<A, P>, tile: Tile) -> Option<TilePixels> {
+    fn render<A: Accel, P: Observer>(&self, tracer: &mut Tracer<A, P>, tile: Tile) -> Option<TilePixels> {
         let places: Vec<_> = (tile.y0..tile.y1).flat_map(|y| (tile.x0..tile.x1).map(move |x| (x, y))).collect();
         let mut done = TilePixels { tile, beauty: Vec::with_capacity(places.len()), layers: Vec::new() };
         let per_pixel = self.offsets.len();
 
         // All samples of a pixel are traced together, and of as many pixels as fit a wave.
-        for places in places.chunks((WAVE_LIMIT / per_pixel).max(1)) {
+        for places in places.chunks(batch_pixels(per_pixel)) {
             tracer.reset(places.len() * per_pixel, self.settings.layers);
             let corners = places.iter().flat_map(|&(x, y)| self.offsets.iter().map(move |&(dx, dy)| (x, y, dx, dy)));
             for (sample, (x, y, dx, dy)) in (0u32..).zip(corners) {

@@ -11,13 +11,14 @@ use super::Progress;
 use super::asking::Asking;
 use super::context::{Context, coverage};
 use super::layers::Facts;
+use super::observer::Observer;
 use super::optics::{dispersed_index, reflect, refract};
 use super::seam::is_same_crossing;
 use super::shade::{Matter, Reader, above, lets_light_in, terminator};
 use super::shadow::Shadows;
 use super::surface::{Surface, Target};
 use super::wave::{Crossing, Medium, Path, Queue, RayClass, Wave};
-use crate::accel::{Accel, Hit, Probe, Ray};
+use crate::accel::{Accel, Hit, Ray};
 use crate::math::{DVec3, Vec3};
 
 /// Rays traced together at most; bounds the memory of a worker.
@@ -45,6 +46,11 @@ pub(crate) struct ByClass<P> {
 }
 
 impl<P> ByClass<P> {
+    /// All of them, in the order of the fields.
+    pub(crate) fn each_mut(&mut self) -> [&mut P; 4] {
+        [&mut self.primary, &mut self.shadow, &mut self.reflected, &mut self.refracted]
+    }
+
     fn of(&mut self, class: RayClass) -> &mut P {
         match class {
             RayClass::Primary => &mut self.primary,
@@ -70,7 +76,7 @@ pub(crate) struct Tracer<'a, A: Accel, P> {
     pub counts: ByClass<P>,
 }
 
-impl<'a, A: Accel, P: Probe> Tracer<'a, A, P> {
+impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     pub(crate) fn new(context: &'a Context<'a>, accel: &'a A, progress: &'a dyn Progress) -> Self {
         Self {
             context,
@@ -92,6 +98,7 @@ impl<'a, A: Accel, P: Probe> Tracer<'a, A, P> {
 
     /// Prepares for `samples` samples, whose eye rays [`Self::start`] adds.
     pub(crate) fn reset(&mut self, samples: usize, facts: bool) {
+        self.counts.each_mut().into_iter().for_each(Observer::batch);
         self.starting.iter_mut().chain(&mut self.continuing).for_each(Queue::clear);
         self.shadows.clear();
         self.samples.clear();

@@ -75,3 +75,23 @@ fn verify_needs_triangles() {
     folder.run(&["verify", "ball.toml"]).ends(3).says(&["ball.toml", "no triangles"]);
     folder.run(&["verify", "ball.toml", "--rays", "0"]).ends(2).says(&["from 1"]);
 }
+
+#[test]
+fn bench_compares_structures_and_writes_reports() {
+    let folder = Folder::with_cube();
+    let words = ["bench", "cube.obj", "--size", "16x12", "--passes", "1", "--accel", "none,fast-bvh", "-q"];
+    let run = folder.run(&[&words[..], &["--report", "r.json", "--report", "r.csv"]].concat()).ends(0);
+    assert!(run.text().contains("hits identical, bit for bit, in all 2 structures") && run.errors().is_empty());
+    let report: Value = serde_json::from_slice(&folder.read("r.json")).unwrap();
+    assert_eq!((&report["schema"], &report["complete"]), (&"meshray-bench/1".into(), &true.into()));
+    assert_eq!(report["models"][0]["structures"][1]["accel"], "fast-bvh");
+    assert_eq!(folder.read("r.csv").iter().filter(|b| **b == b'\n').count(), 1 + 2 * 3);
+}
+
+#[test]
+fn bench_says_what_it_cannot_do() {
+    let folder = Folder::with_cube();
+    folder.run(&["bench", "cube.obj", "--report", "r.txt"]).ends(2).says(&["r.txt", ".json"]);
+    folder.run(&["bench", "cube.obj", "--accel", "none,none"]).ends(2).says(&["none twice"]);
+    folder.run(&["bench", "gone.obj"]).ends(1).says(&["gone.obj"]);
+}

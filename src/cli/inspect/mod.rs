@@ -19,7 +19,7 @@ use super::{accident, print, read};
 
 /// Loads the file and prints what was found.
 pub(super) fn run(args: &InspectArgs) -> Exit {
-    let messages = Messages::new(args.model.messages.into(), false);
+    let messages = Messages::new(args.model.load.messages.into(), false);
     accident::guard(&args.model.input.display().to_string(), &messages, || inspect(args, &messages))
 }
 

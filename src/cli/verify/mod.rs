@@ -18,7 +18,7 @@ use crate::bench::verify::{Plan, verify};
 
 /// Loads the file, judges it and prints what was found.
 pub(super) fn run(args: &VerifyArgs) -> Exit {
-    let messages = Messages::new(args.model.messages.into(), args.quiet);
+    let messages = Messages::new(args.model.load.messages.into(), args.quiet);
     accident::guard(&args.model.input.display().to_string(), &messages, || judge(args, &messages))
 }
 

@@ -1,0 +1,74 @@
+//! Times that are measured several times, and how far they spread.
+
+use std::time::Instant;
+
+/// Values of one quantity from several passes; seconds unless said otherwise.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Spread(Vec<f64>);
+
+impl Spread {
+    /// Adds a pass.
+    pub fn push(&mut self, value: f64) {
+        let place = self.0.partition_point(|&v| v < value);
+        self.0.insert(place, value);
+    }
+
+    /// How many passes there were.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Whether nothing was measured.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The middle value (of the two middle ones, their mean); NaN when nothing was measured.
+    pub fn median(&self) -> f64 {
+        match self.0.len() {
+            0 => f64::NAN,
+            n => 0.5 * (self.0[(n - 1) / 2] + self.0[n / 2]),
+        }
+    }
+
+    /// The least value; NaN when nothing was measured.
+    pub fn min(&self) -> f64 {
+        self.0.first().copied().unwrap_or(f64::NAN)
+    }
+
+    /// The largest value; NaN when nothing was measured.
+    pub fn max(&self) -> f64 {
+        self.0.last().copied().unwrap_or(f64::NAN)
+    }
+
+    /// Each value as `f` of it.
+    #[must_use]
+    pub fn map(&self, f: impl Fn(f64) -> f64) -> Self {
+        let mut mapped = Self::default();
+        self.0.iter().for_each(|&v| mapped.push(f(v)));
+        mapped
+    }
+}
+
+/// Does `work` and tells how many seconds it took.
+pub fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let start = Instant::now();
+    let result = work();
+    (result, start.elapsed().as_secs_f64())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_middle_of_the_passes_is_their_median() {
+        let mut spread = Spread::default();
+        assert!(spread.median().is_nan());
+        [5.0, 1.0, 9.0].into_iter().for_each(|v| spread.push(v));
+        assert_eq!([spread.min(), spread.median(), spread.max()], [1.0, 5.0, 9.0]);
+        spread.push(6.0);
+        assert_eq!(spread.median(), 5.5);
+        assert_eq!([spread.map(|v| -v).min(), spread.map(|v| -v).median()], [-9.0, -5.5]);
+    }
+}

@@ -1,0 +1,309 @@
+//! The same rays through every structure: are the hits the same, what did they cost.
+//!
+//! Counts and times come from separate passes: a timed pass carries no counters. The passes of all structures are
+//! interleaved, so that what disturbs the machine for a while disturbs all of them.
+
+use super::clock::{Spread, timed};
+use super::rays::{Batch, Class, RaySet};
+use super::replay::{Answer, answers, counted, seconds};
+use crate::accel::{Accel, AccelKind, AccelParams, AnyAccel, RayCounts, Shapes, StructureStats};
+
+/// How to compare.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// Which structures, each once.
+    pub kinds: Vec<AccelKind>,
+    /// Parameters of the structures.
+    pub params: AccelParams,
+    /// Timed passes; 0: only counts.
+    pub passes: usize,
+    /// Threads that build and trace, at least 1.
+    pub threads: usize,
+    /// Rays of each class at most.
+    pub rays: usize,
+    /// Ray/prim tests for each class that a slow structure may take in a pass; it gets as few rays as that allows.
+    pub slow_tests: u64,
+    /// Changes the diffuse rays and what is sampled.
+    pub seed: u64,
+}
+
+impl Plan {
+    /// Half a minute or so for a mesh of a hundred thousand triangles.
+    pub const PASSES: usize = 5;
+    /// See [`Self::rays`].
+    pub const RAYS: usize = 200_000;
+    /// See [`Self::slow_tests`].
+    pub const SLOW_TESTS: u64 = 20_000_000;
+
+    /// Rays that a slow structure gets of a class.
+    fn affordable(&self, shapes: &Shapes) -> usize {
+        let rays = self.slow_tests / (shapes.len() as u64).max(1);
+        usize::try_from(rays).unwrap_or(usize::MAX).max(16)
+    }
+}
+
+/// What was found out about one structure.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// Which one.
+    pub kind: AccelKind,
+    /// Seconds of building it.
+    pub build: Spread,
+    /// What it is made of.
+    pub made_of: StructureStats,
+    /// One for each class of rays.
+    pub classes: Vec<ClassRow>,
+    /// Whether it got a sample of the rays only.
+    pub sampled: bool,
+    /// Ray/prim tests of the picture's rays in each pixel, row by row; empty where rays were left out.
+    pub tests_by_pixel: Vec<u32>,
+}
+
+impl Row {
+    /// Rays whose answer differed from the reference, in all passes.
+    pub fn differing(&self) -> u64 {
+        self.classes.iter().map(|c| c.differing).sum()
+    }
+
+    /// Rays that were compared.
+    pub fn rays(&self) -> u64 {
+        self.classes.iter().map(|c| c.counts.queries).sum()
+    }
+
+    /// Seconds for a ray of a mixture with so many of each class; NaN before the first pass.
+    pub fn seconds_per_ray(&self, mixture: &[usize]) -> f64 {
+        let all: usize = mixture.iter().sum();
+        let sum: f64 = self.classes.iter().zip(mixture).map(|(c, &n)| c.seconds.median() * n as f64).sum();
+        sum / all as f64
+    }
+}
+
+/// One structure and one class of rays.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ClassRow {
+    /// Sums over the rays.
+    pub counts: RayCounts,
+    /// Sums of the squares, in the order of [`Count::ALL`].
+    squares: [f64; Count::ALL.len()],
+    /// Seconds for a ray.
+    pub seconds: Spread,
+    /// Rays whose answer differed from the reference.
+    pub differing: u64,
+    /// Passes over the rays for one time, so that the clock's grain does not matter.
+    repeats: u32,
+}
+
+/// A count of [`RayCounts`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Count {
+    /// Ray/prim tests.
+    It,
+    /// Nodes and cells visited.
+    Ts,
+    /// Leaf cells visited.
+    Ets,
+    /// Empty ones among them.
+    Eets,
+    /// Ray/volume tests.
+    Bit,
+    /// Tests saved by the mailbox.
+    Mb,
+}
+
+impl Count {
+    /// Every count, in the order of reports.
+    pub const ALL: [Self; 6] = [Self::It, Self::Ts, Self::Ets, Self::Eets, Self::Bit, Self::Mb];
+
+    /// V. Havran's name, or ours in his manner.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::It => "n_it",
+            Self::Ts => "n_ts",
+            Self::Ets => "n_ets",
+            Self::Eets => "n_eets",
+            Self::Bit => "n_bit",
+            Self::Mb => "n_mb",
+        }
+    }
+
+    /// Its value.
+    pub const fn of(self, counts: &RayCounts) -> u64 {
+        match self {
+            Self::It => counts.n_it,
+            Self::Ts => counts.n_ts,
+            Self::Ets => counts.n_ets,
+            Self::Eets => counts.n_eets,
+            Self::Bit => counts.n_bit,
+            Self::Mb => counts.n_mb,
+        }
+    }
+}
+
+impl ClassRow {
+    /// A count for each ray; 0 without rays.
+    pub fn per_ray(&self, count: Count) -> f64 {
+        count.of(&self.counts) as f64 / self.counts.queries.max(1) as f64
+    }
+
+    /// Half the width of the 95 % interval of [`Self::per_ray`] if these rays are a sample of many more.
+    pub fn interval(&self, count: Count) -> f64 {
+        let (n, mean) = (self.counts.queries as f64, self.per_ray(count));
+        let variance = (self.squares[count as usize] / n - mean * mean).max(0.0) * n / (n - 1.0);
+        if n < 2.0 { f64::INFINITY } else { 1.96 * (variance / n).sqrt() }
+    }
+
+    /// Hits required for each ray: the tests that no structure can save.
+    pub fn n_min(&self) -> f64 {
+        self.counts.found as f64 / self.counts.queries.max(1) as f64
+    }
+
+    /// Share of all tests that was not done, of `prims` for each ray.
+    pub fn culled(&self, prims: usize) -> f64 {
+        if prims == 0 { 0.0 } else { 1.0 - self.per_ray(Count::It) / prims as f64 }
+    }
+
+    /// Millions of rays a second.
+    pub fn rate(&self) -> Spread {
+        self.seconds.map(|s| 1e-6 / s)
+    }
+
+    fn add(&mut self, counts: &RayCounts) {
+        self.counts += *counts;
+        for (square, count) in self.squares.iter_mut().zip(Count::ALL) {
+            let value = count.of(counts) as f64;
+            *square += value * value;
+        }
+    }
+}
+
+/// The rays of one class as one structure gets them, and the answers they should have.
+pub(super) struct Task {
+    pub(super) set: RaySet,
+    expected: Vec<Vec<Answer>>,
+}
+
+/// A pass is at least this long, seconds.
+const SHORTEST: f64 = 4e-3;
+
+/// What happens while structures are compared; tells whether to go on.
+pub type GoOn<'a> = dyn FnMut(&[Row], &str) -> bool + 'a;
+
+/// Compares. `go_on` hears of every step, with the rows as far as they are; `None` when it says to stop.
+///
+/// The reference is the first structure that is not slow, or the first of all; the others must agree with it.
+pub fn compare(shapes: &Shapes, sets: &[RaySet], pixels: usize, plan: &Plan, go_on: &mut GoOn) -> Option<Vec<Row>> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(plan.threads).build().ok()?;
+    let build = |kind| pool.install(|| timed(|| AnyAccel::build(kind, shapes, &plan.params)));
+    let (whole, sampled) = tasks(shapes, sets, plan, |kind| build(kind).0);
+
+    // Each structure once, so that a row is there as soon as possible; then all in turn.
+    let mut rows: Vec<Row> = Vec::new();
+    let mut structures = Vec::new();
+    for &kind in &plan.kinds {
+        if !go_on(&rows, &format!("{kind}: building and counting")) {
+            return None;
+        }
+        let (accel, seconds) = build(kind);
+        let tasks = if kind.is_slow() { &sampled } else { &whole };
+        let mut row = Row {
+            kind,
+            build: Spread::default(),
+            made_of: accel.summary(),
+            classes: Vec::new(),
+            sampled: tasks.iter().zip(sets).any(|(t, s)| t.set.len() < s.len()),
+            tests_by_pixel: Vec::new(),
+        };
+        let pixels = if row.sampled || tasks.iter().any(|t| t.set.asked > t.set.len() as u64) { 0 } else { pixels };
+        row.tests_by_pixel = vec![0; pixels];
+        row.classes = tasks.iter().map(|task| count(&accel, task, &mut row.tests_by_pixel)).collect();
+        if plan.passes > 0 {
+            row.build.push(seconds);
+            time(&accel, tasks, plan.threads, &mut row.classes);
+        }
+        rows.push(row);
+        structures.push(accel);
+    }
+    for pass in 1..plan.passes {
+        for (row, accel) in rows.iter_mut().zip(&structures) {
+            row.build.push(build(row.kind).1);
+            let tasks = if row.kind.is_slow() { &sampled } else { &whole };
+            time(accel, tasks, plan.threads, &mut row.classes);
+        }
+        if !go_on(&rows, &format!("pass {} of {}", pass + 1, plan.passes)) {
+            return None;
+        }
+    }
+    Some(rows)
+}
+
+/// The rays for structures that get all of them, and for slow ones.
+fn tasks<'s>(
+    shapes: &'s Shapes,
+    sets: &[RaySet],
+    plan: &Plan,
+    build: impl Fn(AccelKind) -> AnyAccel<'s>,
+) -> (Vec<Task>, Vec<Task>) {
+    let slow = |set: &RaySet| set.sample(plan.affordable(shapes), plan.seed).0;
+    let Some(&first) = plan.kinds.iter().find(|k| !k.is_slow()).or(plan.kinds.first()) else {
+        return Default::default();
+    };
+    let reference = build(first);
+    let task = |set: RaySet| Task::new(&reference, set);
+    let sampled = sets.iter().map(|set| task(slow(set))).collect();
+    let whole = if first.is_slow() { Vec::new() } else { sets.iter().map(|set| task(set.clone())).collect() };
+    (whole, sampled)
+}
+
+impl Task {
+    pub(super) fn new<A: Accel>(reference: &A, set: RaySet) -> Self {
+        let expected = set.batches.iter().map(|b| answers(reference, b)).collect();
+        Self { set, expected }
+    }
+}
+
+/// Counts, and compares every answer with what was expected: those of a counted walk, and those of a plain one.
+pub(super) fn count<A: Accel>(accel: &A, task: &Task, tests_by_pixel: &mut [u32]) -> ClassRow {
+    let mut row = ClassRow::default();
+    let mut total = 0.0;
+    let in_picture = task.set.class != Class::Diffuse;
+    for (batch, expected) in task.set.batches.iter().zip(&task.expected) {
+        let answered = counted(accel, batch, |ray, counts| {
+            row.add(counts);
+            if let Some(tests) = tests_by_pixel.get_mut(ray.sample as usize).filter(|_| in_picture) {
+                *tests += u32::try_from(counts.n_it).unwrap_or(u32::MAX);
+            }
+        });
+        let (plain, seconds) = timed(|| answers(accel, batch));
+        row.differing += differing(&answered, &plain, expected);
+        total += seconds;
+    }
+    row.repeats = repeats(total);
+    row
+}
+
+/// How often rays that take `seconds` are asked so that the clock's grain does not matter.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small positive number")]
+fn repeats(seconds: f64) -> u32 {
+    (SHORTEST / seconds.max(1e-6)).ceil().clamp(1.0, 1000.0) as u32
+}
+
+fn differing(counted: &[Answer], plain: &[Answer], expected: &[Answer]) -> u64 {
+    let triples = counted.iter().zip(plain).zip(expected);
+    triples.filter(|((counted, plain), expected)| counted != expected || plain != expected).count() as u64
+}
+
+/// One timed pass over all classes.
+fn time<A: Accel>(accel: &A, tasks: &[Task], threads: usize, rows: &mut [ClassRow]) {
+    for (task, row) in tasks.iter().zip(rows) {
+        let pass = |batch: &Batch| seconds(accel, batch, row.repeats, threads);
+        let sum: f64 = task.set.batches.iter().map(pass).sum();
+        row.seconds.push(sum / f64::from(row.repeats) / task.set.len().max(1) as f64);
+    }
+}
+
+/// The number of rays after which building a structure has paid: the seconds it takes to build over the seconds it saves
+/// for each ray against testing everything. `None` when it saves none.
+pub fn break_even(build: f64, per_ray: f64, none_per_ray: f64) -> Option<f64> {
+    let saved = none_per_ray - per_ray;
+    (saved > 0.0 && build.is_finite()).then(|| build / saved)
+}

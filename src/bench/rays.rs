@@ -1,0 +1,175 @@
+//! The rays that structures are compared on: those of a real picture, and one diffuse bounce behind it.
+
+use crate::accel::{Accel, Hit, NO_PRIM, NoProbe, Ray, Shapes};
+use crate::math::Vec3;
+use crate::math::random::Random;
+use crate::render::{Asked, Job, Question, Tape, render_recorded};
+use std::f32::consts::TAU;
+
+/// What sent a ray.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Class {
+    /// The eye.
+    Primary,
+    /// A point that looks for a light.
+    Shadow,
+    /// A mirror.
+    Reflected,
+    /// Glass, or whatever else lets light through.
+    Refracted,
+    /// A matt surface, in a direction drawn by the cosine law. The renderer sends no such rays; a path tracer would.
+    Diffuse,
+}
+
+impl Class {
+    /// Every class, in the order of reports.
+    pub const ALL: [Self; 5] = [Self::Primary, Self::Shadow, Self::Reflected, Self::Refracted, Self::Diffuse];
+
+    /// As printed.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Primary => "primary",
+            Self::Shadow => "shadow",
+            Self::Reflected => "reflected",
+            Self::Refracted => "refracted",
+            Self::Diffuse => "diffuse",
+        }
+    }
+}
+
+/// Rays about which the same is asked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Batch {
+    /// What is asked.
+    pub question: Question,
+    /// About these.
+    pub rays: Vec<Ray>,
+    /// As many hits as rays where the search goes on behind them; else empty.
+    pub after: Vec<Hit>,
+}
+
+impl Batch {
+    fn new(question: Question, asked: &[Asked]) -> Self {
+        let after = if question == Question::Next { asked.iter().map(|a| a.after).collect() } else { Vec::new() };
+        Self { question, rays: asked.iter().map(|a| a.ray).collect(), after }
+    }
+
+    /// The rays at these places.
+    pub fn pick(&self, places: &[usize]) -> Self {
+        let after = if self.after.is_empty() { Vec::new() } else { places.iter().map(|&i| self.after[i]).collect() };
+        Self { question: self.question, rays: places.iter().map(|&i| self.rays[i]).collect(), after }
+    }
+}
+
+/// The rays of one class.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RaySet {
+    /// What sent them.
+    pub class: Class,
+    /// How many the picture asked.
+    pub asked: u64,
+    /// Those that were kept: all, or an even sample.
+    pub batches: Vec<Batch>,
+}
+
+impl RaySet {
+    /// Rays that were kept.
+    pub fn len(&self) -> usize {
+        self.batches.iter().map(|b| b.rays.len()).sum()
+    }
+
+    /// Whether none was.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// At most `limit` rays, evenly from all batches, and the places of the rays kept in each batch.
+    pub fn sample(&self, limit: usize, seed: u64) -> (Self, Vec<Vec<usize>>) {
+        let all = self.len();
+        let places: Vec<Vec<usize>> = self
+            .batches
+            .iter()
+            .map(|b| even_places(b.rays.len(), (b.rays.len() * limit).div_ceil(all.max(1)), seed))
+            .collect();
+        let batches = self.batches.iter().zip(&places).map(|(b, p)| b.pick(p)).collect();
+        (Self { class: self.class, asked: self.asked, batches }, places)
+    }
+}
+
+/// `count` of `len` places, one drawn from each of as many equal parts: no pattern of the picture can fall into step.
+fn even_places(len: usize, count: usize, seed: u64) -> Vec<usize> {
+    if count >= len {
+        return (0..len).collect();
+    }
+    let mut random = Random::new(seed ^ len as u64);
+    let part = |i: usize| i * len / count;
+    (0..count).map(|i| part(i) + random.below(part(i + 1) - part(i))).collect()
+}
+
+/// Renders once and keeps the rays; at most `limit` for each class. Classes without rays are left out. With it the depth
+/// that was used; `None` when the rendering could not be done.
+pub fn record(job: &Job, limit: usize, seed: u64) -> Option<(Vec<RaySet>, u32)> {
+    let (rendered, recording) = render_recorded(job, &())?;
+    let diffuse = diffuse(job, recording.primary.rays(Question::Closest), seed);
+    let mut sets = vec![
+        set(Class::Primary, &recording.primary),
+        set(Class::Shadow, &recording.shadow),
+        set(Class::Reflected, &recording.reflected),
+        set(Class::Refracted, &recording.refracted),
+        RaySet { class: Class::Diffuse, asked: diffuse.rays.len() as u64, batches: vec![diffuse] },
+    ];
+    sets.retain(|set| !set.is_empty());
+    for set in sets.iter_mut().filter(|set| set.len() > limit) {
+        *set = set.sample(limit, seed).0;
+    }
+    Some((sets, rendered.depth))
+}
+
+fn set(class: Class, tape: &Tape) -> RaySet {
+    let batch = |question| Batch::new(question, tape.rays(question));
+    let batches = Question::ALL.into_iter().map(batch).filter(|b| !b.rays.is_empty()).collect();
+    RaySet { class, asked: Question::ALL.into_iter().map(|q| tape.total(q)).sum(), batches }
+}
+
+/// One ray from each hit of an eye ray, on the side it was seen from.
+fn diffuse(job: &Job, eye: &[Asked], seed: u64) -> Batch {
+    let shapes = &job.world.shapes;
+    let eye: Vec<Ray> = eye.iter().map(|a| a.ray).collect();
+    let mut hits = vec![Hit::MISS; eye.len()];
+    job.accel.closest(&eye, &mut hits, &mut job.accel.scratch(), &mut NoProbe);
+    let mut random = Random::new(seed);
+    let found = eye.iter().zip(&hits).filter(|(_, hit)| hit.is_some());
+    let rays = found.filter_map(|(ray, hit)| bounce(shapes, ray, hit, &mut random)).collect();
+    Batch { question: Question::Closest, rays, after: Vec::new() }
+}
+
+/// A ray drawn by the cosine law; `None` where a face has no normal.
+fn bounce(shapes: &Shapes, ray: &Ray, hit: &Hit, random: &mut Random) -> Option<Ray> {
+    let refined = shapes.refine(ray, hit);
+    let normal = if refined.normal.dot(ray.dir) > 0.0 { -refined.normal } else { refined.normal };
+    if normal == Vec3::ZERO {
+        return None;
+    }
+    // A point of the unit disc, lifted onto the hemisphere above it (Malley's method).
+    let (square, turn) = (random.unit(), TAU * random.unit());
+    let radius = square.sqrt();
+    let (tangent, bitangent) = normal.any_orthonormal_pair();
+    let aside = tangent * (radius * libm::cosf(turn)) + bitangent * (radius * libm::sinf(turn));
+    let dir = aside + normal * (1.0 - square).max(f32::EPSILON).sqrt();
+    let planar = hit.prim < (shapes.triangles.len() + shapes.polygons.len()) as u32;
+    let exclude = if planar { hit.prim } else { NO_PRIM };
+    Some(Ray { origin: refined.origin(dir), t_min: 0.0, dir, t_max: f32::INFINITY, exclude, sample: ray.sample })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_even_sample_has_one_place_from_each_part() {
+        let places = even_places(1000, 30, 7);
+        assert_eq!(places.len(), 30);
+        assert!(places.iter().enumerate().all(|(i, &p)| (i * 1000 / 30..(i + 1) * 1000 / 30).contains(&p)));
+        assert_eq!(even_places(3, 9, 7), [0, 1, 2]);
+    }
+}

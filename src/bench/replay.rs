@@ -1,0 +1,120 @@
+//! Asking a structure about recorded rays: for the answers, for the counts, for the time.
+
+use super::clock::timed;
+use super::rays::Batch;
+use crate::accel::{Accel, Hit, NoProbe, Probe, Ray, RayCounts};
+use crate::render::Question;
+use std::thread;
+
+/// Rays asked at once, as the renderer does.
+const SLICE: usize = 256;
+
+/// An answer as bits: t, u, v and prim of a hit, or whether a ray is blocked.
+pub type Answer = [u32; 4];
+
+/// Answers all rays of a batch.
+pub fn answers<A: Accel>(accel: &A, batch: &Batch) -> Vec<Answer> {
+    let mut answers = Vec::with_capacity(batch.rays.len());
+    let mut asking = Asking::new(accel);
+    Slice::cut(batch.question, &batch.rays, &batch.after)
+        .for_each(|slice| asking.ask(&slice, &mut NoProbe, |answer| answers.push(answer)));
+    answers
+}
+
+/// Answers all rays of a batch one by one and hands over what each one cost.
+pub fn counted<A: Accel>(accel: &A, batch: &Batch, mut each: impl FnMut(&Ray, &RayCounts)) -> Vec<Answer> {
+    let mut answers = Vec::with_capacity(batch.rays.len());
+    let mut asking = Asking::new(accel);
+    for i in 0..batch.rays.len() {
+        let mut counts = RayCounts::default();
+        let alone = Slice {
+            question: batch.question,
+            rays: &batch.rays[i..=i],
+            after: batch.after.get(i..=i).unwrap_or_default(),
+        };
+        asking.ask(&alone, &mut counts, |answer| answers.push(answer));
+        each(&batch.rays[i], &counts);
+    }
+    answers
+}
+
+/// Seconds for all rays of a batch, asked `times` times, by so many threads that each take an equal share: from before the
+/// first to after the last.
+pub fn seconds<A: Accel>(accel: &A, batch: &Batch, times: u32, threads: usize) -> f64 {
+    let share = batch.rays.len().div_ceil(threads.max(1)).max(1);
+    let work = |slices: Vec<Slice>| {
+        let mut asking = Asking::new(accel);
+        for _ in 0..times {
+            slices.iter().for_each(|slice| asking.ask_only(slice));
+        }
+    };
+    let shares = |i: usize| {
+        let part = i * share..((i + 1) * share).min(batch.rays.len());
+        Slice::cut(batch.question, &batch.rays[part.clone()], batch.after.get(part).unwrap_or_default())
+    };
+    if threads <= 1 {
+        let slices = shares(0).collect();
+        return timed(|| work(slices)).1;
+    }
+    let shares: Vec<Vec<Slice>> =
+        (0..threads).filter(|i| i * share < batch.rays.len()).map(|i| shares(i).collect()).collect();
+    let together = || thread::scope(|scope| shares.into_iter().for_each(|s| drop(scope.spawn(|| work(s)))));
+    timed(together).1
+}
+
+/// Rays that are asked at once.
+struct Slice<'a> {
+    question: Question,
+    rays: &'a [Ray],
+    after: &'a [Hit],
+}
+
+impl<'a> Slice<'a> {
+    fn cut(question: Question, rays: &'a [Ray], after: &'a [Hit]) -> impl Iterator<Item = Self> {
+        let after = move |i: usize| after.get(i * SLICE..).map_or(after, |rest| &rest[..rest.len().min(SLICE)]);
+        rays.chunks(SLICE).enumerate().map(move |(i, rays)| Self { question, rays, after: after(i) })
+    }
+}
+
+/// A structure, its scratch, and room for the answers.
+struct Asking<'a, A: Accel> {
+    accel: &'a A,
+    scratch: A::Scratch,
+    hits: [Hit; SLICE],
+    blocked: [bool; SLICE],
+}
+
+impl<'a, A: Accel> Asking<'a, A> {
+    fn new(accel: &'a A) -> Self {
+        Self { accel, scratch: accel.scratch(), hits: [Hit::MISS; SLICE], blocked: [false; SLICE] }
+    }
+
+    /// The answers stay where they are, so that nothing else is timed.
+    fn ask_only(&mut self, slice: &Slice) {
+        self.fill(slice, &mut NoProbe);
+        std::hint::black_box((&self.hits, &self.blocked));
+    }
+
+    fn ask<P: Probe>(&mut self, slice: &Slice, probe: &mut P, mut answer: impl FnMut(Answer)) {
+        self.fill(slice, probe);
+        let count = slice.rays.len();
+        match slice.question {
+            Question::Occluded => self.blocked[..count].iter().for_each(|&b| answer([u32::from(b), 0, 0, 0])),
+            _ => self.hits[..count].iter().for_each(|hit| answer(bits(hit))),
+        }
+    }
+
+    fn fill<P: Probe>(&mut self, slice: &Slice, probe: &mut P) {
+        let count = slice.rays.len();
+        let (hits, blocked) = (&mut self.hits[..count], &mut self.blocked[..count]);
+        match slice.question {
+            Question::Closest => self.accel.closest(slice.rays, hits, &mut self.scratch, probe),
+            Question::Occluded => self.accel.occluded(slice.rays, blocked, &mut self.scratch, probe),
+            Question::Next => self.accel.next(slice.rays, slice.after, hits, &mut self.scratch, probe),
+        }
+    }
+}
+
+fn bits(hit: &Hit) -> Answer {
+    [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.prim]
+}

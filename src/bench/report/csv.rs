@@ -1,0 +1,47 @@
+//! One line for each model, structure and class of rays; what was not measured is empty.
+
+use super::{Model, Rays, Report};
+use crate::bench::compare::{ClassRow, Count, Row};
+
+const COLUMNS: &str = "file,prims,structure,class,rays,asked,sampled,differing,t_b,t_b_min,t_b_max,bytes,n_in,n_v,n_ev,\
+                       n_oiv,break_even,mrays,mrays_min,mrays_max,n_it,n_ts,n_ets,n_eets,n_bit,n_mb,n_min,culled,\
+                       threads,passes,seed,version,compiler,flags,cpu";
+
+/// The whole table; `t_b` in seconds, `mrays` in millions of rays a second.
+pub fn write(report: &Report) -> String {
+    let mut text = format!("{COLUMNS}\n");
+    for model in &report.models {
+        for row in &model.rows {
+            for (rays, class) in model.rays.iter().zip(&row.classes) {
+                text += &line(report, model, row, rays, class);
+            }
+        }
+    }
+    text
+}
+
+fn line(report: &Report, model: &Model, row: &Row, rays: &Rays, class: &ClassRow) -> String {
+    let (s, m, p) = (row.made_of, &report.machine, &report.plan);
+    let rate = class.rate();
+    let mut cells = vec![quoted(&model.name), model.prims.to_string(), row.kind.to_string(), rays.class.name().into()];
+    cells.extend([class.counts.queries, rays.asked].map(|n| n.to_string()));
+    cells.extend([row.sampled.to_string(), class.differing.to_string()]);
+    cells.extend([row.build.median(), row.build.min(), row.build.max()].map(number));
+    cells.extend([s.bytes, s.n_in, s.n_v, s.n_ev, s.n_oiv].map(|n| n.to_string()));
+    cells.push(model.break_even(row).map_or(String::new(), number));
+    cells.extend([rate.median(), rate.min(), rate.max()].map(number));
+    cells.extend(Count::ALL.map(|c| number(class.per_ray(c))));
+    cells.extend([class.n_min(), class.culled(model.prims)].map(number));
+    cells.extend([p.threads.to_string(), p.passes.to_string(), p.seed.to_string()]);
+    cells.extend([m.version, m.compiler, m.flags, &m.cpu].map(quoted));
+    cells.join(",") + "\n"
+}
+
+fn number(x: f64) -> String {
+    if x.is_finite() { x.to_string() } else { String::new() }
+}
+
+/// As RFC 4180 has it.
+fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('"', "\"\""))
+}

@@ -1,0 +1,96 @@
+//! Schema `meshray-bench/1`: one JSON object.
+//!
+//! | key | what |
+//! |---|---|
+//! | `schema`, `version`, `complete` | `meshray-bench/1`; of meshray; false while the command has not ended |
+//! | `machine` | `cpu`, `cores`, `system`, `simd`, `compiler`, `flags` |
+//! | `settings` | `threads`, `passes`, `seed`, `rays` (most of a class), `slow_tests` (most tests of a class in a slow structure), and what was asked of structures: `grid_density`, `grid_resolution`, `max_depth`, `step_cost`, `leaf_size` (each null: what suits the kind), `mailbox` |
+//! | `models` | one for each model |
+//!
+//! A model has `file`, `hash` (xxh3-128 of what was read), `prims` (N), `picture` (`width`, `height`, `samples`, `depth`,
+//! `view`), `rays` (by class: `asked`, `kept`), `identical` (whether all hits were), `reference`, and `structures`. A
+//! structure has `accel`, `sampled`, `differing` (rays), `t_b` and `t_tr` (seconds, of a ray; each `median`, `min`, `max`,
+//! `passes`, or null without times), V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`, `bytes`, `break_even` (rays, or null),
+//! and `classes`. A class has exact sums (`rays`, `hits`, `tests`, `steps`, `cells`, `empty_cells`, `volume_tests`,
+//! `tests_saved`), `per_ray` (`n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`, `n_min`), `interval` (half the 95 %
+//! interval of the same, or null when nothing was left out), `culled`, `differing`, `t_tr` (seconds of a ray) and
+//! `mrays`. Keys are only ever added.
+
+use super::{Model, Report};
+use crate::bench::clock::Spread;
+use crate::bench::compare::{ClassRow, Count, Row};
+use serde_json::{Map, Value, json};
+
+/// The name of the schema.
+pub const SCHEMA: &str = "meshray-bench/1";
+
+/// The report, indented.
+pub fn write(report: &Report) -> String {
+    let (m, p) = (&report.machine, &report.plan);
+    let value = json!({
+        "schema": SCHEMA, "version": m.version, "complete": report.complete,
+        "machine": {
+            "cpu": m.cpu, "cores": m.cores, "system": m.system, "simd": m.simd, "compiler": m.compiler, "flags": m.flags,
+        },
+        "settings": {
+            "threads": p.threads, "passes": p.passes, "seed": p.seed, "rays": p.rays, "slow_tests": p.slow_tests,
+            "grid_density": p.params.density, "grid_resolution": p.params.max_resolution,
+            "max_depth": p.params.max_depth, "step_cost": p.params.step_cost, "leaf_size": p.params.leaf_size,
+            "mailbox": p.params.mailbox.name(),
+        },
+        "models": report.models.iter().map(model).collect::<Vec<_>>(),
+    });
+    format!("{value:#}\n")
+}
+
+fn model(model: &Model) -> Value {
+    let rays = model.rays.iter().map(|r| (r.class.name().to_owned(), json!({ "asked": r.asked, "kept": r.kept })));
+    json!({
+        "file": model.name, "hash": format!("{:032x}", model.hash), "prims": model.prims,
+        "picture": {
+            "width": model.width, "height": model.height, "samples": model.samples, "depth": model.depth,
+            "view": model.view,
+        },
+        "rays": rays.collect::<Map<_, _>>(),
+        "identical": model.differing() == 0, "reference": model.reference().map(|k| k.name()),
+        "structures": model.rows.iter().map(|row| structure(model, row)).collect::<Vec<_>>(),
+    })
+}
+
+fn structure(model: &Model, row: &Row) -> Value {
+    let s = row.made_of;
+    let class =
+        |(i, c): (usize, &ClassRow)| (model.rays[i].class.name().to_owned(), class(c, row.sampled, model.prims));
+    json!({
+        "accel": row.kind.name(), "sampled": row.sampled, "differing": row.differing(), "t_b": spread(&row.build),
+        "t_tr": number(model.seconds_per_ray(row)), "n_in": s.n_in, "n_v": s.n_v, "n_ev": s.n_ev, "n_oiv": s.n_oiv,
+        "bytes": s.bytes, "break_even": model.break_even(row),
+        "classes": row.classes.iter().enumerate().map(class).collect::<Map<_, _>>(),
+    })
+}
+
+fn class(class: &ClassRow, sampled: bool, prims: usize) -> Value {
+    let c = &class.counts;
+    let mut per_ray: Map<_, _> = Count::ALL.iter().map(|&n| (n.name().to_owned(), json!(class.per_ray(n)))).collect();
+    per_ray.insert("n_min".into(), json!(class.n_min()));
+    let interval = Count::ALL.iter().map(|&n| (n.name().to_owned(), number(class.interval(n))));
+    json!({
+        "rays": c.queries, "hits": c.found, "tests": c.n_it, "steps": c.n_ts, "cells": c.n_ets,
+        "empty_cells": c.n_eets, "volume_tests": c.n_bit, "tests_saved": c.n_mb, "per_ray": per_ray,
+        "interval": if sampled { Value::Object(interval.collect()) } else { Value::Null },
+        "culled": class.culled(prims), "differing": class.differing,
+        "t_tr": spread(&class.seconds), "mrays": spread(&class.rate()),
+    })
+}
+
+fn spread(spread: &Spread) -> Value {
+    if spread.is_empty() {
+        return Value::Null;
+    }
+    json!({ "median": spread.median(), "min": spread.min(), "max": spread.max(), "passes": spread.len() })
+}
+
+/// JSON knows no infinity.
+fn number(x: f64) -> Value {
+    if x.is_finite() { json!(x) } else { Value::Null }
+}

@@ -1,0 +1,190 @@
+//! What a comparison found, and how it is shown: as text, JSON, CSV, Markdown or a page for a browser.
+
+pub mod csv;
+pub mod json;
+pub mod markdown;
+pub mod number;
+pub mod text;
+
+use super::compare::{Plan, Row, break_even};
+use super::machine::Machine;
+use super::rays::{Class, RaySet};
+use crate::accel::AccelKind;
+use std::path::Path;
+
+/// All models of one command.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// Where it was made.
+    pub machine: Machine,
+    /// How.
+    pub plan: Plan,
+    /// In the order they were measured; the last one's rows may be missing while it is under way.
+    pub models: Vec<Model>,
+    /// Whether everything is done.
+    pub complete: bool,
+}
+
+/// One model.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// The file as typed.
+    pub name: String,
+    /// Of everything that was read.
+    pub hash: u128,
+    /// Shapes of all kinds: N.
+    pub prims: usize,
+    /// Columns of the picture whose rays were recorded.
+    pub width: u32,
+    /// Its rows.
+    pub height: u32,
+    /// Samples a pixel.
+    pub samples: u32,
+    /// Bounces after the eye ray.
+    pub depth: u32,
+    /// Seen from where.
+    pub view: String,
+    /// The rays.
+    pub rays: Vec<Rays>,
+    /// One for each structure.
+    pub rows: Vec<Row>,
+}
+
+/// How many rays there were of a class.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rays {
+    /// The class.
+    pub class: Class,
+    /// Asked by the picture.
+    pub asked: u64,
+    /// Kept and measured.
+    pub kept: usize,
+}
+
+impl Rays {
+    /// Of a set.
+    pub fn of(set: &RaySet) -> Self {
+        Self { class: set.class, asked: set.asked, kept: set.len() }
+    }
+}
+
+impl Model {
+    /// Seconds for a ray of the recorded mixture.
+    pub fn seconds_per_ray(&self, row: &Row) -> f64 {
+        let mixture: Vec<usize> = self.rays.iter().map(|r| r.kept).collect();
+        row.seconds_per_ray(&mixture)
+    }
+
+    /// Rays after which building has paid against testing everything; `None` when it never does, or `none` was not
+    /// measured.
+    pub fn break_even(&self, row: &Row) -> Option<f64> {
+        let none = self.rows.iter().find(|r| r.kind == AccelKind::None && r.kind != row.kind)?;
+        break_even(row.build.median(), self.seconds_per_ray(row), self.seconds_per_ray(none))
+    }
+
+    /// Rays whose answer differed between structures.
+    pub fn differing(&self) -> u64 {
+        self.rows.iter().map(Row::differing).sum()
+    }
+
+    /// The structure whose answers the others must have.
+    pub fn reference(&self) -> Option<AccelKind> {
+        let fast = self.rows.iter().find(|r| !r.kind.is_slow());
+        fast.or(self.rows.first()).map(|r| r.kind)
+    }
+
+    /// Whether all structures agree, in a sentence.
+    pub fn verdict(&self) -> String {
+        let rays: usize = self.rays.iter().map(|r| r.kept).sum();
+        let (count, differing) = (self.rows.len(), self.differing());
+        let rays = number::grouped(rays as u64);
+        let reference = self.reference().map_or("", AccelKind::name);
+        if differing > 0 {
+            let wrong = self.rows.iter().filter(|r| r.differing() > 0);
+            let wrong: Vec<String> =
+                wrong.map(|r| format!("{} in {} rays", r.kind, number::grouped(r.differing()))).collect();
+            return format!("hits DIFFER from those of {reference}: {}", wrong.join(", "));
+        }
+        let sampled: Vec<&str> = self.rows.iter().filter(|r| r.sampled).map(|r| r.kind.name()).collect();
+        let but = if sampled.is_empty() { String::new() } else { format!(" (a sample for {})", sampled.join(", ")) };
+        match count {
+            1 => format!("one structure only, {rays} rays: nothing to compare its hits with"),
+            _ => format!("hits identical, bit for bit, in all {count} structures: {rays} rays{but}"),
+        }
+    }
+
+    /// What picture the rays are from.
+    pub fn picture(&self) -> String {
+        let Self { width, height, samples, depth, view, .. } = self;
+        let plural = if *samples == 1 { "" } else { "s" };
+        format!("{width}×{height}, {samples} sample{plural} a pixel, depth {depth}, {view}")
+    }
+}
+
+impl Report {
+    /// Whether times were taken.
+    pub fn is_timed(&self) -> bool {
+        self.plan.passes > 0
+    }
+
+    /// How times were taken, in a sentence.
+    pub fn method(&self) -> String {
+        let Plan { passes, threads, seed, slow_tests, .. } = &self.plan;
+        let times = match (*passes, *threads) {
+            (0, _) => "no times were taken".to_owned(),
+            (n, 1) => format!("times: wall clock of one thread, median and range of {n} interleaved passes"),
+            (n, t) => format!("times: wall clock of {t} threads, median and range of {n} interleaved passes"),
+        };
+        let tests = number::grouped(*slow_tests);
+        format!(
+            "{times}; counts from separate passes; slow structures get a sample of at most {tests} tests a class; seed {seed}"
+        )
+    }
+}
+
+/// Types of report files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Schema `meshray-bench/1`.
+    Json,
+    /// One line for each structure and class.
+    Csv,
+    /// Tables for a document.
+    Markdown,
+}
+
+impl Format {
+    /// By the ending of a file's name.
+    pub fn from_path(path: &Path) -> Result<Self, String> {
+        let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+        match ending.as_str() {
+            "json" => Ok(Self::Json),
+            "csv" => Ok(Self::Csv),
+            "md" => Ok(Self::Markdown),
+            _ => Err(format!("{}: a report ends in .json, .csv or .md", path.display())),
+        }
+    }
+
+    /// The report in this format.
+    pub fn write(self, report: &Report) -> String {
+        match self {
+            Self::Json => json::write(report),
+            Self::Csv => csv::write(report),
+            Self::Markdown => markdown::write(report),
+        }
+    }
+}
+
+/// What the names of counts mean, a line each.
+pub const WORDS: [(&str, &str); 10] = [
+    ("n_it", "ray/prim tests a ray"),
+    ("n_ts", "nodes and cells visited a ray"),
+    ("n_ets", "leaf cells visited a ray"),
+    ("n_eets", "empty ones among them"),
+    ("n_bit", "ray/volume tests a ray"),
+    ("n_mb", "tests saved by the mailbox a ray"),
+    ("n_min", "hits a ray: tests that nothing can save"),
+    ("culled", "share of all ray/prim tests not done"),
+    ("n_oiv", "prims listed in all cells"),
+    ("break-even", "rays after which building has paid against testing everything"),
+];

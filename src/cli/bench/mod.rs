@@ -1,0 +1,166 @@
+//! `meshray bench`: structures compared on the rays of a real picture, as tables and as report files.
+
+mod scene;
+
+use super::args::BenchArgs;
+use super::exit::Exit;
+use super::job::{self, Wrong};
+use super::message::Messages;
+use super::{accident, interrupt, print};
+use crate::accel::AccelKind;
+use crate::bench::compare::{Plan, Row, compare};
+use crate::bench::machine::Machine;
+use crate::bench::rays;
+use crate::bench::report::{Format, Model, Rays, Report, text};
+use crate::image::write_atomic;
+use scene::Prepared;
+use std::path::PathBuf;
+
+/// What is to be done, checked.
+struct Bench<'a> {
+    args: &'a BenchArgs,
+    files: Vec<(PathBuf, Format)>,
+    messages: Messages,
+}
+
+/// Compares on each model and tells how that ended: as the worst of them.
+pub(super) fn run(args: &BenchArgs) -> Exit {
+    let messages = Messages::new(args.load.messages.into(), args.quiet);
+    let (plan, files) = match (plan(args), files(args)) {
+        (Ok(plan), Ok(files)) => (plan, files),
+        (Err(Wrong(text)), _) | (_, Err(Wrong(text))) => {
+            messages.error("usage", text, "");
+            return Exit::Usage;
+        }
+    };
+    let bench = Bench { args, files, messages };
+    let mut report = Report { machine: Machine::here(), plan, models: Vec::new(), complete: false };
+    let mut worst = Exit::Done;
+    for input in &args.inputs {
+        let name = input.display().to_string();
+        worst = worst.max(accident::guard(&name, &bench.messages, || bench.model(input, &mut report)));
+        if interrupt::raised() {
+            return Exit::Interrupted;
+        }
+    }
+    if report.models.is_empty() {
+        return worst;
+    }
+    report.complete = worst == Exit::Done;
+    worst = worst.max(bench.print(&text::write_notes(&report)));
+    worst.max(bench.write(&report))
+}
+
+fn plan(args: &BenchArgs) -> Result<Plan, Wrong> {
+    let mut kinds: Vec<AccelKind> = Vec::new();
+    for kind in &args.accel {
+        if kinds.contains(kind) {
+            return Err(Wrong(format!("--accel names {kind} twice")));
+        }
+        kinds.push(*kind);
+    }
+    if kinds.is_empty() {
+        kinds = AccelKind::ALL.to_vec();
+    }
+    Ok(Plan {
+        kinds,
+        params: job::params(&args.params)?,
+        passes: args.passes,
+        threads: usize::from(args.threads),
+        rays: args.rays,
+        slow_tests: args.slow_tests,
+        seed: args.seed,
+    })
+}
+
+fn files(args: &BenchArgs) -> Result<Vec<(PathBuf, Format)>, Wrong> {
+    let typed = |path: &PathBuf| Ok((path.clone(), Format::from_path(path).map_err(Wrong)?));
+    args.report.iter().map(typed).collect()
+}
+
+impl Bench<'_> {
+    /// One model: its rays, its rows, its tables.
+    fn model(&self, input: &PathBuf, report: &mut Report) -> Exit {
+        let prepared = match Prepared::new(input, self.args, &self.messages) {
+            Ok(prepared) => prepared,
+            Err(exit) => return exit,
+        };
+        let plan = report.plan.clone();
+        let name = input.display().to_string();
+        self.messages.info("progress", format!("{name}: recording rays"));
+        let Some((sets, depth)) = prepared.with_job(|job| rays::record(job, plan.rays, plan.seed)) else {
+            self.messages.error("threads", format!("{name}: the rays could not be recorded"), "");
+            return Exit::Failed;
+        };
+        let settings = &prepared.settings;
+        report.models.push(Model {
+            name: name.clone(),
+            hash: prepared.loaded.facts.hash,
+            prims: prepared.world.shapes.len(),
+            width: settings.width,
+            height: settings.height,
+            samples: settings.samples,
+            depth,
+            view: prepared.view_phrase.clone(),
+            rays: sets.iter().map(Rays::of).collect(),
+            rows: Vec::new(),
+        });
+
+        // After each structure the report is written, so that a crash costs one row.
+        let mut written = Exit::Done;
+        let mut done = 0;
+        let mut go_on = |rows: &[Row], what: &str| {
+            self.messages.info("progress", format!("{name}: {what}"));
+            if rows.len() > done {
+                done = rows.len();
+                written = written.max(self.keep(report, rows));
+            }
+            !interrupt::raised()
+        };
+        let pixels = settings.width as usize * settings.height as usize;
+        let Some(rows) = compare(&prepared.world.shapes, &sets, pixels, &plan, &mut go_on) else {
+            return if interrupt::raised() { Exit::Interrupted } else { self.no_threads(&name, plan.threads) };
+        };
+        written = written.max(self.keep(report, &rows));
+        let Some(model) = report.models.last() else { return Exit::Failed };
+        written = written.max(self.print(&format!("{}\n", text::write(report, model))));
+        if model.differing() == 0 {
+            return written;
+        }
+        self.messages.error("hits-differ", format!("{name}: {}", model.verdict()), "please report it with the file");
+        Exit::Failed
+    }
+
+    fn keep(&self, report: &mut Report, rows: &[Row]) -> Exit {
+        if let Some(model) = report.models.last_mut() {
+            model.rows = rows.to_vec();
+        }
+        self.write(report)
+    }
+
+    fn write(&self, report: &Report) -> Exit {
+        let mut exit = Exit::Done;
+        for (path, format) in &self.files {
+            if let Err(e) = write_atomic(path, format.write(report).as_bytes(), false) {
+                self.messages.error("output-unwritable", format!("{}: {e}", path.display()), "");
+                exit = Exit::Failed;
+            }
+        }
+        exit
+    }
+
+    fn print(&self, text: &str) -> Exit {
+        match print(text) {
+            Ok(()) => Exit::Done,
+            Err(e) => {
+                self.messages.error("output-unwritable", format!("standard output: {e}"), "");
+                Exit::Failed
+            }
+        }
+    }
+
+    fn no_threads(&self, name: &str, threads: usize) -> Exit {
+        self.messages.error("threads", format!("{name}: cannot start {threads} threads"), "ask for fewer");
+        Exit::Failed
+    }
+}
