@@ -55,7 +55,7 @@
 //! | [`math`] | only numbers: error bounds, eight lanes at once, rays against triangle, polygon, sphere, cone, plane, box |
 //! | [`scene`] | plain data with indices; which features a scene needs, default camera and light |
 //! | [`load`] | files -> scene and warnings: glTF, OBJ + MTL, scene files |
-//! | [`accel`] | shapes -> what does this ray hit: `none`, `bvh`, `grid`, `grid-octree`, `octree`, `fast-octree`, `fast-bvh`; counts |
+//! | [`accel`] | shapes -> what does this ray hit: `none`, `transform`, `spheres`, `boxes`, `bvh`, `grid`, `grid-octree`, `grid-bvh`, `octree`, `fast-octree`, `fast-bvh`; counts |
 //! | [`mod@render`] | rays -> linear pixels: waves, shading models, lights and shadows, optics, textures |
 //! | [`image`] | linear pixels <-> files: tone mapping, formats, metadata, differences |
 //! | [`mod@bench`] | measures and compares: hard rays, exact answers, what came out |

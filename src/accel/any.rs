@@ -4,21 +4,34 @@ use std::any::Any;
 use std::fmt;
 use std::str::FromStr;
 
-use super::intersector::{IntersectorKind, MollerTrumbore, MollerTrumboreDouble, Watertight, WatertightDouble};
+use super::intersector::{IntersectorKind, Looked, MollerTrumbore, MollerTrumboreDouble, Watertight, WatertightDouble};
 use super::query::{Culling, Tested};
-use super::{Accel, AccelParams, Bvh, GridOctree, Hit, Probe, Ray, Shapes, Splitting, StructureStats, Unculled, Wide};
+use super::volumes::{Ball, Volumes};
+use super::{
+    Accel, AccelParams, Bvh, GridOctree, Hit, Probe, Ray, Shapes, Splitting, StructureStats, Transformed, Unculled,
+    Wide,
+};
+use crate::math::aabb::Aabb;
 
 /// Which structure culls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum AccelKind {
     /// Every ray against every shape.
     None,
+    /// The scene turned for each ray, and sorted by depth.
+    Transform,
+    /// A sphere around each object.
+    Spheres,
+    /// A box around each object.
+    Boxes,
     /// A binary hierarchy of boxes.
     Bvh,
     /// A uniform grid with a mailbox.
     Grid,
     /// A uniform grid, its crowded cells refined by octrees, with a mailbox.
     GridOctree,
+    /// A uniform grid, a hierarchy of boxes in each crowded cell, with a mailbox.
+    GridBvh,
     /// One cell refined by an octree, with a mailbox.
     Octree,
     /// The same cuts as boxes in nodes of eight.
@@ -38,16 +51,31 @@ impl AccelKind {
     pub const DEFAULT: Self = Self::FastOctree;
 
     /// Every kind, in the order of the help text.
-    pub const ALL: [Self; 7] =
-        [Self::None, Self::Bvh, Self::Grid, Self::GridOctree, Self::Octree, Self::FastOctree, Self::FastBvh];
+    pub const ALL: [Self; 11] = [
+        Self::None,
+        Self::Transform,
+        Self::Spheres,
+        Self::Boxes,
+        Self::Bvh,
+        Self::Grid,
+        Self::GridOctree,
+        Self::GridBvh,
+        Self::Octree,
+        Self::FastOctree,
+        Self::FastBvh,
+    ];
 
     /// As typed and printed.
     pub const fn name(self) -> &'static str {
         match self {
             Self::None => "none",
+            Self::Transform => "transform",
+            Self::Spheres => "spheres",
+            Self::Boxes => "boxes",
             Self::Bvh => "bvh",
             Self::Grid => "grid",
             Self::GridOctree => "grid-octree",
+            Self::GridBvh => "grid-bvh",
             Self::Octree => "octree",
             Self::FastOctree => "fast-octree",
             Self::FastBvh => "fast-bvh",
@@ -57,7 +85,7 @@ impl AccelKind {
     /// Whether a ray may be tested against a large part of the prims: where many rays are asked, such a structure gets
     /// a sample of them.
     pub fn is_slow(self) -> bool {
-        matches!(self, Self::None)
+        matches!(self, Self::None | Self::Transform | Self::Spheres | Self::Boxes)
     }
 }
 
@@ -93,6 +121,9 @@ pub struct AnyAccel<'a> {
 #[derive(Clone, Debug)]
 enum Structure<'a> {
     None(Unculled<'a>),
+    Transform(Transformed<'a>),
+    Spheres(Volumes<'a, Ball>),
+    Boxes(Volumes<'a, Aabb>),
     Bvh(Bvh<'a>),
     Grid(GridOctree<'a>),
     Wide(Wide<'a>),
@@ -103,6 +134,9 @@ macro_rules! whichever {
     ($structure:expr, $a:ident => $value:expr) => {
         match $structure {
             Structure::None($a) => $value,
+            Structure::Transform($a) => $value,
+            Structure::Spheres($a) => $value,
+            Structure::Boxes($a) => $value,
             Structure::Bvh($a) => $value,
             Structure::Grid($a) => $value,
             Structure::Wide($a) => $value,
@@ -124,9 +158,16 @@ impl<'a> AnyAccel<'a> {
     pub fn build(kind: AccelKind, shapes: &'a Shapes, params: &AccelParams) -> Self {
         let structure = match kind {
             AccelKind::None => Structure::None(Unculled::new(shapes)),
-            AccelKind::Bvh => Structure::Bvh(Bvh::build(shapes, params.bvh_leaf_size())),
+            AccelKind::Transform => Structure::Transform(Transformed::new(shapes)),
+            AccelKind::Spheres => Structure::Spheres(Volumes::build(shapes)),
+            AccelKind::Boxes => Structure::Boxes(Volumes::build(shapes)),
+            AccelKind::Bvh => Structure::Bvh(Bvh::build(shapes, params.tree_leaf_size())),
             AccelKind::Grid | AccelKind::GridOctree | AccelKind::Octree => {
                 Structure::Grid(GridOctree::build(shapes, &params.grid(kind)).with_mailbox(params.mailbox))
+            }
+            AccelKind::GridBvh => {
+                let grid = GridOctree::build(shapes, &params.grid(kind)).with_mailbox(params.mailbox);
+                Structure::Grid(grid.with_trees(params.tree_leaf_size()))
             }
             AccelKind::FastOctree => Structure::Wide(Wide::build(shapes, Splitting::Octree)),
             AccelKind::FastBvh => Structure::Wide(Wide::build(shapes, Splitting::SurfaceArea)),
@@ -161,27 +202,28 @@ impl<'a> AnyAccel<'a> {
     }
 
     fn ask(&self, question: impl Question, scratch: &mut AnyScratch) {
-        whichever!(&self.structure, a => self.ask_with(question, a, scratch));
-    }
-
-    fn ask_with<C: Culling<Scratch: 'static>>(&self, question: impl Question, accel: &C, scratch: &mut AnyScratch) {
-        match scratch.0.downcast_mut() {
-            Some(scratch) => self.ask_tested(question, accel, scratch),
-            // Scratch of another structure: a fresh one does.
-            None => self.ask_tested(question, accel, &mut accel.new_scratch()),
+        match &self.structure {
+            // What is measured has code of its own for every test.
+            Structure::Wide(a) => with_scratch(a, scratch, |scratch| match self.test {
+                IntersectorKind::Exact => question.ask(a, scratch),
+                IntersectorKind::Watertight => question.ask(&Tested::new(a, Watertight), scratch),
+                IntersectorKind::WatertightDouble => question.ask(&Tested::new(a, WatertightDouble), scratch),
+                IntersectorKind::MollerTrumbore => question.ask(&Tested::new(a, MollerTrumbore), scratch),
+                IntersectorKind::MollerTrumboreDouble => question.ask(&Tested::new(a, MollerTrumboreDouble), scratch),
+            }),
+            other => whichever!(other, a => with_scratch(a, scratch, |scratch| match self.test {
+                IntersectorKind::Exact => question.ask(a, scratch),
+                test => question.ask(&Tested::new(a, Looked(test)), scratch),
+            })),
         }
     }
+}
 
-    fn ask_tested<C: Culling>(&self, question: impl Question, accel: &C, scratch: &mut C::Scratch) {
-        match self.test {
-            IntersectorKind::Exact => question.ask(accel, scratch),
-            IntersectorKind::Watertight => question.ask(&Tested::<Watertight, _>::new(accel), scratch),
-            IntersectorKind::WatertightDouble => question.ask(&Tested::<WatertightDouble, _>::new(accel), scratch),
-            IntersectorKind::MollerTrumbore => question.ask(&Tested::<MollerTrumbore, _>::new(accel), scratch),
-            IntersectorKind::MollerTrumboreDouble => {
-                question.ask(&Tested::<MollerTrumboreDouble, _>::new(accel), scratch);
-            }
-        }
+/// Calls `f` with the structure's own scratch; a fresh one if that of another was given.
+fn with_scratch<C: Culling<Scratch: 'static>>(accel: &C, scratch: &mut AnyScratch, f: impl FnOnce(&mut C::Scratch)) {
+    match scratch.0.downcast_mut() {
+        Some(scratch) => f(scratch),
+        None => f(&mut accel.new_scratch()),
     }
 }
 

@@ -20,7 +20,7 @@ pub trait Intersector: Copy + Send + Sync {
     type Prepared: Copy + fmt::Debug;
 
     /// Prepares a ray.
-    fn prepare(ray: &RaySpace) -> Self::Prepared;
+    fn prepare(self, ray: &RaySpace) -> Self::Prepared;
 
     /// The distance at which the line through the ray meets the triangle, if it does.
     fn distance(prepared: &Self::Prepared, ray: &RaySpace, triangle: &Triangle) -> Option<f32>;
@@ -35,7 +35,7 @@ impl Intersector for Exact {
     type Prepared = ();
 
     #[inline]
-    fn prepare(_: &RaySpace) {}
+    fn prepare(self, _: &RaySpace) {}
 
     #[inline]
     fn distance((): &(), ray: &RaySpace, triangle: &Triangle) -> Option<f32> {
@@ -51,7 +51,7 @@ impl Intersector for Watertight {
     type Prepared = Shear<f32>;
 
     #[inline]
-    fn prepare(ray: &RaySpace) -> Shear<f32> {
+    fn prepare(self, ray: &RaySpace) -> Shear<f32> {
         Shear::new(ray)
     }
 
@@ -69,7 +69,7 @@ impl Intersector for WatertightDouble {
     type Prepared = Shear<f64>;
 
     #[inline]
-    fn prepare(ray: &RaySpace) -> Shear<f64> {
+    fn prepare(self, ray: &RaySpace) -> Shear<f64> {
         Shear::new(ray)
     }
 
@@ -87,7 +87,7 @@ impl Intersector for MollerTrumbore {
     type Prepared = ();
 
     #[inline]
-    fn prepare(_: &RaySpace) {}
+    fn prepare(self, _: &RaySpace) {}
 
     #[inline]
     fn distance((): &(), ray: &RaySpace, triangle: &Triangle) -> Option<f32> {
@@ -103,11 +103,52 @@ impl Intersector for MollerTrumboreDouble {
     type Prepared = ();
 
     #[inline]
-    fn prepare(_: &RaySpace) {}
+    fn prepare(self, _: &RaySpace) {}
 
     #[inline]
     fn distance((): &(), ray: &RaySpace, triangle: &Triangle) -> Option<f32> {
         moller_trumbore::double(ray.origin, ray.dir, triangle).map(|(t, ..)| narrow(t))
+    }
+}
+
+/// Any of them, looked up at every test: where code for each would be too much of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Looked(pub IntersectorKind);
+
+/// What [`Looked`] prepares.
+#[derive(Clone, Copy, Debug)]
+pub enum Prepared {
+    /// Nothing, for a test that needs nothing.
+    Plain(IntersectorKind),
+    /// For [`Watertight`].
+    Single(Shear<f32>),
+    /// For [`WatertightDouble`].
+    Double(Shear<f64>),
+}
+
+impl Intersector for Looked {
+    type Prepared = Prepared;
+
+    #[inline]
+    fn prepare(self, ray: &RaySpace) -> Prepared {
+        match self.0 {
+            IntersectorKind::Watertight => Prepared::Single(Watertight.prepare(ray)),
+            IntersectorKind::WatertightDouble => Prepared::Double(WatertightDouble.prepare(ray)),
+            kind => Prepared::Plain(kind),
+        }
+    }
+
+    #[inline]
+    fn distance(prepared: &Prepared, ray: &RaySpace, triangle: &Triangle) -> Option<f32> {
+        match prepared {
+            Prepared::Single(shear) => Watertight::distance(shear, ray, triangle),
+            Prepared::Double(shear) => WatertightDouble::distance(shear, ray, triangle),
+            Prepared::Plain(IntersectorKind::MollerTrumbore) => MollerTrumbore::distance(&(), ray, triangle),
+            Prepared::Plain(IntersectorKind::MollerTrumboreDouble) => {
+                MollerTrumboreDouble::distance(&(), ray, triangle)
+            }
+            Prepared::Plain(_) => Exact::distance(&(), ray, triangle),
+        }
     }
 }
 

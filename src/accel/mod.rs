@@ -23,6 +23,8 @@ pub mod slabs;
 pub mod stats;
 #[cfg(test)]
 pub(crate) mod tests;
+pub mod transform;
+pub mod volumes;
 pub mod wide;
 
 pub use any::{AccelKind, AnyAccel};
@@ -35,8 +37,10 @@ pub use params::AccelParams;
 pub use probe::{NoProbe, Probe, RayCounts};
 pub use query::Tested;
 pub use refine::Refined;
-pub use shapes::{BitSet, Shapes, SpherePrim};
+pub use shapes::{BitSet, Object, Shapes, SpherePrim};
 pub use stats::StructureStats;
+pub use transform::Transformed;
+pub use volumes::Volumes;
 pub use wide::{Listed, Splitting, Wide};
 
 use crate::math::Vec3;

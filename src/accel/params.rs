@@ -55,7 +55,7 @@ impl AccelParams {
                 _ => self.max_resolution.unwrap_or(default.max_resolution),
             },
             max_depth: match kind {
-                AccelKind::Grid => 0,
+                AccelKind::Grid | AccelKind::GridBvh => 0,
                 _ => self.max_depth.unwrap_or(default.max_depth),
             },
             step_cost: self.step_cost.unwrap_or(default.step_cost),
@@ -63,8 +63,8 @@ impl AccelParams {
         }
     }
 
-    /// Prims of a leaf of `bvh`.
-    pub fn bvh_leaf_size(&self) -> u32 {
+    /// Prims of a leaf of `bvh` and `grid-bvh`.
+    pub fn tree_leaf_size(&self) -> u32 {
         self.leaf_size.unwrap_or(bvh::LEAF_SIZE)
     }
 }

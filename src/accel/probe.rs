@@ -20,6 +20,8 @@ pub trait Probe: Default + Send {
     fn repeat_skipped(&mut self) {}
     /// So many ray/volume tests at once (n_bit).
     fn volume_tests(&mut self, _count: usize) {}
+    /// So many corners and other points were transformed into the ray's axes (n_xf).
+    fn transforms(&mut self, _count: usize) {}
     /// The query found a hit.
     fn found(&mut self) {}
 }
@@ -49,6 +51,8 @@ pub struct RayCounts {
     pub n_mb: u64,
     /// Ray/volume tests.
     pub n_bit: u64,
+    /// Points transformed into the axes of a ray.
+    pub n_xf: u64,
 }
 
 impl Probe for RayCounts {
@@ -74,6 +78,9 @@ impl Probe for RayCounts {
     fn volume_tests(&mut self, count: usize) {
         self.n_bit += count as u64;
     }
+    fn transforms(&mut self, count: usize) {
+        self.n_xf += count as u64;
+    }
     fn found(&mut self) {
         self.found += 1;
     }
@@ -89,5 +96,6 @@ impl AddAssign for RayCounts {
         self.n_it += o.n_it;
         self.n_mb += o.n_mb;
         self.n_bit += o.n_bit;
+        self.n_xf += o.n_xf;
     }
 }

@@ -3,8 +3,6 @@
 //! A structure only decides which prims a ray is tested against ([`Culling`]); tests, order and counting happen here, so
 //! that no two structures can differ in them.
 
-use std::marker::PhantomData;
-
 use super::intersector::{Exact, Intersector};
 use super::{Accel, Hit, NO_PRIM, Probe, Ray, Shapes};
 use crate::math::shear::RaySpace;
@@ -42,6 +40,9 @@ pub trait Goal {
 
     /// Hits beyond this distance do not matter any more.
     fn reach(&self) -> f32;
+
+    /// The test itself.
+    fn test(&self) -> Self::Test;
 }
 
 /// One ray under way.
@@ -65,7 +66,7 @@ impl<'a, G: Goal> Query<'a, G> {
         let t_max = ray.t_max.min(f32::MAX);
         let space = RaySpace::new(ray.origin, ray.dir)?;
         let usable = ray.t_min <= t_max && !ray.t_max.is_nan();
-        let prepared = G::Test::prepare(&space);
+        let prepared = goal.test().prepare(&space);
         usable.then_some(Self { ray: space, t_min: ray.t_min, t_max, exclude: ray.exclude, shapes, prepared, goal })
     }
 
@@ -150,7 +151,7 @@ impl<'a, G: Goal> Query<'a, G> {
 /// The first hit.
 struct Closest<I> {
     best: (f32, u32),
-    test: PhantomData<I>,
+    test: I,
 }
 
 impl<I: Intersector> Goal for Closest<I> {
@@ -166,12 +167,16 @@ impl<I: Intersector> Goal for Closest<I> {
     fn reach(&self) -> f32 {
         self.best.0
     }
+    #[inline]
+    fn test(&self) -> I {
+        self.test
+    }
 }
 
 /// Whether anything opaque is hit.
 struct Occluded<I> {
     found: bool,
-    test: PhantomData<I>,
+    test: I,
 }
 
 impl<I: Intersector> Goal for Occluded<I> {
@@ -188,6 +193,10 @@ impl<I: Intersector> Goal for Occluded<I> {
     #[inline]
     fn reach(&self) -> f32 {
         if self.found { f32::NEG_INFINITY } else { f32::INFINITY }
+    }
+    #[inline]
+    fn test(&self) -> I {
+        self.test
     }
 }
 
@@ -210,10 +219,16 @@ impl<I: Intersector> Goal for Next<I> {
     fn reach(&self) -> f32 {
         self.closest.reach()
     }
+    #[inline]
+    fn test(&self) -> I {
+        self.closest.test
+    }
 }
 
 impl<I> Closest<I> {
-    const NOTHING: Self = Self { best: (f32::INFINITY, NO_PRIM), test: PhantomData };
+    fn nothing(test: I) -> Self {
+        Self { best: (f32::INFINITY, NO_PRIM), test }
+    }
 }
 
 impl<C: Culling> Accel for C {
@@ -224,11 +239,11 @@ impl<C: Culling> Accel for C {
     }
 
     fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
-        closest::<Exact, _, _>(self, rays, hits, scratch, probe);
+        closest(Exact, self, rays, hits, scratch, probe);
     }
 
     fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut Self::Scratch, probe: &mut P) {
-        occluded::<Exact, _, _>(self, rays, blocked, scratch, probe);
+        occluded(Exact, self, rays, blocked, scratch, probe);
     }
 
     fn next<P: Probe>(
@@ -239,7 +254,7 @@ impl<C: Culling> Accel for C {
         scratch: &mut Self::Scratch,
         probe: &mut P,
     ) {
-        next::<Exact, _, _>(self, rays, after, hits, scratch, probe);
+        next(Exact, self, rays, after, hits, scratch, probe);
     }
 }
 
@@ -247,13 +262,13 @@ impl<C: Culling> Accel for C {
 #[derive(Clone, Copy, Debug)]
 pub struct Tested<'a, I, C> {
     structure: &'a C,
-    test: PhantomData<I>,
+    test: I,
 }
 
 impl<'a, I: Intersector, C: Culling> Tested<'a, I, C> {
     /// The same structure with another test.
-    pub fn new(structure: &'a C) -> Self {
-        Self { structure, test: PhantomData }
+    pub fn new(structure: &'a C, test: I) -> Self {
+        Self { structure, test }
     }
 }
 
@@ -265,11 +280,11 @@ impl<I: Intersector, C: Culling> Accel for Tested<'_, I, C> {
     }
 
     fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
-        closest::<I, _, _>(self.structure, rays, hits, scratch, probe);
+        closest(self.test, self.structure, rays, hits, scratch, probe);
     }
 
     fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut Self::Scratch, probe: &mut P) {
-        occluded::<I, _, _>(self.structure, rays, blocked, scratch, probe);
+        occluded(self.test, self.structure, rays, blocked, scratch, probe);
     }
 
     fn next<P: Probe>(
@@ -280,11 +295,12 @@ impl<I: Intersector, C: Culling> Accel for Tested<'_, I, C> {
         scratch: &mut Self::Scratch,
         probe: &mut P,
     ) {
-        next::<I, _, _>(self.structure, rays, after, hits, scratch, probe);
+        next(self.test, self.structure, rays, after, hits, scratch, probe);
     }
 }
 
 fn closest<I: Intersector, C: Culling, P: Probe>(
+    test: I,
     structure: &C,
     rays: &[Ray],
     hits: &mut [Hit],
@@ -292,13 +308,14 @@ fn closest<I: Intersector, C: Culling, P: Probe>(
     probe: &mut P,
 ) {
     for (ray, hit) in rays.iter().zip(hits) {
-        let query = answer(structure, ray, Closest::<I>::NOTHING, scratch, probe);
+        let query = answer(structure, ray, Closest::nothing(test), scratch, probe);
         *hit = query.map_or(Hit::MISS, |q| finish(&q, q.goal.best));
         count_found(hit.is_some(), probe);
     }
 }
 
 fn occluded<I: Intersector, C: Culling, P: Probe>(
+    test: I,
     structure: &C,
     rays: &[Ray],
     blocked: &mut [bool],
@@ -306,13 +323,14 @@ fn occluded<I: Intersector, C: Culling, P: Probe>(
     probe: &mut P,
 ) {
     for (ray, blocked) in rays.iter().zip(blocked) {
-        let goal = Occluded::<I> { found: false, test: PhantomData };
+        let goal = Occluded { found: false, test };
         *blocked = answer(structure, ray, goal, scratch, probe).is_some_and(|q| q.goal.found);
         count_found(*blocked, probe);
     }
 }
 
 fn next<I: Intersector, C: Culling, P: Probe>(
+    test: I,
     structure: &C,
     rays: &[Ray],
     after: &[Hit],
@@ -322,7 +340,7 @@ fn next<I: Intersector, C: Culling, P: Probe>(
 ) {
     for ((ray, after), hit) in rays.iter().zip(after).zip(hits) {
         let rest = Ray { t_min: ray.t_min.max(after.t), ..*ray };
-        let goal = Next { after: (after.t, after.prim), closest: Closest::<I>::NOTHING };
+        let goal = Next { after: (after.t, after.prim), closest: Closest::nothing(test) };
         let query = answer(structure, &rest, goal, scratch, probe);
         *hit = query.map_or(Hit::MISS, |q| finish(&q, q.goal.closest.best));
         count_found(hit.is_some(), probe);

@@ -3,6 +3,8 @@
 //! Prim ids run over all kinds: first the triangles, then the polygons, then the spheres, then the
 //! cones, then the planes.
 
+use std::ops::Range;
+
 use crate::math::aabb::Aabb;
 use crate::math::cone::{self, Cone};
 use crate::math::polygon::{self, Polygon};
@@ -29,6 +31,23 @@ pub struct Shapes {
     pub planes: Vec<(Vec3, f32)>,
     /// One bit per prim: a hit always stops light.
     pub opaque: BitSet,
+    /// Where each object made of faces begins: its first triangle and its first polygon, both counted from 0; ascending.
+    /// Empty: all faces are one object.
+    pub face_runs: Vec<[u32; 2]>,
+}
+
+/// Prims that belong together: a glTF primitive or an OBJ `o`/`g`/`usemtl` run where it stands, or a single other prim.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Object {
+    triangles: Range<u32>,
+    others: Range<u32>,
+}
+
+impl Object {
+    /// Its prims, ascending.
+    pub fn prims(&self) -> impl Iterator<Item = u32> + Clone + use<> {
+        self.triangles.clone().chain(self.others.clone())
+    }
 }
 
 /// A sphere in the centred frame.
@@ -79,6 +98,24 @@ impl Shapes {
     /// Prims that have bounds: all but the planes. They come first.
     pub fn bounded(&self) -> u32 {
         index(self.triangles.len() + self.polygons.len() + self.spheres.len() + self.cones.len())
+    }
+
+    /// All objects that have bounded prims: those of faces, then each sphere and cone.
+    pub fn objects(&self) -> Vec<Object> {
+        let (triangles, polygons) = (index(self.triangles.len()), index(self.polygons.len()));
+        let mut starts = self.face_runs.clone();
+        match starts.first_mut() {
+            Some(first) => *first = [0, 0],
+            None => starts.push([0, 0]),
+        }
+        starts.push([triangles, polygons]);
+        let run = |ends: &[[u32; 2]]| {
+            let [from, to] = [ends[0], ends[1]];
+            Object { triangles: from[0]..to[0], others: triangles + from[1]..triangles + to[1] }
+        };
+        let single = |prim| Object { triangles: 0..0, others: prim..prim + 1 };
+        let faces = starts.windows(2).map(run).filter(|o| o.prims().next().is_some());
+        faces.chain((triangles + polygons..self.bounded()).map(single)).collect()
     }
 
     /// What prim `prim` is.

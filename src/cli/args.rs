@@ -217,7 +217,7 @@ pub(super) struct AccelArgs {
     /// Cost of visiting a cell, counted in tests; cells are split when that should pay [default: 4]
     #[arg(long, value_name = "COST", help_heading = "Structure", hide_short_help = true)]
     pub step_cost: Option<f64>,
-    /// Most shapes in a leaf [default: 2 for `bvh`; octrees go by --step-cost]
+    /// Most shapes in a leaf [default: 2 for `bvh` and `grid-bvh`; octrees go by --step-cost]
     #[arg(long, value_name = "N", help_heading = "Structure", hide_short_help = true)]
     pub leaf_size: Option<u32>,
     /// What a ray remembers of the shapes it met, so that they are tested once (grids and octrees)

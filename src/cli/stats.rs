@@ -12,7 +12,7 @@
 //! | `seconds` | of the timed run: `load`, `build`, `render`, `write`; `load` is 0 for further views of one input |
 //! | `scene` | `triangles`, `polygons`, `spheres`, `cones` (cylinders too), `planes`, `vertices`, `materials`, `textures`, `lights` |
 //! | `structure` | V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`; `bytes` and `depth` |
-//! | `counts` | for each ray class `primary`, `shadow`, `reflected`, `refracted`, and `all`: exact `rays`, `hits`, `tests`, `steps`, `cells`, `empty_cells`, `volume_tests`, `tests_saved`; and per ray `n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`; `culled` = 1 − n_it / N |
+//! | `counts` | for each ray class `primary`, `shadow`, `reflected`, `refracted`, and `all`: exact `rays`, `hits`, `tests`, `steps`, `cells`, `empty_cells`, `volume_tests`, `tests_saved`, `transforms`; and per ray `n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`, `n_xf`; `culled` = 1 − n_it / N |
 //! | `counted_seconds` | time of the second run that counted; never compare it with `seconds` |
 //! | `rounding` | largest displacement of a vertex by rounding, world units |
 //!
@@ -121,8 +121,10 @@ fn class_json(c: &RayCounts, prims: u64) -> Value {
     json!({
         "rays": c.queries, "hits": c.found, "tests": c.n_it, "steps": c.n_ts, "cells": c.n_ets,
         "empty_cells": c.n_eets, "volume_tests": c.n_bit, "tests_saved": c.n_mb,
+        "transforms": c.n_xf,
         "n_it": per_ray(c.n_it), "n_ts": per_ray(c.n_ts), "n_ets": per_ray(c.n_ets),
         "n_eets": per_ray(c.n_eets), "n_bit": per_ray(c.n_bit), "n_mb": per_ray(c.n_mb),
+        "n_xf": per_ray(c.n_xf),
         "culled": if prims == 0 { 0.0 } else { 1.0 - per_ray(c.n_it) / prims as f64 },
     })
 }
@@ -130,12 +132,13 @@ fn class_json(c: &RayCounts, prims: u64) -> Value {
 /// What the parameters of a structure were, those that it has.
 fn parameters(kind: AccelKind, params: &AccelParams) -> Value {
     match kind {
-        AccelKind::Bvh => json!({ "leaf_size": params.bvh_leaf_size() }),
-        AccelKind::Grid | AccelKind::GridOctree | AccelKind::Octree => {
+        AccelKind::Bvh => json!({ "leaf_size": params.tree_leaf_size() }),
+        AccelKind::Grid | AccelKind::GridOctree | AccelKind::GridBvh | AccelKind::Octree => {
             let grid = params.grid(kind);
+            let in_trees = (kind == AccelKind::GridBvh).then(|| params.tree_leaf_size());
             json!({
                 "grid_density": grid.density, "grid_resolution": grid.max_resolution, "max_depth": grid.max_depth,
-                "step_cost": grid.step_cost, "leaf_size": grid.leaf_size, "mailbox": params.mailbox.name(),
+                "step_cost": grid.step_cost, "leaf_size": in_trees.or(grid.leaf_size), "mailbox": params.mailbox.name(),
             })
         }
         _ => json!({}),
@@ -218,20 +221,21 @@ impl PictureStats {
 
 fn count_table(counted: &Counted) -> Vec<String> {
     let mut lines = vec![format!(
-        "  {:<10} {:>12} {:>12} {:>9} {:>9} {:>9} {:>9} {:>9}",
-        "counts", "rays", "hits", "n_it", "n_ts", "n_ets", "n_eets", "n_mb"
+        "  {:<10} {:>12} {:>12} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}",
+        "counts", "rays", "hits", "n_it", "n_ts", "n_ets", "n_eets", "n_bit", "n_mb"
     )];
     let mut all = RayCounts::default();
     let mut row = |name: &str, c: &RayCounts| {
         let per_ray = |n: u64| n as f64 / c.queries.max(1) as f64;
         lines.push(format!(
-            "  {name:<10} {:>12} {:>12} {:>9.3} {:>9.3} {:>9.3} {:>9.3} {:>9.3}",
+            "  {name:<10} {:>12} {:>12} {:>9.3} {:>9.3} {:>9.3} {:>9.3} {:>9.3} {:>9.3}",
             c.queries,
             c.found,
             per_ray(c.n_it),
             per_ray(c.n_ts),
             per_ray(c.n_ets),
             per_ray(c.n_eets),
+            per_ray(c.n_bit),
             per_ray(c.n_mb),
         ));
     };

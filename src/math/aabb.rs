@@ -30,6 +30,11 @@ impl Aabb {
         Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
     }
 
+    /// What is in both; empty where they do not meet.
+    pub fn intersection(self, other: Self) -> Self {
+        Self { lo: self.lo.max(other.lo), hi: self.hi.min(other.hi) }
+    }
+
     /// Whether it holds no point.
     pub fn is_empty(&self) -> bool {
         !self.lo.cmple(self.hi).all()

@@ -81,6 +81,7 @@ impl World {
         for instance in &scene.instances {
             let mesh = &scene.meshes[instance.mesh as usize];
             let base = index(shapes.vertices.len());
+            shapes.face_runs.push([index(shapes.triangles.len()), index(shapes.polygons.len())]);
             let to_frame = centered(&instance.world_from_object, center);
             let place = |p: &Vec3| to_frame.transform_point3(p.as_dvec3()).as_vec3();
             shapes.vertices.par_extend(mesh.positions.par_iter().with_min_len(PARALLEL_RUN).map(place));
@@ -248,6 +249,13 @@ mod tests {
         assert_eq!((world.source(4), world.source(5)), (PrimSource::Cone(0), PrimSource::Plane(0)));
         let opaque: Vec<bool> = (0..6).map(|p| world.shapes.opaque.get(p)).collect();
         assert_eq!(opaque, [true, false, false, true, false, false]);
+    }
+
+    #[test]
+    fn objects_are_the_faces_of_an_instance_and_each_other_prim() {
+        let world = World::new(&one_of_each_kind());
+        let objects: Vec<Vec<u32>> = world.shapes.objects().iter().map(|o| o.prims().collect()).collect();
+        assert_eq!(objects, [vec![0], vec![1, 2], vec![3], vec![4]], "a plane is none");
     }
 
     #[test]

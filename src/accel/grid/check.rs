@@ -10,7 +10,7 @@ impl<M> GridOctree<'_, M> {
     pub fn summary(&self) -> StructureStats {
         let mut stats = StructureStats {
             n_in: 1 + self.cells.nodes.len() as u64,
-            bytes: (self.cells.bytes() + size_of_val(&*self.top)) as u64,
+            bytes: (self.cells.bytes() + self.trees.bytes() + size_of_val(&*self.top)) as u64,
             ..StructureStats::default()
         };
         self.each_cell(&mut |cube, cell| {
@@ -18,12 +18,13 @@ impl<M> GridOctree<'_, M> {
             stats.n_ev += u64::from(cell == EMPTY);
             stats.n_oiv += self.cells.list(cell).len() as u64;
             stats.depth = stats.depth.max(self.lattice.levels - cube.level);
+            self.trees.count(cell, &mut stats);
         });
         stats
     }
 
     /// Visits everything: lists ascend, name existing prims only, and each prim is listed in every cell that it touches,
-    /// padded, and in no other.
+    /// padded, and in no other; hierarchies hold what their cells list.
     pub fn check(&self) -> Result<StructureStats, String> {
         let stats = self.summary();
         let prims = self.shapes.bounded();
@@ -42,6 +43,9 @@ impl<M> GridOctree<'_, M> {
         let mut belong = 0;
         let mut failure = None;
         self.each_cell(&mut |cube, cell| {
+            if let Some(fault) = self.tree_fault(cube, cell) {
+                failure = Some(fault);
+            }
             for (&prim, listed) in self.cells.list(cell).iter().zip(1..) {
                 belong += u64::from(overlaps[prim as usize].test(cube));
                 if failure.is_none() && !overlaps[prim as usize].test(cube) {
@@ -68,7 +72,7 @@ impl<M> GridOctree<'_, M> {
     }
 
     /// Every leaf with its cube.
-    fn each_cell(&self, found: &mut impl FnMut(Cube, u32)) {
+    pub(super) fn each_cell(&self, found: &mut impl FnMut(Cube, u32)) {
         for (i, &entry) in self.top.iter().enumerate() {
             self.below(self.lattice.top_cube(self.lattice.top_cell(i)), entry, &|_| true, found);
         }

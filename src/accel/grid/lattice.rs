@@ -125,6 +125,17 @@ impl Lattice {
         Cube { lo: cell.map(|c| c << self.levels), level: self.levels }
     }
 
+    /// The box of a cube and its padding in the frame of the shapes, rounded outwards.
+    ///
+    /// Rounding in `f64` moves it by 3 u of its coordinates. The padding is more than 2⁻⁴⁹ of them, of which the walk needs
+    /// a small part ([`CELL_PAD`]): `f32` coordinates that differ do so by 2⁻²⁴ at least, and that is 2¹⁶ cells at most.
+    pub fn padded_bounds(&self, cube: Cube) -> Aabb {
+        let lo = DVec3::from_array(cube.lo.map(f64::from));
+        let place = |p: DVec3| (self.lo + p / self.scale).as_vec3();
+        let (lo, hi) = (place(lo - self.margins.pad), place(lo + cube.side() + self.margins.pad));
+        Aabb { lo: lo.map(f32::next_down), hi: hi.map(f32::next_up) }
+    }
+
     /// Index of a top cell.
     pub fn top_index(&self, [x, y, z]: [u32; 3]) -> usize {
         (z as usize * self.dims[1] as usize + y as usize) * self.dims[0] as usize + x as usize

@@ -2,7 +2,7 @@
 //!
 //! A grid of cells as near to cubes as possible lies over the shapes ([`lattice`]); every cell lists the prims whose
 //! surface touches it, padded ([`overlap`], `build`). Where a list is so long that smaller cells are expected to pay, the
-//! cell becomes an octree (`octree`). A ray visits cells in order and stops behind the first hit that nothing can precede
+//! cell becomes an octree (`octree`), or is given a hierarchy of boxes (`trees`). A ray visits cells in order and stops behind the first hit that nothing can precede
 //! (`walk`); the mailbox saves repeated tests of prims listed in several cells ([`mailbox`]).
 
 mod build;
@@ -14,6 +14,7 @@ pub(super) mod margins;
 mod octree;
 pub mod overlap;
 pub mod params;
+mod trees;
 mod walk;
 
 use std::marker::PhantomData;
@@ -23,6 +24,8 @@ pub use params::GridParams;
 use self::lattice::{CellMargins, Lattice};
 use self::mailbox::{AnyMailbox, Mailbox, MailboxKind};
 use self::octree::Cells;
+use self::trees::Trees;
+use super::bvh::tree::Stack;
 use super::query::{Culling, Goal, Query};
 use super::{Probe, Shapes};
 
@@ -40,6 +43,7 @@ pub struct GridOctree<'a, M = AnyMailbox> {
     /// One entry for each top cell: a cell, or an octree's root marked [`NODE`].
     top: Vec<u32>,
     cells: Cells,
+    trees: Trees,
     mailbox: MailboxKind,
     scratch: PhantomData<fn() -> M>,
 }
@@ -60,22 +64,38 @@ impl<'a, M: Mailbox> GridOctree<'a, M> {
     pub(super) fn build_within(shapes: &'a Shapes, params: &GridParams, margins: CellMargins) -> Self {
         let lattice = Lattice::new(shapes, params, margins);
         let (top, cells) = build::build(shapes, &lattice, params);
-        Self { shapes, lattice, top, cells, mailbox: MailboxKind::default(), scratch: PhantomData }
+        Self {
+            shapes,
+            lattice,
+            top,
+            cells,
+            trees: Trees::default(),
+            mailbox: MailboxKind::default(),
+            scratch: PhantomData,
+        }
     }
 }
 
+/// What a walk through cells writes to.
+#[derive(Clone, Debug)]
+pub struct GridScratch<M> {
+    /// What the ray remembers.
+    pub mailbox: M,
+    stack: Stack,
+}
+
 impl<M: Mailbox> Culling for GridOctree<'_, M> {
-    type Scratch = M;
+    type Scratch = GridScratch<M>;
 
     fn shapes(&self) -> &Shapes {
         self.shapes
     }
 
-    fn new_scratch(&self) -> M {
-        M::new(self.mailbox, self.shapes.bounded())
+    fn new_scratch(&self) -> GridScratch<M> {
+        GridScratch { mailbox: M::new(self.mailbox, self.shapes.bounded()), stack: Stack::default() }
     }
 
-    fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, mailbox: &mut M, probe: &mut P) {
-        self.walk_cells(query, mailbox, probe);
+    fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, scratch: &mut GridScratch<M>, probe: &mut P) {
+        self.walk_cells(query, scratch, probe);
     }
 }

@@ -14,9 +14,10 @@
 
 use super::lattice::Lattice;
 use super::mailbox::Mailbox;
-use super::{EMPTY, GridOctree, NODE};
+use super::{EMPTY, GridOctree, GridScratch, NODE};
 use crate::accel::Probe;
 use crate::accel::query::{Goal, Query};
+use crate::accel::slabs::BoxRay;
 
 /// A ray in units of finest cells; t is the same as outside.
 struct Track {
@@ -25,11 +26,13 @@ struct Track {
     inv_dir: [f64; 3],
     /// Whether it runs towards larger coordinates.
     forwards: [bool; 3],
+    /// For the hierarchies in cells, if there are any.
+    boxes: Option<BoxRay>,
 }
 
 impl Track {
     /// `None`: the origin is too far away to know the ray's cells.
-    fn new<G: Goal>(lattice: &Lattice, query: &Query<G>) -> Option<Self> {
+    fn new<G: Goal>(lattice: &Lattice, query: &Query<G>, boxes: bool) -> Option<Self> {
         let origin = lattice.place(query.ray.origin);
         let along = query.ray.dir.as_dvec3() * lattice.scale;
         let dir = along.map(|d| if d == 0.0 { lattice.margins.no_slope } else { d });
@@ -38,6 +41,7 @@ impl Track {
             dir: dir.to_array(),
             inv_dir: dir.recip().to_array(),
             forwards: dir.to_array().map(|d| d > 0.0),
+            boxes: boxes.then(|| BoxRay::new(query)),
         })
     }
 
@@ -90,9 +94,14 @@ impl<M: Mailbox> GridOctree<'_, M> {
     }
 
     /// Visits the cells along the ray in order.
-    pub(super) fn walk_cells<G: Goal, P: Probe>(&self, query: &mut Query<G>, mailbox: &mut M, probe: &mut P) {
-        mailbox.next_ray();
-        let Some(track) = Track::new(&self.lattice, query) else {
+    pub(super) fn walk_cells<G: Goal, P: Probe>(
+        &self,
+        query: &mut Query<G>,
+        scratch: &mut GridScratch<M>,
+        probe: &mut P,
+    ) {
+        scratch.mailbox.next_ray();
+        let Some(track) = Track::new(&self.lattice, query, !self.trees.is_empty()) else {
             self.test_all(query, probe);
             return;
         };
@@ -118,9 +127,9 @@ impl<M: Mailbox> GridOctree<'_, M> {
                 probe.cell(true);
             } else {
                 let answered = if entry & NODE == 0 {
-                    self.visit(entry, query, mailbox, probe)
+                    self.visit(entry, &track, query, scratch, probe)
                 } else {
-                    self.walk_octants(entry, cell, enter, &track, query, mailbox, probe)
+                    self.walk_octants(entry, cell, enter, &track, query, scratch, probe)
                 };
                 if answered {
                     return;
@@ -154,7 +163,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
         enter: f64,
         track: &Track,
         query: &mut Query<G>,
-        mailbox: &mut M,
+        scratch: &mut GridScratch<M>,
         probe: &mut P,
     ) -> bool {
         let levels = self.lattice.levels;
@@ -170,7 +179,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
                 probe.step();
                 probe.cell(true);
             } else {
-                if self.visit(cell, query, mailbox, probe) {
+                if self.visit(cell, track, query, scratch, probe) {
                     return true;
                 }
                 end = self.limit(query);
@@ -223,17 +232,30 @@ impl<M: Mailbox> GridOctree<'_, M> {
 
     /// Tests the prims of a cell that has some; whether the query is answered.
     #[inline]
-    fn visit<G: Goal, P: Probe>(&self, cell: u32, query: &mut Query<G>, mailbox: &mut M, probe: &mut P) -> bool {
-        probe.step();
-        probe.cell(false);
-        for &prim in self.cells.list(cell) {
-            if !mailbox.first_visit(prim) {
-                probe.repeat_skipped();
-            } else if query.test(prim, probe) {
-                return true;
+    fn visit<G: Goal, P: Probe>(
+        &self,
+        cell: u32,
+        track: &Track,
+        query: &mut Query<G>,
+        GridScratch { mailbox, stack }: &mut GridScratch<M>,
+        probe: &mut P,
+    ) -> bool {
+        let mut test = |prims: &[u32], query: &mut Query<G>, probe: &mut P| {
+            for &prim in prims {
+                if !mailbox.first_visit(prim) {
+                    probe.repeat_skipped();
+                } else if query.test(prim, probe) {
+                    return true;
+                }
             }
+            false
+        };
+        probe.step();
+        if let (Some(root), Some(ray)) = (self.trees.root(cell), &track.boxes) {
+            return self.trees.tree.walk(root, ray, query, stack, probe, test);
         }
-        false
+        probe.cell(false);
+        test(self.cells.list(cell), query, probe)
     }
 
     fn test_all<G: Goal, P: Probe>(&self, query: &mut Query<G>, probe: &mut P) {

@@ -57,7 +57,7 @@ fn every_reference_seen_is_tested_or_skipped_and_the_exact_kind_tests_no_prim_tw
                 for ray in rays(&shapes, 8).iter().filter(|r| r.exclude == NO_PRIM) {
                     let (exact, hashed) = (counts(&exact, ray, &mut a), counts(&hashed, ray, &mut b));
                     let all = counts(&recorder, ray, &mut c);
-                    let recorded = &c;
+                    let recorded = &c.mailbox;
                     if all.n_ts > 0 {
                         assert_eq!((all.n_it, all.n_mb), (recorded.visits, 0), "{name}");
                         assert_eq!(exact.n_it, recorded.prims.len() as u64, "{name}: each prim once");

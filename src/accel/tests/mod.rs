@@ -6,6 +6,8 @@ mod hierarchy;
 mod mailbox;
 pub(crate) mod scenes;
 mod starts;
+mod transform;
+mod volumes;
 mod watertight;
 
 use super::*;

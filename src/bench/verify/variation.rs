@@ -111,6 +111,7 @@ impl Variations {
 fn only_triangles(shapes: &Shapes) -> Shapes {
     let mut only =
         Shapes { vertices: shapes.vertices.clone(), triangles: shapes.triangles.clone(), ..Shapes::default() };
+    only.face_runs = shapes.face_runs.iter().map(|&[triangle, _]| [triangle, 0]).collect();
     only.opaque = BitSet::filled(only.len(), true);
     only
 }

