@@ -76,8 +76,10 @@ pub mod accel;
 pub mod bench;
 #[cfg(feature = "cli")]
 pub mod cli;
+pub mod generate;
 pub mod image;
 pub mod load;
 pub mod math;
 pub mod render;
+pub mod save;
 pub mod scene;

@@ -3,6 +3,7 @@
 use super::parse;
 use crate::accel::{AccelKind, IntersectorKind, MailboxKind};
 use crate::bench::verify::Plan;
+use crate::generate::Family;
 use crate::image::ToneMap;
 use crate::scene::framing::NamedView;
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
@@ -38,6 +39,8 @@ pub(super) enum Command {
     Verify(VerifyArgs),
     /// Compare structures on a model: the same rays through each, whether the hits are the same, what they cost
     Bench(Box<BenchArgs>),
+    /// Write a scene of any size: tetra, gears, balls, tree, mountain, stadium, instances
+    Generate(GenerateArgs),
     /// Print a completion script for a shell
     Completions {
         /// The shell
@@ -321,6 +324,26 @@ pub(super) struct BenchArgs {
     /// Only the tables, warnings and errors
     #[arg(short, long, help_heading = "Run")]
     pub quiet: bool,
+}
+
+/// What `meshray generate` was given.
+#[derive(Debug, Clone, Args)]
+pub(super) struct GenerateArgs {
+    /// Which kind of scene
+    #[arg(value_name = "NAME", value_parser = parse::family())]
+    pub family: Family,
+    /// About how many triangles, up to 1e7
+    #[arg(long, value_name = "N", default_value = "1e5", value_parser = parse::triangles)]
+    pub size: usize,
+    /// Where to write: a .glb (with materials and instances) or an .obj (triangles alone) [default: NAME-N.glb]
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Only warnings and errors on standard error
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// How messages are written to standard error
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub messages: MessageFormat,
 }
 
 /// One model and how to load it.

@@ -1,6 +1,7 @@
 //! The words of single flags: sizes, vectors, angles, colours. Errors say what would be right.
 
 use crate::accel::{AccelKind, IntersectorKind, MailboxKind};
+use crate::generate::{Family, MAX_TRIANGLES};
 use crate::image::ToneMap;
 use crate::math::Vec3;
 use crate::scene::Background;
@@ -87,6 +88,13 @@ pub(super) fn positive(text: &str) -> Result<usize, String> {
     text.parse().ok().filter(|&n| n > 0).ok_or_else(|| "write a number from 1".into())
 }
 
+/// A number of triangles that a scene can be generated with, also as `1e6`.
+pub(super) fn triangles(text: &str) -> Result<usize, String> {
+    let number = text.parse::<f64>().ok().filter(|n| (1.0..=MAX_TRIANGLES as f64).contains(n));
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
+    number.map(|n| n as usize).ok_or_else(|| "write a number of triangles from 1 to 1e7".into())
+}
+
 /// Bytes with an optional binary suffix: `500M`, `2G`, `2GiB`.
 pub(super) fn bytes(text: &str) -> Result<u64, String> {
     let wrong = || "write a size such as 500M or 2G".to_owned();
@@ -131,6 +139,12 @@ pub(super) fn mailbox() -> impl TypedValueParser<Value = MailboxKind> {
 pub(super) fn intersector() -> impl TypedValueParser<Value = IntersectorKind> {
     let parse = |name: String| name.parse::<IntersectorKind>().map_err(|e| e.to_string());
     PossibleValuesParser::new(IntersectorKind::ALL.map(IntersectorKind::name)).try_map(parse)
+}
+
+/// The names of all families of generated scenes.
+pub(super) fn family() -> impl TypedValueParser<Value = Family> {
+    let parse = |name: String| name.parse::<Family>().map_err(|e| e.to_string());
+    PossibleValuesParser::new(Family::ALL.map(Family::name)).try_map(parse)
 }
 
 /// The names of all tone maps.

@@ -3,6 +3,7 @@
 mod again;
 mod backdrop;
 mod endings;
+mod generate;
 mod interrupt;
 mod messages;
 mod other_commands;

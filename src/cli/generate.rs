@@ -1,0 +1,67 @@
+//! `meshray generate`: scenes of any size, for asking how cost grows.
+
+use super::args::GenerateArgs;
+use super::exit::Exit;
+use super::message::Messages;
+use super::text::grouped;
+use crate::generate::{Family, triangles};
+use crate::image::write_atomic;
+use crate::save::{glb, obj};
+use crate::scene::Scene;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Makes the scene and writes it.
+pub(super) fn run(args: &GenerateArgs) -> Exit {
+    let messages = Messages::new(args.messages.into(), args.quiet);
+    let path = match &args.output {
+        Some(path) => path.clone(),
+        None => PathBuf::from(format!("{}-{}.glb", args.family, args.size)),
+    };
+    if args.output.is_none() && path.exists() {
+        let text = format!("{} exists and is not replaced", path.display());
+        messages.error("output-exists", text, format!("name it to replace it: -o {}", path.display()));
+        return Exit::Failed;
+    }
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let write = match extension.as_str() {
+        "glb" => as_glb,
+        "obj" => as_obj,
+        _ => {
+            let text = format!("{}: a scene is written as .glb or .obj", path.display());
+            messages.error("usage", text, "give the output one of these endings");
+            return Exit::Usage;
+        }
+    };
+    let scene = args.family.scene(args.size);
+    let written = write(&scene).and_then(|bytes| write_atomic(&path, &bytes, false).map_err(|e| e.to_string()));
+    match written {
+        Ok(()) => {
+            messages.info("generated", summary(args.family, &path, &scene));
+            Exit::Done
+        }
+        Err(text) => {
+            messages.error("output-unwritable", format!("{}: {text}", path.display()), "");
+            Exit::Failed
+        }
+    }
+}
+
+fn as_glb(scene: &Scene) -> Result<Vec<u8>, String> {
+    glb::bytes(scene).map_err(|e| e.to_string())
+}
+
+fn as_obj(scene: &Scene) -> Result<Vec<u8>, String> {
+    let mut bytes = Vec::new();
+    obj::write(scene, &mut bytes).and_then(|()| bytes.flush()).map_err(|e| e.to_string())?;
+    Ok(bytes)
+}
+
+fn summary(family: Family, path: &Path, scene: &Scene) -> String {
+    let (count, instances) = (grouped(triangles(scene) as u64), scene.instances.len());
+    format!(
+        "{}: {family}, {count} triangles in {instances} {}",
+        path.display(),
+        if instances == 1 { "object" } else { "objects" }
+    )
+}

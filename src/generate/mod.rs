@@ -1,0 +1,150 @@
+//! Families of scenes of any size, for asking how cost grows with the number of triangles.
+//!
+//! After the Standard Procedural Databases (E. Haines, *A Proposal for Standard Graphics Environments*, 1987), as
+//! triangles: every family takes the number that is wanted and comes as near to it as its rule allows. All are formulas
+//! with fixed random streams: the same on every machine.
+
+mod balls;
+mod gears;
+mod instances;
+mod mountain;
+mod pot;
+mod solid;
+mod stadium;
+mod tetra;
+mod tree;
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::math::{DAffine3, Vec3};
+use crate::scene::{Instance, Material, Mesh, MetalRough, Scene, Surface, UpAxis};
+
+/// The most triangles that can be asked for.
+pub const MAX_TRIANGLES: usize = 10_000_000;
+
+/// A kind of scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// Tetrahedra within a tetrahedron: even in space, much of it empty.
+    Tetra,
+    /// Toothed wheels side by side and in layers: long thin faces.
+    Gears,
+    /// Balls on balls on balls, on a floor: many sizes at once.
+    Balls,
+    /// Branches on branches over one huge floor.
+    Tree,
+    /// A rough height field with four glass balls above it.
+    Mountain,
+    /// A small pot in a huge bowl: all detail in one place.
+    Stadium,
+    /// One pot, many times.
+    Instances,
+}
+
+impl Family {
+    /// Every family.
+    pub const ALL: [Self; 7] =
+        [Self::Tetra, Self::Gears, Self::Balls, Self::Tree, Self::Mountain, Self::Stadium, Self::Instances];
+
+    /// As typed and printed.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Tetra => "tetra",
+            Self::Gears => "gears",
+            Self::Balls => "balls",
+            Self::Tree => "tree",
+            Self::Mountain => "mountain",
+            Self::Stadium => "stadium",
+            Self::Instances => "instances",
+        }
+    }
+
+    /// The scene of about `triangles` triangles, 1 to [`MAX_TRIANGLES`], z upwards.
+    pub fn scene(self, triangles: usize) -> Scene {
+        let wanted = triangles.clamp(1, MAX_TRIANGLES);
+        match self {
+            Self::Tetra => tetra::scene(wanted),
+            Self::Gears => gears::scene(wanted),
+            Self::Balls => balls::scene(wanted),
+            Self::Tree => tree::scene(wanted),
+            Self::Mountain => mountain::scene(wanted),
+            Self::Stadium => stadium::scene(wanted),
+            Self::Instances => instances::scene(wanted),
+        }
+    }
+}
+
+impl fmt::Display for Family {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A name that no family has.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("no family is named {0:?}; there are: tetra, gears, balls, tree, mountain, stadium, instances")]
+pub struct UnknownFamily(String);
+
+impl FromStr for Family {
+    type Err = UnknownFamily;
+
+    fn from_str(name: &str) -> Result<Self, UnknownFamily> {
+        Self::ALL.into_iter().find(|f| f.name() == name).ok_or_else(|| UnknownFamily(name.into()))
+    }
+}
+
+/// Triangles in a scene, instances counted each.
+pub fn triangles(scene: &Scene) -> usize {
+    scene.instances.iter().map(|i| scene.meshes[i.mesh as usize].triangles.len()).sum()
+}
+
+/// A matt or glossy colour.
+fn paint(name: &str, base_color: Vec3, metallic: f32, roughness: f32) -> Material {
+    let surface = Surface::MetalRough(MetalRough { metallic, roughness, ..MetalRough::default() });
+    Material { name: name.into(), base_color, double_sided: true, surface, ..Material::default() }
+}
+
+/// Meshes where they are, one instance each.
+fn standing(meshes: Vec<Mesh>, materials: Vec<Material>) -> Scene {
+    #[expect(clippy::cast_possible_truncation, reason = "a handful of meshes")]
+    let instance = |(i, mesh): (usize, &Mesh)| Instance {
+        name: mesh.name.clone(),
+        mesh: i as u32,
+        world_from_object: DAffine3::IDENTITY,
+    };
+    let instances = meshes.iter().enumerate().map(instance).collect();
+    Scene { meshes, instances, materials, up: UpAxis::Z, ..Scene::default() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_family_comes_near_the_size_that_is_wanted() {
+        for family in Family::ALL {
+            for wanted in [1000, 5000, 20_000, 100_000] {
+                let scene = family.scene(wanted);
+                let ratio = triangles(&scene) as f64 / wanted as f64;
+                // Families of powers come as near as the factor between two of them allows.
+                assert!((0.45..2.2).contains(&ratio), "{family} {wanted}: {}", triangles(&scene));
+                let finite = scene.meshes.iter().flat_map(|m| &m.positions).all(|p| p.is_finite());
+                let sound = scene.meshes.iter().all(|m| {
+                    m.triangles.iter().flatten().all(|&i| (i as usize) < m.positions.len())
+                        && (m.material as usize) < scene.materials.len()
+                });
+                assert!(finite && sound, "{family} {wanted}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_smallest_scene_of_every_family_has_something_to_see() {
+        for family in Family::ALL {
+            assert!(triangles(&family.scene(1)) > 0, "{family}");
+            assert_eq!(family.name().parse(), Ok(family));
+        }
+        assert!("teapot".parse::<Family>().is_err());
+    }
+}

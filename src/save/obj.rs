@@ -1,0 +1,62 @@
+//! Wavefront OBJ: positions and triangles, an object for each instance. Materials are left out: they would be a second
+//! file.
+
+use std::io::{self, Write};
+
+use super::upright;
+use crate::scene::Scene;
+
+/// Writes the triangles of a scene, instances turned into geometry; coordinates as the shortest decimals that give the
+/// same `f32` again.
+///
+/// # Errors
+/// Those of `out`.
+pub fn write(scene: &Scene, out: &mut impl Write) -> io::Result<()> {
+    let turn = upright(scene.up);
+    let mut before = 1;
+    for instance in &scene.instances {
+        let mesh = &scene.meshes[instance.mesh as usize];
+        writeln!(out, "o {}", name(&instance.name))?;
+        let world = turn * instance.world_from_object;
+        for p in &mesh.positions {
+            let p = world.transform_point3(p.as_dvec3()).as_vec3();
+            writeln!(out, "v {} {} {}", p.x, p.y, p.z)?;
+        }
+        for [a, b, c] in mesh.triangles.iter().map(|t| t.map(|i| i as usize + before)) {
+            writeln!(out, "f {a} {b} {c}")?;
+        }
+        before += mesh.positions.len();
+    }
+    Ok(())
+}
+
+/// A name on one line.
+fn name(name: &str) -> String {
+    if name.is_empty() { "object".into() } else { name.replace(char::is_control, " ") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::generate::{Family, triangles};
+    use crate::load::{LoadOptions, load_bytes};
+    use crate::render::World;
+
+    #[test]
+    fn every_triangle_is_read_back_where_it_was() {
+        for family in [Family::Instances, Family::Mountain] {
+            let scene = family.scene(800);
+            let mut bytes = Vec::new();
+            write(&scene, &mut bytes).unwrap();
+            let read = load_bytes("a.obj".as_ref(), bytes, &LoadOptions::default()).unwrap().scene;
+            assert_eq!(triangles(&read), triangles(&scene));
+            let size = |scene: &crate::scene::Scene| {
+                let shapes = World::new(scene).shapes;
+                shapes.vertices.iter().fold(glam::Vec3::ZERO, |m, p| m.max(p.abs()))
+            };
+            let (was, is) = (size(&scene), size(&read));
+            // +Z up became +Y up.
+            assert!((was.x - is.x).abs() + (was.y - is.z).abs() + (was.z - is.y).abs() < 1e-4, "{was} {is}");
+        }
+    }
+}
