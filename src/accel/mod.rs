@@ -10,6 +10,7 @@
 //! one, with many in flight, or as packets, with the same bits in the answer.
 
 pub mod any;
+pub mod auto;
 pub mod bvh;
 pub mod grid;
 pub mod intersector;
@@ -28,6 +29,7 @@ pub mod volumes;
 pub mod wide;
 
 pub use any::{AccelKind, AnyAccel};
+pub use auto::AccelChoice;
 pub use bvh::Bvh;
 pub use grid::mailbox::MailboxKind;
 pub use grid::{GridOctree, GridParams};

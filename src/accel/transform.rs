@@ -10,7 +10,7 @@
 //! With D the largest difference of coordinates between a point and the ray's origin: its sheared coordinates err by
 //! [`HEIGHT_F64`] D, its depth by two roundings. A point within r of another, whose direction has no component larger
 //! than that along the third axis, is within √2 r of it in each sheared axis and r in the third. Extents are widened by
-//! [`SHADOW`] D, depths as in [`slabs`](super::slabs).
+//! `SHADOW` D, depths as in [`slabs`](super::slabs).
 
 use super::query::{Culling, Goal, Query};
 use super::shapes::Prim;

@@ -11,7 +11,8 @@ use super::job::{Batch, RenderJob, Shot};
 use super::parse;
 use super::picture::Effective;
 use super::stats::Counted;
-use crate::accel::MailboxKind;
+use crate::accel::auto::Reason;
+use crate::accel::{AccelKind, MailboxKind};
 use crate::image::{ExrSamples, FileKind, ImageError, Metadata, PngDepth, read_metadata};
 use crate::load::{Diagnostic, Loaded, MtlMode, Polygons};
 use crate::math::DVec3;
@@ -69,6 +70,10 @@ pub(super) struct Facts<'a> {
     pub effective: &'a Effective,
     /// Depth as used.
     pub depth: u32,
+    /// Structure as used.
+    pub accel: AccelKind,
+    /// Why that, if it was chosen by counts.
+    pub reason: Option<Reason>,
     /// What was loaded.
     pub loaded: &'a Loaded,
 }
@@ -133,7 +138,7 @@ impl Facts<'_> {
         if load.mtl == MtlMode::Literal {
             set("mtl", "literal".into());
         }
-        set("accel", self.job.accel.name().into());
+        set("accel", self.accel.name().into());
         set("intersector", self.job.intersector.name().into());
         let params = &self.job.params;
         params.density.iter().for_each(|n| set("grid-density", n.to_string()));

@@ -1,7 +1,7 @@
 //! What was typed: syntax only. What it means together is decided in [`super::job`].
 
 use super::parse;
-use crate::accel::{AccelKind, IntersectorKind, MailboxKind};
+use crate::accel::{AccelChoice, AccelKind, IntersectorKind, MailboxKind};
 use crate::bench::verify::Plan;
 use crate::generate::Family;
 use crate::image::ToneMap;
@@ -176,10 +176,11 @@ pub(super) struct RenderArgs {
     #[arg(long, help_heading = "Loading", hide_short_help = true)]
     pub strict: bool,
 
-    /// Structure that finds what rays hit; the picture is the same with each
-    #[arg(long, value_name = "NAME", value_parser = parse::accel(), default_value = AccelKind::DEFAULT.name(),
+    /// Structure that finds what rays hit; the picture is the same with each. `auto` counts what some rays cost in
+    /// `fast-octree` and `fast-bvh` and takes the better one
+    #[arg(long, value_name = "NAME", value_parser = parse::accel_choice(), default_value = AccelChoice::AUTO,
           help_heading = "Structure", hide_short_help = true)]
-    pub accel: AccelKind,
+    pub accel: AccelChoice,
     /// Test of rays against triangles; all but `exact` are there to be compared with it
     #[arg(long, value_name = "NAME", value_parser = parse::intersector(), default_value = IntersectorKind::Exact.name(),
           help_heading = "Structure", hide_short_help = true)]

@@ -5,7 +5,7 @@ use super::camera::{Choice, LensChoice};
 use super::message;
 use super::output_name::{self, Facts};
 use super::parse::Back;
-use crate::accel::{AccelKind, AccelParams, IntersectorKind};
+use crate::accel::{AccelChoice, AccelParams, IntersectorKind};
 use crate::image::{ExrSamples, FileKind, PngDepth, ToneMap};
 use crate::load::{Limits, LoadOptions, MtlMode, Polygons};
 use crate::scene::UpAxis;
@@ -29,7 +29,7 @@ pub(super) struct RenderJob {
     /// What the command line says about the picture; the rest comes from the scene or the defaults.
     pub look: Look,
     /// Which structure.
-    pub accel: AccelKind,
+    pub accel: AccelChoice,
     /// Which ray/triangle test.
     pub intersector: IntersectorKind,
     /// Its parameters.

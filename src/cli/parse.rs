@@ -1,6 +1,6 @@
 //! The words of single flags: sizes, vectors, angles, colours. Errors say what would be right.
 
-use crate::accel::{AccelKind, IntersectorKind, MailboxKind};
+use crate::accel::{AccelChoice, AccelKind, IntersectorKind, MailboxKind};
 use crate::generate::{Family, MAX_TRIANGLES};
 use crate::image::ToneMap;
 use crate::math::Vec3;
@@ -127,6 +127,12 @@ pub(super) fn background(text: &str) -> Result<Back, String> {
 pub(super) fn accel() -> impl TypedValueParser<Value = AccelKind> {
     let parse = |name: String| name.parse::<AccelKind>().map_err(|e| e.to_string());
     PossibleValuesParser::new(AccelKind::ALL.map(AccelKind::name)).try_map(parse)
+}
+
+/// `auto`, or the name of a structure.
+pub(super) fn accel_choice() -> impl TypedValueParser<Value = AccelChoice> {
+    let parse = |name: String| name.parse::<AccelChoice>().map_err(|e| e.to_string());
+    PossibleValuesParser::new(AccelChoice::names()).try_map(parse)
 }
 
 /// The names of all mailboxes.

@@ -8,7 +8,7 @@ use super::picture::{self, Effective};
 use super::progress::Progress;
 use super::stats::{self, PictureStats, Times};
 use super::{accident, again, interrupt, output_name, read};
-use crate::accel::AnyAccel;
+use crate::accel::auto;
 use crate::image::was_written_by_meshray;
 use crate::load::{Diagnostic, Loaded};
 use crate::render::texture::TextureStore;
@@ -192,7 +192,8 @@ fn render_shot(
     let mut times = Times { load: *load_seconds, ..Times::default() };
     progress.stage("building");
     let start = Instant::now();
-    let accel = AnyAccel::build(job.accel, &world.shapes, &job.params).tested_by(job.intersector);
+    let (accel, reason) = auto::build(job.accel, &world.shapes, &job.params);
+    let accel = accel.tested_by(job.intersector);
     let textures = TextureStore::new(&loaded.scene);
     times.build = start.elapsed().as_secs_f64();
 
@@ -211,7 +212,8 @@ fn render_shot(
     }
     let counted = job.stats.is_some().then(|| stats::count(&work, &rendered, &accel, messages));
 
-    let facts = again::Facts { job, batch, shot, effective: &effective, depth: rendered.depth, loaded };
+    let (depth, accel_kind) = (rendered.depth, accel.kind());
+    let facts = again::Facts { job, batch, shot, effective: &effective, depth, accel: accel_kind, reason, loaded };
     let metadata = again::metadata(&facts, counted.as_ref());
     let start = Instant::now();
     let written = picture::write(shot, &rendered.picture, &effective, loaded.scene.background, &metadata);

@@ -8,6 +8,7 @@
 //! | `schema`, `version` | `meshray-stats/1`; version of meshray |
 //! | `inputs`, `output`, `input_hash` | files as typed (`-`: standard streams); xxh3-128 of what was read, hexadecimal |
 //! | `width`, `height`, `samples`, `depth`, `cutoff`, `seed`, `view`, `accel`, `intersector`, `threads` | settings that were used |
+//! | `auto` | `null`, or why `--accel auto` took `accel`: `why` in words; `rays` and `prims` of the sample; cost of a ray through `fast-octree` and `fast-bvh`, in nodes of eight boxes |
 //! | `parameters` | of the structure, as used: `leaf_size` (`null`: by step cost); of grids and octrees `grid_density`, `grid_resolution`, `max_depth`, `step_cost`, `mailbox` as well |
 //! | `seconds` | of the timed run: `load`, `build`, `render`, `write`; `load` is 0 for further views of one input |
 //! | `scene` | `triangles`, `polygons`, `spheres`, `cones` (cylinders too), `planes`, `vertices`, `materials`, `textures`, `lights` |
@@ -169,9 +170,12 @@ impl PictureStats {
             "output": facts.shot.target.path().map_or("-".into(), |p| p.to_string_lossy()),
             "input_hash": facts.hash(),
             "width": settings.width, "height": settings.height, "samples": settings.samples, "depth": facts.depth,
-            "cutoff": settings.cutoff, "seed": settings.seed, "view": view, "accel": facts.job.accel.name(),
+            "cutoff": settings.cutoff, "seed": settings.seed, "view": view, "accel": facts.accel.name(),
             "intersector": facts.job.intersector.name(),
-            "parameters": parameters(facts.job.accel, &facts.job.params),
+            "auto": facts.reason.map(|r| json!({
+                "why": r.to_string(), "rays": r.rays, "prims": r.prims, "fast-octree": r.octree, "fast-bvh": r.bvh,
+            })),
+            "parameters": parameters(facts.accel, &facts.job.params),
             "threads": rayon::current_num_threads(),
             "seconds": { "load": times.load, "build": times.build, "render": times.render, "write": times.write },
             "scene": {
@@ -212,6 +216,9 @@ impl PictureStats {
         lines.push(format!("  scene      {}", shapes.join("  ")));
         let names = ["n_in", "n_v", "n_ev", "n_oiv", "bytes"].map(|k| format!("{k} {}", short(number("structure", k))));
         lines.push(format!("  structure  {}", names.join("  ")));
+        if let Some(why) = get("auto")["why"].as_str() {
+            lines.push(format!("  auto       {why}"));
+        }
         if let Some(counted) = &self.counted {
             lines.extend(count_table(counted));
         }

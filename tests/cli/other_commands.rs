@@ -36,6 +36,25 @@ fn statistics_are_json_with_a_schema_and_exact_counts() {
 }
 
 #[test]
+fn statistics_say_which_structure_was_used_why_and_with_what() {
+    let folder = Folder::with_cube();
+    let stats = |how: &[&str]| -> Value {
+        let run = folder.render(&[&["cube.obj", "--stats", "json"], how].concat()).ends(0);
+        serde_json::from_str(run.text()).unwrap()
+    };
+    let auto = stats(&[]);
+    let used = auto["accel"].as_str().unwrap();
+    assert!(["fast-octree", "fast-bvh"].contains(&used) && auto["auto"]["why"].as_str().unwrap().starts_with(used));
+    let grid = stats(&["--accel", "grid", "--mailbox", "none", "--grid-density", "2"]);
+    assert!(grid["auto"].is_null());
+    let parameters = [&grid["parameters"]["grid_density"], &grid["parameters"]["mailbox"]];
+    assert_eq!(parameters, [&Value::from(2.0), &Value::from("none")]);
+    assert_eq!(grid["counts"]["all"]["tests_saved"], 0);
+    let turned = stats(&["--accel", "transform"]);
+    assert!(turned["counts"]["all"]["transforms"].as_u64() > turned["counts"]["all"]["tests"].as_u64());
+}
+
+#[test]
 fn the_short_help_has_at_most_15_flags_and_the_long_one_all() {
     let folder = Folder::new();
     let flags = |help: &str| help.lines().filter(|line| line.trim_start().starts_with('-')).count();

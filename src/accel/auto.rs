@@ -1,0 +1,266 @@
+//! `auto`: the fast structure that a fixed sample of rays finds cheaper.
+//!
+//! After M. Hapala, O. Karlík, V. Havran, *When It Makes Sense to Use Uniform Grids for Ray Tracing*, 2011: both
+//! structures are built, some rays are traced through each, and what they cost decides. Here the cost is counted, never
+//! timed, so that the choice depends on neither the machine nor the number of threads; and large scenes are judged by a
+//! part of their prims, so that it costs little.
+//!
+//! The octree is built sooner. The hierarchy is chosen where it saves more than an eighth of the octree's cost.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::any::UnknownAccel;
+use super::shapes::Prim;
+use super::{Accel, AccelKind, AccelParams, AnyAccel, BitSet, Hit, NO_PRIM, Ray, RayCounts, Shapes};
+use crate::math::Vec3;
+use crate::math::aabb::Aabb;
+use crate::math::random::Random;
+
+/// Rays of each of the two kinds.
+const RAYS: usize = 512;
+
+/// Scenes of more prims are judged by about so many of them.
+const SAMPLE: u32 = 1 << 15;
+
+/// Neighbours that are taken together.
+const RUN: u32 = 64;
+
+/// The part of the octree's cost that the hierarchy must save, as it takes longer to build.
+const WORTH: f64 = 0.125;
+
+/// What a block of eight triangles costs, in nodes of eight boxes.
+const BLOCK: f64 = 1.5;
+
+/// What the command is told: a kind, or to find out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum AccelChoice {
+    /// The better one of the fast structures.
+    #[default]
+    Auto,
+    /// This one.
+    Kind(AccelKind),
+}
+
+impl AccelChoice {
+    /// As typed.
+    pub const AUTO: &'static str = "auto";
+
+    /// As typed and printed.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Auto => Self::AUTO,
+            Self::Kind(kind) => kind.name(),
+        }
+    }
+
+    /// All names, in the order of the help text.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        std::iter::once(Self::AUTO).chain(AccelKind::ALL.map(AccelKind::name))
+    }
+}
+
+impl fmt::Display for AccelChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for AccelChoice {
+    type Err = UnknownAccel;
+
+    fn from_str(name: &str) -> Result<Self, UnknownAccel> {
+        if name == Self::AUTO { Ok(Self::Auto) } else { name.parse().map(Self::Kind) }
+    }
+}
+
+/// Why a structure was chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reason {
+    /// What was chosen.
+    pub kind: AccelKind,
+    /// Rays of the sample.
+    pub rays: u64,
+    /// Triangles and other prims that the sample was traced through.
+    pub prims: usize,
+    /// Cost of a ray through `fast-octree`, in nodes.
+    pub octree: f64,
+    /// Cost of a ray through `fast-bvh`, in nodes.
+    pub bvh: f64,
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { kind, rays, prims, octree, bvh } = *self;
+        write!(
+            f,
+            "{kind}: {rays} rays through {prims} shapes cost {octree:.1} nodes each with fast-octree, {bvh:.1} with \
+             fast-bvh, which must save {:.1} % as it takes longer to build",
+            WORTH * 100.0
+        )
+    }
+}
+
+/// Builds what was asked for; the reason, where there was a choice. The same for every number of threads.
+pub fn build<'a>(choice: AccelChoice, shapes: &'a Shapes, params: &AccelParams) -> (AnyAccel<'a>, Option<Reason>) {
+    match (choice, part(shapes)) {
+        (AccelChoice::Kind(kind), _) => (AnyAccel::build(kind, shapes, params), None),
+        (AccelChoice::Auto, None) => {
+            let (accel, reason) = judge(shapes, params);
+            (accel, Some(reason))
+        }
+        (AccelChoice::Auto, Some(part)) => {
+            let (_, reason) = judge(&part, params);
+            (AnyAccel::build(reason.kind, shapes, params), Some(reason))
+        }
+    }
+}
+
+/// Traces the sample through both, and keeps the better one.
+fn judge<'a>(shapes: &'a Shapes, params: &AccelParams) -> (AnyAccel<'a>, Reason) {
+    let rays = sample(shapes);
+    let built = [AccelKind::FastOctree, AccelKind::FastBvh].map(|kind| AnyAccel::build(kind, shapes, params));
+    let [octree, bvh] = built.each_ref().map(|accel| cost(accel, &rays));
+    let [first, second] = built;
+    let accel = if bvh < octree * (1.0 - WORTH) { second } else { first };
+    let reason = Reason { kind: accel.kind(), rays: rays.len() as u64, prims: shapes.bounded() as usize, octree, bvh };
+    (accel, reason)
+}
+
+/// Of one ray, in nodes.
+fn cost(accel: &AnyAccel, rays: &[Ray]) -> f64 {
+    let mut counts = RayCounts::default();
+    accel.closest(rays, &mut vec![Hit::MISS; rays.len()], &mut accel.scratch(), &mut counts);
+    let blocks = counts.n_ets as f64;
+    (counts.n_ts as f64 - blocks + blocks * BLOCK) / counts.queries.max(1) as f64
+}
+
+/// Runs of neighbouring prims spread over all of them; `None`: there are few enough. Files list neighbours together, so
+/// that what is left still has surfaces.
+fn part(shapes: &Shapes) -> Option<Shapes> {
+    let bounded = shapes.bounded();
+    if bounded <= SAMPLE {
+        return None;
+    }
+    let stride = (f64::from(bounded) / f64::from(SAMPLE / RUN)).ceil();
+    let mut part = Shapes::default();
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 65 to 2³²/512")]
+    for first in (0..bounded).step_by(stride as usize) {
+        (first..bounded.min(first.saturating_add(RUN))).for_each(|prim| copy(shapes, prim, &mut part));
+    }
+    part.opaque = BitSet::filled(part.len(), true);
+    Some(part)
+}
+
+fn copy(shapes: &Shapes, prim: u32, part: &mut Shapes) {
+    let base = u32::try_from(part.vertices.len()).unwrap_or(0);
+    match shapes.prim(prim) {
+        Prim::Triangle(corners) => {
+            part.vertices.extend(corners);
+            part.triangles.push([base, base + 1, base + 2]);
+        }
+        Prim::Polygon(polygon) => {
+            part.vertices.extend(polygon.points());
+            let first = u32::try_from(part.polygon_corners.len()).unwrap_or(0);
+            let len = u32::try_from(polygon.corners.len()).unwrap_or(0);
+            part.polygon_corners.extend(base..base + len);
+            part.polygons.push((first, len));
+        }
+        Prim::Sphere(sphere) => part.spheres.push(sphere),
+        Prim::Cone(cone) => part.cones.push(*cone),
+        Prim::Plane(..) => {}
+    }
+}
+
+/// Rays from outside into the scene's box, as from an eye, and from its surfaces in all directions, as light takes.
+fn sample(shapes: &Shapes) -> Vec<Ray> {
+    let mut random = Random::new(0);
+    let bounded = shapes.bounded();
+    if bounded == 0 {
+        return Vec::new();
+    }
+    let bounds = (0..bounded).fold(Aabb::EMPTY, |b, prim| b.union(shapes.bounds(prim)));
+    let (middle, half) = (bounds.lo * 0.5 + bounds.hi * 0.5, bounds.hi * 0.5 - bounds.lo * 0.5);
+    let ray = |origin, dir, exclude| Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude, sample: 0 };
+    let mut rays = Vec::with_capacity(2 * RAYS);
+    for _ in 0..RAYS {
+        let origin = middle + random.direction() * (half.length() * 2.0);
+        let target = middle + random.cube() * half;
+        rays.push(ray(origin, target - origin, NO_PRIM));
+        let prim = u32::try_from(random.below(bounded as usize)).unwrap_or(0);
+        rays.push(ray(place(shapes, prim, &mut random), random.direction(), prim));
+    }
+    rays
+}
+
+/// Somewhere on a triangle, or in the box of another prim.
+fn place(shapes: &Shapes, prim: u32, random: &mut Random) -> Vec3 {
+    match shapes.triangles.get(prim as usize) {
+        Some(&corners) => {
+            let [a, b, c] = shapes.corners(corners);
+            let (u, v) = (random.unit(), random.unit());
+            let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+            a + (b - a) * u + (c - a) * v
+        }
+        None => {
+            let bounds = shapes.bounds(prim);
+            bounds.lo + (bounds.hi - bounds.lo) * random.unit()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::tests::scenes;
+
+    fn chosen(shapes: &Shapes) -> Reason {
+        let (accel, reason) = build(AccelChoice::Auto, shapes, &AccelParams::DEFAULT);
+        let reason = reason.unwrap();
+        assert_eq!(accel.kind(), reason.kind);
+        reason
+    }
+
+    #[test]
+    fn every_choice_is_found_by_its_name_and_one_asked_for_is_taken() {
+        for name in AccelChoice::names() {
+            assert_eq!(name.parse::<AccelChoice>().map(AccelChoice::name), Ok(name));
+        }
+        assert_eq!(AccelChoice::default().name(), "auto");
+        let shapes = scenes::copies(9);
+        let (accel, reason) = build(AccelChoice::Kind(AccelKind::Grid), &shapes, &AccelParams::DEFAULT);
+        assert_eq!((accel.kind(), reason), (AccelKind::Grid, None));
+    }
+
+    #[test]
+    fn the_hierarchy_is_taken_where_it_saves_an_eighth_and_the_octree_elsewhere() {
+        for (name, shapes) in scenes::all() {
+            let reason = chosen(&shapes);
+            let better = if reason.bvh < reason.octree * 0.875 { AccelKind::FastBvh } else { AccelKind::FastOctree };
+            assert_eq!(reason.kind, better, "{name}: {reason}");
+        }
+        let reason = chosen(&scenes::star(60, 30));
+        assert_eq!((reason.kind, reason.rays, reason.prims), (AccelKind::FastBvh, 1024, 60 * 58), "{reason}");
+        // Nothing parts copies: both are the same tree.
+        let reason = chosen(&scenes::copies(1000));
+        assert!(reason.kind == AccelKind::FastOctree && reason.octree == reason.bvh, "{reason}");
+    }
+
+    #[test]
+    fn a_large_mesh_is_judged_by_a_part_of_it_and_by_any_number_of_threads_alike() {
+        let shapes = scenes::star(300, 150);
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            pool.map(|pool| pool.install(|| chosen(&shapes))).ok()
+        };
+        let one = with(1).unwrap();
+        assert!(one.prims > 30_000 && one.prims <= SAMPLE as usize && shapes.len() > 80_000, "{one}");
+        assert_eq!([with(2), with(7)], [Some(one); 2]);
+    }
+
+    #[test]
+    fn a_scene_without_bounded_shapes_is_no_trouble() {
+        let shapes = Shapes { planes: vec![(Vec3::Y, 0.0)], opaque: BitSet::filled(1, true), ..Shapes::default() };
+        assert_eq!(chosen(&shapes).rays, 0);
+    }
+}
