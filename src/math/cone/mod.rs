@@ -1,6 +1,6 @@
 //! Ray against the mantle of a truncated cone (a cylinder where both radii are equal), open at both ends.
 //!
-//! Every number is in a form that does not cancel ([`roots`]), with a running bound of its error; where `f64` cannot
+//! Every number is in a form that does not cancel (`roots`), with a running bound of its error; where `f64` cannot
 //! tell, the same formula runs in numbers twice as long. What this gives, for the `f32` ray and cone:
 //!
 //! - A distance is within 2½ ulp (`f32`) of the exact one. Below 2⁻⁸⁰ of the cone's size, beside the origin, the error is
