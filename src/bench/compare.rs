@@ -108,11 +108,13 @@ pub enum Count {
     Bit,
     /// Tests saved by the mailbox.
     Mb,
+    /// Points transformed into the ray's axes.
+    Xf,
 }
 
 impl Count {
     /// Every count, in the order of reports.
-    pub const ALL: [Self; 6] = [Self::It, Self::Ts, Self::Ets, Self::Eets, Self::Bit, Self::Mb];
+    pub const ALL: [Self; 7] = [Self::It, Self::Ts, Self::Ets, Self::Eets, Self::Bit, Self::Mb, Self::Xf];
 
     /// V. Havran's name, or ours in his manner.
     pub const fn name(self) -> &'static str {
@@ -123,6 +125,7 @@ impl Count {
             Self::Eets => "n_eets",
             Self::Bit => "n_bit",
             Self::Mb => "n_mb",
+            Self::Xf => "n_xf",
         }
     }
 
@@ -135,6 +138,7 @@ impl Count {
             Self::Eets => counts.n_eets,
             Self::Bit => counts.n_bit,
             Self::Mb => counts.n_mb,
+            Self::Xf => counts.n_xf,
         }
     }
 }

@@ -2,6 +2,7 @@
 //! a real picture through every structure, and what they cost there.
 
 pub mod aim;
+pub mod baseline;
 pub mod clock;
 pub mod compare;
 pub mod machine;

@@ -78,7 +78,7 @@ impl Stage {
             rays: rays.iter().map(Rays::of).collect(),
             rows: self.rows(&rays, &plan),
         };
-        Report { machine: Machine::here(), plan, models: vec![model], complete: true }
+        Report { machine: Machine::here(), plan, models: vec![model], heatmap_max: None, complete: true }
     }
 }
 
@@ -221,6 +221,12 @@ fn every_format_holds_every_structure_and_class() {
     let rows = markdown.lines().filter(|l| AccelKind::ALL.iter().any(|k| l.starts_with(&format!("| {k} |")))).count();
     assert_eq!(rows, lines + AccelKind::ALL.len());
     assert!(markdown.contains("bit for bit"));
+
+    let html = Format::Html.write(&report);
+    assert_eq!(html.matches("<tr><th scope=\"row\">").count(), lines + AccelKind::ALL.len());
+    assert_eq!(html.matches("<img ").count(), AccelKind::ALL.len());
+    assert_eq!(html.matches("<svg").count(), html.matches("</svg>").count());
+    assert!(html.contains("still &quot;life&quot;.toml") && !html.contains("http") && !html.contains("<script"));
     assert!(Format::from_path("a.txt".as_ref()).unwrap_err().contains(".json"));
 }
 

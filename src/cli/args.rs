@@ -2,6 +2,7 @@
 
 use super::parse;
 use crate::accel::{AccelChoice, AccelKind, IntersectorKind, MailboxKind};
+use crate::bench::baseline::Limit;
 use crate::bench::verify::Plan;
 use crate::generate::Family;
 use crate::image::ToneMap;
@@ -322,6 +323,15 @@ pub(super) struct BenchArgs {
     /// Write a report too, after each structure; what kind the ending says: json, csv, md, html
     #[arg(long, value_name = "PATH", action = ArgAction::Append, help_heading = "Run")]
     pub report: Vec<PathBuf>,
+    /// Tests that the brightest colour of an HTML report's heat maps stands for [default: the most of any pixel]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Run")]
+    pub heatmap_max: Option<u32>,
+    /// An earlier JSON report of the same models and rays
+    #[arg(long, value_name = "FILE", help_heading = "Run", requires = "fail_if")]
+    pub baseline: Option<PathBuf>,
+    /// Exit with code 1 when a count has changed more since the baseline, such as 'n_it>+1%'
+    #[arg(long, value_name = "LIMIT", value_delimiter = ',', help_heading = "Run", requires = "baseline")]
+    pub fail_if: Vec<Limit>,
     /// Only the tables, warnings and errors
     #[arg(short, long, help_heading = "Run")]
     pub quiet: bool,

@@ -108,6 +108,20 @@ fn bench_compares_structures_and_writes_reports() {
 }
 
 #[test]
+fn bench_fails_when_a_count_grew() {
+    let folder = Folder::with_cube();
+    let words = ["bench", "cube.obj", "--size", "16x12", "--passes", "0", "--accel", "bvh", "-q"];
+    folder.run(&[&words[..], &["--report", "before.json"]].concat()).ends(0);
+    let gate = ["--baseline", "before.json", "--fail-if", "n_it>+1%,bytes>+0%"];
+    folder.run(&[&words[..], &gate[..]].concat()).ends(0);
+    let worse = [&words[..], &gate[..], &["--leaf-size", "100"]].concat();
+    folder.run(&worse).ends(1).says(&["cube.obj, bvh, primary: n_it", "is >+1%"]);
+    folder.run(&[&words[..6], &gate[..], &["-q", "--view", "back"]].concat()).ends(1).says(&["another picture"]);
+    folder.run(&["bench", "cube.obj", "--baseline", "gone.json", "--fail-if", "n_it>+1%"]).ends(1).says(&["gone.json"]);
+    folder.run(&["bench", "cube.obj", "--baseline", "gone.json", "--fail-if", "it>1"]).ends(2).says(&["n_it>+1%"]);
+}
+
+#[test]
 fn bench_says_what_it_cannot_do() {
     let folder = Folder::with_cube();
     folder.run(&["bench", "cube.obj", "--report", "r.txt"]).ends(2).says(&["r.txt", ".json"]);

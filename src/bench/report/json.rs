@@ -12,7 +12,7 @@
 //! structure has `accel`, `sampled`, `differing` (rays), `t_b` and `t_tr` (seconds, of a ray; each `median`, `min`, `max`,
 //! `passes`, or null without times), V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`, `bytes`, `break_even` (rays, or null),
 //! and `classes`. A class has exact sums (`rays`, `hits`, `tests`, `steps`, `cells`, `empty_cells`, `volume_tests`,
-//! `tests_saved`), `per_ray` (`n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`, `n_min`), `interval` (half the 95 %
+//! `tests_saved`, `transforms`), `per_ray` (`n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`, `n_xf`, `n_min`), `interval` (half the 95 %
 //! interval of the same, or null when nothing was left out), `culled`, `differing`, `t_tr` (seconds of a ray) and
 //! `mrays`. Keys are only ever added.
 
@@ -76,7 +76,7 @@ fn class(class: &ClassRow, sampled: bool, prims: usize) -> Value {
     let interval = Count::ALL.iter().map(|&n| (n.name().to_owned(), number(class.interval(n))));
     json!({
         "rays": c.queries, "hits": c.found, "tests": c.n_it, "steps": c.n_ts, "cells": c.n_ets,
-        "empty_cells": c.n_eets, "volume_tests": c.n_bit, "tests_saved": c.n_mb, "per_ray": per_ray,
+        "empty_cells": c.n_eets, "volume_tests": c.n_bit, "tests_saved": c.n_mb, "transforms": c.n_xf, "per_ray": per_ray,
         "interval": if sampled { Value::Object(interval.collect()) } else { Value::Null },
         "culled": class.culled(prims), "differing": class.differing,
         "t_tr": spread(&class.seconds), "mrays": spread(&class.rate()),

@@ -1,6 +1,7 @@
 //! What a comparison found, and how it is shown: as text, JSON, CSV, Markdown or a page for a browser.
 
 pub mod csv;
+pub mod html;
 pub mod json;
 pub mod markdown;
 pub mod number;
@@ -21,6 +22,8 @@ pub struct Report {
     pub plan: Plan,
     /// In the order they were measured; the last one's rows may be missing while it is under way.
     pub models: Vec<Model>,
+    /// What the brightest colour of heat maps stands for; `None`: the most tests of any pixel.
+    pub heatmap_max: Option<u32>,
     /// Whether everything is done.
     pub complete: bool,
 }
@@ -151,6 +154,8 @@ pub enum Format {
     Csv,
     /// Tables for a document.
     Markdown,
+    /// A page with plots.
+    Html,
 }
 
 impl Format {
@@ -161,7 +166,8 @@ impl Format {
             "json" => Ok(Self::Json),
             "csv" => Ok(Self::Csv),
             "md" => Ok(Self::Markdown),
-            _ => Err(format!("{}: a report ends in .json, .csv or .md", path.display())),
+            "html" | "htm" => Ok(Self::Html),
+            _ => Err(format!("{}: a report ends in .json, .csv, .md or .html", path.display())),
         }
     }
 
@@ -171,18 +177,20 @@ impl Format {
             Self::Json => json::write(report),
             Self::Csv => csv::write(report),
             Self::Markdown => markdown::write(report),
+            Self::Html => html::write(report),
         }
     }
 }
 
 /// What the names of counts mean, a line each.
-pub const WORDS: [(&str, &str); 10] = [
+pub const WORDS: [(&str, &str); 11] = [
     ("n_it", "ray/prim tests a ray"),
     ("n_ts", "nodes and cells visited a ray"),
     ("n_ets", "leaf cells visited a ray"),
     ("n_eets", "empty ones among them"),
     ("n_bit", "ray/volume tests a ray"),
     ("n_mb", "tests saved by the mailbox a ray"),
+    ("n_xf", "points transformed into the ray's axes a ray"),
     ("n_min", "hits a ray: tests that nothing can save"),
     ("culled", "share of all ray/prim tests not done"),
     ("n_oiv", "prims listed in all cells"),

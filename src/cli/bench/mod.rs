@@ -1,5 +1,6 @@
 //! `meshray bench`: structures compared on the rays of a real picture, as tables and as report files.
 
+mod gate;
 mod scene;
 
 use super::args::BenchArgs;
@@ -13,6 +14,7 @@ use crate::bench::machine::Machine;
 use crate::bench::rays;
 use crate::bench::report::{Format, Model, Rays, Report, text};
 use crate::image::write_atomic;
+use gate::Gate;
 use scene::Prepared;
 use std::path::PathBuf;
 
@@ -33,8 +35,13 @@ pub(super) fn run(args: &BenchArgs) -> Exit {
             return Exit::Usage;
         }
     };
+    let gate = match args.baseline.as_ref().map(|path| Gate::read(path, &args.fail_if, &messages)).transpose() {
+        Ok(gate) => gate,
+        Err(exit) => return exit,
+    };
     let bench = Bench { args, files, messages };
-    let mut report = Report { machine: Machine::here(), plan, models: Vec::new(), complete: false };
+    let mut report =
+        Report { machine: Machine::here(), plan, models: Vec::new(), heatmap_max: args.heatmap_max, complete: false };
     let mut worst = Exit::Done;
     for input in &args.inputs {
         let name = input.display().to_string();
@@ -48,7 +55,8 @@ pub(super) fn run(args: &BenchArgs) -> Exit {
     }
     report.complete = worst == Exit::Done;
     worst = worst.max(bench.print(&text::write_notes(&report)));
-    worst.max(bench.write(&report))
+    worst = worst.max(bench.write(&report));
+    worst.max(gate.map_or(Exit::Done, |gate| gate.judge(&report, &bench.messages)))
 }
 
 fn plan(args: &BenchArgs) -> Result<Plan, Wrong> {

@@ -1,0 +1,150 @@
+//! A gate of counts: they do not depend on the machine, so what goes beyond a limit is a change of the program.
+//!
+//! Two reports of schema `meshray-bench/1` are compared, model by model (by file name), structure by structure, class by
+//! class. Both must be of the same model and the same rays; otherwise counts say nothing about each other.
+
+use serde_json::Value;
+use std::str::FromStr;
+
+/// What may be limited: counts of each class, then sizes of a structure.
+const NAMES: [&str; 12] =
+    ["n_it", "n_ts", "n_ets", "n_eets", "n_bit", "n_mb", "n_xf", "bytes", "n_in", "n_v", "n_ev", "n_oiv"];
+
+/// A change that is too much, such as `n_it>+1%` or `n_mb<-5%`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Limit {
+    name: String,
+    /// Whether more is too much, or less.
+    above: bool,
+    /// Of the baseline's value.
+    percent: f64,
+}
+
+impl FromStr for Limit {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong =
+            || format!("{text:?}: write a count and its change, such as 'n_it>+1%'; counts: {}", NAMES.join(", "));
+        let place = text.find(['<', '>']).ok_or_else(wrong)?;
+        let (name, rest) = text.split_at(place);
+        let percent = rest[1..].trim().strip_suffix('%').and_then(|p| p.trim().parse::<f64>().ok());
+        let percent = percent.filter(|p| p.is_finite()).ok_or_else(wrong)?;
+        let name = NAMES.into_iter().find(|n| *n == name.trim()).ok_or_else(wrong)?;
+        Ok(Self { name: name.to_owned(), above: rest.starts_with('>'), percent })
+    }
+}
+
+impl Limit {
+    fn is_broken(&self, before: f64, now: f64) -> bool {
+        let bound = before * (1.0 + self.percent / 100.0);
+        // Sums of whole numbers divided by whole numbers: the last digit is no change.
+        let grain = 1e-9 * before.abs().max(now.abs());
+        if self.above { now > bound + grain } else { now < bound - grain }
+    }
+}
+
+/// A line for each count of `now` that changed too much since `baseline`; an error where they cannot be compared.
+pub fn failures(baseline: &Value, now: &Value, limits: &[Limit]) -> Result<Vec<String>, String> {
+    if baseline["schema"] != now["schema"] {
+        return Err(format!("its schema is {}, not {}", baseline["schema"], now["schema"]));
+    }
+    let mut lines = Vec::new();
+    for model in items(&now["models"]) {
+        let name = file_name(&model["file"]);
+        let before = items(&baseline["models"]).iter().find(|m| file_name(&m["file"]) == name);
+        let before = before.ok_or_else(|| format!("it has no model {name}"))?;
+        for (key, what) in [("hash", "another file"), ("picture", "another picture"), ("rays", "other numbers of rays")]
+        {
+            if before[key] != model[key] {
+                return Err(format!("{name}: it is of {what} ({} before, {} now)", before[key], model[key]));
+            }
+        }
+        for row in items(&before["structures"]) {
+            let current = items(&model["structures"]).iter().find(|r| r["accel"] == row["accel"]);
+            let place = format!("{name}, {}", row["accel"].as_str().unwrap_or_default());
+            match current {
+                Some(current) => compare(&place, row, current, limits, &mut lines),
+                None => lines.push(format!("{place}: in the baseline, but not measured now")),
+            }
+        }
+    }
+    Ok(lines)
+}
+
+fn compare(place: &str, before: &Value, now: &Value, limits: &[Limit], lines: &mut Vec<String>) {
+    for limit in limits {
+        let key = limit.name.as_str();
+        let mut judge = |place: &str, before: &Value, now: &Value| {
+            let (Some(before), Some(now)) = (before.as_f64(), now.as_f64()) else { return };
+            if limit.is_broken(before, now) {
+                let change = 100.0 * (now / before - 1.0);
+                let bound = format!("{}{:+}%", if limit.above { '>' } else { '<' }, limit.percent);
+                lines.push(format!("{place}: {key} {now:.6}, was {before:.6}: {change:+.2}% is {bound}"));
+            }
+        };
+        judge(place, &before[key], &now[key]);
+        for (class, counts) in before["classes"].as_object().into_iter().flatten() {
+            let place = format!("{place}, {class}");
+            judge(&place, &counts["per_ray"][key], &now["classes"][class]["per_ray"][key]);
+        }
+    }
+}
+
+fn items(list: &Value) -> &[Value] {
+    list.as_array().map_or(&[], Vec::as_slice)
+}
+
+/// Reports are compared wherever the model lies.
+fn file_name(path: &Value) -> &str {
+    let path = path.as_str().unwrap_or_default();
+    path.rsplit(['/', '\\']).next().unwrap_or(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn report(n_it: f64, bytes: u64) -> Value {
+        let class = json!({ "per_ray": { "n_it": n_it, "n_mb": 2.0 } });
+        let row = json!({ "accel": "grid", "bytes": bytes, "classes": { "shadow": class } });
+        json!({ "schema": "s", "models": [{ "file": "a/b.obj", "hash": "7", "structures": [row] }] })
+    }
+
+    fn judged(before: &Value, now: &Value, limits: &[&str]) -> Vec<String> {
+        let limits: Vec<Limit> = limits.iter().map(|l| l.parse().unwrap()).collect();
+        failures(before, now, &limits).unwrap()
+    }
+
+    #[test]
+    fn what_grew_beyond_its_limit_is_told_and_what_did_not_is_not() {
+        let before = report(10.0, 100);
+        assert_eq!(judged(&before, &report(10.1, 100), &["n_it>+1%"]), [""; 0]);
+        let lines = judged(&before, &report(10.2, 130), &["n_it>+1%", "bytes > +20 %", "n_mb<-5%"]);
+        assert_eq!(lines.len(), 2, "{lines:?}");
+        assert_eq!(lines[0], "b.obj, grid, shadow: n_it 10.200000, was 10.000000: +2.00% is >+1%");
+        assert!(lines[1].starts_with("b.obj, grid: bytes 130"));
+        assert_eq!(judged(&before, &report(9.0, 100), &["n_it<-5%"]).len(), 1);
+        assert_eq!(judged(&report(0.0, 1), &report(0.5, 1), &["n_it>+1%"]).len(), 1, "from nothing to something");
+    }
+
+    #[test]
+    fn reports_of_different_things_are_not_compared() {
+        let (before, mut now) = (report(1.0, 1), report(1.0, 1));
+        now["models"][0]["hash"] = "8".into();
+        assert!(failures(&before, &now, &[]).unwrap_err().contains("another file"));
+        now["models"][0]["file"] = "c.obj".into();
+        assert!(failures(&before, &now, &[]).unwrap_err().contains("no model c.obj"));
+        now = report(1.0, 1);
+        now["models"][0]["structures"] = json!([]);
+        assert_eq!(judged(&before, &now, &[]), ["b.obj, grid: in the baseline, but not measured now"]);
+    }
+
+    #[test]
+    fn a_limit_that_makes_no_sense_is_refused_with_an_example() {
+        for wrong in ["n_it", "n_it>1", "hits>+1%", ">+1%", "n_it>x%"] {
+            assert!(wrong.parse::<Limit>().unwrap_err().contains("'n_it>+1%'"), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! One page for a browser: no script, nothing to fetch, readable on a phone, in the dark and on paper.
+
+mod heat;
+mod plot;
+
+use super::number::{bytes, grouped, seconds, short, whole};
+use super::{Model, Rays, Report, WORDS, text};
+use crate::accel::AccelKind;
+use crate::bench::compare::{ClassRow, Count, Row};
+
+/// Rules of the page. The colours of the classes are M. Okabe and K. Ito's, which people with any kind of colour sight
+/// tell apart; each class has a shape of its own too.
+const STYLE: &str = include_str!("style.css");
+
+/// The page.
+pub fn write(report: &Report) -> String {
+    let mut out = format!(
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+         <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
+         <title>meshray bench</title><style>{STYLE}</style></head><body>\n<h1>meshray bench</h1>\n\
+         <p>The rays of one picture of a model, sent through every structure: are the hits the same, and what do they \
+         cost?</p>\n"
+    );
+    if !report.complete {
+        out += "<p class=\"bad\">Not finished: more is to come, or the command was ended.</p>\n";
+    }
+    report.models.iter().for_each(|model| out += &section(report, model));
+    out + &notes(report) + "</body></html>\n"
+}
+
+fn section(report: &Report, model: &Model) -> String {
+    let verdict = if model.differing() == 0 { "good" } else { "bad" };
+    let mut out = format!(
+        "<section><h2>{}</h2>\n<p>{} prims (N); rays of {}: {}.</p>\n<p class=\"{verdict}\">{}</p>\n",
+        escaped(&model.name),
+        grouped(model.prims as u64),
+        escaped(&model.picture()),
+        rays_line(model),
+        escaped(&model.verdict()),
+    );
+    out += &glance(report, model);
+    out += &figure(
+        "Tests a ray",
+        "Ray/prim tests (n_it) of an average ray, by what sent it. Further left is better; each step is ten times.",
+        &plot::tests(model),
+    );
+    if report.is_timed() && !model.rows.is_empty() {
+        let caption = format!(
+            "Time of an average ray against the time to build. Down and to the left is better.{}",
+            far_off(model)
+        );
+        out += &figure("Speed against build", &caption, &plot::times(model));
+    }
+    out += &heat::figure(report, model);
+    out += &structures(report, model);
+    model.rays.iter().enumerate().for_each(|(i, rays)| out += &class_table(report, model, i, rays));
+    out + "</section>\n"
+}
+
+fn rays_line(model: &Model) -> String {
+    let of = |r: &Rays| match r.asked == r.kept as u64 {
+        true => format!("{} {}", grouped(r.kept as u64), r.class.name()),
+        false => format!("{} {} (an even sample of {})", grouped(r.kept as u64), r.class.name(), grouped(r.asked)),
+    };
+    model.rays.iter().map(of).collect::<Vec<_>>().join(", ")
+}
+
+/// Structures that would take the plot's scale from the others.
+fn far_off(model: &Model) -> String {
+    let slow = model.rows.iter().filter(|r| r.sampled);
+    let told: Vec<String> = slow.map(|r| format!("{} ({} a ray)", r.kind, seconds(model.seconds_per_ray(r)))).collect();
+    if told.is_empty() { String::new() } else { format!(" Far above: {}.", told.join(", ")) }
+}
+
+/// What somebody should know who reads one paragraph only.
+fn glance(report: &Report, model: &Model) -> String {
+    let rated: Vec<&Row> = model.rows.iter().filter(|r| !r.sampled).collect();
+    let tests = |row: &Row| {
+        let sum: u64 = row.classes.iter().map(|c| c.counts.n_it).sum();
+        sum as f64 / row.rays().max(1) as f64
+    };
+    let mut said = Vec::new();
+    let by_speed = |a: &&&Row, b: &&&Row| model.seconds_per_ray(a).total_cmp(&model.seconds_per_ray(b));
+    if let Some(best) = rated.iter().min_by(by_speed).filter(|_| report.is_timed()) {
+        let rate = short(1e-6 / model.seconds_per_ray(best));
+        let mut text = format!("Fastest on these rays: <b>{}</b>, {rate} million rays a second", best.kind);
+        if let Some(none) = model.rows.iter().find(|r| r.kind == AccelKind::None && r.kind != best.kind) {
+            let times = model.seconds_per_ray(none) / model.seconds_per_ray(best);
+            text += &format!(", {} times as fast as testing everything", short(times));
+        }
+        said.push(text);
+    }
+    if let Some(least) = rated.iter().min_by(|a, b| tests(a).total_cmp(&tests(b))) {
+        let culled = 100.0 * (1.0 - tests(least) / model.prims.max(1) as f64);
+        said.push(format!(
+            "Fewest ray/prim tests: <b>{}</b>, {} of {} prims for an average ray ({culled:.2} % culled)",
+            least.kind,
+            short(tests(least)),
+            grouped(model.prims as u64)
+        ));
+    }
+    said.iter().map(|text| format!("<p>{text}.</p>\n")).collect()
+}
+
+fn figure(title: &str, caption: &str, svg: &str) -> String {
+    format!("<figure><h3>{title}</h3><figcaption>{caption}</figcaption>{svg}</figure>\n")
+}
+
+fn structures(report: &Report, model: &Model) -> String {
+    let mut titles = vec!["structure", "memory", "n_in", "n_v", "n_ev", "n_oiv"];
+    if report.is_timed() {
+        titles.extend(["t_b", "min..max", "Mrays/s", "break-even"]);
+    }
+    let cells = |row: &Row| {
+        let s = row.made_of;
+        let mut cells = vec![name(row), bytes(s.bytes)];
+        cells.extend([s.n_in, s.n_v, s.n_ev, s.n_oiv].map(grouped));
+        if report.is_timed() {
+            cells.push(seconds(row.build.median()));
+            cells.push(format!("{}..{}", seconds(row.build.min()), seconds(row.build.max())));
+            cells.push(short(1e-6 / model.seconds_per_ray(row)));
+            cells.push(model.break_even(row).map_or("-".into(), whole));
+        }
+        cells
+    };
+    table("Structures", &titles, model.rows.iter().map(cells).collect())
+}
+
+fn class_table(report: &Report, model: &Model, i: usize, rays: &Rays) -> String {
+    let mut titles = vec!["structure"];
+    if report.is_timed() {
+        titles.extend(["Mrays/s", "min..max"]);
+    }
+    titles.extend(Count::ALL.map(Count::name));
+    titles.extend(["n_min", "culled"]);
+    let cells = |row: &Row, class: &ClassRow| {
+        let mut cells = vec![name(row)];
+        if report.is_timed() {
+            let rate = class.rate();
+            cells.extend([short(rate.median()), format!("{}..{}", short(rate.min()), short(rate.max()))]);
+        }
+        let shown = |c: Count| match row.sampled && class.interval(c) > 0.0 {
+            true => format!("{} ±{}", short(class.per_ray(c)), short(class.interval(c))),
+            false => short(class.per_ray(c)),
+        };
+        cells.extend(Count::ALL.map(shown));
+        cells.extend([format!("{:.3}", class.n_min()), text::culled(class, model.prims)]);
+        cells
+    };
+    let rows = model.rows.iter().filter_map(|row| Some(cells(row, row.classes.get(i)?))).collect();
+    table(&format!("{}: {} rays", rays.class.name(), grouped(rays.kept as u64)), &titles, rows)
+}
+
+/// A star marks a structure that got a sample.
+fn name(row: &Row) -> String {
+    format!("{}{}", row.kind, if row.sampled { "*" } else { "" })
+}
+
+fn table(title: &str, titles: &[&str], rows: Vec<Vec<String>>) -> String {
+    let head: String = titles.iter().map(|t| format!("<th scope=\"col\">{t}</th>")).collect();
+    let line = |cells: Vec<String>| {
+        let mut cells = cells.into_iter();
+        let first = cells.next().unwrap_or_default();
+        let rest: String = cells.map(|c| format!("<td>{c}</td>")).collect();
+        format!("<tr><th scope=\"row\">{first}</th>{rest}</tr>\n")
+    };
+    let body: String = rows.into_iter().map(line).collect();
+    format!(
+        "<h3>{title}</h3><div class=\"wide\"><table><thead><tr>{head}</tr></thead><tbody>\n{body}</tbody></table></div>\n"
+    )
+}
+
+fn notes(report: &Report) -> String {
+    let words: String = WORDS.iter().map(|(word, what)| format!("<dt>{word}</dt><dd>{what}</dd>")).collect();
+    format!(
+        "<section><h2>How to read it</h2><dl>{words}<dt>*</dt><dd>tests so much that it got an even sample of the rays; \
+         ± is half the 95 % interval</dd></dl>\n<p>{}.</p>\n<p>{}.</p></section>\n",
+        escaped(&report.method()),
+        escaped(&report.machine.line())
+    )
+}
+
+/// Text that cannot be taken for markup.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
