@@ -12,7 +12,7 @@ use rayon::prelude::*;
 const SLICE: u32 = 4096;
 
 /// Rays that structures which test very much are given.
-const FEW: u32 = 1_000;
+const FEW: u32 = 400;
 
 const AIMS: [&str; 4] = ["corners", "edge middles", "edges", "random"];
 
