@@ -138,6 +138,5 @@ fn occluded<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<bool> {
 }
 
 fn differences(a: &[Hit], b: &[Hit]) -> u64 {
-    let bits = |h: &Hit| (h.t.to_bits(), h.u.to_bits(), h.v.to_bits(), h.prim);
-    a.iter().zip(b).filter(|(a, b)| bits(a) != bits(b)).count() as u64
+    a.iter().zip(b).filter(|(a, b)| a.bits() != b.bits()).count() as u64
 }

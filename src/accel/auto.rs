@@ -16,6 +16,7 @@ use super::{Accel, AccelKind, AccelParams, AnyAccel, BitSet, Hit, NO_PRIM, Ray, 
 use crate::math::Vec3;
 use crate::math::aabb::Aabb;
 use crate::math::random::Random;
+use crate::math::triangle;
 
 /// Rays of each of the two kinds.
 const RAYS: usize = 512;
@@ -103,13 +104,15 @@ impl fmt::Display for Reason {
 
 /// Builds what was asked for; the reason, where there was a choice. The same for every number of threads.
 pub fn build<'a>(choice: AccelChoice, shapes: &'a Shapes, params: &AccelParams) -> (AnyAccel<'a>, Option<Reason>) {
-    match (choice, part(shapes)) {
-        (AccelChoice::Kind(kind), _) => (AnyAccel::build(kind, shapes, params), None),
-        (AccelChoice::Auto, None) => {
+    if let AccelChoice::Kind(kind) = choice {
+        return (AnyAccel::build(kind, shapes, params), None);
+    }
+    match part(shapes) {
+        None => {
             let (accel, reason) = judge(shapes, params);
             (accel, Some(reason))
         }
-        (AccelChoice::Auto, Some(part)) => {
+        Some(part) => {
             let (_, reason) = judge(&part, params);
             (AnyAccel::build(reason.kind, shapes, params), Some(reason))
         }
@@ -196,12 +199,7 @@ fn sample(shapes: &Shapes) -> Vec<Ray> {
 /// Somewhere on a triangle, or in the box of another prim.
 fn place(shapes: &Shapes, prim: u32, random: &mut Random) -> Vec3 {
     match shapes.triangles.get(prim as usize) {
-        Some(&corners) => {
-            let [a, b, c] = shapes.corners(corners);
-            let (u, v) = (random.unit(), random.unit());
-            let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
-            a + (b - a) * u + (c - a) * v
-        }
+        Some(&corners) => triangle::within(&shapes.corners(corners), random.unit(), random.unit()),
         None => {
             let bounds = shapes.bounds(prim);
             bounds.lo + (bounds.hi - bounds.lo) * random.unit()

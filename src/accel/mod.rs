@@ -85,6 +85,11 @@ impl Hit {
     /// No hit.
     pub const MISS: Self = Self { t: f32::INFINITY, u: 0.0, v: 0.0, prim: NO_PRIM };
 
+    /// t, u, v and prim as bits: equal only where every bit of two hits is.
+    pub fn bits(&self) -> [u32; 4] {
+        [self.t.to_bits(), self.u.to_bits(), self.v.to_bits(), self.prim]
+    }
+
     /// Whether anything was hit.
     pub fn is_some(&self) -> bool {
         self.prim != NO_PRIM

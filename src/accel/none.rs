@@ -17,7 +17,7 @@ impl<'a> Unculled<'a> {
 
     /// All zero but the references: every prim is listed once.
     pub fn summary(&self) -> StructureStats {
-        StructureStats { n_oiv: u64::from(self.shapes.bounded()), ..StructureStats::default() }
+        StructureStats::listing(self.shapes.bounded())
     }
 
     /// Nothing is built that could lose a hit.

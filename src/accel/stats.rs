@@ -16,3 +16,18 @@ pub struct StructureStats {
     /// Levels of the deepest cell below the top level; 0 for a plain grid.
     pub depth: u32,
 }
+
+impl StructureStats {
+    /// Every prim listed once, and nothing built.
+    pub(super) fn listing(prims: u32) -> Self {
+        Self { n_oiv: u64::from(prims), ..Self::default() }
+    }
+}
+
+/// Checks that each prim is listed once: `lists` has how often each is, `place` is what lists them.
+pub(super) fn listed_once(lists: &[u32], place: &str) -> Result<(), String> {
+    match lists.iter().position(|&n| n != 1) {
+        Some(prim) => Err(format!("prim {prim} is in {} {place}", lists[prim])),
+        None => Ok(()),
+    }
+}

@@ -93,7 +93,7 @@ impl<'a> Transformed<'a> {
 
     /// All zero but the references: every prim is listed once.
     pub fn summary(&self) -> StructureStats {
-        StructureStats { n_oiv: u64::from(self.shapes.bounded()), ..StructureStats::default() }
+        StructureStats::listing(self.shapes.bounded())
     }
 
     /// Nothing is built that could lose a hit.

@@ -10,6 +10,7 @@
 use super::query::{Culling, Goal, Query};
 use super::shapes::{Object, Prim};
 use super::slabs::{BoxRay, limit, start};
+use super::stats::listed_once;
 use super::{Probe, Shapes, StructureStats};
 use crate::math::aabb::Aabb;
 use crate::math::bounds::U64;
@@ -68,10 +69,7 @@ impl<'a, V: Volume> Volumes<'a, V> {
                 }
             }
         }
-        match objects.iter().position(|&n| n != 1) {
-            Some(prim) => Err(format!("prim {prim} is in {} objects", objects[prim])),
-            None => Ok(self.summary()),
-        }
+        listed_once(&objects, "objects").map(|()| self.summary())
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::accel::{NO_PRIM, Ray, Shapes};
 use crate::math::Vec3;
 use crate::math::random::Random;
-use crate::math::triangle::{self, Triangle};
+use crate::math::triangle;
 
 /// What rays are aimed at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,13 +84,13 @@ impl<'a> Aimer<'a> {
             Aim::Edges => at(a + (b - a) * r, self.start(i)),
             Aim::InPlane => {
                 let dir = (b - a) * (r - 0.5) + (c - a) * (s - 0.5);
-                ray(inside(&t, r, s) - dir * self.strides(dir), dir)
+                ray(triangle::within(&t, r, s) - dir * self.strides(dir), dir)
             }
             Aim::Grazing => {
                 let tilt = libm::powf(10.0, -1.0 - 6.0 * self.random.unit());
                 let along = ((b - a) * (r - 0.5) + (c - a) * (s - 0.5)).normalize_or(Vec3::X);
                 let dir = along + triangle::normal(&t) * tilt;
-                ray(inside(&t, s, r) - dir * self.reach, dir)
+                ray(triangle::within(&t, s, r) - dir * self.reach, dir)
             }
             Aim::Random => at(self.middle + self.random.cube() * self.reach, self.start(i)),
         }
@@ -107,12 +107,6 @@ impl<'a> Aimer<'a> {
         let strides = self.reach / dir.length();
         if strides.is_finite() { strides } else { 1.0 }
     }
-}
-
-/// A point of the triangle, r and s in 0..1.
-fn inside(&[a, b, c]: &Triangle, r: f32, s: f32) -> Vec3 {
-    let (r, s) = if r + s > 1.0 { (1.0 - r, 1.0 - s) } else { (r, s) };
-    a + (b - a) * r + (c - a) * s
 }
 
 fn ray(origin: Vec3, dir: Vec3) -> Ray {

@@ -156,8 +156,7 @@ fn bounce(shapes: &Shapes, ray: &Ray, hit: &Hit, random: &mut Random) -> Option<
     let (tangent, bitangent) = normal.any_orthonormal_pair();
     let aside = tangent * (radius * libm::cosf(turn)) + bitangent * (radius * libm::sinf(turn));
     let dir = aside + normal * (1.0 - square).max(f32::EPSILON).sqrt();
-    let planar = hit.prim < (shapes.triangles.len() + shapes.polygons.len()) as u32;
-    let exclude = if planar { hit.prim } else { NO_PRIM };
+    let exclude = if shapes.is_flat(hit.prim) { hit.prim } else { NO_PRIM };
     Some(Ray { origin: refined.origin(dir), t_min: 0.0, dir, t_max: f32::INFINITY, exclude, sample: ray.sample })
 }
 

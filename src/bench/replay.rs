@@ -100,7 +100,7 @@ impl<'a, A: Accel> Asking<'a, A> {
         let count = slice.rays.len();
         match slice.question {
             Question::Occluded => self.blocked[..count].iter().for_each(|&b| answer([u32::from(b), 0, 0, 0])),
-            _ => self.hits[..count].iter().for_each(|hit| answer(bits(hit))),
+            _ => self.hits[..count].iter().for_each(|hit| answer(hit.bits())),
         }
     }
 
@@ -113,8 +113,4 @@ impl<'a, A: Accel> Asking<'a, A> {
             Question::Next => self.accel.next(slice.rays, slice.after, hits, &mut self.scratch, probe),
         }
     }
-}
-
-fn bits(hit: &Hit) -> Answer {
-    [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.prim]
 }

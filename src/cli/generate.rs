@@ -8,7 +8,6 @@ use crate::generate::{Family, triangles};
 use crate::image::write_atomic;
 use crate::save::{glb, obj};
 use crate::scene::Scene;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Makes the scene and writes it.
@@ -53,7 +52,7 @@ fn as_glb(scene: &Scene) -> Result<Vec<u8>, String> {
 
 fn as_obj(scene: &Scene) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
-    obj::write(scene, &mut bytes).and_then(|()| bytes.flush()).map_err(|e| e.to_string())?;
+    obj::write(scene, &mut bytes).map_err(|e| e.to_string())?;
     Ok(bytes)
 }
 

@@ -2,7 +2,7 @@
 
 use super::solid::Solid;
 use super::{paint, standing};
-use crate::math::{DAffine3, DVec3, Vec3};
+use crate::math::{DAffine3, DQuat, DVec3, Vec3};
 use crate::scene::Scene;
 
 /// (1 + 9 + 81 + …) balls of 8 · 4^k triangles each, and a floor of two.
@@ -33,7 +33,7 @@ fn shape(wanted: usize) -> (u32, u32) {
 }
 
 fn grow(solid: &mut Solid, ball: &Solid, center: DVec3, radius: f64, up: DVec3, depth: u32) {
-    solid.place(ball, &DAffine3::from_scale_rotation_translation(DVec3::splat(radius), glam::DQuat::IDENTITY, center));
+    solid.place(ball, &DAffine3::from_scale_rotation_translation(DVec3::splat(radius), DQuat::IDENTITY, center));
     if depth == 0 {
         return;
     }

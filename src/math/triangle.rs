@@ -145,6 +145,12 @@ pub fn barycentrics(ray: &RaySpace, triangle: &Triangle) -> (f32, f32) {
     if u + v > 1.0 { (u, 1.0 - u) } else { (u, v) }
 }
 
+/// A point of the triangle; evenly spread where `r` and `s` are, in 0..=1.
+pub fn within(&[a, b, c]: &Triangle, r: f32, s: f32) -> Vec3 {
+    let (r, s) = if r + s > 1.0 { (1.0 - r, 1.0 - s) } else { (r, s) };
+    a + (b - a) * r + (c - a) * s
+}
+
 /// Unit normal, towards the side from which the corners run counter-clockwise; zero for a triangle without area.
 pub fn normal(triangle: &Triangle) -> Vec3 {
     let [a, b, c] = triangle.map(|p| p.as_dvec3());

@@ -3,6 +3,7 @@
 use super::Bvh;
 use super::tree::Below;
 use crate::accel::StructureStats;
+use crate::accel::stats::listed_once;
 use crate::math::aabb::Aabb;
 
 impl Bvh<'_> {
@@ -43,10 +44,6 @@ impl Bvh<'_> {
                 }
             });
         }
-        match (failure, leaves.iter().position(|&n| n != 1)) {
-            (Some(message), _) => Err(message),
-            (None, Some(prim)) => Err(format!("prim {prim} is in {} leaves", leaves[prim])),
-            (None, None) => Ok(self.summary()),
-        }
+        failure.map_or_else(|| listed_once(&leaves, "leaves"), Err).map(|()| self.summary())
     }
 }

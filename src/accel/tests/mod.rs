@@ -32,9 +32,8 @@ pub(crate) fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<[u32; 9]> {
     accel.closest(rays, &mut first, &mut scratch, &mut NoProbe);
     accel.occluded(rays, &mut blocked, &mut scratch, &mut NoProbe);
     accel.next(rays, &first, &mut second, &mut scratch, &mut NoProbe);
-    let bits = |h: &Hit| [h.t.to_bits(), h.u.to_bits(), h.v.to_bits(), h.prim];
     let row = |((a, b), c): ((&Hit, &bool), &Hit)| {
-        let ([t, u, v, p], [t2, u2, v2, p2]) = (bits(a), bits(c));
+        let ([t, u, v, p], [t2, u2, v2, p2]) = (a.bits(), c.bits());
         [t, u, v, p, u32::from(*b), t2, u2, v2, p2]
     };
     first.iter().zip(&blocked).zip(&second).map(row).collect()

@@ -3,6 +3,7 @@
 use super::Wide;
 use super::node::Child;
 use crate::accel::StructureStats;
+use crate::accel::stats::listed_once;
 use crate::math::aabb::Aabb;
 use crate::math::simd::LANES;
 
@@ -32,12 +33,7 @@ impl Wide<'_> {
         if !self.tree.nodes.is_empty() {
             self.holds(0, &mut leaves, &mut failure);
         }
-        let misplaced = leaves.iter().position(|&n| n != 1);
-        match (failure, misplaced) {
-            (Some(message), _) => Err(message),
-            (None, Some(prim)) => Err(format!("prim {prim} is in {} leaves", leaves[prim])),
-            (None, None) => Ok(self.summary()),
-        }
+        failure.map_or_else(|| listed_once(&leaves, "leaves"), Err).map(|()| self.summary())
     }
 
     /// The box of all prims below a node, exactly; counts their leaves.

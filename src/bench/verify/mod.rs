@@ -165,7 +165,7 @@ fn section(variation: &Variation, plan: &Plan) -> Option<Section> {
                 first = answers;
             } else if test == IntersectorKind::Exact {
                 let pairs = first.iter().zip(&answers).flat_map(|(a, b)| a.iter().zip(b));
-                disagreements += pairs.filter(|(a, b)| bits(a) != bits(b)).count();
+                disagreements += pairs.filter(|(a, b)| a.bits() != b.bits()).count();
             }
         }
     }
@@ -182,10 +182,6 @@ fn is_judged(test: IntersectorKind, kind: AccelKind) -> bool {
 
 fn take(rays: &[Ray], count: usize) -> &[Ray] {
     &rays[..rays.len().min(count)]
-}
-
-fn bits(hit: &Hit) -> [u32; 4] {
-    [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.prim]
 }
 
 /// First hits, by all threads.
