@@ -149,9 +149,13 @@ impl Facts<'_> {
         if params.mailbox != MailboxKind::default() {
             set("mailbox", params.mailbox.name().into());
         }
+        if settings.layers && !self.job.look.costs.is_empty() {
+            let names: Vec<_> = self.job.look.costs.iter().map(|cost| cost.name()).collect();
+            set("layers", names.join(","));
+        }
         let switches = [
             ("float", self.shot.kind == FileKind::Exr && output.exr_samples == ExrSamples::Float),
-            ("layers", settings.layers),
+            ("layers", settings.layers && self.job.look.costs.is_empty()),
             ("merge", self.batch.inputs.len() > 1),
             ("allow-empty", self.job.allow_empty),
         ];
@@ -252,6 +256,8 @@ fn with_typed(pixels: RenderArgs, inputs: Vec<PathBuf>, typed: &RenderArgs) -> R
         root: typed.root.clone(),
         max_memory: typed.max_memory,
         keep_partial: typed.keep_partial,
+        heatmap: typed.heatmap.clone(),
+        heatmap_max: typed.heatmap_max,
         strict: typed.strict,
         threads: typed.threads,
         stats: typed.stats,
@@ -300,7 +306,7 @@ mod tests {
             serde_json::json!({"size": "64x32", "eye": "-1,2,3.5", "ortho": "2.5", "layers": true, "camera": "-x"});
         let args = parse_settings(stored.as_object().unwrap()).unwrap();
         assert_eq!((args.size, args.eye), (Some((64, 32)), Some([-1.0, 2.0, 3.5])));
-        assert_eq!((args.ortho, args.layers), (Some(parse::Ortho::Height(2.5)), true));
+        assert_eq!((args.ortho, args.layers), (Some(parse::Ortho::Height(2.5)), Some(parse::CostList(Vec::new()))));
         assert_eq!(args.camera, ["-x"]);
     }
 }

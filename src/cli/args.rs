@@ -6,6 +6,7 @@ use crate::bench::baseline::Limit;
 use crate::bench::verify::Plan;
 use crate::generate::Family;
 use crate::image::ToneMap;
+use crate::render::Cost;
 use crate::scene::framing::NamedView;
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -56,6 +57,7 @@ Examples:
   meshray render ship.glb                            writes ship.png
   meshray render *.obj -o 'thumbs/{stem}.png' --size 256x256
   meshray render ship.glb --view front --view iso -o '{stem}-{view}.exr' --layers
+  meshray render ship.glb --heatmap tests            writes ship.png and ship-tests.png
   curl -s https://example.org/ship.glb | meshray render - -o - > ship.png
   meshray render --again ship.png                    renders that picture again";
 
@@ -88,9 +90,22 @@ pub(super) struct RenderArgs {
     /// Store EXR colours as 32-bit floats
     #[arg(long, help_heading = "Output", hide_short_help = true)]
     pub float: bool,
-    /// Add layers to an EXR: albedo, N, P, Z, prim and instance ids
-    #[arg(long, help_heading = "Output", hide_short_help = true)]
-    pub layers: bool,
+    /// Add layers to an EXR: albedo, N, P, Z, prim and instance ids; named, also what each pixel cost by ray class, such
+    /// as `tests.shadow`: ray/prim tests, nodes and cells visited (steps), tests saved by the mailbox, ms
+    ///
+    /// Counts are exact and the same in every run; milliseconds are noisy (the least of three passes, pixel by pixel).
+    /// They are taken after the picture is done, so that its own time is that of an ordinary run.
+    #[arg(long, value_name = "tests,steps,mailbox,ms", num_args = 0..=1, require_equals = true,
+          default_missing_value = "", value_parser = parse::costs, help_heading = "Output", hide_short_help = true)]
+    pub layers: Option<parse::CostList>,
+    /// Write a heat map beside the picture, such as ship-tests.png: what each pixel cost, on a scale
+    #[arg(long, value_name = "tests|steps|mailbox|ms", value_parser = parse::cost(), value_delimiter = ',',
+          help_heading = "Output", hide_short_help = true)]
+    pub heatmap: Vec<Cost>,
+    /// What the brightest colour of the heat map stands for [default: the most of any pixel]
+    #[arg(long, value_name = "N", value_parser = parse::above_zero, requires = "heatmap", help_heading = "Output",
+          hide_short_help = true)]
+    pub heatmap_max: Option<f64>,
     /// How linear light becomes display colour; EXR stays linear [default: neutral]
     #[arg(long, value_name = "NAME", value_parser = parse::tone_map(), help_heading = "Output", hide_short_help = true)]
     pub tone_map: Option<ToneMap>,

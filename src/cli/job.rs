@@ -2,12 +2,14 @@
 
 use super::args::{AccelArgs, Axis, FileType, MessageFormat, MtlArg, PolygonsArg, RenderArgs, StatsFormat};
 use super::camera::{Choice, LensChoice};
+use super::cost_layers;
 use super::message;
 use super::output_name::{self, Facts};
 use super::parse::Back;
 use crate::accel::{AccelChoice, AccelParams, IntersectorKind};
 use crate::image::{ExrSamples, FileKind, PngDepth, ToneMap};
 use crate::load::{Limits, LoadOptions, MtlMode, Polygons};
+use crate::render::Cost;
 use crate::scene::UpAxis;
 use std::path::{Path, PathBuf};
 
@@ -36,6 +38,10 @@ pub(super) struct RenderJob {
     pub params: AccelParams,
     /// 0: all.
     pub threads: usize,
+    /// Heat maps beside each picture.
+    pub heatmaps: Vec<Cost>,
+    /// What their brightest colour stands for; `None`: the most of any pixel.
+    pub heatmap_max: Option<f64>,
     /// Statistics, if wanted.
     pub stats: Option<Stats>,
     /// Only warnings and errors.
@@ -118,6 +124,8 @@ pub(super) struct Look {
     pub exr: ExrSamples,
     /// Layers beside the beauty.
     pub layers: bool,
+    /// What each pixel cost, as further layers.
+    pub costs: Vec<Cost>,
 }
 
 /// Statistics and where they go.
@@ -147,6 +155,8 @@ impl RenderJob {
             accel: args.accel,
             intersector: args.intersector,
             threads: usize::from(args.threads),
+            heatmaps: args.heatmap.clone(),
+            heatmap_max: args.heatmap_max,
             stats,
             quiet: args.quiet,
             strict: args.strict,
@@ -213,14 +223,30 @@ fn batches(args: &RenderArgs, choices: &[Choice]) -> Result<Vec<Batch>, Wrong> {
         batches.push(Batch { inputs, shots });
     }
     refuse_collisions(&batches)?;
+    check_heatmaps(&batches, &args.heatmap)?;
     check_kinds(args, &batches)?;
     Ok(batches)
+}
+
+/// Heat maps are named after their picture, and must not fall on another.
+fn check_heatmaps(batches: &[Batch], heatmaps: &[Cost]) -> Result<(), Wrong> {
+    let shots: Vec<&Shot> = batches.iter().flat_map(|b| &b.shots).collect();
+    if let Some(twice) = heatmaps.iter().enumerate().find(|(i, cost)| heatmaps[..*i].contains(cost)) {
+        return wrong(format!("--heatmap names {} twice", twice.1));
+    }
+    if !heatmaps.is_empty() && shots.iter().any(|s| s.target == Target::Stdout) {
+        return wrong("a heat map is named after its picture, and standard output has no name; use -o NAME");
+    }
+    match cost_layers::collision(&shots, heatmaps) {
+        Some(name) => wrong(format!("two pictures would be written to {}; choose another -o", name.display())),
+        None => Ok(()),
+    }
 }
 
 /// Flags that only one type of file can honour.
 fn check_kinds(args: &RenderArgs, batches: &[Batch]) -> Result<(), Wrong> {
     let all = |kind| batches.iter().flat_map(|b| &b.shots).all(|s| s.kind == kind);
-    if (args.layers || args.float || args.half) && !all(FileKind::Exr) {
+    if (args.layers.is_some() || args.float || args.half) && !all(FileKind::Exr) {
         return wrong("--layers, --half and --float belong to EXR; use -o NAME.exr or --format exr");
     }
     if args.bits == Some(16) && !all(FileKind::Png) {
@@ -302,7 +328,8 @@ fn look(args: &RenderArgs) -> Look {
         exposure: args.exposure,
         png: if args.bits == Some(16) { PngDepth::Sixteen } else { PngDepth::Eight },
         exr: if args.float { ExrSamples::Float } else { ExrSamples::Half },
-        layers: args.layers,
+        layers: args.layers.is_some(),
+        costs: args.layers.as_ref().map_or(Vec::new(), |list| list.0.clone()),
     }
 }
 
@@ -431,6 +458,10 @@ mod tests {
             "a.obj --stats-file s.json",
             "a.obj --grid-density 0",
             "a.obj --layers",
+            "a.obj --layers=tests",
+            "a.obj -o - --heatmap tests",
+            "a.obj --heatmap tests,tests",
+            "a.obj a-tests.obj --heatmap tests",
             "a.obj -o a.jpg --bits 16",
         ] {
             assert!(job(line).is_err(), "{line}");

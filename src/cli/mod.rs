@@ -8,6 +8,7 @@ mod again;
 mod args;
 mod bench;
 mod camera;
+mod cost_layers;
 mod exit;
 mod generate;
 mod inspect;
@@ -37,7 +38,7 @@ use std::path::Path;
 
 /// Runs the command line `words`, whose first is the program's name.
 pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
-    let cli = match Cli::try_parse_from(with_render(words.into_iter().collect())) {
+    let cli = match Cli::try_parse_from(with_joined_layers(with_render(words.into_iter().collect()))) {
         Ok(cli) => cli,
         Err(e) => {
             let exit = if e.use_stderr() { Exit::Usage } else { Exit::Done };
@@ -88,9 +89,25 @@ fn render_command(typed: &RenderArgs) -> Exit {
 fn with_render(mut words: Vec<OsString>) -> Vec<OsString> {
     let Some(first) = words.get(1).and_then(|w| w.to_str()) else { return words };
     let is_command = Cli::command().get_subcommands().any(|c| c.get_name() == first) || first == "help";
-    let is_file = !first.starts_with('-') && (first.contains(['.', '/', '\\']) || Path::new(first).exists());
-    if !is_command && (is_file || first == "-") {
+    if !is_command && (is_file(first) || first == "-") {
         words.insert(1, "render".into());
+    }
+    words
+}
+
+fn is_file(word: &str) -> bool {
+    !word.starts_with('-') && (word.contains(['.', '/', '\\']) || Path::new(word).exists())
+}
+
+/// Lets `--layers tests,steps` stand for `--layers=tests,steps`, while in `--layers ship.glb` the flag stands alone.
+fn with_joined_layers(mut words: Vec<OsString>) -> Vec<OsString> {
+    let alone = |w: &OsString| w.to_str().is_some_and(|w| !w.starts_with('-') && !is_file(w));
+    if let Some(at) = words.iter().position(|w| w == "--layers")
+        && words.get(at + 1).is_some_and(alone)
+    {
+        let list = words.remove(at + 1);
+        words[at].push("=");
+        words[at].push(list);
     }
     words
 }
@@ -121,6 +138,21 @@ mod tests {
         assert_eq!(with_render(words("meshray --help")), words("meshray --help"));
         assert_eq!(with_render(words("meshray rendr")), words("meshray rendr"));
         assert_eq!(with_render(words("meshray -")), words("meshray render -"));
+    }
+
+    #[test]
+    fn layers_take_names_but_no_file() {
+        let words = |line: &str| line.split(' ').map(OsString::from).collect::<Vec<_>>();
+        let joined = |line: &str| with_joined_layers(words(line));
+        assert_eq!(
+            joined("meshray render a.glb --layers tests,ms -q"),
+            words("meshray render a.glb --layers=tests,ms -q")
+        );
+        for line in
+            ["meshray render --layers a.glb", "meshray render a.glb --layers", "meshray render a.glb --layers -q"]
+        {
+            assert_eq!(joined(line), words(line));
+        }
     }
 
     #[test]

@@ -4,6 +4,7 @@ use crate::accel::{AccelChoice, AccelKind, IntersectorKind, MailboxKind};
 use crate::generate::{Family, MAX_TRIANGLES};
 use crate::image::ToneMap;
 use crate::math::Vec3;
+use crate::render::{Cost, UnknownCost};
 use crate::scene::Background;
 use crate::scene::framing::NamedView;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -72,6 +73,33 @@ pub(super) fn ortho(text: &str) -> Result<Ortho, String> {
     }
     let height = finite(text)?;
     if height > 0.0 { Ok(Ortho::Height(height)) } else { Err("the height must be above 0".into()) }
+}
+
+/// A number above 0.
+pub(super) fn above_zero(text: &str) -> Result<f64, String> {
+    finite(text).ok().filter(|&n| n > 0.0).ok_or_else(|| "write a number above 0".into())
+}
+
+/// Costs that are stored in layers; none are named by `--layers` alone.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct CostList(pub Vec<Cost>);
+
+/// Names of costs with commas between them, or nothing.
+pub(super) fn costs(text: &str) -> Result<CostList, String> {
+    let mut costs = Vec::new();
+    for name in text.split(',').filter(|_| !text.is_empty()) {
+        let cost: Cost = name.trim().parse().map_err(|e: UnknownCost| e.to_string())?;
+        if !costs.contains(&cost) {
+            costs.push(cost);
+        }
+    }
+    Ok(CostList(costs))
+}
+
+/// One of [`Cost::ALL`].
+pub(super) fn cost() -> impl TypedValueParser<Value = Cost> {
+    let parse = |name: String| name.parse::<Cost>().map_err(|e| e.to_string());
+    PossibleValuesParser::new(Cost::ALL.map(Cost::name)).try_map(parse)
 }
 
 /// 8 or 16.
@@ -189,6 +217,13 @@ mod tests {
         for wrong in ["1,2", "1,2,3,4", "1,2,nan", "inf,0,0", ""] {
             assert!(vec3(wrong).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn costs_are_listed_with_commas_and_none_is_a_list_too() {
+        assert_eq!(costs("steps,tests,steps"), Ok(CostList(vec![Cost::Steps, Cost::Tests])));
+        assert_eq!(costs(""), Ok(CostList(Vec::new())));
+        assert!(costs("tests,stpes").unwrap_err().contains("steps"));
     }
 
     #[test]

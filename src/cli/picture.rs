@@ -57,11 +57,11 @@ pub(super) fn background(look: &Look, scene: &Scene) -> Background {
     })
 }
 
-/// A fault when the picture alone needs more than the memory that is allowed.
-pub(super) fn too_large(effective: &Effective, limit: u64) -> Option<Diagnostic> {
+/// A fault when the picture alone, with so many costs of each pixel, needs more than the memory that is allowed.
+pub(super) fn too_large(effective: &Effective, costs: usize, limit: u64) -> Option<Diagnostic> {
     let settings = &effective.settings;
-    // Beauty, its tiles and the encoder's copy; layers beside it.
-    let per_pixel = 16 * 3 + if settings.layers { 48 } else { 0 };
+    // Beauty, its tiles and the encoder's copy; layers beside it; of costs the tiles, five channels, copies and sums.
+    let per_pixel = 16 * 3 + if settings.layers { 48 } else { 0 } + 128 * costs as u64;
     let need = u64::from(settings.width) * u64::from(settings.height) * per_pixel;
     (need > limit).then(|| {
         let text =
@@ -127,6 +127,7 @@ mod tests {
             png: PngDepth::Eight,
             exr: ExrSamples::Half,
             layers: false,
+            costs: Vec::new(),
         }
     }
 
@@ -142,8 +143,8 @@ mod tests {
     #[test]
     fn a_picture_beyond_the_memory_allowed_is_refused() {
         let big = Effective::new(&Look { size: Some((65_535, 65_535)), ..look() }, &RenderHints::default()).unwrap();
-        assert!(too_large(&big, 8 << 30).is_some());
+        assert!(too_large(&big, 0, 8 << 30).is_some());
         let usual = Effective::new(&look(), &RenderHints::default()).unwrap();
-        assert!(too_large(&usual, 8 << 30).is_none());
+        assert!(too_large(&usual, 4, 8 << 30).is_none());
     }
 }

@@ -7,12 +7,12 @@ use super::message::{Messages, Severity};
 use super::picture::{self, Effective};
 use super::progress::Progress;
 use super::stats::{self, PictureStats, Times};
-use super::{accident, again, interrupt, output_name, read};
+use super::{accident, again, cost_layers, interrupt, output_name, read};
 use crate::accel::auto;
 use crate::image::was_written_by_meshray;
 use crate::load::{Diagnostic, Loaded};
 use crate::render::texture::TextureStore;
-use crate::render::{Job, Rendered, View, World};
+use crate::render::{Costs, Job, Rendered, View, World, render_costs};
 use crate::scene::framing::{Bounds, robust_bounds};
 use crate::scene::{default_light, default_light::DefaultLight};
 use std::path::Path;
@@ -50,7 +50,9 @@ fn render_batch(job: &RenderJob, batch: &Batch, messages: &Messages, done: &mut 
     let mut worst = Exit::Done;
     let mut shots = Vec::new();
     for shot in &batch.shots {
-        match check_target(&shot.target, &batch.inputs) {
+        let maps = job.heatmaps.iter().filter_map(|&cost| cost_layers::target(&shot.target, cost));
+        let targets = std::iter::once(shot.target.clone()).chain(maps);
+        match targets.into_iter().try_for_each(|target| check_target(&target, &batch.inputs)) {
             Ok(()) => shots.push(shot),
             Err(fault) => {
                 messages.say(Severity::Error, &fault);
@@ -166,14 +168,15 @@ fn render_shot(
         messages.say(Severity::Error, fault);
         exit
     };
-    if let Some(fault) = overwrites_a_source(&shot.target, loaded) {
+    let names = cost_layers::names(shot, &job.heatmaps);
+    if let Some(fault) = names.iter().find_map(|path| overwrites_a_source(path, loaded)) {
         return fail(&fault, Exit::Failed);
     }
     let effective = match Effective::new(&job.look, &loaded.scene.hints) {
         Ok(effective) => effective,
         Err(text) => return fail(&Diagnostic::new("scene-value", file, "", text), Exit::Input),
     };
-    if let Some(fault) = picture::too_large(&effective, job.load.limits.memory) {
+    if let Some(fault) = picture::too_large(&effective, cost_layers::wanted(job).len(), job.load.limits.memory) {
         return fail(&fault, Exit::Failed);
     }
 
@@ -205,10 +208,14 @@ fn render_shot(
         view: &view,
         settings: &effective.settings,
     };
-    let rendered = trace(job, &work, progress, &mut times);
+    let mut rendered = trace(job, &work, progress, &mut times);
+    let costs = rendered.complete.then(|| costs(job, &work, progress));
     progress.finish();
-    if !rendered.complete {
+    let Some(costs) = costs.flatten() else {
         return keep_partial(shot, &rendered, &effective, loaded, messages);
+    };
+    if let Some(layers) = &mut rendered.picture.layers {
+        cost_layers::add_channels(job, &costs, layers);
     }
     let counted = job.stats.is_some().then(|| stats::count(&work, &rendered, &accel, messages));
 
@@ -224,7 +231,10 @@ fn render_shot(
             summary.say(&rendered, &times, messages);
             let stats = PictureStats::new(&facts, &view_phrase, times, world, accel.summary(), counted);
             done.push(stats);
-            Exit::Done
+            match cost_layers::write_maps(job, shot, effective.settings.width, &costs, accel_kind, messages) {
+                Ok(()) => Exit::Done,
+                Err(fault) => fail(&fault, Exit::Failed),
+            }
         }
         Err(picture::WriteError::BrokenPipe) => Exit::Done,
         Err(picture::WriteError::Fault(fault)) => fail(&fault, Exit::Failed),
@@ -246,9 +256,18 @@ fn trace(job: &RenderJob, work: &Job, progress: &Progress, times: &mut Times) ->
     rendered
 }
 
+/// What each pixel cost, in passes behind the picture's own; `None` when the user gave up.
+fn costs(job: &RenderJob, work: &Job, progress: &Progress) -> Option<Costs> {
+    let wanted = cost_layers::wanted(job);
+    if wanted.is_empty() {
+        return Some(Costs::default());
+    }
+    progress.begin("counting");
+    render_costs(work, &wanted, progress)
+}
+
 /// A picture must never replace a texture of its own model.
-fn overwrites_a_source(target: &Target, loaded: &Loaded) -> Option<Diagnostic> {
-    let path = target.path()?;
+fn overwrites_a_source(path: &Path, loaded: &Loaded) -> Option<Diagnostic> {
     let target = output_name::identity(path);
     let same = loaded.facts.files.iter().any(|file| output_name::identity(file) == target);
     same.then(|| {

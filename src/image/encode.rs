@@ -22,7 +22,7 @@ fn check_shape(picture: &Picture) -> Result<(), ImageError> {
         return Err(fault("beauty", picture.beauty.len()));
     }
     let Some(layers) = &picture.layers else { return Ok(()) };
-    let lengths = [
+    let own = [
         ("albedo", layers.albedo.len()),
         ("normal", layers.normal.len()),
         ("position", layers.position.len()),
@@ -30,7 +30,8 @@ fn check_shape(picture: &Picture) -> Result<(), ImageError> {
         ("prim", layers.prim.len()),
         ("instance", layers.instance.len()),
     ];
-    let wrong = lengths.into_iter().find(|&(_, len)| len != 0 && len != pixels);
+    let channels = layers.channels.iter().map(|c| ("channels", c.values.len()));
+    let wrong = own.into_iter().chain(channels).find(|&(_, len)| len != 0 && len != pixels);
     wrong.map_or(Ok(()), |(array, len)| Err(fault(array, len)))
 }
 

@@ -8,12 +8,13 @@
 //! | `P.X P.Y P.Z` | float | position, world space |
 //! | `Z` | float | distance along the view axis; infinite where nothing was hit |
 //! | `id.prim id.instance` | uint | prim and instance; 4294967295 where nothing was hit |
+//! | such as `tests.shadow` | uint or float | every other [`Channel`] |
 //!
 //! Layers are name prefixes within one flat part, no name is a bare number, and the beauty has the plain names: that
 //! is what compositing programs and libraries agree on. Equal pictures and metadata give equal bytes.
 
 use super::metadata::MAX_TEXT;
-use super::{ExrSamples, FileKind, ImageError, Layers, Metadata, Output, Picture};
+use super::{Channel, ExrSamples, FileKind, ImageError, Layers, Metadata, Output, Picture, Values};
 use ::exr::image::{Blocks, Encoding, FlatSamples, Image, Layer};
 use ::exr::meta::MetaData;
 use ::exr::meta::attribute::{AttributeValue, Chromaticities, LineOrder, Text};
@@ -96,6 +97,10 @@ fn channels(picture: &Picture, output: &Output) -> SmallVec<[AnyChannel<FlatSamp
     if !layers.instance.is_empty() {
         list.push(ids("id.instance", &layers.instance));
     }
+    list.extend(layers.channels.iter().map(|channel| match &channel.values {
+        Values::U32(values) => ids(&channel.name, values),
+        Values::F32(values) => floats(&channel.name, values.clone()),
+    }));
     list
 }
 
@@ -213,6 +218,23 @@ impl Channels<'_> {
         (0..self.len).map(|i| [x[i], y[i], z[i]]).collect()
     }
 
+    /// Channels of layers that have no array of their own, unless they are halves.
+    fn others(&self) -> Vec<Channel> {
+        const OWN: [&str; 4] = ["albedo", "N", "P", "id"];
+        let other = |channel: &AnyChannel<FlatSamples>| {
+            let name = channel.name.to_string();
+            let (layer, _) = name.split_once('.')?;
+            let values = match &channel.sample_data {
+                _ if OWN.contains(&layer) || channel.sample_data.len() != self.len => return None,
+                FlatSamples::U32(values) => Values::U32(values.clone()),
+                FlatSamples::F32(values) => Values::F32(values.clone()),
+                FlatSamples::F16(_) => return None,
+            };
+            Some(Channel { name, values })
+        };
+        self.list.iter().filter_map(other).collect()
+    }
+
     fn layers(&self) -> Option<Layers> {
         let layers = Layers {
             albedo: self.triples(["albedo.R", "albedo.G", "albedo.B"]),
@@ -221,6 +243,7 @@ impl Channels<'_> {
             depth: self.floats("Z").unwrap_or_default(),
             prim: self.ids("id.prim"),
             instance: self.ids("id.instance"),
+            channels: self.others(),
         };
         (layers != Layers::default()).then_some(layers)
     }
@@ -240,6 +263,10 @@ mod tests {
             depth: (0..n).map(|i| if i == 3 { f32::INFINITY } else { i as f32 * 1.000_1 }).collect(),
             prim: (0..n).map(|i| if i == 3 { u32::MAX } else { 16_777_217 + i }).collect(),
             instance: (0..n).collect(),
+            channels: vec![
+                Channel { name: "ms.shadow".into(), values: Values::F32((0..n).map(|i| i as f32 * 0.01).collect()) },
+                Channel { name: "tests.shadow".into(), values: Values::U32((0..n).map(|i| 16_777_217 + i).collect()) },
+            ],
         };
         let beauty = (0..n).map(|i| [i as f32 * 0.123, 1e-3, 70_000.0, 0.7]).collect();
         Picture { width: 7, height: 5, beauty, layers: Some(layers) }
@@ -275,7 +302,7 @@ mod tests {
         let listed: Vec<String> =
             header.channels.list.iter().map(|c| format!("{}:{:?}", c.name, c.sample_type)).collect();
         let expected = "A:F16 B:F16 G:F16 N.X:F16 N.Y:F16 N.Z:F16 P.X:F32 P.Y:F32 P.Z:F32 R:F16 Z:F32 albedo.B:F16 \
-                        albedo.G:F16 albedo.R:F16 id.instance:U32 id.prim:U32";
+                        albedo.G:F16 albedo.R:F16 id.instance:U32 id.prim:U32 ms.shadow:F32 tests.shadow:U32";
         assert_eq!(listed.join(" "), expected);
         assert_eq!(header.compression, Compression::ZIP16);
         assert!(header.own_attributes.software_name.is_none());

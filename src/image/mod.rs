@@ -5,6 +5,7 @@
 
 mod develop;
 pub mod diff;
+pub mod draw;
 mod encode;
 mod error;
 mod exif;
@@ -56,4 +57,48 @@ pub struct Layers {
     pub prim: Vec<u32>,
     /// Instance id of that sample (spheres, cones and planes count on after the instances); `u32::MAX` where nothing was hit.
     pub instance: Vec<u32>,
+    /// Whatever else was asked for.
+    pub channels: Vec<Channel>,
+}
+
+/// One more value for each pixel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Channel {
+    /// Such as `tests.shadow`: what is before the point is the layer.
+    pub name: String,
+    /// `width × height` of them.
+    pub values: Values,
+}
+
+/// The values of a [`Channel`].
+#[derive(Clone, Debug, PartialEq)]
+pub enum Values {
+    /// Counts.
+    U32(Vec<u32>),
+    /// Measures.
+    F32(Vec<f32>),
+}
+
+impl Values {
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::U32(values) => values.len(),
+            Self::F32(values) => values.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Each of them; both kinds fit exactly.
+    pub fn iter(&self) -> impl Iterator<Item = f64> {
+        let (counts, measures): (&[u32], &[f32]) = match self {
+            Self::U32(values) => (values, &[]),
+            Self::F32(values) => (&[], values),
+        };
+        counts.iter().map(|&n| f64::from(n)).chain(measures.iter().map(|&x| f64::from(x)))
+    }
 }

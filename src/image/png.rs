@@ -11,7 +11,7 @@ pub(super) fn encode(picture: &Picture, output: &Output, metadata: &Metadata) ->
     match output.png_depth {
         PngDepth::Eight => {
             let raster: Raster<u8> = raster(picture, output);
-            write(&raster, &raster.samples, BitDepth::Eight, metadata)
+            write_bytes(&raster, metadata)
         }
         PngDepth::Sixteen => {
             let raster: Raster<u16> = raster(picture, output);
@@ -20,6 +20,11 @@ pub(super) fn encode(picture: &Picture, output: &Output, metadata: &Metadata) ->
         }
     }
     .map_err(|e| ImageError::encode(FileKind::Png, e))
+}
+
+/// The bytes of a PNG file of samples that are coded already.
+pub(super) fn write_bytes(raster: &Raster<u8>, metadata: &Metadata) -> Result<Vec<u8>, ::png::EncodingError> {
+    write(raster, &raster.samples, BitDepth::Eight, metadata)
 }
 
 fn write<T>(

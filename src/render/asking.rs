@@ -4,10 +4,6 @@ use super::Progress;
 use super::observer::{Observer, Question};
 use crate::accel::{Accel, Hit, Ray};
 
-/// Rays asked of the structure at once: enough for packets, few enough for brute force over a large scene to stop within
-/// a second.
-const SLICE: usize = 256;
-
 /// A structure, one worker's scratch for it, and whoever may end the work.
 pub(crate) struct Asking<'a, A: Accel> {
     accel: &'a A,
@@ -24,34 +20,37 @@ impl<'a, A: Accel> Asking<'a, A> {
 
     /// The first hit of each ray.
     pub(crate) fn closest<P: Observer>(&mut self, rays: &[Ray], hits: &mut [Hit], probe: &mut P) {
-        for (rays, hits) in rays.chunks(SLICE).zip(hits.chunks_mut(SLICE)) {
+        for (rays, hits) in rays.chunks(P::SLICE).zip(hits.chunks_mut(P::SLICE)) {
             if self.gives_up() {
                 return;
             }
             probe.asked(Question::Closest, rays, &[]);
             self.accel.closest(rays, hits, &mut self.scratch, probe);
+            probe.answered();
         }
     }
 
     /// Whether anything opaque is hit by each ray.
     pub(crate) fn occluded<P: Observer>(&mut self, rays: &[Ray], blocked: &mut [bool], probe: &mut P) {
-        for (rays, blocked) in rays.chunks(SLICE).zip(blocked.chunks_mut(SLICE)) {
+        for (rays, blocked) in rays.chunks(P::SLICE).zip(blocked.chunks_mut(P::SLICE)) {
             if self.gives_up() {
                 return;
             }
             probe.asked(Question::Occluded, rays, &[]);
             self.accel.occluded(rays, blocked, &mut self.scratch, probe);
+            probe.answered();
         }
     }
 
     /// The first hit of each ray behind `after`.
     pub(crate) fn next<P: Observer>(&mut self, rays: &[Ray], after: &[Hit], hits: &mut [Hit], probe: &mut P) {
-        for ((rays, after), hits) in rays.chunks(SLICE).zip(after.chunks(SLICE)).zip(hits.chunks_mut(SLICE)) {
+        for ((rays, after), hits) in rays.chunks(P::SLICE).zip(after.chunks(P::SLICE)).zip(hits.chunks_mut(P::SLICE)) {
             if self.gives_up() {
                 return;
             }
             probe.asked(Question::Next, rays, after);
             self.accel.next(rays, after, hits, &mut self.scratch, probe);
+            probe.answered();
         }
     }
 

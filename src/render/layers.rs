@@ -84,5 +84,6 @@ pub(crate) fn empty(pixels: usize) -> Layers {
         depth: vec![f32::INFINITY; pixels],
         prim: vec![NO_PRIM; pixels],
         instance: vec![NO_PRIM; pixels],
+        channels: Vec::new(),
     }
 }

@@ -10,6 +10,7 @@
 
 mod asking;
 mod context;
+mod costs;
 mod layers;
 mod observer;
 pub mod optics;
@@ -28,6 +29,7 @@ mod wave;
 mod whitted;
 pub mod world;
 
+pub use costs::{Cost, Costs, UnknownCost, render_costs};
 pub use observer::{Asked, Question, Tape};
 pub use view::View;
 pub use world::{PrimSource, World};

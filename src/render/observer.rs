@@ -21,10 +21,16 @@ impl Question {
 /// A probe that hears of whole slices of rays before they are asked. Nothing by default, and nothing in the machine code
 /// then.
 pub(crate) trait Observer: Probe {
+    /// Rays asked at once at most: enough for packets, few enough for brute force over a large scene to stop within a
+    /// second. 1 where the walk's calls must be told apart by ray.
+    const SLICE: usize = 256;
+
     /// These rays are asked now; `after` has the hit of each behind which it goes on, where that is the question.
     fn asked(&mut self, _question: Question, _rays: &[Ray], _after: &[Hit]) {}
-    /// The samples of other pixels begin; sample numbers start from 0 again.
-    fn batch(&mut self) {}
+    /// The rays asked last have their answers.
+    fn answered(&mut self) {}
+    /// So many samples of other pixels begin; sample numbers start from 0 again.
+    fn batch(&mut self, _samples: usize) {}
 }
 
 impl Observer for NoProbe {}
@@ -92,7 +98,7 @@ impl Observer for Tape {
         rays.iter().zip(after).for_each(|(ray, after)| track.push(Asked { ray: *ray, after, batch }, Self::LIMIT));
     }
 
-    fn batch(&mut self) {
+    fn batch(&mut self, _samples: usize) {
         self.batch += 1;
     }
 }

@@ -65,31 +65,80 @@ pub(crate) fn render_tiles<A: Accel, P: Observer>(
     progress: &dyn Progress,
 ) -> (Picture, Vec<ByClass<P>>, bool) {
     let frame = Frame::new(context, view, settings);
+    let work = |tracer: &mut Tracer<A, P>, tile| frame.render(tracer, tile);
+    let (finished, counts, complete) = each_tile(context, accel, settings, progress, work);
+    let mut picture = empty_picture(settings);
+    finished.iter().for_each(|pixels| pixels.store(&mut picture));
+    (picture, counts, complete)
+}
+
+/// Traces every tile, so many pixels together, and gathers what `cost` makes of the observers of each of these batches:
+/// one value for each pixel, row by row. `None` when cancelled.
+pub(crate) fn cost_tiles<A: Accel, P: Observer, T: Copy + Default + Send>(
+    context: &Context,
+    accel: &A,
+    view: &View,
+    settings: &Settings,
+    progress: &dyn Progress,
+    together: Together,
+    cost: impl Fn(&mut ByClass<P>, usize) -> Vec<T> + Sync,
+) -> Option<Vec<T>> {
+    let frame = Frame::new(context, view, settings);
+    let samples = frame.offsets.len();
+    let pixels = match together {
+        Together::Wave => batch_pixels(samples),
+        Together::Pixel => 1,
+    };
+    let work = |tracer: &mut Tracer<A, P>, tile: Tile| {
+        let mut costs = Vec::new();
+        let each = |tracer: &mut Tracer<A, P>| costs.extend(cost(&mut tracer.counts, samples));
+        frame.trace(tracer, tile, pixels, each).map(|()| (tile, costs))
+    };
+    let (finished, _, complete) = each_tile(context, accel, settings, progress, work);
+    let mut all = vec![T::default(); settings.width as usize * settings.height as usize];
+    for (tile, costs) in finished {
+        for ((x, y), cost) in tile.places().zip(costs) {
+            all[y as usize * settings.width as usize + x as usize] = cost;
+        }
+    }
+    complete.then_some(all)
+}
+
+/// Pixels that are traced together.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Together {
+    /// As many as fit a wave, as when rendering.
+    Wave,
+    /// One by one.
+    Pixel,
+}
+
+/// Has every tile worked on by some thread: what came of them, what the threads counted, and whether that was all.
+fn each_tile<A: Accel, P: Observer, T: Send>(
+    context: &Context,
+    accel: &A,
+    settings: &Settings,
+    progress: &dyn Progress,
+    work: impl Fn(&mut Tracer<A, P>, Tile) -> Option<T> + Sync,
+) -> (Vec<T>, Vec<ByClass<P>>, bool) {
     let tiles = tiles(settings.width, settings.height);
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
 
     // Every thread takes tiles in order until none is left.
-    let work = |_: rayon::BroadcastContext| {
+    let take = |_: rayon::BroadcastContext| {
         let mut tracer = Tracer::<A, P>::new(context, accel, progress);
         let mut finished = Vec::new();
         while let Some(&tile) = tiles.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let Some(pixels) = frame.render(&mut tracer, tile) else { break };
-            finished.push(pixels);
+            let Some(result) = work(&mut tracer, tile) else { break };
+            finished.push(result);
             progress.tiles(done.fetch_add(1, Ordering::Relaxed) + 1, tiles.len());
         }
         (finished, tracer.counts)
     };
-    let results = rayon::broadcast(work);
-
-    let mut picture = empty_picture(settings);
-    let mut counts = Vec::new();
-    let mut complete = 0;
-    for (finished, counted) in results {
-        complete += finished.len();
-        finished.iter().for_each(|pixels| pixels.store(&mut picture));
-        counts.push(counted);
-    }
-    (picture, counts, complete == tiles.len())
+    let (finished, counts): (Vec<_>, Vec<_>) = rayon::broadcast(take).into_iter().unzip();
+    let finished: Vec<T> = finished.into_iter().flatten().collect();
+    let complete = finished.len() == tiles.len();
+    (finished, counts, complete)
 }
 
 /// Pixels whose samples are traced together at most.
@@ -102,8 +151,7 @@ pub(crate) fn batches(settings: &Settings) -> Vec<Vec<u32>> {
     let samples = sample_offsets(settings.samples).len();
     let mut batches = Vec::new();
     for tile in tiles(settings.width, settings.height) {
-        let places = (tile.y0..tile.y1).flat_map(|y| (tile.x0..tile.x1).map(move |x| y * settings.width + x));
-        let places: Vec<u32> = places.collect();
+        let places: Vec<u32> = tile.places().map(|(x, y)| y * settings.width + x).collect();
         let repeat = |run: &[u32]| run.iter().flat_map(|&pixel| std::iter::repeat_n(pixel, samples)).collect();
         batches.extend(places.chunks(batch_pixels(samples)).map(repeat));
     }
@@ -131,11 +179,16 @@ fn empty_picture(settings: &Settings) -> Picture {
     }
 }
 
+impl Tile {
+    /// Its pixels, row by row.
+    fn places(self) -> impl Iterator<Item = (u32, u32)> {
+        (self.y0..self.y1).flat_map(move |y| (self.x0..self.x1).map(move |x| (x, y)))
+    }
+}
+
 impl TilePixels {
     fn store(&self, picture: &mut Picture) {
-        let Tile { x0, y0, x1, y1 } = self.tile;
-        let places = (y0..y1).flat_map(|y| (x0..x1).map(move |x| (x, y)));
-        for (k, (x, y)) in places.enumerate() {
+        for (k, (x, y)) in self.tile.places().enumerate() {
             let i = y as usize * picture.width as usize + x as usize;
             picture.beauty[i] = self.beauty[k];
             if let (Some(layers), Some(pixel)) = (&mut picture.layers, self.layers.get(k)) {
@@ -159,13 +212,28 @@ impl<'a> Frame<'a> {
 
     /// Renders one tile; `None` when cancelled.
     fn render<A: Accel, P: Observer>(&self, tracer: &mut Tracer<A, P>, tile: Tile) -> Option<TilePixels> {
-        let places: Vec<_> = (tile.y0..tile.y1).flat_map(|y| (tile.x0..tile.x1).map(move |x| (x, y))).collect();
-        let mut done = TilePixels { tile, beauty: Vec::with_capacity(places.len()), layers: Vec::new() };
+        let mut done = TilePixels { tile, beauty: Vec::new(), layers: Vec::new() };
         let per_pixel = self.offsets.len();
+        self.trace(tracer, tile, batch_pixels(per_pixel), |tracer| {
+            done.beauty.extend(tracer.samples.chunks(per_pixel).map(|s| resolve(s, self.background)));
+            let layer = |f: &[Facts]| LayerPixel::new(f, self.view.eye, self.view.forward);
+            done.layers.extend(tracer.facts.chunks(per_pixel).map(layer));
+        })?;
+        Some(done)
+    }
 
-        // All samples of a pixel are traced together, and of as many pixels as fit a wave.
-        for places in places.chunks(batch_pixels(per_pixel)) {
-            tracer.reset(places.len() * per_pixel, self.settings.layers);
+    /// Traces one tile, all samples of a pixel and so many pixels together, and calls `each` after each of these batches;
+    /// `None` when cancelled.
+    fn trace<A: Accel, P: Observer>(
+        &self,
+        tracer: &mut Tracer<A, P>,
+        tile: Tile,
+        pixels: usize,
+        mut each: impl FnMut(&mut Tracer<A, P>),
+    ) -> Option<()> {
+        let places: Vec<_> = tile.places().collect();
+        for places in places.chunks(pixels) {
+            tracer.reset(places.len() * self.offsets.len(), self.settings.layers);
             let corners = places.iter().flat_map(|&(x, y)| self.offsets.iter().map(move |&(dx, dy)| (x, y, dx, dy)));
             for (sample, (x, y, dx, dy)) in (0u32..).zip(corners) {
                 let (ray, path) = self.eye_ray(tracer.center(), f64::from(x) + dx, f64::from(y) + dy, sample);
@@ -174,11 +242,9 @@ impl<'a> Frame<'a> {
             if !tracer.trace() {
                 return None;
             }
-            done.beauty.extend(tracer.samples.chunks(per_pixel).map(|s| resolve(s, self.background)));
-            let layer = |f: &[Facts]| LayerPixel::new(f, self.view.eye, self.view.forward);
-            done.layers.extend(tracer.facts.chunks(per_pixel).map(layer));
+            each(tracer);
         }
-        Some(done)
+        Some(())
     }
 
     /// The ray through (x, y) of the picture, started before the scene when the eye is far away, in the centred frame.

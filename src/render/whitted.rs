@@ -98,7 +98,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
 
     /// Prepares for `samples` samples, whose eye rays [`Self::start`] adds.
     pub(crate) fn reset(&mut self, samples: usize, facts: bool) {
-        self.counts.each_mut().into_iter().for_each(Observer::batch);
+        self.counts.each_mut().into_iter().for_each(|probe| probe.batch(samples));
         self.starting.iter_mut().chain(&mut self.continuing).for_each(Queue::clear);
         self.shadows.clear();
         self.samples.clear();

@@ -2,6 +2,7 @@
 
 mod again;
 mod backdrop;
+mod costs;
 mod endings;
 mod generate;
 mod interrupt;

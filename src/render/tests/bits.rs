@@ -4,7 +4,7 @@ use super::*;
 use crate::scene::{AlphaMode, Environment, MetalRough};
 
 /// A bit of everything: mirrors, glass, blending, textures aside.
-fn busy() -> Stage {
+pub(super) fn busy() -> Stage {
     let mut s = stage(View::look_at(DVec3::new(1.0, 2.0, 6.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.8)));
     s.settings = Settings { width: 70, height: 50, samples: 3, cutoff: 1.0 / 512.0, layers: true, ..s.settings };
     let pbr = |m: MetalRough| Material { surface: Reflection::MetalRough(m), ..Material::plain() };
@@ -56,18 +56,8 @@ fn every_structure_gives_the_same_bits() {
 #[test]
 fn counting_changes_no_bit() {
     let s = busy();
-    let world = World::new(&s.scene);
-    let accel = AnyAccel::build(AccelKind::None, &world.shapes, &AccelParams::DEFAULT);
-    let textures = TextureStore::new(&s.scene);
-    let job = Job {
-        scene: &s.scene,
-        world: &world,
-        accel: &accel,
-        textures: &textures,
-        view: &s.view,
-        settings: &s.settings,
-    };
-    let (timed, counted) = (crate::render::render(&job, &()), render_counted(&job, &()));
+    let (timed, counted) =
+        s.with_job(AccelKind::None, |job| (crate::render::render(job, &()), render_counted(job, &())));
     assert!(timed.picture == counted.picture);
     assert_eq!(timed.counts, Default::default());
     assert_eq!(counted.counts.primary.queries, 70 * 50 * 3);

@@ -1,6 +1,7 @@
 //! Whole small pictures with analytic answers.
 
 mod bits;
+mod costs;
 mod glass;
 mod light;
 mod mirrors;
@@ -88,19 +89,22 @@ impl Stage {
         self
     }
 
-    fn render_by(&self, kind: AccelKind) -> Rendered {
+    fn with_job<T>(&self, kind: AccelKind, work: impl FnOnce(&Job) -> T) -> T {
         let world = World::new(&self.scene);
         let accel = AnyAccel::build(kind, &world.shapes, &AccelParams::DEFAULT);
         let textures = TextureStore::new(&self.scene);
-        let job = Job {
+        work(&Job {
             scene: &self.scene,
             world: &world,
             accel: &accel,
             textures: &textures,
             view: &self.view,
             settings: &self.settings,
-        };
-        render_counted(&job, &())
+        })
+    }
+
+    fn render_by(&self, kind: AccelKind) -> Rendered {
+        self.with_job(kind, |job| render_counted(job, &()))
     }
 
     fn render(&self) -> Rendered {

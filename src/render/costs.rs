@@ -1,0 +1,251 @@
+//! What each pixel of a picture cost: counts and times by ray class.
+//!
+//! Counting and timing are passes of their own, so that the picture itself is rendered without either.
+
+use super::observer::{Observer, Question};
+use super::tile::{Together, cost_tiles};
+use super::whitted::ByClass;
+use super::{Context, Job, Progress};
+use crate::accel::{Hit, Probe, Ray};
+use crate::image::{Channel, Values};
+use std::fmt;
+use std::str::FromStr;
+use std::time::{Duration, Instant};
+
+/// What is told of each pixel, as a sum over its samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Cost {
+    /// Ray/prim tests (n_it).
+    Tests,
+    /// Nodes and cells visited (n_ts).
+    Steps,
+    /// Tests that the mailbox saved (n_mb).
+    Mailbox,
+    /// Milliseconds. Unlike the counts they are noisy: another run gives others.
+    Ms,
+}
+
+impl Cost {
+    /// All of them, in the order of the help text.
+    pub const ALL: [Self; 4] = [Self::Tests, Self::Steps, Self::Mailbox, Self::Ms];
+
+    /// As typed, and what the names of its channels begin with.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Tests => "tests",
+            Self::Steps => "steps",
+            Self::Mailbox => "mailbox",
+            Self::Ms => "ms",
+        }
+    }
+}
+
+impl fmt::Display for Cost {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A name that no cost has.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("nothing is counted under the name {0:?}; there are: {names}", names = Cost::ALL.map(Cost::name).join(", "))]
+pub struct UnknownCost(String);
+
+impl FromStr for Cost {
+    type Err = UnknownCost;
+
+    fn from_str(name: &str) -> Result<Self, UnknownCost> {
+        Self::ALL.into_iter().find(|c| c.name() == name).ok_or_else(|| UnknownCost(name.into()))
+    }
+}
+
+/// Ray classes as the names of channels end, in the order of [`ByClass`]'s fields.
+const CLASSES: [&str; 4] = ["primary", "shadow", "reflected", "refracted"];
+
+/// What the time of a pixel has beside the classes: everything that is not spent in the structure.
+const SHADING: &str = "shading";
+
+/// Timed passes: what disturbs a pixel in one of them does not show.
+const TIMED: usize = 3;
+
+/// What the pixels of a picture cost.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Costs {
+    /// For each cost that was asked for one channel by ray class, such as `tests.shadow`; `ms` has `ms.shading` too.
+    channels: Vec<Channel>,
+}
+
+impl Costs {
+    /// The channels of a cost; none when it was not asked for.
+    pub fn channels(&self, cost: Cost) -> impl Iterator<Item = &Channel> {
+        let of = move |c: &&Channel| c.name.split_once('.').is_some_and(|(what, _)| what == cost.name());
+        self.channels.iter().filter(of)
+    }
+
+    /// The sum of a cost over all classes, for each pixel.
+    pub fn total(&self, cost: Cost) -> Vec<f64> {
+        let mut total = Vec::new();
+        for channel in self.channels(cost) {
+            total.resize(channel.values.len(), 0.0);
+            total.iter_mut().zip(channel.values.iter()).for_each(|(sum, value)| *sum += value);
+        }
+        total
+    }
+
+    fn push<const N: usize, T: Copy>(
+        &mut self,
+        cost: Cost,
+        parts: [&str; N],
+        pixels: &[[T; N]],
+        values: fn(Vec<T>) -> Values,
+    ) {
+        for (i, part) in parts.into_iter().enumerate() {
+            let name = format!("{cost}.{part}");
+            self.channels.push(Channel { name, values: values(pixels.iter().map(|p| p[i]).collect()) });
+        }
+    }
+}
+
+/// Traces the picture again for each kind of cost: once for all counts, once for the times. The counts are exact and the
+/// same for every number of threads. `None` when cancelled.
+///
+/// Times are those of one pixel after the other on each thread, by the clock, and of [`TIMED`] passes the least: what a
+/// ray's walk takes is its class's, and all else is `ms.shading`.
+pub fn render_costs(job: &Job, wanted: &[Cost], progress: &dyn Progress) -> Option<Costs> {
+    let mut costs = Costs::default();
+    if wanted.iter().any(|&c| c != Cost::Ms) {
+        let counts: Vec<[PixelCounts; 4]> =
+            pass(job, progress, Together::Wave, |classes: &mut ByClass<SampleCounts>, samples| {
+                let [a, b, c, d] = classes.each_mut().map(|class| class.by_pixel(samples));
+                a.into_iter().zip(b).zip(c).zip(d).map(|(((a, b), c), d)| [a, b, c, d]).collect()
+            })?;
+        for (i, cost) in [Cost::Tests, Cost::Steps, Cost::Mailbox].into_iter().enumerate() {
+            if wanted.contains(&cost) {
+                let pixels: Vec<[u32; 4]> = counts.iter().map(|p| p.map(|class| class[i])).collect();
+                costs.push(cost, CLASSES, &pixels, Values::U32);
+            }
+        }
+    }
+    if wanted.contains(&Cost::Ms) {
+        let [a, b, c, d] = CLASSES;
+        costs.push(Cost::Ms, [a, b, c, d, SHADING], &times(job, progress)?, Values::F32);
+    }
+    Some(costs)
+}
+
+/// Times of each pixel by class, and of its shading: those of the pass in which it took least.
+fn times(job: &Job, progress: &dyn Progress) -> Option<Vec<[f32; 5]>> {
+    let timed = || {
+        let pixel = |classes: &mut ByClass<Clock>, _: usize| vec![milliseconds(classes)];
+        pass(job, progress, Together::Pixel, pixel)
+    };
+    let mut least = timed()?;
+    for _ in 1..TIMED {
+        let sum = |times: &[f32; 5]| times.iter().sum::<f32>();
+        let shorter = |(least, times): (&mut [f32; 5], [f32; 5])| {
+            if sum(&times) < sum(least) {
+                *least = times;
+            }
+        };
+        least.iter_mut().zip(timed()?).for_each(shorter);
+    }
+    Some(least)
+}
+
+fn pass<P: Observer, T: Copy + Default + Send>(
+    job: &Job,
+    progress: &dyn Progress,
+    together: Together,
+    cost: impl Fn(&mut ByClass<P>, usize) -> Vec<T> + Sync,
+) -> Option<Vec<T>> {
+    let settings = job.settings;
+    let context = Context::new(job.scene, job.world, job.textures, settings.depth, settings.cutoff);
+    cost_tiles(&context, job.accel, job.view, settings, progress, together, cost)
+}
+
+/// Tests, steps, tests saved.
+type PixelCounts = [u32; 3];
+
+/// Counts of the rays of each sample.
+#[derive(Debug, Default)]
+struct SampleCounts {
+    counts: Vec<PixelCounts>,
+    /// The sample whose ray is asked.
+    current: usize,
+}
+
+impl SampleCounts {
+    fn add(&mut self, what: usize, count: u32) {
+        if let Some(counts) = self.counts.get_mut(self.current) {
+            counts[what] = counts[what].saturating_add(count);
+        }
+    }
+
+    /// Sums over so many samples each.
+    fn by_pixel(&self, samples: usize) -> Vec<PixelCounts> {
+        let sum = |a: PixelCounts, b: &PixelCounts| [0, 1, 2].map(|i| a[i].saturating_add(b[i]));
+        self.counts.chunks(samples).map(|pixel| pixel.iter().fold([0; 3], sum)).collect()
+    }
+}
+
+impl Probe for SampleCounts {
+    fn prim_test(&mut self) {
+        self.add(0, 1);
+    }
+    fn prim_tests(&mut self, count: u32) {
+        self.add(0, count);
+    }
+    fn step(&mut self) {
+        self.add(1, 1);
+    }
+    fn repeat_skipped(&mut self) {
+        self.add(2, 1);
+    }
+}
+
+impl Observer for SampleCounts {
+    const SLICE: usize = 1;
+
+    fn asked(&mut self, _question: Question, rays: &[Ray], _after: &[Hit]) {
+        self.current = rays.first().map_or(0, |ray| ray.sample as usize);
+    }
+
+    fn batch(&mut self, samples: usize) {
+        self.counts.clear();
+        self.counts.resize(samples, [0; 3]);
+    }
+}
+
+/// Time spent on the rays of one pixel.
+#[derive(Debug, Default)]
+struct Clock {
+    /// When the pixel's turn began.
+    began: Option<Instant>,
+    /// When the rays asked last were.
+    asked: Option<Instant>,
+    walking: Duration,
+}
+
+impl Probe for Clock {}
+
+impl Observer for Clock {
+    fn asked(&mut self, _question: Question, _rays: &[Ray], _after: &[Hit]) {
+        self.asked = Some(Instant::now());
+    }
+
+    fn answered(&mut self) {
+        self.walking += self.asked.map_or(Duration::ZERO, |asked| asked.elapsed());
+    }
+
+    fn batch(&mut self, _samples: usize) {
+        *self = Self { began: Some(Instant::now()), ..Self::default() };
+    }
+}
+
+/// By class, and of everything else.
+#[expect(clippy::cast_possible_truncation, reason = "no clock is as exact as f32")]
+fn milliseconds(classes: &mut ByClass<Clock>) -> [f32; 5] {
+    let all = classes.primary.began.map_or(Duration::ZERO, |began| began.elapsed());
+    let [a, b, c, d] = classes.each_mut().map(|class| class.walking);
+    [a, b, c, d, all.saturating_sub(a + b + c + d)].map(|time| (time.as_secs_f64() * 1e3) as f32)
+}
