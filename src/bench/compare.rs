@@ -35,10 +35,21 @@ impl Plan {
     /// See [`Self::slow_tests`].
     pub const SLOW_TESTS: u64 = 20_000_000;
 
+    /// Rays of each class that a slow structure gets at least.
+    pub const FEWEST: usize = 16;
+
     /// Rays that a slow structure gets of a class.
     fn affordable(&self, shapes: &Shapes) -> usize {
-        let rays = self.slow_tests / (shapes.len() as u64).max(1);
-        usize::try_from(rays).unwrap_or(usize::MAX).max(16)
+        self.within_slow_tests(shapes.len()).max(Self::FEWEST)
+    }
+
+    /// Whether a structure stays within what slow ones may take, with so many prims and the fewest rays.
+    pub fn can_bear(&self, kind: AccelKind, prims: usize) -> bool {
+        !kind.is_slow() || self.within_slow_tests(prims) >= Self::FEWEST
+    }
+
+    fn within_slow_tests(&self, prims: usize) -> usize {
+        usize::try_from(self.slow_tests / (prims as u64).max(1)).unwrap_or(usize::MAX)
     }
 }
 

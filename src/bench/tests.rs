@@ -77,8 +77,9 @@ impl Stage {
             view: "default view".into(),
             rays: rays.iter().map(Rays::of).collect(),
             rows: self.rows(&rays, &plan),
+            left_out: Vec::new(),
         };
-        Report { machine: Machine::here(), plan, models: vec![model], heatmap_max: None, complete: true }
+        Report { machine: Machine::here(), plan, models: vec![model], family: None, heatmap_max: None, complete: true }
     }
 }
 
@@ -228,6 +229,59 @@ fn every_format_holds_every_structure_and_class() {
     assert_eq!(html.matches("<svg").count(), html.matches("</svg>").count());
     assert!(html.contains("still &quot;life&quot;.toml") && !html.contains("http") && !html.contains("<script"));
     assert!(Format::from_path("a.txt".as_ref()).unwrap_err().contains(".json"));
+}
+
+/// Three sizes of a family whose structures cost what laws say, to the digit.
+fn grown() -> Report {
+    let whole = Stage::new().report(Plan { kinds: vec![AccelKind::None, AccelKind::Bvh], passes: 1, ..plan() });
+    let model = |prims: usize| {
+        let mut model = Model { name: format!("tetra-{prims}"), prims, ..whole.models[0].clone() };
+        let [none, bvh] = &mut model.rows[..] else { panic!("two structures") };
+        for class in none.classes.iter_mut() {
+            class.counts.n_it = class.counts.queries * prims as u64;
+        }
+        for class in bvh.classes.iter_mut() {
+            class.counts.n_it = class.counts.queries * prims.isqrt() as u64;
+        }
+        bvh.made_of.bytes = 7 * prims as u64;
+        model
+    };
+    let models = [100, 10_000, 1_000_000].map(model).into();
+    Report { family: Some("tetra".parse().unwrap()), models, ..whole }
+}
+
+#[test]
+fn every_format_tells_the_exponents_of_growth() {
+    let mut report = grown();
+    let json: serde_json::Value = serde_json::from_str(&Format::Json.write(&report)).unwrap();
+    let [none, bvh] = [&json["growth"]["structures"][0], &json["growth"]["structures"][1]];
+    assert_eq!((&json["growth"]["family"], &bvh["accel"]), (&"tetra".into(), &"bvh".into()));
+    let is = |value: &serde_json::Value, expected: f64| (value.as_f64().unwrap() - expected).abs() < 1e-9;
+    assert!(is(&none["all"]["n_it"]["exponent"], 1.0) && is(&bvh["all"]["n_it"]["exponent"], 0.5), "{bvh:#}");
+    assert!(is(&bvh["all"]["bytes"]["exponent"], 1.0) && is(&bvh["all"]["bytes"]["factor"], 7.0), "{bvh:#}");
+    assert!(is(&bvh["classes"]["diffuse"]["n_it"]["exponent"], 0.5) && none["all"]["t_b"].is_null(), "{none:#}");
+
+    let csv = Format::Csv.write(&report);
+    let place = csv.lines().next().unwrap().split(',').position(|c| c == "e_n_it").unwrap();
+    let exponents: Vec<f64> = csv.lines().skip(1).map(|l| l.split(',').nth(place).unwrap().parse().unwrap()).collect();
+    assert_eq!(exponents.len(), 3 * 2 * Class::ALL.len());
+    assert!(exponents.iter().all(|e| (e - 1.0).abs() < 1e-9 || (e - 0.5).abs() < 1e-9));
+
+    for text in [text::write_growth(&report), Format::Markdown.write(&report), Format::Html.write(&report)] {
+        assert!(text.contains("0.50 ±0.00") && text.contains("1 000 000"), "{text}");
+    }
+    assert!(Format::Html.write(&report).contains(">bvh 0.50</text>"));
+    // One size is no growth, and no fault.
+    report.models.truncate(1);
+    assert!(text::write_growth(&report).contains("One size only"));
+}
+
+#[test]
+fn slow_structures_end_where_they_would_take_for_ever() {
+    let plan = plan();
+    let limit = (plan.slow_tests / Plan::FEWEST as u64) as usize;
+    assert!(plan.can_bear(AccelKind::None, limit) && !plan.can_bear(AccelKind::None, limit + 1));
+    assert!(plan.can_bear(AccelKind::Grid, 10_000_000));
 }
 
 #[test]

@@ -284,11 +284,20 @@ pub(super) struct VerifyArgs {
 #[derive(Debug, Clone, Args)]
 pub(super) struct BenchArgs {
     /// Models or scene files, one after the other
-    #[arg(value_name = "FILE", required = true)]
+    #[arg(value_name = "FILE", required_unless_present = "generate")]
     pub inputs: Vec<PathBuf>,
     /// How to load them.
     #[command(flatten)]
     pub load: LoadArgs,
+
+    /// Measure how cost grows, on scenes of this family in the --sizes given, made in memory
+    #[arg(long, value_name = "NAME", value_parser = parse::family(), conflicts_with = "inputs", help_heading = "Growth")]
+    pub generate: Option<Family>,
+    /// Triangles of the scenes, each made as near as its family can: a list 1e3,1e4, a range by tens 1e3..1e6 (with its
+    /// end, 1e3..5e4 is 1e3, 1e4, 5e4), or so many with equal ratios, 1e3..1e6:7
+    #[arg(long, value_name = "SIZES", value_parser = parse::sizes, default_value = "1e3..1e5", conflicts_with = "inputs",
+          help_heading = "Growth")]
+    pub sizes: parse::Sizes,
 
     /// Structures to compare, such as `grid-octree,fast-bvh` [default: all]
     #[arg(long, value_name = "NAMES", value_parser = parse::accel(), value_delimiter = ',', help_heading = "Structure")]

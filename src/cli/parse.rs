@@ -1,6 +1,7 @@
 //! The words of single flags: sizes, vectors, angles, colours. Errors say what would be right.
 
 use crate::accel::{AccelChoice, AccelKind, IntersectorKind, MailboxKind};
+use crate::bench::range::{Spacing, values};
 use crate::generate::{Family, MAX_TRIANGLES};
 use crate::image::ToneMap;
 use crate::math::Vec3;
@@ -123,6 +124,16 @@ pub(super) fn triangles(text: &str) -> Result<usize, String> {
     number.map(|n| n as usize).ok_or_else(|| "write a number of triangles from 1 to 1e7".into())
 }
 
+/// Numbers of triangles, ascending.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Sizes(pub Vec<usize>);
+
+/// A list or a range of numbers of triangles, each as [`triangles`] has them.
+pub(super) fn sizes(text: &str) -> Result<Sizes, String> {
+    let sizes = values(text, Spacing::Tens, true)?;
+    sizes.iter().map(|n| triangles(&n.to_string())).collect::<Result<_, _>>().map(Sizes)
+}
+
 /// Bytes with an optional binary suffix: `500M`, `2G`, `2GiB`.
 pub(super) fn bytes(text: &str) -> Result<u64, String> {
     let wrong = || "write a size such as 500M or 2G".to_owned();
@@ -224,6 +235,15 @@ mod tests {
         assert_eq!(costs("steps,tests,steps"), Ok(CostList(vec![Cost::Steps, Cost::Tests])));
         assert_eq!(costs(""), Ok(CostList(Vec::new())));
         assert!(costs("tests,stpes").unwrap_err().contains("steps"));
+    }
+
+    #[test]
+    fn numbers_of_triangles_come_in_lists_and_ranges_up_to_ten_million() {
+        assert_eq!(sizes("1e3..1e7").map(|s| s.0), Ok(vec![1000, 10_000, 100_000, 1_000_000, 10_000_000]));
+        assert_eq!(sizes("500,1e3").map(|s| s.0), Ok(vec![500, 1000]));
+        for wrong in ["0", "0,5", "1e3..1e8", "many", "1e4..1e3"] {
+            assert!(sizes(wrong).is_err(), "{wrong}");
+        }
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 mod again;
 mod backdrop;
+mod bench;
 mod costs;
 mod endings;
 mod generate;

@@ -1,11 +1,15 @@
 //! One line for each model, structure and class of rays; what was not measured is empty.
+//!
+//! Where the models are a family in growing sizes, columns `e_…` are the exponents of that structure and class over all
+//! sizes; the same on the lines of all sizes.
 
+use super::growth::{Cost, Curve};
 use super::{Model, Rays, Report};
 use crate::bench::compare::{ClassRow, Count, Row};
 
 const COLUMNS: &str = "file,prims,structure,class,rays,asked,sampled,differing,t_b,t_b_min,t_b_max,bytes,n_in,n_v,n_ev,\
                        n_oiv,break_even,mrays,mrays_min,mrays_max,n_it,n_ts,n_ets,n_eets,n_bit,n_mb,n_xf,n_min,culled,\
-                       threads,passes,seed,version,compiler,flags,cpu";
+                       threads,passes,seed,version,compiler,flags,cpu,e_n_it,e_n_ts,e_t_tr,e_bytes,e_t_b";
 
 /// The whole table; `t_b` in seconds, `mrays` in millions of rays a second.
 pub fn write(report: &Report) -> String {
@@ -34,6 +38,12 @@ fn line(report: &Report, model: &Model, row: &Row, rays: &Rays, class: &ClassRow
     cells.extend([class.n_min(), class.culled(model.prims)].map(number));
     cells.extend([p.threads.to_string(), p.passes.to_string(), p.seed.to_string()]);
     cells.extend([m.version, m.compiler, m.flags, &m.cpu].map(quoted));
+    let exponent = |cost: Cost| {
+        let class = cost.is_by_class().then_some(rays.class);
+        let fit = report.family.and_then(|_| Curve::of(&report.models, row.kind, cost, class).fit);
+        fit.map_or(String::new(), |f| number(f.exponent))
+    };
+    cells.extend(Cost::ALL.map(exponent));
     cells.join(",") + "\n"
 }
 

@@ -6,6 +6,7 @@
 //! | `machine` | `cpu`, `cores`, `system`, `simd`, `compiler`, `flags` |
 //! | `settings` | `threads`, `passes`, `seed`, `rays` (most of a class), `slow_tests` (most tests of a class in a slow structure), and what was asked of structures: `grid_density`, `grid_resolution`, `max_depth`, `step_cost`, `leaf_size` (each null: what suits the kind), `mailbox` |
 //! | `models` | one for each model |
+//! | `growth` | null, or how cost grows where the models are a family in growing sizes |
 //!
 //! A model has `file`, `hash` (xxh3-128 of what was read), `prims` (N), `picture` (`width`, `height`, `samples`, `depth`,
 //! `view`), `rays` (by class: `asked`, `kept`), `identical` (whether all hits were), `reference`, and `structures`. A
@@ -14,11 +15,19 @@
 //! and `classes`. A class has exact sums (`rays`, `hits`, `tests`, `steps`, `cells`, `empty_cells`, `volume_tests`,
 //! `tests_saved`, `transforms`), `per_ray` (`n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`, `n_xf`, `n_min`), `interval` (half the 95 %
 //! interval of the same, or null when nothing was left out), `culled`, `differing`, `t_tr` (seconds of a ray) and
-//! `mrays`. Keys are only ever added.
+//! `mrays`. `left_out` names slow structures that could not bear so many prims.
+//!
+//! `growth` has `family` and `structures`; of each `accel`, `all` (rays of all classes as they were recorded) and
+//! `classes`, with `n_it`, `n_ts`, `t_tr` of each, and in `all` also `bytes` and `t_b`: null, or the power law that fits
+//! over the number of prims, `exponent`, `error` (its standard error, or null for two sizes), `r2` (or null), `factor`
+//! (cost of one prim), `points` (`[prims, cost]`). Keys are only ever added.
 
+use super::growth::{Cost, Curve, costs, kinds};
 use super::{Model, Report};
+use crate::accel::AccelKind;
 use crate::bench::clock::Spread;
 use crate::bench::compare::{ClassRow, Count, Row};
+use crate::bench::rays::Class;
 use serde_json::{Map, Value, json};
 
 /// The name of the schema.
@@ -39,6 +48,7 @@ pub fn write(report: &Report) -> String {
             "mailbox": p.params.mailbox.name(),
         },
         "models": report.models.iter().map(model).collect::<Vec<_>>(),
+        "growth": growth(report),
     });
     format!("{value:#}\n")
 }
@@ -54,6 +64,31 @@ fn model(model: &Model) -> Value {
         "rays": rays.collect::<Map<_, _>>(),
         "identical": model.differing() == 0, "reference": model.reference().map(|k| k.name()),
         "structures": model.rows.iter().map(|row| structure(model, row)).collect::<Vec<_>>(),
+        "left_out": model.left_out.iter().map(|k| k.name()).collect::<Vec<_>>(),
+    })
+}
+
+fn growth(report: &Report) -> Value {
+    let Some(family) = report.family else { return Value::Null };
+    let laws = |kind: AccelKind, class: Option<Class>| {
+        let costs = costs(report).filter(|c| class.is_none() || c.is_by_class());
+        costs.map(|cost| (cost.name().to_owned(), law(report, kind, cost, class))).collect::<Map<_, _>>()
+    };
+    let structure = |kind: AccelKind| {
+        let classes =
+            Class::ALL.into_iter().filter(|c| report.models.iter().any(|m| m.rays.iter().any(|r| r.class == *c)));
+        let classes: Map<_, _> = classes.map(|c| (c.name().to_owned(), Value::Object(laws(kind, Some(c))))).collect();
+        json!({ "accel": kind.name(), "all": laws(kind, None), "classes": classes })
+    };
+    json!({ "family": family.name(), "structures": kinds(report).into_iter().map(structure).collect::<Vec<_>>() })
+}
+
+fn law(report: &Report, kind: AccelKind, cost: Cost, class: Option<Class>) -> Value {
+    let curve = Curve::of(&report.models, kind, cost, class);
+    let Some(fit) = curve.fit else { return Value::Null };
+    json!({
+        "exponent": fit.exponent, "error": number(fit.error), "r2": number(fit.r2), "factor": number(fit.factor),
+        "points": curve.points,
     })
 }
 

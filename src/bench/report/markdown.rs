@@ -1,12 +1,18 @@
 //! Tables for a document.
 
 use super::number::{bytes, grouped, seconds, short, whole};
-use super::{Model, Rays, Report, WORDS, text};
+use super::{Model, Rays, Report, WORDS, growth, text};
 use crate::bench::compare::Count;
 
 /// The whole report.
 pub fn write(report: &Report) -> String {
     let mut out = String::from("# meshray bench\n");
+    if let Some(family) = report.family {
+        out += &format!("\n## {family}: growth\n\n");
+        growth::sentences(report).iter().for_each(|text| out += &format!("{text}.\n"));
+        growth::tables(report).iter().for_each(|table| out += &format!("\n{}", table.markdown()));
+        out += &format!("\n{}.\n", growth::METHOD);
+    }
     report.models.iter().for_each(|model| write_model(&mut out, report, model));
     let words: Vec<String> = WORDS.iter().map(|(word, what)| format!("`{word}` {what}")).collect();
     out += &format!("\n{}.\n\n{}. {}.\n", words.join("; "), report.method(), report.machine.line());

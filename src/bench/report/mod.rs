@@ -1,16 +1,19 @@
 //! What a comparison found, and how it is shown: as text, JSON, CSV, Markdown or a page for a browser.
 
 pub mod csv;
+pub mod growth;
 pub mod html;
 pub mod json;
 pub mod markdown;
 pub mod number;
+pub mod table;
 pub mod text;
 
-use super::compare::{Plan, Row, break_even};
+use super::compare::{Count, Plan, Row, break_even};
 use super::machine::Machine;
 use super::rays::{Class, RaySet};
 use crate::accel::AccelKind;
+use crate::generate::Family;
 use std::path::Path;
 
 /// All models of one command.
@@ -22,6 +25,8 @@ pub struct Report {
     pub plan: Plan,
     /// In the order they were measured; the last one's rows may be missing while it is under way.
     pub models: Vec<Model>,
+    /// What the models are, where they are one family in growing sizes.
+    pub family: Option<Family>,
     /// What the brightest colour of heat maps stands for; `None`: the most tests of any pixel.
     pub heatmap_max: Option<u32>,
     /// Whether everything is done.
@@ -51,6 +56,8 @@ pub struct Model {
     pub rays: Vec<Rays>,
     /// One for each structure.
     pub rows: Vec<Row>,
+    /// Slow structures that could not bear so many prims.
+    pub left_out: Vec<AccelKind>,
 }
 
 /// How many rays there were of a class.
@@ -76,6 +83,13 @@ impl Model {
     pub fn seconds_per_ray(&self, row: &Row) -> f64 {
         let mixture: Vec<usize> = self.rays.iter().map(|r| r.kept).collect();
         row.seconds_per_ray(&mixture)
+    }
+
+    /// A count for a ray of the recorded mixture.
+    pub fn per_ray(&self, row: &Row, count: Count) -> f64 {
+        let all: usize = self.rays.iter().map(|r| r.kept).sum();
+        let sum: f64 = row.classes.iter().zip(&self.rays).map(|(c, r)| c.per_ray(count) * r.kept as f64).sum();
+        sum / all as f64
     }
 
     /// Rays after which building has paid against testing everything; `None` when it never does, or `none` was not

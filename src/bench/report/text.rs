@@ -1,7 +1,7 @@
 //! Tables for a terminal.
 
 use super::number::{bytes, grouped, seconds, short, whole};
-use super::{Model, Rays, Report, WORDS};
+use super::{Model, Rays, Report, WORDS, growth};
 use crate::bench::clock::Spread;
 use crate::bench::compare::{ClassRow, Count, Row};
 use std::fmt::{Result, Write};
@@ -24,6 +24,19 @@ fn write_model(out: &mut String, report: &Report, model: &Model) -> Result {
     }
     writeln!(out, "\n{}", model.verdict())?;
     Ok(())
+}
+
+/// One model in two lines, where the tables are of all.
+pub fn write_short(model: &Model) -> String {
+    let prims = grouped(model.prims as u64);
+    format!("{}: {prims} prims; rays of {}\n  {}\n", model.name, model.picture(), model.verdict())
+}
+
+/// How cost grows over all models.
+pub fn write_growth(report: &Report) -> String {
+    let tables: String = growth::tables(report).iter().map(|table| format!("\n{}", table.text())).collect();
+    let said: String = growth::sentences(report).iter().map(|text| format!("{text}.\n")).collect();
+    format!("{tables}\n{said}\n{}.\n", growth::METHOD)
 }
 
 /// What holds for all models.

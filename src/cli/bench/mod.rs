@@ -15,7 +15,7 @@ use crate::bench::rays;
 use crate::bench::report::{Format, Model, Rays, Report, text};
 use crate::image::write_atomic;
 use gate::Gate;
-use scene::Prepared;
+use scene::{Prepared, Subject};
 use std::path::PathBuf;
 
 /// What is to be done, checked.
@@ -40,12 +40,18 @@ pub(super) fn run(args: &BenchArgs) -> Exit {
         Err(exit) => return exit,
     };
     let bench = Bench { args, files, messages };
-    let mut report =
-        Report { machine: Machine::here(), plan, models: Vec::new(), heatmap_max: args.heatmap_max, complete: false };
+    let mut report = Report {
+        machine: Machine::here(),
+        plan,
+        models: Vec::new(),
+        family: args.generate,
+        heatmap_max: args.heatmap_max,
+        complete: false,
+    };
     let mut worst = Exit::Done;
-    for input in &args.inputs {
-        let name = input.display().to_string();
-        worst = worst.max(accident::guard(&name, &bench.messages, || bench.model(input, &mut report)));
+    for subject in subjects(args) {
+        let name = subject.to_string();
+        worst = worst.max(accident::guard(&name, &bench.messages, || bench.model(&subject, &mut report)));
         if interrupt::raised() {
             return Exit::Interrupted;
         }
@@ -54,9 +60,20 @@ pub(super) fn run(args: &BenchArgs) -> Exit {
         return worst;
     }
     report.complete = worst == Exit::Done;
+    if report.family.is_some() {
+        worst = worst.max(bench.print(&format!("{}\n", text::write_growth(&report))));
+    }
     worst = worst.max(bench.print(&text::write_notes(&report)));
     worst = worst.max(bench.write(&report));
     worst.max(gate.map_or(Exit::Done, |gate| gate.judge(&report, &bench.messages)))
+}
+
+/// What is measured, in order.
+fn subjects(args: &BenchArgs) -> Vec<Subject> {
+    match args.generate {
+        Some(family) => args.sizes.0.iter().map(|&size| Subject::Generated(family, size)).collect(),
+        None => args.inputs.iter().cloned().map(Subject::File).collect(),
+    }
 }
 
 fn plan(args: &BenchArgs) -> Result<Plan, Wrong> {
@@ -88,13 +105,19 @@ fn files(args: &BenchArgs) -> Result<Vec<(PathBuf, Format)>, Wrong> {
 
 impl Bench<'_> {
     /// One model: its rays, its rows, its tables.
-    fn model(&self, input: &PathBuf, report: &mut Report) -> Exit {
-        let prepared = match Prepared::new(input, self.args, &self.messages) {
+    fn model(&self, subject: &Subject, report: &mut Report) -> Exit {
+        let prepared = match Prepared::new(subject, self.args, &self.messages) {
             Ok(prepared) => prepared,
             Err(exit) => return exit,
         };
-        let plan = report.plan.clone();
-        let name = input.display().to_string();
+        let name = subject.to_string();
+        let (plan, left_out) = match self.bearable(report, &prepared) {
+            Ok(plan) => plan,
+            Err(why) => {
+                self.messages.info("size-left-out", format!("{name} is left out: {why}"));
+                return Exit::Done;
+            }
+        };
         self.messages.info("progress", format!("{name}: recording rays"));
         let Some((sets, depth)) = prepared.with_job(|job| rays::record(job, plan.rays, plan.seed)) else {
             self.messages.error("threads", format!("{name}: the rays could not be recorded"), "");
@@ -112,6 +135,7 @@ impl Bench<'_> {
             view: prepared.view_phrase.clone(),
             rays: sets.iter().map(Rays::of).collect(),
             rows: Vec::new(),
+            left_out,
         });
 
         // After each structure the report is written, so that a crash costs one row.
@@ -131,12 +155,32 @@ impl Bench<'_> {
         };
         written = written.max(self.keep(report, &rows));
         let Some(model) = report.models.last() else { return Exit::Failed };
-        written = written.max(self.print(&format!("{}\n", text::write(report, model))));
+        let tables = if report.family.is_some() { text::write_short(model) } else { text::write(report, model) + "\n" };
+        written = written.max(self.print(&tables));
         if model.differing() == 0 {
             return written;
         }
         self.messages.error("hits-differ", format!("{name}: {}", model.verdict()), "please report it with the file");
         Exit::Failed
+    }
+
+    /// The plan for one model, and the structures that it leaves out. Where sizes grow, slow structures end where they
+    /// would take for ever, and a size whose scene was measured already is no new one.
+    fn bearable(&self, report: &Report, prepared: &Prepared) -> Result<(Plan, Vec<AccelKind>), String> {
+        let mut plan = report.plan.clone();
+        if report.family.is_none() {
+            return Ok((plan, Vec::new()));
+        }
+        let (prims, hash) = (prepared.world.shapes.len(), prepared.loaded.facts.hash);
+        if let Some(same) = report.models.iter().find(|m| m.hash == hash) {
+            return Err(format!("the nearest scene of its family is {}, with {prims} prims", same.name));
+        }
+        let (kinds, left_out) = plan.kinds.iter().partition(|&&kind| report.plan.can_bear(kind, prims));
+        plan.kinds = kinds;
+        if plan.kinds.is_empty() {
+            return Err(format!("{prims} prims are too many for slow structures; raise --slow-tests"));
+        }
+        Ok((plan, left_out))
     }
 
     fn keep(&self, report: &mut Report, rows: &[Row]) -> Exit {

@@ -1,4 +1,4 @@
-//! A model made ready for the one rendering whose rays are recorded.
+//! What is measured, made ready for the one rendering whose rays are recorded.
 
 use super::super::args::BenchArgs;
 use super::super::camera::{self, Choice};
@@ -6,12 +6,66 @@ use super::super::exit::Exit;
 use super::super::message::{Messages, Severity};
 use super::super::read;
 use crate::accel::{AccelKind, AccelParams, AnyAccel};
+use crate::generate::Family;
 use crate::load::{Diagnostic, Loaded};
 use crate::render::texture::TextureStore;
 use crate::render::{Job, Settings, View, World};
-use crate::scene::default_light;
 use crate::scene::framing::robust_bounds;
-use std::path::PathBuf;
+use crate::scene::{Scene, default_light};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use xxhash_rust::xxh3::Xxh3;
+
+/// A file, or a generated scene and the triangles that are wanted.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Subject {
+    File(PathBuf),
+    Generated(Family, usize),
+}
+
+impl fmt::Display for Subject {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File(path) => path.display().fmt(f),
+            Self::Generated(family, size) => write!(f, "{family}-{size}"),
+        }
+    }
+}
+
+impl Subject {
+    /// What goes before the last part of a place in a message.
+    fn path(&self) -> &Path {
+        match self {
+            Self::File(path) => path,
+            Self::Generated(family, _) => Path::new(family.name()),
+        }
+    }
+
+    /// Its scene; what is wrong is said.
+    fn load(&self, args: &BenchArgs, messages: &Messages) -> Result<Loaded, Exit> {
+        match self {
+            Self::File(path) => read::one_model(path, &args.load, messages),
+            Self::Generated(family, size) => {
+                let mut loaded = Loaded { scene: family.scene(*size), ..Loaded::default() };
+                loaded.facts.hash = hash(&loaded.scene);
+                Ok(loaded)
+            }
+        }
+    }
+}
+
+/// Of what a scene's meshes are made of; two sizes of a family with one hash are one scene.
+fn hash(scene: &Scene) -> u128 {
+    let mut hash = Xxh3::new();
+    for instance in &scene.instances {
+        let mesh = &scene.meshes[instance.mesh as usize];
+        let numbers = instance.world_from_object.to_cols_array();
+        numbers.iter().for_each(|n| hash.update(&n.to_le_bytes()));
+        mesh.positions.iter().for_each(|p| p.to_array().iter().for_each(|n| hash.update(&n.to_le_bytes())));
+        mesh.triangles.iter().flatten().for_each(|i| hash.update(&i.to_le_bytes()));
+    }
+    hash.digest128()
+}
 
 /// Everything the rendering needs but the structure.
 pub(super) struct Prepared {
@@ -24,8 +78,9 @@ pub(super) struct Prepared {
 
 impl Prepared {
     /// Loads and frames; what is wrong is said.
-    pub(super) fn new(input: &PathBuf, args: &BenchArgs, messages: &Messages) -> Result<Self, Exit> {
-        let mut loaded = read::one_model(input, &args.load, messages)?;
+    pub(super) fn new(subject: &Subject, args: &BenchArgs, messages: &Messages) -> Result<Self, Exit> {
+        let mut loaded = subject.load(args, messages)?;
+        let input = subject.path();
         let world = World::new(&loaded.scene);
         if world.shapes.is_empty() {
             let fault = Diagnostic::new("nothing-to-draw", input, "", "nothing to hit: it holds no faces");

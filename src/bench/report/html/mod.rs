@@ -1,9 +1,13 @@
 //! One page for a browser: no script, nothing to fetch, readable on a phone, in the dark and on paper.
 
+mod growth;
 mod heat;
+mod lines;
 mod plot;
+mod svg;
 
 use super::number::{bytes, grouped, seconds, short, whole};
+use super::table::Table;
 use super::{Model, Rays, Report, WORDS, text};
 use crate::accel::AccelKind;
 use crate::bench::compare::{ClassRow, Count, Row};
@@ -24,8 +28,23 @@ pub fn write(report: &Report) -> String {
     if !report.complete {
         out += "<p class=\"bad\">Not finished: more is to come, or the command was ended.</p>\n";
     }
-    report.models.iter().for_each(|model| out += &section(report, model));
+    out += &growth::section(report);
+    for model in &report.models {
+        out += &match report.family {
+            None => section(report, model),
+            Some(_) => folded(model, &section(report, model)),
+        };
+    }
     out + &notes(report) + "</body></html>\n"
+}
+
+/// One of many models, to be opened by who wants it.
+fn folded(model: &Model, section: &str) -> String {
+    format!(
+        "<details><summary>{}: {} prims</summary>\n{section}</details>\n",
+        escaped(&model.name),
+        grouped(model.prims as u64)
+    )
 }
 
 fn section(report: &Report, model: &Model) -> String {
@@ -168,6 +187,13 @@ fn table(title: &str, titles: &[&str], rows: Vec<Vec<String>>) -> String {
     format!(
         "<h3>{title}</h3><div class=\"wide\"><table><thead><tr>{head}</tr></thead><tbody>\n{body}</tbody></table></div>\n"
     )
+}
+
+fn table_of(shown: &Table) -> String {
+    let titles: Vec<String> = shown.columns.iter().map(|c| escaped(c)).collect();
+    let titles: Vec<&str> = titles.iter().map(String::as_str).collect();
+    let rows = shown.rows.iter().map(|row| row.iter().map(|cell| escaped(cell)).collect()).collect();
+    table(&escaped(&shown.title), &titles, rows)
 }
 
 fn notes(report: &Report) -> String {

@@ -1,65 +1,11 @@
-//! Plots as SVG, small enough for a phone: 440 units wide.
+//! Plots of one model: what each structure costs.
 
 use super::super::Model;
 use super::super::number::{grouped, seconds, short};
+use super::svg::{Scale, WIDTH, open, rule, spread_out, unit, words};
 use crate::bench::compare::{Count, Row};
 use crate::bench::rays::Class;
 use std::fmt::Write;
-
-const WIDTH: f64 = 440.0;
-
-/// A logarithmic scale: decades from `low` on, along `from..to`.
-struct Scale {
-    low: f64,
-    high: f64,
-    from: f64,
-    to: f64,
-}
-
-impl Scale {
-    /// Whole decades around the values that are above 0.
-    fn around(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for log in values.filter(|v| *v > 0.0 && v.is_finite()).map(f64::log10) {
-            (low, high) = (low.min(log), high.max(log));
-        }
-        if low > high {
-            (low, high) = (0.0, 1.0);
-        }
-        let (low, high) = ((low - 0.02).floor(), (high + 0.02).ceil());
-        Self { low, high: high.max(low + 1.0), from, to }
-    }
-
-    /// Just around the values, with one more part in ten on both sides, and nearly a decade at least.
-    fn fitting(values: impl Iterator<Item = f64> + Clone, from: f64, to: f64) -> Self {
-        let logs = values.filter(|v| *v > 0.0 && v.is_finite()).map(f64::log10);
-        let low = logs.clone().fold(f64::INFINITY, f64::min);
-        let high = logs.fold(f64::NEG_INFINITY, f64::max);
-        let (middle, half) = ((low + high) * 0.5, ((high - low) * 0.6).max(0.4));
-        if low > high {
-            return Self::around(std::iter::empty(), from, to);
-        }
-        Self { low: middle - half, high: middle + half, from, to }
-    }
-
-    /// Where a value lies; what is 0 or below the scale lies at its start.
-    fn at(&self, value: f64) -> f64 {
-        let part = (value.max(1e-300).log10() - self.low) / (self.high - self.low);
-        self.from + part.clamp(0.0, 1.0) * (self.to - self.from)
-    }
-
-    /// The decades, every second or third one where there are many; 1, 2, 5 of each where there are few.
-    #[expect(clippy::cast_possible_truncation, reason = "decades of floats are small")]
-    fn ticks(&self) -> Vec<f64> {
-        let (low, high) = (self.low.ceil() as i32, self.high.floor() as i32);
-        if self.high - self.low < 2.5 && self.low.fract() != 0.0 {
-            let all = (low - 1..=high).flat_map(|decade| [1.0, 2.0, 5.0].map(|m| m * 10f64.powi(decade)));
-            return all.filter(|t| (self.low..=self.high).contains(&t.log10())).collect();
-        }
-        let step = usize::try_from((high - low) / 6 + 1).unwrap_or(1);
-        (low..=high).step_by(step).map(|decade| 10f64.powi(decade)).collect()
-    }
-}
 
 /// Each structure a row, each class a mark: its tests a ray.
 pub(super) fn tests(model: &Model) -> String {
@@ -135,44 +81,6 @@ pub(super) fn times(model: &Model) -> String {
     svg + "</svg>"
 }
 
-/// A round number of seconds: `20 µs`.
-fn unit(seconds: f64) -> String {
-    let scaled = |factor: f64, unit: &str| format!("{} {unit}", grouped((seconds * factor).round() as u64));
-    match seconds {
-        s if s < 0.99e-6 => scaled(1e9, "ns"),
-        s if s < 0.99e-3 => scaled(1e6, "µs"),
-        s if s < 0.99 => scaled(1e3, "ms"),
-        _ => scaled(1.0, "s"),
-    }
-}
-
-/// Ascending places moved apart by at least `gap`, none beyond `end`.
-fn spread_out(places: &[f64], gap: f64, end: f64) -> Vec<f64> {
-    let mut moved: Vec<f64> = Vec::new();
-    for &place in places {
-        moved.push(moved.last().map_or(place, |&before| place.max(before + gap)));
-    }
-    let mut limit = end;
-    for place in moved.iter_mut().rev() {
-        *place = place.min(limit);
-        limit = *place - gap;
-    }
-    moved
-}
-
-fn open(height: f64, label: &str) -> String {
-    format!("<svg viewBox=\"0 0 {WIDTH} {height}\" role=\"img\" aria-label=\"{label}\">")
-}
-
-fn rule(svg: &mut String, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2], class: &str) {
-    // Writing to a string cannot fail, here and below.
-    let _ = write!(svg, "<line class=\"{class}\" x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\"/>");
-}
-
-fn words(svg: &mut String, x: f64, y: f64, anchor: &str, class: &str, text: &str) {
-    let _ = write!(svg, "<text class=\"{class}\" x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{text}</text>");
-}
-
 /// The marks and their names in two lines.
 fn legend(svg: &mut String, model: &Model) {
     for (i, rays) in model.rays.iter().enumerate() {
@@ -196,22 +104,4 @@ fn mark(svg: &mut String, class: Class, x: f64, y: f64, title: &str) {
         svg,
         "<path class=\"{name}\" transform=\"translate({x:.1} {y:.1})\" d=\"{shape}\"><title>{title}</title></path>"
     );
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_never_cover_each_other() {
-        let moved = spread_out(&[10.0, 11.0, 12.0, 95.0, 99.0], 15.0, 100.0);
-        assert!(moved.windows(2).all(|w| w[1] - w[0] >= 14.99) && moved[4] <= 100.0, "{moved:?}");
-    }
-
-    #[test]
-    fn a_scale_has_whole_decades_and_keeps_nothing_at_its_start() {
-        let scale = Scale::around([0.0, 3.0, 250.0].into_iter(), 0.0, 300.0);
-        assert_eq!((scale.low, scale.high, scale.ticks()), (0.0, 3.0, vec![1.0, 10.0, 100.0, 1000.0]));
-        assert_eq!([0.0, 1.0, 10.0, 1e9].map(|v| scale.at(v)), [0.0, 0.0, 100.0, 300.0]);
-    }
 }

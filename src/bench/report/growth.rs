@@ -1,0 +1,240 @@
+//! How the cost of each structure grows with the number of prims, over the models of a report.
+
+use super::number::{bytes, grouped, seconds, short};
+use super::table::Table;
+use super::{Model, Report};
+use crate::accel::AccelKind;
+use crate::bench::compare::{Count, Row};
+use crate::bench::fit::Fit;
+use crate::bench::rays::Class;
+
+/// Something that is better low.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cost {
+    /// Ray/prim tests a ray.
+    Tests,
+    /// Nodes and cells visited a ray.
+    Visits,
+    /// Seconds of a ray.
+    Time,
+    /// Bytes of the structure.
+    Memory,
+    /// Seconds to build.
+    Build,
+}
+
+impl Cost {
+    /// Every cost, in the order of reports.
+    pub const ALL: [Self; 5] = [Self::Tests, Self::Visits, Self::Time, Self::Memory, Self::Build];
+
+    /// As the columns and keys of reports have it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Tests => "n_it",
+            Self::Visits => "n_ts",
+            Self::Time => "t_tr",
+            Self::Memory => "bytes",
+            Self::Build => "t_b",
+        }
+    }
+
+    /// In words.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Tests => "Ray/prim tests a ray (n_it)",
+            Self::Visits => "Nodes and cells visited a ray (n_ts)",
+            Self::Time => "Time of a ray (t_tr)",
+            Self::Memory => "Memory",
+            Self::Build => "Time to build (t_b)",
+        }
+    }
+
+    /// A value with its unit.
+    pub fn shown(self, value: f64) -> String {
+        match self {
+            _ if !value.is_finite() => "-".into(),
+            Self::Tests | Self::Visits => short(value),
+            Self::Time | Self::Build => seconds(value),
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "it was whole and positive")]
+            Self::Memory => bytes(value as u64),
+        }
+    }
+
+    /// Whether it needs a timed pass.
+    pub fn is_time(self) -> bool {
+        matches!(self, Self::Time | Self::Build)
+    }
+
+    /// Whether each class of rays has its own.
+    pub fn is_by_class(self) -> bool {
+        matches!(self, Self::Tests | Self::Visits | Self::Time)
+    }
+
+    /// Of one structure, for an average ray of one class or of all as they were recorded; NaN where nothing was measured.
+    pub fn of(self, model: &Model, row: &Row, class: Option<Class>) -> f64 {
+        let place = class.map(|class| model.rays.iter().position(|r| r.class == class));
+        let count = |count: Count| match place {
+            None => model.per_ray(row, count),
+            Some(place) => place.and_then(|i| row.classes.get(i)).map_or(f64::NAN, |c| c.per_ray(count)),
+        };
+        match self {
+            Self::Tests => count(Count::It),
+            Self::Visits => count(Count::Ts),
+            Self::Memory => row.made_of.bytes as f64,
+            // What builds nothing takes no time that a clock could tell.
+            Self::Build if row.made_of.bytes == 0 => f64::NAN,
+            Self::Build => row.build.median(),
+            Self::Time => match place {
+                None => model.seconds_per_ray(row),
+                Some(place) => place.and_then(|i| row.classes.get(i)).map_or(f64::NAN, |c| c.seconds.median()),
+            },
+        }
+    }
+}
+
+/// One cost of one structure over all models.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    /// Of which structure.
+    pub kind: AccelKind,
+    /// Prims and cost, as the models come; where there is none, it is left out.
+    pub points: Vec<(f64, f64)>,
+    /// Where there are two sizes at least.
+    pub fit: Option<Fit>,
+}
+
+impl Curve {
+    /// Of the models that have a row of this kind.
+    pub fn of(models: &[Model], kind: AccelKind, cost: Cost, class: Option<Class>) -> Self {
+        let point = |model: &Model| {
+            let row = model.rows.iter().find(|r| r.kind == kind)?;
+            let value = cost.of(model, row, class);
+            value.is_finite().then_some((model.prims as f64, value))
+        };
+        let points: Vec<(f64, f64)> = models.iter().filter_map(point).collect();
+        Self { kind, fit: Fit::of(&points), points }
+    }
+
+    /// The exponent and its standard error: `0.33 ±0.02`; `-` where nothing could be fitted.
+    pub fn exponent(&self) -> String {
+        match self.fit {
+            None => "-".into(),
+            Some(fit) if fit.error.is_nan() => self.short_exponent(),
+            Some(fit) => format!("{} ±{:.2}", self.short_exponent(), fit.error),
+        }
+    }
+
+    /// The exponent alone: `0.33`; nothing where nothing could be fitted.
+    pub fn short_exponent(&self) -> String {
+        // What would be shown as -0.00 is 0.
+        let shown = |x: f64| format!("{:.2}", if x.abs() < 0.005 { 0.0 } else { x });
+        self.fit.map_or(String::new(), |fit| shown(fit.exponent))
+    }
+}
+
+/// Structures of which there is a row at all, in the order of the plan.
+pub fn kinds(report: &Report) -> Vec<AccelKind> {
+    let has = |kind: &AccelKind| report.models.iter().any(|m| m.rows.iter().any(|r| r.kind == *kind));
+    report.plan.kinds.iter().copied().filter(has).collect()
+}
+
+/// Costs that the report knows.
+pub fn costs(report: &Report) -> impl Iterator<Item = Cost> {
+    let is_timed = report.is_timed();
+    Cost::ALL.into_iter().filter(move |c| is_timed || !c.is_time())
+}
+
+/// Most sizes in the columns of a table.
+const COLUMNS: usize = 6;
+
+/// A table for each cost: structures down, sizes across, then the exponent and what ten times the prims multiply the cost
+/// by. Of many sizes some are left out.
+pub fn tables(report: &Report) -> Vec<Table> {
+    let models = &report.models;
+    let shown: Vec<&Model> = match models.len() {
+        n if n <= COLUMNS => models.iter().collect(),
+        n => (0..COLUMNS).map(|i| &models[i * (n - 1) / (COLUMNS - 1)]).collect(),
+    };
+    let table = |cost: Cost| {
+        let mut columns = vec!["structure".to_owned()];
+        columns.extend(shown.iter().map(|m| grouped(m.prims as u64)));
+        columns.extend(["exponent", "N × 10"].map(String::from));
+        let line = |kind: AccelKind| {
+            let curve = Curve::of(models, kind, cost, None);
+            let at = |model: &&Model| {
+                let row = model.rows.iter().find(|r| r.kind == kind);
+                let star = |row: &Row| if row.sampled && cost.is_by_class() { "*" } else { "" };
+                row.map_or("-".into(), |row| cost.shown(cost.of(model, row, None)) + star(row))
+            };
+            let mut cells = vec![kind.to_string()];
+            cells.extend(shown.iter().map(at));
+            cells.extend([
+                curve.exponent(),
+                curve.fit.map_or("-".into(), |f| format!("× {}", short(f.for_ten_times()))),
+            ]);
+            cells
+        };
+        Table { title: cost.title().into(), columns, rows: kinds(report).into_iter().map(line).collect() }
+    };
+    costs(report).map(table).collect()
+}
+
+/// What somebody should know who reads one paragraph only, a sentence each.
+pub fn sentences(report: &Report) -> Vec<String> {
+    let (Some(first), Some(last)) = (report.models.first(), report.models.last()) else { return Vec::new() };
+    let mut said = Vec::new();
+    let whole = kinds(report).into_iter().filter(|k| last.rows.iter().any(|r| r.kind == *k && !r.sampled));
+    let whole: Vec<AccelKind> = whole.collect();
+    let at_last =
+        |kind: &AccelKind, cost: Cost| Curve::of(&report.models, *kind, cost, None).points.last().map(|p| p.1);
+    let least = |cost: Cost| {
+        let value = |k: &AccelKind| at_last(k, cost).unwrap_or(f64::INFINITY);
+        whole.iter().copied().min_by(|a, b| value(a).total_cmp(&value(b)))
+    };
+    let factor = |kind, cost| Curve::of(&report.models, kind, cost, None).fit.map(|f| short(f.for_ten_times()));
+    let n = grouped(last.prims as u64);
+    if let Some(best) = least(Cost::Time).filter(|_| report.is_timed()) {
+        let time = at_last(&best, Cost::Time).unwrap_or(f64::NAN);
+        let growth =
+            factor(best, Cost::Time).map_or(String::new(), |f| format!("; ten times the prims multiply it by {f}"));
+        said.push(format!("Fastest at {n} prims: {best}, {} a ray{growth}", seconds(time)));
+    }
+    if let Some(best) = least(Cost::Tests) {
+        let tests = at_last(&best, Cost::Tests).unwrap_or(f64::NAN);
+        let growth =
+            factor(best, Cost::Tests).map_or(String::new(), |f| format!("; ten times the prims multiply them by {f}"));
+        said.push(format!("Fewest tests at {n} prims: {best}, {} a ray{growth}", short(tests)));
+    }
+    for kind in &report.plan.kinds {
+        if let Some(model) = report.models.iter().find(|m| m.left_out.contains(kind)) {
+            let from = grouped(model.prims as u64);
+            let tests = grouped(report.plan.slow_tests);
+            said.push(format!(
+                "{kind} is left out from {from} prims on: not even {} rays of a class within {tests} tests (--slow-tests)",
+                crate::bench::compare::Plan::FEWEST
+            ));
+        }
+    }
+    if first.prims == last.prims {
+        said.push("One size only: no growth to tell".into());
+    }
+    said
+}
+
+/// How the exponents were found, and what the star is.
+pub const METHOD: &str = "exponent e of cost ~ N^e, N prims: least squares of the logarithms over all sizes, ± standard \
+                          error; rays of all classes as they were recorded; N × 10: the cost of \
+                          ten times the prims; * an even sample of the rays";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_exponent_is_shown_with_its_error_and_never_as_minus_nothing() {
+        let curve = |points: &[(f64, f64)]| Curve { kind: AccelKind::Bvh, fit: Fit::of(points), points: points.into() };
+        assert_eq!(curve(&[(10.0, 1.0), (100.0, 10.0)]).exponent(), "1.00");
+        assert_eq!(curve(&[(10.0, 3.0), (100.0, 3.0), (1e3, 2.9999)]).exponent(), "0.00 ±0.00");
+        assert_eq!(curve(&[(10.0, 3.0)]).exponent(), "-");
+    }
+}

@@ -1,0 +1,80 @@
+//! How cost grows with size: plots and tables.
+
+use super::super::Report;
+use super::super::growth::{Cost, Curve, METHOD, costs, kinds, sentences, tables};
+use super::super::number::{bytes, grouped, short};
+use super::lines::{Lines, Series, plot};
+use super::svg::unit;
+use super::{escaped, figure, table_of};
+
+/// The section; nothing where the models are not a family in growing sizes.
+pub(super) fn section(report: &Report) -> String {
+    let (Some(family), false) = (report.family, report.models.is_empty()) else { return String::new() };
+    let sizes: Vec<String> = report.models.iter().map(|m| grouped(m.prims as u64)).collect();
+    let mut out = format!("<section><h2>Growth: {family}</h2>\n<p>Scenes of {} prims (N).</p>\n", sizes.join(", "));
+    sentences(report).iter().for_each(|text| out += &format!("<p>{}.</p>\n", escaped(text)));
+    costs(report).for_each(|cost| out += &curves(report, cost));
+    tables(report).iter().for_each(|table| out += &table_of(table));
+    out + &format!("<p>{}.</p>\n</section>\n", escaped(METHOD))
+}
+
+fn curves(report: &Report, cost: Cost) -> String {
+    let curve = |kind| Curve::of(&report.models, kind, cost, None);
+    let curves: Vec<Curve> = kinds(report).into_iter().map(curve).collect();
+    let nothing: Vec<&str> =
+        curves.iter().filter(|c| c.points.iter().all(|p| p.1 <= 0.0)).map(|c| c.kind.name()).collect();
+    let of = |curve: Curve| {
+        let label = format!("{} {}", curve.kind, curve.short_exponent()).trim_end().to_owned();
+        Series { kind: curve.kind, label, points: curve.points }
+    };
+    let svg = plot(&Lines {
+        label: &format!("{} against the number of prims, by structure", cost.title()),
+        below: "prims of the scene (N)",
+        is_even: false,
+        shown: [&|n| format!("{n:e}"), &|y| tick(cost, y)],
+        series: curves.into_iter().map(of).collect(),
+    });
+    let none =
+        if nothing.is_empty() { String::new() } else { format!(" Nothing at any size: {}.", nothing.join(", ")) };
+    let caption = format!("Both scales are logarithmic; beside each name the exponent of N. Lower is better.{none}");
+    figure(cost.title(), &caption, &svg)
+}
+
+/// A round value of a cost.
+pub(super) fn tick(cost: Cost, value: f64) -> String {
+    match cost {
+        Cost::Tests | Cost::Visits => plain(short(value)),
+        Cost::Time | Cost::Build => unit(value),
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "positive; less than a byte is none"
+        )]
+        Cost::Memory => plain(bytes(value.round() as u64)),
+    }
+}
+
+/// `1.50 kB` as `1.5 kB`.
+fn plain(text: String) -> String {
+    let (number, unit) = text.split_once(' ').filter(|(_, unit)| unit.ends_with('B')).unwrap_or((&text, ""));
+    let number = if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number };
+    if unit.is_empty() { number.to_owned() } else { format!("{number} {unit}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn round_values_have_no_digits_to_spare() {
+        let shown = [
+            (Cost::Tests, 0.5),
+            (Cost::Tests, 10.0),
+            (Cost::Visits, 20_000.0),
+            (Cost::Memory, 1500.0),
+            (Cost::Memory, 2e6),
+        ];
+        assert_eq!(shown.map(|(c, v)| tick(c, v)), ["0.5", "10", "20 000", "1.5 kB", "2 MB"]);
+        assert_eq!([(Cost::Time, 2e-6), (Cost::Build, 0.5)].map(|(c, v)| tick(c, v)), ["2 µs", "500 ms"]);
+    }
+}

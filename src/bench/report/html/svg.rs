@@ -1,0 +1,150 @@
+//! Scales, lines and words of plots as SVG, small enough for a phone: 440 units wide.
+
+use super::super::number::grouped;
+use std::fmt::Write;
+
+/// Units across.
+pub(super) const WIDTH: f64 = 440.0;
+
+/// From `low` to `high` along `from..to`: logarithms to the base of ten, or values themselves.
+pub(super) struct Scale {
+    low: f64,
+    high: f64,
+    from: f64,
+    to: f64,
+    is_even: bool,
+}
+
+impl Scale {
+    /// Whole decades around the values that are above 0.
+    pub(super) fn around(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for log in values.filter(|v| *v > 0.0 && v.is_finite()).map(f64::log10) {
+            (low, high) = (low.min(log), high.max(log));
+        }
+        if low > high {
+            (low, high) = (0.0, 1.0);
+        }
+        let (low, high) = ((low - 0.02).floor(), (high + 0.02).ceil());
+        Self { low, high: high.max(low + 1.0), from, to, is_even: false }
+    }
+
+    /// Just around the values, with one more part in ten on both sides, and nearly a decade at least.
+    pub(super) fn fitting(values: impl Iterator<Item = f64> + Clone, from: f64, to: f64) -> Self {
+        let tight = Self::tight(values, from, to);
+        let (middle, half) = ((tight.low + tight.high) * 0.5, ((tight.high - tight.low) * 0.6).max(0.4));
+        Self { low: middle - half, high: middle + half, ..tight }
+    }
+
+    /// From the least value to the most; a factor of 1.6 at least.
+    pub(super) fn tight(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
+        let logs = values.filter(|v| *v > 0.0 && v.is_finite()).map(f64::log10);
+        Self { is_even: false, ..Self::between(logs, 0.2, from, to) }
+    }
+
+    /// From the least value to the most, themselves and not their logarithms.
+    pub(super) fn even(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
+        Self { is_even: true, ..Self::between(values, 1.0, from, to) }
+    }
+
+    fn between(values: impl Iterator<Item = f64>, least: f64, from: f64, to: f64) -> Self {
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        let (low, high) = if low > high { (0.0, 1.0) } else { (low, high) };
+        let more = (least - (high - low)).max(0.0) * 0.5;
+        Self { low: low - more, high: high + more, from, to, is_even: false }
+    }
+
+    /// Where a value lies; what is 0 or below the scale lies at its start.
+    pub(super) fn at(&self, value: f64) -> f64 {
+        let value = if self.is_even { value } else { value.max(1e-300).log10() };
+        let part = (value - self.low) / (self.high - self.low);
+        self.from + part.clamp(0.0, 1.0) * (self.to - self.from)
+    }
+
+    /// Round values: whole decades where there are many, parts of them where there are few.
+    pub(super) fn ticks(&self) -> Vec<f64> {
+        let span = self.high - self.low;
+        if self.is_even {
+            return self.multiples((span / 6.0).ceil().max(1.0));
+        }
+        match span {
+            s if s >= 2.5 || self.low.fract() == 0.0 => {
+                self.multiples((s / 6.0).ceil()).iter().map(|d| 10f64.powf(*d)).collect()
+            }
+            s if s >= 0.8 => self.within_decades(&[1.0, 2.0, 5.0]),
+            s if s >= 0.4 => self.within_decades(&[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0]),
+            _ => self.within_decades(&[
+                1.0, 1.1, 1.2, 1.3, 1.4, 1.6, 1.8, 2.0, 2.25, 2.5, 2.75, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 7.0, 8.0, 9.0,
+            ]),
+        }
+    }
+
+    /// Of `step`, from the first on the scale.
+    fn multiples(&self, step: f64) -> Vec<f64> {
+        let first = (self.low - 1e-9).ceil();
+        (0..).map(|i| first + f64::from(i) * step).take_while(|v| *v <= self.high + 1e-9).collect()
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "decades of floats are small")]
+    fn within_decades(&self, parts: &[f64]) -> Vec<f64> {
+        let decades = self.low.floor() as i32..=self.high.floor() as i32;
+        let all = decades.flat_map(|decade| parts.iter().map(move |m| m * 10f64.powi(decade)));
+        all.filter(|t| (self.low - 1e-9..=self.high + 1e-9).contains(&t.log10())).collect()
+    }
+}
+
+/// A round number of seconds: `20 µs`.
+pub(super) fn unit(seconds: f64) -> String {
+    let scaled = |factor: f64, unit: &str| format!("{} {unit}", grouped((seconds * factor).round() as u64));
+    match seconds {
+        s if s < 0.99e-6 => scaled(1e9, "ns"),
+        s if s < 0.99e-3 => scaled(1e6, "µs"),
+        s if s < 0.99 => scaled(1e3, "ms"),
+        _ => scaled(1.0, "s"),
+    }
+}
+
+/// Ascending places moved apart by at least `gap`, none beyond `end`.
+pub(super) fn spread_out(places: &[f64], gap: f64, end: f64) -> Vec<f64> {
+    let mut moved: Vec<f64> = Vec::new();
+    for &place in places {
+        moved.push(moved.last().map_or(place, |&before| place.max(before + gap)));
+    }
+    let mut limit = end;
+    for place in moved.iter_mut().rev() {
+        *place = place.min(limit);
+        limit = *place - gap;
+    }
+    moved
+}
+
+pub(super) fn open(height: f64, label: &str) -> String {
+    format!("<svg viewBox=\"0 0 {WIDTH} {height}\" role=\"img\" aria-label=\"{label}\">")
+}
+
+pub(super) fn rule(svg: &mut String, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2], class: &str) {
+    // Writing to a string cannot fail, here and below.
+    let _ = write!(svg, "<line class=\"{class}\" x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\"/>");
+}
+
+pub(super) fn words(svg: &mut String, x: f64, y: f64, anchor: &str, class: &str, text: &str) {
+    let _ = write!(svg, "<text class=\"{class}\" x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{text}</text>");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_never_cover_each_other() {
+        let moved = spread_out(&[10.0, 11.0, 12.0, 95.0, 99.0], 15.0, 100.0);
+        assert!(moved.windows(2).all(|w| w[1] - w[0] >= 14.99) && moved[4] <= 100.0, "{moved:?}");
+    }
+
+    #[test]
+    fn a_scale_has_whole_decades_and_keeps_nothing_at_its_start() {
+        let scale = Scale::around([0.0, 3.0, 250.0].into_iter(), 0.0, 300.0);
+        assert_eq!((scale.low, scale.high, scale.ticks()), (0.0, 3.0, vec![1.0, 10.0, 100.0, 1000.0]));
+        assert_eq!([0.0, 1.0, 10.0, 1e9].map(|v| scale.at(v)), [0.0, 0.0, 100.0, 300.0]);
+    }
+}

@@ -1,0 +1,64 @@
+//! A table that every format can show.
+
+/// Cells of text under a title; the first column names the row.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Table {
+    /// What it shows.
+    pub title: String,
+    /// Heads of the columns.
+    pub columns: Vec<String>,
+    /// As many cells each.
+    pub rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// For a terminal: each column as wide as it must be, all but the first flush right.
+    pub fn text(&self) -> String {
+        let lines = || std::iter::once(&self.columns).chain(&self.rows);
+        let width = |i: usize| lines().filter_map(|l| l.get(i)).map(|c| c.chars().count()).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
+        let mut out = format!("{}\n", self.title);
+        for line in lines() {
+            let mut text = String::new();
+            for (i, (cell, width)) in line.iter().zip(&widths).enumerate() {
+                text += &if i == 0 { format!("{cell:<width$}") } else { format!("  {cell:>width$}") };
+            }
+            out += text.trim_end();
+            out.push('\n');
+        }
+        out
+    }
+
+    /// For a document.
+    pub fn markdown(&self) -> String {
+        let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
+        let rule = "--:|".repeat(self.columns.len().saturating_sub(1));
+        let rows: String = self.rows.iter().map(|row| line(row)).collect();
+        format!("### {}\n\n{}|---|{rule}\n{rows}", self.title, line(&self.columns))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table() -> Table {
+        let words = |words: &[&str]| words.iter().map(|w| (*w).to_owned()).collect::<Vec<_>>();
+        Table {
+            title: "Legs".into(),
+            columns: words(&["beast", "legs"]),
+            rows: vec![words(&["cow", "4"]), words(&["millipede", "1 306"])],
+        }
+    }
+
+    #[test]
+    fn columns_of_text_are_flush() {
+        assert_eq!(table().text(), "Legs\nbeast       legs\ncow            4\nmillipede  1 306\n");
+    }
+
+    #[test]
+    fn markdown_has_a_rule_under_its_heads() {
+        let expected = "### Legs\n\n| beast | legs |\n|---|--:|\n| cow | 4 |\n| millipede | 1 306 |\n";
+        assert_eq!(table().markdown(), expected);
+    }
+}

@@ -1,0 +1,41 @@
+//! `meshray bench`: how cost grows with size, and with a parameter.
+
+use super::program::Folder;
+use serde_json::Value;
+
+const QUICK: [&str; 7] = ["bench", "--size", "16x12", "--passes", "0", "-q", "--accel"];
+
+#[test]
+fn growth_is_measured_on_generated_scenes_and_reported_by_size() {
+    let folder = Folder::new();
+    let words = ["none,bvh", "--generate", "tetra", "--sizes", "50..800:3", "--report", "r.json", "--report", "r.html"];
+    let run = folder.run(&[&QUICK[..], &words].concat()).ends(0);
+    assert!(run.text().contains("exponent") && run.text().contains("tetra-50: 64 prims"), "{}", run.text());
+    let report: Value = serde_json::from_slice(&folder.read("r.json")).unwrap();
+    let prims: Vec<u64> = report["models"].as_array().unwrap().iter().map(|m| m["prims"].as_u64().unwrap()).collect();
+    assert_eq!((prims, &report["complete"]), (vec![64, 256, 1024], &true.into()));
+    let none = &report["growth"]["structures"][0];
+    assert_eq!(none["accel"], "none");
+    let exponent = none["classes"]["primary"]["n_it"]["exponent"].as_f64().unwrap();
+    assert!((exponent - 1.0).abs() < 1e-9, "every eye ray is tested against everything: {exponent}");
+    assert!(String::from_utf8(folder.read("r.html")).unwrap().contains("Growth: tetra"));
+}
+
+#[test]
+fn a_size_that_is_no_new_scene_and_a_structure_that_is_too_slow_are_left_out_and_said() {
+    let folder = Folder::new();
+    let words = ["bench", "--size", "8x6", "--passes", "0", "--accel", "none,bvh", "--generate", "tetra", "--sizes"];
+    let run = folder.run(&[&words[..], &["60,64,1000", "--slow-tests", "2000"]].concat()).ends(0);
+    assert!(run.text().contains("none is left out from 1 024 prims on"), "{}", run.text());
+    run.says(&["tetra-64 is left out: the nearest scene of its family is tetra-60"]);
+}
+
+#[test]
+fn sizes_that_make_no_sense_are_bad_command_lines() {
+    let folder = Folder::with_cube();
+    folder.run(&["bench", "--generate", "tetra", "--sizes", "1e6..1e3"]).ends(2).says(&["1..100"]);
+    folder.run(&["bench", "--generate", "tetra", "--sizes", "1e3..1e8"]).ends(2).says(&["1e7"]);
+    folder.run(&["bench", "cube.obj", "--sizes", "1e3"]).ends(2).says(&["--sizes"]);
+    folder.run(&["bench", "cube.obj", "--generate", "tetra"]).ends(2);
+    folder.run(&["bench"]).ends(2);
+}
