@@ -6,6 +6,7 @@
 use super::clock::{Spread, timed};
 use super::rays::{Batch, Class, RaySet};
 use super::replay::{Answer, answers, counted, seconds};
+use super::sweep::{Setting, Sweep};
 use crate::accel::{Accel, AccelKind, AccelParams, AnyAccel, RayCounts, Shapes, StructureStats};
 
 /// How to compare.
@@ -15,6 +16,8 @@ pub struct Plan {
     pub kinds: Vec<AccelKind>,
     /// Parameters of the structures.
     pub params: AccelParams,
+    /// A parameter that takes several values; `kinds` are those that it changes.
+    pub sweep: Option<Sweep>,
     /// Timed passes; 0: only counts.
     pub passes: usize,
     /// Threads that build and trace, at least 1.
@@ -48,9 +51,29 @@ impl Plan {
         !kind.is_slow() || self.within_slow_tests(prims) >= Self::FEWEST
     }
 
+    /// Every structure to build, in the order of the rows.
+    fn candidates(&self) -> Vec<Candidate> {
+        let of = |&kind: &AccelKind| match &self.sweep {
+            None => vec![Candidate { kind, params: self.params, setting: None }],
+            Some(sweep) => {
+                let settings = sweep.settings(kind, &self.params).into_iter();
+                settings.map(|(setting, params)| Candidate { kind, params, setting: Some(setting) }).collect()
+            }
+        };
+        self.kinds.iter().flat_map(of).collect()
+    }
+
     fn within_slow_tests(&self, prims: usize) -> usize {
         usize::try_from(self.slow_tests / (prims as u64).max(1)).unwrap_or(usize::MAX)
     }
+}
+
+/// A structure to build.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    kind: AccelKind,
+    params: AccelParams,
+    setting: Option<Setting>,
 }
 
 /// What was found out about one structure.
@@ -58,6 +81,8 @@ impl Plan {
 pub struct Row {
     /// Which one.
     pub kind: AccelKind,
+    /// Its value of the parameter that is swept.
+    pub setting: Option<Setting>,
     /// Seconds of building it.
     pub build: Spread,
     /// What it is made of.
@@ -81,11 +106,16 @@ impl Row {
         self.classes.iter().map(|c| c.counts.queries).sum()
     }
 
-    /// Seconds for a ray of a mixture with so many of each class; NaN before the first pass.
-    pub fn seconds_per_ray(&self, mixture: &[usize]) -> f64 {
+    /// Seconds for a ray of a mixture with so many of each class, of each class's passes `pick`; NaN before the first pass.
+    pub fn seconds_per_ray(&self, mixture: &[usize], pick: fn(&Spread) -> f64) -> f64 {
         let all: usize = mixture.iter().sum();
-        let sum: f64 = self.classes.iter().zip(mixture).map(|(c, &n)| c.seconds.median() * n as f64).sum();
+        let sum: f64 = self.classes.iter().zip(mixture).map(|(c, &n)| pick(&c.seconds) * n as f64).sum();
         sum / all as f64
+    }
+
+    /// Its structure, and its value of the parameter that is swept.
+    pub fn name(&self) -> String {
+        self.setting.map_or_else(|| self.kind.to_string(), |setting| format!("{} with {setting}", self.kind))
     }
 }
 
@@ -208,20 +238,24 @@ pub type GoOn<'a> = dyn FnMut(&[Row], &str) -> bool + 'a;
 /// The reference is the first structure that is not slow, or the first of all; the others must agree with it.
 pub fn compare(shapes: &Shapes, sets: &[RaySet], pixels: usize, plan: &Plan, go_on: &mut GoOn) -> Option<Vec<Row>> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(plan.threads).build().ok()?;
-    let build = |kind| pool.install(|| timed(|| AnyAccel::build(kind, shapes, &plan.params)));
-    let (whole, sampled) = tasks(shapes, sets, plan, |kind| build(kind).0);
+    let build = |c: &Candidate| pool.install(|| timed(|| AnyAccel::build(c.kind, shapes, &c.params)));
+    let candidates = plan.candidates();
+    let (whole, sampled) = tasks(shapes, sets, plan, &candidates, |candidate| build(candidate).0);
 
     // Each structure once, so that a row is there as soon as possible; then all in turn.
     let mut rows: Vec<Row> = Vec::new();
     let mut structures = Vec::new();
-    for &kind in &plan.kinds {
-        if !go_on(&rows, &format!("{kind}: building and counting")) {
+    for candidate in &candidates {
+        let &Candidate { kind, setting, .. } = candidate;
+        let value = setting.map_or(String::new(), |setting| format!(", {setting}"));
+        if !go_on(&rows, &format!("{kind}{value}: building and counting")) {
             return None;
         }
-        let (accel, seconds) = build(kind);
+        let (accel, seconds) = build(candidate);
         let tasks = if kind.is_slow() { &sampled } else { &whole };
         let mut row = Row {
             kind,
+            setting,
             build: Spread::default(),
             made_of: accel.summary(),
             classes: Vec::new(),
@@ -239,8 +273,8 @@ pub fn compare(shapes: &Shapes, sets: &[RaySet], pixels: usize, plan: &Plan, go_
         structures.push(accel);
     }
     for pass in 1..plan.passes {
-        for (row, accel) in rows.iter_mut().zip(&structures) {
-            row.build.push(build(row.kind).1);
+        for ((row, accel), candidate) in rows.iter_mut().zip(&structures).zip(&candidates) {
+            row.build.push(build(candidate).1);
             let tasks = if row.kind.is_slow() { &sampled } else { &whole };
             time(accel, tasks, plan.threads, &mut row.classes);
         }
@@ -256,16 +290,17 @@ fn tasks<'s>(
     shapes: &'s Shapes,
     sets: &[RaySet],
     plan: &Plan,
-    build: impl Fn(AccelKind) -> AnyAccel<'s>,
+    candidates: &[Candidate],
+    build: impl Fn(&Candidate) -> AnyAccel<'s>,
 ) -> (Vec<Task>, Vec<Task>) {
     let slow = |set: &RaySet| set.sample(plan.affordable(shapes), plan.seed).0;
-    let Some(&first) = plan.kinds.iter().find(|k| !k.is_slow()).or(plan.kinds.first()) else {
+    let Some(first) = candidates.iter().find(|c| !c.kind.is_slow()).or(candidates.first()) else {
         return Default::default();
     };
     let reference = build(first);
     let task = |set: RaySet| Task::new(&reference, set);
     let sampled = sets.iter().map(|set| task(slow(set))).collect();
-    let whole = if first.is_slow() { Vec::new() } else { sets.iter().map(|set| task(set.clone())).collect() };
+    let whole = if first.kind.is_slow() { Vec::new() } else { sets.iter().map(|set| task(set.clone())).collect() };
     (whole, sampled)
 }
 

@@ -13,6 +13,7 @@ pub mod rays;
 pub mod replay;
 pub mod report;
 pub mod star;
+pub mod sweep;
 #[cfg(test)]
 mod tests;
 pub mod verify;

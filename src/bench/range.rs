@@ -34,9 +34,9 @@ impl Spacing {
     }
 }
 
-/// Rounded to four digits, so that what a report prints repeats the value.
+/// Rounded to three digits, so that what a report prints repeats the value.
 fn printable(value: f64) -> f64 {
-    format!("{value:.3e}").parse().unwrap_or(value)
+    format!("{value:.2e}").parse().unwrap_or(value)
 }
 
 /// The values of `text`, ascending, each once; whole ones where `whole` says so. An error says what to write.
@@ -91,10 +91,10 @@ mod tests {
 
     #[test]
     fn steps_have_equal_ratios_or_differences() {
-        assert_eq!(tens("1e3..1e6:7"), [1e3, 3162.0, 1e4, 31_620.0, 1e5, 316_200.0, 1e6]);
+        assert_eq!(tens("1e3..1e6:7"), [1e3, 3160.0, 1e4, 31_600.0, 1e5, 316_000.0, 1e6]);
         assert_eq!(values("0.5..16", Spacing::Ratio(6), false).unwrap(), [0.5, 1.0, 2.0, 4.0, 8.0, 16.0]);
         assert_eq!(values("0..10", Spacing::Even(6), true).unwrap(), [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]);
-        assert_eq!(values("1..3:3", Spacing::Ratio(6), false).unwrap(), [1.0, 1.732, 3.0]);
+        assert_eq!(values("1..3:3", Spacing::Ratio(6), false).unwrap(), [1.0, 1.73, 3.0]);
         assert_eq!(values("0..3:2", Spacing::Even(6), true).unwrap(), [0.0, 3.0]);
     }
 

@@ -87,6 +87,7 @@ fn plan() -> Plan {
     Plan {
         kinds: AccelKind::ALL.to_vec(),
         params: AccelParams::DEFAULT,
+        sweep: None,
         passes: 0,
         threads: 1,
         rays: Plan::RAYS,
@@ -274,6 +275,58 @@ fn every_format_tells_the_exponents_of_growth() {
     // One size is no growth, and no fault.
     report.models.truncate(1);
     assert!(text::write_growth(&report).contains("One size only"));
+}
+
+/// The report of a sweep over the small scene.
+fn swept(sweep: &str, kinds: &[AccelKind], passes: usize) -> Report {
+    Stage::new().report(Plan { kinds: kinds.into(), sweep: Some(sweep.parse().unwrap()), passes, ..plan() })
+}
+
+#[test]
+fn a_sweep_tells_every_value_and_the_default_and_their_hits_are_the_same() {
+    let report = swept("grid-density=0.5..16", &[AccelKind::Grid, AccelKind::GridOctree], 0);
+    let model = &report.models[0];
+    assert!(model.differing() == 0 && model.rows.iter().all(|r| r.rays() == model.rows[0].rays()));
+    let values = |kind| model.rows.iter().filter(move |r| r.kind == kind).map(|r| r.setting.unwrap().value.unwrap());
+    assert_eq!(values(AccelKind::Grid).collect::<Vec<_>>(), [0.5, 1.0, 2.0, 4.0, 8.0, 16.0]);
+    assert_eq!(values(AccelKind::GridOctree).collect::<Vec<_>>(), [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0]);
+    let [coarse, finer] = [0, 2].map(|i| model.rows[i].made_of.n_v);
+    assert!(finer > coarse, "the parameter reaches the structures: {coarse}, {finer} cells");
+
+    let json: serde_json::Value = serde_json::from_str(&Format::Json.write(&report)).unwrap();
+    assert_eq!(json["sweep"]["parameter"], "grid-density");
+    let (rows, best) = (&json["models"][0]["structures"], &json["models"][0]["best"]);
+    assert_eq!((&rows[3]["setting"]["value"], &rows[3]["setting"]["is_default"]), (&4.0.into(), &true.into()));
+    let cost = |row: &serde_json::Value| -> f64 {
+        let counts = |c: &serde_json::Value| c["tests"].as_f64().unwrap() + c["steps"].as_f64().unwrap();
+        row["classes"].as_object().unwrap().values().map(counts).sum()
+    };
+    let costs: Vec<f64> = (0..6).map(|i| cost(&rows[i])).collect();
+    let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
+    let place = costs.iter().position(|&c| c == least).unwrap();
+    assert_eq!((&best[0]["accel"], &best[0]["value"]), (&"grid".into(), &rows[place]["setting"]["value"]));
+    assert!((best[0]["saved"].as_f64().unwrap() - (1.0 - least / costs[3])).abs() < 1e-9);
+
+    let csv = Format::Csv.write(&report);
+    assert!(csv.lines().filter(|l| l.contains(",grid-density,16,false")).count() == 2 * Class::ALL.len(), "{csv}");
+    let text = text::write(&report, model);
+    for text in [&text, &Format::Markdown.write(&report), &Format::Html.write(&report)] {
+        assert!(text.contains("4 default") || text.contains("4 best default"), "{text}");
+        assert!(text.contains("grid-octree: ") && text.contains("tests and visits a ray together"), "{text}");
+    }
+}
+
+#[test]
+fn a_structure_whose_default_has_no_such_value_is_compared_with_it_all_the_same() {
+    let report = swept("leaf-size=1,8", &[AccelKind::Octree, AccelKind::Bvh], 1);
+    let settings = |kind| report.models[0].rows.iter().filter(move |r| r.kind == kind).map(|r| r.setting.unwrap());
+    let octree: Vec<_> = settings(AccelKind::Octree).map(|s| (s.value, s.is_default)).collect();
+    assert_eq!(octree, [(Some(1.0), false), (Some(8.0), false), (None, true)]);
+    assert_eq!(settings(AccelKind::Bvh).filter(|s| s.is_default).map(|s| s.value).collect::<Vec<_>>(), [Some(2.0)]);
+    let html = Format::Html.write(&report);
+    // One for each cost: tests, visits, time, memory, build.
+    assert_eq!(html.matches("k-octree level").count(), 5);
+    assert_eq!(html.matches("<circle class=\"k-bvh around\"").count(), 5);
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use super::parse;
 use crate::accel::{AccelChoice, AccelKind, IntersectorKind, MailboxKind};
 use crate::bench::baseline::Limit;
+use crate::bench::sweep::Sweep;
 use crate::bench::verify::Plan;
 use crate::generate::Family;
 use crate::image::ToneMap;
@@ -299,6 +300,11 @@ pub(super) struct BenchArgs {
           help_heading = "Growth")]
     pub sizes: parse::Sizes,
 
+    /// Measure the structures that have this parameter at several values and at the default: a list grid-density=1,4, six
+    /// values of a range grid-density=0.5..16 (by equal ratios; max-depth=0..10 by equal differences), or so many,
+    /// grid-density=0.5..16:9. Parameters: grid-density, grid-resolution, max-depth, step-cost, leaf-size
+    #[arg(long, value_name = "NAME=VALUES", conflicts_with_all = ["generate", "baseline"], help_heading = "Structure")]
+    pub sweep: Option<Sweep>,
     /// Structures to compare, such as `grid-octree,fast-bvh` [default: all]
     #[arg(long, value_name = "NAMES", value_parser = parse::accel(), value_delimiter = ',', help_heading = "Structure")]
     pub accel: Vec<AccelKind>,

@@ -39,3 +39,28 @@ fn sizes_that_make_no_sense_are_bad_command_lines() {
     folder.run(&["bench", "cube.obj", "--generate", "tetra"]).ends(2);
     folder.run(&["bench"]).ends(2);
 }
+
+#[test]
+fn a_sweep_names_the_best_value_of_each_structure_that_has_the_parameter() {
+    let folder = Folder::with_cube();
+    let words = ["grid,bvh", "cube.obj", "--sweep", "grid-density=1,4,8", "--report", "r.json"];
+    let run = folder.run(&[&QUICK[..], &words].concat()).ends(0);
+    assert!(run.text().contains("hits identical, bit for bit, in all 3 structures"), "{}", run.text());
+    assert!(run.text().contains("grid: ") && !run.text().contains("bvh"), "{}", run.text());
+    let report: Value = serde_json::from_slice(&folder.read("r.json")).unwrap();
+    let rows = report["models"][0]["structures"].as_array().unwrap();
+    let values: Vec<f64> = rows.iter().map(|r| r["setting"]["value"].as_f64().unwrap()).collect();
+    assert_eq!((values, &report["models"][0]["identical"]), (vec![1.0, 4.0, 8.0], &true.into()));
+}
+
+#[test]
+fn a_sweep_that_changes_nothing_is_a_bad_command_line() {
+    let folder = Folder::with_cube();
+    let wrong = |words: &[&str], says: &[&str]| {
+        folder.run(&[&["bench", "cube.obj"], words].concat()).ends(2).says(says);
+    };
+    wrong(&["--sweep", "grid-density=1,4", "--accel", "bvh,octree"], &["changes none", "grid-octree"]);
+    wrong(&["--sweep", "grid-density=1,4", "--grid-density", "2"], &["same parameter"]);
+    wrong(&["--sweep", "step-cost=1,4", "--leaf-size", "2"], &["beside --leaf-size"]);
+    wrong(&["--sweep", "density=1,4"], &["grid-density"]);
+}

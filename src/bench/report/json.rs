@@ -6,6 +6,7 @@
 //! | `machine` | `cpu`, `cores`, `system`, `simd`, `compiler`, `flags` |
 //! | `settings` | `threads`, `passes`, `seed`, `rays` (most of a class), `slow_tests` (most tests of a class in a slow structure), and what was asked of structures: `grid_density`, `grid_resolution`, `max_depth`, `step_cost`, `leaf_size` (each null: what suits the kind), `mailbox` |
 //! | `models` | one for each model |
+//! | `sweep` | null, or the `parameter` that is swept and its `values` |
 //! | `growth` | null, or how cost grows where the models are a family in growing sizes |
 //!
 //! A model has `file`, `hash` (xxh3-128 of what was read), `prims` (N), `picture` (`width`, `height`, `samples`, `depth`,
@@ -17,13 +18,18 @@
 //! interval of the same, or null when nothing was left out), `culled`, `differing`, `t_tr` (seconds of a ray) and
 //! `mrays`. `left_out` names slow structures that could not bear so many prims.
 //!
+//! Where a parameter is swept, a structure's `setting` has its `value` (null: another parameter rules) and `is_default`,
+//! and the model has `best`: of each `accel` the best `value`, `by` (`t_tr`, or `n_it+n_ts` without times), and `saved`
+//! (share of the default's cost).
+//!
 //! `growth` has `family` and `structures`; of each `accel`, `all` (rays of all classes as they were recorded) and
 //! `classes`, with `n_it`, `n_ts`, `t_tr` of each, and in `all` also `bytes` and `t_b`: null, or the power law that fits
 //! over the number of prims, `exponent`, `error` (its standard error, or null for two sizes), `r2` (or null), `factor`
 //! (cost of one prim), `points` (`[prims, cost]`). Keys are only ever added.
 
-use super::growth::{Cost, Curve, costs, kinds};
-use super::{Model, Report};
+use super::cost::{Cost, costs};
+use super::growth::{Curve, kinds};
+use super::{Model, Report, sweep};
 use crate::accel::AccelKind;
 use crate::bench::clock::Spread;
 use crate::bench::compare::{ClassRow, Count, Row};
@@ -47,13 +53,14 @@ pub fn write(report: &Report) -> String {
             "max_depth": p.params.max_depth, "step_cost": p.params.step_cost, "leaf_size": p.params.leaf_size,
             "mailbox": p.params.mailbox.name(),
         },
-        "models": report.models.iter().map(model).collect::<Vec<_>>(),
+        "models": report.models.iter().map(|m| model(report, m)).collect::<Vec<_>>(),
+        "sweep": report.plan.sweep.as_ref().map(|s| json!({ "parameter": s.parameter.name(), "values": s.values })),
         "growth": growth(report),
     });
     format!("{value:#}\n")
 }
 
-fn model(model: &Model) -> Value {
+fn model(report: &Report, model: &Model) -> Value {
     let rays = model.rays.iter().map(|r| (r.class.name().to_owned(), json!({ "asked": r.asked, "kept": r.kept })));
     json!({
         "file": model.name, "hash": format!("{:032x}", model.hash), "prims": model.prims,
@@ -64,8 +71,18 @@ fn model(model: &Model) -> Value {
         "rays": rays.collect::<Map<_, _>>(),
         "identical": model.differing() == 0, "reference": model.reference().map(|k| k.name()),
         "structures": model.rows.iter().map(|row| structure(model, row)).collect::<Vec<_>>(),
+        "best": report.plan.sweep.as_ref().map(|_| best(report, model)),
         "left_out": model.left_out.iter().map(|k| k.name()).collect::<Vec<_>>(),
     })
+}
+
+fn best(report: &Report, model: &Model) -> Value {
+    let by = if report.is_timed() { "t_tr" } else { "n_it+n_ts" };
+    let of = |curve: &sweep::Curve| {
+        let value = curve.best.setting.and_then(|s| s.value);
+        json!({ "accel": curve.kind.name(), "value": value, "by": by, "saved": curve.saved(report, model) })
+    };
+    sweep::curves(report, model).iter().map(of).collect()
 }
 
 fn growth(report: &Report) -> Value {
@@ -97,7 +114,9 @@ fn structure(model: &Model, row: &Row) -> Value {
     let class =
         |(i, c): (usize, &ClassRow)| (model.rays[i].class.name().to_owned(), class(c, row.sampled, model.prims));
     json!({
-        "accel": row.kind.name(), "sampled": row.sampled, "differing": row.differing(), "t_b": spread(&row.build),
+        "accel": row.kind.name(),
+        "setting": row.setting.map(|s| json!({ "value": s.value, "is_default": s.is_default })),
+        "sampled": row.sampled, "differing": row.differing(), "t_b": spread(&row.build),
         "t_tr": number(model.seconds_per_ray(row)), "n_in": s.n_in, "n_v": s.n_v, "n_ev": s.n_ev, "n_oiv": s.n_oiv,
         "bytes": s.bytes, "break_even": model.break_even(row),
         "classes": row.classes.iter().enumerate().map(class).collect::<Map<_, _>>(),

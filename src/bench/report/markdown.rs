@@ -1,7 +1,7 @@
 //! Tables for a document.
 
 use super::number::{bytes, grouped, seconds, short, whole};
-use super::{Model, Rays, Report, WORDS, growth, text};
+use super::{Model, Rays, Report, WORDS, growth, sweep, text};
 use crate::bench::compare::Count;
 
 /// The whole report.
@@ -26,6 +26,11 @@ fn write_model(out: &mut String, report: &Report, model: &Model) {
     *out += &format!("\n## {}\n\n", model.name.replace('|', "\\|"));
     *out +=
         &format!("{} prims; rays of {}. **{}.**\n\n", grouped(model.prims as u64), model.picture(), model.verdict());
+    if report.plan.sweep.is_some() {
+        sweep::sentences(report, model).iter().for_each(|text| *out += &format!("{text}.\n"));
+        sweep::tables(report, model).iter().for_each(|table| *out += &format!("\n{}", table.markdown()));
+        return;
+    }
     let mut titles = vec!["structure", "memory", "n_in", "n_v", "n_ev", "n_oiv"];
     if report.is_timed() {
         titles.extend(["t_b", "min..max", "Mrays/s", "break-even"]);

@@ -1,14 +1,17 @@
 //! What a comparison found, and how it is shown: as text, JSON, CSV, Markdown or a page for a browser.
 
+pub mod cost;
 pub mod csv;
 pub mod growth;
 pub mod html;
 pub mod json;
 pub mod markdown;
 pub mod number;
+pub mod sweep;
 pub mod table;
 pub mod text;
 
+use super::clock::Spread;
 use super::compare::{Count, Plan, Row, break_even};
 use super::machine::Machine;
 use super::rays::{Class, RaySet};
@@ -81,8 +84,17 @@ impl Rays {
 impl Model {
     /// Seconds for a ray of the recorded mixture.
     pub fn seconds_per_ray(&self, row: &Row) -> f64 {
-        let mixture: Vec<usize> = self.rays.iter().map(|r| r.kept).collect();
-        row.seconds_per_ray(&mixture)
+        row.seconds_per_ray(&self.mixture(), Spread::median)
+    }
+
+    /// The same if every class had its fastest pass at once, and its slowest.
+    pub fn seconds_range(&self, row: &Row) -> [f64; 2] {
+        let mixture = self.mixture();
+        [Spread::min, Spread::max].map(|pick| row.seconds_per_ray(&mixture, pick))
+    }
+
+    fn mixture(&self) -> Vec<usize> {
+        self.rays.iter().map(|r| r.kept).collect()
     }
 
     /// A count for a ray of the recorded mixture.
@@ -119,7 +131,7 @@ impl Model {
         if differing > 0 {
             let wrong = self.rows.iter().filter(|r| r.differing() > 0);
             let wrong: Vec<String> =
-                wrong.map(|r| format!("{} in {} rays", r.kind, number::grouped(r.differing()))).collect();
+                wrong.map(|r| format!("{} in {} rays", r.name(), number::grouped(r.differing()))).collect();
             return format!("hits DIFFER from those of {reference}: {}", wrong.join(", "));
         }
         let sampled: Vec<&str> = self.rows.iter().filter(|r| r.sampled).map(|r| r.kind.name()).collect();

@@ -1,7 +1,7 @@
 //! Tables for a terminal.
 
 use super::number::{bytes, grouped, seconds, short, whole};
-use super::{Model, Rays, Report, WORDS, growth};
+use super::{Model, Rays, Report, WORDS, growth, sweep};
 use crate::bench::clock::Spread;
 use crate::bench::compare::{ClassRow, Count, Row};
 use std::fmt::{Result, Write};
@@ -17,6 +17,11 @@ pub fn write(report: &Report, model: &Model) -> String {
 fn write_model(out: &mut String, report: &Report, model: &Model) -> Result {
     writeln!(out, "{}: {} prims; rays of {}", model.name, grouped(model.prims as u64), model.picture())?;
     writeln!(out)?;
+    if report.plan.sweep.is_some() {
+        sweep::tables(report, model).iter().try_for_each(|table| writeln!(out, "{}", table.text()))?;
+        sweep::sentences(report, model).iter().try_for_each(|text| writeln!(out, "{text}."))?;
+        return writeln!(out, "\n{}", model.verdict());
+    }
     write_structures(out, report, model)?;
     for (i, rays) in model.rays.iter().enumerate() {
         writeln!(out)?;

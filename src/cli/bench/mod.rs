@@ -8,11 +8,12 @@ use super::exit::Exit;
 use super::job::{self, Wrong};
 use super::message::Messages;
 use super::{accident, interrupt, print};
-use crate::accel::AccelKind;
+use crate::accel::{AccelKind, AccelParams};
 use crate::bench::compare::{Plan, Row, compare};
 use crate::bench::machine::Machine;
 use crate::bench::rays;
 use crate::bench::report::{Format, Model, Rays, Report, text};
+use crate::bench::sweep::Sweep;
 use crate::image::write_atomic;
 use gate::Gate;
 use scene::{Prepared, Subject};
@@ -39,6 +40,9 @@ pub(super) fn run(args: &BenchArgs) -> Exit {
         Ok(gate) => gate,
         Err(exit) => return exit,
     };
+    for kind in args.accel.iter().filter(|kind| !plan.kinds.contains(kind)) {
+        messages.info("structure-left-out", format!("{kind} is left out: it has no such parameter"));
+    }
     let bench = Bench { args, files, messages };
     let mut report = Report {
         machine: Machine::here(),
@@ -87,15 +91,36 @@ fn plan(args: &BenchArgs) -> Result<Plan, Wrong> {
     if kinds.is_empty() {
         kinds = AccelKind::ALL.to_vec();
     }
+    let params = job::params(&args.params)?;
+    if let Some(sweep) = &args.sweep {
+        kinds = swept(sweep, kinds, &params)?;
+    }
     Ok(Plan {
         kinds,
-        params: job::params(&args.params)?,
+        params,
+        sweep: args.sweep.clone(),
         passes: args.passes,
         threads: usize::from(args.threads),
         rays: args.rays,
         slow_tests: args.slow_tests,
         seed: args.seed,
     })
+}
+
+/// Those of `kinds` that the sweep changes.
+fn swept(sweep: &Sweep, kinds: Vec<AccelKind>, params: &AccelParams) -> Result<Vec<AccelKind>, Wrong> {
+    let parameter = sweep.parameter;
+    if parameter.is_set(params) {
+        return Err(Wrong(format!("--sweep {parameter} and --{parameter} set the same parameter; use one of them")));
+    }
+    let changed = |params: AccelParams| move |kind: &AccelKind| parameter.changes(*kind, &params);
+    let kinds: Vec<AccelKind> = kinds.into_iter().filter(changed(*params)).collect();
+    if kinds.is_empty() {
+        let others: Vec<&str> = AccelKind::ALL.iter().filter(|k| changed(*params)(k)).map(|k| k.name()).collect();
+        let others = if others.is_empty() { "nothing beside --leaf-size".into() } else { others.join(", ") };
+        return Err(Wrong(format!("--sweep {parameter} changes none of these structures; it changes {others}")));
+    }
+    Ok(kinds)
 }
 
 fn files(args: &BenchArgs) -> Result<Vec<(PathBuf, Format)>, Wrong> {
@@ -149,7 +174,8 @@ impl Bench<'_> {
             }
             !interrupt::raised()
         };
-        let pixels = settings.width as usize * settings.height as usize;
+        // Maps of each value would be too many to look at.
+        let pixels = if plan.sweep.is_some() { 0 } else { settings.width as usize * settings.height as usize };
         let Some(rows) = compare(&prepared.world.shapes, &sets, pixels, &plan, &mut go_on) else {
             return if interrupt::raised() { Exit::Interrupted } else { self.no_threads(&name, plan.threads) };
         };

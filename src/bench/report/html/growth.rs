@@ -1,7 +1,8 @@
 //! How cost grows with size: plots and tables.
 
 use super::super::Report;
-use super::super::growth::{Cost, Curve, METHOD, costs, kinds, sentences, tables};
+use super::super::cost::{Cost, costs};
+use super::super::growth::{Curve, METHOD, kinds, sentences, tables};
 use super::super::number::{bytes, grouped, short};
 use super::lines::{Lines, Series, plot};
 use super::svg::unit;
@@ -25,7 +26,7 @@ fn curves(report: &Report, cost: Cost) -> String {
         curves.iter().filter(|c| c.points.iter().all(|p| p.1 <= 0.0)).map(|c| c.kind.name()).collect();
     let of = |curve: Curve| {
         let label = format!("{} {}", curve.kind, curve.short_exponent()).trim_end().to_owned();
-        Series { kind: curve.kind, label, points: curve.points }
+        Series { kind: curve.kind, label, points: curve.points, ringed: None, boxed: None, level: None }
     };
     let svg = plot(&Lines {
         label: &format!("{} against the number of prims, by structure", cost.title()),

@@ -12,6 +12,12 @@ pub(super) struct Series {
     pub(super) points: Vec<(f64, f64)>,
     /// Its name, and a number that belongs to it.
     pub(super) label: String,
+    /// The x of a point with a circle around it.
+    pub(super) ringed: Option<f64>,
+    /// The x of a point with a square around it.
+    pub(super) boxed: Option<f64>,
+    /// A y of no x, drawn across.
+    pub(super) level: Option<f64>,
 }
 
 /// What a plot shows.
@@ -40,7 +46,8 @@ pub(super) fn plot(lines: &Lines) -> String {
         true => Scale::even(points().map(|p| p.0), LEFT + 8.0, RIGHT - 8.0),
         false => Scale::tight(points().map(|p| p.0), LEFT + 8.0, RIGHT - 8.0),
     };
-    let y = Scale::tight(points().map(|p| p.1), BOTTOM - 8.0, TOP + 8.0);
+    let levels = lines.series.iter().filter_map(|s| s.level).filter(|y| *y > 0.0);
+    let y = Scale::tight(points().map(|p| p.1).chain(levels), BOTTOM - 8.0, TOP + 8.0);
     let mut svg = open(BOTTOM + 40.0, lines.label);
     axes(&mut svg, lines, &x, &y);
 
@@ -78,9 +85,25 @@ fn line(svg: &mut String, series: &Series, lines: &Lines, x: &Scale, y: &Scale) 
     let seen: Vec<_> = series.points.iter().filter(|p| p.1 > 0.0).collect();
     let places: Vec<String> = seen.iter().map(|p| format!("{:.1},{:.1}", x.at(p.0), y.at(p.1))).collect();
     // Writing to a string cannot fail, here and below.
+    if let Some(level) = series.level.filter(|l| *l > 0.0) {
+        let y = y.at(level);
+        let _ =
+            write!(svg, "<line class=\"k-{kind} level\" x1=\"{LEFT}\" y1=\"{y:.1}\" x2=\"{RIGHT}\" y2=\"{y:.1}\"/>");
+    }
     let _ = write!(svg, "<polyline class=\"k-{kind}\" points=\"{}\"/>", places.join(" "));
     for &&(px, py) in &seen {
         mark(svg, kind, x.at(px), y.at(py), &format!("{kind} at {}: {}", shown_x(px), shown_y(py)));
+        let (px_at, py_at) = (x.at(px), y.at(py));
+        if series.ringed == Some(px) {
+            let _ = write!(svg, "<circle class=\"k-{kind} around\" cx=\"{px_at:.1}\" cy=\"{py_at:.1}\" r=\"9\"/>");
+        }
+        if series.boxed == Some(px) {
+            let [left, top] = [px_at - 7.0, py_at - 7.0];
+            let _ = write!(
+                svg,
+                "<rect class=\"k-{kind} around\" x=\"{left:.1}\" y=\"{top:.1}\" width=\"14\" height=\"14\"/>"
+            );
+        }
     }
 }
 

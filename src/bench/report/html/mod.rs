@@ -5,6 +5,7 @@ mod heat;
 mod lines;
 mod plot;
 mod svg;
+mod sweep;
 
 use super::number::{bytes, grouped, seconds, short, whole};
 use super::table::Table;
@@ -57,6 +58,9 @@ fn section(report: &Report, model: &Model) -> String {
         rays_line(model),
         escaped(&model.verdict()),
     );
+    if let Some(sweep) = &report.plan.sweep {
+        return out + &sweep::figures(report, model, sweep) + "</section>\n";
+    }
     out += &glance(report, model);
     out += &figure(
         "Tests a ray",

@@ -71,7 +71,7 @@ impl Scale {
             s if s >= 2.5 || self.low.fract() == 0.0 => {
                 self.multiples((s / 6.0).ceil()).iter().map(|d| 10f64.powf(*d)).collect()
             }
-            s if s >= 0.8 => self.within_decades(&[1.0, 2.0, 5.0]),
+            s if s >= 1.0 => self.within_decades(&[1.0, 2.0, 5.0]),
             s if s >= 0.4 => self.within_decades(&[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0]),
             _ => self.within_decades(&[
                 1.0, 1.1, 1.2, 1.3, 1.4, 1.6, 1.8, 2.0, 2.25, 2.5, 2.75, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 7.0, 8.0, 9.0,

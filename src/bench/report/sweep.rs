@@ -1,0 +1,127 @@
+//! What a parameter costs over its values, and which value is best.
+
+use super::cost::{Cost, costs};
+use super::number::{seconds, short};
+use super::table::Table;
+use super::{Model, Report};
+use crate::accel::AccelKind;
+use crate::bench::compare::Row;
+
+/// One structure at all values of the parameter.
+#[derive(Clone, Debug)]
+pub struct Curve<'a> {
+    /// Which one.
+    pub kind: AccelKind,
+    /// By ascending value; one without a value comes last.
+    pub rows: Vec<&'a Row>,
+    /// The row that costs least.
+    pub best: &'a Row,
+    /// The row of the default value; missing while the command is under way.
+    pub default: Option<&'a Row>,
+}
+
+/// A structure for each curve, in the order of the plan.
+pub fn curves<'a>(report: &Report, model: &'a Model) -> Vec<Curve<'a>> {
+    let curve = |&kind: &AccelKind| {
+        let rows: Vec<&Row> = model.rows.iter().filter(|r| r.kind == kind && r.setting.is_some()).collect();
+        let best = rows.iter().copied().min_by(|a, b| worth(report, model, a).total_cmp(&worth(report, model, b)))?;
+        let default = rows.iter().copied().find(|r| r.setting.is_some_and(|s| s.is_default));
+        Some(Curve { kind, rows, best, default })
+    };
+    report.plan.kinds.iter().filter_map(curve).collect()
+}
+
+/// What is to be low: time where there is one, else tests and visits together.
+fn worth(report: &Report, model: &Model, row: &Row) -> f64 {
+    match report.is_timed() {
+        true => model.seconds_per_ray(row),
+        false => Cost::Tests.of(model, row, None) + Cost::Visits.of(model, row, None),
+    }
+}
+
+impl Curve<'_> {
+    /// Value and cost of each row that has both.
+    pub fn points(&self, model: &Model, cost: Cost) -> Vec<(f64, f64)> {
+        let point = |row: &&Row| Some((row.setting?.value?, cost.of(model, row, None)));
+        self.rows.iter().filter_map(point).collect()
+    }
+
+    /// Share of the default's cost that the best value saves, 0 to 1; `None` without a default.
+    pub fn saved(&self, report: &Report, model: &Model) -> Option<f64> {
+        let default = worth(report, model, self.default?);
+        (default > 0.0).then(|| 1.0 - worth(report, model, self.best) / default)
+    }
+
+    /// The best value and how much better than the default it is.
+    pub fn sentence(&self, report: &Report, model: &Model) -> String {
+        let (Some(best), cost) = (self.best.setting, worth(report, model, self.best)) else { return String::new() };
+        let (kind, told) = (
+            self.kind,
+            match report.is_timed() {
+                true => format!("{} a ray", seconds(cost)),
+                false => format!("{} tests and visits a ray together", short(cost)),
+            },
+        );
+        let Some(default) = self.default.and_then(|row| row.setting) else {
+            return format!("{kind}: {best} is best so far, {told}");
+        };
+        let mut text = match best.is_default {
+            true => format!("{kind}: the default, {best}, is best: {told}"),
+            false => {
+                let saved = 100.0 * self.saved(report, model).unwrap_or(0.0);
+                let than = default.value.map_or_else(|| default.to_string(), |value| value.to_string());
+                format!("{kind}: {best} is best, {told}, {saved:.1} % less than the default, {than}")
+            }
+        };
+        if !best.is_default && !self.is_clear(report, model) {
+            text += ", which is within the spread of the passes";
+        }
+        if let Some(end) = self.end() {
+            text += &format!("; it is the {end} value measured, so the best may lie beyond");
+        }
+        text
+    }
+
+    /// Whether the slowest passes of the best value beat the fastest of the default.
+    fn is_clear(&self, report: &Report, model: &Model) -> bool {
+        let range = |row| model.seconds_range(row);
+        !report.is_timed() || self.default.is_none_or(|default| range(self.best)[1] < range(default)[0])
+    }
+
+    /// Which end of the values the best is at; the default is no end.
+    fn end(&self) -> Option<&'static str> {
+        let best = self.best.setting.filter(|s| !s.is_default)?.value?;
+        let values: Vec<f64> = self.rows.iter().filter_map(|r| r.setting?.value).collect();
+        match (values.first(), values.last()) {
+            _ if values.len() < 2 => None,
+            (Some(&first), _) if first == best => Some("lowest"),
+            (_, Some(&last)) if last == best => Some("highest"),
+            _ => None,
+        }
+    }
+}
+
+/// A table for each structure: values down, costs across.
+pub fn tables(report: &Report, model: &Model) -> Vec<Table> {
+    let Some(sweep) = &report.plan.sweep else { return Vec::new() };
+    let columns = || std::iter::once(sweep.parameter.to_string()).chain(costs(report).map(|c| c.name().to_owned()));
+    let line = |curve: &Curve, row: &Row| {
+        let setting = row.setting;
+        let value = setting.and_then(|s| s.value).map_or("-".into(), |value| value.to_string());
+        let marks = [(std::ptr::eq(row, curve.best), " best"), (setting.is_some_and(|s| s.is_default), " default")];
+        let marks: String = marks.into_iter().filter(|(is, _)| *is).map(|(_, mark)| mark).collect();
+        let costs = costs(report).map(|cost| cost.shown(cost.of(model, row, None)));
+        std::iter::once(value + &marks).chain(costs).collect()
+    };
+    let table = |curve: Curve| Table {
+        title: curve.kind.to_string(),
+        columns: columns().collect(),
+        rows: curve.rows.iter().map(|row| line(&curve, row)).collect(),
+    };
+    curves(report, model).into_iter().map(table).collect()
+}
+
+/// A sentence for each structure.
+pub fn sentences(report: &Report, model: &Model) -> Vec<String> {
+    curves(report, model).iter().map(|curve| curve.sentence(report, model)).collect()
+}
