@@ -2,28 +2,139 @@
 //!
 //! Names are V. Havran's, from the statistics to Haines' Standard Procedural Databases (1999).
 
+use crate::math::aabb::Aabb;
+use crate::math::simd::LANES;
+use crate::math::{DVec3, Vec3};
 use std::ops::AddAssign;
 
 /// What a walk tells about itself while it runs.
+///
+/// What takes work to say is said by a closure, which nobody calls who does not listen.
 pub trait Probe: Default + Send {
     /// One ray was asked of the scene.
     fn query(&mut self) {}
     /// A node or cell was entered (n_ts).
     fn step(&mut self) {}
+    /// The same, told in words: once for each step.
+    fn visit(&mut self, _visit: impl FnOnce() -> Visit) {}
     /// A leaf cell was visited (n_ets), `empty` if nothing is listed in it (n_eets).
     fn cell(&mut self, _empty: bool) {}
     /// One ray/prim test (n_it).
     fn prim_test(&mut self) {}
     /// So many ray/prim tests at once.
     fn prim_tests(&mut self, _count: u32) {}
-    /// A test the mailbox saved (n_mb).
-    fn repeat_skipped(&mut self) {}
+    /// What came of a test.
+    fn tested(&mut self, _test: impl FnOnce() -> Test) {}
+    /// What came of tests of a block of prims: the same for each that has its bit in `lanes`.
+    fn lanes_tested(&mut self, _prims: &[u32; LANES], _lanes: u32, _outcome: Outcome) {}
+    /// A test of this prim that the mailbox saved (n_mb).
+    fn repeat_skipped(&mut self, _prim: u32) {}
     /// So many ray/volume tests at once (n_bit).
     fn volume_tests(&mut self, _count: usize) {}
     /// So many corners and other points were transformed into the ray's axes (n_xf).
     fn transforms(&mut self, _count: usize) {}
     /// The query found a hit.
     fn found(&mut self) {}
+}
+
+/// A node or cell that a walk visits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Visit {
+    /// Which one.
+    pub place: Place,
+    /// The room it takes, in the frame of the shapes.
+    pub extent: Extent,
+    /// Prims listed in it; `None` where it leads to other nodes.
+    pub listed: Option<u32>,
+}
+
+/// A node or cell by its place in its structure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A cell of a grid, by column, row and layer.
+    Cell([u32; 3]),
+    /// A node of an octree in a cell: its least corner and the logarithm of its side, in the finest cells there can be.
+    OctreeNode([u32; 3], u32),
+    /// A leaf of an octree, likewise.
+    Octant([u32; 3], u32),
+    /// A node of a hierarchy.
+    Node(u32),
+    /// A leaf of a hierarchy.
+    Leaf(u32),
+    /// A leaf that is a block of triangles, tested at once.
+    Block(u32),
+    /// A leaf of other prims.
+    Run(u32),
+    /// The volume around an object.
+    Object(u32),
+}
+
+/// The room of a node or cell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Extent {
+    /// A box.
+    Box(Aabb),
+    /// A sphere.
+    Ball {
+        /// Its centre.
+        center: DVec3,
+        /// Its radius.
+        radius: f64,
+    },
+}
+
+impl Extent {
+    /// The smallest box around it.
+    #[expect(clippy::cast_possible_truncation, reason = "a box to be looked at")]
+    pub fn bounds(&self) -> Aabb {
+        match *self {
+            Self::Box(bounds) => bounds,
+            Self::Ball { center, radius } => {
+                let (center, radius) = (center.as_vec3(), Vec3::splat(radius as f32));
+                Aabb { lo: center - radius, hi: center + radius }
+            }
+        }
+    }
+}
+
+/// A ray/prim test.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Test {
+    /// Which prim.
+    pub prim: u32,
+    /// Where the ray meets it; NaN where it does not, or where nobody looked.
+    pub t: f32,
+    /// What came of it.
+    pub outcome: Outcome,
+}
+
+/// What comes of a ray/prim test.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Outcome {
+    /// The ray passes by.
+    Miss,
+    /// It was among a block of prims, but nobody asks about it: the ray starts on it, it is not opaque and only opaque
+    /// ones are looked for, or the answer is known already.
+    LeftOut,
+    /// It is hit, but not within the range that is asked about.
+    OutOfRange,
+    /// It is hit, but a hit before it is known.
+    Farther,
+    /// It is hit, before everything known so far.
+    Hit,
+}
+
+impl Outcome {
+    /// As printed.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Miss => "miss",
+            Self::LeftOut => "left out",
+            Self::OutOfRange => "out of range",
+            Self::Farther => "farther",
+            Self::Hit => "hit",
+        }
+    }
 }
 
 /// Timed runs: every call is an empty inline function.
@@ -72,7 +183,7 @@ impl Probe for RayCounts {
     fn prim_tests(&mut self, count: u32) {
         self.n_it += u64::from(count);
     }
-    fn repeat_skipped(&mut self) {
+    fn repeat_skipped(&mut self, _prim: u32) {
         self.n_mb += 1;
     }
     fn volume_tests(&mut self, count: usize) {

@@ -4,6 +4,7 @@
 //! that no two structures can differ in them.
 
 use super::intersector::{Exact, Intersector};
+use super::probe::{Outcome, Test};
 use super::{Accel, Hit, NO_PRIM, Probe, Ray, Shapes};
 use crate::math::shear::RaySpace;
 use crate::math::simd::LANES;
@@ -35,8 +36,8 @@ pub trait Goal {
         true
     }
 
-    /// A hit within the ray's range was found.
-    fn offer(&mut self, t: f32, prim: u32);
+    /// A hit within the ray's range was found; what that means.
+    fn offer(&mut self, t: f32, prim: u32) -> Outcome;
 
     /// Hits beyond this distance do not matter any more.
     fn reach(&self) -> f32;
@@ -84,15 +85,20 @@ impl<'a, G: Goal> Query<'a, G> {
         }
         probe.prim_test();
         match self.shapes.triangles.get(prim as usize) {
-            Some(&corners) => {
-                if let Some(t) = G::Test::distance(&self.prepared, &self.ray, &self.shapes.corners(corners)) {
-                    self.offer(t, prim);
+            Some(&corners) => match G::Test::distance(&self.prepared, &self.ray, &self.shapes.corners(corners)) {
+                Some(t) => {
+                    let outcome = self.offer(t, prim);
+                    probe.tested(|| Test { prim, t, outcome });
                 }
-            }
+                None => probe.tested(|| Test { prim, t: f32::NAN, outcome: Outcome::Miss }),
+            },
             None => {
-                for t in self.shapes.other_distances(prim, &self.ray, self.t_min >= 0.0) {
-                    self.offer(t, prim);
-                }
+                let [a, b] = self.shapes.other_distances(prim, &self.ray, self.t_min >= 0.0);
+                let outcomes = [self.offer(a, prim), self.offer(b, prim)];
+                probe.tested(|| {
+                    let (t, outcome) = if outcomes[1] > outcomes[0] { (b, outcomes[1]) } else { (a, outcomes[0]) };
+                    Test { prim, t, outcome }
+                });
             }
         }
         self.reach() < self.t_min
@@ -100,9 +106,13 @@ impl<'a, G: Goal> Query<'a, G> {
 
     /// Hands on a hit within the range; a NaN is none.
     #[inline]
-    fn offer(&mut self, t: f32, prim: u32) {
+    fn offer(&mut self, t: f32, prim: u32) -> Outcome {
         if t >= self.t_min && t <= self.t_max {
-            self.goal.offer(t, prim);
+            self.goal.offer(t, prim)
+        } else if t.is_nan() {
+            Outcome::Miss
+        } else {
+            Outcome::OutOfRange
         }
     }
 
@@ -117,12 +127,15 @@ impl<'a, G: Goal> Query<'a, G> {
         probe: &mut P,
     ) -> bool {
         probe.prim_tests(count);
-        let mut open = (verdicts.hit | verdicts.unsure) & ((1 << count) - 1);
+        let all = (1 << count) - 1;
+        let mut open = (verdicts.hit | verdicts.unsure) & all;
+        probe.lanes_tested(prims, all & !open, Outcome::Miss);
         while open != 0 {
             let lane = open.trailing_zeros() as usize % LANES;
             open &= open - 1;
             let certain = verdicts.hit >> lane & 1 == 1;
-            if self.take(prims[lane], certain) {
+            if self.take(prims[lane], certain, probe) {
+                probe.lanes_tested(prims, open, Outcome::LeftOut);
                 return true;
             }
         }
@@ -131,13 +144,18 @@ impl<'a, G: Goal> Query<'a, G> {
 
     /// Offers the hit with a triangle that is hit for certain, or may be.
     #[inline(never)]
-    fn take(&mut self, prim: u32, certain: bool) -> bool {
+    fn take<P: Probe>(&mut self, prim: u32, certain: bool, probe: &mut P) -> bool {
         if prim == self.exclude || !self.goal.wants(self.shapes, prim) {
+            probe.tested(|| Test { prim, t: f32::NAN, outcome: Outcome::LeftOut });
             return false;
         }
         let corners = self.shapes.triangle(prim);
         if certain || triangle::is_hit_near_edge(&self.ray, &corners) {
-            self.offer(triangle::distance(&self.ray, &corners), prim);
+            let t = triangle::distance(&self.ray, &corners);
+            let outcome = self.offer(t, prim);
+            probe.tested(|| Test { prim, t, outcome });
+        } else {
+            probe.tested(|| Test { prim, t: f32::NAN, outcome: Outcome::Miss });
         }
         self.reach() < self.t_min
     }
@@ -158,10 +176,12 @@ impl<I: Intersector> Goal for Closest<I> {
     type Test = I;
 
     #[inline]
-    fn offer(&mut self, t: f32, prim: u32) {
+    fn offer(&mut self, t: f32, prim: u32) -> Outcome {
         if (t, prim) < self.best {
             self.best = (t, prim);
+            return Outcome::Hit;
         }
+        Outcome::Farther
     }
     #[inline]
     fn reach(&self) -> f32 {
@@ -187,8 +207,9 @@ impl<I: Intersector> Goal for Occluded<I> {
         shapes.opaque.get(prim)
     }
     #[inline]
-    fn offer(&mut self, _t: f32, _prim: u32) {
+    fn offer(&mut self, _t: f32, _prim: u32) -> Outcome {
         self.found = true;
+        Outcome::Hit
     }
     #[inline]
     fn reach(&self) -> f32 {
@@ -210,10 +231,8 @@ impl<I: Intersector> Goal for Next<I> {
     type Test = I;
 
     #[inline]
-    fn offer(&mut self, t: f32, prim: u32) {
-        if (t, prim) > self.after {
-            self.closest.offer(t, prim);
-        }
+    fn offer(&mut self, t: f32, prim: u32) -> Outcome {
+        if (t, prim) > self.after { self.closest.offer(t, prim) } else { Outcome::OutOfRange }
     }
     #[inline]
     fn reach(&self) -> f32 {

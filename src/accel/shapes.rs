@@ -44,6 +44,17 @@ pub struct Object {
 }
 
 impl Object {
+    /// How many prims it has.
+    pub fn len(&self) -> u32 {
+        let length = |range: &Range<u32>| range.end - range.start;
+        length(&self.triangles) + length(&self.others)
+    }
+
+    /// Whether it has none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
     /// Its prims, ascending.
     pub fn prims(&self) -> impl Iterator<Item = u32> + Clone + use<> {
         self.triangles.clone().chain(self.others.clone())

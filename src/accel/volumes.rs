@@ -7,6 +7,7 @@
 //! # Why no hit is lost
 //! Volumes hold all points of their prims: boxes are made of the prims' own bounds, and see [`Ball`].
 
+use super::probe::{Extent, Place, Visit};
 use super::query::{Culling, Goal, Query};
 use super::shapes::{Object, Prim};
 use super::slabs::{BoxRay, limit, start};
@@ -32,6 +33,9 @@ pub trait Volume: Copy + std::fmt::Debug + Send + Sync {
 
     /// Whether all of a prim is inside, as far as its corners or bounds tell.
     fn holds(&self, shapes: &Shapes, prim: u32) -> bool;
+
+    /// What it looks like.
+    fn extent(&self) -> Extent;
 }
 
 /// All objects with their volumes.
@@ -84,12 +88,13 @@ impl<V: Volume> Culling for Volumes<'_, V> {
 
     fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, (): &mut (), probe: &mut P) {
         let ray = V::ray(query);
-        for (volume, object) in &self.volumes {
+        for (i, (volume, object)) in (0..).zip(&self.volumes) {
             probe.volume_tests(1);
             if !volume.is_entered(&ray, limit(query)) {
                 continue;
             }
             probe.step();
+            probe.visit(|| Visit { place: Place::Object(i), extent: volume.extent(), listed: Some(object.len()) });
             probe.cell(false);
             for prim in object.prims() {
                 if query.test(prim, probe) {
@@ -117,6 +122,10 @@ impl Volume for Aabb {
 
     fn holds(&self, shapes: &Shapes, prim: u32) -> bool {
         self.union(shapes.bounds(prim)) == *self
+    }
+
+    fn extent(&self) -> Extent {
+        Extent::Box(*self)
     }
 }
 
@@ -175,6 +184,10 @@ impl Volume for Ball {
 
     fn holds(&self, shapes: &Shapes, prim: u32) -> bool {
         reach(shapes, prim, self.center) <= self.radius
+    }
+
+    fn extent(&self) -> Extent {
+        Extent::Ball { center: self.center, radius: self.radius }
     }
 }
 

@@ -24,6 +24,7 @@ mod render;
 mod shell;
 mod stats;
 mod text;
+mod trace;
 mod verify;
 mod version;
 
@@ -53,6 +54,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
         Command::Inspect(args) => inspect::run(&args),
         Command::Bench(args) => bench::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Trace(args) => trace::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::Completions { shell } => shell::completions(shell),
         Command::Man => shell::man(),

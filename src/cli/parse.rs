@@ -35,6 +35,13 @@ pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
     }
 }
 
+/// Column and row.
+pub(super) fn pixel(text: &str) -> Result<(u32, u32), String> {
+    let side = |s: &str| s.trim().parse::<u32>().ok();
+    let pixel = text.split_once(',').and_then(|(x, y)| Some((side(x)?, side(y)?)));
+    pixel.ok_or_else(|| "write column,row from the top left, such as 400,300".into())
+}
+
 /// Three finite numbers.
 pub(super) fn vec3(text: &str) -> Result<[f64; 3], String> {
     let parts: Option<Vec<f64>> = text.split(',').map(|p| finite(p).ok()).collect();

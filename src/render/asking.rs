@@ -26,7 +26,7 @@ impl<'a, A: Accel> Asking<'a, A> {
             }
             probe.asked(Question::Closest, rays, &[]);
             self.accel.closest(rays, hits, &mut self.scratch, probe);
-            probe.answered();
+            probe.answered(hits);
         }
     }
 
@@ -38,7 +38,7 @@ impl<'a, A: Accel> Asking<'a, A> {
             }
             probe.asked(Question::Occluded, rays, &[]);
             self.accel.occluded(rays, blocked, &mut self.scratch, probe);
-            probe.answered();
+            probe.answered(&[]);
         }
     }
 
@@ -50,7 +50,7 @@ impl<'a, A: Accel> Asking<'a, A> {
             }
             probe.asked(Question::Next, rays, after);
             self.accel.next(rays, after, hits, &mut self.scratch, probe);
-            probe.answered();
+            probe.answered(hits);
         }
     }
 

@@ -198,7 +198,7 @@ impl Probe for SampleCounts {
     fn step(&mut self) {
         self.add(1, 1);
     }
-    fn repeat_skipped(&mut self) {
+    fn repeat_skipped(&mut self, _prim: u32) {
         self.add(2, 1);
     }
 }
@@ -233,7 +233,7 @@ impl Observer for Clock {
         self.asked = Some(Instant::now());
     }
 
-    fn answered(&mut self) {
+    fn answered(&mut self, _hits: &[Hit]) {
         self.walking += self.asked.map_or(Duration::ZERO, |asked| asked.elapsed());
     }
 

@@ -18,6 +18,7 @@ mod pixel;
 mod seam;
 mod shade;
 mod shadow;
+pub mod story;
 pub mod studio;
 mod surface;
 #[cfg(test)]

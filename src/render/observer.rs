@@ -27,8 +27,8 @@ pub(crate) trait Observer: Probe {
 
     /// These rays are asked now; `after` has the hit of each behind which it goes on, where that is the question.
     fn asked(&mut self, _question: Question, _rays: &[Ray], _after: &[Hit]) {}
-    /// The rays asked last have their answers.
-    fn answered(&mut self) {}
+    /// The rays asked last have their answers: these hits, where hits were asked for.
+    fn answered(&mut self, _hits: &[Hit]) {}
     /// So many samples of other pixels begin; sample numbers start from 0 again.
     fn batch(&mut self, _samples: usize) {}
 }

@@ -104,6 +104,27 @@ pub(crate) fn cost_tiles<A: Accel, P: Observer, T: Copy + Default + Send>(
     complete.then_some(all)
 }
 
+/// Traces one sample (from 0) of one pixel; `None`: there is no such pixel or sample.
+pub(crate) fn trace_sample<A: Accel, P: Observer>(
+    context: &Context,
+    accel: &A,
+    view: &View,
+    settings: &Settings,
+    (x, y): (u32, u32),
+    sample: u32,
+) -> Option<(Sample, ByClass<P>)> {
+    let frame = Frame::new(context, view, settings);
+    let &(dx, dy) = frame.offsets.get(sample as usize)?;
+    if x >= settings.width || y >= settings.height {
+        return None;
+    }
+    let mut tracer = Tracer::<A, P>::new(context, accel, &());
+    tracer.reset(1, false);
+    let (ray, path) = frame.eye_ray(tracer.center(), f64::from(x) + dx, f64::from(y) + dy, 0);
+    tracer.start(ray, path);
+    tracer.trace().then(|| (tracer.samples[0], tracer.counts))
+}
+
 /// Pixels that are traced together.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Together {

@@ -12,3 +12,4 @@ mod other_commands;
 mod output;
 mod program;
 mod same_pixels;
+mod trace;

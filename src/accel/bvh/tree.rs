@@ -5,6 +5,7 @@ use super::super::slabs::{BoxRay, limit};
 use super::super::wide::Splitting;
 use super::super::wide::split::Item;
 use crate::accel::Probe;
+use crate::accel::probe::{Extent, Place, Visit};
 use crate::math::aabb::Aabb;
 
 /// Prims that are worth a thread's while.
@@ -105,6 +106,14 @@ impl Tree {
         }
     }
 
+    fn visit(&self, node: u32) -> Visit {
+        let (place, listed) = match self.below(node) {
+            Below::Leaf(prims) => (Place::Leaf(node), Some(index(prims.len()))),
+            Below::Children(_) => (Place::Node(node), None),
+        };
+        Visit { place, extent: Extent::Box(*self.bounds(node)), listed }
+    }
+
     /// Bytes of the arrays.
     pub fn bytes(&self) -> usize {
         size_of_val(&*self.nodes) + size_of_val(&*self.prims)
@@ -140,6 +149,7 @@ impl Tree {
                 continue;
             }
             probe.step();
+            probe.visit(|| self.visit(node));
             match self.below(node) {
                 Below::Leaf(prims) => {
                     probe.cell(false);

@@ -136,6 +136,13 @@ impl Lattice {
         Aabb { lo: lo.map(f32::next_down), hi: hi.map(f32::next_up) }
     }
 
+    /// The box of a cube in the frame of the shapes, rounded.
+    pub fn bounds(&self, cube: Cube) -> Aabb {
+        let lo = DVec3::from_array(cube.lo.map(f64::from));
+        let place = |p: DVec3| (self.lo + p / self.scale).as_vec3();
+        Aabb { lo: place(lo), hi: place(lo + cube.side()) }
+    }
+
     /// Index of a top cell.
     pub fn top_index(&self, [x, y, z]: [u32; 3]) -> usize {
         (z as usize * self.dims[1] as usize + y as usize) * self.dims[0] as usize + x as usize

@@ -12,10 +12,11 @@
 //! tested at the latest in the cell of t's interval. The walk ends behind a cell when no later hit can come before the
 //! best one: when that lies, by [`WALK_MARGIN`](crate::math::bounds::WALK_MARGIN), before the exit. A hit found beyond the exit is kept but is not final.
 
-use super::lattice::Lattice;
+use super::lattice::{Cube, Lattice};
 use super::mailbox::Mailbox;
 use super::{EMPTY, GridOctree, GridScratch, NODE};
 use crate::accel::Probe;
+use crate::accel::probe::{Extent, Place, Visit};
 use crate::accel::query::{Goal, Query};
 use crate::accel::slabs::BoxRay;
 
@@ -122,6 +123,9 @@ impl<M: Mailbox> GridOctree<'_, M> {
         loop {
             let (axis, leave) = first_exit(exits);
             let entry = self.top[self.lattice.top_index(cell)];
+            if entry & NODE == 0 {
+                probe.visit(|| self.told(Place::Cell(cell), self.lattice.top_cube(cell), Some(entry)));
+            }
             if entry == EMPTY {
                 probe.step();
                 probe.cell(true);
@@ -175,6 +179,10 @@ impl<M: Mailbox> GridOctree<'_, M> {
         let mut end = self.limit(query);
         loop {
             let (cell, level) = self.descend(root, at, probe);
+            probe.visit(|| {
+                let cube = Cube { lo: at.map(|c| c >> level << level), level };
+                self.told(Place::Octant(cube.lo, level), cube, Some(cell))
+            });
             if cell == EMPTY {
                 probe.step();
                 probe.cell(true);
@@ -223,11 +231,22 @@ impl<M: Mailbox> GridOctree<'_, M> {
         let mut level = self.lattice.levels;
         while entry & NODE != 0 {
             probe.step();
+            probe.visit(|| {
+                let cube = Cube { lo: at.map(|c| c >> level << level), level };
+                self.told(Place::OctreeNode(cube.lo, level), cube, None)
+            });
             level -= 1;
             let octant = (at[0] >> level & 1) | (at[1] >> level & 1) << 1 | (at[2] >> level & 1) << 2;
             entry = self.cells.nodes[(entry & !NODE) as usize][octant as usize];
         }
         (entry, level)
+    }
+
+    /// A node, or a cell and what it lists; a hierarchy in it is told by itself.
+    fn told(&self, place: Place, cube: Cube, cell: Option<u32>) -> Visit {
+        let listed =
+            cell.filter(|&cell| self.trees.root(cell).is_none()).map(|cell| self.cells.list(cell).len() as u32);
+        Visit { place, extent: Extent::Box(self.lattice.bounds(cube)), listed }
     }
 
     /// Tests the prims of a cell that has some; whether the query is answered.
@@ -243,7 +262,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
         let mut test = |prims: &[u32], query: &mut Query<G>, probe: &mut P| {
             for &prim in prims {
                 if !mailbox.first_visit(prim) {
-                    probe.repeat_skipped();
+                    probe.repeat_skipped(prim);
                 } else if query.test(prim, probe) {
                     return true;
                 }

@@ -1,6 +1,7 @@
 //! Nodes, blocks and runs as flat arrays.
 
-use crate::accel::NO_PRIM;
+use crate::accel::probe::{Extent, Place, Visit};
+use crate::accel::{NO_PRIM, Shapes};
 use crate::math::aabb::Aabb;
 use crate::math::simd::{LANES, Row};
 use crate::math::triangles::{Corners8, NO_CORNERS};
@@ -133,6 +134,23 @@ impl Tree {
     /// Bytes of the arrays.
     pub(super) fn bytes(&self) -> usize {
         size_of_val(&*self.nodes) + size_of_val(&*self.blocks) + size_of_val(&*self.runs) + size_of_val(&*self.prims)
+    }
+
+    /// What is said of a child that is visited.
+    pub(super) fn visit(&self, child: u32, shapes: &Shapes) -> Visit {
+        let around = |prims: &[u32]| {
+            let bounds = prims.iter().fold(Aabb::EMPTY, |b, &p| b.union(shapes.bounds(p)));
+            (bounds, Some(index(prims.len())))
+        };
+        let (place, (bounds, listed)) = match Child::unpack(child) {
+            Child::Node(i) => {
+                let node = &self.nodes[i as usize];
+                (Place::Node(i), ((0..LANES).fold(Aabb::EMPTY, |b, slot| b.union(node.bounds(slot))), None))
+            }
+            Child::Block(i, count) => (Place::Block(i), around(&self.blocks[i as usize].prims[..count as usize])),
+            Child::Run(i) => (Place::Run(i), around(self.run(i))),
+        };
+        Visit { place, extent: Extent::Box(bounds), listed }
     }
 
     /// The prims of a run.

@@ -7,6 +7,7 @@ mod light;
 mod mirrors;
 mod see_through;
 mod sight;
+mod story;
 
 use super::texture::TextureStore;
 use super::view::{Lens, View};

@@ -1,0 +1,129 @@
+//! The story of a ray as JSON; the schema is described in [`super`].
+
+use super::Told;
+use super::words::{in_world, inside, light, object, place};
+use crate::accel::probe::{Extent, Place, Test, Visit};
+use crate::accel::{Hit, RayCounts};
+use crate::render::Question;
+use crate::render::story::{Class, Event, Query};
+use serde_json::{Map, Value, json};
+
+/// One object.
+pub(super) fn write(told: &Told) -> String {
+    let settings = told.settings;
+    let value = json!({
+        "schema": "meshray-trace/1",
+        "version": super::super::version::SHORT,
+        "file": told.name,
+        "hash": format!("{:032x}", told.loaded.facts.hash),
+        "view": told.view,
+        "width": settings.width,
+        "height": settings.height,
+        "pixel": [told.pixel.0, told.pixel.1],
+        "sample": told.sample,
+        "samples": settings.samples,
+        "depth": told.story.depth,
+        "accel": told.accel.name(),
+        "prims": told.world.shapes.len(),
+        "radiance": told.story.radiance.to_array(),
+        "through": told.story.through.to_array(),
+        "ray": query(told, 0),
+    });
+    format!("{value:#}\n")
+}
+
+fn query(told: &Told, i: usize) -> Value {
+    let query = &told.story.queries[i];
+    let scene = &told.loaded.scene;
+    let mut object = Map::new();
+    let mut set = |key: &str, value: Value| drop(object.insert(key.into(), value));
+    set("class", query.class.name().into());
+    set("question", question(query.question).into());
+    if query.class == Class::Shadow {
+        set("light", light(scene, query.light).into());
+    }
+    set("origin", in_world(told.world, query.ray.origin).to_array().to_vec().into());
+    set("direction", query.ray.dir.to_array().to_vec().into());
+    set("t_min", query.ray.t_min.into());
+    // Infinite where there is no end; JSON has no number for that.
+    set("t_max", Some(query.ray.t_max).filter(|t| t.is_finite()).into());
+    if query.after.is_some() {
+        set("after", json!({"t": query.after.t, "prim": query.after.prim}));
+    }
+    set("counts", counts(&query.counts));
+    set("hit", hit(told, query));
+    if i == 0 || told.all_steps {
+        set("steps", query.events.iter().map(|event| step(told, query, event)).collect());
+    }
+    set("rays", query.children.iter().map(|&child| self::query(told, child)).collect());
+    Value::Object(object)
+}
+
+const fn question(question: Question) -> &'static str {
+    match question {
+        Question::Closest => "closest",
+        Question::Occluded => "occluded",
+        Question::Next => "next",
+    }
+}
+
+fn counts(c: &RayCounts) -> Value {
+    json!({
+        "n_it": c.n_it, "n_ts": c.n_ts, "n_ets": c.n_ets, "n_eets": c.n_eets, "n_bit": c.n_bit, "n_mb": c.n_mb,
+        "n_xf": c.n_xf,
+    })
+}
+
+fn hit(told: &Told, query: &Query) -> Value {
+    let Hit { t, prim, .. } = query.hit;
+    let Some(place) = place(told.loaded, told.world, query) else { return Value::Null };
+    if query.question == Question::Occluded {
+        return json!({"t": t, "prim": prim, "object": object(&told.loaded.scene, told.world, prim)});
+    }
+    json!({
+        "t": t,
+        "u": place.weights[0],
+        "v": place.weights[1],
+        "prim": prim,
+        "object": place.object,
+        "material": place.material,
+        "position": place.position.to_array(),
+        "normal": place.normal.to_array(),
+    })
+}
+
+fn step(told: &Told, query: &Query, event: &Event) -> Value {
+    match event {
+        Event::Visit(visit) => self::visit(told, query, visit),
+        Event::Test(Test { prim, t, outcome }) => {
+            json!({"test": prim, "outcome": outcome.name(), "t": Some(t).filter(|t| t.is_finite())})
+        }
+        Event::Skipped(prim) => json!({"mailbox": prim}),
+        Event::Volumes(n) => json!({"volumes": n}),
+        Event::Transforms(n) => json!({"transforms": n}),
+    }
+}
+
+fn visit(told: &Told, query: &Query, visit: &Visit) -> Value {
+    let (what, at) = match visit.place {
+        Place::Cell(cell) => ("cell", json!(cell)),
+        Place::OctreeNode(at, level) => ("octree node", json!([at[0], at[1], at[2], level])),
+        Place::Octant(at, level) => ("octant", json!([at[0], at[1], at[2], level])),
+        Place::Node(i) => ("node", json!(i)),
+        Place::Leaf(i) => ("leaf", json!(i)),
+        Place::Block(i) => ("block", json!(i)),
+        Place::Run(i) => ("run", json!(i)),
+        Place::Object(i) => ("object", json!(i)),
+    };
+    let bounds = visit.extent.bounds();
+    let corner = |p| in_world(told.world, p).to_array();
+    let inside = inside(&visit.extent, &query.ray);
+    json!({
+        "visit": what,
+        "at": at,
+        "shape": if matches!(visit.extent, Extent::Ball { .. }) { "sphere" } else { "box" },
+        "box": [corner(bounds.lo), corner(bounds.hi)],
+        "t": inside.map(|(enter, leave)| [Some(enter), Some(leave).filter(|t| t.is_finite())]),
+        "prims": visit.listed,
+    })
+}

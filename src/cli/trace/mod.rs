@@ -1,0 +1,218 @@
+//! `meshray trace`: one eye ray told in order, and all that comes of it; as text, as JSON, and as a picture.
+//!
+//! # Schema `meshray-trace/1`
+//! One JSON object: `version`, `file`, `hash`, `view`, `width`, `height`, `pixel` (column and row from 0), `sample` (from
+//! 0) of `samples`, `depth`, `accel`, `prims` (N), `radiance` (linear colour of the sample) and `through` (share of the
+//! background behind it), and `ray`, the root of a tree:
+//!
+//! | key | what |
+//! |---|---|
+//! | `class`, `question` | `primary`, `shadow`, `reflected`, `refracted`; `closest`, `occluded` (is anything opaque in the way), `next` (what is behind `after`) |
+//! | `origin`, `direction`, `t_min`, `t_max` | the ray, in world space; `t_max` is `null` where it has no end |
+//! | `light`, `after` | what a shadow ray looks for; `t` and `prim` of the hit behind which the search went on |
+//! | `counts` | `n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`, `n_xf` of this query |
+//! | `hit` | `t`, `u`, `v`, `prim`, `object`, `material`, `position`, `normal` (geometric); `null`: nothing; of `occluded` the first prim found in the way |
+//! | `steps` | in order (of the eye ray; of all with `--all-steps`): `visit` with `at`, `shape`, `box`, `t` (entry and exit) and `prims`; `test` with `outcome` and `t`; `mailbox` (a prim that was not tested again); `volumes`, `transforms` (how many) |
+//! | `rays` | what came of it |
+//!
+//! Keys are only ever added.
+
+mod json;
+mod picture;
+mod text;
+mod words;
+
+use super::args::TraceArgs;
+use super::camera::{self, Choice, LensChoice};
+use super::exit::Exit;
+use super::job::{self, Look, Wrong};
+use super::message::{Messages, Severity};
+use super::picture::{Effective, background};
+use super::{accident, output_name, print, read};
+use crate::accel::{AccelKind, AccelParams, auto};
+use crate::image::{ExrSamples, FileKind, Metadata, PngDepth, write_atomic};
+use crate::load::{Diagnostic, Loaded};
+use crate::render::story::{Story, tell};
+use crate::render::texture::TextureStore;
+use crate::render::{Job, Settings, View, World};
+use crate::scene::default_light;
+use crate::scene::framing::robust_bounds;
+use std::path::Path;
+
+/// What there is to tell.
+struct Told<'a> {
+    name: &'a str,
+    loaded: &'a Loaded,
+    world: &'a World,
+    accel: AccelKind,
+    settings: &'a Settings,
+    /// In words.
+    view: &'a str,
+    pixel: (u32, u32),
+    sample: u32,
+    story: &'a Story,
+    /// Whether steps are listed for every ray.
+    all_steps: bool,
+}
+
+/// Loads the model, traces the ray and prints its story.
+pub(super) fn run(args: &TraceArgs) -> Exit {
+    let messages = Messages::new(args.model.load.messages.into(), args.quiet);
+    let checked = check(args).and_then(|look| Ok((look, job::params(&args.params)?)));
+    match checked {
+        Ok((look, params)) => {
+            let name = args.model.input.display().to_string();
+            accident::guard(&name, &messages, || trace(args, &look, &params, &name, &messages).unwrap_or_else(|e| e))
+        }
+        Err(Wrong(text)) => {
+            messages.error("usage", text, "");
+            Exit::Usage
+        }
+    }
+}
+
+/// What the command line says about the picture that the ray is part of.
+fn check(args: &TraceArgs) -> Result<Look, Wrong> {
+    if args.eye.is_none() && (args.at.is_some() || args.up_vector.is_some()) {
+        return Err(Wrong("--at and --up-vector belong to --eye; say where the camera stands".into()));
+    }
+    if let Some(path) = &args.output
+        && FileKind::from_path(path).ok() != Some(FileKind::Png)
+    {
+        return Err(Wrong("-o writes a PNG; name it so".into()));
+    }
+    Ok(Look {
+        size: args.size,
+        samples: Some(args.samples),
+        depth: args.depth,
+        cutoff: args.cutoff,
+        seed: 0,
+        lens: LensChoice::new(args.fov, args.ortho),
+        background: None,
+        tone_map: None,
+        exposure: None,
+        png: PngDepth::Eight,
+        exr: ExrSamples::Half,
+        layers: false,
+        costs: Vec::new(),
+    })
+}
+
+fn choice(args: &TraceArgs) -> Choice {
+    if let Some(eye) = args.eye {
+        return Choice::Free { eye: eye.into(), at: args.at.map(Into::into), up: args.up_vector.map(Into::into) };
+    }
+    let camera = args.camera.clone().map(Choice::Camera);
+    args.view.map(Choice::Named).or(camera).unwrap_or(Choice::Default)
+}
+
+fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messages: &Messages) -> Result<Exit, Exit> {
+    let file = args.model.input.as_path();
+    let fail = |exit: Exit| {
+        move |fault: Diagnostic| {
+            messages.say(Severity::Error, &fault);
+            exit
+        }
+    };
+    check_output(args).map_err(fail(Exit::Failed))?;
+    let mut loaded = read::model(&args.model, messages)?;
+    let world = World::new(&loaded.scene);
+    let wrong = |text: String| Diagnostic::new("scene-value", file, "", text);
+    let effective = Effective::new(look, &loaded.scene.hints).map_err(wrong).map_err(fail(Exit::Input))?;
+    let settings = &effective.settings;
+    inside(args, settings).map_err(|Wrong(text)| {
+        messages.error("usage", text, "");
+        Exit::Usage
+    })?;
+
+    // The eye, its light, and the ray.
+    let bounds = robust_bounds(&loaded.scene);
+    let aspect = f64::from(settings.width) / f64::from(settings.height);
+    let found = camera::camera(&choice(args), look.lens, &loaded.scene, &bounds, aspect, file);
+    let (camera, view_phrase) = found.map_err(fail(Exit::Input))?;
+    default_light::add_if_missing(&mut loaded.scene, &camera);
+    loaded.scene.background = Some(background(look, &loaded.scene));
+    let (accel, _) = auto::build(args.accel, &world.shapes, params);
+    let textures = TextureStore::new(&loaded.scene);
+    let view = View::from_camera(&camera);
+    let job = Job { scene: &loaded.scene, world: &world, accel: &accel, textures: &textures, view: &view, settings };
+    let Some(story) = tell(&job, args.pixel, args.sample) else { return Err(Exit::Failed) };
+    let told = Told {
+        name,
+        loaded: &loaded,
+        world: &world,
+        accel: accel.kind(),
+        settings,
+        view: &view_phrase,
+        pixel: args.pixel,
+        sample: args.sample,
+        story: &story,
+        all_steps: args.all_steps,
+    };
+
+    let text = if args.json { json::write(&told) } else { text::write(&told) };
+    let unwritable = |e: std::io::Error| Diagnostic::new("output-unwritable", "", "", format!("standard output: {e}"));
+    print(&text).map_err(unwritable).map_err(fail(Exit::Failed))?;
+    match &args.output {
+        Some(path) => draw(path, &told, &job, messages).map_err(fail(Exit::Failed)),
+        None => Ok(Exit::Done),
+    }
+}
+
+/// A picture must not replace the model it shows.
+fn check_output(args: &TraceArgs) -> Result<(), Diagnostic> {
+    let Some(path) = &args.output else { return Ok(()) };
+    let same = output_name::identity(path) == output_name::identity(&args.model.input);
+    let fault =
+        || Diagnostic::new("output-is-input", path, "", "is the input itself").remedy("name another file with -o");
+    if same { Err(fault()) } else { Ok(()) }
+}
+
+/// Whether there is such a pixel with such a sample.
+fn inside(args: &TraceArgs, settings: &Settings) -> Result<(), Wrong> {
+    let ((x, y), (width, height)) = (args.pixel, (settings.width, settings.height));
+    if x >= width || y >= height {
+        return Err(Wrong(format!(
+            "pixel {x},{y} is outside the picture of {width}×{height}; columns and rows count from 0 at the top left"
+        )));
+    }
+    if args.sample >= args.samples {
+        let (sample, samples) = (args.sample, args.samples);
+        return Err(Wrong(format!("--sample {sample} is not one of {samples}, counted from 0; raise --samples")));
+    }
+    Ok(())
+}
+
+fn draw(path: &Path, told: &Told, job: &Job, messages: &Messages) -> Result<Exit, Diagnostic> {
+    let fault = |text: String| Diagnostic::new("output-unwritable", path, "", text);
+    let canvas = picture::draw(told, job);
+    let bytes = canvas.png(&Metadata::new()).map_err(|e| fault(e.to_string()))?;
+    write_atomic(path, &bytes, false).map_err(|e| fault(e.to_string()))?;
+    let text = "the scene cut open along the ray, seen from the side, with what was visited";
+    messages.say(Severity::Info, &Diagnostic::new("picture", path, "", text));
+    Ok(Exit::Done)
+}
+
+impl Told<'_> {
+    /// Which ray this is.
+    fn title(&self) -> String {
+        let Settings { width, height, samples, .. } = self.settings;
+        format!(
+            "{}: sample {} of {samples} of pixel {},{} of {width}×{height}, {}; {} over {} prims",
+            self.name,
+            self.sample,
+            self.pixel.0,
+            self.pixel.1,
+            self.view,
+            self.accel,
+            crate::bench::report::number::grouped(self.world.shapes.len() as u64)
+        )
+    }
+
+    fn color(&self) -> String {
+        let [r, g, b] = self.story.radiance.to_array();
+        let through = self.story.through.element_sum() / 3.0;
+        let behind = if through > 0.0 { format!(" and {through} of the background") } else { String::new() };
+        format!("{r} {g} {b}{behind}")
+    }
+}

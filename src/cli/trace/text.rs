@@ -1,0 +1,226 @@
+//! The story of a ray as text.
+
+use super::Told;
+use super::words::{goes_on, in_world, inside, light, object, place};
+use crate::accel::probe::{Extent, Outcome, Place, Visit};
+use crate::bench::report::number::grouped;
+use crate::math::DVec3;
+use crate::render::Question;
+use crate::render::story::{Class, Event, Query};
+use std::fmt::Write;
+
+/// Everything, ray by ray.
+pub(super) fn write(told: &Told) -> String {
+    let mut out = format!("{}\n\n", told.title());
+    tell(told, 0, 0, &mut out);
+    let rays = told.story.queries.len();
+    let tests: u64 = told.story.queries.iter().map(|q| q.counts.n_it).sum();
+    let _ =
+        writeln!(out, "\n{rays} queries in all, {} ray/prim tests; colour (linear) {}", grouped(tests), told.color());
+    out
+}
+
+/// A query, its steps, and what came of it, indented by its depth in the tree.
+fn tell(told: &Told, i: usize, depth: usize, out: &mut String) {
+    let query = &told.story.queries[i];
+    let margin = "  ".repeat(depth);
+    let _ = writeln!(out, "{margin}{}", headline(told, query));
+    if i == 0 || told.all_steps {
+        for line in steps(told, query) {
+            let _ = writeln!(out, "{margin}  {line}");
+        }
+    }
+    let _ = writeln!(out, "{margin}  = {}", ending(told, query));
+    let _ = writeln!(out, "{margin}    {}", counts(query));
+    query.children.iter().for_each(|&child| tell(told, child, depth + 1, out));
+}
+
+fn headline(told: &Told, query: &Query) -> String {
+    let scene = &told.loaded.scene;
+    let from = format!("from {} towards {}", point(in_world(told.world, query.ray.origin)), vector(query.ray.dir));
+    match (query.class, query.question) {
+        (class, Question::Next) => format!("{} ray goes on behind prim {}", class.name(), query.after.prim),
+        (Class::Shadow, Question::Occluded) => format!("shadow ray to {} {from}", light(scene, query.light)),
+        (Class::Shadow, Question::Closest) => "shadow ray looks for what lets light through".into(),
+        (Class::Primary, _) => format!("eye ray {from}"),
+        (class, _) => format!("{} ray {from}", class.name()),
+    }
+}
+
+fn ending(told: &Told, query: &Query) -> String {
+    let Some(place) = place(told.loaded, told.world, query) else {
+        return match query.question {
+            Question::Occluded => "nothing opaque in the way".into(),
+            _ if goes_on(&query.after) => "nothing more".into(),
+            _ => "hits nothing".into(),
+        };
+    };
+    if query.question == Question::Occluded {
+        let object = object(&told.loaded.scene, told.world, query.hit.prim);
+        return format!("blocked by prim {} of {object} at t {}", query.hit.prim, query.hit.t);
+    }
+    let material = if place.material.is_empty() { String::new() } else { format!(", material '{}'", place.material) };
+    format!(
+        "hits prim {} of {}{material}, at t {}, u {}, v {}, position {}, normal {}",
+        query.hit.prim,
+        place.object,
+        query.hit.t,
+        place.weights[0],
+        place.weights[1],
+        point(place.position),
+        vector(place.normal)
+    )
+}
+
+fn counts(query: &Query) -> String {
+    let c = &query.counts;
+    let named = [
+        ("n_it", c.n_it),
+        ("n_ts", c.n_ts),
+        ("n_ets", c.n_ets),
+        ("n_eets", c.n_eets),
+        ("n_bit", c.n_bit),
+        ("n_mb", c.n_mb),
+        ("n_xf", c.n_xf),
+    ];
+    named.map(|(name, n)| format!("{name} {n}")).join("  ")
+}
+
+/// A line for each node or cell, with the tests done in it.
+fn steps(told: &Told, query: &Query) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    let mut runs = Runs::default();
+    for event in &query.events {
+        if let Event::Visit(visit) = event {
+            runs.end(&mut lines);
+            lines.push(self::visit(told, query, visit));
+        } else {
+            runs.add(event, &mut lines);
+        }
+    }
+    runs.end(&mut lines);
+    lines
+}
+
+fn visit(told: &Told, query: &Query, visit: &Visit) -> String {
+    let numbers = |n: [u32; 3]| format!("{} {} {}", n[0], n[1], n[2]);
+    let what = match visit.place {
+        Place::Cell(cell) => format!("cell {}", numbers(cell)),
+        Place::OctreeNode(at, level) => format!("octree node {} of side {}", numbers(at), 1u64 << level),
+        Place::Octant(at, level) => format!("octant {} of side {}", numbers(at), 1u64 << level),
+        Place::Node(i) => format!("node {i}"),
+        Place::Leaf(i) => format!("leaf {i}"),
+        Place::Block(i) => format!("block {i}"),
+        Place::Run(i) => format!("run {i}"),
+        Place::Object(i) => match visit.extent {
+            Extent::Ball { .. } => format!("sphere around object {i}"),
+            Extent::Box(_) => format!("box around object {i}"),
+        },
+    };
+    let listed = match visit.listed {
+        None => String::new(),
+        Some(0) => ", empty".into(),
+        Some(1) => ", 1 prim".into(),
+        Some(n) => format!(", {} prims", grouped(u64::from(n))),
+    };
+    let bounds = visit.extent.bounds();
+    let inside =
+        inside(&visit.extent, &query.ray).map_or(String::new(), |(a, b)| format!(", t {} to {}", real(a), real(b)));
+    let (lo, hi) = (in_world(told.world, bounds.lo), in_world(told.world, bounds.hi));
+    format!("{what}{listed}{inside}, {} to {}", point(lo), point(hi))
+}
+
+/// Tests of one outcome in a row, gathered into one line.
+#[derive(Default)]
+struct Runs {
+    what: String,
+    prims: Vec<u32>,
+}
+
+impl Runs {
+    fn add(&mut self, event: &Event, lines: &mut Vec<String>) {
+        let (what, prim) = match event {
+            Event::Test(test) => match test.outcome {
+                Outcome::Miss | Outcome::LeftOut => (test.outcome.name(), test.prim),
+                outcome => {
+                    self.end(lines);
+                    return lines.push(format!("  {} {}: t {}", outcome.name(), test.prim, test.t));
+                }
+            },
+            Event::Skipped(prim) => ("known to the mailbox", *prim),
+            Event::Volumes(1) => return self.note("asks 1 volume".into(), lines),
+            Event::Volumes(n) => return self.note(format!("asks {} volumes", grouped(*n as u64)), lines),
+            Event::Transforms(n) => return self.note(format!("turns {} points", grouped(*n as u64)), lines),
+            Event::Visit(_) => return,
+        };
+        if self.what != what {
+            self.end(lines);
+            self.what = what.into();
+        }
+        self.prims.push(prim);
+    }
+
+    fn note(&mut self, text: String, lines: &mut Vec<String>) {
+        self.end(lines);
+        lines.push(format!("  {text}"));
+    }
+
+    fn end(&mut self, lines: &mut Vec<String>) {
+        if !self.prims.is_empty() {
+            lines.push(format!("  {} {}", self.what, ranges(&self.prims)));
+        }
+        *self = Self::default();
+    }
+}
+
+/// `3, 5-9, 12`: numbers as they come, runs of neighbours as their ends.
+fn ranges(numbers: &[u32]) -> String {
+    let mut parts: Vec<(u32, u32)> = Vec::new();
+    for &n in numbers {
+        match parts.last_mut() {
+            Some((_, last)) if last.checked_add(1) == Some(n) => *last = n,
+            _ => parts.push((n, n)),
+        }
+    }
+    let part = |(a, b): &(u32, u32)| if a == b { a.to_string() } else { format!("{a}-{b}") };
+    parts.iter().map(part).collect::<Vec<_>>().join(", ")
+}
+
+fn vector(v: crate::math::Vec3) -> String {
+    point(v.as_dvec3())
+}
+
+fn point(p: DVec3) -> String {
+    format!("({}, {}, {})", real(p.x), real(p.y), real(p.z))
+}
+
+/// Six digits, without zeros behind.
+fn real(x: f64) -> String {
+    if x == 0.0 || !x.is_finite() {
+        return x.to_string();
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "a decimal exponent of f64")]
+    let whole = x.abs().log10().floor() as i32;
+    if !(-5..=8).contains(&whole) {
+        return format!("{x:.5e}");
+    }
+    let digits = usize::try_from(5 - whole).unwrap_or(0);
+    let text = format!("{x:.digits$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_of_neighbours_are_written_as_their_ends() {
+        assert_eq!(ranges(&[3, 5, 6, 7, 9, 8, 4_294_967_295]), "3, 5-7, 9, 8, 4294967295");
+    }
+
+    #[test]
+    fn numbers_have_six_digits_at_most() {
+        let texts = [0.0, 1.0, -0.123_456_789, 1234.5, 1.5e-7, 123_456_789.0, 2e12].map(real);
+        assert_eq!(texts, ["0", "1", "-0.123457", "1234.5", "1.50000e-7", "123456789", "2.00000e12"]);
+    }
+}
