@@ -119,6 +119,14 @@ pub fn build<'a>(choice: AccelChoice, shapes: &'a Shapes, params: &AccelParams) 
     }
 }
 
+/// What [`build`] would choose, and why; nothing of the whole scene is built where it is large.
+pub fn reason(shapes: &Shapes, params: &AccelParams) -> Reason {
+    match part(shapes) {
+        None => judge(shapes, params).1,
+        Some(part) => judge(&part, params).1,
+    }
+}
+
 /// Traces the sample through both, and keeps the better one.
 fn judge<'a>(shapes: &'a Shapes, params: &AccelParams) -> (AnyAccel<'a>, Reason) {
     let rays = sample(shapes);
@@ -134,6 +142,11 @@ fn judge<'a>(shapes: &'a Shapes, params: &AccelParams) -> (AnyAccel<'a>, Reason)
 fn cost(accel: &AnyAccel, rays: &[Ray]) -> f64 {
     let mut counts = RayCounts::default();
     accel.closest(rays, &mut vec![Hit::MISS; rays.len()], &mut accel.scratch(), &mut counts);
+    nodes(&counts)
+}
+
+/// The cost of an average ray by which the choice is made, in nodes.
+pub fn nodes(counts: &RayCounts) -> f64 {
     let blocks = counts.n_ets as f64;
     (counts.n_ts as f64 - blocks + blocks * BLOCK) / counts.queries.max(1) as f64
 }

@@ -4,7 +4,7 @@ use super::compare::{Count, Plan, Row, Task, compare, count};
 use super::machine::Machine;
 use super::rays::{Class, RaySet, record};
 use super::report::{Format, Model, Rays, Report, text};
-use crate::accel::{Accel, AccelKind, AccelParams, AnyAccel, Hit, Probe, Ray, RayCounts, Unculled};
+use crate::accel::{Accel, AccelKind, AccelParams, AnyAccel, Hit, Probe, Ray, RayCounts, Unculled, auto};
 use crate::load::{LoadOptions, load_bytes};
 use crate::render::texture::TextureStore;
 use crate::render::{ClassCounts, Job, Question, Settings, View, World, render_counted};
@@ -70,6 +70,8 @@ impl Stage {
             name: "still \"life\".toml".into(),
             hash: 7,
             prims: self.world.shapes.len(),
+            objects: self.world.shapes.objects().len(),
+            auto: plan.sweep.is_none().then(|| auto::reason(&self.world.shapes, &plan.params)),
             width: SIZE.0,
             height: SIZE.1,
             samples: 1,
@@ -79,7 +81,15 @@ impl Stage {
             rows: self.rows(&rays, &plan),
             left_out: Vec::new(),
         };
-        Report { machine: Machine::here(), plan, models: vec![model], family: None, heatmap_max: None, complete: true }
+        Report {
+            machine: Machine::here(),
+            plan,
+            models: vec![model],
+            family: None,
+            heatmap_max: None,
+            compare: None,
+            complete: true,
+        }
     }
 }
 
@@ -226,7 +236,7 @@ fn every_format_holds_every_structure_and_class() {
 
     let html = Format::Html.write(&report);
     assert_eq!(html.matches("<tr><th scope=\"row\">").count(), lines + AccelKind::ALL.len());
-    assert_eq!(html.matches("<img ").count(), AccelKind::ALL.len());
+    assert_eq!(html.matches("<img ").count(), AccelKind::ALL.len() + 1);
     assert_eq!(html.matches("<svg").count(), html.matches("</svg>").count());
     assert!(html.contains("still &quot;life&quot;.toml") && !html.contains("http") && !html.contains("<script"));
     assert!(Format::from_path("a.txt".as_ref()).unwrap_err().contains(".json"));
@@ -327,6 +337,59 @@ fn a_structure_whose_default_has_no_such_value_is_compared_with_it_all_the_same(
     // One for each cost: tests, visits, time, memory, build.
     assert_eq!(html.matches("k-octree level").count(), 5);
     assert_eq!(html.matches("<circle class=\"k-bvh around\"").count(), 5);
+}
+
+#[test]
+fn what_auto_would_choose_is_held_against_the_rays() {
+    let kinds = vec![AccelKind::FastOctree, AccelKind::FastBvh];
+    let mut report = Stage::new().report(Plan { kinds, ..plan() });
+    let nodes = |row: &Row| {
+        let mut sum = RayCounts::default();
+        row.classes.iter().for_each(|c| sum += c.counts);
+        auto::nodes(&sum)
+    };
+    let [octree, bvh] = [0, 1].map(|i| nodes(&report.models[0].rows[i]));
+    for (kind, won) in [(AccelKind::FastOctree, bvh / octree - 1.0), (AccelKind::FastBvh, octree / bvh - 1.0)] {
+        report.models[0].auto.as_mut().unwrap().kind = kind;
+        let said = super::report::auto::sentences(&report, &report.models[0]);
+        assert!(said[0].starts_with(&format!("auto would choose {kind}: ")), "{said:?}");
+        let is_right = if won > -5e-4 { "was right" } else { "was wrong" };
+        assert!(said[1].contains(is_right) && said[1].contains(&format!("{:.1} %", 100.0 * won.abs())), "{said:?}");
+        let json: serde_json::Value = serde_json::from_str(&Format::Json.write(&report)).unwrap();
+        let auto = &json["models"][0]["auto"];
+        assert!((auto["won"].as_f64().unwrap() - won).abs() < 1e-12 && auto["by"] == "nodes", "{auto}");
+    }
+    report.models[0].rows.pop();
+    let said = super::report::auto::sentences(&report, &report.models[0]);
+    assert!(said[1].contains("not measured"), "{said:?}");
+}
+
+#[test]
+fn a_model_tells_how_many_objects_can_be_bounded() {
+    let mut report = Stage::new().report(Plan { kinds: vec![AccelKind::Boxes], ..plan() });
+    assert!(report.models[0].size().ends_with("in 4 objects"), "a box and three balls");
+    report.models[0].objects = 1;
+    let one = "15 prims in one object: spheres and boxes can only bound the whole";
+    let written = [Format::Html, Format::Markdown].map(|f| f.write(&report));
+    assert!(written.iter().chain([&text::write(&report, &report.models[0])]).all(|text| text.contains(one)));
+}
+
+#[test]
+fn the_difference_image_is_of_those_asked_for_or_of_the_fast_ones() {
+    let kinds = vec![AccelKind::None, AccelKind::Grid, AccelKind::FastOctree, AccelKind::FastBvh];
+    let mut report = Stage::new().report(Plan { kinds, ..plan() });
+    assert!(Format::Html.write(&report).contains("Tests in each pixel: fast-octree minus fast-bvh"));
+    report.compare = Some([AccelKind::Grid, AccelKind::None]);
+    let html = Format::Html.write(&report);
+    let rows = &report.models[0].rows;
+    let fewer = rows[0].tests_by_pixel.iter().zip(&rows[1].tests_by_pixel).filter(|(none, grid)| grid < none).count();
+    let share = 100.0 * fewer as f64 / f64::from(SIZE.0 * SIZE.1);
+    assert!(html.contains("grid minus none") && html.contains(&format!("in {share:.1} % of the pixels (blue)")));
+    report.models[0].rows[0].tests_by_pixel.clear();
+    assert!(Format::Html.write(&report).contains("No image of grid minus none"));
+    report.compare = None;
+    report.models[0].rows.truncate(3);
+    assert!(Format::Html.write(&report).contains("grid minus fast-octree"));
 }
 
 #[test]

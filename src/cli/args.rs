@@ -358,6 +358,11 @@ pub(super) struct BenchArgs {
     /// Tests that the brightest colour of an HTML report's heat maps stands for [default: the most of any pixel]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Run")]
     pub heatmap_max: Option<u32>,
+    /// Two structures whose tests in each pixel an HTML report shows the difference of, such as grid,fast-bvh [default:
+    /// the fast ones, or the first two]
+    #[arg(long, value_name = "A,B", value_parser = parse::accel(), value_delimiter = ',', conflicts_with = "sweep",
+          help_heading = "Run")]
+    pub compare: Vec<AccelKind>,
     /// An earlier JSON report of the same models and rays
     #[arg(long, value_name = "FILE", help_heading = "Run", requires = "fail_if")]
     pub baseline: Option<PathBuf>,

@@ -10,7 +10,11 @@ fn growth_is_measured_on_generated_scenes_and_reported_by_size() {
     let folder = Folder::new();
     let words = ["none,bvh", "--generate", "tetra", "--sizes", "50..800:3", "--report", "r.json", "--report", "r.html"];
     let run = folder.run(&[&QUICK[..], &words].concat()).ends(0);
-    assert!(run.text().contains("exponent") && run.text().contains("tetra-50: 64 prims"), "{}", run.text());
+    assert!(
+        run.text().contains("exponent") && run.text().contains("tetra-50: 64 prims in one object"),
+        "{}",
+        run.text()
+    );
     let report: Value = serde_json::from_slice(&folder.read("r.json")).unwrap();
     let prims: Vec<u64> = report["models"].as_array().unwrap().iter().map(|m| m["prims"].as_u64().unwrap()).collect();
     assert_eq!((prims, &report["complete"]), (vec![64, 256, 1024], &true.into()));
@@ -63,4 +67,29 @@ fn a_sweep_that_changes_nothing_is_a_bad_command_line() {
     wrong(&["--sweep", "grid-density=1,4", "--grid-density", "2"], &["same parameter"]);
     wrong(&["--sweep", "step-cost=1,4", "--leaf-size", "2"], &["beside --leaf-size"]);
     wrong(&["--sweep", "density=1,4"], &["grid-density"]);
+}
+
+#[test]
+fn the_structures_of_the_difference_image_are_two_that_are_measured() {
+    let folder = Folder::with_cube();
+    let words = ["none,bvh", "cube.obj", "--compare", "bvh,none", "--report", "r.html"];
+    folder.run(&[&QUICK[..], &words].concat()).ends(0);
+    assert!(String::from_utf8(folder.read("r.html")).unwrap().contains("bvh minus none"));
+    for wrong in ["bvh", "bvh,bvh", "bvh,grid"] {
+        let words = ["bench", "cube.obj", "--accel", "none,bvh", "--compare", wrong];
+        folder.run(&words).ends(2).says(&["--compare"]);
+    }
+}
+
+#[test]
+fn a_report_says_what_auto_would_choose_and_how_many_objects_there_are() {
+    let folder = Folder::with_cube();
+    let words = ["fast-octree,fast-bvh", "cube.obj", "--report", "r.json"];
+    let run = folder.run(&[&QUICK[..], &words].concat()).ends(0);
+    assert!(run.text().contains("12 prims in one object: spheres and boxes"), "{}", run.text());
+    assert!(run.text().contains("auto would choose fast-octree: "), "{}", run.text());
+    let report: Value = serde_json::from_slice(&folder.read("r.json")).unwrap();
+    let model = &report["models"][0];
+    assert_eq!((&model["objects"], &model["auto"]["kind"]), (&1.into(), &"fast-octree".into()));
+    assert_eq!(model["auto"]["won"], 0.0, "both are one leaf");
 }

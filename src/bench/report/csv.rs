@@ -11,7 +11,7 @@ use crate::bench::compare::{ClassRow, Count, Row};
 const COLUMNS: &str = "file,prims,structure,class,rays,asked,sampled,differing,t_b,t_b_min,t_b_max,bytes,n_in,n_v,n_ev,\
                        n_oiv,break_even,mrays,mrays_min,mrays_max,n_it,n_ts,n_ets,n_eets,n_bit,n_mb,n_xf,n_min,culled,\
                        threads,passes,seed,version,compiler,flags,cpu,e_n_it,e_n_ts,e_t_tr,e_bytes,e_t_b,\
-                       parameter,value,is_default";
+                       parameter,value,is_default,objects";
 
 /// The whole table; `t_b` in seconds, `mrays` in millions of rays a second.
 pub fn write(report: &Report) -> String {
@@ -50,6 +50,7 @@ fn line(report: &Report, model: &Model, row: &Row, rays: &Rays, class: &ClassRow
     cells.push(setting.map_or("", |s| s.parameter.name()).into());
     cells.push(setting.and_then(|s| s.value).map_or(String::new(), number));
     cells.push(setting.map_or(String::new(), |s| s.is_default.to_string()));
+    cells.push(model.objects.to_string());
     cells.join(",") + "\n"
 }
 

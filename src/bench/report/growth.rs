@@ -116,6 +116,7 @@ pub fn sentences(report: &Report) -> Vec<String> {
             factor(best, Cost::Tests).map_or(String::new(), |f| format!("; ten times the prims multiply them by {f}"));
         said.push(format!("Fewest tests at {n} prims: {best}, {} a ray{growth}", short(tests)));
     }
+    said.extend(super::auto::over_sizes(report));
     for kind in &report.plan.kinds {
         if let Some(model) = report.models.iter().find(|m| m.left_out.contains(kind)) {
             let from = grouped(model.prims as u64);

@@ -9,7 +9,9 @@
 //! | `sweep` | null, or the `parameter` that is swept and its `values` |
 //! | `growth` | null, or how cost grows where the models are a family in growing sizes |
 //!
-//! A model has `file`, `hash` (xxh3-128 of what was read), `prims` (N), `picture` (`width`, `height`, `samples`, `depth`,
+//! A model has `file`, `hash` (xxh3-128 of what was read), `prims` (N), `objects` (that `spheres` and `boxes` bound), `auto`
+//! (null, or what it would choose: `kind`, `why`, and `won`: how much more the other fast structure costs as a share of
+//! the chosen one's cost, `by` `t_tr` or `nodes`), `picture` (`width`, `height`, `samples`, `depth`,
 //! `view`), `rays` (by class: `asked`, `kept`), `identical` (whether all hits were), `reference`, and `structures`. A
 //! structure has `accel`, `sampled`, `differing` (rays), `t_b` and `t_tr` (seconds, of a ray; each `median`, `min`, `max`,
 //! `passes`, or null without times), V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`, `bytes`, `break_even` (rays, or null),
@@ -27,6 +29,7 @@
 //! over the number of prims, `exponent`, `error` (its standard error, or null for two sizes), `r2` (or null), `factor`
 //! (cost of one prim), `points` (`[prims, cost]`). Keys are only ever added.
 
+use super::auto::Outcome;
 use super::cost::{Cost, costs};
 use super::growth::{Curve, kinds};
 use super::{Model, Report, sweep};
@@ -64,6 +67,7 @@ fn model(report: &Report, model: &Model) -> Value {
     let rays = model.rays.iter().map(|r| (r.class.name().to_owned(), json!({ "asked": r.asked, "kept": r.kept })));
     json!({
         "file": model.name, "hash": format!("{:032x}", model.hash), "prims": model.prims,
+        "objects": model.objects, "auto": choice(report, model),
         "picture": {
             "width": model.width, "height": model.height, "samples": model.samples, "depth": model.depth,
             "view": model.view,
@@ -73,6 +77,15 @@ fn model(report: &Report, model: &Model) -> Value {
         "structures": model.rows.iter().map(|row| structure(model, row)).collect::<Vec<_>>(),
         "best": report.plan.sweep.as_ref().map(|_| best(report, model)),
         "left_out": model.left_out.iter().map(|k| k.name()).collect::<Vec<_>>(),
+    })
+}
+
+fn choice(report: &Report, model: &Model) -> Value {
+    let Some(reason) = model.auto else { return Value::Null };
+    let outcome = Outcome::of(report, model);
+    json!({
+        "kind": reason.kind.name(), "why": reason.to_string(), "won": outcome.map(|o| o.won),
+        "by": outcome.map(|o| if o.is_time { "t_tr" } else { "nodes" }),
     })
 }
 

@@ -1,7 +1,7 @@
 //! Tables for a document.
 
 use super::number::{bytes, grouped, seconds, short, whole};
-use super::{Model, Rays, Report, WORDS, growth, sweep, text};
+use super::{Model, Rays, Report, WORDS, auto, growth, sweep, text};
 use crate::bench::compare::Count;
 
 /// The whole report.
@@ -24,8 +24,11 @@ pub fn write(report: &Report) -> String {
 
 fn write_model(out: &mut String, report: &Report, model: &Model) {
     *out += &format!("\n## {}\n\n", model.name.replace('|', "\\|"));
-    *out +=
-        &format!("{} prims; rays of {}. **{}.**\n\n", grouped(model.prims as u64), model.picture(), model.verdict());
+    *out += &format!("{}; rays of {}. **{}.**\n\n", model.size(), model.picture(), model.verdict());
+    auto::sentences(report, model).iter().for_each(|text| *out += &format!("{text}.\n"));
+    if model.auto.is_some() {
+        out.push('\n');
+    }
     if report.plan.sweep.is_some() {
         sweep::sentences(report, model).iter().for_each(|text| *out += &format!("{text}.\n"));
         sweep::tables(report, model).iter().for_each(|table| *out += &format!("\n{}", table.markdown()));

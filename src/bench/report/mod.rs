@@ -1,5 +1,6 @@
 //! What a comparison found, and how it is shown: as text, JSON, CSV, Markdown or a page for a browser.
 
+pub mod auto;
 pub mod cost;
 pub mod csv;
 pub mod growth;
@@ -16,6 +17,7 @@ use super::compare::{Count, Plan, Row, break_even};
 use super::machine::Machine;
 use super::rays::{Class, RaySet};
 use crate::accel::AccelKind;
+use crate::accel::auto::Reason;
 use crate::generate::Family;
 use std::path::Path;
 
@@ -32,6 +34,8 @@ pub struct Report {
     pub family: Option<Family>,
     /// What the brightest colour of heat maps stands for; `None`: the most tests of any pixel.
     pub heatmap_max: Option<u32>,
+    /// Two structures for the difference image; `None`: the fast ones, or the first two.
+    pub compare: Option<[AccelKind; 2]>,
     /// Whether everything is done.
     pub complete: bool,
 }
@@ -45,6 +49,10 @@ pub struct Model {
     pub hash: u128,
     /// Shapes of all kinds: N.
     pub prims: usize,
+    /// Objects that they belong to, as `spheres` and `boxes` have them.
+    pub objects: usize,
+    /// What `auto` would choose and why, where that was asked.
+    pub auto: Option<Reason>,
     /// Columns of the picture whose rays were recorded.
     pub width: u32,
     /// Its rows.
@@ -139,6 +147,16 @@ impl Model {
         match count {
             1 => format!("one structure only, {rays} rays: nothing to compare its hits with"),
             _ => format!("hits identical, bit for bit, in all {count} structures: {rays} rays{but}"),
+        }
+    }
+
+    /// Its prims and objects.
+    pub fn size(&self) -> String {
+        let prims = number::grouped(self.prims as u64);
+        match self.objects {
+            0 => format!("{prims} prims in no object"),
+            1 => format!("{prims} prims in one object: spheres and boxes can only bound the whole"),
+            n => format!("{prims} prims in {} objects", number::grouped(n as u64)),
         }
     }
 

@@ -1,7 +1,7 @@
 //! Tables for a terminal.
 
 use super::number::{bytes, grouped, seconds, short, whole};
-use super::{Model, Rays, Report, WORDS, growth, sweep};
+use super::{Model, Rays, Report, WORDS, auto, growth, sweep};
 use crate::bench::clock::Spread;
 use crate::bench::compare::{ClassRow, Count, Row};
 use std::fmt::{Result, Write};
@@ -15,11 +15,11 @@ pub fn write(report: &Report, model: &Model) -> String {
 }
 
 fn write_model(out: &mut String, report: &Report, model: &Model) -> Result {
-    writeln!(out, "{}: {} prims; rays of {}", model.name, grouped(model.prims as u64), model.picture())?;
+    writeln!(out, "{}: {}; rays of {}", model.name, model.size(), model.picture())?;
     writeln!(out)?;
     if report.plan.sweep.is_some() {
         sweep::tables(report, model).iter().try_for_each(|table| writeln!(out, "{}", table.text()))?;
-        sweep::sentences(report, model).iter().try_for_each(|text| writeln!(out, "{text}."))?;
+        sweep::sentences(report, model).iter().try_for_each(|text| write!(out, "{}", wrapped(&format!("{text}."))))?;
         return writeln!(out, "\n{}", model.verdict());
     }
     write_structures(out, report, model)?;
@@ -28,20 +28,38 @@ fn write_model(out: &mut String, report: &Report, model: &Model) -> Result {
         write_class(out, report, model, i, rays)?;
     }
     writeln!(out, "\n{}", model.verdict())?;
-    Ok(())
+    auto::sentences(report, model).iter().try_for_each(|text| write!(out, "{}", wrapped(&format!("{text}."))))
 }
 
 /// One model in two lines, where the tables are of all.
 pub fn write_short(model: &Model) -> String {
-    let prims = grouped(model.prims as u64);
-    format!("{}: {prims} prims; rays of {}\n  {}\n", model.name, model.picture(), model.verdict())
+    format!("{}: {}; rays of {}\n  {}\n", model.name, model.size(), model.picture(), model.verdict())
 }
 
 /// How cost grows over all models.
 pub fn write_growth(report: &Report) -> String {
     let tables: String = growth::tables(report).iter().map(|table| format!("\n{}", table.text())).collect();
-    let said: String = growth::sentences(report).iter().map(|text| format!("{text}.\n")).collect();
-    format!("{tables}\n{said}\n{}.\n", growth::METHOD)
+    let said: String = growth::sentences(report).iter().map(|text| wrapped(&format!("{text}."))).collect();
+    format!("{tables}\n{said}\n{}", wrapped(&format!("{}.", growth::METHOD)))
+}
+
+/// Lines of at most 120 columns, but for longer words; all but the first are indented.
+fn wrapped(text: &str) -> String {
+    let (mut out, mut column) = (String::new(), 0);
+    for word in text.split(' ') {
+        let width = word.chars().count();
+        if column > 0 && column + 1 + width > 120 {
+            out += "\n ";
+            column = 1;
+        }
+        if column > 0 {
+            out.push(' ');
+            column += 1;
+        }
+        out += word;
+        column += width;
+    }
+    out + "\n"
 }
 
 /// What holds for all models.
@@ -125,5 +143,18 @@ pub(super) fn culled(class: &ClassRow, prims: usize) -> String {
     match class.culled(prims) * 100.0 {
         p if p > 99.0 && p < 100.0 => format!("{:.4}%", p.min(99.9999)),
         p => format!("{p:.1}%"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_sentences_become_lines() {
+        let text = wrapped(&"twelve words ".repeat(25));
+        assert!(text.lines().count() == 3 && text.lines().all(|l| l.len() <= 120), "{text}");
+        assert!(text.lines().skip(1).all(|l| l.starts_with("  ") && !l.starts_with("   ")), "{text}");
+        assert_eq!(wrapped("short"), "short\n");
     }
 }

@@ -8,7 +8,7 @@ use super::exit::Exit;
 use super::job::{self, Wrong};
 use super::message::Messages;
 use super::{accident, interrupt, print};
-use crate::accel::{AccelKind, AccelParams};
+use crate::accel::{AccelKind, AccelParams, auto};
 use crate::bench::compare::{Plan, Row, compare};
 use crate::bench::machine::Machine;
 use crate::bench::rays;
@@ -50,6 +50,7 @@ pub(super) fn run(args: &BenchArgs) -> Exit {
         models: Vec::new(),
         family: args.generate,
         heatmap_max: args.heatmap_max,
+        compare: <[AccelKind; 2]>::try_from(&args.compare[..]).ok(),
         complete: false,
     };
     let mut worst = Exit::Done;
@@ -90,6 +91,13 @@ fn plan(args: &BenchArgs) -> Result<Plan, Wrong> {
     }
     if kinds.is_empty() {
         kinds = AccelKind::ALL.to_vec();
+    }
+    if let [a, b] = args.compare[..] {
+        if a == b || !kinds.contains(&a) || !kinds.contains(&b) {
+            return Err(Wrong(format!("--compare {a},{b}: name two different structures that are measured (--accel)")));
+        }
+    } else if !args.compare.is_empty() {
+        return Err(Wrong("--compare takes two structures, such as grid,fast-bvh".into()));
     }
     let params = job::params(&args.params)?;
     if let Some(sweep) = &args.sweep {
@@ -153,6 +161,8 @@ impl Bench<'_> {
             name: name.clone(),
             hash: prepared.loaded.facts.hash,
             prims: prepared.world.shapes.len(),
+            objects: prepared.world.shapes.objects().len(),
+            auto: plan.sweep.is_none().then(|| auto::reason(&prepared.world.shapes, &plan.params)),
             width: settings.width,
             height: settings.height,
             samples: settings.samples,

@@ -46,15 +46,25 @@ pub(super) fn figure(report: &Report, model: &Model) -> String {
 }
 
 fn picture(tests: &[u32], width: u32, height: u32, scale: Scale) -> Result<Vec<u8>, EncodingError> {
+    let pixels: Vec<u8> = tests.iter().map(|&n| scale.place(f64::from(n))).collect();
+    indexed(&pixels, width, height, color)
+}
+
+/// A PNG whose pixels are places in a palette.
+pub(super) fn indexed(
+    pixels: &[u8],
+    width: u32,
+    height: u32,
+    color: fn(u8) -> [u8; 3],
+) -> Result<Vec<u8>, EncodingError> {
     let mut file = Vec::new();
     let mut encoder = Encoder::new(&mut file, width, height);
     encoder.set_color(ColorType::Indexed);
     encoder.set_depth(BitDepth::Eight);
     encoder.set_compression(Compression::Balanced);
     encoder.set_palette((0..=255).flat_map(color).collect::<Vec<u8>>());
-    let pixels: Vec<u8> = tests.iter().map(|&n| scale.place(f64::from(n))).collect();
     let mut writer = encoder.write_header()?;
-    writer.write_image_data(&pixels)?;
+    writer.write_image_data(pixels)?;
     writer.finish()?;
     Ok(file)
 }

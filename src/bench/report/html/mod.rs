@@ -1,5 +1,6 @@
 //! One page for a browser: no script, nothing to fetch, readable on a phone, in the dark and on paper.
 
+mod difference;
 mod growth;
 mod heat;
 mod lines;
@@ -9,7 +10,7 @@ mod sweep;
 
 use super::number::{bytes, grouped, seconds, short, whole};
 use super::table::Table;
-use super::{Model, Rays, Report, WORDS, text};
+use super::{Model, Rays, Report, WORDS, auto, text};
 use crate::accel::AccelKind;
 use crate::bench::compare::{ClassRow, Count, Row};
 
@@ -51,9 +52,9 @@ fn folded(model: &Model, section: &str) -> String {
 fn section(report: &Report, model: &Model) -> String {
     let verdict = if model.differing() == 0 { "good" } else { "bad" };
     let mut out = format!(
-        "<section><h2>{}</h2>\n<p>{} prims (N); rays of {}: {}.</p>\n<p class=\"{verdict}\">{}</p>\n",
+        "<section><h2>{}</h2>\n<p>{}; rays of {}: {}.</p>\n<p class=\"{verdict}\">{}</p>\n",
         escaped(&model.name),
-        grouped(model.prims as u64),
+        model.size(),
         escaped(&model.picture()),
         rays_line(model),
         escaped(&model.verdict()),
@@ -75,6 +76,7 @@ fn section(report: &Report, model: &Model) -> String {
         out += &figure("Speed against build", &caption, &plot::times(model));
     }
     out += &heat::figure(report, model);
+    out += &difference::figure(report, model);
     out += &structures(report, model);
     model.rays.iter().enumerate().for_each(|(i, rays)| out += &class_table(report, model, i, rays));
     out + "</section>\n"
@@ -122,6 +124,7 @@ fn glance(report: &Report, model: &Model) -> String {
             grouped(model.prims as u64)
         ));
     }
+    said.extend(auto::sentences(report, model).iter().map(|text| escaped(text)));
     said.iter().map(|text| format!("<p>{text}.</p>\n")).collect()
 }
 
