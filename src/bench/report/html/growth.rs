@@ -5,7 +5,7 @@ use super::super::cost::{Cost, costs};
 use super::super::growth::{Curve, METHOD, kinds, sentences, tables};
 use super::super::number::{bytes, grouped, short};
 use super::lines::{Lines, Series, plot};
-use super::svg::unit;
+use super::svg::{plain, unit};
 use super::{escaped, figure, table_of};
 
 /// The section; nothing where the models are not a family in growing sizes.
@@ -44,22 +44,20 @@ fn curves(report: &Report, cost: Cost) -> String {
 /// A round value of a cost.
 pub(super) fn tick(cost: Cost, value: f64) -> String {
     match cost {
-        Cost::Tests | Cost::Visits => plain(short(value)),
+        Cost::Tests | Cost::Visits if value >= 1e5 => format!("{value:e}"),
+        Cost::Tests | Cost::Visits => plain(&short(value)).to_owned(),
         Cost::Time | Cost::Build => unit(value),
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "positive; less than a byte is none"
         )]
-        Cost::Memory => plain(bytes(value.round() as u64)),
+        Cost::Memory => {
+            let text = bytes(value.round() as u64);
+            let (number, unit) = text.split_once(' ').unwrap_or((&text, ""));
+            format!("{} {unit}", plain(number))
+        }
     }
-}
-
-/// `1.50 kB` as `1.5 kB`.
-fn plain(text: String) -> String {
-    let (number, unit) = text.split_once(' ').filter(|(_, unit)| unit.ends_with('B')).unwrap_or((&text, ""));
-    let number = if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number };
-    if unit.is_empty() { number.to_owned() } else { format!("{number} {unit}") }
 }
 
 #[cfg(test)]
@@ -68,14 +66,9 @@ mod tests {
 
     #[test]
     fn round_values_have_no_digits_to_spare() {
-        let shown = [
-            (Cost::Tests, 0.5),
-            (Cost::Tests, 10.0),
-            (Cost::Visits, 20_000.0),
-            (Cost::Memory, 1500.0),
-            (Cost::Memory, 2e6),
-        ];
-        assert_eq!(shown.map(|(c, v)| tick(c, v)), ["0.5", "10", "20 000", "1.5 kB", "2 MB"]);
-        assert_eq!([(Cost::Time, 2e-6), (Cost::Build, 0.5)].map(|(c, v)| tick(c, v)), ["2 µs", "500 ms"]);
+        let shown =
+            [(Cost::Tests, 0.5), (Cost::Tests, 10.0), (Cost::Visits, 2e5), (Cost::Memory, 1500.0), (Cost::Memory, 2e6)];
+        assert_eq!(shown.map(|(c, v)| tick(c, v)), ["0.5", "10", "2e5", "1.5 kB", "2 MB"]);
+        assert_eq!([(Cost::Time, 1.5e-6), (Cost::Build, 0.5)].map(|(c, v)| tick(c, v)), ["1.5 µs", "500 ms"]);
     }
 }

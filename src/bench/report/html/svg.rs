@@ -1,6 +1,6 @@
 //! Scales, lines and words of plots as SVG, small enough for a phone: 440 units wide.
 
-use super::super::number::grouped;
+use super::super::number::short;
 use std::fmt::Write;
 
 /// Units across.
@@ -72,7 +72,7 @@ impl Scale {
                 self.multiples((s / 6.0).ceil()).iter().map(|d| 10f64.powf(*d)).collect()
             }
             s if s >= 1.0 => self.within_decades(&[1.0, 2.0, 5.0]),
-            s if s >= 0.4 => self.within_decades(&[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0]),
+            s if s >= 0.4 => self.within_decades(&[1.0, 2.0, 3.0, 5.0]),
             _ => self.within_decades(&[
                 1.0, 1.1, 1.2, 1.3, 1.4, 1.6, 1.8, 2.0, 2.25, 2.5, 2.75, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 7.0, 8.0, 9.0,
             ]),
@@ -95,13 +95,18 @@ impl Scale {
 
 /// A round number of seconds: `20 µs`.
 pub(super) fn unit(seconds: f64) -> String {
-    let scaled = |factor: f64, unit: &str| format!("{} {unit}", grouped((seconds * factor).round() as u64));
+    let scaled = |factor: f64, unit: &str| format!("{} {unit}", plain(&short(seconds * factor)));
     match seconds {
         s if s < 0.99e-6 => scaled(1e9, "ns"),
         s if s < 0.99e-3 => scaled(1e6, "µs"),
         s if s < 0.99 => scaled(1e3, "ms"),
         _ => scaled(1.0, "s"),
     }
+}
+
+/// A number without noughts to spare: `1.50` as `1.5`.
+pub(super) fn plain(number: &str) -> &str {
+    if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }
 }
 
 /// Ascending places moved apart by at least `gap`, none beyond `end`.
