@@ -12,6 +12,7 @@ pub mod range;
 pub mod rays;
 pub mod replay;
 pub mod report;
+pub mod row;
 pub mod star;
 pub mod sweep;
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::number::grouped;
 use super::{Model, Report};
 use crate::accel::auto::nodes;
 use crate::accel::{AccelKind, RayCounts};
-use crate::bench::compare::Row;
+use crate::bench::row::Row;
 
 /// How the choice fared against the other fast structure.
 #[derive(Clone, Copy, Debug, PartialEq)]

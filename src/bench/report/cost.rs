@@ -2,8 +2,8 @@
 
 use super::number::{bytes, seconds, short};
 use super::{Model, Report};
-use crate::bench::compare::{Count, Row};
 use crate::bench::rays::Class;
+use crate::bench::row::{Count, Row};
 
 /// Something that is better low.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

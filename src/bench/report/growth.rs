@@ -5,9 +5,9 @@ use super::number::{grouped, seconds, short};
 use super::table::Table;
 use super::{Model, Report};
 use crate::accel::AccelKind;
-use crate::bench::compare::Row;
 use crate::bench::fit::Fit;
 use crate::bench::rays::Class;
+use crate::bench::row::Row;
 
 /// One cost of one structure over all models.
 #[derive(Clone, Debug, PartialEq)]

@@ -35,8 +35,8 @@ use super::growth::{Curve, kinds};
 use super::{Model, Report, sweep};
 use crate::accel::AccelKind;
 use crate::bench::clock::Spread;
-use crate::bench::compare::{ClassRow, Count, Row};
 use crate::bench::rays::Class;
+use crate::bench::row::{ClassRow, Count, Row};
 use serde_json::{Map, Value, json};
 
 /// The name of the schema.

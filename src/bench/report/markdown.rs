@@ -2,7 +2,7 @@
 
 use super::number::{bytes, grouped, seconds, short, whole};
 use super::{Model, Rays, Report, WORDS, auto, growth, sweep, text};
-use crate::bench::compare::Count;
+use crate::bench::row::Count;
 
 /// The whole report.
 pub fn write(report: &Report) -> String {

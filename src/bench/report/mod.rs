@@ -13,9 +13,10 @@ pub mod table;
 pub mod text;
 
 use super::clock::Spread;
-use super::compare::{Count, Plan, Row, break_even};
+use super::compare::{Plan, break_even};
 use super::machine::Machine;
 use super::rays::{Class, RaySet};
+use super::row::{Count, Row};
 use crate::accel::AccelKind;
 use crate::accel::auto::Reason;
 use crate::generate::Family;

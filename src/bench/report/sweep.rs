@@ -5,7 +5,7 @@ use super::number::{seconds, short};
 use super::table::Table;
 use super::{Model, Report};
 use crate::accel::AccelKind;
-use crate::bench::compare::Row;
+use crate::bench::row::Row;
 
 /// One structure at all values of the parameter.
 #[derive(Clone, Debug)]

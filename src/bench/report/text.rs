@@ -3,7 +3,7 @@
 use super::number::{bytes, grouped, seconds, short, whole};
 use super::{Model, Rays, Report, WORDS, auto, growth, sweep};
 use crate::bench::clock::Spread;
-use crate::bench::compare::{ClassRow, Count, Row};
+use crate::bench::row::{ClassRow, Count, Row};
 use std::fmt::{Result, Write};
 
 /// One model: its structures, then each class of rays, then whether hits agree.

@@ -4,7 +4,7 @@ use super::super::number::grouped;
 use super::super::{Model, Report};
 use super::heat::indexed;
 use crate::accel::AccelKind;
-use crate::bench::compare::Row;
+use crate::bench::row::Row;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::fmt::Write;

@@ -12,7 +12,7 @@ use super::number::{bytes, grouped, seconds, short, whole};
 use super::table::Table;
 use super::{Model, Rays, Report, WORDS, auto, text};
 use crate::accel::AccelKind;
-use crate::bench::compare::{ClassRow, Count, Row};
+use crate::bench::row::{ClassRow, Count, Row};
 
 /// Rules of the page. The colours of the classes are M. Okabe and K. Ito's, which people with any kind of colour sight
 /// tell apart; each class has a shape of its own too.

@@ -3,8 +3,8 @@
 use super::super::Model;
 use super::super::number::{grouped, seconds, short};
 use super::svg::{Scale, WIDTH, open, rule, spread_out, unit, words};
-use crate::bench::compare::{Count, Row};
 use crate::bench::rays::Class;
+use crate::bench::row::{Count, Row};
 use std::fmt::Write;
 
 /// Each structure a row, each class a mark: its tests a ray.

@@ -6,6 +6,7 @@ use super::super::{Model, Report};
 use super::growth::tick;
 use super::lines::{Lines, Series, plot};
 use super::{escaped, figure, table_of};
+use crate::bench::row::Row;
 use crate::bench::sweep::Sweep;
 
 /// What stands in the place of the usual figures where a parameter is swept.
@@ -17,7 +18,7 @@ pub(super) fn figures(report: &Report, model: &Model, sweep: &Sweep) -> String {
 }
 
 fn one(report: &Report, model: &Model, sweep: &Sweep, cost: Cost) -> String {
-    let value = |row: Option<&crate::bench::compare::Row>| row.and_then(|r| r.setting).and_then(|s| s.value);
+    let value = |row: Option<&Row>| row.and_then(|r| r.setting).and_then(|s| s.value);
     let of = |curve: &Curve| Series {
         kind: curve.kind,
         points: curve.points(model, cost),

@@ -1,0 +1,151 @@
+//! What one structure costs: its counts and times, class by class.
+
+use super::clock::Spread;
+use super::sweep::Setting;
+use crate::accel::{AccelKind, RayCounts, StructureStats};
+
+/// What was found out about one structure.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// Which one.
+    pub kind: AccelKind,
+    /// Its value of the parameter that is swept.
+    pub setting: Option<Setting>,
+    /// Seconds of building it.
+    pub build: Spread,
+    /// What it is made of.
+    pub made_of: StructureStats,
+    /// One for each class of rays.
+    pub classes: Vec<ClassRow>,
+    /// Whether it got a sample of the rays only.
+    pub sampled: bool,
+    /// Ray/prim tests of the picture's rays in each pixel, row by row; empty where rays were left out.
+    pub tests_by_pixel: Vec<u32>,
+}
+
+impl Row {
+    /// Rays whose answer differed from the reference, in all passes.
+    pub fn differing(&self) -> u64 {
+        self.classes.iter().map(|c| c.differing).sum()
+    }
+
+    /// Rays that were compared.
+    pub fn rays(&self) -> u64 {
+        self.classes.iter().map(|c| c.counts.queries).sum()
+    }
+
+    /// Seconds for a ray of a mixture with so many of each class, of each class's passes `pick`; NaN before the first pass.
+    pub fn seconds_per_ray(&self, mixture: &[usize], pick: fn(&Spread) -> f64) -> f64 {
+        let all: usize = mixture.iter().sum();
+        let sum: f64 = self.classes.iter().zip(mixture).map(|(c, &n)| pick(&c.seconds) * n as f64).sum();
+        sum / all as f64
+    }
+
+    /// Its structure, and its value of the parameter that is swept.
+    pub fn name(&self) -> String {
+        self.setting.map_or_else(|| self.kind.to_string(), |setting| format!("{} with {setting}", self.kind))
+    }
+}
+
+/// One structure and one class of rays.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ClassRow {
+    /// Sums over the rays.
+    pub counts: RayCounts,
+    /// Sums of the squares, in the order of [`Count::ALL`].
+    squares: [f64; Count::ALL.len()],
+    /// Seconds for a ray.
+    pub seconds: Spread,
+    /// Rays whose answer differed from the reference.
+    pub differing: u64,
+    /// Passes over the rays for one time, so that the clock's grain does not matter.
+    pub(super) repeats: u32,
+}
+
+/// A count of [`RayCounts`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Count {
+    /// Ray/prim tests.
+    It,
+    /// Nodes and cells visited.
+    Ts,
+    /// Leaf cells visited.
+    Ets,
+    /// Empty ones among them.
+    Eets,
+    /// Ray/volume tests.
+    Bit,
+    /// Tests saved by the mailbox.
+    Mb,
+    /// Points transformed into the ray's axes.
+    Xf,
+}
+
+impl Count {
+    /// Every count, in the order of reports.
+    pub const ALL: [Self; 7] = [Self::It, Self::Ts, Self::Ets, Self::Eets, Self::Bit, Self::Mb, Self::Xf];
+
+    /// V. Havran's name, or ours in his manner.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::It => "n_it",
+            Self::Ts => "n_ts",
+            Self::Ets => "n_ets",
+            Self::Eets => "n_eets",
+            Self::Bit => "n_bit",
+            Self::Mb => "n_mb",
+            Self::Xf => "n_xf",
+        }
+    }
+
+    /// Its value.
+    pub const fn of(self, counts: &RayCounts) -> u64 {
+        match self {
+            Self::It => counts.n_it,
+            Self::Ts => counts.n_ts,
+            Self::Ets => counts.n_ets,
+            Self::Eets => counts.n_eets,
+            Self::Bit => counts.n_bit,
+            Self::Mb => counts.n_mb,
+            Self::Xf => counts.n_xf,
+        }
+    }
+}
+
+impl ClassRow {
+    /// A count for each ray; 0 without rays.
+    pub fn per_ray(&self, count: Count) -> f64 {
+        count.of(&self.counts) as f64 / self.counts.queries.max(1) as f64
+    }
+
+    /// Half the width of the 95 % interval of [`Self::per_ray`] if these rays are a sample of many more.
+    pub fn interval(&self, count: Count) -> f64 {
+        let (n, mean) = (self.counts.queries as f64, self.per_ray(count));
+        let variance = (self.squares[count as usize] / n - mean * mean).max(0.0) * n / (n - 1.0);
+        if n < 2.0 { f64::INFINITY } else { 1.96 * (variance / n).sqrt() }
+    }
+
+    /// Hits required for each ray: the tests that no structure can save.
+    pub fn n_min(&self) -> f64 {
+        self.counts.found as f64 / self.counts.queries.max(1) as f64
+    }
+
+    /// Share of all tests that was not done, of `prims` for each ray.
+    pub fn culled(&self, prims: usize) -> f64 {
+        if prims == 0 { 0.0 } else { 1.0 - self.per_ray(Count::It) / prims as f64 }
+    }
+
+    /// Millions of rays a second.
+    pub fn rate(&self) -> Spread {
+        self.seconds.map(|s| 1e-6 / s)
+    }
+
+    /// Counts another ray.
+    pub(super) fn add(&mut self, counts: &RayCounts) {
+        self.counts += *counts;
+        for (square, count) in self.squares.iter_mut().zip(Count::ALL) {
+            let value = count.of(counts) as f64;
+            *square += value * value;
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! Growth, sweeps, choices and differences, as reports tell them.
+
+use super::{SIZE, Stage, plan};
+use crate::accel::{AccelKind, RayCounts, auto};
+use crate::bench::compare::Plan;
+use crate::bench::rays::Class;
+use crate::bench::report::auto::sentences as auto_sentences;
+use crate::bench::report::{Format, Model, Report, text};
+use crate::bench::row::Row;
+
+/// Three sizes of a family whose structures cost what laws say, to the digit.
+fn grown() -> Report {
+    let whole = Stage::new().report(Plan { kinds: vec![AccelKind::None, AccelKind::Bvh], passes: 1, ..plan() });
+    let model = |prims: usize| {
+        let mut model = Model { name: format!("tetra-{prims}"), prims, ..whole.models[0].clone() };
+        let [none, bvh] = &mut model.rows[..] else { panic!("two structures") };
+        for class in none.classes.iter_mut() {
+            class.counts.n_it = class.counts.queries * prims as u64;
+        }
+        for class in bvh.classes.iter_mut() {
+            class.counts.n_it = class.counts.queries * prims.isqrt() as u64;
+        }
+        bvh.made_of.bytes = 7 * prims as u64;
+        model
+    };
+    let models = [100, 10_000, 1_000_000].map(model).into();
+    Report { family: Some("tetra".parse().unwrap()), models, ..whole }
+}
+
+#[test]
+fn every_format_tells_the_exponents_of_growth() {
+    let mut report = grown();
+    let json: serde_json::Value = serde_json::from_str(&Format::Json.write(&report)).unwrap();
+    let [none, bvh] = [&json["growth"]["structures"][0], &json["growth"]["structures"][1]];
+    assert_eq!((&json["growth"]["family"], &bvh["accel"]), (&"tetra".into(), &"bvh".into()));
+    let is = |value: &serde_json::Value, expected: f64| (value.as_f64().unwrap() - expected).abs() < 1e-9;
+    assert!(is(&none["all"]["n_it"]["exponent"], 1.0) && is(&bvh["all"]["n_it"]["exponent"], 0.5), "{bvh:#}");
+    assert!(is(&bvh["all"]["bytes"]["exponent"], 1.0) && is(&bvh["all"]["bytes"]["factor"], 7.0), "{bvh:#}");
+    assert!(is(&bvh["classes"]["diffuse"]["n_it"]["exponent"], 0.5) && none["all"]["t_b"].is_null(), "{none:#}");
+
+    let csv = Format::Csv.write(&report);
+    let place = csv.lines().next().unwrap().split(',').position(|c| c == "e_n_it").unwrap();
+    let exponents: Vec<f64> = csv.lines().skip(1).map(|l| l.split(',').nth(place).unwrap().parse().unwrap()).collect();
+    assert_eq!(exponents.len(), 3 * 2 * Class::ALL.len());
+    assert!(exponents.iter().all(|e| (e - 1.0).abs() < 1e-9 || (e - 0.5).abs() < 1e-9));
+
+    for text in [text::write_growth(&report), Format::Markdown.write(&report), Format::Html.write(&report)] {
+        assert!(text.contains("0.50 ±0.00") && text.contains("1 000 000"), "{text}");
+    }
+    assert!(Format::Html.write(&report).contains(">bvh 0.50</text>"));
+    // One size is no growth, and no fault.
+    report.models.truncate(1);
+    assert!(text::write_growth(&report).contains("One size only"));
+}
+
+/// The report of a sweep over the small scene.
+fn swept(sweep: &str, kinds: &[AccelKind], passes: usize) -> Report {
+    Stage::new().report(Plan { kinds: kinds.into(), sweep: Some(sweep.parse().unwrap()), passes, ..plan() })
+}
+
+#[test]
+fn a_sweep_tells_every_value_and_the_default_and_their_hits_are_the_same() {
+    let report = swept("grid-density=0.5..16", &[AccelKind::Grid, AccelKind::GridOctree], 0);
+    let model = &report.models[0];
+    assert!(model.differing() == 0 && model.rows.iter().all(|r| r.rays() == model.rows[0].rays()));
+    let values = |kind| model.rows.iter().filter(move |r| r.kind == kind).map(|r| r.setting.unwrap().value.unwrap());
+    assert_eq!(values(AccelKind::Grid).collect::<Vec<_>>(), [0.5, 1.0, 2.0, 4.0, 8.0, 16.0]);
+    assert_eq!(values(AccelKind::GridOctree).collect::<Vec<_>>(), [0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0]);
+    let [coarse, finer] = [0, 2].map(|i| model.rows[i].made_of.n_v);
+    assert!(finer > coarse, "the parameter reaches the structures: {coarse}, {finer} cells");
+
+    let json: serde_json::Value = serde_json::from_str(&Format::Json.write(&report)).unwrap();
+    assert_eq!(json["sweep"]["parameter"], "grid-density");
+    let (rows, best) = (&json["models"][0]["structures"], &json["models"][0]["best"]);
+    assert_eq!((&rows[3]["setting"]["value"], &rows[3]["setting"]["is_default"]), (&4.0.into(), &true.into()));
+    let cost = |row: &serde_json::Value| -> f64 {
+        let counts = |c: &serde_json::Value| c["tests"].as_f64().unwrap() + c["steps"].as_f64().unwrap();
+        row["classes"].as_object().unwrap().values().map(counts).sum()
+    };
+    let costs: Vec<f64> = (0..6).map(|i| cost(&rows[i])).collect();
+    let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
+    let place = costs.iter().position(|&c| c == least).unwrap();
+    assert_eq!((&best[0]["accel"], &best[0]["value"]), (&"grid".into(), &rows[place]["setting"]["value"]));
+    assert!((best[0]["saved"].as_f64().unwrap() - (1.0 - least / costs[3])).abs() < 1e-9);
+
+    let csv = Format::Csv.write(&report);
+    assert!(csv.lines().filter(|l| l.contains(",grid-density,16,false")).count() == 2 * Class::ALL.len(), "{csv}");
+    let text = text::write(&report, model);
+    for text in [&text, &Format::Markdown.write(&report), &Format::Html.write(&report)] {
+        assert!(text.contains("4 default") || text.contains("4 best default"), "{text}");
+        assert!(text.contains("grid-octree: ") && text.contains("tests and visits a ray together"), "{text}");
+    }
+}
+
+#[test]
+fn a_structure_whose_default_has_no_such_value_is_compared_with_it_all_the_same() {
+    let report = swept("leaf-size=1,8", &[AccelKind::Octree, AccelKind::Bvh], 1);
+    let settings = |kind| report.models[0].rows.iter().filter(move |r| r.kind == kind).map(|r| r.setting.unwrap());
+    let octree: Vec<_> = settings(AccelKind::Octree).map(|s| (s.value, s.is_default)).collect();
+    assert_eq!(octree, [(Some(1.0), false), (Some(8.0), false), (None, true)]);
+    assert_eq!(settings(AccelKind::Bvh).filter(|s| s.is_default).map(|s| s.value).collect::<Vec<_>>(), [Some(2.0)]);
+    let html = Format::Html.write(&report);
+    // One for each cost: tests, visits, time, memory, build.
+    assert_eq!(html.matches("k-octree level").count(), 5);
+    assert_eq!(html.matches("<circle class=\"k-bvh around\"").count(), 5);
+}
+
+#[test]
+fn what_auto_would_choose_is_held_against_the_rays() {
+    let kinds = vec![AccelKind::FastOctree, AccelKind::FastBvh];
+    let mut report = Stage::new().report(Plan { kinds, ..plan() });
+    let nodes = |row: &Row| {
+        let mut sum = RayCounts::default();
+        row.classes.iter().for_each(|c| sum += c.counts);
+        auto::nodes(&sum)
+    };
+    let [octree, bvh] = [0, 1].map(|i| nodes(&report.models[0].rows[i]));
+    for (kind, won) in [(AccelKind::FastOctree, bvh / octree - 1.0), (AccelKind::FastBvh, octree / bvh - 1.0)] {
+        report.models[0].auto.as_mut().unwrap().kind = kind;
+        let said = auto_sentences(&report, &report.models[0]);
+        assert!(said[0].starts_with(&format!("auto would choose {kind}: ")), "{said:?}");
+        let is_right = if won > -5e-4 { "was right" } else { "was wrong" };
+        assert!(said[1].contains(is_right) && said[1].contains(&format!("{:.1} %", 100.0 * won.abs())), "{said:?}");
+        let json: serde_json::Value = serde_json::from_str(&Format::Json.write(&report)).unwrap();
+        let auto = &json["models"][0]["auto"];
+        assert!((auto["won"].as_f64().unwrap() - won).abs() < 1e-12 && auto["by"] == "nodes", "{auto}");
+    }
+    report.models[0].rows.pop();
+    let said = auto_sentences(&report, &report.models[0]);
+    assert!(said[1].contains("not measured"), "{said:?}");
+}
+
+#[test]
+fn a_model_tells_how_many_objects_can_be_bounded() {
+    let mut report = Stage::new().report(Plan { kinds: vec![AccelKind::Boxes], ..plan() });
+    assert!(report.models[0].size().ends_with("in 4 objects"), "a box and three balls");
+    report.models[0].objects = 1;
+    let one = "15 prims in one object: spheres and boxes can only bound the whole";
+    let written = [Format::Html, Format::Markdown].map(|f| f.write(&report));
+    assert!(written.iter().chain([&text::write(&report, &report.models[0])]).all(|text| text.contains(one)));
+}
+
+#[test]
+fn the_difference_image_is_of_those_asked_for_or_of_the_fast_ones() {
+    let kinds = vec![AccelKind::None, AccelKind::Grid, AccelKind::FastOctree, AccelKind::FastBvh];
+    let mut report = Stage::new().report(Plan { kinds, ..plan() });
+    assert!(Format::Html.write(&report).contains("Tests in each pixel: fast-octree minus fast-bvh"));
+    report.compare = Some([AccelKind::Grid, AccelKind::None]);
+    let html = Format::Html.write(&report);
+    let rows = &report.models[0].rows;
+    let fewer = rows[0].tests_by_pixel.iter().zip(&rows[1].tests_by_pixel).filter(|(none, grid)| grid < none).count();
+    let share = 100.0 * fewer as f64 / f64::from(SIZE.0 * SIZE.1);
+    assert!(html.contains("grid minus none") && html.contains(&format!("in {share:.1} % of the pixels (blue)")));
+    report.models[0].rows[0].tests_by_pixel.clear();
+    assert!(Format::Html.write(&report).contains("No image of grid minus none"));
+    report.compare = None;
+    report.models[0].rows.truncate(3);
+    assert!(Format::Html.write(&report).contains("grid minus fast-octree"));
+}
+
+#[test]
+fn slow_structures_end_where_they_would_take_for_ever() {
+    let plan = plan();
+    let limit = (plan.slow_tests / Plan::FEWEST as u64) as usize;
+    assert!(plan.can_bear(AccelKind::None, limit) && !plan.can_bear(AccelKind::None, limit + 1));
+    assert!(plan.can_bear(AccelKind::Grid, 10_000_000));
+}
