@@ -6,7 +6,7 @@ use crate::bench::compare::Plan;
 use crate::bench::rays::Class;
 use crate::bench::report::auto::sentences as auto_sentences;
 use crate::bench::report::{Format, Model, Report, text};
-use crate::bench::row::Row;
+use crate::bench::row::{Count, Row};
 
 /// Three sizes of a family whose structures cost what laws say, to the digit.
 fn grown() -> Report {
@@ -109,12 +109,15 @@ fn a_structure_whose_default_has_no_such_value_is_compared_with_it_all_the_same(
 fn what_auto_would_choose_is_held_against_the_rays() {
     let kinds = vec![AccelKind::FastOctree, AccelKind::FastBvh];
     let mut report = Stage::new().report(Plan { kinds, ..plan() });
+    // In so small a scene both are one leaf; the second is to cost more.
+    report.models[0].rows[1].classes.iter_mut().for_each(|c| c.counts.n_ts += c.counts.queries);
     let nodes = |row: &Row| {
         let mut sum = RayCounts::default();
         row.classes.iter().for_each(|c| sum += c.counts);
         auto::nodes(&sum)
     };
     let [octree, bvh] = [0, 1].map(|i| nodes(&report.models[0].rows[i]));
+    assert!(bvh > octree * 1.1, "{octree} {bvh}");
     for (kind, won) in [(AccelKind::FastOctree, bvh / octree - 1.0), (AccelKind::FastBvh, octree / bvh - 1.0)] {
         report.models[0].auto.as_mut().unwrap().kind = kind;
         let said = auto_sentences(&report, &report.models[0]);
@@ -156,6 +159,14 @@ fn the_difference_image_is_of_those_asked_for_or_of_the_fast_ones() {
     report.compare = None;
     report.models[0].rows.truncate(3);
     assert!(Format::Html.write(&report).contains("grid minus fast-octree"));
+}
+
+#[test]
+fn an_average_ray_is_one_of_the_mixture_that_was_recorded() {
+    let report = Stage::new().report(Plan { kinds: vec![AccelKind::Grid], ..plan() });
+    let (model, row) = (&report.models[0], &report.models[0].rows[0]);
+    let tests: u64 = row.classes.iter().map(|c| c.counts.n_it).sum();
+    assert!((model.per_ray(row, Count::It) - tests as f64 / row.rays() as f64).abs() < 1e-9);
 }
 
 #[test]

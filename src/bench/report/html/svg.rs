@@ -147,6 +147,20 @@ mod tests {
     }
 
     #[test]
+    fn an_even_scale_has_values_and_a_narrow_one_enough_ticks() {
+        let even = Scale::even([0.0, 10.0].into_iter(), 0.0, 100.0);
+        assert_eq!([0.0, 3.0, 10.0].map(|v| even.at(v)), [0.0, 30.0, 100.0]);
+        assert_eq!(even.ticks(), [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]);
+        for (low, high) in [(1.0, 1.1), (3.1, 5.0), (0.4, 2.0), (7e-7, 9e-6), (0.5, 64.0), (1e3, 1e9)] {
+            let scale = Scale::tight([low, high].into_iter(), 0.0, 100.0);
+            let ticks = scale.ticks();
+            assert!((2..=8).contains(&ticks.len()), "{low} {high}: {ticks:?}");
+            assert!(ticks.iter().all(|&t| (-0.1..100.1).contains(&scale.at(t))), "{low} {high}: {ticks:?}");
+        }
+        assert_eq!([1.5e-6, 2e-3, 0.5, 10.0].map(unit), ["1.5 µs", "2 ms", "500 ms", "10 s"]);
+    }
+
+    #[test]
     fn a_scale_has_whole_decades_and_keeps_nothing_at_its_start() {
         let scale = Scale::around([0.0, 3.0, 250.0].into_iter(), 0.0, 300.0);
         assert_eq!((scale.low, scale.high, scale.ticks()), (0.0, 3.0, vec![1.0, 10.0, 100.0, 1000.0]));
