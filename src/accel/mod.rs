@@ -32,7 +32,7 @@ pub use any::{AccelKind, AnyAccel};
 pub use auto::AccelChoice;
 pub use bvh::Bvh;
 pub use grid::mailbox::MailboxKind;
-pub use grid::{GridOctree, GridParams};
+pub use grid::{Assign, GridOctree, GridParams};
 pub use intersector::{Intersector, IntersectorKind};
 pub use none::Unculled;
 pub use params::AccelParams;

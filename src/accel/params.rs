@@ -1,7 +1,7 @@
 //! What a user may ask of a structure; what is left open follows from its kind.
 
 use super::grid::mailbox::MailboxKind;
-use super::grid::params::{GridParams, ParamError, check};
+use super::grid::params::{Assign, GridParams, ParamError, check};
 use super::{AccelKind, bvh};
 
 /// Parameters of all structures; each looks at those that it has. `None`: what suits the kind.
@@ -19,6 +19,12 @@ pub struct AccelParams {
     /// Prims that a leaf may hold, 1 to 1000. For `bvh` and `grid-bvh`; for `grid-octree` and `octree` instead of the step
     /// cost: every cell that lists more is split, as deep as may be.
     pub leaf_size: Option<u32>,
+    /// Cells of the top grid on each axis, 1 to 1024, whatever the density. For kinds with a grid.
+    pub grid_cells: Option<[u32; 3]>,
+    /// References there may be for each prim in the cells of octrees, 1 to 1000. For `grid-octree` and `octree`.
+    pub max_references: Option<f64>,
+    /// What decides that a prim is listed in a cell, for grids and octrees.
+    pub assign: Assign,
     /// What a ray remembers, for grids and octrees.
     pub mailbox: MailboxKind,
 }
@@ -31,6 +37,9 @@ impl AccelParams {
         max_depth: None,
         step_cost: None,
         leaf_size: None,
+        grid_cells: None,
+        max_references: None,
+        assign: Assign::Surface,
         mailbox: MailboxKind::Exact,
     };
 
@@ -60,6 +69,9 @@ impl AccelParams {
             },
             step_cost: self.step_cost.unwrap_or(default.step_cost),
             leaf_size: self.leaf_size,
+            dims: self.grid_cells.filter(|_| kind != AccelKind::Octree),
+            references: self.max_references.unwrap_or(default.references),
+            assign: self.assign,
         }
     }
 

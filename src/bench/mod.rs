@@ -13,6 +13,7 @@ pub mod rays;
 pub mod replay;
 pub mod report;
 pub mod row;
+pub mod spd;
 pub mod star;
 pub mod sweep;
 #[cfg(test)]

@@ -12,7 +12,7 @@ use super::parse;
 use super::picture::Effective;
 use super::stats::Counted;
 use crate::accel::auto::Reason;
-use crate::accel::{AccelKind, MailboxKind};
+use crate::accel::{AccelKind, Assign, MailboxKind};
 use crate::image::{ExrSamples, FileKind, ImageError, Metadata, PngDepth, read_metadata};
 use crate::load::{Diagnostic, Loaded, MtlMode, Polygons};
 use crate::math::DVec3;
@@ -22,7 +22,7 @@ use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
 /// The flags that a picture may bring along.
-const FLAGS: [&str; 33] = [
+const FLAGS: [&str; 36] = [
     "size",
     "samples",
     "depth",
@@ -54,6 +54,9 @@ const FLAGS: [&str; 33] = [
     "max-depth",
     "step-cost",
     "leaf-size",
+    "grid-cells",
+    "max-references",
+    "assign",
     "mailbox",
     "allow-empty",
 ];
@@ -146,6 +149,11 @@ impl Facts<'_> {
         params.max_depth.iter().for_each(|n| set("max-depth", n.to_string()));
         params.step_cost.iter().for_each(|n| set("step-cost", n.to_string()));
         params.leaf_size.iter().for_each(|n| set("leaf-size", n.to_string()));
+        params.grid_cells.iter().for_each(|[x, y, z]| set("grid-cells", format!("{x}x{y}x{z}")));
+        params.max_references.iter().for_each(|n| set("max-references", n.to_string()));
+        if params.assign != Assign::default() {
+            set("assign", params.assign.name().into());
+        }
         if params.mailbox != MailboxKind::default() {
             set("mailbox", params.mailbox.name().into());
         }

@@ -1,7 +1,7 @@
 //! What was typed: syntax only. What it means together is decided in [`super::job`].
 
 use super::parse;
-use crate::accel::{AccelChoice, AccelKind, IntersectorKind, MailboxKind};
+use crate::accel::{AccelChoice, AccelKind, Assign, IntersectorKind, MailboxKind};
 use crate::bench::baseline::Limit;
 use crate::bench::sweep::Sweep;
 use crate::bench::verify::Plan;
@@ -243,6 +243,16 @@ pub(super) struct AccelArgs {
     /// Most shapes in a leaf [default: 2 for `bvh` and `grid-bvh`; octrees go by --step-cost]
     #[arg(long, value_name = "N", help_heading = "Structure", hide_short_help = true)]
     pub leaf_size: Option<u32>,
+    /// Cells of the grid on each axis, such as 46x46x3, whatever the density
+    #[arg(long, value_name = "XxYxZ", value_parser = parse::cells, help_heading = "Structure", hide_short_help = true)]
+    pub grid_cells: Option<[u32; 3]>,
+    /// Most references per shape in the cells of octrees [default: 12]
+    #[arg(long, value_name = "N", help_heading = "Structure", hide_short_help = true)]
+    pub max_references: Option<f64>,
+    /// What puts a shape into a cell: its surface or its box (grids and octrees)
+    #[arg(long, value_name = "WHAT", value_parser = parse::assign(), default_value = Assign::Surface.name(),
+          help_heading = "Structure", hide_short_help = true)]
+    pub assign: Assign,
     /// What a ray remembers of the shapes it met, so that they are tested once (grids and octrees)
     #[arg(long, value_name = "KIND", value_parser = parse::mailbox(), default_value = MailboxKind::Exact.name(),
           help_heading = "Structure", hide_short_help = true)]
@@ -287,7 +297,7 @@ pub(super) struct VerifyArgs {
 #[derive(Debug, Clone, Args)]
 pub(super) struct BenchArgs {
     /// Models or scene files, one after the other
-    #[arg(value_name = "FILE", required_unless_present = "generate")]
+    #[arg(value_name = "FILE", required_unless_present_any = ["generate", "spd"])]
     pub inputs: Vec<PathBuf>,
     /// How to load them.
     #[command(flatten)]
@@ -307,6 +317,12 @@ pub(super) struct BenchArgs {
     /// grid-density=0.5..16:9. Parameters: grid-density, grid-resolution, max-depth, step-cost, leaf-size
     #[arg(long, value_name = "NAME=VALUES", conflicts_with_all = ["generate", "baseline"], help_heading = "Structure")]
     pub sweep: Option<Sweep>,
+    /// Count on the NFF files of this folder what was published of the Standard Procedural Databases in 1999, and put both
+    /// side by side: rays, grids, octrees. Of the other flags --slow-tests (of a structure), --seed and --report count
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["inputs", "generate", "sweep", "baseline", "accel"],
+          help_heading = "Published figures")]
+    pub spd: Option<PathBuf>,
+
     /// Structures to compare, such as `grid-octree,fast-bvh` [default: all]
     #[arg(long, value_name = "NAMES", value_parser = parse::accel(), value_delimiter = ',', help_heading = "Structure")]
     pub accel: Vec<AccelKind>,

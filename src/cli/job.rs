@@ -341,6 +341,9 @@ pub(super) fn params(args: &AccelArgs) -> Result<AccelParams, Wrong> {
         max_depth: args.max_depth,
         step_cost: args.step_cost,
         leaf_size: args.leaf_size,
+        grid_cells: args.grid_cells,
+        max_references: args.max_references,
+        assign: args.assign,
         mailbox: args.mailbox,
     };
     params.validate().map_err(|e| Wrong(e.to_string()))?;

@@ -1,6 +1,6 @@
 //! The words of single flags: sizes, vectors, angles, colours. Errors say what would be right.
 
-use crate::accel::{AccelChoice, AccelKind, IntersectorKind, MailboxKind};
+use crate::accel::{AccelChoice, AccelKind, Assign, IntersectorKind, MailboxKind};
 use crate::bench::range::{Spacing, values};
 use crate::generate::{Family, MAX_TRIANGLES};
 use crate::image::ToneMap;
@@ -40,6 +40,12 @@ pub(super) fn pixel(text: &str) -> Result<(u32, u32), String> {
     let side = |s: &str| s.trim().parse::<u32>().ok();
     let pixel = text.split_once(',').and_then(|(x, y)| Some((side(x)?, side(y)?)));
     pixel.ok_or_else(|| "write column,row from the top left, such as 400,300".into())
+}
+
+/// Numbers of cells on the three axes; their range is the structure's business.
+pub(super) fn cells(text: &str) -> Result<[u32; 3], String> {
+    let parts: Option<Vec<u32>> = text.split(['x', 'X', '×']).map(|n| n.trim().parse().ok()).collect();
+    parts.and_then(|p| <[u32; 3]>::try_from(p).ok()).ok_or_else(|| "write three whole numbers, such as 46x46x3".into())
 }
 
 /// Three finite numbers.
@@ -179,6 +185,12 @@ pub(super) fn accel() -> impl TypedValueParser<Value = AccelKind> {
 pub(super) fn accel_choice() -> impl TypedValueParser<Value = AccelChoice> {
     let parse = |name: String| name.parse::<AccelChoice>().map_err(|e| e.to_string());
     PossibleValuesParser::new(AccelChoice::names()).try_map(parse)
+}
+
+/// What may put a shape into a cell.
+pub(super) fn assign() -> impl TypedValueParser<Value = Assign> {
+    let parse = |name: String| name.parse::<Assign>().map_err(|e| e.to_string());
+    PossibleValuesParser::new(Assign::ALL.map(Assign::name)).try_map(parse)
 }
 
 /// The names of all mailboxes.

@@ -9,7 +9,7 @@
 //! | `inputs`, `output`, `input_hash` | files as typed (`-`: standard streams); xxh3-128 of what was read, hexadecimal |
 //! | `width`, `height`, `samples`, `depth`, `cutoff`, `seed`, `view`, `accel`, `intersector`, `threads` | settings that were used |
 //! | `auto` | `null`, or why `--accel auto` took `accel`: `why` in words; `rays` and `prims` of the sample; cost of a ray through `fast-octree` and `fast-bvh`, in nodes of eight boxes |
-//! | `parameters` | of the structure, as used: `leaf_size` (`null`: by step cost); of grids and octrees `grid_density`, `grid_resolution`, `max_depth`, `step_cost`, `mailbox` as well |
+//! | `parameters` | of the structure, as used: `leaf_size` (`null`: by step cost); of grids and octrees `grid_density`, `grid_resolution`, `max_depth`, `step_cost`, `grid_cells` (`null`: by density), `max_references`, `assign`, `mailbox` as well |
 //! | `seconds` | of the timed run: `load`, `build`, `render`, `write`; `load` is 0 for further views of one input |
 //! | `scene` | `triangles`, `polygons`, `spheres`, `cones` (cylinders too), `planes`, `vertices`, `materials`, `textures`, `lights` |
 //! | `structure` | V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`; `bytes` and `depth` |
@@ -139,7 +139,8 @@ fn parameters(kind: AccelKind, params: &AccelParams) -> Value {
             let in_trees = (kind == AccelKind::GridBvh).then(|| params.tree_leaf_size());
             json!({
                 "grid_density": grid.density, "grid_resolution": grid.max_resolution, "max_depth": grid.max_depth,
-                "step_cost": grid.step_cost, "leaf_size": in_trees.or(grid.leaf_size), "mailbox": params.mailbox.name(),
+                "step_cost": grid.step_cost, "leaf_size": in_trees.or(grid.leaf_size), "grid_cells": grid.dims,
+                "max_references": grid.references, "assign": grid.assign.name(), "mailbox": params.mailbox.name(),
             })
         }
         _ => json!({}),

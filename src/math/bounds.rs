@@ -117,6 +117,16 @@ pub const CELL_PAD: f64 = 64.0 * U64 * RAY_CELLS;
 /// that is more than [`CELL_PAD`], so that a ray that meets the content passes through the grid whatever is rounded.
 pub const GRID_ROOM: f64 = 1.0 / 256.0;
 
+/// [`RAY_CELLS`] where cells and grid must be hardly larger than their content: 2³⁰.
+pub const NEAR_RAY_CELLS: f64 = (1u64 << 30) as f64;
+
+/// [`CELL_PAD`] for rays from within [`NEAR_RAY_CELLS`], by the same derivation: 2⁻¹⁷. Still far above what deciding
+/// which cells a prim touches errs by, 2⁻⁴⁸ R with R at most 2¹⁶.
+pub const NEAR_CELL_PAD: f64 = 64.0 * U64 * NEAR_RAY_CELLS;
+
+/// [`GRID_ROOM`] with it: 2⁻¹², more than [`NEAR_CELL_PAD`].
+pub const NEAR_GRID_ROOM: f64 = 1.0 / 4096.0;
+
 /// What a walk through cells takes for a zero in the direction, in finest cells: no plane is met along such an axis, for
 /// 10¹²⁰ times any distance is beyond every t, and no NaN arises. Smaller numbers do not occur: 2⁻¹⁴⁹ of an `f32` times
 /// at least 2⁻¹²⁹ cells per unit.

@@ -32,6 +32,7 @@ pub mod world;
 
 pub use costs::{Cost, Costs, UnknownCost, render_costs};
 pub use observer::{Asked, Question, Tape};
+pub use surface::given_normal;
 pub use view::View;
 pub use world::{PrimSource, World};
 

@@ -5,6 +5,7 @@
 
 use super::texture::{ColorSpace, TextureStore};
 use super::world::{Placement, PrimSource, World};
+use crate::accel::refine::Refined;
 use crate::accel::{Hit, NO_PRIM, Ray};
 use crate::math::bounds::offset_origin;
 use crate::math::{Vec2, Vec3, Vec4};
@@ -76,6 +77,12 @@ impl<'a> Target<'a> {
             }
         }
     }
+}
+
+/// The normal that a file gives for a point of a face: interpolated, of unit length, on whatever side the file has it.
+/// `None` where it gives none.
+pub fn given_normal(scene: &Scene, world: &World, prim: u32, at: &Refined) -> Option<Vec3> {
+    Target::new(scene, world, prim).patch(world, at.u, at.v, at.position)?.normal()
 }
 
 /// First corner and length of a polygon in its mesh.

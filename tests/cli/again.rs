@@ -9,7 +9,8 @@ fn a_picture_is_repeated_byte_for_byte() {
         let (first, second) = (format!("first.{extension}"), format!("second.{extension}"));
         // Those of the structure show in nothing but the metadata.
         let settings = "--view iso --exposure 0.5 --tone-map aces --seed 7 --background #204060 --accel grid-octree \
-                        --grid-density 0.5 --grid-resolution 9 --max-depth 3 --leaf-size 4 --mailbox hashed";
+                        --grid-density 0.5 --grid-resolution 9 --max-depth 3 --leaf-size 4 --grid-cells 4x5x6 \
+                        --max-references 20 --assign box --mailbox hashed";
         let settings: Vec<&str> = settings.split_whitespace().collect();
         folder.render(&[&["cube.obj", "-o", &first], settings.as_slice()].concat()).ends(0);
         folder.run(&["render", "--again", &first, "-o", &second]).ends(0);

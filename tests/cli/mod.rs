@@ -12,4 +12,5 @@ mod other_commands;
 mod output;
 mod program;
 mod same_pixels;
+mod spd;
 mod trace;

@@ -4,10 +4,12 @@
 //! meant and as `f64` where points are. A top cell is 2^levels finest cells wide, the cell of an octree node half of its
 //! parent's.
 
-use super::GridParams;
+use super::params::{Assign, GridParams};
 use crate::accel::Shapes;
 use crate::math::aabb::Aabb;
-use crate::math::bounds::{CELL_PAD, GRID_ROOM, NO_SLOPE, RAY_CELLS, WALK_MARGIN};
+use crate::math::bounds::{
+    CELL_PAD, GRID_ROOM, NEAR_CELL_PAD, NEAR_GRID_ROOM, NEAR_RAY_CELLS, NO_SLOPE, RAY_CELLS, WALK_MARGIN,
+};
 use crate::math::{DVec3, Vec3, Vec3Swizzles as _};
 
 /// Most finest cells along an axis, R in the derivation of [`CELL_PAD`].
@@ -43,6 +45,10 @@ impl CellMargins {
         no_slope: NO_SLOPE,
         guarded: true,
     };
+
+    /// The same for rays that start nearer: cells and grid are hardly larger than their content.
+    pub const NEAR: Self =
+        Self { pad: NEAR_CELL_PAD, room: NEAR_GRID_ROOM, ray_cells: NEAR_RAY_CELLS, ..Self::DERIVED };
 }
 
 /// Box, resolution and depth of a grid.
@@ -56,6 +62,8 @@ pub struct Lattice {
     pub dims: [u32; 3],
     /// Levels an octree below a top cell may have.
     pub levels: u32,
+    /// What decides that a prim is listed in a cell.
+    pub assign: Assign,
     /// What is allowed for.
     pub margins: CellMargins,
 }
@@ -75,27 +83,14 @@ impl Lattice {
         let longest = if longest > 0.0 { longest } else { lo.abs().max_element().max(f64::from(f32::MIN_POSITIVE)) };
         let extent = (hi - lo).max(DVec3::splat(longest / 1024.0));
 
-        let sizes = Sizes::of(shapes);
-        let cube_root = libm::cbrt(params.density * f64::from(prims) / (extent / longest).element_product()) / longest;
-        let resolution = |factor: f64| {
-            let most = f64::from(params.max_resolution);
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 1..=1024 before")]
-            (extent * cube_root * factor).to_array().map(|n| n.round().clamp(1.0, most) as u32)
-        };
-        // Large overlapping prims are listed in many cells each: then the cells must be larger.
-        let most_references = f64::from(prims) * TOP_REFERENCES;
-        let mut factor = 1.0;
-        let mut dims = resolution(factor);
-        while dims != [1; 3] && sizes.references(dims, extent) > most_references {
-            factor *= 0.75;
-            dims = resolution(factor);
-        }
+        let dims = params.dims.unwrap_or_else(|| dims(shapes, params, extent));
         let most = dims.into_iter().fold(1, u32::max);
         let levels = params.max_depth.min((MAX_FINE / most).ilog2());
 
         let room = extent * margins.room;
         let fine = DVec3::from_array(dims.map(|n| f64::from(n << levels)));
-        Self { lo: (lo + hi) / 2.0 - extent / 2.0 - room, scale: fine / (extent + room * 2.0), dims, levels, margins }
+        let lo = (lo + hi) / 2.0 - extent / 2.0 - room;
+        Self { lo, scale: fine / (extent + room * 2.0), dims, levels, assign: params.assign, margins }
     }
 
     /// Finest cells on each axis.
@@ -159,6 +154,28 @@ impl Lattice {
     pub fn top_len(&self) -> usize {
         self.dims.iter().map(|&n| n as usize).product()
     }
+}
+
+/// Cells on each axis for the density that is asked for.
+fn dims(shapes: &Shapes, params: &GridParams, extent: DVec3) -> [u32; 3] {
+    let longest = extent.max_element();
+    let sizes = Sizes::of(shapes);
+    let cube_root =
+        libm::cbrt(params.density * f64::from(shapes.bounded()) / (extent / longest).element_product()) / longest;
+    let resolution = |factor: f64| {
+        let most = f64::from(params.max_resolution);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 1..=1024 before")]
+        (extent * cube_root * factor).to_array().map(|n| n.round().clamp(1.0, most) as u32)
+    };
+    // Large overlapping prims are listed in many cells each: then the cells must be larger.
+    let most_references = f64::from(shapes.bounded()) * TOP_REFERENCES;
+    let mut factor = 1.0;
+    let mut dims = resolution(factor);
+    while dims != [1; 3] && sizes.references(dims, extent) > most_references {
+        factor *= 0.75;
+        dims = resolution(factor);
+    }
+    dims
 }
 
 /// Sums over the boxes of all prims, from which the references of any resolution follow at once.

@@ -12,8 +12,14 @@ use crate::math::random::Random;
 const DERIVED: CellMargins = CellMargins::DERIVED;
 
 /// Eight cells on each axis, no octrees.
-pub(in crate::accel) const EIGHT: GridParams =
-    GridParams { density: 64.0, max_resolution: 8, max_depth: 0, step_cost: 1.0, leaf_size: None };
+pub(in crate::accel) const EIGHT: GridParams = GridParams {
+    density: 64.0,
+    max_resolution: 8,
+    max_depth: 0,
+    step_cost: 1.0,
+    leaf_size: None,
+    ..GridParams::DEFAULT
+};
 
 fn wrong_with(margins: CellMargins, params: &GridParams, shapes: &Shapes, rays: &[Ray]) -> usize {
     wrong(&<GridOctree>::build_within(shapes, params, margins), shapes, rays)

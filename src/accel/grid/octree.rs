@@ -6,10 +6,7 @@ use super::{EMPTY, GridParams, NODE};
 use crate::accel::Shapes;
 use crate::math::DVec3;
 
-/// References there may be for each prim, in all cells together, beside [`FREE_REFERENCES`].
-const REFERENCES: f64 = 12.0;
-
-/// References that even a scene of few prims may have.
+/// References that even a scene of few prims may have, beside [`GridParams::references`] for each prim.
 const FREE_REFERENCES: f64 = 1024.0;
 
 /// All cells with their lists, and the octree nodes between the top grid and them.
@@ -96,7 +93,7 @@ pub(super) struct Refiner<'a> {
 
 impl<'a> Refiner<'a> {
     pub(super) fn new(shapes: &'a Shapes, lattice: &'a Lattice, params: &GridParams, listed: usize) -> Self {
-        let growth = (f64::from(shapes.bounded()) * REFERENCES + FREE_REFERENCES) / listed.max(1) as f64;
+        let growth = (f64::from(shapes.bounded()) * params.references + FREE_REFERENCES) / listed.max(1) as f64;
         let GridParams { step_cost, leaf_size, .. } = *params;
         Self { shapes, lattice, step_cost, leaf_size, growth, cells: Cells::new() }
     }

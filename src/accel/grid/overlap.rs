@@ -8,6 +8,7 @@
 //! and edge values err by at most 2⁻⁴⁸ R cells; only a plane's normal may err more, and has its own slack.
 
 use super::lattice::{Cube, Lattice};
+use super::params::Assign;
 use crate::accel::shapes::{Prim, Shapes, SpherePrim};
 use crate::math::DVec3;
 use crate::math::bounds::U64;
@@ -28,10 +29,25 @@ pub struct Overlap {
 #[derive(Clone, Debug)]
 #[expect(clippy::large_enum_variant, reason = "nearly all are triangles")]
 enum Surface {
-    Triangle { plane: Slab, edges: [Edge; 9] },
-    Polygon { plane: Slab },
-    Sphere { center: DVec3, radius: f64, cell: DVec3 },
-    Cone { base: DVec3, profile: Profile, cell: DVec3 },
+    Triangle {
+        plane: Slab,
+        edges: [Edge; 9],
+    },
+    Polygon {
+        plane: Slab,
+    },
+    Sphere {
+        center: DVec3,
+        radius: f64,
+        cell: DVec3,
+    },
+    Cone {
+        base: DVec3,
+        profile: Profile,
+        cell: DVec3,
+    },
+    /// Its box will do.
+    Unknown,
 }
 
 impl Overlap {
@@ -40,11 +56,12 @@ impl Overlap {
         let pad = lattice.margins.pad;
         let (lo, hi) = padded_box(shapes, prim, lattice);
         let surface = match shapes.prim(prim) {
+            _ if lattice.assign == Assign::Box => Surface::Unknown,
             Prim::Triangle(corners) => triangle(corners.map(|p| lattice.place(p)), lattice),
             Prim::Polygon(p) => polygon(p, lattice),
             Prim::Sphere(s) => sphere(s, lattice),
             Prim::Cone(c) => cone(c, lattice),
-            Prim::Plane(..) => Surface::Polygon { plane: Slab::default() },
+            Prim::Plane(..) => Surface::Unknown,
         };
         Self { pad, lo, hi, surface }
     }
@@ -62,6 +79,7 @@ impl Overlap {
 
     fn surface_meets(&self, lo: DVec3, side: f64) -> bool {
         match &self.surface {
+            Surface::Unknown => true,
             Surface::Triangle { plane, edges } => plane.meets(lo, side) && edges.iter().all(|e| e.meets(lo, side)),
             Surface::Polygon { plane } => plane.meets(lo, side),
             Surface::Sphere { center, radius, cell } => {

@@ -1,5 +1,8 @@
 //! How fine the grid and its octrees are.
 
+use std::fmt;
+use std::str::FromStr;
+
 /// Parameters of [`GridOctree`](super::GridOctree), all settled; the default suits meshes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GridParams {
@@ -12,9 +15,57 @@ pub struct GridParams {
     pub max_depth: u32,
     /// Cost of visiting a cell in prim tests, 0.1 to 100: a cell is split when that is expected to pay.
     pub step_cost: f64,
-    /// Instead of the step cost: every cell that lists more prims is split, as deep as `max_depth` allows and as long as
-    /// the references of all cells stay a small multiple of the prims.
+    /// Instead of the step cost: every cell that lists more prims is split, as deep as `max_depth` and `references` allow.
     pub leaf_size: Option<u32>,
+    /// Cells of the top grid on each axis, 1 to 1024, whatever the density; `None`: what density and resolution say.
+    pub dims: Option<[u32; 3]>,
+    /// References there may be for each prim in the cells of all octrees together, 1 to 1000.
+    pub references: f64,
+    /// What decides that a prim is listed in a cell.
+    pub assign: Assign,
+}
+
+/// What decides that a prim is listed in a cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Assign {
+    /// Its surface meets the cell.
+    #[default]
+    Surface,
+    /// Its box meets the cell: sooner built, but more is listed. What programs of the 1980s and 1990s did, and what their
+    /// published figures count.
+    Box,
+}
+
+impl Assign {
+    /// Every kind, in the order of the help text.
+    pub const ALL: [Self; 2] = [Self::Surface, Self::Box];
+
+    /// As typed and printed.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Surface => "surface",
+            Self::Box => "box",
+        }
+    }
+}
+
+impl fmt::Display for Assign {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A name that no way of assigning has.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("prims are not assigned to cells by {0:?}; there are: surface, box")]
+pub struct UnknownAssign(String);
+
+impl FromStr for Assign {
+    type Err = UnknownAssign;
+
+    fn from_str(name: &str) -> Result<Self, UnknownAssign> {
+        Self::ALL.into_iter().find(|a| a.name() == name).ok_or_else(|| UnknownAssign(name.into()))
+    }
 }
 
 impl Default for GridParams {
@@ -34,8 +85,16 @@ pub struct ParamError {
 
 impl GridParams {
     /// What suits most meshes.
-    pub const DEFAULT: Self =
-        Self { density: 0.25, max_resolution: 256, max_depth: 8, step_cost: 4.0, leaf_size: None };
+    pub const DEFAULT: Self = Self {
+        density: 0.25,
+        max_resolution: 256,
+        max_depth: 8,
+        step_cost: 4.0,
+        leaf_size: None,
+        dims: None,
+        references: 12.0,
+        assign: Assign::Surface,
+    };
 
     /// A grid without octrees, which has to be finer.
     pub const UNIFORM: Self = Self { density: 4.0, max_depth: 0, ..Self::DEFAULT };
@@ -51,7 +110,10 @@ impl GridParams {
         check("grid resolution", f64::from(resolution), (1..=1024).contains(&resolution), "1 to 1024")?;
         check("octree depth", f64::from(self.max_depth), self.max_depth <= 10, "0 to 10")?;
         let cost = self.step_cost;
-        check("step cost", cost, (0.1..=100.0).contains(&cost), "0.1 to 100")
+        check("step cost", cost, (0.1..=100.0).contains(&cost), "0.1 to 100")?;
+        check("references of a shape", self.references, (1.0..=1000.0).contains(&self.references), "1 to 1000")?;
+        let mut cells = self.dims.into_iter().flatten();
+        cells.try_for_each(|n| check("number of cells on an axis", f64::from(n), (1..=1024).contains(&n), "1 to 1024"))
     }
 }
 
@@ -74,6 +136,8 @@ mod tests {
             GridParams { max_resolution: 0, ..default },
             GridParams { max_depth: 11, ..default },
             GridParams { step_cost: 0.0, ..default },
+            GridParams { references: 0.5, ..default },
+            GridParams { dims: Some([4, 0, 4]), ..default },
         ] {
             assert!(bad.validate().is_err(), "{bad:?}");
         }

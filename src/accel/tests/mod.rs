@@ -16,11 +16,12 @@ use crate::math::shear::RaySpace;
 use crate::math::simd::Level;
 use scenes::{all, broken_rays, rays};
 
-const PARAMS: [GridParams; 4] = [
-    GridParams { density: 0.25, max_resolution: 256, max_depth: 8, step_cost: 4.0, leaf_size: None },
-    GridParams { density: 4.0, max_resolution: 64, max_depth: 0, step_cost: 2.0, leaf_size: None },
-    GridParams { density: 0.01, max_resolution: 1, max_depth: 7, step_cost: 0.5, leaf_size: None },
-    GridParams { density: 0.3, max_resolution: 4, max_depth: 10, step_cost: 1.0, leaf_size: None },
+const PARAMS: [GridParams; 5] = [
+    GridParams::DEFAULT,
+    GridParams { density: 4.0, max_resolution: 64, max_depth: 0, step_cost: 2.0, ..GridParams::DEFAULT },
+    GridParams { density: 0.01, max_resolution: 1, max_depth: 7, step_cost: 0.5, ..GridParams::DEFAULT },
+    GridParams { density: 0.3, max_resolution: 4, max_depth: 10, step_cost: 1.0, ..GridParams::DEFAULT },
+    GridParams { dims: Some([1, 2, 1]), max_depth: 5, leaf_size: Some(1), assign: Assign::Box, ..GridParams::DEFAULT },
 ];
 
 /// All hits of the three queries, as bits.

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `schema`, `version`, `complete` | `meshray-bench/1`; of meshray; false while the command has not ended |
 //! | `machine` | `cpu`, `cores`, `system`, `simd`, `compiler`, `flags` |
-//! | `settings` | `threads`, `passes`, `seed`, `rays` (most of a class), `slow_tests` (most tests of a class in a slow structure), and what was asked of structures: `grid_density`, `grid_resolution`, `max_depth`, `step_cost`, `leaf_size` (each null: what suits the kind), `mailbox` |
+//! | `settings` | `threads`, `passes`, `seed`, `rays` (most of a class), `slow_tests` (most tests of a class in a slow structure), and what was asked of structures: `grid_density`, `grid_resolution`, `max_depth`, `step_cost`, `leaf_size`, `grid_cells`, `max_references` (each null: what suits the kind), `assign`, `mailbox` |
 //! | `models` | one for each model |
 //! | `sweep` | null, or the `parameter` that is swept and its `values` |
 //! | `growth` | null, or how cost grows where the models are a family in growing sizes |
@@ -54,7 +54,8 @@ pub fn write(report: &Report) -> String {
             "threads": p.threads, "passes": p.passes, "seed": p.seed, "rays": p.rays, "slow_tests": p.slow_tests,
             "grid_density": p.params.density, "grid_resolution": p.params.max_resolution,
             "max_depth": p.params.max_depth, "step_cost": p.params.step_cost, "leaf_size": p.params.leaf_size,
-            "mailbox": p.params.mailbox.name(),
+            "grid_cells": p.params.grid_cells, "max_references": p.params.max_references,
+            "assign": p.params.assign.name(), "mailbox": p.params.mailbox.name(),
         },
         "models": report.models.iter().map(|m| model(report, m)).collect::<Vec<_>>(),
         "sweep": report.plan.sweep.as_ref().map(|s| json!({ "parameter": s.parameter.name(), "values": s.values })),

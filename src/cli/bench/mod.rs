@@ -2,6 +2,7 @@
 
 mod gate;
 mod scene;
+mod spd;
 
 use super::args::BenchArgs;
 use super::exit::Exit;
@@ -37,6 +38,9 @@ pub(super) fn run(args: &BenchArgs) -> Exit {
             return Exit::Usage;
         }
     };
+    if let Some(folder) = &args.spd {
+        return spd::run(folder, args, &files, &messages);
+    }
     let gate = match args.baseline.as_ref().map(|path| Gate::read(path, &args.fail_if, &messages)).transpose() {
         Ok(gate) => gate,
         Err(exit) => return exit,

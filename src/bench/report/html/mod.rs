@@ -18,15 +18,26 @@ use crate::bench::row::{ClassRow, Count, Row};
 /// tell apart; each class has a shape of its own too.
 const STYLE: &str = include_str!("style.css");
 
-/// The page.
-pub fn write(report: &Report) -> String {
-    let mut out = format!(
+/// A page of our look under this title.
+pub fn page(title: &str, body: &str) -> String {
+    format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
          <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
-         <title>meshray bench</title><style>{STYLE}</style></head><body>\n<h1>meshray bench</h1>\n\
-         <p>The rays of one picture of a model, sent through every structure: are the hits the same, and what do they \
-         cost?</p>\n"
-    );
+         <title>{title}</title><style>{STYLE}</style></head><body>\n<h1>{title}</h1>\n{body}</body></html>\n"
+    )
+}
+
+/// A paragraph of a sentence.
+pub fn paragraph(sentence: &str) -> String {
+    format!("<p>{}.</p>\n", escaped(sentence))
+}
+
+/// The page.
+pub fn write(report: &Report) -> String {
+    let mut out =
+        "<p>The rays of one picture of a model, sent through every structure: are the hits the same, and what \
+                   do they cost?</p>\n"
+            .to_owned();
     if !report.complete {
         out += "<p class=\"bad\">Not finished: more is to come, or the command was ended.</p>\n";
     }
@@ -37,7 +48,7 @@ pub fn write(report: &Report) -> String {
             Some(_) => folded(model, &section(report, model)),
         };
     }
-    out + &notes(report) + "</body></html>\n"
+    page("meshray bench", &(out + &notes(report)))
 }
 
 /// One of many models, to be opened by who wants it.
@@ -196,7 +207,8 @@ fn table(title: &str, titles: &[&str], rows: Vec<Vec<String>>) -> String {
     )
 }
 
-fn table_of(shown: &Table) -> String {
+/// A table with its title.
+pub fn table_of(shown: &Table) -> String {
     let titles: Vec<String> = shown.columns.iter().map(|c| escaped(c)).collect();
     let titles: Vec<&str> = titles.iter().map(String::as_str).collect();
     let rows = shown.rows.iter().map(|row| row.iter().map(|cell| escaped(cell)).collect()).collect();

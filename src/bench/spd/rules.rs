@@ -1,0 +1,239 @@
+//! Haines' rules: which rays a picture of one of his scenes needs, so that the counts of two programs are comparable.
+//!
+//! Eye rays pass through the corners of 512 × 512 pixels. What is hit sends a shadow ray to each light, unless its normal
+//! points away from it; what reflects or lets light through sends a reflected ray, what lets light through also a
+//! refracted one, unless it is reflected totally. No ray is left out for its small weight; the eye ray is the first of at
+//! most five generations. Surfaces are seen from both sides.
+
+use crate::accel::{Accel, Hit, NO_PRIM, NoProbe, Ray, Shapes};
+use crate::math::{DVec3, Vec3};
+use crate::render::optics::{reflect, refract};
+use crate::render::{World, given_normal};
+use crate::scene::{Camera, LightKind, Projection, Scene, Surface};
+use rayon::prelude::*;
+use std::ops::AddAssign;
+
+/// Pixels on an axis.
+pub const PIXELS: u32 = 512;
+
+/// Generations of rays, the eye's counted.
+const GENERATIONS: u32 = 5;
+
+/// Rays that are traced together.
+const SLICE: usize = 4096;
+
+/// Which side of a surface counts as its outside when shadow rays are sent. The rules leave it open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Facing {
+    /// That from which it is seen, as Haines' own counts have it.
+    Turned,
+    /// That of the file's normals, as Havran's have it.
+    Outward,
+}
+
+/// How many rays there were, and how many hit something.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Eye rays.
+    pub primary: u64,
+    /// Those that hit.
+    pub primary_hits: u64,
+    /// Reflected rays.
+    pub reflected: u64,
+    /// Refracted rays.
+    pub refracted: u64,
+    /// Reflected and refracted rays that hit.
+    pub secondary_hits: u64,
+    /// Shadow rays.
+    pub shadow: u64,
+    /// Shadow rays that met something before the light, whether it lets light through or not.
+    pub shadow_hits: u64,
+}
+
+impl Tally {
+    /// Reflected and refracted rays.
+    pub fn secondary(&self) -> u64 {
+        self.reflected + self.refracted
+    }
+
+    /// Rays that hit something; a picture cannot do with fewer tests.
+    pub fn hits(&self) -> u64 {
+        self.primary_hits + self.secondary_hits + self.shadow_hits
+    }
+
+    /// All rays.
+    pub fn rays(&self) -> u64 {
+        self.primary + self.secondary() + self.shadow
+    }
+}
+
+impl AddAssign for Tally {
+    fn add_assign(&mut self, o: Self) {
+        self.primary += o.primary;
+        self.primary_hits += o.primary_hits;
+        self.reflected += o.reflected;
+        self.refracted += o.refracted;
+        self.secondary_hits += o.secondary_hits;
+        self.shadow += o.shadow;
+        self.shadow_hits += o.shadow_hits;
+    }
+}
+
+/// The rays of a picture.
+#[derive(Clone, Debug, Default)]
+pub struct Sent {
+    /// How many.
+    pub tally: Tally,
+    /// Eye rays, then those reflected and refracted, generation by generation: what do they hit first?
+    pub seeing: Vec<Ray>,
+    /// Shadow rays: does anything lie on them?
+    pub shadow: Vec<Ray>,
+}
+
+/// Sends all rays of the picture that the scene's first camera sees. `None` if it has none, or one for parallel rays.
+///
+/// `pixels` is their number on an axis; there is one more corner. Everything must stop light: `shapes` are those of
+/// `world`, but all opaque, and `accel` is built over them.
+pub fn send<A: Accel>(
+    scene: &Scene,
+    world: &World,
+    shapes: &Shapes,
+    accel: &A,
+    facing: Facing,
+    pixels: u32,
+) -> Option<Sent> {
+    let tracer = Tracer { scene, world, shapes, accel, facing, lights: lights(scene, world), kinds: kinds(scene) };
+    let mut rays = eye_rays(scene.cameras.first()?, world.center, pixels)?;
+    let mut sent = Sent::default();
+    for generation in 1..=GENERATIONS {
+        let last = generation == GENERATIONS;
+        let parts: Vec<Part> = rays.par_chunks(SLICE).map(|slice| tracer.trace(slice, last)).collect();
+        let mut next = Vec::new();
+        for part in parts {
+            sent.tally += part.tally;
+            sent.shadow.extend(part.shadow);
+            next.extend(part.next);
+            let hits = if generation == 1 { &mut sent.tally.primary_hits } else { &mut sent.tally.secondary_hits };
+            *hits += part.hits;
+        }
+        if generation == 1 {
+            sent.tally.primary = rays.len() as u64;
+        }
+        sent.seeing.append(&mut rays);
+        rays = next;
+    }
+    Some(sent)
+}
+
+/// Through the corners of all pixels, row by row from above.
+fn eye_rays(camera: &Camera, center: DVec3, pixels: u32) -> Option<Vec<Ray>> {
+    let Projection::Perspective { y_fov, .. } = camera.projection else { return None };
+    let half = libm::tan(y_fov / 2.0);
+    let origin = (camera.world_from_camera.translation - center).as_vec3();
+    let at = |i: u32| half * (2.0 * f64::from(i) / f64::from(pixels) - 1.0);
+    let ray = |row: u32, column: u32| {
+        let dir = camera.world_from_camera.matrix3 * DVec3::new(at(column), -at(row), -1.0);
+        ray(origin, dir.as_vec3(), f32::INFINITY)
+    };
+    Some((0..=pixels).flat_map(|row| (0..=pixels).map(move |column| (row, column))).map(|(r, c)| ray(r, c)).collect())
+}
+
+/// No ray excludes the face it starts on: the programs that are compared with tested it as any other.
+fn ray(origin: Vec3, dir: Vec3, t_max: f32) -> Ray {
+    Ray { origin, t_min: 0.0, dir, t_max, exclude: NO_PRIM, sample: 0 }
+}
+
+/// Places of the lights in the frame of the shapes.
+fn lights(scene: &Scene, world: &World) -> Vec<Vec3> {
+    let place = |kind: &LightKind| match kind {
+        LightKind::Point { position, .. } => Some((position - world.center).as_vec3()),
+        _ => None,
+    };
+    scene.lights.iter().filter_map(|light| place(&light.kind)).collect()
+}
+
+/// What a material sends.
+#[derive(Clone, Copy, Debug, Default)]
+struct Kind {
+    reflects: bool,
+    /// Index of refraction of what lets light through.
+    transmits: Option<f64>,
+}
+
+fn kinds(scene: &Scene) -> Vec<Kind> {
+    let kind = |surface: &Surface| match surface {
+        Surface::Phong(phong) => {
+            let transmits = (phong.transmission.max_element() > 0.0).then_some(f64::from(phong.ior));
+            Kind { reflects: phong.specular.max_element() > 0.0 || transmits.is_some(), transmits }
+        }
+        _ => Kind::default(),
+    };
+    scene.materials.iter().map(|m| kind(&m.surface)).collect()
+}
+
+struct Tracer<'a, A> {
+    scene: &'a Scene,
+    world: &'a World,
+    shapes: &'a Shapes,
+    accel: &'a A,
+    facing: Facing,
+    lights: Vec<Vec3>,
+    kinds: Vec<Kind>,
+}
+
+/// What some rays led to.
+#[derive(Default)]
+struct Part {
+    tally: Tally,
+    hits: u64,
+    shadow: Vec<Ray>,
+    next: Vec<Ray>,
+}
+
+impl<A: Accel> Tracer<'_, A> {
+    fn trace(&self, rays: &[Ray], last: bool) -> Part {
+        let mut scratch = self.accel.scratch();
+        let mut hits = vec![Hit::MISS; rays.len()];
+        self.accel.closest(rays, &mut hits, &mut scratch, &mut NoProbe);
+        let mut part = Part::default();
+        for (ray, hit) in rays.iter().zip(&hits).filter(|(_, hit)| hit.is_some()) {
+            part.hits += 1;
+            self.follow(ray, hit, last, &mut part);
+        }
+        let mut blocked = vec![false; part.shadow.len()];
+        self.accel.occluded(&part.shadow, &mut blocked, &mut scratch, &mut NoProbe);
+        part.tally.shadow = part.shadow.len() as u64;
+        part.tally.shadow_hits = blocked.iter().filter(|b| **b).count() as u64;
+        part
+    }
+
+    /// The rays that a hit sends.
+    fn follow(&self, ray: &Ray, hit: &Hit, last: bool, part: &mut Part) {
+        let at = self.shapes.refine(ray, hit);
+        let own = given_normal(self.scene, self.world, hit.prim, &at).unwrap_or(at.normal);
+        let seen_from_front = own.dot(ray.dir) <= 0.0;
+        let turned = if seen_from_front { own } else { -own };
+
+        let lit_side = if self.facing == Facing::Turned { turned } else { own };
+        for light in self.lights.iter().filter(|&&light| lit_side.dot(light - at.position) > 0.0) {
+            let origin = at.origin(light - at.position);
+            // The light is at 1.
+            part.shadow.push(self::ray(origin, light - origin, 1.0));
+        }
+
+        let kind = self.kinds[self.world.material(self.scene, hit.prim) as usize];
+        if last || !kind.reflects {
+            return;
+        }
+        let incident = ray.dir.normalize_or_zero();
+        let mut send = |dir: Vec3| part.next.push(self::ray(at.origin(dir), dir, f32::INFINITY));
+        send(reflect(incident, turned));
+        part.tally.reflected += 1;
+        let Some(index) = kind.transmits else { return };
+        let (from, to) = if seen_from_front { (1.0, index) } else { (index, 1.0) };
+        if let Some(dir) = refract(incident, turned, from, to) {
+            send(dir);
+            part.tally.refracted += 1;
+        }
+    }
+}
