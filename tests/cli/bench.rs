@@ -91,5 +91,5 @@ fn a_report_says_what_auto_would_choose_and_how_many_objects_there_are() {
     let report: Value = serde_json::from_slice(&folder.read("r.json")).unwrap();
     let model = &report["models"][0];
     assert_eq!((&model["objects"], &model["auto"]["kind"]), (&1.into(), &"fast-octree".into()));
-    assert_eq!(model["auto"]["won"], 0.0, "both are one leaf");
+    assert_eq!(model["auto"]["won_nodes"], 0.0, "both are one leaf");
 }

@@ -6,19 +6,20 @@ use crate::accel::auto::nodes;
 use crate::accel::{AccelKind, RayCounts};
 use crate::bench::row::Row;
 
-/// How the choice fared against the other fast structure.
+/// How the choice fared against the other fast structure. Shares are of the chosen one's cost, by which the other's is
+/// more; below 0 the choice lost.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outcome {
     /// What was chosen.
     pub chosen: AccelKind,
     /// What else could have been.
     pub other: AccelKind,
-    /// How much more the other costs, as a share of the chosen one's cost; below 0 the choice lost.
-    pub won: f64,
-    /// Whether that is the time of a ray, or what `auto` counts.
-    pub is_time: bool,
-    /// Whether the passes of the two do not overlap.
-    pub is_clear: bool,
+    /// Share of the time of a ray; `None` without times.
+    pub time: Option<f64>,
+    /// Share of the nodes of a ray, as `auto` counts them.
+    pub nodes: f64,
+    /// What makes the times doubtful, to be added to a sentence.
+    doubt: &'static str,
 }
 
 impl Outcome {
@@ -31,29 +32,44 @@ impl Outcome {
         };
         let row = |kind| model.rows.iter().find(|r| r.kind == kind && r.setting.is_none());
         let (ours, theirs) = (row(chosen)?, row(other)?);
-        let is_time = report.is_timed();
-        let cost = |row: &Row| if is_time { model.seconds_per_ray(row) } else { counted(row) };
-        let [[low, high], [other_low, other_high]] = [ours, theirs].map(|row| model.seconds_range(row));
-        let is_clear = !is_time || high < other_low || other_high < low;
-        Some(Self { chosen, other, won: cost(theirs) / cost(ours) - 1.0, is_time, is_clear })
+        let share = |cost: &dyn Fn(&Row) -> f64| cost(theirs) / cost(ours) - 1.0;
+        Some(Self {
+            chosen,
+            other,
+            time: report.is_timed().then(|| share(&|row| model.seconds_per_ray(row))),
+            nodes: share(&counted),
+            doubt: report.doubt(model, ours, theirs),
+        })
+    }
+
+    /// Whether the choice was the better one, by time where there is one.
+    pub fn is_right(&self) -> bool {
+        is_no_loss(self.time.unwrap_or(self.nodes))
     }
 
     /// Whether the choice was the better one, and by how much.
     pub fn sentence(&self) -> String {
-        let Self { chosen, other, won, is_time, is_clear } = *self;
-        let (costs, less) = match is_time {
-            true => ("took", "time"),
-            false => ("cost", "nodes by the same count"),
-        };
-        let but = if is_clear { "" } else { ", which is within the spread of the passes" };
-        // A difference of nothing is no loss.
-        if won > -5e-4 {
-            let more = 100.0 * won.max(0.0);
-            return format!("On these rays that was right: {other} {costs} {more:.1} % more {less}{but}");
+        let Self { other, nodes, doubt, .. } = self;
+        let right = if self.is_right() { "right" } else { "wrong" };
+        let counted = format!("counted as auto does, {other} costs {}", more(*nodes));
+        match self.time {
+            Some(time) => {
+                format!("On these rays that was {right}: {other} takes {} time{doubt}; {counted}", more(time))
+            }
+            None => format!("On these rays that was {right}: {counted}"),
         }
-        let saved = -100.0 * won;
-        format!("On these rays that was wrong: {other} {costs} {saved:.1} % less {less} than {chosen}{but}")
     }
+}
+
+/// A difference of nothing is no loss.
+fn is_no_loss(share: f64) -> bool {
+    share > -5e-4
+}
+
+/// A share as `3.1 % more` or `3.1 % less`.
+fn more(share: f64) -> String {
+    let word = if is_no_loss(share) { "more" } else { "less" };
+    format!("{:.1} % {word}", 100.0 * share.abs())
 }
 
 /// What `auto` counts, for an average ray of the picture.
@@ -77,9 +93,10 @@ pub fn sentences(report: &Report, model: &Model) -> Vec<String> {
 pub fn over_sizes(report: &Report) -> Option<String> {
     let told = |model: &Model| {
         let (kind, prims) = (model.auto?.kind, grouped(model.prims as u64));
-        let fared = Outcome::of(report, model).map_or(String::new(), |o| {
-            let verb = if o.won > -5e-4 { "won" } else { "lost" };
-            format!(" ({verb} {:.1} %{})", 100.0 * o.won.abs(), if o.is_clear { "" } else { ", within the spread" })
+        let fared = Outcome::of(report, model).map_or(String::new(), |outcome| {
+            let verb = if outcome.is_right() { "right" } else { "wrong" };
+            let by = outcome.time.unwrap_or(outcome.nodes);
+            format!(" ({verb}: {} takes {}{})", outcome.other, more(by), outcome.doubt)
         });
         Some(format!("{kind} at {prims} prims{fared}"))
     };

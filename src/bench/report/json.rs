@@ -10,8 +10,8 @@
 //! | `growth` | null, or how cost grows where the models are a family in growing sizes |
 //!
 //! A model has `file`, `hash` (xxh3-128 of what was read), `prims` (N), `objects` (that `spheres` and `boxes` bound), `auto`
-//! (null, or what it would choose: `kind`, `why`, and `won`: how much more the other fast structure costs as a share of
-//! the chosen one's cost, `by` `t_tr` or `nodes`), `picture` (`width`, `height`, `samples`, `depth`,
+//! (null, or what it would choose: `kind`, `why`, and `won_time` and `won_nodes`: how much more the other fast
+//! structure costs in time and nodes, as a share of the chosen one's cost), `picture` (`width`, `height`, `samples`, `depth`,
 //! `view`), `rays` (by class: `asked`, `kept`), `identical` (whether all hits were), `reference`, and `structures`. A
 //! structure has `accel`, `sampled`, `differing` (rays), `t_b` and `t_tr` (seconds, of a ray; each `median`, `min`, `max`,
 //! `passes`, or null without times), V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`, `bytes`, `break_even` (rays, or null),
@@ -85,8 +85,8 @@ fn choice(report: &Report, model: &Model) -> Value {
     let Some(reason) = model.auto else { return Value::Null };
     let outcome = Outcome::of(report, model);
     json!({
-        "kind": reason.kind.name(), "why": reason.to_string(), "won": outcome.map(|o| o.won),
-        "by": outcome.map(|o| if o.is_time { "t_tr" } else { "nodes" }),
+        "kind": reason.kind.name(), "why": reason.to_string(), "won_time": outcome.and_then(|o| o.time),
+        "won_nodes": outcome.map(|o| o.nodes),
     })
 }
 

@@ -175,6 +175,17 @@ impl Report {
         self.plan.passes > 0
     }
 
+    /// What to add where the times of two structures are told apart: nothing, where all passes of one beat all of the other.
+    fn doubt(&self, model: &Model, a: &Row, b: &Row) -> &'static str {
+        let [[low, high], [other_low, other_high]] = [a, b].map(|row| model.seconds_range(row));
+        match self.plan.passes {
+            0 => "",
+            1 => " (one pass only, so of unknown spread)",
+            _ if high < other_low || other_high < low => "",
+            _ => " (within the spread of the passes)",
+        }
+    }
+
     /// How times were taken, in a sentence.
     pub fn method(&self) -> String {
         let Plan { passes, threads, seed, slow_tests, .. } = &self.plan;

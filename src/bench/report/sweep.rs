@@ -70,22 +70,14 @@ impl Curve<'_> {
             false => {
                 let saved = 100.0 * self.saved(report, model).unwrap_or(0.0);
                 let than = default.value.map_or_else(|| default.to_string(), |value| value.to_string());
-                format!("{kind}: {best} is best, {told}, {saved:.1} % less than the default, {than}")
+                let doubt = self.default.map_or("", |default| report.doubt(model, self.best, default));
+                format!("{kind}: {best} is best, {told}, {saved:.1} % less than the default, {than}{doubt}")
             }
         };
-        if !best.is_default && !self.is_clear(report, model) {
-            text += ", which is within the spread of the passes";
-        }
         if let Some(end) = self.end() {
             text += &format!("; it is the {end} value measured, so the best may lie beyond");
         }
         text
-    }
-
-    /// Whether the slowest passes of the best value beat the fastest of the default.
-    fn is_clear(&self, report: &Report, model: &Model) -> bool {
-        let range = |row| model.seconds_range(row);
-        !report.is_timed() || self.default.is_none_or(|default| range(self.best)[1] < range(default)[0])
     }
 
     /// Which end of the values the best is at; the default is no end.

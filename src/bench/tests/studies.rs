@@ -126,7 +126,7 @@ fn what_auto_would_choose_is_held_against_the_rays() {
         assert!(said[1].contains(is_right) && said[1].contains(&format!("{:.1} %", 100.0 * won.abs())), "{said:?}");
         let json: serde_json::Value = serde_json::from_str(&Format::Json.write(&report)).unwrap();
         let auto = &json["models"][0]["auto"];
-        assert!((auto["won"].as_f64().unwrap() - won).abs() < 1e-12 && auto["by"] == "nodes", "{auto}");
+        assert!((auto["won_nodes"].as_f64().unwrap() - won).abs() < 1e-12 && auto["won_time"].is_null(), "{auto}");
     }
     report.models[0].rows.pop();
     let said = auto_sentences(&report, &report.models[0]);
@@ -159,6 +159,23 @@ fn the_difference_image_is_of_those_asked_for_or_of_the_fast_ones() {
     report.compare = None;
     report.models[0].rows.truncate(3);
     assert!(Format::Html.write(&report).contains("grid minus fast-octree"));
+}
+
+#[test]
+fn times_that_overlap_or_come_from_one_pass_are_said_to_be_doubtful() {
+    let told = |times: [&[f64]; 2]| {
+        let kinds = vec![AccelKind::FastOctree, AccelKind::FastBvh];
+        let mut report = Stage::new().report(Plan { kinds, ..plan() });
+        report.plan.passes = times[0].len();
+        for (row, times) in report.models[0].rows.iter_mut().zip(times) {
+            row.classes.iter_mut().for_each(|c| times.iter().for_each(|&t| c.seconds.push(t)));
+        }
+        auto_sentences(&report, &report.models[0]).swap_remove(1)
+    };
+    assert!(told([&[4.0, 5.0], &[6.0, 6.75]]).contains("right: fast-bvh takes 41.7 % more time;"));
+    assert!(told([&[4.0, 5.0], &[3.0, 3.3]]).contains("wrong: fast-bvh takes 30.0 % less time;"));
+    assert!(told([&[4.0, 5.0], &[4.5, 9.0]]).contains("(within the spread of the passes)"));
+    assert!(told([&[4.0], &[6.0]]).contains("50.0 % more time (one pass only"));
 }
 
 #[test]
