@@ -8,6 +8,7 @@ pub mod compare;
 pub mod fit;
 pub mod machine;
 pub mod oracle;
+pub mod pruning;
 pub mod range;
 pub mod rays;
 pub mod replay;

@@ -83,6 +83,7 @@ impl Stage {
             rays: rays.iter().map(Rays::of).collect(),
             rows: self.rows(&rays, &plan),
             left_out: Vec::new(),
+            pruning: None,
         };
         Report {
             machine: Machine::here(),

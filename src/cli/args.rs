@@ -207,6 +207,9 @@ pub(super) struct RenderArgs {
     /// Parameters of the structure
     #[command(flatten)]
     pub params: AccelArgs,
+    /// Do the work of every feature, of those too that the scene lacks (`inspect` lists them); the picture is the same
+    #[arg(long, help_heading = "Run", hide_short_help = true)]
+    pub no_prune: bool,
 
     /// Threads to use; 0: all
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=1024), help_heading = "Run")]

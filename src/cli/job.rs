@@ -38,6 +38,8 @@ pub(super) struct RenderJob {
     pub params: AccelParams,
     /// 0: all.
     pub threads: usize,
+    /// Whether what the scene does without is done all the same.
+    pub everything: bool,
     /// Heat maps beside each picture.
     pub heatmaps: Vec<Cost>,
     /// What their brightest colour stands for; `None`: the most of any pixel.
@@ -155,6 +157,7 @@ impl RenderJob {
             accel: args.accel,
             intersector: args.intersector,
             threads: usize::from(args.threads),
+            everything: args.no_prune,
             heatmaps: args.heatmap.clone(),
             heatmap_max: args.heatmap_max,
             stats,

@@ -33,6 +33,7 @@ impl Effective {
                 cutoff: look.cutoff.or(hints.cutoff).unwrap_or(usual.cutoff),
                 seed: look.seed,
                 layers: look.layers,
+                everything: false,
             },
             output: Output {
                 tone_map: look.tone_map.or(hinted).unwrap_or_default(),
@@ -42,6 +43,14 @@ impl Effective {
                 ..Output::default()
             },
         })
+    }
+}
+
+impl Effective {
+    /// The same; whether what the scene does without is done all the same.
+    pub(super) fn with_everything(mut self, everything: bool) -> Self {
+        self.settings.everything = everything;
+        self
     }
 }
 

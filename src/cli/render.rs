@@ -134,6 +134,7 @@ fn prepare(job: &RenderJob, batch: &Batch, messages: &Messages, progress: &Progr
         })?;
     }
     let world = World::new(&loaded.scene);
+    let world = if job.everything { world.with_everything() } else { world };
     if world.shapes.is_empty() && !job.allow_empty {
         messages.say(Severity::Error, &nothing_to_draw(&loaded, &batch.inputs[0]));
         return Err(Exit::Input);
@@ -173,7 +174,7 @@ fn render_shot(
         return fail(&fault, Exit::Failed);
     }
     let effective = match Effective::new(&job.look, &loaded.scene.hints) {
-        Ok(effective) => effective,
+        Ok(effective) => effective.with_everything(job.everything),
         Err(text) => return fail(&Diagnostic::new("scene-value", file, "", text), Exit::Input),
     };
     if let Some(fault) = picture::too_large(&effective, cost_layers::wanted(job).len(), job.load.limits.memory) {
@@ -198,6 +199,7 @@ fn render_shot(
     let (accel, reason) = auto::build(job.accel, &world.shapes, &job.params);
     let accel = accel.tested_by(job.intersector);
     let textures = TextureStore::new(&loaded.scene);
+    let textures = if job.everything { textures.with_everything() } else { textures };
     times.build = start.elapsed().as_secs_f64();
 
     let work = Job {

@@ -1,5 +1,6 @@
 //! What every ray of an image shares: the scene, its lights and sky in the centred frame, and the limits of the trees.
 
+use super::Settings;
 use super::shade::{Band, LocalLight, Sky, bands};
 use super::texture::TextureStore;
 use super::world::World;
@@ -24,18 +25,15 @@ pub(crate) struct Context<'a> {
     pub depth: u32,
     /// Branches whose largest weight is below this end.
     pub cutoff: f32,
+    /// Whether what the scene does without is done all the same.
+    pub everything: bool,
 }
 
 impl<'a> Context<'a> {
-    pub(crate) fn new(
-        scene: &'a Scene,
-        world: &'a World,
-        textures: &'a TextureStore<'a>,
-        depth: Option<u32>,
-        cutoff: f32,
-    ) -> Self {
+    pub(crate) fn new(scene: &'a Scene, world: &'a World, textures: &'a TextureStore<'a>, settings: &Settings) -> Self {
+        let everything = settings.everything;
         let features = Features::of(scene);
-        let needs = |any: &[Feature]| any.iter().any(|&f| features.has(f));
+        let needs = |any: &[Feature]| everything || any.iter().any(|&f| features.has(f));
         Self {
             scene,
             world,
@@ -45,8 +43,9 @@ impl<'a> Context<'a> {
             bands: if needs(&[Feature::Dispersion]) { bands() } else { Vec::new() },
             has_filters: needs(&[Feature::Mask, Feature::Blend, Feature::ThinTransmission, Feature::Refraction]),
             shows_environment: scene.background == Some(Background::Environment),
-            depth: depth.unwrap_or_else(|| auto_depth(&features)),
-            cutoff,
+            depth: settings.depth.unwrap_or_else(|| auto_depth(&features)),
+            cutoff: settings.cutoff,
+            everything,
         }
     }
 

@@ -159,7 +159,7 @@ fn pass<P: Observer, T: Copy + Default + Send>(
     cost: impl Fn(&mut ByClass<P>, usize) -> Vec<T> + Sync,
 ) -> Option<Vec<T>> {
     let settings = job.settings;
-    let context = Context::new(job.scene, job.world, job.textures, settings.depth, settings.cutoff);
+    let context = Context::new(job.scene, job.world, job.textures, settings);
     cost_tiles(&context, job.accel, job.view, settings, progress, together, cost)
 }
 

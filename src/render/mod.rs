@@ -11,6 +11,7 @@
 mod asking;
 mod context;
 mod costs;
+pub mod everything;
 mod layers;
 mod observer;
 pub mod optics;
@@ -61,11 +62,23 @@ pub struct Settings {
     pub seed: u64,
     /// Whether [`crate::image::Layers`] are wanted.
     pub layers: bool,
+    /// Whether what the scene does without is done all the same, for nothing (see [`everything`]). The world and the
+    /// textures of the [`Job`] must be such, too.
+    pub everything: bool,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { width: 1024, height: 768, samples: 4, depth: None, cutoff: 1.0 / 512.0, seed: 0, layers: false }
+        Self {
+            width: 1024,
+            height: 768,
+            samples: 4,
+            depth: None,
+            cutoff: 1.0 / 512.0,
+            seed: 0,
+            layers: false,
+            everything: false,
+        }
     }
 }
 
@@ -176,7 +189,7 @@ pub struct Recording {
 
 fn render_with<P: Observer>(job: &Job, progress: &dyn Progress) -> (Rendered, Vec<ByClass<P>>) {
     let settings = job.settings;
-    let context = Context::new(job.scene, job.world, job.textures, settings.depth, settings.cutoff);
+    let context = Context::new(job.scene, job.world, job.textures, settings);
     let (picture, counts, complete) = tile::render_tiles(&context, job.accel, job.view, settings, progress);
     (Rendered { picture, counts: ClassCounts::default(), depth: context.depth, complete }, counts)
 }

@@ -93,7 +93,7 @@ pub struct Story {
 /// Traces one sample (counted from 0) of the pixel in column x and row y; `None`: there is no such pixel or sample.
 pub fn tell(job: &Job, pixel: (u32, u32), sample: u32) -> Option<Story> {
     let settings = job.settings;
-    let context = Context::new(job.scene, job.world, job.textures, settings.depth, settings.cutoff);
+    let context = Context::new(job.scene, job.world, job.textures, settings);
     let (seen, told) = trace_sample::<_, Listener>(&context, job.accel, job.view, settings, pixel, sample)?;
     let mut queries = gather(told);
     let parents: Vec<Option<usize>> = (0..queries.len()).map(|i| parent(job, &queries, i)).collect();

@@ -3,6 +3,7 @@
 //! Evaluated once, for the hit that counts. Nothing here knows of light; materials are only asked for their normal and
 //! bump maps. Whatever a file gives, normals come out finite and of unit length.
 
+use super::everything::turn_in_vain;
 use super::texture::{ColorSpace, TextureStore};
 use super::world::{Placement, PrimSource, World};
 use crate::accel::refine::Refined;
@@ -243,7 +244,7 @@ impl Patch<'_> {
     }
 
     /// The normal as the material's normal map turns it.
-    fn normal_mapped(
+    pub(crate) fn normal_mapped(
         &self,
         normal: Vec3,
         material: &Material,
@@ -260,7 +261,13 @@ impl Patch<'_> {
     /// The normal as the material's bump map turns it: by the slope of the heights, from differences one texel wide.
     ///
     /// J. F. Blinn, "Simulation of Wrinkled Surfaces" (1978), with heights in units of the texture's side.
-    fn bumped(&self, normal: Vec3, material: &Material, store: &TextureStore, print: &Footprint) -> Option<Vec3> {
+    pub(crate) fn bumped(
+        &self,
+        normal: Vec3,
+        material: &Material,
+        store: &TextureStore,
+        print: &Footprint,
+    ) -> Option<Vec3> {
         let map = material.bump_map.as_ref()?;
         let (tangent, bitangent) = self.tangents(normal, map, print)?;
         let at = self.coordinates(map, print);
@@ -344,6 +351,9 @@ impl<'a> Surface<'a> {
         let material = self.target.material;
         let own = patch.normal().unwrap_or(if self.front { self.geometric } else { -self.geometric });
         let side = if own.dot(self.geometric) < 0.0 { -1.0 } else { 1.0 };
+        if store.has_everything() {
+            turn_in_vain(store, patch, own, material, &self.footprint);
+        }
         let mapped = patch.normal_mapped(own, material, store, &self.footprint).unwrap_or(own);
         let bumped = patch.bumped(mapped, material, store, &self.footprint).unwrap_or(mapped);
         self.normal = facing(bumped * side, self.view);

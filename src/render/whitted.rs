@@ -20,6 +20,7 @@ use super::surface::{Surface, Target};
 use super::wave::{Crossing, Medium, Path, Queue, RayClass, Wave};
 use crate::accel::{Accel, Hit, Ray};
 use crate::math::{DVec3, Vec3};
+use std::hint::black_box;
 
 /// Rays traced together at most; bounds the memory of a worker.
 pub(crate) const WAVE_LIMIT: usize = 1 << 13;
@@ -218,6 +219,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
 
         if path.depth < context.depth {
             self.reflect_and_refract(&point, &crossing);
+        } else if context.everything {
+            black_box(point.balance(&crossing));
         }
     }
 

@@ -119,6 +119,13 @@ impl World {
         world
     }
 
+    /// The same, in which every prim is asked what light it lets through (see [`everything`](super::everything)).
+    #[must_use]
+    pub fn with_everything(mut self) -> Self {
+        self.shapes.opaque = BitSet::filled(self.shapes.len(), false);
+        self
+    }
+
     /// What prim `prim` came from.
     pub fn source(&self, prim: u32) -> PrimSource {
         let (triangles, polygons) = (index(self.shapes.triangles.len()), index(self.shapes.polygons.len()));

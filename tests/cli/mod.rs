@@ -11,6 +11,7 @@ mod messages;
 mod other_commands;
 mod output;
 mod program;
+mod pruning;
 mod same_pixels;
 mod spd;
 mod trace;

@@ -18,7 +18,9 @@
 //! and `classes`. A class has exact sums (`rays`, `hits`, `tests`, `steps`, `cells`, `empty_cells`, `volume_tests`,
 //! `tests_saved`, `transforms`), `per_ray` (`n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`, `n_xf`, `n_min`), `interval` (half the 95 %
 //! interval of the same, or null when nothing was left out), `culled`, `differing`, `t_tr` (seconds of a ray) and
-//! `mrays`. `left_out` names slow structures that could not bear so many prims.
+//! `mrays`. `left_out` names slow structures that could not bear so many prims. `pruning` is null, or seconds of processor
+//! time of rendering the picture as `usual` and with `everything` on (each as `t_b`), `saved` (a share) and `same`
+//! (whether the pixels were).
 //!
 //! Where a parameter is swept, a structure's `setting` has its `value` (null: another parameter rules) and `is_default`,
 //! and the model has `best`: of each `accel` the best `value`, `by` (`t_tr`, or `n_it+n_ts` without times), and `saved`
@@ -78,6 +80,9 @@ fn model(report: &Report, model: &Model) -> Value {
         "structures": model.rows.iter().map(|row| structure(model, row)).collect::<Vec<_>>(),
         "best": report.plan.sweep.as_ref().map(|_| best(report, model)),
         "left_out": model.left_out.iter().map(|k| k.name()).collect::<Vec<_>>(),
+        "pruning": model.pruning.as_ref().map(|p| json!({
+            "usual": spread(&p.usual), "everything": spread(&p.everything), "saved": p.saved(), "same": p.same,
+        })),
     })
 }
 

@@ -34,6 +34,9 @@ fn write_model(out: &mut String, report: &Report, model: &Model) {
         sweep::tables(report, model).iter().for_each(|table| *out += &format!("\n{}", table.markdown()));
         return;
     }
+    if let Some(pruning) = &model.pruning {
+        *out += &format!("{}.\n\n", pruning.sentence());
+    }
     let mut titles = vec!["structure", "memory", "n_in", "n_v", "n_ev", "n_oiv"];
     if report.is_timed() {
         titles.extend(["t_b", "min..max", "Mrays/s", "break-even"]);

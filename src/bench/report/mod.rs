@@ -15,6 +15,7 @@ pub mod text;
 use super::clock::Spread;
 use super::compare::{Plan, break_even};
 use super::machine::Machine;
+use super::pruning::Pruning;
 use super::rays::{Class, RaySet};
 use super::row::{Count, Row};
 use crate::accel::AccelKind;
@@ -70,6 +71,8 @@ pub struct Model {
     pub rows: Vec<Row>,
     /// Slow structures that could not bear so many prims.
     pub left_out: Vec<AccelKind>,
+    /// What is saved by leaving out what the scene does not need; `None`: not measured.
+    pub pruning: Option<Pruning>,
 }
 
 /// How many rays there were of a class.

@@ -28,7 +28,9 @@ fn write_model(out: &mut String, report: &Report, model: &Model) -> Result {
         write_class(out, report, model, i, rays)?;
     }
     writeln!(out, "\n{}", model.verdict())?;
-    auto::sentences(report, model).iter().try_for_each(|text| write!(out, "{}", wrapped(&format!("{text}."))))
+    auto::sentences(report, model).iter().try_for_each(|text| write!(out, "{}", wrapped(&format!("{text}."))))?;
+    let pruning = model.pruning.iter().map(|p| wrapped(&format!("{}.", p.sentence())));
+    pruning.into_iter().try_for_each(|text| write!(out, "{text}"))
 }
 
 /// One model in two lines, where the tables are of all.

@@ -176,6 +176,7 @@ impl Bench<'_> {
             rays: sets.iter().map(Rays::of).collect(),
             rows: Vec::new(),
             left_out,
+            pruning: None,
         });
 
         // After each structure the report is written, so that a crash costs one row.
@@ -194,10 +195,20 @@ impl Bench<'_> {
         let Some(rows) = compare(&prepared.world.shapes, &sets, pixels, &plan, &mut go_on) else {
             return if interrupt::raised() { Exit::Interrupted } else { self.no_threads(&name, plan.threads) };
         };
+        if plan.passes > 0 && plan.sweep.is_none() && report.family.is_none() {
+            self.messages.info("progress", format!("{name}: rendering with every code path on"));
+            let pruning = prepared.pruning(plan.passes);
+            report.models.iter_mut().last().into_iter().for_each(|model| model.pruning.clone_from(&pruning));
+        }
         written = written.max(self.keep(report, &rows));
         let Some(model) = report.models.last() else { return Exit::Failed };
         let tables = if report.family.is_some() { text::write_short(model) } else { text::write(report, model) + "\n" };
         written = written.max(self.print(&tables));
+        if model.pruning.as_ref().is_some_and(|pruning| !pruning.same) {
+            let text = format!("{name}: the picture with every code path on differs from the usual one");
+            self.messages.error("pixels-differ", text, "please report it with the file");
+            return Exit::Failed;
+        }
         if model.differing() == 0 {
             return written;
         }

@@ -6,6 +6,7 @@ use super::super::exit::Exit;
 use super::super::message::{Messages, Severity};
 use super::super::read;
 use crate::accel::{AccelKind, AccelParams, AnyAccel};
+use crate::bench::pruning::Pruning;
 use crate::generate::Family;
 use crate::load::{Diagnostic, Loaded};
 use crate::render::texture::TextureStore;
@@ -110,16 +111,29 @@ impl Prepared {
 
     /// Lets `work` have it as a job. Which structure it has does not matter: all find the same hits.
     pub(super) fn with_job<T>(&self, work: impl FnOnce(&Job) -> T) -> T {
-        let accel = AnyAccel::build(AccelKind::DEFAULT, &self.world.shapes, &AccelParams::DEFAULT);
-        let textures = TextureStore::new(&self.loaded.scene);
-        work(&Job {
-            scene: &self.loaded.scene,
-            world: &self.world,
-            accel: &accel,
-            textures: &textures,
-            view: &self.view,
-            settings: &self.settings,
+        self.job_in(&self.world, &TextureStore::new(&self.loaded.scene), &self.settings, work)
+    }
+
+    /// What leaving out saves that the scene does not need; `None` when no thread can be started.
+    pub(super) fn pruning(&self, passes: usize) -> Option<Pruning> {
+        let world = self.world.clone().with_everything();
+        let textures = TextureStore::new(&self.loaded.scene).with_everything();
+        let settings = Settings { everything: true, ..self.settings.clone() };
+        self.job_in(&world, &textures, &settings, |everything| {
+            self.with_job(|usual| Pruning::measure(usual, everything, passes))
         })
+    }
+
+    fn job_in<T>(
+        &self,
+        world: &World,
+        textures: &TextureStore,
+        settings: &Settings,
+        work: impl FnOnce(&Job) -> T,
+    ) -> T {
+        let accel = AnyAccel::build(AccelKind::DEFAULT, &world.shapes, &AccelParams::DEFAULT);
+        let scene = &self.loaded.scene;
+        work(&Job { scene, world, accel: &accel, textures, view: &self.view, settings })
     }
 }
 

@@ -6,6 +6,7 @@
 use super::Told;
 use super::words::{in_world, inside};
 use crate::accel::probe::{Extent, Outcome, Visit};
+use crate::accel::{AccelKind, AccelParams, AnyAccel};
 use crate::bench::report::number::grouped;
 use crate::image::draw::{Canvas, Color, text_height, text_width};
 use crate::math::{DVec2, DVec3};
@@ -36,6 +37,9 @@ const REFRACTED: Color = [204, 121, 167];
 /// Both views and a legend.
 pub(super) fn draw(told: &Told, job: &Job) -> Canvas {
     let Some(eye) = told.story.queries.first() else { return Canvas::filled(1, 1, PAPER) };
+    // Whatever the ray went through: all structures give the same picture, and this one soon.
+    let accel = AnyAccel::build(AccelKind::DEFAULT, &told.world.shapes, &AccelParams::DEFAULT);
+    let job = &Job { accel: &accel, ..*job };
     let stage = Stage::new(told, eye);
     let legend = stage.legend();
     let line = text_height(DOT) + 8;

@@ -30,7 +30,12 @@ const MAX_PROBES: f32 = 8.0;
 pub struct TextureStore<'a> {
     textures: &'a [Texture],
     bitmaps: Vec<Source<'a>>,
+    /// What is read where there is no map.
+    stand_in: Option<Source<'static>>,
 }
+
+/// The texture of maps that are not there.
+pub(super) const STAND_IN: u32 = u32::MAX;
 
 /// A bitmap and its smaller copies in both colour spaces.
 #[derive(Debug)]
@@ -44,7 +49,21 @@ impl<'a> TextureStore<'a> {
     /// Makes the scene's textures readable; copies and computes nothing.
     pub fn new(scene: &'a Scene) -> Self {
         let source = |bitmap| Source { bitmap, srgb: Pyramid::new(bitmap), linear: Pyramid::new(bitmap) };
-        Self { textures: &scene.textures, bitmaps: scene.bitmaps.iter().map(source).collect() }
+        Self { textures: &scene.textures, bitmaps: scene.bitmaps.iter().map(source).collect(), stand_in: None }
+    }
+
+    /// The same, in which maps that are not there are read, too, for nothing (see [`everything`](super::everything)).
+    #[must_use]
+    pub fn with_everything(self) -> Self {
+        let bitmap: &'static Bitmap = &super::everything::GREY;
+        let source = Source { bitmap, srgb: Pyramid::new(bitmap), linear: Pyramid::new(bitmap) };
+        Self { stand_in: Some(source), ..self }
+    }
+
+    /// Whether it is that one.
+    #[inline]
+    pub(super) fn has_everything(&self) -> bool {
+        self.stand_in.is_some()
     }
 
     /// Columns and rows of a texture's bitmap; (1, 1) for a texture that does not exist.
@@ -65,6 +84,9 @@ impl<'a> TextureStore<'a> {
     }
 
     fn find(&self, texture: u32) -> Option<(Sampler, &Source<'a>)> {
+        if texture == STAND_IN {
+            return self.stand_in.as_ref().map(|source| (Sampler::default(), source));
+        }
         let texture = self.textures.get(texture as usize)?;
         let source = self.bitmaps.get(texture.bitmap as usize)?;
         is_whole(source.bitmap).then_some((texture.sampler, source))

@@ -74,6 +74,7 @@ fn section(report: &Report, model: &Model) -> String {
         return out + &sweep::figures(report, model, sweep) + "</section>\n";
     }
     out += &glance(report, model);
+    out += &model.pruning.iter().map(|p| format!("<p>{}.</p>\n", escaped(&p.sentence()))).collect::<String>();
     out += &figure(
         "Tests a ray",
         "Ray/prim tests (n_it) of an average ray, by what sent it. Further left is better; each step is ten times.",
