@@ -5,6 +5,7 @@ pub mod aim;
 pub mod baseline;
 pub mod clock;
 pub mod compare;
+pub mod explain;
 pub mod fit;
 pub mod machine;
 pub mod oracle;

@@ -42,6 +42,8 @@ pub(super) enum Command {
     Verify(VerifyArgs),
     /// Compare structures on a model: the same rays through each, whether the hits are the same, what they cost
     Bench(Box<BenchArgs>),
+    /// Say why a mesh costs what it costs: what is taken away in turn, and what that saves
+    Explain(Box<ExplainArgs>),
     /// Tell one ray of a picture in order: what it visits, tests and hits, and all rays that come of it
     Trace(Box<TraceArgs>),
     /// Write a scene of any size: tetra, gears, balls, tree, mountain, stadium, instances
@@ -390,6 +392,48 @@ pub(super) struct BenchArgs {
     pub fail_if: Vec<Limit>,
     /// Only the tables, warnings and errors
     #[arg(short, long, help_heading = "Run")]
+    pub quiet: bool,
+}
+
+/// What `meshray explain` was given.
+#[derive(Debug, Clone, Args)]
+pub(super) struct ExplainArgs {
+    /// The model whose cost is explained.
+    #[command(flatten)]
+    pub model: ModelArgs,
+
+    /// Columns and rows of the pictures that are counted
+    #[arg(long, value_name = "WxH", value_parser = parse::size, default_value = "160x120", help_heading = "Picture")]
+    pub size: (u32, u32),
+    /// Bounces after the eye ray [default: what the scene needs]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=64), help_heading = "Picture")]
+    pub depth: Option<u32>,
+    /// Side of the model
+    #[arg(long, value_name = "NAME", value_parser = parse::view(), help_heading = "Picture", conflicts_with_all = ["camera", "eye"])]
+    pub view: Option<NamedView>,
+    /// A camera of the file, by name or number from 0
+    #[arg(long, value_name = "NAME", help_heading = "Picture", conflicts_with = "eye")]
+    pub camera: Option<String>,
+    /// Camera position
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::vec3, help_heading = "Picture", allow_hyphen_values = true)]
+    pub eye: Option<[f64; 3]>,
+    /// Point the camera looks at [default: middle of the model]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::vec3, help_heading = "Picture", allow_hyphen_values = true, requires = "eye")]
+    pub at: Option<[f64; 3]>,
+
+    /// Structure whose tests and steps are counted
+    #[arg(long, value_name = "NAME", value_parser = parse::accel_choice(), default_value = AccelChoice::AUTO,
+          help_heading = "Structure")]
+    pub accel: AccelChoice,
+    /// Parameters of the structure
+    #[command(flatten)]
+    pub params: AccelArgs,
+
+    /// Print JSON (schema `meshray-explain/1`)
+    #[arg(long, help_heading = "Output")]
+    pub json: bool,
+    /// Only warnings and errors on standard error
+    #[arg(short, long, help_heading = "Output")]
     pub quiet: bool,
 }
 

@@ -10,6 +10,7 @@ mod bench;
 mod camera;
 mod cost_layers;
 mod exit;
+mod explain;
 mod generate;
 mod inspect;
 mod interrupt;
@@ -54,6 +55,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
         Command::Inspect(args) => inspect::run(&args),
         Command::Bench(args) => bench::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Explain(args) => explain::run(&args),
         Command::Trace(args) => trace::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::Completions { shell } => shell::completions(shell),

@@ -5,6 +5,7 @@ mod backdrop;
 mod bench;
 mod costs;
 mod endings;
+mod explain;
 mod generate;
 mod interrupt;
 mod messages;

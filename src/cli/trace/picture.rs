@@ -120,8 +120,6 @@ struct Stage<'a> {
     /// The scene's box.
     scene: (DVec3, DVec3),
     view: View,
-    /// On which side of the picture the ray begins.
-    from_left: bool,
 }
 
 /// A square part of the plane of the picture, in world units.
@@ -158,10 +156,10 @@ impl<'a> Stage<'a> {
             (side.length() > 1e-3 * dir.length()).then(|| side.normalize())
         };
         let forward = across_ray(up).or_else(|| across_ray(DVec3::X)).unwrap_or(DVec3::Z);
-        let from_left = ((scene.0 + scene.1) * 0.5 - ends.1).dot(forward) >= 0.0;
-        let forward = if from_left { forward } else { -forward };
+        let is_behind = ((scene.0 + scene.1) * 0.5 - ends.1).dot(forward) >= 0.0;
+        let forward = if is_behind { forward } else { -forward };
         let view = View::look_along(ends.1, forward, up, Lens::orthographic(2.0));
-        Self { told, eye, parts, ends, scene, view, from_left }
+        Self { told, eye, parts, ends, scene, view }
     }
 
     /// Where a point lies in the plane of the picture, in world units from the end of the ray.
@@ -315,8 +313,14 @@ impl<'a> Stage<'a> {
 
     /// Colours and what they mean, of what there is.
     fn legend(&self) -> Vec<(Color, String)> {
-        let side = if self.from_left { "left" } else { "right" };
-        let mut legend = vec![(RAY, format!("eye ray, from the {side}; dot: its end"))];
+        let from = self.flat(self.ends.0);
+        let side = match (from.y.abs() > from.x.abs(), from) {
+            (true, from) if from.y > 0.0 => "above",
+            (true, _) => "below",
+            (false, from) if from.x < 0.0 => "the left",
+            (false, _) => "the right",
+        };
+        let mut legend = vec![(RAY, format!("eye ray, from {side}; dot: its end"))];
         for part in Part::ALL {
             let count = self.parts.iter().filter(|(_, p)| *p == part).count();
             let text = match part {

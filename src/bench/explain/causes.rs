@@ -1,0 +1,185 @@
+//! What can be suspected in a scene, and the scene without it.
+
+use super::mend::{self, Corners, cut, length, slimness, triangles};
+use super::{Case, Cause, Suspect};
+use crate::accel::AccelKind;
+use crate::math::DVec3;
+use crate::render::Settings;
+use crate::scene::features::{Feature, Features};
+use crate::scene::{AlphaMode, Scene};
+
+/// A triangle is huge from this part of the scene's extent on.
+const HUGE: f64 = 0.25;
+/// It is cut into pieces of this part.
+const PIECE: f64 = 1.0 / 16.0;
+/// A triangle is a sliver when its height is less than this part of its length.
+const SLIM: f64 = 0.05;
+/// Pieces that triangles are cut into at most.
+const MOST_PIECES: usize = 1 << 18;
+/// Bounces that are left of glass.
+const SHALLOW: u32 = 2;
+/// Cells along an axis in which a cluster is looked for.
+const CELLS: usize = 32;
+
+/// All that can be suspected, in the order of [`Cause::ALL`].
+pub(super) fn suspects(case: &Case) -> Vec<Suspect> {
+    let size = Size::of(&case.scene);
+    let found = [
+        huge_triangles(case, &size),
+        dense_cluster(case, &size),
+        shells(case),
+        slivers(case, &size),
+        alpha_cards(case),
+        glass(case),
+        lights(case),
+    ];
+    found.into_iter().flatten().collect()
+}
+
+/// How large the triangles of a scene are.
+struct Size {
+    lo: DVec3,
+    hi: DVec3,
+    count: usize,
+}
+
+impl Size {
+    fn of(scene: &Scene) -> Self {
+        let none = Self { lo: DVec3::INFINITY, hi: DVec3::NEG_INFINITY, count: 0 };
+        triangles(scene).fold(none, |size, corners| {
+            let (lo, hi) = corners.into_iter().fold((size.lo, size.hi), |(lo, hi), p| (lo.min(p), hi.max(p)));
+            Self { lo, hi, count: size.count + 1 }
+        })
+    }
+
+    fn extent(&self) -> f64 {
+        (self.hi - self.lo).max_element()
+    }
+}
+
+fn with_scene(case: &Case, scene: Scene) -> Case {
+    Case { scene, ..case.clone() }
+}
+
+fn huge_triangles(case: &Case, size: &Size) -> Option<Suspect> {
+    let is_huge = |corners: &Corners| length(corners) > HUGE * size.extent() && slimness(corners) >= SLIM;
+    let count = triangles(&case.scene).filter(is_huge).count();
+    (count > 0 && count * 4 < size.count).then(|| {
+        let limit = PIECE * size.extent();
+        Suspect {
+            cause: Cause::HugeTriangles,
+            evidence: format!("{count} of {} triangles are longer than a quarter of the scene", size.count),
+            remedy: format!("cut them into triangles with edges below {limit:.3} units"),
+            without: with_scene(case, cut(&case.scene, |c| is_huge(c).then_some(limit), MOST_PIECES)),
+        }
+    })
+}
+
+fn slivers(case: &Case, size: &Size) -> Option<Suspect> {
+    let is_sliver = |corners: &Corners| slimness(corners) < SLIM && length(corners) > size.extent() * PIECE * 0.5;
+    let count = triangles(&case.scene).filter(is_sliver).count();
+    (count > 0).then(|| {
+        let limit = |corners: &Corners| {
+            let height = slimness(corners) * length(corners);
+            is_sliver(corners).then_some((8.0 * height).max(size.extent() / 64.0))
+        };
+        Suspect {
+            cause: Cause::Slivers,
+            evidence: format!(
+                "{count} of {} triangles are long and less than {:.0} % as high as long",
+                size.count,
+                100.0 * SLIM
+            ),
+            remedy: "remesh them, or cut them across into pieces about as long as high".into(),
+            without: with_scene(case, cut(&case.scene, limit, MOST_PIECES)),
+        }
+    })
+}
+
+fn shells(case: &Case) -> Option<Suspect> {
+    let (scene, copies) = mend::without_copies(&case.scene);
+    (copies > 0).then(|| Suspect {
+        cause: Cause::Shells,
+        evidence: format!("{copies} triangles stand on the same corners as others"),
+        remedy: "remove duplicate faces (merge vertices by distance first)".into(),
+        without: with_scene(case, scene),
+    })
+}
+
+fn dense_cluster(case: &Case, size: &Size) -> Option<Suspect> {
+    // Both fast structures have tight boxes; which of them is better is for `auto` to say.
+    if matches!(case.accel, AccelKind::FastBvh | AccelKind::FastOctree) || size.count == 0 {
+        return None;
+    }
+    // The fewest cells that hold the middles of half of the triangles.
+    let mut cells = vec![0usize; CELLS * CELLS * CELLS];
+    let scale = (size.hi - size.lo).max(DVec3::splat(size.extent() * 1e-9)).recip() * CELLS as f64;
+    for corners in triangles(&case.scene) {
+        let place = ((corners.iter().sum::<DVec3>() / 3.0 - size.lo) * scale).to_array();
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` saturates, NaN is 0")]
+        let [x, y, z] = place.map(|p| (p as usize).min(CELLS - 1));
+        cells[(z * CELLS + y) * CELLS + x] += 1;
+    }
+    cells.sort_unstable();
+    let mut held = 0;
+    let needed = cells.iter().rev().take_while(|&&n| {
+        let before = held;
+        held += n;
+        before * 2 < size.count
+    });
+    let part = 100.0 * needed.count() as f64 / cells.len() as f64;
+    Some(Suspect {
+        cause: Cause::DenseCluster,
+        evidence: format!("half of the triangles lie in {part:.2} % of the scene's box, which {} divides", case.accel),
+        remedy: "--accel fast-bvh".into(),
+        without: Case { accel: AccelKind::FastBvh, ..case.clone() },
+    })
+}
+
+fn alpha_cards(case: &Case) -> Option<Suspect> {
+    let features = Features::of(&case.scene);
+    (features.has(Feature::Mask) || features.has(Feature::Blend)).then(|| {
+        let mut scene = case.scene.clone();
+        let seen_through = scene.materials.iter_mut().filter(|m| m.alpha_mode != AlphaMode::Opaque);
+        let mut names = Vec::new();
+        for material in seen_through {
+            material.alpha_mode = AlphaMode::Opaque;
+            names.push(material.name.clone());
+        }
+        Suspect {
+            cause: Cause::AlphaCards,
+            evidence: format!("rays go on behind {} materials with alpha mask or blending", names.len()),
+            remedy: format!("make what needs no alpha opaque, or cut cards to what is seen: {}", names.join(", ")),
+            without: with_scene(case, scene),
+        }
+    })
+}
+
+fn glass(case: &Case) -> Option<Suspect> {
+    let features = Features::of(&case.scene);
+    let clear = [Feature::Refraction, Feature::ThinTransmission, Feature::Mirrors].iter().any(|&f| features.has(f));
+    (clear && case.settings.depth.is_none_or(|depth| depth > SHALLOW)).then(|| Suspect {
+        cause: Cause::Glass,
+        evidence: "rays are mirrored and bent again and again".into(),
+        remedy: format!("--depth {SHALLOW}"),
+        without: Case { settings: Settings { depth: Some(SHALLOW), ..case.settings.clone() }, ..case.clone() },
+    })
+}
+
+fn lights(case: &Case) -> Option<Suspect> {
+    let lights = &case.scene.lights;
+    let strongest = lights.iter().enumerate().filter(|(_, light)| light.shadows);
+    let count = strongest.clone().count();
+    let by_intensity = |(_, light): &(usize, &crate::scene::Light)| light.intensity.max_element();
+    let (kept, _) = strongest.max_by(|a, b| by_intensity(a).total_cmp(&by_intensity(b)))?;
+    (count > 1).then(|| {
+        let mut scene = case.scene.clone();
+        scene.lights.iter_mut().enumerate().filter(|(i, _)| *i != kept).for_each(|(_, light)| light.shadows = false);
+        Suspect {
+            cause: Cause::Lights,
+            evidence: format!("{count} lights each ask a shadow ray of every point"),
+            remedy: format!("remove lights, or the shadows of all but one of the {count}"),
+            without: with_scene(case, scene),
+        }
+    })
+}

@@ -1,0 +1,168 @@
+//! One cause at a time, and whether it is found.
+
+use super::*;
+use crate::generate::Family;
+use crate::math::random::Random;
+use crate::math::{DAffine3, DVec3, Vec3};
+use crate::render::view::Lens;
+use crate::scene::{AlphaMode, Falloff, Instance, Light, LightKind, Material, Mesh, MetalRough, Surface};
+
+/// A ball of about 2 `side`² triangles.
+fn ball(center: Vec3, radius: f32, side: u32) -> Mesh {
+    let mut mesh = Mesh::default();
+    let point = |i: u32, j: u32| {
+        let (a, b) = (std::f32::consts::PI * i as f32 / side as f32, std::f32::consts::TAU * j as f32 / side as f32);
+        center + radius * Vec3::new(libm::sinf(a) * libm::cosf(b), libm::sinf(a) * libm::sinf(b), libm::cosf(a))
+    };
+    for i in 0..side {
+        for j in 0..side {
+            let base = mesh.positions.len() as u32;
+            mesh.positions.extend([point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)]);
+            mesh.triangles.extend([[base, base + 1, base + 2], [base, base + 2, base + 3]]);
+        }
+    }
+    mesh
+}
+
+fn triangle_soup(count: usize, mut corners: impl FnMut(&mut Random) -> [Vec3; 3]) -> Mesh {
+    let mut random = Random::new(7);
+    let mut mesh = Mesh::default();
+    for _ in 0..count {
+        let base = mesh.positions.len() as u32;
+        mesh.positions.extend(corners(&mut random));
+        mesh.triangles.push([base, base + 1, base + 2]);
+    }
+    mesh
+}
+
+fn matt() -> Material {
+    let surface = Surface::MetalRough(MetalRough { metallic: 0.0, roughness: 1.0, ..MetalRough::default() });
+    Material { name: "matt".into(), base_color: Vec3::splat(0.7), double_sided: true, surface, ..Material::default() }
+}
+
+/// Meshes of one material each, and one light.
+fn scene(parts: Vec<(Mesh, Material)>) -> Scene {
+    let mut scene = Scene::default();
+    for (mesh, material) in parts {
+        let number = scene.meshes.len() as u32;
+        scene.materials.push(material);
+        scene.meshes.push(Mesh { material: number, ..mesh });
+        let world_from_object = DAffine3::IDENTITY;
+        scene.instances.push(Instance { name: String::new(), mesh: number, world_from_object });
+    }
+    scene.lights.push(lamp(DVec3::new(3.0, -4.0, 5.0), 1.0));
+    scene
+}
+
+fn lamp(position: DVec3, intensity: f32) -> Light {
+    let kind = LightKind::Point { position, falloff: Falloff::None };
+    Light { name: String::new(), intensity: Vec3::splat(intensity), kind, shadows: true }
+}
+
+/// The scene from outside, in a few pixels.
+fn case(scene: Scene, accel: AccelKind) -> Case {
+    let bounds = crate::scene::framing::robust_bounds(&scene);
+    let eye = bounds.center() + DVec3::new(0.4, -1.0, 0.5).normalize() * bounds.radius() * 2.6;
+    let view = View::look_at(eye, bounds.center(), DVec3::Z, Lens::perspective(0.8));
+    let settings = Settings { width: 40, height: 30, samples: 1, ..Settings::default() };
+    Case { scene, view, settings, accel, params: AccelParams::DEFAULT }
+}
+
+/// Finds the cause first, with the saving that a picture of four times as many pixels has without it.
+#[track_caller]
+fn assert_is_explained_by(case: &Case, cause: Cause) -> Finding {
+    let (usual, findings) = explain(case, |_| true).unwrap();
+    let told: Vec<_> = findings.iter().map(|f| format!("{}: {:.3}, {}", f.cause, f.saving, f.evidence)).collect();
+    let first = &findings[0];
+    assert!(first.cause == cause && first.saving > 0.15, "{usual:?}\n{told:#?}");
+
+    let larger = Case { settings: Settings { width: 80, height: 60, ..case.settings.clone() }, ..case.clone() };
+    let without = suspects(&larger).into_iter().find(|s| s.cause == cause).unwrap().without;
+    let cost = |case: &Case| Bill::of(case).sum().cost() as f64;
+    let measured = 1.0 - cost(&without) / cost(&larger);
+    assert!(
+        (first.saving / measured - 1.0).abs() < 0.25,
+        "{cause}: {:.3} predicted, {measured:.3} measured",
+        first.saving
+    );
+    first.clone()
+}
+
+#[test]
+fn huge_triangles_among_small_ones_are_found() {
+    let mut parts = vec![(ball(Vec3::ZERO, 0.5, 24), matt())];
+    let huge = |random: &mut Random| [0, 1, 2].map(|_| random.direction() * 1.5);
+    parts.push((triangle_soup(60, huge), matt()));
+    let found = assert_is_explained_by(&case(scene(parts), AccelKind::FastBvh), Cause::HugeTriangles);
+    assert!(found.evidence.contains("1212") && found.cause.keeps_the_picture(), "{}", found.evidence);
+}
+
+#[test]
+fn a_cluster_in_a_large_box_is_found_and_the_hierarchy_recommended() {
+    let mut stadium = Family::Stadium.scene(3000);
+    stadium.lights.push(lamp(DVec3::Z * 100.0, 1.0));
+    // Seen as somebody does who cares for the small thing.
+    let mut case = case(stadium, AccelKind::Grid);
+    case.view = View::look_at(DVec3::new(0.0, -4.0, 3.0), DVec3::ZERO, DVec3::Z, Lens::perspective(0.4));
+    let found = assert_is_explained_by(&case, Cause::DenseCluster);
+    assert_eq!(found.remedy, "--accel fast-bvh");
+}
+
+#[test]
+fn shells_upon_shells_are_found() {
+    let parts = (0..6).map(|_| (ball(Vec3::ZERO, 1.0, 24), matt())).collect();
+    let found = assert_is_explained_by(&case(scene(parts), AccelKind::FastBvh), Cause::Shells);
+    assert!(found.evidence.starts_with(&(5 * 2 * 24 * 24).to_string()), "{}", found.evidence);
+}
+
+#[test]
+fn slivers_are_found() {
+    let sliver = |random: &mut Random| {
+        let (place, along) = (random.direction() * 0.3, random.direction());
+        let aside = along.any_orthonormal_vector() * 0.004;
+        [place - along, place + along, place + aside]
+    };
+    let parts = vec![(triangle_soup(600, sliver), matt())];
+    assert_is_explained_by(&case(scene(parts), AccelKind::FastBvh), Cause::Slivers);
+}
+
+#[test]
+fn cards_that_are_mostly_clear_are_found() {
+    let card = |i: usize| {
+        let y = i as f32 * 0.05;
+        let positions = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, z)| Vec3::new(x, y, z)).to_vec();
+        Mesh { positions, triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() }
+    };
+    let leaf = Material { name: "leaf".into(), opacity: 0.1, alpha_mode: AlphaMode::Mask { cutoff: 0.5 }, ..matt() };
+    let mut parts: Vec<_> = (0..30).map(|i| (card(i), leaf.clone())).collect();
+    parts.push((ball(Vec3::Y * 3.0, 0.5, 16), matt()));
+    let found = assert_is_explained_by(&case(scene(parts), AccelKind::FastBvh), Cause::AlphaCards);
+    assert!(found.remedy.contains("leaf") && !found.cause.keeps_the_picture());
+}
+
+#[test]
+fn glass_in_glass_is_found() {
+    let clear =
+        MetalRough { metallic: 0.0, roughness: 0.0, transmission: 1.0, thick: true, ior: 1.5, ..MetalRough::default() };
+    let glass = Material { name: "glass".into(), surface: Surface::MetalRough(clear), ..matt() };
+    let parts = (0..4).map(|i| (ball(Vec3::ZERO, 1.0 - 0.2 * i as f32, 16), glass.clone())).collect();
+    let found = assert_is_explained_by(&case(scene(parts), AccelKind::FastBvh), Cause::Glass);
+    assert_eq!(found.remedy, "--depth 2");
+}
+
+#[test]
+fn many_lights_are_found() {
+    let mut many = scene(vec![(ball(Vec3::ZERO, 1.0, 24), matt())]);
+    let around = (0..9).map(|i| 0.7 * f64::from(i)).map(|a| DVec3::new(libm::cos(a), libm::sin(a), 1.0) * 4.0);
+    many.lights.extend(around.map(|place| lamp(place, 0.2)));
+    let found = assert_is_explained_by(&case(many, AccelKind::FastBvh), Cause::Lights);
+    assert!(found.evidence.starts_with("10 lights"), "{}", found.evidence);
+}
+
+#[test]
+fn a_plain_mesh_has_nothing_to_explain() {
+    let plain = case(scene(vec![(ball(Vec3::ZERO, 1.0, 24), matt())]), AccelKind::FastBvh);
+    let (usual, findings) = explain(&plain, |_| true).unwrap();
+    assert!(usual.sum().tests > 0 && findings.iter().all(|f| f.saving < 0.1), "{findings:?}");
+    assert_eq!(explain(&case(Family::Stadium.scene(500), AccelKind::Grid), |_| false), None, "it can be ended");
+}
