@@ -15,7 +15,7 @@ pub fn write(report: &Report, model: &Model) -> String {
 }
 
 fn write_model(out: &mut String, report: &Report, model: &Model) -> Result {
-    writeln!(out, "{}: {}; rays of {}", model.name, model.size(), model.picture())?;
+    write!(out, "{}", head(model))?;
     writeln!(out)?;
     if report.plan.sweep.is_some() {
         sweep::tables(report, model).iter().try_for_each(|table| writeln!(out, "{}", table.text()))?;
@@ -33,9 +33,13 @@ fn write_model(out: &mut String, report: &Report, model: &Model) -> Result {
     pruning.into_iter().try_for_each(|text| write!(out, "{text}"))
 }
 
+fn head(model: &Model) -> String {
+    wrapped(&format!("{}: {}; rays of {}", model.name, model.size(), model.picture()))
+}
+
 /// One model in two lines, where the tables are of all.
 pub fn write_short(model: &Model) -> String {
-    format!("{}: {}; rays of {}\n  {}\n", model.name, model.size(), model.picture(), model.verdict())
+    format!("{}  {}\n", head(model), model.verdict())
 }
 
 /// How cost grows over all models.

@@ -5,7 +5,7 @@ use super::super::cost::{Cost, costs};
 use super::super::growth::{Curve, METHOD, kinds, sentences, tables};
 use super::super::number::{bytes, grouped, short};
 use super::lines::{Lines, Series, plot};
-use super::svg::{plain, unit};
+use super::svg::{plain, power, unit};
 use super::{escaped, figure, table_of};
 
 /// The section; nothing where the models are not a family in growing sizes.
@@ -32,7 +32,7 @@ fn curves(report: &Report, cost: Cost) -> String {
         label: &format!("{} against the number of prims, by structure", cost.title()),
         below: "prims of the scene (N)",
         is_even: false,
-        shown: [&|n| format!("{n:e}"), &|y| tick(cost, y)],
+        shown: [&power, &|y| tick(cost, y)],
         series: curves.into_iter().map(of).collect(),
     });
     let none =
@@ -44,7 +44,7 @@ fn curves(report: &Report, cost: Cost) -> String {
 /// A round value of a cost.
 pub(super) fn tick(cost: Cost, value: f64) -> String {
     match cost {
-        Cost::Tests | Cost::Visits if value >= 1e5 => format!("{value:e}"),
+        Cost::Tests | Cost::Visits if value >= 1e5 => power(value),
         Cost::Tests | Cost::Visits => plain(&short(value)).to_owned(),
         Cost::Time | Cost::Build => unit(value),
         #[expect(

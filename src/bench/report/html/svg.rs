@@ -67,12 +67,14 @@ impl Scale {
         if self.is_even {
             return self.multiples((span / 6.0).ceil().max(1.0));
         }
+        let are_whole = self.low.fract() == 0.0 && self.high.fract() == 0.0;
         match span {
-            s if s >= 2.5 || self.low.fract() == 0.0 => {
-                self.multiples((s / 6.0).ceil()).iter().map(|d| 10f64.powf(*d)).collect()
+            s if s >= 2.5 || are_whole => {
+                self.multiples((s / 6.0).ceil()).into_iter().map(|decade| 10f64.powf(decade)).collect()
             }
             s if s >= 1.0 => self.within_decades(&[1.0, 2.0, 5.0]),
-            s if s >= 0.4 => self.within_decades(&[1.0, 2.0, 3.0, 5.0]),
+            s if s >= 0.6 => self.within_decades(&[1.0, 2.0, 3.0, 5.0]),
+            s if s >= 0.35 => self.within_decades(&[1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0]),
             _ => self.within_decades(&[
                 1.0, 1.1, 1.2, 1.3, 1.4, 1.6, 1.8, 2.0, 2.25, 2.5, 2.75, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 7.0, 8.0, 9.0,
             ]),
@@ -102,6 +104,11 @@ pub(super) fn unit(seconds: f64) -> String {
         s if s < 0.99 => scaled(1e3, "ms"),
         _ => scaled(1.0, "s"),
     }
+}
+
+/// A large round number: `2e5`.
+pub(super) fn power(number: f64) -> String {
+    format!("{number:.1e}").replace(".0e", "e")
 }
 
 /// A number without noughts to spare: `1.50` as `1.5`.
@@ -151,12 +158,15 @@ mod tests {
         let even = Scale::even([0.0, 10.0].into_iter(), 0.0, 100.0);
         assert_eq!([0.0, 3.0, 10.0].map(|v| even.at(v)), [0.0, 30.0, 100.0]);
         assert_eq!(even.ticks(), [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]);
-        for (low, high) in [(1.0, 1.1), (3.1, 5.0), (0.4, 2.0), (7e-7, 9e-6), (0.5, 64.0), (1e3, 1e9)] {
+        for (low, high) in
+            [(1.0, 1.1), (3.1, 5.0), (0.4, 2.0), (1.07, 2.84), (7e-7, 9e-6), (1.0, 64.0), (0.5, 64.0), (1e3, 1e9)]
+        {
             let scale = Scale::tight([low, high].into_iter(), 0.0, 100.0);
             let ticks = scale.ticks();
             assert!((2..=8).contains(&ticks.len()), "{low} {high}: {ticks:?}");
             assert!(ticks.iter().all(|&t| (-0.1..100.1).contains(&scale.at(t))), "{low} {high}: {ticks:?}");
         }
+        assert_eq!([1.1 * 1e4, 2e5].map(power), ["1.1e4", "2e5"]);
         assert_eq!([1.5e-6, 2e-3, 0.5, 10.0].map(unit), ["1.5 µs", "2 ms", "500 ms", "10 s"]);
     }
 

@@ -5,6 +5,7 @@ use super::super::sweep::{Curve, curves, sentences, tables};
 use super::super::{Model, Report};
 use super::growth::tick;
 use super::lines::{Lines, Series, plot};
+use super::svg::plain;
 use super::{escaped, figure, table_of};
 use crate::bench::row::Row;
 use crate::bench::sweep::Sweep;
@@ -35,7 +36,7 @@ fn one(report: &Report, model: &Model, sweep: &Sweep, cost: Cost) -> String {
         label: &format!("{} against {}, by structure", cost.title(), sweep.parameter),
         below: sweep.parameter.name(),
         is_even: sweep.parameter.is_even(),
-        shown: [&|v| format!("{v}"), &|y| tick(cost, y)],
+        shown: [&|v| plain(&format!("{v:.4}")).to_owned(), &|y| tick(cost, y)],
         series,
     });
     figure(cost.title(), &caption, &svg)
