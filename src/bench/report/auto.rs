@@ -1,6 +1,7 @@
 //! What `auto` would choose for a model, and whether that was right on its rays.
 
 use super::number::grouped;
+use super::table::Table;
 use super::{Model, Report};
 use crate::accel::auto::nodes;
 use crate::accel::{AccelKind, RayCounts};
@@ -89,17 +90,18 @@ pub fn sentences(report: &Report, model: &Model) -> Vec<String> {
     vec![format!("auto would choose {reason}"), outcome]
 }
 
-/// The choices over growing sizes, in one sentence.
-pub fn over_sizes(report: &Report) -> Option<String> {
-    let told = |model: &Model| {
-        let (kind, prims) = (model.auto?.kind, grouped(model.prims as u64));
-        let fared = Outcome::of(report, model).map_or(String::new(), |outcome| {
-            let verb = if outcome.is_right() { "right" } else { "wrong" };
-            let by = outcome.time.unwrap_or(outcome.nodes);
-            format!(" ({verb}: {} takes {}{})", outcome.other, more(by), outcome.doubt)
-        });
-        Some(format!("{kind} at {prims} prims{fared}"))
+/// The choices over growing sizes, and what the other fast structure costs there; `None` where nothing was asked.
+pub fn over_sizes(report: &Report) -> Option<Table> {
+    let line = |model: &Model| {
+        let (kind, outcome) = (model.auto?.kind, Outcome::of(report, model));
+        let told = |share: Option<f64>| share.map_or("-".into(), more);
+        let time = outcome.and_then(|o| o.time);
+        let doubt = outcome.filter(|o| o.time.is_some()).map_or("", |o| o.doubt);
+        let nodes = told(outcome.map(|o| o.nodes));
+        Some(vec![grouped(model.prims as u64), kind.to_string(), nodes, told(time) + doubt])
     };
-    let told: Vec<String> = report.models.iter().filter_map(told).collect();
-    (!told.is_empty()).then(|| format!("auto would choose {}", told.join(", ")))
+    let rows: Vec<Vec<String>> = report.models.iter().filter_map(line).collect();
+    let columns = ["prims", "auto would choose", "the other's nodes, as auto counts", "the other's time"];
+    let title = "What auto would choose, and what the other fast structure costs".into();
+    (!rows.is_empty()).then(|| Table { title, columns: columns.map(String::from).into(), rows })
 }

@@ -1,5 +1,6 @@
 //! How the cost of each structure grows with the number of prims, over the models of a report.
 
+use super::auto::over_sizes;
 use super::cost::{Cost, costs};
 use super::number::{grouped, seconds, short};
 use super::table::Table;
@@ -59,7 +60,7 @@ pub fn kinds(report: &Report) -> Vec<AccelKind> {
 const COLUMNS: usize = 6;
 
 /// A table for each cost: structures down, sizes across, then the exponent and what ten times the prims multiply the cost
-/// by. Of many sizes some are left out.
+/// by. Of many sizes some are left out. Last, what `auto` would choose.
 pub fn tables(report: &Report) -> Vec<Table> {
     let models = &report.models;
     let shown: Vec<&Model> = match models.len() {
@@ -87,7 +88,7 @@ pub fn tables(report: &Report) -> Vec<Table> {
         };
         Table { title: cost.title().into(), columns, rows: kinds(report).into_iter().map(line).collect() }
     };
-    costs(report).map(table).collect()
+    costs(report).map(table).chain(over_sizes(report)).collect()
 }
 
 /// What somebody should know who reads one paragraph only, a sentence each.
@@ -116,7 +117,6 @@ pub fn sentences(report: &Report) -> Vec<String> {
             factor(best, Cost::Tests).map_or(String::new(), |f| format!("; ten times the prims multiply them by {f}"));
         said.push(format!("Fewest tests at {n} prims: {best}, {} a ray{growth}", short(tests)));
     }
-    said.extend(super::auto::over_sizes(report));
     for kind in &report.plan.kinds {
         if let Some(model) = report.models.iter().find(|m| m.left_out.contains(kind)) {
             let from = grouped(model.prims as u64);

@@ -48,6 +48,8 @@ fn every_format_tells_the_exponents_of_growth() {
         assert!(text.contains("0.50 ±0.00") && text.contains("1 000 000"), "{text}");
     }
     assert!(Format::Html.write(&report).contains(">bvh 0.50</text>"));
+    let text = text::write_growth(&report);
+    assert!(text.lines().any(|l| l.starts_with("10 000  ") && l.contains("fast-octree")), "{text}");
     // One size is no growth, and no fault.
     report.models.truncate(1);
     assert!(text::write_growth(&report).contains("One size only"));
