@@ -109,7 +109,7 @@ impl Costs {
 /// Traces the picture again for each kind of cost: once for all counts, once for the times. The counts are exact and the
 /// same for every number of threads. `None` when cancelled.
 ///
-/// Times are those of one pixel after the other on each thread, by the clock, and of [`TIMED`] passes the least: what a
+/// Times are those of one pixel after the other on each thread, by the clock, and of three passes the least: what a
 /// ray's walk takes is its class's, and all else is `ms.shading`.
 pub fn render_costs(job: &Job, wanted: &[Cost], progress: &dyn Progress) -> Option<Costs> {
     let mut costs = Costs::default();
