@@ -11,7 +11,8 @@ use rayon::prelude::*;
 /// Rays of one task.
 const SLICE: u32 = 4096;
 
-/// Rays that structures which test very much are given.
+/// Rays that structures which test very much are given: one in so many of the others', but a few at least.
+const ONE_IN: u32 = 3200;
 const FEW: u32 = 400;
 
 const AIMS: [&str; 4] = ["corners", "edge middles", "edges", "random"];
@@ -46,7 +47,8 @@ fn place(name: &str, shapes: &Shapes, center: Vec3, rays: f64) -> bool {
     for kind in AccelKind::ALL {
         let accel = AnyAccel::build(kind, shapes, &AccelParams::DEFAULT);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` saturates")]
-        let count = if kind.is_slow() { FEW } else { rays as u32 };
+        let all = rays as u32;
+        let count = if kind.is_slow() { (all / ONE_IN).max(FEW) } else { all };
         let escapes: [usize; 4] = std::array::from_fn(|aim| escapes(&accel, shapes, center, aim, count / 4));
         clean &= escapes == [0; 4];
         print!("{name:28}{kind:14}{count:>12}");
