@@ -16,6 +16,7 @@ pub trait Probe: Default + Send {
     /// A node or cell was entered (n_ts).
     fn step(&mut self) {}
     /// The same, told in words: once for each step.
+    #[inline(always)]
     fn visit(&mut self, _visit: impl FnOnce() -> Visit) {}
     /// A leaf cell was visited (n_ets), `empty` if nothing is listed in it (n_eets).
     fn cell(&mut self, _empty: bool) {}
@@ -24,8 +25,10 @@ pub trait Probe: Default + Send {
     /// So many ray/prim tests at once.
     fn prim_tests(&mut self, _count: u32) {}
     /// What came of a test.
+    #[inline(always)]
     fn tested(&mut self, _test: impl FnOnce() -> Test) {}
     /// What came of tests of a block of prims: the same for each that has its bit in `lanes`.
+    #[inline(always)]
     fn lanes_tested(&mut self, _prims: &[u32; LANES], _lanes: u32, _outcome: Outcome) {}
     /// A test of this prim that the mailbox saved (n_mb).
     fn repeat_skipped(&mut self, _prim: u32) {}

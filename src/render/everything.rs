@@ -8,10 +8,10 @@
 //!   ([`TextureStore::with_everything`](super::texture::TextureStore::with_everything)), with normal and bump mapping;
 //! - at each point where rays end: the balance of what is reflected and refracted, and its spectrum.
 
-use super::surface::{Footprint, Patch};
+use super::surface::Surface;
 use super::texture::{ColorSpace, STAND_IN, TextureStore};
-use crate::math::{Vec2, Vec3};
-use crate::scene::{Bitmap, Material, Pixels, TextureRef, UvTransform};
+use crate::math::Vec2;
+use crate::scene::{Bitmap, Material, Pixels, Surface as Reflection, TextureRef, UvTransform};
 use std::hint::black_box;
 use std::sync::LazyLock;
 
@@ -35,19 +35,28 @@ const fn stand_in() -> TextureRef {
     }
 }
 
-/// Reads a map that is not there.
+/// Looks up every map that the material at a point lacks, and turns the normal by those that would.
 #[cold]
-pub(super) fn read_in_vain(store: &TextureStore, patch: &Patch, space: ColorSpace, footprint: &Footprint) {
-    black_box(patch.texel(&stand_in(), space, store, footprint));
-}
-
-/// Turns a normal by those maps that `material` lacks.
-#[cold]
-pub(super) fn turn_in_vain(store: &TextureStore, patch: &Patch, normal: Vec3, material: &Material, print: &Footprint) {
-    if material.normal_map.is_none() {
-        black_box(patch.normal_mapped(normal, &MAPPED, store, print));
+pub(super) fn look_up_in_vain(surface: &Surface, store: &TextureStore) {
+    let (Some(patch), material, footprint) = (&surface.patch, surface.target.material, &surface.footprint) else {
+        return;
+    };
+    let m = material;
+    let mut maps = vec![&m.base_color_map, &m.opacity_map, &m.emission_map, &m.occlusion_map];
+    match &m.surface {
+        Reflection::Unlit => {}
+        Reflection::Phong(p) => maps.extend([&p.ambient_map, &p.specular_map, &p.shininess_map]),
+        Reflection::MetalRough(p) => {
+            maps.extend([&p.metal_rough_map, &p.specular_map, &p.specular_color_map, &p.transmission_map]);
+        }
     }
-    if material.bump_map.is_none() {
-        black_box(patch.bumped(normal, &MAPPED, store, print));
+    for _ in maps.iter().filter(|map| map.is_none()) {
+        black_box(patch.texel(&stand_in(), ColorSpace::Srgb, store, footprint));
+    }
+    if m.normal_map.is_none() {
+        black_box(patch.normal_mapped(surface.geometric, &MAPPED, store, footprint));
+    }
+    if m.bump_map.is_none() {
+        black_box(patch.bumped(surface.geometric, &MAPPED, store, footprint));
     }
 }

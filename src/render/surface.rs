@@ -3,7 +3,6 @@
 //! Evaluated once, for the hit that counts. Nothing here knows of light; materials are only asked for their normal and
 //! bump maps. Whatever a file gives, normals come out finite and of unit length.
 
-use super::everything::turn_in_vain;
 use super::texture::{ColorSpace, TextureStore};
 use super::world::{Placement, PrimSource, World};
 use crate::accel::refine::Refined;
@@ -351,9 +350,6 @@ impl<'a> Surface<'a> {
         let material = self.target.material;
         let own = patch.normal().unwrap_or(if self.front { self.geometric } else { -self.geometric });
         let side = if own.dot(self.geometric) < 0.0 { -1.0 } else { 1.0 };
-        if store.has_everything() {
-            turn_in_vain(store, patch, own, material, &self.footprint);
-        }
         let mapped = patch.normal_mapped(own, material, store, &self.footprint).unwrap_or(own);
         let bumped = patch.bumped(mapped, material, store, &self.footprint).unwrap_or(mapped);
         self.normal = facing(bumped * side, self.view);

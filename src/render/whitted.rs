@@ -10,6 +10,7 @@
 use super::Progress;
 use super::asking::Asking;
 use super::context::{Context, coverage};
+use super::everything::look_up_in_vain;
 use super::layers::Facts;
 use super::observer::Observer;
 use super::optics::{dispersed_index, reflect, refract};
@@ -212,6 +213,9 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             matter: &matter,
             path: Path { weight: path.weight * covered, ..*path },
         };
+        if context.everything {
+            look_up_in_vain(&surface, context.textures);
+        }
         let everywhere = matter.emission + matter.ambient(&surface, &context.sky, context.scene.ambient);
         let crossing = point.crossing(context, path.band);
         self.add(ray.sample, point.path.weight * everywhere);

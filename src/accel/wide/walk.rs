@@ -82,10 +82,10 @@ impl<G: Goal, P: Probe, B: BoxMargins> Kernel for Walk<'_, '_, G, P, B> {
         let mut child = 0;
         stack.clear();
         loop {
+            probe.visit(|| tree.visit(child, query.shapes()));
             match Child::unpack(child) {
                 Child::Node(node) => {
                     probe.step();
-                    probe.visit(|| tree.visit(child, query.shapes()));
                     probe.volume_tests(LANES);
                     let node = &tree.nodes[node as usize];
                     if let Some(nearest) = slabs.enter(s, node, limit, stack) {
@@ -95,7 +95,6 @@ impl<G: Goal, P: Probe, B: BoxMargins> Kernel for Walk<'_, '_, G, P, B> {
                 }
                 Child::Block(block, count) => {
                     probe.step();
-                    probe.visit(|| tree.visit(child, query.shapes()));
                     probe.cell(false);
                     let block = &tree.blocks[block as usize];
                     let answered = if G::Test::EXACT {
@@ -111,7 +110,6 @@ impl<G: Goal, P: Probe, B: BoxMargins> Kernel for Walk<'_, '_, G, P, B> {
                 }
                 Child::Run(run) => {
                     probe.step();
-                    probe.visit(|| tree.visit(child, query.shapes()));
                     probe.cell(false);
                     for &prim in tree.run(run) {
                         if query.test(prim, probe) {

@@ -18,7 +18,6 @@ pub(crate) use sky::Sky;
 pub(crate) use spectrum::{Band, bands};
 
 use super::context::coverage;
-use super::everything::read_in_vain;
 use super::surface::{Footprint, Patch, Surface};
 use super::texture::{ColorSpace, TextureStore};
 use super::wave::Crossing;
@@ -57,10 +56,6 @@ impl Reader<'_> {
     fn read(&self, map: Option<&TextureRef>, space: ColorSpace) -> Vec4 {
         match (map, self.patch) {
             (Some(map), Some(patch)) => patch.texel(map, space, self.store, self.footprint),
-            (None, Some(patch)) if self.store.has_everything() => {
-                read_in_vain(self.store, patch, space, self.footprint);
-                Vec4::ONE
-            }
             _ => Vec4::ONE,
         }
     }

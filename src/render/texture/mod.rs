@@ -60,12 +60,6 @@ impl<'a> TextureStore<'a> {
         Self { stand_in: Some(source), ..self }
     }
 
-    /// Whether it is that one.
-    #[inline]
-    pub(super) fn has_everything(&self) -> bool {
-        self.stand_in.is_some()
-    }
-
     /// Columns and rows of a texture's bitmap; (1, 1) for a texture that does not exist.
     pub fn size(&self, texture: u32) -> Vec2 {
         self.find(texture).map_or(Vec2::ONE, |(_, source)| pixels(size_of(source.bitmap)))
