@@ -209,6 +209,7 @@ impl Patch<'_> {
     }
 
     /// Interpolated shading normal, world space, on the side of the mesh's own normals.
+    #[inline]
     fn normal(&self) -> Option<Vec3> {
         let n = self.mix(&self.mesh.normals)?.as_dvec3();
         let n = (self.placement.normal_from_object * n).try_normalize()?.as_vec3();
@@ -243,6 +244,7 @@ impl Patch<'_> {
     }
 
     /// The normal as the material's normal map turns it.
+    #[inline]
     pub(crate) fn normal_mapped(
         &self,
         normal: Vec3,
@@ -260,6 +262,7 @@ impl Patch<'_> {
     /// The normal as the material's bump map turns it: by the slope of the heights, from differences one texel wide.
     ///
     /// J. F. Blinn, "Simulation of Wrinkled Surfaces" (1978), with heights in units of the texture's side.
+    #[inline]
     pub(crate) fn bumped(
         &self,
         normal: Vec3,
