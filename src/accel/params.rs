@@ -25,6 +25,8 @@ pub struct AccelParams {
     pub max_references: Option<f64>,
     /// What decides that a prim is listed in a cell, for grids and octrees.
     pub assign: Assign,
+    /// How far boxes of faces reach beyond them along their normals, with [`Assign::Box`]; the shapes' units, 0 to 10⁶.
+    pub thickness: f64,
     /// What a ray remembers, for grids and octrees.
     pub mailbox: MailboxKind,
 }
@@ -40,6 +42,7 @@ impl AccelParams {
         grid_cells: None,
         max_references: None,
         assign: Assign::Surface,
+        thickness: 0.0,
         mailbox: MailboxKind::Exact,
     };
 
@@ -72,6 +75,7 @@ impl AccelParams {
             dims: self.grid_cells.filter(|_| kind != AccelKind::Octree),
             references: self.max_references.unwrap_or(default.references),
             assign: self.assign,
+            thickness: self.thickness,
         }
     }
 

@@ -347,6 +347,7 @@ pub(super) fn params(args: &AccelArgs) -> Result<AccelParams, Wrong> {
         grid_cells: args.grid_cells,
         max_references: args.max_references,
         assign: args.assign,
+        thickness: 0.0,
         mailbox: args.mailbox,
     };
     params.validate().map_err(|e| Wrong(e.to_string()))?;

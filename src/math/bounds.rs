@@ -124,8 +124,8 @@ pub const NEAR_RAY_CELLS: f64 = (1u64 << 30) as f64;
 /// which cells a prim touches errs by, 2⁻⁴⁸ R with R at most 2¹⁶.
 pub const NEAR_CELL_PAD: f64 = 64.0 * U64 * NEAR_RAY_CELLS;
 
-/// [`GRID_ROOM`] with it: 2⁻¹², more than [`NEAR_CELL_PAD`].
-pub const NEAR_GRID_ROOM: f64 = 1.0 / 4096.0;
+/// [`GRID_ROOM`] with it: 2⁻¹⁶, more than [`NEAR_CELL_PAD`] of one cell.
+pub const NEAR_GRID_ROOM: f64 = 1.0 / 65536.0;
 
 /// What a walk through cells takes for a zero in the direction, in finest cells: no plane is met along such an axis, for
 /// 10¹²⁰ times any distance is beyond every t, and no NaN arises. Smaller numbers do not occur: 2⁻¹⁴⁹ of an `f32` times

@@ -5,12 +5,12 @@
 //! parent's.
 
 use super::params::{Assign, GridParams};
-use crate::accel::Shapes;
+use crate::accel::shapes::{Prim, Shapes};
 use crate::math::aabb::Aabb;
 use crate::math::bounds::{
     CELL_PAD, GRID_ROOM, NEAR_CELL_PAD, NEAR_GRID_ROOM, NEAR_RAY_CELLS, NO_SLOPE, RAY_CELLS, WALK_MARGIN,
 };
-use crate::math::{DVec3, Vec3, Vec3Swizzles as _};
+use crate::math::{DVec3, Vec3, Vec3Swizzles as _, triangle};
 
 /// Most finest cells along an axis, R in the derivation of [`CELL_PAD`].
 const MAX_FINE: u32 = 1 << 16;
@@ -64,6 +64,8 @@ pub struct Lattice {
     pub levels: u32,
     /// What decides that a prim is listed in a cell.
     pub assign: Assign,
+    /// [`GridParams::thickness`].
+    pub thickness: f64,
     /// What is allowed for.
     pub margins: CellMargins,
 }
@@ -74,9 +76,12 @@ impl Lattice {
     /// J. Cleary, G. Wyvill, *Analysis of an Algorithm for Fast Ray Tracing Using Uniform Space Subdivision*, 1988.
     pub fn new(shapes: &Shapes, params: &GridParams, margins: CellMargins) -> Self {
         let prims = shapes.bounded();
-        let bounds = (0..prims).fold(Aabb::EMPTY, |b, p| b.union(shapes.bounds(p)));
-        let (lo, hi) = if bounds.is_empty() { (Vec3::ZERO, Vec3::ONE) } else { (bounds.lo, bounds.hi) };
-        let (lo, hi) = (lo.as_dvec3(), hi.as_dvec3());
+        let nothing = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let join = |(lo, hi): (DVec3, DVec3), prim| {
+            let (l, h) = thick_box(shapes, prim, params.thickness);
+            (lo.min(l), hi.max(h))
+        };
+        let (lo, hi) = if prims == 0 { (DVec3::ZERO, DVec3::ONE) } else { (0..prims).fold(nothing, join) };
 
         // A flat or line-like scene gets a thin box, one that is a point a small one: no side is zero.
         let longest = (hi - lo).max_element();
@@ -90,7 +95,15 @@ impl Lattice {
         let room = extent * margins.room;
         let fine = DVec3::from_array(dims.map(|n| f64::from(n << levels)));
         let lo = (lo + hi) / 2.0 - extent / 2.0 - room;
-        Self { lo, scale: fine / (extent + room * 2.0), dims, levels, assign: params.assign, margins }
+        Self {
+            lo,
+            scale: fine / (extent + room * 2.0),
+            dims,
+            levels,
+            assign: params.assign,
+            thickness: params.thickness,
+            margins,
+        }
     }
 
     /// Finest cells on each axis.
@@ -100,7 +113,12 @@ impl Lattice {
 
     /// A point in units of finest cells.
     pub fn place(&self, p: Vec3) -> DVec3 {
-        (p.as_dvec3() - self.lo) * self.scale
+        self.place_f64(p.as_dvec3())
+    }
+
+    /// The same.
+    pub fn place_f64(&self, p: DVec3) -> DVec3 {
+        (p - self.lo) * self.scale
     }
 
     /// The top cells that meet a box in finest cells: first and last on each axis.
@@ -154,6 +172,19 @@ impl Lattice {
     pub fn top_len(&self) -> usize {
         self.dims.iter().map(|&n| n as usize).product()
     }
+}
+
+/// Box of bounded prim `prim`, its face thickened along its normal.
+pub fn thick_box(shapes: &Shapes, prim: u32, thickness: f64) -> (DVec3, DVec3) {
+    let bounds = shapes.bounds(prim);
+    let normal = match shapes.prim(prim) {
+        _ if thickness == 0.0 => Vec3::ZERO,
+        Prim::Triangle(corners) => triangle::normal(&corners),
+        Prim::Polygon(p) => p.normal(),
+        _ => Vec3::ZERO,
+    };
+    let more = normal.abs().as_dvec3() * thickness;
+    (bounds.lo.as_dvec3() - more, bounds.hi.as_dvec3() + more)
 }
 
 /// Cells on each axis for the density that is asked for.

@@ -7,7 +7,7 @@
 //! Every comparison is in favour of overlap by the padding of [`CellMargins`](super::lattice::CellMargins). Rounding here is far below that: points
 //! and edge values err by at most 2⁻⁴⁸ R cells; only a plane's normal may err more, and has its own slack.
 
-use super::lattice::{Cube, Lattice};
+use super::lattice::{Cube, Lattice, thick_box};
 use super::params::Assign;
 use crate::accel::shapes::{Prim, Shapes, SpherePrim};
 use crate::math::DVec3;
@@ -106,8 +106,8 @@ impl Overlap {
 
 /// Box of bounded prim `prim` in finest cells, padded: lower and upper corner.
 pub fn padded_box(shapes: &Shapes, prim: u32, lattice: &Lattice) -> (DVec3, DVec3) {
-    let (bounds, pad) = (shapes.bounds(prim), lattice.margins.pad);
-    (lattice.place(bounds.lo) - pad, lattice.place(bounds.hi) + pad)
+    let ((lo, hi), pad) = (thick_box(shapes, prim, lattice.thickness), lattice.margins.pad);
+    (lattice.place_f64(lo) - pad, lattice.place_f64(hi) + pad)
 }
 
 /// All points between two parallel planes.

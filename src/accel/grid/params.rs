@@ -23,6 +23,9 @@ pub struct GridParams {
     pub references: f64,
     /// What decides that a prim is listed in a cell.
     pub assign: Assign,
+    /// How far the boxes of faces reach beyond them along their normals, in the shapes' units, 0 to 10⁶. For
+    /// [`Assign::Box`]: programs were published whose boxes did.
+    pub thickness: f64,
 }
 
 /// What decides that a prim is listed in a cell.
@@ -94,6 +97,7 @@ impl GridParams {
         dims: None,
         references: 12.0,
         assign: Assign::Surface,
+        thickness: 0.0,
     };
 
     /// A grid without octrees, which has to be finer.
@@ -112,6 +116,7 @@ impl GridParams {
         let cost = self.step_cost;
         check("step cost", cost, (0.1..=100.0).contains(&cost), "0.1 to 100")?;
         check("references of a shape", self.references, (1.0..=1000.0).contains(&self.references), "1 to 1000")?;
+        check("thickness of faces", self.thickness, (0.0..=1e6).contains(&self.thickness), "0 to 1e6")?;
         let mut cells = self.dims.into_iter().flatten();
         cells.try_for_each(|n| check("number of cells on an axis", f64::from(n), (1..=1024).contains(&n), "1 to 1024"))
     }
@@ -138,6 +143,7 @@ mod tests {
             GridParams { step_cost: 0.0, ..default },
             GridParams { references: 0.5, ..default },
             GridParams { dims: Some([4, 0, 4]), ..default },
+            GridParams { thickness: -1.0, ..default },
         ] {
             assert!(bad.validate().is_err(), "{bad:?}");
         }

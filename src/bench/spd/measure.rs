@@ -61,6 +61,8 @@ impl Measured {
 pub struct Row {
     /// Which one.
     pub setting: Setting,
+    /// How far the boxes of faces reached beyond them.
+    pub thickness: f64,
     /// What was published.
     pub theirs: Cost,
     /// What was counted, all a ray.
@@ -106,8 +108,8 @@ impl Setting {
 
     /// Parameters that follow the published rules: objects assigned by their boxes, tested again in each cell, and cells
     /// split while they list more than one.
-    pub fn params(self) -> AccelParams {
-        let rules = AccelParams { assign: Assign::Box, mailbox: MailboxKind::None, ..AccelParams::DEFAULT };
+    pub fn params(self, thickness: f64) -> AccelParams {
+        let rules = AccelParams { assign: Assign::Box, thickness, mailbox: MailboxKind::None, ..AccelParams::DEFAULT };
         match self {
             Self::Grid { cells, .. } => AccelParams { grid_cells: Some(cells), ..rules },
             Self::Octree { depth } => {
@@ -165,11 +167,21 @@ pub fn measure(
     let sent = send(scene, &world, &shapes, &recorder, Facing::Outward, plan.pixels)?;
     measured.outward = sent.tally;
     let rays = ray_set(sent);
-    for (setting, theirs) in Setting::all(published) {
-        go_on(&measured, &setting.name()).then_some(())?;
-        measured.rows.push(row(&shapes, &recorder, &rays, setting, theirs, plan));
+    for thickness in thicknesses(published) {
+        for (setting, theirs) in Setting::all(published) {
+            go_on(&measured, &setting.name()).then_some(())?;
+            let mut row = Row { setting, thickness, theirs, ours: theirs, rays: 0, differing: 0 };
+            row.count(&shapes, &recorder, &rays, plan);
+            measured.rows.push(row);
+        }
     }
     Some(measured)
+}
+
+/// Faces as they are, and as thick as explains the published cells.
+fn thicknesses(published: &published::Scene) -> impl Iterator<Item = f64> + use<> {
+    let thick = published.thickness;
+    std::iter::once(0.0).chain((thick > 0.0).then_some(thick))
 }
 
 fn ray_set(sent: Sent) -> RaySet {
@@ -179,26 +191,44 @@ fn ray_set(sent: Sent) -> RaySet {
     RaySet { class: Class::Primary, asked, batches }
 }
 
-fn row(shapes: &Shapes, recorder: &AnyAccel, rays: &RaySet, setting: Setting, theirs: Cost, plan: Plan) -> Row {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` saturates; a positive number")]
-    let limit = (plan.tests as f64 / theirs.n_it) as usize;
-    let sample = if limit < rays.len() { &rays.sample(limit, plan.seed).0 } else { rays };
-    let accel = AnyAccel::build(setting.kind(), shapes, &setting.params());
-    let (counts, differing) = replay(&accel, recorder, sample);
-    let made_of = accel.summary();
-    let per_ray = |n: u64| n as f64 / counts.queries.max(1) as f64;
-    let ours = Cost {
-        // The one node above a grid's cells is none of theirs.
-        n_in: made_of.n_in - 1,
-        n_v: made_of.n_v,
-        n_ev: made_of.n_ev,
-        n_oiv: made_of.n_oiv,
-        n_it: per_ray(counts.n_it),
-        n_ts: per_ray(counts.n_ts),
-        n_ets: per_ray(counts.n_ets),
-        n_eets: per_ray(counts.n_eets),
-    };
-    Row { setting, theirs, ours, rays: counts.queries, differing }
+impl Row {
+    fn count(&mut self, shapes: &Shapes, recorder: &AnyAccel, rays: &RaySet, plan: Plan) {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "`as` saturates; a positive number"
+        )]
+        let limit = (plan.tests as f64 / self.theirs.n_it) as usize;
+        let sample = if limit < rays.len() { &rays.sample(limit, plan.seed).0 } else { rays };
+        let accel = AnyAccel::build(self.setting.kind(), shapes, &self.setting.params(self.thickness));
+        let (counts, differing) = replay(&accel, recorder, sample);
+        let made_of = accel.summary();
+        let per_ray = |n: u64| n as f64 / counts.queries.max(1) as f64;
+        self.ours = Cost {
+            // The one node above a grid's cells is none of theirs.
+            n_in: made_of.n_in - 1,
+            n_v: made_of.n_v,
+            n_ev: made_of.n_ev,
+            n_oiv: made_of.n_oiv,
+            n_it: per_ray(counts.n_it),
+            n_ts: per_ray(counts.n_ts),
+            n_ets: per_ray(counts.n_ets),
+            n_eets: per_ray(counts.n_eets),
+        };
+        (self.rays, self.differing) = (counts.queries, differing);
+    }
+
+    /// As printed.
+    pub fn name(&self) -> String {
+        let thick = if self.thickness > 0.0 { ", thick faces" } else { "" };
+        format!("{}{thick}", self.setting.name())
+    }
+
+    /// In one word.
+    pub fn short_name(&self) -> String {
+        let thick = if self.thickness > 0.0 { "-thick" } else { "" };
+        format!("{}{thick}", self.setting.short_name())
+    }
 }
 
 /// Rays that one thread asks in a row.
