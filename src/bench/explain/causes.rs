@@ -148,7 +148,10 @@ fn alpha_cards(case: &Case) -> Option<Suspect> {
         }
         Suspect {
             cause: Cause::AlphaCards,
-            evidence: format!("rays go on behind {} materials with alpha mask or blending", names.len()),
+            evidence: match names.len() {
+                1 => "rays go on behind one material with alpha mask or blending".into(),
+                n => format!("rays go on behind {n} materials with alpha mask or blending"),
+            },
             remedy: format!("make what needs no alpha opaque, or cut cards to what is seen: {}", names.join(", ")),
             without: with_scene(case, scene),
         }
