@@ -3,7 +3,7 @@
 use crate::accel::{Accel, Hit, NO_PRIM, NoProbe, Ray, Shapes};
 use crate::math::Vec3;
 use crate::math::random::Random;
-use crate::render::{Asked, Job, Question, Tape, render_recorded};
+use crate::render::{Asked, CLASS_NAMES, Job, Question, Tape, render_recorded};
 use std::f32::consts::TAU;
 
 /// What sent a ray.
@@ -28,11 +28,8 @@ impl Class {
     /// As printed.
     pub const fn name(self) -> &'static str {
         match self {
-            Self::Primary => "primary",
-            Self::Shadow => "shadow",
-            Self::Reflected => "reflected",
-            Self::Refracted => "refracted",
             Self::Diffuse => "diffuse",
+            class => CLASS_NAMES[class as usize],
         }
     }
 }

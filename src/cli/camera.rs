@@ -1,5 +1,6 @@
 //! From what the user chose to a camera in the scene.
 
+use super::args::EyeArgs;
 use super::parse::Ortho;
 use crate::load::Diagnostic;
 use crate::load::suggest::{list, nearest};
@@ -29,6 +30,15 @@ pub(super) enum Choice {
 }
 
 impl Choice {
+    /// What was typed for a single picture; `up` belongs to the place of an eye.
+    pub(super) fn of(args: &EyeArgs, up: Option<[f64; 3]>) -> Self {
+        if let Some(eye) = args.eye {
+            return Self::Free { eye: eye.into(), at: args.at.map(Into::into), up: up.map(Into::into) };
+        }
+        let camera = args.camera.clone().map(Self::Camera);
+        args.view.map(Self::Named).or(camera).unwrap_or(Self::Default)
+    }
+
     /// The word for it in file names and messages.
     pub(super) fn name(&self) -> String {
         match self {

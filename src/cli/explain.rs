@@ -17,7 +17,7 @@ use crate::accel::{AccelParams, auto};
 use crate::bench::explain::{Bill, Case, Finding, Work, explain};
 use crate::bench::report::number::{grouped, short};
 use crate::load::Diagnostic;
-use crate::render::{Settings, View, World};
+use crate::render::{CLASS_NAMES, Settings, View, World};
 use crate::scene::default_light;
 use crate::scene::framing::robust_bounds;
 use serde_json::{Map, Value, json};
@@ -66,7 +66,7 @@ fn judge(args: &ExplainArgs, params: AccelParams, name: &str, messages: &Message
     let bounds = robust_bounds(&loaded.scene);
     let aspect = f64::from(width) / f64::from(height);
     let (camera, view_phrase) =
-        camera::camera(&choice(args), None, &loaded.scene, &bounds, aspect, file).map_err(fail)?;
+        camera::camera(&Choice::of(&args.eye, None), None, &loaded.scene, &bounds, aspect, file).map_err(fail)?;
     default_light::add_if_missing(&mut loaded.scene, &camera);
     let depth = args.depth.or(loaded.scene.hints.depth);
     let settings = Settings { width, height, samples: 1, depth, ..Settings::default() };
@@ -94,16 +94,6 @@ fn judge(args: &ExplainArgs, params: AccelParams, name: &str, messages: &Message
     Ok(Exit::Done)
 }
 
-fn choice(args: &ExplainArgs) -> Choice {
-    if let Some(eye) = args.eye {
-        return Choice::Free { eye: eye.into(), at: args.at.map(Into::into), up: None };
-    }
-    let camera = args.camera.clone().map(Choice::Camera);
-    args.view.map(Choice::Named).or(camera).unwrap_or(Choice::Default)
-}
-
-const CLASSES: [&str; 4] = ["primary", "shadow", "reflected", "refracted"];
-
 impl Told<'_> {
     fn text(&self) -> String {
         let Settings { width, height, .. } = self.case.settings;
@@ -118,7 +108,7 @@ impl Told<'_> {
             short(all.tests as f64 / pixels),
             short(all.steps as f64 / pixels),
         );
-        for (name, work) in CLASSES.iter().zip(&self.usual.0).filter(|(_, work)| work.rays > 0) {
+        for (name, work) in CLASS_NAMES.iter().zip(&self.usual.0).filter(|(_, work)| work.rays > 0) {
             let share = 100.0 * work.cost() as f64 / all.cost().max(1) as f64;
             let _ = writeln!(out, "  {share:3.0} % for {} {name} rays", grouped(work.rays));
         }
@@ -172,7 +162,7 @@ impl Told<'_> {
 fn bill(bill: &Bill) -> Value {
     let work = |w: &Work| json!({"rays": w.rays, "tests": w.tests, "steps": w.steps, "cost": w.cost()});
     let mut classes: Map<String, Value> =
-        CLASSES.iter().zip(&bill.0).map(|(name, w)| ((*name).to_owned(), work(w))).collect();
+        CLASS_NAMES.iter().zip(&bill.0).map(|(name, w)| ((*name).to_owned(), work(w))).collect();
     classes.insert("all".into(), work(&bill.sum()));
     Value::Object(classes)
 }

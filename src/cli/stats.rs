@@ -25,7 +25,7 @@ use super::exit::Exit;
 use super::job::RenderJob;
 use super::message::Messages;
 use crate::accel::{AccelKind, AccelParams, AnyAccel, RayCounts, StructureStats};
-use crate::render::{ClassCounts, Job, Rendered, Settings, World};
+use crate::render::{CLASS_NAMES, ClassCounts, Job, Rendered, Settings, World};
 use serde_json::{Value, json};
 use std::io;
 use std::time::Instant;
@@ -113,7 +113,8 @@ impl Counted {
 
     fn classes(&self) -> [(&'static str, &RayCounts); 4] {
         let c = &self.counts;
-        [("primary", &c.primary), ("shadow", &c.shadow), ("reflected", &c.reflected), ("refracted", &c.refracted)]
+        let [primary, shadow, reflected, refracted] = CLASS_NAMES;
+        [(primary, &c.primary), (shadow, &c.shadow), (reflected, &c.reflected), (refracted, &c.refracted)]
     }
 }
 

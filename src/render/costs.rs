@@ -5,7 +5,7 @@
 use super::observer::{Observer, Question};
 use super::tile::{Together, cost_tiles};
 use super::whitted::ByClass;
-use super::{Context, Job, Progress};
+use super::{CLASS_NAMES, Context, Job, Progress};
 use crate::accel::{Hit, Probe, Ray};
 use crate::image::{Channel, Values};
 use std::fmt;
@@ -58,9 +58,6 @@ impl FromStr for Cost {
         Self::ALL.into_iter().find(|c| c.name() == name).ok_or_else(|| UnknownCost(name.into()))
     }
 }
-
-/// Ray classes as the names of channels end, in the order of [`ByClass`]'s fields.
-const CLASSES: [&str; 4] = ["primary", "shadow", "reflected", "refracted"];
 
 /// What the time of a pixel has beside the classes: everything that is not spent in the structure.
 const SHADING: &str = "shading";
@@ -122,12 +119,12 @@ pub fn render_costs(job: &Job, wanted: &[Cost], progress: &dyn Progress) -> Opti
         for (i, cost) in [Cost::Tests, Cost::Steps, Cost::Mailbox].into_iter().enumerate() {
             if wanted.contains(&cost) {
                 let pixels: Vec<[u32; 4]> = counts.iter().map(|p| p.map(|class| class[i])).collect();
-                costs.push(cost, CLASSES, &pixels, Values::U32);
+                costs.push(cost, CLASS_NAMES, &pixels, Values::U32);
             }
         }
     }
     if wanted.contains(&Cost::Ms) {
-        let [a, b, c, d] = CLASSES;
+        let [a, b, c, d] = CLASS_NAMES;
         costs.push(Cost::Ms, [a, b, c, d, SHADING], &times(job, progress)?, Values::F32);
     }
     Some(costs)

@@ -45,6 +45,9 @@ use observer::Observer;
 use texture::TextureStore;
 use whitted::ByClass;
 
+/// Classes of rays as they are typed and printed, in the order of counts.
+pub const CLASS_NAMES: [&str; 4] = ["primary", "shadow", "reflected", "refracted"];
+
 /// What to render and how well.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {

@@ -6,7 +6,7 @@
 use super::observer::{Observer, Question};
 use super::tile::trace_sample;
 use super::whitted::ByClass;
-use super::{Context, Job};
+use super::{CLASS_NAMES, Context, Job};
 use crate::accel::probe::{Outcome, Test, Visit};
 use crate::accel::{Hit, Probe, Ray, RayCounts};
 use crate::math::Vec3;
@@ -45,12 +45,7 @@ impl Class {
 
     /// As printed.
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Primary => "primary",
-            Self::Shadow => "shadow",
-            Self::Reflected => "reflected",
-            Self::Refracted => "refracted",
-        }
+        CLASS_NAMES[self as usize]
     }
 }
 

@@ -116,7 +116,7 @@ impl Lattice {
         self.place_f64(p.as_dvec3())
     }
 
-    /// The same.
+    /// [`Self::place`] of a point that is no vertex.
     pub fn place_f64(&self, p: DVec3) -> DVec3 {
         (p - self.lo) * self.scale
     }
@@ -177,14 +177,17 @@ impl Lattice {
 /// Box of bounded prim `prim`, its face thickened along its normal.
 pub fn thick_box(shapes: &Shapes, prim: u32, thickness: f64) -> (DVec3, DVec3) {
     let bounds = shapes.bounds(prim);
+    let (lo, hi) = (bounds.lo.as_dvec3(), bounds.hi.as_dvec3());
+    if thickness == 0.0 {
+        return (lo, hi);
+    }
     let normal = match shapes.prim(prim) {
-        _ if thickness == 0.0 => Vec3::ZERO,
         Prim::Triangle(corners) => triangle::normal(&corners),
         Prim::Polygon(p) => p.normal(),
         _ => Vec3::ZERO,
     };
     let more = normal.abs().as_dvec3() * thickness;
-    (bounds.lo.as_dvec3() - more, bounds.hi.as_dvec3() + more)
+    (lo - more, hi + more)
 }
 
 /// Cells on each axis for the density that is asked for.

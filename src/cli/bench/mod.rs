@@ -1,10 +1,10 @@
 //! `meshray bench`: structures compared on the rays of a real picture, as tables and as report files.
 
+mod args;
 mod gate;
 mod scene;
 mod spd;
 
-use super::args::BenchArgs;
 use super::exit::Exit;
 use super::job::{self, Wrong};
 use super::message::Messages;
@@ -17,6 +17,7 @@ use crate::bench::report::{Format, Model, Rays, Report, text};
 use crate::bench::row::Row;
 use crate::bench::sweep::Sweep;
 use crate::image::write_atomic;
+pub(super) use args::BenchArgs;
 use gate::Gate;
 use scene::{Prepared, Subject};
 use std::path::PathBuf;
@@ -38,17 +39,17 @@ pub(super) fn run(args: &BenchArgs) -> Exit {
             return Exit::Usage;
         }
     };
+    let bench = Bench { args, files, messages };
     if let Some(folder) = &args.spd {
-        return spd::run(folder, args, &files, &messages);
+        return bench.published(folder);
     }
-    let gate = match args.baseline.as_ref().map(|path| Gate::read(path, &args.fail_if, &messages)).transpose() {
+    let gate = match args.baseline.as_ref().map(|path| Gate::read(path, &args.fail_if, &bench.messages)).transpose() {
         Ok(gate) => gate,
         Err(exit) => return exit,
     };
     for kind in args.accel.iter().filter(|kind| !plan.kinds.contains(kind)) {
-        messages.info("structure-left-out", format!("{kind} is left out: it has no such parameter"));
+        bench.messages.info("structure-left-out", format!("{kind} is left out: it has no such parameter"));
     }
-    let bench = Bench { args, files, messages };
     let mut report = Report {
         machine: Machine::here(),
         plan,
@@ -243,9 +244,14 @@ impl Bench<'_> {
     }
 
     fn write(&self, report: &Report) -> Exit {
+        self.write_as(|format| format.write(report))
+    }
+
+    /// Writes every file that was asked for.
+    fn write_as(&self, text: impl Fn(Format) -> String) -> Exit {
         let mut exit = Exit::Done;
         for (path, format) in &self.files {
-            if let Err(e) = write_atomic(path, format.write(report).as_bytes(), false) {
+            if let Err(e) = write_atomic(path, text(*format).as_bytes(), false) {
                 self.messages.error("output-unwritable", format!("{}: {e}", path.display()), "");
                 exit = Exit::Failed;
             }

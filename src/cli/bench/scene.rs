@@ -1,10 +1,10 @@
 //! What is measured, made ready for the one rendering whose rays are recorded.
 
-use super::super::args::BenchArgs;
 use super::super::camera::{self, Choice};
 use super::super::exit::Exit;
 use super::super::message::{Messages, Severity};
 use super::super::read;
+use super::args::BenchArgs;
 use crate::accel::{AccelKind, AccelParams, AnyAccel};
 use crate::bench::pruning::Pruning;
 use crate::generate::Family;
@@ -91,7 +91,7 @@ impl Prepared {
         let (width, height) = args.size;
         let bounds = robust_bounds(&loaded.scene);
         let aspect = f64::from(width) / f64::from(height);
-        let found = camera::camera(&choice(args), None, &loaded.scene, &bounds, aspect, input);
+        let found = camera::camera(&Choice::of(&args.eye, None), None, &loaded.scene, &bounds, aspect, input);
         let (camera, view_phrase) = found.map_err(|fault| {
             messages.say(Severity::Error, &fault);
             Exit::Input
@@ -135,12 +135,4 @@ impl Prepared {
         let scene = &self.loaded.scene;
         work(&Job { scene, world, accel: &accel, textures, view: &self.view, settings })
     }
-}
-
-fn choice(args: &BenchArgs) -> Choice {
-    if let Some(eye) = args.eye {
-        return Choice::Free { eye: eye.into(), at: args.at.map(Into::into), up: None };
-    }
-    let camera = args.camera.clone().map(Choice::Camera);
-    args.view.map(Choice::Named).or(camera).unwrap_or(Choice::Default)
 }

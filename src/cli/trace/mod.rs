@@ -73,9 +73,6 @@ pub(super) fn run(args: &TraceArgs) -> Exit {
 
 /// What the command line says about the picture that the ray is part of.
 fn check(args: &TraceArgs) -> Result<Look, Wrong> {
-    if args.eye.is_none() && (args.at.is_some() || args.up_vector.is_some()) {
-        return Err(Wrong("--at and --up-vector belong to --eye; say where the camera stands".into()));
-    }
     if let Some(path) = &args.output
         && FileKind::from_path(path).ok() != Some(FileKind::Png)
     {
@@ -96,14 +93,6 @@ fn check(args: &TraceArgs) -> Result<Look, Wrong> {
         layers: false,
         costs: Vec::new(),
     })
-}
-
-fn choice(args: &TraceArgs) -> Choice {
-    if let Some(eye) = args.eye {
-        return Choice::Free { eye: eye.into(), at: args.at.map(Into::into), up: args.up_vector.map(Into::into) };
-    }
-    let camera = args.camera.clone().map(Choice::Camera);
-    args.view.map(Choice::Named).or(camera).unwrap_or(Choice::Default)
 }
 
 fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messages: &Messages) -> Result<Exit, Exit> {
@@ -128,7 +117,7 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
     // The eye, its light, and the ray.
     let bounds = robust_bounds(&loaded.scene);
     let aspect = f64::from(settings.width) / f64::from(settings.height);
-    let found = camera::camera(&choice(args), look.lens, &loaded.scene, &bounds, aspect, file);
+    let found = camera::camera(&Choice::of(&args.eye, args.up_vector), look.lens, &loaded.scene, &bounds, aspect, file);
     let (camera, view_phrase) = found.map_err(fail(Exit::Input))?;
     default_light::add_if_missing(&mut loaded.scene, &camera);
     loaded.scene.background = Some(background(look, &loaded.scene));
