@@ -3,6 +3,10 @@
 //! A node starts with everything below it as one part; the part with the largest box is cut, and cut again, until there
 //! are eight or nothing is left to cut. Large parts are built by several threads; what they make is joined in order, so
 //! that the tree does not depend on their number.
+//!
+//! Children stand in slots by where they are: the bit k of a slot's number is set where its child lies on the positive side
+//! of axis k, as far as the eight slots allow. `slot ^ octant` is then about the order in which a ray meets them, where
+//! bit k of `octant` is set for a ray that runs backwards along axis k. Slots between may be empty.
 
 use rayon::prelude::*;
 
@@ -77,6 +81,42 @@ impl<'i> Part<'i> {
     }
 }
 
+/// The slot of each part: of all pairs the one that suits best is taken first. A part suits a slot the better the
+/// farther it lies from the middle in the slot's direction.
+fn slots(parts: &[Part]) -> [usize; LANES] {
+    let all = parts.iter().fold(Aabb::EMPTY, |b, p| b.union(p.bounds));
+    // Halves, so that no sum overflows.
+    let middle = |b: &Aabb| b.lo * 0.5 + b.hi * 0.5;
+    let center = middle(&all);
+    let from_center: [Vec3; LANES] =
+        std::array::from_fn(|i| parts.get(i).map_or(Vec3::ZERO, |p| middle(&p.bounds) - center));
+    let suits = |i: usize, slot: usize| {
+        (0..3).map(|k| if slot >> k & 1 == 1 { from_center[i][k] } else { -from_center[i][k] }).sum::<f32>()
+    };
+    let best_of = |i: usize, free: u32| {
+        let free = (0..LANES).filter(|slot| free >> slot & 1 == 1);
+        // The first of equals.
+        free.map(|slot| (suits(i, slot), slot)).reduce(|a, b| if b.0 > a.0 { b } else { a })
+    };
+
+    let (mut slots, mut free, mut open) = ([0; LANES], (1u32 << LANES) - 1, (1u32 << parts.len()) - 1);
+    let mut best: [Option<(f32, usize)>; LANES] = std::array::from_fn(|i| best_of(i, free));
+    while open != 0 {
+        let waiting = (0..LANES).filter(|i| open >> i & 1 == 1);
+        let next = waiting.filter_map(|i| best[i].map(|(value, slot)| (value, slot, i)));
+        let Some((_, slot, i)) = next.reduce(|a, b| if b.0 > a.0 { b } else { a }) else { break };
+        slots[i] = slot;
+        free &= !(1 << slot);
+        open &= !(1 << i);
+        for other in (0..LANES).filter(|other| open >> other & 1 == 1) {
+            if best[other].is_some_and(|(_, taken)| taken == slot) {
+                best[other] = best_of(other, free);
+            }
+        }
+    }
+    slots
+}
+
 struct Builder<'a> {
     shapes: &'a Shapes,
     splitting: Splitting,
@@ -102,9 +142,10 @@ impl Builder<'_> {
         } else {
             Vec::new()
         };
-        for (slot, part) in parts.into_iter().enumerate() {
-            let bounds = part.bounds;
-            let child = match built.get_mut(slot).and_then(Option::take) {
+        let slots = slots(&parts);
+        for (i, part) in parts.into_iter().enumerate() {
+            let (bounds, slot) = (part.bounds, slots[i]);
+            let child = match built.get_mut(i).and_then(Option::take) {
                 Some(subtree) => tree.append(subtree),
                 None if part.items.len() > self.leaf_size(part.items) => Child::Node(self.node(vec![part], tree)),
                 None => self.leaf(part.items, tree),
@@ -158,5 +199,44 @@ impl Builder<'_> {
         }
         tree.blocks.push(block);
         Child::Block(index(tree.blocks.len() - 1), index(prims.len()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn slots_of(middles: &[Vec3]) -> Vec<usize> {
+        let part = |&m: &Vec3| Part { items: &mut [], bounds: Aabb { lo: m - 0.1, hi: m + 0.1 }, whole: true };
+        let parts: Vec<Part> = middles.iter().map(part).collect();
+        slots(&parts)[..parts.len()].to_vec()
+    }
+
+    #[test]
+    fn eight_corners_stand_in_the_slots_of_their_signs() {
+        let corner = |slot: usize| Vec3::from([0, 1, 2].map(|k: usize| if slot >> k & 1 == 1 { 1.0 } else { -1.0 }));
+        let order = [3, 0, 7, 5, 1, 6, 2, 4];
+        assert_eq!(slots_of(&order.map(corner)), order);
+    }
+
+    #[test]
+    fn every_part_has_a_slot_of_its_own_and_those_along_an_axis_stand_in_its_order() {
+        let row: Vec<Vec3> = (0..8).map(|i| Vec3::Y * i as f32).collect();
+        let along = slots_of(&row);
+        let mut sorted = along.clone();
+        sorted.sort_unstable();
+        assert_eq!(sorted, [0, 1, 2, 3, 4, 5, 6, 7]);
+        assert!(along[..4].iter().all(|s| s >> 1 & 1 == 0) && along[4..].iter().all(|s| s >> 1 & 1 == 1), "{along:?}");
+        for copies in 1..=8 {
+            let mut slots = slots_of(&vec![Vec3::ONE; copies]);
+            slots.sort_unstable();
+            slots.dedup();
+            assert_eq!(slots.len(), copies);
+        }
+        // Middles that are no numbers do no harm.
+        let far = Aabb { lo: Vec3::splat(-f32::MAX), hi: Vec3::splat(f32::MAX) };
+        let parts: Vec<Part> = (0..3).map(|_| Part { items: &mut [], bounds: far, whole: true }).collect();
+        let slots = slots(&parts);
+        assert!(slots[0] != slots[1] && slots[1] != slots[2] && slots[0] != slots[2], "{slots:?}");
     }
 }
