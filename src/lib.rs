@@ -59,6 +59,7 @@
 //! | [`mod@render`] | rays -> linear pixels: waves, shading models, lights and shadows, optics, textures |
 //! | [`image`] | linear pixels <-> files: tone mapping, formats, metadata, differences |
 //! | [`mod@bench`] | measures and compares: hard rays, exact answers, what came out |
+//! | [`stopwatch`] | time on the wall and of the processor |
 //! | `cli` | words -> jobs -> messages and exit codes (feature `cli`) |
 //!
 //! `scene` and `accel` use `math`; `load` uses `scene`; `render` uses `scene`, `accel` and `image`; `bench` uses
@@ -83,3 +84,4 @@ pub mod math;
 pub mod render;
 pub mod save;
 pub mod scene;
+pub mod stopwatch;

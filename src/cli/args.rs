@@ -218,6 +218,9 @@ pub(super) struct RenderArgs {
     /// Print times and counts: a timed run, then a counted one
     #[arg(long, value_name = "FORMAT", value_enum, help_heading = "Run")]
     pub stats: Option<StatsFormat>,
+    /// Print where the time went: reading, parsing, building, each class of rays, shading, writing; wall and CPU
+    #[arg(long, help_heading = "Run", hide_short_help = true)]
+    pub profile: bool,
     /// Write the statistics to a file instead of standard output
     #[arg(long, value_name = "PATH", help_heading = "Run", hide_short_help = true)]
     pub stats_file: Option<PathBuf>,

@@ -46,6 +46,8 @@ pub(super) struct RenderJob {
     pub heatmap_max: Option<f64>,
     /// Statistics, if wanted.
     pub stats: Option<Stats>,
+    /// Whether to tell where the time went.
+    pub profile: bool,
     /// Only warnings and errors.
     pub quiet: bool,
     /// Warnings are errors.
@@ -161,6 +163,7 @@ impl RenderJob {
             heatmaps: args.heatmap.clone(),
             heatmap_max: args.heatmap_max,
             stats,
+            profile: args.profile,
             quiet: args.quiet,
             strict: args.strict,
             allow_empty: args.allow_empty,

@@ -19,6 +19,7 @@ mod message;
 mod output_name;
 mod parse;
 mod picture;
+mod profile;
 mod progress;
 mod read;
 mod render;

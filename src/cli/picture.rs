@@ -87,32 +87,41 @@ pub(super) enum WriteError {
     Fault(Diagnostic),
 }
 
-/// Encodes the picture and puts it where it belongs.
-pub(super) fn write(
+impl WriteError {
+    fn new(shot: &Shot, text: String) -> Self {
+        let name = shot.target.path().unwrap_or(std::path::Path::new("-"));
+        Self::Fault(Diagnostic::new("output-unwritable", name, "", text))
+    }
+}
+
+/// The bytes of the picture's file.
+pub(super) fn encoded(
     shot: &Shot,
     picture: &Picture,
     effective: &Effective,
     background: Option<Background>,
     metadata: &Metadata,
-) -> Result<(), WriteError> {
+) -> Result<Vec<u8>, WriteError> {
     let mut output = effective.output.clone();
     if let Some(Background::Color(color)) = background {
         output.background = Some(color.to_array());
     }
-    let name = shot.target.path().unwrap_or(std::path::Path::new("-"));
-    let fault = |text: String| WriteError::Fault(Diagnostic::new("output-unwritable", name, "", text));
-    let bytes = encode(picture, shot.kind, &output, metadata).map_err(|e| fault(e.to_string()))?;
+    encode(picture, shot.kind, &output, metadata).map_err(|e| WriteError::new(shot, e.to_string()))
+}
+
+/// Puts the bytes where they belong.
+pub(super) fn write(shot: &Shot, bytes: &[u8]) -> Result<(), WriteError> {
     let _guard = interrupt::Guard::new();
     match &shot.target {
         Target::Stdout => {
             let mut out = io::stdout().lock();
-            out.write_all(&bytes).and_then(|()| out.flush()).map_err(|e| match e.kind() {
+            out.write_all(bytes).and_then(|()| out.flush()).map_err(|e| match e.kind() {
                 io::ErrorKind::BrokenPipe => WriteError::BrokenPipe,
-                _ => fault(e.to_string()),
+                _ => WriteError::new(shot, e.to_string()),
             })
         }
         Target::Named(path) | Target::Default(path) => {
-            write_atomic(path, &bytes, false).map_err(|e| fault(e.to_string()))
+            write_atomic(path, bytes, false).map_err(|e| WriteError::new(shot, e.to_string()))
         }
     }
 }

@@ -62,6 +62,8 @@ fn append(whole: &mut Loaded, part: Loaded) {
     facts.extensions.extend(more.extensions);
     facts.max_rounding = facts.max_rounding.max(more.max_rounding);
     facts.files.extend(more.files);
+    facts.reading += more.reading;
+    facts.decoding += more.decoding;
 }
 
 fn one(input: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {

@@ -5,6 +5,7 @@ use super::exit::Exit;
 use super::job::{Batch, RenderJob, Shot, Target};
 use super::message::{Messages, Severity};
 use super::picture::{self, Effective};
+use super::profile::Profile;
 use super::progress::Progress;
 use super::stats::{self, PictureStats, Times};
 use super::{accident, again, cost_layers, interrupt, output_name, read};
@@ -66,7 +67,8 @@ fn render_batch(job: &RenderJob, batch: &Batch, messages: &Messages, done: &mut 
     // The bar needs the room that folders would take.
     let name = batch.inputs[0].file_name().unwrap_or(batch.inputs[0].as_os_str()).to_string_lossy();
     let progress = Progress::new(&name, messages, job.quiet, job.keep_partial);
-    match prepare(job, batch, messages, &progress) {
+    let profile = if done.is_empty() { Profile::of_process() } else { Profile::new() };
+    match prepare(job, batch, messages, &progress, profile) {
         Ok(mut ready) => {
             for shot in shots {
                 worst = worst.max(render_shot(job, batch, shot, &mut ready, messages, &progress, done));
@@ -111,15 +113,24 @@ struct Ready {
     world: World,
     bounds: Bounds,
     load_seconds: f64,
+    /// Stages that no picture has told yet.
+    profile: Profile,
 }
 
-fn prepare(job: &RenderJob, batch: &Batch, messages: &Messages, progress: &Progress) -> Result<Ready, Exit> {
+fn prepare(
+    job: &RenderJob,
+    batch: &Batch,
+    messages: &Messages,
+    progress: &Progress,
+    mut profile: Profile,
+) -> Result<Ready, Exit> {
     let start = Instant::now();
     progress.stage("loading");
     let loaded = read::scene(&batch.inputs, &job.load).map_err(|error| {
         messages.load_error(&error);
         read::exit_of(&error)
     })?;
+    profile.loaded(loaded.facts.reading, loaded.facts.decoding);
     loaded.warnings.iter().for_each(|w| messages.say(Severity::Warning, w));
     if job.strict && !loaded.warnings.is_empty() {
         let count = loaded.warnings.len();
@@ -139,8 +150,10 @@ fn prepare(job: &RenderJob, batch: &Batch, messages: &Messages, progress: &Progr
         messages.say(Severity::Error, &nothing_to_draw(&loaded, &batch.inputs[0]));
         return Err(Exit::Input);
     }
+    profile.done("place");
     let bounds = robust_bounds(&loaded.scene);
-    Ok(Ready { loaded, world, bounds, load_seconds: start.elapsed().as_secs_f64() })
+    profile.done("frame");
+    Ok(Ready { loaded, world, bounds, load_seconds: start.elapsed().as_secs_f64(), profile })
 }
 
 fn nothing_to_draw(loaded: &Loaded, file: &Path) -> Diagnostic {
@@ -163,7 +176,7 @@ fn render_shot(
     progress: &Progress,
     done: &mut Vec<PictureStats>,
 ) -> Exit {
-    let Ready { loaded, world, bounds, load_seconds } = ready;
+    let Ready { loaded, world, bounds, load_seconds, profile } = ready;
     let file = &batch.inputs[0];
     let fail = |fault: &Diagnostic, exit| {
         messages.say(Severity::Error, fault);
@@ -192,6 +205,7 @@ fn render_shot(
     let light = default_light::add_if_missing(&mut loaded.scene, &camera);
     loaded.scene.background = Some(picture::background(&job.look, &loaded.scene));
     let view = View::from_camera(&camera);
+    profile.done("frame");
 
     let mut times = Times { load: *load_seconds, ..Times::default() };
     progress.stage("building");
@@ -201,6 +215,7 @@ fn render_shot(
     let textures = TextureStore::new(&loaded.scene);
     let textures = if job.everything { textures.with_everything() } else { textures };
     times.build = start.elapsed().as_secs_f64();
+    profile.done("build");
 
     let work = Job {
         scene: &loaded.scene,
@@ -210,7 +225,7 @@ fn render_shot(
         view: &view,
         settings: &effective.settings,
     };
-    let mut rendered = trace(job, &work, progress, &mut times);
+    let mut rendered = trace(job, &work, progress, &mut times, profile);
     let costs = rendered.complete.then(|| costs(job, &work, progress));
     progress.finish();
     let Some(costs) = costs.flatten() else {
@@ -224,14 +239,22 @@ fn render_shot(
     let (depth, accel_kind) = (rendered.depth, accel.kind());
     let facts = again::Facts { job, batch, shot, effective: &effective, depth, accel: accel_kind, reason, loaded };
     let metadata = again::metadata(&facts, counted.as_ref());
+    profile.skip();
     let start = Instant::now();
-    let written = picture::write(shot, &rendered.picture, &effective, loaded.scene.background, &metadata);
+    let bytes = picture::encoded(shot, &rendered.picture, &effective, loaded.scene.background, &metadata);
+    profile.done("encode");
+    let written = bytes.and_then(|bytes| picture::write(shot, &bytes));
+    profile.done("write");
     times.write = start.elapsed().as_secs_f64();
+    let profile = profile.take();
     let exit = match written {
         Ok(()) => {
             let summary = Summary { shot, effective: &effective, loaded, bounds, view: &view_phrase, light };
             summary.say(&rendered, &times, messages);
-            let stats = PictureStats::new(&facts, &view_phrase, times, world, accel.summary(), counted);
+            let profile = job.profile.then_some(profile);
+            profile.iter().for_each(|p| p.say(messages));
+            let structure = accel.summary();
+            let stats = PictureStats::new(&facts, &view_phrase, times, world, structure, counted, profile.as_ref());
             done.push(stats);
             match cost_layers::write_maps(job, shot, effective.settings.width, &costs, accel_kind, messages) {
                 Ok(()) => Exit::Done,
@@ -249,11 +272,17 @@ fn render_shot(
     exit
 }
 
-fn trace(job: &RenderJob, work: &Job, progress: &Progress, times: &mut Times) -> Rendered {
+fn trace(job: &RenderJob, work: &Job, progress: &Progress, times: &mut Times, profile: &mut Profile) -> Rendered {
     progress.begin("rendering");
     let _guard = job.keep_partial.then(interrupt::Guard::new);
     let start = Instant::now();
-    let rendered = crate::render::render(work, progress);
+    let rendered = if job.profile {
+        let (rendered, parts) = crate::render::render_profiled(work, progress);
+        profile.rendered(&parts);
+        rendered
+    } else {
+        crate::render::render(work, progress)
+    };
     times.render = start.elapsed().as_secs_f64();
     rendered
 }
@@ -283,7 +312,8 @@ fn keep_partial(shot: &Shot, rendered: &Rendered, effective: &Effective, loaded:
     let partial = Shot { target: Target::Named(path.clone()), ..shot.clone() };
     // Without settings in it nobody will take it for a finished picture.
     let metadata = crate::image::Metadata::new();
-    match picture::write(&partial, &rendered.picture, effective, loaded.scene.background, &metadata) {
+    let bytes = picture::encoded(&partial, &rendered.picture, effective, loaded.scene.background, &metadata);
+    match bytes.and_then(|bytes| picture::write(&partial, &bytes)) {
         Ok(()) => messages.info("partial", format!("interrupted; the tiles that were done are in {}", path.display())),
         Err(picture::WriteError::Fault(fault)) => messages.say(Severity::Error, &fault),
         Err(picture::WriteError::BrokenPipe) => {}

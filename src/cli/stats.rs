@@ -15,6 +15,7 @@
 //! | `structure` | V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`; `bytes` and `depth` |
 //! | `counts` | for each ray class `primary`, `shadow`, `reflected`, `refracted`, and `all`: exact `rays`, `hits`, `tests`, `steps`, `cells`, `empty_cells`, `volume_tests`, `tests_saved`, `transforms`; and per ray `n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`, `n_xf`; `culled` = 1 − n_it / N |
 //! | `counted_seconds` | time of the second run that counted; never compare it with `seconds` |
+//! | `profile` | `null`, or with `--profile` its `stages`: `stage`, `part_of` (a class of rays and `shade` are parts of `tiles`), seconds `wall` (`null` of parts) and `cpu` of all threads, `rays` of a class; `peak_memory`, bytes (`null`: the system does not say) |
 //! | `rounding` | largest displacement of a vertex by rounding, world units |
 //!
 //! Keys are only ever added; a change of meaning gets another schema name.
@@ -24,6 +25,7 @@ use super::args::StatsFormat;
 use super::exit::Exit;
 use super::job::RenderJob;
 use super::message::Messages;
+use super::profile::Profile;
 use crate::accel::{AccelKind, AccelParams, AnyAccel, RayCounts, StructureStats};
 use crate::render::{CLASS_NAMES, ClassCounts, Job, Rendered, Settings, World};
 use serde_json::{Value, json};
@@ -163,6 +165,7 @@ impl PictureStats {
         world: &World,
         structure: StructureStats,
         counted: Option<Counted>,
+        profile: Option<&Profile>,
     ) -> Self {
         let settings = &facts.effective.settings;
         let (scene, shapes) = (&facts.loaded.scene, &world.shapes);
@@ -192,6 +195,7 @@ impl PictureStats {
             },
             "counts": counted.as_ref().map(Counted::json),
             "counted_seconds": counted.as_ref().map(|c| c.seconds),
+            "profile": profile.map(Profile::json),
             "rounding": facts.loaded.facts.max_rounding,
         });
         Self { json, counted }

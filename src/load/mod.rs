@@ -19,6 +19,7 @@ pub use diagnostic::{Diagnostic, LoadError, Warnings};
 pub use limits::Limits;
 
 use crate::scene::{Scene, UpAxis};
+use crate::stopwatch::{Spent, Stopwatch};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -99,6 +100,10 @@ pub struct Facts {
     pub files: Vec<PathBuf>,
     /// xxh3-128 of the xxh3-128 hashes of all files in `files`, in that order (see [`paths::Resolver::finish`]).
     pub hash: u128,
+    /// Time that reading the bytes of all files took, of the thread that did it.
+    pub reading: Spent,
+    /// Time that decoding pictures took: from the first to the last, and of all threads together.
+    pub decoding: Spent,
 }
 
 /// A file in memory, with the name it was read from.
@@ -123,7 +128,12 @@ impl Source {
 /// [`LoadError::Read`] when the file itself cannot be read, [`LoadError::Input`] when what it holds cannot be drawn.
 /// A file that is right but holds nothing to draw is `Ok` with an empty scene.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
-    load_source(&read_source(path, &options.limits)?, options)
+    let watch = Stopwatch::of_this_thread();
+    let source = read_source(path, &options.limits)?;
+    let reading = watch.read();
+    let mut loaded = load_source(&source, options)?;
+    loaded.facts.reading += reading;
+    Ok(loaded)
 }
 
 /// Loads a model or scene from memory. Files it names are looked up beside `name`; for `-` in
@@ -157,7 +167,8 @@ fn read_source(path: &Path, limits: &Limits) -> Result<Source, LoadError> {
     if meta.len() > limits.file {
         return Err(too_large(meta.len()));
     }
-    let mut bytes = Vec::new();
+    // One more than there are, so that reading to the end needs no larger room.
+    let mut bytes = Vec::with_capacity(usize::try_from(meta.len()).map_or(0, |length| length.saturating_add(1)));
     file.take(limits.file.saturating_add(1)).read_to_end(&mut bytes).map_err(fault)?;
     if bytes.len() as u64 > limits.file {
         return Err(too_large(bytes.len() as u64));

@@ -5,6 +5,7 @@
 //! say exactly what it was made from.
 
 use super::{Diagnostic, LoadOptions, Source};
+use crate::stopwatch::{Spent, Stopwatch};
 use percent_encoding::percent_decode_str;
 use std::collections::HashMap;
 use std::fs;
@@ -23,6 +24,7 @@ pub struct Resolver {
     read: Vec<(PathBuf, u128)>,
     /// Canonical path -> index into `read`.
     known: HashMap<PathBuf, usize>,
+    reading: Spent,
 }
 
 /// Why a named file was not read.
@@ -100,7 +102,14 @@ impl Resolver {
         let base = base.canonicalize().unwrap_or(base);
         let root = options.root.clone().unwrap_or_else(|| base.clone());
         let root = root.canonicalize().unwrap_or(root);
-        let mut resolver = Self { base, root, max_bytes: options.limits.file, read: Vec::new(), known: HashMap::new() };
+        let mut resolver = Self {
+            base,
+            root,
+            max_bytes: options.limits.file,
+            read: Vec::new(),
+            known: HashMap::new(),
+            reading: Spent::default(),
+        };
         let canonical = source.path.canonicalize().unwrap_or_else(|_| source.path.clone());
         resolver.note(canonical, source.path.clone(), &source.bytes);
         resolver
@@ -123,6 +132,7 @@ impl Resolver {
         let shown = || name.to_string_lossy().into_owned();
         let io = |source| FileFault::Io { name: shown(), source };
         let path = self.locate(name)?;
+        let watch = Stopwatch::of_this_thread();
         let file = fs::File::open(&path).map_err(io)?;
         let meta = file.metadata().map_err(io)?;
         if !meta.is_file() {
@@ -132,13 +142,19 @@ impl Resolver {
         if meta.len() > self.max_bytes {
             return Err(too_large(meta.len()));
         }
-        let mut bytes = Vec::new();
+        let mut bytes = Vec::with_capacity(usize::try_from(meta.len()).map_or(0, |length| length.saturating_add(1)));
         file.take(self.max_bytes.saturating_add(1)).read_to_end(&mut bytes).map_err(io)?;
         if bytes.len() as u64 > self.max_bytes {
             return Err(too_large(bytes.len() as u64));
         }
+        self.reading += watch.read();
         self.note(path, self.base.join(name), &bytes);
         Ok(bytes)
+    }
+
+    /// Time that reading named files has taken.
+    pub fn reading(&self) -> Spent {
+        self.reading
     }
 
     /// Nothing outside this folder is read; canonical.

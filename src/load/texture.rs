@@ -7,10 +7,12 @@
 use super::limits::{Budget, Limits};
 use super::{Diagnostic, Warnings};
 use crate::scene::{Bitmap, Pixels};
+use crate::stopwatch::{Spent, Stopwatch};
 use ::image::{ColorType, DynamicImage, ImageFormat, ImageReader};
 use rayon::prelude::*;
 use std::io::Cursor;
 use std::path::Path;
+use std::time::Instant;
 
 /// A picture to decode.
 #[derive(Debug, Default)]
@@ -23,7 +25,8 @@ pub struct Encoded<'a> {
     pub bytes: std::borrow::Cow<'a, [u8]>,
 }
 
-/// Decodes all, in parallel; `None` for each that could not be, with a warning about `file`.
+/// Decodes all, in parallel; `None` for each that could not be, with a warning about `file`. And the time that took, of
+/// all threads together.
 ///
 /// Sizes are checked against `limits` and `budget` before anything is decoded.
 pub fn decode_all(
@@ -32,20 +35,30 @@ pub fn decode_all(
     limits: &Limits,
     budget: &mut Budget,
     warnings: &mut Warnings,
-) -> Vec<Option<Bitmap>> {
+) -> (Vec<Option<Bitmap>>, Spent) {
+    if images.is_empty() {
+        return Default::default();
+    }
+    let start = Instant::now();
     let sized: Vec<_> = images.iter().map(|image| check_size(&image.bytes, limits, budget)).collect();
     let decoded: Vec<_> = images
         .par_iter()
         .zip(sized)
-        .map(|(image, format)| format.and_then(|format| decode(&image.name, &image.bytes, format)))
+        .map(|(image, format)| {
+            let watch = Stopwatch::of_this_thread();
+            let decoded = format.and_then(|format| decode(&image.name, &image.bytes, format));
+            (decoded, watch.read().cpu)
+        })
         .collect();
+    let spent = Spent { wall: start.elapsed(), cpu: decoded.iter().map(|d| d.1).sum() };
     let mut warn = |image: &Encoded, why: String| {
         let text = format!("image '{}' cannot be used: {why}", super::paths::shorten(&image.name));
         let remedy = "the material is drawn without it; convert it to PNG or JPEG";
         warnings.push(Diagnostic::new("image-unusable", file, &image.place, text).remedy(remedy));
     };
-    let usable = |(image, result): (&Encoded, Result<Bitmap, String>)| result.map_err(|why| warn(image, why)).ok();
-    images.iter().zip(decoded).map(usable).collect()
+    let usable =
+        |(image, (result, _)): (&Encoded, (Result<Bitmap, String>, _))| result.map_err(|why| warn(image, why)).ok();
+    (images.iter().zip(decoded).map(usable).collect(), spent)
 }
 
 /// Reads only the header; refuses what is too large.
@@ -85,10 +98,15 @@ fn decode(name: &str, bytes: &[u8], format: ImageFormat) -> Result<Bitmap, Strin
 
 fn pixels_of(image: DynamicImage) -> Pixels {
     use ColorType::{L16, La16, Rgb16, Rgba16};
-    if matches!(image.color(), L16 | La16 | Rgb16 | Rgba16) {
-        Pixels::Rgba16(image.into_rgba16().pixels().map(|p| p.0).collect())
-    } else {
-        Pixels::Rgba8(image.into_rgba8().pixels().map(|p| p.0).collect())
+    match image {
+        // What most pictures are, without a detour over other types of pixels.
+        DynamicImage::ImageRgb8(image) => {
+            Pixels::Rgba8(image.as_raw().as_chunks::<3>().0.iter().map(|&[r, g, b]| [r, g, b, u8::MAX]).collect())
+        }
+        image if matches!(image.color(), L16 | La16 | Rgb16 | Rgba16) => {
+            Pixels::Rgba16(image.into_rgba16().pixels().map(|p| p.0).collect())
+        }
+        image => Pixels::Rgba8(image.into_rgba8().as_raw().as_chunks::<4>().0.to_vec()),
     }
 }
 
@@ -107,7 +125,7 @@ mod tests {
         let image = Encoded { name: "a.png".into(), place: "7".into(), bytes: Cow::Borrowed(bytes) };
         let mut warnings = Warnings::default();
         let mut budget = Budget::new(limits);
-        let bitmap = decode_all(&[image], Path::new("m.obj"), limits, &mut budget, &mut warnings).remove(0);
+        let bitmap = decode_all(&[image], Path::new("m.obj"), limits, &mut budget, &mut warnings).0.remove(0);
         (bitmap, warnings.into_vec())
     }
 
@@ -118,6 +136,10 @@ mod tests {
         let bitmap = decode_one(&png(grey), &limits).0.unwrap();
         assert_eq!((bitmap.width, bitmap.height), (2, 1));
         assert!(matches!(&bitmap.pixels, Pixels::Rgba8(p) if p[..] == [[7, 7, 7, 255]; 2]));
+
+        let colors = DynamicImage::ImageRgb8(::image::ImageBuffer::from_pixel(2, 1, ::image::Rgb([1u8, 2, 3])));
+        let bitmap = decode_one(&png(colors), &limits).0.unwrap();
+        assert!(matches!(&bitmap.pixels, Pixels::Rgba8(p) if p[..] == [[1, 2, 3, 255]; 2]));
 
         let deep = DynamicImage::ImageRgb16(::image::ImageBuffer::from_pixel(1, 1, ::image::Rgb([1u16, 2, 40000])));
         let bitmap = decode_one(&png(deep), &limits).0.unwrap();

@@ -3,6 +3,7 @@
 //! Counting and timing are passes of their own, so that the picture itself is rendered without either.
 
 use super::observer::{Observer, Question};
+use super::profile::Clock;
 use super::tile::{Together, cost_tiles};
 use super::whitted::ByClass;
 use super::{CLASS_NAMES, Context, Job, Progress};
@@ -10,7 +11,7 @@ use crate::accel::{Hit, Probe, Ray};
 use crate::image::{Channel, Values};
 use std::fmt;
 use std::str::FromStr;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// What is told of each pixel, as a sum over its samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -210,32 +211,6 @@ impl Observer for SampleCounts {
     fn batch(&mut self, samples: usize) {
         self.counts.clear();
         self.counts.resize(samples, [0; 3]);
-    }
-}
-
-/// Time spent on the rays of one pixel.
-#[derive(Debug, Default)]
-struct Clock {
-    /// When the pixel's turn began.
-    began: Option<Instant>,
-    /// When the rays asked last were.
-    asked: Option<Instant>,
-    walking: Duration,
-}
-
-impl Probe for Clock {}
-
-impl Observer for Clock {
-    fn asked(&mut self, _question: Question, _rays: &[Ray], _after: &[Hit]) {
-        self.asked = Some(Instant::now());
-    }
-
-    fn answered(&mut self, _hits: &[Hit]) {
-        self.walking += self.asked.map_or(Duration::ZERO, |asked| asked.elapsed());
-    }
-
-    fn batch(&mut self, _samples: usize) {
-        *self = Self { began: Some(Instant::now()), ..Self::default() };
     }
 }
 

@@ -16,6 +16,7 @@ mod layers;
 mod observer;
 pub mod optics;
 mod pixel;
+mod profile;
 mod seam;
 mod shade;
 mod shadow;
@@ -33,6 +34,7 @@ pub mod world;
 
 pub use costs::{Cost, Costs, UnknownCost, render_costs};
 pub use observer::{Asked, Question, Tape};
+pub use profile::{Profile, render_profiled};
 pub use surface::given_normal;
 pub use view::View;
 pub use world::{PrimSource, World};

@@ -11,6 +11,7 @@ mod interrupt;
 mod messages;
 mod other_commands;
 mod output;
+mod profile;
 mod program;
 mod pruning;
 mod same_pixels;

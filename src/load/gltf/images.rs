@@ -8,6 +8,7 @@ use crate::load::limits::{Budget, Limits};
 use crate::load::paths::Resolver;
 use crate::load::texture::{Encoded, decode_all};
 use crate::scene::Bitmap;
+use crate::stopwatch::Spent;
 use ::image::{ImageFormat, guess_format};
 use gltf::json::{Index, Root, image::Image, texture::Texture};
 use std::borrow::Cow;
@@ -61,7 +62,7 @@ impl<'a> Images<'a> {
         self.bytes.get(self.same.get(&i).copied().unwrap_or(i)).and_then(Option::as_deref)
     }
 
-    /// Decodes the images with these indices.
+    /// Decodes the images with these indices, and tells the time that took.
     pub(super) fn decode(
         &self,
         root: &Root,
@@ -70,7 +71,7 @@ impl<'a> Images<'a> {
         limits: &Limits,
         budget: &mut Budget,
         report: &mut Report,
-    ) -> Vec<Option<Bitmap>> {
+    ) -> (Vec<Option<Bitmap>>, Spent) {
         let (mut encoded, mut places) = (Vec::new(), Vec::new());
         for (k, &i) in drawn.iter().enumerate() {
             let Some(bytes) = self.of(i) else { continue };
@@ -78,10 +79,10 @@ impl<'a> Images<'a> {
             encoded.push(Encoded { name, place: format!("images[{i}]"), bytes: Cow::Borrowed(bytes) });
             places.push(k);
         }
-        let bitmaps = decode_all(&encoded, file, limits, budget, &mut report.warnings);
+        let (bitmaps, spent) = decode_all(&encoded, file, limits, budget, &mut report.warnings);
         let mut out: Vec<Option<Bitmap>> = drawn.iter().map(|_| None).collect();
         places.into_iter().zip(bitmaps).for_each(|(k, bitmap)| out[k] = bitmap);
-        out
+        (out, spent)
     }
 }
 

@@ -184,7 +184,7 @@ impl Loading<'_> {
         let images = Images::load(root, &buffers, &drawn_images, file, &mut resolver, budget, self.report);
         self.charge(reader, &placed, &skins, &palette, budget)?;
         let mut pictures = Report::new(file);
-        let (reads, bitmaps) = rayon::join(
+        let (reads, (bitmaps, decoding)) = rayon::join(
             || read_meshes(reader, &placed, &skins, &palette, file),
             || images.decode(root, &drawn_images, file, &self.options.limits, budget, &mut pictures),
         );
@@ -196,6 +196,7 @@ impl Loading<'_> {
         scene.materials = palette.materials;
         (scene.textures, scene.bitmaps) = textures::keep_decoded(&mut scene.materials, palette.textures.list, bitmaps);
         scene.up = self.options.up.unwrap_or_default();
+        (facts.reading, facts.decoding) = (resolver.reading(), decoding);
         (facts.files, facts.hash) = resolver.finish();
         Ok(scene)
     }

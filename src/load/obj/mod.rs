@@ -64,6 +64,7 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
     let mut reading =
         mtl::Reading { file, options, resolver: &mut resolver, budget: &mut budget, warnings: &mut warnings };
     let materials = mtl::load(&statements.libraries, &names, &mut reading);
+    let (reading, decoding) = (resolver.reading(), materials.decoding);
     let scene = scene(meshes, materials, placed.center, options.up.unwrap_or(guessed));
 
     let (files, hash) = resolver.finish();
@@ -77,6 +78,8 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
         max_rounding: placed.max_rounding,
         files,
         hash,
+        reading,
+        decoding,
         ..Facts::default()
     };
     Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
@@ -84,7 +87,7 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
 
 /// One instance of each mesh, moved to where the file has it.
 fn scene(mut meshes: Vec<Mesh>, materials: mtl::Materials, center: DVec3, up: UpAxis) -> Scene {
-    let mtl::Materials { materials, textures, bitmaps, of_name } = materials;
+    let mtl::Materials { materials, textures, bitmaps, of_name, .. } = materials;
     for (mesh, material) in meshes.iter_mut().zip(of_name) {
         mesh.material = material;
         if materials.get(material as usize).is_some_and(|m| m.normal_map.is_some()) {

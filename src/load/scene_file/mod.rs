@@ -129,6 +129,7 @@ use super::paths::Resolver;
 use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
 use crate::math::DVec3;
 use crate::scene::{Background, Environment, Material, Scene, UpAxis};
+use crate::stopwatch::Stopwatch;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
@@ -299,6 +300,8 @@ fn assemble(
         facts.points_and_lines += part.facts.points_and_lines;
         facts.extensions.extend(part.facts.extensions);
         facts.max_rounding = facts.max_rounding.max(part.facts.max_rounding);
+        facts.reading += part.facts.reading;
+        facts.decoding += part.facts.decoding;
         if let Some(material) = model.material {
             // Meshes count on from this scene's materials once they are appended, so the override comes after.
             let first = scene.meshes.len();
@@ -308,6 +311,7 @@ fn assemble(
             scene.append(std::mem::take(&mut part.scene), &model.world_from_model);
         }
     }
+    facts.reading += resolver.reading();
     (facts.files, facts.hash) = resolver.finish();
     Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
 }
@@ -326,13 +330,16 @@ fn read_model(
         .locate(Path::new(&model.file))
         .map_err(|fault| LoadError::from(fault.diagnose(&source.path, &model.place)))?;
     let options = LoadOptions { root: Some(resolver.root().to_path_buf()), up: model.up, ..options.clone() };
+    let watch = Stopwatch::of_this_thread();
     let model_source = super::read_source(&path, &options.limits)?;
+    let reading = watch.read();
     // Asked before it is read, or a file that names itself would never end.
     if matches!(super::detect::detect(&model_source)?, super::detect::Format::SceneFile) {
         let text = format!("`{}` is a scene file, and scene files do not nest", model.file);
         return Err(Diagnostic::new("scene-nested", &source.path, &model.place, text).remedy("name a model").into());
     }
-    let loaded = super::load_source(&model_source, &options)?;
+    let mut loaded = super::load_source(&model_source, &options)?;
+    loaded.facts.reading += reading;
     resolver.absorb(&loaded.facts.files, loaded.facts.hash);
     Ok(loaded)
 }

@@ -14,6 +14,7 @@ use crate::load::limits::{Budget, Limits};
 use crate::load::paths::{Resolver, shorten};
 use crate::load::{Diagnostic, LoadOptions, MtlMode, Warnings};
 use crate::scene::{Bitmap, Material, Texture};
+use crate::stopwatch::Spent;
 use library::{Finder, Found};
 use meaning::Meaning;
 use parse::{Mtl, Slot};
@@ -29,6 +30,8 @@ pub(super) struct Materials {
     pub bitmaps: Vec<Bitmap>,
     /// Index into `materials` for each name asked for.
     pub of_name: Vec<u32>,
+    /// Time that decoding the pictures took.
+    pub decoding: Spent,
 }
 
 /// Everything that reading files needs.
@@ -94,6 +97,7 @@ pub(super) fn load(libraries: &[(u32, String)], names: &[Option<&str>], reading:
         };
         out.of_name.push(index);
     }
+    out.decoding = textures.decoding;
     (out.textures, out.bitmaps) = textures.finish();
     out
 }

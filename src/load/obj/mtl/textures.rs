@@ -9,6 +9,7 @@ use crate::load::texture::{Encoded, decode_all};
 use crate::load::{Diagnostic, MtlMode, Warnings};
 use crate::math::Vec2;
 use crate::scene::{AlphaMode, Bitmap, Material, Sampler, Surface, Texture, TextureRef, UvTransform, Wrap};
+use crate::stopwatch::Spent;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -25,6 +26,8 @@ pub(super) struct Textures {
     known: HashMap<(usize, String), Option<usize>>,
     pictures: Pictures,
     textures: Vec<Texture>,
+    /// Time that decoding took.
+    pub(super) decoding: Spent,
 }
 
 /// A library whose materials are used.
@@ -84,7 +87,8 @@ impl Textures {
                 }
             }
         }
-        let decoded = decode_all(&images, library.file, limits, budget, warnings);
+        let (decoded, spent) = decode_all(&images, library.file, limits, budget, warnings);
+        self.decoding += spent;
         let numbers: Vec<_> = decoded.into_iter().map(|b: Option<Bitmap>| b.map(|b| self.pictures.add(b))).collect();
         for (image, name) in names {
             self.known.insert((library.number, name), numbers[image]);
