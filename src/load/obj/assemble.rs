@@ -194,9 +194,11 @@ impl Builder<'_> {
         }
 
         self.cut.clear();
-        match self.clipper.cut(&self.ring, &mut self.cut) {
-            Outcome::Crossing => count(&mut out.crossing, &face.0),
-            Outcome::Exact | Outcome::Degenerate => {}
+        if self.ring.len() == 3 {
+            // Faces with equal corners are gone.
+            self.cut.push([0, 1, 2]);
+        } else if self.clipper.cut(&self.ring, &mut self.cut) == Outcome::Crossing {
+            count(&mut out.crossing, &face.0);
         }
         if self.cut.is_empty() {
             return count(&mut out.collapsed, &face.0);

@@ -16,6 +16,22 @@ impl<'a> Lines<'a> {
         Self { rest: text, joined: Vec::new(), number: 1 }
     }
 
+    /// What has not been read.
+    pub(super) fn rest(&self) -> &'a [u8] {
+        self.rest
+    }
+
+    /// Number of the physical line that starts with [`Self::rest`].
+    pub(super) fn number(&self) -> u32 {
+        self.number
+    }
+
+    /// Passes a physical line of so many bytes, its end included.
+    pub(super) fn pass(&mut self, length: usize) {
+        self.rest = &self.rest[length..];
+        self.number = self.number.saturating_add(1);
+    }
+
     /// The next line that is not blank, and the number of the physical line it starts at.
     pub(super) fn next(&mut self) -> Option<(u32, &[u8])> {
         loop {

@@ -1,16 +1,19 @@
 //! Wavefront OBJ and MTL -> scene.
 //!
-//! The text goes through `statements` (lines, numbers, names, faces; every error with its line), then through `tobj`
-//! (`soup`), is centred in `f64` and rounded (`place`), and becomes one mesh and one instance for each run of faces
-//! with the same object, group and material (`assemble`). Materials come from MTL files (`mtl`).
+//! The text goes through `statements` (lines, numbers, names, faces; every error with its line), which leave vertices and
+//! corners (`soup`). These are centred in `f64` and rounded (`place`), and become one mesh and one instance for each run of
+//! faces with the same object, group and material (`assemble`). Materials come from MTL files (`mtl`).
 //!
 //! What the text leaves open is decided so: faces without normals are flat unless a smoothing group says otherwise;
 //! vertex colours are sRGB-coded, MTL colours linear; the fourth number of a vertex is a weight for rational curves and
 //! ignored; every surface is seen from both sides; a face whose normals point to its back is turned round.
 
 mod assemble;
+mod chunk;
 mod color;
 mod encoding;
+mod faults;
+mod join;
 mod lines;
 mod mtl;
 mod number;
@@ -18,6 +21,7 @@ mod pairs;
 mod place;
 mod smooth;
 mod soup;
+mod split;
 mod statements;
 mod up;
 
@@ -42,10 +46,10 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
     let mut resolver = Resolver::new(source, options);
 
     // Geometry.
-    let mut statements = statements::read(&encoding::to_ascii_superset(&source.bytes), file)?;
+    let mut statements = statements::read(&encoding::to_ascii_superset(&source.bytes), file, &mut budget)?;
     statements.odd.warn(file, &mut warnings);
     bytes_to_units(&mut statements, file, &mut warnings);
-    let soup = soup::read(&mut statements, file, &mut budget)?;
+    let soup = std::mem::take(&mut statements.soup);
     let placed = place::place(&soup.positions);
     let flatness = assemble::flatness(&placed.positions, statements.places);
     let mut assembled = assemble::assemble(&statements, &soup, &placed, options.polygons, flatness);
@@ -102,8 +106,8 @@ fn scene(mut meshes: Vec<Mesh>, materials: mtl::Materials, center: DVec3, up: Up
 
 /// Vertex colours written as 0 … 255 become 0 … 1.
 fn bytes_to_units(statements: &mut Statements, file: &Path, warnings: &mut Warnings) {
-    if color::are_bytes(&statements.colors) {
-        for color in statements.colors.iter_mut().filter(|c| **c != [1.0; 3]) {
+    if color::are_bytes(&statements.soup.colors) {
+        for color in statements.soup.colors.iter_mut().filter(|c| **c != [1.0; 3]) {
             *color = color.map(|c| c / 255.0);
         }
         let text = "vertex colours above 1 are taken as 0 … 255";

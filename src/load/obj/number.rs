@@ -12,6 +12,73 @@ pub(super) struct Number<'a> {
     pub odd: bool,
 }
 
+/// A plain decimal number at the start of a text.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Plain {
+    pub value: f64,
+    /// Decimal places of the last digit, as in [`Number`].
+    pub places: i32,
+    /// Bytes it takes.
+    pub length: usize,
+}
+
+/// Powers of ten that `f64` holds exactly.
+const POWERS: [f64; 23] = [
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20,
+    1e21, 1e22,
+];
+
+/// Digits that surely fit into 64 bits.
+const MOST_DIGITS: usize = 19;
+
+/// Reads the number that `text` starts with, if it ends before white space and can be read with one rounding: its digits
+/// make a whole number below 2⁵³ and its power of ten is exact, so that one division or multiplication gives what
+/// [`str::parse`] gives (W. D. Clinger, "How to Read Floating Point Numbers Accurately", 1990). What is not so plain is
+/// for [`check`].
+#[inline]
+pub(super) fn plain(text: &[u8]) -> Option<Plain> {
+    let sign = usize::from(matches!(text.first(), Some(b'-' | b'+')));
+    let (whole, mut at) = digits(text, sign, 0);
+    let (mut mantissa, mut count, mut fraction) = (whole, at - sign, 0);
+    if text.get(at) == Some(&b'.') {
+        let (all, end) = digits(text, at + 1, mantissa);
+        fraction = end - at - 1;
+        (mantissa, at) = (all, end);
+        count += fraction;
+    }
+    if count == 0 || count > MOST_DIGITS || mantissa > 1 << 53 {
+        return None;
+    }
+    let mut power = -(fraction as i64);
+    if matches!(text.get(at), Some(b'e' | b'E')) {
+        let sign = usize::from(matches!(text.get(at + 1), Some(b'-' | b'+')));
+        let (exponent, end) = digits(text, at + 1 + sign, 0);
+        if !(1..=3).contains(&(end - at - 1 - sign)) {
+            return None;
+        }
+        power += if text[at + 1] == b'-' { -(exponent as i64) } else { exponent as i64 };
+        at = end;
+    }
+    if !text.get(at).is_none_or(u8::is_ascii_whitespace) {
+        return None;
+    }
+    let exact = mantissa as f64;
+    let power_of_ten = *POWERS.get(power.unsigned_abs() as usize)?;
+    let value = if power < 0 { exact / power_of_ten } else { exact * power_of_ten };
+    let value = if text[0] == b'-' { -value } else { value };
+    Some(Plain { value, places: -(power as i32), length: at })
+}
+
+/// The digits from `at` on, put behind those of `number`, and where they end; more than fit wrap round.
+#[inline]
+fn digits(text: &[u8], mut at: usize, mut number: u64) -> (u64, usize) {
+    while let Some(digit) = text.get(at).map(|b| b.wrapping_sub(b'0')).filter(|&d| d < 10) {
+        number = number.wrapping_mul(10).wrapping_add(u64::from(digit));
+        at += 1;
+    }
+    (number, at)
+}
+
 /// Checks a word; one that is no number in any reading becomes `nan`.
 pub(super) fn check(word: &[u8]) -> Number<'_> {
     if let Some((end, places)) = scan(word)
@@ -80,6 +147,46 @@ mod tests {
     fn plain_numbers_pass_as_they_are() {
         for (word, expected) in [("1", 1.0), ("+2.", 2.0), ("-.5", -0.5), ("2.e1", 20.0), ("1E-02", 0.01), ("0", 0.0)] {
             assert_eq!(value(word), (expected, false), "{word}");
+        }
+    }
+
+    #[test]
+    fn plain_numbers_are_read_as_the_library_reads_them() {
+        let mut words: Vec<String> =
+            ["0", "-0", "-0.000", "1", "+2.", "-.5", "007", "1e3", "2.5E-2", "1e+22", "9007199254740992", "1.5e-22"]
+                .map(String::from)
+                .into();
+        // Numbers of every length, as programs print them.
+        let mut x = 0.123_456_789_012_345_67_f64;
+        for i in 0..2000 {
+            x = (x * 1.618_033 + 0.271_828).fract();
+            let scaled = (x - 0.5) * POWERS[i % 9];
+            words.push(format!("{scaled:.*}", i % 13));
+            words.push(format!("{scaled:.*e}", i % 11));
+        }
+        let mut read = 0;
+        for word in &words {
+            let Some(found) = plain(word.as_bytes()) else { continue };
+            read += 1;
+            assert_eq!(found.value.to_bits(), word.parse::<f64>().unwrap().to_bits(), "{word}");
+            assert_eq!((Some(found.places), found.length), (check(word.as_bytes()).places, word.len()), "{word}");
+        }
+        assert!(read > words.len() * 9 / 10, "{read} of {}", words.len());
+    }
+
+    #[test]
+    fn a_plain_number_ends_at_white_space_and_nowhere_else() {
+        assert_eq!(plain(b"1.25 7"), Some(Plain { value: 1.25, places: 2, length: 4 }));
+        assert_eq!(plain(b"3\r\n"), Some(Plain { value: 3.0, places: 0, length: 1 }));
+        for word in ["", "-", ".", "+.", "1,5", "2.0f", "1e", "1e+", "1.5D+02", "nan", "1#", "1\\", "0x1", "1/2"] {
+            assert_eq!(plain(word.as_bytes()), None, "{word}");
+        }
+    }
+
+    #[test]
+    fn numbers_that_need_more_than_one_rounding_are_left_to_the_library() {
+        for word in ["9007199254740993", "0.12345678901234567890", "1e23", "1e-23", "1e0001", "1e400"] {
+            assert_eq!(plain(word.as_bytes()), None, "{word}");
         }
     }
 

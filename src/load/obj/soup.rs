@@ -1,152 +1,56 @@
-//! Statements -> arrays, read by `tobj`.
-//!
-//! `tobj` parses the numbers, assembles faces and leaves out vertices that no face uses. It is given a text in which
-//! nothing can go wrong: one object, absolute indices, a stand-in for every coordinate or normal that a corner does not
-//! name (left to itself, `tobj` repeats the one before), no materials, no lines, no comments.
+//! Vertices, and the corners of faces that name them.
 
-use super::statements::Statements;
-use crate::load::limits::Budget;
-use crate::load::{Diagnostic, LoadError};
 use crate::math::{DVec2, DVec3, Vec3};
-use std::path::Path;
 
 /// An index that stands for "none".
 pub(super) const NONE: u32 = u32::MAX;
 
 /// A corner of a face: indices into the arrays of [`Soup`]; the last two may be [`NONE`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Corner {
     pub position: u32,
     pub uv: u32,
     pub normal: u32,
 }
 
-/// The vertices that faces use, and the corners of all faces one after another.
+/// The vertices of a file in its order, and the corners of all faces one after another.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Soup {
+    /// Those that no face uses are not finite.
     pub positions: Vec<DVec3>,
-    /// v points up, as in the file.
+    /// v points up, as in the file. Those that corners name are finite.
     pub uvs: Vec<DVec2>,
-    /// Of any length, but finite.
+    /// Unit length where corners name them.
     pub normals: Vec<Vec3>,
-    /// Per position, as written; empty when the file has none.
+    /// Per position, as written, white where none are; empty when the file has none.
     pub colors: Vec<[f32; 3]>,
     pub corners: Vec<Corner>,
 }
 
-/// Reads the numbers of `statements`.
-///
-/// # Errors
-/// When the memory this takes is over the budget.
-pub(super) fn read(statements: &mut Statements, file: &Path, budget: &mut Budget) -> Result<Soup, LoadError> {
-    // Whether any corner names a coordinate, or a normal.
-    let used = [1, 2].map(|kind| statements.corners.iter().any(|c| c[kind] != 0));
-    reserve(statements, budget)
-        .map_err(|over| Diagnostic::new("over-memory", file, "", over).remedy("raise --max-memory"))?;
-    let text = write(statements, used);
-    let mesh = parse(&text, file)?;
-    drop(text);
-
-    let uvs: Vec<DVec2> = mesh.texcoords.as_chunks::<2>().0.iter().map(|&uv| uv.into()).collect();
-    let normal = |n: &[f64; 3]| DVec3::from(*n).normalize_or_zero().as_vec3();
-    let normals: Vec<Vec3> = mesh.normals.as_chunks::<3>().0.iter().map(normal).collect();
-    let uv_of = |i: &u32| used[0] && uvs.get(*i as usize).is_some_and(|uv| uv.is_finite());
-    let normal_of = |i: &u32| used[1] && normals.get(*i as usize).is_some_and(|&n| n != Vec3::ZERO);
-    let corner = |(i, &position): (usize, &u32)| Corner {
-        position,
-        uv: mesh.texcoord_indices.get(i).copied().filter(uv_of).unwrap_or(NONE),
-        normal: mesh.normal_indices.get(i).copied().filter(normal_of).unwrap_or(NONE),
-    };
-    let corners: Vec<Corner> = mesh.indices.iter().enumerate().map(corner).collect();
-    let positions: Vec<DVec3> = mesh.positions.as_chunks::<3>().0.iter().map(|&p| p.into()).collect();
-    let colors = colors(statements, &corners, positions.len());
-    Ok(Soup { positions, uvs, normals, colors, corners })
-}
-
-/// Asks for what `tobj` and the arrays made from its answer take.
-fn reserve(statements: &Statements, budget: &mut Budget) -> Result<(), String> {
-    /// Bytes of a face in `tobj`: four corners of three indices and a tag.
-    const FACE: u64 = 104;
-    /// Text, `tobj`'s corner, its three indices, ours, and those of the mesh made in the end.
-    const CORNER: u64 = 24 + 24 + 12 + 12 + 12;
-    /// Text, `tobj`'s two copies and hash, ours, and the mesh's.
-    const VERTEX: u64 = 40 + 48 + 16 + 24 + 24;
-    let vertices = statements.counts.iter().map(|&c| u64::from(c)).sum();
-    let parts = [(statements.faces.len() as u64, FACE), (statements.corners.len() as u64, CORNER), (vertices, VERTEX)];
-    parts.into_iter().try_for_each(|(count, size)| budget.take(count, size)).map_err(|over| over.to_string())
-}
-
-/// The text that `tobj` reads; takes the numbers and keeps the rest.
-fn write(statements: &mut Statements, used: [bool; 2]) -> Vec<u8> {
-    let mut text = std::mem::take(&mut statements.numbers);
-    // The stand-ins come last, under the next free number.
-    let stand_in = statements.counts.map(|count| count + 1);
-    text.extend_from_slice(b"vt nan nan\nvn nan nan nan\n");
-    let mut corners = statements.corners.iter();
-    for face in &statements.faces {
-        text.push(b'f');
-        for corner in corners.by_ref().take(face.arity as usize) {
-            text.push(b' ');
-            push_number(&mut text, corner[0]);
-            for kind in [1, 2] {
-                if used[kind - 1] {
-                    text.push(b'/');
-                    push_number(&mut text, if corner[kind] == 0 { stand_in[kind] } else { corner[kind] });
-                } else if kind == 1 && used[1] {
-                    text.push(b'/');
-                }
+impl Soup {
+    /// Takes the places of vertices that no face uses, so that they move neither the centre nor the frame.
+    pub(super) fn leave_out_unused(&mut self) {
+        let mut used = vec![false; self.positions.len()];
+        for corner in &self.corners {
+            if let Some(used) = used.get_mut(corner.position as usize) {
+                *used = true;
             }
         }
-        text.push(b'\n');
+        let unused = self.positions.iter_mut().zip(used).filter(|(_, used)| !used);
+        unused.for_each(|(position, _)| *position = DVec3::NAN);
     }
-    text
-}
-
-fn push_number(text: &mut Vec<u8>, mut number: u32) {
-    let mut digits = [b'0'; 10];
-    let mut at = digits.len();
-    loop {
-        at -= 1;
-        digits[at] += (number % 10) as u8;
-        number /= 10;
-        if number == 0 {
-            break;
-        }
-    }
-    text.extend_from_slice(&digits[at..]);
-}
-
-fn parse(text: &[u8], file: &Path) -> Result<tobj::Mesh, LoadError> {
-    let options = tobj::LoadOptions { triangulate: false, single_index: false, ..Default::default() };
-    let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
-    let fault = |e: tobj::LoadError| Diagnostic::new("obj-unreadable", file, "", format!("cannot be read: {e}"));
-    let (models, _) = tobj::load_obj_buf(&mut &text[..], &options, no_materials).map_err(fault)?;
-    Ok(models.into_iter().next().map(|model| model.mesh).unwrap_or_default())
-}
-
-/// Colours in the order of the positions that `tobj` kept.
-fn colors(statements: &Statements, corners: &[Corner], positions: usize) -> Vec<[f32; 3]> {
-    if statements.colors.is_empty() {
-        return Vec::new();
-    }
-    let mut out = vec![[1.0; 3]; positions];
-    for (corner, written) in corners.iter().zip(&statements.corners) {
-        if let Some(&color) = statements.colors.get(written[0] as usize - 1) {
-            out[corner.position as usize] = color;
-        }
-    }
-    out
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::statements;
     use super::*;
     use crate::load::Limits;
+    use crate::load::limits::Budget;
+    use std::path::Path;
 
     fn of(text: &str) -> Soup {
-        let file = Path::new("m.obj");
-        let mut statements = super::super::statements::read(text.as_bytes(), file).unwrap();
-        read(&mut statements, file, &mut Budget::new(&Limits::default())).unwrap()
+        statements::read(text.as_bytes(), Path::new("m.obj"), &mut Budget::new(&Limits::default())).unwrap().soup
     }
 
     const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
@@ -175,10 +79,17 @@ mod tests {
     }
 
     #[test]
-    fn colors_follow_their_vertices_when_others_are_left_out() {
+    fn coordinates_that_are_not_finite_are_no_coordinates() {
+        let soup = of(&format!("{TRIANGLE}vt 0 inf\nvt 1 1\nf 1/1 2/2 3/1"));
+        assert_eq!(soup.corners.iter().map(|c| c.uv).collect::<Vec<_>>(), [NONE, 1, NONE]);
+    }
+
+    #[test]
+    fn vertices_that_no_face_uses_have_no_place() {
         let soup = of("v 9 9 9 1 1 0\nv 0 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 1 0\nf 4 2 3");
-        assert_eq!(soup.positions, [DVec3::Y, DVec3::ZERO, DVec3::X]);
-        assert_eq!(soup.colors, [[0.0, 1.0, 0.0], [1.0; 3], [1.0, 0.0, 0.0]]);
+        assert!(soup.positions[0].is_nan());
+        assert_eq!(soup.positions[1..], [DVec3::ZERO, DVec3::X, DVec3::Y]);
+        assert_eq!(soup.colors, [[1.0, 1.0, 0.0], [1.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
     }
 
     #[test]
@@ -187,11 +98,43 @@ mod tests {
         assert!(of(TRIANGLE).corners.is_empty());
     }
 
+    /// Corners as (place, coordinate, normal), read by the crate `tobj`.
+    fn read_by_tobj(text: &str) -> Vec<([f64; 3], [f64; 2], [f64; 3])> {
+        let options = tobj::LoadOptions { triangulate: false, single_index: false, ..Default::default() };
+        let none = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
+        let mesh = tobj::load_obj_buf(&mut text.as_bytes(), &options, none).unwrap().0.remove(0).mesh;
+        let of = |list: &[f64], at: u32, i: usize| list[at as usize * 3 + i];
+        let corner = |i: usize| {
+            let (v, vt, vn) = (mesh.indices[i], mesh.texcoord_indices[i] as usize, mesh.normal_indices[i]);
+            let uv = [mesh.texcoords[2 * vt], mesh.texcoords[2 * vt + 1]];
+            ([0, 1, 2].map(|k| of(&mesh.positions, v, k)), uv, [0, 1, 2].map(|k| of(&mesh.normals, vn, k)))
+        };
+        (0..mesh.indices.len()).map(corner).collect()
+    }
+
     #[test]
-    fn memory_over_the_budget_is_refused_before_it_is_taken() {
-        let file = Path::new("m.obj");
-        let mut statements = super::super::statements::read(format!("{TRIANGLE}f 1 2 3").as_bytes(), file).unwrap();
-        let mut budget = Budget::new(&Limits { memory: 500, ..Limits::default() });
-        assert!(read(&mut statements, file, &mut budget).unwrap_err().to_string().contains("--max-memory"));
+    fn another_reader_reads_the_same_corners() {
+        let mut text = String::new();
+        let mut x = 0.3_f64;
+        let mut next = || {
+            x = (x * 1.618_033_988 + 0.271_828_182).fract();
+            x
+        };
+        for i in 0..400 {
+            let digits = i % 17;
+            text += &format!("v {:.digits$} {:e} {}\n", next() - 0.5, next() * 1e-3, next() * 1e5);
+            text += &format!("vt {:.digits$} {}\nvn {:.4} {:.5} {:.6}\n", next(), next(), next(), next(), 0.1 + next());
+        }
+        for i in 1..=396 {
+            text += &format!("f {i}/{}/{i} {}/{i}/{} -{i}/-{i}/-1", 401 - i, i + 4, i + 1);
+            text += if i % 3 == 0 { " 1/1/1\n" } else { "\n" };
+        }
+        let (ours, theirs) = (of(&text), read_by_tobj(&text));
+        assert_eq!(ours.corners.len(), theirs.len());
+        for (corner, (place, uv, normal)) in ours.corners.iter().zip(theirs) {
+            assert_eq!(ours.positions[corner.position as usize].to_array(), place);
+            assert_eq!(ours.uvs[corner.uv as usize].to_array(), uv);
+            assert_eq!(ours.normals[corner.normal as usize], DVec3::from(normal).normalize_or_zero().as_vec3());
+        }
     }
 }

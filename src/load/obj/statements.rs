@@ -1,14 +1,20 @@
-//! OBJ text -> checked statements: numbers that any parser reads, faces with absolute vertex numbers, and everything
-//! that stands between them (names, materials, smoothing groups, colours), which `tobj` drops or gets wrong.
+//! OBJ text -> checked statements: vertices, faces with the corners they name, and everything that stands between them
+//! (names, materials, smoothing groups, colours).
 //!
-//! The text's own errors end here, with their line: after this nothing refers to what is not there.
+//! The text is cut into runs of whole lines (`split`), which are read side by side (`chunk`) and joined as if they had
+//! been read one after another (`join`). The text's own errors end here, with their line (`faults`): after this nothing
+//! refers to what is not there.
 
+use super::chunk::{self, Chunk, LARGEST};
 use super::encoding::decode_name;
-use super::lines::{Lines, keyword, without_comment, words};
-use super::number;
+use super::join::{Joined, join};
+use super::soup::Soup;
+use super::{faults, split};
+use crate::load::limits::{Budget, OverBudget};
 use crate::load::{Diagnostic, LoadError, Warnings};
-use std::collections::HashMap;
+use rayon::prelude::*;
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// One face, without its corners.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,7 +49,15 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    fn note(&mut self, line: u32, word: &[u8]) {
+    /// Adds what was met further on, `lines` lines before which there are.
+    fn append(&mut self, more: Self, lines: u32) {
+        if self.count == 0 && more.count > 0 {
+            (self.line, self.word) = (more.line.saturating_add(lines), more.word);
+        }
+        self.count = self.count.saturating_add(more.count);
+    }
+
+    pub(super) fn note(&mut self, line: u32, word: &[u8]) {
         if self.count == 0 {
             self.line = line;
             self.word = crate::load::paths::shorten(&decode_name(word));
@@ -59,32 +73,27 @@ pub(super) struct Oddities {
     pub lines: Tally,
     pub curves: Tally,
     pub few_corners: Tally,
-    unknown: Tally,
-    number: Tally,
-    short: Tally,
-    weight: Tally,
-    columns: Tally,
-    smoothing: Tally,
+    pub unknown: Tally,
+    pub number: Tally,
+    pub short: Tally,
+    pub weight: Tally,
+    pub columns: Tally,
+    pub smoothing: Tally,
     absent: Tally,
 }
 
 /// A whole file's statements.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Statements {
-    /// `v`, `vt` and `vn` lines of plain numbers, in the file's order.
-    pub numbers: Vec<u8>,
     /// How many `v`, `vt` and `vn` there are.
     pub counts: [u32; 3],
-    /// Corners of all faces: numbers of `v`, `vt` and `vn` from 1; 0: none given.
-    pub corners: Vec<[u32; 3]>,
+    pub soup: Soup,
     pub faces: Vec<Face>,
     pub runs: Vec<Run>,
     /// Names; 0 is the empty one.
     pub names: Vec<String>,
     /// `mtllib` arguments, with their lines.
     pub libraries: Vec<(u32, String)>,
-    /// Red, green, blue of each vertex as written, white where none are; empty when no vertex has any.
-    pub colors: Vec<[f32; 3]>,
     /// Decimal places of the finest coordinate.
     pub places: i32,
     /// The first comments, without their signs.
@@ -92,317 +101,75 @@ pub(super) struct Statements {
     pub odd: Oddities,
 }
 
-/// Comments that are kept: generators write theirs first.
-const COMMENTS: usize = 64;
-
-/// Statements of free-form geometry that draw something.
-const CURVES: [&[u8]; 5] = [b"curv", b"curv2", b"surf", b"bzp", b"bsp"];
-
-/// Statements that change nothing in what is drawn.
-const SILENT: [&[u8]; 29] = [
-    b"vp",
-    b"cstype",
-    b"deg",
-    b"bmat",
-    b"step",
-    b"parm",
-    b"trim",
-    b"hole",
-    b"scrv",
-    b"sp",
-    b"end",
-    b"con",
-    b"ctech",
-    b"stech",
-    b"cdc",
-    b"cdp",
-    b"res",
-    b"mg",
-    b"bevel",
-    b"c_interp",
-    b"d_interp",
-    b"lod",
-    b"maplib",
-    b"usemap",
-    b"shadow_obj",
-    b"trace_obj",
-    b"call",
-    b"csh",
-    b"vw",
-];
-
 /// Reads the whole text.
 ///
 /// # Errors
-/// When a face names what is not there, or its corners cannot be read.
-pub(super) fn read(text: &[u8], file: &Path) -> Result<Statements, LoadError> {
-    let mut reader =
-        Reader { out: Statements { names: vec![String::new()], ..Default::default() }, ..Reader::new(file) };
-    let mut lines = Lines::new(text);
-    while let Some((line, text)) = lines.next() {
-        reader.line = line;
-        reader.statement(text);
-    }
-    reader.finish()
+/// When a face names what is not there, or its corners cannot be read, or the memory this takes is over the budget.
+pub(super) fn read(text: &[u8], file: &Path, budget: &mut Budget) -> Result<Statements, LoadError> {
+    read_in_runs(text, RUN, file, budget)
 }
 
-struct Reader<'a> {
-    file: &'a Path,
-    line: u32,
-    out: Statements,
-    name_ids: HashMap<String, u32>,
-    run_ids: HashMap<Run, u32>,
-    current: Run,
-    /// Index of `current` in `out.runs`, once a face needed it.
-    run: Option<u32>,
-    smoothing: u32,
-    face_count: u32,
-    /// The first fault, counting those after it.
-    fault: Option<Diagnostic>,
-    /// Numbers of vertices that were not there yet when a face named them: (line, corner, kind, number).
-    forward: Vec<(u32, u32, usize, u32)>,
+/// Bytes of a run of lines: enough to keep a thread busy, few enough for all threads to end together.
+const RUN: usize = 1 << 18;
+
+fn read_in_runs(text: &[u8], run: usize, file: &Path, budget: &mut Budget) -> Result<Statements, LoadError> {
+    let over =
+        |over: OverBudget| Diagnostic::new("over-memory", file, "", over.to_string()).remedy("raise --max-memory");
+    let chunks = read_side_by_side(&split::runs(text, run), budget).map_err(over)?;
+    let Joined { mut statements, faulty } = join(chunks).map_err(|largest| {
+        let text = format!("{largest} vertices, corners or faces are more than {LARGEST}");
+        Diagnostic::new("obj-too-large", file, "", text).remedy("split the file")
+    })?;
+    if faulty {
+        statements.odd.absent = faults::find(text, file)?;
+    }
+    statements.soup.leave_out_unused();
+    Ok(statements)
 }
 
-impl<'a> Reader<'a> {
-    fn new(file: &'a Path) -> Self {
-        Self {
-            file,
-            line: 0,
-            out: Statements::default(),
-            name_ids: HashMap::from([(String::new(), 0)]),
-            run_ids: HashMap::new(),
-            current: Run::default(),
-            run: None,
-            smoothing: 0,
-            face_count: 0,
-            fault: None,
-            forward: Vec::new(),
-        }
-    }
+/// Reads every run; stops soon after the memory taken is over the budget, from which it is taken.
+fn read_side_by_side(runs: &[&[u8]], budget: &mut Budget) -> Result<Vec<Chunk>, OverBudget> {
+    let taken = AtomicU64::new(0);
+    let most = *budget;
+    let read = |text: &&[u8]| {
+        let mut left = most;
+        left.take(taken.load(Ordering::Relaxed), 1)?;
+        let chunk = chunk::read(text);
+        taken.fetch_add(bytes(&chunk), Ordering::Relaxed);
+        Ok(chunk)
+    };
+    let chunks = runs.par_iter().map(read).collect::<Result<Vec<_>, OverBudget>>()?;
+    budget.take(taken.into_inner(), 1)?;
+    Ok(chunks)
+}
 
-    fn statement(&mut self, text: &[u8]) {
-        let (word, rest) = keyword(text);
-        match word {
-            b"v" => self.vertex(rest),
-            b"vt" => self.numbers(1, b"vt ", rest, 2, "0"),
-            b"vn" => self.numbers(2, b"vn ", rest, 3, "nan"),
-            b"f" | b"fo" => self.face(rest),
-            b"o" => self.rename(|run, name| *run = Run { object: name, group: 0, ..*run }, without_comment(rest)),
-            b"g" if rest == b"default" => self.rename(|run, name| run.group = name, b""),
-            b"g" => self.rename(|run, name| run.group = name, without_comment(rest)),
-            b"usemtl" => self.rename(|run, name| run.material = Some(name), rest),
-            b"s" => self.smoothing_group(rest),
-            b"mtllib" => self.out.libraries.push((self.line, decode_name(rest))),
-            b"l" => self.out.odd.lines.note(self.line, word),
-            b"p" => words(rest).for_each(|_| self.out.odd.points.note(self.line, word)),
-            // Continued blank lines leave no word.
-            b"" => {}
-            _ if word.starts_with(b"#") => self.comment(text),
-            _ if CURVES.contains(&word) => self.out.odd.curves.note(self.line, word),
-            _ if SILENT.contains(&word) => {}
-            _ => self.out.odd.unknown.note(self.line, word),
-        }
-    }
-
-    fn comment(&mut self, text: &[u8]) {
-        if self.out.comments.len() < COMMENTS {
-            let text = decode_name(text);
-            let text = text.trim_matches(|c: char| c == '#' || c.is_whitespace());
-            if !text.is_empty() {
-                self.out.comments.push(crate::load::paths::shorten(text));
-            }
-        }
-    }
-
-    /// A `v` statement: three coordinates, then perhaps a weight, or a colour, or a colour with alpha.
-    fn vertex(&mut self, rest: &[u8]) {
-        self.numbers(0, b"v ", rest, 3, "0");
-        let mut more = [&b""[..]; 4];
-        let extra = words(rest).skip(3).enumerate().map(|(i, w)| more.get_mut(i).map(|m| *m = w)).count();
-        match extra {
-            0 => {}
-            1 => self.out.odd.weight.note(self.line, more[0]),
-            3 | 4 => self.color([more[0], more[1], more[2]]),
-            _ => self.out.odd.columns.note(self.line, more[0]),
-        }
-        if !self.out.colors.is_empty() {
-            self.out.colors.resize(self.out.counts[0] as usize, [1.0; 3]);
-        }
-    }
-
-    fn color(&mut self, words: [&[u8]; 3]) {
-        let color = words.map(|w| number::check(w).word.parse::<f32>().unwrap_or(f32::NAN));
-        if color.iter().all(|c| c.is_finite()) {
-            self.out.colors.resize(self.out.counts[0] as usize - 1, [1.0; 3]);
-            self.out.colors.push(color);
-        }
-    }
-
-    /// Writes a line of `wanted` numbers; missing ones become `filler`.
-    fn numbers(&mut self, kind: usize, start: &[u8], rest: &[u8], wanted: usize, filler: &str) {
-        self.out.numbers.extend_from_slice(start);
-        let mut found = 0;
-        for word in words(rest).take(wanted) {
-            let number = number::check(word);
-            if number.odd {
-                self.out.odd.number.note(self.line, word);
-            }
-            if kind == 0 {
-                self.out.places = number.places.map_or(self.out.places, |p| p.max(self.out.places));
-            }
-            self.out.numbers.extend_from_slice(number.word.as_bytes());
-            self.out.numbers.push(b' ');
-            found += 1;
-        }
-        // `vt u` is legal; anything else this short is not.
-        if found < wanted && !(kind == 1 && found == 1) {
-            self.out.odd.short.note(self.line, rest);
-        }
-        for _ in found..wanted {
-            self.out.numbers.extend_from_slice(filler.as_bytes());
-            self.out.numbers.push(b' ');
-        }
-        self.out.numbers.push(b'\n');
-        self.out.counts[kind] = self.out.counts[kind].saturating_add(1);
-    }
-
-    fn smoothing_group(&mut self, rest: &[u8]) {
-        let word = words(rest).next().unwrap_or_default();
-        self.smoothing = match word {
-            b"off" | b"" => 0,
-            b"on" => 1,
-            _ => std::str::from_utf8(word).ok().and_then(|w| w.parse().ok()).unwrap_or_else(|| {
-                self.out.odd.smoothing.note(self.line, word);
-                0
-            }),
-        };
-    }
-
-    fn rename(&mut self, set: impl Fn(&mut Run, u32), name: &[u8]) {
-        let name = decode_name(name);
-        let id = match self.name_ids.get(&name) {
-            Some(&id) => id,
-            None => {
-                let id = count(self.out.names.len());
-                self.out.names.push(name.clone());
-                self.name_ids.insert(name, id);
-                id
-            }
-        };
-        set(&mut self.current, id);
-        self.run = None;
-    }
-
-    fn face(&mut self, rest: &[u8]) {
-        let number = self.face_count;
-        self.face_count = self.face_count.saturating_add(1);
-        let first = self.out.corners.len();
-        for (i, word) in words(rest).enumerate() {
-            match self.corner(word, count(i) + 1) {
-                Ok(corner) => self.out.corners.push(corner),
-                Err(fault) => return self.refuse(fault),
-            }
-        }
-        let arity = count(self.out.corners.len() - first);
-        if arity < 3 {
-            self.out.corners.truncate(first);
-            return self.out.odd.few_corners.note(self.line, rest);
-        }
-        let run = self.run();
-        self.out.faces.push(Face { run, smoothing: self.smoothing, arity, line: self.line, number });
-    }
-
-    fn run(&mut self) -> u32 {
-        if let Some(run) = self.run {
-            return run;
-        }
-        let next = count(self.out.runs.len());
-        let run = *self.run_ids.entry(self.current).or_insert(next);
-        if run == next {
-            self.out.runs.push(self.current);
-        }
-        self.run = Some(run);
-        run
-    }
-
-    /// `v`, `v/vt`, `v//vn` or `v/vt/vn`; numbers count from 1, or back from the last one with −1.
-    fn corner(&mut self, word: &[u8], corner: u32) -> Result<[u32; 3], Diagnostic> {
-        let mut out = [0; 3];
-        for (kind, part) in word.split(|&b| b == b'/').enumerate() {
-            if part.is_empty() && kind > 0 {
-                continue;
-            }
-            let Some(number) = whole(part).filter(|_| kind < 3) else { return Err(self.unreadable(word, corner)) };
-            let known = i64::from(self.out.counts[kind]);
-            let absolute = if number < 0 { known + 1 + number } else { number };
-            out[kind] = u32::try_from(absolute)
-                .ok()
-                .filter(|&a| a > 0)
-                .ok_or_else(|| self.out_of_range(self.line, corner, kind, number))?;
-            if absolute > known {
-                self.forward.push((self.line, corner, kind, out[kind]));
-            }
-        }
-        Ok(out)
-    }
-
-    fn unreadable(&self, word: &[u8], corner: u32) -> Diagnostic {
-        let word = crate::load::paths::shorten(&decode_name(word));
-        let text =
-            format!("corner {corner} of the face is '{word}', which is not of the form v, v/vt, v//vn or v/vt/vn");
-        Diagnostic::new("obj-bad-face", self.file, self.line.to_string(), text)
-    }
-
-    fn out_of_range(&self, line: u32, corner: u32, kind: usize, number: i64) -> Diagnostic {
-        let what = ["vertex", "texture coordinate", "normal"][kind];
-        let there = self.out.counts[kind];
-        let (code, text) = match number {
-            0 => ("obj-index-zero", format!("corner {corner} of the face names {what} 0, but numbers start at 1")),
-            1.. => {
-                ("obj-index-range", format!("corner {corner} of the face names {what} {number}, but there are {there}"))
-            }
-            _ => (
-                "obj-index-range",
-                format!("corner {corner} of the face names {what} {number}, but {there} stand before it"),
-            ),
-        };
-        Diagnostic::new(code, self.file, line.to_string(), text).remedy("export the model again")
-    }
-
-    fn refuse(&mut self, fault: Diagnostic) {
-        match &mut self.fault {
-            Some(first) => first.count = first.count.saturating_add(1),
-            None => self.fault = Some(fault),
-        }
-    }
-
-    fn finish(mut self) -> Result<Statements, LoadError> {
-        for (line, corner, kind, number) in std::mem::take(&mut self.forward) {
-            if kind > 0 && self.out.counts[kind] == 0 {
-                // Coordinates or normals were left out as a whole: the faces can still be drawn.
-                self.out.odd.absent.note(line, ["", "texture coordinates", "normals"][kind].as_bytes());
-            } else if number > self.out.counts[kind] {
-                let fault = self.out_of_range(line, corner, kind, i64::from(number));
-                self.refuse(fault);
-            }
-        }
-        for corner in &mut self.out.corners {
-            *corner = [0, 1, 2].map(|kind| if self.out.counts[kind] == 0 { 0 } else { corner[kind] });
-        }
-        // A quarter of u32, so that counts of corners, faces and normals can be added up.
-        let counts = self.out.counts.into_iter().chain([self.face_count, count(self.out.corners.len())]);
-        if let Some(largest) = counts.max().filter(|&c| c > u32::MAX / 4) {
-            let text = format!("{largest} vertices, corners or faces are more than {}", u32::MAX / 4);
-            return Err(Diagnostic::new("obj-too-large", self.file, "", text).remedy("split the file").into());
-        }
-        match self.fault {
-            Some(fault) => Err(fault.into()),
-            None => Ok(self.out),
-        }
-    }
+/// Bytes that a run takes until it has become a part of a mesh.
+fn bytes(chunk: &Chunk) -> u64 {
+    /// A face, twice, and its number in the mesh.
+    const FACE: u64 = 2 * 20 + 4;
+    /// Numbers, indices, those of the mesh, and their vertex.
+    const CORNER: u64 = 12 + 12 + 12 + 16;
+    /// Twice in `f64`, then in `f32`, and in the mesh.
+    const VERTEX: u64 = 2 * 24 + 12 + 12;
+    let vertices = chunk.positions.len() + chunk.uvs.len() + chunk.normals.len() + chunk.colors.len();
+    chunk.faces.len() as u64 * FACE + chunk.corners.len() as u64 * CORNER + vertices as u64 * VERTEX
 }
 
 impl Oddities {
+    /// Adds what was met further on, `lines` lines before which there are.
+    pub(super) fn append(&mut self, more: Self, lines: u32) {
+        self.points.append(more.points, lines);
+        self.lines.append(more.lines, lines);
+        self.curves.append(more.curves, lines);
+        self.few_corners.append(more.few_corners, lines);
+        self.unknown.append(more.unknown, lines);
+        self.number.append(more.number, lines);
+        self.short.append(more.short, lines);
+        self.weight.append(more.weight, lines);
+        self.columns.append(more.columns, lines);
+        self.smoothing.append(more.smoothing, lines);
+    }
+
     /// One warning for each kind met.
     pub(super) fn warn(&self, file: &Path, warnings: &mut Warnings) {
         let mut warn = |code, tally: &Tally, text: String, remedy: &str| {
@@ -434,35 +201,30 @@ impl Oddities {
     }
 }
 
-/// A whole number, if the word is one.
-fn whole(word: &[u8]) -> Option<i64> {
-    let (negative, digits) = match word {
-        [b'-', digits @ ..] => (true, digits),
-        [b'+', digits @ ..] => (false, digits),
-        _ => (false, word),
-    };
-    if digits.is_empty() || digits.len() > 18 {
-        return None;
-    }
-    let value = digits.iter().try_fold(0, |sum, &d| d.is_ascii_digit().then(|| sum * 10 + i64::from(d - b'0')))?;
-    Some(if negative { -value } else { value })
-}
-
-/// Lengths beyond `u32` are refused at the end of reading; until then they only must not wrap.
-fn count(length: usize) -> u32 {
-    u32::try_from(length).unwrap_or(u32::MAX)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    use super::super::soup::NONE;
+    use crate::load::Limits;
+    use crate::math::{DVec2, DVec3, Vec3};
+
+    fn read_with(text: &str, memory: u64) -> Result<Statements, LoadError> {
+        read(text.as_bytes(), Path::new("m.obj"), &mut Budget::new(&Limits { memory, ..Limits::default() }))
+    }
+
     fn of(text: &str) -> Statements {
-        read(text.as_bytes(), Path::new("m.obj")).unwrap()
+        read_with(text, u64::MAX).unwrap()
     }
 
     fn fault(text: &str) -> String {
-        read(text.as_bytes(), Path::new("m.obj")).unwrap_err().to_string()
+        read_with(text, u64::MAX).unwrap_err().to_string()
+    }
+
+    /// Numbers of vertices, coordinates and normals as the text counts them; 0: none.
+    fn corners(s: &Statements) -> Vec<[u32; 3]> {
+        let number = |index: u32| if index == NONE { 0 } else { index + 1 };
+        s.soup.corners.iter().map(|c| [c.position, c.uv, c.normal].map(number)).collect()
     }
 
     const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
@@ -470,12 +232,12 @@ mod tests {
     #[test]
     fn negative_numbers_count_back_from_the_last_vertex_read() {
         let s = of(&format!("{TRIANGLE}vt 0 0\nf -3/-1 -2 -1//\n{TRIANGLE}f -3 -2 -1"));
-        assert_eq!(s.corners, [[1, 1, 0], [2, 0, 0], [3, 0, 0], [4, 0, 0], [5, 0, 0], [6, 0, 0]]);
+        assert_eq!(corners(&s), [[1, 1, 0], [2, 0, 0], [3, 0, 0], [4, 0, 0], [5, 0, 0], [6, 0, 0]]);
     }
 
     #[test]
     fn a_face_may_name_a_vertex_that_comes_later() {
-        assert_eq!(of(&format!("f 1 2 3\n{TRIANGLE}")).corners.len(), 3);
+        assert_eq!(of(&format!("f 1 2 3\n{TRIANGLE}")).soup.corners.len(), 3);
     }
 
     #[test]
@@ -497,7 +259,7 @@ mod tests {
     #[test]
     fn coordinates_and_normals_left_out_as_a_whole_are_only_a_warning() {
         let s = of(&format!("{TRIANGLE}f 1/1/1 2/2/1 3/3/1"));
-        assert_eq!(s.corners, [[1, 0, 0], [2, 0, 0], [3, 0, 0]]);
+        assert_eq!(corners(&s), [[1, 0, 0], [2, 0, 0], [3, 0, 0]]);
         assert_eq!(s.odd.absent.count, 6);
     }
 
@@ -524,9 +286,9 @@ mod tests {
     #[test]
     fn colors_on_some_vertices_leave_the_others_white() {
         let s = of("v 0 0 0\nv 1 0 0 1 0.5 0\nv 2 0 0\nv 3 0 0 0 0 1 0.5\nv 4 0 0 0.5");
-        assert_eq!(s.colors, [[1.0; 3], [1.0, 0.5, 0.0], [1.0; 3], [0.0, 0.0, 1.0], [1.0; 3]]);
+        assert_eq!(s.soup.colors, [[1.0; 3], [1.0, 0.5, 0.0], [1.0; 3], [0.0, 0.0, 1.0], [1.0; 3]]);
         assert_eq!(s.odd.weight.count, 1);
-        assert!(of("v 0 0 0\nv 1 1 1").colors.is_empty());
+        assert!(of("v 0 0 0\nv 1 1 1").soup.colors.is_empty());
     }
 
     #[test]
@@ -538,10 +300,57 @@ mod tests {
     }
 
     #[test]
-    fn numbers_come_out_plain_and_complete() {
-        let s = of("v 1,5 0 # hi\nvt 0.5\nvn 1 0\nv 1 2 3 # hi\nvt 1 2 3");
-        let text = String::from_utf8(s.numbers).unwrap();
-        assert_eq!(text, "v 1.5 0 0 \nvt 0.5 0 \nvn 1 0 nan \nv 1 2 3 \nvt 1 2 \n");
+    fn odd_and_missing_numbers_are_read_and_counted() {
+        let s = of("v 1,5 0 # hi\nvt 0.5\nvn 1 0\nv 1 2 3 # hi\nvt 1 2 3\nf 1 2 1");
+        assert_eq!(s.soup.positions, [DVec3::new(1.5, 0.0, 0.0), DVec3::new(1.0, 2.0, 3.0)]);
+        assert_eq!((s.soup.uvs, s.soup.normals), (vec![DVec2::new(0.5, 0.0), DVec2::new(1.0, 2.0)], vec![Vec3::ZERO]));
         assert_eq!((s.odd.short.count, s.odd.number.count), (2, 1));
+    }
+
+    #[test]
+    fn memory_over_the_budget_is_refused() {
+        let text = format!("{TRIANGLE}f 1 2 3");
+        assert!(read_with(&text, 200).unwrap_err().to_string().contains("--max-memory"));
+        assert!(read_with(&text, 2000).is_ok());
+    }
+
+    /// Every kind of statement, so that each kind of state has to cross from one run of lines to the next.
+    fn all_kinds() -> String {
+        let mut text = String::from("# first\nmtllib a.mtl\n");
+        for i in 0..60 {
+            text += &format!("v {i} 0.5 {}\nv {i}.25 1 0 0.1 0.2 0.3\nvt 0 {i} 0\nvn 0 {} 1\n", i * i, i % 5);
+            match i % 12 {
+                1 => text += "o a\n",
+                2 => text += "usemtl m\nf 1 2 -1\n",
+                3 => text += "g left # side\ns 4\n",
+                4 => text += "f -1 -2/-1 \\\n 2//1\n",
+                5 => text += "s off\nf 1 2\nhello\n# C:\\\n",
+                6 => text += "v 1,5 2\nl 1 2\np 1 2\n",
+                7 => text += "o b\r\nf 1/1/1\t2/2/2 3/3/1 \r\n",
+                8 => text += "usemtl n\n\n  f 4 3 2 1\n",
+                9 => text += "curv 0 1 1 2\nv 1 2 3 4\nmtllib b.mtl\n# more\n",
+                _ => text += "f 1 2 3\nf 1//1 2//1 100//60\n",
+            }
+        }
+        text
+    }
+
+    #[test]
+    fn runs_of_lines_read_side_by_side_make_the_same_whole() {
+        let text = all_kinds();
+        let read = |run: usize| {
+            let mut budget = Budget::new(&Limits::default());
+            let s = read_in_runs(text.as_bytes(), run, Path::new("m.obj"), &mut budget).unwrap();
+            let mut warnings = Warnings::default();
+            s.odd.warn(Path::new("m.obj"), &mut warnings);
+            format!("{s:?} {:?}", warnings.into_vec())
+        };
+        let whole = read(1 << 30);
+        assert!(whole.contains("obj-few-corners") && whole.contains("b.mtl"), "{whole}");
+        for run in [1, 20, 50, 137, 1000] {
+            let parts = read(run);
+            let same = parts.bytes().zip(whole.bytes()).take_while(|(a, b)| a == b).count();
+            assert!(parts == whole, "runs of {run} bytes: {} for {}", &parts[same..], &whole[same..]);
+        }
     }
 }

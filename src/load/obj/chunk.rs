@@ -1,0 +1,456 @@
+//! A run of whole lines -> its statements, read without knowing what stands before it.
+//!
+//! What depends on the lines before is left open and filled in when the runs are joined (`join`): numbers of lines and
+//! faces count from the start of the run, numbers of vertices that count back are relative to it, and names and smoothing
+//! groups that were set before are [`OPEN`]. Most lines are plain (`v`, `vt`, `vn` or `f` with numbers as programs print
+//! them) and read in one pass over their bytes; everything else goes word by word.
+
+use super::encoding::decode_name;
+use super::lines::{Lines, keyword, without_comment, words};
+use super::number::{self, Plain};
+use super::statements::{Face, Oddities, Run};
+use crate::math::{DVec2, DVec3, Vec3};
+use std::collections::HashMap;
+
+/// A name, smoothing group or material that was set before the run.
+pub(super) const OPEN: u32 = u32::MAX;
+
+/// The largest number of a vertex, so that counts of corners, faces and normals can be added up.
+pub(super) const LARGEST: u32 = u32::MAX / 4;
+
+/// Marks the number of a vertex as relative to the start of the run; the rest of its bits hold it plus [`LARGEST`].
+const RELATIVE: u32 = 1 << 31;
+
+/// The number of a vertex, given how many stand before the run; `None` for one before the first.
+pub(super) fn resolve(number: u32, before: u32) -> Option<u32> {
+    if number & RELATIVE == 0 {
+        return Some(number);
+    }
+    let absolute = i64::from(before) + i64::from(number & !RELATIVE) - i64::from(LARGEST);
+    u32::try_from(absolute).ok().filter(|&n| n > 0)
+}
+
+/// What a run of lines holds.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Chunk {
+    pub positions: Vec<DVec3>,
+    /// v points up.
+    pub uvs: Vec<DVec2>,
+    /// Unit length; zero for those without a direction.
+    pub normals: Vec<Vec3>,
+    /// As [`super::soup::Soup::colors`]; may end before the last position.
+    pub colors: Vec<[f32; 3]>,
+    /// Corners of all faces: numbers of `v`, `vt`, `vn` from 1, for [`resolve`]; 0: none given.
+    pub corners: Vec<[u32; 3]>,
+    /// Corners of faces that have too few.
+    pub dropped: Vec<[u32; 3]>,
+    pub faces: Vec<Face>,
+    pub runs: Vec<Run>,
+    /// 0 is the empty one.
+    pub names: Vec<String>,
+    pub libraries: Vec<(u32, String)>,
+    pub places: i32,
+    pub comments: Vec<String>,
+    pub odd: Oddities,
+    /// Lines, and faces of any number of corners.
+    pub lines: u32,
+    pub face_count: u32,
+    /// What the last faces are in.
+    pub last: Run,
+    pub smoothing: u32,
+    /// Whether a corner cannot be read: the file is refused, and another pass finds out why.
+    pub faulty: bool,
+}
+
+/// Comments that are kept: generators write theirs first.
+pub(super) const COMMENTS: usize = 64;
+
+/// Statements of free-form geometry that draw something.
+const CURVES: [&[u8]; 5] = [b"curv", b"curv2", b"surf", b"bzp", b"bsp"];
+
+/// Statements that change nothing in what is drawn.
+const SILENT: [&[u8]; 29] = [
+    b"vp",
+    b"cstype",
+    b"deg",
+    b"bmat",
+    b"step",
+    b"parm",
+    b"trim",
+    b"hole",
+    b"scrv",
+    b"sp",
+    b"end",
+    b"con",
+    b"ctech",
+    b"stech",
+    b"cdc",
+    b"cdp",
+    b"res",
+    b"mg",
+    b"bevel",
+    b"c_interp",
+    b"d_interp",
+    b"lod",
+    b"maplib",
+    b"usemap",
+    b"shadow_obj",
+    b"trace_obj",
+    b"call",
+    b"csh",
+    b"vw",
+];
+
+/// Reads a run of whole lines.
+pub(super) fn read(text: &[u8]) -> Chunk {
+    let last = Run { object: OPEN, group: OPEN, material: Some(OPEN) };
+    let out = Chunk { names: vec![String::new()], last, smoothing: OPEN, ..Chunk::default() };
+    let name_ids = HashMap::from([(String::new(), 0)]);
+    let mut reader = Reader { out, line: 1, name_ids, run_ids: HashMap::new(), run: None };
+    let mut lines = Lines::new(text);
+    loop {
+        if let Some(length) = reader.plain(lines.rest(), lines.number()) {
+            lines.pass(length);
+        } else if let Some((line, text)) = lines.next() {
+            reader.line = line;
+            reader.statement(text);
+        } else {
+            break;
+        }
+    }
+    reader.out.lines = lines.number() - 1;
+    reader.out
+}
+
+struct Reader {
+    out: Chunk,
+    /// The line at hand, from 1.
+    line: u32,
+    name_ids: HashMap<String, u32>,
+    run_ids: HashMap<Run, u32>,
+    /// Index of `out.last` in `out.runs`, once a face needed it.
+    run: Option<u32>,
+}
+
+/// Plain lines.
+impl Reader {
+    /// Reads the plain line that `text` starts with; its length with the line end. `None`: nothing was read.
+    #[inline]
+    fn plain(&mut self, text: &[u8], line: u32) -> Option<usize> {
+        match text {
+            [b'v', b' ', ..] => self.plain_vertex(text),
+            [b'v', b'n', b' ', ..] => self.plain_normal(text),
+            [b'v', b't', b' ', ..] => self.plain_coordinate(text),
+            [b'f', b' ', ..] => {
+                self.line = line;
+                self.plain_face(text)
+            }
+            _ => None,
+        }
+    }
+
+    fn plain_vertex(&mut self, text: &[u8]) -> Option<usize> {
+        let mut at = 1;
+        let [x, y, z] = [next_number(text, &mut at)?, next_number(text, &mut at)?, next_number(text, &mut at)?];
+        let end = line_end(text, at)?;
+        self.out.places = self.out.places.max(x.places).max(y.places).max(z.places);
+        self.push_position(DVec3::new(x.value, y.value, z.value));
+        Some(end)
+    }
+
+    fn plain_normal(&mut self, text: &[u8]) -> Option<usize> {
+        let mut at = 2;
+        let [x, y, z] = [next_number(text, &mut at)?, next_number(text, &mut at)?, next_number(text, &mut at)?];
+        let end = line_end(text, at)?;
+        self.push_normal(DVec3::new(x.value, y.value, z.value));
+        Some(end)
+    }
+
+    fn plain_coordinate(&mut self, text: &[u8]) -> Option<usize> {
+        let mut at = 2;
+        let [u, v] = [next_number(text, &mut at)?, next_number(text, &mut at)?];
+        // Some programs write a third one; it is not used.
+        let end = line_end(text, at).or_else(|| next_number(text, &mut at).and_then(|_| line_end(text, at)))?;
+        self.out.uvs.push(DVec2::new(u.value, v.value));
+        Some(end)
+    }
+
+    fn plain_face(&mut self, text: &[u8]) -> Option<usize> {
+        let first = self.out.corners.len();
+        let mut at = 1;
+        let end = loop {
+            at += text[at..].iter().take_while(|b| matches!(b, b' ' | b'\t')).count();
+            if let Some(end) = line_end(text, at) {
+                break Some(end);
+            }
+            let Some(corner) = plain_corner(text, &mut at) else { break None };
+            self.out.corners.push(corner);
+        };
+        let arity = self.out.corners.len() - first;
+        if end.is_none() || arity < 3 {
+            self.out.corners.truncate(first);
+            return None;
+        }
+        self.push_face(count(arity));
+        end
+    }
+}
+
+/// The number after white space, which must be there.
+#[inline]
+fn next_number(text: &[u8], at: &mut usize) -> Option<Plain> {
+    let rest = &text[*at..];
+    let start = rest.iter().take_while(|b| matches!(b, b' ' | b'\t')).count();
+    let number = number::plain(&rest[start..])?;
+    *at += start + number.length;
+    Some(number)
+}
+
+/// Where the next line starts if nothing but white space is left in this one.
+#[inline]
+fn line_end(text: &[u8], at: usize) -> Option<usize> {
+    let end = at + text[at..].iter().take_while(|b| matches!(b, b' ' | b'\t')).count();
+    match &text[end..] {
+        [] => Some(end),
+        [b'\n', ..] => Some(end + 1),
+        [b'\r', b'\n', ..] => Some(end + 2),
+        [b'\r', ..] => Some(end + 1),
+        _ => None,
+    }
+}
+
+/// `v`, `v/vt`, `v//vn` or `v/vt/vn` of numbers that count from the first.
+#[inline]
+fn plain_corner(text: &[u8], at: &mut usize) -> Option<[u32; 3]> {
+    let mut corner = [plain_index(text, at)?, 0, 0];
+    if text.get(*at) == Some(&b'/') {
+        *at += 1;
+        if text.get(*at) != Some(&b'/') {
+            corner[1] = plain_index(text, at)?;
+        }
+        if text.get(*at) == Some(&b'/') {
+            *at += 1;
+            corner[2] = plain_index(text, at)?;
+        }
+    }
+    text.get(*at).is_none_or(u8::is_ascii_whitespace).then_some(corner)
+}
+
+#[inline]
+fn plain_index(text: &[u8], at: &mut usize) -> Option<u32> {
+    /// Longer ones may be too large.
+    const DIGITS: usize = 9;
+    let (mut index, start) = (0u32, *at);
+    while let Some(digit) = text.get(*at).map(|b| b.wrapping_sub(b'0')).filter(|&d| d < 10) {
+        index = index.wrapping_mul(10).wrapping_add(u32::from(digit));
+        *at += 1;
+    }
+    (*at - start <= DIGITS && index > 0).then_some(index)
+}
+
+/// Any line.
+impl Reader {
+    fn statement(&mut self, text: &[u8]) {
+        let (word, rest) = keyword(text);
+        match word {
+            b"v" => self.vertex(rest),
+            b"vt" => {
+                let [u, v] = self.numbers(1, rest, 0.0);
+                self.out.uvs.push(DVec2::new(u, v));
+            }
+            b"vn" => {
+                let normal = self.numbers(3, rest, f64::NAN);
+                self.push_normal(normal.into());
+            }
+            b"f" | b"fo" => self.face(rest),
+            b"o" => self.rename(|run, name| *run = Run { object: name, group: 0, ..*run }, without_comment(rest)),
+            b"g" if rest == b"default" => self.rename(|run, name| run.group = name, b""),
+            b"g" => self.rename(|run, name| run.group = name, without_comment(rest)),
+            b"usemtl" => self.rename(|run, name| run.material = Some(name), rest),
+            b"s" => self.smoothing_group(rest),
+            b"mtllib" => self.out.libraries.push((self.line, decode_name(rest))),
+            b"l" => self.out.odd.lines.note(self.line, word),
+            b"p" => words(rest).for_each(|_| self.out.odd.points.note(self.line, word)),
+            // Continued blank lines leave no word.
+            b"" => {}
+            _ if word.starts_with(b"#") => self.comment(text),
+            _ if CURVES.contains(&word) => self.out.odd.curves.note(self.line, word),
+            _ if SILENT.contains(&word) => {}
+            _ => self.out.odd.unknown.note(self.line, word),
+        }
+    }
+
+    fn comment(&mut self, text: &[u8]) {
+        if self.out.comments.len() < COMMENTS {
+            let text = decode_name(text);
+            let text = text.trim_matches(|c: char| c == '#' || c.is_whitespace());
+            if !text.is_empty() {
+                self.out.comments.push(crate::load::paths::shorten(text));
+            }
+        }
+    }
+
+    /// A `v` statement: three coordinates, then perhaps a weight, or a colour, or a colour with alpha.
+    fn vertex(&mut self, rest: &[u8]) {
+        let position = self.numbers(3, rest, 0.0);
+        for word in words(rest).take(3) {
+            let places = number::check(word).places;
+            self.out.places = places.map_or(self.out.places, |p| p.max(self.out.places));
+        }
+        self.push_position(position.into());
+        let mut more = [&b""[..]; 4];
+        let extra = words(rest).skip(3).enumerate().map(|(i, w)| more.get_mut(i).map(|m| *m = w)).count();
+        match extra {
+            0 => {}
+            1 => self.out.odd.weight.note(self.line, more[0]),
+            3 | 4 => self.color([more[0], more[1], more[2]]),
+            _ => self.out.odd.columns.note(self.line, more[0]),
+        }
+    }
+
+    /// The colour of the last vertex.
+    fn color(&mut self, words: [&[u8]; 3]) {
+        let color = words.map(|w| number::check(w).word.parse::<f32>().unwrap_or(f32::NAN));
+        if color.iter().all(|c| c.is_finite()) {
+            self.out.colors.resize(self.out.positions.len() - 1, [1.0; 3]);
+            self.out.colors.push(color);
+        }
+    }
+
+    /// The first numbers of a line, of which at least `needed` should be there; missing ones become `filler`.
+    fn numbers<const N: usize>(&mut self, needed: usize, rest: &[u8], filler: f64) -> [f64; N] {
+        let (mut numbers, mut found) = ([filler; N], 0);
+        for (number, word) in numbers.iter_mut().zip(words(rest)) {
+            let checked = number::check(word);
+            if checked.odd {
+                self.out.odd.number.note(self.line, word);
+            }
+            *number = checked.word.parse().unwrap_or(f64::NAN);
+            found += 1;
+        }
+        if found < needed {
+            self.out.odd.short.note(self.line, rest);
+        }
+        numbers
+    }
+
+    fn smoothing_group(&mut self, rest: &[u8]) {
+        let word = words(rest).next().unwrap_or_default();
+        self.out.smoothing = match word {
+            b"off" | b"" => 0,
+            b"on" => 1,
+            _ => match std::str::from_utf8(word).ok().and_then(|w| w.parse().ok()).filter(|&group| group != OPEN) {
+                Some(group) => group,
+                None => {
+                    self.out.odd.smoothing.note(self.line, word);
+                    0
+                }
+            },
+        };
+    }
+
+    fn rename(&mut self, set: impl Fn(&mut Run, u32), name: &[u8]) {
+        let name = decode_name(name);
+        let id = match self.name_ids.get(&name) {
+            Some(&id) => id,
+            None => {
+                let id = count(self.out.names.len());
+                self.out.names.push(name.clone());
+                self.name_ids.insert(name, id);
+                id
+            }
+        };
+        set(&mut self.out.last, id);
+        self.run = None;
+    }
+
+    fn face(&mut self, rest: &[u8]) {
+        let first = self.out.corners.len();
+        for word in words(rest) {
+            match self.corner(word) {
+                Some(corner) => self.out.corners.push(corner),
+                None => self.out.faulty = true,
+            }
+        }
+        let arity = count(self.out.corners.len() - first);
+        if arity < 3 {
+            self.out.dropped.extend(self.out.corners.drain(first..));
+            self.out.face_count = self.out.face_count.saturating_add(1);
+            return self.out.odd.few_corners.note(self.line, rest);
+        }
+        self.push_face(arity);
+    }
+
+    /// `v`, `v/vt`, `v//vn` or `v/vt/vn`; numbers count from 1, or back from the last one with −1.
+    fn corner(&self, word: &[u8]) -> Option<[u32; 3]> {
+        let known = [self.out.positions.len(), self.out.uvs.len(), self.out.normals.len()];
+        let mut out = [0; 3];
+        for (kind, part) in word.split(|&b| b == b'/').enumerate() {
+            if part.is_empty() && kind > 0 {
+                continue;
+            }
+            let number = whole(part).filter(|_| kind < 3)?;
+            out[kind] = match u32::try_from(number) {
+                Ok(number) => Some(number).filter(|n| (1..=LARGEST).contains(n))?,
+                Err(_) => {
+                    let biased = i64::try_from(known[kind]).ok()? + 1 + number + i64::from(LARGEST);
+                    RELATIVE | u32::try_from(biased).ok().filter(|&n| n < RELATIVE)?
+                }
+            };
+        }
+        Some(out)
+    }
+}
+
+/// What both kinds of lines end in.
+impl Reader {
+    #[inline]
+    fn push_position(&mut self, position: DVec3) {
+        self.out.positions.push(position);
+    }
+
+    #[inline]
+    fn push_normal(&mut self, normal: DVec3) {
+        self.out.normals.push(normal.normalize_or_zero().as_vec3());
+    }
+
+    #[inline]
+    fn push_face(&mut self, arity: u32) {
+        let run = self.run();
+        let (line, number) = (self.line, self.out.face_count);
+        self.out.faces.push(Face { run, smoothing: self.out.smoothing, arity, line, number });
+        self.out.face_count = self.out.face_count.saturating_add(1);
+    }
+
+    fn run(&mut self) -> u32 {
+        if let Some(run) = self.run {
+            return run;
+        }
+        let next = count(self.out.runs.len());
+        let run = *self.run_ids.entry(self.out.last).or_insert(next);
+        if run == next {
+            self.out.runs.push(self.out.last);
+        }
+        self.run = Some(run);
+        run
+    }
+}
+
+/// A whole number, if the word is one.
+pub(super) fn whole(word: &[u8]) -> Option<i64> {
+    let (negative, digits) = match word {
+        [b'-', digits @ ..] => (true, digits),
+        [b'+', digits @ ..] => (false, digits),
+        _ => (false, word),
+    };
+    if digits.is_empty() || digits.len() > 18 {
+        return None;
+    }
+    let value = digits.iter().try_fold(0, |sum, &d| d.is_ascii_digit().then(|| sum * 10 + i64::from(d - b'0')))?;
+    Some(if negative { -value } else { value })
+}
+
+/// Lengths beyond `u32` are refused at the end of reading; until then they only must not wrap.
+pub(super) fn count(length: usize) -> u32 {
+    u32::try_from(length).unwrap_or(u32::MAX)
+}

@@ -1,0 +1,232 @@
+//! Runs of lines, read side by side -> the statements of the whole text, as if it had been read line after line.
+
+use super::chunk::{COMMENTS, Chunk, LARGEST, OPEN, resolve};
+use super::soup::{Corner, NONE, Soup};
+use super::statements::{Run, Statements};
+use crate::math::{DVec2, DVec3, Vec3};
+use rayon::prelude::*;
+use std::collections::HashMap;
+
+/// The whole, and whether its corners name what is there.
+pub(super) struct Joined {
+    pub statements: Statements,
+    /// Whether a corner cannot be read, or names something that is not there.
+    pub faulty: bool,
+}
+
+/// Where a run of lines begins in the whole: how many of each stand before it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Before {
+    counts: [u32; 3],
+    lines: u32,
+    faces: u32,
+    smoothing: u32,
+}
+
+/// Joins runs in the order of the text. `None` when there are more vertices, corners or faces than [`LARGEST`], with how
+/// many.
+pub(super) fn join(mut chunks: Vec<Chunk>) -> Result<Joined, u64> {
+    let mut out = Statements::default();
+    let mut table = Table::new();
+    let mut last = Run::default();
+    let mut before = Before::default();
+    let (mut begins, mut runs) = (Vec::with_capacity(chunks.len()), Vec::with_capacity(chunks.len()));
+    check_sizes(&chunks)?;
+    for chunk in &mut chunks {
+        begins.push(before);
+        runs.push(table.take(chunk, &mut last));
+        gather(&mut out, chunk, before.lines);
+        before.advance(chunk);
+    }
+    out.counts = before.counts;
+    (out.names, out.runs) = (table.names, table.runs);
+
+    let colors = chunks.iter().any(|c| !c.colors.is_empty());
+    let colors = if colors { all_colors(&chunks, &begins, out.counts[0]) } else { Vec::new() };
+    let (positions, uvs, normals) = vertices(&mut chunks);
+    let there = There { counts: out.counts, uvs: &uvs, normals: &normals };
+    let (corners, faulty) = corners(&chunks, &begins, &there);
+
+    // Faces come last: they are read more often than they are written.
+    for ((chunk, before), runs) in chunks.iter_mut().zip(&begins).zip(&runs) {
+        for face in &mut chunk.faces {
+            face.run = runs[face.run as usize];
+            face.line = face.line.saturating_add(before.lines);
+            face.number += before.faces;
+            face.smoothing = if face.smoothing == OPEN { before.smoothing } else { face.smoothing };
+        }
+    }
+    out.faces = flat(chunks.iter_mut().map(|c| std::mem::take(&mut c.faces)));
+    out.soup = Soup { positions, uvs, normals, colors, corners };
+    let faulty = faulty || chunks.iter().any(|c| c.faulty);
+    Ok(Joined { statements: out, faulty })
+}
+
+fn check_sizes(chunks: &[Chunk]) -> Result<(), u64> {
+    let sum = |of: fn(&Chunk) -> usize| chunks.iter().map(|c| of(c) as u64).sum::<u64>();
+    let sizes = [
+        sum(|c| c.positions.len()),
+        sum(|c| c.uvs.len()),
+        sum(|c| c.normals.len()),
+        sum(|c| c.corners.len()),
+        sum(|c| c.face_count as usize),
+    ];
+    let largest = sizes.into_iter().max().unwrap_or_default();
+    if largest > u64::from(LARGEST) { Err(largest) } else { Ok(()) }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "sizes were checked to fit")]
+impl Before {
+    fn advance(&mut self, chunk: &Chunk) {
+        let sizes = [chunk.positions.len(), chunk.uvs.len(), chunk.normals.len()];
+        for (count, size) in self.counts.iter_mut().zip(sizes) {
+            *count += size as u32;
+        }
+        self.lines = self.lines.saturating_add(chunk.lines);
+        self.faces += chunk.face_count;
+        if chunk.smoothing != OPEN {
+            self.smoothing = chunk.smoothing;
+        }
+    }
+}
+
+/// What is collected and not counted on.
+fn gather(out: &mut Statements, chunk: &mut Chunk, lines: u32) {
+    let library = |(line, name): (u32, String)| (line.saturating_add(lines), name);
+    out.libraries.extend(std::mem::take(&mut chunk.libraries).into_iter().map(library));
+    let room = COMMENTS - out.comments.len();
+    out.comments.extend(std::mem::take(&mut chunk.comments).into_iter().take(room));
+    out.places = out.places.max(chunk.places);
+    out.odd.append(std::mem::take(&mut chunk.odd), lines);
+}
+
+/// Names and runs of the whole text.
+struct Table {
+    names: Vec<String>,
+    name_ids: HashMap<String, u32>,
+    runs: Vec<Run>,
+    run_ids: HashMap<Run, u32>,
+}
+
+impl Table {
+    fn new() -> Self {
+        Self {
+            names: vec![String::new()],
+            name_ids: HashMap::from([(String::new(), 0)]),
+            runs: Vec::new(),
+            run_ids: HashMap::new(),
+        }
+    }
+
+    /// The number in the whole of each run of a chunk; `last` is what the faces before it were in, and becomes that of its
+    /// own last ones.
+    fn take(&mut self, chunk: &mut Chunk, last: &mut Run) -> Vec<u32> {
+        let names: Vec<u32> = std::mem::take(&mut chunk.names).into_iter().map(|name| self.name(name)).collect();
+        let known = |id: u32, open: u32| if id == OPEN { open } else { names[id as usize] };
+        let before = *last;
+        let closed = |run: &Run| Run {
+            object: known(run.object, before.object),
+            group: known(run.group, before.group),
+            material: if run.material == Some(OPEN) { before.material } else { run.material.map(|m| known(m, 0)) },
+        };
+        let runs = chunk.runs.iter().map(|run| self.run(closed(run))).collect();
+        *last = closed(&chunk.last);
+        runs
+    }
+
+    fn name(&mut self, name: String) -> u32 {
+        let next = super::chunk::count(self.names.len());
+        if let Some(&known) = self.name_ids.get(&name) {
+            return known;
+        }
+        self.names.push(name.clone());
+        self.name_ids.insert(name, next);
+        next
+    }
+
+    fn run(&mut self, run: Run) -> u32 {
+        let next = super::chunk::count(self.runs.len());
+        let id = *self.run_ids.entry(run).or_insert(next);
+        if id == next {
+            self.runs.push(run);
+        }
+        id
+    }
+}
+
+fn all_colors(chunks: &[Chunk], begins: &[Before], positions: u32) -> Vec<[f32; 3]> {
+    let mut all = vec![[1.0; 3]; positions as usize];
+    for (chunk, before) in chunks.iter().zip(begins) {
+        let first = before.counts[0] as usize;
+        all[first..first + chunk.colors.len()].copy_from_slice(&chunk.colors);
+    }
+    all
+}
+
+fn vertices(chunks: &mut [Chunk]) -> (Vec<DVec3>, Vec<DVec2>, Vec<Vec3>) {
+    let positions = flat(chunks.iter_mut().map(|c| std::mem::take(&mut c.positions)));
+    let uvs = flat(chunks.iter_mut().map(|c| std::mem::take(&mut c.uvs)));
+    let normals = flat(chunks.iter_mut().map(|c| std::mem::take(&mut c.normals)));
+    (positions, uvs, normals)
+}
+
+/// All lists as one; a single one is not copied.
+fn flat<T: Copy>(lists: impl ExactSizeIterator<Item = Vec<T>>) -> Vec<T> {
+    let mut lists: Vec<Vec<T>> = lists.collect();
+    if lists.len() == 1 {
+        return lists.pop().unwrap_or_default();
+    }
+    let mut all = Vec::with_capacity(lists.iter().map(Vec::len).sum());
+    lists.into_iter().for_each(|list| all.extend_from_slice(&list));
+    all
+}
+
+/// What corners may name.
+struct There<'a> {
+    counts: [u32; 3],
+    uvs: &'a [DVec2],
+    normals: &'a [Vec3],
+}
+
+impl There<'_> {
+    /// The corner, and whether it names something that is not there.
+    #[inline]
+    fn corner(&self, numbers: &[u32; 3], before: &Before) -> (Corner, bool) {
+        let number = |kind: usize| resolve(numbers[kind], before.counts[kind]).filter(|&n| n <= self.counts[kind]);
+        let [position, uv, normal] = [number(0), number(1), number(2)];
+        // 0 is none.
+        let index = |number: Option<u32>| number.map_or(NONE, |n| n.wrapping_sub(1));
+        let (uv_index, normal_index) = (index(uv), index(normal));
+        let is_finite = self.uvs.get(uv_index as usize).is_some_and(|uv| uv.is_finite());
+        let has_length = self.normals.get(normal_index as usize).is_some_and(|&n| n != Vec3::ZERO);
+        let corner = Corner {
+            position: index(position),
+            uv: if is_finite { uv_index } else { NONE },
+            normal: if has_length { normal_index } else { NONE },
+        };
+        (corner, position.is_none() || uv.is_none() || normal.is_none())
+    }
+}
+
+/// The corners of all faces, and whether one of them, or of the faces that were dropped, names what is not there.
+fn corners(chunks: &[Chunk], begins: &[Before], there: &There) -> (Vec<Corner>, bool) {
+    let mut all = vec![Corner::default(); chunks.iter().map(|c| c.corners.len()).sum()];
+    let mut parts = Vec::with_capacity(chunks.len());
+    let mut rest = all.as_mut_slice();
+    for (chunk, before) in chunks.iter().zip(begins) {
+        let (part, after) = std::mem::take(&mut rest).split_at_mut(chunk.corners.len());
+        parts.push((chunk, before, part));
+        rest = after;
+    }
+    let fill = |(chunk, before, part): (&Chunk, &Before, &mut [Corner])| {
+        let mut faulty = chunk.dropped.iter().any(|numbers| there.corner(numbers, before).1);
+        for (corner, numbers) in part.iter_mut().zip(&chunk.corners) {
+            let odd;
+            (*corner, odd) = there.corner(numbers, before);
+            faulty |= odd;
+        }
+        faulty
+    };
+    let faulty = parts.into_par_iter().map(fill).reduce(|| false, |a, b| a | b);
+    (all, faulty)
+}
