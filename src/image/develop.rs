@@ -3,6 +3,7 @@
 
 use super::srgb::{self, Codes};
 use super::{Output, Picture};
+use crate::math::simd::{Kernel, LANES, Level, Simd};
 use rayon::prelude::*;
 
 /// Coded samples, rows from the top, 3 (opaque) or 4 channels each pixel; alpha is straight.
@@ -23,8 +24,8 @@ pub(super) trait Sample: Copy + Default + Eq + Send + Sync {
     const MAX: Self;
     /// The table of its sRGB codes.
     fn codes() -> &'static Codes;
-    /// A code of that table.
-    fn narrow(code: u16) -> Self;
+    /// The code of linear light in that table.
+    fn code(codes: &Codes, linear: f32) -> Self;
     /// Code of a coverage 0..=1; not on the sRGB curve.
     fn alpha(coverage: f32) -> Self;
 }
@@ -35,9 +36,11 @@ impl Sample for u8 {
     fn codes() -> &'static Codes {
         srgb::codes8()
     }
-    fn narrow(code: u16) -> Self {
-        code as Self
+    #[inline(always)]
+    fn code(codes: &Codes, linear: f32) -> Self {
+        codes.near(linear).0 as Self
     }
+    #[inline(always)]
     fn alpha(coverage: f32) -> Self {
         (coverage.clamp(0.0, 1.0) * 255.0 + 0.5) as Self
     }
@@ -49,9 +52,11 @@ impl Sample for u16 {
     fn codes() -> &'static Codes {
         srgb::codes16()
     }
-    fn narrow(code: u16) -> Self {
-        code
+    #[inline(always)]
+    fn code(codes: &Codes, linear: f32) -> Self {
+        codes.code(linear)
     }
+    #[inline(always)]
     fn alpha(coverage: f32) -> Self {
         (coverage.clamp(0.0, 1.0) * 65_535.0 + 0.5) as Self
     }
@@ -59,26 +64,55 @@ impl Sample for u16 {
 
 /// Develops a whole picture.
 pub(super) fn raster<T: Sample>(picture: &Picture, output: &Output) -> Raster<T> {
-    let developer = Developer::new(output);
-    let opaque = output.background.is_some() || picture.beauty.par_iter().all(|p| T::alpha(p[3]) == T::MAX);
+    let width = (picture.width as usize).max(1);
+    let is_opaque = |row: &[[f32; 4]]| row.iter().all(|p| T::alpha(p[3]) == T::MAX);
+    let opaque = output.background.is_some() || picture.beauty.par_chunks(width).all(is_opaque);
     let channels = if opaque { 3 } else { 4 };
-    let codes = T::codes();
-    let width = picture.width as usize;
     let mut samples = vec![T::default(); picture.beauty.len() * channels];
-    let rows = samples.par_chunks_mut((width * channels).max(1)).zip(picture.beauty.par_chunks(width.max(1)));
-    rows.for_each(|(out, row)| {
-        let mut last = ([f32::NAN; 4], [T::default(); 4]);
-        for (coded, &pixel) in out.chunks_exact_mut(channels).zip(row) {
-            // Large parts of a picture are one colour.
-            if pixel != last.0 {
-                let [r, g, b, a] = developer.pixel(pixel);
-                let [r, g, b] = [r, g, b].map(|c| T::narrow(codes.code(c)));
-                last = (pixel, [r, g, b, T::alpha(a)]);
-            }
-            coded.copy_from_slice(&last.1[..channels]);
-        }
-    });
+    let rows = samples.par_chunks_mut(width * channels).zip(picture.beauty.par_chunks(width));
+    let (developer, level) = (Developer::new(output), Level::best());
+    rows.for_each(|(out, row)| level.run(Row { developer: &developer, row, out, channels }));
     Raster { width: picture.width, height: picture.height, channels: if opaque { 3 } else { 4 }, samples }
+}
+
+/// One row on its way to the file.
+struct Row<'a, T> {
+    developer: &'a Developer<'a>,
+    row: &'a [[f32; 4]],
+    out: &'a mut [T],
+    channels: usize,
+}
+
+impl<T: Sample> Kernel for Row<'_, T> {
+    type Output = ();
+
+    // The lanes are plain arrays: what the token stands for is only what the compiler may use for them.
+    #[inline(always)]
+    fn run<S: Simd>(self, _simd: S) {
+        let codes = T::codes();
+        let blocks = self.out.chunks_mut(self.channels * LANES).zip(self.row.chunks(LANES));
+        let mut last = ([[f32::NAN; 4]; LANES], [[T::default(); 4]; LANES]);
+        for (out, pixels) in blocks {
+            // Large parts of a picture are one colour.
+            if last.0[..pixels.len()] != *pixels {
+                last.0[..pixels.len()].copy_from_slice(pixels);
+                let mut lanes = [[0.0; LANES]; 4];
+                for (i, pixel) in last.0.iter().enumerate() {
+                    for c in 0..4 {
+                        lanes[c][i] = pixel[c];
+                    }
+                }
+                self.developer.develop(&mut lanes);
+                for (i, coded) in last.1.iter_mut().enumerate() {
+                    let code = |c: usize| T::code(codes, lanes[c][i]);
+                    *coded = [code(0), code(1), code(2), T::alpha(lanes[3][i])];
+                }
+            }
+            for (out, coded) in out.chunks_exact_mut(self.channels).zip(&last.1) {
+                out.copy_from_slice(&coded[..self.channels]);
+            }
+        }
+    }
 }
 
 /// The steps for one pixel.
@@ -94,19 +128,39 @@ impl<'a> Developer<'a> {
     }
 
     /// Display light (linear, straight, 0..=1) and coverage of a premultiplied linear pixel.
-    pub(super) fn pixel(&self, [r, g, b, coverage]: [f32; 4]) -> [f32; 4] {
-        let coverage = if coverage > 0.0 { coverage.min(1.0) } else { 0.0 };
-        // Light without coverage (a glint on clear glass) adds to what is behind it; straight alpha cannot hold it.
-        let weight = if coverage > 0.0 { coverage } else { 1.0 };
-        let scale = self.gain / weight;
-        let color = self.output.tone_map.map([r, g, b].map(|c| c * scale));
-        match self.output.background {
-            None if coverage > 0.0 => [color[0], color[1], color[2], coverage],
-            None => [0.0; 4],
-            Some(behind) => {
-                let over = |i: usize| color[i] * weight + behind[i] * (1.0 - coverage);
-                [over(0), over(1), over(2), 1.0]
+    pub(super) fn pixel(&self, pixel: [f32; 4]) -> [f32; 4] {
+        let mut lanes = pixel.map(|c| [c]);
+        self.develop(&mut lanes);
+        lanes.map(|[c]| c)
+    }
+
+    /// The same for premultiplied linear pixels side by side, each channel in a row of its
+    /// own.
+    #[inline(always)]
+    fn develop<const N: usize>(&self, pixels: &mut [[f32; N]; 4]) {
+        let [r, g, b, coverage] = pixels;
+        let (mut weight, mut light) = ([1.0; N], [[0.0; N]; 3]);
+        for i in 0..N {
+            let part = if coverage[i] > 0.0 { coverage[i] } else { 0.0 };
+            coverage[i] = if part < 1.0 { part } else { 1.0 };
+            // Light without coverage (a glint on clear glass) adds to what is behind it; straight alpha cannot hold it.
+            weight[i] = if part > 0.0 { coverage[i] } else { 1.0 };
+            let scale = self.gain / weight[i];
+            (light[0][i], light[1][i], light[2][i]) = (r[i] * scale, g[i] * scale, b[i] * scale);
+        }
+        self.output.tone_map.map_lanes(&mut light);
+        let behind = self.output.background;
+        for (c, channel) in [r, g, b].into_iter().enumerate() {
+            for i in 0..N {
+                channel[i] = match behind {
+                    None if coverage[i] > 0.0 => light[c][i],
+                    None => 0.0,
+                    Some(behind) => light[c][i] * weight[i] + behind[c] * (1.0 - coverage[i]),
+                };
             }
+        }
+        if behind.is_some() {
+            *coverage = [1.0; N];
         }
     }
 }

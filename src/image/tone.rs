@@ -43,26 +43,52 @@ impl ToneMap {
 
     /// Display light of a straight (not premultiplied) colour, each channel 0..=1; NaN and negative light are black.
     pub fn map(self, color: [f32; 3]) -> [f32; 3] {
-        let light = color.map(|c| within(c, BRIGHTEST));
-        let display = match self {
-            Self::None => light,
-            Self::Reinhard => reinhard(light),
-            Self::Aces => aces(light),
-            Self::Neutral => neutral(light),
-        };
-        display.map(|c| within(c, 1.0))
+        let mut lanes = color.map(|c| [c]);
+        self.map_lanes(&mut lanes);
+        lanes.map(|[c]| c)
+    }
+
+    /// The same for several colours at once, each channel in a row of its own: no lane takes a branch, so that the compiler
+    /// makes vectors of them, and each comes out as it would alone.
+    #[inline(always)]
+    pub(super) fn map_lanes<const N: usize>(self, color: &mut [[f32; N]; 3]) {
+        color.iter_mut().flatten().for_each(|c| *c = within(*c, BRIGHTEST));
+        match self {
+            Self::None => {}
+            Self::Reinhard => reinhard(color),
+            Self::Aces => aces(color),
+            Self::Neutral => neutral(color),
+        }
+        color.iter_mut().flatten().for_each(|c| *c = within(*c, 1.0));
     }
 }
 
 /// `x` held in 0..=most; NaN becomes 0. Written so that each comparison is one instruction.
+#[inline(always)]
 fn within(x: f32, most: f32) -> f32 {
     let x = if x > 0.0 { x } else { 0.0 };
     if x < most { x } else { most }
 }
 
-fn reinhard(color: [f32; 3]) -> [f32; 3] {
-    let scale = 1.0 / (1.0 + luminance(color));
-    color.map(|c| c * scale)
+/// The smaller of two numbers that are not NaN.
+#[inline(always)]
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// The greater of two numbers that are not NaN.
+#[inline(always)]
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+#[inline(always)]
+fn reinhard<const N: usize>(color: &mut [[f32; N]; 3]) {
+    let [r, g, b] = color;
+    for i in 0..N {
+        let scale = 1.0 / (1.0 + dot(LUMINANCE, [r[i], g[i], b[i]]));
+        (r[i], g[i], b[i]) = (r[i] * scale, g[i] * scale, b[i] * scale);
+    }
 }
 
 /// Linear Rec. 709 luminance.
@@ -70,20 +96,27 @@ pub fn luminance(color: [f32; 3]) -> f32 {
     dot(LUMINANCE, color)
 }
 
-fn aces(color: [f32; 3]) -> [f32; 3] {
+#[inline(always)]
+fn aces<const N: usize>(color: &mut [[f32; N]; 3]) {
     // Rec. 709 into the rendering space of the fit, and back; rows sum to 1, so that grey stays grey.
     const TO_FIT: [[f32; 3]; 3] =
         [[0.59719, 0.35458, 0.04823], [0.07600, 0.90834, 0.01566], [0.02840, 0.13383, 0.83777]];
     const FROM_FIT: [[f32; 3]; 3] =
         [[1.60475, -0.53108, -0.07367], [-0.10208, 1.10813, -0.00605], [-0.00327, -0.07276, 1.07602]];
-    let fitted = TO_FIT.map(|row| {
-        let v = dot(row, color);
-        (v * (v + 0.024_578_6) - 0.000_090_537) / (v * (0.983_729 * v + 0.432_951) + 0.238_081)
-    });
-    FROM_FIT.map(|row| dot(row, fitted))
+    let [r, g, b] = color;
+    for i in 0..N {
+        let color = [r[i], g[i], b[i]];
+        let mut fitted = [0.0; 3];
+        for (fitted, row) in fitted.iter_mut().zip(TO_FIT) {
+            let v = dot(row, color);
+            *fitted = (v * (v + 0.024_578_6) - 0.000_090_537) / (v * (0.983_729 * v + 0.432_951) + 0.238_081);
+        }
+        (r[i], g[i], b[i]) = (dot(FROM_FIT[0], fitted), dot(FROM_FIT[1], fitted), dot(FROM_FIT[2], fitted));
+    }
 }
 
-fn neutral(color: [f32; 3]) -> [f32; 3] {
+#[inline(always)]
+fn neutral<const N: usize>(color: &mut [[f32; N]; 3]) {
     /// Reflectance of a dielectric at normal incidence: the curve takes this much off, so that a base colour lit fully
     /// comes out as itself.
     const F90_OFFSET: f32 = 0.04;
@@ -91,23 +124,26 @@ fn neutral(color: [f32; 3]) -> [f32; 3] {
     const START: f32 = 0.8 - F90_OFFSET;
     /// How fast compressed colours fade to white.
     const DESATURATION: f32 = 0.15;
-
-    let darkest = color[0].min(color[1]).min(color[2]);
-    let offset = if darkest < 2.0 * F90_OFFSET { darkest - 6.25 * darkest * darkest } else { F90_OFFSET };
-    let color = color.map(|c| c - offset);
-    let peak = color[0].max(color[1]).max(color[2]);
-    if peak < START {
-        return color;
+    const ROOM: f32 = 1.0 - START;
+    let [r, g, b] = color;
+    for i in 0..N {
+        let darkest = smaller(smaller(r[i], g[i]), b[i]);
+        let part = darkest - 6.25 * darkest * darkest;
+        let offset = if darkest < 2.0 * F90_OFFSET { part } else { F90_OFFSET };
+        let (x, y, z) = (r[i] - offset, g[i] - offset, b[i] - offset);
+        let peak = greater(greater(x, y), z);
+        // Below the start these are thrown away.
+        let new_peak = 1.0 - ROOM * ROOM / (peak + ROOM - START);
+        let white = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
+        let (scale, rest) = (new_peak / peak, new_peak * white);
+        let kept = peak < START;
+        r[i] = if kept { x } else { x * scale * (1.0 - white) + rest };
+        g[i] = if kept { y } else { y * scale * (1.0 - white) + rest };
+        b[i] = if kept { z } else { z * scale * (1.0 - white) + rest };
     }
-    let room = 1.0 - START;
-    let new_peak = 1.0 - room * room / (peak + room - START);
-    let white = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
-    color.map(|c| {
-        let compressed = c * (new_peak / peak);
-        compressed * (1.0 - white) + new_peak * white
-    })
 }
 
+#[inline(always)]
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
@@ -191,6 +227,23 @@ mod tests {
                 for color in [[odd; 3], [odd, 0.2, 0.0], [0.0, 0.1, odd]] {
                     let out = curve.map(color);
                     assert!(out.iter().all(|c| (0.0..=1.0).contains(c)), "{curve} of {color:?}: {out:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_colour_comes_out_the_same_beside_others() {
+        let values = [0.0, 1e-9, 0.03, 0.0799, 0.08, 0.3, 0.76, 0.81, 1.0, 7.5, 1e9, f32::INFINITY, f32::NAN, -2.0];
+        let color = |i: usize| [i, i / 14, i / 196].map(|k| values[k % 14]);
+        for curve in ToneMap::ALL {
+            for first in (0..14 * 14 * 14).step_by(8) {
+                let mut lanes: [[f32; 8]; 3] = [0, 1, 2].map(|c| std::array::from_fn(|i| color(first + i)[c]));
+                curve.map_lanes(&mut lanes);
+                let [r, g, b] = lanes;
+                for (i, beside) in r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).enumerate() {
+                    let alone = curve.map(color(first + i));
+                    assert_eq!(alone.map(f32::to_bits), beside.map(f32::to_bits), "{curve} {:?}", color(first + i));
                 }
             }
         }
