@@ -27,20 +27,48 @@ fn narrow(x: f64) -> f32 {
     x as f32
 }
 
-/// Linear RGBA of texel `index` (row by row) of `bitmap`; opaque white where there is none. Alpha is never curved.
-#[inline]
-pub(super) fn texel(bitmap: &Bitmap, space: ColorSpace, index: usize) -> Vec4 {
-    match &bitmap.pixels {
-        Pixels::Rgba8(texels) => texels.get(index).map_or(Vec4::ONE, |&texel| decode8(texel, space)),
-        Pixels::Rgba16(texels) => texels.get(index).map_or(Vec4::ONE, |&texel| decode16(texel, space)),
+/// The stored texels of a bitmap, row by row, and what their numbers mean.
+#[derive(Clone, Copy)]
+pub(super) enum Texels<'a> {
+    /// And the table of colours.
+    Rgba8(&'a [[u8; 4]], &'static [f32; 256]),
+    Rgba16(&'a [[u16; 4]], ColorSpace),
+}
+
+impl<'a> Texels<'a> {
+    /// Those of a bitmap, for one meaning.
+    #[inline]
+    pub(super) fn new(bitmap: &'a Bitmap, space: ColorSpace) -> Self {
+        match &bitmap.pixels {
+            Pixels::Rgba8(texels) => Self::Rgba8(texels, table8(space)),
+            Pixels::Rgba16(texels) => Self::Rgba16(texels, space),
+        }
+    }
+
+    /// Linear RGBA of texel `index`; opaque white where there is none. Alpha is never curved.
+    #[inline]
+    pub(super) fn get(self, index: usize) -> Vec4 {
+        match self {
+            Self::Rgba8(texels, colors) => texels.get(index).map_or(Vec4::ONE, |&texel| decode8(texel, colors)),
+            Self::Rgba16(texels, space) => texels.get(index).map_or(Vec4::ONE, |&texel| decode16(texel, space)),
+        }
     }
 }
 
+/// The linear value of each 8-bit colour.
+fn table8(space: ColorSpace) -> &'static [f32; 256] {
+    match space {
+        ColorSpace::Srgb => &SRGB8,
+        ColorSpace::Linear => &UNIT8,
+    }
+}
+
+/// Linear RGBA of a texel, its colours looked up.
 #[inline]
-fn decode8([r, g, b, a]: [u8; 4], space: ColorSpace) -> Vec4 {
-    let color = if space == ColorSpace::Srgb { &*SRGB8 } else { &*UNIT8 };
-    let color = |c: u8| color[usize::from(c)];
-    Vec4::new(color(r), color(g), color(b), UNIT8[usize::from(a)])
+pub(super) fn decode8([r, g, b, a]: [u8; 4], colors: &[f32; 256]) -> Vec4 {
+    let color = |c: u8| colors[usize::from(c)];
+    // What a table of these holds, too: the quotient in `f64` is never so near the middle of two `f32` that it matters.
+    Vec4::new(color(r), color(g), color(b), f32::from(a) / 255.0)
 }
 
 #[inline]
@@ -72,15 +100,22 @@ mod tests {
         for i in 0..=255u8 {
             let wide = u16::from(i) * 257;
             for space in [ColorSpace::Srgb, ColorSpace::Linear] {
-                let (a, b) = (decode8([i, i, i, i], space), decode16([wide; 4], space));
+                let (a, b) = (decode8([i; 4], table8(space)), decode16([wide; 4], space));
                 assert!((a - b).abs().max_element() < 1e-7, "{i} {space:?}: {a} {b}");
             }
         }
     }
 
     #[test]
+    fn every_alpha_is_its_share_of_255_rounded_once() {
+        for i in 0..=255u8 {
+            assert_eq!(decode8([0, 0, 0, i], table8(ColorSpace::Srgb)).w.to_bits(), UNIT8[usize::from(i)].to_bits());
+        }
+    }
+
+    #[test]
     fn alpha_is_linear_in_both_spaces() {
-        assert_eq!(decode8([0, 0, 0, 51], ColorSpace::Srgb).w, 0.2);
-        assert_eq!(decode8([0, 0, 0, 51], ColorSpace::Linear).w, 0.2);
+        assert_eq!(decode8([0, 0, 0, 51], table8(ColorSpace::Srgb)).w, 0.2);
+        assert_eq!(decode8([0, 0, 0, 51], table8(ColorSpace::Linear)).w, 0.2);
     }
 }

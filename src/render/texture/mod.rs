@@ -11,7 +11,7 @@ mod pyramid;
 
 use crate::math::{Vec2, Vec4};
 use crate::scene::{Bitmap, Filter, Mipmaps, Pixels, Sampler, Scene, Texture, Wrap};
-use pyramid::Pyramid;
+use pyramid::{Plane, Pyramid};
 
 /// What the numbers of a bitmap mean; the slot that reads it decides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,7 +114,15 @@ struct Lookup<'a> {
     sampler: Sampler,
 }
 
-impl Lookup<'_> {
+/// The levels that the probes of one footprint read.
+#[derive(Clone, Copy)]
+enum Plan<'a> {
+    One(Plane<'a>, Filter),
+    /// Two, and the share of the second.
+    Between(Plane<'a>, Plane<'a>, Filter, f32),
+}
+
+impl<'a> Lookup<'a> {
     /// The mean over a footprint.
     fn filtered(&self, uv: Vec2, duvdx: Vec2, duvdy: Vec2) -> Vec4 {
         // The footprint's axes in texels.
@@ -122,10 +130,10 @@ impl Lookup<'_> {
         let (dx, dy) = ((duvdx * texels).length(), (duvdy * texels).length());
         let (major, minor, axis) = if dx >= dy { (dx, dy, duvdx) } else { (dy, dx, duvdy) };
         if major <= 1.0 {
-            return self.level(uv, 0, self.sampler.magnify);
+            return self.read(Plan::One(self.plane(0), self.sampler.magnify), uv);
         }
         if !(major.is_finite() && minor.is_finite()) {
-            return self.at_sharpness(uv, f32::INFINITY);
+            return self.read(self.plan(f32::INFINITY), uv);
         }
 
         // As many probes as the footprint is longer than wide; files that ask for nearest texels get one.
@@ -133,48 +141,60 @@ impl Lookup<'_> {
             Filter::Nearest => 1.0,
             Filter::Linear => (major / minor.max(1.0)).ceil().clamp(1.0, MAX_PROBES),
         };
-        let lod = libm::log2f(major / probes);
+        let plan = self.plan(libm::log2f(major / probes));
         let mut sum = Vec4::ZERO;
         let mut k = 0.5;
         while k < probes {
-            sum += self.at_sharpness(uv + axis * (k / probes - 0.5), lod);
+            sum += self.read(plan, uv + axis * (k / probes - 0.5));
             k += 1.0;
         }
         sum / probes
     }
 
-    /// A lookup where a probe covers 2^`lod` texels.
-    fn at_sharpness(&self, uv: Vec2, lod: f32) -> Vec4 {
+    /// What to read where a probe covers 2^`lod` texels.
+    fn plan(&self, lod: f32) -> Plan<'a> {
         let Sampler { magnify, minify, mipmaps, .. } = self.sampler;
         if lod <= 0.0 {
-            return self.level(uv, 0, magnify);
+            return Plan::One(self.plane(0), magnify);
         }
         let top = self.pyramid.top();
         match mipmaps {
-            Mipmaps::None => self.level(uv, 0, minify),
-            Mipmaps::Nearest => self.level(uv, whole(lod + 0.5).min(top), minify),
+            Mipmaps::None => Plan::One(self.plane(0), minify),
+            Mipmaps::Nearest => Plan::One(self.plane(whole(lod + 0.5).min(top)), minify),
             Mipmaps::Linear => {
                 let lower = whole(lod);
                 if lower >= top {
-                    return self.level(uv, top, minify);
+                    return Plan::One(self.plane(top), minify);
                 }
-                let (a, b) = (self.level(uv, lower, minify), self.level(uv, lower + 1, minify));
-                a + (b - a) * (lod - lod.floor())
+                Plan::Between(self.plane(lower), self.plane(lower + 1), minify, lod - lod.floor())
+            }
+        }
+    }
+
+    fn plane(&self, level: usize) -> Plane<'a> {
+        self.pyramid.plane(self.bitmap, self.space, level)
+    }
+
+    fn read(&self, plan: Plan, uv: Vec2) -> Vec4 {
+        match plan {
+            Plan::One(plane, filter) => self.level(&plane, uv, filter),
+            Plan::Between(lower, upper, filter, share) => {
+                let (a, b) = (self.level(&lower, uv, filter), self.level(&upper, uv, filter));
+                a + (b - a) * share
             }
         }
     }
 
     /// A lookup in one level.
-    fn level(&self, uv: Vec2, level: usize, filter: Filter) -> Vec4 {
-        let (width, height) = pyramid::size(self.bitmap, level);
-        let x = Axis::new(uv.x, width, self.sampler.wrap_u, filter);
-        let y = Axis::new(uv.y, height, self.sampler.wrap_v, filter);
-        let texel = |x, y| self.pyramid.texel(self.bitmap, self.space, level, x, y);
+    #[inline]
+    fn level(&self, plane: &Plane, uv: Vec2, filter: Filter) -> Vec4 {
+        let x = Axis::new(uv.x, plane.width, self.sampler.wrap_u, filter);
+        let y = Axis::new(uv.y, plane.height, self.sampler.wrap_v, filter);
         if filter == Filter::Nearest {
-            return texel(x.near, y.near);
+            return plane.texel(x.near, y.near);
         }
-        let upper = texel(x.near, y.near) * (1.0 - x.share) + texel(x.far, y.near) * x.share;
-        let lower = texel(x.near, y.far) * (1.0 - x.share) + texel(x.far, y.far) * x.share;
+        let upper = plane.texel(x.near, y.near) * (1.0 - x.share) + plane.texel(x.far, y.near) * x.share;
+        let lower = plane.texel(x.near, y.far) * (1.0 - x.share) + plane.texel(x.far, y.far) * x.share;
         upper * (1.0 - y.share) + lower * y.share
     }
 }
@@ -188,23 +208,46 @@ struct Axis {
 
 impl Axis {
     /// Coordinate `c` (0…1 over `len` texels, centres at halves) with its wrap; 0 stands in for one that is not finite.
+    #[inline]
     fn new(c: f32, len: usize, wrap: Wrap, filter: Filter) -> Self {
         let c = if c.is_finite() { c } else { 0.0 };
         let period = match wrap {
-            Wrap::Repeat => c - c.floor(),
-            Wrap::Mirror => c - 2.0 * (c * 0.5).floor(),
+            Wrap::Repeat => c - floor(c),
+            Wrap::Mirror => c - 2.0 * floor(c * 0.5),
             Wrap::Clamp => c.clamp(0.0, 1.0),
         };
         let half = if filter == Filter::Linear { 0.5 } else { 0.0 };
         let place = period * pixels((len, 0)).x - half;
-        let below = place.floor();
+        let below = floor(place);
         let near = signed(below);
         Self { near: wrapped(near, len, wrap), far: wrapped(near + 1, len, wrap), share: place - below }
     }
 }
 
+/// The greatest whole number that is not above `x`, which is no NaN, without the call that processors of 2003 need for it.
+#[inline]
+#[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "within ±2²³ both casts are exact")]
+fn floor(x: f32) -> f32 {
+    // Larger numbers are whole.
+    if x.abs() >= 8_388_608.0 {
+        return x;
+    }
+    let truncated = x as i32 as f32;
+    if truncated > x { truncated - 1.0 } else { truncated }
+}
+
 /// The texel that stands at place `i` of a row that goes on for ever.
+#[inline]
 fn wrapped(i: i64, len: usize, wrap: Wrap) -> usize {
+    match usize::try_from(i) {
+        // Nearly all of them; division takes its time.
+        Ok(i) if i < len => i,
+        _ => wrapped_outside(i, len, wrap),
+    }
+}
+
+#[cold]
+fn wrapped_outside(i: i64, len: usize, wrap: Wrap) -> usize {
     let last = i64::try_from(len).unwrap_or(i64::MAX) - 1;
     let inside = match wrap {
         Wrap::Repeat => i.rem_euclid(last + 1),

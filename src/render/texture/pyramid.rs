@@ -4,7 +4,8 @@
 //! where a side is odd, texels that straddle a border count with the fraction that lies inside. Means are taken of linear
 //! values. Colours (sRGB slots) are weighted by alpha, so that what hides under transparent texels does not bleed out.
 
-use super::{ColorSpace, decode};
+use super::ColorSpace;
+use super::decode::{self, Texels};
 use crate::math::Vec4;
 use crate::scene::Bitmap;
 use std::sync::OnceLock;
@@ -20,7 +21,6 @@ pub(super) struct Pyramid {
 /// A step of 1/65535 is a twentieth of the darkest step of an 8-bit sRGB file.
 #[derive(Debug)]
 struct Level {
-    width: usize,
     texels: Vec<[u16; 4]>,
 }
 
@@ -36,27 +36,59 @@ impl Pyramid {
         self.above.len()
     }
 
-    /// Texel (`x`, `y`) of `level`, made if it is not there; both must lie inside [`size`].
+    /// Level `level`, made if it is not there.
     #[inline]
-    pub(super) fn texel(&self, bitmap: &Bitmap, space: ColorSpace, level: usize, x: usize, y: usize) -> Vec4 {
-        if level == 0 {
-            return decode::texel(bitmap, space, y * bitmap.width as usize + x);
-        }
-        self.level(bitmap, space, level).texel(x, y)
+    pub(super) fn plane<'a>(&'a self, bitmap: &'a Bitmap, space: ColorSpace, level: usize) -> Plane<'a> {
+        let (width, height) = size(bitmap, level);
+        let texels = match level {
+            0 => Stored::Bitmap(Texels::new(bitmap, space)),
+            _ => Stored::Level(&self.level(bitmap, space, level).texels),
+        };
+        Plane { width, height, texels }
     }
 
     /// Level `level` > 0. It depends on the bitmap alone, so it does not matter which thread makes it.
     fn level(&self, bitmap: &Bitmap, space: ColorSpace, level: usize) -> &Level {
         self.above[level - 1].get_or_init(|| {
-            let from = size(bitmap, level - 1);
-            let to = size(bitmap, level);
-            if level == 1 {
-                halve(from, to, space, |x, y| decode::texel(bitmap, space, y * from.0 + x))
-            } else {
-                let below = self.level(bitmap, space, level - 1);
-                halve(from, to, space, |x, y| below.texel(x, y))
+            let (from, to) = (self.plane(bitmap, space, level - 1), size(bitmap, level));
+            match from.texels {
+                Stored::Bitmap(Texels::Rgba8(texels, colors)) if from.is_twice(to) => {
+                    halve_evenly(texels, from.width, space, |&texel| decode::decode8(texel, colors))
+                }
+                Stored::Level(texels) if from.is_twice(to) => halve_evenly(texels, from.width, space, unit),
+                _ => halve(&from, to, space),
             }
         })
+    }
+}
+
+/// One level, ready to be read.
+#[derive(Clone, Copy)]
+pub(super) struct Plane<'a> {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    texels: Stored<'a>,
+}
+
+#[derive(Clone, Copy)]
+enum Stored<'a> {
+    Bitmap(Texels<'a>),
+    Level(&'a [[u16; 4]]),
+}
+
+impl Plane<'_> {
+    /// Linear RGBA of texel (`x`, `y`), which must lie inside.
+    #[inline]
+    pub(super) fn texel(&self, x: usize, y: usize) -> Vec4 {
+        let index = y * self.width + x;
+        match self.texels {
+            Stored::Bitmap(texels) => texels.get(index),
+            Stored::Level(texels) => unit(&texels[index]),
+        }
+    }
+
+    fn is_twice(&self, to: (usize, usize)) -> bool {
+        (self.width, self.height) == (2 * to.0, 2 * to.1)
     }
 }
 
@@ -66,25 +98,48 @@ pub(super) fn size(bitmap: &Bitmap, level: usize) -> (usize, usize) {
     ((bitmap.width as usize >> level).max(1), (bitmap.height as usize >> level).max(1))
 }
 
-impl Level {
-    #[inline]
-    fn texel(&self, x: usize, y: usize) -> Vec4 {
-        let texel = self.texels[y * self.width + x].map(|c| f32::from(c) / 65535.0);
-        Vec4::from_array(texel)
-    }
+#[inline]
+fn unit(texel: &[u16; 4]) -> Vec4 {
+    Vec4::from_array(texel.map(f32::from)) / 65535.0
 }
 
-/// The next smaller copy of a picture of size `from`.
-fn halve(from: (usize, usize), to: (usize, usize), space: ColorSpace, texel: impl Fn(usize, usize) -> Vec4) -> Level {
-    let columns: Vec<Span> = (0..to.0).map(|x| Span::new(x, from.0, to.0)).collect();
+/// The next smaller copy of a level.
+fn halve(from: &Plane, to: (usize, usize), space: ColorSpace) -> Level {
+    let columns: Vec<Span> = (0..to.0).map(|x| Span::new(x, from.width, to.0)).collect();
     let mut texels = Vec::with_capacity(to.0 * to.1);
     for y in 0..to.1 {
-        let rows = Span::new(y, from.1, to.1);
+        let rows = Span::new(y, from.height, to.1);
         for columns in &columns {
-            texels.push(quantized(mean(columns, &rows, space, &texel)));
+            texels.push(quantized(mean(columns, &rows, space, &|x, y| from.texel(x, y))));
         }
     }
-    Level { width: to.0, texels }
+    Level { texels }
+}
+
+/// The same where each texel is the mean of exactly four, with the same bits.
+fn halve_evenly<T>(texels: &[T], width: usize, space: ColorSpace, linear: impl Fn(&T) -> Vec4) -> Level {
+    let mut out = Vec::with_capacity(texels.len() / 4);
+    for rows in texels.chunks_exact(2 * width) {
+        let (upper, lower) = rows.split_at(width);
+        for (a, b) in upper.chunks_exact(2).zip(lower.chunks_exact(2)) {
+            let quarters = [&a[0], &a[1], &b[0], &b[1]].map(|texel| linear(texel) * 0.25);
+            let plain = quarters[0] + quarters[1] + quarters[2] + quarters[3];
+            out.push(quantized(if is_plain(plain, space) {
+                plain
+            } else {
+                let [a, b, c, d] = quarters.map(|q| q * (q.w * 4.0));
+                ((a + b + c + d) / plain.w).truncate().extend(plain.w)
+            }));
+        }
+    }
+    Level { texels: out }
+}
+
+/// Whether a mean needs no weights: where everything is clear there is none to go by, and where everything is solid the
+/// two means are one.
+#[inline]
+fn is_plain(mean: Vec4, space: ColorSpace) -> bool {
+    space == ColorSpace::Linear || mean.w <= 0.0 || mean.w >= 1.0
 }
 
 /// Which texels of the finer level one texel covers along one axis, and the share of each.
@@ -121,8 +176,7 @@ fn mean(columns: &Span, rows: &Span, space: ColorSpace, texel: &impl Fn(usize, u
             weighted += value * alpha;
         }
     }
-    // Where everything is clear there is no weight to go by, and where everything is solid the two means are one.
-    if space == ColorSpace::Linear || plain.w <= 0.0 || plain.w >= 1.0 {
+    if is_plain(plain, space) {
         return plain;
     }
     (weighted / plain.w).truncate().extend(plain.w)
@@ -145,7 +199,7 @@ mod tests {
 
     fn top_of(bitmap: &Bitmap, space: ColorSpace) -> Vec4 {
         let pyramid = Pyramid::new(bitmap);
-        pyramid.texel(bitmap, space, pyramid.top(), 0, 0)
+        pyramid.plane(bitmap, space, pyramid.top()).texel(0, 0)
     }
 
     #[test]
@@ -166,6 +220,24 @@ mod tests {
     fn colours_are_averaged_as_light_not_as_stored_numbers() {
         let checker = bitmap(8, 8, |x, y| [if (x + y) % 2 == 0 { 255 } else { 0 }, 0, 0, 255]);
         assert!((top_of(&checker, ColorSpace::Srgb).x - 0.5).abs() < 1e-4);
+    }
+
+    #[test]
+    fn halving_evenly_gives_the_bits_of_any_halving() {
+        let hash = |x: u32, y: u32| x.wrapping_mul(2_654_435_761).wrapping_add(y.wrapping_mul(40_503)).rotate_left(7);
+        let opaque = bitmap(32, 16, |x, y| [hash(x, y) as u8, hash(y, x) as u8, 7, 255]);
+        let cut_out = bitmap(16, 64, |x, y| [hash(x, y) as u8, 200, 7, (hash(y, x) % 3 * 100) as u8]);
+        for picture in [opaque, cut_out] {
+            for space in [ColorSpace::Srgb, ColorSpace::Linear] {
+                let pyramid = Pyramid::new(&picture);
+                for level in 1..4 {
+                    let below = pyramid.plane(&picture, space, level - 1);
+                    let slow = halve(&below, size(&picture, level), space);
+                    assert!(below.is_twice(size(&picture, level)));
+                    assert!(pyramid.level(&picture, space, level).texels == slow.texels, "level {level} {space:?}");
+                }
+            }
+        }
     }
 
     #[test]
