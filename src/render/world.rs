@@ -169,7 +169,17 @@ impl World {
         if opaque.iter().all(|&o| o) {
             return bits;
         }
-        for prim in 0..index(self.shapes.len()) {
+        // An instance has one material, so that no prim of it needs to be looked up.
+        let first_polygon = index(self.shapes.triangles.len());
+        for (i, instance) in scene.instances.iter().enumerate() {
+            if !opaque[scene.meshes[instance.mesh as usize].material as usize] {
+                let polygons = self.first_polygon[i] + first_polygon..self.first_polygon[i + 1] + first_polygon;
+                let prims = (self.first_triangle[i]..self.first_triangle[i + 1]).chain(polygons);
+                prims.for_each(|prim| bits.set(prim, false));
+            }
+        }
+        let others = first_polygon + index(self.shapes.polygons.len());
+        for prim in others..index(self.shapes.len()) {
             bits.set(prim, opaque[self.material(scene, prim) as usize]);
         }
         bits
@@ -199,13 +209,18 @@ fn join(a: (DVec3, DVec3), b: (DVec3, DVec3)) -> (DVec3, DVec3) {
 }
 
 fn mesh_bounds(mesh: &Mesh, world_from_object: &DAffine3) -> (DVec3, DVec3) {
-    let grow = |(lo, hi): (DVec3, DVec3), i: u32| {
-        let p = world_from_object.transform_point3(mesh.positions[i as usize].as_dvec3());
+    // Faces share their corners, and placing one costs more than a note of it.
+    let mut used = vec![false; mesh.positions.len()];
+    mesh.triangles.iter().flatten().chain(&mesh.polygon_corners).for_each(|&i| used[i as usize] = true);
+    let grow = |(lo, hi): (DVec3, DVec3), (p, _): (&Vec3, &bool)| {
+        let p = world_from_object.transform_point3(p.as_dvec3());
         (lo.min(p), hi.max(p))
     };
-    let run = |t: &[[u32; 3]]| t.iter().flatten().copied().fold(NO_BOX, grow);
-    let triangles = mesh.triangles.par_chunks(PARALLEL_RUN).map(run).reduce(|| NO_BOX, join);
-    mesh.polygon_corners.iter().copied().fold(triangles, grow)
+    let run = |(positions, used): (&[Vec3], &[bool])| {
+        positions.iter().zip(used).filter(|(_, used)| **used).fold(NO_BOX, grow)
+    };
+    let runs = mesh.positions.par_chunks(PARALLEL_RUN).zip(used.par_chunks(PARALLEL_RUN));
+    runs.map(run).reduce(|| NO_BOX, join)
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "loading refuses scenes with 2^32 - 1 prims or vertices")]

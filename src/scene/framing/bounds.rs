@@ -61,7 +61,12 @@ pub fn robust_bounds(scene: &Scene) -> Bounds {
     let mut bounds = Bounds { lo: whole.0, hi: whole.1, strays: 0, whole };
     // Each round zooms in by up to SLICES; the range of f64 needs far fewer than this many.
     for _ in 0..128 {
-        let slices = Slices::new(scene, &bounds);
+        let mut slices = Slices::new(&bounds);
+        slices.cover(scene, &bounds);
+        if slices.has_no_gap() {
+            break;
+        }
+        slices.weigh(scene, &bounds);
         let Some(core) = slices.core() else { break };
         let kept = |part: &Part| bounds.contains(part.center) && slices.lies_in(&core, part.center);
         let Some((lo, hi)) = hull(scene, kept) else { break };
@@ -69,6 +74,9 @@ pub fn robust_bounds(scene: &Scene) -> Bounds {
             break;
         }
         (bounds.lo, bounds.hi) = (lo, hi);
+    }
+    if (bounds.lo, bounds.hi) == bounds.whole {
+        return bounds;
     }
     visit(scene, |part| bounds.strays += u64::from(!bounds.contains(part.lo) || !bounds.contains(part.hi)));
     bounds
@@ -113,12 +121,13 @@ fn visit(scene: &Scene, mut f: impl FnMut(Part)) {
             f(Part { lo: box_of.0, hi: box_of.1, center: (a + b + c) / 3.0, normal, area: normal.length() });
         }
     };
+    let mut places: Vec<DVec3> = Vec::new();
     for instance in &scene.instances {
         let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
-        let corner = |i: u32| {
-            let p = mesh.positions.get(i as usize).copied().unwrap_or_default();
-            instance.world_from_object.transform_point3(p.as_dvec3())
-        };
+        // Faces share their corners.
+        places.clear();
+        places.extend(mesh.positions.iter().map(|p| instance.world_from_object.transform_point3(p.as_dvec3())));
+        let corner = |i: u32| places.get(i as usize).copied().unwrap_or(instance.world_from_object.translation);
         for triangle in &mesh.triangles {
             let [a, b, c] = triangle.map(corner);
             face(a, b, c, (a.min(b).min(c), a.max(b).max(c)));
@@ -159,32 +168,45 @@ struct Slices {
 }
 
 impl Slices {
-    /// Cuts the box of `bounds` and sorts the parts inside into its slices.
-    fn new(scene: &Scene, bounds: &Bounds) -> Self {
-        let width = (bounds.hi - bounds.lo) / SLICES as f64;
-        let mut slices = Self {
+    /// Cuts the box of `bounds`.
+    fn new(bounds: &Bounds) -> Self {
+        Self {
             lo: bounds.lo,
-            width,
+            width: (bounds.hi - bounds.lo) / SLICES as f64,
             covered: [[false; SLICES]; 3],
             area: [[0.0; SLICES]; 3],
             count: [[0; SLICES]; 3],
-        };
-        visit(scene, |part| {
-            if bounds.contains(part.center) {
-                slices.add(&part);
-            }
-        });
-        slices
+        }
     }
 
-    fn add(&mut self, part: &Part) {
-        for axis in 0..3 {
-            let (first, last) = (self.slice(axis, part.lo[axis]), self.slice(axis, part.hi[axis]));
-            self.covered[axis][first..=last].fill(true);
-            let middle = self.slice(axis, part.center[axis]);
-            self.area[axis][middle] += part.area;
-            self.count[axis][middle] += 1;
-        }
+    /// Finds the slices that the parts inside reach into.
+    fn cover(&mut self, scene: &Scene, bounds: &Bounds) {
+        visit(scene, |part| {
+            if bounds.contains(part.center) {
+                for axis in 0..3 {
+                    let (first, last) = (self.slice(axis, part.lo[axis]), self.slice(axis, part.hi[axis]));
+                    self.covered[axis][first..=last].fill(true);
+                }
+            }
+        });
+    }
+
+    /// Whether no slice is empty, so that nothing can come off.
+    fn has_no_gap(&self) -> bool {
+        self.covered.iter().flatten().all(|&covered| covered)
+    }
+
+    /// Sorts the parts inside into the slices.
+    fn weigh(&mut self, scene: &Scene, bounds: &Bounds) {
+        visit(scene, |part| {
+            if bounds.contains(part.center) {
+                for axis in 0..3 {
+                    let middle = self.slice(axis, part.center[axis]);
+                    self.area[axis][middle] += part.area;
+                    self.count[axis][middle] += 1;
+                }
+            }
+        });
     }
 
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the slices there are")]

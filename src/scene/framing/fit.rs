@@ -66,8 +66,13 @@ impl Extremes {
         let camera_from_world = axes.transpose();
         for instance in &scene.instances {
             let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
+            // Faces share their corners.
+            let mut seen = vec![false; mesh.positions.len()];
             for &i in mesh.triangles.iter().flatten().chain(&mesh.polygon_corners) {
                 let Some(p) = mesh.positions.get(i as usize) else { continue };
+                if std::mem::replace(&mut seen[i as usize], true) {
+                    continue;
+                }
                 let p = instance.world_from_object.transform_point3(p.as_dvec3());
                 if bounds.contains(p) {
                     extremes.add(camera_from_world * (p - center), 0.0);
