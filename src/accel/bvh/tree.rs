@@ -2,8 +2,7 @@
 
 use super::super::query::{Goal, Query};
 use super::super::slabs::{BoxRay, limit};
-use super::super::wide::Splitting;
-use super::super::wide::split::Item;
+use super::super::wide::split::{Bounds, Cut, Item, around, cut_by_area};
 use crate::accel::Probe;
 use crate::accel::probe::{Extent, Place, Visit};
 use crate::math::aabb::Aabb;
@@ -46,25 +45,24 @@ impl Tree {
     /// Adds the tree over some prims, at least one; its root. The same for every number of threads.
     pub(in crate::accel) fn add(&mut self, items: &mut [Item], leaf_size: usize) -> u32 {
         let root = index(self.nodes.len());
-        let bounds = items.iter().fold(Aabb::EMPTY, |b, i| b.union(i.bounds));
-        self.grow(items, bounds, leaf_size.max(1));
+        self.grow(items, around(items), leaf_size.max(1));
         root
     }
 
-    fn grow(&mut self, items: &mut [Item], bounds: Aabb, leaf_size: usize) {
+    fn grow(&mut self, items: &mut [Item], bounds: Bounds, leaf_size: usize) {
+        let aabb = bounds.aabb();
         let node = self.nodes.len();
         if items.len() <= leaf_size {
             let first = index(self.prims.len());
-            self.prims.extend(items.iter().map(|i| i.prim));
+            self.prims.extend(items.iter().map(Item::prim));
             self.prims[first as usize..].sort_unstable();
-            self.nodes.push(Node { bounds, at: first, count: index(items.len()) });
+            self.nodes.push(Node { bounds: aabb, at: first, count: index(items.len()) });
             return;
         }
-        self.nodes.push(Node { bounds, at: 0, count: 0 });
+        self.nodes.push(Node { bounds: aabb, at: 0, count: 0 });
         let large = items.len() > PARALLEL;
-        let cut = Splitting::SurfaceArea.cut(items);
-        let [first, second] = cut.bounds;
-        let (left, right) = items.split_at_mut(cut.at);
+        let Cut { at, bounds: [first, second] } = cut_by_area(items, 1);
+        let (left, right) = items.split_at_mut(at);
         if large {
             let build = |items: &mut [Item], bounds| {
                 let mut tree = Self::default();

@@ -76,7 +76,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
         });
         let build = |&(cube, cell): &(Cube, u32)| {
             let bounds = self.lattice.padded_bounds(cube);
-            let item = |&prim: &u32| Item { bounds: clipped(self.shapes, prim, &bounds), prim, cell: [0; 3] };
+            let item = |&prim: &u32| Item::new(clipped(self.shapes, prim, &bounds), prim);
             let mut items: Vec<Item> = self.cells.list(cell).iter().map(item).collect();
             let mut tree = Tree::default();
             tree.add(&mut items, leaf_size);

@@ -73,7 +73,7 @@ fn without_the_error_of_distances_rays_through_edges_of_boxes_miss_what_is_insid
 
 #[test]
 fn boxes_behind_the_best_hit_may_hold_another_as_near() {
-    let shapes = soup(700, 0.4);
+    let shapes = soup(1500, 1.0);
     let rays = far_rays(&shapes, 300, 1e4..1e7);
     assert_needed::<NoRange>(&shapes, &rays);
 }

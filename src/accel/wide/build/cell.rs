@@ -1,0 +1,151 @@
+//! One cell of the octree: its eight parts, and how they are joined in pairs.
+//!
+//! A cell is cut by all three of its middle planes at once, in one pass over what is in it. The parts are then the leaves
+//! of a little binary tree: of the three planes the one of least cost by surface area cuts first. What fits into a leaf is
+//! not cut.
+
+use crate::accel::wide::split::area::weight;
+use crate::accel::wide::split::item::around_middles;
+use crate::accel::wide::split::{Bounds, Item};
+use crate::math::Vec4;
+use crate::math::aabb::Aabb;
+
+/// Levels of the octree: so many that the number of a cell is exact in `f32`.
+const LEVELS: u32 = 23;
+
+/// Where the finest cells of the octree are.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lattice {
+    /// The least middle, doubled.
+    lo: Vec4,
+    scale: Vec4,
+}
+
+/// The parts of a cell: part i lies beyond the plane of axis k where bit k of i is set.
+pub(super) struct Cell {
+    planes: Vec4,
+    bounds: [Bounds; 8],
+    counts: [u32; 8],
+    leaf: u32,
+    /// Of each set of parts those that are cut off first; 0: it is not cut.
+    first: [u8; 256],
+    /// Where the items of each part begin.
+    starts: [u32; 8],
+}
+
+/// Parts with a bit clear on each axis.
+const BEFORE: [u8; 3] = [0b0101_0101, 0b0011_0011, 0b0000_1111];
+
+impl Lattice {
+    pub(super) fn over(bounds: &Aabb) -> Self {
+        let lo = bounds.lo + bounds.lo;
+        let side = (bounds.hi + bounds.hi - lo).max_element();
+        // A little less than all cells, so that the last middle is in the last one.
+        let cells = (1u32 << LEVELS) as f32 * (1.0 - f32::EPSILON);
+        let scale = if side > 0.0 && side.is_finite() { cells / side } else { 0.0 };
+        Self { lo: lo.extend(0.0), scale: Vec4::splat(scale) }
+    }
+
+    /// The place of a doubled middle in finest cells.
+    #[inline(always)]
+    fn place(&self, middle: Vec4) -> Vec4 {
+        (middle - self.lo) * self.scale
+    }
+
+    /// The smallest cell around items, and its parts; `None` where all are in one finest cell.
+    pub(super) fn cell(&self, items: &[Item], leaf: u32) -> Option<Cell> {
+        let middles = around_middles(items);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` saturates, NaN is 0")]
+        let number = |middle: Vec4| self.place(middle).to_array().map(|x| x as u32);
+        let (lo, hi) = (number(middles.lo), number(middles.hi));
+        // The highest bit in which the outermost differ on any axis: set beyond a middle plane and clear before it.
+        let differ = [0, 1, 2].map(|k: usize| lo[k] ^ hi[k]);
+        let bit = (differ[0] | differ[1] | differ[2]).checked_ilog2()?;
+        #[expect(clippy::cast_precision_loss, reason = "at most 23 bits")]
+        let plane = |k: usize| if differ[k] >> bit == 1 { (hi[k] >> bit << bit) as f32 } else { f32::INFINITY };
+        let planes = Vec4::new(plane(0), plane(1), plane(2), f32::INFINITY);
+
+        let (mut bounds, mut counts) = ([Bounds::EMPTY; 8], [0; 8]);
+        for item in items {
+            let part = part(self.place(item.middle()), planes);
+            bounds[part] = bounds[part].join(item.bounds());
+            counts[part] += 1;
+        }
+        let mut cell = Cell { planes, bounds, counts, leaf, first: [0; 256], starts: [0; 8] };
+        cell.order(Cell::ALL, &mut 0);
+        Some(cell)
+    }
+}
+
+#[inline(always)]
+fn part(place: Vec4, planes: Vec4) -> usize {
+    place.cmpge(planes).bitmask() as usize & 7
+}
+
+impl Cell {
+    /// The set of all parts.
+    pub(super) const ALL: u8 = u8::MAX;
+
+    /// The parts of a set that are cut off first; `None` where it is not cut.
+    pub(super) fn cut(&self, set: u8) -> Option<u8> {
+        Some(self.first[set as usize]).filter(|&first| first != 0)
+    }
+
+    /// How many items are in a set of parts.
+    pub(super) fn count(&self, set: u8) -> u32 {
+        members(set).map(|i| self.counts[i]).sum()
+    }
+
+    /// The box around a set of parts.
+    pub(super) fn bounds(&self, set: u8) -> Bounds {
+        members(set).fold(Bounds::EMPTY, |b, i| b.join(self.bounds[i]))
+    }
+
+    /// Decides how a set of parts is cut, and where the items of each begin.
+    fn order(&mut self, set: u8, start: &mut u32) {
+        if let Some(first) = self.cheapest(set) {
+            self.first[set as usize] = first;
+            self.order(first, start);
+            self.order(set & !first, start);
+        } else {
+            for i in members(set) {
+                self.starts[i] = *start;
+                *start += self.counts[i];
+            }
+        }
+    }
+
+    fn cheapest(&self, set: u8) -> Option<u8> {
+        if self.count(set) <= self.leaf {
+            return None;
+        }
+        let mut best = (f32::INFINITY, None);
+        for before in BEFORE {
+            let sides = [set & before, set & !before];
+            let counts = sides.map(|side| self.count(side));
+            if counts[0] == 0 || counts[1] == 0 {
+                continue;
+            }
+            let cost = |side: usize| self.bounds(sides[side]).area() * weight(counts[side], self.leaf);
+            let cost = cost(0) + cost(1);
+            if best.1.is_none() || cost < best.0 {
+                best = (cost, Some(sides[0]));
+            }
+        }
+        best.1
+    }
+
+    /// Puts items in order, part by part.
+    pub(super) fn sort(&self, lattice: &Lattice, items: &[Item], sorted: &mut [Item]) {
+        let mut next = self.starts;
+        for item in items {
+            let place = &mut next[part(lattice.place(item.middle()), self.planes)];
+            sorted[*place as usize] = *item;
+            *place += 1;
+        }
+    }
+}
+
+fn members(set: u8) -> impl Iterator<Item = usize> {
+    (0..8).filter(move |i| set >> i & 1 == 1)
+}

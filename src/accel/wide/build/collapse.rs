@@ -1,0 +1,144 @@
+//! From a binary tree to nodes of eight.
+//!
+//! Which knots become nodes is chosen so that their areas sum to the least: for every knot it is known what it costs to
+//! stand for everything below it by one child of a node, by two, and so on; a node takes what eight cost least. After
+//! H. Ylitie, T. Karras, S. Laine, *Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs*, 2017.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::grow::Knot;
+use super::slots::slots;
+use crate::accel::wide::node::{Child, Node, Tree, index};
+use crate::math::aabb::Aabb;
+use crate::math::simd::LANES;
+
+/// Knots that are worth a thread's while.
+const PARALLEL: usize = 1024;
+
+/// The best ways of standing for a knot and all below it.
+#[derive(Clone, Copy)]
+struct Plan {
+    /// By one child at most, two, … seven: the areas of all nodes below.
+    costs: [f32; LANES - 1],
+    /// How many of two children, three, … eight, of a node of its own, stand for the first side; 0: one fewer will do.
+    shares: [u8; LANES - 1],
+}
+
+impl Plan {
+    const LEAF: Self = Self { costs: [0.0; LANES - 1], shares: [0; LANES - 1] };
+
+    fn of(knot: &Knot, first: &Self, second: &Self) -> Self {
+        let cheapest = |children: usize| {
+            let cost = |share: usize| first.costs[share - 1] + second.costs[children - share - 1];
+            (2..children)
+                .fold((cost(1), 1), |best, share| if cost(share) < best.0 { (cost(share), share) } else { best })
+        };
+        let mut plan = Self::LEAF;
+        let (below, share) = cheapest(LANES);
+        plan.costs[0] = knot.area() + below;
+        plan.shares[LANES - 2] = share as u8;
+        for children in 2..LANES {
+            let (cost, share) = cheapest(children);
+            let fewer = plan.costs[children - 2];
+            if cost < fewer {
+                plan.shares[children - 2] = share as u8;
+            }
+            plan.costs[children - 1] = cost.min(fewer);
+        }
+        plan
+    }
+}
+
+/// Plans for a knot, the first, and all below it.
+fn plan(knots: &[Knot], plans: &mut [Plan]) {
+    let Some(root) = knots.first().filter(|_| knots.len() > PARALLEL) else {
+        for (at, knot) in knots.iter().enumerate().rev().filter(|(_, knot)| !knot.is_leaf()) {
+            plans[at] = Plan::of(knot, &plans[at + 1], &plans[at + knot.at as usize]);
+        }
+        return;
+    };
+    let second = root.at as usize;
+    let (first_plans, second_plans) = plans.split_at_mut(second);
+    rayon::join(|| plan(&knots[1..second], &mut first_plans[1..]), || plan(&knots[second..], second_plans));
+    plans[0] = Plan::of(root, &plans[1], &plans[second]);
+}
+
+/// The nodes over a binary tree; `leaves` has what each leaf is, by its knot.
+pub(super) fn nodes(knots: &[Knot], leaves: &[Child]) -> Vec<Node> {
+    let mut plans = vec![Plan::LEAF; knots.len()];
+    plan(knots, &mut plans);
+    let mut tree = Tree::default();
+    Collapse { knots, plans: &plans, leaves }.node(0..knots.len(), &mut tree);
+    tree.nodes
+}
+
+struct Collapse<'k> {
+    knots: &'k [Knot],
+    plans: &'k [Plan],
+    leaves: &'k [Child],
+}
+
+/// Knots that are children of one node: each with all below it.
+#[derive(Default)]
+struct Children {
+    below: [Range<usize>; LANES],
+    len: usize,
+}
+
+impl Collapse<'_> {
+    /// Adds the node of a knot, the first of these, and all below; its index.
+    fn node(&self, knots: Range<usize>, tree: &mut Tree) -> u32 {
+        let mut children = Children::default();
+        self.expand(knots.clone(), LANES, &mut children);
+        let children = &children.below[..children.len];
+        let mut bounds = [Aabb::EMPTY; LANES];
+        for (bounds, child) in bounds.iter_mut().zip(children) {
+            *bounds = self.knots[child.start].bounds();
+        }
+        let at = tree.nodes.len();
+        tree.nodes.push(Node::EMPTY);
+
+        let is_node = |child: &Range<usize>| !self.knots[child.start].is_leaf();
+        let mut built: Vec<Option<Tree>> = if knots.len() > PARALLEL {
+            let subtree = |child: &Range<usize>| {
+                is_node(child).then(|| {
+                    let mut tree = Tree::default();
+                    self.node(child.clone(), &mut tree);
+                    tree
+                })
+            };
+            children.par_iter().map(subtree).collect()
+        } else {
+            Vec::new()
+        };
+        let slots = slots(&bounds[..children.len()]);
+        for (i, below) in children.iter().enumerate() {
+            let child = match built.get_mut(i).and_then(Option::take) {
+                Some(subtree) => tree.append(subtree),
+                None if is_node(below) => Child::Node(self.node(below.clone(), tree)),
+                None => self.leaves[below.start],
+            };
+            tree.nodes[at].set(slots[i], &bounds[i], child);
+        }
+        index(at)
+    }
+
+    /// The knots that stand for a knot, the first of these, and all below, as so many children.
+    fn expand(&self, knots: Range<usize>, mut most: usize, found: &mut Children) {
+        let (at, knot) = (knots.start, &self.knots[knots.start]);
+        let shares = &self.plans[at].shares;
+        while (2..LANES).contains(&most) && shares[most - 2] == 0 {
+            most -= 1;
+        }
+        if most < 2 || knot.is_leaf() {
+            found.below[found.len] = knots;
+            found.len += 1;
+            return;
+        }
+        let (share, second) = (shares[most - 2] as usize, at + knot.at as usize);
+        self.expand(at + 1..second, share, found);
+        self.expand(second..knots.end, most - share, found);
+    }
+}

@@ -1,0 +1,129 @@
+//! From shapes to a tree.
+//!
+//! A binary tree is grown from the root down ([`grow`]), improved where large and small faces are mixed ([`reinsert`]) and
+//! fused into nodes of eight ([`collapse`]). Its leaves become blocks. Large parts are worked on by several threads; what
+//! they make is joined in order, so that the tree does not depend on their number.
+//!
+//! Children stand in slots by where they are: the bit k of a slot's number is set where its child lies on the positive side
+//! of axis k, as far as the eight slots allow. `slot ^ octant` is then about the order in which a ray meets them, where
+//! bit k of `octant` is set for a ray that runs backwards along axis k. Slots between may be empty.
+
+mod cell;
+mod collapse;
+mod grow;
+mod reinsert;
+mod slots;
+
+use rayon::prelude::*;
+
+use self::cell::Lattice;
+use self::grow::{Grower, Knot, Work};
+use super::node::{Block, Child, Tree, index};
+use super::split::{Bounds, Item, Splitting, around};
+use crate::accel::Shapes;
+use crate::math::simd::LANES;
+use crate::math::triangles::set_corners;
+
+/// Prims of a run at most: they cost more than a triangle, and are tested one by one.
+const RUN: u32 = 2;
+
+/// Items or leaves that one thread takes at a time.
+const CHUNK: usize = 1024;
+
+/// Builds the tree over all bounded prims.
+pub(super) fn build(shapes: &Shapes, splitting: Splitting) -> Tree {
+    if shapes.bounded() == 0 {
+        return Tree::default();
+    }
+    let (knots, prims) = binary_tree(shapes, splitting);
+    let knots = reinsert::improve(knots);
+    let extent = knots.first().map_or(0.0, |root| root.lo.abs().max(root.hi.abs()).max_element());
+    let leaves = Leaves::of(&knots, &prims, shapes);
+    let nodes = collapse::nodes(&knots, &leaves.children);
+    drop(knots);
+    let mut blocks: Vec<Block> =
+        leaves.blocks.par_iter().with_min_len(CHUNK).map(|&of| block(shapes, part(&prims, of))).collect();
+    if blocks.is_empty() {
+        // Empty slots lead to block 0, and a ray that no box can turn away goes there too.
+        blocks.push(Block::EMPTY);
+    }
+    let others = prims[shapes.triangles.len()..].to_vec();
+    Tree { nodes, blocks, runs: leaves.runs, prims: others, extent }
+}
+
+/// The binary tree over all bounded prims, and the prims of its leaves. A leaf holds triangles or other prims, never both.
+fn binary_tree(shapes: &Shapes, splitting: Splitting) -> (Vec<Knot>, Vec<u32>) {
+    let mut items: Vec<Item> =
+        (0..shapes.bounded()).into_par_iter().with_min_len(CHUNK).map(|p| Item::new(shapes.bounds(p), p)).collect();
+    let mut prims = vec![0; items.len()];
+    let (triangles, others) = items.split_at_mut(shapes.triangles.len());
+    let (triangle_prims, other_prims) = prims.split_at_mut(triangles.len());
+    let first_other = index(triangles.len());
+    let parts = [(triangles, triangle_prims, 0, LANES as u32), (others, other_prims, first_other, RUN)];
+
+    let mut knots = Vec::new();
+    let mut both = Bounds::EMPTY;
+    for (items, prims, first, leaf) in parts {
+        if items.is_empty() {
+            continue;
+        }
+        let chunks = items.par_chunks(CHUNK).map(around);
+        let bounds = chunks.reduce(|| Bounds::EMPTY, Bounds::join);
+        let mut spare = if splitting == Splitting::Octree { items.to_vec() } else { Vec::new() };
+        let second = !knots.is_empty();
+        both = both.join(bounds);
+        if second {
+            // One knot over both.
+            knots.insert(0, Knot::fork(both.aabb(), index(knots.len() + 1)));
+        }
+        let grower = Grower { splitting, lattice: Lattice::over(&bounds.aabb()), leaf, area: bounds.area() };
+        grower.grow(Work { items, spare: &mut spare, prims, first }, bounds, &mut knots);
+    }
+    (knots, prims)
+}
+
+/// Where the prims of a leaf are, and how many.
+type Listed = (u32, u32);
+
+fn part(prims: &[u32], (first, count): Listed) -> &[u32] {
+    &prims[first as usize..(first + count) as usize]
+}
+
+/// All leaves in the order of their knots.
+#[derive(Default)]
+struct Leaves {
+    /// By knot, where it is a leaf.
+    children: Vec<Child>,
+    blocks: Vec<Listed>,
+    /// Counted from the first prim that is no triangle.
+    runs: Vec<Listed>,
+}
+
+impl Leaves {
+    fn of(knots: &[Knot], prims: &[u32], shapes: &Shapes) -> Self {
+        let triangles = index(shapes.triangles.len());
+        let mut all = Self { children: Vec::with_capacity(knots.len()), ..Self::default() };
+        for knot in knots {
+            let Knot { at, count, .. } = *knot;
+            all.children.push(if count == 0 {
+                Child::Node(0)
+            } else if prims[at as usize] < triangles {
+                all.blocks.push((at, count));
+                Child::Block(index(all.blocks.len() - 1), count)
+            } else {
+                all.runs.push((at - triangles, count));
+                Child::Run(index(all.runs.len() - 1))
+            });
+        }
+        all
+    }
+}
+
+fn block(shapes: &Shapes, prims: &[u32]) -> Block {
+    let mut block = Block::EMPTY;
+    for (lane, &prim) in prims.iter().enumerate() {
+        set_corners(&mut block.corners, lane, &shapes.triangle(prim));
+        block.prims[lane] = prim;
+    }
+    block
+}
