@@ -95,12 +95,12 @@ pub fn processor_since_start() -> Duration {
 
 #[cfg(unix)]
 fn processor(whose: Whose) -> Duration {
-    use rustix::time::{ClockId, clock_gettime};
+    use nix::time::{ClockId, clock_gettime};
     let time = clock_gettime(match whose {
-        Whose::Process => ClockId::ProcessCPUTime,
-        Whose::Thread => ClockId::ThreadCPUTime,
+        Whose::Process => ClockId::CLOCK_PROCESS_CPUTIME_ID,
+        Whose::Thread => ClockId::CLOCK_THREAD_CPUTIME_ID,
     });
-    Duration::try_from(time).unwrap_or_default()
+    time.map(Duration::from).unwrap_or_default()
 }
 
 #[cfg(not(unix))]
