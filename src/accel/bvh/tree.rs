@@ -61,7 +61,7 @@ impl Tree {
         }
         self.nodes.push(Node { bounds: aabb, at: 0, count: 0 });
         let large = items.len() > PARALLEL;
-        let Cut { at, bounds: [first, second] } = cut_by_area(items, 1);
+        let Cut { at, bounds: [first, second], .. } = cut_by_area(items, 1, None);
         let (left, right) = items.split_at_mut(at);
         if large {
             let build = |items: &mut [Item], bounds| {

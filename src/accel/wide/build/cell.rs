@@ -149,3 +149,62 @@ impl Cell {
 fn members(set: u8) -> impl Iterator<Item = usize> {
     (0..8).filter(move |i| set >> i & 1 == 1)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+
+    const SIDE: Aabb = Aabb { lo: Vec3::ZERO, hi: Vec3::splat(8.0) };
+
+    fn items(at: &[Vec3]) -> Vec<Item> {
+        let bounds = |p: Vec3| Aabb { lo: p - 0.01, hi: p + 0.01 };
+        (0..).zip(at).map(|(prim, &p)| Item::new(bounds(p), prim)).collect()
+    }
+
+    fn sorted(cell: &Cell, lattice: &Lattice, items: &[Item]) -> Vec<u32> {
+        let mut sorted = items.to_vec();
+        cell.sort(lattice, items, &mut sorted);
+        sorted.iter().map(Item::prim).collect()
+    }
+
+    #[test]
+    fn a_cell_is_cut_at_its_middle_and_not_elsewhere() {
+        // 3.9 and 4.1 lie on either side of the plane at 4, 4.1 and 5.9 on the same.
+        let items = items(&[5.9, 3.9, 4.1].map(|x| Vec3::new(x, 0.5, 0.5)));
+        let lattice = Lattice::over(&SIDE);
+        let cell = lattice.cell(&items, 1).unwrap();
+        let first = cell.cut(Cell::ALL).unwrap();
+        assert_eq!((cell.count(first), cell.count(!first)), (1, 2));
+        assert_eq!((cell.cut(first), cell.cut(!first)), (None, None));
+        assert_eq!(sorted(&cell, &lattice, &items), [1, 0, 2]);
+        assert_eq!(cell.bounds(!first).aabb().lo.x, 4.1 - 0.01);
+    }
+
+    #[test]
+    fn eight_corners_are_cut_apart_at_once_and_stay_together_where_they_fit_into_a_leaf() {
+        let corner = |i: usize| Vec3::from([0, 1, 2].map(|k: usize| if i >> k & 1 == 1 { 7.0 } else { 1.0 }));
+        let items = items(&[6, 1, 4, 0, 7, 2, 5, 3].map(corner));
+        let lattice = Lattice::over(&SIDE);
+        let cell = lattice.cell(&items, 1).unwrap();
+        let (mut open, mut leaves) = (vec![Cell::ALL], Vec::new());
+        while let Some(set) = open.pop() {
+            match cell.cut(set) {
+                Some(first) => open.extend([set & !first, first]),
+                None => leaves.push(cell.count(set)),
+            }
+        }
+        assert_eq!(leaves, [1; 8]);
+        let mut prims = sorted(&cell, &lattice, &items);
+        prims.sort_unstable();
+        assert_eq!(prims, [0, 1, 2, 3, 4, 5, 6, 7]);
+        assert_eq!(lattice.cell(&items, 8).unwrap().cut(Cell::ALL), None);
+    }
+
+    #[test]
+    fn what_no_plane_separates_is_no_cell() {
+        assert!(Lattice::over(&SIDE).cell(&items(&[Vec3::ONE; 20]), 1).is_none());
+        let point = Aabb { lo: Vec3::ONE, hi: Vec3::ONE };
+        assert!(Lattice::over(&point).cell(&items(&[Vec3::ONE, Vec3::ZERO]), 1).is_none());
+    }
+}

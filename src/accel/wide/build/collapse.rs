@@ -15,7 +15,7 @@ use crate::math::aabb::Aabb;
 use crate::math::simd::LANES;
 
 /// Knots that are worth a thread's while.
-const PARALLEL: usize = 1024;
+const PARALLEL: usize = 512;
 
 /// The best ways of standing for a knot and all below it.
 #[derive(Clone, Copy)]
@@ -140,5 +140,41 @@ impl Collapse<'_> {
         let (share, second) = (shares[most - 2] as usize, at + knot.at as usize);
         self.expand(at + 1..second, share, found);
         self.expand(second..knots.end, most - share, found);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::grow::tests::{fork, leaf};
+    use super::*;
+
+    /// The children of each node: how many there are, and how many of them are nodes.
+    fn shape(knots: &[Knot]) -> Vec<(usize, usize)> {
+        let leaf = |(i, knot): (u32, &Knot)| if knot.is_leaf() { Child::Block(i, 1) } else { Child::Node(0) };
+        let leaves: Vec<Child> = (0..).zip(knots).map(leaf).collect();
+        let children = |node: &Node| node.children.map(Child::unpack).into_iter().filter(|c| *c != Child::Block(0, 0));
+        let is_node = |c: &Child| matches!(c, Child::Node(_));
+        nodes(knots, &leaves).iter().map(|n| (children(n).count(), children(n).filter(is_node).count())).collect()
+    }
+
+    fn small(i: u32) -> Vec<Knot> {
+        leaf(i, i as f32, i as f32 + 0.5)
+    }
+
+    #[test]
+    fn a_node_takes_up_to_eight_leaves_however_deep_they_are() {
+        assert_eq!(shape(&small(1)), [(1, 0)]);
+        let comb = (2..8).fold(fork(small(0), small(1)), |tree, i| fork(tree, small(i)));
+        assert_eq!(shape(&comb), [(8, 0)]);
+    }
+
+    #[test]
+    fn the_smallest_boxes_become_nodes_of_their_own() {
+        // Nine leaves: two must share a node, and those of the smallest box do.
+        let comb = (0..7).fold(fork(leaf(8, 0.0, 0.1), leaf(9, 0.1, 0.2)), |tree, i| fork(tree, small(i)));
+        assert_eq!(shape(&comb), [(8, 1), (2, 0)]);
+        let (mut tree, pair) = (comb, fork(leaf(10, 0.3, 0.31), leaf(11, 0.31, 0.32)));
+        tree = fork(tree, pair);
+        assert!(shape(&tree).len() <= 3);
     }
 }

@@ -6,7 +6,7 @@ use crate::math::Vec3;
 use crate::math::aabb::Aabb;
 
 /// Items that are worth a thread's while.
-const PARALLEL: usize = 4096;
+const PARALLEL: usize = 1024;
 
 /// Cells of fewer items are not cut at their planes but by area: that fills leaves better.
 const SMALL_CELL: usize = 64;
@@ -94,8 +94,9 @@ impl<'w> Work<'w> {
 }
 
 impl Grower {
-    /// Adds the tree over some items, at least one, to `knots`; the same for every number of threads.
-    pub(super) fn grow(&self, work: Work, bounds: Bounds, knots: &mut Vec<Knot>) {
+    /// Adds the tree over some items, at least one, to `knots`; the same for every number of threads. `middles` is the box
+    /// around their doubled middles, where known.
+    pub(super) fn grow(&self, work: Work, bounds: Bounds, middles: Option<Bounds>, knots: &mut Vec<Knot>) {
         let count = work.items.len();
         if count <= self.leaf as usize {
             if let Some(cut) = self.cut_large_leaf(work.items, &bounds) {
@@ -114,7 +115,7 @@ impl Grower {
             cell.sort(&self.lattice, work.items, work.spare);
             return self.grow_cell(&cell, Cell::ALL, work.swapped(), bounds, knots);
         }
-        let cut = cut_by_area(work.items, self.leaf);
+        let cut = cut_by_area(work.items, self.leaf, middles);
         self.fork(work, &cut, bounds, knots);
     }
 
@@ -124,20 +125,28 @@ impl Grower {
         if items.len() < 2 || area <= self.area * LARGE_LEAF {
             return None;
         }
-        let cut = cut_by_area(items, 1);
+        let cut = cut_by_area(items, 1, None);
         Some(cut).filter(|cut| cut.bounds[0].area() + cut.bounds[1].area() < area * WORTH_CUTTING)
     }
 
     /// Adds the knot of a cut, and all below.
     fn fork(&self, work: Work, cut: &Cut, bounds: Bounds, knots: &mut Vec<Knot>) {
         let (count, [first, second]) = (work.items.len(), cut.bounds);
+        let middles = |part: usize| cut.middles.map(|both| both[part]);
+        let (first_middles, second_middles) = (middles(0), middles(1));
         let [a, b] = work.split_at(cut.at);
-        fork(count, bounds, knots, |k| self.grow(a, first, k), |k| self.grow(b, second, k));
+        fork(
+            count,
+            bounds,
+            knots,
+            |k| self.grow(a, first, first_middles, k),
+            |k| self.grow(b, second, second_middles, k),
+        );
     }
 
     /// The same for some parts of a cell.
     fn grow_cell(&self, cell: &Cell, parts: u8, work: Work, bounds: Bounds, knots: &mut Vec<Knot>) {
-        let Some(first) = cell.cut(parts) else { return self.grow(work, bounds, knots) };
+        let Some(first) = cell.cut(parts) else { return self.grow(work, bounds, None, knots) };
         let second = parts & !first;
         let count = work.items.len();
         let [a, b] = work.split_at(cell.count(first) as usize);
@@ -175,4 +184,65 @@ fn fork(
 )]
 pub(super) fn index(i: usize) -> u32 {
     i as u32
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// A leaf of one prim: a cube from `lo` to `hi` on every axis.
+    pub(in super::super) fn leaf(prim: u32, lo: f32, hi: f32) -> Vec<Knot> {
+        vec![Knot::leaf(Aabb { lo: Vec3::splat(lo), hi: Vec3::splat(hi) }, prim, 1)]
+    }
+
+    /// A knot over two trees.
+    pub(in super::super) fn fork(first: Vec<Knot>, second: Vec<Knot>) -> Vec<Knot> {
+        let root = Knot::fork(first[0].bounds().union(second[0].bounds()), index(first.len() + 1));
+        [vec![root], first, second].concat()
+    }
+
+    /// The first prim of each leaf; every box is the smallest around what is below it.
+    pub(in super::super) fn leaves(knots: &[Knot]) -> Vec<u32> {
+        let root = &knots[0];
+        if root.is_leaf() {
+            assert_eq!(knots.len(), 1);
+            return vec![root.at];
+        }
+        let (first, second) = knots[1..].split_at(root.at as usize - 1);
+        assert_eq!(first[0].bounds().union(second[0].bounds()), root.bounds());
+        [leaves(first), leaves(second)].concat()
+    }
+
+    fn grown(splitting: Splitting, at: &[Vec3]) -> (Vec<Knot>, Vec<u32>) {
+        let item = |(prim, &p): (u32, &Vec3)| Item::new(Aabb { lo: p, hi: p + 0.25 }, prim);
+        let mut items: Vec<Item> = (0..).zip(at).map(item).collect();
+        let (mut spare, mut prims, mut knots) = (items.clone(), vec![0; items.len()], Vec::new());
+        let bounds = crate::accel::wide::split::around(&items);
+        let grower = Grower { splitting, lattice: Lattice::over(&bounds.aabb()), leaf: 8, area: bounds.area() };
+        let work = Work { items: &mut items, spare: &mut spare, prims: &mut prims, first: 0 };
+        grower.grow(work, bounds, None, &mut knots);
+        (knots, prims)
+    }
+
+    #[test]
+    fn every_prim_is_in_one_leaf_and_leaves_stand_in_the_order_of_their_prims() {
+        let at = |i: usize| Vec3::new((i % 37) as f32, (i % 101) as f32, (i / 50) as f32);
+        let places: Vec<Vec3> = (0..3000).map(at).collect();
+        for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
+            let (knots, mut prims) = grown(splitting, &places);
+            let firsts = leaves(&knots);
+            assert!(firsts.is_sorted() && firsts[0] == 0, "{splitting:?}");
+            let counts: Vec<u32> = knots.iter().filter(|k| k.is_leaf()).map(|k| k.count).collect();
+            assert!(counts.iter().sum::<u32>() == 3000 && counts.iter().all(|&n| n <= 8), "{splitting:?}");
+            prims.sort_unstable();
+            assert!(prims.into_iter().eq(0..3000), "{splitting:?}");
+        }
+    }
+
+    #[test]
+    fn a_large_leaf_is_cut_where_its_parts_are_far_apart() {
+        let places = [0.0, 0.5, 1.0, 90.0, 90.5].map(Vec3::splat);
+        assert_eq!(leaves(&grown(Splitting::SurfaceArea, &places).0), [0, 3]);
+        assert_eq!(leaves(&grown(Splitting::SurfaceArea, &[Vec3::ZERO; 5]).0), [0]);
+    }
 }

@@ -19,6 +19,7 @@ use rayon::prelude::*;
 use self::cell::Lattice;
 use self::grow::{Grower, Knot, Work};
 use super::node::{Block, Child, Tree, index};
+use super::split::item::around_middles;
 use super::split::{Bounds, Item, Splitting, around};
 use crate::accel::Shapes;
 use crate::math::simd::LANES;
@@ -67,8 +68,9 @@ fn binary_tree(shapes: &Shapes, splitting: Splitting) -> (Vec<Knot>, Vec<u32>) {
         if items.is_empty() {
             continue;
         }
-        let chunks = items.par_chunks(CHUNK).map(around);
-        let bounds = chunks.reduce(|| Bounds::EMPTY, Bounds::join);
+        let chunks = items.par_chunks(CHUNK);
+        let bounds = chunks.clone().map(around).reduce(|| Bounds::EMPTY, Bounds::join);
+        let middles = chunks.map(around_middles).reduce(|| Bounds::EMPTY, Bounds::join);
         let mut spare = if splitting == Splitting::Octree { items.to_vec() } else { Vec::new() };
         let second = !knots.is_empty();
         both = both.join(bounds);
@@ -77,7 +79,7 @@ fn binary_tree(shapes: &Shapes, splitting: Splitting) -> (Vec<Knot>, Vec<u32>) {
             knots.insert(0, Knot::fork(both.aabb(), index(knots.len() + 1)));
         }
         let grower = Grower { splitting, lattice: Lattice::over(&bounds.aabb()), leaf, area: bounds.area() };
-        grower.grow(Work { items, spare: &mut spare, prims, first }, bounds, &mut knots);
+        grower.grow(Work { items, spare: &mut spare, prims, first }, bounds, Some(middles), &mut knots);
     }
     (knots, prims)
 }

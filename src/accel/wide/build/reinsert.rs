@@ -18,8 +18,9 @@ const BATCH: usize = 256;
 /// It paid if one in so many moved.
 const WORTH: usize = 12;
 
-/// Of so many knots one is tried at most, and a batch.
+/// Of so many knots one is tried at most, and no more than so many, and a batch.
 const SHARE: usize = 16;
+const MOST: usize = 4096;
 
 /// A binary tree with links.
 struct Links {
@@ -35,14 +36,11 @@ const ROOT: u32 = 0;
 
 /// Improves a tree.
 pub(super) fn improve(knots: Vec<Knot>) -> Vec<Knot> {
-    let mut order: Vec<(f32, u32)> = knots.iter().map(Knot::area).zip(0..).skip(1).collect();
-    let most = order.len() / SHARE + BATCH;
+    let order = largest(&knots);
     let mut links = Links::new(knots);
-    let (mut rest, mut tried, mut any) = (order.as_mut_slice(), 0, false);
-    while !rest.is_empty() && tried < most {
-        let batch = take_largest(&mut rest);
+    let mut any = false;
+    for batch in order.chunks(BATCH) {
         let moved = batch.iter().filter(|(_, knot)| links.reinsert(*knot)).count();
-        tried += batch.len();
         any |= moved > 0;
         if moved * WORTH < batch.len() {
             break;
@@ -51,17 +49,17 @@ pub(super) fn improve(knots: Vec<Knot>) -> Vec<Knot> {
     if any { links.in_order() } else { links.knots }
 }
 
-/// The knots of largest area, in order; they are taken away from the front.
-fn take_largest<'o>(rest: &mut &'o mut [(f32, u32)]) -> &'o [(f32, u32)] {
+/// The knots that may be tried, by falling area.
+fn largest(knots: &[Knot]) -> Vec<(f32, u32)> {
+    let mut all: Vec<(f32, u32)> = knots.iter().map(Knot::area).zip(0..).skip(1).collect();
+    let most = (all.len() / SHARE).min(MOST) + BATCH;
     let larger = |a: &(f32, u32), b: &(f32, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
-    let all = std::mem::take(rest);
-    if all.len() > BATCH {
-        all.select_nth_unstable_by(BATCH - 1, larger);
+    if most < all.len() {
+        all.select_nth_unstable_by(most, larger);
+        all.truncate(most);
     }
-    let (batch, others) = all.split_at_mut(BATCH.min(all.len()));
-    batch.sort_unstable_by(larger);
-    *rest = others;
-    batch
+    all.sort_unstable_by(larger);
+    all
 }
 
 fn area(b: &Aabb) -> f32 {
@@ -171,5 +169,40 @@ impl Links {
             knots.push(copy);
         }
         knots
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::grow::tests::{fork, leaf, leaves};
+    use super::*;
+
+    /// The areas of all boxes but those of leaves.
+    fn cost(knots: &[Knot]) -> f32 {
+        knots.iter().filter(|k| !k.is_leaf()).map(Knot::area).sum()
+    }
+
+    #[test]
+    fn a_large_box_among_small_ones_is_put_where_it_enlarges_no_other() {
+        // 0 to 5 in a row, and 6 around all of them beside 0.
+        let small = |i: u32| leaf(i, i as f32, i as f32 + 0.5);
+        let large = leaf(6, 0.0, 5.5);
+        let left = fork(fork(fork(small(0), large), small(1)), small(2));
+        let knots = fork(left, fork(fork(small(3), small(4)), small(5)));
+        let improved = improve(knots.clone());
+        assert!(cost(&improved) < 0.7 * cost(&knots), "{} {}", cost(&improved), cost(&knots));
+        // Checks the boxes and the links as well.
+        let (mut before, mut after) = (leaves(&knots), leaves(&improved));
+        before.sort_unstable();
+        after.sort_unstable();
+        assert_eq!(before, after);
+    }
+
+    #[test]
+    fn a_tree_that_cannot_be_improved_stays_as_it_is() {
+        let small = |i: u32| leaf(i, i as f32, i as f32 + 0.5);
+        let knots = fork(fork(small(0), small(1)), fork(small(2), small(3)));
+        assert_eq!(leaves(&improve(knots)), [0, 1, 2, 3]);
+        assert_eq!(leaves(&improve(small(7))), [7]);
     }
 }

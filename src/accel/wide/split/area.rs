@@ -1,7 +1,5 @@
 //! The cut of least expected cost by surface area, in bins.
 
-use rayon::prelude::*;
-
 use super::item::{Bounds, Item, around_middles};
 use super::{Cut, halves};
 use crate::math::Vec4;
@@ -9,9 +7,12 @@ use crate::math::Vec4;
 /// Bins of each axis.
 const BINS: usize = 16;
 
-/// Items that several threads put into bins, and how many one of them takes.
-const PARALLEL: usize = 1 << 16;
-const CHUNK: usize = 1 << 14;
+/// Half the bins do for so few items.
+const FEW: usize = 16;
+
+/// Of more items than these only one in so many is put into bins: that finds a cut as good, and memory is read less often.
+const MANY: usize = 1 << 13;
+const STRIDE: usize = 7;
 
 /// Adding it to a small number leaves its nearest integer in the lowest bits.
 const TO_INTEGER: f32 = (1 << 23) as f32;
@@ -34,10 +35,10 @@ struct Ruler {
 }
 
 impl Ruler {
-    fn over(middles: &Bounds) -> Self {
+    fn over(middles: &Bounds, bins: usize) -> Self {
         // A little less than all bins, so that the last middle is in the last one.
         let per_unit = |extent: f32| match extent {
-            e if e > 0.0 && e.is_finite() => BINS as f32 * (1.0 - 1.0 / 1024.0) / e,
+            e if e > 0.0 && e.is_finite() => bins as f32 * (1.0 - 1.0 / 1024.0) / e,
             _ => 0.0,
         };
         let extent = middles.hi - middles.lo;
@@ -56,50 +57,36 @@ impl Ruler {
 impl Bins {
     const EMPTY: Self = Self { bounds: [[Bounds::EMPTY; BINS]; 3], counts: [[0; BINS]; 3] };
 
-    fn of(items: &[Item], ruler: &Ruler) -> Self {
-        let mut all = Self::EMPTY;
+    fn add<'i>(&mut self, items: impl Iterator<Item = &'i Item>, ruler: &Ruler) {
         for item in items {
             let [x, y, z, _] = ruler.place(item).to_array();
             for (k, place) in [x, y, z].into_iter().enumerate() {
                 let bin = place.to_bits() as usize % BINS;
-                let bounds = &mut all.bounds[k][bin];
+                let bounds = &mut self.bounds[k][bin];
                 *bounds = bounds.join(item.bounds());
-                all.counts[k][bin] += 1;
+                self.counts[k][bin] += 1;
             }
         }
-        all
     }
 
-    fn join(mut self, other: &Self) -> Self {
-        for k in 0..3 {
-            for i in 0..BINS {
-                self.bounds[k][i] = self.bounds[k][i].join(other.bounds[k][i]);
-                self.counts[k][i] += other.counts[k][i];
-            }
-        }
-        self
-    }
-
-    /// The axis and the first bin of the second part.
-    fn cheapest(&self, leaf: u32) -> Option<(usize, usize)> {
+    /// The axis and the first bin of the second part. What an empty part costs is no number, and never less.
+    fn cheapest(&self, leaf: u32, used: usize) -> Option<(usize, usize)> {
         let mut best = (f32::INFINITY, None);
         for k in 0..3 {
-            let (bounds, counts) = (&self.bounds[k], &self.counts[k]);
-            let mut after = [f32::INFINITY; BINS];
+            let (bounds, counts) = (&self.bounds[k][..used], &self.counts[k][..used]);
+            let mut after = [0.0; BINS];
             let (mut all, mut count) = (Bounds::EMPTY, 0);
-            for i in (1..BINS).rev() {
+            for i in (1..used).rev() {
                 all = all.join(bounds[i]);
                 count += counts[i];
-                if count > 0 {
-                    after[i] = all.area() * weight(count, leaf);
-                }
+                after[i] = all.area() * weight(count, leaf);
             }
             (all, count) = (Bounds::EMPTY, 0);
-            for i in 1..BINS {
+            for i in 1..used {
                 all = all.join(bounds[i - 1]);
                 count += counts[i - 1];
                 let cost = all.area() * weight(count, leaf) + after[i];
-                if count > 0 && cost < best.0 {
+                if cost < best.0 {
                     best = (cost, Some((k, i)));
                 }
             }
@@ -122,25 +109,29 @@ pub(in crate::accel) fn weight(count: u32, leaf: u32) -> f32 {
 }
 
 /// Cuts at least two items between bins of their middles, on the axis and at the place of least cost, where leaves hold up
-/// to `leaf` of them, a power of two; both parts are not empty.
-pub(in crate::accel) fn cut_by_area(items: &mut [Item], leaf: u32) -> Cut {
-    let (ruler, bins) = if items.len() > PARALLEL {
-        let chunks = items.par_chunks(CHUNK);
-        let ruler = Ruler::over(&chunks.clone().map(around_middles).reduce(|| Bounds::EMPTY, Bounds::join));
-        (ruler, chunks.map(|items| Bins::of(items, &ruler)).reduce(|| Bins::EMPTY, |a, b| a.join(&b)))
+/// to `leaf` of them, a power of two; both parts are not empty. `middles` is the box around their middles, where known.
+pub(in crate::accel) fn cut_by_area(items: &mut [Item], leaf: u32, middles: Option<Bounds>) -> Cut {
+    let many = items.len() > MANY;
+    let used = if items.len() <= FEW { BINS / 2 } else { BINS };
+    let ruler = Ruler::over(&middles.unwrap_or_else(|| around_middles(items)), used);
+    let mut bins = Bins::EMPTY;
+    if many {
+        bins.add(items.iter().step_by(STRIDE), &ruler);
     } else {
-        let ruler = Ruler::over(&around_middles(items));
-        (ruler, Bins::of(items, &ruler))
-    };
-    let Some((axis, place)) = bins.cheapest(leaf) else { return halves(items) };
+        bins.add(items.iter(), &ruler);
+    }
+    let Some((axis, place)) = bins.cheapest(leaf, used) else { return halves(items) };
+
     #[expect(clippy::cast_precision_loss, reason = "a few bins")]
     let second = Vec4::splat(TO_INTEGER + place as f32);
-    let at = partition(items, |item| ruler.place(item).cmplt(second).bitmask() >> axis & 1 == 1);
-    if at == 0 || at == items.len() {
-        // Only where boxes are so large that differences of places overflow.
-        return halves(items);
-    }
-    Cut { at, bounds: bins.parts(axis, place) }
+    let is_first = |item: &Item| ruler.place(item).cmplt(second).bitmask() >> axis & 1 == 1;
+    let cut = if many {
+        measured_partition(items, is_first)
+    } else {
+        Cut { at: partition(items, is_first), bounds: bins.parts(axis, place), middles: None }
+    };
+    // Only where boxes are so large that differences of places overflow is one part empty.
+    if cut.at == 0 || cut.at == items.len() { halves(items) } else { cut }
 }
 
 /// Moves the items for which `first` holds to the front; how many there are. Nothing depends on a branch, which could not
@@ -153,4 +144,19 @@ fn partition(items: &mut [Item], first: impl Fn(&Item) -> bool) -> usize {
         at += usize::from(is_first);
     }
     at
+}
+
+/// The same, and the boxes of both parts.
+fn measured_partition(items: &mut [Item], first: impl Fn(&Item) -> bool) -> Cut {
+    let (mut at, mut bounds, mut middles) = (0, [Bounds::EMPTY; 2], [Bounds::EMPTY; 2]);
+    for i in 0..items.len() {
+        let item = items[i];
+        let is_first = first(&item);
+        let part = usize::from(!is_first);
+        bounds[part] = bounds[part].join(item.bounds());
+        middles[part] = middles[part].with(item.middle());
+        items.swap(at, i);
+        at += usize::from(is_first);
+    }
+    Cut { at, bounds, middles: Some(middles) }
 }

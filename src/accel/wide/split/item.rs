@@ -29,11 +29,11 @@ impl Bounds {
         Self { lo: self.lo.min(point), hi: self.hi.max(point) }
     }
 
-    /// What a box costs: half its surface; 0 where it is empty.
+    /// What a box costs: half its surface. Nothing sensible where it is empty.
     #[inline(always)]
     pub(in crate::accel) fn area(&self) -> f32 {
-        let d = (self.hi - self.lo).max(Vec4::ZERO);
-        d.x * d.y + d.y * d.z + d.z * d.x
+        let d = self.hi - self.lo;
+        d.x * d.y + d.z * (d.x + d.y)
     }
 
     /// The same box in memory.

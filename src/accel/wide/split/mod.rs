@@ -21,13 +21,15 @@ pub enum Splitting {
 pub(in crate::accel) struct Cut {
     pub at: usize,
     pub bounds: [Bounds; 2],
+    /// Around the doubled middles of both parts, where that cost nothing to find out.
+    pub middles: Option<[Bounds; 2]>,
 }
 
 /// Items that nothing separates: half each, in the order of the prims.
 fn halves(items: &mut [Item]) -> Cut {
     items.sort_unstable_by_key(Item::prim);
     let at = items.len() / 2;
-    Cut { at, bounds: [around(&items[..at]), around(&items[at..])] }
+    Cut { at, bounds: [around(&items[..at]), around(&items[at..])], middles: None }
 }
 
 #[cfg(test)]
@@ -50,7 +52,7 @@ mod tests {
     #[test]
     fn two_clusters_are_cut_apart() {
         let mut items = items(&[0.0, 7.0, 0.2, 7.3, 0.1]);
-        let cut = cut_by_area(&mut items, 1);
+        let cut = cut_by_area(&mut items, 1, None);
         assert_eq!((prims(&items[..cut.at]), prims(&items[cut.at..])), (vec![0, 2, 4], vec![1, 3]));
         let [first, second] = cut.bounds.map(|b| b.aabb());
         assert_eq!((first.lo.x, first.hi.x, second.lo.x, second.hi.x), (0.0, 0.2 + 0.1, 7.0, 7.3 + 0.1));
@@ -59,15 +61,15 @@ mod tests {
     #[test]
     fn leaves_are_filled_rather_than_halves_made_equal() {
         let mut items = items(&std::array::from_fn::<f32, 20, _>(|i| i as f32));
-        assert_eq!(cut_by_area(&mut items.clone(), 1).at, 10);
+        assert_eq!(cut_by_area(&mut items.clone(), 1, None).at, 10);
         // Of 8 and 12 the larger needs no more leaves than a half does.
-        assert!([8, 12].contains(&cut_by_area(&mut items, 8).at));
+        assert!([8, 12].contains(&cut_by_area(&mut items, 8, None).at));
     }
 
     #[test]
     fn copies_are_halved() {
         let mut items = items(&[1.0; 9]);
-        let cut = cut_by_area(&mut items, 1);
+        let cut = cut_by_area(&mut items, 1, None);
         assert_eq!((cut.at, prims(&items[..cut.at])), (4, vec![0, 1, 2, 3]));
     }
 
@@ -75,7 +77,7 @@ mod tests {
     fn boxes_beyond_all_numbers_are_cut_all_the_same() {
         let huge = Aabb { lo: Vec3::splat(-f32::MAX), hi: Vec3::splat(f32::MAX) };
         let mut items: Vec<Item> = (0..10).map(|prim| Item::new(huge, prim)).collect();
-        let at = cut_by_area(&mut items, 1).at;
+        let at = cut_by_area(&mut items, 1, None).at;
         assert!(at > 0 && at < 10);
     }
 }
