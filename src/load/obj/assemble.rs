@@ -95,6 +95,9 @@ fn count((number, line): &mut (u64, u32), face: &Face) {
 
 /// Faces sorted by run, in the file's order within each.
 fn by_run(faces: &[(Face, u32)], runs: usize) -> Vec<(u32, Vec<(Face, u32)>)> {
+    if runs == 1 {
+        return vec![(0, faces.to_vec())];
+    }
     let mut sizes = vec![0usize; runs];
     faces.iter().for_each(|(face, _)| sizes[face.run as usize] += 1);
     let mut out: Vec<_> = (0..).zip(sizes).map(|(run, size)| (run, Vec::with_capacity(size))).collect();
@@ -193,11 +196,15 @@ impl Builder<'_> {
             return;
         }
 
+        if let [a, b, c] = self.indices[..] {
+            // Nothing to cut, and faces with equal corners are gone.
+            self.mesh.triangles.push([a, b, c]);
+            self.mesh.face_of_triangle.push(face.0.number);
+            out.faces += 1;
+            return;
+        }
         self.cut.clear();
-        if self.ring.len() == 3 {
-            // Faces with equal corners are gone.
-            self.cut.push([0, 1, 2]);
-        } else if self.clipper.cut(&self.ring, &mut self.cut) == Outcome::Crossing {
+        if self.clipper.cut(&self.ring, &mut self.cut) == Outcome::Crossing {
             count(&mut out.crossing, &face.0);
         }
         if self.cut.is_empty() {
@@ -214,6 +221,9 @@ impl Builder<'_> {
     /// Which side is the front decides on which side of the glass a ray is; where winding and normals disagree,
     /// whoever wrote the file has looked at the normals.
     fn turn_to_normals(&mut self, face: &(Face, u32)) -> bool {
+        if self.soup.normals.is_empty() {
+            return false;
+        }
         let given = |at: usize| match self.soup.corners[at].normal {
             NONE => DVec3::ZERO,
             normal => self.soup.normals[normal as usize].as_dvec3(),

@@ -46,7 +46,7 @@ impl<'a> Texels<'a> {
     }
 
     /// Linear RGBA of texel `index`; opaque white where there is none. Alpha is never curved.
-    #[inline]
+    #[inline(always)]
     pub(super) fn get(self, index: usize) -> Vec4 {
         match self {
             Self::Rgba8(texels, colors) => texels.get(index).map_or(Vec4::ONE, |&texel| decode8(texel, colors)),
@@ -64,7 +64,7 @@ fn table8(space: ColorSpace) -> &'static [f32; 256] {
 }
 
 /// Linear RGBA of a texel, its colours looked up.
-#[inline]
+#[inline(always)]
 pub(super) fn decode8([r, g, b, a]: [u8; 4], colors: &[f32; 256]) -> Vec4 {
     let color = |c: u8| colors[usize::from(c)];
     // What a table of these holds, too: the quotient in `f64` is never so near the middle of two `f32` that it matters.

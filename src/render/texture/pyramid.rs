@@ -53,9 +53,12 @@ impl Pyramid {
             let (from, to) = (self.plane(bitmap, space, level - 1), size(bitmap, level));
             match from.texels {
                 Stored::Bitmap(Texels::Rgba8(texels, colors)) if from.is_twice(to) => {
-                    halve_evenly(texels, from.width, space, |&texel| decode::decode8(texel, colors))
+                    let quarters: [f32; 256] = std::array::from_fn(|i| colors[i] * 0.25);
+                    halve_evenly(texels, from.width, |block| mean8(block, colors, &quarters, space))
                 }
-                Stored::Level(texels) if from.is_twice(to) => halve_evenly(texels, from.width, space, unit),
+                Stored::Level(texels) if from.is_twice(to) => halve_evenly(texels, from.width, |[a, b, c, d]| {
+                    mean_of_four(unit(a), unit(b), unit(c), unit(d), space)
+                }),
                 _ => halve(&from, to, space),
             }
         })
@@ -78,7 +81,7 @@ enum Stored<'a> {
 
 impl Plane<'_> {
     /// Linear RGBA of texel (`x`, `y`), which must lie inside.
-    #[inline]
+    #[inline(always)]
     pub(super) fn texel(&self, x: usize, y: usize) -> Vec4 {
         let index = y * self.width + x;
         match self.texels {
@@ -98,9 +101,9 @@ pub(super) fn size(bitmap: &Bitmap, level: usize) -> (usize, usize) {
     ((bitmap.width as usize >> level).max(1), (bitmap.height as usize >> level).max(1))
 }
 
-#[inline]
-fn unit(texel: &[u16; 4]) -> Vec4 {
-    Vec4::from_array(texel.map(f32::from)) / 65535.0
+#[inline(always)]
+fn unit(&[r, g, b, a]: &[u16; 4]) -> Vec4 {
+    Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a)) / 65535.0
 }
 
 /// The next smaller copy of a level.
@@ -116,23 +119,42 @@ fn halve(from: &Plane, to: (usize, usize), space: ColorSpace) -> Level {
     Level { texels }
 }
 
-/// The same where each texel is the mean of exactly four, with the same bits.
-fn halve_evenly<T>(texels: &[T], width: usize, space: ColorSpace, linear: impl Fn(&T) -> Vec4) -> Level {
+/// The same where each texel is the mean of exactly four, which come as upper left and right, lower left and right.
+fn halve_evenly<T>(texels: &[T], width: usize, mean: impl Fn([&T; 4]) -> Vec4) -> Level {
     let mut out = Vec::with_capacity(texels.len() / 4);
     for rows in texels.chunks_exact(2 * width) {
         let (upper, lower) = rows.split_at(width);
-        for (a, b) in upper.chunks_exact(2).zip(lower.chunks_exact(2)) {
-            let quarters = [&a[0], &a[1], &b[0], &b[1]].map(|texel| linear(texel) * 0.25);
-            let plain = quarters[0] + quarters[1] + quarters[2] + quarters[3];
-            out.push(quantized(if is_plain(plain, space) {
-                plain
-            } else {
-                let [a, b, c, d] = quarters.map(|q| q * (q.w * 4.0));
-                ((a + b + c + d) / plain.w).truncate().extend(plain.w)
-            }));
+        for ([a, b], [c, d]) in upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0) {
+            out.push(quantized(mean([a, b, c, d])));
         }
     }
     Level { texels: out }
+}
+
+/// What [`mean`] gives for four texels of equal shares. No maps over arrays here: they are not always inlined, and this
+/// makes most texels.
+#[inline(always)]
+fn mean_of_four(a: Vec4, b: Vec4, c: Vec4, d: Vec4, space: ColorSpace) -> Vec4 {
+    let (a, b, c, d) = (a * 0.25, b * 0.25, c * 0.25, d * 0.25);
+    let plain = a + b + c + d;
+    if is_plain(plain, space) {
+        return plain;
+    }
+    let sum = a * (a.w * 4.0) + b * (b.w * 4.0) + c * (c.w * 4.0) + d * (d.w * 4.0);
+    (sum / plain.w).truncate().extend(plain.w)
+}
+
+/// The same of 8-bit texels; `quarters` has a quarter of each colour. Most pictures are solid, and then it is a matter of
+/// looking up and adding.
+#[inline(always)]
+fn mean8([a, b, c, d]: [&[u8; 4]; 4], colors: &[f32; 256], quarters: &[f32; 256], space: ColorSpace) -> Vec4 {
+    if a[3] & b[3] & c[3] & d[3] < u8::MAX {
+        let linear = |texel: &[u8; 4]| decode::decode8(*texel, colors);
+        return mean_of_four(linear(a), linear(b), linear(c), linear(d), space);
+    }
+    let quarter = |code: u8| quarters[usize::from(code)];
+    let sum = |i: usize| quarter(a[i]) + quarter(b[i]) + quarter(c[i]) + quarter(d[i]);
+    Vec4::new(sum(0), sum(1), sum(2), 1.0)
 }
 
 /// Whether a mean needs no weights: where everything is clear there is none to go by, and where everything is solid the
@@ -183,8 +205,10 @@ fn mean(columns: &Span, rows: &Span, space: ColorSpace, texel: &impl Fn(usize, u
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0…65535")]
+#[inline(always)]
 fn quantized(v: Vec4) -> [u16; 4] {
-    v.to_array().map(|c| (c.clamp(0.0, 1.0) * 65535.0 + 0.5) as u16)
+    let scaled = v.clamp(Vec4::ZERO, Vec4::ONE) * 65535.0 + 0.5;
+    [scaled.x as u16, scaled.y as u16, scaled.z as u16, scaled.w as u16]
 }
 
 #[cfg(test)]

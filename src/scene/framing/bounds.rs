@@ -54,6 +54,27 @@ impl Bounds {
 /// Whatever is connected to the model, however thin, is part of it. A scene with nothing bounded gets the unit box
 /// around the origin.
 pub fn robust_bounds(scene: &Scene) -> Bounds {
+    without_gaps(scene).unwrap_or_else(|| by_parts(scene))
+}
+
+/// The box of a model of faces whose corners alone reach into every slice, so that there is no gap and nothing can come
+/// off: what most models are, found without a look at each face. `None`: it has to be looked at more closely.
+fn without_gaps(scene: &Scene) -> Option<Bounds> {
+    let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    visit_corners(scene, |p| (lo, hi) = (lo.min(p), hi.max(p)))?;
+    let bounds = Bounds { lo, hi, strays: 0, whole: (lo, hi) };
+    let mut slices = Slices::new(&bounds);
+    visit_corners(scene, |p| {
+        for axis in 0..3 {
+            let slice = slices.slice(axis, p[axis]);
+            slices.covered[axis][slice] = true;
+        }
+    })?;
+    slices.has_no_gap().then_some(bounds)
+}
+
+/// The same for any scene, part by part.
+fn by_parts(scene: &Scene) -> Bounds {
     let Some(whole) = hull(scene, |_| true) else {
         let unit = (DVec3::splat(-0.5), DVec3::splat(0.5));
         return Bounds { lo: unit.0, hi: unit.1, strays: 0, whole: unit };
@@ -129,7 +150,8 @@ fn visit(scene: &Scene, mut f: impl FnMut(Part)) {
         places.extend(mesh.positions.iter().map(|p| instance.world_from_object.transform_point3(p.as_dvec3())));
         let corner = |i: u32| places.get(i as usize).copied().unwrap_or(instance.world_from_object.translation);
         for triangle in &mesh.triangles {
-            let [a, b, c] = triangle.map(corner);
+            let [a, b, c] = *triangle;
+            let (a, b, c) = (corner(a), corner(b), corner(c));
             face(a, b, c, (a.min(b).min(c), a.max(b).max(c)));
         }
         // A polygon counts as the fan of triangles around its first corner.
@@ -154,6 +176,25 @@ fn visit(scene: &Scene, mut f: impl FnMut(Part)) {
         let area = std::f64::consts::PI * (cone.base_radius + cone.apex_radius) * slant;
         f(Part { lo, hi, center: (lo + hi) * 0.5, normal: DVec3::ZERO, area });
     }
+}
+
+/// Calls `f` for every corner of the faces, for shared ones once; `None` when a corner is nowhere, or not all are faces.
+fn visit_corners(scene: &Scene, mut f: impl FnMut(DVec3)) -> Option<()> {
+    if !(scene.spheres.is_empty() && scene.cones.is_empty()) {
+        return None;
+    }
+    for instance in &scene.instances {
+        let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
+        let mut used = vec![false; mesh.positions.len()];
+        for &i in mesh.triangles.iter().flatten().chain(&mesh.polygon_corners) {
+            *used.get_mut(i as usize)? = true;
+        }
+        for (p, _) in mesh.positions.iter().zip(used).filter(|(_, used)| *used) {
+            let p = instance.world_from_object.transform_point3(p.as_dvec3());
+            f(Some(p).filter(|p| p.is_finite())?);
+        }
+    }
+    Some(())
 }
 
 /// How much of the model lies in each slice along each axis.
@@ -271,5 +312,49 @@ impl Slices {
             }
         }
         cut
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{DAffine3, Vec3};
+    use crate::scene::{Instance, Mesh};
+
+    /// Triangles along a spiral, `gap` of it left out at the end, on two instances.
+    fn spiral(faces: usize, gap: f32) -> Scene {
+        let at = |i: usize| {
+            let t = i as f32 / faces as f32;
+            let t = if i + 8 > faces { t + gap } else { t };
+            Vec3::new(t * 3.0, libm::sinf(t * 50.0), libm::cosf(t * 41.0))
+        };
+        let positions = (0..faces + 2).map(at).collect();
+        // No face bridges the gap.
+        let bridges = |i: &u32| gap > 0.0 && (faces as u32 - 9..faces as u32 - 7).contains(i);
+        let triangles = (0..faces as u32).filter(|i| !bridges(i)).map(|i| [i, i + 1, i + 2]).collect();
+        let instance = |mesh: u32, x: f64| Instance {
+            name: String::new(),
+            mesh,
+            world_from_object: DAffine3::from_translation(DVec3::new(x, 0.0, 0.0)),
+        };
+        let meshes = vec![Mesh { positions, triangles, ..Mesh::default() }];
+        Scene { meshes, instances: vec![instance(0, 0.0), instance(0, 0.25)], ..Scene::default() }
+    }
+
+    #[test]
+    fn the_short_way_and_the_long_one_find_the_same_box() {
+        for (faces, gap, short) in [(20_000, 0.0, true), (40, 0.0, false), (20_000, 30.0, false)] {
+            let scene = spiral(faces, gap);
+            assert_eq!(without_gaps(&scene).is_some(), short, "{faces} {gap}");
+            assert_eq!(robust_bounds(&scene), by_parts(&scene), "{faces} {gap}");
+            assert_eq!(robust_bounds(&scene).strays > 0, gap > 0.0);
+        }
+    }
+
+    #[test]
+    fn corners_that_are_nowhere_are_left_to_the_long_way() {
+        let mut scene = spiral(20_000, 0.0);
+        scene.meshes[0].positions[7].y = f32::NAN;
+        assert!(without_gaps(&scene).is_none() && robust_bounds(&scene).hi.is_finite());
     }
 }
