@@ -26,6 +26,7 @@ pub mod stats;
 pub(crate) mod tests;
 pub mod transform;
 pub mod volumes;
+pub mod wave;
 pub mod wide;
 
 pub use any::{AccelKind, AnyAccel};
@@ -43,7 +44,7 @@ pub use shapes::{BitSet, Object, Shapes, SpherePrim};
 pub use stats::StructureStats;
 pub use transform::Transformed;
 pub use volumes::Volumes;
-pub use wide::{Listed, Splitting, Wide};
+pub use wide::{Listed, RayOrder, Splitting, Wide};
 
 use crate::math::Vec3;
 pub use crate::math::cone::Cone;

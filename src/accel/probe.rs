@@ -11,6 +11,9 @@ use std::ops::AddAssign;
 ///
 /// What takes work to say is said by a closure, which nobody calls who does not listen.
 pub trait Probe: Default + Send {
+    /// Whether it hears nothing, so that rays may be asked in any way that gives the same answers.
+    const SILENT: bool = false;
+
     /// One ray was asked of the scene.
     fn query(&mut self) {}
     /// A node or cell was entered (n_ts).
@@ -144,7 +147,9 @@ impl Outcome {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoProbe;
 
-impl Probe for NoProbe {}
+impl Probe for NoProbe {
+    const SILENT: bool = true;
+}
 
 /// Sums over the rays of one class; divide by `queries` for Havran's per-ray figures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -5,11 +5,12 @@
 
 use super::intersector::{Exact, Intersector};
 use super::probe::{Outcome, Test};
+use super::wave::{ForAny, ForFirst, ForNext, Wave, begin, end};
 use super::{Accel, Hit, NO_PRIM, Probe, Ray, Shapes};
 use crate::math::shear::RaySpace;
 use crate::math::simd::LANES;
-use crate::math::triangle;
-use crate::math::triangles::Verdicts;
+use crate::math::triangle::{self, Meeting, Triangle};
+use crate::math::triangles::{Corners8, Verdicts, corners_of};
 
 /// A structure: it names the prims that a ray may hit.
 pub trait Culling: Sync {
@@ -24,12 +25,26 @@ pub trait Culling: Sync {
 
     /// Calls [`Query::test`] at least for every bounded prim that the ray hits within [`Query::reach`].
     fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, scratch: &mut Self::Scratch, probe: &mut P);
+
+    /// Answers a wave, one ray after another unless a structure knows better.
+    fn trace<W: Wave, P: Probe>(&self, wave: &mut W, scratch: &mut Self::Scratch, probe: &mut P) {
+        for i in 0..wave.len() {
+            let (mut query, usable) = begin(self.shapes(), wave, i, probe);
+            if usable && !query.test_planes(probe) && self.shapes().bounded() > 0 {
+                self.walk(&mut query, scratch, probe);
+            }
+            end(wave, i, &query, probe);
+        }
+    }
 }
 
 /// What a query looks for, and with which test.
 pub trait Goal {
     /// The test of triangles.
     type Test: Intersector;
+
+    /// Whether that is the exact one.
+    const EXACT: bool = <Self::Test as Intersector>::EXACT;
 
     /// Whether a hit with `prim` would matter at all.
     fn wants(&self, _shapes: &Shapes, _prim: u32) -> bool {
@@ -41,6 +56,9 @@ pub trait Goal {
 
     /// Hits beyond this distance do not matter any more.
     fn reach(&self) -> f32;
+
+    /// The hit that is the answer so far, by distance and prim, where hits are asked for.
+    fn best(&self) -> Option<(f32, u32)>;
 
     /// The test itself.
     fn test(&self) -> Self::Test;
@@ -57,18 +75,30 @@ pub struct Query<'a, G: Goal> {
     exclude: u32,
     shapes: &'a Shapes,
     prepared: <G::Test as Intersector>::Prepared,
-    goal: G,
+    pub(super) goal: G,
+    /// The triangle that was offered last and taken, where it came from a block.
+    winner: Option<Winner>,
+}
+
+/// What the answer needs of a triangle, so that nobody looks it up again.
+#[derive(Clone, Copy, Debug)]
+struct Winner {
+    prim: u32,
+    corners: Triangle,
+    meeting: Meeting,
 }
 
 impl<'a, G: Goal> Query<'a, G> {
-    /// `None` for a ray that cannot hit: zero direction, not finite, or an empty range.
-    fn new(shapes: &'a Shapes, ray: &Ray, goal: G) -> Option<Self> {
+    /// A ray whose hits count from `t_min` on, and whether it can hit anything: not with a direction of zero, numbers that
+    /// are not finite, or an empty range.
+    #[inline(always)]
+    pub(super) fn new(shapes: &'a Shapes, ray: &Ray, t_min: f32, goal: G) -> (Self, bool) {
         // A distance that overflows is no hit, and `<=` is false for NaN.
-        let t_max = ray.t_max.min(f32::MAX);
-        let space = RaySpace::new(ray.origin, ray.dir)?;
-        let usable = ray.t_min <= t_max && !ray.t_max.is_nan();
+        let t_max = if ray.t_max < f32::MAX { ray.t_max } else { f32::MAX };
+        let (space, usable) = RaySpace::checked(ray.origin, ray.dir);
         let prepared = goal.test().prepare(&space);
-        usable.then_some(Self { ray: space, t_min: ray.t_min, t_max, exclude: ray.exclude, shapes, prepared, goal })
+        let usable = usable && t_min <= t_max && !ray.t_max.is_nan();
+        (Self { ray: space, t_min, t_max, exclude: ray.exclude, shapes, prepared, goal, winner: None }, usable)
     }
 
     /// Hits beyond this distance do not matter; shrinks as hits are found.
@@ -122,6 +152,7 @@ impl<'a, G: Goal> Query<'a, G> {
     pub fn test_block<P: Probe>(
         &mut self,
         prims: &[u32; LANES],
+        corners: &Corners8,
         count: u32,
         verdicts: Verdicts,
         probe: &mut P,
@@ -134,7 +165,7 @@ impl<'a, G: Goal> Query<'a, G> {
             let lane = open.trailing_zeros() as usize % LANES;
             open &= open - 1;
             let certain = verdicts.hit >> lane & 1 == 1;
-            if self.take(prims[lane], certain, probe) {
+            if self.take(prims[lane], &corners_of(corners, lane), certain, probe) {
                 probe.lanes_tested(prims, open, Outcome::LeftOut);
                 return true;
             }
@@ -144,20 +175,71 @@ impl<'a, G: Goal> Query<'a, G> {
 
     /// Offers the hit with a triangle that is hit for certain, or may be.
     #[inline(never)]
-    fn take<P: Probe>(&mut self, prim: u32, certain: bool, probe: &mut P) -> bool {
+    pub fn take<P: Probe>(&mut self, prim: u32, corners: &Triangle, certain: bool, probe: &mut P) -> bool {
         if prim == self.exclude || !self.goal.wants(self.shapes, prim) {
             probe.tested(|| Test { prim, t: f32::NAN, outcome: Outcome::LeftOut });
             return false;
         }
-        let corners = self.shapes.triangle(prim);
-        if certain || triangle::is_hit_near_edge(&self.ray, &corners) {
-            let t = triangle::distance(&self.ray, &corners);
+        if certain || triangle::is_hit(&self.ray, corners) {
+            let meeting = triangle::meet(&self.ray, corners);
+            let t = meeting.t;
             let outcome = self.offer(t, prim);
+            if outcome == Outcome::Hit {
+                self.winner = Some(Winner { prim, corners: *corners, meeting });
+            }
             probe.tested(|| Test { prim, t, outcome });
         } else {
             probe.tested(|| Test { prim, t: f32::NAN, outcome: Outcome::Miss });
         }
         self.reach() < self.t_min
+    }
+
+    /// Tests the unbounded planes, which no structure holds, and tells whether the query is answered.
+    #[inline(always)]
+    pub fn test_planes<P: Probe>(&mut self, probe: &mut P) -> bool {
+        !self.shapes.planes.is_empty() && self.test_each_plane(probe)
+    }
+
+    #[inline(never)]
+    fn test_each_plane<P: Probe>(&mut self, probe: &mut P) -> bool {
+        let first = self.shapes.bounded();
+        #[expect(clippy::cast_possible_truncation, reason = "prim ids are u32")]
+        let count = self.shapes.planes.len() as u32;
+        (first..first + count).any(|plane| self.test(plane, probe))
+    }
+
+    /// Offers the hit with a triangle at an exact distance, if it is asked about; what that means.
+    #[inline(always)]
+    pub fn offer_met(&mut self, prim: u32, t: f32) -> Outcome {
+        if prim == self.exclude || !self.goal.wants(self.shapes, prim) {
+            return Outcome::LeftOut;
+        }
+        self.offer(t, prim)
+    }
+
+    /// Whether nothing more can change the answer.
+    #[inline(always)]
+    pub fn is_answered(&self) -> bool {
+        self.reach() < self.t_min
+    }
+
+    /// The hit that is the answer so far, by distance and prim, where hits are asked for.
+    #[inline(always)]
+    pub fn best(&self) -> Option<(f32, u32)> {
+        self.goal.best()
+    }
+
+    /// The same with its barycentric weights, which only the winner needs.
+    #[inline]
+    pub(super) fn hit(&self) -> Hit {
+        let Some((t, prim)) = self.goal.best() else { return Hit::MISS };
+        let (u, v) = match &self.winner {
+            Some(Winner { prim: from, corners, meeting }) if *from == prim && !meeting.t_f64.is_nan() => {
+                triangle::barycentrics_at(&self.ray, corners, meeting.t_f64, meeting.normal)
+            }
+            _ => self.shapes.barycentrics(prim, &self.ray),
+        };
+        Hit { t, u, v, prim }
     }
 
     /// What is asked about.
@@ -167,7 +249,7 @@ impl<'a, G: Goal> Query<'a, G> {
 }
 
 /// The first hit.
-struct Closest<I> {
+pub struct Closest<I> {
     best: (f32, u32),
     test: I,
 }
@@ -188,14 +270,18 @@ impl<I: Intersector> Goal for Closest<I> {
         self.best.0
     }
     #[inline]
+    fn best(&self) -> Option<(f32, u32)> {
+        (self.best.1 != NO_PRIM).then_some(self.best)
+    }
+    #[inline]
     fn test(&self) -> I {
         self.test
     }
 }
 
 /// Whether anything opaque is hit.
-struct Occluded<I> {
-    found: bool,
+pub struct Occluded<I> {
+    pub(super) found: bool,
     test: I,
 }
 
@@ -216,13 +302,17 @@ impl<I: Intersector> Goal for Occluded<I> {
         if self.found { f32::NEG_INFINITY } else { f32::INFINITY }
     }
     #[inline]
+    fn best(&self) -> Option<(f32, u32)> {
+        None
+    }
+    #[inline]
     fn test(&self) -> I {
         self.test
     }
 }
 
 /// The first hit after another.
-struct Next<I> {
+pub struct Next<I> {
     after: (f32, u32),
     closest: Closest<I>,
 }
@@ -239,14 +329,30 @@ impl<I: Intersector> Goal for Next<I> {
         self.closest.reach()
     }
     #[inline]
+    fn best(&self) -> Option<(f32, u32)> {
+        self.closest.best()
+    }
+    #[inline]
     fn test(&self) -> I {
         self.closest.test
     }
 }
 
 impl<I> Closest<I> {
-    fn nothing(test: I) -> Self {
+    pub(super) fn nothing(test: I) -> Self {
         Self { best: (f32::INFINITY, NO_PRIM), test }
+    }
+}
+
+impl<I> Occluded<I> {
+    pub(super) fn nothing(test: I) -> Self {
+        Self { found: false, test }
+    }
+}
+
+impl<I> Next<I> {
+    pub(super) fn nothing(after: &Hit, test: I) -> Self {
+        Self { after: (after.t, after.prim), closest: Closest::nothing(test) }
     }
 }
 
@@ -326,11 +432,7 @@ fn closest<I: Intersector, C: Culling, P: Probe>(
     scratch: &mut C::Scratch,
     probe: &mut P,
 ) {
-    for (ray, hit) in rays.iter().zip(hits) {
-        let query = answer(structure, ray, Closest::nothing(test), scratch, probe);
-        *hit = query.map_or(Hit::MISS, |q| finish(&q, q.goal.best));
-        count_found(hit.is_some(), probe);
-    }
+    structure.trace(&mut ForFirst { rays, hits, test }, scratch, probe);
 }
 
 fn occluded<I: Intersector, C: Culling, P: Probe>(
@@ -341,11 +443,7 @@ fn occluded<I: Intersector, C: Culling, P: Probe>(
     scratch: &mut C::Scratch,
     probe: &mut P,
 ) {
-    for (ray, blocked) in rays.iter().zip(blocked) {
-        let goal = Occluded { found: false, test };
-        *blocked = answer(structure, ray, goal, scratch, probe).is_some_and(|q| q.goal.found);
-        count_found(*blocked, probe);
-    }
+    structure.trace(&mut ForAny { rays, blocked, test }, scratch, probe);
 }
 
 fn next<I: Intersector, C: Culling, P: Probe>(
@@ -357,46 +455,5 @@ fn next<I: Intersector, C: Culling, P: Probe>(
     scratch: &mut C::Scratch,
     probe: &mut P,
 ) {
-    for ((ray, after), hit) in rays.iter().zip(after).zip(hits) {
-        let rest = Ray { t_min: ray.t_min.max(after.t), ..*ray };
-        let goal = Next { after: (after.t, after.prim), closest: Closest::nothing(test) };
-        let query = answer(structure, &rest, goal, scratch, probe);
-        *hit = query.map_or(Hit::MISS, |q| finish(&q, q.goal.closest.best));
-        count_found(hit.is_some(), probe);
-    }
-}
-
-/// Planes first, then what the structure names. `None`: the ray cannot hit.
-fn answer<'a, C: Culling, G: Goal, P: Probe>(
-    structure: &'a C,
-    ray: &Ray,
-    goal: G,
-    scratch: &mut C::Scratch,
-    probe: &mut P,
-) -> Option<Query<'a, G>> {
-    probe.query();
-    let shapes = structure.shapes();
-    let mut query = Query::new(shapes, ray, goal)?;
-    let bounded = shapes.bounded();
-    #[expect(clippy::cast_possible_truncation, reason = "prim ids are u32")]
-    let answered = (0..shapes.planes.len() as u32).any(|plane| query.test(bounded + plane, probe));
-    if !answered && bounded > 0 {
-        structure.walk(&mut query, scratch, probe);
-    }
-    Some(query)
-}
-
-/// Adds the barycentric weights, which only the winner needs.
-fn finish<G: Goal>(query: &Query<G>, (t, prim): (f32, u32)) -> Hit {
-    if prim == NO_PRIM {
-        return Hit::MISS;
-    }
-    let (u, v) = query.shapes.barycentrics(prim, &query.ray);
-    Hit { t, u, v, prim }
-}
-
-fn count_found<P: Probe>(found: bool, probe: &mut P) {
-    if found {
-        probe.found();
-    }
+    structure.trace(&mut ForNext { rays, after, hits, test }, scratch, probe);
 }

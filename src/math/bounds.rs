@@ -56,7 +56,7 @@ impl EdgeMargins {
         displaced * (spread + 0.125 * displaced) + self.underflow
     }
 
-    /// [`Self::error`] in eight lanes.
+    /// [`Self::error`] in eight lanes; `reach` is D in all.
     #[inline(always)]
     pub fn error_lanes<S: Simd>(&self, s: S, reach: S::Lanes, spread: S::Lanes) -> S::Lanes {
         let displaced = s.mul(s.splat(8.0 * self.rounding), s.add(s.add(reach, reach), spread));

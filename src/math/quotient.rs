@@ -29,6 +29,19 @@ impl Bounded {
             None
         }
     }
+
+    /// As [`Self::over`] for numbers whose product neither over- nor underflows, sooner: nothing waits for two divisions.
+    #[inline]
+    pub fn quotient(self, denominator: Self) -> Option<(f64, f64)> {
+        let (n, d) = (self.value.abs(), denominator.value.abs());
+        // Also false for NaN.
+        if denominator.error < 0.25 * d && self.error < 0.25 * n {
+            let relative = (self.error * d + denominator.error * n) / (n * d);
+            Some((self.value / denominator.value, relative * 1.5 + f64::EPSILON))
+        } else {
+            None
+        }
+    }
 }
 
 /// The `f32` nearest to every number within `t` (1 ± `error`), or `None` if there is more than one.

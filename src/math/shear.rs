@@ -27,12 +27,25 @@ pub struct RaySpace {
 
 impl RaySpace {
     /// `None` for a ray that cannot hit: zero direction, or anything not finite.
+    #[inline]
     pub fn new(origin: Vec3, dir: Vec3) -> Option<Self> {
+        let (space, usable) = Self::checked(origin, dir);
+        usable.then_some(space)
+    }
+
+    /// The same, and whether the ray can hit.
+    #[inline(always)]
+    pub fn checked(origin: Vec3, dir: Vec3) -> (Self, bool) {
         let size = dir.abs();
         let z = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
-        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
-        let usable = origin.is_finite() && dir.is_finite() && dir[z] != 0.0;
-        usable.then(|| Self { origin, dir, z, x, y, shear: (dir[x] / dir[z], dir[y] / dir[z]) })
+        let [d_x, d_y, d_z] = match z {
+            0 => [dir.y, dir.z, dir.x],
+            1 => [dir.z, dir.x, dir.y],
+            _ => [dir.x, dir.y, dir.z],
+        };
+        let (x, y) = if z == 0 { (1, 2) } else { (4 - 2 * z, z - 1) };
+        let usable = origin.is_finite() && dir.is_finite() && d_z != 0.0;
+        (Self { origin, dir, z, x, y, shear: (d_x / d_z, d_y / d_z) }, usable)
     }
 
     /// A corner relative to the origin, axes in sheared order but not yet sheared, in `f64`.

@@ -79,13 +79,41 @@ pub fn is_hit_near_edge(ray: &RaySpace, &[a, b, c]: &Triangle) -> bool {
     agree && (first, second, third) != (0, 0, 0)
 }
 
+/// Where a ray meets the plane of a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Meeting {
+    /// Exact t = n·(a − o) / n·d with n = (b − a) × (c − a), rounded once.
+    pub t: f32,
+    /// t to a relative error of [`POSITION_T`], or NaN where [`distance_f64`] must be asked.
+    pub t_f64: f64,
+    /// n.
+    pub normal: DVec3,
+}
+
+/// Where the line through the ray meets a triangle that is hit.
+#[inline]
+pub fn meet(ray: &RaySpace, triangle: &Triangle) -> Meeting {
+    let (numerator, denominator, normal) = plane_terms(ray, triangle, PLANE_TERMS_F64);
+    match numerator.quotient(denominator) {
+        Some((t_f64, error)) if error < POSITION_T => {
+            let t = nearest(t_f64, error).unwrap_or_else(|| exact_distance(ray, triangle));
+            Meeting { t, t_f64, normal }
+        }
+        _ => Meeting { t: distance(ray, triangle), t_f64: f64::NAN, normal },
+    }
+}
+
 /// Exact t = n·(a − o) / n·d with n = (b − a) × (c − a), correctly rounded. The triangle must be hit.
 pub fn distance(ray: &RaySpace, triangle: &Triangle) -> f32 {
     let fast = plane_quotient(ray, triangle, PLANE_TERMS_F64).and_then(|(t, error)| nearest(t, error));
-    fast.unwrap_or_else(|| {
-        let (numerator, denominator) = exact_plane_terms(ray, triangle);
-        rounded::<192, 384>(&numerator, &denominator)
-    })
+    fast.unwrap_or_else(|| exact_distance(ray, triangle))
+}
+
+#[cold]
+#[inline(never)]
+fn exact_distance(ray: &RaySpace, triangle: &Triangle) -> f32 {
+    let (numerator, denominator) = exact_plane_terms(ray, triangle);
+    rounded::<192, 384>(&numerator, &denominator)
 }
 
 /// As [`intersect`]'s distance of a triangle that is hit, to a relative error of [`POSITION_T`].
@@ -107,18 +135,26 @@ fn distance_within(ray: &RaySpace, triangle: &Triangle, enough: f64) -> f64 {
 
 /// t in `f64` and a bound of its relative error, where there is one; `terms` is the relative error of both its terms.
 #[inline]
-fn plane_quotient(ray: &RaySpace, &[a, b, c]: &Triangle, terms: f64) -> Option<(f64, f64)> {
+fn plane_quotient(ray: &RaySpace, triangle: &Triangle, terms: f64) -> Option<(f64, f64)> {
+    let (numerator, denominator, _) = plane_terms(ray, triangle, terms);
+    numerator.quotient(denominator)
+}
+
+/// n·(a − o), n·d and n.
+#[inline]
+fn plane_terms(ray: &RaySpace, &[a, b, c]: &Triangle, terms: f64) -> (Bounded, Bounded, DVec3) {
     let (origin, dir, a) = (ray.origin.as_dvec3(), ray.dir.as_dvec3(), a.as_dvec3());
     let (e1, e2) = (b.as_dvec3() - a, c.as_dvec3() - a);
     let normal = e1.cross(e2);
     let sizes = magnitude_cross(e1.abs(), e2.abs());
     let to_plane = a - origin;
     let term = |v: DVec3| Bounded { value: normal.dot(v), error: sizes.dot(v.abs()) * terms };
-    term(to_plane).over(term(dir))
+    (term(to_plane), term(dir), normal)
 }
 
 /// |p| × |q| with sums for differences: bounds what rounding can do to the cross product.
-fn magnitude_cross(p: DVec3, q: DVec3) -> DVec3 {
+#[inline(always)]
+pub(super) fn magnitude_cross(p: DVec3, q: DVec3) -> DVec3 {
     DVec3::new(p.y * q.z + p.z * q.y, p.z * q.x + p.x * q.z, p.x * q.y + p.y * q.x)
 }
 
@@ -132,17 +168,39 @@ fn exact_plane_terms(ray: &RaySpace, &[a, b, c]: &Triangle) -> (Expansion<192>, 
 
 /// Weights of the second and third corner where the ray meets a triangle that it hits, each in 0..=1.
 pub fn barycentrics(ray: &RaySpace, triangle: &Triangle) -> (f32, f32) {
-    let t = distance_f64(ray, triangle);
     let [a, b, c] = triangle.map(|p| p.as_dvec3());
-    let p = ray.origin.as_dvec3() + ray.dir.as_dvec3() * t;
-    let normal = (b - a).cross(c - a);
-    // Areas in the plane of the triangle, so that a grazing ray is no worse than another.
-    let area = normal.length_squared();
-    let weight = |from: DVec3, to: DVec3| normal.dot((to - from).cross(p - from)) / area;
+    barycentrics_at(ray, triangle, distance_f64(ray, triangle), (b - a).cross(c - a))
+}
+
+/// The same, with what [`meet`] found, or with [`distance_f64`] and the normal (b − a) × (c − a).
+///
+/// Areas in the plane of the triangle, seen along the axis from which they are largest, so that a grazing ray is no worse
+/// than another.
+#[inline]
+pub fn barycentrics_at(ray: &RaySpace, &[a, b, c]: &Triangle, t: f64, normal: DVec3) -> (f32, f32) {
+    let [i, j] = flat_axes(normal);
+    let flat = |p: DVec3| (p[i], p[j]);
+    let a = a.as_dvec3();
+    let ((px, py), (bx, by), (cx, cy)) =
+        (flat(ray.origin.as_dvec3() + ray.dir.as_dvec3() * t - a), flat(b.as_dvec3() - a), flat(c.as_dvec3() - a));
+    let scale = 1.0 / (bx * cy - by * cx);
     #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what this does")]
-    let clamp = |x: f64| if x > 0.0 { x.min(1.0) as f32 } else { 0.0 };
-    let (u, v) = (clamp(weight(c, a)), clamp(weight(a, b)));
+    let clamp = |x: f64| if x > 0.0 { (if x < 1.0 { x } else { 1.0 }) as f32 } else { 0.0 };
+    let (u, v) = (clamp((px * cy - py * cx) * scale), clamp((bx * py - by * px) * scale));
     if u + v > 1.0 { (u, 1.0 - u) } else { (u, v) }
+}
+
+/// The axes of the plane in which a face with this normal is seen largest, in right-handed order.
+#[inline(always)]
+pub fn flat_axes(normal: DVec3) -> [usize; 2] {
+    let size = normal.abs();
+    if size.x >= size.y && size.x >= size.z {
+        [1, 2]
+    } else if size.y >= size.z {
+        [2, 0]
+    } else {
+        [0, 1]
+    }
 }
 
 /// A point of the triangle; evenly spread where `r` and `s` are, in 0..=1.

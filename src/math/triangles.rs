@@ -1,15 +1,41 @@
 //! Eight triangles against one ray: the filter of [`triangle`](super::triangle) in eight lanes.
 //!
-//! Edge values and their bound are computed as there, operation by operation; what the bound cannot decide is left to
-//! the exact form. Verdicts are exact, so it does not matter which of the two found them.
+//! Edge values are computed as there, operation by operation, and their bound from the farthest that any triangle of
+//! the scene may be; what this cannot decide is left to the scalar form. Verdicts are exact, so it does not matter which of
+//! the two found them.
 
+use super::DVec3;
 use super::Vec3;
-use super::bounds::EdgeMargins;
+use super::aabb::Aabb;
+use super::bounds::{EdgeMargins, PLANE_TERMS_F64, POSITION_T};
 use super::shear::RaySpace;
 use super::simd::{LANES, Row, Simd};
+use super::triangle::{flat_axes, magnitude_cross};
 
 /// Corners of eight triangles, by corner and axis.
 pub type Corners8 = [[Row; 3]; 3];
+
+/// No coordinate of what lies in the box is farther from that of the origin.
+#[inline(always)]
+pub fn reach(origin: Vec3, bounds: &Aabb) -> f32 {
+    // Subtraction is monotonic, rounded or not.
+    let far = |lo: f32, hi: f32, o: f32| {
+        let (below, above) = ((lo - o).abs(), (hi - o).abs());
+        if below > above { below } else { above }
+    };
+    let x = far(bounds.lo.x, bounds.hi.x, origin.x);
+    let y = far(bounds.lo.y, bounds.hi.y, origin.y);
+    let z = far(bounds.lo.z, bounds.hi.z, origin.z);
+    let most = if x > y { x } else { y };
+    if most > z { most } else { z }
+}
+
+/// The triangle in a lane.
+#[inline(always)]
+pub fn corners_of(corners: &Corners8, lane: usize) -> [Vec3; 3] {
+    let corner = |c: &[Row; 3]| Vec3::new(c[0][lane % LANES], c[1][lane % LANES], c[2][lane % LANES]);
+    [corner(&corners[0]), corner(&corners[1]), corner(&corners[2])]
+}
 
 /// Lanes without a triangle: a NaN in every corner.
 pub const NO_CORNERS: Corners8 = [[[f32::NAN; LANES]; 3]; 3];
@@ -31,6 +57,8 @@ pub struct RayLanes<S: Simd> {
     /// Origin along these axes.
     origin: [S::Lanes; 3],
     shear: [S::Lanes; 2],
+    /// No corner is farther from the origin on any axis.
+    reach: S::Lanes,
 }
 
 /// Which lanes are hit; a bit of neither mask is a certain miss.
@@ -38,16 +66,17 @@ pub struct RayLanes<S: Simd> {
 pub struct Verdicts {
     /// The line through the ray meets the triangle for certain.
     pub hit: u32,
-    /// Only exact arithmetic can tell. Lanes without a triangle are among these.
+    /// A closer look is needed. Lanes without a triangle are among these.
     pub unsure: u32,
 }
 
 impl<S: Simd> RayLanes<S> {
-    /// Spreads a ray over the lanes.
+    /// Spreads a ray over the lanes; none of the triangles that it is tested against is farther than `reach` ([`reach`]).
     #[inline(always)]
-    pub fn new(s: S, ray: &RaySpace) -> Self {
+    pub fn new(s: S, ray: &RaySpace, reach: f32) -> Self {
         let axes = [ray.x, ray.y, ray.z];
-        Self { axes, origin: axes.map(|k| s.splat(ray.origin[k])), shear: [s.splat(ray.shear.0), s.splat(ray.shear.1)] }
+        let origin = [s.splat(ray.origin[axes[0]]), s.splat(ray.origin[axes[1]]), s.splat(ray.origin[axes[2]])];
+        Self { axes, origin, shear: [s.splat(ray.shear.0), s.splat(ray.shear.1)], reach: s.splat(reach) }
     }
 
     /// Tests eight triangles.
@@ -60,22 +89,7 @@ impl<S: Simd> RayLanes<S> {
     #[inline(always)]
     fn verdicts_within(&self, s: S, corners: &Corners8, margins: EdgeMargins) -> Verdicts {
         let [a, b, c] = [self.relative(s, &corners[0]), self.relative(s, &corners[1]), self.relative(s, &corners[2])];
-        let ([ax, ay], [bx, by], [cx, cy]) = (self.sheared(s, a), self.sheared(s, b), self.sheared(s, c));
-        let u = s.sub(s.mul(cx, by), s.mul(cy, bx));
-        let v = s.sub(s.mul(ax, cy), s.mul(ay, cx));
-        let w = s.sub(s.mul(bx, ay), s.mul(by, ax));
-
-        let reach = s.greater(largest3(s, a), s.greater(largest3(s, b), largest3(s, c)));
-        let spread = s.greater(largest2(s, ax, ay), s.greater(largest2(s, bx, by), largest2(s, cx, cy)));
-        let error = margins.error_lanes(s, reach, spread);
-        let negative = s.sub(s.splat(0.0), error);
-        let (low, high) = (s.smaller(u, s.smaller(v, w)), s.greater(u, s.greater(v, w)));
-
-        // Overflow makes the bound too large or NaN, and the comparisons false.
-        let sound = s.less(error, s.splat(margins.overflow));
-        let miss = s.less(low, negative) & s.less(error, high);
-        let hit = (s.less(error, low) | s.less(high, negative)) & sound;
-        Verdicts { hit, unsure: !(hit | miss & sound) & 0xff }
+        judge(s, [self.sheared(s, a), self.sheared(s, b), self.sheared(s, c)], self.reach, margins)
     }
 
     /// A corner relative to the origin, in sheared order.
@@ -95,22 +109,194 @@ impl<S: Simd> RayLanes<S> {
     }
 }
 
+/// Rays side by side, with the same axis first, ready to be tested against one triangle after another.
+#[derive(Clone, Copy)]
+pub struct RayRow<S: Simd> {
+    /// Axes in sheared order: x, y, z.
+    axes: [usize; 3],
+    origin: [S::Lanes; 3],
+    shear: [S::Lanes; 2],
+    reach: S::Lanes,
+}
+
+impl<S: Simd> RayRow<S> {
+    /// Rays by axis and lane, whose largest components are along axis `z`; none of the triangles that they are tested
+    /// against is farther from any of them than `reach`.
+    #[inline(always)]
+    pub fn new(s: S, origin: &[Row; 3], dir: &[Row; 3], z: usize, reach: f32) -> Self {
+        let axes = [(z + 1) % 3, (z + 2) % 3, z % 3];
+        let along = s.load(&dir[axes[2]]);
+        Self {
+            axes,
+            origin: [s.load(&origin[axes[0]]), s.load(&origin[axes[1]]), s.load(&origin[axes[2]])],
+            shear: [s.div(s.load(&dir[axes[0]]), along), s.div(s.load(&dir[axes[1]]), along)],
+            reach: s.splat(reach),
+        }
+    }
+
+    /// Tests one triangle: a bit for each ray.
+    #[inline(always)]
+    pub fn verdicts(&self, s: S, triangle: &[Vec3; 3]) -> Verdicts {
+        let [a, b, c] = [self.relative(s, triangle[0]), self.relative(s, triangle[1]), self.relative(s, triangle[2])];
+        judge(s, [a, b, c], self.reach, EdgeMargins::DERIVED)
+    }
+
+    /// A corner relative to the origins, sheared.
+    #[inline(always)]
+    fn relative(&self, s: S, corner: Vec3) -> [S::Lanes; 2] {
+        let [x, y, z] = self.axes;
+        let z = s.sub(s.splat(corner[z]), self.origin[2]);
+        let x = s.sub(s.splat(corner[x]), self.origin[0]);
+        let y = s.sub(s.splat(corner[y]), self.origin[1]);
+        [s.sub(x, s.mul(self.shear[0], z)), s.sub(y, s.mul(self.shear[1], z))]
+    }
+}
+
+/// Where rays side by side meet the plane of one triangle: [`meet`](super::triangle::meet) in eight lanes, operation by
+/// operation.
+#[derive(Clone, Copy, Debug)]
+pub struct Meetings {
+    /// t, rounded once.
+    pub t: Row,
+    /// t to a relative error of [`POSITION_T`].
+    pub t_f64: [f64; LANES],
+    /// The lanes in which that is certain; for the others the scalar form must be asked.
+    pub sure: u32,
+}
+
+/// What the rays of a row share when they meet a triangle.
+#[derive(Clone, Copy, Debug)]
+pub struct Plane {
+    corners: [DVec3; 3],
+    normal: DVec3,
+    sizes: DVec3,
+}
+
+impl Plane {
+    /// The plane of a triangle.
+    #[inline(always)]
+    pub fn of(triangle: &[Vec3; 3]) -> Self {
+        let corners = [triangle[0].as_dvec3(), triangle[1].as_dvec3(), triangle[2].as_dvec3()];
+        let (e1, e2) = (corners[1] - corners[0], corners[2] - corners[0]);
+        Self { corners, normal: e1.cross(e2), sizes: magnitude_cross(e1.abs(), e2.abs()) }
+    }
+
+    /// Where rays (by axis and lane) meet it.
+    #[inline(always)]
+    pub fn meet<S: Simd>(&self, s: S, origin: &[Row; 3], dir: &[Row; 3]) -> Meetings {
+        let a = self.corners[0].to_array();
+        let (o, d) = (
+            [s.load(&origin[0]), s.load(&origin[1]), s.load(&origin[2])],
+            [s.load(&dir[0]), s.load(&dir[1]), s.load(&dir[2])],
+        );
+        let to_plane = [
+            s.sub_f64(s.splat_f64(a[0]), s.widen(o[0])),
+            s.sub_f64(s.splat_f64(a[1]), s.widen(o[1])),
+            s.sub_f64(s.splat_f64(a[2]), s.widen(o[2])),
+        ];
+        let (numerator, n_error) = self.term(s, to_plane);
+        let (denominator, d_error) = self.term(s, [s.widen(d[0]), s.widen(d[1]), s.widen(d[2])]);
+        let (n, d) = (s.abs_f64(numerator), s.abs_f64(denominator));
+        let quarter = s.splat_f64(0.25);
+        let signs = s.less_f64(d_error, s.mul_f64(quarter, d)) & s.less_f64(n_error, s.mul_f64(quarter, n));
+        let relative = s.div_f64(s.add_f64(s.mul_f64(n_error, d), s.mul_f64(d_error, n)), s.mul_f64(n, d));
+        let error = s.add_f64(s.mul_f64(relative, s.splat_f64(1.5)), s.splat_f64(f64::EPSILON));
+        let t = s.div_f64(numerator, denominator);
+        let spread = s.mul_f64(s.abs_f64(t), s.mul_f64(error, s.splat_f64(1.001)));
+        let (low, high) = (s.narrow(s.sub_f64(t, spread)), s.narrow(s.add_f64(t, spread)));
+        let rounded = s.at_most(low, high) & s.at_most(high, low);
+        let sure = signs & s.less_f64(error, s.splat_f64(POSITION_T)) & rounded;
+        Meetings { t: s.store(low), t_f64: s.store_f64(t), sure }
+    }
+
+    /// n·v and a bound of its error.
+    #[inline(always)]
+    fn term<S: Simd>(&self, s: S, [x, y, z]: [S::Doubles; 3]) -> (S::Doubles, S::Doubles) {
+        let (n, m) = (self.normal, self.sizes);
+        let value = s.add_f64(
+            s.add_f64(s.mul_f64(s.splat_f64(n.x), x), s.mul_f64(s.splat_f64(n.y), y)),
+            s.mul_f64(s.splat_f64(n.z), z),
+        );
+        let size = s.add_f64(
+            s.add_f64(s.mul_f64(s.splat_f64(m.x), s.abs_f64(x)), s.mul_f64(s.splat_f64(m.y), s.abs_f64(y))),
+            s.mul_f64(s.splat_f64(m.z), s.abs_f64(z)),
+        );
+        (value, s.mul_f64(size, s.splat_f64(PLANE_TERMS_F64)))
+    }
+
+    /// Weights of the second and third corner: [`barycentrics_at`](super::triangle::barycentrics_at) in eight lanes.
+    #[inline(always)]
+    pub fn barycentrics<S: Simd>(&self, s: S, origin: &[Row; 3], dir: &[Row; 3], t: &[f64; LANES]) -> [Row; 2] {
+        let [i, j] = flat_axes(self.normal);
+        let [a, b, c] = [self.corners[0].to_array(), self.corners[1].to_array(), self.corners[2].to_array()];
+        let t = s.load_f64(t);
+        let px = self.along(s, origin, dir, t, i);
+        let py = self.along(s, origin, dir, t, j);
+        let ((bx, by), (cx, cy)) = ((b[i] - a[i], b[j] - a[j]), (c[i] - a[i], c[j] - a[j]));
+        let scale = s.splat_f64(1.0 / (bx * cy - by * cx));
+        let u = s.sub_f64(s.mul_f64(px, s.splat_f64(cy)), s.mul_f64(py, s.splat_f64(cx)));
+        let v = s.sub_f64(s.mul_f64(s.splat_f64(bx), py), s.mul_f64(s.splat_f64(by), px));
+        let u = self.clamped(s, s.mul_f64(u, scale));
+        let v = self.clamped(s, s.mul_f64(v, scale));
+        let (u, mut v) = (s.store(u), s.store(v));
+        for lane in 0..LANES {
+            v[lane] = if u[lane] + v[lane] > 1.0 { 1.0 - u[lane] } else { v[lane] };
+        }
+        [u, v]
+    }
+
+    /// Coordinate `k` of the places at `t`, relative to the first corner.
+    #[inline(always)]
+    fn along<S: Simd>(&self, s: S, origin: &[Row; 3], dir: &[Row; 3], t: S::Doubles, k: usize) -> S::Doubles {
+        let (o, d) = (s.widen(s.load(&origin[k % 3])), s.widen(s.load(&dir[k % 3])));
+        s.sub_f64(s.add_f64(o, s.mul_f64(d, t)), s.splat_f64(self.corners[0][k % 3]))
+    }
+
+    /// Within 0 to 1, rounded; 0 for a NaN.
+    #[inline(always)]
+    fn clamped<S: Simd>(&self, s: S, x: S::Doubles) -> S::Lanes {
+        let positive = s.greater_f64(x, s.splat_f64(0.0));
+        s.narrow(s.smaller_f64(positive, s.splat_f64(1.0)))
+    }
+}
+
+/// The verdicts on triangles by their sheared corners, where that is certain.
 #[inline(always)]
-fn largest2<S: Simd>(s: S, x: S::Lanes, y: S::Lanes) -> S::Lanes {
-    s.greater(s.abs(x), s.abs(y))
+fn judge<S: Simd>(s: S, corners: [[S::Lanes; 2]; 3], reach: S::Lanes, margins: EdgeMargins) -> Verdicts {
+    let [[ax, ay], [bx, by], [cx, cy]] = corners;
+    let u = s.sub(s.mul(cx, by), s.mul(cy, bx));
+    let v = s.sub(s.mul(ax, cy), s.mul(ay, cx));
+    let w = s.sub(s.mul(bx, ay), s.mul(by, ax));
+
+    let spread = s.greater(largest2(s, ax, ay), s.greater(largest2(s, bx, by), largest2(s, cx, cy)));
+    let error = margins.error_lanes(s, reach, spread);
+    let negative = s.sub(s.splat(0.0), error);
+    let (low, high) = (s.smaller(u, s.smaller(v, w)), s.greater(u, s.greater(v, w)));
+
+    // Overflow makes the bound too large or NaN, and the comparisons false.
+    let sound = s.less(error, s.splat(margins.overflow));
+    let miss = s.less(low, negative) & s.less(error, high);
+    let hit = (s.less(error, low) | s.less(high, negative)) & sound;
+    Verdicts { hit, unsure: !(hit | miss & sound) & 0xff }
 }
 
 #[inline(always)]
-fn largest3<S: Simd>(s: S, [x, y, z]: [S::Lanes; 3]) -> S::Lanes {
-    s.greater(s.abs(x), largest2(s, y, z))
+fn largest2<S: Simd>(s: S, x: S::Lanes, y: S::Lanes) -> S::Lanes {
+    s.greater(s.abs(x), s.abs(y))
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::random::Random;
     use super::super::simd::{Kernel, Level};
-    use super::super::triangle;
+    use super::super::triangle::{self, Triangle};
     use super::*;
+
+    /// As [`reach`], of the corners themselves.
+    fn farthest(ray: &RaySpace, corners: &Corners8) -> f32 {
+        let place = |k: usize| corners.iter().flat_map(move |corner| corner[k]);
+        (0..3).flat_map(|k| place(k).map(move |x| (x - ray.origin[k]).abs())).fold(0.0, f32::max)
+    }
 
     struct Test<'a>(&'a RaySpace, &'a Corners8);
 
@@ -119,7 +305,7 @@ mod tests {
 
         #[inline(always)]
         fn run<S: Simd>(self, s: S) -> Verdicts {
-            RayLanes::new(s, self.0).verdicts(s, self.1)
+            RayLanes::new(s, self.0, farthest(self.0, self.1)).verdicts(s, self.1)
         }
     }
 
@@ -193,7 +379,7 @@ mod tests {
 
         #[inline(always)]
         fn run<S: Simd>(self, s: S) -> Verdicts {
-            RayLanes::new(s, self.0).verdicts_within(s, self.1, self.2)
+            RayLanes::new(s, self.0, farthest(self.0, self.1)).verdicts_within(s, self.1, self.2)
         }
     }
 
@@ -245,5 +431,63 @@ mod tests {
         set_corners(&mut corners, 2, &[Vec3::X, Vec3::Y, Vec3::NEG_ONE]);
         let ray = RaySpace::new(Vec3::new(0.0, 0.0, 5.0), Vec3::NEG_Z).map(|r| Level::PORTABLE.run(Test(&r, &corners)));
         assert_eq!(ray, Some(Verdicts { hit: 0b100, unsure: 0b1111_1011 }));
+    }
+
+    /// Eight rays against the first of eight triangles: the verdicts, where they meet its plane, and the weights there.
+    struct Row8<'a>(&'a [RaySpace; LANES], &'a Triangle);
+
+    impl Kernel for Row8<'_> {
+        type Output = (Verdicts, Meetings, [Row; 2]);
+
+        #[inline(always)]
+        fn run<S: Simd>(self, s: S) -> Self::Output {
+            let Self(rays, triangle) = self;
+            let (mut origin, mut dir) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+            for (lane, ray) in rays.iter().enumerate() {
+                for k in 0..3 {
+                    (origin[k][lane], dir[k][lane]) = (ray.origin[k], ray.dir[k]);
+                }
+            }
+            let far = rays.iter().map(|r| reach(r.origin, &Aabb::around(*triangle))).fold(0.0, f32::max);
+            let verdicts = RayRow::new(s, &origin, &dir, rays[0].z, far).verdicts(s, triangle);
+            let plane = Plane::of(triangle);
+            let met = plane.meet(s, &origin, &dir);
+            (verdicts, met, plane.barycentrics(s, &origin, &dir, &met.t_f64))
+        }
+    }
+
+    #[test]
+    fn eight_rays_side_by_side_meet_a_triangle_as_each_does_alone() {
+        let mut random = Random::new(21);
+        let (mut hits, mut sure) = (0, 0);
+        for _ in 0..3000 {
+            let triangle = [random.cube(), random.cube(), random.cube()];
+            let origin = random.cube() * 4.0;
+            let aim = |_| triangle::within(&triangle, random.unit() * 1.2, random.unit());
+            let rays: Vec<RaySpace> = (0..LANES).map(aim).filter_map(|p| RaySpace::new(origin, p - origin)).collect();
+            let Ok(rays) = <[RaySpace; LANES]>::try_from(rays) else { continue };
+            if rays.iter().any(|r| r.z != rays[0].z) {
+                continue;
+            }
+            for level in Level::all() {
+                let (verdicts, met, [u, v]) = level.run(Row8(&rays, &triangle));
+                for (lane, ray) in rays.iter().enumerate() {
+                    let (bit, hit) = (1 << lane, triangle::is_hit(ray, &triangle));
+                    assert!(verdicts.unsure & bit != 0 || (verdicts.hit & bit != 0) == hit, "{}", level.name());
+                    if !hit || met.sure & bit == 0 {
+                        continue;
+                    }
+                    let alone = triangle::meet(ray, &triangle);
+                    assert_eq!(
+                        (met.t[lane].to_bits(), met.t_f64[lane].to_bits()),
+                        (alone.t.to_bits(), alone.t_f64.to_bits())
+                    );
+                    assert_eq!((u[lane], v[lane]), triangle::barycentrics(ray, &triangle));
+                    sure += 1;
+                }
+                hits += rays.iter().filter(|r| triangle::is_hit(r, &triangle)).count();
+            }
+        }
+        assert!(sure > 10_000 && sure > hits * 9 / 10, "{sure} of {hits}");
     }
 }

@@ -5,14 +5,16 @@
 use super::node::Block;
 use crate::accel::query::{Culling, Goal, Query};
 use crate::accel::{Intersector, Probe, Shapes};
+use crate::math::aabb::Aabb;
 use crate::math::simd::{Kernel, LANES, Level, Simd};
-use crate::math::triangles::{RayLanes, set_corners};
+use crate::math::triangles::{RayLanes, reach, set_corners};
 
 /// All triangles as blocks.
 #[derive(Clone, Debug)]
 pub struct Listed<'a> {
     shapes: &'a Shapes,
     blocks: Vec<Block>,
+    bounds: Aabb,
     level: Level,
 }
 
@@ -28,7 +30,8 @@ impl<'a> Listed<'a> {
             }
             block
         };
-        Self { shapes, blocks: (0..count).step_by(LANES).map(block).collect(), level: Level::best() }
+        let blocks = (0..count).step_by(LANES).map(block).collect();
+        Self { shapes, blocks, bounds: Aabb::around(shapes.vertices.iter().copied()), level: Level::best() }
     }
 }
 
@@ -58,13 +61,13 @@ impl<G: Goal, P: Probe> Kernel for All<'_, '_, G, P> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         let Self { listed, query, probe } = self;
-        let lanes = RayLanes::new(s, &query.ray);
+        let lanes = RayLanes::new(s, &query.ray, reach(query.ray.origin, &listed.bounds));
         let mut left = listed.shapes.triangles.len();
         for block in &listed.blocks {
             let count = left.min(LANES);
             left -= count;
             let answered = if G::Test::EXACT {
-                query.test_block(&block.prims, count as u32, lanes.verdicts(s, &block.corners), probe)
+                query.test_block(&block.prims, &block.corners, count as u32, lanes.verdicts(s, &block.corners), probe)
             } else {
                 block.prims[..count].iter().any(|&prim| query.test(prim, probe))
             };

@@ -3,7 +3,8 @@
 
 use std::marker::PhantomData;
 
-use super::walk::{BoxMargins, Derived, Stack};
+use super::slabs::{BoxMargins, Derived};
+use super::walk::Stack;
 use super::{Splitting, Wide};
 use crate::accel::query::{Culling, Goal, Query};
 use crate::accel::tests::scenes::{lattice, mesh, moved, ray, rays, soup};

@@ -1,34 +1,79 @@
 //! The fast structures: a tree of nodes with eight children, whose leaves are blocks of eight triangles.
 //!
-//! Two ways of cutting the scene share one memory layout (`node`), one walk (`walk`) and one proof (`check`):
+//! Two ways of cutting the scene share one memory layout (`node`), one proof (`check`) and three ways of tracing a wave:
 //!
 //! - `fast-octree` ([`Splitting::Octree`]): the uniform grid refined by octrees, kept as boxes. The scene's cube is cut at
-//!   dyadic planes, those of grid and octree cells, each time at the coarsest plane that separates what is left; every
-//!   part keeps the tight box of its prims instead of the cell, so that empty space is never visited.
+//!   dyadic planes, those of grid and octree cells; every part keeps the tight box of its prims instead of the cell, so
+//!   that empty space is never visited.
 //! - `fast-bvh` ([`Splitting::SurfaceArea`]): a hierarchy of boxes by the surface area heuristic in bins.
 //!
-//! In both, binary cuts are fused by area into nodes of eight (I. Wald, C. Benthin, S. Boulos, *Getting Rid of Packets*,
-//! 2008). Each prim is listed once, so there is no mailbox: there would be nothing for it to save.
+//! In both, the binary cuts are improved and fused into nodes of eight (`build`). Each prim is listed once, so there is no
+//! mailbox: there would be nothing for it to save.
+//!
+//! Rays go one by one (`walk`), many in flight (`flight`) or sixteen side by side (`packet`). Hits are ordered by (t, prim)
+//! and every test gives an exact verdict, so that neither the order of visits nor the company of other rays can change an
+//! answer. Counts are those of one ray at a time: whoever listens gets that.
 
 mod build;
 mod check;
+mod flight;
 mod listed;
 #[cfg(test)]
 mod margins;
 mod node;
+mod packet;
+mod slabs;
 pub(super) mod split;
 mod walk;
+#[cfg(test)]
+mod ways;
 
 pub use listed::Listed;
 pub use split::Splitting;
 
 use std::marker::PhantomData;
 
+use self::flight::InFlight;
 use self::node::Tree;
-use self::walk::{BoxMargins, Derived, Stack, Walk};
+use self::packet::{InPackets, RAYS};
+use self::slabs::{BoxMargins, Derived};
+use self::walk::{OneByOne, Stack, Walk};
 use super::query::{Culling, Goal, Query};
+use super::wave::Wave;
 use super::{Probe, Shapes};
 use crate::math::simd::Level;
+
+/// How the rays of a wave are traced. The answers are the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RayOrder {
+    /// Side by side where most rays run alike, else in flight; one after another where there are few.
+    Adaptive,
+    /// One after another.
+    OneByOne,
+    /// Many at a time, each its own way.
+    InFlight,
+    /// Sixteen side by side where they run alike, the others one after another.
+    Packets,
+}
+
+impl RayOrder {
+    /// What suits a wave: by how many of the packets that it would make run to one octant, as far as three rays of each
+    /// tell.
+    fn of<W: Wave>(wave: &W) -> Self {
+        let octant = |i: usize| {
+            let dir = wave.ray(i).dir;
+            [dir.x, dir.y, dir.z].map(f32::is_sign_negative)
+        };
+        let packets = wave.len() / RAYS;
+        let starts = (0..packets).map(|p| p * RAYS);
+        let alike = starts.filter(|&i| octant(i) == octant(i + RAYS / 2) && octant(i) == octant(i + RAYS - 1)).count();
+        match packets {
+            0 => Self::OneByOne,
+            _ if 2 * alike > packets => Self::Packets,
+            _ => Self::InFlight,
+        }
+    }
+}
 
 /// A tree of eight-wide nodes over shapes.
 #[derive(Clone, Debug)]
@@ -37,18 +82,31 @@ pub struct Wide<'a> {
     splitting: Splitting,
     tree: Tree,
     level: Level,
+    rays: RayOrder,
 }
 
 impl<'a> Wide<'a> {
     /// Builds it over the bounded prims; the same for every number of threads.
     pub fn build(shapes: &'a Shapes, splitting: Splitting) -> Self {
-        Self { shapes, splitting, tree: build::build(shapes, splitting), level: Level::best() }
+        Self {
+            shapes,
+            splitting,
+            tree: build::build(shapes, splitting),
+            level: Level::best(),
+            rays: RayOrder::Adaptive,
+        }
     }
 
     /// Walks with another instruction set than the best one; the answers are the same.
     #[must_use]
     pub fn at_level(self, level: Level) -> Self {
         Self { level, ..self }
+    }
+
+    /// Traces waves in another way; the answers are the same.
+    #[must_use]
+    pub fn with_rays(self, rays: RayOrder) -> Self {
+        Self { rays, ..self }
     }
 
     /// Walks by given margins.
@@ -71,10 +129,48 @@ impl Culling for Wide<'_> {
     }
 
     fn new_scratch(&self) -> Stack {
-        Stack::default()
+        Stack::new(&self.tree)
     }
 
     fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, stack: &mut Stack, probe: &mut P) {
         self.walk_within::<Derived, _, _>(query, stack, probe);
+    }
+
+    fn trace<W: Wave, P: Probe>(&self, wave: &mut W, stack: &mut Stack, probe: &mut P) {
+        // Where it is false nothing is compiled for it.
+        if Together::<W, P>::MAY {
+            return self.trace_together(wave, stack, probe);
+        }
+        let (tree, shapes) = (&self.tree, self.shapes);
+        self.level.run(OneByOne { tree, shapes, wave, stack, probe, margins: PhantomData::<Derived> });
+    }
+}
+
+/// Whether rays may be asked in any way that gives the same answers: nobody counts, and the test is exact.
+struct Together<W, P>(PhantomData<(W, P)>);
+
+impl<W: Wave, P: Probe> Together<W, P> {
+    const MAY: bool = P::SILENT && W::Goal::EXACT;
+}
+
+impl Wide<'_> {
+    fn trace_together<W: Wave, P: Probe>(&self, wave: &mut W, stack: &mut Stack, probe: &mut P) {
+        let (tree, shapes, margins) = (&self.tree, self.shapes, PhantomData::<Derived>);
+        let rays = match self.rays {
+            _ if !shapes.planes.is_empty() || tree.nodes.is_empty() => RayOrder::OneByOne,
+            RayOrder::Adaptive => RayOrder::of(wave),
+            rays => rays,
+        };
+        match rays {
+            RayOrder::InFlight => {
+                let Stack { entries, flight, .. } = stack;
+                self.level.run(InFlight { tree, shapes, wave, stack: flight, entries, probe, margins });
+            }
+            RayOrder::Packets => {
+                let Stack { entries, branches, .. } = stack;
+                self.level.run(InPackets { tree, shapes, wave, stack: branches, entries, probe, margins });
+            }
+            _ => self.level.run(OneByOne { tree, shapes, wave, stack, probe, margins }),
+        }
     }
 }

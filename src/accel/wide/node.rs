@@ -10,28 +10,33 @@ use crate::math::triangles::{Corners8, NO_CORNERS};
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Node {
-    /// By axis, lower and upper plane, child.
-    pub planes: [[Row; 2]; 3],
+    /// Planes of the children: lower and upper x, lower and upper y, lower and upper z.
+    pub planes: [Row; 6],
     /// Packed [`Child`]ren.
     pub children: [u32; LANES],
 }
 
 impl Node {
     /// No child.
-    pub(super) const EMPTY: Self =
-        Self { planes: [[[f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]]; 3], children: [Child::NOTHING; LANES] };
+    pub(super) const EMPTY: Self = Self {
+        planes: {
+            let (lower, upper) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+            [lower, upper, lower, upper, lower, upper]
+        },
+        children: [Child::NOTHING; LANES],
+    };
 
     pub(super) fn set(&mut self, slot: usize, bounds: &Aabb, child: Child) {
-        for (rows, (lo, hi)) in self.planes.iter_mut().zip(bounds.lo.to_array().into_iter().zip(bounds.hi.to_array())) {
-            rows[0][slot] = lo;
-            rows[1][slot] = hi;
+        for k in 0..3 {
+            self.planes[2 * k][slot] = bounds.lo[k];
+            self.planes[2 * k + 1][slot] = bounds.hi[k];
         }
         self.children[slot] = child.pack();
     }
 
     /// The box of a child; empty where there is none.
     pub(super) fn bounds(&self, slot: usize) -> Aabb {
-        let corner = |side: usize| [0, 1, 2].map(|k: usize| self.planes[k][side][slot]).into();
+        let corner = |side: usize| [0, 1, 2].map(|k: usize| self.planes[2 * k + side][slot]).into();
         Aabb { lo: corner(0), hi: corner(1) }
     }
 }
@@ -50,6 +55,8 @@ pub(super) enum Child {
 impl Child {
     /// A block without triangles: where an empty slot leads.
     pub(super) const NOTHING: u32 = Self::LEAF;
+    /// No child, packed: the end of a stack. The last run there could be, which no tree has.
+    pub(super) const END: u32 = u32::MAX;
     const LEAF: u32 = 1 << 31;
     const COUNT: u32 = 27;
     /// A count that no block has marks a run.
@@ -61,6 +68,19 @@ impl Child {
             Self::Block(i, count) => Self::LEAF | count << Self::COUNT | i,
             Self::Run(i) => Self::LEAF | Self::RUN << Self::COUNT | i,
         }
+    }
+
+    /// Whether a packed child is no node.
+    #[inline(always)]
+    pub(super) fn is_leaf(word: u32) -> bool {
+        word & Self::LEAF != 0
+    }
+
+    /// The index of the node or of the block that a packed child leads to, and 0 for the other; without branches.
+    #[inline(always)]
+    pub(super) fn either(word: u32) -> (usize, usize) {
+        let leaf = (word >> 31).wrapping_neg();
+        ((word & !leaf) as usize, (word & leaf & ((1 << Self::COUNT) - 1)) as usize)
     }
 
     #[inline(always)]
@@ -99,7 +119,7 @@ impl Block {
 }
 
 /// Everything in arrays.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Tree {
     /// The first is the root; there is none when there are no bounded prims.
     pub nodes: Vec<Node>,
@@ -107,8 +127,26 @@ pub(super) struct Tree {
     /// Other prims than triangles: (first, number) in [`Self::prims`].
     pub runs: Vec<(u32, u32)>,
     pub prims: Vec<u32>,
+    /// Around everything.
+    pub bounds: Aabb,
     /// Largest coordinate of a box, in size.
     pub extent: f32,
+    /// Nodes on the longest way down.
+    pub depth: u32,
+}
+
+impl Default for Tree {
+    fn default() -> Self {
+        Self {
+            nodes: Vec::new(),
+            blocks: Vec::new(),
+            runs: Vec::new(),
+            prims: Vec::new(),
+            bounds: Aabb::EMPTY,
+            extent: 0.0,
+            depth: 0,
+        }
+    }
 }
 
 struct Offsets {
@@ -129,6 +167,22 @@ impl Tree {
         self.runs.extend(part.runs.into_iter().map(|(first, len)| (first + prims, len)));
         self.prims.extend(part.prims);
         Child::Node(by.nodes)
+    }
+
+    /// Notes what walks must know of the whole.
+    pub(super) fn finish(mut self, bounds: Aabb) -> Self {
+        self.bounds = bounds;
+        self.extent = bounds.lo.abs().max(bounds.hi.abs()).max_element();
+        self.depth = if self.nodes.is_empty() { 0 } else { self.depth_below(0) };
+        self
+    }
+
+    fn depth_below(&self, node: u32) -> u32 {
+        let below = |&child: &u32| match Child::unpack(child) {
+            Child::Node(i) => self.depth_below(i),
+            _ => 0,
+        };
+        1 + self.nodes[node as usize].children.iter().map(below).max().unwrap_or(0)
     }
 
     /// Bytes of the arrays.

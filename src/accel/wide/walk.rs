@@ -1,48 +1,112 @@
 //! The way of one ray down the tree, nearer children first.
-//!
-//! # Why no hit is lost
-//! A prim lies in the boxes above it, exactly: they are made of its own `f32` coordinates. The distances to a box's planes
-//! err by [`SLAB_F32`] at most, relative, and [`BOX_UNDERFLOW`], so a box is entered whenever the exact ray meets it within
-//! its range, widened by [`BOX_MARGIN`]. Only where that holds are boxes asked at all: a direction whose reciprocal is not a normal number
-//! constrains nothing on its axis, and with coordinates beyond [`BOX_COORDINATES`] every prim is tested.
 
 use std::marker::PhantomData;
 
+use super::flight::Levels;
 use super::node::{Child, Node, Tree};
+use super::packet::Branch;
+use super::slabs::{BoxMargins, Slabs};
 use crate::accel::query::{Goal, Query};
-use crate::accel::{Intersector, Probe};
+use crate::accel::wave::{Wave, begin, end};
+use crate::accel::{Intersector, Probe, Shapes};
 use crate::math::Vec3;
-use crate::math::bounds::{BOX_COORDINATES, BOX_MARGIN, BOX_UNDERFLOW, SLAB_F32};
 use crate::math::simd::{Kernel, LANES, Simd};
-use crate::math::triangles::RayLanes;
-
-/// What a walk allows for.
-pub(in crate::accel) trait BoxMargins {
-    /// Relative error of a distance to a plane.
-    const SLAB: f32 = SLAB_F32;
-    /// How far beyond the ray's range boxes are entered, relative.
-    const RANGE: f32 = BOX_MARGIN;
-    /// What underflow adds to either.
-    const UNDERFLOW: f32 = BOX_UNDERFLOW;
-    /// Largest coordinate with which boxes are asked.
-    const COORDINATES: f32 = BOX_COORDINATES;
-}
-
-/// The margins that `math::bounds` derives.
-pub(in crate::accel) struct Derived;
-
-impl BoxMargins for Derived {}
+use crate::math::triangles::{RayLanes, reach};
 
 /// A child still to be visited, and the distance at which the ray enters its box.
-#[derive(Clone, Copy, Debug)]
-struct Entry {
-    near: f32,
-    child: u32,
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Entry {
+    pub near: f32,
+    pub child: u32,
 }
 
-/// Children still to be visited, the nearest last.
+/// Children still to be visited, the nearest last. As long as the tree is deep can make it.
 #[derive(Clone, Debug, Default)]
-pub struct Stack(Vec<Entry>);
+pub struct Stack {
+    /// Of one ray.
+    pub(super) entries: Vec<Entry>,
+    /// Of many rays.
+    pub(super) flight: Levels,
+    /// Of a packet.
+    pub(super) branches: Vec<Branch>,
+}
+
+impl Stack {
+    /// For walks down `tree`: every node on the way leaves up to seven children behind.
+    pub(super) fn new(tree: &Tree) -> Self {
+        let most = (LANES - 1) * tree.depth as usize + LANES;
+        Self {
+            entries: vec![Entry::default(); most],
+            flight: Levels::new(most),
+            branches: vec![Branch::default(); most],
+        }
+    }
+}
+
+/// Rays one after another.
+pub(super) struct OneByOne<'w, W, P, B> {
+    pub tree: &'w Tree,
+    pub shapes: &'w Shapes,
+    pub wave: &'w mut W,
+    pub stack: &'w mut Stack,
+    pub probe: &'w mut P,
+    pub margins: PhantomData<B>,
+}
+
+impl<W: Wave, P: Probe, B: BoxMargins> Kernel for OneByOne<'_, W, P, B> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) {
+        let Self { tree, shapes, wave, stack: Stack { entries: stack, .. }, probe, .. } = self;
+        let Some(root) = tree.nodes.first().filter(|_| shapes.planes.is_empty()) else {
+            return (0..wave.len()).for_each(|i| ask_by_itself::<B, _, _, _>(s, tree, shapes, wave, i, stack, probe));
+        };
+        for i in 0..wave.len() {
+            let ray = wave.ray(i);
+            if !(B::allow(tree, ray.origin) && has_direction(ray.dir)) {
+                ask_by_itself::<B, _, _, _>(s, tree, shapes, wave, i, stack, probe);
+                continue;
+            }
+            // Many rays meet no box at all: those need no more than this.
+            let slabs = Slabs::<B>::new(ray.origin, ray.dir, wave.t_min(i));
+            let met = slabs.meets(s, root, B::widened(ray.t_max));
+            if P::SILENT && met.1 == 0 {
+                wave.miss(i);
+                continue;
+            }
+            let (mut query, usable) = begin(shapes, wave, i, probe);
+            if usable {
+                descend(s, tree, &slabs, met, &mut query, stack, probe);
+            }
+            end(wave, i, &query, probe);
+        }
+    }
+}
+
+#[inline(always)]
+pub(super) fn has_direction(dir: Vec3) -> bool {
+    let (x, y, z) = (dir.x.abs(), dir.y.abs(), dir.z.abs());
+    (x <= f32::MAX) & (y <= f32::MAX) & (z <= f32::MAX) & ((x > 0.0) | (y > 0.0) | (z > 0.0))
+}
+
+/// For the few that are not like the others.
+#[inline(always)]
+pub(super) fn ask_by_itself<B: BoxMargins, S: Simd, W: Wave, P: Probe>(
+    s: S,
+    tree: &Tree,
+    shapes: &Shapes,
+    wave: &mut W,
+    i: usize,
+    stack: &mut [Entry],
+    probe: &mut P,
+) {
+    let (mut query, usable) = begin(shapes, wave, i, probe);
+    if usable && !query.test_planes(probe) {
+        walk::<B, _, _, _>(s, tree, &mut query, stack, probe);
+    }
+    end(wave, i, &query, probe);
+}
 
 /// One query under way.
 pub(super) struct Walk<'w, 'q, G: Goal, P, B> {
@@ -53,92 +117,124 @@ pub(super) struct Walk<'w, 'q, G: Goal, P, B> {
     pub margins: PhantomData<B>,
 }
 
-/// A ray ready to be tested against boxes.
-struct Slabs<S: Simd, B> {
-    origin: [S::Lanes; 3],
-    inverse: [S::Lanes; 3],
-    /// Which plane of each axis comes first: 1 where the ray runs backwards.
-    first: [usize; 3],
-    from: f32,
-    margins: PhantomData<B>,
-}
-
 impl<G: Goal, P: Probe, B: BoxMargins> Kernel for Walk<'_, '_, G, P, B> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Self { tree, query, stack: Stack(stack), probe, .. } = self;
-        if tree.nodes.is_empty() {
-            return;
-        }
-        let far_out = query.ray.origin.abs().max_element().max(tree.extent);
-        if far_out > B::COORDINATES {
-            return test_all(query, probe);
-        }
-        let slabs = Slabs::<S, B>::new(s, query.ray.origin, query.ray.dir, query.t_min);
-        let lanes = RayLanes::new(s, &query.ray);
-        let mut limit = widened::<B>(query.reach());
-        let mut child = 0;
-        stack.clear();
-        loop {
-            probe.visit(|| tree.visit(child, query.shapes()));
-            match Child::unpack(child) {
-                Child::Node(node) => {
-                    probe.step();
-                    probe.volume_tests(LANES);
-                    let node = &tree.nodes[node as usize];
-                    if let Some(nearest) = slabs.enter(s, node, limit, stack) {
-                        child = nearest;
-                        continue;
-                    }
-                }
-                Child::Block(block, count) => {
-                    probe.step();
-                    probe.cell(false);
-                    let block = &tree.blocks[block as usize];
-                    let answered = if G::Test::EXACT {
-                        let verdicts = lanes.verdicts(s, &block.corners);
-                        query.test_block(&block.prims, count, verdicts, probe)
-                    } else {
-                        block.prims[..count as usize].iter().any(|&prim| query.test(prim, probe))
-                    };
-                    if answered {
-                        return;
-                    }
-                    limit = widened::<B>(query.reach());
-                }
-                Child::Run(run) => {
-                    probe.step();
-                    probe.cell(false);
-                    for &prim in tree.run(run) {
-                        if query.test(prim, probe) {
-                            return;
-                        }
-                    }
-                    limit = widened::<B>(query.reach());
-                }
-            }
-            loop {
-                let Some(entry) = stack.pop() else { return };
-                if entry.near <= limit {
-                    child = entry.child;
-                    break;
-                }
-            }
-        }
+        walk::<B, _, _, _>(s, self.tree, self.query, &mut self.stack.entries, self.probe);
     }
 }
 
-/// The distance up to which boxes must be entered for hits up to `reach`.
+/// From the root to every leaf that the ray may hit, the nearest first.
 #[inline(always)]
-fn widened<B: BoxMargins>(reach: f32) -> f32 {
-    reach + reach.abs() * B::RANGE + B::UNDERFLOW
+fn walk<B: BoxMargins, S: Simd, G: Goal, P: Probe>(
+    s: S,
+    tree: &Tree,
+    query: &mut Query<G>,
+    stack: &mut [Entry],
+    probe: &mut P,
+) {
+    if tree.nodes.is_empty() {
+        return;
+    }
+    if !B::allow(tree, query.ray.origin) {
+        return test_all(query, probe);
+    }
+    let slabs = Slabs::<B>::new(query.ray.origin, query.ray.dir, query.t_min);
+    let met = slabs.meets(s, &tree.nodes[0], B::widened(query.reach()));
+    descend(s, tree, &slabs, met, query, stack, probe);
+}
+
+/// From the root, whose boxes are `met`, to every leaf that the ray may hit, the nearest first.
+#[inline(always)]
+fn descend<B: BoxMargins, S: Simd, G: Goal, P: Probe>(
+    s: S,
+    tree: &Tree,
+    slabs: &Slabs<B>,
+    met: (S::Lanes, u32),
+    query: &mut Query<G>,
+    stack: &mut [Entry],
+    probe: &mut P,
+) {
+    let lanes = RayLanes::new(s, &query.ray, reach(query.ray.origin, &tree.bounds));
+    let (mut near, mut met) = met;
+    let mut limit = B::widened(query.reach());
+    let (mut node, mut top) = (&tree.nodes[0], 0);
+    probe.visit(|| tree.visit(0, query.shapes()));
+    loop {
+        probe.step();
+        probe.volume_tests(LANES);
+        let mut child = if met != 0 {
+            nearest(s, node, near, met, stack, &mut top)
+        } else {
+            match pop(stack, &mut top, limit) {
+                Some(child) => child,
+                None => return,
+            }
+        };
+        let inner = loop {
+            probe.visit(|| tree.visit(child, query.shapes()));
+            let leaf = match Child::unpack(child) {
+                Child::Node(inner) => break inner,
+                leaf => leaf,
+            };
+            probe.step();
+            probe.cell(false);
+            if test_leaf(s, tree, leaf, &lanes, query, probe) {
+                return;
+            }
+            limit = B::widened(query.reach());
+            match pop(stack, &mut top, limit) {
+                Some(next) => child = next,
+                None => return,
+            }
+        };
+        node = &tree.nodes[inner as usize];
+        (near, met) = slabs.meets(s, node, limit);
+    }
+}
+
+/// The next child that may hold a hit up to `limit`.
+#[inline(always)]
+fn pop(stack: &[Entry], top: &mut usize, limit: f32) -> Option<u32> {
+    while *top > 0 {
+        *top -= 1;
+        let entry = stack[*top];
+        if entry.near <= limit {
+            return Some(entry.child);
+        }
+    }
+    None
+}
+
+/// Tests the prims of a leaf, and tells whether the query is answered.
+#[inline(always)]
+pub(super) fn test_leaf<S: Simd, G: Goal, P: Probe>(
+    s: S,
+    tree: &Tree,
+    leaf: Child,
+    lanes: &RayLanes<S>,
+    query: &mut Query<G>,
+    probe: &mut P,
+) -> bool {
+    match leaf {
+        Child::Block(block, count) if G::Test::EXACT => {
+            let block = &tree.blocks[block as usize];
+            let verdicts = lanes.verdicts(s, &block.corners);
+            query.test_block(&block.prims, &block.corners, count, verdicts, probe)
+        }
+        Child::Block(block, count) => {
+            tree.blocks[block as usize].prims[..count as usize].iter().any(|&prim| query.test(prim, probe))
+        }
+        Child::Run(run) => tree.run(run).iter().any(|&prim| query.test(prim, probe)),
+        Child::Node(_) => false,
+    }
 }
 
 #[cold]
 #[inline(never)]
-fn test_all<G: Goal, P: Probe>(query: &mut Query<G>, probe: &mut P) {
+pub(super) fn test_all<G: Goal, P: Probe>(query: &mut Query<G>, probe: &mut P) {
     for prim in 0..query.shapes().bounded() {
         if query.test(prim, probe) {
             return;
@@ -146,67 +242,30 @@ fn test_all<G: Goal, P: Probe>(query: &mut Query<G>, probe: &mut P) {
     }
 }
 
-impl<S: Simd, B: BoxMargins> Slabs<S, B> {
-    #[inline(always)]
-    fn new(s: S, origin: Vec3, dir: Vec3, t_min: f32) -> Self {
-        let inverse = dir.to_array().map(|d| {
-            let inverse = 1.0 / d;
-            // A NaN drops out of every comparison.
-            if inverse.is_normal() || d == 0.0 { inverse } else { f32::NAN }
-        });
-        Self {
-            origin: [s.splat(origin.x), s.splat(origin.y), s.splat(origin.z)],
-            inverse: [s.splat(inverse[0]), s.splat(inverse[1]), s.splat(inverse[2])],
-            first: dir.to_array().map(|d| usize::from(d.is_sign_negative())),
-            from: t_min - t_min.abs() * B::RANGE - B::UNDERFLOW,
-            margins: PhantomData,
-        }
+/// Puts the children that are met, one at least, on the stack, but for the nearest, which is returned.
+#[inline(always)]
+fn nearest<S: Simd>(s: S, node: &Node, near: S::Lanes, mut met: u32, stack: &mut [Entry], top: &mut usize) -> u32 {
+    let lane = met.trailing_zeros() as usize % LANES;
+    met &= met - 1;
+    if met == 0 {
+        return node.children[lane];
     }
-
-    /// The distances at which the ray enters the boxes of a node, and which of them it meets up to `limit`.
-    #[inline(always)]
-    fn meets(&self, s: S, node: &Node, limit: f32) -> (S::Lanes, u32) {
-        let (mut near, mut far) = (s.splat(self.from), s.splat(limit));
-        for k in 0..3 {
-            let planes = &node.planes[k];
-            let (first, last) = (&planes[self.first[k] & 1], &planes[self.first[k] & 1 ^ 1]);
-            // The second operand is kept where the first is NaN.
-            near = s.greater(s.mul(s.sub(s.load(first), self.origin[k]), self.inverse[k]), near);
-            far = s.smaller(s.mul(s.sub(s.load(last), self.origin[k]), self.inverse[k]), far);
-        }
-        let slack = s.add(s.mul(s.abs(far), s.splat(B::SLAB)), s.splat(B::UNDERFLOW));
-        (near, s.at_most(near, s.add(far, slack)))
-    }
-
-    /// Puts the children that the ray meets on the stack, but for the nearest, which is returned.
-    #[inline(always)]
-    fn enter(&self, s: S, node: &Node, limit: f32, stack: &mut Vec<Entry>) -> Option<u32> {
-        let (near, mut met) = self.meets(s, node, limit);
-        if met == 0 {
-            return None;
-        }
-        let lane = met.trailing_zeros() as usize % LANES;
+    let near = s.store(near);
+    let entry = |lane: usize| Entry { near: near[lane], child: node.children[lane] };
+    let mut nearest = entry(lane);
+    let bottom = *top;
+    while met != 0 {
+        let next = entry(met.trailing_zeros() as usize % LANES);
         met &= met - 1;
-        if met == 0 {
-            return Some(node.children[lane]);
+        let farther = if next.near < nearest.near { std::mem::replace(&mut nearest, next) } else { next };
+        // Insertion: the farther ones lie deeper.
+        let mut at = *top;
+        while at > bottom && stack[at - 1].near < farther.near {
+            stack[at] = stack[at - 1];
+            at -= 1;
         }
-        let near = s.store(near);
-        let entry = |lane: usize| Entry { near: near[lane], child: node.children[lane] };
-        let mut nearest = entry(lane);
-        let bottom = stack.len();
-        while met != 0 {
-            let next = entry(met.trailing_zeros() as usize % LANES);
-            met &= met - 1;
-            let farther = if next.near < nearest.near { std::mem::replace(&mut nearest, next) } else { next };
-            // Insertion: the farther ones lie deeper.
-            let mut at = stack.len();
-            stack.push(farther);
-            while at > bottom && stack[at - 1].near < farther.near {
-                stack[at] = stack[at - 1];
-                at -= 1;
-            }
-            stack[at] = farther;
-        }
-        Some(nearest.child)
+        stack[at] = farther;
+        *top += 1;
     }
+    nearest.child
 }

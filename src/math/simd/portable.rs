@@ -1,6 +1,6 @@
 //! The scalar form: what the other levels must equal bit for bit.
 
-use super::{LANES, Row, Simd};
+use super::{LANES, Order, Pick, Row, Simd};
 
 /// Needs nothing of the processor.
 #[derive(Clone, Copy, Debug)]
@@ -12,12 +12,18 @@ fn each(a: Row, b: Row, f: impl Fn(f32, f32) -> f32) -> Row {
 }
 
 #[inline(always)]
+fn each_f64(a: [f64; LANES], b: [f64; LANES], f: impl Fn(f64, f64) -> f64) -> [f64; LANES] {
+    std::array::from_fn(|k| f(a[k], b[k]))
+}
+
+#[inline(always)]
 fn mask(a: Row, b: Row, holds: impl Fn(f32, f32) -> bool) -> u32 {
     (0..LANES).fold(0, |mask, k| mask | u32::from(holds(a[k], b[k])) << k)
 }
 
 impl Simd for Portable {
     type Lanes = Row;
+    type Doubles = [f64; LANES];
 
     #[inline(always)]
     fn splat(self, x: f32) -> Row {
@@ -27,6 +33,11 @@ impl Simd for Portable {
     #[inline(always)]
     fn load(self, row: &Row) -> Row {
         *row
+    }
+
+    #[inline(always)]
+    fn pick(self, rows: &[Row; 6], Pick(i): Pick) -> Row {
+        rows[i]
     }
 
     #[inline(always)]
@@ -47,6 +58,11 @@ impl Simd for Portable {
     #[inline(always)]
     fn mul(self, a: Row, b: Row) -> Row {
         each(a, b, |a, b| a * b)
+    }
+
+    #[inline(always)]
+    fn div(self, a: Row, b: Row) -> Row {
+        each(a, b, |a, b| a / b)
     }
 
     #[inline(always)]
@@ -73,4 +89,88 @@ impl Simd for Portable {
     fn at_most(self, a: Row, b: Row) -> u32 {
         mask(a, b, |a, b| a <= b)
     }
+
+    #[inline(always)]
+    fn transpose(self, rows: &[Row; LANES]) -> [Row; LANES] {
+        std::array::from_fn(|i| std::array::from_fn(|k| rows[k][i]))
+    }
+
+    #[inline(always)]
+    fn splat_f64(self, x: f64) -> [f64; LANES] {
+        [x; LANES]
+    }
+
+    #[inline(always)]
+    fn widen(self, a: Row) -> [f64; LANES] {
+        a.map(f64::from)
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what this does")]
+    fn narrow(self, a: [f64; LANES]) -> Row {
+        a.map(|x| x as f32)
+    }
+
+    #[inline(always)]
+    fn load_f64(self, row: &[f64; LANES]) -> [f64; LANES] {
+        *row
+    }
+
+    #[inline(always)]
+    fn store_f64(self, a: [f64; LANES]) -> [f64; LANES] {
+        a
+    }
+
+    #[inline(always)]
+    fn add_f64(self, a: [f64; LANES], b: [f64; LANES]) -> [f64; LANES] {
+        each_f64(a, b, |a, b| a + b)
+    }
+
+    #[inline(always)]
+    fn sub_f64(self, a: [f64; LANES], b: [f64; LANES]) -> [f64; LANES] {
+        each_f64(a, b, |a, b| a - b)
+    }
+
+    #[inline(always)]
+    fn mul_f64(self, a: [f64; LANES], b: [f64; LANES]) -> [f64; LANES] {
+        each_f64(a, b, |a, b| a * b)
+    }
+
+    #[inline(always)]
+    fn div_f64(self, a: [f64; LANES], b: [f64; LANES]) -> [f64; LANES] {
+        each_f64(a, b, |a, b| a / b)
+    }
+
+    #[inline(always)]
+    fn greater_f64(self, a: [f64; LANES], b: [f64; LANES]) -> [f64; LANES] {
+        each_f64(a, b, |a, b| if a > b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn smaller_f64(self, a: [f64; LANES], b: [f64; LANES]) -> [f64; LANES] {
+        each_f64(a, b, |a, b| if a < b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn abs_f64(self, a: [f64; LANES]) -> [f64; LANES] {
+        a.map(f64::abs)
+    }
+
+    #[inline(always)]
+    fn less_f64(self, a: [f64; LANES], b: [f64; LANES]) -> u32 {
+        (0..LANES).fold(0, |mask, k| mask | u32::from(a[k] < b[k]) << k)
+    }
+
+    #[inline(always)]
+    fn arrange(self, a: Row, order: Order, to: &mut Row) {
+        *to = std::array::from_fn(|k| a[(order >> (8 * k)) as usize % LANES]);
+    }
+
+    #[inline(always)]
+    fn arrange_words(self, words: &[u32; LANES], order: Order, to: &mut [u32; LANES]) {
+        *to = std::array::from_fn(|k| words[(order >> (8 * k)) as usize % LANES]);
+    }
+
+    #[inline(always)]
+    fn prefetch<T>(self, _: &T) {}
 }

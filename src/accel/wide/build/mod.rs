@@ -22,6 +22,7 @@ use super::node::{Block, Child, Tree, index};
 use super::split::item::around_middles;
 use super::split::{Bounds, Item, Splitting, around};
 use crate::accel::Shapes;
+use crate::math::aabb::Aabb;
 use crate::math::simd::LANES;
 use crate::math::triangles::set_corners;
 
@@ -38,7 +39,7 @@ pub(super) fn build(shapes: &Shapes, splitting: Splitting) -> Tree {
     }
     let (knots, prims) = binary_tree(shapes, splitting);
     let knots = reinsert::improve(knots);
-    let extent = knots.first().map_or(0.0, |root| root.lo.abs().max(root.hi.abs()).max_element());
+    let bounds = knots.first().map_or(Aabb::EMPTY, Knot::bounds);
     let leaves = Leaves::of(&knots, &prims, shapes);
     let nodes = collapse::nodes(&knots, &leaves.children);
     drop(knots);
@@ -49,7 +50,7 @@ pub(super) fn build(shapes: &Shapes, splitting: Splitting) -> Tree {
         blocks.push(Block::EMPTY);
     }
     let others = prims[shapes.triangles.len()..].to_vec();
-    Tree { nodes, blocks, runs: leaves.runs, prims: others, extent }
+    Tree { nodes, blocks, runs: leaves.runs, prims: others, ..Tree::default() }.finish(bounds)
 }
 
 /// The binary tree over all bounded prims, and the prims of its leaves. A leaf holds triangles or other prims, never both.

@@ -1,0 +1,245 @@
+//! The same rays through other programs: `cargo bench --bench peers -- [options]`.
+//!
+//! One process, one thread: each pass sends all rays of a kind through every program in turn, and the processor time of
+//! the passes is compared by its median. Embree is loaded from the path in `MESHRAY_EMBREE`, if there is one.
+
+#![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command that prints what it measured")]
+
+mod embree;
+mod mesh;
+mod obvhs;
+mod ours;
+mod rays;
+mod tracer;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use cpu_time::ThreadTime;
+use meshray::accel::{NO_PRIM, Ray, RayOrder, Splitting, Wide};
+use meshray::bench::clock::Spread;
+
+use crate::embree::Embree;
+use crate::mesh::Mesh;
+use crate::obvhs::Compressed;
+use crate::ours::Ours;
+use crate::rays::{Kind, primary, secondary};
+use crate::tracer::{Answer, PACKET, Packet, Rays, Tracer, packets};
+
+const USAGE: &str = "\
+usage: peers [--passes N] [--only WORD] [--size TRIANGLES] [MESH...]
+       --passes N   timed passes of each program over all rays of a kind (default 5)
+       --only WORD  only programs whose names have this word
+       --size N     triangles of the made mesh, mountain (default 2e6)
+       MESH         rocker, bunny, stadium, hall, mountain (default: all)
+environment: MESHRAY_SHARED, the folder with bench/ and peers/ (default ../shared); MESHRAY_EMBREE, a libembree3 or
+libembree4";
+
+/// Rays handed to a program at once.
+const SLICE: usize = 4096;
+
+const KERNELS: [(RayOrder, &str); 4] = [
+    (RayOrder::OneByOne, "ray by ray"),
+    (RayOrder::InFlight, "in flight"),
+    (RayOrder::Packets, "packets of 16"),
+    (RayOrder::Adaptive, "as it chooses"),
+];
+
+const MESHES: [&str; 5] = ["rocker", "bunny", "stadium", "hall", "mountain"];
+
+/// What was typed.
+struct Words {
+    passes: usize,
+    only: String,
+    size: f64,
+    meshes: Vec<String>,
+}
+
+fn main() -> ExitCode {
+    let Some(words) = parse(std::env::args().skip(1).filter(|w| w != "--bench")) else {
+        eprintln!("{USAGE}");
+        return ExitCode::from(2);
+    };
+    let shared = std::env::var_os("MESHRAY_SHARED").map_or_else(|| PathBuf::from("../shared"), PathBuf::from);
+    let embree = std::env::var_os("MESHRAY_EMBREE").map(|path| Embree::load(Path::new(&path))).transpose();
+    let embree = match embree {
+        Ok(embree) => embree,
+        Err(message) => {
+            eprintln!("MESHRAY_EMBREE: {message}");
+            return ExitCode::from(2);
+        }
+    };
+    if embree.is_none() {
+        println!("MESHRAY_EMBREE is not set: without Embree");
+    }
+    let cameras = std::fs::read_to_string(shared.join("peers/cameras.csv")).unwrap_or_default();
+    let mut clean = true;
+    for name in &words.meshes {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` saturates")]
+        let mesh = match name.as_str() {
+            "mountain" => Ok(Mesh::mountain(words.size as usize)),
+            name => Mesh::read(&shared.join("bench"), name, &cameras),
+        };
+        match mesh {
+            Ok(mesh) => clean &= compare(&mesh, embree.as_ref(), &words),
+            Err(message) => println!("left out: {message}"),
+        }
+    }
+    if clean { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+fn parse(mut words: impl Iterator<Item = String>) -> Option<Words> {
+    let mut parsed = Words { passes: 5, only: String::new(), size: 2e6, meshes: Vec::new() };
+    while let Some(word) = words.next() {
+        match word.as_str() {
+            "--passes" => parsed.passes = words.next()?.parse().ok().filter(|&n| n > 0)?,
+            "--only" => parsed.only = words.next()?,
+            "--size" => parsed.size = words.next()?.parse().ok()?,
+            name if MESHES.contains(&name) => parsed.meshes.push(word),
+            _ => return None,
+        }
+    }
+    if parsed.meshes.is_empty() {
+        parsed.meshes = MESHES.map(String::from).to_vec();
+    }
+    Some(parsed)
+}
+
+/// All programs on one mesh; whether all verdicts of ours are those of the robust reference.
+fn compare(mesh: &Mesh, embree: Option<&Embree>, words: &Words) -> bool {
+    let shapes = &mesh.shapes;
+    let rays = {
+        let primary = primary(&mesh.camera);
+        let hits = Ours::hits(shapes, &primary);
+        let [diffuse, shadow] = secondary(shapes, &mesh.camera, &primary, &hits);
+        [primary, diffuse, shadow]
+    };
+    let packed = [packets(&rays[0]), packets(&rays[1]), packets(&rays[2])];
+    println!(
+        "\n{}: {} triangles; {} rays from the eye, {} hits",
+        mesh.name,
+        shapes.triangles.len(),
+        rays[0].len(),
+        rays[1].len()
+    );
+
+    if words.only.is_empty() {
+        builds(mesh, embree, words.passes);
+    }
+    let mut tracers: Vec<Box<dyn Tracer + '_>> = Vec::new();
+    let mut reference: Option<Box<dyn Tracer + '_>> = None;
+    if let Some(embree) = embree {
+        for (robust, packets) in [(false, false), (false, true), (true, false), (true, true)] {
+            let (mut built, ()) = embree.build(shapes, robust, 1, |build| build());
+            built.with_packets(packets);
+            tracers.push(Box::new(built));
+        }
+        reference = Some(Box::new(embree.build(shapes, true, 1, |build| build()).0));
+    }
+    tracers.push(Box::new(Compressed::build(shapes)));
+    for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
+        for (rays, how) in KERNELS {
+            tracers.push(Box::new(Ours::new(Wide::build(shapes, splitting).with_rays(rays), how)));
+        }
+    }
+    tracers.retain(|t| t.name().contains(&words.only));
+
+    let rates =
+        Kind::ALL.map(|kind| measure(&tracers, kind, &rays[kind as usize], &packed[kind as usize], words.passes));
+    let wrong = Kind::ALL.map(|kind| {
+        verdicts(
+            &tracers,
+            reference.as_deref(),
+            kind,
+            Rays { all: &rays[kind as usize], packets: &packed[kind as usize] },
+        )
+    });
+    println!("{:44}{:>9}{:>9}{:>9}{:>12}", "Mrays/s, one thread", "P", "D", "S", "verdicts");
+    let mut clean = true;
+    for (i, tracer) in tracers.iter().enumerate() {
+        let row: String = rates.iter().map(|r| format!("{:9.2}", r[i])).collect();
+        let differ: usize = wrong.iter().map(|w| w[i]).sum();
+        println!("{:44}{row}{differ:>12}", tracer.name());
+        clean &= !tracer.name().starts_with("meshray") || differ == 0;
+    }
+    clean
+}
+
+/// How long structures take to build, and what they weigh.
+fn builds(mesh: &Mesh, embree: Option<&Embree>, passes: usize) {
+    let (shapes, triangles) = (&mesh.shapes, mesh.shapes.triangles.len() as f64);
+    println!("{:44}{:>12}{:>12}{:>18}", "build", "1 thread ms", "2 threads", "bytes a triangle");
+    let print = |name: &str, times: [Spread; 2], bytes: usize| {
+        let [one, two] = times.map(|t| t.median() * 1e3);
+        println!("{name:44}{one:12.2}{two:12.2}{:18.1}", bytes as f64 / triangles);
+    };
+    if let Some(embree) = embree {
+        let mut bytes = 0;
+        let times = [1, 2].map(|threads| {
+            let mut spread = Spread::default();
+            for _ in 0..passes {
+                let (built, seconds) = embree.build(shapes, false, threads, |build| {
+                    let start = Instant::now();
+                    build();
+                    start.elapsed().as_secs_f64()
+                });
+                bytes = built.bytes;
+                spread.push(seconds);
+            }
+            spread
+        });
+        print(&embree.version, times, bytes);
+    }
+    for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
+        let mut bytes = 0;
+        let times = [1, 2].map(|threads| {
+            let mut spread = Spread::default();
+            let Ok(pool) = rayon::ThreadPoolBuilder::new().num_threads(threads).build() else { return spread };
+            for _ in 0..passes {
+                let start = Instant::now();
+                let wide = pool.install(|| Wide::build(shapes, splitting));
+                spread.push(start.elapsed().as_secs_f64());
+                bytes = wide.summary().bytes as usize;
+            }
+            spread
+        });
+        print(ours::structure(splitting), times, bytes);
+    }
+}
+
+/// Rays a second, in millions, of each program.
+fn measure(tracers: &[Box<dyn Tracer + '_>], kind: Kind, rays: &[Ray], packed: &[Packet], passes: usize) -> Vec<f64> {
+    let mut answers = vec![Answer { prim: NO_PRIM, t: 0.0 }; SLICE];
+    let mut spreads = vec![Spread::default(); tracers.len()];
+    for pass in 0..=passes {
+        for (tracer, spread) in tracers.iter().zip(&mut spreads) {
+            let (any, coherent) = (kind == Kind::Shadow, kind != Kind::Diffuse);
+            let start = ThreadTime::now();
+            for (all, packets) in rays.chunks(SLICE).zip(packed.chunks(SLICE / PACKET)) {
+                tracer.trace(any, coherent, Rays { all, packets }, &mut answers[..all.len()]);
+            }
+            let seconds = start.elapsed().as_secs_f64();
+            // The first pass warms up.
+            if pass > 0 {
+                spread.push(seconds);
+            }
+        }
+    }
+    spreads.iter().map(|s| rays.len() as f64 / s.median() * 1e-6).collect()
+}
+
+/// How many rays each program calls a hit that the reference calls a miss, or the other way round; 0 without a reference.
+fn verdicts(tracers: &[Box<dyn Tracer + '_>], reference: Option<&dyn Tracer>, kind: Kind, rays: Rays) -> Vec<usize> {
+    let Some(reference) = reference else { return vec![0; tracers.len()] };
+    let ask = |tracer: &dyn Tracer| {
+        let mut answers = vec![Answer { prim: NO_PRIM, t: 0.0 }; rays.all.len()];
+        tracer.trace(kind == Kind::Shadow, kind != Kind::Diffuse, rays, &mut answers);
+        answers
+    };
+    let expected = ask(reference);
+    let differ = |got: Vec<Answer>| {
+        got.iter().zip(&expected).filter(|(a, b)| (a.prim == NO_PRIM) != (b.prim == NO_PRIM)).count()
+    };
+    tracers.iter().map(|t| differ(ask(&**t))).collect()
+}

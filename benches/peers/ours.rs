@@ -1,0 +1,64 @@
+//! Our own structures, by the kernel that answers.
+
+use std::cell::RefCell;
+
+use meshray::accel::{Accel, Hit, NO_PRIM, NoProbe, Ray, Shapes, Splitting, Wide};
+
+use crate::tracer::{Answer, Rays, Tracer};
+
+/// The name of a structure.
+pub(crate) fn structure(splitting: Splitting) -> &'static str {
+    match splitting {
+        Splitting::Octree => "meshray fast-octree",
+        Splitting::SurfaceArea => "meshray fast-bvh",
+    }
+}
+
+type Buffers<'a> = (<Wide<'a> as Accel>::Scratch, Vec<Hit>, Vec<bool>);
+
+/// One structure and one kernel.
+pub(crate) struct Ours<'a> {
+    wide: Wide<'a>,
+    name: String,
+    buffers: RefCell<Buffers<'a>>,
+}
+
+impl<'a> Ours<'a> {
+    pub(crate) fn new(wide: Wide<'a>, kernel: &str) -> Self {
+        let structure = structure(wide.splitting());
+        let buffers = RefCell::new((wide.scratch(), Vec::new(), Vec::new()));
+        Self { wide, name: format!("{structure}, {kernel}"), buffers }
+    }
+
+    /// The first hits of all rays.
+    pub(crate) fn hits(shapes: &Shapes, rays: &[Ray]) -> Vec<Hit> {
+        let wide = Wide::build(shapes, Splitting::SurfaceArea);
+        let mut hits = vec![Hit::MISS; rays.len()];
+        wide.closest(rays, &mut hits, &mut wide.scratch(), &mut NoProbe);
+        hits
+    }
+}
+
+impl Tracer for Ours<'_> {
+    fn name(&self) -> String {
+        self.name.clone()
+    }
+
+    fn trace(&self, any: bool, _: bool, rays: Rays, answers: &mut [Answer]) {
+        let rays = rays.all;
+        let (scratch, hits, blocked) = &mut *self.buffers.borrow_mut();
+        if any {
+            blocked.resize(rays.len(), false);
+            self.wide.occluded(rays, blocked, scratch, &mut NoProbe);
+            for (answer, blocked) in answers.iter_mut().zip(blocked) {
+                *answer = Answer { prim: if *blocked { 0 } else { NO_PRIM }, t: 0.0 };
+            }
+        } else {
+            hits.resize(rays.len(), Hit::MISS);
+            self.wide.closest(rays, hits, scratch, &mut NoProbe);
+            for (answer, hit) in answers.iter_mut().zip(hits) {
+                *answer = Answer { prim: hit.prim, t: hit.t };
+            }
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! A ray against the eight boxes of a node.
+//!
+//! # Why no hit is lost
+//! A prim lies in the boxes above it, exactly: they are made of its own `f32` coordinates. The distances to a box's planes
+//! err by [`SLAB_F32`] at most, relative, and [`BOX_UNDERFLOW`], so a box is entered whenever the exact ray meets it within
+//! its range, widened by [`BOX_MARGIN`]. Only where that holds are boxes asked at all: a direction whose reciprocal is not a normal number
+//! constrains nothing on its axis, and with coordinates beyond [`BOX_COORDINATES`] every prim is tested.
+
+use std::marker::PhantomData;
+
+use super::node::{Node, Tree};
+use crate::math::Vec3;
+use crate::math::bounds::{BOX_COORDINATES, BOX_MARGIN, BOX_UNDERFLOW, SLAB_F32};
+use crate::math::simd::{Pick, Simd};
+
+/// What a walk allows for.
+pub(in crate::accel) trait BoxMargins {
+    /// Relative error of a distance to a plane.
+    const SLAB: f32 = SLAB_F32;
+    /// How far beyond the ray's range boxes are entered, relative.
+    const RANGE: f32 = BOX_MARGIN;
+    /// What underflow adds to either.
+    const UNDERFLOW: f32 = BOX_UNDERFLOW;
+    /// Largest coordinate with which boxes are asked.
+    const COORDINATES: f32 = BOX_COORDINATES;
+
+    /// Whether boxes can be asked about a ray from here; not if it is not finite.
+    #[inline(always)]
+    fn allow(tree: &Tree, origin: Vec3) -> bool {
+        let inside = |x: f32| x.abs() <= Self::COORDINATES;
+        inside(origin.x) & inside(origin.y) & inside(origin.z) & (tree.extent <= Self::COORDINATES)
+    }
+
+    /// The distance up to which boxes must be entered for hits up to `reach`.
+    #[inline(always)]
+    fn widened(reach: f32) -> f32 {
+        reach + reach.abs() * Self::RANGE + Self::UNDERFLOW
+    }
+
+    /// The distance from which on boxes must be entered for hits from `t_min` on.
+    #[inline(always)]
+    fn started(t_min: f32) -> f32 {
+        t_min - t_min.abs() * Self::RANGE - Self::UNDERFLOW
+    }
+}
+
+/// The margins that `math::bounds` derives.
+pub(in crate::accel) struct Derived;
+
+impl BoxMargins for Derived {}
+
+/// A ray ready to be tested against boxes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slabs<B> {
+    origin: [f32; 3],
+    inverse: [f32; 3],
+    /// Rows of the planes that come first on each axis, and of those that come last.
+    first: [Pick; 3],
+    last: [Pick; 3],
+    /// Bit k is set where the ray runs backwards along axis k.
+    octant: usize,
+    from: f32,
+    margins: PhantomData<B>,
+}
+
+impl<B: BoxMargins> Slabs<B> {
+    #[inline(always)]
+    pub(super) fn new(origin: Vec3, dir: Vec3, t_min: f32) -> Self {
+        let (x, y, z) = (backwards(dir.x), backwards(dir.y), backwards(dir.z));
+        Self {
+            origin: [origin.x, origin.y, origin.z],
+            inverse: [reciprocal(dir.x), reciprocal(dir.y), reciprocal(dir.z)],
+            first: [Pick::new(x), Pick::new(2 + y), Pick::new(4 + z)],
+            last: [Pick::new(1 - x), Pick::new(3 - y), Pick::new(5 - z)],
+            octant: x | y << 1 | z << 2,
+            from: B::started(t_min),
+            margins: PhantomData,
+        }
+    }
+
+    /// The distances at which the ray enters the boxes of a node, and which of them it meets up to `limit`.
+    #[inline(always)]
+    pub(super) fn meets<S: Simd>(&self, s: S, node: &Node, limit: f32) -> (S::Lanes, u32) {
+        let (mut near, mut far) = (s.splat(self.from), s.splat(limit));
+        for k in 0..3 {
+            let (origin, inverse) = (s.splat(self.origin[k]), s.splat(self.inverse[k]));
+            // The second operand is kept where the first is NaN.
+            near = s.greater(s.mul(s.sub(s.pick(&node.planes, self.first[k]), origin), inverse), near);
+            far = s.smaller(s.mul(s.sub(s.pick(&node.planes, self.last[k]), origin), inverse), far);
+        }
+        let slack = s.add(s.mul(s.abs(far), s.splat(B::SLAB)), s.splat(B::UNDERFLOW));
+        (near, s.at_most(near, s.add(far, slack)))
+    }
+
+    /// The octant that the ray runs to: bit k is set where it runs backwards along axis k.
+    #[inline(always)]
+    pub(super) fn octant(&self) -> usize {
+        self.octant
+    }
+}
+
+/// 1 / d where it constrains anything, else NaN, which drops out of every comparison.
+#[inline(always)]
+fn reciprocal(d: f32) -> f32 {
+    let inverse = 1.0 / d;
+    if inverse.is_normal() || d == 0.0 { inverse } else { f32::NAN }
+}
+
+/// 1 where the ray runs backwards, so that the upper plane comes first.
+#[inline(always)]
+pub(super) fn backwards(d: f32) -> usize {
+    usize::from(d.is_sign_negative())
+}
