@@ -19,6 +19,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Columns and rows of a tile.
 const TILE: u32 = 32;
+
+/// Columns and rows of a block of pixels, whose rays go together.
+const BLOCK: u32 = 4;
+
 /// An eye farther from the scene than this many of its diagonals starts its rays just before the scene.
 const FAR: f64 = 4.0;
 
@@ -31,7 +35,7 @@ struct Tile {
     y1: u32,
 }
 
-/// What came of a tile, row by row.
+/// What came of a tile, in the order of its places.
 struct TilePixels {
     tile: Tile,
     beauty: Vec<[f32; 4]>,
@@ -201,9 +205,14 @@ fn empty_picture(settings: &Settings) -> Picture {
 }
 
 impl Tile {
-    /// Its pixels, row by row.
+    /// Its pixels, block by block and row by row in each, so that rays that follow each other run alike.
     fn places(self) -> impl Iterator<Item = (u32, u32)> {
-        (self.y0..self.y1).flat_map(move |y| (self.x0..self.x1).map(move |x| (x, y)))
+        let starts = |from: u32, to: u32| (from..to).step_by(BLOCK as usize);
+        let blocks = starts(self.y0, self.y1).flat_map(move |y| starts(self.x0, self.x1).map(move |x| (x, y)));
+        blocks.flat_map(move |(x0, y0)| {
+            let (x1, y1) = ((x0 + BLOCK).min(self.x1), (y0 + BLOCK).min(self.y1));
+            (y0..y1).flat_map(move |y| (x0..x1).map(move |x| (x, y)))
+        })
     }
 }
 
