@@ -46,7 +46,8 @@ use crate::math::simd::Level;
 /// How the rays of a wave are traced. The answers are the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RayOrder {
-    /// Side by side where most rays run alike, else in flight; one after another where there are few.
+    /// Side by side where most rays run alike; else in flight in trees that do not fit the caches near the processor, and
+    /// one after another in those that do, or where there are few.
     Adaptive,
     /// One after another.
     OneByOne,
@@ -56,10 +57,13 @@ pub enum RayOrder {
     Packets,
 }
 
+/// Nodes and blocks from which on rays in flight pay: measured, between meshes of 70,000 and 260,000 triangles.
+const LARGE: usize = 1 << 15;
+
 impl RayOrder {
-    /// What suits a wave: by how many of the packets that it would make run to one octant, as far as three rays of each
-    /// tell.
-    fn of<W: Wave>(wave: &W) -> Self {
+    /// What suits a wave through a tree of so many nodes and blocks: by how many of the packets that it would make run to
+    /// one octant, as far as three rays of each tell.
+    fn of<W: Wave>(wave: &W, size: usize) -> Self {
         let octant = |i: usize| {
             let dir = wave.ray(i).dir;
             [dir.x, dir.y, dir.z].map(f32::is_sign_negative)
@@ -70,7 +74,8 @@ impl RayOrder {
         match packets {
             0 => Self::OneByOne,
             _ if 2 * alike > packets => Self::Packets,
-            _ => Self::InFlight,
+            _ if size >= LARGE => Self::InFlight,
+            _ => Self::OneByOne,
         }
     }
 }
@@ -158,7 +163,7 @@ impl Wide<'_> {
         let (tree, shapes, margins) = (&self.tree, self.shapes, PhantomData::<Derived>);
         let rays = match self.rays {
             _ if !shapes.planes.is_empty() || tree.nodes.is_empty() => RayOrder::OneByOne,
-            RayOrder::Adaptive => RayOrder::of(wave),
+            RayOrder::Adaptive => RayOrder::of(wave, tree.nodes.len() + tree.blocks.len()),
             rays => rays,
         };
         match rays {

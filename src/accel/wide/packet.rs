@@ -249,15 +249,18 @@ impl<B: BoxMargins> Packet<B> {
         (near, s.at_most(near, s.add(far, slack)))
     }
 
-    /// Which rays meet the box of a child.
+    /// Which of these rays meet the box of a child.
     #[inline(always)]
-    fn meets_each<S: Simd>(&self, s: S, node: &Node, slot: usize) -> u32 {
+    fn meets_each<S: Simd>(&self, s: S, node: &Node, slot: usize, of: u32) -> u32 {
         let back = |k: usize| self.octant >> k & 1;
         let plane = |k: usize, side: usize| node.planes[(2 * k + side) % 6][slot % LANES];
         let first = [plane(0, back(0)), plane(1, back(1)), plane(2, back(2))];
         let last = [plane(0, 1 - back(0)), plane(1, 1 - back(1)), plane(2, 1 - back(2))];
         let mut rays = 0;
         for row in 0..ROWS {
+            if of >> (LANES * row) & ALL == 0 {
+                continue;
+            }
             let (mut near, mut far) = (s.load(&self.from[row]), s.load(&self.limit[row]));
             for k in 0..3 {
                 let (origin, inverse) = (s.load(&self.origin[row][k]), s.load(&self.inverse[row][k]));
@@ -267,7 +270,7 @@ impl<B: BoxMargins> Packet<B> {
             let slack = s.add(s.mul(s.abs(far), s.splat(B::SLAB)), s.splat(B::UNDERFLOW));
             rays |= s.at_most(near, s.add(far, slack)) << (LANES * row);
         }
-        rays
+        rays & of
     }
 
     /// From the root to every leaf that any ray may hit.
@@ -397,7 +400,7 @@ impl<B: BoxMargins> Packet<B> {
         for _ in 0..met.count_ones() {
             let slot = (order & 7) as usize;
             order >>= 8;
-            let rays = self.meets_each(s, node, slot) & rays;
+            let rays = self.meets_each(s, node, slot, rays);
             if rays != 0 {
                 stack[*top] = Branch { near: near[slot], child: node.children[slot], rays };
                 *top += 1;
@@ -447,9 +450,15 @@ impl<B: BoxMargins> Packet<B> {
             let lane = lanes.trailing_zeros() as usize % LANES;
             lanes &= lanes - 1;
             let corners = corners_of(&block.corners, lane);
-            let (low, high) = (rows[0].verdicts(s, &corners), rows[1].verdicts(s, &corners));
-            let certain = low.hit | high.hit << LANES;
-            let open = (certain | low.unsure | high.unsure << LANES) & rays & *active;
+            let (mut certain, mut unsure) = (0, 0);
+            for (row, tested) in rows.iter().enumerate() {
+                if rays >> (LANES * row) & ALL != 0 {
+                    let verdicts = tested.verdicts(s, &corners);
+                    certain |= verdicts.hit << (LANES * row);
+                    unsure |= verdicts.unsure << (LANES * row);
+                }
+            }
+            let open = (certain | unsure) & rays & *active;
             if open == 0 {
                 continue;
             }

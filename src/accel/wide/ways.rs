@@ -1,7 +1,7 @@
 //! However the rays of a wave are traced, on whatever instruction set: the answers are those of brute force.
 
 use super::flight::FARTHEST_FIRST;
-use super::{RayOrder, Splitting, Wide};
+use super::{LARGE, RayOrder, Splitting, Wide};
 use crate::accel::tests::scenes;
 use crate::accel::{Accel, Hit, NoProbe, Ray, Shapes, Unculled};
 use crate::math::Vec3;
@@ -68,17 +68,20 @@ fn a_wave_may_be_of_any_length() {
 }
 
 #[test]
-fn a_wave_goes_in_packets_where_rays_run_alike_and_in_flight_where_not() {
+fn a_wave_goes_in_packets_where_rays_run_alike_and_in_flight_where_not_and_the_tree_is_large() {
     let shapes = scenes::soup(60, 0.4);
-    let wave = |rays: &[Ray]| {
+    let of = |rays: &[Ray], size: usize| {
         let mut hits = vec![Hit::MISS; rays.len()];
-        RayOrder::of(&crate::accel::wave::ForFirst { rays, hits: &mut hits, test: crate::accel::intersector::Exact })
+        RayOrder::of(
+            &crate::accel::wave::ForFirst { rays, hits: &mut hits, test: crate::accel::intersector::Exact },
+            size,
+        )
     };
     let mixed = scenes::rays(&shapes, 40);
-    assert_eq!(wave(&mixed), RayOrder::InFlight);
+    assert_eq!((of(&mixed, LARGE), of(&mixed, LARGE - 1)), (RayOrder::InFlight, RayOrder::OneByOne));
     let toward = |k: usize| Ray { dir: Vec3::new(1.0, 2.0 + k as f32 * 0.01, 3.0), ..mixed[0] };
-    assert_eq!(wave(&(0..64).map(toward).collect::<Vec<_>>()), RayOrder::Packets);
-    assert_eq!(wave(&mixed[..9]), RayOrder::OneByOne);
+    assert_eq!(of(&(0..64).map(toward).collect::<Vec<_>>(), 1), RayOrder::Packets);
+    assert_eq!(of(&mixed[..9], LARGE), RayOrder::OneByOne);
 }
 
 #[test]
