@@ -32,13 +32,21 @@ const RUN: u32 = 2;
 /// Items or leaves that one thread takes at a time.
 const CHUNK: usize = 1024;
 
+/// How much more than twice as deep an improved tree may be: what is recursive must not run out of stack.
+const ROOM: usize = 32;
+
 /// Builds the tree over all bounded prims.
 pub(super) fn build(shapes: &Shapes, splitting: Splitting) -> Tree {
     if shapes.bounded() == 0 {
         return Tree::default();
     }
-    let (knots, prims) = binary_tree(shapes, splitting);
-    let knots = reinsert::improve(knots);
+    let (grown, mut prims) = binary_tree(shapes, splitting);
+    let deep = 2 * depth(&grown) + ROOM;
+    let mut knots = reinsert::improve(grown);
+    if depth(&knots) > deep {
+        // Where boxes have no area every place is as good as another, and knots were hung one below the other.
+        (knots, prims) = binary_tree(shapes, splitting);
+    }
     let bounds = knots.first().map_or(Aabb::EMPTY, Knot::bounds);
     let leaves = Leaves::of(&knots, &prims, shapes);
     let nodes = collapse::nodes(&knots, &leaves.children);
@@ -51,6 +59,20 @@ pub(super) fn build(shapes: &Shapes, splitting: Splitting) -> Tree {
     }
     let others = prims[shapes.triangles.len()..].to_vec();
     Tree { nodes, blocks, runs: leaves.runs, prims: others, ..Tree::default() }.finish(bounds)
+}
+
+/// Knots on the longest way down.
+fn depth(knots: &[Knot]) -> usize {
+    let (mut left, mut most) = (vec![(0, 1)], 0);
+    while let Some((i, depth)) = left.pop() {
+        let Some(knot) = knots.get(i) else { continue };
+        most = most.max(depth);
+        if !knot.is_leaf() {
+            left.push((i + knot.at as usize, depth + 1));
+            left.push((i + 1, depth + 1));
+        }
+    }
+    most
 }
 
 /// The binary tree over all bounded prims, and the prims of its leaves. A leaf holds triangles or other prims, never both.
@@ -129,4 +151,28 @@ fn block(shapes: &Shapes, prims: &[u32]) -> Block {
         block.prims[lane] = prim;
     }
     block
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::tests::scenes::mesh;
+    use crate::math::Vec3;
+
+    /// A mesh so far away that rounding leaves a few points of it.
+    #[test]
+    fn triangles_that_collapsed_to_points_make_no_deep_tree() {
+        let side = 120;
+        let at = |i: usize| Vec3::new((i % side) as f32, (i / side) as f32, 0.0) * 0.01 + Vec3::splat(1e7);
+        let vertices: Vec<Vec3> = (0..side * side).map(at).collect();
+        let faces = (0..side * (side - 1) - 1).map(|i| [i, i + 1, i + side].map(|v| v as u32)).collect();
+        let shapes = mesh(vertices, faces);
+        for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
+            let (knots, _) = binary_tree(&shapes, splitting);
+            let deep = 2 * depth(&knots) + ROOM;
+            assert!(depth(&reinsert::improve(knots)) > deep, "{splitting:?}: this mesh would not have become deep");
+            let tree = build(&shapes, splitting);
+            assert!(tree.depth as usize <= deep, "{splitting:?}: {}", tree.depth);
+        }
+    }
 }
