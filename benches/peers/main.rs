@@ -16,9 +16,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use cpu_time::ThreadTime;
 use meshray::accel::{NO_PRIM, Ray, RayOrder, Splitting, Wide};
-use meshray::bench::clock::Spread;
+use meshray::bench::clock::{Spread, processor_seconds};
 
 use crate::embree::Embree;
 use crate::mesh::Mesh;
@@ -215,11 +214,11 @@ fn measure(tracers: &[Box<dyn Tracer + '_>], kind: Kind, rays: &[Ray], packed: &
     for pass in 0..=passes {
         for (tracer, spread) in tracers.iter().zip(&mut spreads) {
             let (any, coherent) = (kind == Kind::Shadow, kind != Kind::Diffuse);
-            let start = ThreadTime::now();
-            for (all, packets) in rays.chunks(SLICE).zip(packed.chunks(SLICE / PACKET)) {
-                tracer.trace(any, coherent, Rays { all, packets }, &mut answers[..all.len()]);
-            }
-            let seconds = start.elapsed().as_secs_f64();
+            let ((), seconds) = processor_seconds(|| {
+                for (all, packets) in rays.chunks(SLICE).zip(packed.chunks(SLICE / PACKET)) {
+                    tracer.trace(any, coherent, Rays { all, packets }, &mut answers[..all.len()]);
+                }
+            });
             // The first pass warms up.
             if pass > 0 {
                 spread.push(seconds);

@@ -28,7 +28,7 @@ pub trait Culling: Sync {
 
     /// Answers a wave, one ray after another unless a structure knows better.
     fn trace<W: Wave, P: Probe>(&self, wave: &mut W, scratch: &mut Self::Scratch, probe: &mut P) {
-        for i in 0..wave.len() {
+        for i in 0..wave.rays().len() {
             let (mut query, usable) = begin(self.shapes(), wave, i, probe);
             if usable && !query.test_planes(probe) && self.shapes().bounded() > 0 {
                 self.walk(&mut query, scratch, probe);

@@ -6,33 +6,26 @@ use super::query::{Closest, Goal, Next, Occluded, Query};
 use super::{Hit, Intersector, Probe, Ray, Shapes};
 
 /// Rays that are asked the same question, and where the answers go.
-#[expect(clippy::len_without_is_empty, reason = "nobody asks")]
 pub trait Wave {
     /// What they look for.
     type Goal: Goal;
 
-    /// How many there are.
-    fn len(&self) -> usize;
+    /// The rays; there is an answer for each.
+    fn rays(&self) -> &[Ray];
 
-    /// A ray.
-    fn ray(&self, i: usize) -> &Ray;
-
-    /// From where on its hits count.
+    /// From where on the hits of a ray count.
     #[inline(always)]
     fn t_min(&self, i: usize) -> f32 {
-        self.ray(i).t_min
+        self.rays()[i].t_min
     }
 
-    /// What it looks for.
+    /// What a ray looks for.
     fn goal(&self, i: usize) -> Self::Goal;
 
-    /// Takes the answer of a ray that meets nothing.
-    fn miss(&mut self, i: usize);
+    /// Takes the answer of a ray whose hit, or miss, is known to the last bit.
+    fn take(&mut self, i: usize, hit: Hit);
 
-    /// Takes the answer of a ray whose hit is known to the last bit, where hits are asked for.
-    fn found(&mut self, i: usize, hit: Hit);
-
-    /// Takes an answer, and tells whether there was a hit.
+    /// Takes the answer of a query, and tells whether there was a hit.
     fn answer(&mut self, i: usize, query: &Query<Self::Goal>) -> bool;
 }
 
@@ -45,14 +38,9 @@ pub(super) struct ForFirst<'w, I> {
 impl<I: Intersector> Wave for ForFirst<'_, I> {
     type Goal = Closest<I>;
 
-    #[inline]
-    fn len(&self) -> usize {
-        self.rays.len().min(self.hits.len())
-    }
-
     #[inline(always)]
-    fn ray(&self, i: usize) -> &Ray {
-        &self.rays[i]
+    fn rays(&self) -> &[Ray] {
+        self.rays
     }
 
     #[inline(always)]
@@ -61,12 +49,7 @@ impl<I: Intersector> Wave for ForFirst<'_, I> {
     }
 
     #[inline(always)]
-    fn miss(&mut self, i: usize) {
-        self.hits[i] = Hit::MISS;
-    }
-
-    #[inline(always)]
-    fn found(&mut self, i: usize, hit: Hit) {
+    fn take(&mut self, i: usize, hit: Hit) {
         self.hits[i] = hit;
     }
 
@@ -86,14 +69,9 @@ pub(super) struct ForAny<'w, I> {
 impl<I: Intersector> Wave for ForAny<'_, I> {
     type Goal = Occluded<I>;
 
-    #[inline]
-    fn len(&self) -> usize {
-        self.rays.len().min(self.blocked.len())
-    }
-
     #[inline(always)]
-    fn ray(&self, i: usize) -> &Ray {
-        &self.rays[i]
+    fn rays(&self) -> &[Ray] {
+        self.rays
     }
 
     #[inline(always)]
@@ -102,12 +80,7 @@ impl<I: Intersector> Wave for ForAny<'_, I> {
     }
 
     #[inline(always)]
-    fn miss(&mut self, i: usize) {
-        self.blocked[i] = false;
-    }
-
-    #[inline(always)]
-    fn found(&mut self, i: usize, hit: Hit) {
+    fn take(&mut self, i: usize, hit: Hit) {
         self.blocked[i] = hit.is_some();
     }
 
@@ -128,14 +101,9 @@ pub(super) struct ForNext<'w, I> {
 impl<I: Intersector> Wave for ForNext<'_, I> {
     type Goal = Next<I>;
 
-    #[inline]
-    fn len(&self) -> usize {
-        self.rays.len().min(self.hits.len())
-    }
-
     #[inline(always)]
-    fn ray(&self, i: usize) -> &Ray {
-        &self.rays[i]
+    fn rays(&self) -> &[Ray] {
+        self.rays
     }
 
     #[inline(always)]
@@ -149,12 +117,7 @@ impl<I: Intersector> Wave for ForNext<'_, I> {
     }
 
     #[inline(always)]
-    fn miss(&mut self, i: usize) {
-        self.hits[i] = Hit::MISS;
-    }
-
-    #[inline(always)]
-    fn found(&mut self, i: usize, hit: Hit) {
+    fn take(&mut self, i: usize, hit: Hit) {
         self.hits[i] = hit;
     }
 
@@ -174,7 +137,7 @@ pub fn begin<'a, W: Wave, P: Probe>(
     probe: &mut P,
 ) -> (Query<'a, W::Goal>, bool) {
     probe.query();
-    Query::new(shapes, wave.ray(i), wave.t_min(i), wave.goal(i))
+    Query::new(shapes, &wave.rays()[i], wave.t_min(i), wave.goal(i))
 }
 
 /// Gives the answer that was found.

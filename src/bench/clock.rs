@@ -1,5 +1,6 @@
 //! Times that are measured several times, and how far they spread.
 
+use crate::stopwatch::{Spent, Stopwatch};
 use std::time::Instant;
 
 /// Values of one quantity from several passes; seconds unless said otherwise.
@@ -57,21 +58,13 @@ pub fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     (result, start.elapsed().as_secs_f64())
 }
 
-/// Does `work` and tells how many seconds this thread spent on it: of the processor where the system says so (Linux), so
+/// Does `work` and tells how many seconds this thread spent on it: of the processor where the system says so (Unix), so
 /// that other programs hardly show; else by the clock on the wall.
 pub fn processor_seconds<T>(work: impl FnOnce() -> T) -> (T, f64) {
-    let (spent, start) = (of_this_thread(), Instant::now());
+    let watch = Stopwatch::of_this_thread();
     let result = work();
-    match (spent, of_this_thread()) {
-        (Some(before), Some(after)) if after > before => (result, (after - before) as f64 * 1e-9),
-        _ => (result, start.elapsed().as_secs_f64()),
-    }
-}
-
-/// Nanoseconds of the processor that this thread has had.
-fn of_this_thread() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    text.split_whitespace().next()?.parse().ok()
+    let Spent { wall, cpu } = watch.read();
+    (result, if cpu.is_zero() { wall } else { cpu }.as_secs_f64())
 }
 
 #[cfg(test)]
@@ -82,7 +75,7 @@ mod tests {
     fn time_of_the_processor_leaves_out_what_a_thread_sleeps() {
         let (result, spent) = processor_seconds(|| (0..100_000u64).fold(0, |a, b| std::hint::black_box(a ^ b)));
         assert!(result == (0..100_000u64).fold(0, |a, b| a ^ b) && spent > 0.0);
-        if of_this_thread().is_some() {
+        if cfg!(unix) {
             let ((), asleep) = processor_seconds(|| std::thread::sleep(std::time::Duration::from_millis(50)));
             assert!(asleep < 0.05, "{asleep}");
         }

@@ -16,26 +16,15 @@ pub struct Bounded {
 }
 
 impl Bounded {
-    /// The quotient and a bound of its relative error, or `None` where the denominator's sign is not certain.
-    pub fn over(self, denominator: Self) -> Option<(f64, f64)> {
-        let relative = denominator.error / denominator.value.abs();
-        // Also false for 0/0.
-        if relative < 0.25 {
-            let t = self.value / denominator.value;
-            // (n + e)/(d (1 + r)): r ≤ 1/4 grows to at most 4/3 r; one rounding of the quotient.
-            let error = (self.error / self.value.abs()).max(0.0) * 1.5 + relative * 1.5 + f64::EPSILON;
-            (error < 0.25).then_some((t, error))
-        } else {
-            None
-        }
-    }
-
-    /// As [`Self::over`] for numbers whose product neither over- nor underflows, sooner: nothing waits for two divisions.
+    /// The quotient and a bound of its relative error, or `None` where the sign of either term is not certain. The product
+    /// of both must neither over- nor underflow, which that of two terms made of `f32` coordinates does not.
     #[inline]
-    pub fn quotient(self, denominator: Self) -> Option<(f64, f64)> {
+    pub fn over(self, denominator: Self) -> Option<(f64, f64)> {
         let (n, d) = (self.value.abs(), denominator.value.abs());
         // Also false for NaN.
         if denominator.error < 0.25 * d && self.error < 0.25 * n {
+            // (n + e)/(d (1 + r)): r ≤ 1/4 grows to at most 4/3 r, and e/n ≤ 1/4 adds a third of itself to that; one rounding
+            // of the quotient. Nothing waits for two divisions.
             let relative = (self.error * d + denominator.error * n) / (n * d);
             Some((self.value / denominator.value, relative * 1.5 + f64::EPSILON))
         } else {

@@ -25,6 +25,13 @@ pub struct RaySpace {
     pub shear: (f32, f32),
 }
 
+/// The axis of a direction's largest component; of equal ones the first.
+#[inline(always)]
+pub fn main_axis(dir: Vec3) -> usize {
+    let size = dir.abs();
+    if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) }
+}
+
 impl RaySpace {
     /// `None` for a ray that cannot hit: zero direction, or anything not finite.
     #[inline]
@@ -36,8 +43,7 @@ impl RaySpace {
     /// The same, and whether the ray can hit.
     #[inline(always)]
     pub fn checked(origin: Vec3, dir: Vec3) -> (Self, bool) {
-        let size = dir.abs();
-        let z = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
+        let z = main_axis(dir);
         let [d_x, d_y, d_z] = match z {
             0 => [dir.y, dir.z, dir.x],
             1 => [dir.z, dir.x, dir.y],

@@ -94,7 +94,7 @@ pub struct Meeting {
 #[inline]
 pub fn meet(ray: &RaySpace, triangle: &Triangle) -> Meeting {
     let (numerator, denominator, normal) = plane_terms(ray, triangle, PLANE_TERMS_F64);
-    match numerator.quotient(denominator) {
+    match numerator.over(denominator) {
         Some((t_f64, error)) if error < POSITION_T => {
             let t = nearest(t_f64, error).unwrap_or_else(|| exact_distance(ray, triangle));
             Meeting { t, t_f64, normal }
@@ -137,7 +137,7 @@ fn distance_within(ray: &RaySpace, triangle: &Triangle, enough: f64) -> f64 {
 #[inline]
 fn plane_quotient(ray: &RaySpace, triangle: &Triangle, terms: f64) -> Option<(f64, f64)> {
     let (numerator, denominator, _) = plane_terms(ray, triangle, terms);
-    numerator.quotient(denominator)
+    numerator.over(denominator)
 }
 
 /// n·(a − o), n·d and n.

@@ -88,7 +88,9 @@ impl Tape {
     }
 }
 
-impl Probe for Tape {}
+impl Probe for Tape {
+    const SILENT: bool = true;
+}
 
 impl Observer for Tape {
     fn asked(&mut self, question: Question, rays: &[Ray], after: &[Hit]) {

@@ -12,7 +12,7 @@ use super::slabs::{BoxMargins, Slabs};
 use super::walk::{Entry, ask_by_itself, has_direction, test_leaf};
 use crate::accel::query::{Goal, Query};
 use crate::accel::wave::{Wave, begin, end};
-use crate::accel::{NoProbe, Probe, Shapes};
+use crate::accel::{Hit, NoProbe, Probe, Shapes};
 use crate::math::simd::{Kernel, LANES, Order, Simd};
 use crate::math::triangles::{RayLanes, reach};
 
@@ -128,7 +128,7 @@ impl<W: Wave, P: Probe, B: BoxMargins> Kernel for InFlight<'_, W, P, B> {
         self.stack.prepare();
         let (mut nodes, mut leaves, mut next) = (List::EMPTY, List::EMPTY, 0);
         let mut slots: Vec<Slot<W::Goal, B>> = Vec::with_capacity(SLOTS);
-        for number in 0..SLOTS.min(self.wave.len()) {
+        for number in 0..SLOTS.min(self.wave.rays().len()) {
             slots.push(self.vacant(number));
             if self.start(s, &mut next, &mut slots[number]) {
                 slots[number].join(number, &mut nodes, &mut leaves);
@@ -181,7 +181,7 @@ impl<G: Goal, B> Slot<'_, G, B> {
 impl<'w, W: Wave, P: Probe, B: BoxMargins> InFlight<'w, W, P, B> {
     /// A slot without a ray.
     fn vacant(&self, number: usize) -> Slot<'w, W::Goal, B> {
-        let ray = self.wave.ray(0);
+        let ray = &self.wave.rays()[0];
         let slabs = Slabs::new(ray.origin, ray.dir, 0.0);
         let (query, _) = begin(self.shapes, self.wave, 0, &mut NoProbe);
         let bottom = number * self.stack.stride;
@@ -193,10 +193,10 @@ impl<'w, W: Wave, P: Probe, B: BoxMargins> InFlight<'w, W, P, B> {
     #[inline(always)]
     fn start<S: Simd>(&mut self, s: S, next: &mut usize, slot: &mut Slot<'w, W::Goal, B>) -> bool {
         let (tree, shapes) = (self.tree, self.shapes);
-        while *next < self.wave.len() {
+        while *next < self.wave.rays().len() {
             let i = *next;
             *next += 1;
-            let ray = self.wave.ray(i);
+            let ray = &self.wave.rays()[i];
             if !(B::allow(tree, ray.origin) && has_direction(ray.dir)) {
                 ask_by_itself::<B, _, _, _>(s, tree, shapes, self.wave, i, self.entries, self.probe);
                 continue;
@@ -204,7 +204,7 @@ impl<'w, W: Wave, P: Probe, B: BoxMargins> InFlight<'w, W, P, B> {
             let slabs = Slabs::<B>::new(ray.origin, ray.dir, self.wave.t_min(i));
             let (near, met) = slabs.meets(s, &tree.nodes[0], B::widened(ray.t_max));
             if met == 0 {
-                self.wave.miss(i);
+                self.wave.take(i, Hit::MISS);
                 continue;
             }
             slot.octant = slabs.octant();
@@ -213,7 +213,7 @@ impl<'w, W: Wave, P: Probe, B: BoxMargins> InFlight<'w, W, P, B> {
             slot.ray = i;
             let (query, usable) = begin(shapes, self.wave, i, self.probe);
             if !usable {
-                self.wave.miss(i);
+                self.wave.take(i, Hit::MISS);
                 continue;
             }
             slot.limit = B::widened(query.reach());

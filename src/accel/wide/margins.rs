@@ -5,10 +5,11 @@ use std::marker::PhantomData;
 
 use super::slabs::{BoxMargins, Derived};
 use super::walk::Stack;
-use super::{Splitting, Wide};
+use super::{RayOrder, Splitting, Wide};
 use crate::accel::query::{Culling, Goal, Query};
 use crate::accel::tests::scenes::{lattice, mesh, moved, ray, rays, soup};
 use crate::accel::tests::{far_rays, wrong};
+use crate::accel::wave::Wave;
 use crate::accel::{Probe, Ray, Shapes};
 use crate::math::Vec3;
 use crate::math::random::Random;
@@ -29,6 +30,10 @@ impl<B: BoxMargins> Culling for Walked<'_, B> {
 
     fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, stack: &mut Stack, probe: &mut P) {
         self.0.walk_within::<B, _, _>(query, stack, probe);
+    }
+
+    fn trace<W: Wave, P: Probe>(&self, wave: &mut W, stack: &mut Stack, probe: &mut P) {
+        self.0.trace_within::<B, _, _>(wave, stack, probe);
     }
 }
 
@@ -52,11 +57,12 @@ impl BoxMargins for AnyCoordinates {
     const COORDINATES: f32 = f32::INFINITY;
 }
 
+/// Wrong answers of both trees, in every order of the rays.
 fn wrong_with<B: BoxMargins>(shapes: &Shapes, rays: &[Ray]) -> usize {
-    [Splitting::Octree, Splitting::SurfaceArea]
-        .map(|s| wrong(&Walked::<B>(Wide::build(shapes, s), PhantomData), shapes, rays))
-        .iter()
-        .sum()
+    let ways = [RayOrder::OneByOne, RayOrder::InFlight, RayOrder::Packets];
+    let of =
+        |splitting, way| wrong(&Walked::<B>(Wide::build(shapes, splitting).with_rays(way), PhantomData), shapes, rays);
+    [Splitting::Octree, Splitting::SurfaceArea].iter().flat_map(|&s| ways.map(|w| of(s, w))).sum()
 }
 
 /// Nothing is wrong with the derived margins, something is with the others.

@@ -65,10 +65,10 @@ impl RayOrder {
     /// one octant, as far as three rays of each tell.
     fn of<W: Wave>(wave: &W, size: usize) -> Self {
         let octant = |i: usize| {
-            let dir = wave.ray(i).dir;
+            let dir = wave.rays()[i].dir;
             [dir.x, dir.y, dir.z].map(f32::is_sign_negative)
         };
-        let packets = wave.len() / RAYS;
+        let packets = wave.rays().len() / RAYS;
         let starts = (0..packets).map(|p| p * RAYS);
         let alike = starts.filter(|&i| octant(i) == octant(i + RAYS / 2) && octant(i) == octant(i + RAYS - 1)).count();
         match packets {
@@ -142,12 +142,7 @@ impl Culling for Wide<'_> {
     }
 
     fn trace<W: Wave, P: Probe>(&self, wave: &mut W, stack: &mut Stack, probe: &mut P) {
-        // Where it is false nothing is compiled for it.
-        if Together::<W, P>::MAY {
-            return self.trace_together(wave, stack, probe);
-        }
-        let (tree, shapes) = (&self.tree, self.shapes);
-        self.level.run(OneByOne { tree, shapes, wave, stack, probe, margins: PhantomData::<Derived> });
+        self.trace_within::<Derived, _, _>(wave, stack, probe);
     }
 }
 
@@ -159,8 +154,18 @@ impl<W: Wave, P: Probe> Together<W, P> {
 }
 
 impl Wide<'_> {
-    fn trace_together<W: Wave, P: Probe>(&self, wave: &mut W, stack: &mut Stack, probe: &mut P) {
-        let (tree, shapes, margins) = (&self.tree, self.shapes, PhantomData::<Derived>);
+    /// Traces a wave by given margins.
+    fn trace_within<B: BoxMargins, W: Wave, P: Probe>(&self, wave: &mut W, stack: &mut Stack, probe: &mut P) {
+        // Where it is false nothing is compiled for it.
+        if Together::<W, P>::MAY {
+            return self.trace_together::<B, _, _>(wave, stack, probe);
+        }
+        let (tree, shapes) = (&self.tree, self.shapes);
+        self.level.run(OneByOne { tree, shapes, wave, stack, probe, margins: PhantomData::<B> });
+    }
+
+    fn trace_together<B: BoxMargins, W: Wave, P: Probe>(&self, wave: &mut W, stack: &mut Stack, probe: &mut P) {
+        let (tree, shapes, margins) = (&self.tree, self.shapes, PhantomData::<B>);
         let rays = match self.rays {
             _ if !shapes.planes.is_empty() || tree.nodes.is_empty() => RayOrder::OneByOne,
             RayOrder::Adaptive => RayOrder::of(wave, tree.nodes.len() + tree.blocks.len()),

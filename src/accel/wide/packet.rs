@@ -19,6 +19,7 @@ use crate::accel::query::{Goal, Query};
 use crate::accel::wave::{Wave, begin, end};
 use crate::accel::{Hit, NO_PRIM, Probe, Shapes};
 use crate::math::Vec3;
+use crate::math::shear::main_axis;
 use crate::math::simd::{Kernel, LANES, Pick, Row, Simd};
 use crate::math::triangles::{Plane, RayRow, corners_of, reach};
 
@@ -84,8 +85,8 @@ impl<W: Wave, P: Probe, B: BoxMargins> Kernel for InPackets<'_, W, P, B> {
         let mut queries: Vec<Query<W::Goal>> = Vec::with_capacity(RAYS);
         let mut packet = Packet::<B>::empty();
         let mut start = 0;
-        while start < wave.len() {
-            let count = RAYS.min(wave.len() - start);
+        while start < wave.rays().len() {
+            let count = RAYS.min(wave.rays().len() - start);
             if packet.gather(s, tree, wave, start) {
                 packet.trace(s, tree, shapes, wave, start, stack, &mut queries, probe);
             } else {
@@ -100,13 +101,6 @@ impl<W: Wave, P: Probe, B: BoxMargins> Kernel for InPackets<'_, W, P, B> {
 
 /// Every lane of a row.
 const ALL: u32 = (1 << LANES) - 1;
-
-/// Where a direction is largest.
-#[inline(always)]
-fn main_axis(dir: Vec3) -> usize {
-    let size = dir.abs();
-    if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) }
-}
 
 #[inline(always)]
 fn least(row: &Row) -> f32 {
@@ -123,17 +117,17 @@ impl<B: BoxMargins> Packet<B> {
     /// one the largest.
     #[inline(always)]
     fn gather<S: Simd, W: Wave>(&mut self, s: S, tree: &Tree, wave: &W, start: usize) -> bool {
-        if start + RAYS > wave.len() || tree.extent > B::COORDINATES {
+        if start + RAYS > wave.rays().len() || tree.extent > B::COORDINATES {
             return false;
         }
-        let dir = wave.ray(start).dir;
+        let dir = wave.rays()[start].dir;
         (self.z, self.octant) = (main_axis(dir), octant_of(dir));
         let mut alike = ALL;
         for row in 0..ROWS {
             let mut rays = [[0.0; LANES]; LANES];
             for (place, numbers) in rays.iter_mut().enumerate() {
                 let i = start + row * LANES + place;
-                let ray = wave.ray(i);
+                let ray = &wave.rays()[i];
                 let ([ox, oy, oz], [dx, dy, dz]) = (ray.origin.to_array(), ray.dir.to_array());
                 *numbers = [ox, oy, oz, wave.t_min(i), dx, dy, dz, ray.t_max];
             }
@@ -292,7 +286,7 @@ impl<B: BoxMargins> Packet<B> {
         let mut active = u32::from(u16::MAX);
         self.push(s, &tree.nodes[0], active, limit, stack, &mut top);
         if top == 0 {
-            (start..start + RAYS).for_each(|i| wave.miss(i));
+            (start..start + RAYS).for_each(|i| wave.take(i, Hit::MISS));
             return;
         }
         queries.clear();
@@ -369,7 +363,7 @@ impl<B: BoxMargins> Packet<B> {
                     mine &= mine - 1;
                     let ray = LANES * row + lane;
                     if let Some((t, best)) = queries[ray].best().filter(|b| b.1 == prim) {
-                        wave.found(start + ray, Hit { t, u: u[lane], v: v[lane], prim: best });
+                        wave.take(start + ray, Hit { t, u: u[lane], v: v[lane], prim: best });
                         probe.found();
                         left &= !(1 << ray);
                     }

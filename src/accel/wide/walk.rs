@@ -8,7 +8,7 @@ use super::packet::Branch;
 use super::slabs::{BoxMargins, Slabs};
 use crate::accel::query::{Goal, Query};
 use crate::accel::wave::{Wave, begin, end};
-use crate::accel::{Intersector, Probe, Shapes};
+use crate::accel::{Hit, Intersector, Probe, Shapes};
 use crate::math::Vec3;
 use crate::math::simd::{Kernel, LANES, Simd};
 use crate::math::triangles::{RayLanes, reach};
@@ -60,10 +60,11 @@ impl<W: Wave, P: Probe, B: BoxMargins> Kernel for OneByOne<'_, W, P, B> {
     fn run<S: Simd>(self, s: S) {
         let Self { tree, shapes, wave, stack: Stack { entries: stack, .. }, probe, .. } = self;
         let Some(root) = tree.nodes.first().filter(|_| shapes.planes.is_empty()) else {
-            return (0..wave.len()).for_each(|i| ask_by_itself::<B, _, _, _>(s, tree, shapes, wave, i, stack, probe));
+            return (0..wave.rays().len())
+                .for_each(|i| ask_by_itself::<B, _, _, _>(s, tree, shapes, wave, i, stack, probe));
         };
-        for i in 0..wave.len() {
-            let ray = wave.ray(i);
+        for i in 0..wave.rays().len() {
+            let ray = &wave.rays()[i];
             if !(B::allow(tree, ray.origin) && has_direction(ray.dir)) {
                 ask_by_itself::<B, _, _, _>(s, tree, shapes, wave, i, stack, probe);
                 continue;
@@ -72,7 +73,7 @@ impl<W: Wave, P: Probe, B: BoxMargins> Kernel for OneByOne<'_, W, P, B> {
             let slabs = Slabs::<B>::new(ray.origin, ray.dir, wave.t_min(i));
             let met = slabs.meets(s, root, B::widened(ray.t_max));
             if P::SILENT && met.1 == 0 {
-                wave.miss(i);
+                wave.take(i, Hit::MISS);
                 continue;
             }
             let (mut query, usable) = begin(shapes, wave, i, probe);
@@ -84,13 +85,14 @@ impl<W: Wave, P: Probe, B: BoxMargins> Kernel for OneByOne<'_, W, P, B> {
     }
 }
 
+/// Whether the direction is finite and not zero.
 #[inline(always)]
 pub(super) fn has_direction(dir: Vec3) -> bool {
     let (x, y, z) = (dir.x.abs(), dir.y.abs(), dir.z.abs());
     (x <= f32::MAX) & (y <= f32::MAX) & (z <= f32::MAX) & ((x > 0.0) | (y > 0.0) | (z > 0.0))
 }
 
-/// For the few that are not like the others.
+/// A ray that planes may hit, that boxes cannot be asked about, or that is answered while others go together.
 #[inline(always)]
 pub(super) fn ask_by_itself<B: BoxMargins, S: Simd, W: Wave, P: Probe>(
     s: S,
@@ -234,7 +236,7 @@ pub(super) fn test_leaf<S: Simd, G: Goal, P: Probe>(
 
 #[cold]
 #[inline(never)]
-pub(super) fn test_all<G: Goal, P: Probe>(query: &mut Query<G>, probe: &mut P) {
+fn test_all<G: Goal, P: Probe>(query: &mut Query<G>, probe: &mut P) {
     for prim in 0..query.shapes().bounded() {
         if query.test(prim, probe) {
             return;
