@@ -3,8 +3,9 @@
 use super::shapes::Prim;
 use super::{Hit, Ray, Shapes};
 use crate::math::bounds::{CONE_PROJECTION, POSITION_T, U32, U64, offset_origin};
-use crate::math::inset::inset;
+use crate::math::inset::{Rim, inset};
 use crate::math::shear::RaySpace;
+use crate::math::triangle::{Flat, Triangle};
 use crate::math::{DVec3, Vec3, cone, plane, polygon, sphere, triangle};
 
 /// Where and how a surface was hit, in the frame of the shapes.
@@ -85,6 +86,30 @@ impl Shapes {
     }
 }
 
+/// What hits on one triangle share when they are refined.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Facet {
+    pub flat: Flat,
+    pub rim: Rim,
+}
+
+impl Facet {
+    pub(crate) fn of(triangle: &Triangle) -> Self {
+        let corners = [triangle[0].as_dvec3(), triangle[1].as_dvec3(), triangle[2].as_dvec3()];
+        let flat = Flat::of(corners);
+        Self { flat, rim: Rim::of(corners, flat.normal) }
+    }
+
+    /// Position and error bound of a hit, as [`Shapes::refine`] finds them, and whether that is all: false where
+    /// distances need more than `f64`, and where secondary rays start elsewhere.
+    #[inline(always)]
+    pub(crate) fn place(&self, origin: Vec3, dir: Vec3, weights: (f32, f32)) -> (Vec3, Vec3, bool) {
+        let t = self.flat.distance(origin, dir);
+        let (position, error) = Located::along(origin, dir, t.unwrap_or(0.0)).rounded();
+        (position, error, t.is_some() & !self.rim.is_near(weights, error.max_element()))
+    }
+}
+
 /// A point and a bound of its error on each axis.
 struct Located {
     position: DVec3,
@@ -94,8 +119,13 @@ struct Located {
 impl Located {
     /// o + t d for a t with a relative error of [`POSITION_T`]: one rounding of the product, one of the sum.
     fn on_ray(ray: &Ray, t: f64) -> Self {
-        let step = ray.dir.as_dvec3() * t;
-        let position = ray.origin.as_dvec3() + step;
+        Self::along(ray.origin, ray.dir, t)
+    }
+
+    #[inline(always)]
+    fn along(origin: Vec3, dir: Vec3, t: f64) -> Self {
+        let step = dir.as_dvec3() * t;
+        let position = origin.as_dvec3() + step;
         Self { position, error: step.abs() * (POSITION_T + U64) + position.abs() * U64 }
     }
 
@@ -105,6 +135,7 @@ impl Located {
     }
 
     /// Rounded to `f32`, with the rounding added to the error: u of the position, or half the smallest number.
+    #[inline(always)]
     fn rounded(&self) -> (Vec3, Vec3) {
         let position = self.position.as_vec3();
         let error = self.error + position.as_dvec3().abs() * f64::from(U32) + f64::from(f32::from_bits(1));

@@ -163,6 +163,7 @@ pub const EDGE_ROOM: f64 = 64.0;
 /// `normal` is the unit geometric normal, either side. The position moves along it by Σ|nₖ| errorₖ, the support of the
 /// error box, and each moved coordinate is rounded one float outwards (M. Pharr, W. Jakob, G. Humphreys, *Physically
 /// Based Rendering*, 2023, 6.8.6). The slack covers the rounding of the normal and of the sum: 8 u < 2⁻¹⁰.
+#[inline(always)]
 pub fn offset_origin(position: Vec3, error: Vec3, normal: Vec3, dir: Vec3) -> Vec3 {
     let distance = normal.abs().dot(error) * SLACK;
     let side = if normal.dot(dir) < 0.0 { -distance } else { distance };

@@ -15,16 +15,42 @@ use super::{DVec3, Vec3};
 #[inline]
 pub fn inset(triangle: &Triangle, (u, v): (f32, f32), error: f32) -> DVec3 {
     let [a, b, c] = triangle.map(Vec3::as_dvec3);
-    let weights = [1.0 - f64::from(u) - f64::from(v), f64::from(u), f64::from(v)];
-    let room = f64::from(error) * EDGE_ROOM;
-    let area2 = (b - a).cross(c - a).length_squared();
-    let edges2 = [(c - b).length_squared(), (a - c).length_squared(), (b - a).length_squared()];
-    // The weight of a corner times the height over the opposite edge, 2 area / |edge|, is the distance from that edge.
-    let is_near = |k: usize| weights[k] * weights[k] * area2 < room * room * edges2[k];
-    if area2 == 0.0 || !(is_near(0) || is_near(1) || is_near(2)) {
+    let rim = Rim::of([a, b, c], (b - a).cross(c - a));
+    if !rim.is_near((u, v), error) {
         return DVec3::ZERO;
     }
-    moved_inwards([a, b, c], weights, edges2.map(|e| room * (e / area2).sqrt()), room)
+    let weights = [1.0 - f64::from(u) - f64::from(v), f64::from(u), f64::from(v)];
+    let room = f64::from(error) * EDGE_ROOM;
+    moved_inwards([a, b, c], weights, rim.edges2.map(|e| room * (e / rim.area2).sqrt()), room)
+}
+
+/// What tells how far a point of a triangle is from its edges.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Rim {
+    /// The square of twice the area.
+    pub area2: f64,
+    /// The squares of the edges opposite each corner.
+    pub edges2: [f64; 3],
+}
+
+impl Rim {
+    /// Of a triangle whose normal is (b − a) × (c − a).
+    #[inline(always)]
+    pub fn of([a, b, c]: [DVec3; 3], normal: DVec3) -> Self {
+        let edges2 = [(c - b).length_squared(), (a - c).length_squared(), (b - a).length_squared()];
+        Self { area2: normal.length_squared(), edges2 }
+    }
+
+    /// Whether a hit of weights `u`, `v` whose position is off by `error` is to be moved inwards by [`inset`].
+    #[inline(always)]
+    pub fn is_near(&self, (u, v): (f32, f32), error: f32) -> bool {
+        let (u, v) = (f64::from(u), f64::from(v));
+        let weights = [1.0 - u - v, u, v];
+        let room = f64::from(error) * EDGE_ROOM;
+        // The weight of a corner times the height over the opposite edge, 2 area / |edge|, is the distance from that edge.
+        let is_near = |k: usize| weights[k] * weights[k] * self.area2 < room * room * self.edges2[k];
+        (self.area2 != 0.0) & (is_near(0) | is_near(1) | is_near(2))
+    }
 }
 
 /// The way from the place of weights `w` to one where each weight is at least as large as in `least`.

@@ -18,7 +18,7 @@ pub struct Bounded {
 impl Bounded {
     /// The quotient and a bound of its relative error, or `None` where the sign of either term is not certain. The product
     /// of both must neither over- nor underflow, which that of two terms made of `f32` coordinates does not.
-    #[inline]
+    #[inline(always)]
     pub fn over(self, denominator: Self) -> Option<(f64, f64)> {
         let (n, d) = (self.value.abs(), denominator.value.abs());
         // Also false for NaN.

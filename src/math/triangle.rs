@@ -140,16 +140,50 @@ fn plane_quotient(ray: &RaySpace, triangle: &Triangle, terms: f64) -> Option<(f6
     numerator.over(denominator)
 }
 
+/// What rays share that meet the plane of one triangle: a, n = (b − a) × (c − a) and |b − a| × |c − a| with sums for
+/// differences.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Flat {
+    /// a.
+    pub corner: DVec3,
+    /// n.
+    pub normal: DVec3,
+    /// What bounds the rounding of n.
+    pub sizes: DVec3,
+}
+
+impl Flat {
+    /// The plane of a triangle.
+    #[inline(always)]
+    pub fn of([a, b, c]: [DVec3; 3]) -> Self {
+        let (e1, e2) = (b - a, c - a);
+        Self { corner: a, normal: e1.cross(e2), sizes: magnitude_cross(e1.abs(), e2.abs()) }
+    }
+
+    /// [`distance_f64`] of a triangle that is hit, or `None` where the bound of its error is not good enough.
+    #[inline(always)]
+    pub fn distance(&self, origin: Vec3, dir: Vec3) -> Option<f64> {
+        let (numerator, denominator) = self.terms(origin, dir, PLANE_TERMS_F64);
+        match numerator.over(denominator) {
+            Some((t, error)) if error < POSITION_T => Some(t),
+            _ => None,
+        }
+    }
+
+    /// n·(a − o) and n·d.
+    #[inline(always)]
+    fn terms(&self, origin: Vec3, dir: Vec3, terms: f64) -> (Bounded, Bounded) {
+        let term = |v: DVec3| Bounded { value: self.normal.dot(v), error: self.sizes.dot(v.abs()) * terms };
+        (term(self.corner - origin.as_dvec3()), term(dir.as_dvec3()))
+    }
+}
+
 /// n·(a − o), n·d and n.
 #[inline]
 fn plane_terms(ray: &RaySpace, &[a, b, c]: &Triangle, terms: f64) -> (Bounded, Bounded, DVec3) {
-    let (origin, dir, a) = (ray.origin.as_dvec3(), ray.dir.as_dvec3(), a.as_dvec3());
-    let (e1, e2) = (b.as_dvec3() - a, c.as_dvec3() - a);
-    let normal = e1.cross(e2);
-    let sizes = magnitude_cross(e1.abs(), e2.abs());
-    let to_plane = a - origin;
-    let term = |v: DVec3| Bounded { value: normal.dot(v), error: sizes.dot(v.abs()) * terms };
-    (term(to_plane), term(dir), normal)
+    let flat = Flat::of([a.as_dvec3(), b.as_dvec3(), c.as_dvec3()]);
+    let (numerator, denominator) = flat.terms(ray.origin, ray.dir, terms);
+    (numerator, denominator, flat.normal)
 }
 
 /// |p| × |q| with sums for differences: bounds what rounding can do to the cross product.

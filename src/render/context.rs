@@ -2,6 +2,7 @@
 
 use super::Settings;
 use super::shade::{Band, LocalLight, Sky, bands};
+use super::strip::Uniform;
 use super::texture::TextureStore;
 use super::world::World;
 use crate::math::Vec3;
@@ -15,12 +16,17 @@ pub(crate) struct Context<'a> {
     pub textures: &'a TextureStore<'a>,
     pub sky: Sky,
     pub lights: Vec<LocalLight>,
+    /// What is known of each material for all points of it; `None` where it takes more, or where each point must be
+    /// looked at.
+    pub uniform: Vec<Option<Uniform>>,
     /// Parts of the spectrum; empty unless a material disperses light.
     pub bands: Vec<Band>,
     /// Whether anything but opaque surfaces can stand before a light.
     pub has_filters: bool,
     /// Whether the environment is what is seen behind the scene.
     pub shows_environment: bool,
+    /// Whether nothing is seen but lights, and what shines by itself.
+    pub is_dark: bool,
     /// Bounces after the eye ray.
     pub depth: u32,
     /// Branches whose largest weight is below this end.
@@ -33,17 +39,22 @@ impl<'a> Context<'a> {
     pub(crate) fn new(scene: &'a Scene, world: &'a World, textures: &'a TextureStore<'a>, settings: &Settings) -> Self {
         let everything = settings.everything;
         let features = Features::of(scene);
+        let depth = settings.depth.unwrap_or_else(|| auto_depth(&features));
+        let alone = everything || settings.layers;
+        let uniform = |m: &Material| if alone { None } else { Uniform::of(m, textures, depth > 0) };
         let needs = |any: &[Feature]| everything || any.iter().any(|&f| features.has(f));
         Self {
             scene,
             world,
             textures,
             sky: Sky::new(scene),
+            is_dark: Sky::new(scene).is_dark() && scene.ambient == Vec3::ZERO,
             lights: scene.lights.iter().map(|l| LocalLight::new(l, world.center)).collect(),
+            uniform: scene.materials.iter().map(uniform).collect(),
             bands: if needs(&[Feature::Dispersion]) { bands() } else { Vec::new() },
             has_filters: needs(&[Feature::Mask, Feature::Blend, Feature::ThinTransmission, Feature::Refraction]),
             shows_environment: scene.background == Some(Background::Environment),
-            depth: settings.depth.unwrap_or_else(|| auto_depth(&features)),
+            depth,
             cutoff: settings.cutoff,
             everything,
         }

@@ -12,6 +12,7 @@ mod asking;
 mod context;
 mod costs;
 pub mod everything;
+mod eyes;
 mod layers;
 mod observer;
 pub mod optics;
@@ -21,6 +22,7 @@ mod seam;
 mod shade;
 mod shadow;
 pub mod story;
+mod strip;
 pub mod studio;
 mod surface;
 #[cfg(test)]

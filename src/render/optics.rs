@@ -6,6 +6,7 @@
 use crate::math::{DVec3, Vec3};
 
 /// Mirror direction R = I − 2 (I·N) N; either side of the normal will do.
+#[inline(always)]
 pub fn reflect(incident: Vec3, normal: Vec3) -> Vec3 {
     incident - 2.0 * incident.dot(normal) * normal
 }
@@ -44,6 +45,7 @@ pub fn fresnel_dielectric(cos_i: f64, n_i: f64, n_t: f64) -> f64 {
 
 /// Schlick's approximation, "An Inexpensive BRDF Model for Physically-based Rendering" (1994), with its value at
 /// grazing angles given.
+#[inline(always)]
 pub fn fresnel_schlick(f0: Vec3, f90: f32, cosine: f32) -> Vec3 {
     let m = (1.0 - cosine).clamp(0.0, 1.0);
     let m2 = m * m;

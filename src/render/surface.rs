@@ -3,6 +3,7 @@
 //! Evaluated once, for the hit that counts. Nothing here knows of light; materials are only asked for their normal and
 //! bump maps. Whatever a file gives, normals come out finite and of unit length.
 
+use super::shade::Seen;
 use super::texture::{ColorSpace, TextureStore};
 use super::world::{Placement, PrimSource, World};
 use crate::accel::refine::Refined;
@@ -211,9 +212,7 @@ impl Patch<'_> {
     /// Interpolated shading normal, world space, on the side of the mesh's own normals.
     #[inline]
     fn normal(&self) -> Option<Vec3> {
-        let n = self.mix(&self.mesh.normals)?.as_dvec3();
-        let n = (self.placement.normal_from_object * n).try_normalize()?.as_vec3();
-        n.is_finite().then_some(n)
+        smooth_normal(self.placement, self.mix(&self.mesh.normals)?)
     }
 
     /// Tangent and bitangent, unit and perpendicular to `normal`: those of the mesh, or those of the coordinates.
@@ -358,6 +357,11 @@ impl<'a> Surface<'a> {
         self.normal = facing(bumped * side, self.view);
     }
 
+    /// How it is seen.
+    pub(crate) fn seen(&self) -> Seen {
+        Seen { normal: self.normal, geometric: self.geometric, view: self.view, front: self.front }
+    }
+
     /// A ray from here along `dir` (of any length) up to `t_max`; it starts outside the error of the position, on the
     /// side it goes to, and cannot meet the flat face it starts on.
     pub(crate) fn ray(&self, dir: Vec3, t_max: f32, sample: u32) -> Ray {
@@ -372,10 +376,18 @@ impl<'a> Surface<'a> {
     }
 }
 
+/// An interpolated normal of a mesh as its instance turns it, of unit length; `None` where it has none.
+#[inline(always)]
+pub(crate) fn smooth_normal(placement: &Placement, interpolated: Vec3) -> Option<Vec3> {
+    let normal = (placement.normal_from_object * interpolated.as_dvec3()).try_normalize()?.as_vec3();
+    normal.is_finite().then_some(normal)
+}
+
 /// `normal`, turned just far enough that `view` sees its front.
 ///
 /// Interpolated and mapped normals may point away at silhouettes; unturned they would make black rims.
-fn facing(normal: Vec3, view: Vec3) -> Vec3 {
+#[inline(always)]
+pub(crate) fn facing(normal: Vec3, view: Vec3) -> Vec3 {
     /// Cosine that a turned normal keeps with the view.
     const GRAZING: f32 = 1e-2;
     let cosine = normal.dot(view);

@@ -4,14 +4,14 @@
 //! bits.
 
 use super::context::Context;
+use super::eyes::{Ball, Eye};
 use super::layers::{self, Facts, LayerPixel};
 use super::observer::Observer;
 use super::pixel::sample_offsets;
 use super::view::View;
-use super::wave::{Media, Path};
 use super::whitted::{ByClass, Sample, Tracer, WAVE_LIMIT};
 use super::{Progress, Settings};
-use crate::accel::{Accel, NO_PRIM, Ray};
+use crate::accel::Accel;
 use crate::image::Picture;
 use crate::math::{DVec3, Vec3};
 use crate::scene::Background;
@@ -22,9 +22,6 @@ const TILE: u32 = 32;
 
 /// Columns and rows of a block of pixels, whose rays go together.
 const BLOCK: u32 = 4;
-
-/// An eye farther from the scene than this many of its diagonals starts its rays just before the scene.
-const FAR: f64 = 4.0;
 
 /// A part of the picture: pixels `x0..x1` of rows `y0..y1`.
 #[derive(Clone, Copy, Debug)]
@@ -51,13 +48,6 @@ struct Frame<'a> {
     sample_width: f32,
     scene: Ball,
     background: Option<Vec3>,
-}
-
-/// A ball around everything bounded, world space. `None`-like (infinite) when eye rays must not be shortened.
-#[derive(Clone, Copy)]
-struct Ball {
-    center: DVec3,
-    radius: f64,
 }
 
 /// Renders every tile; the picture, the counts of all threads, and whether nothing was cut short by the user.
@@ -124,7 +114,7 @@ pub(crate) fn trace_sample<A: Accel, P: Observer>(
     }
     let mut tracer = Tracer::<A, P>::new(context, accel, &());
     tracer.reset(1, false);
-    let (ray, path) = frame.eye_ray(tracer.center(), f64::from(x) + dx, f64::from(y) + dy, 0);
+    let (ray, path) = frame.eye(tracer.center()).ray(f64::from(x) + dx, f64::from(y) + dy).with_path(0);
     tracer.start(ray, path);
     tracer.trace().then(|| (tracer.samples[0], tracer.counts))
 }
@@ -264,11 +254,13 @@ impl<'a> Frame<'a> {
         let places: Vec<_> = tile.places().collect();
         for places in places.chunks(pixels) {
             tracer.reset(places.len() * self.offsets.len(), self.settings.layers);
-            let corners = places.iter().flat_map(|&(x, y)| self.offsets.iter().map(move |&(dx, dy)| (x, y, dx, dy)));
-            for (sample, (x, y, dx, dy)) in (0u32..).zip(corners) {
-                let (ray, path) = self.eye_ray(tracer.center(), f64::from(x) + dx, f64::from(y) + dy, sample);
-                tracer.start(ray, path);
-            }
+            let eye = self.eye(tracer.center());
+            tracer.eyes.send(
+                &eye,
+                places.iter().flat_map(|&(x, y)| {
+                    self.offsets.iter().map(move |&(dx, dy)| (f64::from(x) + dx, f64::from(y) + dy))
+                }),
+            );
             if !tracer.trace() {
                 return None;
             }
@@ -277,23 +269,10 @@ impl<'a> Frame<'a> {
         Some(())
     }
 
-    /// The ray through (x, y) of the picture, started before the scene when the eye is far away, in the centred frame.
-    #[expect(clippy::cast_possible_truncation, reason = "widths are estimates")]
-    fn eye_ray(&self, center: DVec3, x: f64, y: f64, sample: u32) -> (Ray, Path) {
-        let eye = self.view.primary(x, y, self.settings.width, self.settings.height);
-        let skipped = self.scene.distance_before(eye.origin, eye.dir);
-        let origin = (eye.origin - center + eye.dir * skipped).as_vec3();
-        let dir = eye.dir.as_vec3();
-        let path = Path {
-            weight: Vec3::ONE,
-            depth: 0,
-            straight: true,
-            band: None,
-            media: Media::default(),
-            cone_width: (eye.cone_width + eye.cone_spread * skipped as f32) * self.sample_width,
-            cone_spread: eye.cone_spread * self.sample_width,
-        };
-        (Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude: NO_PRIM, sample }, path)
+    /// Where eye rays come from.
+    fn eye(&self, center: DVec3) -> Eye<'_> {
+        let Settings { width, height, .. } = *self.settings;
+        Eye { view: self.view, width, height, center, sample_width: self.sample_width, scene: self.scene }
     }
 }
 
@@ -304,15 +283,6 @@ impl Ball {
         let radius = 0.5 * (hi - lo).length();
         let usable = context.scene.planes.is_empty() && radius.is_finite();
         Self { center: lo * 0.5 + hi * 0.5, radius: if usable { radius } else { f64::INFINITY } }
-    }
-
-    /// How much of a ray can be skipped because all of it lies before the ball, seen from far away.
-    fn distance_before(&self, origin: DVec3, dir: DVec3) -> f64 {
-        let to_center = self.center - origin;
-        let far = to_center.length() > 2.0 * self.radius * FAR + self.radius;
-        // Twice the radius leaves room for the rounding of the start.
-        let skipped = to_center.dot(dir) - 2.0 * self.radius;
-        if far && skipped > 0.0 && skipped.is_finite() { skipped } else { 0.0 }
     }
 }
 

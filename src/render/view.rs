@@ -103,6 +103,7 @@ impl View {
 
     /// The ray through (`x`, `y`), in pixels from the top left corner of a `width × height` picture; pixel centres are
     /// at halves.
+    #[inline(always)]
     pub fn primary(&self, x: f64, y: f64, width: u32, height: u32) -> PrimaryRay {
         let pixel = 2.0 / f64::from(height.max(1));
         let film = DVec2::new((x - f64::from(width) * 0.5) * pixel, 1.0 - y * pixel);

@@ -11,12 +11,14 @@ use super::Progress;
 use super::asking::Asking;
 use super::context::{Context, coverage};
 use super::everything::look_up_in_vain;
+use super::eyes::Eyes;
 use super::layers::Facts;
 use super::observer::Observer;
 use super::optics::{dispersed_index, reflect, refract};
 use super::seam::is_same_crossing;
 use super::shade::{Matter, Reader, above, lets_light_in, terminator};
 use super::shadow::Shadows;
+use super::strip::{POINTS, Sorted, Strip};
 use super::surface::{Surface, Target};
 use super::wave::{Crossing, Medium, Path, Queue, RayClass, Wave};
 use crate::accel::{Accel, Hit, Ray};
@@ -27,8 +29,6 @@ use std::hint::black_box;
 pub(crate) const WAVE_LIMIT: usize = 1 << 13;
 /// Shadow rays that wait at most.
 const SHADOW_LIMIT: usize = 1 << 14;
-/// A shadow ray to a point ends this far before it, in its own length: more than the rounding of its start.
-const BEFORE_LIGHT: f32 = 1.0 - 4.0 * f32::EPSILON;
 
 /// What a sample of the picture has gathered.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -66,11 +66,14 @@ impl<P> ByClass<P> {
 pub(crate) struct Tracer<'a, A: Accel, P> {
     context: &'a Context<'a>,
     asking: Asking<'a, A>,
+    pub eyes: Eyes,
     /// Rays that start, by class.
     starting: [Queue; 3],
     /// Rays that go on behind a hit, by class.
     continuing: [Queue; 3],
     wave: Wave,
+    sorted: Sorted,
+    strip: Box<Strip>,
     shadows: Shadows,
     pub samples: Vec<Sample>,
     /// Facts of the first surface of each sample; empty unless layers are wanted.
@@ -83,9 +86,12 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         Self {
             context,
             asking: Asking::new(accel, progress),
+            eyes: Eyes::default(),
             starting: Default::default(),
             continuing: Default::default(),
             wave: Wave::default(),
+            sorted: Sorted::default(),
+            strip: Box::default(),
             shadows: Shadows::default(),
             samples: Vec::new(),
             facts: Vec::new(),
@@ -98,24 +104,26 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         self.context.world.center
     }
 
-    /// Prepares for `samples` samples, whose eye rays [`Self::start`] adds.
+    /// Prepares for `samples` samples, whose eye rays are added to [`Self::eyes`].
     pub(crate) fn reset(&mut self, samples: usize, facts: bool) {
         self.counts.each_mut().into_iter().for_each(|probe| probe.batch(samples));
         self.starting.iter_mut().chain(&mut self.continuing).for_each(Queue::clear);
         self.shadows.clear();
+        self.eyes.clear();
         self.samples.clear();
         self.samples.resize(samples, Sample::default());
         self.facts.clear();
         self.facts.resize(if facts { samples } else { 0 }, Facts::NONE);
     }
 
-    /// Adds an eye ray.
+    /// Adds an eye ray that goes by itself.
     pub(crate) fn start(&mut self, ray: Ray, path: Path) {
         self.starting[RayClass::Primary as usize].push(ray, path, Hit::MISS);
     }
 
     /// Traces all trees to their leaves; false when the user gave up before the end.
     pub(crate) fn trace(&mut self) -> bool {
+        self.trace_eyes();
         while let Some(class) = self.next_wave() {
             if self.asking.cancelled {
                 return false;
@@ -135,6 +143,84 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             self.trace_shadows();
         }
         !self.asking.cancelled
+    }
+
+    /// Traces the rays of all eyes and shades what they hit.
+    fn trace_eyes(&mut self) {
+        let mut eyes = std::mem::take(&mut self.eyes);
+        eyes.hits.resize(eyes.rays.len(), Hit::MISS);
+        self.asking.closest(&eyes.rays, &mut eyes.hits, self.counts.of(RayClass::Primary));
+        if !self.asking.cancelled {
+            self.see(&eyes);
+            self.trace_shadows();
+        }
+        self.eyes = eyes;
+    }
+
+    fn see(&mut self, eyes: &Eyes) {
+        let context = self.context;
+        let mut sorted = std::mem::take(&mut self.sorted);
+        sorted.clear(context.scene.instances.len());
+        for (i, hit) in (0u32..).zip(&eyes.hits) {
+            let at = i as usize;
+            if hit.is_some() {
+                if !sorted.take(context, i, hit.prim) {
+                    self.shade(RayClass::Primary, &eyes.rays[at], &eyes.path(at), hit);
+                }
+            } else if context.shows_environment {
+                self.leave(&eyes.rays[at], &eyes.path(at));
+            } else {
+                self.samples[at].through += Vec3::ONE;
+            }
+        }
+        let mut strip = std::mem::take(&mut self.strip);
+        for k in 0..sorted.instances() {
+            let (instance, hits) = sorted.of(k);
+            let mut hits = hits.peekable();
+            while hits.peek().is_some() {
+                strip.clear();
+                for (index, face) in hits.by_ref().take(POINTS) {
+                    strip.push(index, &eyes.rays[index as usize], &eyes.hits[index as usize], face);
+                }
+                self.shade_strip(eyes, instance, &mut strip);
+            }
+        }
+        self.strip = strip;
+        self.sorted = sorted;
+    }
+
+    /// Shades points of one instance side by side, as [`Self::shade`] does one by one.
+    fn shade_strip(&mut self, eyes: &Eyes, instance: u32, strip: &mut Strip) {
+        let context = self.context;
+        let mesh = &context.scene.meshes[context.scene.instances[instance as usize].mesh as usize];
+        let Some(uniform) = &context.uniform[mesh.material as usize] else { return };
+        let smooth = !mesh.normals.is_empty();
+        strip.find(smooth.then(|| context.world.placement(instance)));
+        for index in strip.left_out(uniform.one_sided) {
+            let i = index as usize;
+            self.shade(RayClass::Primary, &eyes.rays[i], &eyes.path(i), &eyes.hits[i]);
+        }
+        let matter = &uniform.matter;
+        if !context.is_dark || matter.shines() {
+            for (index, seen) in strip.seen() {
+                let everywhere = matter.emission + matter.ambient(&seen, &context.sky, context.scene.ambient);
+                self.add(eyes.rays[index as usize].sample, everywhere);
+            }
+        }
+        for light in &context.lights {
+            strip.shine(matter, light);
+            for shone in strip.shone() {
+                let ray = &eyes.rays[shone.index as usize];
+                if light.shadows {
+                    self.shadows.push(shone.ray(ray.sample, eyes.hits[shone.index as usize].prim), shone.radiance);
+                } else {
+                    self.add(ray.sample, shone.radiance);
+                }
+            }
+        }
+        if self.shadows.len() >= SHADOW_LIMIT {
+            self.trace_shadows();
+        }
     }
 
     /// Takes the next wave and finds its hits. Rays that go on come before rays that start a deeper generation.
@@ -216,7 +302,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         if context.everything {
             look_up_in_vain(&surface, context.textures);
         }
-        let everywhere = matter.emission + matter.ambient(&surface, &context.sky, context.scene.ambient);
+        let everywhere = matter.emission + matter.ambient(&surface.seen(), &context.sky, context.scene.ambient);
         let crossing = point.crossing(context, path.band);
         self.add(ray.sample, point.path.weight * everywhere);
         self.light(&point, &crossing);
@@ -271,10 +357,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
                 self.add(point.ray.sample, radiance);
                 continue;
             }
-            let (dir, end) = match incident.position {
-                Some(position) => (position - surface.origin(to_light), BEFORE_LIGHT),
-                None => (to_light, f32::INFINITY),
-            };
+            let (dir, end) = incident.way(surface.origin(to_light));
             self.shadows.push(surface.ray(dir, end, point.ray.sample), radiance);
         }
         if self.shadows.len() >= SHADOW_LIMIT {

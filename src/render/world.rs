@@ -35,7 +35,7 @@ pub(crate) struct Placement {
 }
 
 impl Placement {
-    fn new(m: DMat3) -> Self {
+    pub(super) fn new(m: DMat3) -> Self {
         let mirrored = m.determinant() < 0.0;
         // The cofactors are det · (inverse transpose) and exist for flattened instances too.
         let cofactors = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));

@@ -226,6 +226,29 @@ impl Material {
         }
     }
 
+    /// The textures that it names.
+    pub fn textures(&self) -> impl Iterator<Item = &TextureRef> {
+        let common = [
+            &self.base_color_map,
+            &self.opacity_map,
+            &self.emission_map,
+            &self.normal_map,
+            &self.bump_map,
+            &self.occlusion_map,
+        ];
+        let own = match &self.surface {
+            Surface::MetalRough(m) => {
+                [&m.metal_rough_map, &m.specular_map, &m.specular_color_map, &m.transmission_map].map(Option::as_ref)
+            }
+            Surface::Phong(p) => {
+                let [a, b, c] = [&p.ambient_map, &p.specular_map, &p.shininess_map].map(Option::as_ref);
+                [a, b, c, None]
+            }
+            Surface::Unlit => [None; 4],
+        };
+        common.map(Option::as_ref).into_iter().chain(own).flatten()
+    }
+
     /// Every slot that can hold a texture.
     pub fn textures_mut(&mut self) -> Vec<&mut Option<TextureRef>> {
         let mut slots = vec![

@@ -45,13 +45,27 @@ pub(crate) struct Incident {
     strength: Vec3,
 }
 
+/// A shadow ray to a point ends this far before it, in its own length: more than the rounding of its start.
+const BEFORE_LIGHT: f32 = 1.0 - 4.0 * f32::EPSILON;
+
 impl Incident {
+    /// Direction and end of a shadow ray from `origin`.
+    #[inline(always)]
+    pub(crate) fn way(&self, origin: Vec3) -> (Vec3, f32) {
+        match self.position {
+            Some(position) => (position - origin, BEFORE_LIGHT),
+            None => (self.to_light, f32::INFINITY),
+        }
+    }
+
     /// Radiance of a white matt surface that faces the light: the founding texts' I.
+    #[inline(always)]
     pub(crate) fn strength(&self) -> Vec3 {
         self.strength
     }
 
     /// Irradiance on a surface that faces the light, lux: π times the strength.
+    #[inline(always)]
     pub(crate) fn irradiance(&self) -> Vec3 {
         self.strength * PI
     }
@@ -73,22 +87,31 @@ impl LocalLight {
 
     /// What arrives at `position` when nothing is in the way; `None` where nothing does.
     pub(crate) fn incident(&self, position: Vec3) -> Option<Incident> {
+        let (incident, arrives) = self.arriving(position);
+        arrives.then_some(incident)
+    }
+
+    /// The same, and whether anything arrives.
+    #[inline(always)]
+    pub(crate) fn arriving(&self, position: Vec3) -> (Incident, bool) {
         let (to_light, share, end) = match self.shape {
             Shape::Directional(to_light) => (to_light, 1.0 / PI, None),
             Shape::Point { position: light, falloff, cone } => {
                 let way = light - position;
-                let to_light = way.try_normalize()?;
+                let to_light = way.try_normalize().unwrap_or(Vec3::ZERO);
                 let share = weaken(falloff, way.length()) * cone.map_or(1.0, |c| c.share(-to_light));
                 (to_light, share, Some(light))
             }
         };
         let strength = (self.intensity * share).min(Vec3::splat(f32::MAX));
-        (strength.max_element() > 0.0).then_some(Incident { to_light, position: end, strength })
+        let arrives = (strength.max_element() > 0.0) & (to_light != Vec3::ZERO);
+        (Incident { to_light, position: end, strength }, arrives)
     }
 }
 
 /// What turns a light's intensity into its strength at `distance`: candela into lux over π; factors stay.
 #[expect(clippy::cast_possible_truncation, reason = "ranges are lengths like any other")]
+#[inline(always)]
 fn weaken(falloff: Falloff, distance: f32) -> f32 {
     let Falloff::InverseSquare { range } = falloff else { return 1.0 };
     let squared = (distance * distance).max(f32::MIN_POSITIVE);
@@ -107,6 +130,7 @@ impl Cone {
     }
 
     /// The share of light that leaves along the unit vector `dir`: the square of the fade over the angle's cosine.
+    #[inline(always)]
     fn share(&self, dir: Vec3) -> f32 {
         let fade = (self.axis.dot(dir) * self.scale + self.offset).clamp(0.0, 1.0);
         fade * fade

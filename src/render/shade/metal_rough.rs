@@ -8,10 +8,9 @@
 //! unscattered apart from a part that is looked up; lights themselves are not seen through rough glass.
 
 use super::facets::{albedo, rebound};
-use super::{Balance, Reader, Sky};
+use super::{Balance, Reader, Seen, Sky};
 use crate::math::Vec3;
 use crate::render::optics::{fresnel_dielectric, fresnel_schlick, reflect};
-use crate::render::surface::Surface;
 use crate::render::wave::Crossing;
 use crate::scene::MetalRough;
 use std::f32::consts::PI;
@@ -70,17 +69,25 @@ impl MetalRoughMatter {
     }
 
     /// Reflectance of the dielectric and of the metal part by Schlick's formula.
+    #[inline(always)]
     fn fresnel(&self, cosine: f32) -> (Vec3, Vec3) {
         (fresnel_schlick(self.f0, self.f90, cosine), fresnel_schlick(self.base, 1.0, cosine))
     }
 
     /// Colour of the light that is scattered under the surface, before what the surface reflects is taken off.
+    #[inline(always)]
     fn scattered(&self) -> Vec3 {
         self.base * ((1.0 - self.metallic) * (1.0 - self.transmission))
     }
 
+    /// Whether a ray off the surface could be seen.
+    pub(crate) fn mirrors(&self) -> bool {
+        self.thick || self.traced(true) > 0.0
+    }
+
     /// BRDF × N·L; all unit vectors, away from the surface.
-    pub(super) fn lit(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
+    #[inline(always)]
+    pub(crate) fn lit(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
         let (n_l, n_v) = (normal.dot(to_light), normal.dot(view));
         if n_l <= 0.0 || n_v <= 0.0 {
             return Vec3::ZERO;
@@ -95,28 +102,28 @@ impl MetalRoughMatter {
     }
 
     /// The surroundings without a ray: scattered and looked-up mirrored light.
-    pub(super) fn ambient(&self, surface: &Surface, sky: &Sky, ambient: Vec3) -> Vec3 {
-        let n_v = surface.normal.dot(surface.view).clamp(0.0, 1.0);
-        let looked_up = 1.0 - self.traced(surface.front);
-        let seen = albedo(self.roughness, n_v);
-        let (dielectric, metal) = (self.f0 * seen.0 + self.f90 * seen.1, self.base * seen.0 + seen.1);
+    pub(super) fn ambient(&self, seen: &Seen, sky: &Sky, ambient: Vec3) -> Vec3 {
+        let n_v = seen.normal.dot(seen.view).clamp(0.0, 1.0);
+        let looked_up = 1.0 - self.traced(seen.front);
+        let shares = albedo(self.roughness, n_v);
+        let (dielectric, metal) = (self.f0 * shares.0 + self.f90 * shares.1, self.base * shares.0 + shares.1);
 
         let taken = self.fresnel(n_v).0.lerp(dielectric, looked_up).max_element();
         let diffuse = self.scattered() * (1.0 - taken).max(0.0) * self.occlusion;
-        let mut sum = diffuse * (sky.diffuse(surface.normal) + ambient);
+        let mut sum = diffuse * (sky.diffuse(seen.normal) + ambient);
         if looked_up > 0.0 {
-            let mirrored = above(reflect(-surface.view, surface.normal), surface.geometric);
+            let mirrored = above(reflect(-seen.view, seen.normal), seen.geometric);
             let light = sky.blurred(mirrored, self.roughness) + ambient;
             sum += dielectric.lerp(metal, self.metallic) * light * (looked_up * self.open(n_v));
             if self.metallic > 0.0 {
-                let light = sky.diffuse(surface.normal) + ambient;
+                let light = sky.diffuse(seen.normal) + ambient;
                 let rebound = rebound(self.roughness, self.base, n_v);
                 sum += rebound * light * (self.metallic * looked_up * self.occlusion);
             }
         }
-        let frosted = self.frosted(surface.front);
+        let frosted = self.frosted(seen.front);
         if frosted > 0.0 {
-            let light = sky.blurred(-surface.view, self.roughness) + ambient;
+            let light = sky.blurred(-seen.view, self.roughness) + ambient;
             sum += self.passed(1.0 - taken) * light * frosted;
         }
         sum
@@ -175,6 +182,7 @@ pub(crate) fn above(dir: Vec3, geometric: Vec3) -> Vec3 {
 }
 
 /// Trowbridge and Reitz's distribution of facets (GGX), `alpha` the square of the roughness.
+#[inline(always)]
 fn ggx(normal: Vec3, half: Vec3, alpha: f32) -> f32 {
     let n_h = normal.dot(half).clamp(0.0, 1.0);
     // 1 − (N·H)² as |N × H|², which keeps its digits in a narrow highlight.
@@ -186,6 +194,7 @@ fn ggx(normal: Vec3, half: Vec3, alpha: f32) -> f32 {
 
 /// Smith's height-correlated masking and shadowing over 4 N·L N·V (E. Heitz, "Understanding the Masking-Shadowing
 /// Function", 2014).
+#[inline(always)]
 fn visibility(n_l: f32, n_v: f32, alpha: f32) -> f32 {
     let a2 = alpha * alpha;
     let view = n_l * (n_v * n_v * (1.0 - a2) + a2).sqrt();

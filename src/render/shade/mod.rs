@@ -24,6 +24,19 @@ use super::wave::Crossing;
 use crate::math::{Vec3, Vec4};
 use crate::scene::{Material, Surface as Reflection, TextureRef};
 
+/// How a point of a surface is seen: unit vectors away from it, and from which side.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Seen {
+    /// For shading.
+    pub normal: Vec3,
+    /// Of the shape itself.
+    pub geometric: Vec3,
+    /// Back along the ray.
+    pub view: Vec3,
+    /// Whether it is the front.
+    pub front: bool,
+}
+
 /// The material at one point of a surface.
 pub(crate) struct Matter {
     pub emission: Vec3,
@@ -81,27 +94,41 @@ impl Reader<'_> {
 impl Matter {
     /// The material at `surface`, whose base colour has been read already.
     pub(crate) fn new(surface: &Surface, base: Vec3, store: &TextureStore) -> Self {
-        let material = surface.target.material;
         let reader = Reader { store, patch: surface.patch.as_ref(), footprint: &surface.footprint };
+        Self::read(surface.target.material, base, &reader)
+    }
+
+    /// A material without maps, the same everywhere.
+    pub(crate) fn without_maps(material: &Material, store: &TextureStore) -> Self {
+        let reader = Reader { store, patch: None, footprint: &Footprint::default() };
+        Self::read(material, reader.base(material).truncate(), &reader)
+    }
+
+    fn read(material: &Material, base: Vec3, reader: &Reader) -> Self {
         let emission = material.emission * reader.srgb(material.emission_map.as_ref());
         let model = match &material.surface {
             Reflection::Unlit => Model::Unlit(base),
-            Reflection::Phong(phong) => Model::Phong(PhongMatter::new(phong, base, &reader)),
+            Reflection::Phong(phong) => Model::Phong(PhongMatter::new(phong, base, reader)),
             Reflection::MetalRough(m) => {
                 let shade = reader.linear(material.occlusion_map.as_ref()).x;
                 let occlusion = 1.0 + material.occlusion_strength * (shade - 1.0);
-                Model::MetalRough(MetalRoughMatter::new(m, base, occlusion, &reader))
+                Model::MetalRough(MetalRoughMatter::new(m, base, occlusion, reader))
             }
         };
         Self { emission, model }
     }
 
+    /// Whether it is seen in the dark.
+    pub(crate) fn shines(&self) -> bool {
+        self.emission != Vec3::ZERO || matches!(self.model, Model::Unlit(_))
+    }
+
     /// What is seen of the light that arrives from everywhere, without a ray.
-    pub(crate) fn ambient(&self, surface: &Surface, sky: &Sky, ambient: Vec3) -> Vec3 {
+    pub(crate) fn ambient(&self, seen: &Seen, sky: &Sky, ambient: Vec3) -> Vec3 {
         match &self.model {
             Model::Unlit(color) => *color,
-            Model::Phong(m) => m.ambient * ambient + m.diffuse * sky.diffuse(surface.normal),
-            Model::MetalRough(m) => m.ambient(surface, sky, ambient),
+            Model::Phong(m) => m.ambient * ambient + m.diffuse * sky.diffuse(seen.normal),
+            Model::MetalRough(m) => m.ambient(seen, sky, ambient),
         }
     }
 
@@ -172,6 +199,7 @@ pub(crate) fn lets_light_in(material: &Material) -> bool {
 /// line, 0 on it, so that the facets of the mesh do not cut the shading off.
 ///
 /// M. J.-Y. Chiang, Y. K. Li, B. Burley, "Taming the Shadow Terminator" (2019). 1 everywhere on flat faces.
+#[inline(always)]
 pub(crate) fn terminator(geometric: Vec3, shading: Vec3, to_light: Vec3) -> f32 {
     let agreement = shading.dot(to_light) * shading.dot(geometric);
     let g = geometric.dot(to_light) / agreement;

@@ -38,11 +38,20 @@ impl PhongMatter {
         }
     }
 
+    /// Whether a ray off the surface could be seen.
+    pub(crate) fn mirrors(&self) -> bool {
+        self.mirror != Vec3::ZERO
+    }
+
     /// Kd N·L + Ks cosⁿα with α between the view and the mirrored light; all unit vectors, away from the surface.
-    pub(super) fn lit(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
+    #[inline(always)]
+    pub(crate) fn lit(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
         let cosine = normal.dot(to_light);
         if cosine <= 0.0 {
             return Vec3::ZERO;
+        }
+        if self.specular == Vec3::ZERO {
+            return self.diffuse * cosine;
         }
         let highlight = view.dot(reflect(-to_light, normal)).max(0.0);
         self.diffuse * cosine + self.specular * libm::powf(highlight, self.shininess)

@@ -22,6 +22,11 @@ impl Sky {
         Self { environment: scene.environment, up: scene.up, backdrop }
     }
 
+    /// Whether nothing comes from anywhere.
+    pub(crate) fn is_dark(&self) -> bool {
+        self.environment == Environment::Black && self.backdrop == Vec3::ZERO
+    }
+
     /// Radiance along a unit direction.
     pub(crate) fn radiance(&self, dir: Vec3) -> Vec3 {
         match self.environment {

@@ -62,3 +62,56 @@ fn counting_changes_no_bit() {
     assert_eq!(timed.counts, Default::default());
     assert_eq!(counted.counts.primary.queries, 70 * 50 * 3);
 }
+
+/// Surfaces without maps of every model, seen from both sides, under every kind of light.
+fn plain() -> Stage {
+    let mut s = stage(View::look_at(DVec3::new(1.0, 2.0, 6.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.8)));
+    s.settings = Settings { width: 61, height: 47, samples: 3, depth: Some(1), ..s.settings };
+    let pbr = |m: MetalRough| Material { surface: Reflection::MetalRough(m), ..Material::plain() };
+    let turned = |x: f64, at: DVec3| DAffine3::from_translation(at) * DAffine3::from_rotation_x(x);
+    let round = |half: f32| {
+        let lean = |x: f32, y: f32| Vec3::new(x, y, 2.0).normalize();
+        let normals = vec![lean(-1.0, -1.0), lean(1.0, -1.0), lean(1.0, 1.0), lean(-1.0, 1.0)];
+        Mesh { normals, ..square(0.0, half) }
+    };
+    s.square(-2.0, 3.0, Material { emission: Vec3::splat(0.01), ..Material::plain() });
+    s.mesh(
+        round(0.7),
+        turned(-1.2, DVec3::new(-1.5, 0.0, 0.0)),
+        pbr(MetalRough { roughness: 0.4, ..MetalRough::default() }),
+    );
+    s.mesh(
+        round(0.7),
+        turned(2.5, DVec3::new(-1.5, 1.2, 0.0)),
+        pbr(MetalRough { metallic: 0.3, ..MetalRough::default() }),
+    );
+    let shiny = Phong { specular: Vec3::splat(0.4), shininess: 9.0, ambient: Vec3::splat(0.2), ..phong() };
+    let mirrored = turned(-0.5, DVec3::new(1.0, 0.2, 0.3)) * DAffine3::from_scale(DVec3::new(-1.0, 1.5, 1.0));
+    s.mesh(round(0.6), mirrored, material(Vec3::new(0.2, 0.5, 0.7), shiny));
+    s.mesh(square(0.0, 0.4), turned(0.7, DVec3::new(0.0, -0.8, 1.0)), material(Vec3::X, phong()));
+    s.mesh(square(0.0, 0.3), turned(0.1, DVec3::new(0.2, 1.4, 0.0)), unlit(Vec3::new(0.1, 0.9, 0.3)));
+    s.mesh(square(0.5, 0.3), DAffine3::from_rotation_y(3.0), Material { double_sided: false, ..Material::plain() });
+    s.lamp(DVec3::new(3.0, 4.0, 5.0), 0.7);
+    let light = |kind, shadows| Light { name: String::new(), intensity: Vec3::new(0.5, 0.6, 0.7), kind, shadows };
+    s.scene.lights.push(light(LightKind::Directional { direction: DVec3::new(1.0, -1.0, -0.5) }, false));
+    let (position, direction) = (DVec3::new(-2.0, 3.0, 3.0), DVec3::new(1.0, -1.5, -1.5));
+    let falloff = Falloff::InverseSquare { range: 20.0 };
+    s.scene.lights.push(light(LightKind::Spot { position, direction, inner: 0.2, outer: 0.6, falloff }, true));
+    s
+}
+
+#[test]
+fn points_shaded_side_by_side_have_the_bits_of_points_shaded_one_by_one() {
+    for environment in [Environment::Black, Environment::Constant(Vec3::splat(0.2)), Environment::Studio] {
+        let mut s = plain();
+        s.scene.environment = environment;
+        let together = s.render();
+        // Layers are taken point by point.
+        s.settings.layers = true;
+        let alone = s.render();
+        assert_eq!(together.counts, alone.counts);
+        assert!(together.picture.beauty == alone.picture.beauty, "{environment:?}");
+        let seen = together.picture.beauty.iter().filter(|c| c[0] > 0.0).count();
+        assert!(seen > 1500, "{seen}");
+    }
+}

@@ -1,0 +1,125 @@
+//! The light that arrives at the points of a strip, and the shadow rays that ask whether it does.
+
+use super::columns::{Column, Columns, Found, POINTS, Strip, get, padded, put};
+use crate::accel::Ray;
+use crate::math::Vec3;
+use crate::math::bounds::offset_origin;
+use crate::math::simd::{Kernel, Simd};
+use crate::render::shade::{Incident, LocalLight, Matter, Model, terminator};
+
+/// What one light does at each point.
+pub(super) struct Lit {
+    /// 1 where it is seen.
+    pub seen: [u32; POINTS],
+    pub radiance: Columns,
+    /// The shadow ray.
+    pub origin: Columns,
+    pub dir: Columns,
+    pub end: Column,
+}
+
+impl Default for Lit {
+    fn default() -> Self {
+        let empty = [[0.0; POINTS]; 3];
+        Self { seen: [0; POINTS], radiance: empty, origin: empty, dir: empty, end: [0.0; POINTS] }
+    }
+}
+
+/// A point that a light shines on.
+pub(crate) struct Shone {
+    /// The place of its ray in the wave.
+    pub index: u32,
+    pub radiance: Vec3,
+    /// Start, direction and end of the shadow ray.
+    pub origin: Vec3,
+    pub dir: Vec3,
+    pub end: f32,
+}
+
+impl Shone {
+    /// The shadow ray, from prim `prim`.
+    #[inline(always)]
+    pub(crate) fn ray(&self, sample: u32, prim: u32) -> Ray {
+        Ray { origin: self.origin, t_min: 0.0, dir: self.dir, t_max: self.end, exclude: prim, sample }
+    }
+}
+
+impl Strip {
+    /// Finds what `light` does at each point of a surface of `matter`.
+    pub(crate) fn shine(&mut self, matter: &Matter, light: &LocalLight) {
+        let (found, lit, points) = (&self.found, &mut self.lit, padded(self.count));
+        self.level.run(Shine { found, lit, points, matter, light });
+    }
+
+    /// The points that it shines on.
+    pub(crate) fn shone(&self) -> impl Iterator<Item = Shone> {
+        let (found, lit) = (&self.found, &self.lit);
+        (0..self.count.min(POINTS)).filter(|&i| lit.seen[i] & found.certain[i] == 1).map(|i| Shone {
+            index: self.rays[i],
+            radiance: get(&lit.radiance, i),
+            origin: get(&lit.origin, i),
+            dir: get(&lit.dir, i),
+            end: lit.end[i],
+        })
+    }
+}
+
+struct Shine<'a> {
+    found: &'a Found,
+    lit: &'a mut Lit,
+    points: usize,
+    matter: &'a Matter,
+    light: &'a LocalLight,
+}
+
+impl Kernel for Shine<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let Self { found, lit, points, matter, light } = self;
+        let light = *light;
+        // The model is chosen outside the loop, which then is a formula.
+        match &matter.model {
+            Model::Unlit(_) => lit.seen.fill(0),
+            Model::Phong(m) => {
+                let m = m.clone();
+                each(found, lit, points, &light, |normal, view, incident| {
+                    m.lit(normal, view, incident.to_light) * incident.strength()
+                });
+            }
+            Model::MetalRough(m) => {
+                let m = m.clone();
+                each(found, lit, points, &light, |normal, view, incident| {
+                    m.lit(normal, view, incident.to_light) * incident.irradiance()
+                });
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn each(
+    found: &Found,
+    lit: &mut Lit,
+    points: usize,
+    light: &LocalLight,
+    reflect: impl Fn(Vec3, Vec3, &Incident) -> Vec3,
+) {
+    for i in 0..points.min(POINTS) {
+        let (position, error) = (get(&found.position, i), get(&found.error, i));
+        let (geometric, normal) = (get(&found.geometric, i), get(&found.normal, i));
+        let (incident, arrives) = light.arriving(position);
+        let to_light = incident.to_light;
+        let above = geometric.dot(to_light) > 0.0;
+        let smooth = terminator(geometric, normal, to_light);
+        let radiance = reflect(normal, get(&found.view, i), &incident) * smooth;
+        let (dir, end) = incident.way(offset_origin(position, error, geometric, to_light));
+        let seen = arrives & above & radiance.is_finite() & (radiance.max_element() > 0.0);
+        lit.seen[i] = u32::from(seen);
+        put(&mut lit.radiance, i, radiance);
+        put(&mut lit.origin, i, offset_origin(position, error, geometric, dir));
+        put(&mut lit.dir, i, dir);
+        lit.end[i] = end;
+    }
+}

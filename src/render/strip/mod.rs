@@ -1,0 +1,18 @@
+//! Points of surfaces without maps, shaded side by side: one number of all points, then the next.
+//!
+//! Where a material is the same all over a mesh, what a point shows depends on a few numbers, and the same formulas are
+//! computed for all points. They are written once, for one point, in `surface`, `shade` and `accel::refine`; here loops
+//! over columns of numbers call them, which the compiler turns into lanes. So a point shaded here gives the same bits as
+//! one shaded by itself, on every instruction set.
+//!
+//! What a column cannot do is left to the tracer: hits near the edge of a face, and those whose distance needs more than
+//! `f64`.
+
+mod columns;
+mod lit;
+mod sorted;
+mod uniform;
+
+pub(crate) use columns::{POINTS, Strip};
+pub(crate) use sorted::Sorted;
+pub(crate) use uniform::Uniform;

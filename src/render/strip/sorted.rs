@@ -1,0 +1,128 @@
+//! The hits of a wave by instance, each with its face; faces that are hit again are not looked up again.
+
+use crate::accel::NO_PRIM;
+use crate::accel::refine::Facet;
+use crate::math::Vec3;
+use crate::math::triangle::{self, Triangle};
+use crate::render::context::Context;
+use crate::render::world::PrimSource;
+
+/// Faces that are remembered: a block of pixels sees about as many.
+const REMEMBERED: usize = 256;
+
+/// No instance; also the mark of faces that must be shaded one by one.
+const NONE: u32 = u32::MAX;
+
+/// A face that was hit.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Face {
+    pub facet: Facet,
+    /// Unit normal on the side that the file calls its front.
+    pub outward: Vec3,
+    /// Of the corners, where the mesh has any.
+    pub normals: Option<[Vec3; 3]>,
+    instance: u32,
+}
+
+/// Hits of a wave, by instance.
+#[derive(Debug)]
+pub(crate) struct Sorted {
+    faces: Vec<Face>,
+    /// The face of a prim, at the place that its number gives.
+    remembered: Box<[(u32, u32); REMEMBERED]>,
+    /// Ray and face of the hits of each instance.
+    lists: Vec<Vec<(u32, u32)>>,
+    /// Instances that were hit, in the order of their first hits.
+    pub(super) hit: Vec<u32>,
+}
+
+impl Default for Sorted {
+    fn default() -> Self {
+        let remembered = Box::new([(NO_PRIM, 0); REMEMBERED]);
+        Self { faces: Vec::new(), remembered, lists: Vec::new(), hit: Vec::new() }
+    }
+}
+
+impl Sorted {
+    /// Forgets all hits.
+    pub(crate) fn clear(&mut self, instances: usize) {
+        self.faces.clear();
+        self.remembered.fill((NO_PRIM, 0));
+        self.lists.resize_with(instances, Vec::new);
+        for instance in self.hit.drain(..) {
+            self.lists[instance as usize].clear();
+        }
+    }
+
+    /// Takes the hit of the `index`th ray; false if it must be shaded by itself.
+    #[inline]
+    pub(crate) fn take(&mut self, context: &Context, index: u32, prim: u32) -> bool {
+        let place = &mut self.remembered[prim as usize % REMEMBERED];
+        if place.0 != prim {
+            *place = (prim, u32::try_from(self.faces.len()).unwrap_or(NONE));
+            self.faces.push(Face::of(context, prim));
+        }
+        let at = place.1;
+        let instance = self.faces[at as usize].instance;
+        let Some(list) = self.lists.get_mut(instance as usize) else { return false };
+        if list.is_empty() {
+            self.hit.push(instance);
+        }
+        list.push((index, at));
+        true
+    }
+
+    /// The instances that were hit.
+    pub(crate) fn instances(&self) -> usize {
+        self.hit.len()
+    }
+
+    /// The `k`th instance that was hit, and the hits with it: rays and faces.
+    pub(crate) fn of(&self, k: usize) -> (u32, impl Iterator<Item = (u32, &Face)>) {
+        let instance = self.hit[k];
+        let hits = &self.lists[instance as usize];
+        (instance, hits.iter().map(|&(index, face)| (index, &self.faces[face as usize])))
+    }
+}
+
+impl Face {
+    /// Looks up a prim.
+    #[inline(never)]
+    fn of(context: &Context, prim: u32) -> Self {
+        Self::new(context, prim).unwrap_or(Self {
+            facet: Facet::default(),
+            outward: Vec3::ZERO,
+            normals: None,
+            instance: NONE,
+        })
+    }
+
+    /// `None` for what is no triangle with an area and a uniform material.
+    fn new(context: &Context, prim: u32) -> Option<Self> {
+        let (scene, world) = (context.scene, context.world);
+        let PrimSource::Triangle { instance, triangle: in_mesh } = world.source(prim) else { return None };
+        let mesh = &scene.meshes[scene.instances[instance as usize].mesh as usize];
+        context.uniform[mesh.material as usize].as_ref()?;
+        if !mesh.colors.is_empty() {
+            return None;
+        }
+        let corners = world.shapes.triangle(prim);
+        let winding = triangle::normal(&corners);
+        if !winding.is_normalized() {
+            return None;
+        }
+        let outward = if world.placement(instance).mirrored { -winding } else { winding };
+        let normals = if mesh.normals.is_empty() {
+            None
+        } else {
+            let [a, b, c] = mesh.triangles[in_mesh as usize].map(|i| mesh.normals.get(i as usize).copied());
+            Some([a?, b?, c?])
+        };
+        Some(Self { instance, ..Self::of_triangle(&corners, outward, normals) })
+    }
+
+    /// A face of no instance.
+    pub(super) fn of_triangle(corners: &Triangle, outward: Vec3, normals: Option<[Vec3; 3]>) -> Self {
+        Self { facet: Facet::of(corners), outward, normals, instance: NONE }
+    }
+}

@@ -1,0 +1,28 @@
+//! Materials that are the same all over a mesh and send no rays on.
+
+use crate::render::shade::{Matter, Model};
+use crate::render::texture::TextureStore;
+use crate::scene::Material;
+
+/// What is known of a material for all points.
+pub(crate) struct Uniform {
+    pub matter: Matter,
+    /// Whether backs of faces are passed.
+    pub one_sided: bool,
+}
+
+impl Uniform {
+    /// `None` for materials with maps, those that let light through, and those that mirror it where rays bounce.
+    pub(crate) fn of(material: &Material, store: &TextureStore, bounces: bool) -> Option<Self> {
+        if material.textures().next().is_some() || !material.is_opaque() {
+            return None;
+        }
+        let matter = Matter::without_maps(material, store);
+        let mirrors = match &matter.model {
+            Model::Unlit(_) => false,
+            Model::Phong(m) => m.mirrors(),
+            Model::MetalRough(m) => m.mirrors(),
+        };
+        (!bounces || !mirrors).then_some(Self { matter, one_sided: !material.double_sided })
+    }
+}
