@@ -5,16 +5,16 @@
 //! ray that should be stopped is free. A start that is a few roundings further inside its own face lies on the right side
 //! of every face that meets it at an edge or corner, unless the angle between them is below [`EDGE_ROOM`]'s.
 
+use super::DVec3;
 use super::bounds::EDGE_ROOM;
-use super::triangle::Triangle;
-use super::{DVec3, Vec3};
+use super::triangle::{Triangle, in_f64};
 
 /// How far a hit of weights `u`, `v` of the second and third corner is to be moved along its triangle, so that its
 /// distance from each edge is at least [`EDGE_ROOM`] times `error`, the uncertainty of its position, or as large as a
 /// narrow triangle has room for. Zero but for hits that near an edge.
 #[inline]
 pub fn inset(triangle: &Triangle, (u, v): (f32, f32), error: f32) -> DVec3 {
-    let [a, b, c] = triangle.map(Vec3::as_dvec3);
+    let [a, b, c] = in_f64(triangle);
     let rim = Rim::of([a, b, c], (b - a).cross(c - a));
     if !rim.is_near((u, v), error) {
         return DVec3::ZERO;
@@ -73,6 +73,7 @@ fn moved_inwards([a, b, c]: [DVec3; 3], w: [f64; 3], least: [f64; 3], room: f64)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Vec3;
     use crate::math::random::Random;
 
     fn distances(triangle: &Triangle, p: DVec3) -> [f64; 3] {

@@ -160,6 +160,12 @@ impl Flat {
         Self { corner: a, normal: e1.cross(e2), sizes: magnitude_cross(e1.abs(), e2.abs()) }
     }
 
+    /// [`normal`](fn@normal).
+    #[inline]
+    pub fn unit(&self) -> Vec3 {
+        self.normal.normalize_or_zero().as_vec3()
+    }
+
     /// [`distance_f64`] of a triangle that is hit, or `None` where the bound of its error is not good enough.
     #[inline(always)]
     pub fn distance(&self, origin: Vec3, dir: Vec3) -> Option<f64> {
@@ -180,8 +186,8 @@ impl Flat {
 
 /// n·(a − o), n·d and n.
 #[inline]
-fn plane_terms(ray: &RaySpace, &[a, b, c]: &Triangle, terms: f64) -> (Bounded, Bounded, DVec3) {
-    let flat = Flat::of([a.as_dvec3(), b.as_dvec3(), c.as_dvec3()]);
+fn plane_terms(ray: &RaySpace, triangle: &Triangle, terms: f64) -> (Bounded, Bounded, DVec3) {
+    let flat = Flat::of(in_f64(triangle));
     let (numerator, denominator) = flat.terms(ray.origin, ray.dir, terms);
     (numerator, denominator, flat.normal)
 }
@@ -202,7 +208,7 @@ fn exact_plane_terms(ray: &RaySpace, &[a, b, c]: &Triangle) -> (Expansion<192>, 
 
 /// Weights of the second and third corner where the ray meets a triangle that it hits, each in 0..=1.
 pub fn barycentrics(ray: &RaySpace, triangle: &Triangle) -> (f32, f32) {
-    let [a, b, c] = triangle.map(|p| p.as_dvec3());
+    let [a, b, c] = in_f64(triangle);
     barycentrics_at(ray, triangle, distance_f64(ray, triangle), (b - a).cross(c - a))
 }
 
@@ -237,6 +243,12 @@ pub fn flat_axes(normal: DVec3) -> [usize; 2] {
     }
 }
 
+/// The same corners in double precision.
+#[inline(always)]
+pub fn in_f64(&[a, b, c]: &Triangle) -> [DVec3; 3] {
+    [a.as_dvec3(), b.as_dvec3(), c.as_dvec3()]
+}
+
 /// A point of the triangle; evenly spread where `r` and `s` are, in 0..=1.
 pub fn within(&[a, b, c]: &Triangle, r: f32, s: f32) -> Vec3 {
     let (r, s) = if r + s > 1.0 { (1.0 - r, 1.0 - s) } else { (r, s) };
@@ -245,8 +257,7 @@ pub fn within(&[a, b, c]: &Triangle, r: f32, s: f32) -> Vec3 {
 
 /// Unit normal, towards the side from which the corners run counter-clockwise; zero for a triangle without area.
 pub fn normal(triangle: &Triangle) -> Vec3 {
-    let [a, b, c] = triangle.map(|p| p.as_dvec3());
-    (b - a).cross(c - a).normalize_or_zero().as_vec3()
+    Flat::of(in_f64(triangle)).unit()
 }
 
 #[inline]

@@ -69,7 +69,7 @@ impl<'a> Target<'a> {
     fn vertices(&self, world: &World, corners: [u32; 3], mesh: &Mesh) -> [Vec3; 3] {
         let shapes = &world.shapes;
         match self.source {
-            PrimSource::Triangle { .. } => shapes.triangles[self.prim as usize].map(|i| shapes.vertices[i as usize]),
+            PrimSource::Triangle { .. } => shapes.triangle(self.prim),
             _ => {
                 let (first, _) = shapes.polygons[self.prim as usize - shapes.triangles.len()];
                 let (own_first, _) = polygon_run(mesh, self.source);
@@ -180,8 +180,11 @@ struct Coordinates {
 }
 
 impl Patch<'_> {
+    #[inline]
     fn mix<T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>>(&self, values: &[T]) -> Option<T> {
-        let [a, b, c] = self.corners.map(|i| values.get(i as usize).copied());
+        let [a, b, c] = self.corners;
+        let value = |i: u32| values.get(i as usize).copied();
+        let (a, b, c) = (value(a), value(b), value(c));
         Some(a? * self.weights[0] + b? * self.weights[1] + c? * self.weights[2])
     }
 
@@ -201,7 +204,9 @@ impl Patch<'_> {
             return Coordinates { uv: Vec2::ZERO, along: Vec2::ZERO, across: Vec2::ZERO, edges: [Vec2::ZERO; 2] };
         };
         let turn = Turn::new(map);
-        let [a, b, c] = self.corners.map(|i| set.get(i as usize).map_or(Vec2::ZERO, |&uv| turn.apply(uv)));
+        let [a, b, c] = self.corners;
+        let corner = |i: u32| set.get(i as usize).map_or(Vec2::ZERO, |&uv| turn.apply(uv));
+        let (a, b, c) = (corner(a), corner(b), corner(c));
         let edges = [b - a, c - a];
         let gradients = Gradients::new(self.vertices);
         let change = |v: Vec3| edges[0] * gradients.second.dot(v) + edges[1] * gradients.third.dot(v);

@@ -9,7 +9,7 @@ use super::layers::{self, Facts, LayerPixel};
 use super::observer::Observer;
 use super::pixel::sample_offsets;
 use super::view::View;
-use super::whitted::{ByClass, Sample, Tracer, WAVE_LIMIT};
+use super::whitted::{ByClass, Sample, Tracer};
 use super::{Progress, Settings};
 use crate::accel::Accel;
 use crate::image::Picture;
@@ -22,6 +22,9 @@ const TILE: u32 = 32;
 
 /// Columns and rows of a block of pixels, whose rays go together.
 const BLOCK: u32 = 4;
+
+/// Samples that are traced together at most: few enough that they and their rays stay in a processor's own cache.
+const TOGETHER: usize = 1 << 11;
 
 /// A part of the picture: pixels `x0..x1` of rows `y0..y1`.
 #[derive(Clone, Copy, Debug)]
@@ -158,7 +161,7 @@ fn each_tile<A: Accel, P: Observer, T: Send>(
 
 /// Pixels whose samples are traced together at most.
 fn batch_pixels(samples: usize) -> usize {
-    (WAVE_LIMIT / samples).max(1)
+    (TOGETHER / samples).max(1)
 }
 
 /// The pixel (row by row, from 0) of each sample of each batch, in the order in which a single thread renders them.

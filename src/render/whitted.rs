@@ -26,7 +26,7 @@ use crate::math::{DVec3, Vec3};
 use std::hint::black_box;
 
 /// Rays traced together at most; bounds the memory of a worker.
-pub(crate) const WAVE_LIMIT: usize = 1 << 13;
+const WAVE_LIMIT: usize = 1 << 13;
 /// Shadow rays that wait at most.
 const SHADOW_LIMIT: usize = 1 << 14;
 
@@ -202,8 +202,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
         let matter = &uniform.matter;
         if !context.is_dark || matter.shines() {
-            for (index, seen) in strip.seen() {
-                let everywhere = matter.emission + matter.ambient(&seen, &context.sky, context.scene.ambient);
+            strip.look_around(matter, &context.sky, context.scene.ambient);
+            for (index, everywhere) in strip.shown() {
                 self.add(eyes.rays[index as usize].sample, everywhere);
             }
         }

@@ -108,14 +108,59 @@ const ALBEDO: [[(f32, f32); 9]; 9] = [
 ];
 
 /// [`ALBEDO`] at any roughness and N·V between its entries, off by at most 0.05.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "both coordinates lie in 0 … 8")]
 pub(super) fn albedo(roughness: f32, n_v: f32) -> (f32, f32) {
-    let (y, x) = (roughness.clamp(0.0, 1.0) * 8.0, n_v.clamp(0.0, 1.0).sqrt() * 8.0);
-    let (row, column) = ((y as usize).min(7), (x as usize).min(7));
-    let (y, x) = (y - row as f32, x - column as f32);
-    let mix = |a: (f32, f32), b: (f32, f32), t: f32| (a.0 + (b.0 - a.0) * t, a.1 + (b.1 - a.1) * t);
-    let along = |row: &[(f32, f32); 9]| mix(row[column], row[column + 1], x);
-    mix(along(&ALBEDO[row]), along(&ALBEDO[row + 1]), y)
+    let lobe = Lobe::of(roughness);
+    between(n_v, |column| lobe.entry(column))
+}
+
+/// [`ALBEDO`] at one roughness.
+#[derive(Clone, Copy)]
+struct Lobe {
+    row: usize,
+    rest: f32,
+}
+
+#[inline(always)]
+fn mix(a: (f32, f32), b: (f32, f32), t: f32) -> (f32, f32) {
+    (a.0 + (b.0 - a.0) * t, a.1 + (b.1 - a.1) * t)
+}
+
+impl Lobe {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "lies in 0 … 8")]
+    fn of(roughness: f32) -> Self {
+        let y = roughness.clamp(0.0, 1.0) * 8.0;
+        let row = (y as usize).min(7);
+        Self { row, rest: y - row as f32 }
+    }
+
+    fn entry(self, column: usize) -> (f32, f32) {
+        mix(ALBEDO[self.row][column], ALBEDO[self.row + 1][column], self.rest)
+    }
+}
+
+/// [`albedo`] of one roughness for many points.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AlbedoRow([(f32, f32); 9]);
+
+impl AlbedoRow {
+    pub(crate) fn of(roughness: f32) -> Self {
+        let lobe = Lobe::of(roughness);
+        Self(std::array::from_fn(|column| lobe.entry(column)))
+    }
+
+    #[inline(always)]
+    pub(crate) fn at(&self, n_v: f32) -> (f32, f32) {
+        between(n_v, |column| self.0[column])
+    }
+}
+
+/// Between the two entries that are nearest to N·V.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "lies in 0 … 8")]
+fn between(n_v: f32, entry: impl Fn(usize) -> (f32, f32)) -> (f32, f32) {
+    let x = n_v.clamp(0.0, 1.0).sqrt() * 8.0;
+    let column = (x as usize).min(7);
+    mix(entry(column), entry(column + 1), x - column as f32)
 }
 
 /// Mean of a white lobe's albedo over the hemisphere, weighted by the cosine, for roughness 0, 1/8, … 1: the integral
@@ -130,19 +175,18 @@ fn mean_albedo(roughness: f32) -> f32 {
     MEAN_ALBEDO[row] + (MEAN_ALBEDO[row + 1] - MEAN_ALBEDO[row]) * (y - row as f32)
 }
 
-/// Share of even light from all around that leaves a metal at N·V after more than one bounce between its facets.
+/// The share of even light from all around that leaves a metal after more than one bounce between its facets, relative
+/// to what the first bounce loses.
 ///
 /// The microfacet model follows light to one facet only and so loses what meets a second: two thirds on the roughest
-/// metal. This is what it loses, coloured once more by each bounce (C. Fdez-Agüera, "A Multiple-Scattering Microfacet
-/// Model for Real-Time Image-Based Lighting", 2019); `f0` is the metal's colour face on.
-pub(super) fn rebound(roughness: f32, f0: Vec3, n_v: f32) -> Vec3 {
+/// metal. This colours it once more by each bounce (C. Fdez-Agüera, "A Multiple-Scattering Microfacet Model for Real-Time
+/// Image-Based Lighting", 2019); `f0` is the metal's colour face on.
+pub(super) fn rebound(roughness: f32, f0: Vec3) -> Vec3 {
     let mean = mean_albedo(roughness);
     // The mean of Schlick's reflectance over the hemisphere.
     let f0 = f0.min(Vec3::ONE);
     let once = f0 + (Vec3::ONE - f0) / 21.0;
-    let color = once * once * mean / (Vec3::ONE - once * (1.0 - mean));
-    let (scale, bias) = albedo(roughness, n_v);
-    color * (1.0 - scale - bias).max(0.0)
+    once * once * mean / (Vec3::ONE - once * (1.0 - mean))
 }
 
 #[cfg(test)]
@@ -166,9 +210,9 @@ mod tests {
     fn white_metal_sends_everything_back_and_colours_deepen() {
         for roughness in [0.0, 0.3, 0.6, 1.0] {
             let (scale, bias) = albedo(roughness, 0.7);
-            assert!((rebound(roughness, Vec3::ONE, 0.7).x + scale + bias - 1.0).abs() < 1e-6);
+            assert!((rebound(roughness, Vec3::ONE).x - 1.0).abs() < 1e-6 && scale + bias <= 1.0);
         }
-        let gold = rebound(0.8, Vec3::new(1.0, 0.7, 0.3), 0.7);
+        let gold = rebound(0.8, Vec3::new(1.0, 0.7, 0.3));
         assert!(gold.y / gold.x < 0.7 && gold.z / gold.y < 0.3 / 0.7, "{gold}");
     }
 }

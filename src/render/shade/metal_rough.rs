@@ -7,10 +7,10 @@
 //! between their facets if need be; of lights they show the first bounce, as the model says. Light passes rough glass
 //! unscattered apart from a part that is looked up; lights themselves are not seen through rough glass.
 
-use super::facets::{albedo, rebound};
+use super::facets::{AlbedoRow, albedo, rebound};
 use super::{Balance, Reader, Seen, Sky};
 use crate::math::Vec3;
-use crate::render::optics::{fresnel_dielectric, fresnel_schlick, reflect};
+use crate::render::optics::{fresnel_dielectric, fresnel_schlick};
 use crate::render::wave::Crossing;
 use crate::scene::MetalRough;
 use std::f32::consts::PI;
@@ -41,6 +41,23 @@ pub(crate) struct MetalRoughMatter {
     pub ior: f32,
     pub thick: bool,
     pub dispersion: f32,
+}
+
+/// What a point sees of its surroundings.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Around {
+    /// Cosine of the view, 0 … 1.
+    pub n_v: f32,
+    /// The lobe's albedo: shares of f0 and f90.
+    pub shares: (f32, f32),
+    /// Mean light over the hemisphere.
+    pub diffuse: Vec3,
+    /// Light around the mirrored view.
+    pub mirrored: Vec3,
+    /// Share of the mirrored light that nothing stands in the way of.
+    pub open: f32,
+    /// Whether the front is seen.
+    pub front: bool,
 }
 
 /// `metallic` with its map.
@@ -104,29 +121,54 @@ impl MetalRoughMatter {
     /// The surroundings without a ray: scattered and looked-up mirrored light.
     pub(super) fn ambient(&self, seen: &Seen, sky: &Sky, ambient: Vec3) -> Vec3 {
         let n_v = seen.normal.dot(seen.view).clamp(0.0, 1.0);
-        let looked_up = 1.0 - self.traced(seen.front);
-        let shares = albedo(self.roughness, n_v);
-        let (dielectric, metal) = (self.f0 * shares.0 + self.f90 * shares.1, self.base * shares.0 + shares.1);
-
-        let taken = self.fresnel(n_v).0.lerp(dielectric, looked_up).max_element();
-        let diffuse = self.scattered() * (1.0 - taken).max(0.0) * self.occlusion;
-        let mut sum = diffuse * (sky.diffuse(seen.normal) + ambient);
-        if looked_up > 0.0 {
-            let mirrored = above(reflect(-seen.view, seen.normal), seen.geometric);
-            let light = sky.blurred(mirrored, self.roughness) + ambient;
-            sum += dielectric.lerp(metal, self.metallic) * light * (looked_up * self.open(n_v));
-            if self.metallic > 0.0 {
-                let light = sky.diffuse(seen.normal) + ambient;
-                let rebound = rebound(self.roughness, self.base, n_v);
-                sum += rebound * light * (self.metallic * looked_up * self.occlusion);
-            }
-        }
+        let looked_up = self.traced(seen.front) < 1.0;
+        let around = Around {
+            n_v,
+            shares: albedo(self.roughness, n_v),
+            diffuse: sky.diffuse(seen.normal) + ambient,
+            mirrored: if looked_up { sky.blurred(seen.mirrored(), self.roughness) + ambient } else { Vec3::ZERO },
+            open: if looked_up { self.open(n_v) } else { 0.0 },
+            front: seen.front,
+        };
+        let rebound = if self.metallic > 0.0 { rebound(self.roughness, self.base) } else { Vec3::ZERO };
+        let (mut sum, taken) = self.around(&around, rebound);
         let frosted = self.frosted(seen.front);
         if frosted > 0.0 {
             let light = sky.blurred(-seen.view, self.roughness) + ambient;
             sum += self.passed(1.0 - taken) * light * frosted;
         }
         sum
+    }
+
+    /// What is scattered and mirrored of the surroundings, and the largest share that the dielectric part mirrors.
+    /// `rebound` is what [`rebound`] gives for the material.
+    #[inline(always)]
+    pub(crate) fn around(&self, around: &Around, rebound: Vec3) -> (Vec3, f32) {
+        let looked_up = 1.0 - self.traced(around.front);
+        let (scale, bias) = around.shares;
+        let (dielectric, metal) = (self.f0 * scale + self.f90 * bias, self.base * scale + bias);
+
+        let taken = self.fresnel(around.n_v).0.lerp(dielectric, looked_up).max_element();
+        let diffuse = self.scattered() * (1.0 - taken).max(0.0) * self.occlusion;
+        let mirrored = dielectric.lerp(metal, self.metallic) * around.mirrored * (looked_up * around.open);
+        let lost = (1.0 - scale - bias).max(0.0);
+        let again = rebound * lost * around.diffuse * (self.metallic * looked_up * self.occlusion);
+        (diffuse * around.diffuse + mirrored + again, taken)
+    }
+
+    /// Its albedo by N·V, and what comes of light that its facets send to each other.
+    pub(crate) fn shares(&self) -> (AlbedoRow, Vec3) {
+        (AlbedoRow::of(self.roughness), rebound(self.roughness, self.base))
+    }
+
+    /// Perceptual roughness.
+    pub(crate) fn roughness(&self) -> f32 {
+        self.roughness
+    }
+
+    /// The same where an occlusion map leaves everything open, as without one.
+    pub(crate) fn in_the_open(&self) -> Self {
+        Self { occlusion: 1.0, ..self.clone() }
     }
 
     /// Weights of the mirror ray and of the ray that passes through.
@@ -154,6 +196,7 @@ impl MetalRoughMatter {
     }
 
     /// Share of the mirrored surroundings that a ray brings in. From inside there is no environment to look up.
+    #[inline(always)]
     fn traced(&self, outside: bool) -> f32 {
         if outside { 1.0 - smoothstep(MIRROR_ROUGHNESS, MATT_ROUGHNESS, self.roughness) } else { 1.0 }
     }
@@ -176,6 +219,7 @@ impl MetalRoughMatter {
 }
 
 /// `dir`, mirrored to the front of a surface when a shading normal has sent it behind.
+#[inline(always)]
 pub(crate) fn above(dir: Vec3, geometric: Vec3) -> Vec3 {
     let height = dir.dot(geometric);
     if height < 0.0 { dir - 2.0 * height * geometric } else { dir }
@@ -202,6 +246,7 @@ fn visibility(n_l: f32, n_v: f32, alpha: f32) -> f32 {
     0.5 / (view + light)
 }
 
+#[inline(always)]
 fn smoothstep(from: f32, to: f32, x: f32) -> f32 {
     let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)

@@ -12,12 +12,13 @@ mod sky;
 mod spectrum;
 
 pub(crate) use light::{Incident, LocalLight};
-pub(crate) use metal_rough::{MetalRoughMatter, above};
+pub(crate) use metal_rough::{Around, MetalRoughMatter, above};
 pub(crate) use phong::PhongMatter;
 pub(crate) use sky::Sky;
 pub(crate) use spectrum::{Band, bands};
 
 use super::context::coverage;
+use super::optics::reflect;
 use super::surface::{Footprint, Patch, Surface};
 use super::texture::{ColorSpace, TextureStore};
 use super::wave::Crossing;
@@ -35,6 +36,14 @@ pub(crate) struct Seen {
     pub view: Vec3,
     /// Whether it is the front.
     pub front: bool,
+}
+
+impl Seen {
+    /// The mirrored direction, never into the surface.
+    #[inline(always)]
+    pub(crate) fn mirrored(&self) -> Vec3 {
+        above(reflect(-self.view, self.normal), self.geometric)
+    }
 }
 
 /// The material at one point of a surface.

@@ -27,6 +27,11 @@ impl Sky {
         self.environment == Environment::Black && self.backdrop == Vec3::ZERO
     }
 
+    /// The up axis of the studio, if that is what surrounds the scene; else every direction is alike.
+    pub(crate) fn studio(&self) -> Option<UpAxis> {
+        (self.environment == Environment::Studio).then_some(self.up)
+    }
+
     /// Radiance along a unit direction.
     pub(crate) fn radiance(&self, dir: Vec3) -> Vec3 {
         match self.environment {

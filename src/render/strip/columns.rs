@@ -1,5 +1,7 @@
 //! Points by number and place: what is known of them, and the surface that is found from it.
 
+use super::around::Surroundings;
+use super::lit::Lit;
 use super::sorted::Face;
 use crate::accel::refine::Facet;
 use crate::accel::{Hit, Ray};
@@ -44,7 +46,8 @@ pub(crate) struct Strip {
     pub(super) rays: [u32; POINTS],
     given: Given,
     pub(super) found: Found,
-    pub(super) lit: super::lit::Lit,
+    pub(super) surroundings: Surroundings,
+    pub(super) lit: Lit,
 }
 
 /// What hits say.
@@ -101,7 +104,15 @@ impl Default for Strip {
             geometric: EMPTY,
             normal: EMPTY,
         };
-        Self { count: 0, level: Level::best(), rays: [0; POINTS], given, found, lit: super::lit::Lit::default() }
+        Self {
+            count: 0,
+            level: Level::best(),
+            rays: [0; POINTS],
+            given,
+            found,
+            surroundings: Surroundings::default(),
+            lit: Lit::default(),
+        }
     }
 }
 
@@ -157,20 +168,6 @@ impl Strip {
             !wanted
         });
         out.map(|i| self.rays[i])
-    }
-
-    /// The rays and points that are left, as they are seen.
-    pub(crate) fn seen(&self) -> impl Iterator<Item = (u32, Seen)> {
-        let found = &self.found;
-        (0..self.count.min(POINTS)).filter(|&i| found.certain[i] == 1).map(|i| {
-            let seen = Seen {
-                normal: get(&found.normal, i),
-                geometric: get(&found.geometric, i),
-                view: get(&found.view, i),
-                front: found.front[i] == 1,
-            };
-            (self.rays[i], seen)
-        })
     }
 }
 
@@ -273,6 +270,17 @@ impl Given {
 }
 
 impl Found {
+    /// How point `i` is seen.
+    #[inline(always)]
+    pub(super) fn seen(&self, i: usize) -> Seen {
+        Seen {
+            normal: get(&self.normal, i),
+            geometric: get(&self.geometric, i),
+            view: get(&self.view, i),
+            front: self.front[i] == 1,
+        }
+    }
+
     /// The shading normal, from the mesh's own.
     #[inline(always)]
     fn shade(&mut self, i: usize, own: Vec3) {
@@ -286,8 +294,8 @@ impl Found {
 mod tests {
     use super::*;
     use crate::accel::NO_PRIM;
+    use crate::math::DMat3;
     use crate::math::random::Random;
-    use crate::math::{DMat3, triangle};
     use crate::render::shade::{LocalLight, Matter};
     use crate::render::texture::TextureStore;
     use crate::scene::{Falloff, Light, LightKind, Material, Scene};
@@ -302,7 +310,7 @@ mod tests {
             let dir = corners[0] * (1.0 - u - v) + corners[1] * u + corners[2] * v - origin;
             let ray = Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude: NO_PRIM, sample: 0 };
             let normals = [random.direction(), random.direction(), random.direction()];
-            let face = Face::of_triangle(&corners, triangle::normal(&corners), Some(normals));
+            let face = Face::of_triangle(&corners, Some(normals));
             strip.push(i, &ray, &Hit { t: 1.0, u, v, prim: i }, &face);
         }
         strip

@@ -8,6 +8,7 @@
 //! What a column cannot do is left to the tracer: hits near the edge of a face, and those whose distance needs more than
 //! `f64`.
 
+mod around;
 mod columns;
 mod lit;
 mod sorted;

@@ -3,7 +3,6 @@
 use crate::accel::NO_PRIM;
 use crate::accel::refine::Facet;
 use crate::math::Vec3;
-use crate::math::triangle::{self, Triangle};
 use crate::render::context::Context;
 use crate::render::world::PrimSource;
 
@@ -107,7 +106,8 @@ impl Face {
             return None;
         }
         let corners = world.shapes.triangle(prim);
-        let winding = triangle::normal(&corners);
+        let facet = Facet::of(&corners);
+        let winding = facet.flat.unit();
         if !winding.is_normalized() {
             return None;
         }
@@ -115,14 +115,17 @@ impl Face {
         let normals = if mesh.normals.is_empty() {
             None
         } else {
-            let [a, b, c] = mesh.triangles[in_mesh as usize].map(|i| mesh.normals.get(i as usize).copied());
-            Some([a?, b?, c?])
+            let [a, b, c] = mesh.triangles[in_mesh as usize];
+            let normal = |i: u32| mesh.normals.get(i as usize).copied();
+            Some([normal(a)?, normal(b)?, normal(c)?])
         };
-        Some(Self { instance, ..Self::of_triangle(&corners, outward, normals) })
+        Some(Self { facet, outward, normals, instance })
     }
 
     /// A face of no instance.
-    pub(super) fn of_triangle(corners: &Triangle, outward: Vec3, normals: Option<[Vec3; 3]>) -> Self {
-        Self { facet: Facet::of(corners), outward, normals, instance: NONE }
+    #[cfg(test)]
+    pub(super) fn of_triangle(corners: &crate::math::triangle::Triangle, normals: Option<[Vec3; 3]>) -> Self {
+        let facet = Facet::of(corners);
+        Self { facet, outward: facet.flat.unit(), normals, instance: NONE }
     }
 }
