@@ -13,9 +13,8 @@
 //! The room stands in a frame whose +Y is up and whose +Z is in front, where glTF models look; [`from_world`] turns
 //! directions of scenes with another up axis into it. It does not follow the camera: the default lights do.
 
-use crate::math::Vec3;
+use crate::math::{Vec3, Vec4};
 use crate::scene::UpAxis;
-use std::sync::LazyLock;
 
 /// Turns a world direction of a scene with up axis `up` into the studio's frame.
 #[inline]
@@ -67,44 +66,54 @@ const BACKDROP_EDGE: f32 = 0.45;
 /// Softness (in direction cosines) of the line between wall and floor.
 const FLOOR_EDGE: f32 = 0.22;
 
-/// A rectangular light, as seen from the middle of the room: flat coordinates are direction cosines along `right` and
-/// `up`, which with `toward` are perpendicular unit vectors.
-struct SoftBox {
-    toward: Vec3,
-    right: Vec3,
-    up: Vec3,
-    /// Half its sides.
-    half: (f32, f32),
-    /// Softness of its edges.
-    edge: f32,
-    /// Radiance added in its middle.
-    radiance: f32,
+/// The rectangular lights, one a lane: key overhead in front, left strip, right panel, rim behind.
+///
+/// Their flat coordinates are direction cosines along `right` and `up`, which with `toward` are perpendicular unit
+/// vectors; these are rows of numbers because every point of a picture asks for the room.
+struct SoftBoxes {
+    toward: [Vec4; 3],
+    right: [Vec4; 3],
+    up: [Vec4; 3],
+    /// Half their sides.
+    half: [Vec4; 2],
+    /// Squared softness of their edges.
+    edge_squared: Vec4,
+    /// Radiance added in their middles.
+    radiance: Vec4,
 }
 
-static BOXES: LazyLock<[SoftBox; 4]> = LazyLock::new(|| {
-    [
-        // Key, overhead in front; left strip; right panel; rim behind.
-        SoftBox::new(Vec3::new(-0.35, 0.80, 0.55), (0.36, 0.26), 0.05, 2.1),
-        SoftBox::new(Vec3::new(-0.95, 0.22, 0.25), (0.11, 0.42), 0.05, 1.3),
-        SoftBox::new(Vec3::new(0.93, 0.30, 0.35), (0.24, 0.34), 0.06, 0.9),
-        SoftBox::new(Vec3::new(0.40, 0.72, -0.70), (0.38, 0.18), 0.06, 1.5),
-    ]
-});
+const BOXES: SoftBoxes = SoftBoxes {
+    toward: [
+        Vec4::new(-0.339_151_1, -0.943_698_3, 0.895_972_1, 0.370_053_23),
+        Vec4::new(0.775_202_5, 0.218_540_65, 0.289_023_25, 0.666_095_85),
+        Vec4::new(0.532_951_7, 0.248_341_65, 0.337_193_8, -0.647_593_2),
+    ],
+    right: [
+        Vec4::new(0.843_661_5, 0.254_493_3, 0.352_226_05, -0.868_243_16),
+        Vec4::ZERO,
+        Vec4::new(0.536_875_5, 0.967_074_5, -0.935_914_93, -0.496_138_93),
+    ],
+    up: [
+        Vec4::new(0.416_187_23, 0.211_345_09, -0.270_501_17, -0.330_476_08),
+        Vec4::new(0.631_712_8, 0.975_827_9, 0.957_322_06, 0.745_866_2),
+        Vec4::new(-0.654_008_5, -0.055_617_13, -0.101_801_515, 0.578_333_14),
+    ],
+    half: [Vec4::new(0.36, 0.11, 0.24, 0.38), Vec4::new(0.26, 0.42, 0.34, 0.18)],
+    edge_squared: Vec4::new(0.05 * 0.05, 0.05 * 0.05, 0.06 * 0.06, 0.06 * 0.06),
+    radiance: Vec4::new(2.1, 1.3, 0.9, 1.5),
+};
 
-impl SoftBox {
-    fn new(toward: Vec3, half: (f32, f32), edge: f32, radiance: f32) -> Self {
-        let toward = toward.normalize();
-        let right = Vec3::Y.cross(toward).normalize();
-        Self { toward, right, up: toward.cross(right), half, edge, radiance }
-    }
-
-    /// Its light along `dir`, every edge softened by `blur` more.
+impl SoftBoxes {
+    /// Their light along `dir`, every edge softened by `blur` more.
     fn along(&self, dir: Vec3, blur: f32) -> f32 {
-        let edge = (self.edge * self.edge + blur * blur).sqrt();
-        let (x, y, z) = (dir.dot(self.right), dir.dot(self.up), dir.dot(self.toward));
+        let (x, y, z) = (Vec4::splat(dir.x), Vec4::splat(dir.y), Vec4::splat(dir.z));
+        let cosine = |axis: &[Vec4; 3]| x * axis[0] + y * axis[1] + z * axis[2];
+        let edge_squared = self.edge_squared + Vec4::splat(blur * blur);
         // The flat coordinates see the back of the room mirrored: fade it out around the edge of sight.
-        let front = step(z, edge.max(0.1));
-        self.radiance * front * slab(x, self.half.0, edge) * slab(y, self.half.1, edge)
+        let front = steps(cosine(&self.toward), edge_squared.max(Vec4::splat(0.01)));
+        let across = slabs(cosine(&self.right), self.half[0], edge_squared);
+        let along = slabs(cosine(&self.up), self.half[1], edge_squared);
+        (self.radiance * front * across * along).element_sum()
     }
 }
 
@@ -116,11 +125,7 @@ fn room(dir: Vec3, alpha: f32) -> f32 {
     let swallowed = BACKDROP * step(-dir.z - BACKDROP_FROM, soft(BACKDROP_EDGE));
     let dome = (HORIZON + (ZENITH - HORIZON) * dir.y) * (1.0 - swallowed);
     let above = step(dir.y, soft(FLOOR_EDGE));
-    let mut sum = NADIR + (dome - NADIR) * above;
-    for light in BOXES.iter() {
-        sum += light.along(dir, blur);
-    }
-    sum
+    NADIR + (dome - NADIR) * above + BOXES.along(dir, blur)
 }
 
 /// A smooth step from 0 to 1 at `x` = 0, `width` wide: x/√(1+x²), whose slow ends are like those of a rough lobe.
@@ -128,42 +133,36 @@ fn step(x: f32, width: f32) -> f32 {
     0.5 + 0.5 * x / (width * width + x * x).sqrt()
 }
 
+/// The same four times, of squared widths.
+fn steps(x: Vec4, width_squared: Vec4) -> Vec4 {
+    0.5 + 0.5 * x / (width_squared + x * x).sqrt()
+}
+
 /// 1 for |x| < `half`, with smooth edges; its integral over x is 2·`half` for every width.
-fn slab(x: f32, half: f32, width: f32) -> f32 {
-    step(x + half, width) - step(x - half, width)
+fn slabs(x: Vec4, half: Vec4, width_squared: Vec4) -> Vec4 {
+    steps(x + half, width_squared) - steps(x - half, width_squared)
 }
 
 /// Number of harmonics: bands 0, 1, 2 and 4 (the cosine has no band 3).
 const HARMONICS: usize = 18;
 
 /// Projection of the room on the harmonics, times the cosine lobe's own factor for each band over π.
-static COEFFICIENTS: LazyLock<[f32; HARMONICS]> = LazyLock::new(|| {
-    // The cosine lobe's factors over π for bands 0, 1, 2, 4.
-    let lobe = |i: usize| [1.0, 2.0 / 3.0, 0.25, -1.0 / 24.0][band(i)];
-    let mut sums = [0.0f64; HARMONICS];
-    for (dir, solid_angle) in directions(96) {
-        let light = f64::from(room(dir, 0.0)) * solid_angle;
-        for (sum, harmonic) in sums.iter_mut().zip(harmonics(dir)) {
-            *sum += f64::from(harmonic) * light;
-        }
-    }
-    std::array::from_fn(|i| narrow(sums[i] * lobe(i)))
-});
-
-/// Which of the four bands harmonic `i` belongs to.
-fn band(i: usize) -> usize {
-    [1, 4, 9].iter().filter(|&&first| i >= first).count()
-}
+#[rustfmt::skip]
+const COEFFICIENTS: [f32; HARMONICS] = [
+    1.093_023_9, -0.025_455_615, 0.459_331_72, 0.170_484_75, -0.019_574_279, 0.068_199_165,
+    -0.048_870_8, -0.037_492_935, -0.013_074_075, -0.006_327_793, -0.001_348_326_4, -0.000_690_833_1,
+    0.008_232_776, 0.009_047_925, -0.003_520_728, 0.012_737_049, -0.018_062_811, 0.000_272_510_52,
+];
 
 fn mean_over_hemisphere(normal: Vec3) -> f32 {
-    let mut sum = 0.0;
-    for (harmonic, coefficient) in harmonics(normal).iter().zip(COEFFICIENTS.iter()) {
-        sum += harmonic * coefficient;
-    }
-    sum.max(0.0)
+    // Three sums that do not wait for each other.
+    let harmonics = harmonics(normal);
+    let every_third = |first: usize| (first..HARMONICS).step_by(3).map(|i| harmonics[i] * COEFFICIENTS[i]).sum::<f32>();
+    (every_third(0) + every_third(1) + every_third(2)).max(0.0)
 }
 
 /// Real spherical harmonics of bands 0, 1, 2 and 4 at a unit vector.
+#[inline(always)]
 #[expect(clippy::excessive_precision, reason = "square roots of rationals over π, as tables give them")]
 fn harmonics(d: Vec3) -> [f32; HARMONICS] {
     let Vec3 { x, y, z } = d;
@@ -190,31 +189,65 @@ fn harmonics(d: Vec3) -> [f32; HARMONICS] {
     ]
 }
 
-/// The sphere cut into `rows × 2·rows` cells of nearly equal size: the middle of each and its solid angle.
-fn directions(rows: u32) -> impl Iterator<Item = (Vec3, f64)> {
-    use std::f64::consts::PI;
-    let step = PI / f64::from(rows);
-    (0..rows).flat_map(move |i| {
-        // The exact area of a ring, at the direction in its middle.
-        let (top, polar) = (step * f64::from(i), step * (f64::from(i) + 0.5));
-        let ring = libm::cos(top) - libm::cos(top + step);
-        (0..2 * rows).map(move |j| {
-            let azimuth = step * (f64::from(j) + 0.5);
-            let (sin, cos) = (libm::sin(polar), libm::cos(polar));
-            let dir = Vec3::new(narrow(sin * libm::cos(azimuth)), narrow(cos), narrow(sin * libm::sin(azimuth)));
-            (dir, ring * step)
-        })
-    })
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "pixels are f32")]
-fn narrow(x: f64) -> f32 {
-    x as f32
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The sphere cut into `rows × 2·rows` cells of nearly equal size: the middle of each and its solid angle.
+    fn directions(rows: u32) -> impl Iterator<Item = (Vec3, f64)> {
+        use std::f64::consts::PI;
+        let step = PI / f64::from(rows);
+        (0..rows).flat_map(move |i| {
+            // The exact area of a ring, at the direction in its middle.
+            let (top, polar) = (step * f64::from(i), step * (f64::from(i) + 0.5));
+            let ring = libm::cos(top) - libm::cos(top + step);
+            (0..2 * rows).map(move |j| {
+                let azimuth = step * (f64::from(j) + 0.5);
+                let (sin, cos) = (libm::sin(polar), libm::cos(polar));
+                let dir = Vec3::new(narrow(sin * libm::cos(azimuth)), narrow(cos), narrow(sin * libm::sin(azimuth)));
+                (dir, ring * step)
+            })
+        })
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "pixels are f32")]
+    fn narrow(x: f64) -> f32 {
+        x as f32
+    }
+
+    /// The lobes' factors over π for bands 0, 1, 2, 4, by harmonic.
+    fn lobe_factor(i: usize) -> f64 {
+        let band = [1, 4, 9].iter().filter(|&&first| i >= first).count();
+        [1.0, 2.0 / 3.0, 0.25, -1.0 / 24.0][band]
+    }
+
+    #[test]
+    fn the_tabulated_room_is_the_projection_of_the_room() {
+        let mut sums = [0.0f64; HARMONICS];
+        for (dir, solid_angle) in directions(96) {
+            let light = f64::from(room(dir, 0.0)) * solid_angle;
+            for (sum, harmonic) in sums.iter_mut().zip(harmonics(dir)) {
+                *sum += f64::from(harmonic) * light;
+            }
+        }
+        for (i, (sum, tabulated)) in sums.iter().zip(COEFFICIENTS).enumerate() {
+            assert!((sum * lobe_factor(i) - f64::from(tabulated)).abs() < 1e-6, "{i}: {sum} {tabulated}");
+        }
+    }
+
+    #[test]
+    fn every_soft_box_hangs_straight_and_faces_the_middle() {
+        let places = [(-0.35, 0.80, 0.55), (-0.95, 0.22, 0.25), (0.93, 0.30, 0.35), (0.40, 0.72, -0.70)];
+        let axis = |rows: &[Vec4; 3], lane: usize| Vec3::from_array(rows.map(|row| row[lane]));
+        for (lane, place) in places.into_iter().enumerate() {
+            let toward = Vec3::from(place).normalize();
+            let right = Vec3::Y.cross(toward).normalize();
+            let expected = [toward, right, toward.cross(right)];
+            for (rows, expected) in [BOXES.toward, BOXES.right, BOXES.up].iter().zip(expected) {
+                assert!((axis(rows, lane) - expected).length() < 1e-6, "{lane}: {expected}");
+            }
+        }
+    }
 
     /// A few dozen directions spread over the sphere.
     fn probes() -> impl Iterator<Item = Vec3> {
