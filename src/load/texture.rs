@@ -99,10 +99,8 @@ fn decode(name: &str, bytes: &[u8], format: ImageFormat) -> Result<Bitmap, Strin
 fn pixels_of(image: DynamicImage) -> Pixels {
     use ColorType::{L16, La16, Rgb16, Rgba16};
     match image {
-        // What most pictures are, without a detour over other types of pixels.
-        DynamicImage::ImageRgb8(image) => {
-            Pixels::Rgba8(image.as_raw().as_chunks::<3>().0.iter().map(|&[r, g, b]| [r, g, b, u8::MAX]).collect())
-        }
+        // What most pictures are: they stay as the decoder left them.
+        DynamicImage::ImageRgb8(image) => Pixels::Rgb8(image.into_raw()),
         image if matches!(image.color(), L16 | La16 | Rgb16 | Rgba16) => {
             Pixels::Rgba16(image.into_rgba16().pixels().map(|p| p.0).collect())
         }
@@ -139,7 +137,7 @@ mod tests {
 
         let colors = DynamicImage::ImageRgb8(::image::ImageBuffer::from_pixel(2, 1, ::image::Rgb([1u8, 2, 3])));
         let bitmap = decode_one(&png(colors), &limits).0.unwrap();
-        assert!(matches!(&bitmap.pixels, Pixels::Rgba8(p) if p[..] == [[1, 2, 3, 255]; 2]));
+        assert!(matches!(&bitmap.pixels, Pixels::Rgb8(p) if p[..] == [1, 2, 3, 1, 2, 3]));
 
         let deep = DynamicImage::ImageRgb16(::image::ImageBuffer::from_pixel(1, 1, ::image::Rgb([1u16, 2, 40000])));
         let bitmap = decode_one(&png(deep), &limits).0.unwrap();

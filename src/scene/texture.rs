@@ -74,6 +74,8 @@ pub struct Bitmap {
 /// Texels as the file stored them; whether 8-bit values are sRGB or linear is decided by the slot that reads them.
 #[derive(Clone, Debug)]
 pub enum Pixels {
+    /// 8 bits a channel, RGB, opaque: three bytes each.
+    Rgb8(Vec<u8>),
     /// 8 bits a channel, RGBA.
     Rgba8(Vec<[u8; 4]>),
     /// 16 bits a channel, RGBA.

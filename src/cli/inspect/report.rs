@@ -277,6 +277,7 @@ fn scene_bytes(scene: &Scene, world: &World) -> u64 {
             + (m.face_of_triangle.len() + m.polygon_corners.len()) * size_of::<u32>()
     };
     let pixels = |p: &Pixels| match p {
+        Pixels::Rgb8(bytes) => bytes.len(),
         Pixels::Rgba8(texels) => texels.len() * 4,
         Pixels::Rgba16(texels) => texels.len() * 8,
     };

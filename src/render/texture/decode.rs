@@ -13,13 +13,46 @@ static SRGB8: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| li
 /// Each 8-bit value divided by 255.
 static UNIT8: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| narrow(i as f64 / 255.0)));
 
+/// Linear value of each 8-bit sRGB value, in units of 2⁻¹² steps of 1/65535: the sum of four fits 32 bits.
+static FIXED_SRGB8: LazyLock<[u32; 256]> = LazyLock::new(|| std::array::from_fn(|i| fixed(i as f64 / 255.0)));
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 … 65535 · 2¹²")]
+fn fixed(s: f64) -> u32 {
+    (curve(s) * 65535.0 * f64::from(1 << FRACTION) + 0.5) as u32
+}
+
+/// Bits behind the point of what [`fixed8`] gives.
+pub(super) const FRACTION: u32 = 12;
+
+/// Linear value of a stored 8-bit colour, in units of 2⁻¹² steps of 1/65535.
+pub(super) fn fixed8(space: ColorSpace) -> &'static [u32; 256] {
+    match space {
+        ColorSpace::Srgb => &FIXED_SRGB8,
+        ColorSpace::Linear => &FIXED_UNIT8,
+    }
+}
+
+/// The same of numbers that are no colours.
+static FIXED_UNIT8: [u32; 256] = {
+    let (mut table, mut i) = ([0; 256], 0);
+    while i < 256 {
+        table[i as usize] = (i * 257) << FRACTION;
+        i += 1;
+    }
+    table
+};
+
 /// Linear value of each 16-bit sRGB value; made when the first such bitmap is read.
 static SRGB16: LazyLock<Vec<f32>> =
     LazyLock::new(|| (0..=u16::MAX).map(|i| linear_from_srgb(f64::from(i) / 65535.0)).collect());
 
 /// The curve for one channel, 0…1 to 0…1.
 fn linear_from_srgb(s: f64) -> f32 {
-    narrow(if s <= 0.04045 { s / 12.92 } else { libm::pow((s + 0.055) / 1.055, 2.4) })
+    narrow(curve(s))
+}
+
+fn curve(s: f64) -> f64 {
+    if s <= 0.04045 { s / 12.92 } else { libm::pow((s + 0.055) / 1.055, 2.4) }
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "texels are f32")]
@@ -31,6 +64,8 @@ fn narrow(x: f64) -> f32 {
 #[derive(Clone, Copy)]
 pub(super) enum Texels<'a> {
     /// And the table of colours.
+    Rgb8(&'a [[u8; 3]], &'static [f32; 256]),
+    /// And the table of colours.
     Rgba8(&'a [[u8; 4]], &'static [f32; 256]),
     Rgba16(&'a [[u16; 4]], ColorSpace),
 }
@@ -40,6 +75,7 @@ impl<'a> Texels<'a> {
     #[inline]
     pub(super) fn new(bitmap: &'a Bitmap, space: ColorSpace) -> Self {
         match &bitmap.pixels {
+            Pixels::Rgb8(texels) => Self::Rgb8(texels.as_chunks().0, table8(space)),
             Pixels::Rgba8(texels) => Self::Rgba8(texels, table8(space)),
             Pixels::Rgba16(texels) => Self::Rgba16(texels, space),
         }
@@ -49,6 +85,7 @@ impl<'a> Texels<'a> {
     #[inline(always)]
     pub(super) fn get(self, index: usize) -> Vec4 {
         match self {
+            Self::Rgb8(texels, colors) => texels.get(index).map_or(Vec4::ONE, |&texel| solid8(texel, colors)),
             Self::Rgba8(texels, colors) => texels.get(index).map_or(Vec4::ONE, |&texel| decode8(texel, colors)),
             Self::Rgba16(texels, space) => texels.get(index).map_or(Vec4::ONE, |&texel| decode16(texel, space)),
         }
@@ -69,6 +106,13 @@ pub(super) fn decode8([r, g, b, a]: [u8; 4], colors: &[f32; 256]) -> Vec4 {
     let color = |c: u8| colors[usize::from(c)];
     // What a table of these holds, too: the quotient in `f64` is never so near the middle of two `f32` that it matters.
     Vec4::new(color(r), color(g), color(b), f32::from(a) / 255.0)
+}
+
+/// The same of a texel without alpha.
+#[inline(always)]
+pub(super) fn solid8([r, g, b]: [u8; 3], colors: &[f32; 256]) -> Vec4 {
+    let color = |c: u8| colors[usize::from(c)];
+    Vec4::new(color(r), color(g), color(b), 1.0)
 }
 
 #[inline]

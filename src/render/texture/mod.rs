@@ -11,7 +11,8 @@ mod pyramid;
 
 use crate::math::{Vec2, Vec4};
 use crate::scene::{Bitmap, Filter, Mipmaps, Pixels, Sampler, Scene, Texture, Wrap};
-use pyramid::{Plane, Pyramid};
+use decode::Texels;
+use pyramid::{Plane, Pyramid, Stored};
 
 /// What the numbers of a bitmap mean; the slot that reads it decides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,6 +91,7 @@ impl<'a> TextureStore<'a> {
 /// Whether there is anything to read, and as much as width and height promise.
 fn is_whole(bitmap: &Bitmap) -> bool {
     let texels = match &bitmap.pixels {
+        Pixels::Rgb8(texels) => texels.len() / 3,
         Pixels::Rgba8(texels) => texels.len(),
         Pixels::Rgba16(texels) => texels.len(),
     };
@@ -130,10 +132,10 @@ impl<'a> Lookup<'a> {
         let (dx, dy) = ((duvdx * texels).length(), (duvdy * texels).length());
         let (major, minor, axis) = if dx >= dy { (dx, dy, duvdx) } else { (dy, dx, duvdy) };
         if major <= 1.0 {
-            return self.read(Plan::One(self.plane(0), self.sampler.magnify), uv);
+            return self.read(Plan::One(self.plane(0), self.sampler.magnify), &Probes::one(uv));
         }
         if !(major.is_finite() && minor.is_finite()) {
-            return self.read(self.plan(f32::INFINITY), uv);
+            return self.read(self.plan(f32::INFINITY), &Probes::one(uv));
         }
 
         // As many probes as the footprint is longer than wide; files that ask for nearest texels get one.
@@ -142,13 +144,7 @@ impl<'a> Lookup<'a> {
             Filter::Linear => (major / minor.max(1.0)).ceil().clamp(1.0, MAX_PROBES),
         };
         let plan = self.plan(libm::log2f(major / probes));
-        let mut sum = Vec4::ZERO;
-        let mut k = 0.5;
-        while k < probes {
-            sum += self.read(plan, uv + axis * (k / probes - 0.5));
-            k += 1.0;
-        }
-        sum / probes
+        self.read(plan, &Probes { uv, axis, count: probes })
     }
 
     /// What to read where a probe covers 2^`lod` texels.
@@ -175,27 +171,70 @@ impl<'a> Lookup<'a> {
         self.pyramid.plane(self.bitmap, self.space, level)
     }
 
-    fn read(&self, plan: Plan, uv: Vec2) -> Vec4 {
+    fn read(&self, plan: Plan, probes: &Probes) -> Vec4 {
         match plan {
-            Plan::One(plane, filter) => self.level(&plane, uv, filter),
+            Plan::One(plane, filter) => self.level(&plane, probes, filter),
             Plan::Between(lower, upper, filter, share) => {
-                let (a, b) = (self.level(&lower, uv, filter), self.level(&upper, uv, filter));
+                let (a, b) = (self.level(&lower, probes, filter), self.level(&upper, probes, filter));
                 a + (b - a) * share
             }
         }
     }
 
-    /// A lookup in one level.
-    #[inline]
-    fn level(&self, plane: &Plane, uv: Vec2, filter: Filter) -> Vec4 {
-        let x = Axis::new(uv.x, plane.width, self.sampler.wrap_u, filter);
-        let y = Axis::new(uv.y, plane.height, self.sampler.wrap_v, filter);
-        if filter == Filter::Nearest {
-            return plane.texel(x.near, y.near);
+    /// A lookup in one level: how texels are stored is asked once, not for each.
+    fn level(&self, plane: &Plane, probes: &Probes, filter: Filter) -> Vec4 {
+        match plane.texels {
+            Stored::Level(texels) => {
+                let codes = self.mean(plane, probes, filter, |i| pyramid::codes(&texels[i]));
+                codes * (1.0 / 65535.0)
+            }
+            Stored::Bitmap(Texels::Rgb8(texels, colors)) => {
+                self.mean(plane, probes, filter, |i| decode::solid8(texels[i], colors))
+            }
+            Stored::Bitmap(texels) => self.mean(plane, probes, filter, |i| texels.get(i)),
         }
-        let upper = plane.texel(x.near, y.near) * (1.0 - x.share) + plane.texel(x.far, y.near) * x.share;
-        let lower = plane.texel(x.near, y.far) * (1.0 - x.share) + plane.texel(x.far, y.far) * x.share;
-        upper * (1.0 - y.share) + lower * y.share
+    }
+
+    /// The mean of all probes.
+    #[inline(always)]
+    fn mean(&self, plane: &Plane, probes: &Probes, filter: Filter, texel: impl Fn(usize) -> Vec4) -> Vec4 {
+        let one = |uv: Vec2| {
+            let x = Axis::new(uv.x, plane.width, self.sampler.wrap_u, filter);
+            let y = Axis::new(uv.y, plane.height, self.sampler.wrap_v, filter);
+            let (near, far) = (y.near * plane.width, y.far * plane.width);
+            if filter == Filter::Nearest {
+                return texel(near + x.near);
+            }
+            let across = |row: usize| {
+                let (a, b) = (texel(row + x.near), texel(row + x.far));
+                a + (b - a) * x.share
+            };
+            let (upper, lower) = (across(near), across(far));
+            upper + (lower - upper) * y.share
+        };
+        if probes.count <= 1.0 {
+            return one(probes.uv);
+        }
+        let mut sum = Vec4::ZERO;
+        let mut k = 0.5;
+        while k < probes.count {
+            sum += one(probes.uv + probes.axis * (k / probes.count - 0.5));
+            k += 1.0;
+        }
+        sum / probes.count
+    }
+}
+
+/// Where a lookup reads: at places of equal distance along `axis`, `uv` in the middle.
+struct Probes {
+    uv: Vec2,
+    axis: Vec2,
+    count: f32,
+}
+
+impl Probes {
+    fn one(uv: Vec2) -> Self {
+        Self { uv, axis: Vec2::ZERO, count: 1.0 }
     }
 }
 

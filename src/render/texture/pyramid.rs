@@ -5,9 +5,9 @@
 //! values. Colours (sRGB slots) are weighted by alpha, so that what hides under transparent texels does not bleed out.
 
 use super::ColorSpace;
-use super::decode::{self, Texels};
+use super::decode::{self, FRACTION, Texels};
 use crate::math::Vec4;
-use crate::scene::Bitmap;
+use crate::scene::{Bitmap, Pixels};
 use std::sync::OnceLock;
 
 /// The levels above a bitmap, for one colour space. Level 0 is the bitmap itself and not stored here.
@@ -22,6 +22,8 @@ pub(super) struct Pyramid {
 #[derive(Debug)]
 struct Level {
     texels: Vec<[u16; 4]>,
+    /// Whether every alpha is 1.
+    solid: bool,
 }
 
 impl Pyramid {
@@ -47,20 +49,42 @@ impl Pyramid {
         Plane { width, height, texels }
     }
 
+    /// Whether a level that is there is known to be solid.
+    fn is_solid(&self, bitmap: &Bitmap, level: usize) -> bool {
+        match level {
+            0 => matches!(bitmap.pixels, Pixels::Rgb8(_)),
+            _ => self.above[level - 1].get().is_some_and(|level| level.solid),
+        }
+    }
+
     /// Level `level` > 0. It depends on the bitmap alone, so it does not matter which thread makes it.
     fn level(&self, bitmap: &Bitmap, space: ColorSpace, level: usize) -> &Level {
         self.above[level - 1].get_or_init(|| {
             let (from, to) = (self.plane(bitmap, space, level - 1), size(bitmap, level));
-            match from.texels {
-                Stored::Bitmap(Texels::Rgba8(texels, colors)) if from.is_twice(to) => {
-                    let quarters: [f32; 256] = std::array::from_fn(|i| colors[i] * 0.25);
-                    halve_evenly(texels, from.width, |block| mean8(block, colors, &quarters, space))
+            let solid = self.is_solid(bitmap, level - 1);
+            let texels = match from.texels {
+                _ if !from.is_twice(to) => halve(&from, to, space),
+                Stored::Bitmap(Texels::Rgb8(texels, _)) if space == ColorSpace::Linear => {
+                    halve_evenly(texels, from.width, |block| solid8(block, |code| (u32::from(code) * 257) << FRACTION))
                 }
-                Stored::Level(texels) if from.is_twice(to) => halve_evenly(texels, from.width, |[a, b, c, d]| {
-                    mean_of_four(unit(a), unit(b), unit(c), unit(d), space)
+                Stored::Bitmap(Texels::Rgb8(texels, _)) => {
+                    let light = decode::fixed8(space);
+                    halve_evenly(texels, from.width, |block| solid8(block, |code| light[usize::from(code)]))
+                }
+                Stored::Bitmap(Texels::Rgba8(texels, colors)) => {
+                    let light = decode::fixed8(space);
+                    halve_evenly(texels, from.width, |block| mean8(block, colors, light, space))
+                }
+                Stored::Level(texels) if solid || space == ColorSpace::Linear => {
+                    halve_evenly(texels, from.width, mean_of_codes)
+                }
+                Stored::Level(texels) => halve_evenly(texels, from.width, |[a, b, c, d]| {
+                    quantized(mean_of_four(unit(a), unit(b), unit(c), unit(d), space))
                 }),
-                _ => halve(&from, to, space),
-            }
+                Stored::Bitmap(_) => halve(&from, to, space),
+            };
+            let solid = solid || level == 1 && texels.iter().all(|texel| texel[3] == u16::MAX);
+            Level { texels, solid }
         })
     }
 }
@@ -70,11 +94,11 @@ impl Pyramid {
 pub(super) struct Plane<'a> {
     pub(super) width: usize,
     pub(super) height: usize,
-    texels: Stored<'a>,
+    pub(super) texels: Stored<'a>,
 }
 
 #[derive(Clone, Copy)]
-enum Stored<'a> {
+pub(super) enum Stored<'a> {
     Bitmap(Texels<'a>),
     Level(&'a [[u16; 4]]),
 }
@@ -102,12 +126,18 @@ pub(super) fn size(bitmap: &Bitmap, level: usize) -> (usize, usize) {
 }
 
 #[inline(always)]
-fn unit(&[r, g, b, a]: &[u16; 4]) -> Vec4 {
-    Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a)) / 65535.0
+fn unit(texel: &[u16; 4]) -> Vec4 {
+    codes(texel) / 65535.0
+}
+
+/// What is stored, 0 … 65535.
+#[inline(always)]
+pub(super) fn codes(&[r, g, b, a]: &[u16; 4]) -> Vec4 {
+    Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a))
 }
 
 /// The next smaller copy of a level.
-fn halve(from: &Plane, to: (usize, usize), space: ColorSpace) -> Level {
+fn halve(from: &Plane, to: (usize, usize), space: ColorSpace) -> Vec<[u16; 4]> {
     let columns: Vec<Span> = (0..to.0).map(|x| Span::new(x, from.width, to.0)).collect();
     let mut texels = Vec::with_capacity(to.0 * to.1);
     for y in 0..to.1 {
@@ -116,19 +146,41 @@ fn halve(from: &Plane, to: (usize, usize), space: ColorSpace) -> Level {
             texels.push(quantized(mean(columns, &rows, space, &|x, y| from.texel(x, y))));
         }
     }
-    Level { texels }
+    texels
 }
 
 /// The same where each texel is the mean of exactly four, which come as upper left and right, lower left and right.
-fn halve_evenly<T>(texels: &[T], width: usize, mean: impl Fn([&T; 4]) -> Vec4) -> Level {
+fn halve_evenly<T>(texels: &[T], width: usize, mean: impl Fn([&T; 4]) -> [u16; 4]) -> Vec<[u16; 4]> {
     let mut out = Vec::with_capacity(texels.len() / 4);
     for rows in texels.chunks_exact(2 * width) {
         let (upper, lower) = rows.split_at(width);
-        for ([a, b], [c, d]) in upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0) {
-            out.push(quantized(mean([a, b, c, d])));
-        }
+        let pairs = upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0);
+        out.extend(pairs.map(|([a, b], [c, d])| mean([a, b, c, d])));
     }
-    Level { texels: out }
+    out
+}
+
+/// What is stored of the mean of four texels without alpha; `light` gives colours as [`decode::fixed8`] does.
+#[inline(always)]
+fn solid8([a, b, c, d]: [&[u8; 3]; 4], light: impl Fn(u8) -> u32) -> [u16; 4] {
+    let sum = |i: usize| rounded(light(a[i]) + light(b[i]) + light(c[i]) + light(d[i]));
+    [sum(0), sum(1), sum(2), u16::MAX]
+}
+
+/// A quarter of a sum in units of 2⁻¹² steps, in steps.
+#[expect(clippy::cast_possible_truncation, reason = "four times 65535 steps at most")]
+#[inline(always)]
+fn rounded(sum: u32) -> u16 {
+    ((sum + (1 << (FRACTION + 1))) >> (FRACTION + 2)) as u16
+}
+
+/// What is stored of the mean of four stored texels whose channels do not weigh each other.
+#[expect(clippy::cast_possible_truncation, reason = "a mean is no larger than the largest")]
+#[inline(always)]
+fn mean_of_codes([a, b, c, d]: [&[u16; 4]; 4]) -> [u16; 4] {
+    let sum = |i: usize| u32::from(a[i]) + u32::from(b[i]) + u32::from(c[i]) + u32::from(d[i]);
+    let mean = |i: usize| ((sum(i) + 2) >> 2) as u16;
+    [mean(0), mean(1), mean(2), mean(3)]
 }
 
 /// What [`mean`] gives for four texels of equal shares. No maps over arrays here: they are not always inlined, and this
@@ -144,17 +196,17 @@ fn mean_of_four(a: Vec4, b: Vec4, c: Vec4, d: Vec4, space: ColorSpace) -> Vec4 {
     (sum / plain.w).truncate().extend(plain.w)
 }
 
-/// The same of 8-bit texels; `quarters` has a quarter of each colour. Most pictures are solid, and then it is a matter of
-/// looking up and adding.
+/// The same of 8-bit texels, as it is stored; `light` has the colours as [`decode::fixed8`] gives them. Most pictures are
+/// solid, and then it is a matter of looking up and adding.
 #[inline(always)]
-fn mean8([a, b, c, d]: [&[u8; 4]; 4], colors: &[f32; 256], quarters: &[f32; 256], space: ColorSpace) -> Vec4 {
+fn mean8([a, b, c, d]: [&[u8; 4]; 4], colors: &[f32; 256], light: &[u32; 256], space: ColorSpace) -> [u16; 4] {
     if a[3] & b[3] & c[3] & d[3] < u8::MAX {
         let linear = |texel: &[u8; 4]| decode::decode8(*texel, colors);
-        return mean_of_four(linear(a), linear(b), linear(c), linear(d), space);
+        return quantized(mean_of_four(linear(a), linear(b), linear(c), linear(d), space));
     }
-    let quarter = |code: u8| quarters[usize::from(code)];
-    let sum = |i: usize| quarter(a[i]) + quarter(b[i]) + quarter(c[i]) + quarter(d[i]);
-    Vec4::new(sum(0), sum(1), sum(2), 1.0)
+    let light = |code: u8| light[usize::from(code)];
+    let sum = |i: usize| rounded(light(a[i]) + light(b[i]) + light(c[i]) + light(d[i]));
+    [sum(0), sum(1), sum(2), u16::MAX]
 }
 
 /// Whether a mean needs no weights: where everything is clear there is none to go by, and where everything is solid the
@@ -214,7 +266,6 @@ fn quantized(v: Vec4) -> [u16; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Pixels;
 
     fn bitmap(width: u32, height: u32, texel: impl Fn(u32, u32) -> [u8; 4]) -> Bitmap {
         let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| texel(x, y)).collect();
@@ -247,18 +298,23 @@ mod tests {
     }
 
     #[test]
-    fn halving_evenly_gives_the_bits_of_any_halving() {
+    fn halving_evenly_is_halving_to_a_step_of_65535() {
         let hash = |x: u32, y: u32| x.wrapping_mul(2_654_435_761).wrapping_add(y.wrapping_mul(40_503)).rotate_left(7);
         let opaque = bitmap(32, 16, |x, y| [hash(x, y) as u8, hash(y, x) as u8, 7, 255]);
         let cut_out = bitmap(16, 64, |x, y| [hash(x, y) as u8, 200, 7, (hash(y, x) % 3 * 100) as u8]);
-        for picture in [opaque, cut_out] {
+        let texels = (0..16 * 8 * 3).map(|i| hash(i, 1) as u8).collect();
+        let without_alpha = Bitmap { name: String::new(), width: 16, height: 8, pixels: Pixels::Rgb8(texels) };
+        for picture in [opaque, cut_out, without_alpha] {
             for space in [ColorSpace::Srgb, ColorSpace::Linear] {
                 let pyramid = Pyramid::new(&picture);
                 for level in 1..4 {
                     let below = pyramid.plane(&picture, space, level - 1);
                     let slow = halve(&below, size(&picture, level), space);
                     assert!(below.is_twice(size(&picture, level)));
-                    assert!(pyramid.level(&picture, space, level).texels == slow.texels, "level {level} {space:?}");
+                    let evenly = &pyramid.level(&picture, space, level).texels;
+                    let steps = evenly.iter().flatten().zip(slow.iter().flatten()).map(|(a, b)| a.abs_diff(*b));
+                    assert_eq!(evenly.len(), slow.len());
+                    assert!(steps.max() <= Some(1), "level {level} {space:?}");
                 }
             }
         }

@@ -117,6 +117,7 @@ impl Pictures {
     fn map(&self, i: usize, change: impl Fn([f32; 4]) -> [f32; 4]) -> Bitmap {
         let Bitmap { name, width, height, pixels } = &self.sources[i];
         let pixels = match pixels {
+            Pixels::Rgb8(bytes) => Pixels::Rgba8(solid(bytes).map(|t| to8(change(from8(t)))).collect()),
             Pixels::Rgba8(texels) => Pixels::Rgba8(texels.iter().map(|&t| to8(change(from8(t)))).collect()),
             Pixels::Rgba16(texels) => Pixels::Rgba16(texels.iter().map(|&t| to16(change(from16(t)))).collect()),
         };
@@ -146,6 +147,7 @@ impl Pictures {
 
 fn texel(bitmap: &Bitmap, at: usize) -> Option<[f32; 4]> {
     match &bitmap.pixels {
+        Pixels::Rgb8(bytes) => solid(bytes).nth(at).map(from8),
         Pixels::Rgba8(texels) => texels.get(at).map(|&t| from8(t)),
         Pixels::Rgba16(texels) => texels.get(at).map(|&t| from16(t)),
     }
@@ -153,9 +155,15 @@ fn texel(bitmap: &Bitmap, at: usize) -> Option<[f32; 4]> {
 
 fn each(bitmap: &Bitmap, mut look: impl FnMut([f32; 4])) {
     match &bitmap.pixels {
+        Pixels::Rgb8(bytes) => solid(bytes).for_each(|t| look(from8(t))),
         Pixels::Rgba8(texels) => texels.iter().for_each(|&t| look(from8(t))),
         Pixels::Rgba16(texels) => texels.iter().for_each(|&t| look(from16(t))),
     }
+}
+
+/// Texels without alpha, with it.
+fn solid(bytes: &[u8]) -> impl Iterator<Item = [u8; 4]> {
+    bytes.as_chunks::<3>().0.iter().map(|&[r, g, b]| [r, g, b, u8::MAX])
 }
 
 fn pick([r, g, b, a]: [f32; 4], channel: Channel) -> f32 {
@@ -206,7 +214,7 @@ mod tests {
     fn texels(pictures: Pictures) -> Vec<Vec<[u8; 4]>> {
         let texels = |bitmap: Bitmap| match bitmap.pixels {
             Pixels::Rgba8(texels) => texels,
-            Pixels::Rgba16(_) => Vec::new(),
+            Pixels::Rgb8(_) | Pixels::Rgba16(_) => Vec::new(),
         };
         pictures.finish().into_iter().map(texels).collect()
     }

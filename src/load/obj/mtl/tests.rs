@@ -34,6 +34,7 @@ fn texel(loaded: &Loaded, map: Option<&TextureRef>) -> [u8; 4] {
     let texture = &loaded.scene.textures[map.unwrap().texture as usize];
     match &loaded.scene.bitmaps[texture.bitmap as usize].pixels {
         Pixels::Rgba8(texels) => texels[0],
+        Pixels::Rgb8(bytes) => [bytes[0], bytes[1], bytes[2], 255],
         Pixels::Rgba16(_) => panic!(),
     }
 }
