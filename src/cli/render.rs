@@ -14,7 +14,7 @@ use crate::image::was_written_by_meshray;
 use crate::load::{Diagnostic, Loaded};
 use crate::render::texture::TextureStore;
 use crate::render::{Costs, Job, Rendered, View, World, render_costs};
-use crate::scene::framing::{Bounds, robust_bounds};
+use crate::scene::framing::{Bounds, robust_bounds_within};
 use crate::scene::{default_light, default_light::DefaultLight};
 use std::path::Path;
 use std::time::Instant;
@@ -151,7 +151,7 @@ fn prepare(
         return Err(Exit::Input);
     }
     profile.done("place");
-    let bounds = robust_bounds(&loaded.scene);
+    let bounds = robust_bounds_within(&loaded.scene, world.bounds);
     profile.done("frame");
     Ok(Ready { loaded, world, bounds, load_seconds: start.elapsed().as_secs_f64(), profile })
 }

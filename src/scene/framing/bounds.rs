@@ -54,23 +54,48 @@ impl Bounds {
 /// Whatever is connected to the model, however thin, is part of it. A scene with nothing bounded gets the unit box
 /// around the origin.
 pub fn robust_bounds(scene: &Scene) -> Bounds {
-    without_gaps(scene).unwrap_or_else(|| by_parts(scene))
+    let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let found = visit_corners(scene, |p| (lo, hi) = (lo.min(p), hi.max(p)));
+    found.and_then(|()| without_gaps(scene, (lo, hi))).unwrap_or_else(|| by_parts(scene))
 }
 
-/// The box of a model of faces whose corners alone reach into every slice, so that there is no gap and nothing can come
-/// off: what most models are, found without a look at each face. `None`: it has to be looked at more closely.
-fn without_gaps(scene: &Scene) -> Option<Bounds> {
-    let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    visit_corners(scene, |p| (lo, hi) = (lo.min(p), hi.max(p)))?;
-    let bounds = Bounds { lo, hi, strays: 0, whole: (lo, hi) };
+/// The same where the box of all corners is known, such as [`World::bounds`](crate::render::World::bounds).
+pub fn robust_bounds_within(scene: &Scene, whole: (DVec3, DVec3)) -> Bounds {
+    without_gaps(scene, whole).unwrap_or_else(|| by_parts(scene))
+}
+
+/// Faces that are looked at between two questions whether all slices have been reached.
+const FACES_AT_A_TIME: usize = 1024;
+
+/// The box of a model of triangles that reach into every slice, so that there is no gap and nothing can come off: what
+/// most models are, found by a look at some of the faces from all over it. `None`: it has to be looked at more closely.
+fn without_gaps(scene: &Scene, whole: (DVec3, DVec3)) -> Option<Bounds> {
+    let (lo, hi) = whole;
+    if !(scene.spheres.is_empty() && scene.cones.is_empty() && lo.is_finite() && hi.is_finite()) {
+        return None;
+    }
+    let bounds = Bounds { lo, hi, strays: 0, whole };
     let mut slices = Slices::new(&bounds);
-    visit_corners(scene, |p| {
-        for axis in 0..3 {
-            let slice = slices.slice(axis, p[axis]);
-            slices.covered[axis][slice] = true;
+    for instance in &scene.instances {
+        let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
+        let corner = |i: u32| {
+            let p = mesh.positions.get(i as usize)?;
+            Some(instance.world_from_object.transform_point3(p.as_dvec3())).filter(|p| p.is_finite())
+        };
+        // Neighbours in the file are neighbours in space: some from all over it reach far sooner than the first ones.
+        let stride = mesh.triangles.len() / FACES_AT_A_TIME + 1;
+        for first in 0..stride {
+            for triangle in mesh.triangles.iter().skip(first).step_by(stride) {
+                let [a, b, c] = triangle.map(corner);
+                let (a, b, c) = (a?, b?, c?);
+                slices.reach(a.min(b).min(c), a.max(b).max(c));
+            }
+            if slices.has_no_gap() {
+                return Some(bounds);
+            }
         }
-    })?;
-    slices.has_no_gap().then_some(bounds)
+    }
+    None
 }
 
 /// The same for any scene, part by part.
@@ -224,12 +249,18 @@ impl Slices {
     fn cover(&mut self, scene: &Scene, bounds: &Bounds) {
         visit(scene, |part| {
             if bounds.contains(part.center) {
-                for axis in 0..3 {
-                    let (first, last) = (self.slice(axis, part.lo[axis]), self.slice(axis, part.hi[axis]));
-                    self.covered[axis][first..=last].fill(true);
-                }
+                self.reach(part.lo, part.hi);
             }
         });
+    }
+
+    /// Notes that a part with this box reaches from slice to slice.
+    #[inline]
+    fn reach(&mut self, lo: DVec3, hi: DVec3) {
+        for axis in 0..3 {
+            let (first, last) = (self.slice(axis, lo[axis]), self.slice(axis, hi[axis]));
+            self.covered[axis][first..=last].fill(true);
+        }
     }
 
     /// Whether no slice is empty, so that nothing can come off.
@@ -343,10 +374,11 @@ mod tests {
 
     #[test]
     fn the_short_way_and_the_long_one_find_the_same_box() {
-        for (faces, gap, short) in [(20_000, 0.0, true), (40, 0.0, false), (20_000, 30.0, false)] {
-            let scene = spiral(faces, gap);
-            assert_eq!(without_gaps(&scene).is_some(), short, "{faces} {gap}");
-            assert_eq!(robust_bounds(&scene), by_parts(&scene), "{faces} {gap}");
+        for (faces, gap, short) in [(20_000, 0.0, true), (40, 0.0, true), (20_000, 30.0, false)] {
+            let (scene, slow) = (spiral(faces, gap), by_parts(&spiral(faces, gap)));
+            assert_eq!(without_gaps(&scene, slow.whole).is_some(), short, "{faces} {gap}");
+            assert_eq!(robust_bounds(&scene), slow, "{faces} {gap}");
+            assert_eq!(robust_bounds_within(&scene, slow.whole), slow, "{faces} {gap}");
             assert_eq!(robust_bounds(&scene).strays > 0, gap > 0.0);
         }
     }
@@ -355,6 +387,7 @@ mod tests {
     fn corners_that_are_nowhere_are_left_to_the_long_way() {
         let mut scene = spiral(20_000, 0.0);
         scene.meshes[0].positions[7].y = f32::NAN;
-        assert!(without_gaps(&scene).is_none() && robust_bounds(&scene).hi.is_finite());
+        let whole = by_parts(&scene).whole;
+        assert!(without_gaps(&scene, whole).is_none() && robust_bounds(&scene).hi.is_finite());
     }
 }

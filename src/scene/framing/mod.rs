@@ -6,7 +6,7 @@
 mod bounds;
 mod fit;
 
-pub use bounds::{Bounds, robust_bounds};
+pub use bounds::{Bounds, robust_bounds, robust_bounds_within};
 pub use fit::{FrameLens, frame};
 
 use super::{Camera, Scene, UpAxis};
