@@ -6,6 +6,7 @@
 use super::buffers::Buffers;
 use super::sparse::{Replaced, Replacements};
 use crate::load::Diagnostic;
+use crate::math::Vec3;
 use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root, buffer};
@@ -155,8 +156,9 @@ impl<'a> Reader<'a> {
         index: Index<Accessor>,
         pick: Pick,
     ) -> Result<Vec<[f32; N]>, Unreadable> {
-        self.elements(index, pick, [0.0; N], |element, format| {
-            std::array::from_fn(|k| if k < format.width() { float(element, format, k) } else { 0.0 })
+        self.elements(index, pick, [0.0; N], |element, format| match stored::<N>(element, format) {
+            Some(floats) => floats,
+            None => std::array::from_fn(|k| if k < format.width() { float(element, format, k) } else { 0.0 }),
         })
     }
 
@@ -192,7 +194,11 @@ impl<'a> Reader<'a> {
             (None, Some(view)) => {
                 let count = usize::try_from(accessor.count.0).ok()?;
                 let run = self.run(view, accessor, format);
-                Some(run.map(|run| extent_of(run.elements(count).map(|element| raws(element, format)), format)))
+                Some(run.map(|run| {
+                    let vectors = |element| stored::<3>(element, format);
+                    extent_of_vectors(run.elements(count).map(vectors))
+                        .unwrap_or_else(|| extent_of(run.elements(count).map(|element| raws(element, format)), format))
+                }))
             }
             _ => None,
         }
@@ -262,6 +268,16 @@ fn short(count: usize, found: usize) -> Unreadable {
     Unreadable::Data(super::codes::Code::AccessorTooLong, text)
 }
 
+/// The floats of an element that holds just `N`, one after the other: nearly all of them.
+#[inline(always)]
+fn stored<const N: usize>(element: &[u8], format: Format) -> Option<[f32; N]> {
+    if format.component != ComponentType::F32 || format.is_matrix() || format.width() != N {
+        return None;
+    }
+    let floats = element.as_chunks::<4>().0.first_chunk::<N>()?;
+    Some(floats.map(f32::from_le_bytes))
+}
+
 /// `N` bytes of an element; zeros past its end, where nobody reads.
 fn bytes<const N: usize>(element: &[u8], at: usize) -> [u8; N] {
     element.get(at..at + N).and_then(|b| b.try_into().ok()).unwrap_or([0; N])
@@ -294,6 +310,23 @@ fn extent_of(elements: impl Iterator<Item = [f64; 16]>, format: Format) -> Exten
         }
     }
     extent
+}
+
+/// The same of vectors of three floats; `None`: they are none, or have numbers that are not finite.
+fn extent_of_vectors(mut vectors: impl Iterator<Item = Option<[f32; 3]>>) -> Option<Extent> {
+    let (mut lo, mut hi) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    // Products with 0 tell what is not finite.
+    let mut zero = Vec3::ZERO;
+    vectors.try_for_each(|vector| {
+        let v = Vec3::from(vector?);
+        (lo, hi, zero) = (lo.min(v), hi.max(v), zero + v * 0.0);
+        Some(())
+    })?;
+    let mut extent = [(f64::INFINITY, f64::NEG_INFINITY); 16];
+    for (k, range) in extent.iter_mut().take(3).enumerate() {
+        *range = (f64::from(lo[k]), f64::from(hi[k]));
+    }
+    (zero == Vec3::ZERO).then_some(extent)
 }
 
 /// Component `k` as stored.
@@ -335,6 +368,21 @@ mod tests {
         assert_eq!(at(ComponentType::I16, &[0xff, 0x7f]), 1.0);
         assert_eq!(at(ComponentType::U16, &[0xff, 0xff]), 1.0);
         assert_eq!(float(&[0x80], format(ComponentType::I8, Type::Scalar, false), 0), -128.0);
+    }
+
+    #[test]
+    fn vectors_of_floats_have_the_extent_of_any_others() {
+        let vector = format(ComponentType::F32, Type::Vec3, false);
+        let bytes = |numbers: [f32; 6]| numbers.map(f32::to_le_bytes).concat();
+        let elements = |bytes: &[u8]| bytes.chunks(12).map(<[u8]>::to_vec).collect::<Vec<_>>();
+        for (numbers, quick) in [([1.0, -2.0, 3.0, -4.0, 5.0, 6.5], true), ([1.0, f32::NAN, 3.0, 4.0, 5.0, 6.0], false)]
+        {
+            let elements = elements(&bytes(numbers));
+            let slow = extent_of(elements.iter().map(|e| raws(e, vector)), vector);
+            let found = extent_of_vectors(elements.iter().map(|e| stored(e, vector)));
+            assert_eq!(found, quick.then_some(slow));
+        }
+        assert_eq!(stored::<3>(&[0; 6], format(ComponentType::U16, Type::Vec3, true)), None);
     }
 
     #[test]
