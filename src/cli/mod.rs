@@ -33,7 +33,7 @@ mod version;
 pub use exit::Exit;
 
 use args::{Cli, Command, RenderArgs};
-use clap::{CommandFactory, Parser};
+use clap::{Parser, Subcommand};
 use message::{Messages, Severity};
 use std::ffi::OsString;
 use std::io::{self, Write};
@@ -93,7 +93,7 @@ fn render_command(typed: &RenderArgs) -> Exit {
 /// Lets `meshray MODEL` stand for `meshray render MODEL`: when the first word is no command but looks like a file.
 fn with_render(mut words: Vec<OsString>) -> Vec<OsString> {
     let Some(first) = words.get(1).and_then(|w| w.to_str()) else { return words };
-    let is_command = Cli::command().get_subcommands().any(|c| c.get_name() == first) || first == "help";
+    let is_command = Command::has_subcommand(first) || first == "help";
     if !is_command && (is_file(first) || first == "-") {
         words.insert(1, "render".into());
     }
@@ -129,6 +129,7 @@ fn print(text: &str) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use clap::CommandFactory;
 
     #[test]
     fn the_command_line_is_consistent() {

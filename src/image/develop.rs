@@ -71,26 +71,28 @@ pub(super) fn raster<T: Sample>(picture: &Picture, output: &Output) -> Raster<T>
     let mut samples = vec![T::default(); picture.beauty.len() * channels];
     let rows = samples.par_chunks_mut(width * channels).zip(picture.beauty.par_chunks(width));
     let (developer, level) = (Developer::new(output), Level::best());
-    rows.for_each(|(out, row)| level.run(Row { developer: &developer, row, out, channels }));
+    rows.for_each(|(out, row)| match opaque {
+        true => level.run(Row::<T, 3> { developer: &developer, row, out }),
+        false => level.run(Row::<T, 4> { developer: &developer, row, out }),
+    });
     Raster { width: picture.width, height: picture.height, channels: if opaque { 3 } else { 4 }, samples }
 }
 
 /// One row on its way to the file.
-struct Row<'a, T> {
+struct Row<'a, T, const CHANNELS: usize> {
     developer: &'a Developer<'a>,
     row: &'a [[f32; 4]],
     out: &'a mut [T],
-    channels: usize,
 }
 
-impl<T: Sample> Kernel for Row<'_, T> {
+impl<T: Sample, const CHANNELS: usize> Kernel for Row<'_, T, CHANNELS> {
     type Output = ();
 
     // The lanes are plain arrays: what the token stands for is only what the compiler may use for them.
     #[inline(always)]
     fn run<S: Simd>(self, _simd: S) {
         let codes = T::codes();
-        let blocks = self.out.chunks_mut(self.channels * LANES).zip(self.row.chunks(LANES));
+        let blocks = self.out.as_chunks_mut::<CHANNELS>().0.chunks_mut(LANES).zip(self.row.chunks(LANES));
         let mut last = ([[f32::NAN; 4]; LANES], [[T::default(); 4]; LANES]);
         for (out, pixels) in blocks {
             // Large parts of a picture are one colour.
@@ -108,8 +110,8 @@ impl<T: Sample> Kernel for Row<'_, T> {
                     *coded = [code(0), code(1), code(2), T::alpha(lanes[3][i])];
                 }
             }
-            for (out, coded) in out.chunks_exact_mut(self.channels).zip(&last.1) {
-                out.copy_from_slice(&coded[..self.channels]);
+            for (out, coded) in out.iter_mut().zip(&last.1) {
+                *out = std::array::from_fn(|c| coded[c]);
             }
         }
     }

@@ -3,7 +3,7 @@
 use super::develop::{Raster, raster};
 use super::metadata::MAX_TEXT;
 use super::{FileKind, ImageError, Metadata, Output, Picture, PngDepth, srgb};
-use ::png::{BitDepth, ColorType, Compression, Decoder, Encoder, SrgbRenderingIntent, Transformations};
+use ::png::{BitDepth, ColorType, Compression, Decoder, Encoder, Filter, SrgbRenderingIntent, Transformations};
 use std::io::{BufRead, Cursor, Seek};
 
 /// The bytes of a PNG file.
@@ -39,6 +39,8 @@ fn write<T>(
     encoder.set_depth(depth);
     // The slower levels take 50 times as long for a quarter less.
     encoder.set_compression(Compression::Fast);
+    // Rendered pictures come out no larger than with the best filter for each row, in half the time.
+    encoder.set_filter(Filter::Paeth);
     encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
     if !metadata.is_empty() {
         encoder.add_text_chunk("Software".to_owned(), metadata.software())?;

@@ -52,14 +52,24 @@ impl ToneMap {
     /// makes vectors of them, and each comes out as it would alone.
     #[inline(always)]
     pub(super) fn map_lanes<const N: usize>(self, color: &mut [[f32; N]; 3]) {
-        color.iter_mut().flatten().for_each(|c| *c = within(*c, BRIGHTEST));
+        hold(color, BRIGHTEST);
         match self {
             Self::None => {}
             Self::Reinhard => reinhard(color),
             Self::Aces => aces(color),
             Self::Neutral => neutral(color),
         }
-        color.iter_mut().flatten().for_each(|c| *c = within(*c, 1.0));
+        hold(color, 1.0);
+    }
+}
+
+/// Holds all numbers in 0..=most.
+#[inline(always)]
+fn hold<const N: usize>(color: &mut [[f32; N]; 3], most: f32) {
+    for channel in color {
+        for c in channel {
+            *c = within(*c, most);
+        }
     }
 }
 
