@@ -54,6 +54,8 @@ pub const NO_PRIM: u32 = u32::MAX;
 
 /// One ray, in the centred frame of its [`Shapes`]. `dir` need not be of unit length; t counts in its lengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
+// In this order origin and t_min, direction and t_max are four numbers in a row each, which packets read at once.
+#[repr(C)]
 pub struct Ray {
     /// Start.
     pub origin: Vec3,
@@ -71,6 +73,7 @@ pub struct Ray {
 
 /// Where a ray meets a shape. Geometry only: the caller looks up what it is made of.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct Hit {
     /// Distance in lengths of the ray's direction; infinite for a miss.
     pub t: f32,

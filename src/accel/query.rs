@@ -46,6 +46,9 @@ pub trait Goal {
     /// Whether that is the exact one.
     const EXACT: bool = <Self::Test as Intersector>::EXACT;
 
+    /// Whether any hit is the answer.
+    const ANY: bool = false;
+
     /// Whether a hit with `prim` would matter at all.
     fn wants(&self, _shapes: &Shapes, _prim: u32) -> bool {
         true
@@ -208,28 +211,7 @@ impl<'a, G: Goal> Query<'a, G> {
         (first..first + count).any(|plane| self.test(plane, probe))
     }
 
-    /// Offers the hit with a triangle at an exact distance, if it is asked about; what that means.
-    #[inline(always)]
-    pub fn offer_met(&mut self, prim: u32, t: f32) -> Outcome {
-        if prim == self.exclude || !self.goal.wants(self.shapes, prim) {
-            return Outcome::LeftOut;
-        }
-        self.offer(t, prim)
-    }
-
-    /// Whether nothing more can change the answer.
-    #[inline(always)]
-    pub fn is_answered(&self) -> bool {
-        self.reach() < self.t_min
-    }
-
-    /// The hit that is the answer so far, by distance and prim, where hits are asked for.
-    #[inline(always)]
-    pub fn best(&self) -> Option<(f32, u32)> {
-        self.goal.best()
-    }
-
-    /// The same with its barycentric weights, which only the winner needs.
+    /// The hit that is the answer so far, with its barycentric weights, which only the winner needs.
     #[inline]
     pub(super) fn hit(&self) -> Hit {
         let Some((t, prim)) = self.goal.best() else { return Hit::MISS };
@@ -287,6 +269,7 @@ pub struct Occluded<I> {
 
 impl<I: Intersector> Goal for Occluded<I> {
     type Test = I;
+    const ANY: bool = true;
 
     #[inline]
     fn wants(&self, shapes: &Shapes, prim: u32) -> bool {

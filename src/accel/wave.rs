@@ -19,11 +19,23 @@ pub trait Wave {
         self.rays()[i].t_min
     }
 
+    /// [`Self::t_min`] of rays that follow each other, of which the first is ray `start`; given are those of the rays.
+    #[inline(always)]
+    fn adapt_t_min(&self, _start: usize, _t_min: &mut [f32]) {}
+
     /// What a ray looks for.
     fn goal(&self, i: usize) -> Self::Goal;
 
     /// Takes the answer of a ray whose hit, or miss, is known to the last bit.
     fn take(&mut self, i: usize, hit: Hit);
+
+    /// Takes the answers of rays that follow each other, the first of them ray `start`.
+    #[inline(always)]
+    fn take_all(&mut self, start: usize, hits: &[Hit]) {
+        for (i, hit) in (start..).zip(hits) {
+            self.take(i, *hit);
+        }
+    }
 
     /// Takes the answer of a query, and tells whether there was a hit.
     fn answer(&mut self, i: usize, query: &Query<Self::Goal>) -> bool;
@@ -51,6 +63,11 @@ impl<I: Intersector> Wave for ForFirst<'_, I> {
     #[inline(always)]
     fn take(&mut self, i: usize, hit: Hit) {
         self.hits[i] = hit;
+    }
+
+    #[inline(always)]
+    fn take_all(&mut self, start: usize, hits: &[Hit]) {
+        self.hits[start..start + hits.len()].copy_from_slice(hits);
     }
 
     #[inline]
@@ -112,6 +129,13 @@ impl<I: Intersector> Wave for ForNext<'_, I> {
     }
 
     #[inline(always)]
+    fn adapt_t_min(&self, start: usize, t_min: &mut [f32]) {
+        for (t_min, after) in t_min.iter_mut().zip(&self.after[start..]) {
+            *t_min = t_min.max(after.t);
+        }
+    }
+
+    #[inline(always)]
     fn goal(&self, i: usize) -> Next<I> {
         Next::nothing(&self.after[i], self.test)
     }
@@ -119,6 +143,11 @@ impl<I: Intersector> Wave for ForNext<'_, I> {
     #[inline(always)]
     fn take(&mut self, i: usize, hit: Hit) {
         self.hits[i] = hit;
+    }
+
+    #[inline(always)]
+    fn take_all(&mut self, start: usize, hits: &[Hit]) {
+        self.hits[start..start + hits.len()].copy_from_slice(hits);
     }
 
     #[inline]

@@ -4,7 +4,7 @@
 //! n such factors (N. Higham, *Accuracy and Stability of Numerical Algorithms*, 2002, lemma 3.1).
 
 use super::Vec3;
-use super::simd::Simd;
+use super::simd::Lanewise;
 
 /// Unit roundoff of `f32`: 2⁻²⁴.
 pub const U32: f32 = f32::EPSILON / 2.0;
@@ -56,9 +56,9 @@ impl EdgeMargins {
         displaced * (spread + 0.125 * displaced) + self.underflow
     }
 
-    /// [`Self::error`] in eight lanes; `reach` is D in all.
+    /// [`Self::error`] in lanes; `reach` is D in all.
     #[inline(always)]
-    pub fn error_lanes<S: Simd>(&self, s: S, reach: S::Lanes, spread: S::Lanes) -> S::Lanes {
+    pub fn error_lanes<S: Lanewise<N>, const N: usize>(&self, s: S, reach: S::Lanes, spread: S::Lanes) -> S::Lanes {
         let displaced = s.mul(s.splat(8.0 * self.rounding), s.add(s.add(reach, reach), spread));
         let product = s.mul(displaced, s.add(spread, s.mul(s.splat(0.125), displaced)));
         s.add(product, s.splat(self.underflow))

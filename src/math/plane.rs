@@ -3,12 +3,12 @@
 use super::Vec3;
 use super::bounds::{EXACT_QUOTIENT, POSITION_T, U64};
 use super::expansion::Expansion;
-use super::quotient::{Bounded, approximate, nearest, rounded};
+use super::quotient::{Bounded, approximate, rounded};
 use super::shear::RaySpace;
 
 /// The distance at which the line through the ray meets the plane n·p = offset; `None` if it runs along it.
 pub fn intersect(ray: &RaySpace, normal: Vec3, offset: f32) -> Option<f32> {
-    if let Some(t) = quotient(ray, normal, offset).and_then(|(t, error)| nearest(t, error)) {
+    if let Some(t) = quotient(ray, normal, offset).and_then(Bounded::nearest) {
         return Some(t);
     }
     let (numerator, denominator) = exact_terms(ray, normal, offset);
@@ -19,7 +19,7 @@ pub fn intersect(ray: &RaySpace, normal: Vec3, offset: f32) -> Option<f32> {
 pub fn distance_f64(ray: &RaySpace, normal: Vec3, offset: f32) -> f64 {
     const { assert!(EXACT_QUOTIENT < POSITION_T) };
     match quotient(ray, normal, offset) {
-        Some((t, error)) if error < POSITION_T => t,
+        Some(t) if t.is_within(POSITION_T) => t.value,
         _ => {
             let (numerator, denominator) = exact_terms(ray, normal, offset);
             approximate(&numerator, &denominator)
@@ -28,7 +28,7 @@ pub fn distance_f64(ray: &RaySpace, normal: Vec3, offset: f32) -> f64 {
 }
 
 /// Products of two `f32` are exact in `f64`; the sums add 3 and 2 roundings.
-fn quotient(ray: &RaySpace, normal: Vec3, offset: f32) -> Option<(f64, f64)> {
+fn quotient(ray: &RaySpace, normal: Vec3, offset: f32) -> Option<Bounded> {
     let (n, o, d) = (normal.as_dvec3(), ray.origin.as_dvec3(), ray.dir.as_dvec3());
     let numerator = f64::from(offset) - n.dot(o);
     let size = f64::from(offset).abs() + n.abs().dot(o.abs());

@@ -16,7 +16,7 @@
 use dashu::rational::RBig;
 
 use super::bounds::{POSITION_T, U64};
-use super::quotient::{Bounded, nearest};
+use super::quotient::Bounded;
 use super::rational::{cross, dot, minus, point, sign};
 use super::shear::RaySpace;
 use super::{DVec3, Vec3, Vec3Swizzles};
@@ -67,14 +67,14 @@ pub fn intersect(ray: &RaySpace, polygon: Polygon) -> Option<f32> {
     if !is_inside(ray, polygon) {
         return None;
     }
-    let near = quotient(ray, polygon).and_then(|(t, error)| nearest(t, error));
+    let near = quotient(ray, polygon).and_then(Bounded::nearest);
     near.or_else(|| exact_distance(ray, polygon).map(|t| never_zero_behind(&t)))
 }
 
 /// As [`intersect`]'s distance of a polygon that is hit, to a relative error of [`POSITION_T`].
 pub fn distance_f64(ray: &RaySpace, polygon: Polygon) -> Option<f64> {
     match quotient(ray, polygon) {
-        Some((t, error)) if error < POSITION_T => Some(t),
+        Some(t) if t.is_within(POSITION_T) => Some(t.value),
         _ => exact_distance(ray, polygon).map(|t| t.to_f64().value()),
     }
 }
@@ -93,14 +93,15 @@ fn is_inside(ray: &RaySpace, polygon: Polygon) -> bool {
     inside
 }
 
-/// The distance in `f64` and a bound of its relative error; `None` where it cannot be told whether the box moves it.
-fn quotient(ray: &RaySpace, polygon: Polygon) -> Option<(f64, f64)> {
+/// The distance in `f64`; `None` where it cannot be told whether the box moves it.
+fn quotient(ray: &RaySpace, polygon: Polygon) -> Option<Bounded> {
     let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
     let (lo, hi) = polygon.bounds();
     let flat = (0..3).find(|&k| lo[k] == hi[k] && d[k] != 0.0);
     if let Some(k) = flat {
         // In an axis-parallel plane nothing is left to choose. One rounding of the difference, one of the quotient.
-        return Some(((f64::from(lo[k]) - o[k]) / d[k], 4.0 * U64));
+        let value = (f64::from(lo[k]) - o[k]) / d[k];
+        return Some(Bounded { value, error: 4.0 * U64 * value.abs() });
     }
 
     // Differences and products err by 4 u, a sum of n terms by n u; then 2 more for the difference and product, 2 for
@@ -112,16 +113,17 @@ fn quotient(ray: &RaySpace, polygon: Polygon) -> Option<(f64, f64)> {
     let (normal, to_first) = (polygon.newell(), first - o);
     let numerator = Bounded { value: normal.dot(to_first), error: doubt * sizes.dot(to_first.abs()) };
     let denominator = Bounded { value: normal.dot(d), error: doubt * sizes.dot(d.abs()) };
-    let (t, error) = numerator.over(denominator)?;
+    let distance = numerator.over(denominator)?;
 
-    let room = 4.0 * U64 + error * 1.01;
+    let t = distance.value;
+    let room = 4.0 * U64 + distance.error / t.abs() * 1.01;
     let inside = |k: usize| {
         let (a, b) = ((f64::from(lo[k]) - o[k]) / d[k], (f64::from(hi[k]) - o[k]) / d[k]);
         let (enter, leave) = (a.min(b), a.max(b));
         let slack = room * (t.abs() + enter.abs().max(leave.abs()));
         t - enter > slack && leave - t > slack
     };
-    (0..3).all(|k| d[k] == 0.0 || inside(k)).then_some((t, error))
+    (0..3).all(|k| d[k] == 0.0 || inside(k)).then_some(distance)
 }
 
 /// a × b with a sum in place of each difference: bounds the sizes of a cross product's terms.

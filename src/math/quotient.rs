@@ -16,28 +16,39 @@ pub struct Bounded {
 }
 
 impl Bounded {
-    /// The quotient and a bound of its relative error, or `None` where the sign of either term is not certain. The product
-    /// of both must neither over- nor underflow, which that of two terms made of `f32` coordinates does not.
+    /// The quotient, or `None` where the sign of either term is not certain. Neither the reciprocal of the denominator nor
+    /// its product with the numerator may over- or underflow, which those of terms made of `f32` coordinates do not.
     #[inline(always)]
-    pub fn over(self, denominator: Self) -> Option<(f64, f64)> {
+    pub fn over(self, denominator: Self) -> Option<Self> {
         let (n, d) = (self.value.abs(), denominator.value.abs());
         // Also false for NaN.
         if denominator.error < 0.25 * d && self.error < 0.25 * n {
-            // (n + e)/(d (1 + r)): r ≤ 1/4 grows to at most 4/3 r, and e/n ≤ 1/4 adds a third of itself to that; one rounding
-            // of the quotient. Nothing waits for two divisions.
-            let relative = (self.error * d + denominator.error * n) / (n * d);
-            Some((self.value / denominator.value, relative * 1.5 + f64::EPSILON))
+            // |(n + e)/(d + f) − n/d| = |e − f n/d| / |d + f|, and |d + f| ≥ 3/4 |d|; 3/2 is for that and for the roundings
+            // here. The reciprocal and the product of the quotient itself are one rounding each.
+            let reciprocal = 1.0 / denominator.value;
+            let value = self.value * reciprocal;
+            let size = value.abs();
+            let error =
+                (self.error + denominator.error * size) * (1.5 * reciprocal.abs()) + size * (2.0 * f64::EPSILON);
+            Some(Self { value, error })
         } else {
             None
         }
     }
-}
 
-/// The `f32` nearest to every number within `t` (1 ± `error`), or `None` if there is more than one.
-pub fn nearest(t: f64, error: f64) -> Option<f32> {
-    let spread = t.abs() * (error * 1.001);
-    let (lo, hi) = (round(t - spread), round(t + spread));
-    (lo.to_bits() == hi.to_bits()).then_some(lo)
+    /// Whether the error is below this part of the value.
+    #[inline]
+    pub fn is_within(self, relative: f64) -> bool {
+        self.error < self.value.abs() * relative
+    }
+
+    /// The `f32` nearest to every number that this may be, or `None` if there is more than one.
+    #[inline]
+    pub fn nearest(self) -> Option<f32> {
+        let spread = self.error * 1.001;
+        let (lo, hi) = (round(self.value - spread), round(self.value + spread));
+        (lo.to_bits() == hi.to_bits()).then_some(lo)
+    }
 }
 
 /// `numerator` / `denominator` to a relative error of [`EXACT_QUOTIENT`].

@@ -7,7 +7,7 @@
 
 use super::bounds::{EXACT_QUOTIENT, EdgeMargins, PLANE_TERMS_F64, POSITION_T};
 use super::expansion::{Expansion, cross, difference, dot, dot_f32};
-use super::quotient::{Bounded, approximate, nearest, rounded};
+use super::quotient::{Bounded, approximate, rounded};
 use super::shear::RaySpace;
 use super::{DVec3, Vec3};
 
@@ -95,9 +95,9 @@ pub struct Meeting {
 pub fn meet(ray: &RaySpace, triangle: &Triangle) -> Meeting {
     let (numerator, denominator, normal) = plane_terms(ray, triangle, PLANE_TERMS_F64);
     match numerator.over(denominator) {
-        Some((t_f64, error)) if error < POSITION_T => {
-            let t = nearest(t_f64, error).unwrap_or_else(|| exact_distance(ray, triangle));
-            Meeting { t, t_f64, normal }
+        Some(t) if t.is_within(POSITION_T) => {
+            let rounded = t.nearest().unwrap_or_else(|| exact_distance(ray, triangle));
+            Meeting { t: rounded, t_f64: t.value, normal }
         }
         _ => Meeting { t: distance(ray, triangle), t_f64: f64::NAN, normal },
     }
@@ -105,7 +105,7 @@ pub fn meet(ray: &RaySpace, triangle: &Triangle) -> Meeting {
 
 /// Exact t = n·(a − o) / n·d with n = (b − a) × (c − a), correctly rounded. The triangle must be hit.
 pub fn distance(ray: &RaySpace, triangle: &Triangle) -> f32 {
-    let fast = plane_quotient(ray, triangle, PLANE_TERMS_F64).and_then(|(t, error)| nearest(t, error));
+    let fast = plane_quotient(ray, triangle, PLANE_TERMS_F64).and_then(Bounded::nearest);
     fast.unwrap_or_else(|| exact_distance(ray, triangle))
 }
 
@@ -125,7 +125,7 @@ pub fn distance_f64(ray: &RaySpace, triangle: &Triangle) -> f64 {
 /// The distance of a triangle that is hit, to a relative error of `enough`, which is more than [`EXACT_QUOTIENT`].
 fn distance_within(ray: &RaySpace, triangle: &Triangle, enough: f64) -> f64 {
     match plane_quotient(ray, triangle, PLANE_TERMS_F64) {
-        Some((t, error)) if error < enough => t,
+        Some(t) if t.is_within(enough) => t.value,
         _ => {
             let (numerator, denominator) = exact_plane_terms(ray, triangle);
             approximate(&numerator, &denominator)
@@ -133,9 +133,9 @@ fn distance_within(ray: &RaySpace, triangle: &Triangle, enough: f64) -> f64 {
     }
 }
 
-/// t in `f64` and a bound of its relative error, where there is one; `terms` is the relative error of both its terms.
+/// t in `f64`, where its error has a bound; `terms` is the relative error of both its terms.
 #[inline]
-fn plane_quotient(ray: &RaySpace, triangle: &Triangle, terms: f64) -> Option<(f64, f64)> {
+fn plane_quotient(ray: &RaySpace, triangle: &Triangle, terms: f64) -> Option<Bounded> {
     let (numerator, denominator, _) = plane_terms(ray, triangle, terms);
     numerator.over(denominator)
 }
@@ -171,7 +171,7 @@ impl Flat {
     pub fn distance(&self, origin: Vec3, dir: Vec3) -> Option<f64> {
         let (numerator, denominator) = self.terms(origin, dir, PLANE_TERMS_F64);
         match numerator.over(denominator) {
-            Some((t, error)) if error < POSITION_T => Some(t),
+            Some(t) if t.is_within(POSITION_T) => Some(t.value),
             _ => None,
         }
     }
@@ -317,7 +317,7 @@ mod tests {
         each_grazing(|ray, triangle| {
             let (numerator, denominator) = exact_plane_terms(ray, triangle);
             let exact = rounded::<192, 384>(&numerator, &denominator);
-            let fast = plane_quotient(ray, triangle, terms).and_then(|(t, error)| nearest(t, error));
+            let fast = plane_quotient(ray, triangle, terms).and_then(Bounded::nearest);
             wrong += usize::from(fast.is_some_and(|t| t.to_bits() != exact.to_bits()));
         });
         wrong

@@ -9,7 +9,7 @@ use super::Vec3;
 use super::aabb::Aabb;
 use super::bounds::{EdgeMargins, PLANE_TERMS_F64, POSITION_T};
 use super::shear::RaySpace;
-use super::simd::{LANES, Row, Simd};
+use super::simd::{LANES, Lanewise, Row, Simd};
 use super::triangle::{flat_axes, magnitude_cross};
 
 /// Corners of eight triangles, by corner and axis.
@@ -50,7 +50,6 @@ pub fn set_corners(corners: &mut Corners8, lane: usize, triangle: &[Vec3; 3]) {
 }
 
 /// A ray ready to be tested against blocks.
-#[derive(Clone, Copy)]
 pub struct RayLanes<S: Simd> {
     /// Axes in sheared order: x, y, z.
     axes: [usize; 3],
@@ -110,25 +109,27 @@ impl<S: Simd> RayLanes<S> {
 }
 
 /// Rays side by side, with the same axis first, ready to be tested against one triangle after another.
-#[derive(Clone, Copy)]
-pub struct RayRow<S: Simd> {
+pub struct RayRow<S: Lanewise<N>, const N: usize> {
     /// Axes in sheared order: x, y, z.
     axes: [usize; 3],
     origin: [S::Lanes; 3],
+    /// The origin of all rays, where they have one.
+    from: Option<Vec3>,
     shear: [S::Lanes; 2],
     reach: S::Lanes,
 }
 
-impl<S: Simd> RayRow<S> {
-    /// Rays by axis and lane, whose largest components are along axis `z`; none of the triangles that they are tested
-    /// against is farther from any of them than `reach`.
+impl<S: Lanewise<N>, const N: usize> RayRow<S, N> {
+    /// Rays by axis and lane, whose largest components are along axis `z`, with the origin of all, if there is one; none
+    /// of the triangles that they are tested against is farther from any of them than `reach`.
     #[inline(always)]
-    pub fn new(s: S, origin: &[Row; 3], dir: &[Row; 3], z: usize, reach: f32) -> Self {
+    pub fn new(s: S, origin: &[[f32; N]; 3], from: Option<Vec3>, dir: &[[f32; N]; 3], z: usize, reach: f32) -> Self {
         let axes = [(z + 1) % 3, (z + 2) % 3, z % 3];
         let along = s.load(&dir[axes[2]]);
         Self {
             axes,
             origin: [s.load(&origin[axes[0]]), s.load(&origin[axes[1]]), s.load(&origin[axes[2]])],
+            from,
             shear: [s.div(s.load(&dir[axes[0]]), along), s.div(s.load(&dir[axes[1]]), along)],
             reach: s.splat(reach),
         }
@@ -137,31 +138,67 @@ impl<S: Simd> RayRow<S> {
     /// Tests one triangle: a bit for each ray.
     #[inline(always)]
     pub fn verdicts(&self, s: S, triangle: &[Vec3; 3]) -> Verdicts {
-        let [a, b, c] = [self.relative(s, triangle[0]), self.relative(s, triangle[1]), self.relative(s, triangle[2])];
-        judge(s, [a, b, c], self.reach, EdgeMargins::DERIVED)
+        let (a, b, c) = (self.relative(s, triangle[0]), self.relative(s, triangle[1]), self.relative(s, triangle[2]));
+        judge(s, [self.sheared(s, a), self.sheared(s, b), self.sheared(s, c)], self.reach, EdgeMargins::DERIVED)
     }
 
-    /// A corner relative to the origins, sheared.
+    /// [`Self::verdicts`], fewer of them unsure: by how far the triangle is instead of how far any could be.
     #[inline(always)]
-    fn relative(&self, s: S, corner: Vec3) -> [S::Lanes; 2] {
+    pub fn closer_verdicts(&self, s: S, triangle: &[Vec3; 3]) -> Verdicts {
+        let (a, b, c) = (self.relative(s, triangle[0]), self.relative(s, triangle[1]), self.relative(s, triangle[2]));
+        let reach = s.greater(largest3(s, a), s.greater(largest3(s, b), largest3(s, c)));
+        judge(s, [self.sheared(s, a), self.sheared(s, b), self.sheared(s, c)], reach, EdgeMargins::DERIVED)
+    }
+
+    /// A corner relative to the origins.
+    #[inline(always)]
+    fn relative(&self, s: S, corner: Vec3) -> [S::Lanes; 3] {
         let [x, y, z] = self.axes;
-        let z = s.sub(s.splat(corner[z]), self.origin[2]);
-        let x = s.sub(s.splat(corner[x]), self.origin[0]);
-        let y = s.sub(s.splat(corner[y]), self.origin[1]);
+        if let Some(from) = self.from {
+            let p = corner - from;
+            return [s.splat(p[x]), s.splat(p[y]), s.splat(p[z])];
+        }
+        [
+            s.sub(s.splat(corner[x]), self.origin[0]),
+            s.sub(s.splat(corner[y]), self.origin[1]),
+            s.sub(s.splat(corner[z]), self.origin[2]),
+        ]
+    }
+
+    #[inline(always)]
+    fn sheared(&self, s: S, [x, y, z]: [S::Lanes; 3]) -> [S::Lanes; 2] {
         [s.sub(x, s.mul(self.shear[0], z)), s.sub(y, s.mul(self.shear[1], z))]
     }
 }
 
-/// Where rays side by side meet the plane of one triangle: [`meet`](super::triangle::meet) in eight lanes, operation by
+/// Where rays side by side meet the plane of one triangle: [`meet`](super::triangle::meet) in lanes, operation by
 /// operation.
 #[derive(Clone, Copy, Debug)]
-pub struct Meetings {
+pub struct Meetings<L, D> {
     /// t, rounded once.
-    pub t: Row,
+    pub t: L,
     /// t to a relative error of [`POSITION_T`].
-    pub t_f64: [f64; LANES],
+    pub t_f64: D,
     /// The lanes in which that is certain; for the others the scalar form must be asked.
     pub sure: u32,
+}
+
+/// What bounds the rays of a row.
+#[derive(Clone, Copy, Debug)]
+pub struct RowBounds {
+    /// All origins lie between these.
+    pub low: DVec3,
+    /// The same.
+    pub high: DVec3,
+    /// The origin, where all rays have the same.
+    pub from: Option<DVec3>,
+    /// No component of a direction is larger in size.
+    pub dir: DVec3,
+}
+
+impl RowBounds {
+    /// Around nothing.
+    pub const NONE: Self = Self { low: DVec3::ZERO, high: DVec3::ZERO, from: None, dir: DVec3::ZERO };
 }
 
 /// What the rays of a row share when they meet a triangle.
@@ -183,50 +220,69 @@ impl Plane {
 
     /// Where rays (by axis and lane) meet it.
     #[inline(always)]
-    pub fn meet<S: Simd>(&self, s: S, origin: &[Row; 3], dir: &[Row; 3]) -> Meetings {
-        let a = self.corners[0].to_array();
-        let (o, d) = (
-            [s.load(&origin[0]), s.load(&origin[1]), s.load(&origin[2])],
-            [s.load(&dir[0]), s.load(&dir[1]), s.load(&dir[2])],
-        );
-        let to_plane = [
-            s.sub_f64(s.splat_f64(a[0]), s.widen(o[0])),
-            s.sub_f64(s.splat_f64(a[1]), s.widen(o[1])),
-            s.sub_f64(s.splat_f64(a[2]), s.widen(o[2])),
-        ];
-        let (numerator, n_error) = self.term(s, to_plane);
-        let (denominator, d_error) = self.term(s, [s.widen(d[0]), s.widen(d[1]), s.widen(d[2])]);
+    pub fn meet<S: Lanewise<N>, const N: usize>(
+        &self,
+        s: S,
+        origin: &[[f32; N]; 3],
+        dir: &[[f32; N]; 3],
+        bounds: &RowBounds,
+    ) -> Meetings<S::Lanes, S::Doubles> {
+        let a = self.corners[0];
+        let (low, high) = ((a - bounds.low).abs(), (a - bounds.high).abs());
+        let numerator = match bounds.from {
+            Some(from) => s.splat_f64(self.normal.dot(a - from)),
+            None => {
+                let o = [s.load(&origin[0]), s.load(&origin[1]), s.load(&origin[2])];
+                let x = s.sub_f64(s.splat_f64(a.x), s.widen(o[0]));
+                let y = s.sub_f64(s.splat_f64(a.y), s.widen(o[1]));
+                let z = s.sub_f64(s.splat_f64(a.z), s.widen(o[2]));
+                self.dot(s, [x, y, z])
+            }
+        };
+        let d = [s.widen(s.load(&dir[0])), s.widen(s.load(&dir[1])), s.widen(s.load(&dir[2]))];
+        let denominator = self.dot(s, d);
+        // Those of the farthest and of the steepest ray there could be.
+        let n_error = s.splat_f64(self.sizes.dot(low.max(high)) * PLANE_TERMS_F64);
+        let d_error = s.splat_f64(self.sizes.dot(bounds.dir) * PLANE_TERMS_F64);
         let (n, d) = (s.abs_f64(numerator), s.abs_f64(denominator));
         let quarter = s.splat_f64(0.25);
         let signs = s.less_f64(d_error, s.mul_f64(quarter, d)) & s.less_f64(n_error, s.mul_f64(quarter, n));
-        let relative = s.div_f64(s.add_f64(s.mul_f64(n_error, d), s.mul_f64(d_error, n)), s.mul_f64(n, d));
-        let error = s.add_f64(s.mul_f64(relative, s.splat_f64(1.5)), s.splat_f64(f64::EPSILON));
-        let t = s.div_f64(numerator, denominator);
-        let spread = s.mul_f64(s.abs_f64(t), s.mul_f64(error, s.splat_f64(1.001)));
+        let reciprocal = s.div_f64(s.splat_f64(1.0), denominator);
+        let t = s.mul_f64(numerator, reciprocal);
+        let size = s.abs_f64(t);
+        let terms = s.add_f64(n_error, s.mul_f64(d_error, size));
+        let error = s.add_f64(
+            s.mul_f64(terms, s.mul_f64(s.splat_f64(1.5), s.abs_f64(reciprocal))),
+            s.mul_f64(size, s.splat_f64(2.0 * f64::EPSILON)),
+        );
+        let spread = s.mul_f64(error, s.splat_f64(1.001));
         let (low, high) = (s.narrow(s.sub_f64(t, spread)), s.narrow(s.add_f64(t, spread)));
         let rounded = s.at_most(low, high) & s.at_most(high, low);
-        let sure = signs & s.less_f64(error, s.splat_f64(POSITION_T)) & rounded;
-        Meetings { t: s.store(low), t_f64: s.store_f64(t), sure }
+        // Below the normal numbers zero gets a sign, which is left to the scalar form.
+        let normal = s.less_f64(s.splat_f64(f64::from(f32::MIN_POSITIVE)), size);
+        let sure = signs & s.less_f64(error, s.mul_f64(size, s.splat_f64(POSITION_T))) & rounded & normal;
+        Meetings { t: low, t_f64: t, sure }
     }
 
-    /// n·v and a bound of its error.
+    /// n·v.
     #[inline(always)]
-    fn term<S: Simd>(&self, s: S, [x, y, z]: [S::Doubles; 3]) -> (S::Doubles, S::Doubles) {
-        let (n, m) = (self.normal, self.sizes);
-        let value = s.add_f64(
+    fn dot<S: Lanewise<N>, const N: usize>(&self, s: S, [x, y, z]: [S::Doubles; 3]) -> S::Doubles {
+        let n = self.normal;
+        s.add_f64(
             s.add_f64(s.mul_f64(s.splat_f64(n.x), x), s.mul_f64(s.splat_f64(n.y), y)),
             s.mul_f64(s.splat_f64(n.z), z),
-        );
-        let size = s.add_f64(
-            s.add_f64(s.mul_f64(s.splat_f64(m.x), s.abs_f64(x)), s.mul_f64(s.splat_f64(m.y), s.abs_f64(y))),
-            s.mul_f64(s.splat_f64(m.z), s.abs_f64(z)),
-        );
-        (value, s.mul_f64(size, s.splat_f64(PLANE_TERMS_F64)))
+        )
     }
 
-    /// Weights of the second and third corner: [`barycentrics_at`](super::triangle::barycentrics_at) in eight lanes.
+    /// Weights of the second and third corner: [`barycentrics_at`](super::triangle::barycentrics_at) in lanes.
     #[inline(always)]
-    pub fn barycentrics<S: Simd>(&self, s: S, origin: &[Row; 3], dir: &[Row; 3], t: &[f64; LANES]) -> [Row; 2] {
+    pub fn barycentrics<S: Lanewise<N>, const N: usize>(
+        &self,
+        s: S,
+        origin: &[[f32; N]; 3],
+        dir: &[[f32; N]; 3],
+        t: &[f64; N],
+    ) -> [[f32; N]; 2] {
         let [i, j] = flat_axes(self.normal);
         let [a, b, c] = [self.corners[0].to_array(), self.corners[1].to_array(), self.corners[2].to_array()];
         let t = s.load_f64(t);
@@ -239,7 +295,7 @@ impl Plane {
         let u = self.clamped(s, s.mul_f64(u, scale));
         let v = self.clamped(s, s.mul_f64(v, scale));
         let (u, mut v) = (s.store(u), s.store(v));
-        for lane in 0..LANES {
+        for lane in 0..N {
             v[lane] = if u[lane] + v[lane] > 1.0 { 1.0 - u[lane] } else { v[lane] };
         }
         [u, v]
@@ -247,14 +303,21 @@ impl Plane {
 
     /// Coordinate `k` of the places at `t`, relative to the first corner.
     #[inline(always)]
-    fn along<S: Simd>(&self, s: S, origin: &[Row; 3], dir: &[Row; 3], t: S::Doubles, k: usize) -> S::Doubles {
+    fn along<S: Lanewise<N>, const N: usize>(
+        &self,
+        s: S,
+        origin: &[[f32; N]; 3],
+        dir: &[[f32; N]; 3],
+        t: S::Doubles,
+        k: usize,
+    ) -> S::Doubles {
         let (o, d) = (s.widen(s.load(&origin[k % 3])), s.widen(s.load(&dir[k % 3])));
         s.sub_f64(s.add_f64(o, s.mul_f64(d, t)), s.splat_f64(self.corners[0][k % 3]))
     }
 
     /// Within 0 to 1, rounded; 0 for a NaN.
     #[inline(always)]
-    fn clamped<S: Simd>(&self, s: S, x: S::Doubles) -> S::Lanes {
+    fn clamped<S: Lanewise<N>, const N: usize>(&self, s: S, x: S::Doubles) -> S::Lanes {
         let positive = s.greater_f64(x, s.splat_f64(0.0));
         s.narrow(s.smaller_f64(positive, s.splat_f64(1.0)))
     }
@@ -262,7 +325,12 @@ impl Plane {
 
 /// The verdicts on triangles by their sheared corners, where that is certain.
 #[inline(always)]
-fn judge<S: Simd>(s: S, corners: [[S::Lanes; 2]; 3], reach: S::Lanes, margins: EdgeMargins) -> Verdicts {
+fn judge<S: Lanewise<N>, const N: usize>(
+    s: S,
+    corners: [[S::Lanes; 2]; 3],
+    reach: S::Lanes,
+    margins: EdgeMargins,
+) -> Verdicts {
     let [[ax, ay], [bx, by], [cx, cy]] = corners;
     let u = s.sub(s.mul(cx, by), s.mul(cy, bx));
     let v = s.sub(s.mul(ax, cy), s.mul(ay, cx));
@@ -277,12 +345,17 @@ fn judge<S: Simd>(s: S, corners: [[S::Lanes; 2]; 3], reach: S::Lanes, margins: E
     let sound = s.less(error, s.splat(margins.overflow));
     let miss = s.less(low, negative) & s.less(error, high);
     let hit = (s.less(error, low) | s.less(high, negative)) & sound;
-    Verdicts { hit, unsure: !(hit | miss & sound) & 0xff }
+    Verdicts { hit, unsure: !(hit | miss & sound) & ((1 << N) - 1) }
 }
 
 #[inline(always)]
-fn largest2<S: Simd>(s: S, x: S::Lanes, y: S::Lanes) -> S::Lanes {
+fn largest2<S: Lanewise<N>, const N: usize>(s: S, x: S::Lanes, y: S::Lanes) -> S::Lanes {
     s.greater(s.abs(x), s.abs(y))
+}
+
+#[inline(always)]
+fn largest3<S: Lanewise<N>, const N: usize>(s: S, [x, y, z]: [S::Lanes; 3]) -> S::Lanes {
+    s.greater(s.abs(z), largest2(s, x, y))
 }
 
 #[cfg(test)]
@@ -437,7 +510,7 @@ mod tests {
     struct Row8<'a>(&'a [RaySpace; LANES], &'a Triangle);
 
     impl Kernel for Row8<'_> {
-        type Output = (Verdicts, Meetings, [Row; 2]);
+        type Output = (Verdicts, Meetings<Row, [f64; LANES]>, [Row; 2]);
 
         #[inline(always)]
         fn run<S: Simd>(self, s: S) -> Self::Output {
@@ -449,9 +522,23 @@ mod tests {
                 }
             }
             let far = rays.iter().map(|r| reach(r.origin, &Aabb::around(*triangle))).fold(0.0, f32::max);
-            let verdicts = RayRow::new(s, &origin, &dir, rays[0].z, far).verdicts(s, triangle);
+            let from = (origin.map(|x| x[0]) == origin.map(|x| x[1])).then(|| rays[0].origin);
+            let row = RayRow::new(s, &origin, from, &dir, rays[0].z, far);
+            let (verdicts, closer) = (row.verdicts(s, triangle), row.closer_verdicts(s, triangle));
+            assert_eq!(verdicts.hit & !(closer.hit | closer.unsure) | closer.unsure & !verdicts.unsure, 0);
             let plane = Plane::of(triangle);
-            let met = plane.meet(s, &origin, &dir);
+            let (least, most) = (
+                |f: fn(&RaySpace) -> DVec3| rays.iter().map(f).reduce(DVec3::min).unwrap(),
+                |f: fn(&RaySpace) -> DVec3| rays.iter().map(f).reduce(DVec3::max).unwrap(),
+            );
+            let bounds = RowBounds {
+                low: least(|r| r.origin.as_dvec3()),
+                high: most(|r| r.origin.as_dvec3()),
+                from: from.map(Vec3::as_dvec3),
+                dir: most(|r| r.dir.as_dvec3().abs()),
+            };
+            let met = plane.meet(s, &origin, &dir, &bounds);
+            let met = Meetings { t: s.store(met.t), t_f64: s.store_f64(met.t_f64), sure: met.sure };
             (verdicts, met, plane.barycentrics(s, &origin, &dir, &met.t_f64))
         }
     }

@@ -12,7 +12,7 @@ use super::slabs::{BoxMargins, Slabs};
 use super::walk::{Entry, ask_by_itself, has_direction, test_leaf};
 use crate::accel::query::{Goal, Query};
 use crate::accel::wave::{Wave, begin, end};
-use crate::accel::{Hit, NoProbe, Probe, Shapes};
+use crate::accel::{Hit, NoProbe, Shapes};
 use crate::math::simd::{Kernel, LANES, Order, Simd};
 use crate::math::triangles::{RayLanes, reach};
 
@@ -91,14 +91,13 @@ struct Slot<'a, G: Goal, B> {
 }
 
 /// A wave of rays.
-pub(super) struct InFlight<'w, W, P, B> {
+pub(super) struct InFlight<'w, W, B> {
     pub tree: &'w Tree,
     pub shapes: &'w Shapes,
     pub wave: &'w mut W,
     pub stack: &'w mut Levels,
     /// For rays that go by themselves.
     pub entries: &'w mut [Entry],
-    pub probe: &'w mut P,
     pub margins: PhantomData<B>,
 }
 
@@ -120,7 +119,7 @@ impl List {
     }
 }
 
-impl<W: Wave, P: Probe, B: BoxMargins> Kernel for InFlight<'_, W, P, B> {
+impl<W: Wave, B: BoxMargins> Kernel for InFlight<'_, W, B> {
     type Output = ();
 
     #[inline(always)]
@@ -178,7 +177,7 @@ impl<G: Goal, B> Slot<'_, G, B> {
     }
 }
 
-impl<'w, W: Wave, P: Probe, B: BoxMargins> InFlight<'w, W, P, B> {
+impl<'w, W: Wave, B: BoxMargins> InFlight<'w, W, B> {
     /// A slot without a ray.
     fn vacant(&self, number: usize) -> Slot<'w, W::Goal, B> {
         let ray = &self.wave.rays()[0];
@@ -198,7 +197,7 @@ impl<'w, W: Wave, P: Probe, B: BoxMargins> InFlight<'w, W, P, B> {
             *next += 1;
             let ray = &self.wave.rays()[i];
             if !(B::allow(tree, ray.origin) && has_direction(ray.dir)) {
-                ask_by_itself::<B, _, _, _>(s, tree, shapes, self.wave, i, self.entries, self.probe);
+                ask_by_itself::<B, _, _, _>(s, tree, shapes, self.wave, i, self.entries, &mut NoProbe);
                 continue;
             }
             let slabs = Slabs::<B>::new(ray.origin, ray.dir, self.wave.t_min(i));
@@ -211,7 +210,7 @@ impl<'w, W: Wave, P: Probe, B: BoxMargins> InFlight<'w, W, P, B> {
             slot.reach = reach(ray.origin, &tree.bounds);
             slot.slabs = slabs;
             slot.ray = i;
-            let (query, usable) = begin(shapes, self.wave, i, self.probe);
+            let (query, usable) = begin(shapes, self.wave, i, &mut NoProbe);
             if !usable {
                 self.wave.take(i, Hit::MISS);
                 continue;
@@ -262,10 +261,10 @@ impl<'w, W: Wave, P: Probe, B: BoxMargins> InFlight<'w, W, P, B> {
             let slot = &mut slots[number as usize];
             let done = slot.child == Child::END || {
                 let lanes = RayLanes::new(s, &slot.query.ray, slot.reach);
-                test_leaf(s, self.tree, Child::unpack(slot.child), &lanes, &mut slot.query, self.probe)
+                test_leaf(s, self.tree, Child::unpack(slot.child), &lanes, &mut slot.query, &mut NoProbe)
             };
             if done {
-                end(self.wave, slot.ray, &slot.query, self.probe);
+                end(self.wave, slot.ray, &slot.query, &mut NoProbe);
                 if !self.start(s, next, slot) {
                     continue;
                 }

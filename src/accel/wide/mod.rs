@@ -40,7 +40,7 @@ use self::slabs::{BoxMargins, Derived};
 use self::walk::{OneByOne, Stack, Walk};
 use super::query::{Culling, Goal, Query};
 use super::wave::Wave;
-use super::{Probe, Shapes};
+use super::{NoProbe, Probe, Shapes};
 use crate::math::simd::Level;
 
 /// How the rays of a wave are traced. The answers are the same.
@@ -158,14 +158,14 @@ impl Wide<'_> {
     fn trace_within<B: BoxMargins, W: Wave, P: Probe>(&self, wave: &mut W, stack: &mut Stack, probe: &mut P) {
         // Where it is false nothing is compiled for it.
         if Together::<W, P>::MAY {
-            return self.trace_together::<B, _, _>(wave, stack, probe);
+            return self.trace_together::<B, _>(wave, stack);
         }
         let (tree, shapes) = (&self.tree, self.shapes);
         self.level.run(OneByOne { tree, shapes, wave, stack, probe, margins: PhantomData::<B> });
     }
 
-    fn trace_together<B: BoxMargins, W: Wave, P: Probe>(&self, wave: &mut W, stack: &mut Stack, probe: &mut P) {
-        let (tree, shapes, margins) = (&self.tree, self.shapes, PhantomData::<B>);
+    fn trace_together<B: BoxMargins, W: Wave>(&self, wave: &mut W, stack: &mut Stack) {
+        let (tree, shapes, margins, probe) = (&self.tree, self.shapes, PhantomData::<B>, &mut NoProbe);
         let rays = match self.rays {
             _ if !shapes.planes.is_empty() || tree.nodes.is_empty() => RayOrder::OneByOne,
             RayOrder::Adaptive => RayOrder::of(wave, tree.nodes.len() + tree.blocks.len()),
@@ -174,11 +174,11 @@ impl Wide<'_> {
         match rays {
             RayOrder::InFlight => {
                 let Stack { entries, flight, .. } = stack;
-                self.level.run(InFlight { tree, shapes, wave, stack: flight, entries, probe, margins });
+                self.level.run(InFlight { tree, shapes, wave, stack: flight, entries, margins });
             }
             RayOrder::Packets => {
                 let Stack { entries, branches, .. } = stack;
-                self.level.run(InPackets { tree, shapes, wave, stack: branches, entries, probe, margins });
+                self.level.run(InPackets { tree, shapes, wave, stack: branches, entries, margins });
             }
             _ => self.level.run(OneByOne { tree, shapes, wave, stack, probe, margins }),
         }

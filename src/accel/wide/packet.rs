@@ -11,23 +11,27 @@
 use std::marker::PhantomData;
 
 use super::flight::FARTHEST_FIRST;
-use super::node::{Block, Child, Node, Tree};
+use super::node::{Child, Node, Tree};
 use super::slabs::{BoxMargins, backwards};
 use super::walk::{Entry, ask_by_itself};
 use crate::accel::probe::Outcome;
-use crate::accel::query::{Goal, Query};
-use crate::accel::wave::{Wave, begin, end};
-use crate::accel::{Hit, NO_PRIM, Probe, Shapes};
-use crate::math::Vec3;
-use crate::math::shear::main_axis;
-use crate::math::simd::{Kernel, LANES, Pick, Row, Simd};
-use crate::math::triangles::{Plane, RayRow, corners_of, reach};
-
-/// Rows of a packet.
-const ROWS: usize = 2;
+use crate::accel::query::Goal;
+use crate::accel::wave::Wave;
+use crate::accel::{Hit, NO_PRIM, NoProbe, Ray, Shapes};
+use crate::math::shear::{RaySpace, main_axis};
+use crate::math::simd::{Kernel, LANES, Lanewise, Pick, Row, Simd, WIDE};
+use crate::math::triangle::{self, Triangle};
+use crate::math::triangles::{Plane, RayRow, RowBounds, corners_of, reach};
+use crate::math::{DVec3, Vec3};
 
 /// Rays of a packet.
-pub(super) const RAYS: usize = ROWS * LANES;
+pub(super) const RAYS: usize = WIDE;
+
+/// Every ray of a packet.
+const ALL: u32 = (1 << RAYS) - 1;
+
+/// A number of each ray.
+type Numbers = [f32; RAYS];
 
 /// A child still to be visited.
 #[derive(Clone, Copy, Debug, Default)]
@@ -40,25 +44,40 @@ pub(super) struct Branch {
 }
 
 /// A wave of rays.
-pub(super) struct InPackets<'w, W, P, B> {
+pub(super) struct InPackets<'w, W, B> {
     pub tree: &'w Tree,
     pub shapes: &'w Shapes,
     pub wave: &'w mut W,
     pub stack: &'w mut [Branch],
     /// For rays that go by themselves.
     pub entries: &'w mut [Entry],
-    pub probe: &'w mut P,
     pub margins: PhantomData<B>,
 }
 
-/// Rays by axis, row and lane.
-#[derive(Clone, Copy)]
-struct Packet<B> {
-    origin: [[Row; 3]; ROWS],
-    dir: [[Row; 3]; ROWS],
-    inverse: [[Row; 3]; ROWS],
-    from: [Row; ROWS],
-    limit: [Row; ROWS],
+/// Sixteen rays that run alike.
+struct Packet<'w, W, B> {
+    tree: &'w Tree,
+    shapes: &'w Shapes,
+    wave: &'w mut W,
+    /// Number of its first ray.
+    start: usize,
+    rays: Bundle<B>,
+    found: Found,
+    /// Rays that still look for something.
+    active: u32,
+}
+
+/// The rays, by axis.
+struct Bundle<B> {
+    origin: [Numbers; 3],
+    dir: [Numbers; 3],
+    inverse: [Numbers; 3],
+    /// Where hits count, inclusive.
+    t_min: Numbers,
+    /// Where boxes matter.
+    from: Numbers,
+    limit: Numbers,
+    exclude: [u32; RAYS],
     /// The origins between which the others lie, by axis: the one first met by a box's first plane, and the other.
     origins: [[f32; 2]; 3],
     /// Least and greatest reciprocal.
@@ -70,121 +89,86 @@ struct Packet<B> {
     z: usize,
     least_from: f32,
     reach: f32,
-    /// What was hit last with a distance that is certain in `f64`, and that distance.
-    met: [u32; RAYS],
-    met_at: [[f64; LANES]; ROWS],
+    /// The origin, where all rays have the same.
+    common: Option<Vec3>,
+    bounds: RowBounds,
     margins: PhantomData<B>,
 }
 
-impl<W: Wave, P: Probe, B: BoxMargins> Kernel for InPackets<'_, W, P, B> {
+/// The best hits so far.
+struct Found {
+    t: Numbers,
+    /// [`NO_PRIM`] where nothing was found; hits then count up to `t`.
+    prim: [u32; RAYS],
+    /// `t` in double precision, where `exact` says so: for triangles of blocks.
+    t_f64: [f64; RAYS],
+    exact: u32,
+    /// Where those triangles are, so that nobody looks up their corners again: block and lane.
+    place: [u32; RAYS],
+}
+
+/// A triangle in a block.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    index: u32,
+    lane: usize,
+    prim: u32,
+}
+
+impl Place {
+    /// Block and lane; there are fewer than 2²⁷ blocks.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "a lane is below 8")]
+    fn packed(self) -> u32 {
+        self.index * LANES as u32 + self.lane as u32
+    }
+}
+
+impl<W: Wave, B: BoxMargins> Kernel for InPackets<'_, W, B> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Self { tree, shapes, wave, stack, entries, probe, .. } = self;
-        let mut queries: Vec<Query<W::Goal>> = Vec::with_capacity(RAYS);
-        let mut packet = Packet::<B>::empty();
-        let mut start = 0;
-        while start < wave.rays().len() {
-            let count = RAYS.min(wave.rays().len() - start);
-            if packet.gather(s, tree, wave, start) {
-                packet.trace(s, tree, shapes, wave, start, stack, &mut queries, probe);
+        let Self { tree, shapes, wave, stack, entries, .. } = self;
+        let mut packet =
+            Packet { tree, shapes, wave, start: 0, rays: Bundle::<B>::empty(), found: Found::nothing(), active: 0 };
+        let count = packet.wave.rays().len();
+        while packet.start < count {
+            if packet.gather(s) {
+                packet.trace(s, stack);
             } else {
-                for i in start..start + count {
-                    ask_by_itself::<B, _, _, _>(s, tree, shapes, wave, i, entries, probe);
+                for i in packet.start..count.min(packet.start + RAYS) {
+                    ask_by_itself::<B, _, _, _>(s, tree, shapes, packet.wave, i, entries, &mut NoProbe);
                 }
             }
-            start += count;
+            packet.start += RAYS;
         }
     }
 }
 
-/// Every lane of a row.
-const ALL: u32 = (1 << LANES) - 1;
-
+/// Puts eight numbers to the first or the last of sixteen.
 #[inline(always)]
-fn least(row: &Row) -> f32 {
-    row.iter().fold(f32::INFINITY, |a, &b| if b < a { b } else { a })
+fn put_half(to: &mut Numbers, half: usize, row: Row) {
+    to.as_chunks_mut().0[half % 2] = row;
 }
 
-#[inline(always)]
-fn greatest(row: &Row) -> f32 {
-    row.iter().fold(f32::NEG_INFINITY, |a, &b| if b > a { b } else { a })
+impl Found {
+    fn nothing() -> Self {
+        Self { t: [0.0; RAYS], prim: [NO_PRIM; RAYS], t_f64: [0.0; RAYS], exact: 0, place: [0; RAYS] }
+    }
 }
 
-impl<B: BoxMargins> Packet<B> {
-    /// The next sixteen rays, if there are as many and they run alike: to the same octant, no component zero, the same
-    /// one the largest.
-    #[inline(always)]
-    fn gather<S: Simd, W: Wave>(&mut self, s: S, tree: &Tree, wave: &W, start: usize) -> bool {
-        if start + RAYS > wave.rays().len() || tree.extent > B::COORDINATES {
-            return false;
-        }
-        let dir = wave.rays()[start].dir;
-        (self.z, self.octant) = (main_axis(dir), octant_of(dir));
-        let mut alike = ALL;
-        for row in 0..ROWS {
-            let mut rays = [[0.0; LANES]; LANES];
-            for (place, numbers) in rays.iter_mut().enumerate() {
-                let i = start + row * LANES + place;
-                let ray = &wave.rays()[i];
-                let ([ox, oy, oz], [dx, dy, dz]) = (ray.origin.to_array(), ray.dir.to_array());
-                *numbers = [ox, oy, oz, wave.t_min(i), dx, dy, dz, ray.t_max];
-            }
-            alike &= self.take_row(s, row, s.transpose(&rays));
-        }
-        if alike == ALL {
-            self.bound(s, tree);
-        }
-        alike == ALL
-    }
-
-    /// Eight rays, by number and lane; a bit for each that runs like the first.
-    #[inline(always)]
-    fn take_row<S: Simd>(&mut self, s: S, row: usize, rays: [S::Lanes; LANES]) -> u32 {
-        let [ox, oy, oz, t_min, dx, dy, dz, t_max] = rays;
-        let (zero, one, most, least_normal) =
-            (s.splat(0.0), s.splat(1.0), s.splat(f32::MAX), s.splat(f32::MIN_POSITIVE));
-        let (origin, dir) = ([ox, oy, oz], [dx, dy, dz]);
-        let coordinates = s.splat(B::COORDINATES);
-        let mut alike = s.at_most(t_min, t_max);
-        for k in 0..3 {
-            let inverse = s.div(one, dir[k]);
-            let size = s.abs(inverse);
-            let back = s.less(dir[k], zero);
-            alike &= s.at_most(s.abs(origin[k]), coordinates) & s.at_most(s.abs(dir[k]), most);
-            alike &= s.at_most(size, most) & s.at_most(least_normal, size);
-            alike &= if self.octant >> k & 1 == 1 { back } else { !back };
-            self.origin[row][k] = s.store(origin[k]);
-            self.dir[row][k] = s.store(dir[k]);
-            self.inverse[row][k] = s.store(inverse);
-        }
-        let (x, y, z) = (s.abs(dx), s.abs(dy), s.abs(dz));
-        let (first, third) = (s.at_most(y, x) & s.at_most(z, x), s.less(y, z));
-        alike &= match self.z {
-            0 => first,
-            1 => !first & !third,
-            _ => !first & third,
-        };
-        let (range, underflow) = (s.splat(B::RANGE), s.splat(B::UNDERFLOW));
-        let from = s.sub(s.sub(t_min, s.mul(s.abs(t_min), range)), underflow);
-        let reach = s.smaller(t_max, most);
-        let limit = s.add(s.add(reach, s.mul(s.abs(reach), range)), underflow);
-        // Not so for a ray that goes on behind nothing: a NaN would hide where the others start.
-        alike &= s.at_most(s.abs(from), most);
-        self.from[row] = s.store(from);
-        self.limit[row] = s.store(limit);
-        alike & ALL
-    }
-
-    #[inline(always)]
+impl<B: BoxMargins> Bundle<B> {
     fn empty() -> Self {
+        let none = [0.0; RAYS];
         Self {
-            origin: [[[0.0; LANES]; 3]; ROWS],
-            dir: [[[0.0; LANES]; 3]; ROWS],
-            inverse: [[[0.0; LANES]; 3]; ROWS],
-            from: [[0.0; LANES]; ROWS],
-            limit: [[0.0; LANES]; ROWS],
+            origin: [none; 3],
+            dir: [none; 3],
+            inverse: [none; 3],
+            t_min: none,
+            from: none,
+            limit: none,
+            exclude: [NO_PRIM; RAYS],
             origins: [[0.0; 2]; 3],
             inverses: [[0.0; 2]; 3],
             first: [Pick::new(0); 3],
@@ -193,39 +177,118 @@ impl<B: BoxMargins> Packet<B> {
             z: 0,
             least_from: 0.0,
             reach: 0.0,
-            met: [NO_PRIM; RAYS],
-            met_at: [[0.0; LANES]; ROWS],
+            common: None,
+            bounds: RowBounds::NONE,
             margins: PhantomData,
         }
+    }
+
+    /// Finds reciprocals and ranges from directions, `t_min` and `t_max`, and whether the rays run alike: to the same
+    /// octant, no component zero, the same one the largest.
+    #[inline(always)]
+    fn prepare<S: Simd>(&mut self, s: S, t_max: &Numbers) -> bool {
+        let s = s.wide();
+        let (t_min, t_max) = (s.load(&self.t_min), s.load(t_max));
+        let o = [s.load(&self.origin[0]), s.load(&self.origin[1]), s.load(&self.origin[2])];
+        let d = [s.load(&self.dir[0]), s.load(&self.dir[1]), s.load(&self.dir[2])];
+        // Sums of sizes keep a NaN. Where they are small enough, so is each of them.
+        let size = s.add(s.add(s.abs(o[0]), s.abs(o[1])), s.abs(o[2]));
+        let mut alike = s.at_most(t_min, t_max) & s.at_most(size, s.splat(B::COORDINATES));
+        let zero = s.splat(0.0);
+        let mut inverses = zero;
+        for (k, &along) in d.iter().enumerate() {
+            // Neither holds for a zero or a NaN.
+            alike &= if self.octant >> k & 1 == 1 { s.less(along, zero) } else { s.less(zero, along) };
+            let inverse = s.div(s.splat(1.0), along);
+            inverses = s.add(inverses, s.abs(inverse));
+            self.inverse[k] = s.store(inverse);
+        }
+        let [x, y, z] = [s.abs(d[0]), s.abs(d[1]), s.abs(d[2])];
+        // Then no reciprocal is below the normal numbers.
+        let largest = s.splat(0.5 / f32::MIN_POSITIVE);
+        alike &= s.at_most(inverses, s.splat(f32::MAX)) & s.at_most(s.add(s.add(x, y), z), largest);
+        alike &= match self.z {
+            0 => s.at_most(y, x) & s.at_most(z, x),
+            1 => !(s.at_most(y, x) & s.at_most(z, x)) & s.at_most(z, y),
+            _ => !(s.at_most(y, x) & s.at_most(z, x)) & s.less(y, z),
+        };
+        let (range, underflow) = (s.splat(B::RANGE), s.splat(B::UNDERFLOW));
+        let from = s.sub(s.sub(t_min, s.mul(s.abs(t_min), range)), underflow);
+        // Not so for a ray that goes on behind nothing: a NaN would hide where the others start.
+        alike &= s.at_most(s.abs(from), s.splat(f32::MAX));
+        self.from = s.store(from);
+        alike & ALL == ALL
+    }
+
+    /// The distance up to which boxes must be entered for hits up to each of these.
+    #[inline(always)]
+    fn widened<S: Simd>(s: S, t: &Numbers) -> Numbers {
+        let s = s.wide();
+        let t = s.load(t);
+        s.store(s.add(s.add(t, s.mul(s.abs(t), s.splat(B::RANGE))), s.splat(B::UNDERFLOW)))
+    }
+
+    /// Which rays meet a box; by axis, its plane that comes first and the one that comes last.
+    #[inline(always)]
+    fn meet<S: Simd>(&self, s: S, first: [f32; 3], last: [f32; 3]) -> u32 {
+        let s = s.wide();
+        let (mut near, mut far) = (s.load(&self.from), s.load(&self.limit));
+        for k in 0..3 {
+            let (origin, inverse) = (s.load(&self.origin[k]), s.load(&self.inverse[k]));
+            near = s.greater(s.mul(s.sub(s.splat(first[k]), origin), inverse), near);
+            far = s.smaller(s.mul(s.sub(s.splat(last[k]), origin), inverse), far);
+        }
+        let slack = s.add(s.mul(s.abs(far), s.splat(B::SLAB)), s.splat(B::UNDERFLOW));
+        s.at_most(near, s.add(far, slack))
     }
 
     /// Finds what bounds all rays.
     #[inline(always)]
     fn bound<S: Simd>(&mut self, s: S, tree: &Tree) {
+        let s = s.wide();
         let back = |k: usize| self.octant >> k & 1;
         (self.first, self.last) = (
             [Pick::new(back(0)), Pick::new(2 + back(1)), Pick::new(4 + back(2))],
             [Pick::new(1 - back(0)), Pick::new(3 - back(1)), Pick::new(5 - back(2))],
         );
-        self.reach = 0.0;
-        self.met = [NO_PRIM; RAYS];
-        for k in 0..3 {
-            let (a, b) = (s.load(&self.origin[0][k]), s.load(&self.origin[1][k]));
-            let (lo, hi) = (least(&s.store(s.smaller(a, b))), greatest(&s.store(s.greater(a, b))));
-            self.origins[k] = if self.octant >> k & 1 == 1 { [lo, hi] } else { [hi, lo] };
-            let low = Vec3::from_array(std::array::from_fn(|i| if i == k { lo } else { tree.bounds.lo[i] }));
-            let high = Vec3::from_array(std::array::from_fn(|i| if i == k { hi } else { tree.bounds.hi[i] }));
-            self.reach = self.reach.max(reach(low, &tree.bounds)).max(reach(high, &tree.bounds));
-            let (a, b) = (s.load(&self.inverse[0][k]), s.load(&self.inverse[1][k]));
-            self.inverses[k] = [least(&s.store(s.smaller(a, b))), greatest(&s.store(s.greater(a, b)))];
+        let (o, first) =
+            ([0, 1, 2].map(|k| self.origin[k]), Vec3::new(self.origin[0][0], self.origin[1][0], self.origin[2][0]));
+        let is = |k: usize| s.at_most(s.load(&o[k]), s.splat(first[k])) & s.at_most(s.splat(first[k]), s.load(&o[k]));
+        self.common = (is(0) & is(1) & is(2) & ALL == ALL).then_some(first);
+        let (mut low, mut high) = (first, first);
+        if self.common.is_none() {
+            for k in 0..3 {
+                let origin = s.load(&self.origin[k]);
+                (low[k], high[k]) = (s.least(origin), s.greatest(origin));
+            }
         }
-        self.least_from = least(&s.store(s.smaller(s.load(&self.from[0]), s.load(&self.from[1]))));
+        self.reach = reach(low, &tree.bounds);
+        if self.common.is_none() {
+            // Each coordinate is farthest from one of both.
+            self.reach = self.reach.max(reach(high, &tree.bounds));
+        }
+        let mut steepest = DVec3::ZERO;
+        for k in 0..3 {
+            let inverse = s.load(&self.inverse[k]);
+            let (least, greatest) = (s.least(inverse), s.greatest(inverse));
+            self.inverses[k] = [least, greatest];
+            (self.origins[k], steepest[k]) = if back(k) == 1 {
+                ([low[k], high[k]], f64::from(-greatest))
+            } else {
+                ([high[k], low[k]], f64::from(least))
+            };
+        }
+        // A reciprocal is rounded once, and so is this.
+        let dir = DVec3::splat(1.0 + f64::from(f32::EPSILON)) / steepest;
+        self.bounds =
+            RowBounds { low: low.as_dvec3(), high: high.as_dvec3(), from: self.common.map(Vec3::as_dvec3), dir };
+        self.least_from = s.least(s.load(&self.from));
     }
 
     /// The distance beyond which no ray looks for hits.
     #[inline(always)]
     fn farthest<S: Simd>(&self, s: S) -> f32 {
-        greatest(&s.store(s.greater(s.load(&self.limit[0]), s.load(&self.limit[1]))))
+        s.wide().greatest(s.wide().load(&self.limit))
     }
 
     /// Which of eight boxes any ray may meet up to `limit`, and the least distances of that.
@@ -243,245 +306,322 @@ impl<B: BoxMargins> Packet<B> {
         (near, s.at_most(near, s.add(far, slack)))
     }
 
-    /// Which of these rays meet the box of a child.
+    /// Which rays meet the box of a child.
     #[inline(always)]
-    fn meets_each<S: Simd>(&self, s: S, node: &Node, slot: usize, of: u32) -> u32 {
+    fn meet_child<S: Simd>(&self, s: S, node: &Node, slot: usize) -> u32 {
         let back = |k: usize| self.octant >> k & 1;
         let plane = |k: usize, side: usize| node.planes[(2 * k + side) % 6][slot % LANES];
         let first = [plane(0, back(0)), plane(1, back(1)), plane(2, back(2))];
         let last = [plane(0, 1 - back(0)), plane(1, 1 - back(1)), plane(2, 1 - back(2))];
-        let mut rays = 0;
-        for row in 0..ROWS {
-            if of >> (LANES * row) & ALL == 0 {
-                continue;
-            }
-            let (mut near, mut far) = (s.load(&self.from[row]), s.load(&self.limit[row]));
-            for k in 0..3 {
-                let (origin, inverse) = (s.load(&self.origin[row][k]), s.load(&self.inverse[row][k]));
-                near = s.greater(s.mul(s.sub(s.splat(first[k]), origin), inverse), near);
-                far = s.smaller(s.mul(s.sub(s.splat(last[k]), origin), inverse), far);
-            }
-            let slack = s.add(s.mul(s.abs(far), s.splat(B::SLAB)), s.splat(B::UNDERFLOW));
-            rays |= s.at_most(near, s.add(far, slack)) << (LANES * row);
+        self.meet(s, first, last)
+    }
+}
+
+impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
+    /// The next sixteen rays, if there are as many and they run alike.
+    #[inline(always)]
+    fn gather<S: Simd>(&mut self, s: S) -> bool {
+        let (tree, start) = (self.tree, self.start);
+        let Some(rays) = self.wave.rays()[start..].first_chunk::<RAYS>() else { return false };
+        if tree.extent > B::COORDINATES {
+            return false;
         }
-        rays & of
+        let bundle = &mut self.rays;
+        (bundle.z, bundle.octant) = (main_axis(rays[0].dir), octant_of(rays[0].dir));
+        let mut t_max = [0.0; RAYS];
+        for half in 0..2 {
+            let (mut from, mut to) = ([[0.0; 4]; LANES], [[0.0; 4]; LANES]);
+            for lane in 0..LANES {
+                let ray = &rays[LANES * half + lane];
+                let (o, d) = (ray.origin, ray.dir);
+                from[lane] = [o.x, o.y, o.z, ray.t_min];
+                to[lane] = [d.x, d.y, d.z, ray.t_max];
+                bundle.exclude[LANES * half + lane] = ray.exclude;
+            }
+            let ([ox, oy, oz, least], [dx, dy, dz, most]) = (s.columns(&from), s.columns(&to));
+            put_half(&mut bundle.origin[0], half, s.store(ox));
+            put_half(&mut bundle.origin[1], half, s.store(oy));
+            put_half(&mut bundle.origin[2], half, s.store(oz));
+            put_half(&mut bundle.dir[0], half, s.store(dx));
+            put_half(&mut bundle.dir[1], half, s.store(dy));
+            put_half(&mut bundle.dir[2], half, s.store(dz));
+            put_half(&mut bundle.t_min, half, s.store(least));
+            // A distance that overflows is no hit.
+            put_half(&mut t_max, half, s.store(s.smaller(most, s.splat(f32::MAX))));
+        }
+        self.wave.adapt_t_min(start, &mut bundle.t_min);
+        if !bundle.prepare(s, &t_max) {
+            return false;
+        }
+        bundle.limit = Bundle::<B>::widened(s, &t_max);
+        self.found.t = t_max;
+        true
     }
 
     /// From the root to every leaf that any ray may hit.
     #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "what a wave brings with it")]
-    fn trace<'a, S: Simd, W: Wave, P: Probe>(
-        &mut self,
-        s: S,
-        tree: &Tree,
-        shapes: &'a Shapes,
-        wave: &mut W,
-        start: usize,
-        stack: &mut [Branch],
-        queries: &mut Vec<Query<'a, W::Goal>>,
-        probe: &mut P,
-    ) {
-        let mut limit = self.farthest(s);
-        let mut top = 0;
-        let mut active = u32::from(u16::MAX);
-        self.push(s, &tree.nodes[0], active, limit, stack, &mut top);
-        if top == 0 {
-            (start..start + RAYS).for_each(|i| wave.take(i, Hit::MISS));
-            return;
+    fn trace<S: Simd>(&mut self, s: S, stack: &mut [Branch]) {
+        let tree = self.tree;
+        let side = |k: usize, last: bool| {
+            if (self.rays.octant >> k & 1 == 1) == last { tree.bounds.lo[k] } else { tree.bounds.hi[k] }
+        };
+        let (first, last) =
+            ([side(0, false), side(1, false), side(2, false)], [side(0, true), side(1, true), side(2, true)]);
+        self.active = self.rays.meet(s, first, last);
+        if self.active == 0 {
+            return self.wave.take_all(self.start, &[Hit::MISS; RAYS]);
         }
-        queries.clear();
-        queries.extend((start..start + RAYS).map(|i| begin(shapes, wave, i, probe).0));
-        let rows = [
-            RayRow::new(s, &self.origin[0], &self.dir[0], self.z, self.reach),
-            RayRow::new(s, &self.origin[1], &self.dir[1], self.z, self.reach),
-        ];
+        self.found.prim = [NO_PRIM; RAYS];
+        self.found.exact = 0;
+        self.rays.bound(s, tree);
+        let row =
+            RayRow::new(s.wide(), &self.rays.origin, self.rays.common, &self.rays.dir, self.rays.z, self.rays.reach);
+        let mut limit = self.rays.farthest(s);
+        let mut top = 0;
+        self.push(s, &tree.nodes[0], self.active, limit, stack, &mut top);
         while top > 0 {
             top -= 1;
             let branch = stack[top];
-            let rays = branch.rays & active;
+            let rays = branch.rays & self.active;
             if branch.near > limit || rays == 0 {
                 continue;
             }
-            match Child::unpack(branch.child) {
-                Child::Node(node) => self.push(s, &tree.nodes[node as usize], rays, limit, stack, &mut top),
-                Child::Block(block, count) => {
-                    let block = &tree.blocks[block as usize];
-                    let changed = self.test(s, block, count, rays, limit, &rows, queries, probe, &mut active);
-                    if changed {
-                        limit = self.farthest(s);
-                    }
-                }
-                Child::Run(run) => {
-                    for &prim in tree.run(run) {
-                        let mut left = rays & active;
-                        while left != 0 {
-                            let ray = left.trailing_zeros() as usize % RAYS;
-                            left &= left - 1;
-                            let answered = queries[ray].test(prim, probe);
-                            self.narrow(ray, &queries[ray], answered, &mut active);
-                        }
-                    }
-                    limit = self.farthest(s);
-                }
-            }
-            if active == 0 {
-                break;
-            }
-        }
-        self.answer(s, shapes, wave, start, queries, probe);
-    }
-
-    /// Gives the answers; weights of hits with the same triangle are found together.
-    #[inline(always)]
-    fn answer<S: Simd, W: Wave, P: Probe>(
-        &self,
-        s: S,
-        shapes: &Shapes,
-        wave: &mut W,
-        start: usize,
-        queries: &[Query<W::Goal>],
-        probe: &mut P,
-    ) {
-        let mut left = 0;
-        for (ray, query) in queries.iter().enumerate() {
-            match query.best() {
-                Some((_, prim)) if prim == self.met[ray] => left |= 1 << ray,
-                _ => end(wave, start + ray, query, probe),
-            }
-        }
-        while left != 0u32 {
-            let prim = self.met[left.trailing_zeros() as usize % RAYS];
-            let plane = Plane::of(&shapes.triangle(prim));
-            for row in 0..ROWS {
-                let mut mine = left >> (LANES * row) & ALL;
-                if mine == 0 {
+            let changed = match Child::unpack(branch.child) {
+                Child::Node(node) => {
+                    self.push(s, &tree.nodes[node as usize], rays, limit, stack, &mut top);
                     continue;
                 }
-                let [u, v] = plane.barycentrics(s, &self.origin[row], &self.dir[row], &self.met_at[row]);
-                while mine != 0 {
-                    let lane = mine.trailing_zeros() as usize % LANES;
-                    mine &= mine - 1;
-                    let ray = LANES * row + lane;
-                    if let Some((t, best)) = queries[ray].best().filter(|b| b.1 == prim) {
-                        wave.take(start + ray, Hit { t, u: u[lane], v: v[lane], prim: best });
-                        probe.found();
-                        left &= !(1 << ray);
-                    }
+                Child::Block(block, count) => self.test(s, block, count, rays, limit, &row),
+                Child::Run(run) => self.test_run(run, rays),
+            };
+            if changed != 0 {
+                self.narrow(s, changed);
+                if self.active == 0 {
+                    break;
                 }
+                limit = self.rays.farthest(s);
             }
         }
+        self.answer(s);
     }
 
     /// Puts the children that some ray meets on the stack, the nearest last.
     #[inline(always)]
     fn push<S: Simd>(&self, s: S, node: &Node, rays: u32, limit: f32, stack: &mut [Branch], top: &mut usize) {
-        let first = [
-            s.pick(&node.planes, self.first[0]),
-            s.pick(&node.planes, self.first[1]),
-            s.pick(&node.planes, self.first[2]),
-        ];
-        let last = [
-            s.pick(&node.planes, self.last[0]),
-            s.pick(&node.planes, self.last[1]),
-            s.pick(&node.planes, self.last[2]),
-        ];
-        let (near, met) = self.meets_any(s, first, last, limit);
+        let bundle = &self.rays;
+        let pick = |p: Pick| s.pick(&node.planes, p);
+        let first = [pick(bundle.first[0]), pick(bundle.first[1]), pick(bundle.first[2])];
+        let last = [pick(bundle.last[0]), pick(bundle.last[1]), pick(bundle.last[2])];
+        let (near, met) = bundle.meets_any(s, first, last, limit);
         if met == 0 {
             return;
         }
         let near = s.store(near);
-        let mut order = FARTHEST_FIRST[self.octant % LANES][met as usize % 256];
+        let mut order = FARTHEST_FIRST[bundle.octant % LANES][met as usize % 256];
         for _ in 0..met.count_ones() {
             let slot = (order & 7) as usize;
             order >>= 8;
-            let rays = self.meets_each(s, node, slot, rays);
+            let rays = bundle.meet_child(s, node, slot) & rays;
+            stack[*top] = Branch { near: near[slot], child: node.children[slot], rays };
+            *top += usize::from(rays != 0);
             if rays != 0 {
-                stack[*top] = Branch { near: near[slot], child: node.children[slot], rays };
-                *top += 1;
+                self.tree.prefetch(s, node.children[slot]);
             }
         }
     }
 
-    /// Notes how far a ray still looks after a test.
+    /// After hits of these rays: how far they still look, if they do.
     #[inline(always)]
-    fn narrow<G: Goal>(&mut self, ray: usize, query: &Query<G>, answered: bool, active: &mut u32) {
-        let limit = &mut self.limit[ray / LANES][ray % LANES];
-        if answered {
-            *active &= !(1 << ray);
-            *limit = f32::NEG_INFINITY;
+    fn narrow<S: Simd>(&mut self, s: S, rays: u32) {
+        let wide = s.wide();
+        if W::Goal::ANY {
+            self.active &= !rays;
+            wide.put(rays, wide.splat(f32::NEG_INFINITY), &mut self.rays.limit);
         } else {
-            *limit = B::widened(query.reach());
+            let limit = Bundle::<B>::widened(s, &self.found.t);
+            wide.put(rays, wide.load(&limit), &mut self.rays.limit);
         }
     }
 
-    /// Tests the triangles of a block, and tells whether anything was hit.
+    /// Tests the triangles of a block, and tells which rays have new hits.
     #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "what a wave brings with it")]
-    fn test<S: Simd, G: Goal, P: Probe>(
+    fn test<S: Simd>(
         &mut self,
         s: S,
-        block: &Block,
+        index: u32,
         count: u32,
-        rays: u32,
+        mut rays: u32,
         limit: f32,
-        rows: &[RayRow<S>; ROWS],
-        queries: &mut [Query<G>],
-        probe: &mut P,
-        active: &mut u32,
-    ) -> bool {
+        row: &RayRow<S::Wide, RAYS>,
+    ) -> u32 {
+        let tree = self.tree;
+        let block = &tree.blocks[index as usize];
         let [a, b, c] = &block.corners;
         let zero = s.splat(0.0);
         let (mut first, mut last) = ([zero; 3], [zero; 3]);
         for k in 0..3 {
             let (a, b, c) = (s.load(&a[k]), s.load(&b[k]), s.load(&c[k]));
             let (low, high) = (s.smaller(a, s.smaller(b, c)), s.greater(a, s.greater(b, c)));
-            (first[k], last[k]) = if self.octant >> k & 1 == 1 { (high, low) } else { (low, high) };
+            (first[k], last[k]) = if self.rays.octant >> k & 1 == 1 { (high, low) } else { (low, high) };
         }
-        let (_, met) = self.meets_any(s, first, last, limit);
+        let (_, met) = self.rays.meets_any(s, first, last, limit);
         let mut lanes = met & ((1 << count) - 1);
-        let mut changed = false;
+        let mut changed = 0;
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize % LANES;
             lanes &= lanes - 1;
             let corners = corners_of(&block.corners, lane);
-            let (mut certain, mut unsure) = (0, 0);
-            for (row, tested) in rows.iter().enumerate() {
-                if rays >> (LANES * row) & ALL != 0 {
-                    let verdicts = tested.verdicts(s, &corners);
-                    certain |= verdicts.hit << (LANES * row);
-                    unsure |= verdicts.unsure << (LANES * row);
-                }
+            let mut verdicts = row.verdicts(s.wide(), &corners);
+            if verdicts.unsure & rays != 0 {
+                verdicts = row.closer_verdicts(s.wide(), &corners);
             }
-            let open = (certain | unsure) & rays & *active;
-            if open == 0 {
-                continue;
-            }
-            let (prim, plane) = (block.prims[lane], Plane::of(&corners));
-            for row in 0..ROWS {
-                let mut mine = open >> (LANES * row) & ALL;
-                if mine == 0 {
-                    continue;
-                }
-                let met = plane.meet(s, &self.origin[row], &self.dir[row]);
-                let sure = met.sure & certain >> (LANES * row);
-                changed = true;
-                while mine != 0 {
-                    let place = mine.trailing_zeros() as usize % LANES;
-                    mine &= mine - 1;
-                    let ray = LANES * row + place;
-                    let query = &mut queries[ray];
-                    if sure >> place & 1 == 0 {
-                        query.take(prim, &corners, certain >> ray & 1 == 1, probe);
-                    } else if query.offer_met(prim, met.t[place]) == Outcome::Hit {
-                        self.met[ray] = prim;
-                        self.met_at[row][place] = met.t_f64[place];
-                    }
-                    let answered = query.is_answered();
-                    self.narrow(ray, &queries[ray], answered, active);
+            if (verdicts.hit | verdicts.unsure) & rays != 0 {
+                let place = Place { index, lane, prim: block.prims[lane] };
+                let hit = self.meet(s, place, &corners, verdicts.hit & rays, verdicts.unsure & rays);
+                changed |= hit;
+                if W::Goal::ANY {
+                    rays &= !hit;
                 }
             }
         }
         changed
+    }
+
+    /// Offers the hits of rays that meet a triangle for certain, and of those that may; which of them are the best now.
+    #[inline(always)]
+    fn meet<S: Simd>(&mut self, s: S, place: Place, corners: &Triangle, certain: u32, unsure: u32) -> u32 {
+        let (s, prim) = (s.wide(), place.prim);
+        let left_out = s.find_word(prim, &self.rays.exclude);
+        if !self.wave.goal(self.start).wants(self.shapes, prim) {
+            return 0;
+        }
+        let met = Plane::of(corners).meet(s, &self.rays.origin, &self.rays.dir, &self.rays.bounds);
+        let known = certain & met.sure & !left_out;
+        let (t_min, best) = (s.load(&self.rays.t_min), s.load(&self.found.t));
+        let better = s.less(t_min, met.t) & s.less(met.t, best) & known;
+        s.put(better, met.t, &mut self.found.t);
+        s.put_f64(better, met.t_f64, &mut self.found.t_f64);
+        s.put_word(better, prim, &mut self.found.prim);
+        s.put_word(better, place.packed(), &mut self.found.place);
+        self.found.exact |= better;
+        // The scalar form decides about equal distances, and about what lanes cannot.
+        let equal = s.at_most(t_min, met.t) & s.at_most(met.t, best) & known & !better;
+        let mut open = equal | (certain & !met.sure | unsure) & !left_out;
+        let mut changed = better;
+        while open != 0 {
+            let ray = open.trailing_zeros() as usize % RAYS;
+            open &= open - 1;
+            changed |= self.meet_exactly(ray, place, corners, certain >> ray & 1 == 1);
+        }
+        changed
+    }
+
+    /// Offers the hit of one ray by the scalar form.
+    #[cold]
+    #[inline(never)]
+    fn meet_exactly(&mut self, ray: usize, place: Place, corners: &Triangle, certain: bool) -> u32 {
+        let space = self.space(ray);
+        if !certain && !triangle::is_hit(&space, corners) {
+            return 0;
+        }
+        let meeting = triangle::meet(&space, corners);
+        let taken = self.offer(ray, place.prim, meeting.t, meeting.t_f64);
+        if taken != 0 {
+            self.found.place[ray] = place.packed();
+        }
+        taken
+    }
+
+    /// Offers a hit in the order of all hits: by distance and prim, behind the one after which the search goes on.
+    fn offer(&mut self, ray: usize, prim: u32, t: f32, t_f64: f64) -> u32 {
+        let behind = |goal: &mut W::Goal| goal.offer(t, prim) == Outcome::Hit;
+        let inside = self.rays.t_min[ray] <= t && (t, prim) < (self.found.t[ray], self.found.prim[ray]);
+        if !inside || !behind(&mut self.wave.goal(self.start + ray)) {
+            return 0;
+        }
+        (self.found.t[ray], self.found.t_f64[ray], self.found.prim[ray]) = (t, t_f64, prim);
+        let bit = 1 << ray;
+        self.found.exact = self.found.exact & !bit | u32::from(!t_f64.is_nan()) << ray;
+        bit
+    }
+
+    /// Tests the prims of a run, one ray after another.
+    #[cold]
+    #[inline(never)]
+    fn test_run(&mut self, run: u32, rays: u32) -> u32 {
+        let mut changed = 0;
+        for &prim in self.tree.run(run) {
+            if !self.wave.goal(self.start).wants(self.shapes, prim) {
+                continue;
+            }
+            let mut open = rays;
+            while open != 0 {
+                let ray = open.trailing_zeros() as usize % RAYS;
+                open &= open - 1;
+                if self.rays.exclude[ray] != prim {
+                    let space = self.space(ray);
+                    let distances = match self.shapes.triangles.get(prim as usize) {
+                        Some(&corners) => {
+                            [triangle::intersect(&space, &self.shapes.corners(corners)).unwrap_or(f32::NAN), f32::NAN]
+                        }
+                        None => self.shapes.other_distances(prim, &space, self.rays.t_min[ray] >= 0.0),
+                    };
+                    changed |= distances.into_iter().fold(0, |c, t| c | self.offer(ray, prim, t, f64::NAN));
+                }
+            }
+        }
+        changed
+    }
+
+    /// A ray in sheared space.
+    fn space(&self, ray: usize) -> RaySpace {
+        let Ray { origin, dir, .. } = self.wave.rays()[self.start + ray];
+        RaySpace::checked(origin, dir).0
+    }
+
+    /// Gives the answers; weights of hits with the same triangle are found together.
+    #[inline(always)]
+    fn answer<S: Simd>(&mut self, s: S) {
+        let (start, found) = (self.start, &self.found);
+        if W::Goal::ANY {
+            for (ray, &prim) in found.prim.iter().enumerate() {
+                self.wave.take(start + ray, Hit { prim, ..Hit::MISS });
+            }
+            return;
+        }
+        let wide = s.wide();
+        let missed = wide.find_word(NO_PRIM, &found.prim);
+        let mut t = found.t;
+        wide.put(missed, wide.splat(f32::INFINITY), &mut t);
+        let (mut u, mut v) = ([0.0; RAYS], [0.0; RAYS]);
+        let mut left = !missed & ALL;
+        while left != 0 {
+            let ray = left.trailing_zeros() as usize % RAYS;
+            if found.exact >> ray & 1 == 0 {
+                (u[ray], v[ray]) = self.shapes.barycentrics(found.prim[ray], &self.space(ray));
+                left &= left - 1;
+                continue;
+            }
+            let place = found.place[ray];
+            let mine = wide.find_word(place, &found.place) & found.exact & !missed;
+            left &= !mine;
+            let block = &self.tree.blocks[place as usize / LANES];
+            let plane = Plane::of(&corners_of(&block.corners, place as usize % LANES));
+            let weights = plane.barycentrics(wide, &self.rays.origin, &self.rays.dir, &found.t_f64);
+            wide.put(mine, wide.load(&weights[0]), &mut u);
+            wide.put(mine, wide.load(&weights[1]), &mut v);
+        }
+        let mut hits = [Hit::MISS; RAYS];
+        for half in 0..2 {
+            let eight = |row: &Numbers| s.load(&row.as_chunks().0[half]);
+            let prim = s.load(&found.prim.as_chunks::<LANES>().0[half].map(f32::from_bits));
+            let rows = s.rows([eight(&t), eight(&u), eight(&v), prim]);
+            for lane in 0..LANES {
+                let [t, u, v, prim] = rows[lane];
+                hits[LANES * half + lane] = Hit { t, u, v, prim: prim.to_bits() };
+            }
+        }
+        self.wave.take_all(start, &hits);
     }
 }
 

@@ -7,7 +7,8 @@
 
 use std::arch::x86_64::*;
 
-use super::{Kernel, LANES, Order, Pick, Row, Simd};
+use super::pair::Pair;
+use super::{Kernel, LANES, Lanewise, Order, Pick, Row, Simd};
 
 /// Proof that the processor has AVX2 and the bit instructions that came with it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,236 +36,340 @@ impl Avx2 {
     }
 }
 
-impl Simd for Avx2 {
-    type Lanes = __m256;
-    type Doubles = [__m256d; 2];
+/// Eight lanes for a token that proves AVX2.
+macro_rules! eight_lanes {
+    ($token:ty, $wide:ty, $widened:expr) => {
+        impl Lanewise<LANES> for $token {
+            type Lanes = __m256;
+            type Doubles = [__m256d; 2];
 
-    #[inline(always)]
-    fn splat(self, x: f32) -> __m256 {
-        // SAFETY: the token proves the features; so below.
-        unsafe { _mm256_set1_ps(x) }
-    }
+            #[inline(always)]
+            fn splat(self, x: f32) -> __m256 {
+                // SAFETY: the token proves the features; so below.
+                unsafe { _mm256_set1_ps(x) }
+            }
 
-    #[inline(always)]
-    fn load(self, row: &Row) -> __m256 {
-        // SAFETY: as above; reads the eight numbers of the row, with no demand on alignment.
-        unsafe { _mm256_loadu_ps(row.as_ptr()) }
-    }
+            #[inline(always)]
+            fn load(self, row: &Row) -> __m256 {
+                // SAFETY: as above; reads the eight numbers of the row, with no demand on alignment.
+                unsafe { _mm256_loadu_ps(row.as_ptr()) }
+            }
 
-    #[inline(always)]
-    fn pick(self, rows: &[Row; 6], Pick(i): Pick) -> __m256 {
-        // SAFETY: as above; a pick is less than 6 by how it is made, so the row is one of these.
-        unsafe { _mm256_loadu_ps(rows.as_ptr().add(i).cast()) }
-    }
+            #[inline(always)]
+            fn store(self, a: __m256) -> Row {
+                let mut row = [0.0; LANES];
+                // SAFETY: as above; writes the eight numbers of the row, with no demand on alignment.
+                unsafe { _mm256_storeu_ps(row.as_mut_ptr(), a) };
+                row
+            }
 
-    #[inline(always)]
-    fn store(self, a: __m256) -> Row {
-        let mut row = [0.0; LANES];
-        // SAFETY: as above; writes the eight numbers of the row, with no demand on alignment.
-        unsafe { _mm256_storeu_ps(row.as_mut_ptr(), a) };
-        row
-    }
+            #[inline(always)]
+            fn add(self, a: __m256, b: __m256) -> __m256 {
+                // SAFETY: the token proves the features; so below.
+                unsafe { _mm256_add_ps(a, b) }
+            }
 
-    #[inline(always)]
-    fn add(self, a: __m256, b: __m256) -> __m256 {
-        // SAFETY: the token proves the features; so below.
-        unsafe { _mm256_add_ps(a, b) }
-    }
+            #[inline(always)]
+            fn sub(self, a: __m256, b: __m256) -> __m256 {
+                // SAFETY: as above.
+                unsafe { _mm256_sub_ps(a, b) }
+            }
 
-    #[inline(always)]
-    fn sub(self, a: __m256, b: __m256) -> __m256 {
-        // SAFETY: as above.
-        unsafe { _mm256_sub_ps(a, b) }
-    }
+            #[inline(always)]
+            fn mul(self, a: __m256, b: __m256) -> __m256 {
+                // SAFETY: as above.
+                unsafe { _mm256_mul_ps(a, b) }
+            }
 
-    #[inline(always)]
-    fn mul(self, a: __m256, b: __m256) -> __m256 {
-        // SAFETY: as above.
-        unsafe { _mm256_mul_ps(a, b) }
-    }
+            #[inline(always)]
+            fn div(self, a: __m256, b: __m256) -> __m256 {
+                // SAFETY: as above.
+                unsafe { _mm256_div_ps(a, b) }
+            }
 
-    #[inline(always)]
-    fn div(self, a: __m256, b: __m256) -> __m256 {
-        // SAFETY: as above.
-        unsafe { _mm256_div_ps(a, b) }
-    }
+            #[inline(always)]
+            fn abs(self, a: __m256) -> __m256 {
+                // SAFETY: as above.
+                unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), a) }
+            }
 
-    #[inline(always)]
-    fn abs(self, a: __m256) -> __m256 {
-        // SAFETY: as above.
-        unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), a) }
-    }
+            #[inline(always)]
+            fn greater(self, a: __m256, b: __m256) -> __m256 {
+                // SAFETY: as above. The instruction gives b where one is NaN, and for two zeros.
+                unsafe { _mm256_max_ps(a, b) }
+            }
 
-    #[inline(always)]
-    fn greater(self, a: __m256, b: __m256) -> __m256 {
-        // SAFETY: as above. The instruction gives b where one is NaN, and for two zeros.
-        unsafe { _mm256_max_ps(a, b) }
-    }
+            #[inline(always)]
+            fn smaller(self, a: __m256, b: __m256) -> __m256 {
+                // SAFETY: as above.
+                unsafe { _mm256_min_ps(a, b) }
+            }
 
-    #[inline(always)]
-    fn smaller(self, a: __m256, b: __m256) -> __m256 {
-        // SAFETY: as above.
-        unsafe { _mm256_min_ps(a, b) }
-    }
+            #[inline(always)]
+            fn less(self, a: __m256, b: __m256) -> u32 {
+                // SAFETY: as above.
+                unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(a, b)).cast_unsigned() }
+            }
 
-    #[inline(always)]
-    fn less(self, a: __m256, b: __m256) -> u32 {
-        // SAFETY: as above.
-        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(a, b)).cast_unsigned() }
-    }
+            #[inline(always)]
+            fn at_most(self, a: __m256, b: __m256) -> u32 {
+                // SAFETY: as above.
+                unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)).cast_unsigned() }
+            }
 
-    #[inline(always)]
-    fn at_most(self, a: __m256, b: __m256) -> u32 {
-        // SAFETY: as above.
-        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)).cast_unsigned() }
-    }
+            #[inline(always)]
+            fn least(self, a: __m256) -> f32 {
+                // SAFETY: as above.
+                unsafe {
+                    let a = _mm_min_ps(_mm256_castps256_ps128(a), _mm256_extractf128_ps::<1>(a));
+                    let a = _mm_min_ps(a, _mm_movehl_ps(a, a));
+                    _mm_cvtss_f32(_mm_min_ss(a, _mm_movehdup_ps(a)))
+                }
+            }
 
-    #[inline(always)]
-    fn transpose(self, rows: &[Row; LANES]) -> [__m256; LANES] {
-        let row = |i: usize| self.load(&rows[i]);
-        let (r0, r1, r2, r3) = (row(0), row(1), row(2), row(3));
-        let (r4, r5, r6, r7) = (row(4), row(5), row(6), row(7));
-        // SAFETY: as above.
-        unsafe {
-            // Pairs of two rows, then of four, then both halves.
-            let (a0, a1) = (_mm256_unpacklo_ps(r0, r1), _mm256_unpackhi_ps(r0, r1));
-            let (a2, a3) = (_mm256_unpacklo_ps(r2, r3), _mm256_unpackhi_ps(r2, r3));
-            let (a4, a5) = (_mm256_unpacklo_ps(r4, r5), _mm256_unpackhi_ps(r4, r5));
-            let (a6, a7) = (_mm256_unpacklo_ps(r6, r7), _mm256_unpackhi_ps(r6, r7));
-            let (b0, b1) = (_mm256_shuffle_ps::<0x44>(a0, a2), _mm256_shuffle_ps::<0xee>(a0, a2));
-            let (b2, b3) = (_mm256_shuffle_ps::<0x44>(a1, a3), _mm256_shuffle_ps::<0xee>(a1, a3));
-            let (b4, b5) = (_mm256_shuffle_ps::<0x44>(a4, a6), _mm256_shuffle_ps::<0xee>(a4, a6));
-            let (b6, b7) = (_mm256_shuffle_ps::<0x44>(a5, a7), _mm256_shuffle_ps::<0xee>(a5, a7));
-            [
-                _mm256_permute2f128_ps::<0x20>(b0, b4),
-                _mm256_permute2f128_ps::<0x20>(b1, b5),
-                _mm256_permute2f128_ps::<0x20>(b2, b6),
-                _mm256_permute2f128_ps::<0x20>(b3, b7),
-                _mm256_permute2f128_ps::<0x31>(b0, b4),
-                _mm256_permute2f128_ps::<0x31>(b1, b5),
-                _mm256_permute2f128_ps::<0x31>(b2, b6),
-                _mm256_permute2f128_ps::<0x31>(b3, b7),
-            ]
+            #[inline(always)]
+            fn greatest(self, a: __m256) -> f32 {
+                // SAFETY: as above.
+                unsafe {
+                    let a = _mm_max_ps(_mm256_castps256_ps128(a), _mm256_extractf128_ps::<1>(a));
+                    let a = _mm_max_ps(a, _mm_movehl_ps(a, a));
+                    _mm_cvtss_f32(_mm_max_ss(a, _mm_movehdup_ps(a)))
+                }
+            }
+
+            #[inline(always)]
+            fn put(self, mask: u32, a: __m256, to: &mut Row) {
+                // SAFETY: as above; reads and writes the eight numbers of the row, with no demand on alignment.
+                unsafe {
+                    let mixed = _mm256_blendv_ps(_mm256_loadu_ps(to.as_ptr()), a, _mm256_castsi256_ps(lanes_in(mask)));
+                    _mm256_storeu_ps(to.as_mut_ptr(), mixed);
+                }
+            }
+
+            #[inline(always)]
+            fn put_word(self, mask: u32, word: u32, to: &mut [u32; LANES]) {
+                // SAFETY: as above; reads and writes eight words, with no demand on alignment.
+                unsafe {
+                    let old = _mm256_loadu_si256(to.as_ptr().cast());
+                    let mixed = _mm256_blendv_epi8(old, _mm256_set1_epi32(word.cast_signed()), lanes_in(mask));
+                    _mm256_storeu_si256(to.as_mut_ptr().cast(), mixed);
+                }
+            }
+
+            #[inline(always)]
+            fn find_word(self, word: u32, among: &[u32; LANES]) -> u32 {
+                // SAFETY: as above; reads eight words, with no demand on alignment.
+                unsafe {
+                    let among = _mm256_loadu_si256(among.as_ptr().cast());
+                    let same = _mm256_cmpeq_epi32(among, _mm256_set1_epi32(word.cast_signed()));
+                    _mm256_movemask_ps(_mm256_castsi256_ps(same)).cast_unsigned()
+                }
+            }
+
+            #[inline(always)]
+            fn splat_f64(self, x: f64) -> [__m256d; 2] {
+                // SAFETY: as above.
+                unsafe { [_mm256_set1_pd(x); 2] }
+            }
+
+            #[inline(always)]
+            fn widen(self, a: __m256) -> [__m256d; 2] {
+                // SAFETY: as above.
+                unsafe { [_mm256_cvtps_pd(_mm256_castps256_ps128(a)), _mm256_cvtps_pd(_mm256_extractf128_ps::<1>(a))] }
+            }
+
+            #[inline(always)]
+            fn narrow(self, a: [__m256d; 2]) -> __m256 {
+                // SAFETY: as above.
+                unsafe { _mm256_set_m128(_mm256_cvtpd_ps(a[1]), _mm256_cvtpd_ps(a[0])) }
+            }
+
+            #[inline(always)]
+            fn load_f64(self, row: &[f64; LANES]) -> [__m256d; 2] {
+                // SAFETY: as above; reads the eight numbers of the row, with no demand on alignment.
+                unsafe { [_mm256_loadu_pd(row.as_ptr()), _mm256_loadu_pd(row.as_ptr().add(4))] }
+            }
+
+            #[inline(always)]
+            fn store_f64(self, a: [__m256d; 2]) -> [f64; LANES] {
+                let mut row = [0.0; LANES];
+                // SAFETY: as above; writes the eight numbers of the row, with no demand on alignment.
+                unsafe {
+                    _mm256_storeu_pd(row.as_mut_ptr(), a[0]);
+                    _mm256_storeu_pd(row.as_mut_ptr().add(4), a[1]);
+                }
+                row
+            }
+
+            #[inline(always)]
+            fn add_f64(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
+                // SAFETY: as above.
+                unsafe { [_mm256_add_pd(a[0], b[0]), _mm256_add_pd(a[1], b[1])] }
+            }
+
+            #[inline(always)]
+            fn sub_f64(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
+                // SAFETY: as above.
+                unsafe { [_mm256_sub_pd(a[0], b[0]), _mm256_sub_pd(a[1], b[1])] }
+            }
+
+            #[inline(always)]
+            fn mul_f64(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
+                // SAFETY: as above.
+                unsafe { [_mm256_mul_pd(a[0], b[0]), _mm256_mul_pd(a[1], b[1])] }
+            }
+
+            #[inline(always)]
+            fn div_f64(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
+                // SAFETY: as above.
+                unsafe { [_mm256_div_pd(a[0], b[0]), _mm256_div_pd(a[1], b[1])] }
+            }
+
+            #[inline(always)]
+            fn greater_f64(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
+                // SAFETY: as above.
+                unsafe { [_mm256_max_pd(a[0], b[0]), _mm256_max_pd(a[1], b[1])] }
+            }
+
+            #[inline(always)]
+            fn smaller_f64(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
+                // SAFETY: as above.
+                unsafe { [_mm256_min_pd(a[0], b[0]), _mm256_min_pd(a[1], b[1])] }
+            }
+
+            #[inline(always)]
+            fn abs_f64(self, a: [__m256d; 2]) -> [__m256d; 2] {
+                // SAFETY: as above.
+                unsafe { [_mm256_andnot_pd(_mm256_set1_pd(-0.0), a[0]), _mm256_andnot_pd(_mm256_set1_pd(-0.0), a[1])] }
+            }
+
+            #[inline(always)]
+            fn less_f64(self, a: [__m256d; 2], b: [__m256d; 2]) -> u32 {
+                // SAFETY: as above.
+                let (low, high) = unsafe {
+                    (
+                        _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(a[0], b[0])),
+                        _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(a[1], b[1])),
+                    )
+                };
+                (low | high << 4).cast_unsigned()
+            }
+
+            #[inline(always)]
+            fn put_f64(self, mask: u32, a: [__m256d; 2], to: &mut [f64; LANES]) {
+                // SAFETY: as above; reads and writes the eight numbers of the row, with no demand on alignment.
+                unsafe {
+                    let lanes = lanes_in(mask);
+                    let low = _mm256_castsi256_pd(_mm256_cvtepi32_epi64(_mm256_castsi256_si128(lanes)));
+                    let high = _mm256_castsi256_pd(_mm256_cvtepi32_epi64(_mm256_extracti128_si256::<1>(lanes)));
+                    let at = to.as_mut_ptr();
+                    _mm256_storeu_pd(at, _mm256_blendv_pd(_mm256_loadu_pd(at), a[0], low));
+                    _mm256_storeu_pd(at.add(4), _mm256_blendv_pd(_mm256_loadu_pd(at.add(4)), a[1], high));
+                }
+            }
         }
-    }
 
-    #[inline(always)]
-    fn splat_f64(self, x: f64) -> [__m256d; 2] {
-        // SAFETY: as above.
-        unsafe { [_mm256_set1_pd(x); 2] }
-    }
+        impl Simd for $token {
+            type Wide = $wide;
 
-    #[inline(always)]
-    fn widen(self, a: __m256) -> [__m256d; 2] {
-        // SAFETY: as above.
-        unsafe { [_mm256_cvtps_pd(_mm256_castps256_ps128(a)), _mm256_cvtps_pd(_mm256_extractf128_ps::<1>(a))] }
-    }
+            #[inline(always)]
+            fn wide(self) -> $wide {
+                $widened(self)
+            }
 
-    #[inline(always)]
-    fn narrow(self, a: [__m256d; 2]) -> __m256 {
-        // SAFETY: as above.
-        unsafe { _mm256_set_m128(_mm256_cvtpd_ps(a[1]), _mm256_cvtpd_ps(a[0])) }
-    }
+            #[inline(always)]
+            fn pick(self, rows: &[Row; 6], Pick(i): Pick) -> __m256 {
+                // SAFETY: as above; a pick is less than 6 by how it is made, so the row is one of these.
+                unsafe { _mm256_loadu_ps(rows.as_ptr().add(i).cast()) }
+            }
 
-    #[inline(always)]
-    fn load_f64(self, row: &[f64; LANES]) -> [__m256d; 2] {
-        // SAFETY: as above; reads the eight numbers of the row, with no demand on alignment.
-        unsafe { [_mm256_loadu_pd(row.as_ptr()), _mm256_loadu_pd(row.as_ptr().add(4))] }
-    }
+            #[inline(always)]
+            fn columns(self, rows: &[[f32; 4]; LANES]) -> [__m256; 4] {
+                let [r0, r1, r2, r3, r4, r5, r6, r7] = rows;
+                // SAFETY: as above; reads the four numbers of each row, with no demand on alignment.
+                unsafe {
+                    let both = |low: &[f32; 4], high: &[f32; 4]| {
+                        _mm256_set_m128(_mm_loadu_ps(high.as_ptr()), _mm_loadu_ps(low.as_ptr()))
+                    };
+                    let (a, b, c, d) = (both(r0, r4), both(r1, r5), both(r2, r6), both(r3, r7));
+                    let (ab, ab_high) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+                    let (cd, cd_high) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+                    [
+                        _mm256_shuffle_ps::<0x44>(ab, cd),
+                        _mm256_shuffle_ps::<0xee>(ab, cd),
+                        _mm256_shuffle_ps::<0x44>(ab_high, cd_high),
+                        _mm256_shuffle_ps::<0xee>(ab_high, cd_high),
+                    ]
+                }
+            }
 
-    #[inline(always)]
-    fn store_f64(self, a: [__m256d; 2]) -> [f64; LANES] {
-        let mut row = [0.0; LANES];
-        // SAFETY: as above; writes the eight numbers of the row, with no demand on alignment.
-        unsafe {
-            _mm256_storeu_pd(row.as_mut_ptr(), a[0]);
-            _mm256_storeu_pd(row.as_mut_ptr().add(4), a[1]);
+            #[inline(always)]
+            fn rows(self, [a, b, c, d]: [__m256; 4]) -> [[f32; 4]; LANES] {
+                let mut rows = [[0.0; 4]; LANES];
+                // SAFETY: as above; writes the four numbers of each row, with no demand on alignment.
+                unsafe {
+                    let (ab, ab_high) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+                    let (cd, cd_high) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+                    let r0 = _mm256_shuffle_ps::<0x44>(ab, cd);
+                    let r1 = _mm256_shuffle_ps::<0xee>(ab, cd);
+                    let r2 = _mm256_shuffle_ps::<0x44>(ab_high, cd_high);
+                    let r3 = _mm256_shuffle_ps::<0xee>(ab_high, cd_high);
+                    _mm_storeu_ps(rows[0].as_mut_ptr(), _mm256_castps256_ps128(r0));
+                    _mm_storeu_ps(rows[1].as_mut_ptr(), _mm256_castps256_ps128(r1));
+                    _mm_storeu_ps(rows[2].as_mut_ptr(), _mm256_castps256_ps128(r2));
+                    _mm_storeu_ps(rows[3].as_mut_ptr(), _mm256_castps256_ps128(r3));
+                    _mm_storeu_ps(rows[4].as_mut_ptr(), _mm256_extractf128_ps::<1>(r0));
+                    _mm_storeu_ps(rows[5].as_mut_ptr(), _mm256_extractf128_ps::<1>(r1));
+                    _mm_storeu_ps(rows[6].as_mut_ptr(), _mm256_extractf128_ps::<1>(r2));
+                    _mm_storeu_ps(rows[7].as_mut_ptr(), _mm256_extractf128_ps::<1>(r3));
+                }
+                rows
+            }
+
+            #[inline(always)]
+            fn arrange(self, a: __m256, order: Order, to: &mut Row) {
+                // SAFETY: as above; writes the eight numbers of the row, with no demand on alignment.
+                unsafe { _mm256_storeu_ps(to.as_mut_ptr(), _mm256_permutevar8x32_ps(a, lanes_of(order))) };
+            }
+
+            #[inline(always)]
+            fn arrange_words(self, words: &[u32; LANES], order: Order, to: &mut [u32; LANES]) {
+                // SAFETY: as above; reads and writes eight words, with no demand on alignment.
+                unsafe {
+                    let words = _mm256_loadu_si256(words.as_ptr().cast());
+                    _mm256_storeu_si256(to.as_mut_ptr().cast(), _mm256_permutevar8x32_epi32(words, lanes_of(order)));
+                }
+            }
+
+            #[inline(always)]
+            fn prefetch<T>(self, at: &T) {
+                let first: *const i8 = std::ptr::from_ref(at).cast();
+                for line in (0..size_of::<T>()).step_by(64) {
+                    // SAFETY: as above; nothing is read, and the address lies within `at`.
+                    unsafe { _mm_prefetch::<_MM_HINT_T0>(first.add(line)) };
+                }
+            }
         }
-        row
-    }
+    };
+}
 
-    #[inline(always)]
-    fn add_f64(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
-        // SAFETY: as above.
-        unsafe { [_mm256_add_pd(a[0], b[0]), _mm256_add_pd(a[1], b[1])] }
-    }
+pub(super) use eight_lanes;
 
-    #[inline(always)]
-    fn sub_f64(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
-        // SAFETY: as above.
-        unsafe { [_mm256_sub_pd(a[0], b[0]), _mm256_sub_pd(a[1], b[1])] }
-    }
+eight_lanes!(Avx2, Pair<Avx2>, Pair);
 
-    #[inline(always)]
-    fn mul_f64(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
-        // SAFETY: as above.
-        unsafe { [_mm256_mul_pd(a[0], b[0]), _mm256_mul_pd(a[1], b[1])] }
-    }
-
-    #[inline(always)]
-    fn div_f64(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
-        // SAFETY: as above.
-        unsafe { [_mm256_div_pd(a[0], b[0]), _mm256_div_pd(a[1], b[1])] }
-    }
-
-    #[inline(always)]
-    fn greater_f64(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
-        // SAFETY: as above.
-        unsafe { [_mm256_max_pd(a[0], b[0]), _mm256_max_pd(a[1], b[1])] }
-    }
-
-    #[inline(always)]
-    fn smaller_f64(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
-        // SAFETY: as above.
-        unsafe { [_mm256_min_pd(a[0], b[0]), _mm256_min_pd(a[1], b[1])] }
-    }
-
-    #[inline(always)]
-    fn abs_f64(self, a: [__m256d; 2]) -> [__m256d; 2] {
-        // SAFETY: as above.
-        unsafe { [_mm256_andnot_pd(_mm256_set1_pd(-0.0), a[0]), _mm256_andnot_pd(_mm256_set1_pd(-0.0), a[1])] }
-    }
-
-    #[inline(always)]
-    fn less_f64(self, a: [__m256d; 2], b: [__m256d; 2]) -> u32 {
-        // SAFETY: as above.
-        let (low, high) = unsafe {
-            (
-                _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(a[0], b[0])),
-                _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(a[1], b[1])),
-            )
-        };
-        (low | high << 4).cast_unsigned()
-    }
-
-    #[inline(always)]
-    fn arrange(self, a: __m256, order: Order, to: &mut Row) {
-        // SAFETY: as above; writes the eight numbers of the row, with no demand on alignment.
-        unsafe { _mm256_storeu_ps(to.as_mut_ptr(), _mm256_permutevar8x32_ps(a, lanes_of(order))) };
-    }
-
-    #[inline(always)]
-    fn arrange_words(self, words: &[u32; LANES], order: Order, to: &mut [u32; LANES]) {
-        // SAFETY: as above; reads and writes eight words, with no demand on alignment.
-        unsafe {
-            let words = _mm256_loadu_si256(words.as_ptr().cast());
-            _mm256_storeu_si256(to.as_mut_ptr().cast(), _mm256_permutevar8x32_epi32(words, lanes_of(order)));
-        }
-    }
-
-    #[inline(always)]
-    fn prefetch<T>(self, at: &T) {
-        let first: *const i8 = std::ptr::from_ref(at).cast();
-        for line in (0..size_of::<T>()).step_by(64) {
-            // SAFETY: as above; nothing is read, and the address lies within `at`.
-            unsafe { _mm_prefetch::<_MM_HINT_T0>(first.add(line)) };
-        }
+/// All bits of the lanes of a mask.
+#[inline(always)]
+pub(super) fn lanes_in(mask: u32) -> __m256i {
+    // SAFETY: only called where a token proves the features.
+    unsafe {
+        let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+        _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(mask.cast_signed()), bits), bits)
     }
 }
 
 /// Each byte as a word.
 #[inline(always)]
-fn lanes_of(order: Order) -> __m256i {
+pub(super) fn lanes_of(order: Order) -> __m256i {
     // SAFETY: only called where a token proves the features.
     unsafe { _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(order.cast_signed())) }
 }

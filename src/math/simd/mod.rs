@@ -1,43 +1,51 @@
-//! Eight `f32` at once, on whatever the processor has.
+//! Eight and sixteen `f32` at once, on whatever the processor has.
 //!
 //! A [`Kernel`] is written once over [`Simd`]; [`Level::run`] compiles it for each instruction set and takes the best one
 //! that the machine offers. Nothing is fused and every operation rounds as its scalar form does, so that a kernel gives
 //! the same bits on every level.
 //!
-//! The only `unsafe` code of the library is here and in [`avx2`](self): a value of a level's token type exists only after
+//! The only `unsafe` code of the library is in `avx2`, `avx512` and `neon`: a value of a level's token type exists only after
 //! the processor was asked, and the operations of a level take its token.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+#[cfg(target_arch = "aarch64")]
+mod neon;
+mod pair;
 mod portable;
+#[cfg(test)]
+mod tests;
 
 use std::sync::LazyLock;
 
 pub use portable::Portable;
 
-/// Numbers in one register.
+/// Lanes of the boxes of a node and the triangles of a block.
 pub const LANES: usize = 8;
+
+/// Lanes of the rays of a packet.
+pub const WIDE: usize = 16;
 
 /// Eight numbers in memory, as nodes and blocks store them.
 pub type Row = [f32; LANES];
 
-/// The operations of one instruction set. A value of the type is the proof that the machine has it.
+/// Arithmetic of one instruction set on `N` numbers at once. A value of the type is the proof that the machine has it.
 ///
 /// Comparisons give a mask: bit k is set where lane k holds.
-pub trait Simd: Copy {
-    /// Eight numbers.
+pub trait Lanewise<const N: usize>: Copy {
+    /// N numbers.
     type Lanes: Copy;
-    /// Eight numbers of double precision.
+    /// N numbers of double precision.
     type Doubles: Copy;
 
     /// The same number in all lanes.
     fn splat(self, x: f32) -> Self::Lanes;
     /// From memory.
-    fn load(self, row: &Row) -> Self::Lanes;
-    /// One of six rows.
-    fn pick(self, rows: &[Row; 6], pick: Pick) -> Self::Lanes;
+    fn load(self, row: &[f32; N]) -> Self::Lanes;
     /// To memory.
-    fn store(self, a: Self::Lanes) -> Row;
+    fn store(self, a: Self::Lanes) -> [f32; N];
     /// a + b.
     fn add(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
     /// a − b.
@@ -56,8 +64,16 @@ pub trait Simd: Copy {
     fn less(self, a: Self::Lanes, b: Self::Lanes) -> u32;
     /// a ≤ b; false where one is NaN.
     fn at_most(self, a: Self::Lanes, b: Self::Lanes) -> u32;
-    /// Rows become columns: lane k of the i-th result is lane i of the k-th row.
-    fn transpose(self, rows: &[Row; LANES]) -> [Self::Lanes; LANES];
+    /// The smallest of all lanes, of which none is NaN; of two zeros either.
+    fn least(self, a: Self::Lanes) -> f32;
+    /// The greatest of all lanes, of which none is NaN; of two zeros either.
+    fn greatest(self, a: Self::Lanes) -> f32;
+    /// To memory in the lanes of `mask`; the others stay.
+    fn put(self, mask: u32, a: Self::Lanes, to: &mut [f32; N]);
+    /// A word to memory in the lanes of `mask`; the others stay.
+    fn put_word(self, mask: u32, word: u32, to: &mut [u32; N]);
+    /// Where a word stands.
+    fn find_word(self, word: u32, among: &[u32; N]) -> u32;
     /// The same number in all lanes.
     fn splat_f64(self, x: f64) -> Self::Doubles;
     /// The same numbers in double precision.
@@ -65,9 +81,9 @@ pub trait Simd: Copy {
     /// The nearest numbers in single precision.
     fn narrow(self, a: Self::Doubles) -> Self::Lanes;
     /// From memory.
-    fn load_f64(self, row: &[f64; LANES]) -> Self::Doubles;
+    fn load_f64(self, row: &[f64; N]) -> Self::Doubles;
     /// To memory.
-    fn store_f64(self, a: Self::Doubles) -> [f64; LANES];
+    fn store_f64(self, a: Self::Doubles) -> [f64; N];
     /// a + b.
     fn add_f64(self, a: Self::Doubles, b: Self::Doubles) -> Self::Doubles;
     /// a − b.
@@ -84,6 +100,23 @@ pub trait Simd: Copy {
     fn smaller_f64(self, a: Self::Doubles, b: Self::Doubles) -> Self::Doubles;
     /// a < b; false where one is NaN.
     fn less_f64(self, a: Self::Doubles, b: Self::Doubles) -> u32;
+    /// To memory in the lanes of `mask`; the others stay.
+    fn put_f64(self, mask: u32, a: Self::Doubles, to: &mut [f64; N]);
+}
+
+/// One instruction set: eight lanes, what nodes and blocks need besides, and sixteen lanes.
+pub trait Simd: Lanewise<LANES> {
+    /// Sixteen lanes of the same machine.
+    type Wide: Lanewise<WIDE>;
+
+    /// Sixteen lanes.
+    fn wide(self) -> Self::Wide;
+    /// One of six rows.
+    fn pick(self, rows: &[Row; 6], pick: Pick) -> Self::Lanes;
+    /// Rows of four become columns: lane k of the i-th result is number i of the k-th row.
+    fn columns(self, rows: &[[f32; 4]; LANES]) -> [Self::Lanes; 4];
+    /// The other way round.
+    fn rows(self, columns: [Self::Lanes; 4]) -> [[f32; 4]; LANES];
     /// To memory in another order: place k gets the lane that byte k of `order` names, 0 to 7.
     fn arrange(self, a: Self::Lanes, order: Order, to: &mut Row);
     /// The same for eight words.
@@ -128,6 +161,10 @@ enum Set {
     Portable,
     #[cfg(target_arch = "x86_64")]
     Avx2(avx2::Avx2),
+    #[cfg(target_arch = "x86_64")]
+    Avx512(avx512::Avx512),
+    #[cfg(target_arch = "aarch64")]
+    Neon,
 }
 
 static BEST: LazyLock<Level> = LazyLock::new(|| *Level::all().last().unwrap_or(&Level::PORTABLE));
@@ -140,7 +177,12 @@ impl Level {
     pub fn all() -> Vec<Self> {
         let mut all = vec![Self::PORTABLE];
         #[cfg(target_arch = "x86_64")]
-        all.extend(avx2::Avx2::detect().map(|token| Self(Set::Avx2(token))));
+        {
+            all.extend(avx2::Avx2::detect().map(|token| Self(Set::Avx2(token))));
+            all.extend(avx512::Avx512::detect().map(|token| Self(Set::Avx512(token))));
+        }
+        #[cfg(target_arch = "aarch64")]
+        all.push(Self(Set::Neon));
         all
     }
 
@@ -156,6 +198,10 @@ impl Level {
             Set::Portable => "portable",
             #[cfg(target_arch = "x86_64")]
             Set::Avx2(_) => "AVX2",
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx512(_) => "AVX-512",
+            #[cfg(target_arch = "aarch64")]
+            Set::Neon => "NEON",
         }
     }
 
@@ -166,132 +212,10 @@ impl Level {
             Set::Portable => kernel.run(Portable),
             #[cfg(target_arch = "x86_64")]
             Set::Avx2(token) => token.run(kernel),
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx512(token) => token.run(kernel),
+            #[cfg(target_arch = "aarch64")]
+            Set::Neon => neon::Neon.run(kernel),
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// All operations in double precision on the same rows, as bits.
-    struct Doubly(Row, Row);
-
-    impl Kernel for Doubly {
-        type Output = Vec<u64>;
-
-        #[inline(always)]
-        fn run<S: Simd>(self, s: S) -> Vec<u64> {
-            let third = s.splat_f64(1.0 / 3.0);
-            let a = s.mul_f64(s.widen(s.load(&self.0)), third);
-            let b = s.load_f64(&self.1.map(f64::from));
-            let results = [
-                s.add_f64(a, b),
-                s.sub_f64(a, b),
-                s.mul_f64(a, b),
-                s.div_f64(a, b),
-                s.abs_f64(a),
-                s.greater_f64(a, b),
-                s.smaller_f64(a, b),
-                s.widen(s.narrow(a)),
-            ];
-            let bits = |x: f64| if x.is_nan() { f64::NAN.to_bits() } else { x.to_bits() };
-            let numbers = results.into_iter().flat_map(|r| s.store_f64(r)).map(bits);
-            numbers.chain([u64::from(s.less_f64(a, b))]).collect()
-        }
-    }
-
-    /// Eight rows as columns, and back.
-    struct Turned([Row; LANES]);
-
-    impl Kernel for Turned {
-        type Output = [Row; LANES];
-
-        #[inline(always)]
-        fn run<S: Simd>(self, s: S) -> [Row; LANES] {
-            let columns = s.transpose(&self.0);
-            let mut rows = [[0.0; LANES]; LANES];
-            for k in 0..LANES {
-                rows[k] = s.store(columns[k]);
-            }
-            rows
-        }
-    }
-
-    #[test]
-    fn rows_become_columns_on_every_level() {
-        let rows: [Row; LANES] = std::array::from_fn(|i| std::array::from_fn(|k| (8 * i + k) as f32));
-        for level in Level::all() {
-            let turned = level.run(Turned(rows));
-            assert!((0..64).all(|i| turned[i % 8][i / 8] == rows[i / 8][i % 8]), "{}", level.name());
-        }
-    }
-
-    const HARD: [f32; 10] =
-        [0.0, -0.0, 1.0, -3.5, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e-42, f32::MAX, f32::MIN_POSITIVE];
-
-    /// All operations on two rows, as bits.
-    struct Everything(Row, Row);
-
-    impl Kernel for Everything {
-        type Output = Vec<u32>;
-
-        #[inline(always)]
-        fn run<S: Simd>(self, s: S) -> Vec<u32> {
-            let (a, b) = (s.load(&self.0), s.load(&self.1));
-            let results = [
-                s.add(a, b),
-                s.sub(a, b),
-                s.mul(a, b),
-                s.div(a, b),
-                s.abs(a),
-                s.greater(a, b),
-                s.smaller(a, b),
-                s.splat(self.0[1]),
-            ];
-            // The sign and payload of a NaN are nobody's business.
-            let bits = |x: f32| if x.is_nan() { f32::NAN.to_bits() } else { x.to_bits() };
-            let order = 0x0706_0102_0005_0304;
-            let (mut arranged, mut words) = ([0.0; LANES], [0; LANES]);
-            s.arrange(a, order, &mut arranged);
-            s.arrange_words(&self.1.map(f32::to_bits), order, &mut words);
-            s.prefetch(&self.0);
-            let mut rows = [self.0; 6];
-            rows[4] = self.1;
-            let picked = s.store(s.pick(&rows, Pick::new(4)));
-            let numbers = results
-                .into_iter()
-                .flat_map(|r| s.store(r))
-                .chain(arranged)
-                .chain(picked)
-                .chain(words.map(f32::from_bits))
-                .map(bits);
-            numbers.chain([s.less(a, b), s.at_most(a, b)]).collect()
-        }
-    }
-
-    #[test]
-    fn every_level_rounds_and_compares_like_plain_numbers() {
-        for (i, &x) in HARD.iter().enumerate() {
-            for &y in &HARD {
-                let a: Row = std::array::from_fn(|k| HARD[(i + k) % HARD.len()]);
-                let b: Row = std::array::from_fn(|k| if k % 2 == 0 { x } else { y });
-                let expected = Level::PORTABLE.run(Everything(a, b));
-                for level in Level::all() {
-                    assert_eq!(level.run(Everything(a, b)), expected, "{} {a:?} {b:?}", level.name());
-                    let doubly = Level::PORTABLE.run(Doubly(a, b));
-                    assert_eq!(level.run(Doubly(a, b)), doubly, "{} {a:?} {b:?}", level.name());
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn the_second_operand_wins_over_nan() {
-        let s = Portable;
-        let (nan, one) = (s.splat(f32::NAN), s.splat(1.0));
-        assert_eq!((s.store(s.greater(nan, one))[0], s.store(s.smaller(nan, one))[0]), (1.0, 1.0));
-        assert!(s.store(s.greater(one, nan))[0].is_nan() && s.store(s.smaller(one, nan))[0].is_nan());
-        assert_eq!((s.less(nan, one), s.at_most(one, nan), s.less(one, s.splat(2.0))), (0, 0, 255));
     }
 }

@@ -1,6 +1,7 @@
 //! The scalar form: what the other levels must equal bit for bit.
 
-use super::{LANES, Order, Pick, Row, Simd};
+use super::pair::Pair;
+use super::{LANES, Lanewise, Order, Pick, Row, Simd};
 
 /// Needs nothing of the processor.
 #[derive(Clone, Copy, Debug)]
@@ -21,7 +22,16 @@ fn mask(a: Row, b: Row, holds: impl Fn(f32, f32) -> bool) -> u32 {
     (0..LANES).fold(0, |mask, k| mask | u32::from(holds(a[k], b[k])) << k)
 }
 
-impl Simd for Portable {
+#[inline(always)]
+fn put<T: Copy>(mask: u32, a: &[T; LANES], to: &mut [T; LANES]) {
+    for k in 0..LANES {
+        if mask >> k & 1 == 1 {
+            to[k] = a[k];
+        }
+    }
+}
+
+impl Lanewise<LANES> for Portable {
     type Lanes = Row;
     type Doubles = [f64; LANES];
 
@@ -33,11 +43,6 @@ impl Simd for Portable {
     #[inline(always)]
     fn load(self, row: &Row) -> Row {
         *row
-    }
-
-    #[inline(always)]
-    fn pick(self, rows: &[Row; 6], Pick(i): Pick) -> Row {
-        rows[i]
     }
 
     #[inline(always)]
@@ -91,8 +96,28 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
-    fn transpose(self, rows: &[Row; LANES]) -> [Row; LANES] {
-        std::array::from_fn(|i| std::array::from_fn(|k| rows[k][i]))
+    fn least(self, a: Row) -> f32 {
+        a.iter().fold(a[0], |x, &y| if y < x { y } else { x })
+    }
+
+    #[inline(always)]
+    fn greatest(self, a: Row) -> f32 {
+        a.iter().fold(a[0], |x, &y| if y > x { y } else { x })
+    }
+
+    #[inline(always)]
+    fn put(self, mask: u32, a: Row, to: &mut Row) {
+        put(mask, &a, to);
+    }
+
+    #[inline(always)]
+    fn put_word(self, mask: u32, word: u32, to: &mut [u32; LANES]) {
+        put(mask, &[word; LANES], to);
+    }
+
+    #[inline(always)]
+    fn find_word(self, word: u32, among: &[u32; LANES]) -> u32 {
+        (0..LANES).fold(0, |mask, k| mask | u32::from(among[k] == word) << k)
     }
 
     #[inline(always)]
@@ -159,6 +184,35 @@ impl Simd for Portable {
     #[inline(always)]
     fn less_f64(self, a: [f64; LANES], b: [f64; LANES]) -> u32 {
         (0..LANES).fold(0, |mask, k| mask | u32::from(a[k] < b[k]) << k)
+    }
+
+    #[inline(always)]
+    fn put_f64(self, mask: u32, a: [f64; LANES], to: &mut [f64; LANES]) {
+        put(mask, &a, to);
+    }
+}
+
+impl Simd for Portable {
+    type Wide = Pair<Self>;
+
+    #[inline(always)]
+    fn wide(self) -> Pair<Self> {
+        Pair(self)
+    }
+
+    #[inline(always)]
+    fn pick(self, rows: &[Row; 6], Pick(i): Pick) -> Row {
+        rows[i]
+    }
+
+    #[inline(always)]
+    fn columns(self, rows: &[[f32; 4]; LANES]) -> [Row; 4] {
+        std::array::from_fn(|i| std::array::from_fn(|k| rows[k][i]))
+    }
+
+    #[inline(always)]
+    fn rows(self, columns: [Row; 4]) -> [[f32; 4]; LANES] {
+        std::array::from_fn(|i| std::array::from_fn(|k| columns[k][i]))
     }
 
     #[inline(always)]

@@ -1,0 +1,278 @@
+//! Sixteen lanes in one 512-bit register of x86-64, and eight in half of one.
+//!
+//! Invariant of every `unsafe` here: the method has an [`Avx512`] token, tokens come from [`Avx512::detect`] alone, and
+//! that gives one only on processors with the instructions.
+
+#![expect(unsafe_code, reason = "instructions of one processor family, guarded by a token; see the module's invariant")]
+
+use std::arch::x86_64::*;
+
+use super::avx2::{eight_lanes, lanes_in, lanes_of};
+use super::{Kernel, LANES, Lanewise, Order, Pick, Row, Simd, WIDE};
+
+/// Proof that the processor has AVX-512 with 256-bit forms, double words and quad words, and what AVX2 came with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Avx512(());
+
+/// The same proof, for sixteen lanes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sixteen(());
+
+impl Avx512 {
+    /// A token if the processor has what [`Self::run`] compiles for.
+    pub(super) fn detect() -> Option<Self> {
+        let has = is_x86_feature_detected!("avx512f")
+            && is_x86_feature_detected!("avx512vl")
+            && is_x86_feature_detected!("avx512dq")
+            && is_x86_feature_detected!("avx512bw")
+            && is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("bmi2")
+            && is_x86_feature_detected!("lzcnt")
+            && is_x86_feature_detected!("popcnt");
+        has.then_some(Self(()))
+    }
+
+    #[inline]
+    pub(super) fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,bmi1,bmi2,lzcnt,popcnt")]
+        fn compiled<K: Kernel>(token: Avx512, kernel: K) -> K::Output {
+            kernel.run(token)
+        }
+        // SAFETY: the token proves the features.
+        unsafe { compiled(self, kernel) }
+    }
+}
+
+eight_lanes!(Avx512, Sixteen, |_: Avx512| Sixteen(()));
+
+/// Both halves of sixteen numbers.
+#[inline(always)]
+fn halves(a: __m512) -> (__m256, __m256) {
+    // SAFETY: only called where a token proves the features.
+    unsafe { (_mm512_castps512_ps256(a), _mm512_extractf32x8_ps::<1>(a)) }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "a mask of sixteen lanes, or the half of one")]
+impl Lanewise<WIDE> for Sixteen {
+    type Lanes = __m512;
+    type Doubles = [__m512d; 2];
+
+    #[inline(always)]
+    fn splat(self, x: f32) -> __m512 {
+        // SAFETY: the token proves the features; so below.
+        unsafe { _mm512_set1_ps(x) }
+    }
+
+    #[inline(always)]
+    fn load(self, row: &[f32; WIDE]) -> __m512 {
+        // SAFETY: as above; reads the sixteen numbers of the row, with no demand on alignment.
+        unsafe { _mm512_loadu_ps(row.as_ptr()) }
+    }
+
+    #[inline(always)]
+    fn store(self, a: __m512) -> [f32; WIDE] {
+        let mut row = [0.0; WIDE];
+        // SAFETY: as above; writes the sixteen numbers of the row, with no demand on alignment.
+        unsafe { _mm512_storeu_ps(row.as_mut_ptr(), a) };
+        row
+    }
+
+    #[inline(always)]
+    fn add(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: as above.
+        unsafe { _mm512_add_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn sub(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: as above.
+        unsafe { _mm512_sub_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn mul(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: as above.
+        unsafe { _mm512_mul_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn div(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: as above.
+        unsafe { _mm512_div_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn abs(self, a: __m512) -> __m512 {
+        // SAFETY: as above.
+        unsafe { _mm512_abs_ps(a) }
+    }
+
+    #[inline(always)]
+    fn greater(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: as above. The instruction gives b where one is NaN, and for two zeros.
+        unsafe { _mm512_max_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn smaller(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: as above.
+        unsafe { _mm512_min_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn less(self, a: __m512, b: __m512) -> u32 {
+        // SAFETY: as above.
+        unsafe { u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b)) }
+    }
+
+    #[inline(always)]
+    fn at_most(self, a: __m512, b: __m512) -> u32 {
+        // SAFETY: as above.
+        unsafe { u32::from(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b)) }
+    }
+
+    #[inline(always)]
+    fn least(self, a: __m512) -> f32 {
+        // SAFETY: as above.
+        unsafe { _mm512_reduce_min_ps(a) }
+    }
+
+    #[inline(always)]
+    fn greatest(self, a: __m512) -> f32 {
+        // SAFETY: as above.
+        unsafe { _mm512_reduce_max_ps(a) }
+    }
+
+    #[inline(always)]
+    fn put(self, mask: u32, a: __m512, to: &mut [f32; WIDE]) {
+        // SAFETY: as above; reads and writes the sixteen numbers of the row, with no demand on alignment.
+        unsafe {
+            let at = to.as_mut_ptr();
+            _mm512_storeu_ps(at, _mm512_mask_mov_ps(_mm512_loadu_ps(at), mask as __mmask16, a));
+        }
+    }
+
+    #[inline(always)]
+    fn put_word(self, mask: u32, word: u32, to: &mut [u32; WIDE]) {
+        // SAFETY: as above; reads and writes sixteen words, with no demand on alignment.
+        unsafe {
+            let at = to.as_mut_ptr().cast();
+            let mixed = _mm512_mask_set1_epi32(_mm512_loadu_si512(at), mask as __mmask16, word.cast_signed());
+            _mm512_storeu_si512(at, mixed);
+        }
+    }
+
+    #[inline(always)]
+    fn find_word(self, word: u32, among: &[u32; WIDE]) -> u32 {
+        // SAFETY: as above; reads sixteen words, with no demand on alignment.
+        unsafe {
+            let among = _mm512_loadu_si512(among.as_ptr().cast());
+            u32::from(_mm512_cmpeq_epi32_mask(among, _mm512_set1_epi32(word.cast_signed())))
+        }
+    }
+
+    #[inline(always)]
+    fn splat_f64(self, x: f64) -> [__m512d; 2] {
+        // SAFETY: as above.
+        unsafe { [_mm512_set1_pd(x); 2] }
+    }
+
+    #[inline(always)]
+    fn widen(self, a: __m512) -> [__m512d; 2] {
+        // SAFETY: as above.
+        unsafe {
+            let (low, high) = halves(a);
+            [_mm512_cvtps_pd(low), _mm512_cvtps_pd(high)]
+        }
+    }
+
+    #[inline(always)]
+    fn narrow(self, a: [__m512d; 2]) -> __m512 {
+        // SAFETY: as above.
+        unsafe {
+            let low = _mm512_castps256_ps512(_mm512_cvtpd_ps(a[0]));
+            _mm512_insertf32x8::<1>(low, _mm512_cvtpd_ps(a[1]))
+        }
+    }
+
+    #[inline(always)]
+    fn load_f64(self, row: &[f64; WIDE]) -> [__m512d; 2] {
+        // SAFETY: as above; reads the sixteen numbers of the row, with no demand on alignment.
+        unsafe { [_mm512_loadu_pd(row.as_ptr()), _mm512_loadu_pd(row.as_ptr().add(8))] }
+    }
+
+    #[inline(always)]
+    fn store_f64(self, a: [__m512d; 2]) -> [f64; WIDE] {
+        let mut row = [0.0; WIDE];
+        // SAFETY: as above; writes the sixteen numbers of the row, with no demand on alignment.
+        unsafe {
+            _mm512_storeu_pd(row.as_mut_ptr(), a[0]);
+            _mm512_storeu_pd(row.as_mut_ptr().add(8), a[1]);
+        }
+        row
+    }
+
+    #[inline(always)]
+    fn add_f64(self, a: [__m512d; 2], b: [__m512d; 2]) -> [__m512d; 2] {
+        // SAFETY: as above.
+        unsafe { [_mm512_add_pd(a[0], b[0]), _mm512_add_pd(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn sub_f64(self, a: [__m512d; 2], b: [__m512d; 2]) -> [__m512d; 2] {
+        // SAFETY: as above.
+        unsafe { [_mm512_sub_pd(a[0], b[0]), _mm512_sub_pd(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn mul_f64(self, a: [__m512d; 2], b: [__m512d; 2]) -> [__m512d; 2] {
+        // SAFETY: as above.
+        unsafe { [_mm512_mul_pd(a[0], b[0]), _mm512_mul_pd(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn div_f64(self, a: [__m512d; 2], b: [__m512d; 2]) -> [__m512d; 2] {
+        // SAFETY: as above.
+        unsafe { [_mm512_div_pd(a[0], b[0]), _mm512_div_pd(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn greater_f64(self, a: [__m512d; 2], b: [__m512d; 2]) -> [__m512d; 2] {
+        // SAFETY: as above.
+        unsafe { [_mm512_max_pd(a[0], b[0]), _mm512_max_pd(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn smaller_f64(self, a: [__m512d; 2], b: [__m512d; 2]) -> [__m512d; 2] {
+        // SAFETY: as above.
+        unsafe { [_mm512_min_pd(a[0], b[0]), _mm512_min_pd(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn abs_f64(self, a: [__m512d; 2]) -> [__m512d; 2] {
+        // SAFETY: as above.
+        unsafe { [_mm512_abs_pd(a[0]), _mm512_abs_pd(a[1])] }
+    }
+
+    #[inline(always)]
+    fn less_f64(self, a: [__m512d; 2], b: [__m512d; 2]) -> u32 {
+        // SAFETY: as above.
+        unsafe {
+            let (low, high) =
+                (_mm512_cmp_pd_mask::<_CMP_LT_OQ>(a[0], b[0]), _mm512_cmp_pd_mask::<_CMP_LT_OQ>(a[1], b[1]));
+            u32::from(low) | u32::from(high) << LANES
+        }
+    }
+
+    #[inline(always)]
+    fn put_f64(self, mask: u32, a: [__m512d; 2], to: &mut [f64; WIDE]) {
+        // SAFETY: as above; reads and writes the sixteen numbers of the row, with no demand on alignment.
+        unsafe {
+            let at = to.as_mut_ptr();
+            _mm512_storeu_pd(at, _mm512_mask_mov_pd(_mm512_loadu_pd(at), mask as __mmask8, a[0]));
+            let (mask, at) = ((mask >> LANES) as __mmask8, at.add(LANES));
+            _mm512_storeu_pd(at, _mm512_mask_mov_pd(_mm512_loadu_pd(at), mask, a[1]));
+        }
+    }
+}
