@@ -45,7 +45,7 @@ impl Culling for Listed<'_> {
     fn new_scratch(&self) {}
 
     fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, (): &mut (), probe: &mut P) {
-        self.level.run(All { listed: self, query, probe });
+        self.level.run_narrow(All { listed: self, query, probe });
     }
 }
 

@@ -41,7 +41,7 @@ use self::walk::{OneByOne, Stack, Walk};
 use super::query::{Culling, Goal, Query};
 use super::wave::Wave;
 use super::{NoProbe, Probe, Shapes};
-use crate::math::simd::Level;
+use crate::math::simd::{Kernel, Level, Portable};
 
 /// How the rays of a wave are traced. The answers are the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -117,7 +117,20 @@ impl<'a> Wide<'a> {
     /// Walks by given margins.
     #[inline]
     fn walk_within<B: BoxMargins, G: Goal, P: Probe>(&self, query: &mut Query<G>, stack: &mut Stack, probe: &mut P) {
-        self.level.run(Walk { tree: &self.tree, query, stack, probe, margins: PhantomData::<B> });
+        self.run_narrow::<B, _>(Walk { tree: &self.tree, query, stack, probe, margins: PhantomData::<B> });
+    }
+
+    /// Runs a kernel that walks by margins `B`.
+    #[inline]
+    fn run<B: BoxMargins, K: Kernel>(&self, kernel: K) -> K::Output {
+        // Where it is false nothing is compiled for it.
+        if B::EVERY_LEVEL { self.level.run(kernel) } else { kernel.run(Portable) }
+    }
+
+    /// The same for one that also counts, or that tests triangles one after another.
+    #[inline]
+    fn run_narrow<B: BoxMargins, K: Kernel>(&self, kernel: K) -> K::Output {
+        if B::EVERY_LEVEL { self.level.run_narrow(kernel) } else { kernel.run(Portable) }
     }
 
     /// How the scene was cut.
@@ -161,7 +174,7 @@ impl Wide<'_> {
             return self.trace_together::<B, _>(wave, stack);
         }
         let (tree, shapes) = (&self.tree, self.shapes);
-        self.level.run(OneByOne { tree, shapes, wave, stack, probe, margins: PhantomData::<B> });
+        self.run_narrow::<B, _>(OneByOne { tree, shapes, wave, stack, probe, margins: PhantomData::<B> });
     }
 
     fn trace_together<B: BoxMargins, W: Wave>(&self, wave: &mut W, stack: &mut Stack) {
@@ -174,13 +187,13 @@ impl Wide<'_> {
         match rays {
             RayOrder::InFlight => {
                 let Stack { entries, flight, .. } = stack;
-                self.level.run(InFlight { tree, shapes, wave, stack: flight, entries, margins });
+                self.run::<B, _>(InFlight { tree, shapes, wave, stack: flight, entries, margins });
             }
             RayOrder::Packets => {
                 let Stack { entries, branches, .. } = stack;
-                self.level.run(InPackets { tree, shapes, wave, stack: branches, entries, margins });
+                self.run::<B, _>(InPackets { tree, shapes, wave, stack: branches, entries, margins });
             }
-            _ => self.level.run(OneByOne { tree, shapes, wave, stack, probe, margins }),
+            _ => self.run::<B, _>(OneByOne { tree, shapes, wave, stack, probe, margins }),
         }
     }
 }

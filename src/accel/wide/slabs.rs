@@ -23,6 +23,8 @@ pub(in crate::accel) trait BoxMargins {
     const UNDERFLOW: f32 = BOX_UNDERFLOW;
     /// Largest coordinate with which boxes are asked.
     const COORDINATES: f32 = BOX_COORDINATES;
+    /// Whether walks are compiled for every instruction set, or only for none.
+    const EVERY_LEVEL: bool = false;
 
     /// Whether boxes can be asked about a ray from here; not if it is not finite.
     #[inline(always)]
@@ -47,7 +49,9 @@ pub(in crate::accel) trait BoxMargins {
 /// The margins that `math::bounds` derives.
 pub(in crate::accel) struct Derived;
 
-impl BoxMargins for Derived {}
+impl BoxMargins for Derived {
+    const EVERY_LEVEL: bool = true;
+}
 
 /// A ray ready to be tested against boxes.
 #[derive(Clone, Copy, Debug)]

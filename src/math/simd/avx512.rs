@@ -7,12 +7,12 @@
 
 use std::arch::x86_64::*;
 
-use super::avx2::{eight_lanes, lanes_in, lanes_of};
+use super::avx2::{Avx2, eight_lanes, lanes_in, lanes_of};
 use super::{Kernel, LANES, Lanewise, Order, Pick, Row, Simd, WIDE};
 
 /// Proof that the processor has AVX-512 with 256-bit forms, double words and quad words, and what AVX2 came with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Avx512(());
+pub(super) struct Avx512(Avx2);
 
 /// The same proof, for sixteen lanes.
 #[derive(Clone, Copy, Debug)]
@@ -24,13 +24,14 @@ impl Avx512 {
         let has = is_x86_feature_detected!("avx512f")
             && is_x86_feature_detected!("avx512vl")
             && is_x86_feature_detected!("avx512dq")
-            && is_x86_feature_detected!("avx512bw")
-            && is_x86_feature_detected!("avx2")
-            && is_x86_feature_detected!("bmi1")
-            && is_x86_feature_detected!("bmi2")
-            && is_x86_feature_detected!("lzcnt")
-            && is_x86_feature_detected!("popcnt");
-        has.then_some(Self(()))
+            && is_x86_feature_detected!("avx512bw");
+        Avx2::detect().filter(|_| has).map(Self)
+    }
+
+    /// The proof of AVX2 alone.
+    #[inline]
+    pub(super) fn narrow(self) -> Avx2 {
+        self.0
     }
 
     #[inline]

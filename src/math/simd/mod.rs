@@ -218,4 +218,18 @@ impl Level {
             Set::Neon => neon::Neon.run(kernel),
         }
     }
+
+    /// Runs a kernel for which code for the widest lanes is not worth its size: AVX2 where there is AVX-512.
+    #[inline]
+    pub fn run_narrow<K: Kernel>(self, kernel: K) -> K::Output {
+        match self.0 {
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx512(token) => token.narrow().run(kernel),
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx2(token) => token.run(kernel),
+            #[cfg(target_arch = "aarch64")]
+            Set::Neon => neon::Neon.run(kernel),
+            Set::Portable => kernel.run(Portable),
+        }
+    }
 }

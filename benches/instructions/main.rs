@@ -1,0 +1,185 @@
+//! How many instructions the kernels take: `cargo bench --bench instructions -- [--record]`.
+//!
+//! Valgrind's Callgrind counts them, so that the figures depend on neither the machine's speed nor its load. It knows no
+//! AVX-512: those kernels are the same code as AVX2's. What is counted must not exceed `baseline.txt` beside this file by
+//! more than [`ALLOWED`]; `--record` writes that file anew.
+
+#![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command that prints what it counted")]
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use meshray::accel::{Accel, BitSet, Hit, NO_PRIM, NoProbe, Ray, RayOrder, Shapes, Splitting, Wide};
+use meshray::generate::Family;
+use meshray::math::Vec3;
+use meshray::math::random::Random;
+use meshray::math::simd::Level;
+use meshray::render::World;
+
+/// Part by which a count may exceed its baseline.
+const ALLOWED: f64 = 0.03;
+
+const TRIANGLES: usize = 20_000;
+const RAYS: usize = 4096;
+
+const LEVELS: [&str; 2] = ["portable", "AVX2"];
+const WAYS: [(RayOrder, &str); 3] =
+    [(RayOrder::OneByOne, "one-by-one"), (RayOrder::InFlight, "in-flight"), (RayOrder::Packets, "packets")];
+const RUNS: [&str; 2] = ["alike", "apart"];
+const QUESTIONS: [&str; 2] = ["first", "any"];
+
+/// One figure: level, way, how the rays run, and what is asked.
+type Case = [String; 4];
+
+fn main() -> ExitCode {
+    // Cargo adds --bench to what was typed.
+    let words: Vec<String> = std::env::args().skip(1).filter(|w| w != "--bench").collect();
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    match words[..] {
+        ["trace", level, way, run, question] => trace([level, way, run, question]),
+        [] => compare(false),
+        ["--record"] => compare(true),
+        _ => {
+            eprintln!("usage: instructions [--record]");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// Counts every case and holds it against the baseline, or records it.
+fn compare(record: bool) -> ExitCode {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/instructions/baseline.txt");
+    let baseline = std::fs::read_to_string(&file).unwrap_or_default();
+    let (compiler, baseline) = baseline.split_once('\n').unwrap_or_default();
+    let baseline: BTreeMap<&str, u64> = baseline
+        .lines()
+        .filter_map(|line| line.rsplit_once(' ').and_then(|(c, n)| Some((c, n.parse().ok()?))))
+        .collect();
+    let mut recorded = format!("{}\n", env!("MESHRAY_COMPILER"));
+    let mut worse = false;
+    println!("{:38}{:>14}{:>10}{:>10}", "instructions a ray", "now", "baseline", "ratio");
+    for case in cases() {
+        let name = case.join(" ");
+        let count = match count(&case) {
+            Ok(count) => count,
+            Err(message) => {
+                eprintln!("{name}: {message}");
+                return ExitCode::from(2);
+            }
+        };
+        recorded.push_str(&format!("{name} {count}\n"));
+        let per_ray = |n: u64| n as f64 / RAYS as f64;
+        match baseline.get(name.as_str()) {
+            Some(&before) => {
+                let ratio = count as f64 / before as f64;
+                worse |= ratio > 1.0 + ALLOWED;
+                println!("{name:38}{:14.0}{:10.0}{ratio:10.3}", per_ray(count), per_ray(before));
+            }
+            None => println!("{name:38}{:14.0}{:>10}", per_ray(count), "-"),
+        }
+    }
+    if record {
+        return match std::fs::write(&file, recorded) {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(e) => {
+                eprintln!("{}: {e}", file.display());
+                ExitCode::from(2)
+            }
+        };
+    }
+    if compiler != env!("MESHRAY_COMPILER") {
+        println!("recorded with {compiler}: ratios to another compiler's code are not judged");
+        return ExitCode::SUCCESS;
+    }
+    if worse {
+        eprintln!("more than {:.0} % above the baseline; accept it with --record", ALLOWED * 100.0);
+        return ExitCode::FAILURE;
+    }
+    ExitCode::SUCCESS
+}
+
+fn cases() -> Vec<Case> {
+    let here = Level::all();
+    let mut cases = Vec::new();
+    for level in LEVELS.into_iter().filter(|level| here.iter().any(|l| l.name() == *level)) {
+        for (_, way) in WAYS {
+            for run in RUNS {
+                for question in QUESTIONS {
+                    cases.push([level, way, run, question].map(String::from));
+                }
+            }
+        }
+    }
+    cases
+}
+
+/// Instructions of one case, counted by running this program again.
+fn count(case: &Case) -> Result<u64, String> {
+    let program: PathBuf = std::env::current_exe().map_err(|e| e.to_string())?;
+    let out = Command::new("valgrind")
+        .args(["--tool=callgrind", "--collect-atstart=no", "--toggle-collect=*counted*"])
+        .arg("--callgrind-out-file=/dev/null")
+        .arg(program)
+        .arg("trace")
+        .args(case)
+        .output()
+        .map_err(|e| format!("valgrind does not start ({e}); install it"))?;
+    let text = String::from_utf8_lossy(&out.stderr);
+    let count = text.lines().find_map(|line| line.split_once("Collected : ")?.1.trim().parse().ok());
+    count.filter(|&n| out.status.success() && n > 0).ok_or_else(|| format!("valgrind counted nothing:\n{text}"))
+}
+
+/// Traces the rays of one case, most of it in [`counted`].
+fn trace([level, way, run, question]: [&str; 4]) -> ExitCode {
+    let world = World::new(&Family::Mountain.scene(TRIANGLES));
+    let (vertices, triangles) = (world.shapes.vertices, world.shapes.triangles);
+    let shapes = Shapes { opaque: BitSet::filled(triangles.len(), true), vertices, triangles, ..Shapes::default() };
+    let (Some(level), Some(&(way, _))) =
+        (Level::all().into_iter().find(|l| l.name() == level), WAYS.iter().find(|(_, name)| *name == way))
+    else {
+        return ExitCode::from(2);
+    };
+    let wide = Wide::build(&shapes, Splitting::SurfaceArea).at_level(level).with_rays(way);
+    let mut scratch = wide.scratch();
+    let mut answers = Answers { hits: vec![Hit::MISS; RAYS], blocked: vec![false; RAYS] };
+    counted(&wide, &rays(&shapes, run == "alike"), question == "any", &mut answers, &mut scratch);
+    let found = answers.hits.iter().filter(|h| h.is_some()).count() + answers.blocked.iter().filter(|&&b| b).count();
+    println!("{found} of {RAYS} rays hit");
+    if found > RAYS / 4 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+struct Answers {
+    hits: Vec<Hit>,
+    blocked: Vec<bool>,
+}
+
+/// What is counted: Callgrind knows it by its name.
+#[inline(never)]
+fn counted<A: Accel>(accel: &A, rays: &[Ray], any: bool, answers: &mut Answers, scratch: &mut A::Scratch) {
+    if any {
+        accel.occluded(rays, &mut answers.blocked, scratch, &mut NoProbe);
+    } else {
+        accel.closest(rays, &mut answers.hits, scratch, &mut NoProbe);
+    }
+}
+
+/// Rays down on the landscape, from one point through a grid in blocks of 4×4, or from anywhere to anywhere.
+fn rays(shapes: &Shapes, alike: bool) -> Vec<Ray> {
+    let bounds = shapes.vertices.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |b, &v| (b.0.min(v), b.1.max(v)));
+    let (middle, size) = ((bounds.0 + bounds.1) * 0.5, bounds.1 - bounds.0);
+    let eye = middle + Vec3::new(-0.1, -0.6, 1.0) * size.length();
+    let mut random = Random::new(1);
+    let ray = |i: usize| {
+        let (block, place) = (i / 16, i % 16);
+        let (column, row) = (block % 16 * 4 + place % 4, block / 16 * 4 + place / 4);
+        let (x, y) = (column as f32 / 64.0 - 0.5, row as f32 / 64.0 - 0.5);
+        let (origin, target) = if alike {
+            (eye, middle + Vec3::new(x, y, 0.0) * size)
+        } else {
+            (middle + random.cube() * size * 0.5, middle + random.cube() * size * 0.5)
+        };
+        Ray { origin, t_min: 0.0, dir: target - origin, t_max: f32::INFINITY, exclude: NO_PRIM, sample: 0 }
+    };
+    (0..RAYS).map(ray).collect()
+}
