@@ -507,14 +507,14 @@ mod tests {
     }
 
     /// Eight rays against the first of eight triangles: the verdicts, where they meet its plane, and the weights there.
-    struct Row8<'a>(&'a [RaySpace; LANES], &'a Triangle);
+    struct Row8<'a>(&'a [RaySpace; LANES], &'a Triangle, Option<Vec3>);
 
     impl Kernel for Row8<'_> {
         type Output = (Verdicts, Meetings<Row, [f64; LANES]>, [Row; 2]);
 
         #[inline(always)]
         fn run<S: Simd>(self, s: S) -> Self::Output {
-            let Self(rays, triangle) = self;
+            let Self(rays, triangle, from) = self;
             let (mut origin, mut dir) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
             for (lane, ray) in rays.iter().enumerate() {
                 for k in 0..3 {
@@ -522,7 +522,6 @@ mod tests {
                 }
             }
             let far = rays.iter().map(|r| reach(r.origin, &Aabb::around(*triangle))).fold(0.0, f32::max);
-            let from = (origin.map(|x| x[0]) == origin.map(|x| x[1])).then(|| rays[0].origin);
             let row = RayRow::new(s, &origin, from, &dir, rays[0].z, far);
             let (verdicts, closer) = (row.verdicts(s, triangle), row.closer_verdicts(s, triangle));
             assert_eq!(verdicts.hit & !(closer.hit | closer.unsure) | closer.unsure & !verdicts.unsure, 0);
@@ -556,8 +555,9 @@ mod tests {
             if rays.iter().any(|r| r.z != rays[0].z) {
                 continue;
             }
-            for level in Level::all() {
-                let (verdicts, met, [u, v]) = level.run(Row8(&rays, &triangle));
+            // All start there, whether the row knows it or not.
+            for (level, from) in Level::all().into_iter().flat_map(|l| [(l, None), (l, Some(origin))]) {
+                let (verdicts, met, [u, v]) = level.run(Row8(&rays, &triangle, from));
                 for (lane, ray) in rays.iter().enumerate() {
                     let (bit, hit) = (1 << lane, triangle::is_hit(ray, &triangle));
                     assert!(verdicts.unsure & bit != 0 || (verdicts.hit & bit != 0) == hit, "{}", level.name());

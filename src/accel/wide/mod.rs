@@ -15,6 +15,7 @@
 //! answer. Counts are those of one ray at a time: whoever listens gets that.
 
 mod build;
+mod bundle;
 mod check;
 mod flight;
 mod listed;
@@ -33,9 +34,10 @@ pub use split::Splitting;
 
 use std::marker::PhantomData;
 
+use self::bundle::RAYS;
 use self::flight::InFlight;
 use self::node::Tree;
-use self::packet::{InPackets, RAYS};
+use self::packet::InPackets;
 use self::slabs::{BoxMargins, Derived};
 use self::walk::{OneByOne, Stack, Walk};
 use super::query::{Culling, Goal, Query};

@@ -22,15 +22,17 @@ fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> String {
     format!("{:?} {:?} {blocked:?}", bits(&hits), bits(&behind))
 }
 
-/// For some rays sixteen side by side that start with them: most bundles run alike, some straddle an octant.
+/// For some rays sixteen side by side that start with them, every other time each from a place of its own: most bundles
+/// run alike, some straddle an octant.
 fn bundles(rays: &[Ray]) -> Vec<Ray> {
-    let bundle = |ray: &Ray| {
+    let bundle = |(i, ray): (usize, &Ray)| {
         let (ray, width) = (*ray, ray.dir.length() * 0.03);
         let side =
             move |k: usize| Vec3::new(0.3, -0.2, 0.1) * (k % 4) as f32 + Vec3::new(0.0, 0.1, 0.2) * (k / 4) as f32;
-        (0..16).map(move |k| Ray { dir: ray.dir + side(k) * width, ..ray })
+        let apart = width * (i % 2) as f32;
+        (0..16).map(move |k| Ray { origin: ray.origin - side(k) * apart, dir: ray.dir + side(k) * width, ..ray })
     };
-    rays.iter().step_by(5).flat_map(bundle).filter(|r| r.dir != Vec3::ZERO).collect()
+    rays.iter().step_by(5).enumerate().flat_map(bundle).filter(|r| r.dir != Vec3::ZERO).collect()
 }
 
 fn assert_all_ways_agree(name: &str, shapes: &Shapes, rays: &[Ray]) {
