@@ -49,11 +49,34 @@ impl EdgeMargins {
     pub const DERIVED: Self =
         Self { rounding: U32 * SLACK, underflow: f32::MIN_POSITIVE, overflow: (1u128 << 100) as f32 };
 
+    /// Of triangles whose distances are wanted, too: so that the sum of edge values that are certain is so far above the
+    /// smallest numbers that their products with heights, 2⁻¹⁴⁹ off when they underflow, do not matter. They are then off
+    /// by 2⁻⁷⁹ of the sum.
+    pub const WITH_DISTANCES: Self = Self { underflow: 1.0 / (1u128 << 70) as f32, ..Self::DERIVED };
+
     /// How far an edge value may be from its exact value; `reach` is D, `spread` M.
     #[inline(always)]
     pub fn error(&self, reach: f32, spread: f32) -> f32 {
         let displaced = 8.0 * self.rounding * (reach + reach + spread);
         displaced * (spread + 0.125 * displaced) + self.underflow
+    }
+
+    /// [`Self::error`] in lanes, for triangles whose corners are no farther from the origin along the ray's main axis than
+    /// `height` is Z: as every shear is at most 1 in size, D ≤ Z + M, and with r for the rounding 8 r (2 Z + 3 M) (M +
+    /// r (2 Z + 3 M)) ≤ M (24 r M + 16 r Z) + 64 r² Z² + 144 r² M².
+    #[inline(always)]
+    pub fn error_by_height<S: Lanewise<N>, const N: usize>(
+        &self,
+        s: S,
+        height: S::Lanes,
+        spread: S::Lanes,
+    ) -> S::Lanes {
+        let r = self.rounding;
+        let product = s.mul(height, s.splat(16.0 * r));
+        let slope = s.mul_add(spread, s.splat(24.0 * r + 144.0 * r * r), product);
+        // 64 = 16² / 4.
+        let constant = s.mul_add(s.mul(product, s.splat(0.25)), product, s.splat(self.underflow));
+        s.mul_add(slope, spread, constant)
     }
 
     /// [`Self::error`] in lanes; `reach` is D in all.
@@ -64,6 +87,12 @@ impl EdgeMargins {
         s.add(product, s.splat(self.underflow))
     }
 }
+
+/// How far the mean of three heights moves when its weights err, over what `math::triangles` says it is made of.
+pub const WEIGHTS: f32 = 3.0 * SLACK;
+
+/// What a mean of heights errs by, relative to the farthest there could be; see `math::triangles`.
+pub const HEIGHTS: f32 = 16.0 * U32;
 
 /// The unit roundoff that the bound of an edge value in `f64` is made of.
 pub const EDGE_ROUNDING_F64: f64 = U64 * SLACK as f64;
@@ -151,6 +180,24 @@ pub const BOX_UNDERFLOW: f32 = f32::MIN_POSITIVE;
 
 /// Scenes and rays with coordinates beyond this are not culled by boxes in `f32`: up to here differences do not overflow.
 pub const BOX_COORDINATES: f32 = f32::MAX / 4.0;
+
+/// How much larger than they are boxes are taken to be where a distance to a plane is plane · (1/d) + (∓ pad − o/d), in
+/// parts of the sum of the largest coordinate of a box, E, and of the origin's, |o|.
+///
+/// The reciprocal, its products with plane, origin and pad, and two sums are rounded once each: u (2 |plane − o| + 2 |o| +
+/// |plane| + 3 pad) over |d|, less than 5 u (E + |o|). The rest of 8 is for directions that are nearly parallel to the plane
+/// ([`PARALLEL`]).
+pub const BOX_PAD: f32 = 8.0 * U32;
+
+/// Components of a direction that are smaller than this part of the largest one are taken to be as large. Within the boxes
+/// a ray goes no farther than E + |o| along the largest, so it moves by 2⁻³⁰ (E + |o|) more along such an axis: 2⁻⁹ of
+/// [`BOX_PAD`].
+pub const PARALLEL: f32 = 1.0 / (1u32 << 30) as f32;
+
+/// Largest size of E + |o| and of a direction (sums of the sizes of components), and the reciprocal of the smallest, for
+/// which these bounds hold: reciprocals are then below 2⁶⁸ and their products below 2¹⁰⁵, edge values and heights below 2¹¹⁶, and the pad
+/// over a direction's component is above 2⁻⁹⁴.
+pub const BOX_RANGE: f32 = (1u64 << 36) as f32;
 
 /// How far from the edges of its face a secondary ray starts, in units of the error of its position.
 ///

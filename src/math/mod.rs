@@ -12,6 +12,7 @@ pub mod ear_clip;
 pub mod expansion;
 pub mod frame;
 pub mod inset;
+pub mod meetings;
 pub mod moller_trumbore;
 #[cfg(test)]
 mod oracle;

@@ -25,11 +25,17 @@ pub struct RaySpace {
     pub shear: (f32, f32),
 }
 
+/// The axis after each; the last is none.
+const NEXT: [usize; 4] = [1, 2, 0, 0];
+
 /// The axis of a direction's largest component; of equal ones the first.
 #[inline(always)]
 pub fn main_axis(dir: Vec3) -> usize {
-    let size = dir.abs();
-    if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) }
+    let (x, y, z) = (dir.x.abs(), dir.y.abs(), dir.z.abs());
+    // Without branches: nobody can foretell the axes of rays that run apart.
+    let either = usize::from(y > x);
+    let most = if y > x { y } else { x };
+    either + (2 - either) * usize::from(z > most)
 }
 
 impl RaySpace {
@@ -44,12 +50,9 @@ impl RaySpace {
     #[inline(always)]
     pub fn checked(origin: Vec3, dir: Vec3) -> (Self, bool) {
         let z = main_axis(dir);
-        let [d_x, d_y, d_z] = match z {
-            0 => [dir.y, dir.z, dir.x],
-            1 => [dir.z, dir.x, dir.y],
-            _ => [dir.x, dir.y, dir.z],
-        };
-        let (x, y) = if z == 0 { (1, 2) } else { (4 - 2 * z, z - 1) };
+        let (x, y) = (NEXT[z & 3], NEXT[NEXT[z & 3] & 3]);
+        let d = [dir.x, dir.y, dir.z, 0.0];
+        let (d_x, d_y, d_z) = (d[x & 3], d[y & 3], d[z & 3]);
         let usable = origin.is_finite() && dir.is_finite() && d_z != 0.0;
         (Self { origin, dir, z, x, y, shear: (d_x / d_z, d_y / d_z) }, usable)
     }

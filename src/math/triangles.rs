@@ -1,15 +1,15 @@
 //! Eight triangles against one ray: the filter of [`triangle`](super::triangle) in eight lanes.
 //!
-//! Edge values are computed as there, operation by operation, and their bound from the farthest that any triangle of
-//! the scene may be; what this cannot decide is left to the scalar form. Verdicts are exact, so it does not matter which of
-//! the two found them.
+//! Edge values are computed as there, with fused operations where the processor has them, and their bound from the
+//! farthest that any triangle of the scene may be; what this cannot decide is left to the scalar form. Verdicts are exact,
+//! so it does not matter which of the two found them.
 
 use super::DVec3;
 use super::Vec3;
 use super::aabb::Aabb;
-use super::bounds::{EdgeMargins, PLANE_TERMS_F64, POSITION_T};
+use super::bounds::{EdgeMargins, HEIGHTS, PLANE_TERMS_F64, POSITION_T, WEIGHTS};
 use super::shear::RaySpace;
-use super::simd::{LANES, Lanewise, Row, Simd};
+use super::simd::{Axis, LANES, Lanewise, Row, Simd};
 use super::triangle::{flat_axes, magnitude_cross};
 
 /// Corners of eight triangles, by corner and axis.
@@ -49,10 +49,96 @@ pub fn set_corners(corners: &mut Corners8, lane: usize, triangle: &[Vec3; 3]) {
     }
 }
 
+/// A ray as blocks see it that are asked about distances, too: its numbers are within
+/// [`BOX_RANGE`](super::bounds::BOX_RANGE).
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C)]
+pub struct Sight {
+    /// Origin along the axes in sheared order.
+    pub origin: [f32; 3],
+    /// 1 over the direction's component along the last of these axes.
+    pub per_length: f32,
+    /// The direction's components along the first two of these axes over that along the last.
+    pub shear: [f32; 2],
+    /// The axis of the direction's largest component.
+    pub main: u32,
+}
+
+/// The axes in sheared order, by the ray's main axis.
+static AXES: [[Axis; 3]; 3] = {
+    let [x, y, z] = [Axis::new(0), Axis::new(1), Axis::new(2)];
+    [[y, z, x], [z, x, y], [x, y, z]]
+};
+
+/// What a ray sees of eight triangles.
+pub struct Look<S: Simd> {
+    /// Which of them it hits.
+    pub verdicts: Verdicts,
+    /// Edge values, and what they may be off.
+    edges: [S::Lanes; 3],
+    error: S::Lanes,
+    /// Corners along the ray's main axis, relative to its origin.
+    heights: [S::Lanes; 3],
+    /// The largest of their sizes.
+    height: S::Lanes,
+}
+
+impl Sight {
+    /// Tests eight triangles.
+    #[inline(always)]
+    pub fn look<S: Simd>(&self, s: S, corners: &Corners8) -> Look<S> {
+        let [ox, oy, oz] = [s.splat(self.origin[0]), s.splat(self.origin[1]), s.splat(self.origin[2])];
+        let [p, q] = [s.splat(self.shear[0]), s.splat(self.shear[1])];
+        let [x, y, z] = AXES[self.main as usize % 3];
+        let [a, b, c] = corners;
+        let (az, bz, cz) = (s.sub(s.along(a, z), oz), s.sub(s.along(b, z), oz), s.sub(s.along(c, z), oz));
+        let (ax, ay) = (s.sub_mul(p, az, s.sub(s.along(a, x), ox)), s.sub_mul(q, az, s.sub(s.along(a, y), oy)));
+        let (bx, by) = (s.sub_mul(p, bz, s.sub(s.along(b, x), ox)), s.sub_mul(q, bz, s.sub(s.along(b, y), oy)));
+        let (cx, cy) = (s.sub_mul(p, cz, s.sub(s.along(c, x), ox)), s.sub_mul(q, cz, s.sub(s.along(c, y), oy)));
+        let u = s.mul_sub(cx, by, s.mul(cy, bx));
+        let v = s.mul_sub(ax, cy, s.mul(ay, cx));
+        let w = s.mul_sub(bx, ay, s.mul(by, ax));
+
+        let spread = s.larger(s.larger(ax, ay), s.larger(s.larger(bx, by), s.larger(cx, cy)));
+        let height = s.larger(az, s.larger(bz, cz));
+        let error = EdgeMargins::WITH_DISTANCES.error_by_height(s, height, spread);
+        // Below zero where all edge values have one sign, as far as the nearest of them is from zero.
+        let zero = s.splat(0.0);
+        let (low, high) = (s.smaller(u, s.smaller(v, w)), s.greater(u, s.greater(v, w)));
+        let apart = s.smaller(s.sub(zero, low), high);
+        let (hit, miss) = (s.less(apart, s.sub(zero, error)), s.less(error, apart));
+        let verdicts = Verdicts { hit, unsure: !(hit | miss) & ((1 << LANES) - 1) };
+        Look { verdicts, edges: [u, v, w], error, heights: [az, bz, cz], height }
+    }
+}
+
+impl<S: Simd> Look<S> {
+    /// Between which distances the exact ones lie, of the triangles that are hit for certain.
+    ///
+    /// The exact distance is the mean of the corners' heights with the exact edge values for weights, all of one sign, over
+    /// the direction's component. Edge values that err by e move the mean by 3 e times the spread of the heights over their
+    /// sum S: half of the spread times the sum of the changes of the weights, 6 e/S. The roundings of heights, products,
+    /// sums, the reciprocal and the last products are 10 u of the largest height; 16 u is for what they leave out.
+    #[inline(always)]
+    pub fn distances(&self, s: S, sight: &Sight) -> [S::Lanes; 2] {
+        let ([u, v, w], [a, b, c]) = (self.edges, self.heights);
+        let per_length = s.splat(sight.per_length);
+        let whole = s.mul(s.div(s.splat(1.0), s.add(u, s.add(v, w))), per_length);
+        let spread = s.sub(s.greater(a, s.greater(b, c)), s.smaller(a, s.smaller(b, c)));
+        let t = s.mul(s.mul_add(u, a, s.mul_add(v, b, s.mul(w, c))), whole);
+        let moved = s.mul(s.mul(spread, self.error), s.splat(WEIGHTS));
+        // What underflow adds is far below the second.
+        let rounded = s.mul_add(self.height, s.splat(HEIGHTS), s.splat(EdgeMargins::WITH_DISTANCES.underflow));
+        let rounded = s.mul(rounded, s.abs(per_length));
+        let error = s.mul_add(moved, s.abs(whole), rounded);
+        [s.sub(t, error), s.add(t, error)]
+    }
+}
+
 /// A ray ready to be tested against blocks.
 pub struct RayLanes<S: Simd> {
     /// Axes in sheared order: x, y, z.
-    axes: [usize; 3],
+    axes: [Axis; 3],
     /// Origin along these axes.
     origin: [S::Lanes; 3],
     shear: [S::Lanes; 2],
@@ -73,9 +159,9 @@ impl<S: Simd> RayLanes<S> {
     /// Spreads a ray over the lanes; none of the triangles that it is tested against is farther than `reach` ([`reach`]).
     #[inline(always)]
     pub fn new(s: S, ray: &RaySpace, reach: f32) -> Self {
-        let axes = [ray.x, ray.y, ray.z];
-        let origin = [s.splat(ray.origin[axes[0]]), s.splat(ray.origin[axes[1]]), s.splat(ray.origin[axes[2]])];
-        Self { axes, origin, shear: [s.splat(ray.shear.0), s.splat(ray.shear.1)], reach: s.splat(reach) }
+        let origin = [s.splat(ray.origin[ray.x]), s.splat(ray.origin[ray.y]), s.splat(ray.origin[ray.z])];
+        let shear = [s.splat(ray.shear.0), s.splat(ray.shear.1)];
+        Self { axes: AXES[ray.z % 3], origin, shear, reach: s.splat(reach) }
     }
 
     /// Tests eight triangles.
@@ -96,15 +182,15 @@ impl<S: Simd> RayLanes<S> {
     fn relative(&self, s: S, corner: &[Row; 3]) -> [S::Lanes; 3] {
         let [x, y, z] = self.axes;
         [
-            s.sub(s.load(&corner[x]), self.origin[0]),
-            s.sub(s.load(&corner[y]), self.origin[1]),
-            s.sub(s.load(&corner[z]), self.origin[2]),
+            s.sub(s.along(corner, x), self.origin[0]),
+            s.sub(s.along(corner, y), self.origin[1]),
+            s.sub(s.along(corner, z), self.origin[2]),
         ]
     }
 
     #[inline(always)]
     fn sheared(&self, s: S, [x, y, z]: [S::Lanes; 3]) -> [S::Lanes; 2] {
-        [s.sub(x, s.mul(self.shear[0], z)), s.sub(y, s.mul(self.shear[1], z))]
+        [s.sub_mul(self.shear[0], z, x), s.sub_mul(self.shear[1], z, y)]
     }
 }
 
@@ -167,7 +253,7 @@ impl<S: Lanewise<N>, const N: usize> RayRow<S, N> {
 
     #[inline(always)]
     fn sheared(&self, s: S, [x, y, z]: [S::Lanes; 3]) -> [S::Lanes; 2] {
-        [s.sub(x, s.mul(self.shear[0], z)), s.sub(y, s.mul(self.shear[1], z))]
+        [s.sub_mul(self.shear[0], z, x), s.sub_mul(self.shear[1], z, y)]
     }
 }
 
@@ -332,9 +418,9 @@ fn judge<S: Lanewise<N>, const N: usize>(
     margins: EdgeMargins,
 ) -> Verdicts {
     let [[ax, ay], [bx, by], [cx, cy]] = corners;
-    let u = s.sub(s.mul(cx, by), s.mul(cy, bx));
-    let v = s.sub(s.mul(ax, cy), s.mul(ay, cx));
-    let w = s.sub(s.mul(bx, ay), s.mul(by, ax));
+    let u = s.mul_sub(cx, by, s.mul(cy, bx));
+    let v = s.mul_sub(ax, cy, s.mul(ay, cx));
+    let w = s.mul_sub(bx, ay, s.mul(by, ax));
 
     let spread = s.greater(largest2(s, ax, ay), s.greater(largest2(s, bx, by), largest2(s, cx, cy)));
     let error = margins.error_lanes(s, reach, spread);

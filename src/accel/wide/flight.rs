@@ -7,45 +7,24 @@
 
 use std::marker::PhantomData;
 
+use super::best::{Met, Seeker};
 use super::node::{Child, Node, Tree};
-use super::slabs::{BoxMargins, Slabs};
-use super::walk::{Entry, ask_by_itself, has_direction, test_leaf};
-use crate::accel::query::{Goal, Query};
-use crate::accel::wave::{Wave, begin, end};
-use crate::accel::{Hit, NoProbe, Shapes};
+use super::ready::{Ready, ReadyRay};
+use super::settle::Settle;
+use super::slabs::BoxMargins;
+use super::walk::{Entry, ask_by_itself};
+use crate::accel::wave::Wave;
+use crate::accel::{Hit, NO_PRIM, NoProbe, Shapes};
 use crate::math::simd::{Kernel, LANES, Order, Simd};
-use crate::math::triangles::{RayLanes, reach};
 
-/// Rays in flight.
-const SLOTS: usize = 20;
+/// Rays in flight: one for each bit of a word.
+const SLOTS: usize = 32;
 
 /// Rays at leaves that are worth a turn.
-const LEAVES: usize = SLOTS / 2;
+const LEAVES: u32 = 16;
 
-/// The stacks of all slots: distances and children apart, so that eight are written at once.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Levels {
-    near: Vec<f32>,
-    child: Vec<u32>,
-    /// Entries of a slot.
-    stride: usize,
-}
-
-impl Levels {
-    /// For stacks of up to `most` entries.
-    pub(super) fn new(most: usize) -> Self {
-        // One below for the end, and eight above that are written and not used.
-        Self { near: Vec::new(), child: Vec::new(), stride: most + 1 + LANES }
-    }
-
-    fn prepare(&mut self) {
-        self.near.resize(self.stride * SLOTS, f32::NEG_INFINITY);
-        self.child.resize(self.stride * SLOTS, Child::END);
-        for bottom in (0..self.stride * SLOTS).step_by(self.stride) {
-            (self.near[bottom], self.child[bottom]) = (f32::NEG_INFINITY, Child::END);
-        }
-    }
-}
+/// Entries of a stack that trees may need here; what may need more goes another way.
+pub(super) const DEPTH: usize = 128;
 
 /// By octant and mask of lanes: the lanes in the mask, the farthest first as that octant sees them.
 pub(super) static FARTHEST_FIRST: [[Order; 256]; LANES] = farthest_first();
@@ -74,20 +53,14 @@ const fn farthest_first() -> [[Order; 256]; LANES] {
 }
 
 /// A ray in flight.
-struct Slot<'a, G: Goal, B> {
-    query: Query<'a, G>,
-    slabs: Slabs<B>,
-    /// Its number in the wave.
-    ray: usize,
-    octant: usize,
-    reach: f32,
-    limit: f32,
-    /// Where its stack begins, with an entry that is never taken off.
-    bottom: usize,
+struct Slot<B> {
+    seeker: Seeker<B>,
     /// Above the top of its stack.
     top: usize,
-    /// Where it is.
-    child: u32,
+    /// Its stack, distances and children apart, so that eight are written at once; the first is never taken off, and above
+    /// the last there is room for what is written and not used.
+    near: [f32; DEPTH + LANES],
+    children: [u32; DEPTH + LANES],
 }
 
 /// A wave of rays.
@@ -95,28 +68,63 @@ pub(super) struct InFlight<'w, W, B> {
     pub tree: &'w Tree,
     pub shapes: &'w Shapes,
     pub wave: &'w mut W,
-    pub stack: &'w mut Levels,
     /// For rays that go by themselves.
     pub entries: &'w mut [Entry],
     pub margins: PhantomData<B>,
 }
 
-/// Numbers of slots.
-struct List {
-    slots: [u8; SLOTS + 1],
-    len: usize,
+/// Slots by the bits of their numbers.
+struct Whereabouts {
+    nodes: u32,
+    leaves: u32,
+    ended: u32,
 }
 
-impl List {
-    const EMPTY: Self = Self { slots: [0; SLOTS + 1], len: 0 };
+/// All slots.
+struct Slots<B> {
+    slots: [Slot<B>; SLOTS],
+    /// Where each of them is; [`Child::END`] without a ray, too.
+    at: [[u32; LANES]; SLOTS / LANES],
+    /// Those that have a ray, by the bits of their numbers.
+    taken: u32,
+}
 
-    /// Adds a slot, or writes it where the next one goes and does not count it.
-    #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, reason = "fewer than 256 slots")]
-    fn push_if(&mut self, slot: usize, holds: bool) {
-        self.slots[self.len] = slot as u8;
-        self.len += usize::from(holds);
+impl<B: BoxMargins> Slots<B> {
+    fn empty() -> Self {
+        let slot = |_| Slot {
+            seeker: Seeker::new(&ReadyRay::default(), 0, NO_PRIM),
+            top: 1,
+            near: [f32::NEG_INFINITY; DEPTH + LANES],
+            children: [Child::END; DEPTH + LANES],
+        };
+        Self { slots: std::array::from_fn(slot), at: [[Child::END; LANES]; SLOTS / LANES], taken: 0 }
     }
+
+    /// Which of them are where.
+    #[inline(always)]
+    fn whereabouts<S: Simd>(&self, s: S) -> Whereabouts {
+        let (mut leaves, mut ended) = (0, 0);
+        for (i, at) in self.at.iter().enumerate() {
+            leaves |= s.high_bits(at) << (LANES * i);
+            ended |= s.find_word(Child::END, at) << (LANES * i);
+        }
+        Whereabouts { nodes: !leaves & self.taken, leaves: leaves & !ended, ended: ended & self.taken }
+    }
+
+    /// Where a slot is.
+    #[inline(always)]
+    fn at(&mut self, number: u32) -> (&mut Slot<B>, &mut u32) {
+        let number = number as usize % SLOTS;
+        (&mut self.slots[number], &mut self.at[number / LANES][number % LANES])
+    }
+}
+
+/// Rays that wait.
+struct Queue {
+    /// The eight that the next one is of.
+    ready: Ready,
+    /// The next one's number in the wave.
+    next: usize,
 }
 
 impl<W: Wave, B: BoxMargins> Kernel for InFlight<'_, W, B> {
@@ -124,155 +132,144 @@ impl<W: Wave, B: BoxMargins> Kernel for InFlight<'_, W, B> {
 
     #[inline(always)]
     fn run<S: Simd>(mut self, s: S) {
-        self.stack.prepare();
-        let (mut nodes, mut leaves, mut next) = (List::EMPTY, List::EMPTY, 0);
-        let mut slots: Vec<Slot<W::Goal, B>> = Vec::with_capacity(SLOTS);
-        for number in 0..SLOTS.min(self.wave.rays().len()) {
-            slots.push(self.vacant(number));
-            if self.start(s, &mut next, &mut slots[number]) {
-                slots[number].join(number, &mut nodes, &mut leaves);
+        let (mut queue, mut settle) = (Queue { ready: Ready::default(), next: 0 }, Settle::EMPTY);
+        let mut slots = Slots::<B>::empty();
+        for number in 0..u32::BITS {
+            self.start(s, &mut slots, number, &mut queue);
+        }
+        let mut met = [Met::NOTHING; SLOTS];
+        let mut nodes = slots.whereabouts(s).nodes;
+        while slots.taken != 0 {
+            self.step(s, &mut slots, nodes);
+            let at = slots.whereabouts(s);
+            nodes = at.nodes;
+            if nodes == 0 || (at.leaves | at.ended).count_ones() >= LEAVES {
+                let answered = self.test(s, &mut slots, at.leaves, &mut met);
+                self.renew(s, &mut slots, at.ended | answered, &mut queue, &mut settle);
+                nodes = slots.whereabouts(s).nodes;
             }
         }
-        while nodes.len + leaves.len > 0 {
-            self.step(s, &mut slots, &mut nodes, &mut leaves);
-            if leaves.len >= LEAVES || nodes.len == 0 {
-                self.test(s, &mut slots, &mut nodes, &mut leaves, &mut next);
-            }
-        }
+        settle.finish(s, self.wave);
     }
 }
 
-impl<G: Goal, B> Slot<'_, G, B> {
+impl<B: BoxMargins> Slot<B> {
     /// Takes the next child off the stack that may hold a hit.
     #[inline(always)]
-    fn pop(&mut self, stack: &Levels) {
+    fn pop(&mut self) -> u32 {
+        let mut top = self.top;
         loop {
-            self.top -= 1;
-            if stack.near[self.top] <= self.limit {
+            top -= 1;
+            if self.near[top % DEPTH] <= self.seeker.ready.limit {
                 break;
             }
         }
-        self.child = stack.child[self.top];
+        self.top = top;
+        self.children[top % DEPTH]
     }
 
     /// Puts the children that are met on the stack, the nearest last.
     #[inline(always)]
-    fn push<S: Simd>(&mut self, s: S, stack: &mut Levels, node: &Node, near: S::Lanes, met: u32) {
-        let order = FARTHEST_FIRST[self.octant % LANES][met as usize % 256];
-        let (nears, children) = (stack.near[self.top..].first_chunk_mut(), stack.child[self.top..].first_chunk_mut());
+    fn push<S: Simd>(&mut self, s: S, node: &Node, near: S::Lanes, met: u32) {
+        let order = FARTHEST_FIRST[self.seeker.ready.slabs.octant as usize % LANES][met as usize % 256];
+        let top = self.top % DEPTH;
+        let (nears, children) = (self.near[top..].first_chunk_mut(), self.children[top..].first_chunk_mut());
         // There is room for eight above every top.
         if let (Some(nears), Some(children)) = (nears, children) {
             s.arrange(near, order, nears);
             s.arrange_words(&node.children, order, children);
-            self.top += met.count_ones() as usize;
+            self.top = top + met.count_ones() as usize;
         }
-    }
-
-    /// Enters the list of those that are at nodes, or at leaves.
-    #[inline(always)]
-    fn join(&self, number: usize, nodes: &mut List, leaves: &mut List) {
-        let leaf = Child::is_leaf(self.child);
-        nodes.push_if(number, !leaf);
-        leaves.push_if(number, leaf);
     }
 }
 
-impl<'w, W: Wave, B: BoxMargins> InFlight<'w, W, B> {
-    /// A slot without a ray.
-    fn vacant(&self, number: usize) -> Slot<'w, W::Goal, B> {
-        let ray = &self.wave.rays()[0];
-        let slabs = Slabs::new(ray.origin, ray.dir, 0.0);
-        let (query, _) = begin(self.shapes, self.wave, 0, &mut NoProbe);
-        let bottom = number * self.stack.stride;
-        Slot { query, slabs, ray: 0, octant: 0, reach: 0.0, limit: 0.0, bottom, top: bottom + 1, child: Child::END }
-    }
-
-    /// Fills a slot with the next ray that meets a box of the root, if there is one; those before it that do not are
+impl<W: Wave, B: BoxMargins> InFlight<'_, W, B> {
+    /// Puts the next ray that meets a box of the root into a slot, if there is one; those before it that do not are
     /// answered.
     #[inline(always)]
-    fn start<S: Simd>(&mut self, s: S, next: &mut usize, slot: &mut Slot<'w, W::Goal, B>) -> bool {
-        let (tree, shapes) = (self.tree, self.shapes);
-        while *next < self.wave.rays().len() {
-            let i = *next;
-            *next += 1;
-            let ray = &self.wave.rays()[i];
-            if !(B::allow(tree, ray.origin) && has_direction(ray.dir)) {
-                ask_by_itself::<B, _, _, _>(s, tree, shapes, self.wave, i, self.entries, &mut NoProbe);
+    fn start<S: Simd>(&mut self, s: S, slots: &mut Slots<B>, number: u32, queue: &mut Queue) {
+        while queue.next < self.wave.rays().len() {
+            let i = queue.next;
+            let lane = i % LANES;
+            if lane == 0 {
+                queue.ready.take::<B, _, _>(s, self.tree, self.wave, i);
+            }
+            queue.next += 1;
+            if queue.ready.allowed >> lane & 1 == 0 {
+                ask_by_itself::<B, _, _, _>(s, self.tree, self.shapes, self.wave, i, self.entries, &mut NoProbe);
                 continue;
             }
-            let slabs = Slabs::<B>::new(ray.origin, ray.dir, self.wave.t_min(i));
-            let (near, met) = slabs.meets(s, &tree.nodes[0], B::widened(ray.t_max));
-            if met == 0 {
-                self.wave.take(i, Hit::MISS);
-                continue;
+            let (ray, root) = (&queue.ready.rays[lane], &self.tree.nodes[0]);
+            let (near, met) = ray.slabs.meets(s, root, ray.limit);
+            if met != 0 {
+                let (slot, at) = slots.at(number);
+                slot.seeker = Seeker::new(ray, i, self.wave.rays()[i].exclude);
+                slot.top = 1;
+                slot.push(s, root, near, met);
+                *at = slot.pop();
+                slots.taken |= 1 << number;
+                return;
             }
-            slot.octant = slabs.octant();
-            slot.reach = reach(ray.origin, &tree.bounds);
-            slot.slabs = slabs;
-            slot.ray = i;
-            let (query, usable) = begin(shapes, self.wave, i, &mut NoProbe);
-            if !usable {
-                self.wave.take(i, Hit::MISS);
-                continue;
-            }
-            slot.limit = B::widened(query.reach());
-            slot.query = query;
-            slot.top = slot.bottom + 1;
-            slot.push(s, self.stack, &tree.nodes[0], near, met);
-            slot.pop(self.stack);
-            return true;
+            self.wave.take(i, Hit::MISS);
         }
-        false
+        slots.taken &= !(1 << number);
     }
 
     /// Every ray that is at a node goes on to the next child.
     #[inline(always)]
-    fn step<S: Simd>(&mut self, s: S, slots: &mut [Slot<'w, W::Goal, B>], nodes: &mut List, leaves: &mut List) {
-        let turn = std::mem::replace(&mut nodes.len, 0);
-        for place in 0..turn {
-            let number = nodes.slots[place] as usize;
-            let slot = &mut slots[number];
-            let node = &self.tree.nodes[slot.child as usize];
-            let (near, met) = slot.slabs.meets(s, node, slot.limit);
-            slot.push(s, self.stack, node, near, met);
-            slot.pop(self.stack);
-            // One of both is where the ray goes, the other is the first, which is at hand.
-            let (node, block) = Child::either(slot.child);
-            if let (Some(node), Some(block)) = (self.tree.nodes.get(node), self.tree.blocks.get(block)) {
-                s.prefetch(node);
-                s.prefetch(block);
-            }
-            slot.join(number, nodes, leaves);
+    fn step<S: Simd>(&self, s: S, slots: &mut Slots<B>, mut nodes: u32) {
+        while nodes != 0 {
+            let (slot, at) = slots.at(nodes.trailing_zeros());
+            nodes &= nodes - 1;
+            let node = &self.tree.nodes[*at as usize];
+            let (near, met) = slot.seeker.ready.slabs.meets(s, node, slot.seeker.ready.limit);
+            slot.push(s, node, near, met);
+            *at = slot.pop();
+            let (node, block) = Child::either(*at);
+            s.prefetch_either(Child::is_leaf(*at), (&self.tree.blocks, block), (&self.tree.nodes, node));
         }
     }
 
-    /// Every ray that is at a leaf tests it and goes on; new rays take the places of those that have their answer.
+    /// Every ray that is at a leaf tests it and goes on; those that have their answer by that are returned. First all are
+    /// tested, then what was hit is looked at: nobody can foretell which, and so no test waits for another's outcome.
     #[inline(always)]
-    fn test<S: Simd>(
-        &mut self,
-        s: S,
-        slots: &mut [Slot<'w, W::Goal, B>],
-        nodes: &mut List,
-        leaves: &mut List,
-        next: &mut usize,
-    ) {
-        let turn = std::mem::replace(leaves, List::EMPTY);
-        for &number in &turn.slots[..turn.len] {
-            let slot = &mut slots[number as usize];
-            let done = slot.child == Child::END || {
-                let lanes = RayLanes::new(s, &slot.query.ray, slot.reach);
-                test_leaf(s, self.tree, Child::unpack(slot.child), &lanes, &mut slot.query, &mut NoProbe)
-            };
-            if done {
-                end(self.wave, slot.ray, &slot.query, &mut NoProbe);
-                if !self.start(s, next, slot) {
-                    continue;
-                }
-            } else {
-                slot.limit = B::widened(slot.query.reach());
-                slot.pop(self.stack);
-            }
-            slot.join(number as usize, nodes, leaves);
+    fn test<S: Simd>(&self, s: S, slots: &mut Slots<B>, mut leaves: u32, met: &mut [Met; SLOTS]) -> u32 {
+        let (mut turn, mut open, mut answered) = (leaves, 0, 0);
+        while turn != 0 {
+            let number = turn.trailing_zeros();
+            turn &= turn - 1;
+            let (slot, at) = slots.at(number);
+            let met = &mut met[number as usize % SLOTS];
+            *met = slot.seeker.meet(s, self.tree, *at);
+            open |= u32::from(met.open != 0) << number;
+        }
+        while open != 0 {
+            let number = open.trailing_zeros();
+            open &= open - 1;
+            let (slot, at) = slots.at(number);
+            let (block, _) = Child::block(*at);
+            let done = slot.seeker.take(self.tree, self.shapes, self.wave, block, &met[number as usize % SLOTS]);
+            answered |= u32::from(done) << number;
+        }
+        leaves &= !answered;
+        while leaves != 0 {
+            let (slot, at) = slots.at(leaves.trailing_zeros());
+            leaves &= leaves - 1;
+            *at = slot.pop();
+        }
+        answered
+    }
+
+    /// Answers the rays that have ended, and puts new ones in their places.
+    #[inline(always)]
+    fn renew<S: Simd>(&mut self, s: S, slots: &mut Slots<B>, mut ended: u32, queue: &mut Queue, settle: &mut Settle) {
+        while ended != 0 {
+            let number = ended.trailing_zeros();
+            ended &= ended - 1;
+            let (slot, at) = slots.at(number);
+            *at = Child::END;
+            settle.answer(s, self.tree, self.wave, slot.seeker.ray, slot.seeker.found());
+            self.start(s, slots, number, queue);
         }
     }
 }

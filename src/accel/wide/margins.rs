@@ -42,6 +42,11 @@ impl BoxMargins for NoSlab {
     const SLAB: f32 = 0.0;
 }
 
+struct NoPad;
+impl BoxMargins for NoPad {
+    const PAD: f32 = 0.0;
+}
+
 struct NoRange;
 impl BoxMargins for NoRange {
     const RANGE: f32 = 0.0;
@@ -76,6 +81,7 @@ fn without_the_error_of_distances_rays_through_edges_of_boxes_miss_what_is_insid
     let shapes = lattice(250);
     let rays = rays(&shapes, 40);
     assert_needed::<NoSlab>(&shapes, &rays);
+    assert_needed::<NoPad>(&shapes, &rays);
 }
 
 #[test]

@@ -14,6 +14,8 @@
 //! and every test gives an exact verdict, so that neither the order of visits nor the company of other rays can change an
 //! answer. Counts are those of one ray at a time: whoever listens gets that.
 
+mod alone;
+mod best;
 mod build;
 mod bundle;
 mod check;
@@ -23,6 +25,9 @@ mod listed;
 mod margins;
 mod node;
 mod packet;
+mod padded;
+mod ready;
+mod settle;
 mod slabs;
 pub(super) mod split;
 mod walk;
@@ -34,8 +39,9 @@ pub use split::Splitting;
 
 use std::marker::PhantomData;
 
+use self::alone::Alone;
 use self::bundle::RAYS;
-use self::flight::InFlight;
+use self::flight::{DEPTH, InFlight};
 use self::node::Tree;
 use self::packet::InPackets;
 use self::slabs::{BoxMargins, Derived};
@@ -48,8 +54,7 @@ use crate::math::simd::{Kernel, Level, Portable};
 /// How the rays of a wave are traced. The answers are the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RayOrder {
-    /// Side by side where most rays run alike; else in flight in trees that do not fit the caches near the processor, and
-    /// one after another in those that do, or where there are few.
+    /// Side by side where most rays run alike; else in flight, or one after another where there are few.
     Adaptive,
     /// One after another.
     OneByOne,
@@ -59,13 +64,13 @@ pub enum RayOrder {
     Packets,
 }
 
-/// Nodes and blocks from which on rays in flight pay: measured, between meshes of 70,000 and 260,000 triangles.
-const LARGE: usize = 1 << 15;
+/// Rays from which on it pays to have them in flight.
+const MANY: usize = 64;
 
 impl RayOrder {
-    /// What suits a wave through a tree of so many nodes and blocks: by how many of the packets that it would make run to
-    /// one octant, as far as three rays of each tell.
-    fn of<W: Wave>(wave: &W, size: usize) -> Self {
+    /// What suits a wave: by how many of the packets that it would make run to one octant, as far as three rays of each
+    /// tell.
+    fn of<W: Wave>(wave: &W) -> Self {
         let octant = |i: usize| {
             let dir = wave.rays()[i].dir;
             [dir.x, dir.y, dir.z].map(f32::is_sign_negative)
@@ -76,7 +81,7 @@ impl RayOrder {
         match packets {
             0 => Self::OneByOne,
             _ if 2 * alike > packets => Self::Packets,
-            _ if size >= LARGE => Self::InFlight,
+            _ if wave.rays().len() >= MANY => Self::InFlight,
             _ => Self::OneByOne,
         }
     }
@@ -183,13 +188,16 @@ impl Wide<'_> {
         let (tree, shapes, margins, probe) = (&self.tree, self.shapes, PhantomData::<B>, &mut NoProbe);
         let rays = match self.rays {
             _ if !shapes.planes.is_empty() || tree.nodes.is_empty() => RayOrder::OneByOne,
-            RayOrder::Adaptive => RayOrder::of(wave, tree.nodes.len() + tree.blocks.len()),
+            RayOrder::Adaptive => RayOrder::of(wave),
             rays => rays,
         };
+        let only_blocks = shapes.planes.is_empty() && !tree.nodes.is_empty() && tree.runs.is_empty();
         match rays {
-            RayOrder::InFlight => {
-                let Stack { entries, flight, .. } = stack;
-                self.run::<B, _>(InFlight { tree, shapes, wave, stack: flight, entries, margins });
+            RayOrder::InFlight if only_blocks && tree.most_behind() < DEPTH => {
+                self.run::<B, _>(InFlight { tree, shapes, wave, entries: &mut stack.entries, margins });
+            }
+            RayOrder::OneByOne | RayOrder::InFlight if only_blocks => {
+                self.run::<B, _>(Alone { tree, shapes, wave, stack: &mut stack.entries, margins });
             }
             RayOrder::Packets => {
                 let Stack { entries, branches, .. } = stack;

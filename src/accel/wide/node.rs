@@ -83,6 +83,13 @@ impl Child {
         ((word & !leaf) as usize, (word & leaf & ((1 << Self::COUNT) - 1)) as usize)
     }
 
+    /// The index of the block that a packed child leads to, if it leads to one, and how many of its lanes hold a triangle;
+    /// of [`Self::END`] an index that no block has.
+    #[inline(always)]
+    pub(super) fn block(word: u32) -> (u32, u32) {
+        (word & ((1 << Self::COUNT) - 1), word >> Self::COUNT & 15)
+    }
+
     #[inline(always)]
     pub(super) fn unpack(word: u32) -> Self {
         let (count, index) = (word >> Self::COUNT & 15, word & ((1 << Self::COUNT) - 1));
@@ -175,6 +182,11 @@ impl Tree {
         self.extent = bounds.lo.abs().max(bounds.hi.abs()).max_element();
         self.depth = if self.nodes.is_empty() { 0 } else { self.depth_below(0) };
         self
+    }
+
+    /// How long a stack may become: every node on the way leaves up to seven children behind.
+    pub(super) fn most_behind(&self) -> usize {
+        (LANES - 1) * self.depth as usize + LANES
     }
 
     fn depth_below(&self, node: u32) -> u32 {

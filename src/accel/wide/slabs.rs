@@ -10,7 +10,7 @@ use std::marker::PhantomData;
 
 use super::node::{Node, Tree};
 use crate::math::Vec3;
-use crate::math::bounds::{BOX_COORDINATES, BOX_MARGIN, BOX_UNDERFLOW, SLAB_F32};
+use crate::math::bounds::{BOX_COORDINATES, BOX_MARGIN, BOX_PAD, BOX_UNDERFLOW, SLAB_F32};
 use crate::math::simd::{Pick, Simd};
 
 /// What a walk allows for.
@@ -21,6 +21,8 @@ pub(in crate::accel) trait BoxMargins {
     const RANGE: f32 = BOX_MARGIN;
     /// What underflow adds to either.
     const UNDERFLOW: f32 = BOX_UNDERFLOW;
+    /// How much larger than they are boxes are taken to be by [`PaddedSlabs`](super::padded::PaddedSlabs).
+    const PAD: f32 = BOX_PAD;
     /// Largest coordinate with which boxes are asked.
     const COORDINATES: f32 = BOX_COORDINATES;
     /// Whether walks are compiled for every instruction set, or only for none.
@@ -61,8 +63,6 @@ pub(super) struct Slabs<B> {
     /// Rows of the planes that come first on each axis, and of those that come last.
     first: [Pick; 3],
     last: [Pick; 3],
-    /// Bit k is set where the ray runs backwards along axis k.
-    octant: usize,
     from: f32,
     margins: PhantomData<B>,
 }
@@ -76,7 +76,6 @@ impl<B: BoxMargins> Slabs<B> {
             inverse: [reciprocal(dir.x), reciprocal(dir.y), reciprocal(dir.z)],
             first: [Pick::new(x), Pick::new(2 + y), Pick::new(4 + z)],
             last: [Pick::new(1 - x), Pick::new(3 - y), Pick::new(5 - z)],
-            octant: x | y << 1 | z << 2,
             from: B::started(t_min),
             margins: PhantomData,
         }
@@ -94,12 +93,6 @@ impl<B: BoxMargins> Slabs<B> {
         }
         let slack = s.add(s.mul(s.abs(far), s.splat(B::SLAB)), s.splat(B::UNDERFLOW));
         (near, s.at_most(near, s.add(far, slack)))
-    }
-
-    /// The octant that the ray runs to: bit k is set where it runs backwards along axis k.
-    #[inline(always)]
-    pub(super) fn octant(&self) -> usize {
-        self.octant
     }
 }
 

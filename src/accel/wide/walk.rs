@@ -2,7 +2,6 @@
 
 use std::marker::PhantomData;
 
-use super::flight::Levels;
 use super::node::{Child, Node, Tree};
 use super::packet::Branch;
 use super::slabs::{BoxMargins, Slabs};
@@ -25,21 +24,15 @@ pub(super) struct Entry {
 pub struct Stack {
     /// Of one ray.
     pub(super) entries: Vec<Entry>,
-    /// Of many rays.
-    pub(super) flight: Levels,
     /// Of a packet.
     pub(super) branches: Vec<Branch>,
 }
 
 impl Stack {
-    /// For walks down `tree`: every node on the way leaves up to seven children behind.
+    /// For walks down `tree`.
     pub(super) fn new(tree: &Tree) -> Self {
-        let most = (LANES - 1) * tree.depth as usize + LANES;
-        Self {
-            entries: vec![Entry::default(); most],
-            flight: Levels::new(most),
-            branches: vec![Branch::default(); most],
-        }
+        let most = tree.most_behind();
+        Self { entries: vec![Entry::default(); most], branches: vec![Branch::default(); most] }
     }
 }
 

@@ -1,7 +1,7 @@
 //! However the rays of a wave are traced, on whatever instruction set: the answers are those of brute force.
 
 use super::flight::FARTHEST_FIRST;
-use super::{LARGE, RayOrder, Splitting, Wide};
+use super::{MANY, RayOrder, Splitting, Wide};
 use crate::accel::tests::scenes;
 use crate::accel::{Accel, Hit, NoProbe, Ray, Shapes, Unculled};
 use crate::math::Vec3;
@@ -70,20 +70,17 @@ fn a_wave_may_be_of_any_length() {
 }
 
 #[test]
-fn a_wave_goes_in_packets_where_rays_run_alike_and_in_flight_where_not_and_the_tree_is_large() {
+fn a_wave_goes_in_packets_where_rays_run_alike_and_in_flight_where_not_and_there_are_many() {
     let shapes = scenes::soup(60, 0.4);
-    let of = |rays: &[Ray], size: usize| {
+    let of = |rays: &[Ray]| {
         let mut hits = vec![Hit::MISS; rays.len()];
-        RayOrder::of(
-            &crate::accel::wave::ForFirst { rays, hits: &mut hits, test: crate::accel::intersector::Exact },
-            size,
-        )
+        RayOrder::of(&crate::accel::wave::ForFirst { rays, hits: &mut hits, test: crate::accel::intersector::Exact })
     };
     let mixed = scenes::rays(&shapes, 40);
-    assert_eq!((of(&mixed, LARGE), of(&mixed, LARGE - 1)), (RayOrder::InFlight, RayOrder::OneByOne));
+    assert_eq!((of(&mixed[..MANY]), of(&mixed[..MANY - 1])), (RayOrder::InFlight, RayOrder::OneByOne));
     let toward = |k: usize| Ray { dir: Vec3::new(1.0, 2.0 + k as f32 * 0.01, 3.0), ..mixed[0] };
-    assert_eq!(of(&(0..64).map(toward).collect::<Vec<_>>(), 1), RayOrder::Packets);
-    assert_eq!(of(&mixed[..9], LARGE), RayOrder::OneByOne);
+    assert_eq!(of(&(0..64).map(toward).collect::<Vec<_>>()), RayOrder::Packets);
+    assert_eq!(of(&mixed[..9]), RayOrder::OneByOne);
 }
 
 #[test]

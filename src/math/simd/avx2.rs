@@ -8,9 +8,9 @@
 use std::arch::x86_64::*;
 
 use super::pair::Pair;
-use super::{Kernel, LANES, Lanewise, Order, Pick, Row, Simd};
+use super::{Axis, Kernel, LANES, Lanewise, Order, Pick, Row, Simd};
 
-/// Proof that the processor has AVX2 and the bit instructions that came with it.
+/// Proof that the processor has AVX2 and the fused and bit instructions that came with it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Avx2(());
 
@@ -18,6 +18,7 @@ impl Avx2 {
     /// A token if the processor has what [`Self::run`] compiles for.
     pub(super) fn detect() -> Option<Self> {
         let has = is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("fma")
             && is_x86_feature_detected!("bmi1")
             && is_x86_feature_detected!("bmi2")
             && is_x86_feature_detected!("lzcnt")
@@ -27,7 +28,7 @@ impl Avx2 {
 
     #[inline]
     pub(super) fn run<K: Kernel>(self, kernel: K) -> K::Output {
-        #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+        #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
         fn compiled<K: Kernel>(token: Avx2, kernel: K) -> K::Output {
             kernel.run(token)
         }
@@ -38,7 +39,7 @@ impl Avx2 {
 
 /// Eight lanes for a token that proves AVX2.
 macro_rules! eight_lanes {
-    ($token:ty, $wide:ty, $widened:expr) => {
+    ($token:ty, $wide:ty, $widened:expr, $larger:expr) => {
         impl Lanewise<LANES> for $token {
             type Lanes = __m256;
             type Doubles = [__m256d; 2];
@@ -85,6 +86,24 @@ macro_rules! eight_lanes {
             fn div(self, a: __m256, b: __m256) -> __m256 {
                 // SAFETY: as above.
                 unsafe { _mm256_div_ps(a, b) }
+            }
+
+            #[inline(always)]
+            fn mul_add(self, a: __m256, b: __m256, c: __m256) -> __m256 {
+                // SAFETY: as above.
+                unsafe { _mm256_fmadd_ps(a, b, c) }
+            }
+
+            #[inline(always)]
+            fn mul_sub(self, a: __m256, b: __m256, c: __m256) -> __m256 {
+                // SAFETY: as above.
+                unsafe { _mm256_fmsub_ps(a, b, c) }
+            }
+
+            #[inline(always)]
+            fn sub_mul(self, a: __m256, b: __m256, c: __m256) -> __m256 {
+                // SAFETY: as above.
+                unsafe { _mm256_fnmadd_ps(a, b, c) }
             }
 
             #[inline(always)]
@@ -278,9 +297,50 @@ macro_rules! eight_lanes {
             }
 
             #[inline(always)]
+            fn choose(self, mask: u32, a: __m256, b: __m256) -> __m256 {
+                // SAFETY: as above.
+                unsafe { _mm256_blendv_ps(b, a, _mm256_castsi256_ps(lanes_in(mask))) }
+            }
+
+            #[inline(always)]
+            fn high_bits(self, words: &[u32; LANES]) -> u32 {
+                // SAFETY: as above; reads eight words, with no demand on alignment.
+                unsafe {
+                    let words = _mm256_loadu_si256(words.as_ptr().cast());
+                    _mm256_movemask_ps(_mm256_castsi256_ps(words)).cast_unsigned()
+                }
+            }
+
+            #[inline(always)]
+            fn signs(self, a: __m256) -> u32 {
+                // SAFETY: as above.
+                unsafe { _mm256_movemask_ps(a).cast_unsigned() }
+            }
+
+            #[inline(always)]
+            fn larger(self, a: __m256, b: __m256) -> __m256 {
+                $larger(self, a, b)
+            }
+
+            #[inline(always)]
+            fn with_sign(self, a: __m256, b: __m256) -> __m256 {
+                // SAFETY: as above.
+                unsafe {
+                    let sign = _mm256_set1_ps(-0.0);
+                    _mm256_or_ps(_mm256_andnot_ps(sign, a), _mm256_and_ps(sign, b))
+                }
+            }
+
+            #[inline(always)]
+            fn along(self, rows: &[Row; 3], Axis(i): Axis) -> __m256 {
+                // SAFETY: as above; an axis is less than 3 by how it is made, so the row is one of these.
+                unsafe { _mm256_loadu_ps(rows.as_ptr().byte_add(i as usize).cast()) }
+            }
+
+            #[inline(always)]
             fn pick(self, rows: &[Row; 6], Pick(i): Pick) -> __m256 {
                 // SAFETY: as above; a pick is less than 6 by how it is made, so the row is one of these.
-                unsafe { _mm256_loadu_ps(rows.as_ptr().add(i).cast()) }
+                unsafe { _mm256_loadu_ps(rows.as_ptr().byte_add(i as usize).cast()) }
             }
 
             #[inline(always)]
@@ -349,13 +409,29 @@ macro_rules! eight_lanes {
                     unsafe { _mm_prefetch::<_MM_HINT_T0>(first.add(line)) };
                 }
             }
+
+            #[inline(always)]
+            fn prefetch_either<T, U>(self, first: bool, a: (&[T], usize), b: (&[U], usize)) {
+                let (a, b): (*const i8, *const i8) =
+                    (a.0.as_ptr().wrapping_add(a.1).cast(), b.0.as_ptr().wrapping_add(b.1).cast());
+                let at = if first { a } else { b };
+                for line in (0..256).step_by(64) {
+                    // SAFETY: as above; nothing is read, so that it does not matter where the address lies.
+                    unsafe { _mm_prefetch::<_MM_HINT_T0>(at.wrapping_add(line)) };
+                }
+            }
         }
     };
 }
 
 pub(super) use eight_lanes;
 
-eight_lanes!(Avx2, Pair<Avx2>, Pair);
+eight_lanes!(Avx2, Pair<Avx2>, Pair, larger);
+
+#[inline(always)]
+fn larger(s: Avx2, a: __m256, b: __m256) -> __m256 {
+    s.greater(s.abs(a), s.abs(b))
+}
 
 /// All bits of the lanes of a mask.
 #[inline(always)]

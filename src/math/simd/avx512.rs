@@ -8,7 +8,7 @@
 use std::arch::x86_64::*;
 
 use super::avx2::{Avx2, eight_lanes, lanes_in, lanes_of};
-use super::{Kernel, LANES, Lanewise, Order, Pick, Row, Simd, WIDE};
+use super::{Axis, Kernel, LANES, Lanewise, Order, Pick, Row, Simd, WIDE};
 
 /// Proof that the processor has AVX-512 with 256-bit forms, double words and quad words, and what AVX2 came with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,7 +36,7 @@ impl Avx512 {
 
     #[inline]
     pub(super) fn run<K: Kernel>(self, kernel: K) -> K::Output {
-        #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,bmi1,bmi2,lzcnt,popcnt")]
+        #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
         fn compiled<K: Kernel>(token: Avx512, kernel: K) -> K::Output {
             kernel.run(token)
         }
@@ -45,7 +45,13 @@ impl Avx512 {
     }
 }
 
-eight_lanes!(Avx512, Sixteen, |_: Avx512| Sixteen(()));
+eight_lanes!(Avx512, Sixteen, |_: Avx512| Sixteen(()), larger);
+
+#[inline(always)]
+fn larger(_: Avx512, a: __m256, b: __m256) -> __m256 {
+    // SAFETY: the token proves the features. The greater size, without a sign.
+    unsafe { _mm256_range_ps::<0b1011>(a, b) }
+}
 
 /// Both halves of sixteen numbers.
 #[inline(always)]
@@ -101,6 +107,24 @@ impl Lanewise<WIDE> for Sixteen {
     fn div(self, a: __m512, b: __m512) -> __m512 {
         // SAFETY: as above.
         unsafe { _mm512_div_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn mul_add(self, a: __m512, b: __m512, c: __m512) -> __m512 {
+        // SAFETY: as above.
+        unsafe { _mm512_fmadd_ps(a, b, c) }
+    }
+
+    #[inline(always)]
+    fn mul_sub(self, a: __m512, b: __m512, c: __m512) -> __m512 {
+        // SAFETY: as above.
+        unsafe { _mm512_fmsub_ps(a, b, c) }
+    }
+
+    #[inline(always)]
+    fn sub_mul(self, a: __m512, b: __m512, c: __m512) -> __m512 {
+        // SAFETY: as above.
+        unsafe { _mm512_fnmadd_ps(a, b, c) }
     }
 
     #[inline(always)]

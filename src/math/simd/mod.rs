@@ -1,8 +1,8 @@
 //! Eight and sixteen `f32` at once, on whatever the processor has.
 //!
 //! A [`Kernel`] is written once over [`Simd`]; [`Level::run`] compiles it for each instruction set and takes the best one
-//! that the machine offers. Nothing is fused and every operation rounds as its scalar form does, so that a kernel gives
-//! the same bits on every level.
+//! that the machine offers. Every operation but `mul_add` and its kin rounds as its scalar form does, so that a kernel
+//! gives the same bits on every level.
 //!
 //! The only `unsafe` code of the library is in `avx2`, `avx512` and `neon`: a value of a level's token type exists only after
 //! the processor was asked, and the operations of a level take its token.
@@ -54,6 +54,12 @@ pub trait Lanewise<const N: usize>: Copy {
     fn mul(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
     /// a / b.
     fn div(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
+    /// a · b + c, rounded once or twice: for what is bounded either way, and decides no bit of an answer.
+    fn mul_add(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes;
+    /// a · b − c, in the same way.
+    fn mul_sub(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes;
+    /// c − a · b, in the same way.
+    fn sub_mul(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes;
     /// |a|.
     fn abs(self, a: Self::Lanes) -> Self::Lanes;
     /// The greater of both; b where one is NaN.
@@ -111,6 +117,21 @@ pub trait Simd: Lanewise<LANES> {
 
     /// Sixteen lanes.
     fn wide(self) -> Self::Wide;
+    /// `a` in the lanes of `mask`, else `b`.
+    fn choose(self, mask: u32, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
+    /// Which words have their highest bit set.
+    fn high_bits(self, words: &[u32; LANES]) -> u32;
+    /// Which lanes have a negative sign, that of zero and NaN included.
+    fn signs(self, a: Self::Lanes) -> u32;
+    /// The greater of both sizes; either where one is NaN.
+    #[inline(always)]
+    fn larger(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+        self.greater(self.abs(a), self.abs(b))
+    }
+    /// The sizes of `a` with the signs of `b`.
+    fn with_sign(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
+    /// The row of an axis.
+    fn along(self, rows: &[Row; 3], axis: Axis) -> Self::Lanes;
     /// One of six rows.
     fn pick(self, rows: &[Row; 6], pick: Pick) -> Self::Lanes;
     /// Rows of four become columns: lane k of the i-th result is number i of the k-th row.
@@ -123,17 +144,40 @@ pub trait Simd: Lanewise<LANES> {
     fn arrange_words(self, words: &[u32; LANES], order: Order, to: &mut [u32; LANES]);
     /// Tells the processor that this is read soon.
     fn prefetch<T>(self, at: &T);
+    /// Tells the processor that the first four cache lines of one of both are read soon, without a branch; elements that
+    /// there are not do no harm.
+    fn prefetch_either<T, U>(self, first: bool, a: (&[T], usize), b: (&[U], usize));
 }
 
-/// Which of six rows: found once and used often, without a test that it is one of them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Pick(usize);
+/// Which of six rows, by the bytes before it: found once and used often, without a test that it is one of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Pick(u32);
 
 impl Pick {
     /// Row `i` of 0 to 5.
     #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "less than 6 rows")]
     pub const fn new(i: usize) -> Self {
-        Self(i % 6)
+        Self((i % 6 * size_of::<Row>()) as u32)
+    }
+
+    /// The other row of a pair: 0 and 1, 2 and 3, 4 and 5.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "a row is small")]
+    pub const fn other(self) -> Self {
+        Self(self.0 ^ size_of::<Row>() as u32)
+    }
+}
+
+/// Which of three axes, by the bytes before its row: found once and used often, without a test that it is one of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Axis(u32);
+
+impl Axis {
+    /// Axis `i` of 0 to 2.
+    #[inline(always)]
+    pub const fn new(i: usize) -> Self {
+        Self((i % 3 * size_of::<Row>()) as u32)
     }
 }
 

@@ -7,7 +7,7 @@
 use std::arch::aarch64::*;
 
 use super::pair::Pair;
-use super::{Kernel, LANES, Lanewise, Order, Pick, Row, Simd};
+use super::{Axis, Kernel, LANES, Lanewise, Order, Pick, Row, Simd};
 
 /// The instructions that every processor of the family has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -170,6 +170,24 @@ impl Lanewise<LANES> for Neon {
     fn div(self, a: Floats, b: Floats) -> Floats {
         // SAFETY: every processor of the family has the instructions.
         unsafe { [vdivq_f32(a[0], b[0]), vdivq_f32(a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn mul_add(self, a: Floats, b: Floats, c: Floats) -> Floats {
+        // SAFETY: every processor of the family has the instructions.
+        unsafe { [vfmaq_f32(c[0], a[0], b[0]), vfmaq_f32(c[1], a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn mul_sub(self, a: Floats, b: Floats, c: Floats) -> Floats {
+        // SAFETY: every processor of the family has the instructions.
+        unsafe { [vfmaq_f32(vnegq_f32(c[0]), a[0], b[0]), vfmaq_f32(vnegq_f32(c[1]), a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn sub_mul(self, a: Floats, b: Floats, c: Floats) -> Floats {
+        // SAFETY: every processor of the family has the instructions.
+        unsafe { [vfmsq_f32(c[0], a[0], b[0]), vfmsq_f32(c[1], a[1], b[1])] }
     }
 
     #[inline(always)]
@@ -375,8 +393,42 @@ impl Simd for Neon {
     }
 
     #[inline(always)]
+    fn choose(self, mask: u32, a: Floats, b: Floats) -> Floats {
+        // SAFETY: every processor of the family has the instructions.
+        unsafe { [vbslq_f32(lanes_in(mask), a[0], b[0]), vbslq_f32(lanes_in(mask >> 4), a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn high_bits(self, words: &[u32; LANES]) -> u32 {
+        (0..LANES).fold(0, |mask, k| mask | words[k] >> 31 << k)
+    }
+
+    #[inline(always)]
+    fn signs(self, a: Floats) -> u32 {
+        // SAFETY: every processor of the family has the instructions.
+        unsafe {
+            let negative = |a| mask(vreinterpretq_u32_s32(vshrq_n_s32::<31>(vreinterpretq_s32_f32(a))));
+            negative(a[0]) | negative(a[1]) << 4
+        }
+    }
+
+    #[inline(always)]
+    fn with_sign(self, a: Floats, b: Floats) -> Floats {
+        // SAFETY: every processor of the family has the instructions.
+        unsafe {
+            let sign = vdupq_n_u32(1 << 31);
+            [vbslq_f32(sign, b[0], a[0]), vbslq_f32(sign, b[1], a[1])]
+        }
+    }
+
+    #[inline(always)]
+    fn along(self, rows: &[Row; 3], Axis(i): Axis) -> Floats {
+        self.load(&rows[i as usize / size_of::<Row>()])
+    }
+
+    #[inline(always)]
     fn pick(self, rows: &[Row; 6], Pick(i): Pick) -> Floats {
-        self.load(&rows[i])
+        self.load(&rows[i as usize / size_of::<Row>()])
     }
 
     #[inline(always)]
@@ -421,6 +473,9 @@ impl Simd for Neon {
             store_words(vreinterpretq_u32_u8(high), &mut halves[1]);
         }
     }
+
+    #[inline(always)]
+    fn prefetch_either<T, U>(self, _: bool, _: (&[T], usize), _: (&[U], usize)) {}
 
     #[inline(always)]
     fn prefetch<T>(self, _: &T) {}

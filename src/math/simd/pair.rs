@@ -67,6 +67,21 @@ impl<S: Lanewise<LANES>> Lanewise<WIDE> for Pair<S> {
     }
 
     #[inline(always)]
+    fn mul_add(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes {
+        [self.0.mul_add(a[0], b[0], c[0]), self.0.mul_add(a[1], b[1], c[1])]
+    }
+
+    #[inline(always)]
+    fn mul_sub(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes {
+        [self.0.mul_sub(a[0], b[0], c[0]), self.0.mul_sub(a[1], b[1], c[1])]
+    }
+
+    #[inline(always)]
+    fn sub_mul(self, a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes {
+        [self.0.sub_mul(a[0], b[0], c[0]), self.0.sub_mul(a[1], b[1], c[1])]
+    }
+
+    #[inline(always)]
     fn greater(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
         [self.0.greater(a[0], b[0]), self.0.greater(a[1], b[1])]
     }

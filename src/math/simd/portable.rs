@@ -1,7 +1,7 @@
 //! The scalar form: what the other levels must equal bit for bit.
 
 use super::pair::Pair;
-use super::{LANES, Lanewise, Order, Pick, Row, Simd};
+use super::{Axis, LANES, Lanewise, Order, Pick, Row, Simd};
 
 /// Needs nothing of the processor.
 #[derive(Clone, Copy, Debug)]
@@ -68,6 +68,21 @@ impl Lanewise<LANES> for Portable {
     #[inline(always)]
     fn div(self, a: Row, b: Row) -> Row {
         each(a, b, |a, b| a / b)
+    }
+
+    #[inline(always)]
+    fn mul_add(self, a: Row, b: Row, c: Row) -> Row {
+        self.add(self.mul(a, b), c)
+    }
+
+    #[inline(always)]
+    fn mul_sub(self, a: Row, b: Row, c: Row) -> Row {
+        self.sub(self.mul(a, b), c)
+    }
+
+    #[inline(always)]
+    fn sub_mul(self, a: Row, b: Row, c: Row) -> Row {
+        self.sub(c, self.mul(a, b))
     }
 
     #[inline(always)]
@@ -201,8 +216,34 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
+    fn choose(self, mask: u32, a: Row, mut b: Row) -> Row {
+        put(mask, &a, &mut b);
+        b
+    }
+
+    #[inline(always)]
+    fn high_bits(self, words: &[u32; LANES]) -> u32 {
+        (0..LANES).fold(0, |mask, k| mask | words[k] >> 31 << k)
+    }
+
+    #[inline(always)]
+    fn signs(self, a: Row) -> u32 {
+        mask(a, a, |a, _| a.is_sign_negative())
+    }
+
+    #[inline(always)]
+    fn with_sign(self, a: Row, b: Row) -> Row {
+        each(a, b, f32::copysign)
+    }
+
+    #[inline(always)]
+    fn along(self, rows: &[Row; 3], Axis(i): Axis) -> Row {
+        rows[i as usize / size_of::<Row>()]
+    }
+
+    #[inline(always)]
     fn pick(self, rows: &[Row; 6], Pick(i): Pick) -> Row {
-        rows[i]
+        rows[i as usize / size_of::<Row>()]
     }
 
     #[inline(always)]
@@ -224,6 +265,9 @@ impl Simd for Portable {
     fn arrange_words(self, words: &[u32; LANES], order: Order, to: &mut [u32; LANES]) {
         *to = std::array::from_fn(|k| words[(order >> (8 * k)) as usize % LANES]);
     }
+
+    #[inline(always)]
+    fn prefetch_either<T, U>(self, _: bool, _: (&[T], usize), _: (&[U], usize)) {}
 
     #[inline(always)]
     fn prefetch<T>(self, _: &T) {}

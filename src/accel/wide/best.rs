@@ -1,0 +1,179 @@
+//! The best hit of a ray so far, known by an interval: most hits need no more to be told from each other.
+//!
+//! Exact distances are dear. Where the intervals of two hits do not touch, the nearer is known without them, and only the
+//! hit that is left at the end needs its own; where they do, or touch an end of the ray's range, the exact test decides.
+
+use std::marker::PhantomData;
+
+use super::node::{Child, Tree};
+use super::ready::ReadyRay;
+use super::slabs::BoxMargins;
+use crate::accel::query::{Goal, Query};
+use crate::accel::wave::Wave;
+use crate::accel::{NO_PRIM, NoProbe, Shapes};
+use crate::math::simd::{LANES, Row, Simd};
+use crate::math::triangle;
+use crate::math::triangles::Look;
+
+/// A ray and what it has found.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seeker<B> {
+    pub ready: ReadyRay,
+    /// Its number in the wave.
+    pub ray: usize,
+    exclude: u32,
+    best: Best,
+    margins: PhantomData<B>,
+}
+
+/// A hit by an interval.
+#[derive(Clone, Copy, Debug)]
+struct Best {
+    /// Its exact distance lies between these. Without a hit: infinite, and the end of the ray's range.
+    low: f32,
+    high: f32,
+    place: Place,
+}
+
+/// What a ray meets of a block.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Met {
+    /// Between which distances, where that is certain.
+    low: Row,
+    high: Row,
+    /// Lanes that are hit for certain, and those of the others that may be, too.
+    hit: u32,
+    pub open: u32,
+}
+
+impl Met {
+    pub(super) const NOTHING: Self = Self { low: [0.0; LANES], high: [0.0; LANES], hit: 0, open: 0 };
+}
+
+/// The first lanes.
+#[inline(always)]
+fn lanes(count: u32) -> u32 {
+    (1 << count) - 1
+}
+
+/// A triangle in a block.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub block: u32,
+    pub lane: u32,
+    /// [`NO_PRIM`] where there is none.
+    pub prim: u32,
+}
+
+impl Place {
+    pub(super) const NONE: Self = Self { block: 0, lane: 0, prim: NO_PRIM };
+}
+
+impl<B: BoxMargins> Seeker<B> {
+    /// A ray that was made ready, of this number in its wave.
+    #[inline(always)]
+    pub(super) fn new(ready: &ReadyRay, ray: usize, exclude: u32) -> Self {
+        Self {
+            ready: *ready,
+            ray,
+            exclude,
+            best: Best { low: f32::INFINITY, high: ready.t_max, place: Place::NONE },
+            margins: PhantomData,
+        }
+    }
+
+    /// The hit that is left.
+    #[inline(always)]
+    pub(super) fn found(&self) -> Place {
+        self.best.place
+    }
+
+    /// Tests the triangles of a leaf, a block, and tells whether nothing more can matter.
+    #[inline(always)]
+    pub(super) fn test<S: Simd, W: Wave>(&mut self, s: S, tree: &Tree, shapes: &Shapes, wave: &W, leaf: u32) -> bool {
+        let (index, count) = Child::block(leaf);
+        let Some(block) = tree.blocks.get(index as usize) else { return true };
+        let look = self.ready.sight.look(s, &block.corners);
+        if (look.verdicts.hit | look.verdicts.unsure) & lanes(count) == 0 {
+            return false;
+        }
+        let met = self.met(s, &look, count);
+        met.open != 0 && self.take(tree, shapes, wave, index, &met)
+    }
+
+    /// What is met of a leaf, whose index is below the number of blocks.
+    #[inline(always)]
+    pub(super) fn meet<S: Simd>(&self, s: S, tree: &Tree, leaf: u32) -> Met {
+        let (index, count) = Child::block(leaf);
+        self.met(s, &self.ready.sight.look(s, &tree.blocks[index as usize].corners), count)
+    }
+
+    #[inline(always)]
+    fn met<S: Simd>(&self, s: S, look: &Look<S>, count: u32) -> Met {
+        let [low, high] = look.distances(s, &self.ready.sight);
+        let in_time = s.at_most(low, s.splat(self.best.high)) & s.at_most(s.splat(self.ready.t_min), high);
+        let (hit, unsure) = (look.verdicts.hit & in_time & lanes(count), look.verdicts.unsure & lanes(count));
+        Met { low: s.store(low), high: s.store(high), hit, open: hit | unsure }
+    }
+
+    /// Takes what is met of a block, and tells whether nothing more can matter.
+    #[inline(always)]
+    pub(super) fn take<W: Wave>(&mut self, tree: &Tree, shapes: &Shapes, wave: &W, index: u32, met: &Met) -> bool {
+        let (prims, mut open) = (&tree.blocks[index as usize].prims, met.open);
+        while open != 0 {
+            let lane = open.trailing_zeros();
+            open &= open - 1;
+            let at = lane as usize % LANES;
+            let place = Place { block: index, lane, prim: prims[at] };
+            let certain = met.hit >> lane & 1 == 1;
+            if self.offer(shapes, wave, place, certain.then_some((met.low[at], met.high[at]))) {
+                return true;
+            }
+        }
+        self.ready.limit = B::widened(self.best.high);
+        false
+    }
+
+    /// Takes a triangle that is hit between these distances, or may be hit; and tells whether that is the answer.
+    #[inline(always)]
+    fn offer<W: Wave>(&mut self, shapes: &Shapes, wave: &W, place: Place, between: Option<(f32, f32)>) -> bool {
+        if place.prim == self.exclude {
+            return false;
+        }
+        match between {
+            Some((low, high)) if low > self.best.high || high < self.ready.t_min => false,
+            Some((low, high)) if (low > self.ready.t_min) & (high < self.best.low) & (high <= self.best.high) => {
+                if !wave.goal(self.ray).wants(shapes, place.prim) {
+                    return false;
+                }
+                self.best = Best { low, high, place };
+                W::Goal::ANY
+            }
+            _ => self.decide(shapes, wave, place, between.is_some()),
+        }
+    }
+
+    /// The best hit and another by the exact test.
+    #[cold]
+    #[inline(never)]
+    fn decide<W: Wave>(&mut self, shapes: &Shapes, wave: &W, place: Place, certain: bool) -> bool {
+        let i = self.ray;
+        let (mut query, usable) = Query::new(shapes, &wave.rays()[i], wave.t_min(i), wave.goal(i));
+        if !usable || !certain && !triangle::is_hit(&query.ray, &shapes.triangle(place.prim)) {
+            return false;
+        }
+        for place in [self.best.place, place].into_iter().filter(|place| place.prim != NO_PRIM) {
+            query.take(place.prim, &shapes.triangle(place.prim), true, &mut NoProbe);
+        }
+        if W::Goal::ANY {
+            if query.reach() < query.t_min {
+                self.best.place = place;
+                return true;
+            }
+        } else if let Some((t, prim)) = query.goal.best() {
+            let place = if prim == place.prim { place } else { self.best.place };
+            self.best = Best { low: t, high: t, place };
+        }
+        false
+    }
+}

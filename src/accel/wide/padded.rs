@@ -1,0 +1,82 @@
+//! A ray against the eight boxes of a node, each a little larger than it is: one operation a plane.
+//!
+//! The distance to a plane is plane · (1/d) − o/d, which errs by parts of the coordinates' sizes instead of parts of
+//! itself: that is what [`BOX_PAD`](crate::math::bounds::BOX_PAD) is for. A ray meets the padded box of whatever it hits, up
+//! to the error of the hit's own distance, which `limit` allows for. Rays with numbers too large or too small for that
+//! ([`BOX_RANGE`](crate::math::bounds::BOX_RANGE)) go by `slabs`.
+
+use super::node::Node;
+use crate::math::simd::{LANES, Pick, Simd};
+
+/// A ray ready to be tested against padded boxes.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C)]
+pub(super) struct PaddedSlabs {
+    pub inverse: [f32; 3],
+    /// Boxes are entered from here on.
+    pub from: f32,
+    /// What is added to planes that come first, and to those that come last.
+    pub first: [f32; 3],
+    pub last: [f32; 3],
+    /// The octant that the ray runs to: bit k is set where it runs backwards along axis k.
+    pub octant: u32,
+}
+
+/// Rows of the planes that come first, by octant.
+static FIRST: [[Pick; 3]; LANES] = {
+    let mut rows = [[Pick::new(0); 3]; LANES];
+    let mut octant = 0;
+    while octant < LANES {
+        rows[octant] = [Pick::new(octant & 1), Pick::new(2 + (octant >> 1 & 1)), Pick::new(4 + (octant >> 2))];
+        octant += 1;
+    }
+    rows
+};
+
+impl PaddedSlabs {
+    /// In lanes, for many nodes.
+    #[inline(always)]
+    pub(super) fn spread<S: Simd>(&self, s: S) -> SlabLanes<S> {
+        let [ix, iy, iz] = self.inverse;
+        let ([fx, fy, fz], [lx, ly, lz]) = (self.first, self.last);
+        SlabLanes {
+            inverse: [s.splat(ix), s.splat(iy), s.splat(iz)],
+            first: [s.splat(fx), s.splat(fy), s.splat(fz)],
+            last: [s.splat(lx), s.splat(ly), s.splat(lz)],
+            rows: FIRST[self.octant as usize % LANES],
+            from: s.splat(self.from),
+        }
+    }
+
+    /// The distances at which the ray enters the boxes of a node, and which of them it meets up to `limit`.
+    #[inline(always)]
+    pub(super) fn meets<S: Simd>(&self, s: S, node: &Node, limit: f32) -> (S::Lanes, u32) {
+        self.spread(s).meets(s, node, limit)
+    }
+}
+
+/// [`PaddedSlabs`] in lanes.
+pub(super) struct SlabLanes<S: Simd> {
+    inverse: [S::Lanes; 3],
+    first: [S::Lanes; 3],
+    last: [S::Lanes; 3],
+    rows: [Pick; 3],
+    from: S::Lanes,
+}
+
+impl<S: Simd> SlabLanes<S> {
+    /// As [`PaddedSlabs::meets`].
+    #[inline(always)]
+    pub(super) fn meets(&self, s: S, node: &Node, limit: f32) -> (S::Lanes, u32) {
+        let ([x, y, z], [ix, iy, iz]) = (self.rows, self.inverse);
+        let first_x = s.mul_add(s.pick(&node.planes, x), ix, self.first[0]);
+        let first_y = s.mul_add(s.pick(&node.planes, y), iy, self.first[1]);
+        let first_z = s.mul_add(s.pick(&node.planes, z), iz, self.first[2]);
+        let last_x = s.mul_add(s.pick(&node.planes, x.other()), ix, self.last[0]);
+        let last_y = s.mul_add(s.pick(&node.planes, y.other()), iy, self.last[1]);
+        let last_z = s.mul_add(s.pick(&node.planes, z.other()), iz, self.last[2]);
+        let near = s.greater(s.greater(first_x, first_y), s.greater(first_z, self.from));
+        let far = s.smaller(s.smaller(last_x, last_y), s.smaller(last_z, s.splat(limit)));
+        (near, s.at_most(near, far))
+    }
+}

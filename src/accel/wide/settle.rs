@@ -1,0 +1,84 @@
+//! Exact distances and weights of hits that are known, eight rays at a time.
+
+use super::best::Place;
+use super::node::Tree;
+use crate::accel::query::Goal;
+use crate::accel::wave::Wave;
+use crate::accel::{Hit, NO_PRIM};
+use crate::math::meetings::Pairs;
+use crate::math::shear::RaySpace;
+use crate::math::simd::{LANES, Simd};
+use crate::math::triangle;
+use crate::math::triangles::corners_of;
+
+/// Rays whose hits wait for their distances.
+pub(super) struct Settle {
+    pairs: Pairs,
+    /// Their numbers in the wave, and what they hit.
+    rays: [usize; LANES],
+    prims: [u32; LANES],
+    count: usize,
+}
+
+impl Settle {
+    pub(super) const EMPTY: Self = Self { pairs: Pairs::EMPTY, rays: [0; LANES], prims: [0; LANES], count: 0 };
+
+    /// Gives a ray its answer, now or with others.
+    #[inline(always)]
+    pub(super) fn answer<S: Simd, W: Wave>(&mut self, s: S, tree: &Tree, wave: &mut W, i: usize, place: Place) {
+        if place.prim == NO_PRIM {
+            return wave.take(i, Hit::MISS);
+        }
+        if W::Goal::ANY {
+            return wave.take(i, Hit { prim: place.prim, t: 0.0, u: 0.0, v: 0.0 });
+        }
+        let (ray, block) = (&wave.rays()[i], &tree.blocks[place.block as usize]);
+        let (at, lane) = (self.count % LANES, place.lane as usize % LANES);
+        for k in 0..3 {
+            self.pairs.origin[k][at] = ray.origin[k];
+            self.pairs.dir[k][at] = ray.dir[k];
+            for (rows, from) in self.pairs.corners.iter_mut().zip(&block.corners) {
+                rows[k][at] = from[k][lane];
+            }
+        }
+        (self.rays[at], self.prims[at]) = (i, place.prim);
+        self.count += 1;
+        if self.count == LANES {
+            self.finish(s, wave);
+        }
+    }
+
+    /// Answers those that wait.
+    #[inline(always)]
+    pub(super) fn finish<S: Simd, W: Wave>(&mut self, s: S, wave: &mut W) {
+        let count = std::mem::replace(&mut self.count, 0);
+        if count == 0 {
+            return;
+        }
+        let met = self.pairs.meet(s);
+        for lane in 0..count.min(LANES) {
+            let (i, prim) = (self.rays[lane], self.prims[lane]);
+            let hit = if met.sure >> lane & 1 == 1 {
+                Hit { t: met.t[lane], u: met.weights[0][lane], v: met.weights[1][lane], prim }
+            } else {
+                self.exactly(wave, lane)
+            };
+            wave.take(i, hit);
+        }
+    }
+
+    /// The hit of one ray by the scalar form.
+    #[cold]
+    #[inline(never)]
+    fn exactly<W: Wave>(&self, wave: &W, lane: usize) -> Hit {
+        let (ray, corners) = (&wave.rays()[self.rays[lane]], corners_of(&self.pairs.corners, lane));
+        let space = RaySpace::checked(ray.origin, ray.dir).0;
+        let meeting = triangle::meet(&space, &corners);
+        let (u, v) = if meeting.t_f64.is_nan() {
+            triangle::barycentrics(&space, &corners)
+        } else {
+            triangle::barycentrics_at(&space, &corners, meeting.t_f64, meeting.normal)
+        };
+        Hit { t: meeting.t, u, v, prim: self.prims[lane] }
+    }
+}
