@@ -29,14 +29,6 @@ pub trait Wave {
     /// Takes the answer of a ray whose hit, or miss, is known to the last bit.
     fn take(&mut self, i: usize, hit: Hit);
 
-    /// Takes the answers of rays that follow each other, the first of them ray `start`.
-    #[inline(always)]
-    fn take_all(&mut self, start: usize, hits: &[Hit]) {
-        for (i, hit) in (start..).zip(hits) {
-            self.take(i, *hit);
-        }
-    }
-
     /// Takes the answer of a query, and tells whether there was a hit.
     fn answer(&mut self, i: usize, query: &Query<Self::Goal>) -> bool;
 }
@@ -63,11 +55,6 @@ impl<I: Intersector> Wave for ForFirst<'_, I> {
     #[inline(always)]
     fn take(&mut self, i: usize, hit: Hit) {
         self.hits[i] = hit;
-    }
-
-    #[inline(always)]
-    fn take_all(&mut self, start: usize, hits: &[Hit]) {
-        self.hits[start..start + hits.len()].copy_from_slice(hits);
     }
 
     #[inline]
@@ -143,11 +130,6 @@ impl<I: Intersector> Wave for ForNext<'_, I> {
     #[inline(always)]
     fn take(&mut self, i: usize, hit: Hit) {
         self.hits[i] = hit;
-    }
-
-    #[inline(always)]
-    fn take_all(&mut self, start: usize, hits: &[Hit]) {
-        self.hits[start..start + hits.len()].copy_from_slice(hits);
     }
 
     #[inline]

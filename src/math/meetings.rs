@@ -1,9 +1,160 @@
-//! Eight rays, each with the triangle that it hits: [`meet`](super::triangle::meet) and
-//! [`barycentrics_at`](super::triangle::barycentrics_at) in lanes, operation by operation.
+//! Where rays meet triangles that they hit: [`meet`](super::triangle::meet) and
+//! [`barycentrics_at`](super::triangle::barycentrics_at) in lanes, operation by operation; of rays side by side and one
+//! triangle ([`Plane`]), or of eight rays, each with a triangle of its own ([`Pairs`]).
 
 use super::bounds::{PLANE_TERMS_F64, POSITION_T};
-use super::simd::{LANES, Row, Simd};
+use super::simd::{LANES, Lanewise, Row, Simd};
+use super::triangle::{flat_axes, magnitude_cross};
 use super::triangles::Corners8;
+use super::{DVec3, Vec3};
+
+/// Where rays side by side meet the plane of one triangle: [`meet`](super::triangle::meet) in lanes, operation by
+/// operation.
+#[derive(Clone, Copy, Debug)]
+pub struct Meetings<L, D> {
+    /// t, rounded once.
+    pub t: L,
+    /// t to a relative error of [`POSITION_T`].
+    pub t_f64: D,
+    /// The lanes in which that is certain; for the others the scalar form must be asked.
+    pub sure: u32,
+}
+
+/// What bounds the rays of a row.
+#[derive(Clone, Copy, Debug)]
+pub struct RowBounds {
+    /// All origins lie between these.
+    pub low: DVec3,
+    /// The same.
+    pub high: DVec3,
+    /// The origin, where all rays have the same.
+    pub from: Option<DVec3>,
+    /// No component of a direction is larger in size.
+    pub dir: DVec3,
+}
+
+impl RowBounds {
+    /// Around nothing.
+    pub const NONE: Self = Self { low: DVec3::ZERO, high: DVec3::ZERO, from: None, dir: DVec3::ZERO };
+}
+
+/// What the rays of a row share when they meet a triangle.
+#[derive(Clone, Copy, Debug)]
+pub struct Plane {
+    corners: [DVec3; 3],
+    normal: DVec3,
+    sizes: DVec3,
+}
+
+impl Plane {
+    /// The plane of a triangle.
+    #[inline(always)]
+    pub fn of(triangle: &[Vec3; 3]) -> Self {
+        let corners = [triangle[0].as_dvec3(), triangle[1].as_dvec3(), triangle[2].as_dvec3()];
+        let (e1, e2) = (corners[1] - corners[0], corners[2] - corners[0]);
+        Self { corners, normal: e1.cross(e2), sizes: magnitude_cross(e1.abs(), e2.abs()) }
+    }
+
+    /// Where rays (by axis and lane) meet it.
+    #[inline(always)]
+    pub fn meet<S: Lanewise<N>, const N: usize>(
+        &self,
+        s: S,
+        origin: &[[f32; N]; 3],
+        dir: &[[f32; N]; 3],
+        bounds: &RowBounds,
+    ) -> Meetings<S::Lanes, S::Doubles> {
+        let a = self.corners[0];
+        let (low, high) = ((a - bounds.low).abs(), (a - bounds.high).abs());
+        let numerator = match bounds.from {
+            Some(from) => s.splat_f64(self.normal.dot(a - from)),
+            None => {
+                let o = [s.load(&origin[0]), s.load(&origin[1]), s.load(&origin[2])];
+                let x = s.sub_f64(s.splat_f64(a.x), s.widen(o[0]));
+                let y = s.sub_f64(s.splat_f64(a.y), s.widen(o[1]));
+                let z = s.sub_f64(s.splat_f64(a.z), s.widen(o[2]));
+                self.dot(s, [x, y, z])
+            }
+        };
+        let d = [s.widen(s.load(&dir[0])), s.widen(s.load(&dir[1])), s.widen(s.load(&dir[2]))];
+        let denominator = self.dot(s, d);
+        // Those of the farthest and of the steepest ray there could be.
+        let n_error = s.splat_f64(self.sizes.dot(low.max(high)) * PLANE_TERMS_F64);
+        let d_error = s.splat_f64(self.sizes.dot(bounds.dir) * PLANE_TERMS_F64);
+        let (n, d) = (s.abs_f64(numerator), s.abs_f64(denominator));
+        let quarter = s.splat_f64(0.25);
+        let signs = s.less_f64(d_error, s.mul_f64(quarter, d)) & s.less_f64(n_error, s.mul_f64(quarter, n));
+        let reciprocal = s.div_f64(s.splat_f64(1.0), denominator);
+        let t = s.mul_f64(numerator, reciprocal);
+        let size = s.abs_f64(t);
+        let terms = s.add_f64(n_error, s.mul_f64(d_error, size));
+        let error = s.add_f64(
+            s.mul_f64(terms, s.mul_f64(s.splat_f64(1.5), s.abs_f64(reciprocal))),
+            s.mul_f64(size, s.splat_f64(2.0 * f64::EPSILON)),
+        );
+        let spread = s.mul_f64(error, s.splat_f64(1.001));
+        let (low, high) = (s.narrow(s.sub_f64(t, spread)), s.narrow(s.add_f64(t, spread)));
+        let rounded = s.at_most(low, high) & s.at_most(high, low);
+        // Below the normal numbers zero gets a sign, which is left to the scalar form.
+        let normal = s.less_f64(s.splat_f64(f64::from(f32::MIN_POSITIVE)), size);
+        let sure = signs & s.less_f64(error, s.mul_f64(size, s.splat_f64(POSITION_T))) & rounded & normal;
+        Meetings { t: low, t_f64: t, sure }
+    }
+
+    /// n·v.
+    #[inline(always)]
+    fn dot<S: Lanewise<N>, const N: usize>(&self, s: S, [x, y, z]: [S::Doubles; 3]) -> S::Doubles {
+        let n = self.normal;
+        s.add_f64(
+            s.add_f64(s.mul_f64(s.splat_f64(n.x), x), s.mul_f64(s.splat_f64(n.y), y)),
+            s.mul_f64(s.splat_f64(n.z), z),
+        )
+    }
+
+    /// Weights of the second and third corner: [`barycentrics_at`](super::triangle::barycentrics_at) in lanes.
+    #[inline(always)]
+    pub fn barycentrics<S: Lanewise<N>, const N: usize>(
+        &self,
+        s: S,
+        origin: &[[f32; N]; 3],
+        dir: &[[f32; N]; 3],
+        t: S::Doubles,
+    ) -> [S::Lanes; 2] {
+        let [i, j] = flat_axes(self.normal);
+        let [a, b, c] = [self.corners[0].to_array(), self.corners[1].to_array(), self.corners[2].to_array()];
+        let px = self.along(s, origin, dir, t, i);
+        let py = self.along(s, origin, dir, t, j);
+        let ((bx, by), (cx, cy)) = ((b[i] - a[i], b[j] - a[j]), (c[i] - a[i], c[j] - a[j]));
+        let scale = s.splat_f64(1.0 / (bx * cy - by * cx));
+        let u = s.sub_f64(s.mul_f64(px, s.splat_f64(cy)), s.mul_f64(py, s.splat_f64(cx)));
+        let v = s.sub_f64(s.mul_f64(s.splat_f64(bx), py), s.mul_f64(s.splat_f64(by), px));
+        let u = self.clamped(s, s.mul_f64(u, scale));
+        let v = self.clamped(s, s.mul_f64(v, scale));
+        let one = s.splat(1.0);
+        [u, s.choose(s.less(one, s.add(u, v)), s.sub(one, u), v)]
+    }
+
+    /// Coordinate `k` of the places at `t`, relative to the first corner.
+    #[inline(always)]
+    fn along<S: Lanewise<N>, const N: usize>(
+        &self,
+        s: S,
+        origin: &[[f32; N]; 3],
+        dir: &[[f32; N]; 3],
+        t: S::Doubles,
+        k: usize,
+    ) -> S::Doubles {
+        let (o, d) = (s.widen(s.load(&origin[k % 3])), s.widen(s.load(&dir[k % 3])));
+        s.sub_f64(s.add_f64(o, s.mul_f64(d, t)), s.splat_f64(self.corners[0][k % 3]))
+    }
+
+    /// Within 0 to 1, rounded; 0 for a NaN.
+    #[inline(always)]
+    fn clamped<S: Lanewise<N>, const N: usize>(&self, s: S, x: S::Doubles) -> S::Lanes {
+        let positive = s.greater_f64(x, s.splat_f64(0.0));
+        s.narrow(s.smaller_f64(positive, s.splat_f64(1.0)))
+    }
+}
 
 /// Rays and triangles, by axis and lane.
 #[derive(Clone, Copy, Debug)]
@@ -154,4 +305,85 @@ fn seen<S: Simd>(s: S, Vectors([x, y, z]): &Vectors<S>, along_x: u32, along_y: u
     s.put_f64(along_y, *y, &mut row);
     s.put_f64(along_x, *x, &mut row);
     s.load_f64(&row)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::random::Random;
+    use super::super::shear::RaySpace;
+    use super::super::sight::RowSight;
+    use super::super::simd::{Kernel, Level};
+    use super::super::triangle::{self, Triangle};
+    use super::super::triangles::Verdicts;
+    use super::*;
+
+    /// Eight rays against the first of eight triangles: the verdicts, where they meet its plane, and the weights there.
+    struct Row8<'a>(&'a [RaySpace; LANES], &'a Triangle, Option<Vec3>);
+
+    impl Kernel for Row8<'_> {
+        type Output = (Verdicts, Meetings<Row, [f64; LANES]>, [Row; 2]);
+
+        #[inline(always)]
+        fn run<S: Simd>(self, s: S) -> Self::Output {
+            let Self(rays, triangle, from) = self;
+            let (mut origin, mut dir) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+            for (lane, ray) in rays.iter().enumerate() {
+                for k in 0..3 {
+                    (origin[k][lane], dir[k][lane]) = (ray.origin[k], ray.dir[k]);
+                }
+            }
+            let verdicts = RowSight::new(s, &origin, from, &dir, rays[0].z).look(s, triangle).verdicts;
+            let plane = Plane::of(triangle);
+            let (least, most) = (
+                |f: fn(&RaySpace) -> DVec3| rays.iter().map(f).reduce(DVec3::min).unwrap(),
+                |f: fn(&RaySpace) -> DVec3| rays.iter().map(f).reduce(DVec3::max).unwrap(),
+            );
+            let bounds = RowBounds {
+                low: least(|r| r.origin.as_dvec3()),
+                high: most(|r| r.origin.as_dvec3()),
+                from: from.map(Vec3::as_dvec3),
+                dir: most(|r| r.dir.as_dvec3().abs()),
+            };
+            let met = plane.meet(s, &origin, &dir, &bounds);
+            let [u, v] = plane.barycentrics(s, &origin, &dir, met.t_f64);
+            let met = Meetings { t: s.store(met.t), t_f64: s.store_f64(met.t_f64), sure: met.sure };
+            (verdicts, met, [s.store(u), s.store(v)])
+        }
+    }
+
+    #[test]
+    fn eight_rays_side_by_side_meet_a_triangle_as_each_does_alone() {
+        let mut random = Random::new(21);
+        let (mut hits, mut sure) = (0, 0);
+        for _ in 0..3000 {
+            let triangle = [random.cube(), random.cube(), random.cube()];
+            let origin = random.cube() * 4.0;
+            let aim = |_| triangle::within(&triangle, random.unit() * 1.2, random.unit());
+            let rays: Vec<RaySpace> = (0..LANES).map(aim).filter_map(|p| RaySpace::new(origin, p - origin)).collect();
+            let Ok(rays) = <[RaySpace; LANES]>::try_from(rays) else { continue };
+            if rays.iter().any(|r| r.z != rays[0].z) {
+                continue;
+            }
+            // All start there, whether the row knows it or not.
+            for (level, from) in Level::all().into_iter().flat_map(|l| [(l, None), (l, Some(origin))]) {
+                let (verdicts, met, [u, v]) = level.run(Row8(&rays, &triangle, from));
+                for (lane, ray) in rays.iter().enumerate() {
+                    let (bit, hit) = (1 << lane, triangle::is_hit(ray, &triangle));
+                    assert!(verdicts.unsure & bit != 0 || (verdicts.hit & bit != 0) == hit, "{}", level.name());
+                    if !hit || met.sure & bit == 0 {
+                        continue;
+                    }
+                    let alone = triangle::meet(ray, &triangle);
+                    assert_eq!(
+                        (met.t[lane].to_bits(), met.t_f64[lane].to_bits()),
+                        (alone.t.to_bits(), alone.t_f64.to_bits())
+                    );
+                    assert_eq!((u[lane], v[lane]), triangle::barycentrics(ray, &triangle));
+                    sure += 1;
+                }
+                hits += rays.iter().filter(|r| triangle::is_hit(r, &triangle)).count();
+            }
+        }
+        assert!(sure > 10_000 && sure > hits * 9 / 10, "{sure} of {hits}");
+    }
 }

@@ -23,6 +23,7 @@ pub mod random;
 pub mod rational;
 pub mod real;
 pub mod shear;
+pub mod sight;
 pub mod simd;
 pub mod sphere;
 pub mod triangle;

@@ -11,9 +11,9 @@ use super::slabs::BoxMargins;
 use crate::accel::query::{Goal, Query};
 use crate::accel::wave::Wave;
 use crate::accel::{NO_PRIM, NoProbe, Shapes};
+use crate::math::sight::Look;
 use crate::math::simd::{LANES, Row, Simd};
 use crate::math::triangle;
-use crate::math::triangles::Look;
 
 /// A ray and what it has found.
 #[derive(Clone, Copy, Debug)]

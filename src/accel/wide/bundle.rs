@@ -3,11 +3,13 @@
 use std::marker::PhantomData;
 
 use super::node::{Node, Tree};
+use super::padded::FIRST;
 use super::slabs::{BoxMargins, backwards};
 use crate::accel::{NO_PRIM, Ray};
+use crate::math::bounds::{BOX_RANGE, PARALLEL};
+use crate::math::meetings::RowBounds;
 use crate::math::shear::main_axis;
-use crate::math::simd::{LANES, Lanewise, Pick, Row, Simd, WIDE};
-use crate::math::triangles::{RowBounds, reach};
+use crate::math::simd::{LANES, Lanewise, Pick, Simd, WIDE};
 use crate::math::{DVec3, Vec3};
 
 /// Rays of a packet.
@@ -19,38 +21,39 @@ pub(super) const ALL: u32 = (1 << RAYS) - 1;
 /// A number of each ray.
 pub(super) type Numbers = [f32; RAYS];
 
-/// The rays, by axis.
+/// The rays, by axis; as boxes see them by padded slabs (`padded`).
 pub(super) struct Bundle<B> {
     pub origin: [Numbers; 3],
     pub dir: [Numbers; 3],
-    pub inverse: [Numbers; 3],
+    inverse: [Numbers; 3],
+    /// What is added to planes that come first, and to those that come last.
+    first: [Numbers; 3],
+    last: [Numbers; 3],
     /// Where hits count, inclusive.
     pub t_min: Numbers,
     /// Where boxes matter.
-    pub from: Numbers,
-    pub limit: Numbers,
+    from: Numbers,
     pub exclude: [u32; RAYS],
-    /// The origins between which the others lie, by axis: the one first met by a box's first plane, and the other.
-    pub origins: [[f32; 2]; 3],
-    /// Least and greatest reciprocal.
-    pub inverses: [[f32; 2]; 3],
-    pub first: [Pick; 3],
-    pub last: [Pick; 3],
+    /// All rays as one.
+    hull: Hull,
+    /// Bit k is set where the rays run backwards along axis k.
     pub octant: usize,
     /// Axis of the largest component of every direction.
     pub z: usize,
-    pub least_from: f32,
-    pub reach: f32,
     /// The origin, where all rays have the same.
     pub common: Option<Vec3>,
     pub bounds: RowBounds,
     margins: PhantomData<B>,
 }
 
-/// Puts eight numbers to the first or the last of sixteen.
-#[inline(always)]
-fn put_half(to: &mut Numbers, half: usize, row: Row) {
-    to.as_chunks_mut().0[half % 2] = row;
+/// Linear bounds of the distances at which any of the rays meets a plane: below those of planes that come first, where
+/// they are not below zero, and above those of planes that come last, where these are not.
+#[derive(Clone, Copy, Debug, Default)]
+struct Hull {
+    /// By axis: what a plane is multiplied with, and what is added.
+    first: [[f32; 2]; 3],
+    last: [[f32; 2]; 3],
+    from: f32,
 }
 
 impl<B: BoxMargins> Bundle<B> {
@@ -60,18 +63,14 @@ impl<B: BoxMargins> Bundle<B> {
             origin: [none; 3],
             dir: [none; 3],
             inverse: [none; 3],
+            first: [none; 3],
+            last: [none; 3],
             t_min: none,
             from: none,
-            limit: none,
             exclude: [NO_PRIM; RAYS],
-            origins: [[0.0; 2]; 3],
-            inverses: [[0.0; 2]; 3],
-            first: [Pick::new(0); 3],
-            last: [Pick::new(0); 3],
+            hull: Hull::default(),
             octant: 0,
             z: 0,
-            least_from: 0.0,
-            reach: 0.0,
             common: None,
             bounds: RowBounds::NONE,
             margins: PhantomData,
@@ -82,140 +81,128 @@ impl<B: BoxMargins> Bundle<B> {
     #[inline(always)]
     pub(super) fn spread<S: Simd>(&mut self, s: S, rays: &[Ray; RAYS]) -> Numbers {
         (self.z, self.octant) = (main_axis(rays[0].dir), octant_of(rays[0].dir));
-        let mut t_max = [0.0; RAYS];
-        for half in 0..2 {
-            let (mut from, mut to) = ([[0.0; 4]; LANES], [[0.0; 4]; LANES]);
-            for lane in 0..LANES {
-                let ray = &rays[LANES * half + lane];
-                let (o, d) = (ray.origin, ray.dir);
-                from[lane] = [o.x, o.y, o.z, ray.t_min];
-                to[lane] = [d.x, d.y, d.z, ray.t_max];
-                self.exclude[LANES * half + lane] = ray.exclude;
-            }
-            let ([ox, oy, oz, least], [dx, dy, dz, most]) = (s.columns(&from), s.columns(&to));
-            put_half(&mut self.origin[0], half, s.store(ox));
-            put_half(&mut self.origin[1], half, s.store(oy));
-            put_half(&mut self.origin[2], half, s.store(oz));
-            put_half(&mut self.dir[0], half, s.store(dx));
-            put_half(&mut self.dir[1], half, s.store(dy));
-            put_half(&mut self.dir[2], half, s.store(dz));
-            put_half(&mut self.t_min, half, s.store(least));
-            // A distance that overflows is no hit.
-            put_half(&mut t_max, half, s.store(s.smaller(most, s.splat(f32::MAX))));
+        let (low, high) = (self.columns(s, rays, 0), self.columns(s, rays, 1));
+        let wide = s.wide();
+        for k in 0..3 {
+            self.origin[k] = wide.store(s.join(low[0][k], high[0][k]));
+            self.dir[k] = wide.store(s.join(low[1][k], high[1][k]));
         }
-        t_max
+        self.t_min = wide.store(s.join(low[0][3], high[0][3]));
+        // A distance that overflows is no hit; a NaN stays one.
+        let t_max = wide.smaller(wide.splat(f32::MAX), s.join(low[1][3], high[1][3]));
+        wide.store(t_max)
     }
 
-    /// Finds reciprocals and ranges from directions, `t_min` and `t_max`, and whether the rays run alike: to the same
-    /// octant, no component zero, the same one the largest.
+    /// Origins with `t_min`, and directions with `t_max`, of one half of the rays.
     #[inline(always)]
-    pub(super) fn prepare<S: Simd>(&mut self, s: S, t_max: &Numbers) -> bool {
-        self.limit = Self::widened(s, t_max);
+    fn columns<S: Simd>(&mut self, s: S, rays: &[Ray; RAYS], half: usize) -> [[S::Lanes; 4]; 2] {
+        let (mut from, mut to) = ([[0.0; 4]; LANES], [[0.0; 4]; LANES]);
+        for lane in 0..LANES {
+            let ray = &rays[LANES * half + lane];
+            let (o, d) = (ray.origin, ray.dir);
+            from[lane] = [o.x, o.y, o.z, ray.t_min];
+            to[lane] = [d.x, d.y, d.z, ray.t_max];
+            self.exclude[LANES * half + lane] = ray.exclude;
+        }
+        [s.columns(&from), s.columns(&to)]
+    }
+
+    /// Finds slabs and ranges from origins, directions, `t_min` and `t_max`, and whether the rays run alike: to the same
+    /// octant, the same component the largest; with numbers for which the bounds of padded boxes hold, and not backwards.
+    #[inline(always)]
+    pub(super) fn prepare<S: Simd>(&mut self, s: S, tree: &Tree, t_max: &Numbers) -> bool {
         let s = s.wide();
-        let (t_min, t_max) = (s.load(&self.t_min), s.load(t_max));
+        let (t_min, t_max, zero) = (s.load(&self.t_min), s.load(t_max), s.splat(0.0));
         let o = [s.load(&self.origin[0]), s.load(&self.origin[1]), s.load(&self.origin[2])];
         let d = [s.load(&self.dir[0]), s.load(&self.dir[1]), s.load(&self.dir[2])];
-        // Sums of sizes keep a NaN. Where they are small enough, so is each of them.
-        let size = s.add(s.add(s.abs(o[0]), s.abs(o[1])), s.abs(o[2]));
-        let mut alike = s.at_most(t_min, t_max) & s.at_most(size, s.splat(B::COORDINATES));
-        let zero = s.splat(0.0);
-        let mut inverses = zero;
-        for (k, &along) in d.iter().enumerate() {
-            // Neither holds for a zero or a NaN.
-            alike &= if self.octant >> k & 1 == 1 { s.less(along, zero) } else { s.less(zero, along) };
-            let inverse = s.div(s.splat(1.0), along);
-            inverses = s.add(inverses, s.abs(inverse));
-            self.inverse[k] = s.store(inverse);
-        }
-        let [x, y, z] = [s.abs(d[0]), s.abs(d[1]), s.abs(d[2])];
-        // Then no reciprocal is below the normal numbers.
-        let largest = s.splat(0.5 / f32::MIN_POSITIVE);
-        alike &= s.at_most(inverses, s.splat(f32::MAX)) & s.at_most(s.add(s.add(x, y), z), largest);
+        let (far, size) = ([s.abs(o[0]), s.abs(o[1]), s.abs(o[2])], [s.abs(d[0]), s.abs(d[1]), s.abs(d[2])]);
+        let extent = s.splat(tree.extent);
+        // Sums keep a NaN.
+        let whole = s.add(extent, s.add(s.add(far[0], far[1]), far[2]));
+        let length = s.add(s.add(size[0], size[1]), size[2]);
+        let (least, most) = (s.splat(1.0 / BOX_RANGE), s.splat(BOX_RANGE));
+        let mut alike = s.at_most(t_min, t_max) & s.at_most(zero, t_min);
+        alike &= s.at_most(least, whole) & s.at_most(whole, most);
+        alike &= s.at_most(least, length) & s.at_most(length, most);
+        let [x, y, z] = size;
         alike &= match self.z {
             0 => s.at_most(y, x) & s.at_most(z, x),
             1 => !(s.at_most(y, x) & s.at_most(z, x)) & s.at_most(z, y),
             _ => !(s.at_most(y, x) & s.at_most(z, x)) & s.less(y, z),
         };
+        let parallel = s.mul(s.greater(x, s.greater(y, z)), s.splat(PARALLEL));
+        let drift = s.mul(whole, s.splat(PARALLEL));
+        for k in 0..3 {
+            alike &= if self.octant >> k & 1 == 1 { s.signs(d[k]) } else { !s.signs(d[k]) };
+            let inverse = s.div(s.splat(1.0), s.with_sign(s.greater(size[k], parallel), d[k]));
+            let pad = s.mul(s.mul_add(s.add(extent, far[k]), s.splat(B::PAD), drift), s.abs(inverse));
+            let middle = s.mul(s.sub(zero, o[k]), inverse);
+            self.inverse[k] = s.store(inverse);
+            self.first[k] = s.store(s.sub(middle, pad));
+            self.last[k] = s.store(s.add(middle, pad));
+        }
         let (range, underflow) = (s.splat(B::RANGE), s.splat(B::UNDERFLOW));
-        let from = s.sub(s.sub(t_min, s.mul(s.abs(t_min), range)), underflow);
-        // Not so for a ray that goes on behind nothing: a NaN would hide where the others start.
-        alike &= s.at_most(s.abs(from), s.splat(f32::MAX));
-        self.from = s.store(from);
+        self.from = s.store(s.sub(s.sub(t_min, s.mul(t_min, range)), underflow));
         alike & ALL == ALL
     }
 
     /// The distance up to which boxes must be entered for hits up to each of these.
     #[inline(always)]
-    pub(super) fn widened<S: Simd>(s: S, t: &Numbers) -> Numbers {
-        let s = s.wide();
-        let t = s.load(t);
-        s.store(s.add(s.add(t, s.mul(s.abs(t), s.splat(B::RANGE))), s.splat(B::UNDERFLOW)))
+    pub(super) fn widened<S: Lanewise<RAYS>>(s: S, t: S::Lanes) -> S::Lanes {
+        s.add(s.add(t, s.mul(s.abs(t), s.splat(B::RANGE))), s.splat(B::UNDERFLOW))
     }
 
-    /// Which rays meet a box; by axis, its plane that comes first and the one that comes last.
+    /// Which rays meet a box up to their limits; by axis, its plane that comes first and the one that comes last.
     #[inline(always)]
-    pub(super) fn meet<S: Simd>(&self, s: S, first: [f32; 3], last: [f32; 3]) -> u32 {
-        let s = s.wide();
-        let (mut near, mut far) = (s.load(&self.from), s.load(&self.limit));
+    pub(super) fn meet<S: Lanewise<RAYS>>(&self, s: S, first: [f32; 3], last: [f32; 3], limit: S::Lanes) -> u32 {
+        let (mut near, mut far) = (s.load(&self.from), limit);
         for k in 0..3 {
-            let (origin, inverse) = (s.load(&self.origin[k]), s.load(&self.inverse[k]));
-            near = s.greater(s.mul(s.sub(s.splat(first[k]), origin), inverse), near);
-            far = s.smaller(s.mul(s.sub(s.splat(last[k]), origin), inverse), far);
+            let inverse = s.load(&self.inverse[k]);
+            near = s.greater(s.mul_add(s.splat(first[k]), inverse, s.load(&self.first[k])), near);
+            far = s.smaller(s.mul_add(s.splat(last[k]), inverse, s.load(&self.last[k])), far);
         }
-        let slack = s.add(s.mul(s.abs(far), s.splat(B::SLAB)), s.splat(B::UNDERFLOW));
-        s.at_most(near, s.add(far, slack))
+        s.at_most(near, far)
     }
 
     /// Finds what bounds all rays.
     #[inline(always)]
     pub(super) fn bound<S: Simd>(&mut self, s: S, tree: &Tree) {
         let s = s.wide();
-        let back = |k: usize| self.octant >> k & 1;
-        (self.first, self.last) = (
-            [Pick::new(back(0)), Pick::new(2 + back(1)), Pick::new(4 + back(2))],
-            [Pick::new(1 - back(0)), Pick::new(3 - back(1)), Pick::new(5 - back(2))],
-        );
-        let (o, first) =
-            ([0, 1, 2].map(|k| self.origin[k]), Vec3::new(self.origin[0][0], self.origin[1][0], self.origin[2][0]));
-        let is = |k: usize| s.at_most(s.load(&o[k]), s.splat(first[k])) & s.at_most(s.splat(first[k]), s.load(&o[k]));
+        let first = Vec3::new(self.origin[0][0], self.origin[1][0], self.origin[2][0]);
+        let o = [s.load(&self.origin[0]), s.load(&self.origin[1]), s.load(&self.origin[2])];
+        let is = |k: usize| s.at_most(o[k], s.splat(first[k])) & s.at_most(s.splat(first[k]), o[k]);
         self.common = (is(0) & is(1) & is(2) & ALL == ALL).then_some(first);
         let (mut low, mut high) = (first, first);
         if self.common.is_none() {
-            for k in 0..3 {
-                let origin = s.load(&self.origin[k]);
-                (low[k], high[k]) = (s.least(origin), s.greatest(origin));
-            }
+            (low, high) = (
+                Vec3::new(s.least(o[0]), s.least(o[1]), s.least(o[2])),
+                Vec3::new(s.greatest(o[0]), s.greatest(o[1]), s.greatest(o[2])),
+            );
         }
-        self.reach = reach(low, &tree.bounds);
-        if self.common.is_none() {
-            // Each coordinate is farthest from one of both.
-            self.reach = self.reach.max(reach(high, &tree.bounds));
-        }
-        let mut steepest = DVec3::ZERO;
+        let (farthest, mut fastest) = (low.abs().max(high.abs()), DVec3::ZERO);
         for k in 0..3 {
             let inverse = s.load(&self.inverse[k]);
             let (least, greatest) = (s.least(inverse), s.greatest(inverse));
-            self.inverses[k] = [least, greatest];
-            (self.origins[k], steepest[k]) = if back(k) == 1 {
-                ([low[k], high[k]], f64::from(-greatest))
+            let pad = B::PAD * (tree.extent + farthest[k]) + PARALLEL * (tree.extent + farthest.element_sum());
+            // The fastest ray from the foremost origin meets planes first, the slowest from the hindmost last.
+            let (fast, slow, front, rear) = if self.octant >> k & 1 == 1 {
+                (greatest, least, low[k], high[k])
             } else {
-                ([high[k], low[k]], f64::from(least))
+                (least, greatest, high[k], low[k])
             };
+            self.hull.first[k] = [fast, -front * fast - pad * fast.abs()];
+            self.hull.last[k] = [slow, -rear * slow + pad * slow.abs()];
+            fastest[k] = f64::from(fast.abs());
         }
         // A reciprocal is rounded once, and so is this.
-        let dir = DVec3::splat(1.0 + f64::from(f32::EPSILON)) / steepest;
+        let dir = DVec3::splat(1.0 + f64::from(f32::EPSILON)) / fastest;
         self.bounds =
             RowBounds { low: low.as_dvec3(), high: high.as_dvec3(), from: self.common.map(Vec3::as_dvec3), dir };
-        self.least_from = s.least(s.load(&self.from));
+        self.hull.from = s.least(s.load(&self.from)).max(0.0);
     }
 
-    /// The distance beyond which no ray looks for hits.
-    #[inline(always)]
-    pub(super) fn farthest<S: Simd>(&self, s: S) -> f32 {
-        s.wide().greatest(s.wide().load(&self.limit))
-    }
-
-    /// Which of eight boxes any ray may meet up to `limit`, and the least distances of that.
+    /// Which of eight boxes any ray may meet up to `limit`, and the least distances of that; by axis, the planes that come
+    /// first and those that come last.
     #[inline(always)]
     pub(super) fn meets_any<S: Simd>(
         &self,
@@ -224,26 +211,31 @@ impl<B: BoxMargins> Bundle<B> {
         last: [S::Lanes; 3],
         limit: f32,
     ) -> (S::Lanes, u32) {
-        let (mut near, mut far) = (s.splat(self.least_from), s.splat(limit));
+        let (mut near, mut far) = (s.splat(self.hull.from), s.splat(limit));
         for k in 0..3 {
-            let (low, high) = (s.splat(self.inverses[k][0]), s.splat(self.inverses[k][1]));
-            let first = s.sub(first[k], s.splat(self.origins[k][0]));
-            let last = s.sub(last[k], s.splat(self.origins[k][1]));
-            near = s.greater(s.smaller(s.mul(first, low), s.mul(first, high)), near);
-            far = s.smaller(s.greater(s.mul(last, low), s.mul(last, high)), far);
+            let ([a, b], [c, d]) = (self.hull.first[k], self.hull.last[k]);
+            near = s.greater(s.mul_add(first[k], s.splat(a), s.splat(b)), near);
+            far = s.smaller(s.mul_add(last[k], s.splat(c), s.splat(d)), far);
         }
-        let slack = s.add(s.mul(s.abs(far), s.splat(B::SLAB)), s.splat(B::UNDERFLOW));
-        (near, s.at_most(near, s.add(far, slack)))
+        (near, s.at_most(near, far))
     }
 
-    /// Which rays meet the box of a child.
+    /// Which of a node's boxes any ray may meet.
     #[inline(always)]
-    pub(super) fn meet_child<S: Simd>(&self, s: S, node: &Node, slot: usize) -> u32 {
+    pub(super) fn meets_any_child<S: Simd>(&self, s: S, node: &Node, limit: f32) -> (S::Lanes, u32) {
+        let [x, y, z] = FIRST[self.octant % LANES];
+        let pick = |p: Pick| s.pick(&node.planes, p);
+        self.meets_any(s, [pick(x), pick(y), pick(z)], [pick(x.other()), pick(y.other()), pick(z.other())], limit)
+    }
+
+    /// Which rays meet the box of a child up to their limits.
+    #[inline(always)]
+    pub(super) fn meet_child<S: Lanewise<RAYS>>(&self, s: S, node: &Node, slot: usize, limit: S::Lanes) -> u32 {
         let back = |k: usize| self.octant >> k & 1;
         let plane = |k: usize, side: usize| node.planes[(2 * k + side) % 6][slot % LANES];
         let first = [plane(0, back(0)), plane(1, back(1)), plane(2, back(2))];
         let last = [plane(0, 1 - back(0)), plane(1, 1 - back(1)), plane(2, 1 - back(2))];
-        self.meet(s, first, last)
+        self.meet(s, first, last, limit)
     }
 }
 

@@ -1,10 +1,9 @@
 //! Sixteen rays side by side: rays that run alike visit the same nodes, which are read and ordered once for all.
 //!
-//! A node's boxes are first asked about all rays at once, by interval arithmetic over origins and reciprocals of
-//! directions (S. Boulos et al., *Packet-based Whitted and Distribution Ray Tracing*, 2007). Rounding is monotonic: the
-//! least and the greatest distance of the interval bound what any of the rays would compute, so what the interval misses
-//! every ray misses, without a margin of its own. A box that is left is asked about each ray. At a leaf the triangles'
-//! own boxes are asked about the interval, and what is left is tested against all rays at once.
+//! A node's boxes are first asked about all rays at once, by a hull of origins and reciprocals of directions (after
+//! S. Boulos et al., *Packet-based Whitted and Distribution Ray Tracing*, 2007); a box that is left is asked about each ray.
+//! At a leaf the triangles' own boxes are asked about the hull, and what is left is tested against all rays at once. Best
+//! hits are known by intervals, as in `best`; exact distances are found at the end, once for all rays of a triangle.
 //!
 //! Rays that do not run alike go their own ways, one after another.
 
@@ -15,14 +14,15 @@ use super::flight::FARTHEST_FIRST;
 use super::node::{Child, Node, Tree};
 use super::slabs::BoxMargins;
 use super::walk::{Entry, ask_by_itself};
-use crate::accel::probe::Outcome;
-use crate::accel::query::Goal;
+use crate::accel::query::{Goal, Query};
 use crate::accel::wave::Wave;
 use crate::accel::{Hit, NO_PRIM, NoProbe, Ray, Shapes};
+use crate::math::meetings::Plane;
 use crate::math::shear::RaySpace;
-use crate::math::simd::{Kernel, LANES, Lanewise, Pick, Simd};
-use crate::math::triangle::{self, Triangle};
-use crate::math::triangles::{Plane, RayRow, corners_of};
+use crate::math::sight::RowSight;
+use crate::math::simd::{Kernel, LANES, Lanewise, Simd};
+use crate::math::triangle;
+use crate::math::triangles::{Verdicts, corners_of};
 
 /// A child still to be visited.
 #[derive(Clone, Copy, Debug, Default)]
@@ -54,22 +54,36 @@ struct Packet<'w, W, B> {
     start: usize,
     rays: Bundle<B>,
     found: Found,
+    /// Where their ranges end.
+    t_max: Numbers,
     /// Rays that still look for something.
     active: u32,
 }
 
-/// The best hits so far.
+/// What was found so far.
 #[derive(Default)]
 struct Found {
-    t: Numbers,
-    /// [`NO_PRIM`] where nothing was found; hits then count up to `t`.
+    /// [`NO_PRIM`] where nothing was found.
     prim: [u32; RAYS],
-    /// `t` in double precision, where `exact` says so: for triangles of blocks.
-    t_f64: [f64; RAYS],
-    exact: u32,
-    /// Where those triangles are, so that nobody looks up their corners again: block and lane.
+    /// Where a triangle is, block and lane, so that nobody looks up its corners again; [`Place::ELSEWHERE`] for prims of
+    /// runs, whose distances are exact.
     place: [u32; RAYS],
 }
+
+/// How far the rays look, in lanes: what every test changes and the next one needs.
+struct Reach<S: Simd> {
+    /// The exact distances of the best hits lie between these, as in `best`. Without a hit: infinite, and the end of the
+    /// ray's range.
+    low: Wide<S>,
+    high: Wide<S>,
+    /// Boxes are entered up to here.
+    limit: Wide<S>,
+    /// The greatest of these.
+    farthest: f32,
+}
+
+/// A number of each ray, in lanes.
+type Wide<S> = <<S as Simd>::Wide as Lanewise<RAYS>>::Lanes;
 
 /// A triangle in a block.
 #[derive(Clone, Copy, Debug)]
@@ -80,6 +94,10 @@ struct Place {
 }
 
 impl Place {
+    /// Not in a block.
+    const ELSEWHERE: u32 = u32::MAX;
+    const NOWHERE: Self = Self { index: 0, lane: 0, prim: NO_PRIM };
+
     /// Block and lane; there are fewer than 2²⁷ blocks.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "a lane is below 8")]
@@ -94,8 +112,16 @@ impl<W: Wave, B: BoxMargins> Kernel for InPackets<'_, W, B> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         let Self { tree, shapes, wave, stack, entries, .. } = self;
-        let mut packet =
-            Packet { tree, shapes, wave, start: 0, rays: Bundle::<B>::empty(), found: Found::default(), active: 0 };
+        let mut packet = Packet {
+            tree,
+            shapes,
+            wave,
+            start: 0,
+            rays: Bundle::<B>::empty(),
+            found: Found::default(),
+            t_max: [0.0; RAYS],
+            active: 0,
+        };
         let count = packet.wave.rays().len();
         while packet.start < count {
             if packet.gather(s) {
@@ -115,12 +141,9 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
     #[inline(always)]
     fn gather<S: Simd>(&mut self, s: S) -> bool {
         let Some(rays) = self.wave.rays()[self.start..].first_chunk::<RAYS>() else { return false };
-        if self.tree.extent > B::COORDINATES {
-            return false;
-        }
-        self.found.t = self.rays.spread(s, rays);
+        self.t_max = self.rays.spread(s, rays);
         self.wave.adapt_t_min(self.start, &mut self.rays.t_min);
-        self.rays.prepare(s, &self.found.t)
+        self.rays.prepare(s, self.tree, &self.t_max)
     }
 
     /// From the root to every leaf that any ray may hit.
@@ -132,52 +155,55 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
         };
         let (first, last) =
             ([side(0, false), side(1, false), side(2, false)], [side(0, true), side(1, true), side(2, true)]);
-        self.active = self.rays.meet(s, first, last);
+        let wide = s.wide();
+        let high = wide.load(&self.t_max);
+        let limit = Bundle::<B>::widened(wide, high);
+        self.active = self.rays.meet(wide, first, last, limit);
         if self.active == 0 {
-            return self.wave.take_all(self.start, &[Hit::MISS; RAYS]);
+            return (self.start..self.start + RAYS).for_each(|i| self.wave.take(i, Hit::MISS));
         }
         self.found.prim = [NO_PRIM; RAYS];
-        self.found.exact = 0;
         self.rays.bound(s, tree);
-        let row =
-            RayRow::new(s.wide(), &self.rays.origin, self.rays.common, &self.rays.dir, self.rays.z, self.rays.reach);
-        let mut limit = self.rays.farthest(s);
+        let sight = RowSight::new(wide, &self.rays.origin, self.rays.common, &self.rays.dir, self.rays.z);
+        let mut reach: Reach<S> = Reach { low: wide.splat(f32::INFINITY), high, limit, farthest: wide.greatest(limit) };
         let mut top = 0;
-        self.push(s, &tree.nodes[0], self.active, limit, stack, &mut top);
+        self.push(s, &tree.nodes[0], self.active, &reach, stack, &mut top);
         while top > 0 {
             top -= 1;
             let branch = stack[top];
             let rays = branch.rays & self.active;
-            if branch.near > limit || rays == 0 {
+            if branch.near > reach.farthest || rays == 0 {
                 continue;
             }
             let changed = match Child::unpack(branch.child) {
                 Child::Node(node) => {
-                    self.push(s, &tree.nodes[node as usize], rays, limit, stack, &mut top);
+                    self.push(s, &tree.nodes[node as usize], rays, &reach, stack, &mut top);
                     continue;
                 }
-                Child::Block(block, count) => self.test(s, block, count, rays, limit, &row),
-                Child::Run(run) => self.test_run(run, rays),
+                Child::Block(block, count) => self.test(s, block, count, rays, &mut reach, &sight),
+                Child::Run(run) => self.test_run(s, run, rays, &mut reach),
             };
             if changed != 0 {
-                self.narrow(s, changed);
-                if self.active == 0 {
-                    break;
+                if W::Goal::ANY {
+                    self.active &= !changed;
+                    reach.limit = wide.choose(changed, wide.splat(f32::NEG_INFINITY), reach.limit);
+                    if self.active == 0 {
+                        break;
+                    }
+                } else {
+                    reach.limit = Bundle::<B>::widened(wide, reach.high);
                 }
-                limit = self.rays.farthest(s);
+                reach.farthest = wide.greatest(reach.limit);
             }
         }
-        self.answer(s);
+        self.answer(s, &reach);
     }
 
     /// Puts the children that some ray meets on the stack, the nearest last.
     #[inline(always)]
-    fn push<S: Simd>(&self, s: S, node: &Node, rays: u32, limit: f32, stack: &mut [Branch], top: &mut usize) {
+    fn push<S: Simd>(&self, s: S, node: &Node, rays: u32, reach: &Reach<S>, stack: &mut [Branch], top: &mut usize) {
         let bundle = &self.rays;
-        let pick = |p: Pick| s.pick(&node.planes, p);
-        let first = [pick(bundle.first[0]), pick(bundle.first[1]), pick(bundle.first[2])];
-        let last = [pick(bundle.last[0]), pick(bundle.last[1]), pick(bundle.last[2])];
-        let (near, met) = bundle.meets_any(s, first, last, limit);
+        let (near, met) = bundle.meets_any_child(s, node, reach.farthest);
         if met == 0 {
             return;
         }
@@ -186,25 +212,12 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
         for _ in 0..met.count_ones() {
             let slot = (order & 7) as usize;
             order >>= 8;
-            let rays = bundle.meet_child(s, node, slot) & rays;
+            let rays = bundle.meet_child(s.wide(), node, slot, reach.limit) & rays;
             stack[*top] = Branch { near: near[slot], child: node.children[slot], rays };
             *top += usize::from(rays != 0);
             if rays != 0 {
                 self.tree.prefetch(s, node.children[slot]);
             }
-        }
-    }
-
-    /// After hits of these rays: how far they still look, if they do.
-    #[inline(always)]
-    fn narrow<S: Simd>(&mut self, s: S, rays: u32) {
-        let wide = s.wide();
-        if W::Goal::ANY {
-            self.active &= !rays;
-            wide.put(rays, wide.splat(f32::NEG_INFINITY), &mut self.rays.limit);
-        } else {
-            let limit = Bundle::<B>::widened(s, &self.found.t);
-            wide.put(rays, wide.load(&limit), &mut self.rays.limit);
         }
     }
 
@@ -216,8 +229,8 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
         index: u32,
         count: u32,
         mut rays: u32,
-        limit: f32,
-        row: &RayRow<S::Wide, RAYS>,
+        reach: &mut Reach<S>,
+        sight: &RowSight<S::Wide, RAYS>,
     ) -> u32 {
         let tree = self.tree;
         let block = &tree.blocks[index as usize];
@@ -229,20 +242,18 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
             let (low, high) = (s.smaller(a, s.smaller(b, c)), s.greater(a, s.greater(b, c)));
             (first[k], last[k]) = if self.rays.octant >> k & 1 == 1 { (high, low) } else { (low, high) };
         }
-        let (_, met) = self.rays.meets_any(s, first, last, limit);
+        let (_, met) = self.rays.meets_any(s, first, last, reach.farthest);
         let mut lanes = met & ((1 << count) - 1);
         let mut changed = 0;
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize % LANES;
             lanes &= lanes - 1;
             let corners = corners_of(&block.corners, lane);
-            let mut verdicts = row.verdicts(s.wide(), &corners);
-            if verdicts.unsure & rays != 0 {
-                verdicts = row.closer_verdicts(s.wide(), &corners);
-            }
-            if (verdicts.hit | verdicts.unsure) & rays != 0 {
+            let look = sight.look(s.wide(), &corners);
+            if (look.verdicts.hit | look.verdicts.unsure) & rays != 0 {
                 let place = Place { index, lane, prim: block.prims[lane] };
-                let hit = self.meet(s, place, &corners, verdicts.hit & rays, verdicts.unsure & rays);
+                let between = sight.distances(s.wide(), &look);
+                let hit = self.take(s, place, rays, look.verdicts, between, reach);
                 changed |= hit;
                 if W::Goal::ANY {
                     rays &= !hit;
@@ -252,101 +263,132 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
         changed
     }
 
-    /// Offers the hits of rays that meet a triangle for certain, and of those that may; which of them are the best now.
+    /// Offers the hits of rays with a triangle, between two distances where they are certain; which of them are the best
+    /// now.
     #[inline(always)]
-    fn meet<S: Simd>(&mut self, s: S, place: Place, corners: &Triangle, certain: u32, unsure: u32) -> u32 {
+    fn take<S: Simd>(
+        &mut self,
+        s: S,
+        place: Place,
+        rays: u32,
+        verdicts: Verdicts,
+        [low, high]: [Wide<S>; 2],
+        reach: &mut Reach<S>,
+    ) -> u32 {
         let (s, prim) = (s.wide(), place.prim);
-        let left_out = s.find_word(prim, &self.rays.exclude);
+        let rays = rays & !s.find_word(prim, &self.rays.exclude);
         if !self.wave.goal(self.start).wants(self.shapes, prim) {
             return 0;
         }
-        let met = Plane::of(corners).meet(s, &self.rays.origin, &self.rays.dir, &self.rays.bounds);
-        let known = certain & met.sure & !left_out;
-        let (t_min, best) = (s.load(&self.rays.t_min), s.load(&self.found.t));
-        let better = s.less(t_min, met.t) & s.less(met.t, best) & known;
-        s.put(better, met.t, &mut self.found.t);
-        s.put_f64(better, met.t_f64, &mut self.found.t_f64);
+        let (hit, unsure) = (verdicts.hit & rays, verdicts.unsure & rays);
+        let t_min = s.load(&self.rays.t_min);
+        let better = s.less(t_min, low) & s.less(high, reach.low) & s.at_most(high, reach.high) & hit;
+        // The exact test decides about distances that may be equal, and about what lanes cannot tell.
+        let in_time = s.at_most(low, reach.high) & s.at_most(t_min, high);
+        let mut open = hit & in_time & !better | unsure;
+        (reach.low, reach.high) = (s.choose(better, low, reach.low), s.choose(better, high, reach.high));
         s.put_word(better, prim, &mut self.found.prim);
         s.put_word(better, place.packed(), &mut self.found.place);
-        self.found.exact |= better;
-        // The scalar form decides about equal distances, and about what lanes cannot.
-        let equal = s.at_most(t_min, met.t) & s.at_most(met.t, best) & known & !better;
-        let mut open = equal | (certain & !met.sure | unsure) & !left_out;
         let mut changed = better;
-        while open != 0 {
-            let ray = open.trailing_zeros() as usize % RAYS;
-            open &= open - 1;
-            changed |= self.meet_exactly(ray, place, corners, certain >> ray & 1 == 1);
-        }
-        changed
-    }
-
-    /// Offers the hit of one ray by the scalar form.
-    #[cold]
-    #[inline(never)]
-    fn meet_exactly(&mut self, ray: usize, place: Place, corners: &Triangle, certain: bool) -> u32 {
-        let space = self.space(ray);
-        if !certain && !triangle::is_hit(&space, corners) {
-            return 0;
-        }
-        let meeting = triangle::meet(&space, corners);
-        let taken = self.offer(ray, place.prim, meeting.t, meeting.t_f64);
-        if taken != 0 {
-            self.found.place[ray] = place.packed();
-        }
-        taken
-    }
-
-    /// Offers a hit in the order of all hits: by distance and prim, behind the one after which the search goes on.
-    fn offer(&mut self, ray: usize, prim: u32, t: f32, t_f64: f64) -> u32 {
-        let behind = |goal: &mut W::Goal| goal.offer(t, prim) == Outcome::Hit;
-        let inside = self.rays.t_min[ray] <= t && (t, prim) < (self.found.t[ray], self.found.prim[ray]);
-        if !inside || !behind(&mut self.wave.goal(self.start + ray)) {
-            return 0;
-        }
-        (self.found.t[ray], self.found.t_f64[ray], self.found.prim[ray]) = (t, t_f64, prim);
-        let bit = 1 << ray;
-        self.found.exact = self.found.exact & !bit | u32::from(!t_f64.is_nan()) << ray;
-        bit
-    }
-
-    /// Tests the prims of a run, one ray after another.
-    #[cold]
-    #[inline(never)]
-    fn test_run(&mut self, run: u32, rays: u32) -> u32 {
-        let mut changed = 0;
-        for &prim in self.tree.run(run) {
-            if !self.wave.goal(self.start).wants(self.shapes, prim) {
-                continue;
-            }
-            let mut open = rays;
+        if open != 0 {
+            let (mut low, mut high) = (s.store(reach.low), s.store(reach.high));
             while open != 0 {
                 let ray = open.trailing_zeros() as usize % RAYS;
                 open &= open - 1;
-                if self.rays.exclude[ray] != prim {
-                    let space = self.space(ray);
-                    let distances = match self.shapes.triangles.get(prim as usize) {
-                        Some(&corners) => {
-                            [triangle::intersect(&space, &self.shapes.corners(corners)).unwrap_or(f32::NAN), f32::NAN]
-                        }
-                        None => self.shapes.other_distances(prim, &space, self.rays.t_min[ray] >= 0.0),
-                    };
-                    changed |= distances.into_iter().fold(0, |c, t| c | self.offer(ray, prim, t, f64::NAN));
+                if let Some(t) = self.decide(ray, place, hit >> ray & 1 == 1) {
+                    (low[ray], high[ray]) = (t, t);
+                    changed |= 1 << ray;
                 }
             }
+            (reach.low, reach.high) = (s.load(&low), s.load(&high));
         }
         changed
     }
 
-    /// A ray in sheared space.
-    fn space(&self, ray: usize) -> RaySpace {
-        let Ray { origin, dir, .. } = self.wave.rays()[self.start + ray];
-        RaySpace::checked(origin, dir).0
+    /// The best hit of one ray and another by the exact test; its distance, if there is one now.
+    #[cold]
+    #[inline(never)]
+    fn decide(&mut self, ray: usize, place: Place, certain: bool) -> Option<f32> {
+        let (mut query, usable) = self.query(ray);
+        let corners = self.shapes.triangle(place.prim);
+        if !usable || !certain && !triangle::is_hit(&query.ray, &corners) {
+            return None;
+        }
+        query.take(place.prim, &corners, true, &mut NoProbe);
+        self.settle(ray, &query, place)
     }
 
-    /// Gives the answers; weights of hits with the same triangle are found together.
+    /// A query of one ray that knows its best hit.
+    fn query(&self, ray: usize) -> (Query<'w, W::Goal>, bool) {
+        let i = self.start + ray;
+        let (mut query, usable) = Query::new(self.shapes, &self.wave.rays()[i], self.wave.t_min(i), self.wave.goal(i));
+        if usable && self.found.prim[ray] != NO_PRIM {
+            query.test(self.found.prim[ray], &mut NoProbe);
+        }
+        (query, usable)
+    }
+
+    /// Takes what a query found, at `place` if it was not known before.
+    fn settle(&mut self, ray: usize, query: &Query<W::Goal>, place: Place) -> Option<f32> {
+        if W::Goal::ANY {
+            let found = query.reach() < query.t_min;
+            self.found.prim[ray] = if found { place.prim } else { NO_PRIM };
+            return found.then_some(f32::NEG_INFINITY);
+        }
+        let (t, prim) = query.goal.best()?;
+        if prim != self.found.prim[ray] {
+            self.found.place[ray] = if prim == place.prim { place.packed() } else { Place::ELSEWHERE };
+        }
+        self.found.prim[ray] = prim;
+        Some(t)
+    }
+
+    /// Tests the prims of a run, one ray after another.
     #[inline(always)]
-    fn answer<S: Simd>(&mut self, s: S) {
+    fn test_run<S: Simd>(&mut self, s: S, run: u32, mut rays: u32, reach: &mut Reach<S>) -> u32 {
+        let (mut low, mut high, mut changed) = (s.wide().store(reach.low), s.wide().store(reach.high), 0);
+        while rays != 0 {
+            let ray = rays.trailing_zeros() as usize % RAYS;
+            rays &= rays - 1;
+            if let Some(t) = self.run_of(ray, run) {
+                (low[ray], high[ray]) = (t, t);
+                changed |= 1 << ray;
+            }
+        }
+        (reach.low, reach.high) = (s.wide().load(&low), s.wide().load(&high));
+        changed
+    }
+
+    /// The best hit of one ray and the prims of a run; its distance, if there is one.
+    #[cold]
+    #[inline(never)]
+    fn run_of(&mut self, ray: usize, run: u32) -> Option<f32> {
+        let (mut query, usable) = self.query(ray);
+        let prims = self.tree.run(run);
+        if !usable {
+            return None;
+        }
+        let met = prims.iter().find(|&&prim| query.test(prim, &mut NoProbe));
+        let prim = met.or(prims.first()).copied().unwrap_or(NO_PRIM);
+        self.settle(ray, &query, if W::Goal::ANY { Place { prim, ..Place::NOWHERE } } else { Place::NOWHERE })
+    }
+
+    /// Distance and weights of one ray's hit by the scalar form.
+    #[cold]
+    #[inline(never)]
+    fn exactly(&self, ray: usize, low: f32) -> (f32, f32, f32) {
+        let (prim, Ray { origin, dir, .. }) = (self.found.prim[ray], self.wave.rays()[self.start + ray]);
+        let space = RaySpace::checked(origin, dir).0;
+        let (u, v) = self.shapes.barycentrics(prim, &space);
+        match self.shapes.triangles.get(prim as usize) {
+            Some(&corners) => (triangle::distance(&space, &self.shapes.corners(corners)), u, v),
+            None => (low, u, v),
+        }
+    }
+
+    /// Gives the answers; distances and weights of hits with the same triangle are found together.
+    #[inline(always)]
+    fn answer<S: Simd>(&mut self, s: S, reach: &Reach<S>) {
         let (start, found) = (self.start, &self.found);
         if W::Goal::ANY {
             for (ray, &prim) in found.prim.iter().enumerate() {
@@ -355,37 +397,42 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
             return;
         }
         let wide = s.wide();
-        let missed = wide.find_word(NO_PRIM, &found.prim);
-        let mut t = found.t;
-        wide.put(missed, wide.splat(f32::INFINITY), &mut t);
-        let (mut u, mut v) = ([0.0; RAYS], [0.0; RAYS]);
-        let mut left = !missed & ALL;
+        let mut left = !wide.find_word(NO_PRIM, &found.prim) & ALL;
+        let low = wide.store(reach.low);
+        let (mut t, mut u, mut v) = (wide.splat(f32::INFINITY), wide.splat(0.0), wide.splat(0.0));
         while left != 0 {
             let ray = left.trailing_zeros() as usize % RAYS;
-            if found.exact >> ray & 1 == 0 {
-                (u[ray], v[ray]) = self.shapes.barycentrics(found.prim[ray], &self.space(ray));
-                left &= left - 1;
-                continue;
-            }
             let place = found.place[ray];
-            let mine = wide.find_word(place, &found.place) & found.exact & !missed;
-            left &= !mine;
-            let block = &self.tree.blocks[place as usize / LANES];
-            let plane = Plane::of(&corners_of(&block.corners, place as usize % LANES));
-            let weights = plane.barycentrics(wide, &self.rays.origin, &self.rays.dir, &found.t_f64);
-            wide.put(mine, wide.load(&weights[0]), &mut u);
-            wide.put(mine, wide.load(&weights[1]), &mut v);
+            let mut alone = 1 << ray;
+            if place != Place::ELSEWHERE {
+                let mine = wide.find_word(place, &found.place) & left;
+                let block = &self.tree.blocks[place as usize / LANES];
+                let plane = Plane::of(&corners_of(&block.corners, place as usize % LANES));
+                let met = plane.meet(wide, &self.rays.origin, &self.rays.dir, &self.rays.bounds);
+                let weights = plane.barycentrics(wide, &self.rays.origin, &self.rays.dir, met.t_f64);
+                let sure = mine & met.sure;
+                t = wide.choose(sure, met.t, t);
+                u = wide.choose(sure, weights[0], u);
+                v = wide.choose(sure, weights[1], v);
+                left &= !sure;
+                alone &= !sure;
+            }
+            if alone != 0 {
+                let exact = self.exactly(ray, low[ray]);
+                t = wide.choose(alone, wide.splat(exact.0), t);
+                u = wide.choose(alone, wide.splat(exact.1), u);
+                v = wide.choose(alone, wide.splat(exact.2), v);
+                left &= !alone;
+            }
         }
-        let mut hits = [Hit::MISS; RAYS];
+        let (t, u, v) = (wide.store(t), wide.store(u), wide.store(v));
         for half in 0..2 {
             let eight = |row: &Numbers| s.load(&row.as_chunks().0[half]);
             let prim = s.load(&found.prim.as_chunks::<LANES>().0[half].map(f32::from_bits));
             let rows = s.rows([eight(&t), eight(&u), eight(&v), prim]);
-            for lane in 0..LANES {
-                let [t, u, v, prim] = rows[lane];
-                hits[LANES * half + lane] = Hit { t, u, v, prim: prim.to_bits() };
+            for (lane, [t, u, v, prim]) in rows.into_iter().enumerate() {
+                self.wave.take(start + LANES * half + lane, Hit { t, u, v, prim: prim.to_bits() });
             }
         }
-        self.wave.take_all(start, &hits);
     }
 }

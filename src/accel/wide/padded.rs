@@ -23,7 +23,7 @@ pub(super) struct PaddedSlabs {
 }
 
 /// Rows of the planes that come first, by octant.
-static FIRST: [[Pick; 3]; LANES] = {
+pub(super) static FIRST: [[Pick; 3]; LANES] = {
     let mut rows = [[Pick::new(0); 3]; LANES];
     let mut octant = 0;
     while octant < LANES {

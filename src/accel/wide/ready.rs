@@ -6,8 +6,8 @@ use super::slabs::BoxMargins;
 use crate::accel::Ray;
 use crate::accel::wave::Wave;
 use crate::math::bounds::{BOX_RANGE, PARALLEL};
+use crate::math::sight::Sight;
 use crate::math::simd::{LANES, Simd};
-use crate::math::triangles::Sight;
 
 /// A ray as boxes and blocks see it.
 #[derive(Clone, Copy, Debug, Default)]

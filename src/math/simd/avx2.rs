@@ -8,7 +8,7 @@
 use std::arch::x86_64::*;
 
 use super::pair::Pair;
-use super::{Axis, Kernel, LANES, Lanewise, Order, Pick, Row, Simd};
+use super::{Axis, Kernel, LANES, Lanewise, Order, Pick, Row, Simd, WIDE};
 
 /// Proof that the processor has AVX2 and the fused and bit instructions that came with it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,7 +39,7 @@ impl Avx2 {
 
 /// Eight lanes for a token that proves AVX2.
 macro_rules! eight_lanes {
-    ($token:ty, $wide:ty, $widened:expr, $larger:expr) => {
+    ($token:ty, $wide:ty, $widened:expr, $larger:expr, $join:expr) => {
         impl Lanewise<LANES> for $token {
             type Lanes = __m256;
             type Doubles = [__m256d; 2];
@@ -119,6 +119,11 @@ macro_rules! eight_lanes {
             }
 
             #[inline(always)]
+            fn larger(self, a: __m256, b: __m256) -> __m256 {
+                $larger(self, a, b)
+            }
+
+            #[inline(always)]
             fn smaller(self, a: __m256, b: __m256) -> __m256 {
                 // SAFETY: as above.
                 unsafe { _mm256_min_ps(a, b) }
@@ -134,6 +139,27 @@ macro_rules! eight_lanes {
             fn at_most(self, a: __m256, b: __m256) -> u32 {
                 // SAFETY: as above.
                 unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)).cast_unsigned() }
+            }
+
+            #[inline(always)]
+            fn choose(self, mask: u32, a: __m256, b: __m256) -> __m256 {
+                // SAFETY: as above.
+                unsafe { _mm256_blendv_ps(b, a, _mm256_castsi256_ps(lanes_in(mask))) }
+            }
+
+            #[inline(always)]
+            fn signs(self, a: __m256) -> u32 {
+                // SAFETY: as above.
+                unsafe { _mm256_movemask_ps(a).cast_unsigned() }
+            }
+
+            #[inline(always)]
+            fn with_sign(self, a: __m256, b: __m256) -> __m256 {
+                // SAFETY: as above.
+                unsafe {
+                    let sign = _mm256_set1_ps(-0.0);
+                    _mm256_or_ps(_mm256_andnot_ps(sign, a), _mm256_and_ps(sign, b))
+                }
             }
 
             #[inline(always)]
@@ -297,12 +323,6 @@ macro_rules! eight_lanes {
             }
 
             #[inline(always)]
-            fn choose(self, mask: u32, a: __m256, b: __m256) -> __m256 {
-                // SAFETY: as above.
-                unsafe { _mm256_blendv_ps(b, a, _mm256_castsi256_ps(lanes_in(mask))) }
-            }
-
-            #[inline(always)]
             fn high_bits(self, words: &[u32; LANES]) -> u32 {
                 // SAFETY: as above; reads eight words, with no demand on alignment.
                 unsafe {
@@ -312,23 +332,8 @@ macro_rules! eight_lanes {
             }
 
             #[inline(always)]
-            fn signs(self, a: __m256) -> u32 {
-                // SAFETY: as above.
-                unsafe { _mm256_movemask_ps(a).cast_unsigned() }
-            }
-
-            #[inline(always)]
-            fn larger(self, a: __m256, b: __m256) -> __m256 {
-                $larger(self, a, b)
-            }
-
-            #[inline(always)]
-            fn with_sign(self, a: __m256, b: __m256) -> __m256 {
-                // SAFETY: as above.
-                unsafe {
-                    let sign = _mm256_set1_ps(-0.0);
-                    _mm256_or_ps(_mm256_andnot_ps(sign, a), _mm256_and_ps(sign, b))
-                }
+            fn join(self, low: __m256, high: __m256) -> <$wide as Lanewise<WIDE>>::Lanes {
+                $join(self, low, high)
             }
 
             #[inline(always)]
@@ -426,7 +431,12 @@ macro_rules! eight_lanes {
 
 pub(super) use eight_lanes;
 
-eight_lanes!(Avx2, Pair<Avx2>, Pair, larger);
+eight_lanes!(Avx2, Pair<Avx2>, Pair, larger, join);
+
+#[inline(always)]
+fn join(_: Avx2, low: __m256, high: __m256) -> [__m256; 2] {
+    [low, high]
+}
 
 #[inline(always)]
 fn larger(s: Avx2, a: __m256, b: __m256) -> __m256 {

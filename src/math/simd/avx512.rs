@@ -45,7 +45,13 @@ impl Avx512 {
     }
 }
 
-eight_lanes!(Avx512, Sixteen, |_: Avx512| Sixteen(()), larger);
+eight_lanes!(Avx512, Sixteen, |_: Avx512| Sixteen(()), larger, join);
+
+#[inline(always)]
+fn join(_: Avx512, low: __m256, high: __m256) -> __m512 {
+    // SAFETY: the token proves the features.
+    unsafe { _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high) }
+}
 
 #[inline(always)]
 fn larger(_: Avx512, a: __m256, b: __m256) -> __m256 {
@@ -140,6 +146,12 @@ impl Lanewise<WIDE> for Sixteen {
     }
 
     #[inline(always)]
+    fn larger(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: as above. The greater size, without a sign.
+        unsafe { _mm512_range_ps::<0b1011>(a, b) }
+    }
+
+    #[inline(always)]
     fn smaller(self, a: __m512, b: __m512) -> __m512 {
         // SAFETY: as above.
         unsafe { _mm512_min_ps(a, b) }
@@ -155,6 +167,27 @@ impl Lanewise<WIDE> for Sixteen {
     fn at_most(self, a: __m512, b: __m512) -> u32 {
         // SAFETY: as above.
         unsafe { u32::from(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b)) }
+    }
+
+    #[inline(always)]
+    fn choose(self, mask: u32, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: as above.
+        unsafe { _mm512_mask_blend_ps(mask as __mmask16, b, a) }
+    }
+
+    #[inline(always)]
+    fn signs(self, a: __m512) -> u32 {
+        // SAFETY: as above.
+        unsafe { u32::from(_mm512_movepi32_mask(_mm512_castps_si512(a))) }
+    }
+
+    #[inline(always)]
+    fn with_sign(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: as above.
+        unsafe {
+            let sign = _mm512_set1_ps(-0.0);
+            _mm512_or_ps(_mm512_andnot_ps(sign, a), _mm512_and_ps(sign, b))
+        }
     }
 
     #[inline(always)]

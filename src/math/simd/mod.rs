@@ -64,12 +64,23 @@ pub trait Lanewise<const N: usize>: Copy {
     fn abs(self, a: Self::Lanes) -> Self::Lanes;
     /// The greater of both; b where one is NaN.
     fn greater(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
+    /// The greater of both sizes; either where one is NaN.
+    #[inline(always)]
+    fn larger(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+        self.greater(self.abs(a), self.abs(b))
+    }
     /// The smaller of both; b where one is NaN.
     fn smaller(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
     /// a < b; false where one is NaN.
     fn less(self, a: Self::Lanes, b: Self::Lanes) -> u32;
     /// a ≤ b; false where one is NaN.
     fn at_most(self, a: Self::Lanes, b: Self::Lanes) -> u32;
+    /// `a` in the lanes of `mask`, else `b`.
+    fn choose(self, mask: u32, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
+    /// Which lanes have a negative sign, that of zero and NaN included.
+    fn signs(self, a: Self::Lanes) -> u32;
+    /// The sizes of `a` with the signs of `b`.
+    fn with_sign(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
     /// The smallest of all lanes, of which none is NaN; of two zeros either.
     fn least(self, a: Self::Lanes) -> f32;
     /// The greatest of all lanes, of which none is NaN; of two zeros either.
@@ -117,19 +128,10 @@ pub trait Simd: Lanewise<LANES> {
 
     /// Sixteen lanes.
     fn wide(self) -> Self::Wide;
-    /// `a` in the lanes of `mask`, else `b`.
-    fn choose(self, mask: u32, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
     /// Which words have their highest bit set.
     fn high_bits(self, words: &[u32; LANES]) -> u32;
-    /// Which lanes have a negative sign, that of zero and NaN included.
-    fn signs(self, a: Self::Lanes) -> u32;
-    /// The greater of both sizes; either where one is NaN.
-    #[inline(always)]
-    fn larger(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
-        self.greater(self.abs(a), self.abs(b))
-    }
-    /// The sizes of `a` with the signs of `b`.
-    fn with_sign(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
+    /// Sixteen lanes of two times eight.
+    fn join(self, low: Self::Lanes, high: Self::Lanes) -> <Self::Wide as Lanewise<WIDE>>::Lanes;
     /// The row of an axis.
     fn along(self, rows: &[Row; 3], axis: Axis) -> Self::Lanes;
     /// One of six rows.

@@ -227,6 +227,30 @@ impl Lanewise<LANES> for Neon {
     }
 
     #[inline(always)]
+    fn choose(self, mask: u32, a: Floats, b: Floats) -> Floats {
+        // SAFETY: every processor of the family has the instructions.
+        unsafe { [vbslq_f32(lanes_in(mask), a[0], b[0]), vbslq_f32(lanes_in(mask >> 4), a[1], b[1])] }
+    }
+
+    #[inline(always)]
+    fn signs(self, a: Floats) -> u32 {
+        // SAFETY: every processor of the family has the instructions.
+        unsafe {
+            let negative = |a| mask(vreinterpretq_u32_s32(vshrq_n_s32::<31>(vreinterpretq_s32_f32(a))));
+            negative(a[0]) | negative(a[1]) << 4
+        }
+    }
+
+    #[inline(always)]
+    fn with_sign(self, a: Floats, b: Floats) -> Floats {
+        // SAFETY: every processor of the family has the instructions.
+        unsafe {
+            let sign = vdupq_n_u32(1 << 31);
+            [vbslq_f32(sign, b[0], a[0]), vbslq_f32(sign, b[1], a[1])]
+        }
+    }
+
+    #[inline(always)]
     fn least(self, a: Floats) -> f32 {
         // SAFETY: every processor of the family has the instructions.
         unsafe { vminvq_f32(vminq_f32(a[0], a[1])) }
@@ -393,32 +417,13 @@ impl Simd for Neon {
     }
 
     #[inline(always)]
-    fn choose(self, mask: u32, a: Floats, b: Floats) -> Floats {
-        // SAFETY: every processor of the family has the instructions.
-        unsafe { [vbslq_f32(lanes_in(mask), a[0], b[0]), vbslq_f32(lanes_in(mask >> 4), a[1], b[1])] }
-    }
-
-    #[inline(always)]
     fn high_bits(self, words: &[u32; LANES]) -> u32 {
         (0..LANES).fold(0, |mask, k| mask | words[k] >> 31 << k)
     }
 
     #[inline(always)]
-    fn signs(self, a: Floats) -> u32 {
-        // SAFETY: every processor of the family has the instructions.
-        unsafe {
-            let negative = |a| mask(vreinterpretq_u32_s32(vshrq_n_s32::<31>(vreinterpretq_s32_f32(a))));
-            negative(a[0]) | negative(a[1]) << 4
-        }
-    }
-
-    #[inline(always)]
-    fn with_sign(self, a: Floats, b: Floats) -> Floats {
-        // SAFETY: every processor of the family has the instructions.
-        unsafe {
-            let sign = vdupq_n_u32(1 << 31);
-            [vbslq_f32(sign, b[0], a[0]), vbslq_f32(sign, b[1], a[1])]
-        }
+    fn join(self, low: Floats, high: Floats) -> [Floats; 2] {
+        [low, high]
     }
 
     #[inline(always)]

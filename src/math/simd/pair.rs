@@ -87,6 +87,11 @@ impl<S: Lanewise<LANES>> Lanewise<WIDE> for Pair<S> {
     }
 
     #[inline(always)]
+    fn larger(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+        [self.0.larger(a[0], b[0]), self.0.larger(a[1], b[1])]
+    }
+
+    #[inline(always)]
     fn smaller(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
         [self.0.smaller(a[0], b[0]), self.0.smaller(a[1], b[1])]
     }
@@ -104,6 +109,21 @@ impl<S: Lanewise<LANES>> Lanewise<WIDE> for Pair<S> {
     #[inline(always)]
     fn at_most(self, a: Self::Lanes, b: Self::Lanes) -> u32 {
         self.0.at_most(a[0], b[0]) | self.0.at_most(a[1], b[1]) << LANES
+    }
+
+    #[inline(always)]
+    fn choose(self, mask: u32, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+        [self.0.choose(mask, a[0], b[0]), self.0.choose(mask >> LANES, a[1], b[1])]
+    }
+
+    #[inline(always)]
+    fn signs(self, a: Self::Lanes) -> u32 {
+        self.0.signs(a[0]) | self.0.signs(a[1]) << LANES
+    }
+
+    #[inline(always)]
+    fn with_sign(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+        [self.0.with_sign(a[0], b[0]), self.0.with_sign(a[1], b[1])]
     }
 
     #[inline(always)]

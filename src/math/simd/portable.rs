@@ -111,6 +111,22 @@ impl Lanewise<LANES> for Portable {
     }
 
     #[inline(always)]
+    fn choose(self, mask: u32, a: Row, mut b: Row) -> Row {
+        put(mask, &a, &mut b);
+        b
+    }
+
+    #[inline(always)]
+    fn signs(self, a: Row) -> u32 {
+        mask(a, a, |a, _| a.is_sign_negative())
+    }
+
+    #[inline(always)]
+    fn with_sign(self, a: Row, b: Row) -> Row {
+        each(a, b, f32::copysign)
+    }
+
+    #[inline(always)]
     fn least(self, a: Row) -> f32 {
         a.iter().fold(a[0], |x, &y| if y < x { y } else { x })
     }
@@ -216,24 +232,13 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
-    fn choose(self, mask: u32, a: Row, mut b: Row) -> Row {
-        put(mask, &a, &mut b);
-        b
-    }
-
-    #[inline(always)]
     fn high_bits(self, words: &[u32; LANES]) -> u32 {
         (0..LANES).fold(0, |mask, k| mask | words[k] >> 31 << k)
     }
 
     #[inline(always)]
-    fn signs(self, a: Row) -> u32 {
-        mask(a, a, |a, _| a.is_sign_negative())
-    }
-
-    #[inline(always)]
-    fn with_sign(self, a: Row, b: Row) -> Row {
-        each(a, b, f32::copysign)
+    fn join(self, low: Row, high: Row) -> [Row; 2] {
+        [low, high]
     }
 
     #[inline(always)]
