@@ -121,14 +121,20 @@ impl<S: Simd> Look<S> {
     /// sums, the reciprocal and the last products are 10 u of the largest height; 16 u is for what they leave out.
     #[inline(always)]
     pub fn distances(&self, s: S, sight: &Sight) -> [S::Lanes; 2] {
+        self.distances_within(s, sight, WEIGHTS, HEIGHTS)
+    }
+
+    /// [`Self::distances`] by given margins.
+    #[inline(always)]
+    fn distances_within(&self, s: S, sight: &Sight, weights: f32, heights: f32) -> [S::Lanes; 2] {
         let ([u, v, w], [a, b, c]) = (self.edges, self.heights);
         let per_length = s.splat(sight.per_length);
         let whole = s.mul(s.div(s.splat(1.0), s.add(u, s.add(v, w))), per_length);
         let spread = s.sub(s.greater(a, s.greater(b, c)), s.smaller(a, s.smaller(b, c)));
         let t = s.mul(s.mul_add(u, a, s.mul_add(v, b, s.mul(w, c))), whole);
-        let moved = s.mul(s.mul(spread, self.error), s.splat(WEIGHTS));
+        let moved = s.mul(s.mul(spread, self.error), s.splat(weights));
         // What underflow adds is far below the second.
-        let rounded = s.mul_add(self.height, s.splat(HEIGHTS), s.splat(EdgeMargins::WITH_DISTANCES.underflow));
+        let rounded = s.mul_add(self.height, s.splat(heights), s.splat(EdgeMargins::WITH_DISTANCES.underflow));
         let rounded = s.mul(rounded, s.abs(per_length));
         let error = s.mul_add(moved, s.abs(whole), rounded);
         [s.sub(t, error), s.add(t, error)]
@@ -447,6 +453,7 @@ fn largest3<S: Lanewise<N>, const N: usize>(s: S, [x, y, z]: [S::Lanes; 3]) -> S
 #[cfg(test)]
 mod tests {
     use super::super::random::Random;
+    use super::super::rational::{exact, hit, point};
     use super::super::simd::{Kernel, Level};
     use super::super::triangle::{self, Triangle};
     use super::*;
@@ -662,5 +669,201 @@ mod tests {
             }
         }
         assert!(sure > 10_000 && sure > hits * 9 / 10, "{sure} of {hits}");
+    }
+
+    fn sight(ray: &RaySpace) -> Sight {
+        Sight {
+            origin: [ray.origin[ray.x], ray.origin[ray.y], ray.origin[ray.z]],
+            per_length: 1.0 / ray.dir[ray.z],
+            shear: [ray.shear.0, ray.shear.1],
+            main: ray.z as u32,
+        }
+    }
+
+    /// Verdicts, and between which distances those that are hit are, by these margins of weights and heights.
+    struct Looked<'a>(&'a Sight, &'a Corners8, [f32; 2]);
+
+    impl Kernel for Looked<'_> {
+        type Output = (Verdicts, [Row; 2]);
+
+        #[inline(always)]
+        fn run<S: Simd>(self, s: S) -> Self::Output {
+            let Self(sight, corners, [weights, heights]) = self;
+            let look = sight.look(s, corners);
+            let [low, high] = look.distances_within(s, sight, weights, heights);
+            (look.verdicts, [s.store(low), s.store(high)])
+        }
+    }
+
+    /// How a ray sees the triangles that it is aimed at.
+    #[derive(Clone, Copy, Debug)]
+    enum View {
+        Ordinary,
+        /// From many sizes away.
+        Far(f32),
+        /// Nearly edge on.
+        Grazing(f32),
+        /// Large triangles and small ones, from next to them.
+        Near,
+        /// With numbers as large, or as small, as may be.
+        Scaled(i32),
+    }
+
+    const VIEWS: [View; 10] = [
+        View::Ordinary,
+        View::Far(1e2),
+        View::Far(1e4),
+        View::Far(1e6),
+        View::Grazing(1e-1),
+        View::Grazing(1e-2),
+        View::Grazing(1e-4),
+        View::Near,
+        View::Scaled(30),
+        View::Scaled(-30),
+    ];
+
+    /// Eight triangles around a ray, each of its own size.
+    fn seen(random: &mut Random, view: View) -> Option<(RaySpace, [Triangle; LANES])> {
+        let (target, dir) = (random.cube(), random.direction() * (0.1 + random.unit()));
+        let triangles: [Triangle; LANES] = std::array::from_fn(|_| {
+            let flat = match view {
+                View::Grazing(slope) => slope,
+                _ => 1.0,
+            };
+            let size = match view {
+                View::Near => 2.0f32.powi(random.below(17) as i32 - 8),
+                _ => 0.2 + random.unit(),
+            };
+            let corner = |from: Vec3| {
+                let across = from - dir * (from.dot(dir) / dir.length_squared());
+                (across * flat + dir * random.cube().x) * size
+            };
+            let around = dir.any_orthonormal_vector();
+            let turned = dir.cross(around).normalize();
+            let corners = [around, turned - around, -turned - around].map(corner);
+            let shift = (corners[0] - corners[1]) * (random.unit() * random.unit());
+            corners.map(|p| target + p + shift)
+        });
+        let back = match view {
+            View::Far(sizes) => sizes,
+            View::Near => 1e-3 * random.unit(),
+            _ => 4.0 * random.unit(),
+        };
+        let scale = match view {
+            View::Scaled(exponent) => 2.0f32.powi(exponent),
+            _ => 1.0,
+        };
+        let ray = RaySpace::new((target - dir * back) * scale, dir * scale.recip())?;
+        Some((ray, triangles.map(|t| t.map(|p| p * scale))))
+    }
+
+    /// Some rays of each view.
+    fn each_view(views: &[View], mut check: impl FnMut(View, &RaySpace, &[Triangle; LANES], &Corners8)) {
+        let mut random = Random::new(51);
+        for &view in views {
+            for _ in 0..120 {
+                let Some((ray, triangles)) = seen(&mut random, view) else { continue };
+                let mut corners = NO_CORNERS;
+                (0..LANES).for_each(|lane| set_corners(&mut corners, lane, &triangles[lane]));
+                check(view, &ray, &triangles, &corners);
+            }
+        }
+    }
+
+    #[test]
+    fn certain_verdicts_of_a_look_are_those_of_the_exact_test() {
+        for level in Level::all() {
+            let (mut certain, mut hits) = (0, 0);
+            each_view(&VIEWS, |view, ray, triangles, corners| {
+                let (verdicts, _) = level.run(Looked(&sight(ray), corners, [WEIGHTS, HEIGHTS]));
+                assert_eq!(verdicts.hit & verdicts.unsure, 0);
+                for lane in (0..LANES).filter(|lane| verdicts.unsure >> lane & 1 == 0) {
+                    let exact = triangle::is_hit_near_edge(ray, &triangles[lane]);
+                    assert_eq!(verdicts.hit >> lane & 1 == 1, exact, "{view:?} on {}", level.name());
+                    (certain, hits) = (certain + 1, hits + u32::from(exact));
+                }
+            });
+            assert!(hits > 1000 && certain > hits + 20, "{hits} hits of {certain}");
+        }
+    }
+
+    #[test]
+    fn a_look_judges_triangles_of_all_sizes_and_rays_at_corners_and_edges() {
+        let mut certain = 0;
+        for exponent in [-20, 0, 20] {
+            each_case(exponent, 0, |ray, triangles, corners| {
+                for level in Level::all() {
+                    let (verdicts, _) = level.run(Looked(&sight(ray), corners, [WEIGHTS, HEIGHTS]));
+                    for lane in (0..LANES).filter(|lane| verdicts.unsure >> lane & 1 == 0) {
+                        let exact = triangle::is_hit(ray, &triangles[lane]);
+                        assert_eq!(verdicts.hit >> lane & 1 == 1, exact, "2^{exponent} on {}", level.name());
+                        certain += 1;
+                    }
+                }
+            });
+        }
+        assert!(certain > 1000, "{certain}");
+    }
+
+    #[test]
+    fn a_look_is_never_certain_of_empty_lanes() {
+        let mut corners = NO_CORNERS;
+        set_corners(&mut corners, 2, &[Vec3::X, Vec3::Y, Vec3::NEG_ONE]);
+        let down = RaySpace::new(Vec3::new(0.0, 0.0, 5.0), Vec3::NEG_Z).map(|ray| sight(&ray));
+        for level in Level::all() {
+            let verdicts = down.map(|sight| level.run(Looked(&sight, &corners, [WEIGHTS, HEIGHTS])).0);
+            assert_eq!(verdicts, Some(Verdicts { hit: 0b100, unsure: 0b1111_1011 }), "{}", level.name());
+        }
+    }
+
+    /// Hits and, of these, those whose exact distance is not where it is said to be.
+    fn misplaced(views: &[View], margins: [f32; 2], level: Level) -> [usize; 2] {
+        let (mut hits, mut outside) = (0, 0);
+        each_view(views, |view, ray, triangles, corners| {
+            let (verdicts, [low, high]) = level.run(Looked(&sight(ray), corners, margins));
+            let (origin, dir) = (point(ray.origin), point(ray.dir));
+            for lane in (0..LANES).filter(|lane| verdicts.hit >> lane & 1 == 1) {
+                let t = hit(&origin, &dir, &triangles[lane]);
+                assert!(t.is_some() && low[lane].is_finite() && high[lane].is_finite(), "{view:?}");
+                hits += 1;
+                outside += usize::from(!t.is_some_and(|t| exact(low[lane]) <= t && t <= exact(high[lane])));
+            }
+        });
+        [hits, outside]
+    }
+
+    #[test]
+    fn exact_distances_lie_where_they_are_said_to() {
+        for level in Level::all() {
+            for view in VIEWS {
+                let [hits, outside] = misplaced(&[view], [WEIGHTS, HEIGHTS], level);
+                assert_eq!(outside, 0, "{view:?} on {}: {hits} hits", level.name());
+            }
+            let [hits, _] = misplaced(&VIEWS, [WEIGHTS, HEIGHTS], level);
+            assert!(hits > 1000, "{hits}");
+        }
+    }
+
+    #[test]
+    fn every_margin_of_a_distance_is_needed() {
+        for level in Level::all() {
+            for (name, margins) in [("weights", [0.0, HEIGHTS]), ("heights", [WEIGHTS, 0.0])] {
+                let [hits, outside] = misplaced(&VIEWS, margins, level);
+                assert!(outside > 0, "{name} on {}: nothing of {hits} goes wrong without it", level.name());
+            }
+        }
+    }
+
+    #[test]
+    fn distances_of_ordinary_hits_are_known_well() {
+        for level in Level::all() {
+            each_view(&[View::Ordinary], |_, ray, triangles, corners| {
+                let (verdicts, [low, high]) = level.run(Looked(&sight(ray), corners, [WEIGHTS, HEIGHTS]));
+                for lane in (0..LANES).filter(|lane| verdicts.hit >> lane & 1 == 1) {
+                    let farthest = triangles[lane].map(|p| (p - ray.origin).length()).into_iter().fold(0.0, f32::max);
+                    assert!(high[lane] - low[lane] < 1e-4 * (farthest + 1.0) / ray.dir.length(), "{}", level.name());
+                }
+            });
+        }
     }
 }
