@@ -145,7 +145,7 @@ mod tests {
     use super::*;
     use crate::accel::Hit;
     use crate::accel::intersector::Exact;
-    use crate::accel::tests::scenes::ray;
+    use crate::accel::tests::scenes::{broken_rays, ray};
     use crate::accel::wave::{ForFirst, ForNext};
     use crate::math::Vec3;
     use crate::math::aabb::Aabb;
@@ -273,6 +273,13 @@ mod tests {
                 let allowed = take(level, tree, &rays, 0).allowed >> lane & 1 == 1;
                 assert_eq!(allowed, expected, "lane {lane} on {}: {ray:?}", level.name());
             }
+        }
+    }
+
+    #[test]
+    fn rays_that_cannot_hit_are_not_allowed() {
+        for ray in broken_rays() {
+            assert_allowed(&tree(2.0), ray, false);
         }
     }
 

@@ -161,3 +161,22 @@ fn trees_too_deep_for_rays_in_flight_are_answered() {
         }
     }
 }
+
+/// How far it may drift from its plane is a matter of the way along its main axis, not of the other coordinates.
+#[test]
+fn rays_along_axes_from_far_away_hit_what_brute_force_hits() {
+    let shapes = scenes::lattice(120);
+    for far in [1e3, 1e5, 1e7] {
+        assert_all_ways_agree("lattice", &shapes, &along_axes(&shapes, 240, far));
+    }
+}
+
+#[test]
+fn rays_without_a_range_hit_nothing() {
+    let shapes = scenes::soup(60, 0.4);
+    for (t_min, t_max) in [(0.0, f32::NAN), (f32::NAN, 1.0), (f32::NAN, f32::NAN), (2.0, 1.0), (0.0, f32::NEG_INFINITY)]
+    {
+        let rays: Vec<Ray> = scenes::rays(&shapes, 6).iter().map(|&ray| Ray { t_min, t_max, ..ray }).collect();
+        assert_all_ways_agree("soup", &shapes, &rays);
+    }
+}
