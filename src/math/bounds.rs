@@ -185,13 +185,13 @@ pub const BOX_COORDINATES: f32 = f32::MAX / 4.0;
 /// parts of the sum of the largest coordinate of a box, E, and of the origin's, |o|.
 ///
 /// The reciprocal, its products with plane, origin and pad, and two sums are rounded once each: u (2 |plane − o| + 2 |o| +
-/// |plane| + 3 pad) over |d|, less than 5 u (E + |o|). The rest of 8 is for directions that are nearly parallel to the plane
+/// |plane| + 3 pad) over |d|, less than 5 u (E + |o|). Directions that are nearly parallel to the plane need more
 /// ([`PARALLEL`]).
 pub const BOX_PAD: f32 = 8.0 * U32;
 
 /// Components of a direction that are smaller than this part of the largest one are taken to be as large. Within the boxes
-/// a ray goes no farther than E + |o| along the largest, so it moves by 2⁻³⁰ (E + |o|) more along such an axis: 2⁻⁹ of
-/// [`BOX_PAD`].
+/// a ray goes no farther than E + |o| along its largest component, so along such an axis it moves by less than this part of
+/// E and all of |o|, which is added to the pad.
 pub const PARALLEL: f32 = 1.0 / (1u32 << 30) as f32;
 
 /// Largest size of E + |o| and of a direction (sums of the sizes of components), and the reciprocal of the smallest, for

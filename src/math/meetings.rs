@@ -314,7 +314,7 @@ mod tests {
     use super::super::sight::RowSight;
     use super::super::simd::{Kernel, Level};
     use super::super::triangle::{self, Triangle};
-    use super::super::triangles::Verdicts;
+    use super::super::triangles::{Verdicts, set_corners};
     use super::*;
 
     /// Eight rays against the first of eight triangles: the verdicts, where they meet its plane, and the weights there.
@@ -385,5 +385,147 @@ mod tests {
             }
         }
         assert!(sure > 10_000 && sure > hits * 9 / 10, "{sure} of {hits}");
+    }
+
+    struct Meet<'a>(&'a Pairs);
+
+    impl Kernel for Meet<'_> {
+        type Output = Places;
+
+        #[inline(always)]
+        fn run<S: Simd>(self, s: S) -> Places {
+            self.0.meet(s)
+        }
+    }
+
+    fn set(pairs: &mut Pairs, lane: usize, ray: &RaySpace, triangle: &Triangle) {
+        for k in 0..3 {
+            (pairs.origin[k][lane], pairs.dir[k][lane]) = (ray.origin[k], ray.dir[k]);
+        }
+        set_corners(&mut pairs.corners, lane, triangle);
+    }
+
+    /// What a ray and a triangle are like.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    enum Kind {
+        Ordinary,
+        /// The ray runs nearly in the triangle's plane.
+        Grazing,
+        /// It starts many sizes away.
+        Far,
+        Tiny,
+        /// It starts next to the triangle, or on it.
+        Near,
+        /// It meets the triangle at a corner, or at an edge.
+        Edge,
+    }
+
+    const KINDS: [Kind; 6] = [Kind::Ordinary, Kind::Grazing, Kind::Far, Kind::Tiny, Kind::Near, Kind::Edge];
+
+    fn pair(random: &mut Random, kind: Kind) -> (Vec3, Vec3, Triangle) {
+        let (place, e1, e2) = (random.cube(), random.cube(), random.cube());
+        let size = if kind == Kind::Tiny { 2.0f32.powi(-20) } else { 1.0 };
+        let triangle = [place, place + e1 * size, place + e2 * size];
+        let (r, s) = (random.unit(), random.unit());
+        let target = match kind {
+            Kind::Edge if r < 0.5 => triangle[1],
+            Kind::Edge => triangle::within(&triangle, s, 0.0),
+            _ => triangle::within(&triangle, r, s),
+        };
+        let away = match kind {
+            Kind::Grazing => e1 * random.unit() - e2 * random.unit() + random.cube() * 1e-2,
+            Kind::Far => random.direction() * 1e5,
+            Kind::Near => random.cube() * 1e-2,
+            _ => random.cube() * 4.0,
+        };
+        (target - away, away * (0.1 + random.unit()), triangle)
+    }
+
+    /// A ray of this kind that hits its triangle.
+    fn hit(random: &mut Random, kind: Kind) -> (RaySpace, Triangle) {
+        loop {
+            let (origin, dir, triangle) = pair(random, kind);
+            if let Some(ray) = RaySpace::new(origin, dir).filter(|ray| triangle::is_hit(ray, &triangle)) {
+                return (ray, triangle);
+            }
+        }
+    }
+
+    fn assert_met_as_alone(met: &Places, lane: usize, (ray, triangle): &(RaySpace, Triangle), context: &str) {
+        let alone = triangle::meet(ray, triangle);
+        assert_eq!(met.t[lane].to_bits(), alone.t.to_bits(), "{context}: {} for {}", met.t[lane], alone.t);
+        let (u, v) = triangle::barycentrics_at(ray, triangle, alone.t_f64, alone.normal);
+        assert_eq!(met.weights.map(|w| w[lane].to_bits()), [u, v].map(f32::to_bits), "{context}: {u}, {v}");
+    }
+
+    #[test]
+    fn eight_rays_meet_eight_triangles_as_each_does_alone() {
+        let mut random = Random::new(41);
+        for kind in KINDS {
+            let (mut sure, mut lanes) = (0, 0);
+            for _ in 0..250 {
+                let hits: [_; LANES] = std::array::from_fn(|_| hit(&mut random, kind));
+                let mut pairs = Pairs::EMPTY;
+                (0..LANES).for_each(|lane| set(&mut pairs, lane, &hits[lane].0, &hits[lane].1));
+                for level in Level::all() {
+                    let met = level.run(Meet(&pairs));
+                    (sure, lanes) = (sure + met.sure.count_ones(), lanes + LANES as u32);
+                    for lane in (0..LANES).filter(|lane| met.sure >> lane & 1 == 1) {
+                        assert_met_as_alone(&met, lane, &hits[lane], &format!("{kind:?} on {}", level.name()));
+                    }
+                }
+            }
+            let enough = if kind == Kind::Ordinary { lanes * 9 / 10 } else { lanes / 20 };
+            assert!(sure > enough, "{kind:?}: {sure} of {lanes}");
+        }
+    }
+
+    #[test]
+    fn weights_are_seen_along_every_axis() {
+        let (mut random, mut sure) = (Random::new(42), 0);
+        for axis in 0..3 {
+            let mut squash = Vec3::ONE;
+            squash[axis] = 0.0;
+            // Also where two components of the normal are equally large.
+            for slope in [0.0, 0.5, 1.0, -1.0] {
+                let mut slanted = |scale: f32| {
+                    let mut p = random.cube() * squash * scale;
+                    p[axis] = p[(axis + 1) % 3] * slope;
+                    p
+                };
+                let triangle = [slanted(1.0), slanted(1.0), slanted(1.0)];
+                let target = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
+                let dir = random.cube() + (Vec3::ONE - squash) * 3.0;
+                let Some(ray) = RaySpace::new(target - dir, dir).filter(|r| triangle::is_hit(r, &triangle)) else {
+                    continue;
+                };
+                let mut pairs = Pairs::EMPTY;
+                set(&mut pairs, 5, &ray, &triangle);
+                for level in Level::all() {
+                    let met = level.run(Meet(&pairs));
+                    if met.sure >> 5 & 1 == 1 {
+                        assert_met_as_alone(&met, 5, &(ray, triangle), level.name());
+                        sure += 1;
+                    }
+                }
+            }
+        }
+        assert!(sure > 6, "{sure}");
+    }
+
+    #[test]
+    fn lanes_without_a_triangle_are_not_sure() {
+        let (ray, triangle) = hit(&mut Random::new(43), Kind::Ordinary);
+        let mut pairs = Pairs::EMPTY;
+        (0..LANES).for_each(|lane| set(&mut pairs, lane, &ray, &triangle));
+        for lane in 0..LANES - 1 {
+            let mut broken = triangle;
+            broken[lane % 3][lane / 3] = f32::NAN;
+            set_corners(&mut pairs.corners, lane, &broken);
+        }
+        for level in Level::all() {
+            assert_eq!(level.run(Meet(&Pairs::EMPTY)).sure, 0, "{}", level.name());
+            assert_eq!(level.run(Meet(&pairs)).sure, 1 << (LANES - 1), "{}", level.name());
+        }
     }
 }

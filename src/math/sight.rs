@@ -62,7 +62,7 @@ impl<S: Simd> Look<S> {
     /// sums, the reciprocal and the last products are 10 u of the largest height; 16 u is for what they leave out.
     #[inline(always)]
     pub fn distances(&self, s: S, sight: &Sight) -> [S::Lanes; 2] {
-        self.view.distances(s, s.splat(sight.per_length))
+        self.view.distances(s, s.splat(sight.per_length), [WEIGHTS, HEIGHTS])
     }
 }
 
@@ -113,7 +113,7 @@ impl<S: Lanewise<N>, const N: usize> RowSight<S, N> {
     /// As [`Look::distances`].
     #[inline(always)]
     pub fn distances(&self, s: S, look: &RowLook<S, N>) -> [S::Lanes; 2] {
-        look.view.distances(s, self.per_length)
+        look.view.distances(s, self.per_length, [WEIGHTS, HEIGHTS])
     }
 
     /// A corner relative to the origins.
@@ -171,17 +171,226 @@ fn view<S: Lanewise<N>, const N: usize>(
 }
 
 impl<S: Lanewise<N>, const N: usize> View<S, N> {
-    /// See [`Look::distances`].
+    /// [`Look::distances`] by given margins of weights and heights.
     #[inline(always)]
-    fn distances(&self, s: S, per_length: S::Lanes) -> [S::Lanes; 2] {
+    fn distances(&self, s: S, per_length: S::Lanes, [weights, heights]: [f32; 2]) -> [S::Lanes; 2] {
         let ([u, v, w], [a, b, c]) = (self.edges, self.heights);
         let whole = s.mul(s.div(s.splat(1.0), s.add(u, s.add(v, w))), per_length);
         let spread = s.sub(s.greater(a, s.greater(b, c)), s.smaller(a, s.smaller(b, c)));
         let t = s.mul(s.mul_add(u, a, s.mul_add(v, b, s.mul(w, c))), whole);
-        let moved = s.mul(s.mul(spread, self.error), s.splat(WEIGHTS));
+        let moved = s.mul(s.mul(spread, self.error), s.splat(weights));
         // What underflow adds is far below the second.
-        let rounded = s.mul_add(self.height, s.splat(HEIGHTS), s.splat(EdgeMargins::WITH_DISTANCES.underflow));
+        let rounded = s.mul_add(self.height, s.splat(heights), s.splat(EdgeMargins::WITH_DISTANCES.underflow));
         let error = s.mul_add(moved, s.abs(whole), s.mul(rounded, s.abs(per_length)));
         [s.sub(t, error), s.add(t, error)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Vec3;
+    use super::super::random::Random;
+    use super::super::rational::{exact, hit, point};
+    use super::super::shear::RaySpace;
+    use super::super::simd::{Kernel, Level, Row};
+    use super::super::triangle::{self, Triangle};
+    use super::super::triangles::tests::each_case;
+    use super::super::triangles::{NO_CORNERS, set_corners};
+    use super::*;
+
+    fn sight(ray: &RaySpace) -> Sight {
+        Sight {
+            origin: [ray.origin[ray.x], ray.origin[ray.y], ray.origin[ray.z]],
+            per_length: 1.0 / ray.dir[ray.z],
+            shear: [ray.shear.0, ray.shear.1],
+            main: ray.z as u32,
+        }
+    }
+
+    /// Verdicts, and between which distances those that are hit are, by these margins of weights and heights.
+    struct Looked<'a>(&'a Sight, &'a Corners8, [f32; 2]);
+
+    impl Kernel for Looked<'_> {
+        type Output = (Verdicts, [Row; 2]);
+
+        #[inline(always)]
+        fn run<S: Simd>(self, s: S) -> Self::Output {
+            let Self(sight, corners, margins) = self;
+            let look = sight.look(s, corners);
+            let [low, high] = look.view.distances(s, s.splat(sight.per_length), margins);
+            (look.verdicts, [s.store(low), s.store(high)])
+        }
+    }
+
+    /// How a ray sees the triangles that it is aimed at.
+    #[derive(Clone, Copy, Debug)]
+    enum Kind {
+        Ordinary,
+        /// From many sizes away.
+        Far(f32),
+        /// Nearly edge on.
+        Grazing(f32),
+        /// Large triangles and small ones, from next to them.
+        Near,
+        /// With numbers as large, or as small, as may be.
+        Scaled(i32),
+    }
+
+    const KINDS: [Kind; 10] = [
+        Kind::Ordinary,
+        Kind::Far(1e2),
+        Kind::Far(1e4),
+        Kind::Far(1e6),
+        Kind::Grazing(1e-1),
+        Kind::Grazing(1e-2),
+        Kind::Grazing(1e-4),
+        Kind::Near,
+        Kind::Scaled(30),
+        Kind::Scaled(-30),
+    ];
+
+    /// Eight triangles around a ray, each of its own size.
+    fn seen(random: &mut Random, kind: Kind) -> Option<(RaySpace, [Triangle; LANES])> {
+        let (target, dir) = (random.cube(), random.direction() * (0.1 + random.unit()));
+        let triangles: [Triangle; LANES] = std::array::from_fn(|_| {
+            let flat = match kind {
+                Kind::Grazing(slope) => slope,
+                _ => 1.0,
+            };
+            let size = match kind {
+                Kind::Near => 2.0f32.powi(random.below(17) as i32 - 8),
+                _ => 0.2 + random.unit(),
+            };
+            let corner = |from: Vec3| {
+                let across = from - dir * (from.dot(dir) / dir.length_squared());
+                (across * flat + dir * random.cube().x) * size
+            };
+            let around = dir.any_orthonormal_vector();
+            let turned = dir.cross(around).normalize();
+            let corners = [around, turned - around, -turned - around].map(corner);
+            let shift = (corners[0] - corners[1]) * (random.unit() * random.unit());
+            corners.map(|p| target + p + shift)
+        });
+        let back = match kind {
+            Kind::Far(sizes) => sizes,
+            Kind::Near => 1e-3 * random.unit(),
+            _ => 4.0 * random.unit(),
+        };
+        let scale = match kind {
+            Kind::Scaled(exponent) => 2.0f32.powi(exponent),
+            _ => 1.0,
+        };
+        let ray = RaySpace::new((target - dir * back) * scale, dir * scale.recip())?;
+        Some((ray, triangles.map(|t| t.map(|p| p * scale))))
+    }
+
+    /// Some rays of each kind.
+    fn each_kind(kinds: &[Kind], mut check: impl FnMut(Kind, &RaySpace, &[Triangle; LANES], &Corners8)) {
+        let mut random = Random::new(51);
+        for &kind in kinds {
+            for _ in 0..120 {
+                let Some((ray, triangles)) = seen(&mut random, kind) else { continue };
+                let mut corners = NO_CORNERS;
+                (0..LANES).for_each(|lane| set_corners(&mut corners, lane, &triangles[lane]));
+                check(kind, &ray, &triangles, &corners);
+            }
+        }
+    }
+
+    #[test]
+    fn certain_verdicts_of_a_look_are_those_of_the_exact_test() {
+        for level in Level::all() {
+            let (mut certain, mut hits) = (0, 0);
+            each_kind(&KINDS, |kind, ray, triangles, corners| {
+                let (verdicts, _) = level.run(Looked(&sight(ray), corners, [WEIGHTS, HEIGHTS]));
+                assert_eq!(verdicts.hit & verdicts.unsure, 0);
+                for lane in (0..LANES).filter(|lane| verdicts.unsure >> lane & 1 == 0) {
+                    let exact = triangle::is_hit_near_edge(ray, &triangles[lane]);
+                    assert_eq!(verdicts.hit >> lane & 1 == 1, exact, "{kind:?} on {}", level.name());
+                    (certain, hits) = (certain + 1, hits + u32::from(exact));
+                }
+            });
+            assert!(hits > 1000 && certain > hits + 20, "{hits} hits of {certain}");
+        }
+    }
+
+    #[test]
+    fn a_look_judges_triangles_of_all_sizes_and_rays_at_corners_and_edges() {
+        let mut certain = 0;
+        for exponent in [-20, 0, 20] {
+            each_case(exponent, 0, |ray, triangles, corners| {
+                for level in Level::all() {
+                    let (verdicts, _) = level.run(Looked(&sight(ray), corners, [WEIGHTS, HEIGHTS]));
+                    for lane in (0..LANES).filter(|lane| verdicts.unsure >> lane & 1 == 0) {
+                        let exact = triangle::is_hit(ray, &triangles[lane]);
+                        assert_eq!(verdicts.hit >> lane & 1 == 1, exact, "2^{exponent} on {}", level.name());
+                        certain += 1;
+                    }
+                }
+            });
+        }
+        assert!(certain > 1000, "{certain}");
+    }
+
+    #[test]
+    fn a_look_is_never_certain_of_empty_lanes() {
+        let mut corners = NO_CORNERS;
+        set_corners(&mut corners, 2, &[Vec3::X, Vec3::Y, Vec3::NEG_ONE]);
+        let down = RaySpace::new(Vec3::new(0.0, 0.0, 5.0), Vec3::NEG_Z).map(|ray| sight(&ray));
+        for level in Level::all() {
+            let verdicts = down.map(|sight| level.run(Looked(&sight, &corners, [WEIGHTS, HEIGHTS])).0);
+            assert_eq!(verdicts, Some(Verdicts { hit: 0b100, unsure: 0b1111_1011 }), "{}", level.name());
+        }
+    }
+
+    /// Hits and, of these, those whose exact distance is not where it is said to be.
+    fn misplaced(kinds: &[Kind], margins: [f32; 2], level: Level) -> [usize; 2] {
+        let (mut hits, mut outside) = (0, 0);
+        each_kind(kinds, |kind, ray, triangles, corners| {
+            let (verdicts, [low, high]) = level.run(Looked(&sight(ray), corners, margins));
+            let (origin, dir) = (point(ray.origin), point(ray.dir));
+            for lane in (0..LANES).filter(|lane| verdicts.hit >> lane & 1 == 1) {
+                let t = hit(&origin, &dir, &triangles[lane]);
+                assert!(t.is_some() && low[lane].is_finite() && high[lane].is_finite(), "{kind:?}");
+                hits += 1;
+                outside += usize::from(!t.is_some_and(|t| exact(low[lane]) <= t && t <= exact(high[lane])));
+            }
+        });
+        [hits, outside]
+    }
+
+    #[test]
+    fn exact_distances_lie_where_they_are_said_to() {
+        for level in Level::all() {
+            for kind in KINDS {
+                let [hits, outside] = misplaced(&[kind], [WEIGHTS, HEIGHTS], level);
+                assert_eq!(outside, 0, "{kind:?} on {}: {hits} hits", level.name());
+            }
+            let [hits, _] = misplaced(&KINDS, [WEIGHTS, HEIGHTS], level);
+            assert!(hits > 1000, "{hits}");
+        }
+    }
+
+    #[test]
+    fn every_margin_of_a_distance_is_needed() {
+        for level in Level::all() {
+            for (name, margins) in [("weights", [0.0, HEIGHTS]), ("heights", [WEIGHTS, 0.0])] {
+                let [hits, outside] = misplaced(&KINDS, margins, level);
+                assert!(outside > 0, "{name} on {}: nothing of {hits} goes wrong without it", level.name());
+            }
+        }
+    }
+
+    #[test]
+    fn distances_of_ordinary_hits_are_known_well() {
+        for level in Level::all() {
+            each_kind(&[Kind::Ordinary], |_, ray, triangles, corners| {
+                let (verdicts, [low, high]) = level.run(Looked(&sight(ray), corners, [WEIGHTS, HEIGHTS]));
+                for lane in (0..LANES).filter(|lane| verdicts.hit >> lane & 1 == 1) {
+                    let farthest = triangles[lane].map(|p| (p - ray.origin).length()).into_iter().fold(0.0, f32::max);
+                    assert!(high[lane] - low[lane] < 1e-4 * (farthest + 1.0) / ray.dir.length(), "{}", level.name());
+                }
+            });
+        }
     }
 }

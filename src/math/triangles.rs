@@ -137,10 +137,10 @@ fn largest2<S: Lanewise<N>, const N: usize>(s: S, x: S::Lanes, y: S::Lanes) -> S
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::random::Random;
     use super::super::simd::{Kernel, Level};
-    use super::super::triangle::{self, Triangle};
+    use super::super::triangle;
     use super::*;
 
     /// As [`reach`], of the corners themselves.
@@ -162,7 +162,11 @@ mod tests {
 
     /// Triangles of all sizes, rays at random and at corners and edges, scaled by 2^exponent; the triangles themselves
     /// smaller by 2^smaller.
-    fn each_case(exponent: i32, smaller: i32, mut check: impl FnMut(&RaySpace, &[[Vec3; 3]; LANES], &Corners8)) {
+    pub(in super::super) fn each_case(
+        exponent: i32,
+        smaller: i32,
+        mut check: impl FnMut(&RaySpace, &[[Vec3; 3]; LANES], &Corners8),
+    ) {
         let mut random = Random::new(7);
         let (scale, shrink) = (2.0f32.powi(exponent), 2.0f32.powi(-smaller));
         for case in 0..600 {

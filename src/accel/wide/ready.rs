@@ -42,8 +42,8 @@ impl Ready {
         let mut least = s.store(t_min);
         wave.adapt_t_min(start, &mut least[..rays.len().min(LANES)]);
         let t_min = s.load(&least);
-        // A distance that overflows is no hit.
-        let t_max = s.smaller(t_max, s.splat(f32::MAX));
+        // A distance that overflows is no hit; a NaN stays.
+        let t_max = s.smaller(s.splat(f32::MAX), t_max);
         let (range, underflow) = (s.splat(B::RANGE), s.splat(B::UNDERFLOW));
         let from = s.sub(s.sub(t_min, s.mul(s.abs(t_min), range)), underflow);
         let limit = s.add(s.add(t_max, s.mul(s.abs(t_max), range)), underflow);
@@ -61,10 +61,11 @@ impl Ready {
             & s.at_most(length, most);
 
         let parallel = s.mul(s.greater(size[0], s.greater(size[1], size[2])), s.splat(PARALLEL));
+        let drift = s.mul(whole, s.splat(PARALLEL));
         let (mut inverse, mut first, mut last) = ([zero; 3], [zero; 3], [zero; 3]);
         for k in 0..3 {
             inverse[k] = s.div(s.splat(1.0), s.with_sign(s.greater(size[k], parallel), d[k]));
-            let pad = s.mul(s.mul(s.add(extent, far[k]), s.splat(B::PAD)), s.abs(inverse[k]));
+            let pad = s.mul(s.add(s.mul(s.add(extent, far[k]), s.splat(B::PAD)), drift), s.abs(inverse[k]));
             let middle = s.mul(s.sub(zero, o[k]), inverse[k]);
             (first[k], last[k]) = (s.sub(middle, pad), s.add(middle, pad));
         }
@@ -137,4 +138,182 @@ impl<S: Simd> Columns<S> {
 #[inline(always)]
 fn turned<S: Simd>(s: S, of: [S::Lanes; 3], [first, second]: [u32; 2]) -> S::Lanes {
     s.choose(first, of[0], s.choose(second, of[1], of[2]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::slabs::Derived;
+    use super::*;
+    use crate::accel::Hit;
+    use crate::accel::intersector::Exact;
+    use crate::accel::tests::scenes::{broken_rays, ray};
+    use crate::accel::wave::{ForFirst, ForNext};
+    use crate::math::Vec3;
+    use crate::math::aabb::Aabb;
+    use crate::math::bounds::{BOX_PAD, BOX_RANGE};
+    use crate::math::random::Random;
+    use crate::math::shear::RaySpace;
+    use crate::math::simd::{Kernel, Level};
+
+    /// A tree without nodes around a cube.
+    fn tree(extent: f32) -> Tree {
+        Tree::default().finish(Aabb { lo: Vec3::splat(-extent), hi: Vec3::splat(extent * 0.5) })
+    }
+
+    struct Take<'a, W>(&'a Tree, &'a W, usize);
+
+    impl<W: Wave> Kernel for Take<'_, W> {
+        type Output = Ready;
+
+        #[inline(always)]
+        fn run<S: Simd>(self, s: S) -> Ready {
+            let mut ready = Ready::default();
+            ready.take::<Derived, _, _>(s, self.0, self.1, self.2);
+            ready
+        }
+    }
+
+    fn take(level: Level, tree: &Tree, rays: &[Ray], start: usize) -> Ready {
+        level.run(Take(tree, &ForFirst { rays, hits: &mut [], test: Exact }, start))
+    }
+
+    /// The same by plain numbers, one ray after another.
+    fn plainly(tree: &Tree, ray: &Ray) -> ReadyRay {
+        let (space, _) = RaySpace::checked(ray.origin, ray.dir);
+        let parallel = ray.dir.abs().max_element() * PARALLEL;
+        let inverse = [0, 1, 2].map(|k| 1.0 / ray.dir[k].abs().max(parallel).copysign(ray.dir[k]));
+        let far = ray.origin.abs();
+        let drift = (tree.extent + ((far.x + far.y) + far.z)) * PARALLEL;
+        let pad = |k: usize| ((tree.extent + far[k]) * BOX_PAD + drift) * inverse[k].abs();
+        let octant = (0..3).fold(0, |octant, k| octant | u32::from(ray.dir[k].is_sign_negative()) << k);
+        let t_max = ray.t_max.min(f32::MAX);
+        ReadyRay {
+            slabs: PaddedSlabs {
+                inverse,
+                from: Derived::started(ray.t_min),
+                first: [0, 1, 2].map(|k| (0.0 - ray.origin[k]) * inverse[k] - pad(k)),
+                last: [0, 1, 2].map(|k| (0.0 - ray.origin[k]) * inverse[k] + pad(k)),
+                octant,
+            },
+            sight: Sight {
+                origin: [ray.origin[space.x], ray.origin[space.y], ray.origin[space.z]],
+                per_length: 1.0 / ray.dir[space.z],
+                shear: [space.shear.0, space.shear.1],
+                main: space.z as u32,
+            },
+            t_min: ray.t_min,
+            t_max,
+            limit: Derived::widened(t_max),
+        }
+    }
+
+    /// Of all octants and main axes, also with equal components and zeros, some with ranges.
+    fn ordinary() -> Vec<Ray> {
+        let mut random = Random::new(61);
+        let part = |random: &mut Random| [1.0, -1.0, 0.0, -0.0, 1e-12, -1e-30, random.cube().x][random.below(7)];
+        let mut rays = Vec::new();
+        while rays.len() < 2000 {
+            let dir = Vec3::new(part(&mut random), part(&mut random), part(&mut random));
+            let dir = if rays.len() % 2 == 0 { dir } else { random.cube() * 100.0 };
+            let range = [(0.0, f32::INFINITY), (-1.5, 2.0), (3.0, 3.0), (f32::MIN_POSITIVE, f32::MAX)];
+            let (t_min, t_max) = range[random.below(4)];
+            rays.push(Ray { t_min, t_max, ..ray(random.cube() * 3.0, dir) });
+            rays.retain(|ray| ray.dir.abs().max_element() > 1e-9);
+        }
+        rays
+    }
+
+    #[test]
+    fn eight_rays_are_made_ready_as_each_would_be_alone() {
+        let (rays, tree) = (ordinary(), tree(2.0));
+        for level in Level::all() {
+            for start in (0..rays.len()).step_by(LANES) {
+                let ready = take(level, &tree, &rays, start);
+                assert_eq!(ready.allowed, 255, "{}: {:?}", level.name(), &rays[start..start + LANES]);
+                for (taken, ray) in ready.rays.iter().zip(&rays[start..]) {
+                    let (taken, expected) = (format!("{taken:?}"), format!("{:?}", plainly(&tree, ray)));
+                    assert_eq!(taken, expected, "{}: {ray:?}", level.name());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn where_fewer_than_eight_rays_are_left_the_last_is_repeated() {
+        let (rays, tree) = (&ordinary()[..LANES + 3], tree(2.0));
+        for level in Level::all() {
+            let ready = take(level, &tree, rays, LANES);
+            for (lane, taken) in ready.rays.iter().enumerate() {
+                let expected = plainly(&tree, &rays[LANES + lane.min(2)]);
+                assert_eq!(format!("{taken:?}"), format!("{expected:?}"), "{}", level.name());
+            }
+        }
+    }
+
+    #[test]
+    fn hits_behind_others_count_from_these_on() {
+        let (rays, tree) = (&ordinary()[..LANES + 3], tree(2.0));
+        let after: Vec<Hit> = (0..rays.len()).map(|i| Hit { t: i as f32 * 0.25, ..Hit::MISS }).collect();
+        for level in Level::all() {
+            let mut hits = vec![Hit::MISS; rays.len()];
+            let wave = ForNext { rays, after: &after, hits: &mut hits, test: Exact };
+            for start in [0, LANES] {
+                let ready = level.run(Take(&tree, &wave, start));
+                for (i, taken) in (start..rays.len()).zip(&ready.rays) {
+                    let expected = plainly(&tree, &Ray { t_min: wave.t_min(i), ..rays[i] });
+                    assert_eq!(format!("{taken:?}"), format!("{expected:?}"), "{}", level.name());
+                }
+            }
+        }
+    }
+
+    fn assert_allowed(tree: &Tree, ray: Ray, expected: bool) {
+        let good = self::ray(Vec3::ZERO, Vec3::X);
+        for level in Level::all() {
+            for lane in 0..LANES {
+                let mut rays = [good; LANES];
+                rays[lane] = ray;
+                let allowed = take(level, tree, &rays, 0).allowed >> lane & 1 == 1;
+                assert_eq!(allowed, expected, "lane {lane} on {}: {ray:?}", level.name());
+            }
+        }
+    }
+
+    #[test]
+    fn rays_that_cannot_hit_are_not_allowed() {
+        for ray in broken_rays() {
+            assert_allowed(&tree(2.0), ray, false);
+        }
+    }
+
+    #[test]
+    fn rays_with_numbers_too_large_or_too_small_for_padded_boxes_are_not_allowed() {
+        let good = ray(Vec3::splat(0.5), Vec3::new(0.3, -1.0, 0.2));
+        for axis in 0..3 {
+            for (size, allowed) in [(0.5, true), (1.001, false), (4.0, false), (f32::MAX / BOX_RANGE, false)] {
+                let (mut far, mut fast) = (good, good);
+                far.origin[axis] = -BOX_RANGE * size;
+                fast.dir[axis] = BOX_RANGE * size;
+                assert_allowed(&tree(2.0), far, allowed);
+                assert_allowed(&tree(2.0), fast, allowed);
+            }
+        }
+        let least = 1.0 / BOX_RANGE;
+        assert_allowed(&tree(2.0), Ray { dir: good.dir * least, ..good }, true);
+        assert_allowed(&tree(2.0), Ray { dir: good.dir * (least * 0.5), ..good }, false);
+        assert_allowed(&tree(2.0), Ray { dir: Vec3::splat(f32::from_bits(1)), ..good }, false);
+    }
+
+    #[test]
+    fn scenes_too_large_or_too_small_for_padded_boxes_allow_no_ray() {
+        let good = ray(Vec3::ZERO, Vec3::X);
+        let extents = [(1.0, true), (0.5 * BOX_RANGE, true), (2.0 * BOX_RANGE, false), (f32::MAX, false)];
+        let least = [(2.0 / BOX_RANGE, true), (0.5 / BOX_RANGE, false), (0.0, false)];
+        for (extent, allowed) in extents.into_iter().chain(least) {
+            for level in Level::all() {
+                let ready = take(level, &tree(extent), &[good], 0);
+                assert_eq!(ready.allowed, if allowed { 255 } else { 0 }, "{extent} on {}", level.name());
+            }
+        }
+    }
 }

@@ -1,10 +1,11 @@
 //! However the rays of a wave are traced, on whatever instruction set: the answers are those of brute force.
 
-use super::flight::FARTHEST_FIRST;
+use super::flight::{DEPTH, FARTHEST_FIRST};
 use super::{MANY, RayOrder, Splitting, Wide};
-use crate::accel::tests::scenes;
+use crate::accel::tests::scenes::{self, ray};
 use crate::accel::{Accel, Hit, NoProbe, Ray, Shapes, Unculled};
 use crate::math::Vec3;
+use crate::math::random::Random;
 use crate::math::simd::Level;
 
 const WAYS: [RayOrder; 4] = [RayOrder::OneByOne, RayOrder::InFlight, RayOrder::Packets, RayOrder::Adaptive];
@@ -91,5 +92,91 @@ fn orders_list_the_lanes_of_a_mask_the_farthest_first() {
             assert_eq!(lanes.iter().fold(0, |m, lane| m | 1 << lane), mask);
             assert!(lanes.windows(2).all(|w| w[0] ^ octant > w[1] ^ octant), "{octant} {mask} {lanes:?}");
         }
+    }
+}
+
+/// Rays exactly along axes, or nearly, or along the diagonals of two axes, some from `far` away, whose other coordinates
+/// are those of corners: within planes of boxes, along their edges and through their corners.
+fn along_axes(shapes: &Shapes, n: usize, far: f32) -> Vec<Ray> {
+    let mut r = Random::new(71);
+    let slight = [0.0, -0.0, 1e-12, -1e-12, 1e-20, -1e-26, 1e-30, -1e-30, 1e-9, -1e-9, 1.0, -1.0];
+    let mut aim = |i: usize| {
+        let mut corner = || shapes.vertices[r.below(shapes.vertices.len())];
+        let (mut origin, target) = (Vec3::new(corner().x, corner().y, corner().z), corner());
+        let (axis, length) = (i % 3, [1.0, -1.0, 0.1, -30.0][r.below(4)]);
+        let mut dir = Vec3::from_array(std::array::from_fn(|_| slight[r.below(slight.len())] * length));
+        dir[axis] = length;
+        origin[(axis + 1) % 3] = target[(axis + 1) % 3];
+        origin[axis] -= [0.0, far * 0.1, far][r.below(3)] * length.signum();
+        ray(origin, dir)
+    };
+    (0..n).map(&mut aim).collect()
+}
+
+#[test]
+fn rays_along_axes_within_the_planes_of_boxes_hit_what_brute_force_hits() {
+    let far = scenes::moved(scenes::lattice(120), 1.0, Vec3::new(300.0, -70.0, 1e5));
+    let small = scenes::moved(scenes::lattice(120), 1.0 / 4096.0, Vec3::ZERO);
+    let scenes = [
+        ("lattice", scenes::lattice(120), 20.0),
+        ("lattice far away", far, 20.0),
+        ("small lattice", small, 0.01),
+        ("soup", scenes::soup(200, 0.4), 5.0),
+        ("star", scenes::star(12, 8), 5.0),
+    ];
+    for (name, shapes, far) in scenes {
+        let rays = along_axes(&shapes, 240, far);
+        assert_all_ways_agree(name, &shapes, &rays);
+        assert_all_ways_agree(name, &shapes, &bundles(&rays[..60]));
+    }
+}
+
+/// Triangles ever smaller and nearer to the origin.
+fn progression(n: u32, ratio: f32) -> Shapes {
+    let corners = |i: u32| {
+        let size = ratio.powi(i as i32);
+        let lift = Vec3::new(1.0, 0.7, 0.4) + Vec3::new(0.0, 0.1, 0.2) * (i % 3) as f32;
+        [Vec3::X, Vec3::Y, Vec3::Z].map(|p| (lift + p * 0.3) * size)
+    };
+    scenes::mesh((0..n).flat_map(corners).collect(), (0..n).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect())
+}
+
+#[test]
+fn trees_too_deep_for_rays_in_flight_are_answered() {
+    let shapes = progression(1200, 0.93);
+    let mut rays = scenes::rays(&shapes, 12);
+    rays.extend((0..40).map(|i| {
+        let target = shapes.vertices[90 * i];
+        ray(Vec3::splat(2.0), target - Vec3::splat(2.0))
+    }));
+    for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
+        let most = Wide::build(&shapes, splitting).tree.most_behind();
+        assert!(most >= DEPTH, "{splitting:?}: {most}");
+    }
+    let expected = answers(&Unculled::new(&shapes), &rays);
+    for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
+        for way in WAYS {
+            let wide = Wide::build(&shapes, splitting).with_rays(way);
+            assert!(answers(&wide, &rays) == expected, "{way:?} of {splitting:?}");
+        }
+    }
+}
+
+/// How far it may drift from its plane is a matter of the way along its main axis, not of the other coordinates.
+#[test]
+fn rays_along_axes_from_far_away_hit_what_brute_force_hits() {
+    let shapes = scenes::lattice(120);
+    for far in [1e3, 1e5, 1e7] {
+        assert_all_ways_agree("lattice", &shapes, &along_axes(&shapes, 240, far));
+    }
+}
+
+#[test]
+fn rays_without_a_range_hit_nothing() {
+    let shapes = scenes::soup(60, 0.4);
+    for (t_min, t_max) in [(0.0, f32::NAN), (f32::NAN, 1.0), (f32::NAN, f32::NAN), (2.0, 1.0), (0.0, f32::NEG_INFINITY)]
+    {
+        let rays: Vec<Ray> = scenes::rays(&shapes, 6).iter().map(|&ray| Ray { t_min, t_max, ..ray }).collect();
+        assert_all_ways_agree("soup", &shapes, &rays);
     }
 }

@@ -1,6 +1,7 @@
 //! Every level rounds, compares and moves as plain numbers do.
 
 use super::*;
+use crate::math::random::Random;
 
 const HARD: [f32; 10] =
     [0.0, -0.0, 1.0, -3.5, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e-42, f32::MAX, f32::MIN_POSITIVE];
@@ -216,4 +217,194 @@ fn the_second_operand_wins_over_nan() {
     assert_eq!((s.store(s.greater(nan, one))[0], s.store(s.smaller(nan, one))[0]), (1.0, 1.0));
     assert!(s.store(s.greater(one, nan))[0].is_nan() && s.store(s.smaller(one, nan))[0].is_nan());
     assert_eq!((s.less(nan, one), s.at_most(one, nan), s.less(one, s.splat(2.0))), (0, 0, 255));
+}
+
+/// [`HARD`], and NaN with the other sign.
+fn hard() -> Vec<f32> {
+    HARD.into_iter().chain([f32::from_bits(0xffc0_0001)]).collect()
+}
+
+/// Every two of them beside each other somewhere, with some lanes.
+fn each_hard_pair(mut check: impl FnMut([Row; 2], u32)) {
+    let all = hard();
+    for (i, &x) in all.iter().enumerate() {
+        for (j, &y) in all.iter().enumerate() {
+            let a = std::array::from_fn(|k| all[(i + k) % all.len()]);
+            let b = std::array::from_fn(|k| if k % 2 == 0 { x } else { y });
+            check([a, b], (0x9e37_79b9_u32).rotate_left((11 * i + j) as u32) & 0xff);
+        }
+    }
+}
+
+/// What only eight lanes do, as bits: nothing of it computes, so that NaN keeps its own.
+struct Only8([Row; 2], u32);
+
+impl Kernel for Only8 {
+    type Output = (Vec<[u32; LANES]>, [u32; 2]);
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> Self::Output {
+        let Self([x, y], mask) = self;
+        let (a, b) = (s.load(&x), s.load(&y));
+        let results = [s.choose(mask, a, b), s.choose(!mask, a, b), s.with_sign(a, b), s.with_sign(b, a)];
+        (
+            results.into_iter().map(|r| s.store(r).map(f32::to_bits)).collect(),
+            [s.signs(a), s.high_bits(&y.map(f32::to_bits))],
+        )
+    }
+}
+
+#[test]
+fn every_level_chooses_and_moves_signs_like_plain_numbers() {
+    each_hard_pair(|[a, b], mask| {
+        let chosen = |mask: u32| std::array::from_fn(|k| if mask >> k & 1 == 1 { a[k] } else { b[k] });
+        let signed = |a: Row, b: Row| std::array::from_fn(|k| a[k].copysign(b[k]));
+        let negative = |a: Row| (0..LANES).fold(0, |m, k| m | u32::from(a[k].is_sign_negative()) << k);
+        let expected: Vec<_> =
+            [chosen(mask), chosen(!mask), signed(a, b), signed(b, a)].map(|r: Row| r.map(f32::to_bits)).into();
+        for level in Level::all() {
+            let (moved, masks) = level.run(Only8([a, b], mask));
+            assert_eq!(moved, expected, "{} {a:?} {b:?} {mask:x}", level.name());
+            assert_eq!(masks, [negative(a), negative(b)], "{} {a:?} {b:?}", level.name());
+        }
+    });
+}
+
+struct Larger([Row; 2]);
+
+impl Kernel for Larger {
+    type Output = Row;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> Row {
+        s.store(s.larger(s.load(&self.0[0]), s.load(&self.0[1])))
+    }
+}
+
+#[test]
+fn the_larger_of_two_sizes_has_no_sign() {
+    each_hard_pair(|[a, b], _| {
+        for level in Level::all() {
+            let larger = level.run(Larger([a, b]));
+            for k in (0..LANES).filter(|&k| !a[k].is_nan() && !b[k].is_nan()) {
+                let expected = a[k].abs().max(b[k].abs());
+                assert!(larger[k] == expected, "{}: {} of {} and {}", level.name(), larger[k], a[k], b[k]);
+                assert!(larger[k].is_sign_positive(), "{}: {} and {}", level.name(), a[k], b[k]);
+            }
+        }
+    });
+}
+
+/// Rows by their axis, and by their number, with the other of the pair.
+struct Rows([Row; 6]);
+
+impl Kernel for Rows {
+    type Output = ([Row; 3], [[Row; 2]; 6]);
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> Self::Output {
+        let [x, y, z, ..] = self.0;
+        let (mut along, mut picked) = ([[0.0; LANES]; 3], [[[0.0; LANES]; 2]; 6]);
+        for (i, along) in along.iter_mut().enumerate() {
+            *along = s.store(s.along(&[x, y, z], Axis::new(i)));
+        }
+        for (i, picked) in picked.iter_mut().enumerate() {
+            let pick = Pick::new(i);
+            *picked = [s.store(s.pick(&self.0, pick)), s.store(s.pick(&self.0, pick.other()))];
+        }
+        (along, picked)
+    }
+}
+
+#[test]
+fn rows_are_found_by_axis_and_by_number_and_others_beside_them() {
+    let rows: [Row; 6] = std::array::from_fn(|i| std::array::from_fn(|k| (LANES * i + k) as f32));
+    for level in Level::all() {
+        let (along, picked) = level.run(Rows(rows));
+        assert_eq!(along[..], rows[..3], "{}", level.name());
+        assert_eq!(picked, std::array::from_fn(|i| [rows[i], rows[i ^ 1]]), "{}", level.name());
+    }
+    assert!((0..6).all(|i| Pick::new(i).other().other() == Pick::new(i)));
+}
+
+struct Soon<'a>(&'a [Row], &'a [u8]);
+
+impl Kernel for Soon<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) {
+        for i in [0, 1, self.0.len(), 1 << 20, usize::MAX / 64] {
+            for first in [true, false] {
+                s.prefetch_either(first, (self.0, i), (self.1, i));
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_not_there_may_be_said_to_be_read_soon() {
+    for level in Level::all() {
+        level.run(Soon(&[[0.0; LANES]; 3], &[7; 5]));
+        level.run(Soon(&[], &[]));
+    }
+}
+
+/// a · b + c, a · b − c and c − a · b.
+#[inline(always)]
+fn products<S: Lanewise<N>, const N: usize>(s: S, [a, b, c]: &[[f32; N]; 3]) -> [[f32; N]; 3] {
+    let (a, b, c) = (s.load(a), s.load(b), s.load(c));
+    [s.store(s.mul_add(a, b, c)), s.store(s.mul_sub(a, b, c)), s.store(s.sub_mul(a, b, c))]
+}
+
+struct Products([[f32; WIDE]; 3]);
+
+impl Kernel for Products {
+    type Output = ([Row; 3], [[f32; WIDE]; 3]);
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> Self::Output {
+        let mut eight = [[0.0; LANES]; 3];
+        for (eight, all) in eight.iter_mut().zip(&self.0) {
+            eight.copy_from_slice(&all[..LANES]);
+        }
+        (products(s, &eight), products(s.wide(), &self.0))
+    }
+}
+
+/// The three, each rounded twice and once.
+fn products_of([a, b, c]: [f32; 3]) -> [[f32; 2]; 3] {
+    [[a * b + c, a.mul_add(b, c)], [a * b - c, a.mul_add(b, -c)], [c - a * b, (-a).mul_add(b, c)]]
+}
+
+fn assert_rounded_once_or_twice(numbers: [[f32; WIDE]; 3]) {
+    for level in Level::all() {
+        let (eight, wide) = level.run(Products(numbers));
+        for lane in 0..WIDE {
+            let of = numbers.map(|row| row[lane]);
+            for (i, allowed) in products_of(of).into_iter().enumerate() {
+                let is_one = |x: f32| allowed.iter().any(|&y| bits(y) == bits(x));
+                let narrow = eight[i].get(lane).copied().unwrap_or(wide[i][lane]);
+                assert!(is_one(wide[i][lane]) && is_one(narrow), "{}: {i} of {of:?}", level.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_product_and_a_sum_are_rounded_once_or_twice() {
+    let all = hard();
+    for i in 0..all.len() * all.len() {
+        let c = |k: usize| all[(i + 3 * k + k / 11) % all.len()];
+        let (a, b) = ([all[i % all.len()]; WIDE], [all[i / all.len()]; WIDE]);
+        assert_rounded_once_or_twice([a, b, std::array::from_fn(c)]);
+    }
+    let mut random = Random::new(31);
+    for _ in 0..300 {
+        // Sums that nearly cancel tell the two apart.
+        let a: [f32; WIDE] = std::array::from_fn(|_| random.unit() + 0.5);
+        let b: [f32; WIDE] = std::array::from_fn(|_| random.unit() - 0.5);
+        let c = std::array::from_fn(|k| -a[k] * b[k] * [1.0, -1.0, 0.75][k % 3]);
+        assert_rounded_once_or_twice([a, b, c]);
+    }
 }
