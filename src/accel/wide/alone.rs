@@ -9,8 +9,8 @@ use super::ready::Ready;
 use super::settle::Settle;
 use super::slabs::BoxMargins;
 use super::walk::{Entry, ask_by_itself};
+use crate::accel::Shapes;
 use crate::accel::wave::Wave;
-use crate::accel::{NoProbe, Shapes};
 use crate::math::simd::{Kernel, LANES, Simd};
 
 /// A wave of rays.
@@ -28,23 +28,51 @@ impl<W: Wave, B: BoxMargins> Kernel for Alone<'_, W, B> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         let Self { tree, shapes, wave, stack, .. } = self;
-        let (mut ready, mut settle) = (Ready::default(), Settle::EMPTY);
-        let count = wave.rays().len();
-        for start in (0..count).step_by(LANES) {
-            ready.take::<B, _, _>(s, tree, wave, start);
-            for i in start..count.min(start + LANES) {
-                let lane = i - start;
-                if ready.allowed >> lane & 1 == 0 {
-                    ask_by_itself::<B, _, _, _>(s, tree, shapes, wave, i, stack, &mut NoProbe);
-                    continue;
-                }
-                let ray = &ready.rays[lane % LANES];
-                let mut seeker = Seeker::<B>::new(ray, i, wave.rays()[i].exclude);
-                descend(s, tree, shapes, wave, &ray.slabs.spread(s), &mut seeker, stack);
-                settle.answer(s, tree, wave, i, seeker.found());
-            }
+        let mut lone = Lone::default();
+        for start in (0..wave.rays().len()).step_by(LANES) {
+            lone.trace::<B, _, _>(s, tree, shapes, wave, start, stack);
         }
-        settle.finish(s, wave);
+        lone.finish(s, wave);
+    }
+}
+
+/// Rays that go alone, eight made ready and eight answered together.
+#[derive(Default)]
+pub(super) struct Lone {
+    ready: Ready,
+    settle: Settle,
+}
+
+impl Lone {
+    /// Traces eight rays of a wave from `start` on, or as many as there are.
+    #[inline(always)]
+    pub(super) fn trace<B: BoxMargins, S: Simd, W: Wave>(
+        &mut self,
+        s: S,
+        tree: &Tree,
+        shapes: &Shapes,
+        wave: &mut W,
+        start: usize,
+        stack: &mut [Entry],
+    ) {
+        self.ready.take::<B, _, _>(s, tree, wave, start);
+        for i in start..wave.rays().len().min(start + LANES) {
+            let lane = i - start;
+            if self.ready.allowed >> lane & 1 == 0 {
+                ask_by_itself::<B, _>(tree, shapes, wave, i, stack);
+                continue;
+            }
+            let ray = &self.ready.rays[lane % LANES];
+            let mut seeker = Seeker::<B>::new(ray, i, wave.rays()[i].exclude);
+            descend(s, tree, shapes, wave, &ray.slabs.spread(s), &mut seeker, stack);
+            self.settle.answer(s, tree, wave, i, seeker.found());
+        }
+    }
+
+    /// Answers those that wait for it.
+    #[inline(always)]
+    pub(super) fn finish<S: Simd, W: Wave>(&mut self, s: S, wave: &mut W) {
+        self.settle.finish(s, wave);
     }
 }
 

@@ -14,7 +14,7 @@ use super::settle::Settle;
 use super::slabs::BoxMargins;
 use super::walk::{Entry, ask_by_itself};
 use crate::accel::wave::Wave;
-use crate::accel::{Hit, NO_PRIM, NoProbe, Shapes};
+use crate::accel::{Hit, NO_PRIM, Shapes};
 use crate::math::simd::{Kernel, LANES, Order, Simd};
 
 /// Rays in flight: one for each bit of a word.
@@ -132,7 +132,7 @@ impl<W: Wave, B: BoxMargins> Kernel for InFlight<'_, W, B> {
 
     #[inline(always)]
     fn run<S: Simd>(mut self, s: S) {
-        let (mut queue, mut settle) = (Queue { ready: Ready::default(), next: 0 }, Settle::EMPTY);
+        let (mut queue, mut settle) = (Queue { ready: Ready::default(), next: 0 }, Settle::default());
         let mut slots = Slots::<B>::empty();
         for number in 0..u32::BITS {
             self.start(s, &mut slots, number, &mut queue);
@@ -196,7 +196,7 @@ impl<W: Wave, B: BoxMargins> InFlight<'_, W, B> {
             }
             queue.next += 1;
             if queue.ready.allowed >> lane & 1 == 0 {
-                ask_by_itself::<B, _, _, _>(s, self.tree, self.shapes, self.wave, i, self.entries, &mut NoProbe);
+                ask_by_itself::<B, _>(self.tree, self.shapes, self.wave, i, self.entries);
                 continue;
             }
             let (ray, root) = (&queue.ready.rays[lane], &self.tree.nodes[0]);

@@ -37,6 +37,25 @@ impl<B: BoxMargins> Culling for Walked<'_, B> {
     }
 }
 
+/// The same, each ray by the walk that counts.
+struct Counted<'a, B>(Walked<'a, B>);
+
+impl<B: BoxMargins> Culling for Counted<'_, B> {
+    type Scratch = Stack;
+
+    fn shapes(&self) -> &Shapes {
+        self.0.shapes()
+    }
+
+    fn new_scratch(&self) -> Stack {
+        self.0.new_scratch()
+    }
+
+    fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, stack: &mut Stack, probe: &mut P) {
+        self.0.walk(query, stack, probe);
+    }
+}
+
 struct NoSlab;
 impl BoxMargins for NoSlab {
     const SLAB: f32 = 0.0;
@@ -62,12 +81,15 @@ impl BoxMargins for AnyCoordinates {
     const COORDINATES: f32 = f32::INFINITY;
 }
 
-/// Wrong answers of both trees, in every order of the rays.
+/// Wrong answers of both trees, in every order of the rays and by the walk that counts.
 fn wrong_with<B: BoxMargins>(shapes: &Shapes, rays: &[Ray]) -> usize {
     let ways = [RayOrder::OneByOne, RayOrder::InFlight, RayOrder::Packets];
-    let of =
-        |splitting, way| wrong(&Walked::<B>(Wide::build(shapes, splitting).with_rays(way), PhantomData), shapes, rays);
-    [Splitting::Octree, Splitting::SurfaceArea].iter().flat_map(|&s| ways.map(|w| of(s, w))).sum()
+    let walked = |splitting, way| Walked::<B>(Wide::build(shapes, splitting).with_rays(way), PhantomData);
+    let of = |splitting| {
+        let counted = wrong(&Counted(walked(splitting, RayOrder::OneByOne)), shapes, rays);
+        counted + ways.map(|way| wrong(&walked(splitting, way), shapes, rays)).iter().sum::<usize>()
+    };
+    of(Splitting::Octree) + of(Splitting::SurfaceArea)
 }
 
 /// Nothing is wrong with the derived margins, something is with the others.

@@ -10,7 +10,8 @@
 //! In both, the binary cuts are improved and fused into nodes of eight (`build`). Each prim is listed once, so there is no
 //! mailbox: there would be nothing for it to save.
 //!
-//! Rays go one by one (`walk`), many in flight (`flight`) or sixteen side by side (`packet`). Hits are ordered by (t, prim)
+//! Rays go one by one (`alone`), many in flight (`flight`) or sixteen side by side (`packet`), through triangles; where there
+//! is anything else, or somebody counts, they go one by one through whatever there is (`walk`). Hits are ordered by (t, prim)
 //! and every test gives an exact verdict, so that neither the order of visits nor the company of other rays can change an
 //! answer. Counts are those of one ray at a time: whoever listens gets that.
 
@@ -185,25 +186,18 @@ impl Wide<'_> {
     }
 
     fn trace_together<B: BoxMargins, W: Wave>(&self, wave: &mut W, stack: &mut Stack) {
-        let (tree, shapes, margins, probe) = (&self.tree, self.shapes, PhantomData::<B>, &mut NoProbe);
-        let rays = match self.rays {
-            _ if !shapes.planes.is_empty() || tree.nodes.is_empty() => RayOrder::OneByOne,
-            RayOrder::Adaptive => RayOrder::of(wave),
-            rays => rays,
-        };
-        let only_blocks = shapes.planes.is_empty() && !tree.nodes.is_empty() && tree.runs.is_empty();
+        let (tree, shapes, margins) = (&self.tree, self.shapes, PhantomData::<B>);
+        if !shapes.planes.is_empty() || !tree.runs.is_empty() || tree.nodes.is_empty() {
+            return self.run::<B, _>(OneByOne { tree, shapes, wave, stack, probe: &mut NoProbe, margins });
+        }
+        let Stack { entries, branches } = stack;
+        let rays = if self.rays == RayOrder::Adaptive { RayOrder::of(wave) } else { self.rays };
         match rays {
-            RayOrder::InFlight if only_blocks && tree.most_behind() < DEPTH => {
-                self.run::<B, _>(InFlight { tree, shapes, wave, entries: &mut stack.entries, margins });
+            RayOrder::Packets => self.run::<B, _>(InPackets { tree, shapes, wave, stack: branches, entries, margins }),
+            RayOrder::InFlight if tree.most_behind() < DEPTH => {
+                self.run::<B, _>(InFlight { tree, shapes, wave, entries, margins });
             }
-            RayOrder::OneByOne | RayOrder::InFlight if only_blocks => {
-                self.run::<B, _>(Alone { tree, shapes, wave, stack: &mut stack.entries, margins });
-            }
-            RayOrder::Packets => {
-                let Stack { entries, branches, .. } = stack;
-                self.run::<B, _>(InPackets { tree, shapes, wave, stack: branches, entries, margins });
-            }
-            _ => self.run::<B, _>(OneByOne { tree, shapes, wave, stack, probe, margins }),
+            _ => self.run::<B, _>(Alone { tree, shapes, wave, stack: entries, margins }),
         }
     }
 }

@@ -9,11 +9,12 @@
 
 use std::marker::PhantomData;
 
+use super::alone::Lone;
 use super::bundle::{ALL, Bundle, Numbers, RAYS};
 use super::flight::FARTHEST_FIRST;
 use super::node::{Child, Node, Tree};
 use super::slabs::BoxMargins;
-use super::walk::{Entry, ask_by_itself};
+use super::walk::Entry;
 use crate::accel::query::{Goal, Query};
 use crate::accel::wave::Wave;
 use crate::accel::{Hit, NO_PRIM, NoProbe, Ray, Shapes};
@@ -65,8 +66,7 @@ struct Packet<'w, W, B> {
 struct Found {
     /// [`NO_PRIM`] where nothing was found.
     prim: [u32; RAYS],
-    /// Where a triangle is, block and lane, so that nobody looks up its corners again; [`Place::ELSEWHERE`] for prims of
-    /// runs, whose distances are exact.
+    /// Where that is, block and lane, so that nobody looks up its corners again.
     place: [u32; RAYS],
 }
 
@@ -94,10 +94,6 @@ struct Place {
 }
 
 impl Place {
-    /// Not in a block.
-    const ELSEWHERE: u32 = u32::MAX;
-    const NOWHERE: Self = Self { index: 0, lane: 0, prim: NO_PRIM };
-
     /// Block and lane; there are fewer than 2²⁷ blocks.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "a lane is below 8")]
@@ -122,17 +118,18 @@ impl<W: Wave, B: BoxMargins> Kernel for InPackets<'_, W, B> {
             t_max: [0.0; RAYS],
             active: 0,
         };
-        let count = packet.wave.rays().len();
+        let (count, mut lone) = (packet.wave.rays().len(), Lone::default());
         while packet.start < count {
             if packet.gather(s) {
                 packet.trace(s, stack);
             } else {
-                for i in packet.start..count.min(packet.start + RAYS) {
-                    ask_by_itself::<B, _, _, _>(s, tree, shapes, packet.wave, i, entries, &mut NoProbe);
+                for start in (packet.start..count.min(packet.start + RAYS)).step_by(LANES) {
+                    lone.trace::<B, _, _>(s, tree, shapes, packet.wave, start, entries);
                 }
             }
             packet.start += RAYS;
         }
+        lone.finish(s, packet.wave);
     }
 }
 
@@ -175,14 +172,12 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
             if branch.near > reach.farthest || rays == 0 {
                 continue;
             }
-            let changed = match Child::unpack(branch.child) {
-                Child::Node(node) => {
-                    self.push(s, &tree.nodes[node as usize], rays, &reach, stack, &mut top);
-                    continue;
-                }
-                Child::Block(block, count) => self.test(s, block, count, rays, &mut reach, &sight),
-                Child::Run(run) => self.test_run(s, run, rays, &mut reach),
-            };
+            if !Child::is_leaf(branch.child) {
+                self.push(s, &tree.nodes[branch.child as usize], rays, &reach, stack, &mut top);
+                continue;
+            }
+            let (block, count) = Child::block(branch.child);
+            let changed = self.test(s, block, count, rays, &mut reach, &sight);
             if changed != 0 {
                 if W::Goal::ANY {
                     self.active &= !changed;
@@ -196,7 +191,7 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
                 reach.farthest = wide.greatest(reach.limit);
             }
         }
-        self.answer(s, &reach);
+        self.answer(s);
     }
 
     /// Puts the children that some ray meets on the stack, the nearest last.
@@ -309,86 +304,42 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
     #[cold]
     #[inline(never)]
     fn decide(&mut self, ray: usize, place: Place, certain: bool) -> Option<f32> {
-        let (mut query, usable) = self.query(ray);
+        let i = self.start + ray;
+        let (mut query, usable) = Query::new(self.shapes, &self.wave.rays()[i], self.wave.t_min(i), self.wave.goal(i));
         let corners = self.shapes.triangle(place.prim);
         if !usable || !certain && !triangle::is_hit(&query.ray, &corners) {
             return None;
         }
-        query.take(place.prim, &corners, true, &mut NoProbe);
-        self.settle(ray, &query, place)
-    }
-
-    /// A query of one ray that knows its best hit.
-    fn query(&self, ray: usize) -> (Query<'w, W::Goal>, bool) {
-        let i = self.start + ray;
-        let (mut query, usable) = Query::new(self.shapes, &self.wave.rays()[i], self.wave.t_min(i), self.wave.goal(i));
-        if usable && self.found.prim[ray] != NO_PRIM {
-            query.test(self.found.prim[ray], &mut NoProbe);
+        let best = self.found.prim[ray];
+        if best != NO_PRIM {
+            query.take(best, &self.shapes.triangle(best), true, &mut NoProbe);
         }
-        (query, usable)
-    }
-
-    /// Takes what a query found, at `place` if it was not known before.
-    fn settle(&mut self, ray: usize, query: &Query<W::Goal>, place: Place) -> Option<f32> {
+        query.take(place.prim, &corners, true, &mut NoProbe);
         if W::Goal::ANY {
             let found = query.reach() < query.t_min;
             self.found.prim[ray] = if found { place.prim } else { NO_PRIM };
             return found.then_some(f32::NEG_INFINITY);
         }
         let (t, prim) = query.goal.best()?;
-        if prim != self.found.prim[ray] {
-            self.found.place[ray] = if prim == place.prim { place.packed() } else { Place::ELSEWHERE };
+        if prim == place.prim {
+            (self.found.prim[ray], self.found.place[ray]) = (prim, place.packed());
         }
-        self.found.prim[ray] = prim;
         Some(t)
-    }
-
-    /// Tests the prims of a run, one ray after another.
-    #[inline(always)]
-    fn test_run<S: Simd>(&mut self, s: S, run: u32, mut rays: u32, reach: &mut Reach<S>) -> u32 {
-        let (mut low, mut high, mut changed) = (s.wide().store(reach.low), s.wide().store(reach.high), 0);
-        while rays != 0 {
-            let ray = rays.trailing_zeros() as usize % RAYS;
-            rays &= rays - 1;
-            if let Some(t) = self.run_of(ray, run) {
-                (low[ray], high[ray]) = (t, t);
-                changed |= 1 << ray;
-            }
-        }
-        (reach.low, reach.high) = (s.wide().load(&low), s.wide().load(&high));
-        changed
-    }
-
-    /// The best hit of one ray and the prims of a run; its distance, if there is one.
-    #[cold]
-    #[inline(never)]
-    fn run_of(&mut self, ray: usize, run: u32) -> Option<f32> {
-        let (mut query, usable) = self.query(ray);
-        let prims = self.tree.run(run);
-        if !usable {
-            return None;
-        }
-        let met = prims.iter().find(|&&prim| query.test(prim, &mut NoProbe));
-        let prim = met.or(prims.first()).copied().unwrap_or(NO_PRIM);
-        self.settle(ray, &query, if W::Goal::ANY { Place { prim, ..Place::NOWHERE } } else { Place::NOWHERE })
     }
 
     /// Distance and weights of one ray's hit by the scalar form.
     #[cold]
     #[inline(never)]
-    fn exactly(&self, ray: usize, low: f32) -> (f32, f32, f32) {
+    fn exactly(&self, ray: usize) -> (f32, f32, f32) {
         let (prim, Ray { origin, dir, .. }) = (self.found.prim[ray], self.wave.rays()[self.start + ray]);
-        let space = RaySpace::checked(origin, dir).0;
-        let (u, v) = self.shapes.barycentrics(prim, &space);
-        match self.shapes.triangles.get(prim as usize) {
-            Some(&corners) => (triangle::distance(&space, &self.shapes.corners(corners)), u, v),
-            None => (low, u, v),
-        }
+        let (space, corners) = (RaySpace::checked(origin, dir).0, self.shapes.triangle(prim));
+        let (u, v) = triangle::barycentrics(&space, &corners);
+        (triangle::distance(&space, &corners), u, v)
     }
 
     /// Gives the answers; distances and weights of hits with the same triangle are found together.
     #[inline(always)]
-    fn answer<S: Simd>(&mut self, s: S, reach: &Reach<S>) {
+    fn answer<S: Simd>(&mut self, s: S) {
         let (start, found) = (self.start, &self.found);
         if W::Goal::ANY {
             for (ray, &prim) in found.prim.iter().enumerate() {
@@ -398,31 +349,26 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
         }
         let wide = s.wide();
         let mut left = !wide.find_word(NO_PRIM, &found.prim) & ALL;
-        let low = wide.store(reach.low);
         let (mut t, mut u, mut v) = (wide.splat(f32::INFINITY), wide.splat(0.0), wide.splat(0.0));
         while left != 0 {
             let ray = left.trailing_zeros() as usize % RAYS;
             let place = found.place[ray];
-            let mut alone = 1 << ray;
-            if place != Place::ELSEWHERE {
-                let mine = wide.find_word(place, &found.place) & left;
-                let block = &self.tree.blocks[place as usize / LANES];
-                let plane = Plane::of(&corners_of(&block.corners, place as usize % LANES));
-                let met = plane.meet(wide, &self.rays.origin, &self.rays.dir, &self.rays.bounds);
-                let weights = plane.barycentrics(wide, &self.rays.origin, &self.rays.dir, met.t_f64);
-                let sure = mine & met.sure;
-                t = wide.choose(sure, met.t, t);
-                u = wide.choose(sure, weights[0], u);
-                v = wide.choose(sure, weights[1], v);
-                left &= !sure;
-                alone &= !sure;
-            }
-            if alone != 0 {
-                let exact = self.exactly(ray, low[ray]);
-                t = wide.choose(alone, wide.splat(exact.0), t);
-                u = wide.choose(alone, wide.splat(exact.1), u);
-                v = wide.choose(alone, wide.splat(exact.2), v);
-                left &= !alone;
+            let mine = wide.find_word(place, &found.place) & left;
+            let block = &self.tree.blocks[place as usize / LANES];
+            let plane = Plane::of(&corners_of(&block.corners, place as usize % LANES));
+            let met = plane.meet(wide, &self.rays.origin, &self.rays.dir, &self.rays.bounds);
+            let weights = plane.barycentrics(wide, &self.rays.origin, &self.rays.dir, met.t_f64);
+            let sure = mine & met.sure;
+            t = wide.choose(sure, met.t, t);
+            u = wide.choose(sure, weights[0], u);
+            v = wide.choose(sure, weights[1], v);
+            left &= !sure;
+            if sure >> ray & 1 == 0 {
+                let (one, exact) = (1 << ray, self.exactly(ray));
+                t = wide.choose(one, wide.splat(exact.0), t);
+                u = wide.choose(one, wide.splat(exact.1), u);
+                v = wide.choose(one, wide.splat(exact.2), v);
+                left &= !one;
             }
         }
         let (t, u, v) = (wide.store(t), wide.store(u), wide.store(v));

@@ -20,9 +20,13 @@ pub(super) struct Settle {
     count: usize,
 }
 
-impl Settle {
-    pub(super) const EMPTY: Self = Self { pairs: Pairs::EMPTY, rays: [0; LANES], prims: [0; LANES], count: 0 };
+impl Default for Settle {
+    fn default() -> Self {
+        Self { pairs: Pairs::EMPTY, rays: [0; LANES], prims: [0; LANES], count: 0 }
+    }
+}
 
+impl Settle {
     /// Gives a ray its answer, now or with others.
     #[inline(always)]
     pub(super) fn answer<S: Simd, W: Wave>(&mut self, s: S, tree: &Tree, wave: &mut W, i: usize, place: Place) {

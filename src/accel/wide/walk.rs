@@ -7,9 +7,9 @@ use super::packet::Branch;
 use super::slabs::{BoxMargins, Slabs};
 use crate::accel::query::{Goal, Query};
 use crate::accel::wave::{Wave, begin, end};
-use crate::accel::{Hit, Intersector, Probe, Shapes};
+use crate::accel::{Hit, Intersector, NoProbe, Probe, Shapes};
 use crate::math::Vec3;
-use crate::math::simd::{Kernel, LANES, Simd};
+use crate::math::simd::{Kernel, LANES, Portable, Simd};
 use crate::math::triangles::{RayLanes, reach};
 
 /// A child still to be visited, and the distance at which the ray enters its box.
@@ -53,13 +53,12 @@ impl<W: Wave, P: Probe, B: BoxMargins> Kernel for OneByOne<'_, W, P, B> {
     fn run<S: Simd>(self, s: S) {
         let Self { tree, shapes, wave, stack: Stack { entries: stack, .. }, probe, .. } = self;
         let Some(root) = tree.nodes.first().filter(|_| shapes.planes.is_empty()) else {
-            return (0..wave.rays().len())
-                .for_each(|i| ask_by_itself::<B, _, _, _>(s, tree, shapes, wave, i, stack, probe));
+            return (0..wave.rays().len()).for_each(|i| ask::<B, _, _, _>(s, tree, shapes, wave, i, stack, probe));
         };
         for i in 0..wave.rays().len() {
             let ray = &wave.rays()[i];
             if !(B::allow(tree, ray.origin) && has_direction(ray.dir)) {
-                ask_by_itself::<B, _, _, _>(s, tree, shapes, wave, i, stack, probe);
+                ask::<B, _, _, _>(s, tree, shapes, wave, i, stack, probe);
                 continue;
             }
             // Many rays meet no box at all: those need no more than this.
@@ -80,14 +79,27 @@ impl<W: Wave, P: Probe, B: BoxMargins> Kernel for OneByOne<'_, W, P, B> {
 
 /// Whether the direction is finite and not zero.
 #[inline(always)]
-pub(super) fn has_direction(dir: Vec3) -> bool {
+fn has_direction(dir: Vec3) -> bool {
     let (x, y, z) = (dir.x.abs(), dir.y.abs(), dir.z.abs());
     (x <= f32::MAX) & (y <= f32::MAX) & (z <= f32::MAX) & ((x > 0.0) | (y > 0.0) | (z > 0.0))
 }
 
-/// A ray that planes may hit, that boxes cannot be asked about, or that is answered while others go together.
+/// A ray that padded boxes cannot be asked about. Such rays are rare: code for one instruction set will do.
+#[cold]
+#[inline(never)]
+pub(super) fn ask_by_itself<B: BoxMargins, W: Wave>(
+    tree: &Tree,
+    shapes: &Shapes,
+    wave: &mut W,
+    i: usize,
+    stack: &mut [Entry],
+) {
+    ask::<B, _, _, _>(Portable, tree, shapes, wave, i, stack, &mut NoProbe);
+}
+
+/// A ray that goes its own way through whatever there is.
 #[inline(always)]
-pub(super) fn ask_by_itself<B: BoxMargins, S: Simd, W: Wave, P: Probe>(
+fn ask<B: BoxMargins, S: Simd, W: Wave, P: Probe>(
     s: S,
     tree: &Tree,
     shapes: &Shapes,
@@ -205,7 +217,7 @@ fn pop(stack: &[Entry], top: &mut usize, limit: f32) -> Option<u32> {
 
 /// Tests the prims of a leaf, and tells whether the query is answered.
 #[inline(always)]
-pub(super) fn test_leaf<S: Simd, G: Goal, P: Probe>(
+fn test_leaf<S: Simd, G: Goal, P: Probe>(
     s: S,
     tree: &Tree,
     leaf: Child,
