@@ -4,8 +4,7 @@ use std::marker::PhantomData;
 
 use super::best::Seeker;
 use super::node::{Child, Node, Tree};
-use super::padded::SlabLanes;
-use super::ready::Ready;
+use super::ready::{Ready, ReadyRay};
 use super::settle::Settle;
 use super::slabs::BoxMargins;
 use super::walk::{Entry, ask_by_itself};
@@ -64,7 +63,7 @@ impl Lone {
             }
             let ray = &self.ready.rays[lane % LANES];
             let mut seeker = Seeker::<B>::new(ray, i, wave.rays()[i].exclude);
-            descend(s, tree, shapes, wave, &ray.slabs.spread(s), &mut seeker, stack);
+            descend(s, tree, shapes, wave, ray, &mut seeker, stack);
             self.settle.answer(s, tree, wave, i, seeker.found());
         }
     }
@@ -83,23 +82,21 @@ fn descend<S: Simd, W: Wave, B: BoxMargins>(
     tree: &Tree,
     shapes: &Shapes,
     wave: &W,
-    slabs: &SlabLanes<S>,
+    ray: &ReadyRay,
     seeker: &mut Seeker<B>,
     stack: &mut [Entry],
 ) {
+    let slabs = ray.slabs.spread(s);
     let (mut node, mut top) = (&tree.nodes[0], 0);
     loop {
-        let (near, met) = slabs.meets(s, node, seeker.ready.limit);
-        let mut child = if met != 0 {
-            nearest(s, node, near, met, stack, &mut top)
-        } else {
-            pop(stack, &mut top, seeker.ready.limit)
-        };
+        let (near, met) = slabs.meets(s, node, seeker.limit);
+        let mut child =
+            if met != 0 { nearest(s, node, near, met, stack, &mut top) } else { pop(stack, &mut top, seeker.limit) };
         while Child::is_leaf(child) {
-            if seeker.test(s, tree, shapes, wave, child) {
+            if seeker.test(s, &ray.sight, tree, shapes, wave, child) {
                 return;
             }
-            child = pop(stack, &mut top, seeker.ready.limit);
+            child = pop(stack, &mut top, seeker.limit);
         }
         node = &tree.nodes[child as usize];
     }

@@ -11,16 +11,18 @@ use super::slabs::BoxMargins;
 use crate::accel::query::{Goal, Query};
 use crate::accel::wave::Wave;
 use crate::accel::{NO_PRIM, NoProbe, Shapes};
-use crate::math::sight::Look;
+use crate::math::sight::{Look, Sight};
 use crate::math::simd::{LANES, Row, Simd};
 use crate::math::triangle;
 
-/// A ray and what it has found.
+/// What a ray looks for, and what it has found.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seeker<B> {
-    pub ready: ReadyRay,
     /// Its number in the wave.
-    pub ray: usize,
+    pub number: usize,
+    /// Boxes are entered up to here.
+    pub limit: f32,
+    t_min: f32,
     exclude: u32,
     best: Best,
     margins: PhantomData<B>,
@@ -72,12 +74,13 @@ impl Place {
 impl<B: BoxMargins> Seeker<B> {
     /// A ray that was made ready, of this number in its wave.
     #[inline(always)]
-    pub(super) fn new(ready: &ReadyRay, ray: usize, exclude: u32) -> Self {
+    pub(super) fn new(ray: &ReadyRay, number: usize, exclude: u32) -> Self {
         Self {
-            ready: *ready,
-            ray,
+            number,
+            limit: ray.limit,
+            t_min: ray.t_min,
             exclude,
-            best: Best { low: f32::INFINITY, high: ready.t_max, place: Place::NONE },
+            best: Best { low: f32::INFINITY, high: ray.t_max, place: Place::NONE },
             margins: PhantomData,
         }
     }
@@ -88,30 +91,38 @@ impl<B: BoxMargins> Seeker<B> {
         self.best.place
     }
 
-    /// Tests the triangles of a leaf, a block, and tells whether nothing more can matter.
+    /// Tests the triangles of a leaf, a block, as the ray sees them, and tells whether nothing more can matter.
     #[inline(always)]
-    pub(super) fn test<S: Simd, W: Wave>(&mut self, s: S, tree: &Tree, shapes: &Shapes, wave: &W, leaf: u32) -> bool {
+    pub(super) fn test<S: Simd, W: Wave>(
+        &mut self,
+        s: S,
+        sight: &Sight,
+        tree: &Tree,
+        shapes: &Shapes,
+        wave: &W,
+        leaf: u32,
+    ) -> bool {
         let (index, count) = Child::block(leaf);
         let Some(block) = tree.blocks.get(index as usize) else { return true };
-        let look = self.ready.sight.look(s, &block.corners);
+        let look = sight.look(s, &block.corners);
         if (look.verdicts.hit | look.verdicts.unsure) & lanes(count) == 0 {
             return false;
         }
-        let met = self.met(s, &look, count);
+        let met = self.met(s, sight, &look, count);
         met.open != 0 && self.take(tree, shapes, wave, index, &met)
     }
 
     /// What is met of a leaf, whose index is below the number of blocks.
     #[inline(always)]
-    pub(super) fn meet<S: Simd>(&self, s: S, tree: &Tree, leaf: u32) -> Met {
+    pub(super) fn meet<S: Simd>(&self, s: S, sight: &Sight, tree: &Tree, leaf: u32) -> Met {
         let (index, count) = Child::block(leaf);
-        self.met(s, &self.ready.sight.look(s, &tree.blocks[index as usize].corners), count)
+        self.met(s, sight, &sight.look(s, &tree.blocks[index as usize].corners), count)
     }
 
     #[inline(always)]
-    fn met<S: Simd>(&self, s: S, look: &Look<S>, count: u32) -> Met {
-        let [low, high] = look.distances(s, &self.ready.sight);
-        let in_time = s.at_most(low, s.splat(self.best.high)) & s.at_most(s.splat(self.ready.t_min), high);
+    fn met<S: Simd>(&self, s: S, sight: &Sight, look: &Look<S>, count: u32) -> Met {
+        let [low, high] = look.distances(s, sight);
+        let in_time = s.at_most(low, s.splat(self.best.high)) & s.at_most(s.splat(self.t_min), high);
         let (hit, unsure) = (look.verdicts.hit & in_time & lanes(count), look.verdicts.unsure & lanes(count));
         Met { low: s.store(low), high: s.store(high), hit, open: hit | unsure }
     }
@@ -130,7 +141,7 @@ impl<B: BoxMargins> Seeker<B> {
                 return true;
             }
         }
-        self.ready.limit = B::widened(self.best.high);
+        self.limit = B::widened(self.best.high);
         false
     }
 
@@ -141,9 +152,9 @@ impl<B: BoxMargins> Seeker<B> {
             return false;
         }
         match between {
-            Some((low, high)) if low > self.best.high || high < self.ready.t_min => false,
-            Some((low, high)) if (low > self.ready.t_min) & (high < self.best.low) & (high <= self.best.high) => {
-                if !wave.goal(self.ray).wants(shapes, place.prim) {
+            Some((low, high)) if low > self.best.high || high < self.t_min => false,
+            Some((low, high)) if (low > self.t_min) & (high < self.best.low) & (high <= self.best.high) => {
+                if !wave.goal(self.number).wants(shapes, place.prim) {
                     return false;
                 }
                 self.best = Best { low, high, place };
@@ -157,7 +168,7 @@ impl<B: BoxMargins> Seeker<B> {
     #[cold]
     #[inline(never)]
     fn decide<W: Wave>(&mut self, shapes: &Shapes, wave: &W, place: Place, certain: bool) -> bool {
-        let i = self.ray;
+        let i = self.number;
         let (mut query, usable) = Query::new(shapes, &wave.rays()[i], wave.t_min(i), wave.goal(i));
         if !usable || !certain && !triangle::is_hit(&query.ray, &shapes.triangle(place.prim)) {
             return false;

@@ -54,6 +54,7 @@ const fn farthest_first() -> [[Order; 256]; LANES] {
 
 /// A ray in flight.
 struct Slot<B> {
+    ray: ReadyRay,
     seeker: Seeker<B>,
     /// Above the top of its stack.
     top: usize,
@@ -92,6 +93,7 @@ struct Slots<B> {
 impl<B: BoxMargins> Slots<B> {
     fn empty() -> Self {
         let slot = |_| Slot {
+            ray: ReadyRay::default(),
             seeker: Seeker::new(&ReadyRay::default(), 0, NO_PRIM),
             top: 1,
             near: [f32::NEG_INFINITY; DEPTH + LANES],
@@ -160,7 +162,7 @@ impl<B: BoxMargins> Slot<B> {
         let mut top = self.top;
         loop {
             top -= 1;
-            if self.near[top % DEPTH] <= self.seeker.ready.limit {
+            if self.near[top % DEPTH] <= self.seeker.limit {
                 break;
             }
         }
@@ -171,7 +173,7 @@ impl<B: BoxMargins> Slot<B> {
     /// Puts the children that are met on the stack, the nearest last.
     #[inline(always)]
     fn push<S: Simd>(&mut self, s: S, node: &Node, near: S::Lanes, met: u32) {
-        let order = FARTHEST_FIRST[self.seeker.ready.slabs.octant as usize % LANES][met as usize % 256];
+        let order = FARTHEST_FIRST[self.ray.slabs.octant as usize % LANES][met as usize % 256];
         let top = self.top % DEPTH;
         let (nears, children) = (self.near[top..].first_chunk_mut(), self.children[top..].first_chunk_mut());
         // There is room for eight above every top.
@@ -203,7 +205,7 @@ impl<W: Wave, B: BoxMargins> InFlight<'_, W, B> {
             let (near, met) = ray.slabs.meets(s, root, ray.limit);
             if met != 0 {
                 let (slot, at) = slots.at(number);
-                slot.seeker = Seeker::new(ray, i, self.wave.rays()[i].exclude);
+                (slot.ray, slot.seeker) = (*ray, Seeker::new(ray, i, self.wave.rays()[i].exclude));
                 slot.top = 1;
                 slot.push(s, root, near, met);
                 *at = slot.pop();
@@ -222,7 +224,7 @@ impl<W: Wave, B: BoxMargins> InFlight<'_, W, B> {
             let (slot, at) = slots.at(nodes.trailing_zeros());
             nodes &= nodes - 1;
             let node = &self.tree.nodes[*at as usize];
-            let (near, met) = slot.seeker.ready.slabs.meets(s, node, slot.seeker.ready.limit);
+            let (near, met) = slot.ray.slabs.meets(s, node, slot.seeker.limit);
             slot.push(s, node, near, met);
             *at = slot.pop();
             let (node, block) = Child::either(*at);
@@ -240,7 +242,7 @@ impl<W: Wave, B: BoxMargins> InFlight<'_, W, B> {
             turn &= turn - 1;
             let (slot, at) = slots.at(number);
             let met = &mut met[number as usize % SLOTS];
-            *met = slot.seeker.meet(s, self.tree, *at);
+            *met = slot.seeker.meet(s, &slot.ray.sight, self.tree, *at);
             open |= u32::from(met.open != 0) << number;
         }
         while open != 0 {
@@ -268,7 +270,7 @@ impl<W: Wave, B: BoxMargins> InFlight<'_, W, B> {
             ended &= ended - 1;
             let (slot, at) = slots.at(number);
             *at = Child::END;
-            settle.answer(s, self.tree, self.wave, slot.seeker.ray, slot.seeker.found());
+            settle.answer(s, self.tree, self.wave, slot.seeker.number, slot.seeker.found());
             self.start(s, slots, number, queue);
         }
     }
