@@ -81,24 +81,7 @@ impl Plane {
         // Those of the farthest and of the steepest ray there could be.
         let n_error = s.splat_f64(self.sizes.dot(low.max(high)) * PLANE_TERMS_F64);
         let d_error = s.splat_f64(self.sizes.dot(bounds.dir) * PLANE_TERMS_F64);
-        let (n, d) = (s.abs_f64(numerator), s.abs_f64(denominator));
-        let quarter = s.splat_f64(0.25);
-        let signs = s.less_f64(d_error, s.mul_f64(quarter, d)) & s.less_f64(n_error, s.mul_f64(quarter, n));
-        let reciprocal = s.div_f64(s.splat_f64(1.0), denominator);
-        let t = s.mul_f64(numerator, reciprocal);
-        let size = s.abs_f64(t);
-        let terms = s.add_f64(n_error, s.mul_f64(d_error, size));
-        let error = s.add_f64(
-            s.mul_f64(terms, s.mul_f64(s.splat_f64(1.5), s.abs_f64(reciprocal))),
-            s.mul_f64(size, s.splat_f64(2.0 * f64::EPSILON)),
-        );
-        let spread = s.mul_f64(error, s.splat_f64(1.001));
-        let (low, high) = (s.narrow(s.sub_f64(t, spread)), s.narrow(s.add_f64(t, spread)));
-        let rounded = s.at_most(low, high) & s.at_most(high, low);
-        // Below the normal numbers zero gets a sign, which is left to the scalar form.
-        let normal = s.less_f64(s.splat_f64(f64::from(f32::MIN_POSITIVE)), size);
-        let sure = signs & s.less_f64(error, s.mul_f64(size, s.splat_f64(POSITION_T))) & rounded & normal;
-        Meetings { t: low, t_f64: t, sure }
+        quotient(s, [numerator, n_error], [denominator, d_error])
     }
 
     /// n·v.
@@ -128,10 +111,7 @@ impl Plane {
         let scale = s.splat_f64(1.0 / (bx * cy - by * cx));
         let u = s.sub_f64(s.mul_f64(px, s.splat_f64(cy)), s.mul_f64(py, s.splat_f64(cx)));
         let v = s.sub_f64(s.mul_f64(s.splat_f64(bx), py), s.mul_f64(s.splat_f64(by), px));
-        let u = self.clamped(s, s.mul_f64(u, scale));
-        let v = self.clamped(s, s.mul_f64(v, scale));
-        let one = s.splat(1.0);
-        [u, s.choose(s.less(one, s.add(u, v)), s.sub(one, u), v)]
+        clamped(s, s.mul_f64(u, scale), s.mul_f64(v, scale))
     }
 
     /// Coordinate `k` of the places at `t`, relative to the first corner.
@@ -147,13 +127,43 @@ impl Plane {
         let (o, d) = (s.widen(s.load(&origin[k % 3])), s.widen(s.load(&dir[k % 3])));
         s.sub_f64(s.add_f64(o, s.mul_f64(d, t)), s.splat_f64(self.corners[0][k % 3]))
     }
+}
 
-    /// Within 0 to 1, rounded; 0 for a NaN.
-    #[inline(always)]
-    fn clamped<S: Lanewise<N>, const N: usize>(&self, s: S, x: S::Doubles) -> S::Lanes {
-        let positive = s.greater_f64(x, s.splat_f64(0.0));
-        s.narrow(s.smaller_f64(positive, s.splat_f64(1.0)))
-    }
+/// n / d, each with the bound of its error: [`Bounded::over`](super::quotient::Bounded) and what is asked of it, in lanes.
+#[inline(always)]
+fn quotient<S: Lanewise<N>, const N: usize>(
+    s: S,
+    [numerator, n_error]: [S::Doubles; 2],
+    [denominator, d_error]: [S::Doubles; 2],
+) -> Meetings<S::Lanes, S::Doubles> {
+    let (n, d) = (s.abs_f64(numerator), s.abs_f64(denominator));
+    let quarter = s.splat_f64(0.25);
+    let signs = s.less_f64(d_error, s.mul_f64(quarter, d)) & s.less_f64(n_error, s.mul_f64(quarter, n));
+    let reciprocal = s.div_f64(s.splat_f64(1.0), denominator);
+    let t = s.mul_f64(numerator, reciprocal);
+    let size = s.abs_f64(t);
+    let terms = s.add_f64(n_error, s.mul_f64(d_error, size));
+    let error = s.add_f64(
+        s.mul_f64(terms, s.mul_f64(s.splat_f64(1.5), s.abs_f64(reciprocal))),
+        s.mul_f64(size, s.splat_f64(2.0 * f64::EPSILON)),
+    );
+    let spread = s.mul_f64(error, s.splat_f64(1.001));
+    let (low, high) = (s.narrow(s.sub_f64(t, spread)), s.narrow(s.add_f64(t, spread)));
+    let rounded = s.at_most(low, high) & s.at_most(high, low);
+    // Below the normal numbers zero gets a sign, which is left to the scalar form.
+    let normal = s.less_f64(s.splat_f64(f64::from(f32::MIN_POSITIVE)), size);
+    let sure = signs & s.less_f64(error, s.mul_f64(size, s.splat_f64(POSITION_T))) & rounded & normal;
+    Meetings { t: low, t_f64: t, sure }
+}
+
+/// Weights within 0 to 1, and their sum, too; rounded, 0 for a NaN.
+#[inline(always)]
+fn clamped<S: Lanewise<N>, const N: usize>(s: S, u: S::Doubles, v: S::Doubles) -> [S::Lanes; 2] {
+    let (zero, most) = (s.splat_f64(0.0), s.splat_f64(1.0));
+    let u = s.narrow(s.smaller_f64(s.greater_f64(u, zero), most));
+    let v = s.narrow(s.smaller_f64(s.greater_f64(v, zero), most));
+    let one = s.splat(1.0);
+    [u, s.choose(s.less(one, s.add(u, v)), s.sub(one, u), v)]
 }
 
 /// Rays and triangles, by axis and lane.
@@ -246,25 +256,9 @@ impl Pairs {
         let (numerator, n_error) = (normal.dot(s, &from), s.mul_f64(sizes.dot(s, &from.abs(s)), terms));
         let (denominator, d_error) = (normal.dot(s, &d), s.mul_f64(sizes.dot(s, &d.abs(s)), terms));
 
-        // As in `quotient::Bounded`.
-        let quarter = s.splat_f64(0.25);
-        let signs = s.less_f64(d_error, s.mul_f64(quarter, s.abs_f64(denominator)))
-            & s.less_f64(n_error, s.mul_f64(quarter, s.abs_f64(numerator)));
-        let reciprocal = s.div_f64(s.splat_f64(1.0), denominator);
-        let t = s.mul_f64(numerator, reciprocal);
-        let size = s.abs_f64(t);
-        let error = s.add_f64(
-            s.mul_f64(s.add_f64(n_error, s.mul_f64(d_error, size)), s.mul_f64(s.splat_f64(1.5), s.abs_f64(reciprocal))),
-            s.mul_f64(size, s.splat_f64(2.0 * f64::EPSILON)),
-        );
-        let spread = s.mul_f64(error, s.splat_f64(1.001));
-        let (low, high) = (s.narrow(s.sub_f64(t, spread)), s.narrow(s.add_f64(t, spread)));
-        let rounded = s.at_most(low, high) & s.at_most(high, low);
-        // Below the normal numbers zero gets a sign, which is left to the scalar form.
-        let normal_t = s.less_f64(s.splat_f64(f64::from(f32::MIN_POSITIVE)), size);
-        let sure = signs & s.less_f64(error, s.mul_f64(size, s.splat_f64(POSITION_T))) & rounded & normal_t;
-
-        Places { t: s.store(low), weights: weights(s, [&o, &d, &a], [&e1, &e2], &normal, t), sure }
+        let Meetings { t, t_f64, sure } = quotient(s, [numerator, n_error], [denominator, d_error]);
+        let [u, v] = weights(s, [&o, &d, &a], [&e1, &e2], &normal, t_f64);
+        Places { t: s.store(t), weights: [s.store(u), s.store(v)], sure }
     }
 }
 
@@ -277,7 +271,7 @@ fn weights<S: Simd>(
     [e1, e2]: [&Vectors<S>; 2],
     normal: &Vectors<S>,
     t: S::Doubles,
-) -> [Row; 2] {
+) -> [S::Lanes; 2] {
     let Vectors([dx, dy, dz]) = *d;
     let moved = Vectors::<S>([s.mul_f64(dx, t), s.mul_f64(dy, t), s.mul_f64(dz, t)]);
     let p = Vectors::<S>([s.add_f64(o.0[0], moved.0[0]), s.add_f64(o.0[1], moved.0[1]), s.add_f64(o.0[2], moved.0[2])])
@@ -288,14 +282,7 @@ fn weights<S: Simd>(
     let scale = s.div_f64(s.splat_f64(1.0), seen(s, normal, along_x, along_y));
     let u = s.mul_f64(seen(s, &p.cross(s, e2), along_x, along_y), scale);
     let v = s.mul_f64(seen(s, &e1.cross(s, &p), along_x, along_y), scale);
-    let (zero, one) = (s.splat_f64(0.0), s.splat_f64(1.0));
-    // 0 for a NaN.
-    let u = s.store(s.narrow(s.smaller_f64(s.greater_f64(u, zero), one)));
-    let mut v = s.store(s.narrow(s.smaller_f64(s.greater_f64(v, zero), one)));
-    for lane in 0..LANES {
-        v[lane] = if u[lane] + v[lane] > 1.0 { 1.0 - u[lane] } else { v[lane] };
-    }
-    [u, v]
+    clamped(s, u, v)
 }
 
 /// The component along an axis, the third where it is neither of both.

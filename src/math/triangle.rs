@@ -212,6 +212,14 @@ pub fn barycentrics(ray: &RaySpace, triangle: &Triangle) -> (f32, f32) {
     barycentrics_at(ray, triangle, distance_f64(ray, triangle), (b - a).cross(c - a))
 }
 
+/// The distance of [`meet`] and these weights.
+pub fn place(ray: &RaySpace, triangle: &Triangle) -> (f32, f32, f32) {
+    let Meeting { t, t_f64, normal } = meet(ray, triangle);
+    let (u, v) =
+        if t_f64.is_nan() { barycentrics(ray, triangle) } else { barycentrics_at(ray, triangle, t_f64, normal) };
+    (t, u, v)
+}
+
 /// The same, with what [`meet`] found, or with [`distance_f64`] and the normal (b − a) × (c − a).
 ///
 /// Areas in the plane of the triangle, seen along the axis from which they are largest, so that a grazing ray is no worse

@@ -3,8 +3,6 @@
 //! Exact distances are dear. Where the intervals of two hits do not touch, the nearer is known without them, and only the
 //! hit that is left at the end needs its own; where they do, or touch an end of the ray's range, the exact test decides.
 
-use std::marker::PhantomData;
-
 use super::node::{Child, Tree};
 use super::ready::ReadyRay;
 use super::slabs::BoxMargins;
@@ -13,11 +11,12 @@ use crate::accel::wave::Wave;
 use crate::accel::{NO_PRIM, NoProbe, Shapes};
 use crate::math::sight::{Look, Sight};
 use crate::math::simd::{LANES, Row, Simd};
-use crate::math::triangle;
+use crate::math::triangle::{self, Triangle};
+use crate::math::triangles::corners_of;
 
 /// What a ray looks for, and what it has found.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seeker<B> {
+pub(super) struct Seeker {
     /// Its number in the wave.
     pub number: usize,
     /// Boxes are entered up to here.
@@ -25,7 +24,6 @@ pub(super) struct Seeker<B> {
     t_min: f32,
     exclude: u32,
     best: Best,
-    margins: PhantomData<B>,
 }
 
 /// A hit by an interval.
@@ -68,10 +66,22 @@ pub(super) struct Place {
 }
 
 impl Place {
-    pub(super) const NONE: Self = Self { block: 0, lane: 0, prim: NO_PRIM };
+    const NONE: Self = Self { block: 0, lane: 0, prim: NO_PRIM };
+
+    /// Block and lane in a word; there are fewer than 2²⁷ blocks.
+    #[inline(always)]
+    pub(super) fn packed(self) -> u32 {
+        self.block << 3 | self.lane
+    }
+
+    /// The corners of a triangle by its packed place.
+    #[inline(always)]
+    pub(super) fn corners(tree: &Tree, packed: u32) -> Triangle {
+        corners_of(&tree.blocks[(packed >> 3) as usize].corners, packed as usize % LANES)
+    }
 }
 
-impl<B: BoxMargins> Seeker<B> {
+impl Seeker {
     /// A ray that was made ready, of this number in its wave.
     #[inline(always)]
     pub(super) fn new(ray: &ReadyRay, number: usize, exclude: u32) -> Self {
@@ -81,7 +91,6 @@ impl<B: BoxMargins> Seeker<B> {
             t_min: ray.t_min,
             exclude,
             best: Best { low: f32::INFINITY, high: ray.t_max, place: Place::NONE },
-            margins: PhantomData,
         }
     }
 
@@ -93,7 +102,7 @@ impl<B: BoxMargins> Seeker<B> {
 
     /// Tests the triangles of a leaf, a block, as the ray sees them, and tells whether nothing more can matter.
     #[inline(always)]
-    pub(super) fn test<S: Simd, W: Wave>(
+    pub(super) fn test<B: BoxMargins, S: Simd, W: Wave>(
         &mut self,
         s: S,
         sight: &Sight,
@@ -109,7 +118,7 @@ impl<B: BoxMargins> Seeker<B> {
             return false;
         }
         let met = self.met(s, sight, &look, count);
-        met.open != 0 && self.take(tree, shapes, wave, index, &met)
+        met.open != 0 && self.take::<B, _>(tree, shapes, wave, index, &met)
     }
 
     /// What is met of a leaf, whose index is below the number of blocks.
@@ -129,7 +138,14 @@ impl<B: BoxMargins> Seeker<B> {
 
     /// Takes what is met of a block, and tells whether nothing more can matter.
     #[inline(always)]
-    pub(super) fn take<W: Wave>(&mut self, tree: &Tree, shapes: &Shapes, wave: &W, index: u32, met: &Met) -> bool {
+    pub(super) fn take<B: BoxMargins, W: Wave>(
+        &mut self,
+        tree: &Tree,
+        shapes: &Shapes,
+        wave: &W,
+        index: u32,
+        met: &Met,
+    ) -> bool {
         let (prims, mut open) = (&tree.blocks[index as usize].prims, met.open);
         while open != 0 {
             let lane = open.trailing_zeros();
@@ -160,31 +176,39 @@ impl<B: BoxMargins> Seeker<B> {
                 self.best = Best { low, high, place };
                 W::Goal::ANY
             }
-            _ => self.decide(shapes, wave, place, between.is_some()),
+            _ => match decide(shapes, wave, self.number, self.best.place.prim, place.prim, between.is_some()) {
+                Some((t, prim)) => {
+                    let place = if prim == place.prim { place } else { self.best.place };
+                    self.best = Best { low: t, high: t, place };
+                    W::Goal::ANY
+                }
+                None => false,
+            },
         }
     }
+}
 
-    /// The best hit and another by the exact test.
-    #[cold]
-    #[inline(never)]
-    fn decide<W: Wave>(&mut self, shapes: &Shapes, wave: &W, place: Place, certain: bool) -> bool {
-        let i = self.number;
-        let (mut query, usable) = Query::new(shapes, &wave.rays()[i], wave.t_min(i), wave.goal(i));
-        if !usable || !certain && !triangle::is_hit(&query.ray, &shapes.triangle(place.prim)) {
-            return false;
-        }
-        for place in [self.best.place, place].into_iter().filter(|place| place.prim != NO_PRIM) {
-            query.take(place.prim, &shapes.triangle(place.prim), true, &mut NoProbe);
-        }
-        if W::Goal::ANY {
-            if query.reach() < query.t_min {
-                self.best.place = place;
-                return true;
-            }
-        } else if let Some((t, prim)) = query.goal.best() {
-            let place = if prim == place.prim { place } else { self.best.place };
-            self.best = Best { low: t, high: t, place };
-        }
-        false
+/// The best of two triangles that ray `i` may hit, by the exact test: `best`, which it does if it is not [`NO_PRIM`], and
+/// `prim`, which it does if that is `certain`. Where any hit is the answer, its distance is negative infinity.
+#[cold]
+#[inline(never)]
+pub(super) fn decide<W: Wave>(
+    shapes: &Shapes,
+    wave: &W,
+    i: usize,
+    best: u32,
+    prim: u32,
+    certain: bool,
+) -> Option<(f32, u32)> {
+    let (mut query, usable) = Query::new(shapes, &wave.rays()[i], wave.t_min(i), wave.goal(i));
+    if !usable || !certain && !triangle::is_hit(&query.ray, &shapes.triangle(prim)) {
+        return None;
     }
+    for prim in [best, prim].into_iter().filter(|&prim| prim != NO_PRIM) {
+        query.take(prim, &shapes.triangle(prim), true, &mut NoProbe);
+    }
+    if W::Goal::ANY {
+        return (query.reach() < query.t_min).then_some((f32::NEG_INFINITY, prim));
+    }
+    query.goal.best()
 }

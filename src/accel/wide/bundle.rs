@@ -3,10 +3,11 @@
 use std::marker::PhantomData;
 
 use super::node::{Node, Tree};
-use super::padded::FIRST;
+use super::padded::{FIRST, Padding};
+use super::ready::Columns;
 use super::slabs::{BoxMargins, backwards};
 use crate::accel::{NO_PRIM, Ray};
-use crate::math::bounds::{BOX_RANGE, PARALLEL};
+use crate::math::bounds::PARALLEL;
 use crate::math::meetings::RowBounds;
 use crate::math::shear::main_axis;
 use crate::math::simd::{LANES, Lanewise, Pick, Simd, WIDE};
@@ -81,30 +82,18 @@ impl<B: BoxMargins> Bundle<B> {
     #[inline(always)]
     pub(super) fn spread<S: Simd>(&mut self, s: S, rays: &[Ray; RAYS]) -> Numbers {
         (self.z, self.octant) = (main_axis(rays[0].dir), octant_of(rays[0].dir));
-        let (low, high) = (self.columns(s, rays, 0), self.columns(s, rays, 1));
+        let (low, high) = (Columns::of(s, &rays[..LANES]), Columns::of(s, &rays[LANES..]));
         let wide = s.wide();
         for k in 0..3 {
-            self.origin[k] = wide.store(s.join(low[0][k], high[0][k]));
-            self.dir[k] = wide.store(s.join(low[1][k], high[1][k]));
+            self.origin[k] = wide.store(s.join(low.origin[k], high.origin[k]));
+            self.dir[k] = wide.store(s.join(low.dir[k], high.dir[k]));
         }
-        self.t_min = wide.store(s.join(low[0][3], high[0][3]));
+        for (exclude, ray) in self.exclude.iter_mut().zip(rays) {
+            *exclude = ray.exclude;
+        }
+        self.t_min = wide.store(s.join(low.t_min, high.t_min));
         // A distance that overflows is no hit; a NaN stays one.
-        let t_max = wide.smaller(wide.splat(f32::MAX), s.join(low[1][3], high[1][3]));
-        wide.store(t_max)
-    }
-
-    /// Origins with `t_min`, and directions with `t_max`, of one half of the rays.
-    #[inline(always)]
-    fn columns<S: Simd>(&mut self, s: S, rays: &[Ray; RAYS], half: usize) -> [[S::Lanes; 4]; 2] {
-        let (mut from, mut to) = ([[0.0; 4]; LANES], [[0.0; 4]; LANES]);
-        for lane in 0..LANES {
-            let ray = &rays[LANES * half + lane];
-            let (o, d) = (ray.origin, ray.dir);
-            from[lane] = [o.x, o.y, o.z, ray.t_min];
-            to[lane] = [d.x, d.y, d.z, ray.t_max];
-            self.exclude[LANES * half + lane] = ray.exclude;
-        }
-        [s.columns(&from), s.columns(&to)]
+        wide.store(wide.smaller(wide.splat(f32::MAX), s.join(low.t_max, high.t_max)))
     }
 
     /// Finds slabs and ranges from origins, directions, `t_min` and `t_max`, and whether the rays run alike: to the same
@@ -115,41 +104,22 @@ impl<B: BoxMargins> Bundle<B> {
         let (t_min, t_max, zero) = (s.load(&self.t_min), s.load(t_max), s.splat(0.0));
         let o = [s.load(&self.origin[0]), s.load(&self.origin[1]), s.load(&self.origin[2])];
         let d = [s.load(&self.dir[0]), s.load(&self.dir[1]), s.load(&self.dir[2])];
-        let (far, size) = ([s.abs(o[0]), s.abs(o[1]), s.abs(o[2])], [s.abs(d[0]), s.abs(d[1]), s.abs(d[2])]);
-        let extent = s.splat(tree.extent);
-        // Sums keep a NaN.
-        let whole = s.add(extent, s.add(s.add(far[0], far[1]), far[2]));
-        let length = s.add(s.add(size[0], size[1]), size[2]);
-        let (least, most) = (s.splat(1.0 / BOX_RANGE), s.splat(BOX_RANGE));
-        let mut alike = s.at_most(t_min, t_max) & s.at_most(zero, t_min);
-        alike &= s.at_most(least, whole) & s.at_most(whole, most);
-        alike &= s.at_most(least, length) & s.at_most(length, most);
-        let [x, y, z] = size;
+        let Padding { inverse, first, last, allowed } = Padding::of::<B, _, RAYS>(s, tree.extent, o, d);
+        let [x, y, z] = [s.abs(d[0]), s.abs(d[1]), s.abs(d[2])];
+        let mut alike = allowed & s.at_most(t_min, t_max) & s.at_most(zero, t_min);
         alike &= match self.z {
             0 => s.at_most(y, x) & s.at_most(z, x),
             1 => !(s.at_most(y, x) & s.at_most(z, x)) & s.at_most(z, y),
             _ => !(s.at_most(y, x) & s.at_most(z, x)) & s.less(y, z),
         };
-        let parallel = s.mul(s.greater(x, s.greater(y, z)), s.splat(PARALLEL));
-        let drift = s.mul(whole, s.splat(PARALLEL));
         for k in 0..3 {
             alike &= if self.octant >> k & 1 == 1 { s.signs(d[k]) } else { !s.signs(d[k]) };
-            let inverse = s.div(s.splat(1.0), s.with_sign(s.greater(size[k], parallel), d[k]));
-            let pad = s.mul(s.mul_add(s.add(extent, far[k]), s.splat(B::PAD), drift), s.abs(inverse));
-            let middle = s.mul(s.sub(zero, o[k]), inverse);
-            self.inverse[k] = s.store(inverse);
-            self.first[k] = s.store(s.sub(middle, pad));
-            self.last[k] = s.store(s.add(middle, pad));
+            self.inverse[k] = s.store(inverse[k]);
+            self.first[k] = s.store(first[k]);
+            self.last[k] = s.store(last[k]);
         }
-        let (range, underflow) = (s.splat(B::RANGE), s.splat(B::UNDERFLOW));
-        self.from = s.store(s.sub(s.sub(t_min, s.mul(t_min, range)), underflow));
+        self.from = s.store(B::started_lanes(s, t_min));
         alike & ALL == ALL
-    }
-
-    /// The distance up to which boxes must be entered for hits up to each of these.
-    #[inline(always)]
-    pub(super) fn widened<S: Lanewise<RAYS>>(s: S, t: S::Lanes) -> S::Lanes {
-        s.add(s.add(t, s.mul(s.abs(t), s.splat(B::RANGE))), s.splat(B::UNDERFLOW))
     }
 
     /// Which rays meet a box up to their limits; by axis, its plane that comes first and the one that comes last.

@@ -53,9 +53,10 @@ const fn farthest_first() -> [[Order; 256]; LANES] {
 }
 
 /// A ray in flight.
-struct Slot<B> {
+#[derive(Clone, Debug)]
+struct Slot {
     ray: ReadyRay,
-    seeker: Seeker<B>,
+    seeker: Seeker,
     /// Above the top of its stack.
     top: usize,
     /// Its stack, distances and children apart, so that eight are written at once; the first is never taken off, and above
@@ -64,8 +65,14 @@ struct Slot<B> {
     children: [u32; DEPTH + LANES],
 }
 
-/// A wave of rays.
+/// A wave of rays, and the slots that they fly in.
 pub(super) struct InFlight<'w, W, B> {
+    pub flight: Flight<'w, W, B>,
+    pub slots: &'w mut Slots,
+}
+
+/// A wave of rays.
+pub(super) struct Flight<'w, W, B> {
     pub tree: &'w Tree,
     pub shapes: &'w Shapes,
     pub wave: &'w mut W,
@@ -82,16 +89,17 @@ struct Whereabouts {
 }
 
 /// All slots.
-struct Slots<B> {
-    slots: [Slot<B>; SLOTS],
+#[derive(Clone, Debug)]
+pub(super) struct Slots {
+    slots: Box<[Slot; SLOTS]>,
     /// Where each of them is; [`Child::END`] without a ray, too.
     at: [[u32; LANES]; SLOTS / LANES],
     /// Those that have a ray, by the bits of their numbers.
     taken: u32,
 }
 
-impl<B: BoxMargins> Slots<B> {
-    fn empty() -> Self {
+impl Default for Slots {
+    fn default() -> Self {
         let slot = |_| Slot {
             ray: ReadyRay::default(),
             seeker: Seeker::new(&ReadyRay::default(), 0, NO_PRIM),
@@ -99,9 +107,11 @@ impl<B: BoxMargins> Slots<B> {
             near: [f32::NEG_INFINITY; DEPTH + LANES],
             children: [Child::END; DEPTH + LANES],
         };
-        Self { slots: std::array::from_fn(slot), at: [[Child::END; LANES]; SLOTS / LANES], taken: 0 }
+        Self { slots: Box::new(std::array::from_fn(slot)), at: [[Child::END; LANES]; SLOTS / LANES], taken: 0 }
     }
+}
 
+impl Slots {
     /// Which of them are where.
     #[inline(always)]
     fn whereabouts<S: Simd>(&self, s: S) -> Whereabouts {
@@ -115,7 +125,7 @@ impl<B: BoxMargins> Slots<B> {
 
     /// Where a slot is.
     #[inline(always)]
-    fn at(&mut self, number: u32) -> (&mut Slot<B>, &mut u32) {
+    fn at(&mut self, number: u32) -> (&mut Slot, &mut u32) {
         let number = number as usize % SLOTS;
         (&mut self.slots[number], &mut self.at[number / LANES][number % LANES])
     }
@@ -133,29 +143,29 @@ impl<W: Wave, B: BoxMargins> Kernel for InFlight<'_, W, B> {
     type Output = ();
 
     #[inline(always)]
-    fn run<S: Simd>(mut self, s: S) {
+    fn run<S: Simd>(self, s: S) {
+        let Self { mut flight, slots } = self;
         let (mut queue, mut settle) = (Queue { ready: Ready::default(), next: 0 }, Settle::default());
-        let mut slots = Slots::<B>::empty();
         for number in 0..u32::BITS {
-            self.start(s, &mut slots, number, &mut queue);
+            flight.start(s, slots, number, &mut queue);
         }
         let mut met = [Met::NOTHING; SLOTS];
         let mut nodes = slots.whereabouts(s).nodes;
         while slots.taken != 0 {
-            self.step(s, &mut slots, nodes);
+            flight.step(s, slots, nodes);
             let at = slots.whereabouts(s);
             nodes = at.nodes;
             if nodes == 0 || (at.leaves | at.ended).count_ones() >= LEAVES {
-                let answered = self.test(s, &mut slots, at.leaves, &mut met);
-                self.renew(s, &mut slots, at.ended | answered, &mut queue, &mut settle);
+                let answered = flight.test(s, slots, at.leaves, &mut met);
+                flight.renew(s, slots, at.ended | answered, &mut queue, &mut settle);
                 nodes = slots.whereabouts(s).nodes;
             }
         }
-        settle.finish(s, self.wave);
+        settle.finish(s, flight.wave);
     }
 }
 
-impl<B: BoxMargins> Slot<B> {
+impl Slot {
     /// Takes the next child off the stack that may hold a hit.
     #[inline(always)]
     fn pop(&mut self) -> u32 {
@@ -185,11 +195,11 @@ impl<B: BoxMargins> Slot<B> {
     }
 }
 
-impl<W: Wave, B: BoxMargins> InFlight<'_, W, B> {
+impl<W: Wave, B: BoxMargins> Flight<'_, W, B> {
     /// Puts the next ray that meets a box of the root into a slot, if there is one; those before it that do not are
     /// answered.
     #[inline(always)]
-    fn start<S: Simd>(&mut self, s: S, slots: &mut Slots<B>, number: u32, queue: &mut Queue) {
+    fn start<S: Simd>(&mut self, s: S, slots: &mut Slots, number: u32, queue: &mut Queue) {
         while queue.next < self.wave.rays().len() {
             let i = queue.next;
             let lane = i % LANES;
@@ -219,7 +229,7 @@ impl<W: Wave, B: BoxMargins> InFlight<'_, W, B> {
 
     /// Every ray that is at a node goes on to the next child.
     #[inline(always)]
-    fn step<S: Simd>(&self, s: S, slots: &mut Slots<B>, mut nodes: u32) {
+    fn step<S: Simd>(&self, s: S, slots: &mut Slots, mut nodes: u32) {
         while nodes != 0 {
             let (slot, at) = slots.at(nodes.trailing_zeros());
             nodes &= nodes - 1;
@@ -235,7 +245,7 @@ impl<W: Wave, B: BoxMargins> InFlight<'_, W, B> {
     /// Every ray that is at a leaf tests it and goes on; those that have their answer by that are returned. First all are
     /// tested, then what was hit is looked at: nobody can foretell which, and so no test waits for another's outcome.
     #[inline(always)]
-    fn test<S: Simd>(&self, s: S, slots: &mut Slots<B>, mut leaves: u32, met: &mut [Met; SLOTS]) -> u32 {
+    fn test<S: Simd>(&self, s: S, slots: &mut Slots, mut leaves: u32, met: &mut [Met; SLOTS]) -> u32 {
         let (mut turn, mut open, mut answered) = (leaves, 0, 0);
         while turn != 0 {
             let number = turn.trailing_zeros();
@@ -250,7 +260,8 @@ impl<W: Wave, B: BoxMargins> InFlight<'_, W, B> {
             open &= open - 1;
             let (slot, at) = slots.at(number);
             let (block, _) = Child::block(*at);
-            let done = slot.seeker.take(self.tree, self.shapes, self.wave, block, &met[number as usize % SLOTS]);
+            let done =
+                slot.seeker.take::<B, _>(self.tree, self.shapes, self.wave, block, &met[number as usize % SLOTS]);
             answered |= u32::from(done) << number;
         }
         leaves &= !answered;
@@ -264,7 +275,7 @@ impl<W: Wave, B: BoxMargins> InFlight<'_, W, B> {
 
     /// Answers the rays that have ended, and puts new ones in their places.
     #[inline(always)]
-    fn renew<S: Simd>(&mut self, s: S, slots: &mut Slots<B>, mut ended: u32, queue: &mut Queue, settle: &mut Settle) {
+    fn renew<S: Simd>(&mut self, s: S, slots: &mut Slots, mut ended: u32, queue: &mut Queue, settle: &mut Settle) {
         while ended != 0 {
             let number = ended.trailing_zeros();
             ended &= ended - 1;

@@ -10,49 +10,38 @@ use crate::accel::query::{Culling, Goal, Query};
 use crate::accel::tests::scenes::{lattice, mesh, moved, ray, rays, soup};
 use crate::accel::tests::{far_rays, wrong};
 use crate::accel::wave::Wave;
-use crate::accel::{Probe, Ray, Shapes};
+use crate::accel::{Probe, Ray, RayCounts, Shapes};
 use crate::math::Vec3;
 use crate::math::random::Random;
 
 /// A tree walked by other margins.
-struct Walked<'a, B>(Wide<'a>, PhantomData<fn() -> B>);
+struct Walked<'a, B> {
+    wide: Wide<'a>,
+    /// Each ray by the walk that counts.
+    counted: bool,
+    margins: PhantomData<fn() -> B>,
+}
 
 impl<B: BoxMargins> Culling for Walked<'_, B> {
     type Scratch = Stack;
 
     fn shapes(&self) -> &Shapes {
-        self.0.shapes()
+        self.wide.shapes()
     }
 
     fn new_scratch(&self) -> Stack {
-        self.0.new_scratch()
+        self.wide.new_scratch()
     }
 
     fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, stack: &mut Stack, probe: &mut P) {
-        self.0.walk_within::<B, _, _>(query, stack, probe);
+        self.wide.walk_within::<B, _, _>(query, stack, probe);
     }
 
     fn trace<W: Wave, P: Probe>(&self, wave: &mut W, stack: &mut Stack, probe: &mut P) {
-        self.0.trace_within::<B, _, _>(wave, stack, probe);
-    }
-}
-
-/// The same, each ray by the walk that counts.
-struct Counted<'a, B>(Walked<'a, B>);
-
-impl<B: BoxMargins> Culling for Counted<'_, B> {
-    type Scratch = Stack;
-
-    fn shapes(&self) -> &Shapes {
-        self.0.shapes()
-    }
-
-    fn new_scratch(&self) -> Stack {
-        self.0.new_scratch()
-    }
-
-    fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, stack: &mut Stack, probe: &mut P) {
-        self.0.walk(query, stack, probe);
+        if self.counted {
+            return self.wide.trace_within::<B, _, _>(wave, stack, &mut RayCounts::default());
+        }
+        self.wide.trace_within::<B, _, _>(wave, stack, probe);
     }
 }
 
@@ -84,10 +73,12 @@ impl BoxMargins for AnyCoordinates {
 /// Wrong answers of both trees, in every order of the rays and by the walk that counts.
 fn wrong_with<B: BoxMargins>(shapes: &Shapes, rays: &[Ray]) -> usize {
     let ways = [RayOrder::OneByOne, RayOrder::InFlight, RayOrder::Packets];
-    let walked = |splitting, way| Walked::<B>(Wide::build(shapes, splitting).with_rays(way), PhantomData);
     let of = |splitting| {
-        let counted = wrong(&Counted(walked(splitting, RayOrder::OneByOne)), shapes, rays);
-        counted + ways.map(|way| wrong(&walked(splitting, way), shapes, rays)).iter().sum::<usize>()
+        let of = |way, counted| {
+            let wide = Wide::build(shapes, splitting).with_rays(way);
+            wrong(&Walked::<B> { wide, counted, margins: PhantomData }, shapes, rays)
+        };
+        of(RayOrder::OneByOne, true) + ways.map(|way| of(way, false)).iter().sum::<usize>()
     };
     of(Splitting::Octree) + of(Splitting::SurfaceArea)
 }

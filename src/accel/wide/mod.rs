@@ -42,7 +42,7 @@ use std::marker::PhantomData;
 
 use self::alone::Alone;
 use self::bundle::RAYS;
-use self::flight::{DEPTH, InFlight};
+use self::flight::{DEPTH, Flight, InFlight};
 use self::node::Tree;
 use self::packet::InPackets;
 use self::slabs::{BoxMargins, Derived};
@@ -66,7 +66,7 @@ pub enum RayOrder {
 }
 
 /// Rays from which on it pays to have them in flight.
-const MANY: usize = 64;
+const MANY: usize = 2 * RAYS;
 
 impl RayOrder {
     /// What suits a wave: by how many of the packets that it would make run to one octant, as far as three rays of each
@@ -190,12 +190,13 @@ impl Wide<'_> {
         if !shapes.planes.is_empty() || !tree.runs.is_empty() || tree.nodes.is_empty() {
             return self.run::<B, _>(OneByOne { tree, shapes, wave, stack, probe: &mut NoProbe, margins });
         }
-        let Stack { entries, branches } = stack;
+        let Stack { entries, branches, slots } = stack;
         let rays = if self.rays == RayOrder::Adaptive { RayOrder::of(wave) } else { self.rays };
         match rays {
             RayOrder::Packets => self.run::<B, _>(InPackets { tree, shapes, wave, stack: branches, entries, margins }),
             RayOrder::InFlight if tree.most_behind() < DEPTH => {
-                self.run::<B, _>(InFlight { tree, shapes, wave, entries, margins });
+                let flight = Flight { tree, shapes, wave, entries, margins };
+                self.run::<B, _>(InFlight { flight, slots });
             }
             _ => self.run::<B, _>(Alone { tree, shapes, wave, stack: entries, margins }),
         }

@@ -10,14 +10,15 @@
 use std::marker::PhantomData;
 
 use super::alone::Lone;
+use super::best::{Place, decide};
 use super::bundle::{ALL, Bundle, Numbers, RAYS};
 use super::flight::FARTHEST_FIRST;
 use super::node::{Child, Node, Tree};
 use super::slabs::BoxMargins;
 use super::walk::Entry;
-use crate::accel::query::{Goal, Query};
+use crate::accel::query::Goal;
 use crate::accel::wave::Wave;
-use crate::accel::{Hit, NO_PRIM, NoProbe, Ray, Shapes};
+use crate::accel::{Hit, NO_PRIM, Ray, Shapes};
 use crate::math::meetings::Plane;
 use crate::math::shear::RaySpace;
 use crate::math::sight::RowSight;
@@ -85,23 +86,6 @@ struct Reach<S: Simd> {
 /// A number of each ray, in lanes.
 type Wide<S> = <<S as Simd>::Wide as Lanewise<RAYS>>::Lanes;
 
-/// A triangle in a block.
-#[derive(Clone, Copy, Debug)]
-struct Place {
-    index: u32,
-    lane: usize,
-    prim: u32,
-}
-
-impl Place {
-    /// Block and lane; there are fewer than 2²⁷ blocks.
-    #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, reason = "a lane is below 8")]
-    fn packed(self) -> u32 {
-        self.index * LANES as u32 + self.lane as u32
-    }
-}
-
 impl<W: Wave, B: BoxMargins> Kernel for InPackets<'_, W, B> {
     type Output = ();
 
@@ -154,7 +138,7 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
             ([side(0, false), side(1, false), side(2, false)], [side(0, true), side(1, true), side(2, true)]);
         let wide = s.wide();
         let high = wide.load(&self.t_max);
-        let limit = Bundle::<B>::widened(wide, high);
+        let limit = B::widened_lanes(wide, high);
         self.active = self.rays.meet(wide, first, last, limit);
         if self.active == 0 {
             return (self.start..self.start + RAYS).for_each(|i| self.wave.take(i, Hit::MISS));
@@ -186,7 +170,7 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
                         break;
                     }
                 } else {
-                    reach.limit = Bundle::<B>::widened(wide, reach.high);
+                    reach.limit = B::widened_lanes(wide, reach.high);
                 }
                 reach.farthest = wide.greatest(reach.limit);
             }
@@ -241,12 +225,12 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
         let mut lanes = met & ((1 << count) - 1);
         let mut changed = 0;
         while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize % LANES;
+            let lane = lanes.trailing_zeros();
             lanes &= lanes - 1;
-            let corners = corners_of(&block.corners, lane);
+            let corners = corners_of(&block.corners, lane as usize);
             let look = sight.look(s.wide(), &corners);
             if (look.verdicts.hit | look.verdicts.unsure) & rays != 0 {
-                let place = Place { index, lane, prim: block.prims[lane] };
+                let place = Place { block: index, lane, prim: block.prims[lane as usize % LANES] };
                 let between = sight.distances(s.wide(), &look);
                 let hit = self.take(s, place, rays, look.verdicts, between, reach);
                 changed |= hit;
@@ -290,51 +274,18 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
             while open != 0 {
                 let ray = open.trailing_zeros() as usize % RAYS;
                 open &= open - 1;
-                if let Some(t) = self.decide(ray, place, hit >> ray & 1 == 1) {
+                let (i, best, certain) = (self.start + ray, self.found.prim[ray], hit >> ray & 1 == 1);
+                if let Some((t, prim)) = decide(self.shapes, self.wave, i, best, place.prim, certain) {
                     (low[ray], high[ray]) = (t, t);
+                    if prim == place.prim {
+                        (self.found.prim[ray], self.found.place[ray]) = (prim, place.packed());
+                    }
                     changed |= 1 << ray;
                 }
             }
             (reach.low, reach.high) = (s.load(&low), s.load(&high));
         }
         changed
-    }
-
-    /// The best hit of one ray and another by the exact test; its distance, if there is one now.
-    #[cold]
-    #[inline(never)]
-    fn decide(&mut self, ray: usize, place: Place, certain: bool) -> Option<f32> {
-        let i = self.start + ray;
-        let (mut query, usable) = Query::new(self.shapes, &self.wave.rays()[i], self.wave.t_min(i), self.wave.goal(i));
-        let corners = self.shapes.triangle(place.prim);
-        if !usable || !certain && !triangle::is_hit(&query.ray, &corners) {
-            return None;
-        }
-        let best = self.found.prim[ray];
-        if best != NO_PRIM {
-            query.take(best, &self.shapes.triangle(best), true, &mut NoProbe);
-        }
-        query.take(place.prim, &corners, true, &mut NoProbe);
-        if W::Goal::ANY {
-            let found = query.reach() < query.t_min;
-            self.found.prim[ray] = if found { place.prim } else { NO_PRIM };
-            return found.then_some(f32::NEG_INFINITY);
-        }
-        let (t, prim) = query.goal.best()?;
-        if prim == place.prim {
-            (self.found.prim[ray], self.found.place[ray]) = (prim, place.packed());
-        }
-        Some(t)
-    }
-
-    /// Distance and weights of one ray's hit by the scalar form.
-    #[cold]
-    #[inline(never)]
-    fn exactly(&self, ray: usize) -> (f32, f32, f32) {
-        let (prim, Ray { origin, dir, .. }) = (self.found.prim[ray], self.wave.rays()[self.start + ray]);
-        let (space, corners) = (RaySpace::checked(origin, dir).0, self.shapes.triangle(prim));
-        let (u, v) = triangle::barycentrics(&space, &corners);
-        (triangle::distance(&space, &corners), u, v)
     }
 
     /// Gives the answers; distances and weights of hits with the same triangle are found together.
@@ -354,8 +305,8 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
             let ray = left.trailing_zeros() as usize % RAYS;
             let place = found.place[ray];
             let mine = wide.find_word(place, &found.place) & left;
-            let block = &self.tree.blocks[place as usize / LANES];
-            let plane = Plane::of(&corners_of(&block.corners, place as usize % LANES));
+            let corners = Place::corners(self.tree, place);
+            let plane = Plane::of(&corners);
             let met = plane.meet(wide, &self.rays.origin, &self.rays.dir, &self.rays.bounds);
             let weights = plane.barycentrics(wide, &self.rays.origin, &self.rays.dir, met.t_f64);
             let sure = mine & met.sure;
@@ -364,7 +315,8 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
             v = wide.choose(sure, weights[1], v);
             left &= !sure;
             if sure >> ray & 1 == 0 {
-                let (one, exact) = (1 << ray, self.exactly(ray));
+                let Ray { origin, dir, .. } = self.wave.rays()[start + ray];
+                let (one, exact) = (1 << ray, triangle::place(&RaySpace::checked(origin, dir).0, &corners));
                 t = wide.choose(one, wide.splat(exact.0), t);
                 u = wide.choose(one, wide.splat(exact.1), u);
                 v = wide.choose(one, wide.splat(exact.2), v);

@@ -3,10 +3,12 @@
 //! The distance to a plane is plane · (1/d) − o/d, which errs by parts of the coordinates' sizes instead of parts of
 //! itself: that is what [`BOX_PAD`](crate::math::bounds::BOX_PAD) is for. A ray meets the padded box of whatever it hits, up
 //! to the error of the hit's own distance, which `limit` allows for. Rays with numbers too large or too small for that
-//! ([`BOX_RANGE`](crate::math::bounds::BOX_RANGE)) go by `slabs`.
+//! ([`BOX_RANGE`]) go by `slabs`.
 
 use super::node::Node;
-use crate::math::simd::{LANES, Pick, Simd};
+use super::slabs::BoxMargins;
+use crate::math::bounds::{BOX_RANGE, PARALLEL};
+use crate::math::simd::{LANES, Lanewise, Pick, Simd};
 
 /// A ray ready to be tested against padded boxes.
 #[derive(Clone, Copy, Debug, Default)]
@@ -20,6 +22,45 @@ pub(super) struct PaddedSlabs {
     pub last: [f32; 3],
     /// The octant that the ray runs to: bit k is set where it runs backwards along axis k.
     pub octant: u32,
+}
+
+/// The padded slabs of rays in lanes, by axis.
+pub(super) struct Padding<L> {
+    pub inverse: [L; 3],
+    pub first: [L; 3],
+    pub last: [L; 3],
+    /// The rays for which the bounds hold.
+    pub allowed: u32,
+}
+
+impl<L: Copy> Padding<L> {
+    /// Of rays with these origins and directions, for boxes whose largest coordinate is `extent`.
+    #[inline(always)]
+    pub(super) fn of<B: BoxMargins, S: Lanewise<N, Lanes = L>, const N: usize>(
+        s: S,
+        extent: f32,
+        o: [L; 3],
+        d: [L; 3],
+    ) -> Self {
+        let (extent, zero) = (s.splat(extent), s.splat(0.0));
+        let (far, size) = ([s.abs(o[0]), s.abs(o[1]), s.abs(o[2])], [s.abs(d[0]), s.abs(d[1]), s.abs(d[2])]);
+        // Sums keep a NaN.
+        let whole = s.add(extent, s.add(s.add(far[0], far[1]), far[2]));
+        let length = s.add(s.add(size[0], size[1]), size[2]);
+        let (least, most) = (s.splat(1.0 / BOX_RANGE), s.splat(BOX_RANGE));
+        let allowed =
+            s.at_most(least, whole) & s.at_most(whole, most) & s.at_most(least, length) & s.at_most(length, most);
+        let parallel = s.mul(s.greater(size[0], s.greater(size[1], size[2])), s.splat(PARALLEL));
+        let drift = s.mul(whole, s.splat(PARALLEL));
+        let (mut inverse, mut first, mut last) = ([zero; 3], [zero; 3], [zero; 3]);
+        for k in 0..3 {
+            inverse[k] = s.div(s.splat(1.0), s.with_sign(s.greater(size[k], parallel), d[k]));
+            let pad = s.mul(s.add(s.mul(s.add(extent, far[k]), s.splat(B::PAD)), drift), s.abs(inverse[k]));
+            let middle = s.mul(s.sub(zero, o[k]), inverse[k]);
+            (first[k], last[k]) = (s.sub(middle, pad), s.add(middle, pad));
+        }
+        Self { inverse, first, last, allowed }
+    }
 }
 
 /// Rows of the planes that come first, by octant.

@@ -1,11 +1,10 @@
 //! Eight rays of a wave made ready together, for kernels that then trace each by itself.
 
 use super::node::Tree;
-use super::padded::PaddedSlabs;
+use super::padded::{PaddedSlabs, Padding};
 use super::slabs::BoxMargins;
 use crate::accel::Ray;
 use crate::accel::wave::Wave;
-use crate::math::bounds::{BOX_RANGE, PARALLEL};
 use crate::math::sight::Sight;
 use crate::math::simd::{LANES, Simd};
 
@@ -37,39 +36,17 @@ impl Ready {
     pub(super) fn take<B: BoxMargins, S: Simd, W: Wave>(&mut self, s: S, tree: &Tree, wave: &W, start: usize) {
         let rays = &wave.rays()[start..];
         let Columns { origin: o, dir: d, t_min, t_max } = Columns::of(s, rays);
-        let zero = s.splat(0.0);
-
         let mut least = s.store(t_min);
         wave.adapt_t_min(start, &mut least[..rays.len().min(LANES)]);
         let t_min = s.load(&least);
         // A distance that overflows is no hit; a NaN stays.
         let t_max = s.smaller(s.splat(f32::MAX), t_max);
-        let (range, underflow) = (s.splat(B::RANGE), s.splat(B::UNDERFLOW));
-        let from = s.sub(s.sub(t_min, s.mul(s.abs(t_min), range)), underflow);
-        let limit = s.add(s.add(t_max, s.mul(s.abs(t_max), range)), underflow);
+        let (from, limit) = (B::started_lanes(s, t_min), B::widened_lanes(s, t_max));
 
-        let (far, size) = ([s.abs(o[0]), s.abs(o[1]), s.abs(o[2])], [s.abs(d[0]), s.abs(d[1]), s.abs(d[2])]);
-        let extent = s.splat(tree.extent);
-        // Sums keep a NaN.
-        let whole = s.add(extent, s.add(s.add(far[0], far[1]), far[2]));
-        let length = s.add(s.add(size[0], size[1]), size[2]);
-        let (least, most) = (s.splat(1.0 / BOX_RANGE), s.splat(BOX_RANGE));
-        self.allowed = s.at_most(t_min, t_max)
-            & s.at_most(least, whole)
-            & s.at_most(whole, most)
-            & s.at_most(least, length)
-            & s.at_most(length, most);
+        let Padding { inverse, first, last, allowed } = Padding::of::<B, _, LANES>(s, tree.extent, o, d);
+        self.allowed = allowed & s.at_most(t_min, t_max);
 
-        let parallel = s.mul(s.greater(size[0], s.greater(size[1], size[2])), s.splat(PARALLEL));
-        let drift = s.mul(whole, s.splat(PARALLEL));
-        let (mut inverse, mut first, mut last) = ([zero; 3], [zero; 3], [zero; 3]);
-        for k in 0..3 {
-            inverse[k] = s.div(s.splat(1.0), s.with_sign(s.greater(size[k], parallel), d[k]));
-            let pad = s.mul(s.add(s.mul(s.add(extent, far[k]), s.splat(B::PAD)), drift), s.abs(inverse[k]));
-            let middle = s.mul(s.sub(zero, o[k]), inverse[k]);
-            (first[k], last[k]) = (s.sub(middle, pad), s.add(middle, pad));
-        }
-
+        let size = [s.abs(d[0]), s.abs(d[1]), s.abs(d[2])];
         // Of equal components the first is the main one.
         let x = s.at_most(size[1], size[0]) & s.at_most(size[2], size[0]);
         let main = [x, !x & s.at_most(size[2], size[1])];
@@ -84,7 +61,7 @@ impl Ready {
         let first = s.rows([first[0], first[1], first[2], limit]);
         let last = s.rows([last[0], last[1], last[2], t_min]);
         let sight = s.rows([sheared[0], sheared[1], sheared[2], per_length]);
-        let shear = s.rows([shear[0], shear[1], t_max, zero]);
+        let shear = s.rows([shear[0], shear[1], t_max, t_max]);
         for (lane, ray) in self.rays.iter_mut().enumerate() {
             let bit = |mask: u32| mask >> lane & 1;
             let [ix, iy, iz, from] = inverse[lane];
@@ -110,17 +87,17 @@ impl Ready {
 }
 
 /// Rays in lanes, by axis.
-struct Columns<S: Simd> {
-    origin: [S::Lanes; 3],
-    dir: [S::Lanes; 3],
-    t_min: S::Lanes,
-    t_max: S::Lanes,
+pub(super) struct Columns<S: Simd> {
+    pub origin: [S::Lanes; 3],
+    pub dir: [S::Lanes; 3],
+    pub t_min: S::Lanes,
+    pub t_max: S::Lanes,
 }
 
 impl<S: Simd> Columns<S> {
     /// The first eight rays, the last repeated where there are fewer.
     #[inline(always)]
-    fn of(s: S, rays: &[Ray]) -> Self {
+    pub(super) fn of(s: S, rays: &[Ray]) -> Self {
         let (mut from, mut to) = ([[0.0; 4]; LANES], [[0.0; 4]; LANES]);
         let last = rays.len() - 1;
         for lane in 0..LANES {
@@ -150,7 +127,7 @@ mod tests {
     use crate::accel::wave::{ForFirst, ForNext};
     use crate::math::Vec3;
     use crate::math::aabb::Aabb;
-    use crate::math::bounds::{BOX_PAD, BOX_RANGE};
+    use crate::math::bounds::{BOX_PAD, BOX_RANGE, PARALLEL};
     use crate::math::random::Random;
     use crate::math::shear::RaySpace;
     use crate::math::simd::{Kernel, Level};

@@ -76,13 +76,7 @@ impl Settle {
     #[inline(never)]
     fn exactly<W: Wave>(&self, wave: &W, lane: usize) -> Hit {
         let (ray, corners) = (&wave.rays()[self.rays[lane]], corners_of(&self.pairs.corners, lane));
-        let space = RaySpace::checked(ray.origin, ray.dir).0;
-        let meeting = triangle::meet(&space, &corners);
-        let (u, v) = if meeting.t_f64.is_nan() {
-            triangle::barycentrics(&space, &corners)
-        } else {
-            triangle::barycentrics_at(&space, &corners, meeting.t_f64, meeting.normal)
-        };
-        Hit { t: meeting.t, u, v, prim: self.prims[lane] }
+        let (t, u, v) = triangle::place(&RaySpace::checked(ray.origin, ray.dir).0, &corners);
+        Hit { t, u, v, prim: self.prims[lane] }
     }
 }

@@ -11,7 +11,7 @@ use std::marker::PhantomData;
 use super::node::{Node, Tree};
 use crate::math::Vec3;
 use crate::math::bounds::{BOX_COORDINATES, BOX_MARGIN, BOX_PAD, BOX_UNDERFLOW, SLAB_F32};
-use crate::math::simd::{Pick, Simd};
+use crate::math::simd::{Lanewise, Pick, Simd};
 
 /// What a walk allows for.
 pub(in crate::accel) trait BoxMargins {
@@ -45,6 +45,18 @@ pub(in crate::accel) trait BoxMargins {
     #[inline(always)]
     fn started(t_min: f32) -> f32 {
         t_min - t_min.abs() * Self::RANGE - Self::UNDERFLOW
+    }
+
+    /// [`Self::widened`] in lanes.
+    #[inline(always)]
+    fn widened_lanes<S: Lanewise<N>, const N: usize>(s: S, reach: S::Lanes) -> S::Lanes {
+        s.add(s.add(reach, s.mul(s.abs(reach), s.splat(Self::RANGE))), s.splat(Self::UNDERFLOW))
+    }
+
+    /// [`Self::started`] in lanes.
+    #[inline(always)]
+    fn started_lanes<S: Lanewise<N>, const N: usize>(s: S, t_min: S::Lanes) -> S::Lanes {
+        s.sub(s.sub(t_min, s.mul(s.abs(t_min), s.splat(Self::RANGE))), s.splat(Self::UNDERFLOW))
     }
 }
 

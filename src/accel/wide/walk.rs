@@ -2,6 +2,7 @@
 
 use std::marker::PhantomData;
 
+use super::flight::Slots;
 use super::node::{Child, Node, Tree};
 use super::packet::Branch;
 use super::slabs::{BoxMargins, Slabs};
@@ -26,13 +27,15 @@ pub struct Stack {
     pub(super) entries: Vec<Entry>,
     /// Of a packet.
     pub(super) branches: Vec<Branch>,
+    /// Of many rays.
+    pub(super) slots: Slots,
 }
 
 impl Stack {
     /// For walks down `tree`.
     pub(super) fn new(tree: &Tree) -> Self {
         let most = tree.most_behind();
-        Self { entries: vec![Entry::default(); most], branches: vec![Branch::default(); most] }
+        Self { entries: vec![Entry::default(); most], branches: vec![Branch::default(); most], slots: Slots::default() }
     }
 }
 
@@ -204,7 +207,7 @@ fn descend<B: BoxMargins, S: Simd, G: Goal, P: Probe>(
 
 /// The next child that may hold a hit up to `limit`.
 #[inline(always)]
-fn pop(stack: &[Entry], top: &mut usize, limit: f32) -> Option<u32> {
+pub(super) fn pop(stack: &[Entry], top: &mut usize, limit: f32) -> Option<u32> {
     while *top > 0 {
         *top -= 1;
         let entry = stack[*top];
@@ -251,7 +254,14 @@ fn test_all<G: Goal, P: Probe>(query: &mut Query<G>, probe: &mut P) {
 
 /// Puts the children that are met, one at least, on the stack, but for the nearest, which is returned.
 #[inline(always)]
-fn nearest<S: Simd>(s: S, node: &Node, near: S::Lanes, mut met: u32, stack: &mut [Entry], top: &mut usize) -> u32 {
+pub(super) fn nearest<S: Simd>(
+    s: S,
+    node: &Node,
+    near: S::Lanes,
+    mut met: u32,
+    stack: &mut [Entry],
+    top: &mut usize,
+) -> u32 {
     let lane = met.trailing_zeros() as usize % LANES;
     met &= met - 1;
     if met == 0 {
