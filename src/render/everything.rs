@@ -15,9 +15,8 @@ use crate::scene::{Bitmap, Material, Pixels, Surface as Reflection, TextureRef, 
 use std::hint::black_box;
 use std::sync::LazyLock;
 
-/// A material that has the maps others lack.
-static MAPPED: LazyLock<Material> =
-    LazyLock::new(|| Material { normal_map: Some(stand_in()), bump_map: Some(stand_in()), ..Material::default() });
+/// A material that has the bump map others lack.
+static BUMPED: LazyLock<Material> = LazyLock::new(|| Material { bump_map: Some(stand_in()), ..Material::default() });
 
 /// A map that is grey everywhere, as large as maps of small files are.
 pub(super) static GREY: LazyLock<Bitmap> = LazyLock::new(|| Bitmap {
@@ -54,9 +53,9 @@ pub(super) fn look_up_in_vain(surface: &Surface, store: &TextureStore) {
         black_box(patch.texel(&stand_in(), ColorSpace::Srgb, store, footprint));
     }
     if m.normal_map.is_none() {
-        black_box(patch.normal_mapped(surface.geometric, &MAPPED, store, footprint));
+        black_box(patch.normal_mapped(surface.geometric, &stand_in(), 1.0, store, footprint));
     }
     if m.bump_map.is_none() {
-        black_box(patch.bumped(surface.geometric, &MAPPED, store, footprint));
+        black_box(patch.bumped(surface.geometric, &BUMPED, store, footprint));
     }
 }

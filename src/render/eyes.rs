@@ -78,7 +78,16 @@ fn ray(origin: Vec3, dir: Vec3, sample: u32) -> Ray {
 }
 
 fn path(cone_width: f32, cone_spread: f32) -> Path {
-    Path { weight: Vec3::ONE, depth: 0, straight: true, band: None, media: Media::default(), cone_width, cone_spread }
+    Path {
+        weight: Vec3::ONE,
+        depth: 0,
+        straight: true,
+        band: None,
+        media: Media::default(),
+        since: 0.0,
+        cone_width,
+        cone_spread,
+    }
 }
 
 impl Ball {

@@ -52,6 +52,13 @@ pub fn fresnel_schlick(f0: Vec3, f90: f32, cosine: f32) -> Vec3 {
     f0 + (Vec3::splat(f90) - f0) * (m2 * m2 * m)
 }
 
+/// The share of light that is left after `length` of what absorbs it with this coefficient, 1 / unit of length: Beer's law.
+#[inline(always)]
+pub fn transmittance(absorption: Vec3, length: f32) -> Vec3 {
+    let left = |coefficient: f32| libm::expf(-coefficient * length.max(0.0));
+    Vec3::new(left(absorption.x), left(absorption.y), left(absorption.z))
+}
+
 /// The smallest angle of incidence, radians, that reflects totally; `None` when the second medium is not the thinner.
 pub fn critical_angle(n_i: f64, n_t: f64) -> Option<f64> {
     (n_t < n_i).then(|| libm::asin(n_t / n_i))

@@ -247,19 +247,18 @@ impl Patch<'_> {
         Some((tangent, sign))
     }
 
-    /// The normal as the material's normal map turns it.
+    /// The normal as a normal map turns it, whose x and y are scaled.
     #[inline]
     pub(crate) fn normal_mapped(
         &self,
         normal: Vec3,
-        material: &Material,
+        map: &TextureRef,
+        scale: f32,
         store: &TextureStore,
         print: &Footprint,
     ) -> Option<Vec3> {
-        let map = material.normal_map.as_ref()?;
         let texel = self.texel(map, ColorSpace::Linear, store, print).truncate() * 2.0 - 1.0;
         let (tangent, bitangent) = self.tangents(normal, map, print)?;
-        let scale = material.normal_scale;
         (tangent * (texel.x * scale) + bitangent * (texel.y * scale) + normal * texel.z).try_normalize()
     }
 
@@ -322,7 +321,8 @@ pub(crate) struct Surface<'a> {
     pub error: Vec3,
     /// Unit normal of the shape itself, turned to the side the ray comes from.
     pub geometric: Vec3,
-    /// Unit normal for shading, never turned away from the ray.
+    /// Unit normal for shading before maps turn it, and after; never turned away from the ray.
+    smooth: Vec3,
     pub normal: Vec3,
     /// Unit vector back along the ray.
     pub view: Vec3,
@@ -345,7 +345,19 @@ impl<'a> Surface<'a> {
         let geometric = if front { outward } else { -outward };
         let footprint = Footprint::new(-view, geometric, width);
         let (position, start, error) = (refined.position, refined.start, refined.error);
-        Self { target, patch, footprint, position, start, error, geometric, normal: geometric, view, front }
+        Self {
+            target,
+            patch,
+            footprint,
+            position,
+            start,
+            error,
+            geometric,
+            smooth: geometric,
+            normal: geometric,
+            view,
+            front,
+        }
     }
 
     /// Finds the shading normal: interpolated, turned by normal and bump map, and to the side of the ray.
@@ -357,9 +369,17 @@ impl<'a> Surface<'a> {
         let material = self.target.material;
         let own = patch.normal().unwrap_or(if self.front { self.geometric } else { -self.geometric });
         let side = if own.dot(self.geometric) < 0.0 { -1.0 } else { 1.0 };
-        let mapped = patch.normal_mapped(own, material, store, &self.footprint).unwrap_or(own);
+        self.smooth = facing(own * side, self.view);
+        let turned = |map| patch.normal_mapped(own, map, material.normal_scale, store, &self.footprint);
+        let mapped = material.normal_map.as_ref().and_then(turned).unwrap_or(own);
         let bumped = patch.bumped(mapped, material, store, &self.footprint).unwrap_or(mapped);
         self.normal = facing(bumped * side, self.view);
+    }
+
+    /// The normal of lacquer with this normal map and its scale, to the side of the ray.
+    pub(crate) fn coat_normal(&self, map: Option<&TextureRef>, scale: f32, store: &TextureStore) -> Vec3 {
+        let turned = |patch: &Patch| patch.normal_mapped(self.smooth, map?, scale, store, &self.footprint);
+        self.patch.as_ref().and_then(turned).map_or(self.smooth, |normal| facing(normal, self.view))
     }
 
     /// How it is seen.

@@ -35,6 +35,8 @@ pub(crate) struct Path {
     pub band: Option<u8>,
     /// What the ray is inside of.
     pub media: Media,
+    /// Up to this t of the ray its weight has been lessened by what absorbs light there.
+    pub since: f32,
     /// Width of the cone around the ray at its start: the part of the picture it stands for.
     pub cone_width: f32,
     /// Growth of that width for each unit of length.
@@ -77,8 +79,13 @@ impl Media {
     /// Index of empty space.
     const OUTSIDE: f32 = 1.0;
 
+    /// The substance that counts; `None` in empty space.
+    pub(crate) fn innermost(&self) -> Option<Medium> {
+        self.items[..self.len as usize].last().copied()
+    }
+
     fn ior(&self) -> f32 {
-        self.items[..self.len as usize].last().map_or(Self::OUTSIDE, |m| m.ior)
+        self.innermost().map_or(Self::OUTSIDE, |m| m.ior)
     }
 
     fn enter(&mut self, medium: Medium) {
@@ -222,6 +229,7 @@ mod tests {
             straight: true,
             band: None,
             media: Media::default(),
+            since: 0.0,
             cone_width: 0.0,
             cone_spread: 0.0,
         };

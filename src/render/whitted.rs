@@ -14,7 +14,7 @@ use super::everything::look_up_in_vain;
 use super::eyes::Eyes;
 use super::layers::Facts;
 use super::observer::Observer;
-use super::optics::{dispersed_index, reflect, refract};
+use super::optics::{dispersed_index, reflect, refract, transmittance};
 use super::seam::is_same_crossing;
 use super::shade::{Matter, Reader, above, lets_light_in, terminator};
 use super::shadow::Shadows;
@@ -212,7 +212,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             for shone in strip.shone() {
                 let ray = &eyes.rays[shone.index as usize];
                 if light.shadows {
-                    self.shadows.push(shone.ray(ray.sample, eyes.hits[shone.index as usize].prim), shone.radiance);
+                    let shadow = shone.ray(ray.sample, eyes.hits[shone.index as usize].prim);
+                    self.shadows.push(shadow, shone.radiance, Vec3::ZERO);
                 } else {
                     self.add(ray.sample, shone.radiance);
                 }
@@ -268,6 +269,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     /// Adds what the surface at `hit` shows by itself, and queues the rays that find the rest.
     fn shade(&mut self, class: RayClass, ray: &Ray, path: &Path, hit: &Hit) {
         let context = self.context;
+        let path = &absorbed(context, ray, path, hit);
         let target = Target::new(context.scene, context.world, hit.prim);
         let material = target.material;
         let width = path.cone_width + path.cone_spread * hit.t;
@@ -340,6 +342,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     /// Direct light: lights without shadows at once, the others when their shadow rays have come through.
     fn light(&mut self, point: &Point, crossing: &Crossing) {
         let surface = point.surface;
+        let inside = self.context.absorption_in(&point.path.media).unwrap_or_default();
         for light in &self.context.lights {
             let Some(incident) = light.incident(surface.position) else { continue };
             let to_light = incident.to_light;
@@ -358,7 +361,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
                 continue;
             }
             let (dir, end) = incident.way(surface.origin(to_light));
-            self.shadows.push(surface.ray(dir, end, point.ray.sample), radiance);
+            self.shadows.push(surface.ray(dir, end, point.ray.sample), radiance, inside);
         }
         if self.shadows.len() >= SHADOW_LIMIT {
             self.trace_shadows();
@@ -368,7 +371,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     /// Queues the secondary rays of a point that have enough weight.
     fn reflect_and_refract(&mut self, point: &Point, crossing: &Crossing) {
         let balance = point.balance(crossing);
-        self.send_reflected(point, point.path.weight * balance.reflected, point.path.band);
+        self.reflect(point, balance.reflected);
 
         let (_, dispersion) = point.matter.refraction();
         let weight = point.path.weight * balance.refracted;
@@ -383,12 +386,27 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
     }
 
-    fn send_reflected(&mut self, point: &Point, weight: Vec3, band: Option<u8>) {
+    /// Queues what is mirrored by the surface and by lacquer over it: one ray where both have the same normal.
+    fn reflect(&mut self, point: &Point, reflected: Vec3) {
+        let (weight, normal, band) = (point.path.weight, point.surface.normal, point.path.band);
+        match point.matter.lacquer() {
+            Some((lacquer, share)) if lacquer == normal => {
+                self.send_reflected(point, normal, weight * (reflected + share), band);
+            }
+            Some((lacquer, share)) => {
+                self.send_reflected(point, normal, weight * reflected, band);
+                self.send_reflected(point, lacquer, weight * share, band);
+            }
+            None => self.send_reflected(point, normal, weight * reflected, band),
+        }
+    }
+
+    fn send_reflected(&mut self, point: &Point, normal: Vec3, weight: Vec3, band: Option<u8>) {
         if !self.context.is_alive(weight) {
             return;
         }
         let surface = point.surface;
-        let dir = above(reflect(-surface.view, surface.normal), surface.geometric);
+        let dir = above(reflect(-surface.view, normal), surface.geometric);
         let path = Path { band, ..point.bounced(weight) };
         let ray = surface.ray(dir, f32::INFINITY, point.ray.sample);
         self.starting[RayClass::Reflected as usize].push(ray, path, Hit::MISS);
@@ -407,7 +425,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let (n_i, n_t) = (f64::from(crossing.n_i), f64::from(crossing.n_t));
         let Some(bent) = refract(-surface.view, surface.normal, n_i, n_t) else {
             // Total reflection by a hair that the balance did not see.
-            return self.send_reflected(point, weight, band);
+            return self.send_reflected(point, surface.normal, weight, band);
         };
         let dir = above(bent, -surface.geometric);
         let path = Path { band, media: crossing.beyond, ..point.bounced(weight) };
@@ -449,6 +467,14 @@ impl Point<'_> {
 
     /// What a ray that starts here carries.
     fn bounced(&self, weight: Vec3) -> Path {
-        Path { weight, depth: self.path.depth + 1, straight: false, cone_width: self.width, ..self.path }
+        let depth = self.path.depth + 1;
+        Path { weight, depth, straight: false, since: 0.0, cone_width: self.width, ..self.path }
     }
+}
+
+/// A path after what its ray is inside of has absorbed its part of the light up to `hit`.
+fn absorbed(context: &Context, ray: &Ray, path: &Path, hit: &Hit) -> Path {
+    let Some(absorption) = context.absorption_in(&path.media) else { return Path { since: hit.t, ..*path } };
+    let left = transmittance(absorption, (hit.t - path.since) * ray.dir.length());
+    Path { weight: path.weight * left, since: hit.t, ..*path }
 }

@@ -4,6 +4,7 @@
 //! the work of absent features; `inspect` lists both halves.
 
 use super::{AlphaMode, LightKind, Material, Mesh, Phong, Scene, Surface};
+use crate::math::Vec3;
 use std::collections::BTreeSet;
 use std::fmt;
 
@@ -52,6 +53,10 @@ pub enum Feature {
     ThinTransmission,
     /// Transmitted rays that bend.
     Refraction,
+    /// Volumes that absorb light.
+    Absorption,
+    /// Lacquer over a surface.
+    Coat,
     /// An index of refraction that depends on the wavelength.
     Dispersion,
     /// Point lights.
@@ -75,7 +80,7 @@ pub const SMOOTH: f32 = 0.2;
 
 impl Feature {
     /// All of them, in the order they are listed.
-    pub const ALL: [Self; 26] = [
+    pub const ALL: [Self; 28] = [
         Self::Triangles,
         Self::Polygons,
         Self::Spheres,
@@ -97,6 +102,8 @@ impl Feature {
         Self::Mirrors,
         Self::ThinTransmission,
         Self::Refraction,
+        Self::Absorption,
+        Self::Coat,
         Self::Dispersion,
         Self::PointLights,
         Self::DirectionalLights,
@@ -128,6 +135,8 @@ impl Feature {
             Self::Mirrors => "mirrors",
             Self::ThinTransmission => "thin transmission",
             Self::Refraction => "refraction",
+            Self::Absorption => "absorption",
+            Self::Coat => "clearcoat",
             Self::Dispersion => "dispersion",
             Self::PointLights => "point lights",
             Self::DirectionalLights => "directional lights",
@@ -198,8 +207,7 @@ impl Features {
     }
 
     fn add_material(&mut self, m: &Material) {
-        let maps = [&m.base_color_map, &m.opacity_map, &m.emission_map, &m.normal_map, &m.bump_map, &m.occlusion_map];
-        self.add_if(maps.iter().any(|map| map.is_some()), Feature::Textures);
+        self.add_if(m.textures().next().is_some(), Feature::Textures);
         self.add_if(m.normal_map.is_some(), Feature::NormalMaps);
         self.add_if(m.bump_map.is_some(), Feature::BumpMaps);
         self.add_if(m.occlusion_map.is_some(), Feature::OcclusionMaps);
@@ -210,14 +218,18 @@ impl Features {
             Surface::Unlit => self.add_if(true, Feature::Unlit),
             Surface::Phong(phong) => self.add_phong(phong),
             Surface::MetalRough(pbr) => {
-                let maps = [&pbr.metal_rough_map, &pbr.specular_map, &pbr.specular_color_map, &pbr.transmission_map];
                 self.add_if(true, Feature::MetalRough);
-                self.add_if(maps.iter().any(|map| map.is_some()), Feature::Textures);
+                if let Some(coat) = &pbr.coat {
+                    self.add_if(true, Feature::Coat);
+                    self.add_if(coat.roughness < SMOOTH || coat.roughness_map.is_some(), Feature::Mirrors);
+                    self.add_if(coat.normal_map.is_some(), Feature::NormalMaps);
+                }
                 // A map can only lower the factor, so a rough factor may still hide smooth spots.
                 self.add_if(pbr.roughness < SMOOTH || pbr.metal_rough_map.is_some(), Feature::Mirrors);
                 if pbr.transmission > 0.0 {
                     self.add_if(true, if pbr.thick { Feature::Refraction } else { Feature::ThinTransmission });
                     self.add_if(pbr.thick && pbr.dispersion > 0.0, Feature::Dispersion);
+                    self.add_if(pbr.thick && pbr.absorption != Vec3::ZERO, Feature::Absorption);
                 }
             }
         }
@@ -276,7 +288,7 @@ fn used_materials(scene: &Scene) -> BTreeSet<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{DVec3, Vec3};
+    use crate::math::DVec3;
     use crate::scene::{Light, MetalRough, Sphere};
 
     fn ball(surface: Surface) -> Scene {

@@ -1,5 +1,6 @@
 //! How a surface answers to light. Factors are linear; maps multiply them.
 
+use super::Coat;
 use crate::math::{Vec2, Vec3};
 
 /// A material. `base_color`, alpha, emission and the normal are common to every [`Surface`] model.
@@ -76,8 +77,18 @@ pub struct MetalRough {
     /// Whether light bends and travels inside (a closed volume); without KHR_materials_volume glTF glass is thin: rays
     /// pass straight on.
     pub thick: bool,
+    /// KHR_materials_volume: how strongly the inside of a thick material absorbs light, 1 / unit of length; 0: clear. A
+    /// length d of it lets exp(−`absorption` d) of the light through (A. Beer, 1852).
+    pub absorption: Vec3,
+    /// KHR_materials_volume: how thick it is where that is not traced: where surroundings seen through rough glass are
+    /// looked up.
+    pub thickness: f32,
+    /// Linear map, green channel × `thickness`.
+    pub thickness_map: Option<TextureRef>,
     /// How strongly `ior` depends on the wavelength: 20 / Abbe number, as KHR_materials_dispersion; 0: not at all.
     pub dispersion: f32,
+    /// Lacquer over it.
+    pub coat: Option<Box<Coat>>,
 }
 
 /// Parameters of the Phong model: `I = Ia Ka + Σ I (Kd N·L + Ks cosⁿα) + mirror + transmission`.
@@ -167,8 +178,50 @@ impl Default for MetalRough {
             transmission: 0.0,
             transmission_map: None,
             thick: false,
+            absorption: Vec3::ZERO,
+            thickness: 0.0,
+            thickness_map: None,
             dispersion: 0.0,
+            coat: None,
         }
+    }
+}
+
+impl MetalRough {
+    /// Its maps.
+    pub fn maps(&self) -> impl Iterator<Item = &TextureRef> {
+        let own = [
+            &self.metal_rough_map,
+            &self.specular_map,
+            &self.specular_color_map,
+            &self.transmission_map,
+            &self.thickness_map,
+        ];
+        own.into_iter().chain(self.coat.iter().flat_map(|coat| coat.maps())).flatten()
+    }
+
+    /// Every slot that can hold a map.
+    pub fn maps_mut(&mut self) -> Vec<&mut Option<TextureRef>> {
+        let mut slots = vec![
+            &mut self.metal_rough_map,
+            &mut self.specular_map,
+            &mut self.specular_color_map,
+            &mut self.transmission_map,
+            &mut self.thickness_map,
+        ];
+        slots.extend(self.coat.iter_mut().flat_map(|coat| coat.maps_mut()));
+        slots
+    }
+
+    /// The `absorption` that leaves `color` of white light after `distance`; none for distances that are not positive or
+    /// not finite.
+    pub fn absorption_of(color: Vec3, distance: f32) -> Vec3 {
+        if !(distance > 0.0 && distance.is_finite()) {
+            return Vec3::ZERO;
+        }
+        // No light at all would take an infinite coefficient, which lets nothing through a length of zero either.
+        let absorbed = |c: f32| (-libm::logf(c.clamp(f32::MIN_POSITIVE, 1.0)) / distance).min(f32::MAX);
+        Vec3::new(absorbed(color.x), absorbed(color.y), absorbed(color.z))
     }
 }
 
@@ -236,17 +289,13 @@ impl Material {
             &self.bump_map,
             &self.occlusion_map,
         ];
-        let own = match &self.surface {
-            Surface::MetalRough(m) => {
-                [&m.metal_rough_map, &m.specular_map, &m.specular_color_map, &m.transmission_map].map(Option::as_ref)
-            }
-            Surface::Phong(p) => {
-                let [a, b, c] = [&p.ambient_map, &p.specular_map, &p.shininess_map].map(Option::as_ref);
-                [a, b, c, None]
-            }
-            Surface::Unlit => [None; 4],
+        let (metal_rough, phong) = match &self.surface {
+            Surface::MetalRough(m) => (Some(m), None),
+            Surface::Phong(p) => (None, Some([&p.ambient_map, &p.specular_map, &p.shininess_map])),
+            Surface::Unlit => (None, None),
         };
-        common.map(Option::as_ref).into_iter().chain(own).flatten()
+        let own = metal_rough.into_iter().flat_map(MetalRough::maps);
+        common.into_iter().flatten().chain(own).chain(phong.into_iter().flatten().flatten())
     }
 
     /// Every slot that can hold a texture.
@@ -260,16 +309,19 @@ impl Material {
             &mut self.occlusion_map,
         ];
         match &mut self.surface {
-            Surface::MetalRough(m) => slots.extend([
-                &mut m.metal_rough_map,
-                &mut m.specular_map,
-                &mut m.specular_color_map,
-                &mut m.transmission_map,
-            ]),
+            Surface::MetalRough(m) => slots.extend(m.maps_mut()),
             Surface::Phong(p) => slots.extend([&mut p.ambient_map, &mut p.specular_map, &mut p.shininess_map]),
             Surface::Unlit => {}
         }
         slots
+    }
+
+    /// Lacquer over it.
+    pub fn coat(&self) -> Option<&Coat> {
+        match &self.surface {
+            Surface::MetalRough(m) => m.coat.as_deref(),
+            Surface::Phong(_) | Surface::Unlit => None,
+        }
     }
 
     /// Whether a hit always stops light and sight: what `accel` calls *opaque*.

@@ -4,6 +4,7 @@
 //! the world is `f64`. Units are metres, angles radians, colours linear Rec. 709, unless a field says otherwise.
 
 pub mod camera;
+pub mod coat;
 pub mod color;
 pub mod default_light;
 pub mod features;
@@ -17,6 +18,7 @@ pub mod mesh;
 pub mod texture;
 
 pub use camera::{Camera, Projection};
+pub use coat::Coat;
 pub use hints::RenderHints;
 pub use light::{Falloff, Light, LightKind};
 pub use material::{AlphaMode, Material, MetalRough, Phong, Surface, TextureRef, UvTransform};

@@ -13,6 +13,7 @@ const SUPPORTED: &[&str] = &[
     "EXT_mesh_gpu_instancing",
     "EXT_texture_webp",
     "KHR_lights_punctual",
+    "KHR_materials_clearcoat",
     "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
@@ -20,6 +21,7 @@ const SUPPORTED: &[&str] = &[
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
+    "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_node_visibility",
     "KHR_texture_transform",
@@ -71,15 +73,10 @@ fn remedy(name: &str) -> &'static str {
 /// Names in one message before the rest is only counted.
 const LISTED: usize = 20;
 
-/// A closed volume that bends light and may absorb it.
-const VOLUME: &str = "KHR_materials_volume";
-
 /// The extensions a file names.
 pub(super) struct Lists {
     used: Vec<String>,
     required: Vec<String>,
-    /// Whether no volume absorbs light: then its boundary is all there is to KHR_materials_volume.
-    clear_volumes: bool,
 }
 
 impl Lists {
@@ -89,10 +86,7 @@ impl Lists {
             let words = root.get(name).and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str);
             words.map(str::to_owned).collect::<Vec<_>>()
         };
-        let materials = root.get("materials").and_then(Value::as_array).into_iter().flatten();
-        let mut volumes = materials.filter_map(|m| m.get("extensions")?.get(VOLUME));
-        let clear_volumes = volumes.all(|v| v.get("attenuationDistance").is_none());
-        Self { used: list("extensionsUsed"), required: list("extensionsRequired"), clear_volumes }
+        Self { used: list("extensionsUsed"), required: list("extensionsRequired") }
     }
 
     /// Each extension once: name, whether required, whether supported.
@@ -100,12 +94,8 @@ impl Lists {
         let required: HashSet<&String> = self.required.iter().collect();
         let mut seen = HashSet::new();
         let each_once = self.used.iter().chain(&self.required).filter(|name| seen.insert(*name));
-        each_once.map(|name| (name.clone(), required.contains(name), self.is_supported(name))).collect()
-    }
-
-    /// Whether a still is drawn as this extension says.
-    fn is_supported(&self, name: &str) -> bool {
-        SUPPORTED.contains(&name) || (name == VOLUME && self.clear_volumes)
+        let is_supported = |name: &str| SUPPORTED.contains(&name);
+        each_once.map(|name| (name.clone(), required.contains(name), is_supported(name))).collect()
     }
 
     /// Refuses what is required and not understood; names in one warning what is only used and changes the look.
@@ -191,22 +181,15 @@ mod tests {
     }
 
     #[test]
-    fn a_volume_is_warned_of_only_where_it_absorbs_light() {
-        let with = |volume: Value| {
-            let materials = json!([{ "extensions": { "KHR_materials_volume": volume } }]);
-            messages(&json!({ "extensionsUsed": ["KHR_materials_volume"], "materials": materials })).1
-        };
-        assert_eq!(with(json!({ "thicknessFactor": 0.5 })), Vec::<String>::new());
-        let absorbing = with(json!({ "thicknessFactor": 0.5, "attenuationDistance": 0.1 }));
-        assert_eq!(absorbing, ["a.gltf:extensionsUsed: drawn without KHR_materials_volume"]);
-    }
-
-    #[test]
     fn what_is_only_used_is_one_warning_and_nothing_when_harmless() {
-        let used = json!(["KHR_materials_sheen", "KHR_xmp", "KHR_materials_clearcoat", "KHR_texture_transform"]);
+        let used =
+            json!(["KHR_materials_sheen", "KHR_xmp", "KHR_materials_diffuse_transmission", "KHR_texture_transform"]);
         let (faults, warnings) = messages(&json!({ "extensionsUsed": used }));
         assert!(faults.is_empty());
-        assert_eq!(warnings, ["a.gltf:extensionsUsed: drawn without KHR_materials_sheen, KHR_materials_clearcoat"]);
+        assert_eq!(
+            warnings,
+            ["a.gltf:extensionsUsed: drawn without KHR_materials_sheen, KHR_materials_diffuse_transmission"]
+        );
     }
 
     #[test]

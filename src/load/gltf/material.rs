@@ -3,13 +3,16 @@
 use super::codes::Code;
 use super::mesh::Needs;
 use super::report::Report;
-use super::textures::{Textures, maps};
+use super::textures::Textures;
 use crate::math::Vec3;
-use crate::scene::{AlphaMode, Material, MetalRough, Surface};
+use crate::scene::{AlphaMode, Coat, Material, MetalRough, Surface};
 use gltf::json;
 use gltf::json::material as source;
 use gltf::json::validation::Checked;
 use serde_json::Value;
+
+/// A closed volume that bends light and may absorb it.
+const VOLUME: &str = "KHR_materials_volume";
 
 /// Converts a material; its maps are noted in `textures`.
 pub(super) fn convert(i: usize, source: &json::Material, textures: &mut Textures, report: &mut Report) -> Material {
@@ -38,9 +41,13 @@ pub(super) fn convert(i: usize, source: &json::Material, textures: &mut Textures
 }
 
 /// What vertices need for a material's maps.
-pub(super) fn needs(material: &mut Material) -> Needs {
-    let tangents = material.normal_map.as_ref().map(|map| map.uv_set);
-    let mut uv_sets: Vec<u32> = maps(material).into_iter().flatten().map(|map| map.uv_set).collect();
+pub(super) fn needs(material: &Material) -> Needs {
+    let of_coat = match &material.surface {
+        Surface::MetalRough(m) => m.coat.as_ref().and_then(|coat| coat.normal_map.as_ref()),
+        _ => None,
+    };
+    let tangents = material.normal_map.as_ref().or(of_coat).map(|map| map.uv_set);
+    let mut uv_sets: Vec<u32> = material.textures().map(|map| map.uv_set).collect();
     uv_sets.sort_unstable();
     uv_sets.dedup();
     Needs { uv_sets, tangents }
@@ -115,10 +122,48 @@ fn metal_rough(source: &json::Material, textures: &mut Textures) -> MetalRough {
         let value = extensions.others.get(extension)?.get(name)?.as_f64()?;
         Some(value as f32)
     };
-    surface.thick = number("KHR_materials_volume", "thicknessFactor").is_some_and(|t| t > 0.0);
+    surface.thickness = number(VOLUME, "thicknessFactor").map_or(0.0, |t| within(t, 0.0, f32::MAX, 0.0));
+    surface.thick = surface.thickness > 0.0;
+    if let Some(distance) = number(VOLUME, "attenuationDistance").filter(|_| surface.thick) {
+        let part = |k: usize| {
+            let color = extensions.others.get(VOLUME)?.get("attenuationColor")?;
+            Some(within(color.get(k)?.as_f64()? as f32, 0.0, 1.0, 1.0))
+        };
+        let color = Vec3::from([0, 1, 2].map(|k| part(k).unwrap_or(1.0)));
+        surface.absorption = MetalRough::absorption_of(color, distance);
+    }
     surface.dispersion =
         number("KHR_materials_dispersion", "dispersion").map_or(0.0, |d| within(d, 0.0, f32::MAX, 0.0));
+    if surface.absorption != Vec3::ZERO && surface.roughness > 0.0 {
+        surface.thickness_map = textures.info(info_of(extensions.others.get(VOLUME), "thicknessTexture").as_ref());
+    }
+    surface.coat = extensions.others.get("KHR_materials_clearcoat").and_then(|c| coat(c, textures)).map(Box::new);
     surface
+}
+
+/// KHR_materials_clearcoat; `None` where its strength is zero.
+fn coat(extension: &Value, textures: &mut Textures) -> Option<Coat> {
+    let number =
+        |name: &str| extension.get(name).and_then(Value::as_f64).map_or(0.0, |x| within(x as f32, 0.0, 1.0, 0.0));
+    let strength = number("clearcoatFactor");
+    if strength <= 0.0 {
+        return None;
+    }
+    let scale = extension.get("clearcoatNormalTexture").and_then(|t| t.get("scale")).and_then(Value::as_f64);
+    let mut map = |name: &str| textures.info(info_of(Some(extension), name).as_ref());
+    Some(Coat {
+        strength,
+        strength_map: map("clearcoatTexture"),
+        roughness: number("clearcoatRoughnessFactor"),
+        roughness_map: map("clearcoatRoughnessTexture"),
+        normal_map: map("clearcoatNormalTexture"),
+        normal_scale: scale.map_or(1.0, |s| s as f32),
+    })
+}
+
+/// A map in an extension's object.
+fn info_of(extension: Option<&Value>, name: &str) -> Option<json::texture::Info> {
+    serde_json::from_value(extension?.get(name)?.clone()).ok()
 }
 
 /// The extension's object, when the material says nothing in metallic-roughness terms.
@@ -147,11 +192,7 @@ fn from_specular_glossiness(
         Some(within(value as f32, 0.0, 1.0, 1.0))
     };
     let color = |name: &str| Vec3::from([0, 1, 2].map(|k| number(name, Some(k)).unwrap_or(1.0)));
-    let mut map = |name: &str| {
-        let info: Option<json::texture::Info> =
-            extension.get(name).and_then(|v| serde_json::from_value(v.clone()).ok());
-        textures.info(info.as_ref())
-    };
+    let mut map = |name: &str| textures.info(info_of(Some(extension), name).as_ref());
     material.base_color = color("diffuseFactor");
     material.opacity = number("diffuseFactor", Some(3)).unwrap_or(1.0);
     material.base_color_map = map("diffuseTexture");

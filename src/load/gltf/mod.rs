@@ -259,12 +259,12 @@ impl Loading<'_> {
             if palette.index.get(i).is_none_or(Option::is_some) {
                 continue;
             }
-            let mut material = match root.materials.get(i) {
+            let material = match root.materials.get(i) {
                 Some(source) => material::convert(i, source, &mut palette.textures, self.report),
                 None => Material { name: "default".into(), ..Material::default() },
             };
             palette.index[i] = u32::try_from(palette.materials.len()).ok();
-            palette.needs.push(material::needs(&mut material));
+            palette.needs.push(material::needs(&material));
             palette.materials.push(material);
         }
         palette

@@ -464,7 +464,7 @@ fn materials_carry_every_factor_and_slot() {
     file.set("images", json!([{"uri": picture()}]));
     file.set("samplers", json!([{"wrapS": 33071, "wrapT": 33648, "magFilter": 9728, "minFilter": 9985}]));
     file.set("textures", json!([{"source": 0, "sampler": 0}, {"source": 0}]));
-    let names = ["ior", "specular", "transmission", "emissive_strength", "dispersion", "volume"];
+    let names = ["ior", "specular", "transmission", "emissive_strength", "dispersion", "volume", "clearcoat"];
     let used: Vec<String> =
         names.iter().map(|n| format!("KHR_materials_{n}")).chain(["KHR_texture_transform".into()]).collect();
     file.set("extensionsUsed", json!(used));
@@ -483,7 +483,13 @@ fn materials_carry_every_factor_and_slot() {
             "KHR_materials_ior": {"ior": 1.33}, "KHR_materials_emissive_strength": {"emissiveStrength": 8},
             "KHR_materials_specular": {"specularFactor": 0.75, "specularColorFactor": [2, 1, 1], "specularTexture": {"index": 1}},
             "KHR_materials_transmission": {"transmissionFactor": 0.9, "transmissionTexture": {"index": 1}},
-            "KHR_materials_volume": {"thicknessFactor": 1}, "KHR_materials_dispersion": {"dispersion": 0.5}},
+            "KHR_materials_volume": {
+                "thicknessFactor": 1, "thicknessTexture": {"index": 1},
+                "attenuationDistance": 0.5, "attenuationColor": [1, 0.25, 0]},
+            "KHR_materials_clearcoat": {
+                "clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.125, "clearcoatRoughnessTexture": {"index": 1},
+                "clearcoatNormalTexture": {"index": 0, "scale": 0.25}},
+            "KHR_materials_dispersion": {"dispersion": 0.5}},
     }]));
     let loaded = file.load();
     let scene = &loaded.scene;
@@ -497,6 +503,12 @@ fn materials_carry_every_factor_and_slot() {
     assert_eq!((surface.specular, surface.specular_color), (0.75, Vec3::new(2.0, 1.0, 1.0)));
     assert_eq!((surface.transmission, surface.thick, surface.dispersion), (0.9, true, 0.5));
     assert!(surface.specular_map.is_some() && surface.transmission_map.is_some());
+    assert_eq!(surface.absorption.x, 0.0);
+    assert!((surface.absorption.y - 2.0 * 4f32.ln()).abs() < 1e-5 && surface.absorption.z > 100.0);
+    assert!(surface.thickness == 1.0 && surface.thickness_map.is_some(), "for what is seen through rough glass");
+    let coat = surface.coat.as_ref().unwrap();
+    assert_eq!((coat.strength, coat.roughness, coat.normal_scale), (0.5, 0.125, 0.25));
+    assert!(coat.strength_map.is_none() && coat.roughness_map.is_some() && coat.normal_map.is_some());
     let base = material.base_color_map.as_ref().unwrap();
     assert_eq!(
         (base.uv_set, base.transform.offset, base.transform.scale),

@@ -2,7 +2,7 @@
 
 use super::images::image_of;
 use crate::math::Vec2;
-use crate::scene::{Bitmap, Filter, Material, Mipmaps, Sampler, Surface, Texture, TextureRef, UvTransform, Wrap};
+use crate::scene::{Bitmap, Filter, Material, Mipmaps, Sampler, Texture, TextureRef, UvTransform, Wrap};
 use gltf::json::extensions::texture::TextureTransform;
 use gltf::json::texture::{self, MagFilter, MinFilter, WrappingMode};
 use gltf::json::validation::Checked;
@@ -95,29 +95,6 @@ fn sampler_of(sampler: &texture::Sampler) -> Sampler {
     Sampler { wrap_u: wrap(sampler.wrap_s), wrap_v: wrap(sampler.wrap_t), magnify, minify, mipmaps }
 }
 
-/// Every map of a material.
-pub(super) fn maps(material: &mut Material) -> Vec<&mut Option<TextureRef>> {
-    let mut maps = vec![
-        &mut material.base_color_map,
-        &mut material.opacity_map,
-        &mut material.emission_map,
-        &mut material.normal_map,
-        &mut material.bump_map,
-        &mut material.occlusion_map,
-    ];
-    match &mut material.surface {
-        Surface::MetalRough(m) => maps.extend([
-            &mut m.metal_rough_map,
-            &mut m.specular_map,
-            &mut m.specular_color_map,
-            &mut m.transmission_map,
-        ]),
-        Surface::Phong(p) => maps.extend([&mut p.ambient_map, &mut p.specular_map, &mut p.shininess_map]),
-        Surface::Unlit => {}
-    }
-    maps
-}
-
 /// Keeps only textures whose image could be decoded, and points materials at what is left.
 pub(super) fn keep_decoded(
     materials: &mut [Material],
@@ -130,7 +107,7 @@ pub(super) fn keep_decoded(
     let bitmap_of = |t: &Texture| new_bitmap.get(t.bitmap as usize).copied().flatten();
     next = 0;
     let new_texture: Vec<_> = textures.iter().map(|t| number(bitmap_of(t).is_some(), &mut next)).collect();
-    for map in materials.iter_mut().flat_map(maps) {
+    for map in materials.iter_mut().flat_map(Material::textures_mut) {
         *map =
             map.take().and_then(|r| Some(TextureRef { texture: new_texture.get(r.texture as usize).copied()??, ..r }));
     }

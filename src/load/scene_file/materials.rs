@@ -89,6 +89,10 @@ fn metal_rough(table: &Table) -> (Vec3, Surface) {
         transmission: part("transmission", 0.0),
         ior: index(table, 1.5),
         thick: table.get("thick", boolean).unwrap_or(true),
+        absorption: MetalRough::absorption_of(
+            table.get("attenuation_color", color).unwrap_or(Vec3::ONE),
+            table.get("attenuation_distance", within(0.0, 1e30)).map_or(f32::INFINITY, |d| d as f32),
+        ),
         dispersion: dispersion(table),
         ..MetalRough::default()
     };

@@ -44,6 +44,8 @@
 //! transmission = 0.0            # default 0
 //! ior = 1.5                     # as above
 //! thick = true                  # whether rays bend; default true
+//! attenuation_color = "white"   # what is left of white light after attenuation_distance inside, default white
+//! attenuation_distance = 1.0    # default: it absorbs nothing
 //! # dispersion, opacity, emission, double_sided as above
 //!
 //! [materials.sticker]

@@ -10,7 +10,7 @@
 use super::facets::{AlbedoRow, albedo, rebound};
 use super::{Balance, Reader, Seen, Sky};
 use crate::math::Vec3;
-use crate::render::optics::{fresnel_dielectric, fresnel_schlick};
+use crate::render::optics::{fresnel_dielectric, fresnel_schlick, transmittance};
 use crate::render::wave::Crossing;
 use crate::scene::MetalRough;
 use std::f32::consts::PI;
@@ -24,7 +24,7 @@ const FROSTED_ROUGHNESS: f32 = 0.6;
 /// That part; the rest goes straight through, so that glass never hides what it holds.
 const FROSTED_SHARE: f32 = 0.75;
 /// Highlights of lights without extent are never narrower than this roughness makes them.
-const NARROWEST_HIGHLIGHT: f32 = 0.045;
+pub(super) const NARROWEST_HIGHLIGHT: f32 = 0.045;
 
 /// The model's parameters at one point.
 #[derive(Clone, Debug)]
@@ -40,6 +40,8 @@ pub(crate) struct MetalRoughMatter {
     occlusion: f32,
     pub ior: f32,
     pub thick: bool,
+    /// What is left of light that passes through the whole of it, where that is not traced.
+    inside: Vec3,
     pub dispersion: f32,
 }
 
@@ -65,6 +67,14 @@ pub(super) fn metallic_at(m: &MetalRough, reader: &Reader) -> f32 {
     (m.metallic * reader.linear(m.metal_rough_map.as_ref()).z).clamp(0.0, 1.0)
 }
 
+/// What the thickness of a material that absorbs light leaves of it.
+fn inside(m: &MetalRough, reader: &Reader) -> Vec3 {
+    if m.absorption == Vec3::ZERO {
+        return Vec3::ONE;
+    }
+    transmittance(m.absorption, m.thickness * reader.linear(m.thickness_map.as_ref()).y)
+}
+
 impl MetalRoughMatter {
     pub(super) fn new(m: &MetalRough, base: Vec3, occlusion: f32, reader: &Reader) -> Self {
         let map = reader.linear(m.metal_rough_map.as_ref());
@@ -81,6 +91,7 @@ impl MetalRoughMatter {
             occlusion: occlusion.clamp(0.0, 1.0),
             ior: m.ior,
             thick: m.thick,
+            inside: inside(m, reader),
             dispersion: m.dispersion,
         }
     }
@@ -127,7 +138,7 @@ impl MetalRoughMatter {
             shares: albedo(self.roughness, n_v),
             diffuse: sky.diffuse(seen.normal) + ambient,
             mirrored: if looked_up { sky.blurred(seen.mirrored(), self.roughness) + ambient } else { Vec3::ZERO },
-            open: if looked_up { self.open(n_v) } else { 0.0 },
+            open: if looked_up { open(n_v, self.occlusion, self.roughness) } else { 0.0 },
             front: seen.front,
         };
         let rebound = if self.metallic > 0.0 { rebound(self.roughness, self.base) } else { Vec3::ZERO };
@@ -135,7 +146,7 @@ impl MetalRoughMatter {
         let frosted = self.frosted(seen.front);
         if frosted > 0.0 {
             let light = sky.blurred(-seen.view, self.roughness) + ambient;
-            sum += self.passed(1.0 - taken) * light * frosted;
+            sum += self.passed(1.0 - taken) * self.inside * light * frosted;
         }
         sum
     }
@@ -198,7 +209,7 @@ impl MetalRoughMatter {
     /// Share of the mirrored surroundings that a ray brings in. From inside there is no environment to look up.
     #[inline(always)]
     fn traced(&self, outside: bool) -> f32 {
-        if outside { 1.0 - smoothstep(MIRROR_ROUGHNESS, MATT_ROUGHNESS, self.roughness) } else { 1.0 }
+        if outside { traced(self.roughness) } else { 1.0 }
     }
 
     /// Share of the light passing through that is looked up instead.
@@ -206,16 +217,22 @@ impl MetalRoughMatter {
         let see_through = self.transmission > 0.0 && outside;
         if see_through { FROSTED_SHARE * smoothstep(0.0, FROSTED_ROUGHNESS, self.roughness) } else { 0.0 }
     }
+}
 
-    /// Share of the mirrored surroundings that the occlusion map leaves open: less where few directions are open and the
-    /// lobe is wide (S. Lagarde, C. de Rousiers, "Moving Frostbite to Physically Based Rendering", 2014).
-    fn open(&self, n_v: f32) -> f32 {
-        if self.occlusion >= 1.0 {
-            return 1.0;
-        }
-        let exponent = libm::exp2f(-16.0 * self.roughness - 1.0);
-        (libm::powf(n_v + self.occlusion, exponent) - 1.0 + self.occlusion).clamp(0.0, 1.0)
+/// Share of the mirrored surroundings that a ray brings in.
+#[inline(always)]
+pub(super) fn traced(roughness: f32) -> f32 {
+    1.0 - smoothstep(MIRROR_ROUGHNESS, MATT_ROUGHNESS, roughness)
+}
+
+/// Share of the mirrored surroundings that the occlusion map leaves open: less where few directions are open and the
+/// lobe is wide (S. Lagarde, C. de Rousiers, "Moving Frostbite to Physically Based Rendering", 2014).
+pub(super) fn open(n_v: f32, occlusion: f32, roughness: f32) -> f32 {
+    if occlusion >= 1.0 {
+        return 1.0;
     }
+    let exponent = libm::exp2f(-16.0 * roughness - 1.0);
+    (libm::powf(n_v + occlusion, exponent) - 1.0 + occlusion).clamp(0.0, 1.0)
 }
 
 /// `dir`, mirrored to the front of a surface when a shading normal has sent it behind.
@@ -227,7 +244,7 @@ pub(crate) fn above(dir: Vec3, geometric: Vec3) -> Vec3 {
 
 /// Trowbridge and Reitz's distribution of facets (GGX), `alpha` the square of the roughness.
 #[inline(always)]
-fn ggx(normal: Vec3, half: Vec3, alpha: f32) -> f32 {
+pub(super) fn ggx(normal: Vec3, half: Vec3, alpha: f32) -> f32 {
     let n_h = normal.dot(half).clamp(0.0, 1.0);
     // 1 − (N·H)² as |N × H|², which keeps its digits in a narrow highlight.
     let sine_squared = normal.cross(half).length_squared();
@@ -239,7 +256,7 @@ fn ggx(normal: Vec3, half: Vec3, alpha: f32) -> f32 {
 /// Smith's height-correlated masking and shadowing over 4 N·L N·V (E. Heitz, "Understanding the Masking-Shadowing
 /// Function", 2014).
 #[inline(always)]
-fn visibility(n_l: f32, n_v: f32, alpha: f32) -> f32 {
+pub(super) fn visibility(n_l: f32, n_v: f32, alpha: f32) -> f32 {
     let a2 = alpha * alpha;
     let view = n_l * (n_v * n_v * (1.0 - a2) + a2).sqrt();
     let light = n_v * (n_l * n_l * (1.0 - a2) + a2).sqrt();
@@ -268,6 +285,7 @@ mod tests {
             occlusion: 1.0,
             ior: 1.5,
             thick: false,
+            inside: Vec3::ONE,
             dispersion: 0.0,
         }
     }

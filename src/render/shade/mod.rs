@@ -4,6 +4,7 @@
 //! and how much of what lies in the mirrored and refracted direction is seen ([`Matter::balance`]). Which rays are
 //! sent, and what they find, is the tracer's business.
 
+mod coat;
 mod facets;
 mod light;
 mod metal_rough;
@@ -11,6 +12,7 @@ mod phong;
 mod sky;
 mod spectrum;
 
+pub(crate) use coat::CoatMatter;
 pub(crate) use light::{Incident, LocalLight};
 pub(crate) use metal_rough::{Around, MetalRoughMatter, above};
 pub(crate) use phong::PhongMatter;
@@ -50,6 +52,8 @@ impl Seen {
 pub(crate) struct Matter {
     pub emission: Vec3,
     pub model: Model,
+    /// Lacquer over it; seen from outside only.
+    pub coat: Option<CoatMatter>,
 }
 
 /// The reflection model at one point.
@@ -104,7 +108,15 @@ impl Matter {
     /// The material at `surface`, whose base colour has been read already.
     pub(crate) fn new(surface: &Surface, base: Vec3, store: &TextureStore) -> Self {
         let reader = Reader { store, patch: surface.patch.as_ref(), footprint: &surface.footprint };
-        Self::read(surface.target.material, base, &reader)
+        let material = surface.target.material;
+        let mut matter = Self::read(material, base, &reader);
+        if let Some(coat) = material.coat().filter(|_| surface.front) {
+            let normal = surface.coat_normal(coat.normal_map.as_ref(), coat.normal_scale, store);
+            let occlusion = occlusion(material, &reader);
+            matter.coat = CoatMatter::new(coat, normal, surface.view, occlusion, &reader);
+            matter.emission *= matter.clear();
+        }
+        matter
     }
 
     /// A material without maps, the same everywhere.
@@ -119,12 +131,15 @@ impl Matter {
             Reflection::Unlit => Model::Unlit(base),
             Reflection::Phong(phong) => Model::Phong(PhongMatter::new(phong, base, reader)),
             Reflection::MetalRough(m) => {
-                let shade = reader.linear(material.occlusion_map.as_ref()).x;
-                let occlusion = 1.0 + material.occlusion_strength * (shade - 1.0);
-                Model::MetalRough(MetalRoughMatter::new(m, base, occlusion, reader))
+                Model::MetalRough(MetalRoughMatter::new(m, base, occlusion(material, reader), reader))
             }
         };
-        Self { emission, model }
+        Self { emission, model, coat: None }
+    }
+
+    /// Share of what is under the lacquer that is seen through it.
+    fn clear(&self) -> f32 {
+        self.coat.as_ref().map_or(1.0, CoatMatter::clear)
     }
 
     /// Whether it is seen in the dark.
@@ -134,19 +149,27 @@ impl Matter {
 
     /// What is seen of the light that arrives from everywhere, without a ray.
     pub(crate) fn ambient(&self, seen: &Seen, sky: &Sky, ambient: Vec3) -> Vec3 {
-        match &self.model {
+        let below = match &self.model {
             Model::Unlit(color) => *color,
             Model::Phong(m) => m.ambient * ambient + m.diffuse * sky.diffuse(seen.normal),
             Model::MetalRough(m) => m.ambient(seen, sky, ambient),
+        };
+        match &self.coat {
+            Some(coat) => below * coat.clear() + coat.ambient(seen, sky, ambient),
+            None => below,
         }
     }
 
     /// What is seen of a light on the viewer's side of the surface.
     pub(crate) fn lit(&self, normal: Vec3, view: Vec3, light: &Incident) -> Vec3 {
-        match &self.model {
+        let below = match &self.model {
             Model::Unlit(_) => Vec3::ZERO,
             Model::Phong(m) => m.lit(normal, view, light.to_light) * light.strength(),
             Model::MetalRough(m) => m.lit(normal, view, light.to_light) * light.irradiance(),
+        };
+        match &self.coat {
+            Some(coat) => below * coat.clear() + light.irradiance() * coat.lit(view, light.to_light),
+            None => below,
         }
     }
 
@@ -160,11 +183,18 @@ impl Matter {
 
     /// How much of the mirrored and of the refracted direction is seen; `cosine` is that of the view.
     pub(crate) fn balance(&self, cosine: f32, crossing: &Crossing) -> Balance {
-        match &self.model {
+        let Balance { reflected, refracted } = match &self.model {
             Model::Unlit(_) => Balance::default(),
             Model::Phong(m) => m.balance(cosine, crossing),
             Model::MetalRough(m) => m.balance(cosine, crossing),
-        }
+        };
+        let clear = self.clear();
+        Balance { reflected: reflected * clear, refracted: refracted * clear }
+    }
+
+    /// The normal of the lacquer over it, and the weight of the mirror ray off that.
+    pub(crate) fn lacquer(&self) -> Option<(Vec3, f32)> {
+        self.coat.as_ref().map(|coat| (coat.normal, coat.mirrored()))
     }
 
     /// Index of refraction of the inside (1: rays pass straight on), and its dispersion.
@@ -175,6 +205,12 @@ impl Matter {
             _ => (1.0, 0.0),
         }
     }
+}
+
+/// Share of the surroundings that the occlusion map leaves open.
+fn occlusion(material: &Material, reader: &Reader) -> f32 {
+    let shade = reader.linear(material.occlusion_map.as_ref()).x;
+    (1.0 + material.occlusion_strength * (shade - 1.0)).clamp(0.0, 1.0)
 }
 
 /// The share of light that a surface lets through to a point in its shadow: filtered by its colour.

@@ -12,9 +12,9 @@ pub(crate) struct Uniform {
 }
 
 impl Uniform {
-    /// `None` for materials with maps, those that let light through, and those that mirror it where rays bounce.
+    /// `None` for materials with maps or lacquer, those that let light through, and those that mirror it where rays bounce.
     pub(crate) fn of(material: &Material, store: &TextureStore, bounces: bool) -> Option<Self> {
-        if material.textures().next().is_some() || !material.is_opaque() {
+        if material.textures().next().is_some() || !material.is_opaque() || material.coat().is_some() {
             return None;
         }
         let matter = Matter::without_maps(material, store);

@@ -115,6 +115,42 @@ fn thick_gltf_glass_bends_and_thin_glass_does_not() {
 }
 
 #[test]
+fn the_inside_of_a_volume_absorbs_light_by_the_length_of_the_way_through() {
+    let absorption = Vec3::new(0.1, 0.5, 2.0);
+    for (ior, degrees) in [(1.0, 0.0), (1.0, 40.0), (1.5, 40.0)] {
+        let mut s = aslant(degrees);
+        for z in [0.0, -2.0] {
+            let m = MetalRough {
+                transmission: 1.0,
+                metallic: 0.0,
+                roughness: 0.0,
+                thick: true,
+                ior,
+                absorption,
+                ..MetalRough::default()
+            };
+            s.square(z, 9.0, Material { surface: Reflection::MetalRough(m), ..Material::default() });
+        }
+        // One volume with two faces; the lower one looks down.
+        s.scene.meshes[1].material = s.scene.meshes[0].material;
+        s.scene.meshes[1].triangles.iter_mut().for_each(|t| t.swap(0, 1));
+        s.square(-3.0, 90.0, unlit(Vec3::ONE));
+        let (cos, sin) = (libm::cos(f64::to_radians(degrees)), libm::sin(f64::to_radians(degrees)));
+        let sine = sin / f64::from(ior);
+        let length = 2.0 / (1.0 - sine * sine).sqrt();
+        let open = (1.0 - optics::fresnel_dielectric(cos, 1.0, f64::from(ior))).powi(2) as f32;
+        let seen = s.color();
+        for k in 0..3 {
+            let expected = open * (-f64::from(absorption[k]) * length).exp() as f32;
+            assert!(
+                (seen[k] - expected).abs() < 2e-3 * expected.max(0.5),
+                "{ior} at {degrees}: {seen}, {k}: {expected}"
+            );
+        }
+    }
+}
+
+#[test]
 fn a_prism_splits_white_light_and_bends_blue_more() {
     let split = |dispersion: f32| {
         let mut s = aslant(60.0);

@@ -1,0 +1,138 @@
+//! Lacquer: a clear dielectric layer over whatever a surface is (KHR_materials_clearcoat).
+//!
+//! What the layer reflects, by the same microfacet model as the surface under it, is taken off what comes from below; light
+//! is not bent on its way through. The share that is taken off is that of the view alone, as the extension says.
+
+use super::facets::albedo;
+use super::metal_rough::{NARROWEST_HIGHLIGHT, above, ggx, open, traced, visibility};
+use super::{Reader, Seen, Sky};
+use crate::math::Vec3;
+use crate::render::optics::reflect;
+use crate::scene::Coat;
+
+/// Reflectance of a boundary to index 1.5, face on.
+const F0: f32 = 0.04;
+
+/// The lacquer at one point.
+#[derive(Clone, Debug)]
+pub(crate) struct CoatMatter {
+    /// Share of the surface that it covers.
+    strength: f32,
+    roughness: f32,
+    /// Its own shading normal, on the viewer's side.
+    pub normal: Vec3,
+    /// Cosine of the view from it.
+    n_v: f32,
+    /// Share of the light from below that it takes off.
+    taken: f32,
+    occlusion: f32,
+}
+
+impl CoatMatter {
+    /// `None` where it covers nothing; `normal` is that of the lacquer.
+    pub(super) fn new(coat: &Coat, normal: Vec3, view: Vec3, occlusion: f32, reader: &Reader) -> Option<Self> {
+        let strength = (coat.strength * reader.linear(coat.strength_map.as_ref()).x).clamp(0.0, 1.0);
+        let roughness = (coat.roughness * reader.linear(coat.roughness_map.as_ref()).y).clamp(0.0, 1.0);
+        let n_v = normal.dot(view).clamp(0.0, 1.0);
+        let taken = strength * fresnel(n_v);
+        (strength > 0.0).then_some(Self { strength, roughness, normal, n_v, taken, occlusion })
+    }
+
+    /// Share of what is below that is seen.
+    pub(super) fn clear(&self) -> f32 {
+        1.0 - self.taken
+    }
+
+    /// BRDF × N·L; unit vectors, away from the surface.
+    pub(super) fn lit(&self, view: Vec3, to_light: Vec3) -> f32 {
+        let (n_l, n_v) = (self.normal.dot(to_light), self.normal.dot(view));
+        if n_l <= 0.0 || n_v <= 0.0 {
+            return 0.0;
+        }
+        let half = (view + to_light).normalize_or(self.normal);
+        let r = self.roughness.max(NARROWEST_HIGHLIGHT);
+        let lobe = ggx(self.normal, half, r * r) * visibility(n_l, n_v, r * r);
+        self.strength * fresnel(view.dot(half)) * lobe * n_l
+    }
+
+    /// What it shows of the surroundings without a ray.
+    pub(super) fn ambient(&self, seen: &Seen, sky: &Sky, ambient: Vec3) -> Vec3 {
+        let looked_up = 1.0 - traced(self.roughness);
+        if looked_up <= 0.0 {
+            return Vec3::ZERO;
+        }
+        let mirrored = above(reflect(-seen.view, self.normal), seen.geometric);
+        let (scale, bias) = albedo(self.roughness, self.n_v);
+        let share = self.strength * (F0 * scale + bias) * open(self.n_v, self.occlusion, self.roughness);
+        (sky.blurred(mirrored, self.roughness) + ambient) * (share * looked_up)
+    }
+
+    /// Weight of the mirror ray off it.
+    pub(super) fn mirrored(&self) -> f32 {
+        self.taken * traced(self.roughness)
+    }
+}
+
+/// Schlick's approximation.
+fn fresnel(cosine: f32) -> f32 {
+    let m = (1.0 - cosine).clamp(0.0, 1.0);
+    let m2 = m * m;
+    F0 + (1.0 - F0) * (m2 * m2 * m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::surface::Footprint;
+    use crate::render::texture::TextureStore;
+    use crate::scene::Scene;
+
+    fn coat(strength: f32, roughness: f32, view: Vec3) -> Option<CoatMatter> {
+        let coat =
+            Coat { strength, strength_map: None, roughness, roughness_map: None, normal_map: None, normal_scale: 1.0 };
+        let (scene, footprint) = (Scene::default(), Footprint::default());
+        let store = TextureStore::new(&scene);
+        let reader = Reader { store: &store, patch: None, footprint: &footprint };
+        CoatMatter::new(&coat, Vec3::Z, view, 1.0, &reader)
+    }
+
+    fn at(degrees: f32) -> Vec3 {
+        let (sin, cos) = libm::sincosf(degrees.to_radians());
+        Vec3::new(sin, 0.0, cos)
+    }
+
+    #[test]
+    fn lacquer_takes_off_what_it_mirrors() {
+        for degrees in [0.0, 30.0, 60.0, 85.0] {
+            let smooth = coat(1.0, 0.0, at(degrees)).unwrap();
+            assert!((smooth.mirrored() + smooth.clear() - 1.0).abs() < 1e-6);
+        }
+        let face_on = coat(1.0, 0.0, Vec3::Z).unwrap();
+        assert!((face_on.mirrored() - 0.04).abs() < 1e-7);
+        assert!((coat(0.5, 0.0, Vec3::Z).unwrap().mirrored() - 0.02).abs() < 1e-7);
+        assert!(coat(0.0, 0.0, Vec3::Z).is_none(), "there is none");
+    }
+
+    #[test]
+    fn rough_lacquer_sends_no_ray_and_shows_a_wide_highlight() {
+        let (smooth, rough) = (coat(1.0, 0.1, Vec3::Z).unwrap(), coat(1.0, 0.6, Vec3::Z).unwrap());
+        assert_eq!(rough.mirrored(), 0.0);
+        assert!(smooth.lit(Vec3::Z, Vec3::Z) > 100.0 * rough.lit(Vec3::Z, Vec3::Z));
+        assert!(smooth.lit(Vec3::Z, at(40.0)) < rough.lit(Vec3::Z, at(40.0)));
+        assert_eq!(rough.lit(Vec3::Z, at(120.0)), 0.0, "behind the surface");
+    }
+
+    #[test]
+    fn a_white_sky_gives_back_no_more_than_the_share_of_the_lacquer() {
+        let sky = Sky::new(&Scene { environment: crate::scene::Environment::Constant(Vec3::ONE), ..Scene::default() });
+        for roughness in [0.15, 0.3, 0.7, 1.0] {
+            for degrees in [0.0, 45.0, 75.0] {
+                let view = at(degrees);
+                let coat = coat(1.0, roughness, view).unwrap();
+                let seen = Seen { normal: Vec3::Z, geometric: Vec3::Z, view, front: true };
+                let white = coat.ambient(&seen, &sky, Vec3::ZERO).x + coat.mirrored();
+                assert!(white > 0.01 && white <= coat.taken + 0.02, "{roughness} at {degrees}: {white}");
+            }
+        }
+    }
+}
