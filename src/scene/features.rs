@@ -57,6 +57,10 @@ pub enum Feature {
     Absorption,
     /// Lacquer over a surface.
     Coat,
+    /// Thin films, whose colours change with the angle.
+    Film,
+    /// Sheen of cloth.
+    Sheen,
     /// An index of refraction that depends on the wavelength.
     Dispersion,
     /// Point lights.
@@ -80,7 +84,7 @@ pub const SMOOTH: f32 = 0.2;
 
 impl Feature {
     /// All of them, in the order they are listed.
-    pub const ALL: [Self; 28] = [
+    pub const ALL: [Self; 30] = [
         Self::Triangles,
         Self::Polygons,
         Self::Spheres,
@@ -104,6 +108,8 @@ impl Feature {
         Self::Refraction,
         Self::Absorption,
         Self::Coat,
+        Self::Film,
+        Self::Sheen,
         Self::Dispersion,
         Self::PointLights,
         Self::DirectionalLights,
@@ -137,6 +143,8 @@ impl Feature {
             Self::Refraction => "refraction",
             Self::Absorption => "absorption",
             Self::Coat => "clearcoat",
+            Self::Film => "iridescence",
+            Self::Sheen => "sheen",
             Self::Dispersion => "dispersion",
             Self::PointLights => "point lights",
             Self::DirectionalLights => "directional lights",
@@ -219,6 +227,8 @@ impl Features {
             Surface::Phong(phong) => self.add_phong(phong),
             Surface::MetalRough(pbr) => {
                 self.add_if(true, Feature::MetalRough);
+                self.add_if(pbr.film.is_some(), Feature::Film);
+                self.add_if(pbr.sheen.is_some(), Feature::Sheen);
                 if let Some(coat) = &pbr.coat {
                     self.add_if(true, Feature::Coat);
                     self.add_if(coat.roughness < SMOOTH || coat.roughness_map.is_some(), Feature::Mirrors);

@@ -1,6 +1,6 @@
 //! How a surface answers to light. Factors are linear; maps multiply them.
 
-use super::Coat;
+use super::{Coat, Film, Sheen};
 use crate::math::{Vec2, Vec3};
 
 /// A material. `base_color`, alpha, emission and the normal are common to every [`Surface`] model.
@@ -87,7 +87,11 @@ pub struct MetalRough {
     pub thickness_map: Option<TextureRef>,
     /// How strongly `ior` depends on the wavelength: 20 / Abbe number, as KHR_materials_dispersion; 0: not at all.
     pub dispersion: f32,
-    /// Lacquer over it.
+    /// A thin film on it.
+    pub film: Option<Box<Film>>,
+    /// Fibres that stand off it.
+    pub sheen: Option<Box<Sheen>>,
+    /// Lacquer over all that.
     pub coat: Option<Box<Coat>>,
 }
 
@@ -182,6 +186,8 @@ impl Default for MetalRough {
             thickness: 0.0,
             thickness_map: None,
             dispersion: 0.0,
+            film: None,
+            sheen: None,
             coat: None,
         }
     }
@@ -197,7 +203,10 @@ impl MetalRough {
             &self.transmission_map,
             &self.thickness_map,
         ];
-        own.into_iter().chain(self.coat.iter().flat_map(|coat| coat.maps())).flatten()
+        let film = self.film.iter().flat_map(|film| film.maps());
+        let sheen = self.sheen.iter().flat_map(|sheen| sheen.maps());
+        let coat = self.coat.iter().flat_map(|coat| coat.maps());
+        own.into_iter().chain(film).chain(sheen).chain(coat).flatten()
     }
 
     /// Every slot that can hold a map.
@@ -209,6 +218,8 @@ impl MetalRough {
             &mut self.transmission_map,
             &mut self.thickness_map,
         ];
+        slots.extend(self.film.iter_mut().flat_map(|film| film.maps_mut()));
+        slots.extend(self.sheen.iter_mut().flat_map(|sheen| sheen.maps_mut()));
         slots.extend(self.coat.iter_mut().flat_map(|coat| coat.maps_mut()));
         slots
     }
@@ -222,6 +233,13 @@ impl MetalRough {
         // No light at all would take an infinite coefficient, which lets nothing through a length of zero either.
         let absorbed = |c: f32| (-libm::logf(c.clamp(f32::MIN_POSITIVE, 1.0)) / distance).min(f32::MAX);
         Vec3::new(absorbed(color.x), absorbed(color.y), absorbed(color.z))
+    }
+}
+
+impl MetalRough {
+    /// Whether it has anything besides the core model: what depends on the view at each point.
+    pub fn has_lobes(&self) -> bool {
+        self.film.is_some() || self.sheen.is_some() || self.coat.is_some()
     }
 }
 
@@ -316,10 +334,10 @@ impl Material {
         slots
     }
 
-    /// Lacquer over it.
-    pub fn coat(&self) -> Option<&Coat> {
+    /// The metallic-roughness model, if that is what it is.
+    pub fn metal_rough(&self) -> Option<&MetalRough> {
         match &self.surface {
-            Surface::MetalRough(m) => m.coat.as_deref(),
+            Surface::MetalRough(m) => Some(m),
             Surface::Phong(_) | Surface::Unlit => None,
         }
     }

@@ -4,7 +4,6 @@
 //! the world is `f64`. Units are metres, angles radians, colours linear Rec. 709, unless a field says otherwise.
 
 pub mod camera;
-pub mod coat;
 pub mod color;
 pub mod default_light;
 pub mod features;
@@ -12,15 +11,16 @@ pub mod framing;
 pub mod hints;
 pub mod ior;
 pub mod light;
+pub mod lobes;
 pub mod material;
 pub mod merge;
 pub mod mesh;
 pub mod texture;
 
 pub use camera::{Camera, Projection};
-pub use coat::Coat;
 pub use hints::RenderHints;
 pub use light::{Falloff, Light, LightKind};
+pub use lobes::{Coat, Film, Sheen};
 pub use material::{AlphaMode, Material, MetalRough, Phong, Surface, TextureRef, UvTransform};
 pub use mesh::{Cone, Instance, Mesh, Plane, Polygon, Sphere};
 pub use texture::{Bitmap, Filter, Mipmaps, Pixels, Sampler, Texture, Wrap};

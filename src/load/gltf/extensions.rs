@@ -17,7 +17,9 @@ const SUPPORTED: &[&str] = &[
     "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_iridescence",
     "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen",
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
@@ -182,13 +184,17 @@ mod tests {
 
     #[test]
     fn what_is_only_used_is_one_warning_and_nothing_when_harmless() {
-        let used =
-            json!(["KHR_materials_sheen", "KHR_xmp", "KHR_materials_diffuse_transmission", "KHR_texture_transform"]);
+        let used = json!([
+            "KHR_materials_subsurface",
+            "KHR_xmp",
+            "KHR_materials_diffuse_transmission",
+            "KHR_texture_transform"
+        ]);
         let (faults, warnings) = messages(&json!({ "extensionsUsed": used }));
         assert!(faults.is_empty());
         assert_eq!(
             warnings,
-            ["a.gltf:extensionsUsed: drawn without KHR_materials_sheen, KHR_materials_diffuse_transmission"]
+            ["a.gltf:extensionsUsed: drawn without KHR_materials_subsurface, KHR_materials_diffuse_transmission"]
         );
     }
 

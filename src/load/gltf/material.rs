@@ -5,7 +5,7 @@ use super::mesh::Needs;
 use super::report::Report;
 use super::textures::Textures;
 use crate::math::Vec3;
-use crate::scene::{AlphaMode, Coat, Material, MetalRough, Surface};
+use crate::scene::{AlphaMode, Coat, Film, Material, MetalRough, Sheen, Surface};
 use gltf::json;
 use gltf::json::material as source;
 use gltf::json::validation::Checked;
@@ -137,14 +137,48 @@ fn metal_rough(source: &json::Material, textures: &mut Textures) -> MetalRough {
     if surface.absorption != Vec3::ZERO && surface.roughness > 0.0 {
         surface.thickness_map = textures.info(info_of(extensions.others.get(VOLUME), "thicknessTexture").as_ref());
     }
-    surface.coat = extensions.others.get("KHR_materials_clearcoat").and_then(|c| coat(c, textures)).map(Box::new);
+    let other = |name: &str| extensions.others.get(name);
+    surface.film = other("KHR_materials_iridescence").and_then(|film| self::film(film, textures)).map(Box::new);
+    surface.sheen = other("KHR_materials_sheen").and_then(|sheen| self::sheen(sheen, textures)).map(Box::new);
+    surface.coat = other("KHR_materials_clearcoat").and_then(|coat| self::coat(coat, textures)).map(Box::new);
     surface
+}
+
+/// A number in an extension's object, kept within limits.
+fn number_of(extension: &Value, name: &str, default: f32, (low, high): (f32, f32)) -> f32 {
+    extension.get(name).and_then(Value::as_f64).map_or(default, |x| within(x as f32, low, high, default))
+}
+
+/// KHR_materials_iridescence; `None` where its strength is zero.
+fn film(extension: &Value, textures: &mut Textures) -> Option<Film> {
+    let strength = number_of(extension, "iridescenceFactor", 0.0, (0.0, 1.0));
+    let thickness = |name: &str, default| number_of(extension, name, default, (0.0, f32::MAX));
+    let mut map = |name: &str| textures.info(info_of(Some(extension), name).as_ref());
+    (strength > 0.0).then(|| Film {
+        strength,
+        strength_map: map("iridescenceTexture"),
+        ior: number_of(extension, "iridescenceIor", 1.3, (1.0, f32::MAX)),
+        thickness: [thickness("iridescenceThicknessMinimum", 100.0), thickness("iridescenceThicknessMaximum", 400.0)],
+        thickness_map: map("iridescenceThicknessTexture"),
+    })
+}
+
+/// KHR_materials_sheen; `None` where its colour is black.
+fn sheen(extension: &Value, textures: &mut Textures) -> Option<Sheen> {
+    let part = |k: usize| extension.get("sheenColorFactor")?.get(k)?.as_f64();
+    let color = Vec3::from([0, 1, 2].map(|k| part(k).map_or(0.0, |c| within(c as f32, 0.0, 1.0, 0.0))));
+    let mut map = |name: &str| textures.info(info_of(Some(extension), name).as_ref());
+    (color != Vec3::ZERO).then(|| Sheen {
+        color,
+        color_map: map("sheenColorTexture"),
+        roughness: number_of(extension, "sheenRoughnessFactor", 0.0, (0.0, 1.0)),
+        roughness_map: map("sheenRoughnessTexture"),
+    })
 }
 
 /// KHR_materials_clearcoat; `None` where its strength is zero.
 fn coat(extension: &Value, textures: &mut Textures) -> Option<Coat> {
-    let number =
-        |name: &str| extension.get(name).and_then(Value::as_f64).map_or(0.0, |x| within(x as f32, 0.0, 1.0, 0.0));
+    let number = |name: &str| number_of(extension, name, 0.0, (0.0, 1.0));
     let strength = number("clearcoatFactor");
     if strength <= 0.0 {
         return None;

@@ -464,7 +464,17 @@ fn materials_carry_every_factor_and_slot() {
     file.set("images", json!([{"uri": picture()}]));
     file.set("samplers", json!([{"wrapS": 33071, "wrapT": 33648, "magFilter": 9728, "minFilter": 9985}]));
     file.set("textures", json!([{"source": 0, "sampler": 0}, {"source": 0}]));
-    let names = ["ior", "specular", "transmission", "emissive_strength", "dispersion", "volume", "clearcoat"];
+    let names = [
+        "ior",
+        "specular",
+        "transmission",
+        "emissive_strength",
+        "dispersion",
+        "volume",
+        "clearcoat",
+        "iridescence",
+        "sheen",
+    ];
     let used: Vec<String> =
         names.iter().map(|n| format!("KHR_materials_{n}")).chain(["KHR_texture_transform".into()]).collect();
     file.set("extensionsUsed", json!(used));
@@ -486,6 +496,10 @@ fn materials_carry_every_factor_and_slot() {
             "KHR_materials_volume": {
                 "thicknessFactor": 1, "thicknessTexture": {"index": 1},
                 "attenuationDistance": 0.5, "attenuationColor": [1, 0.25, 0]},
+            "KHR_materials_iridescence": {
+                "iridescenceFactor": 0.75, "iridescenceIor": 1.25, "iridescenceThicknessMaximum": 500,
+                "iridescenceThicknessTexture": {"index": 1}},
+            "KHR_materials_sheen": {"sheenColorFactor": [0.5, 0.25, 0], "sheenRoughnessTexture": {"index": 1}},
             "KHR_materials_clearcoat": {
                 "clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.125, "clearcoatRoughnessTexture": {"index": 1},
                 "clearcoatNormalTexture": {"index": 0, "scale": 0.25}},
@@ -509,6 +523,12 @@ fn materials_carry_every_factor_and_slot() {
     let coat = surface.coat.as_ref().unwrap();
     assert_eq!((coat.strength, coat.roughness, coat.normal_scale), (0.5, 0.125, 0.25));
     assert!(coat.strength_map.is_none() && coat.roughness_map.is_some() && coat.normal_map.is_some());
+    let film = surface.film.as_ref().unwrap();
+    assert_eq!((film.strength, film.ior, film.thickness), (0.75, 1.25, [100.0, 500.0]));
+    assert!(film.strength_map.is_none() && film.thickness_map.is_some());
+    let sheen = surface.sheen.as_ref().unwrap();
+    assert_eq!((sheen.color, sheen.roughness), (Vec3::new(0.5, 0.25, 0.0), 0.0));
+    assert!(sheen.color_map.is_none() && sheen.roughness_map.is_some());
     let base = material.base_color_map.as_ref().unwrap();
     assert_eq!(
         (base.uv_set, base.transform.offset, base.transform.scale),

@@ -8,11 +8,11 @@
 //! unscattered apart from a part that is looked up; lights themselves are not seen through rough glass.
 
 use super::facets::{AlbedoRow, albedo, rebound};
-use super::{Balance, Reader, Seen, Sky};
+use super::{Balance, Reader, Seen, Sky, film};
 use crate::math::Vec3;
 use crate::render::optics::{fresnel_dielectric, fresnel_schlick, transmittance};
 use crate::render::wave::Crossing;
-use crate::scene::MetalRough;
+use crate::scene::{Film, MetalRough};
 use std::f32::consts::PI;
 
 /// Below this roughness the surroundings are seen by a ray alone …
@@ -35,6 +35,10 @@ pub(crate) struct MetalRoughMatter {
     /// Reflection of the dielectric part, face on and grazing.
     f0: Vec3,
     f90: f32,
+    /// Reflection of the metal part, face on.
+    metal_f0: Vec3,
+    /// Whether a film changes both.
+    filmed: bool,
     /// Share of the light entering the dielectric part that passes through instead of being scattered.
     transmission: f32,
     occlusion: f32,
@@ -83,6 +87,8 @@ impl MetalRoughMatter {
         let at_normal = (m.ior - 1.0) / (m.ior + 1.0);
         Self {
             base: base.max(Vec3::ZERO),
+            metal_f0: base.max(Vec3::ZERO),
+            filmed: false,
             metallic: (m.metallic * map.z).clamp(0.0, 1.0),
             roughness: (m.roughness * map.y).clamp(0.0, 1.0),
             f0: (color * (at_normal * at_normal)).clamp(Vec3::ZERO, Vec3::ONE) * specular,
@@ -96,10 +102,25 @@ impl MetalRoughMatter {
         }
     }
 
+    /// The same under a film, as seen from the outside at this cosine.
+    pub(super) fn filmed(mut self, film: &Film, cosine: f32, reader: &Reader) -> Self {
+        let strength = (film.strength * reader.linear(film.strength_map.as_ref()).x).clamp(0.0, 1.0);
+        let [thin, thick] = film.thickness;
+        let thickness = thin + (thick - thin) * reader.linear(film.thickness_map.as_ref()).y;
+        if strength > 0.0 && thickness > 0.0 {
+            let under = |f0: Vec3| {
+                let share = film::reflectance(film.ior, thickness, f0, cosine);
+                f0.lerp(film::seen_face_on(share, cosine), strength)
+            };
+            (self.f0, self.metal_f0, self.filmed) = (under(self.f0), under(self.metal_f0), true);
+        }
+        self
+    }
+
     /// Reflectance of the dielectric and of the metal part by Schlick's formula.
     #[inline(always)]
     fn fresnel(&self, cosine: f32) -> (Vec3, Vec3) {
-        (fresnel_schlick(self.f0, self.f90, cosine), fresnel_schlick(self.base, 1.0, cosine))
+        (fresnel_schlick(self.f0, self.f90, cosine), fresnel_schlick(self.metal_f0, 1.0, cosine))
     }
 
     /// Colour of the light that is scattered under the surface, before what the surface reflects is taken off.
@@ -141,7 +162,7 @@ impl MetalRoughMatter {
             open: if looked_up { open(n_v, self.occlusion, self.roughness) } else { 0.0 },
             front: seen.front,
         };
-        let rebound = if self.metallic > 0.0 { rebound(self.roughness, self.base) } else { Vec3::ZERO };
+        let rebound = if self.metallic > 0.0 { rebound(self.roughness, self.metal_f0) } else { Vec3::ZERO };
         let (mut sum, taken) = self.around(&around, rebound);
         let frosted = self.frosted(seen.front);
         if frosted > 0.0 {
@@ -157,7 +178,7 @@ impl MetalRoughMatter {
     pub(crate) fn around(&self, around: &Around, rebound: Vec3) -> (Vec3, f32) {
         let looked_up = 1.0 - self.traced(around.front);
         let (scale, bias) = around.shares;
-        let (dielectric, metal) = (self.f0 * scale + self.f90 * bias, self.base * scale + bias);
+        let (dielectric, metal) = (self.f0 * scale + self.f90 * bias, self.metal_f0 * scale + bias);
 
         let taken = self.fresnel(around.n_v).0.lerp(dielectric, looked_up).max_element();
         let diffuse = self.scattered() * (1.0 - taken).max(0.0) * self.occlusion;
@@ -169,7 +190,7 @@ impl MetalRoughMatter {
 
     /// Its albedo by N·V, and what comes of light that its facets send to each other.
     pub(crate) fn shares(&self) -> (AlbedoRow, Vec3) {
-        (AlbedoRow::of(self.roughness), rebound(self.roughness, self.base))
+        (AlbedoRow::of(self.roughness), rebound(self.roughness, self.metal_f0))
     }
 
     /// Perceptual roughness.
@@ -192,7 +213,11 @@ impl MetalRoughMatter {
             #[expect(clippy::cast_possible_truncation, reason = "a share of light")]
             let share = share as f32;
             // Inside, what is turned back belongs to the light that was let in.
-            dielectric = if inside { Vec3::splat(share) } else { Vec3::splat(share * self.f90) };
+            if inside {
+                dielectric = Vec3::splat(share);
+            } else if !self.filmed {
+                dielectric = Vec3::splat(share * self.f90);
+            }
             open = 1.0 - dielectric.max_element();
         }
         Balance {
@@ -277,6 +302,8 @@ mod tests {
     fn matter() -> MetalRoughMatter {
         MetalRoughMatter {
             base: Vec3::new(0.8, 0.4, 0.2),
+            metal_f0: Vec3::new(0.8, 0.4, 0.2),
+            filmed: false,
             metallic: 0.0,
             roughness: 0.5,
             f0: Vec3::splat(0.04),

@@ -6,9 +6,11 @@
 
 mod coat;
 mod facets;
+mod film;
 mod light;
 mod metal_rough;
 mod phong;
+mod sheen;
 mod sky;
 mod spectrum;
 
@@ -16,6 +18,7 @@ pub(crate) use coat::CoatMatter;
 pub(crate) use light::{Incident, LocalLight};
 pub(crate) use metal_rough::{Around, MetalRoughMatter, above};
 pub(crate) use phong::PhongMatter;
+pub(crate) use sheen::SheenMatter;
 pub(crate) use sky::Sky;
 pub(crate) use spectrum::{Band, bands};
 
@@ -25,7 +28,7 @@ use super::surface::{Footprint, Patch, Surface};
 use super::texture::{ColorSpace, TextureStore};
 use super::wave::Crossing;
 use crate::math::{Vec3, Vec4};
-use crate::scene::{Material, Surface as Reflection, TextureRef};
+use crate::scene::{Material, MetalRough, Surface as Reflection, TextureRef};
 
 /// How a point of a surface is seen: unit vectors away from it, and from which side.
 #[derive(Clone, Copy, Debug)]
@@ -52,7 +55,8 @@ impl Seen {
 pub(crate) struct Matter {
     pub emission: Vec3,
     pub model: Model,
-    /// Lacquer over it; seen from outside only.
+    /// Fibres on it, and lacquer over all; seen from outside only.
+    pub sheen: Option<SheenMatter>,
     pub coat: Option<CoatMatter>,
 }
 
@@ -109,14 +113,28 @@ impl Matter {
     pub(crate) fn new(surface: &Surface, base: Vec3, store: &TextureStore) -> Self {
         let reader = Reader { store, patch: surface.patch.as_ref(), footprint: &surface.footprint };
         let material = surface.target.material;
-        let mut matter = Self::read(material, base, &reader);
-        if let Some(coat) = material.coat().filter(|_| surface.front) {
-            let normal = surface.coat_normal(coat.normal_map.as_ref(), coat.normal_scale, store);
-            let occlusion = occlusion(material, &reader);
-            matter.coat = CoatMatter::new(coat, normal, surface.view, occlusion, &reader);
-            matter.emission *= matter.clear();
+        let matter = Self::read(material, base, &reader);
+        match material.metal_rough() {
+            Some(m) if surface.front && m.has_lobes() => matter.with_lobes(m, surface, &reader),
+            _ => matter,
         }
-        matter
+    }
+
+    /// The same with film, sheen and lacquer.
+    #[cold]
+    fn with_lobes(mut self, m: &MetalRough, surface: &Surface, reader: &Reader) -> Self {
+        let n_v = surface.normal.dot(surface.view).clamp(0.0, 1.0);
+        if let (Some(film), Model::MetalRough(core)) = (&m.film, &self.model) {
+            self.model = Model::MetalRough(core.clone().filmed(film, n_v, reader));
+        }
+        self.sheen = m.sheen.as_ref().and_then(|sheen| SheenMatter::new(sheen, n_v, reader));
+        if let Some(coat) = &m.coat {
+            let normal = surface.coat_normal(coat.normal_map.as_ref(), coat.normal_scale, reader.store);
+            let occlusion = occlusion(surface.target.material, reader);
+            self.coat = CoatMatter::new(coat, normal, surface.view, occlusion, reader);
+            self.emission *= self.below_coat();
+        }
+        self
     }
 
     /// A material without maps, the same everywhere.
@@ -134,12 +152,17 @@ impl Matter {
                 Model::MetalRough(MetalRoughMatter::new(m, base, occlusion(material, reader), reader))
             }
         };
-        Self { emission, model, coat: None }
+        Self { emission, model, sheen: None, coat: None }
     }
 
     /// Share of what is under the lacquer that is seen through it.
-    fn clear(&self) -> f32 {
+    fn below_coat(&self) -> f32 {
         self.coat.as_ref().map_or(1.0, CoatMatter::clear)
+    }
+
+    /// Share of what is under fibres and lacquer that is seen through both.
+    fn clear(&self) -> f32 {
+        self.below_coat() * self.sheen.as_ref().map_or(1.0, SheenMatter::clear)
     }
 
     /// Whether it is seen in the dark.
@@ -154,10 +177,14 @@ impl Matter {
             Model::Phong(m) => m.ambient * ambient + m.diffuse * sky.diffuse(seen.normal),
             Model::MetalRough(m) => m.ambient(seen, sky, ambient),
         };
-        match &self.coat {
-            Some(coat) => below * coat.clear() + coat.ambient(seen, sky, ambient),
-            None => below,
+        let mut all = below * self.clear();
+        if let Some(sheen) = &self.sheen {
+            all += sheen.ambient(seen, sky, ambient) * self.below_coat();
         }
+        if let Some(coat) = &self.coat {
+            all += coat.ambient(seen, sky, ambient);
+        }
+        all
     }
 
     /// What is seen of a light on the viewer's side of the surface.
@@ -167,10 +194,14 @@ impl Matter {
             Model::Phong(m) => m.lit(normal, view, light.to_light) * light.strength(),
             Model::MetalRough(m) => m.lit(normal, view, light.to_light) * light.irradiance(),
         };
-        match &self.coat {
-            Some(coat) => below * coat.clear() + light.irradiance() * coat.lit(view, light.to_light),
-            None => below,
+        let mut all = below * self.clear();
+        if let Some(sheen) = &self.sheen {
+            all += sheen.lit(normal, view, light.to_light) * light.irradiance() * self.below_coat();
         }
+        if let Some(coat) = &self.coat {
+            all += light.irradiance() * coat.lit(view, light.to_light);
+        }
+        all
     }
 
     /// What is seen of a light on the other side of the surface.

@@ -2,7 +2,7 @@
 
 use crate::render::shade::{Matter, Model};
 use crate::render::texture::TextureStore;
-use crate::scene::Material;
+use crate::scene::{Material, MetalRough};
 
 /// What is known of a material for all points.
 pub(crate) struct Uniform {
@@ -12,9 +12,12 @@ pub(crate) struct Uniform {
 }
 
 impl Uniform {
-    /// `None` for materials with maps or lacquer, those that let light through, and those that mirror it where rays bounce.
+    /// `None` for materials with maps, film, sheen or lacquer, those that let light through, and those that mirror it where rays bounce.
     pub(crate) fn of(material: &Material, store: &TextureStore, bounces: bool) -> Option<Self> {
-        if material.textures().next().is_some() || !material.is_opaque() || material.coat().is_some() {
+        if material.textures().next().is_some()
+            || !material.is_opaque()
+            || material.metal_rough().is_some_and(MetalRough::has_lobes)
+        {
             return None;
         }
         let matter = Matter::without_maps(material, store);

@@ -1,0 +1,151 @@
+//! Sheen of cloth: fibres that stand off a surface (KHR_materials_sheen).
+//!
+//! A. C. Estevez, C. Kulla, "Production Friendly Microfacet Sheen BRDF" (2017), with the visibility of D. Neubelt and
+//! M. Pettineo, "Crafting a Next-Gen Material Pipeline for The Order: 1886" (2013). What the fibres send back is taken off
+//! what is below them.
+
+use super::{Reader, Seen, Sky};
+use crate::math::Vec3;
+use crate::scene::Sheen;
+use std::f32::consts::PI;
+use std::sync::LazyLock;
+
+/// Entries of [`ALBEDO`] by roughness and by N·V.
+const ENTRIES: usize = 17;
+
+/// Directional albedo of the white lobe: rows by roughness 0 … 1, columns by N·V 0 … 1. Found when it is first needed.
+static ALBEDO: LazyLock<[[f32; ENTRIES]; ENTRIES]> = LazyLock::new(|| {
+    let part = |i: usize| i as f32 / (ENTRIES - 1) as f32;
+    std::array::from_fn(|row| std::array::from_fn(|column| integral(alpha(part(row)), part(column))))
+});
+
+/// The lobe is no thinner than this roughness makes it.
+const LEAST_ROUGHNESS: f32 = 0.07;
+
+/// The surroundings are looked up no sharper than this roughness: the lobe is wide even where it is thin.
+const WIDE: f32 = 0.5;
+
+/// The fibres at one point.
+#[derive(Clone, Debug)]
+pub(crate) struct SheenMatter {
+    color: Vec3,
+    roughness: f32,
+    /// What all of them send back, seen from here.
+    albedo: f32,
+}
+
+impl SheenMatter {
+    /// `None` where there are none; `n_v` is the cosine of the view.
+    pub(super) fn new(sheen: &Sheen, n_v: f32, reader: &Reader) -> Option<Self> {
+        let color = (sheen.color * reader.srgb(sheen.color_map.as_ref())).clamp(Vec3::ZERO, Vec3::ONE);
+        let roughness = (sheen.roughness * reader.linear(sheen.roughness_map.as_ref()).w).clamp(0.0, 1.0);
+        (color != Vec3::ZERO).then(|| Self { color, roughness, albedo: albedo(roughness, n_v) })
+    }
+
+    /// Share of what is below that is seen.
+    pub(super) fn clear(&self) -> f32 {
+        1.0 - self.color.max_element() * self.albedo
+    }
+
+    /// BRDF × N·L; unit vectors, away from the surface.
+    pub(super) fn lit(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
+        let (n_l, n_v) = (normal.dot(to_light), normal.dot(view));
+        if n_l <= 0.0 || n_v <= 0.0 {
+            return Vec3::ZERO;
+        }
+        let half = (view + to_light).normalize_or(normal);
+        self.color * (lobe(alpha(self.roughness), normal.cross(half).length(), n_l, n_v) * n_l)
+    }
+
+    /// What it shows of the surroundings.
+    pub(super) fn ambient(&self, seen: &Seen, sky: &Sky, ambient: Vec3) -> Vec3 {
+        let around = sky.blurred(seen.mirrored(), self.roughness.max(WIDE)) + ambient;
+        self.color * self.albedo * around
+    }
+}
+
+/// The lobe's parameter.
+fn alpha(roughness: f32) -> f32 {
+    let r = roughness.max(LEAST_ROUGHNESS);
+    r * r
+}
+
+/// Distribution × visibility; `sine` is that of the half vector from the normal.
+fn lobe(alpha: f32, sine: f32, n_l: f32, n_v: f32) -> f32 {
+    let exponent = 1.0 / alpha;
+    let distribution = (2.0 + exponent) * libm::powf(sine, exponent) / (2.0 * PI);
+    distribution / (4.0 * (n_l + n_v - n_l * n_v))
+}
+
+/// ∫ BRDF N·L over the hemisphere by midpoints, at most 1.
+fn integral(alpha: f32, n_v: f32) -> f32 {
+    const ROWS: u16 = 64;
+    const COLUMNS: u16 = 32;
+    let n_v = n_v.max(1e-3);
+    let view = Vec3::new((1.0 - n_v * n_v).sqrt(), 0.0, n_v);
+    let mut sum = 0.0;
+    for i in 0..ROWS {
+        let (sin, cos) = libm::sincosf((f32::from(i) + 0.5) / f32::from(ROWS) * PI / 2.0);
+        // One half of the directions: the other mirrors it.
+        for j in 0..COLUMNS {
+            let (sp, cp) = libm::sincosf((f32::from(j) + 0.5) / f32::from(COLUMNS) * PI);
+            let half = (Vec3::new(sin * cp, sin * sp, cos) + view).normalize_or(Vec3::Z);
+            sum += lobe(alpha, Vec3::Z.cross(half).length(), cos, n_v) * cos * sin;
+        }
+    }
+    (sum * (PI / 2.0 / f32::from(ROWS)) * (2.0 * PI / f32::from(COLUMNS))).min(1.0)
+}
+
+/// [`ALBEDO`] between its entries.
+fn albedo(roughness: f32, n_v: f32) -> f32 {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "lies among the entries")]
+    let place = |x: f32| {
+        let x = x.clamp(0.0, 1.0) * (ENTRIES - 1) as f32;
+        let i = (x as usize).min(ENTRIES - 2);
+        (i, x - i as f32)
+    };
+    let ((i, a), (j, b)) = (place(roughness), place(n_v));
+    let row = |i: usize| ALBEDO[i][j] + (ALBEDO[i][j + 1] - ALBEDO[i][j]) * b;
+    row(i) + (row(i + 1) - row(i)) * a
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn white(roughness: f32, n_v: f32) -> SheenMatter {
+        SheenMatter { color: Vec3::ONE, roughness, albedo: albedo(roughness, n_v) }
+    }
+
+    #[test]
+    fn no_more_is_sent_back_than_arrives_and_rough_fibres_send_back_most_where_they_are_grazed() {
+        for row in ALBEDO.iter() {
+            assert!(row.iter().all(|a| (0.0..=1.0).contains(a)), "{row:?}");
+        }
+        for roughness in [0.3, 0.6, 1.0] {
+            assert!(albedo(roughness, 0.1) > 2.0 * albedo(roughness, 1.0), "{roughness}");
+        }
+        assert!(albedo(1.0, 1.0) > albedo(0.4, 1.0));
+    }
+
+    #[test]
+    fn light_and_eye_can_change_places() {
+        let at = |degrees: f32| {
+            let (sin, cos) = libm::sincosf(degrees.to_radians());
+            Vec3::new(sin, 0.0, cos)
+        };
+        let cloth = white(0.5, 0.7);
+        let (a, b) = (at(20.0), at(-70.0));
+        let there = cloth.lit(Vec3::Z, a, b).x / b.z;
+        let back = cloth.lit(Vec3::Z, b, a).x / a.z;
+        assert!((there - back).abs() < 1e-5 && there > 0.0);
+        assert_eq!(cloth.lit(Vec3::Z, a, at(100.0)), Vec3::ZERO, "behind the surface");
+    }
+
+    #[test]
+    fn what_fibres_send_back_is_taken_off_what_is_below() {
+        let cloth = SheenMatter { color: Vec3::new(0.5, 0.0, 0.0), ..white(0.8, 0.2) };
+        assert!((cloth.clear() + 0.5 * cloth.albedo - 1.0).abs() < 1e-6);
+        assert!(cloth.clear() < 1.0);
+    }
+}
