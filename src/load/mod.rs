@@ -10,6 +10,8 @@ pub mod limits;
 pub mod nff;
 pub mod obj;
 pub mod paths;
+#[cfg_attr(not(feature = "draco"), expect(dead_code, reason = "only decoders of others panic"))]
+mod quiet;
 pub mod scene_file;
 pub mod suggest;
 pub mod tangents;

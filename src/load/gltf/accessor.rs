@@ -1,9 +1,11 @@
-//! Reads accessors: every component type, normalised or not, interleaved, sparse, or without a view (zeros).
+//! Reads accessors: every component type, normalised or not, interleaved, sparse, decoded from a compressed primitive, or
+//! without a view (zeros).
 //!
 //! Sizes have been checked against the views by [`super::links`] where the file declares them; here every byte is
 //! looked up with bounds, so that a buffer shorter than declared ends in a message.
 
 use super::buffers::Buffers;
+use super::draco::Decoded;
 use super::sparse::{Replaced, Replacements};
 use crate::load::Diagnostic;
 use crate::math::Vec3;
@@ -17,6 +19,7 @@ pub(super) struct Reader<'a> {
     pub(super) root: &'a Root,
     pub(super) buffers: &'a Buffers<'a>,
     pub(super) replacements: &'a Replacements,
+    pub(super) decoded: &'a Decoded,
 }
 
 /// Which elements of an accessor to read.
@@ -110,13 +113,11 @@ pub(super) struct Run<'a> {
 impl<'a> Run<'a> {
     /// Elements one after the other, from byte `offset` of a view on.
     pub(super) fn packed(
-        root: &Root,
         buffers: &'a Buffers,
         view: Index<buffer::View>,
         offset: u64,
         format: Format,
     ) -> Result<Self, Unreadable> {
-        let view = root.buffer_views.get(view.value()).ok_or(Unreadable::Unknown)?;
         let bytes = match buffers.view(view) {
             Ok(bytes) => bytes,
             Err(Some(why)) => return Err(Unreadable::Buffer(why)),
@@ -178,14 +179,25 @@ impl<'a> Reader<'a> {
         self.root.accessors.get(index.value()).map_or(0, |accessor| accessor.count.0)
     }
 
+    /// Whether an accessor holds only zeros, because the file has nothing for it.
+    pub(super) fn is_blank(&self, index: Index<Accessor>) -> bool {
+        let accessor = self.root.accessors.get(index.value());
+        let nowhere = accessor.is_some_and(|a| a.buffer_view.is_none() && a.sparse.is_none());
+        nowhere && self.decoded.of(index.value()).is_none()
+    }
+
     /// The smallest and largest value of each component, not normalised, numbers that are not finite left out.
     ///
-    /// Small sparse accessors are read whole; `None` for large ones, and for those that hold only zeros.
+    /// Small sparse accessors are read whole; `None` for large ones, for those that hold only zeros, and for those of
+    /// compressed primitives: their bounds are those from before the compression, which moves vertices a little.
     pub(super) fn extent(&self, index: Index<Accessor>) -> Option<Result<Extent, Unreadable>> {
         /// Elements of a sparse accessor worth reading only to be checked.
         const SMALL: u64 = 1 << 16;
         let accessor = self.root.accessors.get(index.value())?;
         let format = Format::of(accessor)?;
+        if self.decoded.of(index.value()).is_some() {
+            return None;
+        }
         match (&accessor.sparse, accessor.buffer_view) {
             (Some(_), _) if accessor.count.0 <= SMALL => {
                 let values = self.elements(index, Pick::All, [0.0; 16], raws);
@@ -193,7 +205,7 @@ impl<'a> Reader<'a> {
             }
             (None, Some(view)) => {
                 let count = usize::try_from(accessor.count.0).ok()?;
-                let run = self.run(view, accessor, format);
+                let run = self.view(view, accessor, format);
                 Some(run.map(|run| {
                     let vectors = |element| stored::<3>(element, format);
                     extent_of_vectors(run.elements(count).map(vectors))
@@ -218,9 +230,8 @@ impl<'a> Reader<'a> {
             Pick::All => count,
             Pick::Only(list) => list.len(),
         };
-        let mut values = match accessor.buffer_view {
-            Some(view) => {
-                let run = self.run(view, accessor, format)?;
+        let mut values = match self.run(index, accessor, format)? {
+            Some(run) => {
                 let read = |element| read(element, format);
                 let values: Vec<T> = match pick {
                     Pick::All => run.elements(count).map(read).collect(),
@@ -235,8 +246,7 @@ impl<'a> Reader<'a> {
         };
         if let Some(sparse) = &accessor.sparse {
             let replaced = self.replacements.of(index.value())?;
-            let new =
-                Run::packed(self.root, self.buffers, sparse.values.buffer_view, sparse.values.byte_offset.0, format)?;
+            let new = Run::packed(self.buffers, sparse.values.buffer_view, sparse.values.byte_offset.0, format)?;
             let lost = || short(replaced.len(), new.len());
             for (slot, replaced) in hits(replaced, pick) {
                 let element = new.element(replaced.value as usize).ok_or_else(lost)?;
@@ -246,9 +256,17 @@ impl<'a> Reader<'a> {
         Ok(values)
     }
 
-    fn run(&self, view: Index<buffer::View>, accessor: &Accessor, format: Format) -> Result<Run<'a>, Unreadable> {
+    /// Where the elements of an accessor lie; `None`: nowhere, they are zeros.
+    fn run(&self, index: Index<Accessor>, accessor: &Accessor, format: Format) -> Result<Option<Run<'a>>, Unreadable> {
+        if let Some(bytes) = self.decoded.of(index.value()) {
+            return Ok(Some(Run { bytes, stride: format.size(), format }));
+        }
+        accessor.buffer_view.map(|view| self.view(view, accessor, format)).transpose()
+    }
+
+    fn view(&self, view: Index<buffer::View>, accessor: &Accessor, format: Format) -> Result<Run<'a>, Unreadable> {
         let offset = accessor.byte_offset.unwrap_or_default().0;
-        Ok(Run::packed(self.root, self.buffers, view, offset, format)?.strided(self.root, view))
+        Ok(Run::packed(self.buffers, view, offset, format)?.strided(self.root, view))
     }
 }
 

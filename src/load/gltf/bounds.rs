@@ -21,7 +21,7 @@ const FREE: u64 = 1 << 28;
 /// Accessors may lie over each other, so that a small file declares any amount of data: only as much is read as files
 /// have that are not made for this.
 pub(super) fn check(reader: Reader, report: &mut Report) {
-    let mut left = reader.buffers.len().saturating_mul(2).saturating_add(FREE);
+    let mut left = (reader.buffers.len() + reader.decoded.len()).saturating_mul(2).saturating_add(FREE);
     let affordable = |accessor: &Accessor| {
         let wanted = accessor.min.is_some() || accessor.max.is_some() || accessor.sparse.is_some();
         let size = Format::of(accessor).map_or(0, |format| format.size() as u64);

@@ -1,6 +1,7 @@
 //! The bytes that buffers and buffer views stand for.
 
 use super::codes::Code;
+use super::meshopt::{self, Decoded};
 use super::report::Report;
 use crate::load::Diagnostic;
 use crate::load::limits::{Budget, OverBudget};
@@ -8,15 +9,17 @@ use crate::load::paths::{FileFault, Resolver, shorten};
 use base64::Engine as _;
 use base64::alphabet;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
-use gltf::json::{Root, buffer};
+use gltf::json::{Index, Root, buffer};
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 /// The bytes of every buffer, or why they are not there.
 pub(super) struct Buffers<'a> {
     root: &'a Root,
     slots: Vec<Slot<'a>>,
+    /// What compressed views hold.
+    decoded: Decoded,
 }
 
 enum Slot<'a> {
@@ -29,7 +32,7 @@ enum Slot<'a> {
 }
 
 impl<'a> Buffers<'a> {
-    /// Finds all buffers. One that cannot be read is a warning until something needs it.
+    /// Finds all buffers, and decodes compressed views. One that cannot be read is a warning until something needs it.
     pub(super) fn load(
         root: &'a Root,
         bin: Option<&'a [u8]>,
@@ -38,29 +41,56 @@ impl<'a> Buffers<'a> {
         budget: &mut Budget,
         report: &mut Report,
     ) -> Self {
-        let mut buffers = Self { root, slots: Vec::with_capacity(root.buffers.len()) };
+        let mut buffers = Self { root, slots: Vec::with_capacity(root.buffers.len()), decoded: Decoded::new() };
         let mut known: HashMap<&str, usize> = HashMap::new();
         let mut find = Find { bin, file, resolver, budget, report };
+        let stand_ins = stand_ins(root);
         for (i, buffer) in root.buffers.iter().enumerate() {
             let named = buffer.uri.as_deref().filter(|uri| !is_data(uri));
             let slot = match named.and_then(|uri| known.get(uri)) {
+                _ if stand_ins.contains(&i) => find.nowhere(i),
                 Some(&other) => Slot::Same(other),
                 None => find.one(i, buffer),
             };
             // What was looked for once is not looked for again, found or not.
+            let named = named.filter(|_| !stand_ins.contains(&i));
             named.into_iter().for_each(|uri| _ = known.entry(uri).or_insert(i));
             buffers.slots.push(slot);
             if let Some(bytes) = buffers.bytes(i) {
                 check_length(i, buffer, bytes, find.report);
             }
         }
+        buffers.decoded = meshopt::decode_views(root, &buffers, file, find.budget);
+        if !meshopt::is_required(root) {
+            buffers.stand_in(&stand_ins, &mut find);
+        }
         buffers
     }
 
-    /// Bytes of all buffers, each file counted once.
+    /// Puts the bytes that the file has uncompressed in place of those that could not be decoded.
+    fn stand_in(&mut self, stand_ins: &HashSet<usize>, find: &mut Find<'a, '_>) {
+        let mut failed: Vec<usize> = self.decoded.iter().filter(|(_, bytes)| bytes.is_err()).map(|(i, _)| *i).collect();
+        failed.sort_unstable();
+        for i in failed {
+            let Some(view) = self.root.buffer_views.get(i) else { continue };
+            let from = view.buffer.value();
+            let skipped = stand_ins.contains(&from) && matches!(self.slots.get(from), Some(Slot::Nowhere(_)));
+            if let (true, Some(buffer)) = (skipped, self.root.buffers.get(from)) {
+                self.slots[from] = find.one(from, buffer);
+            }
+            let whole = self.plain(view).is_ok_and(|bytes| bytes.len() as u64 == view.byte_length.0);
+            if let (true, Some(Err(why))) = (whole, self.decoded.get(&i)) {
+                find.report.warnings.push(why.clone().remedy("the uncompressed data in the file is drawn"));
+                self.decoded.remove(&i);
+            }
+        }
+    }
+
+    /// Bytes of all buffers, each file counted once, and of what was decoded from them.
     pub(super) fn len(&self) -> u64 {
         let bytes = |slot: &Slot| if let Slot::Bytes(bytes) = slot { bytes.len() as u64 } else { 0 };
-        self.slots.iter().map(bytes).sum()
+        let decoded = self.decoded.values().flatten().map(|bytes| bytes.len() as u64);
+        self.slots.iter().map(bytes).chain(decoded).sum()
     }
 
     fn slot(&self, i: usize) -> Option<&Slot<'a>> {
@@ -77,31 +107,55 @@ impl<'a> Buffers<'a> {
         }
     }
 
-    /// The bytes of a view, as far as they are there.
+    /// The bytes of a view, decoded if they are compressed, as far as they are there.
     ///
     /// # Errors
     /// Why there are none. `None`: the file never says where they are.
-    pub(super) fn view(&self, view: &buffer::View) -> Result<&[u8], Option<Diagnostic>> {
-        let bytes = match self.slot(view.buffer.value()) {
+    pub(super) fn view(&self, index: Index<buffer::View>) -> Result<&[u8], Option<Diagnostic>> {
+        match self.decoded.get(&index.value()) {
+            Some(decoded) => decoded.as_deref().map_err(|why| Some(why.clone())),
+            None => self.plain(self.root.buffer_views.get(index.value()).ok_or(None)?),
+        }
+    }
+
+    /// The bytes of a view as they lie in its buffer.
+    fn plain(&self, view: &buffer::View) -> Result<&[u8], Option<Diagnostic>> {
+        let bytes = self.buffer(view.buffer.value())?;
+        let offset = clamp(view.byte_offset.unwrap_or_default().0, bytes.len());
+        let length = clamp(view.byte_length.0, bytes.len() - offset);
+        Ok(&bytes[offset..offset + length])
+    }
+
+    /// The bytes of a buffer, not past its declared length even where the data goes on.
+    ///
+    /// # Errors
+    /// Why there are none. `None`: the file never says where they are.
+    pub(super) fn buffer(&self, i: usize) -> Result<&[u8], Option<Diagnostic>> {
+        let bytes = match self.slot(i) {
             Some(Slot::Bytes(bytes)) => bytes,
             Some(Slot::Failed(why)) => return Err(Some(why.clone())),
             Some(Slot::Nowhere(_) | Slot::Same(_)) | None => return Err(None),
         };
-        // A view may not look past the declared length, even where the data goes on.
-        let declared = self.root.buffers.get(view.buffer.value()).map_or(0, |b| b.byte_length.0);
-        let end = clamp(declared, bytes.len());
-        let offset = clamp(view.byte_offset.unwrap_or_default().0, end);
-        let length = clamp(view.byte_length.0, end - offset);
-        Ok(&bytes[offset..offset + length])
+        let declared = self.root.buffers.get(i).map_or(0, |b| b.byte_length.0);
+        Ok(&bytes[..clamp(declared, bytes.len())])
     }
 
     /// Tells of buffers that nothing says the whereabouts of; for whoever needs one.
-    pub(super) fn nowhere(&self, view: &buffer::View) -> Option<Diagnostic> {
-        match self.slots.get(view.buffer.value()) {
+    pub(super) fn nowhere(&self, index: Index<buffer::View>) -> Option<Diagnostic> {
+        match self.slots.get(self.root.buffer_views.get(index.value())?.buffer.value()) {
             Some(Slot::Nowhere(why)) => Some(why.clone()),
             _ => None,
         }
     }
+}
+
+/// Buffers that are read only when a compressed view cannot be decoded.
+fn stand_ins(root: &Root) -> HashSet<usize> {
+    let declared = root.buffers.iter().enumerate().filter(|(_, buffer)| meshopt::is_stand_in(buffer));
+    let mut found: HashSet<usize> = declared.map(|(i, _)| i).collect();
+    let plain = root.buffer_views.iter().filter(|view| meshopt::extension(view).is_none());
+    plain.for_each(|view| _ = found.remove(&view.buffer.value()));
+    found
 }
 
 /// The smaller one, as a position in memory.
@@ -123,13 +177,16 @@ impl<'a> Find<'a, '_> {
         let place = format!("buffers[{i}]");
         match (&buffer.uri, self.bin) {
             (None, Some(bin)) if i == 0 => Slot::Bytes(Cow::Borrowed(bin)),
-            (None, _) => {
-                let text = "nothing says where its bytes are; what needs them is left out";
-                Slot::Nowhere(Diagnostic::new("gltf-buffer-nowhere", self.file, place, text))
-            }
+            (None, _) => self.nowhere(i),
             (Some(uri), _) if is_data(uri) => self.data(uri, &format!("{place}.uri")),
             (Some(uri), _) => self.named(uri, &format!("{place}.uri")),
         }
+    }
+
+    /// A buffer whose bytes nobody has asked for.
+    fn nowhere(&self, i: usize) -> Slot<'a> {
+        let text = "nothing says where its bytes are; what needs them is left out";
+        Slot::Nowhere(Diagnostic::new("gltf-buffer-nowhere", self.file, format!("buffers[{i}]"), text))
     }
 
     fn data(&mut self, uri: &str, place: &str) -> Slot<'a> {

@@ -11,7 +11,9 @@ use std::path::Path;
 /// Understood completely, as far as a still picture shows.
 const SUPPORTED: &[&str] = &[
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
     "EXT_texture_webp",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",
     "KHR_materials_dispersion",
@@ -25,6 +27,7 @@ const SUPPORTED: &[&str] = &[
     "KHR_materials_unlit",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
     "KHR_node_visibility",
     "KHR_texture_transform",
 ];
@@ -56,12 +59,18 @@ const HARMLESS: &[&str] = &[
     "VRMC_vrm",
 ];
 
+/// Whether what an extension needs is part of this build.
+fn is_built(name: &str) -> bool {
+    let (draco, meshopt) = (name == "KHR_draco_mesh_compression", name.ends_with("_meshopt_compression"));
+    (cfg!(feature = "draco") || !draco) && (cfg!(feature = "meshopt") || !meshopt)
+}
+
 /// What to do about an extension that is required and not understood.
 fn remedy(name: &str) -> &'static str {
     match name {
-        "KHR_draco_mesh_compression" => "decompress it (gltf-pipeline, gltf-transform) or export it without Draco",
+        "KHR_draco_mesh_compression" => "build meshray with the feature 'draco', or export it without Draco",
         "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
-            "decompress it (gltf-transform) or export it without meshopt compression"
+            "build meshray with the feature 'meshopt', or export it without meshopt compression"
         }
         "KHR_texture_basisu" => "convert its KTX2 textures to PNG or JPEG (gltf-transform), or export it with those",
         "KHR_techniques_webgl" => "export it with metallic-roughness materials",
@@ -96,7 +105,7 @@ impl Lists {
         let required: HashSet<&String> = self.required.iter().collect();
         let mut seen = HashSet::new();
         let each_once = self.used.iter().chain(&self.required).filter(|name| seen.insert(*name));
-        let is_supported = |name: &str| SUPPORTED.contains(&name);
+        let is_supported = |name: &str| SUPPORTED.contains(&name) && is_built(name);
         each_once.map(|name| (name.clone(), required.contains(name), is_supported(name))).collect()
     }
 
@@ -143,14 +152,7 @@ impl Lists {
 
 /// Extensions with a stand-in in the file, which tell for themselves where the stand-in is missing.
 fn has_stand_in(name: &str) -> bool {
-    matches!(
-        name,
-        "KHR_draco_mesh_compression"
-            | "EXT_meshopt_compression"
-            | "KHR_meshopt_compression"
-            | "KHR_texture_basisu"
-            | "MSFT_texture_dds"
-    )
+    matches!(name, "KHR_texture_basisu" | "MSFT_texture_dds") || !is_built(name)
 }
 
 #[cfg(test)]
@@ -170,15 +172,11 @@ mod tests {
 
     #[test]
     fn what_is_required_and_unknown_is_one_line_with_a_remedy() {
-        let both = json!(["KHR_draco_mesh_compression", "KHR_materials_ior"]);
+        let both = json!(["KHR_texture_basisu", "KHR_materials_ior"]);
         let (faults, warnings) = messages(&json!({"extensionsUsed": both, "extensionsRequired": both}));
         assert_eq!(faults.len(), 1);
-        assert!(
-            faults[0].starts_with("a.gltf:extensionsRequired: KHR_draco_mesh_compression is required"),
-            "{}",
-            faults[0]
-        );
-        assert!(faults[0].contains("; decompress it"));
+        assert!(faults[0].starts_with("a.gltf:extensionsRequired: KHR_texture_basisu is required"), "{}", faults[0]);
+        assert!(faults[0].contains("; convert its KTX2 textures"));
         assert!(warnings.is_empty());
     }
 

@@ -44,7 +44,7 @@ impl<'a> Images<'a> {
                 images.same.insert(i, other);
                 images.bytes.push(None);
             } else {
-                let mut find = Find { root, buffers, file, resolver, budget, report, drawn };
+                let mut find = Find { buffers, file, resolver, budget, report, drawn };
                 images.bytes.push(find.bytes(i, image));
                 // What was looked for once is not looked for again, found or not.
                 known.extend(named.filter(|_| is_wanted(image, drawn)).map(|uri| (uri, i)));
@@ -88,7 +88,6 @@ impl<'a> Images<'a> {
 
 /// Where the bytes of one image are looked for.
 struct Find<'a, 'b> {
-    root: &'b Root,
     buffers: &'a Buffers<'a>,
     file: &'b Path,
     resolver: &'b mut Resolver,
@@ -109,7 +108,6 @@ impl<'a> Find<'a, '_> {
                 }
             },
             (None, Some(view)) => {
-                let view = self.root.buffer_views.get(view.value())?;
                 let bytes = self.buffers.view(view).ok().map(Cow::Borrowed);
                 if bytes.is_none() && self.drawn {
                     self.report.add(Code::ImageDataInvalid, format!("images[{i}]"), "its bytes are not there");

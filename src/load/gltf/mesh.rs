@@ -203,7 +203,8 @@ impl Task<'_, '_> {
             let place = self.place("attributes.POSITION");
             self.report.add(Code::AccessorInvalidFloat, place, "positions that are not finite numbers");
         }
-        if let Some(index) = self.attribute(Semantic::Normals).filter(|&i| !self.is_blank(i)) {
+        if let Some(index) = self.attribute(Semantic::Normals).filter(|&i| !self.reader.is_blank(i)) {
+            // No direction is zero.
             let normals = self.floats::<3>(index, "attributes.NORMAL").filter(|n| n.len() == count);
             mesh.normals = normals.into_iter().flatten().map(Vec3::from).collect();
         }
@@ -286,11 +287,6 @@ impl Task<'_, '_> {
         }
     }
 
-    /// Whether an accessor is all zeros because nothing was written, which no direction and no weight can be.
-    fn is_blank(&self, index: Index<Accessor>) -> bool {
-        self.reader.root.accessors.get(index.value()).is_some_and(|a| a.buffer_view.is_none() && a.sparse.is_none())
-    }
-
     /// Places a skinned mesh by its joints.
     fn pose(&mut self, mesh: &mut Mesh) -> Option<DVec3> {
         let matrices = self.job.joints?;
@@ -301,7 +297,7 @@ impl Task<'_, '_> {
             else {
                 break;
             };
-            if self.is_blank(weights) {
+            if self.reader.is_blank(weights) {
                 break;
             }
             let result = self.reader.integers::<4>(joints, self.pick());

@@ -6,6 +6,10 @@
 //! read (`accessor`, `mesh`, `images`), each piece with its own bounds. What becomes of a fault is a table
 //! ([`codes`]).
 //!
+//! Compressed geometry is decoded before anything reads it: views by `meshopt`, so that they are views like others, and
+//! primitives by `draco`, so that their accessors are accessors like others. Both libraries sit behind features of the
+//! same names; without them, such files are refused with a line that says so.
+//!
 //! Animations are not played: nodes, morph weights and skins are drawn in their rest pose.
 
 mod accessor;
@@ -15,6 +19,13 @@ mod buffers;
 pub mod codes;
 mod container;
 mod document;
+mod draco;
+mod draco_codec;
+#[cfg(feature = "draco")]
+mod draco_points;
+mod draco_stream;
+#[cfg(feature = "draco")]
+mod draco_survey;
 mod extensions;
 mod faces;
 mod graph;
@@ -22,6 +33,8 @@ mod images;
 mod links;
 mod material;
 mod mesh;
+mod meshopt;
+mod meshopt_codec;
 mod placed;
 mod report;
 mod scene;
@@ -170,7 +183,9 @@ impl Loading<'_> {
         let buffers = Buffers::load(root, bin, file, &mut resolver, budget, self.report);
         let replacements = Replacements::load(root, &buffers, budget, self.report);
         let replacements = replacements.map_err(|over| self.too_large("what sparse accessors replace", over))?;
-        let reader = Reader { root, buffers: &buffers, replacements: &replacements };
+        let decoded = draco::Decoded::load(root, &buffers, file, budget, self.report);
+        self.report.check()?;
+        let reader = Reader { root, buffers: &buffers, replacements: &replacements, decoded: &decoded };
         facts.scene_index = scene::choose(root, self.options.scene.as_deref(), file)?;
         self.check_budget(reader, *budget)?;
         bounds::check(reader, self.report);
@@ -203,7 +218,7 @@ impl Loading<'_> {
 
     /// In a GLB, a first buffer without a uri is the binary chunk, which must be there when it is needed.
     fn check_chunk(&mut self, root: &Root) {
-        let nowhere = root.buffers.first().is_some_and(|buffer| buffer.uri.is_none());
+        let nowhere = root.buffers.first().is_some_and(|buffer| buffer.uri.is_none() && !meshopt::is_stand_in(buffer));
         if nowhere && root.buffer_views.iter().any(|view| view.buffer.value() == 0) {
             self.report.add(codes::Code::BufferMissingGlbData, "buffers[0]", "the file has no binary chunk for it");
         }
@@ -212,7 +227,8 @@ impl Loading<'_> {
     /// Refuses a file whose accessors are larger than memory allows, before any is read.
     fn check_budget(&self, reader: Reader, mut budget: Budget) -> Result<(), LoadError> {
         // Zeros need no bytes in the file, so that only the budget bounds them.
-        let zeros = reader.root.accessors.iter().filter(|a| a.buffer_view.is_none()).map(|a| a.count.0);
+        let accessors = reader.root.accessors.iter().enumerate().filter(|(_, a)| a.buffer_view.is_none());
+        let zeros = accessors.filter(|(i, _)| reader.decoded.of(*i).is_none()).map(|(_, a)| a.count.0);
         let largest = zeros.max().unwrap_or(0);
         self.take(&mut budget, largest.saturating_mul(64), "an accessor")
     }

@@ -295,6 +295,8 @@ pub(super) static EXTENSION_WORDS: &[(&str, &str)] = &[
 /// The extensions whose contents are known.
 pub(super) static EXTENSIONS: &[Extension] = &[
     Extension { name: "EXT_mesh_gpu_instancing", on: &["a node"], object: &INSTANCING },
+    Extension { name: "EXT_meshopt_compression", on: &["a buffer"], object: &MESHOPT_BUFFER },
+    Extension { name: "EXT_meshopt_compression", on: &["a buffer view"], object: &MESHOPT },
     Extension { name: "EXT_texture_webp", on: &["a texture"], object: &TEXTURE_SOURCE },
     Extension { name: "KHR_animation_pointer", on: &["a channel target"], object: &POINTER },
     Extension { name: "KHR_draco_mesh_compression", on: &["a primitive"], object: &DRACO },
@@ -315,6 +317,8 @@ pub(super) static EXTENSIONS: &[Extension] = &[
     Extension { name: "KHR_materials_variants", on: &["a primitive"], object: &VARIANT_MAPPINGS },
     Extension { name: "KHR_materials_volume", on: &["a material"], object: &VOLUME },
     Extension { name: "KHR_mesh_quantization", on: &[], object: &EMPTY },
+    Extension { name: "KHR_meshopt_compression", on: &["a buffer"], object: &MESHOPT_BUFFER },
+    Extension { name: "KHR_meshopt_compression", on: &["a buffer view"], object: &MESHOPT },
     Extension { name: "KHR_node_visibility", on: &["a node"], object: &VISIBILITY },
     Extension { name: "KHR_texture_basisu", on: &["a texture"], object: &TEXTURE_SOURCE },
     Extension { name: "KHR_texture_transform", on: &["a texture slot"], object: &TEXTURE_TRANSFORM },
@@ -332,6 +336,22 @@ static POINTER: Object = Object { name: "an extension", properties: &[need("poin
 static DRACO: Object = Object {
     name: "an extension",
     properties: &[need("bufferView", Index("bufferViews")), need("attributes", Map(&OFFSET))],
+};
+
+static MESHOPT_BUFFER: Object = Object { name: "an extension", properties: &[may("fallback", Bool)] };
+
+/// Sizes and words are checked where streams are decoded.
+static MESHOPT: Object = Object {
+    name: "an extension",
+    properties: &[
+        need("buffer", Index("buffers")),
+        may("byteOffset", OFFSET),
+        need("byteLength", SIZE),
+        need("byteStride", SIZE),
+        need("count", SIZE),
+        need("mode", Text),
+        may("filter", Text),
+    ],
 };
 
 static LIGHTS: Object = Object { name: "an extension", properties: &[need("lights", some(&object(&LIGHT)))] };

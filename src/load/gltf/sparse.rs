@@ -39,7 +39,7 @@ impl Replacements {
                 continue;
             };
             budget.take(sparse.count.0, size_of::<Replaced>() as u64)?;
-            all.push(read(root, buffers, accessor, sparse, &format!("accessors[{i}].sparse.indices"), report));
+            all.push(read(buffers, accessor, sparse, &format!("accessors[{i}].sparse.indices"), report));
         }
         Ok(Self(all))
     }
@@ -55,7 +55,6 @@ impl Replacements {
 }
 
 fn read(
-    root: &Root,
     buffers: &Buffers,
     accessor: &Accessor,
     sparse: &Sparse,
@@ -64,7 +63,7 @@ fn read(
 ) -> Result<Vec<Replaced>, Unreadable> {
     let Checked::Valid(component) = sparse.indices.component_type else { return Err(Unreadable::Unknown) };
     let format = Format { component: component.0, shape: Type::Scalar, normalized: false };
-    let run = Run::packed(root, buffers, sparse.indices.buffer_view, sparse.indices.byte_offset.0, format)?;
+    let run = Run::packed(buffers, sparse.indices.buffer_view, sparse.indices.byte_offset.0, format)?;
     let count = usize::try_from(sparse.count.0).map_err(|_| Unreadable::Unknown)?;
     let elements: Vec<u32> = run.elements(count).map(|element| integer(element, format, 0)).collect();
     if elements.len() < count {

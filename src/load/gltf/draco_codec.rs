@@ -1,0 +1,225 @@
+//! Draco streams -> indices and values of vertices, in the types that accessors declare.
+
+use gltf::json::accessor::ComponentType;
+
+/// Attributes that a stream may have besides those that are wanted.
+pub(super) const SPARE: usize = 2;
+
+/// An attribute that is wanted, in the type that its accessor declares.
+#[derive(Clone, Debug)]
+#[cfg_attr(not(feature = "draco"), expect(dead_code, reason = "only the decoder looks for attributes"))]
+pub(super) struct Wanted {
+    /// Its number in the stream.
+    pub(super) id: u64,
+    /// Its name in messages.
+    pub(super) name: String,
+    pub(super) component: ComponentType,
+    /// Components of a value.
+    pub(super) width: usize,
+    /// Values.
+    pub(super) count: u64,
+}
+
+impl Wanted {
+    /// Bytes of all values.
+    pub(super) fn size(&self) -> u64 {
+        self.count.saturating_mul((self.width * self.component.size()) as u64)
+    }
+}
+
+/// What a stream decoded to.
+pub(super) struct Output {
+    /// Corners of triangles, packed, in the type that was asked for.
+    pub(super) indices: Vec<u8>,
+    /// For each attribute that was wanted, the values of all vertices, packed.
+    pub(super) attributes: Vec<Vec<u8>>,
+}
+
+/// Decodes a stream whose [`super::draco_stream::Counts`] agree with what is wanted.
+///
+/// # Errors
+/// What is wrong with the stream, or what it does not have.
+#[cfg(feature = "draco")]
+pub(super) fn decode(stream: &[u8], indices: ComponentType, wanted: &[Wanted]) -> Result<Output, String> {
+    decoder::decode(stream, indices, wanted)
+}
+
+/// Without the library, says so.
+#[cfg(not(feature = "draco"))]
+pub(super) fn decode(_: &[u8], _: ComponentType, _: &[Wanted]) -> Result<Output, String> {
+    Err("this meshray was built without the feature 'draco'".into())
+}
+
+#[cfg(feature = "draco")]
+mod decoder {
+    //! What the library decodes, in the types that accessors declare.
+
+    use super::{ComponentType, Output, Wanted};
+    use crate::load::gltf::draco_points::Points;
+    use crate::load::gltf::draco_survey::check;
+    use crate::load::quiet::attempt;
+    use draco_oxide_core::attribute::Attribute;
+    use draco_oxide_core::mesh::Mesh;
+    use draco_oxide_decoder::connectivity::Connectivity;
+
+    pub(super) fn decode(stream: &[u8], indices: ComponentType, wanted: &[Wanted]) -> Result<Output, String> {
+        let decoded = attempt(|| mesh(stream, wanted));
+        let damaged = || String::from("the stream cannot be decoded: it is damaged");
+        let (mesh, corners, points) = decoded.unwrap_or_else(|| Err(damaged()))?;
+        let attribute = |wanted: &Wanted| {
+            let mut all = mesh.attributes.iter();
+            let found = all.find(|attribute| attribute.get_id().as_usize() as u64 == wanted.id);
+            let attribute = found.ok_or_else(|| format!("the stream has no attribute {}", wanted.id))?;
+            let all = places(attribute);
+            let chosen: Option<Vec<u32>> = match &points {
+                Some(points) => points.shown.iter().map(|&point| all.get(point as usize).copied()).collect(),
+                None => Some(all),
+            };
+            let values = Values {
+                bytes: attribute.get_data_as_bytes(),
+                kind: attribute.get_component_type().get_id(),
+                width: attribute.get_num_components(),
+            };
+            let values = chosen.ok_or_else(lost).and_then(|places| values.convert(&places, wanted));
+            values.map_err(|why| format!("{}: {why}", wanted.name))
+        };
+        let attributes = wanted.iter().map(attribute).collect::<Result<_, _>>()?;
+        let mut bytes = Vec::with_capacity(corners.len() * indices.size());
+        for corner in corners {
+            let corner = points.as_ref().map_or(corner, |points| points.number[corner as usize]);
+            write(Number::Whole(corner.into()), indices, &mut bytes)?;
+        }
+        Ok(Output { indices: bytes, attributes })
+    }
+
+    /// The mesh as the library has it, the point of each corner, and how the format numbers points if not like it.
+    fn mesh(stream: &[u8], wanted: &[Wanted]) -> Result<(Mesh, Vec<u32>, Option<Points>), String> {
+        let survey = check(stream, wanted)?;
+        let mesh = draco_oxide_decoder::decode_mesh(stream);
+        let mesh = mesh.map_err(|why| format!("the stream cannot be decoded: {why}"))?;
+        let corners: Vec<u32> = mesh.faces.iter().flatten().map(|&corner| usize::from(corner) as u32).collect();
+        let Some(walked) = survey.connectivity.as_ref().and_then(Connectivity::edgebreaker) else {
+            return Ok((mesh, corners, None));
+        };
+        let values: Vec<Vec<u32>> = mesh.attributes.iter().map(places).collect();
+        let points = Points::of(walked, &survey.seams, &corners, &values).ok_or_else(lost)?;
+        Ok((mesh, corners, Some(points)))
+    }
+
+    /// For each point, where its value is.
+    fn places(attribute: &Attribute) -> Vec<u32> {
+        match attribute.point_map_as_slice() {
+            Some(map) => map.iter().map(|&place| usize::from(place) as u32).collect(),
+            None => (0..attribute.len() as u32).collect(),
+        }
+    }
+
+    fn lost() -> String {
+        "a vertex without a value: the stream is damaged".into()
+    }
+
+    /// Decoded values, each once.
+    struct Values<'a> {
+        bytes: &'a [u8],
+        /// Draco's number of the component type.
+        kind: u8,
+        width: usize,
+    }
+
+    #[derive(Clone, Copy)]
+    enum Number {
+        Whole(i64),
+        Float(f32),
+    }
+
+    impl Values<'_> {
+        /// The value of every vertex, which are found at `places`, in the type that is wanted.
+        fn convert(&self, places: &[u32], w: &Wanted) -> Result<Vec<u8>, String> {
+            let count = places.len();
+            if self.width != w.width {
+                return Err(format!("{} components in the stream, {} in the accessor", self.width, w.width));
+            }
+            if count as u64 != w.count {
+                return Err(format!("{count} values in the stream, {} in the accessor", w.count));
+            }
+            let size = self.size()?;
+            // The library keeps values as the machine does, files keep the lowest byte first.
+            let same = self.kind == kind_of(w.component) && cfg!(target_endian = "little");
+            let mut out = Vec::with_capacity(count * w.width * w.component.size());
+            for &place in places {
+                let value = (place as usize).checked_mul(size * self.width).and_then(|start| self.bytes.get(start..));
+                let value = value.and_then(|rest| rest.get(..size * self.width));
+                let value = value.ok_or_else(lost)?;
+                if same {
+                    out.extend_from_slice(value);
+                    continue;
+                }
+                for component in value.chunks_exact(size) {
+                    write(self.number(component), w.component, &mut out)?;
+                }
+            }
+            Ok(out)
+        }
+
+        /// Bytes of a component.
+        fn size(&self) -> Result<usize, String> {
+            match self.kind {
+                1 | 2 => Ok(1),
+                3 | 4 => Ok(2),
+                5 | 6 | 9 => Ok(4),
+                kind => Err(format!("components of Draco's type {kind} have no meaning in glTF")),
+            }
+        }
+
+        /// A component of the stream, in the byte order of the machine.
+        fn number(&self, bytes: &[u8]) -> Number {
+            let (one, two, four) = (bytes.first_chunk(), bytes.first_chunk(), bytes.first_chunk());
+            match (self.kind, one, two, four) {
+                (1, Some(&b), ..) => Number::Whole(i8::from_ne_bytes(b).into()),
+                (2, Some(&b), ..) => Number::Whole(u8::from_ne_bytes(b).into()),
+                (3, _, Some(&b), _) => Number::Whole(i16::from_ne_bytes(b).into()),
+                (4, _, Some(&b), _) => Number::Whole(u16::from_ne_bytes(b).into()),
+                (5, _, _, Some(&b)) => Number::Whole(i32::from_ne_bytes(b).into()),
+                (6, _, _, Some(&b)) => Number::Whole(u32::from_ne_bytes(b).into()),
+                (_, _, _, Some(&b)) => Number::Float(f32::from_ne_bytes(b)),
+                // `size` has left no other.
+                _ => Number::Whole(0),
+            }
+        }
+    }
+
+    /// Draco's number of a component type.
+    fn kind_of(component: ComponentType) -> u8 {
+        match component {
+            ComponentType::I8 => 1,
+            ComponentType::U8 => 2,
+            ComponentType::I16 => 3,
+            ComponentType::U16 => 4,
+            ComponentType::U32 => 6,
+            ComponentType::F32 => 9,
+        }
+    }
+
+    /// Writes a number as a component of an accessor.
+    fn write(number: Number, component: ComponentType, out: &mut Vec<u8>) -> Result<(), String> {
+        let whole = match number {
+            Number::Whole(whole) => whole,
+            Number::Float(float) if component == ComponentType::F32 => {
+                out.extend(float.to_le_bytes());
+                return Ok(());
+            }
+            Number::Float(float) if float.fract() == 0.0 => float as i64,
+            Number::Float(float) => return Err(format!("{float} in the stream, where the accessor has integers")),
+        };
+        let lost = || format!("{whole} in the stream does not fit the type of the accessor");
+        match component {
+            ComponentType::I8 => out.extend(i8::try_from(whole).map_err(|_| lost())?.to_le_bytes()),
+            ComponentType::U8 => out.extend(u8::try_from(whole).map_err(|_| lost())?.to_le_bytes()),
+            ComponentType::I16 => out.extend(i16::try_from(whole).map_err(|_| lost())?.to_le_bytes()),
+            ComponentType::U16 => out.extend(u16::try_from(whole).map_err(|_| lost())?.to_le_bytes()),
+            ComponentType::U32 => out.extend(u32::try_from(whole).map_err(|_| lost())?.to_le_bytes()),
+            ComponentType::F32 => out.extend((whole as f32).to_le_bytes()),
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,106 @@
+//! The order of the points of a mesh that was encoded as a walk over its triangles.
+//!
+//! The library numbers points as it meets them. The format says another order (`AssignPointsToCorners` of the Draco
+//! bitstream specification, version 2.2): vertex by vertex, around each from its left-most corner or from a seam on.
+//! Attributes and morph targets that are not compressed are stored in that order.
+
+use draco_oxide_core::mesh::ds::GenericCornerTable as _;
+use draco_oxide_core::types::CornerIdx;
+use draco_oxide_decoder::connectivity::EdgebreakerConnectivity;
+
+/// The library's mark for no corner.
+pub(super) const NONE: usize = u32::MAX as usize;
+
+/// The points that some triangle shows.
+pub(super) struct Points {
+    /// In the order of the format.
+    pub(super) shown: Vec<u32>,
+    /// For each point of the library, its place among these.
+    pub(super) number: Vec<u32>,
+}
+
+impl Points {
+    /// Numbers the points of `corners`; `values` tells for each attribute the place of a point's value.
+    ///
+    /// `None`: the stream is damaged.
+    pub(super) fn of(
+        walked: &EdgebreakerConnectivity,
+        seams: &[Option<u8>],
+        corners: &[u32],
+        values: &[Vec<u32>],
+    ) -> Option<Self> {
+        let seams = seams.iter().zip(values).filter_map(|(seam, values)| Some(((*seam)?, values.as_slice())));
+        let mut seams: Vec<(u8, &[u32])> = seams.collect();
+        seams.sort_by_key(|seam| seam.0);
+        // There are at most as many points as corners.
+        let last = corners.iter().max().map_or(0, |&last| last as usize);
+        let number = vec![u32::MAX; Some(last + 1).filter(|&count| count <= corners.len().max(1))?];
+        let mut points = Self { shown: Vec::new(), number };
+        // Once around each vertex, and once for each of its seams.
+        let steps = corners.len().saturating_mul(seams.len() + 1);
+        let mut around = Around { walked, corners, seams, left: steps };
+        for (vertex, &corner) in walked.vertex_corners.iter().enumerate().filter(|(_, c)| usize::from(**c) != NONE) {
+            let first = around.first(vertex, corner)?;
+            let mut at = Some(first);
+            while let Some(corner) = at {
+                points.add(around.point(corner)?)?;
+                at = around.next(corner)?.filter(|&next| next != first);
+            }
+        }
+        let met = |&corner: &u32| points.number.get(corner as usize).is_some_and(|&number| number != u32::MAX);
+        corners.iter().all(met).then_some(points)
+    }
+
+    fn add(&mut self, point: u32) -> Option<()> {
+        let number = self.number.get_mut(point as usize)?;
+        if *number == u32::MAX {
+            *number = self.shown.len() as u32;
+            self.shown.push(point);
+        }
+        Some(())
+    }
+}
+
+/// Steps around vertices.
+struct Around<'a> {
+    walked: &'a EdgebreakerConnectivity,
+    corners: &'a [u32],
+    /// Seams by their number, with the place of each point's value.
+    seams: Vec<(u8, &'a [u32])>,
+    /// Steps that a mesh without damage does not need.
+    left: usize,
+}
+
+impl Around<'_> {
+    /// The corner that a round begins with.
+    fn first(&mut self, vertex: usize, corner: CornerIdx) -> Option<CornerIdx> {
+        if self.walked.is_vert_hole.get(vertex).copied().unwrap_or(true) {
+            return Some(corner);
+        }
+        for seam in 0..self.seams.len() {
+            let own = self.value(seam, corner)?;
+            let mut at = self.next(corner)?;
+            while let Some(next) = at.filter(|&next| next != corner) {
+                if self.value(seam, next)? != own {
+                    return Some(next);
+                }
+                at = self.next(next)?;
+            }
+        }
+        Some(corner)
+    }
+
+    /// The next corner around the same vertex; the outer `None`: there is no end to them.
+    fn next(&mut self, corner: CornerIdx) -> Option<Option<CornerIdx>> {
+        self.left = self.left.checked_sub(1)?;
+        Some(self.walked.corner_table.swing_right(corner))
+    }
+
+    fn point(&self, corner: CornerIdx) -> Option<u32> {
+        self.corners.get(usize::from(corner)).copied()
+    }
+
+    fn value(&self, seam: usize, corner: CornerIdx) -> Option<u32> {
+        self.seams.get(seam)?.1.get(self.point(corner)? as usize).copied()
+    }
+}

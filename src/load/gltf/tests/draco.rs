@@ -1,0 +1,243 @@
+//! Primitives compressed by Draco. The streams were written by Google's encoder, version 1.5, from the plain box.
+
+use super::boxes::{Plain, survives, textured, triangles};
+use super::*;
+use crate::load::gltf::draco_codec::{Output, Wanted, decode};
+use gltf::json::accessor::ComponentType;
+
+const NAME: &str = "KHR_draco_mesh_compression";
+
+/// A walk over the triangles, everything quantised.
+const WALK: &str = "RFJBQ08CAgEBAAAACAwECwAAA19LFQEBEP8CNUFVBIqspEZVBIqspEZVBIqspEYFAAAAAwEA/wAAAQEAAgEAAQICBAEKAQEEAgQACQEBAAkDAA0C\
+    AQMJAgELAgEBCQMADAMBAQEBAgMBKgEIAQ4HgM533eimSgAAAAD/AAAAAQEBAQMEqSoBBK0GrQoTdKDsSXsS2s39oPhoe/zdh/artQAAAAADAAAA\
+    AQEBAAMDASABIAMAUEOVAhGoAAAAAAD/DwAAAAAAvwAAAL8AAAC/AACAPwwFAQEBAgMBLK0KVQkKgNjWhaDjq1DMgAwAAABAA4D7ZAAAAAD/AwAA\
+    AAAAAAAAAAAAAIA/CgYDAQEBAQFAAQD/AAAAfwAAAP8CoUEI";
+
+/// The same, as small as it gets, with metadata.
+const SMALL: &str = "RFJBQ08CAgEBAIAAARFxdWFudGl6YXRpb25fYml0cwQMAAAAAAAIDAQLAAADX0sVAQEQ/wI1QVUEiqykRlUEiqykRlUEiqykRgUAAAADAQD/AAEB\
+    AQACAQABAgIEAQoBAQQCBAAJAQEACQMADQIBAwkCAQsCAQEJAwAMAwEBAQEEAwEqAQgBDgeAznfd6KZKAAAAAP8AAAABAQEBBQSpKgEErQatChN0\
+    oOxJexLazf2g+Gh7/N2H9qu1AAAAAAMAAAABAQEAAwMBMAEQAwAolpUCEAAAAAAA/w8AAAAAAL8AAAC/AAAAvwAAgD8MBQEBAQQDASytClUJCoDY\
+    1oWg46tQzIAMAAAAQAOA+2QAAAAA/wMAAAAAAAAAAAAAAACAPwoGAwEBAwEBQAEA/wAAAH8AAAD/AqFBCA==";
+
+/// The order of triangles and vertices kept, normals and texture coordinates as they are.
+const ROW: &str = "RFJBQ08CAgEAAAAMGAEAAgEAAwIEBQYEBgcICgkICwoMDQ4MDg8QEhEQExIUFRYUFhcBBQICBAEKAwkCAQsBCQMADAQCBAAJAAkDAA0BAAABAgAB\
+    AQEBA6ksrQqtCBGSjeF/HM4kRo1IPbS9xP9ngAAAAAD/AAAAAAAAAAAAAAAAAIA/AAAAAAAAgD8AAIA/AAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAA\
+    AACAPwAAgD8AAAAAAACAPwAAAAAAAAAAAACAPwAAAAAAAIA/AACAPwAAAAAAAIA/AAAAAAAAAAAAAIA/AAAAAAAAgD8AAIA/AAAAAAAAgD8AAAAA\
+    AAAAAAAAgD8AAAAAAACAPwAAgD8AAAAAAACAPwAAAAAAAAAAAACAPwAAAAAAAIA/AACAPwAAAAAAAIA/AACAvwAAAAAAAAAAAACAvwAAAAAAAAAA\
+    AACAvwAAAAAAAAAAAACAvwAAAAAAAAAAAACAPwAAAAAAAAAAAACAPwAAAAAAAAAAAACAPwAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgL8AAAAA\
+    AAAAAAAAgL8AAAAAAAAAAAAAgL8AAAAAAAAAAAAAgL8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAA\
+    AAAAAAAAAAAAAIC/AAAAAAAAAAAAAIC/AAAAAAAAAAAAAIC/AAAAAAAAAAAAAIC/AAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/\
+    AAAAAAAAAAAAAIA/AAEBAQEEASwDrRBVAxBCZNo8DNEzYaCu4e8cS5GAAAAAAAMAAAAAAQEBAQMdJ1UNkQsP2VFw4/C6Q9lWflwjCUeAAAAAAP8P\
+    AAAAAAC/AAAAvwAAAL8AAIA/DA==";
+
+/// The numbers of the attributes in these streams, with the accessors that a file needs for them.
+const ATTRIBUTES: &[(&str, u32, u32, &str, bool)] = &[
+    ("POSITION", 13, 5126, "VEC3", false),
+    ("NORMAL", 12, 5126, "VEC3", false),
+    ("TEXCOORD_0", 11, 5126, "VEC2", false),
+    ("COLOR_0", 10, 5121, "VEC4", true),
+];
+
+fn stream(text: &str) -> Vec<u8> {
+    base64::engine::general_purpose::STANDARD.decode(text).unwrap()
+}
+
+/// A box that is nothing but a stream.
+fn file(stream: &[u8]) -> Builder {
+    let mut file = Builder::new();
+    let view = file.view(stream, &[]);
+    let indices = file.push("accessors", json!({"componentType": 5123, "type": "SCALAR", "count": 36}));
+    let (mut attributes, mut listed) = (json!({}), json!({}));
+    for (name, id, component, kind, normalized) in ATTRIBUTES {
+        let accessor = json!({"componentType": component, "type": kind, "count": 24, "normalized": normalized});
+        attributes[*name] = json!(file.push("accessors", accessor));
+        listed[*name] = json!(id);
+    }
+    let extensions = json!({NAME: {"bufferView": view, "attributes": listed}});
+    file.primitive(json!({"attributes": attributes, "indices": indices, "material": 0, "extensions": extensions}));
+    file.set("extensionsUsed", json!([NAME])).set("extensionsRequired", json!([NAME]));
+    textured(&mut file);
+    file
+}
+
+#[test]
+fn a_compressed_box_is_the_same_as_the_plain_one() {
+    let plain = triangles(&Plain::new().file().load());
+    for text in [WALK, SMALL, ROW] {
+        let loaded = file(&stream(text)).load();
+        assert_eq!(codes(&loaded), Vec::<&str>::new(), "{:?}", loaded.warnings);
+        assert_eq!(triangles(&loaded), plain);
+    }
+}
+
+#[test]
+fn whole_numbers_and_the_order_of_vertices_are_kept() {
+    let plain = Plain::new();
+    let wanted = |id, component, width| Wanted { id, name: String::new(), component, width, count: 24 };
+    let all = [wanted(9, ComponentType::U8, 4), wanted(10, ComponentType::U8, 4), wanted(9, ComponentType::U16, 4)];
+    let output = decode(&stream(ROW), ComponentType::U16, &all).unwrap();
+    assert_eq!(output.attributes[0], plain.joints.as_flattened());
+    assert_eq!(output.attributes[1], plain.colors.as_flattened());
+    let wide: Vec<u8> = plain.joints.as_flattened().iter().flat_map(|&j| u16::from(j).to_le_bytes()).collect();
+    assert_eq!(output.attributes[2], wide);
+    let indices: Vec<u8> = plain.indices.iter().flat_map(|i| i.to_le_bytes()).collect();
+    assert_eq!(output.indices, indices);
+}
+
+#[test]
+fn morph_targets_beside_a_stream_move_its_vertices() {
+    let mut file = file(&stream(ROW));
+    let offsets = file.floats("VEC3", [1.0, 0.0, 0.0].repeat(24).as_slice());
+    file.root["meshes"][0]["primitives"][0]["targets"] = json!([{ "POSITION": offsets }]);
+    file.root["meshes"][0]["weights"] = json!([0.5]);
+    let loaded = file.load();
+    let lowest = loaded.scene.meshes[0].positions.iter().map(|p| p.x).fold(f32::INFINITY, f32::min);
+    assert!(lowest.abs() < 1e-3, "{lowest}");
+}
+
+#[test]
+fn two_primitives_may_show_one_stream() {
+    let mut file = file(&stream(WALK));
+    let primitive = file.root["meshes"][0]["primitives"][0].clone();
+    file.set("meshes", json!([{"primitives": [primitive.clone(), primitive]}]));
+    assert_eq!(file.load().facts.faces, 24);
+}
+
+#[test]
+fn an_accessor_of_two_streams_is_one_line() {
+    let mut file = file(&stream(WALK));
+    let other = file.view(&stream(ROW), &[]);
+    let first = file.root["meshes"][0]["primitives"][0].clone();
+    let mut second = first.clone();
+    second["extensions"][NAME]["bufferView"] = json!(other);
+    file.set("meshes", json!([{"primitives": [first, second]}]));
+    let told = file.fault();
+    assert!(told.contains("primitives[1]") && told.contains("two different parts of Draco streams"), "{told}");
+    assert_eq!(told.lines().count(), 1);
+}
+
+#[test]
+fn a_stream_that_disagrees_with_its_accessors_is_one_line_with_the_numbers() {
+    let place = format!("a.gltf:meshes[0].primitives[0].extensions.{NAME}");
+    let remedy = "; get the file again, or export it without Draco compression";
+    let with = |change: &dyn Fn(&mut Builder)| {
+        let mut file = file(&stream(WALK));
+        change(&mut file);
+        file.fault()
+    };
+    let count = |i: usize, count: u32| move |file: &mut Builder| file.root["accessors"][i]["count"] = json!(count);
+    let told = with(&count(0, 33));
+    assert_eq!(told, format!("{place}: the stream has 12 triangles, but the accessor declares 33 indices{remedy}"));
+    let told = with(&|file| (1..5).for_each(|i| count(i, 7)(file)));
+    assert_eq!(told, format!("{place}: the stream has 8 vertices, but the accessors declare 7{remedy}"));
+    let told = with(&|file| (1..5).for_each(|i| count(i, 23)(file)));
+    assert!(told.starts_with(&place) && told.contains("24 values") && told.lines().count() == 1, "{told}");
+    let told = with(&|file| {
+        let primitive = &mut file.root["meshes"][0]["primitives"][0];
+        primitive["extensions"][NAME]["attributes"]["NORMAL"] = json!(99);
+    });
+    assert_eq!(told, format!("{place}: the stream has no attribute 99{remedy}"));
+    let told = with(&|file| file.root["accessors"][1]["type"] = json!("VEC2"));
+    assert!(told.contains("POSITION"), "{told}");
+    let told = with(&|file| file.root["accessors"][3]["type"] = json!("VEC3"));
+    assert!(told.contains("TEXCOORD_0: 2 components in the stream, 3 in the accessor"), "{told}");
+    let told = with(&|file| file.root["meshes"][0]["primitives"][0]["mode"] = json!(1));
+    assert!(told.contains("only triangles can be decoded"), "{told}");
+}
+
+#[test]
+fn what_the_decoder_does_not_know_is_one_line() {
+    let told = |at: usize, byte: u8| {
+        let mut stream = stream(WALK);
+        stream[at] = byte;
+        let told = file(&stream).fault();
+        assert_eq!(told.lines().count(), 1, "{told}");
+        told
+    };
+    assert!(told(0, b'X').contains("its bytes are no Draco stream"));
+    assert!(told(6, 1).contains("the stream has version 2.1, and only 2.2 can be decoded"));
+    assert!(told(7, 0).contains("a point cloud"));
+    assert!(told(8, 7).contains("an unknown method, 7"));
+}
+
+#[test]
+fn absurd_numbers_take_no_memory() {
+    // Triangles, after the vertices at byte 12.
+    let mut many = stream(WALK);
+    many.splice(13..14, [0xff, 0xff, 0xff, 0xff, 0x07]);
+    assert!(file(&many).fault().contains("more than can be decoded"));
+    let mut billions = file(&many);
+    billions.root["accessors"][0]["count"] = json!(3u64 * 0x7fff_ffff);
+    assert_eq!(billions.fault().lines().count(), 1);
+}
+
+#[test]
+fn uncompressed_data_stands_in_for_a_damaged_stream_unless_the_extension_is_required() {
+    let plain = Plain::new();
+    let mut file = plain.file();
+    let view = file.view(b"DRACO but not really", &[]);
+    let listed = json!({"POSITION": 13, "NORMAL": 12, "TEXCOORD_0": 11, "COLOR_0": 10});
+    file.root["meshes"][0]["primitives"][0]["extensions"] = json!({NAME: {"bufferView": view, "attributes": listed}});
+    file.set("extensionsUsed", json!([NAME]));
+    let loaded = file.load();
+    assert_eq!(codes(&loaded), ["gltf-draco"]);
+    assert!(loaded.warnings.iter().any(|w| w.remedy == "the uncompressed data in the file is drawn"));
+    assert_eq!(triangles(&loaded), triangles(&plain.file().load()));
+    file.set("extensionsRequired", json!([NAME]));
+    assert!(file.fault().contains("get the file again"));
+}
+
+#[test]
+fn memory_for_decoding_is_charged() {
+    let bytes = file(&stream(WALK)).gltf();
+    let with = |memory| LoadOptions { limits: Limits { memory, ..Limits::default() }, ..LoadOptions::default() };
+    let refused = (0..200).find_map(|k| {
+        let error = load_bytes(Path::new("a.gltf"), bytes.clone(), &with(40_000 + k * 1000)).err()?;
+        Some(error.to_string()).filter(|text| text.contains("the decoded primitive is too large"))
+    });
+    assert!(refused.is_some_and(|text| text.ends_with("; allow more with --max-memory")));
+}
+
+#[test]
+fn a_stream_that_is_cut_off_is_one_line() {
+    for text in [WALK, SMALL, ROW] {
+        let stream = stream(text);
+        for length in 0..stream.len() {
+            // A last byte may say nothing new.
+            let lives = length > 0 && survives(&file(&stream[..length]).gltf(), &format!("{length} bytes"));
+            assert!(!lives || length + 5 > stream.len(), "{length} of {} bytes", stream.len());
+        }
+    }
+}
+
+#[test]
+fn a_flipped_bit_in_a_stream_never_panics() {
+    let mut refused = 0;
+    for (text, step) in [(WALK, 1), (SMALL, 7), (ROW, 7)] {
+        let stream = stream(text);
+        for bit in (0..stream.len() * 8).step_by(step) {
+            let mut stream = stream.clone();
+            stream[bit / 8] ^= 1 << (bit % 8);
+            refused += u32::from(!survives(&file(&stream).gltf(), &format!("bit {bit}")));
+        }
+    }
+    assert!(refused > 1000, "{refused}");
+}
+
+#[test]
+fn vertices_are_numbered_as_by_the_encoder_of_the_format() {
+    // The corner, axis and side of each vertex in the order that Google's decoder gives.
+    const VERTICES: &str =
+        "110 300 022 302 210 122 222 212 202 120 310 002 102 312 220 010 020 000 322 200 112 012 100 320";
+    const INDICES: [u16; 36] = [
+        2, 5, 6, 3, 11, 8, 8, 11, 12, 14, 9, 16, 10, 4, 15, 4, 0, 15, 17, 1, 19, 2, 6, 18, 20, 7, 21, 7, 13, 21, 14,
+        16, 23, 19, 22, 17,
+    ];
+    let joints = Wanted { id: 9, name: String::new(), component: ComponentType::U8, width: 4, count: 24 };
+    let colors = Wanted { id: 10, ..joints.clone() };
+    let Output { attributes, indices } =
+        decode(&stream(WALK), ComponentType::U16, &[joints.clone(), colors, joints]).unwrap();
+    let vertices = attributes[0].as_chunks::<4>().0.iter().map(|[a, b, c, _]| format!("{a}{b}{c}"));
+    assert_eq!(vertices.collect::<Vec<_>>().join(" "), VERTICES);
+    assert_eq!(indices, INDICES.map(u16::to_le_bytes).concat());
+}

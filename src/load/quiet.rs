@@ -1,0 +1,41 @@
+//! Calls code of others that may panic on damaged input, and keeps the panic from being told as a fault of ours.
+
+use std::cell::Cell;
+use std::panic::{self, AssertUnwindSafe};
+use std::sync::Once;
+
+thread_local! {
+    /// Whether a panic of this thread is expected and will be told as a fault of the file.
+    static EXPECTED: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Does `work`; `None` when it panics. What it has changed by then must not be used.
+///
+/// The panic hook is for the whole process, so that it is wrapped once and asks the thread whether to stay silent.
+pub(crate) fn attempt<T>(work: impl FnOnce() -> T) -> Option<T> {
+    static WRAPPED: Once = Once::new();
+    WRAPPED.call_once(|| {
+        let hook = panic::take_hook();
+        panic::set_hook(Box::new(move |info| {
+            if !EXPECTED.get() {
+                hook(info);
+            }
+        }));
+    });
+    EXPECTED.set(true);
+    let result = panic::catch_unwind(AssertUnwindSafe(work));
+    EXPECTED.set(false);
+    result.ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_is_an_answer() {
+        assert_eq!(attempt(|| 3), Some(3));
+        assert_eq!(attempt(|| -> u32 { panic!("expected in this test") }), None);
+        assert!(!EXPECTED.get());
+    }
+}
