@@ -247,8 +247,8 @@ impl<'a> Check<'a> {
             self.report.add(Code::MeshPrimitiveTooFewTexcoords, &place, text);
         }
         let extension = |name: &str| material.get("extensions").and_then(|e| e.get(name));
-        // Normal maps get tangents from their texture coordinates.
-        let oriented = extension("KHR_materials_anisotropy").is_some();
+        let oriented = extension("KHR_materials_anisotropy").is_some()
+            || extension("KHR_materials_clearcoat").is_some_and(|c| c.get("clearcoatNormalTexture").is_some());
         if oriented && !attributes.contains_key("TANGENT") && material.get("normalTexture").is_none() {
             self.report.add(
                 Code::MeshPrimitiveNoTangentSpace,

@@ -162,7 +162,7 @@ codes! {
         "bounds are computed from the data";
     MeshPrimitiveTangentWithoutNormal "MESH_PRIMITIVE_TANGENT_WITHOUT_NORMAL" Warn "such tangents are to be ignored";
     MeshPrimitiveGeneratedTangentSpace "MESH_PRIMITIVE_GENERATED_TANGENT_SPACE" Accept "MikkTSpace is what the format asks for";
-    MeshPrimitiveNoTangentSpace "MESH_PRIMITIVE_NO_TANGENT_SPACE" Warn "drawn without that effect";
+    MeshPrimitiveNoTangentSpace "MESH_PRIMITIVE_NO_TANGENT_SPACE" Warn "they are made from its texture coordinates";
     MeshPrimitiveTooFewTexcoords "MESH_PRIMITIVE_TOO_FEW_TEXCOORDS" Warn "the map is read at (0, 0)";
     MeshPrimitiveUnequalAccessorCount "MESH_PRIMITIVE_UNEQUAL_ACCESSOR_COUNT" Refuse "which values belong together is unknown";
     MeshPrimitivesUnequalTargetsCount "MESH_PRIMITIVES_UNEQUAL_TARGETS_COUNT" Warn "targets that are missing change nothing";
