@@ -1,14 +1,14 @@
 //! What every ray of an image shares: the scene, its lights and sky in the centred frame, and the limits of the trees.
 
 use super::Settings;
+use super::absorption::Absorption;
 use super::shade::{Band, LocalLight, Sky, bands};
 use super::strip::Uniform;
 use super::texture::TextureStore;
-use super::wave::Media;
 use super::world::World;
 use crate::math::Vec3;
 use crate::scene::features::{Feature, Features};
-use crate::scene::{AlphaMode, Background, Material, Scene, Surface};
+use crate::scene::{AlphaMode, Background, Material, Scene};
 
 /// Shared by all workers, computed once per image.
 pub(crate) struct Context<'a> {
@@ -24,8 +24,8 @@ pub(crate) struct Context<'a> {
     pub bands: Vec<Band>,
     /// Whether anything but opaque surfaces can stand before a light.
     pub has_filters: bool,
-    /// How strongly the inside of each material absorbs light; empty where none does.
-    absorption: Vec<Vec3>,
+    /// How strongly the insides of materials absorb light.
+    pub absorption: Absorption,
     /// Whether the environment is what is seen behind the scene.
     pub shows_environment: bool,
     /// Whether nothing is seen but lights, and what shines by itself.
@@ -56,7 +56,7 @@ impl<'a> Context<'a> {
             uniform: scene.materials.iter().map(uniform).collect(),
             bands: if needs(&[Feature::Dispersion]) { bands() } else { Vec::new() },
             has_filters: needs(&[Feature::Mask, Feature::Blend, Feature::ThinTransmission, Feature::Refraction]),
-            absorption: absorption(&scene.materials, everything),
+            absorption: Absorption::of(&scene.materials, everything),
             shows_environment: scene.background == Some(Background::Environment),
             depth,
             cutoff: settings.cutoff,
@@ -64,33 +64,10 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// How strongly what a ray is inside of absorbs light; `None` where it does not.
-    pub(crate) fn absorption_in(&self, media: &Media) -> Option<Vec3> {
-        if self.absorption.is_empty() {
-            return None;
-        }
-        self.absorption_by(media.innermost()?.material)
-    }
-
-    /// How strongly the inside of a material absorbs light; `None` where it does not.
-    pub(crate) fn absorption_by(&self, material: u32) -> Option<Vec3> {
-        self.absorption.get(material as usize).copied().filter(|a| *a != Vec3::ZERO || self.everything)
-    }
-
     /// Whether a branch of this weight is worth its rays.
     pub(crate) fn is_alive(&self, weight: Vec3) -> bool {
         weight.max_element() >= self.cutoff.max(f32::MIN_POSITIVE)
     }
-}
-
-/// The coefficients of all materials, if any of them absorbs light inside.
-fn absorption(materials: &[Material], everything: bool) -> Vec<Vec3> {
-    let coefficient = |material: &Material| match &material.surface {
-        Surface::MetalRough(m) if m.thick && m.transmission > 0.0 => m.absorption,
-        _ => Vec3::ZERO,
-    };
-    let all: Vec<Vec3> = materials.iter().map(coefficient).collect();
-    if everything || all.iter().any(|a| *a != Vec3::ZERO) { all } else { Vec::new() }
 }
 
 /// Bounces that a scene needs: none without mirrors or glass, a few between mirrors, more where every object is entered
@@ -120,7 +97,7 @@ pub(crate) fn coverage(material: &Material, opacity: f32) -> f32 {
 mod tests {
     use super::*;
     use crate::math::DVec3;
-    use crate::scene::{MetalRough, Phong, Sphere};
+    use crate::scene::{MetalRough, Phong, Sphere, Surface};
 
     fn scene_of(surface: Surface) -> Scene {
         let sphere = Sphere { name: String::new(), center: DVec3::ZERO, radius: 1.0, material: 0 };

@@ -6,7 +6,10 @@
 //!   through ([`World::with_everything`](super::World::with_everything));
 //! - at each point: the lookup of every map that its material lacks, in a map of the program's own
 //!   ([`TextureStore::with_everything`](super::texture::TextureStore::with_everything)), with normal and bump mapping;
+//! - at each point: what is absorbed on the way to it, by materials that absorb nothing;
 //! - at each point where rays end: the balance of what is reflected and refracted, and its spectrum.
+//!
+//! Film, sheen and lacquer are not: a material has them, or there is nothing to be done.
 
 use super::surface::Surface;
 use super::texture::{ColorSpace, STAND_IN, TextureStore};
@@ -46,7 +49,8 @@ pub(super) fn look_up_in_vain(surface: &Surface, store: &TextureStore) {
         Reflection::Unlit => {}
         Reflection::Phong(p) => maps.extend([&p.ambient_map, &p.specular_map, &p.shininess_map]),
         Reflection::MetalRough(p) => {
-            maps.extend([&p.metal_rough_map, &p.specular_map, &p.specular_color_map, &p.transmission_map]);
+            let optical = [&p.transmission_map, &p.thickness_map];
+            maps.extend([&p.metal_rough_map, &p.specular_map, &p.specular_color_map].into_iter().chain(optical));
         }
     }
     for _ in maps.iter().filter(|map| map.is_none()) {

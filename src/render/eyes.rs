@@ -1,7 +1,7 @@
 //! Rays from the eye: the first wave of every batch of pixels, many at a time.
 
 use super::view::View;
-use super::wave::{Media, Path};
+use super::wave::Path;
 use crate::accel::{Hit, NO_PRIM, Ray};
 use crate::math::simd::{Kernel, Level, Simd};
 use crate::math::{DVec3, Vec3};
@@ -69,25 +69,12 @@ impl Eye<'_> {
 
 impl EyeRay {
     pub(crate) fn with_path(&self, sample: u32) -> (Ray, Path) {
-        (ray(self.origin, self.dir, sample), path(self.cone_width, self.cone_spread))
+        (ray(self.origin, self.dir, sample), Path::from_eye(self.cone_width, self.cone_spread))
     }
 }
 
 fn ray(origin: Vec3, dir: Vec3, sample: u32) -> Ray {
     Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude: NO_PRIM, sample }
-}
-
-fn path(cone_width: f32, cone_spread: f32) -> Path {
-    Path {
-        weight: Vec3::ONE,
-        depth: 0,
-        straight: true,
-        band: None,
-        media: Media::default(),
-        since: 0.0,
-        cone_width,
-        cone_spread,
-    }
 }
 
 impl Ball {
@@ -139,7 +126,7 @@ impl Eyes {
 
     /// What the `i`th ray carries.
     pub(crate) fn path(&self, i: usize) -> Path {
-        path(self.cone_width[i], self.cone_spread[i])
+        Path::from_eye(self.cone_width[i], self.cone_spread[i])
     }
 }
 

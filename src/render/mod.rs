@@ -9,6 +9,7 @@
 //! The pixels are the same bits for every structure and every number of threads: structures give equal hits, sums run
 //! in a fixed order within a tile, and transcendental functions are the crate's own.
 
+mod absorption;
 mod asking;
 mod context;
 mod costs;
@@ -17,6 +18,7 @@ mod eyes;
 mod layers;
 mod observer;
 pub mod optics;
+mod patch;
 mod pixel;
 mod profile;
 mod seam;

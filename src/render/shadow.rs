@@ -1,12 +1,15 @@
 //! Shadow rays: one for each light that a point could see, traced in waves.
 
+use super::absorption::Absorption;
 use super::asking::Asking;
 use super::context::Context;
 use super::observer::Observer;
 use super::optics::transmittance;
+use super::patch::Footprint;
 use super::seam::is_same_crossing;
-use super::shade::{Reader, shadow_filter};
-use super::surface::{Footprint, Surface, Target};
+use super::shade::{Reader, lets_light_in, shadow_filter};
+use super::surface::{Surface, Target};
+use super::wave::{Media, Medium};
 use crate::accel::{Accel, Hit, Ray};
 use crate::math::Vec3;
 
@@ -15,6 +18,7 @@ use crate::math::Vec3;
 pub(crate) struct Shadows {
     rays: Vec<Ray>,
     light: Vec<Vec3>,
+    /// What each is inside of; empty where nothing absorbs light.
     inside: Vec<Inside>,
     blocked: Vec<bool>,
     /// The hit that each ray has passed last.
@@ -24,12 +28,11 @@ pub(crate) struct Shadows {
     hits: Vec<Hit>,
 }
 
-/// What absorbs the light of a ray.
+/// What a ray is inside of.
 #[derive(Clone, Copy, Debug)]
 struct Inside {
-    /// 1 / unit of length.
-    absorption: Vec3,
-    /// From this t of the ray on.
+    media: Media,
+    /// Up to this t of the ray its light has been lessened by what absorbs it there.
     since: f32,
 }
 
@@ -38,12 +41,12 @@ impl Shadows {
         self.rays.len()
     }
 
-    /// Adds a ray; `light` is what its sample sees if nothing is in the way, `absorption` the coefficient of what it starts
-    /// inside of.
-    pub(crate) fn push(&mut self, ray: Ray, light: Vec3, absorption: Vec3) {
+    /// Adds a ray; `light` is what its sample sees if nothing is in the way, `media` what it starts inside of: of all rays of
+    /// an image, or of none.
+    pub(crate) fn push(&mut self, ray: Ray, light: Vec3, media: Option<Media>) {
         self.rays.push(ray);
         self.light.push(light);
-        self.inside.push(Inside { absorption, since: 0.0 });
+        self.inside.extend(media.map(|media| Inside { media, since: 0.0 }));
     }
 
     pub(crate) fn clear(&mut self) {
@@ -113,14 +116,16 @@ impl Shadows {
     }
 
     /// Drops the rays for which `wanted` (index, ray, light, what they are inside of) is false; the others keep their order.
-    fn keep(&mut self, mut wanted: impl FnMut(usize, &Ray, &mut Vec3, &mut Inside) -> bool) {
+    fn keep(&mut self, mut wanted: impl FnMut(usize, &Ray, &mut Vec3, Option<&mut Inside>) -> bool) {
         let mut kept = 0;
         for i in 0..self.rays.len() {
-            let (mut light, mut inside) = (self.light[i], self.inside[i]);
-            if wanted(i, &self.rays[i], &mut light, &mut inside) {
+            let (mut light, mut inside) = (self.light[i], self.inside.get(i).copied());
+            if wanted(i, &self.rays[i], &mut light, inside.as_mut()) {
                 self.rays[kept] = self.rays[i];
                 self.light[kept] = light;
-                self.inside[kept] = inside;
+                if let Some(inside) = inside {
+                    self.inside[kept] = inside;
+                }
                 kept += 1;
             }
         }
@@ -131,29 +136,30 @@ impl Shadows {
 }
 
 /// What the surface at `hit` lets through. Maps are read at full sharpness: the shadow's own distance is unknown here.
-fn filter_at(context: &Context, ray: &Ray, hit: &Hit, inside: &mut Inside) -> Vec3 {
+fn filter_at(context: &Context, ray: &Ray, hit: &Hit, inside: Option<&mut Inside>) -> Vec3 {
     let target = Target::new(context.scene, context.world, hit.prim);
-    let absorbed = match context.absorption_by(target.material_id) {
-        Some(absorption) => {
-            let target = Target::new(context.scene, context.world, hit.prim);
-            inside.cross(absorption, ray, hit, Surface::new(context.world, target, ray, hit, 0.0).front)
-        }
-        None => Vec3::ONE,
-    };
     let patch = target.patch(context.world, hit.u, hit.v, ray.origin + ray.dir * hit.t);
     let footprint = Footprint::default();
     let reader = Reader { store: context.textures, patch: patch.as_ref(), footprint: &footprint };
-    shadow_filter(target.material, &reader) * absorbed
+    let filter = shadow_filter(target.material, &reader);
+    let Some(inside) = inside.filter(|_| lets_light_in(target.material)) else { return filter };
+    let entering = Surface::new(context.world, target, ray, hit, 0.0).front;
+    filter * inside.cross(target.material_id, entering, ray, hit, &context.absorption)
 }
 
 impl Inside {
-    /// Goes in or out through the surface of what absorbs with this coefficient: what is left of the light before that.
-    fn cross(&mut self, absorption: Vec3, ray: &Ray, hit: &Hit, entering: bool) -> Vec3 {
+    /// Goes in or out through the surface of a material: what is left of the light before that.
+    fn cross(&mut self, material: u32, entering: bool, ray: &Ray, hit: &Hit, absorption: &Absorption) -> Vec3 {
+        let crossing = self.media.cross(Medium { material, ior: 1.0 }, entering);
+        // What is left without having been entered was all around from the start.
+        let before = if !entering && self.media == crossing.beyond {
+            absorption.by(material)
+        } else {
+            absorption.within(&self.media)
+        };
         let length = (hit.t - self.since) * ray.dir.length();
-        // What was never entered and is left must have been all around from the start.
-        let before = if !entering && self.absorption == Vec3::ZERO { absorption } else { self.absorption };
-        *self = Self { absorption: if entering { absorption } else { Vec3::ZERO }, since: hit.t };
-        transmittance(before, length)
+        *self = Self { media: crossing.beyond, since: hit.t };
+        before.map_or(Vec3::ONE, |absorption| transmittance(absorption, length))
     }
 }
 
@@ -162,23 +168,32 @@ mod tests {
     use super::*;
     use crate::accel::NO_PRIM;
 
-    /// What is left where a ray of length 2 for each t meets these faces of one volume: (t, whether it enters).
-    fn left(absorption: Vec3, crossings: &[(f32, bool)]) -> Vec3 {
+    const THIN: Vec3 = Vec3::new(0.0, 0.1, 1.0);
+    const DENSE: Vec3 = Vec3::new(2.0, 0.2, 0.0);
+
+    /// What is left where a ray of length 2 for each t meets faces of two volumes: (t, which, whether it enters).
+    fn left(crossings: &[(f32, u32, bool)]) -> Vec3 {
         let dir = Vec3::new(0.0, 0.0, 2.0);
         let ray = Ray { origin: Vec3::ZERO, t_min: 0.0, dir, t_max: 9.0, exclude: NO_PRIM, sample: 0 };
-        let mut inside = Inside { absorption: Vec3::ZERO, since: 0.0 };
-        let hit = |t| Hit { t, ..Hit::MISS };
-        crossings.iter().map(|&(t, entering)| inside.cross(absorption, &ray, &hit(t), entering)).product()
+        let mut inside = Inside { media: Media::default(), since: 0.0 };
+        let absorption = Absorption::from(vec![THIN, DENSE]);
+        let cross = |&(t, which, entering): &(f32, u32, bool)| {
+            inside.cross(which, entering, &ray, &Hit { t, ..Hit::MISS }, &absorption)
+        };
+        crossings.iter().map(cross).product()
     }
 
     #[test]
-    fn a_volume_before_a_light_absorbs_by_the_length_between_its_faces() {
-        let absorption = Vec3::new(0.0, 0.1, 1.0);
-        let after = |length: f32| transmittance(absorption, length);
+    fn volumes_before_a_light_absorb_by_the_length_between_their_faces() {
         let near = |a: Vec3, b: Vec3| (a - b).length() < 1e-6;
-        assert!(near(left(absorption, &[(1.0, true), (2.5, false)]), after(3.0)));
-        assert!(near(left(absorption, &[(1.0, true), (2.0, false), (4.0, true), (4.5, false)]), after(3.0)));
-        assert!(near(left(absorption, &[(1.5, false)]), after(3.0)), "from inside");
-        assert_eq!(left(Vec3::ZERO, &[(1.0, true), (2.0, false)]), Vec3::ONE);
+        assert!(near(left(&[(1.0, 0, true), (2.5, 0, false)]), transmittance(THIN, 3.0)));
+        assert!(near(
+            left(&[(1.0, 0, true), (2.0, 0, false), (4.0, 0, true), (4.5, 0, false)]),
+            transmittance(THIN, 3.0)
+        ));
+        assert!(near(left(&[(1.5, 0, false)]), transmittance(THIN, 3.0)), "from inside");
+        // A dense one inside a thin one.
+        let nested = left(&[(1.0, 0, true), (2.0, 1, true), (2.25, 1, false), (4.0, 0, false)]);
+        assert!(near(nested, transmittance(THIN, 5.5) * transmittance(DENSE, 0.5)), "{nested}");
     }
 }

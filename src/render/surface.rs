@@ -3,13 +3,14 @@
 //! Evaluated once, for the hit that counts. Nothing here knows of light; materials are only asked for their normal and
 //! bump maps. Whatever a file gives, normals come out finite and of unit length.
 
+use super::patch::{Footprint, Gradients, Patch};
 use super::shade::Seen;
-use super::texture::{ColorSpace, TextureStore};
+use super::texture::TextureStore;
 use super::world::{Placement, PrimSource, World};
 use crate::accel::refine::Refined;
 use crate::accel::{Hit, NO_PRIM, Ray};
+use crate::math::Vec3;
 use crate::math::bounds::offset_origin;
-use crate::math::{Vec2, Vec3, Vec4};
 use crate::scene::{Material, Mesh, Scene, TextureRef};
 
 /// What was hit, before anything about it is computed.
@@ -115,200 +116,6 @@ fn fan_triangle(mesh: &Mesh, world: &World, prim: u32, source: PrimSource, posit
     (best.0.map(|i| mesh.polygon_corners[i as usize]), best.1)
 }
 
-/// How the weights of a triangle's second and third corner grow along its plane, per world unit.
-#[derive(Clone, Copy)]
-struct Gradients {
-    second: Vec3,
-    third: Vec3,
-}
-
-impl Gradients {
-    /// Zero for a triangle without area.
-    fn new([a, b, c]: [Vec3; 3]) -> Self {
-        let (e1, e2) = (b - a, c - a);
-        let normal = e1.cross(e2);
-        let inverse = 1.0 / normal.length_squared();
-        if !inverse.is_finite() {
-            return Self { second: Vec3::ZERO, third: Vec3::ZERO };
-        }
-        Self { second: e2.cross(normal) * inverse, third: normal.cross(e1) * inverse }
-    }
-}
-
-/// The part of a mesh around a hit: three corners and their weights.
-#[derive(Clone, Copy)]
-pub(crate) struct Patch<'a> {
-    mesh: &'a Mesh,
-    placement: &'a Placement,
-    corners: [u32; 3],
-    weights: [f32; 3],
-    vertices: [Vec3; 3],
-}
-
-/// The two axes, world space, of the ellipse in which a ray's cone meets a surface; one pixel each.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Footprint {
-    along: Vec3,
-    across: Vec3,
-}
-
-impl Footprint {
-    /// Cone of diameter `width` along the unit vector `dir` on a surface with unit normal `normal`.
-    ///
-    /// After T. Akenine-Möller et al., "Improved Shader and Texture Level of Detail Using Ray Cones" (2021).
-    pub(crate) fn new(dir: Vec3, normal: Vec3, width: f32) -> Self {
-        // A grazing cone covers unboundedly much; beyond this the texture is at its smallest copy anyway.
-        const LONGEST: f32 = 1e4;
-        let axis = |v: Vec3| {
-            let seen = (v - dir.dot(v) * dir).length();
-            v * (width / seen.max(1.0 / LONGEST))
-        };
-        let slope = dir - normal.dot(dir) * normal;
-        let along = slope.try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
-        Self { along: axis(along), across: axis(normal.cross(along)) }
-    }
-}
-
-/// Texture coordinates at a point and their change along both axes of a [`Footprint`].
-#[derive(Clone, Copy)]
-struct Coordinates {
-    uv: Vec2,
-    along: Vec2,
-    across: Vec2,
-    /// Change along the second and third corner's edge.
-    edges: [Vec2; 2],
-}
-
-impl Patch<'_> {
-    #[inline]
-    fn mix<T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>>(&self, values: &[T]) -> Option<T> {
-        let [a, b, c] = self.corners;
-        let value = |i: u32| values.get(i as usize).copied();
-        let (a, b, c) = (value(a), value(b), value(c));
-        Some(a? * self.weights[0] + b? * self.weights[1] + c? * self.weights[2])
-    }
-
-    /// Vertex colour, linear RGBA; white when the mesh has none.
-    pub(crate) fn color(&self) -> Vec4 {
-        self.mix(&self.mesh.colors).unwrap_or(Vec4::ONE)
-    }
-
-    /// The texture at this point, linear RGBA.
-    pub(crate) fn texel(&self, map: &TextureRef, space: ColorSpace, store: &TextureStore, print: &Footprint) -> Vec4 {
-        let at = self.coordinates(map, print);
-        store.sample(map.texture, space, at.uv, at.along, at.across)
-    }
-
-    fn coordinates(&self, map: &TextureRef, print: &Footprint) -> Coordinates {
-        let Some(set) = self.mesh.uvs.get(map.uv_set as usize) else {
-            return Coordinates { uv: Vec2::ZERO, along: Vec2::ZERO, across: Vec2::ZERO, edges: [Vec2::ZERO; 2] };
-        };
-        let turn = Turn::new(map);
-        let [a, b, c] = self.corners;
-        let corner = |i: u32| set.get(i as usize).map_or(Vec2::ZERO, |&uv| turn.apply(uv));
-        let (a, b, c) = (corner(a), corner(b), corner(c));
-        let edges = [b - a, c - a];
-        let gradients = Gradients::new(self.vertices);
-        let change = |v: Vec3| edges[0] * gradients.second.dot(v) + edges[1] * gradients.third.dot(v);
-        let uv = a * self.weights[0] + b * self.weights[1] + c * self.weights[2] + map.transform.offset;
-        Coordinates { uv, along: change(print.along), across: change(print.across), edges }
-    }
-
-    /// Interpolated shading normal, world space, on the side of the mesh's own normals.
-    #[inline]
-    fn normal(&self) -> Option<Vec3> {
-        smooth_normal(self.placement, self.mix(&self.mesh.normals)?)
-    }
-
-    /// Tangent and bitangent, unit and perpendicular to `normal`: those of the mesh, or those of the coordinates.
-    fn tangents(&self, normal: Vec3, map: &TextureRef, print: &Footprint) -> Option<(Vec3, Vec3)> {
-        let given = self.mix(&self.mesh.tangents).and_then(|t| {
-            let along = (self.placement.world_from_object * t.truncate().as_dvec3()).as_vec3();
-            // A mirrored instance turns the frame's handedness round.
-            let sign = if (t.w < 0.0) == self.placement.mirrored { 1.0 } else { -1.0 };
-            Some((perpendicular(along, normal)?, sign))
-        });
-        let (tangent, sign) = given.or_else(|| self.tangent_of_coordinates(normal, map, print))?;
-        Some((tangent, normal.cross(tangent) * sign))
-    }
-
-    /// The direction in which u grows, and the handedness that makes the bitangent point against v, which runs down.
-    fn tangent_of_coordinates(&self, normal: Vec3, map: &TextureRef, print: &Footprint) -> Option<(Vec3, f32)> {
-        let [a, b] = self.coordinates(map, print).edges;
-        let (e1, e2) = (self.vertices[1] - self.vertices[0], self.vertices[2] - self.vertices[0]);
-        let area = a.x * b.y - b.x * a.y;
-        if area == 0.0 {
-            return None;
-        }
-        let along_u = (e1 * b.y - e2 * a.y) * area.signum();
-        let along_v = (e2 * a.x - e1 * b.x) * area.signum();
-        let tangent = perpendicular(along_u, normal)?;
-        let sign = if normal.cross(tangent).dot(along_v) <= 0.0 { 1.0 } else { -1.0 };
-        Some((tangent, sign))
-    }
-
-    /// The normal as a normal map turns it, whose x and y are scaled.
-    #[inline]
-    pub(crate) fn normal_mapped(
-        &self,
-        normal: Vec3,
-        map: &TextureRef,
-        scale: f32,
-        store: &TextureStore,
-        print: &Footprint,
-    ) -> Option<Vec3> {
-        let texel = self.texel(map, ColorSpace::Linear, store, print).truncate() * 2.0 - 1.0;
-        let (tangent, bitangent) = self.tangents(normal, map, print)?;
-        (tangent * (texel.x * scale) + bitangent * (texel.y * scale) + normal * texel.z).try_normalize()
-    }
-
-    /// The normal as the material's bump map turns it: by the slope of the heights, from differences one texel wide.
-    ///
-    /// J. F. Blinn, "Simulation of Wrinkled Surfaces" (1978), with heights in units of the texture's side.
-    #[inline]
-    pub(crate) fn bumped(
-        &self,
-        normal: Vec3,
-        material: &Material,
-        store: &TextureStore,
-        print: &Footprint,
-    ) -> Option<Vec3> {
-        let map = material.bump_map.as_ref()?;
-        let (tangent, bitangent) = self.tangents(normal, map, print)?;
-        let at = self.coordinates(map, print);
-        let height = |uv: Vec2| store.sample(map.texture, ColorSpace::Linear, uv, at.along, at.across).x;
-        let texel = Vec2::ONE / store.size(map.texture).max(Vec2::ONE);
-        let rise = |d: Vec2, width: f32| (height(at.uv + d) - height(at.uv - d)) / width;
-        let du = rise(Vec2::new(0.5 * texel.x, 0.0), texel.x) * material.bump_scale;
-        let dv = rise(Vec2::new(0.0, 0.5 * texel.y), texel.y) * material.bump_scale;
-        // v runs down, against the bitangent.
-        (normal - tangent * du + bitangent * dv).try_normalize()
-    }
-}
-
-/// The linear part of a texture transform; the offset is added once, after interpolation.
-struct Turn {
-    x_axis: Vec2,
-    y_axis: Vec2,
-}
-
-impl Turn {
-    fn new(map: &TextureRef) -> Self {
-        let t = &map.transform;
-        let (sin, cos) = if t.rotation == 0.0 { (0.0, 1.0) } else { libm::sincosf(t.rotation) };
-        Self { x_axis: Vec2::new(cos, -sin) * t.scale.x, y_axis: Vec2::new(sin, cos) * t.scale.y }
-    }
-
-    fn apply(&self, uv: Vec2) -> Vec2 {
-        self.x_axis * uv.x + self.y_axis * uv.y
-    }
-}
-
-/// `v` without its part along `normal`, of unit length.
-fn perpendicular(v: Vec3, normal: Vec3) -> Option<Vec3> {
-    (v - normal * normal.dot(v)).try_normalize()
-}
-
 /// A point of a surface, as seen along a ray. Positions in the centred frame, directions in world space.
 pub(crate) struct Surface<'a> {
     pub target: Target<'a>,
@@ -321,8 +128,9 @@ pub(crate) struct Surface<'a> {
     pub error: Vec3,
     /// Unit normal of the shape itself, turned to the side the ray comes from.
     pub geometric: Vec3,
-    /// Unit normal for shading before maps turn it, and after; never turned away from the ray.
+    /// Unit normal before maps turn it, on that side as a whole.
     smooth: Vec3,
+    /// Unit normal for shading, never turned away from the ray.
     pub normal: Vec3,
     /// Unit vector back along the ray.
     pub view: Vec3,
@@ -369,7 +177,7 @@ impl<'a> Surface<'a> {
         let material = self.target.material;
         let own = patch.normal().unwrap_or(if self.front { self.geometric } else { -self.geometric });
         let side = if own.dot(self.geometric) < 0.0 { -1.0 } else { 1.0 };
-        self.smooth = facing(own * side, self.view);
+        self.smooth = own * side;
         let turned = |map| patch.normal_mapped(own, map, material.normal_scale, store, &self.footprint);
         let mapped = material.normal_map.as_ref().and_then(turned).unwrap_or(own);
         let bumped = patch.bumped(mapped, material, store, &self.footprint).unwrap_or(mapped);
@@ -379,7 +187,7 @@ impl<'a> Surface<'a> {
     /// The normal of lacquer with this normal map and its scale, to the side of the ray.
     pub(crate) fn coat_normal(&self, map: Option<&TextureRef>, scale: f32, store: &TextureStore) -> Vec3 {
         let turned = |patch: &Patch| patch.normal_mapped(self.smooth, map?, scale, store, &self.footprint);
-        self.patch.as_ref().and_then(turned).map_or(self.smooth, |normal| facing(normal, self.view))
+        facing(self.patch.as_ref().and_then(turned).unwrap_or(self.smooth), self.view)
     }
 
     /// How it is seen.
@@ -399,13 +207,6 @@ impl<'a> Surface<'a> {
     pub(crate) fn origin(&self, dir: Vec3) -> Vec3 {
         offset_origin(self.start, self.error, self.geometric, dir)
     }
-}
-
-/// An interpolated normal of a mesh as its instance turns it, of unit length; `None` where it has none.
-#[inline(always)]
-pub(crate) fn smooth_normal(placement: &Placement, interpolated: Vec3) -> Option<Vec3> {
-    let normal = (placement.normal_from_object * interpolated.as_dvec3()).try_normalize()?.as_vec3();
-    normal.is_finite().then_some(normal)
 }
 
 /// `normal`, turned just far enough that `view` sees its front.
@@ -430,7 +231,8 @@ fn id(i: usize) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{DAffine3, DVec3};
+    use crate::math::{DAffine3, DVec3, Vec2, Vec4};
+    use crate::render::patch::Coordinates;
     use crate::scene::{
         Bitmap, Instance, MetalRough, Pixels, Polygon, Sampler, Surface as Reflection, Texture, UvTransform,
     };

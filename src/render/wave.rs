@@ -43,6 +43,22 @@ pub(crate) struct Path {
     pub cone_spread: f32,
 }
 
+impl Path {
+    /// That of a ray from the eye.
+    pub(crate) fn from_eye(cone_width: f32, cone_spread: f32) -> Self {
+        Self {
+            weight: Vec3::ONE,
+            depth: 0,
+            straight: true,
+            band: None,
+            media: Media::default(),
+            since: 0.0,
+            cone_width,
+            cone_spread,
+        }
+    }
+}
+
 /// One substance a ray is inside of.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Medium {
@@ -223,16 +239,7 @@ mod tests {
     #[test]
     fn a_queue_gives_its_last_rays_first_and_keeps_the_rest() {
         let (mut queue, mut wave) = (Queue::default(), Wave::default());
-        let path = Path {
-            weight: Vec3::ONE,
-            depth: 0,
-            straight: true,
-            band: None,
-            media: Media::default(),
-            since: 0.0,
-            cone_width: 0.0,
-            cone_spread: 0.0,
-        };
+        let path = Path::from_eye(0.0, 0.0);
         for sample in 0..5 {
             let ray = Ray { origin: Vec3::ZERO, t_min: 0.0, dir: Vec3::Z, t_max: 1.0, exclude: NO_PRIM, sample };
             queue.push(ray, path, Hit::MISS);

@@ -20,7 +20,7 @@ use super::shade::{Matter, Reader, above, lets_light_in, terminator};
 use super::shadow::Shadows;
 use super::strip::{POINTS, Sorted, Strip};
 use super::surface::{Surface, Target};
-use super::wave::{Crossing, Medium, Path, Queue, RayClass, Wave};
+use super::wave::{Crossing, Media, Medium, Path, Queue, RayClass, Wave};
 use crate::accel::{Accel, Hit, Ray};
 use crate::math::{DVec3, Vec3};
 use std::hint::black_box;
@@ -207,13 +207,14 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
                 self.add(eyes.rays[index as usize].sample, everywhere);
             }
         }
+        let outside = context.absorption.is_some().then(Media::default);
         for light in &context.lights {
             strip.shine(matter, light);
             for shone in strip.shone() {
                 let ray = &eyes.rays[shone.index as usize];
                 if light.shadows {
                     let shadow = shone.ray(ray.sample, eyes.hits[shone.index as usize].prim);
-                    self.shadows.push(shadow, shone.radiance, Vec3::ZERO);
+                    self.shadows.push(shadow, shone.radiance, outside);
                 } else {
                     self.add(ray.sample, shone.radiance);
                 }
@@ -269,7 +270,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     /// Adds what the surface at `hit` shows by itself, and queues the rays that find the rest.
     fn shade(&mut self, class: RayClass, ray: &Ray, path: &Path, hit: &Hit) {
         let context = self.context;
-        let path = &absorbed(context, ray, path, hit);
+        let lessened = context.absorption.is_some().then(|| absorbed(context, ray, path, hit));
+        let path = lessened.as_ref().unwrap_or(path);
         let target = Target::new(context.scene, context.world, hit.prim);
         let material = target.material;
         let width = path.cone_width + path.cone_spread * hit.t;
@@ -342,7 +344,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     /// Direct light: lights without shadows at once, the others when their shadow rays have come through.
     fn light(&mut self, point: &Point, crossing: &Crossing) {
         let surface = point.surface;
-        let inside = self.context.absorption_in(&point.path.media).unwrap_or_default();
+        let inside = self.context.absorption.is_some().then_some(point.path.media);
         for light in &self.context.lights {
             let Some(incident) = light.incident(surface.position) else { continue };
             let to_light = incident.to_light;
@@ -474,7 +476,7 @@ impl Point<'_> {
 
 /// A path after what its ray is inside of has absorbed its part of the light up to `hit`.
 fn absorbed(context: &Context, ray: &Ray, path: &Path, hit: &Hit) -> Path {
-    let Some(absorption) = context.absorption_in(&path.media) else { return Path { since: hit.t, ..*path } };
-    let left = transmittance(absorption, (hit.t - path.since) * ray.dir.length());
+    let length = (hit.t - path.since) * ray.dir.length();
+    let left = context.absorption.within(&path.media).map_or(Vec3::ONE, |a| transmittance(a, length));
     Path { weight: path.weight * left, since: hit.t, ..*path }
 }

@@ -1,6 +1,6 @@
 //! Colours as people write them, made linear.
 
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 
 /// Names that can be written for colours; values are sRGB bytes.
 pub const NAMES: [(&str, [u8; 3]); 18] = [
@@ -66,6 +66,16 @@ pub fn from_srgb8(bytes: [u8; 3]) -> Vec3 {
         let c = f32::from(b) / 255.0;
         if c <= 0.04045 { c / 12.92 } else { libm::powf((c + 0.055) / 1.055, 2.4) }
     }))
+}
+
+/// CIE XYZ, white D65, as linear Rec. 709 (IEC 61966-2-1); a colour out of its gamut has negative parts.
+pub fn rec_709_of_xyz(xyz: DVec3) -> DVec3 {
+    let row = |x: f64, y: f64, z: f64| DVec3::new(x, y, z).dot(xyz);
+    DVec3::new(
+        row(3.240_454_2, -1.537_138_5, -0.498_531_4),
+        row(-0.969_266_0, 1.876_010_8, 0.041_556_0),
+        row(0.055_643_4, -0.204_025_9, 1.057_225_2),
+    )
 }
 
 #[cfg(test)]

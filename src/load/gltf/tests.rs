@@ -5,6 +5,7 @@ mod boxes;
 #[cfg(feature = "draco")]
 mod draco;
 mod large;
+mod materials;
 mod memory;
 #[cfg(feature = "meshopt")]
 mod meshopt;
@@ -137,6 +138,13 @@ fn fault(bytes: &[u8]) -> String {
 fn codes(loaded: &Loaded) -> Vec<&'static str> {
     let all = loaded.warnings.iter().map(|w| w.code);
     all.filter(|c| *c != "gltf-mesh-primitive-position-accessor-without-bounds").collect()
+}
+
+/// A data URI with a PNG of one pixel.
+fn picture() -> String {
+    let mut out = std::io::Cursor::new(Vec::new());
+    image::DynamicImage::new_rgb8(1, 1).write_to(&mut out, image::ImageFormat::Png).unwrap();
+    format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(out.into_inner()))
 }
 
 #[test]
@@ -459,170 +467,6 @@ fn a_scene_is_chosen_by_index_or_name_and_without_scenes_all_roots_show() {
     file.root.as_object_mut().unwrap().remove("scenes");
     file.root.as_object_mut().unwrap().remove("scene");
     assert_eq!(file.load().scene.instances.len(), 2);
-}
-
-#[test]
-fn materials_carry_every_factor_and_slot() {
-    let mut file = Builder::new();
-    let positions = file.triangle();
-    let uvs = file.floats("VEC2", &[0., 0., 1., 0., 0., 1.]);
-    file.primitive(json!({"attributes": {"POSITION": positions, "TEXCOORD_0": uvs, "TEXCOORD_1": uvs}, "material": 0}));
-    file.set("images", json!([{"uri": picture()}]));
-    file.set("samplers", json!([{"wrapS": 33071, "wrapT": 33648, "magFilter": 9728, "minFilter": 9985}]));
-    file.set("textures", json!([{"source": 0, "sampler": 0}, {"source": 0}]));
-    let names = [
-        "ior",
-        "specular",
-        "transmission",
-        "emissive_strength",
-        "dispersion",
-        "volume",
-        "clearcoat",
-        "iridescence",
-        "sheen",
-    ];
-    let used: Vec<String> =
-        names.iter().map(|n| format!("KHR_materials_{n}")).chain(["KHR_texture_transform".into()]).collect();
-    file.set("extensionsUsed", json!(used));
-    let moved =
-        json!({"KHR_texture_transform": {"offset": [0.5, 0.25], "rotation": 1.5, "scale": [2, 3], "texCoord": 1}});
-    file.set("materials", json!([{
-        "name": "glass", "doubleSided": true, "alphaMode": "MASK", "alphaCutoff": 0.25,
-        "emissiveFactor": [1, 0.5, 0],
-        "pbrMetallicRoughness": {
-            "baseColorFactor": [0.1, 0.2, 0.3, 0.4], "metallicFactor": 0.5, "roughnessFactor": 0.25,
-            "baseColorTexture": {"index": 0, "extensions": moved},
-            "metallicRoughnessTexture": {"index": 1, "texCoord": 1}},
-        "occlusionTexture": {"index": 1, "strength": 0.5},
-        "emissiveTexture": {"index": 1},
-        "extensions": {
-            "KHR_materials_ior": {"ior": 1.33}, "KHR_materials_emissive_strength": {"emissiveStrength": 8},
-            "KHR_materials_specular": {"specularFactor": 0.75, "specularColorFactor": [2, 1, 1], "specularTexture": {"index": 1}},
-            "KHR_materials_transmission": {"transmissionFactor": 0.9, "transmissionTexture": {"index": 1}},
-            "KHR_materials_volume": {
-                "thicknessFactor": 1, "thicknessTexture": {"index": 1},
-                "attenuationDistance": 0.5, "attenuationColor": [1, 0.25, 0]},
-            "KHR_materials_iridescence": {
-                "iridescenceFactor": 0.75, "iridescenceIor": 1.25, "iridescenceThicknessMaximum": 500,
-                "iridescenceThicknessTexture": {"index": 1}},
-            "KHR_materials_sheen": {"sheenColorFactor": [0.5, 0.25, 0], "sheenRoughnessTexture": {"index": 1}},
-            "KHR_materials_clearcoat": {
-                "clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.125, "clearcoatRoughnessTexture": {"index": 1},
-                "clearcoatNormalTexture": {"index": 0, "scale": 0.25}},
-            "KHR_materials_dispersion": {"dispersion": 0.5}},
-    }]));
-    let loaded = file.load();
-    let scene = &loaded.scene;
-    let material = &scene.materials[0];
-    assert_eq!((material.base_color, material.opacity), (Vec3::new(0.1, 0.2, 0.3), 0.4));
-    assert_eq!((material.alpha_mode, material.double_sided), (AlphaMode::Mask { cutoff: 0.25 }, true));
-    assert_eq!(material.emission, Vec3::new(8.0, 4.0, 0.0));
-    assert_eq!(material.occlusion_strength, 0.5);
-    let Surface::MetalRough(surface) = &material.surface else { panic!() };
-    assert_eq!((surface.metallic, surface.roughness, surface.ior), (0.5, 0.25, 1.33));
-    assert_eq!((surface.specular, surface.specular_color), (0.75, Vec3::new(2.0, 1.0, 1.0)));
-    assert_eq!((surface.transmission, surface.thick, surface.dispersion), (0.9, true, 0.5));
-    assert!(surface.specular_map.is_some() && surface.transmission_map.is_some());
-    assert_eq!(surface.absorption.x, 0.0);
-    assert!((surface.absorption.y - 2.0 * 4f32.ln()).abs() < 1e-5 && surface.absorption.z > 100.0);
-    assert!(surface.thickness == 1.0 && surface.thickness_map.is_some(), "for what is seen through rough glass");
-    let coat = surface.coat.as_ref().unwrap();
-    assert_eq!((coat.strength, coat.roughness, coat.normal_scale), (0.5, 0.125, 0.25));
-    assert!(coat.strength_map.is_none() && coat.roughness_map.is_some() && coat.normal_map.is_some());
-    let film = surface.film.as_ref().unwrap();
-    assert_eq!((film.strength, film.ior, film.thickness), (0.75, 1.25, [100.0, 500.0]));
-    assert!(film.strength_map.is_none() && film.thickness_map.is_some());
-    let sheen = surface.sheen.as_ref().unwrap();
-    assert_eq!((sheen.color, sheen.roughness), (Vec3::new(0.5, 0.25, 0.0), 0.0));
-    assert!(sheen.color_map.is_none() && sheen.roughness_map.is_some());
-    let base = material.base_color_map.as_ref().unwrap();
-    assert_eq!(
-        (base.uv_set, base.transform.offset, base.transform.scale),
-        (1, Vec2::new(0.5, 0.25), Vec2::new(2.0, 3.0))
-    );
-    assert_eq!(base.transform.rotation, 1.5);
-    let sampler = scene.textures[base.texture as usize].sampler;
-    assert_eq!((sampler.wrap_u, sampler.wrap_v), (Wrap::Clamp, Wrap::Mirror));
-    assert_eq!((sampler.magnify, sampler.minify, sampler.mipmaps), (Filter::Nearest, Filter::Linear, Mipmaps::Nearest));
-    assert_eq!((scene.textures.len(), scene.bitmaps.len()), (2, 1), "one picture, read in two ways");
-    assert_eq!(scene.meshes[0].uvs.len(), 2);
-}
-
-/// A data URI with a PNG of one pixel.
-fn picture() -> String {
-    let mut out = std::io::Cursor::new(Vec::new());
-    image::DynamicImage::new_rgb8(1, 1).write_to(&mut out, image::ImageFormat::Png).unwrap();
-    format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(out.into_inner()))
-}
-
-#[test]
-fn unlit_and_specular_glossiness_materials_keep_their_look() {
-    let mut file = Builder::new();
-    let positions = file.triangle();
-    file.set("meshes", json!([{"primitives": [
-        {"attributes": {"POSITION": positions}, "material": 0}, {"attributes": {"POSITION": positions}, "material": 1}]}]));
-    file.set("extensionsUsed", json!(["KHR_materials_unlit", "KHR_materials_pbrSpecularGlossiness"]));
-    file.set(
-        "materials",
-        json!([
-            {"extensions": {"KHR_materials_unlit": {}}, "emissiveFactor": [1, 1, 1]},
-            {"extensions": {"KHR_materials_pbrSpecularGlossiness": {
-                "diffuseFactor": [0.5, 0.5, 0.5, 1], "specularFactor": [0.2, 0.1, 0], "glossinessFactor": 0.75}}},
-        ]),
-    );
-    let scene = file.load().scene;
-    assert!(matches!(scene.materials[0].surface, Surface::Unlit));
-    assert_eq!(scene.materials[0].emission, Vec3::ZERO);
-    let Surface::MetalRough(surface) = &scene.materials[1].surface else { panic!() };
-    assert_eq!((surface.metallic, surface.roughness, surface.ior), (0.0, 0.25, 0.0));
-    assert_eq!(surface.specular_color, Vec3::new(0.2, 0.1, 0.0));
-    assert_eq!(scene.materials[1].base_color, Vec3::splat(0.5));
-}
-
-#[test]
-fn a_missing_or_broken_image_costs_its_map_and_a_warning() {
-    for uri in ["none.png", "data:image/png;base64,AAAA"] {
-        let mut file = Builder::new();
-        let positions = file.triangle();
-        file.primitive(json!({"attributes": {"POSITION": positions}, "material": 0}));
-        file.set("images", json!([{"uri": uri}]));
-        file.set("textures", json!([{"source": 0}]));
-        file.set("materials", json!([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]));
-        let loaded = file.load();
-        assert!(loaded.scene.materials[0].base_color_map.is_none());
-        assert!(loaded.scene.textures.is_empty());
-        assert!(codes(&loaded).iter().any(|c| ["file-missing", "image-unusable"].contains(c)), "{:?}", codes(&loaded));
-    }
-}
-
-#[test]
-fn images_of_materials_that_are_not_drawn_are_not_decoded() {
-    let mut file = Builder::new();
-    let positions = file.triangle();
-    file.primitive(json!({"attributes": {"POSITION": positions}, "material": 1}));
-    file.set("images", json!([{"uri": "none.png"}]));
-    file.set("textures", json!([{"source": 0}]));
-    file.set("materials", json!([{"emissiveTexture": {"index": 0}}, {"name": "used"}]));
-    let loaded = file.load();
-    assert!(codes(&loaded).is_empty(), "{:?}", loaded.warnings);
-    assert_eq!(loaded.scene.materials.len(), 1);
-    assert_eq!(loaded.scene.materials[0].name, "used");
-}
-
-#[test]
-fn a_normal_map_brings_tangents_and_others_do_not() {
-    for (slot, expected) in [("normalTexture", 3), ("emissiveTexture", 0)] {
-        let mut file = Builder::new();
-        let positions = file.triangle();
-        let uvs = file.floats("VEC2", &[0., 0., 1., 0., 0., 1.]);
-        file.primitive(json!({"attributes": {"POSITION": positions, "TEXCOORD_0": uvs}, "material": 0}));
-        file.set("images", json!([{"uri": picture()}]));
-        file.set("textures", json!([{"source": 0}]));
-        let mut material = json!({});
-        material[slot] = json!({"index": 0});
-        file.set("materials", json!([material]));
-        assert_eq!(file.load().scene.meshes[0].tangents.len(), expected, "{slot}");
-    }
 }
 
 #[test]

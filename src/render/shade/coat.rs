@@ -4,10 +4,10 @@
 //! is not bent on its way through. The share that is taken off is that of the view alone, as the extension says.
 
 use super::facets::albedo;
-use super::metal_rough::{NARROWEST_HIGHLIGHT, above, ggx, open, traced, visibility};
+use super::metal_rough::{above, highlight, open, traced};
 use super::{Reader, Seen, Sky};
 use crate::math::Vec3;
-use crate::render::optics::reflect;
+use crate::render::optics::{fresnel_schlick, reflect};
 use crate::scene::Coat;
 
 /// Reflectance of a boundary to index 1.5, face on.
@@ -50,9 +50,7 @@ impl CoatMatter {
             return 0.0;
         }
         let half = (view + to_light).normalize_or(self.normal);
-        let r = self.roughness.max(NARROWEST_HIGHLIGHT);
-        let lobe = ggx(self.normal, half, r * r) * visibility(n_l, n_v, r * r);
-        self.strength * fresnel(view.dot(half)) * lobe * n_l
+        self.strength * fresnel(view.dot(half)) * highlight(self.normal, half, [n_l, n_v], self.roughness) * n_l
     }
 
     /// What it shows of the surroundings without a ray.
@@ -73,17 +71,15 @@ impl CoatMatter {
     }
 }
 
-/// Schlick's approximation.
+/// Reflectance at this cosine.
 fn fresnel(cosine: f32) -> f32 {
-    let m = (1.0 - cosine).clamp(0.0, 1.0);
-    let m2 = m * m;
-    F0 + (1.0 - F0) * (m2 * m2 * m)
+    fresnel_schlick(Vec3::splat(F0), 1.0, cosine).x
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::surface::Footprint;
+    use crate::render::patch::Footprint;
     use crate::render::texture::TextureStore;
     use crate::scene::Scene;
 

@@ -5,6 +5,7 @@
 
 use crate::math::Vec3;
 use crate::render::optics::fresnel_schlick;
+use crate::scene::color::rec_709_of_xyz;
 use std::f32::consts::PI;
 
 /// Films thinner than this many nanometres fade out: without a film there is no boundary to reflect at.
@@ -81,17 +82,7 @@ fn sensitivity(way: f32, shift: Vec3) -> Vec3 {
     let [height, center, variance] = SECOND_X;
     let part = |k: usize| gaussian(HEIGHTS[k], CENTERS[k], VARIANCES[k], shift[k]);
     let x = part(0) + gaussian(height, center, variance, shift.x);
-    rec_709(Vec3::new(x, part(1), part(2)) / WHOLE)
-}
-
-/// CIE XYZ to linear Rec. 709 (IEC 61966-2-1).
-fn rec_709(xyz: Vec3) -> Vec3 {
-    let row = |a: f32, b: f32, c: f32| Vec3::new(a, b, c).dot(xyz);
-    Vec3::new(
-        row(3.240_454_2, -1.537_138_5, -0.498_531_4),
-        row(-0.969_266, 1.876_010_8, 0.041_556),
-        row(0.055_643_4, -0.204_025_9, 1.057_225_2),
-    )
+    rec_709_of_xyz((Vec3::new(x, part(1), part(2)) / WHOLE).as_dvec3()).as_vec3()
 }
 
 #[cfg(test)]

@@ -24,7 +24,7 @@ const FROSTED_ROUGHNESS: f32 = 0.6;
 /// That part; the rest goes straight through, so that glass never hides what it holds.
 const FROSTED_SHARE: f32 = 0.75;
 /// Highlights of lights without extent are never narrower than this roughness makes them.
-pub(super) const NARROWEST_HIGHLIGHT: f32 = 0.045;
+const NARROWEST_HIGHLIGHT: f32 = 0.045;
 
 /// The model's parameters at one point.
 #[derive(Clone, Debug)]
@@ -143,8 +143,7 @@ impl MetalRoughMatter {
         }
         let half = (view + to_light).normalize_or(normal);
         let (dielectric, metal) = self.fresnel(view.dot(half));
-        let r = self.roughness.max(NARROWEST_HIGHLIGHT);
-        let lobe = ggx(normal, half, r * r) * visibility(n_l, n_v, r * r);
+        let lobe = highlight(normal, half, [n_l, n_v], self.roughness);
         let diffuse = self.scattered() * ((1.0 - dielectric.max_element()) / PI);
         let specular = dielectric.lerp(metal, self.metallic) * lobe;
         (diffuse + specular) * n_l
@@ -267,9 +266,16 @@ pub(crate) fn above(dir: Vec3, geometric: Vec3) -> Vec3 {
     if height < 0.0 { dir - 2.0 * height * geometric } else { dir }
 }
 
+/// The microfacet lobe of a light without extent, before Fresnel: distribution × visibility.
+#[inline(always)]
+pub(super) fn highlight(normal: Vec3, half: Vec3, [n_l, n_v]: [f32; 2], roughness: f32) -> f32 {
+    let r = roughness.max(NARROWEST_HIGHLIGHT);
+    ggx(normal, half, r * r) * visibility(n_l, n_v, r * r)
+}
+
 /// Trowbridge and Reitz's distribution of facets (GGX), `alpha` the square of the roughness.
 #[inline(always)]
-pub(super) fn ggx(normal: Vec3, half: Vec3, alpha: f32) -> f32 {
+fn ggx(normal: Vec3, half: Vec3, alpha: f32) -> f32 {
     let n_h = normal.dot(half).clamp(0.0, 1.0);
     // 1 − (N·H)² as |N × H|², which keeps its digits in a narrow highlight.
     let sine_squared = normal.cross(half).length_squared();
@@ -281,7 +287,7 @@ pub(super) fn ggx(normal: Vec3, half: Vec3, alpha: f32) -> f32 {
 /// Smith's height-correlated masking and shadowing over 4 N·L N·V (E. Heitz, "Understanding the Masking-Shadowing
 /// Function", 2014).
 #[inline(always)]
-pub(super) fn visibility(n_l: f32, n_v: f32, alpha: f32) -> f32 {
+fn visibility(n_l: f32, n_v: f32, alpha: f32) -> f32 {
     let a2 = alpha * alpha;
     let view = n_l * (n_v * n_v * (1.0 - a2) + a2).sqrt();
     let light = n_v * (n_l * n_l * (1.0 - a2) + a2).sqrt();

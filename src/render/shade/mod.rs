@@ -24,7 +24,8 @@ pub(crate) use spectrum::{Band, bands};
 
 use super::context::coverage;
 use super::optics::reflect;
-use super::surface::{Footprint, Patch, Surface};
+use super::patch::{Footprint, Patch};
+use super::surface::Surface;
 use super::texture::{ColorSpace, TextureStore};
 use super::wave::Crossing;
 use crate::math::{Vec3, Vec4};

@@ -1,6 +1,7 @@
 //! White light in a few wavelengths, for materials whose index depends on the wavelength.
 
 use crate::math::Vec3;
+use crate::scene::color::rec_709_of_xyz;
 
 /// Number of parts that white light is split into.
 pub(crate) const BANDS: u8 = 12;
@@ -37,12 +38,7 @@ fn rgb(wavelength: f32) -> Vec3 {
     let x = lobe(1.056, 599.8, 37.9, 31.0) + lobe(0.362, 442.0, 16.0, 26.7) + lobe(-0.065, 501.1, 20.4, 26.2);
     let y = lobe(0.821, 568.8, 46.9, 40.5) + lobe(0.286, 530.9, 16.3, 31.1);
     let z = lobe(1.217, 437.0, 11.8, 36.0) + lobe(0.681, 459.0, 26.0, 13.8);
-    let linear = Vec3::new(
-        3.240_97 * x - 1.537_38 * y - 0.498_61 * z,
-        -0.969_24 * x + 1.875_97 * y + 0.041_56 * z,
-        0.055_63 * x - 0.203_98 * y + 1.056_97 * z,
-    );
-    linear.max(Vec3::ZERO)
+    rec_709_of_xyz(Vec3::new(x, y, z).as_dvec3()).as_vec3().max(Vec3::ZERO)
 }
 
 #[cfg(test)]

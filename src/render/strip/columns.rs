@@ -9,8 +9,9 @@ use crate::math::inset::Rim;
 use crate::math::simd::{Kernel, Level, Simd};
 use crate::math::triangle::Flat;
 use crate::math::{DVec3, Vec3};
+use crate::render::patch::smooth_normal;
 use crate::render::shade::Seen;
-use crate::render::surface::{facing, smooth_normal};
+use crate::render::surface::facing;
 use crate::render::world::Placement;
 
 /// Points of a strip at most.

@@ -6,6 +6,8 @@ use crate::load::obj::lines::{Lines, keyword, words};
 use crate::load::obj::number;
 use crate::load::paths::shorten;
 use crate::load::{Diagnostic, Warnings};
+use crate::math::DVec3;
+use crate::scene::color::rec_709_of_xyz;
 use std::path::Path;
 
 /// A material as written; `None`: not said.
@@ -198,7 +200,8 @@ impl Parser<'_> {
         let color = [first, or_first(1), or_first(2)];
         if kind.is_some() {
             self.warn("mtl-xyz", "a CIE XYZ colour is converted to Rec. 709".into());
-            return Some(rec709(color));
+            // What is out of gamut is cut.
+            return Some(rec_709_of_xyz(color.into()).max(DVec3::ZERO).to_array());
         }
         Some(color)
     }
@@ -225,16 +228,6 @@ impl Parser<'_> {
     fn warn(&mut self, code: &'static str, text: String) {
         self.warnings.push(Diagnostic::new(code, self.file, self.line.to_string(), text));
     }
-}
-
-/// CIE XYZ -> linear Rec. 709, D65 white (IEC 61966-2-1); negative parts are out of gamut and cut.
-fn rec709([x, y, z]: [f64; 3]) -> [f64; 3] {
-    let rgb = [
-        3.240_454_2 * x - 1.537_138_5 * y - 0.498_531_4 * z,
-        -0.969_266_0 * x + 1.876_010_8 * y + 0.041_556_0 * z,
-        0.055_643_4 * x - 0.204_025_9 * y + 1.057_225_2 * z,
-    ];
-    rgb.map(|c| c.max(0.0))
 }
 
 #[cfg(test)]

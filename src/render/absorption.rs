@@ -1,0 +1,43 @@
+//! Which materials absorb the light that goes through their inside, and how strongly.
+
+use super::wave::Media;
+use crate::math::Vec3;
+use crate::scene::{Material, Surface};
+
+/// Coefficients of Beer's law by material, 1 / unit of length; empty where nothing absorbs light.
+#[derive(Debug, Default)]
+pub(crate) struct Absorption(Vec<Vec3>);
+
+impl Absorption {
+    /// Those of all materials; with `everything` also where all are zero.
+    pub(crate) fn of(materials: &[Material], everything: bool) -> Self {
+        let coefficient = |material: &Material| match &material.surface {
+            Surface::MetalRough(m) if m.thick && m.transmission > 0.0 => m.absorption,
+            _ => Vec3::ZERO,
+        };
+        let all: Vec<Vec3> = materials.iter().map(coefficient).collect();
+        Self(if everything || all.iter().any(|a| *a != Vec3::ZERO) { all } else { Vec::new() })
+    }
+
+    /// Whether there is any.
+    pub(crate) fn is_some(&self) -> bool {
+        !self.0.is_empty()
+    }
+
+    /// That of the inside of a material.
+    pub(crate) fn by(&self, material: u32) -> Option<Vec3> {
+        self.0.get(material as usize).copied()
+    }
+
+    /// That of what a ray is inside of; `None` in empty space.
+    pub(crate) fn within(&self, media: &Media) -> Option<Vec3> {
+        self.by(media.innermost()?.material)
+    }
+}
+
+#[cfg(test)]
+impl From<Vec<Vec3>> for Absorption {
+    fn from(coefficients: Vec<Vec3>) -> Self {
+        Self(coefficients)
+    }
+}

@@ -1,0 +1,207 @@
+//! The part of a mesh around a hit: interpolated attributes, texture coordinates, and how maps turn the normal.
+
+use super::texture::{ColorSpace, TextureStore};
+use super::world::Placement;
+use crate::math::{Vec2, Vec3, Vec4};
+use crate::scene::{Material, Mesh, TextureRef};
+
+/// How the weights of a triangle's second and third corner grow along its plane, per world unit.
+#[derive(Clone, Copy)]
+pub(super) struct Gradients {
+    pub second: Vec3,
+    pub third: Vec3,
+}
+
+impl Gradients {
+    /// Zero for a triangle without area.
+    pub(super) fn new([a, b, c]: [Vec3; 3]) -> Self {
+        let (e1, e2) = (b - a, c - a);
+        let normal = e1.cross(e2);
+        let inverse = 1.0 / normal.length_squared();
+        if !inverse.is_finite() {
+            return Self { second: Vec3::ZERO, third: Vec3::ZERO };
+        }
+        Self { second: e2.cross(normal) * inverse, third: normal.cross(e1) * inverse }
+    }
+}
+
+/// The part of a mesh around a hit: three corners and their weights.
+#[derive(Clone, Copy)]
+pub(crate) struct Patch<'a> {
+    pub(super) mesh: &'a Mesh,
+    pub(super) placement: &'a Placement,
+    pub(super) corners: [u32; 3],
+    pub(super) weights: [f32; 3],
+    pub(super) vertices: [Vec3; 3],
+}
+
+/// The two axes, world space, of the ellipse in which a ray's cone meets a surface; one pixel each.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Footprint {
+    pub(super) along: Vec3,
+    pub(super) across: Vec3,
+}
+
+impl Footprint {
+    /// Cone of diameter `width` along the unit vector `dir` on a surface with unit normal `normal`.
+    ///
+    /// After T. Akenine-Möller et al., "Improved Shader and Texture Level of Detail Using Ray Cones" (2021).
+    pub(crate) fn new(dir: Vec3, normal: Vec3, width: f32) -> Self {
+        // A grazing cone covers unboundedly much; beyond this the texture is at its smallest copy anyway.
+        const LONGEST: f32 = 1e4;
+        let axis = |v: Vec3| {
+            let seen = (v - dir.dot(v) * dir).length();
+            v * (width / seen.max(1.0 / LONGEST))
+        };
+        let slope = dir - normal.dot(dir) * normal;
+        let along = slope.try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
+        Self { along: axis(along), across: axis(normal.cross(along)) }
+    }
+}
+
+/// Texture coordinates at a point and their change along both axes of a [`Footprint`].
+#[derive(Clone, Copy)]
+pub(super) struct Coordinates {
+    pub uv: Vec2,
+    pub along: Vec2,
+    pub across: Vec2,
+    /// Change along the second and third corner's edge.
+    edges: [Vec2; 2],
+}
+
+impl Patch<'_> {
+    #[inline]
+    fn mix<T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>>(&self, values: &[T]) -> Option<T> {
+        let [a, b, c] = self.corners;
+        let value = |i: u32| values.get(i as usize).copied();
+        let (a, b, c) = (value(a), value(b), value(c));
+        Some(a? * self.weights[0] + b? * self.weights[1] + c? * self.weights[2])
+    }
+
+    /// Vertex colour, linear RGBA; white when the mesh has none.
+    pub(crate) fn color(&self) -> Vec4 {
+        self.mix(&self.mesh.colors).unwrap_or(Vec4::ONE)
+    }
+
+    /// The texture at this point, linear RGBA.
+    pub(crate) fn texel(&self, map: &TextureRef, space: ColorSpace, store: &TextureStore, print: &Footprint) -> Vec4 {
+        let at = self.coordinates(map, print);
+        store.sample(map.texture, space, at.uv, at.along, at.across)
+    }
+
+    pub(super) fn coordinates(&self, map: &TextureRef, print: &Footprint) -> Coordinates {
+        let Some(set) = self.mesh.uvs.get(map.uv_set as usize) else {
+            return Coordinates { uv: Vec2::ZERO, along: Vec2::ZERO, across: Vec2::ZERO, edges: [Vec2::ZERO; 2] };
+        };
+        let turn = Turn::new(map);
+        let [a, b, c] = self.corners;
+        let corner = |i: u32| set.get(i as usize).map_or(Vec2::ZERO, |&uv| turn.apply(uv));
+        let (a, b, c) = (corner(a), corner(b), corner(c));
+        let edges = [b - a, c - a];
+        let gradients = Gradients::new(self.vertices);
+        let change = |v: Vec3| edges[0] * gradients.second.dot(v) + edges[1] * gradients.third.dot(v);
+        let uv = a * self.weights[0] + b * self.weights[1] + c * self.weights[2] + map.transform.offset;
+        Coordinates { uv, along: change(print.along), across: change(print.across), edges }
+    }
+
+    /// Interpolated shading normal, world space, on the side of the mesh's own normals.
+    #[inline]
+    pub(super) fn normal(&self) -> Option<Vec3> {
+        smooth_normal(self.placement, self.mix(&self.mesh.normals)?)
+    }
+
+    /// Tangent and bitangent, unit and perpendicular to `normal`: those of the mesh, or those of the coordinates.
+    fn tangents(&self, normal: Vec3, map: &TextureRef, print: &Footprint) -> Option<(Vec3, Vec3)> {
+        let given = self.mix(&self.mesh.tangents).and_then(|t| {
+            let along = (self.placement.world_from_object * t.truncate().as_dvec3()).as_vec3();
+            // A mirrored instance turns the frame's handedness round.
+            let sign = if (t.w < 0.0) == self.placement.mirrored { 1.0 } else { -1.0 };
+            Some((perpendicular(along, normal)?, sign))
+        });
+        let (tangent, sign) = given.or_else(|| self.tangent_of_coordinates(normal, map, print))?;
+        Some((tangent, normal.cross(tangent) * sign))
+    }
+
+    /// The direction in which u grows, and the handedness that makes the bitangent point against v, which runs down.
+    fn tangent_of_coordinates(&self, normal: Vec3, map: &TextureRef, print: &Footprint) -> Option<(Vec3, f32)> {
+        let [a, b] = self.coordinates(map, print).edges;
+        let (e1, e2) = (self.vertices[1] - self.vertices[0], self.vertices[2] - self.vertices[0]);
+        let area = a.x * b.y - b.x * a.y;
+        if area == 0.0 {
+            return None;
+        }
+        let along_u = (e1 * b.y - e2 * a.y) * area.signum();
+        let along_v = (e2 * a.x - e1 * b.x) * area.signum();
+        let tangent = perpendicular(along_u, normal)?;
+        let sign = if normal.cross(tangent).dot(along_v) <= 0.0 { 1.0 } else { -1.0 };
+        Some((tangent, sign))
+    }
+
+    /// The normal as a normal map turns it, whose x and y are scaled.
+    #[inline]
+    pub(crate) fn normal_mapped(
+        &self,
+        normal: Vec3,
+        map: &TextureRef,
+        scale: f32,
+        store: &TextureStore,
+        print: &Footprint,
+    ) -> Option<Vec3> {
+        let texel = self.texel(map, ColorSpace::Linear, store, print).truncate() * 2.0 - 1.0;
+        let (tangent, bitangent) = self.tangents(normal, map, print)?;
+        (tangent * (texel.x * scale) + bitangent * (texel.y * scale) + normal * texel.z).try_normalize()
+    }
+
+    /// The normal as the material's bump map turns it: by the slope of the heights, from differences one texel wide.
+    ///
+    /// J. F. Blinn, "Simulation of Wrinkled Surfaces" (1978), with heights in units of the texture's side.
+    #[inline]
+    pub(crate) fn bumped(
+        &self,
+        normal: Vec3,
+        material: &Material,
+        store: &TextureStore,
+        print: &Footprint,
+    ) -> Option<Vec3> {
+        let map = material.bump_map.as_ref()?;
+        let (tangent, bitangent) = self.tangents(normal, map, print)?;
+        let at = self.coordinates(map, print);
+        let height = |uv: Vec2| store.sample(map.texture, ColorSpace::Linear, uv, at.along, at.across).x;
+        let texel = Vec2::ONE / store.size(map.texture).max(Vec2::ONE);
+        let rise = |d: Vec2, width: f32| (height(at.uv + d) - height(at.uv - d)) / width;
+        let du = rise(Vec2::new(0.5 * texel.x, 0.0), texel.x) * material.bump_scale;
+        let dv = rise(Vec2::new(0.0, 0.5 * texel.y), texel.y) * material.bump_scale;
+        // v runs down, against the bitangent.
+        (normal - tangent * du + bitangent * dv).try_normalize()
+    }
+}
+
+/// The linear part of a texture transform; the offset is added once, after interpolation.
+struct Turn {
+    x_axis: Vec2,
+    y_axis: Vec2,
+}
+
+impl Turn {
+    fn new(map: &TextureRef) -> Self {
+        let t = &map.transform;
+        let (sin, cos) = if t.rotation == 0.0 { (0.0, 1.0) } else { libm::sincosf(t.rotation) };
+        Self { x_axis: Vec2::new(cos, -sin) * t.scale.x, y_axis: Vec2::new(sin, cos) * t.scale.y }
+    }
+
+    fn apply(&self, uv: Vec2) -> Vec2 {
+        self.x_axis * uv.x + self.y_axis * uv.y
+    }
+}
+
+/// `v` without its part along `normal`, of unit length.
+fn perpendicular(v: Vec3, normal: Vec3) -> Option<Vec3> {
+    (v - normal * normal.dot(v)).try_normalize()
+}
+
+/// An interpolated normal of a mesh as its instance turns it, of unit length; `None` where it has none.
+#[inline(always)]
+pub(crate) fn smooth_normal(placement: &Placement, interpolated: Vec3) -> Option<Vec3> {
+    let normal = (placement.normal_from_object * interpolated.as_dvec3()).try_normalize()?.as_vec3();
+    normal.is_finite().then_some(normal)
+}
