@@ -111,7 +111,7 @@ impl Patch<'_> {
     }
 
     /// Tangent and bitangent, unit and perpendicular to `normal`: those of the mesh, or those of the coordinates.
-    fn tangents(&self, normal: Vec3, map: &TextureRef, print: &Footprint) -> Option<(Vec3, Vec3)> {
+    pub(super) fn tangents(&self, normal: Vec3, map: &TextureRef, print: &Footprint) -> Option<(Vec3, Vec3)> {
         let given = self.mix(&self.mesh.tangents).and_then(|t| {
             let along = (self.placement.world_from_object * t.truncate().as_dvec3()).as_vec3();
             // A mirrored instance turns the frame's handedness round.

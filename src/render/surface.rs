@@ -4,14 +4,14 @@
 //! bump maps. Whatever a file gives, normals come out finite and of unit length.
 
 use super::patch::{Footprint, Gradients, Patch};
-use super::shade::Seen;
+use super::shade::{Seen, lets_light_in};
 use super::texture::TextureStore;
 use super::world::{Placement, PrimSource, World};
 use crate::accel::refine::Refined;
 use crate::accel::{Hit, NO_PRIM, Ray};
-use crate::math::Vec3;
 use crate::math::bounds::offset_origin;
-use crate::scene::{Material, Mesh, Scene, TextureRef};
+use crate::math::{Vec2, Vec3};
+use crate::scene::{Material, Mesh, Scene, TextureRef, UvTransform};
 
 /// What was hit, before anything about it is computed.
 #[derive(Clone, Copy)]
@@ -190,9 +190,28 @@ impl<'a> Surface<'a> {
         facing(self.patch.as_ref().and_then(turned).unwrap_or(self.smooth), self.view)
     }
 
+    /// Unit vectors on the surface for coordinates of a map: along and across; any two where nothing tells.
+    pub(crate) fn tangents(&self, map: Option<&TextureRef>) -> [Vec3; 2] {
+        /// Where tangents come from when no map says: the first set of coordinates.
+        const FIRST: TextureRef = TextureRef {
+            texture: 0,
+            uv_set: 0,
+            transform: UvTransform { offset: Vec2::ZERO, rotation: 0.0, scale: Vec2::ONE },
+        };
+        let of = |patch: &Patch| patch.tangents(self.normal, map.unwrap_or(&FIRST), &self.footprint);
+        let (tangent, bitangent) =
+            self.patch.as_ref().and_then(of).unwrap_or_else(|| self.normal.any_orthonormal_pair());
+        [tangent, bitangent]
+    }
+
+    /// Whether it is seen from outside: from either side where light cannot enter.
+    pub(crate) fn is_outside(&self) -> bool {
+        self.front || !lets_light_in(self.target.material)
+    }
+
     /// How it is seen.
     pub(crate) fn seen(&self) -> Seen {
-        Seen { normal: self.normal, geometric: self.geometric, view: self.view, front: self.front }
+        Seen { normal: self.normal, geometric: self.geometric, view: self.view, outside: self.is_outside() }
     }
 
     /// A ray from here along `dir` (of any length) up to `t_max`; it starts outside the error of the position, on the
@@ -231,11 +250,9 @@ fn id(i: usize) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{DAffine3, DVec3, Vec2, Vec4};
+    use crate::math::{DAffine3, DVec3, Vec4};
     use crate::render::patch::Coordinates;
-    use crate::scene::{
-        Bitmap, Instance, MetalRough, Pixels, Polygon, Sampler, Surface as Reflection, Texture, UvTransform,
-    };
+    use crate::scene::{Bitmap, Instance, MetalRough, Pixels, Polygon, Sampler, Surface as Reflection, Texture};
 
     /// A unit square in z = 0 that faces +z: u runs along x, v down along −y; texture 0 covers it.
     fn scene(texels: Vec<[u8; 4]>, width: u32) -> Scene {

@@ -57,6 +57,8 @@ pub enum Feature {
     Absorption,
     /// Lacquer over a surface.
     Coat,
+    /// Surfaces that are rougher along a grain than across it.
+    Grain,
     /// Thin films, whose colours change with the angle.
     Film,
     /// Sheen of cloth.
@@ -84,7 +86,7 @@ pub const SMOOTH: f32 = 0.2;
 
 impl Feature {
     /// All of them, in the order they are listed.
-    pub const ALL: [Self; 30] = [
+    pub const ALL: [Self; 31] = [
         Self::Triangles,
         Self::Polygons,
         Self::Spheres,
@@ -108,6 +110,7 @@ impl Feature {
         Self::Refraction,
         Self::Absorption,
         Self::Coat,
+        Self::Grain,
         Self::Film,
         Self::Sheen,
         Self::Dispersion,
@@ -143,6 +146,7 @@ impl Feature {
             Self::Refraction => "refraction",
             Self::Absorption => "absorption",
             Self::Coat => "clearcoat",
+            Self::Grain => "anisotropy",
             Self::Film => "iridescence",
             Self::Sheen => "sheen",
             Self::Dispersion => "dispersion",
@@ -227,6 +231,7 @@ impl Features {
             Surface::Phong(phong) => self.add_phong(phong),
             Surface::MetalRough(pbr) => {
                 self.add_if(true, Feature::MetalRough);
+                self.add_if(pbr.grain.is_some(), Feature::Grain);
                 self.add_if(pbr.film.is_some(), Feature::Film);
                 self.add_if(pbr.sheen.is_some(), Feature::Sheen);
                 if let Some(coat) = &pbr.coat {

@@ -1,4 +1,4 @@
-//! What only some surfaces have besides the metallic-roughness model: lacquer, a thin film, sheen.
+//! What only some surfaces have besides the metallic-roughness model: lacquer, a thin film, sheen, a grain.
 
 use super::TextureRef;
 use crate::math::Vec3;
@@ -30,6 +30,17 @@ impl Coat {
     pub fn maps_mut(&mut self) -> [&mut Option<TextureRef>; 3] {
         [&mut self.strength_map, &mut self.roughness_map, &mut self.normal_map]
     }
+}
+
+/// A grain along which light is spread farther than across it (KHR_materials_anisotropy).
+#[derive(Clone, Debug)]
+pub struct Grain {
+    /// 0: none … 1: along the grain the surface is as rough as can be.
+    pub strength: f32,
+    /// Turns the grain from the tangent towards the bitangent, radians.
+    pub rotation: f32,
+    /// Linear map: red and green for −1 … 1 along tangent and bitangent, before the turn; blue × `strength`.
+    pub map: Option<TextureRef>,
 }
 
 /// A film so thin that light reflected off both its sides interferes (KHR_materials_iridescence).

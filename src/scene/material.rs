@@ -1,6 +1,6 @@
 //! How a surface answers to light. Factors are linear; maps multiply them.
 
-use super::{Coat, Film, Sheen};
+use super::{Coat, Film, Grain, Sheen};
 use crate::math::{Vec2, Vec3};
 
 /// A material. `base_color`, alpha, emission and the normal are common to every [`Surface`] model.
@@ -87,6 +87,8 @@ pub struct MetalRough {
     pub thickness_map: Option<TextureRef>,
     /// How strongly `ior` depends on the wavelength: 20 / Abbe number, as KHR_materials_dispersion; 0: not at all.
     pub dispersion: f32,
+    /// A grain, in whose direction it is rougher.
+    pub grain: Option<Box<Grain>>,
     /// A thin film on it.
     pub film: Option<Box<Film>>,
     /// Fibres that stand off it.
@@ -186,6 +188,7 @@ impl Default for MetalRough {
             thickness: 0.0,
             thickness_map: None,
             dispersion: 0.0,
+            grain: None,
             film: None,
             sheen: None,
             coat: None,
@@ -203,10 +206,11 @@ impl MetalRough {
             &self.transmission_map,
             &self.thickness_map,
         ];
+        let grain = self.grain.iter().map(|grain| &grain.map);
         let film = self.film.iter().flat_map(|film| film.maps());
         let sheen = self.sheen.iter().flat_map(|sheen| sheen.maps());
         let coat = self.coat.iter().flat_map(|coat| coat.maps());
-        own.into_iter().chain(film).chain(sheen).chain(coat).flatten()
+        own.into_iter().chain(grain).chain(film).chain(sheen).chain(coat).flatten()
     }
 
     /// Every slot that can hold a map.
@@ -218,6 +222,7 @@ impl MetalRough {
             &mut self.transmission_map,
             &mut self.thickness_map,
         ];
+        slots.extend(self.grain.iter_mut().map(|grain| &mut grain.map));
         slots.extend(self.film.iter_mut().flat_map(|film| film.maps_mut()));
         slots.extend(self.sheen.iter_mut().flat_map(|sheen| sheen.maps_mut()));
         slots.extend(self.coat.iter_mut().flat_map(|coat| coat.maps_mut()));
@@ -239,7 +244,7 @@ impl MetalRough {
 impl MetalRough {
     /// Whether it has anything besides the core model: what depends on the view at each point.
     pub fn has_lobes(&self) -> bool {
-        self.film.is_some() || self.sheen.is_some() || self.coat.is_some()
+        self.grain.is_some() || self.film.is_some() || self.sheen.is_some() || self.coat.is_some()
     }
 }
 

@@ -5,7 +5,7 @@ use super::mesh::Needs;
 use super::report::Report;
 use super::textures::Textures;
 use crate::math::Vec3;
-use crate::scene::{AlphaMode, Coat, Film, Material, MetalRough, Sheen, Surface};
+use crate::scene::{AlphaMode, Coat, Film, Grain, Material, MetalRough, Sheen, Surface};
 use gltf::json;
 use gltf::json::material as source;
 use gltf::json::validation::Checked;
@@ -42,12 +42,12 @@ pub(super) fn convert(i: usize, source: &json::Material, textures: &mut Textures
 
 /// What vertices need for a material's maps.
 pub(super) fn needs(material: &Material) -> Needs {
-    let of_coat = match &material.surface {
-        Surface::MetalRough(m) => m.coat.as_ref().and_then(|coat| coat.normal_map.as_ref()),
-        _ => None,
-    };
-    let tangents = material.normal_map.as_ref().or(of_coat).map(|map| map.uv_set);
-    let mut uv_sets: Vec<u32> = material.textures().map(|map| map.uv_set).collect();
+    let m = material.metal_rough();
+    let of_coat = m.and_then(|m| m.coat.as_ref()?.normal_map.as_ref());
+    // A grain without a map runs along the tangents of the first set.
+    let of_grain = || Some(m?.grain.as_ref()?.map.as_ref().map_or(0, |map| map.uv_set));
+    let tangents = material.normal_map.as_ref().or(of_coat).map(|map| map.uv_set).or_else(of_grain);
+    let mut uv_sets: Vec<u32> = material.textures().map(|map| map.uv_set).chain(tangents).collect();
     uv_sets.sort_unstable();
     uv_sets.dedup();
     Needs { uv_sets, tangents }
@@ -138,6 +138,7 @@ fn metal_rough(source: &json::Material, textures: &mut Textures) -> MetalRough {
         surface.thickness_map = textures.info(info_of(extensions.others.get(VOLUME), "thicknessTexture").as_ref());
     }
     let other = |name: &str| extensions.others.get(name);
+    surface.grain = other("KHR_materials_anisotropy").and_then(|grain| self::grain(grain, textures)).map(Box::new);
     surface.film = other("KHR_materials_iridescence").and_then(|film| self::film(film, textures)).map(Box::new);
     surface.sheen = other("KHR_materials_sheen").and_then(|sheen| self::sheen(sheen, textures)).map(Box::new);
     surface.coat = other("KHR_materials_clearcoat").and_then(|coat| self::coat(coat, textures)).map(Box::new);
@@ -147,6 +148,16 @@ fn metal_rough(source: &json::Material, textures: &mut Textures) -> MetalRough {
 /// A number in an extension's object, kept within limits.
 fn number_of(extension: &Value, name: &str, default: f32, (low, high): (f32, f32)) -> f32 {
     extension.get(name).and_then(Value::as_f64).map_or(default, |x| within(x as f32, low, high, default))
+}
+
+/// KHR_materials_anisotropy; `None` where its strength is zero.
+fn grain(extension: &Value, textures: &mut Textures) -> Option<Grain> {
+    let strength = number_of(extension, "anisotropyStrength", 0.0, (0.0, 1.0));
+    (strength > 0.0).then(|| Grain {
+        strength,
+        rotation: number_of(extension, "anisotropyRotation", 0.0, (f32::MIN, f32::MAX)),
+        map: textures.info(info_of(Some(extension), "anisotropyTexture").as_ref()),
+    })
 }
 
 /// KHR_materials_iridescence; `None` where its strength is zero.

@@ -125,7 +125,7 @@ mod tests {
             for degrees in [0.0, 45.0, 75.0] {
                 let view = at(degrees);
                 let coat = coat(1.0, roughness, view).unwrap();
-                let seen = Seen { normal: Vec3::Z, geometric: Vec3::Z, view, front: true };
+                let seen = Seen { normal: Vec3::Z, geometric: Vec3::Z, view, outside: true };
                 let white = coat.ambient(&seen, &sky, Vec3::ZERO).x + coat.mirrored();
                 assert!(white > 0.01 && white <= coat.taken + 0.02, "{roughness} at {degrees}: {white}");
             }

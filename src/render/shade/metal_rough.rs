@@ -8,7 +8,7 @@
 //! unscattered apart from a part that is looked up; lights themselves are not seen through rough glass.
 
 use super::facets::{AlbedoRow, albedo, rebound};
-use super::{Balance, Reader, Seen, Sky, film};
+use super::{Balance, GrainMatter, Reader, Seen, Sky, film};
 use crate::math::Vec3;
 use crate::render::optics::{fresnel_dielectric, fresnel_schlick, transmittance};
 use crate::render::wave::Crossing;
@@ -24,7 +24,7 @@ const FROSTED_ROUGHNESS: f32 = 0.6;
 /// That part; the rest goes straight through, so that glass never hides what it holds.
 const FROSTED_SHARE: f32 = 0.75;
 /// Highlights of lights without extent are never narrower than this roughness makes them.
-const NARROWEST_HIGHLIGHT: f32 = 0.045;
+pub(super) const NARROWEST_HIGHLIGHT: f32 = 0.045;
 
 /// The model's parameters at one point.
 #[derive(Clone, Debug)]
@@ -32,6 +32,8 @@ pub(crate) struct MetalRoughMatter {
     base: Vec3,
     metallic: f32,
     roughness: f32,
+    /// Along its grain; 0 where it has none.
+    roughness_along: f32,
     /// Reflection of the dielectric part, face on and grazing.
     f0: Vec3,
     f90: f32,
@@ -62,8 +64,8 @@ pub(crate) struct Around {
     pub mirrored: Vec3,
     /// Share of the mirrored light that nothing stands in the way of.
     pub open: f32,
-    /// Whether the front is seen.
-    pub front: bool,
+    /// Whether it is seen from outside.
+    pub outside: bool,
 }
 
 /// `metallic` with its map.
@@ -91,6 +93,7 @@ impl MetalRoughMatter {
             filmed: false,
             metallic: (m.metallic * map.z).clamp(0.0, 1.0),
             roughness: (m.roughness * map.y).clamp(0.0, 1.0),
+            roughness_along: 0.0,
             f0: (color * (at_normal * at_normal)).clamp(Vec3::ZERO, Vec3::ONE) * specular,
             f90: specular,
             transmission: (m.transmission * reader.linear(m.transmission_map.as_ref()).x).clamp(0.0, 1.0),
@@ -102,8 +105,8 @@ impl MetalRoughMatter {
         }
     }
 
-    /// The same under a film, as seen from the outside at this cosine.
-    pub(super) fn filmed(mut self, film: &Film, cosine: f32, reader: &Reader) -> Self {
+    /// Puts it under a film, as seen from the outside at this cosine.
+    pub(super) fn cover(&mut self, film: &Film, cosine: f32, reader: &Reader) {
         let strength = (film.strength * reader.linear(film.strength_map.as_ref()).x).clamp(0.0, 1.0);
         let [thin, thick] = film.thickness;
         let thickness = thin + (thick - thin) * reader.linear(film.thickness_map.as_ref()).y;
@@ -114,7 +117,20 @@ impl MetalRoughMatter {
             };
             (self.f0, self.metal_f0, self.filmed) = (under(self.f0), under(self.metal_f0), true);
         }
-        self
+    }
+
+    /// Gives it a grain.
+    pub(super) fn brush(&mut self, grain: Option<&GrainMatter>) {
+        self.roughness_along = grain.map_or(0.0, GrainMatter::roughness);
+    }
+
+    /// The roughness of a surface that has no grain and spreads light as far in all.
+    fn mean_roughness(&self) -> f32 {
+        if self.roughness_along > self.roughness {
+            (self.roughness * self.roughness_along).sqrt()
+        } else {
+            self.roughness
+        }
     }
 
     /// Reflectance of the dielectric and of the metal part by Schlick's formula.
@@ -137,33 +153,41 @@ impl MetalRoughMatter {
     /// BRDF × N·L; all unit vectors, away from the surface.
     #[inline(always)]
     pub(crate) fn lit(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
+        let lobe = |half| highlight(normal, half, [normal.dot(to_light), normal.dot(view)], self.roughness);
+        self.lit_by(normal, view, to_light, lobe)
+    }
+
+    /// The same with another lobe: what it gives for a half vector, before Fresnel.
+    #[inline(always)]
+    pub(super) fn lit_by(&self, normal: Vec3, view: Vec3, to_light: Vec3, lobe: impl Fn(Vec3) -> f32) -> Vec3 {
         let (n_l, n_v) = (normal.dot(to_light), normal.dot(view));
         if n_l <= 0.0 || n_v <= 0.0 {
             return Vec3::ZERO;
         }
         let half = (view + to_light).normalize_or(normal);
         let (dielectric, metal) = self.fresnel(view.dot(half));
-        let lobe = highlight(normal, half, [n_l, n_v], self.roughness);
         let diffuse = self.scattered() * ((1.0 - dielectric.max_element()) / PI);
-        let specular = dielectric.lerp(metal, self.metallic) * lobe;
+        let specular = dielectric.lerp(metal, self.metallic) * lobe(half);
         (diffuse + specular) * n_l
     }
 
     /// The surroundings without a ray: scattered and looked-up mirrored light.
-    pub(super) fn ambient(&self, seen: &Seen, sky: &Sky, ambient: Vec3) -> Vec3 {
+    pub(super) fn ambient(&self, seen: &Seen, sky: &Sky, ambient: Vec3, grain: Option<&GrainMatter>) -> Vec3 {
         let n_v = seen.normal.dot(seen.view).clamp(0.0, 1.0);
-        let looked_up = self.traced(seen.front) < 1.0;
+        let looked_up = self.traced(seen.outside) < 1.0;
+        let roughness = self.mean_roughness();
+        let mirrored = || grain.map_or_else(|| sky.blurred(seen.mirrored(), roughness), |g| g.mirrored(seen, sky));
         let around = Around {
             n_v,
-            shares: albedo(self.roughness, n_v),
+            shares: albedo(roughness, n_v),
             diffuse: sky.diffuse(seen.normal) + ambient,
-            mirrored: if looked_up { sky.blurred(seen.mirrored(), self.roughness) + ambient } else { Vec3::ZERO },
-            open: if looked_up { open(n_v, self.occlusion, self.roughness) } else { 0.0 },
-            front: seen.front,
+            mirrored: if looked_up { mirrored() + ambient } else { Vec3::ZERO },
+            open: if looked_up { open(n_v, self.occlusion, roughness) } else { 0.0 },
+            outside: seen.outside,
         };
-        let rebound = if self.metallic > 0.0 { rebound(self.roughness, self.metal_f0) } else { Vec3::ZERO };
+        let rebound = if self.metallic > 0.0 { rebound(roughness, self.metal_f0) } else { Vec3::ZERO };
         let (mut sum, taken) = self.around(&around, rebound);
-        let frosted = self.frosted(seen.front);
+        let frosted = self.frosted(seen.outside);
         if frosted > 0.0 {
             let light = sky.blurred(-seen.view, self.roughness) + ambient;
             sum += self.passed(1.0 - taken) * self.inside * light * frosted;
@@ -175,7 +199,7 @@ impl MetalRoughMatter {
     /// `rebound` is what [`rebound`] gives for the material.
     #[inline(always)]
     pub(crate) fn around(&self, around: &Around, rebound: Vec3) -> (Vec3, f32) {
-        let looked_up = 1.0 - self.traced(around.front);
+        let looked_up = 1.0 - self.traced(around.outside);
         let (scale, bias) = around.shares;
         let (dielectric, metal) = (self.f0 * scale + self.f90 * bias, self.metal_f0 * scale + bias);
 
@@ -233,7 +257,7 @@ impl MetalRoughMatter {
     /// Share of the mirrored surroundings that a ray brings in. From inside there is no environment to look up.
     #[inline(always)]
     fn traced(&self, outside: bool) -> f32 {
-        if outside { traced(self.roughness) } else { 1.0 }
+        if outside { traced(self.roughness.max(self.roughness_along)) } else { 1.0 }
     }
 
     /// Share of the light passing through that is looked up instead.
@@ -312,6 +336,7 @@ mod tests {
             filmed: false,
             metallic: 0.0,
             roughness: 0.5,
+            roughness_along: 0.0,
             f0: Vec3::splat(0.04),
             f90: 1.0,
             transmission: 0.0,

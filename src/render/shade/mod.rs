@@ -7,6 +7,7 @@
 mod coat;
 mod facets;
 mod film;
+mod grain;
 mod light;
 mod metal_rough;
 mod phong;
@@ -15,6 +16,7 @@ mod sky;
 mod spectrum;
 
 pub(crate) use coat::CoatMatter;
+pub(crate) use grain::GrainMatter;
 pub(crate) use light::{Incident, LocalLight};
 pub(crate) use metal_rough::{Around, MetalRoughMatter, above};
 pub(crate) use phong::PhongMatter;
@@ -40,8 +42,8 @@ pub(crate) struct Seen {
     pub geometric: Vec3,
     /// Back along the ray.
     pub view: Vec3,
-    /// Whether it is the front.
-    pub front: bool,
+    /// Whether it is seen from outside: from either side where light cannot enter.
+    pub outside: bool,
 }
 
 impl Seen {
@@ -56,7 +58,8 @@ impl Seen {
 pub(crate) struct Matter {
     pub emission: Vec3,
     pub model: Model,
-    /// Fibres on it, and lacquer over all; seen from outside only.
+    /// Its grain, fibres on it, and lacquer over all; seen from outside only.
+    pub grain: Option<GrainMatter>,
     pub sheen: Option<SheenMatter>,
     pub coat: Option<CoatMatter>,
 }
@@ -116,17 +119,21 @@ impl Matter {
         let material = surface.target.material;
         let matter = Self::read(material, base, &reader);
         match material.metal_rough() {
-            Some(m) if surface.front && m.has_lobes() => matter.with_lobes(m, surface, &reader),
+            Some(m) if surface.is_outside() && m.has_lobes() => matter.with_lobes(m, surface, &reader),
             _ => matter,
         }
     }
 
-    /// The same with film, sheen and lacquer.
+    /// The same with grain, film, sheen and lacquer.
     #[cold]
     fn with_lobes(mut self, m: &MetalRough, surface: &Surface, reader: &Reader) -> Self {
         let n_v = surface.normal.dot(surface.view).clamp(0.0, 1.0);
-        if let (Some(film), Model::MetalRough(core)) = (&m.film, &self.model) {
-            self.model = Model::MetalRough(core.clone().filmed(film, n_v, reader));
+        if let Model::MetalRough(core) = &mut self.model {
+            if let Some(film) = &m.film {
+                core.cover(film, n_v, reader);
+            }
+            self.grain = m.grain.as_ref().and_then(|grain| GrainMatter::new(grain, core.roughness(), surface, reader));
+            core.brush(self.grain.as_ref());
         }
         self.sheen = m.sheen.as_ref().and_then(|sheen| SheenMatter::new(sheen, n_v, reader));
         if let Some(coat) = &m.coat {
@@ -153,7 +160,7 @@ impl Matter {
                 Model::MetalRough(MetalRoughMatter::new(m, base, occlusion(material, reader), reader))
             }
         };
-        Self { emission, model, sheen: None, coat: None }
+        Self { emission, model, grain: None, sheen: None, coat: None }
     }
 
     /// Share of what is under the lacquer that is seen through it.
@@ -176,7 +183,7 @@ impl Matter {
         let below = match &self.model {
             Model::Unlit(color) => *color,
             Model::Phong(m) => m.ambient * ambient + m.diffuse * sky.diffuse(seen.normal),
-            Model::MetalRough(m) => m.ambient(seen, sky, ambient),
+            Model::MetalRough(m) => m.ambient(seen, sky, ambient, self.grain.as_ref()),
         };
         let mut all = below * self.clear();
         if let Some(sheen) = &self.sheen {
@@ -193,7 +200,14 @@ impl Matter {
         let below = match &self.model {
             Model::Unlit(_) => Vec3::ZERO,
             Model::Phong(m) => m.lit(normal, view, light.to_light) * light.strength(),
-            Model::MetalRough(m) => m.lit(normal, view, light.to_light) * light.irradiance(),
+            Model::MetalRough(m) => {
+                let to_light = light.to_light;
+                let lit = match &self.grain {
+                    None => m.lit(normal, view, to_light),
+                    Some(grain) => m.lit_by(normal, view, to_light, |_| grain.highlight(normal, view, to_light)),
+                };
+                lit * light.irradiance()
+            }
         };
         let mut all = below * self.clear();
         if let Some(sheen) = &self.sheen {

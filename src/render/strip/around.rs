@@ -98,7 +98,8 @@ fn look(
             diffuse: get(&to.diffuse, i) + ambient,
             mirrored: get(&to.mirrored, i) + ambient,
             open: 1.0,
-            front: found.front[i] == 1,
+            // Nothing that light can enter is shaded here.
+            outside: true,
         };
         put(&mut to.radiance, i, emission + m.around(&around, rebound).0);
     }

@@ -278,7 +278,7 @@ impl Found {
             normal: get(&self.normal, i),
             geometric: get(&self.geometric, i),
             view: get(&self.view, i),
-            front: self.front[i] == 1,
+            outside: true,
         }
     }
 

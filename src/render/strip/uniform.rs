@@ -12,8 +12,8 @@ pub(crate) struct Uniform {
 }
 
 impl Uniform {
-    /// `None` for materials with maps, film, sheen or lacquer, those that let light through, and those that mirror it where
-    /// rays bounce.
+    /// `None` for materials with maps, a grain, film, sheen or lacquer, those that let light through, and those that mirror it
+    /// where rays bounce.
     pub(crate) fn of(material: &Material, store: &TextureStore, bounces: bool) -> Option<Self> {
         if material.textures().next().is_some()
             || !material.is_opaque()

@@ -21,6 +21,7 @@ fn materials_carry_every_factor_and_slot() {
         "clearcoat",
         "iridescence",
         "sheen",
+        "anisotropy",
     ];
     let used: Vec<String> =
         names.iter().map(|n| format!("KHR_materials_{n}")).chain(["KHR_texture_transform".into()]).collect();
@@ -46,6 +47,8 @@ fn materials_carry_every_factor_and_slot() {
             "KHR_materials_iridescence": {
                 "iridescenceFactor": 0.75, "iridescenceIor": 1.25, "iridescenceThicknessMaximum": 500,
                 "iridescenceThicknessTexture": {"index": 1}},
+            "KHR_materials_anisotropy": {
+                "anisotropyStrength": 0.5, "anisotropyRotation": -2, "anisotropyTexture": {"index": 1}},
             "KHR_materials_sheen": {"sheenColorFactor": [0.5, 0.25, 0], "sheenRoughnessTexture": {"index": 1}},
             "KHR_materials_clearcoat": {
                 "clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.125, "clearcoatRoughnessTexture": {"index": 1},
@@ -73,6 +76,8 @@ fn materials_carry_every_factor_and_slot() {
     let film = surface.film.as_ref().unwrap();
     assert_eq!((film.strength, film.ior, film.thickness), (0.75, 1.25, [100.0, 500.0]));
     assert!(film.strength_map.is_none() && film.thickness_map.is_some());
+    let grain = surface.grain.as_ref().unwrap();
+    assert_eq!((grain.strength, grain.rotation, grain.map.is_some()), (0.5, -2.0, true));
     let sheen = surface.sheen.as_ref().unwrap();
     assert_eq!((sheen.color, sheen.roughness), (Vec3::new(0.5, 0.25, 0.0), 0.0));
     assert!(sheen.color_map.is_none() && sheen.roughness_map.is_some());
@@ -144,8 +149,8 @@ fn images_of_materials_that_are_not_drawn_are_not_decoded() {
 }
 
 #[test]
-fn a_normal_map_brings_tangents_and_others_do_not() {
-    for (slot, expected) in [("normalTexture", 3), ("emissiveTexture", 0)] {
+fn what_has_a_direction_brings_tangents_and_the_rest_does_not() {
+    for (slot, expected) in [("normalTexture", 3), ("anisotropy", 3), ("emissiveTexture", 0)] {
         let mut file = Builder::new();
         let positions = file.triangle();
         let uvs = file.floats("VEC2", &[0., 0., 1., 0., 0., 1.]);
@@ -153,7 +158,13 @@ fn a_normal_map_brings_tangents_and_others_do_not() {
         file.set("images", json!([{"uri": picture()}]));
         file.set("textures", json!([{"source": 0}]));
         let mut material = json!({});
-        material[slot] = json!({"index": 0});
+        match slot {
+            "anisotropy" => {
+                file.set("extensionsUsed", json!(["KHR_materials_anisotropy"]));
+                material["extensions"] = json!({"KHR_materials_anisotropy": {"anisotropyStrength": 1}});
+            }
+            _ => material[slot] = json!({"index": 0}),
+        }
         file.set("materials", json!([material]));
         assert_eq!(file.load().scene.meshes[0].tangents.len(), expected, "{slot}");
     }

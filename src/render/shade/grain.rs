@@ -1,0 +1,180 @@
+//! Surfaces with a grain, brushed metal above all: light is spread farther along the grain than across it
+//! (KHR_materials_anisotropy).
+//!
+//! B. Burley, "Physically Based Shading at Disney" (2012) for the distribution of facets, E. Heitz, "Understanding the
+//! Masking-Shadowing Function" (2014) for how they hide each other.
+
+use super::metal_rough::{NARROWEST_HIGHLIGHT, above};
+use super::{Reader, Seen, Sky};
+use crate::math::{Vec2, Vec3};
+use crate::render::optics::reflect;
+use crate::render::surface::Surface;
+use crate::scene::Grain;
+use std::f32::consts::PI;
+
+/// Lookups of the surroundings along the grain.
+const LOOKUPS: u8 = 32;
+
+/// The grain at one point.
+#[derive(Clone, Debug)]
+pub(crate) struct GrainMatter {
+    /// Unit vectors along and across it, on the surface.
+    along: Vec3,
+    across: Vec3,
+    /// Widths of the distribution of facets along and across.
+    alpha: [f32; 2],
+}
+
+impl GrainMatter {
+    /// Of a surface with this roughness across the grain; `None` where it has none.
+    pub(super) fn new(grain: &Grain, roughness: f32, surface: &Surface, reader: &Reader) -> Option<Self> {
+        // A map's middle is no direction; without a map the grain runs along the tangent.
+        let texel = match &grain.map {
+            Some(map) => reader.linear(Some(map)).truncate() * Vec3::new(2.0, 2.0, 1.0) - Vec3::new(1.0, 1.0, 0.0),
+            None => Vec3::new(1.0, 0.0, 1.0),
+        };
+        let strength = (grain.strength * texel.z).clamp(0.0, 1.0);
+        let (sin, cos) = libm::sincosf(grain.rotation);
+        let direction = Vec2::new(cos, sin).rotate(texel.truncate()).try_normalize()?;
+        if strength == 0.0 {
+            return None;
+        }
+        let [tangent, bitangent] = surface.tangents(grain.map.as_ref());
+        let along = tangent * direction.x + bitangent * direction.y;
+        Some(Self::in_frame(along, surface.normal.cross(along), strength, roughness))
+    }
+
+    fn in_frame(along: Vec3, across: Vec3, strength: f32, roughness: f32) -> Self {
+        let r = roughness.max(NARROWEST_HIGHLIGHT);
+        let narrow = r * r;
+        Self { along, across, alpha: [narrow + (1.0 - narrow) * strength * strength, narrow] }
+    }
+
+    /// Perceptual roughness along it.
+    pub(super) fn roughness(&self) -> f32 {
+        self.alpha[0].sqrt()
+    }
+
+    /// Distribution × visibility of a light without extent, before Fresnel; all unit vectors, on the front.
+    pub(super) fn highlight(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> f32 {
+        let half = (view + to_light).normalize_or(normal);
+        self.facets(normal, half) * self.visibility(normal, view, to_light)
+    }
+
+    fn facets(&self, normal: Vec3, half: Vec3) -> f32 {
+        let [wide, narrow] = self.alpha;
+        let (x, y, z) = (half.dot(self.along) / wide, half.dot(self.across) / narrow, half.dot(normal));
+        let squared = x * x + y * y + z * z;
+        1.0 / (PI * wide * narrow * squared * squared)
+    }
+
+    fn visibility(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> f32 {
+        let [wide, narrow] = self.alpha;
+        let stretched =
+            |v: Vec3| Vec3::new(wide * v.dot(self.along), narrow * v.dot(self.across), normal.dot(v)).length();
+        0.5 / (normal.dot(to_light) * stretched(view) + normal.dot(view) * stretched(to_light))
+    }
+
+    /// The surroundings as facets show them that lean along the grain, each as blurred as it is rough across.
+    pub(super) fn mirrored(&self, seen: &Seen, sky: &Sky) -> Vec3 {
+        let [wide, narrow] = self.alpha;
+        let spread = (wide * wide - narrow * narrow).max(0.0).sqrt();
+        // Wide enough that neighbours meet.
+        let blur = narrow.max(2.0 * spread / f32::from(LOOKUPS)).sqrt();
+        let (mut sum, mut shares) = (Vec3::ZERO, 0.0);
+        for k in 0..LOOKUPS {
+            // Slopes that cut the distribution along one axis, α² / 2 (α² + s²)^³⁄₂, into equal parts.
+            let part = f32::from(2 * k + 1) / f32::from(LOOKUPS) - 1.0;
+            let slope = spread * part / (1.0 - part * part).sqrt();
+            let half = (seen.normal + self.along * slope).normalize_or(seen.normal);
+            let share = half.dot(seen.view).max(0.0);
+            if share > 0.0 {
+                let dir = above(reflect(-seen.view, half), seen.geometric);
+                sum += sky.blurred(dir, blur) * share;
+                shares += share;
+            }
+        }
+        if shares > 0.0 { sum / shares } else { sky.blurred(seen.mirrored(), self.roughness()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::metal_rough::highlight;
+    use super::*;
+    use crate::scene::{Environment, Scene};
+
+    fn at(degrees: f32, turn: f32) -> Vec3 {
+        let ((sin, cos), (st, ct)) = (libm::sincosf(degrees.to_radians()), libm::sincosf(turn.to_radians()));
+        Vec3::new(sin * ct, sin * st, cos)
+    }
+
+    fn grain(strength: f32, roughness: f32) -> GrainMatter {
+        GrainMatter::in_frame(Vec3::X, Vec3::Y, strength, roughness)
+    }
+
+    /// ∫ f(h) over the hemisphere by midpoints.
+    fn over_hemisphere(f: impl Fn(Vec3) -> f64) -> f64 {
+        let (rows, columns) = (1000u16, 200u16);
+        let step = (90.0 / f32::from(rows), 360.0 / f32::from(columns));
+        let mut sum = 0.0;
+        for i in 0..rows {
+            let polar = (f32::from(i) + 0.5) * step.0;
+            let ring = f64::from(libm::sinf(polar.to_radians()));
+            sum += (0..columns).map(|j| f(at(polar, (f32::from(j) + 0.5) * step.1)) * ring).sum::<f64>();
+        }
+        sum * f64::from(step.0.to_radians()) * f64::from(step.1.to_radians())
+    }
+
+    #[test]
+    fn facets_cover_the_surface_once() {
+        for (strength, roughness) in [(0.0, 0.4), (0.5, 0.3), (1.0, 0.5), (0.7, 0.8)] {
+            let grain = grain(strength, roughness);
+            let covered = over_hemisphere(|h| f64::from(grain.facets(Vec3::Z, h) * h.z));
+            assert!((covered - 1.0).abs() < 0.01, "{strength} {roughness}: {covered}");
+        }
+    }
+
+    #[test]
+    fn without_strength_it_is_the_lobe_of_surfaces_without_a_grain() {
+        let (view, light) = (at(30.0, 10.0), at(50.0, 130.0));
+        let (own, expected) = (
+            grain(0.0, 0.4).highlight(Vec3::Z, view, light),
+            highlight(Vec3::Z, (view + light).normalize(), [light.z, view.z], 0.4),
+        );
+        assert!((own / expected - 1.0).abs() < 1e-4, "{own} {expected}");
+    }
+
+    #[test]
+    fn highlights_are_long_along_the_grain() {
+        let grain = grain(0.8, 0.2);
+        let along = grain.highlight(Vec3::Z, Vec3::Z, at(50.0, 0.0));
+        let across = grain.highlight(Vec3::Z, Vec3::Z, at(50.0, 90.0));
+        assert!(along > 20.0 * across, "{along} {across}");
+    }
+
+    #[test]
+    fn seen_and_lit_can_change_places() {
+        let (grain, a, b) = (grain(0.6, 0.3), at(25.0, 20.0), at(65.0, 250.0));
+        let (there, back) = (grain.highlight(Vec3::Z, a, b), grain.highlight(Vec3::Z, b, a));
+        assert!((there / back - 1.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn an_even_sky_stays_even_and_the_studio_is_near_the_mean_over_the_lobe() {
+        let seen = |view| Seen { normal: Vec3::Z, geometric: Vec3::Z, view, outside: true };
+        let sky = |environment| Sky::new(&Scene { environment, ..Scene::default() });
+        let (even, studio) = (sky(Environment::Constant(Vec3::ONE)), sky(Environment::Studio));
+        for (strength, roughness) in [(0.5, 0.2), (0.9, 0.3), (1.0, 0.6)] {
+            for view in [at(0.0, 0.0), at(45.0, 30.0), at(45.0, 90.0)] {
+                let grain = grain(strength, roughness);
+                assert!((grain.mirrored(&seen(view), &even) - Vec3::ONE).length() < 1e-5);
+                let lobe = |light: Vec3| f64::from(grain.highlight(Vec3::Z, view, light) * light.z);
+                let whole = over_hemisphere(lobe);
+                let mean = over_hemisphere(|light| lobe(light) * f64::from(studio.radiance(light).x)) / whole;
+                let shown = f64::from(grain.mirrored(&seen(view), &studio).x);
+                assert!((shown / mean - 1.0).abs() < 0.35, "{strength} {roughness} {view}: {shown} for {mean}");
+            }
+        }
+    }
+}
