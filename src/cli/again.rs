@@ -8,7 +8,7 @@ use super::args::{Cli, Command, RenderArgs};
 use super::camera::{Choice, LensChoice};
 use super::exit::Exit;
 use super::job::{Batch, RenderJob, Shot};
-use super::parse;
+use super::parse::{self, Env};
 use super::picture::Effective;
 use super::stats::Counted;
 use crate::accel::auto::Reason;
@@ -16,13 +16,13 @@ use crate::accel::{AccelKind, Assign, MailboxKind};
 use crate::image::{ExrSamples, FileKind, ImageError, Metadata, PngDepth, read_metadata};
 use crate::load::{Diagnostic, Loaded, MtlMode, Polygons};
 use crate::math::DVec3;
-use crate::scene::{Background, UpAxis};
+use crate::scene::{Background, Environment, UpAxis};
 use clap::Parser;
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
 /// The flags that a picture may bring along.
-const FLAGS: [&str; 36] = [
+const FLAGS: [&str; 39] = [
     "size",
     "samples",
     "depth",
@@ -37,6 +37,9 @@ const FLAGS: [&str; 36] = [
     "ortho",
     "up",
     "background",
+    "env",
+    "env-rotate",
+    "env-rays",
     "tone-map",
     "exposure",
     "bits",
@@ -128,6 +131,17 @@ impl Facts<'_> {
             Some(Background::Color(color)) => set("background", parse::color_text(color)),
             None => {}
         }
+        match &self.job.look.env {
+            Some(Env::BuiltIn(Environment::Studio)) => set("env", "studio".into()),
+            Some(Env::BuiltIn(Environment::Black)) => set("env", "black".into()),
+            Some(Env::BuiltIn(_)) => set("env", "white".into()),
+            Some(Env::File(file)) => {
+                set("env", file.to_string_lossy().into_owned());
+                set("env-rotate", self.job.look.env_rotate.to_string());
+            }
+            None => {}
+        }
+        settings.env_rays.iter().for_each(|n| set("env-rays", n.to_string()));
         set("tone-map", output.tone_map.name().into());
         set("exposure", output.exposure.to_string());
         set("format", self.shot.kind.extension().into());

@@ -125,7 +125,7 @@ pub(super) struct RenderArgs {
     /// Repeat a picture with the settings it carries; refuses when the input has changed
     #[arg(long, value_name = "PICTURE", help_heading = "Output", hide_short_help = true, conflicts_with_all = [
         "size", "format", "bits", "half", "float", "layers", "tone_map", "exposure", "merge", "view", "camera", "eye",
-        "at", "up_vector", "fov", "ortho", "up", "background", "samples", "depth", "cutoff", "seed", "scene",
+        "at", "up_vector", "fov", "ortho", "up", "background", "env", "env_rotate", "env_rays", "samples", "depth", "cutoff", "seed", "scene",
         "polygons", "mtl", "allow_empty", "accel", "intersector",
     ])]
     pub again: Option<PathBuf>,
@@ -160,6 +160,21 @@ pub(super) struct RenderArgs {
     /// #rrggbb, a colour name, r,g,b (linear, 0 to 1), `transparent`, or `env`: what reflections see
     #[arg(long, value_name = "COLOR", value_parser = parse::background, help_heading = "Light and background")]
     pub background: Option<parse::Back>,
+    /// What surrounds the scene and lights it: an equirectangular picture (.hdr, .exr), or studio, white, black
+    ///
+    /// It takes the place of default lights; lamps of the file keep shining. A picture's middle lies along +X, a quarter to
+    /// the right of it +Z, its upper edge overhead.
+    #[arg(long, value_name = "FILE|NAME", value_parser = parse::env, help_heading = "Light and background")]
+    pub env: Option<parse::Env>,
+    /// Turn that picture about the up axis
+    #[arg(long, value_name = "DEGREES", value_parser = parse::degrees, requires = "env", allow_hyphen_values = true,
+          help_heading = "Light and background", hide_short_help = true)]
+    pub env_rotate: Option<f64>,
+    /// Rays that each point sends to what surrounds the scene, to find what hides it; with --env white: ambient
+    /// occlusion [default: 16 for pictures, else 0: nothing hides it]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=65_536),
+          help_heading = "Light and background", hide_short_help = true)]
+    pub env_rays: Option<u32>,
 
     /// Rays a pixel [default: 4]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536), help_heading = "Quality")]

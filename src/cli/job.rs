@@ -5,7 +5,7 @@ use super::camera::{Choice, LensChoice};
 use super::cost_layers;
 use super::message;
 use super::output_name::{self, Facts};
-use super::parse::Back;
+use super::parse::{Back, Env};
 use crate::accel::{AccelChoice, AccelParams, IntersectorKind};
 use crate::image::{ExrSamples, FileKind, PngDepth, ToneMap};
 use crate::load::{Limits, LoadOptions, MtlMode, Polygons};
@@ -118,6 +118,12 @@ pub(super) struct Look {
     pub lens: Option<LensChoice>,
     /// Behind everything.
     pub background: Option<Back>,
+    /// Around everything.
+    pub env: Option<Env>,
+    /// How far that is turned, degrees.
+    pub env_rotate: f64,
+    /// Rays to it from each point.
+    pub env_rays: Option<u32>,
     /// Curve from scene light to display light.
     pub tone_map: Option<ToneMap>,
     /// Stops.
@@ -192,6 +198,9 @@ fn check_flags(args: &RenderArgs) -> Result<(), Wrong> {
     }
     if args.merge && args.scene.is_some() {
         return wrong("--scene chooses a scene of one file and cannot be used with --merge");
+    }
+    if args.env_rotate.is_some() && !matches!(args.env, Some(Env::File(_))) {
+        return wrong("--env-rotate turns a picture; the built-in surroundings stay with the model");
     }
     if args.stats_file.is_some() && args.stats.is_none() {
         return wrong("--stats-file needs --stats text or --stats json");
@@ -330,6 +339,9 @@ fn look(args: &RenderArgs) -> Look {
         seed: args.seed,
         lens: LensChoice::new(args.fov, args.ortho),
         background: args.background,
+        env: args.env.clone(),
+        env_rotate: args.env_rotate.unwrap_or(0.0),
+        env_rays: args.env_rays,
         tone_map: args.tone_map,
         exposure: args.exposure,
         png: if args.bits == Some(16) { PngDepth::Sixteen } else { PngDepth::Eight },
@@ -473,6 +485,7 @@ mod tests {
             "a.obj --heatmap tests,tests",
             "a.obj a-tests.obj --heatmap tests",
             "a.obj -o a.jpg --bits 16",
+            "a.obj --env studio --env-rotate 90",
         ] {
             assert!(job(line).is_err(), "{line}");
         }

@@ -6,9 +6,10 @@ use crate::generate::{Family, MAX_TRIANGLES};
 use crate::image::ToneMap;
 use crate::math::Vec3;
 use crate::render::{Cost, UnknownCost};
-use crate::scene::Background;
 use crate::scene::framing::NamedView;
+use crate::scene::{Background, Environment};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use std::path::PathBuf;
 
 /// Longest side of a picture.
 pub(super) const MAX_SIDE: u32 = 65_535;
@@ -173,6 +174,31 @@ pub(super) fn background(text: &str) -> Result<Back, String> {
             .map(Background::Color)
             .map_err(|wrong| format!("{wrong}; or `transparent`, or `env`")),
     }
+}
+
+/// What surrounds the scene, as typed.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Env {
+    /// One of the built-in ones.
+    BuiltIn(Environment),
+    /// A picture.
+    File(PathBuf),
+}
+
+/// `studio`, `white`, `black`, or a file.
+pub(super) fn env(text: &str) -> Result<Env, String> {
+    match text {
+        "studio" => Ok(Env::BuiltIn(Environment::Studio)),
+        "white" => Ok(Env::BuiltIn(Environment::Constant(Vec3::ONE))),
+        "black" => Ok(Env::BuiltIn(Environment::Black)),
+        "" => Err("name a picture, or `studio`, `white`, `black`".into()),
+        file => Ok(Env::File(file.into())),
+    }
+}
+
+/// An angle in degrees.
+pub(super) fn degrees(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|d: &f64| d.is_finite()).ok_or_else(|| "write an angle in degrees such as 90".to_owned())
 }
 
 /// The names of all structures.

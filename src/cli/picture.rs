@@ -32,6 +32,7 @@ impl Effective {
                 depth: look.depth.or(hints.depth),
                 cutoff: look.cutoff.or(hints.cutoff).unwrap_or(usual.cutoff),
                 seed: look.seed,
+                env_rays: look.env_rays,
                 layers: look.layers,
                 everything: false,
             },
@@ -62,7 +63,7 @@ const BACKDROP: crate::math::Vec3 = crate::math::Vec3::splat(0.07);
 pub(super) fn background(look: &Look, scene: &Scene) -> Background {
     look.background.or(scene.background).unwrap_or(match scene.environment {
         Environment::Black => Background::Color(BACKDROP),
-        Environment::Constant(_) | Environment::Studio => Background::Environment,
+        Environment::Constant(_) | Environment::Studio | Environment::Panorama => Background::Environment,
     })
 }
 
@@ -140,6 +141,9 @@ mod tests {
             seed: 0,
             lens: None,
             background: None,
+            env: None,
+            env_rotate: 0.0,
+            env_rays: None,
             tone_map: None,
             exposure: None,
             png: PngDepth::Eight,

@@ -4,6 +4,7 @@ use super::camera;
 use super::exit::Exit;
 use super::job::{Batch, RenderJob, Shot, Target};
 use super::message::{Messages, Severity};
+use super::parse::Env;
 use super::picture::{self, Effective};
 use super::profile::Profile;
 use super::progress::Progress;
@@ -11,13 +12,15 @@ use super::stats::{self, PictureStats, Times};
 use super::{accident, again, cost_layers, interrupt, output_name, read};
 use crate::accel::auto;
 use crate::image::was_written_by_meshray;
-use crate::load::{Diagnostic, Loaded};
+use crate::load::panorama::{self, LoadedPanorama};
+use crate::load::{Diagnostic, LoadError, Loaded};
 use crate::render::texture::TextureStore;
 use crate::render::{Costs, Job, Rendered, View, World, render_costs};
 use crate::scene::framing::{Bounds, robust_bounds_within};
-use crate::scene::{default_light, default_light::DefaultLight};
+use crate::scene::{Environment, default_light, default_light::DefaultLight};
 use std::path::Path;
 use std::time::Instant;
+use xxhash_rust::xxh3::xxh3_128;
 
 /// Does the whole job and tells how it ended: as its worst picture.
 pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
@@ -126,7 +129,11 @@ fn prepare(
 ) -> Result<Ready, Exit> {
     let start = Instant::now();
     progress.stage("loading");
-    let loaded = read::scene(&batch.inputs, &job.load).map_err(|error| {
+    let mut loaded = read::scene(&batch.inputs, &job.load).map_err(|error| {
+        messages.load_error(&error);
+        read::exit_of(&error)
+    })?;
+    surround(job, &mut loaded).map_err(|error| {
         messages.load_error(&error);
         read::exit_of(&error)
     })?;
@@ -154,6 +161,27 @@ fn prepare(
     let bounds = robust_bounds_within(&loaded.scene, world.bounds);
     profile.done("frame");
     Ok(Ready { loaded, world, bounds, load_seconds: start.elapsed().as_secs_f64(), profile })
+}
+
+/// Puts what the command line names around the scene.
+fn surround(job: &RenderJob, loaded: &mut Loaded) -> Result<(), LoadError> {
+    match &job.look.env {
+        None => {}
+        Some(Env::BuiltIn(environment)) => loaded.scene.environment = *environment,
+        Some(Env::File(file)) => {
+            let LoadedPanorama { mut panorama, warnings, hash } = panorama::load(file, &job.load.limits)?;
+            #[expect(clippy::cast_possible_truncation, reason = "an angle")]
+            let rotation = (job.look.env_rotate % 360.0).to_radians() as f32;
+            panorama.rotation = rotation;
+            loaded.scene.environment = Environment::Panorama;
+            loaded.scene.panorama = Some(panorama);
+            loaded.warnings.extend(warnings);
+            loaded.facts.files.push(file.clone());
+            let hashes = [loaded.facts.hash, hash].map(u128::to_le_bytes);
+            loaded.facts.hash = xxh3_128(hashes.as_flattened());
+        }
+    }
+    Ok(())
 }
 
 fn nothing_to_draw(loaded: &Loaded, file: &Path) -> Diagnostic {
@@ -203,6 +231,10 @@ fn render_shot(
     let (lights, environment) = (loaded.scene.lights.clone(), loaded.scene.environment);
     let background = loaded.scene.background;
     let light = default_light::add_if_missing(&mut loaded.scene, &camera);
+    // Lamps that were missing bring the studio along; what was asked for comes before that.
+    if let Some(Env::BuiltIn(environment)) = job.look.env {
+        loaded.scene.environment = environment;
+    }
     loaded.scene.background = Some(picture::background(&job.look, &loaded.scene));
     let view = View::from_camera(&camera);
     profile.done("frame");
@@ -353,6 +385,10 @@ impl Summary<'_> {
         }
         if self.light == DefaultLight::Added {
             parts.push("studio light".into());
+        }
+        let scene = &self.loaded.scene;
+        if let Some(panorama) = scene.panorama.as_ref().filter(|_| scene.environment == Environment::Panorama) {
+            parts.push(format!("light of {}", panorama.name));
         }
         if self.bounds.strays > 0 {
             parts.push(format!("framing leaves out {} far-off faces", self.bounds.strays));

@@ -9,6 +9,7 @@ pub mod gltf;
 pub mod limits;
 pub mod nff;
 pub mod obj;
+pub mod panorama;
 pub mod paths;
 #[cfg_attr(not(feature = "draco"), expect(dead_code, reason = "only decoders of others panic"))]
 mod quiet;

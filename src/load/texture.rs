@@ -64,6 +64,9 @@ pub fn decode_all(
 /// Reads only the header; refuses what is too large.
 fn check_size(bytes: &[u8], limits: &Limits, budget: &mut Budget) -> Result<ImageFormat, String> {
     let format = ::image::guess_format(bytes).map_err(|_| unknown_kind(bytes))?;
+    if matches!(format, ImageFormat::Hdr | ImageFormat::OpenExr) {
+        return Err("it holds radiance (HDR or EXR), not colours of a surface".into());
+    }
     let reader = ImageReader::with_format(Cursor::new(bytes), format);
     let (width, height) = reader.into_dimensions().map_err(|e| e.to_string())?;
     let pixels = u64::from(width) * u64::from(height);

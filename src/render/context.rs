@@ -2,13 +2,17 @@
 
 use super::Settings;
 use super::absorption::Absorption;
-use super::shade::{Band, LocalLight, Sky, bands};
+use super::shade::{Band, LocalLight, bands};
+use super::sky::Sky;
 use super::strip::Uniform;
 use super::texture::TextureStore;
 use super::world::World;
 use crate::math::Vec3;
 use crate::scene::features::{Feature, Features};
 use crate::scene::{AlphaMode, Background, Material, Scene};
+
+/// Rays to a panorama from each point, when nobody says.
+const ENV_RAYS: u32 = 16;
 
 /// Shared by all workers, computed once per image.
 pub(crate) struct Context<'a> {
@@ -28,6 +32,10 @@ pub(crate) struct Context<'a> {
     pub absorption: Absorption,
     /// Whether the environment is what is seen behind the scene.
     pub shows_environment: bool,
+    /// Rays that each point sends to its surroundings.
+    pub env_rays: u32,
+    /// For every random choice.
+    pub seed: u64,
     /// Whether nothing is seen but lights, and what shines by itself.
     pub is_dark: bool,
     /// Bounces after the eye ray.
@@ -43,15 +51,19 @@ impl<'a> Context<'a> {
         let everything = settings.everything;
         let features = Features::of(scene);
         let depth = settings.depth.unwrap_or_else(|| auto_depth(&features));
-        let alone = everything || settings.layers;
+        let sky = Sky::new(scene);
+        let env_rays = settings.env_rays.unwrap_or(if sky.is_map() { ENV_RAYS } else { 0 });
+        let alone = everything || settings.layers || sky.is_map() || env_rays > 0;
         let uniform = |m: &Material| if alone { None } else { Uniform::of(m, textures, depth > 0) };
         let needs = |any: &[Feature]| everything || any.iter().any(|&f| features.has(f));
         Self {
             scene,
             world,
             textures,
-            sky: Sky::new(scene),
-            is_dark: Sky::new(scene).is_dark() && scene.ambient == Vec3::ZERO,
+            is_dark: sky.is_dark() && scene.ambient == Vec3::ZERO,
+            sky,
+            env_rays,
+            seed: settings.seed,
             lights: scene.lights.iter().map(|l| LocalLight::new(l, world.center)).collect(),
             uniform: scene.materials.iter().map(uniform).collect(),
             bands: if needs(&[Feature::Dispersion]) { bands() } else { Vec::new() },

@@ -24,6 +24,7 @@ mod profile;
 mod seam;
 mod shade;
 mod shadow;
+mod sky;
 pub mod story;
 mod strip;
 pub mod studio;
@@ -70,6 +71,9 @@ pub struct Settings {
     pub cutoff: f32,
     /// Seed of every random stream.
     pub seed: u64,
+    /// Rays that each point sends to its surroundings, rounded up to an even number, to find what hides them; 0: nothing does.
+    /// `None`: 16 where the surroundings are a panorama, else 0.
+    pub env_rays: Option<u32>,
     /// Whether [`crate::image::Layers`] are wanted.
     pub layers: bool,
     /// Whether what the scene does without is done all the same, for nothing (see [`everything`]). The world and the
@@ -86,6 +90,7 @@ impl Default for Settings {
             depth: None,
             cutoff: 1.0 / 512.0,
             seed: 0,
+            env_rays: None,
             layers: false,
             everything: false,
         }

@@ -18,6 +18,8 @@ use crate::math::Vec3;
 pub(crate) struct Shadows {
     rays: Vec<Ray>,
     light: Vec<Vec3>,
+    /// What each is to whoever sent it; empty where that is its sample.
+    tags: Vec<u32>,
     /// What each is inside of; empty where nothing absorbs light.
     inside: Vec<Inside>,
     blocked: Vec<bool>,
@@ -49,13 +51,25 @@ impl Shadows {
         self.inside.extend(media.map(|media| Inside { media, since: 0.0 }));
     }
 
+    /// The same with a number below 2³² that its light arrives with instead of the sample's: of all rays, or of none.
+    #[expect(clippy::cast_possible_truncation, reason = "as said")]
+    pub(crate) fn push_tagged(&mut self, ray: Ray, light: Vec3, media: Option<Media>, tag: usize) {
+        self.push(ray, light, media);
+        self.tags.push(tag as u32);
+    }
+
+    fn tag(&self, i: usize) -> u32 {
+        self.tags.get(i).copied().unwrap_or(self.rays[i].sample)
+    }
+
     pub(crate) fn clear(&mut self) {
         self.rays.clear();
+        self.tags.clear();
         self.light.clear();
         self.inside.clear();
     }
 
-    /// Traces all rays and hands what arrives to `arrive`, as (sample, light) in an order that is always the same.
+    /// Traces all rays and hands what arrives to `arrive`, as (sample or tag, light) in an order that is always the same.
     pub(crate) fn trace<A: Accel, P: Observer>(
         &mut self,
         context: &Context,
@@ -67,14 +81,14 @@ impl Shadows {
         self.blocked.resize(self.rays.len(), false);
         asking.occluded(&self.rays, &mut self.blocked, probe);
         if !context.has_filters {
-            let open = self.rays.iter().zip(&self.light).zip(&self.blocked).filter(|(_, blocked)| !**blocked);
-            open.for_each(|((ray, light), _)| arrive(ray.sample, *light));
+            let open = self.light.iter().zip(&self.blocked).enumerate().filter(|(_, (_, blocked))| !**blocked);
+            open.for_each(|(i, (light, _))| arrive(self.tag(i), *light));
             return self.clear();
         }
 
         // What is left meets nothing opaque: walk through everything else on the way, one surface of each ray a time.
         let blocked = std::mem::take(&mut self.blocked);
-        self.keep(|i, _, _, _| !blocked[i]);
+        self.keep(|i, _, _, _, _| !blocked[i]);
         self.blocked = blocked;
         self.after.clear();
         self.hits.clear();
@@ -94,10 +108,10 @@ impl Shadows {
         let hits = std::mem::take(&mut self.hits);
         let after = std::mem::take(&mut self.after);
         let mut kept = std::mem::take(&mut self.kept);
-        self.keep(|i, ray, light, inside| {
+        self.keep(|i, tag, ray, light, inside| {
             let hit = &hits[i];
             if !hit.is_some() {
-                arrive(ray.sample, *light);
+                arrive(tag, *light);
                 return false;
             }
             if !after.get(i).is_some_and(|before| is_same_crossing(&context.world.shapes, ray, before, hit)) {
@@ -115,14 +129,17 @@ impl Shadows {
         self.hits = hits;
     }
 
-    /// Drops the rays for which `wanted` (index, ray, light, what they are inside of) is false; the others keep their order.
-    fn keep(&mut self, mut wanted: impl FnMut(usize, &Ray, &mut Vec3, Option<&mut Inside>) -> bool) {
+    /// Drops the rays for which `wanted` (index, tag, ray, light, what they are inside of) is false; the others keep their order.
+    fn keep(&mut self, mut wanted: impl FnMut(usize, u32, &Ray, &mut Vec3, Option<&mut Inside>) -> bool) {
         let mut kept = 0;
         for i in 0..self.rays.len() {
             let (mut light, mut inside) = (self.light[i], self.inside.get(i).copied());
-            if wanted(i, &self.rays[i], &mut light, inside.as_mut()) {
+            if wanted(i, self.tag(i), &self.rays[i], &mut light, inside.as_mut()) {
                 self.rays[kept] = self.rays[i];
                 self.light[kept] = light;
+                if let Some(&tag) = self.tags.get(i) {
+                    self.tags[kept] = tag;
+                }
                 if let Some(inside) = inside {
                     self.inside[kept] = inside;
                 }
@@ -131,6 +148,7 @@ impl Shadows {
         }
         self.rays.truncate(kept);
         self.light.truncate(kept);
+        self.tags.truncate(kept);
         self.inside.truncate(kept);
     }
 }

@@ -25,6 +25,15 @@ pub fn from_world(up: UpAxis, dir: Vec3) -> Vec3 {
     }
 }
 
+/// The inverse of [`from_world`].
+#[inline]
+pub fn to_world(up: UpAxis, dir: Vec3) -> Vec3 {
+    match up {
+        UpAxis::Y => dir,
+        UpAxis::Z => Vec3::new(dir.x, -dir.z, dir.y),
+    }
+}
+
 /// Linear radiance seen along the unit vector `dir` of the studio's frame.
 #[inline]
 pub fn radiance(dir: Vec3) -> Vec3 {
@@ -367,6 +376,8 @@ mod tests {
     #[test]
     fn up_is_bright_whichever_axis_is_up() {
         assert_eq!(from_world(UpAxis::Z, Vec3::Z), Vec3::Y);
+        let dir = Vec3::new(1.0, 2.0, 3.0);
+        assert_eq!(to_world(UpAxis::Z, from_world(UpAxis::Z, dir)), dir);
         // A Z-up model looks along −y; the studio's front is +z.
         assert_eq!(from_world(UpAxis::Z, Vec3::NEG_Y), Vec3::Z);
         assert!(diffuse(Vec3::Y).x > 2.0 * diffuse(Vec3::NEG_Y).x);

@@ -18,6 +18,7 @@ use super::optics::{dispersed_index, reflect, refract, transmittance};
 use super::seam::is_same_crossing;
 use super::shade::{Matter, Reader, above, lets_light_in, terminator};
 use super::shadow::Shadows;
+use super::sky::{Arounds, Standpoint};
 use super::strip::{POINTS, Sorted, Strip};
 use super::surface::{Surface, Target};
 use super::wave::{Crossing, Media, Medium, Path, Queue, RayClass, Wave};
@@ -75,6 +76,7 @@ pub(crate) struct Tracer<'a, A: Accel, P> {
     sorted: Sorted,
     strip: Box<Strip>,
     shadows: Shadows,
+    arounds: Arounds,
     pub samples: Vec<Sample>,
     /// Facts of the first surface of each sample; empty unless layers are wanted.
     pub facts: Vec<Facts>,
@@ -93,6 +95,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             sorted: Sorted::default(),
             strip: Box::default(),
             shadows: Shadows::default(),
+            arounds: Arounds::default(),
             samples: Vec::new(),
             facts: Vec::new(),
             counts: ByClass::default(),
@@ -109,6 +112,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         self.counts.each_mut().into_iter().for_each(|probe| probe.batch(samples));
         self.starting.iter_mut().chain(&mut self.continuing).for_each(Queue::clear);
         self.shadows.clear();
+        self.arounds.clear();
         self.eyes.clear();
         self.samples.clear();
         self.samples.resize(samples, Sample::default());
@@ -248,12 +252,18 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     }
 
     fn trace_shadows(&mut self) {
-        if self.shadows.len() == 0 {
-            return;
-        }
         let samples = &mut self.samples;
         let arrive = |sample: u32, light: Vec3| samples[sample as usize].radiance += light;
-        self.shadows.trace(self.context, &mut self.asking, &mut self.counts.shadow, arrive);
+        if self.shadows.len() > 0 {
+            self.shadows.trace(self.context, &mut self.asking, &mut self.counts.shadow, arrive);
+        }
+        self.trace_arounds();
+    }
+
+    fn trace_arounds(&mut self) {
+        let samples = &mut self.samples;
+        let arrive = |sample: u32, light: Vec3| samples[sample as usize].radiance += light;
+        self.arounds.trace(self.context, &mut self.asking, &mut self.counts.shadow, arrive);
     }
 
     /// A ray that met nothing: the background shows where the line of sight is straight, else the environment is seen.
@@ -263,7 +273,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             sample.through += path.weight;
         } else {
             let dir = ray.dir.try_normalize().unwrap_or(Vec3::Z);
-            sample.radiance += path.weight * self.context.sky.radiance(dir);
+            sample.radiance += path.weight * self.context.sky.radiance(dir, path.cone_spread);
         }
     }
 
@@ -306,15 +316,34 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         if context.everything {
             look_up_in_vain(&surface, context.textures);
         }
-        let everywhere = matter.emission + matter.ambient(&surface.seen(), &context.sky, context.scene.ambient);
         let crossing = point.crossing(context, path.band);
-        self.add(ray.sample, point.path.weight * everywhere);
+        self.look_around(&point);
         self.light(&point, &crossing);
 
         if path.depth < context.depth {
             self.reflect_and_refract(&point, &crossing);
         } else if context.everything {
             black_box(point.balance(&crossing));
+        }
+    }
+
+    /// Adds what a point shows by itself and of its surroundings, or sends the rays that find what hides those.
+    fn look_around(&mut self, point: &Point) {
+        let (context, surface, matter) = (self.context, point.surface, point.matter);
+        let (weight, sample) = (point.path.weight, point.ray.sample);
+        let open = matter.ambient(&surface.seen(), &context.sky, context.scene.ambient);
+        // What is looked up through glass is seen on its other side, where these rays do not go.
+        if context.env_rays == 0 || matter.is_unlit() || lets_light_in(surface.target.material) {
+            return self.add(sample, weight * (matter.emission + open));
+        }
+        self.add(sample, weight * matter.emission);
+        if open.is_finite() {
+            let media = context.absorption.is_some().then_some(point.path.media);
+            let (ray, hit) = (point.ray, point.hit);
+            self.arounds.push(context, &Standpoint { surface, matter, ray, hit, weight, open, media });
+        }
+        if self.arounds.is_full() {
+            self.trace_arounds();
         }
     }
 

@@ -15,6 +15,7 @@ pub mod lobes;
 pub mod material;
 pub mod merge;
 pub mod mesh;
+pub mod panorama;
 pub mod texture;
 
 pub use camera::{Camera, Projection};
@@ -23,6 +24,7 @@ pub use light::{Falloff, Light, LightKind};
 pub use lobes::{Coat, Film, Grain, Sheen};
 pub use material::{AlphaMode, Material, MetalRough, Phong, Surface, TextureRef, UvTransform};
 pub use mesh::{Cone, Instance, Mesh, Plane, Polygon, Sphere};
+pub use panorama::Panorama;
 pub use texture::{Bitmap, Filter, Mipmaps, Pixels, Sampler, Texture, Wrap};
 
 use crate::math::Vec3;
@@ -54,6 +56,8 @@ pub struct Scene {
     pub ambient: Vec3,
     /// What rays that leave the scene see.
     pub environment: Environment,
+    /// The picture that [`Environment::Panorama`] means.
+    pub panorama: Option<Panorama>,
     /// What primary rays that hit nothing show; `None` when the file does not say.
     pub background: Option<Background>,
     /// Which axis of the file points up.
@@ -72,6 +76,8 @@ pub enum Environment {
     Constant(Vec3),
     /// The built-in studio, a formula (see `render::studio`).
     Studio,
+    /// [`Scene::panorama`]; black without one.
+    Panorama,
 }
 
 /// What a primary ray that hits nothing shows.

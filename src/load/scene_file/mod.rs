@@ -10,7 +10,9 @@
 //! ```toml
 //! up = "y"                      # or "z"; default "y"
 //! background = "white"          # colour, "transparent" or "environment"; default: the environment, dark grey if black
-//! environment = "studio"        # what rays that leave see: "studio", "black" or a colour; default "black"
+//! environment = "studio"        # what rays that leave see: "studio", "black", a colour, or a file such as "sky.hdr",
+//!                               # an equirectangular picture; default "black"
+//! # environment_rotation = 90   # turns that picture about the up axis, degrees
 //!
 //! [render]                      # defaults that the command line overrides; every key optional
 //! size = [800, 600]
@@ -126,11 +128,11 @@ mod reader;
 mod shapes;
 mod view;
 
-use self::reader::{Faults, Table, color, string, word};
+use self::reader::{Faults, Table, color, number, string, word};
 use super::paths::Resolver;
 use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
 use crate::math::DVec3;
-use crate::scene::{Background, Environment, Material, Scene, UpAxis};
+use crate::scene::{Background, Environment, Material, Panorama, Scene, UpAxis};
 use crate::stopwatch::Stopwatch;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
@@ -168,6 +170,14 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
 struct Parsed {
     scene: Scene,
     models: Vec<Model>,
+    panorama: Option<Surrounding>,
+}
+
+/// A picture around the scene.
+struct Surrounding {
+    file: String,
+    place: String,
+    rotation: f32,
 }
 
 /// One `[[models]]` entry.
@@ -184,7 +194,11 @@ fn parse<'a>(faults: &'a Faults, root: &'a DeTable<'a>, options: &LoadOptions) -
     let mut scene = Scene { up: root.get("up", word(&UP)).or(options.up).unwrap_or_default(), ..Scene::default() };
     scene.up = options.up.unwrap_or(scene.up);
     scene.background = root.get("background", background);
-    scene.environment = root.get("environment", environment).unwrap_or_default();
+    let panorama = surrounding(faults, &root);
+    match panorama {
+        Some(_) => scene.environment = Environment::Panorama,
+        None => scene.environment = root.get("environment", environment).unwrap_or_default(),
+    }
     scene.hints = root.table("render", "[render]").map(view::hints).unwrap_or_default();
 
     if let Some(materials) = root.table("materials", "[materials]") {
@@ -232,7 +246,7 @@ fn parse<'a>(faults: &'a Faults, root: &'a DeTable<'a>, options: &LoadOptions) -
     }
     scene.hints.camera = (!scene.cameras.is_empty()).then_some(0);
     root.finish();
-    Parsed { scene, models }
+    Parsed { scene, models, panorama }
 }
 
 fn model(faults: &Faults, scene: &mut Scene, table: Table) -> Option<Model> {
@@ -275,6 +289,28 @@ fn background(value: &DeValue) -> Result<Background, String> {
     }
 }
 
+/// The picture that `environment` names, if it names a file.
+fn surrounding(faults: &Faults, root: &Table) -> Option<Surrounding> {
+    let named = |value: &DeValue| Ok(value.as_str().filter(|name| is_picture(name)).map(str::to_owned));
+    let file = root.get("environment", named).flatten();
+    let degrees = root.get("environment_rotation", number);
+    let Some(file) = file else {
+        if degrees.is_some() {
+            let text = "`environment_rotation` turns a picture, and `environment` names none";
+            root.note(&root.place_of("environment_rotation"), text, "leave it out, or name a picture");
+        }
+        return None;
+    };
+    #[expect(clippy::cast_possible_truncation, reason = "an angle")]
+    let rotation = (degrees.unwrap_or(0.0) % 360.0).to_radians() as f32;
+    Some(Surrounding { file, place: faults.place(root.place_of("environment").start), rotation })
+}
+
+fn is_picture(name: &str) -> bool {
+    let ending = Path::new(name).extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    ["hdr", "exr", "png", "jpg", "jpeg", "webp"].contains(&ending.as_str())
+}
+
 fn environment(value: &DeValue) -> Result<Environment, String> {
     match value.as_str() {
         Some("studio") => Ok(Environment::Studio),
@@ -290,10 +326,19 @@ fn assemble(
     source: &Source,
     options: &LoadOptions,
 ) -> Result<Loaded, LoadError> {
-    let Parsed { mut scene, models } = parsed;
+    let Parsed { mut scene, models, panorama } = parsed;
     let mut warnings = Warnings::default();
     let mut facts = Facts { format: "meshray scene".into(), ..Facts::default() };
     facts.faces = scene.meshes.iter().map(faces).sum();
+    if let Some(Surrounding { file, place, rotation }) = panorama {
+        let bytes = resolver
+            .read_file(Path::new(&file))
+            .map_err(|fault| LoadError::from(fault.diagnose(&source.path, &place)))?;
+        let picture = Source { path: source.path.with_file_name(&file), bytes };
+        let read = super::panorama::decode(&picture, &options.limits)?;
+        read.warnings.into_iter().for_each(|w| warnings.push(w));
+        scene.panorama = Some(Panorama { rotation, ..read.panorama });
+    }
     for model in models {
         let mut part = read_model(&model, &mut resolver, source, options)?;
         part.warnings.into_iter().for_each(|w| warnings.push(w));

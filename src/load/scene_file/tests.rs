@@ -35,6 +35,23 @@ fn the_schema_in_the_module_head_is_read_without_a_fault() {
 }
 
 #[test]
+fn a_picture_may_surround_the_scene() {
+    let dir = tempfile::tempdir().unwrap();
+    ::image::Rgb32FImage::from_pixel(4, 2, ::image::Rgb([2.0, 1.0, 0.5])).save(dir.path().join("sky.exr")).unwrap();
+    let text = "environment = 'sky.exr'\nenvironment_rotation = 90\n[[spheres]]\ncenter = [0, 0, 0]\nradius = 1\n";
+    let source = Source { path: dir.path().join("a.toml"), bytes: text.into() };
+    let loaded = load(&source, &LoadOptions::default()).unwrap();
+    assert_eq!(loaded.scene.environment, Environment::Panorama);
+    let panorama = loaded.scene.panorama.unwrap();
+    assert_eq!((panorama.width, panorama.texels[7]), (4, [2.0, 1.0, 0.5]));
+    assert_eq!(panorama.rotation, std::f32::consts::FRAC_PI_2);
+    assert_eq!(loaded.facts.files.len(), 2, "it belongs to the hash of the input");
+    let alone = faults("environment = 'studio'\nenvironment_rotation = 9\n");
+    assert!(alone[0].contains("names none"), "{alone:?}");
+    assert!(faults("environment = 'no.exr'\n")[0].starts_with("dir/test.toml:1:"));
+}
+
+#[test]
 fn an_unknown_key_names_the_nearest_with_its_line_and_column() {
     let errors = faults("[materials.red]\n  difuse = 1\n[[spheres]]\ncenter=[0,0,0]\nradius=1\nmatreial='red'\n");
     assert_eq!(

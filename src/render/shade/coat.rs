@@ -53,6 +53,11 @@ impl CoatMatter {
         self.strength * fresnel(view.dot(half)) * highlight(self.normal, half, [n_l, n_v], self.roughness) * n_l
     }
 
+    /// BRDF × N·L of the part of it that [`Self::ambient`] looks up.
+    pub(super) fn from_around(&self, view: Vec3, to: Vec3) -> f32 {
+        self.lit(view, to) * (1.0 - traced(self.roughness))
+    }
+
     /// What it shows of the surroundings without a ray.
     pub(super) fn ambient(&self, seen: &Seen, sky: &Sky, ambient: Vec3) -> Vec3 {
         let looked_up = 1.0 - traced(self.roughness);

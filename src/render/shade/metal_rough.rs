@@ -195,6 +195,22 @@ impl MetalRoughMatter {
         sum
     }
 
+    /// BRDF × N·L of what [`Self::ambient`] looks up.
+    pub(super) fn from_around(&self, seen: &Seen, to: Vec3, grain: Option<&GrainMatter>) -> Vec3 {
+        let (normal, view) = (seen.normal, seen.view);
+        let looked_up = 1.0 - self.traced(seen.outside);
+        let lobe = |half| match grain {
+            None => highlight(normal, half, [normal.dot(to), normal.dot(view)], self.roughness),
+            Some(grain) => grain.highlight(normal, view, to),
+        };
+        self.lit_by(normal, view, to, |half| lobe(half) * looked_up) * self.occlusion
+    }
+
+    /// Roughness of the lobe that is looked up, if one is.
+    pub(super) fn gloss(&self) -> Option<f32> {
+        (self.traced(true) < 1.0).then(|| self.mean_roughness())
+    }
+
     /// What is scattered and mirrored of the surroundings, and the largest share that the dielectric part mirrors.
     /// `rebound` is what [`rebound`] gives for the material.
     #[inline(always)]

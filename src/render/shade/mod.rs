@@ -12,7 +12,6 @@ mod light;
 mod metal_rough;
 mod phong;
 mod sheen;
-mod sky;
 mod spectrum;
 
 pub(crate) use coat::CoatMatter;
@@ -21,17 +20,18 @@ pub(crate) use light::{Incident, LocalLight};
 pub(crate) use metal_rough::{Around, MetalRoughMatter, above};
 pub(crate) use phong::PhongMatter;
 pub(crate) use sheen::SheenMatter;
-pub(crate) use sky::Sky;
 pub(crate) use spectrum::{Band, bands};
 
 use super::context::coverage;
 use super::optics::reflect;
 use super::patch::{Footprint, Patch};
+use super::sky::Sky;
 use super::surface::Surface;
 use super::texture::{ColorSpace, TextureStore};
 use super::wave::Crossing;
 use crate::math::{Vec3, Vec4};
 use crate::scene::{Material, MetalRough, Surface as Reflection, TextureRef};
+use std::f32::consts::PI;
 
 /// How a point of a surface is seen: unit vectors away from it, and from which side.
 #[derive(Clone, Copy, Debug)]
@@ -173,9 +173,14 @@ impl Matter {
         self.below_coat() * self.sheen.as_ref().map_or(1.0, SheenMatter::clear)
     }
 
+    /// Whether light does nothing to it.
+    pub(crate) fn is_unlit(&self) -> bool {
+        matches!(self.model, Model::Unlit(_))
+    }
+
     /// Whether it is seen in the dark.
     pub(crate) fn shines(&self) -> bool {
-        self.emission != Vec3::ZERO || matches!(self.model, Model::Unlit(_))
+        self.emission != Vec3::ZERO || self.is_unlit()
     }
 
     /// What is seen of the light that arrives from everywhere, without a ray.
@@ -193,6 +198,33 @@ impl Matter {
             all += coat.ambient(seen, sky, ambient);
         }
         all
+    }
+
+    /// What is seen of light of this radiance from one direction `to`, per solid angle, of all that [`Self::ambient`] shows;
+    /// `ambient` comes from everywhere.
+    pub(crate) fn from_around(&self, seen: &Seen, to: Vec3, radiance: Vec3, ambient: Vec3) -> Vec3 {
+        let (normal, view, all) = (seen.normal, seen.view, radiance + ambient);
+        let below = match &self.model {
+            Model::Unlit(_) => Vec3::ZERO,
+            Model::Phong(m) => (m.ambient * ambient + m.diffuse * radiance) * (normal.dot(to).max(0.0) / PI),
+            Model::MetalRough(m) => m.from_around(seen, to, self.grain.as_ref()) * all,
+        };
+        let mut sum = below * self.clear();
+        if let Some(sheen) = &self.sheen {
+            sum += sheen.lit(normal, view, to) * all * self.below_coat();
+        }
+        if let Some(coat) = &self.coat {
+            sum += all * coat.from_around(view, to);
+        }
+        sum
+    }
+
+    /// Roughness of the lobe that [`Self::ambient`] looks up, if there is one.
+    pub(crate) fn gloss(&self) -> Option<f32> {
+        match &self.model {
+            Model::MetalRough(m) => m.gloss(),
+            Model::Phong(_) | Model::Unlit(_) => None,
+        }
     }
 
     /// What is seen of a light on the viewer's side of the surface.

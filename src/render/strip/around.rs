@@ -3,7 +3,8 @@
 use super::columns::{Column, Columns, Found, POINTS, Strip, get, padded, put};
 use crate::math::Vec3;
 use crate::math::simd::{Kernel, Simd};
-use crate::render::shade::{Around, Matter, MetalRoughMatter, Model, Sky};
+use crate::render::shade::{Around, Matter, MetalRoughMatter, Model};
+use crate::render::sky::Sky;
 use crate::render::studio;
 use crate::scene::UpAxis;
 

@@ -1,5 +1,6 @@
 //! Whole small pictures with analytic answers.
 
+mod around;
 mod bits;
 mod costs;
 mod glass;

@@ -1,0 +1,181 @@
+//! Pictures of surroundings: Radiance HDR, OpenEXR, and 8- or 16-bit pictures, whose colours are sRGB.
+
+use super::limits::{Budget, Limits};
+use super::{Diagnostic, LoadError, Source};
+use crate::image::srgb;
+use crate::scene::Panorama;
+use ::image::{ColorType, DynamicImage, ImageFormat, ImageReader};
+use std::io::Cursor;
+use std::path::Path;
+use std::sync::Arc;
+use xxhash_rust::xxh3::xxh3_128;
+
+/// A panorama and what was found out on the way.
+#[derive(Clone, Debug)]
+pub struct LoadedPanorama {
+    /// The picture.
+    pub panorama: Panorama,
+    /// What is odd about it.
+    pub warnings: Vec<Diagnostic>,
+    /// xxh3-128 of the file.
+    pub hash: u128,
+}
+
+/// Bytes that a pixel takes while it is decoded, turned into radiance, and copied at all sizes.
+const PER_PIXEL: u64 = 48;
+
+/// Loads an equirectangular picture. Colours of HDR and EXR files are taken as linear Rec. 709.
+///
+/// # Errors
+/// [`LoadError::Read`] when the file cannot be read, [`LoadError::Input`] when it is no such picture or larger than
+/// `limits` allow.
+pub fn load(path: &Path, limits: &Limits) -> Result<LoadedPanorama, LoadError> {
+    decode(&super::read_source(path, limits)?, limits)
+}
+
+/// The same from memory.
+///
+/// # Errors
+/// As [`load`].
+pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadError> {
+    let fault = |text: String| {
+        let remedy = "name an equirectangular .hdr or .exr, or `studio`, `white`, `black`";
+        LoadError::from(Diagnostic::new("env-unusable", &source.path, "", text).remedy(remedy))
+    };
+    let format = ::image::guess_format(&source.bytes)
+        .map_err(|_| fault("is no picture that can surround a scene: its kind is unknown".into()))?;
+    let reader = || ImageReader::with_format(Cursor::new(&source.bytes), format);
+    let (width, height) = reader().into_dimensions().map_err(|e| fault(format!("cannot be decoded: {e}")))?;
+    let pixels = u64::from(width) * u64::from(height);
+    if pixels == 0 || pixels > limits.image_pixels {
+        return Err(fault(format!("is {width}×{height} pixels where 1 to {} are allowed", limits.image_pixels)));
+    }
+    Budget::new(limits).take(pixels, PER_PIXEL).map_err(|over| fault(over.to_string()))?;
+    // The decoder of EXR files gives up on some damaged ones by a panic.
+    let decoded = std::panic::catch_unwind(|| reader().decode());
+    let picture = match decoded {
+        Ok(Ok(picture)) => picture,
+        Ok(Err(e)) => return Err(fault(format!("cannot be decoded: {e}"))),
+        Err(_) => return Err(fault("cannot be decoded: it is damaged".into())),
+    };
+    let mut warnings = Vec::new();
+    if u64::from(width) != 2 * u64::from(height) {
+        let text =
+            format!("is {width}×{height}: a panorama of all around is twice as wide as high, so it is stretched");
+        warnings.push(Diagnostic::new("env-shape", &source.path, "", text));
+    }
+    let (texels, odd) = radiance(picture, format);
+    if odd > 0 {
+        let text = format!("{odd} pixels are negative or no finite numbers, and taken as black");
+        warnings.push(Diagnostic::new("env-pixels", &source.path, "", text));
+    }
+    let name = source.path.to_string_lossy().into_owned();
+    let panorama = Panorama { name, width, height, texels: Arc::new(texels), rotation: 0.0 };
+    Ok(LoadedPanorama { panorama, warnings, hash: xxh3_128(&source.bytes) })
+}
+
+/// Linear radiance of all pixels, and how many of them had to be mended.
+fn radiance(picture: DynamicImage, format: ImageFormat) -> (Vec<[f32; 3]>, usize) {
+    use ColorType::{L16, La16, Rgb16, Rgba16};
+    if matches!(format, ImageFormat::Hdr | ImageFormat::OpenExr) {
+        let mut odd = 0;
+        let mend = |texel: &[f32; 3]| {
+            let usable = texel.iter().all(|c| c.is_finite() && *c >= 0.0);
+            odd += usize::from(!usable);
+            texel.map(|c| if c.is_finite() { c.max(0.0) } else { 0.0 })
+        };
+        let texels = picture.into_rgb32f().as_raw().as_chunks::<3>().0.iter().map(mend).collect();
+        return (texels, odd);
+    }
+    let texels = if matches!(picture.color(), L16 | La16 | Rgb16 | Rgba16) {
+        picture.into_rgb16().pixels().map(|p| p.0.map(srgb::decode16)).collect()
+    } else {
+        picture.into_rgb8().pixels().map(|p| p.0.map(srgb::decode8)).collect()
+    };
+    (texels, 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ::image::{ImageBuffer, Rgb, Rgb32FImage};
+
+    fn file(picture: &DynamicImage, format: ImageFormat) -> Source {
+        let mut out = Cursor::new(Vec::new());
+        picture.write_to(&mut out, format).unwrap();
+        Source { path: "sky.exr".into(), bytes: out.into_inner() }
+    }
+
+    fn bright(width: u32, height: u32) -> DynamicImage {
+        let picture: Rgb32FImage = ImageBuffer::from_fn(width, height, |x, _| Rgb([x as f32 * 100.0, 0.5, 0.25]));
+        DynamicImage::ImageRgb32F(picture)
+    }
+
+    #[test]
+    fn hdr_and_exr_keep_light_that_is_brighter_than_white() {
+        for format in [ImageFormat::Hdr, ImageFormat::OpenExr] {
+            let loaded = decode(&file(&bright(4, 2), format), &Limits::default()).unwrap();
+            let panorama = loaded.panorama;
+            assert_eq!((panorama.width, panorama.height, panorama.texels.len()), (4, 2, 8));
+            for (texel, expected) in panorama.texels[3].iter().zip([300.0, 0.5, 0.25]) {
+                assert!((texel - expected).abs() <= expected / 100.0 + 1.0, "{format:?}: {texel}");
+            }
+            assert!(loaded.warnings.is_empty());
+        }
+    }
+
+    #[test]
+    fn pictures_for_screens_are_decoded_from_srgb() {
+        let grey = DynamicImage::ImageRgb8(ImageBuffer::from_pixel(2, 1, Rgb([188u8, 255, 0])));
+        let loaded = decode(&file(&grey, ImageFormat::Png), &Limits::default()).unwrap();
+        let texel = loaded.panorama.texels[0];
+        assert!((texel[0] - 0.5).abs() < 0.01 && texel[1] == 1.0 && texel[2] == 0.0);
+    }
+
+    #[test]
+    fn odd_shapes_and_numbers_are_told_and_mended() {
+        let mut picture = Rgb32FImage::new(3, 3);
+        picture.put_pixel(1, 1, Rgb([f32::NAN, -1.0, 7.0]));
+        picture.put_pixel(2, 1, Rgb([f32::INFINITY, 1.0, 1.0]));
+        let source = file(&DynamicImage::ImageRgb32F(picture), ImageFormat::OpenExr);
+        let loaded = decode(&source, &Limits::default()).unwrap();
+        let codes: Vec<_> = loaded.warnings.iter().map(|w| w.code.to_string()).collect();
+        assert_eq!(codes, ["env-shape", "env-pixels"]);
+        assert_eq!(loaded.panorama.texels[4..6], [[0.0, 0.0, 7.0], [0.0, 1.0, 1.0]]);
+        assert!(loaded.warnings[1].text.starts_with("2 pixels"));
+    }
+
+    #[test]
+    fn what_is_no_picture_damaged_or_too_large_is_refused_in_one_line() {
+        let whole = file(&bright(64, 32), ImageFormat::OpenExr);
+        let refused = |bytes: &[u8], limits: &Limits| {
+            let source = Source { path: "sky.exr".into(), bytes: bytes.to_vec() };
+            let text = decode(&source, limits).unwrap_err().to_string();
+            assert!(text.starts_with("sky.exr: ") && !text.trim_end().contains('\n'), "{text}");
+        };
+        let usual = Limits::default();
+        refused(b"", &usual);
+        refused(b"o cube\nv 0 0 0\n", &usual);
+        refused(&whole.bytes[..40], &usual);
+        refused(&whole.bytes[..whole.bytes.len() / 2], &usual);
+        refused(&whole.bytes, &Limits { image_pixels: 2047, ..usual });
+        refused(&whole.bytes, &Limits { memory: 64 * 32 * 12, ..usual });
+    }
+
+    #[test]
+    fn damaged_files_never_crash() {
+        for format in [ImageFormat::Hdr, ImageFormat::OpenExr] {
+            let whole = file(&bright(16, 8), format).bytes;
+            let mut random = crate::math::random::Random::new(11);
+            for _ in 0..300 {
+                let mut bytes = whole.clone();
+                for _ in 0..=random.below(4) {
+                    let at = random.below(bytes.len());
+                    bytes[at] = random.bits().to_le_bytes()[0];
+                }
+                let limits = Limits { memory: 1 << 24, ..Limits::default() };
+                let _ = decode(&Source { path: "sky".into(), bytes }, &limits);
+            }
+        }
+    }
+}

@@ -1,0 +1,250 @@
+//! How much of its surroundings a point sees: rays to where light comes from, and what is left where they are stopped.
+//!
+//! Without such rays the surroundings light every point as if nothing stood in their way, which a formula tells exactly.
+//! With them that light is weakened by what the rays find. The share that comes through is unbiased: each half of a
+//! point's rays corrects what the other half makes of the formula (a control variate whose factor comes from independent
+//! rays), so that points in the open and points shut in show no noise at all. After E. Heitz, S. Hill, M. McGuire,
+//! "Combining Analytic Direct Illumination and Stochastic Shadows" (2018), without the bias of its ratio.
+//!
+//! Rays are drawn from the cosine around the normal, from the lobe of a rough mirror and from the light of a panorama,
+//! weighted by the balance heuristic (E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997).
+
+use super::Sky;
+use crate::accel::{Accel, Hit, Ray};
+use crate::math::Vec3;
+use crate::math::random::Random;
+use crate::render::asking::Asking;
+use crate::render::context::Context;
+use crate::render::observer::Observer;
+use crate::render::optics::reflect;
+use crate::render::shade::Matter;
+use crate::render::shadow::Shadows;
+use crate::render::surface::Surface;
+use crate::render::wave::Media;
+use std::f32::consts::PI;
+
+/// Rays that wait at most.
+const LIMIT: usize = 1 << 15;
+
+/// Steps of a sequence in the unit square that leaves no gaps: the inverse powers of the root of x³ = x + 1.
+const STEPS: [f32; 2] = [0.754_877_7, 0.569_840_3];
+
+/// Ways to draw a direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Way {
+    /// By the cosine from the normal.
+    Cosine,
+    /// By the facets of a rough mirror of this α.
+    Lobe(f32),
+    /// By the light of the sky.
+    Light,
+}
+
+/// Points that wait for their rays. Buffers of one worker.
+#[derive(Debug, Default)]
+pub(crate) struct Arounds {
+    points: Vec<Point>,
+    /// What each ray brings if nothing is in the way: of each point first one half, then the other.
+    shares: Vec<Vec3>,
+    arrived: Vec<Vec3>,
+    shadows: Shadows,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Point {
+    sample: u32,
+    /// What it shows if nothing is in the way.
+    open: Vec3,
+}
+
+/// A point of a surface that looks around.
+pub(crate) struct Standpoint<'a> {
+    pub surface: &'a Surface<'a>,
+    pub matter: &'a Matter,
+    /// The ray that found it.
+    pub ray: &'a Ray,
+    pub hit: &'a Hit,
+    /// What its sample shows of it, of light of 1.
+    pub weight: Vec3,
+    /// What it shows of its surroundings if nothing is in the way, not weighted.
+    pub open: Vec3,
+    /// What it is inside of, where that absorbs light.
+    pub media: Option<Media>,
+}
+
+impl Arounds {
+    pub(crate) fn clear(&mut self) {
+        self.points.clear();
+        self.shares.clear();
+        self.shadows.clear();
+    }
+
+    /// Whether it is time to trace.
+    pub(crate) fn is_full(&self) -> bool {
+        self.shares.len() >= LIMIT
+    }
+
+    /// Sends `context.env_rays` rays, half of them each from numbers of its own.
+    pub(crate) fn push(&mut self, context: &Context, point: &Standpoint) {
+        let seen = point.surface.seen();
+        let lobe = point.matter.gloss().map(|roughness| Way::Lobe(roughness * roughness));
+        let light = context.sky.is_map().then_some(Way::Light);
+        let ways: Vec<Way> = [Some(Way::Cosine), lobe, light].into_iter().flatten().collect();
+        let half = context.env_rays.div_ceil(2);
+        let mut random = Random::new(context.seed ^ fingerprint(point.ray, point.hit));
+        for _ in 0..2 {
+            let shift = [random.unit(), random.unit()];
+            for k in 0..half {
+                let at = [0, 1].map(|axis: usize| (shift[axis] + k as f32 * STEPS[axis]).fract());
+                let dir = ways[k as usize % ways.len()].draw(at, &context.sky, seen.normal, seen.view);
+                let density = |(i, way): (usize, &Way)| {
+                    let count = half / ways.len() as u32 + u32::from((i as u32) < half % ways.len() as u32);
+                    count as f32 * way.density(dir, &context.sky, seen.normal, seen.view)
+                };
+                let density: f32 = ways.iter().enumerate().map(density).sum();
+                let shown = match dir.dot(seen.geometric) > 0.0 && density > 0.0 {
+                    true => point.matter.from_around(&seen, dir, context.sky.drawn(dir), context.scene.ambient),
+                    false => Vec3::ZERO,
+                };
+                let share = shown * point.weight / (2.0 * density);
+                let share = if share.is_finite() { share } else { Vec3::ZERO };
+                if share.max_element() > 0.0 {
+                    let ray = point.surface.ray(dir, f32::INFINITY, point.ray.sample);
+                    self.shadows.push_tagged(ray, share, point.media, self.shares.len());
+                }
+                self.shares.push(share);
+            }
+        }
+        self.points.push(Point { sample: point.ray.sample, open: point.open * point.weight });
+    }
+
+    /// Traces all rays and hands what points show to `arrive`, as (sample, light) in an order that is always the same.
+    pub(crate) fn trace<A: Accel, P: Observer>(
+        &mut self,
+        context: &Context,
+        asking: &mut Asking<A>,
+        probe: &mut P,
+        mut arrive: impl FnMut(u32, Vec3),
+    ) {
+        if self.points.is_empty() {
+            return;
+        }
+        self.arrived.clear();
+        self.arrived.resize(self.shares.len(), Vec3::ZERO);
+        let arrived = &mut self.arrived;
+        self.shadows.trace(context, asking, probe, |tag, light| arrived[tag as usize] += light);
+        let half = context.env_rays.div_ceil(2) as usize;
+        let halves = self.shares.chunks_exact(2 * half).zip(self.arrived.chunks_exact(2 * half));
+        for (point, (sent, come)) in self.points.iter().zip(halves) {
+            let sums = |of: &[Vec3]| [of[..half].iter().sum::<Vec3>(), of[half..].iter().sum::<Vec3>()];
+            arrive(point.sample, let_through(point.open, sums(sent), sums(come)));
+        }
+        self.clear();
+    }
+}
+
+/// What is left of `open` when rays were sent with these sums of light, for each half, and these came through.
+fn let_through(open: Vec3, sent: [Vec3; 2], come: [Vec3; 2]) -> Vec3 {
+    let share = |i: usize| {
+        let part = |come: f32, sent: f32| if sent > 0.0 { come / sent } else { 1.0 };
+        Vec3::new(part(come[i].x, sent[i].x), part(come[i].y, sent[i].y), part(come[i].z, sent[i].z))
+    };
+    let corrected = |own: usize, other: usize| come[own] + share(other) * (open * 0.5 - sent[own]);
+    corrected(0, 1) + corrected(1, 0)
+}
+
+/// A number for a hit that is the same in every run and for every structure.
+fn fingerprint(ray: &Ray, hit: &Hit) -> u64 {
+    let words = ray.origin.to_array().into_iter().chain(ray.dir.to_array()).chain([hit.t, hit.u, hit.v]);
+    words.fold(u64::from(hit.prim), |mixed, word| Random::new(mixed ^ u64::from(word.to_bits())).bits())
+}
+
+impl Way {
+    fn draw(self, at: [f32; 2], sky: &Sky, normal: Vec3, view: Vec3) -> Vec3 {
+        let around = |cosine: f32| {
+            let (tangent, bitangent) = normal.any_orthonormal_pair();
+            let (sin, cos) = libm::sincosf(2.0 * PI * at[1]);
+            normal * cosine + (tangent * cos + bitangent * sin) * (1.0 - cosine * cosine).max(0.0).sqrt()
+        };
+        match self {
+            Self::Cosine => around((1.0 - at[0]).sqrt()),
+            Self::Lobe(alpha) => {
+                let slope_squared = alpha * alpha * at[0] / (1.0 - at[0]);
+                reflect(-view, around(1.0 / (1.0 + slope_squared).sqrt()))
+            }
+            Self::Light => sky.draw(at).unwrap_or(normal),
+        }
+    }
+
+    /// 1/sr.
+    fn density(self, dir: Vec3, sky: &Sky, normal: Vec3, view: Vec3) -> f32 {
+        match self {
+            Self::Cosine => normal.dot(dir).max(0.0) / PI,
+            Self::Lobe(alpha) => {
+                let half = (view + dir).normalize_or(normal);
+                let (cosine, toward) = (half.dot(normal), half.dot(view));
+                if cosine <= 0.0 || toward <= 0.0 {
+                    return 0.0;
+                }
+                let f = cosine * cosine * (alpha * alpha - 1.0) + 1.0;
+                alpha * alpha / (PI * f * f) * cosine / (4.0 * toward)
+            }
+            Self::Light => sky.density(dir),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Environment, Scene};
+
+    #[test]
+    fn in_the_open_all_comes_through_and_shut_in_nothing_does() {
+        let (open, sent) = (Vec3::new(1.0, 2.0, 3.0), [Vec3::new(0.7, 0.9, 1.4), Vec3::new(0.3, 1.2, 1.5)]);
+        assert!((let_through(open, sent, sent) - open).length() < 1e-6);
+        assert_eq!(let_through(open, sent, [Vec3::ZERO; 2]), Vec3::ZERO);
+        assert_eq!(let_through(open, [Vec3::ZERO; 2], [Vec3::ZERO; 2]), open);
+    }
+
+    #[test]
+    fn what_comes_through_is_right_on_average_however_few_rays_there_are() {
+        // Of light spread by x over 0 … 1 (∫ 2x = 1) the part beyond 0.6 is hidden: 1 − 0.6² = 0.64 of it.
+        let mut random = Random::new(7);
+        let mut half = || {
+            let x = [random.unit(), random.unit()];
+            let sent = x.map(|x| 0.5 * x);
+            let come: f32 = x.iter().zip(sent).map(|(x, sent)| if *x < 0.6 { sent } else { 0.0 }).sum();
+            (Vec3::splat(sent.iter().sum()), Vec3::splat(come))
+        };
+        let n = 200_000;
+        let mut sum = 0.0;
+        for _ in 0..n {
+            let (a, b) = (half(), half());
+            sum += f64::from(let_through(Vec3::ONE, [a.0, b.0], [a.1, b.1]).x);
+        }
+        assert!((sum / f64::from(n) - 0.36).abs() < 0.003, "{}", sum / f64::from(n));
+    }
+
+    #[test]
+    fn drawn_directions_have_the_density_they_are_said_to_have() {
+        let sky = Sky::new(&Scene { environment: Environment::Constant(Vec3::ONE), ..Scene::default() });
+        let normal = Vec3::new(0.3, -0.5, 0.8).normalize();
+        let view = Vec3::new(0.1, -0.2, 1.0).normalize();
+        // ∫ (N·L)² over the hemisphere is 2π/3.
+        for way in [Way::Cosine, Way::Lobe(0.5), Way::Lobe(0.9)] {
+            let n = 40_000u16;
+            let mut sum = 0.0;
+            for k in 0..n {
+                let at = [0, 1].map(|axis: usize| (0.5 + f32::from(k) * STEPS[axis]).fract());
+                let dir = way.draw(at, &sky, normal, view);
+                let density = way.density(dir, &sky, normal, view);
+                if density > 0.0 {
+                    sum += f64::from(normal.dot(dir).max(0.0).powi(2) / density);
+                }
+            }
+            let mean = sum / f64::from(n) / (2.0 / 3.0 * std::f64::consts::PI);
+            assert!((mean - 1.0).abs() < 0.03, "{way:?}: {mean}");
+        }
+    }
+}

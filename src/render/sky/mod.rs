@@ -1,0 +1,176 @@
+//! What rays that leave the scene see, and what arrives from there without a ray.
+
+mod around;
+mod chance;
+mod panorama;
+
+pub(crate) use around::{Arounds, Standpoint};
+
+use super::studio;
+use crate::math::Vec3;
+use crate::scene::{Background, Environment, Scene, UpAxis};
+use chance::Chance;
+use panorama::Pyramid;
+
+/// The environment of a scene, asked with world directions.
+#[derive(Clone, Debug)]
+pub(crate) struct Sky {
+    environment: Environment,
+    up: UpAxis,
+    /// What secondary rays see of a scene without an environment: the background colour, as the founding texts say.
+    backdrop: Vec3,
+    map: Option<Map>,
+}
+
+/// A picture of the surroundings, ready to be asked.
+#[derive(Clone, Debug)]
+struct Map {
+    pyramid: Pyramid,
+    chance: Chance,
+    /// Sine and cosine of its rotation about the up axis.
+    turn: (f32, f32),
+}
+
+impl Sky {
+    pub(crate) fn new(scene: &Scene) -> Self {
+        let backdrop = match scene.background {
+            Some(Background::Color(color)) => color,
+            _ => Vec3::ZERO,
+        };
+        let panorama = scene.panorama.as_ref().filter(|_| scene.environment == Environment::Panorama);
+        let map = panorama.filter(|p| !p.texels.is_empty()).map(|panorama| {
+            let pyramid = Pyramid::new(panorama);
+            let chance = Chance::new(&pyramid);
+            Map { pyramid, chance, turn: libm::sincosf(panorama.rotation) }
+        });
+        Self { environment: scene.environment, up: scene.up, backdrop, map }
+    }
+
+    /// Whether nothing comes from anywhere.
+    pub(crate) fn is_dark(&self) -> bool {
+        match self.environment {
+            Environment::Black => self.backdrop == Vec3::ZERO,
+            Environment::Panorama => self.map.is_none(),
+            Environment::Constant(_) | Environment::Studio => false,
+        }
+    }
+
+    /// Whether it is a picture.
+    pub(crate) fn is_map(&self) -> bool {
+        self.map.is_some()
+    }
+
+    /// The up axis of the studio, if that is what surrounds the scene; else, but for pictures, every direction is alike.
+    pub(crate) fn studio(&self) -> Option<UpAxis> {
+        (self.environment == Environment::Studio).then_some(self.up)
+    }
+
+    /// Radiance along a unit direction, averaged over a cone of this angle across (radians).
+    pub(crate) fn radiance(&self, dir: Vec3, angle: f32) -> Vec3 {
+        match (self.environment, &self.map) {
+            (Environment::Constant(radiance), _) => radiance,
+            (Environment::Studio, _) => studio::radiance(studio::from_world(self.up, dir)),
+            (Environment::Panorama, Some(map)) => map.pyramid.radiance(self.to_map(map, dir), angle),
+            (Environment::Black | Environment::Panorama, _) => self.backdrop,
+        }
+    }
+
+    /// Mean radiance around a mirror direction, as wide as `roughness` (0 … 1) makes it.
+    pub(crate) fn blurred(&self, dir: Vec3, roughness: f32) -> Vec3 {
+        match (self.environment, &self.map) {
+            (Environment::Studio, _) => studio::blurred(studio::from_world(self.up, dir), roughness),
+            (Environment::Panorama, Some(map)) => map.pyramid.blurred(self.to_map(map, dir), roughness),
+            _ => self.radiance(dir, 0.0),
+        }
+    }
+
+    /// Cosine-weighted mean radiance over the hemisphere around `normal`.
+    pub(crate) fn diffuse(&self, normal: Vec3) -> Vec3 {
+        match (self.environment, &self.map) {
+            (Environment::Constant(radiance), _) => radiance,
+            (Environment::Studio, _) => studio::diffuse(studio::from_world(self.up, normal)),
+            (Environment::Panorama, Some(map)) => map.pyramid.diffuse(self.to_map(map, normal)),
+            (Environment::Black | Environment::Panorama, _) => Vec3::ZERO,
+        }
+    }
+
+    /// A direction to look in for light, drawn with two numbers from 0 … 1; `None` where no direction is better than others.
+    fn draw(&self, at: [f32; 2]) -> Option<Vec3> {
+        self.map.as_ref().map(|map| self.from_map(map, map.chance.draw(at)))
+    }
+
+    /// The density of that draw, 1/sr.
+    fn density(&self, dir: Vec3) -> f32 {
+        self.map.as_ref().map_or(0.0, |map| map.chance.density(self.to_map(map, dir)))
+    }
+
+    /// Radiance as [`Self::draw`] and [`Self::density`] know it.
+    fn drawn(&self, dir: Vec3) -> Vec3 {
+        self.map.as_ref().map_or_else(|| self.radiance(dir, 0.0), |map| map.chance.radiance(self.to_map(map, dir)))
+    }
+
+    fn to_map(&self, map: &Map, dir: Vec3) -> Vec3 {
+        let (sin, cos) = map.turn;
+        let Vec3 { x, y, z } = studio::from_world(self.up, dir);
+        Vec3::new(cos * x - sin * z, y, sin * x + cos * z)
+    }
+
+    fn from_map(&self, map: &Map, dir: Vec3) -> Vec3 {
+        let (sin, cos) = map.turn;
+        let turned = Vec3::new(cos * dir.x + sin * dir.z, dir.y, cos * dir.z - sin * dir.x);
+        studio::to_world(self.up, turned)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Panorama;
+    use std::f32::consts::FRAC_PI_2;
+    use std::sync::Arc;
+
+    /// A sky that is red along +X, green along +Z, blue along −X and white along −Z of its own frame.
+    fn quarters(rotation: f32, up: UpAxis) -> Sky {
+        let color = |column: u32| match (column + 32) / 64 % 4 {
+            0 => [0.0, 0.0, 1.0],
+            1 => [1.0, 1.0, 1.0],
+            2 => [1.0, 0.0, 0.0],
+            _ => [0.0, 1.0, 0.0],
+        };
+        let texels = (0..128 * 256).map(|i| color(i % 256)).collect();
+        let panorama = Panorama { name: String::new(), width: 256, height: 128, texels: Arc::new(texels), rotation };
+        Sky::new(&Scene { environment: Environment::Panorama, panorama: Some(panorama), up, ..Scene::default() })
+    }
+
+    #[test]
+    fn a_panorama_is_seen_where_its_convention_says() {
+        let sky = quarters(0.0, UpAxis::Y);
+        let seen = |dir: Vec3| sky.radiance(dir, 0.0).to_array();
+        assert_eq!(seen(Vec3::X), [1.0, 0.0, 0.0]);
+        assert_eq!(seen(Vec3::Z), [0.0, 1.0, 0.0]);
+        assert_eq!(seen(Vec3::NEG_X), [0.0, 0.0, 1.0]);
+        assert_eq!(seen(Vec3::NEG_Z), [1.0, 1.0, 1.0]);
+        assert_eq!(quarters(0.0, UpAxis::Z).radiance(Vec3::NEG_Y, 0.0).to_array(), [0.0, 1.0, 0.0]);
+    }
+
+    #[test]
+    fn a_quarter_turn_brings_what_was_along_x_towards_minus_z() {
+        let sky = quarters(FRAC_PI_2, UpAxis::Y);
+        assert_eq!(sky.radiance(Vec3::NEG_Z, 0.0).to_array(), [1.0, 0.0, 0.0]);
+        assert!(sky.diffuse(Vec3::NEG_Z).x > sky.diffuse(Vec3::X).x);
+        assert!(sky.blurred(Vec3::NEG_Z, 0.5).x > 0.9);
+    }
+
+    #[test]
+    fn drawn_directions_have_the_density_they_are_said_to_have() {
+        let sky = quarters(1.0, UpAxis::Z);
+        // ∫ 1 over the sphere, as the mean of 1 / density.
+        let n = 4096u16;
+        let part = |i: u16| (f32::from(i) + 0.5) / f32::from(n);
+        let whole: f32 = (0..n)
+            .map(|i| sky.draw([part(i), (f32::from(i) * 0.618_034).fract()]).expect("a map is drawn from"))
+            .map(|dir| 1.0 / sky.density(dir) / f32::from(n))
+            .sum();
+        assert!((whole / (4.0 * std::f32::consts::PI) - 1.0).abs() < 0.02, "{whole}");
+    }
+}

@@ -1,0 +1,297 @@
+//! A panorama and smaller copies of it, asked for its radiance at any blur.
+
+use crate::math::Vec3;
+use crate::scene::Panorama;
+use rayon::prelude::*;
+use std::f32::consts::PI;
+use std::sync::Arc;
+
+/// Lookups that make up a rough lobe.
+const LOOKUPS: u16 = 32;
+
+/// Columns and rows of the table of diffuse light.
+const DIFFUSE: (u32, u32) = (64, 32);
+
+/// The golden ratio's inverse: turns that never meet.
+const GOLDEN: f32 = 0.618_034;
+
+/// The levels of a panorama, each half as large as the one before.
+#[derive(Clone, Debug)]
+pub(super) struct Pyramid {
+    levels: Vec<Level>,
+    diffuse: Level,
+}
+
+/// One copy.
+#[derive(Clone, Debug)]
+pub(super) struct Level {
+    pub width: u32,
+    pub height: u32,
+    texels: Arc<Vec<[f32; 3]>>,
+}
+
+impl Pyramid {
+    /// Of a panorama that has texels.
+    pub(super) fn new(panorama: &Panorama) -> Self {
+        let Panorama { width, height, texels, .. } = panorama;
+        let mut levels = vec![Level { width: *width, height: *height, texels: Arc::clone(texels) }];
+        while let Some(next) = levels.last().and_then(Level::halved) {
+            levels.push(next);
+        }
+        let mut pyramid = Self { levels, diffuse: Level { width: 1, height: 1, texels: Arc::new(vec![[0.0; 3]]) } };
+        pyramid.diffuse = pyramid.spread();
+        pyramid
+    }
+
+    /// The finest level with at most so many columns.
+    pub(super) fn at_most(&self, columns: u32) -> &Level {
+        let last = self.levels.len() - 1;
+        &self.levels[self.levels.iter().position(|level| level.width <= columns).unwrap_or(last)]
+    }
+
+    /// Mean radiance in a cone of this angle across.
+    pub(super) fn radiance(&self, dir: Vec3, angle: f32) -> Vec3 {
+        let finest = self.levels[0].angle();
+        self.at_level(dir, if angle > finest { libm::log2f(angle / finest) } else { 0.0 })
+    }
+
+    /// Between the two nearest levels.
+    fn at_level(&self, dir: Vec3, level: f32) -> Vec3 {
+        let last = self.levels.len() - 1;
+        let level = level.clamp(0.0, last as f32);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the levels there are")]
+        let fine = level as usize;
+        let part = level - fine as f32;
+        let sharp = self.levels[fine].along(dir);
+        if part == 0.0 { sharp } else { sharp.lerp(self.levels[(fine + 1).min(last)].along(dir), part) }
+    }
+
+    /// Mean radiance in the lobe of a rough mirror that sends the view along `dir`, seen along its own normal.
+    ///
+    /// Directions are drawn from the GGX distribution, each looked up as blurred as directions are few there (J. Křivánek,
+    /// M. Colbert, "Real-time Shading with Filtered Importance Sampling", 2008).
+    pub(super) fn blurred(&self, dir: Vec3, roughness: f32) -> Vec3 {
+        let alpha = roughness * roughness;
+        // Narrower than a texel is not blurred.
+        if 2.0 * alpha < self.levels[0].angle() {
+            return self.radiance(dir, 0.0);
+        }
+        let (tangent, bitangent) = dir.any_orthonormal_pair();
+        let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
+        for k in 0..LOOKUPS {
+            let u = (f32::from(k) + 0.5) / f32::from(LOOKUPS);
+            let slope = alpha * (u / (1.0 - u)).sqrt();
+            let (sin, cos) = libm::sincosf(2.0 * PI * (f32::from(k) * GOLDEN).fract());
+            let half = (dir + (tangent * cos + bitangent * sin) * slope).normalize();
+            let cosine = half.dot(dir);
+            let light = half * (2.0 * cosine) - dir;
+            let weight = light.dot(dir);
+            if weight <= 0.0 {
+                continue;
+            }
+            // Each stands for an equal share of the lobe: as much of the sphere as the distribution is thin there.
+            let f = cosine * cosine * (alpha * alpha - 1.0) + 1.0;
+            let density = alpha * alpha / (PI * f * f) / 4.0;
+            let area = 1.0 / (f32::from(LOOKUPS) * density);
+            sum += self.radiance(light, area.sqrt()) * weight;
+            weights += weight;
+        }
+        if weights > 0.0 { sum / weights } else { self.radiance(dir, PI) }
+    }
+
+    /// Cosine-weighted mean radiance around a normal.
+    pub(super) fn diffuse(&self, normal: Vec3) -> Vec3 {
+        self.diffuse.along(normal)
+    }
+
+    /// The table of diffuse light: sums over a copy of its own size.
+    fn spread(&self) -> Level {
+        let (width, height) = DIFFUSE;
+        let grid = Level { width, height, texels: Arc::default() };
+        let source = |(row, dir)| (dir, grid.area(row), self.radiance(dir, grid.angle()));
+        let sources: Vec<(Vec3, f32, Vec3)> = grid.middles().map(source).collect();
+        let mean = |&(normal, ..): &(Vec3, f32, Vec3)| {
+            let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
+            for &(dir, area, light) in &sources {
+                let weight = normal.dot(dir).max(0.0) * area;
+                sum += light * weight;
+                weights += weight;
+            }
+            (sum / weights).to_array()
+        };
+        let texels = sources.par_iter().map(mean).collect();
+        Level { width, height, texels: Arc::new(texels) }
+    }
+}
+
+impl Level {
+    /// Degrees of arc, in radians, that a texel is high.
+    pub(super) fn angle(&self) -> f32 {
+        PI / self.height as f32
+    }
+
+    /// Solid angle of a texel in this row.
+    pub(super) fn area(&self, row: u32) -> f32 {
+        let edge = |row: u32| libm::cos(std::f64::consts::PI * f64::from(row) / f64::from(self.height));
+        #[expect(clippy::cast_possible_truncation, reason = "an area of the unit sphere")]
+        let ring = (edge(row) - edge(row + 1)) as f32;
+        ring * 2.0 * PI / self.width as f32
+    }
+
+    pub(super) fn texel(&self, column: u32, row: u32) -> Vec3 {
+        let i = row as usize * self.width as usize + column as usize;
+        self.texels.get(i).map_or(Vec3::ZERO, |&texel| Vec3::from(texel))
+    }
+
+    /// Coordinates of a direction: 0 … width and 0 … height.
+    pub(super) fn coordinates(&self, dir: Vec3) -> (f32, f32) {
+        let around = libm::atan2f(dir.z, dir.x) / (2.0 * PI) + 0.5;
+        let down = libm::atan2f((dir.x * dir.x + dir.z * dir.z).sqrt(), dir.y) / PI;
+        (around * self.width as f32, down * self.height as f32)
+    }
+
+    /// The texel that a direction lies in.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the texels there are")]
+    pub(super) fn nearest(&self, dir: Vec3) -> (u32, u32) {
+        let (x, y) = self.coordinates(dir);
+        ((x as u32).min(self.width - 1), (y as u32).min(self.height - 1))
+    }
+
+    /// The unit direction at these coordinates.
+    pub(super) fn direction(&self, x: f32, y: f32) -> Vec3 {
+        let (sin, cos) = libm::sincosf((x / self.width as f32 - 0.5) * 2.0 * PI);
+        let (sin_down, cos_down) = libm::sincosf(y / self.height as f32 * PI);
+        Vec3::new(sin_down * cos, cos_down, sin_down * sin)
+    }
+
+    /// Row and direction of the middle of each texel.
+    fn middles(&self) -> impl Iterator<Item = (u32, Vec3)> + '_ {
+        let row = move |y: u32| (0..self.width).map(move |x| (y, self.direction(x as f32 + 0.5, y as f32 + 0.5)));
+        (0..self.height).flat_map(row)
+    }
+
+    /// Between the four nearest texels.
+    fn along(&self, dir: Vec3) -> Vec3 {
+        let (x, y) = self.coordinates(dir);
+        let (x, y) = (x - 0.5, (y - 0.5).clamp(0.0, (self.height - 1) as f32));
+        let (left, top) = (x.floor(), y.floor());
+        #[expect(clippy::cast_possible_truncation, reason = "a column or one beyond")]
+        let column = |k: i32| (left as i32 + k).rem_euclid(self.width.cast_signed()).cast_unsigned();
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the rows there are")]
+        let row = |k: u32| (top as u32 + k).min(self.height - 1);
+        let mixed = |row: u32| self.texel(column(0), row).lerp(self.texel(column(1), row), x - left);
+        mixed(row(0)).lerp(mixed(row(1)), y - top)
+    }
+
+    /// Half as large, each texel the mean of those it covers by their area on the sphere; `None` for a single texel.
+    fn halved(&self) -> Option<Self> {
+        if self.width <= 1 && self.height <= 1 {
+            return None;
+        }
+        let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
+        let split = |i: u32, whole: u32, parts: u32| u64::from(i) * u64::from(whole) / u64::from(parts);
+        #[expect(clippy::cast_possible_truncation, reason = "at most the whole")]
+        let range = |i: u32, whole: u32, parts: u32| split(i, whole, parts) as u32..split(i + 1, whole, parts) as u32;
+        let row = |y: u32| {
+            let rows: Vec<(u32, f32)> = range(y, self.height, height).map(|row| (row, self.area(row))).collect();
+            let texel = move |x: u32| {
+                let (mut sum, mut areas) = (Vec3::ZERO, 0.0);
+                for &(row, area) in &rows {
+                    for column in range(x, self.width, width) {
+                        sum += self.texel(column, row) * area;
+                        areas += area;
+                    }
+                }
+                (sum / areas).to_array()
+            };
+            (0..width).map(texel).collect::<Vec<_>>()
+        };
+        let texels = (0..height).into_par_iter().flat_map_iter(row).collect();
+        Some(Self { width, height, texels: Arc::new(texels) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pyramid(width: u32, height: u32, texel: impl Fn(u32, u32) -> [f32; 3]) -> Pyramid {
+        let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| texel(x, y)).collect();
+        Pyramid::new(&Panorama { name: String::new(), width, height, texels: Arc::new(texels), rotation: 0.0 })
+    }
+
+    fn probes() -> impl Iterator<Item = Vec3> {
+        let grid = Level { width: 12, height: 6, texels: Arc::default() };
+        grid.middles().map(|(_, dir)| dir).collect::<Vec<_>>().into_iter().chain([Vec3::Y, Vec3::NEG_Y])
+    }
+
+    #[test]
+    fn an_even_sky_is_even_at_every_blur_and_size() {
+        for (width, height) in [(1, 1), (2, 1), (7, 3), (100, 51), (300, 150)] {
+            let sky = pyramid(width, height, |_, _| [2.0, 1.0, 0.5]);
+            for dir in probes() {
+                for seen in [sky.radiance(dir, 0.3), sky.blurred(dir, 0.4), sky.blurred(dir, 1.0), sky.diffuse(dir)] {
+                    assert!((seen - Vec3::new(2.0, 1.0, 0.5)).length() < 1e-4, "{width}×{height} {dir}: {seen}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn coordinates_and_directions_are_each_others_inverse() {
+        let grid = Level { width: 64, height: 32, texels: Arc::default() };
+        for (_, dir) in grid.middles() {
+            let (x, y) = grid.coordinates(dir);
+            assert!((grid.direction(x, y) - dir).length() < 1e-5, "{dir}");
+        }
+    }
+
+    #[test]
+    fn the_texels_of_a_level_cover_the_sphere() {
+        let grid = Level { width: 50, height: 31, texels: Arc::default() };
+        let whole: f32 = (0..31).map(|row| grid.area(row) * 50.0).sum();
+        assert!((whole - 4.0 * PI).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_sun_lights_by_its_area_and_the_cosine_to_it() {
+        // One texel of 256 × 128 that shines, 2.8° wide.
+        let sky = pyramid(256, 128, |x, y| if (x, y) == (128, 63) { [1000.0; 3] } else { [0.0; 3] });
+        let sun = sky.levels[0].direction(128.5, 63.5);
+        let irradiance = 1000.0 * sky.levels[0].area(63) / PI;
+        for degrees in [0.0f32, 30.0, 60.0, 120.0] {
+            let (sin, cos) = libm::sincosf(degrees.to_radians());
+            let normal = sun * cos + sun.any_orthonormal_vector() * sin;
+            let shown = sky.diffuse(normal).x;
+            assert!((shown - irradiance * cos.max(0.0)).abs() < 0.03 * irradiance, "{degrees}: {shown}");
+        }
+    }
+
+    #[test]
+    fn a_rough_lobe_is_near_its_integral() {
+        let sky = pyramid(256, 128, |x, y| {
+            let bright = (100..140).contains(&x) && (30..60).contains(&y);
+            if bright { [8.0, 4.0, 2.0] } else { [0.2 + 0.001 * x as f32, 0.1, 0.3] }
+        });
+        let grid = Level { width: 256, height: 128, texels: Arc::default() };
+        for roughness in [0.25f32, 0.5, 0.8] {
+            let alpha2 = f64::from(roughness).powi(4);
+            let (mut worst, mut all, mut count) = (0.0f64, 0.0, 0.0);
+            for mirror in probes() {
+                let (mut sum, mut weights) = (0.0, 0.0);
+                for (row, dir) in grid.middles() {
+                    let cosine = f64::from(dir.dot(mirror)).max(0.0);
+                    let f = 0.5 * (1.0 + cosine) * (alpha2 - 1.0) + 1.0;
+                    let weight = alpha2 / (f * f) * cosine * f64::from(grid.area(row));
+                    sum += weight * f64::from(sky.levels[0].along(dir).x);
+                    weights += weight;
+                }
+                let error = (f64::from(sky.blurred(mirror, roughness).x) * weights / sum - 1.0).abs();
+                worst = worst.max(error);
+                all += error;
+                count += 1.0;
+            }
+            assert!(worst < 0.4 && all / count < 0.1, "{roughness}: {worst} at worst, {} on average", all / count);
+        }
+    }
+}
