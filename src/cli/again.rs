@@ -22,7 +22,7 @@ use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
 /// The flags that a picture may bring along.
-const FLAGS: [&str; 39] = [
+const FLAGS: [&str; 40] = [
     "size",
     "samples",
     "depth",
@@ -40,6 +40,7 @@ const FLAGS: [&str; 39] = [
     "env",
     "env-rotate",
     "env-rays",
+    "gloss-rays",
     "tone-map",
     "exposure",
     "bits",
@@ -142,6 +143,9 @@ impl Facts<'_> {
             None => {}
         }
         settings.env_rays.iter().for_each(|n| set("env-rays", n.to_string()));
+        if settings.gloss_rays > 0 {
+            set("gloss-rays", settings.gloss_rays.to_string());
+        }
         set("tone-map", output.tone_map.name().into());
         set("exposure", output.exposure.to_string());
         set("format", self.shot.kind.extension().into());

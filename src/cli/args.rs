@@ -125,7 +125,7 @@ pub(super) struct RenderArgs {
     /// Repeat a picture with the settings it carries; refuses when the input has changed
     #[arg(long, value_name = "PICTURE", help_heading = "Output", hide_short_help = true, conflicts_with_all = [
         "size", "format", "bits", "half", "float", "layers", "tone_map", "exposure", "merge", "view", "camera", "eye",
-        "at", "up_vector", "fov", "ortho", "up", "background", "env", "env_rotate", "env_rays", "samples", "depth", "cutoff", "seed", "scene",
+        "at", "up_vector", "fov", "ortho", "up", "background", "env", "env_rotate", "env_rays", "gloss_rays", "samples", "depth", "cutoff", "seed", "scene",
         "polygons", "mtl", "allow_empty", "accel", "intersector",
     ])]
     pub again: Option<PathBuf>,
@@ -185,6 +185,11 @@ pub(super) struct RenderArgs {
     /// Weight below which a branch of the ray tree ends [default: 0.001953125]
     #[arg(long, value_name = "WEIGHT", value_parser = parse::cutoff, help_heading = "Quality", hide_short_help = true)]
     pub cutoff: Option<f32>,
+    /// Rays that a rough surface spreads over what it mirrors, and over what it lets through; 0: it sees its
+    /// surroundings blurred by a formula, and nothing that stands in them [default: 0]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=65_536), help_heading = "Quality",
+          hide_short_help = true)]
+    pub gloss_rays: Option<u32>,
     /// Seed of every random choice
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Quality", hide_short_help = true)]
     pub seed: u64,

@@ -124,6 +124,8 @@ pub(super) struct Look {
     pub env_rotate: f64,
     /// Rays to it from each point.
     pub env_rays: Option<u32>,
+    /// Rays that rough surfaces spread.
+    pub gloss_rays: u32,
     /// Curve from scene light to display light.
     pub tone_map: Option<ToneMap>,
     /// Stops.
@@ -342,6 +344,7 @@ fn look(args: &RenderArgs) -> Look {
         env: args.env.clone(),
         env_rotate: args.env_rotate.unwrap_or(0.0),
         env_rays: args.env_rays,
+        gloss_rays: args.gloss_rays.unwrap_or(0),
         tone_map: args.tone_map,
         exposure: args.exposure,
         png: if args.bits == Some(16) { PngDepth::Sixteen } else { PngDepth::Eight },

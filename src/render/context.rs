@@ -34,6 +34,8 @@ pub(crate) struct Context<'a> {
     pub shows_environment: bool,
     /// Rays that each point sends to its surroundings.
     pub env_rays: u32,
+    /// Rays that rough surfaces spread.
+    pub gloss_rays: u32,
     /// For every random choice.
     pub seed: u64,
     /// Whether nothing is seen but lights, and what shines by itself.
@@ -50,10 +52,10 @@ impl<'a> Context<'a> {
     pub(crate) fn new(scene: &'a Scene, world: &'a World, textures: &'a TextureStore<'a>, settings: &Settings) -> Self {
         let everything = settings.everything;
         let features = Features::of(scene);
-        let depth = settings.depth.unwrap_or_else(|| auto_depth(&features));
+        let depth = settings.depth.unwrap_or_else(|| auto_depth(&features, settings.gloss_rays > 0));
         let sky = Sky::new(scene);
         let env_rays = settings.env_rays.unwrap_or(if sky.is_map() { ENV_RAYS } else { 0 });
-        let alone = everything || settings.layers || sky.is_map() || env_rays > 0;
+        let alone = everything || settings.layers || sky.is_map() || env_rays > 0 || settings.gloss_rays > 0;
         let uniform = |m: &Material| if alone { None } else { Uniform::of(m, textures, depth > 0) };
         let needs = |any: &[Feature]| everything || any.iter().any(|&f| features.has(f));
         Self {
@@ -63,6 +65,7 @@ impl<'a> Context<'a> {
             is_dark: sky.is_dark() && scene.ambient == Vec3::ZERO,
             sky,
             env_rays,
+            gloss_rays: settings.gloss_rays,
             seed: settings.seed,
             lights: scene.lights.iter().map(|l| LocalLight::new(l, world.center)).collect(),
             uniform: scene.materials.iter().map(uniform).collect(),
@@ -84,12 +87,12 @@ impl<'a> Context<'a> {
 
 /// Bounces that a scene needs: none without mirrors or glass, a few between mirrors, more where every object is entered
 /// and left.
-fn auto_depth(features: &Features) -> u32 {
+fn auto_depth(features: &Features, rough_ones_mirror: bool) -> u32 {
     const GLASS: u32 = 12;
     const MIRRORS: u32 = 5;
     if features.has(Feature::Refraction) || features.has(Feature::ThinTransmission) {
         GLASS
-    } else if features.has(Feature::Mirrors) {
+    } else if features.has(Feature::Mirrors) || rough_ones_mirror && features.has(Feature::MetalRough) {
         MIRRORS
     } else {
         0
@@ -121,10 +124,10 @@ mod tests {
         let matt = Phong::default();
         let mirror = Phong { mirror: Vec3::splat(0.5), ..Phong::default() };
         let glass = MetalRough { transmission: 0.5, ..MetalRough::default() };
-        assert_eq!(auto_depth(&Features::of(&scene_of(Surface::Phong(matt)))), 0);
-        assert_eq!(auto_depth(&Features::of(&scene_of(Surface::Phong(mirror)))), 5);
-        assert_eq!(auto_depth(&Features::of(&scene_of(Surface::MetalRough(glass)))), 12);
-        assert_eq!(auto_depth(&Features::default()), 0);
+        assert_eq!(auto_depth(&Features::of(&scene_of(Surface::Phong(matt))), false), 0);
+        assert_eq!(auto_depth(&Features::of(&scene_of(Surface::Phong(mirror))), false), 5);
+        assert_eq!(auto_depth(&Features::of(&scene_of(Surface::MetalRough(glass))), false), 12);
+        assert_eq!(auto_depth(&Features::default(), false), 0);
     }
 
     #[test]

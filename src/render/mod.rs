@@ -11,8 +11,10 @@
 
 mod absorption;
 mod asking;
+mod branch;
 mod context;
 mod costs;
+mod draws;
 pub mod everything;
 mod eyes;
 mod layers;
@@ -74,6 +76,9 @@ pub struct Settings {
     /// Rays that each point sends to its surroundings, rounded up to an even number, to find what hides them; 0: nothing does.
     /// `None`: 16 where the surroundings are a panorama, else 0.
     pub env_rays: Option<u32>,
+    /// Rays that the first rough surface on a line of sight spreads over what it mirrors, and over what it lets through; 0: rough
+    /// surfaces see their surroundings blurred by a formula, and nothing else.
+    pub gloss_rays: u32,
     /// Whether [`crate::image::Layers`] are wanted.
     pub layers: bool,
     /// Whether what the scene does without is done all the same, for nothing (see [`everything`]). The world and the
@@ -91,6 +96,7 @@ impl Default for Settings {
             cutoff: 1.0 / 512.0,
             seed: 0,
             env_rays: None,
+            gloss_rays: 0,
             layers: false,
             everything: false,
         }

@@ -9,19 +9,20 @@
 
 use super::Progress;
 use super::asking::Asking;
+use super::branch::Point;
 use super::context::{Context, coverage};
 use super::everything::look_up_in_vain;
 use super::eyes::Eyes;
 use super::layers::Facts;
 use super::observer::Observer;
-use super::optics::{dispersed_index, reflect, refract, transmittance};
+use super::optics::transmittance;
 use super::seam::is_same_crossing;
-use super::shade::{Matter, Reader, above, lets_light_in, terminator};
+use super::shade::{Matter, Reader, lets_light_in, terminator};
 use super::shadow::Shadows;
 use super::sky::{Arounds, Standpoint};
 use super::strip::{POINTS, Sorted, Strip};
 use super::surface::{Surface, Target};
-use super::wave::{Crossing, Media, Medium, Path, Queue, RayClass, Wave};
+use super::wave::{Crossing, Media, Path, Queue, RayClass, Wave};
 use crate::accel::{Accel, Hit, Ray};
 use crate::math::{DVec3, Vec3};
 use std::hint::black_box;
@@ -65,13 +66,13 @@ impl<P> ByClass<P> {
 
 /// One worker: its buffers are reused from tile to tile.
 pub(crate) struct Tracer<'a, A: Accel, P> {
-    context: &'a Context<'a>,
+    pub(super) context: &'a Context<'a>,
     asking: Asking<'a, A>,
     pub eyes: Eyes,
     /// Rays that start, by class.
-    starting: [Queue; 3],
+    pub(super) starting: [Queue; 3],
     /// Rays that go on behind a hit, by class.
-    continuing: [Queue; 3],
+    pub(super) continuing: [Queue; 3],
     wave: Wave,
     sorted: Sorted,
     strip: Box<Strip>,
@@ -304,7 +305,10 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         // Local colour: emitted, from everywhere, from each light.
         surface.shade_smoothly(context.textures);
         self.note(ray, path, &surface, base.truncate());
-        let matter = Matter::new(&surface, base.truncate(), context.textures);
+        let mut matter = Matter::new(&surface, base.truncate(), context.textures);
+        if context.gloss_rays > 0 && path.depth < context.depth {
+            matter.spread_by_rays();
+        }
         let point = Point {
             ray,
             hit,
@@ -397,109 +401,6 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         if self.shadows.len() >= SHADOW_LIMIT {
             self.trace_shadows();
         }
-    }
-
-    /// Queues the secondary rays of a point that have enough weight.
-    fn reflect_and_refract(&mut self, point: &Point, crossing: &Crossing) {
-        let balance = point.balance(crossing);
-        self.reflect(point, balance.reflected);
-
-        let (_, dispersion) = point.matter.refraction();
-        let weight = point.path.weight * balance.refracted;
-        if dispersion <= 0.0 || point.path.band.is_some() || !self.context.is_alive(weight) {
-            return self.send_refracted(point, weight, crossing, point.path.band);
-        }
-        // White light splits: each part of the spectrum has its own index from here on.
-        for (i, band) in (0u8..).zip(&self.context.bands) {
-            let crossing = point.crossing(self.context, Some(i));
-            let weight = point.path.weight * point.balance(&crossing).refracted * band.color;
-            self.send_refracted(point, weight, &crossing, Some(i));
-        }
-    }
-
-    /// Queues what is mirrored by the surface and by lacquer over it: one ray where both have the same normal.
-    fn reflect(&mut self, point: &Point, reflected: Vec3) {
-        let (weight, normal, band) = (point.path.weight, point.surface.normal, point.path.band);
-        match point.matter.lacquer() {
-            Some((lacquer, share)) if lacquer == normal => {
-                self.send_reflected(point, normal, weight * (reflected + share), band);
-            }
-            Some((lacquer, share)) => {
-                self.send_reflected(point, normal, weight * reflected, band);
-                self.send_reflected(point, lacquer, weight * share, band);
-            }
-            None => self.send_reflected(point, normal, weight * reflected, band),
-        }
-    }
-
-    fn send_reflected(&mut self, point: &Point, normal: Vec3, weight: Vec3, band: Option<u8>) {
-        if !self.context.is_alive(weight) {
-            return;
-        }
-        let surface = point.surface;
-        let dir = above(reflect(-surface.view, normal), surface.geometric);
-        let path = Path { band, ..point.bounced(weight) };
-        let ray = surface.ray(dir, f32::INFINITY, point.ray.sample);
-        self.starting[RayClass::Reflected as usize].push(ray, path, Hit::MISS);
-    }
-
-    fn send_refracted(&mut self, point: &Point, weight: Vec3, crossing: &Crossing, band: Option<u8>) {
-        if !self.context.is_alive(weight) {
-            return;
-        }
-        // Equal indices leave the ray as it is: the same ray goes on behind this hit.
-        if crossing.n_i == crossing.n_t {
-            let path = Path { weight, band, depth: point.path.depth + 1, media: crossing.beyond, ..point.path };
-            return self.continuing[RayClass::Refracted as usize].push(*point.ray, path, *point.hit);
-        }
-        let surface = point.surface;
-        let (n_i, n_t) = (f64::from(crossing.n_i), f64::from(crossing.n_t));
-        let Some(bent) = refract(-surface.view, surface.normal, n_i, n_t) else {
-            // Total reflection by a hair that the balance did not see.
-            return self.send_reflected(point, surface.normal, weight, band);
-        };
-        let dir = above(bent, -surface.geometric);
-        let path = Path { band, media: crossing.beyond, ..point.bounced(weight) };
-        let ray = surface.ray(dir, f32::INFINITY, point.ray.sample);
-        self.starting[RayClass::Refracted as usize].push(ray, path, Hit::MISS);
-    }
-}
-
-/// A shaded point and the ray that found it.
-struct Point<'a> {
-    ray: &'a Ray,
-    hit: &'a Hit,
-    /// The ray so far, its weight that of the surface.
-    path: Path,
-    /// Width of the ray's cone here.
-    width: f32,
-    surface: &'a Surface<'a>,
-    matter: &'a Matter,
-}
-
-impl Point<'_> {
-    /// The indices on both sides for light of `band`.
-    fn crossing(&self, context: &Context, band: Option<u8>) -> Crossing {
-        let (ior, dispersion) = self.matter.refraction();
-        let band = band.and_then(|i| context.bands.get(usize::from(i)));
-        let ior = match band {
-            #[expect(clippy::cast_possible_truncation, reason = "indices are given in f32")]
-            Some(b) if dispersion > 0.0 => {
-                dispersed_index(f64::from(ior), f64::from(dispersion), f64::from(b.wavelength)) as f32
-            }
-            _ => ior,
-        };
-        self.path.media.cross(Medium { material: self.surface.target.material_id, ior }, self.surface.front)
-    }
-
-    fn balance(&self, crossing: &Crossing) -> super::shade::Balance {
-        self.matter.balance(self.surface.normal.dot(self.surface.view), crossing)
-    }
-
-    /// What a ray that starts here carries.
-    fn bounced(&self, weight: Vec3) -> Path {
-        let depth = self.path.depth + 1;
-        Path { weight, depth, straight: false, since: 0.0, cone_width: self.width, ..self.path }
     }
 }
 

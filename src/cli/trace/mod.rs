@@ -89,6 +89,7 @@ fn check(args: &TraceArgs) -> Result<Look, Wrong> {
         env: None,
         env_rotate: 0.0,
         env_rays: None,
+        gloss_rays: 0,
         tone_map: None,
         exposure: None,
         png: PngDepth::Eight,

@@ -5,7 +5,7 @@
 //! Masking-Shadowing Function" (2014) for how they hide each other.
 
 use super::metal_rough::{NARROWEST_HIGHLIGHT, above};
-use super::{Reader, Seen, Sky};
+use super::{Lobe, Reader, Seen, Sky};
 use crate::math::{Vec2, Vec3};
 use crate::render::optics::reflect;
 use crate::render::surface::Surface;
@@ -53,6 +53,11 @@ impl GrainMatter {
     /// Perceptual roughness along it.
     pub(super) fn roughness(&self) -> f32 {
         self.alpha[0].sqrt()
+    }
+
+    /// Its facets.
+    pub(super) fn lobe(&self, normal: Vec3) -> Lobe {
+        Lobe::new([self.along, self.across], normal, self.alpha)
     }
 
     /// Distribution × visibility of a light without extent, before Fresnel; all unit vectors, on the front.

@@ -34,6 +34,8 @@ pub(crate) struct MetalRoughMatter {
     roughness: f32,
     /// Along its grain; 0 where it has none.
     roughness_along: f32,
+    /// Whether all that is mirrored and let through is seen by rays.
+    by_rays: bool,
     /// Reflection of the dielectric part, face on and grazing.
     f0: Vec3,
     f90: f32,
@@ -94,6 +96,7 @@ impl MetalRoughMatter {
             metallic: (m.metallic * map.z).clamp(0.0, 1.0),
             roughness: (m.roughness * map.y).clamp(0.0, 1.0),
             roughness_along: 0.0,
+            by_rays: false,
             f0: (color * (at_normal * at_normal)).clamp(Vec3::ZERO, Vec3::ONE) * specular,
             f90: specular,
             transmission: (m.transmission * reader.linear(m.transmission_map.as_ref()).x).clamp(0.0, 1.0),
@@ -122,6 +125,17 @@ impl MetalRoughMatter {
     /// Gives it a grain.
     pub(super) fn brush(&mut self, grain: Option<&GrainMatter>) {
         self.roughness_along = grain.map_or(0.0, GrainMatter::roughness);
+    }
+
+    /// From now on all that is mirrored and let through is seen by rays.
+    pub(super) fn spread_by_rays(&mut self) {
+        self.by_rays = true;
+    }
+
+    /// How far its facets spread rays: the α of their distribution; `None` where one ray does.
+    pub(super) fn spreads(&self) -> Option<f32> {
+        (self.by_rays && self.roughness.max(self.roughness_along) >= NARROWEST_HIGHLIGHT)
+            .then_some(self.roughness * self.roughness)
     }
 
     /// The roughness of a surface that has no grain and spreads light as far in all.
@@ -216,14 +230,16 @@ impl MetalRoughMatter {
     #[inline(always)]
     pub(crate) fn around(&self, around: &Around, rebound: Vec3) -> (Vec3, f32) {
         let looked_up = 1.0 - self.traced(around.outside);
+        // Rays that are spread are lost between facets as light that is looked up is.
+        let rough = if self.by_rays { 1.0 } else { looked_up };
         let (scale, bias) = around.shares;
         let (dielectric, metal) = (self.f0 * scale + self.f90 * bias, self.metal_f0 * scale + bias);
 
-        let taken = self.fresnel(around.n_v).0.lerp(dielectric, looked_up).max_element();
+        let taken = self.fresnel(around.n_v).0.lerp(dielectric, rough).max_element();
         let diffuse = self.scattered() * (1.0 - taken).max(0.0) * self.occlusion;
         let mirrored = dielectric.lerp(metal, self.metallic) * around.mirrored * (looked_up * around.open);
         let lost = (1.0 - scale - bias).max(0.0);
-        let again = rebound * lost * around.diffuse * (self.metallic * looked_up * self.occlusion);
+        let again = rebound * lost * around.diffuse * (self.metallic * rough * self.occlusion);
         (diffuse * around.diffuse + mirrored + again, taken)
     }
 
@@ -273,12 +289,12 @@ impl MetalRoughMatter {
     /// Share of the mirrored surroundings that a ray brings in. From inside there is no environment to look up.
     #[inline(always)]
     fn traced(&self, outside: bool) -> f32 {
-        if outside { traced(self.roughness.max(self.roughness_along)) } else { 1.0 }
+        if outside && !self.by_rays { traced(self.roughness.max(self.roughness_along)) } else { 1.0 }
     }
 
     /// Share of the light passing through that is looked up instead.
     fn frosted(&self, outside: bool) -> f32 {
-        let see_through = self.transmission > 0.0 && outside;
+        let see_through = self.transmission > 0.0 && outside && !self.by_rays;
         if see_through { FROSTED_SHARE * smoothstep(0.0, FROSTED_ROUGHNESS, self.roughness) } else { 0.0 }
     }
 }
@@ -353,6 +369,7 @@ mod tests {
             metallic: 0.0,
             roughness: 0.5,
             roughness_along: 0.0,
+            by_rays: false,
             f0: Vec3::splat(0.04),
             f90: 1.0,
             transmission: 0.0,

@@ -9,6 +9,7 @@ mod facets;
 mod film;
 mod grain;
 mod light;
+mod lobe;
 mod metal_rough;
 mod phong;
 mod sheen;
@@ -17,6 +18,7 @@ mod spectrum;
 pub(crate) use coat::CoatMatter;
 pub(crate) use grain::GrainMatter;
 pub(crate) use light::{Incident, LocalLight};
+pub(crate) use lobe::Lobe;
 pub(crate) use metal_rough::{Around, MetalRoughMatter, above};
 pub(crate) use phong::PhongMatter;
 pub(crate) use sheen::SheenMatter;
@@ -217,6 +219,20 @@ impl Matter {
             sum += all * coat.from_around(view, to);
         }
         sum
+    }
+
+    /// From now on rough surfaces mirror and let through by rays that are spread, not by lookups.
+    pub(crate) fn spread_by_rays(&mut self) {
+        if let Model::MetalRough(m) = &mut self.model {
+            m.spread_by_rays();
+        }
+    }
+
+    /// The facets that spread rays; `None` where one ray does.
+    pub(crate) fn lobe(&self, surface: &Surface) -> Option<Lobe> {
+        let Model::MetalRough(m) = &self.model else { return None };
+        let alpha = m.spreads()?;
+        Some(self.grain.as_ref().map_or_else(|| Lobe::even(surface.normal, alpha), |g| g.lobe(surface.normal)))
     }
 
     /// Roughness of the lobe that [`Self::ambient`] looks up, if there is one.

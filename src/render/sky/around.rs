@@ -12,9 +12,9 @@
 use super::Sky;
 use crate::accel::{Accel, Hit, Ray};
 use crate::math::Vec3;
-use crate::math::random::Random;
 use crate::render::asking::Asking;
 use crate::render::context::Context;
+use crate::render::draws::Draws;
 use crate::render::observer::Observer;
 use crate::render::optics::reflect;
 use crate::render::shade::Matter;
@@ -25,9 +25,6 @@ use std::f32::consts::PI;
 
 /// Rays that wait at most.
 const LIMIT: usize = 1 << 15;
-
-/// Steps of a sequence in the unit square that leaves no gaps: the inverse powers of the root of x³ = x + 1.
-const STEPS: [f32; 2] = [0.754_877_7, 0.569_840_3];
 
 /// Ways to draw a direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,12 +88,11 @@ impl Arounds {
         let light = context.sky.is_map().then_some(Way::Light);
         let ways: Vec<Way> = [Some(Way::Cosine), lobe, light].into_iter().flatten().collect();
         let half = context.env_rays.div_ceil(2);
-        let mut random = Random::new(context.seed ^ fingerprint(point.ray, point.hit));
+        let mut draws = Draws::at(context.seed, point.ray, point.hit);
         for _ in 0..2 {
-            let shift = [random.unit(), random.unit()];
+            let spread = draws.spread();
             for k in 0..half {
-                let at = [0, 1].map(|axis: usize| (shift[axis] + k as f32 * STEPS[axis]).fract());
-                let dir = ways[k as usize % ways.len()].draw(at, &context.sky, seen.normal, seen.view);
+                let dir = ways[k as usize % ways.len()].draw(spread.point(k), &context.sky, seen.normal, seen.view);
                 let density = |(i, way): (usize, &Way)| {
                     let count = half / ways.len() as u32 + u32::from((i as u32) < half % ways.len() as u32);
                     count as f32 * way.density(dir, &context.sky, seen.normal, seen.view)
@@ -153,12 +149,6 @@ fn let_through(open: Vec3, sent: [Vec3; 2], come: [Vec3; 2]) -> Vec3 {
     corrected(0, 1) + corrected(1, 0)
 }
 
-/// A number for a hit that is the same in every run and for every structure.
-fn fingerprint(ray: &Ray, hit: &Hit) -> u64 {
-    let words = ray.origin.to_array().into_iter().chain(ray.dir.to_array()).chain([hit.t, hit.u, hit.v]);
-    words.fold(u64::from(hit.prim), |mixed, word| Random::new(mixed ^ u64::from(word.to_bits())).bits())
-}
-
 impl Way {
     fn draw(self, at: [f32; 2], sky: &Sky, normal: Vec3, view: Vec3) -> Vec3 {
         let around = |cosine: f32| {
@@ -197,6 +187,7 @@ impl Way {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::random::Random;
     use crate::scene::{Environment, Scene};
 
     #[test]
@@ -236,7 +227,7 @@ mod tests {
             let n = 40_000u16;
             let mut sum = 0.0;
             for k in 0..n {
-                let at = [0, 1].map(|axis: usize| (0.5 + f32::from(k) * STEPS[axis]).fract());
+                let at = [(f32::from(k) + 0.5) / f32::from(n), (f32::from(k) * 0.618_034).fract()];
                 let dir = way.draw(at, &sky, normal, view);
                 let density = way.density(dir, &sky, normal, view);
                 if density > 0.0 {

@@ -12,6 +12,9 @@ use crate::scene::{Background, Environment, Scene, UpAxis};
 use chance::Chance;
 use panorama::Pyramid;
 
+/// Angle across of cones, radians, from which the studio is blurred: no ray is so wide that has met smooth surfaces only.
+const WIDE: f32 = 0.1;
+
 /// The environment of a scene, asked with world directions.
 #[derive(Clone, Debug)]
 pub(crate) struct Sky {
@@ -69,6 +72,10 @@ impl Sky {
     pub(crate) fn radiance(&self, dir: Vec3, angle: f32) -> Vec3 {
         match (self.environment, &self.map) {
             (Environment::Constant(radiance), _) => radiance,
+            // A cone as wide as rough facets spread one.
+            (Environment::Studio, _) if angle > WIDE => {
+                studio::blurred(studio::from_world(self.up, dir), (0.5 * angle).min(1.0).sqrt())
+            }
             (Environment::Studio, _) => studio::radiance(studio::from_world(self.up, dir)),
             (Environment::Panorama, Some(map)) => map.pyramid.radiance(self.to_map(map, dir), angle),
             (Environment::Black | Environment::Panorama, _) => self.backdrop,

@@ -4,6 +4,7 @@ mod around;
 mod bits;
 mod costs;
 mod glass;
+mod gloss;
 mod light;
 mod mirrors;
 mod see_through;

@@ -1,0 +1,228 @@
+//! The rays that go on from a shaded point: mirrored, refracted, split by wavelength, spread by roughness.
+
+use super::context::Context;
+use super::draws::{Draws, Spread};
+use super::observer::Observer;
+use super::optics::{dispersed_index, reflect, refract};
+use super::shade::{Balance, Lobe, Matter, above};
+use super::surface::Surface;
+use super::wave::{Crossing, Medium, Path, RayClass};
+use super::whitted::Tracer;
+use crate::accel::{Accel, Hit, Ray};
+use crate::math::Vec3;
+
+/// A shaded point and the ray that found it.
+pub(super) struct Point<'a> {
+    pub ray: &'a Ray,
+    pub hit: &'a Hit,
+    /// The ray so far, its weight that of the surface.
+    pub path: Path,
+    /// Width of the ray's cone here.
+    pub width: f32,
+    pub surface: &'a Surface<'a>,
+    pub matter: &'a Matter,
+}
+
+impl Point<'_> {
+    /// The indices on both sides for light of `band`.
+    pub(super) fn crossing(&self, context: &Context, band: Option<u8>) -> Crossing {
+        let (ior, dispersion) = self.matter.refraction();
+        let band = band.and_then(|i| context.bands.get(usize::from(i)));
+        let ior = match band {
+            #[expect(clippy::cast_possible_truncation, reason = "indices are given in f32")]
+            Some(b) if dispersion > 0.0 => {
+                dispersed_index(f64::from(ior), f64::from(dispersion), f64::from(b.wavelength)) as f32
+            }
+            _ => ior,
+        };
+        self.path.media.cross(Medium { material: self.surface.target.material_id, ior }, self.surface.front)
+    }
+
+    pub(super) fn balance(&self, crossing: &Crossing) -> Balance {
+        self.matter.balance(self.surface.normal.dot(self.surface.view), crossing)
+    }
+
+    /// What a ray that starts here carries.
+    fn bounced(&self, weight: Vec3) -> Path {
+        let depth = self.path.depth + 1;
+        Path { weight, depth, straight: false, since: 0.0, cone_width: self.width, ..self.path }
+    }
+}
+
+/// The facets that stand in for a rough surface.
+struct Rough {
+    lobe: Lobe,
+    rays: u32,
+    spread: Spread,
+}
+
+impl<A: Accel, P: Observer> Tracer<'_, A, P> {
+    /// Queues the secondary rays of a point that have enough weight.
+    pub(super) fn reflect_and_refract(&mut self, point: &Point, crossing: &Crossing) {
+        if let Some(lobe) = point.matter.lobe(point.surface) {
+            return self.spread(point, crossing, lobe);
+        }
+        let balance = point.balance(crossing);
+        self.reflect(point, balance.reflected);
+
+        let weight = point.path.weight * balance.refracted;
+        if !self.splits(point) || !self.context.is_alive(weight) {
+            return self.send_refracted(point, weight, crossing, point.path.band);
+        }
+        // White light splits: each part of the spectrum has its own index from here on.
+        for (i, band) in (0u8..).zip(&self.context.bands) {
+            let crossing = point.crossing(self.context, Some(i));
+            let weight = point.path.weight * point.balance(&crossing).refracted * band.color;
+            self.send_refracted(point, weight, &crossing, Some(i));
+        }
+    }
+
+    /// Whether light that is let in here has all its wavelengths still, and loses sight of some.
+    fn splits(&self, point: &Point) -> bool {
+        point.matter.refraction().1 > 0.0 && point.path.band.is_none()
+    }
+
+    /// Spreads rays over what a rough surface mirrors and lets through: several off the first, one off what those find.
+    fn spread(&mut self, point: &Point, crossing: &Crossing, lobe: Lobe) {
+        let rays = if point.path.depth == 0 { self.context.gloss_rays } else { 1 };
+        let mut draws = Draws::at(self.context.seed, point.ray, point.hit);
+        let (outward, inward) = (draws.spread(), draws.spread());
+        let mut rough = Rough { lobe, rays, spread: outward };
+        self.send_lacquer(point);
+        for k in 0..rays {
+            self.send_off_facet(point, crossing, &rough, k);
+        }
+        rough.spread = inward;
+        if !self.splits(point) {
+            (0..rays).for_each(|k| self.send_through_facet(point, crossing, &rough, k, point.path.band, Vec3::ONE));
+            return;
+        }
+        rough.rays = 1;
+        for (k, band) in (0u8..).zip(&self.context.bands) {
+            let crossing = point.crossing(self.context, Some(k));
+            self.send_through_facet(point, &crossing, &rough, u32::from(k), Some(k), band.color);
+        }
+    }
+
+    /// Mirrors the `k`th ray off a facet.
+    fn send_off_facet(&mut self, point: &Point, crossing: &Crossing, rough: &Rough, k: u32) {
+        let (surface, view) = (point.surface, point.surface.view);
+        let facet = rough.lobe.facet(view, rough.spread.point(k));
+        let share = point.matter.balance(view.dot(facet), crossing).reflected;
+        let to = reflect(-view, facet);
+        if surface.normal.dot(to) > 0.0 {
+            let weight = point.path.weight * share * (rough.lobe.kept(view, to) / rough.rays as f32);
+            self.send_spread(point, above(to, surface.geometric), RayClass::Reflected, rough, |path| Path {
+                weight,
+                ..path
+            });
+        }
+    }
+
+    /// Lets the `k`th ray through a facet.
+    fn send_through_facet(
+        &mut self,
+        point: &Point,
+        crossing: &Crossing,
+        rough: &Rough,
+        k: u32,
+        band: Option<u8>,
+        color: Vec3,
+    ) {
+        let (surface, view) = (point.surface, point.surface.view);
+        let facet = rough.lobe.facet(view, rough.spread.point(k));
+        let share = point.matter.balance(view.dot(facet), crossing).refracted;
+        if !self.context.is_alive(point.path.weight * share * color) {
+            return;
+        }
+        let (n_i, n_t) = (f64::from(crossing.n_i), f64::from(crossing.n_t));
+        let bent = if crossing.n_i == crossing.n_t {
+            // Thin: both walls together spread light as a mirror does, on the other side.
+            let mirrored = reflect(-view, facet);
+            Some(mirrored - surface.normal * (2.0 * surface.normal.dot(mirrored)))
+        } else {
+            refract(-view, facet, n_i, n_t)
+        };
+        let Some(to) = bent.filter(|to| surface.normal.dot(*to) < 0.0) else { return };
+        let weight = point.path.weight * share * color * (rough.lobe.kept(view, to) / rough.rays as f32);
+        let media = crossing.beyond;
+        let straight = point.path.straight && crossing.n_i == crossing.n_t;
+        self.send_spread(point, above(to, -surface.geometric), RayClass::Refracted, rough, |path| Path {
+            weight,
+            band,
+            media,
+            straight,
+            ..path
+        });
+    }
+
+    fn send_spread(
+        &mut self,
+        point: &Point,
+        dir: Vec3,
+        class: RayClass,
+        rough: &Rough,
+        finish: impl FnOnce(Path) -> Path,
+    ) {
+        let path = finish(point.bounced(Vec3::ZERO));
+        if !self.context.is_alive(path.weight) {
+            return;
+        }
+        let cone_spread = path.cone_spread + rough.lobe.angle(rough.rays);
+        let ray = point.surface.ray(dir, f32::INFINITY, point.ray.sample);
+        self.starting[class as usize].push(ray, Path { cone_spread, ..path }, Hit::MISS);
+    }
+
+    /// Queues what lacquer mirrors.
+    fn send_lacquer(&mut self, point: &Point) {
+        if let Some((lacquer, share)) = point.matter.lacquer() {
+            self.send_reflected(point, lacquer, point.path.weight * share, point.path.band);
+        }
+    }
+
+    /// Queues what is mirrored by the surface and by lacquer over it: one ray where both have the same normal.
+    fn reflect(&mut self, point: &Point, reflected: Vec3) {
+        let (weight, normal, band) = (point.path.weight, point.surface.normal, point.path.band);
+        match point.matter.lacquer() {
+            Some((lacquer, share)) if lacquer == normal => {
+                self.send_reflected(point, normal, weight * (reflected + share), band);
+            }
+            _ => {
+                self.send_reflected(point, normal, weight * reflected, band);
+                self.send_lacquer(point);
+            }
+        }
+    }
+
+    fn send_reflected(&mut self, point: &Point, normal: Vec3, weight: Vec3, band: Option<u8>) {
+        if !self.context.is_alive(weight) {
+            return;
+        }
+        let surface = point.surface;
+        let dir = above(reflect(-surface.view, normal), surface.geometric);
+        let path = Path { band, ..point.bounced(weight) };
+        let ray = surface.ray(dir, f32::INFINITY, point.ray.sample);
+        self.starting[RayClass::Reflected as usize].push(ray, path, Hit::MISS);
+    }
+
+    fn send_refracted(&mut self, point: &Point, weight: Vec3, crossing: &Crossing, band: Option<u8>) {
+        if !self.context.is_alive(weight) {
+            return;
+        }
+        // Equal indices leave the ray as it is: the same ray goes on behind this hit.
+        if crossing.n_i == crossing.n_t {
+            let path = Path { weight, band, depth: point.path.depth + 1, media: crossing.beyond, ..point.path };
+            return self.continuing[RayClass::Refracted as usize].push(*point.ray, path, *point.hit);
+        }
+        let surface = point.surface;
+        let (n_i, n_t) = (f64::from(crossing.n_i), f64::from(crossing.n_t));
+        let Some(bent) = refract(-surface.view, surface.normal, n_i, n_t) else {
+            // Total reflection by a hair that the balance did not see.
+            return self.send_reflected(point, surface.normal, weight, band);
+        };
+        let dir = above(bent, -surface.geometric);
+        let path = Path { band, media: crossing.beyond, ..point.bounced(weight) };
+        let ray = surface.ray(dir, f32::INFINITY, point.ray.sample);
+        self.starting[RayClass::Refracted as usize].push(ray, path, Hit::MISS);
+    }
+}

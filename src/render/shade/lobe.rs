@@ -1,0 +1,110 @@
+//! The facets of a rough surface, drawn as they are seen: for rays that are spread over what it mirrors and lets through.
+//!
+//! J. Dupuy, A. Benyoub, "Sampling Visible GGX Normals with Spherical Caps" (2023); R. L. Cook, T. Porter, L. Carpenter,
+//! "Distributed Ray Tracing" (1984).
+
+use crate::math::Vec3;
+use std::f32::consts::PI;
+
+/// Facets around a normal: a GGX distribution with a width along each of two axes.
+#[derive(Clone, Debug)]
+pub(crate) struct Lobe {
+    along: Vec3,
+    across: Vec3,
+    normal: Vec3,
+    alpha: [f32; 2],
+}
+
+impl Lobe {
+    /// The axes and the normal are unit vectors, perpendicular to each other.
+    pub(super) fn new([along, across]: [Vec3; 2], normal: Vec3, alpha: [f32; 2]) -> Self {
+        Self { along, across, normal, alpha }
+    }
+
+    /// The same width all around.
+    pub(super) fn even(normal: Vec3, alpha: f32) -> Self {
+        let (along, across) = normal.any_orthonormal_pair();
+        Self::new([along, across], normal, [alpha; 2])
+    }
+
+    /// The unit normal of a facet that is seen from `view`, drawn with two numbers from 0 … 1.
+    pub(crate) fn facet(&self, view: Vec3, at: [f32; 2]) -> Vec3 {
+        let [wide, narrow] = self.alpha;
+        let view = Vec3::new(view.dot(self.along), view.dot(self.across), view.dot(self.normal).max(0.0));
+        // Stretched so that the facets become a hemisphere.
+        let stretched = (view * Vec3::new(wide, narrow, 1.0)).normalize_or(Vec3::Z);
+        let z = (1.0 - at[0]) * (1.0 + stretched.z) - stretched.z;
+        let (sin, cos) = libm::sincosf(2.0 * PI * at[1]);
+        let ring = (1.0 - z * z).max(0.0).sqrt();
+        let half = Vec3::new(ring * cos, ring * sin, z) + stretched;
+        let half = Vec3::new(half.x * wide, half.y * narrow, half.z.max(0.0)).normalize_or(Vec3::Z);
+        self.along * half.x + self.across * half.y + self.normal * half.z
+    }
+
+    /// Share of the light from `to`, on either side, that other facets leave of what the drawn facets send to `view`.
+    pub(crate) fn kept(&self, view: Vec3, to: Vec3) -> f32 {
+        let (n_v, n_l) = (self.normal.dot(view).max(0.0), self.normal.dot(to).abs());
+        let (wide_v, wide_l) = (self.length(view), self.length(to));
+        let whole = n_l * wide_v + n_v * wide_l;
+        if whole > 0.0 { n_l * (n_v + wide_v) / whole } else { 0.0 }
+    }
+
+    fn length(&self, v: Vec3) -> f32 {
+        let [wide, narrow] = self.alpha;
+        Vec3::new(wide * v.dot(self.along), narrow * v.dot(self.across), v.dot(self.normal)).length()
+    }
+
+    /// Angle across the cone, radians, that each of so many rays stands for.
+    pub(crate) fn angle(&self, rays: u32) -> f32 {
+        let [wide, narrow] = self.alpha;
+        2.0 * (wide * narrow / rays.max(1) as f32).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::facets::albedo;
+    use super::*;
+    use crate::render::optics::reflect;
+
+    #[test]
+    fn drawn_facets_send_back_what_the_lobe_does() {
+        for (roughness, degrees) in [(0.3f32, 10.0f32), (0.5, 60.0), (0.8, 40.0), (1.0, 75.0)] {
+            let (sin, cos) = libm::sincosf(degrees.to_radians());
+            let view = Vec3::new(sin * 0.6, sin * 0.8, cos);
+            let lobe = Lobe::even(Vec3::Z, roughness * roughness);
+            let n = 20_000;
+            let mut sum = 0.0;
+            for k in 0..n {
+                let at = [(k as f32 + 0.5) / n as f32, (k as f32 * 0.618_034).fract()];
+                let half = lobe.facet(view, at);
+                assert!(half.is_normalized() && half.z >= 0.0 && half.dot(view) >= -1e-4, "{half}");
+                let to = reflect(-view, half);
+                if to.z > 0.0 {
+                    sum += lobe.kept(view, to) / n as f32;
+                }
+            }
+            let (scale, bias) = albedo(roughness, cos);
+            assert!((sum - scale - bias).abs() < 0.02, "{roughness} at {degrees}: {sum}, {}", scale + bias);
+        }
+    }
+
+    #[test]
+    fn wide_facets_lean_along_the_grain() {
+        let lobe = Lobe::new([Vec3::X, Vec3::Y], Vec3::Z, [0.5, 0.05]);
+        let (mut x, mut y) = (0.0, 0.0);
+        for k in 0..1000u16 {
+            let half = lobe.facet(Vec3::Z, [(f32::from(k) + 0.5) / 1000.0, (f32::from(k) * 0.618_034).fract()]);
+            (x, y) = (x + half.x.abs(), y + half.y.abs());
+        }
+        assert!(x > 5.0 * y, "{x} {y}");
+    }
+
+    #[test]
+    fn without_width_every_facet_is_the_surface() {
+        let lobe = Lobe::even(Vec3::Z, 0.0);
+        let view = Vec3::new(0.6, 0.0, 0.8);
+        assert!((lobe.facet(view, [0.4, 0.7]) - Vec3::Z).length() < 1e-6);
+        assert!((lobe.kept(view, reflect(-view, Vec3::Z)) - 1.0).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,105 @@
+//! Rough surfaces whose rays are spread over what they mirror and let through.
+
+use super::*;
+use crate::accel::AccelKind;
+use crate::scene::{Environment, MetalRough};
+
+fn rough(model: MetalRough) -> Material {
+    Material {
+        base_color: Vec3::ONE,
+        surface: Reflection::MetalRough(model),
+        double_sided: true,
+        ..Material::default()
+    }
+}
+
+fn metal(roughness: f32) -> Material {
+    rough(MetalRough { metallic: 1.0, roughness, ..MetalRough::default() })
+}
+
+/// A floor of white metal at z = 0, looked at straight down from below a ball of radius 1 whose middle is 2 high and
+/// which glows.
+fn under_a_ball(roughness: f32) -> Stage {
+    let mut s = looking_down(0.5);
+    s.view = View::look_at(DVec3::Z * 0.5, DVec3::ZERO, DVec3::Y, Lens::orthographic(0.01));
+    s.plane(DVec3::Z, 0.0, metal(roughness)).sphere(DVec3::Z * 2.0, 1.0, unlit(Vec3::new(4.0, 2.0, 1.0)));
+    (s.settings.samples, s.settings.gloss_rays) = (256, 16);
+    s
+}
+
+#[test]
+fn a_rough_mirror_shows_what_the_lobe_sees() {
+    for roughness in [0.1f32, 0.3, 0.5] {
+        // Facets within 15° of the normal send the view into the ball, which reaches 30° out from straight above.
+        let tan_squared = libm::tanf(15f32.to_radians()).powi(2);
+        let seen = tan_squared / (tan_squared + roughness.powi(4));
+        let color = under_a_ball(roughness).color();
+        assert!((color.x / (4.0 * seen) - 1.0).abs() < 0.03, "{roughness}: {color} for {}", 4.0 * seen);
+        assert!((color.x / color.z - 4.0).abs() < 1e-3);
+    }
+}
+
+#[test]
+fn without_such_rays_a_rough_mirror_sees_the_surroundings_alone() {
+    let mut s = under_a_ball(0.5);
+    s.settings.gloss_rays = 0;
+    assert_eq!(s.color(), Vec3::ZERO);
+}
+
+#[test]
+fn white_in_a_furnace_is_as_bright_as_the_furnace() {
+    for (metallic, roughness) in [(0.0, 0.3), (0.0, 0.7), (1.0, 0.0), (1.0, 0.2), (1.0, 0.6), (1.0, 1.0)] {
+        let mut s = looking_down(5.0);
+        s.sphere(DVec3::new(0.3, 0.2, 0.0), 1.0, rough(MetalRough { metallic, roughness, ..MetalRough::default() }));
+        s.scene.environment = Environment::Constant(Vec3::new(1.0, 2.0, 0.5));
+        (s.settings.samples, s.settings.gloss_rays) = (64, 16);
+        let color = s.color() / Vec3::new(1.0, 2.0, 0.5);
+        assert!((color - Vec3::ONE).abs().max_element() < 0.02, "{metallic} {roughness}: {color}");
+    }
+}
+
+#[test]
+fn frosted_glass_in_a_furnace_loses_only_what_its_facets_hide() {
+    for (thick, roughness) in [(false, 0.3), (true, 0.2), (true, 0.5)] {
+        let mut s = looking_down(5.0);
+        let glass =
+            MetalRough { metallic: 0.0, roughness, transmission: 1.0, thick, thickness: 1.0, ..MetalRough::default() };
+        s.sphere(DVec3::new(0.3, 0.2, 0.0), 1.0, rough(glass));
+        s.scene.environment = Environment::Constant(Vec3::ONE);
+        s.scene.background = Some(crate::scene::Background::Environment);
+        (s.settings.samples, s.settings.gloss_rays) = (256, 4);
+        let color = s.color();
+        assert!(color.x <= 1.02 && color.x > 0.85, "{thick} {roughness}: {color}");
+    }
+}
+
+#[test]
+fn frosted_glass_blurs_what_is_behind_it_the_more_the_farther_it_is() {
+    // A thin frosted pane over a floor that is white for x < 0 and black beyond.
+    let shown = |distance: f64, x: f64| {
+        let mut s = looking_down(1.0);
+        let eye = DVec3::new(x, 0.0, 1.0);
+        s.view = View::look_at(eye, eye - DVec3::Z, DVec3::Y, Lens::orthographic(0.001));
+        let glass = MetalRough { metallic: 0.0, roughness: 0.3, transmission: 1.0, ..MetalRough::default() };
+        s.square(0.0, 9.0, rough(glass));
+        let half = DAffine3::from_translation(DVec3::new(-40.0, 0.0, -distance));
+        s.mesh(square(0.0, 40.0), half, unlit(Vec3::ONE));
+        (s.settings.samples, s.settings.gloss_rays) = (256, 8);
+        s.color().x
+    };
+    assert!((shown(1.0, 0.0) - 0.48).abs() < 0.04, "{}", shown(1.0, 0.0));
+    assert!(shown(0.1, 0.1) < 0.06, "{}", shown(0.1, 0.1));
+    assert!(shown(2.0, 0.1) > 0.25, "{}", shown(2.0, 0.1));
+}
+
+#[test]
+fn every_structure_gives_the_same_bits() {
+    let mut s = under_a_ball(0.4);
+    (s.settings.width, s.settings.height, s.settings.samples, s.settings.gloss_rays) = (16, 16, 1, 3);
+    s.view = View::look_at(DVec3::new(0.0, -6.0, 4.0), DVec3::Z, DVec3::Z, Lens::orthographic(4.0));
+    s.scene.environment = Environment::Studio;
+    let first = s.render().picture.beauty;
+    for kind in AccelKind::ALL {
+        assert!(s.render_by(kind).picture.beauty == first, "{kind:?}");
+    }
+}
