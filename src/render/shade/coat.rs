@@ -54,7 +54,7 @@ impl CoatMatter {
     }
 
     /// BRDF × N·L of the part of it that [`Self::ambient`] looks up.
-    pub(super) fn from_around(&self, view: Vec3, to: Vec3) -> f32 {
+    pub(super) fn lit_around(&self, view: Vec3, to: Vec3) -> f32 {
         self.lit(view, to) * (1.0 - traced(self.roughness))
     }
 

@@ -210,7 +210,7 @@ impl MetalRoughMatter {
     }
 
     /// BRDF × N·L of what [`Self::ambient`] looks up.
-    pub(super) fn from_around(&self, seen: &Seen, to: Vec3, grain: Option<&GrainMatter>) -> Vec3 {
+    pub(super) fn lit_around(&self, seen: &Seen, to: Vec3, grain: Option<&GrainMatter>) -> Vec3 {
         let (normal, view) = (seen.normal, seen.view);
         let looked_up = 1.0 - self.traced(seen.outside);
         let lobe = |half| match grain {

@@ -204,19 +204,19 @@ impl Matter {
 
     /// What is seen of light of this radiance from one direction `to`, per solid angle, of all that [`Self::ambient`] shows;
     /// `ambient` comes from everywhere.
-    pub(crate) fn from_around(&self, seen: &Seen, to: Vec3, radiance: Vec3, ambient: Vec3) -> Vec3 {
+    pub(crate) fn lit_around(&self, seen: &Seen, to: Vec3, radiance: Vec3, ambient: Vec3) -> Vec3 {
         let (normal, view, all) = (seen.normal, seen.view, radiance + ambient);
         let below = match &self.model {
             Model::Unlit(_) => Vec3::ZERO,
             Model::Phong(m) => (m.ambient * ambient + m.diffuse * radiance) * (normal.dot(to).max(0.0) / PI),
-            Model::MetalRough(m) => m.from_around(seen, to, self.grain.as_ref()) * all,
+            Model::MetalRough(m) => m.lit_around(seen, to, self.grain.as_ref()) * all,
         };
         let mut sum = below * self.clear();
         if let Some(sheen) = &self.sheen {
             sum += sheen.lit(normal, view, to) * all * self.below_coat();
         }
         if let Some(coat) = &self.coat {
-            sum += all * coat.from_around(view, to);
+            sum += all * coat.lit_around(view, to);
         }
         sum
     }

@@ -99,7 +99,7 @@ impl Arounds {
                 };
                 let density: f32 = ways.iter().enumerate().map(density).sum();
                 let shown = match dir.dot(seen.geometric) > 0.0 && density > 0.0 {
-                    true => point.matter.from_around(&seen, dir, context.sky.drawn(dir), context.scene.ambient),
+                    true => point.matter.lit_around(&seen, dir, context.sky.drawn(dir), context.scene.ambient),
                     false => Vec3::ZERO,
                 };
                 let share = shown * point.weight / (2.0 * density);

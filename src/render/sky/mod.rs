@@ -103,7 +103,7 @@ impl Sky {
 
     /// A direction to look in for light, drawn with two numbers from 0 … 1; `None` where no direction is better than others.
     fn draw(&self, at: [f32; 2]) -> Option<Vec3> {
-        self.map.as_ref().map(|map| self.from_map(map, map.chance.draw(at)))
+        self.map.as_ref().map(|map| self.to_world(map, map.chance.draw(at)))
     }
 
     /// The density of that draw, 1/sr.
@@ -122,7 +122,7 @@ impl Sky {
         Vec3::new(cos * x - sin * z, y, sin * x + cos * z)
     }
 
-    fn from_map(&self, map: &Map, dir: Vec3) -> Vec3 {
+    fn to_world(&self, map: &Map, dir: Vec3) -> Vec3 {
         let (sin, cos) = map.turn;
         let turned = Vec3::new(cos * dir.x + sin * dir.z, dir.y, cos * dir.z - sin * dir.x);
         studio::to_world(self.up, turned)
