@@ -22,7 +22,7 @@ use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
 /// The flags that a picture may bring along.
-const FLAGS: [&str; 40] = [
+const FLAGS: [&str; 42] = [
     "size",
     "samples",
     "depth",
@@ -41,6 +41,8 @@ const FLAGS: [&str; 40] = [
     "env-rotate",
     "env-rays",
     "gloss-rays",
+    "light-rays",
+    "sun-size",
     "tone-map",
     "exposure",
     "bits",
@@ -146,6 +148,8 @@ impl Facts<'_> {
         if settings.gloss_rays > 0 {
             set("gloss-rays", settings.gloss_rays.to_string());
         }
+        self.job.look.light_rays.iter().for_each(|n| set("light-rays", n.to_string()));
+        self.job.look.sun_size.iter().for_each(|size| set("sun-size", size.to_string()));
         set("tone-map", output.tone_map.name().into());
         set("exposure", output.exposure.to_string());
         set("format", self.shot.kind.extension().into());

@@ -125,7 +125,8 @@ pub(super) struct RenderArgs {
     /// Repeat a picture with the settings it carries; refuses when the input has changed
     #[arg(long, value_name = "PICTURE", help_heading = "Output", hide_short_help = true, conflicts_with_all = [
         "size", "format", "bits", "half", "float", "layers", "tone_map", "exposure", "merge", "view", "camera", "eye",
-        "at", "up_vector", "fov", "ortho", "up", "background", "env", "env_rotate", "env_rays", "gloss_rays", "samples", "depth", "cutoff", "seed", "scene",
+        "at", "up_vector", "fov", "ortho", "up", "background", "env", "env_rotate", "env_rays", "gloss_rays",
+        "light_rays", "sun_size", "samples", "depth", "cutoff", "seed", "scene",
         "polygons", "mtl", "allow_empty", "accel", "intersector",
     ])]
     pub again: Option<PathBuf>,
@@ -170,6 +171,15 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "DEGREES", value_parser = parse::degrees, requires = "env", allow_hyphen_values = true,
           help_heading = "Light and background", hide_short_help = true)]
     pub env_rotate: Option<f64>,
+    /// How wide directional lights and the default key light look in the sky: shadows get soft edges. The sun is 0.53
+    /// wide [default: 0]
+    #[arg(long, value_name = "DEGREES", value_parser = parse::sun, help_heading = "Light and background",
+          hide_short_help = true)]
+    pub sun_size: Option<f64>,
+    /// Shadow rays to each light that has an extent [default: 16]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536),
+          help_heading = "Light and background", hide_short_help = true)]
+    pub light_rays: Option<u32>,
     /// Rays that each point sends to what surrounds the scene, to find what hides it; with --env white: ambient
     /// occlusion [default: 16 for pictures, else 0: nothing hides it]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=65_536),

@@ -126,6 +126,10 @@ pub(super) struct Look {
     pub env_rays: Option<u32>,
     /// Rays that rough surfaces spread.
     pub gloss_rays: u32,
+    /// Shadow rays to each wide light.
+    pub light_rays: Option<u32>,
+    /// How wide directional lights look, degrees.
+    pub sun_size: Option<f64>,
     /// Curve from scene light to display light.
     pub tone_map: Option<ToneMap>,
     /// Stops.
@@ -345,6 +349,8 @@ fn look(args: &RenderArgs) -> Look {
         env_rotate: args.env_rotate.unwrap_or(0.0),
         env_rays: args.env_rays,
         gloss_rays: args.gloss_rays.unwrap_or(0),
+        light_rays: args.light_rays,
+        sun_size: args.sun_size,
         tone_map: args.tone_map,
         exposure: args.exposure,
         png: if args.bits == Some(16) { PngDepth::Sixteen } else { PngDepth::Eight },

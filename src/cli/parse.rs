@@ -196,6 +196,14 @@ pub(super) fn env(text: &str) -> Result<Env, String> {
     }
 }
 
+/// The angle under which a disc in the sky is seen, degrees.
+pub(super) fn sun(text: &str) -> Result<f64, String> {
+    degrees(text)
+        .ok()
+        .filter(|d| (0.0..=180.0).contains(d))
+        .ok_or_else(|| "write an angle of 0 to 180 degrees".to_owned())
+}
+
 /// An angle in degrees.
 pub(super) fn degrees(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|d: &f64| d.is_finite()).ok_or_else(|| "write an angle in degrees such as 90".to_owned())

@@ -2,7 +2,7 @@
 
 use super::camera;
 use super::exit::Exit;
-use super::job::{Batch, RenderJob, Shot, Target};
+use super::job::{Batch, Look, RenderJob, Shot, Target};
 use super::message::{Messages, Severity};
 use super::parse::Env;
 use super::picture::{self, Effective};
@@ -17,7 +17,7 @@ use crate::load::{Diagnostic, LoadError, Loaded};
 use crate::render::texture::TextureStore;
 use crate::render::{Costs, Job, Rendered, View, World, render_costs};
 use crate::scene::framing::{Bounds, robust_bounds_within};
-use crate::scene::{Environment, default_light, default_light::DefaultLight};
+use crate::scene::{Environment, LightKind, Scene, default_light, default_light::DefaultLight};
 use std::path::Path;
 use std::time::Instant;
 use xxhash_rust::xxh3::xxh3_128;
@@ -163,6 +163,13 @@ fn prepare(
     Ok(Ready { loaded, world, bounds, load_seconds: start.elapsed().as_secs_f64(), profile })
 }
 
+/// Gives lights from infinitely far that have no extent the one that was asked for.
+fn widen_suns(look: &Look, scene: &mut Scene) {
+    let Some(degrees) = look.sun_size else { return };
+    let suns = scene.lights.iter_mut().filter(|l| matches!(l.kind, LightKind::Directional { .. }) && l.size == 0.0);
+    suns.for_each(|light| light.size = 0.5 * degrees.to_radians());
+}
+
 /// Puts what the command line names around the scene.
 fn surround(job: &RenderJob, loaded: &mut Loaded) -> Result<(), LoadError> {
     match &job.look.env {
@@ -231,6 +238,7 @@ fn render_shot(
     let (lights, environment) = (loaded.scene.lights.clone(), loaded.scene.environment);
     let background = loaded.scene.background;
     let light = default_light::add_if_missing(&mut loaded.scene, &camera);
+    widen_suns(&job.look, &mut loaded.scene);
     // Lamps that were missing bring the studio along; what was asked for comes before that.
     if let Some(Env::BuiltIn(environment)) = job.look.env {
         loaded.scene.environment = environment;

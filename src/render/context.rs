@@ -9,7 +9,7 @@ use super::texture::TextureStore;
 use super::world::World;
 use crate::math::Vec3;
 use crate::scene::features::{Feature, Features};
-use crate::scene::{AlphaMode, Background, Material, Scene};
+use crate::scene::{AlphaMode, Background, Light, Material, Scene};
 
 /// Rays to a panorama from each point, when nobody says.
 const ENV_RAYS: u32 = 16;
@@ -34,6 +34,8 @@ pub(crate) struct Context<'a> {
     pub shows_environment: bool,
     /// Rays that each point sends to its surroundings.
     pub env_rays: u32,
+    /// Shadow rays to each wide light; at least 1.
+    pub light_rays: u32,
     /// Rays that rough surfaces spread.
     pub gloss_rays: u32,
     /// For every random choice.
@@ -55,7 +57,8 @@ impl<'a> Context<'a> {
         let depth = settings.depth.unwrap_or_else(|| auto_depth(&features, settings.gloss_rays > 0));
         let sky = Sky::new(scene);
         let env_rays = settings.env_rays.unwrap_or(if sky.is_map() { ENV_RAYS } else { 0 });
-        let alone = everything || settings.layers || sky.is_map() || env_rays > 0 || settings.gloss_rays > 0;
+        let wide = scene.lights.iter().any(Light::is_wide);
+        let alone = everything || settings.layers || wide || sky.is_map() || env_rays > 0 || settings.gloss_rays > 0;
         let uniform = |m: &Material| if alone { None } else { Uniform::of(m, textures, depth > 0) };
         let needs = |any: &[Feature]| everything || any.iter().any(|&f| features.has(f));
         Self {
@@ -65,6 +68,7 @@ impl<'a> Context<'a> {
             is_dark: sky.is_dark() && scene.ambient == Vec3::ZERO,
             sky,
             env_rays,
+            light_rays: settings.light_rays.max(1),
             gloss_rays: settings.gloss_rays,
             seed: settings.seed,
             lights: scene.lights.iter().map(|l| LocalLight::new(l, world.center)).collect(),

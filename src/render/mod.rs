@@ -76,6 +76,8 @@ pub struct Settings {
     /// Rays that each point sends to its surroundings, rounded up to an even number, to find what hides them; 0: nothing does.
     /// `None`: 16 where the surroundings are a panorama, else 0.
     pub env_rays: Option<u32>,
+    /// Shadow rays to each light that has an extent, from what is seen first; a quarter of them from what mirrors show.
+    pub light_rays: u32,
     /// Rays that the first rough surface on a line of sight spreads over what it mirrors, and over what it lets through; 0: rough
     /// surfaces see their surroundings blurred by a formula, and nothing else.
     pub gloss_rays: u32,
@@ -96,6 +98,7 @@ impl Default for Settings {
             cutoff: 1.0 / 512.0,
             seed: 0,
             env_rays: None,
+            light_rays: 16,
             gloss_rays: 0,
             layers: false,
             everything: false,

@@ -11,13 +11,14 @@ use super::Progress;
 use super::asking::Asking;
 use super::branch::Point;
 use super::context::{Context, coverage};
+use super::draws::Draws;
 use super::everything::look_up_in_vain;
 use super::eyes::Eyes;
 use super::layers::Facts;
 use super::observer::Observer;
 use super::optics::transmittance;
 use super::seam::is_same_crossing;
-use super::shade::{Matter, Reader, lets_light_in, terminator};
+use super::shade::{Incident, LocalLight, Matter, Reader, lets_light_in, terminator};
 use super::shadow::Shadows;
 use super::sky::{Arounds, Standpoint};
 use super::strip::{POINTS, Sorted, Strip};
@@ -374,33 +375,50 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
     }
 
-    /// Direct light: lights without shadows at once, the others when their shadow rays have come through.
+    /// Direct light, of wide lights from several of their points.
     fn light(&mut self, point: &Point, crossing: &Crossing) {
-        let surface = point.surface;
-        let inside = self.context.absorption.is_some().then_some(point.path.media);
-        for light in &self.context.lights {
-            let Some(incident) = light.incident(surface.position) else { continue };
-            let to_light = incident.to_light;
-            let seen = if surface.geometric.dot(to_light) > 0.0 {
-                let smooth = terminator(surface.geometric, surface.normal, to_light);
-                point.matter.lit(surface.normal, surface.view, &incident) * smooth
-            } else {
-                point.matter.lit_through(surface.normal, surface.view, &incident, crossing)
-            };
-            let radiance = point.path.weight * seen;
-            if !(radiance.is_finite() && radiance.max_element() > 0.0) {
+        let (context, position) = (self.context, point.surface.position);
+        let mut draws = None;
+        for light in &context.lights {
+            if !light.is_wide() {
+                if let Some(incident) = light.incident(position) {
+                    self.shine(point, crossing, light, &incident, 1.0);
+                }
                 continue;
             }
-            if !light.shadows {
-                self.add(point.ray.sample, radiance);
-                continue;
+            // What mirrors show needs no more than a hint of soft edges.
+            let rays = if point.path.depth == 0 { context.light_rays } else { context.light_rays.div_ceil(4) };
+            let spread = draws.get_or_insert_with(|| Draws::at(!context.seed, point.ray, point.hit)).spread();
+            for k in 0..rays {
+                if let Some(incident) = light.incident_from(position, spread.point(k)) {
+                    self.shine(point, crossing, light, &incident, 1.0 / rays as f32);
+                }
             }
-            let (dir, end) = incident.way(surface.origin(to_light));
-            self.shadows.push(surface.ray(dir, end, point.ray.sample), radiance, inside);
         }
         if self.shadows.len() >= SHADOW_LIMIT {
             self.trace_shadows();
         }
+    }
+
+    /// Light of one point of a light that is so much of it: without shadows at once, with them when its ray has come through.
+    fn shine(&mut self, point: &Point, crossing: &Crossing, light: &LocalLight, incident: &Incident, part: f32) {
+        let (surface, to_light) = (point.surface, incident.to_light);
+        let seen = if surface.geometric.dot(to_light) > 0.0 {
+            let smooth = terminator(surface.geometric, surface.normal, to_light);
+            point.matter.lit(surface.normal, surface.view, incident) * smooth
+        } else {
+            point.matter.lit_through(surface.normal, surface.view, incident, crossing)
+        };
+        let radiance = point.path.weight * seen * part;
+        if !(radiance.is_finite() && radiance.max_element() > 0.0) {
+            return;
+        }
+        if !light.shadows {
+            return self.add(point.ray.sample, radiance);
+        }
+        let inside = self.context.absorption.is_some().then_some(point.path.media);
+        let (dir, end) = incident.way(surface.origin(to_light));
+        self.shadows.push(surface.ray(dir, end, point.ray.sample), radiance, inside);
     }
 }
 

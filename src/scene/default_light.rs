@@ -61,6 +61,7 @@ fn lamp(name: &str, lux: f32, from: DVec3, shadows: bool, camera: &Camera) -> Li
         intensity: Vec3::splat(lux),
         kind: LightKind::Directional { direction: travels },
         shadows,
+        size: 0.0,
     }
 }
 

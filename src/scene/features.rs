@@ -3,7 +3,7 @@
 //! Only what can be seen counts: materials that no face, sphere, cone or plane names bring no features. The renderer leaves out
 //! the work of absent features; `inspect` lists both halves.
 
-use super::{AlphaMode, LightKind, Material, Mesh, Phong, Scene, Surface};
+use super::{AlphaMode, Environment, LightKind, Material, Mesh, Phong, Scene, Surface};
 use crate::math::Vec3;
 use std::collections::BTreeSet;
 use std::fmt;
@@ -71,8 +71,14 @@ pub enum Feature {
     DirectionalLights,
     /// Spot lights.
     SpotLights,
+    /// Lights that are rectangles.
+    AreaLights,
     /// Lights that throw shadows.
     Shadows,
+    /// Lights with an extent, whose shadows have soft edges.
+    SoftShadows,
+    /// A picture of the surroundings.
+    Panorama,
 }
 
 /// The features of one scene.
@@ -86,7 +92,7 @@ pub const SMOOTH: f32 = 0.2;
 
 impl Feature {
     /// All of them, in the order they are listed.
-    pub const ALL: [Self; 31] = [
+    pub const ALL: [Self; 34] = [
         Self::Triangles,
         Self::Polygons,
         Self::Spheres,
@@ -117,7 +123,10 @@ impl Feature {
         Self::PointLights,
         Self::DirectionalLights,
         Self::SpotLights,
+        Self::AreaLights,
         Self::Shadows,
+        Self::SoftShadows,
+        Self::Panorama,
     ];
 
     /// The words for it in reports.
@@ -153,7 +162,10 @@ impl Feature {
             Self::PointLights => "point lights",
             Self::DirectionalLights => "directional lights",
             Self::SpotLights => "spot lights",
+            Self::AreaLights => "area lights",
             Self::Shadows => "shadows",
+            Self::SoftShadows => "soft shadows",
+            Self::Panorama => "environment map",
         }
     }
 }
@@ -268,10 +280,13 @@ impl Features {
                 LightKind::Point { .. } => Feature::PointLights,
                 LightKind::Directional { .. } => Feature::DirectionalLights,
                 LightKind::Spot { .. } => Feature::SpotLights,
+                LightKind::Rectangle { .. } => Feature::AreaLights,
             };
             self.add_if(true, kind);
             self.add_if(light.shadows, Feature::Shadows);
+            self.add_if(light.shadows && light.is_wide(), Feature::SoftShadows);
         }
+        self.add_if(scene.environment == Environment::Panorama, Feature::Panorama);
     }
 }
 
@@ -316,7 +331,7 @@ mod tests {
     fn a_scene_lists_what_it_needs_and_what_it_does_not() {
         let mut scene = ball(Surface::Phong(Phong { mirror: Vec3::splat(0.5), ..Phong::default() }));
         let kind = LightKind::Directional { direction: DVec3::NEG_Y };
-        scene.lights.push(Light { name: String::new(), intensity: Vec3::ONE, kind, shadows: false });
+        scene.lights.push(Light { name: String::new(), intensity: Vec3::ONE, kind, shadows: false, size: 0.0 });
         let features = Features::of(&scene);
         let present: Vec<_> = features.present().collect();
         assert_eq!(present, [Feature::Spheres, Feature::Phong, Feature::Mirrors, Feature::DirectionalLights]);

@@ -1,4 +1,4 @@
-//! Lights without extent.
+//! Lights: points, directions, and what shines from a small ball, a disc in the sky or a rectangle.
 
 use crate::math::{DVec3, Vec3};
 
@@ -15,6 +15,9 @@ pub struct Light {
     pub kind: LightKind,
     /// Whether surfaces throw shadows from it.
     pub shadows: bool,
+    /// Radius of the ball that shines, world units; of a directional light half the angle that its disc is seen under,
+    /// radians. 0: shadows have sharp edges. A rectangle has none.
+    pub size: f64,
 }
 
 /// Position and shape of a light.
@@ -45,6 +48,22 @@ pub enum LightKind {
         /// How it weakens.
         falloff: Falloff,
     },
+    /// Shines from one side of a rectangle, by the cosine: `intensity` is that along its normal.
+    Rectangle {
+        /// World position of its middle.
+        position: DVec3,
+        /// Its sides, world units; it shines to where their cross product points.
+        sides: [DVec3; 2],
+        /// How it weakens.
+        falloff: Falloff,
+    },
+}
+
+impl Light {
+    /// Whether it has an extent, so that shadows have soft edges.
+    pub fn is_wide(&self) -> bool {
+        self.size > 0.0 || matches!(self.kind, LightKind::Rectangle { .. })
+    }
 }
 
 /// How light weakens with distance.

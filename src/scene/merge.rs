@@ -69,6 +69,13 @@ fn moved(mut light: Light, place: &DAffine3) -> Light {
             *position = place.transform_point3(*position);
             *direction = turned(*direction);
         }
+        LightKind::Rectangle { position, sides, .. } => {
+            *position = place.transform_point3(*position);
+            *sides = sides.map(|side| place.transform_vector3(side));
+        }
+    }
+    if !matches!(light.kind, LightKind::Directional { .. }) {
+        light.size *= libm::cbrt(place.matrix3.determinant().abs());
     }
     light
 }

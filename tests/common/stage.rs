@@ -98,7 +98,13 @@ impl Stage {
     }
 
     pub fn light(&mut self, intensity: [f32; 3], kind: LightKind) {
-        self.scene.lights.push(Light { name: String::new(), intensity: intensity.into(), kind, shadows: true });
+        self.scene.lights.push(Light {
+            name: String::new(),
+            intensity: intensity.into(),
+            kind,
+            shadows: true,
+            size: 0.0,
+        });
     }
 
     /// The studio around the stage.

@@ -56,7 +56,7 @@ fn scene(parts: Vec<(Mesh, Material)>) -> Scene {
 
 fn lamp(position: DVec3, intensity: f32) -> Light {
     let kind = LightKind::Point { position, falloff: Falloff::None };
-    Light { name: String::new(), intensity: Vec3::splat(intensity), kind, shadows: true }
+    Light { name: String::new(), intensity: Vec3::splat(intensity), kind, shadows: true, size: 0.0 }
 }
 
 /// The scene from outside, in a few pixels.

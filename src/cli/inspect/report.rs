@@ -250,6 +250,7 @@ fn kind(light: &crate::scene::Light) -> &'static str {
         LightKind::Point { .. } => "point",
         LightKind::Directional { .. } => "directional",
         LightKind::Spot { .. } => "spot",
+        LightKind::Rectangle { .. } => "rectangle",
     }
 }
 

@@ -90,6 +90,8 @@ fn check(args: &TraceArgs) -> Result<Look, Wrong> {
         env_rotate: 0.0,
         env_rays: None,
         gloss_rays: 0,
+        light_rays: None,
+        sun_size: None,
         tone_map: None,
         exposure: None,
         png: PngDepth::Eight,

@@ -72,7 +72,7 @@ pub(super) fn light(root: &Root, node: &Node, world: DAffine3, report: &mut Repo
         // The schema check has told of it.
         _ => return None,
     };
-    Some(Light { name: name(&source.name, node), intensity: color * intensity, kind, shadows: true })
+    Some(Light { name: name(&source.name, node), intensity: color * intensity, kind, shadows: true, size: 0.0 })
 }
 
 /// The angles of a cone, 0 ≤ inner ≤ outer ≤ π/2.

@@ -146,7 +146,7 @@ impl Reader<'_> {
         let colored = self.words.peek().is_some_and(|word| word.parse::<f64>().is_ok());
         let intensity = if colored { self.words.point("l")?.as_vec3() } else { Vec3::ONE };
         let kind = LightKind::Point { position, falloff: Falloff::None };
-        self.scene.lights.push(Light { name: String::new(), intensity, kind, shadows: true });
+        self.scene.lights.push(Light { name: String::new(), intensity, kind, shadows: true, size: 0.0 });
         Ok(())
     }
 

@@ -101,6 +101,7 @@
 //! position = [0, 10, 0]
 //! falloff = "inverse-square"    # or "none", the default
 //! range = 20                    # inverse-square: where it ends; default nowhere
+//! radius = 0.1                  # of the ball that shines: shadows get soft edges; default 0
 //! shadows = true                # default true
 //!
 //! [[lights]]
@@ -109,6 +110,17 @@
 //! direction = [0, -1, 0]        # where the light goes; so for directional lights, which have no position
 //! inner = 20                    # half angle where it starts to fade, default 0
 //! outer = 30                    # half angle where it ends, default 45
+//!
+//! [[lights]]
+//! kind = "directional"
+//! direction = [0, -1, 0]
+//! angle = 0.53                  # how wide it looks in the sky, degrees; default 0
+//!
+//! [[lights]]
+//! kind = "rectangle"            # shines to where side_u × side_v points, fades like a point light
+//! position = [0, 3, 0]          # of its middle
+//! side_u = [1, 0, 0]
+//! side_v = [0, 0, 1]
 //!
 //! [[lights]]
 //! kind = "ambient"              # has color and intensity only

@@ -30,7 +30,7 @@ fn the_schema_in_the_module_head_is_read_without_a_fault() {
         scene.cones.iter().map(|c| (c.base_radius, c.apex_radius)).collect::<Vec<_>>(),
         [(1.0, 0.5), (1.0, 1.0)]
     );
-    assert_eq!((scene.meshes[0].triangles.len(), scene.cameras.len(), scene.lights.len()), (2, 1, 2));
+    assert_eq!((scene.meshes[0].triangles.len(), scene.cameras.len(), scene.lights.len()), (2, 1, 4));
     assert_eq!((scene.hints.size, scene.hints.depth), (Some((800, 600)), Some(1)));
 }
 

@@ -9,6 +9,7 @@ enum Kind {
     Point,
     Directional,
     Spot,
+    Rectangle,
     Ambient,
 }
 
@@ -21,8 +22,13 @@ pub(super) enum Lit {
 /// Reads one light; `None`: a fault was noted.
 #[expect(clippy::cast_possible_truncation, reason = "light is f32")]
 pub(super) fn light(table: Table) -> Option<Lit> {
-    let kinds =
-        [("point", Kind::Point), ("directional", Kind::Directional), ("spot", Kind::Spot), ("ambient", Kind::Ambient)];
+    let kinds = [
+        ("point", Kind::Point),
+        ("directional", Kind::Directional),
+        ("spot", Kind::Spot),
+        ("rectangle", Kind::Rectangle),
+        ("ambient", Kind::Ambient),
+    ];
     let kind = table.need("kind", word(&kinds));
     let factor = table.get("intensity", within(0.0, 1e12)).unwrap_or(1.0) as f32;
     let intensity = table.get("color", color).unwrap_or(Vec3::ONE) * factor;
@@ -39,14 +45,20 @@ pub(super) fn light(table: Table) -> Option<Lit> {
             table.need("direction", direction).map(|direction| LightKind::Directional { direction })
         }
         Some(Kind::Spot) => spot(&table),
+        Some(Kind::Rectangle) => rectangle(&table),
         // Which keys belong to an unknown kind cannot be said.
         None => return None,
     };
     let shadows = table.get("shadows", boolean).unwrap_or(true);
+    let size = match kind {
+        Some(Kind::Directional) => 0.5 * table.get("angle", within(0.0, 180.0)).unwrap_or(0.0).to_radians(),
+        Some(Kind::Point | Kind::Spot) => table.get("radius", within(0.0, 1e12)).unwrap_or(0.0),
+        _ => 0.0,
+    };
     table.finish();
     // Directional lights are kept in lux, of which a white matt surface shows the π-th part; files give what it shows.
     let lux = if matches!(kind, Some(Kind::Directional)) { std::f32::consts::PI } else { 1.0 };
-    place.map(|kind| Lit::Light(Light { name, intensity: intensity * lux, kind, shadows }))
+    place.map(|kind| Lit::Light(Light { name, intensity: intensity * lux, kind, shadows, size }))
 }
 
 fn spot(table: &Table) -> Option<LightKind> {
@@ -60,6 +72,17 @@ fn spot(table: &Table) -> Option<LightKind> {
     let falloff = falloff(table);
     let (inner, outer) = (inner.to_radians(), outer.to_radians());
     Some(LightKind::Spot { position: position?, direction: direction?, inner, outer, falloff })
+}
+
+fn rectangle(table: &Table) -> Option<LightKind> {
+    let position = table.need("position", vec);
+    let sides = [table.need("side_u", vec), table.need("side_v", vec)];
+    let falloff = falloff(table);
+    let [u, v] = [sides[0]?, sides[1]?];
+    if u.cross(v).length() <= 1e-9 * u.length() * v.length() {
+        table.note(&table.place_of("side_v"), "`side_u` and `side_v` run along one line", "turn one of them");
+    }
+    Some(LightKind::Rectangle { position: position?, sides: [u, v], falloff })
 }
 
 fn falloff(table: &Table) -> Falloff {

@@ -1,5 +1,8 @@
 //! Lights as the points they shine on see them: direction, strength, and the way a shadow ray has to go.
 //!
+//! Lights with an extent are seen as many points, each of which is drawn by the solid angle it stands for (P. Shirley,
+//! C. Wang, K. Zimmerman, "Monte Carlo Techniques for Direct Lighting Calculations", 1996).
+//!
 //! Two units meet here. The founding texts give a light a factor I, which is what a white matt surface facing it shows;
 //! glTF gives candela and lux, of which such a surface shows the π-th part. Both become a *strength* in the first unit,
 //! so that a Phong and a metallic-roughness surface of one colour look alike under any light.
@@ -13,6 +16,8 @@ use std::f32::consts::PI;
 pub(crate) struct LocalLight {
     intensity: Vec3,
     pub shadows: bool,
+    /// Radius, or half the angle of a disc in the sky, as in [`Light`].
+    size: f32,
     shape: Shape,
 }
 
@@ -24,6 +29,13 @@ enum Shape {
         position: Vec3,
         falloff: Falloff,
         cone: Option<Cone>,
+    },
+    Rectangle {
+        position: Vec3,
+        sides: [Vec3; 2],
+        /// Unit vector to the side it shines to.
+        normal: Vec3,
+        falloff: Falloff,
     },
 }
 
@@ -81,8 +93,59 @@ impl LocalLight {
             LightKind::Spot { position, direction, inner, outer, falloff } => {
                 point(position, falloff, Some(Cone::new(unit(direction), inner, outer)))
             }
+            LightKind::Rectangle { position, sides: [a, b], falloff } => Shape::Rectangle {
+                position: (position - center).as_vec3(),
+                sides: [a.as_vec3(), b.as_vec3()],
+                normal: unit(a.cross(b)),
+                falloff,
+            },
         };
-        Self { intensity: light.intensity, shadows: light.shadows, shape }
+        #[expect(clippy::cast_possible_truncation, reason = "a length like any other")]
+        let size = light.size as f32;
+        Self { intensity: light.intensity, shadows: light.shadows, size, shape }
+    }
+
+    /// Whether it is seen as many points.
+    pub(crate) fn is_wide(&self) -> bool {
+        self.size > 0.0 || matches!(self.shape, Shape::Rectangle { .. })
+    }
+
+    /// What arrives from one point of it, drawn with two numbers from 0 … 1, as if all of it shone from there; the mean of
+    /// many is what arrives from the whole. `None` where nothing does.
+    pub(crate) fn incident_from(&self, position: Vec3, at: [f32; 2]) -> Option<Incident> {
+        let (to_light, share, end) = match self.shape {
+            _ if !self.is_wide() => return self.incident(position),
+            Shape::Directional(to_light) => {
+                let (sin, cos) = libm::sincosf(self.size.min(PI / 2.0));
+                (in_cone(to_light, sin, cos, at), 1.0 / PI, None)
+            }
+            Shape::Point { position: light, falloff, cone } => {
+                let way = light - position;
+                let distance = way.length();
+                let sin = self.size / distance;
+                // Nothing is seen of a ball from inside.
+                if sin >= 1.0 || sin.is_nan() {
+                    return None;
+                }
+                let cos = (1.0 - sin * sin).sqrt();
+                let to_light = in_cone(way / distance, sin, cos, at);
+                let along = way.dot(to_light);
+                let beside = (way - to_light * along).length();
+                let near = along - (self.size * self.size - beside * beside).max(0.0).sqrt();
+                // A ball fills more of the sky than its middle's distance says.
+                let fuller = if matches!(falloff, Falloff::None) { 1.0 } else { 2.0 / (1.0 + cos) };
+                let share = weaken(falloff, distance) * fuller * cone.map_or(1.0, |c| c.share(-to_light));
+                (to_light, share, Some(position + to_light * near))
+            }
+            Shape::Rectangle { position: middle, sides: [a, b], normal, falloff } => {
+                let point = middle + a * (at[0] - 0.5) + b * (at[1] - 0.5);
+                let way = point - position;
+                let to_light = way.try_normalize()?;
+                (to_light, weaken(falloff, way.length()) * (-normal.dot(to_light)).max(0.0), Some(point))
+            }
+        };
+        let strength = (self.intensity * share).min(Vec3::splat(f32::MAX));
+        (strength.max_element() > 0.0).then_some(Incident { to_light, position: end, strength })
     }
 
     /// What arrives at `position` when nothing is in the way; `None` where nothing does.
@@ -96,6 +159,13 @@ impl LocalLight {
     pub(crate) fn arriving(&self, position: Vec3) -> (Incident, bool) {
         let (to_light, share, end) = match self.shape {
             Shape::Directional(to_light) => (to_light, 1.0 / PI, None),
+            // As seen from far away.
+            Shape::Rectangle { position: light, normal, falloff, .. } => {
+                let way = light - position;
+                let to_light = way.try_normalize().unwrap_or(Vec3::ZERO);
+                let share = weaken(falloff, way.length()) * (-normal.dot(to_light)).max(0.0);
+                (to_light, share, Some(light))
+            }
             Shape::Point { position: light, falloff, cone } => {
                 let way = light - position;
                 let to_light = way.try_normalize().unwrap_or(Vec3::ZERO);
@@ -137,6 +207,16 @@ impl Cone {
     }
 }
 
+/// A direction in the cone around `axis` whose half angle has this sine and cosine, evenly by solid angle.
+fn in_cone(axis: Vec3, sin: f32, cos: f32, at: [f32; 2]) -> Vec3 {
+    // 1 − cos as sin² / (1 + cos), which keeps its digits in narrow cones.
+    let down = at[0] * (sin * sin / (1.0 + cos));
+    let ring = (down * (2.0 - down)).max(0.0).sqrt();
+    let (tangent, bitangent) = axis.any_orthonormal_pair();
+    let (sin, cos) = libm::sincosf(2.0 * PI * at[1]);
+    (axis * (1.0 - down) + (tangent * cos + bitangent * sin) * ring).normalize()
+}
+
 fn unit(v: DVec3) -> Vec3 {
     v.try_normalize().unwrap_or(DVec3::Z).as_vec3()
 }
@@ -147,7 +227,7 @@ mod tests {
 
     fn light(kind: LightKind) -> LocalLight {
         LocalLight::new(
-            &Light { name: String::new(), intensity: Vec3::splat(8.0), kind, shadows: true },
+            &Light { name: String::new(), intensity: Vec3::splat(8.0), kind, shadows: true, size: 0.0 },
             DVec3::new(1e7, 0.0, 0.0),
         )
     }

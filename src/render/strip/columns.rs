@@ -322,7 +322,7 @@ mod tests {
         strip.level = level;
         strip.find(placement);
         let kind = LightKind::Point { position: DVec3::new(1.0, 3.0, 2.0), falloff: Falloff::None };
-        let light = Light { name: String::new(), intensity: Vec3::ONE, kind, shadows: true };
+        let light = Light { name: String::new(), intensity: Vec3::ONE, kind, shadows: true, size: 0.0 };
         let matter = Matter::without_maps(&Material::plain(), &TextureStore::new(&Scene::default()));
         strip.shine(&matter, &LocalLight::new(&light, DVec3::ZERO));
         let point = |i: usize| {

@@ -92,7 +92,8 @@ fn plain() -> Stage {
     s.mesh(square(0.0, 0.3), turned(0.1, DVec3::new(0.2, 1.4, 0.0)), unlit(Vec3::new(0.1, 0.9, 0.3)));
     s.mesh(square(0.5, 0.3), DAffine3::from_rotation_y(3.0), Material { double_sided: false, ..Material::plain() });
     s.lamp(DVec3::new(3.0, 4.0, 5.0), 0.7);
-    let light = |kind, shadows| Light { name: String::new(), intensity: Vec3::new(0.5, 0.6, 0.7), kind, shadows };
+    let light =
+        |kind, shadows| Light { name: String::new(), intensity: Vec3::new(0.5, 0.6, 0.7), kind, shadows, size: 0.0 };
     s.scene.lights.push(light(LightKind::Directional { direction: DVec3::new(1.0, -1.0, -0.5) }, false));
     let (position, direction) = (DVec3::new(-2.0, 3.0, 3.0), DVec3::new(1.0, -1.5, -1.5));
     let falloff = Falloff::InverseSquare { range: 20.0 };

@@ -9,6 +9,7 @@ mod light;
 mod mirrors;
 mod see_through;
 mod sight;
+mod soft;
 mod story;
 
 use super::texture::TextureStore;
@@ -88,7 +89,7 @@ impl Stage {
     fn lamp(&mut self, position: DVec3, intensity: f32) -> &mut Self {
         let kind = LightKind::Point { position, falloff: Falloff::None };
         let intensity = Vec3::splat(intensity);
-        self.scene.lights.push(Light { name: String::new(), intensity, kind, shadows: true });
+        self.scene.lights.push(Light { name: String::new(), intensity, kind, shadows: true, size: 0.0 });
         self
     }
 
