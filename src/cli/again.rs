@@ -22,7 +22,7 @@ use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
 /// The flags that a picture may bring along.
-const FLAGS: [&str; 36] = [
+const FLAGS: [&str; 38] = [
     "size",
     "samples",
     "depth",
@@ -45,6 +45,8 @@ const FLAGS: [&str; 36] = [
     "merge",
     "format",
     "scene",
+    "animation",
+    "time",
     "polygons",
     "mtl",
     "accel",
@@ -135,6 +137,10 @@ impl Facts<'_> {
             set("bits", "16".into());
         }
         load.scene.iter().for_each(|scene| set("scene", scene.clone()));
+        if let Some(moment) = &load.moment {
+            moment.animation.iter().for_each(|name| set("animation", name.clone()));
+            set("time", moment.time.to_string());
+        }
         if load.polygons == Polygons::Whole {
             set("polygons", "whole".into());
         }

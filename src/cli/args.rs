@@ -125,7 +125,7 @@ pub(super) struct RenderArgs {
     /// Repeat a picture with the settings it carries; refuses when the input has changed
     #[arg(long, value_name = "PICTURE", help_heading = "Output", hide_short_help = true, conflicts_with_all = [
         "size", "format", "bits", "half", "float", "layers", "tone_map", "exposure", "merge", "view", "camera", "eye",
-        "at", "up_vector", "fov", "ortho", "up", "background", "samples", "depth", "cutoff", "seed", "scene",
+        "at", "up_vector", "fov", "ortho", "up", "background", "samples", "depth", "cutoff", "seed", "scene", "animation", "time", "frame", "fps",
         "polygons", "mtl", "allow_empty", "accel", "intersector",
     ])]
     pub again: Option<PathBuf>,
@@ -177,6 +177,9 @@ pub(super) struct RenderArgs {
     /// Which scene of a glTF file, by name or number from 0
     #[arg(long, value_name = "NAME", help_heading = "Loading", hide_short_help = true)]
     pub scene: Option<String>,
+    /// Which moment of an animation.
+    #[command(flatten)]
+    pub moment: MomentArgs,
     /// What becomes of OBJ faces with more than three corners
     #[arg(long, value_name = "HOW", value_enum, default_value_t, help_heading = "Loading", hide_short_help = true)]
     pub polygons: PolygonsArg,
@@ -450,6 +453,9 @@ pub(super) struct LoadArgs {
     /// Which scene of a glTF file, by name or number from 0
     #[arg(long, value_name = "NAME")]
     pub scene: Option<String>,
+    /// Which moment of an animation.
+    #[command(flatten)]
+    pub moment: MomentArgs,
     /// What becomes of OBJ faces with more than three corners
     #[arg(long, value_name = "HOW", value_enum, default_value_t)]
     pub polygons: PolygonsArg,
@@ -468,6 +474,25 @@ pub(super) struct LoadArgs {
     /// How messages are written to standard error
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub messages: MessageFormat,
+}
+
+/// Which moment of an animation is shown; without any of it, the rest pose.
+#[derive(Debug, Clone, Args)]
+pub(super) struct MomentArgs {
+    /// Animation of a glTF file, by name or number from 0 [default: the first, where a time is given]
+    #[arg(long, value_name = "NAME", help_heading = "Animation", hide_short_help = true)]
+    pub animation: Option<String>,
+    /// Pose at this time of the animation, such as 1.5, 1.5s or 250ms; past its end, the last one
+    #[arg(long, value_name = "TIME", value_parser = parse::time, help_heading = "Animation", hide_short_help = true,
+          conflicts_with = "frame")]
+    pub time: Option<f64>,
+    /// The same by a number from 0: the pose at N / FPS seconds. The camera is framed on that pose, so that for a
+    /// sequence it has to be fixed, by --eye, --camera or --frames
+    #[arg(long, value_name = "N", help_heading = "Animation", hide_short_help = true)]
+    pub frame: Option<u32>,
+    /// Frames a second [default: 24]
+    #[arg(long, value_name = "FPS", value_parser = parse::above_zero, help_heading = "Animation", hide_short_help = true)]
+    pub fps: Option<f64>,
 }
 
 /// Types of picture files.

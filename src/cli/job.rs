@@ -4,6 +4,7 @@ use super::args::{AccelArgs, Axis, FileType, MessageFormat, MtlArg, PolygonsArg,
 use super::camera::{Choice, LensChoice};
 use super::cost_layers;
 use super::message;
+use super::moment;
 use super::output_name::{self, Facts};
 use super::parse::Back;
 use crate::accel::{AccelChoice, AccelParams, IntersectorKind};
@@ -153,7 +154,7 @@ impl RenderJob {
             return wrong("the picture goes to standard output, so the statistics cannot; add --stats-file PATH");
         }
         Ok(Self {
-            load: load_options(args),
+            load: load_options(args)?,
             look: look(args),
             params: params(&args.params)?,
             accel: args.accel,
@@ -192,6 +193,9 @@ fn check_flags(args: &RenderArgs) -> Result<(), Wrong> {
     }
     if args.merge && args.scene.is_some() {
         return wrong("--scene chooses a scene of one file and cannot be used with --merge");
+    }
+    if args.merge && args.moment.animation.is_some() {
+        return wrong("--animation chooses an animation of one file and cannot be used with --merge");
     }
     if args.stats_file.is_some() && args.stats.is_none() {
         return wrong("--stats-file needs --stats text or --stats json");
@@ -303,15 +307,16 @@ fn refuse_collisions(batches: &[Batch]) -> Result<(), Wrong> {
     ))
 }
 
-fn load_options(args: &RenderArgs) -> LoadOptions {
-    LoadOptions {
+fn load_options(args: &RenderArgs) -> Result<LoadOptions, Wrong> {
+    Ok(LoadOptions {
         root: args.root.clone(),
         limits: limits(args.max_memory),
         polygons: args.polygons.into(),
         mtl: args.mtl.into(),
         scene: args.scene.clone(),
         up: args.up.map(Into::into),
-    }
+        moment: moment::moment(&args.moment)?,
+    })
 }
 
 /// The usual limits, none of them above `memory`.
@@ -473,6 +478,8 @@ mod tests {
             "a.obj --heatmap tests,tests",
             "a.obj a-tests.obj --heatmap tests",
             "a.obj -o a.jpg --bits 16",
+            "a.glb --fps 30",
+            "a.glb b.glb --merge --animation Run",
         ] {
             assert!(job(line).is_err(), "{line}");
         }

@@ -68,6 +68,17 @@ pub(super) fn fov(text: &str) -> Result<f64, String> {
     within(text, 0.1, 170.0)
 }
 
+/// Seconds, also with a unit: `1.5`, `1.5s`, `250ms`.
+pub(super) fn time(text: &str) -> Result<f64, String> {
+    let wrong = || "write a time from 0, such as 1.5, 1.5s or 250ms".to_owned();
+    let (number, units) = match (text.strip_suffix("ms"), text.strip_suffix('s')) {
+        (Some(number), _) => (number, 1000.0),
+        (None, Some(number)) => (number, 1.0),
+        (None, None) => (text, 1.0),
+    };
+    finite(number).ok().map(|n| n / units).filter(|&n| n >= 0.0).ok_or_else(wrong)
+}
+
 /// Stops.
 #[expect(clippy::cast_possible_truncation, reason = "the range fits f32")]
 pub(super) fn exposure(text: &str) -> Result<f32, String> {
@@ -272,6 +283,14 @@ mod tests {
         assert_eq!(bytes("3MiB"), Ok(3 << 20));
         for wrong in ["", "G", "0", "2X", "99999999999T", "-1"] {
             assert!(bytes(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn times_have_a_unit_or_are_seconds() {
+        assert_eq!(["1.5", "1.5s", "250ms", "0"].map(|t| time(t).unwrap()), [1.5, 1.5, 0.25, 0.0]);
+        for text in ["-1", "ms", "", "1m", "inf", "nan", "1 s s"] {
+            assert!(time(text).is_err(), "{text}");
         }
     }
 

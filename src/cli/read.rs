@@ -2,8 +2,9 @@
 
 use super::args::{LoadArgs, ModelArgs};
 use super::exit::Exit;
-use super::job;
+use super::job::{self, Wrong};
 use super::message::{Messages, Severity};
+use super::moment;
 use crate::load::{Diagnostic, LoadError, LoadOptions, Loaded, load, load_bytes};
 use crate::math::DAffine3;
 use std::io::Read;
@@ -36,6 +37,10 @@ pub(super) fn model(args: &ModelArgs, messages: &Messages) -> Result<Loaded, Exi
 
 /// The same for a command that takes several.
 pub(super) fn one_model(input: &PathBuf, args: &LoadArgs, messages: &Messages) -> Result<Loaded, Exit> {
+    let moment = moment::moment(&args.moment).map_err(|Wrong(text)| {
+        messages.error("usage", text, "");
+        Exit::Usage
+    })?;
     let options = LoadOptions {
         root: args.root.clone(),
         limits: job::limits(args.max_memory),
@@ -43,6 +48,7 @@ pub(super) fn one_model(input: &PathBuf, args: &LoadArgs, messages: &Messages) -
         mtl: args.mtl.into(),
         scene: args.scene.clone(),
         up: args.up.map(Into::into),
+        moment,
     };
     let loaded = scene(slice::from_ref(input), &options).map_err(|error| {
         messages.load_error(&error);

@@ -347,7 +347,13 @@ impl Summary<'_> {
             format!("depth {}{}", rendered.depth, if settings.depth.is_none() { " (auto)" } else { "" }),
             self.view.to_owned(),
         ];
-        if let Some(reason) = &self.loaded.facts.up_reason {
+        let facts = &self.loaded.facts;
+        if let Some((number, time)) = facts.shown {
+            let name = facts.animations.get(number).map_or("", |animation| animation.name.as_str());
+            let name = if name.is_empty() { number.to_string() } else { format!("'{name}'") };
+            parts.push(format!("animation {name} at {time:.3} s"));
+        }
+        if let Some(reason) = &facts.up_reason {
             let axis = if self.loaded.scene.up == crate::scene::UpAxis::Z { "+Z" } else { "+Y" };
             parts.push(format!("{axis} up ({reason})"));
         }

@@ -180,6 +180,7 @@ impl PictureStats {
             "auto": facts.reason.map(|r| json!({
                 "why": r.to_string(), "rays": r.rays, "prims": r.prims, "fast-octree": r.octree, "fast-bvh": r.bvh,
             })),
+            "animation": facts.loaded.facts.shown.map(|(number, time)| json!({ "number": number, "time": time })),
             "parameters": parameters(facts.accel, &facts.job.params),
             "threads": rayon::current_num_threads(),
             "seconds": { "load": times.load, "build": times.build, "render": times.render, "write": times.write },

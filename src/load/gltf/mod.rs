@@ -10,12 +10,15 @@
 //! primitives by `draco`, so that their accessors are accessors like others. Both libraries sit behind features of the
 //! same names; without them, such files are refused with a line that says so.
 //!
-//! Animations are not played: nodes, morph weights and skins are drawn in their rest pose.
+//! Nodes, morph weights and skins are drawn in their rest pose, or as an animation has them at a moment
+//! ([`Moment`](super::Moment)).
 
 mod accessor;
+mod animation;
 mod attributes;
 mod bounds;
 mod buffers;
+mod choice;
 pub mod codes;
 mod container;
 mod document;
@@ -55,6 +58,7 @@ use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source};
 use crate::math::{DAffine3, DMat4};
 use crate::scene::{Environment, Instance, Material, Scene};
 use accessor::Reader;
+use animation::Pose;
 use buffers::Buffers;
 use document::Document;
 use gltf::json::Root;
@@ -148,7 +152,7 @@ impl Loading<'_> {
         self.take(&mut budget, weight::typed(&value), "the document")?;
         attributes::check(&value, self.report);
         usage::check(&value, self.report);
-        let graph = Graph::new(&value, self.report);
+        let mut graph = Graph::new(&value, self.report);
         let document = document::typed(value, self.report);
         let document = self.passed(document)?;
         links::check(&document.root, self.report);
@@ -156,7 +160,7 @@ impl Loading<'_> {
 
         let mut facts = facts(&document, container.binary);
         facts.extensions = extensions.facts();
-        let scene = self.build(&document, &graph, container.bin, &mut budget, &mut facts)?;
+        let scene = self.build(&document, &mut graph, container.bin, &mut budget, &mut facts)?;
         Ok(Loaded { scene, facts, warnings: Vec::new() })
     }
 
@@ -170,7 +174,7 @@ impl Loading<'_> {
     fn build(
         &mut self,
         document: &Document,
-        graph: &Graph,
+        graph: &mut Graph,
         bin: Option<&[u8]>,
         budget: &mut Budget,
         facts: &mut Facts,
@@ -189,7 +193,9 @@ impl Loading<'_> {
         facts.scene_index = scene::choose(root, self.options.scene.as_deref(), file)?;
         self.check_budget(reader, *budget)?;
         bounds::check(reader, self.report);
-        let placed = scene::walk(reader, graph, facts.scene_index, budget, self.report);
+        let pose = self.pose(reader, graph, document, budget, facts)?;
+        graph.place(&pose.moved);
+        let placed = scene::walk(reader, graph, facts.scene_index, &pose.weights, budget, self.report);
         let placed = placed.map_err(|over| self.too_large("what the nodes show", over))?;
         let skins = skin::joint_matrices(reader, graph, self.report);
         skin::check_scene(root, graph, facts.scene_index, &placed.draws, self.report);
@@ -214,6 +220,42 @@ impl Loading<'_> {
         (facts.reading, facts.decoding) = (resolver.reading(), decoding);
         (facts.files, facts.hash) = resolver.finish();
         Ok(scene)
+    }
+
+    /// What the wished moment does to the nodes; nothing for a file without animations.
+    fn pose(
+        &mut self,
+        reader: Reader,
+        graph: &Graph,
+        document: &Document,
+        budget: &mut Budget,
+        facts: &mut Facts,
+    ) -> Result<Pose, LoadError> {
+        let (file, animations) = (self.source.path.as_path(), &document.animations);
+        let Some(moment) = self.options.moment.as_ref().filter(|_| !animations.is_empty()) else {
+            return Ok(Pose::default());
+        };
+        let names: Vec<Option<&str>> = animations.iter().map(|animation| animation.name.as_deref()).collect();
+        let number = match &moment.animation {
+            Some(wish) => choice::choose(&choice::ANIMATION, &names, wish, file)?,
+            None => 0,
+        };
+        let Some(animation) = animations.get(number) else { return Ok(Pose::default()) };
+        let pose = animation::play(reader, graph, (number, animation), moment.time, budget, self.report)
+            .map_err(|over| self.too_large("an animation", over))?;
+        facts.shown = Some((number, moment.time));
+        // Times are stored as `f32`: what falls on the last one when rounded is not past it.
+        #[expect(clippy::cast_possible_truncation, reason = "compared as stored")]
+        let past = (moment.time as f32) > pose.length as f32;
+        if past {
+            let called = names[number].filter(|name| !name.is_empty());
+            let called = called.map_or_else(|| number.to_string(), |name| format!("'{name}'"));
+            let text =
+                format!("{} s is past the end of animation {called}, which is {} s long", moment.time, pose.length);
+            let warning = Diagnostic::new("animation-over", file, format!("animations[{number}]"), text);
+            self.report.warnings.push(warning.remedy("drawn as at its end"));
+        }
+        Ok(pose)
     }
 
     /// In a GLB, a first buffer without a uri is the binary chunk, which must be there when it is needed.
@@ -382,7 +424,7 @@ fn facts(document: &Document, binary: bool) -> Facts {
         format: format!("glTF {version}{}", if binary { " (binary)" } else { "" }),
         generator: root.asset.generator.clone().unwrap_or_default(),
         scenes: scene::names(root),
-        animations: document.animations as u64,
+        animations: document.animations.iter().map(|animation| animation.facts(root)).collect(),
         ..Facts::default()
     }
 }
