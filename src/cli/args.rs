@@ -125,7 +125,7 @@ pub(super) struct RenderArgs {
     /// Repeat a picture with the settings it carries; refuses when the input has changed
     #[arg(long, value_name = "PICTURE", help_heading = "Output", hide_short_help = true, conflicts_with_all = [
         "size", "format", "bits", "half", "float", "layers", "tone_map", "exposure", "merge", "view", "camera", "eye",
-        "at", "up_vector", "fov", "ortho", "up", "background", "samples", "depth", "cutoff", "seed", "scene", "animation", "time", "frame", "fps",
+        "at", "up_vector", "fov", "ortho", "up", "background", "samples", "depth", "cutoff", "seed", "scene", "animation", "time", "frame", "fps", "frames", "turntable",
         "polygons", "mtl", "allow_empty", "accel", "intersector",
     ])]
     pub again: Option<PathBuf>,
@@ -180,6 +180,19 @@ pub(super) struct RenderArgs {
     /// Which moment of an animation.
     #[command(flatten)]
     pub moment: MomentArgs,
+    /// Several frames, from A to before B (`A..=B`: with B), seen by one camera that has all of them in the picture; with
+    /// --frame N, only that one of them
+    ///
+    /// Pictures go to STEM.0000.png and so on, or to a template with {frame:04}.
+    #[arg(long, value_name = "A..B", value_parser = parse::frames, help_heading = "Animation", hide_short_help = true,
+          conflicts_with_all = ["time", "turntable"])]
+    pub frames: Option<parse::Frames>,
+    /// N pictures from all around, about the up axis, the view or camera being the first; with I/N, only number I of
+    /// them, from 0
+    ///
+    /// Pictures go to STEM.0000.png and so on, or to a template with {frame:04}.
+    #[arg(long, value_name = "N", value_parser = parse::turns, help_heading = "Camera", hide_short_help = true)]
+    pub turntable: Option<parse::Turns>,
     /// What becomes of OBJ faces with more than three corners
     #[arg(long, value_name = "HOW", value_enum, default_value_t, help_heading = "Loading", hide_short_help = true)]
     pub polygons: PolygonsArg,

@@ -24,6 +24,7 @@ mod profile;
 mod progress;
 mod read;
 mod render;
+mod sequence;
 mod shell;
 mod stats;
 mod text;

@@ -12,14 +12,21 @@ pub(super) fn moment(args: &MomentArgs) -> Result<Option<Moment>, Wrong> {
     if args.fps.is_some() && args.frame.is_none() {
         return Err(Wrong("--fps says how long a frame is; add --frame N".into()));
     }
-    let time = args.time.or(args.frame.map(|frame| time_of(frame, args)));
-    let any = time.is_some() || args.animation.is_some();
-    Ok(any.then(|| Moment { animation: args.animation.clone(), time: time.unwrap_or(0.0) }))
+    if let Some(frame) = args.frame {
+        return Ok(Some(of_frame(frame, args)));
+    }
+    let any = args.time.is_some() || args.animation.is_some();
+    Ok(any.then(|| Moment { animation: args.animation.clone(), time: args.time.unwrap_or(0.0) }))
 }
 
-/// When a frame is, seconds.
-fn time_of(frame: u32, args: &MomentArgs) -> f64 {
-    f64::from(frame) / args.fps.unwrap_or(FPS)
+/// What a frame shows.
+pub(super) fn of_frame(frame: u32, args: &MomentArgs) -> Moment {
+    Moment { animation: args.animation.clone(), time: f64::from(frame) / fps(args) }
+}
+
+/// Frames a second.
+pub(super) fn fps(args: &MomentArgs) -> f64 {
+    args.fps.unwrap_or(FPS)
 }
 
 #[cfg(test)]

@@ -49,6 +49,7 @@ pub(super) fn one_model(input: &PathBuf, args: &LoadArgs, messages: &Messages) -
         scene: args.scene.clone(),
         up: args.up.map(Into::into),
         moment,
+        without_pictures: false,
     };
     let loaded = scene(slice::from_ref(input), &options).map_err(|error| {
         messages.load_error(&error);
@@ -56,6 +57,18 @@ pub(super) fn one_model(input: &PathBuf, args: &LoadArgs, messages: &Messages) -
     })?;
     loaded.warnings.iter().for_each(|w| messages.say(Severity::Warning, w));
     Ok(loaded)
+}
+
+/// Gives a frame that was loaded without pictures those of an earlier one, which are the same, with the materials that
+/// show them. Whether it can be done: other materials are a sign that the file has been changed in between.
+pub(super) fn take_pictures(frame: &mut Loaded, earlier: Loaded) -> bool {
+    if frame.scene.materials.len() != earlier.scene.materials.len() {
+        return false;
+    }
+    let (to, from) = (&mut frame.scene, earlier.scene);
+    (to.materials, to.textures, to.bitmaps) = (from.materials, from.textures, from.bitmaps);
+    (frame.facts.files, frame.facts.hash) = (earlier.facts.files, earlier.facts.hash);
+    true
 }
 
 fn append(whole: &mut Loaded, part: Loaded) {

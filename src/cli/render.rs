@@ -1,21 +1,23 @@
 //! `meshray render`: load, build, render, write; one batch after the other, going on where one fails.
 
-use super::camera;
 use super::exit::Exit;
 use super::job::{Batch, RenderJob, Shot, Target};
 use super::message::{Messages, Severity};
 use super::picture::{self, Effective};
 use super::profile::Profile;
 use super::progress::Progress;
+use super::sequence::{self, Step, Survey};
 use super::stats::{self, PictureStats, Times};
 use super::{accident, again, cost_layers, interrupt, output_name, read};
-use crate::accel::auto;
+use crate::accel::AnyAccel;
+use crate::accel::auto::{self, Reason};
 use crate::image::was_written_by_meshray;
-use crate::load::{Diagnostic, Loaded};
+use crate::load::{Diagnostic, LoadOptions, Loaded};
 use crate::render::texture::TextureStore;
 use crate::render::{Costs, Job, Rendered, View, World, render_costs};
 use crate::scene::framing::{Bounds, robust_bounds_within};
-use crate::scene::{default_light, default_light::DefaultLight};
+use crate::scene::{Scene, default_light, default_light::DefaultLight};
+use std::collections::HashSet;
 use std::path::Path;
 use std::time::Instant;
 
@@ -68,18 +70,54 @@ fn render_batch(job: &RenderJob, batch: &Batch, messages: &Messages, done: &mut 
     let name = batch.inputs[0].file_name().unwrap_or(batch.inputs[0].as_os_str()).to_string_lossy();
     let progress = Progress::new(&name, messages, job.quiet, job.keep_partial);
     let profile = if done.is_empty() { Profile::of_process() } else { Profile::new() };
-    match prepare(job, batch, messages, &progress, profile) {
-        Ok(mut ready) => {
-            for shot in shots {
-                worst = worst.max(render_shot(job, batch, shot, &mut ready, messages, &progress, done));
-                if interrupt::raised() {
-                    return Exit::Interrupted;
-                }
-            }
-            worst
+    let aspect = |scene: &Scene| Effective::new(&job.look, &scene.hints).map_or(1.0, |effective| effective.aspect());
+    let survey = match Survey::of(job, batch, aspect, messages, &progress) {
+        Ok(survey) => survey,
+        Err(exit) => return worst.max(exit),
+    };
+    let (mut profile, mut earlier, mut left) = (Some(profile), None, shots.as_slice());
+    while let Some(first) = left.first() {
+        // Pictures of one moment have one scene.
+        let same = left.iter().take_while(|shot| shot.step.moment == first.step.moment).count();
+        let (now, later) = left.split_at(same);
+        left = later;
+        let profile = profile.take().unwrap_or_else(Profile::new);
+        let mut ready = match prepare(job, batch, &first.step, earlier.take(), messages, &progress, profile) {
+            Ok(ready) => ready,
+            Err(exit) => return worst.max(exit),
+        };
+        ready.bounds = survey.as_ref().map_or(ready.bounds, |survey| survey.bounds);
+        worst = worst.max(render_shots(job, batch, now, &mut ready, survey.as_ref(), messages, &progress, done));
+        if interrupt::raised() {
+            return Exit::Interrupted;
         }
-        Err(exit) => worst.max(exit),
+        earlier = Some(ready);
     }
+    worst
+}
+
+/// The pictures of one scene.
+#[expect(clippy::too_many_arguments, reason = "what a batch is rendered with")]
+fn render_shots(
+    job: &RenderJob,
+    batch: &Batch,
+    shots: &[&Shot],
+    ready: &mut Ready,
+    survey: Option<&Survey>,
+    messages: &Messages,
+    progress: &Progress,
+    done: &mut Vec<PictureStats>,
+) -> Exit {
+    let Ready { loaded, world, bounds, load_seconds, profile, .. } = ready;
+    let mut stage = Stage { loaded, world, bounds, load_seconds, profile, survey, built: None };
+    let mut worst = Exit::Done;
+    for shot in shots {
+        worst = worst.max(render_shot(job, batch, shot, &mut stage, messages, progress, done));
+        if interrupt::raised() {
+            break;
+        }
+    }
+    worst
 }
 
 /// Whether a picture may go there. Asked before any work is done for it.
@@ -115,23 +153,51 @@ struct Ready {
     load_seconds: f64,
     /// Stages that no picture has told yet.
     profile: Profile,
+    /// Code and place of the warnings that have been said.
+    told: HashSet<(&'static str, String)>,
+}
+
+/// A scene that is rendered, and the structure that all its pictures share.
+struct Stage<'a> {
+    loaded: &'a mut Loaded,
+    world: &'a World,
+    bounds: &'a Bounds,
+    load_seconds: &'a mut f64,
+    profile: &'a mut Profile,
+    survey: Option<&'a Survey>,
+    built: Option<(AnyAccel<'a>, Option<Reason>)>,
 }
 
 fn prepare(
     job: &RenderJob,
     batch: &Batch,
+    step: &Step,
+    earlier: Option<Ready>,
     messages: &Messages,
     progress: &Progress,
     mut profile: Profile,
 ) -> Result<Ready, Exit> {
     let start = Instant::now();
     progress.stage("loading");
-    let loaded = read::scene(&batch.inputs, &job.load).map_err(|error| {
+    let options = LoadOptions { without_pictures: earlier.is_some(), ..job.load_for(step) };
+    let mut loaded = read::scene(&batch.inputs, &options).map_err(|error| {
         messages.load_error(&error);
         read::exit_of(&error)
     })?;
+    let mut told = HashSet::new();
+    if let Some(earlier) = earlier {
+        told = earlier.told;
+        if !read::take_pictures(&mut loaded, earlier.loaded) {
+            let fault = Diagnostic::new("input-changed", &batch.inputs[0], "", "was changed while it was rendered");
+            messages.say(Severity::Error, &fault.remedy("render it again"));
+            return Err(Exit::Failed);
+        }
+    }
     profile.loaded(loaded.facts.reading, loaded.facts.decoding);
-    loaded.warnings.iter().for_each(|w| messages.say(Severity::Warning, w));
+    // What is wrong with one frame is wrong with most.
+    for warning in loaded.warnings.iter().filter(|w| told.insert((w.code, w.place.clone()))) {
+        messages.say(Severity::Warning, warning);
+    }
     if job.strict && !loaded.warnings.is_empty() {
         let count = loaded.warnings.len();
         let text = format!("not rendered: --strict, and there are {count} kinds of warnings");
@@ -153,7 +219,7 @@ fn prepare(
     profile.done("place");
     let bounds = robust_bounds_within(&loaded.scene, world.bounds);
     profile.done("frame");
-    Ok(Ready { loaded, world, bounds, load_seconds: start.elapsed().as_secs_f64(), profile })
+    Ok(Ready { loaded, world, bounds, load_seconds: start.elapsed().as_secs_f64(), profile, told })
 }
 
 fn nothing_to_draw(loaded: &Loaded, file: &Path) -> Diagnostic {
@@ -171,12 +237,12 @@ fn render_shot(
     job: &RenderJob,
     batch: &Batch,
     shot: &Shot,
-    ready: &mut Ready,
+    stage: &mut Stage,
     messages: &Messages,
     progress: &Progress,
     done: &mut Vec<PictureStats>,
 ) -> Exit {
-    let Ready { loaded, world, bounds, load_seconds, profile } = ready;
+    let Stage { loaded, world, bounds, load_seconds, profile, survey, built } = stage;
     let file = &batch.inputs[0];
     let fail = |fault: &Diagnostic, exit| {
         messages.say(Severity::Error, fault);
@@ -195,8 +261,8 @@ fn render_shot(
     }
 
     // The eye, then the light that belongs to it: each view has its own.
-    let aspect = f64::from(effective.settings.width) / f64::from(effective.settings.height);
-    let (camera, view_phrase) = match camera::camera(&shot.choice, job.look.lens, &loaded.scene, bounds, aspect, file) {
+    let seen = (&loaded.scene, *bounds);
+    let (camera, view_phrase) = match sequence::camera(job, shot, *survey, seen, effective.aspect(), file) {
         Ok(found) => found,
         Err(fault) => return fail(&fault, Exit::Input),
     };
@@ -207,24 +273,21 @@ fn render_shot(
     let view = View::from_camera(&camera);
     profile.done("frame");
 
-    let mut times = Times { load: *load_seconds, ..Times::default() };
+    let mut times = Times { load: **load_seconds, ..Times::default() };
     progress.stage("building");
     let start = Instant::now();
-    let (accel, reason) = auto::build(job.accel, &world.shapes, &job.params);
-    let accel = accel.tested_by(job.intersector);
+    let (accel, reason) = built.get_or_insert_with(|| {
+        let (accel, reason) = auto::build(job.accel, &world.shapes, &job.params);
+        (accel.tested_by(job.intersector), reason)
+    });
+    let (accel, reason) = (&*accel, *reason);
     let textures = TextureStore::new(&loaded.scene);
     let textures = if job.everything { textures.with_everything() } else { textures };
     times.build = start.elapsed().as_secs_f64();
     profile.done("build");
 
-    let work = Job {
-        scene: &loaded.scene,
-        world,
-        accel: &accel,
-        textures: &textures,
-        view: &view,
-        settings: &effective.settings,
-    };
+    let work =
+        Job { scene: &loaded.scene, world, accel, textures: &textures, view: &view, settings: &effective.settings };
     let mut rendered = trace(job, &work, progress, &mut times, profile);
     let costs = rendered.complete.then(|| costs(job, &work, progress));
     progress.finish();
@@ -234,7 +297,7 @@ fn render_shot(
     if let Some(layers) = &mut rendered.picture.layers {
         cost_layers::add_channels(job, &costs, layers);
     }
-    let counted = job.stats.is_some().then(|| stats::count(&work, &rendered, &accel, messages));
+    let counted = job.stats.is_some().then(|| stats::count(&work, &rendered, accel, messages));
 
     let (depth, accel_kind) = (rendered.depth, accel.kind());
     let facts = again::Facts { job, batch, shot, effective: &effective, depth, accel: accel_kind, reason, loaded };
@@ -268,7 +331,7 @@ fn render_shot(
     loaded.scene.lights = lights;
     loaded.scene.environment = environment;
     loaded.scene.background = background;
-    *load_seconds = 0.0;
+    **load_seconds = 0.0;
     exit
 }
 

@@ -42,6 +42,8 @@ pub struct LoadOptions {
     pub up: Option<UpAxis>,
     /// Which moment of an animation of a glTF file is shown; `None`: the rest pose.
     pub moment: Option<Moment>,
+    /// Leaves pictures out: for whoever needs the geometry of a glTF file alone.
+    pub without_pictures: bool,
 }
 
 /// A moment of an animation.

@@ -1,6 +1,7 @@
 //! The program from outside: what scripts and people rely on.
 
 mod again;
+mod animation;
 mod backdrop;
 mod bench;
 mod costs;

@@ -124,7 +124,9 @@ impl<'a> Report<'a> {
         };
         lines.add("extensions", shorten(self.loaded.facts.extensions.iter().map(extension)));
         let animation = |animation: &AnimationFacts| {
-            format!("{} ({:.3} s, {} channels)", label(&animation.name), animation.seconds, animation.channels)
+            let channels = if animation.channels == 1 { "channel" } else { "channels" };
+            let (seconds, count) = (animation.seconds, animation.channels);
+            format!("{} ({seconds:.3} s, {count} {channels})", label(&animation.name))
         };
         lines.add("animations", shorten(self.loaded.facts.animations.iter().map(animation)));
         lines.add("cameras", shorten(scene.cameras.iter().map(|c| format!("{} ({})", label(&c.name), lens(c)))));

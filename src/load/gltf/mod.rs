@@ -202,7 +202,8 @@ impl Loading<'_> {
         let palette = self.palette(document, &placed);
 
         let drawn_images = palette.textures.images.clone();
-        let images = Images::load(root, &buffers, &drawn_images, file, &mut resolver, budget, self.report);
+        let read_images = if self.options.without_pictures { &[][..] } else { &drawn_images };
+        let images = Images::load(root, &buffers, read_images, file, &mut resolver, budget, self.report);
         self.charge(reader, &placed, &skins, &palette, budget)?;
         let mut pictures = Report::new(file);
         let (reads, (bitmaps, decoding)) = rayon::join(
