@@ -27,6 +27,7 @@ mod render;
 mod sequence;
 mod shell;
 mod stats;
+mod summary;
 mod text;
 mod trace;
 mod verify;

@@ -8,6 +8,7 @@ use super::profile::Profile;
 use super::progress::Progress;
 use super::sequence::{self, Step, Survey};
 use super::stats::{self, PictureStats, Times};
+use super::summary::Summary;
 use super::{accident, again, cost_layers, interrupt, output_name, read};
 use crate::accel::AnyAccel;
 use crate::accel::auto::{self, Reason};
@@ -16,7 +17,7 @@ use crate::load::{Diagnostic, LoadOptions, Loaded};
 use crate::render::texture::TextureStore;
 use crate::render::{Costs, Job, Rendered, View, World, render_costs};
 use crate::scene::framing::{Bounds, robust_bounds_within};
-use crate::scene::{Scene, default_light, default_light::DefaultLight};
+use crate::scene::{Scene, default_light};
 use std::collections::HashSet;
 use std::path::Path;
 use std::time::Instant;
@@ -69,12 +70,13 @@ fn render_batch(job: &RenderJob, batch: &Batch, messages: &Messages, done: &mut 
     // The bar needs the room that folders would take.
     let name = batch.inputs[0].file_name().unwrap_or(batch.inputs[0].as_os_str()).to_string_lossy();
     let progress = Progress::new(&name, messages, job.quiet, job.keep_partial);
-    let profile = if done.is_empty() { Profile::of_process() } else { Profile::new() };
+    let mut profile = if done.is_empty() { Profile::of_process() } else { Profile::new() };
     let aspect = |scene: &Scene| Effective::new(&job.look, &scene.hints).map_or(1.0, |effective| effective.aspect());
     let survey = match Survey::of(job, batch, aspect, messages, &progress) {
         Ok(survey) => survey,
         Err(exit) => return worst.max(exit),
     };
+    survey.iter().for_each(|_| profile.done("frame"));
     let (mut profile, mut earlier, mut left) = (Some(profile), None, shots.as_slice());
     while let Some(first) = left.first() {
         // Pictures of one moment have one scene.
@@ -382,50 +384,4 @@ fn keep_partial(shot: &Shot, rendered: &Rendered, effective: &Effective, loaded:
         Err(picture::WriteError::BrokenPipe) => {}
     }
     Exit::Interrupted
-}
-
-/// The lines at the end of a picture.
-struct Summary<'a> {
-    shot: &'a Shot,
-    effective: &'a Effective,
-    loaded: &'a Loaded,
-    bounds: &'a Bounds,
-    view: &'a str,
-    light: DefaultLight,
-}
-
-impl Summary<'_> {
-    fn say(&self, rendered: &Rendered, times: &Times, messages: &Messages) {
-        let name = self.shot.target.path().unwrap_or(Path::new("-"));
-        let say = |code, text: String| messages.say(Severity::Info, &Diagnostic::new(code, name, "", text));
-        say("picture", self.picture(rendered));
-        say("times", times.line(&self.effective.settings));
-    }
-
-    fn picture(&self, rendered: &Rendered) -> String {
-        let settings = &self.effective.settings;
-        let mut parts = vec![
-            format!("{}×{}", settings.width, settings.height),
-            format!("{} samples a pixel", settings.samples),
-            format!("depth {}{}", rendered.depth, if settings.depth.is_none() { " (auto)" } else { "" }),
-            self.view.to_owned(),
-        ];
-        let facts = &self.loaded.facts;
-        if let Some((number, time)) = facts.shown {
-            let name = facts.animations.get(number).map_or("", |animation| animation.name.as_str());
-            let name = if name.is_empty() { number.to_string() } else { format!("'{name}'") };
-            parts.push(format!("animation {name} at {time:.3} s"));
-        }
-        if let Some(reason) = &facts.up_reason {
-            let axis = if self.loaded.scene.up == crate::scene::UpAxis::Z { "+Z" } else { "+Y" };
-            parts.push(format!("{axis} up ({reason})"));
-        }
-        if self.light == DefaultLight::Added {
-            parts.push("studio light".into());
-        }
-        if self.bounds.strays > 0 {
-            parts.push(format!("framing leaves out {} far-off faces", self.bounds.strays));
-        }
-        parts.join(", ")
-    }
 }

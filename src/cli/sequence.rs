@@ -11,8 +11,7 @@ use super::parse::{Frames, Turns};
 use super::progress::Progress;
 use super::{interrupt, moment, read};
 use crate::load::{Diagnostic, LoadOptions, Moment};
-use crate::render::World;
-use crate::scene::framing::{Bounds, Fit, frame, frame_around, robust_bounds_within, turned};
+use crate::scene::framing::{Bounds, Fit, frame, frame_around, robust_bounds, turned};
 use crate::scene::{Camera, Scene};
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -160,7 +159,7 @@ impl Survey {
                 return Err(Exit::Input);
             }
             let scene = &loaded.scene;
-            let here = robust_bounds_within(scene, World::new(scene).bounds);
+            let here = robust_bounds(scene);
             if bounds.is_none() {
                 let first = &batch.shots[0].step;
                 let choices = batch.shots.iter().take_while(|shot| shot.step == *first).map(|shot| &shot.choice);

@@ -108,7 +108,7 @@ fn frames_share_a_camera_that_sees_them_all() {
     let folder = folder();
     folder.render(&["a.gltf", "--frames", "0..=4", "--fps", "4", "-q"]).ends(0);
     let names: Vec<String> = (0..5).map(|i| format!("a.{i:04}.png")).collect();
-    assert_eq!(folder.names(), [&["a.gltf".to_owned()], names.as_slice(), &["cube.obj".to_owned()]].concat());
+    assert!(folder.names().starts_with(&names) && !folder.has("a.0005.png"), "{:?}", folder.names());
     let places: Vec<f64> = names.iter().map(|name| middle(&folder, name)).collect();
     assert!(places.windows(2).all(|pair| pair[1] > pair[0] + 3.0), "{places:?}");
     // Framed together, the way is in the middle of the picture.
@@ -122,7 +122,10 @@ fn one_frame_of_a_sequence_can_be_rendered_again() {
     folder.render(&["a.gltf", "--frames", "1..4", "--frame", "2", "--fps", "4", "-q", "-o", "one.png"]).ends(0);
     folder.run(&["render", "--again", "2.png", "-o", "again.png", "-q"]).ends(0);
     assert!(folder.read("one.png") == folder.read("2.png") && folder.read("again.png") == folder.read("2.png"));
-    folder.render(&["a.gltf", "--frames", "1..4", "--frame", "4"]).ends(2).says(&["--frame 4 is none of --frames 1..4"]);
+    folder
+        .render(&["a.gltf", "--frames", "1..4", "--frame", "4"])
+        .ends(2)
+        .says(&["--frame 4 is none of --frames 1..4"]);
 }
 
 #[test]
@@ -143,12 +146,12 @@ fn a_warning_of_every_frame_is_said_once() {
 #[test]
 fn a_turntable_shows_a_model_from_all_around() {
     let folder = folder();
-    folder.render(&["cube.obj", "--turntable", "4", "-q"]).ends(0);
+    folder.render(&["cube.obj", "--turntable", "4", "--background", "transparent", "-q"]).ends(0);
     let name = |i: u32| format!("cube.{i:04}.png");
     assert!((0..4).all(|i| folder.has(&name(i))), "{:?}", folder.names());
-    // A cube looks the same from four sides, as far as it is lit by the lamps at the camera.
-    let outline = |i: u32| picture(&folder.path(&name(i))).beauty.iter().filter(|p| p[0] > 0.25).count();
-    assert!((0..4).all(|i| outline(i).abs_diff(outline(0)) < 40), "{:?}", (0..4).map(outline).collect::<Vec<_>>());
+    // A cube has the same outline from four sides.
+    let outline = |i: u32| picture(&folder.path(&name(i))).beauty.iter().filter(|p| p[3] > 0.0).count();
+    assert!((0..4).all(|i| outline(i).abs_diff(outline(0)) < 5), "{:?}", (0..4).map(outline).collect::<Vec<_>>());
     assert!(folder.read(&name(0)) != folder.read(&name(1)));
     folder.run(&["render", "--again", &name(3), "-o", "again.png", "-q"]).ends(0);
     assert!(folder.read("again.png") == folder.read(&name(3)));

@@ -286,6 +286,7 @@ mod tests {
             (Code::ArrayTypeMismatch, "a type mismatch of an element"),
         ];
         let sources = [
+            include_str!("animation/play.rs"),
             include_str!("attributes.rs"),
             include_str!("bounds.rs"),
             include_str!("buffers.rs"),

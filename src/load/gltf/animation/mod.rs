@@ -9,11 +9,13 @@ mod play;
 
 pub(super) use play::{Pose, play};
 
+use super::accessor::Reader;
 use super::schema::whole;
 use crate::load::AnimationFacts;
 use curve::Interpolation;
-use gltf::json::{Index, Root, accessor::Accessor};
+use gltf::json::{Index, accessor::Accessor};
 use serde_json::Value;
+use std::collections::HashMap;
 
 /// An animation of the file, as its JSON says.
 #[derive(Clone, Debug, Default)]
@@ -96,15 +98,32 @@ impl Animation {
         }
     }
 
-    /// For reports. The length is that of the `max` of its times, which glTF asks for.
-    pub(super) fn facts(&self, root: &Root) -> AnimationFacts {
-        let last = |channel: &Channel| {
-            let max = root.accessors.get(channel.input.value())?.max.as_ref()?;
-            max.get(0)?.as_f64()
-        };
-        let seconds = self.channels.iter().flatten().filter_map(last).fold(0.0, f64::max);
-        AnimationFacts { name: self.name.clone().unwrap_or_default(), seconds, channels: self.channels.len() }
+    /// The name in quotes, or else the number: what messages call it.
+    pub(super) fn called(&self, number: usize) -> String {
+        let name = self.name.as_deref().filter(|name| !name.is_empty());
+        name.map_or_else(|| number.to_string(), |name| format!("'{name}'"))
     }
+}
+
+/// What there is to say about all of them.
+///
+/// The length of one is that of the `max` of its times, which glTF asks for; where it is missing, they are read.
+pub(super) fn facts(animations: &[Animation], reader: Reader) -> Vec<AnimationFacts> {
+    let mut ends: HashMap<usize, f64> = HashMap::new();
+    let mut end = |input: Index<Accessor>| {
+        *ends.entry(input.value()).or_insert_with(|| {
+            let accessor = reader.root.accessors.get(input.value());
+            let declared = accessor.and_then(|a| a.max.as_ref()?.get(0)?.as_f64());
+            let read = || reader.extent(input)?.ok().map(|extent| extent[0].1).filter(|end| end.is_finite());
+            declared.or_else(read).unwrap_or(0.0)
+        })
+    };
+    let of = |animation: &Animation| AnimationFacts {
+        name: animation.name.clone().unwrap_or_default(),
+        seconds: animation.channels.iter().flatten().map(|channel| end(channel.input)).fold(0.0, f64::max),
+        channels: animation.channels.len(),
+    };
+    animations.iter().map(of).collect()
 }
 
 /// What a channel aims at; `None`: at a property or node that does not exist.

@@ -21,8 +21,6 @@ pub(in super::super) struct Pose {
     pub(in super::super) moved: HashMap<usize, Moved>,
     /// Weights of morph targets, by node.
     pub(in super::super) weights: HashMap<usize, Vec<f32>>,
-    /// When the last key is, seconds.
-    pub(in super::super) length: f64,
 }
 
 /// Evaluates an animation, the `number`th of the file, at `time` seconds.
@@ -136,10 +134,7 @@ impl Player<'_, '_> {
         }
         self.budget.take(self.reader.count(input), size_of::<f32>() as u64 * 2)?;
         let times = match read_times(self.reader, input) {
-            Ok(times) => {
-                self.pose.length = times.last().map_or(0.0, |&last| f64::from(last)).max(self.pose.length);
-                Some(times)
-            }
+            Ok(times) => Some(times),
             Err(fault) => {
                 fault.tell(place, self.report);
                 None

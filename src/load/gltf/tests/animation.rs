@@ -166,6 +166,36 @@ fn joints_that_move_take_their_skin_along() {
 }
 
 #[test]
+fn cameras_and_lamps_go_with_their_nodes() {
+    let mut file = moving("translation", "LINEAR", &[0., 1.], "VEC3", &[0., 0., 0., 0., 4., 0.]);
+    file.set("cameras", json!([{"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}}]));
+    file.set("extensionsUsed", json!(["KHR_lights_punctual"]));
+    file.set("extensions", json!({"KHR_lights_punctual": {"lights": [{"type": "point"}]}}));
+    file.set(
+        "nodes",
+        json!([{"mesh": 0, "children": [1]}, {"translation": [1, 0, 0], "camera": 0,
+        "extensions": {"KHR_lights_punctual": {"light": 0}}}]),
+    );
+    let scene = at(&file, 0.5).scene;
+    assert_close(scene.cameras[0].world_from_camera.translation, [1.0, 2.0, 0.0]);
+    let LightKind::Point { position, .. } = scene.lights[0].kind else { panic!("{:?}", scene.lights) };
+    assert_close(position, [1.0, 2.0, 0.0]);
+}
+
+#[test]
+fn values_may_be_replaced_by_sparse_ones() {
+    let mut file = moving("translation", "LINEAR", &[0., 1., 2.], "VEC3", &[0.; 9]);
+    let index = file.view(&2u16.to_le_bytes(), &[]);
+    let value: Vec<u8> = [6f32, 0., 0.].iter().flat_map(|x| x.to_le_bytes()).collect();
+    let value = file.view(&value, &[]);
+    file.root["accessors"][2]["sparse"] = json!({"count": 1,
+        "indices": {"bufferView": index, "componentType": 5123}, "values": {"bufferView": value}});
+    for (time, x) in [(0.5, 0.0), (1.5, 3.0), (2.0, 6.0)] {
+        assert_close(point(&at(&file, time), DVec3::ZERO), [x, 0.0, 0.0]);
+    }
+}
+
+#[test]
 fn a_broken_channel_is_left_out_and_said_and_the_others_go_on() {
     let nan = f32::NAN;
     let good = [0., 0., 0., 2., 0., 0.];
