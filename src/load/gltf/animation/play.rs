@@ -1,12 +1,12 @@
 //! What one moment of an animation does to the nodes.
 
-use super::super::accessor::{Format, Pick, Reader, Unreadable};
-use super::super::codes::Code;
-use super::super::graph::{Graph, Moved};
-use super::super::report::Report;
 use super::curve::{self, Between, Interpolation, Key};
 use super::{Animation, Channel, Property, Target};
 use crate::load::Diagnostic;
+use crate::load::gltf::accessor::{Format, Pick, Reader, Unreadable};
+use crate::load::gltf::codes::Code;
+use crate::load::gltf::graph::{Graph, Moved};
+use crate::load::gltf::report::Report;
 use crate::load::limits::{Budget, OverBudget};
 use crate::math::DVec3;
 use gltf::json::Index;
@@ -16,18 +16,18 @@ use std::rc::Rc;
 
 /// What an animation puts in the place of what the nodes say.
 #[derive(Clone, Debug, Default)]
-pub(in super::super) struct Pose {
+pub(in crate::load::gltf) struct Pose {
     /// Translations, rotations and scales, by node.
-    pub(in super::super) moved: HashMap<usize, Moved>,
+    pub(in crate::load::gltf) moved: HashMap<usize, Moved>,
     /// Weights of morph targets, by node.
-    pub(in super::super) weights: HashMap<usize, Vec<f32>>,
+    pub(in crate::load::gltf) weights: HashMap<usize, Vec<f32>>,
 }
 
 /// Evaluates an animation, the `number`th of the file, at `time` seconds.
 ///
 /// # Errors
 /// When its times would take more than is left of `budget`.
-pub(in super::super) fn play(
+pub(in crate::load::gltf) fn play(
     reader: Reader,
     graph: &Graph,
     (number, animation): (usize, &Animation),
