@@ -299,13 +299,18 @@ fn refuse_collisions(batches: &[Batch]) -> Result<(), Wrong> {
         batches.iter().flat_map(|b| b.shots.iter().map(|s| (b.inputs[0].as_path(), s))).collect();
     let to_stdout = shots.iter().filter(|(_, s)| s.target == Target::Stdout).count();
     if to_stdout > 1 {
-        return wrong(format!("{to_stdout} pictures cannot all go to standard output; use -o '{{stem}}-{{view}}.png'"));
+        return wrong(format!(
+            "{to_stdout} pictures cannot all go to standard output; use -o '{{stem}}-{{view}}.{{frame:04}}.png'"
+        ));
     }
     let names: Vec<PathBuf> = shots.iter().filter_map(|(_, s)| s.target.path().map(Path::to_path_buf)).collect();
     let Some((a, b)) = output_name::collision(&names) else { return Ok(()) };
-    let what = |i: usize| match &shots[i].1.choice {
-        Choice::Default => format!("{}", shots[i].0.display()),
-        choice => format!("{} ({})", shots[i].0.display(), choice.name()),
+    let what = |i: usize| {
+        let (input, Shot { choice, step, .. }) = shots[i];
+        let view = (*choice != Choice::Default).then(|| choice.name());
+        let parts: Vec<String> = view.into_iter().chain(step.number.map(|n| format!("number {n}"))).collect();
+        let parts = if parts.is_empty() { String::new() } else { format!(" ({})", parts.join(", ")) };
+        format!("{}{parts}", input.display())
     };
     wrong(format!(
         "{} and {} would both be written to {}; use {{dir}}, {{stem}}, {{view}} or {{frame:04}} in -o",
