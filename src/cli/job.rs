@@ -299,9 +299,9 @@ fn refuse_collisions(batches: &[Batch]) -> Result<(), Wrong> {
         batches.iter().flat_map(|b| b.shots.iter().map(|s| (b.inputs[0].as_path(), s))).collect();
     let to_stdout = shots.iter().filter(|(_, s)| s.target == Target::Stdout).count();
     if to_stdout > 1 {
-        return wrong(format!(
-            "{to_stdout} pictures cannot all go to standard output; use -o '{{stem}}-{{view}}.{{frame:04}}.png'"
-        ));
+        let numbered = shots.iter().any(|(_, shot)| shot.step.number.is_some());
+        let name = if numbered { "{stem}.{frame:04}.png" } else { "{stem}-{view}.png" };
+        return wrong(format!("{to_stdout} pictures cannot all go to standard output; use -o '{name}'"));
     }
     let names: Vec<PathBuf> = shots.iter().filter_map(|(_, s)| s.target.path().map(Path::to_path_buf)).collect();
     let Some((a, b)) = output_name::collision(&names) else { return Ok(()) };

@@ -88,36 +88,15 @@ fn render_batch(job: &RenderJob, batch: &Batch, messages: &Messages, done: &mut 
             Ok(ready) => ready,
             Err(exit) => return worst.max(exit),
         };
-        ready.bounds = survey.as_ref().map_or(ready.bounds, |survey| survey.bounds);
-        worst = worst.max(render_shots(job, batch, now, &mut ready, survey.as_ref(), messages, &progress, done));
-        if interrupt::raised() {
-            return Exit::Interrupted;
+        let mut stage = ready.stage(survey.as_ref());
+        for shot in now {
+            worst = worst.max(render_shot(job, batch, shot, &mut stage, messages, &progress, done));
+            if interrupt::raised() {
+                return Exit::Interrupted;
+            }
         }
+        drop(stage);
         earlier = Some(ready);
-    }
-    worst
-}
-
-/// The pictures of one scene.
-#[expect(clippy::too_many_arguments, reason = "what a batch is rendered with")]
-fn render_shots(
-    job: &RenderJob,
-    batch: &Batch,
-    shots: &[&Shot],
-    ready: &mut Ready,
-    survey: Option<&Survey>,
-    messages: &Messages,
-    progress: &Progress,
-    done: &mut Vec<PictureStats>,
-) -> Exit {
-    let Ready { loaded, world, bounds, load_seconds, profile, .. } = ready;
-    let mut stage = Stage { loaded, world, bounds, load_seconds, profile, survey, built: None };
-    let mut worst = Exit::Done;
-    for shot in shots {
-        worst = worst.max(render_shot(job, batch, shot, &mut stage, messages, progress, done));
-        if interrupt::raised() {
-            break;
-        }
     }
     worst
 }
@@ -157,6 +136,15 @@ struct Ready {
     profile: Profile,
     /// Code and place of the warnings that have been said.
     told: HashSet<(&'static str, String)>,
+}
+
+impl Ready {
+    /// Nothing built yet. Frames of a sequence are seen in the bounds of all.
+    fn stage<'a>(&'a mut self, survey: Option<&'a Survey>) -> Stage<'a> {
+        let Self { loaded, world, bounds, load_seconds, profile, .. } = self;
+        let bounds = survey.map_or(&*bounds, |survey| &survey.bounds);
+        Stage { loaded, world, bounds, load_seconds, profile, survey, built: None }
+    }
 }
 
 /// A scene that is rendered, and the structure that all its pictures share.

@@ -43,7 +43,8 @@ pub(super) struct Between {
 }
 
 impl Between {
-    /// Finds `time` among ascending times, of which there is at least one. Outside them the nearest key counts.
+    /// Finds `time` among ascending times, of which there is at least one. Outside them the nearest key counts, and of
+    /// two at one time the later.
     pub(super) fn of(times: &[f32], time: f64) -> Self {
         // The first key behind the moment.
         let after = times.partition_point(|&t| f64::from(t) <= time);
@@ -150,6 +151,8 @@ mod tests {
         assert_eq!(Between::of(&times, 4.0), Between::at_key(2));
         assert_eq!(Between::of(&times, 1e300), Between::at_key(2));
         assert_eq!(Between::of(&[0.0], 7.0), Between::at_key(0));
+        assert_eq!(Between::of(&[0.0, 1.0, 1.0, 2.0], 1.5), Between { before: 2, after: 3, span: 1.0, part: 0.5 });
+        assert_eq!(Between::of(&[1.0, 1.0], 1.0), Between::at_key(1));
     }
 
     #[test]

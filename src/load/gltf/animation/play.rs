@@ -43,15 +43,15 @@ pub(in crate::load::gltf) fn play(
         let place = Place { channel: format!("{place}.channels[{k}]"), animation: &place, sampler: channel.sampler };
         match channel.target {
             Target::Pointer => {
-                let text = "KHR_animation_pointer is not supported: what the channel changes stays as it is";
-                player.report.warn(Code::UnsupportedExtension, place.channel, text);
+                let (code, text) = (Code::UnsupportedExtension, "KHR_animation_pointer is not supported");
+                player.report.warn_with(code, place.channel, text, "what the channel changes stays as it is");
             }
             Target::Nothing => {}
             Target::Node(node, property) => {
                 if !seen.insert(channel.target) {
-                    let text =
-                        format!("a second channel changes the {} of node {node}; the first counts", property.name());
-                    player.report.warn(Code::AnimationDuplicateTargets, place.channel, text);
+                    let code = Code::AnimationDuplicateTargets;
+                    let text = format!("a second channel changes the {} of node {node}", property.name());
+                    player.report.warn_with(code, place.channel, text, "the first counts");
                 } else if let Err(fault) = player.channel(channel, node, property, &place)? {
                     fault.tell(&place, player.report);
                 }
@@ -68,6 +68,16 @@ struct Place<'a> {
     sampler: usize,
 }
 
+impl Place<'_> {
+    fn of_sampler(&self, part: &str) -> String {
+        format!("{}.samplers[{}].{part}", self.animation, self.sampler)
+    }
+}
+
+/// The accessors of a sampler.
+const INPUT: &str = "input";
+const OUTPUT: &str = "output";
+
 /// Why a channel is left out.
 enum Fault {
     /// Of the channel itself.
@@ -82,13 +92,14 @@ enum Fault {
 
 impl Fault {
     fn tell(self, place: &Place, report: &mut Report) {
-        let left_out = |text: String| format!("{text}; the channel is left out");
+        let left_out = "the channel is left out";
         match self {
-            Self::Target(code, text) => report.warn(code, format!("{}.target", place.channel), left_out(text)),
-            Self::Sampler(part, code, text) => {
-                let place = format!("{}.samplers[{}].{part}", place.animation, place.sampler);
-                report.warn(code, place, left_out(text));
+            Self::Target(code, text) => report.warn_with(code, format!("{}.target", place.channel), text, left_out),
+            // Channels share times, and they are looked at once.
+            Self::Sampler(part, code, text) if part == INPUT => {
+                report.warn_with(code, place.of_sampler(part), text, "channels with these times are left out");
             }
+            Self::Sampler(part, code, text) => report.warn_with(code, place.of_sampler(part), text, left_out),
             Self::File(why) => report.warnings.push(why),
             Self::Told => {}
         }
@@ -134,7 +145,14 @@ impl Player<'_, '_> {
         }
         self.budget.take(self.reader.count(input), size_of::<f32>() as u64 * 2)?;
         let times = match read_times(self.reader, input) {
-            Ok(times) => Some(times),
+            Ok(times) => {
+                if let Some(k) = times.windows(2).position(|pair| pair[0] == pair[1]) {
+                    let text = format!("times {k} and {} are both {} s", k + 1, times[k]);
+                    let (code, place) = (Code::AccessorAnimationInputNonIncreasing, place.of_sampler(INPUT));
+                    self.report.warn_with(code, place, text, "the later key counts");
+                }
+                Some(times)
+            }
             Err(fault) => {
                 fault.tell(place, self.report);
                 None
@@ -167,7 +185,7 @@ impl Player<'_, '_> {
                 keys.check(Type::Vec4, 1)?;
                 let (before, after) = keys.around::<4>(between, 1)?;
                 let rotation = curve::rotation(interpolation, between, &before, &after).ok_or_else(|| {
-                    Fault::Sampler("output", Code::AccessorAnimationQuaternion, "a rotation of length 0".into())
+                    Fault::Sampler(OUTPUT, Code::AccessorAnimationQuaternion, "a rotation of length 0".into())
                 })?;
                 self.pose.moved.entry(node).or_default().rotation = Some(rotation);
             }
@@ -197,20 +215,20 @@ impl Player<'_, '_> {
     }
 }
 
-/// Times that are finite and ascend.
+/// Times that are finite and never go back.
 fn read_times(reader: Reader, input: Index<Accessor>) -> Result<Rc<[f32]>, Fault> {
-    let fault = |code, text: String| Fault::Sampler("input", code, text);
+    let fault = |code, text: String| Fault::Sampler(INPUT, code, text);
     let format = reader.root.accessors.get(input.value()).and_then(Format::of).ok_or(Fault::Told)?;
     if format.component != ComponentType::F32 || format.shape != Type::Scalar {
         return Err(fault(Code::AnimationInputFormat, "times must be single floats".into()));
     }
-    let times = reader.floats::<1>(input, Pick::All).map_err(|why| Fault::unreadable("input", why))?;
+    let times = reader.floats::<1>(input, Pick::All).map_err(|why| Fault::unreadable(INPUT, why))?;
     let times: Rc<[f32]> = times.into_iter().map(|[time]| time).collect();
     if let Some(k) = times.iter().position(|time| !time.is_finite()) {
         return Err(fault(Code::AccessorInvalidFloat, format!("time {k} is {}", times[k])));
     }
-    if let Some(k) = times.windows(2).position(|pair| pair[0] >= pair[1]) {
-        let text = format!("time {} ({} s) is not after time {k} ({} s)", k + 1, times[k + 1], times[k]);
+    if let Some(k) = times.windows(2).position(|pair| pair[0] > pair[1]) {
+        let text = format!("time {} ({} s) is before time {k} ({} s)", k + 1, times[k + 1], times[k]);
         return Err(fault(Code::AccessorAnimationInputNonIncreasing, text));
     }
     if times.is_empty() {
@@ -232,7 +250,7 @@ impl Keys<'_> {
     fn check(&self, shape: Type, each: usize) -> Result<(), Fault> {
         let accessor = self.reader.root.accessors.get(self.channel.output.value()).ok_or(Fault::Told)?;
         let format = Format::of(accessor).ok_or(Fault::Told)?;
-        let fault = |code, text: String| Err(Fault::Sampler("output", code, text));
+        let fault = |code, text: String| Err(Fault::Sampler(OUTPUT, code, text));
         let small = format.normalized && format.component != ComponentType::U32;
         let numbers = match format.component {
             ComponentType::F32 => true,
@@ -267,11 +285,11 @@ impl Keys<'_> {
         let first = key.checked_mul(elements).ok_or(Fault::Told)?;
         let wanted: Option<Vec<u32>> = (first..first + elements).map(|i| u32::try_from(i).ok()).collect();
         let read = self.reader.floats::<N>(self.channel.output, Pick::Only(&wanted.ok_or(Fault::Told)?));
-        let read = read.map_err(|why| Fault::unreadable("output", why))?;
+        let read = read.map_err(|why| Fault::unreadable(OUTPUT, why))?;
         let numbers: Vec<f64> = read.iter().flatten().map(|&x| f64::from(x)).collect();
         if let Some(odd) = numbers.iter().find(|x| !x.is_finite()) {
             let text = format!("a value of key {key} is {odd}");
-            return Err(Fault::Sampler("output", Code::AccessorInvalidFloat, text));
+            return Err(Fault::Sampler(OUTPUT, Code::AccessorInvalidFloat, text));
         }
         if self.channel.interpolation != Interpolation::CubicSpline {
             return Ok(Key { value: numbers, ..Key::default() });
