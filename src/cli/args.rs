@@ -192,7 +192,8 @@ pub(super) struct RenderArgs {
     /// N pictures from all around, about the up axis, the view or camera being the first; with I/N, only number I of
     /// them, from 0
     ///
-    /// Pictures go to STEM.0000.png and so on, or to a template with {frame:04}.
+    /// Pictures go to STEM.0000.png and so on, or to a template with {frame:04}. The lamps of a model without its own go
+    /// with the camera, the studio around it stays; --background gives all pictures the same.
     #[arg(long, value_name = "N", value_parser = parse::turns, help_heading = "Camera", hide_short_help = true)]
     pub turntable: Option<parse::Turns>,
     /// What becomes of OBJ faces with more than three corners
