@@ -10,6 +10,7 @@ use super::exit::Exit;
 use super::job::{Batch, RenderJob, Shot};
 use super::parse::{self, Env};
 use super::picture::Effective;
+use super::sequence::Sequence;
 use super::stats::Counted;
 use crate::accel::auto::Reason;
 use crate::accel::{AccelKind, Assign, MailboxKind};
@@ -22,7 +23,7 @@ use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
 /// The flags that a picture may bring along.
-const FLAGS: [&str; 42] = [
+const FLAGS: [&str; 48] = [
     "size",
     "samples",
     "depth",
@@ -51,6 +52,12 @@ const FLAGS: [&str; 42] = [
     "merge",
     "format",
     "scene",
+    "animation",
+    "time",
+    "frame",
+    "fps",
+    "frames",
+    "turntable",
     "polygons",
     "mtl",
     "accel",
@@ -157,6 +164,7 @@ impl Facts<'_> {
             set("bits", "16".into());
         }
         load.scene.iter().for_each(|scene| set("scene", scene.clone()));
+        self.set_step(&mut set);
         if load.polygons == Polygons::Whole {
             set("polygons", "whole".into());
         }
@@ -191,6 +199,27 @@ impl Facts<'_> {
         ];
         flags.extend(switches.into_iter().filter(|(_, on)| *on).map(|(flag, _)| (flag.into(), Value::Bool(true))));
         flags
+    }
+}
+
+impl Facts<'_> {
+    /// The moment that is shown, and the sequence whose camera it has.
+    fn set_step(&self, mut set: impl FnMut(&str, String)) {
+        let step = &self.shot.step;
+        let number = step.number.unwrap_or_default();
+        if let Some(animation) = step.moment.as_ref().and_then(|moment| moment.animation.as_ref()) {
+            set("animation", animation.clone());
+        }
+        if let Some(Sequence::Frames { frames, fps, .. }) = &self.job.sequence {
+            set("frames", frames.to_string());
+            set("frame", number.to_string());
+            set("fps", fps.to_string());
+        } else {
+            step.moment.iter().for_each(|moment| set("time", moment.time.to_string()));
+        }
+        if let Some(Sequence::Turntable(turns)) = &self.job.sequence {
+            set("turntable", format!("{number}/{}", turns.count));
+        }
     }
 }
 

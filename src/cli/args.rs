@@ -61,6 +61,8 @@ Examples:
   meshray render ship.glb                            writes ship.png
   meshray render *.obj -o 'thumbs/{stem}.png' --size 256x256
   meshray render ship.glb --view front --view iso -o '{stem}-{view}.exr' --layers
+  meshray render ship.glb --time 1.5                 a moment of its first animation
+  meshray render ship.glb --turntable 36 -o 'turn/{frame:04}.png'
   meshray render ship.glb --heatmap tests            writes ship.png and ship-tests.png
   curl -s https://example.org/ship.glb | meshray render - -o - > ship.png
   meshray render --again ship.png                    renders that picture again";
@@ -126,7 +128,8 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "PICTURE", help_heading = "Output", hide_short_help = true, conflicts_with_all = [
         "size", "format", "bits", "half", "float", "layers", "tone_map", "exposure", "merge", "view", "camera", "eye",
         "at", "up_vector", "fov", "ortho", "up", "background", "env", "env_rotate", "env_rays", "gloss_rays",
-        "light_rays", "sun_size", "samples", "depth", "cutoff", "seed", "scene",
+        "light_rays", "sun_size", "samples", "depth", "cutoff", "seed", "scene", "animation", "time", "frame", "fps",
+        "frames", "turntable",
         "polygons", "mtl", "allow_empty", "accel", "intersector",
     ])]
     pub again: Option<PathBuf>,
@@ -207,6 +210,23 @@ pub(super) struct RenderArgs {
     /// Which scene of a glTF file, by name or number from 0
     #[arg(long, value_name = "NAME", help_heading = "Loading", hide_short_help = true)]
     pub scene: Option<String>,
+    /// Which moment of an animation.
+    #[command(flatten)]
+    pub moment: MomentArgs,
+    /// Several frames, from A to before B (`A..=B`: with B), seen by one camera that has all of them in the picture; with
+    /// --frame N, only that one of them
+    ///
+    /// Pictures go to STEM.0000.png and so on, or to a template with {frame:04}.
+    #[arg(long, value_name = "A..B", value_parser = parse::frames, help_heading = "Animation", hide_short_help = true,
+          conflicts_with_all = ["time", "turntable"])]
+    pub frames: Option<parse::Frames>,
+    /// N pictures from all around, about the up axis, the view or camera being the first; with I/N, only number I of
+    /// them, from 0
+    ///
+    /// Pictures go to STEM.0000.png and so on, or to a template with {frame:04}. The lamps of a model without its own go
+    /// with the camera, the studio around it stays; --background gives all pictures the same.
+    #[arg(long, value_name = "N", value_parser = parse::turns, help_heading = "Camera", hide_short_help = true)]
+    pub turntable: Option<parse::Turns>,
     /// What becomes of OBJ faces with more than three corners
     #[arg(long, value_name = "HOW", value_enum, default_value_t, help_heading = "Loading", hide_short_help = true)]
     pub polygons: PolygonsArg,
@@ -480,6 +500,9 @@ pub(super) struct LoadArgs {
     /// Which scene of a glTF file, by name or number from 0
     #[arg(long, value_name = "NAME")]
     pub scene: Option<String>,
+    /// Which moment of an animation.
+    #[command(flatten)]
+    pub moment: MomentArgs,
     /// What becomes of OBJ faces with more than three corners
     #[arg(long, value_name = "HOW", value_enum, default_value_t)]
     pub polygons: PolygonsArg,
@@ -498,6 +521,25 @@ pub(super) struct LoadArgs {
     /// How messages are written to standard error
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub messages: MessageFormat,
+}
+
+/// Which moment of an animation is shown; without any of it, the rest pose.
+#[derive(Debug, Clone, Args)]
+pub(super) struct MomentArgs {
+    /// Animation of a glTF file, by name or number from 0 [default: the first, where a time is given]
+    #[arg(long, value_name = "NAME", help_heading = "Animation", hide_short_help = true)]
+    pub animation: Option<String>,
+    /// Pose at this time of the animation, such as 1.5, 1.5s or 250ms; past its end, the last one
+    #[arg(long, value_name = "TIME", value_parser = parse::time, help_heading = "Animation", hide_short_help = true,
+          conflicts_with = "frame")]
+    pub time: Option<f64>,
+    /// The same by a number from 0: the pose at N / FPS seconds. The camera is framed on that pose, so that for a
+    /// sequence it has to be fixed, by --eye, --camera or --frames
+    #[arg(long, value_name = "N", help_heading = "Animation", hide_short_help = true)]
+    pub frame: Option<u32>,
+    /// Frames a second [default: 24]
+    #[arg(long, value_name = "FPS", value_parser = parse::above_zero, help_heading = "Animation", hide_short_help = true)]
+    pub fps: Option<f64>,
 }
 
 /// Types of picture files.

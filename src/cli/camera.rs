@@ -5,7 +5,7 @@ use super::parse::Ortho;
 use crate::load::Diagnostic;
 use crate::load::suggest::{list, nearest};
 use crate::math::DVec3;
-use crate::scene::framing::{self, Bounds, DEFAULT_FOV, FrameLens, NamedView, frame};
+use crate::scene::framing::{self, Bounds, DEFAULT_FOV, Direction, FrameLens, NamedView, frame};
 use crate::scene::{Camera, Projection, Scene, UpAxis};
 use std::path::Path;
 
@@ -97,38 +97,71 @@ pub(super) fn camera(
     aspect: f64,
     file: &Path,
 ) -> Result<(Camera, String), Diagnostic> {
-    let model_height = 2.0 * bounds.radius();
-    let (mut camera, phrase) = match choice {
-        Choice::Default if scene.hints.camera.is_none() => {
-            let direction = framing::default_direction(scene, bounds);
-            (frame(scene, bounds, direction, framing_lens(lens), aspect), default_phrase(scene))
-        }
-        Choice::Default => {
-            let camera = framing::default_camera(scene, bounds, aspect);
-            let phrase = format!("the file's camera {}", quoted(&camera.name)).trim_end().to_owned();
-            (camera, phrase)
-        }
-        Choice::Named(view) => {
-            let direction = view.direction(scene.up);
-            (frame(scene, bounds, direction, framing_lens(lens), aspect), format!("{view} view"))
-        }
-        Choice::Camera(name) => (find(name, scene, file)?.clone(), format!("camera {}", quoted(name))),
-        Choice::Free { eye, at, up } => {
-            let upright = if scene.up == UpAxis::Z { DVec3::Z } else { DVec3::Y };
-            let world_from_camera = Camera::look_at(*eye, at.unwrap_or(bounds.center()), up.unwrap_or(upright));
-            let lens = lens.unwrap_or(LensChoice::Fov(DEFAULT_FOV));
-            let projection = lens.projection(aspect, model_height);
-            (Camera { name: String::new(), projection, world_from_camera }, "given eye".to_owned())
-        }
+    let framed = framing(choice, lens, scene, bounds);
+    let framed = framed.map(|(direction, lens)| frame(scene, bounds, direction, lens, aspect));
+    Shown { choice, lens, aspect, file }.camera(scene, bounds, framed)
+}
+
+/// From where to frame the model and with which lens; `None`: the choice says where its camera stands.
+pub(super) fn framing(
+    choice: &Choice,
+    lens: Option<LensChoice>,
+    scene: &Scene,
+    bounds: &Bounds,
+) -> Option<(Direction, FrameLens)> {
+    let direction = match choice {
+        Choice::Default if scene.hints.camera.is_none() => framing::default_direction(scene, bounds),
+        Choice::Named(view) => view.direction(scene.up),
+        _ => return None,
     };
-    // Framed cameras have the chosen lens already, but for a height of the user's own.
-    let framed = matches!(choice, Choice::Named(_)) || (*choice == Choice::Default && scene.hints.camera.is_none());
-    match lens {
-        Some(LensChoice::Ortho(None)) | Some(LensChoice::Fov(_)) if framed => {}
-        Some(lens) => camera.projection = lens.projection(aspect, model_height),
-        None => {}
+    Some((direction, framing_lens(lens)))
+}
+
+/// What is known of a picture's camera before the scene is looked at.
+pub(super) struct Shown<'a> {
+    pub choice: &'a Choice,
+    pub lens: Option<LensChoice>,
+    /// Width / height of the picture.
+    pub aspect: f64,
+    pub file: &'a Path,
+}
+
+impl Shown<'_> {
+    /// The camera, and a phrase that says which it is. `framed` is that of a choice with a [`framing`].
+    pub(super) fn camera(
+        &self,
+        scene: &Scene,
+        bounds: &Bounds,
+        framed: Option<Camera>,
+    ) -> Result<(Camera, String), Diagnostic> {
+        let Self { choice, lens, aspect, file } = *self;
+        let model_height = 2.0 * bounds.radius();
+        let is_framed = framed.is_some();
+        let (mut camera, phrase) = match (choice, framed) {
+            (Choice::Named(view), Some(framed)) => (framed, format!("{view} view")),
+            (_, Some(framed)) => (framed, default_phrase(scene)),
+            (Choice::Default | Choice::Named(_), None) => {
+                let camera = framing::default_camera(scene, bounds, aspect);
+                let phrase = format!("the file's camera {}", quoted(&camera.name)).trim_end().to_owned();
+                (camera, phrase)
+            }
+            (Choice::Camera(name), None) => (find(name, scene, file)?.clone(), format!("camera {}", quoted(name))),
+            (Choice::Free { eye, at, up }, None) => {
+                let upright = if scene.up == UpAxis::Z { DVec3::Z } else { DVec3::Y };
+                let world_from_camera = Camera::look_at(*eye, at.unwrap_or(bounds.center()), up.unwrap_or(upright));
+                let lens = lens.unwrap_or(LensChoice::Fov(DEFAULT_FOV));
+                let projection = lens.projection(aspect, model_height);
+                (Camera { name: String::new(), projection, world_from_camera }, "given eye".to_owned())
+            }
+        };
+        // Framed cameras have the chosen lens already, but for a height of the user's own.
+        match lens {
+            Some(LensChoice::Ortho(None)) | Some(LensChoice::Fov(_)) if is_framed => {}
+            Some(lens) => camera.projection = lens.projection(aspect, model_height),
+            None => {}
+        }
+        Ok((camera, phrase))
     }
-    Ok((camera, phrase))
 }
 
 /// Says that the file brings cameras, because nothing in the picture does.

@@ -4,8 +4,9 @@ use super::args::{AccelArgs, Axis, FileType, MessageFormat, MtlArg, PolygonsArg,
 use super::camera::{Choice, LensChoice};
 use super::cost_layers;
 use super::message;
-use super::output_name::{self, Facts};
+use super::output_name::{self, Facts, Naming};
 use super::parse::{Back, Env};
+use super::sequence::{self, Sequence, Step};
 use crate::accel::{AccelChoice, AccelParams, IntersectorKind};
 use crate::image::{ExrSamples, FileKind, PngDepth, ToneMap};
 use crate::load::{Limits, LoadOptions, MtlMode, Polygons};
@@ -26,8 +27,10 @@ fn wrong<T>(text: impl Into<String>) -> Result<T, Wrong> {
 pub(super) struct RenderJob {
     /// One scene each, in the order given.
     pub batches: Vec<Batch>,
-    /// How to load.
+    /// How to load; the moment of each picture is its own.
     pub load: LoadOptions,
+    /// What the pictures of a scene have in common, if they belong together.
+    pub sequence: Option<Sequence>,
     /// What the command line says about the picture; the rest comes from the scene or the defaults.
     pub look: Look,
     /// Which structure.
@@ -74,6 +77,8 @@ pub(super) struct Batch {
 pub(super) struct Shot {
     /// Seen from where.
     pub choice: Choice,
+    /// Which part of the sequence it is, and which moment it shows.
+    pub step: Step,
     /// Written to where.
     pub target: Target,
     /// As what.
@@ -158,7 +163,8 @@ impl RenderJob {
     pub(super) fn new(args: &RenderArgs) -> Result<Self, Wrong> {
         check_flags(args)?;
         let choices = choices(args)?;
-        let batches = batches(args, &choices)?;
+        let sequence = sequence::of(args)?;
+        let batches = batches(args, &choices, sequence.as_ref())?;
         let stats = stats(args);
         let to_stdout = batches.iter().flat_map(|b| &b.shots).any(|s| s.target == Target::Stdout);
         if to_stdout && stats.as_ref().is_some_and(|s| s.file.is_none()) {
@@ -181,6 +187,7 @@ impl RenderJob {
             allow_empty: args.allow_empty,
             keep_partial: args.keep_partial,
             expected_hash: None,
+            sequence,
             batches,
         })
     }
@@ -208,6 +215,9 @@ fn check_flags(args: &RenderArgs) -> Result<(), Wrong> {
     if args.env_rotate.is_some() && !matches!(args.env, Some(Env::File(_))) {
         return wrong("--env-rotate turns a picture; the built-in surroundings stay with the model");
     }
+    if args.merge && args.moment.animation.is_some() {
+        return wrong("--animation chooses an animation of one file and cannot be used with --merge");
+    }
     if args.stats_file.is_some() && args.stats.is_none() {
         return wrong("--stats-file needs --stats text or --stats json");
     }
@@ -228,18 +238,20 @@ fn choices(args: &RenderArgs) -> Result<Vec<Choice>, Wrong> {
     Ok(choices)
 }
 
-fn batches(args: &RenderArgs, choices: &[Choice]) -> Result<Vec<Batch>, Wrong> {
+fn batches(args: &RenderArgs, choices: &[Choice], sequence: Option<&Sequence>) -> Result<Vec<Batch>, Wrong> {
+    let steps = sequence::steps(args, sequence)?;
     let groups: Vec<Vec<PathBuf>> =
         if args.merge { vec![args.inputs.clone()] } else { args.inputs.iter().map(|i| vec![i.clone()]).collect() };
     let mut batches = Vec::new();
     let mut frame = 0;
     for inputs in groups {
         let mut shots = Vec::new();
-        for choice in choices {
+        for (step, choice) in steps.iter().flat_map(|step| choices.iter().map(move |choice| (step, choice))) {
             frame += 1;
-            let facts = Facts { input: &inputs[0], view: &choice.name(), frame };
-            let (target, kind) = target(args, &facts, choices.len() > 1)?;
-            shots.push(Shot { choice: choice.clone(), target, kind });
+            let facts = Facts { input: &inputs[0], view: &choice.name(), frame: step.number.unwrap_or(frame) };
+            let naming = Naming { several_views: choices.len() > 1, numbered: step.number.is_some() };
+            let (target, kind) = target(args, &facts, naming)?;
+            shots.push(Shot { choice: choice.clone(), step: step.clone(), target, kind });
         }
         batches.push(Batch { inputs, shots });
     }
@@ -276,17 +288,17 @@ fn check_kinds(args: &RenderArgs, batches: &[Batch]) -> Result<(), Wrong> {
     Ok(())
 }
 
-fn target(args: &RenderArgs, facts: &Facts, several_views: bool) -> Result<(Target, FileKind), Wrong> {
+fn target(args: &RenderArgs, facts: &Facts, naming: Naming) -> Result<(Target, FileKind), Wrong> {
     let format = args.format.map(FileKind::from);
     let extension = format.unwrap_or(FileKind::Png).extension();
     let template = match args.output.as_deref() {
         Some("-") => return Ok((Target::Stdout, format.unwrap_or(FileKind::Png))),
         Some("") => return wrong("-o needs a name"),
         Some(folder) if folder.ends_with('/') || Path::new(folder).is_dir() => {
-            output_name::default_template(Some(folder), several_views, extension)
+            output_name::default_template(Some(folder), naming, extension)
         }
         Some(template) => template.to_owned(),
-        None => output_name::default_template(None, several_views, extension),
+        None => output_name::default_template(None, naming, extension),
     };
     let path = output_name::fill(&template, facts).map_err(Wrong)?;
     let kind = match format {
@@ -302,13 +314,18 @@ fn refuse_collisions(batches: &[Batch]) -> Result<(), Wrong> {
         batches.iter().flat_map(|b| b.shots.iter().map(|s| (b.inputs[0].as_path(), s))).collect();
     let to_stdout = shots.iter().filter(|(_, s)| s.target == Target::Stdout).count();
     if to_stdout > 1 {
-        return wrong(format!("{to_stdout} pictures cannot all go to standard output; use -o '{{stem}}-{{view}}.png'"));
+        let numbered = shots.iter().any(|(_, shot)| shot.step.number.is_some());
+        let name = if numbered { "{stem}.{frame:04}.png" } else { "{stem}-{view}.png" };
+        return wrong(format!("{to_stdout} pictures cannot all go to standard output; use -o '{name}'"));
     }
     let names: Vec<PathBuf> = shots.iter().filter_map(|(_, s)| s.target.path().map(Path::to_path_buf)).collect();
     let Some((a, b)) = output_name::collision(&names) else { return Ok(()) };
-    let what = |i: usize| match &shots[i].1.choice {
-        Choice::Default => format!("{}", shots[i].0.display()),
-        choice => format!("{} ({})", shots[i].0.display(), choice.name()),
+    let what = |i: usize| {
+        let (input, Shot { choice, step, .. }) = shots[i];
+        let view = (*choice != Choice::Default).then(|| choice.name());
+        let parts: Vec<String> = view.into_iter().chain(step.number.map(|n| format!("number {n}"))).collect();
+        let parts = if parts.is_empty() { String::new() } else { format!(" ({})", parts.join(", ")) };
+        format!("{}{parts}", input.display())
     };
     wrong(format!(
         "{} and {} would both be written to {}; use {{dir}}, {{stem}}, {{view}} or {{frame:04}} in -o",
@@ -326,6 +343,8 @@ fn load_options(args: &RenderArgs) -> LoadOptions {
         mtl: args.mtl.into(),
         scene: args.scene.clone(),
         up: args.up.map(Into::into),
+        moment: None,
+        without_pictures: false,
     }
 }
 
@@ -478,6 +497,20 @@ mod tests {
     }
 
     #[test]
+    fn pictures_of_a_sequence_are_numbered() {
+        let named = |names: &[&str]| names.iter().map(|n| Target::Default((*n).into())).collect::<Vec<_>>();
+        assert_eq!(outputs("a.glb --frames 9..11"), named(&["a.0009.png", "a.0010.png"]));
+        assert_eq!(outputs("a.glb --frames 0..3 --frame 2"), named(&["a.0002.png"]));
+        assert_eq!(outputs("a.glb --turntable 2"), named(&["a.0000.png", "a.0001.png"]));
+        assert_eq!(outputs("a.glb --turntable 7/36"), named(&["a.0007.png"]));
+        let both = ["a-front.0001.png", "a-top.0001.png"];
+        assert_eq!(outputs("a.glb --frames 1..=1 --view front,top"), named(&both));
+        let job = job("a.glb --frames 12..14 --fps 48 --animation Run").unwrap();
+        let moments = job.batches[0].shots.iter().map(|s| s.step.moment.clone().unwrap());
+        assert_eq!(moments.map(|m| (m.animation.unwrap(), m.time)).next(), Some(("Run".into(), 0.25)));
+    }
+
+    #[test]
     fn contradictions_are_refused() {
         for line in [
             "a.obj --at 0,0,0",
@@ -495,8 +528,19 @@ mod tests {
             "a.obj a-tests.obj --heatmap tests",
             "a.obj -o a.jpg --bits 16",
             "a.obj --env studio --env-rotate 90",
+            "a.glb --fps 30",
+            "a.glb --frames 0..3 --turntable 4",
+            "a.glb --frames 0..3 --time 1",
+            "a.glb --frames 0..3 --frame 3",
+            "a.glb --frames 0..3 -o a.png",
+            "a.glb --turntable 3 -o -",
+            "- --frames 0..3",
+            "a.glb b.glb --merge --animation Run",
         ] {
-            assert!(job(line).is_err(), "{line}");
+            // Some are known to the parser, others are told by the job.
+            let words = ["meshray", "render"].into_iter().chain(line.split(' '));
+            let parsed = Cli::try_parse_from(words).map(|cli| cli.command);
+            assert!(parsed.is_err() || job(line).is_err(), "{line}");
         }
     }
 }

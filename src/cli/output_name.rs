@@ -1,7 +1,7 @@
 //! Where pictures go: templates, default names, and names that would collide.
 //!
 //! Templates know `{dir}` (the input's folder), `{stem}` (its name without extension), `{view}` and `{frame}` (number
-//! of the picture in this run, from 1; `{frame:04}` pads it with zeros). `{{` and `}}` are plain braces.
+//! of the picture: in its sequence, or else in this run, from 1; `{frame:04}` pads it with zeros). `{{` and `}}` are plain braces.
 
 use crate::load::suggest::nearest;
 use std::collections::HashMap;
@@ -14,7 +14,7 @@ pub(super) struct Facts<'a> {
     pub input: &'a Path,
     /// Name of the view or camera.
     pub view: &'a str,
-    /// Number of the picture, from 1.
+    /// Number of the picture: in its sequence, or else in this run, from 1.
     pub frame: u32,
 }
 
@@ -80,9 +80,23 @@ fn folder(input: &Path) -> String {
     }
 }
 
+/// What has to be in a name to tell the pictures of one input apart.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Naming {
+    /// More than one view or camera.
+    pub several_views: bool,
+    /// Pictures of a sequence.
+    pub numbered: bool,
+}
+
 /// The template that is used when none is given, or when only a folder is.
-pub(super) fn default_template(folder: Option<&str>, several_views: bool, extension: &str) -> String {
-    let name = if several_views { "{stem}-{view}" } else { "{stem}" };
+pub(super) fn default_template(folder: Option<&str>, naming: Naming, extension: &str) -> String {
+    let name = match (naming.several_views, naming.numbered) {
+        (false, false) => "{stem}",
+        (true, false) => "{stem}-{view}",
+        (false, true) => "{stem}.{frame:04}",
+        (true, true) => "{stem}-{view}.{frame:04}",
+    };
     match folder {
         Some(folder) => format!("{}/{name}.{extension}", escape(folder.trim_end_matches('/'))),
         None => format!("{name}.{extension}"),
@@ -173,7 +187,7 @@ mod tests {
 
     #[test]
     fn a_folder_with_braces_is_taken_literally() {
-        let template = default_template(Some("{x}/"), true, "exr");
+        let template = default_template(Some("{x}/"), Naming { several_views: true, numbered: false }, "exr");
         assert_eq!(fill(&template, &facts("a.obj")).unwrap(), Path::new("{x}/a-front.exr"));
     }
 

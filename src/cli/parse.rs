@@ -9,6 +9,7 @@ use crate::render::{Cost, UnknownCost};
 use crate::scene::framing::NamedView;
 use crate::scene::{Background, Environment};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use std::fmt;
 use std::path::PathBuf;
 
 /// Longest side of a picture.
@@ -67,6 +68,73 @@ fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
 /// Degrees.
 pub(super) fn fov(text: &str) -> Result<f64, String> {
     within(text, 0.1, 170.0)
+}
+
+/// Seconds, also with a unit: `1.5`, `1.5s`, `250ms`.
+pub(super) fn time(text: &str) -> Result<f64, String> {
+    let wrong = || "write a time from 0, such as 1.5, 1.5s or 250ms".to_owned();
+    let (number, units) = match (text.strip_suffix("ms"), text.strip_suffix('s')) {
+        (Some(number), _) => (number, 1000.0),
+        (None, Some(number)) => (number, 1.0),
+        (None, None) => (text, 1.0),
+    };
+    finite(number).ok().map(|n| n / units).filter(|&n| n >= 0.0).ok_or_else(wrong)
+}
+
+/// Most pictures of one sequence.
+const MAX_PICTURES: u32 = 100_000;
+
+/// `--frames`: numbers from `first` to before `end`, at least one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Frames {
+    pub first: u32,
+    pub end: u32,
+}
+
+impl fmt::Display for Frames {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}..{}", self.first, self.end)
+    }
+}
+
+/// `A..B` without B, or `A..=B` with it.
+pub(super) fn frames(text: &str) -> Result<Frames, String> {
+    let whole = |s: &str| s.trim().parse::<u32>().ok();
+    let (first, last) = text.split_once("..").ok_or("write A..B, or A..=B to take in B, such as 0..48")?;
+    let end = match last.strip_prefix('=') {
+        Some(last) => whole(last).and_then(|last| last.checked_add(1)),
+        None => whole(last),
+    };
+    let (first, end) = whole(first).zip(end).ok_or("the ends are whole numbers from 0, such as 0..48")?;
+    match end.checked_sub(first) {
+        None | Some(0) => Err("there are no frames between these ends".into()),
+        Some(count) if count > MAX_PICTURES => Err(format!("at most {MAX_PICTURES} frames")),
+        Some(_) => Ok(Frames { first, end }),
+    }
+}
+
+/// `--turntable`: pictures of one turn, or one of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Turns {
+    pub count: u32,
+    /// The number of the only one wanted, from 0.
+    pub only: Option<u32>,
+}
+
+/// `N`, or `I/N` for number I alone.
+pub(super) fn turns(text: &str) -> Result<Turns, String> {
+    let whole = |s: &str| s.trim().parse::<u32>().ok();
+    let (only, count) = match text.split_once('/') {
+        Some((only, count)) => (Some(whole(only)), whole(count)),
+        None => (None, whole(text)),
+    };
+    let count = count.filter(|n| (1..=MAX_PICTURES).contains(n));
+    let count = count.ok_or_else(|| format!("write a number of pictures from 1 to {MAX_PICTURES}"))?;
+    match only {
+        None => Ok(Turns { count, only: None }),
+        Some(Some(only)) if only < count => Ok(Turns { count, only: Some(only) }),
+        Some(_) => Err(format!("write I/{count} with I from 0 to {}", count - 1)),
+    }
 }
 
 /// Stops.
@@ -306,6 +374,28 @@ mod tests {
         assert_eq!(bytes("3MiB"), Ok(3 << 20));
         for wrong in ["", "G", "0", "2X", "99999999999T", "-1"] {
             assert!(bytes(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn ranges_of_frames_hold_one_at_least() {
+        assert_eq!(frames("0..48"), Ok(Frames { first: 0, end: 48 }));
+        assert_eq!(frames("7..=7"), Ok(Frames { first: 7, end: 8 }));
+        for text in ["3..3", "4..3", "..3", "3..", "3", "a..b", "0..=4294967295", "0..4000000", "-1..2"] {
+            assert!(frames(text).is_err(), "{text}");
+        }
+        assert_eq!(turns("36"), Ok(Turns { count: 36, only: None }));
+        assert_eq!(turns("0/4"), Ok(Turns { count: 4, only: Some(0) }));
+        for text in ["0", "4/4", "-1/4", "/4", "4/", "a"] {
+            assert!(turns(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn times_have_a_unit_or_are_seconds() {
+        assert_eq!(["1.5", "1.5s", "250ms", "0"].map(|t| time(t).unwrap()), [1.5, 1.5, 0.25, 0.0]);
+        for text in ["-1", "ms", "", "1m", "inf", "nan", "1 s s"] {
+            assert!(time(text).is_err(), "{text}");
         }
     }
 

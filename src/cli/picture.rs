@@ -50,6 +50,11 @@ impl Effective {
 }
 
 impl Effective {
+    /// Width / height.
+    pub(super) fn aspect(&self) -> f64 {
+        f64::from(self.settings.width) / f64::from(self.settings.height)
+    }
+
     /// The same; whether what the scene does without is done all the same.
     pub(super) fn with_everything(mut self, everything: bool) -> Self {
         self.settings.everything = everything;

@@ -2,8 +2,9 @@
 
 use super::args::{LoadArgs, ModelArgs};
 use super::exit::Exit;
-use super::job;
+use super::job::{self, Wrong};
 use super::message::{Messages, Severity};
+use super::moment;
 use crate::load::{Diagnostic, LoadError, LoadOptions, Loaded, load, load_bytes};
 use crate::math::DAffine3;
 use std::io::Read;
@@ -36,6 +37,10 @@ pub(super) fn model(args: &ModelArgs, messages: &Messages) -> Result<Loaded, Exi
 
 /// The same for a command that takes several.
 pub(super) fn one_model(input: &PathBuf, args: &LoadArgs, messages: &Messages) -> Result<Loaded, Exit> {
+    let moment = moment::moment(&args.moment).map_err(|Wrong(text)| {
+        messages.error("usage", text, "");
+        Exit::Usage
+    })?;
     let options = LoadOptions {
         root: args.root.clone(),
         limits: job::limits(args.max_memory),
@@ -43,6 +48,8 @@ pub(super) fn one_model(input: &PathBuf, args: &LoadArgs, messages: &Messages) -
         mtl: args.mtl.into(),
         scene: args.scene.clone(),
         up: args.up.map(Into::into),
+        moment,
+        without_pictures: false,
     };
     let loaded = scene(slice::from_ref(input), &options).map_err(|error| {
         messages.load_error(&error);
@@ -50,6 +57,19 @@ pub(super) fn one_model(input: &PathBuf, args: &LoadArgs, messages: &Messages) -
     })?;
     loaded.warnings.iter().for_each(|w| messages.say(Severity::Warning, w));
     Ok(loaded)
+}
+
+/// Gives a frame that was loaded without pictures those of an earlier one, which are the same, with the materials that
+/// show them. Whether it can be done: other materials are a sign that the file has been changed in between.
+pub(super) fn take_pictures(frame: &mut Loaded, earlier: Loaded) -> bool {
+    if frame.scene.materials.len() != earlier.scene.materials.len() {
+        return false;
+    }
+    let (to, from) = (&mut frame.scene, earlier.scene);
+    (to.materials, to.textures, to.bitmaps) = (from.materials, from.textures, from.bitmaps);
+    (to.environment, to.panorama) = (from.environment, from.panorama);
+    (frame.facts.files, frame.facts.hash) = (earlier.facts.files, earlier.facts.hash);
+    true
 }
 
 fn append(whole: &mut Loaded, part: Loaded) {

@@ -1,26 +1,26 @@
 //! `meshray render`: load, build, render, write; one batch after the other, going on where one fails.
 
-use super::camera;
 use super::exit::Exit;
-use super::job::{Batch, Look, RenderJob, Shot, Target};
+use super::job::{Batch, RenderJob, Shot, Target};
 use super::message::{Messages, Severity};
-use super::parse::Env;
 use super::picture::{self, Effective};
 use super::profile::Profile;
 use super::progress::Progress;
+use super::sequence::{self, Step, Survey};
 use super::stats::{self, PictureStats, Times};
-use super::{accident, again, cost_layers, interrupt, output_name, read};
-use crate::accel::auto;
+use super::summary::Summary;
+use super::{accident, again, cost_layers, interrupt, output_name, read, surroundings};
+use crate::accel::AnyAccel;
+use crate::accel::auto::{self, Reason};
 use crate::image::was_written_by_meshray;
-use crate::load::panorama::{self, LoadedPanorama};
-use crate::load::{Diagnostic, LoadError, Loaded};
+use crate::load::{Diagnostic, LoadOptions, Loaded};
 use crate::render::texture::TextureStore;
 use crate::render::{Costs, Job, Rendered, View, World, render_costs};
+use crate::scene::Scene;
 use crate::scene::framing::{Bounds, robust_bounds_within};
-use crate::scene::{Environment, LightKind, Scene, default_light, default_light::DefaultLight};
+use std::collections::HashSet;
 use std::path::Path;
 use std::time::Instant;
-use xxhash_rust::xxh3::xxh3_128;
 
 /// Does the whole job and tells how it ended: as its worst picture.
 pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
@@ -70,19 +70,35 @@ fn render_batch(job: &RenderJob, batch: &Batch, messages: &Messages, done: &mut 
     // The bar needs the room that folders would take.
     let name = batch.inputs[0].file_name().unwrap_or(batch.inputs[0].as_os_str()).to_string_lossy();
     let progress = Progress::new(&name, messages, job.quiet, job.keep_partial);
-    let profile = if done.is_empty() { Profile::of_process() } else { Profile::new() };
-    match prepare(job, batch, messages, &progress, profile) {
-        Ok(mut ready) => {
-            for shot in shots {
-                worst = worst.max(render_shot(job, batch, shot, &mut ready, messages, &progress, done));
-                if interrupt::raised() {
-                    return Exit::Interrupted;
-                }
+    let mut profile = if done.is_empty() { Profile::of_process() } else { Profile::new() };
+    let aspect = |scene: &Scene| Effective::new(&job.look, &scene.hints).map_or(1.0, |effective| effective.aspect());
+    let survey = match Survey::of(job, batch, aspect, messages, &progress) {
+        Ok(survey) => survey,
+        Err(exit) => return worst.max(exit),
+    };
+    survey.iter().for_each(|_| profile.done("frame"));
+    let (mut profile, mut earlier, mut left) = (Some(profile), None, shots.as_slice());
+    while let Some(first) = left.first() {
+        // Pictures of one moment have one scene.
+        let same = left.iter().take_while(|shot| shot.step.moment == first.step.moment).count();
+        let (now, later) = left.split_at(same);
+        left = later;
+        let profile = profile.take().unwrap_or_else(Profile::new);
+        let mut ready = match prepare(job, batch, &first.step, earlier.take(), messages, &progress, profile) {
+            Ok(ready) => ready,
+            Err(exit) => return worst.max(exit),
+        };
+        let mut stage = ready.stage(survey.as_ref());
+        for shot in now {
+            worst = worst.max(render_shot(job, batch, shot, &mut stage, messages, &progress, done));
+            if interrupt::raised() {
+                return Exit::Interrupted;
             }
-            worst
         }
-        Err(exit) => worst.max(exit),
+        drop(stage);
+        earlier = Some(ready);
     }
+    worst
 }
 
 /// Whether a picture may go there. Asked before any work is done for it.
@@ -118,27 +134,65 @@ struct Ready {
     load_seconds: f64,
     /// Stages that no picture has told yet.
     profile: Profile,
+    /// Code and place of the warnings that have been said.
+    told: HashSet<(&'static str, String)>,
+}
+
+impl Ready {
+    /// Nothing built yet. Frames of a sequence are seen in the bounds of all.
+    fn stage<'a>(&'a mut self, survey: Option<&'a Survey>) -> Stage<'a> {
+        let Self { loaded, world, bounds, load_seconds, profile, .. } = self;
+        let bounds = survey.map_or(&*bounds, |survey| &survey.bounds);
+        Stage { loaded, world, bounds, load_seconds, profile, survey, built: None }
+    }
+}
+
+/// A scene that is rendered, and the structure that all its pictures share.
+struct Stage<'a> {
+    loaded: &'a mut Loaded,
+    world: &'a World,
+    bounds: &'a Bounds,
+    load_seconds: &'a mut f64,
+    profile: &'a mut Profile,
+    survey: Option<&'a Survey>,
+    built: Option<(AnyAccel<'a>, Option<Reason>)>,
 }
 
 fn prepare(
     job: &RenderJob,
     batch: &Batch,
+    step: &Step,
+    earlier: Option<Ready>,
     messages: &Messages,
     progress: &Progress,
     mut profile: Profile,
 ) -> Result<Ready, Exit> {
     let start = Instant::now();
     progress.stage("loading");
-    let mut loaded = read::scene(&batch.inputs, &job.load).map_err(|error| {
+    let options = LoadOptions { without_pictures: earlier.is_some(), ..job.load_for(step) };
+    let mut loaded = read::scene(&batch.inputs, &options).map_err(|error| {
         messages.load_error(&error);
         read::exit_of(&error)
     })?;
-    surround(job, &mut loaded).map_err(|error| {
-        messages.load_error(&error);
-        read::exit_of(&error)
-    })?;
+    let mut told = HashSet::new();
+    if let Some(earlier) = earlier {
+        told = earlier.told;
+        if !read::take_pictures(&mut loaded, earlier.loaded) {
+            let fault = Diagnostic::new("input-changed", &batch.inputs[0], "", "was changed while it was rendered");
+            messages.say(Severity::Error, &fault.remedy("render it again"));
+            return Err(Exit::Failed);
+        }
+    } else {
+        surroundings::place(&job.look, &job.load.limits, &mut loaded).map_err(|error| {
+            messages.load_error(&error);
+            read::exit_of(&error)
+        })?;
+    }
     profile.loaded(loaded.facts.reading, loaded.facts.decoding);
-    loaded.warnings.iter().for_each(|w| messages.say(Severity::Warning, w));
+    // What is wrong with one frame is wrong with most.
+    for warning in loaded.warnings.iter().filter(|w| told.insert((w.code, w.place.clone()))) {
+        messages.say(Severity::Warning, warning);
+    }
     if job.strict && !loaded.warnings.is_empty() {
         let count = loaded.warnings.len();
         let text = format!("not rendered: --strict, and there are {count} kinds of warnings");
@@ -160,35 +214,7 @@ fn prepare(
     profile.done("place");
     let bounds = robust_bounds_within(&loaded.scene, world.bounds);
     profile.done("frame");
-    Ok(Ready { loaded, world, bounds, load_seconds: start.elapsed().as_secs_f64(), profile })
-}
-
-/// Gives lights from infinitely far that have no extent the one that was asked for.
-fn widen_suns(look: &Look, scene: &mut Scene) {
-    let Some(degrees) = look.sun_size else { return };
-    let suns = scene.lights.iter_mut().filter(|l| matches!(l.kind, LightKind::Directional { .. }) && l.size == 0.0);
-    suns.for_each(|light| light.size = 0.5 * degrees.to_radians());
-}
-
-/// Puts what the command line names around the scene.
-fn surround(job: &RenderJob, loaded: &mut Loaded) -> Result<(), LoadError> {
-    match &job.look.env {
-        None => {}
-        Some(Env::BuiltIn(environment)) => loaded.scene.environment = *environment,
-        Some(Env::File(file)) => {
-            let LoadedPanorama { mut panorama, warnings, hash } = panorama::load(file, &job.load.limits)?;
-            #[expect(clippy::cast_possible_truncation, reason = "an angle")]
-            let rotation = (job.look.env_rotate % 360.0).to_radians() as f32;
-            panorama.rotation = rotation;
-            loaded.scene.environment = Environment::Panorama;
-            loaded.scene.panorama = Some(panorama);
-            loaded.warnings.extend(warnings);
-            loaded.facts.files.push(file.clone());
-            let hashes = [loaded.facts.hash, hash].map(u128::to_le_bytes);
-            loaded.facts.hash = xxh3_128(hashes.as_flattened());
-        }
-    }
-    Ok(())
+    Ok(Ready { loaded, world, bounds, load_seconds: start.elapsed().as_secs_f64(), profile, told })
 }
 
 fn nothing_to_draw(loaded: &Loaded, file: &Path) -> Diagnostic {
@@ -206,12 +232,12 @@ fn render_shot(
     job: &RenderJob,
     batch: &Batch,
     shot: &Shot,
-    ready: &mut Ready,
+    stage: &mut Stage,
     messages: &Messages,
     progress: &Progress,
     done: &mut Vec<PictureStats>,
 ) -> Exit {
-    let Ready { loaded, world, bounds, load_seconds, profile } = ready;
+    let Stage { loaded, world, bounds, load_seconds, profile, survey, built } = stage;
     let file = &batch.inputs[0];
     let fail = |fault: &Diagnostic, exit| {
         messages.say(Severity::Error, fault);
@@ -230,41 +256,33 @@ fn render_shot(
     }
 
     // The eye, then the light that belongs to it: each view has its own.
-    let aspect = f64::from(effective.settings.width) / f64::from(effective.settings.height);
-    let (camera, view_phrase) = match camera::camera(&shot.choice, job.look.lens, &loaded.scene, bounds, aspect, file) {
+    let seen = (&loaded.scene, *bounds);
+    let (camera, view_phrase) = match sequence::camera(job, shot, *survey, seen, effective.aspect(), file) {
         Ok(found) => found,
         Err(fault) => return fail(&fault, Exit::Input),
     };
     let (lights, environment) = (loaded.scene.lights.clone(), loaded.scene.environment);
     let background = loaded.scene.background;
-    let light = default_light::add_if_missing(&mut loaded.scene, &camera);
-    widen_suns(&job.look, &mut loaded.scene);
-    // Lamps that were missing bring the studio along; what was asked for comes before that.
-    if let Some(Env::BuiltIn(environment)) = job.look.env {
-        loaded.scene.environment = environment;
-    }
+    let light = surroundings::light(&job.look, &mut loaded.scene, &camera);
     loaded.scene.background = Some(picture::background(&job.look, &loaded.scene));
     let view = View::from_camera(&camera);
     profile.done("frame");
 
-    let mut times = Times { load: *load_seconds, ..Times::default() };
+    let mut times = Times { load: **load_seconds, ..Times::default() };
     progress.stage("building");
     let start = Instant::now();
-    let (accel, reason) = auto::build(job.accel, &world.shapes, &job.params);
-    let accel = accel.tested_by(job.intersector);
+    let (accel, reason) = built.get_or_insert_with(|| {
+        let (accel, reason) = auto::build(job.accel, &world.shapes, &job.params);
+        (accel.tested_by(job.intersector), reason)
+    });
+    let (accel, reason) = (&*accel, *reason);
     let textures = TextureStore::new(&loaded.scene);
     let textures = if job.everything { textures.with_everything() } else { textures };
     times.build = start.elapsed().as_secs_f64();
     profile.done("build");
 
-    let work = Job {
-        scene: &loaded.scene,
-        world,
-        accel: &accel,
-        textures: &textures,
-        view: &view,
-        settings: &effective.settings,
-    };
+    let work =
+        Job { scene: &loaded.scene, world, accel, textures: &textures, view: &view, settings: &effective.settings };
     let mut rendered = trace(job, &work, progress, &mut times, profile);
     let costs = rendered.complete.then(|| costs(job, &work, progress));
     progress.finish();
@@ -274,7 +292,7 @@ fn render_shot(
     if let Some(layers) = &mut rendered.picture.layers {
         cost_layers::add_channels(job, &costs, layers);
     }
-    let counted = job.stats.is_some().then(|| stats::count(&work, &rendered, &accel, messages));
+    let counted = job.stats.is_some().then(|| stats::count(&work, &rendered, accel, messages));
 
     let (depth, accel_kind) = (rendered.depth, accel.kind());
     let facts = again::Facts { job, batch, shot, effective: &effective, depth, accel: accel_kind, reason, loaded };
@@ -308,7 +326,7 @@ fn render_shot(
     loaded.scene.lights = lights;
     loaded.scene.environment = environment;
     loaded.scene.background = background;
-    *load_seconds = 0.0;
+    **load_seconds = 0.0;
     exit
 }
 
@@ -359,48 +377,4 @@ fn keep_partial(shot: &Shot, rendered: &Rendered, effective: &Effective, loaded:
         Err(picture::WriteError::BrokenPipe) => {}
     }
     Exit::Interrupted
-}
-
-/// The lines at the end of a picture.
-struct Summary<'a> {
-    shot: &'a Shot,
-    effective: &'a Effective,
-    loaded: &'a Loaded,
-    bounds: &'a Bounds,
-    view: &'a str,
-    light: DefaultLight,
-}
-
-impl Summary<'_> {
-    fn say(&self, rendered: &Rendered, times: &Times, messages: &Messages) {
-        let name = self.shot.target.path().unwrap_or(Path::new("-"));
-        let say = |code, text: String| messages.say(Severity::Info, &Diagnostic::new(code, name, "", text));
-        say("picture", self.picture(rendered));
-        say("times", times.line(&self.effective.settings));
-    }
-
-    fn picture(&self, rendered: &Rendered) -> String {
-        let settings = &self.effective.settings;
-        let mut parts = vec![
-            format!("{}×{}", settings.width, settings.height),
-            format!("{} samples a pixel", settings.samples),
-            format!("depth {}{}", rendered.depth, if settings.depth.is_none() { " (auto)" } else { "" }),
-            self.view.to_owned(),
-        ];
-        if let Some(reason) = &self.loaded.facts.up_reason {
-            let axis = if self.loaded.scene.up == crate::scene::UpAxis::Z { "+Z" } else { "+Y" };
-            parts.push(format!("{axis} up ({reason})"));
-        }
-        if self.light == DefaultLight::Added {
-            parts.push("studio light".into());
-        }
-        let scene = &self.loaded.scene;
-        if let Some(panorama) = scene.panorama.as_ref().filter(|_| scene.environment == Environment::Panorama) {
-            parts.push(format!("light of {}", panorama.name));
-        }
-        if self.bounds.strays > 0 {
-            parts.push(format!("framing leaves out {} far-off faces", self.bounds.strays));
-        }
-        parts.join(", ")
-    }
 }

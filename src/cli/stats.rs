@@ -10,7 +10,8 @@
 //! | `width`, `height`, `samples`, `depth`, `cutoff`, `seed`, `view`, `accel`, `intersector`, `threads` | settings that were used |
 //! | `auto` | `null`, or why `--accel auto` took `accel`: `why` in words; `rays` and `prims` of the sample; cost of a ray through `fast-octree` and `fast-bvh`, in nodes of eight boxes |
 //! | `parameters` | of the structure, as used: `leaf_size` (`null`: by step cost); of grids and octrees `grid_density`, `grid_resolution`, `max_depth`, `step_cost`, `grid_cells` (`null`: by density), `max_references`, `assign`, `mailbox` as well |
-//! | `seconds` | of the timed run: `load`, `build`, `render`, `write`; `load` is 0 for further views of one input |
+//! | `seconds` | of the timed run: `load`, `build`, `render`, `write`; `load` and `build` are 0 for further pictures of one scene |
+//! | `animation` | `null`, or which one is shown: its `number` in the file, and the `time` in seconds |
 //! | `scene` | `triangles`, `polygons`, `spheres`, `cones` (cylinders too), `planes`, `vertices`, `materials`, `textures`, `lights` |
 //! | `structure` | V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`; `bytes` and `depth` |
 //! | `counts` | for each ray class `primary`, `shadow`, `reflected`, `refracted`, and `all`: exact `rays`, `hits`, `tests`, `steps`, `cells`, `empty_cells`, `volume_tests`, `tests_saved`, `transforms`; and per ray `n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`, `n_xf`; `culled` = 1 − n_it / N |
@@ -180,6 +181,7 @@ impl PictureStats {
             "auto": facts.reason.map(|r| json!({
                 "why": r.to_string(), "rays": r.rays, "prims": r.prims, "fast-octree": r.octree, "fast-bvh": r.bvh,
             })),
+            "animation": facts.loaded.facts.shown.map(|(number, time)| json!({ "number": number, "time": time })),
             "parameters": parameters(facts.accel, &facts.job.params),
             "threads": rayon::current_num_threads(),
             "seconds": { "load": times.load, "build": times.build, "render": times.render, "write": times.write },

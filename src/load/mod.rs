@@ -41,6 +41,19 @@ pub struct LoadOptions {
     pub scene: Option<String>,
     /// Overrides the up axis.
     pub up: Option<UpAxis>,
+    /// Which moment of an animation of a glTF file is shown; `None`: the rest pose.
+    pub moment: Option<Moment>,
+    /// Leaves pictures out: for whoever needs the geometry of a glTF file alone.
+    pub without_pictures: bool,
+}
+
+/// A moment of an animation.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Moment {
+    /// Which animation: an index, or a name; `None`: the first.
+    pub animation: Option<String>,
+    /// Seconds from its start; finite. Before the first and after the last key those count.
+    pub time: f64,
 }
 
 /// What becomes of OBJ and NFF faces with more than three corners.
@@ -87,8 +100,10 @@ pub struct Facts {
     pub dropped: Vec<(String, u64)>,
     /// Points and lines skipped.
     pub points_and_lines: u64,
-    /// Animations in the file; none is played.
-    pub animations: u64,
+    /// Animations in the file.
+    pub animations: Vec<AnimationFacts>,
+    /// Which of them is shown, and when, seconds from its start; `None`: the rest pose.
+    pub shown: Option<(usize, f64)>,
     /// glTF extensions used: (name, required by the file, supported by us).
     pub extensions: Vec<(String, bool, bool)>,
     /// Names of the scenes in the file; the loaded one is `scene_index`.
@@ -107,6 +122,17 @@ pub struct Facts {
     pub reading: Spent,
     /// Time that decoding pictures took: from the first to the last, and of all threads together.
     pub decoding: Spent,
+}
+
+/// An animation of a file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct AnimationFacts {
+    /// Its name; empty if it has none.
+    pub name: String,
+    /// When its last key is, seconds from its start.
+    pub seconds: f64,
+    /// How many properties of nodes it changes.
+    pub channels: usize,
 }
 
 /// A file in memory, with the name it was read from.
@@ -136,13 +162,28 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
     let reading = watch.read();
     let mut loaded = load_source(&source, options)?;
     loaded.facts.reading += reading;
+    check_moment(&mut loaded, path, options)?;
     Ok(loaded)
 }
 
 /// Loads a model or scene from memory. Files it names are looked up beside `name`; for `-` in
 /// [`LoadOptions::root`], or else in the current folder.
 pub fn load_bytes(name: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Loaded, LoadError> {
-    load_source(&Source { path: name.into(), bytes }, options)
+    let mut loaded = load_source(&Source { path: name.into(), bytes }, options)?;
+    check_moment(&mut loaded, name, options)?;
+    Ok(loaded)
+}
+
+/// A moment of a file without animations: refused when one is named, else a warning.
+fn check_moment(loaded: &mut Loaded, file: &Path, options: &LoadOptions) -> Result<(), LoadError> {
+    let Some(moment) = options.moment.as_ref().filter(|_| loaded.facts.animations.is_empty()) else { return Ok(()) };
+    if let Some(name) = &moment.animation {
+        let fault = Diagnostic::new("animation-none", file, "", format!("there is no animation '{name}'"));
+        return Err(fault.remedy("the file has none").into());
+    }
+    let warning = Diagnostic::new("animation-none", file, "", "the file has no animation");
+    loaded.warnings.push(warning.remedy("drawn at rest, whatever the time"));
+    Ok(())
 }
 
 fn load_source(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {

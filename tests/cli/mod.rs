@@ -1,6 +1,7 @@
 //! The program from outside: what scripts and people rely on.
 
 mod again;
+mod animation;
 mod backdrop;
 mod bench;
 mod costs;
@@ -16,4 +17,5 @@ mod program;
 mod pruning;
 mod same_pixels;
 mod spd;
+mod surroundings;
 mod trace;

@@ -3,7 +3,7 @@
 use super::super::text::grouped;
 use super::topology::Topology;
 use crate::accel::{AccelKind, AccelParams, AnyAccel};
-use crate::load::Loaded;
+use crate::load::{AnimationFacts, Loaded};
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
 use crate::render::World;
 use crate::scene::features::Features;
@@ -123,6 +123,12 @@ impl<'a> Report<'a> {
             format!("{name} ({}{required})", if *supported { "supported" } else { "not supported" })
         };
         lines.add("extensions", shorten(self.loaded.facts.extensions.iter().map(extension)));
+        let animation = |animation: &AnimationFacts| {
+            let channels = if animation.channels == 1 { "channel" } else { "channels" };
+            let (seconds, count) = (animation.seconds, animation.channels);
+            format!("{} ({seconds:.3} s, {count} {channels})", label(&animation.name))
+        };
+        lines.add("animations", shorten(self.loaded.facts.animations.iter().map(animation)));
         lines.add("cameras", shorten(scene.cameras.iter().map(|c| format!("{} ({})", label(&c.name), lens(c)))));
         lines.add("lights", shorten(scene.lights.iter().map(|l| format!("{} ({})", label(&l.name), kind(l)))));
         let bitmaps = scene.bitmaps.iter().map(|b| format!("{} {}×{}", label(&b.name), b.width, b.height));
@@ -174,6 +180,8 @@ impl<'a> Report<'a> {
             "extensions": facts.extensions.iter()
                 .map(|(n, r, s)| json!({ "name": n, "required": r, "supported": s })).collect::<Vec<_>>(),
             "scenes": facts.scenes, "scene": facts.scene_index,
+            "animations": facts.animations.iter()
+                .map(|a| json!({ "name": a.name, "seconds": a.seconds, "channels": a.channels })).collect::<Vec<_>>(),
             "cameras": scene.cameras.iter().map(|c| named(&c.name, lens(c))).collect::<Vec<_>>(),
             "lights": scene.lights.iter().map(|l| named(&l.name, kind(l))).collect::<Vec<_>>(),
             "features": self.features.present().map(|f| f.name()).collect::<Vec<_>>(),

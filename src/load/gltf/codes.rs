@@ -2,8 +2,8 @@
 //!
 //! The rule behind the rows: **refuse** when it is unknown what the file shows (it is not glTF 2.0, a part that must be
 //! there is missing, a number points outside); **warn** when a rule is broken but what is drawn is clear, or when a part
-//! can be left out; **accept** in silence what changes nothing. Faults in animations are at most warned about, because a
-//! still shows the rest pose, and so are those in images, because a material can be drawn without a map
+//! can be left out; **accept** in silence what changes nothing. Faults in animations are at most warned about, because
+//! nodes that they do not move can be drawn at rest, and so are those in images, because a material can be drawn without a map
 //! ([`Code::verdict_at`]).
 
 use std::sync::LazyLock;
@@ -218,22 +218,22 @@ codes! {
     VolumeNoTransmission "KHR_MATERIALS_VOLUME_NO_TRANSMISSION" Accept "no light gets in";
     VariantsNonUnique "KHR_MATERIALS_VARIANTS_NON_UNIQUE_VARIANT" Accept "the default variant is drawn";
 
-    // Animation: a still shows the rest pose.
-    AccessorAnimationInputNegative "ACCESSOR_ANIMATION_INPUT_NEGATIVE" Accept "animation data is not read";
-    AccessorAnimationInputNonIncreasing "ACCESSOR_ANIMATION_INPUT_NON_INCREASING" Accept "animation data is not read";
-    AccessorAnimationQuaternion "ACCESSOR_ANIMATION_SAMPLER_OUTPUT_NON_NORMALIZED_QUATERNION" Accept "animation data is not read";
-    AnimationTargetMatrix "ANIMATION_CHANNEL_TARGET_NODE_MATRIX" Accept "animation is not played";
-    AnimationTargetSkin "ANIMATION_CHANNEL_TARGET_NODE_SKIN" Accept "animation is not played";
-    AnimationTargetNoMorphs "ANIMATION_CHANNEL_TARGET_NODE_WEIGHTS_NO_MORPHS" Accept "animation is not played";
-    AnimationDuplicateTargets "ANIMATION_DUPLICATE_TARGETS" Accept "animation is not played";
-    AnimationByteStride "ANIMATION_SAMPLER_ACCESSOR_WITH_BYTESTRIDE" Accept "animation data is not read";
-    AnimationInputFormat "ANIMATION_SAMPLER_INPUT_ACCESSOR_INVALID_FORMAT" Accept "animation data is not read";
-    AnimationInputFew "ANIMATION_SAMPLER_INPUT_ACCESSOR_TOO_FEW_ELEMENTS" Accept "animation data is not read";
-    AnimationInputBounds "ANIMATION_SAMPLER_INPUT_ACCESSOR_WITHOUT_BOUNDS" Accept "animation data is not read";
-    AnimationOutputCount "ANIMATION_SAMPLER_OUTPUT_ACCESSOR_INVALID_COUNT" Accept "animation data is not read";
-    AnimationOutputFormat "ANIMATION_SAMPLER_OUTPUT_ACCESSOR_INVALID_FORMAT" Accept "animation data is not read";
-    AnimationPointerNode "KHR_ANIMATION_POINTER_ANIMATION_CHANNEL_TARGET_NODE" Accept "animation is not played";
-    AnimationPointerPath "KHR_ANIMATION_POINTER_ANIMATION_CHANNEL_TARGET_PATH" Accept "animation is not played";
+    // Animation: nothing is looked at unless it is played; what cannot be used of it is told then.
+    AccessorAnimationInputNegative "ACCESSOR_ANIMATION_INPUT_NEGATIVE" Accept "it has begun before 0";
+    AccessorAnimationInputNonIncreasing "ACCESSOR_ANIMATION_INPUT_NON_INCREASING" Accept "told when it is played";
+    AccessorAnimationQuaternion "ACCESSOR_ANIMATION_SAMPLER_OUTPUT_NON_NORMALIZED_QUATERNION" Accept "the rotation is made unit";
+    AnimationTargetMatrix "ANIMATION_CHANNEL_TARGET_NODE_MATRIX" Accept "told when it is played";
+    AnimationTargetSkin "ANIMATION_CHANNEL_TARGET_NODE_SKIN" Accept "its joints place the mesh";
+    AnimationTargetNoMorphs "ANIMATION_CHANNEL_TARGET_NODE_WEIGHTS_NO_MORPHS" Accept "told when it is played";
+    AnimationDuplicateTargets "ANIMATION_DUPLICATE_TARGETS" Accept "told when it is played";
+    AnimationByteStride "ANIMATION_SAMPLER_ACCESSOR_WITH_BYTESTRIDE" Accept "read with that stride";
+    AnimationInputFormat "ANIMATION_SAMPLER_INPUT_ACCESSOR_INVALID_FORMAT" Accept "told when it is played";
+    AnimationInputFew "ANIMATION_SAMPLER_INPUT_ACCESSOR_TOO_FEW_ELEMENTS" Accept "one key holds for all times";
+    AnimationInputBounds "ANIMATION_SAMPLER_INPUT_ACCESSOR_WITHOUT_BOUNDS" Accept "the end is found in the data";
+    AnimationOutputCount "ANIMATION_SAMPLER_OUTPUT_ACCESSOR_INVALID_COUNT" Accept "told when it is played";
+    AnimationOutputFormat "ANIMATION_SAMPLER_OUTPUT_ACCESSOR_INVALID_FORMAT" Accept "told when it is played";
+    AnimationPointerNode "KHR_ANIMATION_POINTER_ANIMATION_CHANNEL_TARGET_NODE" Accept "told when it is played";
+    AnimationPointerPath "KHR_ANIMATION_POINTER_ANIMATION_CHANNEL_TARGET_PATH" Accept "told when it is played";
 }
 
 /// `gltf-unresolved-reference` and so on, in the order of [`TABLE`].
@@ -286,6 +286,7 @@ mod tests {
             (Code::ArrayTypeMismatch, "a type mismatch of an element"),
         ];
         let sources = [
+            include_str!("animation/play.rs"),
             include_str!("attributes.rs"),
             include_str!("bounds.rs"),
             include_str!("buffers.rs"),

@@ -3,6 +3,7 @@
 //! The crate's own validation is not used: it refuses legal files and panics on some broken ones. Its structs are
 //! plain data; everything that could panic on access (`Checked::unwrap`, indexing) is avoided throughout this loader.
 
+use super::animation::{self, Animation};
 use super::codes::Code;
 use super::report::Report;
 use super::schema;
@@ -13,8 +14,7 @@ use serde_json::{Map, Number, Value};
 /// A document whose types and indices are right.
 pub(super) struct Document {
     pub(super) root: Root,
-    /// How many animations the file has; they are not kept.
-    pub(super) animations: usize,
+    pub(super) animations: Vec<Animation>,
 }
 
 /// Refuses JSON that is nested deeper than the parser goes.
@@ -47,7 +47,7 @@ pub(super) fn parse(json: &[u8], report: &mut Report) -> Option<Value> {
 
 /// Turns checked JSON into the typed document; images that broke the schema become empty ones.
 pub(super) fn typed(mut value: Value, report: &mut Report) -> Option<Document> {
-    let animations = value.get("animations").and_then(Value::as_array).map_or(0, Vec::len);
+    let animations = animation::all(&value);
     simplify(&mut value);
     let map = value.as_object_mut()?;
     map.remove("animations");

@@ -5,6 +5,7 @@ use super::report::Report;
 use super::schema::whole;
 use crate::math::{DAffine3, DMat3, DMat4, DQuat, DVec3};
 use serde_json::Value;
+use std::collections::HashMap;
 use std::ops::Range;
 
 /// Parents and places of all nodes, in a scene or not.
@@ -15,8 +16,42 @@ pub(super) struct Graph {
     family: Vec<Range<usize>>,
     /// Where the numbers of each tree end, ascending.
     tree_ends: Vec<usize>,
+    /// All nodes, parents before their children.
+    order: Vec<usize>,
+    /// From node to its parent's space, as the file says.
+    local: Vec<Local>,
     /// From node to world space.
     pub(super) world: Vec<DAffine3>,
+}
+
+/// The transform of a node.
+#[derive(Clone, Copy, Debug)]
+enum Local {
+    Matrix(DAffine3),
+    Parts { translation: DVec3, rotation: DQuat, scale: DVec3 },
+}
+
+/// What an animation puts in the place of a node's own translation, rotation and scale.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Moved {
+    pub(super) translation: Option<DVec3>,
+    /// Unit length.
+    pub(super) rotation: Option<DQuat>,
+    pub(super) scale: Option<DVec3>,
+}
+
+impl Local {
+    /// The transform of a node that is moved; a matrix stays as it is.
+    fn affine(self, moved: Moved) -> DAffine3 {
+        match self {
+            Self::Matrix(affine) => affine,
+            Self::Parts { translation, rotation, scale } => DAffine3::from_scale_rotation_translation(
+                moved.scale.unwrap_or(scale),
+                moved.rotation.unwrap_or(rotation),
+                moved.translation.unwrap_or(translation),
+            ),
+        }
+    }
 }
 
 impl Graph {
@@ -33,7 +68,25 @@ impl Graph {
         let family = families(&parents, &order);
         let tops = order.iter().filter(|&&node| parents[node].is_none());
         let tree_ends = tops.map(|&node| family[node].end).collect();
-        Self { world: compose(&parents, &order, &local), family, tree_ends, parents }
+        let mut graph = Self { world: Vec::new(), local, order, family, tree_ends, parents };
+        graph.place(&HashMap::new());
+        graph
+    }
+
+    /// Composes all places anew with some nodes moved.
+    pub(super) fn place(&mut self, moved: &HashMap<usize, Moved>) {
+        let of = |node: usize| moved.get(&node).copied().unwrap_or_default();
+        self.world = self.local.iter().enumerate().map(|(node, local)| local.affine(of(node))).collect();
+        for &node in &self.order {
+            if let Some(parent) = self.parents[node] {
+                self.world[node] = self.world[parent] * self.world[node];
+            }
+        }
+    }
+
+    /// Whether a node's transform is a matrix, which has no parts that could be moved.
+    pub(super) fn has_matrix(&self, node: usize) -> bool {
+        matches!(self.local.get(node), Some(Local::Matrix(_)))
     }
 
     /// Nodes without a parent.
@@ -124,19 +177,19 @@ fn check_scenes(root: &Value, parents: &[Option<usize>], report: &mut Report) {
 }
 
 /// The transform of one node, from its matrix or its translation, rotation and scale.
-fn local(i: usize, node: &Value, report: &mut Report) -> DAffine3 {
+fn local(i: usize, node: &Value, report: &mut Report) -> Local {
     let trs = ["translation", "rotation", "scale"].iter().any(|name| node.get(*name).is_some());
     if let Some(columns) = numbers::<16>(node, "matrix") {
         if trs {
             let text = "a matrix and translation, rotation or scale";
             report.add(Code::NodeMatrixTrs, format!("nodes[{i}].matrix"), text);
         }
-        return from_columns(i, &columns, report);
+        return Local::Matrix(from_columns(i, &columns, report));
     }
     let scale = numbers::<3>(node, "scale").map_or(DVec3::ONE, DVec3::from);
     let translation = numbers::<3>(node, "translation").map_or(DVec3::ZERO, DVec3::from);
     let rotation = numbers::<4>(node, "rotation").map_or(DQuat::IDENTITY, |q| unit(i, DQuat::from_array(q), report));
-    DAffine3::from_scale_rotation_translation(scale, rotation, translation)
+    Local::Parts { translation, rotation, scale }
 }
 
 fn from_columns(i: usize, columns: &[f64; 16], report: &mut Report) -> DAffine3 {
@@ -192,17 +245,6 @@ fn order(parents: &[Option<usize>]) -> Vec<usize> {
     order
 }
 
-/// World transforms.
-fn compose(parents: &[Option<usize>], order: &[usize], local: &[DAffine3]) -> Vec<DAffine3> {
-    let mut world = local.to_vec();
-    for &node in order {
-        if let Some(parent) = parents[node] {
-            world[node] = world[parent] * local[node];
-        }
-    }
-    world
-}
-
 /// Numbers the nodes so that every node and what hangs on it have numbers in a row.
 fn families(parents: &[Option<usize>], order: &[usize]) -> Vec<Range<usize>> {
     let mut sizes = vec![1; parents.len()];
@@ -249,6 +291,24 @@ mod tests {
         assert!(codes.is_empty(), "{codes:?}");
         assert_eq!(graph.world[0].transform_point3(DVec3::X), DVec3::new(6378139.0625, 0.0, -2.0));
         assert_eq!(graph.roots().collect::<Vec<_>>(), [2]);
+    }
+
+    #[test]
+    fn a_moved_node_takes_its_children_along_and_keeps_what_is_not_moved() {
+        let (mut graph, _) = graph(json!([
+            {"children": [1], "translation": [1, 0, 0], "scale": [2, 2, 2]},
+            {"translation": [0, 1, 0]},
+            {"matrix": [1,0,0,0, 0,1,0,0, 0,0,1,0, 5,0,0,1]},
+        ]));
+        let quarter = DQuat::from_array([0.0, 0.0, 0.5f64.sqrt(), 0.5f64.sqrt()]);
+        let away = Moved { translation: Some(DVec3::Z), ..Moved::default() };
+        let turned = Moved { rotation: Some(quarter), ..Moved::default() };
+        graph.place(&HashMap::from([(0, turned), (1, away), (2, away)]));
+        let at = |node: usize| graph.world[node].transform_point3(DVec3::X);
+        assert!((at(0) - DVec3::new(1.0, 2.0, 0.0)).length() < 1e-12, "{}", at(0));
+        assert!((at(1) - DVec3::new(1.0, 2.0, 2.0)).length() < 1e-12, "{}", at(1));
+        assert_eq!(at(2), DVec3::new(6.0, 0.0, 0.0));
+        assert!(graph.has_matrix(2) && !graph.has_matrix(0) && !graph.has_matrix(7));
     }
 
     #[test]

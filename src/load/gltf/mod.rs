@@ -10,12 +10,15 @@
 //! primitives by `draco`, so that their accessors are accessors like others. Both libraries sit behind features of the
 //! same names; without them, such files are refused with a line that says so.
 //!
-//! Animations are not played: nodes, morph weights and skins are drawn in their rest pose.
+//! Nodes, morph weights and skins are drawn in their rest pose, or as an animation has them at a moment
+//! ([`Moment`](super::Moment)).
 
 mod accessor;
+mod animation;
 mod attributes;
 mod bounds;
 mod buffers;
+mod choice;
 pub mod codes;
 mod container;
 mod document;
@@ -35,6 +38,7 @@ mod material;
 mod mesh;
 mod meshopt;
 mod meshopt_codec;
+mod palette;
 mod placed;
 mod report;
 mod scene;
@@ -53,20 +57,21 @@ use super::limits::Budget;
 use super::paths::Resolver;
 use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source};
 use crate::math::{DAffine3, DMat4};
-use crate::scene::{Environment, Instance, Material, Scene};
+use crate::scene::{Environment, Instance, Scene};
 use accessor::Reader;
+use animation::Pose;
 use buffers::Buffers;
 use document::Document;
 use gltf::json::Root;
 use gltf::json::mesh as source;
 use graph::Graph;
 use images::Images;
-use mesh::{Job, Needs, Read};
+use mesh::Read;
+use palette::Palette;
 use rayon::prelude::*;
 use report::Report;
 use scene::Placed;
 use sparse::Replacements;
-use textures::Textures;
 use weight::Weight;
 
 /// Loads a glTF 2.0 file.
@@ -84,45 +89,6 @@ struct Loading<'a> {
     source: &'a Source,
     options: &'a LoadOptions,
     report: &'a mut Report,
-}
-
-/// Materials in use, and how the file's numbers lead to them.
-struct Palette<'a> {
-    materials: Vec<Material>,
-    needs: Vec<Needs>,
-    /// For each material of the file, and last for the default one, its index here.
-    index: Vec<Option<u32>>,
-    textures: Textures<'a>,
-}
-
-impl Palette<'_> {
-    /// The material that a primitive shows; `None` when it is not drawn.
-    fn material(&self, variant: &scene::Variant, primitive: &source::Primitive) -> Option<u32> {
-        // The default material is the last.
-        let i = primitive.material.map_or(self.index.len().checked_sub(1)?, |m| m.value());
-        self.index.get(i).copied().flatten().filter(|_| variant.drawn)
-    }
-
-    /// What to read of a primitive, the `k`th of its mesh.
-    fn job<'a>(
-        &self,
-        variant: &'a scene::Variant,
-        mesh: &'a source::Mesh,
-        k: usize,
-        primitive: &'a source::Primitive,
-        skins: &'a [Option<Vec<DMat4>>],
-    ) -> Job<'a> {
-        let needs = self.material(variant, primitive).and_then(|material| self.needs.get(material as usize));
-        Job {
-            primitive,
-            place: format!("meshes[{}].primitives[{k}]", variant.mesh),
-            name: mesh.name.as_deref().unwrap_or_default(),
-            weights: variant.weights.as_deref().or(mesh.weights.as_deref()).unwrap_or_default(),
-            joints: variant.skin.and_then(|s| skins.get(s)).and_then(Option::as_deref),
-            needs: needs.cloned().unwrap_or_default(),
-            drawn: variant.drawn,
-        }
-    }
 }
 
 impl Loading<'_> {
@@ -148,7 +114,7 @@ impl Loading<'_> {
         self.take(&mut budget, weight::typed(&value), "the document")?;
         attributes::check(&value, self.report);
         usage::check(&value, self.report);
-        let graph = Graph::new(&value, self.report);
+        let mut graph = Graph::new(&value, self.report);
         let document = document::typed(value, self.report);
         let document = self.passed(document)?;
         links::check(&document.root, self.report);
@@ -156,7 +122,7 @@ impl Loading<'_> {
 
         let mut facts = facts(&document, container.binary);
         facts.extensions = extensions.facts();
-        let scene = self.build(&document, &graph, container.bin, &mut budget, &mut facts)?;
+        let scene = self.build(&document, &mut graph, container.bin, &mut budget, &mut facts)?;
         Ok(Loaded { scene, facts, warnings: Vec::new() })
     }
 
@@ -170,7 +136,7 @@ impl Loading<'_> {
     fn build(
         &mut self,
         document: &Document,
-        graph: &Graph,
+        graph: &mut Graph,
         bin: Option<&[u8]>,
         budget: &mut Budget,
         facts: &mut Facts,
@@ -189,14 +155,18 @@ impl Loading<'_> {
         facts.scene_index = scene::choose(root, self.options.scene.as_deref(), file)?;
         self.check_budget(reader, *budget)?;
         bounds::check(reader, self.report);
-        let placed = scene::walk(reader, graph, facts.scene_index, budget, self.report);
+        facts.animations = animation::facts(&document.animations, reader);
+        let pose = self.pose(reader, graph, document, budget, facts)?;
+        graph.place(&pose.moved);
+        let placed = scene::walk(reader, graph, facts.scene_index, &pose.weights, budget, self.report);
         let placed = placed.map_err(|over| self.too_large("what the nodes show", over))?;
         let skins = skin::joint_matrices(reader, graph, self.report);
         skin::check_scene(root, graph, facts.scene_index, &placed.draws, self.report);
-        let palette = self.palette(document, &placed);
+        let palette = Palette::new(root, &placed, self.report);
 
         let drawn_images = palette.textures.images.clone();
-        let images = Images::load(root, &buffers, &drawn_images, file, &mut resolver, budget, self.report);
+        let read_images = if self.options.without_pictures { &[][..] } else { &drawn_images };
+        let images = Images::load(root, &buffers, read_images, file, &mut resolver, budget, self.report);
         self.charge(reader, &placed, &skins, &palette, budget)?;
         let mut pictures = Report::new(file);
         let (reads, (bitmaps, decoding)) = rayon::join(
@@ -214,6 +184,40 @@ impl Loading<'_> {
         (facts.reading, facts.decoding) = (resolver.reading(), decoding);
         (facts.files, facts.hash) = resolver.finish();
         Ok(scene)
+    }
+
+    /// What the wished moment does to the nodes; nothing for a file without animations.
+    fn pose(
+        &mut self,
+        reader: Reader,
+        graph: &Graph,
+        document: &Document,
+        budget: &mut Budget,
+        facts: &mut Facts,
+    ) -> Result<Pose, LoadError> {
+        let (file, animations) = (self.source.path.as_path(), &document.animations);
+        let Some(moment) = self.options.moment.as_ref().filter(|_| !animations.is_empty()) else {
+            return Ok(Pose::default());
+        };
+        let names: Vec<Option<&str>> = animations.iter().map(|animation| animation.name.as_deref()).collect();
+        let number = match &moment.animation {
+            Some(wish) => choice::choose(&choice::ANIMATION, &names, wish, file)?,
+            None => 0,
+        };
+        let Some(animation) = animations.get(number) else { return Ok(Pose::default()) };
+        let pose = animation::play(reader, graph, (number, animation), moment.time, budget, self.report)
+            .map_err(|over| self.too_large("an animation", over))?;
+        facts.shown = Some((number, moment.time));
+        // Times are stored as `f32`: what falls on the last one when rounded is not past it.
+        #[expect(clippy::cast_possible_truncation, reason = "compared as stored")]
+        let past = |end: f64| (moment.time as f32) > end as f32;
+        if let Some(end) = facts.animations.get(number).map(|animation| animation.seconds).filter(|&end| past(end)) {
+            let called = animation.called(number);
+            let text = format!("{} s is past the end of animation {called}, which is {end} s long", moment.time);
+            let warning = Diagnostic::new("animation-over", file, format!("animations[{number}]"), text);
+            self.report.warnings.push(warning.remedy("drawn as at its end"));
+        }
+        Ok(pose)
     }
 
     /// In a GLB, a first buffer without a uri is the binary chunk, which must be there when it is needed.
@@ -257,33 +261,6 @@ impl Loading<'_> {
         let text = format!("{what} is too large: {over}");
         let fault = Diagnostic::new("out-of-memory-limit", &self.source.path, "", text);
         fault.remedy("allow more with --max-memory").into()
-    }
-
-    /// Converts the materials that drawn primitives name.
-    fn palette<'a>(&mut self, document: &'a Document, placed: &Placed) -> Palette<'a> {
-        let root = &document.root;
-        let default = root.materials.len();
-        let mut palette = Palette {
-            materials: Vec::new(),
-            needs: Vec::new(),
-            index: vec![None; default + 1],
-            textures: Textures::new(root),
-        };
-        let drawn = placed.variants.iter().filter(|v| v.drawn).filter_map(|v| root.meshes.get(v.mesh));
-        for primitive in drawn.flat_map(|mesh| &mesh.primitives) {
-            let i = primitive.material.map_or(default, |m| m.value());
-            if palette.index.get(i).is_none_or(Option::is_some) {
-                continue;
-            }
-            let material = match root.materials.get(i) {
-                Some(source) => material::convert(i, source, &mut palette.textures, self.report),
-                None => Material { name: "default".into(), ..Material::default() },
-            };
-            palette.index[i] = u32::try_from(palette.materials.len()).ok();
-            palette.needs.push(material::needs(&material));
-            palette.materials.push(material);
-        }
-        palette
     }
 
     /// Puts what was read into the scene.
@@ -382,7 +359,6 @@ fn facts(document: &Document, binary: bool) -> Facts {
         format: format!("glTF {version}{}", if binary { " (binary)" } else { "" }),
         generator: root.asset.generator.clone().unwrap_or_default(),
         scenes: scene::names(root),
-        animations: document.animations as u64,
         ..Facts::default()
     }
 }

@@ -38,9 +38,13 @@ impl Report {
 
     /// Files a fault as a warning, whatever the table says of the graver cases of its code.
     pub(super) fn warn(&mut self, code: Code, place: impl AsRef<str>, text: impl Into<String>) {
-        let warning = Diagnostic::new(code.name(), &self.file, place.as_ref(), text);
         let why = code.row().why;
-        let remedy = if code.row().verdict == Verdict::Warn { why } else { "" };
+        self.warn_with(code, place, text, if code.row().verdict == Verdict::Warn { why } else { "" });
+    }
+
+    /// The same where something else becomes of it than the table says.
+    pub(super) fn warn_with(&mut self, code: Code, place: impl AsRef<str>, text: impl Into<String>, remedy: &str) {
+        let warning = Diagnostic::new(code.name(), &self.file, place.as_ref(), text);
         let kind = kind(&warning);
         self.warnings.push_kind(warning.remedy(remedy), kind);
     }

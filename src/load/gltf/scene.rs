@@ -1,6 +1,7 @@
 //! Which scene of the file is drawn, and what stands where in it.
 
 use super::accessor::{Pick, Reader, Unreadable};
+use super::choice;
 use super::codes::Code;
 use super::graph::Graph;
 use super::placed;
@@ -19,7 +20,7 @@ use std::path::Path;
 #[derive(Clone, Debug)]
 pub(super) struct Variant {
     pub(super) mesh: usize,
-    /// Weights of a node; `None`: those of the mesh count.
+    /// Weights of a node or an animation; `None`: those of the mesh count.
     pub(super) weights: Option<Vec<f32>>,
     pub(super) skin: Option<usize>,
     /// Whether the scene shows it; others are only checked.
@@ -48,28 +49,15 @@ pub(super) fn names(root: &Root) -> Vec<String> {
     root.scenes.iter().map(|scene| scene.name.clone().unwrap_or_default()).collect()
 }
 
-/// Scenes in one message before the rest is only counted.
-const LISTED: usize = 20;
-
 /// The scene that is asked for by index or name; without a wish, the default one, or else the first.
 pub(super) fn choose(root: &Root, wish: Option<&str>, file: &Path) -> Result<usize, Diagnostic> {
     let Some(wish) = wish else { return Ok(root.scene.map_or(0, |scene| scene.value())) };
-    let by_name = root.scenes.iter().position(|scene| scene.name.as_deref() == Some(wish));
-    let by_index = wish.parse().ok().filter(|&i: &usize| i < root.scenes.len());
-    by_name.or(by_index).ok_or_else(|| {
-        let shown = |(i, name): (usize, String)| if name.is_empty() { i.to_string() } else { format!("{i} '{name}'") };
-        let list: Vec<String> = names(root).into_iter().enumerate().take(LISTED).map(shown).collect();
-        let text = format!("there is no scene '{wish}'");
-        let remedy = match root.scenes.len().saturating_sub(LISTED) {
-            _ if list.is_empty() => "the file has none".into(),
-            0 => format!("it has {}", list.join(", ")),
-            more => format!("it has {} and {more} more", list.join(", ")),
-        };
-        Diagnostic::new("gltf-no-such-scene", file, "scenes", text).remedy(remedy)
-    })
+    let names: Vec<Option<&str>> = root.scenes.iter().map(|scene| scene.name.as_deref()).collect();
+    choice::choose(&choice::SCENE, &names, wish, file)
 }
 
-/// Walks the nodes of a scene; a file without scenes shows all its nodes.
+/// Walks the nodes of a scene; a file without scenes shows all its nodes. `weights` are those that an animation gives to
+/// morph targets, by node.
 ///
 /// # Errors
 /// When the scene would take more than is left of `budget`.
@@ -77,6 +65,7 @@ pub(super) fn walk(
     reader: Reader,
     graph: &Graph,
     scene: usize,
+    weights: &HashMap<usize, Vec<f32>>,
     budget: &mut Budget,
     report: &mut Report,
 ) -> Result<Placed, OverBudget> {
@@ -87,7 +76,7 @@ pub(super) fn walk(
     };
     stack.reverse();
     let mut seen = vec![false; root.nodes.len()];
-    let mut walk = Walk { reader, placed: Placed::default(), known: HashMap::new(), budget, report };
+    let mut walk = Walk { reader, weights, placed: Placed::default(), known: HashMap::new(), budget, report };
     while let Some(i) = stack.pop() {
         let Some(node) = root.nodes.get(i).filter(|node| is_visible(node)) else { continue };
         if std::mem::replace(&mut seen[i], true) {
@@ -111,6 +100,8 @@ type Kind = (usize, Option<usize>, Option<Vec<u32>>);
 
 struct Walk<'a, 'b> {
     reader: Reader<'a>,
+    /// Weights that an animation gives, by node.
+    weights: &'b HashMap<usize, Vec<f32>>,
     placed: Placed,
     /// Where each variant is in the list.
     known: HashMap<Kind, usize>,
@@ -122,7 +113,7 @@ impl Walk<'_, '_> {
     /// Places the mesh of a node, or its copies.
     fn mesh(&mut self, i: usize, node: &Node, world: DAffine3) -> Result<(), OverBudget> {
         let Some(mesh) = node.mesh.and_then(|mesh| self.reader.root.meshes.get(mesh.value())) else { return Ok(()) };
-        let Some(variant) = self.variant(node, mesh) else { return Ok(()) };
+        let Some(variant) = self.variant(i, node, mesh) else { return Ok(()) };
         let copies = match instancing(node) {
             None => Ok(vec![DAffine3::IDENTITY]),
             Some(attributes) => {
@@ -159,9 +150,10 @@ impl Walk<'_, '_> {
     }
 
     /// The variant that a node shows.
-    fn variant(&mut self, node: &Node, mesh: &Mesh) -> Option<usize> {
+    fn variant(&mut self, i: usize, node: &Node, mesh: &Mesh) -> Option<usize> {
         let (index, skin) = (node.mesh?.value(), node.skin.map(|skin| skin.value()));
-        let weights = node.weights.as_ref().filter(|own| mesh.weights.as_ref() != Some(*own));
+        let own = self.weights.get(&i).or(node.weights.as_ref());
+        let weights = own.filter(|own| mesh.weights.as_ref() != Some(*own));
         let bits = weights.map(|weights| weights.iter().map(|w| w.to_bits()).collect());
         let variants = &mut self.placed.variants;
         Some(*self.known.entry((index, skin, bits)).or_insert_with(|| {

@@ -1,7 +1,7 @@
-//! Skinned meshes in their rest pose, by linear blend skinning.
+//! Skinned meshes in the pose of their joints, by linear blend skinning.
 //!
-//! A skinned mesh stands where its joints put it: the node that holds it has no say. The static picture uses the
-//! joints' places as the nodes give them; animation is not played.
+//! A skinned mesh stands where its joints put it: the node that holds it has no say. The joints stand where the nodes do,
+//! at rest or moved by an animation.
 
 use super::accessor::{Format, Pick, Reader, Unreadable};
 use super::codes::Code;
@@ -139,7 +139,7 @@ impl Influences {
     }
 }
 
-/// Puts a mesh into its rest pose; returns the place that its positions are relative to.
+/// Puts a mesh into the pose of its joints; returns the place that its positions are relative to.
 pub(super) fn pose(mesh: &mut Mesh, influences: &Influences, matrices: &[DMat4]) -> (DVec3, Oddities) {
     let mut odd = Oddities::default();
     let mut placed = Vec::with_capacity(mesh.positions.len());

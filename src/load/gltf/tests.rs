@@ -1,5 +1,6 @@
 //! Whole files, made in memory, one feature each.
 
+mod animation;
 #[cfg(any(feature = "draco", feature = "meshopt"))]
 mod boxes;
 #[cfg(feature = "draco")]

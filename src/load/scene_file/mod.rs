@@ -358,6 +358,7 @@ fn assemble(
         facts.dropped.extend(part.facts.dropped);
         facts.points_and_lines += part.facts.points_and_lines;
         facts.extensions.extend(part.facts.extensions);
+        facts.animations.extend(part.facts.animations);
         facts.max_rounding = facts.max_rounding.max(part.facts.max_rounding);
         facts.reading += part.facts.reading;
         facts.decoding += part.facts.decoding;

@@ -35,6 +35,13 @@ impl Bounds {
         self.lo * 0.5 + self.hi * 0.5
     }
 
+    /// The box of both.
+    pub fn union(&self, other: &Self) -> Self {
+        let whole = (self.whole.0.min(other.whole.0), self.whole.1.max(other.whole.1));
+        let strays = self.strays.max(other.strays);
+        Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi), strays, whole }
+    }
+
     /// Half the diagonal, greater than 0.
     pub fn radius(&self) -> f64 {
         let radius = (self.hi - self.lo).length() * 0.5;

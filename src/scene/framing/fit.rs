@@ -1,6 +1,6 @@
 //! Stepping back until everything is in the picture, and no further.
 
-use super::{Bounds, Direction};
+use super::{Bounds, Direction, in_world};
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::scene::{Camera, Projection, Scene};
 
@@ -24,23 +24,76 @@ const FILL: f64 = 0.92;
 /// The fit is to the projected vertices, not to a box or ball around them: the outermost ones touch the border on two
 /// opposite sides and are centred between the others.
 pub fn frame(scene: &Scene, bounds: &Bounds, direction: Direction, lens: FrameLens, aspect: f64) -> Camera {
-    let axes = axes(direction);
-    let aspect = if aspect.is_finite() && aspect > 0.0 { aspect } else { 1.0 };
-    let center = bounds.center();
-    let (eye, projection) = match lens {
-        FrameLens::Perspective { y_fov } => {
-            let half = libm::tan(0.5 * y_fov.clamp(1e-3, 3.0));
-            let extremes = Extremes::of(scene, bounds, &axes, center, (half * aspect * FILL, half * FILL));
-            (extremes.pinhole(bounds.radius()), Projection::Perspective { y_fov, aspect: None })
+    let mut fit = Fit::new(direction, bounds.center(), lens, aspect);
+    fit.add(scene, bounds);
+    fit.camera(bounds.radius())
+}
+
+/// The same for a camera that goes around the model, about the up axis through the middle of `bounds`: from everywhere on
+/// its way all of the model is in the picture. It begins at `direction`.
+pub fn frame_around(scene: &Scene, bounds: &Bounds, direction: Direction, lens: FrameLens, aspect: f64) -> Camera {
+    let mut fit = Fit::new(direction, bounds.center(), lens, aspect);
+    let up = in_world(scene.up, DVec3::Y);
+    let up_in_camera = fit.camera_from_world * up;
+    visit_balls(scene, bounds, |p, radius| {
+        let p = p - fit.center;
+        let height = p.dot(up);
+        fit.extremes.add_ring(up_in_camera, height, (p - up * height).length(), radius);
+    });
+    fit.camera(bounds.radius())
+}
+
+/// A camera that sees several scenes from one place, such as the frames of an animation.
+pub struct Fit {
+    lens: FrameLens,
+    aspect: f64,
+    axes: DMat3,
+    camera_from_world: DMat3,
+    /// Where camera space has its origin.
+    center: DVec3,
+    extremes: Extremes,
+}
+
+impl Fit {
+    /// Sees nothing yet. `center` should be near the model, and `aspect` is width / height.
+    pub fn new(direction: Direction, center: DVec3, lens: FrameLens, aspect: f64) -> Self {
+        let axes = axes(direction);
+        let aspect = if aspect.is_finite() && aspect > 0.0 { aspect } else { 1.0 };
+        let slopes = match lens {
+            FrameLens::Perspective { y_fov } => {
+                let half = libm::tan(0.5 * y_fov.clamp(1e-3, 3.0));
+                (half * aspect * FILL, half * FILL)
+            }
+            FrameLens::Orthographic => (0.0, 0.0),
+        };
+        let extremes = Extremes { sides: [f64::NEG_INFINITY; 4], near: f64::NEG_INFINITY, slopes };
+        Self { lens, aspect, axes, camera_from_world: axes.transpose(), center, extremes }
+    }
+
+    /// Takes in the model in `bounds`.
+    pub fn add(&mut self, scene: &Scene, bounds: &Bounds) {
+        visit_balls(scene, bounds, |p, radius| {
+            self.extremes.add(self.camera_from_world * (p - self.center), radius);
+        });
+    }
+
+    /// The camera for all that was taken in; `radius` says how large that is.
+    pub fn camera(mut self, radius: f64) -> Camera {
+        if self.extremes.near == f64::NEG_INFINITY {
+            self.extremes.add(DVec3::ZERO, radius);
         }
-        FrameLens::Orthographic => {
-            let extremes = Extremes::of(scene, bounds, &axes, center, (0.0, 0.0));
-            let (eye, half_height) = extremes.parallel(bounds.radius(), aspect);
-            (eye, Projection::Orthographic { x_mag: half_height * aspect, y_mag: half_height })
-        }
-    };
-    let world_from_camera = DAffine3::from_mat3_translation(axes, center + axes * eye);
-    Camera { name: String::new(), projection, world_from_camera }
+        let (eye, projection) = match self.lens {
+            FrameLens::Perspective { y_fov } => {
+                (self.extremes.pinhole(radius), Projection::Perspective { y_fov, aspect: None })
+            }
+            FrameLens::Orthographic => {
+                let (eye, half_height) = self.extremes.parallel(radius, self.aspect);
+                (eye, Projection::Orthographic { x_mag: half_height * self.aspect, y_mag: half_height })
+            }
+        };
+        let world_from_camera = DAffine3::from_mat3_translation(self.axes, self.center + self.axes * eye);
+        Camera { name: String::new(), projection, world_from_camera }
+    }
 }
 
 /// The camera's axes: +x right, +y up, +z towards the eye.
@@ -49,6 +102,36 @@ fn axes(direction: Direction) -> DMat3 {
     let upright = |up: DVec3| up.cross(z).try_normalize();
     let x = upright(direction.up).or_else(|| upright(DVec3::Y)).or_else(|| upright(DVec3::Z)).unwrap_or(DVec3::X);
     DMat3::from_cols(x, z.cross(x), z)
+}
+
+/// Calls `f` with the place and radius of every ball of the model in `bounds`; vertices have the radius 0.
+fn visit_balls(scene: &Scene, bounds: &Bounds, mut f: impl FnMut(DVec3, f64)) {
+    for instance in &scene.instances {
+        let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
+        // Faces share their corners.
+        let mut seen = vec![false; mesh.positions.len()];
+        for &i in mesh.triangles.iter().flatten().chain(&mesh.polygon_corners) {
+            let Some(p) = mesh.positions.get(i as usize) else { continue };
+            if std::mem::replace(&mut seen[i as usize], true) {
+                continue;
+            }
+            let p = instance.world_from_object.transform_point3(p.as_dvec3());
+            if bounds.contains(p) {
+                f(p, 0.0);
+            }
+        }
+    }
+    for sphere in scene.spheres.iter().filter(|sphere| bounds.contains(sphere.center)) {
+        f(sphere.center, sphere.radius);
+    }
+    for cone in &scene.cones {
+        let (lo, hi) = cone.bounds();
+        if bounds.contains((lo + hi) * 0.5) {
+            // Balls around the ends hold the mantle; those of a wide flat one reach too far.
+            f(cone.base, cone.base_radius);
+            f(cone.apex, cone.apex_radius);
+        }
+    }
 }
 
 /// How far the model reaches past planes through the origin of camera space that lean like the sides of the picture.
@@ -61,41 +144,6 @@ struct Extremes {
 }
 
 impl Extremes {
-    fn of(scene: &Scene, bounds: &Bounds, axes: &DMat3, center: DVec3, slopes: (f64, f64)) -> Self {
-        let mut extremes = Self { sides: [f64::NEG_INFINITY; 4], near: f64::NEG_INFINITY, slopes };
-        let camera_from_world = axes.transpose();
-        for instance in &scene.instances {
-            let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
-            // Faces share their corners.
-            let mut seen = vec![false; mesh.positions.len()];
-            for &i in mesh.triangles.iter().flatten().chain(&mesh.polygon_corners) {
-                let Some(p) = mesh.positions.get(i as usize) else { continue };
-                if std::mem::replace(&mut seen[i as usize], true) {
-                    continue;
-                }
-                let p = instance.world_from_object.transform_point3(p.as_dvec3());
-                if bounds.contains(p) {
-                    extremes.add(camera_from_world * (p - center), 0.0);
-                }
-            }
-        }
-        for sphere in scene.spheres.iter().filter(|sphere| bounds.contains(sphere.center)) {
-            extremes.add(camera_from_world * (sphere.center - center), sphere.radius);
-        }
-        for cone in &scene.cones {
-            let (lo, hi) = cone.bounds();
-            if bounds.contains((lo + hi) * 0.5) {
-                // Balls around the ends hold the mantle; those of a wide flat one reach too far.
-                extremes.add(camera_from_world * (cone.base - center), cone.base_radius);
-                extremes.add(camera_from_world * (cone.apex - center), cone.apex_radius);
-            }
-        }
-        if extremes.near == f64::NEG_INFINITY {
-            extremes.add(DVec3::ZERO, bounds.radius());
-        }
-        extremes
-    }
-
     /// Takes in a ball, or a point of radius 0.
     fn add(&mut self, p: DVec3, radius: f64) {
         let (sx, sy) = self.slopes;
@@ -106,6 +154,23 @@ impl Extremes {
             *side = side.max(reach);
         }
         self.near = self.near.max(p.z + radius);
+    }
+
+    /// Takes in a ball, or a point of radius 0, wherever it goes on a circle about `up` (a unit vector in camera space):
+    /// `height` along it from the origin, and `distance` from the axis.
+    fn add_ring(&mut self, up: DVec3, height: f64, distance: f64, radius: f64) {
+        let (sx, sy) = self.slopes;
+        // A plane's normal points along the axis in part; the rest of it is met somewhere on the circle.
+        let reach = |n: DVec3| {
+            let along = n.dot(up);
+            let across = (n.length_squared() - along * along).max(0.0).sqrt();
+            height * along + distance * across + radius * n.length()
+        };
+        let normals = [(1.0, 0.0, sx), (-1.0, 0.0, sx), (0.0, 1.0, sy), (0.0, -1.0, sy)].map(DVec3::from);
+        for (side, normal) in self.sides.iter_mut().zip(normals) {
+            *side = side.max(reach(normal));
+        }
+        self.near = self.near.max(reach(DVec3::Z));
     }
 
     /// The nearest eye whose four leaning planes leave nothing outside, centred where there is room.

@@ -7,10 +7,10 @@ mod bounds;
 mod fit;
 
 pub use bounds::{Bounds, robust_bounds, robust_bounds_within};
-pub use fit::{FrameLens, frame};
+pub use fit::{Fit, FrameLens, frame, frame_around};
 
 use super::{Camera, Scene, UpAxis};
-use crate::math::DVec3;
+use crate::math::{DAffine3, DQuat, DVec3};
 use std::fmt;
 use std::str::FromStr;
 
@@ -148,6 +148,14 @@ pub fn default_direction(scene: &Scene, bounds: &Bounds) -> Direction {
     } else {
         Direction::around(scene.up, azimuth, elevation)
     }
+}
+
+/// A camera that has gone around the up axis through `pivot` by `angle`, radians, from the front towards +X.
+pub fn turned(camera: &Camera, up: UpAxis, pivot: DVec3, angle: f64) -> Camera {
+    let axis = in_world(up, DVec3::Y);
+    let turn = DQuat::from_vec4((axis * libm::sin(0.5 * angle)).extend(libm::cos(0.5 * angle)));
+    let about = DAffine3::from_translation(pivot) * DAffine3::from_quat(turn) * DAffine3::from_translation(-pivot);
+    Camera { world_from_camera: about * camera.world_from_camera, ..camera.clone() }
 }
 
 /// The camera of a picture nobody directed: the one the scene file chose, else [`default_direction`] framed for a picture

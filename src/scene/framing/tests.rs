@@ -133,6 +133,40 @@ fn a_framed_ball_is_seen_whole_and_no_smaller_than_it_must() {
 }
 
 #[test]
+fn a_model_stays_inside_while_the_camera_goes_around_it() {
+    let scene = block(Vec3::new(-3.0, -0.5, -0.2), Vec3::new(5.0, 1.0, 0.3), 3);
+    for up in [UpAxis::Y, UpAxis::Z] {
+        let scene = Scene { up, ..scene.clone() };
+        let bounds = robust_bounds(&scene);
+        for lens in [FrameLens::Perspective { y_fov: 0.7 }, FrameLens::Orthographic] {
+            let first = frame_around(&scene, &bounds, default_direction(&scene, &bounds), lens, 1.5);
+            let mut widest = 0.0f64;
+            for turn in 0..36 {
+                let angle = f64::from(turn) * std::f64::consts::TAU / 36.0;
+                let (lo, hi) = seen(&scene, &turned(&first, up, bounds.center(), angle));
+                let reach = (hi.x / 1.5).max(-lo.x / 1.5).max(hi.y).max(-lo.y);
+                assert!(reach < 0.9201, "{up:?} {lens:?} {turn}: {reach}");
+                widest = widest.max(reach);
+            }
+            assert!(widest > 0.85, "{up:?} {lens:?}: {widest}");
+        }
+    }
+}
+
+#[test]
+fn one_camera_for_several_scenes_sees_all_of_each_and_steps_back_no_further() {
+    let scenes = [(0.0, 1.0), (2.0, 3.5)].map(|(lo, hi)| block(Vec3::splat(lo), Vec3::splat(hi), 2));
+    let bounds = scenes.each_ref().map(robust_bounds);
+    let direction = NamedView::Front.direction(UpAxis::Y);
+    let mut fit = Fit::new(direction, bounds[0].center(), FrameLens::Perspective { y_fov: 0.5 }, 1.0);
+    scenes.iter().zip(&bounds).for_each(|(scene, bounds)| fit.add(scene, bounds));
+    let camera = fit.camera(bounds[0].union(&bounds[1]).radius());
+    let seen = scenes.map(|scene| seen(&scene, &camera));
+    let (lo, hi) = (seen[0].0.min(seen[1].0), seen[0].1.max(seen[1].1));
+    assert!((lo.x + 0.92).abs() < 1e-6 && (hi.x - 0.92).abs() < 1e-6, "{lo} {hi}");
+}
+
+#[test]
 fn named_views_look_at_the_side_they_name() {
     for (view, from, top) in [
         (NamedView::Front, DVec3::Z, DVec3::Y),

@@ -2,6 +2,7 @@
 //! scene that makes sense or in a message, and stays within its memory.
 
 use super::*;
+use crate::load::Moment;
 use crate::math::random::Random;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
@@ -39,7 +40,10 @@ fn try_all(name: &str, mutate: impl Fn(&[u8], &mut Random) -> Vec<u8>) {
 
 /// Whether a file was loaded.
 fn try_one(path: &Path, bytes: Vec<u8>) -> bool {
-    let options = LoadOptions { limits: Limits { memory: MEMORY, ..Limits::default() }, ..LoadOptions::default() };
+    let limits = Limits { memory: MEMORY, ..Limits::default() };
+    // Animations are read only where one is played.
+    let moment = Some(Moment { animation: None, time: 0.7 });
+    let options = LoadOptions { limits, moment, ..LoadOptions::default() };
     let loaded = match load_bytes(path, bytes, &options) {
         Ok(loaded) => loaded,
         Err(error) => {

@@ -1,0 +1,187 @@
+//! Pictures that belong together: the frames of an animation, and those from around a model.
+//!
+//! Both have one camera: it has every frame in the picture, or all of the model from everywhere on its way.
+
+use super::args::RenderArgs;
+use super::camera::{self, Choice, Shown};
+use super::exit::Exit;
+use super::job::{Batch, RenderJob, Shot, Wrong};
+use super::message::{Messages, Severity};
+use super::parse::{Frames, Turns};
+use super::progress::Progress;
+use super::{interrupt, moment, read};
+use crate::load::{Diagnostic, LoadOptions, Moment};
+use crate::scene::framing::{Bounds, Fit, frame, frame_around, robust_bounds, turned};
+use crate::scene::{Camera, Scene};
+use std::f64::consts::TAU;
+use std::path::Path;
+
+/// What the pictures of a scene have in common.
+#[derive(Clone, Debug)]
+pub(super) enum Sequence {
+    /// Moments of an animation.
+    Frames {
+        /// Their numbers.
+        frames: Frames,
+        /// How many go by in a second.
+        fps: f64,
+        /// The animation: a name or number; `None`: the first.
+        animation: Option<String>,
+    },
+    /// The camera goes around.
+    Turntable(Turns),
+}
+
+/// One picture's part of a sequence.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Step {
+    /// Number in the sequence; `None`: a picture by itself.
+    pub number: Option<u32>,
+    /// What it shows of an animation; `None`: the rest pose.
+    pub moment: Option<Moment>,
+}
+
+/// The sequence that was typed.
+pub(super) fn of(args: &RenderArgs) -> Result<Option<Sequence>, Wrong> {
+    let Some(frames) = args.frames else { return Ok(args.turntable.map(Sequence::Turntable)) };
+    if let Some(frame) = args.moment.frame.filter(|frame| !(frames.first..frames.end).contains(frame)) {
+        return Err(Wrong(format!("--frame {frame} is none of --frames {frames}")));
+    }
+    if args.inputs.iter().any(|input| input == Path::new("-")) {
+        return Err(Wrong(
+            "--frames reads the model for each frame, and standard input (`-`) can be read only once".into(),
+        ));
+    }
+    let animation = args.moment.animation.clone();
+    Ok(Some(Sequence::Frames { frames, fps: moment::fps(&args.moment), animation }))
+}
+
+/// The pictures of each view, in order.
+pub(super) fn steps(args: &RenderArgs, sequence: Option<&Sequence>) -> Result<Vec<Step>, Wrong> {
+    Ok(match sequence {
+        Some(Sequence::Frames { frames, .. }) => {
+            let wanted = args.moment.frame.map_or(frames.first..frames.end, |only| only..only + 1);
+            let step = |frame| Step { number: Some(frame), moment: Some(moment::of_frame(frame, &args.moment)) };
+            wanted.map(step).collect()
+        }
+        Some(Sequence::Turntable(turns)) => {
+            let moment = moment::moment(&args.moment)?;
+            let wanted = turns.only.map_or(0..turns.count, |only| only..only + 1);
+            wanted.map(|turn| Step { number: Some(turn), moment: moment.clone() }).collect()
+        }
+        None => vec![Step { number: None, moment: moment::moment(&args.moment)? }],
+    })
+}
+
+impl Turns {
+    /// How far around a picture is, radians.
+    pub(super) fn angle(self, number: u32) -> f64 {
+        TAU * f64::from(number) / f64::from(self.count)
+    }
+}
+
+impl RenderJob {
+    /// How to load for a picture.
+    pub(super) fn load_for(&self, step: &Step) -> LoadOptions {
+        LoadOptions { moment: step.moment.clone(), ..self.load.clone() }
+    }
+}
+
+/// The camera of one picture, and a phrase that says which it is. `survey` is that of all frames, if there are several.
+pub(super) fn camera(
+    job: &RenderJob,
+    shot: &Shot,
+    survey: Option<&Survey>,
+    (scene, bounds): (&Scene, &Bounds),
+    aspect: f64,
+    file: &Path,
+) -> Result<(Camera, String), Diagnostic> {
+    let turns = match &job.sequence {
+        Some(Sequence::Turntable(turns)) => Some(*turns),
+        _ => None,
+    };
+    let framing = || camera::framing(&shot.choice, job.look.lens, scene, bounds);
+    let framed = match (survey, turns) {
+        (Some(survey), _) => survey.camera(&shot.choice).cloned(),
+        (None, Some(_)) => framing().map(|(direction, lens)| frame_around(scene, bounds, direction, lens, aspect)),
+        (None, None) => framing().map(|(direction, lens)| frame(scene, bounds, direction, lens, aspect)),
+    };
+    let shown = Shown { choice: &shot.choice, lens: job.look.lens, aspect, file };
+    let (camera, phrase) = shown.camera(scene, bounds, framed)?;
+    let Some((turns, number)) = turns.zip(shot.step.number).filter(|(_, number)| *number > 0) else {
+        return Ok((camera, phrase));
+    };
+    let pivot = match &shot.choice {
+        Choice::Free { at: Some(at), .. } => *at,
+        _ => bounds.center(),
+    };
+    let angle = turns.angle(number);
+    let phrase = format!("{phrase}, {:.1}° around", angle.to_degrees());
+    Ok((turned(&camera, scene.up, pivot, angle), phrase))
+}
+
+/// What all frames of an animation take up, found before the first is rendered.
+pub(super) struct Survey {
+    /// The box of all.
+    pub bounds: Bounds,
+    /// The camera of each choice that is framed on the model.
+    cameras: Vec<(Choice, Option<Camera>)>,
+}
+
+impl Survey {
+    /// Loads the geometry of every frame. The default view looks from where the first of them looks good.
+    ///
+    /// `None`: the pictures of this job are framed one by one.
+    pub(super) fn of(
+        job: &RenderJob,
+        batch: &Batch,
+        aspect: impl Fn(&Scene) -> f64,
+        messages: &Messages,
+        progress: &Progress,
+    ) -> Result<Option<Self>, Exit> {
+        let Some(Sequence::Frames { frames, fps, animation }) = &job.sequence else { return Ok(None) };
+        progress.stage("framing");
+        let mut bounds: Option<Bounds> = None;
+        let mut fits: Vec<(Choice, Option<Fit>)> = Vec::new();
+        for frame in frames.first..frames.end {
+            if interrupt::raised() {
+                return Err(Exit::Interrupted);
+            }
+            let moment = Moment { animation: animation.clone(), time: f64::from(frame) / fps };
+            let options = LoadOptions { moment: Some(moment), without_pictures: true, ..job.load.clone() };
+            let loaded = read::scene(&batch.inputs, &options).map_err(|error| {
+                messages.load_error(&error);
+                read::exit_of(&error)
+            })?;
+            if loaded.facts.animations.is_empty() {
+                let fault = Diagnostic::new("animation-none", &batch.inputs[0], "", "the file has no animation");
+                messages.say(Severity::Error, &fault.remedy("--turntable shows it from all around"));
+                return Err(Exit::Input);
+            }
+            let scene = &loaded.scene;
+            let here = robust_bounds(scene);
+            if bounds.is_none() {
+                let first = &batch.shots[0].step;
+                let choices = batch.shots.iter().take_while(|shot| shot.step == *first).map(|shot| &shot.choice);
+                let fit = |choice: &Choice| {
+                    let framing = camera::framing(choice, job.look.lens, scene, &here);
+                    let fit = framing.map(|(direction, lens)| Fit::new(direction, here.center(), lens, aspect(scene)));
+                    (choice.clone(), fit)
+                };
+                fits = choices.map(fit).collect();
+            }
+            bounds = Some(bounds.map_or(here, |so_far| so_far.union(&here)));
+            fits.iter_mut().filter_map(|(_, fit)| fit.as_mut()).for_each(|fit| fit.add(scene, &here));
+        }
+        Ok(bounds.map(|bounds| {
+            let camera = |(choice, fit): (Choice, Option<Fit>)| (choice, fit.map(|fit| fit.camera(bounds.radius())));
+            Self { bounds, cameras: fits.into_iter().map(camera).collect() }
+        }))
+    }
+
+    /// The camera of a choice, if it is framed on the model.
+    pub(super) fn camera(&self, choice: &Choice) -> Option<&Camera> {
+        let found = self.cameras.iter().find(|(known, _)| known == choice);
+        found.and_then(|(_, camera)| camera.as_ref())
+    }
+}

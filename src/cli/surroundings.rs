@@ -1,0 +1,47 @@
+//! What lights a scene besides its own lamps, as the command line says it.
+
+use super::job::Look;
+use super::parse::Env;
+use crate::load::panorama::{self, LoadedPanorama};
+use crate::load::{Limits, LoadError, Loaded};
+use crate::scene::default_light::{self, DefaultLight};
+use crate::scene::{Camera, Environment, LightKind, Scene};
+use xxhash_rust::xxh3::xxh3_128;
+
+/// Puts what `--env` names around the scene.
+///
+/// # Errors
+/// When it names a picture that cannot be used.
+pub(super) fn place(look: &Look, limits: &Limits, loaded: &mut Loaded) -> Result<(), LoadError> {
+    match &look.env {
+        None => {}
+        Some(Env::BuiltIn(environment)) => loaded.scene.environment = *environment,
+        Some(Env::File(file)) => {
+            let LoadedPanorama { mut panorama, warnings, hash } = panorama::load(file, limits)?;
+            #[expect(clippy::cast_possible_truncation, reason = "an angle")]
+            let rotation = (look.env_rotate % 360.0).to_radians() as f32;
+            panorama.rotation = rotation;
+            loaded.scene.environment = Environment::Panorama;
+            loaded.scene.panorama = Some(panorama);
+            loaded.warnings.extend(warnings);
+            loaded.facts.files.push(file.clone());
+            let hashes = [loaded.facts.hash, hash].map(u128::to_le_bytes);
+            loaded.facts.hash = xxh3_128(hashes.as_flattened());
+        }
+    }
+    Ok(())
+}
+
+/// Lights the scene as `camera` sees it: with lamps where it has none, and suns as wide as they were asked for.
+pub(super) fn light(look: &Look, scene: &mut Scene, camera: &Camera) -> DefaultLight {
+    let light = default_light::add_if_missing(scene, camera);
+    if let Some(degrees) = look.sun_size {
+        let suns = scene.lights.iter_mut().filter(|l| matches!(l.kind, LightKind::Directional { .. }) && l.size == 0.0);
+        suns.for_each(|light| light.size = 0.5 * degrees.to_radians());
+    }
+    // Lamps that were missing bring the studio along; what was asked for comes before that.
+    if let Some(Env::BuiltIn(environment)) = look.env {
+        scene.environment = environment;
+    }
+    light
+}

@@ -1,0 +1,76 @@
+//! The materials of the primitives that are drawn, and what each primitive is read for.
+
+use super::material;
+use super::mesh::{Job, Needs};
+use super::report::Report;
+use super::scene::{Placed, Variant};
+use super::textures::Textures;
+use crate::math::DMat4;
+use crate::scene::Material;
+use gltf::json::Root;
+use gltf::json::mesh as source;
+
+/// Materials in use, and how the file's numbers lead to them.
+pub(super) struct Palette<'a> {
+    pub(super) materials: Vec<Material>,
+    needs: Vec<Needs>,
+    /// For each material of the file, and last for the default one, its index here.
+    index: Vec<Option<u32>>,
+    pub(super) textures: Textures<'a>,
+}
+
+impl<'a> Palette<'a> {
+    /// Converts the materials that drawn primitives name.
+    pub(super) fn new(root: &'a Root, placed: &Placed, report: &mut Report) -> Self {
+        let default = root.materials.len();
+        let mut palette = Self {
+            materials: Vec::new(),
+            needs: Vec::new(),
+            index: vec![None; default + 1],
+            textures: Textures::new(root),
+        };
+        let drawn = placed.variants.iter().filter(|v| v.drawn).filter_map(|v| root.meshes.get(v.mesh));
+        for primitive in drawn.flat_map(|mesh| &mesh.primitives) {
+            let i = primitive.material.map_or(default, |m| m.value());
+            if palette.index.get(i).is_none_or(Option::is_some) {
+                continue;
+            }
+            let material = match root.materials.get(i) {
+                Some(source) => material::convert(i, source, &mut palette.textures, report),
+                None => Material { name: "default".into(), ..Material::default() },
+            };
+            palette.index[i] = u32::try_from(palette.materials.len()).ok();
+            palette.needs.push(material::needs(&material));
+            palette.materials.push(material);
+        }
+        palette
+    }
+
+    /// The material that a primitive shows; `None` when it is not drawn.
+    pub(super) fn material(&self, variant: &Variant, primitive: &source::Primitive) -> Option<u32> {
+        // The default material is the last.
+        let i = primitive.material.map_or(self.index.len().checked_sub(1)?, |m| m.value());
+        self.index.get(i).copied().flatten().filter(|_| variant.drawn)
+    }
+
+    /// What to read of a primitive, the `k`th of its mesh.
+    pub(super) fn job<'j>(
+        &self,
+        variant: &'j Variant,
+        mesh: &'j source::Mesh,
+        k: usize,
+        primitive: &'j source::Primitive,
+        skins: &'j [Option<Vec<DMat4>>],
+    ) -> Job<'j> {
+        let needs = self.material(variant, primitive).and_then(|material| self.needs.get(material as usize));
+        Job {
+            primitive,
+            place: format!("meshes[{}].primitives[{k}]", variant.mesh),
+            name: mesh.name.as_deref().unwrap_or_default(),
+            weights: variant.weights.as_deref().or(mesh.weights.as_deref()).unwrap_or_default(),
+            joints: variant.skin.and_then(|s| skins.get(s)).and_then(Option::as_deref),
+            needs: needs.cloned().unwrap_or_default(),
+            drawn: variant.drawn,
+        }
+    }
+}

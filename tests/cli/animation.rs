@@ -1,0 +1,160 @@
+//! Animations on the command line: a moment, frames that share a camera, a turn around the model.
+
+use super::program::{Folder, Run, picture};
+use base64::Engine as _;
+use serde_json::Value;
+
+/// A triangle that goes right by four times its width in a second: `Slide`; and one that does nothing: `Stay`.
+fn sliding() -> String {
+    let corners = [-1.0f32, -1.0, 0.0, 1.0, -1.0, 0.0, 0.0, 1.0, 0.0];
+    let keys = [0.0f32, 1.0, 0.0, 0.0, 0.0, 8.0, 0.0, 0.0];
+    let bytes: Vec<u8> = corners.iter().chain(&keys).flat_map(|x| x.to_le_bytes()).collect();
+    let data = base64::engine::general_purpose::STANDARD.encode(bytes);
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}},{{}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}}}}]}}],
+        "animations":[
+            {{"name":"Slide","channels":[{{"sampler":0,"target":{{"node":0,"path":"translation"}}}}],
+             "samplers":[{{"input":1,"output":2}}]}},
+            {{"name":"Stay","channels":[{{"sampler":0,"target":{{"node":1,"path":"translation"}}}}],
+             "samplers":[{{"input":1,"output":2}}]}}],
+        "accessors":[
+            {{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[-1,-1,0],"max":[1,1,0]}},
+            {{"bufferView":0,"byteOffset":36,"componentType":5126,"count":2,"type":"SCALAR","min":[0],"max":[1]}},
+            {{"bufferView":0,"byteOffset":44,"componentType":5126,"count":2,"type":"VEC3"}}],
+        "bufferViews":[{{"buffer":0,"byteLength":68}}],
+        "buffers":[{{"byteLength":68,"uri":"data:application/octet-stream;base64,{data}"}}]}}"#
+    )
+}
+
+fn folder() -> Folder {
+    Folder::with_cube().file("a.gltf", sliding())
+}
+
+/// An eye that sees the triangle slide through the picture.
+const WIDE: [&str; 5] = ["--eye", "4,0,20", "--at", "4,0,0", "-q"];
+
+fn wide(folder: &Folder, arguments: &[&str]) -> Run {
+    folder.render(&[arguments, &WIDE].concat())
+}
+
+/// The mean column of what is brighter than the backdrop.
+fn middle(folder: &Folder, name: &str) -> f64 {
+    let beauty = picture(&folder.path(name)).beauty;
+    let columns = beauty.iter().enumerate().filter(|(_, p)| p[0] > 0.25).map(|(i, _)| (i % 32) as f64);
+    let columns: Vec<f64> = columns.collect();
+    assert!(!columns.is_empty(), "{name} shows nothing");
+    columns.iter().sum::<f64>() / columns.len() as f64
+}
+
+#[test]
+fn a_time_moves_the_model_and_the_rest_pose_stays_without() {
+    let folder = folder();
+    let at = |arguments: &[&str]| {
+        wide(&folder, &[&["a.gltf", "-o", "out.png"], arguments].concat()).ends(0);
+        middle(&folder, "out.png")
+    };
+    let (rest, half, end) = (at(&[]), at(&["--time", "0.5"]), at(&["--time", "1s"]));
+    assert!(half > rest + 4.0 && end > half + 4.0, "{rest} {half} {end}");
+    assert_eq!(at(&["--time", "500ms"]), half);
+    assert_eq!(at(&["--frame", "12"]), half);
+    assert_eq!(at(&["--frame", "15", "--fps", "30"]), half);
+    assert_eq!(at(&["--animation", "Slide", "--time", "0.5"]), half);
+    assert_eq!(at(&["--animation", "1", "--time", "0.5"]), rest);
+    assert_eq!(at(&["--animation", "Slide"]), rest);
+}
+
+#[test]
+fn a_time_past_the_end_is_a_warning_with_the_length() {
+    let folder = folder();
+    wide(&folder, &["a.gltf", "--time", "3"]).ends(0).says(&["3 s is past the end of animation 'Slide'", "1 s long"]);
+    wide(&folder, &["a.gltf", "--time", "3", "--strict"]).ends(3);
+}
+
+#[test]
+fn an_unknown_animation_ends_as_an_unknown_scene_does() {
+    let folder = folder();
+    folder.render(&["a.gltf", "--scene", "Run"]).ends(3).says(&["there is no scene 'Run'"]);
+    for command in ["render", "inspect", "verify"] {
+        let run = folder.run(&[command, "a.gltf", "--animation", "Run"]).ends(3);
+        run.says(&["there is no animation 'Run'; it has 0 'Slide', 1 'Stay'"]);
+    }
+    folder.render(&["cube.obj", "--animation", "Run"]).ends(3).says(&["cube.obj", "the file has none"]);
+    folder.render(&["cube.obj", "--time", "1"]).ends(0).says(&["cube.obj: the file has no animation"]);
+    folder.render(&["cube.obj", "--frames", "0..3"]).ends(3).says(&["cube.obj: the file has no animation"]);
+    for wrong in [&["--time", "-1"][..], &["--time", "1", "--frame", "2"], &["--fps", "0", "--frame", "1"]] {
+        folder.render(&[&["a.gltf"], wrong].concat()).ends(2);
+    }
+    folder.run(&["inspect", "a.gltf", "--fps", "30"]).ends(2).says(&["--frame"]);
+}
+
+#[test]
+fn inspect_lists_animations_with_their_lengths_and_shows_a_moment() {
+    let folder = folder();
+    let run = folder.run(&["inspect", "a.gltf"]).ends(0);
+    assert!(run.text().contains("'Slide' (1.000 s, 1 channel), 'Stay' (1.000 s, 1 channel)"), "{}", run.text());
+    let report = |arguments: &[&str]| {
+        let run = folder.run(&[&["inspect", "a.gltf", "--json"], arguments].concat()).ends(0);
+        serde_json::from_str::<Value>(run.text()).unwrap()
+    };
+    let report = (report(&[]), report(&["--time", "1"]));
+    assert_eq!(report.0["animations"][0]["name"], "Slide");
+    assert_eq!(report.0["animations"][1]["seconds"], 1.0);
+    assert_eq!((&report.0["bounds"]["hi"][0], &report.1["bounds"]["hi"][0]), (&Value::from(1.0), &Value::from(9.0)));
+}
+
+#[test]
+fn frames_share_a_camera_that_sees_them_all() {
+    let folder = folder();
+    folder.render(&["a.gltf", "--frames", "0..=4", "--fps", "4", "-q"]).ends(0);
+    let names: Vec<String> = (0..5).map(|i| format!("a.{i:04}.png")).collect();
+    assert!(folder.names().starts_with(&names) && !folder.has("a.0005.png"), "{:?}", folder.names());
+    let places: Vec<f64> = names.iter().map(|name| middle(&folder, name)).collect();
+    assert!(places.windows(2).all(|pair| pair[1] > pair[0] + 3.0), "{places:?}");
+    // Framed together, the way is in the middle of the picture.
+    assert!((places[0] + places[4] - 31.0).abs() < 1.5, "{places:?}");
+}
+
+#[test]
+fn one_frame_of_a_sequence_can_be_rendered_again() {
+    let folder = folder();
+    folder.render(&["a.gltf", "--frames", "1..4", "--fps", "4", "-q", "-o", "{frame}.png"]).ends(0);
+    folder.render(&["a.gltf", "--frames", "1..4", "--frame", "2", "--fps", "4", "-q", "-o", "one.png"]).ends(0);
+    folder.run(&["render", "--again", "2.png", "-o", "again.png", "-q"]).ends(0);
+    assert!(folder.read("one.png") == folder.read("2.png") && folder.read("again.png") == folder.read("2.png"));
+    folder
+        .render(&["a.gltf", "--frames", "1..4", "--frame", "4"])
+        .ends(2)
+        .says(&["--frame 4 is none of --frames 1..4"]);
+}
+
+#[test]
+fn a_frame_alone_has_the_pixels_of_the_sequence_where_the_camera_is_fixed() {
+    let folder = folder();
+    wide(&folder, &["a.gltf", "--frames", "0..3", "--fps", "4", "-o", "{frame}.png"]).ends(0);
+    wide(&folder, &["a.gltf", "--frame", "2", "--fps", "4", "-o", "alone.png"]).ends(0);
+    assert!(picture(&folder.path("2.png")).beauty == picture(&folder.path("alone.png")).beauty);
+}
+
+#[test]
+fn a_warning_of_every_frame_is_said_once() {
+    let folder = folder();
+    let run = wide(&folder, &["a.gltf", "--frames", "0..5", "--fps", "1"]).ends(0);
+    assert_eq!(run.stderr.matches("past the end").count(), 1, "{}", run.stderr);
+}
+
+#[test]
+fn a_turntable_shows_a_model_from_all_around() {
+    let folder = folder();
+    folder.render(&["cube.obj", "--turntable", "4", "--background", "transparent", "-q"]).ends(0);
+    let name = |i: u32| format!("cube.{i:04}.png");
+    assert!((0..4).all(|i| folder.has(&name(i))), "{:?}", folder.names());
+    // A cube has the same outline from four sides.
+    let outline = |i: u32| picture(&folder.path(&name(i))).beauty.iter().filter(|p| p[3] > 0.0).count();
+    assert!((0..4).all(|i| outline(i).abs_diff(outline(0)) < 5), "{:?}", (0..4).map(outline).collect::<Vec<_>>());
+    assert!(folder.read(&name(0)) != folder.read(&name(1)));
+    folder.run(&["render", "--again", &name(3), "-o", "again.png", "-q"]).ends(0);
+    assert!(folder.read("again.png") == folder.read(&name(3)));
+    let run = folder.render(&["a.gltf", "--turntable", "1/8", "--time", "0.5", "-o", "turned.png"]).ends(0);
+    run.says(&["45.0° around", "animation 'Slide' at 0.500 s"]);
+}
