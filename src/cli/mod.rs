@@ -16,6 +16,7 @@ mod inspect;
 mod interrupt;
 mod job;
 mod message;
+mod meter;
 mod moment;
 mod output_name;
 mod parse;

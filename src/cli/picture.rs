@@ -16,6 +16,8 @@ pub(super) struct Effective {
     pub settings: Settings,
     /// For the encoder; its background is filled in when it is written.
     pub output: Output,
+    /// Whether nobody has said how bright the picture is to be: files of measured lamps are metered.
+    pub metered: bool,
 }
 
 impl Effective {
@@ -45,6 +47,7 @@ impl Effective {
                 exr_samples: look.exr,
                 ..Output::default()
             },
+            metered: look.exposure.or(hints.exposure).is_none(),
         })
     }
 }

@@ -9,10 +9,10 @@ use super::progress::Progress;
 use super::sequence::{self, Step, Survey};
 use super::stats::{self, PictureStats, Times};
 use super::summary::Summary;
-use super::{accident, again, cost_layers, interrupt, output_name, read, surroundings};
+use super::{accident, again, cost_layers, interrupt, meter, output_name, read, surroundings};
 use crate::accel::AnyAccel;
 use crate::accel::auto::{self, Reason};
-use crate::image::was_written_by_meshray;
+use crate::image::{FileKind, was_written_by_meshray};
 use crate::load::{Diagnostic, LoadOptions, Loaded};
 use crate::render::texture::TextureStore;
 use crate::render::{Costs, Job, Rendered, View, World, render_costs};
@@ -134,6 +134,8 @@ struct Ready {
     load_seconds: f64,
     /// Stages that no picture has told yet.
     profile: Profile,
+    /// Stops that all pictures of the scene are exposed by; `None`: not yet known.
+    metered: Option<f32>,
     /// Code and place of the warnings that have been said.
     told: HashSet<(&'static str, String)>,
 }
@@ -141,9 +143,9 @@ struct Ready {
 impl Ready {
     /// Nothing built yet. Frames of a sequence are seen in the bounds of all.
     fn stage<'a>(&'a mut self, survey: Option<&'a Survey>) -> Stage<'a> {
-        let Self { loaded, world, bounds, load_seconds, profile, .. } = self;
+        let Self { loaded, world, bounds, load_seconds, profile, metered, .. } = self;
         let bounds = survey.map_or(&*bounds, |survey| &survey.bounds);
-        Stage { loaded, world, bounds, load_seconds, profile, survey, built: None }
+        Stage { loaded, world, bounds, load_seconds, profile, survey, built: None, metered }
     }
 }
 
@@ -156,6 +158,7 @@ struct Stage<'a> {
     profile: &'a mut Profile,
     survey: Option<&'a Survey>,
     built: Option<(AnyAccel<'a>, Option<Reason>)>,
+    metered: &'a mut Option<f32>,
 }
 
 fn prepare(
@@ -174,9 +177,9 @@ fn prepare(
         messages.load_error(&error);
         read::exit_of(&error)
     })?;
-    let mut told = HashSet::new();
+    let (mut told, mut metered) = (HashSet::new(), None);
     if let Some(earlier) = earlier {
-        told = earlier.told;
+        (told, metered) = (earlier.told, earlier.metered);
         if !read::take_pictures(&mut loaded, earlier.loaded) {
             let fault = Diagnostic::new("input-changed", &batch.inputs[0], "", "was changed while it was rendered");
             messages.say(Severity::Error, &fault.remedy("render it again"));
@@ -214,7 +217,7 @@ fn prepare(
     profile.done("place");
     let bounds = robust_bounds_within(&loaded.scene, world.bounds);
     profile.done("frame");
-    Ok(Ready { loaded, world, bounds, load_seconds: start.elapsed().as_secs_f64(), profile, told })
+    Ok(Ready { loaded, world, bounds, load_seconds: start.elapsed().as_secs_f64(), profile, metered, told })
 }
 
 fn nothing_to_draw(loaded: &Loaded, file: &Path) -> Diagnostic {
@@ -237,7 +240,7 @@ fn render_shot(
     progress: &Progress,
     done: &mut Vec<PictureStats>,
 ) -> Exit {
-    let Stage { loaded, world, bounds, load_seconds, profile, survey, built } = stage;
+    let Stage { loaded, world, bounds, load_seconds, profile, survey, built, metered } = stage;
     let file = &batch.inputs[0];
     let fail = |fault: &Diagnostic, exit| {
         messages.say(Severity::Error, fault);
@@ -247,7 +250,7 @@ fn render_shot(
     if let Some(fault) = names.iter().find_map(|path| overwrites_a_source(path, loaded)) {
         return fail(&fault, Exit::Failed);
     }
-    let effective = match Effective::new(&job.look, &loaded.scene.hints) {
+    let mut effective = match Effective::new(&job.look, &loaded.scene.hints) {
         Ok(effective) => effective.with_everything(job.everything),
         Err(text) => return fail(&Diagnostic::new("scene-value", file, "", text), Exit::Input),
     };
@@ -283,6 +286,12 @@ fn render_shot(
 
     let work =
         Job { scene: &loaded.scene, world, accel, textures: &textures, view: &view, settings: &effective.settings };
+    if effective.metered && shot.kind != FileKind::Exr {
+        progress.stage("metering");
+        let stops = *metered.get_or_insert_with(|| meter::exposure(&loaded.scene, &work, &effective).unwrap_or(0.0));
+        effective.output.exposure = stops;
+        profile.done("meter");
+    }
     let mut rendered = trace(job, &work, progress, &mut times, profile);
     let costs = rendered.complete.then(|| costs(job, &work, progress));
     progress.finish();

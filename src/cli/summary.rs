@@ -55,6 +55,9 @@ impl Summary<'_> {
         if let Some(panorama) = scene.panorama.as_ref().filter(|_| scene.environment == Environment::Panorama) {
             parts.push(format!("light of {}", panorama.name));
         }
+        if self.effective.metered && self.effective.output.exposure != 0.0 {
+            parts.push(format!("exposure {:+.1} stops (metered)", self.effective.output.exposure));
+        }
         if self.bounds.strays > 0 {
             parts.push(format!("framing leaves out {} far-off faces", self.bounds.strays));
         }

@@ -50,6 +50,8 @@ pub struct Scene {
     pub bitmaps: Vec<Bitmap>,
     /// Lights, in world space.
     pub lights: Vec<Light>,
+    /// Whether lights are given as they are measured, in lux and candela: a picture needs an exposure.
+    pub photometric: bool,
     /// Cameras the file brought, in world space.
     pub cameras: Vec<Camera>,
     /// Ambient light: radiance from everywhere, multiplied by a material's ambient colour.

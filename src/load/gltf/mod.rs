@@ -175,7 +175,9 @@ impl Loading<'_> {
         );
         // glTF has no word for surroundings: its lights come on top of whatever the viewer puts around the model.
         let environment = Environment::Studio;
-        let mut scene = Scene { cameras: placed.cameras, lights: placed.lights, environment, ..Scene::default() };
+        let photometric = !placed.lights.is_empty();
+        let (cameras, lights) = (placed.cameras, placed.lights);
+        let mut scene = Scene { cameras, lights, photometric, environment, ..Scene::default() };
         self.assemble(&mut scene, root, &placed.draws, reads, facts)?;
         self.report.merge(pictures);
         scene.materials = palette.materials;

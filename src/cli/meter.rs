@@ -1,0 +1,114 @@
+//! The exposure of scenes whose lamps are given in lux and candela.
+//!
+//! A lamp of a room has hundreds of candela and the sun a hundred thousand lux, which no picture shows as they are; many a
+//! file on the other hand counts from 0 to 1. So a small picture is taken first, and where what it shows is far too bright or
+//! too dark, the exposure that makes it right is used and said. One exposure serves all pictures of a scene, or a sequence
+//! would flicker.
+
+use super::picture::Effective;
+use crate::image::Picture;
+use crate::math::Vec3;
+use crate::render::{Job, Settings, render};
+use crate::scene::Scene;
+
+/// Longest side of the small picture.
+const SIDE: u32 = 96;
+
+/// Share of the model's pixels that may be brighter than [`BRIGHT`].
+const ABOVE: f32 = 0.1;
+
+/// What the brightest but those are brought to …
+const BRIGHT: f32 = 0.7;
+
+/// … where they are not between these already: such light is meant as it is.
+const FINE: std::ops::RangeInclusive<f32> = 0.15..=1.5;
+
+/// Stops to add; `None` where the scene is to be shown as it is.
+pub(super) fn exposure(scene: &Scene, job: &Job, effective: &Effective) -> Option<f32> {
+    if !scene.photometric {
+        return None;
+    }
+    let Settings { width, height, .. } = effective.settings;
+    let shrink = |side: u32| (u64::from(side) * u64::from(SIDE)).div_ceil(u64::from(width.max(height)));
+    #[expect(clippy::cast_possible_truncation, reason = "at most SIDE")]
+    let small = |side: u32| (shrink(side) as u32).clamp(1, side);
+    let settings = Settings {
+        width: small(width),
+        height: small(height),
+        samples: 4,
+        layers: true,
+        env_rays: Some(0),
+        gloss_rays: 0,
+        everything: false,
+        ..effective.settings.clone()
+    };
+    let picture = render(&Job { settings: &settings, ..*job }, &()).picture;
+    let bright = bright(&picture)?;
+    // Tenths of a stop: what is printed is what is used.
+    (!FINE.contains(&bright)).then(|| (libm::log2f(BRIGHT / bright) * 10.0).round() / 10.0)
+}
+
+/// What all but [`ABOVE`] of the model's pixels are at most as bright as; `None` where nothing is lit.
+fn bright(picture: &Picture) -> Option<f32> {
+    let prims = &picture.layers.as_ref()?.prim;
+    let seen = picture.beauty.iter().zip(prims).filter(|(_, prim)| **prim != u32::MAX);
+    let mut luminances: Vec<f32> = seen.map(|(p, _)| luminance(Vec3::from_slice(p))).filter(|l| *l > 0.0).collect();
+    luminances.sort_by(f32::total_cmp);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of the length")]
+    let rank = (luminances.len() as f32 * (1.0 - ABOVE)) as usize;
+    luminances.get(rank.min(luminances.len().saturating_sub(1))).copied().filter(|l| l.is_finite())
+}
+
+/// Rec. 709.
+fn luminance(color: Vec3) -> f32 {
+    color.dot(Vec3::new(0.2126, 0.7152, 0.0722))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::{AccelKind, AccelParams, AnyAccel};
+    use crate::math::DVec3;
+    use crate::render::texture::TextureStore;
+    use crate::render::view::Lens;
+    use crate::render::{View, World};
+    use crate::scene::{Falloff, Light, LightKind, Material, Sphere};
+
+    /// The exposure of a white ball under a lamp of so many candela, three units away.
+    fn metered(candela: f32, photometric: bool) -> Option<f32> {
+        let kind = LightKind::Point {
+            position: DVec3::new(0.0, 0.0, 4.0),
+            falloff: Falloff::InverseSquare { range: f64::INFINITY },
+        };
+        let intensity = Vec3::splat(candela);
+        let scene = Scene {
+            spheres: vec![Sphere { name: String::new(), center: DVec3::ZERO, radius: 1.0, material: 0 }],
+            materials: vec![Material::plain()],
+            lights: vec![Light { name: String::new(), intensity, kind, shadows: true, size: 0.0 }],
+            photometric,
+            ..Scene::default()
+        };
+        let world = World::new(&scene);
+        let accel = AnyAccel::build(AccelKind::None, &world.shapes, &AccelParams::DEFAULT);
+        let textures = TextureStore::new(&scene);
+        let view = View::look_at(DVec3::Z * 9.0, DVec3::ZERO, DVec3::Y, Lens::orthographic(3.0));
+        let effective = Effective { settings: Settings::default(), output: Default::default(), metered: false };
+        let settings = &effective.settings;
+        let job = Job { scene: &scene, world: &world, accel: &accel, textures: &textures, view: &view, settings };
+        exposure(&scene, &job, &effective)
+    }
+
+    #[test]
+    fn lamps_that_blind_or_hardly_shine_are_brought_to_the_same_brightness() {
+        let (bright, dark) = (metered(30_000.0, true).unwrap(), metered(0.03, true).unwrap());
+        assert!((dark - bright - libm::log2f(1e6)).abs() < 0.11, "{bright} {dark}");
+        assert!(bright < -8.0 && dark > 6.0);
+    }
+
+    #[test]
+    fn light_within_reach_and_light_without_units_stay_as_they_are() {
+        assert_eq!(metered(20.0, true), None);
+        assert_eq!(metered(30_000.0, false), None);
+        assert_eq!(metered(0.0, true), None);
+    }
+}
