@@ -22,7 +22,7 @@ use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
 /// The flags that a picture may bring along.
-const FLAGS: [&str; 40] = [
+const FLAGS: [&str; 41] = [
     "size",
     "samples",
     "depth",
@@ -49,6 +49,7 @@ const FLAGS: [&str; 40] = [
     "merge",
     "format",
     "scene",
+    "variant",
     "polygons",
     "mtl",
     "accel",
@@ -153,6 +154,7 @@ impl Facts<'_> {
             set("bits", "16".into());
         }
         load.scene.iter().for_each(|scene| set("scene", scene.clone()));
+        load.variant.iter().for_each(|variant| set("variant", variant.clone()));
         if load.polygons == Polygons::Whole {
             set("polygons", "whole".into());
         }

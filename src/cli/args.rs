@@ -126,7 +126,7 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "PICTURE", help_heading = "Output", hide_short_help = true, conflicts_with_all = [
         "size", "format", "bits", "half", "float", "layers", "tone_map", "exposure", "merge", "view", "camera", "eye",
         "at", "up_vector", "fov", "ortho", "up", "background", "env", "env_rotate", "env_rays", "gloss_rays", "samples", "depth", "cutoff", "seed", "scene",
-        "polygons", "mtl", "allow_empty", "accel", "intersector",
+        "variant", "polygons", "mtl", "allow_empty", "accel", "intersector",
     ])]
     pub again: Option<PathBuf>,
 
@@ -197,6 +197,9 @@ pub(super) struct RenderArgs {
     /// Which scene of a glTF file, by name or number from 0
     #[arg(long, value_name = "NAME", help_heading = "Loading", hide_short_help = true)]
     pub scene: Option<String>,
+    /// Which materials of a glTF file that offers variants, by name or number from 0 (`inspect` lists them)
+    #[arg(long, value_name = "NAME", help_heading = "Loading", hide_short_help = true)]
+    pub variant: Option<String>,
     /// What becomes of OBJ faces with more than three corners
     #[arg(long, value_name = "HOW", value_enum, default_value_t, help_heading = "Loading", hide_short_help = true)]
     pub polygons: PolygonsArg,
@@ -470,6 +473,9 @@ pub(super) struct LoadArgs {
     /// Which scene of a glTF file, by name or number from 0
     #[arg(long, value_name = "NAME")]
     pub scene: Option<String>,
+    /// Which materials of a glTF file that offers variants, by name or number from 0 (`inspect` lists them)
+    #[arg(long, value_name = "NAME")]
+    pub variant: Option<String>,
     /// What becomes of OBJ faces with more than three corners
     #[arg(long, value_name = "HOW", value_enum, default_value_t)]
     pub polygons: PolygonsArg,

@@ -42,6 +42,7 @@ pub(super) fn one_model(input: &PathBuf, args: &LoadArgs, messages: &Messages) -
         polygons: args.polygons.into(),
         mtl: args.mtl.into(),
         scene: args.scene.clone(),
+        variant: args.variant.clone(),
         up: args.up.map(Into::into),
     };
     let loaded = scene(slice::from_ref(input), &options).map_err(|error| {

@@ -39,6 +39,9 @@ pub struct LoadOptions {
     pub mtl: MtlMode,
     /// Which scene of a glTF file: an index, or a name; `None`: the default scene.
     pub scene: Option<String>,
+    /// Which variant of materials of a glTF file (KHR_materials_variants): a name, or a number from 0; `None`: the
+    /// materials that primitives name themselves.
+    pub variant: Option<String>,
     /// Overrides the up axis.
     pub up: Option<UpAxis>,
 }
@@ -95,6 +98,10 @@ pub struct Facts {
     pub scenes: Vec<String>,
     /// Which scene was loaded.
     pub scene_index: usize,
+    /// Names of the variants of materials in the file.
+    pub variants: Vec<String>,
+    /// Which of them was loaded, if one was asked for.
+    pub variant: Option<usize>,
     /// Why the up axis was chosen, when it was a guess.
     pub up_reason: Option<String>,
     /// Largest displacement of a vertex by rounding to `f32`, world units.

@@ -16,6 +16,7 @@ mod accessor;
 mod attributes;
 mod bounds;
 mod buffers;
+mod choice;
 pub mod codes;
 mod container;
 mod document;
@@ -46,6 +47,7 @@ mod sparse;
 mod tests;
 mod textures;
 mod usage;
+mod variants;
 mod version;
 mod weight;
 
@@ -88,6 +90,8 @@ struct Loading<'a> {
 
 /// Materials in use, and how the file's numbers lead to them.
 struct Palette<'a> {
+    /// The variant of materials that is asked for.
+    variant: Option<usize>,
     materials: Vec<Material>,
     needs: Vec<Needs>,
     /// For each material of the file, and last for the default one, its index here.
@@ -99,7 +103,7 @@ impl Palette<'_> {
     /// The material that a primitive shows; `None` when it is not drawn.
     fn material(&self, variant: &scene::Variant, primitive: &source::Primitive) -> Option<u32> {
         // The default material is the last.
-        let i = primitive.material.map_or(self.index.len().checked_sub(1)?, |m| m.value());
+        let i = variants::material(primitive, self.variant).unwrap_or(self.index.len().checked_sub(1)?);
         self.index.get(i).copied().flatten().filter(|_| variant.drawn)
     }
 
@@ -187,13 +191,15 @@ impl Loading<'_> {
         self.report.check()?;
         let reader = Reader { root, buffers: &buffers, replacements: &replacements, decoded: &decoded };
         facts.scene_index = scene::choose(root, self.options.scene.as_deref(), file)?;
+        facts.variant = self.variant(&facts.variants)?;
+        facts.variant.iter().for_each(|&variant| variants::check(root, variant, self.report));
         self.check_budget(reader, *budget)?;
         bounds::check(reader, self.report);
         let placed = scene::walk(reader, graph, facts.scene_index, budget, self.report);
         let placed = placed.map_err(|over| self.too_large("what the nodes show", over))?;
         let skins = skin::joint_matrices(reader, graph, self.report);
         skin::check_scene(root, graph, facts.scene_index, &placed.draws, self.report);
-        let palette = self.palette(document, &placed);
+        let palette = self.palette(document, &placed, facts.variant);
 
         let drawn_images = palette.textures.images.clone();
         let images = Images::load(root, &buffers, &drawn_images, file, &mut resolver, budget, self.report);
@@ -214,6 +220,13 @@ impl Loading<'_> {
         (facts.reading, facts.decoding) = (resolver.reading(), decoding);
         (facts.files, facts.hash) = resolver.finish();
         Ok(scene)
+    }
+
+    /// The variant of materials that is asked for.
+    fn variant(&self, names: &[String]) -> Result<Option<usize>, LoadError> {
+        let Some(wish) = &self.options.variant else { return Ok(None) };
+        let words = ("variant", "gltf-no-such-variant", "extensions.KHR_materials_variants.variants");
+        Ok(Some(choice::choose(words, names, wish, &self.source.path)?))
     }
 
     /// In a GLB, a first buffer without a uri is the binary chunk, which must be there when it is needed.
@@ -260,10 +273,11 @@ impl Loading<'_> {
     }
 
     /// Converts the materials that drawn primitives name.
-    fn palette<'a>(&mut self, document: &'a Document, placed: &Placed) -> Palette<'a> {
+    fn palette<'a>(&mut self, document: &'a Document, placed: &Placed, variant: Option<usize>) -> Palette<'a> {
         let root = &document.root;
         let default = root.materials.len();
         let mut palette = Palette {
+            variant,
             materials: Vec::new(),
             needs: Vec::new(),
             index: vec![None; default + 1],
@@ -271,7 +285,7 @@ impl Loading<'_> {
         };
         let drawn = placed.variants.iter().filter(|v| v.drawn).filter_map(|v| root.meshes.get(v.mesh));
         for primitive in drawn.flat_map(|mesh| &mesh.primitives) {
-            let i = primitive.material.map_or(default, |m| m.value());
+            let i = variants::material(primitive, variant).unwrap_or(default);
             if palette.index.get(i).is_none_or(Option::is_some) {
                 continue;
             }
@@ -382,6 +396,7 @@ fn facts(document: &Document, binary: bool) -> Facts {
         format: format!("glTF {version}{}", if binary { " (binary)" } else { "" }),
         generator: root.asset.generator.clone().unwrap_or_default(),
         scenes: scene::names(root),
+        variants: variants::names(root),
         animations: document.animations as u64,
         ..Facts::default()
     }

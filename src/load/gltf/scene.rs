@@ -1,6 +1,7 @@
 //! Which scene of the file is drawn, and what stands where in it.
 
 use super::accessor::{Pick, Reader, Unreadable};
+use super::choice;
 use super::codes::Code;
 use super::graph::Graph;
 use super::placed;
@@ -48,25 +49,10 @@ pub(super) fn names(root: &Root) -> Vec<String> {
     root.scenes.iter().map(|scene| scene.name.clone().unwrap_or_default()).collect()
 }
 
-/// Scenes in one message before the rest is only counted.
-const LISTED: usize = 20;
-
-/// The scene that is asked for by index or name; without a wish, the default one, or else the first.
+/// The scene that is asked for by name or number; without a wish, the default one, or else the first.
 pub(super) fn choose(root: &Root, wish: Option<&str>, file: &Path) -> Result<usize, Diagnostic> {
     let Some(wish) = wish else { return Ok(root.scene.map_or(0, |scene| scene.value())) };
-    let by_name = root.scenes.iter().position(|scene| scene.name.as_deref() == Some(wish));
-    let by_index = wish.parse().ok().filter(|&i: &usize| i < root.scenes.len());
-    by_name.or(by_index).ok_or_else(|| {
-        let shown = |(i, name): (usize, String)| if name.is_empty() { i.to_string() } else { format!("{i} '{name}'") };
-        let list: Vec<String> = names(root).into_iter().enumerate().take(LISTED).map(shown).collect();
-        let text = format!("there is no scene '{wish}'");
-        let remedy = match root.scenes.len().saturating_sub(LISTED) {
-            _ if list.is_empty() => "the file has none".into(),
-            0 => format!("it has {}", list.join(", ")),
-            more => format!("it has {} and {more} more", list.join(", ")),
-        };
-        Diagnostic::new("gltf-no-such-scene", file, "scenes", text).remedy(remedy)
-    })
+    choice::choose(("scene", "gltf-no-such-scene", "scenes"), &names(root), wish, file)
 }
 
 /// Walks the nodes of a scene; a file without scenes shows all its nodes.

@@ -10,6 +10,7 @@ mod memory;
 #[cfg(feature = "meshopt")]
 mod meshopt;
 mod mutated;
+mod variants;
 
 use crate::load::{Limits, LoadError, LoadOptions, Loaded, load_bytes};
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
