@@ -11,7 +11,7 @@ use crate::scene::framing::NamedView;
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
-/// Render downloaded meshes (glTF 2.0, OBJ) into pictures, on any CPU.
+/// Render downloaded meshes (glTF 2.0, OBJ, PLY, STL) into pictures, on any CPU.
 #[derive(Debug, Parser)]
 #[command(
     name = "meshray",
@@ -68,7 +68,7 @@ Examples:
 /// What `meshray render` was given.
 #[derive(Debug, Clone, Args)]
 pub(super) struct RenderArgs {
-    /// Models (.glb, .gltf, .obj, .nff) or scene files (.toml); `-` reads standard input
+    /// Models (.glb, .gltf, .obj, .ply, .stl, .nff) or scene files (.toml); `-` reads standard input
     #[arg(value_name = "INPUT", required_unless_present = "again")]
     pub inputs: Vec<PathBuf>,
 
@@ -200,7 +200,7 @@ pub(super) struct RenderArgs {
     /// Which materials of a glTF file that offers variants, by name or number from 0 (`inspect` lists them)
     #[arg(long, value_name = "NAME", help_heading = "Loading", hide_short_help = true)]
     pub variant: Option<String>,
-    /// What becomes of OBJ faces with more than three corners
+    /// What becomes of OBJ and PLY faces with more than three corners
     #[arg(long, value_name = "HOW", value_enum, default_value_t, help_heading = "Loading", hide_short_help = true)]
     pub polygons: PolygonsArg,
     /// Understand MTL files as exporters mean them, or to the letter
@@ -476,7 +476,7 @@ pub(super) struct LoadArgs {
     /// Which materials of a glTF file that offers variants, by name or number from 0 (`inspect` lists them)
     #[arg(long, value_name = "NAME")]
     pub variant: Option<String>,
-    /// What becomes of OBJ faces with more than three corners
+    /// What becomes of OBJ and PLY faces with more than three corners
     #[arg(long, value_name = "HOW", value_enum, default_value_t)]
     pub polygons: PolygonsArg,
     /// Understand MTL files as exporters mean them, or to the letter
@@ -514,7 +514,7 @@ pub(super) enum FileType {
 pub(super) enum Axis {
     /// +Y, as glTF and most OBJ exporters
     Y,
-    /// +Z, as CAD programs and scanners
+    /// +Z, as CAD programs, printers and scanners
     Z,
 }
 

@@ -11,9 +11,11 @@ pub mod nff;
 pub mod obj;
 pub mod panorama;
 pub mod paths;
+pub mod ply;
 #[cfg_attr(not(feature = "draco"), expect(dead_code, reason = "only decoders of others panic"))]
 mod quiet;
 pub mod scene_file;
+pub mod stl;
 pub mod suggest;
 pub mod tangents;
 pub mod texture;
@@ -33,7 +35,7 @@ pub struct LoadOptions {
     pub root: Option<PathBuf>,
     /// Bounds on memory and sizes.
     pub limits: Limits,
-    /// What becomes of OBJ and NFF faces with more than three corners.
+    /// What becomes of OBJ, PLY and NFF faces with more than three corners.
     pub polygons: Polygons,
     /// How MTL text is understood.
     pub mtl: MtlMode,
@@ -46,7 +48,7 @@ pub struct LoadOptions {
     pub up: Option<UpAxis>,
 }
 
-/// What becomes of OBJ and NFF faces with more than three corners.
+/// What becomes of OBJ, PLY and NFF faces with more than three corners.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Polygons {
     /// Cut into triangles by exact ear clipping.
@@ -80,7 +82,7 @@ pub struct Loaded {
 /// What loading found out besides the scene.
 #[derive(Clone, Debug, Default)]
 pub struct Facts {
-    /// `glTF 2.0 (binary)`, `Wavefront OBJ`, `NFF`, `meshray scene`.
+    /// `glTF 2.0 (binary)`, `Wavefront OBJ`, `NFF`, `PLY (ascii)`, `STL (binary)`, `meshray scene`.
     pub format: String,
     /// Program that wrote the file, if it says.
     pub generator: String,
@@ -157,7 +159,9 @@ fn load_source(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadErr
         detect::Format::Gltf => gltf::load(source, options),
         detect::Format::Nff => nff::load(source, options),
         detect::Format::Obj => obj::load(source, options),
+        detect::Format::Ply => ply::load(source, options),
         detect::Format::SceneFile => scene_file::load(source, options),
+        detect::Format::Stl(encoding) => stl::load(source, encoding, options),
     }
 }
 
