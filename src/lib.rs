@@ -1,7 +1,7 @@
 //! meshray renders the mesh files people download (glTF 2.0, OBJ, PLY, STL) into pictures, on any CPU, and tells what
-//! the picture cost. It is a Whitted ray tracer (T. Whitted, "An Improved Illumination Model for Shaded Display", 1980) whose work is
-//! cut by a uniform grid with octrees in crowded cells; every way of culling gives the same hits as testing everything, bit
-//! for bit.
+//! the picture cost. It is a Whitted ray tracer (T. Whitted, "An Improved Illumination Model for Shaded Display", 1980)
+//! whose work is cut by a uniform grid with octrees in crowded cells; every way of culling gives the same hits as
+//! testing everything, bit for bit.
 //!
 //! # The way of the data
 //! A file becomes a [`scene::Scene`] and warnings ([`load`]). [`render::World`] places its shapes in one centred `f32`

@@ -6,13 +6,17 @@
 mod detect;
 pub mod diagnostic;
 pub mod gltf;
+mod ktx;
 pub mod limits;
 pub mod nff;
 pub mod obj;
 pub mod panorama;
 pub mod paths;
 pub mod ply;
-#[cfg_attr(not(feature = "draco"), expect(dead_code, reason = "only decoders of others panic"))]
+#[cfg_attr(
+    not(any(feature = "draco", feature = "basisu")),
+    expect(dead_code, reason = "only decoders of others panic")
+)]
 mod quiet;
 pub mod scene_file;
 pub mod stl;
