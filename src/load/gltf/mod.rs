@@ -150,7 +150,9 @@ impl Loading<'_> {
         schema::check(&value, self.report);
         self.report.check()?;
         self.take(&mut budget, weight::typed(&value), "the document")?;
-        attributes::check(&value, self.report);
+        let variants = variants::names(&value);
+        let variant = self.variant(&variants)?;
+        attributes::check(&value, variant, self.report);
         usage::check(&value, self.report);
         let graph = Graph::new(&value, self.report);
         let document = document::typed(value, self.report);
@@ -160,6 +162,7 @@ impl Loading<'_> {
 
         let mut facts = facts(&document, container.binary);
         facts.extensions = extensions.facts();
+        (facts.variants, facts.variant) = (variants, variant);
         let scene = self.build(&document, &graph, container.bin, &mut budget, &mut facts)?;
         Ok(Loaded { scene, facts, warnings: Vec::new() })
     }
@@ -191,7 +194,6 @@ impl Loading<'_> {
         self.report.check()?;
         let reader = Reader { root, buffers: &buffers, replacements: &replacements, decoded: &decoded };
         facts.scene_index = scene::choose(root, self.options.scene.as_deref(), file)?;
-        facts.variant = self.variant(&facts.variants)?;
         facts.variant.iter().for_each(|&variant| variants::check(root, variant, self.report));
         self.check_budget(reader, *budget)?;
         bounds::check(reader, self.report);
@@ -396,7 +398,6 @@ fn facts(document: &Document, binary: bool) -> Facts {
         format: format!("glTF {version}{}", if binary { " (binary)" } else { "" }),
         generator: root.asset.generator.clone().unwrap_or_default(),
         scenes: scene::names(root),
-        variants: variants::names(root),
         animations: document.animations as u64,
         ..Facts::default()
     }

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::load::{Limits, Polygons};
-use crate::math::{DVec3, Vec2, Vec3, Vec4};
+use crate::math::{Vec2, Vec3, Vec4};
 use crate::scene::AlphaMode;
 
 pub(super) fn of(bytes: &[u8], options: &LoadOptions) -> Result<Loaded, String> {
@@ -117,7 +117,7 @@ fn every_kind_of_number_is_read_in_either_byte_order() {
             file.extend([3, 0, 1, 2]);
             let loaded = plain(&file);
             let at = loaded.scene.instances[0].world_from_object.translation;
-            let x = DVec3::from(loaded.scene.meshes[0].positions[0].as_dvec3() + at).x;
+            let x = (loaded.scene.meshes[0].positions[0].as_dvec3() + at).x;
             assert_eq!(x, expected, "{kind} {format}");
         }
     }

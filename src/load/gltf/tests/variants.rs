@@ -72,6 +72,15 @@ fn images_and_vertex_data_follow_the_variant() {
 }
 
 #[test]
+fn what_a_material_lacks_is_told_of_the_variant_that_is_shown() {
+    let mut file = shoe();
+    file.root["meshes"][0]["primitives"][0]["attributes"].as_object_mut().unwrap().remove("TEXCOORD_0");
+    let lacks = "gltf-mesh-primitive-too-few-texcoords";
+    assert!(!codes(&file.load()).contains(&lacks) && !codes(&with(&file, "Beach").unwrap()).contains(&lacks));
+    assert!(codes(&with(&file, "Street").unwrap()).contains(&lacks));
+}
+
+#[test]
 fn a_wrong_variant_is_one_line_that_lists_what_there_is() {
     let place = "a.gltf:extensions.KHR_materials_variants.variants: there is no variant";
     let file = shoe();
