@@ -1,7 +1,7 @@
-//! meshray renders the mesh files people download (glTF 2.0, OBJ) into pictures, on any CPU, and tells what the picture
-//! cost. It is a Whitted ray tracer (T. Whitted, "An Improved Illumination Model for Shaded Display", 1980) whose work is
-//! cut by a uniform grid with octrees in crowded cells; every way of culling gives the same hits as testing everything, bit
-//! for bit.
+//! meshray renders the mesh files people download (glTF 2.0, OBJ, PLY, STL) into pictures, on any CPU, and tells what
+//! the picture cost. It is a Whitted ray tracer (T. Whitted, "An Improved Illumination Model for Shaded Display", 1980)
+//! whose work is cut by a uniform grid with octrees in crowded cells; every way of culling gives the same hits as
+//! testing everything, bit for bit.
 //!
 //! # The way of the data
 //! A file becomes a [`scene::Scene`] and warnings ([`load`]). [`render::World`] places its shapes in one centred `f32`
@@ -54,7 +54,7 @@
 //! |---|---|
 //! | [`math`] | only numbers: error bounds, eight lanes at once, rays against triangle, polygon, sphere, cone, plane, box |
 //! | [`scene`] | plain data with indices; which features a scene needs, default camera and light |
-//! | [`load`] | files -> scene and warnings: glTF, OBJ + MTL, scene files |
+//! | [`load`] | files -> scene and warnings: glTF, OBJ + MTL, PLY, STL, NFF, scene files |
 //! | [`accel`] | shapes -> what does this ray hit: `none`, `transform`, `spheres`, `boxes`, `bvh`, `grid`, `grid-octree`, `grid-bvh`, `octree`, `fast-octree`, `fast-bvh`; counts |
 //! | [`mod@render`] | rays -> linear pixels: waves, shading models, lights and shadows, optics, textures |
 //! | [`image`] | linear pixels <-> files: tone mapping, formats, metadata, differences |

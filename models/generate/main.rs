@@ -1,9 +1,10 @@
-//! Writes the binary models of this folder: `cargo run --example generate-models`.
+//! Writes the computed models of this folder: `cargo run --example generate-models`.
 //!
 //! Every shape and texture is a formula, and transcendental functions come from `libm`, so that the files come out the
 //! same on every machine. With `--check` nothing is written, and a file that would change ends the run with an error.
 
 mod animated;
+mod bare;
 mod glass;
 mod glb;
 mod metal;
@@ -24,6 +25,8 @@ fn main() -> io::Result<()> {
         ("glass.glb", glass::model()),
         ("metal.glb", metal::model()),
         ("animated.glb", animated::model()),
+        ("gear.stl", bare::gear()),
+        ("football.ply", bare::football()),
     ];
     for (name, bytes) in models {
         let path = folder.join(name);

@@ -23,7 +23,7 @@ use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
 /// The flags that a picture may bring along.
-const FLAGS: [&str; 48] = [
+const FLAGS: [&str; 49] = [
     "size",
     "samples",
     "depth",
@@ -58,6 +58,7 @@ const FLAGS: [&str; 48] = [
     "fps",
     "frames",
     "turntable",
+    "variant",
     "polygons",
     "mtl",
     "accel",
@@ -165,6 +166,7 @@ impl Facts<'_> {
         }
         load.scene.iter().for_each(|scene| set("scene", scene.clone()));
         self.set_step(&mut set);
+        load.variant.iter().for_each(|variant| set("variant", variant.clone()));
         if load.polygons == Polygons::Whole {
             set("polygons", "whole".into());
         }

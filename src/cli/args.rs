@@ -11,7 +11,7 @@ use crate::scene::framing::NamedView;
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
-/// Render downloaded meshes (glTF 2.0, OBJ) into pictures, on any CPU.
+/// Render downloaded meshes (glTF 2.0, OBJ, PLY, STL) into pictures, on any CPU.
 #[derive(Debug, Parser)]
 #[command(
     name = "meshray",
@@ -70,7 +70,7 @@ Examples:
 /// What `meshray render` was given.
 #[derive(Debug, Clone, Args)]
 pub(super) struct RenderArgs {
-    /// Models (.glb, .gltf, .obj, .nff) or scene files (.toml); `-` reads standard input
+    /// Models (.glb, .gltf, .obj, .ply, .stl, .nff) or scene files (.toml); `-` reads standard input
     #[arg(value_name = "INPUT", required_unless_present = "again")]
     pub inputs: Vec<PathBuf>,
 
@@ -128,7 +128,7 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "PICTURE", help_heading = "Output", hide_short_help = true, conflicts_with_all = [
         "size", "format", "bits", "half", "float", "layers", "tone_map", "exposure", "merge", "view", "camera", "eye",
         "at", "up_vector", "fov", "ortho", "up", "background", "env", "env_rotate", "env_rays", "gloss_rays",
-        "light_rays", "sun_size", "samples", "depth", "cutoff", "seed", "scene", "animation", "time", "frame", "fps",
+        "light_rays", "sun_size", "samples", "depth", "cutoff", "seed", "scene", "variant", "animation", "time", "frame", "fps",
         "frames", "turntable",
         "polygons", "mtl", "allow_empty", "accel", "intersector",
     ])]
@@ -210,6 +210,9 @@ pub(super) struct RenderArgs {
     /// Which scene of a glTF file, by name or number from 0
     #[arg(long, value_name = "NAME", help_heading = "Loading", hide_short_help = true)]
     pub scene: Option<String>,
+    /// Which materials of a glTF file that offers variants, by name or number from 0 (`inspect` lists them)
+    #[arg(long, value_name = "NAME", help_heading = "Loading", hide_short_help = true)]
+    pub variant: Option<String>,
     /// Which moment of an animation.
     #[command(flatten)]
     pub moment: MomentArgs,
@@ -227,7 +230,7 @@ pub(super) struct RenderArgs {
     /// with the camera, the studio around it stays; --background gives all pictures the same.
     #[arg(long, value_name = "N", value_parser = parse::turns, help_heading = "Camera", hide_short_help = true)]
     pub turntable: Option<parse::Turns>,
-    /// What becomes of OBJ faces with more than three corners
+    /// What becomes of OBJ and PLY faces with more than three corners
     #[arg(long, value_name = "HOW", value_enum, default_value_t, help_heading = "Loading", hide_short_help = true)]
     pub polygons: PolygonsArg,
     /// Understand MTL files as exporters mean them, or to the letter
@@ -500,10 +503,13 @@ pub(super) struct LoadArgs {
     /// Which scene of a glTF file, by name or number from 0
     #[arg(long, value_name = "NAME")]
     pub scene: Option<String>,
+    /// Which materials of a glTF file that offers variants, by name or number from 0 (`inspect` lists them)
+    #[arg(long, value_name = "NAME")]
+    pub variant: Option<String>,
     /// Which moment of an animation.
     #[command(flatten)]
     pub moment: MomentArgs,
-    /// What becomes of OBJ faces with more than three corners
+    /// What becomes of OBJ and PLY faces with more than three corners
     #[arg(long, value_name = "HOW", value_enum, default_value_t)]
     pub polygons: PolygonsArg,
     /// Understand MTL files as exporters mean them, or to the letter
@@ -560,7 +566,7 @@ pub(super) enum FileType {
 pub(super) enum Axis {
     /// +Y, as glTF and most OBJ exporters
     Y,
-    /// +Z, as CAD programs and scanners
+    /// +Z, as CAD programs, printers and scanners
     Z,
 }
 

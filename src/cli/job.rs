@@ -212,6 +212,9 @@ fn check_flags(args: &RenderArgs) -> Result<(), Wrong> {
     if args.merge && args.scene.is_some() {
         return wrong("--scene chooses a scene of one file and cannot be used with --merge");
     }
+    if args.merge && args.variant.is_some() {
+        return wrong("--variant chooses materials of one file and cannot be used with --merge");
+    }
     if args.env_rotate.is_some() && !matches!(args.env, Some(Env::File(_))) {
         return wrong("--env-rotate turns a picture; the built-in surroundings stay with the model");
     }
@@ -342,6 +345,7 @@ fn load_options(args: &RenderArgs) -> LoadOptions {
         polygons: args.polygons.into(),
         mtl: args.mtl.into(),
         scene: args.scene.clone(),
+        variant: args.variant.clone(),
         up: args.up.map(Into::into),
         moment: None,
         without_pictures: false,

@@ -47,6 +47,7 @@ pub(super) fn one_model(input: &PathBuf, args: &LoadArgs, messages: &Messages) -
         polygons: args.polygons.into(),
         mtl: args.mtl.into(),
         scene: args.scene.clone(),
+        variant: args.variant.clone(),
         up: args.up.map(Into::into),
         moment,
         without_pictures: false,

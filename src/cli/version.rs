@@ -3,7 +3,7 @@
 /// Version and features of this build.
 pub(super) const LONG: &str = concat!(
     env!("CARGO_PKG_VERSION"),
-    "\ninput: glTF 2.0 (.glb, .gltf), Wavefront OBJ + MTL, NFF, meshray scenes (.toml)",
+    "\ninput: glTF 2.0 (.glb, .gltf), Wavefront OBJ + MTL, PLY, STL, NFF, meshray scenes (.toml)",
     "\noutput: PNG, OpenEXR, JPEG, WebP",
     "\nfeatures: cli",
 );

@@ -2,6 +2,7 @@
 //!
 //! Kinds that cannot be read are named, so that the user knows what to do.
 
+use super::stl::{self, Encoding};
 use super::{Diagnostic, Source};
 
 /// The kinds of file that can be loaded.
@@ -10,14 +11,13 @@ pub(super) enum Format {
     Gltf,
     Nff,
     Obj,
+    Ply,
     SceneFile,
+    Stl(Encoding),
 }
 
 /// Beginnings of files, and what they are.
 const FOREIGN: &[(&[u8], &str)] = &[
-    (b"ply\n", "a PLY file"),
-    (b"ply\r", "a PLY file"),
-    (b"solid ", "an STL file"),
     (b"Kaydara FBX Binary", "an FBX file"),
     (b"; FBX", "an FBX file"),
     (b"BLENDER", "a Blender file"),
@@ -44,8 +44,6 @@ const FOREIGN: &[(&[u8], &str)] = &[
 
 /// Extensions of kinds that have no sure beginning.
 const FOREIGN_EXTENSIONS: &[(&str, &str)] = &[
-    ("stl", "an STL file"),
-    ("ply", "a PLY file"),
     ("fbx", "an FBX file"),
     ("dae", "a COLLADA file"),
     ("3ds", "a 3D Studio file"),
@@ -73,6 +71,15 @@ pub(super) fn detect(source: &Source) -> Result<Format, Diagnostic> {
     if bytes.starts_with(b"glTF") {
         return Ok(Format::Gltf);
     }
+    if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
+        return Ok(Format::Ply);
+    }
+    if stl::is_exact(&source.bytes) {
+        return Ok(Format::Stl(Encoding::Binary));
+    }
+    if is_stl_text(text) {
+        return Ok(Format::Stl(Encoding::Text));
+    }
     if let Some((_, kind)) = FOREIGN.iter().find(|(start, _)| bytes.starts_with(start)) {
         return Err(foreign(source, kind));
     }
@@ -83,6 +90,8 @@ pub(super) fn detect(source: &Source) -> Result<Format, Diagnostic> {
         "gltf" | "glb" => return Ok(Format::Gltf),
         "nff" => return Ok(Format::Nff),
         "obj" => return Ok(Format::Obj),
+        "ply" => return Ok(Format::Ply),
+        "stl" => return Ok(Format::Stl(damaged_stl(text))),
         "toml" => return Ok(Format::SceneFile),
         _ => {}
     }
@@ -99,9 +108,27 @@ fn foreign(source: &Source, kind: &str) -> Diagnostic {
     let remedy = if kind.ends_with("archive") {
         "unpack it first"
     } else {
-        "meshray reads .glb, .gltf, .obj, .nff and .toml scenes"
+        "meshray reads .glb, .gltf, .obj, .ply, .stl, .nff and .toml scenes"
     };
     Diagnostic::new("unsupported-format", &source.path, "", format!("this is {kind}")).remedy(remedy)
+}
+
+/// Whether this is STL as text: `solid` and whatever name, then `facet` on one of the next lines, or the end at once.
+fn is_stl_text(text: &[u8]) -> bool {
+    let first_is = |line: &[u8], words: &[&[u8]]| {
+        let first = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
+        words.iter().any(|word| first.eq_ignore_ascii_case(word))
+    };
+    let mut lines = text.split(|&b| b == b'\n' || b == b'\r').map(<[u8]>::trim_ascii).filter(|line| !line.is_empty());
+    lines.next().is_some_and(|line| first_is(line, &[b"solid"]))
+        && lines.next().is_some_and(|line| first_is(line, &[b"facet", b"endsolid"]))
+}
+
+/// What an STL file was meant to be that is neither as long as it says nor begins as text should.
+fn damaged_stl(text: &[u8]) -> Encoding {
+    let begins = text.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
+    let is_text = begins && !text.iter().take(512).any(|&b| b == 0);
+    if is_text { Encoding::Text } else { Encoding::Binary }
 }
 
 fn has(bytes: &[u8], part: &[u8]) -> bool {
@@ -152,12 +179,31 @@ mod tests {
     }
 
     #[test]
+    fn ply_and_stl_are_known_by_content_and_by_name() {
+        assert_eq!(of("-", b"ply\r\nformat ascii 1.0\r\n"), Ok(Format::Ply));
+        assert_eq!(of("a.ply", b""), Ok(Format::Ply));
+        let (text, binary) = (Ok(Format::Stl(Encoding::Text)), Ok(Format::Stl(Encoding::Binary)));
+        assert_eq!(of("-", b"solid a b\n\n facet normal 0 0 1"), text);
+        assert_eq!(of("a.stl", b"SOLID\nwhat?"), text);
+        assert!(of("-", b"solid rock is heavy\nand so on").is_err());
+        // A header that begins like text makes no text of a file that is as long as it says.
+        let mut named = b"solid facet".to_vec();
+        named.resize(84 + 50, 0);
+        named[80] = 1;
+        assert_eq!(of("-", &named), binary);
+        assert_eq!(of("a.obj", &[0; 84]), binary);
+        assert_eq!(of("a.stl", &[7; 100]), binary);
+        named.truncate(100);
+        assert_eq!(of("a.stl", &named), binary);
+    }
+
+    #[test]
     fn the_extension_decides_where_content_cannot() {
         assert_eq!(of("a.obj", b""), Ok(Format::Obj));
         assert_eq!(of("a.nff", b"s 0 0 0 1"), Ok(Format::Nff));
         assert_eq!(of("a.GLB", b""), Ok(Format::Gltf));
         assert_eq!(of("a.toml", b"# nothing yet"), Ok(Format::SceneFile));
-        assert!(of("a.stl", &[0; 84]).unwrap_err().starts_with("a.stl: this is an STL file; meshray reads"));
+        assert!(of("a.fbx", b"").unwrap_err().starts_with("a.fbx: this is an FBX file; meshray reads"));
         assert!(of("a", b"").unwrap_err().contains("this is empty"));
         assert!(of("a", b"hello").unwrap_err().contains("unknown kind"));
     }

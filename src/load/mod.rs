@@ -6,14 +6,20 @@
 mod detect;
 pub mod diagnostic;
 pub mod gltf;
+mod ktx;
 pub mod limits;
 pub mod nff;
 pub mod obj;
 pub mod panorama;
 pub mod paths;
-#[cfg_attr(not(feature = "draco"), expect(dead_code, reason = "only decoders of others panic"))]
+pub mod ply;
+#[cfg_attr(
+    not(any(feature = "draco", feature = "basisu")),
+    expect(dead_code, reason = "only decoders of others panic")
+)]
 mod quiet;
 pub mod scene_file;
+pub mod stl;
 pub mod suggest;
 pub mod tangents;
 pub mod texture;
@@ -33,12 +39,15 @@ pub struct LoadOptions {
     pub root: Option<PathBuf>,
     /// Bounds on memory and sizes.
     pub limits: Limits,
-    /// What becomes of OBJ and NFF faces with more than three corners.
+    /// What becomes of OBJ, PLY and NFF faces with more than three corners.
     pub polygons: Polygons,
     /// How MTL text is understood.
     pub mtl: MtlMode,
     /// Which scene of a glTF file: an index, or a name; `None`: the default scene.
     pub scene: Option<String>,
+    /// Which variant of materials of a glTF file (KHR_materials_variants): a name, or a number from 0; `None`: the
+    /// materials that primitives name themselves.
+    pub variant: Option<String>,
     /// Overrides the up axis.
     pub up: Option<UpAxis>,
     /// Which moment of an animation of a glTF file is shown; `None`: the rest pose.
@@ -56,7 +65,7 @@ pub struct Moment {
     pub time: f64,
 }
 
-/// What becomes of OBJ and NFF faces with more than three corners.
+/// What becomes of OBJ, PLY and NFF faces with more than three corners.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Polygons {
     /// Cut into triangles by exact ear clipping.
@@ -90,7 +99,7 @@ pub struct Loaded {
 /// What loading found out besides the scene.
 #[derive(Clone, Debug, Default)]
 pub struct Facts {
-    /// `glTF 2.0 (binary)`, `Wavefront OBJ`, `NFF`, `meshray scene`.
+    /// `glTF 2.0 (binary)`, `Wavefront OBJ`, `NFF`, `PLY (ascii)`, `STL (binary)`, `meshray scene`.
     pub format: String,
     /// Program that wrote the file, if it says.
     pub generator: String,
@@ -110,6 +119,10 @@ pub struct Facts {
     pub scenes: Vec<String>,
     /// Which scene was loaded.
     pub scene_index: usize,
+    /// Names of the variants of materials in the file.
+    pub variants: Vec<String>,
+    /// Which of them was loaded, if one was asked for.
+    pub variant: Option<usize>,
     /// Why the up axis was chosen, when it was a guess.
     pub up_reason: Option<String>,
     /// Largest displacement of a vertex by rounding to `f32`, world units.
@@ -191,7 +204,9 @@ fn load_source(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadErr
         detect::Format::Gltf => gltf::load(source, options),
         detect::Format::Nff => nff::load(source, options),
         detect::Format::Obj => obj::load(source, options),
+        detect::Format::Ply => ply::load(source, options),
         detect::Format::SceneFile => scene_file::load(source, options),
+        detect::Format::Stl(encoding) => stl::load(source, encoding, options),
     }
 }
 

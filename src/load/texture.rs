@@ -5,7 +5,7 @@
 //! material goes on without that map.
 
 use super::limits::{Budget, Limits};
-use super::{Diagnostic, Warnings};
+use super::{Diagnostic, Warnings, ktx};
 use crate::scene::{Bitmap, Pixels};
 use crate::stopwatch::{Spent, Stopwatch};
 use ::image::{ColorType, DynamicImage, ImageFormat, ImageReader};
@@ -44,9 +44,9 @@ pub fn decode_all(
     let decoded: Vec<_> = images
         .par_iter()
         .zip(sized)
-        .map(|(image, format)| {
+        .map(|(image, kind)| {
             let watch = Stopwatch::of_this_thread();
-            let decoded = format.and_then(|format| decode(&image.name, &image.bytes, format));
+            let decoded = kind.and_then(|kind| decode(&image.name, &image.bytes, kind));
             (decoded, watch.read().cpu)
         })
         .collect();
@@ -61,14 +61,27 @@ pub fn decode_all(
     (images.iter().zip(decoded).map(usable).collect(), spent)
 }
 
+/// What reads a picture.
+#[derive(Clone, Copy)]
+enum Kind {
+    Image(ImageFormat),
+    Ktx,
+}
+
 /// Reads only the header; refuses what is too large.
-fn check_size(bytes: &[u8], limits: &Limits, budget: &mut Budget) -> Result<ImageFormat, String> {
-    let format = ::image::guess_format(bytes).map_err(|_| unknown_kind(bytes))?;
-    if matches!(format, ImageFormat::Hdr | ImageFormat::OpenExr) {
-        return Err("it holds radiance (HDR or EXR), not colours of a surface".into());
-    }
-    let reader = ImageReader::with_format(Cursor::new(bytes), format);
-    let (width, height) = reader.into_dimensions().map_err(|e| e.to_string())?;
+fn check_size(bytes: &[u8], limits: &Limits, budget: &mut Budget) -> Result<Kind, String> {
+    let (kind, width, height, between) = if ktx::is(bytes) {
+        let ktx::Size { width, height, between } = ktx::size(bytes)?;
+        (Kind::Ktx, width, height, between)
+    } else {
+        let format = ::image::guess_format(bytes).map_err(|_| unknown_kind(bytes))?;
+        if matches!(format, ImageFormat::Hdr | ImageFormat::OpenExr) {
+            return Err("it holds radiance (HDR or EXR), not colours of a surface".into());
+        }
+        let reader = ImageReader::with_format(Cursor::new(bytes), format);
+        let (width, height) = reader.into_dimensions().map_err(|e| e.to_string())?;
+        (Kind::Image(format), width, height, 0)
+    };
     let pixels = u64::from(width) * u64::from(height);
     if pixels == 0 {
         return Err("it has no pixels".into());
@@ -76,15 +89,15 @@ fn check_size(bytes: &[u8], limits: &Limits, budget: &mut Budget) -> Result<Imag
     if pixels > limits.image_pixels {
         return Err(format!("{width}×{height} pixels where {} are allowed", limits.image_pixels));
     }
-    budget.take(pixels, 4).map_err(|over| over.to_string())?;
-    Ok(format)
+    budget.take(pixels, 4).and_then(|()| budget.take(between, 1)).map_err(|over| over.to_string())?;
+    Ok(kind)
 }
 
 /// What bytes that no decoder knows look like.
 fn unknown_kind(bytes: &[u8]) -> String {
     let kind = match bytes {
         [] => "an empty file",
-        [0xab, b'K', b'T', b'X', ..] => "KTX (compressed for GPUs)",
+        [0xab, b'K', b'T', b'X', ..] => "KTX 1 (compressed for GPUs)",
         [b'D', b'D', b'S', b' ', ..] => "DDS (compressed for GPUs)",
         [b's', b'B', ..] => "Basis (compressed for GPUs)",
         [b'<', ..] => "a text or SVG file",
@@ -93,7 +106,8 @@ fn unknown_kind(bytes: &[u8]) -> String {
     format!("it is {kind}")
 }
 
-fn decode(name: &str, bytes: &[u8], format: ImageFormat) -> Result<Bitmap, String> {
+fn decode(name: &str, bytes: &[u8], kind: Kind) -> Result<Bitmap, String> {
+    let Kind::Image(format) = kind else { return ktx::decode(name, bytes) };
     let image = ImageReader::with_format(Cursor::new(bytes), format).decode().map_err(|e| e.to_string())?;
     let (width, height) = (image.width(), image.height());
     Ok(Bitmap { name: name.into(), width, height, pixels: pixels_of(image) })

@@ -7,6 +7,7 @@ mod bench;
 mod costs;
 mod endings;
 mod explain;
+mod formats;
 mod generate;
 mod interrupt;
 mod messages;

@@ -26,7 +26,7 @@ pub fn models() -> Vec<PathBuf> {
             let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
             if path.is_dir() {
                 folders.push(path);
-            } else if ["obj", "glb", "gltf", "toml"].contains(&extension) {
+            } else if ["obj", "glb", "gltf", "ply", "stl", "toml"].contains(&extension) {
                 found.push(path);
             }
         }

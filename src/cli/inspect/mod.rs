@@ -6,9 +6,9 @@
 //! without strays) with `strays`; `units`, `up`, `up_reason`; `topology` (`corners`, `edges`, `open`, `non_manifold`,
 //! `duplicates`, `degenerate`; equal positions count as one corner); `dropped` (by reason); `points_and_lines`;
 //! `textures` (`name`, `width`, `height`); `missing` (files that were named but not found); `extensions` (`name`,
-//! `required`, `supported`); `scenes`, `scene`; `animations` (`name`, `seconds`, `channels`); `cameras`, `lights` (`name`,
-//! `kind`); `features` (needed) and `left_out`; `memory` (bytes: `scene`, `structure`); `max_rounding`; `warnings`
-//! (messages). Keys are only ever added.
+//! `required`, `supported`); `scenes`, `scene`; `variants`, `variant` (the number of the one asked for, or null);
+//! `animations` (`name`, `seconds`, `channels`); `cameras`, `lights` (`name`, `kind`); `features` (needed) and `left_out`;
+//! `memory` (bytes: `scene`, `structure`); `max_rounding`; `warnings` (messages). Keys are only ever added.
 
 mod report;
 mod topology;

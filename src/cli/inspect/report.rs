@@ -70,6 +70,11 @@ impl<'a> Report<'a> {
             });
             lines.add("scenes", shorten(marked));
         }
+        let marked = facts.variants.iter().enumerate().map(|(i, name)| {
+            let mark = if facts.variant == Some(i) { " (this one)" } else { "" };
+            format!("{i} '{name}'{mark}")
+        });
+        lines.add("variants", shorten(marked));
     }
 
     fn contents(&self, lines: &mut Lines) {
@@ -182,6 +187,7 @@ impl<'a> Report<'a> {
             "scenes": facts.scenes, "scene": facts.scene_index,
             "animations": facts.animations.iter()
                 .map(|a| json!({ "name": a.name, "seconds": a.seconds, "channels": a.channels })).collect::<Vec<_>>(),
+            "variants": facts.variants, "variant": facts.variant,
             "cameras": scene.cameras.iter().map(|c| named(&c.name, lens(c))).collect::<Vec<_>>(),
             "lights": scene.lights.iter().map(|l| named(&l.name, kind(l))).collect::<Vec<_>>(),
             "features": self.features.present().map(|f| f.name()).collect::<Vec<_>>(),

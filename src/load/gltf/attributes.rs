@@ -6,13 +6,14 @@ use super::codes::Code;
 use super::document::is_semantic;
 use super::report::Report;
 use super::schema::whole;
+use super::variants;
 use serde_json::{Map, Value};
 use std::collections::HashMap;
 
-/// Checks every primitive.
-pub(super) fn check(root: &Value, report: &mut Report) {
+/// Checks every primitive, with the material that it shows in a variant.
+pub(super) fn check(root: &Value, variant: Option<usize>, report: &mut Report) {
     let quantized = list(root, "extensionsUsed").iter().any(|e| e == "KHR_mesh_quantization");
-    let mut check = Check { root, quantized, views: HashMap::new(), maps: HashMap::new(), report };
+    let mut check = Check { root, variant, quantized, views: HashMap::new(), maps: HashMap::new(), report };
     for (i, mesh) in list(root, "meshes").iter().enumerate() {
         let targets: Vec<usize> = list(mesh, "primitives").iter().map(|p| list(p, "targets").len()).collect();
         for (k, primitive) in list(mesh, "primitives").iter().enumerate() {
@@ -52,6 +53,8 @@ struct Layout<'a> {
 
 struct Check<'a> {
     root: &'a Value,
+    /// The variant of materials that is asked for.
+    variant: Option<usize>,
     quantized: bool,
     /// The attribute that came first in each buffer view.
     views: HashMap<usize, u64>,
@@ -238,7 +241,7 @@ impl<'a> Check<'a> {
     /// Whether the primitive has what its material's maps need.
     fn material(&mut self, primitive: &Value, attributes: &Map<String, Value>, place: &str) {
         let place = format!("{place}.material");
-        let index = primitive.get("material").and_then(whole).and_then(|i| usize::try_from(i).ok());
+        let index = variants::material_in(primitive, self.variant);
         let Some(material) = index.and_then(|i| list(self.root, "materials").get(i)) else { return };
         let layouts = self.maps.entry(index.unwrap_or_default()).or_insert_with(|| layouts(material));
         // The first that is missing is enough, and bounds the work by the number of attributes.

@@ -1,4 +1,4 @@
-//! What the user wishes for by name or number: a scene, an animation.
+//! What the user wishes for by name or number: a scene, a variant of materials, an animation.
 
 use crate::load::Diagnostic;
 use std::path::Path;
@@ -15,6 +15,9 @@ pub(super) struct Kind {
 
 /// Scenes.
 pub(super) const SCENE: Kind = Kind { word: "scene", list: "scenes", code: "gltf-no-such-scene" };
+/// Variants of materials.
+pub(super) const VARIANT: Kind =
+    Kind { word: "variant", list: "extensions.KHR_materials_variants.variants", code: "gltf-no-such-variant" };
 /// Animations.
 pub(super) const ANIMATION: Kind = Kind { word: "animation", list: "animations", code: "gltf-no-such-animation" };
 

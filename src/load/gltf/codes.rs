@@ -216,7 +216,7 @@ codes! {
     IridescenceTextureUnused "KHR_MATERIALS_IRIDESCENCE_THICKNESS_TEXTURE_UNUSED" Accept "iridescence is not drawn";
     VolumeDoubleSided "KHR_MATERIALS_VOLUME_DOUBLE_SIDED" Accept "both sides are drawn";
     VolumeNoTransmission "KHR_MATERIALS_VOLUME_NO_TRANSMISSION" Accept "no light gets in";
-    VariantsNonUnique "KHR_MATERIALS_VARIANTS_NON_UNIQUE_VARIANT" Accept "the default variant is drawn";
+    VariantsNonUnique "KHR_MATERIALS_VARIANTS_NON_UNIQUE_VARIANT" Accept "the first mapping counts, and is told where the variant is asked for";
 
     // Animation: nothing is looked at unless it is played; what cannot be used of it is told then.
     AccessorAnimationInputNegative "ACCESSOR_ANIMATION_INPUT_NEGATIVE" Accept "it has begun before 0";
@@ -303,6 +303,7 @@ mod tests {
             include_str!("skin.rs"),
             include_str!("sparse.rs"),
             include_str!("usage.rs"),
+            include_str!("variants.rs"),
             include_str!("version.rs"),
         ];
         let text: String =

@@ -26,10 +26,12 @@ const SUPPORTED: &[&str] = &[
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
+    "KHR_materials_variants",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_meshopt_compression",
     "KHR_node_visibility",
+    "KHR_texture_basisu",
     "KHR_texture_transform",
 ];
 
@@ -46,7 +48,6 @@ const HARMLESS: &[&str] = &[
     "KHR_animation_pointer",
     "KHR_audio_emitter",
     "KHR_interactivity",
-    "KHR_materials_variants",
     "KHR_node_hoverability",
     "KHR_node_selectability",
     "KHR_physics_rigid_bodies",
@@ -62,8 +63,12 @@ const HARMLESS: &[&str] = &[
 
 /// Whether what an extension needs is part of this build.
 fn is_built(name: &str) -> bool {
-    let (draco, meshopt) = (name == "KHR_draco_mesh_compression", name.ends_with("_meshopt_compression"));
-    (cfg!(feature = "draco") || !draco) && (cfg!(feature = "meshopt") || !meshopt)
+    match name {
+        "KHR_draco_mesh_compression" => cfg!(feature = "draco"),
+        "KHR_texture_basisu" => cfg!(feature = "basisu"),
+        _ if name.ends_with("_meshopt_compression") => cfg!(feature = "meshopt"),
+        _ => true,
+    }
 }
 
 /// What to do about an extension that is required and not understood.
@@ -73,7 +78,7 @@ fn remedy(name: &str) -> &'static str {
         "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
             "build meshray with the feature 'meshopt', or export it without meshopt compression"
         }
-        "KHR_texture_basisu" => "convert its KTX2 textures to PNG or JPEG (gltf-transform), or export it with those",
+        "KHR_texture_basisu" => "build meshray with the feature 'basisu', or export it with PNG or JPEG textures",
         "KHR_techniques_webgl" => "export it with metallic-roughness materials",
         _ if name.starts_with("KHR_materials_") => {
             "export it without, or take it out of extensionsRequired to draw it without"
@@ -153,7 +158,7 @@ impl Lists {
 
 /// Extensions with a stand-in in the file, which tell for themselves where the stand-in is missing.
 fn has_stand_in(name: &str) -> bool {
-    matches!(name, "KHR_texture_basisu" | "MSFT_texture_dds") || !is_built(name)
+    name == "MSFT_texture_dds" || !is_built(name)
 }
 
 #[cfg(test)]
@@ -173,11 +178,15 @@ mod tests {
 
     #[test]
     fn what_is_required_and_unknown_is_one_line_with_a_remedy() {
-        let both = json!(["KHR_texture_basisu", "KHR_materials_ior"]);
+        let both = json!(["KHR_materials_subsurface", "KHR_materials_ior"]);
         let (faults, warnings) = messages(&json!({"extensionsUsed": both, "extensionsRequired": both}));
         assert_eq!(faults.len(), 1);
-        assert!(faults[0].starts_with("a.gltf:extensionsRequired: KHR_texture_basisu is required"), "{}", faults[0]);
-        assert!(faults[0].contains("; convert its KTX2 textures"));
+        assert!(
+            faults[0].starts_with("a.gltf:extensionsRequired: KHR_materials_subsurface is required"),
+            "{}",
+            faults[0]
+        );
+        assert!(faults[0].contains("; export it without, or take it out"));
         assert!(warnings.is_empty());
     }
 

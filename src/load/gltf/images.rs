@@ -3,10 +3,10 @@
 use super::buffers::{Buffers, decode_data, is_data, media_type};
 use super::codes::Code;
 use super::report::Report;
-use crate::load::Diagnostic;
 use crate::load::limits::{Budget, Limits};
 use crate::load::paths::Resolver;
 use crate::load::texture::{Encoded, decode_all};
+use crate::load::{Diagnostic, ktx};
 use crate::scene::Bitmap;
 use crate::stopwatch::Spent;
 use ::image::{ImageFormat, guess_format};
@@ -35,7 +35,6 @@ impl<'a> Images<'a> {
     ) -> Self {
         let mut images = Self { bytes: Vec::new(), same: HashMap::new() };
         let drawn: HashSet<usize> = drawn.iter().copied().collect();
-        let webp = root.extensions_used.iter().any(|e| e == "EXT_texture_webp");
         let mut known: HashMap<&str, usize> = HashMap::new();
         for (i, image) in root.images.iter().enumerate() {
             let named = image.uri.as_deref().filter(|uri| !is_data(uri));
@@ -50,7 +49,7 @@ impl<'a> Images<'a> {
                 known.extend(named.filter(|_| is_wanted(image, drawn)).map(|uri| (uri, i)));
             }
             if let Some(bytes) = images.of(i) {
-                check_kind(webp, i, image, bytes, report);
+                check_kind(root, i, image, bytes, report);
             }
         }
         check_textures(root, &images, report);
@@ -163,16 +162,18 @@ fn kind_of(bytes: &[u8]) -> Option<&'static str> {
         Ok(ImageFormat::Png) => Some("image/png"),
         Ok(ImageFormat::Jpeg) => Some("image/jpeg"),
         Ok(ImageFormat::WebP) => Some("image/webp"),
-        _ if bytes.starts_with(b"\xabKTX 20\xbb") => Some("image/ktx2"),
+        _ if ktx::is(bytes) => Some("image/ktx2"),
         _ if bytes.starts_with(b"DDS ") => Some("image/vnd-ms.dds"),
         _ => None,
     }
 }
 
+/// Kinds of images that only textures with an extension may show: the extension, the media type, and the kind's name.
+const EXTENDED: [(&str, &str, &str); 2] =
+    [("EXT_texture_webp", "image/webp", "WebP"), ("KHR_texture_basisu", "image/ktx2", "KTX2")];
+
 /// Compares what an image says of itself with its bytes.
-///
-/// `webp` says that the file declares the extension for it.
-fn check_kind(webp: bool, i: usize, image: &Image, bytes: &[u8], report: &mut Report) {
+fn check_kind(root: &Root, i: usize, image: &Image, bytes: &[u8], report: &mut Report) {
     let place = format!("images[{i}]");
     let Some(kind) = kind_of(bytes) else {
         return report.add(Code::ImageUnrecognizedFormat, place, "its bytes are no image of a known kind");
@@ -183,8 +184,9 @@ fn check_kind(webp: bool, i: usize, image: &Image, bytes: &[u8], report: &mut Re
         let text = format!("declared as {}, its bytes are {kind}", crate::load::paths::shorten(other));
         report.add(Code::ImageMimeTypeInvalid, &place, text);
     }
-    if kind == "image/webp" && !webp {
-        report.add(Code::ImageNonEnabledMimeType, place, "WebP needs EXT_texture_webp, which is not declared");
+    let is_declared = |extension: &str| root.extensions_used.iter().any(|e| e == extension);
+    if let Some((extension, _, name)) = EXTENDED.iter().find(|e| e.1 == kind && !is_declared(e.0)) {
+        report.add(Code::ImageNonEnabledMimeType, place, format!("{name} needs {extension}, which is not declared"));
     }
 }
 
@@ -192,7 +194,6 @@ fn check_kind(webp: bool, i: usize, image: &Image, bytes: &[u8], report: &mut Re
 fn check_textures(root: &Root, images: &Images, report: &mut Report) {
     let kind = |i: usize| images.of(i).and_then(kind_of);
     for (i, texture) in root.textures.iter().enumerate() {
-        let webp = extension_source(texture, "EXT_texture_webp");
         let plain = kind(texture.source.value()).filter(|k| !["image/png", "image/jpeg"].contains(k));
         if let Some(kind) = plain {
             report.add(
@@ -201,9 +202,11 @@ fn check_textures(root: &Root, images: &Images, report: &mut Report) {
                 format!("{kind} needs an extension"),
             );
         }
-        if let Some(kind) = webp.and_then(kind).filter(|k| *k != "image/webp") {
-            let place = format!("textures[{i}].extensions.EXT_texture_webp.source");
-            report.add(Code::TextureInvalidImageMimeType, place, format!("{kind} is no WebP"));
+        for (extension, right, name) in EXTENDED {
+            if let Some(kind) = extension_source(texture, extension).and_then(kind).filter(|k| *k != right) {
+                let place = format!("textures[{i}].extensions.{extension}.source");
+                report.add(Code::TextureInvalidImageMimeType, place, format!("{kind} is no {name}"));
+            }
         }
     }
 }
@@ -214,7 +217,8 @@ fn extension_source(texture: &Texture, name: &str) -> Option<usize> {
     usize::try_from(source).ok()
 }
 
-/// The image that a texture shows: WebP where the file offers it, then the plain one, then what cannot be decoded.
+/// The image that a texture shows: WebP where the file offers it, then the plain one, then KTX2, which has lost something
+/// to its compression, then what cannot be decoded.
 pub(super) fn image_of(root: &Root, texture: Index<Texture>) -> Option<usize> {
     let texture = root.textures.get(texture.value())?;
     let plain = Some(texture.source.value()).filter(|&i| i < root.images.len());

@@ -50,6 +50,7 @@ mod sparse;
 mod tests;
 mod textures;
 mod usage;
+mod variants;
 mod version;
 mod weight;
 
@@ -112,7 +113,9 @@ impl Loading<'_> {
         schema::check(&value, self.report);
         self.report.check()?;
         self.take(&mut budget, weight::typed(&value), "the document")?;
-        attributes::check(&value, self.report);
+        let variants = variants::names(&value);
+        let variant = self.variant(&variants)?;
+        attributes::check(&value, variant, self.report);
         usage::check(&value, self.report);
         let mut graph = Graph::new(&value, self.report);
         let document = document::typed(value, self.report);
@@ -122,6 +125,7 @@ impl Loading<'_> {
 
         let mut facts = facts(&document, container.binary);
         facts.extensions = extensions.facts();
+        (facts.variants, facts.variant) = (variants, variant);
         let scene = self.build(&document, &mut graph, container.bin, &mut budget, &mut facts)?;
         Ok(Loaded { scene, facts, warnings: Vec::new() })
     }
@@ -153,6 +157,7 @@ impl Loading<'_> {
         self.report.check()?;
         let reader = Reader { root, buffers: &buffers, replacements: &replacements, decoded: &decoded };
         facts.scene_index = scene::choose(root, self.options.scene.as_deref(), file)?;
+        facts.variant.iter().for_each(|&variant| variants::check(root, variant, self.report));
         self.check_budget(reader, *budget)?;
         bounds::check(reader, self.report);
         facts.animations = animation::facts(&document.animations, reader);
@@ -162,7 +167,7 @@ impl Loading<'_> {
         let placed = placed.map_err(|over| self.too_large("what the nodes show", over))?;
         let skins = skin::joint_matrices(reader, graph, self.report);
         skin::check_scene(root, graph, facts.scene_index, &placed.draws, self.report);
-        let palette = Palette::new(root, &placed, self.report);
+        let palette = Palette::new(root, &placed, facts.variant, self.report);
 
         let drawn_images = palette.textures.images.clone();
         let read_images = if self.options.without_pictures { &[][..] } else { &drawn_images };
@@ -220,6 +225,13 @@ impl Loading<'_> {
             self.report.warnings.push(warning.remedy("drawn as at its end"));
         }
         Ok(pose)
+    }
+
+    /// The variant of materials that is asked for.
+    fn variant(&self, names: &[String]) -> Result<Option<usize>, LoadError> {
+        let Some(wish) = &self.options.variant else { return Ok(None) };
+        let names: Vec<Option<&str>> = names.iter().map(|name| Some(name.as_str())).collect();
+        Ok(Some(choice::choose(&choice::VARIANT, &names, wish, &self.source.path)?))
     }
 
     /// In a GLB, a first buffer without a uri is the binary chunk, which must be there when it is needed.

@@ -5,6 +5,7 @@ use super::mesh::{Job, Needs};
 use super::report::Report;
 use super::scene::{Placed, Variant};
 use super::textures::Textures;
+use super::variants;
 use crate::math::DMat4;
 use crate::scene::Material;
 use gltf::json::Root;
@@ -12,6 +13,8 @@ use gltf::json::mesh as source;
 
 /// Materials in use, and how the file's numbers lead to them.
 pub(super) struct Palette<'a> {
+    /// The variant of materials that is asked for.
+    variant: Option<usize>,
     pub(super) materials: Vec<Material>,
     needs: Vec<Needs>,
     /// For each material of the file, and last for the default one, its index here.
@@ -21,9 +24,10 @@ pub(super) struct Palette<'a> {
 
 impl<'a> Palette<'a> {
     /// Converts the materials that drawn primitives name.
-    pub(super) fn new(root: &'a Root, placed: &Placed, report: &mut Report) -> Self {
+    pub(super) fn new(root: &'a Root, placed: &Placed, variant: Option<usize>, report: &mut Report) -> Self {
         let default = root.materials.len();
         let mut palette = Self {
+            variant,
             materials: Vec::new(),
             needs: Vec::new(),
             index: vec![None; default + 1],
@@ -31,7 +35,7 @@ impl<'a> Palette<'a> {
         };
         let drawn = placed.variants.iter().filter(|v| v.drawn).filter_map(|v| root.meshes.get(v.mesh));
         for primitive in drawn.flat_map(|mesh| &mesh.primitives) {
-            let i = primitive.material.map_or(default, |m| m.value());
+            let i = variants::material(primitive, variant).unwrap_or(default);
             if palette.index.get(i).is_none_or(Option::is_some) {
                 continue;
             }
@@ -49,7 +53,7 @@ impl<'a> Palette<'a> {
     /// The material that a primitive shows; `None` when it is not drawn.
     pub(super) fn material(&self, variant: &Variant, primitive: &source::Primitive) -> Option<u32> {
         // The default material is the last.
-        let i = primitive.material.map_or(self.index.len().checked_sub(1)?, |m| m.value());
+        let i = variants::material(primitive, self.variant).unwrap_or(self.index.len().checked_sub(1)?);
         self.index.get(i).copied().flatten().filter(|_| variant.drawn)
     }
 

@@ -49,7 +49,7 @@ pub(super) fn names(root: &Root) -> Vec<String> {
     root.scenes.iter().map(|scene| scene.name.clone().unwrap_or_default()).collect()
 }
 
-/// The scene that is asked for by index or name; without a wish, the default one, or else the first.
+/// The scene that is asked for by name or number; without a wish, the default one, or else the first.
 pub(super) fn choose(root: &Root, wish: Option<&str>, file: &Path) -> Result<usize, Diagnostic> {
     let Some(wish) = wish else { return Ok(root.scene.map_or(0, |scene| scene.value())) };
     let names: Vec<Option<&str>> = root.scenes.iter().map(|scene| scene.name.as_deref()).collect();

@@ -7,7 +7,7 @@ use super::soup::{Corner, NONE, Soup};
 use super::statements::{Face, Statements};
 use crate::load::Polygons;
 use crate::math::ear_clip::{EarClipper, Outcome, newell};
-use crate::math::{DVec3, Vec2, Vec3};
+use crate::math::{DVec3, Vec2, Vec3, Vec4};
 use crate::scene::{Mesh, Polygon};
 
 /// The meshes of a file, and what became of its faces.
@@ -261,6 +261,11 @@ impl Builder<'_> {
         }
         if vertices.iter().any(|(p, _)| soup.colors.get(p as usize).is_some_and(|&c| c != [1.0; 3])) {
             mesh.colors = vertices.iter().map(|(p, _)| super::color::linear(soup.colors[p as usize])).collect();
+        }
+        if !soup.alphas.is_empty() {
+            mesh.colors.resize(mesh.positions.len(), Vec4::ONE);
+            let alphas = vertices.iter().map(|(p, _)| soup.alphas[p as usize]);
+            mesh.colors.iter_mut().zip(alphas).for_each(|(color, alpha)| color.w = alpha);
         }
         if shaded {
             self.fill_normals(faces);

@@ -17,6 +17,14 @@ fn decode(coded: f32) -> f32 {
     if c <= 0.04045 { c / 12.92 } else { libm::powf((c + 0.055) / 1.055, 2.4) }
 }
 
+/// Opacities of vertices, 0…1; none where all are opaque. Where all are 0 the fourth number means something else: nobody
+/// writes a mesh that cannot be seen.
+pub(super) fn opacities(colors: &[[f32; 4]]) -> Vec<f32> {
+    let alphas = || colors.iter().map(|c| if c[3].is_nan() { 1.0 } else { c[3].clamp(0.0, 1.0) });
+    let means_something = alphas().any(|a| a < 1.0) && alphas().any(|a| a > 0.0);
+    if means_something { alphas().collect() } else { Vec::new() }
+}
+
 /// Whether colours were written as 0 … 255.
 pub(super) fn are_bytes(colors: &[[f32; 3]]) -> bool {
     let all = || colors.iter().flatten();

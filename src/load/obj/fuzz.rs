@@ -35,7 +35,7 @@ fn mesh() -> impl Strategy<Value = String> {
 }
 
 /// Every index points at something, every array is empty or full, every number is finite.
-fn assert_sound(loaded: &Loaded) {
+pub(in crate::load) fn assert_sound(loaded: &Loaded) {
     let scene = &loaded.scene;
     assert_eq!(scene.meshes.len(), scene.instances.len());
     let mut faces = 0u64;

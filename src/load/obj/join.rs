@@ -57,7 +57,7 @@ pub(super) fn join(mut chunks: Vec<Chunk>) -> Result<Joined, u64> {
         }
     }
     out.faces = flat(chunks.iter_mut().map(|c| std::mem::take(&mut c.faces)));
-    out.soup = Soup { positions, uvs, normals, colors, corners };
+    out.soup = Soup { positions, uvs, normals, colors, alphas: Vec::new(), corners };
     let faulty = faulty || chunks.iter().any(|c| c.faulty);
     Ok(Joined { statements: out, faulty })
 }

@@ -9,6 +9,7 @@
 //! ignored; every surface is seen from both sides; a face whose normals point to its back is turned round.
 
 mod assemble;
+pub(super) mod bare;
 mod chunk;
 mod color;
 mod encoding;
@@ -16,7 +17,7 @@ mod faults;
 mod join;
 mod lines;
 mod mtl;
-mod number;
+pub(super) mod number;
 mod pairs;
 mod place;
 mod smooth;
@@ -54,7 +55,8 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
     let flatness = assemble::flatness(&placed.positions, statements.places);
     let mut assembled = assemble::assemble(&statements, &soup, &placed, options.polygons, flatness);
     drop(soup);
-    warn_of_faces(&assembled, file, &mut warnings);
+    let codes = ["obj-not-finite", "obj-equal-corners", "obj-crossing-face", "obj-turned-face"];
+    warn_of_faces(&assembled, codes, |line| line.to_string(), file, &mut warnings);
     if statements.faces.is_empty() {
         let text = format!("{} vertices and no face: there is nothing to draw", statements.counts[0]);
         warnings.push(Diagnostic::new("obj-no-faces", file, "", text));
@@ -62,7 +64,7 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
 
     // Which way is up, what everything is made of, and where it stands.
     let (runs, meshes): (Vec<u32>, Vec<Mesh>) = std::mem::take(&mut assembled.meshes).into_iter().unzip();
-    let (guessed, reason) = up::guess(&statements.comments, &meshes, placed.center);
+    let (guessed, reason) = up::guess(&statements.comments, &meshes, placed.center, up::UNSAID);
     let name = |run: &u32| statements.runs[*run as usize].material.map(|id| statements.names[id as usize].as_str());
     let names: Vec<Option<&str>> = runs.iter().map(name).collect();
     let mut reading =
@@ -115,17 +117,24 @@ fn bytes_to_units(statements: &mut Statements, file: &Path, warnings: &mut Warni
     }
 }
 
-fn warn_of_faces(assembled: &Assembled, file: &Path, warnings: &mut Warnings) {
-    let mut warn = |code, (count, line): (u64, u32), text: &str| {
-        if count > 0 {
-            let count = u32::try_from(count).unwrap_or(u32::MAX);
-            warnings.push(Diagnostic { count, ..Diagnostic::new(code, file, line.to_string(), text) });
-        }
-    };
-    warn("obj-not-finite", assembled.not_finite, "a face is dropped: a corner is not a finite number, or over 1e18");
-    warn("obj-equal-corners", assembled.collapsed, "a face is dropped: it has fewer than 3 different corners");
-    warn("obj-crossing-face", assembled.crossing, "a face crosses itself; it is cut as well as can be");
-    warn("obj-turned-face", assembled.turned, "a face is wound against its normals; it is turned round");
+/// Tells what became of faces, in the order of `codes`; `place` names the first of a kind.
+fn warn_of_faces(
+    assembled: &Assembled,
+    codes: [&'static str; 4],
+    place: impl Fn(u32) -> String,
+    file: &Path,
+    warnings: &mut Warnings,
+) {
+    let told = [
+        (assembled.not_finite, "a face is dropped: a corner is not a finite number, or over 1e18"),
+        (assembled.collapsed, "a face is dropped: it has fewer than 3 different corners"),
+        (assembled.crossing, "a face crosses itself; it is cut as well as can be"),
+        (assembled.turned, "a face is wound against its normals; it is turned round"),
+    ];
+    for (code, ((count, first), text)) in codes.into_iter().zip(told).filter(|(_, ((count, _), _))| *count > 0) {
+        let count = u32::try_from(count).unwrap_or(u32::MAX);
+        warnings.push(Diagnostic { count, ..Diagnostic::new(code, file, place(first), text) });
+    }
 }
 
 fn dropped(statements: &Statements, assembled: &Assembled) -> Vec<(String, u64)> {
@@ -158,6 +167,6 @@ fn generator(comments: &[String]) -> String {
 }
 
 #[cfg(test)]
-mod fuzz;
+pub(super) mod fuzz;
 #[cfg(test)]
 mod tests;

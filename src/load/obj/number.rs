@@ -14,7 +14,7 @@ pub(super) struct Number<'a> {
 
 /// A plain decimal number at the start of a text.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Plain {
+pub(in crate::load) struct Plain {
     pub value: f64,
     /// Decimal places of the last digit, as in [`Number`].
     pub places: i32,
@@ -36,7 +36,7 @@ const MOST_DIGITS: usize = 19;
 /// [`str::parse`] gives (W. D. Clinger, "How to Read Floating Point Numbers Accurately", 1990). What is not so plain is
 /// for [`check`].
 #[inline]
-pub(super) fn plain(text: &[u8]) -> Option<Plain> {
+pub(in crate::load) fn plain(text: &[u8]) -> Option<Plain> {
     let sign = usize::from(matches!(text.first(), Some(b'-' | b'+')));
     let (whole, mut at) = digits(text, sign, 0);
     let (mut mantissa, mut count, mut fraction) = (whole, at - sign, 0);

@@ -24,6 +24,8 @@ pub(super) struct Soup {
     pub normals: Vec<Vec3>,
     /// Per position, as written, white where none are; empty when the file has none.
     pub colors: Vec<[f32; 3]>,
+    /// Opacity per position, 0…1; empty when everything is opaque.
+    pub alphas: Vec<f32>,
     pub corners: Vec<Corner>,
 }
 

@@ -1,6 +1,6 @@
-//! Which axis points up: OBJ does not say.
+//! Which axis points up: OBJ does not say, nor do PLY and STL.
 //!
-//! The default is +Y. +Z is chosen only on evidence: a comment that says so, a comment of a program known to write +Z,
+//! Where nothing speaks for an axis the kind of file decides: an OBJ is +Y. There +Z is chosen only on evidence: a comment that says so, a comment of a program known to write +Z,
 //! or a model that stands on z = 0 with a flat bottom there, reaches to both sides of y = 0, and is not a thin plate
 //! (which may as well lean against a wall).
 
@@ -24,8 +24,16 @@ const Z_WRITERS: [&str; 13] = [
     "qgis",
 ];
 
-/// Guesses from the comments, then from the shape; the text says why.
-pub(super) fn guess(comments: &[String], meshes: &[Mesh], center: DVec3) -> (UpAxis, String) {
+/// The up axis of an OBJ that gives no sign.
+pub(super) const UNSAID: (UpAxis, &str) = (UpAxis::Y, "OBJ does not say, and nothing speaks for +Z");
+
+/// Guesses from the comments, then from the shape, or else takes `otherwise`; the text says why.
+pub(super) fn guess(
+    comments: &[String],
+    meshes: &[Mesh],
+    center: DVec3,
+    otherwise: (UpAxis, &str),
+) -> (UpAxis, String) {
     for comment in comments {
         let text = comment.to_lowercase().replace([' ', '-', '_', ':', '=', '+'], "");
         for (axis, said) in [(UpAxis::Z, "zup"), (UpAxis::Z, "upaxisz"), (UpAxis::Y, "yup"), (UpAxis::Y, "upaxisy")] {
@@ -41,7 +49,7 @@ pub(super) fn guess(comments: &[String], meshes: &[Mesh], center: DVec3) -> (UpA
     if stands_on_z(meshes, center) {
         return (UpAxis::Z, "it stands on z = 0 with a flat bottom there".into());
     }
-    (UpAxis::Y, "OBJ does not say, and nothing speaks for +Z".into())
+    (otherwise.0, otherwise.1.into())
 }
 
 /// Whether the shape is that of something standing on z = 0 and not on, or behind, y = 0.
@@ -81,7 +89,7 @@ mod tests {
 
     fn up(comments: &[&str], mesh: &Mesh) -> UpAxis {
         let comments: Vec<_> = comments.iter().map(|&c| c.to_owned()).collect();
-        guess(&comments, std::slice::from_ref(mesh), DVec3::ZERO).0
+        guess(&comments, std::slice::from_ref(mesh), DVec3::ZERO, UNSAID).0
     }
 
     /// A pyramid with its square bottom at height 0 of axis `up`, and its mirror image.

@@ -169,3 +169,56 @@ fn what_has_a_direction_brings_tangents_and_the_rest_does_not() {
         assert_eq!(file.load().scene.meshes[0].tangents.len(), expected, "{slot}");
     }
 }
+
+/// A texture of 4×4 pixels as UASTC: one block of mode 8, which is one colour.
+#[cfg(feature = "basisu")]
+fn ktx2([r, g, b]: [u8; 3]) -> String {
+    let bits = 0b10111 | u128::from(r) << 5 | u128::from(g) << 13 | u128::from(b) << 21 | 255 << 29;
+    let bytes = crate::load::ktx::tests::file(0, (4, 4), (0, 166), &bits.to_le_bytes());
+    format!("data:image/ktx2;base64,{}", base64::engine::general_purpose::STANDARD.encode(bytes))
+}
+
+#[cfg(feature = "basisu")]
+#[test]
+fn a_ktx2_texture_is_drawn_where_there_is_no_plain_one() {
+    let texture = |plain: bool| {
+        let mut file = Builder::new();
+        let positions = file.triangle();
+        let uvs = file.floats("VEC2", &[0., 0., 1., 0., 0., 1.]);
+        file.primitive(json!({"attributes": {"POSITION": positions, "TEXCOORD_0": uvs}, "material": 0}));
+        file.set("images", json!([{"uri": ktx2([9, 90, 200]), "mimeType": "image/ktx2"}, {"uri": picture()}]));
+        let mut texture = json!({"extensions": {"KHR_texture_basisu": {"source": 0}}});
+        if plain {
+            texture["source"] = json!(1);
+        } else {
+            file.set("extensionsRequired", json!(["KHR_texture_basisu"]));
+        }
+        file.set("textures", json!([texture]));
+        file.set("extensionsUsed", json!(["KHR_texture_basisu"]));
+        file.set("materials", json!([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]));
+        let loaded = file.load();
+        assert!(codes(&loaded).is_empty(), "{:?}", loaded.warnings);
+        assert!(loaded.scene.materials[0].base_color_map.is_some());
+        loaded.scene.bitmaps[0].clone()
+    };
+    let compressed = texture(false);
+    assert_eq!((compressed.width, compressed.height), (4, 4));
+    assert!(matches!(&compressed.pixels, Pixels::Rgb8(p) if p[..3] == [9, 90, 200]));
+    assert_eq!(texture(true).width, 1, "the plain one has lost less");
+}
+
+#[test]
+fn ktx2_without_its_extension_is_told() {
+    let mut file = Builder::new();
+    let positions = file.triangle();
+    file.primitive(json!({"attributes": {"POSITION": positions}, "material": 0}));
+    let start = base64::engine::general_purpose::STANDARD.encode(b"\xabKTX 20\xbb\r\n\x1a\n");
+    file.set("images", json!([{"uri": format!("data:image/ktx2;base64,{start}")}]));
+    file.set("textures", json!([{"source": 0}]));
+    file.set("materials", json!([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]));
+    let loaded = file.load();
+    let told = codes(&loaded);
+    for code in ["gltf-image-non-enabled-mime-type", "gltf-texture-invalid-image-mime-type", "image-unusable"] {
+        assert!(told.contains(&code), "{code}: {told:?}");
+    }
+}

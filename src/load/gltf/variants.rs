@@ -1,0 +1,63 @@
+//! KHR_materials_variants: the materials of the variant that is asked for.
+//!
+//! A primitive shows its own material where nobody asks for a variant, and in a variant that says nothing of it.
+
+use super::codes::Code;
+use super::report::Report;
+use gltf::json::Root;
+use gltf::json::mesh::Primitive;
+use serde_json::Value;
+
+const NAME: &str = "KHR_materials_variants";
+
+/// Names of all variants of a document that has passed the schema check.
+pub(super) fn names(root: &Value) -> Vec<String> {
+    let list = root.pointer("/extensions/KHR_materials_variants/variants").and_then(Value::as_array);
+    let name = |variant: &Value| variant.get("name").and_then(Value::as_str).unwrap_or_default().to_owned();
+    list.into_iter().flatten().map(name).collect()
+}
+
+/// The material of the file that a primitive shows in a variant; `None`: the default one.
+pub(super) fn material(primitive: &Primitive, variant: Option<usize>) -> Option<usize> {
+    let mapped = variant.and_then(|variant| mapped(extension(primitive), variant).next());
+    mapped.map(|(_, material)| material).or(primitive.material.map(|material| material.value()))
+}
+
+/// The same of a primitive as it stands in the JSON.
+pub(super) fn material_in(primitive: &Value, variant: Option<usize>) -> Option<usize> {
+    let extension = primitive.get("extensions").and_then(|e| e.get(NAME));
+    let mapped = variant.and_then(|variant| mapped(extension, variant).next());
+    mapped.map(|(_, material)| material).or_else(|| primitive.get("material").and_then(number))
+}
+
+fn extension(primitive: &Primitive) -> Option<&Value> {
+    primitive.extensions.as_ref()?.others.get(NAME)
+}
+
+fn number(value: &Value) -> Option<usize> {
+    super::schema::whole(value).and_then(|n| usize::try_from(n).ok())
+}
+
+/// Warns where two mappings of a primitive speak of the variant.
+pub(super) fn check(root: &Root, variant: usize, report: &mut Report) {
+    for (i, mesh) in root.meshes.iter().enumerate() {
+        for (k, primitive) in mesh.primitives.iter().enumerate() {
+            let mut mappings = mapped(extension(primitive), variant).map(|(mapping, _)| mapping);
+            if let (Some(first), Some(again)) = (mappings.next(), mappings.next()) {
+                let place = format!("meshes[{i}].primitives[{k}].extensions.{NAME}.mappings[{again}]");
+                let text = format!("variant {variant} has a material in mapping {first}, and that one is taken");
+                report.warn(Code::VariantsNonUnique, place, text);
+            }
+        }
+    }
+}
+
+/// The mappings of a primitive that speak of a variant: where each stands, and its material.
+fn mapped(extension: Option<&Value>, variant: usize) -> impl Iterator<Item = (usize, usize)> {
+    let mappings = extension.and_then(|e| e.get("mappings")).and_then(Value::as_array).into_iter().flatten();
+    mappings.enumerate().filter_map(move |(i, mapping)| {
+        let variants = mapping.get("variants")?.as_array()?;
+        let speaks = variants.iter().any(|v| number(v) == Some(variant));
+        Some((i, mapping.get("material").and_then(number)?)).filter(|_| speaks)
+    })
+}

@@ -1,0 +1,177 @@
+//! Vertices and faces that come without a text of statements, as in PLY and STL files -> scene.
+//!
+//! They go the way of an OBJ's: centred and rounded, cut or kept whole, stood upright, plain where nothing is said of their
+//! material.
+
+use super::place::place;
+use super::soup::{Corner, NONE, Soup};
+use super::statements::{Face, Run, Statements};
+use super::{assemble, chunk, color, generator, mtl, scene, up, warn_of_faces};
+use crate::load::limits::{Budget, OverBudget};
+use crate::load::paths::Resolver;
+use crate::load::{Diagnostic, Facts, LoadOptions, Loaded, Source, Warnings};
+use crate::math::{DVec2, DVec3, Vec3};
+use crate::scene::{AlphaMode, Mesh, UpAxis};
+use std::path::Path;
+
+/// What a file of bare geometry holds. Lists that go with the vertices are as long as [`Self::positions`], or empty.
+#[derive(Clone, Debug, Default)]
+pub(in crate::load) struct Bare {
+    pub positions: Vec<DVec3>,
+    /// Of any length; zero where there is none.
+    pub normals: Vec<Vec3>,
+    /// v points up.
+    pub uvs: Vec<DVec2>,
+    /// sRGB-coded, 0…1, and opacity.
+    pub colors: Vec<[f32; 4]>,
+    /// Vertices of all faces, one face after another; each is there.
+    pub corners: Vec<u32>,
+    /// Corners of each face, at least 3.
+    pub arities: Vec<u32>,
+    /// Faces that had fewer.
+    pub few_corners: u64,
+    /// Edges and the like, which are not drawn.
+    pub points_and_lines: u64,
+    /// Decimal places of the finest coordinate; `None` where coordinates are not written in digits.
+    pub places: Option<i32>,
+    /// What the file says of itself.
+    pub comments: Vec<String>,
+}
+
+impl Bare {
+    /// Bytes that a vertex takes until it is part of a mesh: what the file says of it, twice in `f64`, in the mesh, and
+    /// its place in tables.
+    const VERTEX: u64 = 192;
+    /// Bytes that a corner takes: here, as that of a face, and in the mesh.
+    const CORNER: u64 = 40;
+    /// Bytes that a face takes: here, twice as a statement, and its number in the mesh.
+    const FACE: u64 = 56;
+    /// The most vertices, corners or faces.
+    pub(in crate::load) const LARGEST: u64 = chunk::LARGEST as u64;
+
+    /// Takes the memory of so many vertices from a budget, before they are read.
+    pub(in crate::load) fn charge_vertices(budget: &mut Budget, count: u64) -> Result<(), OverBudget> {
+        budget.take(count, Self::VERTEX)
+    }
+
+    /// Takes the memory of a face of so many corners from a budget, before it is added.
+    pub(in crate::load) fn charge_face(budget: &mut Budget, arity: usize) -> Result<(), OverBudget> {
+        budget.take(1, Self::FACE + Self::CORNER * arity as u64)
+    }
+
+    /// Adds a face, or counts one with too few corners.
+    #[expect(clippy::cast_possible_truncation, reason = "memory for 2^32 corners was not granted")]
+    pub(in crate::load) fn face(&mut self, corners: &[u32]) {
+        if corners.len() < 3 {
+            self.few_corners += 1;
+            return;
+        }
+        self.arities.push(corners.len() as u32);
+        self.corners.extend_from_slice(corners);
+    }
+}
+
+/// The line of a message about memory.
+pub(in crate::load) fn over_memory(file: &Path, over: OverBudget) -> Diagnostic {
+    Diagnostic::new("over-memory", file, "", over.to_string()).remedy("raise --max-memory")
+}
+
+/// Makes the scene. `format` is the file's kind for reports; `otherwise` the up axis where nothing speaks for one, and why.
+pub(in crate::load) fn load(
+    bare: Bare,
+    format: &str,
+    otherwise: (UpAxis, &str),
+    source: &Source,
+    options: &LoadOptions,
+    mut budget: Budget,
+) -> Loaded {
+    let file = source.path.as_path();
+    let mut warnings = Warnings::default();
+    let mut resolver = Resolver::new(source, options);
+    let (few_corners, points_and_lines, vertices) = (bare.few_corners, bare.points_and_lines, bare.positions.len());
+    let (statements, soup) = statements(bare);
+    let placed = place(&soup.positions);
+    let flatness = assemble::flatness(&placed.positions, statements.places);
+    let assembled = assemble::assemble(&statements, &soup, &placed, options.polygons, flatness);
+    let is_see_through = !soup.alphas.is_empty();
+    drop(soup);
+
+    // What could not be drawn.
+    let codes = ["face-not-finite", "face-degenerate", "face-crossing", "face-turned"];
+    warn_of_faces(&assembled, codes, |face| format!("face {face}"), file, &mut warnings);
+    if few_corners > 0 {
+        let count = u32::try_from(few_corners).unwrap_or(u32::MAX);
+        let text = "a face is dropped: it has fewer than 3 corners";
+        warnings.push(Diagnostic { count, ..Diagnostic::new("face-few-corners", file, "", text) });
+    }
+    if statements.faces.is_empty() {
+        let text = format!("{vertices} vertices and no face: there is nothing to draw");
+        warnings.push(Diagnostic::new("no-faces", file, "", text));
+    }
+    if points_and_lines > 0 {
+        let text = format!("{points_and_lines} points and lines are not drawn");
+        warnings.push(Diagnostic::new("points-and-lines", file, "", text));
+    }
+
+    let mut dropped = super::dropped(&statements, &assembled);
+    if few_corners > 0 {
+        dropped.push(("fewer than 3 corners".into(), few_corners));
+    }
+    let meshes: Vec<Mesh> = assembled.meshes.into_iter().map(|(_, mesh)| mesh).collect();
+    let (guessed, reason) = up::guess(&statements.comments, &meshes, placed.center, otherwise);
+    let mut reading =
+        mtl::Reading { file, options, resolver: &mut resolver, budget: &mut budget, warnings: &mut warnings };
+    let unnamed = vec![None; meshes.len()];
+    let materials = mtl::load(&[], &unnamed, &mut reading);
+    let mut scene = scene(meshes, materials, placed.center, options.up.unwrap_or(guessed));
+    if is_see_through {
+        scene.materials.iter_mut().for_each(|material| material.alpha_mode = AlphaMode::Blend);
+    }
+    let (files, hash) = resolver.finish();
+    let facts = Facts {
+        format: format.into(),
+        generator: generator(&statements.comments),
+        faces: assembled.faces,
+        dropped,
+        points_and_lines,
+        up_reason: options.up.is_none().then_some(reason),
+        max_rounding: placed.max_rounding,
+        files,
+        hash,
+        ..Facts::default()
+    };
+    Loaded { scene, warnings: warnings.into_vec(), facts }
+}
+
+/// The same as statements of an OBJ would leave it: one run of faces, each attribute numbered as its vertex.
+#[expect(clippy::cast_possible_truncation, reason = "readers keep below Bare::LARGEST")]
+fn statements(bare: Bare) -> (Statements, Soup) {
+    let Bare { positions, normals, uvs, colors, corners, arities, .. } = bare;
+    let normals: Vec<Vec3> = normals.into_iter().map(|n| n.as_dvec3().normalize_or_zero().as_vec3()).collect();
+    let corner = |i: u32| {
+        let (uv, normal) = (uvs.get(i as usize), normals.get(i as usize));
+        Corner {
+            position: i,
+            uv: if uv.is_some_and(|uv| uv.is_finite()) { i } else { NONE },
+            normal: if normal.is_some_and(|n| *n != Vec3::ZERO) { i } else { NONE },
+        }
+    };
+    let corners = corners.into_iter().map(corner).collect();
+    let alphas = color::opacities(&colors);
+    let colors = colors.into_iter().map(|[r, g, b, _]| [r, g, b]).collect();
+    let mut soup = Soup { positions, uvs, normals, colors, alphas, corners };
+    soup.leave_out_unused();
+
+    let faces = (0..).zip(&arities).map(|(number, &arity)| Face { run: 0, smoothing: 0, arity, line: number, number });
+    let statements = Statements {
+        counts: [soup.positions.len() as u32, 0, 0],
+        faces: faces.collect(),
+        runs: vec![Run::default()],
+        names: vec![String::new()],
+        // So many digits that the rounding to `f32` alone counts.
+        places: bare.places.unwrap_or(30),
+        comments: bare.comments,
+        ..Statements::default()
+    };
+    (statements, soup)
+}

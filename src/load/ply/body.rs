@@ -1,0 +1,144 @@
+//! The values of a PLY file, one after another, as text or as bytes.
+
+use super::header::{Element, Encoding, Header, Kind};
+use crate::load::obj::number;
+use crate::load::paths::shorten;
+use crate::load::{Diagnostic, Source};
+use std::path::Path;
+
+/// Where the reading is. Whole numbers of every kind are exact in `f64`.
+pub(super) struct Body<'a> {
+    file: &'a Path,
+    bytes: &'a [u8],
+    at: usize,
+    encoding: Encoding,
+    /// Line of the last value of a text.
+    line: u32,
+    /// Decimal places of the finest number of a text.
+    pub places: i32,
+}
+
+/// Why there is no value.
+pub(super) enum Missing {
+    /// The file ends.
+    End,
+    /// This word is no number.
+    Word(String),
+}
+
+impl<'a> Body<'a> {
+    /// The values behind the header.
+    pub(super) fn new(header: &Header, source: &'a Source) -> Self {
+        let line = header.lines.saturating_add(1);
+        let (file, bytes) = (source.path.as_path(), source.bytes.as_slice());
+        Self { file, bytes, at: header.length, encoding: header.encoding, line, places: 0 }
+    }
+
+    /// A fault of the value read last, or of the one that is missing.
+    pub(super) fn fault(&self, text: impl Into<String>, remedy: &str) -> Diagnostic {
+        let place = match self.encoding {
+            Encoding::Text => self.line.to_string(),
+            _ => format!("byte {}", self.at),
+        };
+        Diagnostic::new("ply-body", self.file, place, text).remedy(remedy)
+    }
+
+    /// The fault of a missing value: `what` it is.
+    pub(super) fn missing(&self, missing: &Missing, what: &str) -> Diagnostic {
+        match missing {
+            Missing::End => self.fault(format!("the file ends before {what}"), "it was cut off; get it again"),
+            Missing::Word(word) => self.fault(format!("`{}` is no number, in {what}", shorten(word)), ""),
+        }
+    }
+
+    /// Bytes that have not been read.
+    fn left(&self) -> u64 {
+        (self.bytes.len() - self.at.min(self.bytes.len())) as u64
+    }
+
+    /// Refuses an element that claims more than there are bytes for.
+    pub(super) fn check_count(&self, element: &Element) -> Result<(), Diagnostic> {
+        let (count, least, left) = (element.count, element.least(self.encoding), self.left());
+        if count.checked_mul(least).is_some_and(|bytes| bytes <= left) {
+            return Ok(());
+        }
+        let name = shorten(&element.name);
+        let text = format!("the header claims {count} × `{name}` of at least {least} bytes, but {left} bytes are left");
+        Err(self.fault(text, "it was cut off; get it again"))
+    }
+
+    /// The next value.
+    #[inline]
+    pub(super) fn value(&mut self, kind: Kind) -> Result<f64, Missing> {
+        match self.encoding {
+            Encoding::Text => self.number(),
+            Encoding::LittleEndian => self.binary(kind, false),
+            Encoding::BigEndian => self.binary(kind, true),
+        }
+    }
+
+    #[inline]
+    fn binary(&mut self, kind: Kind, big: bool) -> Result<f64, Missing> {
+        Ok(match kind {
+            Kind::I8 => f64::from(self.take::<1>(big)?[0] as i8),
+            Kind::U8 => f64::from(self.take::<1>(big)?[0]),
+            Kind::I16 => f64::from(i16::from_le_bytes(self.take(big)?)),
+            Kind::U16 => f64::from(u16::from_le_bytes(self.take(big)?)),
+            Kind::I32 => f64::from(i32::from_le_bytes(self.take(big)?)),
+            Kind::U32 => f64::from(u32::from_le_bytes(self.take(big)?)),
+            Kind::F32 => f64::from(f32::from_le_bytes(self.take(big)?)),
+            Kind::F64 => f64::from_le_bytes(self.take(big)?),
+        })
+    }
+
+    /// The next bytes, lowest first.
+    #[inline]
+    fn take<const N: usize>(&mut self, big: bool) -> Result<[u8; N], Missing> {
+        let mut bytes = *self.bytes.get(self.at..).and_then(<[u8]>::first_chunk::<N>).ok_or(Missing::End)?;
+        self.at += N;
+        if big {
+            bytes.reverse();
+        }
+        Ok(bytes)
+    }
+
+    /// The next word of a text, which must be a number; words may stand on any lines.
+    fn number(&mut self) -> Result<f64, Missing> {
+        while let Some(&b) = self.bytes.get(self.at).filter(|b| b.is_ascii_whitespace()) {
+            // CR LF is one line end, counted at its second half.
+            let ends = b == b'\n' || (b == b'\r' && self.bytes.get(self.at + 1) != Some(&b'\n'));
+            self.line = self.line.saturating_add(u32::from(ends));
+            self.at += 1;
+        }
+        let rest = self.bytes.get(self.at..).filter(|rest| !rest.is_empty()).ok_or(Missing::End)?;
+        if let Some(plain) = number::plain(rest) {
+            self.at += plain.length;
+            self.places = self.places.max(plain.places);
+            return Ok(plain.value);
+        }
+        let length = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
+        let word = String::from_utf8_lossy(&rest[..length]);
+        let value = word.parse::<f64>().map_err(|_| Missing::Word(word.to_string()))?;
+        self.at += length;
+        Ok(value)
+    }
+
+    /// Passes over `count` values of a binary file, of `size` bytes each; whether there are so many.
+    fn skip(&mut self, count: u64, size: usize) -> bool {
+        let bytes = count.checked_mul(size as u64).filter(|&bytes| bytes <= self.left());
+        // As many bytes as there are in memory.
+        self.at += bytes.map_or(0, |bytes| bytes as usize);
+        bytes.is_some()
+    }
+
+    /// Passes over values that nobody asks for.
+    pub(super) fn pass(&mut self, count: u64, kind: Kind) -> Result<(), Missing> {
+        if self.encoding != Encoding::Text {
+            return if self.skip(count, kind.size()) { Ok(()) } else { Err(Missing::End) };
+        }
+        for _ in 0..count {
+            self.number()?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,242 @@
+//! Elements of a PLY file -> vertices and faces.
+
+use super::body::{Body, Missing};
+use super::header::{Element, Encoding, Header, Kind, Property};
+use crate::load::limits::Budget;
+use crate::load::obj::bare::{Bare, over_memory};
+use crate::load::paths::shorten;
+use crate::load::{Diagnostic, Source};
+use crate::math::{DVec2, DVec3, Vec3};
+
+/// Reads every element in the order of the file.
+///
+/// # Errors
+/// At the first value that is missing or makes no sense, or when memory would exceed the budget.
+pub(super) fn read(header: &Header, source: &Source, budget: &mut Budget) -> Result<Bare, Diagnostic> {
+    let body = Body::new(header, source);
+    let vertices = header.element("vertex").map_or(0, |element| element.count);
+    let mut reader = Reader { source, body, vertices, budget, bare: Bare::default() };
+    for element in &header.elements {
+        reader.element(element)?;
+    }
+    let Reader { body, mut bare, .. } = reader;
+    bare.places = (header.encoding == Encoding::Text).then_some(body.places);
+    bare.comments.clone_from(&header.comments);
+    Ok(bare)
+}
+
+/// Numbers of a vertex that have a meaning here.
+const SLOTS: [&[&str]; 12] = [
+    &["x"],
+    &["y"],
+    &["z"],
+    &["nx", "normal_x"],
+    &["ny", "normal_y"],
+    &["nz", "normal_z"],
+    &["u", "s", "texture_u", "texture_s"],
+    &["v", "t", "texture_v", "texture_t"],
+    &["red", "r", "diffuse_red"],
+    &["green", "g", "diffuse_green"],
+    &["blue", "b", "diffuse_blue"],
+    &["alpha", "a", "opacity", "diffuse_alpha"],
+];
+
+struct Reader<'a, 'b> {
+    source: &'a Source,
+    body: Body<'a>,
+    /// How many vertices the header claims; faces may come before them.
+    vertices: u64,
+    budget: &'b mut Budget,
+    bare: Bare,
+}
+
+impl Reader<'_, '_> {
+    fn element(&mut self, element: &Element) -> Result<(), Diagnostic> {
+        self.body.check_count(element)?;
+        let corners = element.properties.iter().position(|property| {
+            property.length.is_some() && matches!(property.name.as_str(), "vertex_indices" | "vertex_index")
+        });
+        match (element.name.as_str(), corners) {
+            ("vertex", _) if self.bare.positions.is_empty() => self.vertices(element),
+            ("face", Some(list)) => self.faces(element, list, false),
+            ("tristrips", Some(list)) => self.faces(element, list, true),
+            (name, _) => {
+                if name == "edge" {
+                    self.bare.points_and_lines = self.bare.points_and_lines.saturating_add(element.count);
+                }
+                // Without properties there is nothing to pass over, however many there are.
+                if element.properties.is_empty() { Ok(()) } else { self.pass(element) }
+            }
+        }
+    }
+
+    fn vertices(&mut self, element: &Element) -> Result<(), Diagnostic> {
+        if element.count > Bare::LARGEST {
+            let text = format!("{} vertices are more than {}", element.count, Bare::LARGEST);
+            return Err(self.body.fault(text, "split the file"));
+        }
+        let slot = |property: &Property| {
+            let name = property.name.as_str();
+            if property.length.is_some() { None } else { SLOTS.iter().position(|names| names.contains(&name)) }
+        };
+        let slots: Vec<Option<usize>> = element.properties.iter().map(slot).collect();
+        let has = |wanted: &[usize]| wanted.iter().all(|slot| slots.contains(&Some(*slot)));
+        if !has(&[0, 1, 2]) {
+            return Err(self.body.fault("vertices have no x, y and z", "export it again"));
+        }
+        let (has_normals, has_uvs, has_colors) = (has(&[3, 4, 5]), has(&[6, 7]), has(&[8, 9, 10]));
+        Bare::charge_vertices(self.budget, element.count).map_err(|over| over_memory(&self.source.path, over))?;
+
+        // The budget has room for so many, so memory has.
+        self.bare.positions.reserve_exact(element.count as usize);
+        for i in 0..element.count {
+            let mut values = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+            for (property, slot) in element.properties.iter().zip(&slots) {
+                match slot {
+                    Some(slot) => {
+                        let value = self.value(element, i, property)?;
+                        values[*slot] = if *slot < 8 { value } else { value / unit(property.kind) };
+                    }
+                    None => self.pass_property(element, i, property)?,
+                }
+            }
+            let [x, y, z, nx, ny, nz, u, v, color @ ..] = values;
+            self.bare.positions.push(DVec3::new(x, y, z));
+            if has_normals {
+                self.bare.normals.push(Vec3::new(nx as f32, ny as f32, nz as f32));
+            }
+            if has_uvs {
+                self.bare.uvs.push(DVec2::new(u, v));
+            }
+            if has_colors {
+                self.bare.colors.push(color.map(|c| c as f32));
+            }
+        }
+        Ok(())
+    }
+
+    /// Polygons, or strips of triangles.
+    fn faces(&mut self, element: &Element, list: usize, strips: bool) -> Result<(), Diagnostic> {
+        let mut corners = Vec::new();
+        for i in 0..element.count {
+            for (k, property) in element.properties.iter().enumerate() {
+                if k == list {
+                    self.corners(element, i, property, strips, &mut corners)?;
+                } else {
+                    self.pass_property(element, i, property)?;
+                }
+            }
+            if strips {
+                for strip in corners.split(|&corner| corner == RESTART) {
+                    self.strip(strip)?;
+                }
+            } else {
+                self.face(&corners)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads a list of vertices into `corners`.
+    fn corners(
+        &mut self,
+        element: &Element,
+        i: u64,
+        property: &Property,
+        strips: bool,
+        corners: &mut Vec<u32>,
+    ) -> Result<(), Diagnostic> {
+        corners.clear();
+        for k in 0..self.length(element, i, property)? {
+            let value = self.value(element, i, property)?;
+            if strips && value == -1.0 {
+                corners.push(RESTART);
+                continue;
+            }
+            // Below the number of vertices, which fits.
+            let is_there = value >= 0.0 && value < self.vertices as f64 && value.fract() == 0.0;
+            if !is_there {
+                let (name, vertices) = (shorten(&element.name), self.vertices);
+                let text = format!("corner {k} of {name} {i} is vertex {value}, but only {vertices} vertices exist");
+                return Err(self.body.fault(text, "it is damaged; export it again"));
+            }
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked just before")]
+            corners.push(value as u32);
+        }
+        Ok(())
+    }
+
+    fn strip(&mut self, strip: &[u32]) -> Result<(), Diagnostic> {
+        for (i, window) in strip.windows(3).enumerate() {
+            let &[a, b, c] = window else { continue };
+            // Two equal corners only turn the strip.
+            if a != b && b != c && c != a {
+                let [a, b] = if i % 2 == 0 { [a, b] } else { [b, a] };
+                self.face(&[a, b, c])?;
+            }
+        }
+        Ok(())
+    }
+
+    fn face(&mut self, corners: &[u32]) -> Result<(), Diagnostic> {
+        Bare::charge_face(self.budget, corners.len()).map_err(|over| over_memory(&self.source.path, over))?;
+        let most = self.bare.corners.len().max(self.bare.arities.len()) as u64 + corners.len() as u64;
+        if most > Bare::LARGEST {
+            let text = format!("more than {} faces or corners", Bare::LARGEST);
+            return Err(self.body.fault(text, "split the file"));
+        }
+        self.bare.face(corners);
+        Ok(())
+    }
+
+    fn value(&mut self, element: &Element, i: u64, property: &Property) -> Result<f64, Diagnostic> {
+        self.body.value(property.kind).map_err(|why| self.missing(&why, element, i, property))
+    }
+
+    /// How long a list is.
+    fn length(&mut self, element: &Element, i: u64, property: &Property) -> Result<u64, Diagnostic> {
+        let kind = property.length.unwrap_or(Kind::U8);
+        let value = self.body.value(kind).map_err(|why| self.missing(&why, element, i, property))?;
+        if value.fract() != 0.0 || !(0.0..=f64::from(u32::MAX)).contains(&value) {
+            let text = format!("{value} is no length of a list, in {}", named(element, i, property));
+            return Err(self.body.fault(text, "it is damaged; export it again"));
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked just before")]
+        Ok(value as u64)
+    }
+
+    fn missing(&self, why: &Missing, element: &Element, i: u64, property: &Property) -> Diagnostic {
+        self.body.missing(why, &named(element, i, property))
+    }
+
+    /// Passes over a whole element.
+    fn pass(&mut self, element: &Element) -> Result<(), Diagnostic> {
+        for i in 0..element.count {
+            for property in &element.properties {
+                self.pass_property(element, i, property)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn pass_property(&mut self, element: &Element, i: u64, property: &Property) -> Result<(), Diagnostic> {
+        let count = if property.length.is_some() { self.length(element, i, property)? } else { 1 };
+        self.body.pass(count, property.kind).map_err(|why| self.missing(&why, element, i, property))
+    }
+}
+
+/// Stands between two strips; more than there can be vertices.
+const RESTART: u32 = u32::MAX;
+
+/// What stands for full light.
+fn unit(kind: Kind) -> f64 {
+    match kind {
+        Kind::F32 | Kind::F64 => 1.0,
+        Kind::U16 => 65535.0,
+        _ => 255.0,
+    }
+}
+
+fn named(element: &Element, i: u64, property: &Property) -> String {
+    format!("`{}` of {} {i}", shorten(&property.name), shorten(&element.name))
+}

@@ -1,0 +1,237 @@
+//! The header of a PLY file: lines of words that end with `end_header`.
+
+use crate::load::Diagnostic;
+use crate::load::paths::shorten;
+use std::path::Path;
+
+/// How values are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Encoding {
+    Text,
+    LittleEndian,
+    BigEndian,
+}
+
+/// What kind of number a value is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl Kind {
+    /// Bytes in a binary file.
+    pub(super) fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+
+    /// Both families of names are in use.
+    fn of(word: &str) -> Option<Self> {
+        Some(match word {
+            "char" | "int8" => Self::I8,
+            "uchar" | "uint8" => Self::U8,
+            "short" | "int16" => Self::I16,
+            "ushort" | "uint16" => Self::U16,
+            "int" | "int32" => Self::I32,
+            "uint" | "uint32" => Self::U32,
+            "float" | "float32" => Self::F32,
+            "double" | "float64" => Self::F64,
+            _ => return None,
+        })
+    }
+}
+
+/// A named value of an element, or a list of them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Property {
+    pub name: String,
+    pub kind: Kind,
+    /// How the number of values in a list is written; `None`: one value.
+    pub length: Option<Kind>,
+}
+
+/// Things of one kind.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Element {
+    pub name: String,
+    /// As claimed; nothing has been looked at.
+    pub count: u64,
+    pub properties: Vec<Property>,
+}
+
+impl Element {
+    /// Bytes that one of it takes in the file at least.
+    pub(super) fn least(&self, encoding: Encoding) -> u64 {
+        let size = |property: &Property| match encoding {
+            // A digit; what follows it may be the end of the file.
+            Encoding::Text => 1,
+            _ => property.length.unwrap_or(property.kind).size() as u64,
+        };
+        self.properties.iter().map(size).sum()
+    }
+}
+
+/// What the header says.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Header {
+    pub encoding: Encoding,
+    pub elements: Vec<Element>,
+    /// Comments and object information, without those words.
+    pub comments: Vec<String>,
+    /// Bytes before the first value.
+    pub length: usize,
+    /// Lines before the first value.
+    pub lines: u32,
+}
+
+impl Header {
+    /// Reads the header.
+    ///
+    /// # Errors
+    /// At the first line that is not understood.
+    pub(super) fn read(bytes: &[u8], file: &Path) -> Result<Self, Diagnostic> {
+        let mut lines = Lines::new(bytes);
+        let mut parts = Parts { file, line: 1, encoding: None, elements: Vec::new(), comments: Vec::new() };
+        if lines.next().is_none_or(|line| line.trim_ascii() != b"ply") {
+            return Err(parts.fault("the file does not begin with a line `ply`", "name a PLY file"));
+        }
+        while let Some(line) = lines.next() {
+            parts.line = lines.count;
+            if parts.take(&String::from_utf8_lossy(line))? {
+                let Some(encoding) = parts.encoding else {
+                    return Err(parts.fault("the header has no line `format`", "export it again"));
+                };
+                let Parts { elements, comments, .. } = parts;
+                return Ok(Self { encoding, elements, comments, length: lines.at, lines: lines.count });
+            }
+        }
+        Err(parts.fault("the file ends inside the header, before `end_header`", "it was cut off; get it again"))
+    }
+
+    /// The element of a name.
+    pub(super) fn element(&self, name: &str) -> Option<&Element> {
+        self.elements.iter().find(|element| element.name == name)
+    }
+}
+
+/// Lines that all end as the first one does: in a binary file, what follows the last may look like half a line end.
+struct Lines<'a> {
+    bytes: &'a [u8],
+    end: &'static [u8],
+    at: usize,
+    count: u32,
+}
+
+impl<'a> Lines<'a> {
+    fn new(bytes: &'a [u8]) -> Self {
+        let first = bytes.iter().position(|b| matches!(b, b'\n' | b'\r')).unwrap_or(bytes.len());
+        let end: &[u8] = match &bytes[first..] {
+            [b'\r', b'\n', ..] => b"\r\n",
+            [b'\r', ..] => b"\r",
+            _ => b"\n",
+        };
+        Self { bytes, end, at: 0, count: 0 }
+    }
+
+    fn next(&mut self) -> Option<&'a [u8]> {
+        let rest = self.bytes.get(self.at..).filter(|rest| !rest.is_empty())?;
+        let length = rest.windows(self.end.len()).position(|w| w == self.end)?;
+        self.at += length + self.end.len();
+        self.count = self.count.saturating_add(1);
+        Some(&rest[..length])
+    }
+}
+
+/// A header in the making.
+struct Parts<'a> {
+    file: &'a Path,
+    line: u32,
+    encoding: Option<Encoding>,
+    elements: Vec<Element>,
+    comments: Vec<String>,
+}
+
+/// Comments that are kept: programs write theirs first.
+const COMMENTS: usize = 64;
+
+impl Parts<'_> {
+    fn fault(&self, text: impl Into<String>, remedy: &str) -> Diagnostic {
+        Diagnostic::new("ply-header", self.file, self.line.to_string(), text).remedy(remedy)
+    }
+
+    /// Takes one line; whether it was the last.
+    fn take(&mut self, line: &str) -> Result<bool, Diagnostic> {
+        let words: Vec<&str> = line.split_ascii_whitespace().collect();
+        match words[..] {
+            [] => {}
+            ["end_header", ..] => return Ok(true),
+            ["comment" | "obj_info", ..] => {
+                if let Some((_, said)) = line.trim().split_once(char::is_whitespace)
+                    && self.comments.len() < COMMENTS
+                {
+                    self.comments.push(said.trim().into());
+                }
+            }
+            ["format", name, _version] => self.encoding = Some(self.encoding(name)?),
+            ["element", name, count] => {
+                let count = count.parse().map_err(|_| {
+                    let text = format!("`{}` is no number of elements `{}`", shorten(count), shorten(name));
+                    self.fault(text, "export it again")
+                })?;
+                self.elements.push(Element { name: name.into(), count, properties: Vec::new() });
+            }
+            ["property", "list", length, kind, name] => {
+                let (length, kind) = (self.kind(length)?, self.kind(kind)?);
+                if matches!(length, Kind::F32 | Kind::F64) {
+                    return Err(self.fault("the length of a list is no whole number", "export it again"));
+                }
+                self.property(Property { name: name.into(), kind, length: Some(length) })?;
+            }
+            ["property", kind, name] => {
+                let kind = self.kind(kind)?;
+                self.property(Property { name: name.into(), kind, length: None })?;
+            }
+            _ => {
+                let text = format!("`{}` is no line of a PLY header", shorten(line.trim()));
+                return Err(self.fault(text, "export it again"));
+            }
+        }
+        Ok(false)
+    }
+
+    fn encoding(&self, name: &str) -> Result<Encoding, Diagnostic> {
+        Ok(match name {
+            "ascii" => Encoding::Text,
+            "binary_little_endian" => Encoding::LittleEndian,
+            "binary_big_endian" => Encoding::BigEndian,
+            _ => {
+                let known = "PLY has ascii, binary_little_endian and binary_big_endian";
+                return Err(self.fault(format!("`{}` is no format of PLY", shorten(name)), known));
+            }
+        })
+    }
+
+    fn kind(&self, word: &str) -> Result<Kind, Diagnostic> {
+        let known = "PLY has char, uchar, short, ushort, int, uint, float and double";
+        Kind::of(word).ok_or_else(|| self.fault(format!("`{}` is no type of PLY", shorten(word)), known))
+    }
+
+    fn property(&mut self, property: Property) -> Result<(), Diagnostic> {
+        let Some(element) = self.elements.last_mut() else {
+            return Err(self.fault("a property before the first element", "export it again"));
+        };
+        element.properties.push(property);
+        Ok(())
+    }
+}

@@ -1,0 +1,46 @@
+//! PLY, the Stanford triangle format (G. Turk, *The PLY Polygon File Format*, 1994) -> scene: text or binary in either
+//! byte order, geometry only.
+//!
+//! A header lists elements and their properties (`header`); their values follow in that order (`body`). Of these are
+//! read: of `vertex` the place (`x y z`), normal (`nx ny nz`), texture coordinates (`u v`, `s t`, `texture_u texture_v`)
+//! and colour (`red green blue alpha`); of `face` its `vertex_indices`; of `tristrips` the same, where −1 starts another
+//! strip. Everything else is passed over; edges are counted and not drawn.
+//!
+//! What the format leaves open is decided as for OBJ: colours are sRGB-coded, faces without normals flat, and every
+//! surface is seen from both sides. Colours of whole bytes are 0…255, floats 0…1.
+//!
+//! The reader is our own: the crates for PLY take memory by the counts that a header claims, or do not say where in the
+//! file a fault is.
+
+mod body;
+mod geometry;
+mod header;
+
+use super::limits::Budget;
+use super::obj::bare;
+use super::{LoadError, LoadOptions, Loaded, Source};
+use crate::scene::UpAxis;
+use header::{Encoding, Header};
+
+/// Loads a PLY file.
+///
+/// # Errors
+/// When the header is not understood, values are missing or are no numbers, or a face names a vertex that is not there:
+/// with the line, or in binary files the byte. A file without faces is an empty scene.
+pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
+    let mut budget = Budget::new(&options.limits);
+    let header = Header::read(&source.bytes, &source.path)?;
+    let bare = geometry::read(&header, source, &mut budget)?;
+    let format = match header.encoding {
+        Encoding::Text => "PLY (ascii)",
+        Encoding::LittleEndian => "PLY (binary, little-endian)",
+        Encoding::BigEndian => "PLY (binary, big-endian)",
+    };
+    let otherwise = (UpAxis::Y, "PLY does not say, and nothing speaks for +Z");
+    Ok(bare::load(bare, format, otherwise, source, options, budget))
+}
+
+#[cfg(test)]
+mod fuzz;
+#[cfg(test)]
+mod tests;

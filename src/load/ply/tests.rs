@@ -1,0 +1,263 @@
+//! Whole files, made in memory.
+
+use super::*;
+use crate::load::{Limits, Polygons};
+use crate::math::{Vec2, Vec3, Vec4};
+use crate::scene::AlphaMode;
+
+pub(super) fn of(bytes: &[u8], options: &LoadOptions) -> Result<Loaded, String> {
+    load(&Source { path: "a.ply".into(), bytes: bytes.to_vec() }, options).map_err(|e| e.to_string())
+}
+
+fn plain(bytes: &[u8]) -> Loaded {
+    of(bytes, &LoadOptions::default()).unwrap()
+}
+
+fn fault(bytes: &[u8]) -> String {
+    of(bytes, &LoadOptions::default()).unwrap_err()
+}
+
+/// Kinds of values and what they hold, which every encoding writes in its own way.
+enum Value {
+    Byte(u8),
+    Int(i32),
+    Float(f32),
+    Double(f64),
+}
+
+/// A file with this header behind the line `format`.
+fn encoded(format: &str, header: &str, values: &[Value]) -> Vec<u8> {
+    let mut out = format!("ply\nformat {format} 1.0\n{header}\nend_header\n").into_bytes();
+    for value in values {
+        match (format, value) {
+            ("ascii", Value::Byte(x)) => out.extend(format!("{x} ").bytes()),
+            ("ascii", Value::Int(x)) => out.extend(format!("{x}\n").bytes()),
+            ("ascii", Value::Float(x)) => out.extend(format!("{x} ").bytes()),
+            ("ascii", Value::Double(x)) => out.extend(format!("{x} ").bytes()),
+            ("binary_little_endian", Value::Int(x)) => out.extend(x.to_le_bytes()),
+            ("binary_little_endian", Value::Float(x)) => out.extend(x.to_le_bytes()),
+            ("binary_little_endian", Value::Double(x)) => out.extend(x.to_le_bytes()),
+            (_, Value::Byte(x)) => out.push(*x),
+            (_, Value::Int(x)) => out.extend(x.to_be_bytes()),
+            (_, Value::Float(x)) => out.extend(x.to_be_bytes()),
+            (_, Value::Double(x)) => out.extend(x.to_be_bytes()),
+        }
+    }
+    out
+}
+
+pub(super) const FORMATS: [&str; 3] = ["ascii", "binary_little_endian", "binary_big_endian"];
+
+/// A square of four vertices with everything that is read, some things that are not, and a triangle beside it.
+pub(super) fn square(format: &str) -> Vec<u8> {
+    let header = "comment made by hand\nelement vertex 5\nproperty float x\nproperty float y\nproperty double z\n\
+        property float nx\nproperty float ny\nproperty float nz\nproperty float s\nproperty float t\n\
+        property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha\nproperty int scanner\n\
+        element camera 1\nproperty list uchar float view\n\
+        element face 2\nproperty uchar quality\nproperty list uchar int vertex_indices\nproperty list uchar float wedge";
+    let mut values = Vec::new();
+    for (i, (x, y)) in [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (2.0, 0.5)].into_iter().enumerate() {
+        values.extend([x, y].map(Value::Float));
+        values.push(Value::Double(0.25));
+        values.extend([0.0, 0.0, 2.0, x / 2.0, y].map(Value::Float));
+        values.extend([255, 0, 51 * i as u8, 255].map(Value::Byte));
+        values.push(Value::Int(-7));
+    }
+    values.extend([Value::Byte(2), Value::Float(1.0), Value::Float(2.0)]);
+    values.extend([Value::Byte(9), Value::Byte(4)].into_iter().chain([0, 1, 2, 3].map(Value::Int)));
+    values.extend([Value::Byte(1), Value::Float(0.5)]);
+    values.extend([Value::Byte(9), Value::Byte(3)].into_iter().chain([1, 4, 2].map(Value::Int)));
+    values.push(Value::Byte(0));
+    encoded(format, header, &values)
+}
+
+#[test]
+fn every_encoding_gives_the_same_scene() {
+    let text = plain(&square("ascii"));
+    let mesh = &text.scene.meshes[0];
+    assert_eq!((text.facts.faces, mesh.triangles.len(), mesh.positions.len()), (2, 3, 5));
+    assert_eq!(mesh.normals, [Vec3::Z; 5]);
+    assert_eq!(mesh.uvs[0][2], Vec2::new(0.5, 0.0), "v points up in the file and down here");
+    assert_eq!(mesh.colors[0], Vec4::new(1.0, 0.0, 0.0, 1.0));
+    assert_eq!(text.facts.generator, "");
+    assert!(text.warnings.is_empty(), "{:?}", text.warnings);
+    let names = ["PLY (ascii)", "PLY (binary, little-endian)", "PLY (binary, big-endian)"];
+    for (format, name) in FORMATS.into_iter().zip(names) {
+        let loaded = plain(&square(format));
+        assert_eq!(loaded.facts.format, name);
+        assert_eq!(format!("{:?}", loaded.scene), format!("{:?}", text.scene), "{format}");
+    }
+}
+
+#[test]
+fn every_kind_of_number_is_read_in_either_byte_order() {
+    let bytes: [(&str, &[u8]); 8] = [
+        ("char", &[0xfe]),
+        ("uint8", &[3]),
+        ("short", &[0xff, 0xfe]),
+        ("ushort", &[0x80, 0]),
+        ("int32", &[0xff, 0xff, 0xff, 0xfd]),
+        ("uint", &[0x80, 0, 0, 0]),
+        ("float32", &[0x3f, 0, 0, 0]),
+        ("double", &[0x3f, 0xd0, 0, 0, 0, 0, 0, 0]),
+    ];
+    let expected = [-2.0, 3.0, -2.0, 32768.0, -3.0, 2_147_483_648.0, 0.5, 0.25];
+    for ((kind, big), expected) in bytes.into_iter().zip(expected) {
+        for format in &FORMATS[1..] {
+            let mut file = format!(
+                "ply\nformat {format} 1.0\nelement vertex 3\nproperty {kind} x\nproperty uchar y\nproperty uchar z\n\
+                 element face 1\nproperty list uchar uchar vertex_index\nend_header\n"
+            )
+            .into_bytes();
+            for yz in [[0, 0], [1, 0], [0, 1]] {
+                let little = big.iter().rev().copied();
+                file.extend::<Vec<u8>>(if *format == FORMATS[2] { big.to_vec() } else { little.collect() });
+                file.extend(yz);
+            }
+            file.extend([3, 0, 1, 2]);
+            let loaded = plain(&file);
+            let at = loaded.scene.instances[0].world_from_object.translation;
+            let x = (loaded.scene.meshes[0].positions[0].as_dvec3() + at).x;
+            assert_eq!(x, expected, "{kind} {format}");
+        }
+    }
+}
+
+const TRIANGLE: &str = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+    element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+
+fn text(body: &str) -> Vec<u8> {
+    format!("ply\nformat ascii 1.0\n{TRIANGLE}{body}").into_bytes()
+}
+
+#[test]
+fn words_may_stand_on_any_lines_and_lines_end_anyhow() {
+    let expected = format!("{:?}", plain(&text("0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")).scene);
+    let windows = String::from_utf8(text("0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")).unwrap().replace('\n', "\r\n");
+    let old_mac = windows.replace("\r\n", "\r");
+    for file in [text("0 0 0 1 0 0\n\n0 1\n0 3 0 1 2"), windows.into(), old_mac.into()] {
+        assert_eq!(format!("{:?}", plain(&file).scene), expected);
+    }
+    // A comment in no encoding that we know is still a comment.
+    let mut file = b"ply\nformat ascii 1.0\ncomment caf\xe9\n".to_vec();
+    file.extend(text("0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n").split_off("ply\nformat ascii 1.0\n".len()));
+    assert_eq!(format!("{:?}", plain(&file).scene), expected);
+}
+
+#[test]
+fn polygons_are_cut_or_kept_whole_as_those_of_obj() {
+    let options = LoadOptions { polygons: Polygons::Whole, ..LoadOptions::default() };
+    let whole = of(&square("ascii"), &options).unwrap();
+    assert_eq!((whole.scene.meshes[0].polygons.len(), whole.scene.meshes[0].triangles.len()), (1, 1));
+}
+
+#[test]
+fn strips_turn_at_every_triangle_and_start_anew_at_minus_one() {
+    let file = "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n\
+        element tristrips 1\nproperty list int int vertex_indices\nend_header\n\
+        0 0 0\n1 0 0\n0 1 0\n1 1 0\n2 1 0\n9 0 1 2 3 3 -1 1 4 3\n";
+    let loaded = plain(file.as_bytes());
+    assert_eq!(loaded.scene.meshes[0].triangles, [[0, 1, 2], [2, 1, 3], [1, 4, 3]]);
+    let up = loaded.scene.meshes[0].triangles.iter().all(|t| {
+        let [a, b, c] = t.map(|i| loaded.scene.meshes[0].positions[i as usize]);
+        (b - a).cross(c - a).z > 0.0
+    });
+    assert!(up, "every triangle is seen from the same side");
+}
+
+#[test]
+fn opacity_of_vertices_is_drawn_and_an_empty_channel_is_not() {
+    let file = |alphas: [f32; 3]| {
+        let vertex = |a: f32, at: &str| format!("{at} 1 1 1 {a}\n");
+        let [a, b, c] = alphas;
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+             property float red\nproperty float green\nproperty float blue\nproperty float alpha\n\
+             element face 1\nproperty list uchar int vertex_indices\nend_header\n{}{}{}3 0 1 2\n",
+            vertex(a, "0 0 0"),
+            vertex(b, "1 0 0"),
+            vertex(c, "0 1 0")
+        )
+    };
+    let see_through = plain(file([1.0, 0.5, 0.0]).as_bytes()).scene;
+    assert_eq!(see_through.meshes[0].colors.iter().map(|c| c.w).collect::<Vec<_>>(), [1.0, 0.5, 0.0]);
+    assert_eq!(see_through.materials[0].alpha_mode, AlphaMode::Blend);
+    for alphas in [[1.0; 3], [0.0; 3]] {
+        let scene = plain(file(alphas).as_bytes()).scene;
+        assert!(scene.meshes[0].colors.is_empty(), "white and opaque");
+        assert_eq!(scene.materials[0].alpha_mode, AlphaMode::Opaque);
+    }
+}
+
+#[test]
+fn what_cannot_be_drawn_is_counted() {
+    let file = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+        element edge 2\nproperty int vertex1\nproperty int vertex2\n\
+        element face 4\nproperty list uchar int vertex_indices\nend_header\n\
+        0 0 0\n1 0 0\nnan 1 0\n0 1\n1 2\n2 0 1\n3 0 1 2\n3 0 0 1\n0\n";
+    let loaded = plain(file.as_bytes());
+    assert_eq!((loaded.facts.faces, loaded.facts.points_and_lines), (0, 2));
+    let mut codes: Vec<_> = loaded.warnings.iter().map(|w| (w.code, w.count)).collect();
+    codes.sort_unstable();
+    let expected = [("face-degenerate", 1), ("face-few-corners", 2), ("face-not-finite", 1), ("points-and-lines", 1)];
+    assert_eq!(codes, expected);
+    let dropped: u64 = loaded.facts.dropped.iter().map(|d| d.1).sum();
+    assert_eq!(dropped, 4);
+
+    let cloud = plain(
+        b"ply\nformat ascii 1.0\nelement vertex 1\nproperty int x\nproperty int y\nproperty int z\nend_header\n1 2 3",
+    );
+    assert!(cloud.scene.meshes.is_empty());
+    assert_eq!(cloud.warnings[0].to_string(), "a.ply: 1 vertices and no face: there is nothing to draw");
+}
+
+#[test]
+fn faults_name_the_line_or_the_byte() {
+    let header = |line: &str| format!("ply\nformat ascii 1.0\n{line}\nend_header\n").into_bytes();
+    let expected: [(Vec<u8>, &str); 14] = [
+        (b"ply\n".to_vec(), "a.ply:1: the file ends inside the header, before `end_header`"),
+        (b"plywood\n".to_vec(), "a.ply:1: the file does not begin with a line `ply`"),
+        (b"ply\nend_header\n".to_vec(), "a.ply:2: the header has no line `format`"),
+        (b"ply\nformat utf8 1.0\nend_header\n".to_vec(), "a.ply:2: `utf8` is no format of PLY"),
+        (header("element vertex many"), "a.ply:3: `many` is no number of elements `vertex`"),
+        (header("property float x"), "a.ply:3: a property before the first element"),
+        (header("element vertex 1\nproperty half x"), "a.ply:4: `half` is no type of PLY"),
+        (header("element face 1\nproperty list float int vertex_index"), "a.ply:4: the length of a list"),
+        (header("elephant"), "a.ply:3: `elephant` is no line of a PLY header"),
+        (
+            header("element vertex 1\nproperty float x"),
+            "a.ply:6: the header claims 1 × `vertex` of at least 1 bytes, but 0",
+        ),
+        (header("element vertex 0\nproperty float x"), "a.ply:6: vertices have no x, y and z"),
+        (text("0 0 0\n1 zero 0\n0 1 0\n3 0 1 2\n"), "a.ply:11: `zero` is no number, in `y` of vertex 1"),
+        (text("0 0 0\n1 0 0\n0 1 0\n3 0 1\n"), "a.ply:14: the file ends before `vertex_indices` of face 0"),
+        (text("0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"), "a.ply:13: corner 2 of face 0 is vertex 3, but only 3 vertices exist"),
+    ];
+    for (file, message) in expected {
+        let fault = fault(&file);
+        assert!(fault.starts_with(message) && fault.lines().count() == 1, "{fault}\n{message}");
+    }
+    let mut binary = square(FORMATS[1]);
+    let length = binary.len();
+    binary.truncate(length - 1);
+    let cut = fault(&binary);
+    assert!(cut.starts_with(&format!("a.ply:byte {}: the file ends before `wedge` of face 1", length - 1)), "{cut}");
+}
+
+#[test]
+fn counts_in_a_header_take_no_memory() {
+    let claims = |line: &str| format!("ply\nformat binary_little_endian 1.0\nelement {line}\nend_header\nabcd");
+    // Nothing to read however often: nothing happens.
+    assert!(of(claims("thing 18446744073709551615").as_bytes(), &LoadOptions::default()).is_ok());
+    for line in [
+        "vertex 18446744073709551615\nproperty float x\nproperty float y\nproperty float z",
+        "vertex 4000000000\nproperty double x\nproperty double y\nproperty double z",
+        "face 1\nproperty list uint int vertex_indices",
+        "thing 18446744073709551615\nproperty list uchar int what",
+    ] {
+        assert!(fault(claims(line).as_bytes()).starts_with("a.ply:byte"), "{line}");
+    }
+    let small = LoadOptions { limits: Limits { memory: 500, ..Limits::default() }, ..LoadOptions::default() };
+    let over = of(&square("ascii"), &small).unwrap_err();
+    assert_eq!(over, "a.ply: 960 bytes are needed where 500 of 500 are left; raise --max-memory");
+}

@@ -1,0 +1,55 @@
+//! Binary STL: 80 bytes of anything, the number of triangles, and 50 bytes for each.
+
+use super::Triangles;
+use crate::load::obj::bare::Bare;
+use crate::load::{Diagnostic, Source};
+use crate::math::DVec3;
+
+/// Bytes before the first triangle.
+const HEADER: usize = 84;
+
+/// Bytes of a triangle: a normal, three places, and two bytes of attributes.
+const TRIANGLE: usize = 50;
+
+/// How many triangles the header claims.
+fn claimed(bytes: &[u8]) -> Option<u64> {
+    let count = bytes.get(80..HEADER)?.first_chunk::<4>()?;
+    Some(u64::from(u32::from_le_bytes(*count)))
+}
+
+/// Whether the file is as long as a binary STL of so many triangles: hardly anything else is.
+pub(in crate::load) fn is_exact(bytes: &[u8]) -> bool {
+    claimed(bytes).is_some_and(|count| HEADER as u64 + count * TRIANGLE as u64 == bytes.len() as u64)
+}
+
+/// Reads every triangle.
+///
+/// # Errors
+/// When there are fewer than the header claims. What follows them is not looked at.
+pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnostic> {
+    let bytes = source.bytes.as_slice();
+    let fault = |at: usize, text: String| {
+        let fault = Diagnostic::new("stl-cut-off", &source.path, format!("byte {at}"), text);
+        fault.remedy("it was cut off; get it again")
+    };
+    let count = claimed(bytes)
+        .ok_or_else(|| fault(bytes.len(), format!("the file ends inside its header of {HEADER} bytes")))?;
+    let records = bytes[HEADER..].as_chunks::<TRIANGLE>().0;
+    if (records.len() as u64) < count {
+        let text = format!("the header claims {count} triangles, but only {} are there", records.len());
+        return Err(fault(HEADER + records.len() * TRIANGLE, text));
+    }
+    // As many as there are in memory.
+    for record in &records[..count as usize] {
+        let number = |k: usize| {
+            let bytes = [record[k], record[k + 1], record[k + 2], record[k + 3]];
+            f64::from(f32::from_le_bytes(bytes))
+        };
+        let place = |k: usize| DVec3::new(number(k), number(k + 4), number(k + 8));
+        out.add([place(12), place(24), place(36)])?;
+    }
+    let mut bare = out.bare;
+    let said = String::from_utf8_lossy(&bytes[..80]);
+    bare.comments.push(said.trim_matches(|c: char| c.is_control() || c.is_whitespace()).into());
+    Ok(bare)
+}

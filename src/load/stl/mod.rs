@@ -1,0 +1,96 @@
+//! STL, the format of stereolithography (3D Systems, 1988) -> scene: triangles as text or in binary, geometry only.
+//!
+//! Every triangle brings places of its own; those that are equal bit for bit become one vertex, so that faces are
+//! connected. Surfaces are flat: the normal that the file gives for a facet says nothing that its corners do not, and is
+//! often wrong, so that it is not read; nor are the two bytes of attributes, which mean something else in every program.
+//!
+//! The reader is our own: crates for STL take a binary file that begins with `solid` for text, and do not say where in the
+//! file a fault is.
+
+mod binary;
+mod text;
+
+use super::limits::Budget;
+use super::obj::bare::{self, Bare, over_memory};
+use super::{Diagnostic, LoadError, LoadOptions, Loaded, Source};
+use crate::math::DVec3;
+use crate::scene::UpAxis;
+use std::collections::HashMap;
+use std::path::Path;
+
+pub(super) use binary::is_exact;
+
+/// How triangles are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    /// As words.
+    Text,
+    /// As records of 50 bytes.
+    Binary,
+}
+
+/// Loads an STL file.
+///
+/// # Errors
+/// When the text is not understood, or a binary file holds fewer triangles than it says: with the line or byte. A file
+/// without triangles is an empty scene.
+pub fn load(source: &Source, encoding: Encoding, options: &LoadOptions) -> Result<Loaded, LoadError> {
+    let mut budget = Budget::new(&options.limits);
+    let triangles = Triangles { file: &source.path, budget: &mut budget, bare: Bare::default(), known: HashMap::new() };
+    let (bare, format) = match encoding {
+        Encoding::Text => (text::read(source, triangles)?, "STL (ascii)"),
+        Encoding::Binary => (binary::read(source, triangles)?, "STL (binary)"),
+    };
+    // Layers are built upwards along z.
+    let otherwise = (UpAxis::Z, "STL does not say; what is made to be printed stands on the xy plane");
+    Ok(bare::load(bare, format, otherwise, source, options, budget))
+}
+
+/// Triangles one after another, whose equal places become one vertex.
+struct Triangles<'a> {
+    file: &'a Path,
+    budget: &'a mut Budget,
+    bare: Bare,
+    /// Vertices by the bits of their places.
+    known: HashMap<[u64; 3], u32>,
+}
+
+impl Triangles<'_> {
+    /// Bytes that a vertex takes in the table, which is never less than half full once it has grown.
+    const KNOWN: u64 = 2 * 40;
+
+    fn add(&mut self, corners: [DVec3; 3]) -> Result<(), Diagnostic> {
+        Bare::charge_face(self.budget, 3).map_err(|over| over_memory(self.file, over))?;
+        let mut numbers = [0; 3];
+        for (number, place) in numbers.iter_mut().zip(corners) {
+            *number = self.vertex(place)?;
+        }
+        self.bare.face(&numbers);
+        Ok(())
+    }
+
+    fn vertex(&mut self, place: DVec3) -> Result<u32, Diagnostic> {
+        // Adding 0 makes one zero of two.
+        let key = place.to_array().map(|x| (x + 0.0).to_bits());
+        if let Some(&number) = self.known.get(&key) {
+            return Ok(number);
+        }
+        let taken = Bare::charge_vertices(self.budget, 1).and_then(|()| self.budget.take(1, Self::KNOWN));
+        taken.map_err(|over| over_memory(self.file, over))?;
+        let number = self.bare.positions.len();
+        if number as u64 >= Bare::LARGEST {
+            let text = format!("more than {} vertices", Bare::LARGEST);
+            return Err(Diagnostic::new("stl-too-large", self.file, "", text).remedy("split the file"));
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "checked just before")]
+        let number = number as u32;
+        self.known.insert(key, number);
+        self.bare.positions.push(place);
+        Ok(number)
+    }
+}
+
+#[cfg(test)]
+mod fuzz;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,139 @@
+//! Whole files, made in memory.
+
+use super::*;
+use crate::load::{Limits, load_bytes};
+use crate::math::Vec3;
+use crate::scene::UpAxis;
+
+/// A tetrahedron above the xy plane: four triangles on four places.
+const CORNERS: [[[f32; 3]; 3]; 4] = {
+    let [a, b, c, d] = [[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.5]];
+    [[a, c, b], [a, b, d], [b, c, d], [c, a, d]]
+};
+
+pub(super) fn binary(header: &str) -> Vec<u8> {
+    let mut out = header.as_bytes().to_vec();
+    out.resize(80, 0);
+    out.extend(4u32.to_le_bytes());
+    for corners in CORNERS {
+        // A normal that is wrong, as many are, and attributes.
+        out.extend([9f32, f32::NAN, 0.0].iter().flat_map(|x| x.to_le_bytes()));
+        out.extend(corners.iter().flatten().flat_map(|x| x.to_le_bytes()));
+        out.extend([0x12, 0x34]);
+    }
+    out
+}
+
+pub(super) fn text() -> String {
+    let mut out = "solid tetra of ours\n".to_owned();
+    for corners in CORNERS {
+        out += " facet normal nan 0 0\n  outer loop\n";
+        out.extend(corners.iter().map(|[x, y, z]| format!("   vertex {x:e} {y} {z:.3}\n")));
+        out += "  endloop\n endfacet\n";
+    }
+    out + "endsolid tetra of ours\n"
+}
+
+pub(super) fn of(bytes: &[u8], options: &LoadOptions) -> Result<Loaded, String> {
+    load_bytes(Path::new("a.stl"), bytes.to_vec(), options).map_err(|e| e.to_string())
+}
+
+fn plain(bytes: &[u8]) -> Loaded {
+    of(bytes, &LoadOptions::default()).unwrap()
+}
+
+fn fault(bytes: &[u8]) -> String {
+    of(bytes, &LoadOptions::default()).unwrap_err()
+}
+
+#[test]
+fn text_and_binary_give_the_same_scene() {
+    let (ascii, bytes) = (plain(text().as_bytes()), plain(&binary("a tetrahedron")));
+    assert_eq!((ascii.facts.format.as_str(), bytes.facts.format.as_str()), ("STL (ascii)", "STL (binary)"));
+    assert_eq!(format!("{:?}", ascii.scene), format!("{:?}", bytes.scene));
+    let mesh = &bytes.scene.meshes[0];
+    assert_eq!((mesh.positions.len(), mesh.triangles.len(), bytes.facts.faces), (4, 4, 4), "equal places are one");
+    assert!(mesh.normals.is_empty(), "flat");
+    assert!(bytes.warnings.is_empty(), "{:?}", bytes.warnings);
+    assert_eq!(bytes.scene.up, UpAxis::Z);
+}
+
+#[test]
+fn a_binary_file_may_call_itself_solid() {
+    let loaded = plain(&binary("solid facet\nexported from a program"));
+    assert_eq!((loaded.facts.format.as_str(), loaded.facts.faces), ("STL (binary)", 4));
+    assert!(loaded.facts.generator.contains("exported from"), "{}", loaded.facts.generator);
+}
+
+#[test]
+fn keywords_come_in_any_case_on_any_lines_in_several_solids() {
+    let shouted = text().to_uppercase().replace("  ", "\t");
+    let in_a_row = text().replace("loop\n", "loop ").replace('\n', "\r\n");
+    let split = text().replacen(" endfacet\n", " endfacet\nendsolid\nsolid second\n", 1);
+    let expected = format!("{:?}", plain(text().as_bytes()).scene);
+    for file in [shouted, in_a_row, split, text().replace("endsolid tetra of ours\n", "")] {
+        assert_eq!(format!("{:?}", plain(file.as_bytes()).scene), expected, "{file}");
+    }
+}
+
+#[test]
+fn both_zeros_are_one_place_and_near_places_are_two() {
+    let facet =
+        |x: &str| format!("facet normal 0 0 1 outer loop vertex {x} 0 0 vertex 1 0 0 vertex 0 1 0 endloop endfacet\n");
+    let file = format!("solid\n{}{}{}endsolid", facet("0"), facet("-0"), facet("1e-30"));
+    let loaded = plain(file.as_bytes());
+    assert_eq!(loaded.scene.meshes[0].positions.len(), 4);
+    assert_eq!(loaded.scene.meshes[0].triangles[0], loaded.scene.meshes[0].triangles[1]);
+}
+
+#[test]
+fn a_wish_for_an_axis_counts() {
+    let options = LoadOptions { up: Some(UpAxis::Y), ..LoadOptions::default() };
+    let loaded = of(&binary(""), &options).unwrap();
+    assert_eq!((loaded.scene.up, loaded.facts.up_reason), (UpAxis::Y, None));
+    assert!(plain(&binary("")).facts.up_reason.is_some());
+}
+
+#[test]
+fn faults_name_the_line_or_the_byte() {
+    let whole = binary("");
+    let cut = fault(&whole[..whole.len() - 1]);
+    assert!(cut.starts_with("a.stl:byte 234: the header claims 4 triangles, but only 3 are there"), "{cut}");
+    let header = fault(&whole[..50]);
+    assert!(header.starts_with("a.stl:byte 50: the file ends inside its header of 84 bytes"), "{header}");
+    let expected = [
+        (text().replacen("vertex", "vortex", 1), "a.stl:4: `vortex` where `vertex` should be"),
+        (text().replacen("1.500", "tall", 1), "a.stl:13: `tall` where a number should be"),
+        (text()[..100].to_owned(), "a.stl:6: the file ends where `vertex` should follow"),
+        (text().replacen("solid", "solid x\nliquid", 1), "a.stl:2: `liquid` where `solid`, `facet` or `endsolid`"),
+        ("solid\nfacet normal 0 0 1\nouter".into(), "a.stl:3: the file ends where `loop` should follow"),
+    ];
+    for (file, message) in expected {
+        let fault = fault(file.as_bytes());
+        assert!(fault.starts_with(message) && fault.lines().count() == 1, "{fault}\n{message}");
+    }
+}
+
+#[test]
+fn what_is_beyond_the_last_triangle_is_not_looked_at() {
+    let mut longer = binary("");
+    longer.extend(b"a footer");
+    assert_eq!(plain(&longer).facts.faces, 4);
+    assert!(plain(b"solid nothing\nendsolid nothing\n").scene.meshes.is_empty());
+}
+
+#[test]
+fn a_count_takes_no_memory() {
+    let mut huge = binary("");
+    huge[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
+    assert!(fault(&huge).contains("claims 4294967295 triangles, but only 4"));
+    let small = LoadOptions { limits: Limits { memory: 500, ..Limits::default() }, ..LoadOptions::default() };
+    assert!(of(&binary(""), &small).unwrap_err().ends_with("raise --max-memory"));
+}
+
+#[test]
+fn coordinates_that_are_not_finite_drop_their_faces() {
+    let loaded = plain(text().replace("1.500", "nan").as_bytes());
+    assert_eq!((loaded.facts.faces, loaded.warnings[0].code, loaded.warnings[0].count), (1, "face-not-finite", 3));
+    assert!(loaded.scene.meshes[0].positions.iter().all(|p: &Vec3| p.is_finite()));
+}

@@ -1,0 +1,121 @@
+//! STL as text: `solid`, then for each triangle `facet normal x y z`, `outer loop`, three times `vertex x y z`, `endloop`,
+//! `endfacet`; at the end `endsolid`. There may be several solids.
+//!
+//! Words may stand on any lines and in any case, as programs write them.
+
+use super::Triangles;
+use crate::load::obj::bare::Bare;
+use crate::load::obj::number;
+use crate::load::paths::shorten;
+use crate::load::{Diagnostic, Source};
+use crate::math::DVec3;
+use std::path::Path;
+
+/// Reads every triangle.
+///
+/// # Errors
+/// At the first word that is out of place, with its line. A solid without its end is whole all the same.
+pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnostic> {
+    let mut words = Words { file: &source.path, bytes: &source.bytes, at: 0, line: 1, places: 0 };
+    // A byte-order mark.
+    words.at = if source.bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
+    let mut names = Vec::new();
+    while let Some(word) = words.next() {
+        if is(word, "solid") {
+            let name = words.rest_of_line();
+            if names.is_empty() && !name.is_empty() {
+                names.push(name);
+            }
+        } else if is(word, "facet") {
+            out.add(facet(&mut words)?)?;
+        } else if is(word, "endsolid") {
+            words.rest_of_line();
+        } else {
+            return Err(words.fault(word, "`solid`, `facet` or `endsolid`"));
+        }
+    }
+    let mut bare = out.bare;
+    bare.places = Some(words.places);
+    bare.comments = names;
+    Ok(bare)
+}
+
+/// The three places of a facet; its normal may be anything.
+fn facet(words: &mut Words) -> Result<[DVec3; 3], Diagnostic> {
+    words.expect("normal")?;
+    for _ in 0..3 {
+        words.next();
+    }
+    words.expect("outer")?;
+    words.expect("loop")?;
+    let mut corners = [DVec3::ZERO; 3];
+    for corner in &mut corners {
+        words.expect("vertex")?;
+        *corner = DVec3::new(words.number()?, words.number()?, words.number()?);
+    }
+    words.expect("endloop")?;
+    words.expect("endfacet")?;
+    Ok(corners)
+}
+
+/// Whether a word is this keyword, in any case.
+fn is(word: &[u8], keyword: &str) -> bool {
+    word.eq_ignore_ascii_case(keyword.as_bytes())
+}
+
+struct Words<'a> {
+    file: &'a Path,
+    bytes: &'a [u8],
+    at: usize,
+    /// Of the word read last.
+    line: u32,
+    /// Decimal places of the finest number.
+    places: i32,
+}
+
+impl<'a> Words<'a> {
+    fn next(&mut self) -> Option<&'a [u8]> {
+        while let Some(&b) = self.bytes.get(self.at).filter(|b| b.is_ascii_whitespace()) {
+            // CR LF is one line end, counted at its second half.
+            let ends = b == b'\n' || (b == b'\r' && self.bytes.get(self.at + 1) != Some(&b'\n'));
+            self.line = self.line.saturating_add(u32::from(ends));
+            self.at += 1;
+        }
+        let rest = &self.bytes[self.at..];
+        let length = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
+        self.at += length;
+        Some(&rest[..length]).filter(|word| !word.is_empty())
+    }
+
+    /// The name of a solid, which may be of any words.
+    fn rest_of_line(&mut self) -> String {
+        let rest = &self.bytes[self.at..];
+        let length = rest.iter().position(|b| matches!(b, b'\n' | b'\r')).unwrap_or(rest.len());
+        self.at += length;
+        String::from_utf8_lossy(rest[..length].trim_ascii()).into_owned()
+    }
+
+    fn fault(&self, word: &[u8], expected: &str) -> Diagnostic {
+        let text = match word {
+            [] => format!("the file ends where {expected} should follow"),
+            word => format!("`{}` where {expected} should be", shorten(&String::from_utf8_lossy(word))),
+        };
+        let remedy = if word.is_empty() { "it was cut off; get it again" } else { "it is damaged; export it again" };
+        Diagnostic::new("stl-syntax", self.file, self.line.to_string(), text).remedy(remedy)
+    }
+
+    fn expect(&mut self, keyword: &str) -> Result<(), Diagnostic> {
+        let word = self.next().unwrap_or_default();
+        if is(word, keyword) { Ok(()) } else { Err(self.fault(word, &format!("`{keyword}`"))) }
+    }
+
+    fn number(&mut self) -> Result<f64, Diagnostic> {
+        let word = self.next().unwrap_or_default();
+        if let Some(plain) = number::plain(word) {
+            self.places = self.places.max(plain.places);
+            return Ok(plain.value);
+        }
+        let value = std::str::from_utf8(word).ok().and_then(|word| word.parse::<f64>().ok());
+        value.ok_or_else(|| self.fault(word, "a number"))
+    }
+}
