@@ -10,6 +10,7 @@ mod glb;
 mod metal;
 mod picture;
 mod shape;
+mod sky;
 mod still_life;
 mod textured;
 
@@ -27,6 +28,7 @@ fn main() -> io::Result<()> {
         ("animated.glb", animated::model()),
         ("gear.stl", bare::gear()),
         ("football.ply", bare::football()),
+        ("evening.hdr", sky::evening()),
     ];
     for (name, bytes) in models {
         let path = folder.join(name);
