@@ -1,9 +1,10 @@
-//! Every model and broken file that others made, in one process: loads, renders small, and stays sane.
+//! Every model and broken file that others made, in one process: loads, renders small, stays sane, and looks as it did.
 //!
 //! Runs only when `MESHRAY_SHARED` names the folder that holds `models/`; it says how many files it saw, what they were
 //! warned about and what was refused.
 
 use crate::common::still;
+use crate::golden::sheet::Sheet;
 use meshray::accel::AccelKind;
 use meshray::image::Picture;
 use meshray::load::{LoadError, LoadOptions, Loaded, load};
@@ -31,8 +32,8 @@ const THIN: &[(&str, &str)] = &[
 
 /// What became of one file.
 enum Outcome {
-    /// A picture: its coverage (0 … 1) and the warnings.
-    Drawn { coverage: f64, warnings: Vec<String> },
+    /// A picture and the warnings.
+    Drawn { picture: Box<Picture>, warnings: Vec<String> },
     /// It holds nothing to draw, and says so.
     Empty,
     /// Refused with this message.
@@ -47,13 +48,15 @@ fn shared_models_are_drawn() {
     let mut files = find(&folder);
     files.retain(|f| !f.starts_with(folder.join("invalid")));
     let (mut drawn, mut warned, mut empty, mut refused) = (0, 0, 0, 0);
-    let mut failures = Vec::new();
+    let (mut failures, mut sheet) = (Vec::new(), Sheet::default());
     for file in &files {
         let name = file.strip_prefix(&folder).unwrap_or(file).display().to_string();
         let start = Instant::now();
         match try_file(file) {
-            Outcome::Drawn { coverage, warnings } => {
+            Outcome::Drawn { picture, warnings } => {
                 drawn += 1;
+                sheet.add(&name, &picture);
+                let coverage = coverage(&picture);
                 warned += usize::from(!warnings.is_empty());
                 println!("{name}: {:.0} % covered, {:.0?}", coverage * 100.0, start.elapsed());
                 warnings.iter().for_each(|w| println!("    {w}"));
@@ -79,6 +82,7 @@ fn shared_models_are_drawn() {
         }
     }
     println!("{} models: {drawn} drawn, {warned} of them warned, {empty} empty, {refused} refused", files.len());
+    failures.extend(sheet.faults());
     assert!(drawn > 0, "no models under {}", folder.display());
     assert!(failures.is_empty(), "{} models fail:\n{}", failures.len(), failures.join("\n"));
 }
@@ -163,7 +167,7 @@ fn find(folder: &Path) -> Vec<PathBuf> {
             let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
             if path.is_dir() {
                 folders.push(path);
-            } else if ["gltf", "glb", "obj"].contains(&extension.as_str()) {
+            } else if ["gltf", "glb", "obj", "ply", "stl"].contains(&extension.as_str()) {
                 found.push(path);
             }
         }
@@ -200,7 +204,7 @@ fn draw(path: &Path) -> Outcome {
         return Outcome::Broken("a pixel is not a number".into());
     }
     let warnings = loaded.warnings.iter().map(ToString::to_string).collect();
-    Outcome::Drawn { coverage: coverage(&picture), warnings }
+    Outcome::Drawn { picture: Box::new(picture), warnings }
 }
 
 /// Part of the pixels where a surface is seen, however transparent it is.

@@ -9,6 +9,7 @@
 //! run again without it.
 
 mod pictures;
+pub mod sheet;
 
 use crate::common::root;
 use meshray::image::diff::{Space, compare, side_by_side};
