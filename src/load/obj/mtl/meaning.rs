@@ -12,13 +12,15 @@
 use super::parse::{Mtl, Slot};
 use crate::load::{Diagnostic, MtlMode, Warnings};
 use crate::math::Vec3;
-use crate::scene::{AlphaMode, Material, MetalRough, Phong, Surface};
+use crate::scene::{AlphaMode, Coat, Grain, Material, MetalRough, Phong, Sheen, Surface};
 use std::path::Path;
 
 /// Diffuse colour of a material that gives none: that of [`Material::plain`].
 const NO_DIFFUSE: f32 = 0.6;
 /// Exponent of a highlight whose width nobody gave: that of a satin finish.
 const NO_SHININESS: f64 = 32.0;
+/// Roughness of the fibres of cloth.
+const SHEEN_ROUGHNESS: f32 = 0.3;
 /// Index of refraction of glass nobody gave one for.
 const NO_IOR: f64 = 1.5;
 
@@ -253,9 +255,41 @@ impl Meaning<'_> {
             ior: if ior > 1.0 { ior } else { number(NO_IOR) },
             transmission: passed.max_element(),
             thick: glass,
+            sheen: self.sheen().map(Box::new),
+            coat: self.coat().map(Box::new),
+            grain: self.grain().map(Box::new),
             ..MetalRough::default()
         }
     }
+
+    /// `Ps`: white fibres. No field tells their roughness.
+    fn sheen(&self) -> Option<Sheen> {
+        let strength = share(self.mtl.ps)?;
+        Some(Sheen { color: Vec3::splat(strength), color_map: None, roughness: SHEEN_ROUGHNESS, roughness_map: None })
+    }
+
+    /// `Pc`, `Pcr`.
+    fn coat(&self) -> Option<Coat> {
+        Some(Coat {
+            strength: share(self.mtl.pc)?,
+            strength_map: None,
+            roughness: share(self.mtl.pcr).unwrap_or(0.0),
+            roughness_map: None,
+            normal_map: None,
+            normal_scale: 1.0,
+        })
+    }
+
+    /// `aniso`, `anisor`.
+    fn grain(&self) -> Option<Grain> {
+        let rotation = self.mtl.anisor.map_or(0.0, |turns| number(turns.rem_euclid(1.0) * std::f64::consts::TAU));
+        Some(Grain { strength: share(self.mtl.aniso)?, rotation, map: None })
+    }
+}
+
+/// A share of at most 1; `None` where nothing of it is there.
+fn share(of: Option<f64>) -> Option<f32> {
+    of.map(|x| number(x.clamp(0.0, 1.0))).filter(|x| *x > 0.0)
 }
 
 /// A colour, never negative.
@@ -413,5 +447,18 @@ mod tests {
     fn illum_0_is_constant_only_literally() {
         assert!(matches!(literal("Kd 1\nillum 0").surface, Surface::Unlit));
         assert_eq!(guess("Kd 1\nillum 0").1, ["mtl-constant"]);
+    }
+
+    #[test]
+    fn sheen_clear_coat_and_anisotropy_are_drawn() {
+        let (material, warnings) = guess("Kd 1 1 1\nPr 0.2\nPs 0.4\nPc 0.5\nPcr 0.6\naniso 0.7\nanisor 0.25");
+        let Surface::MetalRough(m) = &material.surface else { panic!("physically based") };
+        let (sheen, coat, grain) = (m.sheen.as_ref().unwrap(), m.coat.as_ref().unwrap(), m.grain.as_ref().unwrap());
+        assert_eq!((sheen.color, coat.strength, coat.roughness), (Vec3::splat(0.4), 0.5, 0.6));
+        assert_eq!((grain.strength, grain.rotation), (0.7, std::f32::consts::FRAC_PI_2));
+        assert!(warnings.is_empty(), "{warnings:?}");
+        let (plain, _) = guess("Pr 0.2\nPs 0\nPc 0\nPcr 0.03\naniso 0\nanisor 0");
+        let Surface::MetalRough(m) = &plain.surface else { panic!("physically based") };
+        assert!(!m.has_lobes(), "exporters write zeros for what a material does not have");
     }
 }

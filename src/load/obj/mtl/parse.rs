@@ -28,7 +28,13 @@ pub(super) struct Mtl {
     pub illum: Option<i32>,
     pub pr: Option<f64>,
     pub pm: Option<f64>,
-    /// Fields of physically based materials that are not drawn: sheen, clear coat, anisotropy.
+    /// Sheen, clear coat and its roughness, anisotropy and its rotation (1: once around).
+    pub ps: Option<f64>,
+    pub pc: Option<f64>,
+    pub pcr: Option<f64>,
+    pub aniso: Option<f64>,
+    pub anisor: Option<f64>,
+    /// What is known and not drawn.
     pub unsupported: Vec<(u32, &'static str)>,
     pub maps: Vec<(Slot, Map)>,
 }
@@ -73,12 +79,7 @@ const MAPS: [(&[u8], Slot); 17] = [
 ];
 
 /// Fields and maps that are known and not drawn.
-const UNSUPPORTED: [(&[u8], &str); 16] = [
-    (b"ps", "sheen (Ps)"),
-    (b"pc", "clear coat (Pc)"),
-    (b"pcr", "clear coat (Pcr)"),
-    (b"aniso", "anisotropy (aniso)"),
-    (b"anisor", "anisotropy (anisor)"),
+const UNSUPPORTED: [(&[u8], &str); 11] = [
     (b"map_ps", "sheen (map_Ps)"),
     (b"map_pc", "clear coat (map_Pc)"),
     (b"map_pcr", "clear coat (map_Pcr)"),
@@ -105,7 +106,7 @@ impl Mtl {
     /// roughness or metal and does not count.
     pub(super) fn is_physical(&self) -> bool {
         let of_pbr = |what: &str| ["sheen", "clear", "aniso", "a packed"].iter().any(|start| what.starts_with(start));
-        self.pr.or(self.pm).is_some()
+        [self.pr, self.pm, self.ps, self.pc, self.pcr, self.aniso, self.anisor].iter().any(Option::is_some)
             || [Slot::Roughness, Slot::Metallic, Slot::OcclusionRoughMetal].iter().any(|&s| self.map(s).is_some())
             || self.unsupported.iter().any(|(_, what)| of_pbr(what))
     }
@@ -154,6 +155,11 @@ impl Parser<'_> {
             b"illum" => m.illum = self.number(rest).map(|n| n as i32).or(m.illum),
             b"pr" => m.pr = self.number(rest).or(m.pr),
             b"pm" => m.pm = self.number(rest).or(m.pm),
+            b"ps" => m.ps = self.number(rest).or(m.ps),
+            b"pc" => m.pc = self.number(rest).or(m.pc),
+            b"pcr" => m.pcr = self.number(rest).or(m.pcr),
+            b"aniso" => m.aniso = self.number(rest).or(m.aniso),
+            b"anisor" => m.anisor = self.number(rest).or(m.anisor),
             _ if SILENT.contains(&word) => {}
             _ => self.map_or_unknown(m, word, rest),
         }
@@ -254,7 +260,7 @@ mod tests {
     #[test]
     fn what_cannot_be_read_or_drawn_is_a_counted_warning_and_nothing_else() {
         let text = "Kd 9 9 9\nnewmtl a\nKd spectral x.rfl 1\nKs xyz 0.9505 1 1.089\nNs x\nd -halo 0.5\nmap_Kd\nfoo 1\nfoo 2\n\
-                    refl -type sphere a.png\nPs 0\nPc 0.5\nmap_Ks -type cube_top a.png";
+                    refl -type sphere a.png\nmap_Ps 0\nmap_Pc a.png\nmap_Ks -type cube_top a.png";
         let (materials, warnings) = of(text);
         let m = &materials[0];
         assert_eq!((m.kd, m.ns, m.d), (None, None, Some(0.5)));
