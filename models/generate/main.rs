@@ -28,7 +28,7 @@ fn main() -> io::Result<()> {
         ("animated.glb", animated::model()),
         ("gear.stl", bare::gear()),
         ("football.ply", bare::football()),
-        ("evening.hdr", sky::evening()),
+        ("evening.hdr", sky::evening()?),
     ];
     for (name, bytes) in models {
         let path = folder.join(name);

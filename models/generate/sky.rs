@@ -4,6 +4,7 @@ use glam::Vec3;
 use image::Rgb;
 use image::codecs::hdr::HdrEncoder;
 use std::f32::consts::PI;
+use std::io;
 
 const WIDTH: u16 = 256;
 const HEIGHT: u16 = 128;
@@ -12,7 +13,7 @@ const HEIGHT: u16 = 128;
 const SUN: f32 = 0.0185;
 
 /// The panorama as a Radiance HDR file.
-pub(crate) fn evening() -> Vec<u8> {
+pub(crate) fn evening() -> io::Result<Vec<u8>> {
     let texel = |y, x| {
         let color = mean_around(f32::from(x), f32::from(y));
         Rgb(color.to_array())
@@ -20,8 +21,8 @@ pub(crate) fn evening() -> Vec<u8> {
     let texels: Vec<Rgb<f32>> = (0..HEIGHT).flat_map(|y| (0..WIDTH).map(move |x| texel(y, x))).collect();
     let mut file = Vec::new();
     let encoded = HdrEncoder::new(&mut file).encode(&texels, WIDTH.into(), HEIGHT.into());
-    encoded.expect("writing to memory does not fail, and the picture has a size");
-    file
+    encoded.map_err(io::Error::other)?;
+    Ok(file)
 }
 
 /// Mean of a few points in a texel, so that the sun keeps its light.

@@ -86,22 +86,27 @@ impl Arounds {
         let seen = point.surface.seen();
         let lobe = point.matter.gloss().map(|roughness| Way::Lobe(roughness * roughness));
         let light = context.sky.is_map().then_some(Way::Light);
-        let ways: Vec<Way> = [Some(Way::Cosine), lobe, light].into_iter().flatten().collect();
+        let ways = [Some(Way::Cosine), lobe, light];
+        let count = 1 + u32::from(lobe.is_some()) + u32::from(light.is_some());
         let half = context.env_rays.div_ceil(2);
+        let view = View::new(seen.normal, seen.view);
         let mut draws = Draws::at(context.seed, point.ray, point.hit);
         for _ in 0..2 {
             let spread = draws.spread();
             for k in 0..half {
-                let dir = ways[k as usize % ways.len()].draw(spread.point(k), &context.sky, seen.normal, seen.view);
-                let density = |(i, way): (usize, &Way)| {
-                    let count = half / ways.len() as u32 + u32::from((i as u32) < half % ways.len() as u32);
-                    count as f32 * way.density(dir, &context.sky, seen.normal, seen.view)
+                let Some(way) = ways.iter().flatten().nth((k % count) as usize) else { continue };
+                let dir = way.draw(spread.point(k), &context.sky, &view);
+                if dir.dot(seen.geometric) <= 0.0 {
+                    self.shares.push(Vec3::ZERO);
+                    continue;
+                }
+                let (radiance, drawn) = context.sky.drawn(dir);
+                let density = |(i, way): (u32, &Way)| {
+                    let rays = half / count + u32::from(i < half % count);
+                    rays as f32 * way.density(dir, drawn, &view)
                 };
-                let density: f32 = ways.iter().enumerate().map(density).sum();
-                let shown = match dir.dot(seen.geometric) > 0.0 && density > 0.0 {
-                    true => point.matter.lit_around(&seen, dir, context.sky.drawn(dir), context.scene.ambient),
-                    false => Vec3::ZERO,
-                };
+                let density: f32 = (0..).zip(ways.iter().flatten()).map(density).sum();
+                let shown = point.matter.lit_around(&seen, dir, radiance, context.scene.ambient);
                 let share = shown * point.weight / (2.0 * density);
                 let share = if share.is_finite() { share } else { Vec3::ZERO };
                 if share.max_element() > 0.0 {
@@ -149,37 +154,52 @@ fn let_through(open: Vec3, sent: [Vec3; 2], come: [Vec3; 2]) -> Vec3 {
     corrected(0, 1) + corrected(1, 0)
 }
 
+/// The frame that directions are drawn in.
+struct View {
+    normal: Vec3,
+    tangent: Vec3,
+    bitangent: Vec3,
+    view: Vec3,
+}
+
+impl View {
+    fn new(normal: Vec3, view: Vec3) -> Self {
+        let (tangent, bitangent) = normal.any_orthonormal_pair();
+        Self { normal, tangent, bitangent, view }
+    }
+}
+
 impl Way {
-    fn draw(self, at: [f32; 2], sky: &Sky, normal: Vec3, view: Vec3) -> Vec3 {
+    fn draw(self, at: [f32; 2], sky: &Sky, view: &View) -> Vec3 {
         let around = |cosine: f32| {
-            let (tangent, bitangent) = normal.any_orthonormal_pair();
             let (sin, cos) = libm::sincosf(2.0 * PI * at[1]);
-            normal * cosine + (tangent * cos + bitangent * sin) * (1.0 - cosine * cosine).max(0.0).sqrt()
+            let ring = (1.0 - cosine * cosine).max(0.0).sqrt();
+            view.normal * cosine + (view.tangent * cos + view.bitangent * sin) * ring
         };
         match self {
             Self::Cosine => around((1.0 - at[0]).sqrt()),
             Self::Lobe(alpha) => {
                 let slope_squared = alpha * alpha * at[0] / (1.0 - at[0]);
-                reflect(-view, around(1.0 / (1.0 + slope_squared).sqrt()))
+                reflect(-view.view, around(1.0 / (1.0 + slope_squared).sqrt()))
             }
-            Self::Light => sky.draw(at).unwrap_or(normal),
+            Self::Light => sky.draw(at).unwrap_or(view.normal),
         }
     }
 
-    /// 1/sr.
-    fn density(self, dir: Vec3, sky: &Sky, normal: Vec3, view: Vec3) -> f32 {
+    /// 1/sr; `light` is that of drawing by the light of the sky.
+    fn density(self, dir: Vec3, light: f32, view: &View) -> f32 {
         match self {
-            Self::Cosine => normal.dot(dir).max(0.0) / PI,
+            Self::Cosine => view.normal.dot(dir).max(0.0) / PI,
             Self::Lobe(alpha) => {
-                let half = (view + dir).normalize_or(normal);
-                let (cosine, toward) = (half.dot(normal), half.dot(view));
+                let half = (view.view + dir).normalize_or(view.normal);
+                let (cosine, toward) = (half.dot(view.normal), half.dot(view.view));
                 if cosine <= 0.0 || toward <= 0.0 {
                     return 0.0;
                 }
                 let f = cosine * cosine * (alpha * alpha - 1.0) + 1.0;
                 alpha * alpha / (PI * f * f) * cosine / (4.0 * toward)
             }
-            Self::Light => sky.density(dir),
+            Self::Light => light,
         }
     }
 }
@@ -221,15 +241,15 @@ mod tests {
     fn drawn_directions_have_the_density_they_are_said_to_have() {
         let sky = Sky::new(&Scene { environment: Environment::Constant(Vec3::ONE), ..Scene::default() });
         let normal = Vec3::new(0.3, -0.5, 0.8).normalize();
-        let view = Vec3::new(0.1, -0.2, 1.0).normalize();
+        let view = View::new(normal, Vec3::new(0.1, -0.2, 1.0).normalize());
         // ∫ (N·L)² over the hemisphere is 2π/3.
         for way in [Way::Cosine, Way::Lobe(0.5), Way::Lobe(0.9)] {
             let n = 40_000u16;
             let mut sum = 0.0;
             for k in 0..n {
                 let at = [(f32::from(k) + 0.5) / f32::from(n), (f32::from(k) * 0.618_034).fract()];
-                let dir = way.draw(at, &sky, normal, view);
-                let density = way.density(dir, &sky, normal, view);
+                let dir = way.draw(at, &sky, &view);
+                let density = way.density(dir, 0.0, &view);
                 if density > 0.0 {
                     sum += f64::from(normal.dot(dir).max(0.0).powi(2) / density);
                 }

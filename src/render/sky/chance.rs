@@ -60,11 +60,12 @@ impl Chance {
         Self { level, rows, columns, densities }
     }
 
-    /// Radiance of the texel that a direction in the panorama's frame lies in: what its density was made of. Mixed with its
-    /// neighbours a sun would shine where it is hardly ever drawn.
-    pub(super) fn radiance(&self, dir: Vec3) -> Vec3 {
+    /// Radiance of the texel that a direction in the panorama's frame lies in, and the density of drawing that direction,
+    /// 1/sr. Mixed with its neighbours a sun would shine where it is hardly ever drawn.
+    pub(super) fn look(&self, dir: Vec3) -> (Vec3, f32) {
         let (column, row) = self.level.nearest(dir);
-        self.level.texel(column, row)
+        let density = self.densities[row as usize * self.level.width as usize + column as usize];
+        (self.level.texel(column, row), density)
     }
 
     /// The direction of two numbers from 0 … 1, in the panorama's frame.
@@ -78,12 +79,6 @@ impl Chance {
         let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
         let (sin, cos) = libm::sincosf(((column as f32 + right) / width as f32 - 0.5) * 2.0 * PI);
         Vec3::new(sine * cos, cosine, sine * sin)
-    }
-
-    /// The density of a direction in the panorama's frame, 1/sr.
-    pub(super) fn density(&self, dir: Vec3) -> f32 {
-        let (column, row) = self.level.nearest(dir);
-        self.densities[row as usize * self.level.width as usize + column as usize]
     }
 }
 

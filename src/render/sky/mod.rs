@@ -106,14 +106,9 @@ impl Sky {
         self.map.as_ref().map(|map| self.to_world(map, map.chance.draw(at)))
     }
 
-    /// The density of that draw, 1/sr.
-    fn density(&self, dir: Vec3) -> f32 {
-        self.map.as_ref().map_or(0.0, |map| map.chance.density(self.to_map(map, dir)))
-    }
-
-    /// Radiance as [`Self::draw`] and [`Self::density`] know it.
-    fn drawn(&self, dir: Vec3) -> Vec3 {
-        self.map.as_ref().map_or_else(|| self.radiance(dir, 0.0), |map| map.chance.radiance(self.to_map(map, dir)))
+    /// Radiance as [`Self::draw`] knows it, and the density of drawing this direction, 1/sr.
+    fn drawn(&self, dir: Vec3) -> (Vec3, f32) {
+        self.map.as_ref().map_or_else(|| (self.radiance(dir, 0.0), 0.0), |map| map.chance.look(self.to_map(map, dir)))
     }
 
     fn to_map(&self, map: &Map, dir: Vec3) -> Vec3 {
@@ -176,7 +171,7 @@ mod tests {
         let part = |i: u16| (f32::from(i) + 0.5) / f32::from(n);
         let whole: f32 = (0..n)
             .map(|i| sky.draw([part(i), (f32::from(i) * 0.618_034).fract()]).expect("a map is drawn from"))
-            .map(|dir| 1.0 / sky.density(dir) / f32::from(n))
+            .map(|dir| 1.0 / sky.drawn(dir).1 / f32::from(n))
             .sum();
         assert!((whole / (4.0 * std::f32::consts::PI) - 1.0).abs() < 0.02, "{whole}");
     }

@@ -4,16 +4,24 @@ use crate::math::Vec3;
 use crate::scene::Panorama;
 use rayon::prelude::*;
 use std::f32::consts::PI;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 /// Lookups that make up a rough lobe.
-const LOOKUPS: u16 = 32;
+const LOOKUPS: usize = 32;
 
 /// Columns and rows of the table of diffuse light.
 const DIFFUSE: (u32, u32) = (64, 32);
 
-/// The golden ratio's inverse: turns that never meet.
-const GOLDEN: f32 = 0.618_034;
+/// Slopes along two axes of facets that stand for equal shares of a GGX distribution of width 1.
+static PATTERN: LazyLock<[[f32; 2]; LOOKUPS]> = LazyLock::new(|| {
+    /// The golden ratio's inverse: turns that never meet.
+    const GOLDEN: f32 = 0.618_034;
+    std::array::from_fn(|k| {
+        let part = (k as f32 + 0.5) / LOOKUPS as f32;
+        let (sin, cos) = libm::sincosf(2.0 * PI * (k as f32 * GOLDEN).fract());
+        [cos, sin].map(|axis| axis * (part / (1.0 - part)).sqrt())
+    })
+});
 
 /// The levels of a panorama, each half as large as the one before.
 #[derive(Clone, Debug)]
@@ -62,8 +70,9 @@ impl Pyramid {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the levels there are")]
         let fine = level as usize;
         let part = level - fine as f32;
-        let sharp = self.levels[fine].along(dir);
-        if part == 0.0 { sharp } else { sharp.lerp(self.levels[(fine + 1).min(last)].along(dir), part) }
+        let at = coordinates(dir);
+        let sharp = self.levels[fine].at(at);
+        if part == 0.0 { sharp } else { sharp.lerp(self.levels[(fine + 1).min(last)].at(at), part) }
     }
 
     /// Mean radiance in the lobe of a rough mirror that sends the view along `dir`, seen along its own normal.
@@ -78,12 +87,9 @@ impl Pyramid {
         }
         let (tangent, bitangent) = dir.any_orthonormal_pair();
         let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
-        for k in 0..LOOKUPS {
-            let u = (f32::from(k) + 0.5) / f32::from(LOOKUPS);
-            let slope = alpha * (u / (1.0 - u)).sqrt();
-            let (sin, cos) = libm::sincosf(2.0 * PI * (f32::from(k) * GOLDEN).fract());
-            let half = (dir + (tangent * cos + bitangent * sin) * slope).normalize();
-            let cosine = half.dot(dir);
+        for [x, y] in PATTERN.iter().map(|slopes| slopes.map(|slope| slope * alpha)) {
+            let cosine = 1.0 / (1.0 + x * x + y * y).sqrt();
+            let half = (dir + tangent * x + bitangent * y) * cosine;
             let light = half * (2.0 * cosine) - dir;
             let weight = light.dot(dir);
             if weight <= 0.0 {
@@ -92,7 +98,7 @@ impl Pyramid {
             // Each stands for an equal share of the lobe: as much of the sphere as the distribution is thin there.
             let f = cosine * cosine * (alpha * alpha - 1.0) + 1.0;
             let density = alpha * alpha / (PI * f * f) / 4.0;
-            let area = 1.0 / (f32::from(LOOKUPS) * density);
+            let area = 1.0 / (LOOKUPS as f32 * density);
             sum += self.radiance(light, area.sqrt()) * weight;
             weights += weight;
         }
@@ -101,7 +107,7 @@ impl Pyramid {
 
     /// Cosine-weighted mean radiance around a normal.
     pub(super) fn diffuse(&self, normal: Vec3) -> Vec3 {
-        self.diffuse.along(normal)
+        self.diffuse.at(coordinates(normal))
     }
 
     /// The table of diffuse light: sums over a copy of its own size.
@@ -124,6 +130,13 @@ impl Pyramid {
     }
 }
 
+/// Where a direction is in a panorama: 0 … 1 once around, and 0 … 1 from the zenith down.
+fn coordinates(dir: Vec3) -> (f32, f32) {
+    let around = libm::atan2f(dir.z, dir.x) / (2.0 * PI) + 0.5;
+    let down = libm::atan2f((dir.x * dir.x + dir.z * dir.z).sqrt(), dir.y) / PI;
+    (around, down)
+}
+
 impl Level {
     /// Degrees of arc, in radians, that a texel is high.
     pub(super) fn angle(&self) -> f32 {
@@ -143,17 +156,11 @@ impl Level {
         self.texels.get(i).map_or(Vec3::ZERO, |&texel| Vec3::from(texel))
     }
 
-    /// Coordinates of a direction: 0 … width and 0 … height.
-    pub(super) fn coordinates(&self, dir: Vec3) -> (f32, f32) {
-        let around = libm::atan2f(dir.z, dir.x) / (2.0 * PI) + 0.5;
-        let down = libm::atan2f((dir.x * dir.x + dir.z * dir.z).sqrt(), dir.y) / PI;
-        (around * self.width as f32, down * self.height as f32)
-    }
-
     /// The texel that a direction lies in.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the texels there are")]
     pub(super) fn nearest(&self, dir: Vec3) -> (u32, u32) {
-        let (x, y) = self.coordinates(dir);
+        let (x, y) = coordinates(dir);
+        let (x, y) = (x * self.width as f32, y * self.height as f32);
         ((x as u32).min(self.width - 1), (y as u32).min(self.height - 1))
     }
 
@@ -170,10 +177,10 @@ impl Level {
         (0..self.height).flat_map(row)
     }
 
-    /// Between the four nearest texels.
-    fn along(&self, dir: Vec3) -> Vec3 {
-        let (x, y) = self.coordinates(dir);
-        let (x, y) = (x - 0.5, (y - 0.5).clamp(0.0, (self.height - 1) as f32));
+    /// Between the four nearest texels of a place, both its coordinates 0 … 1.
+    fn at(&self, (x, y): (f32, f32)) -> Vec3 {
+        let (x, y) = (x * self.width as f32 - 0.5, y * self.height as f32 - 0.5);
+        let y = y.clamp(0.0, (self.height - 1) as f32);
         let (left, top) = (x.floor(), y.floor());
         #[expect(clippy::cast_possible_truncation, reason = "a column or one beyond")]
         let column = |k: i32| (left as i32 + k).rem_euclid(self.width.cast_signed()).cast_unsigned();
@@ -241,8 +248,8 @@ mod tests {
     fn coordinates_and_directions_are_each_others_inverse() {
         let grid = Level { width: 64, height: 32, texels: Arc::default() };
         for (_, dir) in grid.middles() {
-            let (x, y) = grid.coordinates(dir);
-            assert!((grid.direction(x, y) - dir).length() < 1e-5, "{dir}");
+            let (x, y) = coordinates(dir);
+            assert!((grid.direction(x * 64.0, y * 32.0) - dir).length() < 1e-5, "{dir}");
         }
     }
 
@@ -283,7 +290,7 @@ mod tests {
                     let cosine = f64::from(dir.dot(mirror)).max(0.0);
                     let f = 0.5 * (1.0 + cosine) * (alpha2 - 1.0) + 1.0;
                     let weight = alpha2 / (f * f) * cosine * f64::from(grid.area(row));
-                    sum += weight * f64::from(sky.levels[0].along(dir).x);
+                    sum += weight * f64::from(sky.levels[0].at(coordinates(dir)).x);
                     weights += weight;
                 }
                 let error = (f64::from(sky.blurred(mirror, roughness).x) * weights / sum - 1.0).abs();
