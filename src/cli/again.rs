@@ -153,9 +153,7 @@ impl Facts<'_> {
             None => {}
         }
         settings.env_rays.iter().for_each(|n| set("env-rays", n.to_string()));
-        if settings.gloss_rays > 0 {
-            set("gloss-rays", settings.gloss_rays.to_string());
-        }
+        settings.gloss_rays.iter().for_each(|n| set("gloss-rays", n.to_string()));
         self.job.look.light_rays.iter().for_each(|n| set("light-rays", n.to_string()));
         self.job.look.sun_size.iter().for_each(|size| set("sun-size", size.to_string()));
         set("tone-map", output.tone_map.name().into());

@@ -130,7 +130,7 @@ pub(super) struct Look {
     /// Rays to it from each point.
     pub env_rays: Option<u32>,
     /// Rays that rough surfaces spread.
-    pub gloss_rays: u32,
+    pub gloss_rays: Option<u32>,
     /// Shadow rays to each wide light.
     pub light_rays: Option<u32>,
     /// How wide directional lights look, degrees.
@@ -371,7 +371,7 @@ fn look(args: &RenderArgs) -> Look {
         env: args.env.clone(),
         env_rotate: args.env_rotate.unwrap_or(0.0),
         env_rays: args.env_rays,
-        gloss_rays: args.gloss_rays.unwrap_or(0),
+        gloss_rays: args.gloss_rays,
         light_rays: args.light_rays,
         sun_size: args.sun_size,
         tone_map: args.tone_map,

@@ -38,7 +38,7 @@ pub(super) fn exposure(scene: &Scene, job: &Job, effective: &Effective) -> Optio
         samples: 4,
         layers: true,
         env_rays: Some(0),
-        gloss_rays: 0,
+        gloss_rays: Some(0),
         everything: false,
         ..effective.settings.clone()
     };

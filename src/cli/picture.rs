@@ -154,7 +154,7 @@ mod tests {
             env: None,
             env_rotate: 0.0,
             env_rays: None,
-            gloss_rays: 0,
+            gloss_rays: None,
             light_rays: None,
             sun_size: None,
             tone_map: None,

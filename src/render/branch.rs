@@ -4,7 +4,7 @@ use super::context::Context;
 use super::draws::{Draws, Spread};
 use super::observer::Observer;
 use super::optics::{dispersed_index, reflect, refract};
-use super::shade::{Balance, Lobe, Matter, above};
+use super::shade::{Balance, Lobe, Matter, above, has_inside, lets_light_in};
 use super::surface::Surface;
 use super::wave::{Crossing, Medium, Path, RayClass};
 use super::whitted::Tracer;
@@ -53,13 +53,29 @@ impl Point<'_> {
 struct Rough {
     lobe: Lobe,
     rays: u32,
+    /// Whether light that other facets stop goes on through those.
+    glass: bool,
     spread: Spread,
+}
+
+impl Rough {
+    /// `to`, or where glass sends what runs into its surface again: to the side of `normal` after all.
+    fn beyond(&self, normal: Vec3, to: Vec3) -> Vec3 {
+        if self.glass { above(to, normal) } else { to }
+    }
+
+    /// Share of what a facet sends from `to` to `view` that others leave.
+    fn kept(&self, view: Vec3, to: Vec3) -> f32 {
+        if self.glass { 1.0 } else { self.lobe.kept(view, to) }
+    }
 }
 
 impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     /// Queues the secondary rays of a point that have enough weight.
     pub(super) fn reflect_and_refract(&mut self, point: &Point, crossing: &Crossing) {
-        if let Some(lobe) = point.matter.lobe(point.surface) {
+        // A volume that bends nothing is clear however rough its surface is.
+        let bends = crossing.n_i != crossing.n_t || !has_inside(point.surface.target.material);
+        if let Some(lobe) = point.matter.lobe(point.surface).filter(|_| bends) {
             return self.spread(point, crossing, lobe);
         }
         let balance = point.balance(crossing);
@@ -84,15 +100,15 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
 
     /// Spreads rays over what a rough surface mirrors and lets through: several off the first, one off what those find.
     fn spread(&mut self, point: &Point, crossing: &Crossing, lobe: Lobe) {
-        let rays = if point.path.depth == 0 { self.context.gloss_rays } else { 1 };
-        let mut draws = Draws::at(self.context.seed, point.ray, point.hit);
-        let (outward, inward) = (draws.spread(), draws.spread());
-        let mut rough = Rough { lobe, rays, spread: outward };
+        let rays = if point.path.depth == 0 { self.context.gloss.rays } else { 1 };
+        // The same facets mirror and let through, so that nothing is lost between both.
+        let spread = Draws::at(self.context.seed, point.ray, point.hit).spread();
+        let glass = lets_light_in(point.surface.target.material);
+        let mut rough = Rough { lobe, rays, glass, spread };
         self.send_lacquer(point);
         for k in 0..rays {
             self.send_off_facet(point, crossing, &rough, k);
         }
-        rough.spread = inward;
         if !self.splits(point) {
             (0..rays).for_each(|k| self.send_through_facet(point, crossing, &rough, k, point.path.band, Vec3::ONE));
             return;
@@ -109,9 +125,9 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let (surface, view) = (point.surface, point.surface.view);
         let facet = rough.lobe.facet(view, rough.spread.point(k));
         let share = point.matter.balance(view.dot(facet), crossing).reflected;
-        let to = reflect(-view, facet);
+        let to = rough.beyond(surface.normal, reflect(-view, facet));
         if surface.normal.dot(to) > 0.0 {
-            let weight = point.path.weight * share * (rough.lobe.kept(view, to) / rough.rays as f32);
+            let weight = point.path.weight * share * (rough.kept(view, to) / rough.rays as f32);
             self.send_spread(point, above(to, surface.geometric), RayClass::Reflected, rough, |path| Path {
                 weight,
                 ..path
@@ -143,8 +159,8 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         } else {
             refract(-view, facet, n_i, n_t)
         };
-        let Some(to) = bent.filter(|to| surface.normal.dot(*to) < 0.0) else { return };
-        let weight = point.path.weight * share * color * (rough.lobe.kept(view, to) / rough.rays as f32);
+        let Some(to) = bent.map(|to| rough.beyond(-surface.normal, to)) else { return };
+        let weight = point.path.weight * share * color * (rough.kept(view, to) / rough.rays as f32);
         let media = crossing.beyond;
         let straight = point.path.straight && crossing.n_i == crossing.n_t;
         self.send_spread(point, above(to, -surface.geometric), RayClass::Refracted, rough, |path| Path {

@@ -2,7 +2,7 @@
 
 use super::Settings;
 use super::absorption::Absorption;
-use super::shade::{Band, LocalLight, bands};
+use super::shade::{Band, LocalLight, bands, lets_light_in};
 use super::sky::Sky;
 use super::strip::Uniform;
 use super::texture::TextureStore;
@@ -37,7 +37,7 @@ pub(crate) struct Context<'a> {
     /// Shadow rays to each wide light; at least 1.
     pub light_rays: u32,
     /// Rays that rough surfaces spread.
-    pub gloss_rays: u32,
+    pub gloss: Gloss,
     /// For every random choice.
     pub seed: u64,
     /// Whether nothing is seen but lights, and what shines by itself.
@@ -50,15 +50,37 @@ pub(crate) struct Context<'a> {
     pub everything: bool,
 }
 
+/// Which rough surfaces spread how many rays.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Gloss {
+    pub rays: u32,
+    /// Whether all do, or only what lets light through.
+    all: bool,
+}
+
+impl Gloss {
+    fn new(asked: Option<u32>) -> Self {
+        /// Rays through frosted glass, when nobody says.
+        const GLASS: u32 = 4;
+        Self { rays: asked.unwrap_or(GLASS), all: asked.is_some_and(|rays| rays > 0) }
+    }
+
+    /// Whether a material spreads rays where it is rough.
+    pub(crate) fn spreads(self, material: &Material) -> bool {
+        self.all || self.rays > 0 && lets_light_in(material)
+    }
+}
+
 impl<'a> Context<'a> {
     pub(crate) fn new(scene: &'a Scene, world: &'a World, textures: &'a TextureStore<'a>, settings: &Settings) -> Self {
         let everything = settings.everything;
         let features = Features::of(scene);
-        let depth = settings.depth.unwrap_or_else(|| auto_depth(&features, settings.gloss_rays > 0));
+        let gloss = Gloss::new(settings.gloss_rays);
+        let depth = settings.depth.unwrap_or_else(|| auto_depth(&features, gloss.all));
         let sky = Sky::new(scene);
         let env_rays = settings.env_rays.unwrap_or(if sky.is_map() { ENV_RAYS } else { 0 });
         let wide = scene.lights.iter().any(Light::is_wide);
-        let alone = everything || settings.layers || wide || sky.is_map() || env_rays > 0 || settings.gloss_rays > 0;
+        let alone = everything || settings.layers || wide || sky.is_map() || env_rays > 0 || gloss.all;
         let uniform = |m: &Material| if alone { None } else { Uniform::of(m, textures, depth > 0) };
         let needs = |any: &[Feature]| everything || any.iter().any(|&f| features.has(f));
         Self {
@@ -69,7 +91,7 @@ impl<'a> Context<'a> {
             sky,
             env_rays,
             light_rays: settings.light_rays.max(1),
-            gloss_rays: settings.gloss_rays,
+            gloss,
             seed: settings.seed,
             lights: scene.lights.iter().map(|l| LocalLight::new(l, world.center)).collect(),
             uniform: scene.materials.iter().map(uniform).collect(),

@@ -79,8 +79,8 @@ pub struct Settings {
     /// Shadow rays to each light that has an extent, from what is seen first; a quarter of them from what mirrors show.
     pub light_rays: u32,
     /// Rays that the first rough surface on a line of sight spreads over what it mirrors, and over what it lets through; 0: rough
-    /// surfaces see their surroundings blurred by a formula, and nothing else.
-    pub gloss_rays: u32,
+    /// surfaces see their surroundings blurred by a formula, and nothing else. `None`: 4 for what lets light through, else 0.
+    pub gloss_rays: Option<u32>,
     /// Whether [`crate::image::Layers`] are wanted.
     pub layers: bool,
     /// Whether what the scene does without is done all the same, for nothing (see [`everything`]). The world and the
@@ -99,7 +99,7 @@ impl Default for Settings {
             seed: 0,
             env_rays: None,
             light_rays: 16,
-            gloss_rays: 0,
+            gloss_rays: None,
             layers: false,
             everything: false,
         }

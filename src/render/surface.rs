@@ -4,7 +4,7 @@
 //! bump maps. Whatever a file gives, normals come out finite and of unit length.
 
 use super::patch::{Footprint, Gradients, Patch};
-use super::shade::{Seen, lets_light_in};
+use super::shade::{Seen, has_inside};
 use super::texture::TextureStore;
 use super::world::{Placement, PrimSource, World};
 use crate::accel::refine::Refined;
@@ -204,9 +204,9 @@ impl<'a> Surface<'a> {
         [tangent, bitangent]
     }
 
-    /// Whether it is seen from outside: from either side where light cannot enter.
+    /// Whether it is seen from outside: from either side where there is no inside.
     pub(crate) fn is_outside(&self) -> bool {
-        self.front || !lets_light_in(self.target.material)
+        self.front || !has_inside(self.target.material)
     }
 
     /// How it is seen.

@@ -28,6 +28,8 @@ use crate::accel::{Accel, Hit, Ray};
 use crate::math::{DVec3, Vec3};
 use std::hint::black_box;
 
+/// Angle across a path's cone, radians, above which rough surfaces have spread it.
+const SPREAD: f32 = 0.1;
 /// Rays traced together at most; bounds the memory of a worker.
 const WAVE_LIMIT: usize = 1 << 13;
 /// Shadow rays that wait at most.
@@ -307,7 +309,10 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         surface.shade_smoothly(context.textures);
         self.note(ray, path, &surface, base.truncate());
         let mut matter = Matter::new(&surface, base.truncate(), context.textures);
-        if context.gloss_rays > 0 && path.depth < context.depth {
+        if path.cone_spread > SPREAD {
+            matter.blur(path.cone_spread);
+        }
+        if path.depth < context.depth && context.gloss.spreads(material) {
             matter.spread_by_rays();
         }
         let point = Point {

@@ -83,5 +83,5 @@ impl Sheet {
 }
 
 fn stored(extension: &str) -> PathBuf {
-    root().join("tests/golden/shared").with_extension(extension)
+    root().join("tests/sweep").with_extension(extension)
 }

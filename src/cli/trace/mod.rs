@@ -89,7 +89,7 @@ fn check(args: &TraceArgs) -> Result<Look, Wrong> {
         env: None,
         env_rotate: 0.0,
         env_rays: None,
-        gloss_rays: 0,
+        gloss_rays: None,
         light_rays: None,
         sun_size: None,
         tone_map: None,

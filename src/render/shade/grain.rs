@@ -84,14 +84,18 @@ impl GrainMatter {
     pub(super) fn mirrored(&self, seen: &Seen, sky: &Sky) -> Vec3 {
         let [wide, narrow] = self.alpha;
         let spread = (wide * wide - narrow * narrow).max(0.0).sqrt();
-        // Wide enough that neighbours meet.
-        let blur = narrow.max(2.0 * spread / f32::from(LOOKUPS)).sqrt();
+        // Slopes that cut the distribution along one axis, α² / 2 (α² + s²)^³⁄₂, into equal parts.
+        let slope = |part: f32| spread * part / (1.0 - part * part).max(f32::MIN_POSITIVE).sqrt();
         let (mut sum, mut shares) = (Vec3::ZERO, 0.0);
+        let mut edge = -PI / 2.0;
         for k in 0..LOOKUPS {
-            // Slopes that cut the distribution along one axis, α² / 2 (α² + s²)^³⁄₂, into equal parts.
             let part = f32::from(2 * k + 1) / f32::from(LOOKUPS) - 1.0;
-            let slope = spread * part / (1.0 - part * part).sqrt();
-            let half = (seen.normal + self.along * slope).normalize_or(seen.normal);
+            let slope_here = slope(part);
+            // Wide enough that neighbours meet: a lookup reaches as far as its part of the slopes.
+            let next = libm::atanf(slope(part + 1.0 / f32::from(LOOKUPS)));
+            let blur = narrow.max(next - edge).sqrt();
+            edge = next;
+            let half = (seen.normal + self.along * slope_here).normalize_or(seen.normal);
             let share = half.dot(seen.view).max(0.0);
             if share > 0.0 {
                 let dir = above(reflect(-seen.view, half), seen.geometric);

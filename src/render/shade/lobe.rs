@@ -4,6 +4,7 @@
 //! "Distributed Ray Tracing" (1984).
 
 use crate::math::Vec3;
+use crate::render::optics::reflect;
 use std::f32::consts::PI;
 
 /// Facets around a normal: a GGX distribution with a width along each of two axes.
@@ -49,6 +50,17 @@ impl Lobe {
         if whole > 0.0 { n_l * (n_v + wide_v) / whole } else { 0.0 }
     }
 
+    /// What all facets together send back to `view` of light from everywhere, if they mirror all of it.
+    pub(super) fn albedo(&self, view: Vec3) -> f32 {
+        const DRAWN: u8 = 16;
+        let kept = |k: u8| {
+            let at = [(f32::from(k) + 0.5) / f32::from(DRAWN), (f32::from(k) * 0.618_034).fract()];
+            let to = reflect(-view, self.facet(view, at));
+            if self.normal.dot(to) > 0.0 { self.kept(view, to) } else { 0.0 }
+        };
+        (0..DRAWN).map(kept).sum::<f32>() / f32::from(DRAWN)
+    }
+
     fn length(&self, v: Vec3) -> f32 {
         let [wide, narrow] = self.alpha;
         Vec3::new(wide * v.dot(self.along), narrow * v.dot(self.across), v.dot(self.normal)).length()
@@ -65,7 +77,6 @@ impl Lobe {
 mod tests {
     use super::super::facets::albedo;
     use super::*;
-    use crate::render::optics::reflect;
 
     #[test]
     fn drawn_facets_send_back_what_the_lobe_does() {

@@ -34,6 +34,8 @@ pub(crate) struct MetalRoughMatter {
     roughness: f32,
     /// Along its grain; 0 where it has none.
     roughness_along: f32,
+    /// What a white surface with that grain sends back in all; 1 where it has none.
+    sent_back: f32,
     /// Whether all that is mirrored and let through is seen by rays.
     by_rays: bool,
     /// Reflection of the dielectric part, face on and grazing.
@@ -96,6 +98,7 @@ impl MetalRoughMatter {
             metallic: (m.metallic * map.z).clamp(0.0, 1.0),
             roughness: (m.roughness * map.y).clamp(0.0, 1.0),
             roughness_along: 0.0,
+            sent_back: 1.0,
             by_rays: false,
             f0: (color * (at_normal * at_normal)).clamp(Vec3::ZERO, Vec3::ONE) * specular,
             f90: specular,
@@ -122,9 +125,26 @@ impl MetalRoughMatter {
         }
     }
 
-    /// Gives it a grain.
-    pub(super) fn brush(&mut self, grain: Option<&GrainMatter>) {
-        self.roughness_along = grain.map_or(0.0, GrainMatter::roughness);
+    /// Gives it a grain, which `view` sees on this normal.
+    pub(super) fn brush(&mut self, grain: Option<&GrainMatter>, normal: Vec3, view: Vec3) {
+        if let Some(grain) = grain {
+            (self.roughness_along, self.sent_back) = (grain.roughness(), grain.lobe(normal).albedo(view));
+        }
+    }
+
+    /// Makes it at least so rough.
+    pub(super) fn blur(&mut self, roughness: f32) {
+        self.roughness = self.roughness.max(roughness);
+    }
+
+    /// Shares of f0 and f90 in what its lobe sends back.
+    fn albedo(&self, n_v: f32) -> (f32, f32) {
+        let (scale, bias) = albedo(self.mean_roughness(), n_v);
+        if self.roughness_along == 0.0 {
+            return (scale, bias);
+        }
+        let kept = self.sent_back / (scale + bias).max(f32::MIN_POSITIVE);
+        (scale * kept, bias * kept)
     }
 
     /// From now on all that is mirrored and let through is seen by rays.
@@ -193,7 +213,7 @@ impl MetalRoughMatter {
         let mirrored = || grain.map_or_else(|| sky.blurred(seen.mirrored(), roughness), |g| g.mirrored(seen, sky));
         let around = Around {
             n_v,
-            shares: albedo(roughness, n_v),
+            shares: self.albedo(n_v),
             diffuse: sky.diffuse(seen.normal) + ambient,
             mirrored: if looked_up { mirrored() + ambient } else { Vec3::ZERO },
             open: if looked_up { open(n_v, self.occlusion, roughness) } else { 0.0 },
@@ -258,8 +278,8 @@ impl MetalRoughMatter {
         Self { occlusion: 1.0, ..self.clone() }
     }
 
-    /// Weights of the mirror ray and of the ray that passes through.
-    pub(super) fn balance(&self, cosine: f32, crossing: &Crossing) -> Balance {
+    /// Weights of the mirror ray and of the ray that passes through, as seen from outside or not.
+    pub(super) fn balance(&self, cosine: f32, crossing: &Crossing, outside: bool) -> Balance {
         let (mut dielectric, metal) = self.fresnel(cosine);
         let mut open = 1.0 - dielectric.max_element();
         let inside = crossing.n_i > crossing.n_t;
@@ -276,8 +296,8 @@ impl MetalRoughMatter {
             open = 1.0 - dielectric.max_element();
         }
         Balance {
-            reflected: dielectric.lerp(metal, self.metallic) * self.traced(!inside),
-            refracted: self.passed(open) * (1.0 - self.frosted(!inside)),
+            reflected: dielectric.lerp(metal, self.metallic) * self.traced(outside),
+            refracted: self.passed(open) * (1.0 - self.frosted(outside)),
         }
     }
 
@@ -294,8 +314,12 @@ impl MetalRoughMatter {
 
     /// Share of the light passing through that is looked up instead.
     fn frosted(&self, outside: bool) -> f32 {
-        let see_through = self.transmission > 0.0 && outside && !self.by_rays;
-        if see_through { FROSTED_SHARE * smoothstep(0.0, FROSTED_ROUGHNESS, self.roughness) } else { 0.0 }
+        if self.transmission <= 0.0 || !outside || self.by_rays {
+            return 0.0;
+        }
+        // What hardly bends light hardly spreads it.
+        let bending = if self.thick { (2.0 * self.ior - 2.0).clamp(0.0, 1.0) } else { 1.0 };
+        FROSTED_SHARE * smoothstep(0.0, FROSTED_ROUGHNESS, self.roughness * bending)
     }
 }
 
@@ -369,6 +393,7 @@ mod tests {
             metallic: 0.0,
             roughness: 0.5,
             roughness_along: 0.0,
+            sent_back: 1.0,
             by_rays: false,
             f0: Vec3::splat(0.04),
             f90: 1.0,
@@ -445,9 +470,9 @@ mod tests {
     fn a_mirror_of_metal_has_the_color_of_its_base() {
         let metal = MetalRoughMatter { metallic: 1.0, roughness: 0.0, ..matter() };
         let outside = Media::default().cross(Medium { material: 0, ior: 1.0 }, true);
-        assert_eq!(metal.balance(1.0, &outside).reflected, metal.base);
-        assert_eq!(metal.balance(1.0, &outside).refracted, Vec3::ZERO);
-        assert_eq!(MetalRoughMatter { roughness: 0.5, ..metal }.balance(1.0, &outside).reflected, Vec3::ZERO);
+        assert_eq!(metal.balance(1.0, &outside, true).reflected, metal.base);
+        assert_eq!(metal.balance(1.0, &outside, true).refracted, Vec3::ZERO);
+        assert_eq!(MetalRoughMatter { roughness: 0.5, ..metal }.balance(1.0, &outside, true).reflected, Vec3::ZERO);
     }
 
     #[test]
@@ -455,13 +480,13 @@ mod tests {
         let glass = MetalRoughMatter { base: Vec3::ONE, roughness: 0.0, transmission: 1.0, thick: true, ..matter() };
         let into = Media::default().cross(Medium { material: 0, ior: 1.5 }, true);
         let out = into.beyond.cross(Medium { material: 0, ior: 1.5 }, false);
-        for crossing in [into, out] {
+        for (crossing, outside) in [(into, true), (out, false)] {
             for cosine in [0.1, 0.5, 0.8, 1.0] {
-                let balance = glass.balance(cosine, &crossing);
+                let balance = glass.balance(cosine, &crossing, outside);
                 assert!((balance.reflected + balance.refracted - Vec3::ONE).length() < 1e-6);
             }
         }
-        assert_eq!(glass.balance(0.1, &out).refracted, Vec3::ZERO, "total reflection");
+        assert_eq!(glass.balance(0.1, &out, false).refracted, Vec3::ZERO, "total reflection");
     }
 
     #[test]

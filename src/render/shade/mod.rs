@@ -58,6 +58,8 @@ impl Seen {
 
 /// The material at one point of a surface.
 pub(crate) struct Matter {
+    /// Whether it is seen from outside.
+    outside: bool,
     pub emission: Vec3,
     pub model: Model,
     /// Its grain, fibres on it, and lacquer over all; seen from outside only.
@@ -119,9 +121,9 @@ impl Matter {
     pub(crate) fn new(surface: &Surface, base: Vec3, store: &TextureStore) -> Self {
         let reader = Reader { store, patch: surface.patch.as_ref(), footprint: &surface.footprint };
         let material = surface.target.material;
-        let matter = Self::read(material, base, &reader);
+        let matter = Self { outside: surface.is_outside(), ..Self::read(material, base, &reader) };
         match material.metal_rough() {
-            Some(m) if surface.is_outside() && m.has_lobes() => matter.with_lobes(m, surface, &reader),
+            Some(m) if matter.outside && m.has_lobes() => matter.with_lobes(m, surface, &reader),
             _ => matter,
         }
     }
@@ -135,7 +137,7 @@ impl Matter {
                 core.cover(film, n_v, reader);
             }
             self.grain = m.grain.as_ref().and_then(|grain| GrainMatter::new(grain, core.roughness(), surface, reader));
-            core.brush(self.grain.as_ref());
+            core.brush(self.grain.as_ref(), surface.normal, surface.view);
         }
         self.sheen = m.sheen.as_ref().and_then(|sheen| SheenMatter::new(sheen, n_v, reader));
         if let Some(coat) = &m.coat {
@@ -162,7 +164,7 @@ impl Matter {
                 Model::MetalRough(MetalRoughMatter::new(m, base, occlusion(material, reader), reader))
             }
         };
-        Self { emission, model, grain: None, sheen: None, coat: None }
+        Self { outside: true, emission, model, grain: None, sheen: None, coat: None }
     }
 
     /// Share of what is under the lacquer that is seen through it.
@@ -228,6 +230,15 @@ impl Matter {
         }
     }
 
+    /// Blurs what is seen along a path that rough surfaces have spread to this angle across, radians: on such paths narrow
+    /// highlights would be met by few rays, each far too bright (A. S. Kaplanyan, C. Dachsbacher, "Path Space Regularization
+    /// for Holistic and Robust Light Transport", 2013).
+    pub(crate) fn blur(&mut self, angle: f32) {
+        if let Model::MetalRough(m) = &mut self.model {
+            m.blur((0.5 * angle).sqrt().min(0.5));
+        }
+    }
+
     /// The facets that spread rays; `None` where one ray does.
     pub(crate) fn lobe(&self, surface: &Surface) -> Option<Lobe> {
         let Model::MetalRough(m) = &self.model else { return None };
@@ -280,7 +291,7 @@ impl Matter {
         let Balance { reflected, refracted } = match &self.model {
             Model::Unlit(_) => Balance::default(),
             Model::Phong(m) => m.balance(cosine, crossing),
-            Model::MetalRough(m) => m.balance(cosine, crossing),
+            Model::MetalRough(m) => m.balance(cosine, crossing, self.outside),
         };
         let clear = self.clear();
         Balance { reflected: reflected * clear, refracted: refracted * clear }
@@ -323,6 +334,11 @@ pub(crate) fn shadow_filter(material: &Material, reader: &Reader) -> Vec3 {
         Reflection::MetalRough(_) => Vec3::ZERO,
     };
     Vec3::splat(1.0 - solid) + passed.clamp(Vec3::ZERO, Vec3::ONE) * solid
+}
+
+/// Whether a material has an inside: back faces of what is thin are seen from outside, too.
+pub(crate) fn has_inside(material: &Material) -> bool {
+    lets_light_in(material) && material.metal_rough().is_none_or(|m| m.thick)
 }
 
 /// Whether rays can enter a material, so that its back faces are seen from inside.
