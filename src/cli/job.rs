@@ -107,7 +107,7 @@ impl Target {
 }
 
 /// What the command line says about the picture; `None`: nothing.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Look {
     /// Columns and rows.
     pub size: Option<(u32, u32)>,

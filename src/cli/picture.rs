@@ -140,46 +140,22 @@ pub(super) fn write(shot: &Shot, bytes: &[u8]) -> Result<(), WriteError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::{ExrSamples, PngDepth};
-
-    fn look() -> Look {
-        Look {
-            size: None,
-            samples: None,
-            depth: None,
-            cutoff: None,
-            seed: 0,
-            lens: None,
-            background: None,
-            env: None,
-            env_rotate: 0.0,
-            env_rays: None,
-            gloss_rays: None,
-            light_rays: None,
-            sun_size: None,
-            tone_map: None,
-            exposure: None,
-            png: PngDepth::Eight,
-            exr: ExrSamples::Half,
-            layers: false,
-            costs: Vec::new(),
-        }
-    }
 
     #[test]
     fn the_command_line_overrides_the_scene_file_which_overrides_the_defaults() {
         let hints =
             RenderHints { depth: Some(5), samples: Some(9), tone_map: Some("aces".into()), ..Default::default() };
-        let effective = Effective::new(&Look { depth: Some(1), ..look() }, &hints).unwrap();
+        let effective = Effective::new(&Look { depth: Some(1), ..Look::default() }, &hints).unwrap();
         assert_eq!((effective.settings.depth, effective.settings.samples), (Some(1), 9));
         assert_eq!((effective.settings.width, effective.output.tone_map), (1024, ToneMap::Aces));
     }
 
     #[test]
     fn a_picture_beyond_the_memory_allowed_is_refused() {
-        let big = Effective::new(&Look { size: Some((65_535, 65_535)), ..look() }, &RenderHints::default()).unwrap();
+        let big =
+            Effective::new(&Look { size: Some((65_535, 65_535)), ..Look::default() }, &RenderHints::default()).unwrap();
         assert!(too_large(&big, 0, 8 << 30).is_some());
-        let usual = Effective::new(&look(), &RenderHints::default()).unwrap();
+        let usual = Effective::new(&Look::default(), &RenderHints::default()).unwrap();
         assert!(too_large(&usual, 4, 8 << 30).is_none());
     }
 }

@@ -2,9 +2,9 @@
 
 use super::limits::{Budget, Limits};
 use super::{Diagnostic, LoadError, Source};
-use crate::image::srgb;
 use crate::scene::Panorama;
-use ::image::{ColorType, DynamicImage, ImageFormat, ImageReader};
+use crate::scene::color::from_srgb;
+use ::image::{DynamicImage, ImageFormat, ImageReader};
 use std::io::Cursor;
 use std::path::Path;
 use std::sync::Arc;
@@ -76,23 +76,19 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
 
 /// Linear radiance of all pixels, and how many of them had to be mended.
 fn radiance(picture: DynamicImage, format: ImageFormat) -> (Vec<[f32; 3]>, usize) {
-    use ColorType::{L16, La16, Rgb16, Rgba16};
-    if matches!(format, ImageFormat::Hdr | ImageFormat::OpenExr) {
-        let mut odd = 0;
-        let mend = |texel: &[f32; 3]| {
-            let usable = texel.iter().all(|c| c.is_finite() && *c >= 0.0);
-            odd += usize::from(!usable);
-            texel.map(|c| if c.is_finite() { c.max(0.0) } else { 0.0 })
-        };
-        let texels = picture.into_rgb32f().as_raw().as_chunks::<3>().0.iter().map(mend).collect();
-        return (texels, odd);
+    let picture = picture.into_rgb32f();
+    let texels = picture.as_raw().as_chunks::<3>().0.iter();
+    if !matches!(format, ImageFormat::Hdr | ImageFormat::OpenExr) {
+        return (texels.map(|&codes| from_srgb(codes).to_array()).collect(), 0);
     }
-    let texels = if matches!(picture.color(), L16 | La16 | Rgb16 | Rgba16) {
-        picture.into_rgb16().pixels().map(|p| p.0.map(srgb::decode16)).collect()
-    } else {
-        picture.into_rgb8().pixels().map(|p| p.0.map(srgb::decode8)).collect()
+    let mut odd = 0;
+    let mend = |texel: &[f32; 3]| {
+        let usable = texel.iter().all(|c| c.is_finite() && *c >= 0.0);
+        odd += usize::from(!usable);
+        texel.map(|c| if c.is_finite() { c.max(0.0) } else { 0.0 })
     };
-    (texels, 0)
+    let texels = texels.map(mend).collect();
+    (texels, odd)
 }
 
 #[cfg(test)]

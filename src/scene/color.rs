@@ -62,10 +62,13 @@ fn triple(text: &str) -> Option<Vec3> {
 
 /// Linear colour of sRGB bytes.
 pub fn from_srgb8(bytes: [u8; 3]) -> Vec3 {
-    Vec3::from(bytes.map(|b| {
-        let c = f32::from(b) / 255.0;
-        if c <= 0.04045 { c / 12.92 } else { libm::powf((c + 0.055) / 1.055, 2.4) }
-    }))
+    from_srgb(bytes.map(|b| f32::from(b) / 255.0))
+}
+
+/// Linear colour of sRGB codes, 0 … 1 (IEC 61966-2-1).
+pub fn from_srgb(codes: [f32; 3]) -> Vec3 {
+    let decode = |c: f32| if c <= 0.04045 { c / 12.92 } else { libm::powf((c + 0.055) / 1.055, 2.4) };
+    Vec3::from(codes.map(decode))
 }
 
 /// CIE XYZ, white D65, as linear Rec. 709 (IEC 61966-2-1); a colour out of its gamut has negative parts.

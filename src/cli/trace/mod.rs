@@ -30,7 +30,7 @@ use super::message::{Messages, Severity};
 use super::picture::{Effective, background};
 use super::{accident, output_name, print, read};
 use crate::accel::{AccelKind, AccelParams, auto};
-use crate::image::{ExrSamples, FileKind, Metadata, PngDepth, write_atomic};
+use crate::image::{FileKind, Metadata, write_atomic};
 use crate::load::{Diagnostic, Loaded};
 use crate::render::story::{Story, tell};
 use crate::render::texture::TextureStore;
@@ -83,21 +83,8 @@ fn check(args: &TraceArgs) -> Result<Look, Wrong> {
         samples: Some(args.samples),
         depth: args.depth,
         cutoff: args.cutoff,
-        seed: 0,
         lens: LensChoice::new(args.fov, args.ortho),
-        background: None,
-        env: None,
-        env_rotate: 0.0,
-        env_rays: None,
-        gloss_rays: None,
-        light_rays: None,
-        sun_size: None,
-        tone_map: None,
-        exposure: None,
-        png: PngDepth::Eight,
-        exr: ExrSamples::Half,
-        layers: false,
-        costs: Vec::new(),
+        ..Look::default()
     })
 }
 

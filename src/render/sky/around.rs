@@ -1,7 +1,8 @@
 //! How much of its surroundings a point sees: rays to where light comes from, and what is left where they are stopped.
 //!
 //! Without such rays the surroundings light every point as if nothing stood in their way, which a formula tells exactly.
-//! With them that light is weakened by what the rays find. The share that comes through is unbiased: each half of a
+//! With them that light is weakened by what the rays find. The share that comes through is as right on average as the formula
+//! is: each half of a
 //! point's rays corrects what the other half makes of the formula (a control variate whose factor comes from independent
 //! rays), so that points in the open and points shut in show no noise at all. After E. Heitz, S. Hill, M. McGuire,
 //! "Combining Analytic Direct Illumination and Stochastic Shadows" (2018), without the bias of its ratio.
@@ -94,7 +95,7 @@ impl Arounds {
         for _ in 0..2 {
             let spread = draws.spread();
             for k in 0..half {
-                let Some(way) = ways.iter().flatten().nth((k % count) as usize) else { continue };
+                let way = ways.iter().flatten().nth((k % count) as usize).unwrap_or(&Way::Cosine);
                 let dir = way.draw(spread.point(k), &context.sky, &view);
                 if dir.dot(seen.geometric) <= 0.0 {
                     self.shares.push(Vec3::ZERO);
