@@ -1,6 +1,7 @@
 //! What was typed: syntax only. What it means together is decided in [`super::job`].
 
 use super::bench::BenchArgs;
+use super::diff::DiffArgs;
 use super::parse;
 use crate::accel::{AccelChoice, Assign, IntersectorKind, MailboxKind};
 use crate::bench::verify::Plan;
@@ -45,6 +46,8 @@ pub(super) enum Command {
     Explain(Box<ExplainArgs>),
     /// Tell one ray of a picture in order: what it visits, tests and hits, and all rays that come of it
     Trace(Box<TraceArgs>),
+    /// Compare two pictures: RMSE, PSNR, FLIP, the worst pixel, a heat map
+    Diff(Box<DiffArgs>),
     /// Write a scene of any size: tetra, gears, balls, tree, mountain, stadium, instances
     Generate(GenerateArgs),
     /// Print a completion script for a shell

@@ -9,6 +9,7 @@ mod args;
 mod bench;
 mod camera;
 mod cost_layers;
+mod diff;
 mod exit;
 mod explain;
 mod generate;
@@ -63,6 +64,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
         Command::Verify(args) => verify::run(&args),
         Command::Explain(args) => explain::run(&args),
         Command::Trace(args) => trace::run(&args),
+        Command::Diff(args) => diff::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::Completions { shell } => shell::completions(shell),
         Command::Man => shell::man(),

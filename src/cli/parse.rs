@@ -158,6 +158,11 @@ pub(super) fn ortho(text: &str) -> Result<Ortho, String> {
     if height > 0.0 { Ok(Ortho::Height(height)) } else { Err("the height must be above 0".into()) }
 }
 
+/// A number that is not below 0.
+pub(super) fn not_negative(text: &str) -> Result<f64, String> {
+    finite(text).ok().filter(|&n| n >= 0.0).ok_or_else(|| "write 0 or a number above it".into())
+}
+
 /// A number above 0.
 pub(super) fn above_zero(text: &str) -> Result<f64, String> {
     finite(text).ok().filter(|&n| n > 0.0).ok_or_else(|| "write a number above 0".into())

@@ -65,7 +65,7 @@ pub enum ImageError {
         reason: String,
     },
     /// The bytes are no picture that can be read here.
-    #[error("neither a PNG nor an EXR picture")]
+    #[error("neither a PNG, EXR, JPEG nor a WebP picture")]
     NotAPicture,
     /// The file could not be read.
     #[error("{}: {source}", path.display())]

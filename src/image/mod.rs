@@ -11,6 +11,7 @@ mod error;
 mod exif;
 mod exr;
 mod kind;
+pub mod look;
 pub mod metadata;
 mod output;
 mod photo;

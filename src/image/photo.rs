@@ -1,10 +1,11 @@
 //! JPEG (lossy, opaque) and WebP (lossless) files, 8-bit sRGB.
 
 use super::develop::{Raster, raster};
-use super::{FileKind, ImageError, Metadata, Output, Picture, exif};
+use super::{FileKind, ImageError, Metadata, Output, Picture, exif, srgb};
 use ::image::codecs::jpeg::JpegEncoder;
 use ::image::codecs::webp::WebPEncoder;
-use ::image::{ExtendedColorType, ImageEncoder};
+use ::image::{ExtendedColorType, ImageEncoder, ImageFormat, ImageReader};
+use std::io::Cursor;
 
 /// Largest side of a JPEG and of a WebP file: what their size fields hold.
 const JPEG_SIDE: u32 = 65_535;
@@ -33,6 +34,23 @@ pub(super) fn encode_webp(picture: &Picture, output: &Output, metadata: &Metadat
     let encoder = WebPEncoder::new_lossless(&mut file);
     finish(encoder, &raster(picture, output), exif::write(metadata), FileKind::Webp)?;
     Ok(file)
+}
+
+/// Reads such a file; at most `max_pixels`.
+pub(super) fn decode(bytes: &[u8], kind: FileKind, max_pixels: u64) -> Result<Picture, ImageError> {
+    let fail = |e: ::image::ImageError| ImageError::decode(kind, e);
+    let format = if kind == FileKind::Webp { ImageFormat::WebP } else { ImageFormat::Jpeg };
+    let reader = || ImageReader::with_format(Cursor::new(bytes), format);
+    let (width, height) = reader().into_dimensions().map_err(fail)?;
+    super::read::check_size(kind, width, height, max_pixels)?;
+    let pixels = reader().decode().map_err(fail)?.into_rgba8();
+    let premultiplied = |[r, g, b, a]: [u8; 4]| {
+        let part = f32::from(a) / 255.0;
+        let [r, g, b] = [r, g, b].map(|c| srgb::decode8(c) * part);
+        [r, g, b, part]
+    };
+    let (width, height) = pixels.dimensions();
+    Ok(Picture { width, height, beauty: pixels.pixels().map(|p| premultiplied(p.0)).collect(), layers: None })
 }
 
 fn finish(

@@ -5,6 +5,7 @@ mod animation;
 mod backdrop;
 mod bench;
 mod costs;
+mod diff;
 mod endings;
 mod explain;
 mod formats;

@@ -1,10 +1,17 @@
-//! How different two pictures are, and what a picture is like: numbers, and a picture of the difference.
+//! How different two pictures are: numbers, and pictures of the difference.
 //!
 //! Differences are those of the display codes (sRGB, 0..=1), where equal steps look about equal, or of the linear
-//! values. Sums run over rows in order, so that they do not depend on threads.
+//! values. Sums run over rows in order, so that they do not depend on threads. How different pictures look to an eye
+//! says [`flip`](mod@flip).
 
-use super::develop::Developer;
-use super::{Output, Picture, ToneMap, srgb, tone};
+pub mod flip;
+mod layers;
+mod looks;
+
+pub use layers::{LayerDifference, layer_differences};
+pub use looks::{Looks, looks};
+
+use super::{Picture, srgb};
 
 /// What is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,13 +22,22 @@ pub enum Space {
     Display,
 }
 
-/// How different two pictures of one size are, over all pixels and four channels.
+/// How different two pictures of one size are, over all pixels; over three channels, or four where a pixel of either is
+/// not covered in full.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
+    /// Channels compared: 3 or 4.
+    pub channels: u32,
     /// Root of the mean squared difference.
     pub rmse: f64,
+    /// The same, relative to the root of the mean square of what was expected; infinite where that is black.
+    pub relative_rmse: f64,
+    /// Mean of what is there less what was expected, over the colour channels: what no noise explains.
+    pub bias: f64,
     /// Largest difference of a channel; infinite where just one of two values is a number.
     pub max: f64,
+    /// Column and row of the first pixel with that.
+    pub worst: (u32, u32),
     /// Peak signal-to-noise ratio for a peak of 1, decibels; infinite for equal pictures.
     pub psnr: f64,
     /// Pixels with a channel that differs by more than the threshold.
@@ -35,37 +51,76 @@ pub fn compare(expected: &Picture, actual: &Picture, space: Space, threshold: f6
     if (expected.width, expected.height, expected.beauty.len()) != (actual.width, actual.height, actual.beauty.len()) {
         return None;
     }
-    let (mut sum, mut max, mut over) = (0.0, 0.0_f64, 0);
-    for (&a, &b) in expected.beauty.iter().zip(&actual.beauty) {
-        let mut worst = 0.0_f64;
-        for d in channel_differences(a, b, space) {
+    let channels = if is_covered(expected) && is_covered(actual) { 3 } else { 4 };
+    let (mut sum, mut energy, mut bias) = (0.0, 0.0, 0.0);
+    let (mut max, mut worst, mut over) = (0.0_f64, 0, 0);
+    for (i, (&a, &b)) in expected.beauty.iter().zip(&actual.beauty).enumerate() {
+        let (a, b) = (values(a, space), values(b, space));
+        let mut most = 0.0_f64;
+        for c in 0..channels {
+            let d = distance(a[c], b[c]);
             sum += d * d;
-            worst = worst.max(d);
+            energy += a[c] * a[c];
+            most = most.max(d);
         }
-        max = max.max(worst);
-        over += u64::from(worst > threshold);
+        bias += (0..3).filter(|&c| a[c] != b[c]).map(|c| b[c] - a[c]).sum::<f64>();
+        if most > max {
+            (max, worst) = (most, i);
+        }
+        over += u64::from(most > threshold);
     }
-    let pixels = expected.beauty.len() as u64;
-    let mse = if pixels == 0 { 0.0 } else { sum / (pixels * 4) as f64 };
-    Some(Difference { rmse: mse.sqrt(), max, psnr: -10.0 * libm::log10(mse), over, pixels })
-}
-
-fn channel_differences(a: [f32; 4], b: [f32; 4], space: Space) -> [f64; 4] {
-    let (a, b) = match space {
-        Space::Linear => (a.map(f64::from), b.map(f64::from)),
-        Space::Display => (display(a), display(b)),
-    };
-    std::array::from_fn(|i| match (a[i].is_nan(), b[i].is_nan()) {
-        (true, true) => 0.0,
-        (false, false) if a[i] == b[i] => 0.0,
-        (false, false) => (a[i] - b[i]).abs(),
-        _ => f64::INFINITY,
+    let pixels = expected.beauty.len();
+    let mean = |sum: f64, channels: usize| if pixels == 0 { 0.0 } else { sum / (pixels * channels) as f64 };
+    let mse = mean(sum, channels);
+    Some(Difference {
+        channels: if channels == 3 { 3 } else { 4 },
+        rmse: mse.sqrt(),
+        relative_rmse: if sum == 0.0 { 0.0 } else { (sum / energy).sqrt() },
+        bias: mean(bias, 3),
+        max,
+        worst: place(worst, expected.width),
+        psnr: -10.0 * libm::log10(mse),
+        over,
+        pixels: pixels as u64,
     })
 }
 
-fn display([r, g, b, a]: [f32; 4]) -> [f64; 4] {
+/// Largest difference of a channel, at each pixel of two pictures of one size.
+pub fn greatest(expected: &Picture, actual: &Picture, space: Space) -> Vec<f64> {
+    let pixels = expected.beauty.iter().zip(&actual.beauty);
+    pixels.map(|(&a, &b)| channel_differences(a, b, space).into_iter().fold(0.0, f64::max)).collect()
+}
+
+fn is_covered(picture: &Picture) -> bool {
+    picture.beauty.iter().all(|p| p[3] == 1.0)
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "a picture has at most 2^32 columns and rows")]
+fn place(pixel: usize, width: u32) -> (u32, u32) {
+    let width = (width as usize).max(1);
+    ((pixel % width) as u32, (pixel / width) as u32)
+}
+
+fn channel_differences(a: [f32; 4], b: [f32; 4], space: Space) -> [f64; 4] {
+    let (a, b) = (values(a, space), values(b, space));
+    std::array::from_fn(|i| distance(a[i], b[i]))
+}
+
+fn distance(a: f64, b: f64) -> f64 {
+    match (a.is_nan(), b.is_nan()) {
+        (true, true) => 0.0,
+        (false, false) if a == b => 0.0,
+        (false, false) => (a - b).abs(),
+        _ => f64::INFINITY,
+    }
+}
+
+fn values([r, g, b, a]: [f32; 4], space: Space) -> [f64; 4] {
     let coded = |c: f32| srgb::encode(f64::from(c).clamp(0.0, 1.0));
-    [coded(r), coded(g), coded(b), f64::from(a)]
+    match space {
+        Space::Linear => [r, g, b, a].map(f64::from),
+        Space::Display => [coded(r), coded(g), coded(b), f64::from(a)],
+    }
 }
 
 /// Expected, difference, actual, side by side; the difference is that of the display codes, `gain` times, on black.
@@ -107,50 +162,6 @@ impl IntoRgba for [f32; 3] {
     }
 }
 
-/// What a developed picture is like where it is covered: is it too dark, blown out, empty?
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Look {
-    /// Fraction of pixels with any coverage.
-    pub coverage: f64,
-    /// Mean luma (Rec. 709 weights of the sRGB codes, 0..=1), weighted by coverage.
-    pub mean_luminance: f64,
-    /// Fraction of the covered pixels with a channel at its largest 8-bit code.
-    pub clipped: f64,
-    /// Pixels with a value that is no number.
-    pub not_numbers: u64,
-}
-
-/// Looks at a picture through the tone map and exposure of `output`, without its background.
-pub fn look(picture: &Picture, output: &Output) -> Look {
-    let output = Output { background: None, ..output.clone() };
-    let developer = Developer::new(&output);
-    let (mut covered, mut clipped, mut not_numbers) = (0_u64, 0_u64, 0);
-    let (mut luma, mut weight) = (0.0, 0.0);
-    for &p in &picture.beauty {
-        not_numbers += u64::from(p.iter().any(|c| c.is_nan()));
-        let [r, g, b, a] = developer.pixel(p);
-        if a > 0.0 {
-            let codes = [r, g, b].map(srgb::encode8);
-            covered += 1;
-            clipped += u64::from(codes.contains(&255));
-            luma += f64::from(a) * f64::from(tone::luminance(codes.map(f32::from))) / 255.0;
-            weight += f64::from(a);
-        }
-    }
-    let ratio = |n: u64, of: u64| if of == 0 { 0.0 } else { n as f64 / of as f64 };
-    Look {
-        coverage: ratio(covered, picture.beauty.len() as u64),
-        mean_luminance: if weight > 0.0 { luma / weight } else { 0.0 },
-        clipped: ratio(clipped, covered),
-        not_numbers,
-    }
-}
-
-/// The choices that show a picture's values as they are.
-pub fn as_is() -> Output {
-    Output { tone_map: ToneMap::None, ..Output::default() }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -174,9 +185,21 @@ mod tests {
         let d = compare(&a, &b, Space::Linear, 0.4).unwrap();
         // 0.25 over eight values.
         assert!((d.rmse - 0.03125_f64.sqrt()).abs() < 1e-12 && d.max == 0.5 && d.over == 1);
+        assert_eq!((d.channels, d.worst, d.bias), (4, (1, 0), 0.5 / 6.0));
         assert!((d.psnr - 15.051_5).abs() < 1e-4);
         assert_eq!(compare(&a, &b, Space::Linear, 0.5).unwrap().over, 0);
         assert!((compare(&a, &b, Space::Display, 0.0).unwrap().max - 0.735_36).abs() < 1e-4);
+    }
+
+    #[test]
+    fn opaque_pictures_have_three_channels_to_differ_in() {
+        let (a, b) = (of(&[[0.5, 0.5, 0.5, 1.0]]), of(&[[0.5, 0.5, 0.2, 1.0]]));
+        let d = compare(&a, &b, Space::Linear, 0.0).unwrap();
+        assert!((d.rmse - (0.09_f64 / 3.0).sqrt()).abs() < 1e-7 && d.channels == 3);
+        assert!((d.relative_rmse - (0.09_f64 / 0.75).sqrt()).abs() < 1e-7 && (d.bias + 0.1).abs() < 1e-7);
+        assert_eq!(greatest(&a, &b, Space::Linear), [0.5 - f64::from(0.2_f32)]);
+        let black = of(&[[0.0, 0.0, 0.0, 1.0]]);
+        assert_eq!(compare(&black, &a, Space::Linear, 0.0).unwrap().relative_rmse, f64::INFINITY);
     }
 
     #[test]
@@ -200,16 +223,5 @@ mod tests {
         assert_eq!(all.beauty[4], b.beauty[0]);
         let uneven = side_by_side(&a, &of(&[[1.0; 4]]), 1.0);
         assert_eq!((uneven.width, uneven.beauty.len(), uneven.beauty[5]), (6, 6, [0.0; 4]));
-    }
-
-    #[test]
-    fn a_look_counts_only_what_is_covered() {
-        let grey = srgb::decode8(128);
-        let picture = of(&[[grey, grey, grey, 1.0], [1.0; 4], [0.0; 4], [0.5, 0.0, 0.0, 0.5]]);
-        let look = look(&picture, &as_is());
-        assert_eq!((look.coverage, look.not_numbers), (0.75, 0));
-        assert!((look.clipped - 2.0 / 3.0).abs() < 1e-12);
-        let mean = (128.0 / 255.0 + 1.0 + 0.5 * 0.2126) / 2.5;
-        assert!((look.mean_luminance - mean).abs() < 1e-6, "{look:?}");
     }
 }

@@ -1,0 +1,88 @@
+//! What was typed after `meshray diff`.
+
+use super::super::args::MessageFormat;
+use super::super::parse;
+use super::limit::Limit;
+use crate::image::ToneMap;
+use crate::image::diff::Space;
+use crate::image::diff::flip::PIXELS_PER_DEGREE;
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+
+/// What `meshray diff` was given.
+#[derive(Debug, Clone, Args)]
+pub(in crate::cli) struct DiffArgs {
+    /// What is expected: a png, exr, jpg or webp
+    #[arg(value_name = "EXPECTED")]
+    pub expected: PathBuf,
+    /// What is compared with it, of the same size
+    #[arg(value_name = "ACTUAL")]
+    pub actual: PathBuf,
+
+    /// Which values are compared [default: linear for two EXR files, else display]
+    #[arg(long, value_name = "SPACE", value_enum, help_heading = "Comparison")]
+    pub space: Option<SpaceArg>,
+    /// How the linear light of EXR files becomes display colour, where that is compared [default: none]
+    #[arg(long, value_name = "NAME", value_parser = parse::tone_map(), help_heading = "Comparison")]
+    pub tone_map: Option<ToneMap>,
+    /// EXR files brighter (+) or darker (-) by this many stops, where display colour is compared
+    #[arg(long, value_name = "STOPS", value_parser = parse::exposure, allow_hyphen_values = true, help_heading = "Comparison")]
+    pub exposure: Option<f32>,
+    /// Count pixels with a channel that differs by more than this
+    #[arg(long, value_name = "VALUE", value_parser = parse::not_negative, default_value_t = 0.0, help_heading = "Comparison")]
+    pub threshold: f64,
+    /// Pixels a degree of the visual field, for FLIP: the default is a 3840-column screen, 0.7 m wide, from 0.7 m
+    #[arg(long, value_name = "N", value_parser = parse::above_zero, default_value_t = (PIXELS_PER_DEGREE * 100.0).round() / 100.0,
+          help_heading = "Comparison")]
+    pub pixels_per_degree: f64,
+    /// Exit with code 1 when a figure is beyond a limit, such as 'rmse>0.01,flip>0.05,psnr<40'
+    #[arg(long, value_name = "LIMIT", value_delimiter = ',', help_heading = "Comparison")]
+    pub fail_if: Vec<Limit>,
+
+    /// Write a heat map of the difference at each pixel, a PNG
+    #[arg(short, long, value_name = "FILE", help_heading = "Output")]
+    pub output: Option<PathBuf>,
+    /// What the heat map shows
+    #[arg(long, value_name = "WHAT", value_enum, default_value_t, requires = "output", help_heading = "Output")]
+    pub show: Show,
+    /// What the brightest colour of the heat map stands for [default: the most of any pixel]
+    #[arg(long, value_name = "VALUE", value_parser = parse::above_zero, requires = "output", help_heading = "Output")]
+    pub heatmap_max: Option<f64>,
+    /// Write expected, difference × 8 and actual side by side, a PNG
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub side_by_side: Option<PathBuf>,
+    /// Print JSON (schema `meshray-diff/1`)
+    #[arg(long, help_heading = "Output")]
+    pub json: bool,
+    /// How messages are written to standard error
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t, help_heading = "Output")]
+    pub messages: MessageFormat,
+}
+
+/// `--space`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(in crate::cli) enum SpaceArg {
+    /// sRGB codes, 0 to 1
+    Display,
+    /// Light
+    Linear,
+}
+
+impl From<SpaceArg> for Space {
+    fn from(space: SpaceArg) -> Self {
+        match space {
+            SpaceArg::Display => Self::Display,
+            SpaceArg::Linear => Self::Linear,
+        }
+    }
+}
+
+/// `--show`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(in crate::cli) enum Show {
+    /// How different it looks, 0 to 1
+    #[default]
+    Flip,
+    /// The greatest difference of a channel
+    Channel,
+}

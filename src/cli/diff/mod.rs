@@ -1,0 +1,153 @@
+//! `meshray diff`: how different two pictures are, in numbers and as a picture.
+//!
+//! # Schema `meshray-diff/1`
+//! One JSON object: `version`, `expected`, `actual` (as typed), `width`, `height`, `space` (`display` or `linear`),
+//! `channels` (3, or 4 with coverage), `rmse`, `relative_rmse`, `bias`, `max`, `worst` (`x`, `y`, `expected`, `actual`: the values
+//! compared), `psnr`, `threshold`, `pixels_over`, `pixels`, `flip` (`mean`, `max`, `worst` with `x` and `y`,
+//! `pixels_per_degree`, and for linear pictures `exposures` with `first`, `last` in stops and `count`), `layers` (`name`, `rmse`,
+//! `max`, `differing`, `values`), `layers_of_one` (names), `broken` (limits of `--fail-if`). What is not finite is null.
+//! Keys are only ever added.
+
+mod args;
+mod limit;
+mod report;
+
+use super::exit::Exit;
+use super::message::{Messages, Severity};
+use super::{accident, print};
+use crate::bench::report::number::short;
+use crate::image::diff::{
+    Difference, LayerDifference, Looks, Space, compare, greatest, layer_differences, looks, side_by_side,
+};
+use crate::image::draw::heat::{Map, Scale};
+use crate::image::look::{as_is, developed};
+use crate::image::read::read_picture_and_kind;
+use crate::image::{FileKind, ImageError, Metadata, Output, Picture, ToneMap, encode, write_atomic};
+use crate::load::Diagnostic;
+pub(super) use args::DiffArgs;
+use args::Show;
+use std::path::Path;
+
+/// How much stronger the difference is drawn between both pictures.
+const GAIN: f32 = 8.0;
+
+/// Two pictures and how different they are.
+struct Compared {
+    expected: Picture,
+    actual: Picture,
+    space: Space,
+    difference: Difference,
+    looks: Looks,
+    layers: Vec<LayerDifference>,
+    layers_of_one: Vec<String>,
+}
+
+/// Compares, prints what was found, and draws it.
+pub(super) fn run(args: &DiffArgs) -> Exit {
+    let messages = Messages::new(args.messages.into(), false);
+    accident::guard(&args.actual.display().to_string(), &messages, || {
+        let done = compared(args).and_then(|compared| {
+            draw(args, &compared)?;
+            tell(args, &compared, &messages)
+        });
+        done.unwrap_or_else(|fault| {
+            messages.say(Severity::Error, &fault.0);
+            fault.1
+        })
+    })
+}
+
+/// What went wrong, and how that ends.
+type Fault = Box<(Diagnostic, Exit)>;
+
+fn compared(args: &DiffArgs) -> Result<Compared, Fault> {
+    let (expected, first) = read(&args.expected)?;
+    let (actual, second) = read(&args.actual)?;
+    let size = |picture: &Picture| (picture.width, picture.height);
+    if size(&expected) != size(&actual) {
+        let [(w, h), (width, height)] = [&expected, &actual].map(size);
+        let text = format!("{width}×{height} pixels, but {} has {w}×{h}", args.expected.display());
+        let fault = Diagnostic::new("sizes-differ", &args.actual, "", text).remedy("compare pictures of one size");
+        return Err(Box::new((fault, Exit::Input)));
+    }
+    let both_linear = [first, second] == [FileKind::Exr; 2];
+    let space = args.space.map_or(if both_linear { Space::Linear } else { Space::Display }, Into::into);
+    let layers = match (&expected.layers, &actual.layers) {
+        (Some(a), Some(b)) => layer_differences(a, b),
+        _ => Default::default(),
+    };
+    let shown = |picture: Picture, kind| match space {
+        Space::Display if kind == FileKind::Exr => developed(&picture, &development(args)),
+        _ => picture,
+    };
+    let (expected, actual) = (shown(expected, first), shown(actual, second));
+    let Some(difference) = compare(&expected, &actual, space, args.threshold) else {
+        let fault = Diagnostic::new("picture-broken", &args.actual, "", "it has not as many pixels as its size says");
+        return Err(Box::new((fault, Exit::Input)));
+    };
+    let looks = looks(&expected, &actual, space, args.pixels_per_degree);
+    Ok(Compared { expected, actual, space, difference, looks, layers: layers.0, layers_of_one: layers.1 })
+}
+
+/// How EXR files become display colour.
+fn development(args: &DiffArgs) -> Output {
+    let (tone_map, exposure) = (args.tone_map.unwrap_or(ToneMap::None), args.exposure.unwrap_or(0.0));
+    Output { tone_map, exposure, ..Output::default() }
+}
+
+fn read(path: &Path) -> Result<(Picture, FileKind), Fault> {
+    read_picture_and_kind(path).map_err(|e| match e {
+        ImageError::Read { source, .. } => {
+            Box::new((Diagnostic::new("file-unreadable", path, "", source.to_string()), Exit::Failed))
+        }
+        other => Box::new((Diagnostic::new("picture-unreadable", path, "", other.to_string()), Exit::Input)),
+    })
+}
+
+fn draw(args: &DiffArgs, compared: &Compared) -> Result<(), Fault> {
+    if let Some(path) = &args.output {
+        write(path, map(args, compared))?;
+    }
+    if let Some(path) = &args.side_by_side {
+        let whole = side_by_side(&compared.expected, &compared.actual, GAIN);
+        write(path, encode(&whole, FileKind::Png, &as_is(), &Metadata::new()))?;
+    }
+    Ok(())
+}
+
+fn map(args: &DiffArgs, compared: &Compared) -> Result<Vec<u8>, ImageError> {
+    let (what, values) = match args.show {
+        Show::Flip => ("FLIP", compared.looks.values.iter().copied().map(f64::from).collect()),
+        Show::Channel => {
+            ("greatest difference of a channel", greatest(&compared.expected, &compared.actual, compared.space))
+        }
+    };
+    let most = args.heatmap_max.unwrap_or_else(|| values.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max));
+    let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+    let title = format!("{what}: mean {}, most {}", short(mean), short(most));
+    let scale = Scale::new(most, finest(most));
+    Map { width: compared.expected.width, values: &values, scale, title: &title, label: short }
+        .draw()
+        .png(&Metadata::new())
+}
+
+/// What is told apart from nothing on a scale up to `most`: a power of ten, at least ten times less.
+fn finest(most: f64) -> f64 {
+    if most > 0.0 { libm::exp10(libm::floor(libm::log10(most)) - 1.0) } else { 0.1 }
+}
+
+fn write(path: &Path, bytes: Result<Vec<u8>, ImageError>) -> Result<(), Fault> {
+    let fault = |text: String| Box::new((Diagnostic::new("output-unwritable", path, "", text), Exit::Failed));
+    write_atomic(path, &bytes.map_err(|e| fault(e.to_string()))?, false).map_err(|e| fault(e.to_string()))
+}
+
+/// Prints the figures; a limit that is broken is said and decides how it ends.
+fn tell(args: &DiffArgs, compared: &Compared, messages: &Messages) -> Result<Exit, Fault> {
+    let broken: Vec<String> = args.fail_if.iter().filter_map(|limit| limit.broken_by(compared)).collect();
+    let text = if args.json { report::json(args, compared, &broken) } else { report::text(args, compared) };
+    print(&text).map_err(|e| {
+        Box::new((Diagnostic::new("output-unwritable", "", "", format!("standard output: {e}")), Exit::Failed))
+    })?;
+    broken.iter().for_each(|line| messages.error("pictures-differ", line, ""));
+    Ok(if broken.is_empty() { Exit::Done } else { Exit::Failed })
+}

@@ -1,0 +1,154 @@
+//! The figures of a difference, as text and as JSON.
+
+use super::Compared;
+use super::args::DiffArgs;
+use crate::bench::report::number::grouped;
+use crate::image::Picture;
+use crate::image::diff::Space;
+use crate::image::srgb;
+use serde_json::{Value, json};
+use std::fmt::Write;
+
+/// For people: a line for each figure.
+pub(super) fn text(args: &DiffArgs, compared: &Compared) -> String {
+    let (d, looks) = (&compared.difference, &compared.looks);
+    let (width, height) = (compared.expected.width, compared.expected.height);
+    let values = match (compared.space, d.channels) {
+        (Space::Display, 3) => "display colour, 0 to 1",
+        (Space::Display, _) => "display colour over black and coverage, 0 to 1",
+        (Space::Linear, 3) => "linear light",
+        (Space::Linear, _) => "linear light over black and coverage",
+    };
+    let mut lines = vec![("", format!("{width}×{height} pixels, {values}"))];
+    let (x, y) = d.worst;
+    lines.push(("RMSE", figure(d.rmse)));
+    lines.push(("relative RMSE", format!("{} of the root mean square expected", figure(d.relative_rmse))));
+    lines.push(("bias", format!("{:+.3e} mean of actual − expected", d.bias)));
+    lines.push((
+        "max",
+        format!(
+            "{} at ({x}, {y}): {} expected, {}",
+            figure(d.max),
+            at(compared, Side::Expected),
+            at(compared, Side::Actual)
+        ),
+    ));
+    lines.push((
+        "PSNR",
+        if d.psnr.is_finite() { format!("{:.2} dB", d.psnr) } else { "infinite: they are equal".into() },
+    ));
+    let (x, y) = looks.worst;
+    let exposures = looks.exposures.map_or_else(String::new, |e| {
+        format!("; the worst of {} exposures, {:+.1} to {:+.1} stops", e.count, e.first, e.last)
+    });
+    lines.push(("FLIP", format!("{} mean, {} max at ({x}, {y}){exposures}", figure(looks.mean), figure(looks.max))));
+    let share = 100.0 * d.over as f64 / d.pixels.max(1) as f64;
+    let beyond = if args.threshold > 0.0 { format!(" by more than {}", args.threshold) } else { String::new() };
+    lines.push(("pixels", format!("{} of {} differ{beyond} ({share:.2} %)", grouped(d.over), grouped(d.pixels))));
+    for layer in &compared.layers {
+        let what = format!(
+            "RMSE {}, max {}, {} of {} values differ",
+            figure(layer.rmse),
+            figure(layer.max),
+            grouped(layer.differing),
+            grouped(layer.values)
+        );
+        lines.push((&layer.name, what));
+    }
+    for name in &compared.layers_of_one {
+        lines.push((name, "only one of the files has it".into()));
+    }
+    let names = lines.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
+    lines.iter().fold(String::new(), |mut text, (name, what)| {
+        // Writing to a string does not fail.
+        let _ = if name.is_empty() { writeln!(text, "{what}") } else { writeln!(text, "  {name:<names$}  {what}") };
+        text
+    })
+}
+
+/// For programs.
+pub(super) fn json(args: &DiffArgs, compared: &Compared, broken: &[String]) -> String {
+    let (d, looks) = (&compared.difference, &compared.looks);
+    let exposures = looks.exposures.map(|e| json!({"first": e.first, "last": e.last, "count": e.count}));
+    let layers: Vec<Value> = compared
+        .layers
+        .iter()
+        .map(|l| json!({"name": l.name, "rmse": l.rmse, "max": l.max, "differing": l.differing, "values": l.values}))
+        .collect();
+    let report = json!({
+        "schema": "meshray-diff/1",
+        "version": env!("CARGO_PKG_VERSION"),
+        "expected": args.expected.to_string_lossy(),
+        "actual": args.actual.to_string_lossy(),
+        "width": compared.expected.width,
+        "height": compared.expected.height,
+        "space": if compared.space == Space::Display { "display" } else { "linear" },
+        "channels": d.channels,
+        "rmse": d.rmse,
+        "relative_rmse": d.relative_rmse,
+        "bias": d.bias,
+        "max": d.max,
+        "worst": {
+            "x": d.worst.0, "y": d.worst.1,
+            "expected": compared_values(compared, Side::Expected), "actual": compared_values(compared, Side::Actual),
+        },
+        "psnr": d.psnr,
+        "threshold": args.threshold,
+        "pixels_over": d.over,
+        "pixels": d.pixels,
+        "flip": {
+            "mean": looks.mean, "max": looks.max, "worst": {"x": looks.worst.0, "y": looks.worst.1},
+            "pixels_per_degree": args.pixels_per_degree, "exposures": exposures,
+        },
+        "layers": layers,
+        "layers_of_one": compared.layers_of_one,
+        "broken": broken,
+    });
+    format!("{report:#}\n")
+}
+
+/// Which of both pictures.
+#[derive(Clone, Copy)]
+enum Side {
+    Expected,
+    Actual,
+}
+
+/// The values that were compared at the worst pixel.
+fn compared_values(compared: &Compared, side: Side) -> Vec<f64> {
+    let picture: &Picture = match side {
+        Side::Expected => &compared.expected,
+        Side::Actual => &compared.actual,
+    };
+    let (x, y) = compared.difference.worst;
+    let pixel = picture.beauty.get(y as usize * picture.width as usize + x as usize).copied().unwrap_or_default();
+    let coded = |(k, c): (usize, f32)| match compared.space {
+        Space::Display if k < 3 => srgb::encode(f64::from(c).clamp(0.0, 1.0)),
+        _ => f64::from(c),
+    };
+    pixel.into_iter().enumerate().map(coded).take(compared.difference.channels as usize).collect()
+}
+
+fn at(compared: &Compared, side: Side) -> String {
+    compared_values(compared, side).into_iter().map(|v| format!("{v:.4}")).collect::<Vec<_>>().join(" ")
+}
+
+/// Four digits, as small errors need them.
+fn figure(x: f64) -> String {
+    match x {
+        0.0 => "0".into(),
+        x if !x.is_finite() => "infinite".into(),
+        x if x.abs() >= 1e-3 && x.abs() < 1e4 => format!("{x:.5}"),
+        x => format!("{x:.3e}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_errors_keep_their_digits() {
+        assert_eq!([0.0, 0.0123, 4.2e-7, f64::INFINITY].map(figure), ["0", "0.01230", "4.200e-7", "infinite"]);
+    }
+}

@@ -1,0 +1,127 @@
+//! FLIP of linear pictures of any range: the worst that is seen at any exposure that somebody may look at them with.
+
+use super::{Displayed, flip};
+use crate::image::tone::luminance;
+use rayon::prelude::*;
+
+/// The curve of K. Narkowicz, "ACES Filmic Tone Mapping Curve" (2015), with its exposure of 0.6: three coefficients above
+/// and three below the fraction.
+const CURVE: [f64; 6] = [2.51 * 0.36, 0.03 * 0.6, 0.0, 2.43 * 0.36, 0.59 * 0.6, 0.14];
+
+/// What the brightest pixel comes to at the darkest exposure, and the median one at the brightest.
+const BRIGHT: f64 = 0.85;
+
+/// Exposures, in stops: from the one at which the brightest pixel of the reference is just not blown out, to the one at
+/// which its median pixel (of those that are not black) is not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Exposures {
+    /// The darkest.
+    pub first: f64,
+    /// The brightest.
+    pub last: f64,
+    /// How many, at equal distances.
+    pub count: u32,
+}
+
+impl Exposures {
+    /// Exposures beyond which nobody looks.
+    const MOST: f64 = 40.0;
+
+    /// Those for a picture, linear Rec. 709.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most a few tens")]
+    pub fn of(reference: &[[f32; 3]]) -> Self {
+        let mut lights: Vec<f32> =
+            reference.iter().map(|&p| luminance(p)).filter(|&y| y > 0.0 && y.is_finite()).collect();
+        if lights.is_empty() {
+            return Self { first: 0.0, last: 0.0, count: 1 };
+        }
+        lights.sort_unstable_by(f32::total_cmp);
+        let (most, median) = (lights[lights.len() - 1], lights[lights.len() / 2]);
+        let stops = |light: f32| libm::log2(shown_at(BRIGHT) / f64::from(light)).clamp(-Self::MOST, Self::MOST);
+        let (first, last) = (stops(most), stops(median));
+        Self { first, last, count: ((last - first).ceil() as u32).max(2) }
+    }
+
+    /// The `k`th of them, from 0.
+    pub fn stops(&self, k: u32) -> f64 {
+        self.first + (self.last - self.first) * f64::from(k) / f64::from(self.count.max(2) - 1)
+    }
+}
+
+/// FLIP of each pixel: the greatest of all exposures. Pictures of `width` columns and one size, linear Rec. 709.
+pub fn flip_of_any_range(
+    width: usize,
+    reference: &[[f32; 3]],
+    test: &[[f32; 3]],
+    exposures: Exposures,
+    pixels_per_degree: f64,
+) -> Vec<f32> {
+    let mut worst = vec![0.0_f32; reference.len()];
+    for k in 0..exposures.count {
+        let gain = libm::exp2(exposures.stops(k));
+        let [a, b] = [reference, test].map(|pixels| developed(pixels, gain));
+        let shown = |pixels| Displayed { width, pixels };
+        let values = flip(shown(&a), shown(&b), pixels_per_degree);
+        worst.iter_mut().zip(values).for_each(|(worst, value)| *worst = worst.max(value));
+    }
+    worst
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "single precision is enough for a colour")]
+fn developed(pixels: &[[f32; 3]], gain: f64) -> Vec<[f32; 3]> {
+    pixels.par_iter().map(|pixel| pixel.map(|c| curve(f64::from(c) * gain) as f32)).collect()
+}
+
+fn curve(x: f64) -> f64 {
+    let [a, b, c, d, e, f] = CURVE;
+    // Nothing is darker than black; beyond any display, infinity among it, the curve is flat.
+    let x = x.clamp(0.0, 1e6);
+    (((a * x + b) * x + c) / ((d * x + e) * x + f)).clamp(0.0, 1.0)
+}
+
+/// The light that comes to a value of the display, greater than 0.
+fn shown_at(value: f64) -> f64 {
+    let [a, b, c] = [0, 1, 2].map(|k: usize| CURVE[k] - value * CURVE[k + 3]);
+    (-b + (b * b - 4.0 * a * c).sqrt()) / (2.0 * a)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exposures_run_from_the_brightest_to_the_median_pixel() {
+        assert!((curve(shown_at(BRIGHT)) - BRIGHT).abs() < 1e-12);
+        let grey = |y: f32| [y; 3];
+        let exposures = Exposures::of(&[grey(0.0), grey(0.0), grey(1.0), grey(1.0), grey(16.0)]);
+        assert!((exposures.last - exposures.first - 4.0).abs() < 1e-6 && exposures.count == 4, "{exposures:?}");
+        assert!((curve(16.0 * libm::exp2(exposures.stops(0))) - BRIGHT).abs() < 1e-6);
+        assert!((curve(libm::exp2(exposures.stops(3))) - BRIGHT).abs() < 1e-6);
+        assert_eq!(Exposures::of(&[grey(0.0)]).count, 1);
+    }
+
+    #[test]
+    fn differences_among_highlights_and_in_the_dark_are_both_seen() {
+        let mut reference = vec![[0.01_f32; 3]; 64 * 64];
+        reference[..64 * 16].fill([200.0; 3]);
+        let exposures = Exposures::of(&reference);
+        let differing = |rows: std::ops::Range<usize>, to: f32| {
+            let mut test = reference.clone();
+            test[64 * rows.start..64 * rows.end].fill([to; 3]);
+            let values = flip_of_any_range(64, &reference, &test, exposures, super::super::PIXELS_PER_DEGREE);
+            (values[64 * 4 + 32], values[64 * 56 + 32])
+        };
+        let (bright, dark) = differing(0..8, 100.0);
+        assert!(bright > 0.05 && dark == 0.0, "{bright} {dark}");
+        let (bright, dark) = differing(48..64, 0.02);
+        assert!(bright == 0.0 && dark > 0.05, "{bright} {dark}");
+    }
+
+    #[test]
+    fn values_that_are_no_numbers_do_no_harm() {
+        let reference = [[1.0; 3], [f32::INFINITY; 3], [f32::NAN, 0.0, 0.0], [-1.0; 3]];
+        let exposures = Exposures::of(&reference);
+        let values = flip_of_any_range(2, &reference, &[[1.0; 3]; 4], exposures, super::super::PIXELS_PER_DEGREE);
+        assert_eq!(values.len(), 4);
+    }
+}

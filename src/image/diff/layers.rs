@@ -1,0 +1,90 @@
+//! How different the layers of two EXR files are.
+
+use super::distance;
+use crate::image::Layers;
+
+/// The difference of one layer that both pictures have.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LayerDifference {
+    /// As in the file, such as `albedo`, `Z` or `id.prim`.
+    pub name: String,
+    /// Root of the mean squared difference of its values.
+    pub rmse: f64,
+    /// The greatest difference; infinite where just one of two values is a number.
+    pub max: f64,
+    /// Values that differ.
+    pub differing: u64,
+    /// Values compared.
+    pub values: u64,
+}
+
+/// Those of the layers that both have, and the names of those that one has alone.
+pub fn layer_differences(expected: &Layers, actual: &Layers) -> (Vec<LayerDifference>, Vec<String>) {
+    let (ours, theirs) = (named(expected), named(actual));
+    let other = |name: &str| theirs.iter().find(|(other, _)| other == name);
+    let mut alone: Vec<String> = Vec::new();
+    let mut both = Vec::new();
+    for (name, values) in &ours {
+        match other(name) {
+            Some((_, others)) => both.push(difference(name, values, others)),
+            None => alone.push(name.clone()),
+        }
+    }
+    alone.extend(theirs.iter().map(|(name, _)| name).filter(|n| !ours.iter().any(|(o, _)| o == *n)).cloned());
+    (both, alone)
+}
+
+fn difference(name: &str, expected: &[f64], actual: &[f64]) -> LayerDifference {
+    let (mut sum, mut max, mut differing) = (0.0, 0.0_f64, 0);
+    for (&a, &b) in expected.iter().zip(actual) {
+        let d = distance(a, b);
+        sum += d * d;
+        max = max.max(d);
+        differing += u64::from(d > 0.0);
+    }
+    let rmse = (sum / expected.len().max(1) as f64).sqrt();
+    LayerDifference { name: name.to_owned(), rmse, max, differing, values: expected.len() as u64 }
+}
+
+/// Every layer there is, by its name in the file.
+fn named(layers: &Layers) -> Vec<(String, Vec<f64>)> {
+    let vectors = |name: &str, values: &[[f32; 3]]| {
+        (name.to_owned(), values.as_flattened().iter().copied().map(f64::from).collect())
+    };
+    let ids = |name: &str, values: &[u32]| (name.to_owned(), values.iter().copied().map(f64::from).collect());
+    let mut all: Vec<(String, Vec<f64>)> = vec![
+        vectors("albedo", &layers.albedo),
+        vectors("N", &layers.normal),
+        vectors("P", &layers.position),
+        ("Z".to_owned(), layers.depth.iter().copied().map(f64::from).collect()),
+        ids("id.prim", &layers.prim),
+        ids("id.instance", &layers.instance),
+    ];
+    all.extend(layers.channels.iter().map(|channel| (channel.name.clone(), channel.values.iter().collect())));
+    all.retain(|(_, values)| !values.is_empty());
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::{Channel, Values};
+
+    #[test]
+    fn layers_are_compared_by_name_and_what_is_missing_is_named() {
+        let a = Layers {
+            depth: vec![1.0, f32::INFINITY],
+            prim: vec![3, 4],
+            channels: vec![Channel { name: "tests.shadow".into(), values: Values::U32(vec![7, 9]) }],
+            ..Layers::default()
+        };
+        let b =
+            Layers { depth: vec![1.5, f32::INFINITY], albedo: vec![[0.0; 3]; 2], channels: Vec::new(), ..a.clone() };
+        let (both, alone) = layer_differences(&a, &b);
+        let names: Vec<&str> = both.iter().map(|layer| layer.name.as_str()).collect();
+        assert_eq!(names, ["Z", "id.prim"]);
+        assert_eq!((both[0].max, both[0].differing, both[0].values), (0.5, 1, 2));
+        assert_eq!((both[1].rmse, both[1].differing), (0.0, 0));
+        assert_eq!(alone, ["tests.shadow", "albedo"]);
+    }
+}

@@ -1,0 +1,103 @@
+//! `meshray diff`: figures, limits, pictures of the difference.
+
+use super::program::Folder;
+use meshray::image::{FileKind, Layers, Metadata, Output, Picture, ToneMap, encode, read_picture};
+use serde_json::Value;
+
+fn picture(odd: f32) -> Picture {
+    let mut beauty = vec![[0.25, 0.25, 0.25, 1.0]; 40 * 30];
+    beauty[12 * 40 + 7] = [odd, 0.25, 0.25, 1.0];
+    let layers = Layers { depth: vec![odd; 40 * 30], ..Layers::default() };
+    Picture { width: 40, height: 30, beauty, layers: Some(layers) }
+}
+
+fn bytes(picture: &Picture, kind: FileKind) -> Vec<u8> {
+    let output = Output { tone_map: ToneMap::None, ..Output::default() };
+    encode(picture, kind, &output, &Metadata::default()).unwrap()
+}
+
+fn folder() -> Folder {
+    Folder::new()
+        .file("a.png", bytes(&picture(0.25), FileKind::Png))
+        .file("b.png", bytes(&picture(1.0), FileKind::Png))
+        .file("a.exr", bytes(&picture(0.25), FileKind::Exr))
+        .file("b.exr", bytes(&picture(8.0), FileKind::Exr))
+        .file("a.webp", bytes(&picture(0.25), FileKind::Webp))
+        .file("a.jpg", bytes(&picture(0.25), FileKind::Jpeg))
+}
+
+fn figures(folder: &Folder, words: &[&str]) -> Value {
+    let run = folder.run(&[&["diff", "--json"], words].concat()).ends(0);
+    serde_json::from_str(run.text()).unwrap()
+}
+
+#[test]
+fn equal_pictures_differ_by_nothing_whatever_their_type() {
+    let folder = folder();
+    for other in ["a.png", "a.webp"] {
+        let found = figures(&folder, &["a.png", other, "--fail-if", "rmse>0,max>0,flip>0,pixels>0"]);
+        assert_eq!((&found["rmse"], &found["flip"]["max"], &found["psnr"]), (&0.0.into(), &0.0.into(), &Value::Null));
+    }
+    let lossy = figures(&folder, &["a.png", "a.jpg"]);
+    assert!(lossy["max"].as_f64().unwrap() < 0.02, "{lossy}");
+}
+
+#[test]
+fn the_worst_pixel_is_named_with_both_of_its_values() {
+    let folder = folder();
+    let found = figures(&folder, &["a.png", "b.png"]);
+    assert_eq!((&found["schema"], &found["space"]), (&"meshray-diff/1".into(), &"display".into()));
+    assert_eq!((&found["worst"]["x"], &found["worst"]["y"]), (&7.into(), &12.into()));
+    let max = found["max"].as_f64().unwrap();
+    // A quarter of the light is the code 137 of 255.
+    assert!((max - (1.0 - 137.0 / 255.0)).abs() < 1e-6 && found["pixels_over"] == 1, "{found}");
+    assert!((found["rmse"].as_f64().unwrap() - max / 3600_f64.sqrt()).abs() < 1e-9);
+    let run = folder.run(&["diff", "a.png", "b.png"]).ends(0);
+    for words in ["40×30 pixels, display colour", "at (7, 12)", "FLIP", "1 of 1 200 differ"] {
+        assert!(run.text().contains(words), "{words}\n{}", run.text());
+    }
+}
+
+#[test]
+fn two_exr_files_are_compared_in_linear_light_with_their_layers() {
+    let folder = folder();
+    let found = figures(&folder, &["a.exr", "b.exr"]);
+    assert_eq!((&found["space"], &found["max"]), (&"linear".into(), &7.75.into()));
+    assert!(found["flip"]["exposures"]["count"].as_u64().unwrap() >= 2, "{found}");
+    assert_eq!((&found["layers"][0]["name"], &found["layers"][0]["rmse"]), (&"Z".into(), &7.75.into()));
+    let shown = figures(&folder, &["a.exr", "b.exr", "--space", "display", "--exposure", "-3"]);
+    assert!((shown["worst"]["actual"][0].as_f64().unwrap() - 1.0).abs() < 1e-6, "{shown}");
+    let mixed = figures(&folder, &["a.exr", "a.png"]);
+    assert!(mixed["space"] == "display" && mixed["max"].as_f64().unwrap() < 0.003, "{mixed}");
+}
+
+#[test]
+fn a_broken_limit_ends_with_1_and_says_which() {
+    let folder = folder();
+    folder.run(&["diff", "a.png", "b.png", "--fail-if", "rmse>0.1,psnr<20"]).ends(0);
+    let run = folder.run(&["diff", "a.png", "b.png", "--fail-if", "rmse>0.1", "--fail-if", "max>0.2"]).ends(1);
+    run.says(&["max is 0.46", "max>0.2"]);
+    folder.run(&["diff", "a.png", "b.png", "--fail-if", "ssim>1"]).ends(2).says(&["relative-rmse"]);
+}
+
+#[test]
+fn maps_are_drawn_and_kept_only_where_they_are_asked_for() {
+    let folder = folder();
+    let words = ["diff", "a.png", "b.png", "-o", "map.png", "--show", "channel", "--side-by-side", "both.png"];
+    folder.run(&words).ends(0);
+    let map = read_picture(&folder.path("map.png")).unwrap();
+    assert!(map.width >= 40 && map.height > 30);
+    let [quiet, loud] = [0, 12 * map.width as usize + 7].map(|i| map.beauty[i]);
+    assert!(loud[0] > 0.9 && quiet[0] < 0.1, "{quiet:?} {loud:?}");
+    assert_eq!(read_picture(&folder.path("both.png")).unwrap().width, 120);
+}
+
+#[test]
+fn what_cannot_be_compared_is_told() {
+    let folder = folder()
+        .file("small.png", bytes(&Picture { width: 1, height: 1, beauty: vec![[0.0; 4]], layers: None }, FileKind::Png))
+        .file("text.png", b"no picture");
+    folder.run(&["diff", "a.png", "small.png"]).ends(3).says(&["small.png", "1×1", "40×30"]);
+    folder.run(&["diff", "a.png", "text.png"]).ends(3).says(&["text.png", "neither"]);
+    folder.run(&["diff", "a.png", "missing.png"]).ends(1).says(&["missing.png"]);
+}
