@@ -8,7 +8,7 @@
 use super::picture::Effective;
 use crate::image::Picture;
 use crate::math::Vec3;
-use crate::render::{Job, Settings, render};
+use crate::render::{Job, Sampling, Settings, render};
 use crate::scene::Scene;
 
 /// Longest side of the small picture.
@@ -36,6 +36,8 @@ pub(super) fn exposure(scene: &Scene, job: &Job, effective: &Effective) -> Optio
         width: small(width),
         height: small(height),
         samples: 4,
+        sampling: Sampling::Uniform,
+        lens: None,
         layers: true,
         env_rays: Some(0),
         gloss_rays: Some(0),

@@ -30,6 +30,8 @@ impl Effective {
             settings: Settings {
                 width,
                 height,
+                sampling: usual.sampling,
+                lens: None,
                 samples: look.samples.or(hints.samples).unwrap_or(usual.samples),
                 depth: look.depth.or(hints.depth),
                 cutoff: look.cutoff.or(hints.cutoff).unwrap_or(usual.cutoff),

@@ -118,15 +118,22 @@ impl<T: Sample, const CHANNELS: usize> Kernel for Row<'_, T, CHANNELS> {
 }
 
 /// The steps for one pixel.
-pub(super) struct Developer<'a> {
+pub(crate) struct Developer<'a> {
     output: &'a Output,
     gain: f32,
 }
 
 impl<'a> Developer<'a> {
     /// Takes what depends on the settings out of the loop over pixels.
-    pub(super) fn new(output: &'a Output) -> Self {
+    pub(crate) fn new(output: &'a Output) -> Self {
         Self { output, gain: libm::exp2f(output.exposure) }
+    }
+
+    /// sRGB codes 0..=1, as fine as 16 bits, times coverage, and coverage of a premultiplied linear pixel.
+    pub(crate) fn coded(&self, pixel: [f32; 4]) -> [f32; 4] {
+        let [r, g, b, coverage] = self.pixel(pixel);
+        let coded = |light: f32| f32::from(srgb::encode16(light)) / 65_535.0 * coverage;
+        [coded(r), coded(g), coded(b), coverage]
     }
 
     /// Display light (linear, straight, 0..=1) and coverage of a premultiplied linear pixel.

@@ -21,6 +21,7 @@ pub mod srgb;
 pub mod tone;
 mod write;
 
+pub(crate) use develop::Developer;
 pub use encode::encode;
 pub use error::ImageError;
 pub use kind::FileKind;

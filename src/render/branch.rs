@@ -1,7 +1,7 @@
 //! The rays that go on from a shaded point: mirrored, refracted, split by wavelength, spread by roughness.
 
 use super::context::Context;
-use super::draws::{Draws, Spread};
+use super::draws::{Purpose, Spread};
 use super::observer::Observer;
 use super::optics::{dispersed_index, reflect, refract};
 use super::shade::{Balance, Lobe, Matter, above, has_inside, lets_light_in};
@@ -102,14 +102,17 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     fn spread(&mut self, point: &Point, crossing: &Crossing, lobe: Lobe) {
         let rays = if point.path.depth == 0 { self.context.gloss.rays } else { 1 };
         // The same facets mirror and let through, so that nothing is lost between both.
-        let spread = Draws::at(self.context.seed, point.ray, point.hit).spread();
+        let splits = self.splits(point);
+        #[expect(clippy::cast_possible_truncation, reason = "a handful")]
+        let points = if splits { rays.max(self.context.bands.len() as u32) } else { rays };
+        let spread = self.draws(point, Purpose::Facets).spread(points);
         let glass = lets_light_in(point.surface.target.material);
         let mut rough = Rough { lobe, rays, glass, spread };
         self.send_lacquer(point);
         for k in 0..rays {
             self.send_off_facet(point, crossing, &rough, k);
         }
-        if !self.splits(point) {
+        if !splits {
             (0..rays).for_each(|k| self.send_through_facet(point, crossing, &rough, k, point.path.band, Vec3::ONE));
             return;
         }
@@ -130,7 +133,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             let weight = point.path.weight * share * (rough.kept(view, to) / rough.rays as f32);
             self.send_spread(point, above(to, surface.geometric), RayClass::Reflected, rough, |path| Path {
                 weight,
-                ..path
+                ..path.turned(RayClass::Reflected, k + 1)
             });
         }
     }
@@ -168,7 +171,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             band,
             media,
             straight,
-            ..path
+            ..path.turned(RayClass::Refracted, k + 1)
         });
     }
 
@@ -216,7 +219,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
         let surface = point.surface;
         let dir = above(reflect(-surface.view, normal), surface.geometric);
-        let path = Path { band, ..point.bounced(weight) };
+        let path = Path { band, ..point.bounced(weight).turned(RayClass::Reflected, 0) };
         let ray = surface.ray(dir, f32::INFINITY, point.ray.sample);
         self.starting[RayClass::Reflected as usize].push(ray, path, Hit::MISS);
     }
@@ -225,9 +228,11 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         if !self.context.is_alive(weight) {
             return;
         }
+        let turn = band.map_or(0, |band| u32::from(band) + 1);
         // Equal indices leave the ray as it is: the same ray goes on behind this hit.
         if crossing.n_i == crossing.n_t {
-            let path = Path { weight, band, depth: point.path.depth + 1, media: crossing.beyond, ..point.path };
+            let path = point.path.turned(RayClass::Refracted, turn);
+            let path = Path { weight, band, depth: point.path.depth + 1, media: crossing.beyond, ..path };
             return self.continuing[RayClass::Refracted as usize].push(*point.ray, path, *point.hit);
         }
         let surface = point.surface;
@@ -237,7 +242,8 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             return self.send_reflected(point, surface.normal, weight, band);
         };
         let dir = above(bent, -surface.geometric);
-        let path = Path { band, media: crossing.beyond, ..point.bounced(weight) };
+        let path = point.bounced(weight).turned(RayClass::Refracted, turn);
+        let path = Path { band, media: crossing.beyond, ..path };
         let ray = surface.ray(dir, f32::INFINITY, point.ray.sample);
         self.starting[RayClass::Refracted as usize].push(ray, path, Hit::MISS);
     }

@@ -3,6 +3,7 @@
 use super::Settings;
 use super::absorption::Absorption;
 use super::shade::{Band, LocalLight, bands, lets_light_in};
+use super::sampling::Sampling;
 use super::sky::Sky;
 use super::strip::Uniform;
 use super::texture::TextureStore;
@@ -13,6 +14,18 @@ use crate::scene::{AlphaMode, Background, Light, Material, Scene};
 
 /// Rays to a panorama from each point, when nobody says.
 const ENV_RAYS: u32 = 16;
+
+/// Fewest rays to a panorama from a point of which there are several samples.
+const ENV_RAYS_LEAST: u32 = 6;
+
+/// Samples of a pixel that share the rays which one sample would send from each point: of stochastic sampling as many as
+/// every pixel has, for more rays come with more samples where they are needed.
+fn samples_together(settings: &Settings) -> u32 {
+    match settings.sampling {
+        Sampling::Stochastic(how) => how.min_samples.min(how.max_samples).max(1),
+        Sampling::Uniform | Sampling::Adaptive(_) => 1,
+    }
+}
 
 /// Shared by all workers, computed once per image.
 pub(crate) struct Context<'a> {
@@ -65,6 +78,11 @@ impl Gloss {
         Self { rays: asked.unwrap_or(GLASS), all: asked.is_some_and(|rays| rays > 0) }
     }
 
+    /// The same rays, shared by so many samples.
+    fn shared_by(self, samples: u32) -> Self {
+        Self { rays: self.rays.div_ceil(samples), ..self }
+    }
+
     /// Whether a material spreads rays where it is rough.
     pub(crate) fn spreads(self, material: &Material) -> bool {
         self.all || self.rays > 0 && lets_light_in(material)
@@ -75,10 +93,13 @@ impl<'a> Context<'a> {
     pub(crate) fn new(scene: &'a Scene, world: &'a World, textures: &'a TextureStore<'a>, settings: &Settings) -> Self {
         let everything = settings.everything;
         let features = Features::of(scene);
-        let gloss = Gloss::new(settings.gloss_rays);
+        let together = samples_together(settings);
+        let gloss = Gloss::new(settings.gloss_rays).shared_by(together);
         let depth = settings.depth.unwrap_or_else(|| auto_depth(&features, gloss.all));
         let sky = Sky::new(scene);
         let env_rays = settings.env_rays.unwrap_or(if sky.is_map() { ENV_RAYS } else { 0 });
+        // Each way of drawing a direction to a panorama needs a ray in each of both halves.
+        let env_rays = env_rays.div_ceil(together).max(env_rays.min(if sky.is_map() { ENV_RAYS_LEAST } else { 2 }));
         let wide = scene.lights.iter().any(Light::is_wide);
         let alone = everything || settings.layers || wide || sky.is_map() || env_rays > 0 || gloss.all;
         let uniform = |m: &Material| if alone { None } else { Uniform::of(m, textures, depth > 0) };
@@ -90,7 +111,7 @@ impl<'a> Context<'a> {
             is_dark: sky.is_dark() && scene.ambient == Vec3::ZERO,
             sky,
             env_rays,
-            light_rays: settings.light_rays.max(1),
+            light_rays: settings.light_rays.max(1).div_ceil(together),
             gloss,
             seed: settings.seed,
             lights: scene.lights.iter().map(|l| LocalLight::new(l, world.center)).collect(),

@@ -104,7 +104,7 @@ impl Costs {
     }
 }
 
-/// Traces the picture again for each kind of cost: once for all counts, once for the times. The counts are exact and the
+/// Traces the picture again, as many samples in each pixel as [`super::Settings::samples`] says, for each kind of cost: once for all counts, once for the times. The counts are exact and the
 /// same for every number of threads. `None` when cancelled.
 ///
 /// Times are those of one pixel after the other on each thread, by the clock, and of three passes the least: what a
@@ -156,9 +156,9 @@ fn pass<P: Observer, T: Copy + Default + Send>(
     together: Together,
     cost: impl Fn(&mut ByClass<P>, usize) -> Vec<T> + Sync,
 ) -> Option<Vec<T>> {
-    let settings = job.settings;
-    let context = Context::new(job.scene, job.world, job.textures, settings);
-    cost_tiles(&context, job.accel, job.view, settings, progress, together, cost)
+    let settings = job.settings.fixed();
+    let context = Context::new(job.scene, job.world, job.textures, &settings);
+    cost_tiles(&context, job.accel, job.view, &settings, progress, together, cost)
 }
 
 /// Tests, steps, tests saved.

@@ -1,5 +1,6 @@
 //! Numbers for random choices: the same in every run, for every structure and any number of threads.
 
+use super::sobol::{self, mix};
 use crate::accel::{Hit, Ray};
 use crate::math::random::Random;
 
@@ -8,35 +9,83 @@ use crate::math::random::Random;
 /// M. Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences" (2018).
 const STEPS: [f32; 2] = [0.754_877_7, 0.569_840_3];
 
+/// A sample's place among those of its pixel: the `index`th of a sequence that no other pixel has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Stream {
+    pub key: u32,
+    pub index: u32,
+}
+
 /// The random choices of one hit.
 #[derive(Clone, Debug)]
-pub(crate) struct Draws(Random);
+pub(crate) struct Draws(From);
 
-/// Points that fill the unit square evenly, moved as a whole.
+#[derive(Clone, Debug)]
+enum From {
+    /// The hit alone.
+    Hit(Random),
+    /// The sample's place among its pixel's, in dimensions that the kind of choice decides.
+    Stream(Stream, u32),
+}
+
+/// Points that fill the unit square evenly.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Spread {
-    shift: [f32; 2],
+pub(crate) enum Spread {
+    /// A lattice, moved as a whole.
+    Moved([f32; 2]),
+    /// A part of a sequence that begins with this index.
+    Part { key: u32, first: u32 },
+}
+
+/// What random choices of one hit are for: each has numbers of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Purpose {
+    Lights,
+    Facets,
+    Surroundings,
 }
 
 impl Draws {
-    /// Those of a hit; nothing but the ray and where it ended decides them.
-    pub(crate) fn at(seed: u64, ray: &Ray, hit: &Hit) -> Self {
+    /// Those of a hit. Where the sample has no place in a stream, nothing but the ray and where it ended decides them: equal
+    /// rays have equal numbers. Else they are the sample's members of sequences that all samples of its pixel share, so that
+    /// these together fill what they sample evenly; `branch` tells the hits of one sample's tree apart.
+    pub(crate) fn at(seed: u64, streams: &[Stream], branch: u32, ray: &Ray, hit: &Hit, purpose: Purpose) -> Self {
+        if let Some(&stream) = streams.get(ray.sample as usize) {
+            return Self(From::Stream(stream, mix(branch, purpose as u32)));
+        }
+        let seed = if purpose == Purpose::Lights { !seed } else { seed };
         let words = ray.origin.to_array().into_iter().chain(ray.dir.to_array()).chain([hit.t, hit.u, hit.v]);
         let start = seed ^ u64::from(hit.prim);
-        Self(Random::new(words.fold(start, |mixed, word| Random::new(mixed ^ u64::from(word.to_bits())).bits())))
+        let mixed = words.fold(start, |mixed, word| Random::new(mixed ^ u64::from(word.to_bits())).bits());
+        Self(From::Hit(Random::new(mixed)))
     }
 
-    /// A sequence that is independent of those taken before.
-    pub(crate) fn spread(&mut self) -> Spread {
-        Spread { shift: [self.0.unit(), self.0.unit()] }
+    /// A sequence that is independent of those taken before, for so many points.
+    pub(crate) fn spread(&mut self, points: u32) -> Spread {
+        match &mut self.0 {
+            From::Hit(random) => Spread::Moved([random.unit(), random.unit()]),
+            From::Stream(stream, dimension) => {
+                *dimension = mix(*dimension, u32::MAX);
+                Spread::Part { key: mix(stream.key, *dimension), first: stream.index.wrapping_mul(points) }
+            }
+        }
     }
 }
 
 impl Spread {
     /// Its `k`th point, both coordinates 0 ≤ x < 1.
     pub(crate) fn point(self, k: u32) -> [f32; 2] {
-        [0, 1].map(|axis: usize| (self.shift[axis] + k as f32 * STEPS[axis]).fract())
+        match self {
+            Self::Moved(shift) => [0, 1].map(|axis: usize| (shift[axis] + k as f32 * STEPS[axis]).fract()),
+            Self::Part { key, first } => sobol::point::<2>(first.wrapping_add(k), key).map(below_one),
+        }
     }
+}
+
+/// Rounding must not reach 1.
+#[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what this does")]
+fn below_one(x: f64) -> f32 {
+    (x as f32).min(1.0_f32.next_down())
 }
 
 #[cfg(test)]
@@ -54,7 +103,8 @@ mod tests {
             exclude: crate::accel::NO_PRIM,
             sample: 0,
         };
-        let first = |seed, x| Draws::at(seed, &ray(x), &Hit { t: 1.0, ..Hit::MISS }).spread().point(0);
+        let at = |seed, x| Draws::at(seed, &[], 0, &ray(x), &Hit { t: 1.0, ..Hit::MISS }, Purpose::Facets);
+        let first = |seed, x| at(seed, x).spread(1).point(0);
         assert_eq!(first(0, 1.0), first(0, 1.0));
         assert_ne!(first(0, 1.0), first(1, 1.0));
         assert_ne!(first(0, 1.0), first(0, 1.0 + f32::EPSILON));
@@ -62,12 +112,38 @@ mod tests {
 
     #[test]
     fn points_fill_the_square_evenly() {
-        let spread = Spread { shift: [0.3, 0.9] };
+        let spread = Spread::Moved([0.3, 0.9]);
         let mut cells = [0; 64];
         for k in 0..640 {
             let [x, y] = spread.point(k);
             cells[(x * 8.0) as usize * 8 + (y * 8.0) as usize] += 1;
         }
         assert!(cells.iter().all(|&n| (7..=13).contains(&n)), "{cells:?}");
+    }
+
+    #[test]
+    fn the_samples_of_a_pixel_share_a_sequence_whatever_they_hit() {
+        let ray = |sample| Ray {
+            origin: Vec3::X * sample as f32,
+            t_min: 0.0,
+            dir: Vec3::NEG_Z,
+            t_max: 9.0,
+            exclude: crate::accel::NO_PRIM,
+            sample,
+        };
+        let streams: Vec<Stream> = (0..64).map(|index| Stream { key: 5, index }).collect();
+        let cell = |sample, branch, purpose| {
+            let [x, y] = Draws::at(0, &streams, branch, &ray(sample), &Hit::MISS, purpose).spread(1).point(0);
+            (x * 8.0) as usize * 8 + (y * 8.0) as usize
+        };
+        for (branch, purpose) in [(0, Purpose::Lights), (7, Purpose::Facets)] {
+            let mut cells: Vec<usize> = (0..64).map(|sample| cell(sample, branch, purpose)).collect();
+            cells.sort_unstable();
+            assert!(cells.into_iter().eq(0..64), "{purpose:?}");
+        }
+        // Other branches and purposes draw from other sequences.
+        let same = |a: (u32, Purpose), b: (u32, Purpose)| (0..64).filter(|&s| cell(s, a.0, a.1) == cell(s, b.0, b.1)).count();
+        assert!(same((0, Purpose::Lights), (0, Purpose::Facets)) < 8);
+        assert!(same((0, Purpose::Lights), (1, Purpose::Lights)) < 8);
     }
 }

@@ -1,6 +1,6 @@
 //! Rays from the eye: the first wave of every batch of pixels, many at a time.
 
-use super::view::View;
+use super::view::{PrimaryRay, View};
 use super::wave::Path;
 use crate::accel::{Hit, NO_PRIM, Ray};
 use crate::math::simd::{Kernel, Level, Simd};
@@ -18,6 +18,34 @@ pub(crate) struct Eyes {
     cone_spread: Vec<f32>,
 }
 
+/// A lens with an opening: what is not at its focus is blurred.
+///
+/// R. L. Cook, T. Porter, L. Carpenter, "Distributed Ray Tracing" (1984). Uniform sampling has one point of the lens for
+/// each of its samples, another for each pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ThinLens {
+    /// Radius of the opening, world units.
+    pub radius: f64,
+    /// Distance along the view axis of what is sharp, world units; above 0.
+    pub focus: f64,
+}
+
+/// A point of the picture, from its upper left corner in pixels, seen through a point of the lens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Place {
+    pub x: f64,
+    pub y: f64,
+    /// In the unit square, which is laid over the disc of the lens.
+    pub lens: [f64; 2],
+}
+
+impl Place {
+    /// Through the middle of the lens.
+    pub(crate) fn new(x: f64, y: f64) -> Self {
+        Self { x, y, lens: [0.5; 2] }
+    }
+}
+
 /// Where eye rays come from.
 #[derive(Clone, Copy)]
 pub(crate) struct Eye<'a> {
@@ -30,6 +58,8 @@ pub(crate) struct Eye<'a> {
     pub sample_width: f32,
     /// Everything that can be seen, where rays may start just before it.
     pub scene: Ball,
+    /// `None`: everything is sharp.
+    pub lens: Option<ThinLens>,
 }
 
 /// An eye farther from the scene than this many of its diagonals starts its rays just before the scene.
@@ -52,11 +82,28 @@ pub(crate) struct EyeRay {
 }
 
 impl Eye<'_> {
-    /// The ray through (x, y) of the picture, started before the scene when the eye is far away, in the centred frame.
+    /// The ray of a place, started before the scene when the eye is far away, in the centred frame.
+    pub(crate) fn ray(&self, place: Place) -> EyeRay {
+        let eye = self.view.primary(place.x, place.y, self.width, self.height);
+        self.start(match self.lens {
+            Some(lens) => self.through(lens, eye, place.lens),
+            None => eye,
+        })
+    }
+
+    /// The ray from a point of the lens to where `ray` meets what is in focus.
+    #[inline(always)]
+    fn through(&self, lens: ThinLens, ray: PrimaryRay, at: [f64; 2]) -> PrimaryRay {
+        let view = self.view;
+        let [x, y] = on_disc(at).map(|c| c * lens.radius);
+        let sharp = ray.dir * (lens.focus / ray.dir.dot(view.forward));
+        let aside = view.right * x + view.up * y;
+        PrimaryRay { origin: ray.origin + aside, dir: (sharp - aside).normalize(), ..ray }
+    }
+
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "widths are estimates")]
-    pub(crate) fn ray(&self, x: f64, y: f64) -> EyeRay {
-        let eye = self.view.primary(x, y, self.width, self.height);
+    fn start(&self, eye: PrimaryRay) -> EyeRay {
         let skipped = self.scene.distance_before(eye.origin, eye.dir);
         EyeRay {
             origin: (eye.origin - self.center + eye.dir * skipped).as_vec3(),
@@ -65,6 +112,23 @@ impl Eye<'_> {
             cone_spread: eye.cone_spread * self.sample_width,
         }
     }
+}
+
+/// A point of the unit square laid over the unit disc: areas keep their size, and neighbours stay together.
+///
+/// P. Shirley, K. Chiu, "A Low Distortion Map Between Disk and Square" (1997).
+fn on_disc([u, v]: [f64; 2]) -> [f64; 2] {
+    let (x, y) = (2.0 * u - 1.0, 2.0 * v - 1.0);
+    let quarter = std::f64::consts::FRAC_PI_4;
+    let (radius, angle) = if x.abs() > y.abs() {
+        (x, quarter * (y / x))
+    } else if y != 0.0 {
+        (y, 2.0 * quarter - quarter * (x / y))
+    } else {
+        return [0.0; 2];
+    };
+    let (sin, cos) = libm::sincos(angle);
+    [radius * cos, radius * sin]
 }
 
 impl EyeRay {
@@ -97,11 +161,12 @@ impl Eyes {
         self.cone_spread.clear();
     }
 
-    /// Adds the rays through these points of the picture; the `i`th ray is that of sample `i`.
-    pub(crate) fn send(&mut self, eye: &Eye, points: impl Iterator<Item = (f64, f64)>) {
+    /// Adds the rays of these places; the `i`th ray is that of sample `i`.
+    pub(crate) fn send(&mut self, eye: &Eye, places: impl Iterator<Item = Place>) {
         let mut run = Run::default();
-        for (x, y) in points {
-            (run.x[run.count % RUN], run.y[run.count % RUN]) = (x, y);
+        for Place { x, y, lens } in places {
+            let at = run.count % RUN;
+            (run.x[at], run.y[at], run.lens[at]) = (x, y, lens);
             run.count += 1;
             if run.count == RUN {
                 self.take(eye, &mut run);
@@ -135,6 +200,7 @@ struct Run {
     count: usize,
     x: [f64; RUN],
     y: [f64; RUN],
+    lens: [[f64; 2]; RUN],
     origin: [[f32; RUN]; 3],
     dir: [[f32; RUN]; 3],
     cone_width: [f32; RUN],
@@ -147,6 +213,7 @@ impl Default for Run {
             count: 0,
             x: [0.0; RUN],
             y: [0.0; RUN],
+            lens: [[0.0; 2]; RUN],
             origin: [[0.0; RUN]; 3],
             dir: [[0.0; RUN]; 3],
             cone_width: [0.0; RUN],
@@ -169,10 +236,70 @@ impl Kernel for Aim<'_> {
         let view = *eye.view;
         let eye = Eye { view: &view, ..*eye };
         for i in 0..run.count.next_multiple_of(8).min(RUN) {
-            let EyeRay { origin, dir, cone_width, cone_spread } = eye.ray(run.x[i], run.y[i]);
+            let mut ray = view.primary(run.x[i], run.y[i], eye.width, eye.height);
+            if let Some(lens) = eye.lens {
+                ray = eye.through(lens, ray, run.lens[i]);
+            }
+            let EyeRay { origin, dir, cone_width, cone_spread } = eye.start(ray);
             (run.origin[0][i], run.origin[1][i], run.origin[2][i]) = (origin.x, origin.y, origin.z);
             (run.dir[0][i], run.dir[1][i], run.dir[2][i]) = (dir.x, dir.y, dir.z);
             (run.cone_width[i], run.cone_spread[i]) = (cone_width, cone_spread);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::view::Lens;
+
+    fn eye(view: &View, lens: Option<ThinLens>) -> Eye<'_> {
+        let scene = Ball { center: DVec3::ZERO, radius: f64::INFINITY };
+        Eye { view, width: 40, height: 30, center: DVec3::ZERO, sample_width: 1.0, scene, lens }
+    }
+
+    #[test]
+    fn rays_through_all_of_a_lens_meet_where_it_is_focused() {
+        for lens in [Lens::perspective(0.8), Lens::orthographic(3.0)] {
+            let view = View::look_at(DVec3::new(1.0, 2.0, 6.0), DVec3::ZERO, DVec3::Y, lens);
+            let thin = ThinLens { radius: 0.3, focus: 4.0 };
+            let sharp = eye(&view, None).ray(Place::new(7.5, 21.0));
+            let length = 4.0 / f64::from(sharp.dir.dot(view.forward.as_vec3()));
+            let meeting = sharp.origin + sharp.dir * length as f32;
+            let mut farthest = 0.0_f32;
+            for at in [[0.0, 0.0], [0.5, 0.5], [1.0, 0.3], [0.2, 0.9]] {
+                let ray = eye(&view, Some(thin)).ray(Place { x: 7.5, y: 21.0, lens: at });
+                let nearest = (meeting - ray.origin).dot(ray.dir);
+                assert!((ray.origin + ray.dir * nearest - meeting).length() < 1e-5, "{at:?}");
+                farthest = farthest.max((ray.origin - sharp.origin).length());
+            }
+            assert!((0.2..=0.300_01).contains(&farthest), "{farthest}");
+        }
+    }
+
+    #[test]
+    fn the_square_covers_the_disc_evenly() {
+        let n = 200;
+        let middle = |i: u32| (f64::from(i) + 0.5) / f64::from(n);
+        let points = (0..n * n).map(|i| on_disc([middle(i % n), middle(i / n)]));
+        let inner = points.filter(|[x, y]| x * x + y * y < 0.25).count();
+        assert!((inner as f64 / f64::from(n * n) - 0.25).abs() < 0.005, "{inner}");
+    }
+
+    #[test]
+    fn rays_set_up_side_by_side_have_the_bits_of_single_ones() {
+        let view = View::look_at(DVec3::new(1.0, 2.0, 6.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.8));
+        for lens in [None, Some(ThinLens { radius: 0.3, focus: 4.0 })] {
+            let eye = eye(&view, lens);
+            let place = |i: u32| {
+                let i = f64::from(i);
+                Place { x: i * 0.37, y: 30.0 - i * 0.21, lens: [(i * 0.618).fract(), (i * 0.414).fract()] }
+            };
+            let mut eyes = Eyes::default();
+            eyes.send(&eye, (0..100).map(place));
+            for (i, ray) in (0..100).zip(&eyes.rays) {
+                assert_eq!(*ray, eye.ray(place(i)).with_path(i).0, "{lens:?}");
+            }
         }
     }
 }

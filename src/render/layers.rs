@@ -47,21 +47,53 @@ pub(crate) struct LayerPixel {
     instance: u32,
 }
 
-impl LayerPixel {
-    /// From the samples of a pixel; depth counts from `eye` along the unit vector `forward`.
+/// The first surfaces of the samples of a pixel, gathered one by one.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LayerSum {
+    albedo: Vec3,
+    normal: Vec3,
+    first: Facts,
+    samples: u32,
+}
+
+impl Default for LayerSum {
+    fn default() -> Self {
+        Self { albedo: Vec3::ZERO, normal: Vec3::ZERO, first: Facts::NONE, samples: 0 }
+    }
+}
+
+impl LayerSum {
+    pub(crate) fn add(&mut self, facts: &Facts) {
+        self.albedo += facts.albedo;
+        self.normal += facts.normal;
+        self.samples += 1;
+        if !self.first.is_some() {
+            self.first = *facts;
+        }
+    }
+
+    /// Depth counts from `eye` along the unit vector `forward`.
     #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "layers are f32")]
-    pub(crate) fn new(samples: &[Facts], eye: DVec3, forward: DVec3) -> Self {
-        let share = 1.0 / samples.len().max(1) as f32;
-        let first = samples.iter().find(|f| f.is_some());
-        let normal: Vec3 = samples.iter().map(|f| f.normal).sum();
-        Self {
-            albedo: samples.iter().map(|f| f.albedo).sum::<Vec3>() * share,
-            normal: normal * share,
+    pub(crate) fn pixel(&self, eye: DVec3, forward: DVec3) -> LayerPixel {
+        let share = 1.0 / self.samples.max(1) as f32;
+        let first = Some(&self.first).filter(|f| f.is_some());
+        LayerPixel {
+            albedo: self.albedo * share,
+            normal: self.normal * share,
             position: first.map_or(Vec3::ZERO, |f| f.position.as_vec3()),
             depth: first.map_or(f32::INFINITY, |f| (f.position - eye).dot(forward) as f32),
             prim: first.map_or(NO_PRIM, |f| f.prim),
             instance: first.map_or(NO_PRIM, |f| f.instance),
         }
+    }
+}
+
+impl LayerPixel {
+    /// From the samples of a pixel; depth counts from `eye` along the unit vector `forward`.
+    pub(crate) fn new(samples: &[Facts], eye: DVec3, forward: DVec3) -> Self {
+        let mut sum = LayerSum::default();
+        samples.iter().for_each(|facts| sum.add(facts));
+        sum.pixel(eye, forward)
     }
 
     /// Writes this into pixel `i` of `layers`, whose arrays are all long enough.

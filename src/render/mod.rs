@@ -10,23 +10,29 @@
 //! in a fixed order within a tile, and transcendental functions are the crate's own.
 
 mod absorption;
+mod adaptive;
 mod asking;
 mod branch;
+mod certainty;
 mod context;
 mod costs;
 mod draws;
 pub mod everything;
 mod eyes;
+mod frame;
 mod layers;
 mod observer;
 pub mod optics;
 mod patch;
 mod pixel;
 mod profile;
+mod sampling;
 mod seam;
 mod shade;
 mod shadow;
 mod sky;
+mod sobol;
+mod stochastic;
 pub mod story;
 mod strip;
 pub mod studio;
@@ -41,8 +47,10 @@ mod whitted;
 pub mod world;
 
 pub use costs::{Cost, Costs, UnknownCost, render_costs};
+pub use eyes::ThinLens;
 pub use observer::{Asked, Question, Tape};
 pub use profile::{Profile, render_profiled};
+pub use sampling::{Adaptive, ErrorSpace, Filter, Quality, Sampled, Sampling, Stochastic};
 pub use surface::given_normal;
 pub use view::View;
 pub use world::{PrimSource, World};
@@ -65,8 +73,13 @@ pub struct Settings {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// Samples a pixel: a square number lies on a regular grid, another on a rank-1 lattice.
+    /// Samples a pixel of uniform sampling: a square number lies on a regular grid, another on a rank-1 lattice. What needs
+    /// a fixed number in every other kind of sampling, too (costs of pixels, recorded rays, single samples), takes these.
     pub samples: u32,
+    /// Which rays a pixel gets.
+    pub sampling: Sampling,
+    /// The lens, if it has an opening.
+    pub lens: Option<ThinLens>,
     /// Bounces after the eye ray; `None`: chosen from the scene.
     pub depth: Option<u32>,
     /// Branches whose weight (largest channel) falls below this end.
@@ -88,12 +101,21 @@ pub struct Settings {
     pub everything: bool,
 }
 
+impl Settings {
+    /// The same with as many samples in each pixel.
+    fn fixed(&self) -> Self {
+        Self { sampling: Sampling::Uniform, ..self.clone() }
+    }
+}
+
 impl Default for Settings {
     fn default() -> Self {
         Self {
             width: 1024,
             height: 768,
             samples: 4,
+            sampling: Sampling::Uniform,
+            lens: None,
             depth: None,
             cutoff: 1.0 / 512.0,
             seed: 0,
@@ -159,6 +181,8 @@ pub struct Rendered {
     pub picture: Picture,
     /// Zero unless counted.
     pub counts: ClassCounts,
+    /// How many rays pixels got, and how certain they are.
+    pub sampled: Sampled,
     /// The maximum depth used.
     pub depth: u32,
     /// False when rendering was cancelled before the end.
@@ -182,9 +206,10 @@ pub fn render_counted(job: &Job, progress: &dyn Progress) -> Rendered {
     rendered
 }
 
-/// Renders on one thread and keeps the rays: of each class at most [`Tape::LIMIT`] for each question. `None` when a thread
-/// cannot be started or the rendering was cancelled.
+/// Renders on one thread, as many samples in each pixel as [`Settings::samples`] says, and keeps the rays: of each class at
+/// most [`Tape::LIMIT`] for each question. `None` when a thread cannot be started or the rendering was cancelled.
 pub fn render_recorded(job: &Job, progress: &dyn Progress) -> Option<(Rendered, Recording)> {
+    let job = &Job { settings: &job.settings.fixed(), ..*job };
     // One thread takes the tiles in order, so that the rays come in the same order in every run.
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().ok()?;
     let (rendered, mut tapes) = alone.install(|| render_with::<Tape>(job, progress));
@@ -214,6 +239,7 @@ pub struct Recording {
 fn render_with<P: Observer>(job: &Job, progress: &dyn Progress) -> (Rendered, Vec<ByClass<P>>) {
     let settings = job.settings;
     let context = Context::new(job.scene, job.world, job.textures, settings);
-    let (picture, counts, complete) = tile::render_tiles(&context, job.accel, job.view, settings, progress);
-    (Rendered { picture, counts: ClassCounts::default(), depth: context.depth, complete }, counts)
+    let (picture, sampled, counts, complete) =
+        tile::render_tiles(&context, job.accel, job.view, settings, progress);
+    (Rendered { picture, counts: ClassCounts::default(), sampled, depth: context.depth, complete }, counts)
 }

@@ -34,11 +34,11 @@ pub fn render_profiled(job: &Job, progress: &dyn Progress) -> (Rendered, Profile
     let mut watch = Stopwatch::of_all_threads();
     let context = Context::new(job.scene, job.world, job.textures, job.settings);
     let prepare = watch.lap();
-    let (picture, clocks, complete) =
+    let (picture, sampled, clocks, complete) =
         tile::render_tiles::<_, Clock>(&context, job.accel, job.view, job.settings, progress);
     let tiles = watch.lap();
     let (trace, rays) = shares(clocks, tiles.cpu);
-    let rendered = Rendered { picture, counts: Default::default(), depth: context.depth, complete };
+    let rendered = Rendered { picture, counts: Default::default(), sampled, depth: context.depth, complete };
     (rendered, Profile { prepare, tiles, trace, rays })
 }
 

@@ -85,9 +85,10 @@ pub struct Story {
     pub depth: u32,
 }
 
-/// Traces one sample (counted from 0) of the pixel in column x and row y; `None`: there is no such pixel or sample.
+/// Traces one sample (counted from 0) of the pixel in column x and row y, of [`super::Settings::samples`] in each; `None`:
+/// there is no such pixel or sample.
 pub fn tell(job: &Job, pixel: (u32, u32), sample: u32) -> Option<Story> {
-    let settings = job.settings;
+    let settings = &job.settings.fixed();
     let context = Context::new(job.scene, job.world, job.textures, settings);
     let (seen, told) = trace_sample::<_, Listener>(&context, job.accel, job.view, settings, pixel, sample)?;
     let mut queries = gather(told);

@@ -4,17 +4,17 @@
 //! bits.
 
 use super::context::Context;
-use super::eyes::{Ball, Eye};
+use super::eyes::Ball;
+use super::frame::{Frame, resolve};
 use super::layers::{self, Facts, LayerPixel};
 use super::observer::Observer;
 use super::pixel::sample_offsets;
+use super::sampling::{Sampled, Sampling};
 use super::view::View;
 use super::whitted::{ByClass, Sample, Tracer};
-use super::{Progress, Settings};
+use super::{Progress, Settings, adaptive, stochastic};
 use crate::accel::Accel;
-use crate::image::Picture;
-use crate::math::{DVec3, Vec3};
-use crate::scene::Background;
+use crate::image::{Channel, Layers, Picture, Values};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Columns and rows of a tile.
@@ -24,49 +24,105 @@ const TILE: u32 = 32;
 const BLOCK: u32 = 4;
 
 /// Samples that are traced together at most: few enough that they and their rays stay in a processor's own cache.
-const TOGETHER: usize = 1 << 11;
+pub(super) const TOGETHER: usize = 1 << 11;
 
 /// A part of the picture: pixels `x0..x1` of rows `y0..y1`.
 #[derive(Clone, Copy, Debug)]
-struct Tile {
-    x0: u32,
-    y0: u32,
-    x1: u32,
-    y1: u32,
+pub(super) struct Tile {
+    pub x0: u32,
+    pub y0: u32,
+    pub x1: u32,
+    pub y1: u32,
 }
 
 /// What came of a tile, in the order of its places.
-struct TilePixels {
-    tile: Tile,
-    beauty: Vec<[f32; 4]>,
-    layers: Vec<LayerPixel>,
+pub(super) struct TilePixels {
+    pub tile: Tile,
+    pub beauty: Vec<[f32; 4]>,
+    pub layers: Vec<LayerPixel>,
+    /// Empty where every pixel has equally many samples.
+    pub facts: Vec<PixelFacts>,
+    /// Eye rays in all.
+    pub rays: u64,
 }
 
-/// What all tiles share.
-struct Frame<'a> {
-    view: &'a View,
-    settings: &'a Settings,
-    offsets: Vec<(f64, f64)>,
-    /// Sharpness of one sample relative to a pixel.
-    sample_width: f32,
-    scene: Ball,
-    background: Option<Vec3>,
+/// How the sampling of a pixel went.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PixelFacts {
+    /// Eye rays.
+    pub count: u32,
+    /// Standard error, if that was estimated.
+    pub error: f32,
+    pub end: End,
 }
 
-/// Renders every tile; the picture, the counts of all threads, and whether nothing was cut short by the user.
+/// Why a pixel got no more samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum End {
+    /// Nothing was estimated.
+    Unknown,
+    /// Its mean was certain.
+    Met,
+    /// It had the most that are allowed.
+    Ceiling,
+}
+
+/// Renders every tile; the picture, how it was sampled, the counts of all threads, and whether nothing was cut short by the user.
 pub(crate) fn render_tiles<A: Accel, P: Observer>(
     context: &Context,
     accel: &A,
     view: &View,
     settings: &Settings,
     progress: &dyn Progress,
-) -> (Picture, Vec<ByClass<P>>, bool) {
+) -> (Picture, Sampled, Vec<ByClass<P>>, bool) {
     let frame = Frame::new(context, view, settings);
-    let work = |tracer: &mut Tracer<A, P>, tile| frame.render(tracer, tile);
+    let work = |tracer: &mut Tracer<A, P>, tile| match &settings.sampling {
+        Sampling::Uniform => frame.render(tracer, tile),
+        Sampling::Adaptive(how) => adaptive::render(&frame, how, tracer, tile),
+        Sampling::Stochastic(how) => stochastic::render(&frame, how, tracer, tile),
+    };
     let (finished, counts, complete) = each_tile(context, accel, settings, progress, work);
     let mut picture = empty_picture(settings);
     finished.iter().for_each(|pixels| pixels.store(&mut picture));
-    (picture, counts, complete)
+    let sampled = sampled(settings, &finished);
+    if let Some(layers) = &mut picture.layers {
+        add_channels(&sampled, layers);
+    }
+    (picture, sampled, counts, complete)
+}
+
+/// How the pixels of finished tiles were sampled; the others had no rays.
+fn sampled(settings: &Settings, finished: &[TilePixels]) -> Sampled {
+    let pixels = settings.width as usize * settings.height as usize;
+    let rays = finished.iter().map(|tile| tile.rays).sum();
+    let mut sampled = Sampled { pixels: pixels as u64, rays, ..Sampled::default() };
+    if settings.sampling != Sampling::Uniform {
+        sampled.counts = vec![0; pixels];
+    }
+    if matches!(settings.sampling, Sampling::Stochastic(_)) {
+        sampled.errors = vec![0.0; pixels];
+    }
+    for tile in finished {
+        for ((x, y), facts) in tile.tile.places().zip(&tile.facts) {
+            let i = y as usize * settings.width as usize + x as usize;
+            sampled.counts[i] = facts.count;
+            sampled.errors.get_mut(i).into_iter().for_each(|error| *error = facts.error);
+            sampled.met += u64::from(facts.end == End::Met);
+            sampled.at_most += u64::from(facts.end == End::Ceiling);
+        }
+    }
+    sampled
+}
+
+/// What is known of the sampling of each pixel, as layers.
+fn add_channels(sampled: &Sampled, layers: &mut Layers) {
+    let mut add = |name: &str, values: Values| {
+        if !values.is_empty() {
+            layers.channels.push(Channel { name: name.into(), values });
+        }
+    };
+    add("sampling.error", Values::F32(sampled.errors.clone()));
+    add("sampling.count", Values::U32(sampled.counts.clone()));
 }
 
 /// Traces every tile, so many pixels together, and gathers what `cost` makes of the observers of each of these batches:
@@ -111,13 +167,13 @@ pub(crate) fn trace_sample<A: Accel, P: Observer>(
     sample: u32,
 ) -> Option<(Sample, ByClass<P>)> {
     let frame = Frame::new(context, view, settings);
-    let &(dx, dy) = frame.offsets.get(sample as usize)?;
     if x >= settings.width || y >= settings.height {
         return None;
     }
+    let place = frame.places((x, y)).nth(sample as usize)?;
     let mut tracer = Tracer::<A, P>::new(context, accel, &());
     tracer.reset(1, false);
-    let (ray, path) = frame.eye(tracer.center()).ray(f64::from(x) + dx, f64::from(y) + dy).with_path(0);
+    let (ray, path) = frame.eye(tracer.center()).ray(place).with_path(0);
     tracer.start(ray, path);
     tracer.trace().then(|| (tracer.samples[0], tracer.counts))
 }
@@ -199,7 +255,7 @@ fn empty_picture(settings: &Settings) -> Picture {
 
 impl Tile {
     /// Its pixels, block by block and row by row in each, so that rays that follow each other run alike.
-    fn places(self) -> impl Iterator<Item = (u32, u32)> {
+    pub(super) fn places(self) -> impl Iterator<Item = (u32, u32)> {
         let starts = |from: u32, to: u32| (from..to).step_by(BLOCK as usize);
         let blocks = starts(self.y0, self.y1).flat_map(move |y| starts(self.x0, self.x1).map(move |x| (x, y)));
         blocks.flat_map(move |(x0, y0)| {
@@ -210,6 +266,11 @@ impl Tile {
 }
 
 impl TilePixels {
+    /// Nothing yet.
+    pub(super) fn empty(tile: Tile) -> Self {
+        Self { tile, beauty: Vec::new(), layers: Vec::new(), facts: Vec::new(), rays: 0 }
+    }
+
     fn store(&self, picture: &mut Picture) {
         for (k, (x, y)) in self.tile.places().enumerate() {
             let i = y as usize * picture.width as usize + x as usize;
@@ -221,27 +282,17 @@ impl TilePixels {
     }
 }
 
-impl<'a> Frame<'a> {
-    #[expect(clippy::cast_precision_loss, reason = "sample counts are small")]
-    fn new(context: &Context, view: &'a View, settings: &'a Settings) -> Self {
-        let offsets = sample_offsets(settings.samples);
-        let background = match context.scene.background {
-            Some(Background::Color(color)) => Some(color),
-            _ => None,
-        };
-        let sample_width = 1.0 / (offsets.len() as f32).sqrt();
-        Self { view, settings, offsets, sample_width, scene: Ball::new(context), background }
-    }
-
+impl Frame<'_> {
     /// Renders one tile; `None` when cancelled.
     fn render<A: Accel, P: Observer>(&self, tracer: &mut Tracer<A, P>, tile: Tile) -> Option<TilePixels> {
-        let mut done = TilePixels { tile, beauty: Vec::new(), layers: Vec::new() };
+        let mut done = TilePixels::empty(tile);
         let per_pixel = self.offsets.len();
         self.trace(tracer, tile, batch_pixels(per_pixel), |tracer| {
             done.beauty.extend(tracer.samples.chunks(per_pixel).map(|s| resolve(s, self.background)));
             let layer = |f: &[Facts]| LayerPixel::new(f, self.view.eye, self.view.forward);
             done.layers.extend(tracer.facts.chunks(per_pixel).map(layer));
         })?;
+        done.rays = (done.beauty.len() * per_pixel) as u64;
         Some(done)
     }
 
@@ -258,12 +309,7 @@ impl<'a> Frame<'a> {
         for places in places.chunks(pixels) {
             tracer.reset(places.len() * self.offsets.len(), self.settings.layers);
             let eye = self.eye(tracer.center());
-            tracer.eyes.send(
-                &eye,
-                places.iter().flat_map(|&(x, y)| {
-                    self.offsets.iter().map(move |&(dx, dy)| (f64::from(x) + dx, f64::from(y) + dy))
-                }),
-            );
+            tracer.eyes.send(&eye, places.iter().flat_map(|&at| self.places(at)));
             if !tracer.trace() {
                 return None;
             }
@@ -271,44 +317,14 @@ impl<'a> Frame<'a> {
         }
         Some(())
     }
-
-    /// Where eye rays come from.
-    fn eye(&self, center: DVec3) -> Eye<'_> {
-        let Settings { width, height, .. } = *self.settings;
-        Eye { view: self.view, width, height, center, sample_width: self.sample_width, scene: self.scene }
-    }
 }
 
 impl Ball {
     /// Around the scene's box; unbounded planes may lie anywhere before it, so that nothing can be skipped.
-    fn new(context: &Context) -> Self {
+    pub(super) fn new(context: &Context) -> Self {
         let (lo, hi) = context.world.bounds;
         let radius = 0.5 * (hi - lo).length();
         let usable = context.scene.planes.is_empty() && radius.is_finite();
         Self { center: lo * 0.5 + hi * 0.5, radius: if usable { radius } else { f64::INFINITY } }
     }
-}
-
-/// A pixel from its samples: premultiplied RGBA.
-///
-/// Alpha is one minus the share of the background that shows through. Coloured glass lets it through by channels; there
-/// is one alpha, so before a known background colour the least channel is left to the image writer and what the others
-/// show more is added here, and without one their mean is left to it.
-#[expect(clippy::cast_precision_loss, reason = "sample counts are small")]
-fn resolve(samples: &[Sample], background: Option<Vec3>) -> [f32; 4] {
-    let share = 1.0 / samples.len().max(1) as f32;
-    let mut color = samples.iter().map(|s| s.radiance).sum::<Vec3>() * share;
-    let through = (samples.iter().map(|s| s.through).sum::<Vec3>() * share).clamp(Vec3::ZERO, Vec3::ONE);
-    let clear = match background {
-        Some(background) => {
-            let least = through.min_element();
-            color += (through - Vec3::splat(least)) * background;
-            least
-        }
-        None if through.x == through.y && through.y == through.z => through.x,
-        None => through.element_sum() / 3.0,
-    };
-    // A sum of finite parts can still overflow.
-    let color = if color.is_finite() { color } else { color.min(Vec3::splat(f32::MAX)).max(Vec3::ZERO) };
-    color.extend(1.0 - clear).to_array()
 }

@@ -3,6 +3,7 @@
 //! There is no recursion and no allocation per ray: shading pushes children into queues, and each queue is drained in
 //! slices of rays of one class. The queues are buffers of one worker, reused from tile to tile.
 
+use super::sobol::mix;
 use crate::accel::{Hit, Ray};
 use crate::math::Vec3;
 
@@ -41,6 +42,8 @@ pub(crate) struct Path {
     pub cone_width: f32,
     /// Growth of that width for each unit of length.
     pub cone_spread: f32,
+    /// Which way through the tree of rays led here: the same number in all samples for the same turns.
+    pub branch: u32,
 }
 
 impl Path {
@@ -55,7 +58,13 @@ impl Path {
             since: 0.0,
             cone_width,
             cone_spread,
+            branch: 0,
         }
+    }
+
+    /// The same after a turn that no other ray from this point takes.
+    pub(crate) fn turned(self, class: RayClass, number: u32) -> Self {
+        Self { branch: mix(self.branch, (number << 2) | class as u32), ..self }
     }
 }
 

@@ -11,7 +11,7 @@ use super::Progress;
 use super::asking::Asking;
 use super::branch::Point;
 use super::context::{Context, coverage};
-use super::draws::Draws;
+use super::draws::{Draws, Purpose, Stream};
 use super::everything::look_up_in_vain;
 use super::eyes::Eyes;
 use super::layers::Facts;
@@ -34,6 +34,8 @@ const SPREAD: f32 = 0.1;
 const WAVE_LIMIT: usize = 1 << 13;
 /// Shadow rays that wait at most.
 const SHADOW_LIMIT: usize = 1 << 14;
+/// The turn of a ray that goes on behind a surface.
+const ON: u32 = u32::MAX >> 2;
 
 /// What a sample of the picture has gathered.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -82,6 +84,8 @@ pub(crate) struct Tracer<'a, A: Accel, P> {
     shadows: Shadows,
     arounds: Arounds,
     pub samples: Vec<Sample>,
+    /// The place of each sample among those of its pixel; empty where only rays decide random choices.
+    pub streams: Vec<Stream>,
     /// Facts of the first surface of each sample; empty unless layers are wanted.
     pub facts: Vec<Facts>,
     pub counts: ByClass<P>,
@@ -101,6 +105,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             shadows: Shadows::default(),
             arounds: Arounds::default(),
             samples: Vec::new(),
+            streams: Vec::new(),
             facts: Vec::new(),
             counts: ByClass::default(),
         }
@@ -118,6 +123,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         self.shadows.clear();
         self.arounds.clear();
         self.eyes.clear();
+        self.streams.clear();
         self.samples.clear();
         self.samples.resize(samples, Sample::default());
         self.facts.clear();
@@ -349,8 +355,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         self.add(sample, weight * matter.emission);
         if open.is_finite() {
             let media = context.absorption.is_some().then_some(point.path.media);
-            let (ray, hit) = (point.ray, point.hit);
-            self.arounds.push(context, &Standpoint { surface, matter, ray, hit, weight, open, media });
+            let (ray, draws) = (point.ray, self.draws(point, Purpose::Surroundings));
+            self.arounds.push(context, &Standpoint { surface, matter, ray, draws, weight, open, media });
         }
         if self.arounds.is_full() {
             self.trace_arounds();
@@ -362,8 +368,14 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let weight = path.weight * (1.0 - covered);
         let class = if covered > 0.0 { RayClass::Refracted } else { class };
         if self.context.is_alive(weight) {
-            self.continuing[class as usize].push(*ray, Path { weight, ..*path }, *hit);
+            let path = Path { weight, ..path.turned(class, ON) };
+            self.continuing[class as usize].push(*ray, path, *hit);
         }
+    }
+
+    /// Numbers for the random choices of a point.
+    pub(super) fn draws(&self, point: &Point, purpose: Purpose) -> Draws {
+        Draws::at(self.context.seed, &self.streams, point.path.branch, point.ray, point.hit, purpose)
     }
 
     /// Remembers the first surface of a sample for the layers.
@@ -393,7 +405,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             }
             // What mirrors show needs no more than a hint of soft edges.
             let rays = if point.path.depth == 0 { context.light_rays } else { context.light_rays.div_ceil(4) };
-            let spread = draws.get_or_insert_with(|| Draws::at(!context.seed, point.ray, point.hit)).spread();
+            let spread = draws.get_or_insert_with(|| self.draws(point, Purpose::Lights)).spread(rays);
             for k in 0..rays {
                 if let Some(incident) = light.incident_from(position, spread.point(k)) {
                     self.shine(point, crossing, light, &incident, 1.0 / rays as f32);

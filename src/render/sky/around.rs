@@ -11,7 +11,7 @@
 //! weighted by the balance heuristic (E. Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997).
 
 use super::Sky;
-use crate::accel::{Accel, Hit, Ray};
+use crate::accel::{Accel, Ray};
 use crate::math::Vec3;
 use crate::render::asking::Asking;
 use crate::render::context::Context;
@@ -61,7 +61,8 @@ pub(crate) struct Standpoint<'a> {
     pub matter: &'a Matter,
     /// The ray that found it.
     pub ray: &'a Ray,
-    pub hit: &'a Hit,
+    /// Numbers for the directions of its rays.
+    pub draws: Draws,
     /// What its sample shows of it, of light of 1.
     pub weight: Vec3,
     /// What it shows of its surroundings if nothing is in the way, not weighted.
@@ -91,9 +92,9 @@ impl Arounds {
         let count = 1 + u32::from(lobe.is_some()) + u32::from(light.is_some());
         let half = context.env_rays.div_ceil(2);
         let view = View::new(seen.normal, seen.view);
-        let mut draws = Draws::at(context.seed, point.ray, point.hit);
+        let mut draws = point.draws.clone();
         for _ in 0..2 {
-            let spread = draws.spread();
+            let spread = draws.spread(half);
             for k in 0..half {
                 let way = ways.iter().flatten().nth((k % count) as usize).unwrap_or(&Way::Cosine);
                 let dir = way.draw(spread.point(k), &context.sky, &view);

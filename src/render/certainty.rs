@@ -1,0 +1,244 @@
+//! When the mean of a pixel's samples is certain enough.
+//!
+//! A pixel's samples belong to [`STREAMS`] scramblings that know nothing of each other. Each has a mean of its own, and how
+//! far these lie apart tells how far the mean of all is off, however evenly the samples of one scrambling are spread (A. B.
+//! Owen, "Randomized QMC", 2013, chapter 17). What counts is the written picture: the mean goes through the tone
+//! curve, so its error there is found by leaving out each stream in turn (J. W. Tukey's jackknife, 1958).
+//!
+//! A pixel is looked at again and again, and stops at the first look that is content. Were each look 95 % certain, all
+//! together would be less. See [`factor`] for what is done about it.
+
+use super::ErrorSpace;
+use super::frame::Sum;
+use crate::image::{Developer, Output};
+use crate::math::Vec3;
+use std::f64::consts::{FRAC_1_SQRT_2, PI};
+
+/// Independent scramblings of a pixel.
+pub(super) const STREAMS: usize = 8;
+
+/// The judge of all pixels of a picture.
+pub(super) struct Certainty<'a> {
+    /// `None`: errors are counted in linear light.
+    developer: Option<Developer<'a>>,
+    background: Option<Vec3>,
+    /// Whether the written picture is transparent in parts.
+    transparent: bool,
+    /// What a pixel may be wrong by.
+    error: f32,
+    /// How many standard errors that must be.
+    factor: f32,
+}
+
+/// How the mean of a pixel is to be written; what is behind it is in [`Certainty`].
+pub(super) fn output(space: ErrorSpace, background: Option<Vec3>) -> Option<Output> {
+    let ErrorSpace::Display { tone_map, exposure } = space else { return None };
+    Some(Output { tone_map, exposure, background: background.map(|b| b.to_array()), ..Output::default() })
+}
+
+impl<'a> Certainty<'a> {
+    /// Of a picture that is written as `output` says (`None`: as linear light), each pixel of it within `error` with this
+    /// `confidence`.
+    #[expect(clippy::cast_possible_truncation, reason = "a small number")]
+    pub(super) fn new(
+        output: Option<&'a Output>,
+        background: Option<Vec3>,
+        transparent: bool,
+        error: f32,
+        confidence: f64,
+    ) -> Self {
+        let developer = output.map(Developer::new);
+        Self { developer, background, transparent, error, factor: factor(confidence) as f32 }
+    }
+
+    /// The numbers of the written picture: RGB and alpha, the colour premultiplied.
+    pub(super) fn written(&self, sum: &Sum) -> [f32; 4] {
+        let pixel = sum.resolve(self.background);
+        match (&self.developer, self.background) {
+            (Some(developer), _) => developer.coded(pixel),
+            (None, None) => pixel,
+            (None, Some(behind)) => {
+                let color = Vec3::from_slice(&pixel) + behind * (1.0 - pixel[3]);
+                color.extend(1.0).to_array()
+            }
+        }
+    }
+
+    /// Whether these samples agree within the error that is allowed: nothing is seen in the pixel that could be missed.
+    pub(super) fn agree(&self, samples: &[Sum]) -> bool {
+        let (mut least, mut most) = ([f32::INFINITY; 4], [f32::NEG_INFINITY; 4]);
+        for written in samples.iter().map(|sample| self.written(sample)) {
+            for c in 0..4 {
+                (least[c], most[c]) = (least[c].min(written[c]), most[c].max(written[c]));
+            }
+        }
+        (0..4).all(|c| most[c] - least[c] <= self.error)
+    }
+
+    /// Whether two pixels look so different that something may lie between them.
+    pub(super) fn differ(&self, a: [f32; 4], b: [f32; 4]) -> bool {
+        /// Times the error that is allowed: shading changes slower from pixel to pixel.
+        const STEEP: f32 = 8.0;
+        (0..4).any(|c| (a[c] - b[c]).abs() > STEEP * self.error)
+    }
+
+    /// Standard error of a pixel, the root of the mean over its channels, from streams of equally many samples.
+    #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "a handful of streams")]
+    pub(super) fn standard_error(&self, streams: &[Sum]) -> f32 {
+        if streams.windows(2).all(|pair| pair[0] == pair[1]) {
+            return 0.0;
+        }
+        let all = streams.iter().fold(Sum::default(), |all, stream| all.plus(*stream, 1.0));
+        let without = |stream: &Sum| self.written(&all.plus(*stream, -1.0)).map(f64::from);
+        let left: Vec<[f64; 4]> = streams.iter().map(without).collect();
+        let n = streams.len() as f64;
+        let squares = |c: usize| {
+            let mean = left.iter().map(|v| v[c]).sum::<f64>() / n;
+            left.iter().map(|v| (v[c] - mean) * (v[c] - mean)).sum::<f64>() * (n - 1.0) / n
+        };
+        let channels = if self.transparent { 4 } else { 3 };
+        ((0..channels).map(squares).sum::<f64>() / channels as f64).sqrt() as f32
+    }
+
+    /// Whether a pixel with this standard error is within the error that is allowed.
+    pub(super) fn is_met(&self, standard_error: f32) -> bool {
+        standard_error * self.factor <= self.error
+    }
+}
+
+/// Degrees of freedom of an estimate from [`STREAMS`] means.
+const FREEDOM: f64 = (STREAMS - 1) as f64;
+
+/// How many estimated standard errors the error that is allowed must be, so that a pixel that stops at the first look
+/// which finds it so is within that error with probability `confidence`.
+///
+/// With ρ standard errors in the error allowed, a look stops wrongly when it takes the standard error for ρ/f of what it
+/// is or less, and the mean is off by more than ρ of them: two events that are independent for normal means. From look to
+/// look the samples double, which divides the standard error by √2 at least. The probabilities of all looks are added,
+/// the worst start of ρ is taken, and f is found for which that is 1 − `confidence`; it is never less than Student's t,
+/// which a single look would need.
+fn factor(confidence: f64) -> f64 {
+    let wrong = 1.0 - confidence;
+    let student = bisect(|t| 1.0 - student_within(t) > wrong);
+    student.max(bisect(|f| wrong_stops(f) > wrong))
+}
+
+/// Chance that some look stops wrongly, at most.
+fn wrong_stops(factor: f64) -> f64 {
+    /// By how much each round lessens the standard error at least.
+    const GAIN: f64 = std::f64::consts::SQRT_2;
+    const STARTS: u32 = 32;
+    let look = |rho: f64| chi_square_below(FREEDOM * (rho / factor) * (rho / factor)) * normal_beyond(rho);
+    let looks = |start: f64| std::iter::successors(Some(start), |rho| Some(rho * GAIN)).take_while(|rho| *rho < 9.0);
+    let starts = (0..STARTS).map(|k| 0.05 * libm::pow(GAIN, f64::from(k) / f64::from(STARTS)));
+    starts.map(|start| looks(start).map(look).sum::<f64>()).fold(0.0, f64::max)
+}
+
+/// Where `is_below` stops being true, in 0…1000.
+fn bisect(is_below: impl Fn(f64) -> bool) -> f64 {
+    let (mut low, mut high) = (0.0, 1000.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if is_below(middle) { low = middle } else { high = middle }
+    }
+    high
+}
+
+/// Chance of a normal number more than `x` ≥ 0 standard deviations off.
+fn normal_beyond(x: f64) -> f64 {
+    libm::erfc(x * FRAC_1_SQRT_2)
+}
+
+/// Chance of χ² with 7 degrees of freedom below `x` ≥ 0.
+fn chi_square_below(x: f64) -> f64 {
+    let tail = (2.0 * x / PI).sqrt() * libm::exp(-0.5 * x) * (1.0 + x / 3.0 + x * x / 15.0);
+    (libm::erf((0.5 * x).sqrt()) - tail).max(0.0)
+}
+
+/// Chance of Student's t with 7 degrees of freedom within ±`t`.
+fn student_within(t: f64) -> f64 {
+    let angle = libm::atan(t / FREEDOM.sqrt());
+    let (sin, cos) = libm::sincos(angle);
+    let series = cos * (1.0 + cos * cos * (2.0 / 3.0 + cos * cos * 8.0 / 15.0));
+    2.0 / PI * (angle + sin * series)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::Random;
+
+    #[test]
+    fn distributions_agree_with_published_tables() {
+        // Student's t and χ² for 7 degrees of freedom, and the normal distribution.
+        for (t, within) in [(2.365, 0.95), (3.499, 0.99), (1.895, 0.90)] {
+            assert!((student_within(t) - within).abs() < 1e-4, "{t}");
+        }
+        for (x, below) in [(14.067, 0.95), (2.167, 0.05), (6.346, 0.50)] {
+            assert!((chi_square_below(x) - below).abs() < 1e-4, "{x}");
+        }
+        assert!((normal_beyond(1.96) - 0.05).abs() < 1e-4);
+    }
+
+    #[test]
+    fn more_confidence_asks_for_more_standard_errors_and_never_less_than_students() {
+        let factors = [0.8, 0.9, 0.95, 0.99, 0.999].map(factor);
+        assert!(factors.windows(2).all(|pair| pair[0] < pair[1]), "{factors:?}");
+        assert!(factors[2] > 2.364);
+        for confidence in [0.8, 0.95, 0.99] {
+            assert!(wrong_stops(factor(confidence)) <= 1.0 - confidence + 1e-9);
+        }
+    }
+
+    fn grey(light: f32, samples: f32) -> Sum {
+        Sum { radiance: Vec3::splat(light * samples), through: Vec3::ZERO, weight: samples }
+    }
+
+    #[test]
+    fn what_is_the_same_in_all_streams_is_certain() {
+        let output = output(ErrorSpace::default(), None);
+        let judge = Certainty::new(output.as_ref(), None, false, 0.01, 0.95);
+        assert_eq!(judge.standard_error(&[grey(0.3, 3.0); STREAMS]), 0.0);
+        assert!(judge.agree(&[grey(0.3, 1.0); 4]) && !judge.agree(&[grey(0.3, 1.0), grey(0.4, 1.0)]));
+    }
+
+    #[test]
+    fn linear_errors_are_those_of_a_mean() {
+        let judge = Certainty::new(None, None, false, 0.01, 0.95);
+        let values = [0.1_f32, 0.3, 0.2, 0.5, 0.4, 0.2, 0.1, 0.2];
+        let mean = values.iter().sum::<f32>() / 8.0;
+        let expected = (values.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / (8.0 * 7.0)).sqrt();
+        let found = judge.standard_error(&values.map(|v| grey(v, 5.0)));
+        assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+    }
+
+    /// Pixels of normal samples, in rounds that double, judged as pictures are.
+    #[test]
+    fn pixels_that_stop_at_the_first_content_look_are_right_as_often_as_asked() {
+        let judge = Certainty::new(None, None, false, 0.05, 0.95);
+        let mut random = Random::new(11);
+        for spread in [0.1_f32, 0.3, 0.7, 1.5] {
+            let (pixels, mut right) = (4000, 0);
+            for _ in 0..pixels {
+                let mut streams = [Sum::default(); STREAMS];
+                let mut target = 1.0;
+                loop {
+                    for stream in &mut streams {
+                        while stream.weight < target {
+                            // Nearly normal, of variance 1.
+                            let noise = (0..12).map(|_| random.unit()).sum::<f32>() - 6.0;
+                            *stream = stream.plus(grey(noise * spread, 1.0), 1.0);
+                        }
+                    }
+                    if judge.is_met(judge.standard_error(&streams)) {
+                        break;
+                    }
+                    target *= 2.0;
+                }
+                let all = streams.iter().fold(Sum::default(), |all, s| all.plus(*s, 1.0));
+                right += u32::from((all.radiance.x / all.weight).abs() <= 0.05);
+            }
+            assert!(f64::from(right) >= 0.945 * f64::from(pixels), "{spread}: {right}");
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! What all pixels of a picture share, and how samples become a pixel.
+
+use super::context::Context;
+use super::eyes::{Ball, Eye, Place, ThinLens};
+use super::pixel::sample_offsets;
+use super::sampling::{Adaptive, Sampling};
+use super::sobol::{self, mix};
+use super::view::View;
+use super::whitted::Sample;
+use super::Settings;
+use crate::math::{DVec3, Vec3};
+use crate::scene::Background;
+
+/// Samples of a pixel that a ray is as sharp as, where their number is not known before: sharp enough for what a texture
+/// shows between two samples, and not so sharp that it must be averaged from many.
+const SHARPNESS: f32 = 16.0;
+
+/// What all tiles share.
+pub(super) struct Frame<'a> {
+    pub view: &'a View,
+    pub settings: &'a Settings,
+    /// Where the samples of a pixel lie, when they lie at the same places in each.
+    pub offsets: Vec<(f64, f64)>,
+    /// Sharpness of one sample relative to a pixel.
+    sample_width: f32,
+    scene: Ball,
+    pub background: Option<Vec3>,
+}
+
+impl<'a> Frame<'a> {
+    #[expect(clippy::cast_precision_loss, reason = "sample counts are small")]
+    pub(super) fn new(context: &Context, view: &'a View, settings: &'a Settings) -> Self {
+        let offsets = sample_offsets(settings.samples);
+        let background = match context.scene.background {
+            Some(Background::Color(color)) => Some(color),
+            _ => None,
+        };
+        let samples = match settings.sampling {
+            Sampling::Uniform => offsets.len() as f32,
+            Sampling::Adaptive(_) | Sampling::Stochastic(_) => SHARPNESS,
+        };
+        let sample_width = 1.0 / samples.sqrt();
+        Self { view, settings, offsets, sample_width, scene: Ball::new(context), background }
+    }
+
+    /// Where eye rays come from.
+    pub(super) fn eye(&self, center: DVec3) -> Eye<'_> {
+        let Settings { width, height, lens, .. } = *self.settings;
+        Eye { view: self.view, width, height, center, sample_width: self.sample_width, scene: self.scene, lens }
+    }
+
+    /// The places of the samples of a pixel when they are the same in each, but for the lens.
+    pub(super) fn places(&self, (x, y): (u32, u32)) -> impl Iterator<Item = Place> {
+        let (lens, key) = (self.settings.lens, pixel_key(self.settings.seed, (x, y)));
+        (0..).zip(&self.offsets).map(move |(i, &(dx, dy))| {
+            let place = Place::new(f64::from(x) + dx, f64::from(y) + dy);
+            Place { lens: on_lens(lens, key, i), ..place }
+        })
+    }
+}
+
+/// The `i`th point of a pixel's lens; its middle where it has no opening.
+pub(super) fn on_lens(lens: Option<ThinLens>, key: u32, i: u32) -> [f64; 2] {
+    lens.map_or([0.5; 2], |_| sobol::point(i, key))
+}
+
+/// What tells the numbers of pixels apart.
+#[expect(clippy::cast_possible_truncation, reason = "both halves are mixed in")]
+pub(super) fn pixel_key(seed: u64, (x, y): (u32, u32)) -> u32 {
+    mix(mix(mix(seed as u32, (seed >> 32) as u32), x), y)
+}
+
+/// What samples have gathered together.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Sum {
+    pub radiance: Vec3,
+    pub through: Vec3,
+    pub weight: f32,
+}
+
+impl Sum {
+    pub(super) fn add(&mut self, sample: &Sample) {
+        self.radiance += sample.radiance;
+        self.through += sample.through;
+        self.weight += 1.0;
+    }
+
+    /// This and another, so many times.
+    pub(super) fn plus(self, other: Self, times: f32) -> Self {
+        Self {
+            radiance: self.radiance + other.radiance * times,
+            through: self.through + other.through * times,
+            weight: self.weight + other.weight * times,
+        }
+    }
+
+    /// A pixel from its samples: premultiplied RGBA.
+    ///
+    /// Alpha is one minus the share of the background that shows through. Coloured glass lets it through by channels; there
+    /// is one alpha, so before a known background colour the least channel is left to the image writer and what the others
+    /// show more is added here, and without one their mean is left to it.
+    pub(super) fn resolve(&self, background: Option<Vec3>) -> [f32; 4] {
+        let share = 1.0 / self.weight.max(f32::MIN_POSITIVE);
+        let mut color = self.radiance * share;
+        let through = (self.through * share).clamp(Vec3::ZERO, Vec3::ONE);
+        let clear = match background {
+            Some(background) => {
+                let least = through.min_element();
+                color += (through - Vec3::splat(least)) * background;
+                least
+            }
+            None if through.x == through.y && through.y == through.z => through.x,
+            None => through.element_sum() / 3.0,
+        };
+        // A sum of finite parts can still overflow.
+        let color = if color.is_finite() { color } else { color.min(Vec3::splat(f32::MAX)).max(Vec3::ZERO) };
+        color.extend(1.0 - clear).to_array()
+    }
+}
+
+/// A pixel from all of its samples.
+pub(super) fn resolve(samples: &[Sample], background: Option<Vec3>) -> [f32; 4] {
+    let mut sum = Sum::default();
+    samples.iter().for_each(|sample| sum.add(sample));
+    sum.resolve(background)
+}
+
+/// The numbers in which an adaptive picture's colours are compared: linear light over the background, after exposure.
+pub(super) fn compared(how: &Adaptive, sample: &Sample, background: Option<Vec3>) -> [f32; 4] {
+    let gain = libm::exp2f(how.exposure);
+    let color = (sample.radiance + sample.through * background.unwrap_or(Vec3::ZERO)) * gain;
+    // Without a background its share is seen in the picture's alpha.
+    let clear = if background.is_some() { 0.0 } else { sample.through.element_sum() / 3.0 };
+    color.extend(clear).to_array()
+}

@@ -1,0 +1,241 @@
+//! How a picture is sampled: how many rays a pixel gets, where in it they lie, and when they are enough.
+
+use crate::image::ToneMap;
+use std::fmt;
+use std::str::FromStr;
+
+/// Which rays a pixel gets.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Sampling {
+    /// [`super::Settings::samples`] at the same places in every pixel; of 1 in its middle.
+    #[default]
+    Uniform,
+    /// Its corners and its middle, and more where these differ.
+    Adaptive(Adaptive),
+    /// Random ones until their mean is certain.
+    Stochastic(Stochastic),
+}
+
+/// Five rays in a square, the corners shared with the squares beside it; a quadrant whose corner differs from the middle
+/// becomes a square of its own (T. Whitted, "An Improved Illumination Model for Shaded Display", 1980). What is smaller than
+/// a pixel and lies between the five rays is missed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Adaptive {
+    /// Difference of a channel, linear light after exposure, above which a quadrant is split.
+    pub threshold: f32,
+    /// How often a pixel's side is halved at most; at most [`Adaptive::MAX_LEVELS`].
+    pub levels: u32,
+    /// Stops of brightening before colours are compared.
+    pub exposure: f32,
+}
+
+impl Adaptive {
+    /// A square of the last level is the 256th part of a pixel's side.
+    pub const MAX_LEVELS: u32 = 8;
+}
+
+impl Default for Adaptive {
+    fn default() -> Self {
+        Self { threshold: 0.05, levels: 3, exposure: 0.0 }
+    }
+}
+
+/// Rays at random places, added in rounds until the mean of a pixel is certain.
+///
+/// R. L. Cook, T. Porter, L. Carpenter, "Distributed Ray Tracing" (1984); M. A. Z. Dippé, E. H. Wold, "Antialiasing Through
+/// Stochastic Sampling" (1985). With the same numbers wide lights, rough surfaces and lenses are sampled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stochastic {
+    /// What a pixel may be wrong by, the root of the mean squared error of its channels, each 0…1 after development.
+    pub error: f32,
+    /// How certain that is to be: a probability in 0.5…0.9999.
+    pub confidence: f64,
+    /// Rays of a pixel when all of them and its neighbours' agree; at least 2.
+    pub min_samples: u32,
+    /// Rays of a pixel at most.
+    pub max_samples: u32,
+    /// Weights of the places in and around a pixel.
+    pub filter: Filter,
+    /// In which numbers errors are counted.
+    pub space: ErrorSpace,
+}
+
+impl Default for Stochastic {
+    fn default() -> Self {
+        Quality::default().stochastic()
+    }
+}
+
+/// Weight of a place by its distance from a pixel's middle, on each axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Filter {
+    /// All of the pixel alike, nothing outside.
+    #[default]
+    Box,
+    /// Falls to nothing at the middle of the next pixel.
+    Tent,
+}
+
+/// The numbers in which errors are counted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ErrorSpace {
+    /// Linear light as it is stored in an EXR.
+    Linear,
+    /// sRGB codes 0…1 of the developed picture.
+    Display {
+        /// Curve from scene light to display light.
+        tone_map: ToneMap,
+        /// Stops of brightening before that.
+        exposure: f32,
+    },
+}
+
+impl Default for ErrorSpace {
+    fn default() -> Self {
+        Self::Display { tone_map: ToneMap::default(), exposure: 0.0 }
+    }
+}
+
+/// How good a stochastic picture is to be, in a word.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Quality {
+    /// To see whether it is what was meant.
+    Draft,
+    /// To look at.
+    #[default]
+    Normal,
+    /// To print and to measure.
+    Final,
+}
+
+impl Quality {
+    /// What the word stands for.
+    pub fn stochastic(self) -> Stochastic {
+        let (error, max_samples) = match self {
+            Self::Draft => (0.06, 64),
+            Self::Normal => (0.03, 256),
+            Self::Final => (0.01, 2048),
+        };
+        Stochastic {
+            error,
+            confidence: 0.95,
+            min_samples: 4,
+            max_samples,
+            filter: Filter::default(),
+            space: ErrorSpace::default(),
+        }
+    }
+}
+
+/// What came of the sampling of a picture.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sampled {
+    /// Pixels of the picture.
+    pub pixels: u64,
+    /// Eye rays of each pixel, row by row; rays that pixels share count for each of them. Empty where all have as many.
+    pub counts: Vec<u32>,
+    /// Standard error of each pixel in the error space, the root of the mean over its channels; of stochastic sampling.
+    pub errors: Vec<f32>,
+    /// Eye rays in all.
+    pub rays: u64,
+    /// Pixels whose mean became as certain as was asked.
+    pub met: u64,
+    /// Pixels that were given up at the most rays allowed.
+    pub at_most: u64,
+}
+
+impl Sampled {
+    /// Rays of a pixel on the average; 0 without pixels.
+    #[expect(clippy::cast_precision_loss, reason = "a ratio")]
+    pub fn mean(&self) -> f64 {
+        self.rays as f64 / self.pixels.max(1) as f64
+    }
+
+    /// Most rays of a pixel.
+    pub fn most(&self) -> u64 {
+        self.counts.iter().copied().max().map_or_else(|| self.rays / self.pixels.max(1), u64::from)
+    }
+
+    /// Estimated root of the mean squared error of the whole picture; `None` where nothing was estimated.
+    #[expect(clippy::cast_precision_loss, reason = "a ratio")]
+    pub fn rmse(&self) -> Option<f64> {
+        let sum: f64 = self.errors.iter().map(|&e| f64::from(e) * f64::from(e)).sum();
+        (!self.errors.is_empty()).then(|| (sum / self.errors.len() as f64).sqrt())
+    }
+}
+
+macro_rules! names {
+    ($kind:ident, $what:literal, $($value:ident => $name:literal),+) => {
+        impl $kind {
+            /// Every one.
+            pub const ALL: &'static [Self] = &[$(Self::$value),+];
+
+            /// Its name on the command line.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$value => $name),+ }
+            }
+        }
+
+        impl fmt::Display for $kind {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(self.name())
+            }
+        }
+
+        impl FromStr for $kind {
+            type Err = String;
+
+            fn from_str(name: &str) -> Result<Self, String> {
+                let known = || [$($name),+].join(", ");
+                let unknown = || format!(concat!("no ", $what, " is called '{}': it is one of {}"), name, known());
+                Self::ALL.iter().copied().find(|one| one.name() == name).ok_or_else(unknown)
+            }
+        }
+    };
+}
+
+names!(Filter, "filter", Box => "box", Tent => "tent");
+names!(Quality, "quality", Draft => "draft", Normal => "normal", Final => "final");
+
+impl Filter {
+    /// A place, in pixels from the pixel's upper left corner, that is drawn by this filter's weight with a number 0 ≤ u < 1.
+    ///
+    /// Places are drawn, not weighed: every sample counts the same (M. Ernst, M. Stamminger, G. Greiner, "Filter Importance
+    /// Sampling", 2006).
+    pub(super) fn place(self, u: f64) -> f64 {
+        match self {
+            Self::Box => u,
+            Self::Tent if u < 0.5 => (2.0 * u).sqrt() - 0.5,
+            Self::Tent => 1.5 - (2.0 - 2.0 * u).sqrt(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_tent_has_its_top_over_the_middle_and_ends_over_the_next() {
+        let place = |u| Filter::Tent.place(u);
+        assert_eq!((place(0.0), place(0.5)), (-0.5, 0.5));
+        assert!((place(1.0 - 1e-12) - 1.5).abs() < 1e-5);
+        // An eighth of a tent's area lies in its outer half on each side.
+        assert!((place(0.125) - 0.0).abs() < 1e-12 && (place(0.875) - 1.0).abs() < 1e-12);
+        let mean = (0..1000).map(|i| place((f64::from(i) + 0.5) / 1000.0)).sum::<f64>() / 1000.0;
+        assert!((mean - 0.5).abs() < 1e-9, "{mean}");
+    }
+
+    #[test]
+    fn names_are_read_back() {
+        assert!(Filter::ALL.iter().all(|&f| f.name().parse() == Ok(f)));
+        assert!(Quality::ALL.iter().all(|&q| q.name().parse() == Ok(q)));
+        assert!("fine".parse::<Quality>().unwrap_err().contains("draft, normal, final"));
+    }
+
+    #[test]
+    fn a_better_quality_asks_for_less_error() {
+        let errors = Quality::ALL.iter().map(|q| q.stochastic().error).collect::<Vec<_>>();
+        assert!(errors.windows(2).all(|pair| pair[0] > pair[1]), "{errors:?}");
+    }
+}

@@ -1,0 +1,205 @@
+//! Stochastic sampling of a tile: its pixels advance together in rounds, and only those that are not certain yet go into
+//! the next.
+//!
+//! What decides about a pixel are its own samples, and in the first round those of the pixels beside it in its tile: a
+//! pixel that happens to see nothing of what its neighbours see goes on with them.
+
+use super::certainty::{Certainty, STREAMS, output};
+use super::draws::Stream;
+use super::eyes::Place;
+use super::frame::{Frame, Sum, pixel_key};
+use super::layers::LayerSum;
+use super::observer::Observer;
+use super::sampling::Stochastic;
+use super::sobol::{self, mix};
+use super::tile::{End, PixelFacts, TOGETHER, Tile, TilePixels};
+use super::whitted::Tracer;
+use crate::accel::Accel;
+use crate::scene::Background;
+
+/// Samples at which variances are first relied on: two of each stream.
+const FIRST_LOOK: u32 = 2 * STREAMS as u32;
+
+/// A pixel on its way.
+struct Pixel {
+    x: u32,
+    y: u32,
+    /// For all of its numbers.
+    key: u32,
+    streams: [Sum; STREAMS],
+    layers: LayerSum,
+    facts: PixelFacts,
+}
+
+/// Renders one tile; `None` when cancelled.
+pub(super) fn render<A: Accel, P: Observer>(
+    frame: &Frame,
+    how: &Stochastic,
+    tracer: &mut Tracer<A, P>,
+    tile: Tile,
+) -> Option<TilePixels> {
+    let output = output(how.space, frame.background);
+    let transparent = matches!(tracer.context.scene.background, None | Some(Background::Transparent));
+    let judge = Certainty::new(output.as_ref(), frame.background, transparent, how.error, how.confidence);
+    let mut pixels: Vec<Pixel> = tile.places().map(|at| Pixel::new(frame.settings.seed, at)).collect();
+    let mut active: Vec<usize> = (0..pixels.len()).collect();
+    let mut from = 0;
+    for to in rounds(how) {
+        trace(frame, how, tracer, &mut pixels, &active, from..to)?;
+        let seen = &active;
+        if to < FIRST_LOOK {
+            active = restless(&judge, tile, &mut pixels);
+        } else {
+            seen.iter().for_each(|&i| pixels[i].look(&judge));
+            active.retain(|&i| pixels[i].facts.end == End::Ceiling);
+        }
+        from = to;
+    }
+    let rays = pixels.iter().map(|pixel| u64::from(pixel.facts.count)).sum();
+    let view = frame.view;
+    Some(TilePixels {
+        tile,
+        beauty: pixels.iter().map(|pixel| pixel.sum().resolve(frame.background)).collect(),
+        layers: match frame.settings.layers {
+            true => pixels.iter().map(|pixel| pixel.layers.pixel(view.eye, view.forward)).collect(),
+            false => Vec::new(),
+        },
+        facts: pixels.iter().map(|pixel| pixel.facts).collect(),
+        rays,
+    })
+}
+
+/// Samples of a pixel after each round: the fewest, then twice as many from round to round.
+fn rounds(how: &Stochastic) -> Vec<u32> {
+    #[expect(clippy::cast_possible_truncation, reason = "a handful")]
+    let whole = |n: u32| n - n % STREAMS as u32;
+    let most = if how.max_samples < FIRST_LOOK { how.max_samples.max(1) } else { whole(how.max_samples) };
+    let fewest = if how.min_samples < FIRST_LOOK { how.min_samples } else { whole(how.min_samples) };
+    let mut rounds = vec![fewest.clamp(1, most)];
+    let mut next = if fewest < FIRST_LOOK { FIRST_LOOK } else { fewest.saturating_mul(2) };
+    while rounds.last().is_some_and(|&last| last < most) {
+        rounds.push(next.min(most));
+        next = next.saturating_mul(2);
+    }
+    rounds
+}
+
+/// Traces these samples of all active pixels.
+fn trace<A: Accel, P: Observer>(
+    frame: &Frame,
+    how: &Stochastic,
+    tracer: &mut Tracer<A, P>,
+    pixels: &mut [Pixel],
+    active: &[usize],
+    samples: std::ops::Range<u32>,
+) -> Option<()> {
+    let mut left = active.iter().flat_map(|&pixel| samples.clone().map(move |i| (pixel, i)));
+    let mut batch: Vec<(usize, u32)> = Vec::with_capacity(TOGETHER);
+    loop {
+        batch.clear();
+        batch.extend(left.by_ref().take(TOGETHER));
+        if batch.is_empty() {
+            return Some(());
+        }
+        tracer.reset(batch.len(), frame.settings.layers);
+        tracer.streams.extend(batch.iter().map(|&(pixel, i)| pixels[pixel].stream(i)));
+        let eye = frame.eye(tracer.center());
+        tracer.eyes.send(&eye, batch.iter().map(|&(pixel, i)| pixels[pixel].place(how, i)));
+        if !tracer.trace() {
+            return None;
+        }
+        for (k, &(pixel, i)) in batch.iter().enumerate() {
+            let pixel = &mut pixels[pixel];
+            pixel.streams[i as usize % STREAMS].add(&tracer.samples[k]);
+            pixel.facts.count += 1;
+            tracer.facts.get(k).iter().for_each(|facts| pixel.layers.add(facts));
+        }
+    }
+}
+
+/// The pixels that a first round leaves in doubt: their samples or those of a pixel beside them disagree, or both are of
+/// different colours. All others are done.
+fn restless(judge: &Certainty, tile: Tile, pixels: &mut [Pixel]) -> Vec<usize> {
+    let (width, height) = (tile.x1 - tile.x0, tile.y1 - tile.y0);
+    let index = |x: u32, y: u32| ((y - tile.y0) * width + x - tile.x0) as usize;
+    let mut seen = vec![(false, [0.0; 4]); (width * height) as usize];
+    for pixel in pixels.iter_mut() {
+        let streams = pixel.taken();
+        seen[index(pixel.x, pixel.y)] = (judge.agree(streams), judge.written(&pixel.sum()));
+        pixel.facts.error = judge.standard_error(pixel.taken());
+    }
+    let is_calm = |x: u32, y: u32| {
+        let (_, own) = seen[index(x, y)];
+        let columns = x.saturating_sub(1).max(tile.x0)..(x + 2).min(tile.x1);
+        let mut around = (y.saturating_sub(1).max(tile.y0)..(y + 2).min(tile.y1))
+            .flat_map(|y| columns.clone().map(move |x| (x, y)))
+            .map(|(x, y)| seen[index(x, y)]);
+        around.all(|(agrees, color)| agrees && !judge.differ(own, color))
+    };
+    let mut left = Vec::new();
+    for (i, pixel) in pixels.iter_mut().enumerate() {
+        if is_calm(pixel.x, pixel.y) {
+            pixel.facts.end = End::Met;
+        } else {
+            left.push(i);
+        }
+    }
+    left
+}
+
+impl Pixel {
+    fn new(seed: u64, (x, y): (u32, u32)) -> Self {
+        let facts = PixelFacts { count: 0, error: 0.0, end: End::Ceiling };
+        Self { x, y, key: pixel_key(seed, (x, y)), streams: Default::default(), layers: LayerSum::default(), facts }
+    }
+
+    /// The place of the `i`th sample among its streams'.
+    #[expect(clippy::cast_possible_truncation, reason = "a handful of streams")]
+    fn stream(&self, i: u32) -> Stream {
+        let streams = STREAMS as u32;
+        Stream { key: mix(self.key, i % streams), index: i / streams }
+    }
+
+    /// Where the `i`th sample goes through the picture and the lens.
+    fn place(&self, how: &Stochastic, i: u32) -> Place {
+        let Stream { key, index } = self.stream(i);
+        let [x, y, u, v] = sobol::point(index, key);
+        let (x, y) = (f64::from(self.x) + how.filter.place(x), f64::from(self.y) + how.filter.place(y));
+        Place { x, y, lens: [u, v] }
+    }
+
+    fn sum(&self) -> Sum {
+        self.streams.iter().fold(Sum::default(), |sum, stream| sum.plus(*stream, 1.0))
+    }
+
+    /// The streams that have samples.
+    fn taken(&self) -> &[Sum] {
+        &self.streams[..STREAMS.min(self.facts.count as usize)]
+    }
+
+    /// Finds out how certain the mean is.
+    fn look(&mut self, judge: &Certainty) {
+        self.facts.error = judge.standard_error(&self.streams);
+        if judge.is_met(self.facts.error) {
+            self.facts.end = End::Met;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounds_double_and_end_at_the_most() {
+        let rounds = |min_samples, max_samples| {
+            super::rounds(&Stochastic { min_samples, max_samples, ..Stochastic::default() })
+        };
+        assert_eq!(rounds(4, 256), [4, 16, 32, 64, 128, 256]);
+        assert_eq!(rounds(4, 100), [4, 16, 32, 64, 96]);
+        assert_eq!(rounds(30, 256), [24, 48, 96, 192, 256]);
+        assert_eq!(rounds(4, 4), [4]);
+        assert_eq!(rounds(4, 3), [3]);
+        assert_eq!(rounds(64, 16), [16]);
+    }
+}
