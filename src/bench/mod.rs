@@ -17,6 +17,7 @@ pub mod report;
 pub mod row;
 pub mod spd;
 pub mod star;
+pub mod study;
 pub mod sweep;
 #[cfg(test)]
 mod tests;

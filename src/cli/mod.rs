@@ -29,6 +29,7 @@ mod render;
 mod sequence;
 mod shell;
 mod stats;
+mod study;
 mod summary;
 mod surroundings;
 mod text;
@@ -63,6 +64,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
         Command::Bench(args) => bench::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Explain(args) => explain::run(&args),
+        Command::Study(args) => study::run(&args),
         Command::Trace(args) => trace::run(&args),
         Command::Diff(args) => diff::run(&args),
         Command::Generate(args) => generate::run(&args),

@@ -5,7 +5,7 @@ mod growth;
 mod heat;
 mod lines;
 mod plot;
-mod svg;
+pub(crate) mod svg;
 mod sweep;
 
 use super::number::{bytes, grouped, seconds, short, whole};
@@ -227,6 +227,6 @@ fn notes(report: &Report) -> String {
 }
 
 /// Text that cannot be taken for markup.
-fn escaped(text: &str) -> String {
+pub(crate) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

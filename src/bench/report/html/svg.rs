@@ -4,10 +4,10 @@ use super::super::number::short;
 use std::fmt::Write;
 
 /// Units across.
-pub(super) const WIDTH: f64 = 440.0;
+pub(crate) const WIDTH: f64 = 440.0;
 
 /// From `low` to `high` along `from..to`: logarithms to the base of ten, or values themselves.
-pub(super) struct Scale {
+pub(crate) struct Scale {
     low: f64,
     high: f64,
     from: f64,
@@ -17,7 +17,7 @@ pub(super) struct Scale {
 
 impl Scale {
     /// Whole decades around the values that are above 0.
-    pub(super) fn around(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
+    pub(crate) fn around(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         for log in values.filter(|v| *v > 0.0 && v.is_finite()).map(f64::log10) {
             (low, high) = (low.min(log), high.max(log));
@@ -30,20 +30,20 @@ impl Scale {
     }
 
     /// Just around the values, with one more part in ten on both sides, and nearly a decade at least.
-    pub(super) fn fitting(values: impl Iterator<Item = f64> + Clone, from: f64, to: f64) -> Self {
+    pub(crate) fn fitting(values: impl Iterator<Item = f64> + Clone, from: f64, to: f64) -> Self {
         let tight = Self::tight(values, from, to);
         let (middle, half) = ((tight.low + tight.high) * 0.5, ((tight.high - tight.low) * 0.6).max(0.4));
         Self { low: middle - half, high: middle + half, ..tight }
     }
 
     /// From the least value to the most; a factor of 1.6 at least.
-    pub(super) fn tight(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
+    pub(crate) fn tight(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
         let logs = values.filter(|v| *v > 0.0 && v.is_finite()).map(f64::log10);
         Self { is_even: false, ..Self::between(logs, 0.2, from, to) }
     }
 
     /// From the least value to the most, themselves and not their logarithms.
-    pub(super) fn even(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
+    pub(crate) fn even(values: impl Iterator<Item = f64>, from: f64, to: f64) -> Self {
         Self { is_even: true, ..Self::between(values, 1.0, from, to) }
     }
 
@@ -55,14 +55,14 @@ impl Scale {
     }
 
     /// Where a value lies; what is 0 or below the scale lies at its start.
-    pub(super) fn at(&self, value: f64) -> f64 {
+    pub(crate) fn at(&self, value: f64) -> f64 {
         let value = if self.is_even { value } else { value.max(1e-300).log10() };
         let part = (value - self.low) / (self.high - self.low);
         self.from + part.clamp(0.0, 1.0) * (self.to - self.from)
     }
 
     /// Round values: whole decades where there are many, parts of them where there are few.
-    pub(super) fn ticks(&self) -> Vec<f64> {
+    pub(crate) fn ticks(&self) -> Vec<f64> {
         let span = self.high - self.low;
         if self.is_even {
             return self.multiples((span / 6.0).ceil().max(1.0));
@@ -96,7 +96,7 @@ impl Scale {
 }
 
 /// A round number of seconds: `20 µs`.
-pub(super) fn unit(seconds: f64) -> String {
+pub(crate) fn unit(seconds: f64) -> String {
     let scaled = |factor: f64, unit: &str| format!("{} {unit}", plain(&short(seconds * factor)));
     match seconds {
         s if s < 0.99e-6 => scaled(1e9, "ns"),
@@ -107,17 +107,17 @@ pub(super) fn unit(seconds: f64) -> String {
 }
 
 /// A large round number: `2e5`.
-pub(super) fn power(number: f64) -> String {
+pub(crate) fn power(number: f64) -> String {
     format!("{number:.1e}").replace(".0e", "e")
 }
 
 /// A number without noughts to spare: `1.50` as `1.5`.
-pub(super) fn plain(number: &str) -> &str {
+pub(crate) fn plain(number: &str) -> &str {
     if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }
 }
 
 /// Ascending places moved apart by at least `gap`, none beyond `end`.
-pub(super) fn spread_out(places: &[f64], gap: f64, end: f64) -> Vec<f64> {
+pub(crate) fn spread_out(places: &[f64], gap: f64, end: f64) -> Vec<f64> {
     let mut moved: Vec<f64> = Vec::new();
     for &place in places {
         moved.push(moved.last().map_or(place, |&before| place.max(before + gap)));
@@ -130,16 +130,16 @@ pub(super) fn spread_out(places: &[f64], gap: f64, end: f64) -> Vec<f64> {
     moved
 }
 
-pub(super) fn open(height: f64, label: &str) -> String {
+pub(crate) fn open(height: f64, label: &str) -> String {
     format!("<svg viewBox=\"0 0 {WIDTH} {height}\" role=\"img\" aria-label=\"{label}\">")
 }
 
-pub(super) fn rule(svg: &mut String, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2], class: &str) {
+pub(crate) fn rule(svg: &mut String, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2], class: &str) {
     // Writing to a string cannot fail, here and below.
     let _ = write!(svg, "<line class=\"{class}\" x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\"/>");
 }
 
-pub(super) fn words(svg: &mut String, x: f64, y: f64, anchor: &str, class: &str, text: &str) {
+pub(crate) fn words(svg: &mut String, x: f64, y: f64, anchor: &str, class: &str, text: &str) {
     let _ = write!(svg, "<text class=\"{class}\" x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{text}</text>");
 }
 

@@ -1,0 +1,75 @@
+//! Which settings to use for what, and why.
+
+use super::Study;
+use super::knob::Knob;
+use super::measure::Row;
+use crate::render::Quality;
+
+/// What is advised for one purpose.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Advice {
+    /// For what.
+    pub purpose: Quality,
+    /// Place of the row that is advised; `None` where none is good enough.
+    pub row: Option<usize>,
+    /// Why, in a sentence.
+    pub why: String,
+}
+
+/// Root mean square error of a picture that is good enough for a purpose, codes 0..=1: about five, two and a half and one
+/// of 255 steps.
+pub const fn good_enough(purpose: Quality) -> f64 {
+    match purpose {
+        Quality::Draft => 0.02,
+        Quality::Normal => 0.01,
+        Quality::Final => 0.004,
+    }
+}
+
+pub(super) fn advice(study: &Study) -> Vec<Advice> {
+    Quality::ALL.iter().map(|&purpose| advise(study, purpose)).collect()
+}
+
+/// The program's own choice for a purpose, where nothing that is as good takes much less time.
+fn advise(study: &Study, purpose: Quality) -> Advice {
+    /// Part of the time that another setting must save to be worth its flags: differences below this are noise of the clock.
+    const WORTH: f64 = 0.2;
+    let goal = good_enough(purpose);
+    let time = |i: usize| study.rows[i].cpu.median();
+    let good: Vec<usize> = (0..study.rows.len()).filter(|&i| study.rows[i].error.rmse <= goal).collect();
+    let fastest = good.iter().copied().min_by(|&a, &b| time(a).total_cmp(&time(b)));
+    let own = good.iter().copied().find(|&i| is_quality(&study.rows[i], purpose));
+    let steps = 255.0 * goal;
+    let Some(fastest) = fastest else {
+        let why = format!("no setting that was tried comes below an error of {goal} ({steps:.1} of 255 steps)");
+        return Advice { purpose, row: None, why };
+    };
+    let row = own.filter(|&own| time(fastest) > (1.0 - WORTH) * time(own)).unwrap_or(fastest);
+    let chosen = &study.rows[row];
+    let what = if own == Some(row) { "the program's own choice: " } else { "" };
+    let rest = rest(chosen);
+    let beaten = own.filter(|&own| own != row).map_or_else(String::new, |own| {
+        format!(
+            ", {:.0} % less time than --quality {purpose} for an error that is small enough, too",
+            100.0 * (1.0 - time(row) / time(own))
+        )
+    });
+    let why = format!(
+        "{what}the fastest with an error of at most {goal} ({steps:.1} of 255 steps): {:.4}, {rest}{beaten}",
+        chosen.error.rmse
+    );
+    Advice { purpose, row: Some(row), why }
+}
+
+/// What kind of error is left.
+fn rest(row: &Row) -> &'static str {
+    if row.error.bias > row.error.noise {
+        "most of it bias, which more samples do not lessen"
+    } else {
+        "most of it noise"
+    }
+}
+
+fn is_quality(row: &Row, purpose: Quality) -> bool {
+    row.setting.knob == Knob::Quality && row.setting.flags.ends_with(purpose.name())
+}

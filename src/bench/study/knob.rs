@@ -1,0 +1,173 @@
+//! The knobs that a scene has, and the settings of each that are tried.
+//!
+//! | knob | costs | risks |
+//! |---|---|---|
+//! | sampling | rays of each pixel | jagged edges, noise; what is smaller than the distance of two samples is lost |
+//! | depth | rays behind mirrors and glass | what is seen through more surfaces is black |
+//! | cut-off | the same, of little weight | their light is missing: pictures get darker |
+//! | light rays | shadow rays to wide lights | noise in soft shadows |
+//! | surroundings' rays | rays to a panorama from every point | noise in what it lights |
+//! | gloss rays | rays that a rough surface spreads | noise in what frosted glass shows |
+//! | test | time of each ray/triangle test | holes and wrong hits where rays graze edges |
+
+use super::Subject;
+use crate::accel::IntersectorKind;
+use crate::render::{Adaptive, Quality, Sampling, Settings, Stochastic};
+use crate::scene::features::{Feature, Features};
+use std::fmt;
+
+/// What is turned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Knob {
+    /// `--quality`.
+    Quality,
+    /// `--aa off` and `uniform`.
+    Uniform,
+    /// `--aa adaptive`.
+    Adaptive,
+    /// `--aa stochastic`.
+    Stochastic,
+    /// `--depth`.
+    Depth,
+    /// `--cutoff`.
+    Cutoff,
+    /// `--light-rays`.
+    LightRays,
+    /// `--env-rays`.
+    EnvRays,
+    /// `--gloss-rays`.
+    GlossRays,
+    /// `--intersector`.
+    Test,
+}
+
+impl Knob {
+    /// Every one, in the order they are tried.
+    pub const ALL: [Self; 10] = [
+        Self::Quality,
+        Self::Uniform,
+        Self::Adaptive,
+        Self::Stochastic,
+        Self::Depth,
+        Self::Cutoff,
+        Self::LightRays,
+        Self::EnvRays,
+        Self::GlossRays,
+        Self::Test,
+    ];
+
+    /// Its name in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Quality => "quality",
+            Self::Uniform => "uniform",
+            Self::Adaptive => "adaptive",
+            Self::Stochastic => "stochastic",
+            Self::Depth => "depth",
+            Self::Cutoff => "cutoff",
+            Self::LightRays => "light-rays",
+            Self::EnvRays => "env-rays",
+            Self::GlossRays => "gloss-rays",
+            Self::Test => "intersector",
+        }
+    }
+
+    /// Whether the scene has it.
+    fn is_in(self, features: &Features) -> bool {
+        let any = |of: &[Feature]| of.iter().any(|&f| features.has(f));
+        match self {
+            Self::Quality | Self::Uniform | Self::Adaptive | Self::Stochastic => true,
+            Self::Test => any(&[Feature::Triangles]),
+            Self::Depth | Self::Cutoff => any(&[Feature::Mirrors, Feature::Refraction, Feature::ThinTransmission]),
+            Self::LightRays => any(&[Feature::SoftShadows]),
+            Self::EnvRays => any(&[Feature::Panorama]),
+            Self::GlossRays => any(&[Feature::Refraction, Feature::ThinTransmission]),
+        }
+    }
+}
+
+impl fmt::Display for Knob {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// One way to render the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setting {
+    /// What it turns.
+    pub knob: Knob,
+    /// How it is typed: flags of `meshray render`.
+    pub flags: String,
+    /// What that means.
+    pub settings: Settings,
+    /// The ray/triangle test.
+    pub test: IntersectorKind,
+}
+
+/// Every setting of every knob that the scene has. What a knob does not turn is as at the usual quality.
+pub(super) fn settings(subject: &Subject) -> Vec<Setting> {
+    let features = Features::of(subject.scene);
+    Knob::ALL.into_iter().filter(|knob| knob.is_in(&features)).flat_map(|knob| of(knob, subject)).collect()
+}
+
+fn of(knob: Knob, subject: &Subject) -> Vec<Setting> {
+    let stochastic = |how: Stochastic| Sampling::Stochastic(Stochastic { space: subject.space(), ..how });
+    let usual = Settings { sampling: stochastic(Quality::default().stochastic()), ..subject.base.clone() };
+    let sampled = |sampling: Sampling, samples: u32| Settings { sampling, samples, ..usual.clone() };
+    let setting = |flags: String, settings: Settings| Setting { knob, flags, settings, test: IntersectorKind::Exact };
+    match knob {
+        Knob::Quality => {
+            let with = |quality: Quality| {
+                setting(format!("--quality {quality}"), sampled(stochastic(quality.stochastic()), usual.samples))
+            };
+            Quality::ALL.iter().copied().map(with).collect()
+        }
+        Knob::Uniform => {
+            let with = |n: u32| setting(format!("--samples {n}"), sampled(Sampling::Uniform, n));
+            [1, 4, 16, 64].map(with).into()
+        }
+        Knob::Adaptive => {
+            let with = |threshold: f32| {
+                let how = Adaptive { threshold, exposure: subject.output.exposure, ..Adaptive::default() };
+                setting(
+                    format!("--aa adaptive --aa-threshold {threshold}"),
+                    sampled(Sampling::Adaptive(how), usual.samples),
+                )
+            };
+            [0.2, 0.1, 0.05, 0.025].map(with).into()
+        }
+        Knob::Stochastic => {
+            let with = |error: f32| {
+                let how =
+                    Stochastic { error, max_samples: Quality::Final.stochastic().max_samples, ..Stochastic::default() };
+                setting(format!("--pixel-error {error}"), sampled(stochastic(how), usual.samples))
+            };
+            [0.16, 0.08, 0.04, 0.02].map(with).into()
+        }
+        Knob::Depth => {
+            let with = |n: u32| setting(format!("--depth {n}"), Settings { depth: Some(n), ..usual.clone() });
+            [0, 1, 2, 4, 8, 16].map(with).into()
+        }
+        Knob::Cutoff => {
+            let with = |cutoff: f32| setting(format!("--cutoff {cutoff}"), Settings { cutoff, ..usual.clone() });
+            [1.0 / 8.0, 1.0 / 32.0, 1.0 / 128.0, 1.0 / 2048.0].map(with).into()
+        }
+        Knob::LightRays => {
+            let with = |n: u32| setting(format!("--light-rays {n}"), Settings { light_rays: n, ..usual.clone() });
+            [1, 4, 16, 64].map(with).into()
+        }
+        Knob::EnvRays => {
+            let with = |n: u32| setting(format!("--env-rays {n}"), Settings { env_rays: Some(n), ..usual.clone() });
+            [2, 8, 32, 128].map(with).into()
+        }
+        Knob::GlossRays => {
+            let with = |n: u32| setting(format!("--gloss-rays {n}"), Settings { gloss_rays: Some(n), ..usual.clone() });
+            [1, 4, 16].map(with).into()
+        }
+        Knob::Test => {
+            let others = IntersectorKind::ALL.into_iter().filter(|test| *test != IntersectorKind::Exact);
+            others.map(|test| Setting { test, ..setting(format!("--intersector {test}"), usual.clone()) }).collect()
+        }
+    }
+}

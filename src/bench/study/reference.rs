@@ -1,0 +1,99 @@
+//! What pictures are compared with.
+
+use super::{Plan, Subject};
+use crate::image::look::developed;
+use crate::image::{Picture, srgb};
+use crate::render::{Sampling, Settings, Stochastic, render};
+
+/// Renderings with numbers of their own that a reference is the mean of.
+const PARTS: u32 = 8;
+
+/// The mean of many samples of each pixel, every knob that cuts anything short turned up; gathered in double precision.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    /// Columns.
+    pub width: u32,
+    /// Codes 0..=1 of the picture as it is displayed, over black, and coverage; row by row.
+    pub pixels: Vec<[f64; 4]>,
+    /// Whether some pixel is not covered in full, so that coverage counts.
+    pub is_transparent: bool,
+    /// Its own error: the standard error of the mean, estimated from its parts, as a root mean square.
+    pub error: f64,
+    /// Samples of each pixel.
+    pub samples: u32,
+}
+
+impl Reference {
+    pub(super) fn render(subject: &Subject, plan: &Plan, go_on: &mut dyn FnMut(u32, u32) -> bool) -> Option<Self> {
+        let samples = (plan.reference_samples / PARTS).max(8);
+        let how = Stochastic { min_samples: samples, max_samples: samples, ..Stochastic::default() };
+        let mut sums: Vec<[f64; 4]> = Vec::new();
+        let mut parts: Vec<Vec<[f64; 4]>> = Vec::new();
+        let mut width = 0;
+        for part in 0..PARTS {
+            if !go_on(part, PARTS) {
+                return None;
+            }
+            let settings = Settings {
+                sampling: Sampling::Stochastic(Stochastic { space: subject.space(), ..how }),
+                // No rendering that is compared with it has these numbers.
+                seed: plan.seed.wrapping_add(0x5eed_0000 + u64::from(part)),
+                depth: subject.base.depth.map(|depth| depth.max(32)).or(deep(subject)),
+                cutoff: 1e-6,
+                layers: false,
+                ..subject.base.clone()
+            };
+            let picture = render(&subject.job(&settings, subject.accel), &()).picture;
+            width = picture.width;
+            sums.resize(picture.beauty.len(), [0.0; 4]);
+            for (sum, pixel) in sums.iter_mut().zip(&picture.beauty) {
+                (0..4).for_each(|c| sum[c] += f64::from(pixel[c]) / f64::from(PARTS));
+            }
+            parts.push(codes(&picture, subject));
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "the mean of single numbers as one of them")]
+        let beauty = sums.iter().map(|sum| sum.map(|c| c as f32)).collect();
+        let height = u32::try_from(sums.len()).unwrap_or(u32::MAX).checked_div(width).unwrap_or(0);
+        let mean = Picture { width, height, beauty, layers: None };
+        let is_transparent = mean.beauty.iter().any(|p| p[3] != 1.0);
+        let pixels = codes(&mean, subject);
+        let error = standard_error(&parts, channels(is_transparent));
+        Some(Self { width, pixels, is_transparent, error, samples: samples * PARTS })
+    }
+
+    /// Channels that are compared: 3, or 4 with coverage.
+    pub fn channels(&self) -> usize {
+        channels(self.is_transparent)
+    }
+}
+
+/// Bounces that leave nothing out; `None` where the scene needs none at all.
+fn deep(subject: &Subject) -> Option<u32> {
+    use crate::scene::features::{Feature, Features};
+    let features = Features::of(subject.scene);
+    let any = [Feature::Mirrors, Feature::Refraction, Feature::ThinTransmission].iter().any(|&f| features.has(f));
+    any.then_some(32)
+}
+
+fn channels(is_transparent: bool) -> usize {
+    if is_transparent { 4 } else { 3 }
+}
+
+/// The codes of a picture as it is displayed.
+pub(super) fn codes(picture: &Picture, subject: &Subject) -> Vec<[f64; 4]> {
+    let code = |c: f32| srgb::encode(f64::from(c).clamp(0.0, 1.0));
+    let shown = developed(picture, subject.output);
+    shown.beauty.iter().map(|&[r, g, b, a]| [code(r), code(g), code(b), f64::from(a)]).collect()
+}
+
+/// Of the mean of all parts, over all pixels and channels.
+fn standard_error(parts: &[Vec<[f64; 4]>], channels: usize) -> f64 {
+    let n = parts.len() as f64;
+    let pixels = parts.first().map_or(0, Vec::len);
+    let variance = |i: usize, c: usize| {
+        let mean = parts.iter().map(|part| part[i][c]).sum::<f64>() / n;
+        parts.iter().map(|part| (part[i][c] - mean) * (part[i][c] - mean)).sum::<f64>() / (n - 1.0)
+    };
+    let sum: f64 = (0..pixels).map(|i| (0..channels).map(|c| variance(i, c)).sum::<f64>()).sum();
+    (sum / (pixels * channels).max(1) as f64 / n).sqrt()
+}

@@ -1,0 +1,137 @@
+//! `meshray study`: what each knob buys on a model, and which settings to use.
+
+use super::args::StudyArgs;
+use super::camera::{self, Choice};
+use super::exit::Exit;
+use super::job::Wrong;
+use super::message::{Messages, Severity};
+use super::{accident, interrupt, print, read};
+use crate::accel::{AccelParams, auto};
+use crate::bench::study::report::{Format, text};
+use crate::bench::study::{Plan, Study, Subject, measure, reference, settings};
+use crate::image::{Output, write_atomic};
+use crate::load::Diagnostic;
+use crate::render::texture::TextureStore;
+use crate::render::{Settings, View, World};
+use crate::scene::default_light;
+use crate::scene::framing::robust_bounds;
+use std::path::{Path, PathBuf};
+
+/// Loads the model, renders it with every setting, and prints and writes rows as they come.
+pub(super) fn run(args: &StudyArgs) -> Exit {
+    let messages = Messages::new(args.model.load.messages.into(), args.quiet);
+    let typed = |path: &PathBuf| Ok((path.clone(), Format::from_path(path).map_err(Wrong)?));
+    let files: Vec<(PathBuf, Format)> = match args.report.iter().map(typed).collect() {
+        Ok(files) => files,
+        Err(Wrong(text)) => {
+            messages.error("usage", text, "");
+            return Exit::Usage;
+        }
+    };
+    let name = args.model.input.display().to_string();
+    accident::guard(&name, &messages, || {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.unwrap_or(0)).build();
+        match pool {
+            Ok(pool) => pool.install(|| study(args, &files, &name, &messages).unwrap_or_else(|exit| exit)),
+            Err(e) => {
+                messages.error("threads", format!("no threads can be started: {e}"), "ask for fewer (--threads)");
+                Exit::Failed
+            }
+        }
+    })
+}
+
+fn study(args: &StudyArgs, files: &[(PathBuf, Format)], name: &str, messages: &Messages) -> Result<Exit, Exit> {
+    let file = args.model.input.as_path();
+    let mut loaded = read::model(&args.model, messages)?;
+    let world = World::new(&loaded.scene);
+    let fail = |fault: Diagnostic| {
+        messages.say(Severity::Error, &fault);
+        Exit::Input
+    };
+    if world.shapes.is_empty() {
+        return Err(fail(Diagnostic::new("nothing-to-draw", file, "", "nothing to hit: it holds no faces")));
+    }
+    let (width, height) = args.size;
+    let bounds = robust_bounds(&loaded.scene);
+    let aspect = f64::from(width) / f64::from(height);
+    let (camera, view_phrase) =
+        camera::camera(&Choice::of(&args.eye, None), None, &loaded.scene, &bounds, aspect, file).map_err(fail)?;
+    default_light::add_if_missing(&mut loaded.scene, &camera);
+    let hints = &loaded.scene.hints;
+    let base = Settings { width, height, depth: hints.depth, seed: args.seed, ..Settings::default() };
+    let tone_map = match hints.tone_map.as_deref().map(str::parse).transpose() {
+        Ok(hinted) => args.tone_map.or(hinted).unwrap_or_default(),
+        Err(e) => return Err(fail(Diagnostic::new("scene-value", file, "", format!("{e}")))),
+    };
+    let exposure = args.exposure.or(hints.exposure).unwrap_or(0.0);
+    let output = Output { tone_map, exposure, ..Output::default() };
+    let (accel, _) = auto::build(args.accel, &world.shapes, &AccelParams::DEFAULT);
+    let (textures, view) = (TextureStore::new(&loaded.scene), View::from_camera(&camera));
+    let subject = Subject {
+        scene: &loaded.scene,
+        world: &world,
+        accel: &accel,
+        textures: &textures,
+        view: &view,
+        base: &base,
+        output: &output,
+    };
+    let plan = Plan { passes: args.passes, reference_samples: args.reference_samples, seed: args.seed };
+    let mut going = |done: u32, of: u32| {
+        messages.info("progress", format!("{name}: the reference, part {} of {of}", done + 1));
+        !interrupt::raised()
+    };
+    let reference = reference(&subject, &plan, &mut going).ok_or(Exit::Interrupted)?;
+    let mut study = Study {
+        name: name.to_owned(),
+        hash: loaded.facts.hash,
+        view: view_phrase,
+        size: (width, height),
+        threads: rayon::current_num_threads(),
+        plan,
+        reference,
+        rows: Vec::new(),
+        complete: false,
+    };
+    let told = Told { files, messages };
+    told.print(&text::head(&study))?;
+    for setting in settings(&subject) {
+        if interrupt::raised() {
+            break;
+        }
+        let row = measure(&subject, &plan, &study.reference, setting);
+        told.print(&text::row(&row))?;
+        study.rows.push(row);
+        told.write(&study)?;
+    }
+    study.complete = !interrupt::raised();
+    told.print(&text::conclusion(&study))?;
+    told.write(&study)?;
+    Ok(if study.complete { Exit::Done } else { Exit::Interrupted })
+}
+
+/// Where rows go as they come.
+struct Told<'a> {
+    files: &'a [(PathBuf, Format)],
+    messages: &'a Messages,
+}
+
+impl Told<'_> {
+    fn print(&self, text: &str) -> Result<(), Exit> {
+        print(text).map_err(|e| self.unwritable(Path::new("standard output"), &e.to_string()))
+    }
+
+    /// Writes every report with what there is so far, so that a crash costs one row.
+    fn write(&self, study: &Study) -> Result<(), Exit> {
+        self.files.iter().try_for_each(|(path, format)| {
+            let bytes = format.write(study).into_bytes();
+            write_atomic(path, &bytes, false).map_err(|e| self.unwritable(path, &e.to_string()))
+        })
+    }
+
+    fn unwritable(&self, path: &Path, why: &str) -> Exit {
+        self.messages.error("output-unwritable", format!("{}: {why}", path.display()), "");
+        Exit::Failed
+    }
+}
