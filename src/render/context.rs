@@ -2,8 +2,8 @@
 
 use super::Settings;
 use super::absorption::Absorption;
-use super::shade::{Band, LocalLight, bands, lets_light_in};
 use super::sampling::Sampling;
+use super::shade::{Band, LocalLight, bands, lets_light_in};
 use super::sky::Sky;
 use super::strip::Uniform;
 use super::texture::TextureStore;

@@ -142,7 +142,8 @@ mod tests {
             assert!(cells.into_iter().eq(0..64), "{purpose:?}");
         }
         // Other branches and purposes draw from other sequences.
-        let same = |a: (u32, Purpose), b: (u32, Purpose)| (0..64).filter(|&s| cell(s, a.0, a.1) == cell(s, b.0, b.1)).count();
+        let same =
+            |a: (u32, Purpose), b: (u32, Purpose)| (0..64).filter(|&s| cell(s, a.0, a.1) == cell(s, b.0, b.1)).count();
         assert!(same((0, Purpose::Lights), (0, Purpose::Facets)) < 8);
         assert!(same((0, Purpose::Lights), (1, Purpose::Lights)) < 8);
     }

@@ -1,5 +1,6 @@
 //! What all pixels of a picture share, and how samples become a pixel.
 
+use super::Settings;
 use super::context::Context;
 use super::eyes::{Ball, Eye, Place, ThinLens};
 use super::pixel::sample_offsets;
@@ -7,7 +8,6 @@ use super::sampling::{Adaptive, Sampling};
 use super::sobol::{self, mix};
 use super::view::View;
 use super::whitted::Sample;
-use super::Settings;
 use crate::math::{DVec3, Vec3};
 use crate::scene::Background;
 

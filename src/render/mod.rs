@@ -239,7 +239,6 @@ pub struct Recording {
 fn render_with<P: Observer>(job: &Job, progress: &dyn Progress) -> (Rendered, Vec<ByClass<P>>) {
     let settings = job.settings;
     let context = Context::new(job.scene, job.world, job.textures, settings);
-    let (picture, sampled, counts, complete) =
-        tile::render_tiles(&context, job.accel, job.view, settings, progress);
+    let (picture, sampled, counts, complete) = tile::render_tiles(&context, job.accel, job.view, settings, progress);
     (Rendered { picture, counts: ClassCounts::default(), sampled, depth: context.depth, complete }, counts)
 }

@@ -192,9 +192,8 @@ mod tests {
 
     #[test]
     fn rounds_double_and_end_at_the_most() {
-        let rounds = |min_samples, max_samples| {
-            super::rounds(&Stochastic { min_samples, max_samples, ..Stochastic::default() })
-        };
+        let rounds =
+            |min_samples, max_samples| super::rounds(&Stochastic { min_samples, max_samples, ..Stochastic::default() });
         assert_eq!(rounds(4, 256), [4, 16, 32, 64, 128, 256]);
         assert_eq!(rounds(4, 100), [4, 16, 32, 64, 96]);
         assert_eq!(rounds(30, 256), [24, 48, 96, 192, 256]);

@@ -17,6 +17,7 @@ mod profile;
 mod program;
 mod pruning;
 mod same_pixels;
+mod sampling;
 mod spd;
 mod surroundings;
 mod trace;
