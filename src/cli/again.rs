@@ -10,6 +10,7 @@ use super::exit::Exit;
 use super::job::{Batch, RenderJob, Shot};
 use super::parse::{self, Env};
 use super::picture::Effective;
+use super::sampling;
 use super::sequence::Sequence;
 use super::stats::Counted;
 use crate::accel::auto::Reason;
@@ -17,15 +18,27 @@ use crate::accel::{AccelKind, Assign, MailboxKind};
 use crate::image::{ExrSamples, FileKind, ImageError, Metadata, PngDepth, read_metadata};
 use crate::load::{Diagnostic, Loaded, MtlMode, Polygons};
 use crate::math::DVec3;
+use crate::render::Sampled;
 use crate::scene::{Background, Environment, UpAxis};
 use clap::Parser;
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
 /// The flags that a picture may bring along.
-const FLAGS: [&str; 49] = [
+const FLAGS: [&str; 60] = [
     "size",
+    "aa",
     "samples",
+    "pixel-error",
+    "confidence",
+    "min-samples",
+    "max-samples",
+    "filter",
+    "error-space",
+    "aa-threshold",
+    "aa-depth",
+    "aperture",
+    "focus",
     "depth",
     "cutoff",
     "seed",
@@ -85,6 +98,8 @@ pub(super) struct Facts<'a> {
     pub shot: &'a Shot,
     /// Settings as used.
     pub effective: &'a Effective,
+    /// What came of them.
+    pub sampled: &'a Sampled,
     /// Depth as used.
     pub depth: u32,
     /// Structure as used.
@@ -112,7 +127,7 @@ impl Facts<'_> {
         let mut flags = Map::new();
         let mut set = |flag: &str, value: String| drop(flags.insert(flag.into(), Value::String(value)));
         set("size", format!("{}x{}", settings.width, settings.height));
-        set("samples", settings.samples.to_string());
+        sampling::flags(settings, &mut set);
         set("depth", self.depth.to_string());
         set("cutoff", settings.cutoff.to_string());
         set("seed", settings.seed.to_string());

@@ -3,6 +3,7 @@
 use super::bench::BenchArgs;
 use super::diff::DiffArgs;
 use super::parse;
+use super::sampling::SamplingArgs;
 use crate::accel::{AccelChoice, Assign, IntersectorKind, MailboxKind};
 use crate::bench::study::Plan as Study;
 use crate::bench::verify::Plan;
@@ -134,7 +135,8 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "PICTURE", help_heading = "Output", hide_short_help = true, conflicts_with_all = [
         "size", "format", "bits", "half", "float", "layers", "tone_map", "exposure", "merge", "view", "camera", "eye",
         "at", "up_vector", "fov", "ortho", "up", "background", "env", "env_rotate", "env_rays", "gloss_rays",
-        "light_rays", "sun_size", "samples", "depth", "cutoff", "seed", "scene", "variant", "animation", "time", "frame", "fps",
+        "light_rays", "sun_size", "aa", "quality", "samples", "pixel_error", "confidence", "min_samples", "max_samples",
+        "filter", "error_space", "aa_threshold", "aa_depth", "aperture", "focus", "depth", "cutoff", "seed", "scene", "variant", "animation", "time", "frame", "fps",
         "frames", "turntable",
         "polygons", "mtl", "allow_empty", "accel", "intersector",
     ])]
@@ -195,9 +197,9 @@ pub(super) struct RenderArgs {
           help_heading = "Light and background", hide_short_help = true)]
     pub env_rays: Option<u32>,
 
-    /// Rays a pixel [default: 4]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536), help_heading = "Quality")]
-    pub samples: Option<u32>,
+    /// How pixels are sampled.
+    #[command(flatten)]
+    pub sampling: SamplingArgs,
     /// Bounces after the eye ray [default: what the scene needs]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=64), help_heading = "Quality")]
     pub depth: Option<u32>,

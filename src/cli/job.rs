@@ -6,6 +6,7 @@ use super::cost_layers;
 use super::message;
 use super::output_name::{self, Facts, Naming};
 use super::parse::{Back, Env};
+use super::sampling::SamplingArgs;
 use super::sequence::{self, Sequence, Step};
 use crate::accel::{AccelChoice, AccelParams, IntersectorKind};
 use crate::image::{ExrSamples, FileKind, PngDepth, ToneMap};
@@ -111,8 +112,8 @@ impl Target {
 pub(super) struct Look {
     /// Columns and rows.
     pub size: Option<(u32, u32)>,
-    /// Rays a pixel.
-    pub samples: Option<u32>,
+    /// Which rays pixels get, and through which lens.
+    pub sampling: SamplingArgs,
     /// Bounces after the eye ray.
     pub depth: Option<u32>,
     /// Weight where a branch ends.
@@ -162,6 +163,7 @@ impl RenderJob {
     /// Checks what was typed. Touches no file.
     pub(super) fn new(args: &RenderArgs) -> Result<Self, Wrong> {
         check_flags(args)?;
+        args.sampling.check()?;
         let choices = choices(args)?;
         let sequence = sequence::of(args)?;
         let batches = batches(args, &choices, sequence.as_ref())?;
@@ -362,7 +364,7 @@ pub(super) fn limits(memory: Option<u64>) -> Limits {
 fn look(args: &RenderArgs) -> Look {
     Look {
         size: args.size,
-        samples: args.samples,
+        sampling: args.sampling.clone(),
         depth: args.depth,
         cutoff: args.cutoff,
         seed: args.seed,

@@ -26,6 +26,7 @@ mod profile;
 mod progress;
 mod read;
 mod render;
+mod sampling;
 mod sequence;
 mod shell;
 mod stats;

@@ -5,7 +5,7 @@ use crate::bench::range::{Spacing, values};
 use crate::generate::{Family, MAX_TRIANGLES};
 use crate::image::ToneMap;
 use crate::math::Vec3;
-use crate::render::{Cost, UnknownCost};
+use crate::render::{Cost, Filter, Quality, UnknownCost};
 use crate::scene::framing::NamedView;
 use crate::scene::{Background, Environment};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -147,6 +147,51 @@ pub(super) fn exposure(text: &str) -> Result<f32, String> {
 #[expect(clippy::cast_possible_truncation, reason = "the range fits f32")]
 pub(super) fn cutoff(text: &str) -> Result<f32, String> {
     within(text, 0.0, 1.0).map(|n| n as f32)
+}
+
+/// An error or a difference of channels.
+#[expect(clippy::cast_possible_truncation, reason = "the range fits f32")]
+pub(super) fn error(text: &str) -> Result<f32, String> {
+    within(text, 1e-6, 1e6).map(|n| n as f32)
+}
+
+/// A probability, as it is or in percent.
+pub(super) fn confidence(text: &str) -> Result<f64, String> {
+    let n = match text.strip_suffix('%') {
+        Some(percent) => finite(percent)? / 100.0,
+        None => finite(text)?,
+    };
+    let known = (0.5..=0.9999).contains(&n);
+    if known { Ok(n) } else { Err("write a confidence from 50% to 99.99%".into()) }
+}
+
+/// A radius.
+pub(super) fn radius(text: &str) -> Result<f64, String> {
+    finite(text).ok().filter(|&n| n >= 0.0).ok_or_else(|| "write a radius, 0 or more".into())
+}
+
+/// What is sharp.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Focus {
+    /// So far along the line of sight.
+    Distance(f64),
+    /// What is as far as this point.
+    Point([f64; 3]),
+}
+
+/// A distance or a point.
+pub(super) fn focus(text: &str) -> Result<Focus, String> {
+    if text.contains(',') { vec3(text).map(Focus::Point) } else { above_zero(text).map(Focus::Distance) }
+}
+
+/// One of [`Quality::ALL`].
+pub(super) fn quality() -> impl TypedValueParser<Value = Quality> {
+    PossibleValuesParser::new(Quality::ALL.iter().map(|q| q.name())).try_map(|name: String| name.parse::<Quality>())
+}
+
+/// One of [`Filter::ALL`].
+pub(super) fn filter() -> impl TypedValueParser<Value = Filter> {
+    PossibleValuesParser::new(Filter::ALL.iter().map(|f| f.name())).try_map(|name: String| name.parse::<Filter>())
 }
 
 /// A height, or `auto`.

@@ -3,7 +3,7 @@
 
 use super::interrupt;
 use super::job::{Look, Shot, Target};
-use crate::image::{Metadata, Output, Picture, ToneMap, encode, write_atomic};
+use crate::image::{FileKind, Metadata, Output, Picture, ToneMap, encode, write_atomic};
 use crate::load::Diagnostic;
 use crate::render::Settings;
 use crate::scene::{Background, Environment, RenderHints, Scene};
@@ -26,13 +26,14 @@ impl Effective {
         let usual = Settings::default();
         let (width, height) = look.size.or(hints.size).unwrap_or((usual.width, usual.height));
         let hinted = hints.tone_map.as_deref().map(str::parse::<ToneMap>).transpose().map_err(|e| e.to_string())?;
+        let (samples, sampling) = look.sampling.sampling(hints);
         Ok(Self {
             settings: Settings {
                 width,
                 height,
-                sampling: usual.sampling,
+                sampling,
                 lens: None,
-                samples: look.samples.or(hints.samples).unwrap_or(usual.samples),
+                samples,
                 depth: look.depth.or(hints.depth),
                 cutoff: look.cutoff.or(hints.cutoff).unwrap_or(usual.cutoff),
                 seed: look.seed,
@@ -55,6 +56,11 @@ impl Effective {
 }
 
 impl Effective {
+    /// The same for a picture that is written as this kind of file: errors are counted in what it holds.
+    pub(super) fn written_as(&mut self, look: &Look, kind: FileKind) {
+        self.settings.sampling = look.sampling.written(self.settings.sampling, kind, &self.output);
+    }
+
     /// Width / height.
     pub(super) fn aspect(&self) -> f64 {
         f64::from(self.settings.width) / f64::from(self.settings.height)
@@ -83,7 +89,7 @@ pub(super) fn background(look: &Look, scene: &Scene) -> Background {
 pub(super) fn too_large(effective: &Effective, costs: usize, limit: u64) -> Option<Diagnostic> {
     let settings = &effective.settings;
     // Beauty, its tiles and the encoder's copy; layers beside it; of costs the tiles, five channels, copies and sums.
-    let per_pixel = 16 * 3 + if settings.layers { 48 } else { 0 } + 128 * costs as u64;
+    let per_pixel = 16 * 3 + if settings.layers { 64 } else { 0 } + 8 + 128 * costs as u64;
     let need = u64::from(settings.width) * u64::from(settings.height) * per_pixel;
     (need > limit).then(|| {
         let text =

@@ -269,6 +269,10 @@ fn render_shot(
     let light = surroundings::light(&job.look, &mut loaded.scene, &camera);
     loaded.scene.background = Some(picture::background(&job.look, &loaded.scene));
     let view = View::from_camera(&camera);
+    match job.look.sampling.lens(&view, (bounds.lo + bounds.hi) * 0.5, file) {
+        Ok(lens) => effective.settings.lens = lens,
+        Err(fault) => return fail(&fault, Exit::Input),
+    }
     profile.done("frame");
 
     let mut times = Times { load: **load_seconds, ..Times::default() };
@@ -284,14 +288,16 @@ fn render_shot(
     times.build = start.elapsed().as_secs_f64();
     profile.done("build");
 
-    let work =
-        Job { scene: &loaded.scene, world, accel, textures: &textures, view: &view, settings: &effective.settings };
+    let scene = &loaded.scene;
+    let work = Job { scene, world, accel, textures: &textures, view: &view, settings: &effective.settings };
     if effective.metered && shot.kind != FileKind::Exr {
         progress.stage("metering");
         let stops = *metered.get_or_insert_with(|| meter::exposure(&loaded.scene, &work, &effective).unwrap_or(0.0));
         effective.output.exposure = stops;
         profile.done("meter");
     }
+    effective.written_as(&job.look, shot.kind);
+    let work = Job { settings: &effective.settings, scene, world, accel, textures: &textures, view: &view };
     let mut rendered = trace(job, &work, progress, &mut times, profile);
     let costs = rendered.complete.then(|| costs(job, &work, progress));
     progress.finish();
@@ -304,7 +310,9 @@ fn render_shot(
     let counted = job.stats.is_some().then(|| stats::count(&work, &rendered, accel, messages));
 
     let (depth, accel_kind) = (rendered.depth, accel.kind());
-    let facts = again::Facts { job, batch, shot, effective: &effective, depth, accel: accel_kind, reason, loaded };
+    let sampled = &rendered.sampled;
+    let facts =
+        again::Facts { job, batch, shot, effective: &effective, sampled, depth, accel: accel_kind, reason, loaded };
     let metadata = again::metadata(&facts, counted.as_ref());
     profile.skip();
     let start = Instant::now();

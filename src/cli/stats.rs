@@ -8,6 +8,7 @@
 //! | `schema`, `version` | `meshray-stats/1`; version of meshray |
 //! | `inputs`, `output`, `input_hash` | files as typed (`-`: standard streams); xxh3-128 of what was read, hexadecimal |
 //! | `width`, `height`, `samples`, `depth`, `cutoff`, `seed`, `view`, `accel`, `intersector`, `threads` | settings that were used |
+//! | `sampling` | `aa` and its settings (then `samples`, that of uniform sampling, is `null`); eye `rays`, `mean` and `most` of a pixel; of stochastic sampling pixels that `met` `pixel_error`, those stopped at the `ceiling`, and the picture's estimated `rmse` in `error_space` |
 //! | `auto` | `null`, or why `--accel auto` took `accel`: `why` in words; `rays` and `prims` of the sample; cost of a ray through `fast-octree` and `fast-bvh`, in nodes of eight boxes |
 //! | `parameters` | of the structure, as used: `leaf_size` (`null`: by step cost); of grids and octrees `grid_density`, `grid_resolution`, `max_depth`, `step_cost`, `grid_cells` (`null`: by density), `max_references`, `assign`, `mailbox` as well |
 //! | `seconds` | of the timed run: `load`, `build`, `render`, `write`; `load` and `build` are 0 for further pictures of one scene |
@@ -27,8 +28,9 @@ use super::exit::Exit;
 use super::job::RenderJob;
 use super::message::Messages;
 use super::profile::Profile;
+use super::sampling;
 use crate::accel::{AccelKind, AccelParams, AnyAccel, RayCounts, StructureStats};
-use crate::render::{CLASS_NAMES, ClassCounts, Job, Rendered, Settings, World};
+use crate::render::{CLASS_NAMES, ClassCounts, Job, Rendered, Sampling, World};
 use serde_json::{Value, json};
 use std::io;
 use std::time::Instant;
@@ -48,15 +50,14 @@ pub(super) struct Times {
 
 impl Times {
     /// One line for people.
-    pub(super) fn line(&self, settings: &Settings) -> String {
-        let eye_rays = f64::from(settings.width) * f64::from(settings.height) * f64::from(settings.samples);
+    pub(super) fn line(&self, eye_rays: u64) -> String {
         format!(
             "load {}, build {}, render {}, write {}; {} eye rays",
             seconds(self.load),
             seconds(self.build),
             seconds(self.render),
             seconds(self.write),
-            short(eye_rays)
+            short(eye_rays as f64)
         )
     }
 }
@@ -169,13 +170,15 @@ impl PictureStats {
         profile: Option<&Profile>,
     ) -> Self {
         let settings = &facts.effective.settings;
+        let samples = (settings.sampling == Sampling::Uniform).then_some(settings.samples);
+        let sampling = sampling::json(settings, facts.sampled);
         let (scene, shapes) = (&facts.loaded.scene, &world.shapes);
         let json = json!({
             "schema": "meshray-stats/1", "version": super::version::SHORT,
             "inputs": facts.inputs(),
             "output": facts.shot.target.path().map_or("-".into(), |p| p.to_string_lossy()),
             "input_hash": facts.hash(),
-            "width": settings.width, "height": settings.height, "samples": settings.samples, "depth": facts.depth,
+            "width": settings.width, "height": settings.height, "samples": samples, "sampling": sampling, "depth": facts.depth,
             "cutoff": settings.cutoff, "seed": settings.seed, "view": view, "accel": facts.accel.name(),
             "intersector": facts.job.intersector.name(),
             "auto": facts.reason.map(|r| json!({
@@ -207,11 +210,11 @@ impl PictureStats {
         let get = |key: &str| &self.json[key];
         let number = |group: &str, key: &str| self.json[group][key].as_f64().unwrap_or(0.0);
         let mut lines = vec![format!(
-            "{}  {}×{}  {} samples  depth {}  {}  {} threads",
+            "{}  {}×{}  {:.1} samples  depth {}  {}  {} threads",
             get("output").as_str().unwrap_or_default(),
             get("width"),
             get("height"),
-            get("samples"),
+            number("sampling", "mean"),
             get("depth"),
             get("accel").as_str().unwrap_or_default(),
             get("threads"),

@@ -3,6 +3,7 @@
 use super::job::Shot;
 use super::message::{Messages, Severity};
 use super::picture::Effective;
+use super::sampling;
 use super::stats::Times;
 use crate::load::{Diagnostic, Loaded};
 use crate::render::Rendered;
@@ -27,14 +28,14 @@ impl Summary<'_> {
         let name = self.shot.target.path().unwrap_or(Path::new("-"));
         let say = |code, text: String| messages.say(Severity::Info, &Diagnostic::new(code, name, "", text));
         say("picture", self.picture(rendered));
-        say("times", times.line(&self.effective.settings));
+        say("times", times.line(rendered.sampled.rays));
     }
 
     fn picture(&self, rendered: &Rendered) -> String {
         let settings = &self.effective.settings;
         let mut parts = vec![
             format!("{}×{}", settings.width, settings.height),
-            format!("{} samples a pixel", settings.samples),
+            sampling::phrase(settings, &rendered.sampled),
             format!("depth {}{}", rendered.depth, if settings.depth.is_none() { " (auto)" } else { "" }),
             self.view.to_owned(),
         ];

@@ -18,6 +18,7 @@ mod profile;
 mod program;
 mod pruning;
 mod same_pixels;
+mod sampling;
 mod spd;
 mod surroundings;
 mod trace;

@@ -4,8 +4,8 @@ use super::{check, check_all, plain};
 use crate::common::stage::{Stage, metal_rough, phong, unlit};
 use meshray::image::{Output, Picture, ToneMap};
 use meshray::math::{DVec3, Vec2, Vec3, Vec4};
-use meshray::render::View;
 use meshray::render::view::Lens;
+use meshray::render::{Adaptive, Sampling, Stochastic, ThinLens, View};
 use meshray::scene::mesh::Polygon;
 use meshray::scene::{
     AlphaMode, Background, Coat, Falloff, Film, Filter, LightKind, Material, Mesh, MetalRough, Mipmaps, Phong, Sampler,
@@ -455,6 +455,35 @@ fn golden_the_studio_is_behind_when_asked_for() {
     let material = stage.material(metal_rough([0.95; 3], chrome));
     stage.sphere([0.0; 3], 1.2, material);
     check_all(&[("studio", &stage.render(), &Output::default())]);
+}
+
+/// A ball and a card before a checkered floor, under a wide lamp.
+fn edges_and_soft_shadows() -> Stage {
+    let mut stage = Stage::new([0.0, 1.2, 5.0], [0.0, 0.0, 0.0]);
+    stage.scene.background = Some(Background::Color(Vec3::splat(0.3)));
+    checkered_floor(&mut stage, -1.0);
+    let (red, blue) = (stage.matt(RED), stage.matt(BLUE));
+    stage.sphere([-0.8, -0.2, 0.0], 0.8, red);
+    stage.card(0.9, -0.2, -0.4, 0.7, blue);
+    stage.lamp([3.0, 5.0, 4.0], WHITE);
+    stage.scene.lights[0].size = 0.8;
+    stage
+}
+
+#[test]
+fn golden_adaptive_sampling_is_smooth_at_edges() {
+    let mut stage = edges_and_soft_shadows();
+    stage.settings.sampling = Sampling::Adaptive(Adaptive::default());
+    check("adaptive", &stage.render());
+}
+
+#[test]
+fn golden_stochastic_sampling_is_smooth_at_edges_and_through_a_lens() {
+    let mut stage = edges_and_soft_shadows();
+    stage.settings.sampling = Sampling::Stochastic(Stochastic::default());
+    let sharp = stage.render();
+    stage.settings.lens = Some(ThinLens { radius: 0.15, focus: 5.0 });
+    check_all(&[("stochastic", &sharp, &plain()), ("lens", &stage.render(), &plain())]);
 }
 
 #[test]

@@ -28,6 +28,7 @@ use super::exit::Exit;
 use super::job::{self, Look, Wrong};
 use super::message::{Messages, Severity};
 use super::picture::{Effective, background};
+use super::sampling::SamplingArgs;
 use super::{accident, output_name, print, read};
 use crate::accel::{AccelKind, AccelParams, auto};
 use crate::image::{FileKind, Metadata, write_atomic};
@@ -80,7 +81,7 @@ fn check(args: &TraceArgs) -> Result<Look, Wrong> {
     }
     Ok(Look {
         size: args.size,
-        samples: Some(args.samples),
+        sampling: SamplingArgs { samples: Some(args.samples), ..SamplingArgs::default() },
         depth: args.depth,
         cutoff: args.cutoff,
         lens: LensChoice::new(args.fov, args.ortho),

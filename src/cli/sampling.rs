@@ -1,0 +1,326 @@
+//! The flags of pixel sampling and of the lens: what was typed, what it means together, and how it is stored in a picture.
+
+use super::job::Wrong;
+use super::parse::{self, Focus};
+use crate::image::{FileKind, Output};
+use crate::load::Diagnostic;
+use crate::math::DVec3;
+use crate::render::{Adaptive, ErrorSpace, Filter, Quality, Sampled, Sampling, Settings, Stochastic, ThinLens, View};
+use crate::scene::RenderHints;
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// How pixels are sampled.
+#[derive(Debug, Clone, Default, Args)]
+pub(super) struct SamplingArgs {
+    /// Which rays a pixel gets: `off` one through its middle; `uniform` --samples at the same places in each; `adaptive`
+    /// corners and middle, and more where these differ; `stochastic` more until its mean is certain [default: stochastic,
+    /// or what other flags ask for]
+    #[arg(long, value_name = "HOW", value_enum, help_heading = "Quality")]
+    pub aa: Option<Aa>,
+    /// How good a stochastic picture is to be: --pixel-error and --max-samples in a word: draft 0.06 and 64, normal 0.03 and
+    /// 256, final 0.01 and 2048 [default: normal]
+    #[arg(long, value_name = "WORD", value_parser = parse::quality(), help_heading = "Quality")]
+    pub quality: Option<Quality>,
+    /// Exactly N rays a pixel, at the same places in each (--aa uniform). Costs of pixels (--layers tests, --heatmap) are
+    /// always those of N rays, 4 when nothing is said
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536), help_heading = "Quality")]
+    pub samples: Option<u32>,
+    /// Error of a pixel that stochastic sampling stops at: root mean square over its channels, which run from 0 to 1 in the
+    /// written picture. Half of it costs about two to three times the rays
+    #[arg(long, value_name = "E", value_parser = parse::error, help_heading = "Quality")]
+    pub pixel_error: Option<f32>,
+    /// How certain that error is to be, such as 95% or 0.95 [default: 95%]
+    #[arg(long, value_name = "PERCENT", value_parser = parse::confidence, help_heading = "Quality", hide_short_help = true)]
+    pub confidence: Option<f64>,
+    /// Fewest rays of a pixel of stochastic sampling, enough where they and those of its neighbours agree. Light, gloss and
+    /// environment rays are divided by it [default: 4]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=65_536), help_heading = "Quality",
+          hide_short_help = true)]
+    pub min_samples: Option<u32>,
+    /// Most rays of a pixel of stochastic sampling, certain or not
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1_048_576), help_heading = "Quality",
+          hide_short_help = true)]
+    pub max_samples: Option<u32>,
+    /// What of a pixel and around it counts in stochastic sampling: box, all of it alike; tent, its middle most, softer
+    /// [default: box]
+    #[arg(long, value_name = "NAME", value_parser = parse::filter(), help_heading = "Quality", hide_short_help = true)]
+    pub filter: Option<Filter>,
+    /// In what numbers --pixel-error counts: sRGB codes after exposure and tone map, or linear light [default: linear for
+    /// EXR, else display]
+    #[arg(long, value_name = "SPACE", value_enum, help_heading = "Quality", hide_short_help = true)]
+    pub error_space: Option<SpaceArg>,
+    /// Difference of a channel, linear light after exposure, above which adaptive sampling looks closer [default: 0.05]
+    #[arg(long, value_name = "T", value_parser = parse::error, help_heading = "Quality", hide_short_help = true)]
+    pub aa_threshold: Option<f32>,
+    /// How often adaptive sampling halves a pixel at most; 0: five rays [default: 3]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=i64::from(Adaptive::MAX_LEVELS)),
+          help_heading = "Quality", hide_short_help = true)]
+    pub aa_depth: Option<u32>,
+    /// Radius of the lens, in the units of the model: what is not at --focus is blurred [default: 0, everything is sharp]
+    #[arg(long, value_name = "R", value_parser = parse::radius, help_heading = "Camera", hide_short_help = true)]
+    pub aperture: Option<f64>,
+    /// What is sharp: a distance along the line of sight, or a point [default: the middle of the model]
+    #[arg(long, value_name = "D|X,Y,Z", value_parser = parse::focus, requires = "aperture", help_heading = "Camera",
+          hide_short_help = true, allow_hyphen_values = true)]
+    pub focus: Option<Focus>,
+}
+
+/// `--aa`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Aa {
+    Off,
+    Uniform,
+    Adaptive,
+    Stochastic,
+}
+
+/// `--error-space`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum SpaceArg {
+    Display,
+    Linear,
+}
+
+impl SamplingArgs {
+    /// Refuses flags that belong to different kinds of sampling.
+    pub(super) fn check(&self) -> Result<(), Wrong> {
+        let stochastic = [
+            ("--quality", self.quality.is_some()),
+            ("--pixel-error", self.pixel_error.is_some()),
+            ("--confidence", self.confidence.is_some()),
+            ("--min-samples", self.min_samples.is_some()),
+            ("--max-samples", self.max_samples.is_some()),
+            ("--filter", self.filter.is_some()),
+            ("--error-space", self.error_space.is_some()),
+        ];
+        let adaptive = [("--aa-threshold", self.aa_threshold.is_some()), ("--aa-depth", self.aa_depth.is_some())];
+        let uniform = [("--samples", self.samples.is_some())];
+        let groups = [(Aa::Stochastic, &stochastic[..]), (Aa::Adaptive, &adaptive), (Aa::Uniform, &uniform)];
+        let asked = |flags: &[(&'static str, bool)]| flags.iter().find(|(_, typed)| *typed).map(|(flag, _)| *flag);
+        let mut typed = groups.iter().filter_map(|(aa, flags)| asked(flags).map(|flag| (*aa, flag)));
+        if let (Some((_, one)), Some((_, other))) = (typed.next(), typed.next()) {
+            return Err(Wrong(format!("{one} and {other} belong to different kinds of --aa; use one of them")));
+        }
+        for (aa, flags) in groups {
+            if let (Some(chosen), Some(flag)) = (self.aa, asked(flags))
+                && chosen != aa
+            {
+                let name = |aa: Aa| aa.to_possible_value().map_or_else(String::new, |v| v.get_name().to_owned());
+                return Err(Wrong(format!("{flag} belongs to --aa {}, not to --aa {}", name(aa), name(chosen))));
+            }
+        }
+        if let (Some(fewest), Some(most)) = (self.min_samples, self.max_samples)
+            && fewest > most
+        {
+            return Err(Wrong(format!("--min-samples {fewest} is more than --max-samples {most}")));
+        }
+        Ok(())
+    }
+
+    /// The kind of sampling: as typed, as other flags or the scene file have it, or stochastic.
+    fn kind(&self, hints: &RenderHints) -> Aa {
+        let tuned = [
+            self.quality.is_some(),
+            self.pixel_error.is_some(),
+            self.confidence.is_some(),
+            self.min_samples.is_some(),
+            self.max_samples.is_some(),
+            self.filter.is_some(),
+            self.error_space.is_some(),
+        ];
+        self.aa.unwrap_or(if self.aa_threshold.is_some() || self.aa_depth.is_some() {
+            Aa::Adaptive
+        } else if self.samples.is_some() || hints.samples.is_some() && !tuned.contains(&true) {
+            Aa::Uniform
+        } else {
+            Aa::Stochastic
+        })
+    }
+
+    /// The samples of uniform sampling, and which rays pixels get. Errors are counted in what is said here; [`written`] says
+    /// what that is for one picture.
+    pub(super) fn sampling(&self, hints: &RenderHints) -> (u32, Sampling) {
+        let usual = Settings::default().samples;
+        let samples = self.samples.or(hints.samples).unwrap_or(usual);
+        match self.kind(hints) {
+            Aa::Off => (1, Sampling::Uniform),
+            Aa::Uniform => (samples, Sampling::Uniform),
+            Aa::Adaptive => {
+                let usual = Adaptive::default();
+                let threshold = self.aa_threshold.unwrap_or(usual.threshold);
+                let levels = self.aa_depth.unwrap_or(usual.levels);
+                (samples, Sampling::Adaptive(Adaptive { threshold, levels, ..usual }))
+            }
+            Aa::Stochastic => {
+                let usual = self.quality.unwrap_or_default().stochastic();
+                let most = self.max_samples.unwrap_or(usual.max_samples.max(self.min_samples.unwrap_or(0)));
+                let how = Stochastic {
+                    error: self.pixel_error.unwrap_or(usual.error),
+                    confidence: self.confidence.unwrap_or(usual.confidence),
+                    min_samples: self.min_samples.unwrap_or(usual.min_samples).min(most),
+                    max_samples: most,
+                    filter: self.filter.unwrap_or(usual.filter),
+                    space: usual.space,
+                };
+                (samples, Sampling::Stochastic(how))
+            }
+        }
+    }
+
+    /// The same sampling for a picture that is written as this kind of file, developed like that.
+    pub(super) fn written(&self, sampling: Sampling, kind: FileKind, output: &Output) -> Sampling {
+        let linear = match self.error_space {
+            Some(space) => space == SpaceArg::Linear,
+            None => kind == FileKind::Exr,
+        };
+        let (tone_map, exposure) = (output.tone_map, output.exposure);
+        match sampling {
+            Sampling::Uniform => sampling,
+            Sampling::Adaptive(how) => {
+                Sampling::Adaptive(Adaptive { exposure: if kind == FileKind::Exr { 0.0 } else { exposure }, ..how })
+            }
+            Sampling::Stochastic(how) => {
+                let space = if linear { ErrorSpace::Linear } else { ErrorSpace::Display { tone_map, exposure } };
+                Sampling::Stochastic(Stochastic { space, ..how })
+            }
+        }
+    }
+
+    /// The lens in front of this eye; `middle` is that of the model.
+    pub(super) fn lens(&self, view: &View, middle: DVec3, file: &Path) -> Result<Option<ThinLens>, Diagnostic> {
+        let Some(radius) = self.aperture.filter(|&radius| radius > 0.0) else { return Ok(None) };
+        let depth = |point: DVec3| (point - view.eye).dot(view.forward);
+        let focus = match self.focus {
+            Some(Focus::Distance(distance)) => distance,
+            Some(Focus::Point(point)) => depth(point.into()),
+            None => depth(middle),
+        };
+        if focus > 0.0 && focus.is_finite() {
+            return Ok(Some(ThinLens { radius, focus }));
+        }
+        let text = format!("what should be sharp lies {focus} before the eye, so behind it");
+        Err(Diagnostic::new("focus", file, "", text).remedy("choose another --focus"))
+    }
+}
+
+/// The flags that repeat the sampling of a picture.
+pub(super) fn flags(settings: &Settings, mut set: impl FnMut(&str, String)) {
+    match settings.sampling {
+        Sampling::Uniform => {
+            set("aa", "uniform".into());
+            set("samples", settings.samples.to_string());
+        }
+        Sampling::Adaptive(how) => {
+            set("aa", "adaptive".into());
+            set("aa-threshold", how.threshold.to_string());
+            set("aa-depth", how.levels.to_string());
+        }
+        Sampling::Stochastic(how) => {
+            set("aa", "stochastic".into());
+            set("pixel-error", how.error.to_string());
+            set("confidence", how.confidence.to_string());
+            set("min-samples", how.min_samples.to_string());
+            set("max-samples", how.max_samples.to_string());
+            set("filter", how.filter.name().into());
+            set("error-space", if how.space == ErrorSpace::Linear { "linear" } else { "display" }.into());
+        }
+    }
+    if let Some(lens) = settings.lens {
+        set("aperture", lens.radius.to_string());
+        set("focus", lens.focus.to_string());
+    }
+}
+
+/// How the picture was sampled, in words.
+pub(super) fn phrase(settings: &Settings, sampled: &Sampled) -> String {
+    let rays = format!("{:.1} samples a pixel (at most {})", sampled.mean(), sampled.most());
+    match settings.sampling {
+        Sampling::Uniform => format!("{} samples a pixel", settings.samples),
+        Sampling::Adaptive(_) => format!("adaptive, {rays}"),
+        Sampling::Stochastic(how) => {
+            let percent = |n: u64| 100.0 * n as f64 / sampled.pixels.max(1) as f64;
+            let rmse = sampled.rmse().unwrap_or(0.0);
+            format!(
+                "{rays}, {:.1} % of pixels within {} at {} %, estimated error {rmse:.4}",
+                percent(sampled.met),
+                how.error,
+                100.0 * how.confidence,
+            )
+        }
+    }
+}
+
+/// The number as it was typed, not as its nearest `f32` looks in `f64`.
+fn plain(x: f32) -> f64 {
+    x.to_string().parse().unwrap_or_else(|_| x.into())
+}
+
+/// The same for programs.
+pub(super) fn json(settings: &Settings, sampled: &Sampled) -> Value {
+    let rays = json!({ "rays": sampled.rays, "mean": sampled.mean(), "most": sampled.most() });
+    let mut all = match settings.sampling {
+        Sampling::Uniform => json!({ "aa": "uniform" }),
+        Sampling::Adaptive(how) => json!({ "aa": "adaptive", "threshold": plain(how.threshold), "depth": how.levels }),
+        Sampling::Stochastic(how) => json!({
+            "aa": "stochastic", "pixel_error": plain(how.error), "confidence": how.confidence,
+            "min_samples": how.min_samples, "max_samples": how.max_samples, "filter": how.filter.name(),
+            "error_space": if how.space == ErrorSpace::Linear { "linear" } else { "display" },
+            "met": sampled.met, "ceiling": sampled.at_most, "rmse": sampled.rmse(),
+        }),
+    };
+    if let (Value::Object(all), Value::Object(rays)) = (&mut all, rays) {
+        all.extend(rays);
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn kind(args: SamplingArgs) -> (u32, Sampling) {
+        args.check().unwrap();
+        args.sampling(&RenderHints::default())
+    }
+
+    #[test]
+    fn nothing_said_is_stochastic_and_samples_alone_are_uniform() {
+        let none = SamplingArgs::default();
+        assert_eq!(kind(none.clone()).1, Sampling::Stochastic(Quality::Normal.stochastic()));
+        assert_eq!(kind(SamplingArgs { samples: Some(9), ..none.clone() }), (9, Sampling::Uniform));
+        assert_eq!(kind(SamplingArgs { aa: Some(Aa::Off), ..none.clone() }), (1, Sampling::Uniform));
+        assert!(matches!(kind(SamplingArgs { aa_depth: Some(2), ..none.clone() }).1, Sampling::Adaptive(_)));
+        let hints = RenderHints { samples: Some(9), ..RenderHints::default() };
+        assert_eq!(none.sampling(&hints), (9, Sampling::Uniform));
+        let draft = SamplingArgs { quality: Some(Quality::Draft), ..none };
+        assert_eq!(draft.sampling(&hints).1, Sampling::Stochastic(Quality::Draft.stochastic()));
+    }
+
+    #[test]
+    fn flags_of_different_kinds_are_refused_by_name() {
+        let none = SamplingArgs::default();
+        let both = SamplingArgs { samples: Some(4), pixel_error: Some(0.01), ..none.clone() };
+        let Wrong(text) = both.check().unwrap_err();
+        assert!(text.contains("--pixel-error") && text.contains("--samples"), "{text}");
+        let other = SamplingArgs { aa: Some(Aa::Adaptive), filter: Some(Filter::Tent), ..none.clone() };
+        let Wrong(text) = other.check().unwrap_err();
+        assert!(text.contains("--filter") && text.contains("stochastic") && text.contains("adaptive"), "{text}");
+        assert!(SamplingArgs { min_samples: Some(8), max_samples: Some(4), ..none }.check().is_err());
+    }
+
+    #[test]
+    fn an_exr_counts_errors_in_linear_light() {
+        let args = SamplingArgs::default();
+        let sampling = kind(args.clone()).1;
+        let space = |args: &SamplingArgs, kind| match args.written(sampling, kind, &Output::default()) {
+            Sampling::Stochastic(how) => how.space,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(space(&args, FileKind::Exr), ErrorSpace::Linear);
+        assert_eq!(space(&args, FileKind::Png), ErrorSpace::default());
+        let linear = SamplingArgs { error_space: Some(SpaceArg::Linear), ..args };
+        assert_eq!(space(&linear, FileKind::Png), ErrorSpace::Linear);
+    }
+}

@@ -1,0 +1,286 @@
+//! Adaptive and stochastic sampling: what they see, what they cost, and whether they keep what they promise.
+
+use super::*;
+use crate::image::Values;
+use crate::render::{
+    Adaptive, ErrorSpace, Filter, Sampling, Stochastic, ThinLens, render, render_costs, render_recorded,
+};
+use crate::scene::Background;
+
+fn adaptive(threshold: f32, levels: u32) -> Sampling {
+    Sampling::Adaptive(Adaptive { threshold, levels, exposure: 0.0 })
+}
+
+fn stochastic(error: f32, max_samples: u32) -> Stochastic {
+    Stochastic { error, max_samples, ..Stochastic::default() }
+}
+
+/// One pixel, x and y from 0 to 1, of which everything left of `edge` is white.
+fn edge(edge: f64) -> Stage {
+    let mut s = looking_down(1.0);
+    let at = DAffine3::from_translation(DVec3::X * (edge - 2.5));
+    s.mesh(square(0.0, 2.0), at, unlit(Vec3::ONE));
+    s
+}
+
+/// Soft shadows, frosted glass and edges under a wide lamp, through a lens.
+fn soft() -> Stage {
+    let mut s = stage(View::look_at(DVec3::new(0.5, 2.5, 5.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.7)));
+    s.plane(DVec3::Y, -0.8, material(Vec3::new(0.6, 0.5, 0.4), phong()));
+    s.sphere(DVec3::new(-0.7, 0.0, 0.0), 0.7, material(Vec3::new(0.2, 0.4, 0.7), phong()));
+    let frosted = crate::scene::MetalRough { roughness: 0.3, metallic: 1.0, ..Default::default() };
+    let frosted = Material { surface: Reflection::MetalRough(frosted), ..Material::plain() };
+    s.sphere(DVec3::new(0.9, -0.1, 0.3), 0.6, frosted);
+    let kind = LightKind::Point { position: DVec3::new(2.0, 4.0, 3.0), falloff: Falloff::None };
+    s.scene.lights.push(Light { name: String::new(), intensity: Vec3::ONE, kind, shadows: true, size: 0.6 });
+    s.scene.background = Some(Background::Color(Vec3::new(0.1, 0.2, 0.3)));
+    s.settings.gloss_rays = Some(4);
+    s.settings.depth = Some(2);
+    s.settings.lens = Some(ThinLens { radius: 0.05, focus: 5.0 });
+    s
+}
+
+#[test]
+fn a_pixel_is_the_mean_of_its_quadrants_and_a_quadrant_that_differs_one_of_its_own() {
+    // Worked out by hand for an edge at 0.4: corners A and C are white, B, D and E black.
+    for (levels, expected) in [(0, 0.25), (1, 0.375)] {
+        let mut s = edge(0.4);
+        s.settings.sampling = adaptive(0.1, levels);
+        assert_eq!(s.color(), Vec3::splat(expected), "{levels}");
+    }
+    let mut s = edge(0.4);
+    s.settings.sampling = adaptive(0.1, 8);
+    assert_near(s.color(), Vec3::splat(0.4), 0.003);
+    // Less than the threshold is no difference.
+    s.settings.sampling = adaptive(1.5, 8);
+    assert_eq!(s.color(), Vec3::splat(0.25));
+}
+
+#[test]
+fn corners_belong_to_all_pixels_around_them() {
+    let mut s = edge(0.4);
+    (s.settings.width, s.settings.height, s.settings.sampling) = (40, 10, adaptive(0.1, 0));
+    let rendered = s.render();
+    // Two tiles, 32 and 8 pixels wide.
+    assert_eq!(rendered.sampled.rays, 33 * 11 + 32 * 10 + 9 * 11 + 8 * 10);
+    assert_eq!(rendered.counts.primary.queries, rendered.sampled.rays);
+    assert!(rendered.sampled.counts.iter().all(|&n| n == 5) && rendered.sampled.most() == 5);
+    // The edge lies in one column; a quadrant that is split takes three rays, fewer where a neighbour has traced them.
+    s.settings.sampling = adaptive(0.1, 1);
+    let finer = s.render().sampled.rays - rendered.sampled.rays;
+    assert!(finer > 0 && finer <= 10 * 2 * 3, "{finer}");
+}
+
+/// Pixels with a speck each, 0.2 of a pixel wide, between the corners and the middle.
+fn specks() -> Stage {
+    let mut s = looking_down(1.0);
+    let side = 12;
+    s.view = View::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, Lens::orthographic(f64::from(side)));
+    (s.settings.width, s.settings.height) = (side, side);
+    for i in 0..side * side {
+        let at = |k: u32| f64::from(k) + 0.75 - 0.5 * f64::from(side);
+        let place = DAffine3::from_translation(DVec3::new(at(i % side), at(i / side), 0.0));
+        s.mesh(square(0.0, 0.1), place, unlit(Vec3::ONE));
+    }
+    s
+}
+
+fn mean(rendered: &Rendered) -> f32 {
+    rendered.picture.beauty.iter().map(|p| p[0]).sum::<f32>() / rendered.picture.beauty.len() as f32
+}
+
+#[test]
+fn specks_between_the_five_rays_are_missed_by_adaptive_sampling_and_seen_by_stochastic() {
+    let mut s = specks();
+    s.settings.sampling = adaptive(0.01, 8);
+    assert_eq!(mean(&s.render()), 0.0, "the weakness of the five rays");
+    s.settings.sampling = Sampling::Stochastic(stochastic(0.05, 1024));
+    let seen = mean(&s.render());
+    assert!((seen / 0.04 - 1.0).abs() < 0.1, "{seen}");
+}
+
+#[test]
+fn a_lucky_start_is_caught_by_what_neighbours_saw() {
+    // So few rays each that most pixels see nothing of their speck at first.
+    let mut s = specks();
+    let how = Stochastic { min_samples: 4, ..stochastic(0.05, 1024) };
+    s.settings.sampling = Sampling::Stochastic(how);
+    let rendered = s.render();
+    let given_up = rendered.sampled.counts.iter().filter(|&&n| n == 4).count();
+    // By chance (1 − 0.04)⁴ = 85 % of 144 pixels see nothing in four rays.
+    assert!(given_up < 60, "{given_up}");
+}
+
+#[test]
+fn what_is_flat_costs_the_fewest_rays_and_what_is_not_costs_more() {
+    let mut s = edge(0.5);
+    s.view = View::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, Lens::orthographic(1.0));
+    (s.settings.width, s.settings.height) = (33, 33);
+    s.settings.sampling = Sampling::Stochastic(stochastic(0.02, 512));
+    let sampled = s.render().sampled;
+    let count = |x: usize| sampled.counts[5 * 33 + x];
+    assert!((0..14).chain(19..33).all(|x| count(x) == 4), "{:?}", &sampled.counts[..33]);
+    assert!(count(16) >= 32, "{}", count(16));
+    assert_eq!(sampled.met + sampled.at_most, 33 * 33);
+    assert!(sampled.mean() < 10.0 && sampled.rmse().is_some_and(|e| e > 0.0 && e < 0.005), "{:?}", sampled.rmse());
+}
+
+#[test]
+fn a_tent_reaches_into_the_next_pixel_and_a_box_does_not() {
+    let seen = |filter, edge_at: f64| {
+        let mut s = edge(edge_at);
+        s.settings.sampling = Sampling::Stochastic(Stochastic { filter, ..stochastic(0.001, 4096) });
+        s.color().x
+    };
+    assert_eq!((seen(Filter::Box, 0.0), seen(Filter::Box, 1.0)), (0.0, 1.0));
+    // An eighth of the tent lies beyond each side of the pixel.
+    assert!((seen(Filter::Tent, 0.0) - 0.125).abs() < 0.005);
+    assert!((seen(Filter::Tent, 0.5) - 0.5).abs() < 0.01);
+}
+
+#[test]
+fn every_structure_and_number_of_threads_gives_the_same_bits_in_every_kind_of_sampling() {
+    let mut s = soft();
+    (s.settings.width, s.settings.height, s.settings.layers) = (40, 30, true);
+    for sampling in [adaptive(0.05, 2), Sampling::Stochastic(stochastic(0.08, 64)), Sampling::Uniform] {
+        s.settings.sampling = sampling;
+        let truth = s.render();
+        for kind in [AccelKind::GridOctree, AccelKind::FastOctree, AccelKind::FastBvh] {
+            let by = s.render_by(kind);
+            assert!(by.picture == truth.picture && by.sampled == truth.sampled, "{kind}, {sampling:?}");
+        }
+        for threads in [1, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            let by = pool.install(|| s.render());
+            assert!(by.picture == truth.picture && by.counts == truth.counts, "{threads} threads, {sampling:?}");
+        }
+    }
+}
+
+#[test]
+fn layers_tell_how_certain_each_pixel_is_and_what_it_took() {
+    let mut s = soft();
+    (s.settings.width, s.settings.height, s.settings.layers) = (20, 15, true);
+    s.settings.sampling = Sampling::Stochastic(stochastic(0.08, 64));
+    let rendered = s.render();
+    let layers = rendered.picture.layers.expect("asked for");
+    let channel = |name: &str| &layers.channels.iter().find(|c| c.name == name).expect("a layer").values;
+    assert_eq!(*channel("sampling.error"), Values::F32(rendered.sampled.errors.clone()));
+    assert_eq!(*channel("sampling.count"), Values::U32(rendered.sampled.counts.clone()));
+    let rays: u64 = rendered.sampled.counts.iter().map(|&n| u64::from(n)).sum();
+    assert_eq!((rays, rays), (rendered.sampled.rays, rendered.counts.primary.queries));
+    assert!(rendered.sampled.errors.iter().any(|&e| e > 0.0));
+}
+
+#[test]
+fn what_needs_a_fixed_number_of_samples_takes_it() {
+    let mut s = soft();
+    (s.settings.width, s.settings.height, s.settings.samples) = (6, 5, 2);
+    s.settings.sampling = Sampling::Stochastic(stochastic(0.08, 64));
+    s.with_job(AccelKind::GridOctree, |job| {
+        let (rendered, recording) = render_recorded(job, &()).expect("a thread");
+        assert_eq!(rendered.sampled.rays, 60);
+        assert_eq!(recording.primary.total(crate::render::Question::Closest), 60);
+        let costs = render_costs(job, &[crate::render::Cost::Tests], &()).expect("not cancelled");
+        assert_eq!(costs.total(crate::render::Cost::Tests).len(), 30);
+    });
+}
+
+#[test]
+fn a_lens_blurs_what_is_not_at_its_focus_and_loses_no_light() {
+    let spot = |focus: f64| {
+        let mut s = looking_down(5.0);
+        s.view = View::look_at(DVec3::Z * 5.0, DVec3::ZERO, DVec3::Y, Lens::orthographic(2.0));
+        (s.settings.width, s.settings.height) = (16, 16);
+        s.square(0.0, 0.25, unlit(Vec3::ONE));
+        s.settings.lens = Some(ThinLens { radius: 0.2, focus });
+        s.settings.sampling = Sampling::Stochastic(stochastic(0.02, 1024));
+        s.render()
+    };
+    let (sharp, blurred) = (spot(5.0), spot(2.5));
+    let touched = |r: &Rendered| r.picture.beauty.iter().filter(|p| p[0] > 0.02).count();
+    assert_eq!(touched(&sharp), 16);
+    assert!(touched(&blurred) > 30, "{}", touched(&blurred));
+    assert!((mean(&blurred) / mean(&sharp) - 1.0).abs() < 0.05, "{} {}", mean(&blurred), mean(&sharp));
+}
+
+#[test]
+fn one_light_ray_a_sample_finds_the_brightness_that_many_find() {
+    let mut s = soft();
+    (s.settings.width, s.settings.height) = (1, 1);
+    s.view = View::look_at(DVec3::new(0.0, 2.0, 0.0), DVec3::new(-0.9, -0.8, -0.9), DVec3::X, Lens::perspective(0.2));
+    s.settings.lens = None;
+    (s.settings.samples, s.settings.light_rays) = (256, 16);
+    let expected = s.color();
+    s.settings.light_rays = 1;
+    let how = Stochastic { space: ErrorSpace::Linear, ..stochastic(0.002, 16_384) };
+    s.settings.sampling = Sampling::Stochastic(how);
+    assert_near(s.color(), expected, 0.006);
+}
+
+/// What became of the pixels of a picture that the criterion stopped after estimating a variance that is not 0.
+struct Kept {
+    stopped: usize,
+    within: usize,
+    /// Pixels whose error is less than a quarter of what was asked, and the share of all rays that went to them.
+    far_above: usize,
+    wasted: f64,
+}
+
+/// Renders the soft scene and compares each pixel's written values with those of a converged picture.
+fn kept(width: u32, height: u32, error: f32, reference: u32) -> Kept {
+    let mut s = soft();
+    (s.settings.width, s.settings.height) = (width, height);
+    let output = crate::image::Output { background: Some([0.1, 0.2, 0.3]), ..Default::default() };
+    let developer = crate::image::Developer::new(&output);
+    let rendered = |s: &Stage| s.with_job(AccelKind::FastBvh, |job| render(job, &()));
+    s.settings.sampling = Sampling::Stochastic(stochastic(error, 4096));
+    let found = rendered(&s);
+    (s.settings.seed, s.settings.lens) = (99, s.settings.lens);
+    let whole = Stochastic { min_samples: reference, max_samples: reference, ..stochastic(1e-6, reference) };
+    // As many light and gloss rays a sample as above.
+    s.settings.light_rays = 4 * reference;
+    s.settings.gloss_rays = Some(reference);
+    s.settings.sampling = Sampling::Stochastic(whole);
+    let truth = rendered(&s);
+    let mut kept = Kept { stopped: 0, within: 0, far_above: 0, wasted: 0.0 };
+    let sampled = &found.sampled;
+    for (i, (a, b)) in found.picture.beauty.iter().zip(&truth.picture.beauty).enumerate() {
+        if sampled.counts[i] < 16 || sampled.counts[i] >= 4096 || sampled.errors[i] == 0.0 {
+            continue;
+        }
+        let (a, b) = (developer.coded(*a), developer.coded(*b));
+        let off = ((0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f32>() / 3.0).sqrt();
+        kept.stopped += 1;
+        kept.within += usize::from(off <= error);
+        if 4.0 * off < error {
+            kept.far_above += 1;
+            kept.wasted += f64::from(sampled.counts[i]) / sampled.rays as f64;
+        }
+    }
+    kept
+}
+
+#[test]
+fn pixels_that_stop_are_within_the_error_as_often_as_promised() {
+    let kept = kept(24, 18, 0.03, 512);
+    assert!(kept.stopped > 200, "{}", kept.stopped);
+    assert!(kept.within as f64 >= 0.93 * kept.stopped as f64, "{} of {}", kept.within, kept.stopped);
+}
+
+/// `cargo test --release --lib -- --ignored --nocapture a_hundred_thousand`
+#[test]
+#[ignore = "takes minutes when optimised"]
+fn a_hundred_thousand_pixels_that_stop_are_within_the_error_as_often_as_promised() {
+    let kept = kept(512, 384, 0.01, 1024);
+    let share = |n: usize| 100.0 * n as f64 / kept.stopped as f64;
+    println!(
+        "{} pixels stopped with a variance: {:.2} % within, {:.1} % below a quarter of the error, with {:.1} % of all rays",
+        kept.stopped,
+        share(kept.within),
+        share(kept.far_above),
+        100.0 * kept.wasted
+    );
+    assert!(kept.stopped >= 100_000, "{}", kept.stopped);
+    assert!(share(kept.within) >= 93.0);
+}

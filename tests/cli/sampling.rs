@@ -1,0 +1,90 @@
+//! How pixels are sampled: flags, layers, statistics, and pictures that repeat themselves.
+
+use super::program::{Folder, picture};
+use serde_json::Value;
+
+const SMALL: [&str; 4] = ["render", "cube.obj", "--size", "32x24"];
+
+fn run(folder: &Folder, arguments: &[&str]) -> super::program::Run {
+    folder.run(&[&SMALL, arguments].concat())
+}
+
+#[test]
+fn pictures_of_every_kind_of_sampling_are_repeated_byte_for_byte() {
+    let kinds = [
+        "",
+        "--aa off",
+        "--aa adaptive --aa-threshold 0.03 --aa-depth 2",
+        "--quality draft --filter tent --confidence 90% --error-space linear",
+        "--pixel-error 0.02 --min-samples 6 --max-samples 40 --aperture 0.1 --focus 0,0,1",
+        "--samples 3 --aperture 0.1",
+    ];
+    for kind in kinds {
+        let folder = Folder::with_cube();
+        let words: Vec<&str> = kind.split_whitespace().collect();
+        run(&folder, &[&["-o", "first.png"], words.as_slice()].concat()).ends(0);
+        folder.run(&["render", "--again", "first.png", "-o", "second.png"]).ends(0);
+        assert!(folder.read("first.png") == folder.read("second.png"), "{kind}");
+    }
+}
+
+#[test]
+fn the_default_stops_when_it_is_certain_and_says_so() {
+    let folder = Folder::with_cube();
+    let done = run(&folder, &["-o", "a.exr", "--layers", "--float", "--stats", "json"]).ends(0);
+    let stats: Value = serde_json::from_str(done.text()).unwrap();
+    let sampling = &stats["sampling"];
+    assert_eq!((&stats["samples"], sampling["aa"].as_str()), (&Value::Null, Some("stochastic")));
+    assert_eq!(sampling["error_space"], "linear");
+    let number = |key: &str| sampling[key].as_f64().unwrap();
+    assert!(number("mean") >= 4.0 && number("most") > 4.0 && number("rmse") > 0.0, "{sampling}");
+    assert_eq!(number("met") + number("ceiling"), 32.0 * 24.0);
+    let layers = picture(&folder.path("a.exr")).layers.unwrap();
+    let channel = |name: &str| layers.channels.iter().find(|c| c.name == name).unwrap();
+    let rays: f64 = channel("sampling.count").values.iter().sum();
+    assert_eq!(Some(rays), sampling["rays"].as_f64());
+    assert_eq!(Some(rays), stats["counts"]["primary"]["rays"].as_f64());
+    let squares: f64 = channel("sampling.error").values.iter().map(|e| e * e).sum();
+    assert!(((squares / (32.0 * 24.0)).sqrt() - number("rmse")).abs() < 1e-9);
+    run(&folder, &["-o", "a.png"]).ends(0).says(&["samples a pixel", "within 0.0", "at 95 %", "estimated error"]);
+}
+
+#[test]
+fn samples_alone_are_uniform() {
+    let folder = Folder::with_cube();
+    let stats: Value =
+        serde_json::from_str(run(&folder, &["--samples", "5", "--stats", "json"]).ends(0).text()).unwrap();
+    assert_eq!((stats["samples"].as_u64(), stats["sampling"]["rays"].as_u64()), (Some(5), Some(32 * 24 * 5)));
+}
+
+#[test]
+fn costs_of_pixels_are_those_of_a_fixed_number_of_rays() {
+    let folder = Folder::with_cube();
+    run(&folder, &["-o", "a.exr", "--float", "--layers", "tests"]).ends(0);
+    run(&folder, &["-o", "b.exr", "--float", "--layers", "tests", "--samples", "4"]).ends(0);
+    let tests = |name: &str| {
+        let layers = picture(&folder.path(name)).layers.unwrap();
+        layers.channels.into_iter().find(|c| c.name == "tests.primary").unwrap()
+    };
+    assert_eq!(tests("a.exr"), tests("b.exr"));
+}
+
+#[test]
+fn flags_that_contradict_each_other_are_refused() {
+    let folder = Folder::with_cube();
+    for (words, said) in [
+        ("--samples 4 --pixel-error 0.01", "--samples"),
+        ("--aa uniform --quality final", "--quality"),
+        ("--aa-depth 2 --filter tent", "--aa-depth"),
+        ("--min-samples 9 --max-samples 8", "--min-samples 9"),
+        ("--confidence 3", "50%"),
+        ("--focus 3", "--aperture"),
+        ("--aperture -1", "radius"),
+    ] {
+        let words: Vec<&str> = words.split_whitespace().collect();
+        run(&folder, &words).ends(2).says(&[said]);
+    }
+    run(&folder, &["--aperture", "0.1", "--eye", "0,0,5", "--at", "0,0,0", "--focus", "0,0,9"])
+        .ends(3)
+        .says(&["behind"]);
+}
