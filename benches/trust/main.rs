@@ -1,18 +1,26 @@
-//! Hits over very many rays: `cargo bench --bench trust -- closed|agree [options]`.
+//! Hits over very many rays: `cargo bench --bench trust -- closed|agree|kernels [options]`.
 //!
 //! `closed` counts the rays that escape from inside a closed mesh; `agree` compares the fast structures with each other
-//! and with brute force on the models that are named. Both end with 1 if there is any difference.
+//! and with brute force on the models that are named. Both end with 1 if there is any difference. `kernels` draws the speed of
+//! our tests, and of Embree's where `MESHRAY_EMBREE` names its library, against their wrong answers.
 
 #![expect(clippy::print_stdout, clippy::print_stderr, reason = "a command that prints what it counted")]
 
 mod agree;
 mod closed;
+#[expect(dead_code, reason = "bytes of its structure are asked for by the other bench")]
+#[path = "../peers/embree.rs"]
+mod embree;
+mod kernels;
+#[path = "../peers/tracer.rs"]
+mod tracer;
 
 use std::process::ExitCode;
 
 const USAGE: &str = "\
 usage: trust closed [--rays N]                       N aimed rays a place (default 8e6)
-       trust agree [--rays N] [--tests N] FILE...    N rays (default 1e7), N tests of brute force (default 1e10)";
+       trust agree [--rays N] [--tests N] FILE...    N rays (default 1e7), N tests of brute force (default 1e10)
+       trust kernels [--rays N] FILE PAGE.html       N rays of each kind (default 1e5)";
 
 /// What was typed.
 struct Words {
@@ -29,6 +37,11 @@ fn main() -> ExitCode {
         (Some("closed"), Some(w)) => closed::run(if w.rays > 0.0 { w.rays } else { 8e6 }),
         (Some("agree"), Some(w)) if !w.files.is_empty() => {
             agree::run(&w.files, if w.rays > 0.0 { w.rays } else { 1e7 }, if w.tests > 0.0 { w.tests } else { 1e10 })
+        }
+        (Some("kernels"), Some(w)) if w.files.len() == 2 => {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 1")]
+            let rays = if w.rays > 0.0 { w.rays as usize } else { 100_000 };
+            kernels::run(&w.files[0], rays, &w.files[1])
         }
         // `cargo bench` runs every bench without words.
         (None, _) => closed::run(1e5),

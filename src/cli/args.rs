@@ -356,6 +356,9 @@ pub(super) struct VerifyArgs {
     /// Print JSON (schema `meshray-verify/1`)
     #[arg(long)]
     pub json: bool,
+    /// Write a page for a browser that plots the tests' speed against their wrong answers
+    #[arg(long, value_name = "FILE.html")]
+    pub plot: Option<PathBuf>,
     /// Only warnings and errors on standard error
     #[arg(short, long)]
     pub quiet: bool,

@@ -62,7 +62,7 @@ fn study(args: &StudyArgs, files: &[(PathBuf, Format)], name: &str, messages: &M
     let base = Settings { width, height, depth: hints.depth, seed: args.seed, ..Settings::default() };
     let tone_map = match hints.tone_map.as_deref().map(str::parse).transpose() {
         Ok(hinted) => args.tone_map.or(hinted).unwrap_or_default(),
-        Err(e) => return Err(fail(Diagnostic::new("scene-value", file, "", format!("{e}")))),
+        Err(e) => return Err(fail(Diagnostic::new("scene-value", file, "", e.to_string()))),
     };
     let exposure = args.exposure.or(hints.exposure).unwrap_or(0.0);
     let output = Output { tone_map, exposure, ..Output::default() };

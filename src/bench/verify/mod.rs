@@ -4,6 +4,7 @@
 //! aimed at what is hard ([`aim`](crate::bench::aim)), the oracle says what they hit
 //! ([`oracle`](crate::bench::oracle)), and answers are counted against that ([`tally`]).
 
+pub mod kernels;
 pub mod spawned;
 pub mod tally;
 pub mod variation;

@@ -14,7 +14,8 @@ use super::exit::Exit;
 use super::message::Messages;
 use super::progress::Progress;
 use super::{accident, print, read};
-use crate::bench::verify::{Plan, verify};
+use crate::bench::verify::{Plan, kernels, verify};
+use crate::image::write_atomic;
 
 /// Loads the file, judges it and prints what was found.
 pub(super) fn run(args: &VerifyArgs) -> Exit {
@@ -41,6 +42,13 @@ fn judge(args: &VerifyArgs, messages: &Messages) -> Exit {
         messages.error("nothing-to-verify", format!("{name}: no triangles to aim at"), "give a file with a mesh");
         return Exit::Input;
     };
+    if let Some(path) = &args.plot {
+        let page = kernels::html(&name, &report::rays(&plan), &kernels::of(&findings));
+        if let Err(e) = write_atomic(path, page.as_bytes(), false) {
+            messages.error("output-unwritable", format!("{}: {e}", path.display()), "");
+            return Exit::Failed;
+        }
+    }
     let report = report::Report { name: &name, hash: loaded.facts.hash, plan: &plan, findings: &findings };
     let text = if args.json { report.json() } else { report.text() };
     match print(&text) {

@@ -20,6 +20,15 @@ pub(super) struct Report<'a> {
     pub findings: &'a Findings,
 }
 
+/// What was asked, in a sentence.
+pub(super) fn rays(plan: &Plan) -> String {
+    format!(
+        "Rays at {}, {} of each for the mesh as it is, scaled, and moved far from the origin; times are of one thread",
+        Aim::ALL.map(Aim::name).join(", "),
+        grouped(plan.rays as u64)
+    )
+}
+
 impl Report<'_> {
     /// Tables and a verdict.
     pub(super) fn text(&self) -> String {
