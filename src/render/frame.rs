@@ -11,10 +11,6 @@ use super::whitted::Sample;
 use crate::math::{DVec3, Vec3};
 use crate::scene::Background;
 
-/// Samples of a pixel that a ray is as sharp as, where their number is not known before: sharp enough for what a texture
-/// shows between two samples, and not so sharp that it must be averaged from many.
-const SHARPNESS: f32 = 16.0;
-
 /// What all tiles share.
 pub(super) struct Frame<'a> {
     pub view: &'a View,
@@ -35,9 +31,11 @@ impl<'a> Frame<'a> {
             Some(Background::Color(color)) => Some(color),
             _ => None,
         };
+        // Where more samples come as they are needed a ray is as sharp as the most of them: what it blurs stays blurred.
         let samples = match settings.sampling {
             Sampling::Uniform => offsets.len() as f32,
-            Sampling::Adaptive(_) | Sampling::Stochastic(_) => SHARPNESS,
+            Sampling::Adaptive(how) => (4_u32 << (2 * how.levels.min(Adaptive::MAX_LEVELS))) as f32,
+            Sampling::Stochastic(how) => how.max_samples.max(1) as f32,
         };
         let sample_width = 1.0 / samples.sqrt();
         Self { view, settings, offsets, sample_width, scene: Ball::new(context), background }

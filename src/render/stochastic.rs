@@ -20,6 +20,10 @@ use crate::scene::Background;
 /// Samples at which variances are first relied on: two of each stream.
 const FIRST_LOOK: u32 = 2 * STREAMS as u32;
 
+/// Samples of a pixel in doubt that must all be the same before it is believed that there is nothing to see: a thing that
+/// covers a tenth of it is missed by one pixel in thirty.
+const SEEN_NOTHING: u32 = 2 * FIRST_LOOK;
+
 /// A pixel on its way.
 struct Pixel {
     x: u32,
@@ -180,7 +184,8 @@ impl Pixel {
     /// Finds out how certain the mean is.
     fn look(&mut self, judge: &Certainty) {
         self.facts.error = judge.standard_error(&self.streams);
-        if judge.is_met(self.facts.error) {
+        let sure = self.facts.error > 0.0 || self.facts.count >= SEEN_NOTHING;
+        if sure && judge.is_met(self.facts.error) {
             self.facts.end = End::Met;
         }
     }

@@ -79,7 +79,7 @@ fn flags_that_contradict_each_other_are_refused() {
         ("--min-samples 9 --max-samples 8", "--min-samples 9"),
         ("--confidence 3", "50%"),
         ("--focus 3", "--aperture"),
-        ("--aperture -1", "radius"),
+        ("--aperture=-1", "radius"),
     ] {
         let words: Vec<&str> = words.split_whitespace().collect();
         run(&folder, &words).ends(2).says(&[said]);
