@@ -14,6 +14,7 @@ mod asking;
 mod branch;
 mod context;
 mod costs;
+mod curve;
 mod draws;
 pub mod everything;
 mod eyes;

@@ -7,6 +7,7 @@ mod glass;
 mod gloss;
 mod light;
 mod mirrors;
+mod round;
 mod see_through;
 mod sight;
 mod soft;
