@@ -57,6 +57,11 @@ impl Pyramid {
         pyramid
     }
 
+    /// Radians across a texel.
+    pub(super) fn finest(&self) -> f32 {
+        self.levels[0].angle()
+    }
+
     /// The finest level with at most so many columns.
     pub(super) fn at_most(&self, columns: u32) -> &Level {
         let last = self.levels.len() - 1;
@@ -162,6 +167,12 @@ fn coordinates(dir: Vec3) -> (f32, f32) {
 }
 
 impl Level {
+    /// The places of a copy alone.
+    #[cfg(test)]
+    pub(super) fn without_texels((width, height): (u32, u32)) -> Self {
+        Self { width, height, texels: Arc::default() }
+    }
+
     /// Degrees of arc, in radians, that a texel is high.
     pub(super) fn angle(&self) -> f32 {
         PI / self.height as f32
@@ -196,7 +207,7 @@ impl Level {
     }
 
     /// Row and direction of the middle of each texel.
-    fn middles(&self) -> impl Iterator<Item = (u32, Vec3)> + '_ {
+    pub(super) fn middles(&self) -> impl Iterator<Item = (u32, Vec3)> + '_ {
         let row = move |y: u32| (0..self.width).map(move |x| (y, self.direction(x as f32 + 0.5, y as f32 + 0.5)));
         (0..self.height).flat_map(row)
     }
