@@ -120,7 +120,6 @@ mod tests {
                 whole += expected * expected;
             }
             let (off, around) = ((off / whole).sqrt(), (around / whole).sqrt());
-            eprintln!("roughness {roughness}: {off} off, {around} around the mirrored direction");
             assert!(off < most && off < part * around, "{roughness}: {off}, {around} around the mirrored direction");
         }
     }
