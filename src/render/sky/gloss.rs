@@ -10,6 +10,9 @@ use std::sync::LazyLock;
 /// Lookups that make up a lobe.
 const LOOKUPS: usize = 64;
 
+/// Width of the hills that stand for the lookups' shares of the sphere, in roots of those: as wide as they are apart.
+const HILL: f32 = 0.75;
+
 /// Numbers that draw facets for equal shares of a lobe: 0 … 1, and cosine and sine of a turn.
 static PATTERN: LazyLock<[(f32, [f32; 2]); LOOKUPS]> = LazyLock::new(|| {
     /// The golden ratio's inverse: turns that never meet.
@@ -26,7 +29,7 @@ impl Pyramid {
     ///
     /// Facets are drawn as they are seen, and each direction is looked up as blurred as directions are few there
     /// (J. Křivánek, M. Colbert, "Real-time Shading with Filtered Importance Sampling", 2008). A table of lobes around the
-    /// mirrored direction, as games have it, is another lobe: on rough surfaces a small sun shows 40 % wrong through it.
+    /// mirrored direction, as games have it, is another lobe: on rough surfaces it shows a small sun a quarter wrong.
     pub(super) fn mirrored(&self, lobe: &Lobe, view: Vec3, to_map: impl Fn(Vec3) -> Vec3) -> Option<Vec3> {
         if lobe.angle(1) < self.finest() {
             return None;
@@ -38,7 +41,7 @@ impl Pyramid {
             let weight = lobe.sent(view, to);
             if weight > 0.0 {
                 let area = 1.0 / (LOOKUPS as f32 * lobe.density(view, facet));
-                sum += self.radiance(to_map(to), area.min(4.0 * PI).sqrt()) * weight;
+                sum += self.smooth_radiance(to_map(to), HILL * area.min(4.0 * PI).sqrt()) * weight;
                 weights += weight;
             }
         }
@@ -108,7 +111,8 @@ mod tests {
     #[test]
     fn a_small_sun_shows_in_rough_lobes_as_their_integrals_say() {
         let sky = sunny();
-        for (roughness, most, part) in [(0.3f32, 0.1, 0.95), (0.5, 0.06, 0.6), (0.8, 0.06, 0.3)] {
+        let (mut found, mut good) = (Vec::new(), true);
+        for (roughness, most, part) in [(0.3f32, 0.08, 0.8), (0.5, 0.12, 0.75), (0.8, 0.1, 0.4)] {
             let (mut off, mut whole, mut around) = (0.0, 0.0, 0.0);
             for normal in normals() {
                 let lobe = Lobe::even(normal, roughness * roughness);
@@ -120,7 +124,9 @@ mod tests {
                 whole += expected * expected;
             }
             let (off, around) = ((off / whole).sqrt(), (around / whole).sqrt());
-            assert!(off < most && off < part * around, "{roughness}: {off}, {around} around the mirrored direction");
+            found.push((roughness, off, around));
+            good &= off < most && off < part * around;
         }
+        assert!(good, "roughness, error, error around the mirrored direction: {found:?}");
     }
 }
