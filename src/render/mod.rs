@@ -16,6 +16,7 @@ mod branch;
 mod certainty;
 mod context;
 mod costs;
+mod curve;
 mod draws;
 pub mod everything;
 mod eyes;

@@ -211,6 +211,26 @@ mod tests {
         assert!((1.0..2.5).contains(&(brightest(red) - brightest(violet))), "{}", brightest(violet));
     }
 
+    /// S11 (drop): a million parallel rays that meet the drop evenly, for each of two wavelengths.
+    #[test]
+    fn the_light_of_a_drop_gathers_at_the_angles_of_the_primary_bow() {
+        const RAYS: u32 = 1_000_000;
+        const STEPS_PER_DEGREE: f64 = 10.0;
+        for (n, angle) in [(1.331, 42.4), (1.344, 40.5)] {
+            let mut found = [0u32; 900];
+            for i in 0..RAYS {
+                // As many rays cross each part of the disc.
+                let impact = ((f64::from(i) + 0.5) / f64::from(RAYS)).sqrt() as f32;
+                let degrees = rainbow_angle(impact, 1.0, n).expect("light enters water and leaves it again");
+                found[(degrees * STEPS_PER_DEGREE) as usize] += 1;
+            }
+            let peak = (0..found.len()).max_by_key(|&i| found[i]).expect("steps") as f64;
+            assert!((peak + 0.5 - angle * STEPS_PER_DEGREE).abs() <= 1.0, "{n}: {} degrees", peak / STEPS_PER_DEGREE);
+            let beyond = found[(angle * STEPS_PER_DEGREE) as usize + 2..].iter().sum::<u32>();
+            assert_eq!(beyond, 0, "no light is sent beyond the bow: Alexander's band is dark");
+        }
+    }
+
     /// S8 (critical angle): whether η |I × N| / (|I| |N|) ≥ 1, in rational numbers, and how far its square is from 1.
     fn exact_total_reflection(i: Vec3, n: Vec3, n_i: f64, n_t: f64) -> (bool, f64) {
         use crate::math::rational::{cross, dot, point};

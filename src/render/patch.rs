@@ -1,5 +1,6 @@
 //! The part of a mesh around a hit: interpolated attributes, texture coordinates, and how maps turn the normal.
 
+use super::curve::Curve;
 use super::texture::{ColorSpace, TextureStore};
 use super::world::Placement;
 use crate::math::{Vec2, Vec3, Vec4};
@@ -110,6 +111,26 @@ impl Patch<'_> {
         smooth_normal(self.placement, self.mix(&self.mesh.normals)?)
     }
 
+    /// Whether the mesh's own normals differ over it: whether it stands for something round.
+    #[inline]
+    pub(super) fn is_curved(&self) -> bool {
+        self.corner_normals().is_some_and(differ)
+    }
+
+    /// The surface that its normals describe, on their own side or, with −1, on the other; `None` if it is flat.
+    pub(super) fn curve(&self, side: f32) -> Option<Curve> {
+        let normals = self.corner_normals().filter(|&normals| differ(normals))?;
+        let [a, b, c] = normals.map(|normal| smooth_normal(self.placement, normal).map(|normal| normal * side));
+        Some(Curve::new(self.vertices, [a?, b?, c?]))
+    }
+
+    #[inline]
+    fn corner_normals(&self) -> Option<[Vec3; 3]> {
+        let normal = |i: u32| self.mesh.normals.get(i as usize).copied();
+        let [a, b, c] = self.corners.map(normal);
+        Some([a?, b?, c?])
+    }
+
     /// Tangent and bitangent, unit and perpendicular to `normal`: those of the mesh, or those of the coordinates.
     pub(super) fn tangents(&self, normal: Vec3, map: &TextureRef, print: &Footprint) -> Option<(Vec3, Vec3)> {
         let given = self.mix(&self.mesh.tangents).and_then(|t| {
@@ -174,6 +195,12 @@ impl Patch<'_> {
         // v runs down, against the bitangent.
         (normal - tangent * du + bitangent * dv).try_normalize()
     }
+}
+
+/// Whether the normals of a triangle's corners are not all the same.
+#[inline(always)]
+pub(super) fn differ([a, b, c]: [Vec3; 3]) -> bool {
+    a != b || a != c
 }
 
 /// The linear part of a texture transform; the offset is added once, after interpolation.

@@ -3,6 +3,7 @@
 use super::absorption::Absorption;
 use super::asking::Asking;
 use super::context::Context;
+use super::curve::Feelers;
 use super::observer::Observer;
 use super::optics::transmittance;
 use super::patch::Footprint;
@@ -22,6 +23,9 @@ pub(crate) struct Shadows {
     tags: Vec<u32>,
     /// What each is inside of; empty where nothing absorbs light.
     inside: Vec<Inside>,
+    /// The ways up to where some of the rays start, and which those are.
+    risers: Vec<Ray>,
+    raised: Vec<usize>,
     blocked: Vec<bool>,
     /// The hit that each ray has passed last.
     after: Vec<Hit>,
@@ -51,7 +55,16 @@ impl Shadows {
         self.inside.extend(media.map(|media| Inside { media, since: 0.0 }));
     }
 
-    /// The same with a number below 2³² that its light arrives with instead of the sample's: of all rays, or of none.
+    /// The same of a ray that may start above its surface.
+    pub(crate) fn push_feelers(&mut self, feelers: &Feelers, light: Vec3, media: Option<Media>) {
+        if let Some(riser) = feelers.riser {
+            self.raised.push(self.rays.len());
+            self.risers.push(riser);
+        }
+        self.push(feelers.ray, light, media);
+    }
+
+    /// The same as [`Self::push`] with a number below 2³² that its light arrives with instead of the sample's: of all rays, or of none.
     #[expect(clippy::cast_possible_truncation, reason = "as said")]
     pub(crate) fn push_tagged(&mut self, ray: Ray, light: Vec3, media: Option<Media>, tag: usize) {
         self.push(ray, light, media);
@@ -67,6 +80,8 @@ impl Shadows {
         self.tags.clear();
         self.light.clear();
         self.inside.clear();
+        self.risers.clear();
+        self.raised.clear();
     }
 
     /// Traces all rays and hands what arrives to `arrive`, as (sample or tag, light) in an order that is always the same.
@@ -80,6 +95,7 @@ impl Shadows {
         self.blocked.clear();
         self.blocked.resize(self.rays.len(), false);
         asking.occluded(&self.rays, &mut self.blocked, probe);
+        self.climb(asking, probe);
         if !context.has_filters {
             let open = self.light.iter().zip(&self.blocked).enumerate().filter(|(_, (_, blocked))| !**blocked);
             open.for_each(|(i, (light, _))| arrive(self.tag(i), *light));
@@ -101,6 +117,18 @@ impl Shadows {
             asking.next(&self.rays, &self.after, &mut self.hits, probe);
         }
         self.clear();
+    }
+
+    /// Blocks the rays whose starts are cut off from their surfaces.
+    fn climb<A: Accel, P: Observer>(&mut self, asking: &mut Asking<A>, probe: &mut P) {
+        if self.risers.is_empty() {
+            return;
+        }
+        let mut cut_off = vec![false; self.risers.len()];
+        asking.occluded(&self.risers, &mut cut_off, probe);
+        for (&i, _) in self.raised.iter().zip(cut_off).filter(|(_, cut_off)| *cut_off) {
+            self.blocked[i] = true;
+        }
     }
 
     /// Hands over the light of rays that met nothing more, weakens that of the others, and drops those it leaves dark.

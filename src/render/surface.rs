@@ -132,6 +132,9 @@ pub(crate) struct Surface<'a> {
     smooth: Vec3,
     /// Unit normal for shading, never turned away from the ray.
     pub normal: Vec3,
+    /// Unit normal of the plane that lights must be above to shine on it: where a mesh stands for something round, not that
+    /// of the triangle.
+    pub horizon: Vec3,
     /// Unit vector back along the ray.
     pub view: Vec3,
     /// Whether the front of the face was hit.
@@ -163,6 +166,7 @@ impl<'a> Surface<'a> {
             geometric,
             smooth: geometric,
             normal: geometric,
+            horizon: geometric,
             view,
             front,
         }
@@ -176,12 +180,20 @@ impl<'a> Surface<'a> {
         let Some(patch) = &self.patch else { return };
         let material = self.target.material;
         let own = patch.normal().unwrap_or(if self.front { self.geometric } else { -self.geometric });
-        let side = if own.dot(self.geometric) < 0.0 { -1.0 } else { 1.0 };
+        let side = self.side(own);
         self.smooth = own * side;
+        if patch.is_curved() {
+            self.horizon = facing(self.smooth, self.view);
+        }
         let turned = |map| patch.normal_mapped(own, map, material.normal_scale, store, &self.footprint);
         let mapped = material.normal_map.as_ref().and_then(turned).unwrap_or(own);
         let bumped = patch.bumped(mapped, material, store, &self.footprint).unwrap_or(mapped);
         self.normal = facing(bumped * side, self.view);
+    }
+
+    /// 1 for a normal on the side that is seen, −1 for one on the other.
+    pub(super) fn side(&self, own: Vec3) -> f32 {
+        if own.dot(self.geometric) < 0.0 { -1.0 } else { 1.0 }
     }
 
     /// The normal of lacquer with this normal map and its scale, to the side of the ray.

@@ -11,6 +11,7 @@ use super::Progress;
 use super::asking::Asking;
 use super::branch::Point;
 use super::context::{Context, coverage};
+use super::curve::Feelers;
 use super::draws::{Draws, Purpose, Stream};
 use super::everything::look_up_in_vain;
 use super::eyes::Eyes;
@@ -225,12 +226,13 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         for light in &context.lights {
             strip.shine(matter, light);
             for shone in strip.shone() {
-                let ray = &eyes.rays[shone.index as usize];
-                if light.shadows {
-                    let shadow = shone.ray(ray.sample, eyes.hits[shone.index as usize].prim);
-                    self.shadows.push(shadow, shone.radiance, outside);
-                } else {
+                let (ray, hit) = (&eyes.rays[shone.index as usize], &eyes.hits[shone.index as usize]);
+                if !light.shadows {
                     self.add(ray.sample, shone.radiance);
+                } else if !shone.grazes {
+                    self.shadows.push(shone.ray(ray.sample, hit.prim), shone.radiance, outside);
+                } else if let Some(feelers) = feelers(context, light, ray, hit) {
+                    self.shadows.push_feelers(&feelers, shone.radiance, outside);
                 }
             }
         }
@@ -420,8 +422,9 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     /// Light of one point of a light that is so much of it: without shadows at once, with them when its ray has come through.
     fn shine(&mut self, point: &Point, crossing: &Crossing, light: &LocalLight, incident: &Incident, part: f32) {
         let (surface, to_light) = (point.surface, incident.to_light);
-        let seen = if surface.geometric.dot(to_light) > 0.0 {
-            let smooth = terminator(surface.geometric, surface.normal, to_light);
+        let above = surface.horizon.dot(to_light) > 0.0;
+        let seen = if above {
+            let smooth = terminator(surface.horizon, surface.normal, to_light);
             point.matter.lit(surface.normal, surface.view, incident) * smooth
         } else {
             point.matter.lit_through(surface.normal, surface.view, incident, crossing)
@@ -434,9 +437,21 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             return self.add(point.ray.sample, radiance);
         }
         let inside = self.context.absorption.is_some().then_some(point.path.media);
-        let (dir, end) = incident.way(surface.origin(to_light));
-        self.shadows.push(surface.ray(dir, end, point.ray.sample), radiance, inside);
+        let sample = point.ray.sample;
+        if !above {
+            return self.shadows.push(surface.straight_feeler(incident, sample), radiance, inside);
+        }
+        if let Some(feelers) = surface.feelers(incident, sample) {
+            self.shadows.push_feelers(&feelers, radiance, inside);
+        }
     }
+}
+
+/// What finds out whether a light shines on the round surface at `hit`.
+fn feelers(context: &Context, light: &LocalLight, ray: &Ray, hit: &Hit) -> Option<Feelers> {
+    let target = Target::new(context.scene, context.world, hit.prim);
+    let surface = Surface::new(context.world, target, ray, hit, 0.0);
+    surface.feelers(&light.incident(surface.position)?, ray.sample)
 }
 
 /// A path after what its ray is inside of has absorbed its part of the light up to `hit`.

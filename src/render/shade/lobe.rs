@@ -23,19 +23,25 @@ impl Lobe {
     }
 
     /// The same width all around.
-    pub(super) fn even(normal: Vec3, alpha: f32) -> Self {
+    pub(crate) fn even(normal: Vec3, alpha: f32) -> Self {
         let (along, across) = normal.any_orthonormal_pair();
         Self::new([along, across], normal, [alpha; 2])
     }
 
     /// The unit normal of a facet that is seen from `view`, drawn with two numbers from 0 … 1.
     pub(crate) fn facet(&self, view: Vec3, at: [f32; 2]) -> Vec3 {
+        let (sin, cos) = libm::sincosf(2.0 * PI * at[1]);
+        self.facet_turned(view, at[0], [cos, sin])
+    }
+
+    /// The same with cosine and sine of the turn that the second number stands for.
+    #[inline]
+    pub(crate) fn facet_turned(&self, view: Vec3, at: f32, [cos, sin]: [f32; 2]) -> Vec3 {
         let [wide, narrow] = self.alpha;
         let view = Vec3::new(view.dot(self.along), view.dot(self.across), view.dot(self.normal).max(0.0));
         // Stretched so that the facets become a hemisphere.
         let stretched = (view * Vec3::new(wide, narrow, 1.0)).normalize_or(Vec3::Z);
-        let z = (1.0 - at[0]) * (1.0 + stretched.z) - stretched.z;
-        let (sin, cos) = libm::sincosf(2.0 * PI * at[1]);
+        let z = (1.0 - at) * (1.0 + stretched.z) - stretched.z;
         let ring = (1.0 - z * z).max(0.0).sqrt();
         let half = Vec3::new(ring * cos, ring * sin, z) + stretched;
         let half = Vec3::new(half.x * wide, half.y * narrow, half.z.max(0.0)).normalize_or(Vec3::Z);
@@ -50,13 +56,28 @@ impl Lobe {
         if whole > 0.0 { n_l * (n_v + wide_v) / whole } else { 0.0 }
     }
 
+    /// The same, and 0 for light from below the surface.
+    pub(crate) fn sent(&self, view: Vec3, to: Vec3) -> f32 {
+        if self.normal.dot(to) > 0.0 { self.kept(view, to) } else { 0.0 }
+    }
+
+    /// How densely the directions that `view` is mirrored to lie where this facet mirrors it, 1/sr.
+    pub(crate) fn density(&self, view: Vec3, facet: Vec3) -> f32 {
+        let [wide, narrow] = self.alpha;
+        let stretched =
+            Vec3::new(facet.dot(self.along) / wide, facet.dot(self.across) / narrow, facet.dot(self.normal));
+        let squared = stretched.length_squared();
+        let facets = 1.0 / (PI * wide * narrow * squared * squared);
+        facets / (2.0 * (self.normal.dot(view).max(0.0) + self.length(view)))
+    }
+
     /// What all facets together send back to `view` of light from everywhere, if they mirror all of it.
     pub(super) fn albedo(&self, view: Vec3) -> f32 {
         const DRAWN: u8 = 16;
         let kept = |k: u8| {
             let at = [(f32::from(k) + 0.5) / f32::from(DRAWN), (f32::from(k) * 0.618_034).fract()];
             let to = reflect(-view, self.facet(view, at));
-            if self.normal.dot(to) > 0.0 { self.kept(view, to) } else { 0.0 }
+            self.sent(view, to)
         };
         (0..DRAWN).map(kept).sum::<f32>() / f32::from(DRAWN)
     }

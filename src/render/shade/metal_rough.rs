@@ -210,7 +210,7 @@ impl MetalRoughMatter {
         let n_v = seen.normal.dot(seen.view).clamp(0.0, 1.0);
         let looked_up = self.traced(seen.outside) < 1.0;
         let roughness = self.mean_roughness();
-        let mirrored = || grain.map_or_else(|| sky.blurred(seen.mirrored(), roughness), |g| g.mirrored(seen, sky));
+        let mirrored = || grain.map_or_else(|| sky.mirrored(seen, roughness), |g| g.mirrored(seen, sky));
         let around = Around {
             n_v,
             shares: self.albedo(n_v),

@@ -350,14 +350,15 @@ pub(crate) fn lets_light_in(material: &Material) -> bool {
     }
 }
 
-/// How much of a light a smooth surface shows near the line where its true shape turns away from it: 1 away from that
-/// line, 0 on it, so that the facets of the mesh do not cut the shading off.
+/// How much of a light a mapped surface shows near the line where it turns away from it: 1 away from that line, 0 on it, so
+/// that where the surface ends does not cut off what its maps do.
 ///
-/// M. J.-Y. Chiang, Y. K. Li, B. Burley, "Taming the Shadow Terminator" (2019). 1 everywhere on flat faces.
+/// `horizon` is the normal without maps. M. J.-Y. Chiang, Y. K. Li, B. Burley, "Taming the Shadow Terminator" (2019), who
+/// compare with the facets of the mesh, which then show. 1 everywhere on surfaces without maps.
 #[inline(always)]
-pub(crate) fn terminator(geometric: Vec3, shading: Vec3, to_light: Vec3) -> f32 {
-    let agreement = shading.dot(to_light) * shading.dot(geometric);
-    let g = geometric.dot(to_light) / agreement;
+pub(crate) fn terminator(horizon: Vec3, shading: Vec3, to_light: Vec3) -> f32 {
+    let agreement = shading.dot(to_light) * shading.dot(horizon);
+    let g = horizon.dot(to_light) / agreement;
     // Not a number where the shading normal is square to the light or to the surface: such light is not seen anyway.
     if g.is_nan() || g >= 1.0 {
         return 1.0;

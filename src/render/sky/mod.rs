@@ -2,10 +2,12 @@
 
 mod around;
 mod chance;
+mod gloss;
 mod panorama;
 
 pub(crate) use around::{Arounds, Standpoint};
 
+use super::shade::{Lobe, Seen};
 use super::studio;
 use crate::math::Vec3;
 use crate::scene::{Background, Environment, Scene, UpAxis};
@@ -89,6 +91,16 @@ impl Sky {
             (Environment::Panorama, Some(map)) => map.pyramid.blurred(self.to_map(map, dir), roughness),
             _ => self.radiance(dir, 0.0),
         }
+    }
+
+    /// Mean radiance as the facets of a rough mirror show it, seen as said: of a picture by the very facets that are seen,
+    /// else around the mirrored direction.
+    pub(crate) fn mirrored(&self, seen: &Seen, roughness: f32) -> Vec3 {
+        let exact = self.map.as_ref().and_then(|map| {
+            let lobe = Lobe::even(seen.normal, roughness * roughness);
+            map.pyramid.mirrored(&lobe, seen.view, |dir| self.to_map(map, dir))
+        });
+        exact.unwrap_or_else(|| self.blurred(seen.mirrored(), roughness))
     }
 
     /// Cosine-weighted mean radiance over the hemisphere around `normal`.

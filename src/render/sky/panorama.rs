@@ -33,6 +33,8 @@ static PATTERN: LazyLock<[[f32; 2]; LOOKUPS]> = LazyLock::new(|| {
 #[derive(Clone, Debug)]
 pub(super) struct Pyramid {
     levels: Vec<Level>,
+    /// The same sizes from the second on, each a smooth mean of the one before: a small sun stays where it is in all of them.
+    soft: Vec<Level>,
     diffuse: Level,
 }
 
@@ -52,9 +54,19 @@ impl Pyramid {
         while let Some(next) = levels.last().and_then(Level::halved) {
             levels.push(next);
         }
-        let mut pyramid = Self { levels, diffuse: Level { width: 1, height: 1, texels: Arc::new(vec![[0.0; 3]]) } };
+        let mut soft: Vec<Level> = Vec::new();
+        for to in &levels[1..] {
+            soft.push(soft.last().unwrap_or(&levels[0]).softened((to.width, to.height)));
+        }
+        let mut pyramid =
+            Self { levels, soft, diffuse: Level { width: 1, height: 1, texels: Arc::new(vec![[0.0; 3]]) } };
         pyramid.diffuse = pyramid.spread();
         pyramid
+    }
+
+    /// Radians across a texel.
+    pub(super) fn finest(&self) -> f32 {
+        self.levels[0].angle()
     }
 
     /// The finest level with at most so many columns.
@@ -67,6 +79,17 @@ impl Pyramid {
     pub(super) fn radiance(&self, dir: Vec3, angle: f32) -> Vec3 {
         let finest = self.levels[0].angle();
         self.at_level(dir, if angle > finest { libm::log2f(angle / finest) } else { 0.0 })
+    }
+
+    /// About the same without the borders of texels: the mean weighted by a smooth hill of this width.
+    pub(super) fn smooth_radiance(&self, dir: Vec3, angle: f32) -> Vec3 {
+        let level = libm::log2f((angle / self.levels[0].angle()).max(1.0)).min(self.soft.len() as f32);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the levels there are")]
+        let fine = level as usize;
+        let plane = |k: usize| if k == 0 { &self.levels[0] } else { &self.soft[k - 1] };
+        let at = coordinates(dir);
+        let sharp = plane(fine).at(at);
+        sharp.lerp(plane((fine + 1).min(self.soft.len())).at(at), level - fine as f32)
     }
 
     /// Between the two nearest levels.
@@ -162,6 +185,12 @@ fn coordinates(dir: Vec3) -> (f32, f32) {
 }
 
 impl Level {
+    /// The places of a copy alone.
+    #[cfg(test)]
+    pub(super) fn without_texels((width, height): (u32, u32)) -> Self {
+        Self { width, height, texels: Arc::default() }
+    }
+
     /// Degrees of arc, in radians, that a texel is high.
     pub(super) fn angle(&self) -> f32 {
         PI / self.height as f32
@@ -196,7 +225,7 @@ impl Level {
     }
 
     /// Row and direction of the middle of each texel.
-    fn middles(&self) -> impl Iterator<Item = (u32, Vec3)> + '_ {
+    pub(super) fn middles(&self) -> impl Iterator<Item = (u32, Vec3)> + '_ {
         let row = move |y: u32| (0..self.width).map(move |x| (y, self.direction(x as f32 + 0.5, y as f32 + 0.5)));
         (0..self.height).flat_map(row)
     }
@@ -219,6 +248,46 @@ impl Level {
             at(0).lerp(at(1), x - left)
         };
         mixed(row(0)).lerp(mixed(row(1)), y - top)
+    }
+
+    /// Smaller, each texel the mean of those around it by their area and by how near they are: light goes to the texels
+    /// that it would be mixed from, so that its middle stays where it is.
+    fn softened(&self, (width, height): (u32, u32)) -> Self {
+        let taps = |i: u32, from: u32, to: u32| {
+            let step = from as f32 / to as f32;
+            let middle = (i as f32 + 0.5) * step - 0.5;
+            #[expect(clippy::cast_possible_truncation, reason = "texels of a side")]
+            let first = (middle - step).ceil() as i32;
+            let share = move |k: i32| (1.0 - (k as f32 - middle).abs() / step).max(0.0);
+            (first..).map(move |k| (k, share(k))).take_while(|(_, share)| *share > 0.0).collect::<Vec<_>>()
+        };
+        let around = |k: i32| k.rem_euclid(self.width.cast_signed()).cast_unsigned();
+        let columns: Vec<_> = (0..width).map(|x| taps(x, self.width, width)).collect();
+        let row = |y: u32| {
+            // Beyond a pole lies the same row, half a turn on.
+            let over = |k: i32| match k {
+                k if k < 0 => ((-1 - k).cast_unsigned().min(self.height - 1), self.width / 2),
+                k => match (self.height - 1).checked_sub(k.cast_unsigned()) {
+                    Some(_) => (k.cast_unsigned(), 0),
+                    None => ((2 * self.height - 1).saturating_sub(k.cast_unsigned()), self.width / 2),
+                },
+            };
+            let rows: Vec<_> = taps(y, self.height, height).into_iter().map(|(k, share)| (over(k), share)).collect();
+            let rows: Vec<_> = rows.into_iter().map(|(place, share)| (place, share * self.area(place.0))).collect();
+            let texel = |columns: &Vec<(i32, f32)>| {
+                let (mut sum, mut whole) = (Vec3::ZERO, 0.0);
+                for &((row, turn), weight) in &rows {
+                    for &(column, share) in columns {
+                        sum += self.texel((around(column) + turn) % self.width, row) * (weight * share);
+                        whole += weight * share;
+                    }
+                }
+                (sum / whole).to_array()
+            };
+            columns.iter().map(texel).collect::<Vec<_>>()
+        };
+        let texels = (0..height).into_par_iter().flat_map_iter(row).collect();
+        Self { width, height, texels: Arc::new(texels) }
     }
 
     /// Half as large, each texel the mean of those it covers by their area on the sphere; `None` for a single texel.

@@ -9,7 +9,7 @@ use crate::math::inset::Rim;
 use crate::math::simd::{Kernel, Level, Simd};
 use crate::math::triangle::Flat;
 use crate::math::{DVec3, Vec3};
-use crate::render::patch::smooth_normal;
+use crate::render::patch::{differ, smooth_normal};
 use crate::render::shade::Seen;
 use crate::render::surface::facing;
 use crate::render::world::Placement;
@@ -64,6 +64,8 @@ struct Given {
     outward: Columns,
     /// Of the three corners; only of meshes that have any.
     normals: [Columns; 3],
+    /// 1 where those differ.
+    curved: [u32; POINTS],
 }
 
 /// The surface at each point.
@@ -72,6 +74,8 @@ pub(super) struct Found {
     pub certain: [u32; POINTS],
     /// 1 where the front is seen.
     pub front: [u32; POINTS],
+    /// 1 where the mesh stands for something round.
+    pub curved: [u32; POINTS],
     pub position: Columns,
     pub error: Columns,
     pub view: Columns,
@@ -95,10 +99,12 @@ impl Default for Strip {
             edges2: WIDE,
             outward: EMPTY,
             normals: [EMPTY; 3],
+            curved: [0; POINTS],
         };
         let found = Found {
             certain: [0; POINTS],
             front: [0; POINTS],
+            curved: [0; POINTS],
             position: EMPTY,
             error: EMPTY,
             view: EMPTY,
@@ -140,6 +146,7 @@ impl Strip {
         given.area2[i] = rim.area2;
         put_wide(&mut given.edges2, i, DVec3::from_array(rim.edges2));
         put(&mut given.outward, i, face.outward);
+        given.curved[i] = u32::from(face.normals.is_some_and(differ));
         if let Some(normals) = &face.normals {
             for (columns, &normal) in given.normals.iter_mut().zip(normals) {
                 put(columns, i, normal);
@@ -205,6 +212,7 @@ impl Kernel for Faceted<'_> {
         for i in 0..points.min(POINTS) {
             given.place(found, i);
         }
+        found.curved = [0; POINTS];
         for i in 0..points.min(POINTS) {
             given.turn(found, i);
             found.shade(i, get(&given.outward, i));
@@ -226,6 +234,7 @@ impl Kernel for Smooth<'_> {
     fn run<S: Simd>(self, _: S) {
         let Self { given, found, points, placement } = self;
         let placement = *placement;
+        found.curved = given.curved;
         for i in 0..points.min(POINTS) {
             given.place(found, i);
         }

@@ -5,12 +5,15 @@ use crate::accel::Ray;
 use crate::math::Vec3;
 use crate::math::bounds::offset_origin;
 use crate::math::simd::{Kernel, Simd};
+use crate::render::curve::STEEP;
 use crate::render::shade::{Incident, LocalLight, Matter, Model, terminator};
 
 /// What one light does at each point.
 pub(super) struct Lit {
     /// 1 where it is seen.
     pub seen: [u32; POINTS],
+    /// 1 where its light is so flat that shadow rays do not start on the triangle.
+    pub grazes: [u32; POINTS],
     pub radiance: Columns,
     /// The shadow ray.
     pub origin: Columns,
@@ -21,7 +24,7 @@ pub(super) struct Lit {
 impl Default for Lit {
     fn default() -> Self {
         let empty = [[0.0; POINTS]; 3];
-        Self { seen: [0; POINTS], radiance: empty, origin: empty, dir: empty, end: [0.0; POINTS] }
+        Self { seen: [0; POINTS], grazes: [0; POINTS], radiance: empty, origin: empty, dir: empty, end: [0.0; POINTS] }
     }
 }
 
@@ -30,6 +33,8 @@ pub(crate) struct Shone {
     /// The place of its ray in the wave.
     pub index: u32,
     pub radiance: Vec3,
+    /// Whether the light is so flat that the shadow ray must be found by [`Surface`](crate::render::surface::Surface).
+    pub grazes: bool,
     /// Start, direction and end of the shadow ray.
     pub origin: Vec3,
     pub dir: Vec3,
@@ -57,6 +62,7 @@ impl Strip {
         (0..self.count.min(POINTS)).filter(|&i| lit.seen[i] & found.certain[i] == 1).map(|i| Shone {
             index: self.rays[i],
             radiance: get(&lit.radiance, i),
+            grazes: lit.grazes[i] == 1,
             origin: get(&lit.origin, i),
             dir: get(&lit.dir, i),
             end: lit.end[i],
@@ -111,12 +117,15 @@ fn each(
         let (geometric, normal) = (get(&found.geometric, i), get(&found.normal, i));
         let (incident, arrives) = light.arriving(position);
         let to_light = incident.to_light;
-        let above = geometric.dot(to_light) > 0.0;
-        let smooth = terminator(geometric, normal, to_light);
+        let curved = found.curved[i] == 1;
+        let horizon = if curved { normal } else { geometric };
+        let above = horizon.dot(to_light) > 0.0;
+        let smooth = terminator(horizon, normal, to_light);
         let radiance = reflect(normal, get(&found.view, i), &incident) * smooth;
         let (dir, end) = incident.way(offset_origin(position, error, geometric, to_light));
         let seen = arrives & above & radiance.is_finite() & (radiance.max_element() > 0.0);
         lit.seen[i] = u32::from(seen);
+        lit.grazes[i] = u32::from(curved & (geometric.dot(to_light) < STEEP));
         put(&mut lit.radiance, i, radiance);
         put(&mut lit.origin, i, offset_origin(position, error, geometric, dir));
         put(&mut lit.dir, i, dir);

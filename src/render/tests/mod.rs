@@ -7,6 +7,7 @@ mod glass;
 mod gloss;
 mod light;
 mod mirrors;
+mod round;
 mod sampling;
 mod see_through;
 mod sight;

@@ -1,0 +1,129 @@
+//! How far the round surface that a triangle's normals describe rises over the triangle, so that the shadow rays of coarse
+//! smooth meshes start where the surface would be and not under it.
+
+use super::shade::Incident;
+use super::surface::Surface;
+use crate::accel::{NO_PRIM, Ray};
+use crate::math::Vec3;
+
+/// Cosine between a light and a triangle from which on shadow rays start on the triangle itself; below it they start the
+/// higher the flatter the light is. Rays towards steeper light leave a rounded mesh in any case.
+pub(crate) const STEEP: f32 = 0.1;
+
+/// The corners of a triangle over each other's tangent planes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Curve {
+    /// Unit normals of the corners.
+    normals: [Vec3; 3],
+    /// Of the plane at each corner: the heights of all three over it.
+    heights: [Vec3; 3],
+}
+
+impl Curve {
+    /// The triangle with these corners and unit normals there, all on one side.
+    pub(super) fn new(vertices: [Vec3; 3], normals: [Vec3; 3]) -> Self {
+        let over = |k: usize| {
+            let height = |j: usize| (vertices[j] - vertices[k]).dot(normals[k]);
+            Vec3::new(height(0), height(1), height(2))
+        };
+        Self { normals, heights: [over(0), over(1), over(2)] }
+    }
+
+    /// The way from the point of the triangle with these weights of the corners to the surface: the mean of the ways to the
+    /// corners' tangent planes, of those that it lies under. Zero at the corners, and where the surface is hollow.
+    ///
+    /// J. Hanika, "Hacking the Shadow Terminator" (Ray Tracing Gems II, 2021).
+    pub(super) fn lift(&self, weights: [f32; 3]) -> Vec3 {
+        let at = Vec3::from(weights);
+        let to_plane = |k: usize| self.normals[k] * (weights[k] * (-self.heights[k].dot(at)).max(0.0));
+        to_plane(0) + to_plane(1) + to_plane(2)
+    }
+}
+
+/// The rays that find what stands between a point and a light.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Feelers {
+    /// Towards the light.
+    pub ray: Ray,
+    /// From the triangle to where that ray starts, if it starts above it: what is in between hides the light as well.
+    pub riser: Option<Ray>,
+}
+
+impl Surface<'_> {
+    /// The rays that must meet nothing if light that is above the [horizon](Self::horizon) is to arrive here; `None` where
+    /// the triangle itself hides it.
+    pub(crate) fn feelers(&self, incident: &Incident, sample: u32) -> Option<Feelers> {
+        let cosine = self.geometric.dot(incident.to_light);
+        if cosine < STEEP
+            && let Some(lift) = self.lift()
+        {
+            let foot = self.origin(self.geometric);
+            let lift = lift * (1.0 - cosine / STEEP).min(1.0);
+            let start = foot + lift;
+            let (dir, t_max) = incident.way(start);
+            // Its own triangle may be in the way of a ray that starts above it.
+            let ray = Ray { origin: start, t_min: 0.0, dir, t_max, exclude: NO_PRIM, sample };
+            let riser = Ray { origin: foot, t_min: 0.0, dir: lift, t_max: 1.0, exclude: self.target.prim, sample };
+            return Some(Feelers { ray, riser: Some(riser) });
+        }
+        if cosine <= 0.0 {
+            return None;
+        }
+        Some(Feelers { ray: self.straight_feeler(incident, sample), riser: None })
+    }
+
+    /// The ray from the triangle itself to a light on either side of it.
+    pub(crate) fn straight_feeler(&self, incident: &Incident, sample: u32) -> Ray {
+        let (dir, end) = incident.way(self.origin(incident.to_light));
+        self.ray(dir, end, sample)
+    }
+
+    /// The way to the round surface on the side that is seen, where it is more than the rounding of the position.
+    fn lift(&self) -> Option<Vec3> {
+        let patch = self.patch.as_ref()?;
+        let lift = patch.curve(self.side(patch.normal()?))?.lift(patch.weights);
+        let rounding = self.error.dot(self.geometric.abs());
+        (lift.dot(self.geometric) > rounding && lift.is_finite()).then_some(lift)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three points of the unit sphere, so many radians apart.
+    fn cap(width: f32) -> [Vec3; 3] {
+        let corner = |turn: f32| {
+            let (sin, cos) = libm::sincosf(turn);
+            Vec3::new(cos * width, sin * width, 1.0).normalize()
+        };
+        [corner(0.0), corner(2.1), corner(4.2)]
+    }
+
+    fn weights() -> impl Iterator<Item = [f32; 3]> {
+        let pairs = (0..=10u8).flat_map(|i| (0..=10 - i).map(move |j| (f32::from(i) / 10.0, f32::from(j) / 10.0)));
+        pairs.map(|(u, v)| [1.0 - u - v, u, v])
+    }
+
+    #[test]
+    fn a_facet_of_a_ball_is_lifted_to_the_ball_and_no_farther_than_its_tangent_planes_meet() {
+        for width in [0.5, 0.1, 0.01] {
+            let corners = cap(width);
+            let curve = Curve::new(corners, corners);
+            for [a, b, c] in weights() {
+                let place = corners[0] * a + corners[1] * b + corners[2] * c;
+                let radius = (place + curve.lift([a, b, c])).length();
+                assert!(radius > 1.0 - 1e-6 && radius < 1.0 + width * width, "{width}: {radius} at {a} {b} {c}");
+            }
+        }
+    }
+
+    #[test]
+    fn flat_and_hollow_triangles_stay_where_they_are() {
+        let corners = cap(0.3);
+        let hollow = Curve::new(corners, corners.map(|n| -n));
+        assert!(weights().all(|w| hollow.lift(w) == Vec3::ZERO));
+        let flat = Curve::new([Vec3::ZERO, Vec3::X, Vec3::Y], [Vec3::Z; 3]);
+        assert!(weights().all(|w| flat.lift(w) == Vec3::ZERO));
+    }
+}

@@ -1,0 +1,132 @@
+//! What a rough surface mirrors of a panorama, without a ray: lookups along the directions that its facets send the view to.
+
+use super::panorama::Pyramid;
+use crate::math::Vec3;
+use crate::render::optics::reflect;
+use crate::render::shade::Lobe;
+use std::f32::consts::PI;
+use std::sync::LazyLock;
+
+/// Lookups that make up a lobe.
+const LOOKUPS: usize = 64;
+
+/// Width of the hills that stand for the lookups' shares of the sphere, in roots of those: as wide as they are apart.
+const HILL: f32 = 0.75;
+
+/// Numbers that draw facets for equal shares of a lobe: 0 … 1, and cosine and sine of a turn.
+static PATTERN: LazyLock<[(f32, [f32; 2]); LOOKUPS]> = LazyLock::new(|| {
+    /// The golden ratio's inverse: turns that never meet.
+    const GOLDEN: f32 = 0.618_034;
+    std::array::from_fn(|k| {
+        let (sin, cos) = libm::sincosf(2.0 * PI * (k as f32 * GOLDEN).fract());
+        ((k as f32 + 0.5) / LOOKUPS as f32, [cos, sin])
+    })
+});
+
+impl Pyramid {
+    /// Mean radiance as facets of `lobe` that are seen from `view` mirror it and others let it through; `to_map` turns
+    /// directions into those of the panorama. `None` where the lobe is narrower than a texel, or shows nothing.
+    ///
+    /// Facets are drawn as they are seen, and each direction is looked up as blurred as directions are few there
+    /// (J. Křivánek, M. Colbert, "Real-time Shading with Filtered Importance Sampling", 2008). A table of lobes around the
+    /// mirrored direction, as games have it, is another lobe: on rough surfaces it shows a small sun a quarter wrong.
+    pub(super) fn mirrored(&self, lobe: &Lobe, view: Vec3, to_map: impl Fn(Vec3) -> Vec3) -> Option<Vec3> {
+        if lobe.angle(1) < self.finest() {
+            return None;
+        }
+        let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
+        for &(at, turn) in PATTERN.iter() {
+            let facet = lobe.facet_turned(view, at, turn);
+            let to = reflect(-view, facet);
+            let weight = lobe.sent(view, to);
+            if weight > 0.0 {
+                let area = 1.0 / (LOOKUPS as f32 * lobe.density(view, facet));
+                sum += self.smooth_radiance(to_map(to), HILL * area.min(4.0 * PI).sqrt()) * weight;
+                weights += weight;
+            }
+        }
+        (weights > 0.0).then(|| sum / weights)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::panorama::Level;
+    use super::*;
+    use crate::scene::Panorama;
+    use std::sync::Arc;
+
+    const SIZE: (u32, u32) = (256, 128);
+
+    fn pyramid(texel: impl Fn(Vec3) -> [f32; 3]) -> Pyramid {
+        let grid = Level::without_texels(SIZE);
+        let texels = grid.middles().map(|(_, dir)| texel(dir)).collect();
+        let (width, height) = SIZE;
+        Pyramid::new(&Panorama { name: String::new(), width, height, texels: Arc::new(texels), rotation: 0.0 })
+    }
+
+    /// A gradient and a sun, 3° wide, that lights as much as all the rest.
+    fn sunny() -> Pyramid {
+        let sun = Vec3::new(0.55, 0.62, 0.45).normalize();
+        pyramid(|dir| {
+            let off = sun.cross(dir).length().atan2(sun.dot(dir)).to_degrees() / 1.5;
+            let shine = 700.0 * (-0.5 * off * off).exp();
+            [0.3 + 0.2 * dir.y + shine, 0.3, 0.5 - 0.2 * dir.y]
+        })
+    }
+
+    /// The mean over the lobe by all texels.
+    fn integral(sky: &Pyramid, lobe: &Lobe, normal: Vec3, view: Vec3) -> f32 {
+        let grid = Level::without_texels(SIZE);
+        let (mut sum, mut whole) = (0.0, 0.0);
+        for (row, to) in grid.middles().filter(|(_, to)| to.dot(normal) > 0.0) {
+            let facet = (view + to).normalize();
+            let weight = f64::from(lobe.density(view, facet) * lobe.sent(view, to) * grid.area(row));
+            sum += weight * f64::from(sky.radiance(to, 0.0).x);
+            whole += weight;
+        }
+        (sum / whole) as f32
+    }
+
+    /// Normals that are seen from +z, all around and to 72°.
+    fn normals() -> impl Iterator<Item = Vec3> {
+        (0..48u8).map(|k| {
+            let (sin, cos) = libm::sincosf(f32::from(k) * 2.4);
+            let polar = libm::sincosf((f32::from(k) * 1.5).to_radians());
+            Vec3::new(polar.0 * cos, polar.0 * sin, polar.1)
+        })
+    }
+
+    #[test]
+    fn an_even_sky_is_even_in_every_lobe() {
+        let sky = pyramid(|_| [2.0, 1.0, 0.5]);
+        for (roughness, normal) in [0.2f32, 0.5, 1.0].into_iter().flat_map(|r| normals().map(move |n| (r, n))) {
+            let lobe = Lobe::even(normal, roughness * roughness);
+            let seen = sky.mirrored(&lobe, Vec3::Z, |dir| dir).expect("wider than a texel");
+            assert!((seen - Vec3::new(2.0, 1.0, 0.5)).length() < 1e-4, "{roughness} {normal}: {seen}");
+        }
+        assert!(sky.mirrored(&Lobe::even(Vec3::Z, 1e-3), Vec3::Z, |dir| dir).is_none());
+    }
+
+    #[test]
+    fn a_small_sun_shows_in_rough_lobes_as_their_integrals_say() {
+        let sky = sunny();
+        let (mut found, mut good) = (Vec::new(), true);
+        for (roughness, most, part) in [(0.3f32, 0.08, 0.8), (0.5, 0.12, 0.75), (0.8, 0.1, 0.4)] {
+            let (mut off, mut whole, mut around) = (0.0, 0.0, 0.0);
+            for normal in normals() {
+                let lobe = Lobe::even(normal, roughness * roughness);
+                let expected = integral(&sky, &lobe, normal, Vec3::Z);
+                let shown = sky.mirrored(&lobe, Vec3::Z, |dir| dir).expect("wider than a texel").x;
+                let table = sky.blurred(reflect(Vec3::NEG_Z, normal), roughness).x;
+                off += (shown - expected) * (shown - expected);
+                around += (table - expected) * (table - expected);
+                whole += expected * expected;
+            }
+            let (off, around) = ((off / whole).sqrt(), (around / whole).sqrt());
+            found.push((roughness, off, around));
+            good &= off < most && off < part * around;
+        }
+        assert!(good, "roughness, error, error around the mirrored direction: {found:?}");
+    }
+}
