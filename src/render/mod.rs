@@ -17,6 +17,7 @@ mod costs;
 mod draws;
 pub mod everything;
 mod eyes;
+mod keeping;
 mod layers;
 mod observer;
 pub mod optics;
@@ -41,6 +42,7 @@ mod whitted;
 pub mod world;
 
 pub use costs::{Cost, Costs, UnknownCost, render_costs};
+pub use keeping::{Instancing, UnknownInstancing};
 pub use observer::{Asked, Question, Tape};
 pub use profile::{Profile, render_profiled};
 pub use surface::given_normal;
@@ -126,7 +128,7 @@ pub struct Job<'a> {
     pub scene: &'a Scene,
     /// The same scene placed for tracing.
     pub world: &'a World,
-    /// The structure built over `world.shapes`.
+    /// The structure built over the world ([`World::structure`]).
     pub accel: &'a AnyAccel<'a>,
     /// The scene's textures.
     pub textures: &'a TextureStore<'a>,

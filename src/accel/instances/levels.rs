@@ -48,6 +48,11 @@ impl<'a> TwoLevel<'a> {
         Self { kept, stored: Wide::build(shapes, splitting), objects, places }
     }
 
+    /// What is not kept.
+    pub fn shapes(&self) -> &Shapes {
+        self.stored.shapes()
+    }
+
     /// Sizes of all trees together, each counted once; depths are added up.
     pub fn summary(&self) -> StructureStats {
         let mut sum = self.stored.summary();
