@@ -74,8 +74,7 @@ impl Keeping {
         let mut objects: Vec<Option<u32>> = vec![None; scene.meshes.len()];
         for i in chosen(scene, how) {
             let mesh = &scene.meshes[i];
-            objects[i] =
-                Some(kept.add(Object::new(&mesh.positions, &mesh.triangles, opaque[mesh.material as usize])));
+            objects[i] = Some(kept.add(Object::new(&mesh.positions, &mesh.triangles, opaque[mesh.material as usize])));
         }
         if kept.objects().is_empty() {
             return Self { kept, places: vec![None; scene.instances.len()] };

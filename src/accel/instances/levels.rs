@@ -215,14 +215,7 @@ impl Accel for TwoLevel<'_> {
         }
     }
 
-    fn next<P: Probe>(
-        &self,
-        rays: &[Ray],
-        after: &[Hit],
-        hits: &mut [Hit],
-        scratch: &mut LevelScratch,
-        probe: &mut P,
-    ) {
+    fn next<P: Probe>(&self, rays: &[Ray], after: &[Hit], hits: &mut [Hit], scratch: &mut LevelScratch, probe: &mut P) {
         self.renumber(rays, &mut scratch.rays);
         scratch.after.clear();
         scratch.after.extend(after.iter().map(|after| self.after(after)));

@@ -71,11 +71,7 @@ fn object(shapes: &Shapes, opaque: bool) -> Object {
 
 /// Three objects, one of which lets light through.
 fn objects() -> Vec<Object> {
-    vec![
-        object(&scenes::star(12, 8), true),
-        object(&scenes::soup(40, 0.8), false),
-        object(&scenes::lattice(30), true),
-    ]
+    vec![object(&scenes::star(12, 8), true), object(&scenes::soup(40, 0.8), false), object(&scenes::lattice(30), true)]
 }
 
 /// Spheres, cones, planes and triangles beside what is kept.
@@ -180,7 +176,8 @@ fn singular_and_extreme_placements_are_flattened() {
         assert!(at(diagonal).is_none(), "{diagonal}");
     }
     assert!(Place::new(DAffine3::from_translation(DVec3::splat(1e5)), &star).is_none(), "rounding moves corners");
-    let places = [(0, DAffine3::IDENTITY), (1, DAffine3::from_scale(DVec3::new(1.0, 1.0, 0.0))), (0, DAffine3::IDENTITY)];
+    let places =
+        [(0, DAffine3::IDENTITY), (1, DAffine3::from_scale(DVec3::new(1.0, 1.0, 0.0))), (0, DAffine3::IDENTITY)];
     let both = Both::new(objects(), &places, &others());
     assert_eq!(both.kept.placed().len(), 2);
     assert_hits_of_the_flattened_scene("one is flat", &both, &scenes::rays(&both.flat, 30));
