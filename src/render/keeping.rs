@@ -49,7 +49,7 @@ impl FromStr for Instancing {
 /// Triangles from which on a mesh is worth a tree of its own, where nobody says so.
 const WORTH_A_TREE: usize = 64;
 
-/// Triangles that keeping must save: flattened, so many take 27 MB with the tree over them, and rays through one tree are
+/// Triangles that keeping must save: flattened, so many take 20 MB with the tree over them, and rays through one tree are
 /// sooner answered than through two.
 const WORTH_KEEPING: usize = 1 << 18;
 
