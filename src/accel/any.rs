@@ -8,8 +8,8 @@ use super::intersector::{IntersectorKind, Looked, MollerTrumbore, MollerTrumbore
 use super::query::{Culling, Tested};
 use super::volumes::{Ball, Volumes};
 use super::{
-    Accel, AccelParams, Bvh, GridOctree, Hit, Probe, Ray, Shapes, Splitting, StructureStats, Transformed, Unculled,
-    Wide,
+    Accel, AccelParams, Bvh, GridOctree, Hit, Kept, Probe, Ray, Shapes, Splitting, StructureStats, Transformed,
+    TwoLevel, Unculled, Wide,
 };
 use crate::math::aabb::Aabb;
 
@@ -82,6 +82,11 @@ impl AccelKind {
         }
     }
 
+    /// Whether it can hold objects that are stored once and stand in several places.
+    pub fn keeps_instances(self) -> bool {
+        matches!(self, Self::FastOctree | Self::FastBvh)
+    }
+
     /// Whether a ray may be tested against a large part of the prims: where many rays are asked, such a structure gets
     /// a sample of them.
     pub fn is_slow(self) -> bool {
@@ -127,6 +132,7 @@ enum Structure<'a> {
     Bvh(Bvh<'a>),
     Grid(GridOctree<'a>),
     Wide(Wide<'a>),
+    TwoLevel(TwoLevel<'a>),
 }
 
 /// Evaluates an expression for whatever structure there is.
@@ -140,6 +146,7 @@ macro_rules! whichever {
             Structure::Bvh($a) => $value,
             Structure::Grid($a) => $value,
             Structure::Wide($a) => $value,
+            Structure::TwoLevel($a) => $value,
         }
     };
 }
@@ -172,6 +179,21 @@ impl<'a> AnyAccel<'a> {
             AccelKind::FastOctree => Structure::Wide(Wide::build(shapes, Splitting::Octree)),
             AccelKind::FastBvh => Structure::Wide(Wide::build(shapes, Splitting::SurfaceArea)),
         };
+        Self { kind, structure, test: IntersectorKind::Exact }
+    }
+
+    /// Builds a structure over `shapes` and what is `kept`, where anything is; for kinds that can
+    /// ([`AccelKind::keeps_instances`]), others give way to the default. Asked with the exact test, and with no other where
+    /// anything is kept.
+    pub fn build_with(kind: AccelKind, shapes: &'a Shapes, kept: &'a Kept, params: &AccelParams) -> Self {
+        if kept.is_empty() {
+            return Self::build(kind, shapes, params);
+        }
+        let (kind, splitting) = match kind {
+            AccelKind::FastBvh => (kind, Splitting::SurfaceArea),
+            _ => (AccelKind::FastOctree, Splitting::Octree),
+        };
+        let structure = Structure::TwoLevel(TwoLevel::build(shapes, kept, splitting));
         Self { kind, structure, test: IntersectorKind::Exact }
     }
 
@@ -211,19 +233,35 @@ impl<'a> AnyAccel<'a> {
                 IntersectorKind::MollerTrumbore => question.ask(&Tested::new(a, MollerTrumbore), scratch),
                 IntersectorKind::MollerTrumboreDouble => question.ask(&Tested::new(a, MollerTrumboreDouble), scratch),
             }),
-            other => whichever!(other, a => with_scratch(a, scratch, |scratch| match self.test {
-                IntersectorKind::Exact => question.ask(a, scratch),
-                test => question.ask(&Tested::new(a, Looked(test)), scratch),
-            })),
+            Structure::TwoLevel(a) => with_scratch(a, scratch, |scratch| question.ask(a, scratch)),
+            Structure::None(a) => looked(a, self.test, question, scratch),
+            Structure::Transform(a) => looked(a, self.test, question, scratch),
+            Structure::Spheres(a) => looked(a, self.test, question, scratch),
+            Structure::Boxes(a) => looked(a, self.test, question, scratch),
+            Structure::Bvh(a) => looked(a, self.test, question, scratch),
+            Structure::Grid(a) => looked(a, self.test, question, scratch),
         }
     }
 }
 
+/// Asks a structure with a test that is looked up each time, unless it is the exact one.
+fn looked<C: Culling<Scratch: 'static>>(
+    accel: &C,
+    test: IntersectorKind,
+    question: impl Question,
+    scratch: &mut AnyScratch,
+) {
+    with_scratch(accel, scratch, |scratch| match test {
+        IntersectorKind::Exact => question.ask(accel, scratch),
+        test => question.ask(&Tested::new(accel, Looked(test)), scratch),
+    });
+}
+
 /// Calls `f` with the structure's own scratch; a fresh one if that of another was given.
-fn with_scratch<C: Culling<Scratch: 'static>>(accel: &C, scratch: &mut AnyScratch, f: impl FnOnce(&mut C::Scratch)) {
+fn with_scratch<A: Accel<Scratch: 'static>>(accel: &A, scratch: &mut AnyScratch, f: impl FnOnce(&mut A::Scratch)) {
     match scratch.0.downcast_mut() {
         Some(scratch) => f(scratch),
-        None => f(&mut accel.new_scratch()),
+        None => f(&mut accel.scratch()),
     }
 }
 
@@ -232,7 +270,7 @@ impl Accel for AnyAccel<'_> {
 
     #[expect(clippy::unit_arg, reason = "the scratch of some is the unit")]
     fn scratch(&self) -> AnyScratch {
-        AnyScratch(whichever!(&self.structure, a => Box::new(a.new_scratch())))
+        AnyScratch(whichever!(&self.structure, a => Box::new(a.scratch())))
     }
 
     fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut AnyScratch, probe: &mut P) {

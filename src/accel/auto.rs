@@ -11,8 +11,9 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::any::UnknownAccel;
+use super::instances::Object;
 use super::shapes::Prim;
-use super::{Accel, AccelKind, AccelParams, AnyAccel, BitSet, Hit, NO_PRIM, Ray, RayCounts, Shapes};
+use super::{Accel, AccelKind, AccelParams, AnyAccel, BitSet, Hit, Kept, NO_PRIM, Ray, RayCounts, Shapes};
 use crate::math::Vec3;
 use crate::math::aabb::Aabb;
 use crate::math::random::Random;
@@ -117,6 +118,30 @@ pub fn build<'a>(choice: AccelChoice, shapes: &'a Shapes, params: &AccelParams) 
             (AnyAccel::build(reason.kind, shapes, params), Some(reason))
         }
     }
+}
+
+/// The same over `shapes` and what is `kept`: the larger one of both, shapes or objects, is the one that is judged.
+pub fn build_with<'a>(
+    choice: AccelChoice,
+    shapes: &'a Shapes,
+    kept: &'a Kept,
+    params: &AccelParams,
+) -> (AnyAccel<'a>, Option<Reason>) {
+    if kept.is_empty() {
+        return build(choice, shapes, params);
+    }
+    let reason = match choice {
+        AccelChoice::Kind(_) => None,
+        AccelChoice::Auto => {
+            let all = std::iter::once(shapes).chain(kept.objects().iter().map(Object::shapes));
+            all.max_by_key(|shapes| shapes.bounded()).map(|shapes| reason(shapes, params))
+        }
+    };
+    let kind = match (choice, reason) {
+        (AccelChoice::Kind(kind), _) => kind,
+        (AccelChoice::Auto, reason) => reason.map_or(AccelKind::DEFAULT, |reason| reason.kind),
+    };
+    (AnyAccel::build_with(kind, shapes, kept, params), reason)
 }
 
 /// What [`build`] would choose, and why; nothing of the whole scene is built where it is large.

@@ -37,7 +37,7 @@ pub trait Probe: Default + Send {
     fn repeat_skipped(&mut self, _prim: u32) {}
     /// So many ray/volume tests at once (n_bit).
     fn volume_tests(&mut self, _count: usize) {}
-    /// So many corners and other points were transformed into the ray's axes (n_xf).
+    /// So many corners and other points were transformed, into the ray's axes or to where an object stands (n_xf).
     fn transforms(&mut self, _count: usize) {}
     /// The query found a hit.
     fn found(&mut self) {}
@@ -170,7 +170,7 @@ pub struct RayCounts {
     pub n_mb: u64,
     /// Ray/volume tests.
     pub n_bit: u64,
-    /// Points transformed into the axes of a ray.
+    /// Points transformed into the axes of a ray, or to where an object stands.
     pub n_xf: u64,
 }
 

@@ -176,6 +176,34 @@ impl<'a, G: Goal> Query<'a, G> {
         false
     }
 
+    /// [`Self::test_block`] for triangles of which the caller knows that they are wanted; they need not be among the shapes.
+    #[inline(always)]
+    pub(super) fn test_wanted_block<P: Probe>(
+        &mut self,
+        prims: &[u32; LANES],
+        corners: &Corners8,
+        count: u32,
+        verdicts: Verdicts,
+        probe: &mut P,
+    ) -> bool {
+        probe.prim_tests(count);
+        let all = (1 << count) - 1;
+        let mut open = (verdicts.hit | verdicts.unsure) & all;
+        probe.lanes_tested(prims, all & !open, Outcome::Miss);
+        while open != 0 {
+            let lane = open.trailing_zeros() as usize % LANES;
+            open &= open - 1;
+            let (prim, certain) = (prims[lane], verdicts.hit >> lane & 1 == 1);
+            if prim == self.exclude {
+                probe.tested(|| Test { prim, t: f32::NAN, outcome: Outcome::LeftOut });
+            } else if self.take_wanted(prim, &corners_of(corners, lane), certain, probe) {
+                probe.lanes_tested(prims, open, Outcome::LeftOut);
+                return true;
+            }
+        }
+        false
+    }
+
     /// Offers the hit with a triangle that is hit for certain, or may be.
     #[inline(never)]
     pub fn take<P: Probe>(&mut self, prim: u32, corners: &Triangle, certain: bool, probe: &mut P) -> bool {
@@ -183,6 +211,11 @@ impl<'a, G: Goal> Query<'a, G> {
             probe.tested(|| Test { prim, t: f32::NAN, outcome: Outcome::LeftOut });
             return false;
         }
+        self.take_wanted(prim, corners, certain, probe)
+    }
+
+    #[inline(always)]
+    fn take_wanted<P: Probe>(&mut self, prim: u32, corners: &Triangle, certain: bool, probe: &mut P) -> bool {
         if certain || triangle::is_hit(&self.ray, corners) {
             let meeting = triangle::meet(&self.ray, corners);
             let t = meeting.t;
@@ -222,6 +255,18 @@ impl<'a, G: Goal> Query<'a, G> {
             _ => self.shapes.barycentrics(prim, &self.ray),
         };
         Hit { t, u, v, prim }
+    }
+
+    /// The same for a hit with a triangle of a block, which need not be among the shapes; `None` where nothing such is the
+    /// answer.
+    pub(super) fn hit_by_winner(&self) -> Option<Hit> {
+        let (t, prim) = self.goal.best()?;
+        let Winner { corners, meeting, .. } = self.winner.as_ref().filter(|winner| winner.prim == prim)?;
+        let (u, v) = match meeting.t_f64.is_nan() {
+            true => triangle::barycentrics(&self.ray, corners),
+            false => triangle::barycentrics_at(&self.ray, corners, meeting.t_f64, meeting.normal),
+        };
+        Some(Hit { t, u, v, prim })
     }
 
     /// What is asked about.
@@ -325,6 +370,11 @@ impl<I> Closest<I> {
     pub(super) fn nothing(test: I) -> Self {
         Self { best: (f32::INFINITY, NO_PRIM), test }
     }
+
+    /// The first hit, if it comes before one that is known.
+    pub(super) fn before(known: &Hit, test: I) -> Self {
+        Self { best: (known.t, known.prim), test }
+    }
 }
 
 impl<I> Occluded<I> {
@@ -336,6 +386,11 @@ impl<I> Occluded<I> {
 impl<I> Next<I> {
     pub(super) fn nothing(after: &Hit, test: I) -> Self {
         Self { after: (after.t, after.prim), closest: Closest::nothing(test) }
+    }
+
+    /// The first hit after one, if it comes before another that is known.
+    pub(super) fn between(after: &Hit, known: &Hit, test: I) -> Self {
+        Self { after: (after.t, after.prim), closest: Closest::before(known, test) }
     }
 }
 

@@ -38,8 +38,23 @@ impl Refined {
 impl Shapes {
     /// Position, error bound, normal and weights of a hit that a query of these shapes found on `ray`.
     pub fn refine(&self, ray: &Ray, hit: &Hit) -> Refined {
-        if let Prim::Triangle(corners) = self.prim(hit.prim) {
-            let facet = Facet::of(&corners);
+        self.prim(hit.prim).refine(ray, hit)
+    }
+
+    /// Weights of the second and third corner where the ray hits triangle `prim`; 0 for other prims.
+    pub(super) fn barycentrics(&self, prim: u32, ray: &RaySpace) -> (f32, f32) {
+        match self.prim(prim) {
+            Prim::Triangle(corners) => triangle::barycentrics(ray, &corners),
+            _ => (0.0, 0.0),
+        }
+    }
+}
+
+impl Prim<'_> {
+    /// Position, error bound, normal and weights of a hit with this prim that a query found on `ray`.
+    pub fn refine(&self, ray: &Ray, hit: &Hit) -> Refined {
+        if let Prim::Triangle(corners) = self {
+            let facet = Facet::of(corners);
             let (position, error, certain) = facet.place(ray.origin, ray.dir, (hit.u, hit.v));
             if certain {
                 return Refined { position, start: position, error, normal: facet.flat.unit(), u: hit.u, v: hit.v };
@@ -55,10 +70,10 @@ impl Shapes {
             return Refined { position, start: position, error: Vec3::ZERO, normal: Vec3::ZERO, u: 0.0, v: 0.0 };
         };
         let on_ray = |t: f64| Located::on_ray(ray, t);
-        let (located, normal) = match self.prim(hit.prim) {
-            Prim::Triangle(corners) => (on_ray(triangle::distance_f64(&space, &corners)), triangle::normal(&corners)),
-            Prim::Polygon(p) => (on_ray(polygon::distance_f64(&space, p).unwrap_or(f64::from(hit.t))), p.normal()),
-            Prim::Plane(normal, offset) => (on_ray(plane::distance_f64(&space, normal, offset)), normal),
+        let (located, normal) = match self {
+            Prim::Triangle(corners) => (on_ray(triangle::distance_f64(&space, corners)), triangle::normal(corners)),
+            Prim::Polygon(p) => (on_ray(polygon::distance_f64(&space, *p).unwrap_or(f64::from(hit.t))), p.normal()),
+            Prim::Plane(normal, offset) => (on_ray(plane::distance_f64(&space, *normal, *offset)), *normal),
             Prim::Sphere(s) => {
                 let p = Located::on_ray(ray, f64::from(hit.t));
                 let (arm, normal) = sphere::project(p.position, s.center, s.radius);
@@ -79,22 +94,14 @@ impl Shapes {
         };
         let (position, error) = located.rounded();
         let mut refined = Refined { position, start: position, error, normal, u: hit.u, v: hit.v };
-        if let Prim::Triangle(corners) = self.prim(hit.prim) {
-            let way = inset(&corners, (hit.u, hit.v), error.max_element());
+        if let Prim::Triangle(corners) = self {
+            let way = inset(corners, (hit.u, hit.v), error.max_element());
             if way != DVec3::ZERO {
                 let (start, error) = located.moved(way).rounded();
                 refined = Refined { start, error: error.max(refined.error), ..refined };
             }
         }
         refined
-    }
-
-    /// Weights of the second and third corner where the ray hits triangle `prim`; 0 for other prims.
-    pub(super) fn barycentrics(&self, prim: u32, ray: &RaySpace) -> (f32, f32) {
-        match self.prim(prim) {
-            Prim::Triangle(corners) => triangle::barycentrics(ray, &corners),
-            _ => (0.0, 0.0),
-        }
     }
 }
 
@@ -176,7 +183,7 @@ mod tests {
             let dir = a * (1.0 - u - v) + b * u + c * v - origin;
             let ray = Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude: NO_PRIM, sample: 0 };
             let hit = Hit { t: 1.0, u, v, prim: 0 };
-            assert_eq!(shapes.refine(&ray, &hit), shapes.refine_with_care(&ray, &hit));
+            assert_eq!(shapes.refine(&ray, &hit), shapes.prim(hit.prim).refine_with_care(&ray, &hit));
             placed += usize::from(Facet::of(&shapes.triangle(0)).place(origin, dir, (u, v)).2);
         }
         assert!((1900..2300).contains(&placed), "{placed}");

@@ -331,6 +331,7 @@ fn with_typed(pixels: RenderArgs, inputs: Vec<PathBuf>, typed: &RenderArgs) -> R
         max_memory: typed.max_memory,
         keep_partial: typed.keep_partial,
         no_prune: typed.no_prune,
+        instances: typed.instances,
         heatmap: typed.heatmap.clone(),
         heatmap_max: typed.heatmap_max,
         strict: typed.strict,

@@ -9,7 +9,7 @@ use crate::bench::study::Plan as Study;
 use crate::bench::verify::Plan;
 use crate::generate::Family;
 use crate::image::ToneMap;
-use crate::render::Cost;
+use crate::render::{Cost, Instancing};
 use crate::scene::framing::NamedView;
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -269,6 +269,11 @@ pub(super) struct RenderArgs {
     /// Parameters of the structure
     #[command(flatten)]
     pub params: AccelArgs,
+    /// What becomes of meshes that are shown several times; the picture is the same. `auto` stores them once where that
+    /// saves much memory, `keep` wherever it can, `flatten` never
+    #[arg(long, value_name = "HOW", value_parser = parse::instancing(), default_value = Instancing::Auto.name(),
+          help_heading = "Structure", hide_short_help = true)]
+    pub instances: Instancing,
     /// Do the work of every feature, of those too that the scene lacks (`inspect` lists them); the picture is the same
     #[arg(long, help_heading = "Run", hide_short_help = true)]
     pub no_prune: bool,

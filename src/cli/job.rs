@@ -11,7 +11,7 @@ use super::sequence::{self, Sequence, Step};
 use crate::accel::{AccelChoice, AccelParams, IntersectorKind};
 use crate::image::{ExrSamples, FileKind, PngDepth, ToneMap};
 use crate::load::{Limits, LoadOptions, MtlMode, Polygons};
-use crate::render::Cost;
+use crate::render::{Cost, Instancing};
 use crate::scene::UpAxis;
 use std::path::{Path, PathBuf};
 
@@ -40,6 +40,8 @@ pub(super) struct RenderJob {
     pub intersector: IntersectorKind,
     /// Its parameters.
     pub params: AccelParams,
+    /// What becomes of meshes that are shown several times; flattened where the structure can do nothing else.
+    pub instances: Instancing,
     /// 0: all.
     pub threads: usize,
     /// Whether what the scene does without is done all the same.
@@ -178,6 +180,7 @@ impl RenderJob {
             params: params(&args.params)?,
             accel: args.accel,
             intersector: args.intersector,
+            instances: instances(args)?,
             threads: usize::from(args.threads),
             everything: args.no_prune,
             heatmaps: args.heatmap.clone(),
@@ -192,6 +195,27 @@ impl RenderJob {
             sequence,
             batches,
         })
+    }
+}
+
+/// What the structure and the test can do of what was asked.
+fn instances(args: &RenderArgs) -> Result<Instancing, Wrong> {
+    let able = match args.accel {
+        AccelChoice::Auto => true,
+        AccelChoice::Kind(kind) => kind.keeps_instances(),
+    };
+    let exact = args.intersector == IntersectorKind::Exact;
+    match args.instances {
+        Instancing::Keep if !able => wrong(format!(
+            "--instances keep: {} stores each instance by itself; use --accel fast-octree, fast-bvh or auto",
+            args.accel
+        )),
+        Instancing::Keep if !exact => wrong(format!(
+            "--instances keep goes with the exact test alone, not with --intersector {}",
+            args.intersector
+        )),
+        Instancing::Auto if !(able && exact) => Ok(Instancing::Flatten),
+        how => Ok(how),
     }
 }
 

@@ -5,7 +5,7 @@ use crate::bench::range::{Spacing, values};
 use crate::generate::{Family, MAX_TRIANGLES};
 use crate::image::ToneMap;
 use crate::math::Vec3;
-use crate::render::{Cost, Filter, Quality, UnknownCost};
+use crate::render::{Cost, Filter, Instancing, Quality, UnknownCost};
 use crate::scene::framing::NamedView;
 use crate::scene::{Background, Environment};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -337,6 +337,12 @@ pub(super) fn accel() -> impl TypedValueParser<Value = AccelKind> {
 pub(super) fn accel_choice() -> impl TypedValueParser<Value = AccelChoice> {
     let parse = |name: String| name.parse::<AccelChoice>().map_err(|e| e.to_string());
     PossibleValuesParser::new(AccelChoice::names()).try_map(parse)
+}
+
+/// What may become of meshes that are shown several times.
+pub(super) fn instancing() -> impl TypedValueParser<Value = Instancing> {
+    let parse = |name: String| name.parse::<Instancing>().map_err(|e| e.to_string());
+    PossibleValuesParser::new(Instancing::ALL.map(Instancing::name)).try_map(parse)
 }
 
 /// What may put a shape into a cell.

@@ -11,7 +11,7 @@ use super::stats::{self, PictureStats, Times};
 use super::summary::Summary;
 use super::{accident, again, cost_layers, interrupt, meter, output_name, read, surroundings};
 use crate::accel::AnyAccel;
-use crate::accel::auto::{self, Reason};
+use crate::accel::auto::Reason;
 use crate::image::{FileKind, was_written_by_meshray};
 use crate::load::{Diagnostic, LoadOptions, Loaded};
 use crate::render::texture::TextureStore;
@@ -208,9 +208,9 @@ fn prepare(
             Exit::Input
         })?;
     }
-    let world = World::new(&loaded.scene);
+    let world = World::placing(&loaded.scene, job.instances);
     let world = if job.everything { world.with_everything() } else { world };
-    if world.shapes.is_empty() && !job.allow_empty {
+    if world.is_empty() && !job.allow_empty {
         messages.say(Severity::Error, &nothing_to_draw(&loaded, &batch.inputs[0]));
         return Err(Exit::Input);
     }
@@ -279,7 +279,7 @@ fn render_shot(
     progress.stage("building");
     let start = Instant::now();
     let (accel, reason) = built.get_or_insert_with(|| {
-        let (accel, reason) = auto::build(job.accel, &world.shapes, &job.params);
+        let (accel, reason) = world.structure(job.accel, &job.params);
         (accel.tested_by(job.intersector), reason)
     });
     let (accel, reason) = (&*accel, *reason);

@@ -13,7 +13,7 @@
 //! | `parameters` | of the structure, as used: `leaf_size` (`null`: by step cost); of grids and octrees `grid_density`, `grid_resolution`, `max_depth`, `step_cost`, `grid_cells` (`null`: by density), `max_references`, `assign`, `mailbox` as well |
 //! | `seconds` | of the timed run: `load`, `build`, `render`, `write`; `load` and `build` are 0 for further pictures of one scene |
 //! | `animation` | `null`, or which one is shown: its `number` in the file, and the `time` in seconds |
-//! | `scene` | `triangles`, `polygons`, `spheres`, `cones` (cylinders too), `planes`, `vertices`, `materials`, `textures`, `lights` |
+//! | `scene` | as shown: `triangles`, `polygons`, `spheres`, `cones` (cylinders too), `planes`, `materials`, `textures`, `lights`; as stored: `vertices`, `stored_triangles`, `bytes` of all shapes; `kept_instances`: those of meshes that are stored once |
 //! | `structure` | V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`; `bytes` and `depth` |
 //! | `counts` | for each ray class `primary`, `shadow`, `reflected`, `refracted`, and `all`: exact `rays`, `hits`, `tests`, `steps`, `cells`, `empty_cells`, `volume_tests`, `tests_saved`, `transforms`; and per ray `n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`, `n_xf`; `culled` = 1 − n_it / N |
 //! | `counted_seconds` | time of the second run that counted; never compare it with `seconds` |
@@ -98,7 +98,7 @@ pub(super) fn count(work: &Job, timed: &Rendered, accel: &AnyAccel, messages: &M
         let text = format!("the counted run with {} gave other pixels than the timed one", accel.kind());
         messages.error("counts-differ", text, "please report it with the model");
     }
-    let prims = work.world.shapes.len() as u64;
+    let prims = work.world.len() as u64;
     Counted { counts: counted.counts, seconds: start.elapsed().as_secs_f64(), prims }
 }
 
@@ -173,6 +173,7 @@ impl PictureStats {
         let samples = (settings.sampling == Sampling::Uniform).then_some(settings.samples);
         let sampling = sampling::json(settings, facts.sampled);
         let (scene, shapes) = (&facts.loaded.scene, &world.shapes);
+        let kept_vertices: usize = world.kept.objects().iter().map(|o| o.shapes().vertices.len()).sum();
         let json = json!({
             "schema": "meshray-stats/1", "version": super::version::SHORT,
             "inputs": facts.inputs(),
@@ -189,9 +190,12 @@ impl PictureStats {
             "threads": rayon::current_num_threads(),
             "seconds": { "load": times.load, "build": times.build, "render": times.render, "write": times.write },
             "scene": {
-                "triangles": shapes.triangles.len(), "polygons": shapes.polygons.len(),
+                "triangles": world.triangles(), "polygons": shapes.polygons.len(),
                 "spheres": shapes.spheres.len(), "cones": shapes.cones.len(), "planes": shapes.planes.len(),
-                "vertices": shapes.vertices.len(),
+                "vertices": shapes.vertices.len() + kept_vertices,
+                "kept_instances": world.kept.placed().len(),
+                "stored_triangles": shapes.triangles.len() + world.kept.stored(),
+                "bytes": world.bytes(),
                 "materials": scene.materials.len(), "textures": scene.textures.len(), "lights": scene.lights.len(),
             },
             "structure": {
@@ -225,6 +229,11 @@ impl PictureStats {
         let shapes = shapes.map(|k| (number("scene", k), k)).into_iter().filter(|(n, _)| *n > 0.0);
         let shapes: Vec<String> = shapes.map(|(n, k)| format!("{} {k}", short(n))).collect();
         lines.push(format!("  scene      {}", shapes.join("  ")));
+        let scene = |key| short(number("scene", key));
+        if number("scene", "kept_instances") > 0.0 {
+            let (kept, stored) = (scene("kept_instances"), scene("stored_triangles"));
+            lines.push(format!("  stored     {stored} triangles  bytes {}  {kept} instances kept", scene("bytes")));
+        }
         let names = ["n_in", "n_v", "n_ev", "n_oiv", "bytes"].map(|k| format!("{k} {}", short(number("structure", k))));
         lines.push(format!("  structure  {}", names.join("  ")));
         if let Some(why) = get("auto")["why"].as_str() {

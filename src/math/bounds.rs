@@ -199,6 +199,25 @@ pub const PARALLEL: f32 = 1.0 / (1u32 << 30) as f32;
 /// over a direction's component is above 2⁻⁹⁴.
 pub const BOX_RANGE: f32 = (1u64 << 36) as f32;
 
+/// As [`BOX_PAD`], for a ray that was carried into the frame of an object: its origin is rounded there, and its direction,
+/// u |o| and, as far as the boxes reach, u (E + |o|) more.
+pub const PLACED_PAD: f32 = BOX_PAD + 2.0 * U32;
+
+/// What is added besides on every axis, in parts of E + |o|: what [`PARALLEL`] needs, and what carrying errs by in `f64`.
+/// With C ≤ [`PLACED_CONDITION`], a difference, three products and two sums err by less than 5 · 2⁻⁵³ C |o| in the origin,
+/// the same without the difference in the direction: 2⁻³⁴ (E + |o|) together.
+pub const PLACED_DRIFT: f32 = 2.0 * PARALLEL;
+
+/// The largest condition of a matrix by which rays are carried, in the maximum norm: how much longer some directions become
+/// than others.
+pub const PLACED_CONDITION: f64 = (1u64 << 16) as f64;
+
+/// How much larger or smaller an object may become where it stands, so that ordinary rays stay within [`BOX_RANGE`].
+pub const PLACED_SCALE: f64 = (1u64 << 24) as f64;
+
+/// How far rounding may move corners, in parts of the object's size: more than this, and boxes would cull little.
+pub const PLACED_ROOM: f32 = 1.0 / 1024.0;
+
 /// How far from the edges of its face a secondary ray starts, in units of the error of its position.
 ///
 /// [`offset_origin`] leaves the face by at most 3 errors. A face that rises from the edge at an angle α is at that

@@ -21,6 +21,7 @@ mod draws;
 pub mod everything;
 mod eyes;
 mod frame;
+mod keeping;
 mod layers;
 mod observer;
 pub mod optics;
@@ -49,6 +50,7 @@ pub mod world;
 
 pub use costs::{Cost, Costs, UnknownCost, render_costs};
 pub use eyes::ThinLens;
+pub use keeping::{Instancing, UnknownInstancing};
 pub use observer::{Asked, Question, Tape};
 pub use profile::{Profile, render_profiled};
 pub use sampling::{Adaptive, ErrorSpace, Filter, Quality, Sampled, Sampling, Stochastic};
@@ -149,7 +151,7 @@ pub struct Job<'a> {
     pub scene: &'a Scene,
     /// The same scene placed for tracing.
     pub world: &'a World,
-    /// The structure built over `world.shapes`.
+    /// The structure built over the world ([`World::structure`]).
     pub accel: &'a AnyAccel<'a>,
     /// The scene's textures.
     pub textures: &'a TextureStore<'a>,

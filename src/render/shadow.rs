@@ -142,7 +142,7 @@ impl Shadows {
                 arrive(tag, *light);
                 return false;
             }
-            if !after.get(i).is_some_and(|before| is_same_crossing(&context.world.shapes, ray, before, hit)) {
+            if !after.get(i).is_some_and(|before| is_same_crossing(|prim| context.world.prim(prim), ray, before, hit)) {
                 *light *= filter_at(context, ray, hit, inside);
             }
             let goes_on = light.max_element() > 0.0;

@@ -130,7 +130,7 @@ fn parent(job: &Job, queries: &[Query], i: usize) -> Option<usize> {
         _ if query.class == Class::Primary => None,
         _ => queries.iter().enumerate().position(|(k, q)| {
             let could = k != i && q.class != Class::Shadow && q.hit.is_some();
-            could && job.world.shapes.refine(&q.ray, &q.hit).origin(query.ray.dir) == query.ray.origin
+            could && job.world.refine(&q.ray, &q.hit).origin(query.ray.dir) == query.ray.origin
         }),
     }
 }

@@ -70,9 +70,9 @@ impl<'a> Target<'a> {
     fn vertices(&self, world: &World, corners: [u32; 3], mesh: &Mesh) -> [Vec3; 3] {
         let shapes = &world.shapes;
         match self.source {
-            PrimSource::Triangle { .. } => shapes.triangle(self.prim),
+            PrimSource::Triangle { .. } => world.triangle(self.prim),
             _ => {
-                let (first, _) = shapes.polygons[self.prim as usize - shapes.triangles.len()];
+                let (first, _) = world.polygon(self.prim);
                 let (own_first, _) = polygon_run(mesh, self.source);
                 let base = shapes.polygon_corners[first as usize] - mesh.polygon_corners[own_first as usize];
                 corners.map(|i| shapes.vertices[(i + base) as usize])
@@ -100,7 +100,7 @@ fn polygon_run(mesh: &Mesh, source: PrimSource) -> (u32, u32) {
 fn fan_triangle(mesh: &Mesh, world: &World, prim: u32, source: PrimSource, position: Vec3) -> ([u32; 3], [f32; 3]) {
     let shapes = &world.shapes;
     let (first, len) = polygon_run(mesh, source);
-    let (world_first, _) = shapes.polygons[prim as usize - shapes.triangles.len()];
+    let (world_first, _) = world.polygon(prim);
     let corner = |i: u32| shapes.vertices[shapes.polygon_corners[(world_first + i) as usize] as usize];
     let mut best = ([first; 3], [1.0, 0.0, 0.0], f32::NEG_INFINITY);
     for i in 1..len.saturating_sub(1) {
@@ -144,7 +144,7 @@ pub(crate) struct Surface<'a> {
 impl<'a> Surface<'a> {
     /// The surface at `hit` of `ray` whose cone is `width` wide there.
     pub(crate) fn new(world: &World, target: Target<'a>, ray: &Ray, hit: &Hit, width: f32) -> Self {
-        let refined = world.shapes.refine(ray, hit);
+        let refined = world.refine(ray, hit);
         let view = -ray.dir.try_normalize().unwrap_or(Vec3::Z);
         let patch = target.patch(world, refined.u, refined.v, refined.position);
 

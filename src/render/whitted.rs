@@ -148,7 +148,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
                 let (ray, path, hit) = (&wave.rays[i], &wave.paths[i], &wave.hits[i]);
                 if !hit.is_some() {
                     self.leave(ray, path);
-                } else if is_same_crossing(&self.context.world.shapes, ray, &wave.after[i], hit) {
+                } else if is_same_crossing(|prim| self.context.world.prim(prim), ray, &wave.after[i], hit) {
                     self.continuing[class as usize].push(*ray, *path, *hit);
                 } else {
                     self.shade(class, ray, path, hit);

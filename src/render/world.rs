@@ -1,21 +1,31 @@
-//! The scene as the structures see it: every instance's shapes in one centred `f32` frame, and the way back from a prim
-//! to what it came from.
+//! The scene as the structures see it: every instance's shapes in one centred `f32` frame, but for what is kept as objects
+//! that stand in several places; and the way back from a prim to what it came from.
+//!
+//! Prims have the numbers of the flattened scene, whether or not anything is kept.
 
-use crate::accel::{BitSet, Cone, Shapes, SpherePrim};
+use super::keeping::{self, Instancing, Keeping};
+use crate::accel::auto::{self, Reason};
+use crate::accel::instances::{Spot, placed};
+use crate::accel::refine::Refined;
+use crate::accel::shapes::Prim;
+use crate::accel::{AccelChoice, AccelParams, AnyAccel, BitSet, Cone, Hit, Kept, Ray, Shapes, SpherePrim};
 use crate::math::frame::snapped_center;
+use crate::math::triangle::Triangle;
 use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 use crate::scene::{Mesh, Scene};
 use rayon::prelude::*;
 
-/// A [`Scene`] flattened for tracing. World position = `center` + position in [`Shapes`].
+/// A [`Scene`] placed for tracing. World position = `center` + position in [`Shapes`].
 #[derive(Clone, Debug)]
 pub struct World {
     /// What was subtracted from every world position, in `f64`, before rounding.
     pub center: DVec3,
     /// Box of everything but planes, world space; `lo > hi` when there is nothing.
     pub bounds: (DVec3, DVec3),
-    /// Every shape, centred.
+    /// Every shape that is not kept, centred; all of them where nothing is kept.
     pub shapes: Shapes,
+    /// What is stored once and stands in several places.
+    pub kept: Kept,
     /// First prim of each instance's triangles, and one past the last.
     first_triangle: Vec<u32>,
     /// First polygon (counted from 0) of each instance, and one past the last.
@@ -70,29 +80,41 @@ pub enum PrimSource {
 }
 
 impl World {
-    /// Places every shape of the scene in the world, finds the centre and rounds once.
+    /// Places every shape of the scene in the world, each instance by itself, finds the centre and rounds once.
     pub fn new(scene: &Scene) -> Self {
+        Self::placing(scene, Instancing::Flatten)
+    }
+
+    /// The same, but for meshes with several instances, with which `how` is dealt: rays hit the same prims at the same
+    /// distances.
+    pub fn placing(scene: &Scene, how: Instancing) -> Self {
         let bounds = bounds(scene);
         let center = snapped_center(bounds.0, bounds.1);
         let mut shapes = Shapes::default();
         let (mut first_triangle, mut first_polygon) = (Vec::new(), Vec::new());
+        let opaque: Vec<bool> = scene.materials.iter().map(crate::scene::Material::is_opaque).collect();
+        let Keeping { mut kept, places } = Keeping::of(scene, how, &opaque, |m| centered(m, center));
 
         // Triangles and polygons, instance by instance, so that prim ids follow the file's order.
-        for instance in &scene.instances {
+        for (instance, place) in scene.instances.iter().zip(places) {
             let mesh = &scene.meshes[instance.mesh as usize];
+            first_triangle.push(index(shapes.triangles.len()) + kept.shown());
+            first_polygon.push(index(shapes.polygons.len()));
+            if let Some((object, place)) = place {
+                kept.put(object, index(shapes.triangles.len()) + kept.shown(), place);
+                continue;
+            }
             let base = index(shapes.vertices.len());
             shapes.face_runs.push([index(shapes.triangles.len()), index(shapes.polygons.len())]);
             let to_frame = centered(&instance.world_from_object, center);
-            let place = |p: &Vec3| to_frame.transform_point3(p.as_dvec3()).as_vec3();
+            let place = |p: &Vec3| placed(&to_frame, *p);
             shapes.vertices.par_extend(mesh.positions.par_iter().with_min_len(PARALLEL_RUN).map(place));
-            first_triangle.push(index(shapes.triangles.len()));
             shapes.triangles.extend(mesh.triangles.iter().map(|t| t.map(|i| i + base)));
-            first_polygon.push(index(shapes.polygons.len()));
             let corners = index(shapes.polygon_corners.len());
             shapes.polygons.extend(mesh.polygons.iter().map(|p| (p.first + corners, p.len)));
             shapes.polygon_corners.extend(mesh.polygon_corners.iter().map(|i| i + base));
         }
-        first_triangle.push(index(shapes.triangles.len()));
+        first_triangle.push(index(shapes.triangles.len()) + kept.shown());
         first_polygon.push(index(shapes.polygons.len()));
 
         #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what this does")]
@@ -114,21 +136,72 @@ impl World {
         }
 
         let placements = scene.instances.iter().map(|i| Placement::new(i.world_from_object.matrix3)).collect();
-        let mut world = Self { center, bounds, shapes, first_triangle, first_polygon, placements };
-        world.shapes.opaque = world.opaque_bits(scene);
+        let mut world = Self { center, bounds, shapes, kept, first_triangle, first_polygon, placements };
+        world.shapes.opaque = world.opaque_bits(scene, &opaque);
         world
+    }
+
+    /// The structure that was asked for over everything, and the reason where there was a choice.
+    pub fn structure(&self, choice: AccelChoice, params: &AccelParams) -> (AnyAccel<'_>, Option<Reason>) {
+        auto::build_with(choice, &self.shapes, &self.kept, params)
+    }
+
+    /// Number of prims of all kinds, those of an object once for each place where it stands.
+    pub fn len(&self) -> usize {
+        self.shapes.len() + self.kept.shown() as usize
+    }
+
+    /// Whether there is nothing to hit.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Number of triangles, likewise: the lowest prims.
+    pub fn triangles(&self) -> u32 {
+        index(self.shapes.triangles.len()) + self.kept.shown()
+    }
+
+    /// Bytes of the shapes as they are stored.
+    pub fn bytes(&self) -> usize {
+        keeping::bytes(&self.shapes, &self.kept)
+    }
+
+    /// What prim `prim` is, in the centred frame.
+    #[inline]
+    pub fn prim(&self, prim: u32) -> Prim<'_> {
+        self.kept.prim(&self.shapes, prim)
+    }
+
+    /// The corners of triangle `prim`, in the centred frame.
+    #[inline]
+    pub fn triangle(&self, prim: u32) -> Triangle {
+        match self.kept.find(prim) {
+            Spot::Stored(prim) => self.shapes.triangle(prim),
+            Spot::Placed(placed, triangle) => self.kept.triangle(placed, triangle),
+        }
+    }
+
+    /// First corner and length of polygon `prim` among the corners of all polygons of [`Self::shapes`].
+    pub(crate) fn polygon(&self, prim: u32) -> (u32, u32) {
+        self.shapes.polygons[(prim - self.triangles()) as usize]
+    }
+
+    /// Position, error bound, normal and weights of a hit that a query found on `ray`.
+    pub fn refine(&self, ray: &Ray, hit: &Hit) -> Refined {
+        self.prim(hit.prim).refine(ray, hit)
     }
 
     /// The same, in which every prim is asked what light it lets through (see [`everything`](super::everything)).
     #[must_use]
     pub fn with_everything(mut self) -> Self {
         self.shapes.opaque = BitSet::filled(self.shapes.len(), false);
+        self.kept.set_opaque(false);
         self
     }
 
     /// What prim `prim` came from.
     pub fn source(&self, prim: u32) -> PrimSource {
-        let (triangles, polygons) = (index(self.shapes.triangles.len()), index(self.shapes.polygons.len()));
+        let (triangles, polygons) = (self.triangles(), index(self.shapes.polygons.len()));
         let (spheres, cones) = (index(self.shapes.spheres.len()), index(self.shapes.cones.len()));
         let owner = |first: &[u32], i: u32| index(first.partition_point(|&f| f <= i) - 1);
         if prim < triangles {
@@ -163,8 +236,8 @@ impl World {
         &self.placements[instance as usize]
     }
 
-    fn opaque_bits(&self, scene: &Scene) -> BitSet {
-        let opaque: Vec<bool> = scene.materials.iter().map(crate::scene::Material::is_opaque).collect();
+    /// Of what is not kept.
+    fn opaque_bits(&self, scene: &Scene, opaque: &[bool]) -> BitSet {
         let mut bits = BitSet::filled(self.shapes.len(), true);
         if opaque.iter().all(|&o| o) {
             return bits;
@@ -174,13 +247,16 @@ impl World {
         for (i, instance) in scene.instances.iter().enumerate() {
             if !opaque[scene.meshes[instance.mesh as usize].material as usize] {
                 let polygons = self.first_polygon[i] + first_polygon..self.first_polygon[i + 1] + first_polygon;
-                let prims = (self.first_triangle[i]..self.first_triangle[i + 1]).chain(polygons);
-                prims.for_each(|prim| bits.set(prim, false));
+                let triangles = match self.kept.find(self.first_triangle[i]) {
+                    Spot::Stored(first) => first..first + (self.first_triangle[i + 1] - self.first_triangle[i]),
+                    Spot::Placed(..) => 0..0,
+                };
+                triangles.chain(polygons).for_each(|prim| bits.set(prim, false));
             }
         }
         let others = first_polygon + index(self.shapes.polygons.len());
         for prim in others..index(self.shapes.len()) {
-            bits.set(prim, opaque[self.material(scene, prim) as usize]);
+            bits.set(prim, opaque[self.material(scene, self.kept.number(prim)) as usize]);
         }
         bits
     }

@@ -10,6 +10,7 @@ mod endings;
 mod explain;
 mod formats;
 mod generate;
+mod instances;
 mod interrupt;
 mod messages;
 mod other_commands;

@@ -14,6 +14,8 @@
 //! is anything else, or somebody counts, they go one by one through whatever there is (`walk`). Hits are ordered by (t, prim)
 //! and every test gives an exact verdict, so that neither the order of visits nor the company of other rays can change an
 //! answer. Counts are those of one ray at a time: whoever listens gets that.
+//!
+//! An object that stands in several places has a tree in its own frame, through which rays go one by one (`placed`).
 
 mod alone;
 mod best;
@@ -27,6 +29,7 @@ mod margins;
 mod node;
 mod packet;
 mod padded;
+mod placed;
 mod ready;
 mod settle;
 mod slabs;
@@ -46,7 +49,8 @@ use self::flight::{DEPTH, Flight, InFlight};
 use self::node::Tree;
 use self::packet::InPackets;
 use self::slabs::{BoxMargins, Derived};
-use self::walk::{OneByOne, Stack, Walk};
+pub(super) use self::walk::Stack;
+use self::walk::{OneByOne, Walk};
 use super::query::{Culling, Goal, Query};
 use super::wave::Wave;
 use super::{NoProbe, Probe, Shapes};

@@ -32,6 +32,11 @@ pub struct Stack {
 }
 
 impl Stack {
+    /// How many children of one ray it can hold.
+    pub(in crate::accel) fn len(&self) -> usize {
+        self.entries.len()
+    }
+
     /// For walks down `tree`.
     pub(super) fn new(tree: &Tree) -> Self {
         let most = tree.most_behind();

@@ -26,7 +26,7 @@ pub(super) struct Place<'a> {
 pub(super) fn place<'a>(loaded: &'a Loaded, world: &World, query: &Query) -> Option<Place<'a>> {
     let scene = &loaded.scene;
     query.hit.is_some().then(|| {
-        let refined = world.shapes.refine(&query.ray, &query.hit);
+        let refined = world.refine(&query.ray, &query.hit);
         let material = scene.materials.get(world.material(scene, query.hit.prim) as usize);
         Place {
             object: object(scene, world, query.hit.prim),

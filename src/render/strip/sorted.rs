@@ -105,7 +105,7 @@ impl Face {
         if !mesh.colors.is_empty() {
             return None;
         }
-        let corners = world.shapes.triangle(prim);
+        let corners = world.triangle(prim);
         let facet = Facet::of(&corners);
         let winding = facet.flat.unit();
         if !winding.is_normalized() {

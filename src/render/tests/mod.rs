@@ -5,6 +5,7 @@ mod bits;
 mod costs;
 mod glass;
 mod gloss;
+mod instances;
 mod light;
 mod mirrors;
 mod round;

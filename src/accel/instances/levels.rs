@@ -1,0 +1,227 @@
+//! The structure of two levels: a tree for each object, and one over the places where they stand.
+
+use super::{Kept, Placed, Spot};
+use crate::accel::bvh::tree::{Below, Stack as PlaceStack, Tree as PlaceTree};
+use crate::accel::intersector::Exact;
+use crate::accel::query::{Closest, Culling, Goal, Next, Occluded, Query};
+use crate::accel::slabs::BoxRay;
+use crate::accel::stats::listed_once;
+use crate::accel::wide::split::Item;
+use crate::accel::wide::{Splitting, Stack};
+use crate::accel::{Accel, Hit, NO_PRIM, Probe, Ray, Shapes, StructureStats, Wide};
+use crate::math::aabb::Aabb;
+use rayon::prelude::*;
+
+/// What is not kept in a tree of its own, as ever; each kept object in one; and a hierarchy of boxes over the places.
+///
+/// Prims have the numbers of the flattened scene, in rays and in hits.
+#[derive(Clone, Debug)]
+pub struct TwoLevel<'a> {
+    kept: &'a Kept,
+    /// Over what is not kept.
+    stored: Wide<'a>,
+    /// Over each object, in its own frame.
+    objects: Vec<Wide<'a>>,
+    /// Over the places, by their numbers. Its root is node 0; there is none without places.
+    places: PlaceTree,
+}
+
+/// What walks through both levels write to.
+#[derive(Debug)]
+pub struct LevelScratch {
+    stored: Stack,
+    places: PlaceStack,
+    object: Option<Stack>,
+    rays: Vec<Ray>,
+    after: Vec<Hit>,
+}
+
+impl<'a> TwoLevel<'a> {
+    /// Builds all trees; the same for every number of threads.
+    pub fn build(shapes: &'a Shapes, kept: &'a Kept, splitting: Splitting) -> Self {
+        let objects = kept.objects().par_iter().map(|o| Wide::build(o.shapes(), splitting)).collect();
+        let mut items: Vec<Item> = (0..).zip(kept.placed()).map(|(i, p)| Item::new(p.place.bounds, i)).collect();
+        let mut places = PlaceTree::default();
+        if !items.is_empty() {
+            places.add(&mut items, 1);
+        }
+        Self { kept, stored: Wide::build(shapes, splitting), objects, places }
+    }
+
+    /// What is not kept.
+    pub fn shapes(&self) -> &Shapes {
+        self.stored.shapes()
+    }
+
+    /// Sizes of all trees together, each counted once; depths are added up.
+    pub fn summary(&self) -> StructureStats {
+        let mut sum = self.stored.summary();
+        let (mut above, mut below) = (0, sum.depth);
+        sum.bytes += self.places.bytes() as u64;
+        if !self.kept.is_empty() {
+            self.places.each(0, 0, &mut |_, depth, node| match node {
+                Below::Children(_) => sum.n_in += 1,
+                Below::Leaf(_) => above = above.max(depth + 1),
+            });
+        }
+        for stats in self.objects.iter().map(Wide::summary) {
+            sum.n_in += stats.n_in;
+            sum.n_v += stats.n_v;
+            sum.n_oiv += stats.n_oiv;
+            sum.bytes += stats.bytes;
+            below = below.max(above + stats.depth);
+        }
+        sum.depth = below;
+        sum
+    }
+
+    /// Visits everything: each tree holds what it should, each place is in one leaf, and each placed corner is in the boxes
+    /// above the places and, carried back, no farther from itself than boxes are widened.
+    pub fn check(&self) -> Result<StructureStats, String> {
+        self.stored.check()?;
+        for (i, object) in self.objects.iter().enumerate() {
+            object.check().map_err(|e| format!("object {i}: {e}"))?;
+        }
+        let mut leaves = vec![0u32; self.kept.placed().len()];
+        let mut failure = None;
+        if !self.kept.is_empty() {
+            self.places.each(0, 0, &mut |node, _, below| {
+                let content = match below {
+                    Below::Children(children) => {
+                        children.into_iter().fold(Aabb::EMPTY, |b, c| b.union(*self.places.bounds(c)))
+                    }
+                    Below::Leaf(places) => places.iter().fold(Aabb::EMPTY, |b, &i| {
+                        leaves[i as usize] += 1;
+                        b.union(self.kept.placed()[i as usize].place.bounds)
+                    }),
+                };
+                let bounds = *self.places.bounds(node);
+                if bounds.union(content) != bounds {
+                    failure = Some(format!("node {node} of the places is {bounds:?}, below it is {content:?}"));
+                }
+            });
+        }
+        failure.map_or_else(|| listed_once(&leaves, "leaves of places"), Err)?;
+        for (i, placed) in self.kept.placed().iter().enumerate() {
+            self.holds(placed).map_err(|e| format!("place {i}: {e}"))?;
+        }
+        Ok(self.summary())
+    }
+
+    fn holds(&self, Placed { object, place, .. }: &Placed) -> Result<(), String> {
+        for &corner in &self.kept.objects()[*object as usize].shapes().vertices {
+            let there = place.corner(corner);
+            let off = (place.carried(there) - corner.as_dvec3()).abs();
+            let outside = place.bounds.union(Aabb { lo: there, hi: there }) != place.bounds;
+            if outside || off.cmpgt(place.room.as_dvec3()).any() {
+                let (bounds, room) = (place.bounds, place.room);
+                return Err(format!("{corner} stands at {there} in {bounds:?}, {off} from itself of {room}"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Goes on with a query that knows what is stored, through the objects where they stand.
+    fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, scratch: &mut LevelScratch, probe: &mut P) {
+        let (false, Some(stack)) = (self.kept.is_empty(), &mut scratch.object) else { return };
+        let ray = BoxRay::new(query);
+        self.places.walk(0, &ray, query, &mut scratch.places, probe, |places, query, probe| {
+            places.iter().any(|&i| {
+                let placed = &self.kept.placed()[i as usize];
+                let wanted = !G::ANY || self.kept.objects()[placed.object as usize].opaque;
+                let tree = &self.objects[placed.object as usize];
+                wanted && tree.walk_placed(&placed.place, placed.first, query, stack, probe)
+            })
+        });
+    }
+
+    /// Asks for hits behind what is known of each ray, and puts what comes before it in its place.
+    fn go_on<G: Goal, P: Probe>(
+        &self,
+        rays: &[Ray],
+        hits: &mut [Hit],
+        scratch: &mut LevelScratch,
+        probe: &mut P,
+        query: impl Fn(usize, &Hit) -> (f32, G),
+    ) {
+        for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
+            let known = Hit { prim: self.kept.number(hit.prim), ..*hit };
+            let (t_min, goal) = query(i, &known);
+            let (mut query, usable) = Query::new(self.stored.shapes(), ray, t_min, goal);
+            if usable {
+                self.walk(&mut query, scratch, probe);
+            }
+            *hit = query.hit_by_winner().unwrap_or(known);
+            if hit.is_some() && !known.is_some() {
+                probe.found();
+            }
+        }
+    }
+
+    /// The rays as the tree of what is stored knows them: by the numbers that prims have there.
+    fn renumber(&self, rays: &[Ray], renumbered: &mut Vec<Ray>) {
+        renumbered.clear();
+        renumbered.extend(rays.iter().map(|ray| match self.kept.find(ray.exclude) {
+            Spot::Stored(exclude) => Ray { exclude, ..*ray },
+            Spot::Placed(..) => Ray { exclude: NO_PRIM, ..*ray },
+        }));
+    }
+
+    /// A hit such that the same stored prims come after it as after `after`.
+    fn after(&self, after: &Hit) -> Hit {
+        match self.kept.find(after.prim) {
+            Spot::Stored(prim) => Hit { prim, ..*after },
+            // After the last stored prim with a lower number; where there is none, after everything nearer.
+            Spot::Placed(placed, _) => match placed.before.checked_sub(1) {
+                Some(prim) => Hit { prim, ..*after },
+                None => Hit { prim: NO_PRIM, t: after.t.next_down(), ..*after },
+            },
+        }
+    }
+}
+
+impl Accel for TwoLevel<'_> {
+    type Scratch = LevelScratch;
+
+    fn scratch(&self) -> LevelScratch {
+        let deepest = self.objects.iter().map(Wide::new_scratch).max_by_key(Stack::len);
+        LevelScratch {
+            stored: self.stored.new_scratch(),
+            places: PlaceStack::default(),
+            object: deepest,
+            rays: Vec::new(),
+            after: Vec::new(),
+        }
+    }
+
+    fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut LevelScratch, probe: &mut P) {
+        self.renumber(rays, &mut scratch.rays);
+        self.stored.closest(&scratch.rays, hits, &mut scratch.stored, probe);
+        self.go_on(rays, hits, scratch, probe, |i, known| (rays[i].t_min, Closest::before(known, Exact)));
+    }
+
+    fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut LevelScratch, probe: &mut P) {
+        self.renumber(rays, &mut scratch.rays);
+        self.stored.occluded(&scratch.rays, blocked, &mut scratch.stored, probe);
+        for (ray, blocked) in rays.iter().zip(blocked).filter(|(_, blocked)| !**blocked) {
+            let (mut query, usable) = Query::new(self.stored.shapes(), ray, ray.t_min, Occluded::nothing(Exact));
+            if usable {
+                self.walk(&mut query, scratch, probe);
+            }
+            *blocked = query.goal.found;
+            if *blocked {
+                probe.found();
+            }
+        }
+    }
+
+    fn next<P: Probe>(&self, rays: &[Ray], after: &[Hit], hits: &mut [Hit], scratch: &mut LevelScratch, probe: &mut P) {
+        self.renumber(rays, &mut scratch.rays);
+        scratch.after.clear();
+        scratch.after.extend(after.iter().map(|after| self.after(after)));
+        self.stored.next(&scratch.rays, &scratch.after, hits, &mut scratch.stored, probe);
+        self.go_on(rays, hits, scratch, probe, |i, known| {
+            (rays[i].t_min.max(after[i].t), Next::between(&after[i], known, Exact))
+        });
+    }
+}

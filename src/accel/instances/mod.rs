@@ -1,0 +1,187 @@
+//! Objects that are stored once and stand in several places.
+//!
+//! A scene may show a mesh a thousand times. Flattened, it is stored a thousand times; kept, its triangles and the tree
+//! over them are stored once ([`Object`]), and [`TwoLevel`] holds a tree over the places where they stand. What is hit is
+//! the same bit for bit, for a triangle that a ray comes near is put into the scene's frame by the function that
+//! flattening uses ([`placed`]), and is tested there. Only boxes are asked in the object's own frame ([`Place`] has
+//! the proof that this loses no hit).
+//!
+//! Prims have the numbers of the flattened scene: [`Kept::find`] leads from there to what is stored.
+
+mod levels;
+mod place;
+#[cfg(test)]
+mod tests;
+
+pub use levels::{LevelScratch, TwoLevel};
+pub use place::{Place, placed};
+
+use super::shapes::Prim;
+use super::{NO_PRIM, Shapes};
+use crate::math::triangle::Triangle;
+
+/// Triangles in a frame of their own.
+#[derive(Clone, Debug)]
+pub struct Object {
+    /// Vertices that triangles use, and triangles; nothing else.
+    shapes: Shapes,
+    /// Whether all of it stops light.
+    pub opaque: bool,
+}
+
+impl Object {
+    /// Of `vertices`, those that no triangle uses are left out. One triangle at least; indices are within range.
+    pub fn new(vertices: &[crate::math::Vec3], triangles: &[[u32; 3]], opaque: bool) -> Self {
+        let mut used = vec![false; vertices.len()];
+        triangles.iter().flatten().for_each(|&i| used[i as usize] = true);
+        let mut before = 0;
+        let place = |&used: &bool| {
+            before += u32::from(used);
+            before - u32::from(used)
+        };
+        let moved: Vec<u32> = used.iter().map(place).collect();
+        let shapes = Shapes {
+            vertices: vertices.iter().zip(&used).filter(|(_, used)| **used).map(|(v, _)| *v).collect(),
+            triangles: triangles.iter().map(|t| t.map(|i| moved[i as usize])).collect(),
+            ..Shapes::default()
+        };
+        Self { shapes, opaque }
+    }
+
+    /// The triangles.
+    pub fn shapes(&self) -> &Shapes {
+        &self.shapes
+    }
+}
+
+/// An object where it stands.
+#[derive(Clone, Debug)]
+pub struct Placed {
+    /// Index into [`Kept::objects`].
+    pub object: u32,
+    /// The number of its first triangle among the prims of the scene; the others follow.
+    pub first: u32,
+    /// Stored prims with lower numbers.
+    before: u32,
+    /// How it stands there.
+    pub place: Place,
+}
+
+/// Everything that is kept; nothing by default.
+#[derive(Clone, Debug, Default)]
+pub struct Kept {
+    objects: Vec<Object>,
+    /// By their first prims, ascending.
+    placed: Vec<Placed>,
+    /// Triangles of all that are placed.
+    shown: u32,
+}
+
+/// What a prim of the scene is.
+#[derive(Clone, Copy, Debug)]
+pub enum Spot<'k> {
+    /// A prim of the shapes in the scene's frame, by its number there.
+    Stored(u32),
+    /// A triangle of an object, by its number there.
+    Placed(&'k Placed, u32),
+}
+
+impl Kept {
+    /// Adds an object that stands nowhere yet; its index.
+    pub fn add(&mut self, object: Object) -> u32 {
+        self.objects.push(object);
+        index(self.objects.len()) - 1
+    }
+
+    /// Puts an object somewhere; places come in the order of their first prims. `first` is that of this one.
+    pub fn put(&mut self, object: u32, first: u32, place: Place) {
+        self.placed.push(Placed { object, first, before: first - self.shown, place });
+        self.shown += self.count(object);
+    }
+
+    /// Whether nothing is.
+    pub fn is_empty(&self) -> bool {
+        self.placed.is_empty()
+    }
+
+    /// What is stored once.
+    pub fn objects(&self) -> &[Object] {
+        &self.objects
+    }
+
+    /// Where all of it stands.
+    pub fn placed(&self) -> &[Placed] {
+        &self.placed
+    }
+
+    /// Triangles that are shown, those of an object once for each place.
+    pub fn shown(&self) -> u32 {
+        self.shown
+    }
+
+    /// Triangles that are stored.
+    pub fn stored(&self) -> usize {
+        self.objects.iter().map(|o| o.shapes.triangles.len()).sum()
+    }
+
+    /// Bytes of vertices, triangles and places.
+    pub fn bytes(&self) -> usize {
+        let shapes = |o: &Object| size_of_val(&*o.shapes.vertices) + size_of_val(&*o.shapes.triangles);
+        self.objects.iter().map(shapes).sum::<usize>() + size_of_val(&*self.placed)
+    }
+
+    fn count(&self, object: u32) -> u32 {
+        index(self.objects[object as usize].shapes.triangles.len())
+    }
+
+    /// What prim `prim` of the scene is. [`NO_PRIM`] is stored as itself.
+    #[inline]
+    pub fn find(&self, prim: u32) -> Spot<'_> {
+        if self.placed.is_empty() || prim == NO_PRIM {
+            return Spot::Stored(prim);
+        }
+        self.find_among(prim)
+    }
+
+    #[inline(never)]
+    fn find_among(&self, prim: u32) -> Spot<'_> {
+        let behind = self.placed.partition_point(|p| p.first <= prim);
+        let Some(placed) = behind.checked_sub(1).map(|i| &self.placed[i]) else { return Spot::Stored(prim) };
+        let (triangle, count) = (prim - placed.first, self.count(placed.object));
+        if triangle < count { Spot::Placed(placed, triangle) } else { Spot::Stored(placed.before + (triangle - count)) }
+    }
+
+    /// The number among the prims of the scene of a stored one.
+    #[inline]
+    pub fn number(&self, stored: u32) -> u32 {
+        let behind = if stored == NO_PRIM { 0 } else { self.placed.partition_point(|p| p.before <= stored) };
+        match behind.checked_sub(1).map(|i| &self.placed[i]) {
+            Some(placed) => placed.first + self.count(placed.object) + (stored - placed.before),
+            None => stored,
+        }
+    }
+
+    /// Triangle `triangle` of an object where it stands.
+    pub fn triangle(&self, placed: &Placed, triangle: u32) -> Triangle {
+        self.objects[placed.object as usize].shapes.triangle(triangle).map(|corner| placed.place.corner(corner))
+    }
+
+    /// What prim `prim` of the scene is, in the scene's frame; `shapes` are those that are not kept.
+    #[inline]
+    pub fn prim<'a>(&self, shapes: &'a Shapes, prim: u32) -> Prim<'a> {
+        match self.find(prim) {
+            Spot::Stored(prim) => shapes.prim(prim),
+            Spot::Placed(placed, triangle) => Prim::Triangle(self.triangle(placed, triangle)),
+        }
+    }
+
+    /// What was not opaque for a while is again, or the other way round: all objects at once.
+    pub fn set_opaque(&mut self, opaque: bool) {
+        self.objects.iter_mut().for_each(|o| o.opaque = opaque);
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "loading refuses scenes with 2^32 - 1 prims")]
+fn index(i: usize) -> u32 {
+    i as u32
+}

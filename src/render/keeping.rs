@@ -1,0 +1,117 @@
+//! Which meshes are kept as objects that stand in several places, and which are flattened.
+
+use crate::accel::instances::{Object, Place};
+use crate::accel::{Cone, Kept};
+use crate::math::DAffine3;
+use crate::scene::{Mesh, Scene};
+use rayon::prelude::*;
+use std::str::FromStr;
+
+/// What becomes of meshes with several instances. What rays hit is the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Instancing {
+    /// They are kept where that saves much memory.
+    #[default]
+    Auto,
+    /// They are kept.
+    Keep,
+    /// Each instance is stored by itself.
+    Flatten,
+}
+
+impl Instancing {
+    /// Every way, in the order of the help text.
+    pub const ALL: [Self; 3] = [Self::Auto, Self::Keep, Self::Flatten];
+
+    /// As typed and printed.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Keep => "keep",
+            Self::Flatten => "flatten",
+        }
+    }
+}
+
+/// A name that no way has.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("nothing is called {0:?} that instances could become; there are: auto, keep, flatten")]
+pub struct UnknownInstancing(String);
+
+impl FromStr for Instancing {
+    type Err = UnknownInstancing;
+
+    fn from_str(name: &str) -> Result<Self, UnknownInstancing> {
+        Self::ALL.into_iter().find(|how| how.name() == name).ok_or_else(|| UnknownInstancing(name.into()))
+    }
+}
+
+/// Triangles from which on a mesh is worth a tree of its own, where nobody says so.
+const WORTH_A_TREE: usize = 64;
+
+/// Triangles that keeping must save: flattened, so many take 20 MB with the tree over them, and rays through one tree are
+/// sooner answered than through two.
+const WORTH_KEEPING: usize = 1 << 18;
+
+/// The objects of a scene, and where instances of them stand.
+pub(super) struct Keeping {
+    /// All objects, which stand nowhere yet.
+    pub kept: Kept,
+    /// For each instance the index of its object and its place; `None`: it is flattened.
+    pub places: Vec<Option<(u32, Place)>>,
+}
+
+impl Keeping {
+    /// Chooses, and finds where instances stand; those that stand in no ordinary way are flattened all the same.
+    /// `opaque` tells of each material whether it stops light, `to_frame` moves an instance into the scene's frame.
+    pub(super) fn of(
+        scene: &Scene,
+        how: Instancing,
+        opaque: &[bool],
+        to_frame: impl Fn(&DAffine3) -> DAffine3 + Sync,
+    ) -> Self {
+        let mut kept = Kept::default();
+        let mut objects: Vec<Option<u32>> = vec![None; scene.meshes.len()];
+        for i in chosen(scene, how) {
+            let mesh = &scene.meshes[i];
+            objects[i] = Some(kept.add(Object::new(&mesh.positions, &mesh.triangles, opaque[mesh.material as usize])));
+        }
+        if kept.objects().is_empty() {
+            return Self { kept, places: vec![None; scene.instances.len()] };
+        }
+        let place = |instance: &crate::scene::Instance| {
+            let object = objects[instance.mesh as usize]?;
+            let shapes = kept.objects()[object as usize].shapes();
+            Some((object, Place::new(to_frame(&instance.world_from_object), shapes)?))
+        };
+        let places = scene.instances.par_iter().map(place).collect();
+        Self { kept, places }
+    }
+}
+
+/// The meshes that are kept.
+fn chosen(scene: &Scene, how: Instancing) -> Vec<usize> {
+    let least = match how {
+        Instancing::Auto => WORTH_A_TREE,
+        Instancing::Keep => 1,
+        Instancing::Flatten => return Vec::new(),
+    };
+    let mut uses = vec![0usize; scene.meshes.len()];
+    scene.instances.iter().for_each(|i| uses[i.mesh as usize] += 1);
+    let suits = |mesh: &Mesh| mesh.triangles.len() >= least && mesh.polygons.is_empty();
+    let chosen: Vec<usize> = (0..scene.meshes.len()).filter(|&i| uses[i] > 1 && suits(&scene.meshes[i])).collect();
+    let saved: usize = chosen.iter().map(|&i| (uses[i] - 1) * scene.meshes[i].triangles.len()).sum();
+    if how == Instancing::Auto && saved < WORTH_KEEPING { Vec::new() } else { chosen }
+}
+
+/// Bytes of shapes as they are stored, kept objects with them.
+pub(super) fn bytes(shapes: &crate::accel::Shapes, kept: &Kept) -> usize {
+    size_of_val(&*shapes.vertices)
+        + size_of_val(&*shapes.triangles)
+        + size_of_val(&*shapes.polygons)
+        + size_of_val(&*shapes.polygon_corners)
+        + size_of_val(&*shapes.spheres)
+        + shapes.cones.len() * size_of::<Cone>()
+        + size_of_val(&*shapes.planes)
+        + kept.bytes()
+}
