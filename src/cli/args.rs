@@ -126,7 +126,7 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "STOPS", value_parser = parse::exposure, help_heading = "Output", allow_hyphen_values = true)]
     pub exposure: Option<f32>,
     /// Put all inputs into one scene and one picture
-    #[arg(long, help_heading = "Output")]
+    #[arg(long, help_heading = "Output", hide_short_help = true)]
     pub merge: bool,
     /// On Ctrl-C keep the tiles that are done as NAME.partial.png
     #[arg(long, help_heading = "Output", hide_short_help = true)]

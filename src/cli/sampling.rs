@@ -17,7 +17,7 @@ pub(super) struct SamplingArgs {
     /// Which rays a pixel gets: `off` one through its middle; `uniform` --samples at the same places in each; `adaptive`
     /// corners and middle, and more where these differ; `stochastic` more until its mean is certain [default: stochastic,
     /// or what other flags ask for]
-    #[arg(long, value_name = "HOW", value_enum, help_heading = "Quality")]
+    #[arg(long, value_name = "HOW", value_enum, help_heading = "Quality", hide_short_help = true)]
     pub aa: Option<Aa>,
     /// How good a stochastic picture is to be: --pixel-error and --max-samples in a word: draft 0.06 and 64, normal 0.03 and
     /// 256, final 0.01 and 2048 [default: normal]
@@ -29,7 +29,7 @@ pub(super) struct SamplingArgs {
     pub samples: Option<u32>,
     /// Error of a pixel that stochastic sampling stops at: root mean square over its channels, which run from 0 to 1 in the
     /// written picture. Half of it costs about two to three times the rays
-    #[arg(long, value_name = "E", value_parser = parse::error, help_heading = "Quality")]
+    #[arg(long, value_name = "E", value_parser = parse::error, help_heading = "Quality", hide_short_help = true)]
     pub pixel_error: Option<f32>,
     /// How certain that error is to be, such as 95% or 0.95 [default: 95%]
     #[arg(long, value_name = "PERCENT", value_parser = parse::confidence, help_heading = "Quality", hide_short_help = true)]
