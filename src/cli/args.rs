@@ -135,7 +135,7 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "PICTURE", help_heading = "Output", hide_short_help = true, conflicts_with_all = [
         "size", "format", "bits", "half", "float", "layers", "tone_map", "exposure", "merge", "view", "camera", "eye",
         "at", "up_vector", "fov", "ortho", "up", "background", "env", "env_rotate", "env_rays", "gloss_rays",
-        "light_rays", "sun_size", "aa", "quality", "samples", "pixel_error", "confidence", "min_samples", "max_samples",
+        "light_rays", "sun_size", "aa", "quality", "samples", "pixel_error", "target_error", "confidence", "min_samples", "max_samples",
         "filter", "error_space", "aa_threshold", "aa_depth", "aperture", "focus", "depth", "cutoff", "seed", "scene", "variant", "animation", "time", "frame", "fps",
         "frames", "turntable",
         "polygons", "mtl", "allow_empty", "accel", "intersector",
@@ -284,6 +284,10 @@ pub(super) struct RenderArgs {
     /// Print times and counts: a timed run, then a counted one
     #[arg(long, value_name = "FORMAT", value_enum, help_heading = "Run")]
     pub stats: Option<StatsFormat>,
+    /// Render no picture: say what time, rays, tests and memory it would take and what error it would have, each with an
+    /// interval, from about a hundredth of its pixels
+    #[arg(long, help_heading = "Run", hide_short_help = true, conflicts_with_all = ["again", "heatmap"])]
+    pub dry_run: bool,
     /// Print where the time went: reading, parsing, building, each class of rays, shading, writing; wall and CPU
     #[arg(long, help_heading = "Run", hide_short_help = true)]
     pub profile: bool,

@@ -60,6 +60,8 @@ pub(super) struct RenderJob {
     pub strict: bool,
     /// Nothing to draw is no error.
     pub allow_empty: bool,
+    /// Whether pictures are only foretold.
+    pub dry_run: bool,
     /// Keep the tiles that are done on Ctrl-C.
     pub keep_partial: bool,
     /// The hash that the inputs must have (`--again`), in hexadecimal.
@@ -190,6 +192,7 @@ impl RenderJob {
             quiet: args.quiet,
             strict: args.strict,
             allow_empty: args.allow_empty,
+            dry_run: args.dry_run,
             keep_partial: args.keep_partial,
             expected_hash: None,
             sequence,

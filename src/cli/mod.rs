@@ -10,6 +10,7 @@ mod bench;
 mod camera;
 mod cost_layers;
 mod diff;
+mod dry_run;
 mod exit;
 mod explain;
 mod generate;

@@ -9,7 +9,7 @@ use super::progress::Progress;
 use super::sequence::{self, Step, Survey};
 use super::stats::{self, PictureStats, Times};
 use super::summary::Summary;
-use super::{accident, again, cost_layers, interrupt, meter, output_name, read, surroundings};
+use super::{accident, again, cost_layers, dry_run, interrupt, meter, output_name, read, surroundings};
 use crate::accel::AnyAccel;
 use crate::accel::auto::Reason;
 use crate::image::{FileKind, was_written_by_meshray};
@@ -298,6 +298,9 @@ fn render_shot(
     }
     effective.written_as(&job.look, shot.kind);
     let work = Job { settings: &effective.settings, scene, world, accel, textures: &textures, view: &view };
+    if job.dry_run {
+        return foretell(job, file, &work, messages, progress);
+    }
     let mut rendered = trace(job, &work, progress, &mut times, profile);
     let costs = rendered.complete.then(|| costs(job, &work, progress));
     progress.finish();
@@ -345,6 +348,21 @@ fn render_shot(
     loaded.scene.background = background;
     **load_seconds = 0.0;
     exit
+}
+
+/// Says what a picture would take.
+fn foretell(job: &RenderJob, file: &Path, work: &Job, messages: &Messages, progress: &Progress) -> Exit {
+    progress.begin("looking");
+    let found = crate::render::forecast(work, progress);
+    progress.finish();
+    match found.map(|forecast| dry_run::say(file, work, &forecast, job.stats.as_ref().map(|stats| stats.format))) {
+        Some(Ok(())) => Exit::Done,
+        Some(Err(e)) => {
+            messages.error("output-unwritable", format!("standard output: {e}"), "");
+            Exit::Failed
+        }
+        None => Exit::Interrupted,
+    }
 }
 
 fn trace(job: &RenderJob, work: &Job, progress: &Progress, times: &mut Times, profile: &mut Profile) -> Rendered {

@@ -31,6 +31,12 @@ pub(super) struct SamplingArgs {
     /// written picture. Half of it costs about two to three times the rays
     #[arg(long, value_name = "E", value_parser = parse::error, help_heading = "Quality", hide_short_help = true)]
     pub pixel_error: Option<f32>,
+    /// Error of the whole picture to reach, and not much less: the root of its mean squared error, in the numbers of
+    /// --error-space. A part of the picture is rendered first to find out how (see --dry-run); then it is rendered twice, the
+    /// difference of both tells the error, and what is missing is added
+    #[arg(long, value_name = "E", value_parser = parse::error, help_heading = "Quality", hide_short_help = true,
+          conflicts_with_all = ["pixel_error", "quality"])]
+    pub target_error: Option<f32>,
     /// How certain that error is to be, such as 95% or 0.95 [default: 95%]
     #[arg(long, value_name = "PERCENT", value_parser = parse::confidence, help_heading = "Quality", hide_short_help = true)]
     pub confidence: Option<f64>,
@@ -67,6 +73,9 @@ pub(super) struct SamplingArgs {
     pub focus: Option<Focus>,
 }
 
+/// Samples of a pixel at most where the error of the whole picture is asked for.
+const MOST_TO_TARGET: u32 = 1 << 14;
+
 /// `--aa`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Aa {
@@ -89,6 +98,7 @@ impl SamplingArgs {
         let stochastic = [
             ("--quality", self.quality.is_some()),
             ("--pixel-error", self.pixel_error.is_some()),
+            ("--target-error", self.target_error.is_some()),
             ("--confidence", self.confidence.is_some()),
             ("--min-samples", self.min_samples.is_some()),
             ("--max-samples", self.max_samples.is_some()),
@@ -124,6 +134,7 @@ impl SamplingArgs {
         let tuned = [
             self.quality.is_some(),
             self.pixel_error.is_some(),
+            self.target_error.is_some(),
             self.confidence.is_some(),
             self.min_samples.is_some(),
             self.max_samples.is_some(),
@@ -155,7 +166,8 @@ impl SamplingArgs {
             }
             Aa::Stochastic => {
                 let usual = self.quality.unwrap_or_default().stochastic();
-                let most = self.max_samples.unwrap_or(usual.max_samples.max(self.min_samples.unwrap_or(0)));
+                let usual_most = if self.target_error.is_some() { MOST_TO_TARGET } else { usual.max_samples };
+                let most = self.max_samples.unwrap_or(usual_most.max(self.min_samples.unwrap_or(0)));
                 let how = Stochastic {
                     error: self.pixel_error.unwrap_or(usual.error),
                     confidence: self.confidence.unwrap_or(usual.confidence),
@@ -163,6 +175,7 @@ impl SamplingArgs {
                     max_samples: most,
                     filter: self.filter.unwrap_or(usual.filter),
                     space: usual.space,
+                    target: self.target_error,
                 };
                 (samples, Sampling::Stochastic(how))
             }
@@ -219,7 +232,10 @@ pub(super) fn flags(settings: &Settings, mut set: impl FnMut(&str, String)) {
         }
         Sampling::Stochastic(how) => {
             set("aa", "stochastic".into());
-            set("pixel-error", how.error.to_string());
+            match how.target {
+                Some(target) => set("target-error", target.to_string()),
+                None => set("pixel-error", how.error.to_string()),
+            }
             set("confidence", how.confidence.to_string());
             set("min-samples", how.min_samples.to_string());
             set("max-samples", how.max_samples.to_string());
@@ -236,6 +252,12 @@ pub(super) fn flags(settings: &Settings, mut set: impl FnMut(&str, String)) {
 /// How the picture was sampled, in words.
 pub(super) fn phrase(settings: &Settings, sampled: &Sampled) -> String {
     let rays = format!("{:.1} samples a pixel (at most {})", sampled.mean(), sampled.most());
+    if let Some(to) = sampled.targeted {
+        return format!(
+            "{rays}, error {:.4} where {} was asked for (foretold {:.4} and {:.1} s of processor time, took {:.1} s)",
+            to.estimate, to.target, to.foretold, to.foretold_cpu, to.cpu
+        );
+    }
     match settings.sampling {
         Sampling::Uniform => format!("{} samples a pixel", settings.samples),
         Sampling::Adaptive(_) => format!("adaptive, {rays}"),
@@ -267,7 +289,8 @@ pub(super) fn json(settings: &Settings, sampled: &Sampled) -> Value {
             "aa": "stochastic", "pixel_error": plain(how.error), "confidence": how.confidence,
             "min_samples": how.min_samples, "max_samples": how.max_samples, "filter": how.filter.name(),
             "error_space": if how.space == ErrorSpace::Linear { "linear" } else { "display" },
-            "met": sampled.met, "ceiling": sampled.at_most, "rmse": sampled.rmse(),
+            "met": sampled.met, "ceiling": sampled.at_most, "rmse": sampled.rmse(), "target_error": how.target.map(plain),
+            "foretold": sampled.targeted.map(|to| json!({ "rmse": to.foretold, "cpu_seconds": to.foretold_cpu })),
         }),
     };
     if let (Value::Object(all), Value::Object(rays)) = (&mut all, rays) {

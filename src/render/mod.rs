@@ -20,11 +20,13 @@ mod curve;
 mod draws;
 pub mod everything;
 mod eyes;
+mod forecast;
 mod frame;
 mod keeping;
 mod layers;
 mod observer;
 pub mod optics;
+mod part;
 mod patch;
 mod pixel;
 mod profile;
@@ -39,6 +41,7 @@ pub mod story;
 mod strip;
 pub mod studio;
 mod surface;
+mod target;
 #[cfg(test)]
 mod tests;
 pub mod texture;
@@ -50,10 +53,11 @@ pub mod world;
 
 pub use costs::{Cost, Costs, UnknownCost, render_costs};
 pub use eyes::ThinLens;
+pub use forecast::{Forecast, Interval, forecast};
 pub use keeping::{Instancing, UnknownInstancing};
 pub use observer::{Asked, Question, Tape};
 pub use profile::{Profile, render_profiled};
-pub use sampling::{Adaptive, ErrorSpace, Filter, Quality, Sampled, Sampling, Stochastic};
+pub use sampling::{Adaptive, ErrorSpace, Filter, Quality, Sampled, Sampling, Stochastic, Targeted};
 pub use surface::given_normal;
 pub use view::View;
 pub use world::{PrimSource, World};
@@ -241,6 +245,12 @@ pub struct Recording {
 
 fn render_with<P: Observer>(job: &Job, progress: &dyn Progress) -> (Rendered, Vec<ByClass<P>>) {
     let settings = job.settings;
+    if let Sampling::Stochastic(how) = &settings.sampling
+        && how.target.is_some()
+        && let Some(done) = target::render(job, how, progress)
+    {
+        return done;
+    }
     let context = Context::new(job.scene, job.world, job.textures, settings);
     let (picture, sampled, counts, complete) = tile::render_tiles(&context, job.accel, job.view, settings, progress);
     (Rendered { picture, counts: ClassCounts::default(), sampled, depth: context.depth, complete }, counts)

@@ -58,6 +58,9 @@ pub struct Stochastic {
     pub filter: Filter,
     /// In which numbers errors are counted.
     pub space: ErrorSpace,
+    /// What the whole picture may be wrong by, the root of its mean squared error in these numbers. With it, `error` is found
+    /// so that the picture is just as exact as that.
+    pub target: Option<f32>,
 }
 
 impl Default for Stochastic {
@@ -123,6 +126,7 @@ impl Quality {
             max_samples,
             filter: Filter::default(),
             space: ErrorSpace::default(),
+            target: None,
         }
     }
 }
@@ -142,6 +146,23 @@ pub struct Sampled {
     pub met: u64,
     /// Pixels that were given up at the most rays allowed.
     pub at_most: u64,
+    /// How near it came to the error of the whole picture that was asked for, if one was.
+    pub targeted: Option<Targeted>,
+}
+
+/// The error of a whole picture, the root of its mean squared error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Targeted {
+    /// What was asked for.
+    pub target: f32,
+    /// What was expected from a part of the picture, before it was rendered.
+    pub foretold: f64,
+    /// What was estimated from all of it, by how its renderings differ.
+    pub estimate: f64,
+    /// Seconds of processor time that were expected, without those for finding out.
+    pub foretold_cpu: f64,
+    /// What it took.
+    pub cpu: f64,
 }
 
 impl Sampled {
@@ -159,6 +180,9 @@ impl Sampled {
     /// Estimated root of the mean squared error of the whole picture; `None` where nothing was estimated.
     #[expect(clippy::cast_precision_loss, reason = "a ratio")]
     pub fn rmse(&self) -> Option<f64> {
+        if let Some(targeted) = self.targeted {
+            return Some(targeted.estimate);
+        }
         let sum: f64 = self.errors.iter().map(|&e| f64::from(e) * f64::from(e)).sum();
         (!self.errors.is_empty()).then(|| (sum / self.errors.len() as f64).sqrt())
     }

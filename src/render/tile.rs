@@ -15,7 +15,9 @@ use super::whitted::{ByClass, Sample, Tracer};
 use super::{Progress, Settings, adaptive, stochastic};
 use crate::accel::Accel;
 use crate::image::{Channel, Layers, Picture, Values};
+use crate::stopwatch::{Spent, Stopwatch};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
 
 /// Columns and rows of a tile.
 const TILE: u32 = 32;
@@ -67,6 +69,35 @@ pub(super) enum End {
     Ceiling,
 }
 
+/// One way to sample a tile, whichever was chosen; `None` when cancelled.
+fn render_tile<A: Accel, P: Observer>(frame: &Frame, tracer: &mut Tracer<A, P>, tile: Tile) -> Option<TilePixels> {
+    match &frame.settings.sampling {
+        Sampling::Uniform => frame.render(tracer, tile),
+        Sampling::Adaptive(how) => adaptive::render(frame, how, tracer, tile),
+        Sampling::Stochastic(how) => stochastic::render(frame, how, tracer, tile),
+    }
+}
+
+/// Renders these tiles alone, in any order: what came of each with the time of the processor that it took, the counts of all
+/// threads, and whether nothing was cut short.
+pub(super) fn render_some<A: Accel, P: Observer>(
+    context: &Context,
+    accel: &A,
+    view: &View,
+    settings: &Settings,
+    progress: &dyn Progress,
+    tiles: &[Tile],
+) -> (Vec<(TilePixels, Duration)>, Vec<ByClass<P>>, bool) {
+    let frame = Frame::new(context, view, settings);
+    let work = |tracer: &mut Tracer<A, P>, tile| {
+        let watch = Stopwatch::of_this_thread();
+        let pixels = render_tile(&frame, tracer, tile)?;
+        let Spent { cpu, wall } = watch.read();
+        Some((pixels, if cpu.is_zero() { wall } else { cpu }))
+    };
+    each_tile(context, accel, tiles, progress, work)
+}
+
 /// Renders every tile; the picture, how it was sampled, the counts of all threads, and whether nothing was cut short by the user.
 pub(crate) fn render_tiles<A: Accel, P: Observer>(
     context: &Context,
@@ -76,12 +107,9 @@ pub(crate) fn render_tiles<A: Accel, P: Observer>(
     progress: &dyn Progress,
 ) -> (Picture, Sampled, Vec<ByClass<P>>, bool) {
     let frame = Frame::new(context, view, settings);
-    let work = |tracer: &mut Tracer<A, P>, tile| match &settings.sampling {
-        Sampling::Uniform => frame.render(tracer, tile),
-        Sampling::Adaptive(how) => adaptive::render(&frame, how, tracer, tile),
-        Sampling::Stochastic(how) => stochastic::render(&frame, how, tracer, tile),
-    };
-    let (finished, counts, complete) = each_tile(context, accel, settings, progress, work);
+    let work = |tracer: &mut Tracer<A, P>, tile| render_tile(&frame, tracer, tile);
+    let tiles = tiles(settings.width, settings.height);
+    let (finished, counts, complete) = each_tile(context, accel, &tiles, progress, work);
     let mut picture = empty_picture(settings);
     finished.iter().for_each(|pixels| pixels.store(&mut picture));
     let sampled = sampled(settings, &finished);
@@ -115,7 +143,7 @@ fn sampled(settings: &Settings, finished: &[TilePixels]) -> Sampled {
 }
 
 /// What is known of the sampling of each pixel, as layers.
-fn add_channels(sampled: &Sampled, layers: &mut Layers) {
+pub(super) fn add_channels(sampled: &Sampled, layers: &mut Layers) {
     let mut add = |name: &str, values: Values| {
         if !values.is_empty() {
             layers.channels.push(Channel { name: name.into(), values });
@@ -147,7 +175,8 @@ pub(crate) fn cost_tiles<A: Accel, P: Observer, T: Copy + Default + Send>(
         let each = |tracer: &mut Tracer<A, P>| costs.extend(cost(&mut tracer.counts, samples));
         frame.trace(tracer, tile, pixels, each).map(|()| (tile, costs))
     };
-    let (finished, _, complete) = each_tile(context, accel, settings, progress, work);
+    let tiles = tiles(settings.width, settings.height);
+    let (finished, _, complete) = each_tile(context, accel, &tiles, progress, work);
     let mut all = vec![T::default(); settings.width as usize * settings.height as usize];
     for (tile, costs) in finished {
         for ((x, y), cost) in tile.places().zip(costs) {
@@ -191,11 +220,10 @@ pub(crate) enum Together {
 fn each_tile<A: Accel, P: Observer, T: Send>(
     context: &Context,
     accel: &A,
-    settings: &Settings,
+    tiles: &[Tile],
     progress: &dyn Progress,
     work: impl Fn(&mut Tracer<A, P>, Tile) -> Option<T> + Sync,
 ) -> (Vec<T>, Vec<ByClass<P>>, bool) {
-    let tiles = tiles(settings.width, settings.height);
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
 
     // Every thread takes tiles in order until none is left.

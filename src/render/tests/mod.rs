@@ -17,6 +17,7 @@ mod story;
 
 use super::texture::TextureStore;
 use super::view::{Lens, View};
+use super::{Forecast, forecast};
 use super::{Job, Rendered, Settings, World, render_counted};
 use crate::accel::{AccelKind, AccelParams, AnyAccel};
 use crate::math::{DAffine3, DVec3, Vec3};
@@ -116,6 +117,10 @@ impl Stage {
 
     fn render(&self) -> Rendered {
         self.render_by(AccelKind::None)
+    }
+
+    fn forecast(&self) -> Forecast {
+        self.with_job(AccelKind::DEFAULT, |job| forecast(job, &())).unwrap()
     }
 
     /// Colour of the first pixel.

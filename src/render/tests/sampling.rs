@@ -1,9 +1,11 @@
 //! Adaptive and stochastic sampling: what they see, what they cost, and whether they keep what they promise.
 
 use super::*;
-use crate::image::Values;
+use crate::image::diff::{Space, compare};
+use crate::image::look::developed;
+use crate::image::{Output, Values};
 use crate::render::{
-    Adaptive, ErrorSpace, Filter, Sampling, Stochastic, ThinLens, render, render_costs, render_recorded,
+    Adaptive, ErrorSpace, Filter, Interval, Sampling, Stochastic, ThinLens, render, render_costs, render_recorded,
 };
 use crate::scene::Background;
 
@@ -285,4 +287,48 @@ fn a_hundred_thousand_pixels_that_stop_are_within_the_error_as_often_as_promised
     );
     assert!(kept.stopped >= 100_000, "{}", kept.stopped);
     assert!(share(kept.within) >= 93.0);
+}
+
+#[test]
+fn a_picture_is_as_exact_as_it_was_asked_to_be_and_hardly_more() {
+    let mut s = soft();
+    (s.settings.width, s.settings.height) = (40, 30);
+    let render = |s: &mut Stage, seed: u64, how: Stochastic| {
+        (s.settings.seed, s.settings.sampling) = (seed, Sampling::Stochastic(how));
+        s.render()
+    };
+    let whole = Stochastic { min_samples: 2048, ..stochastic(1e-6, 2048) };
+    let reference = render(&mut s, 99, whole);
+    for target in [0.008_f32, 0.005] {
+        let how = Stochastic { target: Some(target), ..stochastic(0.5, 4096) };
+        let found = render(&mut s, 3, how);
+        let [a, b] = [&reference.picture, &found.picture].map(|p| developed(p, &Output::default()));
+        let error = compare(&a, &b, Space::Display, 0.0).unwrap().rmse;
+        let asked = f64::from(target);
+        let said = found.sampled.targeted.unwrap();
+        assert!((0.75..1.2).contains(&(error / asked)), "{target}: {error}, {said:?}");
+        assert!((0.8..=1.03).contains(&(said.estimate / asked)), "{said:?}");
+        // Counted are all rays, those for finding out among them.
+        assert_eq!(found.counts.primary.queries, found.sampled.rays);
+        assert!(found.sampled.rays > found.sampled.counts.iter().map(|&n| u64::from(n)).sum::<u64>());
+    }
+}
+
+#[test]
+fn a_forecast_holds_what_then_happens() {
+    let mut s = soft();
+    (s.settings.width, s.settings.height) = (160, 120);
+    s.settings.sampling = Sampling::Stochastic(stochastic(0.1, 64));
+    let foretold = s.forecast();
+    assert!(foretold.looked_at < foretold.pixels && foretold.pixels == 160 * 120);
+    let rendered = s.render_by(AccelKind::DEFAULT);
+    // Pixels among their neighbours get some more rays than in the squares that were looked at.
+    let near = |i: Interval, value: f64| (0.8 * i.low..1.25 * i.high).contains(&value);
+    assert!(near(foretold.rays, rendered.sampled.rays as f64), "{:?} {}", foretold.rays, rendered.sampled.rays);
+    let c = rendered.counts;
+    let tests: u64 = [c.primary, c.shadow, c.reflected, c.refracted].iter().map(|c| c.n_it).sum();
+    assert!(near(foretold.tests, tests as f64), "{:?} {tests}", foretold.tests);
+    assert!(foretold.rmse.is_some_and(|e| e.value > 0.0) && foretold.cpu.value > 0.0);
+    s.settings.sampling = Sampling::Uniform;
+    assert_eq!(s.forecast().rmse, None, "nothing differs from one rendering to the next");
 }

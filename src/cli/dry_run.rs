@@ -1,0 +1,101 @@
+//! `--dry-run`: what a picture would take, without rendering it.
+//!
+//! # Schema `meshray-forecast/1`
+//! With `--stats json` one JSON object for each picture: `version`, `file`, `width`, `height`, `looked_at` (pixels that were rendered to
+//! find out), `cpu_seconds`, `wall_seconds`, `rays` (from the eye), `tests` (ray/prim) and `rmse` (in the numbers of
+//! `--error-space`; null where every rendering is the same), each with `value`, `low` and `high`, which hold it with 95 %
+//! confidence; `memory` (bytes; null where the system does not tell). Keys are only ever added.
+
+use super::args::StatsFormat;
+use super::print;
+use crate::bench::report::number::{bytes, seconds, short};
+use crate::render::{Forecast, Interval, Job};
+use crate::stopwatch::peak_memory;
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// Prints what was foretold.
+pub(super) fn say(file: &Path, work: &Job, forecast: &Forecast, format: Option<StatsFormat>) -> std::io::Result<()> {
+    let told = Told { file, work, forecast, memory: memory(work) };
+    print(&if format == Some(StatsFormat::Json) { told.json() } else { told.text() })
+}
+
+struct Told<'a> {
+    file: &'a Path,
+    work: &'a Job<'a>,
+    forecast: &'a Forecast,
+    memory: Option<u64>,
+}
+
+/// The most that the whole run holds at once: what it has held so far, and the picture with its file.
+fn memory(work: &Job) -> Option<u64> {
+    /// Bytes of a pixel: its colour, what is known of its sampling, and its samples in the file.
+    const PIXEL: u64 = 16 + 8 + 8;
+    /// Of its layers.
+    const LAYERS: u64 = 80;
+    let settings = work.settings;
+    let pixels = u64::from(settings.width) * u64::from(settings.height);
+    peak_memory().map(|held| held + pixels * (PIXEL + if settings.layers { LAYERS } else { 0 }))
+}
+
+impl Told<'_> {
+    /// By all threads, each of which has a core of its own at best.
+    fn wall(&self) -> Interval {
+        let threads = rayon::current_num_threads().max(1) as f64;
+        let Interval { value, low, high } = self.forecast.cpu;
+        Interval { value: value / threads, low: low / threads, high: high / threads }
+    }
+
+    fn text(&self) -> String {
+        let Forecast { looked_at, pixels, cpu, rays, tests, rmse } = *self.forecast;
+        let settings = self.work.settings;
+        let range =
+            |i: Interval, unit: fn(f64) -> String| format!("{} ({} to {})", unit(i.value), unit(i.low), unit(i.high));
+        let mut lines = vec![
+            ("processor time", range(cpu, seconds)),
+            ("time", format!("{} with {} threads", range(self.wall(), seconds), rayon::current_num_threads())),
+            (
+                "rays from the eye",
+                format!("{}, {} a pixel", range(rays, short), short(rays.value / pixels.max(1) as f64)),
+            ),
+            ("ray/prim tests", range(tests, short)),
+        ];
+        lines.push((
+            "error",
+            match rmse {
+                Some(rmse) => range(rmse, |e| format!("{e:.4}")),
+                None => "not known: every rendering has the same samples, so none tells how wrong they are".into(),
+            },
+        ));
+        lines.extend(self.memory.map(|held| ("memory", bytes(held))));
+        let mut text = format!(
+            "{}: {}×{}, foretold from {:.1} % of the pixels, with 95 % confidence; nothing is written\n",
+            self.file.display(),
+            settings.width,
+            settings.height,
+            100.0 * looked_at as f64 / pixels.max(1) as f64
+        );
+        lines.iter().for_each(|(name, what)| text += &format!("  {name:<18}{what}\n"));
+        text
+    }
+
+    fn json(&self) -> String {
+        let Forecast { looked_at, cpu, rays, tests, rmse, .. } = *self.forecast;
+        let interval = |i: Interval| json!({"value": i.value, "low": i.low, "high": i.high});
+        let value = json!({
+            "schema": "meshray-forecast/1",
+            "version": super::version::SHORT,
+            "file": self.file.to_string_lossy(),
+            "width": self.work.settings.width,
+            "height": self.work.settings.height,
+            "looked_at": looked_at,
+            "cpu_seconds": interval(cpu),
+            "wall_seconds": interval(self.wall()),
+            "rays": interval(rays),
+            "tests": interval(tests),
+            "rmse": rmse.map_or(Value::Null, interval),
+            "memory": self.memory,
+        });
+        format!("{value:#}\n")
+    }
+}

@@ -1,0 +1,110 @@
+//! What a picture will take and how wrong it will be, foretold from a part of it.
+
+use super::part::{Measure, Part, Quiet, squared_errors, squares};
+use super::sampling::Sampling;
+use super::target;
+use super::{Job, Progress, Settings};
+use crate::accel::{NoProbe, RayCounts};
+
+/// A number that was estimated, and what it lies between with 95 % confidence.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    /// The estimate.
+    pub value: f64,
+    /// The least that it may be.
+    pub low: f64,
+    /// The most.
+    pub high: f64,
+}
+
+impl Interval {
+    /// The mean of such values, times `scale`.
+    pub(super) fn of_mean(values: &[f64], scale: f64) -> Self {
+        /// Standard errors to both sides.
+        const REACH: f64 = 1.96;
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n.max(1.0);
+        let variance = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / (n - 1.0).max(1.0);
+        let half = REACH * (variance / n.max(1.0)).sqrt();
+        Self { value: mean * scale, low: (mean - half).max(0.0) * scale, high: (mean + half) * scale }
+    }
+
+    /// Each number as `f` of it, which must grow with it.
+    pub(super) fn map(self, f: impl Fn(f64) -> f64) -> Self {
+        Self { value: f(self.value), low: f(self.low), high: f(self.high) }
+    }
+
+    /// Whether a value lies in it.
+    pub fn contains(&self, value: f64) -> bool {
+        (self.low..=self.high).contains(&value)
+    }
+}
+
+/// What a picture will take.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Forecast {
+    /// Pixels that were rendered to find out.
+    pub looked_at: u64,
+    /// Pixels of the picture.
+    pub pixels: u64,
+    /// Seconds of processor time for its rays and their shading.
+    pub cpu: Interval,
+    /// Eye rays.
+    pub rays: Interval,
+    /// Ray/prim tests of all rays.
+    pub tests: Interval,
+    /// Root mean square error in the numbers that sampling counts errors in; `None` where every rendering is the same, so
+    /// that nothing can be told from their differences.
+    pub rmse: Option<Interval>,
+}
+
+/// Foretells the rendering of a job from about a hundredth of its pixels, at least some thousands: rendered twice, with
+/// different random numbers. `None` when cancelled.
+pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
+    let (settings, renderings) = match job.settings.sampling {
+        Sampling::Stochastic(how) if how.target.is_some() => {
+            let plan = target::plan::<NoProbe>(job, &how, &Quiet(progress))?;
+            (plan.settings(job.settings, 0), f64::from(plan.renderings))
+        }
+        _ => (job.settings.clone(), 1.0),
+    };
+    let squares = squares(settings.width, settings.height);
+    let timed = Part::<NoProbe>::render(job, &settings, &squares, progress)?;
+    let other = Settings { seed: target::seed(settings.seed, 1), ..settings.clone() };
+    let counted = Part::<RayCounts>::render(job, &other, &squares, progress)?;
+    let pixels = u64::from(settings.width) * u64::from(settings.height);
+    let looked_at: u64 = timed.squares.iter().map(|square| square.beauty.len() as u64).sum();
+    // For a pixel of each square: a small square at the edge counts as much as its pixels do.
+    let per_pixel = |value: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        (0..timed.squares.len()).map(|i| value(i) / timed.squares[i].beauty.len().max(1) as f64).collect()
+    };
+    let whole = pixels as f64 * renderings;
+    let rays = Interval::of_mean(&per_pixel(&|i| timed.squares[i].rays as f64), whole);
+    let tests: u64 =
+        counted.counts.iter().flat_map(|c| [c.primary, c.shadow, c.reflected, c.refracted]).map(|c| c.n_it).sum();
+    let per_ray = tests as f64 / counted.rays().max(1) as f64;
+    let squared = squared_errors(&Measure::of(job), &timed, &counted);
+    let is_random = matches!(settings.sampling, Sampling::Stochastic(_));
+    Some(Forecast {
+        looked_at,
+        pixels,
+        cpu: Interval::of_mean(&per_pixel(&|i| timed.spent[i].as_secs_f64()), whole),
+        rays,
+        tests: rays.map(|rays| rays * per_ray),
+        rmse: is_random.then(|| Interval::of_mean(&squared, 1.0 / renderings).map(f64::sqrt)),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_interval_is_as_wide_as_the_values_lie_apart() {
+        let even = Interval::of_mean(&[2.0; 10], 3.0);
+        assert_eq!((even.value, even.low, even.high), (6.0, 6.0, 6.0));
+        let wide = Interval::of_mean(&[1.0, 3.0], 1.0);
+        assert!((wide.high - wide.value - 1.96).abs() < 1e-12 && wide.low > 0.0 && wide.contains(2.5));
+        assert_eq!(Interval::of_mean(&[0.0, 8.0], 1.0).low, 0.0);
+    }
+}

@@ -1,0 +1,172 @@
+//! A part of a picture that tells about the whole: small squares of its pixels, spread evenly.
+
+use super::certainty::output;
+use super::context::Context;
+use super::observer::Observer;
+use super::sampling::{ErrorSpace, Sampling};
+use super::tile::{Tile, TilePixels, render_some};
+use super::whitted::ByClass;
+use super::{Job, Progress, Settings};
+use crate::image::Developer;
+use crate::math::Vec3;
+use crate::scene::Background;
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+/// Columns and rows of a square.
+const SIDE: u32 = 8;
+
+/// One square in so many is looked at …
+const ONE_IN: usize = 100;
+
+/// … but at least so many of them: what is estimated from them is then right within about a tenth.
+const LEAST: usize = 128;
+
+/// Squares of a picture of this size: all of them where it is small.
+pub(super) fn squares(width: u32, height: u32) -> Vec<Tile> {
+    let (columns, rows) = (width.div_ceil(SIDE), height.div_ceil(SIDE));
+    let all = columns as usize * rows as usize;
+    let wanted = (all / ONE_IN).max(LEAST);
+    let square = |(column, row): (u32, u32)| {
+        let (x0, y0) = (column * SIDE, row * SIDE);
+        Tile { x0, y0, x1: (x0 + SIDE).min(width), y1: (y0 + SIDE).min(height) }
+    };
+    let mut chosen = BTreeSet::new();
+    if wanted * 2 >= all {
+        chosen.extend((0..rows).flat_map(|row| (0..columns).map(move |column| (column, row))));
+    }
+    let mut next = 0;
+    while chosen.len() < wanted.min(all) {
+        chosen.insert(spread(next, columns, rows));
+        next += 1;
+    }
+    chosen.into_iter().map(square).collect()
+}
+
+/// The `k`th cell of a sequence that leaves no gaps (M. Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences",
+/// 2018).
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a number of cells")]
+fn spread(k: u32, columns: u32, rows: u32) -> (u32, u32) {
+    let at = |step: f64, cells: u32| {
+        let part = (0.5 + f64::from(k) * step).fract();
+        ((part * f64::from(cells)) as u32).min(cells.saturating_sub(1))
+    };
+    (at(0.754_877_666_246_692_8, columns), at(0.569_840_290_998_053_2, rows))
+}
+
+/// What came of the squares of a picture, in their order.
+pub(super) struct Part<P> {
+    pub squares: Vec<TilePixels>,
+    /// Time of the processor for each.
+    pub spent: Vec<Duration>,
+    pub counts: Vec<ByClass<P>>,
+}
+
+impl<P: Observer> Part<P> {
+    /// Renders them; `None` when cancelled.
+    pub(super) fn render(job: &Job, settings: &Settings, squares: &[Tile], progress: &dyn Progress) -> Option<Self> {
+        let context = Context::new(job.scene, job.world, job.textures, settings);
+        let (mut finished, counts, complete) =
+            render_some(&context, job.accel, job.view, settings, &Quiet(progress), squares);
+        // Threads finish squares in any order; sums over them have one.
+        finished.sort_by_key(|(pixels, _)| (pixels.tile.x0, pixels.tile.y0));
+        let (squares, spent) = finished.into_iter().unzip();
+        complete.then_some(Self { squares, spent, counts })
+    }
+
+    /// Of processor time, on the average.
+    pub(super) fn seconds_per_pixel(&self) -> f64 {
+        let pixels: usize = self.squares.iter().map(|square| square.beauty.len()).sum();
+        self.spent.iter().sum::<Duration>().as_secs_f64() / pixels.max(1) as f64
+    }
+
+    /// Eye rays.
+    pub(super) fn rays(&self) -> u64 {
+        self.squares.iter().map(|square| square.rays).sum()
+    }
+}
+
+/// Mean squared error of one of two renderings that have only noise in which to differ, for each square.
+pub(super) fn squared_errors<P, Q>(measure: &Measure, a: &Part<P>, b: &Part<Q>) -> Vec<f64> {
+    a.squares.iter().zip(&b.squares).map(|(a, b)| 0.5 * measure.mean_square(&a.beauty, &b.beauty)).collect()
+}
+
+/// The numbers in which errors of a picture are counted.
+pub(super) struct Measure {
+    output: Option<crate::image::Output>,
+    background: Option<Vec3>,
+    /// 3, or 4 with coverage where the picture has no background.
+    channels: usize,
+}
+
+impl Measure {
+    /// Those of a scene; of stochastic sampling its own, else those of the displayed picture.
+    pub(super) fn of(job: &Job) -> Self {
+        let space = match job.settings.sampling {
+            Sampling::Stochastic(how) => how.space,
+            _ => ErrorSpace::default(),
+        };
+        let background = match job.scene.background {
+            Some(Background::Color(color)) => Some(color),
+            _ => None,
+        };
+        let transparent = matches!(job.scene.background, None | Some(Background::Transparent));
+        Self { output: output(space, background), background, channels: if transparent { 4 } else { 3 } }
+    }
+
+    /// Mean over pixels and channels of the squared difference of two pictures.
+    pub(super) fn mean_square(&self, a: &[[f32; 4]], b: &[[f32; 4]]) -> f64 {
+        let developer = self.output.as_ref().map(Developer::new);
+        let behind = self.background.unwrap_or(Vec3::ZERO).extend(1.0).to_array();
+        let written = |&pixel: &[f32; 4]| match &developer {
+            Some(developer) => developer.coded(pixel),
+            None if self.background.is_some() => [0, 1, 2, 3].map(|c: usize| pixel[c] + behind[c] * (1.0 - pixel[3])),
+            None => pixel,
+        };
+        let square = |(a, b): (&[f32; 4], &[f32; 4])| {
+            let (a, b) = (written(a), written(b));
+            (0..self.channels).map(|c| f64::from(a[c] - b[c]).powi(2)).sum::<f64>()
+        };
+        a.iter().zip(b).map(square).sum::<f64>() / (a.len() * self.channels).max(1) as f64
+    }
+}
+
+/// Hears whether to stop, and tells nothing.
+pub(super) struct Quiet<'a>(pub &'a dyn Progress);
+
+impl Progress for Quiet<'_> {
+    fn tiles(&self, _done: usize, _total: usize) {}
+
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn squares_are_a_hundredth_of_a_large_picture_and_all_of_a_small_one() {
+        let pixels = |width, height| {
+            let squares = squares(width, height);
+            squares.iter().map(|s| (s.x1 - s.x0) * (s.y1 - s.y0)).sum::<u32>()
+        };
+        assert_eq!(pixels(4000, 3000), 1875 * 64);
+        assert_eq!(pixels(100, 100), 100 * 100);
+        assert_eq!(pixels(1, 1), 1);
+        assert_eq!(squares(800, 600).len(), 128);
+    }
+
+    #[test]
+    fn squares_lie_everywhere_and_none_twice() {
+        let squares = squares(1024, 768);
+        let mut corners: Vec<_> = squares.iter().map(|s| (s.x0, s.y0)).collect();
+        corners.dedup();
+        assert_eq!(corners.len(), 128);
+        for (x, y) in [(0, 0), (512, 0), (0, 384), (512, 384)] {
+            let here = corners.iter().filter(|c| c.0 / 512 * 512 == x && c.1 / 384 * 384 == y).count();
+            assert!((26..=38).contains(&here), "{here} at {x} {y}");
+        }
+    }
+}

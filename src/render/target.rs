@@ -1,0 +1,221 @@
+//! A picture as exact as it was asked to be, and hardly more.
+//!
+//! What error a picture has after sampling to a given error of a pixel depends on the scene. So a part of it is sampled
+//! to several, each twice with different random numbers, until the error of the picture is as it should be ([`plan`]). Then
+//! the whole picture is rendered twice; the difference of both tells the error of their mean, whatever was right or wrong
+//! about the forecast, and if that is too large a third rendering makes it what was asked.
+
+use super::context::Context;
+use super::observer::Observer;
+use super::part::{Measure, Part, squared_errors, squares};
+use super::sampling::{Sampled, Sampling, Stochastic, Targeted};
+use super::tile::{TilePixels, add_channels, render_tiles};
+use super::whitted::ByClass;
+use super::{ClassCounts, Job, Progress, Rendered, Settings};
+use crate::image::Picture;
+use crate::stopwatch::Stopwatch;
+
+/// The first two renderings are planned to leave this part more than what is asked: what is too exact already cannot be
+/// taken back, what is not exact enough can be mended.
+const OVER: f64 = 1.07;
+
+/// An error is what was asked when it is at most this part more.
+const CLOSE: f64 = 1.02;
+
+/// How a target is reached.
+pub(super) struct Plan<P> {
+    how: Stochastic,
+    /// Error of the whole picture that one rendering of it leaves, as foretold.
+    rmse: f64,
+    /// By how much that grows with the error of a pixel: the exponent.
+    slope: f64,
+    /// Renderings of the whole picture.
+    pub renderings: u32,
+    /// Eye rays spent on finding this out.
+    rays: u64,
+    /// Seconds of processor time of one rendering, as foretold.
+    cpu: f64,
+    counts: Vec<ByClass<P>>,
+    /// The squares that were looked at, as the second rendering would have them.
+    second: Vec<TilePixels>,
+}
+
+impl<P> Plan<P> {
+    /// Error of the first rendering of the whole picture, from where it differs from the second one of the squares.
+    fn error_of_first(&self, measure: &Measure, picture: &Picture) -> f64 {
+        let squares = self.second.iter();
+        let square = |square: &TilePixels| {
+            let place = |(x, y): (u32, u32)| y as usize * picture.width as usize + x as usize;
+            let same: Vec<[f32; 4]> = square.tile.places().map(|at| picture.beauty[place(at)]).collect();
+            measure.mean_square(&same, &square.beauty)
+        };
+        let both = squares.map(square).sum::<f64>() / self.second.len().max(1) as f64;
+        let own = (both - self.rmse * self.rmse).max(0.0).sqrt();
+        own.clamp(0.4 * self.rmse, 1.5 * self.rmse)
+    }
+
+    /// Error of another rendering that, mixed with one of error `have`, makes one of error `target`; both weighed by the
+    /// inverse of their squares.
+    fn missing(&self, have: f64, target: f64) -> f64 {
+        /// What is worth rendering: more than so many times as bad adds nothing.
+        const WORST: f64 = 3.0;
+        let square = 1.0 / (1.0 / (target * target) - 1.0 / (have * have));
+        if square > 0.0 { square.sqrt().min(WORST * have) } else { WORST * have }
+    }
+
+    /// Aims at another error of a rendering than the last one's.
+    fn aim(&mut self, last: f64, next: f64) {
+        let gain = libm::pow(next / last, 1.0 / self.slope);
+        self.how.error = single((f64::from(self.how.error) * gain).clamp(1e-5, 0.5));
+    }
+
+    /// Those of one of its renderings.
+    pub(super) fn settings(&self, settings: &Settings, number: u64) -> Settings {
+        Settings { sampling: Sampling::Stochastic(self.how), seed: seed(settings.seed, number), ..settings.clone() }
+    }
+}
+
+/// The seed of the `number`th rendering of a picture; the first has the picture's own.
+pub(super) fn seed(seed: u64, number: u64) -> u64 {
+    seed ^ number.wrapping_mul(0x9e37_79b9_7f4a_7c15)
+}
+
+/// Finds the error of a pixel that leaves the error of the picture that is asked for. `None` when cancelled.
+pub(super) fn plan<P: Observer>(job: &Job, how: &Stochastic, progress: &dyn Progress) -> Option<Plan<P>> {
+    /// Errors of a pixel that make sense.
+    const RANGE: std::ops::RangeInclusive<f64> = 1e-5..=0.5;
+    const TRIES: usize = 4;
+    let target = f64::from(how.target.unwrap_or(how.error));
+    let wanted = OVER * std::f64::consts::SQRT_2 * target;
+    let (squares, measure) = (squares(job.settings.width, job.settings.height), Measure::of(job));
+    let mut plan = Plan {
+        how: Stochastic { target: None, ..*how },
+        rmse: 0.0,
+        slope: 1.0,
+        renderings: 2,
+        rays: 0,
+        cpu: 0.0,
+        counts: Vec::new(),
+        second: Vec::new(),
+    };
+    let (mut error, mut before) = (3.0 * wanted, None);
+    for _ in 0..TRIES {
+        error = error.clamp(*RANGE.start(), *RANGE.end());
+        plan.how.error = single(error);
+        let mut parts = Vec::new();
+        for number in 0..2 {
+            parts.push(Part::<P>::render(job, &plan.settings(job.settings, number), &squares, progress)?);
+        }
+        let squared = squared_errors(&measure, &parts[0], &parts[1]);
+        plan.rmse = (squared.iter().sum::<f64>() / squared.len().max(1) as f64).sqrt();
+        let pixels = f64::from(job.settings.width) * f64::from(job.settings.height);
+        plan.cpu = parts.iter().map(|part| part.seconds_per_pixel() * pixels * 0.5).sum();
+        for part in parts {
+            plan.rays += part.rays();
+            plan.counts.extend(part.counts);
+            plan.second = part.squares;
+        }
+        let found = (error, plan.rmse);
+        if let Some((error, rmse)) = before.replace(found)
+            && found.0 != error
+            && rmse > 0.0
+            && found.1 > 0.0
+        {
+            // Noise of the estimate must not turn the search round.
+            plan.slope = (libm::log(found.1 / rmse) / libm::log(found.0 / error)).clamp(0.3, 1.5);
+        }
+        let off = plan.rmse / wanted;
+        let is_at_end = off < 1.0 && error >= *RANGE.end() || off > 1.0 && error <= *RANGE.start();
+        if (0.94..1.06).contains(&off) || is_at_end {
+            break;
+        }
+        error *= libm::pow(1.0 / off.clamp(0.05, 20.0), 1.0 / plan.slope);
+    }
+    // Where the fewest samples do already, there is no use in doing it twice.
+    plan.renderings = if plan.rmse <= target { 1 } else { 2 };
+    Some(plan)
+}
+
+/// Renders until the error of the picture is what was asked; the picture is the mean of two renderings or three.
+pub(super) fn render<P: Observer>(
+    job: &Job,
+    how: &Stochastic,
+    progress: &dyn Progress,
+) -> Option<(Rendered, Vec<ByClass<P>>)> {
+    let target = f64::from(how.target.unwrap_or(how.error));
+    let mut plan = plan::<P>(job, how, &super::part::Quiet(progress))?;
+    let mut counts = std::mem::take(&mut plan.counts);
+    let watch = Stopwatch::of_all_threads();
+    let foretold = plan.rmse / f64::from(plan.renderings).sqrt();
+    let mut one = |settings: &Settings| {
+        let context = Context::new(job.scene, job.world, job.textures, settings);
+        let (picture, sampled, more, complete) =
+            render_tiles::<_, P>(&context, job.accel, job.view, settings, progress);
+        counts.extend(more);
+        Rendered { picture, counts: ClassCounts::default(), sampled, depth: context.depth, complete }
+    };
+    let mut whole = one(&plan.settings(job.settings, 0));
+    let mut estimate = plan.rmse;
+    if plan.renderings == 2 && whole.complete {
+        let measure = Measure::of(job);
+        // Among their neighbours pixels are sampled more than in small squares.
+        let first = plan.error_of_first(&measure, &whole.picture);
+        let second = plan.missing(first, OVER * target);
+        plan.aim(first, second);
+        let other = one(&plan.settings(job.settings, 1));
+        whole.complete = other.complete;
+        let both = measure.mean_square(&whole.picture.beauty, &other.picture.beauty);
+        let part = first * first / (first * first + second * second);
+        estimate = (both * part * (1.0 - part)).sqrt();
+        mix(&mut whole, &other, single(part));
+        if whole.complete && estimate > CLOSE * target {
+            let third = plan.missing(estimate, target);
+            plan.aim(second, third);
+            let other = one(&plan.settings(job.settings, 2));
+            whole.complete = other.complete;
+            let both = measure.mean_square(&whole.picture.beauty, &other.picture.beauty);
+            let own = (both - estimate * estimate).max(0.0);
+            let part = estimate * estimate / (estimate * estimate + own);
+            estimate = (estimate * estimate * (1.0 - part).powi(2) + own * part.powi(2)).sqrt();
+            mix(&mut whole, &other, single(part));
+        }
+    }
+    whole.sampled.rays += plan.rays;
+    whole.sampled.targeted = Some(Targeted {
+        target: single(target),
+        foretold,
+        estimate,
+        foretold_cpu: plan.cpu * f64::from(plan.renderings),
+        cpu: watch.read().cpu.as_secs_f64(),
+    });
+    if let Some(layers) = &mut whole.picture.layers {
+        layers.channels.retain(|channel| !channel.name.starts_with("sampling."));
+        add_channels(&whole.sampled, layers);
+    }
+    Some((whole, counts))
+}
+
+/// Mixes another rendering in, of which `part` is taken.
+fn mix(whole: &mut Rendered, other: &Rendered, part: f32) {
+    mix_pictures(&mut whole.picture, &other.picture, part);
+    let (sampled, more): (&mut Sampled, &Sampled) = (&mut whole.sampled, &other.sampled);
+    sampled.rays += more.rays;
+    sampled.met = sampled.met.max(more.met);
+    sampled.at_most = sampled.at_most.min(more.at_most);
+    sampled.counts.iter_mut().zip(&more.counts).for_each(|(count, more)| *count += more);
+    for (error, more) in sampled.errors.iter_mut().zip(&more.errors) {
+        let (a, b) = (*error * (1.0 - part), more * part);
+        *error = (a * a + b * b).sqrt();
+    }
+}
+
+fn mix_pictures(whole: &mut Picture, other: &Picture, part: f32) {
+    for (pixel, more) in whole.beauty.iter_mut().zip(&other.beauty) {
+        (0..4).for_each(|c| pixel[c] = pixel[c] * (1.0 - part) + more[c] * part);
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "an error needs no more digits")]
+fn single(x: f64) -> f32 {
+    x as f32
+}
