@@ -25,11 +25,12 @@ use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
 /// The flags that a picture may bring along.
-const FLAGS: [&str; 60] = [
+const FLAGS: [&str; 61] = [
     "size",
     "aa",
     "samples",
     "pixel-error",
+    "target-error",
     "confidence",
     "min-samples",
     "max-samples",

@@ -21,5 +21,6 @@ mod pruning;
 mod same_pixels;
 mod sampling;
 mod spd;
+mod study;
 mod surroundings;
 mod trace;

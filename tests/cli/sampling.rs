@@ -18,6 +18,7 @@ fn pictures_of_every_kind_of_sampling_are_repeated_byte_for_byte() {
         "--quality draft --filter tent --confidence 90% --error-space linear",
         "--pixel-error 0.02 --min-samples 6 --max-samples 40 --aperture 0.1 --focus 0,0,1",
         "--samples 3 --aperture 0.1",
+        "--target-error 0.01",
     ];
     for kind in kinds {
         let folder = Folder::with_cube();
@@ -87,4 +88,29 @@ fn flags_that_contradict_each_other_are_refused() {
     run(&folder, &["--aperture", "0.1", "--eye", "0,0,5", "--at", "0,0,0", "--focus", "0,0,9"])
         .ends(3)
         .says(&["behind"]);
+}
+
+#[test]
+fn a_dry_run_foretells_and_writes_nothing() {
+    let folder = Folder::with_cube();
+    let run = folder.run(&["render", "cube.obj", "--size", "160x120", "--dry-run"]).ends(0);
+    for words in ["160×120", "processor time", "rays from the eye", "ray/prim tests", "error", "nothing is written"] {
+        assert!(run.text().contains(words), "{words}\n{}", run.text());
+    }
+    let run = folder.run(&["render", "cube.obj", "--size", "160x120", "--dry-run", "--stats", "json"]).ends(0);
+    let told: Value = serde_json::from_str(run.text()).unwrap();
+    assert_eq!(told["schema"], "meshray-forecast/1");
+    let (rays, rmse) = (&told["rays"], &told["rmse"]["value"]);
+    assert!(rays["low"].as_f64() <= rays["value"].as_f64() && rays["value"].as_f64() <= rays["high"].as_f64());
+    assert!(rmse.as_f64().unwrap() > 0.0 && told["looked_at"].as_u64().unwrap() < 160 * 120, "{told}");
+    assert_eq!(folder.names(), ["cube.obj"]);
+}
+
+#[test]
+fn an_error_that_is_asked_for_is_reached_and_said_with_what_was_foretold() {
+    let folder = Folder::with_cube();
+    let run = folder.run(&["render", "cube.obj", "--size", "96x72", "--target-error", "0.002", "-o", "a.png"]).ends(0);
+    run.says(&["where 0.002 was asked for", "foretold"]);
+    folder.run(&["render", "cube.obj", "--target-error", "0.002", "--samples", "4"]).ends(2).says(&["--target-error"]);
+    folder.run(&["render", "cube.obj", "--target-error", "0.002", "--pixel-error", "0.1"]).ends(2);
 }
