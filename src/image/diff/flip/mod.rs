@@ -5,8 +5,8 @@
 //! "Visualizing Errors in Rendered High Dynamic Range Images" (2021).
 //!
 //! A value is computed for each pixel, 0 (nobody sees a difference) to 1. Colours are filtered as the eye does from a given
-//! distance, and compared in a space where distances look even ([`color`]); edges and points are found and compared
-//! ([`features`]), and a difference of these raises that of the colours.
+//! distance, and compared in a space where distances look even (`color`); edges and points are found and compared
+//! (`features`), and a difference of these raises that of the colours.
 
 mod color;
 mod features;
