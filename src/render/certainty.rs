@@ -64,15 +64,24 @@ impl<'a> Certainty<'a> {
         }
     }
 
-    /// Whether these samples agree within the error that is allowed: nothing is seen in the pixel that could be missed.
-    pub(super) fn agree(&self, samples: &[Sum]) -> bool {
-        let (mut least, mut most) = ([f32::INFINITY; 4], [f32::NEG_INFINITY; 4]);
-        for written in samples.iter().map(|sample| self.written(sample)) {
-            for c in 0..4 {
-                (least[c], most[c]) = (least[c].min(written[c]), most[c].max(written[c]));
-            }
-        }
-        (0..4).all(|c| most[c] - least[c] <= self.error)
+    /// What the colours of these samples lie between.
+    pub(super) fn range(&self, samples: &[Sum]) -> Range {
+        samples.iter().map(|sample| self.written(sample)).fold(Range::NOTHING, |range, color| Range {
+            least: std::array::from_fn(|c| range.least[c].min(color[c])),
+            most: std::array::from_fn(|c| range.most[c].max(color[c])),
+        })
+    }
+
+    /// Whether samples in this range agree within the error that is allowed: nothing is seen in the pixel that could be missed.
+    pub(super) fn agree(&self, range: &Range) -> bool {
+        (0..4).all(|c| range.most[c] - range.least[c] <= self.error)
+    }
+
+    /// How far apart the ends of a range are, the root of the mean over the channels.
+    #[expect(clippy::cast_precision_loss, reason = "a handful of channels")]
+    pub(super) fn contrast(&self, range: &Range) -> f32 {
+        let squares: f32 = (0..self.channels()).map(|c| (range.most[c] - range.least[c]).max(0.0).powi(2)).sum();
+        (squares / self.channels() as f32).sqrt()
     }
 
     /// Whether two pixels look so different that something may lie between them.
@@ -96,13 +105,43 @@ impl<'a> Certainty<'a> {
             let mean = left.iter().map(|v| v[c]).sum::<f64>() / n;
             left.iter().map(|v| (v[c] - mean) * (v[c] - mean)).sum::<f64>() * (n - 1.0) / n
         };
-        let channels = if self.transparent { 4 } else { 3 };
+        let channels = self.channels();
         ((0..channels).map(squares).sum::<f64>() / channels as f64).sqrt() as f32
     }
 
-    /// Whether a pixel with this standard error is within the error that is allowed.
-    pub(super) fn is_met(&self, standard_error: f32) -> bool {
-        standard_error * self.factor <= self.error
+    /// Whether a pixel with this standard error is within the error that is allowed, when around it there is such a contrast.
+    ///
+    /// Samples that saw nothing of what lies around them are not far apart, and no proof that nothing of it is in the pixel.
+    /// One sample of `count` that sees it makes the standard error `contrast / count`: what has not been seen yet is given
+    /// half a sample (H. Jeffreys, "An Invariant Form for the Prior Probability in Estimation Problems", 1946).
+    #[expect(clippy::cast_precision_loss, reason = "a count of samples")]
+    pub(super) fn is_met(&self, standard_error: f32, contrast: f32, count: u32) -> bool {
+        let unseen = 0.5 * contrast / count.max(1) as f32;
+        standard_error.max(unseen) * self.factor <= self.error
+    }
+
+    fn channels(&self) -> usize {
+        if self.transparent { 4 } else { 3 }
+    }
+}
+
+/// What the colours of samples lie between, channel by channel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Range {
+    least: [f32; 4],
+    most: [f32; 4],
+}
+
+impl Range {
+    /// Of no samples.
+    pub(super) const NOTHING: Self = Self { least: [f32::INFINITY; 4], most: [f32::NEG_INFINITY; 4] };
+
+    /// Of the samples of both.
+    pub(super) fn with(self, other: Self) -> Self {
+        Self {
+            least: std::array::from_fn(|c| self.least[c].min(other.least[c])),
+            most: std::array::from_fn(|c| self.most[c].max(other.most[c])),
+        }
     }
 }
 
@@ -199,7 +238,8 @@ mod tests {
         let output = output(ErrorSpace::default(), None);
         let judge = Certainty::new(output.as_ref(), None, false, 0.01, 0.95);
         assert_eq!(judge.standard_error(&[grey(0.3, 3.0); STREAMS]), 0.0);
-        assert!(judge.agree(&[grey(0.3, 1.0); 4]) && !judge.agree(&[grey(0.3, 1.0), grey(0.4, 1.0)]));
+        let agree = |samples: &[Sum]| judge.agree(&judge.range(samples));
+        assert!(agree(&[grey(0.3, 1.0); 4]) && !agree(&[grey(0.3, 1.0), grey(0.4, 1.0)]));
     }
 
     #[test]
@@ -230,7 +270,7 @@ mod tests {
                             *stream = stream.plus(grey(noise * spread, 1.0), 1.0);
                         }
                     }
-                    if judge.is_met(judge.standard_error(&streams)) {
+                    if judge.is_met(judge.standard_error(&streams), 0.0, 1) {
                         break;
                     }
                     target *= 2.0;

@@ -61,10 +61,10 @@ pub struct Forecast {
 /// Foretells the rendering of a job from about a hundredth of its pixels, at least some thousands: rendered twice, with
 /// different random numbers. `None` when cancelled.
 pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
-    let (settings, renderings) = match job.settings.sampling {
+    let (settings, work) = match job.settings.sampling {
         Sampling::Stochastic(how) if how.target.is_some() => {
             let plan = target::plan::<NoProbe>(job, &how, &Quiet(progress))?;
-            (plan.settings(job.settings, 0), f64::from(plan.renderings))
+            (plan.settings(job.settings, 0), plan.work)
         }
         _ => (job.settings.clone(), 1.0),
     };
@@ -78,7 +78,7 @@ pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
     let per_pixel = |value: &dyn Fn(usize) -> f64| -> Vec<f64> {
         (0..timed.squares.len()).map(|i| value(i) / timed.squares[i].beauty.len().max(1) as f64).collect()
     };
-    let whole = pixels as f64 * renderings;
+    let whole = pixels as f64 * work;
     let rays = Interval::of_mean(&per_pixel(&|i| timed.squares[i].rays as f64), whole);
     let tests: u64 =
         counted.counts.iter().flat_map(|c| [c.primary, c.shadow, c.reflected, c.refracted]).map(|c| c.n_it).sum();
@@ -91,7 +91,7 @@ pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
         cpu: Interval::of_mean(&per_pixel(&|i| timed.spent[i].as_secs_f64()), whole),
         rays,
         tests: rays.map(|rays| rays * per_ray),
-        rmse: is_random.then(|| Interval::of_mean(&squared, 1.0 / renderings).map(f64::sqrt)),
+        rmse: is_random.then(|| Interval::of_mean(&squared, 1.0 / work).map(f64::sqrt)),
     })
 }
 

@@ -4,7 +4,7 @@
 //! What decides about a pixel are its own samples, and in the first round those of the pixels beside it in its tile: a
 //! pixel that happens to see nothing of what its neighbours see goes on with them.
 
-use super::certainty::{Certainty, STREAMS, output};
+use super::certainty::{Certainty, Range, STREAMS, output};
 use super::draws::Stream;
 use super::eyes::Place;
 use super::frame::{Frame, Sum, pixel_key};
@@ -20,10 +20,6 @@ use crate::scene::Background;
 /// Samples at which variances are first relied on: two of each stream.
 const FIRST_LOOK: u32 = 2 * STREAMS as u32;
 
-/// Samples of a pixel in doubt that must all be the same before it is believed that there is nothing to see: a thing that
-/// covers a tenth of it is missed by one pixel in thirty.
-const SEEN_NOTHING: u32 = 2 * FIRST_LOOK;
-
 /// A pixel on its way.
 struct Pixel {
     x: u32,
@@ -33,6 +29,8 @@ struct Pixel {
     streams: [Sum; STREAMS],
     layers: LayerSum,
     facts: PixelFacts,
+    /// Between the samples of the first round of it and of the pixels beside it.
+    contrast: f32,
 }
 
 /// Renders one tile; `None` when cancelled.
@@ -50,13 +48,13 @@ pub(super) fn render<A: Accel, P: Observer>(
     let mut from = 0;
     for to in rounds(how) {
         trace(frame, how, tracer, &mut pixels, &active, from..to)?;
-        let seen = &active;
-        if to < FIRST_LOOK {
-            active = restless(&judge, tile, &mut pixels);
-        } else {
-            seen.iter().for_each(|&i| pixels[i].look(&judge));
-            active.retain(|&i| pixels[i].facts.end == End::Ceiling);
+        if from == 0 {
+            look_around(&judge, tile, &mut pixels, to < FIRST_LOOK);
         }
+        if to >= FIRST_LOOK {
+            active.iter().for_each(|&i| pixels[i].look(&judge));
+        }
+        active.retain(|&i| pixels[i].facts.end == End::Ceiling);
         from = to;
     }
     let rays = pixels.iter().map(|pixel| u64::from(pixel.facts.count)).sum();
@@ -121,40 +119,43 @@ fn trace<A: Accel, P: Observer>(
     }
 }
 
-/// The pixels that a first round leaves in doubt: their samples or those of a pixel beside them disagree, or both are of
-/// different colours. All others are done.
-fn restless(judge: &Certainty, tile: Tile, pixels: &mut [Pixel]) -> Vec<usize> {
+/// Finds the contrast around each pixel after a first round, and if that `may_end` with it those that are done: their samples
+/// and those of the pixels beside them agree each among themselves, and both are of the same colours.
+fn look_around(judge: &Certainty, tile: Tile, pixels: &mut [Pixel], may_end: bool) {
     let (width, height) = (tile.x1 - tile.x0, tile.y1 - tile.y0);
     let index = |x: u32, y: u32| ((y - tile.y0) * width + x - tile.x0) as usize;
-    let mut seen = vec![(false, [0.0; 4]); (width * height) as usize];
+    let mut seen = vec![(Range::NOTHING, [0.0; 4]); (width * height) as usize];
     for pixel in pixels.iter_mut() {
-        let streams = pixel.taken();
-        seen[index(pixel.x, pixel.y)] = (judge.agree(streams), judge.written(&pixel.sum()));
+        seen[index(pixel.x, pixel.y)] = (judge.range(pixel.taken()), judge.written(&pixel.sum()));
         pixel.facts.error = judge.standard_error(pixel.taken());
     }
-    let is_calm = |x: u32, y: u32| {
+    for pixel in pixels.iter_mut() {
+        let (x, y) = (pixel.x, pixel.y);
         let (_, own) = seen[index(x, y)];
         let columns = x.saturating_sub(1).max(tile.x0)..(x + 2).min(tile.x1);
-        let mut around = (y.saturating_sub(1).max(tile.y0)..(y + 2).min(tile.y1))
+        let around = (y.saturating_sub(1).max(tile.y0)..(y + 2).min(tile.y1))
             .flat_map(|y| columns.clone().map(move |x| (x, y)))
             .map(|(x, y)| seen[index(x, y)]);
-        around.all(|(agrees, color)| agrees && !judge.differ(own, color))
-    };
-    let mut left = Vec::new();
-    for (i, pixel) in pixels.iter_mut().enumerate() {
-        if is_calm(pixel.x, pixel.y) {
+        pixel.contrast = judge.contrast(&around.clone().fold(Range::NOTHING, |all, (range, _)| all.with(range)));
+        let is_calm = || around.clone().all(|(range, color)| judge.agree(&range) && !judge.differ(own, color));
+        if may_end && is_calm() {
             pixel.facts.end = End::Met;
-        } else {
-            left.push(i);
         }
     }
-    left
 }
 
 impl Pixel {
     fn new(seed: u64, (x, y): (u32, u32)) -> Self {
         let facts = PixelFacts { count: 0, error: 0.0, end: End::Ceiling };
-        Self { x, y, key: pixel_key(seed, (x, y)), streams: Default::default(), layers: LayerSum::default(), facts }
+        Self {
+            x,
+            y,
+            key: pixel_key(seed, (x, y)),
+            streams: Default::default(),
+            layers: LayerSum::default(),
+            facts,
+            contrast: 0.0,
+        }
     }
 
     /// The place of the `i`th sample among its streams'.
@@ -184,8 +185,7 @@ impl Pixel {
     /// Finds out how certain the mean is.
     fn look(&mut self, judge: &Certainty) {
         self.facts.error = judge.standard_error(&self.streams);
-        let sure = self.facts.error > 0.0 || self.facts.count >= SEEN_NOTHING;
-        if sure && judge.is_met(self.facts.error) {
+        if judge.is_met(self.facts.error, self.contrast, self.facts.count) {
             self.facts.end = End::Met;
         }
     }

@@ -3,21 +3,22 @@
 //! What error a picture has after sampling to a given error of a pixel depends on the scene. So a part of it is sampled
 //! to several, each twice with different random numbers, until the error of the picture is as it should be ([`plan`]). Then
 //! the whole picture is rendered twice; the difference of both tells the error of their mean, whatever was right or wrong
-//! about the forecast, and if that is too large a third rendering makes it what was asked.
+//! about the forecast, and as that is planned to be too large, a third rendering makes it what was asked.
 
 use super::context::Context;
 use super::observer::Observer;
 use super::part::{Measure, Part, squared_errors, squares};
 use super::sampling::{Sampled, Sampling, Stochastic, Targeted};
-use super::tile::{TilePixels, add_channels, render_tiles};
+use super::tile::{add_channels, render_tiles};
 use super::whitted::ByClass;
 use super::{ClassCounts, Job, Progress, Rendered, Settings};
 use crate::image::Picture;
 use crate::stopwatch::Stopwatch;
 
-/// The first two renderings are planned to leave this part more than what is asked: what is too exact already cannot be
-/// taken back, what is not exact enough can be mended.
-const OVER: f64 = 1.07;
+/// The first two renderings are planned to leave this part more than what is asked. A forecast from a part of the picture may
+/// be a third off, where few pixels have most of the error; what is too exact already cannot be taken back, and what is not
+/// exact enough is mended by a third rendering, when the error is known.
+const OVER: f64 = 1.3;
 
 /// An error is what was asked when it is at most this part more.
 const CLOSE: f64 = 1.02;
@@ -29,31 +30,16 @@ pub(super) struct Plan<P> {
     rmse: f64,
     /// By how much that grows with the error of a pixel: the exponent.
     slope: f64,
-    /// Renderings of the whole picture.
-    pub renderings: u32,
+    /// How many times the work of one rendering all together take: that many times less is the square of their error.
+    pub work: f64,
     /// Eye rays spent on finding this out.
     rays: u64,
     /// Seconds of processor time of one rendering, as foretold.
     cpu: f64,
     counts: Vec<ByClass<P>>,
-    /// The squares that were looked at, as the second rendering would have them.
-    second: Vec<TilePixels>,
 }
 
 impl<P> Plan<P> {
-    /// Error of the first rendering of the whole picture, from where it differs from the second one of the squares.
-    fn error_of_first(&self, measure: &Measure, picture: &Picture) -> f64 {
-        let squares = self.second.iter();
-        let square = |square: &TilePixels| {
-            let place = |(x, y): (u32, u32)| y as usize * picture.width as usize + x as usize;
-            let same: Vec<[f32; 4]> = square.tile.places().map(|at| picture.beauty[place(at)]).collect();
-            measure.mean_square(&same, &square.beauty)
-        };
-        let both = squares.map(square).sum::<f64>() / self.second.len().max(1) as f64;
-        let own = (both - self.rmse * self.rmse).max(0.0).sqrt();
-        own.clamp(0.4 * self.rmse, 1.5 * self.rmse)
-    }
-
     /// Error of another rendering that, mixed with one of error `have`, makes one of error `target`; both weighed by the
     /// inverse of their squares.
     fn missing(&self, have: f64, target: f64) -> f64 {
@@ -92,11 +78,10 @@ pub(super) fn plan<P: Observer>(job: &Job, how: &Stochastic, progress: &dyn Prog
         how: Stochastic { target: None, ..*how },
         rmse: 0.0,
         slope: 1.0,
-        renderings: 2,
+        work: 1.0,
         rays: 0,
         cpu: 0.0,
         counts: Vec::new(),
-        second: Vec::new(),
     };
     let (mut error, mut before) = (3.0 * wanted, None);
     for _ in 0..TRIES {
@@ -113,7 +98,6 @@ pub(super) fn plan<P: Observer>(job: &Job, how: &Stochastic, progress: &dyn Prog
         for part in parts {
             plan.rays += part.rays();
             plan.counts.extend(part.counts);
-            plan.second = part.squares;
         }
         let found = (error, plan.rmse);
         if let Some((error, rmse)) = before.replace(found)
@@ -132,7 +116,7 @@ pub(super) fn plan<P: Observer>(job: &Job, how: &Stochastic, progress: &dyn Prog
         error *= libm::pow(1.0 / off.clamp(0.05, 20.0), 1.0 / plan.slope);
     }
     // Where the fewest samples do already, there is no use in doing it twice.
-    plan.renderings = if plan.rmse <= target { 1 } else { 2 };
+    plan.work = if plan.rmse <= target { 1.0 } else { 2.0 * OVER * OVER };
     Some(plan)
 }
 
@@ -146,7 +130,7 @@ pub(super) fn render<P: Observer>(
     let mut plan = plan::<P>(job, how, &super::part::Quiet(progress))?;
     let mut counts = std::mem::take(&mut plan.counts);
     let watch = Stopwatch::of_all_threads();
-    let foretold = plan.rmse / f64::from(plan.renderings).sqrt();
+    let foretold = plan.rmse / plan.work.sqrt();
     let mut one = |settings: &Settings| {
         let context = Context::new(job.scene, job.world, job.textures, settings);
         let (picture, sampled, more, complete) =
@@ -156,21 +140,17 @@ pub(super) fn render<P: Observer>(
     };
     let mut whole = one(&plan.settings(job.settings, 0));
     let mut estimate = plan.rmse;
-    if plan.renderings == 2 && whole.complete {
+    if plan.work > 1.0 && whole.complete {
         let measure = Measure::of(job);
-        // Among their neighbours pixels are sampled more than in small squares.
-        let first = plan.error_of_first(&measure, &whole.picture);
-        let second = plan.missing(first, OVER * target);
-        plan.aim(first, second);
         let other = one(&plan.settings(job.settings, 1));
         whole.complete = other.complete;
         let both = measure.mean_square(&whole.picture.beauty, &other.picture.beauty);
-        let part = first * first / (first * first + second * second);
-        estimate = (both * part * (1.0 - part)).sqrt();
-        mix(&mut whole, &other, single(part));
+        // Half of the difference is what each is off their mean.
+        estimate = 0.5 * both.sqrt();
+        mix(&mut whole, &other, 0.5);
         if whole.complete && estimate > CLOSE * target {
             let third = plan.missing(estimate, target);
-            plan.aim(second, third);
+            plan.aim((0.5 * both).sqrt(), third);
             let other = one(&plan.settings(job.settings, 2));
             whole.complete = other.complete;
             let both = measure.mean_square(&whole.picture.beauty, &other.picture.beauty);
@@ -185,7 +165,7 @@ pub(super) fn render<P: Observer>(
         target: single(target),
         foretold,
         estimate,
-        foretold_cpu: plan.cpu * f64::from(plan.renderings),
+        foretold_cpu: plan.cpu * plan.work,
         cpu: watch.read().cpu.as_secs_f64(),
     });
     if let Some(layers) = &mut whole.picture.layers {
