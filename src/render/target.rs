@@ -3,7 +3,7 @@
 //! What error a picture has after sampling to a given error of a pixel depends on the scene. So a part of it is sampled
 //! to several, each twice with different random numbers, until the error of the picture is as it should be ([`plan`]). Then
 //! the whole picture is rendered twice; the difference of both tells the error of their mean, whatever was right or wrong
-//! about the forecast, and as that is planned to be too large, a third rendering makes it what was asked.
+//! about the forecast, and as that is planned to be too large, a third rendering, seldom a fourth, makes it what was asked.
 
 use super::context::Context;
 use super::observer::Observer;
@@ -17,8 +17,11 @@ use crate::stopwatch::Stopwatch;
 
 /// The first two renderings are planned to leave this part more than what is asked. A forecast from a part of the picture may
 /// be a third off, where few pixels have most of the error; what is too exact already cannot be taken back, and what is not
-/// exact enough is mended by a third rendering, when the error is known.
+/// exact enough is mended by further renderings, when the error is known.
 const OVER: f64 = 1.3;
+
+/// Renderings beyond the first two, at most; the first of them is near enough, or the second.
+const MENDS: u64 = 4;
 
 /// An error is what was asked when it is at most this part more.
 const CLOSE: f64 = 1.02;
@@ -120,7 +123,7 @@ pub(super) fn plan<P: Observer>(job: &Job, how: &Stochastic, progress: &dyn Prog
     Some(plan)
 }
 
-/// Renders until the error of the picture is what was asked; the picture is the mean of two renderings or three.
+/// Renders until the error of the picture is what was asked; the picture is the mean of several renderings.
 pub(super) fn render<P: Observer>(
     job: &Job,
     how: &Stochastic,
@@ -148,16 +151,20 @@ pub(super) fn render<P: Observer>(
         // Half of the difference is what each is off their mean.
         estimate = 0.5 * both.sqrt();
         mix(&mut whole, &other, 0.5);
-        if whole.complete && estimate > CLOSE * target {
-            let third = plan.missing(estimate, target);
-            plan.aim((0.5 * both).sqrt(), third);
-            let other = one(&plan.settings(job.settings, 2));
+        let mut last = (0.5 * both).sqrt();
+        for number in 2..2 + MENDS {
+            if !whole.complete || estimate <= CLOSE * target {
+                break;
+            }
+            plan.aim(last, plan.missing(estimate, target));
+            let other = one(&plan.settings(job.settings, number));
             whole.complete = other.complete;
             let both = measure.mean_square(&whole.picture.beauty, &other.picture.beauty);
             let own = (both - estimate * estimate).max(0.0);
             let part = estimate * estimate / (estimate * estimate + own);
             estimate = (estimate * estimate * (1.0 - part).powi(2) + own * part.powi(2)).sqrt();
             mix(&mut whole, &other, single(part));
+            last = own.sqrt().max(f64::MIN_POSITIVE);
         }
     }
     whole.sampled.rays += plan.rays;
