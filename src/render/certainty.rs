@@ -37,18 +37,17 @@ pub(super) fn output(space: ErrorSpace, background: Option<Vec3>) -> Option<Outp
 }
 
 impl<'a> Certainty<'a> {
-    /// Of a picture that is written as `output` says (`None`: as linear light), each pixel of it within `error` with this
-    /// `confidence`.
-    #[expect(clippy::cast_possible_truncation, reason = "a small number")]
+    /// Of a picture that is written as `output` says (`None`: as linear light), each pixel of it within `error`, of which
+    /// that must be so many standard errors ([`factor`]).
     pub(super) fn new(
         output: Option<&'a Output>,
         background: Option<Vec3>,
         transparent: bool,
         error: f32,
-        confidence: f64,
+        factor: f32,
     ) -> Self {
         let developer = output.map(Developer::new);
-        Self { developer, background, transparent, error, factor: factor(confidence) as f32 }
+        Self { developer, background, transparent, error, factor }
     }
 
     /// The numbers of the written picture: RGB and alpha, the colour premultiplied.
@@ -156,10 +155,13 @@ const FREEDOM: f64 = (STREAMS - 1) as f64;
 /// look the samples double, which divides the standard error by √2 at least. The probabilities of all looks are added,
 /// the worst start of ρ is taken, and f is found for which that is 1 − `confidence`; it is never less than Student's t,
 /// which a single look would need.
-fn factor(confidence: f64) -> f64 {
+///
+/// A search that takes milliseconds: once for a picture.
+#[expect(clippy::cast_possible_truncation, reason = "a small number")]
+pub(super) fn factor(confidence: f64) -> f32 {
     let wrong = 1.0 - confidence;
     let student = bisect(|t| 1.0 - student_within(t) > wrong);
-    student.max(bisect(|f| wrong_stops(f) > wrong))
+    student.max(bisect(|f| wrong_stops(f) > wrong)) as f32
 }
 
 /// Chance that some look stops wrongly, at most.
@@ -225,7 +227,7 @@ mod tests {
         assert!(factors.windows(2).all(|pair| pair[0] < pair[1]), "{factors:?}");
         assert!(factors[2] > 2.364);
         for confidence in [0.8, 0.95, 0.99] {
-            assert!(wrong_stops(factor(confidence)) <= 1.0 - confidence + 1e-9);
+            assert!(wrong_stops(factor(confidence).into()) <= 1.0 - confidence + 1e-6);
         }
     }
 
@@ -236,7 +238,7 @@ mod tests {
     #[test]
     fn what_is_the_same_in_all_streams_is_certain() {
         let output = output(ErrorSpace::default(), None);
-        let judge = Certainty::new(output.as_ref(), None, false, 0.01, 0.95);
+        let judge = Certainty::new(output.as_ref(), None, false, 0.01, factor(0.95));
         assert_eq!(judge.standard_error(&[grey(0.3, 3.0); STREAMS]), 0.0);
         let agree = |samples: &[Sum]| judge.agree(&judge.range(samples));
         assert!(agree(&[grey(0.3, 1.0); 4]) && !agree(&[grey(0.3, 1.0), grey(0.4, 1.0)]));
@@ -244,7 +246,7 @@ mod tests {
 
     #[test]
     fn linear_errors_are_those_of_a_mean() {
-        let judge = Certainty::new(None, None, false, 0.01, 0.95);
+        let judge = Certainty::new(None, None, false, 0.01, factor(0.95));
         let values = [0.1_f32, 0.3, 0.2, 0.5, 0.4, 0.2, 0.1, 0.2];
         let mean = values.iter().sum::<f32>() / 8.0;
         let expected = (values.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / (8.0 * 7.0)).sqrt();
@@ -255,7 +257,7 @@ mod tests {
     /// Pixels of normal samples, in rounds that double, judged as pictures are.
     #[test]
     fn pixels_that_stop_at_the_first_content_look_are_right_as_often_as_asked() {
-        let judge = Certainty::new(None, None, false, 0.05, 0.95);
+        let judge = Certainty::new(None, None, false, 0.05, factor(0.95));
         let mut random = Random::new(11);
         for spread in [0.1_f32, 0.3, 0.7, 1.5] {
             let (pixels, mut right) = (4000, 0);

@@ -1,6 +1,7 @@
 //! What all pixels of a picture share, and how samples become a pixel.
 
 use super::Settings;
+use super::certainty;
 use super::context::Context;
 use super::eyes::{Ball, Eye, Place, ThinLens};
 use super::pixel::sample_offsets;
@@ -21,6 +22,8 @@ pub(super) struct Frame<'a> {
     sample_width: f32,
     scene: Ball,
     pub background: Option<Vec3>,
+    /// How many standard errors of a pixel its allowed error must be; found by a search, so once for all tiles.
+    pub standard_errors: f32,
 }
 
 impl<'a> Frame<'a> {
@@ -38,7 +41,11 @@ impl<'a> Frame<'a> {
             Sampling::Stochastic(how) => how.max_samples.max(1) as f32,
         };
         let sample_width = 1.0 / samples.sqrt();
-        Self { view, settings, offsets, sample_width, scene: Ball::new(context), background }
+        let standard_errors = match settings.sampling {
+            Sampling::Stochastic(how) => certainty::factor(how.confidence),
+            Sampling::Uniform | Sampling::Adaptive(_) => 0.0,
+        };
+        Self { view, settings, offsets, sample_width, scene: Ball::new(context), background, standard_errors }
     }
 
     /// Where eye rays come from.

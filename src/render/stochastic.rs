@@ -42,7 +42,7 @@ pub(super) fn render<A: Accel, P: Observer>(
 ) -> Option<TilePixels> {
     let output = output(how.space, frame.background);
     let transparent = matches!(tracer.context.scene.background, None | Some(Background::Transparent));
-    let judge = Certainty::new(output.as_ref(), frame.background, transparent, how.error, how.confidence);
+    let judge = Certainty::new(output.as_ref(), frame.background, transparent, how.error, frame.standard_errors);
     let mut pixels: Vec<Pixel> = tile.places().map(|at| Pixel::new(frame.settings.seed, at)).collect();
     let mut active: Vec<usize> = (0..pixels.len()).collect();
     let mut from = 0;
