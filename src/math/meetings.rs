@@ -33,11 +33,6 @@ pub struct RowBounds {
     pub dir: DVec3,
 }
 
-impl RowBounds {
-    /// Around nothing.
-    pub const NONE: Self = Self { low: DVec3::ZERO, high: DVec3::ZERO, from: None, dir: DVec3::ZERO };
-}
-
 /// What the rays of a row share when they meet a triangle.
 #[derive(Clone, Copy, Debug)]
 pub struct Plane {
@@ -79,8 +74,8 @@ impl Plane {
         let d = [s.widen(s.load(&dir[0])), s.widen(s.load(&dir[1])), s.widen(s.load(&dir[2]))];
         let denominator = self.dot(s, d);
         // Those of the farthest and of the steepest ray there could be.
-        let n_error = s.splat_f64(self.sizes.dot(low.max(high)) * PLANE_TERMS_F64);
-        let d_error = s.splat_f64(self.sizes.dot(bounds.dir) * PLANE_TERMS_F64);
+        let n_error = s.splat_f64(self.sizes.dot(low.max(high)) * (PLANE_TERMS_F64 * QUOTIENT));
+        let d_error = s.splat_f64(self.sizes.dot(bounds.dir) * (PLANE_TERMS_F64 * QUOTIENT));
         quotient(s, [numerator, n_error], [denominator, d_error])
     }
 
@@ -129,30 +124,32 @@ impl Plane {
     }
 }
 
-/// n / d, each with the bound of its error: [`Bounded::over`](super::quotient::Bounded) and what is asked of it, in lanes.
+/// What the errors of a quotient's terms are multiplied with: the 3/2 and the 1.001 of [`Bounded`](super::quotient::Bounded),
+/// and room for what is rounded otherwise here.
+const QUOTIENT: f64 = 1.502;
+
+/// n / d, each with [`QUOTIENT`] times the bound of its error: [`Bounded::over`](super::quotient::Bounded) and what is asked
+/// of it, in lanes. What is certain here is certain there, and never the other way round.
+///
+/// That an error is below a quarter of its term need not be asked: with e ≥ n/4 or f ≥ d/4 the bound of the quotient's error
+/// is 3/8 of its size at least, and not below the part [`POSITION_T`] of it. Zeros and NaN fail there, too.
 #[inline(always)]
 fn quotient<S: Lanewise<N>, const N: usize>(
     s: S,
     [numerator, n_error]: [S::Doubles; 2],
     [denominator, d_error]: [S::Doubles; 2],
 ) -> Meetings<S::Lanes, S::Doubles> {
-    let (n, d) = (s.abs_f64(numerator), s.abs_f64(denominator));
-    let quarter = s.splat_f64(0.25);
-    let signs = s.less_f64(d_error, s.mul_f64(quarter, d)) & s.less_f64(n_error, s.mul_f64(quarter, n));
     let reciprocal = s.div_f64(s.splat_f64(1.0), denominator);
     let t = s.mul_f64(numerator, reciprocal);
     let size = s.abs_f64(t);
     let terms = s.add_f64(n_error, s.mul_f64(d_error, size));
-    let error = s.add_f64(
-        s.mul_f64(terms, s.mul_f64(s.splat_f64(1.5), s.abs_f64(reciprocal))),
-        s.mul_f64(size, s.splat_f64(2.0 * f64::EPSILON)),
-    );
-    let spread = s.mul_f64(error, s.splat_f64(1.001));
-    let (low, high) = (s.narrow(s.sub_f64(t, spread)), s.narrow(s.add_f64(t, spread)));
-    let rounded = s.at_most(low, high) & s.at_most(high, low);
-    // Below the normal numbers zero gets a sign, which is left to the scalar form.
-    let normal = s.less_f64(s.splat_f64(f64::from(f32::MIN_POSITIVE)), size);
-    let sure = signs & s.less_f64(error, s.mul_f64(size, s.splat_f64(POSITION_T))) & rounded & normal;
+    let rounded = s.mul_f64(size, s.splat_f64(2.0 * QUOTIENT * f64::EPSILON));
+    let error = s.add_f64(s.mul_f64(terms, s.abs_f64(reciprocal)), rounded);
+    let (low, high) = (s.narrow(s.sub_f64(t, error)), s.narrow(s.add_f64(t, error)));
+    // Rounding keeps the order of both, so that they are equal. Below the normal numbers zero gets a sign, which is left to
+    // the scalar form.
+    let one = s.at_most(high, low) & s.less(s.splat(f32::MIN_POSITIVE), s.abs(low));
+    let sure = s.less_f64(error, s.mul_f64(size, s.splat_f64(POSITION_T))) & one;
     Meetings { t: low, t_f64: t, sure }
 }
 
@@ -252,7 +249,7 @@ impl Pairs {
         let normal = e1.cross(s, &e2);
         let sizes = e1.abs(s).magnitude_cross(s, &e2.abs(s));
         let from = a.minus(s, &o);
-        let terms = s.splat_f64(PLANE_TERMS_F64);
+        let terms = s.splat_f64(PLANE_TERMS_F64 * QUOTIENT);
         let (numerator, n_error) = (normal.dot(s, &from), s.mul_f64(sizes.dot(s, &from.abs(s)), terms));
         let (denominator, d_error) = (normal.dot(s, &d), s.mul_f64(sizes.dot(s, &d.abs(s)), terms));
 
@@ -301,7 +298,7 @@ mod tests {
     use super::super::sight::RowSight;
     use super::super::simd::{Kernel, Level};
     use super::super::triangle::{self, Triangle};
-    use super::super::triangles::{Verdicts, set_corners};
+    use super::super::triangles::{NO_CORNERS, Verdicts, set_corners};
     use super::*;
 
     /// Eight rays against the first of eight triangles: the verdicts, where they meet its plane, and the weights there.
@@ -319,7 +316,10 @@ mod tests {
                     (origin[k][lane], dir[k][lane]) = (ray.origin[k], ray.dir[k]);
                 }
             }
-            let verdicts = RowSight::new(s, &origin, from, &dir, rays[0].z).look(s, triangle).verdicts;
+            let mut corners = NO_CORNERS;
+            set_corners(&mut corners, 3, triangle);
+            let sight = RowSight::<S, LANES>::new(s, &origin, from, &dir, rays[0].z);
+            let verdicts = sight.look(s, &sight.ready(s, &corners), 3).verdicts;
             let plane = Plane::of(triangle);
             let (least, most) = (
                 |f: fn(&RaySpace) -> DVec3| rays.iter().map(f).reduce(DVec3::min).unwrap(),

@@ -5,7 +5,7 @@
 
 use super::Vec3;
 use super::bounds::{EdgeMargins, HEIGHTS, WEIGHTS};
-use super::simd::{Axis, LANES, Lanewise, Simd};
+use super::simd::{Axis, LANES, Lanewise, Row, Simd};
 use super::triangles::{Corners8, Verdicts};
 
 /// A ray as blocks see it that are asked about distances, too: its numbers are within
@@ -69,11 +69,12 @@ impl<S: Simd> Look<S> {
 /// Rays side by side, with the same axis first, as triangles see them one after another; their numbers are within
 /// [`BOX_RANGE`](super::bounds::BOX_RANGE).
 pub struct RowSight<S: Lanewise<N>, const N: usize> {
-    /// Axes in sheared order: x, y, z.
-    axes: [usize; 3],
+    /// The axis of their largest component.
+    main: usize,
+    /// Origins along the axes in sheared order.
     origin: [S::Lanes; 3],
-    /// The origin of all rays, where they have one.
-    from: Option<Vec3>,
+    /// The origin of all rays along these axes, where they have one.
+    from: Option<[f32; 3]>,
     shear: [S::Lanes; 2],
     /// 1 over the directions' components along the last of the axes.
     per_length: S::Lanes,
@@ -93,18 +94,33 @@ impl<S: Lanewise<N>, const N: usize> RowSight<S, N> {
         let axes = [(z + 1) % 3, (z + 2) % 3, z % 3];
         let along = s.load(&dir[axes[2]]);
         Self {
-            axes,
+            main: z,
             origin: [s.load(&origin[axes[0]]), s.load(&origin[axes[1]]), s.load(&origin[axes[2]])],
-            from,
+            from: from.map(|from| axes.map(|k| from[k])),
             shear: [s.div(s.load(&dir[axes[0]]), along), s.div(s.load(&dir[axes[1]]), along)],
             per_length: s.div(s.splat(1.0), along),
         }
     }
 
-    /// Tests one triangle: a bit for each ray.
+    /// Eight triangles made ready for [`Self::look`]: along the axes in sheared order, relative to the origin of all rays
+    /// where they have one.
     #[inline(always)]
-    pub fn look(&self, s: S, triangle: &[Vec3; 3]) -> RowLook<S, N> {
-        let (a, b, c) = (self.relative(s, triangle[0]), self.relative(s, triangle[1]), self.relative(s, triangle[2]));
+    pub fn ready<T: Simd>(&self, s: T, corners: &Corners8) -> Corners8 {
+        let (axes, from) = (AXES[self.main % 3], self.from.unwrap_or_default());
+        let mut ready = [[[0.0; LANES]; 3]; 3];
+        for (ready, rows) in ready.iter_mut().zip(corners) {
+            for k in 0..3 {
+                ready[k] = s.store(s.sub(s.along(rows, axes[k]), s.splat(from[k])));
+            }
+        }
+        ready
+    }
+
+    /// Tests one of eight triangles that were made ready: a bit for each ray.
+    #[inline(always)]
+    pub fn look(&self, s: S, ready: &Corners8, lane: usize) -> RowLook<S, N> {
+        let [a, b, c] = ready;
+        let (a, b, c) = (self.relative(s, a, lane), self.relative(s, b, lane), self.relative(s, c, lane));
         let sheared = [self.sheared(s, a), self.sheared(s, b), self.sheared(s, c)];
         let (verdicts, view) = view(s, sheared, [a[2], b[2], c[2]]);
         RowLook { verdicts, view }
@@ -116,19 +132,14 @@ impl<S: Lanewise<N>, const N: usize> RowSight<S, N> {
         look.view.distances(s, self.per_length, [WEIGHTS, HEIGHTS])
     }
 
-    /// A corner relative to the origins.
+    /// A corner of the triangle in a lane relative to the origins.
     #[inline(always)]
-    fn relative(&self, s: S, corner: Vec3) -> [S::Lanes; 3] {
-        let [x, y, z] = self.axes;
-        if let Some(from) = self.from {
-            let p = corner - from;
-            return [s.splat(p[x]), s.splat(p[y]), s.splat(p[z])];
+    fn relative(&self, s: S, [x, y, z]: &[Row; 3], lane: usize) -> [S::Lanes; 3] {
+        let [x, y, z] = [s.splat(x[lane % LANES]), s.splat(y[lane % LANES]), s.splat(z[lane % LANES])];
+        if self.from.is_some() {
+            return [x, y, z];
         }
-        [
-            s.sub(s.splat(corner[x]), self.origin[0]),
-            s.sub(s.splat(corner[y]), self.origin[1]),
-            s.sub(s.splat(corner[z]), self.origin[2]),
-        ]
+        [s.sub(x, self.origin[0]), s.sub(y, self.origin[1]), s.sub(z, self.origin[2])]
     }
 
     #[inline(always)]

@@ -29,7 +29,7 @@ impl<W: Wave, B: BoxMargins> Kernel for Alone<'_, W, B> {
         let Self { tree, shapes, wave, stack, .. } = self;
         let mut lone = Lone::default();
         for start in (0..wave.rays().len()).step_by(LANES) {
-            lone.trace::<B, _, _>(s, tree, shapes, wave, start, stack);
+            lone.trace::<B, _, _>(s, tree, shapes, wave, (start, u32::MAX), stack);
         }
         lone.finish(s, wave);
     }
@@ -43,7 +43,7 @@ pub(super) struct Lone {
 }
 
 impl Lone {
-    /// Traces eight rays of a wave from `start` on, or as many as there are.
+    /// Of eight rays of a wave from `start` on, or as many as there are, traces those of a mask.
     #[inline(always)]
     pub(super) fn trace<B: BoxMargins, S: Simd, W: Wave>(
         &mut self,
@@ -51,12 +51,15 @@ impl Lone {
         tree: &Tree,
         shapes: &Shapes,
         wave: &mut W,
-        start: usize,
+        (start, which): (usize, u32),
         stack: &mut [Entry],
     ) {
         self.ready.take::<B, _, _>(s, tree, wave, start);
         for i in start..wave.rays().len().min(start + LANES) {
             let lane = i - start;
+            if which >> lane & 1 == 0 {
+                continue;
+            }
             if self.ready.allowed >> lane & 1 == 0 {
                 ask_by_itself::<B, _>(tree, shapes, wave, i, stack);
                 continue;

@@ -43,7 +43,9 @@ pub(super) struct Bundle<B> {
     pub z: usize,
     /// The origin, where all rays have the same.
     pub common: Option<Vec3>,
-    pub bounds: RowBounds,
+    /// All origins lie between these.
+    low: Vec3,
+    high: Vec3,
     margins: PhantomData<B>,
 }
 
@@ -73,7 +75,8 @@ impl<B: BoxMargins> Bundle<B> {
             octant: 0,
             z: 0,
             common: None,
-            bounds: RowBounds::NONE,
+            low: Vec3::ZERO,
+            high: Vec3::ZERO,
             margins: PhantomData,
         }
     }
@@ -96,10 +99,11 @@ impl<B: BoxMargins> Bundle<B> {
         wide.store(wide.smaller(wide.splat(f32::MAX), s.join(low.t_max, high.t_max)))
     }
 
-    /// Finds slabs and ranges from origins, directions, `t_min` and `t_max`, and whether the rays run alike: to the same
-    /// octant, the same component the largest; with numbers for which the bounds of padded boxes hold, and not backwards.
+    /// Finds slabs and ranges from origins, directions, `t_min` and `t_max`, and which rays run as the first does: to the
+    /// same octant, the same component the largest; with numbers for which the bounds of padded boxes hold, and not
+    /// backwards.
     #[inline(always)]
-    pub(super) fn prepare<S: Simd>(&mut self, s: S, tree: &Tree, t_max: &Numbers) -> bool {
+    pub(super) fn prepare<S: Simd>(&mut self, s: S, tree: &Tree, t_max: &Numbers) -> u32 {
         let s = s.wide();
         let (t_min, t_max, zero) = (s.load(&self.t_min), s.load(t_max), s.splat(0.0));
         let o = [s.load(&self.origin[0]), s.load(&self.origin[1]), s.load(&self.origin[2])];
@@ -119,7 +123,17 @@ impl<B: BoxMargins> Bundle<B> {
             self.last[k] = s.store(last[k]);
         }
         self.from = s.store(B::started_lanes(s, t_min));
-        alike & ALL == ALL
+        alike & ALL
+    }
+
+    /// Puts a ray that runs alike in the place of each that does not, so that nothing bounds those.
+    #[inline(always)]
+    pub(super) fn fill<S: Simd>(&mut self, s: S, alike: u32, t_max: &mut Numbers) {
+        let (s, lane) = (s.wide(), alike.trailing_zeros() as usize % RAYS);
+        let rows = [&mut self.origin, &mut self.dir, &mut self.inverse, &mut self.first, &mut self.last];
+        for row in rows.into_iter().flatten().chain([&mut self.t_min, &mut self.from, t_max]) {
+            *row = s.store(s.choose(alike, s.load(row), s.splat(row[lane])));
+        }
     }
 
     /// Which rays meet a box up to their limits; by axis, its plane that comes first and the one that comes last.
@@ -142,33 +156,47 @@ impl<B: BoxMargins> Bundle<B> {
         let o = [s.load(&self.origin[0]), s.load(&self.origin[1]), s.load(&self.origin[2])];
         let is = |k: usize| s.at_most(o[k], s.splat(first[k])) & s.at_most(s.splat(first[k]), o[k]);
         self.common = (is(0) & is(1) & is(2) & ALL == ALL).then_some(first);
-        let (mut low, mut high) = (first, first);
+        (self.low, self.high) = (first, first);
+        let zero = s.splat(0.0);
         if self.common.is_none() {
-            (low, high) = (
-                Vec3::new(s.least(o[0]), s.least(o[1]), s.least(o[2])),
-                Vec3::new(s.greatest(o[0]), s.greatest(o[1]), s.greatest(o[2])),
-            );
+            let [x, y, z, _] = s.least_of_each([o[0], o[1], o[2], zero]);
+            self.low = Vec3::new(x, y, z);
+            let [x, y, z, _] = s.least_of_each([s.sub(zero, o[0]), s.sub(zero, o[1]), s.sub(zero, o[2]), zero]);
+            self.high = Vec3::new(-x, -y, -z);
         }
-        let (farthest, mut fastest) = (low.abs().max(high.abs()), DVec3::ZERO);
+        let inverse = [s.load(&self.inverse[0]), s.load(&self.inverse[1]), s.load(&self.inverse[2])];
+        let [x, y, z, from] = s.least_of_each([inverse[0], inverse[1], inverse[2], s.load(&self.from)]);
+        let least = [x, y, z];
+        let [x, y, z, _] =
+            s.least_of_each([s.sub(zero, inverse[0]), s.sub(zero, inverse[1]), s.sub(zero, inverse[2]), zero]);
+        let greatest = [-x, -y, -z];
+        let farthest = self.low.abs().max(self.high.abs());
+        let drift = PARALLEL * (tree.extent + farthest.element_sum());
         for k in 0..3 {
-            let inverse = s.load(&self.inverse[k]);
-            let (least, greatest) = (s.least(inverse), s.greatest(inverse));
-            let pad = B::PAD * (tree.extent + farthest[k]) + PARALLEL * (tree.extent + farthest.element_sum());
+            let pad = B::PAD * (tree.extent + farthest[k]) + drift;
             // The fastest ray from the foremost origin meets planes first, the slowest from the hindmost last.
             let (fast, slow, front, rear) = if self.octant >> k & 1 == 1 {
-                (greatest, least, low[k], high[k])
+                (greatest[k], least[k], self.low[k], self.high[k])
             } else {
-                (least, greatest, high[k], low[k])
+                (least[k], greatest[k], self.high[k], self.low[k])
             };
             self.hull.first[k] = [fast, -front * fast - pad * fast.abs()];
             self.hull.last[k] = [slow, -rear * slow + pad * slow.abs()];
-            fastest[k] = f64::from(fast.abs());
         }
+        self.hull.from = from.max(0.0);
+    }
+
+    /// Bounds of origins and directions, as exact distances need them.
+    #[inline(always)]
+    pub(super) fn row_bounds(&self) -> RowBounds {
         // A reciprocal is rounded once, and so is this.
-        let dir = DVec3::splat(1.0 + f64::from(f32::EPSILON)) / fastest;
-        self.bounds =
-            RowBounds { low: low.as_dvec3(), high: high.as_dvec3(), from: self.common.map(Vec3::as_dvec3), dir };
-        self.hull.from = s.least(s.load(&self.from)).max(0.0);
+        let fastest = |k: usize| (1.0 + f64::from(f32::EPSILON)) / f64::from(self.hull.first[k][0].abs());
+        RowBounds {
+            low: self.low.as_dvec3(),
+            high: self.high.as_dvec3(),
+            from: self.common.map(Vec3::as_dvec3),
+            dir: DVec3::new(fastest(0), fastest(1), fastest(2)),
+        }
     }
 
     /// Which of eight boxes any ray may meet up to `limit`, and the least distances of that; by axis, the planes that come

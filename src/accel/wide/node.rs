@@ -3,7 +3,7 @@
 use crate::accel::probe::{Extent, Place, Visit};
 use crate::accel::{NO_PRIM, Shapes};
 use crate::math::aabb::Aabb;
-use crate::math::simd::{LANES, Row, Simd};
+use crate::math::simd::{LANES, Row};
 use crate::math::triangles::{Corners8, NO_CORNERS};
 
 /// Eight children: their boxes and what they are.
@@ -217,15 +217,6 @@ impl Tree {
             Child::Run(i) => (Place::Run(i), around(self.run(i))),
         };
         Visit { place, extent: Extent::Box(bounds), listed }
-    }
-
-    /// Tells the processor that a child, not the root, is visited soon.
-    #[inline(always)]
-    pub(super) fn prefetch<S: Simd>(&self, s: S, child: u32) {
-        match Child::either(child) {
-            (0, block) => self.blocks.get(block).into_iter().for_each(|block| s.prefetch(block)),
-            (node, _) => self.nodes.get(node).into_iter().for_each(|node| s.prefetch(node)),
-        }
     }
 
     /// The prims of a run.

@@ -1,11 +1,13 @@
 //! Sixteen rays side by side: rays that run alike visit the same nodes, which are read and ordered once for all.
 //!
 //! A node's boxes are first asked about all rays at once, by a hull of origins and reciprocals of directions (after
-//! S. Boulos et al., *Packet-based Whitted and Distribution Ray Tracing*, 2007); a box that is left is asked about each ray.
-//! At a leaf the triangles' own boxes are asked about the hull, and what is left is tested against all rays at once. Best
-//! hits are known by intervals, as in `best`; exact distances are found at the end, once for all rays of a triangle.
+//! S. Boulos et al., *Packet-based Whitted and Distribution Ray Tracing*, 2007); of several boxes that are left each is asked
+//! about each ray. At a leaf the triangles' own boxes are asked about the hull, and what is left is tested against all rays
+//! at once. Best hits are known by intervals, as in `best`; exact distances are found at the end, once for all rays of a
+//! triangle.
 //!
-//! Rays that do not run alike go their own ways, one after another.
+//! A few rays of sixteen that do not run as the others do go their own ways, one after another, and so do all where too few
+//! run alike.
 
 use std::marker::PhantomData;
 
@@ -24,7 +26,10 @@ use crate::math::shear::RaySpace;
 use crate::math::sight::RowSight;
 use crate::math::simd::{Kernel, LANES, Lanewise, Simd};
 use crate::math::triangle;
-use crate::math::triangles::{Verdicts, corners_of};
+use crate::math::triangles::Verdicts;
+
+/// Rays that run alike from which on they are a packet, without the others.
+const ENOUGH: u32 = 8;
 
 /// A child still to be visited.
 #[derive(Clone, Copy, Debug, Default)]
@@ -104,12 +109,16 @@ impl<W: Wave, B: BoxMargins> Kernel for InPackets<'_, W, B> {
         };
         let (count, mut lone) = (packet.wave.rays().len(), Lone::default());
         while packet.start < count {
-            if packet.gather(s) {
-                packet.trace(s, stack);
-            } else {
-                for start in (packet.start..count.min(packet.start + RAYS)).step_by(LANES) {
-                    lone.trace::<B, _, _>(s, tree, shapes, packet.wave, start, entries);
+            let alike = packet.gather(s);
+            if alike != 0 {
+                packet.trace(s, alike, stack);
+            }
+            let mut apart = ALL & !alike;
+            for start in (packet.start..count.min(packet.start + RAYS)).step_by(LANES) {
+                if apart != 0 {
+                    lone.trace::<B, _, _>(s, tree, shapes, packet.wave, (start, apart), entries);
                 }
+                apart >>= LANES;
             }
             packet.start += RAYS;
         }
@@ -118,18 +127,26 @@ impl<W: Wave, B: BoxMargins> Kernel for InPackets<'_, W, B> {
 }
 
 impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
-    /// The next sixteen rays, if there are as many and they run alike.
+    /// Takes the next sixteen rays, if there are as many; those that run alike, if they are worth a packet, or none.
     #[inline(always)]
-    fn gather<S: Simd>(&mut self, s: S) -> bool {
-        let Some(rays) = self.wave.rays()[self.start..].first_chunk::<RAYS>() else { return false };
+    fn gather<S: Simd>(&mut self, s: S) -> u32 {
+        let Some(rays) = self.wave.rays()[self.start..].first_chunk::<RAYS>() else { return 0 };
         self.t_max = self.rays.spread(s, rays);
         self.wave.adapt_t_min(self.start, &mut self.rays.t_min);
-        self.rays.prepare(s, self.tree, &self.t_max)
+        let alike = self.rays.prepare(s, self.tree, &self.t_max);
+        match alike.count_ones() {
+            16 => ALL,
+            ENOUGH..16 => {
+                self.rays.fill(s, alike, &mut self.t_max);
+                alike
+            }
+            _ => 0,
+        }
     }
 
-    /// From the root to every leaf that any ray may hit.
+    /// From the root to every leaf that any of these rays may hit. The others get an answer, too, which means nothing.
     #[inline(always)]
-    fn trace<S: Simd>(&mut self, s: S, stack: &mut [Branch]) {
+    fn trace<S: Simd>(&mut self, s: S, alike: u32, stack: &mut [Branch]) {
         let tree = self.tree;
         let side = |k: usize, last: bool| {
             if (self.rays.octant >> k & 1 == 1) == last { tree.bounds.lo[k] } else { tree.bounds.hi[k] }
@@ -139,21 +156,24 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
         let wide = s.wide();
         let high = wide.load(&self.t_max);
         let limit = B::widened_lanes(wide, high);
-        self.active = self.rays.meet(wide, first, last, limit);
+        self.active = self.rays.meet(wide, first, last, limit) & alike;
         if self.active == 0 {
             return (self.start..self.start + RAYS).for_each(|i| self.wave.take(i, Hit::MISS));
         }
         self.found.prim = [NO_PRIM; RAYS];
         self.rays.bound(s, tree);
         let sight = RowSight::new(wide, &self.rays.origin, self.rays.common, &self.rays.dir, self.rays.z);
-        let mut reach: Reach<S> = Reach { low: wide.splat(f32::INFINITY), high, limit, farthest: wide.greatest(limit) };
+        let low = wide.splat(f32::INFINITY);
+        let limit = wide.choose(self.active, limit, wide.splat(f32::NEG_INFINITY));
+        let mut reach: Reach<S> = Reach { low, high, limit, farthest: wide.greatest(limit) };
         let mut top = 0;
         self.push(s, &tree.nodes[0], self.active, &reach, stack, &mut top);
         while top > 0 {
             top -= 1;
             let branch = stack[top];
-            let rays = branch.rays & self.active;
-            if branch.near > reach.farthest || rays == 0 {
+            // Rays that need no more have no limit above zero.
+            let rays = branch.rays & wide.at_most(wide.splat(branch.near), reach.limit);
+            if rays == 0 {
                 continue;
             }
             if !Child::is_leaf(branch.child) {
@@ -170,7 +190,7 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
                         break;
                     }
                 } else {
-                    reach.limit = B::widened_lanes(wide, reach.high);
+                    reach.limit = wide.choose(changed, B::widened_lanes(wide, reach.high), reach.limit);
                 }
                 reach.farthest = wide.greatest(reach.limit);
             }
@@ -186,17 +206,15 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
         if met == 0 {
             return;
         }
-        let near = s.store(near);
+        let (near, only) = (s.store(near), met.is_power_of_two());
         let mut order = FARTHEST_FIRST[bundle.octant % LANES][met as usize % 256];
         for _ in 0..met.count_ones() {
             let slot = (order & 7) as usize;
             order >>= 8;
-            let rays = bundle.meet_child(s.wide(), node, slot, reach.limit) & rays;
-            stack[*top] = Branch { near: near[slot], child: node.children[slot], rays };
-            *top += usize::from(rays != 0);
-            if rays != 0 {
-                self.tree.prefetch(s, node.children[slot]);
-            }
+            // The only one is visited for the rays that visit the node: mostly there are some for it.
+            let met = if only { rays } else { bundle.meet_child(s.wide(), node, slot, reach.limit) & rays };
+            stack[*top] = Branch { near: near[slot], child: node.children[slot], rays: met };
+            *top += usize::from(met != 0);
         }
     }
 
@@ -224,11 +242,14 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
         let (_, met) = self.rays.meets_any(s, first, last, reach.farthest);
         let mut lanes = met & ((1 << count) - 1);
         let mut changed = 0;
+        if lanes == 0 {
+            return 0;
+        }
+        let ready = sight.ready(s, &block.corners);
         while lanes != 0 {
             let lane = lanes.trailing_zeros();
             lanes &= lanes - 1;
-            let corners = corners_of(&block.corners, lane as usize);
-            let look = sight.look(s.wide(), &corners);
+            let look = sight.look(s.wide(), &ready, lane as usize);
             if (look.verdicts.hit | look.verdicts.unsure) & rays != 0 {
                 let place = Place { block: index, lane, prim: block.prims[lane as usize % LANES] };
                 let between = sight.distances(s.wide(), &look);
@@ -299,31 +320,31 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
             return;
         }
         let wide = s.wide();
+        let bounds = self.rays.row_bounds();
         let mut left = !wide.find_word(NO_PRIM, &found.prim) & ALL;
         let (mut t, mut u, mut v) = (wide.splat(f32::INFINITY), wide.splat(0.0), wide.splat(0.0));
+        let mut unsure = 0;
         while left != 0 {
-            let ray = left.trailing_zeros() as usize % RAYS;
-            let place = found.place[ray];
+            let place = found.place[left.trailing_zeros() as usize % RAYS];
             let mine = wide.find_word(place, &found.place) & left;
-            let corners = Place::corners(self.tree, place);
-            let plane = Plane::of(&corners);
-            let met = plane.meet(wide, &self.rays.origin, &self.rays.dir, &self.rays.bounds);
+            // What is certain is known late: the next triangle does not wait for it.
+            left &= !mine;
+            let plane = Plane::of(&Place::corners(self.tree, place));
+            let met = plane.meet(wide, &self.rays.origin, &self.rays.dir, &bounds);
             let weights = plane.barycentrics(wide, &self.rays.origin, &self.rays.dir, met.t_f64);
-            let sure = mine & met.sure;
-            t = wide.choose(sure, met.t, t);
-            u = wide.choose(sure, weights[0], u);
-            v = wide.choose(sure, weights[1], v);
-            left &= !sure;
-            if sure >> ray & 1 == 0 {
-                let Ray { origin, dir, .. } = self.wave.rays()[start + ray];
-                let (one, exact) = (1 << ray, triangle::place(&RaySpace::checked(origin, dir).0, &corners));
-                t = wide.choose(one, wide.splat(exact.0), t);
-                u = wide.choose(one, wide.splat(exact.1), u);
-                v = wide.choose(one, wide.splat(exact.2), v);
-                left &= !one;
-            }
+            unsure |= mine & !met.sure;
+            t = wide.choose(mine, met.t, t);
+            u = wide.choose(mine, weights[0], u);
+            v = wide.choose(mine, weights[1], v);
         }
-        let (t, u, v) = (wide.store(t), wide.store(u), wide.store(v));
+        let (mut t, mut u, mut v) = (wide.store(t), wide.store(u), wide.store(v));
+        while unsure != 0 {
+            let ray = unsure.trailing_zeros() as usize % RAYS;
+            unsure &= unsure - 1;
+            let Ray { origin, dir, .. } = self.wave.rays()[start + ray];
+            let corners = Place::corners(self.tree, found.place[ray]);
+            (t[ray], u[ray], v[ray]) = triangle::place(&RaySpace::checked(origin, dir).0, &corners);
+        }
         for half in 0..2 {
             let eight = |row: &Numbers| s.load(&row.as_chunks().0[half]);
             let prim = s.load(&found.prim.as_chunks::<LANES>().0[half].map(f32::from_bits));

@@ -61,6 +61,33 @@ fn rays_that_run_alike_hit_what_brute_force_hits() {
     }
 }
 
+/// Of each sixteen rays that run alike some, the first among them or not, run back, along another axis, or have no range or
+/// no place that boxes could be asked about.
+#[test]
+fn rays_among_others_that_run_otherwise_hit_what_brute_force_hits() {
+    let mut r = Random::new(72);
+    for (name, shapes) in scenes::all() {
+        let alike = bundles(&scenes::rays(&shapes, 4));
+        let mut rays: Vec<Ray> = Vec::new();
+        for (i, bundle) in alike.chunks(16).enumerate() {
+            let apart = [1, 2, 7, 8, 9, 15][i % 6];
+            let mut bundle = bundle.to_vec();
+            for _ in 0..apart {
+                let (k, ray) = (r.below(bundle.len()), bundle[0]);
+                bundle[k] = match r.below(5) {
+                    0 => Ray { dir: -ray.dir, ..ray },
+                    1 => Ray { dir: Vec3::new(ray.dir.y, ray.dir.z, ray.dir.x), ..ray },
+                    2 => Ray { t_min: 2.0, t_max: 1.0, ..ray },
+                    3 => Ray { t_max: f32::NAN, ..ray },
+                    _ => Ray { origin: ray.origin * 1e30, ..ray },
+                };
+            }
+            rays.extend(bundle);
+        }
+        assert_all_ways_agree(name, &shapes, &rays);
+    }
+}
+
 #[test]
 fn a_wave_may_be_of_any_length() {
     let shapes = scenes::soup(60, 0.4);

@@ -173,6 +173,24 @@ macro_rules! eight_lanes {
             }
 
             #[inline(always)]
+            fn least_of_each(self, [a, b, c, d]: [__m256; 4]) -> [f32; 4] {
+                // SAFETY: as above; writes the four numbers of the row, with no demand on alignment.
+                unsafe {
+                    let ab = _mm256_min_ps(_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+                    let cd = _mm256_min_ps(_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+                    // By half: a, b, a, b and c, d, c, d to a, b, c, d.
+                    let all = _mm256_min_ps(
+                        _mm256_shuffle_ps::<0b01_00_01_00>(ab, cd),
+                        _mm256_shuffle_ps::<0b11_10_11_10>(ab, cd),
+                    );
+                    let least = _mm_min_ps(_mm256_castps256_ps128(all), _mm256_extractf128_ps::<1>(all));
+                    let mut row = [0.0; 4];
+                    _mm_storeu_ps(row.as_mut_ptr(), least);
+                    row
+                }
+            }
+
+            #[inline(always)]
             fn greatest(self, a: __m256) -> f32 {
                 // SAFETY: as above.
                 unsafe {
@@ -403,15 +421,6 @@ macro_rules! eight_lanes {
                 unsafe {
                     let words = _mm256_loadu_si256(words.as_ptr().cast());
                     _mm256_storeu_si256(to.as_mut_ptr().cast(), _mm256_permutevar8x32_epi32(words, lanes_of(order)));
-                }
-            }
-
-            #[inline(always)]
-            fn prefetch<T>(self, at: &T) {
-                let first: *const i8 = std::ptr::from_ref(at).cast();
-                for line in (0..size_of::<T>()).step_by(64) {
-                    // SAFETY: as above; nothing is read, and the address lies within `at`.
-                    unsafe { _mm_prefetch::<_MM_HINT_T0>(first.add(line)) };
                 }
             }
 

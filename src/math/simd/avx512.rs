@@ -16,7 +16,7 @@ pub(super) struct Avx512(Avx2);
 
 /// The same proof, for sixteen lanes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sixteen(());
+pub(super) struct Sixteen(Avx512);
 
 impl Avx512 {
     /// A token if the processor has what [`Self::run`] compiles for.
@@ -45,7 +45,7 @@ impl Avx512 {
     }
 }
 
-eight_lanes!(Avx512, Sixteen, |_: Avx512| Sixteen(()), larger, join);
+eight_lanes!(Avx512, Sixteen, Sixteen, larger, join);
 
 #[inline(always)]
 fn join(_: Avx512, low: __m256, high: __m256) -> __m512 {
@@ -194,6 +194,16 @@ impl Lanewise<WIDE> for Sixteen {
     fn least(self, a: __m512) -> f32 {
         // SAFETY: as above.
         unsafe { _mm512_reduce_min_ps(a) }
+    }
+
+    #[inline(always)]
+    fn least_of_each(self, [a, b, c, d]: [__m512; 4]) -> [f32; 4] {
+        let (a, b, c, d) = (halves(a), halves(b), halves(c), halves(d));
+        // SAFETY: as above.
+        let eight = unsafe {
+            [_mm256_min_ps(a.0, a.1), _mm256_min_ps(b.0, b.1), _mm256_min_ps(c.0, c.1), _mm256_min_ps(d.0, d.1)]
+        };
+        self.0.least_of_each(eight)
     }
 
     #[inline(always)]

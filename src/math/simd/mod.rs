@@ -85,6 +85,11 @@ pub trait Lanewise<const N: usize>: Copy {
     fn least(self, a: Self::Lanes) -> f32;
     /// The greatest of all lanes, of which none is NaN; of two zeros either.
     fn greatest(self, a: Self::Lanes) -> f32;
+    /// [`Self::least`] of each of four.
+    #[inline(always)]
+    fn least_of_each(self, [a, b, c, d]: [Self::Lanes; 4]) -> [f32; 4] {
+        [self.least(a), self.least(b), self.least(c), self.least(d)]
+    }
     /// To memory in the lanes of `mask`; the others stay.
     fn put(self, mask: u32, a: Self::Lanes, to: &mut [f32; N]);
     /// A word to memory in the lanes of `mask`; the others stay.
@@ -144,8 +149,6 @@ pub trait Simd: Lanewise<LANES> {
     fn arrange(self, a: Self::Lanes, order: Order, to: &mut Row);
     /// The same for eight words.
     fn arrange_words(self, words: &[u32; LANES], order: Order, to: &mut [u32; LANES]);
-    /// Tells the processor that this is read soon.
-    fn prefetch<T>(self, at: &T);
     /// Tells the processor that the first four cache lines of one of both are read soon, without a branch; elements that
     /// there are not do no harm.
     fn prefetch_either<T, U>(self, first: bool, a: (&[T], usize), b: (&[U], usize));

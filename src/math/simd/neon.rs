@@ -481,7 +481,4 @@ impl Simd for Neon {
 
     #[inline(always)]
     fn prefetch_either<T, U>(self, _: bool, _: (&[T], usize), _: (&[U], usize)) {}
-
-    #[inline(always)]
-    fn prefetch<T>(self, _: &T) {}
 }

@@ -132,6 +132,12 @@ impl<S: Lanewise<LANES>> Lanewise<WIDE> for Pair<S> {
     }
 
     #[inline(always)]
+    fn least_of_each(self, [a, b, c, d]: [Self::Lanes; 4]) -> [f32; 4] {
+        let s = self.0;
+        s.least_of_each([s.smaller(a[0], a[1]), s.smaller(b[0], b[1]), s.smaller(c[0], c[1]), s.smaller(d[0], d[1])])
+    }
+
+    #[inline(always)]
     fn greatest(self, [low, high]: Self::Lanes) -> f32 {
         self.0.greatest(self.0.greater(low, high))
     }

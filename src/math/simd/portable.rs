@@ -273,7 +273,4 @@ impl Simd for Portable {
 
     #[inline(always)]
     fn prefetch_either<T, U>(self, _: bool, _: (&[T], usize), _: (&[U], usize)) {}
-
-    #[inline(always)]
-    fn prefetch<T>(self, _: &T) {}
 }

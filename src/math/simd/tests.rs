@@ -175,6 +175,35 @@ fn the_ends_of_a_row_are_found_wherever_they_stand() {
     }
 }
 
+/// The least of each of four rows, sixteen lanes long and eight.
+struct LeastOfEach([[f32; WIDE]; 4]);
+
+impl Kernel for LeastOfEach {
+    type Output = [[f32; 4]; 2];
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> [[f32; 4]; 2] {
+        let (w, [a, b, c, d]) = (s.wide(), &self.0);
+        let wide = w.least_of_each([w.load(a), w.load(b), w.load(c), w.load(d)]);
+        let [a, b, c, d] = [a, b, c, d].map(|row| row.first_chunk().unwrap());
+        [wide, s.least_of_each([s.load(a), s.load(b), s.load(c), s.load(d)])]
+    }
+}
+
+#[test]
+fn the_least_of_each_of_four_rows_is_found_wherever_it_stands() {
+    for low in 0..WIDE {
+        let rows: [[f32; WIDE]; 4] = std::array::from_fn(|row| {
+            let at = (low + 5 * row) % WIDE;
+            std::array::from_fn(|k| if k == at { -1.0 - row as f32 } else { (k * 3 % 7) as f32 + row as f32 })
+        });
+        let least = |lanes: usize| rows.map(|row| row[..lanes].iter().copied().fold(f32::INFINITY, f32::min));
+        for level in Level::all() {
+            assert_eq!(level.run(LeastOfEach(rows)), [least(WIDE), least(LANES)], "{}", level.name());
+        }
+    }
+}
+
 /// Rows as columns, and back; a row in another order; one of six rows.
 struct Moved([[f32; 4]; LANES]);
 
@@ -188,7 +217,6 @@ impl Kernel for Moved {
         let (mut arranged, mut words) = ([0.0; LANES], [0; LANES]);
         s.arrange(columns[1], order, &mut arranged);
         s.arrange_words(&s.store(columns[2]).map(f32::to_bits), order, &mut words);
-        s.prefetch(&self.0);
         let mut rows = [s.store(columns[0]); 6];
         rows[4] = s.store(columns[3]);
         let picked = s.store(s.pick(&rows, Pick::new(4)));
