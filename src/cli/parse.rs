@@ -5,7 +5,7 @@ use crate::bench::range::{Spacing, values};
 use crate::generate::{Family, MAX_TRIANGLES};
 use crate::image::ToneMap;
 use crate::math::Vec3;
-use crate::render::{Cost, Filter, Instancing, Quality, UnknownCost};
+use crate::render::{Cost, Filter, Instancing, Quality, Split, UnknownCost};
 use crate::scene::framing::NamedView;
 use crate::scene::{Background, Environment};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -192,6 +192,11 @@ pub(super) fn quality() -> impl TypedValueParser<Value = Quality> {
 /// One of [`Filter::ALL`].
 pub(super) fn filter() -> impl TypedValueParser<Value = Filter> {
     PossibleValuesParser::new(Filter::ALL.iter().map(|f| f.name())).try_map(|name: String| name.parse::<Filter>())
+}
+
+/// One of [`Split::ALL`].
+pub(super) fn split() -> impl TypedValueParser<Value = Split> {
+    PossibleValuesParser::new(Split::ALL.iter().map(|s| s.name())).try_map(|name: String| name.parse::<Split>())
 }
 
 /// A height, or `auto`.

@@ -79,7 +79,7 @@ fn append(whole: &mut Loaded, part: Loaded) {
     let (facts, more) = (&mut whole.facts, part.facts);
     facts.faces += more.faces;
     facts.dropped.extend(more.dropped);
-    facts.points_and_lines += more.points_and_lines;
+    facts.wires.append(&more.wires);
     facts.extensions.extend(more.extensions);
     facts.max_rounding = facts.max_rounding.max(more.max_rounding);
     facts.files.extend(more.files);

@@ -23,9 +23,11 @@ pub mod stl;
 pub mod suggest;
 pub mod tangents;
 pub mod texture;
+pub mod wires;
 
 pub use diagnostic::{Diagnostic, LoadError, Warnings};
 pub use limits::Limits;
+pub use wires::WireFacts;
 
 use crate::scene::{Scene, UpAxis};
 use crate::stopwatch::{Spent, Stopwatch};
@@ -107,8 +109,8 @@ pub struct Facts {
     pub faces: u64,
     /// Faces dropped, by reason: (reason, count).
     pub dropped: Vec<(String, u64)>,
-    /// Points and lines skipped.
-    pub points_and_lines: u64,
+    /// Points and lines of the file.
+    pub wires: WireFacts,
     /// Animations in the file.
     pub animations: Vec<AnimationFacts>,
     /// Which of them is shown, and when, seconds from its start; `None`: the rest pose.

@@ -5,7 +5,7 @@ use crate::math::Vec3;
 use crate::scene::{Material, Surface};
 
 /// Coefficients of Beer's law by material, 1 / unit of length; empty where nothing absorbs light.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Absorption(Vec<Vec3>);
 
 impl Absorption {

@@ -9,7 +9,7 @@
 //! - at each point: what is absorbed on the way to it, by materials that absorb nothing;
 //! - at each point where rays end: the balance of what is reflected and refracted, and its spectrum.
 //!
-//! Grain, film, sheen and lacquer are not: a material has them, or there is nothing to be done.
+//! Grain, film, sheen, lacquer and what is scattered through are not: a material has them, or there is nothing to be done.
 
 use super::surface::Surface;
 use super::texture::{ColorSpace, STAND_IN, TextureStore};

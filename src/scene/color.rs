@@ -71,6 +71,11 @@ pub fn from_srgb(codes: [f32; 3]) -> Vec3 {
     Vec3::from(codes.map(decode))
 }
 
+/// The sRGB code, 0 … 1, that [`from_srgb`] reads as this linear value.
+pub fn to_srgb(linear: f32) -> f32 {
+    if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * libm::powf(linear, 1.0 / 2.4) - 0.055 }
+}
+
 /// CIE XYZ, white D65, as linear Rec. 709 (IEC 61966-2-1); a colour out of its gamut has negative parts.
 pub fn rec_709_of_xyz(xyz: DVec3) -> DVec3 {
     let row = |x: f64, y: f64, z: f64| DVec3::new(x, y, z).dot(xyz);

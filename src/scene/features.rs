@@ -63,6 +63,8 @@ pub enum Feature {
     Film,
     /// Sheen of cloth.
     Sheen,
+    /// Light that is scattered through surfaces.
+    Translucence,
     /// An index of refraction that depends on the wavelength.
     Dispersion,
     /// Point lights.
@@ -92,7 +94,7 @@ pub const SMOOTH: f32 = 0.2;
 
 impl Feature {
     /// All of them, in the order they are listed.
-    pub const ALL: [Self; 34] = [
+    pub const ALL: [Self; 35] = [
         Self::Triangles,
         Self::Polygons,
         Self::Spheres,
@@ -119,6 +121,7 @@ impl Feature {
         Self::Grain,
         Self::Film,
         Self::Sheen,
+        Self::Translucence,
         Self::Dispersion,
         Self::PointLights,
         Self::DirectionalLights,
@@ -158,6 +161,7 @@ impl Feature {
             Self::Grain => "anisotropy",
             Self::Film => "iridescence",
             Self::Sheen => "sheen",
+            Self::Translucence => "diffuse transmission",
             Self::Dispersion => "dispersion",
             Self::PointLights => "point lights",
             Self::DirectionalLights => "directional lights",
@@ -246,6 +250,7 @@ impl Features {
                 self.add_if(pbr.grain.is_some(), Feature::Grain);
                 self.add_if(pbr.film.is_some(), Feature::Film);
                 self.add_if(pbr.sheen.is_some(), Feature::Sheen);
+                self.add_if(pbr.translucence.is_some(), Feature::Translucence);
                 if let Some(coat) = &pbr.coat {
                     self.add_if(true, Feature::Coat);
                     self.add_if(coat.roughness < SMOOTH || coat.roughness_map.is_some(), Feature::Mirrors);

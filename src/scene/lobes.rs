@@ -1,4 +1,5 @@
-//! What only some surfaces have besides the metallic-roughness model: lacquer, a thin film, sheen, a grain.
+//! What only some surfaces have besides the metallic-roughness model: lacquer, a thin film, sheen, a grain, light that is
+//! scattered through them.
 
 use super::TextureRef;
 use crate::math::Vec3;
@@ -92,5 +93,32 @@ impl Sheen {
     /// Every slot that can hold a map.
     pub fn maps_mut(&mut self) -> [&mut Option<TextureRef>; 2] {
         [&mut self.color_map, &mut self.roughness_map]
+    }
+}
+
+/// Light that is scattered through to the other side, as by leaves, paper and wax (KHR_materials_diffuse_transmission).
+///
+/// The surface counts as thin: light comes out where it went in, whatever KHR_materials_volume says of its inside.
+#[derive(Clone, Debug)]
+pub struct Translucence {
+    /// 0: all light that is scattered comes back … 1: all of it goes through.
+    pub share: f32,
+    /// Linear map, alpha channel × `share`.
+    pub share_map: Option<TextureRef>,
+    /// Colour of the light that goes through, linear, 0 … 1; that which comes back has the base colour.
+    pub color: Vec3,
+    /// sRGB map × `color`.
+    pub color_map: Option<TextureRef>,
+}
+
+impl Translucence {
+    /// Its maps.
+    pub fn maps(&self) -> [&Option<TextureRef>; 2] {
+        [&self.share_map, &self.color_map]
+    }
+
+    /// Every slot that can hold a map.
+    pub fn maps_mut(&mut self) -> [&mut Option<TextureRef>; 2] {
+        [&mut self.share_map, &mut self.color_map]
     }
 }

@@ -1,6 +1,6 @@
 //! How a surface answers to light. Factors are linear; maps multiply them.
 
-use super::{Coat, Film, Grain, Sheen};
+use super::{Coat, Film, Grain, Sheen, Translucence};
 use crate::math::{Vec2, Vec3};
 
 /// A material. `base_color`, alpha, emission and the normal are common to every [`Surface`] model.
@@ -87,6 +87,8 @@ pub struct MetalRough {
     pub thickness_map: Option<TextureRef>,
     /// How strongly `ior` depends on the wavelength: 20 / Abbe number, as KHR_materials_dispersion; 0: not at all.
     pub dispersion: f32,
+    /// Light that is scattered through it.
+    pub translucence: Option<Box<Translucence>>,
     /// A grain, in whose direction it is rougher.
     pub grain: Option<Box<Grain>>,
     /// A thin film on it.
@@ -188,6 +190,7 @@ impl Default for MetalRough {
             thickness: 0.0,
             thickness_map: None,
             dispersion: 0.0,
+            translucence: None,
             grain: None,
             film: None,
             sheen: None,
@@ -210,7 +213,8 @@ impl MetalRough {
         let film = self.film.iter().flat_map(|film| film.maps());
         let sheen = self.sheen.iter().flat_map(|sheen| sheen.maps());
         let coat = self.coat.iter().flat_map(|coat| coat.maps());
-        own.into_iter().chain(grain).chain(film).chain(sheen).chain(coat).flatten()
+        let through = self.translucence.iter().flat_map(|translucence| translucence.maps());
+        own.into_iter().chain(through).chain(grain).chain(film).chain(sheen).chain(coat).flatten()
     }
 
     /// Every slot that can hold a map.
@@ -222,6 +226,7 @@ impl MetalRough {
             &mut self.transmission_map,
             &mut self.thickness_map,
         ];
+        slots.extend(self.translucence.iter_mut().flat_map(|translucence| translucence.maps_mut()));
         slots.extend(self.grain.iter_mut().map(|grain| &mut grain.map));
         slots.extend(self.film.iter_mut().flat_map(|film| film.maps_mut()));
         slots.extend(self.sheen.iter_mut().flat_map(|sheen| sheen.maps_mut()));

@@ -21,7 +21,7 @@ pub mod texture;
 pub use camera::{Camera, Projection};
 pub use hints::RenderHints;
 pub use light::{Falloff, Light, LightKind};
-pub use lobes::{Coat, Film, Grain, Sheen};
+pub use lobes::{Coat, Film, Grain, Sheen, Translucence};
 pub use material::{AlphaMode, Material, MetalRough, Phong, Surface, TextureRef, UvTransform};
 pub use mesh::{Cone, Instance, Mesh, Plane, Polygon, Sphere};
 pub use panorama::Panorama;

@@ -74,3 +74,29 @@ fn a_variant_is_chosen_kept_with_the_picture_and_listed() {
     assert_eq!((&report["variants"], &report["variant"]), (&json!(["day", "night"]), &json!(1)));
     assert!(folder.run(&["inspect", "a.gltf", "--variant", "1"]).text().contains("0 'day', 1 'night' (this one)"));
 }
+
+#[test]
+fn points_and_lines_are_drawn_as_thick_as_inspect_says() {
+    let text = "mtllib a.mtl\nv -4 0 0\nv 4 0 0\nv 0 -3 0\nv 0 3 0\nusemtl red\nl 1 2\nusemtl blue\np 3 4\n";
+    let materials = "newmtl red\nKd 1 0 0\nnewmtl blue\nKd 0 0 1\n";
+    let folder = Folder::new().file("cross.obj", text).file("a.mtl", materials);
+    let words = ["render", "cross.obj", "--view", "front", "--size", "129x129", "--aa", "uniform", "--samples", "36"];
+    folder.run(&[&words[..], &["--background", "transparent", "--tone-map", "none"]].concat()).ends(0);
+    let shown = picture(&folder.path("cross.png"));
+    // The width is a 256th of ten units, and the picture less than 20 wide.
+    let [r, g, b, alpha] = shown.beauty[64 * 129 + 64];
+    assert!(alpha > 0.05 && (r / alpha) > 0.99 && g == 0.0 && b == 0.0, "{:?}", shown.beauty[64 * 129 + 64]);
+    let blue = shown.beauty.iter().filter(|p| p[2] > 0.0 && p[0] == 0.0).count();
+    let clear = shown.beauty.iter().filter(|p| p[3] == 0.0).count();
+    assert!((2..=8).contains(&blue) && clear > 129 * 124, "{blue} pixels show points, {clear} nothing");
+
+    let report: Value = serde_json::from_str(folder.run(&["inspect", "cross.obj", "--json"]).ends(0).text()).unwrap();
+    let width = json!(10.0 / 256.0);
+    assert_eq!(report["wires"], json!({ "points": 2, "lines": 1, "point_width": width, "line_width": width }));
+    let text = folder.run(&["inspect", "cross.obj"]);
+    assert!(
+        text.text().contains("2 drawn 0.0391 wide") && text.text().contains("1 drawn 0.0391 wide"),
+        "{}",
+        text.text()
+    );
+}

@@ -3,7 +3,7 @@
 use super::super::text::grouped;
 use super::topology::Topology;
 use crate::accel::{AccelKind, AccelParams, AnyAccel};
-use crate::load::{AnimationFacts, Loaded};
+use crate::load::{AnimationFacts, Loaded, WireFacts};
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
 use crate::render::World;
 use crate::scene::features::Features;
@@ -88,7 +88,9 @@ impl<'a> Report<'a> {
         let instances = scene.instances.len() + scene.spheres.len() + scene.cones.len() + scene.planes.len();
         lines.add("objects", format!("{} of {} meshes", grouped(instances as u64), grouped(scene.meshes.len() as u64)));
         lines.add("materials", shorten(scene.materials.iter().map(|m| label(&m.name))));
-        lines.count("points, lines", facts.points_and_lines, "skipped");
+        let wires = &facts.wires;
+        lines.count("points", wires.points, &format!("drawn {:.4} wide", wires.point_width));
+        lines.count("lines", wires.lines, &format!("drawn {:.4} wide", wires.line_width));
     }
 
     fn place(&self, lines: &mut Lines) {
@@ -151,6 +153,11 @@ impl<'a> Report<'a> {
         lines.count("warnings", self.loaded.warnings.iter().map(|w| u64::from(w.count)).sum(), "");
     }
 
+    fn wires(&self) -> Value {
+        let WireFacts { points, lines, point_width, line_width } = self.loaded.facts.wires;
+        json!({ "points": points, "point_width": point_width, "lines": lines, "line_width": line_width })
+    }
+
     /// One JSON object (see the module's head).
     pub(super) fn json(&self) -> String {
         let (scene, shapes, facts) = (&self.loaded.scene, &self.world.shapes, &self.loaded.facts);
@@ -178,7 +185,8 @@ impl<'a> Report<'a> {
                 "degenerate": topology.degenerate,
             },
             "dropped": facts.dropped.iter().map(|(why, n)| json!({ "reason": why, "count": n })).collect::<Vec<_>>(),
-            "points_and_lines": facts.points_and_lines,
+            "points_and_lines": facts.wires.points + facts.wires.lines,
+            "wires": self.wires(),
             "textures": scene.bitmaps.iter()
                 .map(|b| json!({ "name": b.name, "width": b.width, "height": b.height })).collect::<Vec<_>>(),
             "missing": self.missing(),

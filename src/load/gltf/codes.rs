@@ -208,12 +208,12 @@ codes! {
     ImageUnexpectedEos "IMAGE_UNEXPECTED_EOS" Warn "the material is drawn without it";
     ImageUnrecognizedFormat "IMAGE_UNRECOGNIZED_FORMAT" Warn "the material is drawn without it";
     TextureInvalidImageMimeType "TEXTURE_INVALID_IMAGE_MIME_TYPE" Warn "the bytes decide";
-    AnisotropyTexcoord "KHR_MATERIALS_ANISOTROPY_ANISOTROPY_TEXTURE_TEXCOORD" Accept "anisotropy is not drawn";
-    ClearcoatTexcoord "KHR_MATERIALS_CLEARCOAT_CLEARCOAT_NORMAL_TEXTURE_TEXCOORD" Accept "clearcoat is not drawn";
+    AnisotropyTexcoord "KHR_MATERIALS_ANISOTROPY_ANISOTROPY_TEXTURE_TEXCOORD" Accept "each map has coordinates of its own";
+    ClearcoatTexcoord "KHR_MATERIALS_CLEARCOAT_CLEARCOAT_NORMAL_TEXTURE_TEXCOORD" Accept "each map has coordinates of its own";
     DispersionNoVolume "KHR_MATERIALS_DISPERSION_NO_VOLUME" Accept "thin glass does not bend light";
     EmissiveStrengthZeroFactor "KHR_MATERIALS_EMISSIVE_STRENGTH_ZERO_FACTOR" Accept "nothing glows";
-    IridescenceRangeWithoutTexture "KHR_MATERIALS_IRIDESCENCE_THICKNESS_RANGE_WITHOUT_TEXTURE" Accept "iridescence is not drawn";
-    IridescenceTextureUnused "KHR_MATERIALS_IRIDESCENCE_THICKNESS_TEXTURE_UNUSED" Accept "iridescence is not drawn";
+    IridescenceRangeWithoutTexture "KHR_MATERIALS_IRIDESCENCE_THICKNESS_RANGE_WITHOUT_TEXTURE" Accept "the greatest thickness is taken";
+    IridescenceTextureUnused "KHR_MATERIALS_IRIDESCENCE_THICKNESS_TEXTURE_UNUSED" Accept "without iridescence its thickness shows nothing";
     VolumeDoubleSided "KHR_MATERIALS_VOLUME_DOUBLE_SIDED" Accept "both sides are drawn";
     VolumeNoTransmission "KHR_MATERIALS_VOLUME_NO_TRANSMISSION" Accept "no light gets in";
     VariantsNonUnique "KHR_MATERIALS_VARIANTS_NON_UNIQUE_VARIANT" Accept "the first mapping counts, and is told where the variant is asked for";

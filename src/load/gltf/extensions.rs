@@ -17,6 +17,7 @@ const SUPPORTED: &[&str] = &[
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
+    "KHR_materials_diffuse_transmission",
     "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
@@ -192,17 +193,13 @@ mod tests {
 
     #[test]
     fn what_is_only_used_is_one_warning_and_nothing_when_harmless() {
-        let used = json!([
-            "KHR_materials_subsurface",
-            "KHR_xmp",
-            "KHR_materials_diffuse_transmission",
-            "KHR_texture_transform"
-        ]);
+        let used =
+            json!(["KHR_materials_subsurface", "KHR_xmp", "KHR_materials_volume_scatter", "KHR_texture_transform"]);
         let (faults, warnings) = messages(&json!({ "extensionsUsed": used }));
         assert!(faults.is_empty());
         assert_eq!(
             warnings,
-            ["a.gltf:extensionsUsed: drawn without KHR_materials_subsurface, KHR_materials_diffuse_transmission"]
+            ["a.gltf:extensionsUsed: drawn without KHR_materials_subsurface, KHR_materials_volume_scatter"]
         );
     }
 

@@ -24,14 +24,21 @@ pub(super) fn triangles(mode: Mode, corners: &[u32]) -> Option<Vec<[u32; 3]>> {
     Some(triangles)
 }
 
-/// How many points or lines a primitive has.
-pub(super) fn points_and_lines(mode: Mode, corners: usize) -> u64 {
-    let count = match mode {
-        Mode::Points | Mode::LineLoop => corners,
-        Mode::Lines => corners / 2,
-        _ => corners.saturating_sub(1),
-    };
-    count as u64
+/// The ends of the lines of a primitive in the order of glTF 2.0 §3.7.2.1; the same vertex twice for a point.
+///
+/// Nothing for triangles. A corner left over makes no line.
+pub(super) fn lines(mode: Mode, corners: &[u32]) -> Vec<[u32; 2]> {
+    let steps = corners.windows(2).map(|l| [l[0], l[1]]);
+    match mode {
+        Mode::Points => corners.iter().map(|&corner| [corner; 2]).collect(),
+        Mode::Lines => corners.chunks_exact(2).map(|l| [l[0], l[1]]).collect(),
+        Mode::LineStrip => steps.collect(),
+        Mode::LineLoop => {
+            let back = corners.last().zip(corners.first()).map(|(&last, &first)| [last, first]);
+            steps.chain(back.filter(|_| corners.len() > 1)).collect()
+        }
+        Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan => Vec::new(),
+    }
 }
 
 /// Numbers corners among the vertices in use and gives those, ascending; `None`: all `vertices` are in use.
@@ -207,10 +214,19 @@ mod tests {
         assert_eq!(triangles(Mode::TriangleFan, &corners), Some(vec![[11, 12, 10], [12, 13, 10], [13, 14, 10]]));
         assert_eq!(triangles(Mode::TriangleFan, &[]), Some(vec![]));
         assert_eq!(triangles(Mode::LineStrip, &corners), None);
-        assert_eq!(
-            [Mode::Points, Mode::Lines, Mode::LineLoop, Mode::LineStrip].map(|m| points_and_lines(m, 5)),
-            [5, 2, 5, 4]
-        );
+    }
+
+    #[test]
+    fn strips_go_on_loops_come_back_and_points_have_one_end() {
+        let corners = [10, 11, 12];
+        assert_eq!(lines(Mode::Points, &corners), [[10, 10], [11, 11], [12, 12]]);
+        assert_eq!(lines(Mode::Lines, &corners), [[10, 11]]);
+        assert_eq!(lines(Mode::LineStrip, &corners), [[10, 11], [11, 12]]);
+        assert_eq!(lines(Mode::LineLoop, &corners), [[10, 11], [11, 12], [12, 10]]);
+        assert_eq!(lines(Mode::Triangles, &corners), [[0; 2]; 0]);
+        for short in [&[][..], &[10]] {
+            assert!([Mode::Lines, Mode::LineStrip, Mode::LineLoop].iter().all(|&mode| lines(mode, short).is_empty()));
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::mesh::Needs;
 use super::report::Report;
 use super::textures::Textures;
 use crate::math::Vec3;
-use crate::scene::{AlphaMode, Coat, Film, Grain, Material, MetalRough, Sheen, Surface};
+use crate::scene::{AlphaMode, Coat, Film, Grain, Material, MetalRough, Sheen, Surface, Translucence};
 use gltf::json;
 use gltf::json::material as source;
 use gltf::json::validation::Checked;
@@ -138,6 +138,8 @@ fn metal_rough(source: &json::Material, textures: &mut Textures) -> MetalRough {
         surface.thickness_map = textures.info(info_of(extensions.others.get(VOLUME), "thicknessTexture").as_ref());
     }
     let other = |name: &str| extensions.others.get(name);
+    let through = other("KHR_materials_diffuse_transmission");
+    surface.translucence = through.and_then(|through| translucence(through, textures)).map(Box::new);
     surface.grain = other("KHR_materials_anisotropy").and_then(|grain| self::grain(grain, textures)).map(Box::new);
     surface.film = other("KHR_materials_iridescence").and_then(|film| self::film(film, textures)).map(Box::new);
     surface.sheen = other("KHR_materials_sheen").and_then(|sheen| self::sheen(sheen, textures)).map(Box::new);
@@ -184,6 +186,19 @@ fn sheen(extension: &Value, textures: &mut Textures) -> Option<Sheen> {
         color_map: map("sheenColorTexture"),
         roughness: number_of(extension, "sheenRoughnessFactor", 0.0, (0.0, 1.0)),
         roughness_map: map("sheenRoughnessTexture"),
+    })
+}
+
+/// KHR_materials_diffuse_transmission; `None` where nothing goes through.
+fn translucence(extension: &Value, textures: &mut Textures) -> Option<Translucence> {
+    let part = |k: usize| extension.get("diffuseTransmissionColorFactor")?.get(k)?.as_f64();
+    let share = number_of(extension, "diffuseTransmissionFactor", 0.0, (0.0, 1.0));
+    let mut map = |name: &str| textures.info(info_of(Some(extension), name).as_ref());
+    (share > 0.0).then(|| Translucence {
+        share,
+        share_map: map("diffuseTransmissionTexture"),
+        color: Vec3::from([0, 1, 2].map(|k| part(k).map_or(1.0, |c| within(c as f32, 0.0, 1.0, 1.0)))),
+        color_map: map("diffuseTransmissionColorTexture"),
     })
 }
 

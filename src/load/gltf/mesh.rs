@@ -55,7 +55,8 @@ pub(super) struct Read {
     /// Where the mesh stands when a skin has placed it.
     pub(super) center: Option<DVec3>,
     pub(super) dropped: Dropped,
-    pub(super) points_and_lines: u64,
+    /// Its lines, as [`crate::load::wires::Wires::ends`]; there are no triangles then.
+    pub(super) lines: Vec<[u32; 2]>,
 }
 
 /// Reads one primitive; `None` when there is nothing to draw in it.
@@ -119,18 +120,21 @@ impl Task<'_, '_> {
             None => (0..u32::try_from(mesh.positions.len()).ok()?).collect(),
         };
         let triangles = faces::triangles(mode, &corners);
-        let points_and_lines = if triangles.is_some() { 0 } else { faces::points_and_lines(mode, corners.len()) };
+        let lines = faces::lines(mode, &corners);
         drop(corners);
         mesh.triangles = triangles.unwrap_or_default();
         self.attributes(&mut mesh);
         self.morph(&mut mesh);
         self.directions(&mut mesh);
         let center = self.pose(&mut mesh);
+        if !lines.is_empty() {
+            return Some(Read { mesh, center, lines, dropped: Dropped::default() });
+        }
         let dropped = faces::clean(&mut mesh, mode == Mode::TriangleStrip);
         if let Some(set) = self.job.needs.tangents.filter(|_| mesh.tangents.is_empty()) {
             tangents::generate(&mut mesh, set);
         }
-        Some(Read { mesh, center, dropped, points_and_lines })
+        Some(Read { mesh, center, dropped, lines })
     }
 
     /// The accessor of an attribute, when its format can be read.

@@ -10,6 +10,8 @@
 //! primitives by `draco`, so that their accessors are accessors like others. Both libraries sit behind features of the
 //! same names; without them, such files are refused with a line that says so.
 //!
+//! Points and lines are read like triangles and get a width in the end ([`super::wires`]).
+//!
 //! Nodes, morph weights and skins are drawn in their rest pose, or as an animation has them at a moment
 //! ([`Moment`](super::Moment)).
 
@@ -56,6 +58,7 @@ mod weight;
 
 use super::limits::Budget;
 use super::paths::Resolver;
+use super::wires::{self, Wires};
 use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source};
 use crate::math::{DAffine3, DMat4};
 use crate::scene::{Environment, Instance, Scene};
@@ -85,6 +88,9 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
     let warnings = report.warnings.into_vec();
     Ok(Loaded { warnings, ..loaded })
 }
+
+/// The number of a mesh, and where a skin has put it.
+type Part = (u32, Option<DAffine3>);
 
 struct Loading<'a> {
     source: &'a Source,
@@ -183,10 +189,13 @@ impl Loading<'_> {
         let photometric = !placed.lights.is_empty();
         let (cameras, lights) = (placed.cameras, placed.lights);
         let mut scene = Scene { cameras, lights, photometric, environment, ..Scene::default() };
-        self.assemble(&mut scene, root, &placed.draws, reads, facts)?;
+        let (wires, places) = self.assemble(&mut scene, root, &placed.draws, reads, facts)?;
         self.report.merge(pictures);
         scene.materials = palette.materials;
         (scene.textures, scene.bitmaps) = textures::keep_decoded(&mut scene.materials, palette.textures.list, bitmaps);
+        let lost = wires::draw(&wires, &places, &mut scene, budget, facts, file)
+            .map_err(|over| self.too_large("what points and lines become", over))?;
+        lost.into_iter().for_each(|warning| self.report.warnings.push(warning));
         scene.up = self.options.up.unwrap_or_default();
         (facts.reading, facts.decoding) = (resolver.reading(), decoding);
         (facts.files, facts.hash) = resolver.finish();
@@ -277,7 +286,7 @@ impl Loading<'_> {
         fault.remedy("allow more with --max-memory").into()
     }
 
-    /// Puts what was read into the scene.
+    /// Puts what was read into the scene; points and lines are given back with their places.
     fn assemble(
         &mut self,
         scene: &mut Scene,
@@ -285,38 +294,46 @@ impl Loading<'_> {
         draws: &[scene::Draw],
         reads: Vec<Vec<(Option<Read>, Report)>>,
         facts: &mut Facts,
-    ) -> Result<(), LoadError> {
+    ) -> Result<(Vec<Wires>, Vec<Instance>), LoadError> {
         let mut dropped = faces::Dropped::default();
-        // For each variant, its meshes and where a skin has put them.
-        let mut parts: Vec<Vec<(u32, Option<DAffine3>)>> = Vec::new();
+        // For each variant, its meshes and where a skin has put them; likewise its points and lines.
+        let mut parts: Vec<[Vec<Part>; 2]> = Vec::new();
+        let mut wires: Vec<Wires> = Vec::new();
         for primitives in reads {
-            let mut part = Vec::new();
+            let mut part = [Vec::new(), Vec::new()];
             for (read, report) in primitives {
                 self.report.merge(report);
                 let Some(read) = read else { continue };
-                facts.points_and_lines += read.points_and_lines;
+                let center = read.center.map(DAffine3::from_translation);
                 dropped.not_finite += read.dropped.not_finite;
                 dropped.degenerate += read.dropped.degenerate;
                 if !read.mesh.triangles.is_empty() {
                     facts.faces += read.mesh.triangles.len() as u64;
-                    part.push((scene.meshes.len() as u32, read.center.map(DAffine3::from_translation)));
+                    part[0].push((scene.meshes.len() as u32, center));
                     scene.meshes.push(read.mesh);
+                } else if !read.lines.is_empty() {
+                    part[1].push((wires.len() as u32, center));
+                    wires.push(Wires { mesh: read.mesh, ends: read.lines });
                 }
             }
             parts.push(part);
         }
         self.report.check()?;
+        let mut places = Vec::new();
         for draw in draws {
             let name = root.nodes.get(draw.node).and_then(|node| node.name.as_ref());
-            let place = |&(mesh, posed): &(u32, Option<DAffine3>)| Instance {
+            let place = |&(mesh, posed): &Part| Instance {
                 name: name.cloned().unwrap_or_default(),
                 mesh,
                 world_from_object: posed.unwrap_or(draw.world),
             };
-            scene.instances.extend(parts.get(draw.variant).into_iter().flatten().map(place));
+            if let Some([meshes, lines]) = parts.get(draw.variant) {
+                scene.instances.extend(meshes.iter().map(place));
+                places.extend(lines.iter().map(place));
+            }
         }
         self.tell_dropped(dropped, facts);
-        Ok(())
+        Ok((wires, places))
     }
 
     fn tell_dropped(&mut self, dropped: faces::Dropped, facts: &mut Facts) {
@@ -330,10 +347,6 @@ impl Loading<'_> {
             let mut warning = Diagnostic::new(code, file, "", format!("a face with {reason} is left out"));
             warning.count = u32::try_from(count).unwrap_or(u32::MAX);
             self.report.warnings.push(warning);
-        }
-        if facts.points_and_lines > 0 {
-            let text = format!("{} points and lines are not drawn", facts.points_and_lines);
-            self.report.warnings.push(Diagnostic::new("points-and-lines", file, "", text));
         }
     }
 }

@@ -304,6 +304,7 @@ pub(super) static EXTENSIONS: &[Extension] = &[
     Extension { name: "KHR_lights_punctual", on: &["a node"], object: &LIGHT_REFERENCE },
     Extension { name: "KHR_materials_anisotropy", on: &["a material"], object: &ANISOTROPY },
     Extension { name: "KHR_materials_clearcoat", on: &["a material"], object: &CLEARCOAT },
+    Extension { name: "KHR_materials_diffuse_transmission", on: &["a material"], object: &DIFFUSE_TRANSMISSION },
     Extension { name: "KHR_materials_dispersion", on: &["a material"], object: &DISPERSION },
     Extension { name: "KHR_materials_emissive_strength", on: &["a material"], object: &EMISSIVE_STRENGTH },
     Extension { name: "KHR_materials_ior", on: &["a material"], object: &IOR },
@@ -427,6 +428,16 @@ static SPECULAR_GLOSSINESS: Object = Object {
         may("specularFactor", exactly(3, &UNIT)),
         may("glossinessFactor", UNIT),
         may("specularGlossinessTexture", object(&TEXTURE_INFO)),
+    ],
+};
+
+static DIFFUSE_TRANSMISSION: Object = Object {
+    name: "an extension",
+    properties: &[
+        may("diffuseTransmissionFactor", UNIT),
+        may("diffuseTransmissionTexture", object(&TEXTURE_INFO)),
+        may("diffuseTransmissionColorFactor", exactly(3, &UNIT)),
+        may("diffuseTransmissionColorTexture", object(&TEXTURE_INFO)),
     ],
 };
 

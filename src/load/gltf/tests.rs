@@ -382,7 +382,7 @@ fn vertex_colours_come_in_three_types_with_or_without_alpha() {
 }
 
 #[test]
-fn strips_and_fans_become_triangles_and_points_are_counted() {
+fn strips_and_fans_become_triangles_and_points_and_lines_get_a_width() {
     let square = [0f32, 0., 0., 1., 0., 0., 0., 1., 0., 1., 1., 0.];
     for (mode, triangles) in [(5, vec![[0, 1, 2], [1, 3, 2]]), (6, vec![[1, 2, 0], [2, 3, 0]])] {
         let mut file = Builder::new();
@@ -390,13 +390,38 @@ fn strips_and_fans_become_triangles_and_points_are_counted() {
         file.primitive(json!({"attributes": {"POSITION": positions}, "mode": mode}));
         assert_eq!(file.load().scene.meshes[0].triangles, triangles);
     }
+    for (mode, points, lines) in [(0, 4, 0), (1, 0, 2), (2, 0, 4), (3, 0, 3)] {
+        let mut file = Builder::new();
+        let positions = file.floats("VEC3", &square);
+        file.primitive(json!({"attributes": {"POSITION": positions}, "mode": mode}));
+        let loaded = file.load();
+        let width = 2f64.sqrt() / 256.0;
+        let wires = loaded.facts.wires;
+        assert_eq!((wires.points, wires.lines, loaded.facts.faces), (points, lines, 0), "mode {mode}");
+        assert!((wires.point_width.max(wires.line_width) - width).abs() < 1e-9, "{wires:?}");
+        assert_eq!(loaded.scene.meshes[0].triangles.len() as u64, 8 * (points + lines));
+        assert!(codes(&loaded).is_empty(), "{:?}", loaded.warnings);
+    }
+}
+
+#[test]
+fn lines_without_an_end_or_a_place_are_left_out_like_faces() {
     let mut file = Builder::new();
-    let positions = file.floats("VEC3", &square);
-    file.primitive(json!({"attributes": {"POSITION": positions}, "mode": 0}));
+    let positions = file.floats("VEC3", &[0., 0., 0., 1., 0., 0., f32::INFINITY, 0., 0.]);
+    file.primitive(json!({"attributes": {"POSITION": positions}, "mode": 3}));
     let loaded = file.load();
-    assert!(loaded.scene.meshes.is_empty(), "nothing to draw is no error of loading");
-    assert_eq!(loaded.facts.points_and_lines, 4);
-    assert_eq!(codes(&loaded), ["points-and-lines"]);
+    assert_eq!((loaded.facts.wires.lines, loaded.scene.meshes[0].triangles.len()), (2, 8));
+    assert!(codes(&loaded).contains(&"line-not-finite"), "{:?}", loaded.warnings);
+    let mut file = Builder::new();
+    let positions = file.floats("VEC3", &square_corner());
+    let indices = file.shorts(&[0, 7]);
+    file.primitive(json!({"attributes": {"POSITION": positions}, "indices": indices, "mode": 1}));
+    let message = file.fault();
+    assert!(message.contains("index 7 at position 1, but only 3 vertices exist"), "{message}");
+}
+
+fn square_corner() -> [f32; 9] {
+    [0., 0., 0., 1., 0., 0., 0., 1., 0.]
 }
 
 #[test]
@@ -554,7 +579,7 @@ fn data_that_is_used_for_two_things_is_read_twice_with_a_warning() {
     // The first three shorts of the positions are zeros and stand for one corner.
     file.root["accessors"][indices]["count"] = json!(2);
     file.primitive(json!({"attributes": {"POSITION": positions}, "indices": indices, "mode": 3}));
-    assert_eq!(codes(&file.load()), ["gltf-buffer-view-target-override", "points-and-lines"]);
+    assert_eq!(codes(&file.load()), ["gltf-buffer-view-target-override"]);
     file.primitive(json!({"attributes": {"POSITION": positions, "_CUSTOM": indices}, "indices": indices}));
     assert!(file.fault().contains("2 elements where other attributes have 3"));
 }

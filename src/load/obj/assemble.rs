@@ -106,7 +106,7 @@ fn by_run(faces: &[(Face, u32)], runs: usize) -> Vec<(u32, Vec<(Face, u32)>)> {
 }
 
 /// `object/group`, whichever there is.
-fn name(statements: &Statements, run: u32) -> String {
+pub(super) fn name(statements: &Statements, run: u32) -> String {
     let run = statements.runs[run as usize];
     let name = |id: u32| statements.names[id as usize].as_str();
     match (name(run.object), name(run.group)) {
@@ -123,7 +123,7 @@ fn range(&(face, first): &(Face, u32)) -> std::ops::Range<usize> {
 }
 
 /// What makes a vertex besides its position: texture coordinate and normal, each an index or [`NONE`].
-type Key = (u32, u32);
+pub(super) type Key = (u32, u32);
 
 struct Builder<'a> {
     soup: &'a Soup,
@@ -249,24 +249,7 @@ impl Builder<'_> {
 
     /// Fills the vertex arrays that the triangles point into.
     fn fill(&mut self, faces: &[(Face, u32)], shaded: bool) {
-        let Self { vertices, soup, positions, mesh, .. } = self;
-        mesh.positions = vertices.iter().map(|(p, _)| positions[p as usize]).collect();
-        if vertices.iter().any(|(_, (uv, _))| uv != NONE) {
-            // v points up in OBJ and down in our scenes.
-            let uv = |(_, (uv, _)): (u32, Key)| match soup.uvs.get(uv as usize) {
-                Some(uv) => crate::math::DVec2::new(uv.x, 1.0 - uv.y).as_vec2(),
-                None => Vec2::ZERO,
-            };
-            mesh.uvs = vec![vertices.iter().map(uv).collect()];
-        }
-        if vertices.iter().any(|(p, _)| soup.colors.get(p as usize).is_some_and(|&c| c != [1.0; 3])) {
-            mesh.colors = vertices.iter().map(|(p, _)| super::color::linear(soup.colors[p as usize])).collect();
-        }
-        if !soup.alphas.is_empty() {
-            mesh.colors.resize(mesh.positions.len(), Vec4::ONE);
-            let alphas = vertices.iter().map(|(p, _)| soup.alphas[p as usize]);
-            mesh.colors.iter_mut().zip(alphas).for_each(|(color, alpha)| color.w = alpha);
-        }
+        fill_vertices(&mut self.mesh, &self.vertices, self.soup, self.positions);
         if shaded {
             self.fill_normals(faces);
         }
@@ -293,6 +276,27 @@ impl Builder<'_> {
         let place = |c: &Corner| self.positions[c.position as usize].as_dvec3();
         let ring: Vec<DVec3> = self.soup.corners[range(&faces[i])].iter().map(place).collect();
         newell(&ring).try_normalize().unwrap_or(DVec3::Z).as_vec3()
+    }
+}
+
+/// Fills the places, texture coordinates and colours of a mesh's vertices.
+pub(super) fn fill_vertices(mesh: &mut Mesh, vertices: &Pairs<Key>, soup: &Soup, positions: &[Vec3]) {
+    mesh.positions = vertices.iter().map(|(p, _)| positions[p as usize]).collect();
+    if vertices.iter().any(|(_, (uv, _))| uv != NONE) {
+        // v points up in OBJ and down in our scenes.
+        let uv = |(_, (uv, _)): (u32, Key)| match soup.uvs.get(uv as usize) {
+            Some(uv) => crate::math::DVec2::new(uv.x, 1.0 - uv.y).as_vec2(),
+            None => Vec2::ZERO,
+        };
+        mesh.uvs = vec![vertices.iter().map(uv).collect()];
+    }
+    if vertices.iter().any(|(p, _)| soup.colors.get(p as usize).is_some_and(|&c| c != [1.0; 3])) {
+        mesh.colors = vertices.iter().map(|(p, _)| super::color::linear(soup.colors[p as usize])).collect();
+    }
+    if !soup.alphas.is_empty() {
+        mesh.colors.resize(mesh.positions.len(), Vec4::ONE);
+        let alphas = vertices.iter().map(|(p, _)| soup.alphas[p as usize]);
+        mesh.colors.iter_mut().zip(alphas).for_each(|(color, alpha)| color.w = alpha);
     }
 }
 

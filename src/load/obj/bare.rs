@@ -5,11 +5,12 @@
 
 use super::place::place;
 use super::soup::{Corner, NONE, Soup};
-use super::statements::{Face, Run, Statements};
-use super::{assemble, chunk, color, generator, mtl, scene, up, warn_of_faces};
+use super::statements::{Face, Run, Statements, Stroke};
+use super::{assemble, chunk, color, generator, mtl, scene, strokes, up, warn_of_faces};
 use crate::load::limits::{Budget, OverBudget};
 use crate::load::paths::Resolver;
-use crate::load::{Diagnostic, Facts, LoadOptions, Loaded, Source, Warnings};
+use crate::load::wires::Wires;
+use crate::load::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
 use crate::math::{DVec2, DVec3, Vec3};
 use crate::scene::{AlphaMode, Mesh, UpAxis};
 use std::path::Path;
@@ -30,8 +31,8 @@ pub(in crate::load) struct Bare {
     pub arities: Vec<u32>,
     /// Faces that had fewer.
     pub few_corners: u64,
-    /// Edges and the like, which are not drawn.
-    pub points_and_lines: u64,
+    /// The vertices at both ends of each edge; each is there.
+    pub edges: Vec<[u32; 2]>,
     /// Decimal places of the finest coordinate; `None` where coordinates are not written in digits.
     pub places: Option<i32>,
     /// What the file says of itself.
@@ -46,6 +47,8 @@ impl Bare {
     const CORNER: u64 = 40;
     /// Bytes that a face takes: here, twice as a statement, and its number in the mesh.
     const FACE: u64 = 56;
+    /// Bytes that a point or edge takes as a statement, with its corners and their vertices.
+    const STROKE: u64 = 192;
     /// The most vertices, corners or faces.
     pub(in crate::load) const LARGEST: u64 = chunk::LARGEST as u64;
 
@@ -57,6 +60,16 @@ impl Bare {
     /// Takes the memory of a face of so many corners from a budget, before it is added.
     pub(in crate::load) fn charge_face(budget: &mut Budget, arity: usize) -> Result<(), OverBudget> {
         budget.take(1, Self::FACE + Self::CORNER * arity as u64)
+    }
+
+    /// Whether there is nothing that joins its vertices: then they are points.
+    fn is_cloud(&self) -> bool {
+        self.arities.is_empty() && self.edges.is_empty() && self.few_corners == 0
+    }
+
+    /// How many points and edges are drawn.
+    fn strokes(&self) -> u64 {
+        (if self.is_cloud() { self.positions.len() } else { self.edges.len() }) as u64
     }
 
     /// Adds a face, or counts one with too few corners.
@@ -76,7 +89,11 @@ pub(in crate::load) fn over_memory(file: &Path, over: OverBudget) -> Diagnostic 
     Diagnostic::new("over-memory", file, "", over.to_string()).remedy("raise --max-memory")
 }
 
-/// Makes the scene. `format` is the file's kind for reports; `otherwise` the up axis where nothing speaks for one, and why.
+/// Makes the scene of faces and edges, or else of all vertices as points. `format` is the file's kind for reports;
+/// `otherwise` the up axis where nothing speaks for one, and why.
+///
+/// # Errors
+/// When points and lines would take more than is left of the budget.
 pub(in crate::load) fn load(
     bare: Bare,
     format: &str,
@@ -84,16 +101,19 @@ pub(in crate::load) fn load(
     source: &Source,
     options: &LoadOptions,
     mut budget: Budget,
-) -> Loaded {
+) -> Result<Loaded, LoadError> {
     let file = source.path.as_path();
     let mut warnings = Warnings::default();
     let mut resolver = Resolver::new(source, options);
-    let (few_corners, points_and_lines, vertices) = (bare.few_corners, bare.points_and_lines, bare.positions.len());
+    let (few_corners, vertices) = (bare.few_corners, bare.positions.len());
+    budget.take(bare.strokes(), Bare::STROKE).map_err(|over| over_memory(file, over))?;
     let (statements, soup) = statements(bare);
     let placed = place(&soup.positions);
     let flatness = assemble::flatness(&placed.positions, statements.places);
     let assembled = assemble::assemble(&statements, &soup, &placed, options.polygons, flatness);
     let is_see_through = !soup.alphas.is_empty();
+    let wires = strokes::assemble(&statements, &soup, &placed);
+    let wires: Vec<Wires> = wires.into_iter().map(|(_, wires)| wires).collect();
     drop(soup);
 
     // What could not be drawn.
@@ -104,13 +124,9 @@ pub(in crate::load) fn load(
         let text = "a face is dropped: it has fewer than 3 corners";
         warnings.push(Diagnostic { count, ..Diagnostic::new("face-few-corners", file, "", text) });
     }
-    if statements.faces.is_empty() {
+    if statements.faces.is_empty() && wires.is_empty() {
         let text = format!("{vertices} vertices and no face: there is nothing to draw");
         warnings.push(Diagnostic::new("no-faces", file, "", text));
-    }
-    if points_and_lines > 0 {
-        let text = format!("{points_and_lines} points and lines are not drawn");
-        warnings.push(Diagnostic::new("points-and-lines", file, "", text));
     }
 
     let mut dropped = super::dropped(&statements, &assembled);
@@ -121,32 +137,34 @@ pub(in crate::load) fn load(
     let (guessed, reason) = up::guess(&statements.comments, &meshes, placed.center, otherwise);
     let mut reading =
         mtl::Reading { file, options, resolver: &mut resolver, budget: &mut budget, warnings: &mut warnings };
-    let unnamed = vec![None; meshes.len()];
+    let unnamed = vec![None; meshes.len() + wires.len()];
     let materials = mtl::load(&[], &unnamed, &mut reading);
     let mut scene = scene(meshes, materials, placed.center, options.up.unwrap_or(guessed));
     if is_see_through {
         scene.materials.iter_mut().for_each(|material| material.alpha_mode = AlphaMode::Blend);
     }
     let (files, hash) = resolver.finish();
-    let facts = Facts {
+    let mut facts = Facts {
         format: format.into(),
         generator: generator(&statements.comments),
         faces: assembled.faces,
         dropped,
-        points_and_lines,
         up_reason: options.up.is_none().then_some(reason),
         max_rounding: placed.max_rounding,
         files,
         hash,
         ..Facts::default()
     };
-    Loaded { scene, warnings: warnings.into_vec(), facts }
+    let lost = super::draw(&wires, placed.center, &mut scene, &mut budget, &mut facts, file)?;
+    lost.into_iter().for_each(|warning| warnings.push(warning));
+    Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
 }
 
 /// The same as statements of an OBJ would leave it: one run of faces, each attribute numbered as its vertex.
 #[expect(clippy::cast_possible_truncation, reason = "readers keep below Bare::LARGEST")]
 fn statements(bare: Bare) -> (Statements, Soup) {
-    let Bare { positions, normals, uvs, colors, corners, arities, .. } = bare;
+    let is_cloud = bare.is_cloud();
+    let Bare { positions, normals, uvs, colors, corners, arities, edges, .. } = bare;
     let normals: Vec<Vec3> = normals.into_iter().map(|n| n.as_dvec3().normalize_or_zero().as_vec3()).collect();
     let corner = |i: u32| {
         let (uv, normal) = (uvs.get(i as usize), normals.get(i as usize));
@@ -156,16 +174,23 @@ fn statements(bare: Bare) -> (Statements, Soup) {
             normal: if normal.is_some_and(|n| *n != Vec3::ZERO) { i } else { NONE },
         }
     };
+    let stroke = |arity, joined| Stroke { run: 0, line: 0, arity, joined };
+    let (strokes, stroke_corners) = if is_cloud {
+        ((0..positions.len()).map(|_| stroke(1, false)).collect(), (0..positions.len() as u32).map(corner).collect())
+    } else {
+        (edges.iter().map(|_| stroke(2, true)).collect(), edges.iter().flatten().map(|&i| corner(i)).collect())
+    };
     let corners = corners.into_iter().map(corner).collect();
     let alphas = color::opacities(&colors);
     let colors = colors.into_iter().map(|[r, g, b, _]| [r, g, b]).collect();
-    let mut soup = Soup { positions, uvs, normals, colors, alphas, corners };
+    let mut soup = Soup { positions, uvs, normals, colors, alphas, corners, stroke_corners };
     soup.leave_out_unused();
 
     let faces = (0..).zip(&arities).map(|(number, &arity)| Face { run: 0, smoothing: 0, arity, line: number, number });
     let statements = Statements {
         counts: [soup.positions.len() as u32, 0, 0],
         faces: faces.collect(),
+        strokes,
         runs: vec![Run::default()],
         names: vec![String::new()],
         // So many digits that the rounding to `f32` alone counts.

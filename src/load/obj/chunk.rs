@@ -8,7 +8,7 @@
 use super::encoding::decode_name;
 use super::lines::{Lines, keyword, without_comment, words};
 use super::number::{self, Plain};
-use super::statements::{Face, Oddities, Run};
+use super::statements::{Face, Oddities, Run, Stroke};
 use crate::math::{DVec2, DVec3, Vec3};
 use std::collections::HashMap;
 
@@ -45,6 +45,10 @@ pub(super) struct Chunk {
     /// Corners of faces that have too few.
     pub dropped: Vec<[u32; 3]>,
     pub faces: Vec<Face>,
+    /// Points and lines.
+    pub strokes: Vec<Stroke>,
+    /// Their corners, as [`Self::corners`].
+    pub stroke_corners: Vec<[u32; 3]>,
     pub runs: Vec<Run>,
     /// 0 is the empty one.
     pub names: Vec<String>,
@@ -269,8 +273,8 @@ impl Reader {
             b"usemtl" => self.rename(|run, name| run.material = Some(name), rest),
             b"s" => self.smoothing_group(rest),
             b"mtllib" => self.out.libraries.push((self.line, decode_name(rest))),
-            b"l" => self.out.odd.lines.note(self.line, word),
-            b"p" => words(rest).for_each(|_| self.out.odd.points.note(self.line, word)),
+            b"l" => self.stroke(rest, true),
+            b"p" => self.stroke(rest, false),
             // Continued blank lines leave no word.
             b"" => {}
             _ if word.starts_with(b"#") => self.comment(text),
@@ -379,6 +383,25 @@ impl Reader {
             return self.out.odd.few_corners.note(self.line, rest);
         }
         self.push_face(arity);
+    }
+
+    /// A `p` or `l` statement; one that cannot be read is counted and left out.
+    fn stroke(&mut self, rest: &[u8], joined: bool) {
+        let first = self.out.stroke_corners.len();
+        for word in words(rest) {
+            let Some(corner) = self.corner(word) else {
+                self.out.stroke_corners.truncate(first);
+                break;
+            };
+            self.out.stroke_corners.push(corner);
+        }
+        let arity = count(self.out.stroke_corners.len() - first);
+        if arity < if joined { 2 } else { 1 } {
+            self.out.stroke_corners.truncate(first);
+            return self.out.odd.strokes.note(self.line, rest);
+        }
+        let run = self.run();
+        self.out.strokes.push(Stroke { run, line: self.line, arity, joined });
     }
 
     /// `v`, `v/vt`, `v//vn` or `v/vt/vn`; numbers count from 1, or back from the last one with −1.

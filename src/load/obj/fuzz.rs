@@ -38,7 +38,7 @@ fn mesh() -> impl Strategy<Value = String> {
 pub(in crate::load) fn assert_sound(loaded: &Loaded) {
     let scene = &loaded.scene;
     assert_eq!(scene.meshes.len(), scene.instances.len());
-    let mut faces = 0u64;
+    let mut drawn = 0u64;
     for mesh in &scene.meshes {
         let n = mesh.positions.len();
         assert!((mesh.material as usize) < scene.materials.len());
@@ -58,10 +58,12 @@ pub(in crate::load) fn assert_sound(loaded: &Loaded) {
             false => mesh.face_of_triangle.clone(),
         };
         numbers.dedup();
-        faces += (numbers.len() + mesh.polygons.len()) as u64;
+        drawn += (numbers.len() + mesh.polygons.len()) as u64;
         assert!(mesh.polygons.iter().all(|p| p.len >= 3 && (p.first + p.len) as usize <= mesh.polygon_corners.len()));
     }
-    assert_eq!(faces, loaded.facts.faces);
+    let facts = &loaded.facts;
+    let nowhere: u64 = facts.dropped.iter().filter(|d| d.0.contains("point or line")).map(|d| d.1).sum();
+    assert_eq!(drawn + nowhere, facts.faces + facts.wires.points + facts.wires.lines);
 }
 
 fn check(text: &str) {

@@ -2,7 +2,7 @@
 
 use super::chunk::{COMMENTS, Chunk, LARGEST, OPEN, resolve};
 use super::soup::{Corner, NONE, Soup};
-use super::statements::{Run, Statements};
+use super::statements::{Run, Statements, Stroke};
 use crate::math::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -57,7 +57,8 @@ pub(super) fn join(mut chunks: Vec<Chunk>) -> Result<Joined, u64> {
         }
     }
     out.faces = flat(chunks.iter_mut().map(|c| std::mem::take(&mut c.faces)));
-    out.soup = Soup { positions, uvs, normals, colors, alphas: Vec::new(), corners };
+    let stroke_corners = strokes(&chunks, &begins, &runs, &there, &mut out);
+    out.soup = Soup { positions, uvs, normals, colors, alphas: Vec::new(), corners, stroke_corners };
     let faulty = faulty || chunks.iter().any(|c| c.faulty);
     Ok(Joined { statements: out, faulty })
 }
@@ -69,6 +70,7 @@ fn check_sizes(chunks: &[Chunk]) -> Result<(), u64> {
         sum(|c| c.uvs.len()),
         sum(|c| c.normals.len()),
         sum(|c| c.corners.len()),
+        sum(|c| c.stroke_corners.len()),
         sum(|c| c.face_count as usize),
     ];
     let largest = sizes.into_iter().max().unwrap_or_default();
@@ -206,6 +208,29 @@ impl There<'_> {
         };
         (corner, position.is_none() || uv.is_none() || normal.is_none())
     }
+}
+
+/// Takes over points and lines; their corners. What names a vertex that is not there is counted and left out.
+fn strokes(chunks: &[Chunk], begins: &[Before], runs: &[Vec<u32>], there: &There, out: &mut Statements) -> Vec<Corner> {
+    let mut corners = Vec::with_capacity(chunks.iter().map(|c| c.stroke_corners.len()).sum());
+    for ((chunk, before), runs) in chunks.iter().zip(begins).zip(runs) {
+        let mut rest = chunk.stroke_corners.as_slice();
+        for stroke in &chunk.strokes {
+            let (numbers, after) = rest.split_at(stroke.arity as usize);
+            rest = after;
+            let own = numbers.iter().map(|numbers| there.corner(numbers, before).0);
+            let first = corners.len();
+            corners.extend(own);
+            let line = stroke.line.saturating_add(before.lines);
+            if corners[first..].iter().any(|corner| corner.position == NONE) {
+                corners.truncate(first);
+                out.odd.strokes.note(line, if stroke.joined { b"l" } else { b"p" });
+            } else {
+                out.strokes.push(Stroke { run: runs[stroke.run as usize], line, ..*stroke });
+            }
+        }
+    }
+    corners
 }
 
 /// The corners of all faces, and whether one of them, or of the faces that were dropped, names what is not there.

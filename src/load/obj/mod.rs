@@ -4,6 +4,8 @@
 //! corners (`soup`). These are centred in `f64` and rounded (`place`), and become one mesh and one instance for each run of
 //! faces with the same object, group and material (`assemble`). Materials come from MTL files (`mtl`).
 //!
+//! Points and lines (`strokes`) get a width (`load::wires`).
+//!
 //! What the text leaves open is decided so: faces without normals are flat unless a smoothing group says otherwise;
 //! vertex colours are sRGB-coded, MTL colours linear; the fourth number of a vertex is a weight for rational curves and
 //! ignored; every surface is seen from both sides; a face whose normals point to its back is turned round.
@@ -24,10 +26,12 @@ mod smooth;
 mod soup;
 mod split;
 mod statements;
+mod strokes;
 mod up;
 
 use super::limits::Budget;
 use super::paths::Resolver;
+use super::wires::{self, Wires};
 use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
 use crate::math::{DAffine3, DVec3};
 use crate::scene::{Instance, Mesh, Scene, UpAxis};
@@ -54,10 +58,12 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
     let placed = place::place(&soup.positions);
     let flatness = assemble::flatness(&placed.positions, statements.places);
     let mut assembled = assemble::assemble(&statements, &soup, &placed, options.polygons, flatness);
+    let (wire_runs, mut wires): (Vec<u32>, Vec<Wires>) =
+        strokes::assemble(&statements, &soup, &placed).into_iter().unzip();
     drop(soup);
     let codes = ["obj-not-finite", "obj-equal-corners", "obj-crossing-face", "obj-turned-face"];
     warn_of_faces(&assembled, codes, |line| line.to_string(), file, &mut warnings);
-    if statements.faces.is_empty() {
+    if statements.faces.is_empty() && wires.is_empty() {
         let text = format!("{} vertices and no face: there is nothing to draw", statements.counts[0]);
         warnings.push(Diagnostic::new("obj-no-faces", file, "", text));
     }
@@ -66,20 +72,21 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
     let (runs, meshes): (Vec<u32>, Vec<Mesh>) = std::mem::take(&mut assembled.meshes).into_iter().unzip();
     let (guessed, reason) = up::guess(&statements.comments, &meshes, placed.center, up::UNSAID);
     let name = |run: &u32| statements.runs[*run as usize].material.map(|id| statements.names[id as usize].as_str());
-    let names: Vec<Option<&str>> = runs.iter().map(name).collect();
+    let names: Vec<Option<&str>> = runs.iter().chain(&wire_runs).map(name).collect();
     let mut reading =
         mtl::Reading { file, options, resolver: &mut resolver, budget: &mut budget, warnings: &mut warnings };
     let materials = mtl::load(&statements.libraries, &names, &mut reading);
     let (reading, decoding) = (resolver.reading(), materials.decoding);
-    let scene = scene(meshes, materials, placed.center, options.up.unwrap_or(guessed));
+    let of_wires = materials.of_name.get(meshes.len()..).unwrap_or_default();
+    wires.iter_mut().zip(of_wires).for_each(|(wires, &material)| wires.mesh.material = material);
+    let mut scene = scene(meshes, materials, placed.center, options.up.unwrap_or(guessed));
 
     let (files, hash) = resolver.finish();
-    let facts = Facts {
+    let mut facts = Facts {
         format: "Wavefront OBJ".into(),
         generator: generator(&statements.comments),
         faces: assembled.faces,
         dropped: dropped(&statements, &assembled),
-        points_and_lines: u64::from(statements.odd.points.count) + u64::from(statements.odd.lines.count),
         up_reason: options.up.is_none().then_some(reason),
         max_rounding: placed.max_rounding,
         files,
@@ -88,7 +95,24 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
         decoding,
         ..Facts::default()
     };
+    let lost = draw(&wires, placed.center, &mut scene, &mut budget, &mut facts, file)?;
+    lost.into_iter().for_each(|warning| warnings.push(warning));
     Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
+}
+
+/// Puts points and lines into the scene, moved to where the file has them; a warning when some have no place.
+fn draw(
+    wires: &[Wires],
+    center: DVec3,
+    scene: &mut Scene,
+    budget: &mut Budget,
+    facts: &mut Facts,
+    file: &Path,
+) -> Result<Option<Diagnostic>, Diagnostic> {
+    let world_from_object = DAffine3::from_translation(center);
+    let place = |(mesh, of): (u32, &Wires)| Instance { name: of.mesh.name.clone(), mesh, world_from_object };
+    let places: Vec<Instance> = (0..).zip(wires).map(place).collect();
+    wires::draw(wires, &places, scene, budget, facts, file).map_err(|over| bare::over_memory(file, over))
 }
 
 /// One instance of each mesh, moved to where the file has it.

@@ -16,7 +16,7 @@ pub(super) struct Corner {
 /// The vertices of a file in its order, and the corners of all faces one after another.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Soup {
-    /// Those that no face uses are not finite.
+    /// Those that no face, line or point uses are not finite.
     pub positions: Vec<DVec3>,
     /// v points up, as in the file. Those that corners name are finite.
     pub uvs: Vec<DVec2>,
@@ -27,13 +27,15 @@ pub(super) struct Soup {
     /// Opacity per position, 0…1; empty when everything is opaque.
     pub alphas: Vec<f32>,
     pub corners: Vec<Corner>,
+    /// Corners of all points and lines, one statement after another.
+    pub stroke_corners: Vec<Corner>,
 }
 
 impl Soup {
-    /// Takes the places of vertices that no face uses, so that they move neither the centre nor the frame.
+    /// Takes the places of vertices that nothing uses, so that they move neither the centre nor the frame.
     pub(super) fn leave_out_unused(&mut self) {
         let mut used = vec![false; self.positions.len()];
-        for corner in &self.corners {
+        for corner in self.corners.iter().chain(&self.stroke_corners) {
             if let Some(used) = used.get_mut(corner.position as usize) {
                 *used = true;
             }

@@ -31,6 +31,19 @@ pub(super) struct Face {
     pub number: u32,
 }
 
+/// One `p` or `l` statement, without its corners.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Stroke {
+    /// Which of [`Statements::runs`].
+    pub run: u32,
+    /// Where it stands in the file.
+    pub line: u32,
+    /// Number of corners, at least 1, or 2 of a line.
+    pub arity: u32,
+    /// Whether its corners are joined.
+    pub joined: bool,
+}
+
 /// What faces between two `o`, `g` or `usemtl` statements share; indices into [`Statements::names`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct Run {
@@ -69,8 +82,7 @@ impl Tally {
 /// Odd things, counted.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Oddities {
-    pub points: Tally,
-    pub lines: Tally,
+    pub strokes: Tally,
     pub curves: Tally,
     pub few_corners: Tally,
     pub unknown: Tally,
@@ -89,6 +101,7 @@ pub(super) struct Statements {
     pub counts: [u32; 3],
     pub soup: Soup,
     pub faces: Vec<Face>,
+    pub strokes: Vec<Stroke>,
     pub runs: Vec<Run>,
     /// Names; 0 is the empty one.
     pub names: Vec<String>,
@@ -152,14 +165,15 @@ fn bytes(chunk: &Chunk) -> u64 {
     /// Twice in `f64`, then in `f32`, and in the mesh.
     const VERTEX: u64 = 2 * 24 + 12 + 12;
     let vertices = chunk.positions.len() + chunk.uvs.len() + chunk.normals.len() + chunk.colors.len();
-    chunk.faces.len() as u64 * FACE + chunk.corners.len() as u64 * CORNER + vertices as u64 * VERTEX
+    let corners = chunk.corners.len() + chunk.stroke_corners.len();
+    let faces = chunk.faces.len() + chunk.strokes.len();
+    faces as u64 * FACE + corners as u64 * CORNER + vertices as u64 * VERTEX
 }
 
 impl Oddities {
     /// Adds what was met further on, `lines` lines before which there are.
     pub(super) fn append(&mut self, more: Self, lines: u32) {
-        self.points.append(more.points, lines);
-        self.lines.append(more.lines, lines);
+        self.strokes.append(more.strokes, lines);
         self.curves.append(more.curves, lines);
         self.few_corners.append(more.few_corners, lines);
         self.unknown.append(more.unknown, lines);
@@ -178,9 +192,8 @@ impl Oddities {
                 warnings.push(Diagnostic { count: tally.count, ..warning });
             }
         };
-        let not_drawn = "has no surface and is not drawn";
-        warn("obj-points", &self.points, format!("a point {not_drawn}"), "");
-        warn("obj-lines", &self.lines, format!("a line {not_drawn}"), "");
+        let stroke = format!("'{}' names no vertices of this file and is left out", self.strokes.word);
+        warn("obj-bad-line", &self.strokes, stroke, "export the model again");
         let curve = format!("free-form geometry ('{}') is not drawn", self.curves.word);
         warn("obj-free-form", &self.curves, curve, "export it as polygons");
         let few = "a face with fewer than 3 corners is dropped";
@@ -292,11 +305,23 @@ mod tests {
     }
 
     #[test]
-    fn points_lines_and_curves_are_counted_and_short_faces_dropped() {
+    fn curves_are_counted_and_short_faces_dropped() {
         let s = of(&format!("{TRIANGLE}p 1 2 3\nl 1 2 3\nsurf 0 1 0 1 1\nf 1 2\nf\nf 1 2 3\nhello"));
-        assert_eq!((s.odd.points.count, s.odd.lines.count, s.odd.curves.count), (3, 1, 1));
+        assert_eq!((s.odd.strokes.count, s.odd.curves.count), (0, 1));
         assert_eq!((s.odd.few_corners.count, s.odd.unknown.count), (2, 1));
         assert_eq!(s.faces, [Face { run: 0, smoothing: 0, arity: 3, line: 9, number: 2 }]);
+    }
+
+    #[test]
+    fn points_and_lines_name_vertices_like_faces_and_bad_ones_are_left_out() {
+        let text = format!("l 1/1 2 3 # side\n{TRIANGLE}vt 0 0\np -1 1\nl 1\nl 1 9\np x\np\nl 1 -4\nf 1 2 3\nl 2 3");
+        let s = of(&text);
+        let stroke = |line, arity, joined| Stroke { run: 0, line, arity, joined };
+        assert_eq!(s.strokes, [stroke(1, 3, true), stroke(6, 2, false), stroke(13, 2, true)]);
+        let numbers: Vec<_> = s.soup.stroke_corners.iter().map(|c| (c.position, c.uv == NONE)).collect();
+        let at = |i| (i, true);
+        assert_eq!(numbers, [(0, false), at(1), at(2), at(2), at(0), at(1), at(2)]);
+        assert_eq!(s.odd.strokes.count, 5);
     }
 
     #[test]

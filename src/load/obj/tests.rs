@@ -3,7 +3,7 @@
 use super::*;
 use crate::load::Polygons;
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
-use crate::scene::UpAxis;
+use crate::scene::{Material, Surface, UpAxis};
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
@@ -207,10 +207,25 @@ fn faces_without_three_finite_different_corners_are_dropped_and_counted() {
 }
 
 #[test]
-fn points_lines_and_curves_are_warnings_and_an_empty_scene_is_no_error() {
-    let loaded = of(&format!("{TRIANGLE}l 1 2 3\np 1 2\ncurv 0 1 1 2"));
-    assert_eq!(codes(&loaded), [("obj-points", 2), ("obj-lines", 1), ("obj-free-form", 1), ("obj-no-faces", 1)]);
-    assert_eq!(loaded.facts.points_and_lines, 3);
+fn points_and_lines_are_drawn_in_the_colours_of_their_material_and_vertices() {
+    let text = "v 0 0 0 1 0 0\nv 4 0 0 0 0 1\nv 0 3 0\ng ship\nl 1 2 3 # keel\np 3\nusemtl b\nl -1 -3";
+    let loaded = of(text);
+    let (scene, wires) = (&loaded.scene, loaded.facts.wires);
+    assert_eq!((wires.points, wires.lines, wires.line_width), (1, 3, 5.0 / 256.0));
+    assert_eq!(scene.meshes.iter().map(|m| m.triangles.len()).collect::<Vec<_>>(), [24, 8]);
+    assert_eq!((scene.meshes[0].name.as_str(), scene.instances[1].name.as_str()), ("ship", "ship"));
+    let shown = scene.meshes.iter().map(|mesh| &scene.materials[mesh.material as usize]);
+    assert_eq!(shown.clone().map(|m| m.name.as_str()).collect::<Vec<_>>(), [Material::plain().name.as_str(), "b"]);
+    assert!(shown.clone().all(|m| matches!(m.surface, Surface::Unlit)));
+    let ends = [scene.meshes[0].colors[0], scene.meshes[0].colors[5]].map(|c| c.truncate().to_array());
+    assert_eq!(ends, [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
+    fuzz::assert_sound(&loaded);
+}
+
+#[test]
+fn lines_that_name_nothing_and_curves_are_warnings_and_an_empty_scene_is_no_error() {
+    let loaded = of(&format!("{TRIANGLE}l 1 2 9\np x\ncurv 0 1 1 2"));
+    assert_eq!(codes(&loaded), [("obj-bad-line", 2), ("obj-free-form", 1), ("obj-no-faces", 1)]);
     assert!(loaded.scene.meshes.is_empty() && loaded.scene.instances.is_empty());
     assert!(of("").scene.meshes.is_empty());
 }

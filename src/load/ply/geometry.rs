@@ -60,10 +60,8 @@ impl Reader<'_, '_> {
             ("vertex", _) if self.bare.positions.is_empty() => self.vertices(element),
             ("face", Some(list)) => self.faces(element, list, false),
             ("tristrips", Some(list)) => self.faces(element, list, true),
-            (name, _) => {
-                if name == "edge" {
-                    self.bare.points_and_lines = self.bare.points_and_lines.saturating_add(element.count);
-                }
+            ("edge", _) if ends(element).is_some() => self.edges(element),
+            _ => {
                 // Without properties there is nothing to pass over, however many there are.
                 if element.properties.is_empty() { Ok(()) } else { self.pass(element) }
             }
@@ -115,6 +113,27 @@ impl Reader<'_, '_> {
         Ok(())
     }
 
+    /// Lines.
+    fn edges(&mut self, element: &Element) -> Result<(), Diagnostic> {
+        let Some(slots) = ends(element) else { return self.pass(element) };
+        for i in 0..element.count {
+            let mut edge = [0; 2];
+            for (k, property) in element.properties.iter().enumerate() {
+                match slots.iter().position(|&slot| slot == k) {
+                    Some(end) => {
+                        let value = self.value(element, i, property)?;
+                        edge[end] = self.index(value, end as u64, element, i)?;
+                    }
+                    None => self.pass_property(element, i, property)?,
+                }
+            }
+            // An edge takes what a face of two corners would.
+            Bare::charge_face(self.budget, 2).map_err(|over| over_memory(&self.source.path, over))?;
+            self.bare.edges.push(edge);
+        }
+        Ok(())
+    }
+
     /// Polygons, or strips of triangles.
     fn faces(&mut self, element: &Element, list: usize, strips: bool) -> Result<(), Diagnostic> {
         let mut corners = Vec::new();
@@ -153,17 +172,22 @@ impl Reader<'_, '_> {
                 corners.push(RESTART);
                 continue;
             }
-            // Below the number of vertices, which fits.
-            let is_there = value >= 0.0 && value < self.vertices as f64 && value.fract() == 0.0;
-            if !is_there {
-                let (name, vertices) = (shorten(&element.name), self.vertices);
-                let text = format!("corner {k} of {name} {i} is vertex {value}, but only {vertices} vertices exist");
-                return Err(self.body.fault(text, "it is damaged; export it again"));
-            }
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked just before")]
-            corners.push(value as u32);
+            corners.push(self.index(value, k, element, i)?);
         }
         Ok(())
+    }
+
+    /// The number of a vertex that is there.
+    fn index(&self, value: f64, corner: u64, element: &Element, i: u64) -> Result<u32, Diagnostic> {
+        // Below the number of vertices, which fits.
+        let is_there = value >= 0.0 && value < self.vertices as f64 && value.fract() == 0.0;
+        if !is_there {
+            let (name, vertices) = (shorten(&element.name), self.vertices);
+            let text = format!("corner {corner} of {name} {i} is vertex {value}, but only {vertices} vertices exist");
+            return Err(self.body.fault(text, "it is damaged; export it again"));
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked just before")]
+        Ok(value as u32)
     }
 
     fn strip(&mut self, strip: &[u32]) -> Result<(), Diagnostic> {
@@ -223,6 +247,13 @@ impl Reader<'_, '_> {
         let count = if property.length.is_some() { self.length(element, i, property)? } else { 1 };
         self.body.pass(count, property.kind).map_err(|why| self.missing(&why, element, i, property))
     }
+}
+
+/// Which properties of an edge are its ends.
+fn ends(element: &Element) -> Option<[usize; 2]> {
+    let number = |property: &Property, name: &str| property.length.is_none() && property.name == name;
+    let slot = |name| element.properties.iter().position(|property| number(property, name));
+    Some([slot("vertex1")?, slot("vertex2")?])
 }
 
 /// Stands between two strips; more than there can be vertices.

@@ -4,7 +4,8 @@
 //! A header lists elements and their properties (`header`); their values follow in that order (`body`). Of these are
 //! read: of `vertex` the place (`x y z`), normal (`nx ny nz`), texture coordinates (`u v`, `s t`, `texture_u texture_v`)
 //! and colour (`red green blue alpha`); of `face` its `vertex_indices`; of `tristrips` the same, where −1 starts another
-//! strip. Everything else is passed over; edges are counted and not drawn.
+//! strip; of `edge` its `vertex1` and `vertex2`. Everything else is passed over. Where nothing joins the vertices, as in
+//! clouds that scanners write, they are points.
 //!
 //! What the format leaves open is decided as for OBJ: colours are sRGB-coded, faces without normals flat, and every
 //! surface is seen from both sides. Colours of whole bytes are 0…255, floats 0…1.
@@ -26,7 +27,7 @@ use header::{Encoding, Header};
 ///
 /// # Errors
 /// When the header is not understood, values are missing or are no numbers, or a face names a vertex that is not there:
-/// with the line, or in binary files the byte. A file without faces is an empty scene.
+/// with the line, or in binary files the byte. A file without vertices is an empty scene.
 pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
     let mut budget = Budget::new(&options.limits);
     let header = Header::read(&source.bytes, &source.path)?;
@@ -37,7 +38,7 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
         Encoding::BigEndian => "PLY (binary, big-endian)",
     };
     let otherwise = (UpAxis::Y, "PLY does not say, and nothing speaks for +Z");
-    Ok(bare::load(bare, format, otherwise, source, options, budget))
+    bare::load(bare, format, otherwise, source, options, budget)
 }
 
 #[cfg(test)]

@@ -196,19 +196,36 @@ fn what_cannot_be_drawn_is_counted() {
         element face 4\nproperty list uchar int vertex_indices\nend_header\n\
         0 0 0\n1 0 0\nnan 1 0\n0 1\n1 2\n2 0 1\n3 0 1 2\n3 0 0 1\n0\n";
     let loaded = plain(file.as_bytes());
-    assert_eq!((loaded.facts.faces, loaded.facts.points_and_lines), (0, 2));
+    assert_eq!((loaded.facts.faces, loaded.facts.wires.lines), (0, 2));
     let mut codes: Vec<_> = loaded.warnings.iter().map(|w| (w.code, w.count)).collect();
     codes.sort_unstable();
-    let expected = [("face-degenerate", 1), ("face-few-corners", 2), ("face-not-finite", 1), ("points-and-lines", 1)];
+    let expected = [("face-degenerate", 1), ("face-few-corners", 2), ("face-not-finite", 1), ("line-not-finite", 1)];
     assert_eq!(codes, expected);
     let dropped: u64 = loaded.facts.dropped.iter().map(|d| d.1).sum();
-    assert_eq!(dropped, 4);
+    assert_eq!(dropped, 5);
+    assert_eq!(loaded.scene.meshes[0].triangles.len(), 8, "one edge has both its ends");
 
-    let cloud = plain(
-        b"ply\nformat ascii 1.0\nelement vertex 1\nproperty int x\nproperty int y\nproperty int z\nend_header\n1 2 3",
-    );
-    assert!(cloud.scene.meshes.is_empty());
-    assert_eq!(cloud.warnings[0].to_string(), "a.ply: 1 vertices and no face: there is nothing to draw");
+    let start = "ply\nformat ascii 1.0\nelement vertex 0\nproperty int x\nproperty int y\nproperty int z\n";
+    let nothing = plain(format!("{start}end_header\n").as_bytes());
+    assert!(nothing.scene.meshes.is_empty());
+    assert_eq!(nothing.warnings[0].to_string(), "a.ply: 0 vertices and no face: there is nothing to draw");
+}
+
+#[test]
+fn vertices_that_nothing_joins_are_points_lit_by_their_normals() {
+    let header = |normals: &str| {
+        let axes = "property float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n";
+        format!("ply\nformat ascii 1.0\nelement vertex 2\n{axes}{normals}end_header\n")
+    };
+    let cloud = plain(format!("{}0 0 0 255 0 0\n3 4 0 0 255 0\n", header("")).as_bytes());
+    let (mesh, wires) = (&cloud.scene.meshes[0], cloud.facts.wires);
+    assert_eq!((wires.points, wires.lines, wires.point_width, mesh.triangles.len()), (2, 0, 5.0 / 256.0, 16));
+    assert_eq!((mesh.colors[0].to_array(), mesh.colors[6].to_array()), ([1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0]));
+    assert!(mesh.normals.is_empty() && cloud.warnings.is_empty(), "{:?}", cloud.warnings);
+    let normals = "property float nx\nproperty float ny\nproperty float nz\n";
+    let cloud = plain(format!("{}0 0 0 255 0 0 0 0 2\n3 4 0 0 255 0 1 0 0\n", header(normals)).as_bytes());
+    let mesh = &cloud.scene.meshes[0];
+    assert_eq!((mesh.triangles.len(), mesh.normals[0], mesh.normals[4]), (4, Vec3::Z, Vec3::X));
 }
 
 #[test]

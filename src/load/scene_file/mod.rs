@@ -356,7 +356,7 @@ fn assemble(
         part.warnings.into_iter().for_each(|w| warnings.push(w));
         facts.faces += part.facts.faces;
         facts.dropped.extend(part.facts.dropped);
-        facts.points_and_lines += part.facts.points_and_lines;
+        facts.wires.append(&part.facts.wires);
         facts.extensions.extend(part.facts.extensions);
         facts.animations.extend(part.facts.animations);
         facts.max_rounding = facts.max_rounding.max(part.facts.max_rounding);

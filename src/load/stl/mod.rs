@@ -43,7 +43,7 @@ pub fn load(source: &Source, encoding: Encoding, options: &LoadOptions) -> Resul
     };
     // Layers are built upwards along z.
     let otherwise = (UpAxis::Z, "STL does not say; what is made to be printed stands on the xy plane");
-    Ok(bare::load(bare, format, otherwise, source, options, budget))
+    bare::load(bare, format, otherwise, source, options, budget)
 }
 
 /// Triangles one after another, whose equal places become one vertex.

@@ -6,13 +6,16 @@
 //! ray: what stands in its way is known from the occlusion map only. Metals give all of it back, after several bounces
 //! between their facets if need be; of lights they show the first bounce, as the model says. Light passes rough glass
 //! unscattered apart from a part that is looked up; lights themselves are not seen through rough glass.
+//!
+//! A translucent surface scatters a share of what enters it to its other side, evenly in all directions: half spaces
+//! change places, and Fresnel takes off as much as if the light stood where it is mirrored.
 
 use super::facets::{AlbedoRow, albedo, rebound};
 use super::{Balance, GrainMatter, Reader, Seen, Sky, film};
 use crate::math::Vec3;
 use crate::render::optics::{fresnel_dielectric, fresnel_schlick, transmittance};
 use crate::render::wave::Crossing;
-use crate::scene::{Film, MetalRough};
+use crate::scene::{Film, MetalRough, Translucence};
 use std::f32::consts::PI;
 
 /// Below this roughness the surroundings are seen by a ray alone …
@@ -47,6 +50,9 @@ pub(crate) struct MetalRoughMatter {
     filmed: bool,
     /// Share of the light entering the dielectric part that passes through instead of being scattered.
     transmission: f32,
+    /// Share of the light that is scattered to the other side, and its colour there.
+    share: f32,
+    through: Vec3,
     occlusion: f32,
     pub ior: f32,
     pub thick: bool,
@@ -103,12 +109,26 @@ impl MetalRoughMatter {
             f0: (color * (at_normal * at_normal)).clamp(Vec3::ZERO, Vec3::ONE) * specular,
             f90: specular,
             transmission: (m.transmission * reader.linear(m.transmission_map.as_ref()).x).clamp(0.0, 1.0),
+            share: 0.0,
+            through: Vec3::ZERO,
             occlusion: occlusion.clamp(0.0, 1.0),
             ior: m.ior,
             thick: m.thick,
             inside: inside(m, reader),
             dispersion: m.dispersion,
         }
+    }
+
+    /// Lets it scatter light to its other side.
+    pub(super) fn thin(&mut self, translucence: &Translucence, reader: &Reader) {
+        self.share = (translucence.share * reader.linear(translucence.share_map.as_ref()).w).clamp(0.0, 1.0);
+        let color = translucence.color * reader.srgb(translucence.color_map.as_ref());
+        self.through = color.clamp(Vec3::ZERO, Vec3::ONE);
+    }
+
+    /// Whether it scatters light to its other side.
+    pub(super) fn is_translucent(&self) -> bool {
+        self.share > 0.0
     }
 
     /// Puts it under a film, as seen from the outside at this cosine.
@@ -176,7 +196,12 @@ impl MetalRoughMatter {
     /// Colour of the light that is scattered under the surface, before what the surface reflects is taken off.
     #[inline(always)]
     fn scattered(&self) -> Vec3 {
-        self.base * ((1.0 - self.metallic) * (1.0 - self.transmission))
+        self.base * ((1.0 - self.metallic) * (1.0 - self.transmission) * (1.0 - self.share))
+    }
+
+    /// The same of the light that is scattered to the other side.
+    fn scattered_through(&self) -> Vec3 {
+        self.through * ((1.0 - self.metallic) * (1.0 - self.transmission) * self.share)
     }
 
     /// Whether a ray off the surface could be seen.
@@ -189,6 +214,17 @@ impl MetalRoughMatter {
     pub(crate) fn lit(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
         let lobe = |half| highlight(normal, half, [normal.dot(to_light), normal.dot(view)], self.roughness);
         self.lit_by(normal, view, to_light, lobe)
+    }
+
+    /// BTDF × |N·L| of light on the other side.
+    pub(super) fn lit_through(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
+        let (n_l, n_v) = (-normal.dot(to_light), normal.dot(view));
+        if !self.is_translucent() || n_l <= 0.0 || n_v <= 0.0 {
+            return Vec3::ZERO;
+        }
+        let half = (view + to_light + 2.0 * n_l * normal).normalize_or(normal);
+        let (dielectric, _) = self.fresnel(view.dot(half));
+        self.scattered_through() * ((1.0 - dielectric.max_element()) / PI * n_l)
     }
 
     /// The same with another lobe: what it gives for a half vector, before Fresnel.
@@ -221,6 +257,10 @@ impl MetalRoughMatter {
         };
         let rebound = if self.metallic > 0.0 { rebound(roughness, self.metal_f0) } else { Vec3::ZERO };
         let (mut sum, taken) = self.around(&around, rebound);
+        if self.is_translucent() {
+            let behind = sky.diffuse(-seen.normal) + ambient;
+            sum += self.scattered_through() * behind * ((1.0 - taken).max(0.0) * self.occlusion);
+        }
         let frosted = self.frosted(seen.outside);
         if frosted > 0.0 {
             let light = sky.blurred(-seen.view, self.roughness) + ambient;
@@ -237,7 +277,8 @@ impl MetalRoughMatter {
             None => highlight(normal, half, [normal.dot(to), normal.dot(view)], self.roughness),
             Some(grain) => grain.highlight(normal, view, to),
         };
-        self.lit_by(normal, view, to, |half| lobe(half) * looked_up) * self.occlusion
+        let through = if self.is_translucent() { self.lit_through(normal, view, to) } else { Vec3::ZERO };
+        (self.lit_by(normal, view, to, |half| lobe(half) * looked_up) + through) * self.occlusion
     }
 
     /// Roughness of the lobe that is looked up, if one is.
@@ -398,6 +439,8 @@ mod tests {
             f0: Vec3::splat(0.04),
             f90: 1.0,
             transmission: 0.0,
+            share: 0.0,
+            through: Vec3::ZERO,
             occlusion: 1.0,
             ior: 1.5,
             thick: false,
@@ -455,6 +498,23 @@ mod tests {
     fn a_matt_dielectric_is_lambertian_but_for_its_sheen() {
         let dull = MetalRoughMatter { f0: Vec3::ZERO, f90: 0.0, ..matter() };
         assert!((dull.lit(Vec3::Z, at(-20.0), at(60.0)) - dull.base * 0.5 / PI).length() < 1e-6);
+    }
+
+    #[test]
+    fn a_translucent_surface_shares_its_light_between_both_sides() {
+        let through = Vec3::new(0.2, 0.9, 0.1);
+        let leaf = MetalRoughMatter { f0: Vec3::ZERO, f90: 0.0, share: 0.25, through, ..matter() };
+        let (front, back) = (leaf.lit(Vec3::Z, at(-20.0), at(60.0)), leaf.lit_through(Vec3::Z, at(-20.0), at(120.0)));
+        assert!((front - leaf.base * (0.75 * 0.5 / PI)).length() < 1e-6);
+        assert!((back - through * (0.25 * 0.5 / PI)).length() < 1e-6);
+        assert_eq!(leaf.lit_through(Vec3::Z, at(-20.0), at(60.0)), Vec3::ZERO, "that is the front");
+        let metal = MetalRoughMatter { metallic: 1.0, ..leaf.clone() };
+        assert_eq!(metal.lit_through(Vec3::Z, at(-20.0), at(120.0)), Vec3::ZERO);
+        let glossy = MetalRoughMatter { f0: Vec3::splat(0.04), f90: 1.0, ..leaf };
+        let (there, back) = (glossy.lit_through(Vec3::Z, at(25.0), at(130.0)) / 50f32.to_radians().cos(), {
+            glossy.lit_through(Vec3::NEG_Z, at(130.0), at(25.0)) / 25f32.to_radians().cos()
+        });
+        assert!((there - back).length() < 1e-5, "seen and lit can change places: {there} {back}");
     }
 
     #[test]

@@ -121,7 +121,12 @@ impl Matter {
     pub(crate) fn new(surface: &Surface, base: Vec3, store: &TextureStore) -> Self {
         let reader = Reader { store, patch: surface.patch.as_ref(), footprint: &surface.footprint };
         let material = surface.target.material;
-        let matter = Self { outside: surface.is_outside(), ..Self::read(material, base, &reader) };
+        let mut matter = Self { outside: surface.is_outside(), ..Self::read(material, base, &reader) };
+        if let (Some(translucence), Model::MetalRough(core)) =
+            (material.metal_rough().and_then(|m| m.translucence.as_ref()), &mut matter.model)
+        {
+            core.thin(translucence, &reader);
+        }
         match material.metal_rough() {
             Some(m) if matter.outside && m.has_lobes() => matter.with_lobes(m, surface, &reader),
             _ => matter,
@@ -282,8 +287,16 @@ impl Matter {
     pub(crate) fn lit_through(&self, normal: Vec3, view: Vec3, light: &Incident, crossing: &Crossing) -> Vec3 {
         match &self.model {
             Model::Phong(m) => m.lit_through(normal, view, light.to_light, crossing) * light.strength(),
-            _ => Vec3::ZERO,
+            Model::MetalRough(m) if m.is_translucent() => {
+                m.lit_through(normal, view, light.to_light) * light.irradiance() * self.clear()
+            }
+            Model::MetalRough(_) | Model::Unlit(_) => Vec3::ZERO,
         }
+    }
+
+    /// Whether it scatters light to its other side.
+    pub(crate) fn is_translucent(&self) -> bool {
+        matches!(&self.model, Model::MetalRough(m) if m.is_translucent())
     }
 
     /// How much of the mirrored and of the refracted direction is seen; `cosine` is that of the view.

@@ -6,6 +6,7 @@ mod costs;
 mod glass;
 mod gloss;
 mod instances;
+mod leaf;
 mod light;
 mod mirrors;
 mod round;

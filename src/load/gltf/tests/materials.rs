@@ -22,6 +22,7 @@ fn materials_carry_every_factor_and_slot() {
         "iridescence",
         "sheen",
         "anisotropy",
+        "diffuse_transmission",
     ];
     let used: Vec<String> =
         names.iter().map(|n| format!("KHR_materials_{n}")).chain(["KHR_texture_transform".into()]).collect();
@@ -53,6 +54,9 @@ fn materials_carry_every_factor_and_slot() {
             "KHR_materials_clearcoat": {
                 "clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.125, "clearcoatRoughnessTexture": {"index": 1},
                 "clearcoatNormalTexture": {"index": 0, "scale": 0.25}},
+            "KHR_materials_diffuse_transmission": {
+                "diffuseTransmissionFactor": 0.25, "diffuseTransmissionTexture": {"index": 1},
+                "diffuseTransmissionColorFactor": [1, 0.5, 0]},
             "KHR_materials_dispersion": {"dispersion": 0.5}},
     }]));
     let loaded = file.load();
@@ -81,6 +85,9 @@ fn materials_carry_every_factor_and_slot() {
     let sheen = surface.sheen.as_ref().unwrap();
     assert_eq!((sheen.color, sheen.roughness), (Vec3::new(0.5, 0.25, 0.0), 0.0));
     assert!(sheen.color_map.is_none() && sheen.roughness_map.is_some());
+    let through = surface.translucence.as_ref().unwrap();
+    assert_eq!((through.share, through.color), (0.25, Vec3::new(1.0, 0.5, 0.0)));
+    assert!(through.share_map.is_some() && through.color_map.is_none());
     let base = material.base_color_map.as_ref().unwrap();
     assert_eq!(
         (base.uv_set, base.transform.offset, base.transform.scale),

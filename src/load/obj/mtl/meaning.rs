@@ -234,7 +234,7 @@ impl Meaning<'_> {
     /// A physically based material. Roughness that is not given comes from `Ns`, as the width of the highlight
     /// (B. Walter et al., "Microfacet Models for Refraction through Rough Surfaces", 2007: α² = 2 / (n + 2)).
     fn metal_rough(&mut self, glass: bool, passed: Vec3) -> MetalRough {
-        let packed = (self.has_map)(Slot::OcclusionRoughMetal);
+        let packed = (self.has_map)(Slot::OcclusionRoughMetal) || (self.has_map)(Slot::RoughMetalOcclusion);
         let roughness = match self.mtl.pr {
             Some(0.0) if self.guessing() && ((self.has_map)(Slot::Roughness) || packed) => 1.0,
             Some(pr) => pr,
@@ -264,16 +264,16 @@ impl Meaning<'_> {
 
     /// `Ps`: white fibres. No field tells their roughness.
     fn sheen(&self) -> Option<Sheen> {
-        let strength = share(self.mtl.ps)?;
+        let strength = self.share_under(Slot::Sheen, self.mtl.ps)?;
         Some(Sheen { color: Vec3::splat(strength), color_map: None, roughness: SHEEN_ROUGHNESS, roughness_map: None })
     }
 
     /// `Pc`, `Pcr`.
     fn coat(&self) -> Option<Coat> {
         Some(Coat {
-            strength: share(self.mtl.pc)?,
+            strength: self.share_under(Slot::Coat, self.mtl.pc)?,
             strength_map: None,
-            roughness: share(self.mtl.pcr).unwrap_or(0.0),
+            roughness: self.share_under(Slot::CoatRoughness, self.mtl.pcr).unwrap_or(0.0),
             roughness_map: None,
             normal_map: None,
             normal_scale: 1.0,
@@ -282,8 +282,19 @@ impl Meaning<'_> {
 
     /// `aniso`, `anisor`.
     fn grain(&self) -> Option<Grain> {
-        let rotation = self.mtl.anisor.map_or(0.0, |turns| number(turns.rem_euclid(1.0) * std::f64::consts::TAU));
-        Some(Grain { strength: share(self.mtl.aniso)?, rotation, map: None })
+        // A map of turns has them in its picture.
+        let turns = self.mtl.anisor.filter(|_| !(self.has_map)(Slot::GrainTurn));
+        let rotation = turns.map_or(0.0, |turns| number(turns.rem_euclid(1.0) * std::f64::consts::TAU));
+        Some(Grain { strength: self.share_under(Slot::Grain, self.mtl.aniso)?, rotation, map: None })
+    }
+
+    /// The share that a map is multiplied by: all where no number is given, or a careless 0.
+    fn share_under(&self, slot: Slot, of: Option<f64>) -> Option<f32> {
+        match of {
+            None if (self.has_map)(slot) => Some(1.0),
+            Some(0.0) if self.guessing() && (self.has_map)(slot) => Some(1.0),
+            _ => share(of),
+        }
     }
 }
 

@@ -34,8 +34,6 @@ pub(super) struct Mtl {
     pub pcr: Option<f64>,
     pub aniso: Option<f64>,
     pub anisor: Option<f64>,
-    /// What is known and not drawn.
-    pub unsupported: Vec<(u32, &'static str)>,
     pub maps: Vec<(Slot, Map)>,
 }
 
@@ -55,10 +53,17 @@ pub(super) enum Slot {
     Metallic,
     /// Occlusion, roughness, metal in red, green, blue.
     OcclusionRoughMetal,
+    /// Roughness, metal, occlusion in red, green, blue.
+    RoughMetalOcclusion,
+    Sheen,
+    Coat,
+    CoatRoughness,
+    Grain,
+    GrainTurn,
 }
 
 /// Map statements, in lower case.
-const MAPS: [(&[u8], Slot); 17] = [
+const MAPS: [(&[u8], Slot); 23] = [
     (b"map_ka", Slot::Ambient),
     (b"map_kd", Slot::Diffuse),
     (b"map_ks", Slot::Specular),
@@ -76,22 +81,30 @@ const MAPS: [(&[u8], Slot); 17] = [
     (b"map_pr", Slot::Roughness),
     (b"map_pm", Slot::Metallic),
     (b"map_orm", Slot::OcclusionRoughMetal),
+    (b"map_rma", Slot::RoughMetalOcclusion),
+    (b"map_ps", Slot::Sheen),
+    (b"map_pc", Slot::Coat),
+    (b"map_pcr", Slot::CoatRoughness),
+    (b"map_aniso", Slot::Grain),
+    (b"map_anisor", Slot::GrainTurn),
 ];
 
-/// Fields and maps that are known and not drawn.
-const UNSUPPORTED: [(&[u8], &str); 11] = [
-    (b"map_ps", "sheen (map_Ps)"),
-    (b"map_pc", "clear coat (map_Pc)"),
-    (b"map_pcr", "clear coat (map_Pcr)"),
-    (b"map_aniso", "anisotropy (map_aniso)"),
-    (b"map_anisor", "anisotropy (map_anisor)"),
-    (b"disp", "displacement (disp)"),
-    (b"map_disp", "displacement (map_disp)"),
-    (b"decal", "a decal (decal)"),
-    (b"refl", "a reflection map (refl)"),
-    (b"map_refl", "a reflection map (map_refl)"),
-    (b"map_rma", "a packed map (map_RMA)"),
+/// Maps that are known and not drawn, and what is seen instead.
+///
+/// The text gives a displacement no unit, and what is proven of hits is proven of the faces that a file has. A reflection
+/// map is a picture of surroundings for one material alone, in which nothing of the scene stands; here mirrors see the
+/// scene, and `--env` is around all of it. What a decal shows where is said by no picture, but by procedures of one
+/// program.
+const UNSUPPORTED: [(&[u8], &str, &str); 5] = [
+    (b"disp", "displacement (disp)", DISPLACED),
+    (b"map_disp", "displacement (map_disp)", DISPLACED),
+    (b"decal", "a decal (decal)", "paint it into map_Kd"),
+    (b"refl", "a reflection map (refl)", REFLECTED),
+    (b"map_refl", "a reflection map (map_refl)", REFLECTED),
 ];
+
+const DISPLACED: &str = "faces stay where the file has them; displace them before export, or name the map as bump";
+const REFLECTED: &str = "mirrors see the scene; --env puts a picture around it";
 
 /// Statements that change nothing in our pictures.
 const SILENT: [&[u8]; 4] = [b"sharpness", b"map_aat", b"km", b"ke_strength"];
@@ -105,10 +118,20 @@ impl Mtl {
     /// Whether any field or map of physically based materials is there. A normal map alone says nothing about
     /// roughness or metal and does not count.
     pub(super) fn is_physical(&self) -> bool {
-        let of_pbr = |what: &str| ["sheen", "clear", "aniso", "a packed"].iter().any(|start| what.starts_with(start));
+        /// Maps of nothing else.
+        const MAPS: [Slot; 9] = [
+            Slot::Roughness,
+            Slot::Metallic,
+            Slot::OcclusionRoughMetal,
+            Slot::RoughMetalOcclusion,
+            Slot::Sheen,
+            Slot::Coat,
+            Slot::CoatRoughness,
+            Slot::Grain,
+            Slot::GrainTurn,
+        ];
         [self.pr, self.pm, self.ps, self.pc, self.pcr, self.aniso, self.anisor].iter().any(Option::is_some)
-            || [Slot::Roughness, Slot::Metallic, Slot::OcclusionRoughMetal].iter().any(|&s| self.map(s).is_some())
-            || self.unsupported.iter().any(|(_, what)| of_pbr(what))
+            || MAPS.iter().any(|&slot| self.map(slot).is_some())
     }
 }
 
@@ -166,7 +189,12 @@ impl Parser<'_> {
     }
 
     fn map_or_unknown(&mut self, m: &mut Mtl, word: &[u8], rest: &[u8]) {
+        // Exporters write zeros for what a material does not have.
+        let zero = words(rest).next().and_then(|w| number::check(w).word.parse::<f64>().ok()) == Some(0.0);
         if let Some((_, slot)) = MAPS.iter().find(|(name, _)| *name == word) {
+            if zero && words(rest).count() == 1 {
+                return;
+            }
             match options::parse(rest, self.line) {
                 Some(map) => {
                     for option in &map.ignored {
@@ -176,13 +204,12 @@ impl Parser<'_> {
                 }
                 None => self.warn("mtl-map-without-file", format!("'{}' names no file", decode_name(word))),
             }
-        } else if let Some((_, what)) = UNSUPPORTED.iter().find(|(name, _)| *name == word) {
-            // Exporters write zeros for what a material does not have.
-            let zero = words(rest).next().and_then(|w| number::check(w).word.parse::<f64>().ok()) == Some(0.0);
+        } else if let Some((_, what, instead)) = UNSUPPORTED.iter().find(|(name, ..)| *name == word) {
             if !zero {
-                self.warn("mtl-unsupported", format!("{what} is not drawn"));
+                let text = format!("{what} is not drawn");
+                let warning = Diagnostic::new("mtl-unsupported", self.file, self.line.to_string(), text);
+                self.warnings.push(warning.remedy(*instead));
             }
-            m.unsupported.push((self.line, what));
         } else {
             self.warn("mtl-unknown-statement", format!("'{}' is not an MTL statement", shorten(&decode_name(word))));
         }
@@ -260,10 +287,10 @@ mod tests {
     #[test]
     fn what_cannot_be_read_or_drawn_is_a_counted_warning_and_nothing_else() {
         let text = "Kd 9 9 9\nnewmtl a\nKd spectral x.rfl 1\nKs xyz 0.9505 1 1.089\nNs x\nd -halo 0.5\nmap_Kd\nfoo 1\nfoo 2\n\
-                    refl -type sphere a.png\nmap_Ps 0\nmap_Pc a.png\nmap_Ks -type cube_top a.png";
+                    refl -type sphere a.png\nmap_Ps 0\ndisp 0\ndisp a.png\nmap_Ks -type cube_top a.png";
         let (materials, warnings) = of(text);
         let m = &materials[0];
-        assert_eq!((m.kd, m.ns, m.d), (None, None, Some(0.5)));
+        assert_eq!((m.kd, m.ns, m.d, m.is_physical()), (None, None, Some(0.5), false));
         assert!(m.ks.unwrap().iter().all(|c| (c - 1.0).abs() < 1e-3), "{:?}", m.ks);
         let codes: Vec<_> = warnings.iter().map(|w| (w.code, w.count)).collect();
         assert_eq!(

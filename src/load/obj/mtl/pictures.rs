@@ -1,9 +1,10 @@
 //! Pictures that maps name -> bitmaps of the scene, and those made from them: one channel, two in one, opaque.
 //!
-//! Our materials read fixed channels (opacity and shininess red, roughness green, metal blue); MTL names a picture, and
+//! Our materials read fixed channels (opacity and shininess red, roughness green, metal blue, …); MTL names a picture, and
 //! perhaps a channel, for each.
 
 use super::options::Channel;
+use crate::scene::color::to_srgb;
 use crate::scene::{Bitmap, Pixels};
 use std::collections::HashMap;
 
@@ -20,6 +21,11 @@ pub(super) enum Take {
     Inverse(usize, Channel),
     /// Roughness in green, metal in blue, 1 where there is none.
     RoughMetal(Option<(usize, Channel)>, Option<(usize, Channel)>),
+    /// One channel coded as sRGB in red, green, blue: a number where a colour is read.
+    Coded(usize, Channel),
+    /// Strength of a grain in blue, and in red and green its direction, by how often it is turned: a channel times the
+    /// number whose bits these are. 1 and not at all where there is none.
+    Grain(Option<(usize, Channel)>, Option<(usize, Channel)>, u64),
 }
 
 /// How a picture uses its alpha channel.
@@ -66,6 +72,8 @@ impl Pictures {
             Take::Channel(i, channel) => Made::New(self.map(i, |p| grey(pick(p, channel)))),
             Take::Inverse(i, channel) => Made::New(self.map(i, |p| grey(1.0 - pick(p, channel)))),
             Take::RoughMetal(rough, metal) => Made::New(self.rough_metal(rough, metal)),
+            Take::Coded(i, channel) => Made::New(self.coded(i, channel)),
+            Take::Grain(strength, turn, most) => Made::New(self.grain(strength, turn, f64::from_bits(most))),
         };
         #[expect(clippy::cast_possible_truncation, reason = "a handful of pictures for each material")]
         let index = self.made.len() as u32;
@@ -124,9 +132,37 @@ impl Pictures {
         Bitmap { name: name.clone(), width: *width, height: *height, pixels }
     }
 
-    /// The smaller picture is repeated texel by texel to the larger one's size.
+    /// In sixteen bits, so that coding loses nothing.
+    fn coded(&self, i: usize, channel: Channel) -> Bitmap {
+        let Bitmap { name, width, height, .. } = &self.sources[i];
+        let mut pixels = Vec::new();
+        each(&self.sources[i], |p| pixels.push(to16(grey(to_srgb(pick(p, channel))))));
+        Bitmap { name: name.clone(), width: *width, height: *height, pixels: Pixels::Rgba16(pixels) }
+    }
+
     fn rough_metal(&self, rough: Option<(usize, Channel)>, metal: Option<(usize, Channel)>) -> Bitmap {
-        let sizes = [rough, metal].into_iter().flatten().map(|(i, _)| (self.sources[i].width, self.sources[i].height));
+        let (bitmap, values) = self.pair([rough, metal]);
+        let pixels =
+            values.into_iter().map(|[rough, metal]| to8([1.0, rough.unwrap_or(1.0), metal.unwrap_or(1.0), 1.0]));
+        Bitmap { pixels: Pixels::Rgba8(pixels.collect()), ..bitmap }
+    }
+
+    /// In sixteen bits, so that a grain that is not turned is not turned.
+    fn grain(&self, strength: Option<(usize, Channel)>, turn: Option<(usize, Channel)>, most: f64) -> Bitmap {
+        let (bitmap, values) = self.pair([strength, turn]);
+        #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
+        let texel = |[strength, turn]: [Option<f32>; 2]| {
+            let (sin, cos) = libm::sincos(f64::from(turn.unwrap_or(0.0)) * most * std::f64::consts::TAU);
+            to16([0.5 + 0.5 * cos as f32, 0.5 + 0.5 * sin as f32, strength.unwrap_or(1.0), 1.0])
+        };
+        Bitmap { pixels: Pixels::Rgba16(values.into_iter().map(texel).collect()), ..bitmap }
+    }
+
+    /// The values of two pictures at each texel, and a bitmap for them without pixels.
+    ///
+    /// The smaller picture is repeated texel by texel to the larger one's size.
+    fn pair(&self, [first, second]: [Option<(usize, Channel)>; 2]) -> (Bitmap, Vec<[Option<f32>; 2]>) {
+        let sizes = [first, second].into_iter().flatten().map(|(i, _)| (self.sources[i].width, self.sources[i].height));
         let (width, height) = sizes.fold((1, 1), |(w, h), (x, y)| (w.max(x), h.max(y)));
         let read = |source: Option<(usize, Channel)>, x: u32, y: u32| match source {
             Some((i, channel)) => {
@@ -134,14 +170,15 @@ impl Pictures {
                 let scaled = |at: u32, of: u32, to: u32| u64::from(at) * u64::from(to) / u64::from(of);
                 let at = scaled(y, height, bitmap.height) * u64::from(bitmap.width) + scaled(x, width, bitmap.width);
                 #[expect(clippy::cast_possible_truncation, reason = "an index into texels in memory")]
-                texel(bitmap, at as usize).map_or(1.0, |p| pick(p, channel))
+                texel(bitmap, at as usize).map(|p| pick(p, channel))
             }
-            None => 1.0,
+            None => None,
         };
         let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
-        let pixels = texels.map(|(x, y)| to8([1.0, read(rough, x, y), read(metal, x, y), 1.0])).collect();
-        let names = [rough, metal].into_iter().flatten().map(|(i, _)| self.sources[i].name.as_str());
-        Bitmap { name: names.collect::<Vec<_>>().join(" + "), width, height, pixels: Pixels::Rgba8(pixels) }
+        let values = texels.map(|(x, y)| [read(first, x, y), read(second, x, y)]).collect();
+        let names = [first, second].into_iter().flatten().map(|(i, _)| self.sources[i].name.as_str());
+        let name = names.collect::<Vec<_>>().join(" + ");
+        (Bitmap { name, width, height, pixels: Pixels::Rgba8(Vec::new()) }, values)
     }
 }
 
@@ -240,6 +277,27 @@ mod tests {
         let mut p = pictures(&[(2, 1, &[[1; 4], [2; 4]]), (1, 2, &[[3; 4], [4; 4]])]);
         p.take(Take::RoughMetal(Some((0, Channel::Red)), Some((1, Channel::Red))));
         assert_eq!(texels(p), [[[255, 1, 3, 255], [255, 2, 3, 255], [255, 1, 4, 255], [255, 2, 4, 255]]]);
+    }
+
+    #[test]
+    fn numbers_are_read_back_from_where_colours_and_directions_are() {
+        let mut p = pictures(&[(2, 1, &[[51, 0, 0, 0], [128, 0, 0, 0]])]);
+        let (red, quarter) = (Some((0, Channel::Red)), 0.25f64.to_bits());
+        let takes =
+            [Take::Coded(0, Channel::Red), Take::Grain(red, None, quarter), Take::Grain(None, red, 5f64.to_bits())];
+        for take in takes {
+            p.take(take);
+        }
+        let wide = |bitmap: Bitmap| match bitmap.pixels {
+            Pixels::Rgba16(texels) => texels.into_iter().map(|t| t.map(|c| f32::from(c) / 65535.0)).collect(),
+            other => panic!("{other:?}"),
+        };
+        let made: Vec<Vec<[f32; 4]>> = p.finish().into_iter().map(wide).collect();
+        let value = crate::scene::color::from_srgb([0, 1, 2].map(|k| made[0][0][k]));
+        assert!((value - 0.2).abs().max_element() < 1e-4, "{value}");
+        let near = |texel: [f32; 4], expected: [f32; 3]| (0..3).all(|k| (texel[k] - expected[k]).abs() < 1e-4);
+        assert!(near(made[1][0], [1.0, 0.5, 0.2]), "a strength turns nothing: {:?}", made[1]);
+        assert!(near(made[2][0], [1.0, 0.5, 1.0]), "a fifth of five turns is a whole one: {:?}", made[2]);
     }
 
     #[test]

@@ -156,6 +156,36 @@ fn roughness_and_metal_maps_share_one_texture() {
 }
 
 #[test]
+fn maps_of_sheen_lacquer_and_grain_are_drawn_and_zeros_under_them_count_as_1() {
+    let maps = "map_Ps s.png\nmap_Pc -imfchan g c.png\nmap_Pcr c.png\nmap_aniso a.png\nmap_anisor t.png\n";
+    let mtl = format!("newmtl a\nKd 1 1 1\nPr 0.5\nPs 0\nPc 0.5\naniso 0\nanisor 0\n{maps}");
+    let files = [("s.png", [90; 4]), ("c.png", [20, 60, 20, 255]), ("a.png", [51; 4]), ("t.png", [255; 4])];
+    let (loaded, m) = guess(&mtl, &files);
+    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+    let Surface::MetalRough(s) = &m.surface else { panic!("physically based") };
+    let (sheen, coat, grain) = (s.sheen.as_ref().unwrap(), s.coat.as_ref().unwrap(), s.grain.as_ref().unwrap());
+    assert_eq!((sheen.color, coat.strength, coat.roughness), (Vec3::ONE, 0.5, 1.0));
+    assert_eq!((grain.strength, grain.rotation), (1.0, 0.0));
+    assert_eq!(texel(&loaded, coat.strength_map.as_ref())[0], 60);
+    assert_eq!(texel(&loaded, coat.roughness_map.as_ref())[1], 49, "brightness");
+    assert!(sheen.color_map.is_some() && grain.map.is_some());
+
+    let (_, plain) = guess("newmtl a\nKd 1 1 1\nPc 1\naniso 0.5\nmap_Pc 0\nmap_aniso none.png", &[]);
+    let Surface::MetalRough(s) = &plain.surface else { panic!("physically based") };
+    assert!(s.coat.as_ref().unwrap().strength_map.is_none() && s.grain.as_ref().unwrap().map.is_none());
+    assert_eq!(s.grain.as_ref().unwrap().strength, 0.5, "a map that is not there changes nothing");
+}
+
+#[test]
+fn a_packed_map_with_roughness_first_is_drawn() {
+    let (loaded, m) = guess("newmtl a\nKd 1 1 1\nmap_RMA p.png", &[("p.png", [10, 20, 30, 255])]);
+    let Surface::MetalRough(s) = &m.surface else { panic!("physically based") };
+    assert_eq!((s.roughness, s.metallic, loaded.warnings.len()), (1.0, 1.0, 0));
+    assert_eq!(texel(&loaded, s.metal_rough_map.as_ref())[1..3], [10, 20]);
+    assert_eq!(texel(&loaded, m.occlusion_map.as_ref())[0], 30);
+}
+
+#[test]
 fn everything_invisible_is_opaque_but_a_single_hidden_part_stays_hidden() {
     let both = "newmtl a\nKd 1 1 1\nd 0\nnewmtl b\nKd 1 1 1\nd 0";
     let (loaded, m) = guess(both, &[]);

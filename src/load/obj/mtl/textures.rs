@@ -8,7 +8,7 @@ use crate::load::limits::{Budget, Limits};
 use crate::load::texture::{Encoded, decode_all};
 use crate::load::{Diagnostic, MtlMode, Warnings};
 use crate::math::Vec2;
-use crate::scene::{AlphaMode, Bitmap, Material, Sampler, Surface, Texture, TextureRef, UvTransform, Wrap};
+use crate::scene::{AlphaMode, Bitmap, Material, MetalRough, Sampler, Surface, Texture, TextureRef, UvTransform, Wrap};
 use crate::stopwatch::Spent;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -144,11 +144,15 @@ impl Mapper<'_> {
         self.relief(material);
         let packed = self.whole(Slot::OcclusionRoughMetal);
         let rough_metal = packed.clone().or_else(|| self.rough_metal());
+        let occlusion = packed.or_else(|| self.occlusion());
         let ambient =
             if self.mode == MtlMode::Literal { self.whole(Slot::Ambient) } else { material.base_color_map.clone() };
         let base_is_black = material.base_color == crate::math::Vec3::ZERO;
         match &mut material.surface {
-            Surface::MetalRough(m) => m.metal_rough_map = rough_metal,
+            Surface::MetalRough(m) => {
+                m.metal_rough_map = rough_metal;
+                self.lobes(m);
+            }
             Surface::Phong(p) => {
                 p.ambient_map = if base_is_black { None } else { ambient };
                 p.specular_map = self.whole(Slot::Specular);
@@ -156,7 +160,7 @@ impl Mapper<'_> {
             }
             Surface::Unlit => {}
         }
-        material.occlusion_map = packed;
+        material.occlusion_map = occlusion;
     }
 
     fn picture(&self, slot: Slot) -> Option<(&Map, usize)> {
@@ -265,8 +269,47 @@ impl Mapper<'_> {
         material.bump_map = Some(self.textures.texture(take, &map));
     }
 
+    /// Maps of sheen, lacquer and grain.
+    fn lobes(&mut self, m: &mut MetalRough) {
+        if let Some(sheen) = &mut m.sheen {
+            sheen.color_map = self.picture(Slot::Sheen).map(|(map, picture)| (map.clone(), picture)).map(|(map, i)| {
+                let take = Take::Coded(i, map.channel.unwrap_or(Channel::Luminance));
+                self.textures.texture(take, &map)
+            });
+        }
+        if let Some(coat) = &mut m.coat {
+            coat.strength_map = self.scalar(Slot::Coat);
+            coat.roughness_map = self.scalar(Slot::CoatRoughness);
+        }
+        if let Some(grain) = &mut m.grain {
+            grain.map = self.grain();
+        }
+    }
+
+    /// Strength and direction of a grain in one texture; both go by the options of the first there is.
+    fn grain(&mut self) -> Option<TextureRef> {
+        let channel = |(map, picture): (&Map, usize)| (picture, map.channel.unwrap_or(Channel::Luminance));
+        let (strength, turn) = (self.picture(Slot::Grain), self.picture(Slot::GrainTurn));
+        let map = strength.or(turn)?.0.clone();
+        let most = self.mtl.anisor.filter(|turns| *turns != 0.0 || self.mode == MtlMode::Literal).unwrap_or(1.0);
+        let take = Take::Grain(strength.map(channel), turn.map(channel), most.to_bits());
+        Some(self.textures.texture(take, &map))
+    }
+
+    /// The occlusion in a map that has it in blue.
+    fn occlusion(&mut self) -> Option<TextureRef> {
+        let (map, picture) = self.picture(Slot::RoughMetalOcclusion)?;
+        let map = map.clone();
+        Some(self.textures.texture(Take::Channel(picture, Channel::Blue), &map))
+    }
+
     /// Roughness and metal in one texture; both go by the options of the first there is.
     fn rough_metal(&mut self) -> Option<TextureRef> {
+        if let Some((map, picture)) = self.picture(Slot::RoughMetalOcclusion) {
+            let map = map.clone();
+            let take = Take::RoughMetal(Some((picture, Channel::Red)), Some((picture, Channel::Green)));
+            return Some(self.textures.texture(take, &map));
+        }
         let channel = |(map, picture): (&Map, usize)| (picture, map.channel.unwrap_or(Channel::Luminance));
         let (rough, metal) = (self.picture(Slot::Roughness), self.picture(Slot::Metallic));
         let map = rough.or(metal)?.0.clone();

@@ -1,0 +1,55 @@
+//! Points and lines -> what `load::wires` draws: one part for each run of statements that share object, group and material.
+
+use super::assemble::{Key, fill_vertices, name};
+use super::pairs::Pairs;
+use super::place::Placed;
+use super::soup::{Corner, NONE, Soup};
+use super::statements::{Statements, Stroke};
+use crate::load::wires::Wires;
+use crate::math::Vec3;
+use crate::scene::Mesh;
+use std::collections::BTreeMap;
+
+/// The points and lines of each of [`Statements::runs`] that has any, with its index.
+pub(super) fn assemble(statements: &Statements, soup: &Soup, placed: &Placed) -> Vec<(u32, Wires)> {
+    let mut of_run: BTreeMap<u32, Vec<(Stroke, &[Corner])>> = BTreeMap::new();
+    let mut rest = soup.stroke_corners.as_slice();
+    for stroke in &statements.strokes {
+        let (corners, after) = rest.split_at(stroke.arity as usize);
+        rest = after;
+        of_run.entry(stroke.run).or_default().push((*stroke, corners));
+    }
+    if of_run.is_empty() {
+        return Vec::new();
+    }
+    let mut vertices = Pairs::new(soup.positions.len());
+    let mut build = |(run, strokes): (u32, Vec<(Stroke, &[Corner])>)| {
+        vertices.clear();
+        let mut wires = wires(&strokes, soup, placed, &mut vertices);
+        wires.mesh.name = name(statements, run);
+        (run, wires)
+    };
+    of_run.into_iter().map(&mut build).collect()
+}
+
+fn wires(strokes: &[(Stroke, &[Corner])], soup: &Soup, placed: &Placed, vertices: &mut Pairs<Key>) -> Wires {
+    let mut ends = Vec::new();
+    let mut numbers = Vec::new();
+    for (stroke, corners) in strokes {
+        numbers.clear();
+        numbers.extend(corners.iter().map(|c| vertices.number(c.position, (c.uv, c.normal))));
+        if stroke.joined {
+            ends.extend(numbers.windows(2).map(|pair| [pair[0], pair[1]]));
+        } else {
+            ends.extend(numbers.iter().map(|&number| [number; 2]));
+        }
+    }
+    let mut mesh = Mesh::default();
+    fill_vertices(&mut mesh, vertices, soup, &placed.positions);
+    // Lit only where every end says how.
+    if vertices.iter().all(|(_, (_, normal))| normal != NONE) {
+        let normal = |(_, (_, normal)): (u32, Key)| soup.normals.get(normal as usize).copied().unwrap_or(Vec3::Z);
+        mesh.normals = vertices.iter().map(normal).collect();
+    }
+    Wires { mesh, ends }
+}

@@ -1,0 +1,228 @@
+//! Points and lines -> thin solids, since rays meet only what has an extent.
+//!
+//! Formats give points and lines no width; programs that draw them in pixels choose one. Here they have a width in the
+//! world, so that they stand in perspective, hide and are hidden, and are hit like every other triangle: 1/256 of the
+//! diagonal of the box around everything in the file, or less where there are so many that they would run together
+//! (`Widths`). A point becomes an octahedron, or a tetrahedron where it is one of a crowd; a line a prism of three sides,
+//! half a width longer at each end, so that joints are closed.
+//!
+//! Where vertices have no normals nothing says how light meets a line: such ones are drawn without light, in their base
+//! colour plus emission, as the glTF 2.0 specification recommends (§3.9.6). Where they have, they are lit by these: points
+//! are squares then, lines low roofs, whose faces look where the normals do. Whatever their places do (scale, shear,
+//! mirror), widths are those of the world: solids are made there, once for all places that differ by a shift alone.
+
+mod bake;
+mod solid;
+#[cfg(test)]
+mod tests;
+
+use super::limits::{Budget, OverBudget};
+use super::{Diagnostic, Facts};
+use crate::math::{DAffine3, DMat3, DVec3};
+use crate::scene::{Instance, Material, Mesh, Scene, Surface};
+use bake::Baked;
+use std::collections::HashMap;
+use std::path::Path;
+
+/// Points and lines that share a material, before they have a width.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Wires {
+    /// Their vertices and material; no faces.
+    pub mesh: Mesh,
+    /// The vertices at both ends of each line; the same one twice for a point.
+    pub ends: Vec<[u32; 2]>,
+}
+
+impl Wires {
+    /// How many points and how many lines.
+    fn count(&self) -> [u64; 2] {
+        let points = self.ends.iter().filter(|[a, b]| a == b).count() as u64;
+        [points, self.ends.len() as u64 - points]
+    }
+
+    fn is_lit(&self) -> bool {
+        !self.mesh.normals.is_empty()
+    }
+}
+
+/// Points and lines of a file, and how they are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct WireFacts {
+    /// Points.
+    pub points: u64,
+    /// Lines; those of a strip one by one.
+    pub lines: u64,
+    /// Width of the points, world units; 0 without points.
+    pub point_width: f64,
+    /// Width of the lines, world units; 0 without lines.
+    pub line_width: f64,
+}
+
+impl WireFacts {
+    /// Adds those of another file; the larger width is told.
+    pub fn append(&mut self, more: &Self) {
+        self.points += more.points;
+        self.lines += more.lines;
+        self.point_width = self.point_width.max(more.point_width);
+        self.line_width = self.line_width.max(more.line_width);
+    }
+}
+
+/// Parts of the diagonal that points and lines are wide at most.
+const PARTS: f64 = 256.0;
+
+/// So many points, or lines, are a crowd: they get as few triangles as a solid can have.
+const CROWD: u64 = 1 << 16;
+
+/// How wide points and lines are, world units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Widths {
+    point: f64,
+    line: f64,
+    /// Whether there is a crowd of points.
+    crowd: bool,
+}
+
+impl Widths {
+    /// For so many points and lines in a box with this diagonal.
+    ///
+    /// N points spread over a surface as large as the box are about diagonal / √N apart: wider ones would run together.
+    /// Lines are kept to a quarter of that, so that a mesh of wires shows what lies behind.
+    #[expect(clippy::cast_precision_loss, reason = "counts of what is in memory")]
+    fn new([points, lines]: [u64; 2], diagonal: f64) -> Self {
+        // A single place has no size: any will do, since the camera is framed on what is drawn.
+        let diagonal = if diagonal > 0.0 && diagonal.is_finite() { diagonal } else { PARTS };
+        let point = diagonal / (points as f64).sqrt().max(PARTS);
+        let line = diagonal / (4.0 * (lines as f64).sqrt()).max(PARTS);
+        Self { point, line, crowd: points >= CROWD }
+    }
+}
+
+/// Puts points and lines into the scene as solids; `places` are instances whose `mesh` counts `wires`.
+///
+/// Meshes are in place before: the width goes by the box around all of it. Points and lines with an end that is not finite
+/// are left out, counted in `facts`, and told in the warning that is returned.
+///
+/// # Errors
+/// When the solids would take more than is left of `budget`.
+pub(super) fn draw(
+    wires: &[Wires],
+    places: &[Instance],
+    scene: &mut Scene,
+    budget: &mut Budget,
+    facts: &mut Facts,
+    file: &Path,
+) -> Result<Option<Diagnostic>, OverBudget> {
+    let counts: Vec<[u64; 2]> = wires.iter().map(Wires::count).collect();
+    let placed = places.iter().filter_map(|place| counts.get(place.mesh as usize));
+    let widths = Widths::new(placed.fold([0, 0], |[p, l], [q, m]| [p + q, l + m]), diagonal(wires, places, scene));
+    let mut drawing = Drawing { scene, budget, widths, materials: HashMap::new(), dropped: 0 };
+    let mut known: HashMap<(u32, [u64; 9]), Vec<Part>> = HashMap::new();
+    for place in places {
+        let Some(of) = wires.get(place.mesh as usize) else { continue };
+        let linear = place.world_from_object.matrix3;
+        let key = (place.mesh, linear.to_cols_array().map(f64::to_bits));
+        let parts = match known.get(&key) {
+            Some(parts) => parts,
+            None => {
+                let parts = drawing.bake(of, linear)?;
+                known.entry(key).or_insert(parts)
+            }
+        };
+        drawing.place(place, parts);
+    }
+
+    let dropped = drawing.dropped;
+    let [points, lines] = counts.iter().fold([0, 0], |[p, l], [q, m]| [p + q, l + m]);
+    let or_none = |count: u64, width: f64| if count > 0 { width } else { 0.0 };
+    let (point_width, line_width) = (or_none(points, widths.point), or_none(lines, widths.line));
+    facts.wires = WireFacts { points, lines, point_width, line_width };
+    if dropped == 0 {
+        return Ok(None);
+    }
+    const REASON: &str = "a point or line with an end that is not finite";
+    facts.dropped.push((REASON.into(), dropped));
+    let warning = Diagnostic::new("line-not-finite", file, "", format!("{REASON} is left out"));
+    Ok(Some(Diagnostic { count: u32::try_from(dropped).unwrap_or(u32::MAX), ..warning }))
+}
+
+/// The number of a mesh of solids, and its place around that of the wires.
+type Part = (u32, DVec3);
+
+/// What solids are put into.
+struct Drawing<'a> {
+    scene: &'a mut Scene,
+    budget: &'a mut Budget,
+    widths: Widths,
+    /// The material that wires show, by that of the file and whether they are lit.
+    materials: HashMap<(u32, bool), u32>,
+    dropped: u64,
+}
+
+impl Drawing<'_> {
+    /// Makes the solids of wires that are turned and stretched by `linear`: meshes, and where they stand.
+    fn bake(&mut self, wires: &Wires, linear: DMat3) -> Result<Vec<Part>, OverBudget> {
+        self.budget.take(bake::cost(wires, &self.widths), 1)?;
+        let material = self.material(wires);
+        let Baked { meshes, center, dropped } = bake::bake(wires, linear, &self.widths);
+        self.dropped += dropped;
+        let mut parts = Vec::with_capacity(meshes.len());
+        for mesh in meshes {
+            // Checked by the budget: each mesh takes hundreds of bytes.
+            #[expect(clippy::cast_possible_truncation, reason = "scenes have fewer than 2^32 meshes")]
+            parts.push((self.scene.meshes.len() as u32, center));
+            self.scene.meshes.push(Mesh { material, ..mesh });
+        }
+        Ok(parts)
+    }
+
+    fn place(&mut self, place: &Instance, parts: &[Part]) {
+        for &(mesh, center) in parts {
+            let world_from_object = DAffine3::from_translation(place.world_from_object.translation + center);
+            self.scene.instances.push(Instance { name: place.name.clone(), mesh, world_from_object });
+        }
+    }
+
+    /// What the wires show of their material: both sides where they are flat, no light where they have no normals.
+    fn material(&mut self, wires: &Wires) -> u32 {
+        let (from, lit) = (wires.mesh.material, wires.is_lit());
+        if let Some(&known) = self.materials.get(&(from, lit)) {
+            return known;
+        }
+        let Some(material) = self.scene.materials.get(from as usize) else { return from };
+        if lit && material.double_sided {
+            return from;
+        }
+        let material = if lit {
+            Material { double_sided: true, ..material.clone() }
+        } else {
+            Material {
+                double_sided: false,
+                normal_map: None,
+                bump_map: None,
+                occlusion_map: None,
+                surface: Surface::Unlit,
+                ..material.clone()
+            }
+        };
+        #[expect(clippy::cast_possible_truncation, reason = "there are fewer materials than meshes")]
+        let index = self.scene.materials.len() as u32;
+        self.scene.materials.push(material);
+        self.materials.insert((from, lit), index);
+        index
+    }
+}
+
+/// Diagonal of the box around all meshes and wires where they stand; not positive where there is nothing.
+fn diagonal(wires: &[Wires], places: &[Instance], scene: &Scene) -> f64 {
+    let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let of_wires = places.iter().filter_map(|place| Some((place, &wires.get(place.mesh as usize)?.mesh)));
+    let of_meshes = scene.instances.iter().filter_map(|place| Some((place, scene.meshes.get(place.mesh as usize)?)));
+    for (place, mesh) in of_wires.chain(of_meshes) {
+        let points = mesh.positions.iter().map(|p| place.world_from_object.transform_point3(p.as_dvec3()));
+        for point in points.filter(|p| p.is_finite()) {
+            (lo, hi) = (lo.min(point), hi.max(point));
+        }
+    }
+    if lo.cmple(hi).all() { (hi - lo).length() } else { 0.0 }
+}

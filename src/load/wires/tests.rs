@@ -1,0 +1,173 @@
+use super::*;
+use crate::load::Limits;
+use crate::math::{DQuat, Vec2, Vec3, Vec4};
+use std::collections::HashSet;
+
+fn budget() -> Budget {
+    Budget::new(&Limits::default())
+}
+
+fn place(mesh: u32, world_from_object: DAffine3) -> Instance {
+    Instance { name: "here".into(), mesh, world_from_object }
+}
+
+fn wires(positions: &[[f32; 3]], ends: &[[u32; 2]]) -> Wires {
+    let positions = positions.iter().map(|&p| p.into()).collect();
+    Wires { mesh: Mesh { name: "wires".into(), positions, ..Mesh::default() }, ends: ends.to_vec() }
+}
+
+fn red() -> Scene {
+    let material = Material { base_color: Vec3::X, emission: Vec3::Y, double_sided: true, ..Material::plain() };
+    Scene { materials: vec![material], ..Scene::default() }
+}
+
+fn drawn(wires: &[Wires], places: &[Instance]) -> (Scene, Facts, Option<Diagnostic>) {
+    let (mut scene, mut facts) = (red(), Facts::default());
+    let warning = draw(wires, places, &mut scene, &mut budget(), &mut facts, Path::new("a.gltf")).unwrap();
+    (scene, facts, warning)
+}
+
+/// Corners of an instance in the world.
+fn corners(scene: &Scene, instance: usize) -> Vec<DVec3> {
+    let Instance { mesh, world_from_object, .. } = &scene.instances[instance];
+    let positions = &scene.meshes[*mesh as usize].positions;
+    positions.iter().map(|p| world_from_object.transform_point3(p.as_dvec3())).collect()
+}
+
+fn middle(points: &[DVec3]) -> DVec3 {
+    points.iter().sum::<DVec3>() / points.len() as f64
+}
+
+/// How far the corners of a prism are from the line between the middles of its ends.
+fn thickness(corners: &[DVec3]) -> f64 {
+    let (a, b) = (middle(&corners[..3]), middle(&corners[3..]));
+    let along = (b - a).normalize();
+    corners.iter().map(|c| (*c - a).reject_from(along).length()).fold(0.0, f64::max)
+}
+
+#[test]
+fn points_and_lines_stand_where_the_file_has_them() {
+    let of = wires(&[[0.0, 0.0, 0.0], [3.0, 4.0, 0.0]], &[[0, 0], [0, 1]]);
+    let shift = DAffine3::from_translation(DVec3::new(1e7, 0.0, -2.0));
+    let (scene, facts, warning) = drawn(&[of], &[place(0, shift)]);
+    let corners = corners(&scene, 0);
+    assert_eq!((corners.len(), scene.meshes[0].triangles.len()), (6 + 6, 8 + 8));
+    let width = 5.0 / 256.0;
+    assert!((middle(&corners[..6]) - shift.translation).length() < 1e-6, "{corners:?}");
+    assert!(corners[..6].iter().all(|c| (*c - shift.translation).length() < width));
+    let half = DVec3::new(0.6, 0.8, 0.0) * (width / 2.0);
+    assert!((middle(&corners[6..9]) - (shift.translation - half)).length() < 1e-6);
+    assert!((middle(&corners[9..]) - (shift.translation + DVec3::new(3.0, 4.0, 0.0) + half)).length() < 1e-6);
+    assert_eq!(scene.meshes[0].face_of_triangle, [vec![0; 8], vec![1; 8]].concat());
+    assert_eq!(facts.wires, WireFacts { points: 1, lines: 1, point_width: width, line_width: width });
+    assert!(warning.is_none() && facts.dropped.is_empty() && scene.instances[0].name == "here");
+}
+
+#[test]
+fn widths_are_those_of_the_world_however_a_place_stretches() {
+    let of = wires(&[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], &[[0, 1], [0, 2]]);
+    let turn = DQuat::from_rotation_z(0.3);
+    let stretched = DAffine3::from_scale_rotation_translation(DVec3::new(-10.0, 2.0, 0.0), turn, DVec3::Z);
+    let (scene, facts, _) = drawn(&[of], &[place(0, stretched)]);
+    let corners = corners(&scene, 0);
+    let expected = facts.wires.line_width * std::f64::consts::PI / 27f64.sqrt();
+    for prism in corners.chunks(6) {
+        assert!((thickness(prism) - expected).abs() < 1e-5 * expected, "{prism:?}");
+    }
+    assert!((middle(&corners[3..6]) - turn * DVec3::X * -10.0 - DVec3::Z).length() < facts.wires.line_width);
+}
+
+#[test]
+fn places_that_differ_by_a_shift_share_a_mesh() {
+    let of = wires(&[[0.0; 3], [1.0, 0.0, 0.0]], &[[0, 1]]);
+    let shifted = |x: f64| place(0, DAffine3::from_translation(DVec3::X * x));
+    let turned = place(0, DAffine3::from_rotation_y(1.0));
+    let (scene, facts, _) = drawn(&[of], &[shifted(0.0), shifted(5.0), turned]);
+    assert_eq!(scene.instances.iter().map(|i| i.mesh).collect::<Vec<_>>(), [0, 0, 1]);
+    assert_eq!((scene.meshes.len(), facts.wires.lines), (2, 1));
+}
+
+#[test]
+fn without_normals_they_are_unlit_and_with_them_lit() {
+    let mut of = wires(&[[0.0; 3], [1.0, 0.0, 0.0]], &[[0, 1], [1, 1]]);
+    let (scene, ..) = drawn(std::slice::from_ref(&of), &[place(0, DAffine3::IDENTITY)]);
+    let shown = &scene.materials[scene.meshes[0].material as usize];
+    assert!(matches!(shown.surface, Surface::Unlit) && !shown.double_sided);
+    assert_eq!((shown.base_color, shown.emission), (Vec3::X, Vec3::Y));
+    assert!(!matches!(scene.materials[0].surface, Surface::Unlit), "faces keep the material");
+
+    of.mesh.normals = vec![Vec3::Y, Vec3::Z];
+    of.mesh.colors = vec![Vec4::ONE, Vec4::new(1.0, 0.0, 0.0, 1.0)];
+    of.mesh.uvs = vec![Vec::new(), vec![Vec2::ZERO, Vec2::ONE]];
+    let mirror = place(0, DAffine3::from_scale(DVec3::new(1.0, -2.0, 1.0)));
+    let (scene, ..) = drawn(&[of], &[mirror]);
+    let mesh = &scene.meshes[0];
+    let shown = &scene.materials[mesh.material as usize];
+    assert!(!matches!(shown.surface, Surface::Unlit) && shown.double_sided);
+    assert_eq!(mesh.normals, [vec![Vec3::NEG_Y; 3], vec![Vec3::Z; 3 + 4]].concat());
+    assert_eq!(mesh.positions.len(), 6 + 4, "points with normals are squares");
+    assert_eq!((mesh.colors[0], mesh.colors[3], mesh.colors[9]), (Vec4::ONE, of_red(), of_red()));
+    assert_eq!((mesh.uvs[0].len(), mesh.uvs[1][2], mesh.uvs[1][9]), (0, Vec2::ZERO, Vec2::ONE));
+}
+
+fn of_red() -> Vec4 {
+    Vec4::new(1.0, 0.0, 0.0, 1.0)
+}
+
+#[test]
+fn ends_that_are_not_finite_are_left_out_and_told() {
+    let of =
+        wires(&[[0.0; 3], [1.0, 0.0, 0.0], [f32::NAN, 0.0, 0.0], [0.0, f32::INFINITY, 0.0]], &[[0, 1], [1, 2], [3, 3]]);
+    let (scene, facts, warning) = drawn(&[of], &[place(0, DAffine3::IDENTITY)]);
+    assert_eq!(scene.meshes[0].triangles.len(), 8);
+    let warning = warning.unwrap();
+    assert_eq!((warning.code, warning.count, facts.dropped[0].1), ("line-not-finite", 2, 2));
+    let nowhere = wires(&[[f32::NAN; 3]], &[[0, 0]]);
+    let (scene, facts, _) = drawn(&[nowhere], &[place(0, DAffine3::IDENTITY)]);
+    assert!(scene.meshes.is_empty() && scene.instances.is_empty() && facts.dropped[0].1 == 1);
+}
+
+#[test]
+fn lines_without_length_and_a_place_without_size_are_points() {
+    let of = wires(&[[2.0; 3], [2.0; 3]], &[[0, 1], [0, 0]]);
+    let (scene, facts, warning) = drawn(&[of], &[place(0, DAffine3::IDENTITY)]);
+    assert_eq!((scene.meshes[0].positions.len(), warning), (6 + 6, None));
+    assert_eq!(facts.wires, WireFacts { points: 1, lines: 1, point_width: 1.0, line_width: 1.0 });
+}
+
+#[test]
+fn crowds_are_thinner_and_simpler() {
+    let few = Widths::new([CROWD - 1, 4096], 256.0);
+    assert_eq!(few, Widths { point: 1.0, line: 1.0, crowd: false });
+    let many = Widths::new([4 * CROWD, 4 * 4096], 256.0);
+    assert_eq!(many, Widths { point: 0.5, line: 0.5, crowd: true });
+
+    let side = 257u32;
+    let positions: Vec<[f32; 3]> = (0..side * side).map(|i| [(i % side) as f32, (i / side) as f32, 0.0]).collect();
+    let ends: Vec<[u32; 2]> = (0..side * side).map(|i| [i; 2]).collect();
+    let (scene, facts, _) = drawn(&[wires(&positions, &ends)], &[place(0, DAffine3::IDENTITY)]);
+    assert_eq!(scene.meshes[0].triangles.len(), 4 * (side * side) as usize);
+    assert!((facts.wires.point_width - 256.0 * 2f64.sqrt() / 257.0).abs() < 1e-9);
+}
+
+#[test]
+fn more_than_memory_allows_is_refused_before_it_is_made() {
+    let of = wires(&[[0.0; 3], [1.0, 0.0, 0.0]], &[[0, 1]; 1000]);
+    let bytes = bake::cost(&of, &Widths::new([0, 1000], 1.0));
+    let with = |memory: u64| {
+        let mut budget = Budget::new(&Limits { memory, ..Limits::default() });
+        let places = [place(0, DAffine3::IDENTITY)];
+        draw(std::slice::from_ref(&of), &places, &mut red(), &mut budget, &mut Facts::default(), Path::new("a")).is_ok()
+    };
+    assert!(with(bytes) && !with(bytes - 1));
+    assert_eq!(bytes, 1000 * (6 * 12 + 8 * 16));
+}
+
+#[test]
+fn no_corner_of_a_solid_meets_another() {
+    // A line a million times as long as it is wide, far from where the file begins.
+    let of = wires(&[[1e6, 0.0, 0.0], [1e6 + 1.0, 1.0, 0.0]], &[[0, 1], [0, 0]]);
+    let (scene, _, warning) = drawn(&[of], &[place(0, DAffine3::IDENTITY)]);
+    let distinct: HashSet<_> = scene.meshes[0].positions.iter().map(|p| p.to_array().map(f32::to_bits)).collect();
+    assert_eq!((distinct.len(), warning), (12, None));
+}
