@@ -25,7 +25,7 @@ use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
 /// The flags that a picture may bring along.
-const FLAGS: [&str; 61] = [
+const FLAGS: [&str; 63] = [
     "size",
     "aa",
     "samples",
@@ -36,8 +36,10 @@ const FLAGS: [&str; 61] = [
     "max-samples",
     "filter",
     "error-space",
+    "aa-split",
     "aa-threshold",
     "aa-depth",
+    "aa-min-depth",
     "aperture",
     "focus",
     "depth",

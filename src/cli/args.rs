@@ -136,7 +136,7 @@ pub(super) struct RenderArgs {
         "size", "format", "bits", "half", "float", "layers", "tone_map", "exposure", "merge", "view", "camera", "eye",
         "at", "up_vector", "fov", "ortho", "up", "background", "env", "env_rotate", "env_rays", "gloss_rays",
         "light_rays", "sun_size", "aa", "quality", "samples", "pixel_error", "target_error", "confidence", "min_samples", "max_samples",
-        "filter", "error_space", "aa_threshold", "aa_depth", "aperture", "focus", "depth", "cutoff", "seed", "scene", "variant", "animation", "time", "frame", "fps",
+        "filter", "error_space", "aa_split", "aa_threshold", "aa_depth", "aa_min_depth", "aperture", "focus", "depth", "cutoff", "seed", "scene", "variant", "animation", "time", "frame", "fps",
         "frames", "turntable",
         "polygons", "mtl", "allow_empty", "accel", "intersector",
     ])]

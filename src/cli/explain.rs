@@ -8,18 +8,15 @@
 //! ever added.
 
 use super::args::ExplainArgs;
-use super::camera::{self, Choice};
 use super::exit::Exit;
 use super::job::{self, Wrong};
-use super::message::{Messages, Severity};
-use super::{accident, interrupt, print, read};
+use super::message::Messages;
+use super::seen::{self, Seen};
+use super::{accident, interrupt, print};
 use crate::accel::{AccelParams, auto};
 use crate::bench::explain::{Bill, Case, Finding, Work, explain};
 use crate::bench::report::number::{grouped, short};
-use crate::load::Diagnostic;
-use crate::render::{CLASS_NAMES, Settings, View, World};
-use crate::scene::default_light;
-use crate::scene::framing::robust_bounds;
+use crate::render::{CLASS_NAMES, Settings};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
@@ -52,27 +49,13 @@ struct Told<'a> {
 }
 
 fn judge(args: &ExplainArgs, params: AccelParams, name: &str, messages: &Messages) -> Result<Exit, Exit> {
-    let file = args.model.input.as_path();
-    let fail = |fault: Diagnostic| {
-        messages.say(Severity::Error, &fault);
-        Exit::Input
-    };
-    let mut loaded = read::model(&args.model, messages)?;
-    let world = World::new(&loaded.scene);
-    if world.shapes.is_empty() {
-        return Err(fail(Diagnostic::new("nothing-to-draw", file, "", "nothing to hit: it holds no faces")));
-    }
+    let Seen { loaded, world, view, phrase } = seen::model(&args.model, &args.eye, args.size, messages)?;
     let (width, height) = args.size;
-    let bounds = robust_bounds(&loaded.scene);
-    let aspect = f64::from(width) / f64::from(height);
-    let (camera, view_phrase) =
-        camera::camera(&Choice::of(&args.eye, None), None, &loaded.scene, &bounds, aspect, file).map_err(fail)?;
-    default_light::add_if_missing(&mut loaded.scene, &camera);
     let depth = args.depth.or(loaded.scene.hints.depth);
     let settings = Settings { width, height, samples: 1, depth, ..Settings::default() };
     let (accel, _) = auto::build(args.accel, &world.shapes, &params);
     let kind = accel.kind();
-    let case = Case { scene: loaded.scene, view: View::from_camera(&camera), settings, accel: kind, params };
+    let case = Case { scene: loaded.scene, view, settings, accel: kind, params };
     let going = |cause| {
         messages.info("progress", format!("{name}: without {cause}"));
         !interrupt::raised()
@@ -81,7 +64,7 @@ fn judge(args: &ExplainArgs, params: AccelParams, name: &str, messages: &Message
     let told = Told {
         name,
         hash: loaded.facts.hash,
-        view: &view_phrase,
+        view: &phrase,
         prims: world.shapes.len(),
         case: &case,
         usual: &usual,

@@ -28,6 +28,7 @@ mod progress;
 mod read;
 mod render;
 mod sampling;
+mod seen;
 mod sequence;
 mod shell;
 mod stats;

@@ -221,12 +221,9 @@ fn prepare(
 }
 
 fn nothing_to_draw(loaded: &Loaded, file: &Path) -> Diagnostic {
-    let facts = &loaded.facts;
-    let held = match (facts.points_and_lines, facts.dropped.iter().map(|(_, n)| n).sum::<u64>()) {
-        (0, 0) => "nothing to draw: it holds no faces".to_owned(),
-        (n, 0) => format!("nothing to draw: it holds only {n} points and lines"),
-        (0, n) => format!("nothing to draw: all of its {n} faces had to be dropped"),
-        (p, n) => format!("nothing to draw: only {p} points and lines, and {n} faces that had to be dropped"),
+    let held = match loaded.facts.dropped.iter().map(|(_, n)| n).sum::<u64>() {
+        0 => "nothing to draw: it holds no faces, lines or points".to_owned(),
+        n => format!("nothing to draw: all of its {n} faces, lines and points had to be dropped"),
     };
     Diagnostic::new("nothing-to-draw", file, "", held).remedy("--allow-empty draws the background")
 }

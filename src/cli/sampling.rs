@@ -5,7 +5,9 @@ use super::parse::{self, Focus};
 use crate::image::{FileKind, Output};
 use crate::load::Diagnostic;
 use crate::math::DVec3;
-use crate::render::{Adaptive, ErrorSpace, Filter, Quality, Sampled, Sampling, Settings, Stochastic, ThinLens, View};
+use crate::render::{
+    Adaptive, ErrorSpace, Filter, Quality, Sampled, Sampling, Settings, Split, Stochastic, ThinLens, View,
+};
 use crate::scene::RenderHints;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
@@ -19,8 +21,8 @@ pub(super) struct SamplingArgs {
     /// or what other flags ask for]
     #[arg(long, value_name = "HOW", value_enum, help_heading = "Quality", hide_short_help = true)]
     pub aa: Option<Aa>,
-    /// How good a stochastic picture is to be: --pixel-error and --max-samples in a word: draft 0.06 and 64, normal 0.03 and
-    /// 256, final 0.01 and 2048 [default: normal]
+    /// How good a stochastic picture is to be: --pixel-error and --max-samples in a word: draft 0.15 and 64, normal 0.06 and
+    /// 256, final 0.015 and 1024 [default: normal]
     #[arg(long, value_name = "WORD", value_parser = parse::quality(), help_heading = "Quality")]
     pub quality: Option<Quality>,
     /// Exactly N rays a pixel, at the same places in each (--aa uniform). Costs of pixels (--layers tests, --heatmap) are
@@ -40,12 +42,12 @@ pub(super) struct SamplingArgs {
     /// How certain that error is to be, such as 95% or 0.95 [default: 95%]
     #[arg(long, value_name = "PERCENT", value_parser = parse::confidence, help_heading = "Quality", hide_short_help = true)]
     pub confidence: Option<f64>,
-    /// Fewest rays of a pixel of stochastic sampling, enough where they and those of its neighbours agree. Light, gloss and
-    /// environment rays are divided by it [default: 4]
+    /// Fewest rays of a pixel of stochastic sampling, enough where they and those of its neighbours agree; the next power of
+    /// two is taken. Light, gloss and environment rays are divided by it [default: 4]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=65_536), help_heading = "Quality",
           hide_short_help = true)]
     pub min_samples: Option<u32>,
-    /// Most rays of a pixel of stochastic sampling, certain or not
+    /// Most rays of a pixel of stochastic sampling, certain or not; the power of two below is taken
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1_048_576), help_heading = "Quality",
           hide_short_help = true)]
     pub max_samples: Option<u32>,
@@ -53,17 +55,29 @@ pub(super) struct SamplingArgs {
     /// [default: box]
     #[arg(long, value_name = "NAME", value_parser = parse::filter(), help_heading = "Quality", hide_short_help = true)]
     pub filter: Option<Filter>,
-    /// In what numbers --pixel-error counts: sRGB codes after exposure and tone map, or linear light [default: linear for
-    /// EXR, else display]
+    /// In what numbers --pixel-error and --aa-threshold count: sRGB codes after exposure and tone map, or linear light
+    /// [default: linear for EXR, else display]
     #[arg(long, value_name = "SPACE", value_enum, help_heading = "Quality", hide_short_help = true)]
     pub error_space: Option<SpaceArg>,
-    /// Difference of a channel, linear light after exposure, above which adaptive sampling looks closer [default: 0.05]
+    /// Which quarters of a pixel adaptive sampling looks at closer: `corners` those whose corner differs from the middle of the
+    /// pixel, as the algorithm was published; `effect` those that, by all that was found on their border, could change the
+    /// pixel: fewer rays for a smaller error [default: effect]
+    #[arg(long, value_name = "NAME", value_parser = parse::split(), help_heading = "Quality", hide_short_help = true)]
+    pub aa_split: Option<Split>,
+    /// What they are looked at above: what they could change the pixel by, 0 to 1 in the written picture, half of it for
+    /// half again as many rays [default: 0.001]; of corners the difference of a channel, linear light after exposure
+    /// [default: 0.05]
     #[arg(long, value_name = "T", value_parser = parse::error, help_heading = "Quality", hide_short_help = true)]
     pub aa_threshold: Option<f32>,
-    /// How often adaptive sampling halves a pixel at most; 0: five rays [default: 3]
+    /// How often adaptive sampling halves a pixel at most; 0: five rays [default: 6, of corners 3]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=i64::from(Adaptive::MAX_LEVELS)),
           help_heading = "Quality", hide_short_help = true)]
     pub aa_depth: Option<u32>,
+    /// How often it halves every pixel: what lies between the rays is missed, of which there are 2, 8, 32 … to a pixel. Each
+    /// more costs four times the rays where nothing is to be seen [default: 1, of corners 0]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=i64::from(Adaptive::MAX_LEVELS)),
+          help_heading = "Quality", hide_short_help = true)]
+    pub aa_min_depth: Option<u32>,
     /// Radius of the lens, in the units of the model: what is not at --focus is blurred [default: 0, everything is sharp]
     #[arg(long, value_name = "R", value_parser = parse::radius, help_heading = "Camera", hide_short_help = true)]
     pub aperture: Option<f64>,
@@ -95,17 +109,7 @@ pub(super) enum SpaceArg {
 impl SamplingArgs {
     /// Refuses flags that belong to different kinds of sampling.
     pub(super) fn check(&self) -> Result<(), Wrong> {
-        let stochastic = [
-            ("--quality", self.quality.is_some()),
-            ("--pixel-error", self.pixel_error.is_some()),
-            ("--target-error", self.target_error.is_some()),
-            ("--confidence", self.confidence.is_some()),
-            ("--min-samples", self.min_samples.is_some()),
-            ("--max-samples", self.max_samples.is_some()),
-            ("--filter", self.filter.is_some()),
-            ("--error-space", self.error_space.is_some()),
-        ];
-        let adaptive = [("--aa-threshold", self.aa_threshold.is_some()), ("--aa-depth", self.aa_depth.is_some())];
+        let (stochastic, adaptive) = (self.stochastic_flags(), self.adaptive_flags());
         let uniform = [("--samples", self.samples.is_some())];
         let groups = [(Aa::Stochastic, &stochastic[..]), (Aa::Adaptive, &adaptive), (Aa::Uniform, &uniform)];
         let asked = |flags: &[(&'static str, bool)]| flags.iter().find(|(_, typed)| *typed).map(|(flag, _)| *flag);
@@ -121,6 +125,15 @@ impl SamplingArgs {
                 return Err(Wrong(format!("{flag} belongs to --aa {}, not to --aa {}", name(aa), name(chosen))));
             }
         }
+        if self.error_space.is_some() && (self.samples.is_some() || matches!(self.aa, Some(Aa::Off | Aa::Uniform))) {
+            let text = "--error-space belongs to --aa stochastic and adaptive: --aa uniform looks at no error";
+            return Err(Wrong(text.into()));
+        }
+        if let (Some(least), Some(most)) = (self.aa_min_depth, self.aa_depth)
+            && least > most
+        {
+            return Err(Wrong(format!("--aa-min-depth {least} is more than --aa-depth {most}")));
+        }
         if let (Some(fewest), Some(most)) = (self.min_samples, self.max_samples)
             && fewest > most
         {
@@ -129,21 +142,36 @@ impl SamplingArgs {
         Ok(())
     }
 
+    /// Flags of stochastic sampling alone, and whether they were typed.
+    fn stochastic_flags(&self) -> [(&'static str, bool); 7] {
+        [
+            ("--quality", self.quality.is_some()),
+            ("--pixel-error", self.pixel_error.is_some()),
+            ("--target-error", self.target_error.is_some()),
+            ("--confidence", self.confidence.is_some()),
+            ("--min-samples", self.min_samples.is_some()),
+            ("--max-samples", self.max_samples.is_some()),
+            ("--filter", self.filter.is_some()),
+        ]
+    }
+
+    /// Flags of adaptive sampling alone.
+    fn adaptive_flags(&self) -> [(&'static str, bool); 4] {
+        [
+            ("--aa-split", self.aa_split.is_some()),
+            ("--aa-threshold", self.aa_threshold.is_some()),
+            ("--aa-depth", self.aa_depth.is_some()),
+            ("--aa-min-depth", self.aa_min_depth.is_some()),
+        ]
+    }
+
     /// The kind of sampling: as typed, as other flags or the scene file have it, or stochastic.
     fn kind(&self, hints: &RenderHints) -> Aa {
-        let tuned = [
-            self.quality.is_some(),
-            self.pixel_error.is_some(),
-            self.target_error.is_some(),
-            self.confidence.is_some(),
-            self.min_samples.is_some(),
-            self.max_samples.is_some(),
-            self.filter.is_some(),
-            self.error_space.is_some(),
-        ];
-        self.aa.unwrap_or(if self.aa_threshold.is_some() || self.aa_depth.is_some() {
+        let typed = |flags: &[(&str, bool)]| flags.iter().any(|(_, typed)| *typed);
+        let tuned = typed(&self.stochastic_flags()) || self.error_space.is_some();
+        self.aa.unwrap_or(if typed(&self.adaptive_flags()) {
             Aa::Adaptive
-        } else if self.samples.is_some() || hints.samples.is_some() && !tuned.contains(&true) {
+        } else if self.samples.is_some() || hints.samples.is_some() && !tuned {
             Aa::Uniform
         } else {
             Aa::Stochastic
@@ -159,10 +187,11 @@ impl SamplingArgs {
             Aa::Off => (1, Sampling::Uniform),
             Aa::Uniform => (samples, Sampling::Uniform),
             Aa::Adaptive => {
-                let usual = Adaptive::default();
+                let usual = Adaptive::usual(self.aa_split.unwrap_or_default());
                 let threshold = self.aa_threshold.unwrap_or(usual.threshold);
-                let levels = self.aa_depth.unwrap_or(usual.levels);
-                (samples, Sampling::Adaptive(Adaptive { threshold, levels, ..usual }))
+                let levels = self.aa_depth.unwrap_or(usual.levels.max(self.aa_min_depth.unwrap_or(0)));
+                let min_levels = self.aa_min_depth.unwrap_or(usual.min_levels).min(levels);
+                (samples, Sampling::Adaptive(Adaptive { threshold, levels, min_levels, ..usual }))
             }
             Aa::Stochastic => {
                 let usual = self.quality.unwrap_or_default().stochastic();
@@ -189,15 +218,11 @@ impl SamplingArgs {
             None => kind == FileKind::Exr,
         };
         let (tone_map, exposure) = (output.tone_map, output.exposure);
+        let space = if linear { ErrorSpace::Linear } else { ErrorSpace::Display { tone_map, exposure } };
         match sampling {
             Sampling::Uniform => sampling,
-            Sampling::Adaptive(how) => {
-                Sampling::Adaptive(Adaptive { exposure: if kind == FileKind::Exr { 0.0 } else { exposure }, ..how })
-            }
-            Sampling::Stochastic(how) => {
-                let space = if linear { ErrorSpace::Linear } else { ErrorSpace::Display { tone_map, exposure } };
-                Sampling::Stochastic(Stochastic { space, ..how })
-            }
+            Sampling::Adaptive(how) => Sampling::Adaptive(Adaptive { space, ..how }),
+            Sampling::Stochastic(how) => Sampling::Stochastic(Stochastic { space, ..how }),
         }
     }
 
@@ -218,6 +243,11 @@ impl SamplingArgs {
     }
 }
 
+/// What `--error-space` is called.
+fn space(space: ErrorSpace) -> &'static str {
+    if space == ErrorSpace::Linear { "linear" } else { "display" }
+}
+
 /// The flags that repeat the sampling of a picture.
 pub(super) fn flags(settings: &Settings, mut set: impl FnMut(&str, String)) {
     match settings.sampling {
@@ -227,8 +257,11 @@ pub(super) fn flags(settings: &Settings, mut set: impl FnMut(&str, String)) {
         }
         Sampling::Adaptive(how) => {
             set("aa", "adaptive".into());
+            set("aa-split", how.split.name().into());
             set("aa-threshold", how.threshold.to_string());
             set("aa-depth", how.levels.to_string());
+            set("aa-min-depth", how.min_levels.to_string());
+            set("error-space", space(how.space).into());
         }
         Sampling::Stochastic(how) => {
             set("aa", "stochastic".into());
@@ -240,7 +273,7 @@ pub(super) fn flags(settings: &Settings, mut set: impl FnMut(&str, String)) {
             set("min-samples", how.min_samples.to_string());
             set("max-samples", how.max_samples.to_string());
             set("filter", how.filter.name().into());
-            set("error-space", if how.space == ErrorSpace::Linear { "linear" } else { "display" }.into());
+            set("error-space", space(how.space).into());
         }
     }
     if let Some(lens) = settings.lens {
@@ -284,11 +317,14 @@ pub(super) fn json(settings: &Settings, sampled: &Sampled) -> Value {
     let rays = json!({ "rays": sampled.rays, "mean": sampled.mean(), "most": sampled.most() });
     let mut all = match settings.sampling {
         Sampling::Uniform => json!({ "aa": "uniform" }),
-        Sampling::Adaptive(how) => json!({ "aa": "adaptive", "threshold": plain(how.threshold), "depth": how.levels }),
+        Sampling::Adaptive(how) => json!({
+            "aa": "adaptive", "split": how.split.name(), "threshold": plain(how.threshold), "depth": how.levels,
+            "min_depth": how.min_levels, "error_space": space(how.space),
+        }),
         Sampling::Stochastic(how) => json!({
             "aa": "stochastic", "pixel_error": plain(how.error), "confidence": how.confidence,
             "min_samples": how.min_samples, "max_samples": how.max_samples, "filter": how.filter.name(),
-            "error_space": if how.space == ErrorSpace::Linear { "linear" } else { "display" },
+            "error_space": space(how.space),
             "met": sampled.met, "ceiling": sampled.at_most, "rmse": sampled.rmse(), "target_error": how.target.map(plain),
             "foretold": sampled.targeted.map(|to| json!({ "rmse": to.foretold, "cpu_seconds": to.foretold_cpu })),
         }),

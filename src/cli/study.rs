@@ -1,20 +1,18 @@
 //! `meshray study`: what each knob buys on a model, and which settings to use.
 
 use super::args::StudyArgs;
-use super::camera::{self, Choice};
 use super::exit::Exit;
 use super::job::Wrong;
 use super::message::{Messages, Severity};
-use super::{accident, interrupt, print, read};
+use super::seen::{self, Seen};
+use super::{accident, interrupt, print};
 use crate::accel::{AccelParams, auto};
 use crate::bench::study::report::{Format, text};
 use crate::bench::study::{Plan, Study, Subject, measure, reference, settings};
 use crate::image::{Output, write_atomic};
 use crate::load::Diagnostic;
+use crate::render::Settings;
 use crate::render::texture::TextureStore;
-use crate::render::{Settings, View, World};
-use crate::scene::default_light;
-use crate::scene::framing::robust_bounds;
 use std::path::{Path, PathBuf};
 
 /// Loads the model, renders it with every setting, and prints and writes rows as they come.
@@ -42,32 +40,22 @@ pub(super) fn run(args: &StudyArgs) -> Exit {
 }
 
 fn study(args: &StudyArgs, files: &[(PathBuf, Format)], name: &str, messages: &Messages) -> Result<Exit, Exit> {
-    let file = args.model.input.as_path();
-    let mut loaded = read::model(&args.model, messages)?;
-    let world = World::new(&loaded.scene);
-    let fail = |fault: Diagnostic| {
-        messages.say(Severity::Error, &fault);
-        Exit::Input
-    };
-    if world.shapes.is_empty() {
-        return Err(fail(Diagnostic::new("nothing-to-draw", file, "", "nothing to hit: it holds no faces")));
-    }
+    let Seen { loaded, world, view, phrase } = seen::model(&args.model, &args.eye, args.size, messages)?;
     let (width, height) = args.size;
-    let bounds = robust_bounds(&loaded.scene);
-    let aspect = f64::from(width) / f64::from(height);
-    let (camera, view_phrase) =
-        camera::camera(&Choice::of(&args.eye, None), None, &loaded.scene, &bounds, aspect, file).map_err(fail)?;
-    default_light::add_if_missing(&mut loaded.scene, &camera);
     let hints = &loaded.scene.hints;
     let base = Settings { width, height, depth: hints.depth, seed: args.seed, ..Settings::default() };
     let tone_map = match hints.tone_map.as_deref().map(str::parse).transpose() {
         Ok(hinted) => args.tone_map.or(hinted).unwrap_or_default(),
-        Err(e) => return Err(fail(Diagnostic::new("scene-value", file, "", e.to_string()))),
+        Err(e) => {
+            let fault = Diagnostic::new("scene-value", args.model.input.as_path(), "", e.to_string());
+            messages.say(Severity::Error, &fault);
+            return Err(Exit::Input);
+        }
     };
     let exposure = args.exposure.or(hints.exposure).unwrap_or(0.0);
     let output = Output { tone_map, exposure, ..Output::default() };
     let (accel, _) = auto::build(args.accel, &world.shapes, &AccelParams::DEFAULT);
-    let (textures, view) = (TextureStore::new(&loaded.scene), View::from_camera(&camera));
+    let textures = TextureStore::new(&loaded.scene);
     let subject = Subject {
         scene: &loaded.scene,
         world: &world,
@@ -86,7 +74,7 @@ fn study(args: &StudyArgs, files: &[(PathBuf, Format)], name: &str, messages: &M
     let mut study = Study {
         name: name.to_owned(),
         hash: loaded.facts.hash,
-        view: view_phrase,
+        view: phrase,
         size: (width, height),
         threads: rayon::current_num_threads(),
         plan,

@@ -1,9 +1,11 @@
 //! When the mean of a pixel's samples is certain enough.
 //!
-//! A pixel's samples belong to [`STREAMS`] scramblings that know nothing of each other. Each has a mean of its own, and how
-//! far these lie apart tells how far the mean of all is off, however evenly the samples of one scrambling are spread (A. B.
-//! Owen, "Randomized QMC", 2013, chapter 17). What counts is the written picture: the mean goes through the tone
-//! curve, so its error there is found by leaving out each stream in turn (J. W. Tukey's jackknife, 1958).
+//! A pixel's samples are runs of one scrambled sequence: [`GROUPS`] groups, each of which fills the pixel evenly, and all
+//! together more evenly than groups of different scramblings would. Each has a mean of its own, and how far these lie apart
+//! bounds how far the mean of all is off (A. B. Owen, "Randomized QMC", 2013, chapter 17, for groups that know nothing of
+//! each other; where one fills the gaps that another leaves, the mean of all is better than that, and the estimate errs to
+//! the safe side). What counts is the written picture: the mean goes through the tone curve, so its error there is found by
+//! leaving out each group in turn (J. W. Tukey's jackknife, 1958).
 //!
 //! A pixel is looked at again and again, and stops at the first look that is content. Were each look 95 % certain, all
 //! together would be less. See [`factor`] for what is done about it.
@@ -14,8 +16,8 @@ use crate::image::{Developer, Output};
 use crate::math::Vec3;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-/// Independent scramblings of a pixel.
-pub(super) const STREAMS: usize = 8;
+/// Groups of a pixel's samples.
+pub(super) const GROUPS: usize = 8;
 
 /// The judge of all pixels of a picture.
 pub(super) struct Certainty<'a> {
@@ -90,16 +92,16 @@ impl<'a> Certainty<'a> {
         (0..4).any(|c| (a[c] - b[c]).abs() > STEEP * self.error)
     }
 
-    /// Standard error of a pixel, the root of the mean over its channels, from streams of equally many samples.
-    #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "a handful of streams")]
-    pub(super) fn standard_error(&self, streams: &[Sum]) -> f32 {
-        if streams.windows(2).all(|pair| pair[0] == pair[1]) {
+    /// Standard error of a pixel, the root of the mean over its channels, from groups of equally many samples.
+    #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "a handful of groups")]
+    pub(super) fn standard_error(&self, groups: &[Sum]) -> f32 {
+        if groups.windows(2).all(|pair| pair[0] == pair[1]) {
             return 0.0;
         }
-        let all = streams.iter().fold(Sum::default(), |all, stream| all.plus(*stream, 1.0));
-        let without = |stream: &Sum| self.written(&all.plus(*stream, -1.0)).map(f64::from);
-        let left: Vec<[f64; 4]> = streams.iter().map(without).collect();
-        let n = streams.len() as f64;
+        let all = groups.iter().fold(Sum::default(), |all, group| all.plus(*group, 1.0));
+        let without = |group: &Sum| self.written(&all.plus(*group, -1.0)).map(f64::from);
+        let left: Vec<[f64; 4]> = groups.iter().map(without).collect();
+        let n = groups.len() as f64;
         let squares = |c: usize| {
             let mean = left.iter().map(|v| v[c]).sum::<f64>() / n;
             left.iter().map(|v| (v[c] - mean) * (v[c] - mean)).sum::<f64>() * (n - 1.0) / n
@@ -144,8 +146,8 @@ impl Range {
     }
 }
 
-/// Degrees of freedom of an estimate from [`STREAMS`] means.
-const FREEDOM: f64 = (STREAMS - 1) as f64;
+/// Degrees of freedom of an estimate from [`GROUPS`] means.
+const FREEDOM: f64 = (GROUPS - 1) as f64;
 
 /// How many estimated standard errors the error that is allowed must be, so that a pixel that stops at the first look
 /// which finds it so is within that error with probability `confidence`.
@@ -208,6 +210,7 @@ fn student_within(t: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::math::random::Random;
+    use crate::render::sobol::mix;
 
     #[test]
     fn distributions_agree_with_published_tables() {
@@ -236,10 +239,10 @@ mod tests {
     }
 
     #[test]
-    fn what_is_the_same_in_all_streams_is_certain() {
+    fn what_is_the_same_in_all_groups_is_certain() {
         let output = output(ErrorSpace::default(), None);
         let judge = Certainty::new(output.as_ref(), None, false, 0.01, factor(0.95));
-        assert_eq!(judge.standard_error(&[grey(0.3, 3.0); STREAMS]), 0.0);
+        assert_eq!(judge.standard_error(&[grey(0.3, 3.0); GROUPS]), 0.0);
         let agree = |samples: &[Sum]| judge.agree(&judge.range(samples));
         assert!(agree(&[grey(0.3, 1.0); 4]) && !agree(&[grey(0.3, 1.0), grey(0.4, 1.0)]));
     }
@@ -262,25 +265,62 @@ mod tests {
         for spread in [0.1_f32, 0.3, 0.7, 1.5] {
             let (pixels, mut right) = (4000, 0);
             for _ in 0..pixels {
-                let mut streams = [Sum::default(); STREAMS];
+                let mut groups = [Sum::default(); GROUPS];
                 let mut target = 1.0;
                 loop {
-                    for stream in &mut streams {
-                        while stream.weight < target {
+                    for group in &mut groups {
+                        while group.weight < target {
                             // Nearly normal, of variance 1.
                             let noise = (0..12).map(|_| random.unit()).sum::<f32>() - 6.0;
-                            *stream = stream.plus(grey(noise * spread, 1.0), 1.0);
+                            *group = group.plus(grey(noise * spread, 1.0), 1.0);
                         }
                     }
-                    if judge.is_met(judge.standard_error(&streams), 0.0, 1) {
+                    if judge.is_met(judge.standard_error(&groups), 0.0, 1) {
                         break;
                     }
                     target *= 2.0;
                 }
-                let all = streams.iter().fold(Sum::default(), |all, s| all.plus(*s, 1.0));
+                let all = groups.iter().fold(Sum::default(), |all, s| all.plus(*s, 1.0));
                 right += u32::from((all.radiance.x / all.weight).abs() <= 0.05);
             }
             assert!(f64::from(right) >= 0.945 * f64::from(pixels), "{spread}: {right}");
+        }
+    }
+
+    /// The mean of squared errors of many pixels of one brightness each, and of their squared standard errors.
+    fn squares(samples: u32, brightness: impl Fn([f64; 2], u32) -> f64, mean: f64) -> (f64, f64) {
+        let judge = Certainty::new(None, None, false, 0.01, factor(0.95));
+        let pixels = 2000;
+        let (mut errors, mut estimates) = (0.0, 0.0);
+        for pixel in 0..pixels {
+            let mut groups = [Sum::default(); GROUPS];
+            for i in 0..samples {
+                let light = brightness(crate::render::sobol::point(i, pixel), mix(pixel, i));
+                let group = &mut groups[(i * 8 / samples) as usize];
+                *group = group.plus(grey(light as f32, 1.0), 1.0);
+            }
+            let all = groups.iter().fold(Sum::default(), |all, group| all.plus(*group, 1.0));
+            errors += (f64::from(all.radiance.x / all.weight) - mean).powi(2);
+            estimates += f64::from(judge.standard_error(&groups)).powi(2);
+        }
+        (errors / f64::from(pixels), estimates / f64::from(pixels))
+    }
+
+    #[test]
+    fn what_groups_differ_by_is_no_less_than_what_their_mean_is_off() {
+        let edge = |[x, y]: [f64; 2], _: u32| f64::from(u8::from(y < 0.31 + 0.4 * x));
+        let gradient = |[x, y]: [f64; 2], _: u32| 0.7 * x + 0.3 * y;
+        // Nothing of this is spread evenly.
+        let noise = |_: [f64; 2], random: u32| f64::from(random) / 4_294_967_296.0;
+        for samples in [8, 32, 128] {
+            for (what, (error, estimate), at_least) in [
+                ("edge", squares(samples, edge, 0.51), 2.0),
+                ("gradient", squares(samples, gradient, 0.5), 20.0),
+                ("noise", squares(samples, noise, 0.5), 0.88),
+            ] {
+                assert!(estimate > at_least * error, "{what} of {samples}: {error:e} {estimate:e}");
+                assert!(what != "noise" || estimate < 1.12 * error, "{what} of {samples}: {error:e} {estimate:e}");
+            }
         }
     }
 }

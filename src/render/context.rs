@@ -11,6 +11,7 @@ use super::world::World;
 use crate::math::Vec3;
 use crate::scene::features::{Feature, Features};
 use crate::scene::{AlphaMode, Background, Light, Material, Scene};
+use std::sync::Arc;
 
 /// Rays to a panorama from each point, when nobody says.
 const ENV_RAYS: u32 = 16;
@@ -27,16 +28,17 @@ fn samples_together(settings: &Settings) -> u32 {
     }
 }
 
-/// Shared by all workers, computed once per image.
+/// Shared by all workers, computed once per image. What takes long to compute is shared by copies.
+#[derive(Clone)]
 pub(crate) struct Context<'a> {
     pub scene: &'a Scene,
     pub world: &'a World,
     pub textures: &'a TextureStore<'a>,
-    pub sky: Sky,
+    pub sky: Arc<Sky>,
     pub lights: Vec<LocalLight>,
     /// What is known of each material for all points of it; `None` where it takes more, or where each point must be
     /// looked at.
-    pub uniform: Vec<Option<Uniform>>,
+    pub uniform: Arc<[Option<Uniform>]>,
     /// Parts of the spectrum; empty unless a material disperses light.
     pub bands: Vec<Band>,
     /// Whether anything but opaque surfaces can stand before a light.
@@ -96,7 +98,7 @@ impl<'a> Context<'a> {
         let together = samples_together(settings);
         let gloss = Gloss::new(settings.gloss_rays).shared_by(together);
         let depth = settings.depth.unwrap_or_else(|| auto_depth(&features, gloss.all));
-        let sky = Sky::new(scene);
+        let sky = Arc::new(Sky::new(scene));
         let env_rays = settings.env_rays.unwrap_or(if sky.is_map() { ENV_RAYS } else { 0 });
         // Each way of drawing a direction to a panorama needs a ray in each of both halves.
         let env_rays = env_rays.div_ceil(together).max(env_rays.min(if sky.is_map() { ENV_RAYS_LEAST } else { 2 }));
@@ -124,6 +126,11 @@ impl<'a> Context<'a> {
             cutoff: settings.cutoff,
             everything,
         }
+    }
+
+    /// The same with other random choices.
+    pub(super) fn reseeded(&self, seed: u64) -> Self {
+        Self { seed, ..self.clone() }
     }
 
     /// Whether a branch of this weight is worth its rays.

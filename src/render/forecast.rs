@@ -1,8 +1,10 @@
 //! What a picture will take and how wrong it will be, foretold from a part of it.
 
-use super::part::{Measure, Part, Quiet, squared_errors, squares};
+use super::context::Context;
+use super::part::{Measure, Part, Quiet, SIDE, squared_errors, squares};
 use super::sampling::Sampling;
 use super::target;
+use super::tile::TILE;
 use super::{Job, Progress, Settings};
 use crate::accel::{NoProbe, RayCounts};
 
@@ -61,17 +63,18 @@ pub struct Forecast {
 /// Foretells the rendering of a job from about a hundredth of its pixels, at least some thousands: rendered twice, with
 /// different random numbers. `None` when cancelled.
 pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
+    let context = Context::new(job.scene, job.world, job.textures, job.settings);
     let (settings, work) = match job.settings.sampling {
         Sampling::Stochastic(how) if how.target.is_some() => {
-            let plan = target::plan::<NoProbe>(job, &how, &Quiet(progress))?;
+            let plan = target::plan::<NoProbe>(job, &context, &how, &Quiet(progress))?;
             (plan.settings(job.settings, 0), plan.work)
         }
         _ => (job.settings.clone(), 1.0),
     };
     let squares = squares(settings.width, settings.height);
-    let timed = Part::<NoProbe>::render(job, &settings, &squares, progress)?;
+    let timed = Part::<NoProbe>::render(job, &context, &settings, &squares, progress)?;
     let other = Settings { seed: target::seed(settings.seed, 1), ..settings.clone() };
-    let counted = Part::<RayCounts>::render(job, &other, &squares, progress)?;
+    let counted = Part::<RayCounts>::render(job, &context, &other, &squares, progress)?;
     let pixels = u64::from(settings.width) * u64::from(settings.height);
     let looked_at: u64 = timed.squares.iter().map(|square| square.beauty.len() as u64).sum();
     // For a pixel of each square: a small square at the edge counts as much as its pixels do.
@@ -79,7 +82,13 @@ pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
         (0..timed.squares.len()).map(|i| value(i) / timed.squares[i].beauty.len().max(1) as f64).collect()
     };
     let whole = pixels as f64 * work;
-    let rays = Interval::of_mean(&per_pixel(&|i| timed.squares[i].rays as f64), whole);
+    // Of the pixels around it a square has more, for its size, than a tile.
+    let rays_of = |i: usize| {
+        let square = &timed.squares[i];
+        square.rays as f64 - square.rays_around as f64 * (1.0 - f64::from(SIDE) / f64::from(TILE))
+    };
+    let rays = Interval::of_mean(&per_pixel(&rays_of), whole);
+    let seconds_of = |i: usize| timed.spent[i].as_secs_f64() * rays_of(i) / timed.squares[i].rays.max(1) as f64;
     let tests: u64 =
         counted.counts.iter().flat_map(|c| [c.primary, c.shadow, c.reflected, c.refracted]).map(|c| c.n_it).sum();
     let per_ray = tests as f64 / counted.rays().max(1) as f64;
@@ -88,7 +97,7 @@ pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
     Some(Forecast {
         looked_at,
         pixels,
-        cpu: Interval::of_mean(&per_pixel(&|i| timed.spent[i].as_secs_f64()), whole),
+        cpu: Interval::of_mean(&per_pixel(&seconds_of), whole),
         rays,
         tests: rays.map(|rays| rays * per_ray),
         rmse: is_random.then(|| Interval::of_mean(&squared, 1.0 / work).map(f64::sqrt)),

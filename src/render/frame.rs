@@ -5,12 +5,15 @@ use super::certainty;
 use super::context::Context;
 use super::eyes::{Ball, Eye, Place, ThinLens};
 use super::pixel::sample_offsets;
-use super::sampling::{Adaptive, Sampling};
+use super::sampling::Sampling;
 use super::sobol::{self, mix};
 use super::view::View;
 use super::whitted::Sample;
 use crate::math::{DVec3, Vec3};
 use crate::scene::Background;
+
+/// Levels of adaptive sampling beyond which rays get no sharper: what is finer in a texture would be seen by chance.
+const SHARPEST: u32 = 3;
 
 /// What all tiles share.
 pub(super) struct Frame<'a> {
@@ -37,7 +40,7 @@ impl<'a> Frame<'a> {
         // Where more samples come as they are needed a ray is as sharp as the most of them: what it blurs stays blurred.
         let samples = match settings.sampling {
             Sampling::Uniform => offsets.len() as f32,
-            Sampling::Adaptive(how) => (4_u32 << (2 * how.levels.min(Adaptive::MAX_LEVELS))) as f32,
+            Sampling::Adaptive(how) => (4_u32 << (2 * how.levels.min(SHARPEST))) as f32,
             Sampling::Stochastic(how) => how.max_samples.max(1) as f32,
         };
         let sample_width = 1.0 / samples.sqrt();
@@ -128,13 +131,4 @@ pub(super) fn resolve(samples: &[Sample], background: Option<Vec3>) -> [f32; 4] 
     let mut sum = Sum::default();
     samples.iter().for_each(|sample| sum.add(sample));
     sum.resolve(background)
-}
-
-/// The numbers in which an adaptive picture's colours are compared: linear light over the background, after exposure.
-pub(super) fn compared(how: &Adaptive, sample: &Sample, background: Option<Vec3>) -> [f32; 4] {
-    let gain = libm::exp2f(how.exposure);
-    let color = (sample.radiance + sample.through * background.unwrap_or(Vec3::ZERO)) * gain;
-    // Without a background its share is seen in the picture's alpha.
-    let clear = if background.is_some() { 0.0 } else { sample.through.element_sum() / 3.0 };
-    color.extend(clear).to_array()
 }

@@ -57,7 +57,7 @@ pub use forecast::{Forecast, Interval, forecast};
 pub use keeping::{Instancing, UnknownInstancing};
 pub use observer::{Asked, Question, Tape};
 pub use profile::{Profile, render_profiled};
-pub use sampling::{Adaptive, ErrorSpace, Filter, Quality, Sampled, Sampling, Stochastic, Targeted};
+pub use sampling::{Adaptive, ErrorSpace, Filter, Quality, Sampled, Sampling, Split, Stochastic, Targeted};
 pub use surface::given_normal;
 pub use view::View;
 pub use world::{PrimSource, World};

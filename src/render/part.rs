@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 /// Columns and rows of a square.
-const SIDE: u32 = 8;
+pub(super) const SIDE: u32 = 8;
 
 /// One square in so many is looked at …
 const ONE_IN: usize = 100;
@@ -63,9 +63,15 @@ pub(super) struct Part<P> {
 }
 
 impl<P: Observer> Part<P> {
-    /// Renders them; `None` when cancelled.
-    pub(super) fn render(job: &Job, settings: &Settings, squares: &[Tile], progress: &dyn Progress) -> Option<Self> {
-        let context = Context::new(job.scene, job.world, job.textures, settings);
+    /// Renders them in a context that was made for these settings but for their seed; `None` when cancelled.
+    pub(super) fn render(
+        job: &Job,
+        context: &Context,
+        settings: &Settings,
+        squares: &[Tile],
+        progress: &dyn Progress,
+    ) -> Option<Self> {
+        let context = context.reseeded(settings.seed);
         let (mut finished, counts, complete) =
             render_some(&context, job.accel, job.view, settings, &Quiet(progress), squares);
         // Threads finish squares in any order; sums over them have one.

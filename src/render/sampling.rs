@@ -16,27 +16,52 @@ pub enum Sampling {
     Stochastic(Stochastic),
 }
 
-/// Five rays in a square, the corners shared with the squares beside it; a quadrant whose corner differs from the middle
-/// becomes a square of its own (T. Whitted, "An Improved Illumination Model for Shaded Display", 1980). What is smaller than
-/// a pixel and lies between the five rays is missed.
+/// Five rays in a square, the corners shared with the squares beside it; a quadrant that is worth it becomes a square of its
+/// own (T. Whitted, "An Improved Illumination Model for Shaded Display", 1980). What lies between the first rays of a pixel and
+/// of those beside it is missed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Adaptive {
-    /// Difference of a channel, linear light after exposure, above which a quadrant is split.
+    /// Which quadrants are split.
+    pub split: Split,
+    /// What they are split above, as that says.
     pub threshold: f32,
     /// How often a pixel's side is halved at most; at most [`Adaptive::MAX_LEVELS`].
     pub levels: u32,
-    /// Stops of brightening before colours are compared.
-    pub exposure: f32,
+    /// How often it is halved in any case; `levels` when that is less.
+    pub min_levels: u32,
+    /// In which numbers effects are counted; corners are compared in linear light after this exposure.
+    pub space: ErrorSpace,
+}
+
+/// Which quadrants of a square are split.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Split {
+    /// Those whose corner differs from the middle of the square: a channel, linear light after exposure, by more than the
+    /// threshold. As the algorithm was published.
+    Corners,
+    /// Those in which the points that were traced on the border, by neighbours too, lie so far apart that the value of
+    /// the pixel would be written by more than the threshold differently, were the quadrant as the one or as the other.
+    #[default]
+    Effect,
 }
 
 impl Adaptive {
     /// A square of the last level is the 256th part of a pixel's side.
     pub const MAX_LEVELS: u32 = 8;
+
+    /// What is usual where quadrants are split so.
+    pub fn usual(split: Split) -> Self {
+        let space = ErrorSpace::default();
+        match split {
+            Split::Corners => Self { split, threshold: 0.05, levels: 3, min_levels: 0, space },
+            Split::Effect => Self { split, threshold: 0.001, levels: 6, min_levels: 1, space },
+        }
+    }
 }
 
 impl Default for Adaptive {
     fn default() -> Self {
-        Self { threshold: 0.05, levels: 3, exposure: 0.0 }
+        Self::usual(Split::default())
     }
 }
 
@@ -50,9 +75,9 @@ pub struct Stochastic {
     pub error: f32,
     /// How certain that is to be: a probability in 0.5…0.9999.
     pub confidence: f64,
-    /// Rays of a pixel when all of them and its neighbours' agree; at least 2.
+    /// Rays of a pixel when all of them and its neighbours' agree, at least 2; raised to a power of two.
     pub min_samples: u32,
-    /// Rays of a pixel at most.
+    /// Rays of a pixel at most; lowered to a power of two.
     pub max_samples: u32,
     /// Weights of the places in and around a pixel.
     pub filter: Filter,
@@ -115,9 +140,9 @@ impl Quality {
     /// What the word stands for.
     pub fn stochastic(self) -> Stochastic {
         let (error, max_samples) = match self {
-            Self::Draft => (0.06, 64),
-            Self::Normal => (0.03, 256),
-            Self::Final => (0.01, 2048),
+            Self::Draft => (0.15, 64),
+            Self::Normal => (0.06, 256),
+            Self::Final => (0.015, 1024),
         };
         Stochastic {
             error,
@@ -219,6 +244,7 @@ macro_rules! names {
 }
 
 names!(Filter, "filter", Box => "box", Tent => "tent");
+names!(Split, "rule for splitting", Corners => "corners", Effect => "effect");
 names!(Quality, "quality", Draft => "draft", Normal => "normal", Final => "final");
 
 impl Filter {

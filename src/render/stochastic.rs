@@ -1,24 +1,25 @@
 //! Stochastic sampling of a tile: its pixels advance together in rounds, and only those that are not certain yet go into
 //! the next.
 //!
-//! What decides about a pixel are its own samples, and in the first round those of the pixels beside it in its tile: a
-//! pixel that happens to see nothing of what its neighbours see goes on with them.
+//! What decides about a pixel are its own samples, and in the first round those of the pixels beside it: a pixel that
+//! happens to see nothing of what its neighbours see goes on with them. Pixels around the tile are therefore sampled in that
+//! round too, by this tile for itself, since no tile may wait for another; that their rays are traced again is counted.
 
-use super::certainty::{Certainty, Range, STREAMS, output};
+use super::certainty::{Certainty, GROUPS, Range, output};
 use super::draws::Stream;
 use super::eyes::Place;
 use super::frame::{Frame, Sum, pixel_key};
 use super::layers::LayerSum;
 use super::observer::Observer;
 use super::sampling::Stochastic;
-use super::sobol::{self, mix};
+use super::sobol;
 use super::tile::{End, PixelFacts, TOGETHER, Tile, TilePixels};
 use super::whitted::Tracer;
 use crate::accel::Accel;
 use crate::scene::Background;
 
-/// Samples at which variances are first relied on: two of each stream.
-const FIRST_LOOK: u32 = 2 * STREAMS as u32;
+/// Samples at which variances are first relied on: one in each group.
+const FIRST_LOOK: u32 = GROUPS as u32;
 
 /// A pixel on its way.
 struct Pixel {
@@ -26,7 +27,8 @@ struct Pixel {
     y: u32,
     /// For all of its numbers.
     key: u32,
-    streams: [Sum; STREAMS],
+    /// Samples in the order of the sequence, the same number in each.
+    groups: [Sum; GROUPS],
     layers: LayerSum,
     facts: PixelFacts,
     /// Between the samples of the first round of it and of the pixels beside it.
@@ -43,13 +45,18 @@ pub(super) fn render<A: Accel, P: Observer>(
     let output = output(how.space, frame.background);
     let transparent = matches!(tracer.context.scene.background, None | Some(Background::Transparent));
     let judge = Certainty::new(output.as_ref(), frame.background, transparent, how.error, frame.standard_errors);
-    let mut pixels: Vec<Pixel> = tile.places().map(|at| Pixel::new(frame.settings.seed, at)).collect();
+    let rounds: Vec<u32> = rounds(how).collect();
+    // After a single round nothing is decided, and nobody asks what lies around.
+    let wide = if rounds.len() > 1 { tile.grown(frame.settings.width, frame.settings.height) } else { tile };
+    let places = tile.places().chain(wide.places().filter(|&at| !tile.contains(at)));
+    let mut pixels: Vec<Pixel> = places.map(|at| Pixel::new(frame.settings.seed, at)).collect();
     let mut active: Vec<usize> = (0..pixels.len()).collect();
     let mut from = 0;
-    for to in rounds(how) {
+    for to in rounds {
         trace(frame, how, tracer, &mut pixels, &active, from..to)?;
         if from == 0 {
-            look_around(&judge, tile, &mut pixels, to < FIRST_LOOK);
+            look_around(&judge, wide, &mut pixels, to < FIRST_LOOK);
+            active.truncate(tile.pixels());
         }
         if to >= FIRST_LOOK {
             active.iter().for_each(|&i| pixels[i].look(&judge));
@@ -57,7 +64,10 @@ pub(super) fn render<A: Accel, P: Observer>(
         active.retain(|&i| pixels[i].facts.end == End::Ceiling);
         from = to;
     }
-    let rays = pixels.iter().map(|pixel| u64::from(pixel.facts.count)).sum();
+    let rays = |pixels: &[Pixel]| pixels.iter().map(|pixel| u64::from(pixel.facts.count)).sum::<u64>();
+    let rays_around = rays(&pixels[tile.pixels()..]);
+    pixels.truncate(tile.pixels());
+    let rays = rays(&pixels) + rays_around;
     let view = frame.view;
     Some(TilePixels {
         tile,
@@ -68,22 +78,16 @@ pub(super) fn render<A: Accel, P: Observer>(
         },
         facts: pixels.iter().map(|pixel| pixel.facts).collect(),
         rays,
+        rays_around,
     })
 }
 
-/// Samples of a pixel after each round: the fewest, then twice as many from round to round.
-fn rounds(how: &Stochastic) -> Vec<u32> {
-    #[expect(clippy::cast_possible_truncation, reason = "a handful")]
-    let whole = |n: u32| n - n % STREAMS as u32;
-    let most = if how.max_samples < FIRST_LOOK { how.max_samples.max(1) } else { whole(how.max_samples) };
-    let fewest = if how.min_samples < FIRST_LOOK { how.min_samples } else { whole(how.min_samples) };
-    let mut rounds = vec![fewest.clamp(1, most)];
-    let mut next = if fewest < FIRST_LOOK { FIRST_LOOK } else { fewest.saturating_mul(2) };
-    while rounds.last().is_some_and(|&last| last < most) {
-        rounds.push(next.min(most));
-        next = next.saturating_mul(2);
-    }
-    rounds
+/// Samples of a pixel after each round: the fewest, then twice as many from round to round, powers of two throughout, as
+/// these many points of the sequence lie most evenly.
+fn rounds(how: &Stochastic) -> impl Iterator<Item = u32> {
+    let most = 1 << how.max_samples.max(1).ilog2();
+    let fewest = how.min_samples.max(1).checked_next_power_of_two().unwrap_or(most).min(most);
+    std::iter::successors(Some(fewest), move |&last| (last < most).then_some(2 * last))
 }
 
 /// Traces these samples of all active pixels.
@@ -95,6 +99,10 @@ fn trace<A: Accel, P: Observer>(
     active: &[usize],
     samples: std::ops::Range<u32>,
 ) -> Option<()> {
+    let in_group = (samples.end as usize).div_ceil(GROUPS);
+    if samples.start as usize >= GROUPS {
+        active.iter().for_each(|&pixel| pixels[pixel].join_groups());
+    }
     let mut left = active.iter().flat_map(|&pixel| samples.clone().map(move |i| (pixel, i)));
     let mut batch: Vec<(usize, u32)> = Vec::with_capacity(TOGETHER);
     loop {
@@ -112,7 +120,7 @@ fn trace<A: Accel, P: Observer>(
         }
         for (k, &(pixel, i)) in batch.iter().enumerate() {
             let pixel = &mut pixels[pixel];
-            pixel.streams[i as usize % STREAMS].add(&tracer.samples[k]);
+            pixel.groups[i as usize / in_group].add(&tracer.samples[k]);
             pixel.facts.count += 1;
             tracer.facts.get(k).iter().for_each(|facts| pixel.layers.add(facts));
         }
@@ -151,40 +159,46 @@ impl Pixel {
             x,
             y,
             key: pixel_key(seed, (x, y)),
-            streams: Default::default(),
+            groups: Default::default(),
             layers: LayerSum::default(),
             facts,
             contrast: 0.0,
         }
     }
 
-    /// The place of the `i`th sample among its streams'.
-    #[expect(clippy::cast_possible_truncation, reason = "a handful of streams")]
+    /// The `i`th sample's numbers.
     fn stream(&self, i: u32) -> Stream {
-        let streams = STREAMS as u32;
-        Stream { key: mix(self.key, i % streams), index: i / streams }
+        Stream { key: self.key, index: i }
     }
 
     /// Where the `i`th sample goes through the picture and the lens.
     fn place(&self, how: &Stochastic, i: u32) -> Place {
-        let Stream { key, index } = self.stream(i);
-        let [x, y, u, v] = sobol::point(index, key);
+        let [x, y, u, v] = sobol::point(i, self.key);
         let (x, y) = (f64::from(self.x) + how.filter.place(x), f64::from(self.y) + how.filter.place(y));
         Place { x, y, lens: [u, v] }
     }
 
-    fn sum(&self) -> Sum {
-        self.streams.iter().fold(Sum::default(), |sum, stream| sum.plus(*stream, 1.0))
+    /// Makes groups that hold as many samples as those that come next will.
+    fn join_groups(&mut self) {
+        let joined = |k: usize| match self.groups.get(2 * k..2 * k + 2) {
+            Some([a, b]) => a.plus(*b, 1.0),
+            _ => Sum::default(),
+        };
+        self.groups = std::array::from_fn(joined);
     }
 
-    /// The streams that have samples.
+    fn sum(&self) -> Sum {
+        self.groups.iter().fold(Sum::default(), |sum, group| sum.plus(*group, 1.0))
+    }
+
+    /// The groups that have samples.
     fn taken(&self) -> &[Sum] {
-        &self.streams[..STREAMS.min(self.facts.count as usize)]
+        &self.groups[..GROUPS.min(self.facts.count as usize)]
     }
 
     /// Finds out how certain the mean is.
     fn look(&mut self, judge: &Certainty) {
-        self.facts.error = judge.standard_error(&self.streams);
+        self.facts.error = judge.standard_error(&self.groups);
         if judge.is_met(self.facts.error, self.contrast, self.facts.count) {
             self.facts.end = End::Met;
         }
@@ -197,13 +211,14 @@ mod tests {
 
     #[test]
     fn rounds_double_and_end_at_the_most() {
-        let rounds =
-            |min_samples, max_samples| super::rounds(&Stochastic { min_samples, max_samples, ..Stochastic::default() });
-        assert_eq!(rounds(4, 256), [4, 16, 32, 64, 128, 256]);
-        assert_eq!(rounds(4, 100), [4, 16, 32, 64, 96]);
-        assert_eq!(rounds(30, 256), [24, 48, 96, 192, 256]);
+        let rounds = |min_samples, max_samples| {
+            super::rounds(&Stochastic { min_samples, max_samples, ..Stochastic::default() }).collect::<Vec<_>>()
+        };
+        assert_eq!(rounds(4, 256), [4, 8, 16, 32, 64, 128, 256]);
+        assert_eq!(rounds(4, 100), [4, 8, 16, 32, 64]);
+        assert_eq!(rounds(30, 256), [32, 64, 128, 256]);
         assert_eq!(rounds(4, 4), [4]);
-        assert_eq!(rounds(4, 3), [3]);
+        assert_eq!(rounds(4, 3), [2]);
         assert_eq!(rounds(64, 16), [16]);
     }
 }

@@ -70,7 +70,12 @@ pub(super) fn seed(seed: u64, number: u64) -> u64 {
 }
 
 /// Finds the error of a pixel that leaves the error of the picture that is asked for. `None` when cancelled.
-pub(super) fn plan<P: Observer>(job: &Job, how: &Stochastic, progress: &dyn Progress) -> Option<Plan<P>> {
+pub(super) fn plan<P: Observer>(
+    job: &Job,
+    context: &Context,
+    how: &Stochastic,
+    progress: &dyn Progress,
+) -> Option<Plan<P>> {
     /// Errors of a pixel that make sense.
     const RANGE: std::ops::RangeInclusive<f64> = 1e-5..=0.5;
     const TRIES: usize = 4;
@@ -92,7 +97,7 @@ pub(super) fn plan<P: Observer>(job: &Job, how: &Stochastic, progress: &dyn Prog
         plan.how.error = single(error);
         let mut parts = Vec::new();
         for number in 0..2 {
-            parts.push(Part::<P>::render(job, &plan.settings(job.settings, number), &squares, progress)?);
+            parts.push(Part::<P>::render(job, context, &plan.settings(job.settings, number), &squares, progress)?);
         }
         let squared = squared_errors(&measure, &parts[0], &parts[1]);
         plan.rmse = (squared.iter().sum::<f64>() / squared.len().max(1) as f64).sqrt();
@@ -130,12 +135,13 @@ pub(super) fn render<P: Observer>(
     progress: &dyn Progress,
 ) -> Option<(Rendered, Vec<ByClass<P>>)> {
     let target = f64::from(how.target.unwrap_or(how.error));
-    let mut plan = plan::<P>(job, how, &super::part::Quiet(progress))?;
+    let context = Context::new(job.scene, job.world, job.textures, job.settings);
+    let mut plan = plan::<P>(job, &context, how, &super::part::Quiet(progress))?;
     let mut counts = std::mem::take(&mut plan.counts);
     let watch = Stopwatch::of_all_threads();
     let foretold = plan.rmse / plan.work.sqrt();
     let mut one = |settings: &Settings| {
-        let context = Context::new(job.scene, job.world, job.textures, settings);
+        let context = context.reseeded(settings.seed);
         let (picture, sampled, more, complete) =
             render_tiles::<_, P>(&context, job.accel, job.view, settings, progress);
         counts.extend(more);

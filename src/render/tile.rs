@@ -1,7 +1,7 @@
 //! The picture in tiles: each is one unit of work for one thread, and threads take the next tile when they are done.
 //!
-//! Nothing a tile computes depends on another tile or on the thread, so that every number of threads gives the same
-//! bits.
+//! Nothing a tile computes depends on the thread, nor on another tile (but in [`adaptive`], where they take turns), so that
+//! every number of threads gives the same bits.
 
 use super::context::Context;
 use super::eyes::Ball;
@@ -20,7 +20,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 /// Columns and rows of a tile.
-const TILE: u32 = 32;
+pub(super) const TILE: u32 = 32;
 
 /// Columns and rows of a block of pixels, whose rays go together.
 const BLOCK: u32 = 4;
@@ -46,6 +46,8 @@ pub(super) struct TilePixels {
     pub facts: Vec<PixelFacts>,
     /// Eye rays in all.
     pub rays: u64,
+    /// Of them those through pixels around the tile.
+    pub rays_around: u64,
 }
 
 /// How the sampling of a pixel went.
@@ -109,7 +111,10 @@ pub(crate) fn render_tiles<A: Accel, P: Observer>(
     let frame = Frame::new(context, view, settings);
     let work = |tracer: &mut Tracer<A, P>, tile| render_tile(&frame, tracer, tile);
     let tiles = tiles(settings.width, settings.height);
-    let (finished, counts, complete) = each_tile(context, accel, &tiles, progress, work);
+    let (finished, counts, complete) = match &settings.sampling {
+        Sampling::Adaptive(how) => adaptive::render_all(&frame, how, (context, accel), progress, &tiles),
+        _ => each_tile(context, accel, &tiles, progress, work),
+    };
     let mut picture = empty_picture(settings);
     finished.iter().for_each(|pixels| pixels.store(&mut picture));
     let sampled = sampled(settings, &finished);
@@ -291,12 +296,31 @@ impl Tile {
             (y0..y1).flat_map(move |y| (x0..x1).map(move |x| (x, y)))
         })
     }
+
+    /// How many pixels it has.
+    pub(super) fn pixels(self) -> usize {
+        (self.x1 - self.x0) as usize * (self.y1 - self.y0) as usize
+    }
+
+    pub(super) fn contains(self, (x, y): (u32, u32)) -> bool {
+        (self.x0..self.x1).contains(&x) && (self.y0..self.y1).contains(&y)
+    }
+
+    /// With the pixels around it that a picture of this size has.
+    pub(super) fn grown(self, width: u32, height: u32) -> Self {
+        Self {
+            x0: self.x0.saturating_sub(1),
+            y0: self.y0.saturating_sub(1),
+            x1: (self.x1 + 1).min(width),
+            y1: (self.y1 + 1).min(height),
+        }
+    }
 }
 
 impl TilePixels {
     /// Nothing yet.
     pub(super) fn empty(tile: Tile) -> Self {
-        Self { tile, beauty: Vec::new(), layers: Vec::new(), facts: Vec::new(), rays: 0 }
+        Self { tile, beauty: Vec::new(), layers: Vec::new(), facts: Vec::new(), rays: 0, rays_around: 0 }
     }
 
     fn store(&self, picture: &mut Picture) {

@@ -15,8 +15,8 @@ pub fn cube_with_a_bad_face() -> String {
     format!("{CUBE}f 1 1 2\n")
 }
 
-/// Points and lines only.
-pub const NOTHING_TO_DRAW: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\np 1 2 3\nl 1 2 3\n";
+/// Points and lines that stand nowhere.
+pub const NOTHING_TO_DRAW: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan 0 0\np 4\nl 1 4\n";
 
 /// A GLB whose header promises more than there is.
 pub const BROKEN_GLB: &[u8] = b"glTF\x02\0\0\0\xff\xff\0\0\x10\0\0\0JSON{\"asset\":";

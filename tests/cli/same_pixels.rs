@@ -12,7 +12,7 @@ fn all_agree(folder: &Folder, input: &str, size: &str, structures: &[&str]) {
     let mut first = None;
     for (i, accel) in structures.iter().enumerate() {
         for threads in if cfg!(debug_assertions) { &THREADS[i % 3..][..1] } else { &THREADS } {
-            let how = ["--size", size, "--accel", accel, "--threads", threads, "--max-samples", "16"];
+            let how = ["--size", size, "--accel", accel, "--threads", threads, "--max-samples", "8"];
             let run =
                 folder.run(&[&["render", "--float", "--layers", "-o", "out.exr", input], how.as_slice()].concat());
             run.ends(0);

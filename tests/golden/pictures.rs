@@ -3,7 +3,8 @@
 use super::{check, check_all, plain};
 use crate::common::stage::{Stage, metal_rough, phong, unlit};
 use meshray::image::{Output, Picture, ToneMap};
-use meshray::math::{DVec3, Vec2, Vec3, Vec4};
+use meshray::load::{LoadOptions, load_bytes};
+use meshray::math::{DAffine3, DQuat, DVec3, Vec2, Vec3, Vec4};
 use meshray::render::view::Lens;
 use meshray::render::{Adaptive, Sampling, Stochastic, ThinLens, View};
 use meshray::scene::mesh::Polygon;
@@ -11,6 +12,7 @@ use meshray::scene::{
     AlphaMode, Background, Coat, Falloff, Film, Filter, LightKind, Material, Mesh, MetalRough, Mipmaps, Phong, Sampler,
     Sheen, TextureRef, Wrap,
 };
+use std::path::Path;
 
 const WHITE: [f32; 3] = [1.0; 3];
 const RED: [f32; 3] = [0.8, 0.1, 0.05];
@@ -551,6 +553,44 @@ fn golden_tone_maps_bend_bright_light_each_in_its_way() {
         ("tone-map-aces", &picture, &through(ToneMap::Aces)),
         ("tone-map-neutral", &picture, &through(ToneMap::Neutral)),
     ]);
+}
+
+#[test]
+fn golden_points_and_lines_are_thin_solids() {
+    let read = |name: &str, text: String| {
+        load_bytes(Path::new(name), text.into_bytes(), &LoadOptions::default()).unwrap().scene
+    };
+    // A cube of wires and its corners, in colours and without light.
+    let mut cube = String::new();
+    for i in 0..8 {
+        let bit = |k: i32| i >> k & 1;
+        let [x, y, z] = [bit(0), bit(1), bit(2)];
+        cube += &format!("v {x} {y} {z} {} {} {}\n", 0.3 + 0.7 * x as f32, 0.3 + 0.7 * y as f32, z);
+        for k in (0..3).filter(|&k| bit(k) == 0) {
+            cube += &format!("l {} {}\n", i + 1, i + (1 << k) + 1);
+        }
+    }
+    // A ball of points with normals, lit from the left.
+    const POINTS: u32 = 60_000;
+    let axes = ["x", "y", "z", "nx", "ny", "nz"].map(|name| format!("property float {name}\n")).concat();
+    let mut ball = format!("ply\nformat ascii 1.0\nelement vertex {POINTS}\n{axes}end_header\n");
+    for i in 0..POINTS {
+        // Evenly spread: by the golden angle around the axis, in equal steps along it.
+        let z = 1.0 - (f64::from(i) + 0.5) * 2.0 / f64::from(POINTS);
+        let (ring, turn) = ((1.0 - z * z).sqrt(), f64::from(i) * 2.399_963_23);
+        let p = format!("{:.6} {:.6} {z:.6}", ring * turn.cos(), ring * turn.sin());
+        ball += &format!("{p} {p}\n");
+    }
+    let mut stage = flat();
+    let turned = DQuat::from_rotation_x(0.5) * DQuat::from_rotation_y(0.6);
+    let place = DAffine3::from_scale_rotation_translation(DVec3::splat(0.8), turned, DVec3::new(-1.0, -0.3, 0.0));
+    stage.scene.append(read("cube.obj", cube), &place);
+    let place = DAffine3::from_scale_rotation_translation(DVec3::splat(0.6), DQuat::IDENTITY, DVec3::X * 0.6);
+    stage.scene.append(read("ball.ply", ball), &place);
+    stage.sun([1.0, -0.5, -0.5], 0.9);
+    // Lines are a fifth of a pixel wide here.
+    stage.settings.samples = 64;
+    check("points-and-lines", &stage.render());
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::Study;
 use super::knob::Knob;
 use super::measure::Row;
-use crate::render::Quality;
+use crate::render::{Quality, Sampling};
 
 /// What is advised for one purpose.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,10 +63,12 @@ fn advise(study: &Study, purpose: Quality) -> Advice {
 
 /// What kind of error is left.
 fn rest(row: &Row) -> &'static str {
-    if row.error.bias > row.error.noise {
-        "most of it bias, which more samples do not lessen"
-    } else {
-        "most of it noise"
+    match row.setting.settings.sampling {
+        _ if row.error.bias <= row.error.noise => "most of it noise",
+        Sampling::Stochastic(_) => "most of it bias, which more samples do not lessen",
+        Sampling::Uniform | Sampling::Adaptive(_) => {
+            "the same in every rendering, as its rays go through the same places"
+        }
     }
 }
 

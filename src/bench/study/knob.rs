@@ -1,14 +1,4 @@
-//! The knobs that a scene has, and the settings of each that are tried.
-//!
-//! | knob | costs | risks |
-//! |---|---|---|
-//! | sampling | rays of each pixel | jagged edges, noise; what is smaller than the distance of two samples is lost |
-//! | depth | rays behind mirrors and glass | what is seen through more surfaces is black |
-//! | cut-off | the same, of little weight | their light is missing: pictures get darker |
-//! | light rays | shadow rays to wide lights | noise in soft shadows |
-//! | surroundings' rays | rays to a panorama from every point | noise in what it lights |
-//! | gloss rays | rays that a rough surface spreads | noise in what frosted glass shows |
-//! | test | time of each ray/triangle test | holes and wrong hits where rays graze edges |
+//! The knobs that a scene has, what each costs and risks ([`Knob::price`]), and the settings of each that are tried.
 
 use super::Subject;
 use crate::accel::IntersectorKind;
@@ -72,6 +62,30 @@ impl Knob {
         }
     }
 
+    /// What it costs to turn it up, and what is at risk when it is turned down.
+    pub const fn price(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Quality | Self::Stochastic => {
+                ("rays of each pixel that is not certain yet", "noise; what is smaller than a pixel is found by chance")
+            }
+            Self::Uniform => {
+                ("rays of every pixel", "jagged edges, and patterns that are not there where there is fine detail")
+            }
+            Self::Adaptive => (
+                "rays where points beside each other differ",
+                "what is smaller than the distance of the first rays is lost",
+            ),
+            Self::Depth => ("rays behind mirrors and glass", "what is seen through more surfaces is black"),
+            Self::Cutoff => {
+                ("rays behind mirrors and glass, of little weight", "their light is missing: pictures get darker")
+            }
+            Self::LightRays => ("shadow rays to wide lights", "noise in soft shadows"),
+            Self::EnvRays => ("rays to a panorama from every point", "noise in what it lights"),
+            Self::GlossRays => ("rays that a rough surface spreads", "noise in what frosted glass shows"),
+            Self::Test => ("time of each ray/triangle test", "holes and wrong hits where rays graze edges"),
+        }
+    }
+
     /// Whether the scene has it.
     fn is_in(self, features: &Features) -> bool {
         let any = |of: &[Feature]| of.iter().any(|&f| features.has(f));
@@ -129,13 +143,13 @@ fn of(knob: Knob, subject: &Subject) -> Vec<Setting> {
         }
         Knob::Adaptive => {
             let with = |threshold: f32| {
-                let how = Adaptive { threshold, exposure: subject.output.exposure, ..Adaptive::default() };
+                let how = Adaptive { threshold, space: subject.space(), ..Adaptive::default() };
                 setting(
                     format!("--aa adaptive --aa-threshold {threshold}"),
                     sampled(Sampling::Adaptive(how), usual.samples),
                 )
             };
-            [0.2, 0.1, 0.05, 0.025].map(with).into()
+            [0.008, 0.004, 0.002, 0.001].map(with).into()
         }
         Knob::Stochastic => {
             let with = |error: f32| {

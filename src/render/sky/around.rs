@@ -36,6 +36,8 @@ enum Way {
     Lobe(f32),
     /// By the light of the sky.
     Light,
+    /// By the cosine from the back of the normal, from where light is scattered through.
+    Behind,
 }
 
 /// Points that wait for their rays. Buffers of one worker.
@@ -88,8 +90,9 @@ impl Arounds {
         let seen = point.surface.seen();
         let lobe = point.matter.gloss().map(|roughness| Way::Lobe(roughness * roughness));
         let light = context.sky.is_map().then_some(Way::Light);
-        let ways = [Some(Way::Cosine), lobe, light];
-        let count = 1 + u32::from(lobe.is_some()) + u32::from(light.is_some());
+        let behind = point.matter.is_translucent().then_some(Way::Behind);
+        let ways = [Some(Way::Cosine), lobe, light, behind];
+        let count = 1 + u32::from(lobe.is_some()) + u32::from(light.is_some()) + u32::from(behind.is_some());
         let half = context.env_rays.div_ceil(2);
         let view = View::new(seen.normal, seen.view);
         let mut draws = point.draws.clone();
@@ -98,7 +101,10 @@ impl Arounds {
             for k in 0..half {
                 let way = ways.iter().flatten().nth((k % count) as usize).unwrap_or(&Way::Cosine);
                 let dir = way.draw(spread.point(k), &context.sky, &view);
-                if dir.dot(seen.geometric) <= 0.0 {
+                let is_behind = dir.dot(seen.geometric) <= 0.0;
+                // Normals and the face itself may not agree on the side.
+                let is_lost = if behind.is_some() { is_behind != (dir.dot(seen.normal) <= 0.0) } else { is_behind };
+                if is_lost {
                     self.shares.push(Vec3::ZERO);
                     continue;
                 }
@@ -185,6 +191,7 @@ impl Way {
                 reflect(-view.view, around(1.0 / (1.0 + slope_squared).sqrt()))
             }
             Self::Light => sky.draw(at).unwrap_or(view.normal),
+            Self::Behind => -around((1.0 - at[0]).sqrt()),
         }
     }
 
@@ -202,6 +209,7 @@ impl Way {
                 alpha * alpha / (PI * f * f) * cosine / (4.0 * toward)
             }
             Self::Light => light,
+            Self::Behind => (-view.normal.dot(dir)).max(0.0) / PI,
         }
     }
 }
@@ -245,7 +253,7 @@ mod tests {
         let normal = Vec3::new(0.3, -0.5, 0.8).normalize();
         let view = View::new(normal, Vec3::new(0.1, -0.2, 1.0).normalize());
         // ∫ (N·L)² over the hemisphere is 2π/3.
-        for way in [Way::Cosine, Way::Lobe(0.5), Way::Lobe(0.9)] {
+        for (way, side) in [(Way::Cosine, 1.0), (Way::Lobe(0.5), 1.0), (Way::Lobe(0.9), 1.0), (Way::Behind, -1.0)] {
             let n = 40_000u16;
             let mut sum = 0.0;
             for k in 0..n {
@@ -253,7 +261,7 @@ mod tests {
                 let dir = way.draw(at, &sky, &view);
                 let density = way.density(dir, 0.0, &view);
                 if density > 0.0 {
-                    sum += f64::from(normal.dot(dir).max(0.0).powi(2) / density);
+                    sum += f64::from((side * normal.dot(dir)).max(0.0).powi(2) / density);
                 }
             }
             let mean = sum / f64::from(n) / (2.0 / 3.0 * std::f64::consts::PI);

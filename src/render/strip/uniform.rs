@@ -2,7 +2,7 @@
 
 use crate::render::shade::{Matter, Model};
 use crate::render::texture::TextureStore;
-use crate::scene::{Material, MetalRough};
+use crate::scene::Material;
 
 /// What is known of a material for all points.
 pub(crate) struct Uniform {
@@ -12,12 +12,12 @@ pub(crate) struct Uniform {
 }
 
 impl Uniform {
-    /// `None` for materials with maps, a grain, film, sheen or lacquer, those that let light through, and those that mirror it
-    /// where rays bounce.
+    /// `None` for materials with maps, a grain, film, sheen or lacquer, those that let light through or scatter it through, and
+    /// those that mirror it where rays bounce.
     pub(crate) fn of(material: &Material, store: &TextureStore, bounces: bool) -> Option<Self> {
         if material.textures().next().is_some()
             || !material.is_opaque()
-            || material.metal_rough().is_some_and(MetalRough::has_lobes)
+            || material.metal_rough().is_some_and(|m| m.has_lobes() || m.translucence.is_some())
         {
             return None;
         }

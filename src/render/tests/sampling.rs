@@ -5,12 +5,14 @@ use crate::image::diff::{Space, compare};
 use crate::image::look::developed;
 use crate::image::{Output, Values, srgb};
 use crate::render::{
-    Adaptive, ErrorSpace, Filter, Interval, Sampling, Stochastic, ThinLens, render, render_costs, render_recorded,
+    Adaptive, ErrorSpace, Filter, Interval, Sampling, Split, Stochastic, ThinLens, render, render_costs,
+    render_recorded,
 };
 use crate::scene::Background;
 
+/// As it was published.
 fn adaptive(threshold: f32, levels: u32) -> Sampling {
-    Sampling::Adaptive(Adaptive { threshold, levels, exposure: 0.0 })
+    Sampling::Adaptive(Adaptive { threshold, levels, ..Adaptive::usual(Split::Corners) })
 }
 
 fn stochastic(error: f32, max_samples: u32) -> Stochastic {
@@ -63,8 +65,8 @@ fn corners_belong_to_all_pixels_around_them() {
     let mut s = edge(0.4);
     (s.settings.width, s.settings.height, s.settings.sampling) = (40, 10, adaptive(0.1, 0));
     let rendered = s.render();
-    // Two tiles, 32 and 8 pixels wide.
-    assert_eq!(rendered.sampled.rays, 33 * 11 + 32 * 10 + 9 * 11 + 8 * 10);
+    // In two tiles, 32 and 8 pixels wide.
+    assert_eq!(rendered.sampled.rays, 41 * 11 + 40 * 10);
     assert_eq!(rendered.counts.primary.queries, rendered.sampled.rays);
     assert!(rendered.sampled.counts.iter().all(|&n| n == 5) && rendered.sampled.most() == 5);
     // The edge lies in one column; a quadrant that is split takes three rays, fewer where a neighbour has traced them.
@@ -162,7 +164,8 @@ fn a_tent_reaches_into_the_next_pixel_and_a_box_does_not() {
 fn every_structure_and_number_of_threads_gives_the_same_bits_in_every_kind_of_sampling() {
     let mut s = soft();
     (s.settings.width, s.settings.height, s.settings.layers) = (40, 30, true);
-    for sampling in [adaptive(0.05, 2), Sampling::Stochastic(stochastic(0.08, 64)), Sampling::Uniform] {
+    for sampling in [adaptive(0.05, 2), effect(0.004, 1), Sampling::Stochastic(stochastic(0.08, 64)), Sampling::Uniform]
+    {
         s.settings.sampling = sampling;
         let truth = s.render();
         for kind in [AccelKind::GridOctree, AccelKind::FastOctree, AccelKind::FastBvh] {
@@ -190,6 +193,21 @@ fn layers_tell_how_certain_each_pixel_is_and_what_it_took() {
     let rays: u64 = rendered.sampled.counts.iter().map(|&n| u64::from(n)).sum();
     assert_eq!((rays, rays), (rendered.sampled.rays, rendered.counts.primary.queries));
     assert!(rendered.sampled.errors.iter().any(|&e| e > 0.0));
+}
+
+#[test]
+fn pixels_around_tiles_are_looked_at_only_where_that_can_decide_something() {
+    let mut s = soft();
+    (s.settings.width, s.settings.height) = (40, 12);
+    let mut rays = |min_samples| {
+        s.settings.sampling = Sampling::Stochastic(Stochastic { min_samples, ..stochastic(0.1, 16) });
+        let sampled = s.render().sampled;
+        (sampled.rays, sampled.counts.iter().map(|&n| u64::from(n)).sum::<u64>())
+    };
+    assert_eq!(rays(16), (40 * 12 * 16, 40 * 12 * 16));
+    // The two tiles meet in a line of twelve pixels: each looks at one row of the other's.
+    let (all, kept) = rays(4);
+    assert_eq!(all - kept, 2 * 12 * 4);
 }
 
 #[test]
@@ -266,7 +284,7 @@ fn kept(width: u32, height: u32, error: f32, reference: u32) -> Kept {
     let mut kept = Kept { stopped: 0, within: 0, far_above: 0, wasted: 0.0 };
     let sampled = &found.sampled;
     for (i, (a, b)) in found.picture.beauty.iter().zip(&truth.picture.beauty).enumerate() {
-        if sampled.counts[i] < 16 || sampled.counts[i] >= 4096 || sampled.errors[i] == 0.0 {
+        if sampled.counts[i] < 8 || sampled.counts[i] >= 4096 || sampled.errors[i] == 0.0 {
             continue;
         }
         let (a, b) = (developer.coded(*a), developer.coded(*b));
@@ -347,4 +365,63 @@ fn a_forecast_holds_what_then_happens() {
     assert!(foretold.rmse.is_some_and(|e| e.value > 0.0) && foretold.cpu.value > 0.0);
     s.settings.sampling = Sampling::Uniform;
     assert_eq!(s.forecast().rmse, None, "nothing differs from one rendering to the next");
+}
+
+/// By what its quadrants could change a pixel.
+fn effect(threshold: f32, min_levels: u32) -> Sampling {
+    let space = ErrorSpace::Linear;
+    Sampling::Adaptive(Adaptive { threshold, min_levels, space, ..Adaptive::usual(Split::Effect) })
+}
+
+#[test]
+fn what_a_neighbour_found_on_the_border_of_a_quadrant_is_looked_into() {
+    // The slanted edge of a square as large as two pixels passes between corners and middles.
+    let mut s = looking_down(1.0);
+    (s.settings.width, s.settings.height) = (40, 34);
+    s.view = View::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, Lens::orthographic(34.0));
+    let turned = DAffine3::from_rotation_z(0.3);
+    s.mesh(square(0.0, 13.0), turned, unlit(Vec3::ONE));
+    let area = |s: &Stage| {
+        let rendered = s.render();
+        let lit: f32 = rendered.picture.beauty.iter().map(|p| p[0]).sum();
+        (f64::from(lit), rendered.sampled.mean())
+    };
+    let pixels = |s: &Stage| s.render().picture.beauty.iter().map(|p| f64::from(p[0])).collect::<Vec<_>>();
+    s.settings.samples = 2500;
+    let truth = pixels(&s);
+    let off = |s: &Stage| {
+        let squares: f64 = pixels(s).iter().zip(&truth).map(|(a, b)| (a - b) * (a - b)).sum();
+        (squares / truth.len() as f64).sqrt()
+    };
+    s.settings.sampling = adaptive(0.1, 5);
+    let (corners, rays) = (off(&s), area(&s).1);
+    s.settings.sampling = effect(0.002, 0);
+    let (seen, fewer) = (off(&s), area(&s).1);
+    assert!(5.0 * seen < corners && fewer < rays, "{seen} with {fewer} rays, {corners} with {rays}");
+    // The edges pass through the border of two tiles, too: all light that there is.
+    assert!((area(&s).0 / (26.0 * 26.0) - 1.0).abs() < 2e-4, "{}", area(&s).0);
+}
+
+#[test]
+fn specks_between_the_five_rays_are_found_where_pixels_are_halved_in_any_case() {
+    let mut s = specks(0.2);
+    s.settings.sampling = effect(0.002, 0);
+    assert_eq!(mean(&s.render()), 0.0);
+    // Specks lie around the middles of quadrants.
+    s.settings.sampling = effect(0.0001, 1);
+    assert!((mean(&s.render()) - 0.04).abs() < 0.002, "{}", mean(&s.render()));
+}
+
+#[test]
+fn a_bright_spot_is_worth_more_looks_than_a_white_one() {
+    let rays = |brightness: f32| {
+        let mut s = specks(0.2);
+        for material in &mut s.scene.materials {
+            *material = unlit(Vec3::splat(brightness));
+        }
+        s.settings.sampling = effect(0.002, 1);
+        s.render().sampled.mean()
+    };
+    let (white, bright) = (rays(1.0), rays(20.0));
+    assert!(2.0 * white < bright, "{white} {bright}");
 }

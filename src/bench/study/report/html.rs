@@ -39,6 +39,7 @@ pub fn write(study: &Study) -> String {
     );
     out += &crops(study);
     out += &table(study);
+    out += &knobs(study);
     out += "</section>\n";
     out += &paragraph(&Machine::here().line());
     page("meshray study", &out)
@@ -172,6 +173,18 @@ fn table(study: &Study) -> String {
             e.flip,
             if front.contains(&i) { "yes" } else { "" }
         );
+    }
+    out + "</tbody></table></div>\n"
+}
+
+/// What each knob that was turned costs and risks.
+fn knobs(study: &Study) -> String {
+    let mut out = "<h3>What knobs cost, and what they risk</h3>\n<div class=\"wide\"><table class=\"text\"><thead><tr><th>knob</th>\
+                   <th>turned up, it costs</th><th>turned down, it risks</th></tr></thead><tbody>\n"
+        .to_owned();
+    for knob in Knob::ALL.into_iter().filter(|&knob| study.rows.iter().any(|row| row.setting.knob == knob)) {
+        let (costs, risks) = knob.price();
+        let _ = writeln!(out, "<tr><th>{knob}</th><td>{costs}</td><td>{risks}</td></tr>");
     }
     out + "</tbody></table></div>\n"
 }

@@ -1,0 +1,165 @@
+//! The lattice of points that all pixels share, and what was found at those of one tile.
+
+use crate::render::eyes::Place;
+use crate::render::frame::{Frame, on_lens, pixel_key};
+use crate::render::layers::Facts;
+use crate::render::sampling::Adaptive;
+use crate::render::whitted::Sample;
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
+
+/// A point: steps from the picture's upper left corner.
+pub(super) type Step = (u32, u32);
+
+/// A point, and its number in a tile.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Point {
+    pub at: Step,
+    pub number: u32,
+}
+
+/// What the ray of a point has found.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Found {
+    pub at: Step,
+    pub sample: Sample,
+    pub facts: Facts,
+}
+
+/// The points of a tile and of its border.
+pub(super) struct Lattice {
+    /// Steps in a pixel.
+    pub pixel: u32,
+    /// Of all points but the middles of squares, which no other square has.
+    numbers: HashMap<Step, u32, BuildHasherDefault<Spread>>,
+    /// `None`: not traced yet.
+    samples: Vec<Option<Sample>>,
+    /// Empty unless layers are wanted.
+    facts: Vec<Facts>,
+    /// Points that nobody has asked for before.
+    pub wanted: Vec<Point>,
+}
+
+impl Lattice {
+    pub(super) fn new(pixel: u32) -> Self {
+        Self { pixel, numbers: HashMap::default(), samples: Vec::new(), facts: Vec::new(), wanted: Vec::new() }
+    }
+
+    /// The number of a point, which is wanted if it has none yet.
+    pub(super) fn point(&mut self, at: Step) -> u32 {
+        let next = self.next();
+        let number = self.number(at);
+        if number == next {
+            self.wanted.push(Point { at, number });
+        }
+        number
+    }
+
+    /// The number of the middle of a new square, which is wanted.
+    pub(super) fn middle(&mut self, at: Step) -> u32 {
+        let number = self.next();
+        self.samples.push(None);
+        self.wanted.push(Point { at, number });
+        number
+    }
+
+    /// The number of a point that others may have, too.
+    pub(super) fn number(&mut self, at: Step) -> u32 {
+        let next = self.next();
+        let number = *self.numbers.entry(at).or_insert(next);
+        if number == next {
+            self.samples.push(None);
+        }
+        number
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "a tile has a thousand pixels")]
+    fn next(&self) -> u32 {
+        self.samples.len() as u32
+    }
+
+    /// What was found at a point with this number.
+    pub(super) fn sample(&self, number: u32) -> Option<&Sample> {
+        self.samples[number as usize].as_ref()
+    }
+
+    /// The first surface there, where layers are wanted.
+    pub(super) fn facts(&self, number: u32) -> Facts {
+        self.facts.get(number as usize).copied().unwrap_or(Facts::NONE)
+    }
+
+    /// The number of a point that was traced, the middle of no square.
+    fn traced(&self, at: Step) -> Option<u32> {
+        self.numbers.get(&at).copied().filter(|&number| self.sample(number).is_some())
+    }
+
+    /// Keeps what was found at a point with this number.
+    pub(super) fn store(&mut self, number: u32, sample: Sample, facts: Option<Facts>) {
+        self.samples[number as usize] = Some(sample);
+        if let Some(facts) = facts {
+            self.facts.resize(self.samples.len(), Facts::NONE);
+            self.facts[number as usize] = facts;
+        }
+    }
+
+    /// What was found at a point, the middle of no square.
+    pub(super) fn found(&self, at: Step) -> Option<Found> {
+        let number = self.traced(at)?;
+        self.sample(number).map(|&sample| Found { at, sample, facts: self.facts(number) })
+    }
+
+    /// What was found in the row of points `y`.
+    pub(super) fn row(&self, y: u32) -> impl Iterator<Item = Found> {
+        self.numbers.keys().filter(move |&&(_, row)| row == y).filter_map(|&at| self.found(at))
+    }
+
+    /// Numbers of the traced points on the border of a square, its corners not among them.
+    ///
+    /// Where the middle of an edge was not traced, nothing on that edge was: squares get smaller by halves.
+    pub(super) fn on_border(&self, (x, y): Step, side: u32, each: &mut impl FnMut(Step, u32)) {
+        let ends = [((x, y), (1, 0)), ((x, y + side), (1, 0)), ((x, y), (0, 1)), ((x + side, y), (0, 1))];
+        for (at, along) in ends {
+            self.on_edge(at, along, side, each);
+        }
+    }
+
+    fn on_edge(&self, (x, y): Step, along: Step, length: u32, each: &mut impl FnMut(Step, u32)) {
+        let half = length / 2;
+        let middle = (x + along.0 * half, y + along.1 * half);
+        if half > 0
+            && let Some(number) = self.traced(middle)
+        {
+            each(middle, number);
+            self.on_edge((x, y), along, half, each);
+            self.on_edge(middle, along, half, each);
+        }
+    }
+
+    /// The place of a point in the picture, exactly; a ray depends on nothing else.
+    pub(super) fn place(frame: &Frame, pixel: u32, (x, y): Step) -> Place {
+        /// Steps in a pixel that no lattice exceeds.
+        const FINEST: u32 = 2 << Adaptive::MAX_LEVELS;
+        let finest = |steps: u32| steps.wrapping_mul(FINEST / pixel);
+        let key = pixel_key(frame.settings.seed, (finest(x), finest(y)));
+        let lens = on_lens(frame.settings.lens, key, 0);
+        Place { x: f64::from(x) / f64::from(pixel), y: f64::from(y) / f64::from(pixel), lens }
+    }
+}
+
+/// Spreads points over a table: they come from us, so that nobody can aim at its weak places.
+#[derive(Default)]
+struct Spread(u64);
+
+impl Hasher for Spread {
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|&byte| self.write_u32(byte.into()));
+    }
+
+    fn write_u32(&mut self, n: u32) {
+        self.0 = (self.0.rotate_left(32) ^ u64::from(n)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    }
+
+    fn finish(&self) -> u64 {
+        self.0 ^ (self.0 >> 32)
+    }
+}
