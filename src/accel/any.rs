@@ -8,8 +8,8 @@ use super::intersector::{IntersectorKind, Looked, MollerTrumbore, MollerTrumbore
 use super::query::{Culling, Tested};
 use super::volumes::{Ball, Volumes};
 use super::{
-    Accel, AccelParams, Bvh, GridOctree, Hit, Kept, Probe, Ray, Shapes, Splitting, StructureStats, Transformed,
-    TwoLevel, Unculled, Wide,
+    Accel, AccelParams, Bvh, GridOctree, Hit, Kept, NoProbe, Probe, Ray, Shapes, Splitting, StructureStats,
+    Transformed, TwoLevel, Unculled, Wide,
 };
 use crate::math::aabb::Aabb;
 
@@ -157,6 +157,9 @@ pub struct AnyScratch(Box<dyn Any + Send>);
 
 /// A question that can be asked of any structure.
 trait Question {
+    /// Whether nobody listens to how it is answered.
+    const SILENT: bool;
+
     fn ask<A: Accel>(self, accel: &A, scratch: &mut A::Scratch);
 }
 
@@ -223,16 +226,17 @@ impl<'a> AnyAccel<'a> {
         whichever!(&self.structure, a => a.check())
     }
 
-    fn ask(&self, question: impl Question, scratch: &mut AnyScratch) {
+    fn ask<Q: Question>(&self, question: Q, scratch: &mut AnyScratch) {
         match &self.structure {
-            // What is measured has code of its own for every test.
-            Structure::Wide(a) => with_scratch(a, scratch, |scratch| match self.test {
+            // What is timed has code of its own for every test.
+            Structure::Wide(a) if Q::SILENT => with_scratch(a, scratch, |scratch| match self.test {
                 IntersectorKind::Exact => question.ask(a, scratch),
                 IntersectorKind::Watertight => question.ask(&Tested::new(a, Watertight), scratch),
                 IntersectorKind::WatertightDouble => question.ask(&Tested::new(a, WatertightDouble), scratch),
                 IntersectorKind::MollerTrumbore => question.ask(&Tested::new(a, MollerTrumbore), scratch),
                 IntersectorKind::MollerTrumboreDouble => question.ask(&Tested::new(a, MollerTrumboreDouble), scratch),
             }),
+            Structure::Wide(a) => looked(a, self.test, question, scratch),
             Structure::TwoLevel(a) => with_scratch(a, scratch, |scratch| question.ask(a, scratch)),
             Structure::None(a) => looked(a, self.test, question, scratch),
             Structure::Transform(a) => looked(a, self.test, question, scratch),
@@ -273,16 +277,30 @@ impl Accel for AnyAccel<'_> {
         AnyScratch(whichever!(&self.structure, a => Box::new(a.scratch())))
     }
 
+    // All that are silent share what is compiled for one.
+
     fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut AnyScratch, probe: &mut P) {
-        self.ask(FirstHits { rays, hits, probe }, scratch);
+        if P::SILENT {
+            self.ask(FirstHits { rays, hits, probe: &mut NoProbe }, scratch);
+        } else {
+            self.ask(FirstHits { rays, hits, probe }, scratch);
+        }
     }
 
     fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut AnyScratch, probe: &mut P) {
-        self.ask(Blocked { rays, blocked, probe }, scratch);
+        if P::SILENT {
+            self.ask(Blocked { rays, blocked, probe: &mut NoProbe }, scratch);
+        } else {
+            self.ask(Blocked { rays, blocked, probe }, scratch);
+        }
     }
 
     fn next<P: Probe>(&self, rays: &[Ray], after: &[Hit], hits: &mut [Hit], scratch: &mut AnyScratch, probe: &mut P) {
-        self.ask(NextHits { rays, after, hits, probe }, scratch);
+        if P::SILENT {
+            self.ask(NextHits { rays, after, hits, probe: &mut NoProbe }, scratch);
+        } else {
+            self.ask(NextHits { rays, after, hits, probe }, scratch);
+        }
     }
 }
 
@@ -293,6 +311,8 @@ struct FirstHits<'q, P> {
 }
 
 impl<P: Probe> Question for FirstHits<'_, P> {
+    const SILENT: bool = P::SILENT;
+
     fn ask<A: Accel>(self, accel: &A, scratch: &mut A::Scratch) {
         accel.closest(self.rays, self.hits, scratch, self.probe);
     }
@@ -305,6 +325,8 @@ struct Blocked<'q, P> {
 }
 
 impl<P: Probe> Question for Blocked<'_, P> {
+    const SILENT: bool = P::SILENT;
+
     fn ask<A: Accel>(self, accel: &A, scratch: &mut A::Scratch) {
         accel.occluded(self.rays, self.blocked, scratch, self.probe);
     }
@@ -318,6 +340,8 @@ struct NextHits<'q, P> {
 }
 
 impl<P: Probe> Question for NextHits<'_, P> {
+    const SILENT: bool = P::SILENT;
+
     fn ask<A: Accel>(self, accel: &A, scratch: &mut A::Scratch) {
         accel.next(self.rays, self.after, self.hits, scratch, self.probe);
     }

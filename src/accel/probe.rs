@@ -14,6 +14,9 @@ pub trait Probe: Default + Send {
     /// Whether it hears nothing, so that rays may be asked in any way that gives the same answers.
     const SILENT: bool = false;
 
+    /// Whether it counts so many rays that exact walks are compiled for every instruction set, or hears of few.
+    const OF_PICTURES: bool = Self::SILENT;
+
     /// One ray was asked of the scene.
     fn query(&mut self) {}
     /// A node or cell was entered (n_ts).
@@ -175,6 +178,8 @@ pub struct RayCounts {
 }
 
 impl Probe for RayCounts {
+    const OF_PICTURES: bool = true;
+
     fn query(&mut self) {
         self.queries += 1;
     }

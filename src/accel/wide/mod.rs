@@ -176,6 +176,8 @@ struct Together<W, P>(PhantomData<(W, P)>);
 
 impl<W: Wave, P: Probe> Together<W, P> {
     const MAY: bool = P::SILENT && W::Goal::EXACT;
+    /// Whether it is worth code for every instruction set.
+    const ON_EVERY_LEVEL: bool = P::SILENT || P::OF_PICTURES && W::Goal::EXACT;
 }
 
 impl Wide<'_> {
@@ -186,7 +188,8 @@ impl Wide<'_> {
             return self.trace_together::<B, _>(wave, stack);
         }
         let (tree, shapes) = (&self.tree, self.shapes);
-        self.run_narrow::<B, _>(OneByOne { tree, shapes, wave, stack, probe, margins: PhantomData::<B> });
+        let kernel = OneByOne { tree, shapes, wave, stack, probe, margins: PhantomData::<B> };
+        if Together::<W, P>::ON_EVERY_LEVEL { self.run_narrow::<B, _>(kernel) } else { kernel.run(Portable) }
     }
 
     fn trace_together<B: BoxMargins, W: Wave>(&self, wave: &mut W, stack: &mut Stack) {
