@@ -24,12 +24,12 @@ fn all_agree(folder: &Folder, input: &str, size: &str, structures: &[&str]) {
     }
 }
 
-/// Every ray against every prim takes minutes without optimisation: then slow structures render only a model of a few
-/// prims here, and the others through the library, smaller (`models`).
+/// Every ray against every prim takes minutes: slow structures render only a model of a few prims here, and the others
+/// through the library, smaller (`models`).
 #[test]
 fn every_model_gives_the_same_bits_with_every_structure_and_any_threads() {
     let all = AccelKind::ALL.map(AccelKind::name);
-    let affordable = AccelKind::ALL.into_iter().filter(|kind| !cfg!(debug_assertions) || !kind.is_slow());
+    let affordable = AccelKind::ALL.into_iter().filter(|kind| !kind.is_slow());
     let affordable: Vec<_> = affordable.map(AccelKind::name).collect();
     let folder = Folder::with_cube();
     all_agree(&folder, "cube.obj", "48x36", &all);

@@ -132,17 +132,16 @@ impl<'a> Wide<'a> {
         self.run_narrow::<B, _>(Walk { tree: &self.tree, query, stack, probe, margins: PhantomData::<B> });
     }
 
-    /// Runs a kernel that walks by margins `B`.
+    /// Runs a kernel that walks by margins `B`. What is not asked for is not compiled.
     #[inline]
     fn run<B: BoxMargins, K: Kernel>(&self, kernel: K) -> K::Output {
-        // Where it is false nothing is compiled for it.
-        if B::EVERY_LEVEL { self.level.run(kernel) } else { kernel.run(Portable) }
+        if B::EVERY_LEVEL { self.level.run(kernel) } else { self.level.run_vectors(kernel) }
     }
 
     /// The same for one that also counts, or that tests triangles one after another.
     #[inline]
     fn run_narrow<B: BoxMargins, K: Kernel>(&self, kernel: K) -> K::Output {
-        if B::EVERY_LEVEL { self.level.run_narrow(kernel) } else { kernel.run(Portable) }
+        if B::EVERY_LEVEL { self.level.run_narrow(kernel) } else { self.level.run_vectors(kernel) }
     }
 
     /// How the scene was cut.

@@ -25,7 +25,7 @@ pub(in crate::accel) trait BoxMargins {
     const PAD: f32 = BOX_PAD;
     /// Largest coordinate with which boxes are asked.
     const COORDINATES: f32 = BOX_COORDINATES;
-    /// Whether walks are compiled for every instruction set, or only for none.
+    /// Whether walks are compiled for every instruction set, or for vectors alone ([`Level::run_vectors`](crate::math::simd::Level::run_vectors)).
     const EVERY_LEVEL: bool = false;
 
     /// Whether boxes can be asked about a ray from here; not if it is not finite.

@@ -281,4 +281,23 @@ impl Level {
             Set::Portable => kernel.run(Portable),
         }
     }
+
+    /// Runs a kernel that is compiled for vectors alone, AVX2's or NEON's: the scalar form takes many times as long to
+    /// compile, too long for kernels that only tests run.
+    ///
+    /// # Panics
+    ///
+    /// Where there are no such vectors.
+    #[inline]
+    pub(crate) fn run_vectors<K: Kernel>(self, kernel: K) -> K::Output {
+        match self.0 {
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx512(token) => token.narrow().run(kernel),
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx2(token) => token.run(kernel),
+            #[cfg(target_arch = "aarch64")]
+            Set::Neon => neon::Neon.run(kernel),
+            Set::Portable => unreachable!("{} has no vectors of eight", self.name()),
+        }
+    }
 }
