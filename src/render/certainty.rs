@@ -52,25 +52,45 @@ impl<'a> Certainty<'a> {
         Self { developer, background, transparent, error, factor }
     }
 
-    /// The numbers of the written picture: RGB and alpha, the colour premultiplied.
-    pub(super) fn written(&self, sum: &Sum) -> [f32; 4] {
-        let pixel = sum.resolve(self.background);
-        match (&self.developer, self.background) {
-            (Some(developer), _) => developer.coded(pixel),
-            (None, None) => pixel,
-            (None, Some(behind)) => {
-                let color = Vec3::from_slice(&pixel) + behind * (1.0 - pixel[3]);
-                color.extend(1.0).to_array()
+    /// The numbers of the written picture for each of these sums, RGB and alpha, the colour premultiplied: a row for each
+    /// channel.
+    fn written<const N: usize>(&self, sums: &[Sum; N]) -> [[f32; N]; 4] {
+        let mut rows = [[0.0; N]; 4];
+        for (i, sum) in sums.iter().enumerate() {
+            let pixel = sum.resolve(self.background);
+            for c in 0..4 {
+                rows[c][i] = pixel[c];
             }
         }
+        match (&self.developer, self.background) {
+            (Some(developer), _) => developer.coded_lanes(&mut rows),
+            (None, None) => {}
+            (None, Some(behind)) => {
+                let [r, g, b, coverage] = &mut rows;
+                for (channel, behind) in [r, g, b].into_iter().zip(behind.to_array()) {
+                    for i in 0..N {
+                        channel[i] += behind * (1.0 - coverage[i]);
+                    }
+                }
+                *coverage = [1.0; N];
+            }
+        }
+        rows
     }
 
-    /// What the colours of these samples lie between.
-    pub(super) fn range(&self, samples: &[Sum]) -> Range {
-        samples.iter().map(|sample| self.written(sample)).fold(Range::NOTHING, |range, color| Range {
-            least: std::array::from_fn(|c| range.least[c].min(color[c])),
-            most: std::array::from_fn(|c| range.most[c].max(color[c])),
-        })
+    /// What groups of samples of a pixel show, [`GROUPS`] at most and one at least.
+    pub(super) fn see(&self, groups: &[Sum]) -> Seen {
+        if are_equal(groups) {
+            let color = self.written(&[groups[0]]).map(|[c]| c);
+            return Seen { color, range: Range { least: color, most: color }, error: 0.0 };
+        }
+        let rows = self.written(&std::array::from_fn::<Sum, GROUPS, _>(|k| *groups.get(k).unwrap_or(&groups[0])));
+        let range = Range {
+            least: rows.map(|row| row.into_iter().fold(f32::INFINITY, f32::min)),
+            most: rows.map(|row| row.into_iter().fold(f32::NEG_INFINITY, f32::max)),
+        };
+        let color = self.written(&[total(groups)]).map(|[c]| c);
+        Seen { color, range, error: self.standard_error(groups) }
     }
 
     /// Whether samples in this range agree within the error that is allowed: nothing is seen in the pixel that could be missed.
@@ -92,22 +112,24 @@ impl<'a> Certainty<'a> {
         (0..4).any(|c| (a[c] - b[c]).abs() > STEEP * self.error)
     }
 
-    /// Standard error of a pixel, the root of the mean over its channels, from groups of equally many samples.
+    /// Standard error of a pixel, the root of the mean over its channels, from groups of equally many samples, [`GROUPS`]
+    /// at most and one at least.
     #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "a handful of groups")]
     pub(super) fn standard_error(&self, groups: &[Sum]) -> f32 {
-        if groups.windows(2).all(|pair| pair[0] == pair[1]) {
+        if are_equal(groups) {
             return 0.0;
         }
-        let all = groups.iter().fold(Sum::default(), |all, group| all.plus(*group, 1.0));
-        let without = |group: &Sum| self.written(&all.plus(*group, -1.0)).map(f64::from);
-        let left: Vec<[f64; 4]> = groups.iter().map(without).collect();
+        let all = total(groups);
+        let without = |k: usize| groups.get(k).map_or(all, |group| all.plus(*group, -1.0));
+        let rows = self.written(&std::array::from_fn::<Sum, GROUPS, _>(without));
         let n = groups.len() as f64;
-        let squares = |c: usize| {
-            let mean = left.iter().map(|v| v[c]).sum::<f64>() / n;
-            left.iter().map(|v| (v[c] - mean) * (v[c] - mean)).sum::<f64>() * (n - 1.0) / n
+        let squares = |row: &[f32; GROUPS]| {
+            let left = || row[..groups.len()].iter().copied().map(f64::from);
+            let mean = left().sum::<f64>() / n;
+            left().map(|v| (v - mean) * (v - mean)).sum::<f64>() * (n - 1.0) / n
         };
         let channels = self.channels();
-        ((0..channels).map(squares).sum::<f64>() / channels as f64).sqrt() as f32
+        (rows[..channels].iter().map(squares).sum::<f64>() / channels as f64).sqrt() as f32
     }
 
     /// Whether a pixel with this standard error is within the error that is allowed, when around it there is such a contrast.
@@ -124,6 +146,31 @@ impl<'a> Certainty<'a> {
     fn channels(&self) -> usize {
         if self.transparent { 4 } else { 3 }
     }
+}
+
+/// All samples of groups together.
+fn total(groups: &[Sum]) -> Sum {
+    groups.iter().fold(Sum::default(), |all, group| all.plus(*group, 1.0))
+}
+
+fn are_equal(groups: &[Sum]) -> bool {
+    groups.windows(2).all(|pair| pair[0] == pair[1])
+}
+
+/// What the samples of a pixel show, in the numbers of the written picture.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seen {
+    /// Of their mean.
+    pub color: [f32; 4],
+    /// What they lie between.
+    pub range: Range,
+    /// Standard error of the mean.
+    pub error: f32,
+}
+
+impl Seen {
+    /// Nothing.
+    pub(super) const NOTHING: Self = Self { color: [0.0; 4], range: Range::NOTHING, error: 0.0 };
 }
 
 /// What the colours of samples lie between, channel by channel.
@@ -243,7 +290,7 @@ mod tests {
         let output = output(ErrorSpace::default(), None);
         let judge = Certainty::new(output.as_ref(), None, false, 0.01, factor(0.95));
         assert_eq!(judge.standard_error(&[grey(0.3, 3.0); GROUPS]), 0.0);
-        let agree = |samples: &[Sum]| judge.agree(&judge.range(samples));
+        let agree = |samples: &[Sum]| judge.agree(&judge.see(samples).range);
         assert!(agree(&[grey(0.3, 1.0); 4]) && !agree(&[grey(0.3, 1.0), grey(0.4, 1.0)]));
     }
 

@@ -5,7 +5,7 @@
 //! happens to see nothing of what its neighbours see goes on with them. Pixels around the tile are therefore sampled in that
 //! round too, by this tile for itself, since no tile may wait for another; that their rays are traced again is counted.
 
-use super::certainty::{Certainty, GROUPS, Range, output};
+use super::certainty::{Certainty, GROUPS, Range, Seen, output};
 use super::draws::Stream;
 use super::eyes::Place;
 use super::frame::{Frame, Sum, pixel_key};
@@ -100,6 +100,7 @@ fn trace<A: Accel, P: Observer>(
     samples: std::ops::Range<u32>,
 ) -> Option<()> {
     let in_group = (samples.end as usize).div_ceil(GROUPS);
+    let has_lens = frame.settings.lens.is_some();
     if samples.start as usize >= GROUPS {
         active.iter().for_each(|&pixel| pixels[pixel].join_groups());
     }
@@ -114,7 +115,7 @@ fn trace<A: Accel, P: Observer>(
         tracer.reset(batch.len(), frame.settings.layers);
         tracer.streams.extend(batch.iter().map(|&(pixel, i)| pixels[pixel].stream(i)));
         let eye = frame.eye(tracer.center());
-        tracer.eyes.send(&eye, batch.iter().map(|&(pixel, i)| pixels[pixel].place(how, i)));
+        tracer.eyes.send(&eye, batch.iter().map(|&(pixel, i)| pixels[pixel].place(how, has_lens, i)));
         if !tracer.trace() {
             return None;
         }
@@ -132,22 +133,23 @@ fn trace<A: Accel, P: Observer>(
 fn look_around(judge: &Certainty, tile: Tile, pixels: &mut [Pixel], may_end: bool) {
     let (width, height) = (tile.x1 - tile.x0, tile.y1 - tile.y0);
     let index = |x: u32, y: u32| ((y - tile.y0) * width + x - tile.x0) as usize;
-    let mut seen = vec![(Range::NOTHING, [0.0; 4]); (width * height) as usize];
+    let mut seen = vec![Seen::NOTHING; (width * height) as usize];
     for pixel in pixels.iter_mut() {
-        seen[index(pixel.x, pixel.y)] = (judge.range(pixel.taken()), judge.written(&pixel.sum()));
-        pixel.facts.error = judge.standard_error(pixel.taken());
+        let mine = judge.see(pixel.taken());
+        pixel.facts.error = mine.error;
+        seen[index(pixel.x, pixel.y)] = mine;
     }
     for pixel in pixels.iter_mut() {
         let (x, y) = (pixel.x, pixel.y);
-        let (_, own) = seen[index(x, y)];
+        let own = &seen[index(x, y)];
         let columns = x.saturating_sub(1).max(tile.x0)..(x + 2).min(tile.x1);
         let around = (y.saturating_sub(1).max(tile.y0)..(y + 2).min(tile.y1))
-            .flat_map(|y| columns.clone().map(move |x| (x, y)))
-            .map(|(x, y)| seen[index(x, y)]);
-        pixel.contrast = judge.contrast(&around.clone().fold(Range::NOTHING, |all, (range, _)| all.with(range)));
-        let is_calm = || around.clone().all(|(range, color)| judge.agree(&range) && !judge.differ(own, color));
-        if may_end && is_calm() {
+            .flat_map(|y| &seen[index(columns.start, y)..=index(columns.end - 1, y)]);
+        let is_calm = |seen: &Seen| judge.agree(&seen.range) && !judge.differ(own.color, seen.color);
+        if may_end && around.clone().all(is_calm) {
             pixel.facts.end = End::Met;
+        } else {
+            pixel.contrast = judge.contrast(&around.fold(Range::NOTHING, |all, seen| all.with(seen.range)));
         }
     }
 }
@@ -172,8 +174,14 @@ impl Pixel {
     }
 
     /// Where the `i`th sample goes through the picture and the lens.
-    fn place(&self, how: &Stochastic, i: u32) -> Place {
-        let [x, y, u, v] = sobol::point(i, self.key);
+    fn place(&self, how: &Stochastic, has_lens: bool, i: u32) -> Place {
+        // The first two numbers are the same however many are asked for.
+        let [x, y, u, v] = if has_lens {
+            sobol::point(i, self.key)
+        } else {
+            let [x, y] = sobol::point(i, self.key);
+            [x, y, 0.5, 0.5]
+        };
         let (x, y) = (f64::from(self.x) + how.filter.place(x), f64::from(self.y) + how.filter.place(y));
         Place { x, y, lens: [u, v] }
     }
