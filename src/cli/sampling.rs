@@ -298,10 +298,11 @@ pub(super) fn phrase(settings: &Settings, sampled: &Sampled) -> String {
             let percent = |n: u64| 100.0 * n as f64 / sampled.pixels.max(1) as f64;
             let rmse = sampled.rmse().unwrap_or(0.0);
             format!(
-                "{rays}, {:.1} % of pixels within {} at {} %, estimated error {rmse:.4}",
+                "{rays}, {:.1} % of pixels within {} at {} %, estimated error {rmse:.4}, {:.0} % of the rays to spare",
                 percent(sampled.met),
                 how.error,
                 100.0 * how.confidence,
+                100.0 * sampled.spare as f64 / sampled.rays.max(1) as f64,
             )
         }
     }
@@ -325,7 +326,7 @@ pub(super) fn json(settings: &Settings, sampled: &Sampled) -> Value {
             "aa": "stochastic", "pixel_error": plain(how.error), "confidence": how.confidence,
             "min_samples": how.min_samples, "max_samples": how.max_samples, "filter": how.filter.name(),
             "error_space": space(how.space),
-            "met": sampled.met, "ceiling": sampled.at_most, "rmse": sampled.rmse(), "target_error": how.target.map(plain),
+            "met": sampled.met, "ceiling": sampled.at_most, "rmse": sampled.rmse(), "spare": sampled.spare, "target_error": how.target.map(plain),
             "foretold": sampled.targeted.map(|to| json!({ "rmse": to.foretold, "cpu_seconds": to.foretold_cpu })),
         }),
     };

@@ -132,15 +132,23 @@ impl<'a> Certainty<'a> {
         (rows[..channels].iter().map(squares).sum::<f64>() / channels as f64).sqrt() as f32
     }
 
-    /// Whether a pixel with this standard error is within the error that is allowed, when around it there is such a contrast.
+    /// What part of the error that is allowed a pixel with this standard error uses, when around it there is such a
+    /// contrast; up to 1 it is as certain as was asked.
     ///
     /// Samples that saw nothing of what lies around them are not far apart, and no proof that nothing of it is in the pixel.
     /// One sample of `count` that sees it makes the standard error `contrast / count`: what has not been seen yet is given
     /// half a sample (H. Jeffreys, "An Invariant Form for the Prior Probability in Estimation Problems", 1946).
     #[expect(clippy::cast_precision_loss, reason = "a count of samples")]
-    pub(super) fn is_met(&self, standard_error: f32, contrast: f32, count: u32) -> bool {
+    pub(super) fn used(&self, standard_error: f32, contrast: f32, count: u32) -> f32 {
         let unseen = 0.5 * contrast / count.max(1) as f32;
-        standard_error.max(unseen) * self.factor <= self.error
+        standard_error.max(unseen) * self.factor / self.error
+    }
+
+    /// Samples of `count` without which a pixel that used this part of its error would have been certain: fewer of them
+    /// make an error that is larger by no more than their number is smaller, as samples that are spread evenly do.
+    #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part")]
+    pub(super) fn spare(&self, used: f32, count: u32) -> u32 {
+        ((1.0 - used.clamp(0.0, 1.0)) * count.saturating_sub(GROUPS as u32) as f32) as u32
     }
 
     fn channels(&self) -> usize {
@@ -295,6 +303,18 @@ mod tests {
     }
 
     #[test]
+    fn rays_that_nobody_needed_are_those_beyond_the_error_that_was_allowed() {
+        let judge = Certainty::new(None, None, false, 0.01, 2.5);
+        assert_eq!(judge.used(0.004, 0.0, 64), 1.0);
+        assert_eq!(judge.spare(1.0, 64), 0);
+        // Half the error: half of the rays beyond the first.
+        assert_eq!(judge.used(0.002, 0.0, 64), 0.5);
+        assert_eq!(judge.spare(0.5, 72), 32);
+        // Half a sample of what lies around, of 64.
+        assert_eq!(judge.used(0.0, 0.512, 64), 1.0);
+    }
+
+    #[test]
     fn linear_errors_are_those_of_a_mean() {
         let judge = Certainty::new(None, None, false, 0.01, factor(0.95));
         let values = [0.1_f32, 0.3, 0.2, 0.5, 0.4, 0.2, 0.1, 0.2];
@@ -322,7 +342,7 @@ mod tests {
                             *group = group.plus(grey(noise * spread, 1.0), 1.0);
                         }
                     }
-                    if judge.is_met(judge.standard_error(&groups), 0.0, 1) {
+                    if judge.used(judge.standard_error(&groups), 0.0, 1) <= 1.0 {
                         break;
                     }
                     target *= 2.0;

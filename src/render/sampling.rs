@@ -171,6 +171,8 @@ pub struct Sampled {
     pub met: u64,
     /// Pixels that were given up at the most rays allowed.
     pub at_most: u64,
+    /// Eye rays beyond what made pixels certain, by their own estimates: rays come in rounds that double.
+    pub spare: u64,
     /// How near it came to the error of the whole picture that was asked for, if one was.
     pub targeted: Option<Targeted>,
 }

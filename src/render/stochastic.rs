@@ -156,7 +156,7 @@ fn look_around(judge: &Certainty, tile: Tile, pixels: &mut [Pixel], may_end: boo
 
 impl Pixel {
     fn new(seed: u64, (x, y): (u32, u32)) -> Self {
-        let facts = PixelFacts { count: 0, error: 0.0, end: End::Ceiling };
+        let facts = PixelFacts { count: 0, spare: 0, error: 0.0, end: End::Ceiling };
         Self {
             x,
             y,
@@ -207,8 +207,10 @@ impl Pixel {
     /// Finds out how certain the mean is.
     fn look(&mut self, judge: &Certainty) {
         self.facts.error = judge.standard_error(&self.groups);
-        if judge.is_met(self.facts.error, self.contrast, self.facts.count) {
+        let used = judge.used(self.facts.error, self.contrast, self.facts.count);
+        if used <= 1.0 {
             self.facts.end = End::Met;
+            self.facts.spare = judge.spare(used, self.facts.count);
         }
     }
 }

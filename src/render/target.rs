@@ -195,6 +195,7 @@ fn mix(whole: &mut Rendered, other: &Rendered, part: f32) {
     sampled.rays += more.rays;
     sampled.met = sampled.met.max(more.met);
     sampled.at_most = sampled.at_most.min(more.at_most);
+    sampled.spare += more.spare;
     sampled.counts.iter_mut().zip(&more.counts).for_each(|(count, more)| *count += more);
     for (error, more) in sampled.errors.iter_mut().zip(&more.errors) {
         let (a, b) = (*error * (1.0 - part), more * part);

@@ -55,6 +55,8 @@ pub(super) struct TilePixels {
 pub(super) struct PixelFacts {
     /// Eye rays.
     pub count: u32,
+    /// Of them those that were not needed, as far as its estimates tell.
+    pub spare: u32,
     /// Standard error, if that was estimated.
     pub error: f32,
     pub end: End,
@@ -142,6 +144,7 @@ fn sampled(settings: &Settings, finished: &[TilePixels]) -> Sampled {
             sampled.errors.get_mut(i).into_iter().for_each(|error| *error = facts.error);
             sampled.met += u64::from(facts.end == End::Met);
             sampled.at_most += u64::from(facts.end == End::Ceiling);
+            sampled.spare += u64::from(facts.spare);
         }
     }
     sampled

@@ -7,34 +7,27 @@ use super::{Axis, LANES, Lanewise, Order, Pick, Row, Simd};
 #[derive(Clone, Copy, Debug)]
 pub struct Portable;
 
-// Counted loops and no branches, as compilers take long over anything else: kernels are large once all of it is in them.
-
 #[inline(always)]
-fn each<T: Copy>(mut a: [T; LANES], b: [T; LANES], f: impl Fn(T, T) -> T) -> [T; LANES] {
-    let mut k = 0;
-    while k < LANES {
-        a[k] = f(a[k], b[k]);
-        k += 1;
-    }
-    a
+fn each(a: Row, b: Row, f: impl Fn(f32, f32) -> f32) -> Row {
+    std::array::from_fn(|k| f(a[k], b[k]))
 }
 
 #[inline(always)]
-fn mask<T: Copy>(a: &[T; LANES], b: &[T; LANES], holds: impl Fn(T, T) -> bool) -> u32 {
-    let (mut mask, mut k) = (0, 0);
-    while k < LANES {
-        mask |= u32::from(holds(a[k], b[k])) << k;
-        k += 1;
-    }
-    mask
+fn each_f64(a: [f64; LANES], b: [f64; LANES], f: impl Fn(f64, f64) -> f64) -> [f64; LANES] {
+    std::array::from_fn(|k| f(a[k], b[k]))
+}
+
+#[inline(always)]
+fn mask(a: Row, b: Row, holds: impl Fn(f32, f32) -> bool) -> u32 {
+    (0..LANES).fold(0, |mask, k| mask | u32::from(holds(a[k], b[k])) << k)
 }
 
 #[inline(always)]
 fn put<T: Copy>(mask: u32, a: &[T; LANES], to: &mut [T; LANES]) {
-    let mut k = 0;
-    while k < LANES {
-        to[k] = if mask >> k & 1 == 1 { a[k] } else { to[k] };
-        k += 1;
+    for k in 0..LANES {
+        if mask >> k & 1 == 1 {
+            to[k] = a[k];
+        }
     }
 }
 
@@ -109,12 +102,12 @@ impl Lanewise<LANES> for Portable {
 
     #[inline(always)]
     fn less(self, a: Row, b: Row) -> u32 {
-        mask(&a, &b, |a, b| a < b)
+        mask(a, b, |a, b| a < b)
     }
 
     #[inline(always)]
     fn at_most(self, a: Row, b: Row) -> u32 {
-        mask(&a, &b, |a, b| a <= b)
+        mask(a, b, |a, b| a <= b)
     }
 
     #[inline(always)]
@@ -125,7 +118,7 @@ impl Lanewise<LANES> for Portable {
 
     #[inline(always)]
     fn signs(self, a: Row) -> u32 {
-        mask(&a, &a, |a: f32, _| a.is_sign_negative())
+        mask(a, a, |a, _| a.is_sign_negative())
     }
 
     #[inline(always)]
@@ -155,7 +148,7 @@ impl Lanewise<LANES> for Portable {
 
     #[inline(always)]
     fn find_word(self, word: u32, among: &[u32; LANES]) -> u32 {
-        mask(among, among, |a, _| a == word)
+        (0..LANES).fold(0, |mask, k| mask | u32::from(among[k] == word) << k)
     }
 
     #[inline(always)]
@@ -186,32 +179,32 @@ impl Lanewise<LANES> for Portable {
 
     #[inline(always)]
     fn add_f64(self, a: [f64; LANES], b: [f64; LANES]) -> [f64; LANES] {
-        each(a, b, |a, b| a + b)
+        each_f64(a, b, |a, b| a + b)
     }
 
     #[inline(always)]
     fn sub_f64(self, a: [f64; LANES], b: [f64; LANES]) -> [f64; LANES] {
-        each(a, b, |a, b| a - b)
+        each_f64(a, b, |a, b| a - b)
     }
 
     #[inline(always)]
     fn mul_f64(self, a: [f64; LANES], b: [f64; LANES]) -> [f64; LANES] {
-        each(a, b, |a, b| a * b)
+        each_f64(a, b, |a, b| a * b)
     }
 
     #[inline(always)]
     fn div_f64(self, a: [f64; LANES], b: [f64; LANES]) -> [f64; LANES] {
-        each(a, b, |a, b| a / b)
+        each_f64(a, b, |a, b| a / b)
     }
 
     #[inline(always)]
     fn greater_f64(self, a: [f64; LANES], b: [f64; LANES]) -> [f64; LANES] {
-        each(a, b, |a, b| if a > b { a } else { b })
+        each_f64(a, b, |a, b| if a > b { a } else { b })
     }
 
     #[inline(always)]
     fn smaller_f64(self, a: [f64; LANES], b: [f64; LANES]) -> [f64; LANES] {
-        each(a, b, |a, b| if a < b { a } else { b })
+        each_f64(a, b, |a, b| if a < b { a } else { b })
     }
 
     #[inline(always)]
@@ -221,7 +214,7 @@ impl Lanewise<LANES> for Portable {
 
     #[inline(always)]
     fn less_f64(self, a: [f64; LANES], b: [f64; LANES]) -> u32 {
-        mask(&a, &b, |a, b| a < b)
+        (0..LANES).fold(0, |mask, k| mask | u32::from(a[k] < b[k]) << k)
     }
 
     #[inline(always)]
@@ -240,7 +233,7 @@ impl Simd for Portable {
 
     #[inline(always)]
     fn high_bits(self, words: &[u32; LANES]) -> u32 {
-        mask(words, words, |a, _| a >> 31 == 1)
+        (0..LANES).fold(0, |mask, k| mask | words[k] >> 31 << k)
     }
 
     #[inline(always)]

@@ -300,7 +300,7 @@ impl Plot {
             points.sort_unstable();
             points.dedup();
             let count = u32::try_from(points.len()).unwrap_or(u32::MAX);
-            done.facts.push(PixelFacts { count, error: 0.0, end: End::Unknown });
+            done.facts.push(PixelFacts { count, spare: 0, error: 0.0, end: End::Unknown });
             if frame.settings.layers {
                 let mut sum = LayerSum::default();
                 let five = std::iter::once(self.squares[i].middle).chain(self.squares[i].corners);
