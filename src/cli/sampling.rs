@@ -286,9 +286,18 @@ pub(super) fn flags(settings: &Settings, mut set: impl FnMut(&str, String)) {
 pub(super) fn phrase(settings: &Settings, sampled: &Sampled) -> String {
     let rays = format!("{:.1} samples a pixel (at most {})", sampled.mean(), sampled.most());
     if let Some(to) = sampled.targeted {
+        let own: u64 = sampled.counts.iter().copied().map(u64::from).sum();
+        let each = |rays: u64| rays as f64 / sampled.pixels.max(1) as f64;
         return format!(
-            "{rays}, error {:.4} where {} was asked for (foretold {:.4} and {:.1} s of processor time, took {:.1} s)",
-            to.estimate, to.target, to.foretold, to.foretold_cpu, to.cpu
+            "{:.1} samples a pixel (at most {}) and {:.1} to find out how many, error {:.4} where {} was asked for (foretold {:.4} and {:.1} s of processor time, took {:.1} s)",
+            each(own),
+            sampled.most(),
+            each(sampled.rays.saturating_sub(own)),
+            to.estimate,
+            to.target,
+            to.foretold,
+            to.foretold_cpu,
+            to.cpu
         );
     }
     match settings.sampling {

@@ -72,7 +72,8 @@ fn number(rate: Rate) -> (f64, bool) {
 
 fn plot(kernels: &[Kernel]) -> String {
     const LEFT: f64 = 52.0;
-    const RIGHT: f64 = 300.0;
+    // As far as leaves room for the longest name.
+    const RIGHT: f64 = 272.0;
     const TOP: f64 = 14.0;
     const BOTTOM: f64 = 270.0;
     let x = Scale::fitting(kernels.iter().map(Kernel::rate), LEFT, RIGHT);

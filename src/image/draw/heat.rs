@@ -39,7 +39,7 @@ impl Scale {
 
     /// Values to write beside the scale: 0, powers of ten well apart from the end, and the end.
     pub fn ticks(&self) -> Vec<f64> {
-        let decades = (0..18).map(|decade| self.unit * 10f64.powi(decade)).take_while(|&tick| tick < 0.6 * self.max);
+        let decades = (0..18).map(|decade| self.unit * 10f64.powi(decade)).take_while(|&tick| tick < 0.4 * self.max);
         std::iter::once(0.0).chain(decades).chain([self.max]).collect()
     }
 }
