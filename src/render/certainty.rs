@@ -304,14 +304,15 @@ mod tests {
 
     #[test]
     fn rays_that_nobody_needed_are_those_beyond_the_error_that_was_allowed() {
-        let judge = Certainty::new(None, None, false, 0.01, 2.5);
-        assert_eq!(judge.used(0.004, 0.0, 64), 1.0);
+        // Powers of two, of which products are exact.
+        let judge = Certainty::new(None, None, false, 1.0 / 64.0, 2.0);
+        assert_eq!(judge.used(1.0 / 128.0, 0.0, 64), 1.0);
         assert_eq!(judge.spare(1.0, 64), 0);
         // Half the error: half of the rays beyond the first.
-        assert_eq!(judge.used(0.002, 0.0, 64), 0.5);
+        assert_eq!(judge.used(1.0 / 256.0, 0.0, 64), 0.5);
         assert_eq!(judge.spare(0.5, 72), 32);
         // Half a sample of what lies around, of 64.
-        assert_eq!(judge.used(0.0, 0.512, 64), 1.0);
+        assert_eq!(judge.used(0.0, 1.0, 64), 1.0);
     }
 
     #[test]
