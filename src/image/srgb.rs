@@ -34,11 +34,6 @@ pub fn encode8(linear: f32) -> u8 {
     }
 }
 
-/// The 16-bit code nearest to linear light; below 0 and NaN are 0, above 1 is 65 535.
-pub fn encode16(linear: f32) -> u16 {
-    codes16().code(linear)
-}
-
 /// The table of 8-bit codes, for loops that should not look for it again and again.
 pub(super) fn codes8() -> &'static Codes {
     static CODES: LazyLock<Codes> = LazyLock::new(|| Codes::new(255, 16));
@@ -162,6 +157,10 @@ impl Chords {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn encode16(linear: f32) -> u16 {
+        codes16().code(linear)
+    }
 
     #[test]
     fn chords_are_near_the_curve() {

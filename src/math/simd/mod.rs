@@ -271,15 +271,7 @@ impl Level {
     /// Runs a kernel for which code for the widest lanes is not worth its size: AVX2 where there is AVX-512.
     #[inline]
     pub fn run_narrow<K: Kernel>(self, kernel: K) -> K::Output {
-        match self.0 {
-            #[cfg(target_arch = "x86_64")]
-            Set::Avx512(token) => token.narrow().run(kernel),
-            #[cfg(target_arch = "x86_64")]
-            Set::Avx2(token) => token.run(kernel),
-            #[cfg(target_arch = "aarch64")]
-            Set::Neon => neon::Neon.run(kernel),
-            Set::Portable => kernel.run(Portable),
-        }
+        if self == Self::PORTABLE { kernel.run(Portable) } else { self.run_vectors(kernel) }
     }
 
     /// Runs a kernel that is compiled for vectors alone, AVX2's or NEON's: the scalar form takes many times as long to
