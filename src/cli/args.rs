@@ -241,6 +241,16 @@ pub(super) struct RenderArgs {
     /// What becomes of OBJ and PLY faces with more than three corners
     #[arg(long, value_name = "HOW", value_enum, default_value_t, help_heading = "Loading", hide_short_help = true)]
     pub polygons: PolygonsArg,
+    /// Give meshes without normals smooth ones, but for edges at which faces lean by more than so many degrees, 30 when
+    /// none are given
+    #[arg(long, value_name = "DEGREES", value_parser = parse::lean, num_args = 0..=1, require_equals = true,
+          default_missing_value = "30", help_heading = "Loading",
+          hide_short_help = true)]
+    pub smooth: Option<f64>,
+    /// How wide points and lines are, units of the model [default: 1/256 of its diagonal, less where there are very many]
+    #[arg(long, value_name = "WIDTH", value_parser = parse::above_zero, help_heading = "Loading",
+          hide_short_help = true)]
+    pub line_width: Option<f64>,
     /// Understand MTL files as exporters mean them, or to the letter
     #[arg(long, value_name = "HOW", value_enum, default_value_t, help_heading = "Loading", hide_short_help = true)]
     pub mtl: MtlArg,
@@ -577,6 +587,14 @@ pub(super) struct LoadArgs {
     /// What becomes of OBJ and PLY faces with more than three corners
     #[arg(long, value_name = "HOW", value_enum, default_value_t)]
     pub polygons: PolygonsArg,
+    /// Give meshes without normals smooth ones, but for edges at which faces lean by more than so many degrees, 30 when
+    /// none are given
+    #[arg(long, value_name = "DEGREES", value_parser = parse::lean, num_args = 0..=1, require_equals = true,
+          default_missing_value = "30")]
+    pub smooth: Option<f64>,
+    /// How wide points and lines are, units of the model [default: 1/256 of its diagonal, less where there are very many]
+    #[arg(long, value_name = "WIDTH", value_parser = parse::above_zero)]
+    pub line_width: Option<f64>,
     /// Understand MTL files as exporters mean them, or to the letter
     #[arg(long, value_name = "HOW", value_enum, default_value_t)]
     pub mtl: MtlArg,

@@ -373,6 +373,8 @@ fn load_options(args: &RenderArgs) -> LoadOptions {
         limits: limits(args.max_memory),
         polygons: args.polygons.into(),
         mtl: args.mtl.into(),
+        smooth: args.smooth,
+        line_width: args.line_width,
         scene: args.scene.clone(),
         variant: args.variant.clone(),
         up: args.up.map(Into::into),

@@ -327,6 +327,11 @@ pub(super) fn sun(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "write an angle of 0 to 180 degrees".to_owned())
 }
 
+/// The angle between two faces: degrees are written, radians come of it.
+pub(super) fn lean(text: &str) -> Result<f64, String> {
+    sun(text).map(f64::to_radians)
+}
+
 /// An angle in degrees.
 pub(super) fn degrees(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|d: &f64| d.is_finite()).ok_or_else(|| "write an angle in degrees such as 90".to_owned())

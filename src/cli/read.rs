@@ -46,6 +46,8 @@ pub(super) fn one_model(input: &PathBuf, args: &LoadArgs, messages: &Messages) -
         limits: job::limits(args.max_memory),
         polygons: args.polygons.into(),
         mtl: args.mtl.into(),
+        smooth: args.smooth,
+        line_width: args.line_width,
         scene: args.scene.clone(),
         variant: args.variant.clone(),
         up: args.up.map(Into::into),

@@ -19,6 +19,7 @@ pub mod ply;
 )]
 mod quiet;
 pub mod scene_file;
+mod smooth;
 pub mod stl;
 pub mod suggest;
 pub mod tangents;
@@ -54,6 +55,11 @@ pub struct LoadOptions {
     pub up: Option<UpAxis>,
     /// Which moment of an animation of a glTF file is shown; `None`: the rest pose.
     pub moment: Option<Moment>,
+    /// Gives meshes without normals smooth ones, but for edges at which faces lean by more than so many radians; `None`:
+    /// their faces are flat.
+    pub smooth: Option<f64>,
+    /// How wide lines and points are, world units; `None`: 1/256 of what is drawn, or less where there are very many.
+    pub line_width: Option<f64>,
     /// Leaves pictures out: for whoever needs the geometry of a glTF file alone.
     pub without_pictures: bool,
 }
@@ -202,14 +208,23 @@ fn check_moment(loaded: &mut Loaded, file: &Path, options: &LoadOptions) -> Resu
 }
 
 fn load_source(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
-    match detect::detect(source)? {
+    let mut loaded = match detect::detect(source)? {
         detect::Format::Gltf => gltf::load(source, options),
         detect::Format::Nff => nff::load(source, options),
         detect::Format::Obj => obj::load(source, options),
         detect::Format::Ply => ply::load(source, options),
         detect::Format::SceneFile => scene_file::load(source, options),
         detect::Format::Stl(encoding) => stl::load(source, encoding, options),
+    }?;
+    if let Some(angle) = options.smooth {
+        let mut budget = limits::Budget::new(&options.limits);
+        smooth::smooth(&mut loaded.scene, angle, &mut budget).map_err(|over| {
+            let text = format!("smooth normals are too large: {over}");
+            let fault = Diagnostic::new("out-of-memory-limit", &source.path, "", text);
+            LoadError::from(fault.remedy("allow more with --max-memory"))
+        })?;
     }
+    Ok(loaded)
 }
 
 /// Reads the model file itself, which may lie anywhere.

@@ -2,6 +2,7 @@
 
 use super::context::Context;
 use super::draws::{Purpose, Spread};
+use super::glint;
 use super::observer::Observer;
 use super::optics::{dispersed_index, reflect, refract};
 use super::shade::{Balance, Lobe, Matter, above, has_inside, lets_light_in};
@@ -10,6 +11,9 @@ use super::wave::{Crossing, Medium, Path, RayClass};
 use super::whitted::Tracer;
 use crate::accel::{Accel, Hit, Ray};
 use crate::math::Vec3;
+
+/// How many times as far as its normals a mirror turns directions.
+const MIRROR: f32 = 2.0;
 
 /// A shaded point and the ray that found it.
 pub(super) struct Point<'a> {
@@ -42,10 +46,11 @@ impl Point<'_> {
         self.matter.balance(self.surface.normal.dot(self.surface.view), crossing)
     }
 
-    /// What a ray that starts here carries.
-    fn bounced(&self, weight: Vec3) -> Path {
+    /// What a ray that starts here carries; directions turn `factor` times as far as normals do.
+    fn bounced(&self, context: &Context, weight: Vec3, factor: f32) -> Path {
         let depth = self.path.depth + 1;
-        Path { weight, depth, straight: false, since: 0.0, cone_width: self.width, ..self.path }
+        let cone_spread = glint::bent(self.surface, context, self.path.cone_spread, factor);
+        Path { weight, depth, straight: false, since: 0.0, cone_width: self.width, cone_spread, ..self.path }
     }
 }
 
@@ -183,13 +188,14 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         rough: &Rough,
         finish: impl FnOnce(Path) -> Path,
     ) {
-        let path = finish(point.bounced(Vec3::ZERO));
+        let path = finish(point.bounced(self.context, Vec3::ZERO, MIRROR));
         if !self.context.is_alive(path.weight) {
             return;
         }
-        let cone_spread = path.cone_spread + rough.lobe.angle(rough.rays);
+        let angle = rough.lobe.angle(rough.rays);
+        let (cone_spread, scattered) = (path.cone_spread + angle, path.scattered + angle);
         let ray = point.surface.ray(dir, f32::INFINITY, point.ray.sample);
-        self.starting[class as usize].push(ray, Path { cone_spread, ..path }, Hit::MISS);
+        self.starting[class as usize].push(ray, Path { cone_spread, scattered, ..path }, Hit::MISS);
     }
 
     /// Queues what lacquer mirrors.
@@ -219,7 +225,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
         let surface = point.surface;
         let dir = above(reflect(-surface.view, normal), surface.geometric);
-        let path = Path { band, ..point.bounced(weight).turned(RayClass::Reflected, 0) };
+        let path = Path { band, ..point.bounced(self.context, weight, MIRROR).turned(RayClass::Reflected, 0) };
         let ray = surface.ray(dir, f32::INFINITY, point.ray.sample);
         self.starting[RayClass::Reflected as usize].push(ray, path, Hit::MISS);
     }
@@ -242,7 +248,9 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             return self.send_reflected(point, surface.normal, weight, band);
         };
         let dir = above(bent, -surface.geometric);
-        let path = point.bounced(weight).turned(RayClass::Refracted, turn);
+        // As far as directions turn when light falls in steeply.
+        let turns = (1.0 - crossing.n_i / crossing.n_t).abs();
+        let path = point.bounced(self.context, weight, turns).turned(RayClass::Refracted, turn);
         let path = Path { band, media: crossing.beyond, ..path };
         let ray = surface.ray(dir, f32::INFINITY, point.ray.sample);
         self.starting[RayClass::Refracted as usize].push(ray, path, Hit::MISS);

@@ -26,6 +26,8 @@ pub(super) struct Certainty<'a> {
     background: Option<Vec3>,
     /// Whether the written picture is transparent in parts.
     transparent: bool,
+    /// By how much the exposure multiplies light.
+    gain: f32,
     /// What a pixel may be wrong by.
     error: f32,
     /// How many standard errors that must be.
@@ -49,7 +51,8 @@ impl<'a> Certainty<'a> {
         factor: f32,
     ) -> Self {
         let developer = output.map(Developer::new);
-        Self { developer, background, transparent, error, factor }
+        let gain = output.map_or(1.0, |output| libm::exp2f(output.exposure));
+        Self { developer, background, transparent, gain, error, factor }
     }
 
     /// The numbers of the written picture for each of these sums, RGB and alpha, the colour premultiplied: a row for each
@@ -82,12 +85,14 @@ impl<'a> Certainty<'a> {
     pub(super) fn see(&self, groups: &[Sum]) -> Seen {
         if are_equal(groups) {
             let color = self.written(&[groups[0]]).map(|[c]| c);
-            return Seen { color, range: Range { least: color, most: color }, error: 0.0 };
+            let range = Range { least: color, most: color, brightest: self.brightest(groups) };
+            return Seen { color, range, error: 0.0 };
         }
         let rows = self.written(&std::array::from_fn::<Sum, GROUPS, _>(|k| *groups.get(k).unwrap_or(&groups[0])));
         let range = Range {
             least: rows.map(|row| row.into_iter().fold(f32::INFINITY, f32::min)),
             most: rows.map(|row| row.into_iter().fold(f32::NEG_INFINITY, f32::max)),
+            brightest: self.brightest(groups),
         };
         let color = self.written(&[total(groups)]).map(|[c]| c);
         Seen { color, range, error: self.standard_error(groups) }
@@ -98,11 +103,19 @@ impl<'a> Certainty<'a> {
         (0..4).all(|c| range.most[c] - range.least[c] <= self.error)
     }
 
-    /// How far apart the ends of a range are, the root of the mean over the channels.
+    /// The greatest channel of the light of any of these groups, after exposure.
+    fn brightest(&self, groups: &[Sum]) -> f32 {
+        let light = |group: &Sum| group.radiance.max_element() / group.weight.max(f32::MIN_POSITIVE);
+        groups.iter().map(light).fold(0.0, f32::max) * self.gain
+    }
+
+    /// How far apart the ends of a range are, the root of the mean over the channels. Where light is so many times brighter than
+    /// what is written as white, one sample of it moves the mean of a pixel as many times as far as white would.
     #[expect(clippy::cast_precision_loss, reason = "a handful of channels")]
     pub(super) fn contrast(&self, range: &Range) -> f32 {
         let squares: f32 = (0..self.channels()).map(|c| (range.most[c] - range.least[c]).max(0.0).powi(2)).sum();
-        (squares / self.channels() as f32).sqrt()
+        let beyond_white = if self.developer.is_some() { range.brightest.max(1.0) } else { 1.0 };
+        (squares / self.channels() as f32).sqrt() * beyond_white
     }
 
     /// Whether two pixels look so different that something may lie between them.
@@ -186,17 +199,20 @@ impl Seen {
 pub(super) struct Range {
     least: [f32; 4],
     most: [f32; 4],
+    /// Their brightest channel of light, which may be more than can be written.
+    brightest: f32,
 }
 
 impl Range {
     /// Of no samples.
-    pub(super) const NOTHING: Self = Self { least: [f32::INFINITY; 4], most: [f32::NEG_INFINITY; 4] };
+    pub(super) const NOTHING: Self = Self { least: [f32::INFINITY; 4], most: [f32::NEG_INFINITY; 4], brightest: 0.0 };
 
     /// Of the samples of both.
     pub(super) fn with(self, other: Self) -> Self {
         Self {
             least: std::array::from_fn(|c| self.least[c].min(other.least[c])),
             most: std::array::from_fn(|c| self.most[c].max(other.most[c])),
+            brightest: self.brightest.max(other.brightest),
         }
     }
 }
@@ -313,6 +329,19 @@ mod tests {
         assert_eq!(judge.spare(0.5, 72), 32);
         // Half a sample of what lies around, of 64.
         assert_eq!(judge.used(0.0, 1.0, 64), 1.0);
+    }
+
+    #[test]
+    fn what_is_brighter_than_white_makes_as_much_more_of_a_difference() {
+        let output = output(ErrorSpace::default(), None);
+        let contrast = |light: f32, output: Option<&Output>| {
+            let judge = Certainty::new(output, None, false, 0.01, factor(0.95));
+            let around = |light| judge.see(&[grey(light, 2.0); GROUPS]).range;
+            judge.contrast(&around(0.0).with(around(light)))
+        };
+        let [white, glint] = [1.0, 64.0].map(|light| contrast(light, output.as_ref()));
+        assert!(white > 0.9 && white < 1.01 && glint > 60.0, "{white} {glint}");
+        assert_eq!(contrast(64.0, None), 64.0, "in linear light it says so itself");
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use super::Settings;
 use super::absorption::Absorption;
+use super::glint;
 use super::sampling::Sampling;
 use super::shade::{Band, LocalLight, bands, lets_light_in};
 use super::sky::Sky;
@@ -53,6 +54,8 @@ pub(crate) struct Context<'a> {
     pub light_rays: u32,
     /// Rays that rough surfaces spread.
     pub gloss: Gloss,
+    /// How far highlights are spread, in widths of a ray's cone.
+    pub highlight_reach: f32,
     /// For every random choice.
     pub seed: u64,
     /// Whether nothing is seen but lights, and what shines by itself.
@@ -115,6 +118,7 @@ impl<'a> Context<'a> {
             env_rays,
             light_rays: settings.light_rays.max(1).div_ceil(together),
             gloss,
+            highlight_reach: glint::reach(settings),
             seed: settings.seed,
             lights: scene.lights.iter().map(|l| LocalLight::new(l, world.center)).collect(),
             uniform: scene.materials.iter().map(uniform).collect(),
@@ -128,9 +132,9 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// The same with other random choices.
-    pub(super) fn reseeded(&self, seed: u64) -> Self {
-        Self { seed, ..self.clone() }
+    /// The same with other random choices, and other samples.
+    pub(super) fn resampled(&self, settings: &Settings) -> Self {
+        Self { seed: settings.seed, highlight_reach: glint::reach(settings), ..self.clone() }
     }
 
     /// Whether a branch of this weight is worth its rays.

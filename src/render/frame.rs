@@ -29,21 +29,26 @@ pub(super) struct Frame<'a> {
     pub standard_errors: f32,
 }
 
+/// Sharpness of one sample relative to a pixel.
+#[expect(clippy::cast_precision_loss, reason = "sample counts are small")]
+pub(super) fn sample_width(settings: &Settings) -> f32 {
+    // Where more samples come as they are needed a ray is as sharp as the most of them: what it blurs stays blurred.
+    let samples = match settings.sampling {
+        Sampling::Uniform => settings.samples.max(1) as f32,
+        Sampling::Adaptive(how) => (4_u32 << (2 * how.levels.min(SHARPEST))) as f32,
+        Sampling::Stochastic(how) => how.max_samples.max(1) as f32,
+    };
+    1.0 / samples.sqrt()
+}
+
 impl<'a> Frame<'a> {
-    #[expect(clippy::cast_precision_loss, reason = "sample counts are small")]
     pub(super) fn new(context: &Context, view: &'a View, settings: &'a Settings) -> Self {
         let offsets = sample_offsets(settings.samples);
         let background = match context.scene.background {
             Some(Background::Color(color)) => Some(color),
             _ => None,
         };
-        // Where more samples come as they are needed a ray is as sharp as the most of them: what it blurs stays blurred.
-        let samples = match settings.sampling {
-            Sampling::Uniform => offsets.len() as f32,
-            Sampling::Adaptive(how) => (4_u32 << (2 * how.levels.min(SHARPEST))) as f32,
-            Sampling::Stochastic(how) => how.max_samples.max(1) as f32,
-        };
-        let sample_width = 1.0 / samples.sqrt();
+        let sample_width = sample_width(settings);
         let standard_errors = match settings.sampling {
             Sampling::Stochastic(how) => certainty::factor(how.confidence),
             Sampling::Uniform | Sampling::Adaptive(_) => 0.0,

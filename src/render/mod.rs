@@ -22,6 +22,7 @@ pub mod everything;
 mod eyes;
 mod forecast;
 mod frame;
+mod glint;
 mod keeping;
 mod layers;
 mod observer;

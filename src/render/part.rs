@@ -71,7 +71,7 @@ impl<P: Observer> Part<P> {
         squares: &[Tile],
         progress: &dyn Progress,
     ) -> Option<Self> {
-        let context = context.reseeded(settings.seed);
+        let context = context.resampled(settings);
         let (mut finished, counts, complete) =
             render_some(&context, job.accel, job.view, settings, &Quiet(progress), squares);
         // Threads finish squares in any order; sums over them have one.
@@ -80,10 +80,21 @@ impl<P: Observer> Part<P> {
         complete.then_some(Self { squares, spent, counts })
     }
 
+    fn pixels(&self) -> usize {
+        self.squares.iter().map(|square| square.beauty.len()).sum()
+    }
+
     /// Of processor time, on the average.
     pub(super) fn seconds_per_pixel(&self) -> f64 {
-        let pixels: usize = self.squares.iter().map(|square| square.beauty.len()).sum();
-        self.spent.iter().sum::<Duration>().as_secs_f64() / pixels.max(1) as f64
+        self.spent.iter().sum::<Duration>().as_secs_f64() / self.pixels().max(1) as f64
+    }
+
+    /// Samples of each, on the average.
+    #[expect(clippy::cast_precision_loss, reason = "counts of rays")]
+    pub(super) fn samples_per_pixel(&self) -> f64 {
+        let samples =
+            self.squares.iter().flat_map(|square| &square.facts).map(|facts| u64::from(facts.count)).sum::<u64>();
+        samples as f64 / self.pixels().max(1) as f64
     }
 
     /// Eye rays.

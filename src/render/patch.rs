@@ -131,6 +131,39 @@ impl Patch<'_> {
         Some([a?, b?, c?])
     }
 
+    /// How the mesh's own normal, of unit length, turns along two ways in the plane of the triangle; zero where it is flat.
+    pub(super) fn bends(&self, ways: [Vec3; 2]) -> [Vec3; 2] {
+        let Some([a, b, c]) = self.corner_normals().filter(|&normals| differ(normals)) else { return [Vec3::ZERO; 2] };
+        let [wa, wb, wc] = self.weights;
+        let turned = |normal: Vec3| self.placement.normal_from_object * normal.as_dvec3();
+        let normal = turned(a * wa + b * wb + c * wc);
+        let length = normal.length();
+        let (second, third) = (turned(b - a) / length, turned(c - a) / length);
+        let normal = normal / length;
+        let gradients = Gradients::new(self.vertices);
+        ways.map(|way| {
+            let change = second * f64::from(gradients.second.dot(way)) + third * f64::from(gradients.third.dot(way));
+            let change = (change - normal * normal.dot(change)).as_vec3();
+            if change.is_finite() { change } else { Vec3::ZERO }
+        })
+    }
+
+    /// How far a normal map turns the normal in `reach` of both axes of a footprint: the squares of the angles, summed.
+    pub(super) fn turning_of_map(
+        &self,
+        map: &TextureRef,
+        scale: f32,
+        store: &TextureStore,
+        print: &Footprint,
+        reach: f32,
+    ) -> f32 {
+        let at = self.coordinates(map, print);
+        let changes = store.changes(map.texture, at.uv, [at.along, at.across], reach);
+        let scale = Vec3::new(scale, scale, 1.0);
+        // Components run from -1 to 1, texels from 0 to 1.
+        changes.map(|change| 4.0 * (change.truncate() * scale).length_squared()).iter().sum()
+    }
+
     /// Tangent and bitangent, unit and perpendicular to `normal`: those of the mesh, or those of the coordinates.
     pub(super) fn tangents(&self, normal: Vec3, map: &TextureRef, print: &Footprint) -> Option<(Vec3, Vec3)> {
         let given = self.mix(&self.mesh.tangents).and_then(|t| {

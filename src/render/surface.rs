@@ -3,6 +3,7 @@
 //! Evaluated once, for the hit that counts. Nothing here knows of light; materials are only asked for their normal and
 //! bump maps. Whatever a file gives, normals come out finite and of unit length.
 
+use super::context::Context;
 use super::patch::{Footprint, Gradients, Patch};
 use super::shade::{Seen, has_inside};
 use super::texture::TextureStore;
@@ -214,6 +215,38 @@ impl<'a> Surface<'a> {
         let (tangent, bitangent) =
             self.patch.as_ref().and_then(of).unwrap_or_else(|| self.normal.any_orthonormal_pair());
         [tangent, bitangent]
+    }
+
+    /// How its normal turns along both axes of the ray's cone before maps turn it.
+    pub(crate) fn bends(&self, context: &Context) -> [Vec3; 2] {
+        let Footprint { along, across } = self.footprint;
+        match (&self.patch, self.target.source) {
+            (Some(patch), _) => patch.bends([along, across]),
+            (None, PrimSource::Sphere(i)) => {
+                let curvature = (1.0 / context.scene.spheres[i as usize].radius) as f32;
+                [along * curvature, across * curvature]
+            }
+            (None, PrimSource::Cone(i)) => {
+                let cone = &context.scene.cones[i as usize];
+                let axis = (cone.apex - cone.base).normalize_or_zero();
+                let from = self.position.as_dvec3() + context.world.center - cone.base;
+                let curvature = 1.0 / (from - axis * axis.dot(from)).length();
+                let round = |v: Vec3| ((v.as_dvec3() - axis * axis.dot(v.as_dvec3())) * curvature).as_vec3();
+                [round(along), round(across)]
+            }
+            _ => [Vec3::ZERO; 2],
+        }
+    }
+
+    /// How far its normal turns in `reach` of the ray's cone: the squares, summed over both axes. Bump maps are not asked.
+    pub(crate) fn turning(&self, context: &Context, reach: f32) -> f32 {
+        let [along, across] = self.bends(context);
+        let of_mesh = (along.length_squared() + across.length_squared()) * (reach * reach);
+        let material = self.target.material;
+        let of_map = self.patch.as_ref().zip(material.normal_map.as_ref()).map_or(0.0, |(patch, map)| {
+            patch.turning_of_map(map, material.normal_scale, context.textures, &self.footprint, reach)
+        });
+        of_mesh + of_map
     }
 
     /// Whether it is seen from outside: from either side where there is no inside.

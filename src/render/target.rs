@@ -54,6 +54,12 @@ impl<P> Plan<P> {
 
     /// Aims at another error of a rendering than the last one's.
     fn aim(&mut self, last: f64, next: f64) {
+        /// From so many times the error on fewer rays are enough for the pixels that get fewest.
+        const COARSER: f64 = 1.2;
+        const FEWEST: u32 = 2;
+        if next > COARSER * last {
+            self.how.min_samples = (self.how.min_samples / 2).max(FEWEST);
+        }
         let gain = libm::pow(next / last, 1.0 / self.slope);
         self.how.error = single((f64::from(self.how.error) * gain).clamp(1e-5, 0.5));
     }
@@ -103,10 +109,12 @@ pub(super) fn plan<P: Observer>(
         plan.rmse = (squared.iter().sum::<f64>() / squared.len().max(1) as f64).sqrt();
         let pixels = f64::from(job.settings.width) * f64::from(job.settings.height);
         plan.cpu = parts.iter().map(|part| part.seconds_per_pixel() * pixels * 0.5).sum();
+        let samples = parts.iter().map(|part| part.samples_per_pixel() * 0.5).sum();
         for part in parts {
             plan.rays += part.rays();
             plan.counts.extend(part.counts);
         }
+        let fewest = how.min_samples.max(fewest(samples)).min(how.max_samples.max(1));
         let found = (error, plan.rmse);
         if let Some((error, rmse)) = before.replace(found)
             && found.0 != error
@@ -118,14 +126,29 @@ pub(super) fn plan<P: Observer>(
         }
         let off = plan.rmse / wanted;
         let is_at_end = off < 1.0 && error >= *RANGE.end() || off > 1.0 && error <= *RANGE.start();
-        if (0.94..1.06).contains(&off) || is_at_end {
+        if (0.94..1.06).contains(&off) && fewest == plan.how.min_samples || is_at_end {
             break;
         }
+        plan.how.min_samples = fewest;
         error *= libm::pow(1.0 / off.clamp(0.05, 20.0), 1.0 / plan.slope);
     }
     // Where the fewest samples do already, there is no use in doing it twice.
     plan.work = if plan.rmse <= target { 1.0 } else { 2.0 * OVER * OVER };
     Some(plan)
+}
+
+/// What pixels should start with, a power of two, when they get so many samples on average: those that see nothing in their
+/// first ones stop, and where many samples are wanted that is an error which more renderings do not lessen.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "far less than 2^32 samples, and not negative"
+)]
+fn fewest(samples: f64) -> u32 {
+    /// Part of the samples that all pixels get.
+    const SURE: f64 = 0.25;
+    const MOST: u32 = 64;
+    1 << ((SURE * samples) as u32).clamp(1, MOST).ilog2()
 }
 
 /// Renders until the error of the picture is what was asked; the picture is the mean of several renderings.
@@ -141,7 +164,7 @@ pub(super) fn render<P: Observer>(
     let watch = Stopwatch::of_all_threads();
     let foretold = plan.rmse / plan.work.sqrt();
     let mut one = |settings: &Settings| {
-        let context = context.reseeded(settings.seed);
+        let context = context.resampled(settings);
         let (picture, sampled, more, complete) =
             render_tiles::<_, P>(&context, job.accel, job.view, settings, progress);
         counts.extend(more);

@@ -42,6 +42,8 @@ pub(crate) struct Path {
     pub cone_width: f32,
     /// Growth of that width for each unit of length.
     pub cone_spread: f32,
+    /// The part of that growth, radians, that is due to rough surfaces.
+    pub scattered: f32,
     /// Which way through the tree of rays led here: the same number in all samples for the same turns.
     pub branch: u32,
 }
@@ -58,6 +60,7 @@ impl Path {
             since: 0.0,
             cone_width,
             cone_spread,
+            scattered: 0.0,
             branch: 0,
         }
     }

@@ -15,6 +15,7 @@ use super::curve::Feelers;
 use super::draws::{Draws, Purpose, Stream};
 use super::everything::look_up_in_vain;
 use super::eyes::Eyes;
+use super::glint;
 use super::layers::Facts;
 use super::observer::Observer;
 use super::optics::transmittance;
@@ -317,8 +318,11 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         surface.shade_smoothly(context.textures);
         self.note(ray, path, &surface, base.truncate());
         let mut matter = Matter::new(&surface, base.truncate(), context.textures);
-        if path.cone_spread > SPREAD {
-            matter.blur(path.cone_spread);
+        if path.scattered > SPREAD {
+            matter.blur(path.scattered);
+        }
+        if !context.lights.is_empty() && matter.has_narrow_highlight() {
+            matter.widen_highlight(glint::widening(&surface, context, path.cone_spread));
         }
         if path.depth < context.depth && context.gloss.spreads(material) {
             matter.spread_by_rays();

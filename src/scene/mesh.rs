@@ -31,6 +31,22 @@ pub struct Mesh {
     pub polygon_corners: Vec<u32>,
 }
 
+impl Mesh {
+    /// The number of corners of all faces.
+    pub fn corners(&self) -> usize {
+        3 * self.triangles.len() + self.polygon_corners.len()
+    }
+
+    /// Calls `look` with the corners of each face: triangles first, then polygons as they lie in
+    /// [`Self::polygon_corners`].
+    pub fn each_face(&self, mut look: impl FnMut(&[u32])) {
+        self.triangles.iter().for_each(|face| look(face));
+        for polygon in &self.polygons {
+            look(&self.polygon_corners[polygon.first as usize..][..polygon.len as usize]);
+        }
+    }
+}
+
 /// A planar n-gon: a run of [`Mesh::polygon_corners`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Polygon {

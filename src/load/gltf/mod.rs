@@ -193,7 +193,7 @@ impl Loading<'_> {
         self.report.merge(pictures);
         scene.materials = palette.materials;
         (scene.textures, scene.bitmaps) = textures::keep_decoded(&mut scene.materials, palette.textures.list, bitmaps);
-        let lost = wires::draw(&wires, &places, &mut scene, budget, facts, file)
+        let lost = wires::draw(&wires, &places, &mut scene, budget, facts, file, self.options.line_width)
             .map_err(|over| self.too_large("what points and lines become", over))?;
         lost.into_iter().for_each(|warning| self.report.warnings.push(warning));
         scene.up = self.options.up.unwrap_or_default();

@@ -155,7 +155,7 @@ pub(in crate::load) fn load(
         hash,
         ..Facts::default()
     };
-    let lost = super::draw(&wires, placed.center, &mut scene, &mut budget, &mut facts, file)?;
+    let lost = super::draw(&wires, placed.center, &mut scene, &mut budget, &mut facts, file, options.line_width)?;
     lost.into_iter().for_each(|warning| warnings.push(warning));
     Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
 }

@@ -95,7 +95,7 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
         decoding,
         ..Facts::default()
     };
-    let lost = draw(&wires, placed.center, &mut scene, &mut budget, &mut facts, file)?;
+    let lost = draw(&wires, placed.center, &mut scene, &mut budget, &mut facts, file, options.line_width)?;
     lost.into_iter().for_each(|warning| warnings.push(warning));
     Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
 }
@@ -108,11 +108,12 @@ fn draw(
     budget: &mut Budget,
     facts: &mut Facts,
     file: &Path,
+    width: Option<f64>,
 ) -> Result<Option<Diagnostic>, Diagnostic> {
     let world_from_object = DAffine3::from_translation(center);
     let place = |(mesh, of): (u32, &Wires)| Instance { name: of.mesh.name.clone(), mesh, world_from_object };
     let places: Vec<Instance> = (0..).zip(wires).map(place).collect();
-    wires::draw(wires, &places, scene, budget, facts, file).map_err(|over| bare::over_memory(file, over))
+    wires::draw(wires, &places, scene, budget, facts, file, width).map_err(|over| bare::over_memory(file, over))
 }
 
 /// One instance of each mesh, moved to where the file has it.

@@ -87,21 +87,21 @@ impl Widths {
     /// For so many points and lines in a box with this diagonal.
     ///
     /// N points spread over a surface as large as the box are about diagonal / √N apart: wider ones would run together.
-    /// Lines are kept to a quarter of that, so that a mesh of wires shows what lies behind.
+    /// Lines are kept to a quarter of that, so that a mesh of wires shows what lies behind. `asked` goes before all that.
     #[expect(clippy::cast_precision_loss, reason = "counts of what is in memory")]
-    fn new([points, lines]: [u64; 2], diagonal: f64) -> Self {
+    fn new([points, lines]: [u64; 2], diagonal: f64, asked: Option<f64>) -> Self {
         // A single place has no size: any will do, since the camera is framed on what is drawn.
         let diagonal = if diagonal > 0.0 && diagonal.is_finite() { diagonal } else { PARTS };
         let point = diagonal / (points as f64).sqrt().max(PARTS);
         let line = diagonal / (4.0 * (lines as f64).sqrt()).max(PARTS);
-        Self { point, line, crowd: points >= CROWD }
+        Self { point: asked.unwrap_or(point), line: asked.unwrap_or(line), crowd: points >= CROWD }
     }
 }
 
 /// Puts points and lines into the scene as solids; `places` are instances whose `mesh` counts `wires`.
 ///
 /// Meshes are in place before: the width goes by the box around all of it. Points and lines with an end that is not finite
-/// are left out, counted in `facts`, and told in the warning that is returned.
+/// are left out, counted in `facts`, and told in the warning that is returned. `width` is what the user asked for.
 ///
 /// # Errors
 /// When the solids would take more than is left of `budget`.
@@ -112,10 +112,12 @@ pub(super) fn draw(
     budget: &mut Budget,
     facts: &mut Facts,
     file: &Path,
+    width: Option<f64>,
 ) -> Result<Option<Diagnostic>, OverBudget> {
     let counts: Vec<[u64; 2]> = wires.iter().map(Wires::count).collect();
     let placed = places.iter().filter_map(|place| counts.get(place.mesh as usize));
-    let widths = Widths::new(placed.fold([0, 0], |[p, l], [q, m]| [p + q, l + m]), diagonal(wires, places, scene));
+    let count = placed.fold([0, 0], |[p, l], [q, m]| [p + q, l + m]);
+    let widths = Widths::new(count, diagonal(wires, places, scene), width);
     let mut drawing = Drawing { scene, budget, widths, materials: HashMap::new(), dropped: 0 };
     let mut known: HashMap<(u32, [u64; 9]), Vec<Part>> = HashMap::new();
     for place in places {

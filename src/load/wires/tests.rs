@@ -23,7 +23,7 @@ fn red() -> Scene {
 
 fn drawn(wires: &[Wires], places: &[Instance]) -> (Scene, Facts, Option<Diagnostic>) {
     let (mut scene, mut facts) = (red(), Facts::default());
-    let warning = draw(wires, places, &mut scene, &mut budget(), &mut facts, Path::new("a.gltf")).unwrap();
+    let warning = draw(wires, places, &mut scene, &mut budget(), &mut facts, Path::new("a.gltf"), None).unwrap();
     (scene, facts, warning)
 }
 
@@ -137,9 +137,11 @@ fn lines_without_length_and_a_place_without_size_are_points() {
 
 #[test]
 fn crowds_are_thinner_and_simpler() {
-    let few = Widths::new([CROWD - 1, 4096], 256.0);
+    let asked = Widths::new([CROWD, 4096], 256.0, Some(0.3));
+    assert_eq!((asked.point, asked.line, asked.crowd), (0.3, 0.3, true));
+    let few = Widths::new([CROWD - 1, 4096], 256.0, None);
     assert_eq!(few, Widths { point: 1.0, line: 1.0, crowd: false });
-    let many = Widths::new([4 * CROWD, 4 * 4096], 256.0);
+    let many = Widths::new([4 * CROWD, 4 * 4096], 256.0, None);
     assert_eq!(many, Widths { point: 0.5, line: 0.5, crowd: true });
 
     let side = 257u32;
@@ -153,11 +155,12 @@ fn crowds_are_thinner_and_simpler() {
 #[test]
 fn more_than_memory_allows_is_refused_before_it_is_made() {
     let of = wires(&[[0.0; 3], [1.0, 0.0, 0.0]], &[[0, 1]; 1000]);
-    let bytes = bake::cost(&of, &Widths::new([0, 1000], 1.0));
+    let bytes = bake::cost(&of, &Widths::new([0, 1000], 1.0, None));
     let with = |memory: u64| {
         let mut budget = Budget::new(&Limits { memory, ..Limits::default() });
         let places = [place(0, DAffine3::IDENTITY)];
-        draw(std::slice::from_ref(&of), &places, &mut red(), &mut budget, &mut Facts::default(), Path::new("a")).is_ok()
+        draw(std::slice::from_ref(&of), &places, &mut red(), &mut budget, &mut Facts::default(), Path::new("a"), None)
+            .is_ok()
     };
     assert!(with(bytes) && !with(bytes - 1));
     assert_eq!(bytes, 1000 * (6 * 12 + 8 * 16));

@@ -4,7 +4,7 @@
 //! is not bent on its way through. The share that is taken off is that of the view alone, as the extension says.
 
 use super::facets::albedo;
-use super::metal_rough::{above, highlight, open, traced};
+use super::metal_rough::{NARROW_HIGHLIGHT, above, highlight, open, squared_width, traced, widening};
 use super::{Reader, Seen, Sky};
 use crate::math::Vec3;
 use crate::render::optics::{fresnel_schlick, reflect};
@@ -26,6 +26,8 @@ pub(crate) struct CoatMatter {
     /// Share of the light from below that it takes off.
     taken: f32,
     occlusion: f32,
+    /// What is added to the squared width of its highlights.
+    widening: f32,
 }
 
 impl CoatMatter {
@@ -35,7 +37,7 @@ impl CoatMatter {
         let roughness = (coat.roughness * reader.linear(coat.roughness_map.as_ref()).y).clamp(0.0, 1.0);
         let n_v = normal.dot(view).clamp(0.0, 1.0);
         let taken = strength * fresnel(n_v);
-        (strength > 0.0).then_some(Self { strength, roughness, normal, n_v, taken, occlusion })
+        (strength > 0.0).then_some(Self { strength, roughness, normal, n_v, taken, occlusion, widening: 0.0 })
     }
 
     /// Share of what is below that is seen.
@@ -43,19 +45,34 @@ impl CoatMatter {
         1.0 - self.taken
     }
 
-    /// BRDF × N·L; unit vectors, away from the surface.
+    /// Whether its highlights are narrow.
+    pub(super) fn has_narrow_highlight(&self) -> bool {
+        self.roughness < NARROW_HIGHLIGHT
+    }
+
+    /// Widens the highlights of lights.
+    pub(super) fn widen_highlight(&mut self, by: f32) {
+        self.widening = widening(self.roughness, by);
+    }
+
+    /// BRDF × N·L of a light; unit vectors, away from the surface.
     pub(super) fn lit(&self, view: Vec3, to_light: Vec3) -> f32 {
+        self.shown(view, to_light, squared_width(self.roughness) + self.widening)
+    }
+
+    /// The same for facets with a squared width of α².
+    fn shown(&self, view: Vec3, to_light: Vec3, a2: f32) -> f32 {
         let (n_l, n_v) = (self.normal.dot(to_light), self.normal.dot(view));
         if n_l <= 0.0 || n_v <= 0.0 {
             return 0.0;
         }
         let half = (view + to_light).normalize_or(self.normal);
-        self.strength * fresnel(view.dot(half)) * highlight(self.normal, half, [n_l, n_v], self.roughness) * n_l
+        self.strength * fresnel(view.dot(half)) * highlight(self.normal, half, [n_l, n_v], a2) * n_l
     }
 
     /// BRDF × N·L of the part of it that [`Self::ambient`] looks up.
     pub(super) fn lit_around(&self, view: Vec3, to: Vec3) -> f32 {
-        self.lit(view, to) * (1.0 - traced(self.roughness))
+        self.shown(view, to, squared_width(self.roughness)) * (1.0 - traced(self.roughness))
     }
 
     /// What it shows of the surroundings without a ray.

@@ -4,7 +4,7 @@
 //! B. Burley, "Physically Based Shading at Disney" (2012) for the distribution of facets, E. Heitz, "Understanding the
 //! Masking-Shadowing Function" (2014) for how they hide each other.
 
-use super::metal_rough::{NARROWEST_HIGHLIGHT, above};
+use super::metal_rough::{NARROWEST_HIGHLIGHT, above, widening};
 use super::{Lobe, Reader, Seen, Sky};
 use crate::math::{Vec2, Vec3};
 use crate::render::optics::reflect;
@@ -23,6 +23,8 @@ pub(crate) struct GrainMatter {
     across: Vec3,
     /// Widths of the distribution of facets along and across.
     alpha: [f32; 2],
+    /// What is added to the squares of both where lights are seen in it.
+    widening: f32,
 }
 
 impl GrainMatter {
@@ -47,7 +49,7 @@ impl GrainMatter {
     fn in_frame(along: Vec3, across: Vec3, strength: f32, roughness: f32) -> Self {
         let r = roughness.max(NARROWEST_HIGHLIGHT);
         let narrow = r * r;
-        Self { along, across, alpha: [narrow + (1.0 - narrow) * strength * strength, narrow] }
+        Self { along, across, alpha: [narrow + (1.0 - narrow) * strength * strength, narrow], widening: 0.0 }
     }
 
     /// Perceptual roughness along it.
@@ -58,6 +60,17 @@ impl GrainMatter {
     /// Its facets.
     pub(super) fn lobe(&self, normal: Vec3) -> Lobe {
         Lobe::new([self.along, self.across], normal, self.alpha)
+    }
+
+    /// Widens the highlights of lights.
+    pub(super) fn widen_highlight(&mut self, by: f32) {
+        self.widening = widening(self.alpha[1].sqrt(), by);
+    }
+
+    /// [`Self::highlight`], widened.
+    pub(super) fn widened(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> f32 {
+        let alpha = self.alpha.map(|a| (a * a + self.widening).sqrt());
+        Self { alpha, ..self.clone() }.highlight(normal, view, to_light)
     }
 
     /// Distribution × visibility of a light without extent, before Fresnel; all unit vectors, on the front.
@@ -109,7 +122,7 @@ impl GrainMatter {
 
 #[cfg(test)]
 mod tests {
-    use super::super::metal_rough::highlight;
+    use super::super::metal_rough::{highlight, squared_width};
     use super::*;
     use crate::scene::{Environment, Scene};
 
@@ -149,7 +162,7 @@ mod tests {
         let (view, light) = (at(30.0, 10.0), at(50.0, 130.0));
         let (own, expected) = (
             grain(0.0, 0.4).highlight(Vec3::Z, view, light),
-            highlight(Vec3::Z, (view + light).normalize(), [light.z, view.z], 0.4),
+            highlight(Vec3::Z, (view + light).normalize(), [light.z, view.z], squared_width(0.4)),
         );
         assert!((own / expected - 1.0).abs() < 1e-4, "{own} {expected}");
     }

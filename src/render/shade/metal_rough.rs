@@ -28,6 +28,8 @@ const FROSTED_ROUGHNESS: f32 = 0.6;
 const FROSTED_SHARE: f32 = 0.75;
 /// Highlights of lights without extent are never narrower than this roughness makes them.
 pub(super) const NARROWEST_HIGHLIGHT: f32 = 0.045;
+/// Below this roughness they are widened so that rays meet them (see [`crate::render::glint`]).
+pub(super) const NARROW_HIGHLIGHT: f32 = 0.35;
 
 /// The model's parameters at one point.
 #[derive(Clone, Debug)]
@@ -59,6 +61,8 @@ pub(crate) struct MetalRoughMatter {
     /// What is left of light that passes through the whole of it, where that is not traced.
     inside: Vec3,
     pub dispersion: f32,
+    /// What is added to the squared width of the highlights of lights.
+    widening: f32,
 }
 
 /// What a point sees of its surroundings.
@@ -116,6 +120,7 @@ impl MetalRoughMatter {
             thick: m.thick,
             inside: inside(m, reader),
             dispersion: m.dispersion,
+            widening: 0.0,
         }
     }
 
@@ -155,6 +160,16 @@ impl MetalRoughMatter {
     /// Makes it at least so rough.
     pub(super) fn blur(&mut self, roughness: f32) {
         self.roughness = self.roughness.max(roughness);
+    }
+
+    /// Whether its highlights are narrow.
+    pub(super) fn has_narrow_highlight(&self) -> bool {
+        self.roughness < NARROW_HIGHLIGHT
+    }
+
+    /// Widens the highlights of lights.
+    pub(super) fn widen_highlight(&mut self, by: f32) {
+        self.widening = widening(self.roughness, by);
     }
 
     /// Shares of f0 and f90 in what its lobe sends back.
@@ -212,7 +227,8 @@ impl MetalRoughMatter {
     /// BRDF × N·L; all unit vectors, away from the surface.
     #[inline(always)]
     pub(crate) fn lit(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
-        let lobe = |half| highlight(normal, half, [normal.dot(to_light), normal.dot(view)], self.roughness);
+        let a2 = squared_width(self.roughness) + self.widening;
+        let lobe = |half| highlight(normal, half, [normal.dot(to_light), normal.dot(view)], a2);
         self.lit_by(normal, view, to_light, lobe)
     }
 
@@ -274,7 +290,7 @@ impl MetalRoughMatter {
         let (normal, view) = (seen.normal, seen.view);
         let looked_up = 1.0 - self.traced(seen.outside);
         let lobe = |half| match grain {
-            None => highlight(normal, half, [normal.dot(to), normal.dot(view)], self.roughness),
+            None => highlight(normal, half, [normal.dot(to), normal.dot(view)], squared_width(self.roughness)),
             Some(grain) => grain.highlight(normal, view, to),
         };
         let through = if self.is_translucent() { self.lit_through(normal, view, to) } else { Vec3::ZERO };
@@ -387,20 +403,33 @@ pub(crate) fn above(dir: Vec3, geometric: Vec3) -> Vec3 {
     if height < 0.0 { dir - 2.0 * height * geometric } else { dir }
 }
 
-/// The microfacet lobe of a light without extent, before Fresnel: distribution × visibility.
+/// α² of the highlights that a roughness gives: its fourth power.
 #[inline(always)]
-pub(super) fn highlight(normal: Vec3, half: Vec3, [n_l, n_v]: [f32; 2], roughness: f32) -> f32 {
-    let r = roughness.max(NARROWEST_HIGHLIGHT);
-    ggx(normal, half, r * r) * visibility(n_l, n_v, r * r)
+pub(super) fn squared_width(roughness: f32) -> f32 {
+    let alpha = roughness.max(NARROWEST_HIGHLIGHT) * roughness.max(NARROWEST_HIGHLIGHT);
+    alpha * alpha
 }
 
-/// Trowbridge and Reitz's distribution of facets (GGX), `alpha` the square of the roughness.
+/// What may be added to that: all of `by` where it is narrow, up to what would make it wide, and less and less of it where
+/// roughness makes it wide by itself.
+pub(super) fn widening(roughness: f32, by: f32) -> f32 {
+    /// α² of a roughness of 0.7.
+    const WIDE: f32 = 0.24;
+    by.min(WIDE) * (1.0 - smoothstep(0.5 * NARROW_HIGHLIGHT, NARROW_HIGHLIGHT, roughness))
+}
+
+/// The microfacet lobe of a light without extent, before Fresnel: distribution × visibility, for a squared width α².
 #[inline(always)]
-fn ggx(normal: Vec3, half: Vec3, alpha: f32) -> f32 {
+pub(super) fn highlight(normal: Vec3, half: Vec3, [n_l, n_v]: [f32; 2], a2: f32) -> f32 {
+    ggx(normal, half, a2) * visibility(n_l, n_v, a2)
+}
+
+/// Trowbridge and Reitz's distribution of facets (GGX), `a2` the fourth power of the roughness.
+#[inline(always)]
+fn ggx(normal: Vec3, half: Vec3, a2: f32) -> f32 {
     let n_h = normal.dot(half).clamp(0.0, 1.0);
     // 1 − (N·H)² as |N × H|², which keeps its digits in a narrow highlight.
     let sine_squared = normal.cross(half).length_squared();
-    let a2 = alpha * alpha;
     let f = n_h * n_h * a2 + sine_squared;
     a2 / (PI * f * f)
 }
@@ -408,8 +437,7 @@ fn ggx(normal: Vec3, half: Vec3, alpha: f32) -> f32 {
 /// Smith's height-correlated masking and shadowing over 4 N·L N·V (E. Heitz, "Understanding the Masking-Shadowing
 /// Function", 2014).
 #[inline(always)]
-fn visibility(n_l: f32, n_v: f32, alpha: f32) -> f32 {
-    let a2 = alpha * alpha;
+fn visibility(n_l: f32, n_v: f32, a2: f32) -> f32 {
     let view = n_l * (n_v * n_v * (1.0 - a2) + a2).sqrt();
     let light = n_v * (n_l * n_l * (1.0 - a2) + a2).sqrt();
     0.5 / (view + light)
@@ -446,6 +474,7 @@ mod tests {
             thick: false,
             inside: Vec3::ONE,
             dispersion: 0.0,
+            widening: 0.0,
         }
     }
 

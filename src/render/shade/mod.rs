@@ -244,6 +244,25 @@ impl Matter {
         }
     }
 
+    /// Whether lights without extent are seen in it so small that they must be widened.
+    pub(crate) fn has_narrow_highlight(&self) -> bool {
+        let core = matches!(&self.model, Model::MetalRough(m) if m.has_narrow_highlight());
+        core || self.coat.as_ref().is_some_and(CoatMatter::has_narrow_highlight)
+    }
+
+    /// Adds to the squared widths α² of the highlights of lights, where they are narrow.
+    pub(crate) fn widen_highlight(&mut self, by: f32) {
+        if let Model::MetalRough(m) = &mut self.model {
+            m.widen_highlight(by);
+        }
+        if let Some(grain) = &mut self.grain {
+            grain.widen_highlight(by);
+        }
+        if let Some(coat) = &mut self.coat {
+            coat.widen_highlight(by);
+        }
+    }
+
     /// The facets that spread rays; `None` where one ray does.
     pub(crate) fn lobe(&self, surface: &Surface) -> Option<Lobe> {
         let Model::MetalRough(m) = &self.model else { return None };
@@ -268,7 +287,7 @@ impl Matter {
                 let to_light = light.to_light;
                 let lit = match &self.grain {
                     None => m.lit(normal, view, to_light),
-                    Some(grain) => m.lit_by(normal, view, to_light, |_| grain.highlight(normal, view, to_light)),
+                    Some(grain) => m.lit_by(normal, view, to_light, |_| grain.widened(normal, view, to_light)),
                 };
                 lit * light.irradiance()
             }

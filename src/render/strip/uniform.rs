@@ -12,8 +12,8 @@ pub(crate) struct Uniform {
 }
 
 impl Uniform {
-    /// `None` for materials with maps, a grain, film, sheen or lacquer, those that let light through or scatter it through, and
-    /// those that mirror it where rays bounce.
+    /// `None` for materials with maps, a grain, film, sheen or lacquer, those that let light through or scatter it through,
+    /// those that mirror it where rays bounce, and those in which lights are seen small.
     pub(crate) fn of(material: &Material, store: &TextureStore, bounces: bool) -> Option<Self> {
         if material.textures().next().is_some()
             || !material.is_opaque()
@@ -27,6 +27,8 @@ impl Uniform {
             Model::Phong(m) => m.mirrors(),
             Model::MetalRough(m) => m.mirrors(),
         };
-        (!bounces || !mirrors).then_some(Self { matter, one_sided: !material.double_sided })
+        // How far a highlight must be widened differs from point to point.
+        (!(matter.has_narrow_highlight() || bounces && mirrors))
+            .then_some(Self { matter, one_sided: !material.double_sided })
     }
 }

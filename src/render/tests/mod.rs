@@ -4,6 +4,7 @@ mod around;
 mod bits;
 mod costs;
 mod glass;
+mod glints;
 mod gloss;
 mod instances;
 mod leaf;

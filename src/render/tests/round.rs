@@ -3,7 +3,7 @@
 use super::*;
 
 /// A ball of radius 1 about the y axis with so many faces around and from pole to pole, and its own normals.
-fn ball(around: u32, down: u32) -> Mesh {
+pub(super) fn ball(around: u32, down: u32) -> Mesh {
     let mut positions = Vec::new();
     for row in 0..=down {
         let (ring, y) = libm::sincosf(row as f32 / down as f32 * std::f32::consts::PI);

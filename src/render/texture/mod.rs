@@ -78,6 +78,14 @@ impl<'a> TextureStore<'a> {
         lookup.filtered(uv, duvdx, duvdy)
     }
 
+    /// How much linear texels change from `uv` to `reach` times each of two ways, which span a footprint as in [`Self::sample`]:
+    /// between single texels, of the level that suits the footprint, that lie at least one apart.
+    pub(super) fn changes(&self, texture: u32, uv: Vec2, ways: [Vec2; 2], reach: f32) -> [Vec4; 2] {
+        let Some((sampler, source)) = self.find(texture) else { return [Vec4::ZERO; 2] };
+        let lookup = Lookup { bitmap: source.bitmap, pyramid: &source.linear, space: ColorSpace::Linear, sampler };
+        lookup.changes(uv, ways, reach)
+    }
+
     fn find(&self, texture: u32) -> Option<(Sampler, &Source<'a>)> {
         if texture == STAND_IN {
             return self.stand_in.as_ref().map(|source| (Sampler::default(), source));
@@ -145,6 +153,30 @@ impl<'a> Lookup<'a> {
         };
         let plan = self.plan(libm::log2f(major / probes));
         self.read(plan, &Probes { uv, axis, count: probes })
+    }
+
+    fn changes(&self, uv: Vec2, ways: [Vec2; 2], reach: f32) -> [Vec4; 2] {
+        let texels = pixels(size_of(self.bitmap));
+        let widest = ways.map(|way| (way * texels).length()).into_iter().fold(0.0, f32::max);
+        let level = match self.sampler.mipmaps {
+            Mipmaps::Nearest | Mipmaps::Linear if widest > 1.0 => whole(libm::log2f(widest)).min(self.pyramid.top()),
+            _ => 0,
+        };
+        let plane = self.plane(level);
+        let texel = |uv: Vec2| {
+            let x = Axis::new(uv.x, plane.width, self.sampler.wrap_u, Filter::Nearest);
+            let y = Axis::new(uv.y, plane.height, self.sampler.wrap_v, Filter::Nearest);
+            plane.texel(x.near, y.near)
+        };
+        let (here, texels) = (texel(uv), pixels((plane.width, plane.height)));
+        ways.map(|way| {
+            let apart = (way * texels).length() * reach;
+            if !(apart > 0.0 && apart.is_finite()) {
+                return Vec4::ZERO;
+            }
+            let longer = (1.0 / apart).max(1.0);
+            (texel(uv + way * (reach * longer)) - here) / longer
+        })
     }
 
     /// What to read where a probe covers 2^`lod` texels.

@@ -174,3 +174,21 @@ proptest! {
         prop_assert!(color.x >= 50.0 / 255.0 - 1e-4 && color.x <= 150.0 / 255.0 + 1e-4, "{color}");
     }
 }
+
+#[test]
+fn texels_change_by_their_slope_however_far_apart_they_are_read() {
+    // Four steps of 255 a texel, along u alone.
+    let scene = scene(64, 64, Sampler::default(), |x, _| grey((x * 4) as u8));
+    let store = TextureStore::new(&scene);
+    let texel = 1.0 / 64.0;
+    for (width, reach, texels) in [(1.0, 1.0, 1.0), (0.1, 1.0, 0.1), (0.1, 5.0, 0.5), (1.0, 8.0, 8.0), (4.0, 2.0, 8.0)]
+    {
+        let ways = [Vec2::new(width * texel, 0.0), Vec2::new(0.0, width * texel)];
+        let [along, across] = store.changes(0, Vec2::splat(0.3), ways, reach);
+        let expected = texels * 4.0 / 255.0;
+        assert!((along.x - expected).abs() < 0.01 * expected, "{width} × {reach}: {} not {expected}", along.x);
+        assert_eq!(across, Vec4::ZERO);
+    }
+    assert_eq!(store.changes(9, Vec2::ZERO, [Vec2::X, Vec2::Y], 1.0), [Vec4::ZERO; 2], "no texture");
+    assert_eq!(store.changes(0, Vec2::ZERO, [Vec2::NAN, Vec2::ZERO], 1.0), [Vec4::ZERO; 2], "no footprint");
+}
