@@ -105,17 +105,30 @@ impl<'a> Certainty<'a> {
 
     /// The greatest channel of the light of any of these groups, after exposure.
     fn brightest(&self, groups: &[Sum]) -> f32 {
-        let light = |group: &Sum| group.radiance.max_element() / group.weight.max(f32::MIN_POSITIVE);
-        groups.iter().map(light).fold(0.0, f32::max) * self.gain
+        groups.iter().map(|group| self.light(group)).fold(0.0, f32::max)
     }
 
-    /// How far apart the ends of a range are, the root of the mean over the channels. Where light is so many times brighter than
-    /// what is written as white, one sample of it moves the mean of a pixel as many times as far as white would.
+    /// The greatest channel of the light of a group, after exposure.
+    fn light(&self, group: &Sum) -> f32 {
+        group.radiance.max_element() / group.weight.max(f32::MIN_POSITIVE) * self.gain
+    }
+
+    /// How far apart the ends of a range are, the root of the mean over the channels.
     #[expect(clippy::cast_precision_loss, reason = "a handful of channels")]
     pub(super) fn contrast(&self, range: &Range) -> f32 {
         let squares: f32 = (0..self.channels()).map(|c| (range.most[c] - range.least[c]).max(0.0).powi(2)).sum();
-        let beyond_white = if self.developer.is_some() { range.brightest.max(1.0) } else { 1.0 };
-        (squares / self.channels() as f32).sqrt() * beyond_white
+        (squares / self.channels() as f32).sqrt()
+    }
+
+    /// How many times as far as white a sample as bright as `around` would move the mean of a pixel: 1 where none of these
+    /// groups can have missed it, since they differ by about as much as one of its samples would make them.
+    pub(super) fn beyond_white(&self, groups: &[Sum], around: f32) -> f32 {
+        if around <= 1.0 || self.developer.is_none() {
+            return 1.0;
+        }
+        let samples = groups.first().map_or(0.0, |group| group.weight);
+        let least = groups.iter().map(|group| self.light(group)).fold(f32::INFINITY, f32::min);
+        if (self.brightest(groups) - least) * samples >= 0.5 * around { 1.0 } else { around }
     }
 
     /// Whether two pixels look so different that something may lie between them.
@@ -200,7 +213,7 @@ pub(super) struct Range {
     least: [f32; 4],
     most: [f32; 4],
     /// Their brightest channel of light, which may be more than can be written.
-    brightest: f32,
+    pub brightest: f32,
 }
 
 impl Range {
@@ -332,16 +345,18 @@ mod tests {
     }
 
     #[test]
-    fn what_is_brighter_than_white_makes_as_much_more_of_a_difference() {
+    fn what_is_brighter_than_white_counts_as_much_more_until_it_has_been_seen() {
         let output = output(ErrorSpace::default(), None);
-        let contrast = |light: f32, output: Option<&Output>| {
-            let judge = Certainty::new(output, None, false, 0.01, factor(0.95));
-            let around = |light| judge.see(&[grey(light, 2.0); GROUPS]).range;
-            judge.contrast(&around(0.0).with(around(light)))
-        };
-        let [white, glint] = [1.0, 64.0].map(|light| contrast(light, output.as_ref()));
-        assert!(white > 0.9 && white < 1.01 && glint > 60.0, "{white} {glint}");
-        assert_eq!(contrast(64.0, None), 64.0, "in linear light it says so itself");
+        let judge = Certainty::new(output.as_ref(), None, false, 0.01, factor(0.95));
+        let mut groups = [grey(0.25, 4.0); GROUPS];
+        assert_eq!(judge.see(&[grey(64.0, 2.0), grey(0.5, 2.0)]).range.brightest, 64.0);
+        assert_eq!(judge.beyond_white(&groups, 64.0), 64.0);
+        assert_eq!(judge.beyond_white(&groups, 0.7), 1.0, "less than white is seen as it is");
+        // One of four samples has met it.
+        groups[3] = grey(16.0, 4.0);
+        assert_eq!(judge.beyond_white(&groups, 64.0), 1.0);
+        let linear = Certainty::new(None, None, false, 0.01, factor(0.95));
+        assert_eq!(linear.beyond_white(&[grey(0.25, 4.0); GROUPS], 64.0), 1.0, "contrast says so itself");
     }
 
     #[test]

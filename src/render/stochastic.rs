@@ -33,6 +33,8 @@ struct Pixel {
     facts: PixelFacts,
     /// Between the samples of the first round of it and of the pixels beside it.
     contrast: f32,
+    /// The brightest light among these.
+    brightest: f32,
 }
 
 /// Renders one tile; `None` when cancelled.
@@ -149,7 +151,8 @@ fn look_around(judge: &Certainty, tile: Tile, pixels: &mut [Pixel], may_end: boo
         if may_end && around.clone().all(is_calm) {
             pixel.facts.end = End::Met;
         } else {
-            pixel.contrast = judge.contrast(&around.fold(Range::NOTHING, |all, seen| all.with(seen.range)));
+            let around = around.fold(Range::NOTHING, |all, seen| all.with(seen.range));
+            (pixel.contrast, pixel.brightest) = (judge.contrast(&around), around.brightest);
         }
     }
 }
@@ -165,6 +168,7 @@ impl Pixel {
             layers: LayerSum::default(),
             facts,
             contrast: 0.0,
+            brightest: 0.0,
         }
     }
 
@@ -207,7 +211,8 @@ impl Pixel {
     /// Finds out how certain the mean is.
     fn look(&mut self, judge: &Certainty) {
         self.facts.error = judge.standard_error(&self.groups);
-        let used = judge.used(self.facts.error, self.contrast, self.facts.count);
+        let contrast = self.contrast * judge.beyond_white(&self.groups, self.brightest);
+        let used = judge.used(self.facts.error, contrast, self.facts.count);
         if used <= 1.0 {
             self.facts.end = End::Met;
             self.facts.spare = judge.spare(used, self.facts.count);
