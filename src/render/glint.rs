@@ -2,8 +2,8 @@
 //!
 //! A light without extent is seen in a smooth surface where the normal lies halfway between light and eye. Where normals
 //! turn fast that is a spot of a thousandth of a pixel, a thousand times as bright as white: it changes the pixel and is met
-//! by one ray in thousands. So highlights are widened by how far the halfway directions of a part of the pixel lie apart, which
-//! spreads their light over that part and takes nothing of it away.
+//! by one ray in thousands. So highlights are at least as wide as the halfway directions of a part of the pixel lie apart, which
+//! spreads their light over that part and takes nothing of it away; wider ones stay as they are.
 //!
 //! A. S. Kaplanyan, S. Hill, A. Patney, A. Lefohn, "Filtering Distributions of Normals for Shading Antialiasing" (2016),
 //! with a kernel of half the width of theirs; J. Amanatides, "Ray Tracing with Cones" (1984), for what mirrors do to a cone.
@@ -25,9 +25,9 @@ pub(super) fn reach(settings: &Settings) -> f32 {
     (OF_PIXEL / sample_width(settings)).max(OF_SAMPLE)
 }
 
-/// What is added to the squared width α² of a highlight on `surface`, seen along a ray whose cone grows by `spread`: twice
-/// the variance of the slopes of halfway directions along each axis, since GGX has α² where a Gaussian has that.
-pub(super) fn widening(surface: &Surface, context: &Context, spread: f32) -> f32 {
+/// The squared width α² of a highlight on `surface` at least, seen along a ray whose cone grows by `spread`: twice the
+/// variance of the slopes of halfway directions along each axis, since GGX has α² where a Gaussian has that.
+pub(super) fn least_square(surface: &Surface, context: &Context, spread: f32) -> f32 {
     let reach = context.highlight_reach;
     // The direction to the eye turns over the cone, and the halfway direction half as far, along both axes.
     let eye = spread * reach;

@@ -322,7 +322,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             matter.blur(path.scattered);
         }
         if !context.lights.is_empty() && matter.has_narrow_highlight() {
-            matter.widen_highlight(glint::widening(&surface, context, path.cone_spread));
+            matter.widen_highlight(glint::least_square(&surface, context, path.cone_spread));
         }
         if path.depth < context.depth && context.gloss.spreads(material) {
             matter.spread_by_rays();

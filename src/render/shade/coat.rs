@@ -4,7 +4,7 @@
 //! is not bent on its way through. The share that is taken off is that of the view alone, as the extension says.
 
 use super::facets::albedo;
-use super::metal_rough::{NARROW_HIGHLIGHT, above, highlight, open, squared_width, traced, widening};
+use super::metal_rough::{NARROW_HIGHLIGHT, above, highlight, least_square, open, squared_width, traced};
 use super::{Reader, Seen, Sky};
 use crate::math::Vec3;
 use crate::render::optics::{fresnel_schlick, reflect};
@@ -26,8 +26,8 @@ pub(crate) struct CoatMatter {
     /// Share of the light from below that it takes off.
     taken: f32,
     occlusion: f32,
-    /// What is added to the squared width of its highlights.
-    widening: f32,
+    /// α² of its highlights at least.
+    least_square: f32,
 }
 
 impl CoatMatter {
@@ -37,7 +37,7 @@ impl CoatMatter {
         let roughness = (coat.roughness * reader.linear(coat.roughness_map.as_ref()).y).clamp(0.0, 1.0);
         let n_v = normal.dot(view).clamp(0.0, 1.0);
         let taken = strength * fresnel(n_v);
-        (strength > 0.0).then_some(Self { strength, roughness, normal, n_v, taken, occlusion, widening: 0.0 })
+        (strength > 0.0).then_some(Self { strength, roughness, normal, n_v, taken, occlusion, least_square: 0.0 })
     }
 
     /// Share of what is below that is seen.
@@ -50,14 +50,14 @@ impl CoatMatter {
         self.roughness < NARROW_HIGHLIGHT
     }
 
-    /// Widens the highlights of lights.
-    pub(super) fn widen_highlight(&mut self, by: f32) {
-        self.widening = widening(self.roughness, by);
+    /// Widens the highlights of lights to this α².
+    pub(super) fn widen_highlight(&mut self, to: f32) {
+        self.least_square = least_square(self.roughness, to);
     }
 
     /// BRDF × N·L of a light; unit vectors, away from the surface.
     pub(super) fn lit(&self, view: Vec3, to_light: Vec3) -> f32 {
-        self.shown(view, to_light, squared_width(self.roughness) + self.widening)
+        self.shown(view, to_light, squared_width(self.roughness).max(self.least_square))
     }
 
     /// The same for facets with a squared width of α².

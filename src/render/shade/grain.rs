@@ -4,7 +4,7 @@
 //! B. Burley, "Physically Based Shading at Disney" (2012) for the distribution of facets, E. Heitz, "Understanding the
 //! Masking-Shadowing Function" (2014) for how they hide each other.
 
-use super::metal_rough::{NARROWEST_HIGHLIGHT, above, widening};
+use super::metal_rough::{NARROWEST_HIGHLIGHT, above, least_square};
 use super::{Lobe, Reader, Seen, Sky};
 use crate::math::{Vec2, Vec3};
 use crate::render::optics::reflect;
@@ -23,8 +23,8 @@ pub(crate) struct GrainMatter {
     across: Vec3,
     /// Widths of the distribution of facets along and across.
     alpha: [f32; 2],
-    /// What is added to the squares of both where lights are seen in it.
-    widening: f32,
+    /// Squares of both where lights are seen in it, at least.
+    least_square: f32,
 }
 
 impl GrainMatter {
@@ -49,7 +49,7 @@ impl GrainMatter {
     fn in_frame(along: Vec3, across: Vec3, strength: f32, roughness: f32) -> Self {
         let r = roughness.max(NARROWEST_HIGHLIGHT);
         let narrow = r * r;
-        Self { along, across, alpha: [narrow + (1.0 - narrow) * strength * strength, narrow], widening: 0.0 }
+        Self { along, across, alpha: [narrow + (1.0 - narrow) * strength * strength, narrow], least_square: 0.0 }
     }
 
     /// Perceptual roughness along it.
@@ -62,14 +62,14 @@ impl GrainMatter {
         Lobe::new([self.along, self.across], normal, self.alpha)
     }
 
-    /// Widens the highlights of lights.
-    pub(super) fn widen_highlight(&mut self, by: f32) {
-        self.widening = widening(self.alpha[1].sqrt(), by);
+    /// Widens the highlights of lights to this α².
+    pub(super) fn widen_highlight(&mut self, to: f32) {
+        self.least_square = least_square(self.alpha[1].sqrt(), to);
     }
 
     /// [`Self::highlight`], widened.
     pub(super) fn widened(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> f32 {
-        let alpha = self.alpha.map(|a| (a * a + self.widening).sqrt());
+        let alpha = self.alpha.map(|a| (a * a).max(self.least_square).sqrt());
         Self { alpha, ..self.clone() }.highlight(normal, view, to_light)
     }
 

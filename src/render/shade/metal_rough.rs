@@ -61,8 +61,8 @@ pub(crate) struct MetalRoughMatter {
     /// What is left of light that passes through the whole of it, where that is not traced.
     inside: Vec3,
     pub dispersion: f32,
-    /// What is added to the squared width of the highlights of lights.
-    widening: f32,
+    /// α² of the highlights of lights at least.
+    least_square: f32,
 }
 
 /// What a point sees of its surroundings.
@@ -120,7 +120,7 @@ impl MetalRoughMatter {
             thick: m.thick,
             inside: inside(m, reader),
             dispersion: m.dispersion,
-            widening: 0.0,
+            least_square: 0.0,
         }
     }
 
@@ -167,9 +167,9 @@ impl MetalRoughMatter {
         self.roughness < NARROW_HIGHLIGHT
     }
 
-    /// Widens the highlights of lights.
-    pub(super) fn widen_highlight(&mut self, by: f32) {
-        self.widening = widening(self.roughness, by);
+    /// Widens the highlights of lights to this α².
+    pub(super) fn widen_highlight(&mut self, to: f32) {
+        self.least_square = least_square(self.roughness, to);
     }
 
     /// Shares of f0 and f90 in what its lobe sends back.
@@ -227,7 +227,7 @@ impl MetalRoughMatter {
     /// BRDF × N·L; all unit vectors, away from the surface.
     #[inline(always)]
     pub(crate) fn lit(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
-        let a2 = squared_width(self.roughness) + self.widening;
+        let a2 = squared_width(self.roughness).max(self.least_square);
         let lobe = |half| highlight(normal, half, [normal.dot(to_light), normal.dot(view)], a2);
         self.lit_by(normal, view, to_light, lobe)
     }
@@ -410,12 +410,12 @@ pub(super) fn squared_width(roughness: f32) -> f32 {
     alpha * alpha
 }
 
-/// What may be added to that: all of `by` where it is narrow, up to what would make it wide, and less and less of it where
-/// roughness makes it wide by itself.
-pub(super) fn widening(roughness: f32, by: f32) -> f32 {
+/// What that is at least where it should be `to`: all of it where roughness makes it narrow, up to what is wide, and less and
+/// less where roughness makes it wide by itself.
+pub(super) fn least_square(roughness: f32, to: f32) -> f32 {
     /// α² of a roughness of 0.7.
     const WIDE: f32 = 0.24;
-    by.min(WIDE) * (1.0 - smoothstep(0.5 * NARROW_HIGHLIGHT, NARROW_HIGHLIGHT, roughness))
+    to.min(WIDE) * (1.0 - smoothstep(0.5 * NARROW_HIGHLIGHT, NARROW_HIGHLIGHT, roughness))
 }
 
 /// The microfacet lobe of a light without extent, before Fresnel: distribution × visibility, for a squared width α².
@@ -474,7 +474,7 @@ mod tests {
             thick: false,
             inside: Vec3::ONE,
             dispersion: 0.0,
-            widening: 0.0,
+            least_square: 0.0,
         }
     }
 

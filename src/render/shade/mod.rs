@@ -250,16 +250,16 @@ impl Matter {
         core || self.coat.as_ref().is_some_and(CoatMatter::has_narrow_highlight)
     }
 
-    /// Adds to the squared widths α² of the highlights of lights, where they are narrow.
-    pub(crate) fn widen_highlight(&mut self, by: f32) {
+    /// Widens the highlights of lights to this squared width α², where they are narrower.
+    pub(crate) fn widen_highlight(&mut self, to: f32) {
         if let Model::MetalRough(m) = &mut self.model {
-            m.widen_highlight(by);
+            m.widen_highlight(to);
         }
         if let Some(grain) = &mut self.grain {
-            grain.widen_highlight(by);
+            grain.widen_highlight(to);
         }
         if let Some(coat) = &mut self.coat {
-            coat.widen_highlight(by);
+            coat.widen_highlight(to);
         }
     }
 
