@@ -7,26 +7,32 @@
 //! that neither a format that repeats them nor a change of material makes a seam.
 
 use super::limits::{Budget, OverBudget};
+use crate::math::ear_clip::newell;
 use crate::math::{DVec3, Vec3};
-use crate::scene::{Mesh, Scene};
+use crate::scene::{Mesh, Scene, Surface};
 use std::collections::HashMap;
 use std::mem::size_of;
 
 /// Faces at one place from which on all of them stay flat there: each is compared with each other.
 const MOST_AROUND: usize = 512;
 
-/// Gives all meshes without normals smooth ones, but for edges at which faces lean by more than `angle`, radians.
+/// Gives all meshes without normals smooth ones, but for edges at which faces lean by more than `most`, radians. Those that
+/// no light changes need none.
 ///
 /// # Errors
 /// When that takes more memory than is left of `budget`.
-pub(super) fn smooth(scene: &mut Scene, angle: f64, budget: &mut Budget) -> Result<(), OverBudget> {
-    let flat = |mesh: &Mesh| mesh.normals.is_empty() && mesh.corners() > 0;
+pub(super) fn smooth(scene: &mut Scene, most: f64, budget: &mut Budget) -> Result<(), OverBudget> {
+    let materials = &scene.materials;
+    let is_unlit =
+        |mesh: &Mesh| materials.get(mesh.material as usize).is_some_and(|m| matches!(m.surface, Surface::Unlit));
+    let flat = |mesh: &Mesh| mesh.normals.is_empty() && mesh.corners() > 0 && !is_unlit(mesh);
     let corners: usize = scene.meshes.iter().filter(|&mesh| flat(mesh)).map(Mesh::corners).sum();
     // A corner, its place in a table and the vertex it may become.
     let vertex = 2 * size_of::<Vec3>() + 4 * size_of::<Vec3>() + size_of::<Corner>() + size_of::<([u32; 3], u32)>();
     budget.take(corners as u64, vertex as u64)?;
-    for group in standing_together(scene, flat) {
-        let normals = normals(&group, &scene.meshes, libm::cos(angle));
+    let groups = standing_together(scene, flat);
+    for group in groups {
+        let normals = normals(&group, &scene.meshes, libm::cos(most));
         let mut rest = normals.as_slice();
         for mesh in group {
             let mesh = &mut scene.meshes[mesh];
@@ -59,6 +65,13 @@ fn standing_together(scene: &Scene, wanted: impl Fn(&Mesh) -> bool) -> Vec<Vec<u
     groups
 }
 
+/// Angle at corner i of a polygon, radians; 0 where it has none.
+pub(super) fn angle(ring: &[DVec3], i: usize) -> f64 {
+    let n = ring.len();
+    let (a, b) = (ring[(i + n - 1) % n] - ring[i], ring[(i + 1) % n] - ring[i]);
+    libm::atan2(a.cross(b).length(), a.dot(b))
+}
+
 /// A corner of a face, as others see it that meet it.
 struct Corner {
     /// Unit normal of its face; zero without area.
@@ -72,20 +85,18 @@ struct Corner {
 /// A normal for each corner of all these meshes in turn; zero where there is none.
 fn normals(group: &[usize], meshes: &[Mesh], least_cosine: f64) -> Vec<Vec3> {
     let mut numbers: HashMap<[u32; 3], u32> = HashMap::new();
-    let mut corners = Vec::new();
+    let (mut corners, mut ring) = (Vec::new(), Vec::new());
     for mesh in group.iter().map(|&i| &meshes[i]) {
         mesh.each_face(|face| {
-            let at = |i: usize| mesh.positions[face[i % face.len()] as usize].as_dvec3();
-            let normal = (1..face.len() - 1).map(|i| (at(i) - at(0)).cross(at(i + 1) - at(0))).sum::<DVec3>();
-            let normal = normal.normalize_or_zero();
+            ring.clear();
+            ring.extend(face.iter().map(|&vertex| mesh.positions[vertex as usize].as_dvec3()));
+            let normal = newell(&ring).normalize_or_zero();
             for (i, &vertex) in face.iter().enumerate() {
-                let (to, from) = (at(i + 1) - at(i), at(i + face.len() - 1) - at(i));
-                let angle = libm::atan2(to.cross(from).length(), to.dot(from));
                 // Both zeros are one place.
                 let key = mesh.positions[vertex as usize].to_array().map(|c| (c + 0.0).to_bits());
                 #[expect(clippy::cast_possible_truncation, reason = "loading refuses 2^32 corners")]
                 let new = numbers.len() as u32;
-                corners.push(Corner { normal, angle, place: *numbers.entry(key).or_insert(new) });
+                corners.push(Corner { normal, angle: angle(&ring, i), place: *numbers.entry(key).or_insert(new) });
             }
         });
     }

@@ -29,6 +29,8 @@ const CLOSE: f64 = 1.02;
 /// How a target is reached.
 pub(super) struct Plan<P> {
     how: Stochastic,
+    /// Fewest samples of a pixel as they were asked for.
+    asked: u32,
     /// Error of the whole picture that one rendering of it leaves, as foretold.
     rmse: f64,
     /// By how much that grows with the error of a pixel: the exponent.
@@ -54,11 +56,11 @@ impl<P> Plan<P> {
 
     /// Aims at another error of a rendering than the last one's.
     fn aim(&mut self, last: f64, next: f64) {
-        /// From so many times the error on fewer rays are enough for the pixels that get fewest.
+        /// From so many times the error on fewer samples are enough for the pixels that get fewest, but not fewer than half of
+        /// what was asked for: all renderings together give them more.
         const COARSER: f64 = 1.2;
-        const FEWEST: u32 = 2;
         if next > COARSER * last {
-            self.how.min_samples = (self.how.min_samples / 2).max(FEWEST);
+            self.how.min_samples = (self.how.min_samples / 2).max(self.asked / 2).max(1);
         }
         let gain = libm::pow(next / last, 1.0 / self.slope);
         self.how.error = single((f64::from(self.how.error) * gain).clamp(1e-5, 0.5));
@@ -84,12 +86,13 @@ pub(super) fn plan<P: Observer>(
 ) -> Option<Plan<P>> {
     /// Errors of a pixel that make sense.
     const RANGE: std::ops::RangeInclusive<f64> = 1e-5..=0.5;
-    const TRIES: usize = 4;
+    const TRIES: usize = 6;
     let target = f64::from(how.target.unwrap_or(how.error));
     let wanted = OVER * std::f64::consts::SQRT_2 * target;
     let (squares, measure) = (squares(job.settings.width, job.settings.height), Measure::of(job));
     let mut plan = Plan {
         how: Stochastic { target: None, ..*how },
+        asked: how.min_samples,
         rmse: 0.0,
         slope: 1.0,
         work: 1.0,
@@ -98,7 +101,7 @@ pub(super) fn plan<P: Observer>(
         counts: Vec::new(),
     };
     let (mut error, mut before) = (3.0 * wanted, None);
-    for _ in 0..TRIES {
+    for left in (0..TRIES).rev() {
         error = error.clamp(*RANGE.start(), *RANGE.end());
         plan.how.error = single(error);
         let mut parts = Vec::new();
@@ -126,7 +129,8 @@ pub(super) fn plan<P: Observer>(
         }
         let off = plan.rmse / wanted;
         let is_at_end = off < 1.0 && error >= *RANGE.end() || off > 1.0 && error <= *RANGE.start();
-        if (0.94..1.06).contains(&off) && fewest == plan.how.min_samples || is_at_end {
+        // The last try is what is rendered.
+        if (0.94..1.06).contains(&off) && fewest == plan.how.min_samples || is_at_end || left == 0 {
             break;
         }
         plan.how.min_samples = fewest;

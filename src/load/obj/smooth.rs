@@ -10,6 +10,7 @@
 use super::pairs::Pairs;
 use super::soup::{NONE, Soup};
 use super::statements::Face;
+use crate::load::smooth::angle;
 use crate::math::ear_clip::newell;
 use crate::math::{DVec3, Vec3};
 
@@ -56,13 +57,6 @@ pub(super) fn smooth(soup: &Soup, positions: &[Vec3], faces: &[(Face, u32)]) -> 
         }
     }
     Smooth { normals, of_corner }
-}
-
-/// Angle at corner i of a polygon, radians; 0 where it has none.
-fn angle(ring: &[DVec3], i: usize) -> f64 {
-    let n = ring.len();
-    let (a, b) = (ring[(i + n - 1) % n] - ring[i], ring[(i + 1) % n] - ring[i]);
-    libm::atan2(a.cross(b).length(), a.dot(b))
 }
 
 #[cfg(test)]
