@@ -110,7 +110,6 @@ fn apply(map: &mut Map, option: &[u8], values: &[&[u8]]) {
         b"-mm" if (or(0, 0.0), or(1, 1.0)) != (0.0, 1.0) => map.base_gain = Some((or(0, 0.0), or(1, 1.0))),
         b"-clamp" => map.clamp = text == b"on",
         b"-cc" if text == b"on" => map.ignored.push("-cc on".into()),
-        b"-type" => map.ignored.push(format!("-type {}", decode_name(&text))),
         b"-imfchan" => {
             map.channel = match text.as_slice() {
                 b"r" => Some(Channel::Red),
@@ -121,7 +120,7 @@ fn apply(map: &mut Map, option: &[u8], values: &[&[u8]]) {
                 _ => None,
             }
         }
-        // Blending, sharpening and resolution hints are up to the renderer.
+        // Blending, sharpening and resolution hints are up to the renderer; types are those of reflection maps.
         _ => {}
     }
 }
@@ -182,7 +181,7 @@ mod tests {
 
     #[test]
     fn options_that_cannot_be_drawn_are_remembered() {
-        assert_eq!(of("-type sphere -cc on -blendu off -texres 512 a.png").ignored, ["-type sphere", "-cc on"]);
+        assert_eq!(of("-type sphere -cc on -blendu off -texres 512 a.png").ignored, ["-cc on"]);
         assert_eq!(of("-t 0.1 0.2 0.3 a.png").ignored, ["-t"]);
         assert!(of("-t 0 0 0 a.png").ignored.is_empty());
     }

@@ -35,6 +35,8 @@ pub(super) struct Mtl {
     pub aniso: Option<f64>,
     pub anisor: Option<f64>,
     pub maps: Vec<(Slot, Map)>,
+    /// Line of its reflection map.
+    pub refl: Option<u32>,
 }
 
 /// What a map changes.
@@ -48,6 +50,7 @@ pub(super) enum Slot {
     Dissolve,
     Transparency,
     Bump,
+    Displacement,
     Normal,
     Roughness,
     Metallic,
@@ -63,7 +66,7 @@ pub(super) enum Slot {
 }
 
 /// Map statements, in lower case.
-const MAPS: [(&[u8], Slot); 23] = [
+const MAPS: [(&[u8], Slot); 25] = [
     (b"map_ka", Slot::Ambient),
     (b"map_kd", Slot::Diffuse),
     (b"map_ks", Slot::Specular),
@@ -74,6 +77,8 @@ const MAPS: [(&[u8], Slot); 23] = [
     (b"map_tr", Slot::Transparency),
     (b"map_bump", Slot::Bump),
     (b"bump", Slot::Bump),
+    (b"disp", Slot::Displacement),
+    (b"map_disp", Slot::Displacement),
     (b"norm", Slot::Normal),
     (b"map_norm", Slot::Normal),
     (b"map_normal", Slot::Normal),
@@ -89,22 +94,13 @@ const MAPS: [(&[u8], Slot); 23] = [
     (b"map_anisor", Slot::GrainTurn),
 ];
 
-/// Maps that are known and not drawn, and what is seen instead.
-///
-/// The text gives a displacement no unit, and what is proven of hits is proven of the faces that a file has. A reflection
-/// map is a picture of surroundings for one material alone, in which nothing of the scene stands; here mirrors see the
-/// scene, and `--env` is around all of it. What a decal shows where is said by no picture, but by procedures of one
-/// program.
-const UNSUPPORTED: [(&[u8], &str, &str); 5] = [
-    (b"disp", "displacement (disp)", DISPLACED),
-    (b"map_disp", "displacement (map_disp)", DISPLACED),
-    (b"decal", "a decal (decal)", "paint it into map_Kd"),
-    (b"refl", "a reflection map (refl)", REFLECTED),
-    (b"map_refl", "a reflection map (map_refl)", REFLECTED),
-];
+/// What is said of a decal: what it shows where is said by no picture, but by procedures of one program.
+const DECAL: (&str, &str) = ("a decal (decal) is not drawn", "paint it into map_Kd");
 
-const DISPLACED: &str = "faces stay where the file has them; displace them before export, or name the map as bump";
-const REFLECTED: &str = "mirrors see the scene; --env puts a picture around it";
+/// What is said of a reflection map: a picture of surroundings for one material alone, in which nothing of the scene
+/// stands. Here mirrors see the scene, and `--env` is around all of it.
+const REFLECTED: (&str, &str) =
+    ("a reflection map (refl) is not drawn", "mirrors see the scene; --env puts a picture around it");
 
 /// Statements that change nothing in our pictures.
 const SILENT: [&[u8]; 4] = [b"sharpness", b"map_aat", b"km", b"ke_strength"];
@@ -113,6 +109,11 @@ impl Mtl {
     /// The last map of a slot.
     pub(super) fn map(&self, slot: Slot) -> Option<&Map> {
         self.maps.iter().rev().find(|(s, _)| *s == slot).map(|(_, map)| map)
+    }
+
+    /// Whether its specular colour, which reflections are multiplied by, is not black.
+    fn is_shiny(&self) -> bool {
+        self.ks.is_some_and(|ks| ks.iter().any(|&c| c > 0.0)) || self.map(Slot::Specular).is_some()
     }
 
     /// Whether any field or map of physically based materials is there. A normal map alone says nothing about
@@ -151,6 +152,12 @@ pub(super) fn parse(text: &[u8], file: &Path, warnings: &mut Warnings) -> Vec<Mt
             && let Some(material) = out.last_mut()
         {
             parser.field(material, &word.to_ascii_lowercase(), rest);
+        }
+    }
+    for material in &out {
+        if let Some(line) = material.refl.filter(|_| material.is_shiny()) {
+            parser.line = line;
+            parser.not_drawn(REFLECTED);
         }
     }
     out
@@ -204,15 +211,19 @@ impl Parser<'_> {
                 }
                 None => self.warn("mtl-map-without-file", format!("'{}' names no file", decode_name(word))),
             }
-        } else if let Some((_, what, instead)) = UNSUPPORTED.iter().find(|(name, ..)| *name == word) {
-            if !zero {
-                let text = format!("{what} is not drawn");
-                let warning = Diagnostic::new("mtl-unsupported", self.file, self.line.to_string(), text);
-                self.warnings.push(warning.remedy(*instead));
-            }
-        } else {
-            self.warn("mtl-unknown-statement", format!("'{}' is not an MTL statement", shorten(&decode_name(word))));
+            return;
         }
+        match word {
+            b"refl" | b"map_refl" | b"decal" if zero => {}
+            b"refl" | b"map_refl" => m.refl = Some(self.line),
+            b"decal" => self.not_drawn(DECAL),
+            _ => self.warn("mtl-unknown-statement", format!("'{}' is not an MTL statement", shorten(&decode_name(word)))),
+        }
+    }
+
+    fn not_drawn(&mut self, (what, instead): (&'static str, &'static str)) {
+        let warning = Diagnostic::new("mtl-unsupported", self.file, self.line.to_string(), what.to_string());
+        self.warnings.push(warning.remedy(instead));
     }
 
     /// `r [g b]`, `xyz x [y z]` or `spectral file [factor]`.
@@ -287,7 +298,7 @@ mod tests {
     #[test]
     fn what_cannot_be_read_or_drawn_is_a_counted_warning_and_nothing_else() {
         let text = "Kd 9 9 9\nnewmtl a\nKd spectral x.rfl 1\nKs xyz 0.9505 1 1.089\nNs x\nd -halo 0.5\nmap_Kd\nfoo 1\nfoo 2\n\
-                    refl -type sphere a.png\nmap_Ps 0\ndisp 0\ndisp a.png\nmap_Ks -type cube_top a.png";
+                    refl -type sphere a.png\nmap_Ps 0\ndisp 0\ndecal a.png\nmap_Ks -cc on a.png";
         let (materials, warnings) = of(text);
         let m = &materials[0];
         assert_eq!((m.kd, m.ns, m.d, m.is_physical()), (None, None, Some(0.5), false));
@@ -307,6 +318,12 @@ mod tests {
                 ("mtl-map-option", 1),
             ]
         );
+    }
+
+    #[test]
+    fn a_reflection_map_is_missed_only_where_something_reflects() {
+        let codes = |ks: &str| of(&format!("newmtl a\nrefl -type sphere a.png\n{ks}")).1.len();
+        assert_eq!([codes(""), codes("Ks 0 0 0"), codes("Ks 0 .5 0"), codes("map_Ks a.png")], [0, 0, 1, 1]);
     }
 
     #[test]

@@ -144,6 +144,15 @@ fn a_normal_map_written_as_bump_map_is_known_by_its_texels() {
 }
 
 #[test]
+fn a_displacement_is_drawn_as_bump_unless_there_is_one_and_it_is_said() {
+    let (loaded, m) = guess("newmtl a\nKd 1 1 1\ndisp -bm 2 b.png", &[("b.png", [128, 128, 255, 255])]);
+    assert!(m.bump_map.is_some() && m.normal_map.is_none(), "heights are never normals");
+    assert_eq!((m.bump_scale, codes(&loaded)), (2.0 / 64.0, vec!["mtl-displacement-as-bump", "mtl-bump-height"]));
+    let (loaded, _) = guess("newmtl a\nKd 1 1 1\nbump b.png\nmap_disp d.png", &[("b.png", [9; 4]), ("d.png", [9; 4])]);
+    assert_eq!(codes(&loaded), ["mtl-bump-height"]);
+}
+
+#[test]
 fn roughness_and_metal_maps_share_one_texture() {
     let mtl = "newmtl a\nKd 1 1 1\nPr 0\nPm 1\nmap_Pr r.png\nmap_Pm m.png\nnorm n.png";
     let (loaded, m) = guess(mtl, &[("r.png", [50; 4]), ("m.png", [70; 4]), ("n.png", [128, 128, 255, 255])]);

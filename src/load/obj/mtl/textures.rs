@@ -249,11 +249,20 @@ impl Mapper<'_> {
             material.normal_scale = strength(&map);
             material.normal_map = Some(self.textures.texture(Take::Whole(picture), &map));
         }
-        let Some((map, picture)) = self.picture(Slot::Bump) else { return };
+        // Faces stay where the file has them: what is proven of hits is proven of those.
+        let displaced = self.picture(Slot::Bump).is_none();
+        let slot = if displaced { Slot::Displacement } else { Slot::Bump };
+        let Some((map, picture)) = self.picture(slot) else { return };
         let map = map.clone();
         self.options(&map);
         let guessing = self.mode == MtlMode::Guess;
-        if guessing && material.normal_map.is_none() && self.textures.pictures.is_normal_map(picture) {
+        if displaced {
+            let text = "a displacement map (disp) is drawn as a bump map, which moves no faces";
+            let line = self.mtl.line.to_string();
+            let warning = Diagnostic::new("mtl-displacement-as-bump", self.library.file, line, text);
+            self.warnings.push(warning.remedy("displace them before export where that shows"));
+        }
+        if guessing && !displaced && material.normal_map.is_none() && self.textures.pictures.is_normal_map(picture) {
             self.guess("mtl-normal-as-bump", "a bump map is a normal map by its texels and used as one");
             material.normal_scale = strength(&map);
             material.normal_map = Some(self.textures.texture(Take::Whole(picture), &map));
