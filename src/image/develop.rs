@@ -138,7 +138,7 @@ impl<'a> Developer<'a> {
     }
 
     /// The same for pixels side by side, each channel in a row of its own.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn coded_lanes<const N: usize>(&self, pixels: &mut [[f32; N]; 4]) {
         self.develop(pixels);
         let [r, g, b, coverage] = pixels;

@@ -14,10 +14,14 @@ use super::ErrorSpace;
 use super::frame::Sum;
 use crate::image::{Developer, Output};
 use crate::math::Vec3;
+use crate::math::simd::{Kernel, Level, Simd};
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 /// Groups of a pixel's samples.
 pub(super) const GROUPS: usize = 8;
+
+/// Half of them.
+const HALF: usize = GROUPS / 2;
 
 /// The judge of all pixels of a picture.
 pub(super) struct Certainty<'a> {
@@ -32,6 +36,7 @@ pub(super) struct Certainty<'a> {
     error: f32,
     /// How many standard errors that must be.
     factor: f32,
+    level: Level,
 }
 
 /// How the mean of a pixel is to be written; what is behind it is in [`Certainty`].
@@ -52,33 +57,13 @@ impl<'a> Certainty<'a> {
     ) -> Self {
         let developer = output.map(Developer::new);
         let gain = output.map_or(1.0, |output| libm::exp2f(output.exposure));
-        Self { developer, background, transparent, gain, error, factor }
+        Self { developer, background, transparent, gain, error, factor, level: Level::best() }
     }
 
     /// The numbers of the written picture for each of these sums, RGB and alpha, the colour premultiplied: a row for each
     /// channel.
     fn written<const N: usize>(&self, sums: &[Sum; N]) -> [[f32; N]; 4] {
-        let mut rows = [[0.0; N]; 4];
-        for (i, sum) in sums.iter().enumerate() {
-            let pixel = sum.resolve(self.background);
-            for c in 0..4 {
-                rows[c][i] = pixel[c];
-            }
-        }
-        match (&self.developer, self.background) {
-            (Some(developer), _) => developer.coded_lanes(&mut rows),
-            (None, None) => {}
-            (None, Some(behind)) => {
-                let [r, g, b, coverage] = &mut rows;
-                for (channel, behind) in [r, g, b].into_iter().zip(behind.to_array()) {
-                    for i in 0..N {
-                        channel[i] += behind * (1.0 - coverage[i]);
-                    }
-                }
-                *coverage = [1.0; N];
-            }
-        }
-        rows
+        self.level.run(Written { judge: self, sums })
     }
 
     /// What groups of samples of a pixel show, [`GROUPS`] at most and one at least.
@@ -88,14 +73,24 @@ impl<'a> Certainty<'a> {
             let range = Range { least: color, most: color, brightest: self.brightest(groups) };
             return Seen { color, range, error: 0.0 };
         }
-        let rows = self.written(&std::array::from_fn::<Sum, GROUPS, _>(|k| *groups.get(k).unwrap_or(&groups[0])));
+        match groups.len() {
+            ..=HALF => self.see_beside::<HALF, GROUPS>(groups),
+            _ => self.see_beside::<GROUPS, { 2 * GROUPS }>(groups),
+        }
+    }
+
+    /// The same for at most `N` groups, written beside what is left without each of them.
+    fn see_beside<const N: usize, const LANES: usize>(&self, groups: &[Sum]) -> Seen {
+        let left = left_out(groups);
+        let lane = |k: usize| if k < N { *groups.get(k).unwrap_or(&groups[0]) } else { left(k - N) };
+        let rows = self.written(&std::array::from_fn::<Sum, LANES, _>(lane));
         let range = Range {
-            least: rows.map(|row| row.into_iter().fold(f32::INFINITY, f32::min)),
-            most: rows.map(|row| row.into_iter().fold(f32::NEG_INFINITY, f32::max)),
+            least: rows.map(|row| row[..N].iter().copied().fold(f32::INFINITY, f32::min)),
+            most: rows.map(|row| row[..N].iter().copied().fold(f32::NEG_INFINITY, f32::max)),
             brightest: self.brightest(groups),
         };
-        let color = self.written(&[total(groups)]).map(|[c]| c);
-        Seen { color, range, error: self.standard_error(groups) }
+        let left = rows.each_ref().map(|row| &row[N..N + groups.len()]);
+        Seen { color: left.map(mean), range, error: self.spread(left) }
     }
 
     /// Whether samples in this range agree within the error that is allowed: nothing is seen in the pixel that could be missed.
@@ -140,22 +135,25 @@ impl<'a> Certainty<'a> {
 
     /// Standard error of a pixel, the root of the mean over its channels, from groups of equally many samples, [`GROUPS`]
     /// at most and one at least.
-    #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "a handful of groups")]
     pub(super) fn standard_error(&self, groups: &[Sum]) -> f32 {
         if are_equal(groups) {
             return 0.0;
         }
-        let all = total(groups);
-        let without = |k: usize| groups.get(k).map_or(all, |group| all.plus(*group, -1.0));
-        let rows = self.written(&std::array::from_fn::<Sum, GROUPS, _>(without));
-        let n = groups.len() as f64;
-        let squares = |row: &[f32; GROUPS]| {
-            let left = || row[..groups.len()].iter().copied().map(f64::from);
+        let rows = self.written(&std::array::from_fn::<Sum, GROUPS, _>(left_out(groups)));
+        self.spread(rows.each_ref().map(|row| &row[..groups.len()]))
+    }
+
+    /// Standard error of what is written for all groups, from what is written without each of them.
+    #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "a handful of groups")]
+    fn spread(&self, rows: [&[f32]; 4]) -> f32 {
+        let n = rows[0].len() as f64;
+        let squares = |row: &[f32]| {
+            let left = || row.iter().copied().map(f64::from);
             let mean = left().sum::<f64>() / n;
             left().map(|v| (v - mean) * (v - mean)).sum::<f64>() * (n - 1.0) / n
         };
         let channels = self.channels();
-        (rows[..channels].iter().map(squares).sum::<f64>() / channels as f64).sqrt() as f32
+        (rows[..channels].iter().map(|row| squares(row)).sum::<f64>() / channels as f64).sqrt() as f32
     }
 
     /// What part of the error that is allowed a pixel with this standard error uses, when around it there is such a
@@ -182,6 +180,54 @@ impl<'a> Certainty<'a> {
     }
 }
 
+/// What is written for sums of samples side by side.
+struct Written<'a, 'j, const N: usize> {
+    judge: &'a Certainty<'j>,
+    sums: &'a [Sum; N],
+}
+
+impl<const N: usize> Kernel for Written<'_, '_, N> {
+    type Output = [[f32; N]; 4];
+
+    // The lanes are plain arrays: what the token stands for is only what the compiler may use for them.
+    #[inline(always)]
+    fn run<S: Simd>(self, _simd: S) -> Self::Output {
+        let Self { judge, sums } = self;
+        let mut rows = [[0.0; N]; 4];
+        for (i, sum) in sums.iter().enumerate() {
+            let pixel = sum.resolve(judge.background);
+            for c in 0..4 {
+                rows[c][i] = pixel[c];
+            }
+        }
+        match (&judge.developer, judge.background) {
+            (Some(developer), _) => developer.coded_lanes(&mut rows),
+            (None, None) => {}
+            (None, Some(behind)) => {
+                let [r, g, b, coverage] = &mut rows;
+                for (channel, behind) in [r, g, b].into_iter().zip(behind.to_array()) {
+                    for i in 0..N {
+                        channel[i] += behind * (1.0 - coverage[i]);
+                    }
+                }
+                *coverage = [1.0; N];
+            }
+        }
+        rows
+    }
+}
+
+/// All samples but those of the `k`th group; all of them where there is no such group.
+fn left_out(groups: &[Sum]) -> impl Fn(usize) -> Sum {
+    let all = total(groups);
+    move |k| groups.get(k).map_or(all, |group| all.plus(*group, -1.0))
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a handful of groups")]
+fn mean(of: &[f32]) -> f32 {
+    of.iter().sum::<f32>() / of.len() as f32
+}
+
 /// All samples of groups together.
 fn total(groups: &[Sum]) -> Sum {
     groups.iter().fold(Sum::default(), |all, group| all.plus(*group, 1.0))
@@ -194,7 +240,7 @@ fn are_equal(groups: &[Sum]) -> bool {
 /// What the samples of a pixel show, in the numbers of the written picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
-    /// Of their mean.
+    /// Of their mean, to within what bends the tone curve.
     pub color: [f32; 4],
     /// What they lie between.
     pub range: Range,

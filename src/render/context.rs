@@ -146,7 +146,8 @@ impl<'a> Context<'a> {
 /// Bounces that a scene needs: none without mirrors or glass, a few between mirrors, more where every object is entered
 /// and left.
 fn auto_depth(features: &Features, rough_ones_mirror: bool) -> u32 {
-    const GLASS: u32 = 12;
+    /// Light that is reflected inside of glass as a whole loses nothing: paths are long, but few.
+    const GLASS: u32 = 64;
     const MIRRORS: u32 = 5;
     if features.has(Feature::Refraction) || features.has(Feature::ThinTransmission) {
         GLASS
@@ -184,7 +185,7 @@ mod tests {
         let glass = MetalRough { transmission: 0.5, ..MetalRough::default() };
         assert_eq!(auto_depth(&Features::of(&scene_of(Surface::Phong(matt))), false), 0);
         assert_eq!(auto_depth(&Features::of(&scene_of(Surface::Phong(mirror))), false), 5);
-        assert_eq!(auto_depth(&Features::of(&scene_of(Surface::MetalRough(glass))), false), 12);
+        assert_eq!(auto_depth(&Features::of(&scene_of(Surface::MetalRough(glass))), false), 64);
         assert_eq!(auto_depth(&Features::default(), false), 0);
     }
 

@@ -99,6 +99,7 @@ impl Sum {
     }
 
     /// This and another, so many times.
+    #[inline(always)]
     pub(super) fn plus(self, other: Self, times: f32) -> Self {
         Self {
             radiance: self.radiance + other.radiance * times,
@@ -112,6 +113,7 @@ impl Sum {
     /// Alpha is one minus the share of the background that shows through. Coloured glass lets it through by channels; there
     /// is one alpha, so before a known background colour the least channel is left to the image writer and what the others
     /// show more is added here, and without one their mean is left to it.
+    #[inline(always)]
     pub(super) fn resolve(&self, background: Option<Vec3>) -> [f32; 4] {
         let share = 1.0 / self.weight.max(f32::MIN_POSITIVE);
         let mut color = self.radiance * share;

@@ -63,6 +63,7 @@ const fn tables() -> [[[u32; 256]; 4]; DIMENSIONS] {
 }
 
 /// The `index`th number of a dimension's sequence, as a fraction of 2³².
+#[inline]
 fn sobol(index: u32, dimension: usize) -> u32 {
     let [a, b, c, d] = index.to_le_bytes();
     let table = &TABLES[dimension];
@@ -70,6 +71,7 @@ fn sobol(index: u32, dimension: usize) -> u32 {
 }
 
 /// Turns the bits of a fraction, each by a choice that depends on the bits above it.
+#[inline]
 fn scramble(x: u32, key: u32) -> u32 {
     let mut x = x.reverse_bits();
     x ^= x.wrapping_mul(0x3d20_adea);
@@ -93,16 +95,34 @@ pub(super) fn mix(a: u32, b: u32) -> u32 {
     stir(stir(a.wrapping_add(0x9e37_79b9)).wrapping_add(b).wrapping_mul(0x9e37_79b1))
 }
 
-/// The `index`th point of the sequence of a key, each coordinate 0 ≤ x < 1; the first 2ᵏ points of every key lie in
-/// different cells of each division of the first two axes into 2ᵏ.
-pub(super) fn point<const N: usize>(index: u32, key: u32) -> [f64; N] {
-    // A permutation that keeps aligned runs of 2ᵏ together.
-    let index = scramble(index, key);
-    std::array::from_fn(|d| {
+/// The points of a key.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Points<const N: usize> {
+    key: u32,
+    /// What scrambles each axis.
+    axes: [u32; N],
+}
+
+impl<const N: usize> Points<N> {
+    #[inline]
+    pub(super) fn of(key: u32) -> Self {
         #[expect(clippy::cast_possible_truncation, reason = "a small number")]
-        let bits = scramble(sobol(index, d), mix(key, d as u32 + 1));
-        f64::from(bits) / 4_294_967_296.0
-    })
+        Self { key, axes: std::array::from_fn(|d| mix(key, d as u32 + 1)) }
+    }
+
+    /// The `index`th point of the sequence, each coordinate 0 ≤ x < 1; the first 2ᵏ points of every key lie in different
+    /// cells of each division of the first two axes into 2ᵏ.
+    #[inline]
+    pub(super) fn at(&self, index: u32) -> [f64; N] {
+        // A permutation that keeps aligned runs of 2ᵏ together.
+        let index = scramble(index, self.key);
+        std::array::from_fn(|d| f64::from(scramble(sobol(index, d), self.axes[d])) / 4_294_967_296.0)
+    }
+}
+
+/// The `index`th of a key's [`Points`].
+pub(super) fn point<const N: usize>(index: u32, key: u32) -> [f64; N] {
+    Points::of(key).at(index)
 }
 
 #[cfg(test)]

@@ -27,6 +27,8 @@ struct Pixel {
     y: u32,
     /// For all of its numbers.
     key: u32,
+    /// Where its samples lie.
+    places: sobol::Points<2>,
     /// Samples in the order of the sequence, the same number in each.
     groups: [Sum; GROUPS],
     layers: LayerSum,
@@ -136,8 +138,13 @@ fn look_around(judge: &Certainty, tile: Tile, pixels: &mut [Pixel], may_end: boo
     let (width, height) = (tile.x1 - tile.x0, tile.y1 - tile.y0);
     let index = |x: u32, y: u32| ((y - tile.y0) * width + x - tile.x0) as usize;
     let mut seen = vec![Seen::NOTHING; (width * height) as usize];
+    // Large parts of a picture are one colour.
+    let mut last = ([Sum::default(); GROUPS], Seen::NOTHING);
     for pixel in pixels.iter_mut() {
-        let mine = judge.see(pixel.taken());
+        if last.0 != pixel.groups {
+            last = (pixel.groups, judge.see(pixel.taken()));
+        }
+        let mine = last.1;
         pixel.facts.error = mine.error;
         seen[index(pixel.x, pixel.y)] = mine;
     }
@@ -160,10 +167,12 @@ fn look_around(judge: &Certainty, tile: Tile, pixels: &mut [Pixel], may_end: boo
 impl Pixel {
     fn new(seed: u64, (x, y): (u32, u32)) -> Self {
         let facts = PixelFacts { count: 0, spare: 0, error: 0.0, end: End::Ceiling };
+        let key = pixel_key(seed, (x, y));
         Self {
             x,
             y,
-            key: pixel_key(seed, (x, y)),
+            key,
+            places: sobol::Points::of(key),
             groups: Default::default(),
             layers: LayerSum::default(),
             facts,
@@ -183,7 +192,7 @@ impl Pixel {
         let [x, y, u, v] = if has_lens {
             sobol::point(i, self.key)
         } else {
-            let [x, y] = sobol::point(i, self.key);
+            let [x, y] = self.places.at(i);
             [x, y, 0.5, 0.5]
         };
         let (x, y) = (f64::from(self.x) + how.filter.place(x), f64::from(self.y) + how.filter.place(y));

@@ -16,25 +16,16 @@ pub struct Advice {
     pub why: String,
 }
 
-/// Root mean square error of a picture that is good enough for a purpose, codes 0..=1: about five, two and a half and one
-/// of 255 steps.
-pub const fn good_enough(purpose: Quality) -> f64 {
-    match purpose {
-        Quality::Draft => 0.02,
-        Quality::Normal => 0.01,
-        Quality::Final => 0.004,
-    }
-}
-
 pub(super) fn advice(study: &Study) -> Vec<Advice> {
     Quality::ALL.iter().map(|&purpose| advise(study, purpose)).collect()
 }
 
 /// The program's own choice for a purpose, where nothing that is as good takes much less time.
 fn advise(study: &Study, purpose: Quality) -> Advice {
-    /// Part of the time that another setting must save to be worth its flags: differences below this are noise of the clock.
-    const WORTH: f64 = 0.2;
-    let goal = good_enough(purpose);
+    /// Part of the time that another setting must save to be worth its flags: differences below this are those of the clock,
+    /// and of the next view of the model, which a setting that was found for this one knows nothing of.
+    const WORTH: f64 = 0.35;
+    let goal = purpose.good_enough();
     let time = |i: usize| study.rows[i].cpu.median();
     let good: Vec<usize> = (0..study.rows.len()).filter(|&i| study.rows[i].error.rmse <= goal).collect();
     let fastest = good.iter().copied().min_by(|&a, &b| time(a).total_cmp(&time(b)));

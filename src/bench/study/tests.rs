@@ -103,7 +103,7 @@ fn every_report_has_every_row_and_says_what_to_use() {
     for advice in &advice {
         assert!(!advice.why.is_empty());
         let chosen = advice.row.map(|i| study.rows[i].error.rmse);
-        assert!(chosen.is_none_or(|rmse| rmse <= advice::good_enough(advice.purpose)));
+        assert!(chosen.is_none_or(|rmse| rmse <= advice.purpose.good_enough()));
     }
     let lines: String = study.rows.iter().map(text::row).collect();
     assert_eq!(lines.lines().count(), 3);

@@ -314,8 +314,8 @@ mod tests {
                 ("mtl-map-without-file", 1),
                 ("mtl-unknown-statement", 2),
                 ("mtl-unsupported", 1),
-                ("mtl-unsupported", 1),
                 ("mtl-map-option", 1),
+                ("mtl-unsupported", 1),
             ]
         );
     }
