@@ -201,7 +201,7 @@ pub(super) struct RenderArgs {
     #[command(flatten)]
     pub sampling: SamplingArgs,
     /// Bounces after the eye ray [default: what the scene needs]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=64), help_heading = "Quality")]
+    #[arg(long, value_name = "N", value_parser = parse::depth(), help_heading = "Quality")]
     pub depth: Option<u32>,
     /// Weight below which a branch of the ray tree ends [default: 0.001953125]
     #[arg(long, value_name = "WEIGHT", value_parser = parse::cutoff, help_heading = "Quality", hide_short_help = true)]
@@ -411,7 +411,7 @@ pub(super) struct ExplainArgs {
     #[arg(long, value_name = "WxH", value_parser = parse::size, default_value = "160x120", help_heading = "Picture")]
     pub size: (u32, u32),
     /// Bounces after the eye ray [default: what the scene needs]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=64), help_heading = "Picture")]
+    #[arg(long, value_name = "N", value_parser = parse::depth(), help_heading = "Picture")]
     pub depth: Option<u32>,
     /// From where it is seen.
     #[command(flatten)]
@@ -496,7 +496,7 @@ pub(super) struct TraceArgs {
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Ray")]
     pub sample: u32,
     /// Bounces after the eye ray [default: what the scene needs]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=64), help_heading = "Ray")]
+    #[arg(long, value_name = "N", value_parser = parse::depth(), help_heading = "Ray")]
     pub depth: Option<u32>,
     /// Weight below which a branch of the ray tree ends [default: 0.001953125]
     #[arg(long, value_name = "WEIGHT", value_parser = parse::cutoff, help_heading = "Ray")]

@@ -7,7 +7,7 @@ use crate::image::ToneMap;
 use crate::math::Vec3;
 use crate::render::{Cost, Filter, Instancing, Quality, Split, UnknownCost};
 use crate::scene::framing::NamedView;
-use crate::scene::{Background, Environment};
+use crate::scene::{Background, Environment, MAX_DEPTH};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::fmt;
 use std::path::PathBuf;
@@ -187,6 +187,11 @@ pub(super) fn focus(text: &str) -> Result<Focus, String> {
 /// One of [`Quality::ALL`].
 pub(super) fn quality() -> impl TypedValueParser<Value = Quality> {
     PossibleValuesParser::new(Quality::ALL.iter().map(|q| q.name())).try_map(|name: String| name.parse::<Quality>())
+}
+
+/// Bounces after the eye ray.
+pub(super) fn depth() -> impl TypedValueParser<Value = u32> {
+    clap::value_parser!(u32).range(0..=i64::from(MAX_DEPTH))
 }
 
 /// One of [`Filter::ALL`].

@@ -100,7 +100,7 @@ impl<'a> Context<'a> {
         let features = Features::of(scene);
         let together = samples_together(settings);
         let gloss = Gloss::new(settings.gloss_rays).shared_by(together);
-        let depth = settings.depth.unwrap_or_else(|| auto_depth(&features, gloss.all));
+        let depth = settings.depth.unwrap_or_else(|| auto_depth(&features, gloss.all, settings.cutoff));
         let sky = Arc::new(Sky::new(scene));
         let env_rays = settings.env_rays.unwrap_or(if sky.is_map() { ENV_RAYS } else { 0 });
         // Each way of drawing a direction to a panorama needs a ray in each of both halves.
@@ -145,12 +145,16 @@ impl<'a> Context<'a> {
 
 /// Bounces that a scene needs: none without mirrors or glass, a few between mirrors, more where every object is entered
 /// and left.
-fn auto_depth(features: &Features, rough_ones_mirror: bool) -> u32 {
-    /// Light that is reflected inside of glass as a whole loses nothing: paths are long, but few.
-    const GLASS: u32 = 64;
+fn auto_depth(features: &Features, rough_ones_mirror: bool, cutoff: f32) -> u32 {
+    /// Light that is reflected inside of glass as a whole loses nothing: in a thin wall paths are long, but they are few.
+    const GLASS: u32 = 256;
+    /// As all branches of a path together weigh no more than it, 1 ÷ cutoff of them go on at most; below this cutoff that
+    /// no longer holds their number down, which may double with each bounce.
+    const BRANCHES_END: f32 = 1e-6;
+    const BRANCHING_GLASS: u32 = 12;
     const MIRRORS: u32 = 5;
     if features.has(Feature::Refraction) || features.has(Feature::ThinTransmission) {
-        GLASS
+        if cutoff < BRANCHES_END { BRANCHING_GLASS } else { GLASS }
     } else if features.has(Feature::Mirrors) || rough_ones_mirror && features.has(Feature::MetalRough) {
         MIRRORS
     } else {
@@ -183,10 +187,12 @@ mod tests {
         let matt = Phong::default();
         let mirror = Phong { mirror: Vec3::splat(0.5), ..Phong::default() };
         let glass = MetalRough { transmission: 0.5, ..MetalRough::default() };
-        assert_eq!(auto_depth(&Features::of(&scene_of(Surface::Phong(matt))), false), 0);
-        assert_eq!(auto_depth(&Features::of(&scene_of(Surface::Phong(mirror))), false), 5);
-        assert_eq!(auto_depth(&Features::of(&scene_of(Surface::MetalRough(glass))), false), 64);
-        assert_eq!(auto_depth(&Features::default(), false), 0);
+        assert_eq!(auto_depth(&Features::of(&scene_of(Surface::Phong(matt))), false, 0.002), 0);
+        assert_eq!(auto_depth(&Features::of(&scene_of(Surface::Phong(mirror))), false, 0.002), 5);
+        let glass = Features::of(&scene_of(Surface::MetalRough(glass)));
+        assert_eq!(auto_depth(&glass, false, 0.002), 256);
+        assert_eq!(auto_depth(&Features::default(), false, 0.002), 0);
+        assert_eq!(auto_depth(&glass, false, 0.0), 12, "paths that nothing ends double with each bounce");
     }
 
     #[test]

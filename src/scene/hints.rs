@@ -1,5 +1,8 @@
 //! Render settings that a scene file brings along; the command line overrides each of them.
 
+/// Most bounces that may be asked for; the wall of a wine glass leads light along hundreds of total reflections.
+pub const MAX_DEPTH: u32 = 1024;
+
 /// What a scene file asks for; `None`: it does not say.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RenderHints {

@@ -161,7 +161,7 @@ fn of(knob: Knob, subject: &Subject) -> Vec<Setting> {
         }
         Knob::Depth => {
             let with = |n: u32| setting(format!("--depth {n}"), Settings { depth: Some(n), ..usual.clone() });
-            [0, 1, 2, 4, 8, 16].map(with).into()
+            [0, 1, 2, 4, 8, 16, 32].map(with).into()
         }
         Knob::Cutoff => {
             let with = |cutoff: f32| setting(format!("--cutoff {cutoff}"), Settings { cutoff, ..usual.clone() });

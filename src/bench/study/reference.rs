@@ -4,6 +4,7 @@ use super::{Plan, Subject};
 use crate::image::look::developed;
 use crate::image::{Picture, srgb};
 use crate::render::{Sampling, Settings, Stochastic, render};
+use crate::scene::MAX_DEPTH;
 
 /// Renderings with numbers of their own that a reference is the mean of.
 const PARTS: u32 = 8;
@@ -38,7 +39,7 @@ impl Reference {
                 sampling: Sampling::Stochastic(Stochastic { space: subject.space(), ..how }),
                 // No rendering that is compared with it has these numbers.
                 seed: plan.seed.wrapping_add(0x5eed_0000 + u64::from(part)),
-                depth: subject.base.depth.map(|depth| depth.max(32)).or(deep(subject)),
+                depth: subject.base.depth.map(|depth| depth.max(MAX_DEPTH)).or(deep(subject)),
                 cutoff: 1e-6,
                 layers: false,
                 ..subject.base.clone()
@@ -72,7 +73,7 @@ fn deep(subject: &Subject) -> Option<u32> {
     use crate::scene::features::{Feature, Features};
     let features = Features::of(subject.scene);
     let any = [Feature::Mirrors, Feature::Refraction, Feature::ThinTransmission].iter().any(|&f| features.has(f));
-    any.then_some(32)
+    any.then_some(MAX_DEPTH)
 }
 
 fn channels(is_transparent: bool) -> usize {

@@ -55,7 +55,7 @@ pub(in crate::cli) struct BenchArgs {
           help_heading = "Rays")]
     pub samples: u32,
     /// Bounces after the eye ray [default: what the scene needs]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=64), help_heading = "Rays")]
+    #[arg(long, value_name = "N", value_parser = parse::depth(), help_heading = "Rays")]
     pub depth: Option<u32>,
     /// From where it is seen.
     #[command(flatten)]

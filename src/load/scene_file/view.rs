@@ -2,7 +2,7 @@
 
 use super::reader::{Table, boolean, color, direction, number, numbers, positive, string, vec, whole, within, word};
 use crate::math::{DVec3, Vec3};
-use crate::scene::{Camera, Falloff, Light, LightKind, Projection, RenderHints};
+use crate::scene::{Camera, Falloff, Light, LightKind, MAX_DEPTH, Projection, RenderHints};
 
 #[derive(Clone, Copy)]
 enum Kind {
@@ -127,7 +127,7 @@ pub(super) fn hints(table: Table) -> RenderHints {
             side(w).zip(side(h)).ok_or_else(|| "must be two whole numbers from 1 to 65535".into())
         }),
         samples: table.get("samples", whole(1, 65_536)),
-        depth: table.get("depth", whole(0, 64)),
+        depth: table.get("depth", whole(0, MAX_DEPTH)),
         cutoff: table.get("cutoff", within(0.0, 1.0)).map(|n| n as f32),
         tone_map: table.get("tone_map", word(&maps)).map(str::to_owned),
         exposure: table.get("exposure", number).map(|n| n as f32),

@@ -279,9 +279,17 @@ impl Matter {
     }
 
     /// What is seen of a light on the viewer's side of the surface.
+    ///
+    /// From inside there is no highlight: what a light sends in was bent where it came in, so it does not arrive along the
+    /// straight line, and never so flat that all of it is mirrored. Light that thin walls lead along hundreds of
+    /// reflections would gain such a highlight at each.
     pub(crate) fn lit(&self, normal: Vec3, view: Vec3, light: &Incident) -> Vec3 {
         let below = match &self.model {
             Model::Unlit(_) => Vec3::ZERO,
+            Model::Phong(m) if !self.outside => m.scattered(normal, light.to_light) * light.strength(),
+            Model::MetalRough(m) if !self.outside => {
+                m.lit_by(normal, view, light.to_light, |_| 0.0) * light.irradiance()
+            }
             Model::Phong(m) => m.lit(normal, view, light.to_light) * light.strength(),
             Model::MetalRough(m) => {
                 let to_light = light.to_light;

@@ -51,10 +51,15 @@ impl PhongMatter {
             return Vec3::ZERO;
         }
         if self.specular == Vec3::ZERO {
-            return self.diffuse * cosine;
+            return self.scattered(normal, to_light);
         }
         let highlight = view.dot(reflect(-to_light, normal)).max(0.0);
         self.diffuse * cosine + self.specular * libm::powf(highlight, self.shininess)
+    }
+
+    /// Kd (N·L): the same without its highlight.
+    pub(super) fn scattered(&self, normal: Vec3, to_light: Vec3) -> Vec3 {
+        self.diffuse * normal.dot(to_light).max(0.0)
     }
 
     /// Kt (N·H′)ⁿ for a light seen through the surface: the analogue of Blinn's highlight for the refracted direction.

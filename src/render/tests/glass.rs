@@ -186,6 +186,25 @@ fn a_light_behind_frosted_phong_glass_shines_through() {
     assert!(beside > 0.0 && beside < 0.4);
 }
 
+/// Light arrives at the inside of a wall bent; straight on, it would be added at each of hundreds of reflections.
+#[test]
+fn a_lamp_is_seen_in_glass_from_outside_and_in_no_wall_from_inside() {
+    let phong = Phong { specular: Vec3::ONE, shininess: 8.0, transmission: Vec3::ONE, ior: 1.5, ..phong() };
+    let clear =
+        MetalRough { transmission: 1.0, thick: true, metallic: 0.0, ior: 1.5, roughness: 0.3, ..MetalRough::default() };
+    for glass in
+        [material(Vec3::ZERO, phong), Material { surface: Reflection::MetalRough(clear), ..Material::default() }]
+    {
+        let mut s = looking_down(5.0);
+        s.square(0.0, 9.0, glass).lamp(DVec3::Z * 4.0, 20.0);
+        s.settings.depth = Some(0);
+        assert!(s.color().x > 0.05, "{:?}", s.color());
+        // Now what is before the eye is the inside.
+        s.scene.meshes[0].triangles.iter_mut().for_each(|t| t.swap(0, 1));
+        assert_eq!(s.color(), Vec3::ZERO);
+    }
+}
+
 /// S7 (stack of plates): every pane is entered and left, and the ray comes out shifted but not turned.
 #[test]
 fn a_hundred_plates_of_glass_shift_a_ray_and_leave_its_direction() {

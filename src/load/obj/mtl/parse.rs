@@ -217,7 +217,9 @@ impl Parser<'_> {
             b"refl" | b"map_refl" | b"decal" if zero => {}
             b"refl" | b"map_refl" => m.refl = Some(self.line),
             b"decal" => self.not_drawn(DECAL),
-            _ => self.warn("mtl-unknown-statement", format!("'{}' is not an MTL statement", shorten(&decode_name(word)))),
+            _ => {
+                self.warn("mtl-unknown-statement", format!("'{}' is not an MTL statement", shorten(&decode_name(word))))
+            }
         }
     }
 
