@@ -153,7 +153,7 @@ impl Quality {
         let (error, min_samples, max_samples) = match self {
             Self::Draft => (0.25, 2, 64),
             Self::Normal => (0.08, 4, 256),
-            Self::Final => (0.035, 4, 1024),
+            Self::Final => (0.03, 4, 1024),
         };
         Stochastic {
             error,
