@@ -22,7 +22,7 @@ pub(super) struct SamplingArgs {
     #[arg(long, value_name = "HOW", value_enum, help_heading = "Quality", hide_short_help = true)]
     pub aa: Option<Aa>,
     /// How good a stochastic picture is to be: draft (error per pixel 0.25, 2 to 64 rays), normal (0.08, 4 to 256) or final
-    /// (0.03, 4 to 1024) [default: normal]
+    /// (0.035, 4 to 1024) [default: normal]
     #[arg(long, value_name = "WORD", value_parser = parse::quality(), help_heading = "Quality")]
     pub quality: Option<Quality>,
     /// Exactly N rays a pixel, at the same places in each (--aa uniform). Costs of pixels (--layers tests, --heatmap) are

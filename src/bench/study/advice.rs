@@ -22,33 +22,34 @@ pub(super) fn advice(study: &Study) -> Vec<Advice> {
 
 /// The program's own choice for a purpose, where nothing that is as good takes much less time.
 fn advise(study: &Study, purpose: Quality) -> Advice {
-    /// Part of the time that another setting must save to be worth its flags: differences below this are those of the clock,
-    /// and of the next view of the model, which a setting that was found for this one knows nothing of.
-    const WORTH: f64 = 0.35;
+    /// Part of the time that another setting must save to be worth its flags: differences below this are those of the next
+    /// view of the model, which a setting that was found for this one knows nothing of.
+    const WORTH: f64 = 0.4;
     let goal = purpose.good_enough();
-    let time = |i: usize| study.rows[i].cpu.median();
+    // What else the machine does only adds to a time.
+    let time = |i: usize| study.rows[i].cpu.min();
     let good: Vec<usize> = (0..study.rows.len()).filter(|&i| study.rows[i].error.rmse <= goal).collect();
     let fastest = good.iter().copied().min_by(|&a, &b| time(a).total_cmp(&time(b)));
     let own = good.iter().copied().find(|&i| is_quality(&study.rows[i], purpose));
-    let steps = 255.0 * goal;
+    let goal = format!("an error of at most {goal} ({:.1} of 255 steps)", 255.0 * goal);
     let Some(fastest) = fastest else {
-        let why = format!("no setting that was tried comes below an error of {goal} ({steps:.1} of 255 steps)");
-        return Advice { purpose, row: None, why };
+        return Advice { purpose, row: None, why: format!("no setting that was tried comes to {goal}") };
     };
     let row = own.filter(|&own| time(fastest) > (1.0 - WORTH) * time(own)).unwrap_or(fastest);
-    let chosen = &study.rows[row];
-    let what = if own == Some(row) { "the program's own choice: " } else { "" };
-    let rest = rest(chosen);
-    let beaten = own.filter(|&own| own != row).map_or_else(String::new, |own| {
-        format!(
-            ", {:.0} % less time than --quality {purpose} for an error that is small enough, too",
-            100.0 * (1.0 - time(row) / time(own))
-        )
-    });
-    let why = format!(
-        "{what}the fastest with an error of at most {goal} ({steps:.1} of 255 steps): {:.4}, {rest}{beaten}",
-        chosen.error.rmse
-    );
+    let of_own = if own == Some(row) { "the program's own choice" } else { "not the program's own choice" };
+    let left = format!("{:.4}, {}", study.rows[row].error.rmse, rest(&study.rows[row]));
+    let saved = |own: usize| 100.0 * (1.0 - time(fastest) / time(own));
+    let why = match own {
+        Some(own) if row == own && row != fastest => {
+            let flags = &study.rows[fastest].setting.flags;
+            format!("{of_own}, with {goal}: {left}; {flags} takes {:.0} % less time in this view", saved(own))
+        }
+        Some(own) if row != own => format!(
+            "{of_own}, the fastest with {goal}: {left}, {:.0} % less time than --quality {purpose}, which is near enough, too",
+            saved(own)
+        ),
+        _ => format!("{of_own}, the fastest with {goal}: {left}"),
+    };
     Advice { purpose, row: Some(row), why }
 }
 
