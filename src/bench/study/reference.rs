@@ -39,7 +39,7 @@ impl Reference {
                 sampling: Sampling::Stochastic(Stochastic { space: subject.space(), ..how }),
                 // No rendering that is compared with it has these numbers.
                 seed: plan.seed.wrapping_add(0x5eed_0000 + u64::from(part)),
-                depth: subject.base.depth.map(|depth| depth.max(MAX_DEPTH)).or(deep(subject)),
+                depth: subject.base.depth.and(Some(MAX_DEPTH)).or(deep(subject)),
                 cutoff: 1e-6,
                 layers: false,
                 ..subject.base.clone()

@@ -51,7 +51,7 @@ impl PhongMatter {
             return Vec3::ZERO;
         }
         if self.specular == Vec3::ZERO {
-            return self.scattered(normal, to_light);
+            return self.diffuse * cosine;
         }
         let highlight = view.dot(reflect(-to_light, normal)).max(0.0);
         self.diffuse * cosine + self.specular * libm::powf(highlight, self.shininess)
