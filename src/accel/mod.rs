@@ -48,6 +48,8 @@ pub use transform::Transformed;
 pub use volumes::Volumes;
 pub use wide::{Listed, RayOrder, Splitting, Wide};
 
+use bytemuck::{Pod, Zeroable};
+
 use crate::math::Vec3;
 pub use crate::math::cone::Cone;
 
@@ -55,8 +57,7 @@ pub use crate::math::cone::Cone;
 pub const NO_PRIM: u32 = u32::MAX;
 
 /// One ray, in the centred frame of its [`Shapes`]. `dir` need not be of unit length; t counts in its lengths.
-#[derive(Clone, Copy, Debug, PartialEq)]
-// In this order origin and t_min, direction and t_max are four numbers in a row each, which packets read at once.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Ray {
     /// Start.
@@ -71,6 +72,29 @@ pub struct Ray {
     pub exclude: u32,
     /// The sample that owns the ray; no structure looks at it.
     pub sample: u32,
+}
+
+impl Ray {
+    /// Origin and `t_min`, direction and `t_max`: four numbers in a row each, which lanes read at once.
+    #[inline(always)]
+    fn in_fours(&self) -> [&[f32; 4]; 2] {
+        let [from, to] = &bytemuck::cast_ref::<Self, RayWords>(self).numbers;
+        [from, to]
+    }
+
+    /// The other way round.
+    #[inline(always)]
+    pub(crate) fn from_fours(numbers: [[f32; 4]; 2], exclude: u32, sample: u32) -> Self {
+        bytemuck::cast(RayWords { numbers, others: [exclude, sample] })
+    }
+}
+
+/// A [`Ray`] by its words.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct RayWords {
+    numbers: [[f32; 4]; 2],
+    others: [u32; 2],
 }
 
 /// Where a ray meets a shape. Geometry only: the caller looks up what it is made of.

@@ -1,6 +1,5 @@
-//! Where rays meet triangles that they hit: [`meet`](super::triangle::meet) and
-//! [`barycentrics_at`](super::triangle::barycentrics_at) in lanes, operation by operation; of rays side by side and one
-//! triangle ([`Plane`]), or of eight rays, each with a triangle of its own ([`Pairs`]).
+//! Where rays meet triangles that they hit, each ray a triangle of its own: [`meet`](super::triangle::meet) and
+//! [`barycentrics_at`](super::triangle::barycentrics_at) in lanes, operation by operation.
 
 use super::bounds::{PLANE_TERMS_F64, POSITION_T};
 use super::simd::{LANES, Lanewise, Row, Simd};
@@ -8,16 +7,69 @@ use super::triangle::{flat_axes, magnitude_cross};
 use super::triangles::Corners8;
 use super::{DVec3, Vec3};
 
-/// Where rays side by side meet the plane of one triangle: [`meet`](super::triangle::meet) in lanes, operation by
-/// operation.
+/// Rays and triangles, by axis and lane.
 #[derive(Clone, Copy, Debug)]
-pub struct Meetings<L, D> {
-    /// t, rounded once.
+pub struct Pairs {
+    /// Where the rays start.
+    pub origin: [Row; 3],
+    /// Their directions.
+    pub dir: [Row; 3],
+    /// The triangle that each of them hits.
+    pub corners: Corners8,
+}
+
+/// Where they meet.
+#[derive(Clone, Copy, Debug)]
+pub struct Meetings<L> {
+    /// Exact t, rounded once.
     pub t: L,
-    /// t to a relative error of [`POSITION_T`].
-    pub t_f64: D,
+    /// Weights of the second and third corner.
+    pub weights: [L; 2],
     /// The lanes in which that is certain; for the others the scalar form must be asked.
     pub sure: u32,
+}
+
+impl Pairs {
+    /// No rays.
+    pub const EMPTY: Self =
+        Self { origin: [[0.0; LANES]; 3], dir: [[0.0; LANES]; 3], corners: super::triangles::NO_CORNERS };
+
+    /// Where each ray meets its triangle.
+    #[inline(always)]
+    pub fn meet<S: Simd>(&self, s: S) -> Meetings<Row> {
+        let [a, b, c] = &self.corners;
+        let corners = [loaded(s, a), loaded(s, b), loaded(s, c)];
+        let Meetings { t, weights: [u, v], sure } = meet(s, loaded(s, &self.origin), loaded(s, &self.dir), corners);
+        Meetings { t: s.store(t), weights: [s.store(u), s.store(v)], sure }
+    }
+}
+
+/// Three rows from memory.
+#[inline(always)]
+fn loaded<S: Lanewise<N>, const N: usize>(s: S, [x, y, z]: &[[f32; N]; 3]) -> [S::Lanes; 3] {
+    [s.load(x), s.load(y), s.load(z)]
+}
+
+/// Where rays meet their triangles; origins, directions and corners by axis.
+#[inline(always)]
+pub fn meet<S: Lanewise<N>, const N: usize>(
+    s: S,
+    origin: [S::Lanes; 3],
+    dir: [S::Lanes; 3],
+    [a, b, c]: [[S::Lanes; 3]; 3],
+) -> Meetings<S::Lanes> {
+    let (a, b, c) = (Vectors::<S, N>::of(s, a), Vectors::<S, N>::of(s, b), Vectors::<S, N>::of(s, c));
+    let (o, d) = (Vectors::<S, N>::of(s, origin), Vectors::<S, N>::of(s, dir));
+    let (e1, e2) = (b.minus(s, &a), c.minus(s, &a));
+    let normal = e1.cross(s, &e2);
+    let sizes = e1.abs(s).magnitude_cross(s, &e2.abs(s));
+    let from = a.minus(s, &o);
+    let terms = s.splat_f64(PLANE_TERMS_F64 * QUOTIENT);
+    let (numerator, n_error) = (normal.dot(s, &from), s.mul_f64(sizes.dot(s, &from.abs(s)), terms));
+    let (denominator, d_error) = (normal.dot(s, &d), s.mul_f64(sizes.dot(s, &d.abs(s)), terms));
+
+    let Quotients { rounded, value, sure } = quotient(s, [numerator, n_error], [denominator, d_error]);
+    Meetings { t: rounded, weights: weights(s, [&o, &d, &a], [&e1, &e2], &normal, value), sure }
 }
 
 /// What bounds the rays of a row.
@@ -58,7 +110,7 @@ impl Plane {
         origin: &[[f32; N]; 3],
         dir: &[[f32; N]; 3],
         bounds: &RowBounds,
-    ) -> Meetings<S::Lanes, S::Doubles> {
+    ) -> Meetings<S::Lanes> {
         let a = self.corners[0];
         let (low, high) = ((a - bounds.low).abs(), (a - bounds.high).abs());
         let numerator = match bounds.from {
@@ -76,7 +128,8 @@ impl Plane {
         // Those of the farthest and of the steepest ray there could be.
         let n_error = s.splat_f64(self.sizes.dot(low.max(high)) * (PLANE_TERMS_F64 * QUOTIENT));
         let d_error = s.splat_f64(self.sizes.dot(bounds.dir) * (PLANE_TERMS_F64 * QUOTIENT));
-        quotient(s, [numerator, n_error], [denominator, d_error])
+        let Quotients { rounded, value, sure } = quotient(s, [numerator, n_error], [denominator, d_error]);
+        Meetings { t: rounded, weights: self.barycentrics(s, origin, dir, value), sure }
     }
 
     /// n·v.
@@ -91,7 +144,7 @@ impl Plane {
 
     /// Weights of the second and third corner: [`barycentrics_at`](super::triangle::barycentrics_at) in lanes.
     #[inline(always)]
-    pub fn barycentrics<S: Lanewise<N>, const N: usize>(
+    fn barycentrics<S: Lanewise<N>, const N: usize>(
         &self,
         s: S,
         origin: &[[f32; N]; 3],
@@ -124,9 +177,19 @@ impl Plane {
     }
 }
 
-/// What the errors of a quotient's terms are multiplied with: the 3/2 and the 1.001 of [`Bounded`](super::quotient::Bounded),
-/// and room for what is rounded otherwise here.
+/// What bounds the error of a quotient's terms is multiplied with: the 3/2 and the 1.001 of
+/// [`Bounded`](super::quotient::Bounded), and room for what is rounded otherwise here.
 const QUOTIENT: f64 = 1.502;
+
+/// Quotients of bounded terms.
+struct Quotients<L, D> {
+    /// Rounded once.
+    rounded: L,
+    /// To a relative error of [`POSITION_T`].
+    value: D,
+    /// The lanes in which both are certain.
+    sure: u32,
+}
 
 /// n / d, each with [`QUOTIENT`] times the bound of its error: [`Bounded::over`](super::quotient::Bounded) and what is asked
 /// of it, in lanes. What is certain here is certain there, and never the other way round.
@@ -138,19 +201,42 @@ fn quotient<S: Lanewise<N>, const N: usize>(
     s: S,
     [numerator, n_error]: [S::Doubles; 2],
     [denominator, d_error]: [S::Doubles; 2],
-) -> Meetings<S::Lanes, S::Doubles> {
+) -> Quotients<S::Lanes, S::Doubles> {
     let reciprocal = s.div_f64(s.splat_f64(1.0), denominator);
-    let t = s.mul_f64(numerator, reciprocal);
-    let size = s.abs_f64(t);
+    let value = s.mul_f64(numerator, reciprocal);
+    let size = s.abs_f64(value);
     let terms = s.add_f64(n_error, s.mul_f64(d_error, size));
-    let rounded = s.mul_f64(size, s.splat_f64(2.0 * QUOTIENT * f64::EPSILON));
-    let error = s.add_f64(s.mul_f64(terms, s.abs_f64(reciprocal)), rounded);
-    let (low, high) = (s.narrow(s.sub_f64(t, error)), s.narrow(s.add_f64(t, error)));
+    let rounding = s.mul_f64(size, s.splat_f64(2.0 * QUOTIENT * f64::EPSILON));
+    let error = s.add_f64(s.mul_f64(terms, s.abs_f64(reciprocal)), rounding);
+    let (low, high) = (s.narrow(s.sub_f64(value, error)), s.narrow(s.add_f64(value, error)));
     // Rounding keeps the order of both, so that they are equal. Below the normal numbers zero gets a sign, which is left to
     // the scalar form.
     let one = s.at_most(high, low) & s.less(s.splat(f32::MIN_POSITIVE), s.abs(low));
     let sure = s.less_f64(error, s.mul_f64(size, s.splat_f64(POSITION_T))) & one;
-    Meetings { t: low, t_f64: t, sure }
+    Quotients { rounded: low, value, sure }
+}
+
+/// Weights of the second and third corner: areas seen along the axis from which they are largest. Each is a component of a
+/// cross product over that of the normal.
+#[inline(always)]
+fn weights<S: Lanewise<N>, const N: usize>(
+    s: S,
+    [o, d, a]: [&Vectors<S, N>; 3],
+    [e1, e2]: [&Vectors<S, N>; 2],
+    normal: &Vectors<S, N>,
+    t: S::Doubles,
+) -> [S::Lanes; 2] {
+    let [x, y, z] = normal.abs(s).0;
+    let along_x = !s.less_f64(x, y) & !s.less_f64(x, z);
+    let along = [along_x, !s.less_f64(y, z) & !along_x];
+    let scale = s.div_f64(s.splat_f64(1.0), normal.turned(s, along)[2]);
+    let ([ox, oy, _], [dx, dy, _], [ax, ay, _]) = (o.turned(s, along), d.turned(s, along), a.turned(s, along));
+    let px = s.sub_f64(s.add_f64(ox, s.mul_f64(dx, t)), ax);
+    let py = s.sub_f64(s.add_f64(oy, s.mul_f64(dy, t)), ay);
+    let ([bx, by, _], [cx, cy, _]) = (e1.turned(s, along), e2.turned(s, along));
+    let u = s.sub_f64(s.mul_f64(px, cy), s.mul_f64(cx, py));
+    let v = s.sub_f64(s.mul_f64(bx, py), s.mul_f64(px, by));
+    clamped(s, s.mul_f64(u, scale), s.mul_f64(v, scale))
 }
 
 /// Weights within 0 to 1, and their sum, too; rounded, 0 for a NaN.
@@ -163,35 +249,13 @@ fn clamped<S: Lanewise<N>, const N: usize>(s: S, u: S::Doubles, v: S::Doubles) -
     [u, s.choose(s.less(one, s.add(u, v)), s.sub(one, u), v)]
 }
 
-/// Rays and triangles, by axis and lane.
-#[derive(Clone, Copy, Debug)]
-pub struct Pairs {
-    /// Where the rays start.
-    pub origin: [Row; 3],
-    /// Their directions.
-    pub dir: [Row; 3],
-    /// The triangle that each of them hits.
-    pub corners: Corners8,
-}
+/// A vector in each lane.
+struct Vectors<S: Lanewise<N>, const N: usize>([S::Doubles; 3]);
 
-/// Where they meet.
-#[derive(Clone, Copy, Debug)]
-pub struct Places {
-    /// Exact t, rounded once.
-    pub t: Row,
-    /// Weights of the second and third corner.
-    pub weights: [Row; 2],
-    /// The lanes in which that is certain; for the others the scalar form must be asked.
-    pub sure: u32,
-}
-
-/// Eight vectors.
-struct Vectors<S: Simd>([S::Doubles; 3]);
-
-impl<S: Simd> Vectors<S> {
+impl<S: Lanewise<N>, const N: usize> Vectors<S, N> {
     #[inline(always)]
-    fn of(s: S, rows: &[Row; 3]) -> Self {
-        Self([s.widen(s.load(&rows[0])), s.widen(s.load(&rows[1])), s.widen(s.load(&rows[2]))])
+    fn of(s: S, [x, y, z]: [S::Lanes; 3]) -> Self {
+        Self([s.widen(x), s.widen(y), s.widen(z)])
     }
 
     #[inline(always)]
@@ -232,155 +296,35 @@ impl<S: Simd> Vectors<S> {
             s.add_f64(s.mul_f64(a, *y), s.mul_f64(b, *x)),
         ])
     }
-}
 
-impl Pairs {
-    /// No rays.
-    pub const EMPTY: Self =
-        Self { origin: [[0.0; LANES]; 3], dir: [[0.0; LANES]; 3], corners: super::triangles::NO_CORNERS };
-
-    /// Where each ray meets its triangle.
+    /// Turned so that an axis comes last: the first in the lanes of the first mask, the second in those of the other.
     #[inline(always)]
-    pub fn meet<S: Simd>(&self, s: S) -> Places {
-        let [a, b, c] = &self.corners;
-        let (a, b, c) = (Vectors::of(s, a), Vectors::of(s, b), Vectors::of(s, c));
-        let (o, d) = (Vectors::of(s, &self.origin), Vectors::of(s, &self.dir));
-        let (e1, e2) = (b.minus(s, &a), c.minus(s, &a));
-        let normal = e1.cross(s, &e2);
-        let sizes = e1.abs(s).magnitude_cross(s, &e2.abs(s));
-        let from = a.minus(s, &o);
-        let terms = s.splat_f64(PLANE_TERMS_F64 * QUOTIENT);
-        let (numerator, n_error) = (normal.dot(s, &from), s.mul_f64(sizes.dot(s, &from.abs(s)), terms));
-        let (denominator, d_error) = (normal.dot(s, &d), s.mul_f64(sizes.dot(s, &d.abs(s)), terms));
-
-        let Meetings { t, t_f64, sure } = quotient(s, [numerator, n_error], [denominator, d_error]);
-        let [u, v] = weights(s, [&o, &d, &a], [&e1, &e2], &normal, t_f64);
-        Places { t: s.store(t), weights: [s.store(u), s.store(v)], sure }
+    fn turned(&self, s: S, [along_x, along_y]: [u32; 2]) -> [S::Doubles; 3] {
+        let [x, y, z] = self.0;
+        let last = s.choose_f64(along_x, x, s.choose_f64(along_y, y, z));
+        let first = s.choose_f64(along_x, y, s.choose_f64(along_y, z, x));
+        let second = s.choose_f64(along_x, z, s.choose_f64(along_y, x, y));
+        [first, second, last]
     }
-}
-
-/// Weights of the second and third corner: areas seen along the axis from which they are largest. Each is a component of a
-/// cross product over that of the normal.
-#[inline(always)]
-fn weights<S: Simd>(
-    s: S,
-    [o, d, a]: [&Vectors<S>; 3],
-    [e1, e2]: [&Vectors<S>; 2],
-    normal: &Vectors<S>,
-    t: S::Doubles,
-) -> [S::Lanes; 2] {
-    let Vectors([dx, dy, dz]) = *d;
-    let moved = Vectors::<S>([s.mul_f64(dx, t), s.mul_f64(dy, t), s.mul_f64(dz, t)]);
-    let p = Vectors::<S>([s.add_f64(o.0[0], moved.0[0]), s.add_f64(o.0[1], moved.0[1]), s.add_f64(o.0[2], moved.0[2])])
-        .minus(s, a);
-    let [x, y, z] = normal.abs(s).0;
-    let along_x = !s.less_f64(x, y) & !s.less_f64(x, z);
-    let along_y = !s.less_f64(y, z) & !along_x;
-    let scale = s.div_f64(s.splat_f64(1.0), seen(s, normal, along_x, along_y));
-    let u = s.mul_f64(seen(s, &p.cross(s, e2), along_x, along_y), scale);
-    let v = s.mul_f64(seen(s, &e1.cross(s, &p), along_x, along_y), scale);
-    clamped(s, u, v)
-}
-
-/// The component along an axis, the third where it is neither of both.
-#[inline(always)]
-fn seen<S: Simd>(s: S, Vectors([x, y, z]): &Vectors<S>, along_x: u32, along_y: u32) -> S::Doubles {
-    let mut row = s.store_f64(*z);
-    s.put_f64(along_y, *y, &mut row);
-    s.put_f64(along_x, *x, &mut row);
-    s.load_f64(&row)
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::random::Random;
     use super::super::shear::RaySpace;
-    use super::super::sight::RowSight;
     use super::super::simd::{Kernel, Level};
     use super::super::triangle::{self, Triangle};
-    use super::super::triangles::{NO_CORNERS, Verdicts, set_corners};
+    use super::super::triangles::set_corners;
+    use super::super::{Vec3, simd::WIDE};
     use super::*;
-
-    /// Eight rays against the first of eight triangles: the verdicts, where they meet its plane, and the weights there.
-    struct Row8<'a>(&'a [RaySpace; LANES], &'a Triangle, Option<Vec3>);
-
-    impl Kernel for Row8<'_> {
-        type Output = (Verdicts, Meetings<Row, [f64; LANES]>, [Row; 2]);
-
-        #[inline(always)]
-        fn run<S: Simd>(self, s: S) -> Self::Output {
-            let Self(rays, triangle, from) = self;
-            let (mut origin, mut dir) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
-            for (lane, ray) in rays.iter().enumerate() {
-                for k in 0..3 {
-                    (origin[k][lane], dir[k][lane]) = (ray.origin[k], ray.dir[k]);
-                }
-            }
-            let mut corners = NO_CORNERS;
-            set_corners(&mut corners, 3, triangle);
-            let sight = RowSight::<S, LANES>::new(s, &origin, from, &dir, rays[0].z);
-            let verdicts = sight.look(s, &sight.ready(s, &corners), 3).verdicts;
-            let plane = Plane::of(triangle);
-            let (least, most) = (
-                |f: fn(&RaySpace) -> DVec3| rays.iter().map(f).reduce(DVec3::min).unwrap(),
-                |f: fn(&RaySpace) -> DVec3| rays.iter().map(f).reduce(DVec3::max).unwrap(),
-            );
-            let bounds = RowBounds {
-                low: least(|r| r.origin.as_dvec3()),
-                high: most(|r| r.origin.as_dvec3()),
-                from: from.map(Vec3::as_dvec3),
-                dir: most(|r| r.dir.as_dvec3().abs()),
-            };
-            let met = plane.meet(s, &origin, &dir, &bounds);
-            let [u, v] = plane.barycentrics(s, &origin, &dir, met.t_f64);
-            let met = Meetings { t: s.store(met.t), t_f64: s.store_f64(met.t_f64), sure: met.sure };
-            (verdicts, met, [s.store(u), s.store(v)])
-        }
-    }
-
-    #[test]
-    fn eight_rays_side_by_side_meet_a_triangle_as_each_does_alone() {
-        let mut random = Random::new(21);
-        let (mut hits, mut sure) = (0, 0);
-        for _ in 0..3000 {
-            let triangle = [random.cube(), random.cube(), random.cube()];
-            let origin = random.cube() * 4.0;
-            let aim = |_| triangle::within(&triangle, random.unit() * 1.2, random.unit());
-            let rays: Vec<RaySpace> = (0..LANES).map(aim).filter_map(|p| RaySpace::new(origin, p - origin)).collect();
-            let Ok(rays) = <[RaySpace; LANES]>::try_from(rays) else { continue };
-            if rays.iter().any(|r| r.z != rays[0].z) {
-                continue;
-            }
-            // All start there, whether the row knows it or not.
-            for (level, from) in Level::all().into_iter().flat_map(|l| [(l, None), (l, Some(origin))]) {
-                let (verdicts, met, [u, v]) = level.run(Row8(&rays, &triangle, from));
-                for (lane, ray) in rays.iter().enumerate() {
-                    let (bit, hit) = (1 << lane, triangle::is_hit(ray, &triangle));
-                    assert!(verdicts.unsure & bit != 0 || (verdicts.hit & bit != 0) == hit, "{}", level.name());
-                    if !hit || met.sure & bit == 0 {
-                        continue;
-                    }
-                    let alone = triangle::meet(ray, &triangle);
-                    assert_eq!(
-                        (met.t[lane].to_bits(), met.t_f64[lane].to_bits()),
-                        (alone.t.to_bits(), alone.t_f64.to_bits())
-                    );
-                    assert_eq!((u[lane], v[lane]), triangle::barycentrics(ray, &triangle));
-                    sure += 1;
-                }
-                hits += rays.iter().filter(|r| triangle::is_hit(r, &triangle)).count();
-            }
-        }
-        assert!(sure > 10_000 && sure > hits * 9 / 10, "{sure} of {hits}");
-    }
 
     struct Meet<'a>(&'a Pairs);
 
     impl Kernel for Meet<'_> {
-        type Output = Places;
+        type Output = Meetings<Row>;
 
         #[inline(always)]
-        fn run<S: Simd>(self, s: S) -> Places {
+        fn run<S: Simd>(self, s: S) -> Meetings<Row> {
             self.0.meet(s)
         }
     }
@@ -438,7 +382,7 @@ mod tests {
         }
     }
 
-    fn assert_met_as_alone(met: &Places, lane: usize, (ray, triangle): &(RaySpace, Triangle), context: &str) {
+    fn assert_met_as_alone(met: &Meetings<Row>, lane: usize, (ray, triangle): &(RaySpace, Triangle), context: &str) {
         let alone = triangle::meet(ray, triangle);
         assert_eq!(met.t[lane].to_bits(), alone.t.to_bits(), "{context}: {} for {}", met.t[lane], alone.t);
         let (u, v) = triangle::barycentrics_at(ray, triangle, alone.t_f64, alone.normal);
@@ -464,6 +408,51 @@ mod tests {
             }
             let enough = if kind == Kind::Ordinary { lanes * 9 / 10 } else { lanes / 20 };
             assert!(sure > enough, "{kind:?}: {sure} of {lanes}");
+        }
+    }
+
+    /// Sixteen rays, those of two eights.
+    struct MeetWide<'a>([&'a Pairs; 2]);
+
+    impl Kernel for MeetWide<'_> {
+        type Output = ([[f32; WIDE]; 3], u32);
+
+        #[inline(always)]
+        fn run<S: Simd>(self, s: S) -> Self::Output {
+            let [low, high] = self.0;
+            let wide = s.wide();
+            let join = |row: fn(&Pairs, usize) -> &Row, k: usize| {
+                std::array::from_fn(|lane| row(if lane < LANES { low } else { high }, k)[lane % LANES])
+            };
+            let rows = |row| loaded(wide, &[join(row, 0), join(row, 1), join(row, 2)]);
+            let corners = [rows(|p, k| &p.corners[0][k]), rows(|p, k| &p.corners[1][k]), rows(|p, k| &p.corners[2][k])];
+            let met = meet(wide, rows(|p, k| &p.origin[k]), rows(|p, k| &p.dir[k]), corners);
+            ([wide.store(met.t), wide.store(met.weights[0]), wide.store(met.weights[1])], met.sure)
+        }
+    }
+
+    #[test]
+    fn sixteen_rays_meet_their_triangles_as_two_times_eight_do() {
+        let mut random = Random::new(44);
+        for _ in 0..100 {
+            let pairs = [(); 2].map(|()| {
+                let mut pairs = Pairs::EMPTY;
+                for lane in 0..LANES {
+                    let (ray, triangle) = hit(&mut random, KINDS[lane % KINDS.len()]);
+                    set(&mut pairs, lane, &ray, &triangle);
+                }
+                pairs
+            });
+            for level in Level::all() {
+                let (numbers, sure) = level.run(MeetWide([&pairs[0], &pairs[1]]));
+                let [low, high] = pairs.each_ref().map(|pairs| level.run(Meet(pairs)));
+                assert_eq!(sure, low.sure | high.sure << LANES, "{}", level.name());
+                for (lane, eight) in (0..WIDE).map(|lane| (lane, if lane < LANES { &low } else { &high })) {
+                    let numbers = numbers.map(|row| row[lane].to_bits());
+                    let expected = [eight.t, eight.weights[0], eight.weights[1]].map(|row| row[lane % LANES].to_bits());
+                    assert_eq!(numbers, expected, "lane {lane} on {}", level.name());
+                }
+            }
         }
     }
 

@@ -12,7 +12,7 @@ use crate::accel::{NO_PRIM, NoProbe, Shapes};
 use crate::math::sight::{Look, Sight};
 use crate::math::simd::{LANES, Row, Simd};
 use crate::math::triangle::{self, Triangle};
-use crate::math::triangles::corners_of;
+use crate::math::triangles::{Corners8, corners_of};
 
 /// What a ray looks for, and what it has found.
 #[derive(Clone, Copy, Debug)]
@@ -74,10 +74,17 @@ impl Place {
         self.block << 3 | self.lane
     }
 
+    /// The corners in the block of a packed place, and its lane.
+    #[inline(always)]
+    pub(super) fn rows(tree: &Tree, packed: u32) -> (&Corners8, usize) {
+        (&tree.blocks[(packed >> 3) as usize].corners, packed as usize % LANES)
+    }
+
     /// The corners of a triangle by its packed place.
     #[inline(always)]
     pub(super) fn corners(tree: &Tree, packed: u32) -> Triangle {
-        corners_of(&tree.blocks[(packed >> 3) as usize].corners, packed as usize % LANES)
+        let (rows, lane) = Self::rows(tree, packed);
+        corners_of(rows, lane)
     }
 }
 

@@ -21,7 +21,7 @@ use super::walk::Entry;
 use crate::accel::query::Goal;
 use crate::accel::wave::Wave;
 use crate::accel::{Hit, NO_PRIM, Ray, Shapes};
-use crate::math::meetings::Plane;
+use crate::math::meetings::{Meetings, Plane, meet};
 use crate::math::shear::RaySpace;
 use crate::math::sight::RowSight;
 use crate::math::simd::{Kernel, LANES, Lanewise, Simd};
@@ -30,6 +30,9 @@ use crate::math::triangles::Verdicts;
 
 /// Rays that run alike from which on they are a packet, without the others.
 const ENOUGH: u32 = 8;
+
+/// So many rays before they are taken they are fetched: a processor that foretells what is read does not see beyond a page.
+const AHEAD: usize = 8 * RAYS;
 
 /// A child still to be visited.
 #[derive(Clone, Copy, Debug, Default)]
@@ -130,7 +133,11 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
     /// Takes the next sixteen rays, if there are as many; those that run alike, if they are worth a packet, or none.
     #[inline(always)]
     fn gather<S: Simd>(&mut self, s: S) -> u32 {
-        let Some(rays) = self.wave.rays()[self.start..].first_chunk::<RAYS>() else { return 0 };
+        let rays = &self.wave.rays()[self.start..];
+        if let Some(later) = rays.get(AHEAD..AHEAD + RAYS) {
+            s.prefetch(later);
+        }
+        let Some(rays) = rays.first_chunk::<RAYS>() else { return 0 };
         self.t_max = self.rays.spread(s, rays);
         self.wave.adapt_t_min(self.start, &mut self.rays.t_min);
         let alike = self.rays.prepare(s, self.tree, &self.t_max);
@@ -166,36 +173,65 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
         let low = wide.splat(f32::INFINITY);
         let limit = wide.choose(self.active, limit, wide.splat(f32::NEG_INFINITY));
         let mut reach: Reach<S> = Reach { low, high, limit, farthest: wide.greatest(limit) };
-        let mut top = 0;
-        self.push(s, &tree.nodes[0], self.active, &reach, stack, &mut top);
-        while top > 0 {
-            top -= 1;
-            let branch = stack[top];
-            // Rays that need no more have no limit above zero.
-            let rays = branch.rays & wide.at_most(wide.splat(branch.near), reach.limit);
-            if rays == 0 {
-                continue;
-            }
-            if !Child::is_leaf(branch.child) {
-                self.push(s, &tree.nodes[branch.child as usize], rays, &reach, stack, &mut top);
-                continue;
-            }
-            let (block, count) = Child::block(branch.child);
-            let changed = self.test(s, block, count, rays, &mut reach, &sight);
-            if changed != 0 {
-                if W::Goal::ANY {
-                    self.active &= !changed;
-                    reach.limit = wide.choose(changed, wide.splat(f32::NEG_INFINITY), reach.limit);
-                    if self.active == 0 {
-                        break;
-                    }
-                } else {
-                    reach.limit = wide.choose(changed, B::widened_lanes(wide, reach.high), reach.limit);
+        let (mut top, mut branch) = (0, Branch { near: 0.0, child: 0, rays: self.active });
+        loop {
+            let mut nearer = false;
+            if Child::is_leaf(branch.child) {
+                self.visit(s, branch, &mut reach, &sight);
+                if W::Goal::ANY && self.active == 0 {
+                    break;
                 }
-                reach.farthest = wide.greatest(reach.limit);
+            } else {
+                let below = top;
+                self.push(s, &tree.nodes[branch.child as usize], branch.rays, &reach, stack, &mut top);
+                nearer = top > below;
             }
+            // Those that meet the nearest child were just found; rays that need no more have no limit above zero.
+            if !nearer && !self.pop_others(wide, &reach, stack, &mut top) {
+                break;
+            }
+            top -= 1;
+            branch = stack[top];
         }
         self.answer(s);
+    }
+
+    /// Takes off the stack what no ray needs any more, and tells whether anything is left; the rays that need the last.
+    #[inline(always)]
+    fn pop_others<L: Lanewise<RAYS>, S: Simd<Wide = L>>(
+        &self,
+        s: L,
+        reach: &Reach<S>,
+        stack: &mut [Branch],
+        top: &mut usize,
+    ) -> bool {
+        while *top > 0 {
+            let branch = &mut stack[*top - 1];
+            branch.rays &= s.at_most(s.splat(branch.near), reach.limit);
+            if branch.rays != 0 {
+                return true;
+            }
+            *top -= 1;
+        }
+        false
+    }
+
+    /// Tests a leaf.
+    #[inline(always)]
+    fn visit<S: Simd>(&mut self, s: S, branch: Branch, reach: &mut Reach<S>, sight: &RowSight<S::Wide, RAYS>) {
+        let wide = s.wide();
+        let (block, count) = Child::block(branch.child);
+        let changed = self.test(s, block, count, branch.rays, reach, sight);
+        if changed == 0 {
+            return;
+        }
+        if W::Goal::ANY {
+            self.active &= !changed;
+            reach.limit = wide.choose(changed, wide.splat(f32::NEG_INFINITY), reach.limit);
+        } else {
+            reach.limit = wide.choose(changed, B::widened_lanes(wide, reach.high), reach.limit);
+        }
+        reach.farthest = wide.greatest(reach.limit);
     }
 
     /// Puts the children that some ray meets on the stack, the nearest last.
@@ -309,7 +345,26 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
         changed
     }
 
-    /// Gives the answers; distances and weights of hits with the same triangle are found together.
+    /// Where the rays of a mask meet what they hit.
+    #[inline(always)]
+    fn meet_each<S: Lanewise<RAYS>>(&self, s: S, mut left: u32) -> Meetings<S::Lanes> {
+        let mut corners = [[s.splat(0.0); 3]; 3];
+        while left != 0 {
+            let place = self.found.place[left.trailing_zeros() as usize % RAYS];
+            let mine = s.find_word(place, &self.found.place);
+            left &= !mine;
+            let (rows, lane) = Place::rows(self.tree, place);
+            for (corner, rows) in corners.iter_mut().zip(rows) {
+                for k in 0..3 {
+                    corner[k] = s.choose(mine, s.splat(rows[k][lane]), corner[k]);
+                }
+            }
+        }
+        let [o, d] = [&self.rays.origin, &self.rays.dir];
+        meet(s, [s.load(&o[0]), s.load(&o[1]), s.load(&o[2])], [s.load(&d[0]), s.load(&d[1]), s.load(&d[2])], corners)
+    }
+
+    /// Gives the answers, all distances and weights together.
     #[inline(always)]
     fn answer<S: Simd>(&mut self, s: S) {
         let (start, found) = (self.start, &self.found);
@@ -320,24 +375,22 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
             return;
         }
         let wide = s.wide();
-        let bounds = self.rays.row_bounds();
-        let mut left = !wide.find_word(NO_PRIM, &found.prim) & ALL;
-        let (mut t, mut u, mut v) = (wide.splat(f32::INFINITY), wide.splat(0.0), wide.splat(0.0));
-        let mut unsure = 0;
-        while left != 0 {
-            let place = found.place[left.trailing_zeros() as usize % RAYS];
-            let mine = wide.find_word(place, &found.place) & left;
-            // What is certain is known late: the next triangle does not wait for it.
-            left &= !mine;
-            let plane = Plane::of(&Place::corners(self.tree, place));
-            let met = plane.meet(wide, &self.rays.origin, &self.rays.dir, &bounds);
-            let weights = plane.barycentrics(wide, &self.rays.origin, &self.rays.dir, met.t_f64);
-            unsure |= mine & !met.sure;
-            t = wide.choose(mine, met.t, t);
-            u = wide.choose(mine, weights[0], u);
-            v = wide.choose(mine, weights[1], v);
+        let hit = !wide.find_word(NO_PRIM, &found.prim) & ALL;
+        if hit == 0 {
+            return (start..start + RAYS).for_each(|i| self.wave.take(i, Hit::MISS));
         }
-        let (mut t, mut u, mut v) = (wide.store(t), wide.store(u), wide.store(v));
+        let (mut unsure, zero) = (hit, wide.splat(0.0));
+        let place = found.place[hit.trailing_zeros() as usize % RAYS];
+        let Meetings { t, weights: [u, v], sure } = if hit & !wide.find_word(place, &found.place) == 0 {
+            let bounds = self.rays.row_bounds();
+            Plane::of(&Place::corners(self.tree, place)).meet(wide, &self.rays.origin, &self.rays.dir, &bounds)
+        } else {
+            self.meet_each(wide, hit)
+        };
+        let t = wide.choose(unsure, t, wide.splat(f32::INFINITY));
+        let (mut t, mut u, mut v) =
+            (wide.store(t), wide.store(wide.choose(unsure, u, zero)), wide.store(wide.choose(unsure, v, zero)));
+        unsure &= !sure;
         while unsure != 0 {
             let ray = unsure.trailing_zeros() as usize % RAYS;
             unsure &= unsure - 1;

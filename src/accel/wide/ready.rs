@@ -98,15 +98,10 @@ impl<S: Simd> Columns<S> {
     /// The first eight rays, the last repeated where there are fewer.
     #[inline(always)]
     pub(super) fn of(s: S, rays: &[Ray]) -> Self {
-        let (mut from, mut to) = ([[0.0; 4]; LANES], [[0.0; 4]; LANES]);
         let last = rays.len() - 1;
-        for lane in 0..LANES {
-            let ray = &rays[lane.min(last)];
-            let (o, d) = (ray.origin, ray.dir);
-            from[lane] = [o.x, o.y, o.z, ray.t_min];
-            to[lane] = [d.x, d.y, d.z, ray.t_max];
-        }
-        let ([ox, oy, oz, t_min], [dx, dy, dz, t_max]) = (s.columns(&from), s.columns(&to));
+        let rays: [_; LANES] = std::array::from_fn(|lane| rays[lane.min(last)].in_fours());
+        let [ox, oy, oz, t_min] = s.columns(rays.map(|[from, _]| from));
+        let [dx, dy, dz, t_max] = s.columns(rays.map(|[_, to]| to));
         Self { origin: [ox, oy, oz], dir: [dx, dy, dz], t_min, t_max }
     }
 }

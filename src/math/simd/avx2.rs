@@ -248,12 +248,6 @@ macro_rules! eight_lanes {
             }
 
             #[inline(always)]
-            fn load_f64(self, row: &[f64; LANES]) -> [__m256d; 2] {
-                // SAFETY: as above; reads the eight numbers of the row, with no demand on alignment.
-                unsafe { [_mm256_loadu_pd(row.as_ptr()), _mm256_loadu_pd(row.as_ptr().add(4))] }
-            }
-
-            #[inline(always)]
             fn store_f64(self, a: [__m256d; 2]) -> [f64; LANES] {
                 let mut row = [0.0; LANES];
                 // SAFETY: as above; writes the eight numbers of the row, with no demand on alignment.
@@ -319,15 +313,13 @@ macro_rules! eight_lanes {
             }
 
             #[inline(always)]
-            fn put_f64(self, mask: u32, a: [__m256d; 2], to: &mut [f64; LANES]) {
-                // SAFETY: as above; reads and writes the eight numbers of the row, with no demand on alignment.
+            fn choose_f64(self, mask: u32, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
+                // SAFETY: as above.
                 unsafe {
                     let lanes = lanes_in(mask);
                     let low = _mm256_castsi256_pd(_mm256_cvtepi32_epi64(_mm256_castsi256_si128(lanes)));
                     let high = _mm256_castsi256_pd(_mm256_cvtepi32_epi64(_mm256_extracti128_si256::<1>(lanes)));
-                    let at = to.as_mut_ptr();
-                    _mm256_storeu_pd(at, _mm256_blendv_pd(_mm256_loadu_pd(at), a[0], low));
-                    _mm256_storeu_pd(at.add(4), _mm256_blendv_pd(_mm256_loadu_pd(at.add(4)), a[1], high));
+                    [_mm256_blendv_pd(b[0], a[0], low), _mm256_blendv_pd(b[1], a[1], high)]
                 }
             }
         }
@@ -367,7 +359,7 @@ macro_rules! eight_lanes {
             }
 
             #[inline(always)]
-            fn columns(self, rows: &[[f32; 4]; LANES]) -> [__m256; 4] {
+            fn columns(self, rows: [&[f32; 4]; LANES]) -> [__m256; 4] {
                 let [r0, r1, r2, r3, r4, r5, r6, r7] = rows;
                 // SAFETY: as above; reads the four numbers of each row, with no demand on alignment.
                 unsafe {
@@ -431,6 +423,15 @@ macro_rules! eight_lanes {
                 let at = if first { a } else { b };
                 for line in (0..256).step_by(64) {
                     // SAFETY: as above; nothing is read, so that it does not matter where the address lies.
+                    unsafe { _mm_prefetch::<_MM_HINT_T0>(at.wrapping_add(line)) };
+                }
+            }
+
+            #[inline(always)]
+            fn prefetch<T>(self, all: &[T]) {
+                let at: *const i8 = all.as_ptr().cast();
+                for line in (0..size_of_val(all)).step_by(64) {
+                    // SAFETY: as above; nothing is read.
                     unsafe { _mm_prefetch::<_MM_HINT_T0>(at.wrapping_add(line)) };
                 }
             }

@@ -265,12 +265,6 @@ impl Lanewise<WIDE> for Sixteen {
     }
 
     #[inline(always)]
-    fn load_f64(self, row: &[f64; WIDE]) -> [__m512d; 2] {
-        // SAFETY: as above; reads the sixteen numbers of the row, with no demand on alignment.
-        unsafe { [_mm512_loadu_pd(row.as_ptr()), _mm512_loadu_pd(row.as_ptr().add(8))] }
-    }
-
-    #[inline(always)]
     fn store_f64(self, a: [__m512d; 2]) -> [f64; WIDE] {
         let mut row = [0.0; WIDE];
         // SAFETY: as above; writes the sixteen numbers of the row, with no demand on alignment.
@@ -334,13 +328,13 @@ impl Lanewise<WIDE> for Sixteen {
     }
 
     #[inline(always)]
-    fn put_f64(self, mask: u32, a: [__m512d; 2], to: &mut [f64; WIDE]) {
-        // SAFETY: as above; reads and writes the sixteen numbers of the row, with no demand on alignment.
+    fn choose_f64(self, mask: u32, a: [__m512d; 2], b: [__m512d; 2]) -> [__m512d; 2] {
+        // SAFETY: as above.
         unsafe {
-            let at = to.as_mut_ptr();
-            _mm512_storeu_pd(at, _mm512_mask_mov_pd(_mm512_loadu_pd(at), mask as __mmask8, a[0]));
-            let (mask, at) = ((mask >> LANES) as __mmask8, at.add(LANES));
-            _mm512_storeu_pd(at, _mm512_mask_mov_pd(_mm512_loadu_pd(at), mask, a[1]));
+            [
+                _mm512_mask_blend_pd(mask as __mmask8, b[0], a[0]),
+                _mm512_mask_blend_pd((mask >> LANES) as __mmask8, b[1], a[1]),
+            ]
         }
     }
 }

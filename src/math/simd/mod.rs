@@ -102,8 +102,6 @@ pub trait Lanewise<const N: usize>: Copy {
     fn widen(self, a: Self::Lanes) -> Self::Doubles;
     /// The nearest numbers in single precision.
     fn narrow(self, a: Self::Doubles) -> Self::Lanes;
-    /// From memory.
-    fn load_f64(self, row: &[f64; N]) -> Self::Doubles;
     /// To memory.
     fn store_f64(self, a: Self::Doubles) -> [f64; N];
     /// a + b.
@@ -122,8 +120,8 @@ pub trait Lanewise<const N: usize>: Copy {
     fn smaller_f64(self, a: Self::Doubles, b: Self::Doubles) -> Self::Doubles;
     /// a < b; false where one is NaN.
     fn less_f64(self, a: Self::Doubles, b: Self::Doubles) -> u32;
-    /// To memory in the lanes of `mask`; the others stay.
-    fn put_f64(self, mask: u32, a: Self::Doubles, to: &mut [f64; N]);
+    /// `a` in the lanes of `mask`, else `b`.
+    fn choose_f64(self, mask: u32, a: Self::Doubles, b: Self::Doubles) -> Self::Doubles;
 }
 
 /// One instruction set: eight lanes, what nodes and blocks need besides, and sixteen lanes.
@@ -142,7 +140,7 @@ pub trait Simd: Lanewise<LANES> {
     /// One of six rows.
     fn pick(self, rows: &[Row; 6], pick: Pick) -> Self::Lanes;
     /// Rows of four become columns: lane k of the i-th result is number i of the k-th row.
-    fn columns(self, rows: &[[f32; 4]; LANES]) -> [Self::Lanes; 4];
+    fn columns(self, rows: [&[f32; 4]; LANES]) -> [Self::Lanes; 4];
     /// The other way round.
     fn rows(self, columns: [Self::Lanes; 4]) -> [[f32; 4]; LANES];
     /// To memory in another order: place k gets the lane that byte k of `order` names, 0 to 7.
@@ -152,6 +150,8 @@ pub trait Simd: Lanewise<LANES> {
     /// Tells the processor that the first four cache lines of one of both are read soon, without a branch; elements that
     /// there are not do no harm.
     fn prefetch_either<T, U>(self, first: bool, a: (&[T], usize), b: (&[U], usize));
+    /// Tells the processor that all of this is read soon.
+    fn prefetch<T>(self, all: &[T]);
 }
 
 /// Which of six rows, by the bytes before it: found once and used often, without a test that it is one of them.

@@ -319,12 +319,6 @@ impl Lanewise<LANES> for Neon {
     }
 
     #[inline(always)]
-    fn load_f64(self, row: &[f64; LANES]) -> Doubles {
-        let pairs = row.as_chunks().0;
-        [load_pair(&pairs[0]), load_pair(&pairs[1]), load_pair(&pairs[2]), load_pair(&pairs[3])]
-    }
-
-    #[inline(always)]
     fn store_f64(self, a: Doubles) -> [f64; LANES] {
         let mut row = [0.0; LANES];
         let pairs = row.as_chunks_mut().0;
@@ -397,13 +391,15 @@ impl Lanewise<LANES> for Neon {
     }
 
     #[inline(always)]
-    fn put_f64(self, mask: u32, a: Doubles, to: &mut [f64; LANES]) {
+    fn choose_f64(self, mask: u32, a: Doubles, b: Doubles) -> Doubles {
         // SAFETY: every processor of the family has the instructions.
         unsafe {
-            for (k, (pair, a)) in (0..).zip(to.as_chunks_mut().0.iter_mut().zip(a)) {
-                let old = load_pair(pair);
-                store_pair(vbslq_f64(pair_in(mask >> (2 * k)), a, old), pair);
-            }
+            [
+                vbslq_f64(pair_in(mask), a[0], b[0]),
+                vbslq_f64(pair_in(mask >> 2), a[1], b[1]),
+                vbslq_f64(pair_in(mask >> 4), a[2], b[2]),
+                vbslq_f64(pair_in(mask >> 6), a[3], b[3]),
+            ]
         }
     }
 }
@@ -437,9 +433,9 @@ impl Simd for Neon {
     }
 
     #[inline(always)]
-    fn columns(self, rows: &[[f32; 4]; LANES]) -> [Floats; 4] {
-        let low = turned([load(&rows[0]), load(&rows[1]), load(&rows[2]), load(&rows[3])]);
-        let high = turned([load(&rows[4]), load(&rows[5]), load(&rows[6]), load(&rows[7])]);
+    fn columns(self, rows: [&[f32; 4]; LANES]) -> [Floats; 4] {
+        let low = turned([load(rows[0]), load(rows[1]), load(rows[2]), load(rows[3])]);
+        let high = turned([load(rows[4]), load(rows[5]), load(rows[6]), load(rows[7])]);
         [[low[0], high[0]], [low[1], high[1]], [low[2], high[2]], [low[3], high[3]]]
     }
 
@@ -481,4 +477,7 @@ impl Simd for Neon {
 
     #[inline(always)]
     fn prefetch_either<T, U>(self, _: bool, _: (&[T], usize), _: (&[U], usize)) {}
+
+    #[inline(always)]
+    fn prefetch<T>(self, _: &[T]) {}
 }

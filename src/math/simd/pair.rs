@@ -178,12 +178,6 @@ impl<S: Lanewise<LANES>> Lanewise<WIDE> for Pair<S> {
     }
 
     #[inline(always)]
-    fn load_f64(self, row: &[f64; WIDE]) -> Self::Doubles {
-        let (low, high) = halves(row);
-        [self.0.load_f64(low), self.0.load_f64(high)]
-    }
-
-    #[inline(always)]
     fn store_f64(self, [low, high]: Self::Doubles) -> [f64; WIDE] {
         joined(self.0.store_f64(low), self.0.store_f64(high))
     }
@@ -229,9 +223,7 @@ impl<S: Lanewise<LANES>> Lanewise<WIDE> for Pair<S> {
     }
 
     #[inline(always)]
-    fn put_f64(self, mask: u32, a: Self::Doubles, to: &mut [f64; WIDE]) {
-        let (low, high) = halves_mut(to);
-        self.0.put_f64(mask, a[0], low);
-        self.0.put_f64(mask >> LANES, a[1], high);
+    fn choose_f64(self, mask: u32, a: Self::Doubles, b: Self::Doubles) -> Self::Doubles {
+        [self.0.choose_f64(mask, a[0], b[0]), self.0.choose_f64(mask >> LANES, a[1], b[1])]
     }
 }

@@ -168,11 +168,6 @@ impl Lanewise<LANES> for Portable {
     }
 
     #[inline(always)]
-    fn load_f64(self, row: &[f64; LANES]) -> [f64; LANES] {
-        *row
-    }
-
-    #[inline(always)]
     fn store_f64(self, a: [f64; LANES]) -> [f64; LANES] {
         a
     }
@@ -218,8 +213,9 @@ impl Lanewise<LANES> for Portable {
     }
 
     #[inline(always)]
-    fn put_f64(self, mask: u32, a: [f64; LANES], to: &mut [f64; LANES]) {
-        put(mask, &a, to);
+    fn choose_f64(self, mask: u32, a: [f64; LANES], mut b: [f64; LANES]) -> [f64; LANES] {
+        put(mask, &a, &mut b);
+        b
     }
 }
 
@@ -252,7 +248,7 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
-    fn columns(self, rows: &[[f32; 4]; LANES]) -> [Row; 4] {
+    fn columns(self, rows: [&[f32; 4]; LANES]) -> [Row; 4] {
         std::array::from_fn(|i| std::array::from_fn(|k| rows[k][i]))
     }
 
@@ -273,4 +269,7 @@ impl Simd for Portable {
 
     #[inline(always)]
     fn prefetch_either<T, U>(self, _: bool, _: (&[T], usize), _: (&[U], usize)) {}
+
+    #[inline(always)]
+    fn prefetch<T>(self, _: &[T]) {}
 }

@@ -41,8 +41,7 @@ fn everything<S: Lanewise<N>, const N: usize>(s: S, rows: &[[f32; N]; 2], mask: 
 
     let third = s.splat_f64(1.0 / 3.0);
     let c = s.mul_f64(s.widen(a), third);
-    let mut doubles = rows[1].map(f64::from);
-    let d = s.load_f64(&doubles);
+    let d = s.widen(b);
     let results = [
         s.add_f64(c, d),
         s.sub_f64(c, d),
@@ -52,11 +51,10 @@ fn everything<S: Lanewise<N>, const N: usize>(s: S, rows: &[[f32; N]; 2], mask: 
         s.greater_f64(c, d),
         s.smaller_f64(c, d),
         s.widen(s.narrow(c)),
+        s.choose_f64(mask, c, d),
     ];
     all.extend(results.into_iter().flat_map(|r| s.store_f64(r)).map(bits_f64));
     all.push(u64::from(s.less_f64(c, d)));
-    s.put_f64(mask, c, &mut doubles);
-    all.extend(doubles.map(bits_f64));
     all
 }
 
@@ -99,8 +97,8 @@ fn plainly<const N: usize>(rows: &[[f32; N]; 2], mask: u32) -> Vec<u64> {
         each(|a, _| f64::from(a as f32)),
     ];
     all.extend(results.concat());
-    all.push((0..N).fold(0, |m, k| m | u64::from(c[k] < d[k]) << k));
     all.extend((0..N).map(|k| bits_f64(if chosen(k) { c[k] } else { d[k] })));
+    all.push((0..N).fold(0, |m, k| m | u64::from(c[k] < d[k]) << k));
     all
 }
 
@@ -212,7 +210,7 @@ impl Kernel for Moved {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Self::Output {
-        let columns = s.columns(&self.0);
+        let columns = s.columns(self.0.each_ref());
         let order = 0x0706_0102_0005_0304;
         let (mut arranged, mut words) = ([0.0; LANES], [0; LANES]);
         s.arrange(columns[1], order, &mut arranged);
