@@ -1,9 +1,9 @@
 //! Rays from the eye: the first wave of every batch of pixels, many at a time.
 
-use super::view::{PrimaryRay, View};
+use super::view::{Lens, PrimaryRay, View};
 use super::wave::Path;
 use crate::accel::{Hit, NO_PRIM, Ray};
-use crate::math::simd::{Kernel, Level, Simd};
+use crate::math::simd::{Kernel, LANES, Level, Simd};
 use crate::math::{DVec3, Vec3};
 
 /// Rays that are set up at a time.
@@ -102,13 +102,18 @@ impl Eye<'_> {
     }
 
     #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, reason = "widths are estimates")]
     fn start(&self, eye: PrimaryRay) -> EyeRay {
-        let skipped = self.scene.distance_before(eye.origin, eye.dir);
+        self.skip(eye, self.scene.seen_from(eye.origin).distance_before(eye.dir))
+    }
+
+    /// Starts a ray so far along.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "widths are estimates")]
+    fn skip(&self, eye: PrimaryRay, distance: f64) -> EyeRay {
         EyeRay {
-            origin: (eye.origin - self.center + eye.dir * skipped).as_vec3(),
+            origin: (eye.origin - self.center + eye.dir * distance).as_vec3(),
             dir: eye.dir.as_vec3(),
-            cone_width: (eye.cone_width + eye.cone_spread * skipped as f32) * self.sample_width,
+            cone_width: (eye.cone_width + eye.cone_spread * distance as f32) * self.sample_width,
             cone_spread: eye.cone_spread * self.sample_width,
         }
     }
@@ -141,15 +146,30 @@ fn ray(origin: Vec3, dir: Vec3, sample: u32) -> Ray {
     Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude: NO_PRIM, sample }
 }
 
+/// A ball as a place sees it.
+#[derive(Clone, Copy)]
+struct SeenBall {
+    to_center: DVec3,
+    radius: f64,
+    /// Whether it is so far away that rays need not start at the place.
+    far: bool,
+}
+
 impl Ball {
-    /// How much of a ray can be skipped because all of it lies before the ball, seen from far away.
     #[inline(always)]
-    fn distance_before(&self, origin: DVec3, dir: DVec3) -> f64 {
-        let to_center = self.center - origin;
-        let far = to_center.length() > 2.0 * self.radius * FAR + self.radius;
+    fn seen_from(&self, origin: DVec3) -> SeenBall {
+        let (to_center, radius) = (self.center - origin, self.radius);
+        SeenBall { to_center, radius, far: to_center.length() > 2.0 * radius * FAR + radius }
+    }
+}
+
+impl SeenBall {
+    /// The distance that a ray can skip because all of it lies before the ball.
+    #[inline(always)]
+    fn distance_before(&self, dir: DVec3) -> f64 {
         // Twice the radius leaves room for the rounding of the start.
-        let skipped = to_center.dot(dir) - 2.0 * self.radius;
-        if far & (skipped > 0.0) & (skipped < f64::INFINITY) { skipped } else { 0.0 }
+        let skipped = self.to_center.dot(dir) - 2.0 * self.radius;
+        if self.far & (skipped > 0.0) & (skipped < f64::INFINITY) { skipped } else { 0.0 }
     }
 }
 
@@ -164,28 +184,27 @@ impl Eyes {
     /// Adds the rays of these places; the `i`th ray is that of sample `i`.
     pub(crate) fn send(&mut self, eye: &Eye, places: impl Iterator<Item = Place>) {
         let mut run = Run::default();
-        for Place { x, y, lens } in places {
+        places.for_each(|Place { x, y, lens }| {
             let at = run.count % RUN;
-            (run.x[at], run.y[at], run.lens[at]) = (x, y, lens);
+            (run.x[at], run.y[at]) = (x, y);
+            if eye.lens.is_some() {
+                run.lens[at] = lens;
+            }
             run.count += 1;
             if run.count == RUN {
                 self.take(eye, &mut run);
             }
-        }
+        });
         self.take(eye, &mut run);
     }
 
     fn take(&mut self, eye: &Eye, run: &mut Run) {
-        Level::best().run(Aim { eye, run });
+        #[expect(clippy::cast_possible_truncation, reason = "a wave has few samples")]
+        Level::best().run(Aim { eye, run, sample: self.rays.len() as u32 });
         let count = run.count.min(RUN);
-        for (i, sample) in (0..count).zip(self.rays.len()..) {
-            let [ox, oy, oz] = [run.origin[0][i], run.origin[1][i], run.origin[2][i]];
-            let [dx, dy, dz] = [run.dir[0][i], run.dir[1][i], run.dir[2][i]];
-            #[expect(clippy::cast_possible_truncation, reason = "a wave has few samples")]
-            self.rays.push(ray(Vec3::new(ox, oy, oz), Vec3::new(dx, dy, dz), sample as u32));
-        }
-        self.cone_width.extend(&run.cone_width[..count]);
-        self.cone_spread.extend(&run.cone_spread[..count]);
+        self.rays.extend_from_slice(&run.rays[..count]);
+        self.cone_width.extend_from_slice(&run.cone_width[..count]);
+        self.cone_spread.extend_from_slice(&run.cone_spread[..count]);
         run.count = 0;
     }
 
@@ -205,6 +224,7 @@ struct Run {
     dir: [[f32; RUN]; 3],
     cone_width: [f32; RUN],
     cone_spread: [f32; RUN],
+    rays: [Ray; RUN],
 }
 
 impl Default for Run {
@@ -218,6 +238,7 @@ impl Default for Run {
             dir: [[0.0; RUN]; 3],
             cone_width: [0.0; RUN],
             cone_spread: [0.0; RUN],
+            rays: [ray(Vec3::ZERO, Vec3::ZERO, 0); RUN],
         }
     }
 }
@@ -225,25 +246,63 @@ impl Default for Run {
 struct Aim<'a> {
     eye: &'a Eye<'a>,
     run: &'a mut Run,
+    /// That of the first ray.
+    sample: u32,
 }
 
 impl Kernel for Aim<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<S: Simd>(self, _: S) {
-        let Self { eye, run } = self;
+    fn run<S: Simd>(self, s: S) {
+        let Self { eye, run, sample } = self;
         let view = *eye.view;
         let eye = Eye { view: &view, ..*eye };
-        for i in 0..run.count.next_multiple_of(8).min(RUN) {
-            let mut ray = view.primary(run.x[i], run.y[i], eye.width, eye.height);
-            if let Some(lens) = eye.lens {
-                ray = eye.through(lens, ray, run.lens[i]);
+        // What all rays share is decided outside the loop, which then is a formula.
+        match (view.lens, eye.lens) {
+            (Lens::Perspective { .. }, None) => {
+                let ball = eye.scene.seen_from(view.eye);
+                if ball.far {
+                    run.each(&eye, |ray, _| eye.skip(ray, ball.distance_before(ray.dir)));
+                } else {
+                    run.each(&eye, |ray, _| eye.skip(ray, 0.0));
+                }
             }
-            let EyeRay { origin, dir, cone_width, cone_spread } = eye.start(ray);
-            (run.origin[0][i], run.origin[1][i], run.origin[2][i]) = (origin.x, origin.y, origin.z);
-            (run.dir[0][i], run.dir[1][i], run.dir[2][i]) = (dir.x, dir.y, dir.z);
-            (run.cone_width[i], run.cone_spread[i]) = (cone_width, cone_spread);
+            (_, None) => run.each(&eye, |ray, _| eye.start(ray)),
+            (_, Some(lens)) => run.each(&eye, |ray, at| eye.start(eye.through(lens, ray, at))),
+        }
+        run.write_rays(s, sample);
+    }
+}
+
+impl Run {
+    /// Finds every ray from that through the middle of the lens, and the point of the lens.
+    #[inline(always)]
+    fn each(&mut self, eye: &Eye, start: impl Fn(PrimaryRay, [f64; 2]) -> EyeRay) {
+        for i in 0..self.count.next_multiple_of(LANES).min(RUN) {
+            let ray = eye.view.primary(self.x[i], self.y[i], eye.width, eye.height);
+            let EyeRay { origin, dir, cone_width, cone_spread } = start(ray, self.lens[i]);
+            (self.origin[0][i], self.origin[1][i], self.origin[2][i]) = (origin.x, origin.y, origin.z);
+            (self.dir[0][i], self.dir[1][i], self.dir[2][i]) = (dir.x, dir.y, dir.z);
+            (self.cone_width[i], self.cone_spread[i]) = (cone_width, cone_spread);
+        }
+    }
+
+    /// Rays from their columns, as they lie in memory: four numbers at a time.
+    #[inline(always)]
+    fn write_rays<S: Simd>(&mut self, s: S, mut sample: u32) {
+        let (zero, infinite) = (s.splat(0.0), s.splat(f32::INFINITY));
+        let eights = self.count.div_ceil(LANES).min(RUN / LANES);
+        for (k, rays) in self.rays.as_chunks_mut::<LANES>().0[..eights].iter_mut().enumerate() {
+            let eight = |row: &[f32; RUN]| row.as_chunks::<LANES>().0[k];
+            let [ox, oy, oz] = [eight(&self.origin[0]), eight(&self.origin[1]), eight(&self.origin[2])];
+            let [dx, dy, dz] = [eight(&self.dir[0]), eight(&self.dir[1]), eight(&self.dir[2])];
+            let from = s.rows([s.load(&ox), s.load(&oy), s.load(&oz), zero]);
+            let to = s.rows([s.load(&dx), s.load(&dy), s.load(&dz), infinite]);
+            for (ray, (from, to)) in rays.iter_mut().zip(from.into_iter().zip(to)) {
+                *ray = Ray::from_fours([from, to], NO_PRIM, sample);
+                sample += 1;
+            }
         }
     }
 }
@@ -251,7 +310,6 @@ impl Kernel for Aim<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::view::Lens;
 
     fn eye(view: &View, lens: Option<ThinLens>) -> Eye<'_> {
         let scene = Ball { center: DVec3::ZERO, radius: f64::INFINITY };

@@ -110,12 +110,13 @@ impl View {
         match self.lens {
             Lens::Perspective { half_height } => {
                 let to_film = (self.right * film.x + self.up * film.y) * half_height + self.forward;
-                let distance = to_film.length();
+                // One division for all four.
+                let nearness = 1.0 / to_film.length();
                 PrimaryRay {
                     origin: self.eye,
-                    dir: to_film / distance,
+                    dir: to_film * nearness,
                     cone_width: 0.0,
-                    cone_spread: narrow(pixel * half_height / distance),
+                    cone_spread: narrow(pixel * half_height * nearness),
                 }
             }
             Lens::Orthographic { half_height } => PrimaryRay {
