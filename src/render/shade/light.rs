@@ -64,10 +64,7 @@ impl Incident {
     /// Direction and end of a shadow ray from `origin`.
     #[inline(always)]
     pub(crate) fn way(&self, origin: Vec3) -> (Vec3, f32) {
-        match self.position {
-            Some(position) => (position - origin, BEFORE_LIGHT),
-            None => (self.to_light, f32::INFINITY),
-        }
+        way(origin, self.to_light, self.position)
     }
 
     /// Radiance of a white matt surface that faces the light: the founding texts' I.
@@ -80,6 +77,15 @@ impl Incident {
     #[inline(always)]
     pub(crate) fn irradiance(&self) -> Vec3 {
         self.strength * PI
+    }
+}
+
+/// Direction and end of a shadow ray from `origin` to a light in this direction, at `position` if it is anywhere.
+#[inline(always)]
+pub(crate) fn way(origin: Vec3, to_light: Vec3, position: Option<Vec3>) -> (Vec3, f32) {
+    match position {
+        Some(position) => (position - origin, BEFORE_LIGHT),
+        None => (to_light, f32::INFINITY),
     }
 }
 
@@ -154,9 +160,42 @@ impl LocalLight {
         arrives.then_some(incident)
     }
 
+    /// [`Self::arriving`] at the first so many positions.
+    #[inline(always)]
+    pub(crate) fn arriving_at(
+        &self,
+        points: usize,
+        position: impl Fn(usize) -> Vec3,
+        mut take: impl FnMut(usize, (Incident, bool)),
+    ) {
+        // The shape is known outside the loop, which then is a formula.
+        match self.shape {
+            Shape::Directional(to_light) => {
+                let light = Self { shape: Shape::Directional(to_light), ..*self };
+                (0..points).for_each(|i| take(i, light.arriving(position(i))));
+            }
+            Shape::Point { position: from, falloff, cone } => {
+                let light = Self { shape: Shape::Point { position: from, falloff, cone }, ..*self };
+                (0..points).for_each(|i| take(i, light.arriving(position(i))));
+            }
+            Shape::Rectangle { position: middle, sides, normal, falloff } => {
+                let light = Self { shape: Shape::Rectangle { position: middle, sides, normal, falloff }, ..*self };
+                (0..points).for_each(|i| take(i, light.arriving(position(i))));
+            }
+        }
+    }
+
+    /// Where it stands; `None`: nowhere.
+    pub(crate) fn position(&self) -> Option<Vec3> {
+        match self.shape {
+            Shape::Directional(_) => None,
+            Shape::Point { position, .. } | Shape::Rectangle { position, .. } => Some(position),
+        }
+    }
+
     /// The same, and whether anything arrives.
     #[inline(always)]
-    pub(crate) fn arriving(&self, position: Vec3) -> (Incident, bool) {
+    fn arriving(&self, position: Vec3) -> (Incident, bool) {
         let (to_light, share, end) = match self.shape {
             Shape::Directional(to_light) => (to_light, 1.0 / PI, None),
             // As seen from far away.

@@ -17,7 +17,7 @@ mod spectrum;
 
 pub(crate) use coat::CoatMatter;
 pub(crate) use grain::GrainMatter;
-pub(crate) use light::{Incident, LocalLight};
+pub(crate) use light::{Incident, LocalLight, way};
 pub(crate) use lobe::Lobe;
 pub(crate) use metal_rough::{Around, MetalRoughMatter, above};
 pub(crate) use phong::PhongMatter;

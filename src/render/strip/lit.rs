@@ -6,7 +6,7 @@ use crate::math::Vec3;
 use crate::math::bounds::offset_origin;
 use crate::math::simd::{Kernel, Simd};
 use crate::render::curve::STEEP;
-use crate::render::shade::{Incident, LocalLight, Matter, Model, terminator};
+use crate::render::shade::{LocalLight, Matter, Model, terminator, way};
 
 /// What one light does at each point.
 pub(super) struct Lit {
@@ -14,6 +14,9 @@ pub(super) struct Lit {
     pub seen: [u32; POINTS],
     /// 1 where its light is so flat that shadow rays do not start on the triangle.
     pub grazes: [u32; POINTS],
+    to_light: Columns,
+    /// Its strength, or irradiance, as the model wants it.
+    light: Columns,
     pub radiance: Columns,
     /// The shadow ray.
     pub origin: Columns,
@@ -24,7 +27,16 @@ pub(super) struct Lit {
 impl Default for Lit {
     fn default() -> Self {
         let empty = [[0.0; POINTS]; 3];
-        Self { seen: [0; POINTS], grazes: [0; POINTS], radiance: empty, origin: empty, dir: empty, end: [0.0; POINTS] }
+        Self {
+            seen: [0; POINTS],
+            grazes: [0; POINTS],
+            to_light: empty,
+            light: empty,
+            radiance: empty,
+            origin: empty,
+            dir: empty,
+            end: [0.0; POINTS],
+        }
     }
 }
 
@@ -84,49 +96,59 @@ impl Kernel for Shine<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
         let Self { found, lit, points, matter, light } = self;
-        let light = *light;
+        let (points, light) = (points.min(POINTS), *light);
+        let in_lux = matches!(matter.model, Model::MetalRough(_));
+        light.arriving_at(
+            points,
+            |i| get(&found.position, i),
+            |i, (incident, arrives)| {
+                put(&mut lit.to_light, i, incident.to_light);
+                put(&mut lit.light, i, if in_lux { incident.irradiance() } else { incident.strength() });
+                lit.seen[i] = u32::from(arrives);
+            },
+        );
         // The model is chosen outside the loop, which then is a formula.
         match &matter.model {
             Model::Unlit(_) => lit.seen.fill(0),
             Model::Phong(m) => {
                 let m = m.clone();
-                each(found, lit, points, &light, |normal, view, incident| {
-                    m.lit(normal, view, incident.to_light) * incident.strength()
-                });
+                reflect(found, lit, points, |normal, view, to_light| m.lit(normal, view, to_light));
             }
             Model::MetalRough(m) => {
                 let m = m.clone();
-                each(found, lit, points, &light, |normal, view, incident| {
-                    m.lit(normal, view, incident.to_light) * incident.irradiance()
-                });
+                reflect(found, lit, points, |normal, view, to_light| m.lit(normal, view, to_light));
             }
+        }
+        match light.position() {
+            Some(position) => start(found, lit, points, Some(position)),
+            None => start(found, lit, points, None),
         }
     }
 }
 
+/// What the points reflect of the light that arrives.
 #[inline(always)]
-fn each(
-    found: &Found,
-    lit: &mut Lit,
-    points: usize,
-    light: &LocalLight,
-    reflect: impl Fn(Vec3, Vec3, &Incident) -> Vec3,
-) {
+fn reflect(found: &Found, lit: &mut Lit, points: usize, share: impl Fn(Vec3, Vec3, Vec3) -> Vec3) {
     for i in 0..points.min(POINTS) {
-        let (position, error) = (get(&found.position, i), get(&found.error, i));
-        let (geometric, normal) = (get(&found.geometric, i), get(&found.normal, i));
-        let (incident, arrives) = light.arriving(position);
-        let to_light = incident.to_light;
+        let (geometric, normal, to_light) = (get(&found.geometric, i), get(&found.normal, i), get(&lit.to_light, i));
         let curved = found.curved[i] == 1;
         let horizon = if curved { normal } else { geometric };
         let above = horizon.dot(to_light) > 0.0;
         let smooth = terminator(horizon, normal, to_light);
-        let radiance = reflect(normal, get(&found.view, i), &incident) * smooth;
-        let (dir, end) = incident.way(offset_origin(position, error, geometric, to_light));
-        let seen = arrives & above & radiance.is_finite() & (radiance.max_element() > 0.0);
-        lit.seen[i] = u32::from(seen);
+        let radiance = share(normal, get(&found.view, i), to_light) * get(&lit.light, i) * smooth;
+        lit.seen[i] &= u32::from(above & radiance.is_finite() & (radiance.max_element() > 0.0));
         lit.grazes[i] = u32::from(curved & (geometric.dot(to_light) < STEEP));
         put(&mut lit.radiance, i, radiance);
+    }
+}
+
+/// Where shadow rays start, and where they go.
+#[inline(always)]
+fn start(found: &Found, lit: &mut Lit, points: usize, light: Option<Vec3>) {
+    for i in 0..points.min(POINTS) {
+        let (position, error, geometric) = (get(&found.position, i), get(&found.error, i), get(&found.geometric, i));
+        let to_light = get(&lit.to_light, i);
+        let (dir, end) = way(offset_origin(position, error, geometric, to_light), to_light, light);
         put(&mut lit.origin, i, offset_origin(position, error, geometric, dir));
         put(&mut lit.dir, i, dir);
         lit.end[i] = end;
