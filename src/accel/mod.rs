@@ -77,7 +77,7 @@ pub struct Ray {
 impl Ray {
     /// Origin and `t_min`, direction and `t_max`: four numbers in a row each, which lanes read at once.
     #[inline(always)]
-    fn in_fours(&self) -> [&[f32; 4]; 2] {
+    pub(crate) fn in_fours(&self) -> [&[f32; 4]; 2] {
         let [from, to] = &bytemuck::cast_ref::<Self, RayWords>(self).numbers;
         [from, to]
     }
@@ -98,7 +98,7 @@ struct RayWords {
 }
 
 /// Where a ray meets a shape. Geometry only: the caller looks up what it is made of.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Hit {
     /// Distance in lengths of the ray's direction; infinite for a miss.
@@ -114,6 +114,12 @@ pub struct Hit {
 impl Hit {
     /// No hit.
     pub const MISS: Self = Self { t: f32::INFINITY, u: 0.0, v: 0.0, prim: NO_PRIM };
+
+    /// t, u, v, and the bits of prim: four numbers in a row, which lanes read at once.
+    #[inline(always)]
+    pub(crate) fn as_four(&self) -> &[f32; 4] {
+        bytemuck::cast_ref(self)
+    }
 
     /// t, u, v and prim as bits: equal only where every bit of two hits is.
     pub fn bits(&self) -> [u32; 4] {

@@ -13,11 +13,11 @@
 //! The room stands in a frame whose +Y is up and whose +Z is in front, where glTF models look; [`from_world`] turns
 //! directions of scenes with another up axis into it. It does not follow the camera: the default lights do.
 
-use crate::math::{Vec3, Vec4};
+use crate::math::Vec3;
 use crate::scene::UpAxis;
 
 /// Turns a world direction of a scene with up axis `up` into the studio's frame.
-#[inline]
+#[inline(always)]
 pub fn from_world(up: UpAxis, dir: Vec3) -> Vec3 {
     match up {
         UpAxis::Y => dir,
@@ -41,7 +41,7 @@ pub fn radiance(dir: Vec3) -> Vec3 {
 }
 
 /// Mean radiance around the unit mirror direction `dir` for a perceptual roughness of 0 (just [`radiance`]) … 1.
-#[inline]
+#[inline(always)]
 pub fn blurred(dir: Vec3, roughness: f32) -> Vec3 {
     let alpha = roughness.clamp(0.0, 1.0) * roughness.clamp(0.0, 1.0);
     let sharp = room(dir, alpha);
@@ -50,7 +50,7 @@ pub fn blurred(dir: Vec3, roughness: f32) -> Vec3 {
 }
 
 /// Cosine-weighted mean radiance over the hemisphere around the unit vector `normal`: irradiance / π.
-#[inline]
+#[inline(always)]
 pub fn diffuse(normal: Vec3) -> Vec3 {
     Vec3::splat(mean_over_hemisphere(normal))
 }
@@ -75,81 +75,87 @@ const BACKDROP_EDGE: f32 = 0.45;
 /// Softness (in direction cosines) of the line between wall and floor.
 const FLOOR_EDGE: f32 = 0.22;
 
-/// The rectangular lights, one a lane: key overhead in front, left strip, right panel, rim behind.
+/// A number of each rectangular light.
+type Four = [f32; 4];
+
+/// The rectangular lights: key overhead in front, left strip, right panel, rim behind.
 ///
 /// Their flat coordinates are direction cosines along `right` and `up`, which with `toward` are perpendicular unit
-/// vectors; these are rows of numbers because every point of a picture asks for the room.
+/// vectors. They are rows of plain numbers so that the formulas become lanes: of the four lights of one point, or of many
+/// points.
 struct SoftBoxes {
-    toward: [Vec4; 3],
-    right: [Vec4; 3],
-    up: [Vec4; 3],
+    toward: [Four; 3],
+    right: [Four; 3],
+    up: [Four; 3],
     /// Half their sides.
-    half: [Vec4; 2],
+    half: [Four; 2],
     /// Squared softness of their edges.
-    edge_squared: Vec4,
+    edge_squared: Four,
     /// Radiance added in their middles.
-    radiance: Vec4,
+    radiance: Four,
 }
 
 const BOXES: SoftBoxes = SoftBoxes {
     toward: [
-        Vec4::new(-0.339_151_1, -0.943_698_3, 0.895_972_1, 0.370_053_23),
-        Vec4::new(0.775_202_5, 0.218_540_65, 0.289_023_25, 0.666_095_85),
-        Vec4::new(0.532_951_7, 0.248_341_65, 0.337_193_8, -0.647_593_2),
+        [-0.339_151_1, -0.943_698_3, 0.895_972_1, 0.370_053_23],
+        [0.775_202_5, 0.218_540_65, 0.289_023_25, 0.666_095_85],
+        [0.532_951_7, 0.248_341_65, 0.337_193_8, -0.647_593_2],
     ],
     right: [
-        Vec4::new(0.843_661_5, 0.254_493_3, 0.352_226_05, -0.868_243_16),
-        Vec4::ZERO,
-        Vec4::new(0.536_875_5, 0.967_074_5, -0.935_914_93, -0.496_138_93),
+        [0.843_661_5, 0.254_493_3, 0.352_226_05, -0.868_243_16],
+        [0.0; 4],
+        [0.536_875_5, 0.967_074_5, -0.935_914_93, -0.496_138_93],
     ],
     up: [
-        Vec4::new(0.416_187_23, 0.211_345_09, -0.270_501_17, -0.330_476_08),
-        Vec4::new(0.631_712_8, 0.975_827_9, 0.957_322_06, 0.745_866_2),
-        Vec4::new(-0.654_008_5, -0.055_617_13, -0.101_801_515, 0.578_333_14),
+        [0.416_187_23, 0.211_345_09, -0.270_501_17, -0.330_476_08],
+        [0.631_712_8, 0.975_827_9, 0.957_322_06, 0.745_866_2],
+        [-0.654_008_5, -0.055_617_13, -0.101_801_515, 0.578_333_14],
     ],
-    half: [Vec4::new(0.36, 0.11, 0.24, 0.38), Vec4::new(0.26, 0.42, 0.34, 0.18)],
-    edge_squared: Vec4::new(0.05 * 0.05, 0.05 * 0.05, 0.06 * 0.06, 0.06 * 0.06),
-    radiance: Vec4::new(2.1, 1.3, 0.9, 1.5),
+    half: [[0.36, 0.11, 0.24, 0.38], [0.26, 0.42, 0.34, 0.18]],
+    edge_squared: [0.05 * 0.05, 0.05 * 0.05, 0.06 * 0.06, 0.06 * 0.06],
+    radiance: [2.1, 1.3, 0.9, 1.5],
 };
 
 impl SoftBoxes {
     /// Their light along `dir`, every edge softened by `blur` more.
+    #[inline(always)]
     fn along(&self, dir: Vec3, blur: f32) -> f32 {
-        let (x, y, z) = (Vec4::splat(dir.x), Vec4::splat(dir.y), Vec4::splat(dir.z));
-        let cosine = |axis: &[Vec4; 3]| x * axis[0] + y * axis[1] + z * axis[2];
-        let edge_squared = self.edge_squared + Vec4::splat(blur * blur);
-        // The flat coordinates see the back of the room mirrored: fade it out around the edge of sight.
-        let front = steps(cosine(&self.toward), edge_squared.max(Vec4::splat(0.01)));
-        let across = slabs(cosine(&self.right), self.half[0], edge_squared);
-        let along = slabs(cosine(&self.up), self.half[1], edge_squared);
-        (self.radiance * front * across * along).element_sum()
+        let mut light = [0.0; 4];
+        for (k, light) in light.iter_mut().enumerate() {
+            let cosine = |axis: &[Four; 3]| dir.x * axis[0][k] + dir.y * axis[1][k] + dir.z * axis[2][k];
+            let edge_squared = self.edge_squared[k] + blur * blur;
+            // The flat coordinates see the back of the room mirrored: fade it out around the edge of sight.
+            let front = step(cosine(&self.toward), edge_squared.max(0.01));
+            let across = slab(cosine(&self.right), self.half[0][k], edge_squared);
+            let along = slab(cosine(&self.up), self.half[1][k], edge_squared);
+            *light = self.radiance[k] * front * across * along;
+        }
+        (light[0] + light[1]) + (light[2] + light[3])
     }
 }
 
 /// The room along `dir`, blurred by a lobe of width `alpha`.
+#[inline(always)]
 fn room(dir: Vec3, alpha: f32) -> f32 {
     let blur = SPREAD_PER_ALPHA * alpha;
     // Walls brighten slowly to the ceiling; the floor and the wall behind are darker.
-    let soft = |edge: f32| (edge * edge + blur * blur).sqrt();
+    let soft = |edge: f32| edge * edge + blur * blur;
     let swallowed = BACKDROP * step(-dir.z - BACKDROP_FROM, soft(BACKDROP_EDGE));
     let dome = (HORIZON + (ZENITH - HORIZON) * dir.y) * (1.0 - swallowed);
     let above = step(dir.y, soft(FLOOR_EDGE));
     NADIR + (dome - NADIR) * above + BOXES.along(dir, blur)
 }
 
-/// A smooth step from 0 to 1 at `x` = 0, `width` wide: x/√(1+x²), whose slow ends are like those of a rough lobe.
-fn step(x: f32, width: f32) -> f32 {
-    0.5 + 0.5 * x / (width * width + x * x).sqrt()
-}
-
-/// The same four times, of squared widths.
-fn steps(x: Vec4, width_squared: Vec4) -> Vec4 {
+/// A smooth step from 0 to 1 at `x` = 0, so wide: x/√(1+x²), whose slow ends are like those of a rough lobe.
+#[inline(always)]
+fn step(x: f32, width_squared: f32) -> f32 {
     0.5 + 0.5 * x / (width_squared + x * x).sqrt()
 }
 
 /// 1 for |x| < `half`, with smooth edges; its integral over x is 2·`half` for every width.
-fn slabs(x: Vec4, half: Vec4, width_squared: Vec4) -> Vec4 {
-    steps(x + half, width_squared) - steps(x - half, width_squared)
+#[inline(always)]
+fn slab(x: f32, half: f32, width_squared: f32) -> f32 {
+    step(x + half, width_squared) - step(x - half, width_squared)
 }
 
 /// Number of harmonics: bands 0, 1, 2 and 4 (the cosine has no band 3).
@@ -163,6 +169,7 @@ const COEFFICIENTS: [f32; HARMONICS] = [
     0.008_232_776, 0.009_047_925, -0.003_520_728, 0.012_737_049, -0.018_062_811, 0.000_272_510_52,
 ];
 
+#[inline(always)]
 fn mean_over_hemisphere(normal: Vec3) -> f32 {
     // Three sums that do not wait for each other.
     let harmonics = harmonics(normal);
@@ -247,7 +254,7 @@ mod tests {
     #[test]
     fn every_soft_box_hangs_straight_and_faces_the_middle() {
         let places = [(-0.35, 0.80, 0.55), (-0.95, 0.22, 0.25), (0.93, 0.30, 0.35), (0.40, 0.72, -0.70)];
-        let axis = |rows: &[Vec4; 3], lane: usize| Vec3::from_array(rows.map(|row| row[lane]));
+        let axis = |rows: &[Four; 3], lane: usize| Vec3::from_array(rows.map(|row| row[lane]));
         for (lane, place) in places.into_iter().enumerate() {
             let toward = Vec3::from(place).normalize();
             let right = Vec3::Y.cross(toward).normalize();

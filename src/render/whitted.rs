@@ -192,12 +192,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let mut strip = std::mem::take(&mut self.strip);
         for k in 0..sorted.instances() {
             let (instance, hits) = sorted.of(k);
-            let mut hits = hits.peekable();
-            while hits.peek().is_some() {
-                strip.clear();
-                for (index, face) in hits.by_ref().take(POINTS) {
-                    strip.push(index, &eyes.rays[index as usize], &eyes.hits[index as usize], face);
-                }
+            for hits in hits.chunks(POINTS) {
+                strip.take(hits, sorted.faces(), &eyes.rays, &eyes.hits);
                 self.shade_strip(eyes, instance, &mut strip);
             }
         }

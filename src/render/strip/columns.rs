@@ -56,16 +56,90 @@ struct Given {
     origin: Columns,
     dir: Columns,
     weights: [Column; 2],
-    corner: [[f64; POINTS]; 3],
-    normal: [[f64; POINTS]; 3],
-    sizes: [[f64; POINTS]; 3],
-    area2: [f64; POINTS],
-    edges2: [[f64; POINTS]; 3],
-    outward: Columns,
-    /// Of the three corners; only of meshes that have any.
-    normals: [Columns; 3],
-    /// 1 where those differ.
-    curved: [u32; POINTS],
+    faces: Faces,
+}
+
+/// A number of every point, and room for what is written behind the last.
+type Roomy<T> = [T; POINTS + LANES];
+
+/// What is known of the face at every point: [`FaceNumbers`] in columns.
+struct Faces {
+    wide: [Roomy<f64>; WIDE_NUMBERS],
+    narrow: [Roomy<f32>; NARROW_NUMBERS],
+    /// 1 where the normals of the corners differ.
+    curved: Roomy<u32>,
+}
+
+const WIDE_NUMBERS: usize = 13;
+const NARROW_NUMBERS: usize = 12;
+
+/// What points of a face share.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FaceNumbers {
+    /// Corner, normal and sizes of its plane; the square of twice its area, and those of its edges.
+    wide: [f64; WIDE_NUMBERS],
+    /// The unit normal of its front, and those of its corners.
+    narrow: [f32; NARROW_NUMBERS],
+    curved: u32,
+}
+
+impl FaceNumbers {
+    /// With the unit normal on its front and the normals of its corners, if it has any.
+    pub(super) fn new(facet: &Facet, outward: Vec3, normals: Option<[Vec3; 3]>) -> Self {
+        let Facet { flat: Flat { corner: c, normal: n, sizes: s }, rim: Rim { area2, edges2: [e, f, g] } } = *facet;
+        let [p, q, r] = normals.unwrap_or_default();
+        Self {
+            wide: [c.x, c.y, c.z, n.x, n.y, n.z, s.x, s.y, s.z, area2, e, f, g],
+            narrow: [outward.x, outward.y, outward.z, p.x, p.y, p.z, q.x, q.y, q.z, r.x, r.y, r.z],
+            curved: u32::from(normals.is_some_and(differ)),
+        }
+    }
+}
+
+impl Faces {
+    const EMPTY: Self = Self {
+        wide: [[0.0; POINTS + LANES]; WIDE_NUMBERS],
+        narrow: [[0.0; POINTS + LANES]; NARROW_NUMBERS],
+        curved: [0; POINTS + LANES],
+    };
+
+    /// Sets the face of eight points from `at` on.
+    #[inline(always)]
+    fn set_eight(&mut self, at: usize, face: &FaceNumbers) {
+        let at = at % POINTS;
+        for (column, number) in self.wide.iter_mut().zip(face.wide) {
+            column[at..at + LANES].copy_from_slice(&[number; LANES]);
+        }
+        for (column, number) in self.narrow.iter_mut().zip(face.narrow) {
+            column[at..at + LANES].copy_from_slice(&[number; LANES]);
+        }
+        self.curved[at..at + LANES].copy_from_slice(&[face.curved; LANES]);
+    }
+
+    #[inline(always)]
+    fn facet(&self, i: usize) -> Facet {
+        let w = |k: usize| self.wide[k][i];
+        let three = |k: usize| DVec3::new(w(k), w(k + 1), w(k + 2));
+        let rim = Rim { area2: w(9), edges2: [w(10), w(11), w(12)] };
+        Facet { flat: Flat { corner: three(0), normal: three(3), sizes: three(6) }, rim }
+    }
+
+    /// The unit normal of the front.
+    #[inline(always)]
+    fn outward(&self, i: usize) -> Vec3 {
+        self.three(0, i)
+    }
+
+    /// Those of the corners.
+    #[inline(always)]
+    fn normals(&self, i: usize) -> [Vec3; 3] {
+        [self.three(3, i), self.three(6, i), self.three(9, i)]
+    }
+
+    #[inline(always)]
+    fn three(&self, k: usize, i: usize) -> Vec3 {
+        Vec3::new(self.narrow[k][i], self.narrow[k + 1][i], self.narrow[k + 2][i])
+    }
 }
 
 /// The surface at each point.
@@ -84,23 +158,10 @@ pub(super) struct Found {
 }
 
 const EMPTY: Columns = [[0.0; POINTS]; 3];
-const WIDE: [[f64; POINTS]; 3] = [[0.0; POINTS]; 3];
 
 impl Default for Strip {
     fn default() -> Self {
-        let given = Given {
-            origin: EMPTY,
-            dir: EMPTY,
-            weights: [[0.0; POINTS]; 2],
-            corner: WIDE,
-            normal: WIDE,
-            sizes: WIDE,
-            area2: [0.0; POINTS],
-            edges2: WIDE,
-            outward: EMPTY,
-            normals: [EMPTY; 3],
-            curved: [0; POINTS],
-        };
+        let given = Given { origin: EMPTY, dir: EMPTY, weights: [[0.0; POINTS]; 2], faces: Faces::EMPTY };
         let found = Found {
             certain: [0; POINTS],
             front: [0; POINTS],
@@ -124,34 +185,13 @@ impl Default for Strip {
 }
 
 impl Strip {
-    pub(crate) fn clear(&mut self) {
-        self.count = 0;
-    }
-
-    /// Takes the hit of the `index`th ray of a wave; at most [`POINTS`].
-    #[inline]
-    pub(crate) fn push(&mut self, index: u32, ray: &Ray, hit: &Hit, face: &Face) {
-        let i = self.count % POINTS;
-        self.count = i + 1;
-        self.rays[i] = index;
-        let given = &mut self.given;
-        put(&mut given.origin, i, ray.origin);
-        put(&mut given.dir, i, ray.dir);
-        given.weights[0][i] = hit.u;
-        given.weights[1][i] = hit.v;
-        let Facet { flat, rim } = &face.facet;
-        put_wide(&mut given.corner, i, flat.corner);
-        put_wide(&mut given.normal, i, flat.normal);
-        put_wide(&mut given.sizes, i, flat.sizes);
-        given.area2[i] = rim.area2;
-        put_wide(&mut given.edges2, i, DVec3::from_array(rim.edges2));
-        put(&mut given.outward, i, face.outward);
-        given.curved[i] = u32::from(face.normals.is_some_and(differ));
-        if let Some(normals) = &face.normals {
-            for (columns, &normal) in given.normals.iter_mut().zip(normals) {
-                put(columns, i, normal);
-            }
+    /// Takes hits, at most [`POINTS`], each by the place of its ray in a wave and that of its face.
+    pub(crate) fn take(&mut self, hit: &[(u32, u32)], faces: &[Face], rays: &[Ray], hits: &[Hit]) {
+        self.count = hit.len().min(POINTS);
+        for (at, (ray, _)) in self.rays.iter_mut().zip(hit) {
+            *at = *ray;
         }
+        self.level.run(Gather { given: &mut self.given, hit: &hit[..self.count], faces, rays, hits });
     }
 
     /// Finds the surface at each point; `placement` where the mesh has normals of its own.
@@ -185,16 +225,42 @@ pub(super) fn padded(count: usize) -> usize {
     count.next_multiple_of(LANES).min(POINTS)
 }
 
-#[inline(always)]
-fn get_wide(columns: &[[f64; POINTS]; 3], i: usize) -> DVec3 {
-    DVec3::new(columns[0][i], columns[1][i], columns[2][i])
+struct Gather<'a> {
+    given: &'a mut Given,
+    hit: &'a [(u32, u32)],
+    faces: &'a [Face],
+    rays: &'a [Ray],
+    hits: &'a [Hit],
 }
 
-#[inline(always)]
-fn put_wide(columns: &mut [[f64; POINTS]; 3], i: usize, v: DVec3) {
-    columns[0][i] = v.x;
-    columns[1][i] = v.y;
-    columns[2][i] = v.z;
+impl Kernel for Gather<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) {
+        let Self { given, hit, faces, rays, hits } = self;
+        for (k, eight) in hit.chunks(LANES).enumerate() {
+            let index: [usize; LANES] = std::array::from_fn(|lane| eight[lane.min(eight.len() - 1)].0 as usize);
+            let [ox, oy, oz, _] = s.columns(index.map(|i| rays[i].in_fours()[0]));
+            let [dx, dy, dz, _] = s.columns(index.map(|i| rays[i].in_fours()[1]));
+            let [_, u, v, _] = s.columns(index.map(|i| hits[i].as_four()));
+            let rows =
+                [s.store(ox), s.store(oy), s.store(oz), s.store(dx), s.store(dy), s.store(dz), s.store(u), s.store(v)];
+            let columns = given.origin.iter_mut().chain(&mut given.dir).chain(&mut given.weights);
+            for (column, row) in columns.zip(rows) {
+                column.as_chunks_mut().0[k] = row;
+            }
+        }
+        // What is written behind the last point of a face belongs to the next one, which is written later.
+        let mut at = 0;
+        for same in hit.chunk_by(|(_, a), (_, b)| a == b) {
+            let face = faces[same[0].1 as usize].numbers;
+            for eight in (at..at + same.len()).step_by(LANES) {
+                given.faces.set_eight(eight, &face);
+            }
+            at += same.len();
+        }
+    }
 }
 
 struct Faceted<'a> {
@@ -215,7 +281,7 @@ impl Kernel for Faceted<'_> {
         found.curved = [0; POINTS];
         for i in 0..points.min(POINTS) {
             given.turn(found, i);
-            found.shade(i, get(&given.outward, i));
+            found.shade(i, given.faces.outward(i));
         }
     }
 }
@@ -234,16 +300,16 @@ impl Kernel for Smooth<'_> {
     fn run<S: Simd>(self, _: S) {
         let Self { given, found, points, placement } = self;
         let placement = *placement;
-        found.curved = given.curved;
+        found.curved.copy_from_slice(&given.faces.curved[..POINTS]);
         for i in 0..points.min(POINTS) {
             given.place(found, i);
         }
         for i in 0..points.min(POINTS) {
             given.turn(found, i);
             let (u, v) = (given.weights[0][i], given.weights[1][i]);
-            let [a, b, c] = [get(&given.normals[0], i), get(&given.normals[1], i), get(&given.normals[2], i)];
+            let [a, b, c] = given.faces.normals(i);
             let mixed = a * (1.0 - u - v) + b * u + c * v;
-            let own = smooth_normal(&placement, mixed).unwrap_or(get(&given.outward, i));
+            let own = smooth_normal(&placement, mixed).unwrap_or(given.faces.outward(i));
             found.shade(i, own);
         }
     }
@@ -253,13 +319,7 @@ impl Given {
     /// Position and error.
     #[inline(always)]
     fn place(&self, found: &mut Found, i: usize) {
-        let flat = Flat {
-            corner: get_wide(&self.corner, i),
-            normal: get_wide(&self.normal, i),
-            sizes: get_wide(&self.sizes, i),
-        };
-        let edges2 = [self.edges2[0][i], self.edges2[1][i], self.edges2[2][i]];
-        let facet = Facet { flat, rim: Rim { area2: self.area2[i], edges2 } };
+        let facet = self.faces.facet(i);
         let weights = (self.weights[0][i], self.weights[1][i]);
         let (position, error, certain) = facet.place(get(&self.origin, i), get(&self.dir, i), weights);
         put(&mut found.position, i, position);
@@ -271,7 +331,7 @@ impl Given {
     #[inline(always)]
     fn turn(&self, found: &mut Found, i: usize) {
         let view = -get(&self.dir, i).try_normalize().unwrap_or(Vec3::Z);
-        let outward = get(&self.outward, i);
+        let outward = self.faces.outward(i);
         let front = outward.dot(view) >= 0.0;
         put(&mut found.view, i, view);
         put(&mut found.geometric, i, if front { outward } else { -outward });
@@ -311,24 +371,26 @@ mod tests {
     use crate::scene::{Falloff, Light, LightKind, Material, Scene};
 
     /// Random triangles hit in their middles.
-    fn filled() -> Strip {
-        let (mut random, mut strip) = (Random::new(4), Strip::default());
+    fn filled(level: Level) -> Strip {
+        let (mut random, mut strip) = (Random::new(4), Strip { level, ..Strip::default() });
+        let (mut rays, mut hits, mut faces) = (Vec::new(), Vec::new(), Vec::new());
         for i in 0..61 {
             let corners = [random.cube(), random.cube(), random.cube()];
             let (u, v) = (random.unit() * 0.5, random.unit() * 0.5);
             let origin = random.cube() + Vec3::Z * 5.0;
             let dir = corners[0] * (1.0 - u - v) + corners[1] * u + corners[2] * v - origin;
-            let ray = Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude: NO_PRIM, sample: 0 };
+            rays.push(Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude: NO_PRIM, sample: 0 });
+            hits.push(Hit { t: 1.0, u, v, prim: i });
             let normals = [random.direction(), random.direction(), random.direction()];
-            let face = Face::of_triangle(&corners, Some(normals));
-            strip.push(i, &ray, &Hit { t: 1.0, u, v, prim: i }, &face);
+            faces.push(Face::of_triangle(&corners, Some(normals)));
         }
+        let hit: Vec<(u32, u32)> = (0..61).map(|i| (i, i)).collect();
+        strip.take(&hit, &faces, &rays, &hits);
         strip
     }
 
     fn found(level: Level, placement: Option<&Placement>) -> Vec<[u32; 20]> {
-        let mut strip = filled();
-        strip.level = level;
+        let mut strip = filled(level);
         strip.find(placement);
         let kind = LightKind::Point { position: DVec3::new(1.0, 3.0, 2.0), falloff: Falloff::None };
         let light = Light { name: String::new(), intensity: Vec3::ONE, kind, shadows: true, size: 0.0 };
@@ -344,6 +406,47 @@ mod tests {
             all
         };
         (0..strip.count).map(point).collect()
+    }
+
+    #[test]
+    fn every_point_has_the_numbers_of_its_ray_its_hit_and_its_face() {
+        let mut random = Random::new(5);
+        let number = |i: usize| i as f32;
+        let ray = |i: usize| Ray {
+            origin: Vec3::new(number(i), number(i) + 0.25, number(i) + 0.5),
+            t_min: 0.0,
+            dir: -Vec3::new(number(i), number(i) + 0.25, number(i) + 0.5),
+            t_max: f32::INFINITY,
+            exclude: NO_PRIM,
+            sample: 0,
+        };
+        let rays: Vec<Ray> = (0..100).map(ray).collect();
+        let hits: Vec<Hit> = (0..100).map(|i| Hit { t: 1.0, u: number(i), v: -number(i), prim: 7 }).collect();
+        let face = |_| Face::of_triangle(&[(); 3].map(|()| random.cube()), Some([(); 3].map(|()| random.direction())));
+        let faces: Vec<Face> = (0..20).map(face).collect();
+        // Faces that one point shows, or some, or more than are written at once.
+        let mut hit = Vec::new();
+        for (face, length) in [1, 2, 9, 1, 17, 8, 3, 23].into_iter().enumerate() {
+            hit.extend((0..length).map(|_| (99 - hit.len() as u32, 2 * face as u32)).collect::<Vec<_>>());
+            let start = hit.len() - length;
+            (start..hit.len()).for_each(|i| hit[i].0 = 99 - i as u32);
+        }
+        for level in Level::all() {
+            for count in [1, 7, 8, 40, POINTS] {
+                let mut strip = Strip { level, ..Strip::default() };
+                strip.take(&hit[..count], &faces, &rays, &hits);
+                let given = &strip.given;
+                for (i, &(index, face)) in hit[..count].iter().enumerate() {
+                    let (ray, of_hit) = (&rays[index as usize], &hits[index as usize]);
+                    assert_eq!((get(&given.origin, i), get(&given.dir, i)), (ray.origin, ray.dir));
+                    assert_eq!((given.weights[0][i], given.weights[1][i]), (of_hit.u, of_hit.v));
+                    let FaceNumbers { wide, narrow, curved } = faces[face as usize].numbers;
+                    assert_eq!(given.faces.wide.map(|column| column[i]), wide, "{i} of {count} on {}", level.name());
+                    assert_eq!(given.faces.narrow.map(|column| column[i]), narrow, "{i} of {count}");
+                    assert_eq!(given.faces.curved[i], curved);
+                }
+            }
+        }
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The hits of a wave by instance, each with its face; faces that are hit again are not looked up again.
 
+use super::columns::FaceNumbers;
 use crate::accel::NO_PRIM;
 use crate::accel::refine::Facet;
 use crate::math::Vec3;
@@ -15,11 +16,7 @@ const NONE: u32 = u32::MAX;
 /// A face that was hit.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Face {
-    pub facet: Facet,
-    /// Unit normal on the side that the file calls its front.
-    pub outward: Vec3,
-    /// Of the corners, where the mesh has any.
-    pub normals: Option<[Vec3; 3]>,
+    pub(super) numbers: FaceNumbers,
     instance: u32,
 }
 
@@ -54,7 +51,7 @@ impl Sorted {
     }
 
     /// Takes the hit of the `index`th ray; false if it must be shaded by itself.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn take(&mut self, context: &Context, index: u32, prim: u32) -> bool {
         let place = &mut self.remembered[prim as usize % REMEMBERED];
         if place.0 != prim {
@@ -76,11 +73,15 @@ impl Sorted {
         self.hit.len()
     }
 
-    /// The `k`th instance that was hit, and the hits with it: rays and faces.
-    pub(crate) fn of(&self, k: usize) -> (u32, impl Iterator<Item = (u32, &Face)>) {
+    /// The `k`th instance that was hit, and the hits with it: rays, and faces among [`Self::faces`].
+    pub(crate) fn of(&self, k: usize) -> (u32, &[(u32, u32)]) {
         let instance = self.hit[k];
-        let hits = &self.lists[instance as usize];
-        (instance, hits.iter().map(|&(index, face)| (index, &self.faces[face as usize])))
+        (instance, &self.lists[instance as usize])
+    }
+
+    /// All that were hit.
+    pub(crate) fn faces(&self) -> &[Face] {
+        &self.faces
     }
 }
 
@@ -88,12 +89,8 @@ impl Face {
     /// Looks up a prim.
     #[inline(never)]
     fn of(context: &Context, prim: u32) -> Self {
-        Self::new(context, prim).unwrap_or(Self {
-            facet: Facet::default(),
-            outward: Vec3::ZERO,
-            normals: None,
-            instance: NONE,
-        })
+        let nothing = || FaceNumbers::new(&Facet::default(), Vec3::ZERO, None);
+        Self::new(context, prim).unwrap_or_else(|| Self { numbers: nothing(), instance: NONE })
     }
 
     /// `None` for what is no triangle with an area and a uniform material.
@@ -119,13 +116,13 @@ impl Face {
             let normal = |i: u32| mesh.normals.get(i as usize).copied();
             Some([normal(a)?, normal(b)?, normal(c)?])
         };
-        Some(Self { facet, outward, normals, instance })
+        Some(Self { numbers: FaceNumbers::new(&facet, outward, normals), instance })
     }
 
     /// A face of no instance.
     #[cfg(test)]
     pub(super) fn of_triangle(corners: &crate::math::triangle::Triangle, normals: Option<[Vec3; 3]>) -> Self {
         let facet = Facet::of(corners);
-        Self { facet, outward: facet.flat.unit(), normals, instance: NONE }
+        Self { numbers: FaceNumbers::new(&facet, facet.flat.unit(), normals), instance: NONE }
     }
 }
