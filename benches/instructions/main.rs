@@ -1,4 +1,4 @@
-//! How many instructions the kernels take: `cargo bench --bench instructions -- [--record]`.
+//! How many instructions the kernels and whole pictures take: `cargo bench --bench instructions -- [--record]`.
 //!
 //! Valgrind's Callgrind counts them, so that the figures depend on neither the machine's speed nor its load. It knows no
 //! AVX-512: those kernels are the same code as AVX2's. What is counted must not exceed `baseline.txt` beside this file by
@@ -10,12 +10,17 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
-use meshray::accel::{Accel, BitSet, Hit, NO_PRIM, NoProbe, Ray, RayOrder, Shapes, Splitting, Wide};
+use meshray::accel::{
+    Accel, AccelKind, AccelParams, AnyAccel, BitSet, Hit, NO_PRIM, NoProbe, Ray, RayOrder, Shapes, Splitting, Wide,
+};
 use meshray::generate::Family;
-use meshray::math::Vec3;
 use meshray::math::random::Random;
 use meshray::math::simd::Level;
-use meshray::render::World;
+use meshray::math::{DVec3, Vec3};
+use meshray::render::texture::TextureStore;
+use meshray::render::view::Lens;
+use meshray::render::{Job, Settings, View, World, render};
+use meshray::scene::{Falloff, Light, LightKind, Material, default_light, framing};
 
 /// Part by which a count may exceed its baseline.
 const ALLOWED: f64 = 0.03;
@@ -32,7 +37,12 @@ const WAYS: [(RayOrder, &str); 3] =
 const RUNS: [&str; 2] = ["alike", "apart"];
 const QUESTIONS: [&str; 2] = ["first", "any"];
 
-/// One figure: level, way, how the rays run, and what is asked.
+/// Pictures by what lights them: a sample for each of [`RAYS`] pixels. They are drawn with the best instructions that
+/// Valgrind knows, so that a formula that is no longer computed in lanes shows.
+const LIGHTS: [&str; 2] = ["lamp", "studio"];
+const SIDE: u32 = 64;
+
+/// One figure: level, way, how the rays run, and what is asked; or level, "picture", of what, and what lights it.
 type Case = [String; 4];
 
 fn main() -> ExitCode {
@@ -40,6 +50,7 @@ fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).filter(|w| w != "--bench").collect();
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     match words[..] {
+        ["trace", _, "picture", _, light] => picture(light),
         ["trace", level, way, run, question] => trace([level, way, run, question]),
         [] => compare(false),
         ["--record"] => compare(true),
@@ -114,6 +125,9 @@ fn cases() -> Vec<Case> {
             }
         }
     }
+    if here.iter().any(|level| level.name() == "AVX2") {
+        cases.extend(LIGHTS.map(|light| ["AVX2", "picture", "plain", light].map(String::from)));
+    }
     cases
 }
 
@@ -150,6 +164,40 @@ fn trace([level, way, run, question]: [&str; 4]) -> ExitCode {
     let found = answers.hits.iter().filter(|h| h.is_some()).count() + answers.blocked.iter().filter(|&&b| b).count();
     println!("{found} of {RAYS} rays hit");
     if found > RAYS / 4 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// Renders a landscape of one material from above, most of it in [`counted_picture`].
+fn picture(light: &str) -> ExitCode {
+    let mut scene = Family::Mountain.scene(TRIANGLES);
+    scene.materials.fill(Material::plain());
+    scene.lights.clear();
+    let (lo, hi) = World::new(&scene).bounds;
+    let (middle, size) = ((lo + hi) * 0.5, hi - lo);
+    let camera = framing::default_camera(&scene, &framing::robust_bounds(&scene), 1.0);
+    let eye = middle + DVec3::new(-0.1, -0.6, 1.0) * size.length();
+    if light == "lamp" {
+        let kind = LightKind::Point { position: eye + DVec3::X * size.x, falloff: Falloff::None };
+        scene.lights.push(Light { name: String::new(), intensity: Vec3::ONE, kind, shadows: true, size: 0.0 });
+    } else {
+        default_light::add_if_missing(&mut scene, &camera);
+    }
+    let world = World::new(&scene);
+    let accel = AnyAccel::build(AccelKind::default(), &world.shapes, &AccelParams::DEFAULT);
+    let settings = Settings { width: SIDE, height: SIDE, samples: 1, ..Settings::default() };
+    let textures = TextureStore::new(&scene);
+    let view = &View::look_at(eye, middle, DVec3::Z, Lens::perspective(0.3));
+    let job = Job { scene: &scene, world: &world, accel: &accel, textures: &textures, view, settings: &settings };
+    // The pool's thread draws what it counts.
+    let Ok(pool) = rayon::ThreadPoolBuilder::new().num_threads(1).build() else { return ExitCode::from(2) };
+    let shown = pool.install(|| counted_picture(&job));
+    println!("{shown} of {RAYS} pixels show the landscape");
+    if shown > RAYS / 2 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// What is counted of a picture; how many pixels show anything lit.
+#[inline(never)]
+fn counted_picture(job: &Job) -> usize {
+    render(job, &()).picture.beauty.iter().filter(|[r, g, b, a]| *a > 0.0 && r + g + b > 0.0).count()
 }
 
 struct Answers {

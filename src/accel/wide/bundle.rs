@@ -154,8 +154,11 @@ impl<B: BoxMargins> Bundle<B> {
         let s = s.wide();
         let first = Vec3::new(self.origin[0][0], self.origin[1][0], self.origin[2][0]);
         let o = [s.load(&self.origin[0]), s.load(&self.origin[1]), s.load(&self.origin[2])];
-        let is = |k: usize| s.at_most(o[k], s.splat(first[k])) & s.at_most(s.splat(first[k]), o[k]);
-        self.common = (is(0) & is(1) & is(2) & ALL == ALL).then_some(first);
+        let mut alike = ALL;
+        for k in 0..3 {
+            alike &= s.at_most(o[k], s.splat(first[k])) & s.at_most(s.splat(first[k]), o[k]);
+        }
+        self.common = (alike == ALL).then_some(first);
         (self.low, self.high) = (first, first);
         let zero = s.splat(0.0);
         if self.common.is_none() {

@@ -61,7 +61,10 @@ impl<W: Wave, P: Probe, B: BoxMargins> Kernel for OneByOne<'_, W, P, B> {
     fn run<S: Simd>(self, s: S) {
         let Self { tree, shapes, wave, stack: Stack { entries: stack, .. }, probe, .. } = self;
         let Some(root) = tree.nodes.first().filter(|_| shapes.planes.is_empty()) else {
-            return (0..wave.rays().len()).for_each(|i| ask::<B, _, _, _>(s, tree, shapes, wave, i, stack, probe));
+            for i in 0..wave.rays().len() {
+                ask::<B, _, _, _>(s, tree, shapes, wave, i, stack, probe);
+            }
+            return;
         };
         for i in 0..wave.rays().len() {
             let ray = &wave.rays()[i];
