@@ -1,5 +1,6 @@
-//! Where rays meet triangles that they hit, each ray a triangle of its own: [`meet`](super::triangle::meet) and
-//! [`barycentrics_at`](super::triangle::barycentrics_at) in lanes, operation by operation.
+//! Where rays meet triangles that they hit: [`meet`](super::triangle::meet) and
+//! [`barycentrics_at`](super::triangle::barycentrics_at) in lanes, operation by operation; of rays that each have a triangle
+//! of their own ([`meet`]), or that share one ([`Plane`]).
 
 use super::bounds::{PLANE_TERMS_F64, POSITION_T};
 use super::simd::{LANES, Lanewise, Row, Simd};
@@ -177,7 +178,7 @@ impl Plane {
     }
 }
 
-/// What bounds the error of a quotient's terms is multiplied with: the 3/2 and the 1.001 of
+/// What the errors of a quotient's terms are multiplied with: the 3/2 and the 1.001 of
 /// [`Bounded`](super::quotient::Bounded), and room for what is rounded otherwise here.
 const QUOTIENT: f64 = 1.502;
 
@@ -312,11 +313,81 @@ impl<S: Lanewise<N>, const N: usize> Vectors<S, N> {
 mod tests {
     use super::super::random::Random;
     use super::super::shear::RaySpace;
+    use super::super::sight::RowSight;
+    use super::super::simd::WIDE;
     use super::super::simd::{Kernel, Level};
     use super::super::triangle::{self, Triangle};
-    use super::super::triangles::set_corners;
-    use super::super::{Vec3, simd::WIDE};
+    use super::super::triangles::{NO_CORNERS, Verdicts, set_corners};
     use super::*;
+
+    /// Eight rays against a triangle: the verdicts, and where they meet its plane.
+    struct Row8<'a>(&'a [RaySpace; LANES], &'a Triangle, Option<Vec3>);
+
+    impl Kernel for Row8<'_> {
+        type Output = (Verdicts, Meetings<Row>);
+
+        #[inline(always)]
+        fn run<S: Simd>(self, s: S) -> Self::Output {
+            let Self(rays, triangle, from) = self;
+            let (mut origin, mut dir) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+            for (lane, ray) in rays.iter().enumerate() {
+                for k in 0..3 {
+                    (origin[k][lane], dir[k][lane]) = (ray.origin[k], ray.dir[k]);
+                }
+            }
+            let mut corners = NO_CORNERS;
+            set_corners(&mut corners, 3, triangle);
+            let sight = RowSight::<S, LANES>::new(s, &origin, from, &dir, rays[0].z);
+            let verdicts = sight.look(s, &sight.ready(s, &corners), 3).verdicts;
+            let plane = Plane::of(triangle);
+            let (least, most) = (
+                |f: fn(&RaySpace) -> DVec3| rays.iter().map(f).reduce(DVec3::min).unwrap(),
+                |f: fn(&RaySpace) -> DVec3| rays.iter().map(f).reduce(DVec3::max).unwrap(),
+            );
+            let bounds = RowBounds {
+                low: least(|r| r.origin.as_dvec3()),
+                high: most(|r| r.origin.as_dvec3()),
+                from: from.map(Vec3::as_dvec3),
+                dir: most(|r| r.dir.as_dvec3().abs()),
+            };
+            let Meetings { t, weights: [u, v], sure } = plane.meet(s, &origin, &dir, &bounds);
+            (verdicts, Meetings { t: s.store(t), weights: [s.store(u), s.store(v)], sure })
+        }
+    }
+
+    #[test]
+    fn eight_rays_side_by_side_meet_a_triangle_as_each_does_alone() {
+        let mut random = Random::new(21);
+        let (mut hits, mut sure) = (0, 0);
+        for _ in 0..3000 {
+            let triangle = [random.cube(), random.cube(), random.cube()];
+            let origin = random.cube() * 4.0;
+            let aim = |_| triangle::within(&triangle, random.unit() * 1.2, random.unit());
+            let rays: Vec<RaySpace> = (0..LANES).map(aim).filter_map(|p| RaySpace::new(origin, p - origin)).collect();
+            let Ok(rays) = <[RaySpace; LANES]>::try_from(rays) else { continue };
+            if rays.iter().any(|r| r.z != rays[0].z) {
+                continue;
+            }
+            // All start there, whether the row knows it or not.
+            for (level, from) in Level::all().into_iter().flat_map(|l| [(l, None), (l, Some(origin))]) {
+                let (verdicts, met) = level.run(Row8(&rays, &triangle, from));
+                let [u, v] = met.weights;
+                for (lane, ray) in rays.iter().enumerate() {
+                    let (bit, hit) = (1 << lane, triangle::is_hit(ray, &triangle));
+                    assert!(verdicts.unsure & bit != 0 || (verdicts.hit & bit != 0) == hit, "{}", level.name());
+                    if !hit || met.sure & bit == 0 {
+                        continue;
+                    }
+                    let alone = triangle::meet(ray, &triangle);
+                    assert_eq!(met.t[lane].to_bits(), alone.t.to_bits());
+                    assert_eq!((u[lane], v[lane]), triangle::barycentrics(ray, &triangle));
+                    sure += 1;
+                }
+                hits += rays.iter().filter(|r| triangle::is_hit(r, &triangle)).count();
+            }
+        }
+        assert!(sure > 10_000 && sure > hits * 9 / 10, "{sure} of {hits}");
+    }
 
     struct Meet<'a>(&'a Pairs);
 

@@ -196,7 +196,8 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
         self.answer(s);
     }
 
-    /// Takes off the stack what no ray needs any more, and tells whether anything is left; the rays that need the last.
+    /// Takes off the stack what no ray needs any more, and tells whether anything is left: on top of it a child, for the rays
+    /// that need it.
     #[inline(always)]
     fn pop_others<L: Lanewise<RAYS>, S: Simd<Wide = L>>(
         &self,

@@ -160,7 +160,7 @@ impl LocalLight {
         arrives.then_some(incident)
     }
 
-    /// [`Self::arriving`] at the first so many positions.
+    /// What arrives at the first so many positions, and whether anything does.
     #[inline(always)]
     pub(crate) fn arriving_at(
         &self,
@@ -193,7 +193,7 @@ impl LocalLight {
         }
     }
 
-    /// The same, and whether anything arrives.
+    /// What arrives at `position`, and whether anything does.
     #[inline(always)]
     fn arriving(&self, position: Vec3) -> (Incident, bool) {
         let (to_light, share, end) = match self.shape {
