@@ -54,12 +54,6 @@ fn load_bytes(bytes: &[u8; 16]) -> uint8x16_t {
 }
 
 #[inline(always)]
-fn load_pair(numbers: &[f64; 2]) -> float64x2_t {
-    // SAFETY: reads both numbers, with no demand on alignment.
-    unsafe { vld1q_f64(numbers.as_ptr()) }
-}
-
-#[inline(always)]
 fn store_pair(a: float64x2_t, to: &mut [f64; 2]) {
     // SAFETY: writes both numbers, with no demand on alignment.
     unsafe { vst1q_f64(to.as_mut_ptr(), a) };
