@@ -3,8 +3,8 @@
 //! A node's boxes are first asked about all rays at once, by a hull of origins and reciprocals of directions (after
 //! S. Boulos et al., *Packet-based Whitted and Distribution Ray Tracing*, 2007); of several boxes that are left each is asked
 //! about each ray. At a leaf the triangles' own boxes are asked about the hull, and what is left is tested against all rays
-//! at once. Best hits are known by intervals, as in `best`; exact distances are found at the end, once for all rays of a
-//! triangle.
+//! at once. Best hits are known by intervals, as in `best`; exact distances are found at the end, those of all rays
+//! together.
 //!
 //! A few rays of sixteen that do not run as the others do go their own ways, one after another, and so do all where too few
 //! run alike.
@@ -187,34 +187,13 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
                 nearer = top > below;
             }
             // Those that meet the nearest child were just found; rays that need no more have no limit above zero.
-            if !nearer && !self.pop_others(wide, &reach, stack, &mut top) {
+            if !nearer && !drop_unneeded(s, &reach, stack, &mut top) {
                 break;
             }
             top -= 1;
             branch = stack[top];
         }
         self.answer(s);
-    }
-
-    /// Takes off the stack what no ray needs any more, and tells whether anything is left: on top of it a child, for the rays
-    /// that need it.
-    #[inline(always)]
-    fn pop_others<L: Lanewise<RAYS>, S: Simd<Wide = L>>(
-        &self,
-        s: L,
-        reach: &Reach<S>,
-        stack: &mut [Branch],
-        top: &mut usize,
-    ) -> bool {
-        while *top > 0 {
-            let branch = &mut stack[*top - 1];
-            branch.rays &= s.at_most(s.splat(branch.near), reach.limit);
-            if branch.rays != 0 {
-                return true;
-            }
-            *top -= 1;
-        }
-        false
     }
 
     /// Tests a leaf.
@@ -408,4 +387,20 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
             }
         }
     }
+}
+
+/// Takes off the stack what no ray needs any more, and tells whether anything is left: on top of it a child, for the rays that
+/// need it.
+#[inline(always)]
+fn drop_unneeded<S: Simd>(s: S, reach: &Reach<S>, stack: &mut [Branch], top: &mut usize) -> bool {
+    let wide = s.wide();
+    while *top > 0 {
+        let branch = &mut stack[*top - 1];
+        branch.rays &= wide.at_most(wide.splat(branch.near), reach.limit);
+        if branch.rays != 0 {
+            return true;
+        }
+        *top -= 1;
+    }
+    false
 }

@@ -201,15 +201,6 @@ macro_rules! eight_lanes {
             }
 
             #[inline(always)]
-            fn put(self, mask: u32, a: __m256, to: &mut Row) {
-                // SAFETY: as above; reads and writes the eight numbers of the row, with no demand on alignment.
-                unsafe {
-                    let mixed = _mm256_blendv_ps(_mm256_loadu_ps(to.as_ptr()), a, _mm256_castsi256_ps(lanes_in(mask)));
-                    _mm256_storeu_ps(to.as_mut_ptr(), mixed);
-                }
-            }
-
-            #[inline(always)]
             fn put_word(self, mask: u32, word: u32, to: &mut [u32; LANES]) {
                 // SAFETY: as above; reads and writes eight words, with no demand on alignment.
                 unsafe {

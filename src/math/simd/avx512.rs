@@ -213,15 +213,6 @@ impl Lanewise<WIDE> for Sixteen {
     }
 
     #[inline(always)]
-    fn put(self, mask: u32, a: __m512, to: &mut [f32; WIDE]) {
-        // SAFETY: as above; reads and writes the sixteen numbers of the row, with no demand on alignment.
-        unsafe {
-            let at = to.as_mut_ptr();
-            _mm512_storeu_ps(at, _mm512_mask_mov_ps(_mm512_loadu_ps(at), mask as __mmask16, a));
-        }
-    }
-
-    #[inline(always)]
     fn put_word(self, mask: u32, word: u32, to: &mut [u32; WIDE]) {
         // SAFETY: as above; reads and writes sixteen words, with no demand on alignment.
         unsafe {

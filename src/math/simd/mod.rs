@@ -90,8 +90,6 @@ pub trait Lanewise<const N: usize>: Copy {
     fn least_of_each(self, [a, b, c, d]: [Self::Lanes; 4]) -> [f32; 4] {
         [self.least(a), self.least(b), self.least(c), self.least(d)]
     }
-    /// To memory in the lanes of `mask`; the others stay.
-    fn put(self, mask: u32, a: Self::Lanes, to: &mut [f32; N]);
     /// A word to memory in the lanes of `mask`; the others stay.
     fn put_word(self, mask: u32, word: u32, to: &mut [u32; N]);
     /// Where a word stands.

@@ -257,17 +257,6 @@ impl Lanewise<LANES> for Neon {
     }
 
     #[inline(always)]
-    fn put(self, mask: u32, a: Floats, to: &mut Row) {
-        // SAFETY: every processor of the family has the instructions.
-        unsafe {
-            let halves = to.as_chunks_mut().0;
-            let (low, high) = (load(&halves[0]), load(&halves[1]));
-            store(vbslq_f32(lanes_in(mask), a[0], low), &mut halves[0]);
-            store(vbslq_f32(lanes_in(mask >> 4), a[1], high), &mut halves[1]);
-        }
-    }
-
-    #[inline(always)]
     fn put_word(self, mask: u32, word: u32, to: &mut [u32; LANES]) {
         // SAFETY: every processor of the family has the instructions.
         unsafe {

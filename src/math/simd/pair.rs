@@ -143,13 +143,6 @@ impl<S: Lanewise<LANES>> Lanewise<WIDE> for Pair<S> {
     }
 
     #[inline(always)]
-    fn put(self, mask: u32, a: Self::Lanes, to: &mut [f32; WIDE]) {
-        let (low, high) = halves_mut(to);
-        self.0.put(mask, a[0], low);
-        self.0.put(mask >> LANES, a[1], high);
-    }
-
-    #[inline(always)]
     fn put_word(self, mask: u32, word: u32, to: &mut [u32; WIDE]) {
         let (low, high) = halves_mut(to);
         self.0.put_word(mask, word, low);

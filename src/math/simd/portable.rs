@@ -137,11 +137,6 @@ impl Lanewise<LANES> for Portable {
     }
 
     #[inline(always)]
-    fn put(self, mask: u32, a: Row, to: &mut Row) {
-        put(mask, &a, to);
-    }
-
-    #[inline(always)]
     fn put_word(self, mask: u32, word: u32, to: &mut [u32; LANES]) {
         put(mask, &[word; LANES], to);
     }

@@ -32,10 +32,9 @@ fn everything<S: Lanewise<N>, const N: usize>(s: S, rows: &[[f32; N]; 2], mask: 
     let mut all: Vec<u64> = results.into_iter().flat_map(|r| s.store(r)).map(bits).collect();
     all.extend([s.less(a, b), s.at_most(a, b)].map(u64::from));
 
-    let (mut mixed, mut words) = (rows[1], rows[1].map(f32::to_bits));
-    s.put(mask, a, &mut mixed);
+    let mut words = rows[1].map(f32::to_bits);
     s.put_word(mask, 7, &mut words);
-    all.extend(mixed.map(bits));
+    all.extend(s.store(s.choose(mask, a, b)).map(bits));
     all.extend(words.map(u64::from));
     all.push(u64::from(s.find_word(7, &words)));
 
@@ -365,6 +364,8 @@ impl Kernel for Soon<'_> {
                 s.prefetch_either(first, (self.0, i), (self.1, i));
             }
         }
+        s.prefetch(self.0);
+        s.prefetch(self.1);
     }
 }
 

@@ -1,15 +1,13 @@
 //! Points by number and place: what is known of them, and the surface that is found from it.
 
 use super::around::Surroundings;
+use super::faces::Faces;
 use super::lit::Lit;
 use super::sorted::Face;
-use crate::accel::refine::Facet;
 use crate::accel::{Hit, Ray};
-use crate::math::inset::Rim;
+use crate::math::Vec3;
 use crate::math::simd::{Kernel, Level, Simd};
-use crate::math::triangle::Flat;
-use crate::math::{DVec3, Vec3};
-use crate::render::patch::{differ, smooth_normal};
+use crate::render::patch::smooth_normal;
 use crate::render::shade::Seen;
 use crate::render::surface::facing;
 use crate::render::world::Placement;
@@ -18,7 +16,7 @@ use crate::render::world::Placement;
 pub(crate) const POINTS: usize = 64;
 
 /// Points are computed so many at a time.
-const LANES: usize = 8;
+pub(super) const LANES: usize = 8;
 
 /// One number of every point.
 pub(super) type Column = [f32; POINTS];
@@ -57,89 +55,6 @@ struct Given {
     dir: Columns,
     weights: [Column; 2],
     faces: Faces,
-}
-
-/// A number of every point, and room for what is written behind the last.
-type Roomy<T> = [T; POINTS + LANES];
-
-/// What is known of the face at every point: [`FaceNumbers`] in columns.
-struct Faces {
-    wide: [Roomy<f64>; WIDE_NUMBERS],
-    narrow: [Roomy<f32>; NARROW_NUMBERS],
-    /// 1 where the normals of the corners differ.
-    curved: Roomy<u32>,
-}
-
-const WIDE_NUMBERS: usize = 13;
-const NARROW_NUMBERS: usize = 12;
-
-/// What points of a face share.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct FaceNumbers {
-    /// Corner, normal and sizes of its plane; the square of twice its area, and those of its edges.
-    wide: [f64; WIDE_NUMBERS],
-    /// The unit normal of its front, and those of its corners.
-    narrow: [f32; NARROW_NUMBERS],
-    curved: u32,
-}
-
-impl FaceNumbers {
-    /// With the unit normal on its front and the normals of its corners, if it has any.
-    pub(super) fn new(facet: &Facet, outward: Vec3, normals: Option<[Vec3; 3]>) -> Self {
-        let Facet { flat: Flat { corner: c, normal: n, sizes: s }, rim: Rim { area2, edges2: [e, f, g] } } = *facet;
-        let [p, q, r] = normals.unwrap_or_default();
-        Self {
-            wide: [c.x, c.y, c.z, n.x, n.y, n.z, s.x, s.y, s.z, area2, e, f, g],
-            narrow: [outward.x, outward.y, outward.z, p.x, p.y, p.z, q.x, q.y, q.z, r.x, r.y, r.z],
-            curved: u32::from(normals.is_some_and(differ)),
-        }
-    }
-}
-
-impl Faces {
-    const EMPTY: Self = Self {
-        wide: [[0.0; POINTS + LANES]; WIDE_NUMBERS],
-        narrow: [[0.0; POINTS + LANES]; NARROW_NUMBERS],
-        curved: [0; POINTS + LANES],
-    };
-
-    /// Sets the face of eight points from `at` on.
-    #[inline(always)]
-    fn set_eight(&mut self, at: usize, face: &FaceNumbers) {
-        let at = at % POINTS;
-        for (column, number) in self.wide.iter_mut().zip(face.wide) {
-            column[at..at + LANES].copy_from_slice(&[number; LANES]);
-        }
-        for (column, number) in self.narrow.iter_mut().zip(face.narrow) {
-            column[at..at + LANES].copy_from_slice(&[number; LANES]);
-        }
-        self.curved[at..at + LANES].copy_from_slice(&[face.curved; LANES]);
-    }
-
-    #[inline(always)]
-    fn facet(&self, i: usize) -> Facet {
-        let w = |k: usize| self.wide[k][i];
-        let three = |k: usize| DVec3::new(w(k), w(k + 1), w(k + 2));
-        let rim = Rim { area2: w(9), edges2: [w(10), w(11), w(12)] };
-        Facet { flat: Flat { corner: three(0), normal: three(3), sizes: three(6) }, rim }
-    }
-
-    /// The unit normal of the front.
-    #[inline(always)]
-    fn outward(&self, i: usize) -> Vec3 {
-        self.three(0, i)
-    }
-
-    /// Those of the corners.
-    #[inline(always)]
-    fn normals(&self, i: usize) -> [Vec3; 3] {
-        [self.three(3, i), self.three(6, i), self.three(9, i)]
-    }
-
-    #[inline(always)]
-    fn three(&self, k: usize, i: usize) -> Vec3 {
-        Vec3::new(self.narrow[k][i], self.narrow[k + 1][i], self.narrow[k + 2][i])
-    }
 }
 
 /// The surface at each point.
@@ -251,13 +166,9 @@ impl Kernel for Gather<'_> {
                 column.as_chunks_mut().0[k] = row;
             }
         }
-        // What is written behind the last point of a face belongs to the next one, which is written later.
         let mut at = 0;
         for same in hit.chunk_by(|(_, a), (_, b)| a == b) {
-            let face = faces[same[0].1 as usize].numbers;
-            for eight in (at..at + same.len()).step_by(LANES) {
-                given.faces.set_eight(eight, &face);
-            }
+            given.faces.set(at..at + same.len(), &faces[same[0].1 as usize].numbers);
             at += same.len();
         }
     }
@@ -300,7 +211,7 @@ impl Kernel for Smooth<'_> {
     fn run<S: Simd>(self, _: S) {
         let Self { given, found, points, placement } = self;
         let placement = *placement;
-        found.curved.copy_from_slice(&given.faces.curved[..POINTS]);
+        found.curved.copy_from_slice(given.faces.curved());
         for i in 0..points.min(POINTS) {
             given.place(found, i);
         }
@@ -364,8 +275,8 @@ impl Found {
 mod tests {
     use super::*;
     use crate::accel::NO_PRIM;
-    use crate::math::DMat3;
     use crate::math::random::Random;
+    use crate::math::{DMat3, DVec3};
     use crate::render::shade::{LocalLight, Matter};
     use crate::render::texture::TextureStore;
     use crate::scene::{Falloff, Light, LightKind, Material, Scene};
@@ -425,12 +336,9 @@ mod tests {
         let face = |_| Face::of_triangle(&[(); 3].map(|()| random.cube()), Some([(); 3].map(|()| random.direction())));
         let faces: Vec<Face> = (0..20).map(face).collect();
         // Faces that one point shows, or some, or more than are written at once.
-        let mut hit = Vec::new();
-        for (face, length) in [1, 2, 9, 1, 17, 8, 3, 23].into_iter().enumerate() {
-            hit.extend((0..length).map(|_| (99 - hit.len() as u32, 2 * face as u32)).collect::<Vec<_>>());
-            let start = hit.len() - length;
-            (start..hit.len()).for_each(|i| hit[i].0 = 99 - i as u32);
-        }
+        let lengths = [1, 2, 9, 1, 17, 8, 3, 23];
+        let seen = (0u32..).step_by(2).zip(lengths).flat_map(|(face, length)| std::iter::repeat_n(face, length));
+        let hit: Vec<(u32, u32)> = (0..100).rev().zip(seen).collect();
         for level in Level::all() {
             for count in [1, 7, 8, 40, POINTS] {
                 let mut strip = Strip { level, ..Strip::default() };
@@ -440,10 +348,8 @@ mod tests {
                     let (ray, of_hit) = (&rays[index as usize], &hits[index as usize]);
                     assert_eq!((get(&given.origin, i), get(&given.dir, i)), (ray.origin, ray.dir));
                     assert_eq!((given.weights[0][i], given.weights[1][i]), (of_hit.u, of_hit.v));
-                    let FaceNumbers { wide, narrow, curved } = faces[face as usize].numbers;
-                    assert_eq!(given.faces.wide.map(|column| column[i]), wide, "{i} of {count} on {}", level.name());
-                    assert_eq!(given.faces.narrow.map(|column| column[i]), narrow, "{i} of {count}");
-                    assert_eq!(given.faces.curved[i], curved);
+                    let numbers = faces[face as usize].numbers;
+                    assert_eq!(given.faces.at(i), numbers, "{i} of {count} on {}", level.name());
                 }
             }
         }

@@ -10,6 +10,7 @@
 
 mod around;
 mod columns;
+mod faces;
 mod lit;
 mod sorted;
 mod uniform;

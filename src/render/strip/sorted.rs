@@ -1,6 +1,6 @@
 //! The hits of a wave by instance, each with its face; faces that are hit again are not looked up again.
 
-use super::columns::FaceNumbers;
+use super::faces::FaceNumbers;
 use crate::accel::NO_PRIM;
 use crate::accel::refine::Facet;
 use crate::math::Vec3;
