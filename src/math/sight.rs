@@ -177,7 +177,7 @@ fn view<S: Lanewise<N>, const N: usize>(
     let (low, high) = (s.smaller(u, s.smaller(v, w)), s.greater(u, s.greater(v, w)));
     let apart = s.smaller(s.sub(zero, low), high);
     let (hit, miss) = (s.less(apart, s.sub(zero, error)), s.less(error, apart));
-    let verdicts = Verdicts { hit, unsure: !(hit | miss) & ((1 << N) - 1) };
+    let verdicts = Verdicts { hit, unsure: !(hit | miss) & (u32::MAX >> (u32::BITS as usize - N)) };
     (verdicts, View { edges: [u, v, w], error, heights, height })
 }
 

@@ -128,7 +128,7 @@ fn judge<S: Lanewise<N>, const N: usize>(
     let sound = s.less(error, s.splat(margins.overflow));
     let miss = s.less(low, negative) & s.less(error, high);
     let hit = (s.less(error, low) | s.less(high, negative)) & sound;
-    Verdicts { hit, unsure: !(hit | miss & sound) & ((1 << N) - 1) }
+    Verdicts { hit, unsure: !(hit | miss & sound) & (u32::MAX >> (u32::BITS as usize - N)) }
 }
 
 #[inline(always)]

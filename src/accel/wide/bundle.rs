@@ -1,4 +1,4 @@
-//! Sixteen rays by axis: what bounds them all, and which of them meet a box.
+//! Rays of a packet by axis: what bounds them all, and which of them meet a box.
 
 use std::marker::PhantomData;
 
@@ -10,31 +10,27 @@ use crate::accel::{NO_PRIM, Ray};
 use crate::math::bounds::PARALLEL;
 use crate::math::meetings::RowBounds;
 use crate::math::shear::main_axis;
-use crate::math::simd::{LANES, Lanewise, Pick, Simd, WIDE};
+use crate::math::simd::{LANES, Lanewise, Pick, Simd};
 use crate::math::{DVec3, Vec3};
 
-/// Rays of a packet.
-pub(super) const RAYS: usize = WIDE;
-
-/// Every ray of a packet.
-pub(super) const ALL: u32 = (1 << RAYS) - 1;
-
-/// A number of each ray.
-pub(super) type Numbers = [f32; RAYS];
+/// A bit for every ray of a packet of `N`.
+pub(super) const fn all<const N: usize>() -> u32 {
+    u32::MAX >> (u32::BITS as usize - N)
+}
 
 /// The rays, by axis; as boxes see them by padded slabs (`padded`).
-pub(super) struct Bundle<B> {
-    pub origin: [Numbers; 3],
-    pub dir: [Numbers; 3],
-    inverse: [Numbers; 3],
+pub(super) struct Bundle<B, const N: usize> {
+    pub origin: [[f32; N]; 3],
+    pub dir: [[f32; N]; 3],
+    inverse: [[f32; N]; 3],
     /// What is added to planes that come first, and to those that come last.
-    first: [Numbers; 3],
-    last: [Numbers; 3],
+    first: [[f32; N]; 3],
+    last: [[f32; N]; 3],
     /// Where hits count, inclusive.
-    pub t_min: Numbers,
+    pub t_min: [f32; N],
     /// Where boxes matter.
-    from: Numbers,
-    pub exclude: [u32; RAYS],
+    from: [f32; N],
+    pub exclude: [u32; N],
     /// All rays as one.
     hull: Hull,
     /// Bit k is set where the rays run backwards along axis k.
@@ -59,9 +55,9 @@ struct Hull {
     from: f32,
 }
 
-impl<B: BoxMargins> Bundle<B> {
+impl<B: BoxMargins, const N: usize> Bundle<B, N> {
     pub(super) fn empty() -> Self {
-        let none = [0.0; RAYS];
+        let none = [0.0; N];
         Self {
             origin: [none; 3],
             dir: [none; 3],
@@ -70,7 +66,7 @@ impl<B: BoxMargins> Bundle<B> {
             last: [none; 3],
             t_min: none,
             from: none,
-            exclude: [NO_PRIM; RAYS],
+            exclude: [NO_PRIM; N],
             hull: Hull::default(),
             octant: 0,
             z: 0,
@@ -81,34 +77,36 @@ impl<B: BoxMargins> Bundle<B> {
         }
     }
 
-    /// Takes sixteen rays; how far each of them looks.
+    /// Takes the rays; how far each of them looks.
     #[inline(always)]
-    pub(super) fn spread<S: Simd>(&mut self, s: S, rays: &[Ray; RAYS]) -> Numbers {
+    pub(super) fn spread<S: Simd, T: Lanewise<N>>(&mut self, s: S, lanes: T, rays: &[Ray; N]) -> [f32; N] {
         (self.z, self.octant) = (main_axis(rays[0].dir), octant_of(rays[0].dir));
-        let (low, high) = (Columns::of(s, &rays[..LANES]), Columns::of(s, &rays[LANES..]));
-        let wide = s.wide();
-        for k in 0..3 {
-            self.origin[k] = wide.store(s.join(low.origin[k], high.origin[k]));
-            self.dir[k] = wide.store(s.join(low.dir[k], high.dir[k]));
+        let mut t_max = [0.0; N];
+        for (k, eight) in rays.as_chunks::<LANES>().0.iter().enumerate() {
+            let columns = Columns::of(s, eight);
+            for axis in 0..3 {
+                self.origin[axis].as_chunks_mut().0[k] = s.store(columns.origin[axis]);
+                self.dir[axis].as_chunks_mut().0[k] = s.store(columns.dir[axis]);
+            }
+            self.t_min.as_chunks_mut().0[k] = s.store(columns.t_min);
+            t_max.as_chunks_mut().0[k] = s.store(columns.t_max);
         }
         for (exclude, ray) in self.exclude.iter_mut().zip(rays) {
             *exclude = ray.exclude;
         }
-        self.t_min = wide.store(s.join(low.t_min, high.t_min));
         // A distance that overflows is no hit; a NaN stays one.
-        wide.store(wide.smaller(wide.splat(f32::MAX), s.join(low.t_max, high.t_max)))
+        lanes.store(lanes.smaller(lanes.splat(f32::MAX), lanes.load(&t_max)))
     }
 
     /// Finds slabs and ranges from origins, directions, `t_min` and `t_max`, and which rays run as the first does: to the
     /// same octant, the same component the largest; with numbers for which the bounds of padded boxes hold, and not
     /// backwards.
     #[inline(always)]
-    pub(super) fn prepare<S: Simd>(&mut self, s: S, tree: &Tree, t_max: &Numbers) -> u32 {
-        let s = s.wide();
+    pub(super) fn prepare<T: Lanewise<N>>(&mut self, s: T, tree: &Tree, t_max: &[f32; N]) -> u32 {
         let (t_min, t_max, zero) = (s.load(&self.t_min), s.load(t_max), s.splat(0.0));
         let o = [s.load(&self.origin[0]), s.load(&self.origin[1]), s.load(&self.origin[2])];
         let d = [s.load(&self.dir[0]), s.load(&self.dir[1]), s.load(&self.dir[2])];
-        let Padding { inverse, first, last, allowed } = Padding::of::<B, _, RAYS>(s, tree.extent, o, d);
+        let Padding { inverse, first, last, allowed } = Padding::of::<B, _, N>(s, tree.extent, o, d);
         let [x, y, z] = [s.abs(d[0]), s.abs(d[1]), s.abs(d[2])];
         let mut alike = allowed & s.at_most(t_min, t_max) & s.at_most(zero, t_min);
         alike &= match self.z {
@@ -123,13 +121,13 @@ impl<B: BoxMargins> Bundle<B> {
             self.last[k] = s.store(last[k]);
         }
         self.from = s.store(B::started_lanes(s, t_min));
-        alike & ALL
+        alike & all::<N>()
     }
 
     /// Puts a ray that runs alike in the place of each that does not, so that nothing bounds those.
     #[inline(always)]
-    pub(super) fn fill<S: Simd>(&mut self, s: S, alike: u32, t_max: &mut Numbers) {
-        let (s, lane) = (s.wide(), alike.trailing_zeros() as usize % RAYS);
+    pub(super) fn fill<T: Lanewise<N>>(&mut self, s: T, alike: u32, t_max: &mut [f32; N]) {
+        let lane = alike.trailing_zeros() as usize % N;
         let rows = [&mut self.origin, &mut self.dir, &mut self.inverse, &mut self.first, &mut self.last];
         for row in rows.into_iter().flatten().chain([&mut self.t_min, &mut self.from, t_max]) {
             *row = s.store(s.choose(alike, s.load(row), s.splat(row[lane])));
@@ -138,7 +136,7 @@ impl<B: BoxMargins> Bundle<B> {
 
     /// Which rays meet a box up to their limits; by axis, its plane that comes first and the one that comes last.
     #[inline(always)]
-    pub(super) fn meet<S: Lanewise<RAYS>>(&self, s: S, first: [f32; 3], last: [f32; 3], limit: S::Lanes) -> u32 {
+    pub(super) fn meet<T: Lanewise<N>>(&self, s: T, first: [f32; 3], last: [f32; 3], limit: T::Lanes) -> u32 {
         let (mut near, mut far) = (s.load(&self.from), limit);
         for k in 0..3 {
             let inverse = s.load(&self.inverse[k]);
@@ -150,15 +148,14 @@ impl<B: BoxMargins> Bundle<B> {
 
     /// Finds what bounds all rays.
     #[inline(always)]
-    pub(super) fn bound<S: Simd>(&mut self, s: S, tree: &Tree) {
-        let s = s.wide();
+    pub(super) fn bound<T: Lanewise<N>>(&mut self, s: T, tree: &Tree) {
         let first = Vec3::new(self.origin[0][0], self.origin[1][0], self.origin[2][0]);
         let o = [s.load(&self.origin[0]), s.load(&self.origin[1]), s.load(&self.origin[2])];
-        let mut alike = ALL;
+        let mut alike = all::<N>();
         for k in 0..3 {
             alike &= s.at_most(o[k], s.splat(first[k])) & s.at_most(s.splat(first[k]), o[k]);
         }
-        self.common = (alike == ALL).then_some(first);
+        self.common = (alike == all::<N>()).then_some(first);
         (self.low, self.high) = (first, first);
         let zero = s.splat(0.0);
         if self.common.is_none() {
@@ -231,7 +228,7 @@ impl<B: BoxMargins> Bundle<B> {
 
     /// Which rays meet the box of a child up to their limits.
     #[inline(always)]
-    pub(super) fn meet_child<S: Lanewise<RAYS>>(&self, s: S, node: &Node, slot: usize, limit: S::Lanes) -> u32 {
+    pub(super) fn meet_child<T: Lanewise<N>>(&self, s: T, node: &Node, slot: usize, limit: T::Lanes) -> u32 {
         let back = |k: usize| self.octant >> k & 1;
         let plane = |k: usize, side: usize| node.planes[(2 * k + side) % 6][slot % LANES];
         let first = [plane(0, back(0)), plane(1, back(1)), plane(2, back(2))];

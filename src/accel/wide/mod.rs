@@ -44,7 +44,6 @@ pub use split::Splitting;
 use std::marker::PhantomData;
 
 use self::alone::Alone;
-use self::bundle::RAYS;
 use self::flight::{DEPTH, Flight, InFlight};
 use self::node::Tree;
 use self::packet::InPackets;
@@ -54,7 +53,7 @@ use self::walk::{OneByOne, Walk};
 use super::query::{Culling, Goal, Query};
 use super::wave::Wave;
 use super::{NoProbe, Probe, Shapes};
-use crate::math::simd::{Kernel, Level, Portable};
+use crate::math::simd::{Kernel, Level, Portable, WIDE};
 
 /// How the rays of a wave are traced. The answers are the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,12 +64,12 @@ pub enum RayOrder {
     OneByOne,
     /// Many at a time, each its own way.
     InFlight,
-    /// Sixteen side by side where they run alike, the others one after another.
+    /// Sixteen or thirty-two side by side where they run alike, the others one after another.
     Packets,
 }
 
 /// Rays from which on it pays to have them in flight.
-const MANY: usize = 2 * RAYS;
+const MANY: usize = 2 * WIDE;
 
 impl RayOrder {
     /// What suits a wave: by how many of the packets that it would make run to one octant, as far as three rays of each
@@ -80,9 +79,9 @@ impl RayOrder {
             let dir = wave.rays()[i].dir;
             [dir.x, dir.y, dir.z].map(f32::is_sign_negative)
         };
-        let packets = wave.rays().len() / RAYS;
-        let starts = (0..packets).map(|p| p * RAYS);
-        let alike = starts.filter(|&i| octant(i) == octant(i + RAYS / 2) && octant(i) == octant(i + RAYS - 1)).count();
+        let packets = wave.rays().len() / WIDE;
+        let starts = (0..packets).map(|p| p * WIDE);
+        let alike = starts.filter(|&i| octant(i) == octant(i + WIDE / 2) && octant(i) == octant(i + WIDE - 1)).count();
         match packets {
             0 => Self::OneByOne,
             _ if 2 * alike > packets => Self::Packets,

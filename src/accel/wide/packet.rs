@@ -1,4 +1,4 @@
-//! Sixteen rays side by side: rays that run alike visit the same nodes, which are read and ordered once for all.
+//! Sixteen or thirty-two rays side by side: rays that run alike visit the same nodes, which are read and ordered once for all.
 //!
 //! A node's boxes are first asked about all rays at once, by a hull of origins and reciprocals of directions (after
 //! S. Boulos et al., *Packet-based Whitted and Distribution Ray Tracing*, 2007); of several boxes that are left each is asked
@@ -6,14 +6,17 @@
 //! at once. Best hits are known by intervals, as in `best`; exact distances are found at the end, those of all rays
 //! together.
 //!
-//! A few rays of sixteen that do not run as the others do go their own ways, one after another, and so do all where too few
-//! run alike.
+//! What a packet waits for is mostly itself: each test decides which is next. So thirty-two rays, where there are registers
+//! for them, take little more time than sixteen, as long as they stay together; where less than half of them visit what the
+//! packet visits, those that follow go by sixteen.
+//!
+//! A few rays that do not run as the others do go their own ways, one after another, and so do all where too few run alike.
 
 use std::marker::PhantomData;
 
 use super::alone::Lone;
 use super::best::{Place, decide};
-use super::bundle::{ALL, Bundle, Numbers, RAYS};
+use super::bundle::{Bundle, all};
 use super::flight::FARTHEST_FIRST;
 use super::node::{Child, Node, Tree};
 use super::slabs::BoxMargins;
@@ -24,15 +27,21 @@ use crate::accel::{Hit, NO_PRIM, Ray, Shapes};
 use crate::math::meetings::{Meetings, Plane, meet};
 use crate::math::shear::RaySpace;
 use crate::math::sight::RowSight;
-use crate::math::simd::{Kernel, LANES, Lanewise, Simd};
+use crate::math::simd::{BROAD, Kernel, LANES, Lanewise, Simd, WIDE};
 use crate::math::triangle;
 use crate::math::triangles::Verdicts;
 
-/// Rays that run alike from which on they are a packet, without the others.
+/// So many rays before they are taken they are fetched: a processor that foretells what is read does not see beyond a page.
+const AHEAD: usize = 128;
+
+/// Rays of sixteen that run alike from which on they are a packet, without the others.
 const ENOUGH: u32 = 8;
 
-/// So many rays before they are taken they are fetched: a processor that foretells what is read does not see beyond a page.
-const AHEAD: usize = 8 * RAYS;
+/// The same of thirty-two: what runs otherwise may be a packet of its own.
+const ENOUGH_BROAD: u32 = 24;
+
+/// So many narrow packets come after a broad one whose rays are not close, and twice as many after the next such one.
+const PATIENCE: usize = 8;
 
 /// A child still to be visited.
 #[derive(Clone, Copy, Debug, Default)]
@@ -55,44 +64,55 @@ pub(super) struct InPackets<'w, W, B> {
     pub margins: PhantomData<B>,
 }
 
-/// Sixteen rays that run alike.
-struct Packet<'w, W, B> {
+/// What packets are traced through, and who takes their answers.
+struct Trip<'w, W> {
     tree: &'w Tree,
     shapes: &'w Shapes,
     wave: &'w mut W,
+    stack: &'w mut [Branch],
+    entries: &'w mut [Entry],
+    lone: Lone,
+}
+
+/// `N` rays that run alike.
+struct Packet<B, const N: usize> {
     /// Number of its first ray.
     start: usize,
-    rays: Bundle<B>,
-    found: Found,
+    rays: Bundle<B, N>,
+    found: Found<N>,
     /// Where their ranges end.
-    t_max: Numbers,
+    t_max: [f32; N],
     /// Rays that still look for something.
     active: u32,
 }
 
 /// What was found so far.
-#[derive(Default)]
-struct Found {
+struct Found<const N: usize> {
     /// [`NO_PRIM`] where nothing was found.
-    prim: [u32; RAYS],
+    prim: [u32; N],
     /// Where that is, block and lane, so that nobody looks up its corners again.
-    place: [u32; RAYS],
+    place: [u32; N],
 }
 
 /// How far the rays look, in lanes: what every test changes and the next one needs.
-struct Reach<S: Simd> {
+struct Reach<T: Lanewise<N>, const N: usize> {
     /// The exact distances of the best hits lie between these, as in `best`. Without a hit: infinite, and the end of the
     /// ray's range.
-    low: Wide<S>,
-    high: Wide<S>,
+    low: T::Lanes,
+    high: T::Lanes,
     /// Boxes are entered up to here.
-    limit: Wide<S>,
+    limit: T::Lanes,
     /// The greatest of these.
     farthest: f32,
 }
 
-/// A number of each ray, in lanes.
-type Wide<S> = <<S as Simd>::Wide as Lanewise<RAYS>>::Lanes;
+/// How many rays visit the nodes and leaves of packets together.
+#[derive(Clone, Copy, Debug, Default)]
+struct Company {
+    visits: u32,
+    /// Rays that visit them, summed.
+    rays: u32,
+}
 
 impl<W: Wave, B: BoxMargins> Kernel for InPackets<'_, W, B> {
     type Output = ();
@@ -100,108 +120,140 @@ impl<W: Wave, B: BoxMargins> Kernel for InPackets<'_, W, B> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         let Self { tree, shapes, wave, stack, entries, .. } = self;
-        let mut packet = Packet {
-            tree,
-            shapes,
-            wave,
-            start: 0,
-            rays: Bundle::<B>::empty(),
-            found: Found::default(),
-            t_max: [0.0; RAYS],
-            active: 0,
-        };
-        let (count, mut lone) = (packet.wave.rays().len(), Lone::default());
-        while packet.start < count {
-            let alike = packet.gather(s);
-            if alike != 0 {
-                packet.trace(s, alike, stack);
-            }
-            let mut apart = ALL & !alike;
-            for start in (packet.start..count.min(packet.start + RAYS)).step_by(LANES) {
-                if apart != 0 {
-                    lone.trace::<B, _, _>(s, tree, shapes, packet.wave, (start, apart), entries);
+        let (mut narrow, mut broad) = (Packet::<B, WIDE>::empty(), Packet::<B, BROAD>::empty());
+        let mut trip = Trip { tree, shapes, wave, stack, entries, lone: Lone::default() };
+        let (count, mut start) = (trip.wave.rays().len(), 0);
+        let (mut apart, mut patience) = (0_usize, PATIENCE);
+        while start < count {
+            if S::BROAD_FITS && apart == 0 && start + BROAD <= count {
+                let alike = broad.gather(s, s.broad(), &trip, start);
+                if alike.count_ones() >= ENOUGH_BROAD {
+                    let company = broad.pass(s, s.broad(), &mut trip, alike);
+                    (apart, patience) =
+                        if company.is_close::<BROAD>() { (0, PATIENCE) } else { (patience, 2 * patience) };
+                    start += BROAD;
+                    continue;
                 }
-                apart >>= LANES;
+                apart = BROAD / WIDE;
             }
-            packet.start += RAYS;
+            let alike = narrow.gather(s, s.wide(), &trip, start);
+            narrow.pass(s, s.wide(), &mut trip, if alike.count_ones() >= ENOUGH { alike } else { 0 });
+            (start, apart) = (start + WIDE, apart.saturating_sub(1));
         }
-        lone.finish(s, packet.wave);
+        trip.lone.finish(s, trip.wave);
     }
 }
 
-impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
-    /// Takes the next sixteen rays, if there are as many; those that run alike, if they are worth a packet, or none.
+impl Company {
+    /// Whether half of `N` rays and more visit what they visit, on the average: then they are better off together than in
+    /// halves.
+    fn is_close<const N: usize>(self) -> bool {
+        2 * u64::from(self.rays) >= u64::from(self.visits) * N as u64
+    }
+}
+
+impl<B: BoxMargins, const N: usize> Packet<B, N> {
+    fn empty() -> Self {
+        Self {
+            start: 0,
+            rays: Bundle::empty(),
+            found: Found { prim: [NO_PRIM; N], place: [0; N] },
+            t_max: [0.0; N],
+            active: 0,
+        }
+    }
+
+    /// Answers the rays that were taken, or as many as there are: those of a mask together.
     #[inline(always)]
-    fn gather<S: Simd>(&mut self, s: S) -> u32 {
-        let rays = &self.wave.rays()[self.start..];
-        if let Some(later) = rays.get(AHEAD..AHEAD + RAYS) {
+    fn pass<S: Simd, T: Lanewise<N>, W: Wave>(&mut self, s: S, wide: T, trip: &mut Trip<W>, alike: u32) -> Company {
+        let company = if alike == 0 { Company::default() } else { self.trace(s, wide, alike, trip) };
+        let (mut apart, count) = (all::<N>() & !alike, trip.wave.rays().len());
+        for start in (self.start..count.min(self.start + N)).step_by(LANES) {
+            if apart & all::<LANES>() != 0 {
+                trip.lone.trace::<B, _, _>(s, trip.tree, trip.shapes, trip.wave, (start, apart), trip.entries);
+            }
+            apart >>= LANES;
+        }
+        company
+    }
+
+    /// Takes the rays from `start` on, if there are as many, and tells which of them run alike.
+    #[inline(always)]
+    fn gather<S: Simd, T: Lanewise<N>, W: Wave>(&mut self, s: S, wide: T, trip: &Trip<W>, start: usize) -> u32 {
+        self.start = start;
+        let rays = &trip.wave.rays()[start..];
+        if let Some(later) = rays.get(AHEAD..AHEAD + N) {
             s.prefetch(later);
         }
-        let Some(rays) = rays.first_chunk::<RAYS>() else { return 0 };
-        self.t_max = self.rays.spread(s, rays);
-        self.wave.adapt_t_min(self.start, &mut self.rays.t_min);
-        let alike = self.rays.prepare(s, self.tree, &self.t_max);
-        match alike.count_ones() {
-            16 => ALL,
-            ENOUGH..16 => {
-                self.rays.fill(s, alike, &mut self.t_max);
-                alike
-            }
-            _ => 0,
-        }
+        let Some(rays) = rays.first_chunk::<N>() else { return 0 };
+        self.t_max = self.rays.spread(s, wide, rays);
+        trip.wave.adapt_t_min(start, &mut self.rays.t_min);
+        self.rays.prepare(wide, trip.tree, &self.t_max)
     }
 
     /// From the root to every leaf that any of these rays may hit. The others get an answer, too, which means nothing.
     #[inline(always)]
-    fn trace<S: Simd>(&mut self, s: S, alike: u32, stack: &mut [Branch]) {
-        let tree = self.tree;
+    fn trace<S: Simd, T: Lanewise<N>, W: Wave>(&mut self, s: S, wide: T, alike: u32, trip: &mut Trip<W>) -> Company {
+        let (tree, mut company) = (trip.tree, Company::default());
+        if alike != all::<N>() {
+            self.rays.fill(wide, alike, &mut self.t_max);
+        }
         let side = |k: usize, last: bool| {
             if (self.rays.octant >> k & 1 == 1) == last { tree.bounds.lo[k] } else { tree.bounds.hi[k] }
         };
         let (first, last) =
             ([side(0, false), side(1, false), side(2, false)], [side(0, true), side(1, true), side(2, true)]);
-        let wide = s.wide();
         let high = wide.load(&self.t_max);
         let limit = B::widened_lanes(wide, high);
         self.active = self.rays.meet(wide, first, last, limit) & alike;
         if self.active == 0 {
-            return (self.start..self.start + RAYS).for_each(|i| self.wave.take(i, Hit::MISS));
+            (self.start..self.start + N).for_each(|i| trip.wave.take(i, Hit::MISS));
+            return company;
         }
-        self.found.prim = [NO_PRIM; RAYS];
-        self.rays.bound(s, tree);
+        self.found.prim = [NO_PRIM; N];
+        self.rays.bound(wide, tree);
         let sight = RowSight::new(wide, &self.rays.origin, self.rays.common, &self.rays.dir, self.rays.z);
         let low = wide.splat(f32::INFINITY);
         let limit = wide.choose(self.active, limit, wide.splat(f32::NEG_INFINITY));
-        let mut reach: Reach<S> = Reach { low, high, limit, farthest: wide.greatest(limit) };
+        let mut reach: Reach<T, N> = Reach { low, high, limit, farthest: wide.greatest(limit) };
         let (mut top, mut branch) = (0, Branch { near: 0.0, child: 0, rays: self.active });
         loop {
             let mut nearer = false;
+            company.visits += 1;
+            company.rays += branch.rays.count_ones();
             if Child::is_leaf(branch.child) {
-                self.visit(s, branch, &mut reach, &sight);
+                self.visit(s, wide, trip, branch, &mut reach, &sight);
                 if W::Goal::ANY && self.active == 0 {
                     break;
                 }
             } else {
                 let below = top;
-                self.push(s, &tree.nodes[branch.child as usize], branch.rays, &reach, stack, &mut top);
+                self.push(s, wide, &tree.nodes[branch.child as usize], branch.rays, &reach, (trip.stack, &mut top));
                 nearer = top > below;
             }
             // Those that meet the nearest child were just found; rays that need no more have no limit above zero.
-            if !nearer && !drop_unneeded(s, &reach, stack, &mut top) {
+            if !nearer && !drop_unneeded(wide, &reach, trip.stack, &mut top) {
                 break;
             }
             top -= 1;
-            branch = stack[top];
+            branch = trip.stack[top];
         }
-        self.answer(s);
+        self.answer(s, wide, trip);
+        company
     }
 
     /// Tests a leaf.
     #[inline(always)]
-    fn visit<S: Simd>(&mut self, s: S, branch: Branch, reach: &mut Reach<S>, sight: &RowSight<S::Wide, RAYS>) {
-        let wide = s.wide();
-        let (block, count) = Child::block(branch.child);
-        let changed = self.test(s, block, count, branch.rays, reach, sight);
+    fn visit<S: Simd, T: Lanewise<N>, W: Wave>(
+        &mut self,
+        s: S,
+        wide: T,
+        trip: &Trip<W>,
+        branch: Branch,
+        reach: &mut Reach<T, N>,
+        sight: &RowSight<T, N>,
+    ) {
+        let changed = self.test(s, wide, trip, branch, reach, sight);
         if changed == 0 {
             return;
         }
@@ -216,7 +268,15 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
 
     /// Puts the children that some ray meets on the stack, the nearest last.
     #[inline(always)]
-    fn push<S: Simd>(&self, s: S, node: &Node, rays: u32, reach: &Reach<S>, stack: &mut [Branch], top: &mut usize) {
+    fn push<S: Simd, T: Lanewise<N>>(
+        &self,
+        s: S,
+        wide: T,
+        node: &Node,
+        rays: u32,
+        reach: &Reach<T, N>,
+        (stack, top): (&mut [Branch], &mut usize),
+    ) {
         let bundle = &self.rays;
         let (near, met) = bundle.meets_any_child(s, node, reach.farthest);
         if met == 0 {
@@ -228,7 +288,7 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
             let slot = (order & 7) as usize;
             order >>= 8;
             // The only one is visited for the rays that visit the node: mostly there are some for it.
-            let met = if only { rays } else { bundle.meet_child(s.wide(), node, slot, reach.limit) & rays };
+            let met = if only { rays } else { bundle.meet_child(wide, node, slot, reach.limit) & rays };
             stack[*top] = Branch { near: near[slot], child: node.children[slot], rays: met };
             *top += usize::from(met != 0);
         }
@@ -236,17 +296,17 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
 
     /// Tests the triangles of a block, and tells which rays have new hits.
     #[inline(always)]
-    fn test<S: Simd>(
+    fn test<S: Simd, T: Lanewise<N>, W: Wave>(
         &mut self,
         s: S,
-        index: u32,
-        count: u32,
-        mut rays: u32,
-        reach: &mut Reach<S>,
-        sight: &RowSight<S::Wide, RAYS>,
+        wide: T,
+        trip: &Trip<W>,
+        branch: Branch,
+        reach: &mut Reach<T, N>,
+        sight: &RowSight<T, N>,
     ) -> u32 {
-        let tree = self.tree;
-        let block = &tree.blocks[index as usize];
+        let ((index, count), mut rays) = (Child::block(branch.child), branch.rays);
+        let block = &trip.tree.blocks[index as usize];
         let [a, b, c] = &block.corners;
         let zero = s.splat(0.0);
         let (mut first, mut last) = ([zero; 3], [zero; 3]);
@@ -265,11 +325,11 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
         while lanes != 0 {
             let lane = lanes.trailing_zeros();
             lanes &= lanes - 1;
-            let look = sight.look(s.wide(), &ready, lane as usize);
+            let look = sight.look(wide, &ready, lane as usize);
             if (look.verdicts.hit | look.verdicts.unsure) & rays != 0 {
                 let place = Place { block: index, lane, prim: block.prims[lane as usize % LANES] };
-                let between = sight.distances(s.wide(), &look);
-                let hit = self.take(s, place, rays, look.verdicts, between, reach);
+                let between = sight.distances(wide, &look);
+                let hit = self.take(wide, trip, (place, rays), look.verdicts, between, reach);
                 changed |= hit;
                 if W::Goal::ANY {
                     rays &= !hit;
@@ -282,18 +342,18 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
     /// Offers the hits of rays with a triangle, between two distances where they are certain; which of them are the best
     /// now.
     #[inline(always)]
-    fn take<S: Simd>(
+    fn take<T: Lanewise<N>, W: Wave>(
         &mut self,
-        s: S,
-        place: Place,
-        rays: u32,
+        s: T,
+        trip: &Trip<W>,
+        (place, rays): (Place, u32),
         verdicts: Verdicts,
-        [low, high]: [Wide<S>; 2],
-        reach: &mut Reach<S>,
+        [low, high]: [T::Lanes; 2],
+        reach: &mut Reach<T, N>,
     ) -> u32 {
-        let (s, prim) = (s.wide(), place.prim);
+        let prim = place.prim;
         let rays = rays & !s.find_word(prim, &self.rays.exclude);
-        if !self.wave.goal(self.start).wants(self.shapes, prim) {
+        if !trip.wave.goal(self.start).wants(trip.shapes, prim) {
             return 0;
         }
         let (hit, unsure) = (verdicts.hit & rays, verdicts.unsure & rays);
@@ -309,10 +369,10 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
         if open != 0 {
             let (mut low, mut high) = (s.store(reach.low), s.store(reach.high));
             while open != 0 {
-                let ray = open.trailing_zeros() as usize % RAYS;
+                let ray = open.trailing_zeros() as usize % N;
                 open &= open - 1;
                 let (i, best, certain) = (self.start + ray, self.found.prim[ray], hit >> ray & 1 == 1);
-                if let Some((t, prim)) = decide(self.shapes, self.wave, i, best, place.prim, certain) {
+                if let Some((t, prim)) = decide(trip.shapes, &*trip.wave, i, best, place.prim, certain) {
                     (low[ray], high[ray]) = (t, t);
                     if prim == place.prim {
                         (self.found.prim[ray], self.found.place[ray]) = (prim, place.packed());
@@ -327,13 +387,13 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
 
     /// Where the rays of a mask meet what they hit.
     #[inline(always)]
-    fn meet_each<S: Lanewise<RAYS>>(&self, s: S, mut left: u32) -> Meetings<S::Lanes> {
+    fn meet_each<T: Lanewise<N>>(&self, s: T, tree: &Tree, mut left: u32) -> Meetings<T::Lanes> {
         let mut corners = [[s.splat(0.0); 3]; 3];
         while left != 0 {
-            let place = self.found.place[left.trailing_zeros() as usize % RAYS];
+            let place = self.found.place[left.trailing_zeros() as usize % N];
             let mine = s.find_word(place, &self.found.place);
             left &= !mine;
-            let (rows, lane) = Place::rows(self.tree, place);
+            let (rows, lane) = Place::rows(tree, place);
             for (corner, rows) in corners.iter_mut().zip(rows) {
                 for k in 0..3 {
                     corner[k] = s.choose(mine, s.splat(rows[k][lane]), corner[k]);
@@ -346,44 +406,42 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
 
     /// Gives the answers, all distances and weights together.
     #[inline(always)]
-    fn answer<S: Simd>(&mut self, s: S) {
-        let (start, found) = (self.start, &self.found);
+    fn answer<S: Simd, T: Lanewise<N>, W: Wave>(&mut self, s: S, wide: T, trip: &mut Trip<W>) {
+        let (start, found, tree) = (self.start, &self.found, trip.tree);
         if W::Goal::ANY {
             for (ray, &prim) in found.prim.iter().enumerate() {
-                self.wave.take(start + ray, Hit { prim, ..Hit::MISS });
+                trip.wave.take(start + ray, Hit { prim, ..Hit::MISS });
             }
             return;
         }
-        let wide = s.wide();
-        let hit = !wide.find_word(NO_PRIM, &found.prim) & ALL;
+        let hit = !wide.find_word(NO_PRIM, &found.prim) & all::<N>();
         if hit == 0 {
-            return (start..start + RAYS).for_each(|i| self.wave.take(i, Hit::MISS));
+            return (start..start + N).for_each(|i| trip.wave.take(i, Hit::MISS));
         }
         let (mut unsure, zero) = (hit, wide.splat(0.0));
-        let place = found.place[hit.trailing_zeros() as usize % RAYS];
+        let place = found.place[hit.trailing_zeros() as usize % N];
         let Meetings { t, weights: [u, v], sure } = if hit & !wide.find_word(place, &found.place) == 0 {
             let bounds = self.rays.row_bounds();
-            Plane::of(&Place::corners(self.tree, place)).meet(wide, &self.rays.origin, &self.rays.dir, &bounds)
+            Plane::of(&Place::corners(tree, place)).meet(wide, &self.rays.origin, &self.rays.dir, &bounds)
         } else {
-            self.meet_each(wide, hit)
+            self.meet_each(wide, tree, hit)
         };
         let t = wide.choose(unsure, t, wide.splat(f32::INFINITY));
         let (mut t, mut u, mut v) =
             (wide.store(t), wide.store(wide.choose(unsure, u, zero)), wide.store(wide.choose(unsure, v, zero)));
         unsure &= !sure;
         while unsure != 0 {
-            let ray = unsure.trailing_zeros() as usize % RAYS;
+            let ray = unsure.trailing_zeros() as usize % N;
             unsure &= unsure - 1;
-            let Ray { origin, dir, .. } = self.wave.rays()[start + ray];
-            let corners = Place::corners(self.tree, found.place[ray]);
+            let Ray { origin, dir, .. } = trip.wave.rays()[start + ray];
+            let corners = Place::corners(tree, found.place[ray]);
             (t[ray], u[ray], v[ray]) = triangle::place(&RaySpace::checked(origin, dir).0, &corners);
         }
-        for half in 0..2 {
-            let eight = |row: &Numbers| s.load(&row.as_chunks().0[half]);
-            let prim = s.load(&found.prim.as_chunks::<LANES>().0[half].map(f32::from_bits));
-            let rows = s.rows([eight(&t), eight(&u), eight(&v), prim]);
+        for (k, prim) in found.prim.as_chunks::<LANES>().0.iter().enumerate() {
+            let [t, u, v] = [&t.as_chunks().0[k], &u.as_chunks().0[k], &v.as_chunks().0[k]];
+            let rows = s.rows([s.load(t), s.load(u), s.load(v), s.load(&prim.map(f32::from_bits))]);
             for (lane, [t, u, v, prim]) in rows.into_iter().enumerate() {
-                self.wave.take(start + LANES * half + lane, Hit { t, u, v, prim: prim.to_bits() });
+                trip.wave.take(start + LANES * k + lane, Hit { t, u, v, prim: prim.to_bits() });
             }
         }
     }
@@ -392,8 +450,12 @@ impl<'w, W: Wave, B: BoxMargins> Packet<'w, W, B> {
 /// Takes off the stack what no ray needs any more, and tells whether anything is left: on top of it a child, for the rays that
 /// need it.
 #[inline(always)]
-fn drop_unneeded<S: Simd>(s: S, reach: &Reach<S>, stack: &mut [Branch], top: &mut usize) -> bool {
-    let wide = s.wide();
+fn drop_unneeded<T: Lanewise<N>, const N: usize>(
+    wide: T,
+    reach: &Reach<T, N>,
+    stack: &mut [Branch],
+    top: &mut usize,
+) -> bool {
     while *top > 0 {
         let branch = &mut stack[*top - 1];
         branch.rays &= wide.at_most(wide.splat(branch.near), reach.limit);

@@ -26,12 +26,17 @@ fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> String {
 /// For some rays sixteen side by side that start with them, every other time each from a place of its own: most bundles
 /// run alike, some straddle an octant.
 fn bundles(rays: &[Ray]) -> Vec<Ray> {
+    side_by_side(rays, 16)
+}
+
+/// The same with so many rays in each bundle.
+fn side_by_side(rays: &[Ray], count: usize) -> Vec<Ray> {
     let bundle = |(i, ray): (usize, &Ray)| {
         let (ray, width) = (*ray, ray.dir.length() * 0.03);
         let side =
             move |k: usize| Vec3::new(0.3, -0.2, 0.1) * (k % 4) as f32 + Vec3::new(0.0, 0.1, 0.2) * (k / 4) as f32;
         let apart = width * (i % 2) as f32;
-        (0..16).map(move |k| Ray { origin: ray.origin - side(k) * apart, dir: ray.dir + side(k) * width, ..ray })
+        (0..count).map(move |k| Ray { origin: ray.origin - side(k) * apart, dir: ray.dir + side(k) * width, ..ray })
     };
     rays.iter().step_by(5).enumerate().flat_map(bundle).filter(|r| r.dir != Vec3::ZERO).collect()
 }
@@ -56,43 +61,47 @@ fn rays_in_flight_and_in_packets_hit_what_brute_force_hits() {
 #[test]
 fn rays_that_run_alike_hit_what_brute_force_hits() {
     for (name, shapes) in scenes::all() {
-        let rays = bundles(&scenes::rays(&shapes, 6));
-        assert_all_ways_agree(name, &shapes, &rays);
+        for count in [16, 32, 80] {
+            let rays = side_by_side(&scenes::rays(&shapes, 6), count);
+            assert_all_ways_agree(name, &shapes, &rays);
+        }
     }
 }
 
-/// Of each sixteen rays that run alike some, the first among them or not, run back, along another axis, or have no range or
+/// Of sixteen rays that run alike, or thirty-two, some, the first among them or not, run back, along another axis, or have no range or
 /// no place that boxes could be asked about.
 #[test]
 fn rays_among_others_that_run_otherwise_hit_what_brute_force_hits() {
     let mut r = Random::new(72);
     for (name, shapes) in scenes::all() {
-        let alike = bundles(&scenes::rays(&shapes, 4));
-        let mut rays: Vec<Ray> = Vec::new();
-        for (i, bundle) in alike.chunks(16).enumerate() {
-            let apart = [1, 2, 7, 8, 9, 15][i % 6];
-            let mut bundle = bundle.to_vec();
-            for _ in 0..apart {
-                let (k, ray) = (r.below(bundle.len()), bundle[0]);
-                bundle[k] = match r.below(5) {
-                    0 => Ray { dir: -ray.dir, ..ray },
-                    1 => Ray { dir: Vec3::new(ray.dir.y, ray.dir.z, ray.dir.x), ..ray },
-                    2 => Ray { t_min: 2.0, t_max: 1.0, ..ray },
-                    3 => Ray { t_max: f32::NAN, ..ray },
-                    _ => Ray { origin: ray.origin * 1e30, ..ray },
-                };
+        for count in [16, 32] {
+            let alike = side_by_side(&scenes::rays(&shapes, 4), count);
+            let mut rays: Vec<Ray> = Vec::new();
+            for (i, bundle) in alike.chunks(count).enumerate() {
+                let apart = [1, 2, 7, 8, 9, 15][i % 6] * count / 16;
+                let mut bundle = bundle.to_vec();
+                for _ in 0..apart {
+                    let (k, ray) = (r.below(bundle.len()), bundle[0]);
+                    bundle[k] = match r.below(5) {
+                        0 => Ray { dir: -ray.dir, ..ray },
+                        1 => Ray { dir: Vec3::new(ray.dir.y, ray.dir.z, ray.dir.x), ..ray },
+                        2 => Ray { t_min: 2.0, t_max: 1.0, ..ray },
+                        3 => Ray { t_max: f32::NAN, ..ray },
+                        _ => Ray { origin: ray.origin * 1e30, ..ray },
+                    };
+                }
+                rays.extend(bundle);
             }
-            rays.extend(bundle);
+            assert_all_ways_agree(name, &shapes, &rays);
         }
-        assert_all_ways_agree(name, &shapes, &rays);
     }
 }
 
 #[test]
 fn a_wave_may_be_of_any_length() {
     let shapes = scenes::soup(60, 0.4);
-    let rays = bundles(&scenes::rays(&shapes, 2));
-    for count in [0, 1, 15, 16, 17, 40] {
+    let rays = side_by_side(&scenes::rays(&shapes, 2), 48);
+    for count in [0, 1, 15, 16, 17, 31, 32, 33, 48, 49, 150] {
         assert_all_ways_agree("soup", &shapes, &rays[..count]);
     }
 }

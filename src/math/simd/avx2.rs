@@ -8,7 +8,7 @@
 use std::arch::x86_64::*;
 
 use super::pair::Pair;
-use super::{Axis, Kernel, LANES, Lanewise, Order, Pick, Row, Simd, WIDE};
+use super::{Axis, Kernel, LANES, Lanewise, Order, Pick, Row, Simd};
 
 /// Proof that the processor has AVX2 and the fused and bit instructions that came with it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,7 +39,7 @@ impl Avx2 {
 
 /// Eight lanes for a token that proves AVX2.
 macro_rules! eight_lanes {
-    ($token:ty, $wide:ty, $widened:expr, $larger:expr, $join:expr) => {
+    ($token:ty, $wide:ty, $widened:expr, $larger:expr, $broad_fits:expr) => {
         impl Lanewise<LANES> for $token {
             type Lanes = __m256;
             type Doubles = [__m256d; 2];
@@ -317,10 +317,17 @@ macro_rules! eight_lanes {
 
         impl Simd for $token {
             type Wide = $wide;
+            type Broad = Pair<$wide>;
+            const BROAD_FITS: bool = $broad_fits;
 
             #[inline(always)]
             fn wide(self) -> $wide {
                 $widened(self)
+            }
+
+            #[inline(always)]
+            fn broad(self) -> Pair<$wide> {
+                Pair($widened(self))
             }
 
             #[inline(always)]
@@ -330,11 +337,6 @@ macro_rules! eight_lanes {
                     let words = _mm256_loadu_si256(words.as_ptr().cast());
                     _mm256_movemask_ps(_mm256_castsi256_ps(words)).cast_unsigned()
                 }
-            }
-
-            #[inline(always)]
-            fn join(self, low: __m256, high: __m256) -> <$wide as Lanewise<WIDE>>::Lanes {
-                $join(self, low, high)
             }
 
             #[inline(always)]
@@ -432,12 +434,7 @@ macro_rules! eight_lanes {
 
 pub(super) use eight_lanes;
 
-eight_lanes!(Avx2, Pair<Avx2>, Pair, larger, join);
-
-#[inline(always)]
-fn join(_: Avx2, low: __m256, high: __m256) -> [__m256; 2] {
-    [low, high]
-}
+eight_lanes!(Avx2, Pair<Avx2>, Pair, larger, false);
 
 #[inline(always)]
 fn larger(s: Avx2, a: __m256, b: __m256) -> __m256 {

@@ -8,6 +8,7 @@
 use std::arch::x86_64::*;
 
 use super::avx2::{Avx2, eight_lanes, lanes_in, lanes_of};
+use super::pair::Pair;
 use super::{Axis, Kernel, LANES, Lanewise, Order, Pick, Row, Simd, WIDE};
 
 /// Proof that the processor has AVX-512 with 256-bit forms, double words and quad words, and what AVX2 came with.
@@ -45,13 +46,7 @@ impl Avx512 {
     }
 }
 
-eight_lanes!(Avx512, Sixteen, Sixteen, larger, join);
-
-#[inline(always)]
-fn join(_: Avx512, low: __m256, high: __m256) -> __m512 {
-    // SAFETY: the token proves the features.
-    unsafe { _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high) }
-}
+eight_lanes!(Avx512, Sixteen, Sixteen, larger, true);
 
 #[inline(always)]
 fn larger(_: Avx512, a: __m256, b: __m256) -> __m256 {

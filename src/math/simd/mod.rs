@@ -1,4 +1,4 @@
-//! Eight and sixteen `f32` at once, on whatever the processor has.
+//! Eight, sixteen and thirty-two `f32` at once, on whatever the processor has.
 //!
 //! A [`Kernel`] is written once over [`Simd`]; [`Level::run`] compiles it for each instruction set and takes the best one
 //! that the machine offers. Every operation but `mul_add` and its kin rounds as its scalar form does, so that a kernel
@@ -27,6 +27,9 @@ pub const LANES: usize = 8;
 
 /// Lanes of the rays of a packet.
 pub const WIDE: usize = 16;
+
+/// Lanes of the rays of a broad packet.
+pub const BROAD: usize = 32;
 
 /// Eight numbers in memory, as nodes and blocks store them.
 pub type Row = [f32; LANES];
@@ -126,13 +129,17 @@ pub trait Lanewise<const N: usize>: Copy {
 pub trait Simd: Lanewise<LANES> {
     /// Sixteen lanes of the same machine.
     type Wide: Lanewise<WIDE>;
+    /// Thirty-two lanes of it.
+    type Broad: Lanewise<BROAD>;
+    /// Whether these fit into its registers: elsewhere numbers go through memory, and sixteen lanes are faster (measured).
+    const BROAD_FITS: bool;
 
     /// Sixteen lanes.
     fn wide(self) -> Self::Wide;
+    /// Thirty-two lanes.
+    fn broad(self) -> Self::Broad;
     /// Which words have their highest bit set.
     fn high_bits(self, words: &[u32; LANES]) -> u32;
-    /// Sixteen lanes of two times eight.
-    fn join(self, low: Self::Lanes, high: Self::Lanes) -> <Self::Wide as Lanewise<WIDE>>::Lanes;
     /// The row of an axis.
     fn along(self, rows: &[Row; 3], axis: Axis) -> Self::Lanes;
     /// One of six rows.

@@ -389,6 +389,8 @@ impl Lanewise<LANES> for Neon {
 
 impl Simd for Neon {
     type Wide = Pair<Self>;
+    type Broad = Pair<Pair<Self>>;
+    const BROAD_FITS: bool = false;
 
     #[inline(always)]
     fn wide(self) -> Pair<Self> {
@@ -396,13 +398,13 @@ impl Simd for Neon {
     }
 
     #[inline(always)]
-    fn high_bits(self, words: &[u32; LANES]) -> u32 {
-        (0..LANES).fold(0, |mask, k| mask | words[k] >> 31 << k)
+    fn broad(self) -> Pair<Pair<Self>> {
+        Pair(Pair(self))
     }
 
     #[inline(always)]
-    fn join(self, low: Floats, high: Floats) -> [Floats; 2] {
-        [low, high]
+    fn high_bits(self, words: &[u32; LANES]) -> u32 {
+        (0..LANES).fold(0, |mask, k| mask | words[k] >> 31 << k)
     }
 
     #[inline(always)]

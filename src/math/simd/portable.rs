@@ -216,6 +216,8 @@ impl Lanewise<LANES> for Portable {
 
 impl Simd for Portable {
     type Wide = Pair<Self>;
+    type Broad = Pair<Pair<Self>>;
+    const BROAD_FITS: bool = false;
 
     #[inline(always)]
     fn wide(self) -> Pair<Self> {
@@ -223,13 +225,13 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
-    fn high_bits(self, words: &[u32; LANES]) -> u32 {
-        (0..LANES).fold(0, |mask, k| mask | words[k] >> 31 << k)
+    fn broad(self) -> Pair<Pair<Self>> {
+        Pair(Pair(self))
     }
 
     #[inline(always)]
-    fn join(self, low: Row, high: Row) -> [Row; 2] {
-        [low, high]
+    fn high_bits(self, words: &[u32; LANES]) -> u32 {
+        (0..LANES).fold(0, |mask, k| mask | words[k] >> 31 << k)
     }
 
     #[inline(always)]

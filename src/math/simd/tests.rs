@@ -112,14 +112,15 @@ impl Kernel for Narrow {
     }
 }
 
-struct Broad([[f32; WIDE]; 2], u32);
+/// Sixteen and thirty-two lanes.
+struct More([[f32; WIDE]; 2], [[f32; BROAD]; 2], u32);
 
-impl Kernel for Broad {
-    type Output = Vec<u64>;
+impl Kernel for More {
+    type Output = [Vec<u64>; 2];
 
     #[inline(always)]
-    fn run<S: Simd>(self, s: S) -> Vec<u64> {
-        everything(s.wide(), &self.0, self.1)
+    fn run<S: Simd>(self, s: S) -> [Vec<u64>; 2] {
+        [everything(s.wide(), &self.0, self.2 & 0xffff), everything(s.broad(), &self.1, self.2)]
     }
 }
 
@@ -127,13 +128,15 @@ impl Kernel for Broad {
 fn every_level_computes_like_plain_numbers() {
     for (i, &x) in HARD.iter().enumerate() {
         for (j, &y) in HARD.iter().enumerate() {
-            let a: [f32; WIDE] = std::array::from_fn(|k| HARD[(i + k) % HARD.len()]);
-            let b: [f32; WIDE] = std::array::from_fn(|k| if k % 2 == 0 { x } else { y });
-            let mask = (0x9e37_79b9_u32).rotate_left((10 * i + j) as u32) & 0xffff;
+            let a: [f32; BROAD] = std::array::from_fn(|k| HARD[(i + k) % HARD.len()]);
+            let b: [f32; BROAD] = std::array::from_fn(|k| if k % 2 == 0 { x } else { y });
+            let mask = (0x9e37_79b9_u32).rotate_left((10 * i + j) as u32);
             let first = [*a.first_chunk().unwrap(), *b.first_chunk().unwrap()];
+            let half = [*a.first_chunk().unwrap(), *b.first_chunk().unwrap()];
             for level in Level::all() {
                 let name = level.name();
-                assert_eq!(level.run(Broad([a, b], mask)), plainly(&[a, b], mask), "{name} {a:?} {b:?} {mask:x}");
+                let expected = [plainly(&half, mask & 0xffff), plainly(&[a, b], mask)];
+                assert_eq!(level.run(More(half, [a, b], mask)), expected, "{name} {a:?} {b:?} {mask:x}");
                 let eight = plainly::<LANES>(&first, mask & 0xff);
                 assert_eq!(level.run(Narrow(first, mask & 0xff)), eight, "{name} {first:?} {mask:x}");
             }
@@ -142,29 +145,30 @@ fn every_level_computes_like_plain_numbers() {
 }
 
 /// Least and greatest of all lanes.
-struct Ends([f32; WIDE]);
+struct Ends([f32; BROAD]);
 
 impl Kernel for Ends {
-    type Output = [f32; 4];
+    type Output = [f32; 6];
 
     #[inline(always)]
-    fn run<S: Simd>(self, s: S) -> [f32; 4] {
-        let (w, all) = (s.wide(), s.wide().load(&self.0));
+    fn run<S: Simd>(self, s: S) -> [f32; 6] {
+        let (b, all) = (s.broad(), s.broad().load(&self.0));
+        let (w, half) = (s.wide(), s.wide().load(self.0.first_chunk().unwrap()));
         let eight = s.load(self.0.first_chunk().unwrap());
-        [w.least(all), w.greatest(all), s.least(eight), s.greatest(eight)]
+        [b.least(all), b.greatest(all), w.least(half), w.greatest(half), s.least(eight), s.greatest(eight)]
     }
 }
 
 #[test]
 fn the_ends_of_a_row_are_found_wherever_they_stand() {
-    for low in 0..WIDE {
-        for high in (0..WIDE).filter(|&high| high != low) {
-            let mut row: [f32; WIDE] = std::array::from_fn(|k| k as f32);
+    for low in 0..BROAD {
+        for high in (0..BROAD).filter(|&high| high != low) {
+            let mut row: [f32; BROAD] = std::array::from_fn(|k| k as f32);
             (row[low], row[high]) = (-5.0, 50.0);
             let ends = |row: &[f32]| {
                 [row.iter().copied().fold(f32::INFINITY, f32::min), row.iter().copied().fold(0.0, f32::max)]
             };
-            let expected = [ends(&row), ends(&row[..LANES])].concat();
+            let expected = [ends(&row), ends(&row[..WIDE]), ends(&row[..LANES])].concat();
             for level in Level::all() {
                 assert_eq!(level.run(Ends(row))[..], expected, "{}", level.name());
             }
@@ -172,31 +176,33 @@ fn the_ends_of_a_row_are_found_wherever_they_stand() {
     }
 }
 
-/// The least of each of four rows, sixteen lanes long and eight.
-struct LeastOfEach([[f32; WIDE]; 4]);
+/// The least of each of four rows, thirty-two lanes long, sixteen and eight.
+struct LeastOfEach([[f32; BROAD]; 4]);
 
 impl Kernel for LeastOfEach {
-    type Output = [[f32; 4]; 2];
+    type Output = [[f32; 4]; 3];
 
     #[inline(always)]
-    fn run<S: Simd>(self, s: S) -> [[f32; 4]; 2] {
-        let (w, [a, b, c, d]) = (s.wide(), &self.0);
+    fn run<S: Simd>(self, s: S) -> [[f32; 4]; 3] {
+        let (t, w, [a, b, c, d]) = (s.broad(), s.wide(), &self.0);
+        let broad = t.least_of_each([t.load(a), t.load(b), t.load(c), t.load(d)]);
+        let [a, b, c, d] = [a, b, c, d].map(|row| row.first_chunk().unwrap());
         let wide = w.least_of_each([w.load(a), w.load(b), w.load(c), w.load(d)]);
         let [a, b, c, d] = [a, b, c, d].map(|row| row.first_chunk().unwrap());
-        [wide, s.least_of_each([s.load(a), s.load(b), s.load(c), s.load(d)])]
+        [broad, wide, s.least_of_each([s.load(a), s.load(b), s.load(c), s.load(d)])]
     }
 }
 
 #[test]
 fn the_least_of_each_of_four_rows_is_found_wherever_it_stands() {
-    for low in 0..WIDE {
-        let rows: [[f32; WIDE]; 4] = std::array::from_fn(|row| {
-            let at = (low + 5 * row) % WIDE;
+    for low in 0..BROAD {
+        let rows: [[f32; BROAD]; 4] = std::array::from_fn(|row| {
+            let at = (low + 5 * row) % BROAD;
             std::array::from_fn(|k| if k == at { -1.0 - row as f32 } else { (k * 3 % 7) as f32 + row as f32 })
         });
         let least = |lanes: usize| rows.map(|row| row[..lanes].iter().copied().fold(f32::INFINITY, f32::min));
         for level in Level::all() {
-            assert_eq!(level.run(LeastOfEach(rows)), [least(WIDE), least(LANES)], "{}", level.name());
+            assert_eq!(level.run(LeastOfEach(rows)), [least(BROAD), least(WIDE), least(LANES)], "{}", level.name());
         }
     }
 }
