@@ -40,7 +40,7 @@ const fn stand_in() -> TextureRef {
 /// Looks up every map that the material at a point lacks, and turns the normal by those that would.
 #[cold]
 pub(super) fn look_up_in_vain(surface: &Surface, store: &TextureStore) {
-    let (Some(patch), material, footprint) = (&surface.patch, surface.target.material, &surface.footprint) else {
+    let (Some(patch), material) = (&surface.patch, surface.target.material) else {
         return;
     };
     let m = material;
@@ -54,12 +54,12 @@ pub(super) fn look_up_in_vain(surface: &Surface, store: &TextureStore) {
         }
     }
     for _ in maps.iter().filter(|map| map.is_none()) {
-        black_box(patch.texel(&stand_in(), ColorSpace::Srgb, store, footprint));
+        black_box(patch.texel(&stand_in(), ColorSpace::Srgb, store));
     }
     if m.normal_map.is_none() {
-        black_box(patch.normal_mapped(surface.geometric, &stand_in(), 1.0, store, footprint));
+        black_box(patch.normal_mapped(surface.geometric, &stand_in(), 1.0, store));
     }
     if m.bump_map.is_none() {
-        black_box(patch.bumped(surface.geometric, &BUMPED, store, footprint));
+        black_box(patch.bumped(surface.geometric, &BUMPED, store));
     }
 }

@@ -5,6 +5,7 @@ use super::texture::{ColorSpace, TextureStore};
 use super::world::Placement;
 use crate::math::{Vec2, Vec3, Vec4};
 use crate::scene::{Material, Mesh, TextureRef};
+use std::cell::Cell;
 
 /// How the weights of a triangle's second and third corner grow along its plane, per world unit.
 #[derive(Clone, Copy)]
@@ -27,13 +28,16 @@ impl Gradients {
 }
 
 /// The part of a mesh around a hit: three corners and their weights.
-#[derive(Clone, Copy)]
 pub(crate) struct Patch<'a> {
     pub(super) mesh: &'a Mesh,
     pub(super) placement: &'a Placement,
     pub(super) corners: [u32; 3],
     pub(super) weights: [f32; 3],
     pub(super) vertices: [Vec3; 3],
+    /// What of it maps are read for.
+    pub(super) print: Footprint,
+    /// The coordinates that were asked for last: the maps of a material mostly share them.
+    pub(super) last: Cell<Option<(TextureRef, Coordinates)>>,
 }
 
 /// The two axes, world space, of the ellipse in which a ray's cone meets a surface; one pixel each.
@@ -85,12 +89,23 @@ impl Patch<'_> {
     }
 
     /// The texture at this point, linear RGBA.
-    pub(crate) fn texel(&self, map: &TextureRef, space: ColorSpace, store: &TextureStore, print: &Footprint) -> Vec4 {
-        let at = self.coordinates(map, print);
+    pub(crate) fn texel(&self, map: &TextureRef, space: ColorSpace, store: &TextureStore) -> Vec4 {
+        let at = self.coordinates(map);
         store.sample(map.texture, space, at.uv, at.along, at.across)
     }
 
-    pub(super) fn coordinates(&self, map: &TextureRef, print: &Footprint) -> Coordinates {
+    pub(super) fn coordinates(&self, map: &TextureRef) -> Coordinates {
+        match self.last.get() {
+            Some((last, at)) if (last.uv_set, last.transform) == (map.uv_set, map.transform) => at,
+            _ => {
+                let at = self.find_coordinates(map);
+                self.last.set(Some((*map, at)));
+                at
+            }
+        }
+    }
+
+    fn find_coordinates(&self, map: &TextureRef) -> Coordinates {
         let Some(set) = self.mesh.uvs.get(map.uv_set as usize) else {
             return Coordinates { uv: Vec2::ZERO, along: Vec2::ZERO, across: Vec2::ZERO, edges: [Vec2::ZERO; 2] };
         };
@@ -102,7 +117,7 @@ impl Patch<'_> {
         let gradients = Gradients::new(self.vertices);
         let change = |v: Vec3| edges[0] * gradients.second.dot(v) + edges[1] * gradients.third.dot(v);
         let uv = a * self.weights[0] + b * self.weights[1] + c * self.weights[2] + map.transform.offset;
-        Coordinates { uv, along: change(print.along), across: change(print.across), edges }
+        Coordinates { uv, along: change(self.print.along), across: change(self.print.across), edges }
     }
 
     /// Interpolated shading normal, world space, on the side of the mesh's own normals.
@@ -149,15 +164,8 @@ impl Patch<'_> {
     }
 
     /// How far a normal map turns the normal in `reach` of both axes of a footprint: the squares of the angles, summed.
-    pub(super) fn turning_of_map(
-        &self,
-        map: &TextureRef,
-        scale: f32,
-        store: &TextureStore,
-        print: &Footprint,
-        reach: f32,
-    ) -> f32 {
-        let at = self.coordinates(map, print);
+    pub(super) fn turning_of_map(&self, map: &TextureRef, scale: f32, store: &TextureStore, reach: f32) -> f32 {
+        let at = self.coordinates(map);
         let changes = store.changes(map.texture, at.uv, [at.along, at.across], reach);
         let scale = Vec3::new(scale, scale, 1.0);
         // Components run from -1 to 1, texels from 0 to 1.
@@ -165,20 +173,20 @@ impl Patch<'_> {
     }
 
     /// Tangent and bitangent, unit and perpendicular to `normal`: those of the mesh, or those of the coordinates.
-    pub(super) fn tangents(&self, normal: Vec3, map: &TextureRef, print: &Footprint) -> Option<(Vec3, Vec3)> {
+    pub(super) fn tangents(&self, normal: Vec3, map: &TextureRef) -> Option<(Vec3, Vec3)> {
         let given = self.mix(&self.mesh.tangents).and_then(|t| {
             let along = (self.placement.world_from_object * t.truncate().as_dvec3()).as_vec3();
             // A mirrored instance turns the frame's handedness round.
             let sign = if (t.w < 0.0) == self.placement.mirrored { 1.0 } else { -1.0 };
             Some((perpendicular(along, normal)?, sign))
         });
-        let (tangent, sign) = given.or_else(|| self.tangent_of_coordinates(normal, map, print))?;
+        let (tangent, sign) = given.or_else(|| self.tangent_of_coordinates(normal, map))?;
         Some((tangent, normal.cross(tangent) * sign))
     }
 
     /// The direction in which u grows, and the handedness that makes the bitangent point against v, which runs down.
-    fn tangent_of_coordinates(&self, normal: Vec3, map: &TextureRef, print: &Footprint) -> Option<(Vec3, f32)> {
-        let [a, b] = self.coordinates(map, print).edges;
+    fn tangent_of_coordinates(&self, normal: Vec3, map: &TextureRef) -> Option<(Vec3, f32)> {
+        let [a, b] = self.coordinates(map).edges;
         let (e1, e2) = (self.vertices[1] - self.vertices[0], self.vertices[2] - self.vertices[0]);
         let area = a.x * b.y - b.x * a.y;
         if area == 0.0 {
@@ -199,10 +207,9 @@ impl Patch<'_> {
         map: &TextureRef,
         scale: f32,
         store: &TextureStore,
-        print: &Footprint,
     ) -> Option<Vec3> {
-        let texel = self.texel(map, ColorSpace::Linear, store, print).truncate() * 2.0 - 1.0;
-        let (tangent, bitangent) = self.tangents(normal, map, print)?;
+        let texel = self.texel(map, ColorSpace::Linear, store).truncate() * 2.0 - 1.0;
+        let (tangent, bitangent) = self.tangents(normal, map)?;
         (tangent * (texel.x * scale) + bitangent * (texel.y * scale) + normal * texel.z).try_normalize()
     }
 
@@ -210,16 +217,10 @@ impl Patch<'_> {
     ///
     /// J. F. Blinn, "Simulation of Wrinkled Surfaces" (1978), with heights in units of the texture's side.
     #[inline]
-    pub(crate) fn bumped(
-        &self,
-        normal: Vec3,
-        material: &Material,
-        store: &TextureStore,
-        print: &Footprint,
-    ) -> Option<Vec3> {
+    pub(crate) fn bumped(&self, normal: Vec3, material: &Material, store: &TextureStore) -> Option<Vec3> {
         let map = material.bump_map.as_ref()?;
-        let (tangent, bitangent) = self.tangents(normal, map, print)?;
-        let at = self.coordinates(map, print);
+        let (tangent, bitangent) = self.tangents(normal, map)?;
+        let at = self.coordinates(map);
         let height = |uv: Vec2| store.sample(map.texture, ColorSpace::Linear, uv, at.along, at.across).x;
         let texel = Vec2::ONE / store.size(map.texture).max(Vec2::ONE);
         let rise = |d: Vec2, width: f32| (height(at.uv + d) - height(at.uv - d)) / width;

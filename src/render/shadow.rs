@@ -6,7 +6,6 @@ use super::context::Context;
 use super::curve::Feelers;
 use super::observer::Observer;
 use super::optics::transmittance;
-use super::patch::Footprint;
 use super::seam::is_same_crossing;
 use super::shade::{Reader, lets_light_in, shadow_filter};
 use super::surface::{Surface, Target};
@@ -185,8 +184,7 @@ impl Shadows {
 fn filter_at(context: &Context, ray: &Ray, hit: &Hit, inside: Option<&mut Inside>) -> Vec3 {
     let target = Target::new(context.scene, context.world, hit.prim);
     let patch = target.patch(context.world, hit.u, hit.v, ray.origin + ray.dir * hit.t);
-    let footprint = Footprint::default();
-    let reader = Reader { store: context.textures, patch: patch.as_ref(), footprint: &footprint };
+    let reader = Reader { store: context.textures, patch: patch.as_ref() };
     let filter = shadow_filter(target.material, &reader);
     let Some(inside) = inside.filter(|_| lets_light_in(target.material)) else { return filter };
     let entering = Surface::new(context.world, target, ray, hit, 0.0).front;

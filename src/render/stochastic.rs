@@ -110,6 +110,7 @@ fn trace<A: Accel, P: Observer>(
     }
     let mut left = active.iter().flat_map(|&pixel| samples.clone().map(move |i| (pixel, i)));
     let mut batch: Vec<(usize, u32)> = Vec::with_capacity(TOGETHER);
+    let (mut many, mut squares) = (sobol::Many::default(), Vec::with_capacity(TOGETHER));
     loop {
         batch.clear();
         batch.extend(left.by_ref().take(TOGETHER));
@@ -119,7 +120,14 @@ fn trace<A: Accel, P: Observer>(
         tracer.reset(batch.len(), frame.settings.layers);
         tracer.streams.extend(batch.iter().map(|&(pixel, i)| pixels[pixel].stream(i)));
         let eye = frame.eye(tracer.center());
-        tracer.eyes.send(&eye, batch.iter().map(|&(pixel, i)| pixels[pixel].place(how, has_lens, i)));
+        if has_lens {
+            tracer.eyes.send(&eye, batch.iter().map(|&(pixel, i)| pixels[pixel].place_and_lens(how, i)));
+        } else {
+            squares.clear();
+            many.find(batch.iter().map(|&(pixel, i)| (pixels[pixel].places, i)), &mut squares);
+            let places = batch.iter().zip(&squares);
+            tracer.eyes.send(&eye, places.map(|(&(pixel, _), &[x, y])| pixels[pixel].place(how, [x, y, 0.5, 0.5])));
+        }
         if !tracer.trace() {
             return None;
         }
@@ -186,15 +194,13 @@ impl Pixel {
         Stream { key: self.key, index: i }
     }
 
-    /// Where the `i`th sample goes through the picture and the lens.
-    fn place(&self, how: &Stochastic, has_lens: bool, i: u32) -> Place {
-        // The first two numbers are the same however many are asked for.
-        let [x, y, u, v] = if has_lens {
-            sobol::point(i, self.key)
-        } else {
-            let [x, y] = self.places.at(i);
-            [x, y, 0.5, 0.5]
-        };
+    /// Where the `i`th sample goes through the picture and the lens. Its first two numbers are those without a lens.
+    fn place_and_lens(&self, how: &Stochastic, i: u32) -> Place {
+        self.place(how, sobol::point(i, self.key))
+    }
+
+    /// The place of a point of the unit square, and of that of the lens.
+    fn place(&self, how: &Stochastic, [x, y, u, v]: [f64; 4]) -> Place {
         let (x, y) = (f64::from(self.x) + how.filter.place(x), f64::from(self.y) + how.filter.place(y));
         Place { x, y, lens: [u, v] }
     }

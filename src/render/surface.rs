@@ -13,6 +13,7 @@ use crate::accel::{Hit, NO_PRIM, Ray};
 use crate::math::bounds::offset_origin;
 use crate::math::{Vec2, Vec3};
 use crate::scene::{Material, Mesh, Scene, TextureRef, UvTransform};
+use std::cell::Cell;
 
 /// What was hit, before anything about it is computed.
 #[derive(Clone, Copy)]
@@ -56,7 +57,8 @@ impl<'a> Target<'a> {
 
     /// The part of the mesh around a hit; `None` on spheres, cones and planes, which have no texture coordinates.
     ///
-    /// `u`, `v` are the weights of a triangle's second and third corner, `position` is in the centred frame.
+    /// `u`, `v` are the weights of a triangle's second and third corner, `position` is in the centred frame. Maps are read at
+    /// the point, as sharp as they are.
     pub(crate) fn patch(&self, world: &World, u: f32, v: f32, position: Vec3) -> Option<Patch<'a>> {
         let (mesh, placement) = self.mesh?;
         let (corners, weights) = match self.source {
@@ -64,7 +66,8 @@ impl<'a> Target<'a> {
             _ => fan_triangle(mesh, world, self.prim, self.source, position),
         };
         let vertices = self.vertices(world, corners, mesh);
-        Some(Patch { mesh, placement, corners, weights, vertices })
+        let print = Footprint::default();
+        Some(Patch { mesh, placement, corners, weights, vertices, print, last: Cell::new(None) })
     }
 
     /// World positions (centred frame) of mesh vertices.
@@ -147,7 +150,7 @@ impl<'a> Surface<'a> {
     pub(crate) fn new(world: &World, target: Target<'a>, ray: &Ray, hit: &Hit, width: f32) -> Self {
         let refined = world.refine(ray, hit);
         let view = -ray.dir.try_normalize().unwrap_or(Vec3::Z);
-        let patch = target.patch(world, refined.u, refined.v, refined.position);
+        let mut patch = target.patch(world, refined.u, refined.v, refined.position);
 
         // The winding in the world is turned round in mirrored instances; the file's front stays the front.
         let mirrored = patch.as_ref().is_some_and(|p| p.placement.mirrored);
@@ -156,6 +159,9 @@ impl<'a> Surface<'a> {
         let front = outward.dot(view) >= 0.0;
         let geometric = if front { outward } else { -outward };
         let footprint = Footprint::new(-view, geometric, width);
+        if let Some(patch) = &mut patch {
+            patch.print = footprint;
+        }
         let (position, start, error) = (refined.position, refined.start, refined.error);
         Self {
             target,
@@ -186,9 +192,9 @@ impl<'a> Surface<'a> {
         if patch.is_curved() {
             self.horizon = facing(self.smooth, self.view);
         }
-        let turned = |map| patch.normal_mapped(own, map, material.normal_scale, store, &self.footprint);
+        let turned = |map| patch.normal_mapped(own, map, material.normal_scale, store);
         let mapped = material.normal_map.as_ref().and_then(turned).unwrap_or(own);
-        let bumped = patch.bumped(mapped, material, store, &self.footprint).unwrap_or(mapped);
+        let bumped = patch.bumped(mapped, material, store).unwrap_or(mapped);
         self.normal = facing(bumped * side, self.view);
     }
 
@@ -199,7 +205,7 @@ impl<'a> Surface<'a> {
 
     /// The normal of lacquer with this normal map and its scale, to the side of the ray.
     pub(crate) fn coat_normal(&self, map: Option<&TextureRef>, scale: f32, store: &TextureStore) -> Vec3 {
-        let turned = |patch: &Patch| patch.normal_mapped(self.smooth, map?, scale, store, &self.footprint);
+        let turned = |patch: &Patch| patch.normal_mapped(self.smooth, map?, scale, store);
         facing(self.patch.as_ref().and_then(turned).unwrap_or(self.smooth), self.view)
     }
 
@@ -211,7 +217,7 @@ impl<'a> Surface<'a> {
             uv_set: 0,
             transform: UvTransform { offset: Vec2::ZERO, rotation: 0.0, scale: Vec2::ONE },
         };
-        let of = |patch: &Patch| patch.tangents(self.normal, map.unwrap_or(&FIRST), &self.footprint);
+        let of = |patch: &Patch| patch.tangents(self.normal, map.unwrap_or(&FIRST));
         let (tangent, bitangent) =
             self.patch.as_ref().and_then(of).unwrap_or_else(|| self.normal.any_orthonormal_pair());
         [tangent, bitangent]
@@ -243,9 +249,11 @@ impl<'a> Surface<'a> {
         let [along, across] = self.bends(context);
         let of_mesh = (along.length_squared() + across.length_squared()) * (reach * reach);
         let material = self.target.material;
-        let of_map = self.patch.as_ref().zip(material.normal_map.as_ref()).map_or(0.0, |(patch, map)| {
-            patch.turning_of_map(map, material.normal_scale, context.textures, &self.footprint, reach)
-        });
+        let of_map = self
+            .patch
+            .as_ref()
+            .zip(material.normal_map.as_ref())
+            .map_or(0.0, |(patch, map)| patch.turning_of_map(map, material.normal_scale, context.textures, reach));
         of_mesh + of_map
     }
 
@@ -345,7 +353,7 @@ mod tests {
     }
 
     fn coordinates(scene: &Scene, map: &TextureRef) -> Coordinates {
-        seen(scene, 1.0, |s, _| s.patch.as_ref().expect("a mesh has coordinates").coordinates(map, &s.footprint))
+        seen(scene, 1.0, |s, _| s.patch.as_ref().expect("a mesh has coordinates").coordinates(map))
     }
 
     #[track_caller]
@@ -473,8 +481,8 @@ mod tests {
     fn surfaces_without_coordinates_or_texture_are_safe() {
         let mut scene = scene(vec![[0, 0, 255, 255]], 1);
         let missing = TextureRef { texture: 7, uv_set: 3, transform: UvTransform::default() };
-        scene.materials[0].normal_map = Some(missing.clone());
-        scene.materials[0].bump_map = Some(missing.clone());
+        scene.materials[0].normal_map = Some(missing);
+        scene.materials[0].bump_map = Some(missing);
         scene.materials[0].surface =
             Reflection::MetalRough(MetalRough { metal_rough_map: Some(missing), ..MetalRough::default() });
         assert_near(normal(&scene, 1.0), Vec3::Z);

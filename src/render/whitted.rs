@@ -300,7 +300,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         if !surface.front && !material.double_sided && !lets_light_in(material) {
             return self.continuing[class as usize].push(*ray, *path, *hit);
         }
-        let reader = Reader { store: context.textures, patch: surface.patch.as_ref(), footprint: &surface.footprint };
+        let reader = Reader { store: context.textures, patch: surface.patch.as_ref() };
         let base = reader.base(material);
         let covered = coverage(material, base.w);
         if covered < 1.0 {

@@ -144,7 +144,7 @@ pub enum AlphaMode {
 }
 
 /// Which texture, through which coordinates.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureRef {
     /// Index into [`super::Scene::textures`].
     pub texture: u32,

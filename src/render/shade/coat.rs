@@ -101,16 +101,15 @@ fn fresnel(cosine: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::patch::Footprint;
     use crate::render::texture::TextureStore;
     use crate::scene::Scene;
 
     fn coat(strength: f32, roughness: f32, view: Vec3) -> Option<CoatMatter> {
         let coat =
             Coat { strength, strength_map: None, roughness, roughness_map: None, normal_map: None, normal_scale: 1.0 };
-        let (scene, footprint) = (Scene::default(), Footprint::default());
+        let scene = Scene::default();
         let store = TextureStore::new(&scene);
-        let reader = Reader { store: &store, patch: None, footprint: &footprint };
+        let reader = Reader { store: &store, patch: None };
         CoatMatter::new(&coat, Vec3::Z, view, 1.0, &reader)
     }
 

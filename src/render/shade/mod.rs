@@ -26,7 +26,7 @@ pub(crate) use spectrum::{Band, bands};
 
 use super::context::coverage;
 use super::optics::reflect;
-use super::patch::{Footprint, Patch};
+use super::patch::Patch;
 use super::sky::Sky;
 use super::surface::Surface;
 use super::texture::{ColorSpace, TextureStore};
@@ -86,14 +86,13 @@ pub(crate) struct Balance {
 pub(crate) struct Reader<'a> {
     pub store: &'a TextureStore<'a>,
     pub patch: Option<&'a Patch<'a>>,
-    pub footprint: &'a Footprint,
 }
 
 impl Reader<'_> {
     /// The map's linear RGBA; white where there is no map, or nothing to read it with.
     fn read(&self, map: Option<&TextureRef>, space: ColorSpace) -> Vec4 {
         match (map, self.patch) {
-            (Some(map), Some(patch)) => patch.texel(map, space, self.store, self.footprint),
+            (Some(map), Some(patch)) => patch.texel(map, space, self.store),
             _ => Vec4::ONE,
         }
     }
@@ -119,7 +118,7 @@ impl Reader<'_> {
 impl Matter {
     /// The material at `surface`, whose base colour has been read already.
     pub(crate) fn new(surface: &Surface, base: Vec3, store: &TextureStore) -> Self {
-        let reader = Reader { store, patch: surface.patch.as_ref(), footprint: &surface.footprint };
+        let reader = Reader { store, patch: surface.patch.as_ref() };
         let material = surface.target.material;
         let mut matter = Self { outside: surface.is_outside(), ..Self::read(material, base, &reader) };
         if let (Some(translucence), Model::MetalRough(core)) =
@@ -156,7 +155,7 @@ impl Matter {
 
     /// A material without maps, the same everywhere.
     pub(crate) fn without_maps(material: &Material, store: &TextureStore) -> Self {
-        let reader = Reader { store, patch: None, footprint: &Footprint::default() };
+        let reader = Reader { store, patch: None };
         Self::read(material, reader.base(material).truncate(), &reader)
     }
 

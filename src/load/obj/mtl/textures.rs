@@ -143,10 +143,9 @@ impl Mapper<'_> {
         material.emission_map = self.whole(Slot::Emission);
         self.relief(material);
         let packed = self.whole(Slot::OcclusionRoughMetal);
-        let rough_metal = packed.clone().or_else(|| self.rough_metal());
+        let rough_metal = packed.or_else(|| self.rough_metal());
         let occlusion = packed.or_else(|| self.occlusion());
-        let ambient =
-            if self.mode == MtlMode::Literal { self.whole(Slot::Ambient) } else { material.base_color_map.clone() };
+        let ambient = if self.mode == MtlMode::Literal { self.whole(Slot::Ambient) } else { material.base_color_map };
         let base_is_black = material.base_color == crate::math::Vec3::ZERO;
         match &mut material.surface {
             Surface::MetalRough(m) => {

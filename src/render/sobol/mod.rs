@@ -6,6 +6,10 @@
 //! Every scrambling by itself is distributed evenly over the cube, so that the mean of a function over its points is
 //! right on the average, and scramblings of different keys are independent.
 
+mod many;
+
+pub(super) use many::Many;
+
 /// Dimensions that are stratified together.
 pub(super) const DIMENSIONS: usize = 4;
 
@@ -73,13 +77,17 @@ fn sobol(index: u32, dimension: usize) -> u32 {
 /// Turns the bits of a fraction, each by a choice that depends on the bits above it.
 #[inline]
 fn scramble(x: u32, key: u32) -> u32 {
-    let mut x = x.reverse_bits();
+    turned(x.reverse_bits(), key).reverse_bits()
+}
+
+/// The same where the bits above come first, as the lowest.
+#[inline(always)]
+fn turned(mut x: u32, key: u32) -> u32 {
     x ^= x.wrapping_mul(0x3d20_adea);
     x = x.wrapping_add(key);
     x = x.wrapping_mul((key >> 16) | 1);
     x ^= x.wrapping_mul(0x0552_6c56);
-    x ^= x.wrapping_mul(0x53a2_2864);
-    x.reverse_bits()
+    x ^ x.wrapping_mul(0x53a2_2864)
 }
 
 /// Thirty-two bits that two numbers decide, no part of which shows in them.

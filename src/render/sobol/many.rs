@@ -1,0 +1,102 @@
+//! The first two coordinates of many points at a time.
+//!
+//! The same numbers as [`Points::at`] gives, without its tables: of these two dimensions the bits of a point are a formula of
+//! the bits of its index, which the compiler turns into lanes.
+
+use super::{Points, turned};
+use crate::math::simd::{Kernel, LANES, Level, Simd};
+
+/// Points that are found at a time.
+const RUN: usize = 64;
+
+/// Points that are wanted, by number and place.
+pub(in crate::render) struct Many {
+    count: usize,
+    index: [u32; RUN],
+    key: [u32; RUN],
+    axes: [[u32; RUN]; 2],
+    found: [[f64; RUN]; 2],
+}
+
+impl Default for Many {
+    fn default() -> Self {
+        Self { count: 0, index: [0; RUN], key: [0; RUN], axes: [[0; RUN]; 2], found: [[0.0; RUN]; 2] }
+    }
+}
+
+impl Many {
+    /// Appends a point of each of these keys, which are told with its index.
+    pub(in crate::render) fn find(
+        &mut self,
+        wanted: impl Iterator<Item = (Points<2>, u32)>,
+        found: &mut Vec<[f64; 2]>,
+    ) {
+        wanted.for_each(|(points, index)| {
+            let at = self.count % RUN;
+            (self.index[at], self.key[at]) = (index, points.key);
+            (self.axes[0][at], self.axes[1][at]) = (points.axes[0], points.axes[1]);
+            self.count += 1;
+            if self.count == RUN {
+                self.flush(found);
+            }
+        });
+        self.flush(found);
+    }
+
+    fn flush(&mut self, found: &mut Vec<[f64; 2]>) {
+        Level::best().run(Scatter(self));
+        let [x, y] = &self.found;
+        found.extend(x.iter().zip(y).take(self.count).map(|(x, y)| [*x, *y]));
+        self.count = 0;
+    }
+}
+
+struct Scatter<'a>(&'a mut Many);
+
+impl Kernel for Scatter<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let Many { count, index, key, axes: [across, down], found: [x, y] } = self.0;
+        for i in 0..count.next_multiple_of(LANES).min(RUN) {
+            let index = turned(index[i].reverse_bits(), key[i]).reverse_bits();
+            x[i] = fraction(turned(index, across[i]).reverse_bits());
+            y[i] = fraction(turned(shifted(index), down[i]).reverse_bits());
+        }
+    }
+}
+
+#[inline(always)]
+fn fraction(x: u32) -> f64 {
+    f64::from(x) / 4_294_967_296.0
+}
+
+/// The bits of the second dimension, the last first. Its direction numbers are the powers of 1 + x, as polynomials over
+/// bits: this puts 1 + x for x, and as (1 + x)ᵏ is 1 + xᵏ where k is a power of two, it takes five steps.
+#[inline(always)]
+fn shifted(mut index: u32) -> u32 {
+    index ^= index >> 1 & 0x5555_5555;
+    index ^= index >> 2 & 0x3333_3333;
+    index ^= index >> 4 & 0x0f0f_0f0f;
+    index ^= index >> 8 & 0x00ff_00ff;
+    index ^ (index >> 16 & 0x0000_ffff)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::mix;
+    use super::*;
+
+    #[test]
+    fn many_points_are_those_of_one_by_one() {
+        let (mut many, mut found) = (Many::default(), Vec::new());
+        for count in [0, 1, 63, 64, 65, 500] {
+            let wanted =
+                (0..count).map(|i| (Points::of(mix(3, i)), if i % 3 == 0 { i } else { mix(4, i) >> (i % 32) }));
+            found.clear();
+            many.find(wanted.clone(), &mut found);
+            assert!(found.iter().copied().eq(wanted.map(|(points, index)| points.at(index))), "{count}");
+        }
+    }
+}
