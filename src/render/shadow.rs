@@ -12,14 +12,13 @@ use super::surface::{Surface, Target};
 use super::wave::{Media, Medium};
 use crate::accel::{Accel, Hit, Ray};
 use crate::math::Vec3;
+use bytemuck::{Pod, Zeroable};
 
 /// Shadow rays that wait, each with the light it lets through. Buffers of one worker.
 #[derive(Debug, Default)]
 pub(crate) struct Shadows {
     rays: Vec<Ray>,
-    light: Vec<Vec3>,
-    /// What each is to whoever sent it; empty where that is its sample.
-    tags: Vec<u32>,
+    light: Vec<Bound>,
     /// What each is inside of; empty where nothing absorbs light.
     inside: Vec<Inside>,
     /// The ways up to where some of the rays start, and which those are.
@@ -31,6 +30,15 @@ pub(crate) struct Shadows {
     /// The same for the rays that go on, while they are picked out.
     kept: Vec<Hit>,
     hits: Vec<Hit>,
+}
+
+/// Light that arrives if nothing is in the way.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Bound {
+    pub radiance: Vec3,
+    /// Where it arrives: its ray's sample, or what else whoever sent it says.
+    pub tag: u32,
 }
 
 /// What a ray is inside of.
@@ -49,9 +57,7 @@ impl Shadows {
     /// Adds a ray; `light` is what its sample sees if nothing is in the way, `media` what it starts inside of: of all rays of
     /// an image, or of none.
     pub(crate) fn push(&mut self, ray: Ray, light: Vec3, media: Option<Media>) {
-        self.rays.push(ray);
-        self.light.push(light);
-        self.inside.extend(media.map(|media| Inside { media, since: 0.0 }));
+        self.push_bound(ray, Bound { radiance: light, tag: ray.sample }, media);
     }
 
     /// The same of a ray that may start above its surface.
@@ -63,20 +69,24 @@ impl Shadows {
         self.push(feelers.ray, light, media);
     }
 
-    /// The same as [`Self::push`] with a number below 2³² that its light arrives with instead of the sample's: of all rays, or of none.
-    #[expect(clippy::cast_possible_truncation, reason = "as said")]
-    pub(crate) fn push_tagged(&mut self, ray: Ray, light: Vec3, media: Option<Media>, tag: usize) {
-        self.push(ray, light, media);
-        self.tags.push(tag as u32);
+    /// The same as [`Self::push`] of light that need not be bound for the ray's sample.
+    pub(crate) fn push_bound(&mut self, ray: Ray, light: Bound, media: Option<Media>) {
+        self.rays.push(ray);
+        self.light.push(light);
+        self.inside.extend(media.map(|media| Inside { media, since: 0.0 }));
     }
 
-    fn tag(&self, i: usize) -> u32 {
-        self.tags.get(i).copied().unwrap_or(self.rays[i].sample)
+    /// The same of many.
+    pub(crate) fn push_all(&mut self, rays: &[Ray], light: &[Bound], media: Option<Media>) {
+        self.rays.extend_from_slice(rays);
+        self.light.extend_from_slice(light);
+        if let Some(media) = media {
+            self.inside.resize(self.rays.len(), Inside { media, since: 0.0 });
+        }
     }
 
     pub(crate) fn clear(&mut self) {
         self.rays.clear();
-        self.tags.clear();
         self.light.clear();
         self.inside.clear();
         self.risers.clear();
@@ -96,14 +106,14 @@ impl Shadows {
         asking.occluded(&self.rays, &mut self.blocked, probe);
         self.climb(asking, probe);
         if !context.has_filters {
-            let open = self.light.iter().zip(&self.blocked).enumerate().filter(|(_, (_, blocked))| !**blocked);
-            open.for_each(|(i, (light, _))| arrive(self.tag(i), *light));
+            let open = self.light.iter().zip(&self.blocked).filter(|(_, blocked)| !**blocked);
+            open.for_each(|(light, _)| arrive(light.tag, light.radiance));
             return self.clear();
         }
 
         // What is left meets nothing opaque: walk through everything else on the way, one surface of each ray a time.
         let blocked = std::mem::take(&mut self.blocked);
-        self.keep(|i, _, _, _, _| !blocked[i]);
+        self.keep(|i, _, _, _| !blocked[i]);
         self.blocked = blocked;
         self.after.clear();
         self.hits.clear();
@@ -135,16 +145,16 @@ impl Shadows {
         let hits = std::mem::take(&mut self.hits);
         let after = std::mem::take(&mut self.after);
         let mut kept = std::mem::take(&mut self.kept);
-        self.keep(|i, tag, ray, light, inside| {
+        self.keep(|i, ray, light, inside| {
             let hit = &hits[i];
             if !hit.is_some() {
-                arrive(tag, *light);
+                arrive(light.tag, light.radiance);
                 return false;
             }
             if !after.get(i).is_some_and(|before| is_same_crossing(|prim| context.world.prim(prim), ray, before, hit)) {
-                *light *= filter_at(context, ray, hit, inside);
+                light.radiance *= filter_at(context, ray, hit, inside);
             }
-            let goes_on = light.max_element() > 0.0;
+            let goes_on = light.radiance.max_element() > 0.0;
             if goes_on {
                 kept.push(*hit);
             }
@@ -156,17 +166,14 @@ impl Shadows {
         self.hits = hits;
     }
 
-    /// Drops the rays for which `wanted` (index, tag, ray, light, what they are inside of) is false; the others keep their order.
-    fn keep(&mut self, mut wanted: impl FnMut(usize, u32, &Ray, &mut Vec3, Option<&mut Inside>) -> bool) {
+    /// Drops the rays for which `wanted` (index, ray, light, what they are inside of) is false; the others keep their order.
+    fn keep(&mut self, mut wanted: impl FnMut(usize, &Ray, &mut Bound, Option<&mut Inside>) -> bool) {
         let mut kept = 0;
         for i in 0..self.rays.len() {
             let (mut light, mut inside) = (self.light[i], self.inside.get(i).copied());
-            if wanted(i, self.tag(i), &self.rays[i], &mut light, inside.as_mut()) {
+            if wanted(i, &self.rays[i], &mut light, inside.as_mut()) {
                 self.rays[kept] = self.rays[i];
                 self.light[kept] = light;
-                if let Some(&tag) = self.tags.get(i) {
-                    self.tags[kept] = tag;
-                }
                 if let Some(inside) = inside {
                     self.inside[kept] = inside;
                 }
@@ -175,7 +182,6 @@ impl Shadows {
         }
         self.rays.truncate(kept);
         self.light.truncate(kept);
-        self.tags.truncate(kept);
         self.inside.truncate(kept);
     }
 }

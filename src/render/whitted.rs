@@ -27,6 +27,7 @@ use super::strip::{POINTS, Sorted, Strip};
 use super::surface::{Surface, Target};
 use super::wave::{Crossing, Media, Path, Queue, RayClass, Wave};
 use crate::accel::{Accel, Hit, Ray};
+use crate::math::simd::LANES;
 use crate::math::{DVec3, Vec3};
 use std::hint::black_box;
 
@@ -177,16 +178,12 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let context = self.context;
         let mut sorted = std::mem::take(&mut self.sorted);
         sorted.clear(context.scene.instances.len());
-        for (i, hit) in (0u32..).zip(&eyes.hits) {
-            let at = i as usize;
-            if hit.is_some() {
-                if !sorted.take(context, i, hit.prim) {
-                    self.shade(RayClass::Primary, &eyes.rays[at], &eyes.path(at), hit);
-                }
-            } else if context.shows_environment {
-                self.leave(&eyes.rays[at], &eyes.path(at));
-            } else {
-                self.samples[at].through += Vec3::ONE;
+        for (start, eight) in (0..).step_by(LANES).zip(eyes.hits.chunks(LANES)) {
+            // Neighbours mostly hit the same.
+            let first = eight[0].prim;
+            let alike = eight.iter().all(|hit| hit.prim == first);
+            if !(alike && eight[0].is_some() && sorted.take(context, (start, eight.len()), first)) {
+                (start..).zip(eight).for_each(|(i, hit)| self.see_one(eyes, &mut sorted, i, hit));
             }
         }
         let mut strip = std::mem::take(&mut self.strip);
@@ -199,6 +196,19 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
         self.strip = strip;
         self.sorted = sorted;
+    }
+
+    fn see_one(&mut self, eyes: &Eyes, sorted: &mut Sorted, i: u32, hit: &Hit) {
+        let at = i as usize;
+        if hit.is_some() {
+            if !sorted.take(self.context, (i, 1), hit.prim) {
+                self.shade(RayClass::Primary, &eyes.rays[at], &eyes.path(at), hit);
+            }
+        } else if self.context.shows_environment {
+            self.leave(&eyes.rays[at], &eyes.path(at));
+        } else {
+            self.samples[at].through += Vec3::ONE;
+        }
     }
 
     /// Shades points of one instance side by side, as [`Self::shade`] does one by one.
@@ -215,21 +225,20 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let matter = &uniform.matter;
         if !context.is_dark || matter.shines() {
             strip.look_around(matter, &context.sky, context.scene.ambient);
-            for (index, everywhere) in strip.shown() {
-                self.add(eyes.rays[index as usize].sample, everywhere);
-            }
+            strip.shown().for_each(|(i, everywhere)| self.add(i, everywhere));
         }
         let outside = context.absorption.is_some().then(Media::default);
         for light in &context.lights {
             strip.shine(matter, light);
-            for shone in strip.shone() {
-                let (ray, hit) = (&eyes.rays[shone.index as usize], &eyes.hits[shone.index as usize]);
-                if !light.shadows {
-                    self.add(ray.sample, shone.radiance);
-                } else if !shone.grazes {
-                    self.shadows.push(shone.ray(ray.sample, hit.prim), shone.radiance, outside);
-                } else if let Some(feelers) = feelers(context, light, ray, hit) {
-                    self.shadows.push_feelers(&feelers, shone.radiance, outside);
+            if !light.shadows {
+                strip.shone().for_each(|(i, radiance)| self.add(i, radiance));
+                continue;
+            }
+            strip.send(&mut self.shadows, outside);
+            for (i, radiance) in strip.grazed() {
+                let (ray, hit) = (&eyes.rays[i as usize], &eyes.hits[i as usize]);
+                if let Some(feelers) = feelers(context, light, ray, hit) {
+                    self.shadows.push_feelers(&feelers, radiance, outside);
                 }
             }
         }

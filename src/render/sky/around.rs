@@ -19,7 +19,7 @@ use crate::render::draws::Draws;
 use crate::render::observer::Observer;
 use crate::render::optics::reflect;
 use crate::render::shade::Matter;
-use crate::render::shadow::Shadows;
+use crate::render::shadow::{Bound, Shadows};
 use crate::render::surface::Surface;
 use crate::render::wave::Media;
 use std::f32::consts::PI;
@@ -119,7 +119,9 @@ impl Arounds {
                 let share = if share.is_finite() { share } else { Vec3::ZERO };
                 if share.max_element() > 0.0 {
                     let ray = point.surface.ray(dir, f32::INFINITY, point.ray.sample);
-                    self.shadows.push_tagged(ray, share, point.media, self.shares.len());
+                    #[expect(clippy::cast_possible_truncation, reason = "few shares wait, see LIMIT")]
+                    let light = Bound { radiance: share, tag: self.shares.len() as u32 };
+                    self.shadows.push_bound(ray, light, point.media);
                 }
                 self.shares.push(share);
             }

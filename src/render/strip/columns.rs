@@ -2,7 +2,7 @@
 
 use super::around::Surroundings;
 use super::faces::Faces;
-use super::lit::Lit;
+use super::lit::{Lit, Sent};
 use super::sorted::Face;
 use crate::accel::{Hit, Ray};
 use crate::math::Vec3;
@@ -43,18 +43,19 @@ pub(crate) struct Strip {
     pub(super) level: Level,
     /// The place of each point's ray in its wave.
     pub(super) rays: [u32; POINTS],
-    given: Given,
+    pub(super) given: Given,
     pub(super) found: Found,
     pub(super) surroundings: Surroundings,
     pub(super) lit: Lit,
+    pub(super) sent: Sent,
 }
 
 /// What hits say.
-struct Given {
+pub(super) struct Given {
     origin: Columns,
     dir: Columns,
     weights: [Column; 2],
-    faces: Faces,
+    pub faces: Faces,
 }
 
 /// The surface at each point.
@@ -95,6 +96,7 @@ impl Default for Strip {
             found,
             surroundings: Surroundings::default(),
             lit: Lit::default(),
+            sent: Sent::default(),
         }
     }
 }
@@ -123,14 +125,14 @@ impl Strip {
 impl Strip {
     /// The rays whose points must be shaded one by one, from now on left out here.
     pub(crate) fn left_out(&mut self, one_sided: bool) -> impl Iterator<Item = u32> {
-        let found = &mut self.found;
-        let count = self.count.min(POINTS);
-        let out = (0..count).filter(move |&i| {
-            let wanted = (found.certain[i] == 1) & (!one_sided | (found.front[i] == 1));
-            found.certain[i] = u32::from(wanted);
-            !wanted
-        });
-        out.map(|i| self.rays[i])
+        let Found { certain, front, .. } = &mut self.found;
+        let either = u32::from(!one_sided);
+        certain.iter_mut().zip(front).for_each(|(certain, front)| *certain &= *front | either);
+        let certain = &self.found.certain[..self.count.min(POINTS)];
+        // Hardly ever any.
+        let all = certain.iter().fold(1, |all, one| all & one) == 1;
+        let points = if all { 0..0 } else { 0..certain.len() };
+        points.filter(|&i| certain[i] != 1).map(|i| self.rays[i])
     }
 }
 
@@ -293,7 +295,7 @@ mod tests {
             rays.push(Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude: NO_PRIM, sample: 0 });
             hits.push(Hit { t: 1.0, u, v, prim: i });
             let normals = [random.direction(), random.direction(), random.direction()];
-            faces.push(Face::of_triangle(&corners, Some(normals)));
+            faces.push(Face::of_triangle(i, &corners, Some(normals)));
         }
         let hit: Vec<(u32, u32)> = (0..61).map(|i| (i, i)).collect();
         strip.take(&hit, &faces, &rays, &hits);
@@ -333,7 +335,10 @@ mod tests {
         };
         let rays: Vec<Ray> = (0..100).map(ray).collect();
         let hits: Vec<Hit> = (0..100).map(|i| Hit { t: 1.0, u: number(i), v: -number(i), prim: 7 }).collect();
-        let face = |_| Face::of_triangle(&[(); 3].map(|()| random.cube()), Some([(); 3].map(|()| random.direction())));
+        let face = |prim| {
+            let corners = [(); 3].map(|()| random.cube());
+            Face::of_triangle(prim, &corners, Some([(); 3].map(|()| random.direction())))
+        };
         let faces: Vec<Face> = (0..20).map(face).collect();
         // Faces that one point shows, or some, or more than are written at once.
         let lengths = [1, 2, 9, 1, 17, 8, 3, 23];

@@ -18,6 +18,7 @@ pub(super) struct Faces {
     narrow: [Roomy<f32>; NARROW_NUMBERS],
     /// 1 where the normals of the corners differ.
     curved: Roomy<u32>,
+    prims: Roomy<u32>,
 }
 
 const WIDE_NUMBERS: usize = 13;
@@ -31,17 +32,19 @@ pub(super) struct FaceNumbers {
     /// The unit normal of its front, and those of its corners.
     narrow: [f32; NARROW_NUMBERS],
     curved: u32,
+    prim: u32,
 }
 
 impl FaceNumbers {
-    /// With the unit normal on its front and the normals of its corners, if it has any.
-    pub(super) fn new(facet: &Facet, outward: Vec3, normals: Option<[Vec3; 3]>) -> Self {
+    /// Of prim `prim`, with the unit normal on its front and the normals of its corners, if it has any.
+    pub(super) fn new(prim: u32, facet: &Facet, outward: Vec3, normals: Option<[Vec3; 3]>) -> Self {
         let Facet { flat: Flat { corner: c, normal: n, sizes: s }, rim: Rim { area2, edges2: [e, f, g] } } = *facet;
         let [p, q, r] = normals.unwrap_or_default();
         Self {
             wide: [c.x, c.y, c.z, n.x, n.y, n.z, s.x, s.y, s.z, area2, e, f, g],
             narrow: [outward.x, outward.y, outward.z, p.x, p.y, p.z, q.x, q.y, q.z, r.x, r.y, r.z],
             curved: u32::from(normals.is_some_and(differ)),
+            prim,
         }
     }
 }
@@ -52,6 +55,7 @@ impl Faces {
         wide: [[0.0; POINTS + LANES]; WIDE_NUMBERS],
         narrow: [[0.0; POINTS + LANES]; NARROW_NUMBERS],
         curved: [0; POINTS + LANES],
+        prims: [0; POINTS + LANES],
     };
 
     /// Sets the face of these points. What follows up to seven behind them is written, too, and must be set later.
@@ -73,6 +77,7 @@ impl Faces {
             column[at..at + LANES].copy_from_slice(&[number; LANES]);
         }
         self.curved[at..at + LANES].copy_from_slice(&[face.curved; LANES]);
+        self.prims[at..at + LANES].copy_from_slice(&[face.prim; LANES]);
     }
 
     /// The plane and the rim.
@@ -102,10 +107,17 @@ impl Faces {
         &self.curved[..POINTS]
     }
 
+    /// By point, the number of the face among all prims.
+    #[inline(always)]
+    pub(super) fn prims(&self) -> &[u32] {
+        &self.prims[..POINTS]
+    }
+
     /// All of a point.
     #[cfg(test)]
     pub(super) fn at(&self, i: usize) -> FaceNumbers {
-        FaceNumbers { wide: self.wide.map(|c| c[i]), narrow: self.narrow.map(|c| c[i]), curved: self.curved[i] }
+        let (wide, narrow) = (self.wide.map(|c| c[i]), self.narrow.map(|c| c[i]));
+        FaceNumbers { wide, narrow, curved: self.curved[i], prim: self.prims[i] }
     }
 
     #[inline(always)]

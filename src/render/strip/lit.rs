@@ -1,19 +1,26 @@
 //! The light that arrives at the points of a strip, and the shadow rays that ask whether it does.
 
-use super::columns::{Column, Columns, Found, POINTS, Strip, get, padded, put};
+use super::columns::{Column, Columns, Found, LANES, POINTS, Strip, get, padded, put};
 use crate::accel::Ray;
 use crate::math::Vec3;
 use crate::math::bounds::offset_origin;
 use crate::math::simd::{Kernel, Simd};
 use crate::render::curve::STEEP;
 use crate::render::shade::{LocalLight, Matter, Model, terminator, way};
+use crate::render::shadow::{Bound, Shadows};
+use crate::render::wave::Media;
+use bytemuck::Zeroable;
+
+/// Light whose shadow ray starts on the triangle.
+const PLAIN: u32 = 1;
+
+/// Light so flat that the shadow ray must be found by [`Surface`](crate::render::surface::Surface).
+const GRAZING: u32 = 2;
 
 /// What one light does at each point.
 pub(super) struct Lit {
-    /// 1 where it is seen.
+    /// [`PLAIN`] or [`GRAZING`] where it is seen, else 0.
     pub seen: [u32; POINTS],
-    /// 1 where its light is so flat that shadow rays do not start on the triangle.
-    pub grazes: [u32; POINTS],
     to_light: Columns,
     /// Its strength, or irradiance, as the model wants it.
     light: Columns,
@@ -29,7 +36,6 @@ impl Default for Lit {
         let empty = [[0.0; POINTS]; 3];
         Self {
             seen: [0; POINTS],
-            grazes: [0; POINTS],
             to_light: empty,
             light: empty,
             radiance: empty,
@@ -40,27 +46,6 @@ impl Default for Lit {
     }
 }
 
-/// A point that a light shines on.
-pub(crate) struct Shone {
-    /// The place of its ray in the wave.
-    pub index: u32,
-    pub radiance: Vec3,
-    /// Whether the light is so flat that the shadow ray must be found by [`Surface`](crate::render::surface::Surface).
-    pub grazes: bool,
-    /// Start, direction and end of the shadow ray.
-    pub origin: Vec3,
-    pub dir: Vec3,
-    pub end: f32,
-}
-
-impl Shone {
-    /// The shadow ray, from prim `prim`.
-    #[inline(always)]
-    pub(crate) fn ray(&self, sample: u32, prim: u32) -> Ray {
-        Ray { origin: self.origin, t_min: 0.0, dir: self.dir, t_max: self.end, exclude: prim, sample }
-    }
-}
-
 impl Strip {
     /// Finds what `light` does at each point of a surface of `matter`.
     pub(crate) fn shine(&mut self, matter: &Matter, light: &LocalLight) {
@@ -68,17 +53,87 @@ impl Strip {
         self.level.run(Shine { found, lit, points, matter, light });
     }
 
-    /// The points that it shines on.
-    pub(crate) fn shone(&self) -> impl Iterator<Item = Shone> {
-        let (found, lit) = (&self.found, &self.lit);
-        (0..self.count.min(POINTS)).filter(|&i| lit.seen[i] & found.certain[i] == 1).map(|i| Shone {
-            index: self.rays[i],
-            radiance: get(&lit.radiance, i),
-            grazes: lit.grazes[i] == 1,
-            origin: get(&lit.origin, i),
-            dir: get(&lit.dir, i),
-            end: lit.end[i],
-        })
+    /// The points that it shines on: the place of the ray of each, and what it shows.
+    pub(crate) fn shone(&self) -> impl Iterator<Item = (u32, Vec3)> {
+        self.lit_as(|seen| seen != 0)
+    }
+
+    /// Those of them whose shadow rays [`Self::send`] does not send.
+    pub(crate) fn grazed(&self) -> impl Iterator<Item = (u32, Vec3)> {
+        let any = self.lit.seen[..padded(self.count)].iter().fold(0, |all, seen| all | seen) & GRAZING != 0;
+        self.lit_as(move |seen| any && seen == GRAZING)
+    }
+
+    fn lit_as(&self, wanted: impl Fn(u32) -> bool) -> impl Iterator<Item = (u32, Vec3)> {
+        let points = (0..self.count.min(POINTS)).filter(move |&i| wanted(self.lit.seen[i]));
+        points.map(|i| (self.rays[i], get(&self.lit.radiance, i)))
+    }
+
+    /// Sends the shadow rays that start on their triangles, for rays whose places in the wave are their samples;
+    /// `media` is what they start inside of, where that matters.
+    pub(crate) fn send(&mut self, shadows: &mut Shadows, media: Option<Media>) {
+        let (prims, rays, lit, sent) = (self.given.faces.prims(), &self.rays, &self.lit, &mut self.sent);
+        let count = self.level.run(Send { points: self.count.min(POINTS), prims, rays, lit, sent });
+        shadows.push_all(&self.sent.rays[..count], &self.sent.light[..count], media);
+    }
+}
+
+/// Shadow rays, with what each brings: all of a strip together, because what is copied soon after it was gathered is read
+/// before it is there.
+pub(super) struct Sent {
+    rays: [Ray; POINTS],
+    light: [Bound; POINTS],
+}
+
+impl Default for Sent {
+    fn default() -> Self {
+        Self { rays: [Ray::zeroed(); POINTS], light: [Bound::zeroed(); POINTS] }
+    }
+}
+
+struct Send<'a> {
+    points: usize,
+    prims: &'a [u32],
+    rays: &'a [u32; POINTS],
+    lit: &'a Lit,
+    sent: &'a mut Sent,
+}
+
+impl Kernel for Send<'_> {
+    /// How many rays there are.
+    type Output = usize;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> usize {
+        let Self { points, prims, rays, lit, sent } = self;
+        let mut count = 0;
+        let eights = prims.as_chunks::<LANES>().0.iter().zip(rays.as_chunks::<LANES>().0);
+        for (k, (prims, samples)) in eights.enumerate().take(padded(points) / LANES) {
+            let eight = |column: &Column| column.as_chunks::<LANES>().0[k];
+            let three = |columns: &Columns| [eight(&columns[0]), eight(&columns[1]), eight(&columns[2])];
+            let there = (1 << (points - k * LANES).min(LANES)) - 1;
+            let which = s.find_word(PLAIN, &lit.seen.as_chunks().0[k]) & there;
+            if which == 0 {
+                continue;
+            }
+            let ([ox, oy, oz], [dx, dy, dz], end) = (three(&lit.origin), three(&lit.dir), eight(&lit.end));
+            let from = s.rows([s.load(&ox), s.load(&oy), s.load(&oz), s.splat(0.0)]);
+            let to = s.rows([s.load(&dx), s.load(&dy), s.load(&dz), s.load(&end)]);
+            let [r, g, b] = three(&lit.radiance);
+            // Numbers of samples only pass through the lanes, as bits.
+            let light = s.rows([s.load(&r), s.load(&g), s.load(&b), s.load(bytemuck::cast_ref(samples))]);
+            let mut put = |at: usize, i: usize| {
+                sent.rays[at % POINTS] = Ray::from_fours([from[i], to[i]], prims[i], samples[i]);
+                sent.light[at % POINTS] = bytemuck::cast(light[i]);
+            };
+            if which == (1 << LANES) - 1 {
+                (0..LANES).for_each(|i| put(count + i, i));
+            } else {
+                (0..LANES).filter(|i| which >> i & 1 == 1).enumerate().for_each(|(j, i)| put(count + j, i));
+            }
+            count += which.count_ones() as usize;
+        }
+        count
     }
 }
 
@@ -134,10 +189,12 @@ fn reflect(found: &Found, lit: &mut Lit, points: usize, share: impl Fn(Vec3, Vec
         let curved = found.curved[i] == 1;
         let horizon = if curved { normal } else { geometric };
         let above = horizon.dot(to_light) > 0.0;
+        let grazes = curved & (geometric.dot(to_light) < STEEP);
         let smooth = terminator(horizon, normal, to_light);
         let radiance = share(normal, get(&found.view, i), to_light) * get(&lit.light, i) * smooth;
-        lit.seen[i] &= u32::from(above & radiance.is_finite() & (radiance.max_element() > 0.0));
-        lit.grazes[i] = u32::from(curved & (geometric.dot(to_light) < STEEP));
+        let seen = above & radiance.is_finite() & (radiance.max_element() > 0.0) & (found.certain[i] == 1);
+        let how = if grazes { GRAZING } else { PLAIN };
+        lit.seen[i] *= if seen { how } else { 0 };
         put(&mut lit.radiance, i, radiance);
     }
 }

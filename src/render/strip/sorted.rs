@@ -50,9 +50,9 @@ impl Sorted {
         }
     }
 
-    /// Takes the hit of the `index`th ray; false if it must be shaded by itself.
+    /// Takes the hits on one prim of so many rays that follow each other; false if they must be shaded one by one.
     #[inline(always)]
-    pub(crate) fn take(&mut self, context: &Context, index: u32, prim: u32) -> bool {
+    pub(crate) fn take(&mut self, context: &Context, (first, count): (u32, usize), prim: u32) -> bool {
         let place = &mut self.remembered[prim as usize % REMEMBERED];
         if place.0 != prim {
             *place = (prim, u32::try_from(self.faces.len()).unwrap_or(NONE));
@@ -64,7 +64,7 @@ impl Sorted {
         if list.is_empty() {
             self.hit.push(instance);
         }
-        list.push((index, at));
+        list.extend((first..).take(count).map(|ray| (ray, at)));
         true
     }
 
@@ -89,7 +89,7 @@ impl Face {
     /// Looks up a prim.
     #[inline(never)]
     fn of(context: &Context, prim: u32) -> Self {
-        let nothing = || FaceNumbers::new(&Facet::default(), Vec3::ZERO, None);
+        let nothing = || FaceNumbers::new(prim, &Facet::default(), Vec3::ZERO, None);
         Self::new(context, prim).unwrap_or_else(|| Self { numbers: nothing(), instance: NONE })
     }
 
@@ -116,13 +116,17 @@ impl Face {
             let normal = |i: u32| mesh.normals.get(i as usize).copied();
             Some([normal(a)?, normal(b)?, normal(c)?])
         };
-        Some(Self { numbers: FaceNumbers::new(&facet, outward, normals), instance })
+        Some(Self { numbers: FaceNumbers::new(prim, &facet, outward, normals), instance })
     }
 
     /// A face of no instance.
     #[cfg(test)]
-    pub(super) fn of_triangle(corners: &crate::math::triangle::Triangle, normals: Option<[Vec3; 3]>) -> Self {
+    pub(super) fn of_triangle(
+        prim: u32,
+        corners: &crate::math::triangle::Triangle,
+        normals: Option<[Vec3; 3]>,
+    ) -> Self {
         let facet = Facet::of(corners);
-        Self { numbers: FaceNumbers::new(&facet, facet.flat.unit(), normals), instance: NONE }
+        Self { numbers: FaceNumbers::new(prim, &facet, facet.flat.unit(), normals), instance: NONE }
     }
 }
