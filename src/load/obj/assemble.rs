@@ -9,6 +9,11 @@ use crate::load::Polygons;
 use crate::math::ear_clip::{EarClipper, Outcome, newell};
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
 use crate::scene::{Mesh, Polygon};
+use rayon::prelude::*;
+use std::borrow::Cow;
+
+/// Faces that one thread looks at at a time.
+const FACES: usize = 1 << 12;
 
 /// The meshes of a file, and what became of its faces.
 #[derive(Clone, Debug, Default)]
@@ -51,8 +56,8 @@ pub(super) fn assemble(
         cut: Vec::new(),
         mesh: Mesh::default(),
     };
-    for (run, range) in by_run(&faces, statements.runs.len()) {
-        let mesh = builder.build(&range, name(statements, run), &mut out);
+    for (run, faces) in by_run(&faces, statements.runs.len()) {
+        let mesh = builder.build(&faces, name(statements, run), &mut out);
         if !mesh.triangles.is_empty() || !mesh.polygons.is_empty() {
             out.meshes.push((run, mesh));
         }
@@ -60,24 +65,26 @@ pub(super) fn assemble(
     out
 }
 
-/// The faces that can be drawn, with their first corners.
-fn keep(statements: &Statements, soup: &Soup, positions: &[Vec3], out: &mut Assembled) -> Vec<(Face, u32)> {
-    let mut first = 0;
-    let mut kept = Vec::with_capacity(statements.faces.len());
-    for face in &statements.faces {
-        let range = first as usize..(first + face.arity) as usize;
-        let place = |c: &Corner| positions[c.position as usize];
-        let corners = soup.corners.get(range).unwrap_or_default();
-        if !corners.iter().all(|c| place(c).is_finite()) {
-            count(&mut out.not_finite, face);
-        } else if !has_three_places(corners.iter().map(place)) {
-            count(&mut out.collapsed, face);
-        } else if !corners.is_empty() {
-            kept.push((*face, first));
-        }
-        first += face.arity;
+/// The faces that can be drawn; mostly all, which are not copied.
+fn keep<'s>(statements: &'s Statements, soup: &Soup, positions: &[Vec3], out: &mut Assembled) -> Cow<'s, [Face]> {
+    let corners = |face: &Face| soup.corners.get(face.corners()).unwrap_or_default();
+    let place = |c: &Corner| positions[c.position as usize];
+    let is_finite = |face: &Face| corners(face).iter().all(|c| place(c).is_finite());
+    let is_wide = |face: &Face| has_three_places(corners(face).iter().map(place));
+    let faces = &statements.faces;
+    if faces.par_iter().with_min_len(FACES).all(|face| is_finite(face) && is_wide(face)) {
+        return Cow::Borrowed(faces);
     }
-    kept
+    let can_be_drawn = |face: &&Face| {
+        let (is_finite, is_wide) = (is_finite(face), is_wide(face));
+        if !is_finite {
+            count(&mut out.not_finite, face);
+        } else if !is_wide {
+            count(&mut out.collapsed, face);
+        }
+        is_finite && is_wide
+    };
+    Cow::Owned(faces.iter().filter(can_be_drawn).copied().collect())
 }
 
 fn has_three_places(mut places: impl Iterator<Item = Vec3>) -> bool {
@@ -94,15 +101,15 @@ fn count((number, line): &mut (u64, u32), face: &Face) {
 }
 
 /// Faces sorted by run, in the file's order within each.
-fn by_run(faces: &[(Face, u32)], runs: usize) -> Vec<(u32, Vec<(Face, u32)>)> {
+fn by_run(faces: &[Face], runs: usize) -> Vec<(u32, Cow<'_, [Face]>)> {
     if runs == 1 {
-        return vec![(0, faces.to_vec())];
+        return vec![(0, Cow::Borrowed(faces))];
     }
     let mut sizes = vec![0usize; runs];
-    faces.iter().for_each(|(face, _)| sizes[face.run as usize] += 1);
-    let mut out: Vec<_> = (0..).zip(sizes).map(|(run, size)| (run, Vec::with_capacity(size))).collect();
-    faces.iter().for_each(|face| out[face.0.run as usize].1.push(*face));
-    out
+    faces.iter().for_each(|face| sizes[face.run as usize] += 1);
+    let mut lists: Vec<Vec<Face>> = sizes.into_iter().map(Vec::with_capacity).collect();
+    faces.iter().for_each(|face| lists[face.run as usize].push(*face));
+    (0..).zip(lists.into_iter().map(Cow::Owned)).collect()
 }
 
 /// `object/group`, whichever there is.
@@ -115,11 +122,6 @@ pub(super) fn name(statements: &Statements, run: u32) -> String {
         (object, group) if object == group => object.into(),
         (object, group) => format!("{object}/{group}"),
     }
-}
-
-/// The corners of a face in [`Soup::corners`].
-fn range(&(face, first): &(Face, u32)) -> std::ops::Range<usize> {
-    first as usize..(first + face.arity) as usize
 }
 
 /// What makes a vertex besides its position: texture coordinate and normal, each an index or [`NONE`].
@@ -141,10 +143,12 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    fn build(&mut self, faces: &[(Face, u32)], name: String, out: &mut Assembled) -> Mesh {
+    fn build(&mut self, faces: &[Face], name: String, out: &mut Assembled) -> Mesh {
         self.mesh = Mesh { name, ..Mesh::default() };
         self.vertices.clear();
-        let shaded = faces.iter().any(|f| range(f).any(|at| self.normal_number(at) != NONE));
+        let has_normals = !(self.soup.normals.is_empty() && self.smooth.of_corner.is_empty());
+        let is_shaded = |face: &Face| face.corners().any(|at| self.normal_number(at) != NONE);
+        let shaded = has_normals && faces.iter().any(is_shaded);
         for face in faces {
             self.face(face, shaded, out);
         }
@@ -174,24 +178,28 @@ impl Builder<'_> {
         self.first_smooth() + self.smooth.normals.len() as u32
     }
 
-    fn face(&mut self, face: &(Face, u32), shaded: bool, out: &mut Assembled) {
+    fn face(&mut self, face: &Face, shaded: bool, out: &mut Assembled) {
         self.ring.clear();
         self.indices.clear();
-        for at in range(face) {
+        // Of a triangle places are asked for only to compare it with its normals.
+        let needs_places = face.arity > 3 || !self.soup.normals.is_empty();
+        for at in face.corners() {
             let Corner { position, uv, .. } = self.soup.corners[at];
             let normal = match self.normal_number(at) {
                 // A flat face among shaded ones carries its own normal.
-                NONE if shaded => self.first_flat() + face.0.number,
+                NONE if shaded => self.first_flat() + face.number,
                 normal => normal,
             };
-            self.ring.push(self.positions[position as usize].as_dvec3());
+            if needs_places {
+                self.ring.push(self.positions[position as usize].as_dvec3());
+            }
             self.indices.push(self.vertices.number(position, (uv, normal)));
         }
         if self.turn_to_normals(face) {
-            count(&mut out.turned, &face.0);
+            count(&mut out.turned, face);
         }
         if self.flatness.is_some_and(|flatness| self.ring.len() > 3 && is_flat(&self.ring, flatness)) {
-            self.keep_whole(face.0.number);
+            self.keep_whole(face.number);
             out.faces += 1;
             return;
         }
@@ -199,20 +207,20 @@ impl Builder<'_> {
         if let [a, b, c] = self.indices[..] {
             // Nothing to cut, and faces with equal corners are gone.
             self.mesh.triangles.push([a, b, c]);
-            self.mesh.face_of_triangle.push(face.0.number);
+            self.mesh.face_of_triangle.push(face.number);
             out.faces += 1;
             return;
         }
         self.cut.clear();
         if self.clipper.cut(&self.ring, &mut self.cut) == Outcome::Crossing {
-            count(&mut out.crossing, &face.0);
+            count(&mut out.crossing, face);
         }
         if self.cut.is_empty() {
-            return count(&mut out.collapsed, &face.0);
+            return count(&mut out.collapsed, face);
         }
         let vertex = |i: u32| self.indices[i as usize];
         self.mesh.triangles.extend(self.cut.iter().map(|t| t.map(vertex)));
-        self.mesh.face_of_triangle.extend(self.cut.iter().map(|_| face.0.number));
+        self.mesh.face_of_triangle.extend(self.cut.iter().map(|_| face.number));
         out.faces += 1;
     }
 
@@ -220,7 +228,7 @@ impl Builder<'_> {
     ///
     /// Which side is the front decides on which side of the glass a ray is; where winding and normals disagree,
     /// whoever wrote the file has looked at the normals.
-    fn turn_to_normals(&mut self, face: &(Face, u32)) -> bool {
+    fn turn_to_normals(&mut self, face: &Face) -> bool {
         if self.soup.normals.is_empty() {
             return false;
         }
@@ -228,7 +236,7 @@ impl Builder<'_> {
             NONE => DVec3::ZERO,
             normal => self.soup.normals[normal as usize].as_dvec3(),
         };
-        let sum: DVec3 = range(face).map(given).sum();
+        let sum: DVec3 = face.corners().map(given).sum();
         let wrong = sum != DVec3::ZERO && newell(&self.ring).dot(sum) < 0.0;
         if wrong {
             self.ring.reverse();
@@ -248,14 +256,14 @@ impl Builder<'_> {
     }
 
     /// Fills the vertex arrays that the triangles point into.
-    fn fill(&mut self, faces: &[(Face, u32)], shaded: bool) {
+    fn fill(&mut self, faces: &[Face], shaded: bool) {
         fill_vertices(&mut self.mesh, &self.vertices, self.soup, self.positions);
         if shaded {
             self.fill_normals(faces);
         }
     }
 
-    fn fill_normals(&mut self, faces: &[(Face, u32)]) {
+    fn fill_normals(&mut self, faces: &[Face]) {
         let (first_smooth, first_flat) = (self.first_smooth(), self.first_flat());
         let mut normals: Vec<Vec3> = Vec::with_capacity(self.vertices.len());
         for (_, (_, number)) in self.vertices.iter() {
@@ -271,10 +279,10 @@ impl Builder<'_> {
     }
 
     /// The normal of a face of this mesh; +z for one without area, where it is never seen.
-    fn flat_normal(&self, faces: &[(Face, u32)], number: u32) -> Vec3 {
-        let Ok(i) = faces.binary_search_by_key(&number, |f| f.0.number) else { return Vec3::Z };
+    fn flat_normal(&self, faces: &[Face], number: u32) -> Vec3 {
+        let Ok(i) = faces.binary_search_by_key(&number, |f| f.number) else { return Vec3::Z };
         let place = |c: &Corner| self.positions[c.position as usize].as_dvec3();
-        let ring: Vec<DVec3> = self.soup.corners[range(&faces[i])].iter().map(place).collect();
+        let ring: Vec<DVec3> = self.soup.corners[faces[i].corners()].iter().map(place).collect();
         newell(&ring).try_normalize().unwrap_or(DVec3::Z).as_vec3()
     }
 }

@@ -186,7 +186,13 @@ fn statements(bare: Bare) -> (Statements, Soup) {
     let mut soup = Soup { positions, uvs, normals, colors, alphas, corners, stroke_corners };
     soup.leave_out_unused();
 
-    let faces = (0..).zip(&arities).map(|(number, &arity)| Face { run: 0, smoothing: 0, arity, line: number, number });
+    let mut next = 0;
+    let face = |(number, &arity): (u32, &u32)| {
+        let first = next;
+        next += arity;
+        Face { run: 0, smoothing: 0, arity, line: number, number, first }
+    };
+    let faces = (0..).zip(&arities).map(face);
     let statements = Statements {
         counts: [soup.positions.len() as u32, 0, 0],
         faces: faces.collect(),

@@ -441,7 +441,8 @@ impl Reader {
     fn push_face(&mut self, arity: u32) {
         let run = self.run();
         let (line, number) = (self.line, self.out.face_count);
-        self.out.faces.push(Face { run, smoothing: self.out.smoothing, arity, line, number });
+        let first = count(self.out.corners.len()).saturating_sub(arity);
+        self.out.faces.push(Face { run, smoothing: self.out.smoothing, arity, line, number, first });
         self.out.face_count = self.out.face_count.saturating_add(1);
     }
 

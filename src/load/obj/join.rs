@@ -1,6 +1,6 @@
 //! Runs of lines, read side by side -> the statements of the whole text, as if it had been read line after line.
 
-use super::chunk::{COMMENTS, Chunk, LARGEST, OPEN, resolve};
+use super::chunk::{COMMENTS, Chunk, LARGEST, OPEN, count, resolve};
 use super::soup::{Corner, NONE, Soup};
 use super::statements::{Run, Statements, Stroke};
 use crate::math::{DVec2, DVec3, Vec3};
@@ -48,13 +48,16 @@ pub(super) fn join(mut chunks: Vec<Chunk>) -> Result<Joined, u64> {
     let (corners, faulty) = corners(&chunks, &begins, &there);
 
     // Faces come last: they are read more often than they are written.
+    let mut first = 0;
     for ((chunk, before), runs) in chunks.iter_mut().zip(&begins).zip(&runs) {
         for face in &mut chunk.faces {
+            face.first += first;
             face.run = runs[face.run as usize];
             face.line = face.line.saturating_add(before.lines);
             face.number += before.faces;
             face.smoothing = if face.smoothing == OPEN { before.smoothing } else { face.smoothing };
         }
+        first += count(chunk.corners.len());
     }
     out.faces = flat(chunks.iter_mut().map(|c| std::mem::take(&mut c.faces)));
     let stroke_corners = strokes(&chunks, &begins, &runs, &there, &mut out);
@@ -137,7 +140,7 @@ impl Table {
     }
 
     fn name(&mut self, name: String) -> u32 {
-        let next = super::chunk::count(self.names.len());
+        let next = count(self.names.len());
         if let Some(&known) = self.name_ids.get(&name) {
             return known;
         }
@@ -147,7 +150,7 @@ impl Table {
     }
 
     fn run(&mut self, run: Run) -> u32 {
-        let next = super::chunk::count(self.runs.len());
+        let next = count(self.runs.len());
         let id = *self.run_ids.entry(run).or_insert(next);
         if id == next {
             self.runs.push(run);
@@ -235,7 +238,8 @@ fn strokes(chunks: &[Chunk], begins: &[Before], runs: &[Vec<u32>], there: &There
 
 /// The corners of all faces, and whether one of them, or of the faces that were dropped, names what is not there.
 fn corners(chunks: &[Chunk], begins: &[Before], there: &There) -> (Vec<Corner>, bool) {
-    let mut all = vec![Corner::default(); chunks.iter().map(|c| c.corners.len()).sum()];
+    // Its pages are made by the threads that write there.
+    let mut all: Vec<Corner> = bytemuck::zeroed_vec(chunks.iter().map(|c| c.corners.len()).sum());
     let mut parts = Vec::with_capacity(chunks.len());
     let mut rest = all.as_mut_slice();
     for (chunk, before) in chunks.iter().zip(begins) {

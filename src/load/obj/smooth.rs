@@ -23,10 +23,9 @@ pub(super) struct Smooth {
     pub of_corner: Vec<u32>,
 }
 
-/// Computes what the corners without a normal need. `faces` come with their first corners.
-pub(super) fn smooth(soup: &Soup, positions: &[Vec3], faces: &[(Face, u32)]) -> Smooth {
-    let corners = |&(face, first): &(Face, u32)| first as usize..first as usize + face.arity as usize;
-    let needs = |f: &(Face, u32)| f.0.smoothing > 0 && soup.corners[corners(f)].iter().any(|c| c.normal == NONE);
+/// Computes what the corners without a normal need.
+pub(super) fn smooth(soup: &Soup, positions: &[Vec3], faces: &[Face]) -> Smooth {
+    let needs = |f: &Face| f.smoothing > 0 && soup.corners[f.corners()].iter().any(|c| c.normal == NONE);
     if !faces.iter().any(needs) {
         return Smooth::default();
     }
@@ -36,13 +35,13 @@ pub(super) fn smooth(soup: &Soup, positions: &[Vec3], faces: &[(Face, u32)]) -> 
     let mut pairs = Pairs::new(positions.len());
     let mut of_corner = vec![NONE; soup.corners.len()];
     let mut ring: Vec<DVec3> = Vec::new();
-    for face in faces.iter().filter(|f| f.0.smoothing > 0) {
-        let range = corners(face);
+    for face in faces.iter().filter(|f| f.smoothing > 0) {
+        let range = face.corners();
         ring.clear();
         ring.extend(soup.corners[range.clone()].iter().map(|c| positions[c.position as usize].as_dvec3()));
         let normal = newell(&ring).normalize_or_zero();
         for (i, at) in range.enumerate() {
-            let pair = pairs.number(soup.corners[at].position, face.0.smoothing);
+            let pair = pairs.number(soup.corners[at].position, face.smoothing);
             sums.resize(pairs.len(), DVec3::ZERO);
             sums[pair as usize] += normal * angle(&ring, i);
             of_corner[at] = pair;

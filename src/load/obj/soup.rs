@@ -1,12 +1,13 @@
 //! Vertices, and the corners of faces that name them.
 
 use crate::math::{DVec2, DVec3, Vec3};
+use bytemuck::Zeroable;
 
 /// An index that stands for "none".
 pub(super) const NONE: u32 = u32::MAX;
 
 /// A corner of a face: indices into the arrays of [`Soup`]; the last two may be [`NONE`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Zeroable)]
 pub(super) struct Corner {
     pub position: u32,
     pub uv: u32,

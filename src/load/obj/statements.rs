@@ -13,6 +13,7 @@ use super::{faults, split};
 use crate::load::limits::{Budget, OverBudget};
 use crate::load::{Diagnostic, LoadError, Warnings};
 use rayon::prelude::*;
+use std::ops::Range;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -29,6 +30,15 @@ pub(super) struct Face {
     pub line: u32,
     /// Which of the file's faces, from 0; those that are not kept count.
     pub number: u32,
+    /// The first of its corners in [`Soup::corners`].
+    pub first: u32,
+}
+
+impl Face {
+    /// Its corners in [`Soup::corners`].
+    pub(super) fn corners(&self) -> Range<usize> {
+        self.first as usize..self.first as usize + self.arity as usize
+    }
 }
 
 /// One `p` or `l` statement, without its corners.
@@ -159,7 +169,7 @@ fn read_side_by_side(runs: &[&[u8]], budget: &mut Budget) -> Result<Vec<Chunk>, 
 /// Bytes that a run takes until it has become a part of a mesh.
 fn bytes(chunk: &Chunk) -> u64 {
     /// A face, twice, and its number in the mesh.
-    const FACE: u64 = 2 * 20 + 4;
+    const FACE: u64 = 2 * 24 + 4;
     /// Numbers, indices, those of the mesh, and their vertex.
     const CORNER: u64 = 12 + 12 + 12 + 16;
     /// Twice in `f64`, then in `f32`, and in the mesh.
@@ -309,7 +319,7 @@ mod tests {
         let s = of(&format!("{TRIANGLE}p 1 2 3\nl 1 2 3\nsurf 0 1 0 1 1\nf 1 2\nf\nf 1 2 3\nhello"));
         assert_eq!((s.odd.strokes.count, s.odd.curves.count), (0, 1));
         assert_eq!((s.odd.few_corners.count, s.odd.unknown.count), (2, 1));
-        assert_eq!(s.faces, [Face { run: 0, smoothing: 0, arity: 3, line: 9, number: 2 }]);
+        assert_eq!(s.faces, [Face { run: 0, smoothing: 0, arity: 3, line: 9, number: 2, first: 0 }]);
     }
 
     #[test]
