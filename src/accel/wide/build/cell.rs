@@ -9,6 +9,10 @@ use crate::accel::wide::split::item::around_middles;
 use crate::accel::wide::split::{Bounds, Item};
 use crate::math::Vec4;
 use crate::math::aabb::Aabb;
+use rayon::prelude::*;
+
+/// Items that one thread takes at a time where several share a cell. The same for every number of threads: so is the tree.
+const CHUNK: usize = 1 << 12;
 
 /// Levels of the octree: so many that the number of a cell is exact in `f32`.
 const LEVELS: u32 = 23;
@@ -31,7 +35,12 @@ pub(super) struct Cell {
     first: [u8; 256],
     /// Where the items of each part begin.
     starts: [u32; 8],
+    /// How many items each [`CHUNK`] has in each part; empty where one thread does all.
+    chunks: Vec<[u32; 8]>,
 }
+
+/// The boxes around the parts of some items, and how many are in each.
+type Parts = ([Bounds; 8], [u32; 8]);
 
 /// Parts with a bit clear on each axis.
 const BEFORE: [u8; 3] = [0b0101_0101, 0b0011_0011, 0b0000_1111];
@@ -54,7 +63,12 @@ impl Lattice {
 
     /// The smallest cell around items, and its parts; `None` where all are in one finest cell.
     pub(super) fn cell(&self, items: &[Item], leaf: u32) -> Option<Cell> {
-        let middles = around_middles(items);
+        let shared = items.len() > 2 * CHUNK;
+        let middles = if shared {
+            items.par_chunks(CHUNK).map(around_middles).reduce(|| Bounds::EMPTY, Bounds::join)
+        } else {
+            around_middles(items)
+        };
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` saturates, NaN is 0")]
         let number = |middle: Vec4| self.place(middle).to_array().map(|x| x as u32);
         let (lo, hi) = (number(middles.lo), number(middles.hi));
@@ -65,15 +79,32 @@ impl Lattice {
         let plane = |k: usize| if differ[k] >> bit == 1 { (hi[k] >> bit << bit) as f32 } else { f32::INFINITY };
         let planes = Vec4::new(plane(0), plane(1), plane(2), f32::INFINITY);
 
+        let (mut bounds, mut counts, mut chunks) = ([Bounds::EMPTY; 8], [0; 8], Vec::new());
+        if shared {
+            let parts: Vec<Parts> = items.par_chunks(CHUNK).map(|items| self.parts(items, planes)).collect();
+            for (of_chunk, count) in parts {
+                for i in 0..8 {
+                    bounds[i] = bounds[i].join(of_chunk[i]);
+                    counts[i] += count[i];
+                }
+                chunks.push(count);
+            }
+        } else {
+            (bounds, counts) = self.parts(items, planes);
+        }
+        let mut cell = Cell { planes, bounds, counts, leaf, first: [0; 256], starts: [0; 8], chunks };
+        cell.order(Cell::ALL, &mut 0);
+        Some(cell)
+    }
+
+    fn parts(&self, items: &[Item], planes: Vec4) -> Parts {
         let (mut bounds, mut counts) = ([Bounds::EMPTY; 8], [0; 8]);
         for item in items {
             let part = part(self.place(item.middle()), planes);
             bounds[part] = bounds[part].join(item.bounds());
             counts[part] += 1;
         }
-        let mut cell = Cell { planes, bounds, counts, leaf, first: [0; 256], starts: [0; 8] };
-        cell.order(Cell::ALL, &mut 0);
-        Some(cell)
+        (bounds, counts)
     }
 }
 
@@ -137,12 +168,38 @@ impl Cell {
 
     /// Puts items in order, part by part.
     pub(super) fn sort(&self, lattice: &Lattice, items: &[Item], sorted: &mut [Item]) {
-        let mut next = self.starts;
-        for item in items {
-            let place = &mut next[part(lattice.place(item.middle()), self.planes)];
-            sorted[*place as usize] = *item;
-            *place += 1;
+        let part = |item: &Item| part(lattice.place(item.middle()), self.planes);
+        if self.chunks.is_empty() {
+            let mut next = self.starts;
+            for item in items {
+                let place = &mut next[part(item)];
+                sorted[*place as usize] = *item;
+                *place += 1;
+            }
+            return;
         }
+        let put = |(items, places): (&[Item], [&mut [Item]; 8])| {
+            let mut next = [0; 8];
+            for item in items {
+                let part = part(item);
+                places[part][next[part]] = *item;
+                next[part] += 1;
+            }
+        };
+        items.par_chunks(CHUNK).zip(self.places(sorted)).for_each(put);
+    }
+
+    /// Where each chunk puts its items of each part.
+    fn places<'s>(&self, mut sorted: &'s mut [Item]) -> Vec<[&'s mut [Item]; 8]> {
+        let mut places: Vec<[&mut [Item]; 8]> = self.chunks.iter().map(|_| Default::default()).collect();
+        let mut parts = [0, 1, 2, 3, 4, 5, 6, 7];
+        parts.sort_by_key(|&part| self.starts[part]);
+        for part in parts {
+            for (places, counts) in places.iter_mut().zip(&self.chunks) {
+                (places[part], sorted) = sorted.split_at_mut(counts[part] as usize);
+            }
+        }
+        places
     }
 }
 
@@ -199,6 +256,20 @@ mod tests {
         prims.sort_unstable();
         assert_eq!(prims, [0, 1, 2, 3, 4, 5, 6, 7]);
         assert_eq!(lattice.cell(&items, 8).unwrap().cut(Cell::ALL), None);
+    }
+
+    #[test]
+    fn many_items_are_put_in_order_by_several_threads_as_by_one() {
+        let mut random = crate::math::random::Random::new(3);
+        let at: Vec<Vec3> = (0..5 * CHUNK + 77).map(|_| (random.cube() + 1.0) * 4.0).collect();
+        let (items, lattice) = (items(&at), Lattice::over(&SIDE));
+        let cell = lattice.cell(&items, 8).unwrap();
+        assert_eq!(cell.chunks.len(), 6);
+        let (bounds, counts) = lattice.parts(&items, cell.planes);
+        assert_eq!(cell.counts, counts);
+        assert_eq!(cell.bounds.map(|b| b.aabb()), bounds.map(|b| b.aabb()));
+        let alone = Cell { chunks: Vec::new(), bounds, counts, ..lattice.cell(&items, 8).unwrap() };
+        assert_eq!(sorted(&cell, &lattice, &items), sorted(&alone, &lattice, &items));
     }
 
     #[test]

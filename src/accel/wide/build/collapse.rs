@@ -6,6 +6,7 @@
 
 use std::ops::Range;
 
+use bytemuck::Zeroable;
 use rayon::prelude::*;
 
 use super::grow::Knot;
@@ -18,7 +19,7 @@ use crate::math::simd::LANES;
 const PARALLEL: usize = 512;
 
 /// The best ways of standing for a knot and all below it.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Zeroable)]
 struct Plan {
     /// By one child at most, two, … seven: the areas of all nodes below.
     costs: [f32; LANES - 1],
@@ -27,6 +28,7 @@ struct Plan {
 }
 
 impl Plan {
+    /// All zeros, what memory begins as.
     const LEAF: Self = Self { costs: [0.0; LANES - 1], shares: [0; LANES - 1] };
 
     fn of(knot: &Knot, first: &Self, second: &Self) -> Self {
@@ -67,7 +69,7 @@ fn plan(knots: &[Knot], plans: &mut [Plan]) {
 
 /// The nodes over a binary tree; `leaves` has what each leaf is, by its knot.
 pub(super) fn nodes(knots: &[Knot], leaves: &[Child]) -> Vec<Node> {
-    let mut plans = vec![Plan::LEAF; knots.len()];
+    let mut plans = bytemuck::zeroed_vec(knots.len());
     plan(knots, &mut plans);
     let mut tree = Tree::default();
     Collapse { knots, plans: &plans, leaves }.node(0..knots.len(), &mut tree);

@@ -6,9 +6,6 @@
 //! costs hardly more than looking, and large faces before small ones, which cuts between middles handle badly, are put
 //! where they do the least harm. One after the other, so that the result does not depend on threads.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
-
 use super::grow::{Knot, index};
 use crate::math::aabb::Aabb;
 
@@ -27,15 +24,17 @@ struct Links {
     knots: Vec<Knot>,
     parents: Vec<u32>,
     sides: Vec<[u32; 2]>,
-    /// Places still to be looked at: what is added above them, as ordered bits, and the knot.
-    open: BinaryHeap<Reverse<(u32, u32)>>,
+    /// Places still to be looked at: what is added above them, and the knot.
+    open: Vec<(f32, u32)>,
+    /// Knots on the way up from one.
+    way: Vec<u32>,
 }
 
 /// The root, which is never moved.
 const ROOT: u32 = 0;
 
-/// Improves a tree.
-pub(super) fn improve(knots: Vec<Knot>) -> Vec<Knot> {
+/// Improves a tree; whether anything was moved.
+pub(super) fn improve(knots: Vec<Knot>) -> (Vec<Knot>, bool) {
     let order = largest(&knots);
     let mut links = Links::new(knots);
     let mut any = false;
@@ -46,7 +45,7 @@ pub(super) fn improve(knots: Vec<Knot>) -> Vec<Knot> {
             break;
         }
     }
-    if any { links.in_order() } else { links.knots }
+    (if any { links.in_order() } else { links.knots }, any)
 }
 
 /// The knots that may be tried, by falling area.
@@ -75,7 +74,7 @@ impl Links {
             sides[i as usize] = both;
             both.iter().for_each(|&side| parents[side as usize] = i);
         }
-        Self { knots, parents, sides, open: BinaryHeap::new() }
+        Self { knots, parents, sides, open: Vec::new(), way: Vec::new() }
     }
 
     fn bounds(&self, knot: u32) -> Aabb {
@@ -92,7 +91,7 @@ impl Links {
         let sibling = if a == knot { b } else { a };
         self.replace(parent, sibling);
         self.fit(self.parents[parent as usize]);
-        let beside = self.best_place(&self.bounds(knot).clone()).unwrap_or(sibling);
+        let beside = self.best_place(&self.bounds(knot), sibling);
         self.replace(beside, parent);
         self.sides[parent as usize] = [beside, knot];
         self.parents[beside as usize] = parent;
@@ -124,28 +123,43 @@ impl Links {
         }
     }
 
-    /// The knot beside which a box adds the least area to the tree.
-    fn best_place(&mut self, bounds: &Aabb) -> Option<u32> {
+    /// The knot beside which a box adds the least area to the tree: `known`, or one where it is less.
+    fn best_place(&mut self, bounds: &Aabb, known: u32) -> u32 {
         let alone = area(bounds);
-        let (mut least, mut best) = (f32::INFINITY, None);
+        let (mut least, mut best) = (self.added_beside(bounds, known), known);
         self.open.clear();
-        self.open.push(Reverse((0, ROOT)));
-        while let Some(Reverse((added, knot))) = self.open.pop() {
-            let added = f32::from_bits(added);
+        self.open.push((0.0, ROOT));
+        while let Some((added, knot)) = self.open.pop() {
             if added + alone >= least {
-                break;
+                continue;
             }
             let here = self.bounds(knot);
             let total = added + area(&here.union(*bounds));
             if total < least && knot != ROOT {
-                (least, best) = (total, Some(knot));
+                (least, best) = (total, knot);
             }
             let added = (total - area(&here)).max(0.0);
             if added + alone < least && !self.knots[knot as usize].is_leaf() {
-                self.open.extend(self.sides[knot as usize].map(|side| Reverse((added.to_bits(), side))));
+                self.open.extend(self.sides[knot as usize].map(|side| (added, side)));
             }
         }
         best
+    }
+
+    /// The area that a box beside a knot adds to the tree, with that of the knot above both.
+    fn added_beside(&mut self, bounds: &Aabb, knot: u32) -> f32 {
+        self.way.clear();
+        let mut above = knot;
+        while above != ROOT {
+            above = self.parents[above as usize];
+            self.way.push(above);
+        }
+        // From the root down, as the search adds.
+        let grown = |added: f32, &above: &u32| {
+            let here = self.bounds(above);
+            (added + area(&here.union(*bounds)) - area(&here)).max(0.0)
+        };
+        self.way.iter().rev().fold(0.0, grown) + area(&self.bounds(knot).union(*bounds))
     }
 
     /// The knots in order again, each followed by its first side.
@@ -189,7 +203,8 @@ mod tests {
         let large = leaf(6, 0.0, 5.5);
         let left = fork(fork(fork(small(0), large), small(1)), small(2));
         let knots = fork(left, fork(fork(small(3), small(4)), small(5)));
-        let improved = improve(knots.clone());
+        let (improved, moved) = improve(knots.clone());
+        assert!(moved);
         assert!(cost(&improved) < 0.7 * cost(&knots), "{} {}", cost(&improved), cost(&knots));
         // Checks the boxes and the links as well.
         let (mut before, mut after) = (leaves(&knots), leaves(&improved));
@@ -202,7 +217,7 @@ mod tests {
     fn a_tree_that_cannot_be_improved_stays_as_it_is() {
         let small = |i: u32| leaf(i, i as f32, i as f32 + 0.5);
         let knots = fork(fork(small(0), small(1)), fork(small(2), small(3)));
-        assert_eq!(leaves(&improve(knots)), [0, 1, 2, 3]);
-        assert_eq!(leaves(&improve(small(7))), [7]);
+        assert_eq!(leaves(&improve(knots).0), [0, 1, 2, 3]);
+        assert_eq!(leaves(&improve(small(7)).0), [7]);
     }
 }

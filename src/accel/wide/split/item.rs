@@ -2,9 +2,10 @@
 
 use crate::math::aabb::Aabb;
 use crate::math::{Vec3, Vec4};
+use bytemuck::Zeroable;
 
 /// A box whose fourth lanes mean nothing.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Zeroable)]
 pub(in crate::accel) struct Bounds {
     pub lo: Vec4,
     pub hi: Vec4,
@@ -12,7 +13,7 @@ pub(in crate::accel) struct Bounds {
 
 /// A prim and its box, 32 bytes. The fourth lanes hold its number in the lowest bits of two ordinary numbers: the
 /// processor is slow with the tiny numbers that most integers are as floats.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Zeroable)]
 pub(in crate::accel) struct Item(Bounds);
 
 impl Bounds {
