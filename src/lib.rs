@@ -60,6 +60,7 @@
 //! | [`image`] | linear pixels <-> files: tone mapping, formats, metadata, differences |
 //! | [`mod@bench`] | measures and compares: hard rays, exact answers, what came out |
 //! | [`stopwatch`] | time on the wall and of the processor |
+//! | [`threads`] | worker threads, each on a processor of its own |
 //! | `cli` | words -> jobs -> messages and exit codes (feature `cli`) |
 //!
 //! `scene` and `accel` use `math`; `load` uses `scene`; `render` uses `scene`, `accel` and `image`; `bench` uses
@@ -85,3 +86,4 @@ pub mod render;
 pub mod save;
 pub mod scene;
 pub mod stopwatch;
+pub mod threads;

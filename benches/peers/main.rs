@@ -194,7 +194,7 @@ fn builds(mesh: &Mesh, embree: Option<&Embree>, passes: usize) {
         let mut bytes = 0;
         let times = [1, 2].map(|threads| {
             let mut spread = Spread::default();
-            let Ok(pool) = rayon::ThreadPoolBuilder::new().num_threads(threads).build() else { return spread };
+            let Ok(pool) = meshray::threads::pool(threads) else { return spread };
             for _ in 0..passes {
                 let start = Instant::now();
                 let wide = pool.install(|| Wide::build(shapes, splitting));

@@ -9,6 +9,7 @@ use super::replay::{Answer, answers, counted, seconds};
 use super::row::{ClassRow, Row};
 use super::sweep::{Setting, Sweep};
 use crate::accel::{Accel, AccelKind, AccelParams, AnyAccel, Shapes};
+use crate::threads;
 
 /// How to compare.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,7 +94,7 @@ pub type GoOn<'a> = dyn FnMut(&[Row], &str) -> bool + 'a;
 ///
 /// The reference is the first structure that is not slow, or the first of all; the others must agree with it.
 pub fn compare(shapes: &Shapes, sets: &[RaySet], pixels: usize, plan: &Plan, go_on: &mut GoOn) -> Option<Vec<Row>> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(plan.threads).build().ok()?;
+    let pool = threads::pool(plan.threads).ok()?;
     let build = |c: &Candidate| pool.install(|| timed(|| AnyAccel::build(c.kind, shapes, &c.params)));
     let candidates = plan.candidates();
     let (whole, sampled) = tasks(shapes, sets, plan, &candidates, |candidate| build(candidate).0);

@@ -1,8 +1,8 @@
 //! Where and by what a measurement was made.
 
 use crate::math::simd::Level;
+use crate::threads;
 use std::fs;
-use std::thread::available_parallelism;
 
 /// What times depend on; counts do not.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -28,7 +28,7 @@ impl Machine {
     pub fn here() -> Self {
         Self {
             cpu: cpu().unwrap_or_else(|| "unknown".into()),
-            cores: available_parallelism().map_or(1, usize::from),
+            cores: threads::available(),
             system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
             simd: Level::best().name().to_owned(),
             compiler: env!("MESHRAY_COMPILER"),

@@ -4,6 +4,7 @@ use super::clock::timed;
 use super::rays::Batch;
 use crate::accel::{Accel, Hit, NoProbe, Probe, Ray, RayCounts};
 use crate::render::Question;
+use crate::threads;
 use std::thread;
 
 /// Rays asked at once, as the renderer does.
@@ -59,7 +60,7 @@ pub fn seconds<A: Accel>(accel: &A, batch: &Batch, times: u32, threads: usize) -
     let shares: Vec<Vec<Slice>> =
         (0..threads).filter(|i| i * share < batch.rays.len()).map(|i| shares(i).collect()).collect();
     let together = || thread::scope(|scope| shares.into_iter().for_each(|s| drop(scope.spawn(|| work(s)))));
-    timed(together).1
+    threads::anywhere(|| timed(together)).1
 }
 
 /// Rays that are asked at once.

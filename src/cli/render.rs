@@ -18,13 +18,14 @@ use crate::render::texture::TextureStore;
 use crate::render::{Costs, Job, Rendered, View, World, render_costs};
 use crate::scene::Scene;
 use crate::scene::framing::{Bounds, robust_bounds_within};
+use crate::threads;
 use std::collections::HashSet;
 use std::path::Path;
 use std::time::Instant;
 
 /// Does the whole job and tells how it ended: as its worst picture.
 pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
-    let pool = match rayon::ThreadPoolBuilder::new().num_threads(job.threads).build() {
+    let pool = match threads::pool(job.threads) {
         Ok(pool) => pool,
         Err(e) => {
             messages.error("threads", format!("cannot start {} threads: {e}", job.threads), "ask for fewer");

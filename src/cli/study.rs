@@ -13,6 +13,7 @@ use crate::image::{Output, write_atomic};
 use crate::load::Diagnostic;
 use crate::render::Settings;
 use crate::render::texture::TextureStore;
+use crate::threads;
 use std::path::{Path, PathBuf};
 
 /// Loads the model, renders it with every setting, and prints and writes rows as they come.
@@ -27,14 +28,11 @@ pub(super) fn run(args: &StudyArgs) -> Exit {
         }
     };
     let name = args.model.input.display().to_string();
-    accident::guard(&name, &messages, || {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads.unwrap_or(0)).build();
-        match pool {
-            Ok(pool) => pool.install(|| study(args, &files, &name, &messages).unwrap_or_else(|exit| exit)),
-            Err(e) => {
-                messages.error("threads", format!("no threads can be started: {e}"), "ask for fewer (--threads)");
-                Exit::Failed
-            }
+    accident::guard(&name, &messages, || match threads::pool(args.threads.unwrap_or(0)) {
+        Ok(pool) => pool.install(|| study(args, &files, &name, &messages).unwrap_or_else(|exit| exit)),
+        Err(e) => {
+            messages.error("threads", format!("no threads can be started: {e}"), "ask for fewer (--threads)");
+            Exit::Failed
         }
     })
 }

@@ -15,6 +15,7 @@
 
 use super::metadata::MAX_TEXT;
 use super::{Channel, ExrSamples, FileKind, ImageError, Layers, Metadata, Output, Picture, Values};
+use crate::threads;
 use ::exr::image::{Blocks, Encoding, FlatSamples, Image, Layer};
 use ::exr::meta::MetaData;
 use ::exr::meta::attribute::{AttributeValue, Chromaticities, LineOrder, Text};
@@ -51,7 +52,7 @@ pub(super) fn encode(picture: &Picture, output: &Output, metadata: &Metadata) ->
     // The encoder would start threads of its own, as many as there are cores.
     let one_thread = rayon::current_num_threads() == 1;
     let writer = if one_thread { image.write().non_parallel() } else { image.write() };
-    writer.to_buffered(&mut file).map_err(|e| ImageError::encode(FileKind::Exr, e))?;
+    threads::anywhere(|| writer.to_buffered(&mut file)).map_err(|e| ImageError::encode(FileKind::Exr, e))?;
     let mut bytes = file.into_inner();
     sort_attributes(&mut bytes)
         .ok_or_else(|| ImageError::encode(FileKind::Exr, "the encoder's header is not understood"))?;

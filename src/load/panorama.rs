@@ -4,6 +4,7 @@ use super::limits::{Budget, Limits};
 use super::{Diagnostic, LoadError, Source};
 use crate::scene::Panorama;
 use crate::scene::color::from_srgb;
+use crate::threads;
 use ::image::{DynamicImage, ImageFormat, ImageReader};
 use std::io::Cursor;
 use std::path::Path;
@@ -52,7 +53,7 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
     }
     Budget::new(limits).take(pixels, PER_PIXEL).map_err(|over| fault(over.to_string()))?;
     // The decoder of EXR files gives up on some damaged ones by a panic.
-    let decoded = std::panic::catch_unwind(|| reader().decode());
+    let decoded = std::panic::catch_unwind(|| threads::anywhere(|| reader().decode()));
     let picture = match decoded {
         Ok(Ok(picture)) => picture,
         Ok(Err(e)) => return Err(fault(format!("cannot be decoded: {e}"))),
