@@ -118,8 +118,8 @@ fn round_up(x: f64) -> f32 {
 /// The curve by chords between values that are an even ratio apart in every doubling: for estimates, where a rounded code
 /// would add steps of its own.
 pub(super) struct Chords {
-    /// Codes 0..=1 where the chords begin, and of 1.
-    ends: Vec<f32>,
+    /// Codes 0..=1 where the chords begin, and of 1; the rest is room, so that no index is outside.
+    ends: Box<[f32; Self::ROOM]>,
 }
 
 impl Chords {
@@ -127,13 +127,17 @@ impl Chords {
     const FIRST: f32 = 1.0 / 512.0;
     /// Bits of the fraction of a number within a chord: 128 chords a doubling.
     const WITHIN: u32 = 23 - 7;
+    /// A power of two above the nine doublings' number of ends.
+    const ROOM: usize = 1 << 11;
 
     /// All of them, found once.
     pub(super) fn get() -> &'static Self {
         static CHORDS: LazyLock<Chords> = LazyLock::new(|| {
             let starts = (Chords::FIRST.to_bits() >> Chords::WITHIN)..=(1.0_f32.to_bits() >> Chords::WITHIN);
             let value = |start: u32| f64::from(f32::from_bits(start << Chords::WITHIN));
-            Chords { ends: starts.map(|start| narrow(encode(value(start)))).collect() }
+            let mut ends = Box::new([1.0; Chords::ROOM]);
+            ends.iter_mut().zip(starts).for_each(|(end, start)| *end = narrow(encode(value(start))));
+            Chords { ends }
         });
         &CHORDS
     }
@@ -146,7 +150,7 @@ impl Chords {
         let light = if light < 1.0 { light } else { 1.0 };
         let bits = light.to_bits();
         let start = ((bits - Self::FIRST.to_bits()) >> Self::WITHIN) as usize;
-        let (from, to) = (self.ends[start], self.ends[(start + 1).min(self.ends.len() - 1)]);
+        let (from, to) = (self.ends[start % Self::ROOM], self.ends[(start + 1) % Self::ROOM]);
         let part = (bits & ((1 << Self::WITHIN) - 1)) as f32 / (1 << Self::WITHIN) as f32;
         let curved = from + (to - from) * part;
         let straight = if linear > 0.0 { 12.92 * linear } else { 0.0 };

@@ -55,7 +55,7 @@ pub(super) fn render<A: Accel, P: Observer>(
     let places = tile.places().chain(wide.places().filter(|&at| !tile.contains(at)));
     let mut pixels: Vec<Pixel> = places.map(|at| Pixel::new(frame.settings.seed, at)).collect();
     let mut active: Vec<usize> = (0..pixels.len()).collect();
-    let mut from = 0;
+    let (mut from, mut errors) = (0, Vec::new());
     for to in rounds {
         trace(frame, how, tracer, &mut pixels, &active, from..to)?;
         if from == 0 {
@@ -63,7 +63,7 @@ pub(super) fn render<A: Accel, P: Observer>(
             active.truncate(tile.pixels());
         }
         if to >= FIRST_LOOK {
-            active.iter().for_each(|&i| pixels[i].look(&judge));
+            look(&judge, &mut pixels, &active, &mut errors);
         }
         active.retain(|&i| pixels[i].facts.end == End::Ceiling);
         from = to;
@@ -146,19 +146,15 @@ fn look_around(judge: &Certainty, tile: Tile, pixels: &mut [Pixel], may_end: boo
     let (width, height) = (tile.x1 - tile.x0, tile.y1 - tile.y0);
     let index = |x: u32, y: u32| ((y - tile.y0) * width + x - tile.x0) as usize;
     let mut seen = vec![Seen::NOTHING; (width * height) as usize];
-    // Large parts of a picture are one colour.
-    let mut last = ([Sum::default(); GROUPS], Seen::NOTHING);
-    for pixel in pixels.iter_mut() {
-        if last.0 != pixel.groups {
-            last = (pixel.groups, judge.see(pixel.taken()));
-        }
-        let mine = last.1;
-        pixel.facts.error = mine.error;
-        seen[index(pixel.x, pixel.y)] = mine;
-    }
+    let mut each = pixels.iter();
+    judge.see_each(pixels.iter().map(Pixel::taken), |of_pixel| {
+        let at = each.next().map_or(0, |pixel| index(pixel.x, pixel.y));
+        seen[at] = *of_pixel;
+    });
     for pixel in pixels.iter_mut() {
         let (x, y) = (pixel.x, pixel.y);
         let own = &seen[index(x, y)];
+        pixel.facts.error = own.error;
         let columns = x.saturating_sub(1).max(tile.x0)..(x + 2).min(tile.x1);
         let around = (y.saturating_sub(1).max(tile.y0)..(y + 2).min(tile.y1))
             .flat_map(|y| &seen[index(columns.start, y)..=index(columns.end - 1, y)]);
@@ -169,6 +165,16 @@ fn look_around(judge: &Certainty, tile: Tile, pixels: &mut [Pixel], may_end: boo
             let around = around.fold(Range::NOTHING, |all, seen| all.with(seen.range));
             (pixel.contrast, pixel.brightest) = (judge.contrast(&around), around.brightest);
         }
+    }
+}
+
+/// Finds out how certain the means of these pixels are.
+fn look(judge: &Certainty, pixels: &mut [Pixel], active: &[usize], errors: &mut Vec<f32>) {
+    errors.clear();
+    judge.each_standard_error(active.iter().map(|&i| &pixels[i].groups[..]), |error| errors.push(error));
+    for (&i, &error) in active.iter().zip(&*errors) {
+        pixels[i].facts.error = error;
+        pixels[i].look(judge);
     }
 }
 
@@ -223,9 +229,8 @@ impl Pixel {
         &self.groups[..GROUPS.min(self.facts.count as usize)]
     }
 
-    /// Finds out how certain the mean is.
+    /// Finds out how certain the mean is, whose standard error is known.
     fn look(&mut self, judge: &Certainty) {
-        self.facts.error = judge.standard_error(&self.groups);
         let contrast = self.contrast * judge.beyond_white(&self.groups, self.brightest);
         let used = judge.used(self.facts.error, contrast, self.facts.count);
         if used <= 1.0 {

@@ -10,18 +10,18 @@
 //! A pixel is looked at again and again, and stops at the first look that is content. Were each look 95 % certain, all
 //! together would be less. See [`factor`] for what is done about it.
 
+mod beside;
+mod confidence;
+
 use super::ErrorSpace;
 use super::frame::Sum;
 use crate::image::{Developer, Output};
 use crate::math::Vec3;
-use crate::math::simd::{Kernel, Level, Simd};
-use std::f64::consts::{FRAC_1_SQRT_2, PI};
+use crate::math::simd::Level;
+pub(in crate::render) use confidence::factor;
 
 /// Groups of a pixel's samples.
 pub(super) const GROUPS: usize = 8;
-
-/// Half of them.
-const HALF: usize = GROUPS / 2;
 
 /// The judge of all pixels of a picture.
 pub(super) struct Certainty<'a> {
@@ -60,39 +60,6 @@ impl<'a> Certainty<'a> {
         Self { developer, background, transparent, gain, error, factor, level: Level::best() }
     }
 
-    /// The numbers of the written picture for each of these sums, RGB and alpha, the colour premultiplied: a row for each
-    /// channel.
-    fn written<const N: usize>(&self, sums: &[Sum; N]) -> [[f32; N]; 4] {
-        self.level.run(Written { judge: self, sums })
-    }
-
-    /// What groups of samples of a pixel show, [`GROUPS`] at most and one at least.
-    pub(super) fn see(&self, groups: &[Sum]) -> Seen {
-        if are_equal(groups) {
-            let color = self.written(&[groups[0]]).map(|[c]| c);
-            let range = Range { least: color, most: color, brightest: self.brightest(groups) };
-            return Seen { color, range, error: 0.0 };
-        }
-        match groups.len() {
-            ..=HALF => self.see_beside::<HALF, GROUPS>(groups),
-            _ => self.see_beside::<GROUPS, { 2 * GROUPS }>(groups),
-        }
-    }
-
-    /// The same for at most `N` groups, written beside what is left without each of them.
-    fn see_beside<const N: usize, const LANES: usize>(&self, groups: &[Sum]) -> Seen {
-        let left = left_out(groups);
-        let lane = |k: usize| if k < N { *groups.get(k).unwrap_or(&groups[0]) } else { left(k - N) };
-        let rows = self.written(&std::array::from_fn::<Sum, LANES, _>(lane));
-        let range = Range {
-            least: rows.map(|row| row[..N].iter().copied().fold(f32::INFINITY, f32::min)),
-            most: rows.map(|row| row[..N].iter().copied().fold(f32::NEG_INFINITY, f32::max)),
-            brightest: self.brightest(groups),
-        };
-        let left = rows.each_ref().map(|row| &row[N..N + groups.len()]);
-        Seen { color: left.map(mean), range, error: self.spread(left) }
-    }
-
     /// Whether samples in this range agree within the error that is allowed: nothing is seen in the pixel that could be missed.
     pub(super) fn agree(&self, range: &Range) -> bool {
         (0..4).all(|c| range.most[c] - range.least[c] <= self.error)
@@ -104,6 +71,7 @@ impl<'a> Certainty<'a> {
     }
 
     /// The greatest channel of the light of a group, after exposure.
+    #[inline(always)]
     fn light(&self, group: &Sum) -> f32 {
         group.radiance.max_element() / group.weight.max(f32::MIN_POSITIVE) * self.gain
     }
@@ -133,29 +101,6 @@ impl<'a> Certainty<'a> {
         (0..4).any(|c| (a[c] - b[c]).abs() > STEEP * self.error)
     }
 
-    /// Standard error of a pixel, the root of the mean over its channels, from groups of equally many samples, [`GROUPS`]
-    /// at most and one at least.
-    pub(super) fn standard_error(&self, groups: &[Sum]) -> f32 {
-        if are_equal(groups) {
-            return 0.0;
-        }
-        let rows = self.written(&std::array::from_fn::<Sum, GROUPS, _>(left_out(groups)));
-        self.spread(rows.each_ref().map(|row| &row[..groups.len()]))
-    }
-
-    /// Standard error of what is written for all groups, from what is written without each of them.
-    #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "a handful of groups")]
-    fn spread(&self, rows: [&[f32]; 4]) -> f32 {
-        let n = rows[0].len() as f64;
-        let squares = |row: &[f32]| {
-            let left = || row.iter().copied().map(f64::from);
-            let mean = left().sum::<f64>() / n;
-            left().map(|v| (v - mean) * (v - mean)).sum::<f64>() * (n - 1.0) / n
-        };
-        let channels = self.channels();
-        (rows[..channels].iter().map(|row| squares(row)).sum::<f64>() / channels as f64).sqrt() as f32
-    }
-
     /// What part of the error that is allowed a pixel with this standard error uses, when around it there is such a
     /// contrast; up to 1 it is as certain as was asked.
     ///
@@ -178,63 +123,6 @@ impl<'a> Certainty<'a> {
     fn channels(&self) -> usize {
         if self.transparent { 4 } else { 3 }
     }
-}
-
-/// What is written for sums of samples side by side.
-struct Written<'a, 'j, const N: usize> {
-    judge: &'a Certainty<'j>,
-    sums: &'a [Sum; N],
-}
-
-impl<const N: usize> Kernel for Written<'_, '_, N> {
-    type Output = [[f32; N]; 4];
-
-    // The lanes are plain arrays: what the token stands for is only what the compiler may use for them.
-    #[inline(always)]
-    fn run<S: Simd>(self, _simd: S) -> Self::Output {
-        let Self { judge, sums } = self;
-        let mut rows = [[0.0; N]; 4];
-        for (i, sum) in sums.iter().enumerate() {
-            let pixel = sum.resolve(judge.background);
-            for c in 0..4 {
-                rows[c][i] = pixel[c];
-            }
-        }
-        match (&judge.developer, judge.background) {
-            (Some(developer), _) => developer.coded_lanes(&mut rows),
-            (None, None) => {}
-            (None, Some(behind)) => {
-                let [r, g, b, coverage] = &mut rows;
-                for (channel, behind) in [r, g, b].into_iter().zip(behind.to_array()) {
-                    for i in 0..N {
-                        channel[i] += behind * (1.0 - coverage[i]);
-                    }
-                }
-                *coverage = [1.0; N];
-            }
-        }
-        rows
-    }
-}
-
-/// All samples but those of the `k`th group; all of them where there is no such group.
-fn left_out(groups: &[Sum]) -> impl Fn(usize) -> Sum {
-    let all = total(groups);
-    move |k| groups.get(k).map_or(all, |group| all.plus(*group, -1.0))
-}
-
-#[expect(clippy::cast_precision_loss, reason = "a handful of groups")]
-fn mean(of: &[f32]) -> f32 {
-    of.iter().sum::<f32>() / of.len() as f32
-}
-
-/// All samples of groups together.
-fn total(groups: &[Sum]) -> Sum {
-    groups.iter().fold(Sum::default(), |all, group| all.plus(*group, 1.0))
-}
-
-fn are_equal(groups: &[Sum]) -> bool {
-    groups.windows(2).all(|pair| pair[0] == pair[1])
 }
 
 /// What the samples of a pixel show, in the numbers of the written picture.
@@ -276,92 +164,22 @@ impl Range {
     }
 }
 
-/// Degrees of freedom of an estimate from [`GROUPS`] means.
-const FREEDOM: f64 = (GROUPS - 1) as f64;
-
-/// How many estimated standard errors the error that is allowed must be, so that a pixel that stops at the first look
-/// which finds it so is within that error with probability `confidence`.
-///
-/// With ρ standard errors in the error allowed, a look stops wrongly when it takes the standard error for ρ/f of what it
-/// is or less, and the mean is off by more than ρ of them: two events that are independent for normal means. From look to
-/// look the samples double, which divides the standard error by √2 at least. The probabilities of all looks are added,
-/// the worst start of ρ is taken, and f is found for which that is 1 − `confidence`; it is never less than Student's t,
-/// which a single look would need.
-///
-/// A search that takes milliseconds: once for a picture.
-#[expect(clippy::cast_possible_truncation, reason = "a small number")]
-pub(super) fn factor(confidence: f64) -> f32 {
-    let wrong = 1.0 - confidence;
-    let student = bisect(|t| 1.0 - student_within(t) > wrong);
-    student.max(bisect(|f| wrong_stops(f) > wrong)) as f32
-}
-
-/// Chance that some look stops wrongly, at most.
-fn wrong_stops(factor: f64) -> f64 {
-    /// By how much each round lessens the standard error at least.
-    const GAIN: f64 = std::f64::consts::SQRT_2;
-    const STARTS: u32 = 32;
-    let look = |rho: f64| chi_square_below(FREEDOM * (rho / factor) * (rho / factor)) * normal_beyond(rho);
-    let looks = |start: f64| std::iter::successors(Some(start), |rho| Some(rho * GAIN)).take_while(|rho| *rho < 9.0);
-    let starts = (0..STARTS).map(|k| 0.05 * libm::pow(GAIN, f64::from(k) / f64::from(STARTS)));
-    starts.map(|start| looks(start).map(look).sum::<f64>()).fold(0.0, f64::max)
-}
-
-/// Where `is_below` stops being true, in 0…1000.
-fn bisect(is_below: impl Fn(f64) -> bool) -> f64 {
-    let (mut low, mut high) = (0.0, 1000.0);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if is_below(middle) { low = middle } else { high = middle }
-    }
-    high
-}
-
-/// Chance of a normal number more than `x` ≥ 0 standard deviations off.
-fn normal_beyond(x: f64) -> f64 {
-    libm::erfc(x * FRAC_1_SQRT_2)
-}
-
-/// Chance of χ² with 7 degrees of freedom below `x` ≥ 0.
-fn chi_square_below(x: f64) -> f64 {
-    let tail = (2.0 * x / PI).sqrt() * libm::exp(-0.5 * x) * (1.0 + x / 3.0 + x * x / 15.0);
-    (libm::erf((0.5 * x).sqrt()) - tail).max(0.0)
-}
-
-/// Chance of Student's t with 7 degrees of freedom within ±`t`.
-fn student_within(t: f64) -> f64 {
-    let angle = libm::atan(t / FREEDOM.sqrt());
-    let (sin, cos) = libm::sincos(angle);
-    let series = cos * (1.0 + cos * cos * (2.0 / 3.0 + cos * cos * 8.0 / 15.0));
-    2.0 / PI * (angle + sin * series)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::math::random::Random;
     use crate::render::sobol::mix;
 
-    #[test]
-    fn distributions_agree_with_published_tables() {
-        // Student's t and χ² for 7 degrees of freedom, and the normal distribution.
-        for (t, within) in [(2.365, 0.95), (3.499, 0.99), (1.895, 0.90)] {
-            assert!((student_within(t) - within).abs() < 1e-4, "{t}");
-        }
-        for (x, below) in [(14.067, 0.95), (2.167, 0.05), (6.346, 0.50)] {
-            assert!((chi_square_below(x) - below).abs() < 1e-4, "{x}");
-        }
-        assert!((normal_beyond(1.96) - 0.05).abs() < 1e-4);
+    fn see(judge: &Certainty, groups: &[Sum]) -> Seen {
+        let mut seen = Seen::NOTHING;
+        judge.see_each([groups].into_iter(), |all| seen = *all);
+        seen
     }
 
-    #[test]
-    fn more_confidence_asks_for_more_standard_errors_and_never_less_than_students() {
-        let factors = [0.8, 0.9, 0.95, 0.99, 0.999].map(factor);
-        assert!(factors.windows(2).all(|pair| pair[0] < pair[1]), "{factors:?}");
-        assert!(factors[2] > 2.364);
-        for confidence in [0.8, 0.95, 0.99] {
-            assert!(wrong_stops(factor(confidence).into()) <= 1.0 - confidence + 1e-6);
-        }
+    fn standard_error(judge: &Certainty, groups: &[Sum]) -> f32 {
+        let mut error = f32::NAN;
+        judge.each_standard_error([groups].into_iter(), |of_groups| error = of_groups);
+        error
     }
 
     fn grey(light: f32, samples: f32) -> Sum {
@@ -372,8 +190,8 @@ mod tests {
     fn what_is_the_same_in_all_groups_is_certain() {
         let output = output(ErrorSpace::default(), None);
         let judge = Certainty::new(output.as_ref(), None, false, 0.01, factor(0.95));
-        assert_eq!(judge.standard_error(&[grey(0.3, 3.0); GROUPS]), 0.0);
-        let agree = |samples: &[Sum]| judge.agree(&judge.see(samples).range);
+        assert_eq!(standard_error(&judge, &[grey(0.3, 3.0); GROUPS]), 0.0);
+        let agree = |samples: &[Sum]| judge.agree(&see(&judge, samples).range);
         assert!(agree(&[grey(0.3, 1.0); 4]) && !agree(&[grey(0.3, 1.0), grey(0.4, 1.0)]));
     }
 
@@ -395,7 +213,7 @@ mod tests {
         let output = output(ErrorSpace::default(), None);
         let judge = Certainty::new(output.as_ref(), None, false, 0.01, factor(0.95));
         let mut groups = [grey(0.25, 4.0); GROUPS];
-        assert_eq!(judge.see(&[grey(64.0, 2.0), grey(0.5, 2.0)]).range.brightest, 64.0);
+        assert_eq!(see(&judge, &[grey(64.0, 2.0), grey(0.5, 2.0)]).range.brightest, 64.0);
         assert_eq!(judge.beyond_white(&groups, 64.0), 64.0);
         assert_eq!(judge.beyond_white(&groups, 0.7), 1.0, "less than white is seen as it is");
         // One of four samples has met it.
@@ -411,7 +229,7 @@ mod tests {
         let values = [0.1_f32, 0.3, 0.2, 0.5, 0.4, 0.2, 0.1, 0.2];
         let mean = values.iter().sum::<f32>() / 8.0;
         let expected = (values.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / (8.0 * 7.0)).sqrt();
-        let found = judge.standard_error(&values.map(|v| grey(v, 5.0)));
+        let found = standard_error(&judge, &values.map(|v| grey(v, 5.0)));
         assert!((found - expected).abs() < 1e-6, "{found} {expected}");
     }
 
@@ -433,7 +251,7 @@ mod tests {
                             *group = group.plus(grey(noise * spread, 1.0), 1.0);
                         }
                     }
-                    if judge.used(judge.standard_error(&groups), 0.0, 1) <= 1.0 {
+                    if judge.used(standard_error(&judge, &groups), 0.0, 1) <= 1.0 {
                         break;
                     }
                     target *= 2.0;
@@ -459,7 +277,7 @@ mod tests {
             }
             let all = groups.iter().fold(Sum::default(), |all, group| all.plus(*group, 1.0));
             errors += (f64::from(all.radiance.x / all.weight) - mean).powi(2);
-            estimates += f64::from(judge.standard_error(&groups)).powi(2);
+            estimates += f64::from(standard_error(&judge, &groups)).powi(2);
         }
         (errors / f64::from(pixels), estimates / f64::from(pixels))
     }

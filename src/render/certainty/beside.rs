@@ -1,0 +1,307 @@
+//! What the samples of many pixels show, side by side: one number of all pixels, then the next.
+//!
+//! The formulas of `frame` and of the developer are called in loops over pixels, of which the compiler makes lanes. So a
+//! pixel has the same bits beside any others, on every instruction set.
+
+use super::{Certainty, GROUPS, Range, Seen};
+use crate::math::Vec3;
+use crate::math::simd::{Kernel, Simd};
+use crate::render::frame::Sum;
+
+/// Pixels that are looked at together.
+const PIXELS: usize = 16;
+
+/// A number of every pixel.
+type Row = [f32; PIXELS];
+
+/// The written numbers of every pixel, RGB and alpha.
+type Rows = [Row; 4];
+
+/// One group of samples of every pixel.
+#[derive(Clone, Copy)]
+struct Sums {
+    radiance: [Row; 3],
+    through: [Row; 3],
+    weight: Row,
+}
+
+impl Sums {
+    const EMPTY: Self = Self { radiance: [[0.0; PIXELS]; 3], through: [[0.0; PIXELS]; 3], weight: [0.0; PIXELS] };
+
+    #[inline(always)]
+    fn at(&self, i: usize) -> Sum {
+        let three = |rows: &[Row; 3]| Vec3::new(rows[0][i], rows[1][i], rows[2][i]);
+        Sum { radiance: three(&self.radiance), through: three(&self.through), weight: self.weight[i] }
+    }
+
+    #[inline(always)]
+    fn set(&mut self, i: usize, sum: Sum) {
+        let Sum { radiance: r, through: t, weight } = sum;
+        (self.radiance[0][i], self.radiance[1][i], self.radiance[2][i]) = (r.x, r.y, r.z);
+        (self.through[0][i], self.through[1][i], self.through[2][i]) = (t.x, t.y, t.z);
+        self.weight[i] = weight;
+    }
+}
+
+/// Pixels that wait to be looked at together.
+struct Beside<'g> {
+    sums: [Sums; GROUPS],
+    /// The groups of the last of them.
+    last: &'g [Sum],
+    pixels: usize,
+    /// How many pixels that follow each other are alike.
+    alike: [u32; PIXELS],
+    seen: Found,
+}
+
+/// What is found out about them.
+struct Found {
+    color: Rows,
+    least: Rows,
+    most: Rows,
+    brightest: Row,
+    error: Row,
+}
+
+impl Certainty<'_> {
+    /// Tells what groups of samples of each of these pixels show: as many groups of every pixel, [`GROUPS`] at most.
+    pub(in crate::render) fn see_each<'g>(&self, pixels: impl Iterator<Item = &'g [Sum]>, mut tell: impl FnMut(&Seen)) {
+        self.look_at_each(pixels, true, |found, i| tell(&found.at(i)));
+    }
+
+    /// Tells the standard error of each of these pixels, the root of the mean over its channels, from groups of equally many
+    /// samples: as many groups of every pixel, [`GROUPS`] at most.
+    pub(in crate::render) fn each_standard_error<'g>(
+        &self,
+        pixels: impl Iterator<Item = &'g [Sum]>,
+        mut tell: impl FnMut(f32),
+    ) {
+        self.look_at_each(pixels, false, |found, i| tell(found.error[i]));
+    }
+
+    fn look_at_each<'g>(
+        &self,
+        pixels: impl Iterator<Item = &'g [Sum]>,
+        range: bool,
+        mut tell: impl FnMut(&Found, usize),
+    ) {
+        let mut beside = Beside::new();
+        for groups in pixels {
+            if beside.is_full_for(groups) {
+                beside.look(self, range, &mut tell);
+            }
+            beside.take(groups);
+        }
+        beside.look(self, range, &mut tell);
+    }
+}
+
+impl<'g> Beside<'g> {
+    fn new() -> Self {
+        let (row, rows) = ([0.0; PIXELS], [[0.0; PIXELS]; 4]);
+        let seen = Found { color: rows, least: rows, most: rows, brightest: row, error: row };
+        Self { sums: [Sums::EMPTY; GROUPS], last: &[], pixels: 0, alike: [0; PIXELS], seen }
+    }
+
+    /// Whether those that wait must be looked at before a pixel with these groups.
+    fn is_full_for(&self, groups: &[Sum]) -> bool {
+        self.pixels == PIXELS && self.last != groups
+    }
+
+    fn take(&mut self, groups: &'g [Sum]) {
+        // Large parts of a picture are one colour.
+        if self.pixels == 0 || self.last != groups {
+            for (sums, group) in self.sums.iter_mut().zip(groups) {
+                sums.set(self.pixels % PIXELS, *group);
+            }
+            self.alike[self.pixels % PIXELS] = 0;
+            self.last = groups;
+            self.pixels += 1;
+        }
+        self.alike[self.pixels - 1] += 1;
+    }
+
+    /// Looks at all that wait, and tells what each has shown.
+    fn look(&mut self, judge: &Certainty, range: bool, mut tell: impl FnMut(&Found, usize)) {
+        let (sums, to) = (&self.sums[..self.last.len().min(GROUPS)], &mut self.seen);
+        if range {
+            judge.level.run(See { judge, sums, to });
+        } else {
+            judge.level.run(Doubt { judge, sums, to });
+        }
+        for (i, alike) in self.alike[..self.pixels].iter().enumerate() {
+            (0..*alike).for_each(|_| tell(to, i));
+        }
+        self.pixels = 0;
+    }
+}
+
+impl Found {
+    fn at(&self, i: usize) -> Seen {
+        let color = |rows: &Rows| rows.map(|row| row[i]);
+        let range = Range { least: color(&self.least), most: color(&self.most), brightest: self.brightest[i] };
+        Seen { color: color(&self.color), range, error: self.error[i] }
+    }
+}
+
+/// All that samples show.
+struct See<'a, 'j> {
+    judge: &'a Certainty<'j>,
+    sums: &'a [Sums],
+    to: &'a mut Found,
+}
+
+impl Kernel for See<'_, '_> {
+    type Output = ();
+
+    // The lanes are plain arrays: what the token stands for is only what the compiler may use for them.
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let Self { judge, sums, to } = self;
+        let Some((first, others)) = sums.split_first() else { return };
+        let of_first = judge.written(first);
+        (to.least, to.most, to.brightest) = (of_first, of_first, [0.0; PIXELS]);
+        for group in others {
+            let rows = judge.written(group);
+            for ((least, most), row) in to.least.iter_mut().zip(&mut to.most).zip(&rows) {
+                for i in 0..PIXELS {
+                    (least[i], most[i]) = (least[i].min(row[i]), most[i].max(row[i]));
+                }
+            }
+        }
+        for group in sums {
+            for i in 0..PIXELS {
+                to.brightest[i] = to.brightest[i].max(judge.light(&group.at(i)));
+            }
+        }
+        let left = judge.left_out(sums);
+        let left = &left[..sums.len().min(GROUPS)];
+        mean(left, &mut to.color);
+        judge.spread(left, &mut to.error);
+        // What is the same in all groups has no rounding of means.
+        let equal = equal(sums);
+        for (to, row) in to.color.iter_mut().zip(&of_first) {
+            (0..PIXELS).for_each(|i| to[i] = if equal[i] == 1 { row[i] } else { to[i] });
+        }
+        (0..PIXELS).for_each(|i| to.error[i] = if equal[i] == 1 { 0.0 } else { to.error[i] });
+    }
+}
+
+/// Standard errors alone.
+struct Doubt<'a, 'j> {
+    judge: &'a Certainty<'j>,
+    sums: &'a [Sums],
+    to: &'a mut Found,
+}
+
+impl Kernel for Doubt<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let Self { judge, sums, to } = self;
+        let left = judge.left_out(sums);
+        judge.spread(&left[..sums.len().min(GROUPS)], &mut to.error);
+        let equal = equal(sums);
+        (0..PIXELS).for_each(|i| to.error[i] = if equal[i] == 1 { 0.0 } else { to.error[i] });
+    }
+}
+
+impl Certainty<'_> {
+    /// The numbers of the written picture for these sums, the colour premultiplied.
+    #[inline(always)]
+    fn written(&self, sums: &Sums) -> Rows {
+        let mut rows = [[0.0; PIXELS]; 4];
+        match self.background {
+            Some(behind) => resolve(sums, Some(behind), &mut rows),
+            None => resolve(sums, None, &mut rows),
+        }
+        match (&self.developer, self.background) {
+            (Some(developer), _) => developer.coded_lanes(&mut rows),
+            (None, None) => {}
+            (None, Some(behind)) => {
+                let [r, g, b, coverage] = &mut rows;
+                for (channel, behind) in [r, g, b].into_iter().zip(behind.to_array()) {
+                    for i in 0..PIXELS {
+                        channel[i] += behind * (1.0 - coverage[i]);
+                    }
+                }
+                *coverage = [1.0; PIXELS];
+            }
+        }
+        rows
+    }
+
+    /// What is written without each of the groups.
+    #[inline(always)]
+    fn left_out(&self, sums: &[Sums]) -> [Rows; GROUPS] {
+        let mut all = Sums::EMPTY;
+        for group in sums {
+            for i in 0..PIXELS {
+                all.set(i, all.at(i).plus(group.at(i), 1.0));
+            }
+        }
+        let (mut left, mut rows) = (Sums::EMPTY, [[[0.0; PIXELS]; 4]; GROUPS]);
+        for (rows, group) in rows.iter_mut().zip(sums) {
+            for i in 0..PIXELS {
+                left.set(i, all.at(i).plus(group.at(i), -1.0));
+            }
+            *rows = self.written(&left);
+        }
+        rows
+    }
+
+    /// Standard error of what is written for all groups, from what is written without each of them.
+    #[inline(always)]
+    #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "a handful of groups")]
+    fn spread(&self, left: &[Rows], to: &mut Row) {
+        let (n, channels) = (left.len() as f64, self.channels());
+        let mut all = [0.0; PIXELS];
+        for c in 0..channels {
+            let (mut sum, mut squares) = ([0.0; PIXELS], [0.0; PIXELS]);
+            for rows in left {
+                (0..PIXELS).for_each(|i| sum[i] += f64::from(rows[c][i]));
+            }
+            for rows in left {
+                for i in 0..PIXELS {
+                    let off = f64::from(rows[c][i]) - sum[i] / n;
+                    squares[i] += off * off;
+                }
+            }
+            (0..PIXELS).for_each(|i| all[i] += squares[i] * (n - 1.0) / n);
+        }
+        (0..PIXELS).for_each(|i| to[i] = (all[i] / channels as f64).sqrt() as f32);
+    }
+}
+
+#[inline(always)]
+fn resolve(sums: &Sums, background: Option<Vec3>, rows: &mut Rows) {
+    let [red, green, blue, coverage] = rows;
+    for i in 0..PIXELS {
+        [red[i], green[i], blue[i], coverage[i]] = sums.at(i).resolve(background);
+    }
+}
+
+#[inline(always)]
+#[expect(clippy::cast_precision_loss, reason = "a handful of groups")]
+fn mean(of: &[Rows], to: &mut Rows) {
+    *to = [[0.0; PIXELS]; 4];
+    for rows in of {
+        for (to, row) in to.iter_mut().zip(rows) {
+            (0..PIXELS).for_each(|i| to[i] += row[i]);
+        }
+    }
+    for row in to {
+        (0..PIXELS).for_each(|i| row[i] /= of.len() as f32);
+    }
+}
+
+/// By pixel, 1 where all groups are the same.
+#[inline(always)]
+fn equal(sums: &[Sums]) -> [u32; PIXELS] {
+    let mut equal = [1; PIXELS];
+    for pair in sums.windows(2) {
+        (0..PIXELS).for_each(|i| equal[i] &= u32::from(pair[0].at(i) == pair[1].at(i)));
+    }
+    equal
+}

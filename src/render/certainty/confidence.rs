@@ -1,0 +1,91 @@
+//! How many standard errors a confidence takes, when a pixel is looked at again and again.
+
+use super::GROUPS;
+use std::f64::consts::{FRAC_1_SQRT_2, PI};
+
+/// Degrees of freedom of an estimate from [`GROUPS`] means.
+const FREEDOM: f64 = (GROUPS - 1) as f64;
+
+/// How many estimated standard errors the error that is allowed must be, so that a pixel that stops at the first look
+/// which finds it so is within that error with probability `confidence`.
+///
+/// With ρ standard errors in the error allowed, a look stops wrongly when it takes the standard error for ρ/f of what it
+/// is or less, and the mean is off by more than ρ of them: two events that are independent for normal means. From look to
+/// look the samples double, which divides the standard error by √2 at least. The probabilities of all looks are added,
+/// the worst start of ρ is taken, and f is found for which that is 1 − `confidence`; it is never less than Student's t,
+/// which a single look would need.
+///
+/// A search that takes milliseconds: once for a picture.
+#[expect(clippy::cast_possible_truncation, reason = "a small number")]
+pub(in crate::render) fn factor(confidence: f64) -> f32 {
+    let wrong = 1.0 - confidence;
+    let student = bisect(|t| 1.0 - student_within(t) > wrong);
+    student.max(bisect(|f| wrong_stops(f) > wrong)) as f32
+}
+
+/// Chance that some look stops wrongly, at most.
+fn wrong_stops(factor: f64) -> f64 {
+    /// By how much each round lessens the standard error at least.
+    const GAIN: f64 = std::f64::consts::SQRT_2;
+    const STARTS: u32 = 32;
+    let look = |rho: f64| chi_square_below(FREEDOM * (rho / factor) * (rho / factor)) * normal_beyond(rho);
+    let looks = |start: f64| std::iter::successors(Some(start), |rho| Some(rho * GAIN)).take_while(|rho| *rho < 9.0);
+    let starts = (0..STARTS).map(|k| 0.05 * libm::pow(GAIN, f64::from(k) / f64::from(STARTS)));
+    starts.map(|start| looks(start).map(look).sum::<f64>()).fold(0.0, f64::max)
+}
+
+/// Where `is_below` stops being true, in 0…1000.
+fn bisect(is_below: impl Fn(f64) -> bool) -> f64 {
+    let (mut low, mut high) = (0.0, 1000.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if is_below(middle) { low = middle } else { high = middle }
+    }
+    high
+}
+
+/// Chance of a normal number more than `x` ≥ 0 standard deviations off.
+fn normal_beyond(x: f64) -> f64 {
+    libm::erfc(x * FRAC_1_SQRT_2)
+}
+
+/// Chance of χ² with 7 degrees of freedom below `x` ≥ 0.
+fn chi_square_below(x: f64) -> f64 {
+    let tail = (2.0 * x / PI).sqrt() * libm::exp(-0.5 * x) * (1.0 + x / 3.0 + x * x / 15.0);
+    (libm::erf((0.5 * x).sqrt()) - tail).max(0.0)
+}
+
+/// Chance of Student's t with 7 degrees of freedom within ±`t`.
+fn student_within(t: f64) -> f64 {
+    let angle = libm::atan(t / FREEDOM.sqrt());
+    let (sin, cos) = libm::sincos(angle);
+    let series = cos * (1.0 + cos * cos * (2.0 / 3.0 + cos * cos * 8.0 / 15.0));
+    2.0 / PI * (angle + sin * series)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distributions_agree_with_published_tables() {
+        // Student's t and χ² for 7 degrees of freedom, and the normal distribution.
+        for (t, within) in [(2.365, 0.95), (3.499, 0.99), (1.895, 0.90)] {
+            assert!((student_within(t) - within).abs() < 1e-4, "{t}");
+        }
+        for (x, below) in [(14.067, 0.95), (2.167, 0.05), (6.346, 0.50)] {
+            assert!((chi_square_below(x) - below).abs() < 1e-4, "{x}");
+        }
+        assert!((normal_beyond(1.96) - 0.05).abs() < 1e-4);
+    }
+
+    #[test]
+    fn more_confidence_asks_for_more_standard_errors_and_never_less_than_students() {
+        let factors = [0.8, 0.9, 0.95, 0.99, 0.999].map(factor);
+        assert!(factors.windows(2).all(|pair| pair[0] < pair[1]), "{factors:?}");
+        assert!(factors[2] > 2.364);
+        for confidence in [0.8, 0.95, 0.99] {
+            assert!(wrong_stops(factor(confidence).into()) <= 1.0 - confidence + 1e-6);
+        }
+    }
+}
