@@ -6,7 +6,7 @@ use super::glint;
 use super::sampling::Sampling;
 use super::shade::{Band, LocalLight, bands, lets_light_in};
 use super::sky::Sky;
-use super::strip::Uniform;
+use super::strip::Common;
 use super::texture::TextureStore;
 use super::world::World;
 use crate::math::Vec3;
@@ -39,7 +39,7 @@ pub(crate) struct Context<'a> {
     pub lights: Vec<LocalLight>,
     /// What is known of each material for all points of it; `None` where it takes more, or where each point must be
     /// looked at.
-    pub uniform: Arc<[Option<Uniform>]>,
+    pub common: Arc<[Option<Common>]>,
     /// Parts of the spectrum; empty unless a material disperses light.
     pub bands: Vec<Band>,
     /// Whether anything but opaque surfaces can stand before a light.
@@ -107,7 +107,7 @@ impl<'a> Context<'a> {
         let env_rays = env_rays.div_ceil(together).max(env_rays.min(if sky.is_map() { ENV_RAYS_LEAST } else { 2 }));
         let wide = scene.lights.iter().any(Light::is_wide);
         let alone = everything || settings.layers || wide || sky.is_map() || env_rays > 0 || gloss.all;
-        let uniform = |m: &Material| if alone { None } else { Uniform::of(m, textures, depth > 0) };
+        let common = |m: &Material| if alone { None } else { Common::of(m, textures, depth > 0) };
         let needs = |any: &[Feature]| everything || any.iter().any(|&f| features.has(f));
         Self {
             scene,
@@ -121,7 +121,7 @@ impl<'a> Context<'a> {
             highlight_reach: glint::reach(settings),
             seed: settings.seed,
             lights: scene.lights.iter().map(|l| LocalLight::new(l, world.center)).collect(),
-            uniform: scene.materials.iter().map(uniform).collect(),
+            common: scene.materials.iter().map(common).collect(),
             bands: if needs(&[Feature::Dispersion]) { bands() } else { Vec::new() },
             has_filters: needs(&[Feature::Mask, Feature::Blend, Feature::ThinTransmission, Feature::Refraction]),
             absorption: Absorption::of(&scene.materials, everything),

@@ -51,6 +51,7 @@ impl Footprint {
     /// Cone of diameter `width` along the unit vector `dir` on a surface with unit normal `normal`.
     ///
     /// After T. Akenine-Möller et al., "Improved Shader and Texture Level of Detail Using Ray Cones" (2021).
+    #[inline(always)]
     pub(crate) fn new(dir: Vec3, normal: Vec3, width: f32) -> Self {
         // A grazing cone covers unboundedly much; beyond this the texture is at its smallest copy anyway.
         const LONGEST: f32 = 1e4;
@@ -75,6 +76,12 @@ pub(super) struct Coordinates {
 }
 
 impl Patch<'_> {
+    /// Moves it to another point of its triangle.
+    pub(super) fn move_to(&mut self, weights: [f32; 3], print: Footprint) {
+        (self.weights, self.print) = (weights, print);
+        self.last.set(None);
+    }
+
     #[inline]
     fn mix<T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>>(&self, values: &[T]) -> Option<T> {
         let [a, b, c] = self.corners;

@@ -192,15 +192,12 @@ impl<'a> Surface<'a> {
         if patch.is_curved() {
             self.horizon = facing(self.smooth, self.view);
         }
-        let turned = |map| patch.normal_mapped(own, map, material.normal_scale, store);
-        let mapped = material.normal_map.as_ref().and_then(turned).unwrap_or(own);
-        let bumped = patch.bumped(mapped, material, store).unwrap_or(mapped);
-        self.normal = facing(bumped * side, self.view);
+        self.normal = mapped_normal(patch, material, store, own, side, self.view);
     }
 
     /// 1 for a normal on the side that is seen, −1 for one on the other.
     pub(super) fn side(&self, own: Vec3) -> f32 {
-        if own.dot(self.geometric) < 0.0 { -1.0 } else { 1.0 }
+        side_of(own, self.geometric)
     }
 
     /// The normal of lacquer with this normal map and its scale, to the side of the ray.
@@ -279,6 +276,28 @@ impl<'a> Surface<'a> {
     pub(crate) fn origin(&self, dir: Vec3) -> Vec3 {
         offset_origin(self.start, self.error, self.geometric, dir)
     }
+}
+
+/// 1 for a normal of a mesh on the side that is seen, whose normal is `geometric`; −1 for one on the other.
+#[inline(always)]
+pub(crate) fn side_of(own: Vec3, geometric: Vec3) -> f32 {
+    if own.dot(geometric) < 0.0 { -1.0 } else { 1.0 }
+}
+
+/// A mesh's own normal as maps turn it, on the side of the ray.
+#[inline]
+pub(crate) fn mapped_normal(
+    patch: &Patch,
+    material: &Material,
+    store: &TextureStore,
+    own: Vec3,
+    side: f32,
+    view: Vec3,
+) -> Vec3 {
+    let turned = |map| patch.normal_mapped(own, map, material.normal_scale, store);
+    let mapped = material.normal_map.as_ref().and_then(turned).unwrap_or(own);
+    let bumped = patch.bumped(mapped, material, store).unwrap_or(mapped);
+    facing(bumped * side, view)
 }
 
 /// `normal`, turned just far enough that `view` sees its front.

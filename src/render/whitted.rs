@@ -215,14 +215,17 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     fn shade_strip(&mut self, eyes: &Eyes, instance: u32, strip: &mut Strip) {
         let context = self.context;
         let mesh = &context.scene.meshes[context.scene.instances[instance as usize].mesh as usize];
-        let Some(uniform) = &context.uniform[mesh.material as usize] else { return };
+        let Some(common) = &context.common[mesh.material as usize] else { return };
         let smooth = !mesh.normals.is_empty();
         strip.find(smooth.then(|| context.world.placement(instance)));
-        for index in strip.left_out(uniform.one_sided) {
+        if common.mapped || !mesh.colors.is_empty() {
+            strip.read(context, eyes, mesh.material, common);
+        }
+        for index in strip.left_out(common.one_sided) {
             let i = index as usize;
             self.shade(RayClass::Primary, &eyes.rays[i], &eyes.path(i), &eyes.hits[i]);
         }
-        let matter = &uniform.matter;
+        let matter = &common.matter;
         if !context.is_dark || matter.shines() {
             strip.look_around(matter, &context.sky, context.scene.ambient);
             strip.shown().for_each(|(i, everywhere)| self.add(i, everywhere));

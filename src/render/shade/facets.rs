@@ -108,7 +108,7 @@ const ALBEDO: [[(f32, f32); 9]; 9] = [
 ];
 
 /// [`ALBEDO`] at any roughness and N·V between its entries, off by at most 0.05.
-pub(super) fn albedo(roughness: f32, n_v: f32) -> (f32, f32) {
+pub(crate) fn albedo(roughness: f32, n_v: f32) -> (f32, f32) {
     let lobe = Lobe::of(roughness);
     between(n_v, |column| lobe.entry(column))
 }

@@ -32,7 +32,7 @@ pub(super) const NARROWEST_HIGHLIGHT: f32 = 0.045;
 pub(super) const NARROW_HIGHLIGHT: f32 = 0.35;
 
 /// The model's parameters at one point.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct MetalRoughMatter {
     base: Vec3,
     metallic: f32,
@@ -63,6 +63,15 @@ pub(crate) struct MetalRoughMatter {
     pub dispersion: f32,
     /// α² of the highlights of lights at least.
     least_square: f32,
+}
+
+/// Those of its parameters that maps of its colour, roughness, metalness and occlusion change.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MetalRoughPaint {
+    pub base: Vec3,
+    pub metallic: f32,
+    pub roughness: f32,
+    pub occlusion: f32,
 }
 
 /// What a point sees of its surroundings.
@@ -122,6 +131,18 @@ impl MetalRoughMatter {
             dispersion: m.dispersion,
             least_square: 0.0,
         }
+    }
+
+    pub(crate) fn paint(&self) -> MetalRoughPaint {
+        let Self { base, metallic, roughness, occlusion, .. } = *self;
+        MetalRoughPaint { base, metallic, roughness, occlusion }
+    }
+
+    /// The same with other numbers of maps, where no film is over it.
+    #[inline(always)]
+    pub(crate) fn painted(&self, paint: MetalRoughPaint) -> Self {
+        let MetalRoughPaint { base, metallic, roughness, occlusion } = paint;
+        Self { base, metal_f0: base, metallic, roughness, occlusion, ..*self }
     }
 
     /// Lets it scatter light to its other side.
@@ -271,7 +292,7 @@ impl MetalRoughMatter {
             open: if looked_up { open(n_v, self.occlusion, roughness) } else { 0.0 },
             outside: seen.outside,
         };
-        let rebound = if self.metallic > 0.0 { rebound(roughness, self.metal_f0) } else { Vec3::ZERO };
+        let rebound = if self.metallic > 0.0 { self.rebound() } else { Vec3::ZERO };
         let (mut sum, taken) = self.around(&around, rebound);
         if self.is_translucent() {
             let behind = sky.diffuse(-seen.normal) + ambient;
@@ -320,9 +341,15 @@ impl MetalRoughMatter {
         (diffuse * around.diffuse + mirrored + again, taken)
     }
 
-    /// Its albedo by N·V, and what comes of light that its facets send to each other.
-    pub(crate) fn shares(&self) -> (AlbedoRow, Vec3) {
-        (AlbedoRow::of(self.roughness), rebound(self.roughness, self.metal_f0))
+    /// Its albedo by N·V, where it has no grain.
+    pub(crate) fn shares(&self) -> AlbedoRow {
+        AlbedoRow::of(self.roughness)
+    }
+
+    /// What comes of light that its facets send to each other.
+    #[inline(always)]
+    pub(crate) fn rebound(&self) -> Vec3 {
+        rebound(self.mean_roughness(), self.metal_f0)
     }
 
     /// Perceptual roughness.
@@ -332,7 +359,7 @@ impl MetalRoughMatter {
 
     /// The same where an occlusion map leaves everything open, as without one.
     pub(crate) fn in_the_open(&self) -> Self {
-        Self { occlusion: 1.0, ..self.clone() }
+        Self { occlusion: 1.0, ..*self }
     }
 
     /// Weights of the mirror ray and of the ray that passes through, as seen from outside or not.
@@ -388,7 +415,7 @@ pub(super) fn traced(roughness: f32) -> f32 {
 
 /// Share of the mirrored surroundings that the occlusion map leaves open: less where few directions are open and the
 /// lobe is wide (S. Lagarde, C. de Rousiers, "Moving Frostbite to Physically Based Rendering", 2014).
-pub(super) fn open(n_v: f32, occlusion: f32, roughness: f32) -> f32 {
+pub(crate) fn open(n_v: f32, occlusion: f32, roughness: f32) -> f32 {
     if occlusion >= 1.0 {
         return 1.0;
     }
@@ -503,7 +530,7 @@ mod tests {
     fn the_tabulated_albedo_is_that_of_the_lobe() {
         for (roughness, degrees) in [(0.3, 0.0), (0.5, 45.0), (0.5, 80.0), (0.8, 60.0), (1.0, 20.0)] {
             let white = MetalRoughMatter { f0: Vec3::ONE, base: Vec3::ZERO, roughness, ..matter() };
-            let black = MetalRoughMatter { f0: Vec3::ZERO, ..white.clone() };
+            let black = MetalRoughMatter { f0: Vec3::ZERO, ..white };
             let (sum, bias) = (reflected_in_all(&white, at(degrees)).x, reflected_in_all(&black, at(degrees)).x);
             let known = albedo(roughness, at(degrees).z);
             assert!((known.0 - (sum - bias)).abs() < 0.05, "{roughness} at {degrees}: {}, {known:?}", sum - bias);
@@ -537,7 +564,7 @@ mod tests {
         assert!((front - leaf.base * (0.75 * 0.5 / PI)).length() < 1e-6);
         assert!((back - through * (0.25 * 0.5 / PI)).length() < 1e-6);
         assert_eq!(leaf.lit_through(Vec3::Z, at(-20.0), at(60.0)), Vec3::ZERO, "that is the front");
-        let metal = MetalRoughMatter { metallic: 1.0, ..leaf.clone() };
+        let metal = MetalRoughMatter { metallic: 1.0, ..leaf };
         assert_eq!(metal.lit_through(Vec3::Z, at(-20.0), at(120.0)), Vec3::ZERO);
         let glossy = MetalRoughMatter { f0: Vec3::splat(0.04), f90: 1.0, ..leaf };
         let (there, back) = (glossy.lit_through(Vec3::Z, at(25.0), at(130.0)) / 50f32.to_radians().cos(), {

@@ -16,11 +16,12 @@ mod sheen;
 mod spectrum;
 
 pub(crate) use coat::CoatMatter;
+pub(crate) use facets::{AlbedoRow, albedo};
 pub(crate) use grain::GrainMatter;
 pub(crate) use light::{Incident, LocalLight, way};
 pub(crate) use lobe::Lobe;
-pub(crate) use metal_rough::{Around, MetalRoughMatter, above};
-pub(crate) use phong::PhongMatter;
+pub(crate) use metal_rough::{Around, MetalRoughMatter, MetalRoughPaint, above, open};
+pub(crate) use phong::{PhongMatter, PhongPaint};
 pub(crate) use sheen::SheenMatter;
 pub(crate) use spectrum::{Band, bands};
 
@@ -159,7 +160,8 @@ impl Matter {
         Self::read(material, reader.base(material).truncate(), &reader)
     }
 
-    fn read(material: &Material, base: Vec3, reader: &Reader) -> Self {
+    /// The material as maps say, but for a grain, film, sheen and lacquer, as seen from outside.
+    pub(crate) fn read(material: &Material, base: Vec3, reader: &Reader) -> Self {
         let emission = material.emission * reader.srgb(material.emission_map.as_ref());
         let model = match &material.surface {
             Reflection::Unlit => Model::Unlit(base),

@@ -10,7 +10,7 @@ use crate::render::wave::Crossing;
 use crate::scene::Phong;
 
 /// Phong's parameters at one point.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct PhongMatter {
     pub ambient: Vec3,
     pub diffuse: Vec3,
@@ -21,6 +21,15 @@ pub(crate) struct PhongMatter {
     pub ior: f32,
     pub fresnel: bool,
     pub dispersion: f32,
+}
+
+/// Those of them that maps change.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PhongPaint {
+    pub ambient: Vec3,
+    pub diffuse: Vec3,
+    pub specular: Vec3,
+    pub shininess: f32,
 }
 
 impl PhongMatter {
@@ -36,6 +45,18 @@ impl PhongMatter {
             fresnel: phong.fresnel,
             dispersion: phong.dispersion,
         }
+    }
+
+    pub(crate) fn paint(&self) -> PhongPaint {
+        let Self { ambient, diffuse, specular, shininess, .. } = *self;
+        PhongPaint { ambient, diffuse, specular, shininess }
+    }
+
+    /// The same with other numbers of a map.
+    #[inline(always)]
+    pub(crate) fn painted(&self, paint: PhongPaint) -> Self {
+        let PhongPaint { ambient, diffuse, specular, shininess } = paint;
+        Self { ambient, diffuse, specular, shininess, ..*self }
     }
 
     /// Whether a ray off the surface could be seen.

@@ -1,9 +1,10 @@
 //! What the points of a strip show of their surroundings, and what they shine with themselves.
 
 use super::columns::{Column, Columns, Found, POINTS, Strip, get, padded, put};
+use super::painted::Painted;
 use crate::math::Vec3;
 use crate::math::simd::{Kernel, Simd};
-use crate::render::shade::{Around, Matter, MetalRoughMatter, Model};
+use crate::render::shade::{AlbedoRow, Around, Matter, MetalRoughMatter, Model, PhongMatter, albedo, open};
 use crate::render::sky::Sky;
 use crate::render::studio;
 use crate::scene::UpAxis;
@@ -13,6 +14,8 @@ pub(super) struct Surroundings {
     /// Cosine of the view, and the shares of f0 and f90 there.
     n_v: Column,
     shares: [Column; 2],
+    /// Share of the mirrored surroundings that nothing stands in the way of.
+    open: Column,
     mirrored_dir: Columns,
     diffuse: Columns,
     mirrored: Columns,
@@ -22,15 +25,23 @@ pub(super) struct Surroundings {
 impl Default for Surroundings {
     fn default() -> Self {
         let (one, three) = ([0.0; POINTS], [[0.0; POINTS]; 3]);
-        Self { n_v: one, shares: [one; 2], mirrored_dir: three, diffuse: three, mirrored: three, radiance: three }
+        Self {
+            n_v: one,
+            shares: [one; 2],
+            open: one,
+            mirrored_dir: three,
+            diffuse: three,
+            mirrored: three,
+            radiance: three,
+        }
     }
 }
 
 impl Strip {
     /// Finds what each point of a surface of `matter` shows of `sky` and of light from everywhere.
     pub(crate) fn look_around(&mut self, matter: &Matter, sky: &Sky, ambient: Vec3) {
-        let (found, to, points) = (&self.found, &mut self.surroundings, padded(self.count));
-        self.level.run(Look { found, to, points, matter, sky, ambient });
+        let (found, painted, to, points) = (&self.found, &self.painted, &mut self.surroundings, padded(self.count));
+        self.level.run(Look { found, painted, to, points, matter, sky, ambient });
     }
 
     /// The rays of the points, and what they show.
@@ -43,6 +54,7 @@ impl Strip {
 
 struct Look<'a> {
     found: &'a Found,
+    painted: &'a Painted,
     to: &'a mut Surroundings,
     points: usize,
     matter: &'a Matter,
@@ -53,56 +65,136 @@ struct Look<'a> {
 impl Kernel for Look<'_> {
     type Output = ();
 
+    // Whether maps change the material is asked outside the loops, which then are formulas.
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Self { found, to, points, matter, sky, ambient } = self;
+        let Self { found, painted, to, points, matter, sky, ambient } = self;
         let (points, emission) = (points.min(POINTS), matter.emission);
         match &matter.model {
+            Model::Unlit(_) if painted.any => {
+                (0..points).for_each(|i| put(&mut to.radiance, i, painted.emission(i) + painted.unlit(i)));
+            }
             Model::Unlit(color) => (0..points).for_each(|i| put(&mut to.radiance, i, emission + *color)),
             Model::Phong(m) => {
+                let m = *m;
                 spread(sky, &found.normal, points, &mut to.diffuse);
-                for i in 0..points {
-                    let radiance = emission + (m.ambient * ambient + m.diffuse * get(&to.diffuse, i));
-                    put(&mut to.radiance, i, radiance);
+                if painted.any {
+                    scatter(to, points, ambient, |i| (painted.emission(i), painted.phong(i, &m)));
+                } else {
+                    scatter(to, points, ambient, |_| (emission, m));
                 }
             }
-            Model::MetalRough(m) => look(&m.in_the_open(), found, to, points, sky, ambient, emission),
+            Model::MetalRough(m) if painted.any => look(&Mapped { m: *m, painted }, found, to, points, sky, ambient),
+            Model::MetalRough(m) => {
+                look(&Even { m: m.in_the_open(), row: m.shares(), emission }, found, to, points, sky, ambient);
+            }
         }
     }
 }
 
+/// What Phong's model shows of light from everywhere.
 #[inline(always)]
-fn look(
-    m: &MetalRoughMatter,
-    found: &Found,
-    to: &mut Surroundings,
-    points: usize,
-    sky: &Sky,
-    ambient: Vec3,
+fn scatter(to: &mut Surroundings, points: usize, ambient: Vec3, matter: impl Fn(usize) -> (Vec3, PhongMatter)) {
+    for i in 0..points.min(POINTS) {
+        let (emission, m) = matter(i);
+        put(&mut to.radiance, i, emission + (m.ambient * ambient + m.diffuse * get(&to.diffuse, i)));
+    }
+}
+
+/// A metallic-rough material at each point.
+trait MetalRoughPoints {
+    fn matter(&self, i: usize) -> MetalRoughMatter;
+    fn emission(&self, i: usize) -> Vec3;
+    /// Shares of f0 and f90 in what its lobe sends back where the cosine of the view is `n_v`.
+    fn shares(&self, i: usize, n_v: f32) -> (f32, f32);
+    /// Share of the mirrored surroundings that nothing stands in the way of.
+    fn open(&self, i: usize, n_v: f32) -> f32;
+}
+
+/// The same everywhere.
+struct Even {
+    m: MetalRoughMatter,
+    row: AlbedoRow,
     emission: Vec3,
-) {
-    let (row, rebound) = m.shares();
+}
+
+impl MetalRoughPoints for Even {
+    #[inline(always)]
+    fn matter(&self, _: usize) -> MetalRoughMatter {
+        self.m
+    }
+
+    #[inline(always)]
+    fn emission(&self, _: usize) -> Vec3 {
+        self.emission
+    }
+
+    #[inline(always)]
+    fn shares(&self, _: usize, n_v: f32) -> (f32, f32) {
+        self.row.at(n_v)
+    }
+
+    #[inline(always)]
+    fn open(&self, _: usize, _: f32) -> f32 {
+        1.0
+    }
+}
+
+/// As maps say.
+struct Mapped<'a> {
+    m: MetalRoughMatter,
+    painted: &'a Painted,
+}
+
+impl MetalRoughPoints for Mapped<'_> {
+    #[inline(always)]
+    fn matter(&self, i: usize) -> MetalRoughMatter {
+        self.painted.metal_rough(i, &self.m)
+    }
+
+    #[inline(always)]
+    fn emission(&self, i: usize) -> Vec3 {
+        self.painted.emission(i)
+    }
+
+    #[inline(always)]
+    fn shares(&self, i: usize, n_v: f32) -> (f32, f32) {
+        albedo(self.painted.roughness[i], n_v)
+    }
+
+    #[inline(always)]
+    fn open(&self, i: usize, n_v: f32) -> f32 {
+        open(n_v, self.painted.occlusion[i], self.painted.roughness[i])
+    }
+}
+
+#[inline(always)]
+fn look(m: &impl MetalRoughPoints, found: &Found, to: &mut Surroundings, points: usize, sky: &Sky, ambient: Vec3) {
     for i in 0..points.min(POINTS) {
         let seen = found.seen(i);
         to.n_v[i] = seen.normal.dot(seen.view).clamp(0.0, 1.0);
         put(&mut to.mirrored_dir, i, seen.mirrored());
     }
     for i in 0..points.min(POINTS) {
-        (to.shares[0][i], to.shares[1][i]) = row.at(to.n_v[i]);
+        (to.shares[0][i], to.shares[1][i]) = m.shares(i, to.n_v[i]);
+    }
+    for i in 0..points.min(POINTS) {
+        to.open[i] = m.open(i, to.n_v[i]);
     }
     spread(sky, &found.normal, points, &mut to.diffuse);
-    blur(sky, m.roughness(), &to.mirrored_dir, points, &mut to.mirrored);
+    blur(sky, |i| m.matter(i).roughness(), &to.mirrored_dir, points, &mut to.mirrored);
     for i in 0..points.min(POINTS) {
         let around = Around {
             n_v: to.n_v[i],
             shares: (to.shares[0][i], to.shares[1][i]),
             diffuse: get(&to.diffuse, i) + ambient,
             mirrored: get(&to.mirrored, i) + ambient,
-            open: 1.0,
+            open: to.open[i],
             // Nothing that light can enter is shaded here.
             outside: true,
         };
-        put(&mut to.radiance, i, emission + m.around(&around, rebound).0);
+        let matter = m.matter(i);
+        put(&mut to.radiance, i, m.emission(i) + matter.around(&around, matter.rebound()).0);
     }
 }
 
@@ -124,20 +216,20 @@ fn spread(sky: &Sky, normals: &Columns, points: usize, to: &mut Columns) {
     }
 }
 
-/// Mean light around these mirrored directions.
+/// Mean light around these mirrored directions, as far as the roughness says.
 #[inline(always)]
-fn blur(sky: &Sky, roughness: f32, dirs: &Columns, points: usize, to: &mut Columns) {
+fn blur(sky: &Sky, roughness: impl Fn(usize) -> f32, dirs: &Columns, points: usize, to: &mut Columns) {
     match sky.studio() {
         Some(UpAxis::Y) => {
             for i in 0..points.min(POINTS) {
-                put(to, i, studio::blurred(studio::from_world(UpAxis::Y, get(dirs, i)), roughness));
+                put(to, i, studio::blurred(studio::from_world(UpAxis::Y, get(dirs, i)), roughness(i)));
             }
         }
         Some(UpAxis::Z) => {
             for i in 0..points.min(POINTS) {
-                put(to, i, studio::blurred(studio::from_world(UpAxis::Z, get(dirs, i)), roughness));
+                put(to, i, studio::blurred(studio::from_world(UpAxis::Z, get(dirs, i)), roughness(i)));
             }
         }
-        None => (0..points.min(POINTS)).for_each(|i| put(to, i, sky.blurred(Vec3::Z, roughness))),
+        None => (0..points.min(POINTS)).for_each(|i| put(to, i, sky.blurred(Vec3::Z, roughness(i)))),
     }
 }

@@ -3,13 +3,14 @@
 use super::around::Surroundings;
 use super::faces::Faces;
 use super::lit::{Lit, Sent};
+use super::painted::{Painted, Tried};
 use super::sorted::Face;
 use crate::accel::{Hit, Ray};
 use crate::math::Vec3;
 use crate::math::simd::{Kernel, Level, Simd};
 use crate::render::patch::smooth_normal;
 use crate::render::shade::Seen;
-use crate::render::surface::facing;
+use crate::render::surface::{facing, side_of};
 use crate::render::world::Placement;
 
 /// Points of a strip at most.
@@ -45,6 +46,9 @@ pub(crate) struct Strip {
     pub(super) rays: [u32; POINTS],
     pub(super) given: Given,
     pub(super) found: Found,
+    pub(super) painted: Painted,
+    /// By material, whether reading its maps paid.
+    pub(super) tried: Vec<Tried>,
     pub(super) surroundings: Surroundings,
     pub(super) lit: Lit,
     pub(super) sent: Sent,
@@ -70,6 +74,8 @@ pub(super) struct Found {
     pub error: Columns,
     pub view: Columns,
     pub geometric: Columns,
+    /// Of the plane that lights must be above: where the mesh stands for something round, not that of the triangle.
+    pub horizon: Columns,
     pub normal: Columns,
 }
 
@@ -86,6 +92,7 @@ impl Default for Strip {
             error: EMPTY,
             view: EMPTY,
             geometric: EMPTY,
+            horizon: EMPTY,
             normal: EMPTY,
         };
         Self {
@@ -94,6 +101,8 @@ impl Default for Strip {
             rays: [0; POINTS],
             given,
             found,
+            painted: Painted::default(),
+            tried: Vec::new(),
             surroundings: Surroundings::default(),
             lit: Lit::default(),
             sent: Sent::default(),
@@ -115,6 +124,7 @@ impl Strip {
     pub(crate) fn find(&mut self, placement: Option<&Placement>) {
         let points = padded(self.count);
         let (given, found) = (&self.given, &mut self.found);
+        self.painted.any = false;
         match placement {
             Some(placement) => self.level.run(Smooth { given, found, points, placement }),
             None => self.level.run(Faceted { given, found, points }),
@@ -267,9 +277,10 @@ impl Found {
     /// The shading normal, from the mesh's own.
     #[inline(always)]
     fn shade(&mut self, i: usize, own: Vec3) {
-        let side = if own.dot(get(&self.geometric, i)) < 0.0 { -1.0 } else { 1.0 };
-        let normal = facing(own * side, get(&self.view, i));
+        let geometric = get(&self.geometric, i);
+        let normal = facing(own * side_of(own, geometric), get(&self.view, i));
         put(&mut self.normal, i, normal);
+        put(&mut self.horizon, i, if self.curved[i] == 1 { normal } else { geometric });
     }
 }
 

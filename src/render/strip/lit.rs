@@ -1,6 +1,7 @@
 //! The light that arrives at the points of a strip, and the shadow rays that ask whether it does.
 
 use super::columns::{Column, Columns, Found, LANES, POINTS, Strip, get, padded, put};
+use super::painted::Painted;
 use crate::accel::Ray;
 use crate::math::Vec3;
 use crate::math::bounds::offset_origin;
@@ -49,8 +50,8 @@ impl Default for Lit {
 impl Strip {
     /// Finds what `light` does at each point of a surface of `matter`.
     pub(crate) fn shine(&mut self, matter: &Matter, light: &LocalLight) {
-        let (found, lit, points) = (&self.found, &mut self.lit, padded(self.count));
-        self.level.run(Shine { found, lit, points, matter, light });
+        let (found, lit, points, painted) = (&self.found, &mut self.lit, padded(self.count), &self.painted);
+        self.level.run(Shine { found, lit, points, matter, painted, light });
     }
 
     /// The points that it shines on: the place of the ray of each, and what it shows.
@@ -142,6 +143,7 @@ struct Shine<'a> {
     lit: &'a mut Lit,
     points: usize,
     matter: &'a Matter,
+    painted: &'a Painted,
     light: &'a LocalLight,
 }
 
@@ -150,7 +152,7 @@ impl Kernel for Shine<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Self { found, lit, points, matter, light } = self;
+        let Self { found, lit, points, matter, painted, light } = self;
         let (points, light) = (points.min(POINTS), *light);
         let in_lux = matches!(matter.model, Model::MetalRough(_));
         light.arriving_at(
@@ -165,13 +167,25 @@ impl Kernel for Shine<'_> {
         // The model is chosen outside the loop, which then is a formula.
         match &matter.model {
             Model::Unlit(_) => lit.seen.fill(0),
+            Model::Phong(m) if painted.any => {
+                let m = *m;
+                reflect(found, lit, points, |i, normal, view, to_light| {
+                    painted.phong(i, &m).lit(normal, view, to_light)
+                });
+            }
             Model::Phong(m) => {
-                let m = m.clone();
-                reflect(found, lit, points, |normal, view, to_light| m.lit(normal, view, to_light));
+                let m = *m;
+                reflect(found, lit, points, |_, normal, view, to_light| m.lit(normal, view, to_light));
+            }
+            Model::MetalRough(m) if painted.any => {
+                let m = *m;
+                reflect(found, lit, points, |i, normal, view, to_light| {
+                    painted.metal_rough(i, &m).lit(normal, view, to_light)
+                });
             }
             Model::MetalRough(m) => {
-                let m = m.clone();
-                reflect(found, lit, points, |normal, view, to_light| m.lit(normal, view, to_light));
+                let m = *m;
+                reflect(found, lit, points, |_, normal, view, to_light| m.lit(normal, view, to_light));
             }
         }
         match light.position() {
@@ -183,15 +197,14 @@ impl Kernel for Shine<'_> {
 
 /// What the points reflect of the light that arrives.
 #[inline(always)]
-fn reflect(found: &Found, lit: &mut Lit, points: usize, share: impl Fn(Vec3, Vec3, Vec3) -> Vec3) {
+fn reflect(found: &Found, lit: &mut Lit, points: usize, share: impl Fn(usize, Vec3, Vec3, Vec3) -> Vec3) {
     for i in 0..points.min(POINTS) {
         let (geometric, normal, to_light) = (get(&found.geometric, i), get(&found.normal, i), get(&lit.to_light, i));
-        let curved = found.curved[i] == 1;
-        let horizon = if curved { normal } else { geometric };
+        let (horizon, curved) = (get(&found.horizon, i), found.curved[i] == 1);
         let above = horizon.dot(to_light) > 0.0;
         let grazes = curved & (geometric.dot(to_light) < STEEP);
         let smooth = terminator(horizon, normal, to_light);
-        let radiance = share(normal, get(&found.view, i), to_light) * get(&lit.light, i) * smooth;
+        let radiance = share(i, normal, get(&found.view, i), to_light) * get(&lit.light, i) * smooth;
         let seen = above & radiance.is_finite() & (radiance.max_element() > 0.0) & (found.certain[i] == 1);
         let how = if grazes { GRAZING } else { PLAIN };
         lit.seen[i] *= if seen { how } else { 0 };

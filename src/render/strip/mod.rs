@@ -1,7 +1,7 @@
-//! Points of surfaces without maps, shaded side by side: one number of all points, then the next.
+//! Points of surfaces, shaded side by side: one number of all points, then the next.
 //!
-//! Where a material is the same all over a mesh, what a point shows depends on a few numbers, and the same formulas are
-//! computed for all points. They are written once, for one point, in `surface`, `shade` and `accel::refine`; here loops
+//! Where a material neither mirrors nor lets light through, what a point shows depends on a few numbers, and the same
+//! formulas are computed for all points. They are written once, for one point, in `surface`, `shade` and `accel::refine`; here loops
 //! over columns of numbers call them, which the compiler turns into lanes. So a point shaded here gives the same bits as
 //! one shaded by itself, on every instruction set.
 //!
@@ -10,11 +10,12 @@
 
 mod around;
 mod columns;
+mod common;
 mod faces;
 mod lit;
+mod painted;
 mod sorted;
-mod uniform;
 
 pub(crate) use columns::{POINTS, Strip};
+pub(crate) use common::Common;
 pub(crate) use sorted::Sorted;
-pub(crate) use uniform::Uniform;

@@ -93,15 +93,12 @@ impl Face {
         Self::new(context, prim).unwrap_or_else(|| Self { numbers: nothing(), instance: NONE })
     }
 
-    /// `None` for what is no triangle with an area and a uniform material.
+    /// `None` for what is no triangle with an area and a material that points have in common.
     fn new(context: &Context, prim: u32) -> Option<Self> {
         let (scene, world) = (context.scene, context.world);
         let PrimSource::Triangle { instance, triangle: in_mesh } = world.source(prim) else { return None };
         let mesh = &scene.meshes[scene.instances[instance as usize].mesh as usize];
-        context.uniform[mesh.material as usize].as_ref()?;
-        if !mesh.colors.is_empty() {
-            return None;
-        }
+        context.common[mesh.material as usize].as_ref()?;
         let corners = world.triangle(prim);
         let facet = Facet::of(&corners);
         let winding = facet.flat.unit();

@@ -1,7 +1,9 @@
 //! The same bits, whoever computes them.
 
 use super::*;
-use crate::scene::{AlphaMode, Environment, MetalRough};
+use crate::math::Vec2;
+use crate::math::random::Random;
+use crate::scene::{AlphaMode, Bitmap, Environment, MetalRough, Pixels, Sampler, Texture, TextureRef, UvTransform};
 
 /// A bit of everything: mirrors, glass, blending, textures aside.
 pub(super) fn busy() -> Stage {
@@ -114,5 +116,55 @@ fn points_shaded_side_by_side_have_the_bits_of_points_shaded_one_by_one() {
         assert!(together.picture.beauty == alone.picture.beauty, "{environment:?}");
         let seen = together.picture.beauty.iter().filter(|c| c[0] > 0.0).count();
         assert!(seen > 1500, "{seen}");
+    }
+}
+
+/// The same with maps of everything that points side by side may read, and colours at the vertices of some meshes.
+fn painted() -> Stage {
+    let mut s = plain();
+    let mut random = Random::new(8);
+    for side in [3, 16, 40] {
+        let texels = (0..side * side).map(|_| [(); 4].map(|()| (random.unit() * 255.0) as u8)).collect();
+        let bitmap = Bitmap { name: String::new(), width: side, height: side, pixels: Pixels::Rgba8(texels) };
+        s.scene.textures.push(Texture { bitmap: s.scene.bitmaps.len() as u32, sampler: Sampler::default() });
+        s.scene.bitmaps.push(bitmap);
+    }
+    let transform = UvTransform { scale: Vec2::splat(3.0), rotation: 0.4, ..UvTransform::default() };
+    let map = |texture| Some(TextureRef { texture, uv_set: 0, transform });
+    for (i, material) in s.scene.materials.iter_mut().enumerate() {
+        material.base_color_map = map(0);
+        material.occlusion_map = map(1);
+        (material.emission, material.emission_map) = (Vec3::new(0.1, 0.2, 0.1), map(2));
+        material.normal_map = map(1).filter(|_| i % 2 == 0);
+        (material.bump_map, material.bump_scale) = (map(2).filter(|_| i % 3 == 0), 0.1);
+        match &mut material.surface {
+            Reflection::MetalRough(m) => (m.metal_rough_map, m.roughness) = (map(1), 1.0),
+            Reflection::Phong(p) => {
+                (p.ambient_map, p.specular_map) = (map(1), map(2));
+                (p.shininess, p.shininess_map) = (20.0, map(0));
+            }
+            Reflection::Unlit => {}
+        }
+    }
+    for (i, mesh) in s.scene.meshes.iter_mut().enumerate() {
+        mesh.uvs = vec![mesh.positions.iter().map(|p| p.truncate()).collect()];
+        if i % 2 == 1 {
+            mesh.colors = mesh.positions.iter().map(|_| random.cube().abs().extend(1.0)).collect();
+        }
+    }
+    s
+}
+
+#[test]
+fn mapped_points_shaded_side_by_side_have_the_bits_of_points_shaded_one_by_one() {
+    // Where no ray bounces even mirrors are seen by lookups.
+    for (depth, environment) in [(1, Environment::Studio), (0, Environment::Studio), (1, Environment::Black)] {
+        let mut s = painted();
+        (s.settings.depth, s.scene.environment) = (Some(depth), environment);
+        let together = s.render();
+        s.settings.layers = true;
+        let alone = s.render();
+        assert_eq!(together.counts, alone.counts);
+        assert!(together.picture.beauty == alone.picture.beauty, "depth {depth}, {environment:?}");
     }
 }
