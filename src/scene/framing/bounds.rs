@@ -1,7 +1,8 @@
 //! The box of the model without its strays: parts so few, so small and so far away that nobody meant them to be seen.
 
-use crate::math::DVec3;
-use crate::scene::Scene;
+use crate::math::{DVec3, Vec3};
+use crate::scene::{Instance, Mesh, Scene};
+use rayon::prelude::*;
 
 /// What there is to see.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,6 +75,9 @@ pub fn robust_bounds_within(scene: &Scene, whole: (DVec3, DVec3)) -> Bounds {
 /// Faces that are looked at between two questions whether all slices have been reached.
 const FACES_AT_A_TIME: usize = 1024;
 
+/// How often faces from all over a mesh are looked at before all of them are.
+const LOOKS: usize = 16;
+
 /// The box of a model of triangles that reach into every slice, so that there is no gap and nothing can come off: what
 /// most models are, found by a look at some of the faces from all over it. `None`: it has to be looked at more closely.
 fn without_gaps(scene: &Scene, whole: (DVec3, DVec3)) -> Option<Bounds> {
@@ -91,12 +95,18 @@ fn without_gaps(scene: &Scene, whole: (DVec3, DVec3)) -> Option<Bounds> {
         };
         // Neighbours in the file are neighbours in space: some from all over it reach far sooner than the first ones.
         let stride = mesh.triangles.len() / FACES_AT_A_TIME + 1;
-        for first in 0..stride {
+        for first in 0..stride.min(LOOKS) {
             for triangle in mesh.triangles.iter().skip(first).step_by(stride) {
                 let [a, b, c] = triangle.map(corner);
                 let (a, b, c) = (a?, b?, c?);
                 slices.reach(a.min(b).min(c), a.max(b).max(c));
             }
+            if slices.has_no_gap() {
+                return Some(bounds);
+            }
+        }
+        if stride > LOOKS {
+            slices.cover(instance, mesh)?;
             if slices.has_no_gap() {
                 return Some(bounds);
             }
@@ -114,12 +124,10 @@ fn by_parts(scene: &Scene) -> Bounds {
     let mut bounds = Bounds { lo: whole.0, hi: whole.1, strays: 0, whole };
     // Each round zooms in by up to SLICES; the range of f64 needs far fewer than this many.
     for _ in 0..128 {
-        let mut slices = Slices::new(&bounds);
-        slices.cover(scene, &bounds);
+        let slices = Slices::of(scene, &bounds);
         if slices.has_no_gap() {
             break;
         }
-        slices.weigh(scene, &bounds);
         let Some(core) = slices.core() else { break };
         let kept = |part: &Part| bounds.contains(part.center) && slices.lies_in(&core, part.center);
         let Some((lo, hi)) = hull(scene, kept) else { break };
@@ -131,17 +139,19 @@ fn by_parts(scene: &Scene) -> Bounds {
     if (bounds.lo, bounds.hi) == bounds.whole {
         return bounds;
     }
-    visit(scene, |part| bounds.strays += u64::from(!bounds.contains(part.lo) || !bounds.contains(part.hi)));
+    let outside = |part: &Part| !bounds.contains(part.lo) || !bounds.contains(part.hi);
+    bounds.strays = gather(scene, || 0, |n, part| *n += u64::from(outside(part)), |n, more| *n += more);
     bounds
 }
 
 /// The mean direction of all faces weighted by area: length 1 for a card, 0 for a closed body.
 pub(super) fn facing(scene: &Scene) -> DVec3 {
-    let (mut sum, mut area) = (DVec3::ZERO, 0.0);
-    visit(scene, |part| {
-        sum += part.normal;
-        area += part.normal.length();
-    });
+    let add = |(sum, area): &mut (DVec3, f64), part: &Part| {
+        *sum += part.normal;
+        *area += part.normal.length();
+    };
+    let join = |all: &mut (DVec3, f64), more: (DVec3, f64)| *all = (all.0 + more.0, all.1 + more.1);
+    let (sum, area) = gather(scene, Default::default, add, join);
     if area > 0.0 { sum / area } else { DVec3::ZERO }
 }
 
@@ -156,57 +166,107 @@ struct Part {
 }
 
 /// Box of the parts that `keep` wants; `None` when there are none.
-fn hull(scene: &Scene, keep: impl Fn(&Part) -> bool) -> Option<(DVec3, DVec3)> {
-    let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    visit(scene, |part| {
-        if keep(&part) {
-            (lo, hi) = (lo.min(part.lo), hi.max(part.hi));
+fn hull(scene: &Scene, keep: impl Fn(&Part) -> bool + Sync) -> Option<(DVec3, DVec3)> {
+    let nothing = || (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let join = |all: &mut (DVec3, DVec3), more: (DVec3, DVec3)| *all = (all.0.min(more.0), all.1.max(more.1));
+    let add = |all: &mut (DVec3, DVec3), part: &Part| {
+        if keep(part) {
+            join(all, (part.lo, part.hi));
         }
-    });
+    };
+    let (lo, hi) = gather(scene, nothing, add, join);
     lo.cmple(hi).all().then_some((lo, hi))
 }
 
-/// Calls `f` for every face, sphere and cone with finite corners.
-fn visit(scene: &Scene, mut f: impl FnMut(Part)) {
-    let mut face = |a: DVec3, b: DVec3, c: DVec3, box_of: (DVec3, DVec3)| {
-        if box_of.0.is_finite() && box_of.1.is_finite() {
-            let normal = (b - a).cross(c - a) * 0.5;
-            f(Part { lo: box_of.0, hi: box_of.1, center: (a + b + c) / 3.0, normal, area: normal.length() });
-        }
-    };
-    let mut places: Vec<DVec3> = Vec::new();
+/// Faces that one thread takes at a time: the same for every number of threads, so that sums are, too.
+const CHUNK: usize = 1 << 15;
+
+/// Adds up every face, sphere and cone with finite corners, from `nothing`; `join` adds what others have added up.
+fn gather<T: Send>(
+    scene: &Scene,
+    nothing: impl Fn() -> T + Sync,
+    add: impl Fn(&mut T, &Part) + Sync,
+    join: impl Fn(&mut T, T),
+) -> T {
+    let mut all = nothing();
     for instance in &scene.instances {
         let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
         // Faces share their corners.
-        places.clear();
-        places.extend(mesh.positions.iter().map(|p| instance.world_from_object.transform_point3(p.as_dvec3())));
-        let corner = |i: u32| places.get(i as usize).copied().unwrap_or(instance.world_from_object.translation);
-        for triangle in &mesh.triangles {
-            let [a, b, c] = *triangle;
-            let (a, b, c) = (corner(a), corner(b), corner(c));
-            face(a, b, c, (a.min(b).min(c), a.max(b).max(c)));
+        let world = |p: &Vec3| instance.world_from_object.transform_point3(p.as_dvec3());
+        let places: Vec<DVec3> = mesh.positions.par_iter().with_min_len(CHUNK).map(world).collect();
+        let faces = Faces { instance, mesh, places: &places };
+        let of = |triangles: &[[u32; 3]]| {
+            let mut sum = nothing();
+            faces.visit(triangles, |part| add(&mut sum, part));
+            sum
+        };
+        match mesh.triangles.len() {
+            ..=CHUNK => faces.visit(&mesh.triangles, |part| add(&mut all, part)),
+            _ => {
+                let sums: Vec<T> = mesh.triangles.par_chunks(CHUNK).map(of).collect();
+                sums.into_iter().for_each(|sum| join(&mut all, sum));
+            }
         }
-        // A polygon counts as the fan of triangles around its first corner.
-        for polygon in &mesh.polygons {
+        faces.visit_polygons(|part| add(&mut all, part));
+    }
+    visit_solids(scene, |part| add(&mut all, part));
+    all
+}
+
+/// The faces of an instance.
+struct Faces<'a> {
+    instance: &'a Instance,
+    mesh: &'a Mesh,
+    /// World space.
+    places: &'a [DVec3],
+}
+
+impl Faces<'_> {
+    fn corner(&self, i: u32) -> DVec3 {
+        self.places.get(i as usize).copied().unwrap_or(self.instance.world_from_object.translation)
+    }
+
+    fn visit(&self, triangles: &[[u32; 3]], mut f: impl FnMut(&Part)) {
+        for triangle in triangles {
+            Part::face(triangle.map(|i| self.corner(i))).iter().for_each(&mut f);
+        }
+    }
+
+    /// A polygon counts as the fan of triangles around its first corner.
+    fn visit_polygons(&self, mut f: impl FnMut(&Part)) {
+        for polygon in &self.mesh.polygons {
             let run = polygon.first as usize..(polygon.first + polygon.len) as usize;
-            let corners = mesh.polygon_corners.get(run).unwrap_or_default();
+            let corners = self.mesh.polygon_corners.get(run).unwrap_or_default();
             for pair in corners.windows(2).skip(1) {
-                let [a, b, c] = [corners[0], pair[0], pair[1]].map(corner);
-                face(a, b, c, (a.min(b).min(c), a.max(b).max(c)));
+                Part::face([corners[0], pair[0], pair[1]].map(|i| self.corner(i))).iter().for_each(&mut f);
             }
         }
     }
+}
+
+impl Part {
+    /// `None` where a corner is nowhere.
+    fn face([a, b, c]: [DVec3; 3]) -> Option<Self> {
+        let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
+        let normal = (b - a).cross(c - a) * 0.5;
+        let face = Self { lo, hi, center: (a + b + c) / 3.0, normal, area: normal.length() };
+        (lo.is_finite() && hi.is_finite()).then_some(face)
+    }
+}
+
+/// Calls `f` for every sphere and cone.
+fn visit_solids(scene: &Scene, mut f: impl FnMut(&Part)) {
     for sphere in &scene.spheres {
         let (lo, hi) = (sphere.center - sphere.radius, sphere.center + sphere.radius);
         let area = 4.0 * std::f64::consts::PI * sphere.radius * sphere.radius;
-        f(Part { lo, hi, center: sphere.center, normal: DVec3::ZERO, area });
+        f(&Part { lo, hi, center: sphere.center, normal: DVec3::ZERO, area });
     }
     for cone in &scene.cones {
         let ((lo, hi), length, dr) =
             (cone.bounds(), cone.base.distance(cone.apex), cone.base_radius - cone.apex_radius);
         let slant = (length * length + dr * dr).sqrt();
         let area = std::f64::consts::PI * (cone.base_radius + cone.apex_radius) * slant;
-        f(Part { lo, hi, center: (lo + hi) * 0.5, normal: DVec3::ZERO, area });
+        f(&Part { lo, hi, center: (lo + hi) * 0.5, normal: DVec3::ZERO, area });
     }
 }
 
@@ -252,13 +312,26 @@ impl Slices {
         }
     }
 
-    /// Finds the slices that the parts inside reach into.
-    fn cover(&mut self, scene: &Scene, bounds: &Bounds) {
-        visit(scene, |part| {
+    /// Sorts the parts inside the box into its slices.
+    fn of(scene: &Scene, bounds: &Bounds) -> Self {
+        let add = |slices: &mut Self, part: &Part| {
             if bounds.contains(part.center) {
-                self.reach(part.lo, part.hi);
+                slices.reach(part.lo, part.hi);
+                slices.weigh(part);
             }
-        });
+        };
+        gather(scene, || Self::new(bounds), add, Self::join)
+    }
+
+    /// Adds what other slices of the same box have.
+    fn join(&mut self, other: Self) {
+        for axis in 0..3 {
+            for i in 0..SLICES {
+                self.covered[axis][i] |= other.covered[axis][i];
+                self.area[axis][i] += other.area[axis][i];
+                self.count[axis][i] += other.count[axis][i];
+            }
+        }
     }
 
     /// Notes that a part with this box reaches from slice to slice.
@@ -270,22 +343,53 @@ impl Slices {
         }
     }
 
+    /// Notes how far every triangle of a mesh reaches; `None` when a corner is nowhere.
+    fn cover(&mut self, instance: &Instance, mesh: &Mesh) -> Option<()> {
+        /// A flag for every slice along each axis.
+        type Covered = [[bool; SLICES]; 3];
+        let cell = |p: &Vec3| {
+            let p = instance.world_from_object.transform_point3(p.as_dvec3());
+            #[expect(clippy::cast_possible_truncation, reason = "there are 256 slices")]
+            let cell = || [0, 1, 2].map(|axis| self.slice(axis, p[axis]) as u8);
+            p.is_finite().then(cell)
+        };
+        let cells: Vec<[u8; 3]> = mesh.positions.par_iter().with_min_len(CHUNK).map(cell).collect::<Option<_>>()?;
+        let of = |triangles: &[[u32; 3]]| {
+            let mut covered: Covered = [[false; SLICES]; 3];
+            for triangle in triangles {
+                let [a, b, c] = triangle.map(|i| cells.get(i as usize));
+                let (a, b, c) = (a?, b?, c?);
+                for (axis, covered) in covered.iter_mut().enumerate() {
+                    let (first, last) = (a[axis].min(b[axis]).min(c[axis]), a[axis].max(b[axis]).max(c[axis]));
+                    let (first, last) = (usize::from(first), usize::from(last));
+                    // Mostly the same, and filling a run takes a call.
+                    covered[first] = true;
+                    if first < last {
+                        covered[first..=last].fill(true);
+                    }
+                }
+            }
+            Some(covered)
+        };
+        let parts: Vec<Covered> = mesh.triangles.par_chunks(CHUNK).map(of).collect::<Option<_>>()?;
+        for part in &parts {
+            self.covered.iter_mut().flatten().zip(part.iter().flatten()).for_each(|(to, covered)| *to |= covered);
+        }
+        Some(())
+    }
+
     /// Whether no slice is empty, so that nothing can come off.
     fn has_no_gap(&self) -> bool {
         self.covered.iter().flatten().all(|&covered| covered)
     }
 
-    /// Sorts the parts inside into the slices.
-    fn weigh(&mut self, scene: &Scene, bounds: &Bounds) {
-        visit(scene, |part| {
-            if bounds.contains(part.center) {
-                for axis in 0..3 {
-                    let middle = self.slice(axis, part.center[axis]);
-                    self.area[axis][middle] += part.area;
-                    self.count[axis][middle] += 1;
-                }
-            }
-        });
+    /// Adds a part to the slices that its middle is in.
+    fn weigh(&mut self, part: &Part) {
+        for axis in 0..3 {
+            let middle = self.slice(axis, part.center[axis]);
+            self.area[axis][middle] += part.area;
+            self.count[axis][middle] += 1;
+        }
     }
 
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the slices there are")]
@@ -356,8 +460,7 @@ impl Slices {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{DAffine3, Vec3};
-    use crate::scene::{Instance, Mesh};
+    use crate::math::DAffine3;
 
     /// Triangles along a spiral, `gap` of it left out at the end, on two instances.
     fn spiral(faces: usize, gap: f32) -> Scene {
@@ -381,12 +484,21 @@ mod tests {
 
     #[test]
     fn the_short_way_and_the_long_one_find_the_same_box() {
-        for (faces, gap, short) in [(20_000, 0.0, true), (40, 0.0, true), (20_000, 30.0, false)] {
+        for (faces, gap, short) in [(20_000, 0.0, true), (40, 0.0, true), (20_000, 30.0, false), (80_000, 30.0, false)]
+        {
             let (scene, slow) = (spiral(faces, gap), by_parts(&spiral(faces, gap)));
             assert_eq!(without_gaps(&scene, slow.whole).is_some(), short, "{faces} {gap}");
             assert_eq!(robust_bounds(&scene), slow, "{faces} {gap}");
             assert_eq!(robust_bounds_within(&scene, slow.whole), slow, "{faces} {gap}");
             assert_eq!(robust_bounds(&scene).strays > 0, gap > 0.0);
+        }
+    }
+
+    #[test]
+    fn every_face_counts_once_whoever_counts_it() {
+        for faces in [40, CHUNK, CHUNK + 1, 3 * CHUNK + 5] {
+            let counted = gather(&spiral(faces, 0.0), || 0, |n, _| *n += 1, |n, more| *n += more);
+            assert_eq!(counted, 2 * faces, "two instances");
         }
     }
 
