@@ -208,6 +208,11 @@ impl Eyes {
         run.count = 0;
     }
 
+    /// How wide the cone of the `i`th ray grows, radians.
+    pub(crate) fn cone_spread(&self, i: usize) -> f32 {
+        self.cone_spread[i]
+    }
+
     /// What the `i`th ray carries.
     pub(crate) fn path(&self, i: usize) -> Path {
         Path::from_eye(self.cone_width[i], self.cone_spread[i])

@@ -35,7 +35,7 @@ pub fn to_world(up: UpAxis, dir: Vec3) -> Vec3 {
 }
 
 /// Linear radiance seen along the unit vector `dir` of the studio's frame.
-#[inline]
+#[inline(always)]
 pub fn radiance(dir: Vec3) -> Vec3 {
     Vec3::splat(room(dir, 0.0))
 }

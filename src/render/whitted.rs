@@ -86,6 +86,8 @@ pub(crate) struct Tracer<'a, A: Accel, P> {
     strip: Box<Strip>,
     shadows: Shadows,
     arounds: Arounds,
+    /// Eye rays that met nothing and see the surroundings.
+    missed: Vec<u32>,
     pub samples: Vec<Sample>,
     /// The place of each sample among those of its pixel; empty where only rays decide random choices.
     pub streams: Vec<Stream>,
@@ -107,6 +109,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             strip: Box::default(),
             shadows: Shadows::default(),
             arounds: Arounds::default(),
+            missed: Vec::new(),
             samples: Vec::new(),
             streams: Vec::new(),
             facts: Vec::new(),
@@ -186,6 +189,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
                 (start..).zip(eight).for_each(|(i, hit)| self.see_one(eyes, &mut sorted, i, hit));
             }
         }
+        self.see_surroundings(eyes);
         let mut strip = std::mem::take(&mut self.strip);
         for k in 0..sorted.instances() {
             let (instance, hits) = sorted.of(k);
@@ -198,6 +202,15 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         self.sorted = sorted;
     }
 
+    /// Adds what rays that met nothing see.
+    fn see_surroundings(&mut self, eyes: &Eyes) {
+        let mut missed = std::mem::take(&mut self.missed);
+        let rays = missed.iter().map(|&i| (i, eyes.rays[i as usize].dir, eyes.cone_spread(i as usize)));
+        self.context.sky.each_radiance(rays, |i, radiance| self.samples[i as usize].radiance += radiance);
+        missed.clear();
+        self.missed = missed;
+    }
+
     fn see_one(&mut self, eyes: &Eyes, sorted: &mut Sorted, i: u32, hit: &Hit) {
         let at = i as usize;
         if hit.is_some() {
@@ -205,7 +218,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
                 self.shade(RayClass::Primary, &eyes.rays[at], &eyes.path(at), hit);
             }
         } else if self.context.shows_environment {
-            self.leave(&eyes.rays[at], &eyes.path(at));
+            self.missed.push(i);
         } else {
             self.samples[at].through += Vec3::ONE;
         }

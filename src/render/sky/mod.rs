@@ -1,6 +1,7 @@
 //! What rays that leave the scene see, and what arrives from there without a ray.
 
 mod around;
+mod beyond;
 mod chance;
 mod gloss;
 mod panorama;
