@@ -82,8 +82,9 @@ pub(crate) struct Tracer<'a, A: Accel, P> {
     /// Rays that go on behind a hit, by class.
     pub(super) continuing: [Queue; 3],
     wave: Wave,
-    sorted: Sorted,
-    strip: Box<Strip>,
+    /// Both are large: there is always one of each, but while it is at work.
+    sorted: Option<Sorted>,
+    strip: Option<Box<Strip>>,
     shadows: Shadows,
     arounds: Arounds,
     /// Eye rays that met nothing and see the surroundings.
@@ -105,8 +106,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             starting: Default::default(),
             continuing: Default::default(),
             wave: Wave::default(),
-            sorted: Sorted::default(),
-            strip: Box::default(),
+            sorted: Some(Sorted::default()),
+            strip: Some(Box::default()),
             shadows: Shadows::default(),
             arounds: Arounds::default(),
             missed: Vec::new(),
@@ -179,7 +180,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
 
     fn see(&mut self, eyes: &Eyes) {
         let context = self.context;
-        let mut sorted = std::mem::take(&mut self.sorted);
+        let mut sorted = self.sorted.take().unwrap_or_default();
         sorted.clear(context.scene.instances.len());
         for (start, eight) in (0..).step_by(LANES).zip(eyes.hits.chunks(LANES)) {
             // Neighbours mostly hit the same.
@@ -190,7 +191,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             }
         }
         self.see_surroundings(eyes);
-        let mut strip = std::mem::take(&mut self.strip);
+        let mut strip = self.strip.take().unwrap_or_default();
         for k in 0..sorted.instances() {
             let (instance, hits) = sorted.of(k);
             for hits in hits.chunks(POINTS) {
@@ -198,8 +199,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
                 self.shade_strip(eyes, instance, &mut strip);
             }
         }
-        self.strip = strip;
-        self.sorted = sorted;
+        self.strip = Some(strip);
+        self.sorted = Some(sorted);
     }
 
     /// Adds what rays that met nothing see.
