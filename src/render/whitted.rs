@@ -195,8 +195,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         for k in 0..sorted.instances() {
             let (instance, hits) = sorted.of(k);
             for hits in hits.chunks(POINTS) {
-                strip.take(hits, sorted.faces(), &eyes.rays, &eyes.hits);
-                self.shade_strip(eyes, instance, &mut strip);
+                self.shade_strip(eyes, &sorted, (instance, hits), &mut strip);
             }
         }
         self.strip = Some(strip);
@@ -216,7 +215,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let at = i as usize;
         if hit.is_some() {
             if !sorted.take(self.context, (i, 1), hit.prim) {
-                self.shade(RayClass::Primary, &eyes.rays[at], &eyes.path(at), hit);
+                self.shade_eye(eyes, at);
             }
         } else if self.context.shows_environment {
             self.missed.push(i);
@@ -225,19 +224,28 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
     }
 
+    /// Shades what the `i`th eye ray has hit.
+    fn shade_eye(&mut self, eyes: &Eyes, i: usize) {
+        self.shade(RayClass::Primary, &eyes.rays[i], &eyes.path(i), &eyes.hits[i]);
+    }
+
     /// Shades points of one instance side by side, as [`Self::shade`] does one by one.
-    fn shade_strip(&mut self, eyes: &Eyes, instance: u32, strip: &mut Strip) {
+    fn shade_strip(&mut self, eyes: &Eyes, sorted: &Sorted, (instance, hits): (u32, &[(u32, u32)]), strip: &mut Strip) {
         let context = self.context;
         let mesh = &context.scene.meshes[context.scene.instances[instance as usize].mesh as usize];
         let Some(common) = &context.common[mesh.material as usize] else { return };
-        let smooth = !mesh.normals.is_empty();
+        let (smooth, reads) = (!mesh.normals.is_empty(), common.mapped || !mesh.colors.is_empty());
+        if reads && strip.reads_in_vain(mesh.material) {
+            hits.iter().for_each(|&(ray, _)| self.shade_eye(eyes, ray as usize));
+            return;
+        }
+        strip.take(hits, sorted.faces(), &eyes.rays, &eyes.hits);
         strip.find(smooth.then(|| context.world.placement(instance)));
-        if common.mapped || !mesh.colors.is_empty() {
+        if reads {
             strip.read(context, eyes, mesh.material, common);
         }
         for index in strip.left_out(common.one_sided) {
-            let i = index as usize;
-            self.shade(RayClass::Primary, &eyes.rays[i], &eyes.path(i), &eyes.hits[i]);
+            self.shade_eye(eyes, index as usize);
         }
         let matter = &common.matter;
         if !context.is_dark || matter.shines() {

@@ -32,9 +32,8 @@ impl Common {
             mapped: material.textures().next().is_some(),
             bounces,
         };
-        // With a map of it the least roughness is nowhere but where that says so.
-        let is_mapped = metal_rough.is_some_and(|m| m.metal_rough_map.is_some() && m.roughness > 0.0);
-        (is_mapped || common.can_be_beside(&common.matter)).then_some(common)
+        // A map can only make it smoother than it is where that is white.
+        common.can_be_beside(&common.matter).then_some(common)
     }
 
     /// Whether a point with this of the material can be shaded beside others.

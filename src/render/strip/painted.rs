@@ -114,7 +114,7 @@ pub(super) struct Tried {
 }
 
 impl Tried {
-    /// Strips that are not read before it is tried again whether that pays.
+    /// One strip of so many is taken to find out whether that pays.
     const PAUSE: u32 = 16;
 
     /// Whether the next points had better be shaded one by one: most of the last could not be shaded beside others.
@@ -131,16 +131,15 @@ impl Tried {
 }
 
 impl Strip {
+    /// Whether points of a material had better not be taken, because most would be left out once they are read.
+    pub(crate) fn reads_in_vain(&mut self, material: u32) -> bool {
+        self.tried.get_mut(material as usize).is_some_and(Tried::skips)
+    }
+
     /// Reads what maps and vertices say at the points that eye rays have hit, of a mesh of `material`, and leaves out those
     /// that cannot be shaded beside others then.
     pub(crate) fn read(&mut self, context: &Context, eyes: &Eyes, material: u32, common: &Common) {
-        let count = self.count.min(POINTS);
-        self.tried.resize(context.scene.materials.len(), Tried::default());
-        if self.tried[material as usize].skips() {
-            self.found.certain[..count].fill(0);
-            return;
-        }
-        let id = material as usize;
+        let (count, id) = (self.count.min(POINTS), material as usize);
         let material = &context.scene.materials[id];
         let Self { painted, found, rays, .. } = self;
         painted.any = true;
@@ -159,11 +158,17 @@ impl Strip {
                 prim = hit.prim;
                 patch = Target::new(context.scene, context.world, prim).patch(context.world, hit.u, hit.v, Vec3::ZERO);
             }
-            let Some(patch) = &mut patch else { continue };
+            let Some(patch) = &mut patch else {
+                self.found.certain[i] = 0;
+                continue;
+            };
             let print = Footprint { along: get(&self.painted.along, i), across: get(&self.painted.across, i) };
             patch.move_to([1.0 - hit.u - hit.v, hit.u, hit.v], print);
             points += 1;
             in_vain += usize::from(!self.read_at(i, context, material, common, patch));
+        }
+        if self.tried.len() <= id {
+            self.tried.resize(id + 1, Tried::default());
         }
         self.tried[id].note(points, in_vain);
     }
