@@ -109,6 +109,7 @@ impl<'g> Beside<'g> {
     }
 
     fn take(&mut self, groups: &'g [Sum]) {
+        debug_assert!(self.pixels == 0 || self.last.len() == groups.len());
         // Large parts of a picture are one colour.
         if self.pixels == 0 || self.last != groups {
             for (sums, group) in self.sums.iter_mut().zip(groups) {

@@ -125,7 +125,7 @@ impl Tried {
 
     fn note(&mut self, points: usize, in_vain: usize) {
         // What was long ago counts less and less.
-        let add = |sum: u32, new: usize| sum - sum / 8 + u32::try_from(new).unwrap_or(0);
+        let add = |sum: u32, new: usize| sum - sum.div_ceil(8) + u32::try_from(new).unwrap_or(0);
         (self.points, self.in_vain) = (add(self.points, points), add(self.in_vain, in_vain));
     }
 }
@@ -212,5 +212,22 @@ impl Kernel for Print<'_> {
             put(&mut painted.along, i, along);
             put(&mut painted.across, i, across);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_material_that_was_read_in_vain_is_tried_again_and_taken_once_that_pays() {
+        let mut tried = Tried::default();
+        assert!(!tried.skips(), "nothing is known yet");
+        (0..9).for_each(|_| tried.note(1, 1));
+        let taken = |tried: &mut Tried, strips: usize| (0..strips).filter(|_| !tried.skips()).count();
+        assert_eq!(taken(&mut tried, 160), 10);
+        // However few points a strip has.
+        (0..20).for_each(|_| tried.note(1, 0));
+        assert_eq!(taken(&mut tried, 160), 160);
     }
 }
