@@ -7,6 +7,7 @@ use crate::load::{Diagnostic, Warnings};
 use crate::scene::Pixels;
 use base64::Engine as _;
 use proptest::prelude::*;
+use proptest::test_runner::FileFailurePersistence;
 use std::borrow::Cow;
 use std::path::Path;
 
@@ -187,6 +188,12 @@ fn what_is_not_supported_is_named() {
 }
 
 proptest! {
+    // Cases that failed once are run again before any others.
+    #![proptest_config(ProptestConfig {
+        failure_persistence: Some(Box::new(FileFailurePersistence::Direct("tests/ktx-damage.txt"))),
+        ..ProptestConfig::default()
+    })]
+
     #[test]
     fn damaged_files_end_in_a_picture_or_a_warning(
         kind in 0usize..6,
