@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use meshray::accel::{NO_PRIM, Ray, RayOrder, Splitting, Wide};
+use meshray::accel::{NO_PRIM, RayOrder, Splitting, Wide};
 use meshray::bench::clock::{Spread, processor_seconds};
 
 use crate::embree::Embree;
@@ -24,11 +24,12 @@ use crate::mesh::Mesh;
 use crate::obvhs::Compressed;
 use crate::ours::Ours;
 use crate::rays::{Kind, primary, secondary};
-use crate::tracer::{Answer, PACKET, Packet, Rays, Tracer, packets};
+use crate::tracer::{Answer, PACKET, Rays, Tracer, packets};
 
 const USAGE: &str = "\
-usage: peers [--passes N] [--only WORD] [--size TRIANGLES] [MESH...]
+usage: peers [--passes N] [--kinds LETTERS] [--only WORD] [--size TRIANGLES] [MESH...]
        --passes N   timed passes of each program over all rays of a kind (default 5)
+       --kinds PDS  only these kinds of rays: from the eye, diffuse, shadow
        --only WORD  only programs whose names have this word
        --size N     triangles of the made mesh, mountain (default 2e6)
        MESH         rocker, bunny, stadium, hall, mountain (default: all)
@@ -50,6 +51,7 @@ const MESHES: [&str; 5] = ["rocker", "bunny", "stadium", "hall", "mountain"];
 /// What was typed.
 struct Words {
     passes: usize,
+    kinds: String,
     only: String,
     size: f64,
     meshes: Vec<String>,
@@ -89,10 +91,11 @@ fn main() -> ExitCode {
 }
 
 fn parse(mut words: impl Iterator<Item = String>) -> Option<Words> {
-    let mut parsed = Words { passes: 5, only: String::new(), size: 2e6, meshes: Vec::new() };
+    let mut parsed = Words { passes: 5, kinds: "PDS".into(), only: String::new(), size: 2e6, meshes: Vec::new() };
     while let Some(word) = words.next() {
         match word.as_str() {
             "--passes" => parsed.passes = words.next()?.parse().ok().filter(|&n| n > 0)?,
+            "--kinds" => parsed.kinds = words.next()?,
             "--only" => parsed.only = words.next()?,
             "--size" => parsed.size = words.next()?.parse().ok()?,
             name if MESHES.contains(&name) => parsed.meshes.push(word),
@@ -144,17 +147,12 @@ fn compare(mesh: &Mesh, embree: Option<&Embree>, words: &Words) -> bool {
     }
     tracers.retain(|t| t.name().contains(&words.only));
 
-    let rates =
-        Kind::ALL.map(|kind| measure(&tracers, kind, &rays[kind as usize], &packed[kind as usize], words.passes));
-    let wrong = Kind::ALL.map(|kind| {
-        verdicts(
-            &tracers,
-            reference.as_deref(),
-            kind,
-            Rays { all: &rays[kind as usize], packets: &packed[kind as usize] },
-        )
-    });
-    println!("{:44}{:>9}{:>9}{:>9}{:>12}", "Mrays/s, one thread", "P", "D", "S", "verdicts");
+    let kinds: Vec<Kind> = Kind::ALL.into_iter().filter(|kind| words.kinds.contains(kind.letter())).collect();
+    let of = |kind: Kind| Rays { all: &rays[kind as usize], packets: &packed[kind as usize] };
+    let rates: Vec<_> = kinds.iter().map(|&kind| measure(&tracers, kind, of(kind), words.passes)).collect();
+    let wrong: Vec<_> = kinds.iter().map(|&kind| verdicts(&tracers, reference.as_deref(), kind, of(kind))).collect();
+    let letters: String = kinds.iter().map(|kind| format!("{:>9}", kind.letter())).collect();
+    println!("{:44}{letters}{:>12}", "Mrays/s, one thread", "verdicts");
     let mut clean = true;
     for (i, tracer) in tracers.iter().enumerate() {
         let row: String = rates.iter().map(|r| format!("{:9.2}", r[i])).collect();
@@ -208,14 +206,14 @@ fn builds(mesh: &Mesh, embree: Option<&Embree>, passes: usize) {
 }
 
 /// Rays a second, in millions, of each program.
-fn measure(tracers: &[Box<dyn Tracer + '_>], kind: Kind, rays: &[Ray], packed: &[Packet], passes: usize) -> Vec<f64> {
+fn measure(tracers: &[Box<dyn Tracer + '_>], kind: Kind, rays: Rays, passes: usize) -> Vec<f64> {
     let mut answers = vec![Answer { prim: NO_PRIM, t: 0.0 }; SLICE];
     let mut spreads = vec![Spread::default(); tracers.len()];
     for pass in 0..=passes {
         for (tracer, spread) in tracers.iter().zip(&mut spreads) {
             let (any, coherent) = (kind == Kind::Shadow, kind != Kind::Diffuse);
             let ((), seconds) = processor_seconds(|| {
-                for (all, packets) in rays.chunks(SLICE).zip(packed.chunks(SLICE / PACKET)) {
+                for (all, packets) in rays.all.chunks(SLICE).zip(rays.packets.chunks(SLICE / PACKET)) {
                     tracer.trace(any, coherent, Rays { all, packets }, &mut answers[..all.len()]);
                 }
             });
@@ -225,7 +223,7 @@ fn measure(tracers: &[Box<dyn Tracer + '_>], kind: Kind, rays: &[Ray], packed: &
             }
         }
     }
-    spreads.iter().map(|s| rays.len() as f64 / s.median() * 1e-6).collect()
+    spreads.iter().map(|s| rays.all.len() as f64 / s.median() * 1e-6).collect()
 }
 
 /// How many rays each program calls a hit that the reference calls a miss, or the other way round; 0 without a reference.

@@ -28,6 +28,15 @@ pub(crate) enum Kind {
 
 impl Kind {
     pub(crate) const ALL: [Self; 3] = [Self::Primary, Self::Diffuse, Self::Shadow];
+
+    /// As it is typed and printed.
+    pub(crate) fn letter(self) -> char {
+        match self {
+            Self::Primary => 'P',
+            Self::Diffuse => 'D',
+            Self::Shadow => 'S',
+        }
+    }
 }
 
 fn ray(origin: DVec3, dir: DVec3, t_max: f64) -> Ray {

@@ -105,8 +105,15 @@ pub fn meet(ray: &RaySpace, triangle: &Triangle) -> Meeting {
 
 /// Exact t = n·(a − o) / n·d with n = (b − a) × (c − a), correctly rounded. The triangle must be hit.
 pub fn distance(ray: &RaySpace, triangle: &Triangle) -> f32 {
-    let fast = plane_quotient(ray, triangle, PLANE_TERMS_F64).and_then(Bounded::nearest);
-    fast.unwrap_or_else(|| exact_distance(ray, triangle))
+    distance_along(ray.origin, ray.dir, triangle)
+}
+
+/// [`distance`] of a ray that was not made ready; its direction is not zero.
+#[inline]
+pub fn distance_along(origin: Vec3, dir: Vec3, triangle: &Triangle) -> f32 {
+    let (numerator, denominator) = Flat::of(in_f64(triangle)).terms(origin, dir, PLANE_TERMS_F64);
+    let fast = numerator.over(denominator).and_then(Bounded::nearest);
+    fast.unwrap_or_else(|| exact_distance(&RaySpace::checked(origin, dir).0, triangle))
 }
 
 #[cold]

@@ -6,9 +6,11 @@
 use super::node::{Child, Tree};
 use super::ready::ReadyRay;
 use super::slabs::BoxMargins;
-use crate::accel::query::{Goal, Query};
+use crate::accel::probe::Outcome;
+use crate::accel::query::Goal;
 use crate::accel::wave::Wave;
-use crate::accel::{NO_PRIM, NoProbe, Shapes};
+use crate::accel::{NO_PRIM, Shapes};
+use crate::math::shear::RaySpace;
 use crate::math::sight::{Look, Sight};
 use crate::math::simd::{LANES, Row, Simd};
 use crate::math::triangle::{self, Triangle};
@@ -28,11 +30,11 @@ pub(super) struct Seeker {
 
 /// A hit by an interval.
 #[derive(Clone, Copy, Debug)]
-struct Best {
+pub(super) struct Best {
     /// Its exact distance lies between these. Without a hit: infinite, and the end of the ray's range.
-    low: f32,
-    high: f32,
-    place: Place,
+    pub low: f32,
+    pub high: f32,
+    pub place: Place,
 }
 
 /// What a ray meets of a block.
@@ -72,6 +74,12 @@ impl Place {
     #[inline(always)]
     pub(super) fn packed(self) -> u32 {
         self.block << 3 | self.lane
+    }
+
+    /// The place that was packed, of this triangle.
+    #[inline(always)]
+    pub(super) fn unpacked(packed: u32, prim: u32) -> Self {
+        Self { block: packed >> 3, lane: packed % LANES as u32, prim }
     }
 
     /// The corners in the block of a packed place, and its lane.
@@ -160,7 +168,7 @@ impl Seeker {
             let at = lane as usize % LANES;
             let place = Place { block: index, lane, prim: prims[at] };
             let certain = met.hit >> lane & 1 == 1;
-            if self.offer(shapes, wave, place, certain.then_some((met.low[at], met.high[at]))) {
+            if self.offer(tree, shapes, wave, place, certain.then_some((met.low[at], met.high[at]))) {
                 return true;
             }
         }
@@ -170,7 +178,14 @@ impl Seeker {
 
     /// Takes a triangle that is hit between these distances, or may be hit; and tells whether that is the answer.
     #[inline(always)]
-    fn offer<W: Wave>(&mut self, shapes: &Shapes, wave: &W, place: Place, between: Option<(f32, f32)>) -> bool {
+    fn offer<W: Wave>(
+        &mut self,
+        tree: &Tree,
+        shapes: &Shapes,
+        wave: &W,
+        place: Place,
+        between: Option<(f32, f32)>,
+    ) -> bool {
         if place.prim == self.exclude {
             return false;
         }
@@ -183,9 +198,8 @@ impl Seeker {
                 self.best = Best { low, high, place };
                 W::Goal::ANY
             }
-            _ => match decide(shapes, wave, self.number, self.best.place.prim, place.prim, between.is_some()) {
-                Some((t, prim)) => {
-                    let place = if prim == place.prim { place } else { self.best.place };
+            _ => match decide(tree, shapes, wave, self.number, &self.best, place, between.is_some()) {
+                Some(t) => {
                     self.best = Best { low: t, high: t, place };
                     W::Goal::ANY
                 }
@@ -195,27 +209,38 @@ impl Seeker {
     }
 }
 
-/// The best of two triangles that ray `i` may hit, by the exact test: `best`, which it does if it is not [`NO_PRIM`], and
-/// `prim`, which it does if that is `certain`. Where any hit is the answer, its distance is negative infinity.
-#[cold]
+/// Whether a triangle is hit before the best one so far, which was found by intervals, by the exact test; `certain`: it is on
+/// the ray's line. Then where, or a distance of negative infinity where any hit is the answer.
 #[inline(never)]
 pub(super) fn decide<W: Wave>(
+    tree: &Tree,
     shapes: &Shapes,
     wave: &W,
     i: usize,
-    best: u32,
-    prim: u32,
+    best: &Best,
+    place: Place,
     certain: bool,
-) -> Option<(f32, u32)> {
-    let (mut query, usable) = Query::new(shapes, &wave.rays()[i], wave.t_min(i), wave.goal(i));
-    if !usable || !certain && !triangle::is_hit(&query.ray, &shapes.triangle(prim)) {
+) -> Option<f32> {
+    let (ray, corners) = (&wave.rays()[i], Place::corners(tree, place.packed()));
+    if !certain && !triangle::is_hit(&RaySpace::checked(ray.origin, ray.dir).0, &corners) {
         return None;
     }
-    for prim in [best, prim].into_iter().filter(|&prim| prim != NO_PRIM) {
-        query.take(prim, &shapes.triangle(prim), true, &mut NoProbe);
+    let t = triangle::distance_along(ray.origin, ray.dir, &corners);
+    let (mut goal, within) = (wave.goal(i), wave.t_min(i)..=ray.t_max.min(f32::MAX));
+    if !within.contains(&t) || !goal.wants(shapes, place.prim) || goal.offer(t, place.prim) != Outcome::Hit {
+        return None;
     }
     if W::Goal::ANY {
-        return (query.reach() < query.t_min).then_some((f32::NEG_INFINITY, prim));
+        return Some(f32::NEG_INFINITY);
     }
-    query.goal.best()
+    // Rounding keeps the order, so that the exact distance of the best one lies between its bounds when rounded, too.
+    let before = if t < best.low {
+        true
+    } else if t > best.high {
+        false
+    } else {
+        let known = triangle::distance_along(ray.origin, ray.dir, &Place::corners(tree, best.place.packed()));
+        (t, place.prim) < (known, best.place.prim)
+    };
+    before.then_some(t)
 }

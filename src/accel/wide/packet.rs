@@ -15,7 +15,7 @@
 use std::marker::PhantomData;
 
 use super::alone::Lone;
-use super::best::{Place, decide};
+use super::best::{Best, Place, decide};
 use super::bundle::{Bundle, all};
 use super::flight::FARTHEST_FIRST;
 use super::node::{Child, Node, Tree};
@@ -371,12 +371,15 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
             while open != 0 {
                 let ray = open.trailing_zeros() as usize % N;
                 open &= open - 1;
-                let (i, best, certain) = (self.start + ray, self.found.prim[ray], hit >> ray & 1 == 1);
-                if let Some((t, prim)) = decide(trip.shapes, &*trip.wave, i, best, place.prim, certain) {
+                let (i, certain) = (self.start + ray, hit >> ray & 1 == 1);
+                let best = Best {
+                    low: low[ray],
+                    high: high[ray],
+                    place: Place::unpacked(self.found.place[ray], self.found.prim[ray]),
+                };
+                if let Some(t) = decide(trip.tree, trip.shapes, &*trip.wave, i, &best, place, certain) {
                     (low[ray], high[ray]) = (t, t);
-                    if prim == place.prim {
-                        (self.found.prim[ray], self.found.place[ray]) = (prim, place.packed());
-                    }
+                    (self.found.prim[ray], self.found.place[ray]) = (place.prim, place.packed());
                     changed |= 1 << ray;
                 }
             }

@@ -178,13 +178,12 @@ impl Kernel for See<'_, '_> {
         let left = judge.left_out(sums);
         let left = &left[..sums.len().min(GROUPS)];
         mean(left, &mut to.color);
-        judge.spread(left, &mut to.error);
-        // What is the same in all groups has no rounding of means.
         let equal = equal(sums);
+        judge.spread(left, &equal, &mut to.error);
+        // What is the same in all groups has no rounding of means.
         for (to, row) in to.color.iter_mut().zip(&of_first) {
             (0..PIXELS).for_each(|i| to[i] = if equal[i] == 1 { row[i] } else { to[i] });
         }
-        (0..PIXELS).for_each(|i| to.error[i] = if equal[i] == 1 { 0.0 } else { to.error[i] });
     }
 }
 
@@ -202,9 +201,7 @@ impl Kernel for Doubt<'_, '_> {
     fn run<S: Simd>(self, _: S) {
         let Self { judge, sums, to } = self;
         let left = judge.left_out(sums);
-        judge.spread(&left[..sums.len().min(GROUPS)], &mut to.error);
-        let equal = equal(sums);
-        (0..PIXELS).for_each(|i| to.error[i] = if equal[i] == 1 { 0.0 } else { to.error[i] });
+        judge.spread(&left[..sums.len().min(GROUPS)], &equal(sums), &mut to.error);
     }
 }
 
@@ -252,10 +249,11 @@ impl Certainty<'_> {
         rows
     }
 
-    /// Standard error of what is written for all groups, from what is written without each of them.
+    /// Standard error of what is written for all groups, from what is written without each of them; none where all groups are
+    /// [`equal`].
     #[inline(always)]
     #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "a handful of groups")]
-    fn spread(&self, left: &[Rows], to: &mut Row) {
+    fn spread(&self, left: &[Rows], equal: &[u32; PIXELS], to: &mut Row) {
         let (n, channels) = (left.len() as f64, self.channels());
         let mut all = [0.0; PIXELS];
         for c in 0..channels {
@@ -271,7 +269,10 @@ impl Certainty<'_> {
             }
             (0..PIXELS).for_each(|i| all[i] += squares[i] * (n - 1.0) / n);
         }
-        (0..PIXELS).for_each(|i| to[i] = (all[i] / channels as f64).sqrt() as f32);
+        for i in 0..PIXELS {
+            let error = (all[i] / channels as f64).sqrt() as f32;
+            to[i] = if equal[i] == 1 { 0.0 } else { error };
+        }
     }
 }
 

@@ -133,6 +133,7 @@ impl MetalRoughMatter {
         }
     }
 
+    /// The numbers that maps have said.
     pub(crate) fn paint(&self) -> MetalRoughPaint {
         let Self { base, metallic, roughness, occlusion, .. } = *self;
         MetalRoughPaint { base, metallic, roughness, occlusion }

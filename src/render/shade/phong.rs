@@ -47,6 +47,7 @@ impl PhongMatter {
         }
     }
 
+    /// The numbers that maps have said.
     pub(crate) fn paint(&self) -> PhongPaint {
         let Self { ambient, diffuse, specular, shininess, .. } = *self;
         PhongPaint { ambient, diffuse, specular, shininess }

@@ -13,7 +13,7 @@ pub(crate) struct Common {
     /// Whether maps change it from point to point.
     pub mapped: bool,
     /// Whether rays bounce off it where it mirrors.
-    pub bounces: bool,
+    bounces: bool,
 }
 
 impl Common {

@@ -3,6 +3,8 @@
 use super::*;
 use crate::math::Vec2;
 use crate::math::random::Random;
+use crate::render::strip::Common;
+use crate::render::texture::TextureStore;
 use crate::scene::{AlphaMode, Bitmap, Environment, MetalRough, Pixels, Sampler, Texture, TextureRef, UvTransform};
 
 /// A bit of everything: mirrors, glass, blending, textures aside.
@@ -160,6 +162,9 @@ fn mapped_points_shaded_side_by_side_have_the_bits_of_points_shaded_one_by_one()
     // Where no ray bounces even mirrors are seen by lookups.
     for (depth, environment) in [(1, Environment::Studio), (0, Environment::Studio), (1, Environment::Black)] {
         let mut s = painted();
+        let store = TextureStore::new(&s.scene);
+        let beside = |m: &Material| Common::of(m, &store, depth > 0).is_some_and(|common| common.mapped);
+        assert!(s.scene.materials.iter().all(beside), "nothing would be compared");
         (s.settings.depth, s.scene.environment) = (Some(depth), environment);
         let together = s.render();
         s.settings.layers = true;
