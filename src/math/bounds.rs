@@ -61,9 +61,10 @@ impl EdgeMargins {
         displaced * (spread + 0.125 * displaced) + self.underflow
     }
 
-    /// [`Self::error`] in lanes, for triangles whose corners are no farther from the origin along the ray's main axis than
-    /// `height` is Z: as every shear is at most 1 in size, D ≤ Z + M, and with r for the rounding 8 r (2 Z + 3 M) (M +
-    /// r (2 Z + 3 M)) ≤ M (24 r M + 16 r Z) + 64 r² Z² + 144 r² M².
+    /// The same in lanes, for shears that are products with a reciprocal and err by 2 u, and for triangles whose corners are
+    /// no farther from the origin along the ray's main axis than `height`, Z. A sheared corner is then displaced by 5 u D +
+    /// u M, and d = u (5/2 D + M). As every shear is at most 1 in size, D ≤ Z + M, and with r for the rounding
+    /// 8 r (5/2 Z + 7/2 M) (M + r (5/2 Z + 7/2 M)) ≤ M (28 r M + 20 r Z) + 100 r² Z² + 196 r² M².
     #[inline(always)]
     pub fn error_by_height<S: Lanewise<N>, const N: usize>(
         &self,
@@ -72,9 +73,9 @@ impl EdgeMargins {
         spread: S::Lanes,
     ) -> S::Lanes {
         let r = self.rounding;
-        let product = s.mul(height, s.splat(16.0 * r));
-        let slope = s.mul_add(spread, s.splat(24.0 * r + 144.0 * r * r), product);
-        // 64 = 16² / 4.
+        let product = s.mul(height, s.splat(20.0 * r));
+        let slope = s.mul_add(spread, s.splat(28.0 * r + 196.0 * r * r), product);
+        // 100 = 20² / 4.
         let constant = s.mul_add(s.mul(product, s.splat(0.25)), product, s.splat(self.underflow));
         s.mul_add(slope, spread, constant)
     }
@@ -93,6 +94,16 @@ pub const WEIGHTS: f32 = 3.0 * SLACK;
 
 /// What a mean of heights errs by, relative to the farthest there could be; see `math::triangles`.
 pub const HEIGHTS: f32 = 16.0 * U32;
+
+/// What an edge value of `math::fan` errs by, relative to D G: D ≥ |a − o| of the corners, G ≥ the edges, in the maximum norm.
+///
+/// A component of corner × edge is two products of at most D G, of which each factor errs by u, each product and their
+/// difference by u: 8 u D G. The value is one such component and two times a shear of at most 1, which errs by 2 u: 3 · 8 u
+/// D G + 2 · 2 u · 2 D G. Two products, and sums of at most 4 and 6 D G: 14 u D G. Together 46 u D G.
+///
+/// Six times the volume between origin and triangle is such a component times a corner, three times: 3 · 8 u D² G, 6 u D² G
+/// for the corner's rounding, and 16 u D² G for three products and two sums: 46 u D² G, too.
+pub const FAN_EDGE: f32 = 46.0 * U32 * SLACK;
 
 /// The unit roundoff that the bound of an edge value in `f64` is made of.
 pub const EDGE_ROUNDING_F64: f64 = U64 * SLACK as f64;

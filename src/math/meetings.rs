@@ -313,7 +313,7 @@ impl<S: Lanewise<N>, const N: usize> Vectors<S, N> {
 mod tests {
     use super::super::random::Random;
     use super::super::shear::RaySpace;
-    use super::super::sight::RowSight;
+    use super::super::sight::{RowSight, Rows};
     use super::super::simd::WIDE;
     use super::super::simd::{Kernel, Level};
     use super::super::triangle::{self, Triangle};
@@ -337,8 +337,9 @@ mod tests {
             }
             let mut corners = NO_CORNERS;
             set_corners(&mut corners, 3, triangle);
-            let sight = RowSight::<S, LANES>::new(s, &origin, from, &dir, rays[0].z);
-            let verdicts = sight.look(s, &sight.ready(s, &corners), 3).verdicts;
+            let per_length = s.store(s.div(s.splat(1.0), s.load(&dir[rays[0].z])));
+            let sight = RowSight::<S, LANES>::new(s, &origin, &dir, rays[0].z, &per_length);
+            let (verdicts, _) = sight.look(s, &sight.ready(s, &corners, 1 << 3).0, 3);
             let plane = Plane::of(triangle);
             let (least, most) = (
                 |f: fn(&RaySpace) -> DVec3| rays.iter().map(f).reduce(DVec3::min).unwrap(),

@@ -10,6 +10,7 @@ pub mod bounds;
 pub mod cone;
 pub mod ear_clip;
 pub mod expansion;
+pub mod fan;
 pub mod frame;
 pub mod inset;
 pub mod meetings;

@@ -3,7 +3,6 @@
 //! As in [`triangles`](super::triangles), but operations are fused where the processor can, and the bounds are those of each
 //! triangle's own distance: an interval that holds the exact distance tells most hits from each other.
 
-use super::Vec3;
 use super::bounds::{EdgeMargins, HEIGHTS, WEIGHTS};
 use super::simd::{Axis, LANES, Lanewise, Row, Simd};
 use super::triangles::{Corners8, Verdicts};
@@ -24,7 +23,7 @@ pub struct Sight {
 }
 
 /// The axes in sheared order, by the ray's main axis.
-static AXES: [[Axis; 3]; 3] = {
+pub(super) static AXES: [[Axis; 3]; 3] = {
     let [x, y, z] = [Axis::new(0), Axis::new(1), Axis::new(2)];
     [[y, z, x], [z, x, y], [x, y, z]]
 };
@@ -73,72 +72,47 @@ pub struct RowSight<S: Lanewise<N>, const N: usize> {
     main: usize,
     /// Origins along the axes in sheared order.
     origin: [S::Lanes; 3],
-    /// The origin of all rays along these axes, where they have one.
-    from: Option<[f32; 3]>,
     shear: [S::Lanes; 2],
     /// 1 over the directions' components along the last of the axes.
     per_length: S::Lanes,
 }
 
-/// What rays side by side see of a triangle.
-pub struct RowLook<S: Lanewise<N>, const N: usize> {
-    /// Which of them hit it.
-    pub verdicts: Verdicts,
-    view: View<S, N>,
+/// Rays side by side, and how they see triangles: eight are made ready at once, and one after another is looked at.
+pub trait Rows<S: Lanewise<N>, const N: usize> {
+    /// Eight triangles made ready.
+    type Ready;
+    /// What the rays see of one.
+    type Look;
+
+    /// Makes eight triangles ready, and says which of `lanes` any of the rays may hit.
+    fn ready<T: Simd>(&self, s: T, corners: &Corners8, lanes: u32) -> (Self::Ready, u32);
+
+    /// Tests one of eight triangles that were made ready: a bit for each ray. One that is hit behind the origin may be called
+    /// a miss.
+    fn look(&self, s: S, ready: &Self::Ready, lane: usize) -> (Verdicts, Self::Look);
+
+    /// Between which distances the exact ones lie, of rays that hit for certain.
+    fn distances(&self, s: S, ready: &Self::Ready, lane: usize, look: &Self::Look) -> [S::Lanes; 2];
 }
 
 impl<S: Lanewise<N>, const N: usize> RowSight<S, N> {
-    /// Rays by axis and lane, whose largest components are along axis `z`, with the origin of all, if there is one.
+    /// Rays by axis and lane, whose largest components are along axis `z`, with 1 over these.
     #[inline(always)]
-    pub fn new(s: S, origin: &[[f32; N]; 3], from: Option<Vec3>, dir: &[[f32; N]; 3], z: usize) -> Self {
+    pub fn new(s: S, origin: &[[f32; N]; 3], dir: &[[f32; N]; 3], z: usize, per_length: &[f32; N]) -> Self {
         let axes = [(z + 1) % 3, (z + 2) % 3, z % 3];
-        let along = s.load(&dir[axes[2]]);
+        let per_length = s.load(per_length);
         Self {
             main: z,
             origin: [s.load(&origin[axes[0]]), s.load(&origin[axes[1]]), s.load(&origin[axes[2]])],
-            from: from.map(|from| axes.map(|k| from[k])),
-            shear: [s.div(s.load(&dir[axes[0]]), along), s.div(s.load(&dir[axes[1]]), along)],
-            per_length: s.div(s.splat(1.0), along),
+            shear: [s.mul(s.load(&dir[axes[0]]), per_length), s.mul(s.load(&dir[axes[1]]), per_length)],
+            per_length,
         }
-    }
-
-    /// Eight triangles made ready for [`Self::look`]: along the axes in sheared order, relative to the origin of all rays
-    /// where they have one.
-    #[inline(always)]
-    pub fn ready<T: Simd>(&self, s: T, corners: &Corners8) -> Corners8 {
-        let (axes, from) = (AXES[self.main % 3], self.from.unwrap_or_default());
-        let mut ready = [[[0.0; LANES]; 3]; 3];
-        for (ready, rows) in ready.iter_mut().zip(corners) {
-            for k in 0..3 {
-                ready[k] = s.store(s.sub(s.along(rows, axes[k]), s.splat(from[k])));
-            }
-        }
-        ready
-    }
-
-    /// Tests one of eight triangles that were made ready: a bit for each ray.
-    #[inline(always)]
-    pub fn look(&self, s: S, ready: &Corners8, lane: usize) -> RowLook<S, N> {
-        let [a, b, c] = ready;
-        let (a, b, c) = (self.relative(s, a, lane), self.relative(s, b, lane), self.relative(s, c, lane));
-        let sheared = [self.sheared(s, a), self.sheared(s, b), self.sheared(s, c)];
-        let (verdicts, view) = view(s, sheared, [a[2], b[2], c[2]]);
-        RowLook { verdicts, view }
-    }
-
-    /// As [`Look::distances`].
-    #[inline(always)]
-    pub fn distances(&self, s: S, look: &RowLook<S, N>) -> [S::Lanes; 2] {
-        look.view.distances(s, self.per_length, [WEIGHTS, HEIGHTS])
     }
 
     /// A corner of the triangle in a lane relative to the origins.
     #[inline(always)]
     fn relative(&self, s: S, [x, y, z]: &[Row; 3], lane: usize) -> [S::Lanes; 3] {
         let [x, y, z] = [s.splat(x[lane % LANES]), s.splat(y[lane % LANES]), s.splat(z[lane % LANES])];
-        if self.from.is_some() {
-            return [x, y, z];
-        }
         [s.sub(x, self.origin[0]), s.sub(y, self.origin[1]), s.sub(z, self.origin[2])]
     }
 
@@ -148,8 +122,38 @@ impl<S: Lanewise<N>, const N: usize> RowSight<S, N> {
     }
 }
 
+impl<S: Lanewise<N>, const N: usize> Rows<S, N> for RowSight<S, N> {
+    type Ready = Corners8;
+    type Look = View<S, N>;
+
+    /// Along the axes in sheared order.
+    #[inline(always)]
+    fn ready<T: Simd>(&self, s: T, corners: &Corners8, lanes: u32) -> (Corners8, u32) {
+        let axes = AXES[self.main % 3];
+        let mut ready = [[[0.0; LANES]; 3]; 3];
+        for (ready, rows) in ready.iter_mut().zip(corners) {
+            for k in 0..3 {
+                ready[k] = s.store(s.along(rows, axes[k]));
+            }
+        }
+        (ready, lanes)
+    }
+
+    #[inline(always)]
+    fn look(&self, s: S, [a, b, c]: &Corners8, lane: usize) -> (Verdicts, View<S, N>) {
+        let (a, b, c) = (self.relative(s, a, lane), self.relative(s, b, lane), self.relative(s, c, lane));
+        let sheared = [self.sheared(s, a), self.sheared(s, b), self.sheared(s, c)];
+        view(s, sheared, [a[2], b[2], c[2]])
+    }
+
+    #[inline(always)]
+    fn distances(&self, s: S, _: &Corners8, _: usize, view: &View<S, N>) -> [S::Lanes; 2] {
+        view.distances(s, self.per_length, [WEIGHTS, HEIGHTS])
+    }
+}
+
 /// What verdicts leave behind: enough to tell about distances.
-struct View<S: Lanewise<N>, const N: usize> {
+pub struct View<S: Lanewise<N>, const N: usize> {
     /// Edge values, and what they may be off.
     edges: [S::Lanes; 3],
     error: S::Lanes,

@@ -146,6 +146,12 @@ impl<B: BoxMargins, const N: usize> Bundle<B, N> {
         s.at_most(near, far)
     }
 
+    /// 1 over the largest component of each direction.
+    #[inline(always)]
+    pub(super) fn per_length(&self) -> &[f32; N] {
+        &self.inverse[self.z % 3]
+    }
+
     /// Finds what bounds all rays.
     #[inline(always)]
     pub(super) fn bound<T: Lanewise<N>>(&mut self, s: T, tree: &Tree) {

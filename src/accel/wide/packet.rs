@@ -18,15 +18,16 @@ use super::alone::Lone;
 use super::best::{Best, Place, decide};
 use super::bundle::{Bundle, all};
 use super::flight::FARTHEST_FIRST;
-use super::node::{Child, Node, Tree};
+use super::node::{Block, Child, Node, Tree};
 use super::slabs::BoxMargins;
 use super::walk::Entry;
 use crate::accel::query::Goal;
 use crate::accel::wave::Wave;
 use crate::accel::{Hit, NO_PRIM, Ray, Shapes};
+use crate::math::fan::Fan;
 use crate::math::meetings::{Meetings, Plane, meet};
 use crate::math::shear::RaySpace;
-use crate::math::sight::RowSight;
+use crate::math::sight::{RowSight, Rows};
 use crate::math::simd::{BROAD, Kernel, LANES, Lanewise, Simd, WIDE};
 use crate::math::triangle;
 use crate::math::triangles::Verdicts;
@@ -104,6 +105,13 @@ struct Reach<T: Lanewise<N>, const N: usize> {
     limit: T::Lanes,
     /// The greatest of these.
     farthest: f32,
+}
+
+/// How the rays see triangles.
+enum Seen<T: Lanewise<N>, const N: usize> {
+    /// All from one place.
+    Together(Fan<T, N>),
+    Apart(RowSight<T, N>),
 }
 
 /// How many rays visit the nodes and leaves of packets together.
@@ -212,7 +220,11 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         }
         self.found.prim = [NO_PRIM; N];
         self.rays.bound(wide, tree);
-        let sight = RowSight::new(wide, &self.rays.origin, self.rays.common, &self.rays.dir, self.rays.z);
+        let (rays, per_length) = (&self.rays, self.rays.per_length());
+        let sight = match rays.common {
+            Some(from) => Seen::Together(Fan::new(wide, from, &rays.dir, rays.z, per_length)),
+            None => Seen::Apart(RowSight::new(wide, &rays.origin, &rays.dir, rays.z, per_length)),
+        };
         let low = wide.splat(f32::INFINITY);
         let limit = wide.choose(self.active, limit, wide.splat(f32::NEG_INFINITY));
         let mut reach: Reach<T, N> = Reach { low, high, limit, farthest: wide.greatest(limit) };
@@ -251,7 +263,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         trip: &Trip<W>,
         branch: Branch,
         reach: &mut Reach<T, N>,
-        sight: &RowSight<T, N>,
+        sight: &Seen<T, N>,
     ) {
         let changed = self.test(s, wide, trip, branch, reach, sight);
         if changed == 0 {
@@ -303,9 +315,9 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         trip: &Trip<W>,
         branch: Branch,
         reach: &mut Reach<T, N>,
-        sight: &RowSight<T, N>,
+        sight: &Seen<T, N>,
     ) -> u32 {
-        let ((index, count), mut rays) = (Child::block(branch.child), branch.rays);
+        let (index, count) = Child::block(branch.child);
         let block = &trip.tree.blocks[index as usize];
         let [a, b, c] = &block.corners;
         let zero = s.splat(0.0);
@@ -316,20 +328,39 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
             (first[k], last[k]) = if self.rays.octant >> k & 1 == 1 { (high, low) } else { (low, high) };
         }
         let (_, met) = self.rays.meets_any(s, first, last, reach.farthest);
-        let mut lanes = met & ((1 << count) - 1);
-        let mut changed = 0;
+        let lanes = met & ((1 << count) - 1);
         if lanes == 0 {
             return 0;
         }
-        let ready = sight.ready(s, &block.corners);
+        match sight {
+            Seen::Together(fan) => self.test_each(s, wide, trip, (block, index, lanes), branch.rays, reach, fan),
+            Seen::Apart(rows) => self.test_each(s, wide, trip, (block, index, lanes), branch.rays, reach, rows),
+        }
+    }
+
+    /// Tests the triangles of a mask, and tells which of the rays have new hits.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "one loop for both kinds of sight")]
+    fn test_each<S: Simd, T: Lanewise<N>, W: Wave, R: Rows<T, N>>(
+        &mut self,
+        s: S,
+        wide: T,
+        trip: &Trip<W>,
+        (block, index, lanes): (&Block, u32, u32),
+        mut rays: u32,
+        reach: &mut Reach<T, N>,
+        sight: &R,
+    ) -> u32 {
+        let (ready, mut lanes) = sight.ready(s, &block.corners, lanes);
+        let mut changed = 0;
         while lanes != 0 {
             let lane = lanes.trailing_zeros();
             lanes &= lanes - 1;
-            let look = sight.look(wide, &ready, lane as usize);
-            if (look.verdicts.hit | look.verdicts.unsure) & rays != 0 {
+            let (verdicts, look) = sight.look(wide, &ready, lane as usize);
+            if (verdicts.hit | verdicts.unsure) & rays != 0 {
                 let place = Place { block: index, lane, prim: block.prims[lane as usize % LANES] };
-                let between = sight.distances(wide, &look);
-                let hit = self.take(wide, trip, (place, rays), look.verdicts, between, reach);
+                let between = sight.distances(wide, &ready, lane as usize, &look);
+                let hit = self.take(wide, trip, (place, rays), verdicts, between, reach);
                 changed |= hit;
                 if W::Goal::ANY {
                     rays &= !hit;
