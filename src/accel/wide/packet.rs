@@ -76,18 +76,20 @@ struct Trip<'w, W> {
 }
 
 /// `N` rays that run alike.
+#[repr(C, align(64))]
 struct Packet<B, const N: usize> {
-    /// Number of its first ray.
-    start: usize,
     rays: Bundle<B, N>,
     found: Found<N>,
     /// Where their ranges end.
     t_max: [f32; N],
+    /// Number of the first ray.
+    start: usize,
     /// Rays that still look for something.
     active: u32,
 }
 
 /// What was found so far.
+#[repr(C, align(64))]
 struct Found<const N: usize> {
     /// [`NO_PRIM`] where nothing was found.
     prim: [u32; N],
