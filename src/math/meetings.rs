@@ -3,7 +3,7 @@
 //! of their own ([`meet`]), or that share one ([`Plane`]).
 
 use super::bounds::{PLANE_TERMS_F64, POSITION_T};
-use super::simd::{LANES, Lanewise, Row, Simd};
+use super::simd::{LANES, Lanewise, ROUNDED, Row, Simd};
 use super::triangle::{flat_axes, magnitude_cross};
 use super::triangles::Corners8;
 use super::{DVec3, Vec3};
@@ -57,20 +57,49 @@ pub fn meet<S: Lanewise<N>, const N: usize>(
     s: S,
     origin: [S::Lanes; 3],
     dir: [S::Lanes; 3],
-    [a, b, c]: [[S::Lanes; 3]; 3],
+    corners: [[S::Lanes; 3]; 3],
 ) -> Meetings<S::Lanes> {
+    let [n_bound, d_bound] = term_bounds(s, origin, dir, corners);
+    let [a, b, c] = corners;
     let (a, b, c) = (Vectors::<S, N>::of(s, a), Vectors::<S, N>::of(s, b), Vectors::<S, N>::of(s, c));
     let (o, d) = (Vectors::<S, N>::of(s, origin), Vectors::<S, N>::of(s, dir));
     let (e1, e2) = (b.minus(s, &a), c.minus(s, &a));
     let normal = e1.cross(s, &e2);
-    let sizes = e1.abs(s).magnitude_cross(s, &e2.abs(s));
-    let from = a.minus(s, &o);
-    let terms = s.splat_f64(PLANE_TERMS_F64 * QUOTIENT);
-    let (numerator, n_error) = (normal.dot(s, &from), s.mul_f64(sizes.dot(s, &from.abs(s)), terms));
-    let (denominator, d_error) = (normal.dot(s, &d), s.mul_f64(sizes.dot(s, &d.abs(s)), terms));
-
-    let Quotients { rounded, value, sure } = quotient(s, [numerator, n_error], [denominator, d_error]);
+    let (numerator, denominator) = (normal.dot(s, &a.minus(s, &o)), normal.dot(s, &d));
+    let (n_bound, d_bound) = (s.widen(n_bound), s.widen(d_bound));
+    let Quotients { rounded, value, sure } = quotient(s, [numerator, n_bound], [denominator, d_bound]);
     Meetings { t: rounded, weights: weights(s, [&o, &d, &a], [&e1, &e2], &normal, value), sure }
+}
+
+/// What numerators and denominators must be larger than: [`SURE`] of the sums of the sizes of their terms.
+#[inline(always)]
+fn term_bounds<S: Lanewise<N>, const N: usize>(
+    s: S,
+    origin: [S::Lanes; 3],
+    dir: [S::Lanes; 3],
+    [a, b, c]: [[S::Lanes; 3]; 3],
+) -> [S::Lanes; 2] {
+    let (p, q, from) = (apart(s, b, a), apart(s, c, a), apart(s, a, origin));
+    let sizes = [
+        s.mul_add(p[1], q[2], s.mul(p[2], q[1])),
+        s.mul_add(p[2], q[0], s.mul(p[0], q[2])),
+        s.mul_add(p[0], q[1], s.mul(p[1], q[0])),
+    ];
+    let along = [s.abs(dir[0]), s.abs(dir[1]), s.abs(dir[2])];
+    let (sure, least) = (s.splat(SURE), s.splat(f32::MIN_POSITIVE));
+    [s.mul_add(sum(s, sizes, from), sure, least), s.mul_add(sum(s, sizes, along), sure, least)]
+}
+
+/// How far places are apart, by axis.
+#[inline(always)]
+fn apart<S: Lanewise<N>, const N: usize>(s: S, p: [S::Lanes; 3], q: [S::Lanes; 3]) -> [S::Lanes; 3] {
+    [s.abs(s.sub(p[0], q[0])), s.abs(s.sub(p[1], q[1])), s.abs(s.sub(p[2], q[2]))]
+}
+
+/// p · q.
+#[inline(always)]
+fn sum<S: Lanewise<N>, const N: usize>(s: S, p: [S::Lanes; 3], q: [S::Lanes; 3]) -> S::Lanes {
+    s.mul_add(p[0], q[0], s.mul_add(p[1], q[1], s.mul(p[2], q[2])))
 }
 
 /// What bounds the rays of a row.
@@ -83,7 +112,7 @@ pub struct RowBounds {
     /// The origin, where all rays have the same.
     pub from: Option<DVec3>,
     /// No component of a direction is larger in size.
-    pub dir: DVec3,
+    pub dir: f64,
 }
 
 /// What the rays of a row share when they meet a triangle.
@@ -127,9 +156,9 @@ impl Plane {
         let d = [s.widen(s.load(&dir[0])), s.widen(s.load(&dir[1])), s.widen(s.load(&dir[2]))];
         let denominator = self.dot(s, d);
         // Those of the farthest and of the steepest ray there could be.
-        let n_error = s.splat_f64(self.sizes.dot(low.max(high)) * (PLANE_TERMS_F64 * QUOTIENT));
-        let d_error = s.splat_f64(self.sizes.dot(bounds.dir) * (PLANE_TERMS_F64 * QUOTIENT));
-        let Quotients { rounded, value, sure } = quotient(s, [numerator, n_error], [denominator, d_error]);
+        let n_bound = s.splat_f64(self.sizes.dot(low.max(high)) * f64::from(SURE));
+        let d_bound = s.splat_f64(self.sizes.element_sum() * bounds.dir * f64::from(SURE));
+        let Quotients { rounded, value, sure } = quotient(s, [numerator, n_bound], [denominator, d_bound]);
         Meetings { t: rounded, weights: self.barycentrics(s, origin, dir, value), sure }
     }
 
@@ -178,9 +207,15 @@ impl Plane {
     }
 }
 
-/// What the errors of a quotient's terms are multiplied with: the 3/2 and the 1.001 of
-/// [`Bounded`](super::quotient::Bounded), and room for what is rounded otherwise here.
-const QUOTIENT: f64 = 1.502;
+/// A term is certain enough when it is larger than this part of the sum of the sizes of what it is made of.
+///
+/// [`Bounded::over`](super::quotient::Bounded) finds a quotient to an error of 3/2 of those of its terms and 4 u, relative;
+/// half of [`POSITION_T`], but for a thousandth, is left for each term, which errs by [`PLANE_TERMS_F64`] of that sum. The sum
+/// may be computed in `f32`: fewer than 16 roundings.
+const SURE: f32 = {
+    assert!(ROUNDED == POSITION_T);
+    (PLANE_TERMS_F64 * (1.5 * 1.001 * 2.0 / POSITION_T)) as f32 * (1.0 + 16.0 * f32::EPSILON)
+};
 
 /// Quotients of bounded terms.
 struct Quotients<L, D> {
@@ -192,29 +227,20 @@ struct Quotients<L, D> {
     sure: u32,
 }
 
-/// n / d, each with [`QUOTIENT`] times the bound of its error: [`Bounded::over`](super::quotient::Bounded) and what is asked
-/// of it, in lanes. What is certain here is certain there, and never the other way round.
-///
-/// That an error is below a quarter of its term need not be asked: with e ≥ n/4 or f ≥ d/4 the bound of the quotient's error
-/// is 3/8 of its size at least, and not below the part [`POSITION_T`] of it. Zeros and NaN fail there, too.
+/// n / d, where both are larger than what is asked of them: [`Bounded::over`](super::quotient::Bounded) in lanes. What is
+/// certain here is certain there, and never the other way round.
 #[inline(always)]
 fn quotient<S: Lanewise<N>, const N: usize>(
     s: S,
-    [numerator, n_error]: [S::Doubles; 2],
-    [denominator, d_error]: [S::Doubles; 2],
+    [numerator, n_bound]: [S::Doubles; 2],
+    [denominator, d_bound]: [S::Doubles; 2],
 ) -> Quotients<S::Lanes, S::Doubles> {
-    let reciprocal = s.div_f64(s.splat_f64(1.0), denominator);
-    let value = s.mul_f64(numerator, reciprocal);
-    let size = s.abs_f64(value);
-    let terms = s.add_f64(n_error, s.mul_f64(d_error, size));
-    let rounding = s.mul_f64(size, s.splat_f64(2.0 * QUOTIENT * f64::EPSILON));
-    let error = s.add_f64(s.mul_f64(terms, s.abs_f64(reciprocal)), rounding);
-    let (low, high) = (s.narrow(s.sub_f64(value, error)), s.narrow(s.add_f64(value, error)));
-    // Rounding keeps the order of both, so that they are equal. Below the normal numbers zero gets a sign, which is left to
-    // the scalar form.
-    let one = s.at_most(high, low) & s.less(s.splat(f32::MIN_POSITIVE), s.abs(low));
-    let sure = s.less_f64(error, s.mul_f64(size, s.splat_f64(POSITION_T))) & one;
-    Quotients { rounded: low, value, sure }
+    let value = s.mul_f64(numerator, s.div_f64(s.splat_f64(1.0), denominator));
+    let rounded = s.narrow(value);
+    let certain = s.less_f64(n_bound, s.abs_f64(numerator)) & s.less_f64(d_bound, s.abs_f64(denominator));
+    // Below the normal numbers zero gets a sign, which is left to the scalar form.
+    let sure = certain & s.rounds_surely(value) & s.less(s.splat(f32::MIN_POSITIVE), s.abs(rounded));
+    Quotients { rounded, value, sure }
 }
 
 /// Weights of the second and third corner: areas seen along the axis from which they are largest. Each is a component of a
@@ -243,10 +269,10 @@ fn weights<S: Lanewise<N>, const N: usize>(
 /// Weights within 0 to 1, and their sum, too; rounded, 0 for a NaN.
 #[inline(always)]
 fn clamped<S: Lanewise<N>, const N: usize>(s: S, u: S::Doubles, v: S::Doubles) -> [S::Lanes; 2] {
-    let (zero, most) = (s.splat_f64(0.0), s.splat_f64(1.0));
-    let u = s.narrow(s.smaller_f64(s.greater_f64(u, zero), most));
-    let v = s.narrow(s.smaller_f64(s.greater_f64(v, zero), most));
-    let one = s.splat(1.0);
+    // Rounding keeps the order, and neither bound is rounded.
+    let (zero, one) = (s.splat(0.0), s.splat(1.0));
+    let u = s.smaller(s.greater(s.narrow(u), zero), one);
+    let v = s.smaller(s.greater(s.narrow(v), zero), one);
     [u, s.choose(s.less(one, s.add(u, v)), s.sub(one, u), v)]
 }
 
@@ -284,17 +310,6 @@ impl<S: Lanewise<N>, const N: usize> Vectors<S, N> {
             s.sub_f64(s.mul_f64(b, *z), s.mul_f64(*y, c)),
             s.sub_f64(s.mul_f64(c, *x), s.mul_f64(*z, a)),
             s.sub_f64(s.mul_f64(a, *y), s.mul_f64(*x, b)),
-        ])
-    }
-
-    /// With sums for differences.
-    #[inline(always)]
-    fn magnitude_cross(&self, s: S, Self([x, y, z]): &Self) -> Self {
-        let [a, b, c] = self.0;
-        Self([
-            s.add_f64(s.mul_f64(b, *z), s.mul_f64(c, *y)),
-            s.add_f64(s.mul_f64(c, *x), s.mul_f64(a, *z)),
-            s.add_f64(s.mul_f64(a, *y), s.mul_f64(b, *x)),
         ])
     }
 
@@ -349,7 +364,7 @@ mod tests {
                 low: least(|r| r.origin.as_dvec3()),
                 high: most(|r| r.origin.as_dvec3()),
                 from: from.map(Vec3::as_dvec3),
-                dir: most(|r| r.dir.as_dvec3().abs()),
+                dir: most(|r| r.dir.as_dvec3().abs()).max_element(),
             };
             let Meetings { t, weights: [u, v], sure } = plane.meet(s, &origin, &dir, &bounds);
             (verdicts, Meetings { t: s.store(t), weights: [s.store(u), s.store(v)], sure })

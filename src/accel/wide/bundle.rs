@@ -11,7 +11,7 @@ use crate::math::bounds::PARALLEL;
 use crate::math::meetings::RowBounds;
 use crate::math::shear::main_axis;
 use crate::math::simd::{LANES, Lanewise, Pick, Simd};
-use crate::math::{DVec3, Vec3};
+use crate::math::Vec3;
 
 /// A bit for every ray of a packet of `N`.
 pub(super) const fn all<const N: usize>() -> u32 {
@@ -197,13 +197,13 @@ impl<B: BoxMargins, const N: usize> Bundle<B, N> {
     /// Bounds of origins and directions, as exact distances need them.
     #[inline(always)]
     pub(super) fn row_bounds(&self) -> RowBounds {
-        // A reciprocal is rounded once, and so is this.
-        let fastest = |k: usize| (1.0 + f64::from(f32::EPSILON)) / f64::from(self.hull.first[k][0].abs());
+        // A reciprocal is rounded once.
+        let slowest = self.hull.first[self.z % 3][0].abs();
         RowBounds {
             low: self.low.as_dvec3(),
             high: self.high.as_dvec3(),
             from: self.common.map(Vec3::as_dvec3),
-            dir: DVec3::new(fastest(0), fastest(1), fastest(2)),
+            dir: (1.0 + f64::from(f32::EPSILON)) / f64::from(slowest),
         }
     }
 

@@ -8,7 +8,7 @@
 use std::arch::x86_64::*;
 
 use super::pair::Pair;
-use super::{Axis, Kernel, LANES, Lanewise, Order, Pick, Row, Simd};
+use super::{Axis, Kernel, LANES, Lanewise, MIDDLE, NEAR_MIDDLE, Order, Pick, Row, Simd};
 
 /// Proof that the processor has AVX2 and the fused and bit instructions that came with it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -289,6 +289,22 @@ macro_rules! eight_lanes {
             fn abs_f64(self, a: [__m256d; 2]) -> [__m256d; 2] {
                 // SAFETY: as above.
                 unsafe { [_mm256_andnot_pd(_mm256_set1_pd(-0.0), a[0]), _mm256_andnot_pd(_mm256_set1_pd(-0.0), a[1])] }
+            }
+
+            #[inline(always)]
+            fn rounds_surely(self, a: [__m256d; 2]) -> u32 {
+                // SAFETY: as above.
+                let (low, high) = unsafe {
+                    let (middle, near) = (_mm256_set1_epi64x(MIDDLE), _mm256_set1_epi64x(NEAR_MIDDLE));
+                    let low = _mm256_and_si256(_mm256_add_epi64(_mm256_castpd_si256(a[0]), middle), near);
+                    let high = _mm256_and_si256(_mm256_add_epi64(_mm256_castpd_si256(a[1]), middle), near);
+                    let zero = _mm256_setzero_si256();
+                    (
+                        _mm256_movemask_pd(_mm256_castsi256_pd(_mm256_cmpeq_epi64(low, zero))),
+                        _mm256_movemask_pd(_mm256_castsi256_pd(_mm256_cmpeq_epi64(high, zero))),
+                    )
+                };
+                !(low | high << 4).cast_unsigned() & 255
             }
 
             #[inline(always)]

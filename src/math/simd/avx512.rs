@@ -9,7 +9,7 @@ use std::arch::x86_64::*;
 
 use super::avx2::{Avx2, eight_lanes, lanes_in, lanes_of};
 use super::pair::Pair;
-use super::{Axis, Kernel, LANES, Lanewise, Order, Pick, Row, Simd, WIDE};
+use super::{Axis, Kernel, LANES, Lanewise, MIDDLE, NEAR_MIDDLE, Order, Pick, Row, Simd, WIDE};
 
 /// Proof that the processor has AVX-512 with 256-bit forms, double words and quad words, and what AVX2 came with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -301,6 +301,17 @@ impl Lanewise<WIDE> for Sixteen {
     fn abs_f64(self, a: [__m512d; 2]) -> [__m512d; 2] {
         // SAFETY: as above.
         unsafe { [_mm512_abs_pd(a[0]), _mm512_abs_pd(a[1])] }
+    }
+
+    #[inline(always)]
+    fn rounds_surely(self, a: [__m512d; 2]) -> u32 {
+        // SAFETY: as above.
+        unsafe {
+            let (middle, near) = (_mm512_set1_epi64(MIDDLE), _mm512_set1_epi64(NEAR_MIDDLE));
+            let low = _mm512_test_epi64_mask(_mm512_add_epi64(_mm512_castpd_si512(a[0]), middle), near);
+            let high = _mm512_test_epi64_mask(_mm512_add_epi64(_mm512_castpd_si512(a[1]), middle), near);
+            u32::from(low) | u32::from(high) << LANES
+        }
     }
 
     #[inline(always)]

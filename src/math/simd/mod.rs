@@ -34,6 +34,18 @@ pub const BROAD: usize = 32;
 /// Eight numbers in memory, as nodes and blocks store them.
 pub type Row = [f32; LANES];
 
+/// See [`Lanewise::rounds_surely`].
+pub const ROUNDED: f64 = 1.0 / (1u64 << 40) as f64;
+
+/// What makes a double that is too near to the middle between two floats carry over the bits of [`NEAR_MIDDLE`]: the last 29
+/// bits are cut off when it is rounded, and 2⁻⁴⁰ of it is at most 2¹³ in units of the last. Twice that is kept away from.
+#[cfg(target_arch = "x86_64")]
+const MIDDLE: i64 = (1 << 14) - (1 << 28);
+
+/// The bits that are zero then.
+#[cfg(target_arch = "x86_64")]
+const NEAR_MIDDLE: i64 = (1 << 29) - (1 << 15);
+
 /// Arithmetic of one instruction set on `N` numbers at once. A value of the type is the proof that the machine has it.
 ///
 /// Comparisons give a mask: bit k is set where lane k holds.
@@ -119,6 +131,14 @@ pub trait Lanewise<const N: usize>: Copy {
     fn greater_f64(self, a: Self::Doubles, b: Self::Doubles) -> Self::Doubles;
     /// The smaller of both; b where one is NaN.
     fn smaller_f64(self, a: Self::Doubles, b: Self::Doubles) -> Self::Doubles;
+    /// Where all numbers within a part [`ROUNDED`] of the finite `a`, which is in the normal range of single precision, have
+    /// the same nearest number there; it may also be false where they have.
+    #[inline(always)]
+    fn rounds_surely(self, a: Self::Doubles) -> u32 {
+        let room = self.mul_f64(self.abs_f64(a), self.splat_f64(ROUNDED));
+        let (low, high) = (self.narrow(self.sub_f64(a, room)), self.narrow(self.add_f64(a, room)));
+        self.at_most(low, high) & self.at_most(high, low)
+    }
     /// a < b; false where one is NaN.
     fn less_f64(self, a: Self::Doubles, b: Self::Doubles) -> u32;
     /// `a` in the lanes of `mask`, else `b`.

@@ -218,6 +218,11 @@ macro_rules! pair {
             }
 
             #[inline(always)]
+            fn rounds_surely(self, a: Self::Doubles) -> u32 {
+                self.0.rounds_surely(a[0]) | self.0.rounds_surely(a[1]) << $half
+            }
+
+            #[inline(always)]
             fn less_f64(self, a: Self::Doubles, b: Self::Doubles) -> u32 {
                 self.0.less_f64(a[0], b[0]) | self.0.less_f64(a[1], b[1]) << $half
             }
