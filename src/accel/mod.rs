@@ -121,6 +121,12 @@ impl Hit {
         bytemuck::cast_ref(self)
     }
 
+    /// The other way round, of some.
+    #[inline(always)]
+    pub(crate) fn from_fours<const N: usize>(fours: [[f32; 4]; N]) -> [Self; N] {
+        fours.map(|four| bytemuck::cast(four))
+    }
+
     /// t, u, v and prim as bits: equal only where every bit of two hits is.
     pub fn bits(&self) -> [u32; 4] {
         [self.t.to_bits(), self.u.to_bits(), self.v.to_bits(), self.prim]

@@ -29,6 +29,12 @@ pub trait Wave {
     /// Takes the answer of a ray whose hit, or miss, is known to the last bit.
     fn take(&mut self, i: usize, hit: Hit);
 
+    /// [`Self::take`] for rays that follow each other.
+    #[inline(always)]
+    fn take_all(&mut self, start: usize, hits: &[Hit]) {
+        (start..).zip(hits).for_each(|(i, hit)| self.take(i, *hit));
+    }
+
     /// Takes the answer of a query, and tells whether there was a hit.
     fn answer(&mut self, i: usize, query: &Query<Self::Goal>) -> bool;
 }
@@ -55,6 +61,11 @@ impl<I: Intersector> Wave for ForFirst<'_, I> {
     #[inline(always)]
     fn take(&mut self, i: usize, hit: Hit) {
         self.hits[i] = hit;
+    }
+
+    #[inline(always)]
+    fn take_all(&mut self, start: usize, hits: &[Hit]) {
+        self.hits[start..start + hits.len()].copy_from_slice(hits);
     }
 
     #[inline]
@@ -86,6 +97,12 @@ impl<I: Intersector> Wave for ForAny<'_, I> {
     #[inline(always)]
     fn take(&mut self, i: usize, hit: Hit) {
         self.blocked[i] = hit.is_some();
+    }
+
+    #[inline(always)]
+    fn take_all(&mut self, start: usize, hits: &[Hit]) {
+        let blocked = &mut self.blocked[start..start + hits.len()];
+        blocked.iter_mut().zip(hits).for_each(|(blocked, hit)| *blocked = hit.is_some());
     }
 
     #[inline]
@@ -130,6 +147,11 @@ impl<I: Intersector> Wave for ForNext<'_, I> {
     #[inline(always)]
     fn take(&mut self, i: usize, hit: Hit) {
         self.hits[i] = hit;
+    }
+
+    #[inline(always)]
+    fn take_all(&mut self, start: usize, hits: &[Hit]) {
+        self.hits[start..start + hits.len()].copy_from_slice(hits);
     }
 
     #[inline]

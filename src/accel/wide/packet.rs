@@ -217,7 +217,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         let limit = B::widened_lanes(wide, high);
         self.active = self.rays.meet(wide, first, last, limit) & alike;
         if self.active == 0 {
-            (self.start..self.start + N).for_each(|i| trip.wave.take(i, Hit::MISS));
+            trip.wave.take_all(self.start, &[Hit::MISS; N]);
             return company;
         }
         self.found.prim = [NO_PRIM; N];
@@ -445,14 +445,12 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
     fn answer<S: Simd, T: Lanewise<N>, W: Wave>(&mut self, s: S, wide: T, trip: &mut Trip<W>) {
         let (start, found, tree) = (self.start, &self.found, trip.tree);
         if W::Goal::ANY {
-            for (ray, &prim) in found.prim.iter().enumerate() {
-                trip.wave.take(start + ray, Hit { prim, ..Hit::MISS });
-            }
+            trip.wave.take_all(start, &found.prim.map(|prim| Hit { prim, ..Hit::MISS }));
             return;
         }
         let hit = !wide.find_word(NO_PRIM, &found.prim) & all::<N>();
         if hit == 0 {
-            return (start..start + N).for_each(|i| trip.wave.take(i, Hit::MISS));
+            return trip.wave.take_all(start, &[Hit::MISS; N]);
         }
         let (mut unsure, zero) = (hit, wide.splat(0.0));
         let place = found.place[hit.trailing_zeros() as usize % N];
@@ -476,9 +474,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         for (k, prim) in found.prim.as_chunks::<LANES>().0.iter().enumerate() {
             let [t, u, v] = [&t.as_chunks().0[k], &u.as_chunks().0[k], &v.as_chunks().0[k]];
             let rows = s.rows([s.load(t), s.load(u), s.load(v), s.load(&prim.map(f32::from_bits))]);
-            for (lane, [t, u, v, prim]) in rows.into_iter().enumerate() {
-                trip.wave.take(start + LANES * k + lane, Hit { t, u, v, prim: prim.to_bits() });
-            }
+            trip.wave.take_all(start + LANES * k, &Hit::from_fours(rows));
         }
     }
 }
