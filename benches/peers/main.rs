@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use meshray::accel::{NO_PRIM, RayOrder, Splitting, Wide};
+use meshray::accel::{NO_PRIM, Pencil, RayOrder, Splitting, Wide};
 use meshray::bench::clock::{Spread, processor_seconds};
 
 use crate::embree::Embree;
@@ -24,7 +24,7 @@ use crate::mesh::Mesh;
 use crate::obvhs::Compressed;
 use crate::ours::Ours;
 use crate::rays::{Kind, primary, secondary};
-use crate::tracer::{Answer, PACKET, Rays, Tracer, packets};
+use crate::tracer::{Answer, PACKET, Rays, Tracer, directions, packets};
 
 const USAGE: &str = "\
 usage: peers [--passes N] [--kinds LETTERS] [--only WORD] [--size TRIANGLES] [MESH...]
@@ -148,7 +148,12 @@ fn compare(mesh: &Mesh, embree: Option<&Embree>, words: &Words) -> bool {
     tracers.retain(|t| t.name().contains(&words.only));
 
     let kinds: Vec<Kind> = Kind::ALL.into_iter().filter(|kind| words.kinds.contains(kind.letter())).collect();
-    let of = |kind: Kind| Rays { all: &rays[kind as usize], packets: &packed[kind as usize] };
+    let (origin, dirs) = (mesh.camera.eye.as_vec3(), directions(&rays[0]));
+    let of = |kind: Kind| Rays {
+        all: &rays[kind as usize],
+        packets: &packed[kind as usize],
+        pencil: (kind == Kind::Primary).then(|| Pencil { origin, dirs: dirs.each_ref().map(Vec::as_slice) }),
+    };
     let rates: Vec<_> = kinds.iter().map(|&kind| measure(&tracers, kind, of(kind), words.passes)).collect();
     let wrong: Vec<_> = kinds.iter().map(|&kind| verdicts(&tracers, reference.as_deref(), kind, of(kind))).collect();
     let letters: String = kinds.iter().map(|kind| format!("{:>9}", kind.letter())).collect();
@@ -213,8 +218,10 @@ fn measure(tracers: &[Box<dyn Tracer + '_>], kind: Kind, rays: Rays, passes: usi
         for (tracer, spread) in tracers.iter().zip(&mut spreads) {
             let (any, coherent) = (kind == Kind::Shadow, kind != Kind::Diffuse);
             let ((), seconds) = processor_seconds(|| {
-                for (all, packets) in rays.all.chunks(SLICE).zip(rays.packets.chunks(SLICE / PACKET)) {
-                    tracer.trace(any, coherent, Rays { all, packets }, &mut answers[..all.len()]);
+                let parts = rays.all.chunks(SLICE).zip(rays.packets.chunks(SLICE / PACKET));
+                for (start, (all, packets)) in (0..).step_by(SLICE).zip(parts) {
+                    let pencil = rays.pencil.map(|pencil| pencil.part(start..start + all.len()));
+                    tracer.trace(any, coherent, Rays { all, packets, pencil }, &mut answers[..all.len()]);
                 }
             });
             // The first pass warms up.

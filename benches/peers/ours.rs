@@ -45,7 +45,7 @@ impl Tracer for Ours<'_> {
     }
 
     fn trace(&self, any: bool, _: bool, rays: Rays, answers: &mut [Answer]) {
-        let rays = rays.all;
+        let (pencil, rays) = (rays.pencil, rays.all);
         let (scratch, hits, blocked) = &mut *self.buffers.borrow_mut();
         if any {
             blocked.resize(rays.len(), false);
@@ -55,7 +55,10 @@ impl Tracer for Ours<'_> {
             }
         } else {
             hits.resize(rays.len(), Hit::MISS);
-            self.wide.closest(rays, hits, scratch, &mut NoProbe);
+            match &pencil {
+                Some(pencil) => self.wide.closest_from(pencil, rays, hits, scratch, &mut NoProbe),
+                None => self.wide.closest(rays, hits, scratch, &mut NoProbe),
+            }
             for (answer, hit) in answers.iter_mut().zip(hits) {
                 *answer = Answer { prim: hit.prim, t: hit.t };
             }

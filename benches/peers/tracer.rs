@@ -1,6 +1,6 @@
 //! What every program that is compared can do.
 
-use meshray::accel::Ray;
+use meshray::accel::{Pencil, Ray};
 
 /// What a ray met: the prim, or `NO_PRIM`; for rays that ask for any hit, 0 or `NO_PRIM`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,11 +24,13 @@ pub(crate) const PACKET: usize = 16;
 /// Sixteen rays side by side: origins, directions, ends.
 pub(crate) type Packet = [[f32; PACKET]; 7];
 
-/// The same rays one after another and in packets, so that each program finds them as it likes them.
+/// The same rays one after another, in packets, and by axis, so that each program finds them as it likes them.
 #[derive(Clone, Copy)]
 pub(crate) struct Rays<'a> {
     pub all: &'a [Ray],
     pub packets: &'a [Packet],
+    /// The directions by axis, where all start at one place.
+    pub pencil: Option<Pencil<'a>>,
 }
 
 /// Rays in packets; the last one may be filled up with what it has.
@@ -45,4 +47,9 @@ pub(crate) fn packets(rays: &[Ray]) -> Vec<Packet> {
         packet
     };
     rays.chunks(PACKET).map(packet).collect()
+}
+
+/// The directions of rays, by axis.
+pub(crate) fn directions(rays: &[Ray]) -> [Vec<f32>; 3] {
+    [0, 1, 2].map(|k| rays.iter().map(|ray| ray.dir[k]).collect())
 }

@@ -46,6 +46,7 @@ pub use shapes::{BitSet, Object, Shapes, SpherePrim};
 pub use stats::StructureStats;
 pub use transform::Transformed;
 pub use volumes::Volumes;
+pub use wave::Pencil;
 pub use wide::{Listed, RayOrder, Splitting, Wide};
 
 use bytemuck::{Pod, Zeroable};
@@ -155,6 +156,18 @@ pub trait Accel: Sync {
 
     /// The first hit of each ray in `t_min..=t_max`; [`Hit::MISS`] where there is none.
     fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P);
+
+    /// [`Self::closest`] for rays that are those of a pencil, too: who traces rays from one place together reads them there.
+    fn closest_from<P: Probe>(
+        &self,
+        _pencil: &Pencil,
+        rays: &[Ray],
+        hits: &mut [Hit],
+        scratch: &mut Self::Scratch,
+        probe: &mut P,
+    ) {
+        self.closest(rays, hits, scratch, probe);
+    }
 
     /// Whether anything *opaque* lies in `t_min..=t_max` of each ray.
     fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut Self::Scratch, probe: &mut P);

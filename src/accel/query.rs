@@ -6,7 +6,7 @@
 use super::intersector::{Exact, Intersector};
 use super::probe::{Outcome, Test};
 use super::wave::{ForAny, ForFirst, ForNext, Wave, begin, end};
-use super::{Accel, Hit, NO_PRIM, Probe, Ray, Shapes};
+use super::{Accel, Hit, NO_PRIM, Pencil, Probe, Ray, Shapes};
 use crate::math::shear::RaySpace;
 use crate::math::simd::LANES;
 use crate::math::triangle::{self, Meeting, Triangle};
@@ -405,6 +405,17 @@ impl<C: Culling> Accel for C {
         closest(Exact, self, rays, hits, scratch, probe);
     }
 
+    fn closest_from<P: Probe>(
+        &self,
+        pencil: &Pencil,
+        rays: &[Ray],
+        hits: &mut [Hit],
+        scratch: &mut Self::Scratch,
+        probe: &mut P,
+    ) {
+        self.trace(&mut ForFirst { rays, pencil: Some(*pencil), hits, test: Exact }, scratch, probe);
+    }
+
     fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut Self::Scratch, probe: &mut P) {
         occluded(Exact, self, rays, blocked, scratch, probe);
     }
@@ -470,7 +481,7 @@ fn closest<I: Intersector, C: Culling, P: Probe>(
     scratch: &mut C::Scratch,
     probe: &mut P,
 ) {
-    structure.trace(&mut ForFirst { rays, hits, test }, scratch, probe);
+    structure.trace(&mut ForFirst { rays, pencil: None, hits, test }, scratch, probe);
 }
 
 fn occluded<I: Intersector, C: Culling, P: Probe>(

@@ -2,8 +2,36 @@
 //!
 //! A structure may ask the rays of a wave in any order and in any number at once.
 
+use std::ops::Range;
+
 use super::query::{Closest, Goal, Next, Occluded, Query};
-use super::{Hit, Intersector, Probe, Ray, Shapes};
+use super::{Hit, Intersector, NO_PRIM, Probe, Ray, Shapes};
+use crate::math::Vec3;
+
+/// Rays that start at one place, look for hits from there on without end, and exclude no prim.
+#[derive(Clone, Copy, Debug)]
+pub struct Pencil<'w> {
+    /// Where they start.
+    pub origin: Vec3,
+    /// Their directions, by axis.
+    pub dirs: [&'w [f32]; 3],
+}
+
+impl Pencil<'_> {
+    /// One of its rays, of no sample.
+    #[inline(always)]
+    pub(super) fn ray(&self, i: usize) -> Ray {
+        let [x, y, z] = self.dirs;
+        let dir = Vec3::new(x[i], y[i], z[i]);
+        Ray { origin: self.origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude: NO_PRIM, sample: 0 }
+    }
+
+    /// These of its rays, or as many of them as there are.
+    #[must_use]
+    pub fn part(&self, rays: Range<usize>) -> Self {
+        Self { dirs: self.dirs.map(|row| row.get(rays.clone()).unwrap_or(&[])), ..*self }
+    }
+}
 
 /// Rays that are asked the same question, and where the answers go.
 pub trait Wave {
@@ -13,15 +41,27 @@ pub trait Wave {
     /// The rays; there is an answer for each.
     fn rays(&self) -> &[Ray];
 
+    /// One of them, from wherever it is read soonest.
+    #[inline(always)]
+    fn ray(&self, i: usize) -> Ray {
+        self.rays()[i]
+    }
+
     /// From where on the hits of a ray count.
     #[inline(always)]
     fn t_min(&self, i: usize) -> f32 {
-        self.rays()[i].t_min
+        self.ray(i).t_min
     }
 
     /// [`Self::t_min`] of rays that follow each other, of which the first is ray `start`; given are those of the rays.
     #[inline(always)]
     fn adapt_t_min(&self, _start: usize, _t_min: &mut [f32]) {}
+
+    /// The rays once more, where they all start at one place.
+    #[inline(always)]
+    fn pencil(&self) -> Option<Pencil<'_>> {
+        None
+    }
 
     /// What a ray looks for.
     fn goal(&self, i: usize) -> Self::Goal;
@@ -41,6 +81,7 @@ pub trait Wave {
 
 pub(super) struct ForFirst<'w, I> {
     pub rays: &'w [Ray],
+    pub pencil: Option<Pencil<'w>>,
     pub hits: &'w mut [Hit],
     pub test: I,
 }
@@ -51,6 +92,16 @@ impl<I: Intersector> Wave for ForFirst<'_, I> {
     #[inline(always)]
     fn rays(&self) -> &[Ray] {
         self.rays
+    }
+
+    #[inline(always)]
+    fn ray(&self, i: usize) -> Ray {
+        self.pencil.map_or_else(|| self.rays[i], |pencil| pencil.ray(i))
+    }
+
+    #[inline(always)]
+    fn pencil(&self) -> Option<Pencil<'_>> {
+        self.pencil
     }
 
     #[inline(always)]

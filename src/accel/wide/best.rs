@@ -221,7 +221,7 @@ pub(super) fn decide<W: Wave>(
     place: Place,
     certain: bool,
 ) -> Option<f32> {
-    let (ray, corners) = (&wave.rays()[i], Place::corners(tree, place.packed()));
+    let (ray, corners) = (wave.ray(i), Place::corners(tree, place.packed()));
     if !certain && !triangle::is_hit(&RaySpace::checked(ray.origin, ray.dir).0, &corners) {
         return None;
     }

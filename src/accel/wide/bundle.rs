@@ -82,7 +82,7 @@ impl<B: BoxMargins, const N: usize> Bundle<B, N> {
     /// Takes the rays; how far each of them looks.
     #[inline(always)]
     pub(super) fn spread<S: Simd, T: Lanewise<N>>(&mut self, s: S, lanes: T, rays: &[Ray; N]) -> [f32; N] {
-        (self.z, self.octant) = (main_axis(rays[0].dir), octant_of(rays[0].dir));
+        (self.z, self.octant, self.common) = (main_axis(rays[0].dir), octant_of(rays[0].dir), None);
         let mut t_max = [0.0; N];
         for (k, eight) in rays.as_chunks::<LANES>().0.iter().enumerate() {
             let columns = Columns::of(s, eight);
@@ -98,6 +98,23 @@ impl<B: BoxMargins, const N: usize> Bundle<B, N> {
         }
         // A distance that overflows is no hit; a NaN stays one.
         lanes.store(lanes.smaller(lanes.splat(f32::MAX), lanes.load(&t_max)))
+    }
+
+    /// All rays that are taken from now on start here, and have all of their ranges.
+    pub(super) fn start_at(&mut self, origin: Vec3) {
+        self.origin = [[origin.x; N], [origin.y; N], [origin.z; N]];
+        (self.t_min, self.exclude, self.common) = ([0.0; N], [NO_PRIM; N], Some(origin));
+    }
+
+    /// Takes rays of a pencil by their directions, from `start` on; whether there are as many.
+    #[inline(always)]
+    pub(super) fn turn(&mut self, dirs: [&[f32]; 3], start: usize) -> bool {
+        let row = |k: usize| dirs[k].get(start..).and_then(<[f32]>::first_chunk);
+        let (Some(x), Some(y), Some(z)) = (row(0), row(1), row(2)) else { return false };
+        self.dir = [*x, *y, *z];
+        let first = Vec3::new(x[0], y[0], z[0]);
+        (self.z, self.octant) = (main_axis(first), octant_of(first));
+        true
     }
 
     /// Finds slabs and ranges from origins, directions, `t_min` and `t_max`, and which rays run as the first does: to the
@@ -157,21 +174,11 @@ impl<B: BoxMargins, const N: usize> Bundle<B, N> {
     /// Finds what bounds all rays.
     #[inline(always)]
     pub(super) fn bound<T: Lanewise<N>>(&mut self, s: T, tree: &Tree) {
-        let first = Vec3::new(self.origin[0][0], self.origin[1][0], self.origin[2][0]);
-        let o = [s.load(&self.origin[0]), s.load(&self.origin[1]), s.load(&self.origin[2])];
-        let mut alike = all::<N>();
-        for k in 0..3 {
-            alike &= s.at_most(o[k], s.splat(first[k])) & s.at_most(s.splat(first[k]), o[k]);
+        match self.common {
+            Some(origin) => (self.low, self.high) = (origin, origin),
+            None => self.bound_origins(s),
         }
-        self.common = (alike == all::<N>()).then_some(first);
-        (self.low, self.high) = (first, first);
         let zero = s.splat(0.0);
-        if self.common.is_none() {
-            let [x, y, z, _] = s.least_of_each([o[0], o[1], o[2], zero]);
-            self.low = Vec3::new(x, y, z);
-            let [x, y, z, _] = s.least_of_each([s.sub(zero, o[0]), s.sub(zero, o[1]), s.sub(zero, o[2]), zero]);
-            self.high = Vec3::new(-x, -y, -z);
-        }
         let inverse = [s.load(&self.inverse[0]), s.load(&self.inverse[1]), s.load(&self.inverse[2])];
         let [x, y, z, from] = s.least_of_each([inverse[0], inverse[1], inverse[2], s.load(&self.from)]);
         let least = [x, y, z];
@@ -192,6 +199,26 @@ impl<B: BoxMargins, const N: usize> Bundle<B, N> {
             self.hull.last[k] = [slow, -rear * slow + pad * slow.abs()];
         }
         self.hull.from = from.max(0.0);
+    }
+
+    /// Finds what bounds all origins.
+    #[inline(always)]
+    fn bound_origins<T: Lanewise<N>>(&mut self, s: T) {
+        let first = Vec3::new(self.origin[0][0], self.origin[1][0], self.origin[2][0]);
+        let o = [s.load(&self.origin[0]), s.load(&self.origin[1]), s.load(&self.origin[2])];
+        let mut alike = all::<N>();
+        for k in 0..3 {
+            alike &= s.at_most(o[k], s.splat(first[k])) & s.at_most(s.splat(first[k]), o[k]);
+        }
+        self.common = (alike == all::<N>()).then_some(first);
+        (self.low, self.high) = (first, first);
+        if self.common.is_none() {
+            let zero = s.splat(0.0);
+            let [x, y, z, _] = s.least_of_each([o[0], o[1], o[2], zero]);
+            self.low = Vec3::new(x, y, z);
+            let [x, y, z, _] = s.least_of_each([s.sub(zero, o[0]), s.sub(zero, o[1]), s.sub(zero, o[2]), zero]);
+            self.high = Vec3::new(-x, -y, -z);
+        }
     }
 
     /// Bounds of origins and directions, as exact distances need them.

@@ -215,7 +215,7 @@ impl<W: Wave, B: BoxMargins> Flight<'_, W, B> {
             let (near, met) = ray.slabs.meets(s, root, ray.limit);
             if met != 0 {
                 let (slot, at) = slots.at(number);
-                (slot.ray, slot.seeker) = (*ray, Seeker::new(ray, i, self.wave.rays()[i].exclude));
+                (slot.ray, slot.seeker) = (*ray, Seeker::new(ray, i, self.wave.ray(i).exclude));
                 slot.top = 1;
                 slot.push(s, root, near, met);
                 *at = slot.pop();

@@ -22,8 +22,9 @@ use super::node::{Block, Child, Node, Tree};
 use super::slabs::BoxMargins;
 use super::walk::Entry;
 use crate::accel::query::Goal;
-use crate::accel::wave::Wave;
+use crate::accel::wave::{Pencil, Wave};
 use crate::accel::{Hit, NO_PRIM, Ray, Shapes};
+use crate::math::Vec3;
 use crate::math::fan::Fan;
 use crate::math::meetings::{Meetings, Plane, meet};
 use crate::math::shear::RaySpace;
@@ -131,6 +132,10 @@ impl<W: Wave, B: BoxMargins> Kernel for InPackets<'_, W, B> {
     fn run<S: Simd>(self, s: S) {
         let Self { tree, shapes, wave, stack, entries, .. } = self;
         let (mut narrow, mut broad) = (Packet::<B, WIDE>::empty(), Packet::<B, BROAD>::empty());
+        if let Some(Pencil { origin, .. }) = wave.pencil() {
+            broad.start_at(origin);
+            narrow.start_at(origin);
+        }
         let mut trip = Trip { tree, shapes, wave, stack, entries, lone: Lone::default() };
         let (count, mut start) = (trip.wave.rays().len(), 0);
         let (mut apart, mut patience) = (0_usize, PATIENCE);
@@ -173,6 +178,12 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         }
     }
 
+    /// All rays that are taken from now on are of a pencil.
+    fn start_at(&mut self, origin: Vec3) {
+        self.rays.start_at(origin);
+        self.t_max = [f32::MAX; N];
+    }
+
     /// Answers the rays that were taken, or as many as there are: those of a mask together.
     #[inline(always)]
     fn pass<S: Simd, T: Lanewise<N>, W: Wave>(&mut self, s: S, wide: T, trip: &mut Trip<W>, alike: u32) -> Company {
@@ -191,6 +202,9 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
     #[inline(always)]
     fn gather<S: Simd, T: Lanewise<N>, W: Wave>(&mut self, s: S, wide: T, trip: &Trip<W>, start: usize) -> u32 {
         self.start = start;
+        if let Some(Pencil { dirs, .. }) = trip.wave.pencil() {
+            return if self.rays.turn(dirs, start) { self.rays.prepare(wide, trip.tree, &self.t_max) } else { 0 };
+        }
         let rays = &trip.wave.rays()[start..];
         if let Some(later) = rays.get(AHEAD..AHEAD + N) {
             s.prefetch(later);
@@ -467,7 +481,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         while unsure != 0 {
             let ray = unsure.trailing_zeros() as usize % N;
             unsure &= unsure - 1;
-            let Ray { origin, dir, .. } = trip.wave.rays()[start + ray];
+            let Ray { origin, dir, .. } = trip.wave.ray(start + ray);
             let corners = Place::corners(tree, found.place[ray]);
             (t[ray], u[ray], v[ray]) = triangle::place(&RaySpace::checked(origin, dir).0, &corners);
         }

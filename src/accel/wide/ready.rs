@@ -4,7 +4,8 @@ use super::node::Tree;
 use super::padded::{PaddedSlabs, Padding};
 use super::slabs::BoxMargins;
 use crate::accel::Ray;
-use crate::accel::wave::Wave;
+use crate::accel::wave::{Pencil, Wave};
+use crate::math::Vec3;
 use crate::math::sight::Sight;
 use crate::math::simd::{LANES, Simd};
 
@@ -35,7 +36,8 @@ impl Ready {
     #[inline(always)]
     pub(super) fn take<B: BoxMargins, S: Simd, W: Wave>(&mut self, s: S, tree: &Tree, wave: &W, start: usize) {
         let rays = &wave.rays()[start..];
-        let Columns { origin: o, dir: d, t_min, t_max } = Columns::of(s, rays);
+        let columns = wave.pencil().and_then(|pencil| Columns::of_pencil(s, &pencil, start));
+        let Columns { origin: o, dir: d, t_min, t_max } = columns.unwrap_or_else(|| Columns::of(s, rays));
         let mut least = s.store(t_min);
         wave.adapt_t_min(start, &mut least[..rays.len().min(LANES)]);
         let t_min = s.load(&least);
@@ -95,6 +97,20 @@ pub(super) struct Columns<S: Simd> {
 }
 
 impl<S: Simd> Columns<S> {
+    /// Eight rays of a pencil from `start` on; `None` where there are fewer.
+    #[inline(always)]
+    fn of_pencil(s: S, pencil: &Pencil, start: usize) -> Option<Self> {
+        let [x, y, z] = pencil.dirs;
+        let (x, y, z) = (x.get(start..)?.first_chunk()?, y.get(start..)?.first_chunk()?, z.get(start..)?.first_chunk()?);
+        let Vec3 { x: ox, y: oy, z: oz } = pencil.origin;
+        Some(Self {
+            origin: [s.splat(ox), s.splat(oy), s.splat(oz)],
+            dir: [s.load(x), s.load(y), s.load(z)],
+            t_min: s.splat(0.0),
+            t_max: s.splat(f32::INFINITY),
+        })
+    }
+
     /// The first eight rays, the last repeated where there are fewer.
     #[inline(always)]
     pub(super) fn of(s: S, rays: &[Ray]) -> Self {
@@ -146,7 +162,7 @@ mod tests {
     }
 
     fn take(level: Level, tree: &Tree, rays: &[Ray], start: usize) -> Ready {
-        level.run(Take(tree, &ForFirst { rays, hits: &mut [], test: Exact }, start))
+        level.run(Take(tree, &ForFirst { rays, pencil: None, hits: &mut [], test: Exact }, start))
     }
 
     /// The same by plain numbers, one ray after another.

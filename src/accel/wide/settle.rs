@@ -36,7 +36,7 @@ impl Settle {
         if W::Goal::ANY {
             return wave.take(i, Hit { prim: place.prim, t: 0.0, u: 0.0, v: 0.0 });
         }
-        let (ray, block) = (&wave.rays()[i], &tree.blocks[place.block as usize]);
+        let (ray, block) = (wave.ray(i), &tree.blocks[place.block as usize]);
         let (at, lane) = (self.count % LANES, place.lane as usize % LANES);
         for k in 0..3 {
             self.pairs.origin[k][at] = ray.origin[k];
@@ -75,7 +75,7 @@ impl Settle {
     #[cold]
     #[inline(never)]
     fn exactly<W: Wave>(&self, wave: &W, lane: usize) -> Hit {
-        let (ray, corners) = (&wave.rays()[self.rays[lane]], corners_of(&self.pairs.corners, lane));
+        let (ray, corners) = (wave.ray(self.rays[lane]), corners_of(&self.pairs.corners, lane));
         let (t, u, v) = triangle::place(&RaySpace::checked(ray.origin, ray.dir).0, &corners);
         Hit { t, u, v, prim: self.prims[lane] }
     }

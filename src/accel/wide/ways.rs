@@ -111,7 +111,7 @@ fn a_wave_goes_in_packets_where_rays_run_alike_and_in_flight_where_not_and_there
     let shapes = scenes::soup(60, 0.4);
     let of = |rays: &[Ray]| {
         let mut hits = vec![Hit::MISS; rays.len()];
-        RayOrder::of(&crate::accel::wave::ForFirst { rays, hits: &mut hits, test: crate::accel::intersector::Exact })
+        RayOrder::of(&crate::accel::wave::ForFirst { rays, pencil: None, hits: &mut hits, test: crate::accel::intersector::Exact })
     };
     let mixed = scenes::rays(&shapes, 40);
     assert_eq!((of(&mixed[..MANY]), of(&mixed[..MANY - 1])), (RayOrder::InFlight, RayOrder::OneByOne));
