@@ -3,7 +3,7 @@
 //! As in [`sight`](super::sight), but rays that start together share more: the edge value of a ray is linear in its
 //! direction, d · (p × q) / d_z for the edge from q to p, so that the cross products, the error of the edge values, and on
 //! which side of a triangle the origin lies are found once for all rays, of eight triangles at a time. What is left for
-//! a ray are two operations an edge; and triangles that lie beside all of the rays are left out by the same planes.
+//! a ray are two operations an edge.
 
 use super::Vec3;
 use super::bounds::{EdgeMargins, FAN_EDGE, HEIGHTS, WEIGHTS};
@@ -24,9 +24,6 @@ pub struct Fan<S: Lanewise<N>, const N: usize> {
     per_length: S::Lanes,
     /// Its sign.
     forwards: f32,
-    /// All shears lie in the middle of these, or so far from it.
-    middle: [f32; 2],
-    half: [f32; 2],
 }
 
 /// Eight triangles made ready for a fan.
@@ -51,16 +48,12 @@ impl<S: Lanewise<N>, const N: usize> Fan<S, N> {
     pub fn new(s: S, origin: Vec3, dir: &[[f32; N]; 3], z: usize, per_length: &[f32; N]) -> Self {
         let per_length = s.load(per_length);
         let (p, q) = (s.mul(s.load(&dir[(z + 1) % 3]), per_length), s.mul(s.load(&dir[(z + 2) % 3]), per_length));
-        let zero = s.splat(0.0);
-        let [p_low, p_high, q_low, q_high] = s.least_of_each([p, s.sub(zero, p), q, s.sub(zero, q)]);
         Self {
             axes: AXES[z % 3],
             origin: [origin[(z + 1) % 3], origin[(z + 2) % 3], origin[z % 3]],
             shear: [p, q],
             per_length,
             forwards: 1f32.copysign(dir[z % 3][0]),
-            middle: [0.5 * (p_low - p_high), 0.5 * (q_low - q_high)],
-            half: [-0.5 * (p_low + p_high), -0.5 * (q_low + q_high)],
         }
     }
 
@@ -86,17 +79,9 @@ impl<S: Lanewise<N>, const N: usize> Fan<S, N> {
         ]
     }
 
-    /// The greatest edge value that any of the rays may have.
-    #[inline(always)]
-    fn most<T: Simd>(&self, s: T, [x, y, z]: [T::Lanes; 3]) -> T::Lanes {
-        let (across, along) = (s.abs(x), s.abs(y));
-        let middle = s.mul_add(x, s.splat(self.middle[0]), s.mul_add(y, s.splat(self.middle[1]), z));
-        s.mul_add(across, s.splat(self.half[0]), s.mul_add(along, s.splat(self.half[1]), middle))
-    }
-
     /// [`Rows::ready`] by a given margin of edge values.
     #[inline(always)]
-    fn ready_within<T: Simd>(&self, s: T, corners: &Corners8, lanes: u32, margin: f32) -> (FanReady, u32) {
+    fn ready_within<T: Simd>(&self, s: T, corners: &Corners8, margin: f32) -> FanReady {
         let [pa, pb, pc] = corners;
         let (a, b, c) = (self.relative(s, pa), self.relative(s, pb), self.relative(s, pc));
         let (cb, ac, ba) = (self.edge(s, pc, pb), self.edge(s, pa, pc), self.edge(s, pb, pa));
@@ -113,10 +98,6 @@ impl<S: Lanewise<N>, const N: usize> Fan<S, N> {
         let side = s.with_sign(s.splat(1.0), s.mul(volume, s.splat(self.forwards)));
         let (u, v, w) = (turned(s, u, side), turned(s, v, side), turned(s, w, side));
 
-        // The bound of all rays errs less than the value of one.
-        let beside = s.mul(error, s.splat(-2.0));
-        let met = lanes
-            & !(s.less(self.most(s, u), beside) | s.less(self.most(s, v), beside) | s.less(self.most(s, w), beside));
         let heights = [a[2], b[2], c[2]];
         let highest = s.greater(heights[0], s.greater(heights[1], heights[2]));
         let lowest = s.smaller(heights[0], s.smaller(heights[1], heights[2]));
@@ -125,14 +106,13 @@ impl<S: Lanewise<N>, const N: usize> Fan<S, N> {
             s.splat(HEIGHTS),
             s.splat(EdgeMargins::WITH_DISTANCES.underflow),
         );
-        let ready = FanReady {
+        FanReady {
             edges: [stored(s, u), stored(s, v), stored(s, w)],
             error: s.store(error),
             heights: stored(s, heights),
             moved: s.store(s.mul(s.mul(s.sub(highest, lowest), error), s.splat(WEIGHTS))),
             rounded: s.store(rounded),
-        };
-        (ready, met)
+        }
     }
 }
 
@@ -141,8 +121,8 @@ impl<S: Lanewise<N>, const N: usize> Rows<S, N> for Fan<S, N> {
     type Look = FanLook<S, N>;
 
     #[inline(always)]
-    fn ready<T: Simd>(&self, s: T, corners: &Corners8, lanes: u32) -> (FanReady, u32) {
-        self.ready_within(s, corners, lanes, FAN_EDGE)
+    fn ready<T: Simd>(&self, s: T, corners: &Corners8) -> FanReady {
+        self.ready_within(s, corners, FAN_EDGE)
     }
 
     #[inline(always)]
@@ -225,8 +205,8 @@ mod tests {
         triangles: [Triangle; LANES],
     }
 
-    /// What a fan says of each triangle: whether any ray may hit it, the verdicts, and between which distances hits are.
-    type Said = [(bool, Verdicts, [Row; 2]); LANES];
+    /// What a fan says of each triangle: the verdicts, and between which distances hits are.
+    type Said = [(Verdicts, [Row; 2]); LANES];
 
     struct Ask<'a>(&'a Case, f32);
 
@@ -247,12 +227,12 @@ mod tests {
             let z = RaySpace::checked(*origin, dirs[0]).0.z;
             let per_length = s.store(s.div(s.splat(1.0), s.load(&dir[z])));
             let fan = Fan::<S, LANES>::new(s, *origin, &dir, z, &per_length);
-            let (ready, met) = fan.ready_within(s, &corners, 255, margin);
-            let mut said = [(false, Verdicts { hit: 0, unsure: 0 }, [[0.0; LANES]; 2]); LANES];
+            let ready = fan.ready_within(s, &corners, margin);
+            let mut said = [(Verdicts { hit: 0, unsure: 0 }, [[0.0; LANES]; 2]); LANES];
             for (lane, said) in said.iter_mut().enumerate() {
                 let (verdicts, look) = fan.look(s, &ready, lane);
                 let [low, high] = fan.distances(s, &ready, lane, &look);
-                *said = (met >> lane & 1 == 1, verdicts, [s.store(low), s.store(high)]);
+                *said = (verdicts, [s.store(low), s.store(high)]);
             }
             said
         }
@@ -335,15 +315,14 @@ mod tests {
         let (mut hits, mut misses, mut wrong) = (0, 0, 0);
         for case in cases(kind, 150) {
             let said = level.run(Ask(&case, margin));
-            for ((met, verdicts, _), triangle) in said.iter().zip(&case.triangles) {
+            for ((verdicts, _), triangle) in said.iter().zip(&case.triangles) {
                 assert_eq!(verdicts.hit & verdicts.unsure, 0);
                 for (lane, &dir) in case.dirs.iter().enumerate() {
                     let ray = RaySpace::checked(case.origin, dir).0;
                     let ahead = triangle::intersect(&ray, triangle).is_some_and(|t| t >= 0.0);
                     let [hit, unsure] = [verdicts.hit, verdicts.unsure].map(|mask| mask >> lane & 1 == 1);
                     (hits, misses) = (hits + usize::from(hit), misses + usize::from(!hit && !unsure));
-                    // What is left out is missed by every ray.
-                    wrong += usize::from(!unsure && hit != ahead || ahead && !met);
+                    wrong += usize::from(!unsure && hit != ahead);
                 }
             }
         }
@@ -373,26 +352,13 @@ mod tests {
     }
 
     #[test]
-    fn triangles_beside_all_rays_are_left_out() {
-        let (mut beside, mut left_out) = (0, 0);
-        for case in cases(Kind::Ordinary, 150) {
-            let said = Level::best().run(Ask(&case, FAN_EDGE));
-            for (met, verdicts, _) in said {
-                beside += usize::from(verdicts.hit | verdicts.unsure == 0);
-                left_out += usize::from(!met);
-            }
-        }
-        assert!(left_out > 50 && left_out <= beside, "{left_out} of {beside}");
-    }
-
-    #[test]
     fn exact_distances_lie_where_a_fan_says() {
         let mut hits = 0;
         for kind in KINDS {
             for case in cases(kind, 60) {
                 for level in Level::all() {
                     let said = level.run(Ask(&case, FAN_EDGE));
-                    for ((_, verdicts, [low, high]), triangle) in said.iter().zip(&case.triangles) {
+                    for ((verdicts, [low, high]), triangle) in said.iter().zip(&case.triangles) {
                         for lane in (0..LANES).filter(|lane| verdicts.hit >> lane & 1 == 1) {
                             let t = hit(&point(case.origin), &point(case.dirs[lane]), triangle).expect("it is hit");
                             assert!(exact(low[lane]) <= t && t <= exact(high[lane]), "{kind:?} on {}", level.name());
@@ -410,7 +376,7 @@ mod tests {
         let [case] = &cases(Kind::Ordinary, 1)[..] else { panic!("one case") };
         let triangles = [[Vec3::NAN; 3]; LANES];
         for level in Level::all() {
-            for (_, verdicts, _) in level.run(Ask(&Case { triangles, ..*case }, FAN_EDGE)) {
+            for (verdicts, _) in level.run(Ask(&Case { triangles, ..*case }, FAN_EDGE)) {
                 assert_eq!(verdicts, Verdicts { hit: 0, unsure: 255 }, "{}", level.name());
             }
         }

@@ -84,8 +84,8 @@ pub trait Rows<S: Lanewise<N>, const N: usize> {
     /// What the rays see of one.
     type Look;
 
-    /// Makes eight triangles ready, and says which of `lanes` any of the rays may hit.
-    fn ready<T: Simd>(&self, s: T, corners: &Corners8, lanes: u32) -> (Self::Ready, u32);
+    /// Makes eight triangles ready.
+    fn ready<T: Simd>(&self, s: T, corners: &Corners8) -> Self::Ready;
 
     /// Tests one of eight triangles that were made ready: a bit for each ray. One that is hit behind the origin may be called
     /// a miss.
@@ -128,7 +128,7 @@ impl<S: Lanewise<N>, const N: usize> Rows<S, N> for RowSight<S, N> {
 
     /// Along the axes in sheared order.
     #[inline(always)]
-    fn ready<T: Simd>(&self, s: T, corners: &Corners8, lanes: u32) -> (Corners8, u32) {
+    fn ready<T: Simd>(&self, s: T, corners: &Corners8) -> Corners8 {
         let axes = AXES[self.main % 3];
         let mut ready = [[[0.0; LANES]; 3]; 3];
         for (ready, rows) in ready.iter_mut().zip(corners) {
@@ -136,7 +136,7 @@ impl<S: Lanewise<N>, const N: usize> Rows<S, N> for RowSight<S, N> {
                 ready[k] = s.store(s.along(rows, axes[k]));
             }
         }
-        (ready, lanes)
+        ready
     }
 
     #[inline(always)]

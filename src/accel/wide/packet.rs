@@ -367,8 +367,8 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         reach: &mut Reach<T, N>,
         sight: &R,
     ) -> u32 {
-        let (ready, mut lanes) = sight.ready(s, &block.corners, lanes);
-        let mut changed = 0;
+        let ready = sight.ready(s, &block.corners);
+        let (mut lanes, mut changed) = (lanes, 0);
         while lanes != 0 {
             let lane = lanes.trailing_zeros();
             lanes &= lanes - 1;
