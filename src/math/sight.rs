@@ -3,13 +3,15 @@
 //! As in [`triangles`](super::triangles), but operations are fused where the processor can, and the bounds are those of each
 //! triangle's own distance: an interval that holds the exact distance tells most hits from each other.
 
+use bytemuck::{Pod, Zeroable};
+
 use super::bounds::{EdgeMargins, HEIGHTS, WEIGHTS};
 use super::simd::{Axis, LANES, Lanewise, Row, Simd};
 use super::triangles::{Corners8, Verdicts};
 
 /// A ray as blocks see it that are asked about distances, too: its numbers are within
 /// [`BOX_RANGE`](super::bounds::BOX_RANGE).
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Sight {
     /// Origin along the axes in sheared order.

@@ -97,13 +97,13 @@ impl Place {
 }
 
 impl Seeker {
-    /// A ray that was made ready, of this number in its wave.
+    /// A ray that was made ready, whose hits count from `t_min` on, of this number in its wave.
     #[inline(always)]
-    pub(super) fn new(ray: &ReadyRay, number: usize, exclude: u32) -> Self {
+    pub(super) fn new(ray: &ReadyRay, t_min: f32, number: usize, exclude: u32) -> Self {
         Self {
             number,
-            limit: ray.limit,
-            t_min: ray.t_min,
+            limit: ray.slabs.limit,
+            t_min,
             exclude,
             best: Best { low: f32::INFINITY, high: ray.t_max, place: Place::NONE },
         }
@@ -198,7 +198,7 @@ impl Seeker {
                 self.best = Best { low, high, place };
                 W::Goal::ANY
             }
-            _ => match decide(tree, shapes, wave, self.number, &self.best, place, between.is_some()) {
+            _ => match decide(tree, shapes, wave, self.number, self.best, place, between.is_some()) {
                 Some(t) => {
                     self.best = Best { low: t, high: t, place };
                     W::Goal::ANY
@@ -211,13 +211,14 @@ impl Seeker {
 
 /// Whether a triangle is hit before the best one so far, which was found by intervals, by the exact test; `certain`: it is on
 /// the ray's line. Then where, or a distance of negative infinity where any hit is the answer.
+#[cold]
 #[inline(never)]
 pub(super) fn decide<W: Wave>(
     tree: &Tree,
     shapes: &Shapes,
     wave: &W,
     i: usize,
-    best: &Best,
+    best: Best,
     place: Place,
     certain: bool,
 ) -> Option<f32> {

@@ -16,6 +16,7 @@ use super::walk::{Entry, ask_by_itself};
 use crate::accel::wave::Wave;
 use crate::accel::{Hit, NO_PRIM, Shapes};
 use crate::math::simd::{Kernel, LANES, Order, Simd};
+use bytemuck::Zeroable;
 
 /// Rays in flight: one for each bit of a word.
 const SLOTS: usize = 32;
@@ -93,7 +94,7 @@ struct Whereabouts {
 pub(super) struct Slots {
     slots: Box<[Slot; SLOTS]>,
     /// Where each of them is; [`Child::END`] without a ray, too.
-    at: [[u32; LANES]; SLOTS / LANES],
+    at: [u32; SLOTS],
     /// Those that have a ray, by the bits of their numbers.
     taken: u32,
 }
@@ -101,13 +102,13 @@ pub(super) struct Slots {
 impl Default for Slots {
     fn default() -> Self {
         let slot = |_| Slot {
-            ray: ReadyRay::default(),
-            seeker: Seeker::new(&ReadyRay::default(), 0, NO_PRIM),
+            ray: ReadyRay::zeroed(),
+            seeker: Seeker::new(&ReadyRay::zeroed(), 0.0, 0, NO_PRIM),
             top: 1,
             near: [f32::NEG_INFINITY; DEPTH + LANES],
             children: [Child::END; DEPTH + LANES],
         };
-        Self { slots: Box::new(std::array::from_fn(slot)), at: [[Child::END; LANES]; SLOTS / LANES], taken: 0 }
+        Self { slots: Box::new(std::array::from_fn(slot)), at: [Child::END; SLOTS], taken: 0 }
     }
 }
 
@@ -116,7 +117,7 @@ impl Slots {
     #[inline(always)]
     fn whereabouts<S: Simd>(&self, s: S) -> Whereabouts {
         let (mut leaves, mut ended) = (0, 0);
-        for (i, at) in self.at.iter().enumerate() {
+        for (i, at) in self.at.as_chunks().0.iter().enumerate() {
             leaves |= s.high_bits(at) << (LANES * i);
             ended |= s.find_word(Child::END, at) << (LANES * i);
         }
@@ -127,7 +128,7 @@ impl Slots {
     #[inline(always)]
     fn at(&mut self, number: u32) -> (&mut Slot, &mut u32) {
         let number = number as usize % SLOTS;
-        (&mut self.slots[number], &mut self.at[number / LANES][number % LANES])
+        (&mut self.slots[number], &mut self.at[number])
     }
 }
 
@@ -212,10 +213,11 @@ impl<W: Wave, B: BoxMargins> Flight<'_, W, B> {
                 continue;
             }
             let (ray, root) = (&queue.ready.rays[lane], &self.tree.nodes[0]);
-            let (near, met) = ray.slabs.meets(s, root, ray.limit);
+            let (near, met) = ray.slabs.meets(s, root, ray.slabs.limit);
             if met != 0 {
                 let (slot, at) = slots.at(number);
-                (slot.ray, slot.seeker) = (*ray, Seeker::new(ray, i, self.wave.ray(i).exclude));
+                let seeker = Seeker::new(ray, queue.ready.t_min[lane], i, self.wave.ray(i).exclude);
+                (slot.ray, slot.seeker) = (*ray, seeker);
                 slot.top = 1;
                 slot.push(s, root, near, met);
                 *at = slot.pop();

@@ -424,7 +424,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
                     high: high[ray],
                     place: Place::unpacked(self.found.place[ray], self.found.prim[ray]),
                 };
-                if let Some(t) = decide(trip.tree, trip.shapes, &*trip.wave, i, &best, place, certain) {
+                if let Some(t) = decide(trip.tree, trip.shapes, &*trip.wave, i, best, place, certain) {
                     (low[ray], high[ray]) = (t, t);
                     (self.found.prim[ray], self.found.place[ray]) = (place.prim, place.packed());
                     changed |= 1 << ray;

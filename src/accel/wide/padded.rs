@@ -5,20 +5,25 @@
 //! to the error of the hit's own distance, which `limit` allows for. Rays with numbers too large or too small for that
 //! ([`BOX_RANGE`]) go by `slabs`.
 
+use bytemuck::{Pod, Zeroable};
+
 use super::node::Node;
 use super::slabs::BoxMargins;
 use crate::math::bounds::{BOX_RANGE, PARALLEL};
 use crate::math::simd::{LANES, Lanewise, Pick, Simd};
 
 /// A ray ready to be tested against padded boxes.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct PaddedSlabs {
     pub inverse: [f32; 3],
     /// Boxes are entered from here on.
     pub from: f32,
-    /// What is added to planes that come first, and to those that come last.
+    /// What is added to planes that come first.
     pub first: [f32; 3],
+    /// Boxes are entered up to here while nothing is hit.
+    pub limit: f32,
+    /// What is added to planes that come last.
     pub last: [f32; 3],
     /// The octant that the ray runs to: bit k is set where it runs backwards along axis k.
     pub octant: u32,

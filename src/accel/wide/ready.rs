@@ -7,28 +7,32 @@ use crate::accel::Ray;
 use crate::accel::wave::{Pencil, Wave};
 use crate::math::Vec3;
 use crate::math::sight::Sight;
-use crate::math::simd::{LANES, Simd};
+use crate::math::simd::{LANES, Row, Simd};
+use bytemuck::{Pod, Zeroable};
 
-/// A ray as boxes and blocks see it.
-#[derive(Clone, Copy, Debug, Default)]
+/// A ray as boxes and blocks see it: rows of four numbers, which lanes write at once.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct ReadyRay {
     pub slabs: PaddedSlabs,
     pub sight: Sight,
-    /// Hits count from here.
-    pub t_min: f32,
     /// Hits count up to here.
     pub t_max: f32,
-    /// Boxes are entered up to here.
-    pub limit: f32,
 }
 
 /// Eight rays.
-#[derive(Default)]
 pub(super) struct Ready {
     pub rays: [ReadyRay; LANES],
+    /// Their hits count from here.
+    pub t_min: Row,
     /// Those for which the bounds of padded boxes hold, and whose range is not empty.
     pub allowed: u32,
+}
+
+impl Default for Ready {
+    fn default() -> Self {
+        Self { rays: [ReadyRay::zeroed(); LANES], t_min: [0.0; LANES], allowed: 0 }
+    }
 }
 
 impl Ready {
@@ -38,9 +42,9 @@ impl Ready {
         let rays = &wave.rays()[start..];
         let columns = wave.pencil().and_then(|pencil| Columns::of_pencil(s, &pencil, start));
         let Columns { origin: o, dir: d, t_min, t_max } = columns.unwrap_or_else(|| Columns::of(s, rays));
-        let mut least = s.store(t_min);
-        wave.adapt_t_min(start, &mut least[..rays.len().min(LANES)]);
-        let t_min = s.load(&least);
+        self.t_min = s.store(t_min);
+        wave.adapt_t_min(start, &mut self.t_min[..rays.len().min(LANES)]);
+        let t_min = s.load(&self.t_min);
         // A distance that overflows is no hit; a NaN stays.
         let t_max = s.smaller(s.splat(f32::MAX), t_max);
         let (from, limit) = (B::started_lanes(s, t_min), B::widened_lanes(s, t_max));
@@ -58,34 +62,38 @@ impl Ready {
             [s.div(turned(s, [d[1], d[2], d[0]], main), along), s.div(turned(s, [d[2], d[0], d[1]], main), along)];
         let sheared = [turned(s, [o[1], o[2], o[0]], main), turned(s, [o[2], o[0], o[1]], main), turned(s, o, main)];
 
-        let back = [s.signs(d[0]), s.signs(d[1]), s.signs(d[2])];
-        let inverse = s.rows([inverse[0], inverse[1], inverse[2], from]);
-        let first = s.rows([first[0], first[1], first[2], limit]);
-        let last = s.rows([last[0], last[1], last[2], t_min]);
-        let sight = s.rows([sheared[0], sheared[1], sheared[2], per_length]);
-        let shear = s.rows([shear[0], shear[1], t_max, t_max]);
+        let octant = octants(s, [s.signs(d[0]), s.signs(d[1]), s.signs(d[2])]);
+        let main = s.choose(main[0], word(s, 0), s.choose(main[1], word(s, 1), word(s, 2)));
+        let rows = [
+            s.rows([inverse[0], inverse[1], inverse[2], from]),
+            s.rows([first[0], first[1], first[2], limit]),
+            s.rows([last[0], last[1], last[2], octant]),
+            s.rows([sheared[0], sheared[1], sheared[2], per_length]),
+            s.rows([shear[0], shear[1], main, t_max]),
+        ];
         for (lane, ray) in self.rays.iter_mut().enumerate() {
-            let bit = |mask: u32| mask >> lane & 1;
-            let [ix, iy, iz, from] = inverse[lane];
-            let [fx, fy, fz, limit] = first[lane];
-            let [lx, ly, lz, t_min] = last[lane];
-            let [ox, oy, oz, per_length] = sight[lane];
-            let [p, q, t_max, _] = shear[lane];
-            let octant = bit(back[0]) | bit(back[1]) << 1 | bit(back[2]) << 2;
-            *ray = ReadyRay {
-                slabs: PaddedSlabs { inverse: [ix, iy, iz], from, first: [fx, fy, fz], last: [lx, ly, lz], octant },
-                sight: Sight {
-                    origin: [ox, oy, oz],
-                    per_length,
-                    shear: [p, q],
-                    main: 2 - 2 * bit(main[0]) - bit(main[1]),
-                },
-                t_min,
-                t_max,
-                limit,
-            };
+            let [a, b, c, d, e] = &rows;
+            *ray = bytemuck::cast([a[lane], b[lane], c[lane], d[lane], e[lane]]);
         }
     }
+}
+
+/// The same word in all lanes, by its bits.
+#[inline(always)]
+fn word<S: Simd>(s: S, word: u32) -> S::Lanes {
+    s.splat(f32::from_bits(word))
+}
+
+/// The octants that rays run to which run backwards along the axes in the lanes of these masks: words, by their bits.
+#[inline(always)]
+fn octants<S: Simd>(s: S, [x, y, z]: [u32; 3]) -> S::Lanes {
+    let along_z = [
+        s.choose(z, word(s, 4), word(s, 0)),
+        s.choose(z, word(s, 5), word(s, 1)),
+        s.choose(z, word(s, 6), word(s, 2)),
+        s.choose(z, word(s, 7), word(s, 3)),
+    ];
+    s.choose(y, s.choose(x, along_z[3], along_z[2]), s.choose(x, along_z[1], along_z[0]))
 }
 
 /// Rays in lanes, by axis.
@@ -166,7 +174,7 @@ mod tests {
     }
 
     /// The same by plain numbers, one ray after another.
-    fn plainly(tree: &Tree, ray: &Ray) -> ReadyRay {
+    fn plainly(tree: &Tree, ray: &Ray) -> (ReadyRay, f32) {
         let (space, _) = RaySpace::checked(ray.origin, ray.dir);
         let parallel = ray.dir.abs().max_element() * PARALLEL;
         let inverse = [0, 1, 2].map(|k| 1.0 / ray.dir[k].abs().max(parallel).copysign(ray.dir[k]));
@@ -175,11 +183,12 @@ mod tests {
         let pad = |k: usize| ((tree.extent + far[k]) * BOX_PAD + drift) * inverse[k].abs();
         let octant = (0..3).fold(0, |octant, k| octant | u32::from(ray.dir[k].is_sign_negative()) << k);
         let t_max = ray.t_max.min(f32::MAX);
-        ReadyRay {
+        let ready = ReadyRay {
             slabs: PaddedSlabs {
                 inverse,
                 from: Derived::started(ray.t_min),
                 first: [0, 1, 2].map(|k| (0.0 - ray.origin[k]) * inverse[k] - pad(k)),
+                limit: Derived::widened(t_max),
                 last: [0, 1, 2].map(|k| (0.0 - ray.origin[k]) * inverse[k] + pad(k)),
                 octant,
             },
@@ -189,10 +198,14 @@ mod tests {
                 shear: [space.shear.0, space.shear.1],
                 main: space.z as u32,
             },
-            t_min: ray.t_min,
             t_max,
-            limit: Derived::widened(t_max),
-        }
+        };
+        (ready, ray.t_min)
+    }
+
+    /// The same of a ray that was taken.
+    fn of(ready: &Ready, lane: usize) -> (ReadyRay, f32) {
+        (ready.rays[lane], ready.t_min[lane])
     }
 
     /// Of all octants and main axes, also with equal components and zeros, some with ranges.
@@ -218,8 +231,8 @@ mod tests {
             for start in (0..rays.len()).step_by(LANES) {
                 let ready = take(level, &tree, &rays, start);
                 assert_eq!(ready.allowed, 255, "{}: {:?}", level.name(), &rays[start..start + LANES]);
-                for (taken, ray) in ready.rays.iter().zip(&rays[start..]) {
-                    let (taken, expected) = (format!("{taken:?}"), format!("{:?}", plainly(&tree, ray)));
+                for (lane, ray) in rays[start..].iter().take(LANES).enumerate() {
+                    let (taken, expected) = (format!("{:?}", of(&ready, lane)), format!("{:?}", plainly(&tree, ray)));
                     assert_eq!(taken, expected, "{}: {ray:?}", level.name());
                 }
             }
@@ -231,9 +244,9 @@ mod tests {
         let (rays, tree) = (&ordinary()[..LANES + 3], tree(2.0));
         for level in Level::all() {
             let ready = take(level, &tree, rays, LANES);
-            for (lane, taken) in ready.rays.iter().enumerate() {
+            for lane in 0..LANES {
                 let expected = plainly(&tree, &rays[LANES + lane.min(2)]);
-                assert_eq!(format!("{taken:?}"), format!("{expected:?}"), "{}", level.name());
+                assert_eq!(format!("{:?}", of(&ready, lane)), format!("{expected:?}"), "{}", level.name());
             }
         }
     }
@@ -247,9 +260,9 @@ mod tests {
             let wave = ForNext { rays, after: &after, hits: &mut hits, test: Exact };
             for start in [0, LANES] {
                 let ready = level.run(Take(&tree, &wave, start));
-                for (i, taken) in (start..rays.len()).zip(&ready.rays) {
+                for (i, lane) in (start..rays.len()).zip(0..LANES) {
                     let expected = plainly(&tree, &Ray { t_min: wave.t_min(i), ..rays[i] });
-                    assert_eq!(format!("{taken:?}"), format!("{expected:?}"), "{}", level.name());
+                    assert_eq!(format!("{:?}", of(&ready, lane)), format!("{expected:?}"), "{}", level.name());
                 }
             }
         }
