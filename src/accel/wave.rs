@@ -47,6 +47,12 @@ pub trait Wave {
         self.rays()[i]
     }
 
+    /// What a ray excludes.
+    #[inline(always)]
+    fn exclude(&self, i: usize) -> u32 {
+        self.rays()[i].exclude
+    }
+
     /// From where on the hits of a ray count.
     #[inline(always)]
     fn t_min(&self, i: usize) -> f32 {
@@ -97,6 +103,11 @@ impl<I: Intersector> Wave for ForFirst<'_, I> {
     #[inline(always)]
     fn ray(&self, i: usize) -> Ray {
         self.pencil.map_or_else(|| self.rays[i], |pencil| pencil.ray(i))
+    }
+
+    #[inline(always)]
+    fn exclude(&self, i: usize) -> u32 {
+        if self.pencil.is_some() { NO_PRIM } else { self.rays[i].exclude }
     }
 
     #[inline(always)]

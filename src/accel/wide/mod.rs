@@ -68,6 +68,10 @@ pub enum RayOrder {
     Packets,
 }
 
+/// Of a tree of so many bytes most comes soon enough from the caches: rays in flight are 5 to 12 % faster when they do not
+/// fetch what they visit next, with trees of half a megabyte to four; 7 % slower with one of fourteen (measured).
+const NEAR: usize = 1 << 23;
+
 /// Rays from which on it pays to have them in flight.
 const MANY: usize = 2 * WIDE;
 
@@ -200,7 +204,7 @@ impl Wide<'_> {
         match rays {
             RayOrder::Packets => self.run::<B, _>(InPackets { tree, shapes, wave, stack: branches, entries, margins }),
             RayOrder::InFlight if tree.most_behind() < DEPTH => {
-                let flight = Flight { tree, shapes, wave, entries, margins };
+                let flight = Flight { tree, far: tree.bytes() > NEAR, shapes, wave, entries, margins };
                 self.run::<B, _>(InFlight { flight, slots });
             }
             _ => self.run::<B, _>(Alone { tree, shapes, wave, stack: entries, margins }),
