@@ -41,7 +41,7 @@ const fn farthest_first() -> [[Order; 256]; LANES] {
                 rank -= 1;
                 let lane = rank ^ octant;
                 if mask >> lane & 1 == 1 {
-                    order |= (lane as Order) << (8 * place);
+                    order |= (lane as Order) << (4 * place);
                     place += 1;
                 }
             }
@@ -75,6 +75,8 @@ pub(super) struct InFlight<'w, W, B> {
 /// A wave of rays.
 pub(super) struct Flight<'w, W, B> {
     pub tree: &'w Tree,
+    /// Whether it is worth fetching what is visited next.
+    pub far: bool,
     pub shapes: &'w Shapes,
     pub wave: &'w mut W,
     /// For rays that go by themselves.
@@ -239,8 +241,10 @@ impl<W: Wave, B: BoxMargins> Flight<'_, W, B> {
             let (near, met) = slot.ray.slabs.meets(s, node, slot.seeker.limit);
             slot.push(s, node, near, met);
             *at = slot.pop();
-            let (node, block) = Child::either(*at);
-            s.prefetch_either(Child::is_leaf(*at), (&self.tree.blocks, block), (&self.tree.nodes, node));
+            if self.far {
+                let (node, block) = Child::either(*at);
+                s.prefetch_either(Child::is_leaf(*at), (&self.tree.blocks, block), (&self.tree.nodes, node));
+            }
         }
     }
 

@@ -314,7 +314,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         let mut order = FARTHEST_FIRST[bundle.octant % LANES][met as usize % 256];
         for _ in 0..met.count_ones() {
             let slot = (order & 7) as usize;
-            order >>= 8;
+            order >>= 4;
             // The only one is visited for the rays that visit the node: mostly there are some for it.
             let met = if only { rays } else { bundle.meet_child(wide, node, slot, reach.limit) & rays };
             stack[*top] = Branch { near: near[slot], child: node.children[slot], rays: met };

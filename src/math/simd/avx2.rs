@@ -467,9 +467,12 @@ pub(super) fn lanes_in(mask: u32) -> __m256i {
     }
 }
 
-/// Each byte as a word.
+/// Each four bits as a word, of which the lowest three count.
 #[inline(always)]
 pub(super) fn lanes_of(order: Order) -> __m256i {
     // SAFETY: only called where a token proves the features.
-    unsafe { _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(order.cast_signed())) }
+    unsafe {
+        let places = _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28);
+        _mm256_srlv_epi32(_mm256_set1_epi32(order.cast_signed()), places)
+    }
 }

@@ -168,7 +168,7 @@ pub trait Simd: Lanewise<LANES> {
     fn columns(self, rows: [&[f32; 4]; LANES]) -> [Self::Lanes; 4];
     /// The other way round.
     fn rows(self, columns: [Self::Lanes; 4]) -> [[f32; 4]; LANES];
-    /// To memory in another order: place k gets the lane that byte k of `order` names, 0 to 7.
+    /// To memory in another order: place k gets the lane, 0 to 7, that the `k`th four bits of `order` name.
     fn arrange(self, a: Self::Lanes, order: Order, to: &mut Row);
     /// The same for eight words.
     fn arrange_words(self, words: &[u32; LANES], order: Order, to: &mut [u32; LANES]);
@@ -211,8 +211,8 @@ impl Axis {
     }
 }
 
-/// Lanes in some order, one a byte, the first in the lowest.
-pub type Order = u64;
+/// Lanes in some order, four bits each, the first in the lowest.
+pub type Order = u32;
 
 /// Code that is compiled once for each instruction set.
 ///

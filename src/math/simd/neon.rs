@@ -104,7 +104,7 @@ fn turned([a, b, c, d]: [float32x4_t; 4]) -> [float32x4_t; 4] {
 fn arranged(low: uint8x16_t, high: uint8x16_t, order: Order) -> [uint8x16_t; 2] {
     // SAFETY: every processor of the family has the instructions.
     unsafe {
-        let lanes = vcombine_u8(vcreate_u8(order), vcreate_u8(order));
+        let lanes = vcombine_u8(vcreate_u8(in_bytes(order)), vcreate_u8(in_bytes(order)));
         let bytes = |places: [u8; 16]| {
             let lane = vqtbl1q_u8(lanes, load_bytes(&places));
             let byte = load_bytes(&[0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3]);
@@ -465,4 +465,12 @@ impl Simd for Neon {
 
     #[inline(always)]
     fn prefetch<T>(self, _: &[T]) {}
+}
+
+/// Four bits a byte.
+#[inline(always)]
+fn in_bytes(order: Order) -> u64 {
+    let halves = (u64::from(order) | u64::from(order) << 16) & 0x0000_ffff_0000_ffff;
+    let bytes = (halves | halves << 8) & 0x00ff_00ff_00ff_00ff;
+    (bytes | bytes << 4) & 0x0f0f_0f0f_0f0f_0f0f
 }

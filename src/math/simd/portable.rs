@@ -256,12 +256,12 @@ impl Simd for Portable {
 
     #[inline(always)]
     fn arrange(self, a: Row, order: Order, to: &mut Row) {
-        *to = std::array::from_fn(|k| a[(order >> (8 * k)) as usize % LANES]);
+        *to = std::array::from_fn(|k| a[(order >> (4 * k)) as usize % LANES]);
     }
 
     #[inline(always)]
     fn arrange_words(self, words: &[u32; LANES], order: Order, to: &mut [u32; LANES]) {
-        *to = std::array::from_fn(|k| words[(order >> (8 * k)) as usize % LANES]);
+        *to = std::array::from_fn(|k| words[(order >> (4 * k)) as usize % LANES]);
     }
 
     #[inline(always)]
