@@ -218,7 +218,7 @@ impl<W: Wave, B: BoxMargins> Flight<'_, W, B> {
             let (near, met) = ray.slabs.meets(s, root, ray.slabs.limit);
             if met != 0 {
                 let (slot, at) = slots.at(number);
-                let seeker = Seeker::new(ray, queue.ready.t_min[lane], i, self.wave.ray(i).exclude);
+                let seeker = Seeker::new(ray, queue.ready.t_min[lane], i, self.wave.exclude(i));
                 (slot.ray, slot.seeker) = (*ray, seeker);
                 slot.top = 1;
                 slot.push(s, root, near, met);
