@@ -106,7 +106,7 @@ impl Default for Slots {
         let slot = |_| Slot {
             ray: ReadyRay::zeroed(),
             seeker: Seeker::new(&ReadyRay::zeroed(), 0.0, 0, NO_PRIM),
-            top: 1,
+            top: LANES,
             near: [f32::NEG_INFINITY; DEPTH + LANES],
             children: [Child::END; DEPTH + LANES],
         };
@@ -169,6 +169,25 @@ impl<W: Wave, B: BoxMargins> Kernel for InFlight<'_, W, B> {
 }
 
 impl Slot {
+    /// The same, eight at a time.
+    #[inline(always)]
+    fn pop_many<S: Simd>(&mut self, s: S) -> u32 {
+        let mut top = self.top;
+        let limit = s.splat(self.seeker.limit);
+        loop {
+            let bottom = (top - LANES) % DEPTH;
+            let Some(eight) = self.near[bottom..].first_chunk() else { return Child::END };
+            let within = s.at_most(s.load(eight), limit);
+            if within != 0 {
+                top = bottom + within.ilog2() as usize;
+                break;
+            }
+            top -= LANES;
+        }
+        self.top = top;
+        self.children[top % DEPTH]
+    }
+
     /// Takes the next child off the stack that may hold a hit.
     #[inline(always)]
     fn pop(&mut self) -> u32 {
@@ -220,7 +239,7 @@ impl<W: Wave, B: BoxMargins> Flight<'_, W, B> {
                 let (slot, at) = slots.at(number);
                 let seeker = Seeker::new(ray, queue.ready.t_min[lane], i, self.wave.exclude(i));
                 (slot.ray, slot.seeker) = (*ray, seeker);
-                slot.top = 1;
+                slot.top = LANES;
                 slot.push(s, root, near, met);
                 *at = slot.pop();
                 slots.taken |= 1 << number;
@@ -274,7 +293,7 @@ impl<W: Wave, B: BoxMargins> Flight<'_, W, B> {
         while leaves != 0 {
             let (slot, at) = slots.at(leaves.trailing_zeros());
             leaves &= leaves - 1;
-            *at = slot.pop();
+            *at = slot.pop_many(s);
         }
         answered
     }
