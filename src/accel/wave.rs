@@ -7,6 +7,7 @@ use std::ops::Range;
 use super::query::{Closest, Goal, Next, Occluded, Query};
 use super::{Hit, Intersector, NO_PRIM, Probe, Ray, Shapes};
 use crate::math::Vec3;
+use crate::math::simd::{LANES, Row};
 
 /// Rays that start at one place, look for hits from there on without end, and exclude no prim.
 #[derive(Clone, Copy, Debug)]
@@ -18,6 +19,17 @@ pub struct Pencil<'w> {
 }
 
 impl Pencil<'_> {
+    /// The directions of eight of its rays from `start` on.
+    #[inline(always)]
+    pub(super) fn eight(&self, start: usize) -> [Row; 3] {
+        let [x, y, z] = self.dirs;
+        let mut eight = [[0.0; LANES]; 3];
+        eight[0].copy_from_slice(&x[start..start + LANES]);
+        eight[1].copy_from_slice(&y[start..start + LANES]);
+        eight[2].copy_from_slice(&z[start..start + LANES]);
+        eight
+    }
+
     /// One of its rays, of no sample.
     #[inline(always)]
     pub(super) fn ray(&self, i: usize) -> Ray {
@@ -102,7 +114,10 @@ impl<I: Intersector> Wave for ForFirst<'_, I> {
 
     #[inline(always)]
     fn ray(&self, i: usize) -> Ray {
-        self.pencil.map_or_else(|| self.rays[i], |pencil| pencil.ray(i))
+        match &self.pencil {
+            Some(pencil) => pencil.ray(i),
+            None => self.rays[i],
+        }
     }
 
     #[inline(always)]

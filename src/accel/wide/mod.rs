@@ -80,7 +80,7 @@ impl RayOrder {
     /// tell.
     fn of<W: Wave>(wave: &W) -> Self {
         let octant = |i: usize| {
-            let dir = wave.rays()[i].dir;
+            let dir = wave.ray(i).dir;
             [dir.x, dir.y, dir.z].map(f32::is_sign_negative)
         };
         let packets = wave.rays().len() / WIDE;

@@ -40,8 +40,10 @@ impl Ready {
     #[inline(always)]
     pub(super) fn take<B: BoxMargins, S: Simd, W: Wave>(&mut self, s: S, tree: &Tree, wave: &W, start: usize) {
         let rays = &wave.rays()[start..];
-        let columns = wave.pencil().and_then(|pencil| Columns::of_pencil(s, &pencil, start));
-        let Columns { origin: o, dir: d, t_min, t_max } = columns.unwrap_or_else(|| Columns::of(s, rays));
+        let Columns { origin: o, dir: d, t_min, t_max } = match wave.pencil() {
+            Some(pencil) if rays.len() >= LANES => Columns::of_pencil(s, &pencil, start),
+            _ => Columns::of(s, rays),
+        };
         self.t_min = s.store(t_min);
         wave.adapt_t_min(start, &mut self.t_min[..rays.len().min(LANES)]);
         let t_min = s.load(&self.t_min);
@@ -105,18 +107,16 @@ pub(super) struct Columns<S: Simd> {
 }
 
 impl<S: Simd> Columns<S> {
-    /// Eight rays of a pencil from `start` on; `None` where there are fewer.
+    /// Eight rays of a pencil from `start` on.
     #[inline(always)]
-    fn of_pencil(s: S, pencil: &Pencil, start: usize) -> Option<Self> {
-        let [x, y, z] = pencil.dirs;
-        let (x, y, z) = (x.get(start..)?.first_chunk()?, y.get(start..)?.first_chunk()?, z.get(start..)?.first_chunk()?);
-        let Vec3 { x: ox, y: oy, z: oz } = pencil.origin;
-        Some(Self {
+    fn of_pencil(s: S, pencil: &Pencil, start: usize) -> Self {
+        let (Vec3 { x: ox, y: oy, z: oz }, dirs) = (pencil.origin, pencil.eight(start));
+        Self {
             origin: [s.splat(ox), s.splat(oy), s.splat(oz)],
-            dir: [s.load(x), s.load(y), s.load(z)],
+            dir: [s.load(&dirs[0]), s.load(&dirs[1]), s.load(&dirs[2])],
             t_min: s.splat(0.0),
             t_max: s.splat(f32::INFINITY),
-        })
+        }
     }
 
     /// The first eight rays, the last repeated where there are fewer.
