@@ -8,7 +8,7 @@ use super::intersector::{IntersectorKind, Looked, MollerTrumbore, MollerTrumbore
 use super::query::{Culling, Tested};
 use super::volumes::{Ball, Volumes};
 use super::{
-    Accel, AccelParams, Bvh, GridOctree, Hit, Kept, NoProbe, Probe, Ray, Shapes, Splitting, StructureStats,
+    Accel, AccelParams, Bvh, GridOctree, Hit, Kept, NoProbe, Pencil, Probe, Ray, Shapes, Splitting, StructureStats,
     Transformed, TwoLevel, Unculled, Wide,
 };
 use crate::math::aabb::Aabb;
@@ -226,6 +226,21 @@ impl<'a> AnyAccel<'a> {
         whichever!(&self.structure, a => a.check())
     }
 
+    fn ask_first<P: Probe>(
+        &self,
+        pencil: Option<&Pencil>,
+        rays: &[Ray],
+        hits: &mut [Hit],
+        scratch: &mut AnyScratch,
+        probe: &mut P,
+    ) {
+        if P::SILENT {
+            self.ask(FirstHits { rays, pencil, hits, probe: &mut NoProbe }, scratch);
+        } else {
+            self.ask(FirstHits { rays, pencil, hits, probe }, scratch);
+        }
+    }
+
     fn ask<Q: Question>(&self, question: Q, scratch: &mut AnyScratch) {
         match &self.structure {
             // What is timed has code of its own for every test.
@@ -280,11 +295,18 @@ impl Accel for AnyAccel<'_> {
     // All that are silent share what is compiled for one.
 
     fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut AnyScratch, probe: &mut P) {
-        if P::SILENT {
-            self.ask(FirstHits { rays, hits, probe: &mut NoProbe }, scratch);
-        } else {
-            self.ask(FirstHits { rays, hits, probe }, scratch);
-        }
+        self.ask_first(None, rays, hits, scratch, probe);
+    }
+
+    fn closest_from<P: Probe>(
+        &self,
+        pencil: &Pencil,
+        rays: &[Ray],
+        hits: &mut [Hit],
+        scratch: &mut AnyScratch,
+        probe: &mut P,
+    ) {
+        self.ask_first(Some(pencil), rays, hits, scratch, probe);
     }
 
     fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut AnyScratch, probe: &mut P) {
@@ -306,6 +328,7 @@ impl Accel for AnyAccel<'_> {
 
 struct FirstHits<'q, P> {
     rays: &'q [Ray],
+    pencil: Option<&'q Pencil<'q>>,
     hits: &'q mut [Hit],
     probe: &'q mut P,
 }
@@ -314,7 +337,10 @@ impl<P: Probe> Question for FirstHits<'_, P> {
     const SILENT: bool = P::SILENT;
 
     fn ask<A: Accel>(self, accel: &A, scratch: &mut A::Scratch) {
-        accel.closest(self.rays, self.hits, scratch, self.probe);
+        match self.pencil {
+            Some(pencil) => accel.closest_from(pencil, self.rays, self.hits, scratch, self.probe),
+            None => accel.closest(self.rays, self.hits, scratch, self.probe),
+        }
     }
 }
 

@@ -101,11 +101,7 @@ impl<S: Lanewise<N>, const N: usize> Fan<S, N> {
         let heights = [a[2], b[2], c[2]];
         let highest = s.greater(heights[0], s.greater(heights[1], heights[2]));
         let lowest = s.smaller(heights[0], s.smaller(heights[1], heights[2]));
-        let rounded = s.mul_add(
-            largest(s, heights),
-            s.splat(HEIGHTS),
-            s.splat(EdgeMargins::WITH_DISTANCES.underflow),
-        );
+        let rounded = s.mul_add(largest(s, heights), s.splat(HEIGHTS), s.splat(EdgeMargins::WITH_DISTANCES.underflow));
         FanReady {
             edges: [stored(s, u), stored(s, v), stored(s, w)],
             error: s.store(error),
@@ -161,11 +157,7 @@ impl<S: Lanewise<N>, const N: usize> Fan<S, N> {
 /// p × q.
 #[inline(always)]
 fn cross<S: Simd>(s: S, [px, py, pz]: [S::Lanes; 3], [qx, qy, qz]: [S::Lanes; 3]) -> [S::Lanes; 3] {
-    [
-        s.mul_sub(py, qz, s.mul(pz, qy)),
-        s.mul_sub(pz, qx, s.mul(px, qz)),
-        s.mul_sub(px, qy, s.mul(py, qx)),
-    ]
+    [s.mul_sub(py, qz, s.mul(pz, qy)), s.mul_sub(pz, qx, s.mul(px, qz)), s.mul_sub(px, qy, s.mul(py, qx))]
 }
 
 /// The largest component, in size.

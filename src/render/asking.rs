@@ -2,7 +2,7 @@
 
 use super::Progress;
 use super::observer::{Observer, Question};
-use crate::accel::{Accel, Hit, Ray};
+use crate::accel::{Accel, Hit, Pencil, Ray};
 
 /// A structure, one worker's scratch for it, and whoever may end the work.
 pub(crate) struct Asking<'a, A: Accel> {
@@ -20,12 +20,30 @@ impl<'a, A: Accel> Asking<'a, A> {
 
     /// The first hit of each ray.
     pub(crate) fn closest<P: Observer>(&mut self, rays: &[Ray], hits: &mut [Hit], probe: &mut P) {
-        for (rays, hits) in rays.chunks(P::SLICE).zip(hits.chunks_mut(P::SLICE)) {
+        self.closest_of(None, rays, hits, probe);
+    }
+
+    /// The same of rays that are those of a pencil, if there is one.
+    pub(crate) fn closest_of<P: Observer>(
+        &mut self,
+        pencil: Option<Pencil>,
+        rays: &[Ray],
+        hits: &mut [Hit],
+        probe: &mut P,
+    ) {
+        let slices = rays.chunks(P::SLICE).zip(hits.chunks_mut(P::SLICE));
+        for (start, (rays, hits)) in (0..).step_by(P::SLICE).zip(slices) {
             if self.gives_up() {
                 return;
             }
             probe.asked(Question::Closest, rays, &[]);
-            self.accel.closest(rays, hits, &mut self.scratch, probe);
+            match pencil {
+                Some(pencil) => {
+                    let pencil = pencil.part(start..start + rays.len());
+                    self.accel.closest_from(&pencil, rays, hits, &mut self.scratch, probe);
+                }
+                None => self.accel.closest(rays, hits, &mut self.scratch, probe),
+            }
             probe.answered(hits);
         }
     }

@@ -2,7 +2,7 @@
 
 use super::view::{Lens, PrimaryRay, View};
 use super::wave::Path;
-use crate::accel::{Hit, NO_PRIM, Ray};
+use crate::accel::{Hit, NO_PRIM, Pencil, Ray};
 use crate::math::simd::{Kernel, LANES, Level, Simd};
 use crate::math::{DVec3, Vec3};
 
@@ -14,6 +14,8 @@ const RUN: usize = 64;
 pub(crate) struct Eyes {
     pub rays: Vec<Ray>,
     pub hits: Vec<Hit>,
+    /// Their directions by axis, as long as all start at one place.
+    dirs: [Vec<f32>; 3],
     cone_width: Vec<f32>,
     cone_spread: Vec<f32>,
 }
@@ -89,6 +91,12 @@ impl Eye<'_> {
             Some(lens) => self.through(lens, eye, place.lens),
             None => eye,
         })
+    }
+
+    /// Whether all rays start where the eye is.
+    fn sees_from_one_place(&self) -> bool {
+        let perspective = matches!(self.view.lens, Lens::Perspective { .. });
+        perspective && self.lens.is_none() && !self.scene.seen_from(self.view.eye).far
     }
 
     /// The ray from a point of the lens to where `ray` meets what is in focus.
@@ -177,6 +185,7 @@ impl Eyes {
     pub(crate) fn clear(&mut self) {
         self.rays.clear();
         self.hits.clear();
+        self.dirs.iter_mut().for_each(Vec::clear);
         self.cone_width.clear();
         self.cone_spread.clear();
     }
@@ -202,10 +211,22 @@ impl Eyes {
         #[expect(clippy::cast_possible_truncation, reason = "a wave has few samples")]
         Level::best().run(Aim { eye, run, sample: self.rays.len() as u32 });
         let count = run.count.min(RUN);
+        if eye.sees_from_one_place() {
+            self.dirs.iter_mut().zip(&run.dir).for_each(|(dirs, run)| dirs.extend_from_slice(&run[..count]));
+        }
         self.rays.extend_from_slice(&run.rays[..count]);
         self.cone_width.extend_from_slice(&run.cone_width[..count]);
         self.cone_spread.extend_from_slice(&run.cone_spread[..count]);
         run.count = 0;
+    }
+
+    /// The rays, as a pencil if they are one, and room for a hit of each.
+    pub(crate) fn ask(&mut self) -> (&[Ray], Option<Pencil<'_>>, &mut [Hit]) {
+        let Self { rays, hits, dirs, .. } = self;
+        hits.resize(rays.len(), Hit::MISS);
+        let first = rays.first().filter(|_| dirs[0].len() == rays.len());
+        let pencil = first.map(|ray| Pencil { origin: ray.origin, dirs: dirs.each_ref().map(Vec::as_slice) });
+        (rays, pencil, hits)
     }
 
     /// How wide the cone of the `i`th ray grows, radians.

@@ -169,8 +169,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     /// Traces the rays of all eyes and shades what they hit.
     fn trace_eyes(&mut self) {
         let mut eyes = std::mem::take(&mut self.eyes);
-        eyes.hits.resize(eyes.rays.len(), Hit::MISS);
-        self.asking.closest(&eyes.rays, &mut eyes.hits, self.counts.of(RayClass::Primary));
+        let (rays, pencil, hits) = eyes.ask();
+        self.asking.closest_of(pencil, rays, hits, self.counts.of(RayClass::Primary));
         if !self.asking.cancelled {
             self.see(&eyes);
             self.trace_shadows();

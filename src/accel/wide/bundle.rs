@@ -7,11 +7,11 @@ use super::padded::{FIRST, Padding};
 use super::ready::Columns;
 use super::slabs::{BoxMargins, backwards};
 use crate::accel::{NO_PRIM, Ray};
+use crate::math::Vec3;
 use crate::math::bounds::PARALLEL;
 use crate::math::meetings::RowBounds;
 use crate::math::shear::main_axis;
 use crate::math::simd::{LANES, Lanewise, Pick, Simd};
-use crate::math::Vec3;
 
 /// A bit for every ray of a packet of `N`.
 pub(super) const fn all<const N: usize>() -> u32 {

@@ -3,7 +3,7 @@
 use super::flight::{DEPTH, FARTHEST_FIRST};
 use super::{MANY, RayOrder, Splitting, Wide};
 use crate::accel::tests::scenes::{self, ray};
-use crate::accel::{Accel, Hit, NoProbe, Ray, Shapes, Unculled};
+use crate::accel::{Accel, Hit, NoProbe, Pencil, Ray, Shapes, Unculled};
 use crate::math::Vec3;
 use crate::math::random::Random;
 use crate::math::simd::Level;
@@ -98,6 +98,40 @@ fn rays_among_others_that_run_otherwise_hit_what_brute_force_hits() {
 }
 
 #[test]
+fn the_rays_of_a_pencil_hit_what_they_hit_one_by_one() {
+    let mut random = Random::new(77);
+    for (name, shapes) in scenes::all() {
+        let seen = scenes::rays(&shapes, 3);
+        for (k, from) in seen.iter().step_by(29).enumerate() {
+            let (sharp, along) = ([0.02, 0.3, 3.0][k % 3], k % 4 == 0);
+            let turned = |_| {
+                let dir = from.dir + random.cube() * (sharp * from.dir.length());
+                // Some run along an axis, with components of zero.
+                ray(
+                    from.origin,
+                    if along { dir * Vec3::new(1.0, 0.0, if k % 8 == 0 { 0.0 } else { 1.0 }) } else { dir },
+                )
+            };
+            let rays: Vec<Ray> = (0..[75, 64, 17][k % 3]).map(turned).filter(|ray| ray.dir != Vec3::ZERO).collect();
+            let dirs = [0, 1, 2].map(|k| rays.iter().map(|ray| ray.dir[k]).collect::<Vec<f32>>());
+            let pencil = Pencil { origin: from.origin, dirs: dirs.each_ref().map(Vec::as_slice) };
+            let ask = |wide: &Wide| {
+                let mut hits = vec![Hit::MISS; rays.len()];
+                wide.closest_from(&pencil, &rays, &mut hits, &mut wide.scratch(), &mut NoProbe);
+                hits.iter().map(Hit::bits).collect::<Vec<_>>()
+            };
+            let (unculled, mut expected) = (Unculled::new(&shapes), vec![Hit::MISS; rays.len()]);
+            unculled.closest(&rays, &mut expected, &mut unculled.scratch(), &mut NoProbe);
+            let expected: Vec<_> = expected.iter().map(Hit::bits).collect();
+            for (level, way) in Level::all().into_iter().flat_map(|level| WAYS.map(|way| (level, way))) {
+                let wide = Wide::build(&shapes, Splitting::SurfaceArea).at_level(level).with_rays(way);
+                assert!(ask(&wide) == expected, "{name}: {way:?} on {}", level.name());
+            }
+        }
+    }
+}
+
+#[test]
 fn a_wave_may_be_of_any_length() {
     let shapes = scenes::soup(60, 0.4);
     let rays = side_by_side(&scenes::rays(&shapes, 2), 48);
@@ -111,7 +145,12 @@ fn a_wave_goes_in_packets_where_rays_run_alike_and_in_flight_where_not_and_there
     let shapes = scenes::soup(60, 0.4);
     let of = |rays: &[Ray]| {
         let mut hits = vec![Hit::MISS; rays.len()];
-        RayOrder::of(&crate::accel::wave::ForFirst { rays, pencil: None, hits: &mut hits, test: crate::accel::intersector::Exact })
+        RayOrder::of(&crate::accel::wave::ForFirst {
+            rays,
+            pencil: None,
+            hits: &mut hits,
+            test: crate::accel::intersector::Exact,
+        })
     };
     let mixed = scenes::rays(&shapes, 40);
     assert_eq!((of(&mixed[..MANY]), of(&mixed[..MANY - 1])), (RayOrder::InFlight, RayOrder::OneByOne));
@@ -124,7 +163,7 @@ fn a_wave_goes_in_packets_where_rays_run_alike_and_in_flight_where_not_and_there
 fn orders_list_the_lanes_of_a_mask_the_farthest_first() {
     for (octant, orders) in FARTHEST_FIRST.iter().enumerate() {
         for (mask, order) in orders.iter().enumerate() {
-            let lanes: Vec<usize> = (0..mask.count_ones()).map(|k| (order >> (8 * k)) as usize & 255).collect();
+            let lanes: Vec<usize> = (0..mask.count_ones()).map(|k| (order >> (4 * k)) as usize & 15).collect();
             assert_eq!(lanes.iter().fold(0, |m, lane| m | 1 << lane), mask);
             assert!(lanes.windows(2).all(|w| w[0] ^ octant > w[1] ^ octant), "{octant} {mask} {lanes:?}");
         }

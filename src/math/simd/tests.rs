@@ -216,7 +216,7 @@ impl Kernel for Moved {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Self::Output {
         let columns = s.columns(self.0.each_ref());
-        let order = 0x0706_0102_0005_0304;
+        let order = 0x7612_0534;
         let (mut arranged, mut words) = ([0.0; LANES], [0; LANES]);
         s.arrange(columns[1], order, &mut arranged);
         s.arrange_words(&s.store(columns[2]).map(f32::to_bits), order, &mut words);
@@ -440,4 +440,59 @@ fn a_product_and_a_sum_are_rounded_once_or_twice() {
         let c = std::array::from_fn(|k| -a[k] * b[k] * [1.0, -1.0, 0.75][k % 3]);
         assert_rounded_once_or_twice([a, b, c]);
     }
+}
+
+/// Which of these are surely rounded, in eight lanes and in sixteen.
+struct Rounds([[f64; LANES]; 2]);
+
+impl Kernel for Rounds {
+    type Output = [u32; 2];
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> Self::Output {
+        /// Doubles from floats: what is left of each number after its nearest float.
+        #[inline(always)]
+        fn doubles<S: Lanewise<N>, const N: usize>(s: S, row: &[f64; N]) -> S::Doubles {
+            let nearest: [f32; N] = std::array::from_fn(|k| row[k] as f32);
+            let rest: [f32; N] = std::array::from_fn(|k| (row[k] - f64::from(nearest[k])) as f32);
+            s.add_f64(s.widen(s.load(&nearest)), s.widen(s.load(&rest)))
+        }
+        let both: [f64; WIDE] = std::array::from_fn(|k| self.0[k / LANES][k % LANES]);
+        let eights = self.0.map(|row| s.rounds_surely(doubles(s, &row)));
+        [eights[0] | eights[1] << LANES, s.wide().rounds_surely(doubles(s.wide(), &both))]
+    }
+}
+
+#[test]
+fn what_is_surely_rounded_is_so_wherever_the_number_is_within_its_error() {
+    let mut random = Random::new(31);
+    let (mut sure, mut near) = (0, 0);
+    for case in 0..4000 {
+        let mut rows = [[0.0; LANES]; 2];
+        for (k, x) in rows.as_flattened_mut().iter_mut().enumerate() {
+            let float = (random.unit() + 0.5) * 2f32.powi(random.below(200) as i32 - 100);
+            let middle = (f64::from(float) + f64::from(float.next_up())) / 2.0;
+            // Around the middle of two floats as far as matters, farther from it, and anywhere.
+            let size = match case % 3 {
+                0 => middle * (1.0 + f64::from(random.cube().x) * 4.0 * ROUNDED),
+                1 => middle * (1.0 + f64::from(random.cube().x) * 1e3 * ROUNDED),
+                _ => f64::from(float) * (1.0 + f64::from(random.unit()) * 1e-7),
+            };
+            *x = if k % 2 == 0 { size } else { -size };
+        }
+        for level in Level::all() {
+            let [eights, sixteen] = level.run(Rounds(rows));
+            for (k, x) in rows.as_flattened().iter().enumerate() {
+                // Doubles that two floats make have 48 bits.
+                let x = f64::from(*x as f32) + f64::from((*x - f64::from(*x as f32)) as f32);
+                let one = (x * (1.0 - ROUNDED)) as f32 == (x * (1.0 + ROUNDED)) as f32;
+                for mask in [eights, sixteen] {
+                    let said = mask >> k & 1 == 1;
+                    assert!(one || !said, "{x} on {}", level.name());
+                    (sure, near) = (sure + usize::from(said), near + usize::from(!one));
+                }
+            }
+        }
+    }
+    assert!(sure > near && near > 1000, "{sure} sure, {near} too near to tell");
 }
