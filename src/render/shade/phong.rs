@@ -68,15 +68,36 @@ impl PhongMatter {
     /// Kd N·L + Ks cosⁿα with α between the view and the mirrored light; all unit vectors, away from the surface.
     #[inline(always)]
     pub(crate) fn lit(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
+        let shown = self.glows() && normal.dot(to_light) > 0.0;
+        let highlight = if shown { self.highlight(Self::agreement(normal, view, to_light)) } else { 0.0 };
+        self.lit_with(normal, to_light, highlight)
+    }
+
+    /// Whether lights show as highlights.
+    #[inline(always)]
+    pub(crate) fn glows(&self) -> bool {
+        self.specular != Vec3::ZERO
+    }
+
+    /// cosα, 0 where that is negative.
+    #[inline(always)]
+    pub(crate) fn agreement(normal: Vec3, view: Vec3, to_light: Vec3) -> f32 {
+        let cosine = view.dot(reflect(-to_light, normal));
+        if cosine > 0.0 { cosine } else { 0.0 }
+    }
+
+    /// cosⁿα of cosα.
+    #[inline]
+    pub(crate) fn highlight(&self, agreement: f32) -> f32 {
+        libm::powf(agreement, self.shininess)
+    }
+
+    /// [`Self::lit`] with cosⁿα: nothing but a formula.
+    #[inline(always)]
+    pub(crate) fn lit_with(&self, normal: Vec3, to_light: Vec3, highlight: f32) -> Vec3 {
         let cosine = normal.dot(to_light);
-        if cosine <= 0.0 {
-            return Vec3::ZERO;
-        }
-        if self.specular == Vec3::ZERO {
-            return self.diffuse * cosine;
-        }
-        let highlight = view.dot(reflect(-to_light, normal)).max(0.0);
-        self.diffuse * cosine + self.specular * libm::powf(highlight, self.shininess)
+        let lit = self.diffuse * cosine + self.specular * highlight;
+        if cosine > 0.0 { lit } else { Vec3::ZERO }
     }
 
     /// Kd (N·L): the same without its highlight.

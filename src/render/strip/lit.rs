@@ -7,7 +7,7 @@ use crate::math::Vec3;
 use crate::math::bounds::offset_origin;
 use crate::math::simd::{Kernel, Simd};
 use crate::render::curve::STEEP;
-use crate::render::shade::{LocalLight, Matter, Model, terminator, way};
+use crate::render::shade::{LocalLight, Matter, Model, PhongMatter, terminator, way};
 use crate::render::shadow::{Bound, Shadows};
 use crate::render::wave::Media;
 use bytemuck::Zeroable;
@@ -169,13 +169,19 @@ impl Kernel for Shine<'_> {
             Model::Unlit(_) => lit.seen.fill(0),
             Model::Phong(m) if painted.any => {
                 let m = *m;
-                reflect(found, lit, points, |i, normal, view, to_light| {
-                    painted.phong(i, &m).lit(normal, view, to_light)
+                let highlights = highlights(found, lit, points, |i| painted.phong(i, &m));
+                reflect(found, lit, points, |i, normal, _, to_light| {
+                    painted.phong(i, &m).lit_with(normal, to_light, highlights[i])
                 });
+            }
+            Model::Phong(m) if m.glows() => {
+                let m = *m;
+                let highlights = highlights(found, lit, points, |_| m);
+                reflect(found, lit, points, |i, normal, _, to_light| m.lit_with(normal, to_light, highlights[i]));
             }
             Model::Phong(m) => {
                 let m = *m;
-                reflect(found, lit, points, |_, normal, view, to_light| m.lit(normal, view, to_light));
+                reflect(found, lit, points, |_, normal, _, to_light| m.lit_with(normal, to_light, 0.0));
             }
             Model::MetalRough(m) if painted.any => {
                 let m = *m;
@@ -193,6 +199,24 @@ impl Kernel for Shine<'_> {
             None => start(found, lit, points, None),
         }
     }
+}
+
+/// How bright Phong's highlight is at each point. Powers are found one by one, and only where there is something to see.
+#[inline(always)]
+fn highlights(found: &Found, lit: &Lit, points: usize, matter: impl Fn(usize) -> PhongMatter) -> Column {
+    let mut highlights = [0.0; POINTS];
+    for (i, highlight) in highlights.iter_mut().enumerate().take(points) {
+        let (normal, to_light) = (get(&found.normal, i), get(&lit.to_light, i));
+        let agreement = PhongMatter::agreement(normal, get(&found.view, i), to_light);
+        *highlight = if normal.dot(to_light) > 0.0 { agreement } else { 0.0 };
+    }
+    for (i, highlight) in highlights.iter_mut().enumerate().take(points) {
+        let m = matter(i);
+        if lit.seen[i] != 0 && m.glows() {
+            *highlight = m.highlight(*highlight);
+        }
+    }
+    highlights
 }
 
 /// What the points reflect of the light that arrives.
