@@ -49,7 +49,7 @@ pub(crate) fn run(file: &str, count: usize, page: &str) -> bool {
         }
     };
     let packed = packets(&rays);
-    let both = Rays { all: &rays, packets: &packed };
+    let both = Rays { all: &rays, packets: &packed, pencil: None };
     let mut ways: Vec<Way> = Vec::new();
     for test in IntersectorKind::ALL {
         let tested = accel.clone().tested_by(test);

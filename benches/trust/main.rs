@@ -12,6 +12,7 @@ mod closed;
 #[path = "../peers/embree.rs"]
 mod embree;
 mod kernels;
+#[expect(dead_code, reason = "pencils are read by a tracer of the other bench")]
 #[path = "../peers/tracer.rs"]
 mod tracer;
 

@@ -125,7 +125,7 @@ impl Hit {
     /// The other way round, of some.
     #[inline(always)]
     pub(crate) fn from_fours<const N: usize>(fours: [[f32; 4]; N]) -> [Self; N] {
-        fours.map(|four| bytemuck::cast(four))
+        fours.map(bytemuck::cast)
     }
 
     /// t, u, v and prim as bits: equal only where every bit of two hits is.
