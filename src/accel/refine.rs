@@ -2,7 +2,7 @@
 
 use super::shapes::Prim;
 use super::{Hit, Ray, Shapes};
-use crate::math::bounds::{CONE_PROJECTION, POSITION_T, U32, U64, offset_origin};
+use crate::math::bounds::{CONE_PROJECTION, POSITION_T, U32, U64, above, offset_origin};
 use crate::math::inset::{Rim, inset};
 use crate::math::shear::RaySpace;
 use crate::math::triangle::{Flat, Triangle};
@@ -158,7 +158,7 @@ impl Located {
     fn rounded(&self) -> (Vec3, Vec3) {
         let position = self.position.as_vec3();
         let error = self.error + position.as_dvec3().abs() * f64::from(U32) + f64::from(f32::from_bits(1));
-        (position, error.as_vec3().map(f32::next_up))
+        (position, error.as_vec3().map(above))
     }
 }
 

@@ -245,12 +245,28 @@ pub fn offset_origin(position: Vec3, error: Vec3, normal: Vec3, dir: Vec3) -> Ve
     let distance = normal.abs().dot(error) * SLACK;
     let side = if normal.dot(dir) < 0.0 { -distance } else { distance };
     let offset = normal * side;
-    let step = |p: f32, o: f32| match o {
-        o if o > 0.0 => (p + o).next_up(),
-        o if o < 0.0 => (p + o).next_down(),
-        _ => p,
-    };
-    Vec3::new(step(position.x, offset.x), step(position.y, offset.y), step(position.z, offset.z))
+    Vec3::new(moved(position.x, offset.x), moved(position.y, offset.y), moved(position.z, offset.z))
+}
+
+/// x + way, one float further on that way; x itself where there is no way.
+///
+/// The floats of one sign are in the order of their bits, so that the next one on a way is found without asking which it is.
+#[inline(always)]
+fn moved(x: f32, way: f32) -> f32 {
+    const SIGN: u32 = 1 << 31;
+    let sum = x + way;
+    let apart = (sum.to_bits() ^ way.to_bits()) >> 31;
+    let further = sum.to_bits().wrapping_add(1).wrapping_sub(apart << 1);
+    let from_zero = way.to_bits() & SIGN | 1;
+    let next = f32::from_bits(if sum == 0.0 { from_zero } else { further });
+    let next = if sum.is_finite() { next } else { sum };
+    if way.abs() > 0.0 { next } else { x }
+}
+
+/// The next float above one that is not negative.
+#[inline(always)]
+pub(crate) fn above(x: f32) -> f32 {
+    f32::from_bits((x.to_bits() + 1).min(f32::INFINITY.to_bits()))
 }
 
 #[cfg(test)]
@@ -266,6 +282,25 @@ mod tests {
             let side = f64::from(n.dot(dir).signum());
             assert!(moved.dot(n.as_dvec3()) * side > 1.4e-6, "{moved} for {dir}");
             assert!(moved.length() < 4e-6);
+        }
+    }
+
+    #[test]
+    fn what_is_moved_ends_at_the_float_next_to_the_sum() {
+        let tiny = f32::from_bits(1);
+        let numbers = [0.0, -0.0, tiny, -tiny, 1e-30, -1e-30, 1.0, -1.0, 0.75, -3.5, f32::MAX, f32::MIN];
+        for (x, way) in numbers.into_iter().flat_map(|x| numbers.map(|way| (x, way))) {
+            let sum = x + way;
+            let expected = match way {
+                _ if sum.is_infinite() => sum,
+                way if way > 0.0 => sum.next_up(),
+                way if way < 0.0 => sum.next_down(),
+                _ => x,
+            };
+            assert_eq!(moved(x, way).to_bits(), expected.to_bits(), "{x} {way}");
+        }
+        for x in numbers.map(f32::abs).into_iter().chain([f32::INFINITY]) {
+            assert_eq!(above(x), x.next_up());
         }
     }
 

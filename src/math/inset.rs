@@ -21,24 +21,24 @@ pub fn inset(triangle: &Triangle, (u, v): (f32, f32), error: f32) -> DVec3 {
     }
     let weights = [1.0 - f64::from(u) - f64::from(v), f64::from(u), f64::from(v)];
     let room = f64::from(error) * EDGE_ROOM;
-    moved_inwards([a, b, c], weights, rim.edges2.map(|e| room * (e / rim.area2).sqrt()), room)
+    moved_inwards([a, b, c], weights, rim.heights2.map(|height2| room / height2.sqrt()), room)
 }
 
 /// What tells how far a point of a triangle is from its edges.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Rim {
-    /// The square of twice the area.
-    pub area2: f64,
-    /// The squares of the edges opposite each corner.
-    pub edges2: [f64; 3],
+    /// The squares of the heights of each corner over the opposite edge; infinite where the triangle has no area.
+    pub heights2: [f64; 3],
 }
 
 impl Rim {
     /// Of a triangle whose normal is (b − a) × (c − a).
     #[inline(always)]
     pub fn of([a, b, c]: [DVec3; 3], normal: DVec3) -> Self {
-        let edges2 = [(c - b).length_squared(), (a - c).length_squared(), (b - a).length_squared()];
-        Self { area2: normal.length_squared(), edges2 }
+        // The square of twice the area.
+        let area2 = normal.length_squared();
+        let over = |edge: DVec3| if area2 == 0.0 { f64::INFINITY } else { area2 / edge.length_squared() };
+        Self { heights2: [over(c - b), over(a - c), over(b - a)] }
     }
 
     /// Whether a hit of weights `u`, `v` whose position is off by `error` is to be moved inwards by [`inset`].
@@ -47,9 +47,10 @@ impl Rim {
         let (u, v) = (f64::from(u), f64::from(v));
         let weights = [1.0 - u - v, u, v];
         let room = f64::from(error) * EDGE_ROOM;
-        // The weight of a corner times the height over the opposite edge, 2 area / |edge|, is the distance from that edge.
-        let is_near = |k: usize| weights[k] * weights[k] * self.area2 < room * room * self.edges2[k];
-        (self.area2 != 0.0) & (is_near(0) | is_near(1) | is_near(2))
+        // The weight of a corner times its height over the opposite edge is the distance from that edge. (Zero times an
+        // infinite height is no number, and not near.)
+        let is_near = |k: usize| weights[k] * weights[k] * self.heights2[k] < room * room;
+        is_near(0) | is_near(1) | is_near(2)
     }
 }
 

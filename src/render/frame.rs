@@ -135,7 +135,14 @@ impl Sum {
 
 /// A pixel from all of its samples.
 pub(super) fn resolve(samples: &[Sample], background: Option<Vec3>) -> [f32; 4] {
-    let mut sum = Sum::default();
-    samples.iter().for_each(|sample| sum.add(sample));
-    sum.resolve(background)
+    // Six numbers side by side, which makes two additions of each sample.
+    let mut sum = [0.0; 6];
+    for Sample { radiance: r, through: t } in samples {
+        let numbers = [r.x, r.y, r.z, t.x, t.y, t.z];
+        (0..6).for_each(|k| sum[k] += numbers[k]);
+    }
+    let [r, g, b, through @ ..] = sum;
+    #[expect(clippy::cast_precision_loss, reason = "sample counts are small")]
+    let weight = samples.len() as f32;
+    Sum { radiance: Vec3::new(r, g, b), through: Vec3::from_array(through), weight }.resolve(background)
 }

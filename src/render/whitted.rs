@@ -239,7 +239,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             hits.iter().for_each(|&(ray, _)| self.shade_eye(eyes, ray as usize));
             return;
         }
-        strip.take(hits, sorted.faces(), &eyes.rays, &eyes.hits);
+        strip.take(hits, sorted.faces(), &eyes.rays, &eyes.hits, smooth);
         strip.find(smooth.then(|| context.world.placement(instance)));
         if reads {
             strip.read(context, eyes, mesh.material, common);

@@ -38,7 +38,8 @@ pub(super) fn put(columns: &mut Columns, i: usize, v: Vec3) {
     columns[2][i] = v.z;
 }
 
-/// Points of one instance.
+/// Points of one instance. Columns lie in whole cache lines.
+#[repr(C, align(64))]
 pub(crate) struct Strip {
     pub(super) count: usize,
     pub(super) level: Level,
@@ -55,6 +56,7 @@ pub(crate) struct Strip {
 }
 
 /// What hits say.
+#[repr(C, align(64))]
 pub(super) struct Given {
     origin: Columns,
     dir: Columns,
@@ -63,6 +65,7 @@ pub(super) struct Given {
 }
 
 /// The surface at each point.
+#[repr(C, align(64))]
 pub(super) struct Found {
     /// 1 where that is all, 0 where the tracer must look itself.
     pub certain: [u32; POINTS],
@@ -111,13 +114,14 @@ impl Default for Strip {
 }
 
 impl Strip {
-    /// Takes hits, at most [`POINTS`], each by the place of its ray in a wave and that of its face.
-    pub(crate) fn take(&mut self, hit: &[(u32, u32)], faces: &[Face], rays: &[Ray], hits: &[Hit]) {
+    /// Takes hits, at most [`POINTS`], each by the place of its ray in a wave and that of its face, with the normals of its
+    /// corners if the mesh is `smooth`.
+    pub(crate) fn take(&mut self, hit: &[(u32, u32)], faces: &[Face], rays: &[Ray], hits: &[Hit], smooth: bool) {
         self.count = hit.len().min(POINTS);
         for (at, (ray, _)) in self.rays.iter_mut().zip(hit) {
             *at = *ray;
         }
-        self.level.run(Gather { given: &mut self.given, hit: &hit[..self.count], faces, rays, hits });
+        self.level.run(Gather { given: &mut self.given, hit: &hit[..self.count], faces, rays, hits, smooth });
     }
 
     /// Finds the surface at each point; `placement` where the mesh has normals of its own.
@@ -158,6 +162,7 @@ struct Gather<'a> {
     faces: &'a [Face],
     rays: &'a [Ray],
     hits: &'a [Hit],
+    smooth: bool,
 }
 
 impl Kernel for Gather<'_> {
@@ -165,12 +170,12 @@ impl Kernel for Gather<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Self { given, hit, faces, rays, hits } = self;
+        let Self { given, hit, faces, rays, hits, smooth } = self;
         for (k, eight) in hit.chunks(LANES).enumerate() {
             let index: [usize; LANES] = std::array::from_fn(|lane| eight[lane.min(eight.len() - 1)].0 as usize);
-            let [ox, oy, oz, _] = s.columns(index.map(|i| rays[i].in_fours()[0]));
-            let [dx, dy, dz, _] = s.columns(index.map(|i| rays[i].in_fours()[1]));
-            let [_, u, v, _] = s.columns(index.map(|i| hits[i].as_four()));
+            let [ox, oy, oz, _] = s.columns(std::array::from_fn(|lane| rays[index[lane]].in_fours()[0]));
+            let [dx, dy, dz, _] = s.columns(std::array::from_fn(|lane| rays[index[lane]].in_fours()[1]));
+            let [_, u, v, _] = s.columns(std::array::from_fn(|lane| hits[index[lane]].as_four()));
             let rows =
                 [s.store(ox), s.store(oy), s.store(oz), s.store(dx), s.store(dy), s.store(dz), s.store(u), s.store(v)];
             let columns = given.origin.iter_mut().chain(&mut given.dir).chain(&mut given.weights);
@@ -180,7 +185,11 @@ impl Kernel for Gather<'_> {
         }
         let mut at = 0;
         for same in hit.chunk_by(|(_, a), (_, b)| a == b) {
-            given.faces.set(at..at + same.len(), &faces[same[0].1 as usize].numbers);
+            let (points, numbers) = (at..at + same.len(), &faces[same[0].1 as usize].numbers);
+            given.faces.set(points.clone(), numbers);
+            if smooth {
+                given.faces.set_normals(points, numbers);
+            }
             at += same.len();
         }
     }
@@ -309,7 +318,7 @@ mod tests {
             faces.push(Face::of_triangle(i, &corners, Some(normals)));
         }
         let hit: Vec<(u32, u32)> = (0..61).map(|i| (i, i)).collect();
-        strip.take(&hit, &faces, &rays, &hits);
+        strip.take(&hit, &faces, &rays, &hits, true);
         strip
     }
 
@@ -358,7 +367,7 @@ mod tests {
         for level in Level::all() {
             for count in [1, 7, 8, 40, POINTS] {
                 let mut strip = Strip { level, ..Strip::default() };
-                strip.take(&hit[..count], &faces, &rays, &hits);
+                strip.take(&hit[..count], &faces, &rays, &hits, true);
                 let given = &strip.given;
                 for (i, &(index, face)) in hit[..count].iter().enumerate() {
                     let (ray, of_hit) = (&rays[index as usize], &hits[index as usize]);

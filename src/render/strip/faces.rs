@@ -13,24 +13,28 @@ use crate::render::patch::differ;
 type Roomy<T> = [T; POINTS + LANES];
 
 /// What is known of the face at every point: [`FaceNumbers`] in columns.
+#[repr(C, align(64))]
 pub(super) struct Faces {
     wide: [Roomy<f64>; WIDE_NUMBERS],
-    narrow: [Roomy<f32>; NARROW_NUMBERS],
+    outward: [Roomy<f32>; 3],
+    normals: [Roomy<f32>; NORMAL_NUMBERS],
     /// 1 where the normals of the corners differ.
     curved: Roomy<u32>,
     prims: Roomy<u32>,
 }
 
-const WIDE_NUMBERS: usize = 13;
-const NARROW_NUMBERS: usize = 12;
+const WIDE_NUMBERS: usize = 12;
+const NORMAL_NUMBERS: usize = 9;
 
 /// What points of a face share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct FaceNumbers {
-    /// Corner, normal and sizes of its plane; the square of twice its area, and those of its edges.
+    /// Corner, normal and sizes of its plane, and the squares of its heights.
     wide: [f64; WIDE_NUMBERS],
-    /// The unit normal of its front, and those of its corners.
-    narrow: [f32; NARROW_NUMBERS],
+    /// The unit normal of its front.
+    outward: [f32; 3],
+    /// Those of its corners.
+    normals: [f32; NORMAL_NUMBERS],
     curved: u32,
     prim: u32,
 }
@@ -38,11 +42,12 @@ pub(super) struct FaceNumbers {
 impl FaceNumbers {
     /// Of prim `prim`, with the unit normal on its front and the normals of its corners, if it has any.
     pub(super) fn new(prim: u32, facet: &Facet, outward: Vec3, normals: Option<[Vec3; 3]>) -> Self {
-        let Facet { flat: Flat { corner: c, normal: n, sizes: s }, rim: Rim { area2, edges2: [e, f, g] } } = *facet;
+        let Facet { flat: Flat { corner: c, normal: n, sizes: s }, rim: Rim { heights2: [e, f, g] } } = *facet;
         let [p, q, r] = normals.unwrap_or_default();
         Self {
-            wide: [c.x, c.y, c.z, n.x, n.y, n.z, s.x, s.y, s.z, area2, e, f, g],
-            narrow: [outward.x, outward.y, outward.z, p.x, p.y, p.z, q.x, q.y, q.z, r.x, r.y, r.z],
+            wide: [c.x, c.y, c.z, n.x, n.y, n.z, s.x, s.y, s.z, e, f, g],
+            outward: outward.to_array(),
+            normals: [p.x, p.y, p.z, q.x, q.y, q.z, r.x, r.y, r.z],
             curved: u32::from(normals.is_some_and(differ)),
             prim,
         }
@@ -53,31 +58,30 @@ impl Faces {
     /// No faces.
     pub(super) const EMPTY: Self = Self {
         wide: [[0.0; POINTS + LANES]; WIDE_NUMBERS],
-        narrow: [[0.0; POINTS + LANES]; NARROW_NUMBERS],
+        outward: [[0.0; POINTS + LANES]; 3],
+        normals: [[0.0; POINTS + LANES]; NORMAL_NUMBERS],
         curved: [0; POINTS + LANES],
         prims: [0; POINTS + LANES],
     };
 
-    /// Sets the face of these points. What follows up to seven behind them is written, too, and must be set later.
+    /// Sets the face of these points, but for the normals of its corners. What follows up to seven behind them is written,
+    /// too, and must be set later.
     #[inline(always)]
     pub(super) fn set(&mut self, points: Range<usize>, face: &FaceNumbers) {
         for at in points.step_by(LANES) {
-            self.set_eight(at, face);
+            set_eight(&mut self.wide, at, &face.wide);
+            set_eight(&mut self.outward, at, &face.outward);
+            set_eight(std::array::from_mut(&mut self.prims), at, &[face.prim]);
         }
     }
 
-    /// Sets the face of eight points from `at` on.
+    /// Sets the normals of its corners, in the same way.
     #[inline(always)]
-    fn set_eight(&mut self, at: usize, face: &FaceNumbers) {
-        let at = at % POINTS;
-        for (column, number) in self.wide.iter_mut().zip(face.wide) {
-            column[at..at + LANES].copy_from_slice(&[number; LANES]);
+    pub(super) fn set_normals(&mut self, points: Range<usize>, face: &FaceNumbers) {
+        for at in points.step_by(LANES) {
+            set_eight(&mut self.normals, at, &face.normals);
+            set_eight(std::array::from_mut(&mut self.curved), at, &[face.curved]);
         }
-        for (column, number) in self.narrow.iter_mut().zip(face.narrow) {
-            column[at..at + LANES].copy_from_slice(&[number; LANES]);
-        }
-        self.curved[at..at + LANES].copy_from_slice(&[face.curved; LANES]);
-        self.prims[at..at + LANES].copy_from_slice(&[face.prim; LANES]);
     }
 
     /// The plane and the rim.
@@ -85,20 +89,21 @@ impl Faces {
     pub(super) fn facet(&self, i: usize) -> Facet {
         let w = |k: usize| self.wide[k][i];
         let three = |k: usize| DVec3::new(w(k), w(k + 1), w(k + 2));
-        let rim = Rim { area2: w(9), edges2: [w(10), w(11), w(12)] };
+        let rim = Rim { heights2: [w(9), w(10), w(11)] };
         Facet { flat: Flat { corner: three(0), normal: three(3), sizes: three(6) }, rim }
     }
 
     /// The unit normal of the front.
     #[inline(always)]
     pub(super) fn outward(&self, i: usize) -> Vec3 {
-        self.three(0, i)
+        Vec3::from_array(self.outward.each_ref().map(|column| column[i]))
     }
 
     /// Those of the corners.
     #[inline(always)]
     pub(super) fn normals(&self, i: usize) -> [Vec3; 3] {
-        [self.three(3, i), self.three(6, i), self.three(9, i)]
+        let n = |k: usize| self.normals[k][i];
+        [0, 3, 6].map(|k| Vec3::new(n(k), n(k + 1), n(k + 2)))
     }
 
     /// By point, 1 where those differ.
@@ -116,12 +121,21 @@ impl Faces {
     /// All of a point.
     #[cfg(test)]
     pub(super) fn at(&self, i: usize) -> FaceNumbers {
-        let (wide, narrow) = (self.wide.map(|c| c[i]), self.narrow.map(|c| c[i]));
-        FaceNumbers { wide, narrow, curved: self.curved[i], prim: self.prims[i] }
+        FaceNumbers {
+            wide: self.wide.map(|c| c[i]),
+            outward: self.outward.map(|c| c[i]),
+            normals: self.normals.map(|c| c[i]),
+            curved: self.curved[i],
+            prim: self.prims[i],
+        }
     }
+}
 
-    #[inline(always)]
-    fn three(&self, k: usize, i: usize) -> Vec3 {
-        Vec3::new(self.narrow[k][i], self.narrow[k + 1][i], self.narrow[k + 2][i])
+/// Sets the numbers of eight points from `at` on.
+#[inline(always)]
+fn set_eight<T: Copy, const N: usize>(columns: &mut [Roomy<T>; N], at: usize, numbers: &[T; N]) {
+    let at = at % POINTS;
+    for (column, &number) in columns.iter_mut().zip(numbers) {
+        column[at..at + LANES].copy_from_slice(&[number; LANES]);
     }
 }

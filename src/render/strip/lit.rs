@@ -19,6 +19,7 @@ const PLAIN: u32 = 1;
 const GRAZING: u32 = 2;
 
 /// What one light does at each point.
+#[repr(C, align(64))]
 pub(super) struct Lit {
     /// [`PLAIN`] or [`GRAZING`] where it is seen, else 0.
     pub seen: [u32; POINTS],
@@ -239,12 +240,26 @@ fn reflect(found: &Found, lit: &mut Lit, points: usize, share: impl Fn(usize, Ve
 /// Where shadow rays start, and where they go.
 #[inline(always)]
 fn start(found: &Found, lit: &mut Lit, points: usize, light: Option<Vec3>) {
+    let mut turned = 0;
     for i in 0..points.min(POINTS) {
-        let (position, error, geometric) = (get(&found.position, i), get(&found.error, i), get(&found.geometric, i));
-        let to_light = get(&lit.to_light, i);
-        let (dir, end) = way(offset_origin(position, error, geometric, to_light), to_light, light);
-        put(&mut lit.origin, i, offset_origin(position, error, geometric, dir));
+        let (geometric, to_light) = (get(&found.geometric, i), get(&lit.to_light, i));
+        let origin = leave(found, i, to_light);
+        let (dir, end) = way(origin, to_light, light);
+        put(&mut lit.origin, i, origin);
         put(&mut lit.dir, i, dir);
         lit.end[i] = end;
+        turned |= u32::from((geometric.dot(to_light) < 0.0) != (geometric.dot(dir) < 0.0));
     }
+    // A ray leaves on the side to which it goes; that is hardly ever another than that of the light.
+    if turned == 1 {
+        for i in 0..points.min(POINTS) {
+            put(&mut lit.origin, i, leave(found, i, get(&lit.dir, i)));
+        }
+    }
+}
+
+/// Where a ray from point `i` in this direction starts.
+#[inline(always)]
+fn leave(found: &Found, i: usize, dir: Vec3) -> Vec3 {
+    offset_origin(get(&found.position, i), get(&found.error, i), get(&found.geometric, i), dir)
 }
