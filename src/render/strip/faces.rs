@@ -96,14 +96,14 @@ impl Faces {
     /// The unit normal of the front.
     #[inline(always)]
     pub(super) fn outward(&self, i: usize) -> Vec3 {
-        Vec3::from_array(self.outward.each_ref().map(|column| column[i]))
+        Vec3::new(self.outward[0][i], self.outward[1][i], self.outward[2][i])
     }
 
     /// Those of the corners.
     #[inline(always)]
     pub(super) fn normals(&self, i: usize) -> [Vec3; 3] {
         let n = |k: usize| self.normals[k][i];
-        [0, 3, 6].map(|k| Vec3::new(n(k), n(k + 1), n(k + 2)))
+        [Vec3::new(n(0), n(1), n(2)), Vec3::new(n(3), n(4), n(5)), Vec3::new(n(6), n(7), n(8))]
     }
 
     /// By point, 1 where those differ.
