@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use meshray::accel::{NO_PRIM, Pencil, RayOrder, Splitting, Wide};
+use meshray::accel::{AccelChoice, AccelParams, NO_PRIM, Pencil, RayOrder, Splitting, Wide, auto};
 use meshray::bench::clock::{Spread, processor_seconds};
 
 use crate::embree::Embree;
@@ -168,46 +168,59 @@ fn compare(mesh: &Mesh, embree: Option<&Embree>, words: &Words) -> bool {
     clean
 }
 
-/// How long structures take to build, and what they weigh.
+/// Builds a structure with so many threads: the seconds that took, and its bytes.
+type Build<'a> = Box<dyn Fn(usize) -> (f64, usize) + 'a>;
+
+/// How long structures take to build, and what they weigh. The programs take turns.
 fn builds(mesh: &Mesh, embree: Option<&Embree>, passes: usize) {
     let (shapes, triangles) = (&mesh.shapes, mesh.shapes.triangles.len() as f64);
-    println!("{:44}{:>12}{:>12}{:>18}", "build", "1 thread ms", "2 threads", "bytes a triangle");
-    let print = |name: &str, times: [Spread; 2], bytes: usize| {
-        let [one, two] = times.map(|t| t.median() * 1e3);
-        println!("{name:44}{one:12.2}{two:12.2}{:18.1}", bytes as f64 / triangles);
-    };
+    let mut programs: Vec<(&str, Build)> = Vec::new();
     if let Some(embree) = embree {
-        let mut bytes = 0;
-        let times = [1, 2].map(|threads| {
-            let mut spread = Spread::default();
-            for _ in 0..passes {
-                let (built, seconds) = embree.build(shapes, false, threads, |build| {
-                    let start = Instant::now();
-                    build();
-                    start.elapsed().as_secs_f64()
-                });
-                bytes = built.bytes;
-                spread.push(seconds);
-            }
-            spread
-        });
-        print(&embree.version, times, bytes);
+        let build = |threads| {
+            let (built, seconds) = embree.build(shapes, false, threads, |build| {
+                let start = Instant::now();
+                build();
+                start.elapsed().as_secs_f64()
+            });
+            (seconds, built.bytes)
+        };
+        programs.push((&embree.version, Box::new(build)));
     }
     for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
-        let mut bytes = 0;
-        let times = [1, 2].map(|threads| {
-            let mut spread = Spread::default();
-            let Ok(pool) = meshray::threads::pool(threads) else { return spread };
-            for _ in 0..passes {
-                let start = Instant::now();
-                let wide = pool.install(|| Wide::build(shapes, splitting));
-                spread.push(start.elapsed().as_secs_f64());
-                bytes = wide.summary().bytes as usize;
-            }
-            spread
-        });
-        print(ours::structure(splitting), times, bytes);
+        let build = move |threads| ours(threads, || Wide::build(shapes, splitting), |wide| wide.summary().bytes);
+        programs.push((ours::structure(splitting), Box::new(build)));
     }
+    let auto = |threads| {
+        let build = || auto::build(AccelChoice::Auto, shapes, &AccelParams::DEFAULT);
+        ours(threads, build, |(built, _)| built.summary().bytes)
+    };
+    programs.push(("meshray auto, the default", Box::new(auto)));
+
+    let mut times = vec![[Spread::default(), Spread::default()]; programs.len()];
+    let mut bytes = vec![0; programs.len()];
+    for _ in 0..passes {
+        for (i, (_, build)) in programs.iter().enumerate() {
+            for (threads, spread) in (1..).zip(&mut times[i]) {
+                let (seconds, size) = build(threads);
+                spread.push(seconds);
+                bytes[i] = size;
+            }
+        }
+    }
+    println!("{:44}{:>12}{:>12}{:>18}", "build", "1 thread ms", "2 threads", "bytes a triangle");
+    for (((name, _), times), bytes) in programs.iter().zip(&times).zip(&bytes) {
+        let [one, two] = times.each_ref().map(|t| t.median() * 1e3);
+        println!("{name:44}{one:12.2}{two:12.2}{:18.1}", *bytes as f64 / triangles);
+    }
+}
+
+/// Builds one of ours with so many threads.
+fn ours<T: Send>(threads: usize, build: impl Fn() -> T + Sync, bytes: impl Fn(&T) -> u64) -> (f64, usize) {
+    let Ok(pool) = meshray::threads::pool(threads) else { return (f64::NAN, 0) };
+    let start = Instant::now();
+    let built = pool.install(&build);
+    let seconds = start.elapsed().as_secs_f64();
+    (seconds, bytes(&built) as usize)
 }
 
 /// Rays a second, in millions, of each program.

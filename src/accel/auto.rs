@@ -5,7 +5,8 @@
 //! timed, so that the choice depends on neither the machine nor the number of threads; and large scenes are judged by a
 //! part of their prims, so that it costs little.
 //!
-//! The octree is built sooner. The hierarchy is chosen where it saves more than a thirty-second part of the octree's cost.
+//! The octree is built sooner. The hierarchy is chosen where it saves more than a thirty-second part of the octree's cost
+//! in large scenes; in small ones, which smaller samples judge, it must save more, an eleventh in the smallest.
 
 use std::fmt;
 use std::str::FromStr;
@@ -19,17 +20,20 @@ use crate::math::aabb::Aabb;
 use crate::math::random::Random;
 use crate::math::triangle;
 
-/// Rays of each of the two kinds.
-const RAYS: usize = 256;
+/// Of so many prims one is judged, but no fewer and no more than these: finding out must cost less than it can save.
+const SHARE: u32 = 32;
+const FEWEST: u32 = 1 << 9;
+const MOST: u32 = 1 << 12;
 
-/// Scenes of more prims are judged by about so many of them.
-const SAMPLE: u32 = 1 << 12;
+/// Runs of neighbours that these are taken in.
+const RUNS: u32 = 64;
 
-/// Neighbours that are taken together.
-const RUN: u32 = 64;
+/// One ray of each of the two kinds for so many prims that are judged.
+const PRIMS_A_RAY: usize = 16;
 
-/// The part of the octree's cost that the hierarchy must save, as it takes longer to build.
-const WORTH: f64 = 1.0 / 32.0;
+/// The part of the octree's cost that the hierarchy must save, as it takes longer to build, where a single prim is judged:
+/// chance falls with the root of their number.
+const WORTH: f64 = 2.0;
 
 /// What a block of eight triangles costs, in nodes of eight boxes.
 const BLOCK: f64 = 1.5;
@@ -89,16 +93,18 @@ pub struct Reason {
     pub octree: f64,
     /// Cost of a ray through `fast-bvh`, in nodes.
     pub bvh: f64,
+    /// The part of the octree's cost that the hierarchy must save.
+    pub worth: f64,
 }
 
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { kind, rays, prims, octree, bvh } = *self;
+        let Self { kind, rays, prims, octree, bvh, worth } = *self;
         write!(
             f,
             "{kind}: {rays} rays through {prims} shapes cost {octree:.1} nodes each with fast-octree, {bvh:.1} with \
              fast-bvh, which must save {:.1} % as it takes longer to build",
-            WORTH * 100.0
+            worth * 100.0
         )
     }
 }
@@ -108,13 +114,14 @@ pub fn build<'a>(choice: AccelChoice, shapes: &'a Shapes, params: &AccelParams) 
     if let AccelChoice::Kind(kind) = choice {
         return (AnyAccel::build(kind, shapes, params), None);
     }
-    match part(shapes) {
+    let judged = judged_of(shapes.bounded());
+    match part(shapes, judged) {
         None => {
-            let (accel, reason) = judge(shapes, params);
+            let (accel, reason) = judge(shapes, judged, params);
             (accel, Some(reason))
         }
         Some(part) => {
-            let (_, reason) = judge(&part, params);
+            let (_, reason) = judge(&part, judged, params);
             (AnyAccel::build(reason.kind, shapes, params), Some(reason))
         }
     }
@@ -146,23 +153,26 @@ pub fn build_with<'a>(
 
 /// What [`build`] would choose, and why; nothing of the whole scene is built where it is large.
 pub fn reason(shapes: &Shapes, params: &AccelParams) -> Reason {
-    match part(shapes) {
-        None => judge(shapes, params).1,
-        Some(part) => judge(&part, params).1,
+    let judged = judged_of(shapes.bounded());
+    match part(shapes, judged) {
+        None => judge(shapes, judged, params).1,
+        Some(part) => judge(&part, judged, params).1,
     }
 }
 
-/// Traces the sample through both, and keeps the better one.
-fn judge<'a>(shapes: &'a Shapes, params: &AccelParams) -> (AnyAccel<'a>, Reason) {
-    let rays = sample(shapes);
-    let judged = |kind| {
+/// Traces the sample through both, as is worth it where about so many prims are `judged`, and keeps the better one.
+fn judge<'a>(shapes: &'a Shapes, judged: u32, params: &AccelParams) -> (AnyAccel<'a>, Reason) {
+    let rays = sample(shapes, judged as usize / PRIMS_A_RAY);
+    let tried = |kind| {
         let accel = AnyAccel::build(kind, shapes, params);
         let cost = cost(&accel, &rays);
         (accel, cost)
     };
-    let ((first, octree), (second, bvh)) = rayon::join(|| judged(AccelKind::FastOctree), || judged(AccelKind::FastBvh));
-    let accel = if bvh < octree * (1.0 - WORTH) { second } else { first };
-    let reason = Reason { kind: accel.kind(), rays: rays.len() as u64, prims: shapes.bounded() as usize, octree, bvh };
+    let ((first, octree), (second, bvh)) = rayon::join(|| tried(AccelKind::FastOctree), || tried(AccelKind::FastBvh));
+    let worth = WORTH / f64::from(judged).sqrt();
+    let accel = if bvh < octree * (1.0 - worth) { second } else { first };
+    let reason =
+        Reason { kind: accel.kind(), rays: rays.len() as u64, prims: shapes.bounded() as usize, octree, bvh, worth };
     (accel, reason)
 }
 
@@ -179,18 +189,22 @@ pub fn nodes(counts: &RayCounts) -> f64 {
     (counts.n_ts as f64 - blocks + blocks * BLOCK) / counts.queries.max(1) as f64
 }
 
+/// How many of so many prims are judged, about.
+fn judged_of(bounded: u32) -> u32 {
+    (bounded / SHARE).clamp(FEWEST, MOST)
+}
+
 /// Runs of neighbouring prims spread over all of them; `None`: there are few enough. Files list neighbours together, so
 /// that what is left still has surfaces.
-fn part(shapes: &Shapes) -> Option<Shapes> {
+fn part(shapes: &Shapes, judged: u32) -> Option<Shapes> {
     let bounded = shapes.bounded();
-    if bounded <= SAMPLE {
+    if bounded <= judged {
         return None;
     }
-    let stride = (f64::from(bounded) / f64::from(SAMPLE / RUN)).ceil();
+    let (stride, run) = (bounded.div_ceil(RUNS), judged / RUNS);
     let mut part = Shapes::default();
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 65 to 2³²/512")]
     for first in (0..bounded).step_by(stride as usize) {
-        (first..bounded.min(first.saturating_add(RUN))).for_each(|prim| copy(shapes, prim, &mut part));
+        (first..bounded.min(first.saturating_add(run))).for_each(|prim| copy(shapes, prim, &mut part));
     }
     part.opaque = BitSet::filled(part.len(), true);
     Some(part)
@@ -216,8 +230,9 @@ fn copy(shapes: &Shapes, prim: u32, part: &mut Shapes) {
     }
 }
 
-/// Rays from outside into the scene's box, as from an eye, and from its surfaces in all directions, as light takes.
-fn sample(shapes: &Shapes) -> Vec<Ray> {
+/// So many rays of each kind: from outside into the scene's box, as from an eye, and from its surfaces in all directions, as
+/// light takes.
+fn sample(shapes: &Shapes, each: usize) -> Vec<Ray> {
     let mut random = Random::new(0);
     let bounded = shapes.bounded();
     if bounded == 0 {
@@ -226,8 +241,8 @@ fn sample(shapes: &Shapes) -> Vec<Ray> {
     let bounds = (0..bounded).fold(Aabb::EMPTY, |b, prim| b.union(shapes.bounds(prim)));
     let (middle, half) = (bounds.lo * 0.5 + bounds.hi * 0.5, bounds.hi * 0.5 - bounds.lo * 0.5);
     let ray = |origin, dir, exclude| Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude, sample: 0 };
-    let mut rays = Vec::with_capacity(2 * RAYS);
-    for _ in 0..RAYS {
+    let mut rays = Vec::with_capacity(2 * each);
+    for _ in 0..each {
         let origin = middle + random.direction() * (half.length() * 2.0);
         let target = middle + random.cube() * half;
         rays.push(ray(origin, target - origin, NO_PRIM));
@@ -275,12 +290,15 @@ mod tests {
     fn the_hierarchy_is_taken_where_it_saves_enough_and_the_octree_elsewhere() {
         for (name, shapes) in scenes::all() {
             let reason = chosen(&shapes);
-            let better =
-                if reason.bvh < reason.octree * (1.0 - WORTH) { AccelKind::FastBvh } else { AccelKind::FastOctree };
+            let saves = reason.bvh < reason.octree * (1.0 - reason.worth);
+            let better = if saves { AccelKind::FastBvh } else { AccelKind::FastOctree };
             assert_eq!(reason.kind, better, "{name}: {reason}");
         }
         let reason = chosen(&scenes::star(60, 30));
-        assert_eq!((reason.kind, reason.rays, reason.prims), (AccelKind::FastBvh, 512, 60 * 58), "{reason}");
+        let (rays, prims) = (2 * u64::from(FEWEST) / PRIMS_A_RAY as u64, FEWEST as usize);
+        assert_eq!((reason.rays, reason.prims), (rays, prims), "{reason}");
+        let reason = chosen(&scenes::star(300, 150));
+        assert_eq!(reason.kind, AccelKind::FastBvh, "{reason}");
         // Nothing parts copies: both are the same tree.
         let reason = chosen(&scenes::copies(1000));
         assert!(reason.kind == AccelKind::FastOctree && reason.octree == reason.bvh, "{reason}");
@@ -294,7 +312,8 @@ mod tests {
             pool.map(|pool| pool.install(|| chosen(&shapes))).ok()
         };
         let one = with(1).unwrap();
-        assert!(one.prims > 3_500 && one.prims <= SAMPLE as usize && shapes.len() > 80_000, "{one}");
+        let most = shapes.len() / SHARE as usize;
+        assert!(one.prims > most - RUNS as usize && one.prims <= most && most > 2 * FEWEST as usize, "{one}");
         assert_eq!([with(2), with(7)], [Some(one); 2]);
     }
 

@@ -24,6 +24,7 @@ pub mod stl;
 pub mod suggest;
 pub mod tangents;
 pub mod texture;
+mod whole;
 pub mod wires;
 
 pub use diagnostic::{Diagnostic, LoadError, Warnings};
@@ -32,7 +33,6 @@ pub use wires::WireFacts;
 
 use crate::scene::{Scene, UpAxis};
 use crate::stopwatch::{Spent, Stopwatch};
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// How to load.
@@ -243,9 +243,7 @@ fn read_source(path: &Path, limits: &Limits) -> Result<Source, LoadError> {
     if meta.len() > limits.file {
         return Err(too_large(meta.len()));
     }
-    // One more than there are, so that reading to the end needs no larger room.
-    let mut bytes = Vec::with_capacity(usize::try_from(meta.len()).map_or(0, |length| length.saturating_add(1)));
-    file.take(limits.file.saturating_add(1)).read_to_end(&mut bytes).map_err(fault)?;
+    let bytes = whole::read(file, meta.len(), limits.file).map_err(fault)?;
     if bytes.len() as u64 > limits.file {
         return Err(too_large(bytes.len() as u64));
     }

@@ -2,6 +2,7 @@
 
 use crate::math::frame::snapped_center;
 use crate::math::{DVec3, Vec3};
+use rayon::prelude::*;
 
 /// Rounded positions, relative to `center`.
 #[derive(Clone, Debug, Default)]
@@ -16,24 +17,30 @@ pub(super) struct Placed {
 /// Larger coordinates count as infinite, so that sums and products of a few of them stay within `f32`'s range.
 const LARGEST: f64 = 1e18;
 
+/// Positions that one thread looks at at a time.
+const POSITIONS: usize = 1 << 13;
+
 /// Subtracts the centre of all finite positions in `f64`, then rounds.
 pub(super) fn place(positions: &[DVec3]) -> Placed {
     let usable = |p: &&DVec3| p.is_finite() && p.abs().max_element() <= LARGEST;
-    let lo = positions.iter().filter(usable).fold(DVec3::INFINITY, |lo, &p| lo.min(p));
-    let hi = positions.iter().filter(usable).fold(DVec3::NEG_INFINITY, |hi, &p| hi.max(p));
+    let nothing = || (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let around = |part: &[DVec3]| part.iter().filter(usable).fold(nothing(), |(lo, hi), &p| (lo.min(p), hi.max(p)));
+    let both = |(lo, hi): (DVec3, DVec3), (low, high): (DVec3, DVec3)| (lo.min(low), hi.max(high));
+    let (lo, hi) = positions.par_chunks(POSITIONS).map(around).reduce(nothing, both);
     let center = snapped_center(lo, hi);
-    let mut max_rounding = 0.0f64;
-    let round = |p: &DVec3| {
-        if !usable(&p) {
-            return Vec3::NAN;
+    let mut rounded = vec![Vec3::NAN; positions.len()];
+    let round = |(to, from): (&mut [Vec3], &[DVec3])| {
+        let mut max_rounding = 0.0f64;
+        for (to, p) in to.iter_mut().zip(from).filter(|(_, p)| usable(p)) {
+            let exact = *p - center;
+            *to = exact.as_vec3();
+            max_rounding = max_rounding.max(to.as_dvec3().distance(exact));
         }
-        let exact = *p - center;
-        let rounded = exact.as_vec3();
-        max_rounding = max_rounding.max(rounded.as_dvec3().distance(exact));
-        rounded
+        max_rounding
     };
-    let positions = positions.iter().map(round).collect();
-    Placed { center, positions, max_rounding }
+    let parts = rounded.par_chunks_mut(POSITIONS).zip(positions.par_chunks(POSITIONS));
+    let max_rounding = parts.map(round).reduce(|| 0.0, f64::max);
+    Placed { center, positions: rounded, max_rounding }
 }
 
 #[cfg(test)]

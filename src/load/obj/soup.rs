@@ -2,6 +2,9 @@
 
 use crate::math::{DVec2, DVec3, Vec3};
 use bytemuck::Zeroable;
+use rayon::prelude::*;
+use std::sync::atomic::AtomicBool;
+use std::sync::atomic::Ordering::Relaxed;
 
 /// An index that stands for "none".
 pub(super) const NONE: u32 = u32::MAX;
@@ -35,14 +38,16 @@ pub(super) struct Soup {
 impl Soup {
     /// Takes the places of vertices that nothing uses, so that they move neither the centre nor the frame.
     pub(super) fn leave_out_unused(&mut self) {
-        let mut used = vec![false; self.positions.len()];
-        for corner in self.corners.iter().chain(&self.stroke_corners) {
-            if let Some(used) = used.get_mut(corner.position as usize) {
-                *used = true;
+        /// Corners and positions that one thread looks at at a time.
+        const MANY: usize = 1 << 13;
+        let used: Vec<AtomicBool> = std::iter::repeat_with(AtomicBool::default).take(self.positions.len()).collect();
+        self.corners.par_iter().with_min_len(MANY).chain(&self.stroke_corners).for_each(|corner| {
+            if let Some(used) = used.get(corner.position as usize) {
+                used.store(true, Relaxed);
             }
-        }
-        let unused = self.positions.iter_mut().zip(used).filter(|(_, used)| !used);
-        unused.for_each(|(position, _)| *position = DVec3::NAN);
+        });
+        let positions = self.positions.par_iter_mut().with_min_len(MANY).zip(used);
+        positions.filter(|(_, used)| !used.load(Relaxed)).for_each(|(position, _)| *position = DVec3::NAN);
     }
 }
 

@@ -15,31 +15,71 @@ const FREEDOM: f64 = (GROUPS - 1) as f64;
 /// the worst start of ρ is taken, and f is found for which that is 1 − `confidence`; it is never less than Student's t,
 /// which a single look would need.
 ///
-/// A search that takes milliseconds: once for a picture.
+/// A search that takes a tenth of a millisecond: once for a picture.
 #[expect(clippy::cast_possible_truncation, reason = "a small number")]
 pub(in crate::render) fn factor(confidence: f64) -> f32 {
     let wrong = 1.0 - confidence;
-    let student = bisect(|t| 1.0 - student_within(t) > wrong);
-    student.max(bisect(|f| wrong_stops(f) > wrong)) as f32
+    let student = zero(|t| 1.0 - student_within(t) - wrong);
+    let looks = Looks::new();
+    student.max(zero(|f| looks.wrong_stops(f) - wrong)) as f32
 }
 
-/// Chance that some look stops wrongly, at most.
-fn wrong_stops(factor: f64) -> f64 {
-    /// By how much each round lessens the standard error at least.
-    const GAIN: f64 = std::f64::consts::SQRT_2;
-    const STARTS: u32 = 32;
-    let look = |rho: f64| chi_square_below(FREEDOM * (rho / factor) * (rho / factor)) * normal_beyond(rho);
-    let looks = |start: f64| std::iter::successors(Some(start), |rho| Some(rho * GAIN)).take_while(|rho| *rho < 9.0);
-    let starts = (0..STARTS).map(|k| 0.05 * libm::pow(GAIN, f64::from(k) / f64::from(STARTS)));
-    starts.map(|start| looks(start).map(look).sum::<f64>()).fold(0.0, f64::max)
+/// Looks at pixels that start with different errors.
+struct Looks {
+    /// By start, what ρ is at each look, and the chance that the mean is off by more than that.
+    of_start: Vec<Vec<(f64, f64)>>,
 }
 
-/// Where `is_below` stops being true, in 0…1000.
-fn bisect(is_below: impl Fn(f64) -> bool) -> f64 {
-    let (mut low, mut high) = (0.0, 1000.0);
+impl Looks {
+    fn new() -> Self {
+        /// By how much each round lessens the standard error at least.
+        const GAIN: f64 = std::f64::consts::SQRT_2;
+        const STARTS: u32 = 32;
+        let looks =
+            |start: f64| std::iter::successors(Some(start), |rho| Some(rho * GAIN)).take_while(|rho| *rho < 9.0);
+        let starts = (0..STARTS).map(|k| 0.05 * libm::pow(GAIN, f64::from(k) / f64::from(STARTS)));
+        let of_start = starts.map(|start| looks(start).map(|rho| (rho, normal_beyond(rho))).collect());
+        Self { of_start: of_start.collect() }
+    }
+
+    /// Chance that some look stops wrongly, at most.
+    fn wrong_stops(&self, factor: f64) -> f64 {
+        let look = |(rho, beyond): &(f64, f64)| chi_square_below(FREEDOM * (rho / factor) * (rho / factor)) * beyond;
+        self.of_start.iter().map(|looks| looks.iter().map(look).sum::<f64>()).fold(0.0, f64::max)
+    }
+}
+
+/// Where a falling function that is positive at ¼ passes zero, in ¼…1000 (1000 where it does not).
+///
+/// By the secant of what encloses the place, the end that stays for long counting half (the Illinois method; M. Dowell,
+/// P. Jarratt, "A Modified Regula Falsi Method for Computing the Root of an Equation", 1971).
+fn zero(f: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut above) = (0.25, f(0.25));
+    let (mut high, mut below) = (low, above);
+    while below > 0.0 {
+        (low, above) = (high, below);
+        high *= 2.0;
+        if high > 1000.0 {
+            return 1000.0;
+        }
+        below = f(high);
+    }
+    let mut stayed = 0;
     for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if is_below(middle) { low = middle } else { high = middle }
+        if high - low <= 1e-12 * high {
+            break;
+        }
+        let middle = (low * below - high * above) / (below - above);
+        let value = f(middle);
+        if value > 0.0 {
+            (low, above) = (middle, value);
+            below *= if stayed == 1 { 0.5 } else { 1.0 };
+            stayed = 1;
+        } else {
+            (high, below) = (middle, value);
+            above *= if stayed == -1 { 0.5 } else { 1.0 };
+            stayed = -1;
+        }
     }
     high
 }
@@ -85,7 +125,8 @@ mod tests {
         assert!(factors.windows(2).all(|pair| pair[0] < pair[1]), "{factors:?}");
         assert!(factors[2] > 2.364);
         for confidence in [0.8, 0.95, 0.99] {
-            assert!(wrong_stops(factor(confidence).into()) <= 1.0 - confidence + 1e-6);
+            let wrong = Looks::new().wrong_stops(factor(confidence).into());
+            assert!((wrong - (1.0 - confidence)).abs() < 1e-6 || wrong < 1.0 - confidence);
         }
     }
 }
