@@ -5,7 +5,7 @@
 //! happens to see nothing of what its neighbours see goes on with them. Pixels around the tile are therefore sampled in that
 //! round too, by this tile for itself, since no tile may wait for another; that their rays are traced again is counted.
 
-use super::certainty::{Certainty, GROUPS, Range, Seen, output};
+use super::certainty::{self, Certainty, GROUPS, Seen, output};
 use super::draws::Stream;
 use super::eyes::Place;
 use super::frame::{Frame, Sum, pixel_key};
@@ -17,6 +17,7 @@ use super::tile::{End, PixelFacts, TOGETHER, Tile, TilePixels};
 use super::whitted::Tracer;
 use crate::accel::Accel;
 use crate::scene::Background;
+use std::ops::Range;
 
 /// Samples at which variances are first relied on: one in each group.
 const FIRST_LOOK: u32 = GROUPS as u32;
@@ -94,50 +95,76 @@ fn rounds(how: &Stochastic) -> impl Iterator<Item = u32> {
     std::iter::successors(Some(fewest), move |&last| (last < most).then_some(2 * last))
 }
 
-/// Traces these samples of all active pixels.
+/// Traces these samples of all active pixels, in batches.
 fn trace<A: Accel, P: Observer>(
     frame: &Frame,
     how: &Stochastic,
     tracer: &mut Tracer<A, P>,
     pixels: &mut [Pixel],
     active: &[usize],
-    samples: std::ops::Range<u32>,
+    samples: Range<u32>,
 ) -> Option<()> {
-    let in_group = (samples.end as usize).div_ceil(GROUPS);
-    let has_lens = frame.settings.lens.is_some();
     if samples.start as usize >= GROUPS {
         active.iter().for_each(|&pixel| pixels[pixel].join_groups());
     }
-    let mut left = active.iter().flat_map(|&pixel| samples.clone().map(move |i| (pixel, i)));
-    let mut batch: Vec<(usize, u32)> = Vec::with_capacity(TOGETHER);
-    let (mut many, mut squares) = (sobol::Many::default(), Vec::with_capacity(TOGETHER));
-    loop {
-        batch.clear();
-        batch.extend(left.by_ref().take(TOGETHER));
-        if batch.is_empty() {
-            return Some(());
-        }
-        tracer.reset(batch.len(), frame.settings.layers);
-        tracer.streams.extend(batch.iter().map(|&(pixel, i)| pixels[pixel].stream(i)));
-        let eye = frame.eye(tracer.center());
-        if has_lens {
-            tracer.eyes.send(&eye, batch.iter().map(|&(pixel, i)| pixels[pixel].place_and_lens(how, i)));
-        } else {
-            squares.clear();
-            many.find(batch.iter().map(|&(pixel, i)| (pixels[pixel].places, i)), &mut squares);
-            let places = batch.iter().zip(&squares);
-            tracer.eyes.send(&eye, places.map(|(&(pixel, _), &[x, y])| pixels[pixel].place(how, [x, y, 0.5, 0.5])));
-        }
-        if !tracer.trace() {
-            return None;
-        }
-        for (k, &(pixel, i)) in batch.iter().enumerate() {
-            let pixel = &mut pixels[pixel];
-            pixel.groups[i as usize / in_group].add(&tracer.samples[k]);
-            pixel.facts.count += 1;
-            tracer.facts.get(k).iter().for_each(|facts| pixel.layers.add(facts));
+    let in_group = (samples.end as usize).div_ceil(GROUPS);
+    let mut places = Places::default();
+    for some in active.chunks((TOGETHER / samples.len().max(1)).max(1)) {
+        for start in samples.clone().step_by(TOGETHER) {
+            let samples = start..samples.end.min(start + TOGETHER as u32);
+            trace_batch(frame, how, tracer, (pixels, some), (samples, in_group), &mut places)?;
         }
     }
+    Some(())
+}
+
+/// Where samples lie in their pixels; buffers.
+#[derive(Default)]
+struct Places {
+    many: sobol::Many,
+    squares: Vec<[f64; 2]>,
+}
+
+/// Traces the same samples of `some` pixels, of which so many go into each group, all together.
+fn trace_batch<A: Accel, P: Observer>(
+    frame: &Frame,
+    how: &Stochastic,
+    tracer: &mut Tracer<A, P>,
+    (pixels, some): (&mut [Pixel], &[usize]),
+    (samples, in_group): (Range<u32>, usize),
+    places: &mut Places,
+) -> Option<()> {
+    let each = samples.len();
+    tracer.reset(some.len() * each, frame.settings.layers);
+    let eye = frame.eye(tracer.center());
+    let all = &*pixels;
+    some.iter().for_each(|&pixel| tracer.streams.extend(samples.clone().map(|i| all[pixel].stream(i))));
+    if frame.settings.lens.is_some() {
+        let places = some.iter().flat_map(|&pixel| samples.clone().map(move |i| all[pixel].place_and_lens(how, i)));
+        tracer.eyes.send(&eye, places);
+    } else {
+        let Places { many, squares } = places;
+        squares.clear();
+        many.find(some.iter().flat_map(|&pixel| samples.clone().map(move |i| (all[pixel].places, i))), squares);
+        how.filter.place_each(squares.as_flattened_mut());
+        let places = some.iter().zip(squares.chunks(each)).flat_map(|(&pixel, squares)| {
+            let pixel = &all[pixel];
+            squares.iter().map(move |&place| pixel.place(place, [0.5; 2]))
+        });
+        tracer.eyes.send(&eye, places);
+    }
+    if !tracer.trace() {
+        return None;
+    }
+    for (k, &pixel) in some.iter().enumerate() {
+        let (pixel, of_pixel) = (&mut pixels[pixel], k * each..(k + 1) * each);
+        for (i, sample) in samples.clone().zip(&tracer.samples[of_pixel.clone()]) {
+            pixel.groups[i as usize / in_group].add(sample);
+        }
+        pixel.facts.count += samples.end - samples.start;
+        tracer.facts.get(of_pixel).into_iter().flatten().for_each(|facts| pixel.layers.add(facts));
+    }
+    Some(())
 }
 
 /// Finds the contrast around each pixel after a first round, and if that `may_end` with it those that are done: their samples
@@ -146,23 +173,25 @@ fn look_around(judge: &Certainty, tile: Tile, pixels: &mut [Pixel], may_end: boo
     let (width, height) = (tile.x1 - tile.x0, tile.y1 - tile.y0);
     let index = |x: u32, y: u32| ((y - tile.y0) * width + x - tile.x0) as usize;
     let mut seen = vec![Seen::NOTHING; (width * height) as usize];
+    let mut agree = vec![false; seen.len()];
     let mut each = pixels.iter();
     judge.see_each(pixels.iter().map(Pixel::taken), |of_pixel| {
         let at = each.next().map_or(0, |pixel| index(pixel.x, pixel.y));
-        seen[at] = *of_pixel;
+        (seen[at], agree[at]) = (*of_pixel, judge.agree(&of_pixel.range));
     });
     for pixel in pixels.iter_mut() {
         let (x, y) = (pixel.x, pixel.y);
         let own = &seen[index(x, y)];
         pixel.facts.error = own.error;
         let columns = x.saturating_sub(1).max(tile.x0)..(x + 2).min(tile.x1);
-        let around = (y.saturating_sub(1).max(tile.y0)..(y + 2).min(tile.y1))
-            .flat_map(|y| &seen[index(columns.start, y)..=index(columns.end - 1, y)]);
-        let is_calm = |seen: &Seen| judge.agree(&seen.range) && !judge.differ(own.color, seen.color);
-        if may_end && around.clone().all(is_calm) {
+        let rows = y.saturating_sub(1).max(tile.y0)..(y + 2).min(tile.y1);
+        let around = rows.map(|y| index(columns.start, y)..index(columns.end - 1, y) + 1);
+        // Nearly all are calm, so that all are asked without asking whether one was not.
+        let is_calm = |calm: bool, at: usize| calm & agree[at] & !judge.differ(own.color, seen[at].color);
+        if may_end && around.clone().flatten().fold(true, is_calm) {
             pixel.facts.end = End::Met;
         } else {
-            let around = around.fold(Range::NOTHING, |all, seen| all.with(seen.range));
+            let around = around.flatten().fold(certainty::Range::NOTHING, |all, at| all.with(seen[at].range));
             (pixel.contrast, pixel.brightest) = (judge.contrast(&around), around.brightest);
         }
     }
@@ -202,13 +231,13 @@ impl Pixel {
 
     /// Where the `i`th sample goes through the picture and the lens. Its first two numbers are those without a lens.
     fn place_and_lens(&self, how: &Stochastic, i: u32) -> Place {
-        self.place(how, sobol::point(i, self.key))
+        let [x, y, u, v] = sobol::point(i, self.key);
+        self.place([x, y].map(|number| how.filter.place(number)), [u, v])
     }
 
-    /// The place of a point of the unit square, and of that of the lens.
-    fn place(&self, how: &Stochastic, [x, y, u, v]: [f64; 4]) -> Place {
-        let (x, y) = (f64::from(self.x) + how.filter.place(x), f64::from(self.y) + how.filter.place(y));
-        Place { x, y, lens: [u, v] }
+    /// The place so far from the pixel's upper left corner, seen through a point of the lens.
+    fn place(&self, [x, y]: [f64; 2], lens: [f64; 2]) -> Place {
+        Place { x: f64::from(self.x) + x, y: f64::from(self.y) + y, lens }
     }
 
     /// Makes groups that hold as many samples as those that come next will.

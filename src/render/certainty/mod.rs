@@ -62,7 +62,7 @@ impl<'a> Certainty<'a> {
 
     /// Whether samples in this range agree within the error that is allowed: nothing is seen in the pixel that could be missed.
     pub(super) fn agree(&self, range: &Range) -> bool {
-        (0..4).all(|c| range.most[c] - range.least[c] <= self.error)
+        (0..4).fold(true, |all, c| all & (range.most[c] - range.least[c] <= self.error))
     }
 
     /// The greatest channel of the light of any of these groups, after exposure.
@@ -98,7 +98,7 @@ impl<'a> Certainty<'a> {
     pub(super) fn differ(&self, a: [f32; 4], b: [f32; 4]) -> bool {
         /// Times the error that is allowed: shading changes slower from pixel to pixel.
         const STEEP: f32 = 8.0;
-        (0..4).any(|c| (a[c] - b[c]).abs() > STEEP * self.error)
+        (0..4).fold(false, |any, c| any | ((a[c] - b[c]).abs() > STEEP * self.error))
     }
 
     /// What part of the error that is allowed a pixel with this standard error uses, when around it there is such a
