@@ -49,7 +49,7 @@ impl<S: Lanewise<N>, const N: usize> Fan<S, N> {
         let per_length = s.load(per_length);
         let (p, q) = (s.mul(s.load(&dir[(z + 1) % 3]), per_length), s.mul(s.load(&dir[(z + 2) % 3]), per_length));
         Self {
-            axes: AXES[z % 3],
+            axes: AXES[z % 4],
             origin: [origin[(z + 1) % 3], origin[(z + 2) % 3], origin[z % 3]],
             shear: [p, q],
             per_length,

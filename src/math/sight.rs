@@ -24,10 +24,10 @@ pub struct Sight {
     pub main: u32,
 }
 
-/// The axes in sheared order, by the ray's main axis.
-pub(super) static AXES: [[Axis; 3]; 3] = {
+/// The axes in sheared order, by the ray's main axis; the last is room, so that two bits of a number find an entry.
+pub(super) static AXES: [[Axis; 3]; 4] = {
     let [x, y, z] = [Axis::new(0), Axis::new(1), Axis::new(2)];
-    [[y, z, x], [z, x, y], [x, y, z]]
+    [[y, z, x], [z, x, y], [x, y, z], [x, y, z]]
 };
 
 /// What a ray sees of eight triangles.
@@ -43,7 +43,7 @@ impl Sight {
     pub fn look<S: Simd>(&self, s: S, corners: &Corners8) -> Look<S> {
         let [ox, oy, oz] = [s.splat(self.origin[0]), s.splat(self.origin[1]), s.splat(self.origin[2])];
         let [p, q] = [s.splat(self.shear[0]), s.splat(self.shear[1])];
-        let [x, y, z] = AXES[self.main as usize % 3];
+        let [x, y, z] = AXES[self.main as usize % 4];
         let [a, b, c] = corners;
         let (az, bz, cz) = (s.sub(s.along(a, z), oz), s.sub(s.along(b, z), oz), s.sub(s.along(c, z), oz));
         let (ax, ay) = (s.sub_mul(p, az, s.sub(s.along(a, x), ox)), s.sub_mul(q, az, s.sub(s.along(a, y), oy)));
@@ -131,7 +131,7 @@ impl<S: Lanewise<N>, const N: usize> Rows<S, N> for RowSight<S, N> {
     /// Along the axes in sheared order.
     #[inline(always)]
     fn ready<T: Simd>(&self, s: T, corners: &Corners8) -> Corners8 {
-        let axes = AXES[self.main % 3];
+        let axes = AXES[self.main % 4];
         let mut ready = [[[0.0; LANES]; 3]; 3];
         for (ready, rows) in ready.iter_mut().zip(corners) {
             for k in 0..3 {

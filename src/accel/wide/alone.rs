@@ -65,7 +65,7 @@ impl Lone {
                 continue;
             }
             let ray = &self.ready.rays[lane % LANES];
-            let mut seeker = Seeker::new(ray, self.ready.t_min[lane % LANES], i, wave.exclude(i));
+            let mut seeker = Seeker::new(ray, self.ready.t_min[lane % LANES], i, self.ready.exclude[lane % LANES]);
             descend::<B, _, _>(s, tree, shapes, wave, ray, &mut seeker, stack);
             self.settle.answer(s, tree, wave, i, seeker.found());
         }

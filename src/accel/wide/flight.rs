@@ -237,7 +237,7 @@ impl<W: Wave, B: BoxMargins> Flight<'_, W, B> {
             let (near, met) = ray.slabs.meets(s, root, ray.slabs.limit);
             if met != 0 {
                 let (slot, at) = slots.at(number);
-                let seeker = Seeker::new(ray, queue.ready.t_min[lane], i, self.wave.exclude(i));
+                let seeker = Seeker::new(ray, queue.ready.t_min[lane], i, queue.ready.exclude[lane]);
                 (slot.ray, slot.seeker) = (*ray, seeker);
                 slot.top = LANES;
                 slot.push(s, root, near, met);
@@ -252,15 +252,26 @@ impl<W: Wave, B: BoxMargins> Flight<'_, W, B> {
 
     /// Every ray that is at a node goes on to the next child.
     #[inline(always)]
-    fn step<S: Simd>(&self, s: S, slots: &mut Slots, mut nodes: u32) {
+    fn step<S: Simd>(&self, s: S, slots: &mut Slots, nodes: u32) {
+        if self.far {
+            self.step_each::<S, true>(s, slots, nodes);
+        } else {
+            self.step_each::<S, false>(s, slots, nodes);
+        }
+    }
+
+    /// The same; `FAR`: what is visited next is fetched.
+    #[inline(always)]
+    fn step_each<S: Simd, const FAR: bool>(&self, s: S, slots: &mut Slots, mut nodes: u32) {
+        let tree_nodes = &self.tree.nodes[..];
         while nodes != 0 {
             let (slot, at) = slots.at(nodes.trailing_zeros());
             nodes &= nodes - 1;
-            let node = &self.tree.nodes[*at as usize];
+            let node = &tree_nodes[*at as usize];
             let (near, met) = slot.ray.slabs.meets(s, node, slot.seeker.limit);
             slot.push(s, node, near, met);
             *at = slot.pop();
-            if self.far {
+            if FAR {
                 let (node, block) = Child::either(*at);
                 s.prefetch_either(Child::is_leaf(*at), (&self.tree.blocks, block), (&self.tree.nodes, node));
             }

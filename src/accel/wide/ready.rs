@@ -3,8 +3,8 @@
 use super::node::Tree;
 use super::padded::{PaddedSlabs, Padding};
 use super::slabs::BoxMargins;
-use crate::accel::Ray;
 use crate::accel::wave::{Pencil, Wave};
+use crate::accel::{NO_PRIM, Ray};
 use crate::math::Vec3;
 use crate::math::sight::Sight;
 use crate::math::simd::{LANES, Row, Simd};
@@ -25,13 +25,15 @@ pub(super) struct Ready {
     pub rays: [ReadyRay; LANES],
     /// Their hits count from here.
     pub t_min: Row,
+    /// What they do not hit.
+    pub exclude: [u32; LANES],
     /// Those for which the bounds of padded boxes hold, and whose range is not empty.
     pub allowed: u32,
 }
 
 impl Default for Ready {
     fn default() -> Self {
-        Self { rays: [ReadyRay::zeroed(); LANES], t_min: [0.0; LANES], allowed: 0 }
+        Self { rays: [ReadyRay::zeroed(); LANES], t_min: [0.0; LANES], exclude: [NO_PRIM; LANES], allowed: 0 }
     }
 }
 
@@ -44,6 +46,8 @@ impl Ready {
             Some(pencil) if rays.len() >= LANES => Columns::of_pencil(s, &pencil, start),
             _ => Columns::of(s, rays),
         };
+        let last = rays.len() - 1;
+        self.exclude = std::array::from_fn(|lane| wave.exclude(start + lane.min(last)));
         self.t_min = s.store(t_min);
         wave.adapt_t_min(start, &mut self.t_min[..rays.len().min(LANES)]);
         let t_min = s.load(&self.t_min);
