@@ -42,7 +42,7 @@ const SLICE: usize = 4096;
 const KERNELS: [(RayOrder, &str); 4] = [
     (RayOrder::OneByOne, "ray by ray"),
     (RayOrder::InFlight, "in flight"),
-    (RayOrder::Packets, "packets of 16"),
+    (RayOrder::Packets, "packets of 16 or 32"),
     (RayOrder::Adaptive, "as it chooses"),
 ];
 
