@@ -214,9 +214,10 @@ fn builds(mesh: &Mesh, embree: Option<&Embree>, passes: usize) {
     }
 }
 
-/// Builds one of ours with so many threads.
+/// Builds one of ours with so many threads, which are there and awake, as they are once a file has been read.
 fn ours<T: Send>(threads: usize, build: impl Fn() -> T + Sync, bytes: impl Fn(&T) -> u64) -> (f64, usize) {
     let Ok(pool) = meshray::threads::pool(threads) else { return (f64::NAN, 0) };
+    pool.broadcast(|_| ());
     let start = Instant::now();
     let built = pool.install(&build);
     let seconds = start.elapsed().as_secs_f64();
