@@ -114,17 +114,8 @@ pub fn build<'a>(choice: AccelChoice, shapes: &'a Shapes, params: &AccelParams) 
     if let AccelChoice::Kind(kind) = choice {
         return (AnyAccel::build(kind, shapes, params), None);
     }
-    let judged = judged_of(shapes.bounded());
-    match part(shapes, judged) {
-        None => {
-            let (accel, reason) = judge(shapes, judged, params);
-            (accel, Some(reason))
-        }
-        Some(part) => {
-            let (_, reason) = judge(&part, judged, params);
-            (AnyAccel::build(reason.kind, shapes, params), Some(reason))
-        }
-    }
+    let (accel, reason) = judge(shapes, params);
+    (accel.unwrap_or_else(|| AnyAccel::build(reason.kind, shapes, params)), Some(reason))
 }
 
 /// The same over `shapes` and what is `kept`: the larger one of both, shapes or objects, is the one that is judged.
@@ -153,15 +144,23 @@ pub fn build_with<'a>(
 
 /// What [`build`] would choose, and why; nothing of the whole scene is built where it is large.
 pub fn reason(shapes: &Shapes, params: &AccelParams) -> Reason {
-    let judged = judged_of(shapes.bounded());
+    judge(shapes, params).1
+}
+
+/// Judges a scene by a part of it, or by all of it where that is no more; then what was chosen is built already.
+fn judge<'a>(shapes: &'a Shapes, params: &AccelParams) -> (Option<AnyAccel<'a>>, Reason) {
+    let judged = (shapes.bounded() / SHARE).clamp(FEWEST, MOST);
     match part(shapes, judged) {
-        None => judge(shapes, judged, params).1,
-        Some(part) => judge(&part, judged, params).1,
+        Some(part) => (None, try_both(&part, judged, params).1),
+        None => {
+            let (accel, reason) = try_both(shapes, judged, params);
+            (Some(accel), reason)
+        }
     }
 }
 
-/// Traces the sample through both, as is worth it where about so many prims are `judged`, and keeps the better one.
-fn judge<'a>(shapes: &'a Shapes, judged: u32, params: &AccelParams) -> (AnyAccel<'a>, Reason) {
+/// Traces a sample through both, as long as `judged` prims are worth, and keeps the better one.
+fn try_both<'a>(shapes: &'a Shapes, judged: u32, params: &AccelParams) -> (AnyAccel<'a>, Reason) {
     let rays = sample(shapes, judged as usize / PRIMS_A_RAY);
     let tried = |kind| {
         let accel = AnyAccel::build(kind, shapes, params);
@@ -189,12 +188,7 @@ pub fn nodes(counts: &RayCounts) -> f64 {
     (counts.n_ts as f64 - blocks + blocks * BLOCK) / counts.queries.max(1) as f64
 }
 
-/// How many of so many prims are judged, about.
-fn judged_of(bounded: u32) -> u32 {
-    (bounded / SHARE).clamp(FEWEST, MOST)
-}
-
-/// Runs of neighbouring prims spread over all of them; `None`: there are few enough. Files list neighbours together, so
+/// About so many prims, in runs of neighbours spread over all; `None`: there are no more. Files list neighbours together, so
 /// that what is left still has surfaces.
 fn part(shapes: &Shapes, judged: u32) -> Option<Shapes> {
     let bounded = shapes.bounded();

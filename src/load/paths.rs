@@ -4,12 +4,12 @@
 //! symbolic links are resolved, and never from a network. Everything read is listed and hashed, so that a picture can
 //! say exactly what it was made from.
 
-use super::{Diagnostic, LoadOptions, Source};
+use super::{Diagnostic, LoadOptions, Source, whole};
 use crate::stopwatch::{Spent, Stopwatch};
 use percent_encoding::percent_decode_str;
 use std::collections::HashMap;
 use std::fs;
-use std::io::{self, Read};
+use std::io;
 use std::path::{Component, Path, PathBuf};
 use xxhash_rust::xxh3::xxh3_128;
 
@@ -142,8 +142,8 @@ impl Resolver {
         if meta.len() > self.max_bytes {
             return Err(too_large(meta.len()));
         }
-        let mut bytes = Vec::with_capacity(usize::try_from(meta.len()).map_or(0, |length| length.saturating_add(1)));
-        file.take(self.max_bytes.saturating_add(1)).read_to_end(&mut bytes).map_err(io)?;
+        // What other threads would do meanwhile is not in this one's time.
+        let bytes = whole::read_in_turn(file, meta.len(), self.max_bytes).map_err(io)?;
         if bytes.len() as u64 > self.max_bytes {
             return Err(too_large(bytes.len() as u64));
         }

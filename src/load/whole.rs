@@ -20,6 +20,14 @@ pub(super) fn read(file: File, length: u64, most: u64) -> io::Result<Vec<u8>> {
     {
         return Ok(bytes);
     }
+    read_in_turn(file, length, most)
+}
+
+/// The same by this thread alone.
+///
+/// # Errors
+/// Those of the system.
+pub(super) fn read_in_turn(file: File, length: u64, most: u64) -> io::Result<Vec<u8>> {
     // Room for one more than there are, so that reading to the end needs no larger one.
     let mut bytes = Vec::with_capacity(usize::try_from(length).map_or(0, |length| length.saturating_add(1)));
     file.take(most.saturating_add(1)).read_to_end(&mut bytes)?;

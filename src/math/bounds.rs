@@ -263,10 +263,10 @@ fn moved(x: f32, way: f32) -> f32 {
     if way.abs() > 0.0 { next } else { x }
 }
 
-/// The next float above one that is not negative.
+/// The next float above one that is not negative; infinity where there is none, or no number.
 #[inline(always)]
 pub(crate) fn above(x: f32) -> f32 {
-    f32::from_bits((x.to_bits() + 1).min(f32::INFINITY.to_bits()))
+    f32::from_bits(x.to_bits().min(f32::MAX.to_bits()) + 1)
 }
 
 #[cfg(test)]
@@ -302,6 +302,7 @@ mod tests {
         for x in numbers.map(f32::abs).into_iter().chain([f32::INFINITY]) {
             assert_eq!(above(x), x.next_up());
         }
+        assert_eq!([f32::NAN, -f32::NAN].map(above), [f32::INFINITY; 2]);
     }
 
     #[test]

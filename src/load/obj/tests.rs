@@ -37,6 +37,26 @@ fn a_triangle_becomes_a_mesh_and_an_instance_with_a_plain_material() {
 }
 
 #[test]
+fn triangles_alone_have_the_corners_they_have_beside_a_vertex_that_nothing_uses() {
+    use crate::math::random::Random;
+    let mut random = Random::new(3);
+    let vertices: String = (0..40).map(|_| random.cube()).map(|p| format!("v {} {} {}\n", p.x, p.y, p.z)).collect();
+    let faces: String =
+        (0..60).map(|i| format!("f {} {} {}\n", i % 40 + 1, (i + 7) % 40 + 1, (i + 13) % 40 + 1)).collect();
+    let corners = |text: &str| -> Vec<[Vec3; 3]> {
+        let loaded = of(text);
+        let mesh = &loaded.scene.meshes[0];
+        mesh.triangles.iter().map(|t| t.map(|corner| mesh.positions[corner as usize])).collect()
+    };
+    let alone = corners(&format!("{vertices}{faces}"));
+    assert_eq!(alone, corners(&format!("{vertices}v 0 0 0\n{faces}")));
+    let loaded = of(&format!("{vertices}{faces}"));
+    assert_eq!((alone.len(), loaded.facts.faces), (60, 60));
+    // Their vertices are the file's.
+    assert_eq!(loaded.scene.meshes[0].triangles[..2], [[0, 7, 13], [1, 8, 14]]);
+}
+
+#[test]
 fn every_encoding_and_line_end_gives_the_same_mesh() {
     let text = format!("{SQUARE}f 1 2 \\\n 3 4 # all\n");
     let expected = of(&text).scene.meshes[0].triangles.clone();
