@@ -17,6 +17,7 @@ mod generate;
 mod inspect;
 mod interrupt;
 mod job;
+mod memory;
 mod message;
 mod meter;
 mod moment;
@@ -61,6 +62,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
     };
     interrupt::install();
     accident::install();
+    memory::keep_freed();
     match cli.command {
         Command::Render(args) => render_command(&args),
         Command::Inspect(args) => inspect::run(&args),
