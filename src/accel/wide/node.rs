@@ -62,7 +62,7 @@ impl Child {
     /// A count that no block has marks a run.
     const RUN: u32 = 15;
 
-    fn pack(self) -> u32 {
+    pub(super) fn pack(self) -> u32 {
         match self {
             Self::Node(i) => i,
             Self::Block(i, count) => Self::LEAF | count << Self::COUNT | i,

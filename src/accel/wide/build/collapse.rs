@@ -67,19 +67,18 @@ fn plan(knots: &[Knot], plans: &mut [Plan]) {
     plans[0] = Plan::of(root, &plans[1], &plans[second]);
 }
 
-/// The nodes over a binary tree; `leaves` has what each leaf is, by its knot.
-pub(super) fn nodes(knots: &[Knot], leaves: &[Child]) -> Vec<Node> {
+/// The nodes over a binary tree whose leaves are packed children.
+pub(super) fn nodes(knots: &[Knot]) -> Vec<Node> {
     let mut plans = bytemuck::zeroed_vec(knots.len());
     plan(knots, &mut plans);
     let mut tree = Tree::default();
-    Collapse { knots, plans: &plans, leaves }.node(0..knots.len(), &mut tree);
+    Collapse { knots, plans: &plans }.node(0..knots.len(), &mut tree);
     tree.nodes
 }
 
 struct Collapse<'k> {
     knots: &'k [Knot],
     plans: &'k [Plan],
-    leaves: &'k [Child],
 }
 
 /// Knots that are children of one node: each with all below it.
@@ -120,7 +119,7 @@ impl Collapse<'_> {
             let child = match built.get_mut(i).and_then(Option::take) {
                 Some(subtree) => tree.append(subtree),
                 None if is_node(below) => Child::Node(self.node(below.clone(), tree)),
-                None => self.leaves[below.start],
+                None => Child::unpack(self.knots[below.start].at),
             };
             tree.nodes[at].set(slots[i], &bounds[i], child);
         }
@@ -152,11 +151,11 @@ mod tests {
 
     /// The children of each node: how many there are, and how many of them are nodes.
     fn shape(knots: &[Knot]) -> Vec<(usize, usize)> {
-        let leaf = |(i, knot): (u32, &Knot)| if knot.is_leaf() { Child::Block(i, 1) } else { Child::Node(0) };
-        let leaves: Vec<Child> = (0..).zip(knots).map(leaf).collect();
+        let mut packed = knots.to_vec();
+        packed.iter_mut().filter(|k| k.is_leaf()).for_each(|k| k.at = Child::Block(k.at, 1).pack());
         let children = |node: &Node| node.children.map(Child::unpack).into_iter().filter(|c| *c != Child::Block(0, 0));
         let is_node = |c: &Child| matches!(c, Child::Node(_));
-        nodes(knots, &leaves).iter().map(|n| (children(n).count(), children(n).filter(is_node).count())).collect()
+        nodes(&packed).iter().map(|n| (children(n).count(), children(n).filter(is_node).count())).collect()
     }
 
     fn small(i: u32) -> Vec<Knot> {

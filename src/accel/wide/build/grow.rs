@@ -20,7 +20,8 @@ const WORTH_CUTTING: f32 = 0.7;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Knot {
     pub lo: Vec3,
-    /// Of a leaf the first of its prims; of another knot how many knots further on its second side is.
+    /// Of a leaf the first of its prims, in the end the packed child that it is; of another knot how many knots further on
+    /// its second side is.
     pub at: u32,
     pub hi: Vec3,
     /// Prims of a leaf; 0: no leaf.

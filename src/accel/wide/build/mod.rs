@@ -40,25 +40,19 @@ pub(super) fn build(shapes: &Shapes, splitting: Splitting) -> Tree {
     if shapes.bounded() == 0 {
         return Tree::default();
     }
-    let (grown, mut prims) = binary_tree(shapes, splitting);
+    let triangles = shapes.triangles.len();
+    let (grown, prims) = binary_tree(shapes, splitting);
     let deep = 2 * depth(&grown) + ROOM;
-    let (mut knots, moved) = reinsert::improve(grown);
+    let (mut knots, moved) = reinsert::improve(grown, splitting);
     if moved && depth(&knots) > deep {
         // Where boxes hardly have an area rounding makes places better, and knots may be hung one below the other.
-        (knots, prims) = binary_tree(shapes, splitting);
+        knots = binary_tree(shapes, splitting).0;
     }
+    let leaves = Leaves::list(&mut knots, &prims, index(triangles));
+    let blocks = leaves.blocks(shapes, &prims);
     let bounds = knots.first().map_or(Aabb::EMPTY, Knot::bounds);
-    let leaves = Leaves::of(&knots, &prims, shapes);
-    let nodes = collapse::nodes(&knots, &leaves.children);
-    drop(knots);
-    let mut blocks: Vec<Block> =
-        leaves.blocks.par_iter().with_min_len(CHUNK).map(|&of| block(shapes, part(&prims, of))).collect();
-    if blocks.is_empty() {
-        // Empty slots lead to block 0, and a ray that no box can turn away goes there too.
-        blocks.push(Block::EMPTY);
-    }
-    let others = prims[shapes.triangles.len()..].to_vec();
-    Tree { nodes, blocks, runs: leaves.runs, prims: others, ..Tree::default() }.finish(bounds)
+    let nodes = collapse::nodes(&knots);
+    Tree { nodes, blocks, runs: leaves.runs, prims: prims[triangles..].to_vec(), ..Tree::default() }.finish(bounds)
 }
 
 /// Knots on the longest way down.
@@ -92,8 +86,11 @@ fn depth_from(knots: &[Knot], levels: u32) -> usize {
 
 /// The binary tree over all bounded prims, and the prims of its leaves. A leaf holds triangles or other prims, never both.
 fn binary_tree(shapes: &Shapes, splitting: Splitting) -> (Vec<Knot>, Vec<u32>) {
-    let mut items: Vec<Item> =
-        (0..shapes.bounded()).into_par_iter().with_min_len(CHUNK).map(|p| Item::new(shapes.bounds(p), p)).collect();
+    let item = |prim| match shapes.triangles.get(prim as usize) {
+        Some(corners) => Item::of_triangle(&shapes.corners(*corners), prim),
+        None => Item::new(shapes.bounds(prim), prim),
+    };
+    let mut items: Vec<Item> = (0..shapes.bounded()).into_par_iter().with_min_len(CHUNK).map(item).collect();
     let mut prims = vec![0; items.len()];
     let (triangles, others) = items.split_at_mut(shapes.triangles.len());
     let (triangle_prims, other_prims) = prims.split_at_mut(triangles.len());
@@ -131,33 +128,38 @@ fn part(prims: &[u32], (first, count): Listed) -> &[u32] {
     &prims[first as usize..(first + count) as usize]
 }
 
-/// All leaves in the order of their knots.
+/// All leaves, in their order.
 #[derive(Default)]
 struct Leaves {
-    /// By knot, where it is a leaf.
-    children: Vec<Child>,
     blocks: Vec<Listed>,
     /// Counted from the first prim that is no triangle.
     runs: Vec<Listed>,
 }
 
 impl Leaves {
-    fn of(knots: &[Knot], prims: &[u32], shapes: &Shapes) -> Self {
-        let triangles = index(shapes.triangles.len());
-        let mut all = Self { children: Vec::with_capacity(knots.len()), ..Self::default() };
-        for knot in knots {
+    /// Lists the leaves among `knots`. Each then has the child that it is, packed, in place of its first prim.
+    fn list(knots: &mut [Knot], prims: &[u32], triangles: u32) -> Self {
+        let mut all = Self::default();
+        for knot in knots.iter_mut().filter(|knot| knot.is_leaf()) {
             let Knot { at, count, .. } = *knot;
-            all.children.push(if count == 0 {
-                Child::Node(0)
-            } else if prims[at as usize] < triangles {
+            let child = if prims[at as usize] < triangles {
                 all.blocks.push((at, count));
                 Child::Block(index(all.blocks.len() - 1), count)
             } else {
                 all.runs.push((at - triangles, count));
                 Child::Run(index(all.runs.len() - 1))
-            });
+            };
+            knot.at = child.pack();
         }
         all
+    }
+
+    fn blocks(&self, shapes: &Shapes, prims: &[u32]) -> Vec<Block> {
+        if self.blocks.is_empty() {
+            // Empty slots lead to block 0, and a ray that no box can turn away goes there too.
+            return vec![Block::EMPTY];
+        }
+        self.blocks.par_iter().with_min_len(CHUNK).map(|&of| block(shapes, part(prims, of))).collect()
     }
 }
 
@@ -187,7 +189,7 @@ mod tests {
         for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
             let (knots, _) = binary_tree(&shapes, splitting);
             let deep = 2 * depth(&knots) + ROOM;
-            let improved = depth(&reinsert::improve(knots).0);
+            let improved = depth(&reinsert::improve(knots, splitting).0);
             assert!(improved <= deep, "{splitting:?}: {improved}, places as good as another were taken for better");
             let tree = build(&shapes, splitting);
             assert!(tree.depth as usize <= deep, "{splitting:?}: {}", tree.depth);

@@ -2,11 +2,12 @@
 //!
 //! After J. Bittner, M. Hapala, V. Havran, *Fast Insertion-Based Optimization of Bounding Volume Hierarchies*, 2013: a knot
 //! is taken out with its parent, and put back beside the knot that adds the least area above it, found by branch and bound.
-//! The largest boxes are tried first, some at a time, for as long as enough of them move: a mesh that is one even surface
-//! costs hardly more than looking, and large faces before small ones, which cuts between middles handle badly, are put
-//! where they do the least harm. One after the other, so that the result does not depend on threads.
+//! Those that promise most are tried first, some at a time, for as long as enough of them move: a mesh that is one even
+//! surface costs hardly more than looking, and large faces before small ones, which cuts between middles handle badly, are
+//! put where they do the least harm. One after the other, so that the result does not depend on threads.
 
 use super::grow::{Knot, index};
+use crate::accel::wide::split::{Bounds, Splitting};
 use crate::math::aabb::Aabb;
 
 /// Knots that are tried before it is asked whether that paid.
@@ -15,13 +16,21 @@ const BATCH: usize = 256;
 /// It paid if one in so many moved.
 const WORTH: usize = 12;
 
-/// Of so many knots one is tried at most, and no more than so many, and a batch.
-const SHARE: usize = 16;
+/// Of so many knots one is tried at most, and no more than so many; and a batch, or the fourth part of a small tree and a
+/// few.
+const SHARE: usize = 32;
 const MOST: usize = 4096;
+const FEW: usize = 16;
+
+/// The part of its own area that counts against what taking a knot out can save. All of it comes back wherever the knot
+/// goes; but boxes further up may shrink, too.
+const RETURNS: f32 = 0.75;
 
 /// A binary tree with links.
 struct Links {
     knots: Vec<Knot>,
+    /// Their boxes, which change.
+    boxes: Vec<Bounds>,
     parents: Vec<u32>,
     sides: Vec<[u32; 2]>,
     /// Places still to be looked at: what is added above them, and the knot.
@@ -33,9 +42,9 @@ struct Links {
 /// The root, which is never moved.
 const ROOT: u32 = 0;
 
-/// Improves a tree; whether anything was moved.
-pub(super) fn improve(knots: Vec<Knot>) -> (Vec<Knot>, bool) {
-    let order = largest(&knots);
+/// Improves a tree that was cut so; whether anything was moved.
+pub(super) fn improve(knots: Vec<Knot>, splitting: Splitting) -> (Vec<Knot>, bool) {
+    let order = promising(&knots, splitting);
     let mut links = Links::new(knots);
     let mut any = false;
     for batch in order.chunks(BATCH) {
@@ -48,22 +57,30 @@ pub(super) fn improve(knots: Vec<Knot>) -> (Vec<Knot>, bool) {
     (if any { links.in_order() } else { links.knots }, any)
 }
 
-/// The knots that may be tried, by falling area.
-fn largest(knots: &[Knot]) -> Vec<(f32, u32)> {
-    let mut all: Vec<(f32, u32)> = knots.iter().map(Knot::area).zip(0..).skip(1).collect();
-    let most = (all.len() / SHARE).min(MOST) + BATCH;
-    let larger = |a: &(f32, u32), b: &(f32, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
+/// The knots that may be tried, by falling promise.
+///
+/// Planes of cells leave small knots alone with large ones, in boxes much larger than they are, and what is saved by taking
+/// a knot out is that box. Cuts by area leave few such; there the largest knots come first.
+fn promising(knots: &[Knot], splitting: Splitting) -> Vec<(f32, u32)> {
+    let mut all = Vec::with_capacity(knots.len());
+    for (i, above) in (0..).zip(knots).filter(|(_, knot)| !knot.is_leaf()) {
+        for side in [i + 1, i + above.at] {
+            let own = knots[side as usize].area();
+            let promise = match splitting {
+                Splitting::Octree => above.area() - own * RETURNS,
+                Splitting::SurfaceArea => own,
+            };
+            all.push((promise, side));
+        }
+    }
+    let most = (all.len() / SHARE).min(MOST) + BATCH.min(all.len() / 4 + FEW);
+    let better = |a: &(f32, u32), b: &(f32, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
     if most < all.len() {
-        all.select_nth_unstable_by(most, larger);
+        all.select_nth_unstable_by(most, better);
         all.truncate(most);
     }
-    all.sort_unstable_by(larger);
+    all.sort_unstable_by(better);
     all
-}
-
-fn area(b: &Aabb) -> f32 {
-    let d = b.hi - b.lo;
-    d.x * d.y + d.y * d.z + d.z * d.x
 }
 
 impl Links {
@@ -74,11 +91,13 @@ impl Links {
             sides[i as usize] = both;
             both.iter().for_each(|&side| parents[side as usize] = i);
         }
-        Self { knots, parents, sides, open: Vec::new(), way: Vec::new() }
+        let boxes = knots.iter().map(|knot| knot.bounds().into()).collect();
+        Self { knots, boxes, parents, sides, open: Vec::new(), way: Vec::new() }
     }
 
-    fn bounds(&self, knot: u32) -> Aabb {
-        self.knots[knot as usize].bounds()
+    #[inline(always)]
+    fn bounds(&self, knot: u32) -> Bounds {
+        self.boxes[knot as usize]
     }
 
     /// Whether a knot was moved elsewhere.
@@ -91,7 +110,7 @@ impl Links {
         let sibling = if a == knot { b } else { a };
         self.replace(parent, sibling);
         self.fit(self.parents[parent as usize]);
-        let beside = self.best_place(&self.bounds(knot), sibling);
+        let beside = self.best_place(self.bounds(knot), sibling);
         self.replace(beside, parent);
         self.sides[parent as usize] = [beside, knot];
         self.parents[beside as usize] = parent;
@@ -113,9 +132,9 @@ impl Links {
     fn fit(&mut self, mut knot: u32) {
         loop {
             let [a, b] = self.sides[knot as usize].map(|side| self.bounds(side));
-            let (fitting, there) = (a.union(b), &mut self.knots[knot as usize]);
-            let fits = fitting == there.bounds();
-            (there.lo, there.hi) = (fitting.lo, fitting.hi);
+            let (fitting, there) = (a.join(b), &mut self.boxes[knot as usize]);
+            let fits = fitting.lo.cmpeq(there.lo).all() & fitting.hi.cmpeq(there.hi).all();
+            *there = fitting;
             if fits || knot == ROOT {
                 return;
             }
@@ -124,8 +143,8 @@ impl Links {
     }
 
     /// The knot beside which a box adds the least area to the tree: `known`, or one where it is less.
-    fn best_place(&mut self, bounds: &Aabb, known: u32) -> u32 {
-        let alone = area(bounds);
+    fn best_place(&mut self, bounds: Bounds, known: u32) -> u32 {
+        let alone = bounds.area();
         let (mut least, mut best) = (self.added_beside(bounds, known), known);
         self.open.clear();
         self.open.push((0.0, ROOT));
@@ -134,11 +153,11 @@ impl Links {
                 continue;
             }
             let here = self.bounds(knot);
-            let total = added + area(&here.union(*bounds));
+            let total = added + here.join(bounds).area();
             if total < least && knot != ROOT {
                 (least, best) = (total, knot);
             }
-            let added = (total - area(&here)).max(0.0);
+            let added = (total - here.area()).max(0.0);
             if added + alone < least && !self.knots[knot as usize].is_leaf() {
                 self.open.extend(self.sides[knot as usize].map(|side| (added, side)));
             }
@@ -147,7 +166,7 @@ impl Links {
     }
 
     /// The area that a box beside a knot adds to the tree, with that of the knot above both.
-    fn added_beside(&mut self, bounds: &Aabb, knot: u32) -> f32 {
+    fn added_beside(&mut self, bounds: Bounds, knot: u32) -> f32 {
         self.way.clear();
         let mut above = knot;
         while above != ROOT {
@@ -157,9 +176,9 @@ impl Links {
         // From the root down, as the search adds.
         let grown = |added: f32, &above: &u32| {
             let here = self.bounds(above);
-            (added + area(&here.union(*bounds)) - area(&here)).max(0.0)
+            (added + here.join(bounds).area() - here.area()).max(0.0)
         };
-        self.way.iter().rev().fold(0.0, grown) + area(&self.bounds(knot).union(*bounds))
+        self.way.iter().rev().fold(0.0, grown) + self.bounds(knot).join(bounds).area()
     }
 
     /// The knots in order again, each followed by its first side.
@@ -173,7 +192,9 @@ impl Links {
                 let above: &mut Knot = &mut knots[above];
                 above.at = index(at) - above.at;
             }
-            let mut copy = self.knots[knot as usize];
+            let mut copy = Knot { ..self.knots[knot as usize] };
+            let Aabb { lo, hi } = self.boxes[knot as usize].aabb();
+            (copy.lo, copy.hi) = (lo, hi);
             if !copy.is_leaf() {
                 let [first, second] = self.sides[knot as usize];
                 // Until the second side is there, where the knot itself is.
@@ -203,21 +224,23 @@ mod tests {
         let large = leaf(6, 0.0, 5.5);
         let left = fork(fork(fork(small(0), large), small(1)), small(2));
         let knots = fork(left, fork(fork(small(3), small(4)), small(5)));
-        let (improved, moved) = improve(knots.clone());
-        assert!(moved);
-        assert!(cost(&improved) < 0.7 * cost(&knots), "{} {}", cost(&improved), cost(&knots));
-        // Checks the boxes and the links as well.
-        let (mut before, mut after) = (leaves(&knots), leaves(&improved));
-        before.sort_unstable();
-        after.sort_unstable();
-        assert_eq!(before, after);
+        for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
+            let (improved, moved) = improve(knots.clone(), splitting);
+            assert!(moved);
+            assert!(cost(&improved) < 0.7 * cost(&knots), "{} {}", cost(&improved), cost(&knots));
+            // Checks the boxes and the links as well.
+            let (mut before, mut after) = (leaves(&knots), leaves(&improved));
+            before.sort_unstable();
+            after.sort_unstable();
+            assert_eq!(before, after);
+        }
     }
 
     #[test]
     fn a_tree_that_cannot_be_improved_stays_as_it_is() {
         let small = |i: u32| leaf(i, i as f32, i as f32 + 0.5);
         let knots = fork(fork(small(0), small(1)), fork(small(2), small(3)));
-        assert_eq!(leaves(&improve(knots).0), [0, 1, 2, 3]);
-        assert_eq!(leaves(&improve(small(7)).0), [7]);
+        assert_eq!(leaves(&improve(knots, Splitting::Octree).0), [0, 1, 2, 3]);
+        assert_eq!(leaves(&improve(small(7), Splitting::Octree).0), [7]);
     }
 }

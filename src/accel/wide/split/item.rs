@@ -1,6 +1,7 @@
 //! Prims on their way into a tree, and boxes in registers of four lanes.
 
 use crate::math::aabb::Aabb;
+use crate::math::triangle::Triangle;
 use crate::math::{Vec3, Vec4};
 use bytemuck::Zeroable;
 
@@ -59,8 +60,21 @@ const LOW: u32 = (1 << LOW_BITS) - 1;
 impl Item {
     #[inline]
     pub(in crate::accel) fn new(bounds: Aabb, prim: u32) -> Self {
+        Self::numbered(bounds.into(), prim)
+    }
+
+    /// A triangle of finite corners.
+    #[inline(always)]
+    pub(in crate::accel) fn of_triangle(corners: &Triangle, prim: u32) -> Self {
+        let [a, b, c] = corners.map(|corner| corner.extend(0.0));
+        Self::numbered(Bounds { lo: a.min(b).min(c), hi: a.max(b).max(c) }, prim)
+    }
+
+    #[inline(always)]
+    fn numbered(mut bounds: Bounds, prim: u32) -> Self {
         let number = |bits: u32| f32::from_bits(1f32.to_bits() | bits);
-        Self(Bounds { lo: bounds.lo.extend(number(prim & LOW)), hi: bounds.hi.extend(number(prim >> LOW_BITS)) })
+        (bounds.lo.w, bounds.hi.w) = (number(prim & LOW), number(prim >> LOW_BITS));
+        Self(bounds)
     }
 
     #[inline(always)]
@@ -102,6 +116,9 @@ mod tests {
             let item = Item::new(bounds, prim);
             assert_eq!((item.prim(), item.bounds().aabb()), (prim, bounds));
             assert!(item.bounds().lo.w.is_normal() && item.bounds().hi.w.is_normal());
+            let corners = [Vec3::new(-1.0, 5.0, 4.0), Vec3::new(4.0, 2.0, 3.0), Vec3::new(2.0, 3.0, 6.5)];
+            let around = Item::of_triangle(&corners, prim);
+            assert_eq!((around.prim(), around.bounds().aabb()), (prim, bounds));
         }
     }
 }
