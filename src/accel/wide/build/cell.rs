@@ -157,7 +157,9 @@ impl Cell {
             if counts[0] == 0 || counts[1] == 0 {
                 continue;
             }
-            let cost = |side: usize| self.bounds(sides[side]).area() * weight(counts[side], self.leaf);
+            let cost = |side: usize| {
+                self.bounds(sides[side]).area() * weight(counts[side].cast_signed(), self.leaf.cast_signed())
+            };
             let cost = cost(0) + cost(1);
             if best.1.is_none() || cost < best.0 {
                 best = (cost, Some(sides[0]));

@@ -2,7 +2,7 @@
 
 use super::item::{Bounds, Item, around_middles};
 use super::{Cut, halves};
-use crate::math::Vec4;
+use crate::math::{Mat4, Vec4};
 
 /// Bins of each axis.
 const BINS: usize = 16;
@@ -20,11 +20,11 @@ const TO_INTEGER: f32 = (1 << 23) as f32;
 /// What part of the cost of a set a leaf's tests are, against those of its prims: a leaf is tested at once, full or not.
 const WHOLE_LEAVES: f32 = 0.5;
 
-/// Boxes and numbers of what falls into each bin.
+/// Boxes and numbers of what falls into each of `N` bins, on the three axes.
 #[derive(Clone, Copy)]
-struct Bins {
-    bounds: [[Bounds; BINS]; 3],
-    counts: [[u32; BINS]; 3],
+struct Bins<const N: usize> {
+    bounds: [[Bounds; 3]; N],
+    counts: [[i32; 4]; N],
 }
 
 /// Where bins begin, and how many there are for a unit of length.
@@ -54,56 +54,78 @@ impl Ruler {
     }
 }
 
-impl Bins {
-    const EMPTY: Self = Self { bounds: [[Bounds::EMPTY; BINS]; 3], counts: [[0; BINS]; 3] };
+impl<const N: usize> Bins<N> {
+    const EMPTY: Self = Self { bounds: [[Bounds::EMPTY; 3]; N], counts: [[0; 4]; N] };
 
     fn add<'i>(&mut self, items: impl Iterator<Item = &'i Item>, ruler: &Ruler) {
         for item in items {
             let [x, y, z, _] = ruler.place(item).to_array();
             for (k, place) in [x, y, z].into_iter().enumerate() {
-                let bin = place.to_bits() as usize % BINS;
-                let bounds = &mut self.bounds[k][bin];
+                let bin = place.to_bits() as usize % N;
+                let bounds = &mut self.bounds[bin][k];
                 *bounds = bounds.join(item.bounds());
-                self.counts[k][bin] += 1;
+                self.counts[bin][k] += 1;
             }
         }
     }
 
     /// The axis and the first bin of the second part. What an empty part costs is no number, and never less.
-    fn cheapest(&self, leaf: u32, used: usize) -> Option<(usize, usize)> {
-        let mut best = (f32::INFINITY, None);
-        for k in 0..3 {
-            let (bounds, counts) = (&self.bounds[k][..used], &self.counts[k][..used]);
-            let mut after = [0.0; BINS];
-            let (mut all, mut count) = (Bounds::EMPTY, 0);
-            for i in (1..used).rev() {
-                all = all.join(bounds[i]);
-                count += counts[i];
-                after[i] = all.area() * weight(count, leaf);
-            }
-            (all, count) = (Bounds::EMPTY, 0);
-            for i in 1..used {
-                all = all.join(bounds[i - 1]);
-                count += counts[i - 1];
-                let cost = all.area() * weight(count, leaf) + after[i];
-                if cost < best.0 {
-                    best = (cost, Some((k, i)));
-                }
+    fn cheapest(&self, leaf: u32) -> Option<(usize, usize)> {
+        let mut after = [Vec4::ZERO; N];
+        let mut part = Sides::EMPTY;
+        for i in (1..N).rev() {
+            part.add(&self.bounds[i], &self.counts[i]);
+            after[i] = part.costs(leaf);
+        }
+        let (mut least, mut at) = ([f32::INFINITY; 4], [0u8; 4]);
+        part = Sides::EMPTY;
+        let before = self.bounds.iter().zip(&self.counts);
+        for (i, ((bounds, counts), after)) in (1..).zip(before.zip(&after[1..])) {
+            part.add(bounds, counts);
+            let costs = (part.costs(leaf) + *after).to_array();
+            for ((least, at), cost) in least.iter_mut().zip(&mut at).zip(costs) {
+                (*least, *at) = if cost < *least { (cost, i) } else { (*least, *at) };
             }
         }
-        best.1
+        let axes = (0..3).filter(|&k| at[k] > 0);
+        // The first of equals.
+        axes.reduce(|a, b| if least[b] < least[a] { b } else { a }).map(|axis| (axis, usize::from(at[axis])))
     }
 
     fn parts(&self, axis: usize, place: usize) -> [Bounds; 2] {
-        let (first, second) = self.bounds[axis].split_at(place);
-        [first, second].map(|bins| bins.iter().fold(Bounds::EMPTY, |b, bin| b.join(*bin)))
+        let (first, second) = self.bounds.split_at(place);
+        [first, second].map(|bins| bins.iter().fold(Bounds::EMPTY, |b, bin| b.join(bin[axis])))
+    }
+}
+
+/// What lies on one side of a place, on each axis.
+struct Sides {
+    bounds: [Bounds; 3],
+    counts: [i32; 4],
+}
+
+impl Sides {
+    const EMPTY: Self = Self { bounds: [Bounds::EMPTY; 3], counts: [0; 4] };
+
+    #[inline(always)]
+    fn add(&mut self, bounds: &[Bounds; 3], counts: &[i32; 4]) {
+        self.bounds.iter_mut().zip(bounds).for_each(|(all, bounds)| *all = all.join(*bounds));
+        self.counts.iter_mut().zip(counts).for_each(|(all, count)| *all += count);
+    }
+
+    /// What they cost: [`Bounds::area`] times [`weight`], of the three axes in lanes.
+    #[inline(always)]
+    fn costs(&self, leaf: u32) -> Vec4 {
+        let [a, b, c] = self.bounds.map(|b| b.hi - b.lo);
+        let Mat4 { x_axis: x, y_axis: y, z_axis: z, .. } = Mat4::from_cols(a, b, c, Vec4::ZERO).transpose();
+        (x * y + z * (x + y)) * Vec4::from_array(self.counts.map(|count| weight(count, leaf.cast_signed())))
     }
 }
 
 /// What a set of so many costs where leaves hold up to `leaf`, a power of two.
 #[inline(always)]
 #[expect(clippy::cast_precision_loss, reason = "a cost")]
-pub(in crate::accel) fn weight(count: u32, leaf: u32) -> f32 {
+pub(in crate::accel) fn weight(count: i32, leaf: i32) -> f32 {
     let whole_leaves = count.wrapping_add(leaf - 1) & !(leaf - 1);
     count as f32 + WHOLE_LEAVES * whole_leaves as f32
 }
@@ -111,16 +133,20 @@ pub(in crate::accel) fn weight(count: u32, leaf: u32) -> f32 {
 /// Cuts at least two items between bins of their middles, on the axis and at the place of least cost, where leaves hold up
 /// to `leaf` of them, a power of two; both parts are not empty. `middles` is the box around their middles, where known.
 pub(in crate::accel) fn cut_by_area(items: &mut [Item], leaf: u32, middles: Option<Bounds>) -> Cut {
+    if items.len() <= FEW { cut_in::<{ BINS / 2 }>(items, leaf, middles) } else { cut_in::<BINS>(items, leaf, middles) }
+}
+
+/// The same between `N` bins.
+fn cut_in<const N: usize>(items: &mut [Item], leaf: u32, middles: Option<Bounds>) -> Cut {
     let many = items.len() > MANY;
-    let used = if items.len() <= FEW { BINS / 2 } else { BINS };
-    let ruler = Ruler::over(&middles.unwrap_or_else(|| around_middles(items)), used);
-    let mut bins = Bins::EMPTY;
+    let ruler = Ruler::over(&middles.unwrap_or_else(|| around_middles(items)), N);
+    let mut bins = Bins::<N>::EMPTY;
     if many {
         bins.add(items.iter().step_by(STRIDE), &ruler);
     } else {
         bins.add(items.iter(), &ruler);
     }
-    let Some((axis, place)) = bins.cheapest(leaf, used) else { return halves(items) };
+    let Some((axis, place)) = bins.cheapest(leaf) else { return halves(items) };
 
     #[expect(clippy::cast_precision_loss, reason = "a few bins")]
     let second = Vec4::splat(TO_INTEGER + place as f32);
