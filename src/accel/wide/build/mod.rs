@@ -49,9 +49,10 @@ pub(super) fn build(shapes: &Shapes, splitting: Splitting) -> Tree {
         knots = binary_tree(shapes, splitting).0;
     }
     let leaves = Leaves::list(&mut knots, &prims, index(triangles));
-    let blocks = leaves.blocks(shapes, &prims);
     let bounds = knots.first().map_or(Aabb::EMPTY, Knot::bounds);
     let nodes = collapse::nodes(&knots);
+    drop(knots);
+    let blocks = leaves.blocks(shapes, &prims);
     Tree { nodes, blocks, runs: leaves.runs, prims: prims[triangles..].to_vec(), ..Tree::default() }.finish(bounds)
 }
 

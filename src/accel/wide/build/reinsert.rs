@@ -192,7 +192,7 @@ impl Links {
                 let above: &mut Knot = &mut knots[above];
                 above.at = index(at) - above.at;
             }
-            let mut copy = Knot { ..self.knots[knot as usize] };
+            let mut copy = self.knots[knot as usize];
             let Aabb { lo, hi } = self.boxes[knot as usize].aabb();
             (copy.lo, copy.hi) = (lo, hi);
             if !copy.is_leaf() {
