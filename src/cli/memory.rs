@@ -2,7 +2,7 @@
 
 use std::hint::black_box;
 
-/// Has the C library keep what is freed, to be used again, up to 64 MiB of it.
+/// Has the C library keep what is freed, to be used again, up to 64 MiB of it in each of its arenas.
 ///
 /// Loading, building and tracing each work in large buffers of their own, and a buffer of more than 128 KiB is a mapping that
 /// glibc hands back to the system when it is freed: the next one comes as new pages that the system must clear, a tenth of

@@ -28,7 +28,7 @@ pub struct Bvh<'a> {
 impl<'a> Bvh<'a> {
     /// Builds it over the bounded prims, leaves of at most `leaf_size`; the same for every number of threads.
     pub fn build(shapes: &'a Shapes, leaf_size: u32) -> Self {
-        let item = |prim| Item::new(shapes.bounds(prim), prim);
+        let item = |prim| Item::of(shapes, prim);
         let mut items: Vec<Item> = (0..shapes.bounded()).map(item).collect();
         let mut tree = Tree::default();
         if !items.is_empty() {

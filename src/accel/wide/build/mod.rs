@@ -87,11 +87,8 @@ fn depth_from(knots: &[Knot], levels: u32) -> usize {
 
 /// The binary tree over all bounded prims, and the prims of its leaves. A leaf holds triangles or other prims, never both.
 fn binary_tree(shapes: &Shapes, splitting: Splitting) -> (Vec<Knot>, Vec<u32>) {
-    let item = |prim| match shapes.triangles.get(prim as usize) {
-        Some(corners) => Item::of_triangle(&shapes.corners(*corners), prim),
-        None => Item::new(shapes.bounds(prim), prim),
-    };
-    let mut items: Vec<Item> = (0..shapes.bounded()).into_par_iter().with_min_len(CHUNK).map(item).collect();
+    let mut items: Vec<Item> =
+        (0..shapes.bounded()).into_par_iter().with_min_len(CHUNK).map(|prim| Item::of(shapes, prim)).collect();
     let mut prims = vec![0; items.len()];
     let (triangles, others) = items.split_at_mut(shapes.triangles.len());
     let (triangle_prims, other_prims) = prims.split_at_mut(triangles.len());

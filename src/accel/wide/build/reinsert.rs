@@ -237,6 +237,17 @@ mod tests {
     }
 
     #[test]
+    fn what_is_small_beside_what_is_large_comes_first_in_trees_cut_at_planes_and_what_is_large_elsewhere() {
+        let (small, large) = (leaf(0, 0.0, 0.5), leaf(1, 0.0, 5.5));
+        let knots = fork(fork(small, large), fork(leaf(2, 6.0, 8.0), leaf(3, 8.0, 10.0)));
+        let first_leaf = |splitting| {
+            let tried = promising(&knots, splitting).into_iter().map(|(_, knot)| knots[knot as usize]);
+            tried.filter(Knot::is_leaf).map(|leaf| leaf.at).next()
+        };
+        assert_eq!([Splitting::Octree, Splitting::SurfaceArea].map(first_leaf), [Some(0), Some(1)]);
+    }
+
+    #[test]
     fn a_tree_that_cannot_be_improved_stays_as_it_is() {
         let small = |i: u32| leaf(i, i as f32, i as f32 + 0.5);
         let knots = fork(fork(small(0), small(1)), fork(small(2), small(3)));

@@ -186,3 +186,52 @@ fn measured_partition(items: &mut [Item], first: impl Fn(&Item) -> bool) -> Cut 
     }
     Cut { at, bounds, middles: Some(middles) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+    use crate::math::aabb::Aabb;
+    use crate::math::random::Random;
+
+    /// The cheapest cut by its definition: axis by axis, place by place, the boxes of both parts made anew.
+    fn defined<const N: usize>(bins: &Bins<N>, leaf: u32) -> Option<(usize, usize)> {
+        let mut best = (f32::INFINITY, None);
+        for axis in 0..3 {
+            for place in 1..N {
+                let counts = [0..place, place..N].map(|part| bins.counts[part].iter().map(|c| c[axis]).sum::<i32>());
+                let [a, b] = bins.parts(axis, place);
+                let cost =
+                    a.area() * weight(counts[0], leaf.cast_signed()) + b.area() * weight(counts[1], leaf.cast_signed());
+                if cost < best.0 {
+                    best = (cost, Some((axis, place)));
+                }
+            }
+        }
+        best.1
+    }
+
+    fn assert_cheapest_is_as_defined<const N: usize>(items: &[Item], leaf: u32) {
+        let mut bins = Bins::<N>::EMPTY;
+        bins.add(items.iter(), &Ruler::over(&around_middles(items), N));
+        assert_eq!(bins.cheapest(leaf), defined(&bins, leaf), "{} items, leaves of {leaf}", items.len());
+    }
+
+    #[test]
+    fn the_sweep_over_three_axes_finds_the_cut_that_is_cheapest_by_definition() {
+        let mut random = Random::new(9);
+        for count in [2, 3, 9, 16, 40, 300] {
+            for shape in [Vec3::ONE, Vec3::new(1.0, 0.0, 5.0), Vec3::ZERO] {
+                let mut item = |prim| {
+                    let (at, size) = (random.cube() * shape, random.unit() * 0.3);
+                    Item::new(Aabb { lo: at, hi: at + size }, prim)
+                };
+                let items: Vec<Item> = (0..count).map(&mut item).collect();
+                for leaf in [1, 8] {
+                    assert_cheapest_is_as_defined::<{ BINS / 2 }>(&items, leaf);
+                    assert_cheapest_is_as_defined::<BINS>(&items, leaf);
+                }
+            }
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! Prims on their way into a tree, and boxes in registers of four lanes.
 
+use crate::accel::Shapes;
 use crate::math::aabb::Aabb;
-use crate::math::triangle::Triangle;
 use crate::math::{Vec3, Vec4};
 use bytemuck::Zeroable;
 
@@ -63,10 +63,12 @@ impl Item {
         Self::numbered(bounds.into(), prim)
     }
 
-    /// A triangle of finite corners.
+    /// Prim `prim` in the box around it.
     #[inline(always)]
-    pub(in crate::accel) fn of_triangle(corners: &Triangle, prim: u32) -> Self {
-        let [a, b, c] = corners.map(|corner| corner.extend(0.0));
+    pub(in crate::accel) fn of(shapes: &Shapes, prim: u32) -> Self {
+        let Some(corners) = shapes.triangles.get(prim as usize) else { return Self::new(shapes.bounds(prim), prim) };
+        // Corners are finite: registers need not take care of what is no number, as `Aabb` does.
+        let [a, b, c] = shapes.corners(*corners).map(|corner| corner.extend(0.0));
         Self::numbered(Bounds { lo: a.min(b).min(c), hi: a.max(b).max(c) }, prim)
     }
 
@@ -108,6 +110,7 @@ pub(in crate::accel) fn around_middles(items: &[Item]) -> Bounds {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::accel::tests::scenes;
 
     #[test]
     fn an_item_keeps_its_prim_and_its_box() {
@@ -116,9 +119,16 @@ mod tests {
             let item = Item::new(bounds, prim);
             assert_eq!((item.prim(), item.bounds().aabb()), (prim, bounds));
             assert!(item.bounds().lo.w.is_normal() && item.bounds().hi.w.is_normal());
-            let corners = [Vec3::new(-1.0, 5.0, 4.0), Vec3::new(4.0, 2.0, 3.0), Vec3::new(2.0, 3.0, 6.5)];
-            let around = Item::of_triangle(&corners, prim);
-            assert_eq!((around.prim(), around.bounds().aabb()), (prim, bounds));
+        }
+    }
+
+    #[test]
+    fn the_item_of_a_prim_has_its_box_whatever_shape_it_is() {
+        for (name, shapes) in scenes::all() {
+            for prim in 0..shapes.bounded() {
+                let item = Item::of(&shapes, prim);
+                assert_eq!((item.prim(), item.bounds().aabb()), (prim, shapes.bounds(prim)), "{name}");
+            }
         }
     }
 }
