@@ -21,8 +21,8 @@ pub(super) struct SamplingArgs {
     /// or what other flags ask for]
     #[arg(long, value_name = "HOW", value_enum, help_heading = "Quality", hide_short_help = true)]
     pub aa: Option<Aa>,
-    /// How good a stochastic picture is to be: draft (error per pixel 0.25, 2 to 64 rays), normal (0.08, 4 to 256) or final
-    /// (0.035, 4 to 1024) [default: normal]
+    /// How good a stochastic picture is to be: draft (error per pixel 0.25, up to 64 rays), normal (0.08, up to 256) or final
+    /// (0.035, up to 1024) [default: normal]
     #[arg(long, value_name = "WORD", value_parser = parse::quality(), help_heading = "Quality")]
     pub quality: Option<Quality>,
     /// Exactly N rays a pixel, at the same places in each (--aa uniform). Costs of pixels (--layers tests, --heatmap) are
@@ -43,8 +43,8 @@ pub(super) struct SamplingArgs {
     #[arg(long, value_name = "PERCENT", value_parser = parse::confidence, help_heading = "Quality", hide_short_help = true)]
     pub confidence: Option<f64>,
     /// Fewest rays of a pixel of stochastic sampling, enough where they and those of its neighbours agree; the next power of
-    /// two is taken. Light, gloss and environment rays are divided by it [default: 4, 2 for drafts]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=65_536), help_heading = "Quality",
+    /// two is taken. Light, gloss and environment rays are divided by it, by 4 at least [default: 1]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536), help_heading = "Quality",
           hide_short_help = true)]
     pub min_samples: Option<u32>,
     /// Most rays of a pixel of stochastic sampling, certain or not; the power of two below is taken

@@ -2,6 +2,7 @@
 
 use super::Settings;
 use super::absorption::Absorption;
+use super::certainty;
 use super::glint;
 use super::sampling::Sampling;
 use super::shade::{Band, LocalLight, bands, lets_light_in};
@@ -21,10 +22,10 @@ const ENV_RAYS: u32 = 16;
 const ENV_RAYS_LEAST: u32 = 6;
 
 /// Samples of a pixel that share the rays which one sample would send from each point: of stochastic sampling as many as
-/// every pixel has, for more rays come with more samples where they are needed.
+/// every pixel has that is not even, for more rays come with more samples where they are needed.
 fn samples_together(settings: &Settings) -> u32 {
     match settings.sampling {
-        Sampling::Stochastic(how) => how.min_samples.min(how.max_samples).max(1),
+        Sampling::Stochastic(how) => how.min_samples.max(certainty::SURE).min(how.max_samples).max(1),
         Sampling::Uniform | Sampling::Adaptive(_) => 1,
     }
 }

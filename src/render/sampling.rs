@@ -76,7 +76,8 @@ pub struct Stochastic {
     pub error: f32,
     /// How certain that is to be: a probability in 0.5…0.9999.
     pub confidence: f64,
-    /// Rays of a pixel when all of them and its neighbours' agree, at least 2; raised to a power of two.
+    /// Rays of a pixel when all of them and its neighbours' agree, at least 1; raised to a power of two. From less than 4 on a
+    /// pixel gets 4 wherever they do not look the same.
     pub min_samples: u32,
     /// Rays of a pixel at most; lowered to a power of two.
     pub max_samples: u32,
@@ -152,9 +153,9 @@ impl Quality {
     /// and metal. Clear glass is just at that for a final picture; thin wires before a far pattern need the next word.
     pub fn stochastic(self) -> Stochastic {
         let (error, min_samples, max_samples) = match self {
-            Self::Draft => (0.25, 2, 64),
-            Self::Normal => (0.08, 4, 256),
-            Self::Final => (0.035, 4, 1024),
+            Self::Draft => (0.25, 1, 64),
+            Self::Normal => (0.08, 1, 256),
+            Self::Final => (0.035, 1, 1024),
         };
         Stochastic {
             error,

@@ -4,8 +4,8 @@
 //! pixel has the same bits beside any others, on every instruction set.
 
 use super::{Certainty, GROUPS, Range, Seen};
-use crate::math::Vec3;
 use crate::math::simd::{Kernel, Simd};
+use crate::math::{Vec3, Vec4};
 use crate::render::frame::Sum;
 
 /// Pixels that are looked at together.
@@ -139,7 +139,7 @@ impl<'g> Beside<'g> {
 
 impl Found {
     fn at(&self, i: usize) -> Seen {
-        let color = |rows: &Rows| rows.map(|row| row[i]);
+        let color = |[r, g, b, a]: &Rows| Vec4::new(r[i], g[i], b[i], a[i]);
         let range = Range { least: color(&self.least), most: color(&self.most), brightest: self.brightest[i] };
         Seen { color: color(&self.color), range, error: self.error[i] }
     }
@@ -174,6 +174,10 @@ impl Kernel for See<'_, '_> {
             for i in 0..PIXELS {
                 to.brightest[i] = to.brightest[i].max(judge.light(&group.at(i)));
             }
+        }
+        if others.is_empty() {
+            (to.color, to.error) = (of_first, [0.0; PIXELS]);
+            return;
         }
         let left = judge.left_out(sums);
         let left = &left[..sums.len().min(GROUPS)];

@@ -16,12 +16,15 @@ mod confidence;
 use super::ErrorSpace;
 use super::frame::Sum;
 use crate::image::{Developer, Output};
-use crate::math::Vec3;
 use crate::math::simd::Level;
+use crate::math::{Vec3, Vec4};
 pub(in crate::render) use confidence::factor;
 
 /// Groups of a pixel's samples.
 pub(super) const GROUPS: usize = 8;
+
+/// Samples that tell by themselves what a pixel shows; one that has fewer must look as those beside it do.
+pub(super) const SURE: u32 = 4;
 
 /// The judge of all pixels of a picture.
 pub(super) struct Certainty<'a> {
@@ -62,7 +65,20 @@ impl<'a> Certainty<'a> {
 
     /// Whether samples in this range agree within the error that is allowed: nothing is seen in the pixel that could be missed.
     pub(super) fn agree(&self, range: &Range) -> bool {
-        (0..4).fold(true, |all, c| all & (range.most[c] - range.least[c] <= self.error))
+        (range.most - range.least).cmple(Vec4::splat(self.error)).all()
+    }
+
+    /// Whether what makes a pixel uneven is thinner than it: of the nine pixels around and with it hardly any is of one of the
+    /// colours that it lies between. An edge has at least three on each side.
+    pub(super) fn is_thin<'s>(&self, own: &Range, around: impl Iterator<Item = &'s Seen>) -> bool {
+        let (wide, middle) = (own.most - own.least, (own.least + own.most) * 0.5);
+        let channel = (0..self.channels()).fold(0, |most, c| if wide[c] > wide[most] { c } else { most });
+        let (mut above, mut below) = (0, 0);
+        for seen in around {
+            above += u32::from(seen.color[channel] > middle[channel]);
+            below += u32::from(seen.color[channel] <= middle[channel]);
+        }
+        above.min(below) < 3
     }
 
     /// The greatest channel of the light of any of these groups, after exposure.
@@ -79,7 +95,8 @@ impl<'a> Certainty<'a> {
     /// How far apart the ends of a range are, the root of the mean over the channels.
     #[expect(clippy::cast_precision_loss, reason = "a handful of channels")]
     pub(super) fn contrast(&self, range: &Range) -> f32 {
-        let squares: f32 = (0..self.channels()).map(|c| (range.most[c] - range.least[c]).max(0.0).powi(2)).sum();
+        let wide = (range.most - range.least).max(Vec4::ZERO);
+        let squares: f32 = (0..self.channels()).map(|c| wide[c] * wide[c]).sum();
         (squares / self.channels() as f32).sqrt()
     }
 
@@ -94,11 +111,25 @@ impl<'a> Certainty<'a> {
         if (self.brightest(groups) - least) * samples >= 0.5 * around { 1.0 } else { around }
     }
 
-    /// Whether two pixels look so different that something may lie between them.
-    pub(super) fn differ(&self, a: [f32; 4], b: [f32; 4]) -> bool {
-        /// Times the error that is allowed: shading changes slower from pixel to pixel.
-        const STEEP: f32 = 8.0;
-        (0..4).fold(false, |any, c| any | ((a[c] - b[c]).abs() > STEEP * self.error))
+    /// Whether a pixel of so many samples looks so different from one beside it that something may lie between them.
+    pub(super) fn differ(&self, a: Vec4, b: Vec4, samples: u32) -> bool {
+        // Times the error that is allowed. Few samples must show next to the same, as they tell nothing else; more may differ,
+        // for shading changes slower than that from pixel to pixel.
+        let steep = match samples {
+            1 => 0.25,
+            2..SURE => 1.0,
+            _ => 8.0,
+        };
+        (a - b).abs().cmpgt(Vec4::splat(steep * self.error)).any()
+    }
+
+    /// Standard error of a pixel of one sample, the root of the mean over its channels, from the range of nine samples: of it and
+    /// of the pixels beside it, which lie farther apart than it is wide.
+    pub(super) fn error_within(&self, nine: &Range) -> f32 {
+        /// What nine numbers lie between is so many times their standard deviation (L. H. C. Tippett, "On the Extreme
+        /// Individuals and the Range of Samples Taken from a Normal Population", 1925).
+        const RANGE: f32 = 2.970;
+        self.contrast(nine) / RANGE
     }
 
     /// What part of the error that is allowed a pixel with this standard error uses, when around it there is such a
@@ -129,7 +160,7 @@ impl<'a> Certainty<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Seen {
     /// Of their mean, to within what bends the tone curve.
-    pub color: [f32; 4],
+    pub color: Vec4,
     /// What they lie between.
     pub range: Range,
     /// Standard error of the mean.
@@ -137,28 +168,28 @@ pub(super) struct Seen {
 }
 
 impl Seen {
-    /// Nothing.
-    pub(super) const NOTHING: Self = Self { color: [0.0; 4], range: Range::NOTHING, error: 0.0 };
+    /// Nothing: it agrees with everything.
+    pub(super) const NOTHING: Self = Self { color: Vec4::NAN, range: Range::NOTHING, error: 0.0 };
 }
 
 /// What the colours of samples lie between, channel by channel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Range {
-    least: [f32; 4],
-    most: [f32; 4],
+    least: Vec4,
+    most: Vec4,
     /// Their brightest channel of light, which may be more than can be written.
     pub brightest: f32,
 }
 
 impl Range {
     /// Of no samples.
-    pub(super) const NOTHING: Self = Self { least: [f32::INFINITY; 4], most: [f32::NEG_INFINITY; 4], brightest: 0.0 };
+    pub(super) const NOTHING: Self = Self { least: Vec4::INFINITY, most: Vec4::NEG_INFINITY, brightest: 0.0 };
 
     /// Of the samples of both.
     pub(super) fn with(self, other: Self) -> Self {
         Self {
-            least: std::array::from_fn(|c| self.least[c].min(other.least[c])),
-            most: std::array::from_fn(|c| self.most[c].max(other.most[c])),
+            least: self.least.min(other.least),
+            most: self.most.max(other.most),
             brightest: self.brightest.max(other.brightest),
         }
     }
@@ -193,6 +224,25 @@ mod tests {
         assert_eq!(standard_error(&judge, &[grey(0.3, 3.0); GROUPS]), 0.0);
         let agree = |samples: &[Sum]| judge.agree(&see(&judge, samples).range);
         assert!(agree(&[grey(0.3, 1.0); 4]) && !agree(&[grey(0.3, 1.0), grey(0.4, 1.0)]));
+    }
+
+    #[test]
+    fn a_wire_is_thin_and_an_edge_is_not() {
+        let judge = Certainty::new(None, None, false, 0.01, factor(0.95));
+        let seen = |colors: [f32; 9]| colors.map(|light| see(&judge, &[grey(light, 1.0)]));
+        let own = see(&judge, &[grey(0.0, 1.0), grey(1.0, 1.0)]);
+        let is_thin = |colors: [f32; 9]| judge.is_thin(&own.range, seen(colors).iter());
+        assert!(!is_thin([0.0, 0.0, 0.0, 0.3, 0.5, 0.9, 1.0, 1.0, 1.0]));
+        assert!(is_thin([0.0, 0.0, 0.0, 0.3, 0.5, 0.9, 0.0, 0.0, 0.0]));
+        assert!(is_thin([1.0, 1.0, 1.0, 1.0, 0.5, 1.0, 1.0, 1.0, 1.0]));
+        // At the border of the picture, an edge with nothing behind it.
+        let mut at_border = seen([0.0, 0.0, 0.0, 0.0, 0.5, 0.0, 1.0, 1.0, 1.0]);
+        at_border[6..].fill(Seen::NOTHING);
+        assert!(judge.is_thin(&own.range, at_border.iter()));
+        // A single sample is as certain as those around it lie together.
+        let nine = seen([0.0, 0.1, 0.2, 0.3, 0.3, 0.3, 0.3, 0.3, 0.2]);
+        let range = nine.iter().fold(Range::NOTHING, |all, seen| all.with(seen.range));
+        assert!((judge.error_within(&range) - 0.3 / 2.97).abs() < 1e-6);
     }
 
     #[test]
