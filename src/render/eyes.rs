@@ -12,12 +12,16 @@ const RUN: usize = 64;
 /// Eye rays, and what they hit.
 #[derive(Debug, Default)]
 pub(crate) struct Eyes {
-    pub rays: Vec<Ray>,
+    /// There are so many; what lies behind in the buffers is left from others.
+    count: usize,
+    rays: Vec<Ray>,
     pub hits: Vec<Hit>,
-    /// Their directions by axis, as long as all start at one place.
+    /// Their directions by axis.
     dirs: [Vec<f32>; 3],
     cone_width: Vec<f32>,
     cone_spread: Vec<f32>,
+    /// Whether all start where the eye is.
+    is_pencil: bool,
 }
 
 /// A lens with an opening: what is not at its focus is blurred.
@@ -183,11 +187,13 @@ impl SeenBall {
 
 impl Eyes {
     pub(crate) fn clear(&mut self) {
-        self.rays.clear();
+        (self.count, self.is_pencil) = (0, true);
         self.hits.clear();
-        self.dirs.iter_mut().for_each(Vec::clear);
-        self.cone_width.clear();
-        self.cone_spread.clear();
+    }
+
+    /// All of them.
+    pub(crate) fn rays(&self) -> &[Ray] {
+        &self.rays[..self.count]
     }
 
     /// Adds the rays of these places; the `i`th ray is that of sample `i`.
@@ -208,24 +214,38 @@ impl Eyes {
     }
 
     fn take(&mut self, eye: &Eye, run: &mut Run) {
+        let start = self.count;
+        self.make_room(start + RUN);
+        self.count += run.count.min(RUN);
+        self.is_pencil &= eye.sees_from_one_place();
+        let Some(rays) = from(&mut self.rays, start) else { return };
         #[expect(clippy::cast_possible_truncation, reason = "a wave has few samples")]
-        Level::best().run(Aim { eye, run, sample: self.rays.len() as u32 });
-        let count = run.count.min(RUN);
-        if eye.sees_from_one_place() {
-            self.dirs.iter_mut().zip(&run.dir).for_each(|(dirs, run)| dirs.extend_from_slice(&run[..count]));
+        Level::best().run(Aim { eye, run, rays, sample: start as u32 });
+        let cones = [(&mut self.cone_width, &run.cone_width), (&mut self.cone_spread, &run.cone_spread)];
+        for (to, numbers) in self.dirs.iter_mut().zip(&run.dir).chain(cones) {
+            from(to, start).into_iter().for_each(|to| *to = *numbers);
         }
-        self.rays.extend_from_slice(&run.rays[..count]);
-        self.cone_width.extend_from_slice(&run.cone_width[..count]);
-        self.cone_spread.extend_from_slice(&run.cone_spread[..count]);
         run.count = 0;
+    }
+
+    /// Makes buffers that hold so many, if they are shorter. They stay as long: what is written is not cleared before.
+    fn make_room(&mut self, count: usize) {
+        if self.rays.len() < count {
+            let count = count.next_power_of_two();
+            self.rays.resize(count, ray(Vec3::ZERO, Vec3::ZERO, 0));
+            for numbers in self.dirs.iter_mut().chain([&mut self.cone_width, &mut self.cone_spread]) {
+                numbers.resize(count, 0.0);
+            }
+        }
     }
 
     /// The rays, as a pencil if they are one, and room for a hit of each.
     pub(crate) fn ask(&mut self) -> (&[Ray], Option<Pencil<'_>>, &mut [Hit]) {
-        let Self { rays, hits, dirs, .. } = self;
-        hits.resize(rays.len(), Hit::MISS);
-        let first = rays.first().filter(|_| dirs[0].len() == rays.len());
-        let pencil = first.map(|ray| Pencil { origin: ray.origin, dirs: dirs.each_ref().map(Vec::as_slice) });
+        let Self { count, rays, hits, dirs, is_pencil, .. } = self;
+        let rays = &rays[..*count];
+        hits.resize(*count, Hit::MISS);
+        let first = rays.first().filter(|_| *is_pencil);
+        let pencil = first.map(|ray| Pencil { origin: ray.origin, dirs: dirs.each_ref().map(|row| &row[..*count]) });
         (rays, pencil, hits)
     }
 
@@ -240,7 +260,12 @@ impl Eyes {
     }
 }
 
-/// Rays by number and place.
+/// As many elements as a run has, from one on.
+fn from<T>(buffer: &mut [T], start: usize) -> Option<&mut [T; RUN]> {
+    buffer.get_mut(start..)?.first_chunk_mut()
+}
+
+/// Places by number, and what is found of their rays, which compilers make lanes of as long as it lies in one structure.
 struct Run {
     count: usize,
     x: [f64; RUN],
@@ -250,7 +275,6 @@ struct Run {
     dir: [[f32; RUN]; 3],
     cone_width: [f32; RUN],
     cone_spread: [f32; RUN],
-    rays: [Ray; RUN],
 }
 
 impl Default for Run {
@@ -264,7 +288,6 @@ impl Default for Run {
             dir: [[0.0; RUN]; 3],
             cone_width: [0.0; RUN],
             cone_spread: [0.0; RUN],
-            rays: [ray(Vec3::ZERO, Vec3::ZERO, 0); RUN],
         }
     }
 }
@@ -272,6 +295,8 @@ impl Default for Run {
 struct Aim<'a> {
     eye: &'a Eye<'a>,
     run: &'a mut Run,
+    /// Where the rays go.
+    rays: &'a mut [Ray; RUN],
     /// That of the first ray.
     sample: u32,
 }
@@ -281,7 +306,7 @@ impl Kernel for Aim<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Self { eye, run, sample } = self;
+        let Self { eye, run, rays, sample } = self;
         let view = *eye.view;
         let eye = Eye { view: &view, ..*eye };
         // What all rays share is decided outside the loop, which then is a formula.
@@ -297,7 +322,7 @@ impl Kernel for Aim<'_> {
             (_, None) => run.each(&eye, |ray, _| eye.start(ray)),
             (_, Some(lens)) => run.each(&eye, |ray, at| eye.start(eye.through(lens, ray, at))),
         }
-        run.write_rays(s, sample);
+        run.write_rays(s, rays, sample);
     }
 }
 
@@ -316,17 +341,17 @@ impl Run {
 
     /// Rays from their columns, as they lie in memory: four numbers at a time.
     #[inline(always)]
-    fn write_rays<S: Simd>(&mut self, s: S, mut sample: u32) {
+    fn write_rays<S: Simd>(&self, s: S, rays: &mut [Ray; RUN], mut sample: u32) {
         let (zero, infinite) = (s.splat(0.0), s.splat(f32::INFINITY));
         let eights = self.count.div_ceil(LANES).min(RUN / LANES);
-        for (k, rays) in self.rays.as_chunks_mut::<LANES>().0[..eights].iter_mut().enumerate() {
+        for (k, rays) in rays.as_chunks_mut::<LANES>().0[..eights].iter_mut().enumerate() {
             let eight = |row: &[f32; RUN]| row.as_chunks::<LANES>().0[k];
             let [ox, oy, oz] = [eight(&self.origin[0]), eight(&self.origin[1]), eight(&self.origin[2])];
             let [dx, dy, dz] = [eight(&self.dir[0]), eight(&self.dir[1]), eight(&self.dir[2])];
             let from = s.rows([s.load(&ox), s.load(&oy), s.load(&oz), zero]);
-            let to = s.rows([s.load(&dx), s.load(&dy), s.load(&dz), infinite]);
-            for (ray, (from, to)) in rays.iter_mut().zip(from.into_iter().zip(to)) {
-                *ray = Ray::from_fours([from, to], NO_PRIM, sample);
+            let towards = s.rows([s.load(&dx), s.load(&dy), s.load(&dz), infinite]);
+            for (ray, (from, towards)) in rays.iter_mut().zip(from.into_iter().zip(towards)) {
+                *ray = Ray::from_fours([from, towards], NO_PRIM, sample);
                 sample += 1;
             }
         }
@@ -381,7 +406,8 @@ mod tests {
             };
             let mut eyes = Eyes::default();
             eyes.send(&eye, (0..100).map(place));
-            for (i, ray) in (0..100).zip(&eyes.rays) {
+            assert_eq!(eyes.rays().len(), 100);
+            for (i, ray) in (0..100).zip(eyes.rays()) {
                 assert_eq!(*ray, eye.ray(place(i)).with_path(i).0, "{lens:?}");
             }
         }

@@ -205,7 +205,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     /// Adds what rays that met nothing see.
     fn see_surroundings(&mut self, eyes: &Eyes) {
         let mut missed = std::mem::take(&mut self.missed);
-        let rays = missed.iter().map(|&i| (i, eyes.rays[i as usize].dir, eyes.cone_spread(i as usize)));
+        let rays = missed.iter().map(|&i| (i, eyes.rays()[i as usize].dir, eyes.cone_spread(i as usize)));
         self.context.sky.each_radiance(rays, |i, radiance| self.samples[i as usize].radiance += radiance);
         missed.clear();
         self.missed = missed;
@@ -226,7 +226,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
 
     /// Shades what the `i`th eye ray has hit.
     fn shade_eye(&mut self, eyes: &Eyes, i: usize) {
-        self.shade(RayClass::Primary, &eyes.rays[i], &eyes.path(i), &eyes.hits[i]);
+        self.shade(RayClass::Primary, &eyes.rays()[i], &eyes.path(i), &eyes.hits[i]);
     }
 
     /// Shades points of one instance side by side, as [`Self::shade`] does one by one.
@@ -239,7 +239,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             hits.iter().for_each(|&(ray, _)| self.shade_eye(eyes, ray as usize));
             return;
         }
-        strip.take(hits, sorted.faces(), &eyes.rays, &eyes.hits, smooth);
+        strip.take(hits, sorted.faces(), eyes.rays(), &eyes.hits, smooth);
         strip.find(smooth.then(|| context.world.placement(instance)));
         if reads {
             strip.read(context, eyes, mesh.material, common);
@@ -261,7 +261,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             }
             strip.send(&mut self.shadows, outside);
             for (i, radiance) in strip.grazed() {
-                let (ray, hit) = (&eyes.rays[i as usize], &eyes.hits[i as usize]);
+                let (ray, hit) = (&eyes.rays()[i as usize], &eyes.hits[i as usize]);
                 if let Some(feelers) = feelers(context, light, ray, hit) {
                     self.shadows.push_feelers(&feelers, radiance, outside);
                 }
