@@ -188,7 +188,6 @@ impl SeenBall {
 impl Eyes {
     pub(crate) fn clear(&mut self) {
         (self.count, self.is_pencil) = (0, true);
-        self.hits.clear();
     }
 
     /// All of them.
@@ -243,6 +242,7 @@ impl Eyes {
     pub(crate) fn ask(&mut self) -> (&[Ray], Option<Pencil<'_>>, &mut [Hit]) {
         let Self { count, rays, hits, dirs, is_pencil, .. } = self;
         let rays = &rays[..*count];
+        // Whoever is asked writes each of them.
         hits.resize(*count, Hit::MISS);
         let first = rays.first().filter(|_| *is_pencil);
         let pencil = first.map(|ray| Pencil { origin: ray.origin, dirs: dirs.each_ref().map(|row| &row[..*count]) });
