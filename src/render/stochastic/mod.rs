@@ -36,7 +36,7 @@ pub(super) fn render<A: Accel, P: Observer>(
     let output = output(how.space, frame.background);
     let transparent = matches!(tracer.context.scene.background, None | Some(Background::Transparent));
     let judge = Certainty::new(output.as_ref(), frame.background, transparent, how.error, frame.standard_errors);
-    let rounds: Vec<u32> = rounds(how).collect();
+    let rounds: Vec<u32> = rounds(how, frame.settings).collect();
     let rings = rings(tile, frame.settings, &rounds);
     let mut pixels = pixels(&rings, frame.settings);
     let mut around = Around::new(rings[rings.len() - 1], &pixels);
@@ -81,9 +81,11 @@ pub(super) fn render<A: Accel, P: Observer>(
 
 /// Samples of a pixel after each round: the fewest, but then at least [`SURE`], then twice as many from round to round,
 /// powers of two throughout, as these many points of the sequence lie most evenly.
-fn rounds(how: &Stochastic) -> impl Iterator<Item = u32> {
+fn rounds(how: &Stochastic, settings: &Settings) -> impl Iterator<Item = u32> + use<> {
     let most = 1 << how.max_samples.max(1).ilog2();
-    let fewest = how.min_samples.max(1).checked_next_power_of_two().unwrap_or(most).min(most);
+    // In a single row or column there are not enough pixels beside one.
+    let least = if settings.width.min(settings.height) < 2 { SURE } else { 1 };
+    let fewest = how.min_samples.max(least).checked_next_power_of_two().unwrap_or(most).min(most);
     std::iter::successors(Some(fewest), move |&last| (last < most).then(|| (2 * last).max(SURE).min(most)))
 }
 
@@ -200,12 +202,16 @@ mod tests {
 
     #[test]
     fn rounds_double_and_end_at_the_most() {
-        let rounds = |min_samples, max_samples| {
-            super::rounds(&Stochastic { min_samples, max_samples, ..Stochastic::default() }).collect::<Vec<_>>()
+        let rounds_of = |min_samples, max_samples, height| {
+            let settings = Settings { width: 16, height, ..Settings::default() };
+            super::rounds(&Stochastic { min_samples, max_samples, ..Stochastic::default() }, &settings)
+                .collect::<Vec<_>>()
         };
+        let rounds = |min_samples, max_samples| rounds_of(min_samples, max_samples, 9);
         assert_eq!(rounds(1, 64), [1, 4, 8, 16, 32, 64]);
         assert_eq!(rounds(2, 8), [2, 4, 8]);
         assert_eq!(rounds(1, 2), [1, 2]);
+        assert_eq!(rounds_of(1, 16, 1), [4, 8, 16], "of a single row");
         assert_eq!(rounds(4, 256), [4, 8, 16, 32, 64, 128, 256]);
         assert_eq!(rounds(4, 100), [4, 8, 16, 32, 64]);
         assert_eq!(rounds(30, 256), [32, 64, 128, 256]);
