@@ -239,7 +239,12 @@ mod tests {
         let mut at_border = seen([0.0, 0.0, 0.0, 0.0, 0.5, 0.0, 1.0, 1.0, 1.0]);
         at_border[6..].fill(Seen::NOTHING);
         assert!(judge.is_thin(&own.range, at_border.iter()));
-        // A single sample is as certain as those around it lie together.
+    }
+
+    #[test]
+    fn a_single_sample_is_as_certain_as_those_around_it_lie_together() {
+        let judge = Certainty::new(None, None, false, 0.01, factor(0.95));
+        let seen = |colors: [f32; 9]| colors.map(|light| see(&judge, &[grey(light, 1.0)]));
         let nine = seen([0.0, 0.1, 0.2, 0.3, 0.3, 0.3, 0.3, 0.3, 0.2]);
         let range = nine.iter().fold(Range::NOTHING, |all, seen| all.with(seen.range));
         assert!((judge.error_within(&range) - 0.3 / 2.97).abs() < 1e-6);

@@ -46,8 +46,8 @@ pub(super) fn render<A: Accel, P: Observer>(
         trace(frame, how, tracer, &mut pixels, &active, from..to)?;
         if round < looks(&rounds) {
             around.see(&judge, &pixels, &active);
-            let mut news = active.clone();
-            while from > 0 && !news.is_empty() {
+            let mut news = if from > 0 { active.clone() } else { Vec::new() };
+            while !news.is_empty() {
                 news = around.reopen(&judge, &mut pixels[..rings[1].pixels()], &news, from);
                 trace(frame, how, tracer, &mut pixels, &news, from..to)?;
                 around.see(&judge, &pixels, &news);
