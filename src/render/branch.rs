@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::draws::{Purpose, Spread};
-use super::glint;
+use super::glint::{self, MIRROR};
 use super::observer::Observer;
 use super::optics::{dispersed_index, reflect, refract};
 use super::shade::{Balance, Lobe, Matter, above, has_inside, lets_light_in};
@@ -11,9 +11,6 @@ use super::wave::{Crossing, Medium, Path, RayClass};
 use super::whitted::Tracer;
 use crate::accel::{Accel, Hit, Ray};
 use crate::math::Vec3;
-
-/// How many times as far as its normals a mirror turns directions.
-const MIRROR: f32 = 2.0;
 
 /// A shaded point and the ray that found it.
 pub(super) struct Point<'a> {

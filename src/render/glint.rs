@@ -19,6 +19,8 @@ const OF_PIXEL: f32 = 0.25;
 const OF_SAMPLE: f32 = 0.5;
 /// Growth of a cone beyond which it says nothing any more.
 const WIDEST_CONE: f32 = 1.0;
+/// How many times as far as its normals a mirror turns directions.
+pub(super) const MIRROR: f32 = 2.0;
 
 /// How far highlights are spread, in widths of a ray's cone.
 pub(super) fn reach(settings: &Settings) -> f32 {
@@ -28,17 +30,28 @@ pub(super) fn reach(settings: &Settings) -> f32 {
 /// The squared width α² of a highlight on `surface` at least, seen along a ray whose cone grows by `spread`: twice the
 /// variance of the slopes of halfway directions along each axis, since GGX has α² where a Gaussian has that.
 pub(super) fn least_square(surface: &Surface, context: &Context, spread: f32) -> f32 {
-    let reach = context.highlight_reach;
+    least_of(surface.turning(context, context.highlight_reach), spread, context.highlight_reach)
+}
+
+/// The same where normals turn so far within reach: the squares of the angles, summed over both axes.
+#[inline(always)]
+pub(super) fn least_of(turning: f32, spread: f32, reach: f32) -> f32 {
     // The direction to the eye turns over the cone, and the halfway direction half as far, along both axes.
     let eye = spread * reach;
-    surface.turning(context, reach) + 0.5 * eye * eye
+    turning + 0.5 * eye * eye
 }
 
 /// Growth of a ray's cone behind a surface that bends it, by how far normals turn within it; `factor` says how many times
 /// as far directions turn, 2 for mirrors.
 pub(super) fn bent(surface: &Surface, context: &Context, spread: f32, factor: f32) -> f32 {
     let [along, across] = surface.bends(context);
-    let turned = (0.5 * (along.length_squared() + across.length_squared())).sqrt();
+    behind(along.length_squared() + across.length_squared(), spread, factor)
+}
+
+/// The same where normals turn so far over the cone: the squares of the angles, summed over both axes.
+#[inline(always)]
+pub(super) fn behind(bend: f32, spread: f32, factor: f32) -> f32 {
+    let turned = (0.5 * bend).sqrt();
     let spread = spread + factor * turned;
     // What is not a number, at the tip of a cone, is as wide as can be.
     if spread < WIDEST_CONE { spread } else { WIDEST_CONE }

@@ -3,20 +3,20 @@
 use super::curve::Curve;
 use super::texture::{ColorSpace, TextureStore};
 use super::world::Placement;
-use crate::math::{Vec2, Vec3, Vec4};
-use crate::scene::{Material, Mesh, TextureRef};
+use crate::math::{DVec3, Vec2, Vec3, Vec4};
+use crate::scene::{Material, Mesh, TextureRef, UvTransform};
 use std::cell::Cell;
 
 /// How the weights of a triangle's second and third corner grow along its plane, per world unit.
 #[derive(Clone, Copy)]
-pub(super) struct Gradients {
+pub(crate) struct Gradients {
     pub second: Vec3,
     pub third: Vec3,
 }
 
 impl Gradients {
     /// Zero for a triangle without area.
-    pub(super) fn new([a, b, c]: [Vec3; 3]) -> Self {
+    pub(crate) fn new([a, b, c]: [Vec3; 3]) -> Self {
         let (e1, e2) = (b - a, c - a);
         let normal = e1.cross(e2);
         let inverse = 1.0 / normal.length_squared();
@@ -25,6 +25,40 @@ impl Gradients {
         }
         Self { second: e2.cross(normal) * inverse, third: normal.cross(e1) * inverse }
     }
+
+    /// How coordinates of the corners change along the axes of a footprint.
+    #[inline(always)]
+    pub(crate) fn of_coordinates(&self, edges: [Vec2; 2], print: &Footprint) -> [Vec2; 2] {
+        let change = |v: Vec3| edges[0] * self.second.dot(v) + edges[1] * self.third.dot(v);
+        [change(print.along), change(print.across)]
+    }
+
+    /// How the mesh's own normal, of unit length, turns along two ways in the plane of the triangle, by the normals of its
+    /// corners, which differ, and their weights.
+    #[inline(always)]
+    pub(crate) fn of_normal(
+        &self,
+        placement: &Placement,
+        [a, b, c]: [Vec3; 3],
+        [wa, wb, wc]: [f32; 3],
+        ways: [Vec3; 2],
+    ) -> [Vec3; 2] {
+        let normal = turned(placement, a * wa + b * wb + c * wc);
+        let length = normal.length();
+        let (second, third) = (turned(placement, b - a) / length, turned(placement, c - a) / length);
+        let normal = normal / length;
+        let along = |way: Vec3| {
+            let change = second * f64::from(self.second.dot(way)) + third * f64::from(self.third.dot(way));
+            let change = (change - normal * normal.dot(change)).as_vec3();
+            if change.is_finite() { change } else { Vec3::ZERO }
+        };
+        [along(ways[0]), along(ways[1])]
+    }
+}
+
+#[inline(always)]
+fn turned(placement: &Placement, normal: Vec3) -> DVec3 {
+    placement.normal_from_object * normal.as_dvec3()
 }
 
 /// The part of a mesh around a hit: three corners and their weights.
@@ -116,15 +150,14 @@ impl Patch<'_> {
         let Some(set) = self.mesh.uvs.get(map.uv_set as usize) else {
             return Coordinates { uv: Vec2::ZERO, along: Vec2::ZERO, across: Vec2::ZERO, edges: [Vec2::ZERO; 2] };
         };
-        let turn = Turn::new(map);
+        let turn = Turn::new(&map.transform);
         let [a, b, c] = self.corners;
         let corner = |i: u32| set.get(i as usize).map_or(Vec2::ZERO, |&uv| turn.apply(uv));
         let (a, b, c) = (corner(a), corner(b), corner(c));
         let edges = [b - a, c - a];
-        let gradients = Gradients::new(self.vertices);
-        let change = |v: Vec3| edges[0] * gradients.second.dot(v) + edges[1] * gradients.third.dot(v);
+        let [along, across] = Gradients::new(self.vertices).of_coordinates(edges, &self.print);
         let uv = a * self.weights[0] + b * self.weights[1] + c * self.weights[2] + map.transform.offset;
-        Coordinates { uv, along: change(self.print.along), across: change(self.print.across), edges }
+        Coordinates { uv, along, across, edges }
     }
 
     /// Interpolated shading normal, world space, on the side of the mesh's own normals.
@@ -155,38 +188,19 @@ impl Patch<'_> {
 
     /// How the mesh's own normal, of unit length, turns along two ways in the plane of the triangle; zero where it is flat.
     pub(super) fn bends(&self, ways: [Vec3; 2]) -> [Vec3; 2] {
-        let Some([a, b, c]) = self.corner_normals().filter(|&normals| differ(normals)) else { return [Vec3::ZERO; 2] };
-        let [wa, wb, wc] = self.weights;
-        let turned = |normal: Vec3| self.placement.normal_from_object * normal.as_dvec3();
-        let normal = turned(a * wa + b * wb + c * wc);
-        let length = normal.length();
-        let (second, third) = (turned(b - a) / length, turned(c - a) / length);
-        let normal = normal / length;
-        let gradients = Gradients::new(self.vertices);
-        ways.map(|way| {
-            let change = second * f64::from(gradients.second.dot(way)) + third * f64::from(gradients.third.dot(way));
-            let change = (change - normal * normal.dot(change)).as_vec3();
-            if change.is_finite() { change } else { Vec3::ZERO }
-        })
+        let Some(normals) = self.corner_normals().filter(|&normals| differ(normals)) else { return [Vec3::ZERO; 2] };
+        Gradients::new(self.vertices).of_normal(self.placement, normals, self.weights, ways)
     }
 
     /// How far a normal map turns the normal in `reach` of both axes of a footprint: the squares of the angles, summed.
     pub(super) fn turning_of_map(&self, map: &TextureRef, scale: f32, store: &TextureStore, reach: f32) -> f32 {
         let at = self.coordinates(map);
-        let changes = store.changes(map.texture, at.uv, [at.along, at.across], reach);
-        let scale = Vec3::new(scale, scale, 1.0);
-        // Components run from -1 to 1, texels from 0 to 1.
-        changes.map(|change| 4.0 * (change.truncate() * scale).length_squared()).iter().sum()
+        turning_of(store.changes(map.texture, at.uv, [at.along, at.across], reach), scale)
     }
 
     /// Tangent and bitangent, unit and perpendicular to `normal`: those of the mesh, or those of the coordinates.
     pub(super) fn tangents(&self, normal: Vec3, map: &TextureRef) -> Option<(Vec3, Vec3)> {
-        let given = self.mix(&self.mesh.tangents).and_then(|t| {
-            let along = (self.placement.world_from_object * t.truncate().as_dvec3()).as_vec3();
-            // A mirrored instance turns the frame's handedness round.
-            let sign = if (t.w < 0.0) == self.placement.mirrored { 1.0 } else { -1.0 };
-            Some((perpendicular(along, normal)?, sign))
-        });
+        let given = self.mix(&self.mesh.tangents).and_then(|t| given_tangent(self.placement, t, normal));
         let (tangent, sign) = given.or_else(|| self.tangent_of_coordinates(normal, map))?;
         Some((tangent, normal.cross(tangent) * sign))
     }
@@ -215,9 +229,9 @@ impl Patch<'_> {
         scale: f32,
         store: &TextureStore,
     ) -> Option<Vec3> {
-        let texel = self.texel(map, ColorSpace::Linear, store).truncate() * 2.0 - 1.0;
+        let texel = self.texel(map, ColorSpace::Linear, store).truncate();
         let (tangent, bitangent) = self.tangents(normal, map)?;
-        (tangent * (texel.x * scale) + bitangent * (texel.y * scale) + normal * texel.z).try_normalize()
+        turned_by_texel(normal, [tangent, bitangent], texel, scale)
     }
 
     /// The normal as the material's bump map turns it: by the slope of the heights, from differences one texel wide.
@@ -244,25 +258,52 @@ pub(super) fn differ([a, b, c]: [Vec3; 3]) -> bool {
     a != b || a != c
 }
 
+/// The tangent that a file gives, mixed of those of the corners, perpendicular to `normal` and of unit length, and the sign
+/// of its bitangent.
+#[inline(always)]
+pub(crate) fn given_tangent(placement: &Placement, mixed: Vec4, normal: Vec3) -> Option<(Vec3, f32)> {
+    let along = (placement.world_from_object * mixed.truncate().as_dvec3()).as_vec3();
+    // A mirrored instance turns the frame's handedness round.
+    let sign = if (mixed.w < 0.0) == placement.mirrored { 1.0 } else { -1.0 };
+    Some((perpendicular(along, normal)?, sign))
+}
+
+/// A normal as a texel of a normal map, whose x and y are scaled, turns it between its tangent and bitangent.
+#[inline(always)]
+pub(crate) fn turned_by_texel(normal: Vec3, [tangent, bitangent]: [Vec3; 2], texel: Vec3, scale: f32) -> Option<Vec3> {
+    let texel = texel * 2.0 - 1.0;
+    (tangent * (texel.x * scale) + bitangent * (texel.y * scale) + normal * texel.z).try_normalize()
+}
+
+/// How far a normal map turns the normal where its texels change so much along two ways: the squares of the angles, summed.
+#[inline(always)]
+pub(crate) fn turning_of([along, across]: [Vec4; 2], scale: f32) -> f32 {
+    let scale = Vec3::new(scale, scale, 1.0);
+    // Components run from -1 to 1, texels from 0 to 1.
+    let turning = |change: Vec4| 4.0 * (change.truncate() * scale).length_squared();
+    turning(along) + turning(across)
+}
+
 /// The linear part of a texture transform; the offset is added once, after interpolation.
-struct Turn {
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Turn {
     x_axis: Vec2,
     y_axis: Vec2,
 }
 
 impl Turn {
-    fn new(map: &TextureRef) -> Self {
-        let t = &map.transform;
+    pub(crate) fn new(t: &UvTransform) -> Self {
         let (sin, cos) = if t.rotation == 0.0 { (0.0, 1.0) } else { libm::sincosf(t.rotation) };
         Self { x_axis: Vec2::new(cos, -sin) * t.scale.x, y_axis: Vec2::new(sin, cos) * t.scale.y }
     }
 
-    fn apply(&self, uv: Vec2) -> Vec2 {
+    pub(crate) fn apply(&self, uv: Vec2) -> Vec2 {
         self.x_axis * uv.x + self.y_axis * uv.y
     }
 }
 
 /// `v` without its part along `normal`, of unit length.
+#[inline(always)]
 fn perpendicular(v: Vec3, normal: Vec3) -> Option<Vec3> {
     (v - normal * normal.dot(v)).try_normalize()
 }

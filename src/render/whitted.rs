@@ -235,26 +235,28 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let mesh = &context.scene.meshes[context.scene.instances[instance as usize].mesh as usize];
         let Some(common) = &context.common[mesh.material as usize] else { return };
         let (smooth, reads) = (!mesh.normals.is_empty(), common.mapped || !mesh.colors.is_empty());
-        if reads && strip.reads_in_vain(mesh.material) {
-            hits.iter().for_each(|&(ray, _)| self.shade_eye(eyes, ray as usize));
-            return;
+        let (matter, shiny, placement) = (&common.matter, common.shiny, context.world.placement(instance));
+        strip.take(hits, sorted, eyes.rays(), &eyes.hits, smooth);
+        strip.find(smooth.then_some(placement));
+        if reads || shiny {
+            strip.widen(eyes);
         }
-        strip.take(hits, sorted.faces(), eyes.rays(), &eyes.hits, smooth);
-        strip.find(smooth.then(|| context.world.placement(instance)));
         if reads {
-            strip.read(context, eyes, mesh.material, common);
+            strip.read(context, eyes, (mesh, placement), common);
+        }
+        if shiny {
+            strip.bend(context, matter, smooth.then_some(placement));
         }
         for index in strip.left_out(common.one_sided) {
             self.shade_eye(eyes, index as usize);
         }
-        let matter = &common.matter;
         if !context.is_dark || matter.shines() {
             strip.look_around(matter, &context.sky, context.scene.ambient);
             strip.shown().for_each(|(i, everywhere)| self.add(i, everywhere));
         }
         let outside = context.absorption.is_some().then(Media::default);
         for light in &context.lights {
-            strip.shine(matter, light);
+            strip.shine((matter, shiny), light);
             if !light.shadows {
                 strip.shone().for_each(|(i, radiance)| self.add(i, radiance));
                 continue;
@@ -266,6 +268,9 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
                     self.shadows.push_feelers(&feelers, radiance, outside);
                 }
             }
+        }
+        if shiny && context.depth > 0 {
+            strip.mirror(context, matter, &mut self.starting[RayClass::Reflected as usize]);
         }
         if self.shadows.len() >= SHADOW_LIMIT {
             self.trace_shadows();

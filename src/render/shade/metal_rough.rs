@@ -12,7 +12,7 @@
 
 use super::facets::{AlbedoRow, albedo, rebound};
 use super::{Balance, GrainMatter, Reader, Seen, Sky, film};
-use crate::math::Vec3;
+use crate::math::{Vec3, Vec4};
 use crate::render::optics::{fresnel_dielectric, fresnel_schlick, transmittance};
 use crate::render::wave::Crossing;
 use crate::scene::{Film, MetalRough, Translucence};
@@ -74,6 +74,19 @@ pub(crate) struct MetalRoughPaint {
     pub occlusion: f32,
 }
 
+impl MetalRoughPaint {
+    /// From the base colour, the share of the surroundings that is open, and what the map of roughness and metalness says.
+    #[inline(always)]
+    pub(crate) fn of(m: &MetalRough, base: Vec3, occlusion: f32, map: Vec4) -> Self {
+        Self {
+            base: base.max(Vec3::ZERO),
+            metallic: (m.metallic * map.z).clamp(0.0, 1.0),
+            roughness: (m.roughness * map.y).clamp(0.0, 1.0),
+            occlusion: occlusion.clamp(0.0, 1.0),
+        }
+    }
+}
+
 /// What a point sees of its surroundings.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Around {
@@ -106,16 +119,17 @@ fn inside(m: &MetalRough, reader: &Reader) -> Vec3 {
 
 impl MetalRoughMatter {
     pub(super) fn new(m: &MetalRough, base: Vec3, occlusion: f32, reader: &Reader) -> Self {
-        let map = reader.linear(m.metal_rough_map.as_ref());
+        let paint = MetalRoughPaint::of(m, base, occlusion, reader.linear(m.metal_rough_map.as_ref()));
+        let MetalRoughPaint { base, metallic, roughness, occlusion } = paint;
         let specular = m.specular * reader.linear(m.specular_map.as_ref()).w;
         let color = m.specular_color * reader.srgb(m.specular_color_map.as_ref());
         let at_normal = (m.ior - 1.0) / (m.ior + 1.0);
         Self {
-            base: base.max(Vec3::ZERO),
-            metal_f0: base.max(Vec3::ZERO),
+            base,
+            metal_f0: base,
             filmed: false,
-            metallic: (m.metallic * map.z).clamp(0.0, 1.0),
-            roughness: (m.roughness * map.y).clamp(0.0, 1.0),
+            metallic,
+            roughness,
             roughness_along: 0.0,
             sent_back: 1.0,
             by_rays: false,
@@ -124,7 +138,7 @@ impl MetalRoughMatter {
             transmission: (m.transmission * reader.linear(m.transmission_map.as_ref()).x).clamp(0.0, 1.0),
             share: 0.0,
             through: Vec3::ZERO,
-            occlusion: occlusion.clamp(0.0, 1.0),
+            occlusion,
             ior: m.ior,
             thick: m.thick,
             inside: inside(m, reader),
@@ -185,13 +199,26 @@ impl MetalRoughMatter {
     }
 
     /// Whether its highlights are narrow.
+    #[inline(always)]
     pub(super) fn has_narrow_highlight(&self) -> bool {
-        self.roughness < NARROW_HIGHLIGHT
+        is_narrow(self.roughness)
     }
 
     /// Widens the highlights of lights to this α².
     pub(super) fn widen_highlight(&mut self, to: f32) {
         self.least_square = least_square(self.roughness, to);
+    }
+
+    /// α² of the highlights of lights at least, where narrow ones must be as wide as `to`; 0 where they are not narrow.
+    #[inline(always)]
+    pub(crate) fn least_square(&self, to: f32) -> f32 {
+        if self.has_narrow_highlight() { least_square(self.roughness, to) } else { 0.0 }
+    }
+
+    /// The same with highlights of this α² at least.
+    #[inline(always)]
+    pub(crate) fn at_least(&self, least_square: f32) -> Self {
+        Self { least_square, ..*self }
     }
 
     /// Shares of f0 and f90 in what its lobe sends back.
@@ -381,9 +408,21 @@ impl MetalRoughMatter {
             open = 1.0 - dielectric.max_element();
         }
         Balance {
-            reflected: dielectric.lerp(metal, self.metallic) * self.traced(outside),
+            reflected: self.mirrored(dielectric, metal, outside),
             refracted: self.passed(open) * (1.0 - self.frosted(outside)),
         }
+    }
+
+    #[inline(always)]
+    fn mirrored(&self, dielectric: Vec3, metal: Vec3, outside: bool) -> Vec3 {
+        dielectric.lerp(metal, self.metallic) * self.traced(outside)
+    }
+
+    /// The weight of the mirror ray of what lets no light in.
+    #[inline(always)]
+    pub(crate) fn reflected(&self, cosine: f32) -> Vec3 {
+        let (dielectric, metal) = self.fresnel(cosine);
+        self.mirrored(dielectric, metal, true)
     }
 
     /// What passes through of the light along one direction when `open` of it enters.
@@ -438,8 +477,15 @@ pub(super) fn squared_width(roughness: f32) -> f32 {
     alpha * alpha
 }
 
+/// Whether a roughness makes highlights of lights that must be widened.
+#[inline(always)]
+pub(crate) fn is_narrow(roughness: f32) -> bool {
+    roughness < NARROW_HIGHLIGHT
+}
+
 /// What that is at least where it should be `to`: all of it where roughness makes it narrow, up to what is wide, and less and
 /// less where roughness makes it wide by itself.
+#[inline(always)]
 pub(super) fn least_square(roughness: f32, to: f32) -> f32 {
     /// α² of a roughness of 0.7.
     const WIDE: f32 = 0.24;

@@ -20,7 +20,7 @@ pub(crate) use facets::{AlbedoRow, albedo};
 pub(crate) use grain::GrainMatter;
 pub(crate) use light::{Incident, LocalLight, way};
 pub(crate) use lobe::Lobe;
-pub(crate) use metal_rough::{Around, MetalRoughMatter, MetalRoughPaint, above, open};
+pub(crate) use metal_rough::{Around, MetalRoughMatter, MetalRoughPaint, above, is_narrow, open};
 pub(crate) use phong::{PhongMatter, PhongPaint};
 pub(crate) use sheen::SheenMatter;
 pub(crate) use spectrum::{Band, bands};
@@ -111,9 +111,15 @@ impl Reader<'_> {
         let map = self.read(material.base_color_map.as_ref(), ColorSpace::Srgb);
         let opacity_map = self.linear(material.opacity_map.as_ref()).x;
         let vertex = self.patch.map_or(Vec4::ONE, Patch::color);
-        let base = material.base_color.extend(material.opacity * opacity_map) * map * vertex;
-        if base.is_finite() { base } else { Vec4::ONE }
+        base_color(material, map, opacity_map, vertex)
     }
+}
+
+/// Base colour and opacity: factors × maps × vertex colour.
+#[inline(always)]
+pub(crate) fn base_color(material: &Material, map: Vec4, opacity_map: f32, vertex: Vec4) -> Vec4 {
+    let base = material.base_color.extend(material.opacity * opacity_map) * map * vertex;
+    if base.is_finite() { base } else { Vec4::ONE }
 }
 
 impl Matter {
@@ -147,7 +153,8 @@ impl Matter {
         self.sheen = m.sheen.as_ref().and_then(|sheen| SheenMatter::new(sheen, n_v, reader));
         if let Some(coat) = &m.coat {
             let normal = surface.coat_normal(coat.normal_map.as_ref(), coat.normal_scale, reader.store);
-            let occlusion = occlusion(surface.target.material, reader);
+            let material = surface.target.material;
+            let occlusion = occlusion(material, reader.linear(material.occlusion_map.as_ref()).x);
             self.coat = CoatMatter::new(coat, normal, surface.view, occlusion, reader);
             self.emission *= self.below_coat();
         }
@@ -167,7 +174,8 @@ impl Matter {
             Reflection::Unlit => Model::Unlit(base),
             Reflection::Phong(phong) => Model::Phong(PhongMatter::new(phong, base, reader)),
             Reflection::MetalRough(m) => {
-                Model::MetalRough(MetalRoughMatter::new(m, base, occlusion(material, reader), reader))
+                let shade = reader.linear(material.occlusion_map.as_ref()).x;
+                Model::MetalRough(MetalRoughMatter::new(m, base, occlusion(material, shade), reader))
             }
         };
         Self { outside: true, emission, model, grain: None, sheen: None, coat: None }
@@ -353,9 +361,9 @@ impl Matter {
     }
 }
 
-/// Share of the surroundings that the occlusion map leaves open.
-fn occlusion(material: &Material, reader: &Reader) -> f32 {
-    let shade = reader.linear(material.occlusion_map.as_ref()).x;
+/// Share of the surroundings that the occlusion map leaves open, which says `shade`.
+#[inline(always)]
+pub(crate) fn occlusion(material: &Material, shade: f32) -> f32 {
     (1.0 + material.occlusion_strength * (shade - 1.0)).clamp(0.0, 1.0)
 }
 

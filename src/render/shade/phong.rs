@@ -32,13 +32,30 @@ pub(crate) struct PhongPaint {
     pub shininess: f32,
 }
 
+impl PhongPaint {
+    /// From the diffuse colour, and what maps of the others say.
+    #[inline(always)]
+    pub(crate) fn of(phong: &Phong, diffuse: Vec3, (ambient, specular, shininess): (Vec3, Vec3, f32)) -> Self {
+        Self {
+            ambient: phong.ambient * ambient,
+            diffuse,
+            specular: phong.specular * specular,
+            shininess: (phong.shininess * shininess).max(0.0),
+        }
+    }
+}
+
 impl PhongMatter {
     pub(super) fn new(phong: &Phong, diffuse: Vec3, reader: &Reader) -> Self {
+        let [ambient, specular] = [&phong.ambient_map, &phong.specular_map].map(|map| reader.srgb(map.as_ref()));
+        let shininess = reader.linear(phong.shininess_map.as_ref()).x;
+        let PhongPaint { ambient, diffuse, specular, shininess } =
+            PhongPaint::of(phong, diffuse, (ambient, specular, shininess));
         Self {
-            ambient: phong.ambient * reader.srgb(phong.ambient_map.as_ref()),
+            ambient,
             diffuse,
-            specular: phong.specular * reader.srgb(phong.specular_map.as_ref()),
-            shininess: (phong.shininess * reader.linear(phong.shininess_map.as_ref()).x).max(0.0),
+            specular,
+            shininess,
             mirror: phong.mirror,
             transmission: phong.transmission,
             ior: phong.ior,
@@ -119,6 +136,13 @@ impl PhongMatter {
         self.transmission * libm::powf(normal.dot(facet).abs(), self.shininess)
     }
 
+    /// The weight of the mirror ray of what lets no light in.
+    #[inline(always)]
+    pub(crate) fn reflected(&self, cosine: f32) -> Vec3 {
+        let schlick = fresnel_schlick(self.mirror, 1.0, cosine);
+        if self.fresnel && self.mirror != Vec3::ZERO { schlick } else { self.mirror }
+    }
+
     /// Without Fresnel the weights are the material's own, and total reflection adds what cannot pass to the mirror.
     /// With it an opaque surface reflects more at grazing angles (Schlick), and a transparent one splits the light by
     /// the exact formula for dielectrics.
@@ -132,8 +156,7 @@ impl PhongMatter {
                 Balance { reflected: (self.mirror + self.transmission).min(Vec3::ONE), refracted: Vec3::ZERO }
             }
             (false, _) => Balance { reflected: self.mirror, refracted: self.transmission },
-            (true, false) if self.mirror == Vec3::ZERO => Balance::default(),
-            (true, false) => Balance { reflected: fresnel_schlick(self.mirror, 1.0, cosine), refracted: Vec3::ZERO },
+            (true, false) => Balance { reflected: self.reflected(cosine), refracted: Vec3::ZERO },
             (true, true) => {
                 // Inside, what is turned back has been let in before and is not the mirror's to weaken.
                 let inside = crossing.n_i > crossing.n_t;

@@ -1,16 +1,19 @@
 //! Points by number and place: what is known of them, and the surface that is found from it.
 
 use super::around::Surroundings;
+use super::cones::Cones;
 use super::faces::Faces;
 use super::lit::{Lit, Sent};
-use super::painted::{Painted, Tried};
-use super::sorted::Face;
+use super::painted::Painted;
+use super::sorted::Sorted;
 use crate::accel::{Hit, Ray};
 use crate::math::Vec3;
+use crate::math::bounds::offset_origin;
 use crate::math::simd::{Kernel, Level, Simd};
 use crate::render::patch::smooth_normal;
 use crate::render::shade::Seen;
 use crate::render::surface::{facing, side_of};
+use crate::render::texture::Places;
 use crate::render::world::Placement;
 
 /// Points of a strip at most.
@@ -38,6 +41,12 @@ pub(super) fn put(columns: &mut Columns, i: usize, v: Vec3) {
     columns[2][i] = v.z;
 }
 
+/// Where a ray from point `i` in this direction starts.
+#[inline(always)]
+pub(super) fn leave(found: &Found, i: usize, dir: Vec3) -> Vec3 {
+    offset_origin(get(&found.position, i), get(&found.error, i), get(&found.geometric, i), dir)
+}
+
 /// Points of one instance. Columns lie in whole cache lines.
 #[repr(C, align(64))]
 pub(crate) struct Strip {
@@ -48,8 +57,8 @@ pub(crate) struct Strip {
     pub(super) given: Given,
     pub(super) found: Found,
     pub(super) painted: Painted,
-    /// By material, whether reading its maps paid.
-    pub(super) tried: Vec<Tried>,
+    pub(super) cones: Cones,
+    pub(super) places: Places,
     pub(super) surroundings: Surroundings,
     pub(super) lit: Lit,
     pub(super) sent: Sent,
@@ -60,7 +69,7 @@ pub(crate) struct Strip {
 pub(super) struct Given {
     origin: Columns,
     dir: Columns,
-    weights: [Column; 2],
+    pub weights: [Column; 2],
     pub faces: Faces,
 }
 
@@ -105,7 +114,8 @@ impl Default for Strip {
             given,
             found,
             painted: Painted::default(),
-            tried: Vec::new(),
+            cones: Cones::default(),
+            places: Places::default(),
             surroundings: Surroundings::default(),
             lit: Lit::default(),
             sent: Sent::default(),
@@ -116,12 +126,12 @@ impl Default for Strip {
 impl Strip {
     /// Takes hits, at most [`POINTS`], each by the place of its ray in a wave and that of its face, with the normals of its
     /// corners if the mesh is `smooth`.
-    pub(crate) fn take(&mut self, hit: &[(u32, u32)], faces: &[Face], rays: &[Ray], hits: &[Hit], smooth: bool) {
+    pub(crate) fn take(&mut self, hit: &[(u32, u32)], sorted: &Sorted, rays: &[Ray], hits: &[Hit], smooth: bool) {
         self.count = hit.len().min(POINTS);
         for (at, (ray, _)) in self.rays.iter_mut().zip(hit) {
             *at = *ray;
         }
-        self.level.run(Gather { given: &mut self.given, hit: &hit[..self.count], faces, rays, hits, smooth });
+        self.level.run(Gather { given: &mut self.given, hit: &hit[..self.count], sorted, rays, hits, smooth });
     }
 
     /// Finds the surface at each point; `placement` where the mesh has normals of its own.
@@ -159,7 +169,7 @@ pub(super) fn padded(count: usize) -> usize {
 struct Gather<'a> {
     given: &'a mut Given,
     hit: &'a [(u32, u32)],
-    faces: &'a [Face],
+    sorted: &'a Sorted,
     rays: &'a [Ray],
     hits: &'a [Hit],
     smooth: bool,
@@ -170,7 +180,8 @@ impl Kernel for Gather<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Self { given, hit, faces, rays, hits, smooth } = self;
+        let Self { given, hit, sorted, rays, hits, smooth } = self;
+        let (faces, skins) = (sorted.faces(), sorted.skins());
         for (k, eight) in hit.chunks(LANES).enumerate() {
             let index: [usize; LANES] = std::array::from_fn(|lane| eight[lane.min(eight.len() - 1)].0 as usize);
             let [ox, oy, oz, _] = s.columns(std::array::from_fn(|lane| rays[index[lane]].in_fours()[0]));
@@ -185,10 +196,13 @@ impl Kernel for Gather<'_> {
         }
         let mut at = 0;
         for same in hit.chunk_by(|(_, a), (_, b)| a == b) {
-            let (points, numbers) = (at..at + same.len(), &faces[same[0].1 as usize].numbers);
-            given.faces.set(points.clone(), numbers);
+            let (points, face) = (at..at + same.len(), &faces[same[0].1 as usize]);
+            given.faces.set(points.clone(), &face.numbers);
             if smooth {
-                given.faces.set_normals(points, numbers);
+                given.faces.set_normals(points.clone(), &face.numbers);
+            }
+            if let Some(skin) = skins.get(face.skin as usize) {
+                given.faces.set_skin(points, skin);
             }
             at += same.len();
         }
@@ -295,6 +309,7 @@ impl Found {
 
 #[cfg(test)]
 mod tests {
+    use super::super::sorted::Face;
     use super::*;
     use crate::accel::NO_PRIM;
     use crate::math::random::Random;
@@ -318,7 +333,7 @@ mod tests {
             faces.push(Face::of_triangle(i, &corners, Some(normals)));
         }
         let hit: Vec<(u32, u32)> = (0..61).map(|i| (i, i)).collect();
-        strip.take(&hit, &faces, &rays, &hits, true);
+        strip.take(&hit, &Sorted::of_faces(faces), &rays, &hits, true);
         strip
     }
 
@@ -328,7 +343,7 @@ mod tests {
         let kind = LightKind::Point { position: DVec3::new(1.0, 3.0, 2.0), falloff: Falloff::None };
         let light = Light { name: String::new(), intensity: Vec3::ONE, kind, shadows: true, size: 0.0 };
         let matter = Matter::without_maps(&Material::plain(), &TextureStore::new(&Scene::default()));
-        strip.shine(&matter, &LocalLight::new(&light, DVec3::ZERO));
+        strip.shine((&matter, false), &LocalLight::new(&light, DVec3::ZERO));
         let point = |i: usize| {
             let (f, l) = (&strip.found, &strip.lit);
             let columns = [&f.position, &f.error, &f.view, &f.normal, &l.radiance, &l.origin];
@@ -359,7 +374,7 @@ mod tests {
             let corners = [(); 3].map(|()| random.cube());
             Face::of_triangle(prim, &corners, Some([(); 3].map(|()| random.direction())))
         };
-        let faces: Vec<Face> = (0..20).map(face).collect();
+        let sorted = Sorted::of_faces((0..20).map(face).collect());
         // Faces that one point shows, or some, or more than are written at once.
         let lengths = [1, 2, 9, 1, 17, 8, 3, 23];
         let seen = (0u32..).step_by(2).zip(lengths).flat_map(|(face, length)| std::iter::repeat_n(face, length));
@@ -367,13 +382,13 @@ mod tests {
         for level in Level::all() {
             for count in [1, 7, 8, 40, POINTS] {
                 let mut strip = Strip { level, ..Strip::default() };
-                strip.take(&hit[..count], &faces, &rays, &hits, true);
+                strip.take(&hit[..count], &sorted, &rays, &hits, true);
                 let given = &strip.given;
                 for (i, &(index, face)) in hit[..count].iter().enumerate() {
                     let (ray, of_hit) = (&rays[index as usize], &hits[index as usize]);
                     assert_eq!((get(&given.origin, i), get(&given.dir, i)), (ray.origin, ray.dir));
                     assert_eq!((given.weights[0][i], given.weights[1][i]), (of_hit.u, of_hit.v));
-                    let numbers = faces[face as usize].numbers;
+                    let numbers = sorted.faces()[face as usize].numbers;
                     assert_eq!(given.faces.at(i), numbers, "{i} of {count} on {}", level.name());
                 }
             }

@@ -6,8 +6,8 @@ use super::columns::{LANES, POINTS};
 use crate::accel::refine::Facet;
 use crate::math::inset::Rim;
 use crate::math::triangle::Flat;
-use crate::math::{DVec3, Vec3};
-use crate::render::patch::differ;
+use crate::math::{DVec3, Vec2, Vec3, Vec4};
+use crate::render::patch::{Gradients, differ};
 
 /// A number of every point, and room for what is written behind the last.
 type Roomy<T> = [T; POINTS + LANES];
@@ -21,10 +21,12 @@ pub(super) struct Faces {
     /// 1 where the normals of the corners differ.
     curved: Roomy<u32>,
     prims: Roomy<u32>,
+    skins: [Roomy<f32>; SKIN_NUMBERS],
 }
 
 const WIDE_NUMBERS: usize = 12;
 const NORMAL_NUMBERS: usize = 9;
+const SKIN_NUMBERS: usize = 24;
 
 /// What points of a face share.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,6 +39,22 @@ pub(super) struct FaceNumbers {
     normals: [f32; NORMAL_NUMBERS],
     curved: u32,
     prim: u32,
+}
+
+/// What points of a face share where their surroundings on it count: how the weights of its corners grow, and the texture
+/// coordinates and tangents there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Skin([f32; SKIN_NUMBERS]);
+
+impl Skin {
+    /// Coordinates are turned, but not moved yet.
+    pub(super) fn new(gradients: &Gradients, [a, b, c]: [Vec2; 3], tangents: [Vec4; 3]) -> Self {
+        let Gradients { second: p, third: q } = gradients;
+        let mut all = [0.0; SKIN_NUMBERS];
+        all[..12].copy_from_slice(&[p.x, p.y, p.z, q.x, q.y, q.z, a.x, a.y, b.x, b.y, c.x, c.y]);
+        all[12..].copy_from_slice(tangents.map(|t| t.to_array()).as_flattened());
+        Self(all)
+    }
 }
 
 impl FaceNumbers {
@@ -62,6 +80,7 @@ impl Faces {
         normals: [[0.0; POINTS + LANES]; NORMAL_NUMBERS],
         curved: [0; POINTS + LANES],
         prims: [0; POINTS + LANES],
+        skins: [[0.0; POINTS + LANES]; SKIN_NUMBERS],
     };
 
     /// Sets the face of these points, but for the normals of its corners. What follows up to seven behind them is written,
@@ -82,6 +101,38 @@ impl Faces {
             set_eight(&mut self.normals, at, &face.normals);
             set_eight(std::array::from_mut(&mut self.curved), at, &[face.curved]);
         }
+    }
+
+    /// Sets its skin, in the same way.
+    #[inline(always)]
+    pub(super) fn set_skin(&mut self, points: Range<usize>, skin: &Skin) {
+        for at in points.step_by(LANES) {
+            set_eight(&mut self.skins, at, &skin.0);
+        }
+    }
+
+    /// How the weights of its corners grow.
+    #[inline(always)]
+    pub(super) fn gradients(&self, i: usize) -> Gradients {
+        let s = |k: usize| self.skins[k][i];
+        Gradients { second: Vec3::new(s(0), s(1), s(2)), third: Vec3::new(s(3), s(4), s(5)) }
+    }
+
+    /// The texture coordinates of the corners.
+    #[inline(always)]
+    pub(super) fn uvs(&self, i: usize) -> [Vec2; 3] {
+        let s = |k: usize| self.skins[k][i];
+        [Vec2::new(s(6), s(7)), Vec2::new(s(8), s(9)), Vec2::new(s(10), s(11))]
+    }
+
+    /// The tangents of the corners.
+    #[inline(always)]
+    pub(super) fn tangents(&self, i: usize) -> [Vec4; 3] {
+        let four = |k: usize| {
+            let s = |j: usize| self.skins[k + j][i];
+            Vec4::new(s(0), s(1), s(2), s(3))
+        };
+        [four(12), four(16), four(20)]
     }
 
     /// The plane and the rim.

@@ -1,10 +1,10 @@
 //! The light that arrives at the points of a strip, and the shadow rays that ask whether it does.
 
-use super::columns::{Column, Columns, Found, LANES, POINTS, Strip, get, padded, put};
+use super::columns::{Column, Columns, Found, LANES, POINTS, Strip, get, leave, padded, put};
+use super::cones::Cones;
 use super::painted::Painted;
 use crate::accel::Ray;
 use crate::math::Vec3;
-use crate::math::bounds::offset_origin;
 use crate::math::simd::{Kernel, Simd};
 use crate::render::curve::STEEP;
 use crate::render::shade::{LocalLight, Matter, Model, PhongMatter, terminator, way};
@@ -49,10 +49,11 @@ impl Default for Lit {
 }
 
 impl Strip {
-    /// Finds what `light` does at each point of a surface of `matter`.
-    pub(crate) fn shine(&mut self, matter: &Matter, light: &LocalLight) {
+    /// Finds what `light` does at each point of a surface of `matter`, on which highlights may be narrow if it is `shiny`.
+    pub(crate) fn shine(&mut self, (matter, shiny): (&Matter, bool), light: &LocalLight) {
         let (found, lit, points, painted) = (&self.found, &mut self.lit, padded(self.count), &self.painted);
-        self.level.run(Shine { found, lit, points, matter, painted, light });
+        let cones = shiny.then_some(&self.cones);
+        self.level.run(Shine { found, lit, points, matter, painted, cones, light });
     }
 
     /// The points that it shines on: the place of the ray of each, and what it shows.
@@ -145,6 +146,8 @@ struct Shine<'a> {
     points: usize,
     matter: &'a Matter,
     painted: &'a Painted,
+    /// Where highlights may be narrow.
+    cones: Option<&'a Cones>,
     light: &'a LocalLight,
 }
 
@@ -153,7 +156,7 @@ impl Kernel for Shine<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Self { found, lit, points, matter, painted, light } = self;
+        let Self { found, lit, points, matter, painted, cones, light } = self;
         let (points, light) = (points.min(POINTS), *light);
         let in_lux = matches!(matter.model, Model::MetalRough(_));
         light.arriving_at(
@@ -184,15 +187,22 @@ impl Kernel for Shine<'_> {
                 let m = *m;
                 reflect(found, lit, points, |_, normal, _, to_light| m.lit_with(normal, to_light, 0.0));
             }
-            Model::MetalRough(m) if painted.any => {
-                let m = *m;
-                reflect(found, lit, points, |i, normal, view, to_light| {
-                    painted.metal_rough(i, &m).lit(normal, view, to_light)
-                });
-            }
             Model::MetalRough(m) => {
                 let m = *m;
-                reflect(found, lit, points, |_, normal, view, to_light| m.lit(normal, view, to_light));
+                match (painted.any, cones) {
+                    (true, Some(cones)) => reflect(found, lit, points, |i, normal, view, to_light| {
+                        painted.metal_rough(i, &m).at_least(cones.least_square[i]).lit(normal, view, to_light)
+                    }),
+                    (true, None) => reflect(found, lit, points, |i, normal, view, to_light| {
+                        painted.metal_rough(i, &m).lit(normal, view, to_light)
+                    }),
+                    (false, Some(cones)) => reflect(found, lit, points, |i, normal, view, to_light| {
+                        m.at_least(cones.least_square[i]).lit(normal, view, to_light)
+                    }),
+                    (false, None) => {
+                        reflect(found, lit, points, |_, normal, view, to_light| m.lit(normal, view, to_light));
+                    }
+                }
             }
         }
         match light.position() {
@@ -256,10 +266,4 @@ fn start(found: &Found, lit: &mut Lit, points: usize, light: Option<Vec3>) {
             put(&mut lit.origin, i, leave(found, i, get(&lit.dir, i)));
         }
     }
-}
-
-/// Where a ray from point `i` in this direction starts.
-#[inline(always)]
-fn leave(found: &Found, i: usize, dir: Vec3) -> Vec3 {
-    offset_origin(get(&found.position, i), get(&found.error, i), get(&found.geometric, i), dir)
 }

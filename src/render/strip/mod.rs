@@ -11,9 +11,11 @@
 mod around;
 mod columns;
 mod common;
+mod cones;
 mod faces;
 mod lit;
 mod painted;
+mod sheet;
 mod sorted;
 
 pub(crate) use columns::{POINTS, Strip};

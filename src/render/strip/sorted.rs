@@ -1,11 +1,14 @@
 //! The hits of a wave by instance, each with its face; faces that are hit again are not looked up again.
 
-use super::faces::FaceNumbers;
+use super::faces::{FaceNumbers, Skin};
+use super::sheet::Sheet;
 use crate::accel::NO_PRIM;
 use crate::accel::refine::Facet;
-use crate::math::Vec3;
+use crate::math::{Vec3, Vec4};
 use crate::render::context::Context;
+use crate::render::patch::Gradients;
 use crate::render::world::PrimSource;
+use crate::scene::Mesh;
 
 /// Faces that are remembered: a block of pixels sees about as many.
 const REMEMBERED: usize = 256;
@@ -18,12 +21,15 @@ const NONE: u32 = u32::MAX;
 pub(crate) struct Face {
     pub(super) numbers: FaceNumbers,
     instance: u32,
+    /// Its place among the skins; [`NONE`] if it has none.
+    pub(super) skin: u32,
 }
 
 /// Hits of a wave, by instance.
 #[derive(Debug)]
 pub(crate) struct Sorted {
     faces: Vec<Face>,
+    skins: Vec<Skin>,
     /// The face of a prim, at the place that its number gives.
     remembered: Box<[(u32, u32); REMEMBERED]>,
     /// Ray and face of the hits of each instance.
@@ -35,7 +41,7 @@ pub(crate) struct Sorted {
 impl Default for Sorted {
     fn default() -> Self {
         let remembered = Box::new([(NO_PRIM, 0); REMEMBERED]);
-        Self { faces: Vec::new(), remembered, lists: Vec::new(), hit: Vec::new() }
+        Self { faces: Vec::new(), skins: Vec::new(), remembered, lists: Vec::new(), hit: Vec::new() }
     }
 }
 
@@ -43,6 +49,7 @@ impl Sorted {
     /// Forgets all hits.
     pub(crate) fn clear(&mut self, instances: usize) {
         self.faces.clear();
+        self.skins.clear();
         self.remembered.fill((NO_PRIM, 0));
         self.lists.resize_with(instances, Vec::new);
         for instance in self.hit.drain(..) {
@@ -56,7 +63,7 @@ impl Sorted {
         let place = &mut self.remembered[prim as usize % REMEMBERED];
         if place.0 != prim {
             *place = (prim, u32::try_from(self.faces.len()).unwrap_or(NONE));
-            self.faces.push(Face::of(context, prim));
+            self.faces.push(Face::of(context, prim, &mut self.skins));
         }
         let at = place.1;
         let instance = self.faces[at as usize].instance;
@@ -83,22 +90,33 @@ impl Sorted {
     pub(crate) fn faces(&self) -> &[Face] {
         &self.faces
     }
+
+    /// Faces of no hits.
+    #[cfg(test)]
+    pub(super) fn of_faces(faces: Vec<Face>) -> Self {
+        Self { faces, ..Self::default() }
+    }
+
+    /// The skins of those that have one.
+    pub(super) fn skins(&self) -> &[Skin] {
+        &self.skins
+    }
 }
 
 impl Face {
     /// Looks up a prim.
     #[inline(never)]
-    fn of(context: &Context, prim: u32) -> Self {
+    fn of(context: &Context, prim: u32, skins: &mut Vec<Skin>) -> Self {
         let nothing = || FaceNumbers::new(prim, &Facet::default(), Vec3::ZERO, None);
-        Self::new(context, prim).unwrap_or_else(|| Self { numbers: nothing(), instance: NONE })
+        Self::new(context, prim, skins).unwrap_or_else(|| Self { numbers: nothing(), instance: NONE, skin: NONE })
     }
 
     /// `None` for what is no triangle with an area and a material that points have in common.
-    fn new(context: &Context, prim: u32) -> Option<Self> {
+    fn new(context: &Context, prim: u32, skins: &mut Vec<Skin>) -> Option<Self> {
         let (scene, world) = (context.scene, context.world);
         let PrimSource::Triangle { instance, triangle: in_mesh } = world.source(prim) else { return None };
         let mesh = &scene.meshes[scene.instances[instance as usize].mesh as usize];
-        context.common[mesh.material as usize].as_ref()?;
+        let common = context.common[mesh.material as usize].as_ref()?;
         let corners = world.triangle(prim);
         let facet = Facet::of(&corners);
         let winding = facet.flat.unit();
@@ -113,7 +131,14 @@ impl Face {
             let normal = |i: u32| mesh.normals.get(i as usize).copied();
             Some([normal(a)?, normal(b)?, normal(c)?])
         };
-        Some(Self { numbers: FaceNumbers::new(prim, &facet, outward, normals), instance })
+        let numbers = FaceNumbers::new(prim, &facet, outward, normals);
+        let sheet = common.sheet.as_ref().filter(|sheet| sheet.covers(mesh));
+        if sheet.is_none() && !common.shiny {
+            return Some(Self { numbers, instance, skin: NONE });
+        }
+        let skin = u32::try_from(skins.len()).unwrap_or(NONE);
+        skins.push(skin_of(mesh, mesh.triangles[in_mesh as usize], &Gradients::new(corners), sheet));
+        Some(Self { numbers, instance, skin })
     }
 
     /// A face of no instance.
@@ -124,6 +149,14 @@ impl Face {
         normals: Option<[Vec3; 3]>,
     ) -> Self {
         let facet = Facet::of(corners);
-        Self { numbers: FaceNumbers::new(prim, &facet, facet.flat.unit(), normals), instance: NONE }
+        Self { numbers: FaceNumbers::new(prim, &facet, facet.flat.unit(), normals), instance: NONE, skin: NONE }
     }
+}
+
+/// The skin of a triangle of a mesh.
+fn skin_of(mesh: &Mesh, corners: [u32; 3], gradients: &Gradients, sheet: Option<&Sheet>) -> Skin {
+    let uvs = sheet.map_or_else(Default::default, |sheet| sheet.coordinates(mesh, corners));
+    // Corners without a tangent give points without one, which are shaded one by one.
+    let tangent = |i: u32| mesh.tangents.get(i as usize).copied().unwrap_or(Vec4::NAN);
+    Skin::new(gradients, uvs, corners.map(tangent))
 }

@@ -5,7 +5,9 @@ use crate::math::Vec2;
 use crate::math::random::Random;
 use crate::render::strip::Common;
 use crate::render::texture::TextureStore;
-use crate::scene::{AlphaMode, Bitmap, Environment, MetalRough, Pixels, Sampler, Texture, TextureRef, UvTransform};
+use crate::scene::{
+    AlphaMode, Bitmap, Environment, MetalRough, Pixels, Sampler, Texture, TextureRef, UvTransform, Wrap,
+};
 
 /// A bit of everything: mirrors, glass, blending, textures aside.
 pub(super) fn busy() -> Stage {
@@ -89,6 +91,15 @@ fn plain() -> Stage {
         turned(2.5, DVec3::new(-1.5, 1.2, 0.0)),
         pbr(MetalRough { metallic: 0.3, ..MetalRough::default() }),
     );
+    let mirror = pbr(MetalRough { roughness: 0.04, metallic: 0.6, ..MetalRough::default() });
+    s.mesh(round(0.5), turned(0.3, DVec3::new(1.2, 1.4, -0.5)), mirror);
+    s.mesh(
+        round(0.5),
+        turned(-0.9, DVec3::new(-0.3, -1.2, 0.9)),
+        pbr(MetalRough { roughness: 0.15, ..MetalRough::default() }),
+    );
+    let polished = Phong { mirror: Vec3::new(0.3, 0.2, 0.1), fresnel: true, ..phong() };
+    s.mesh(round(0.4), turned(0.2, DVec3::new(-2.0, -1.0, 0.5)), material(Vec3::new(0.3, 0.3, 0.5), polished));
     let shiny = Phong { specular: Vec3::splat(0.4), shininess: 9.0, ambient: Vec3::splat(0.2), ..phong() };
     let mirrored = turned(-0.5, DVec3::new(1.0, 0.2, 0.3)) * DAffine3::from_scale(DVec3::new(-1.0, 1.5, 1.0));
     s.mesh(round(0.6), mirrored, material(Vec3::new(0.2, 0.5, 0.7), shiny));
@@ -121,14 +132,15 @@ fn points_shaded_side_by_side_have_the_bits_of_points_shaded_one_by_one() {
     }
 }
 
-/// The same with maps of everything that points side by side may read, and colours at the vertices of some meshes.
+/// The same with maps of everything that points side by side may read, tangents, and colours at the vertices of some meshes.
 fn painted() -> Stage {
     let mut s = plain();
     let mut random = Random::new(8);
     for side in [3, 16, 40] {
         let texels = (0..side * side).map(|_| [(); 4].map(|()| (random.unit() * 255.0) as u8)).collect();
         let bitmap = Bitmap { name: String::new(), width: side, height: side, pixels: Pixels::Rgba8(texels) };
-        s.scene.textures.push(Texture { bitmap: s.scene.bitmaps.len() as u32, sampler: Sampler::default() });
+        let sampler = Sampler { wrap_u: if side == 16 { Wrap::Mirror } else { Wrap::Repeat }, ..Sampler::default() };
+        s.scene.textures.push(Texture { bitmap: s.scene.bitmaps.len() as u32, sampler });
         s.scene.bitmaps.push(bitmap);
     }
     let transform = UvTransform { scale: Vec2::splat(3.0), rotation: 0.4, ..UvTransform::default() };
@@ -150,7 +162,12 @@ fn painted() -> Stage {
     }
     for (i, mesh) in s.scene.meshes.iter_mut().enumerate() {
         mesh.uvs = vec![mesh.positions.iter().map(|p| p.truncate()).collect()];
-        if i % 2 == 1 {
+        if i % 4 < 3 {
+            let tangent =
+                |p: &Vec3| (Vec3::new(0.9, -0.4, 0.1 * p.x).normalize()).extend(if i % 4 == 0 { 1.0 } else { -1.0 });
+            mesh.tangents = mesh.positions.iter().map(tangent).collect();
+        }
+        if i % 4 == 1 {
             mesh.colors = mesh.positions.iter().map(|_| random.cube().abs().extend(1.0)).collect();
         }
     }

@@ -7,7 +7,10 @@
 //! Every lookup is a pure function of the scene and its arguments: no state, no order, the same bits on every thread.
 
 mod decode;
+mod places;
 mod pyramid;
+
+pub(crate) use places::{Layout, Places, Spots, changes};
 
 use crate::math::{Vec2, Vec4};
 use crate::scene::{Bitmap, Filter, Mipmaps, Pixels, Sampler, Scene, Texture, Wrap};
@@ -147,35 +150,31 @@ impl<'a> Lookup<'a> {
         }
 
         // As many probes as the footprint is longer than wide; files that ask for nearest texels get one.
-        let probes = match self.sampler.minify {
+        let count = match self.sampler.minify {
             Filter::Nearest => 1.0,
-            Filter::Linear => (major / minor.max(1.0)).ceil().clamp(1.0, MAX_PROBES),
+            Filter::Linear => probes(major, minor),
         };
-        let plan = self.plan(libm::log2f(major / probes));
-        self.read(plan, &Probes { uv, axis, count: probes })
+        let plan = self.plan(libm::log2f(major / count));
+        self.read(plan, &Probes { uv, axis, count })
     }
 
     fn changes(&self, uv: Vec2, ways: [Vec2; 2], reach: f32) -> [Vec4; 2] {
         let texels = pixels(size_of(self.bitmap));
-        let widest = ways.map(|way| (way * texels).length()).into_iter().fold(0.0, f32::max);
+        let widest = (ways[0] * texels).length().max((ways[1] * texels).length());
         let level = match self.sampler.mipmaps {
-            Mipmaps::Nearest | Mipmaps::Linear if widest > 1.0 => whole(libm::log2f(widest)).min(self.pyramid.top()),
-            _ => 0,
+            Mipmaps::None => 0,
+            Mipmaps::Nearest | Mipmaps::Linear => doublings(widest),
         };
-        let plane = self.plane(level);
+        let plane = self.plane((level as usize).min(self.pyramid.top()));
         let texel = |uv: Vec2| {
             let x = Axis::new(uv.x, plane.width, self.sampler.wrap_u, Filter::Nearest);
             let y = Axis::new(uv.y, plane.height, self.sampler.wrap_v, Filter::Nearest);
             plane.texel(x.near, y.near)
         };
         let (here, texels) = (texel(uv), pixels((plane.width, plane.height)));
-        ways.map(|way| {
-            let apart = (way * texels).length() * reach;
-            if !(apart > 0.0 && apart.is_finite()) {
-                return Vec4::ZERO;
-            }
-            let longer = (1.0 / apart).max(1.0);
-            (texel(uv + way * (reach * longer)) - here) / longer
+        ways.map(|way| match apart(way, texels, reach) {
+            Some(longer) => (texel(uv + way * (reach * longer)) - here) / longer,
+            None => Vec4::ZERO,
         })
     }
 
@@ -194,7 +193,7 @@ impl<'a> Lookup<'a> {
                 if lower >= top {
                     return Plan::One(self.plane(top), minify);
                 }
-                Plan::Between(self.plane(lower), self.plane(lower + 1), minify, lod - lod.floor())
+                Plan::Between(self.plane(lower), self.plane(lower + 1), minify, lod - floor(lod))
             }
         }
     }
@@ -257,6 +256,31 @@ impl<'a> Lookup<'a> {
     }
 }
 
+/// How often one can be doubled without passing `x`: the whole part of its logarithm, 0 where that is negative or `x` is no
+/// number.
+#[inline(always)]
+fn doublings(x: f32) -> u32 {
+    let exponent = (x.to_bits() >> 23).saturating_sub(127);
+    if x >= 1.0 { exponent } else { 0 }
+}
+
+/// How many times as long as `reach` of a way a step must be to come at least one texel far, 1 if that is far enough;
+/// `None` where no step does.
+#[inline(always)]
+fn apart(way: Vec2, texels: Vec2, reach: f32) -> Option<f32> {
+    let apart = (way * texels).length() * reach;
+    ((apart > 0.0) & apart.is_finite()).then(|| (1.0 / apart).max(1.0))
+}
+
+/// As many probes as a footprint is longer than wide, rounded up; its axes are in texels.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "1 to 8")]
+fn probes(major: f32, minor: f32) -> f32 {
+    let times = (major / minor.max(1.0)).clamp(1.0, MAX_PROBES);
+    let truncated = times as i32 as f32;
+    if truncated < times { truncated + 1.0 } else { truncated }
+}
+
 /// Where a lookup reads: at places of equal distance along `axis`, `uv` in the middle.
 struct Probes {
     uv: Vec2,
@@ -296,7 +320,7 @@ impl Axis {
 }
 
 /// The greatest whole number that is not above `x`, which is no NaN, without the call that processors of 2003 need for it.
-#[inline]
+#[inline(always)]
 #[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "within ±2²³ both casts are exact")]
 fn floor(x: f32) -> f32 {
     // Larger numbers are whole.

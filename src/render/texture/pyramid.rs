@@ -107,7 +107,12 @@ impl Plane<'_> {
     /// Linear RGBA of texel (`x`, `y`), which must lie inside.
     #[inline(always)]
     pub(super) fn texel(&self, x: usize, y: usize) -> Vec4 {
-        let index = y * self.width + x;
+        self.at(y * self.width + x)
+    }
+
+    /// The same by number, row by row.
+    #[inline(always)]
+    pub(super) fn at(&self, index: usize) -> Vec4 {
         match self.texels {
             Stored::Bitmap(texels) => texels.get(index),
             Stored::Level(texels) => unit(&texels[index]),

@@ -1,4 +1,6 @@
 use super::*;
+use crate::math::random::Random;
+use crate::math::simd::LANES;
 use crate::scene::{Bitmap, Texture};
 use proptest::prelude::*;
 
@@ -191,4 +193,76 @@ fn texels_change_by_their_slope_however_far_apart_they_are_read() {
     }
     assert_eq!(store.changes(9, Vec2::ZERO, [Vec2::X, Vec2::Y], 1.0), [Vec4::ZERO; 2], "no texture");
     assert_eq!(store.changes(0, Vec2::ZERO, [Vec2::NAN, Vec2::ZERO], 1.0), [Vec4::ZERO; 2], "no footprint");
+}
+
+/// Numbers that lookups get, and some that they had better not.
+fn odd(random: &mut Random, size: f32) -> f32 {
+    match (random.unit() * 40.0) as u32 {
+        0 => 0.0,
+        1 => 1.0,
+        2 => f32::NAN,
+        3 => f32::INFINITY,
+        4 => -3.0e38,
+        5 => -f32::MIN_POSITIVE,
+        _ => (random.unit() * 2.0 - 1.0) * size,
+    }
+}
+
+#[test]
+fn lookups_at_eight_points_have_the_bits_of_single_ones() {
+    let mut random = Random::new(7);
+    let wraps = [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp];
+    let mipmaps = [Mipmaps::None, Mipmaps::Nearest, Mipmaps::Linear];
+    for (k, (width, height)) in [(1, 1), (1, 7), (3, 2), (16, 16), (61, 40), (128, 4)].into_iter().enumerate() {
+        for i in 0..9 {
+            let (wrap_u, wrap_v, mipmaps) = (wraps[i % 3], wraps[(i + k) % 3], mipmaps[i / 3]);
+            let sampler = Sampler { wrap_u, wrap_v, mipmaps, ..Sampler::default() };
+            let seed = random.bits();
+            let texel = |x: u32, y: u32| {
+                (seed as u32 ^ x.wrapping_mul(0x9e37_79b9) ^ y.wrapping_mul(0x85eb_ca6b)).to_le_bytes()
+            };
+            let mut scene = scene(width, height, sampler, texel);
+            if i % 2 == 0 {
+                let Pixels::Rgba8(texels) = &scene.bitmaps[0].pixels else { unreachable!() };
+                scene.bitmaps[0].pixels = Pixels::Rgb8(texels.iter().flat_map(|t| [t[0], t[1], t[2]]).collect());
+            }
+            let store = TextureStore::new(&scene);
+            let layout = Layout::of(&store, 0).expect("mixed");
+            for footprint in [0.001, 0.02, 0.3, 20.0] {
+                let mut spots = Spots::default();
+                let Spots { uv, along, across } = &mut spots;
+                uv.as_flattened_mut().iter_mut().for_each(|c| *c = odd(&mut random, 4.0));
+                let ways = along.as_flattened_mut().iter_mut().chain(across.as_flattened_mut());
+                ways.for_each(|c| *c = odd(&mut random, footprint));
+                compare(&store, &layout, &spots, 1.0 + random.unit());
+            }
+        }
+    }
+}
+
+fn compare(store: &TextureStore, layout: &Layout, spots: &Spots, reach: f32) {
+    let at = |row: &[[f32; LANES]; 2], i: usize| Vec2::new(row[0][i], row[1][i]);
+    let bits = |texel: Vec4| texel.to_array().map(f32::to_bits);
+    let mut places = Places::default();
+    places.find(layout, spots);
+    let found = changes(store, (0, layout), spots, reach, [true; LANES]);
+    for space in [ColorSpace::Srgb, ColorSpace::Linear] {
+        let mut texels = [Vec4::NAN; LANES];
+        places.read(store, (0, space), &mut texels);
+        for i in 0..LANES {
+            let (uv, along, across) = (at(&spots.uv, i), at(&spots.along, i), at(&spots.across, i));
+            let single = store.sample(0, space, uv, along, across);
+            assert_eq!(bits(texels[i]), bits(single), "{uv} {along} {across} {layout:?}");
+            let single = store.changes(0, uv, [along, across], reach);
+            assert_eq!(found.map(|way| bits(way[i])), single.map(bits), "{uv} {along} {across} {layout:?}");
+        }
+    }
+}
+
+#[test]
+fn texels_that_are_not_mixed_or_not_there_are_left_to_single_lookups() {
+    let nearest = Sampler { minify: Filter::Nearest, ..Sampler::default() };
+    assert!(Layout::of(&TextureStore::new(&scene(4, 4, nearest, |_, _| grey(9))), 0).is_none());
+    let plain = scene(4, 4, Sampler::default(), |_, _| grey(9));
+    assert!(Layout::of(&TextureStore::new(&plain), 1).is_none() && Layout::of(&TextureStore::new(&plain), 0).is_some());
 }

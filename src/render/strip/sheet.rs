@@ -1,0 +1,259 @@
+//! Maps of a material that points of a strip read side by side: those that share their coordinates.
+
+use super::columns::{Found, Given, LANES, POINTS, Strip, get, padded, put};
+use super::cones::Cones;
+use super::faces::Faces;
+use super::painted::Painted;
+use crate::math::simd::{Kernel, Simd};
+use crate::math::{Vec2, Vec3, Vec4};
+use crate::render::context::Context;
+use crate::render::patch::{Turn, given_tangent, smooth_normal, turned_by_texel, turning_of};
+use crate::render::shade::{MetalRoughPaint, PhongPaint, base_color, occlusion};
+use crate::render::surface::{facing, side_of};
+use crate::render::texture::{ColorSpace, Layout, Places, Spots, TextureStore, changes};
+use crate::render::world::Placement;
+use crate::scene::{Material, Mesh, Surface, TextureRef};
+
+/// What a map is read for.
+#[derive(Clone, Copy, Debug)]
+enum Slot {
+    Base,
+    Emission,
+    Occlusion,
+    Normal,
+    MetalRough,
+    Ambient,
+    Specular,
+    Shininess,
+}
+
+const SLOTS: usize = 8;
+
+/// What the maps of eight points say.
+type Texels = [[Vec4; LANES]; SLOTS];
+
+/// The maps of a material, all of which have the same coordinates.
+#[derive(Debug)]
+pub(crate) struct Sheet {
+    uv_set: u32,
+    turn: Turn,
+    offset: Vec2,
+    stacks: Vec<Stack>,
+    /// The texture of the normal map, and how its texels lie.
+    normal_map: Option<(u32, Layout)>,
+}
+
+/// Maps that are read in the same places.
+#[derive(Debug)]
+struct Stack {
+    layout: Layout,
+    maps: Vec<(Slot, u32, ColorSpace)>,
+}
+
+impl Sheet {
+    /// `None` for materials without maps, and for those of which one has its own coordinates or is read in another way.
+    pub(super) fn of(material: &Material, store: &TextureStore) -> Option<Self> {
+        let maps = maps(material);
+        let (_, first, _) = maps.first()?;
+        if maps.len() < material.textures().count() {
+            return None;
+        }
+        let mut sheet = Self {
+            uv_set: first.uv_set,
+            turn: Turn::new(&first.transform),
+            offset: first.transform.offset,
+            stacks: Vec::new(),
+            normal_map: None,
+        };
+        for &(slot, map, space) in &maps {
+            if (map.uv_set, map.transform) != (first.uv_set, first.transform) {
+                return None;
+            }
+            let layout = Layout::of(store, map.texture)?;
+            sheet.add(layout, (slot, map.texture, space));
+            if let Slot::Normal = slot {
+                sheet.normal_map = Some((map.texture, layout));
+            }
+        }
+        Some(sheet)
+    }
+
+    fn add(&mut self, layout: Layout, map: (Slot, u32, ColorSpace)) {
+        match self.stacks.iter_mut().find(|stack| stack.layout == layout) {
+            Some(stack) => stack.maps.push(map),
+            None => self.stacks.push(Stack { layout, maps: vec![map] }),
+        }
+    }
+
+    /// Whether a mesh has what it takes to read them, and nothing that they are mixed with.
+    pub(super) fn covers(&self, mesh: &Mesh) -> bool {
+        let turns = self.normal_map.is_some();
+        mesh.colors.is_empty() && mesh.uvs.len() > self.uv_set as usize && !(turns && mesh.tangents.is_empty())
+    }
+
+    /// The coordinates of the corners, but for the offset.
+    pub(super) fn coordinates(&self, mesh: &Mesh, corners: [u32; 3]) -> [Vec2; 3] {
+        let set = mesh.uvs.get(self.uv_set as usize);
+        let corner = |i: u32| set.and_then(|set| set.get(i as usize)).map_or(Vec2::ZERO, |&uv| self.turn.apply(uv));
+        corners.map(corner)
+    }
+}
+
+/// The maps that strips know, and what for.
+fn maps(material: &Material) -> Vec<(Slot, &TextureRef, ColorSpace)> {
+    let (metal_rough, [ambient, specular, shininess]) = match &material.surface {
+        Surface::MetalRough(m) => (m.metal_rough_map.as_ref(), [None; 3]),
+        Surface::Phong(p) => (None, [&p.ambient_map, &p.specular_map, &p.shininess_map].map(Option::as_ref)),
+        Surface::Unlit => (None, [None; 3]),
+    };
+    let all = [
+        (Slot::Base, material.base_color_map.as_ref(), ColorSpace::Srgb),
+        (Slot::Emission, material.emission_map.as_ref(), ColorSpace::Srgb),
+        (Slot::Occlusion, material.occlusion_map.as_ref(), ColorSpace::Linear),
+        (Slot::Normal, material.normal_map.as_ref(), ColorSpace::Linear),
+        (Slot::MetalRough, metal_rough, ColorSpace::Linear),
+        (Slot::Ambient, ambient, ColorSpace::Srgb),
+        (Slot::Specular, specular, ColorSpace::Srgb),
+        (Slot::Shininess, shininess, ColorSpace::Linear),
+    ];
+    all.into_iter().filter_map(|(slot, map, space)| Some((slot, map?, space))).collect()
+}
+
+impl Strip {
+    /// Reads what the maps of a sheet say at the points, and turns their normals; `placement` where the mesh has normals of
+    /// its own.
+    pub(super) fn read_sheet(
+        &mut self,
+        context: &Context,
+        (material, sheet): (&Material, &Sheet),
+        placement: &Placement,
+        smooth: bool,
+    ) {
+        let count = self.count.min(POINTS);
+        let Self { given, found, painted, cones, places, level, .. } = self;
+        let (faces, store) = (&given.faces, context.textures);
+        // Where lights show as highlights, what turns normals makes narrow ones wider.
+        let reach = context.highlight_reach;
+        let widens = !context.lights.is_empty() && material.metal_rough().is_some();
+        let turns = sheet.normal_map.as_ref().filter(|_| widens).map(|(texture, layout)| (*texture, layout, reach));
+        let weights = &given.weights;
+        level.run(Read { sheet, material, store, faces, weights, cones, painted, places, turns, count });
+        if sheet.normal_map.is_some() {
+            let points = padded(count);
+            let scale = material.normal_scale;
+            level.run(TurnNormals { given, found, painted, points, placement, smooth, scale });
+        }
+    }
+}
+
+struct Read<'a> {
+    sheet: &'a Sheet,
+    material: &'a Material,
+    store: &'a TextureStore<'a>,
+    faces: &'a Faces,
+    weights: &'a [[f32; POINTS]; 2],
+    cones: &'a mut Cones,
+    painted: &'a mut Painted,
+    places: &'a mut Places,
+    /// The normal map, where its changes count within such a reach.
+    turns: Option<(u32, &'a Layout, f32)>,
+    count: usize,
+}
+
+impl Kernel for Read<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let Self { sheet, material, store, faces, weights, cones, painted, places, turns, count } = self;
+        for start in (0..count.min(POINTS)).step_by(LANES) {
+            let mut spots = Spots::default();
+            for lane in 0..LANES {
+                let i = start + lane;
+                let ([a, b, c], [u, v]) = (faces.uvs(i), [weights[0][i], weights[1][i]]);
+                let [along, across] = faces.gradients(i).of_coordinates([b - a, c - a], &cones.footprint(i));
+                let uv = a * (1.0 - u - v) + b * u + c * v + sheet.offset;
+                (spots.uv[0][lane], spots.uv[1][lane]) = (uv.x, uv.y);
+                (spots.along[0][lane], spots.along[1][lane]) = (along.x, along.y);
+                (spots.across[0][lane], spots.across[1][lane]) = (across.x, across.y);
+            }
+            let mut texels: Texels = [[Vec4::ONE; LANES]; SLOTS];
+            let points = (count - start).min(LANES);
+            for stack in &sheet.stacks {
+                places.find(&stack.layout, &spots);
+                for &(slot, texture, space) in &stack.maps {
+                    places.read(store, (texture, space), &mut texels[slot as usize][..points]);
+                }
+            }
+            for lane in 0..points {
+                paint(painted, start + lane, material, |slot| texels[slot as usize][lane]);
+            }
+            if let Some((texture, layout, reach)) = turns {
+                let mut narrow = [false; LANES];
+                (0..points).for_each(|lane| narrow[lane] = painted.has_narrow_highlight(start + lane));
+                if narrow != [false; LANES] {
+                    let [along, across] = changes(store, (texture, layout), &spots, reach, narrow);
+                    for lane in 0..points {
+                        cones.turning[start + lane] = turning_of([along[lane], across[lane]], material.normal_scale);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What maps make of a material at a point.
+#[inline(always)]
+fn paint(painted: &mut Painted, i: usize, material: &Material, texel: impl Fn(Slot) -> Vec4) {
+    let base = base_color(material, texel(Slot::Base), 1.0, Vec4::ONE).truncate();
+    painted.put_emission(i, material.emission * texel(Slot::Emission).truncate());
+    painted.put_normal_texel(i, texel(Slot::Normal).truncate());
+    match &material.surface {
+        Surface::Unlit => painted.put_unlit(i, base),
+        Surface::Phong(p) => {
+            let [ambient, specular] = [Slot::Ambient, Slot::Specular].map(|slot| texel(slot).truncate());
+            painted.put_phong(i, PhongPaint::of(p, base, (ambient, specular, texel(Slot::Shininess).x)));
+        }
+        Surface::MetalRough(m) => {
+            let open = occlusion(material, texel(Slot::Occlusion).x);
+            painted.put_metal_rough(i, MetalRoughPaint::of(m, base, open, texel(Slot::MetalRough)));
+        }
+    }
+}
+
+/// Turns normals by the texels of a normal map.
+struct TurnNormals<'a> {
+    given: &'a Given,
+    found: &'a mut Found,
+    painted: &'a Painted,
+    points: usize,
+    placement: &'a Placement,
+    smooth: bool,
+    scale: f32,
+}
+
+impl Kernel for TurnNormals<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let Self { given, found, painted, points, placement, smooth, scale } = self;
+        let placement = *placement;
+        for i in 0..points.min(POINTS) {
+            let (faces, [u, v]) = (&given.faces, [given.weights[0][i], given.weights[1][i]]);
+            let weights = [1.0 - u - v, u, v];
+            let [a, b, c] = faces.normals(i);
+            let mixed = smooth_normal(&placement, a * weights[0] + b * weights[1] + c * weights[2]);
+            let own = if smooth { mixed.unwrap_or(faces.outward(i)) } else { faces.outward(i) };
+            let [a, b, c] = faces.tangents(i);
+            let tangent = given_tangent(&placement, a * weights[0] + b * weights[1] + c * weights[2], own);
+            let (tangent, sign) = tangent.unwrap_or((Vec3::NAN, 1.0));
+            let frame = [tangent, own.cross(tangent) * sign];
+            let turned = turned_by_texel(own, frame, painted.normal_texel(i), scale).unwrap_or(own);
+            let side = side_of(own, get(&found.geometric, i));
+            put(&mut found.normal, i, facing(turned * side, get(&found.view, i)));
+            // Without a tangent it takes the coordinates around.
+            found.certain[i] &= u32::from(tangent.is_finite());
+        }
+    }
+}

@@ -1,0 +1,367 @@
+//! Lookups at eight points side by side: where they read is found once for all maps that lie alike.
+//!
+//! Maps of one material mostly have one size, one sampler and the same coordinates. The places are those that
+//! [`Lookup::filtered`](super::Lookup) finds one by one, and texels are summed in its order: the same bits.
+
+use super::pyramid::{self, Plane, Stored};
+use super::{
+    ColorSpace, Lookup, MAX_PROBES, TextureStore, apart, decode, doublings, floor, pixels, probes, size_of, wrapped,
+};
+use crate::math::simd::LANES;
+use crate::math::{Vec2, Vec4};
+use crate::scene::{Filter, Mipmaps, Sampler, Wrap};
+use decode::Texels;
+
+/// One number of each of eight points.
+type Eight = [f32; LANES];
+
+/// Probes of a point at most.
+const PROBES: usize = MAX_PROBES as usize;
+
+/// Texture coordinates of eight points, and how they change along both axes of what a sample covers.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Spots {
+    pub uv: [Eight; 2],
+    pub along: [Eight; 2],
+    pub across: [Eight; 2],
+}
+
+impl Spots {
+    #[inline(always)]
+    fn axes(&self, i: usize) -> [Vec2; 2] {
+        [Vec2::new(self.along[0][i], self.along[1][i]), Vec2::new(self.across[0][i], self.across[1][i])]
+    }
+}
+
+/// How the texels of a bitmap lie, and how they are read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Layout {
+    width: u32,
+    height: u32,
+    top: u32,
+    wrap: [Wrap; 2],
+    mipmaps: Mipmaps,
+}
+
+impl Layout {
+    /// That of a texture; `None` for one that is not there, or whose texels are not mixed.
+    pub(crate) fn of(store: &TextureStore, texture: u32) -> Option<Self> {
+        let (sampler, source) = store.find(texture)?;
+        let Sampler { magnify: Filter::Linear, minify: Filter::Linear, mipmaps, wrap_u, wrap_v, .. } = sampler else {
+            return None;
+        };
+        let (width, height) = size_of(source.bitmap);
+        // Numbers of texels are computed in 32 bits, and places in `f32`.
+        let texels = u32::try_from(width.checked_mul(height)?).ok()?;
+        let (width, height, top) = (u32::try_from(width).ok()?, u32::try_from(height).ok()?, source.srgb.top());
+        let small = texels < u32::MAX / 2 && width.max(height) < 1 << 23;
+        small.then_some(Self { width, height, top: u32::try_from(top).ok()?, wrap: [wrap_u, wrap_v], mipmaps })
+    }
+}
+
+/// How much linear texels change at each of eight points from `uv` to `reach` times each of both axes, as
+/// [`TextureStore::changes`](super::TextureStore) finds it; only where `wanted`, elsewhere zero.
+#[inline(always)]
+pub(crate) fn changes(
+    store: &TextureStore,
+    (texture, layout): (u32, &Layout),
+    at: &Spots,
+    reach: f32,
+    wanted: [bool; LANES],
+) -> [[Vec4; LANES]; 2] {
+    let mut changes = [[Vec4::ZERO; LANES]; 2];
+    let Some((sampler, source)) = store.find(texture) else { return changes };
+    let lookup = Lookup { bitmap: source.bitmap, pyramid: &source.linear, space: ColorSpace::Linear, sampler };
+    let size = pixels((layout.width as usize, layout.height as usize));
+    let mut level = [0; LANES];
+    for i in 0..LANES {
+        let [along, across] = at.axes(i).map(|axis| (axis * size).length());
+        let doublings = doublings(along.max(across)).min(layout.top);
+        level[i] = if layout.mipmaps == Mipmaps::None { 0 } else { doublings };
+    }
+    let (width, height) = (sides(layout.width, &level, 0), sides(layout.height, &level, 0));
+    // The point itself, and a step along each axis; how long that is.
+    let (mut places, mut steps) = ([at.uv; 3], [[0.0; LANES]; 2]);
+    for i in 0..LANES {
+        #[expect(clippy::cast_precision_loss, reason = "sides are below 2²³")]
+        let texels = Vec2::new(width[i] as f32, height[i] as f32);
+        for (k, way) in at.axes(i).into_iter().enumerate() {
+            let longer = apart(way, texels, reach).unwrap_or(0.0);
+            let moved = Vec2::new(at.uv[0][i], at.uv[1][i]) + way * (reach * longer);
+            (places[k + 1][0][i], places[k + 1][1][i], steps[k][i]) = (moved.x, moved.y, longer);
+        }
+    }
+    let mut texels = [[0; LANES]; 3];
+    for (texels, uv) in texels.iter_mut().zip(&places) {
+        let (x, y) = (nearest(&uv[0], &width, layout.wrap[0]), nearest(&uv[1], &height, layout.wrap[1]));
+        for i in 0..LANES {
+            texels[i] = y[i].wrapping_mul(width[i]).wrapping_add(x[i]);
+        }
+    }
+    for i in (0..LANES).filter(|&i| wanted[i]) {
+        let plane = lookup.plane(level[i] as usize);
+        let here = plane.at(texels[0][i] as usize);
+        for k in 0..2 {
+            if steps[k][i] > 0.0 {
+                changes[k][i] = (plane.at(texels[k + 1][i] as usize) - here) / steps[k][i];
+            }
+        }
+    }
+    changes
+}
+
+/// The texel in which each coordinate along one axis lies.
+#[inline(always)]
+fn nearest(c: &Eight, sides: &[u32; LANES], wrap: Wrap) -> [u32; LANES] {
+    let (c, mut texels) = (periods(c, wrap), [0; LANES]);
+    for i in 0..LANES {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "sides are below 2²³")]
+        let at = floor(c[i] * sides[i] as f32) as i32;
+        texels[i] = inside(at, sides[i], wrap);
+    }
+    texels
+}
+
+/// The sides of a map in the level so far above that of each point.
+#[inline(always)]
+fn sides(whole: u32, level: &[u32; LANES], above: u32) -> [u32; LANES] {
+    let mut sides = [0; LANES];
+    for (side, level) in sides.iter_mut().zip(level) {
+        *side = (whole >> (level + above).min(31)).max(1);
+    }
+    sides
+}
+
+/// Coordinates within the part of the plane that repeats.
+#[inline(always)]
+fn periods(c: &Eight, wrap: Wrap) -> Eight {
+    let mut periods = [0.0; LANES];
+    for (period, c) in periods.iter_mut().zip(c) {
+        *period = if c.is_finite() { *c } else { 0.0 };
+    }
+    match wrap {
+        Wrap::Repeat => periods.iter_mut().for_each(|c| *c -= floor(*c)),
+        Wrap::Mirror => periods.iter_mut().for_each(|c| *c -= 2.0 * floor(*c * 0.5)),
+        Wrap::Clamp => periods.iter_mut().for_each(|c| *c = c.clamp(0.0, 1.0)),
+    }
+    periods
+}
+
+/// Where lookups at eight points read.
+pub(crate) struct Places {
+    /// Probes at each point, a whole number.
+    probes: Eight,
+    level: [u32; LANES],
+    /// 1 where the next level is read, too, and its share.
+    between: [u32; LANES],
+    share: Eight,
+    taps: [[Taps; PROBES]; 2],
+}
+
+/// Four texels at each point, and the shares of the right and the lower ones.
+#[derive(Clone, Copy)]
+struct Taps {
+    corners: [[u32; LANES]; 4],
+    x: Eight,
+    y: Eight,
+}
+
+impl Default for Places {
+    fn default() -> Self {
+        let taps = Taps { corners: [[0; LANES]; 4], x: [0.0; LANES], y: [0.0; LANES] };
+        Self {
+            probes: [1.0; LANES],
+            level: [0; LANES],
+            between: [0; LANES],
+            share: [0.0; LANES],
+            taps: [[taps; PROBES]; 2],
+        }
+    }
+}
+
+impl Places {
+    /// Finds where maps of this layout are read.
+    #[inline(always)]
+    pub(crate) fn find(&mut self, layout: &Layout, at: &Spots) {
+        let axis = self.choose_levels(layout, at);
+        let most = self.probes.iter().fold(1.0_f32, |most, &probes| most.max(probes));
+        let levels = if self.between == [0; LANES] { 1 } else { 2 };
+        let (mut p, mut k) = (0, 0.5);
+        while k < most {
+            // Where there is one probe it lies in the middle.
+            let mut uv = at.uv;
+            for (uv, axis) in uv.iter_mut().zip(&axis) {
+                for i in 0..LANES {
+                    let moved = uv[i] + axis[i] * (k / self.probes[i] - 0.5);
+                    uv[i] = if self.probes[i] > 1.0 { moved } else { uv[i] };
+                }
+            }
+            for (above, taps) in (0..).zip(&mut self.taps).take(levels) {
+                taps[p % PROBES].find(layout, &uv, &self.level, above);
+            }
+            (p, k) = (p + 1, k + 1.0);
+        }
+    }
+
+    /// Chooses levels and numbers of probes; gives the longer axis of what is covered.
+    #[inline(always)]
+    fn choose_levels(&mut self, layout: &Layout, at: &Spots) -> [Eight; 2] {
+        let size = pixels((layout.width as usize, layout.height as usize));
+        let (mut axis, mut lod) = ([[0.0; LANES]; 2], [0.0; LANES]);
+        for i in 0..LANES {
+            let [along, across] = at.axes(i);
+            let (dx, dy) = ((along * size).length(), (across * size).length());
+            let (major, minor) = if dx >= dy { (dx, dy) } else { (dy, dx) };
+            let longer = if dx >= dy { along } else { across };
+            let bounded = major.is_finite() & minor.is_finite();
+            let probes = if bounded & (major > 1.0) { probes(major, minor) } else { 1.0 };
+            (axis[0][i], axis[1][i], self.probes[i]) = (longer.x, longer.y, probes);
+            // Up to one texel is read as it is; what has no bounds is as small as can be.
+            lod[i] = if major <= 1.0 {
+                1.0
+            } else if bounded {
+                major / probes
+            } else {
+                f32::INFINITY
+            };
+        }
+        for lod in &mut lod {
+            *lod = if *lod > 1.0 { libm::log2f(*lod) } else { 0.0 };
+        }
+        let top = layout.top;
+        for i in 0..LANES {
+            let (lod, lower) = (lod[i], whole(lod[i]));
+            let (level, between) = match layout.mipmaps {
+                Mipmaps::None => (0, 0),
+                Mipmaps::Nearest => (if lod > 0.0 { whole(lod + 0.5).min(top) } else { 0 }, 0),
+                Mipmaps::Linear => (lower.min(top), u32::from((lod > 0.0) & (lower < top))),
+            };
+            (self.level[i], self.between[i], self.share[i]) = (level, between, lod - floor(lod));
+        }
+        axis
+    }
+
+    /// Linear RGBA (straight alpha) of a texture of the layout at the first points.
+    #[inline(always)]
+    pub(crate) fn read(&self, store: &TextureStore, (texture, space): (u32, ColorSpace), to: &mut [Vec4]) {
+        let Some((sampler, source)) = store.find(texture) else { return };
+        let pyramid = if space == ColorSpace::Srgb { &source.srgb } else { &source.linear };
+        let lookup = Lookup { bitmap: source.bitmap, pyramid, space, sampler };
+        for (i, to) in to.iter_mut().enumerate().take(LANES) {
+            let level = self.level[i] as usize;
+            *to = self.of_level(&lookup.plane(level), 0, i);
+            if self.between[i] == 1 {
+                let upper = self.of_level(&lookup.plane(level + 1), 1, i);
+                *to += (upper - *to) * self.share[i];
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn of_level(&self, plane: &Plane, above: usize, i: usize) -> Vec4 {
+        match plane.texels {
+            Stored::Level(texels) => self.mean(above, i, |at| pyramid::codes(&texels[at as usize])) * (1.0 / 65535.0),
+            Stored::Bitmap(Texels::Rgb8(texels, colors)) => {
+                self.mean(above, i, |at| decode::solid8(texels[at as usize], colors))
+            }
+            Stored::Bitmap(texels) => self.mean(above, i, |at| texels.get(at as usize)),
+        }
+    }
+
+    /// The mean of all probes of point `i`.
+    #[inline(always)]
+    fn mean(&self, above: usize, i: usize, texel: impl Fn(u32) -> Vec4) -> Vec4 {
+        let one = |taps: &Taps| {
+            let [a, b, c, d] = &taps.corners;
+            let (a, b, c, d) = (texel(a[i]), texel(b[i]), texel(c[i]), texel(d[i]));
+            let (upper, lower) = (a + (b - a) * taps.x[i], c + (d - c) * taps.x[i]);
+            upper + (lower - upper) * taps.y[i]
+        };
+        let (taps, probes) = (&self.taps[above], self.probes[i]);
+        if probes <= 1.0 {
+            return one(&taps[0]);
+        }
+        let (mut sum, mut p, mut k) = (Vec4::ZERO, 0, 0.5);
+        while k < probes {
+            sum += one(&taps[p % PROBES]);
+            (p, k) = (p + 1, k + 1.0);
+        }
+        sum / probes
+    }
+}
+
+impl Taps {
+    /// The four texels around each of `uv`, in the level so far above that of the point.
+    #[inline(always)]
+    fn find(&mut self, layout: &Layout, uv: &[Eight; 2], level: &[u32; LANES], above: u32) {
+        let (width, height) = (sides(layout.width, level, above), sides(layout.height, level, above));
+        let (x, y) = (Pairs::find(&uv[0], &width, layout.wrap[0]), Pairs::find(&uv[1], &height, layout.wrap[1]));
+        for i in 0..LANES {
+            let (upper, lower) = (y.near[i].wrapping_mul(width[i]), y.far[i].wrapping_mul(width[i]));
+            self.corners[0][i] = upper.wrapping_add(x.near[i]);
+            self.corners[1][i] = upper.wrapping_add(x.far[i]);
+            self.corners[2][i] = lower.wrapping_add(x.near[i]);
+            self.corners[3][i] = lower.wrapping_add(x.far[i]);
+        }
+        (self.x, self.y) = (x.share, y.share);
+    }
+}
+
+/// The two texels next to each coordinate along one axis, and the share of the second.
+struct Pairs {
+    near: [u32; LANES],
+    far: [u32; LANES],
+    share: Eight,
+}
+
+impl Pairs {
+    #[inline(always)]
+    fn find(c: &Eight, sides: &[u32; LANES], wrap: Wrap) -> Self {
+        let period = periods(c, wrap);
+        let (mut near, mut share) = ([0_i32; LANES], [0.0; LANES]);
+        let mut outside = 0;
+        for i in 0..LANES {
+            #[expect(clippy::cast_precision_loss, reason = "sides are below 2²³")]
+            let place = period[i] * sides[i] as f32 - 0.5;
+            let below = floor(place);
+            share[i] = place - below;
+            #[expect(clippy::cast_possible_truncation, reason = "no farther than two sides")]
+            let at = below as i32;
+            near[i] = at;
+            outside |= u32::from((at < 0) | (at.wrapping_add(1) >= sides[i].cast_signed()));
+        }
+        let (mut first, mut second) = ([0; LANES], [0; LANES]);
+        if outside == 0 {
+            for i in 0..LANES {
+                (first[i], second[i]) = (near[i].cast_unsigned(), near[i].cast_unsigned() + 1);
+            }
+        } else {
+            for i in 0..LANES {
+                (first[i], second[i]) = (inside(near[i], sides[i], wrap), inside(near[i] + 1, sides[i], wrap));
+            }
+        }
+        Self { near: first, far: second, share }
+    }
+}
+
+/// The texel that stands at place `i` of a row of so many that goes on for ever.
+#[inline(always)]
+fn inside(i: i32, len: u32, wrap: Wrap) -> u32 {
+    let signed = len.cast_signed();
+    match wrap {
+        Wrap::Repeat if (-1..=signed).contains(&i) => {
+            let up = if i < 0 { signed - 1 } else { i };
+            (if up >= signed { up - signed } else { up }).cast_unsigned()
+        }
+        Wrap::Clamp => i.clamp(0, signed - 1).cast_unsigned(),
+        #[expect(clippy::cast_possible_truncation, reason = "it is less than `len`")]
+        _ => wrapped(i64::from(i), len as usize, wrap) as u32,
+    }
+}
+
+/// The whole part of what is not negative.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "x is not negative; the cast saturates")]
+fn whole(x: f32) -> u32 {
+    x as u32
+}
