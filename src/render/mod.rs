@@ -12,6 +12,7 @@
 mod absorption;
 mod adaptive;
 mod asking;
+mod beside;
 mod branch;
 mod certainty;
 mod context;

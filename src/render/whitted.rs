@@ -9,9 +9,9 @@
 
 use super::Progress;
 use super::asking::Asking;
+use super::beside::Beside;
 use super::branch::Point;
 use super::context::{Context, coverage};
-use super::curve::Feelers;
 use super::draws::{Draws, Purpose, Stream};
 use super::everything::look_up_in_vain;
 use super::eyes::Eyes;
@@ -19,20 +19,17 @@ use super::glint;
 use super::layers::Facts;
 use super::observer::Observer;
 use super::optics::transmittance;
-use super::seam::is_same_crossing;
 use super::shade::{Incident, LocalLight, Matter, Reader, lets_light_in, terminator};
 use super::shadow::Shadows;
 use super::sky::{Arounds, Standpoint};
-use super::strip::{POINTS, Sorted, Strip};
 use super::surface::{Surface, Target};
-use super::wave::{Crossing, Media, Path, Queue, RayClass, Wave};
+use super::wave::{Crossing, Path, Queue, RayClass, Wave};
 use crate::accel::{Accel, Hit, Ray};
-use crate::math::simd::LANES;
 use crate::math::{DVec3, Vec3};
 use std::hint::black_box;
 
 /// Angle across a path's cone, radians, above which rough surfaces have spread it.
-const SPREAD: f32 = 0.1;
+pub(super) const SPREAD: f32 = 0.1;
 /// Rays traced together at most; bounds the memory of a worker.
 const WAVE_LIMIT: usize = 1 << 13;
 /// Shadow rays that wait at most.
@@ -82,13 +79,9 @@ pub(crate) struct Tracer<'a, A: Accel, P> {
     /// Rays that go on behind a hit, by class.
     pub(super) continuing: [Queue; 3],
     wave: Wave,
-    /// Both are large: there is always one of each, but while it is at work.
-    sorted: Option<Sorted>,
-    strip: Option<Box<Strip>>,
-    shadows: Shadows,
+    pub(super) beside: Beside,
+    pub(super) shadows: Shadows,
     arounds: Arounds,
-    /// Eye rays that met nothing and see the surroundings.
-    missed: Vec<u32>,
     pub samples: Vec<Sample>,
     /// The place of each sample among those of its pixel; empty where only rays decide random choices.
     pub streams: Vec<Stream>,
@@ -106,11 +99,9 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             starting: Default::default(),
             continuing: Default::default(),
             wave: Wave::default(),
-            sorted: Some(Sorted::default()),
-            strip: Some(Box::default()),
+            beside: Beside::default(),
             shadows: Shadows::default(),
             arounds: Arounds::default(),
-            missed: Vec::new(),
             samples: Vec::new(),
             streams: Vec::new(),
             facts: Vec::new(),
@@ -150,16 +141,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
                 return false;
             }
             let wave = std::mem::take(&mut self.wave);
-            for i in 0..wave.rays.len() {
-                let (ray, path, hit) = (&wave.rays[i], &wave.paths[i], &wave.hits[i]);
-                if !hit.is_some() {
-                    self.leave(ray, path);
-                } else if is_same_crossing(|prim| self.context.world.prim(prim), ray, &wave.after[i], hit) {
-                    self.continuing[class as usize].push(*ray, *path, *hit);
-                } else {
-                    self.shade(class, ray, path, hit);
-                }
-            }
+            self.shade_wave(class, &wave);
             self.wave = wave;
             self.trace_shadows();
         }
@@ -172,109 +154,10 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let (rays, pencil, hits) = eyes.ask();
         self.asking.closest_of(pencil, rays, hits, self.counts.of(RayClass::Primary));
         if !self.asking.cancelled {
-            self.see(&eyes);
+            self.shade_eyes(&eyes);
             self.trace_shadows();
         }
         self.eyes = eyes;
-    }
-
-    fn see(&mut self, eyes: &Eyes) {
-        let context = self.context;
-        let mut sorted = self.sorted.take().unwrap_or_default();
-        sorted.clear(context.scene.instances.len());
-        for (start, eight) in (0..).step_by(LANES).zip(eyes.hits.chunks(LANES)) {
-            // Neighbours mostly hit the same.
-            let first = eight[0].prim;
-            let alike = eight.iter().all(|hit| hit.prim == first);
-            if !(alike && eight[0].is_some() && sorted.take(context, (start, eight.len()), first)) {
-                (start..).zip(eight).for_each(|(i, hit)| self.see_one(eyes, &mut sorted, i, hit));
-            }
-        }
-        self.see_surroundings(eyes);
-        let mut strip = self.strip.take().unwrap_or_default();
-        for k in 0..sorted.instances() {
-            let (instance, hits) = sorted.of(k);
-            for hits in hits.chunks(POINTS) {
-                self.shade_strip(eyes, &sorted, (instance, hits), &mut strip);
-            }
-        }
-        self.strip = Some(strip);
-        self.sorted = Some(sorted);
-    }
-
-    /// Adds what rays that met nothing see.
-    fn see_surroundings(&mut self, eyes: &Eyes) {
-        let mut missed = std::mem::take(&mut self.missed);
-        let rays = missed.iter().map(|&i| (i, eyes.rays()[i as usize].dir, eyes.cone_spread(i as usize)));
-        self.context.sky.each_radiance(rays, |i, radiance| self.samples[i as usize].radiance += radiance);
-        missed.clear();
-        self.missed = missed;
-    }
-
-    fn see_one(&mut self, eyes: &Eyes, sorted: &mut Sorted, i: u32, hit: &Hit) {
-        let at = i as usize;
-        if hit.is_some() {
-            if !sorted.take(self.context, (i, 1), hit.prim) {
-                self.shade_eye(eyes, at);
-            }
-        } else if self.context.shows_environment {
-            self.missed.push(i);
-        } else {
-            self.samples[at].through += Vec3::ONE;
-        }
-    }
-
-    /// Shades what the `i`th eye ray has hit.
-    fn shade_eye(&mut self, eyes: &Eyes, i: usize) {
-        self.shade(RayClass::Primary, &eyes.rays()[i], &eyes.path(i), &eyes.hits[i]);
-    }
-
-    /// Shades points of one instance side by side, as [`Self::shade`] does one by one.
-    fn shade_strip(&mut self, eyes: &Eyes, sorted: &Sorted, (instance, hits): (u32, &[(u32, u32)]), strip: &mut Strip) {
-        let context = self.context;
-        let mesh = &context.scene.meshes[context.scene.instances[instance as usize].mesh as usize];
-        let Some(common) = &context.common[mesh.material as usize] else { return };
-        let (smooth, reads) = (!mesh.normals.is_empty(), common.mapped || !mesh.colors.is_empty());
-        let (matter, shiny, placement) = (&common.matter, common.shiny, context.world.placement(instance));
-        strip.take(hits, sorted, eyes.rays(), &eyes.hits, smooth);
-        strip.find(smooth.then_some(placement));
-        if reads || shiny {
-            strip.widen(eyes);
-        }
-        if reads {
-            strip.read(context, eyes, (mesh, placement), common);
-        }
-        if shiny {
-            strip.bend(context, matter, smooth.then_some(placement));
-        }
-        for index in strip.left_out(common.one_sided) {
-            self.shade_eye(eyes, index as usize);
-        }
-        if !context.is_dark || matter.shines() {
-            strip.look_around(matter, &context.sky, context.scene.ambient);
-            strip.shown().for_each(|(i, everywhere)| self.add(i, everywhere));
-        }
-        let outside = context.absorption.is_some().then(Media::default);
-        for light in &context.lights {
-            strip.shine((matter, shiny), light);
-            if !light.shadows {
-                strip.shone().for_each(|(i, radiance)| self.add(i, radiance));
-                continue;
-            }
-            strip.send(&mut self.shadows, outside);
-            for (i, radiance) in strip.grazed() {
-                let (ray, hit) = (&eyes.rays()[i as usize], &eyes.hits[i as usize]);
-                if let Some(feelers) = feelers(context, light, ray, hit) {
-                    self.shadows.push_feelers(&feelers, radiance, outside);
-                }
-            }
-        }
-        if shiny && context.depth > 0 {
-            strip.mirror(context, matter, &mut self.starting[RayClass::Reflected as usize]);
-        }
-        if self.shadows.len() >= SHADOW_LIMIT {
-            self.trace_shadows();
-        }
     }
 
     /// Takes the next wave and finds its hits. Rays that go on come before rays that start a deeper generation.
@@ -308,6 +191,13 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         self.trace_arounds();
     }
 
+    /// Traces shadow rays once many wait.
+    pub(super) fn relieve_shadows(&mut self) {
+        if self.shadows.len() >= SHADOW_LIMIT {
+            self.trace_shadows();
+        }
+    }
+
     fn trace_arounds(&mut self) {
         let samples = &mut self.samples;
         let arrive = |sample: u32, light: Vec3| samples[sample as usize].radiance += light;
@@ -315,7 +205,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     }
 
     /// A ray that met nothing: the background shows where the line of sight is straight, else the environment is seen.
-    fn leave(&mut self, ray: &Ray, path: &Path) {
+    pub(super) fn leave(&mut self, ray: &Ray, path: &Path) {
         let sample = &mut self.samples[ray.sample as usize];
         if path.straight && !self.context.shows_environment {
             sample.through += path.weight;
@@ -326,7 +216,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     }
 
     /// Adds what the surface at `hit` shows by itself, and queues the rays that find the rest.
-    fn shade(&mut self, class: RayClass, ray: &Ray, path: &Path, hit: &Hit) {
+    pub(super) fn shade(&mut self, class: RayClass, ray: &Ray, path: &Path, hit: &Hit) {
         let context = self.context;
         let lessened = context.absorption.is_some().then(|| absorbed(context, ray, path, hit));
         let path = lessened.as_ref().unwrap_or(path);
@@ -427,7 +317,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         }
     }
 
-    fn add(&mut self, sample: u32, radiance: Vec3) {
+    pub(super) fn add(&mut self, sample: u32, radiance: Vec3) {
         if radiance.is_finite() {
             self.samples[sample as usize].radiance += radiance;
         }
@@ -453,9 +343,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
                 }
             }
         }
-        if self.shadows.len() >= SHADOW_LIMIT {
-            self.trace_shadows();
-        }
+        self.relieve_shadows();
     }
 
     /// Light of one point of a light that is so much of it: without shadows at once, with them when its ray has come through.
@@ -484,13 +372,6 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             self.shadows.push_feelers(&feelers, radiance, inside);
         }
     }
-}
-
-/// What finds out whether a light shines on the round surface at `hit`.
-fn feelers(context: &Context, light: &LocalLight, ray: &Ray, hit: &Hit) -> Option<Feelers> {
-    let target = Target::new(context.scene, context.world, hit.prim);
-    let surface = Surface::new(context.world, target, ray, hit, 0.0);
-    surface.feelers(&light.incident(surface.position)?, ray.sample)
 }
 
 /// A path after what its ray is inside of has absorbed its part of the light up to `hit`.

@@ -42,13 +42,35 @@ impl Strip {
     pub(crate) fn look_around(&mut self, matter: &Matter, sky: &Sky, ambient: Vec3) {
         let (found, painted, to, points) = (&self.found, &self.painted, &mut self.surroundings, padded(self.count));
         self.level.run(Look { found, painted, to, points, matter, sky, ambient });
+        if let Some(weights) = &self.weights {
+            self.level.run(Weigh { weights, radiance: &mut self.surroundings.radiance, points });
+        }
     }
 
-    /// The rays of the points, and what they show.
+    /// The samples of the points, and what they show.
     pub(crate) fn shown(&self) -> impl Iterator<Item = (u32, Vec3)> {
         let (found, surroundings) = (&self.found, &self.surroundings);
         let certain = (0..self.count.min(POINTS)).filter(|&i| found.certain[i] == 1);
-        certain.map(|i| (self.rays[i], get(&surroundings.radiance, i)))
+        certain.map(|i| (self.samples[i], get(&surroundings.radiance, i)))
+    }
+}
+
+/// Makes of what points show what their samples see.
+pub(super) struct Weigh<'a> {
+    pub weights: &'a Columns,
+    pub radiance: &'a mut Columns,
+    pub points: usize,
+}
+
+impl Kernel for Weigh<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let Self { weights, radiance, points } = self;
+        for i in 0..points.min(POINTS) {
+            put(radiance, i, get(weights, i) * get(radiance, i));
+        }
     }
 }
 

@@ -6,10 +6,10 @@ use super::faces::Faces;
 use super::lit::{Lit, Sent};
 use super::painted::Painted;
 use super::sorted::Sorted;
-use crate::accel::{Hit, Ray};
 use crate::math::Vec3;
 use crate::math::bounds::offset_origin;
 use crate::math::simd::{Kernel, Level, Simd};
+use crate::render::beside::Traced;
 use crate::render::patch::smooth_normal;
 use crate::render::shade::Seen;
 use crate::render::surface::{facing, side_of};
@@ -52,8 +52,12 @@ pub(super) fn leave(found: &Found, i: usize, dir: Vec3) -> Vec3 {
 pub(crate) struct Strip {
     pub(super) count: usize,
     pub(super) level: Level,
-    /// The place of each point's ray in its wave.
+    /// The place of each point's ray in its wave, …
     pub(super) rays: [u32; POINTS],
+    /// … the sample to which it belongs, …
+    pub(super) samples: [u32; POINTS],
+    /// … and its weight; `None` where all are 1.
+    pub(super) weights: Option<Columns>,
     pub(super) given: Given,
     pub(super) found: Found,
     pub(super) painted: Painted,
@@ -111,6 +115,8 @@ impl Default for Strip {
             count: 0,
             level: Level::best(),
             rays: [0; POINTS],
+            samples: [0; POINTS],
+            weights: None,
             given,
             found,
             painted: Painted::default(),
@@ -124,14 +130,22 @@ impl Default for Strip {
 }
 
 impl Strip {
-    /// Takes hits, at most [`POINTS`], each by the place of its ray in a wave and that of its face, with the normals of its
+    /// Takes hits, at most [`POINTS`], each by the place of its ray in what was traced and that of its face, with the normals of its
     /// corners if the mesh is `smooth`.
-    pub(crate) fn take(&mut self, hit: &[(u32, u32)], sorted: &Sorted, rays: &[Ray], hits: &[Hit], smooth: bool) {
+    pub(crate) fn take(&mut self, hit: &[(u32, u32)], sorted: &Sorted, traced: Traced, smooth: bool) {
         self.count = hit.len().min(POINTS);
         for (at, (ray, _)) in self.rays.iter_mut().zip(hit) {
             *at = *ray;
         }
-        self.level.run(Gather { given: &mut self.given, hit: &hit[..self.count], sorted, rays, hits, smooth });
+        (self.samples, self.weights) = (self.rays, None);
+        if let Traced::Wave(_, wave) = traced {
+            let weights = self.weights.insert(EMPTY);
+            for (i, &ray) in self.rays[..self.count].iter().enumerate() {
+                self.samples[i] = wave.rays[ray as usize].sample;
+                put(weights, i, wave.paths[ray as usize].weight);
+            }
+        }
+        self.level.run(Gather { given: &mut self.given, hit: &hit[..self.count], sorted, traced, smooth });
     }
 
     /// Finds the surface at each point; `placement` where the mesh has normals of its own.
@@ -170,8 +184,7 @@ struct Gather<'a> {
     given: &'a mut Given,
     hit: &'a [(u32, u32)],
     sorted: &'a Sorted,
-    rays: &'a [Ray],
-    hits: &'a [Hit],
+    traced: Traced<'a>,
     smooth: bool,
 }
 
@@ -180,8 +193,9 @@ impl Kernel for Gather<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Self { given, hit, sorted, rays, hits, smooth } = self;
+        let Self { given, hit, sorted, traced, smooth } = self;
         let (faces, skins) = (sorted.faces(), sorted.skins());
+        let (rays, hits) = (traced.rays(), traced.hits());
         for (k, eight) in hit.chunks(LANES).enumerate() {
             let index: [usize; LANES] = std::array::from_fn(|lane| eight[lane.min(eight.len() - 1)].0 as usize);
             let [ox, oy, oz, _] = s.columns(std::array::from_fn(|lane| rays[index[lane]].in_fours()[0]));

@@ -6,8 +6,8 @@ use super::painted::Painted;
 use crate::accel::{Hit, NO_PRIM, Ray};
 use crate::math::Vec3;
 use crate::math::simd::{Kernel, Simd};
+use crate::render::beside::Traced;
 use crate::render::context::Context;
-use crate::render::eyes::Eyes;
 use crate::render::glint;
 use crate::render::patch::Footprint;
 use crate::render::shade::{Matter, Model};
@@ -41,6 +41,9 @@ struct Mirrored {
     spread: Column,
 }
 
+/// The weights of eye rays.
+const ONES: Columns = [[1.0; POINTS]; 3];
+
 impl Default for Cones {
     fn default() -> Self {
         let (one, three) = ([0.0; POINTS], [[0.0; POINTS]; 3]);
@@ -67,14 +70,14 @@ impl Cones {
 }
 
 impl Strip {
-    /// Finds what the cones of eye rays cover.
-    pub(crate) fn widen(&mut self, eyes: &Eyes) {
+    /// Finds what the cones of the rays cover.
+    pub(crate) fn widen(&mut self, traced: Traced) {
         let count = self.count.min(POINTS);
         let Self { cones, found, rays, .. } = self;
         cones.turning.fill(0.0);
         for (i, &ray) in rays[..count].iter().enumerate() {
-            let Path { cone_width, cone_spread, .. } = eyes.path(ray as usize);
-            (cones.width[i], cones.spread[i]) = (cone_width + cone_spread * eyes.hits[ray as usize].t, cone_spread);
+            let (Path { cone_width, cone_spread, .. }, hit) = (traced.path(ray as usize), &traced.hits()[ray as usize]);
+            (cones.width[i], cones.spread[i]) = (cone_width + cone_spread * hit.t, cone_spread);
         }
         self.level.run(Print { found, cones, points: padded(count) });
     }
@@ -93,20 +96,27 @@ impl Strip {
         }
     }
 
-    /// Sends the rays that find what a surface of `matter` mirrors, for rays whose places in the wave are their samples.
-    pub(crate) fn mirror(&mut self, context: &Context, matter: &Matter, to: &mut Queue) {
-        let Self { cones, painted, found, given, .. } = self;
+    /// Sends the rays that find what a surface of `matter` mirrors.
+    pub(crate) fn mirror(&mut self, context: &Context, matter: &Matter, traced: Traced, to: &mut Queue) {
+        let Self { cones, painted, found, given, weights, .. } = self;
         let (points, cutoff) = (padded(self.count), context.cutoff.max(f32::MIN_POSITIVE));
-        self.level.run(Mirror { painted, found, cones, points, matter, cutoff });
+        let weights = weights.as_ref().unwrap_or(&ONES);
+        self.level.run(Mirror { painted, found, cones, points, matter, weights, cutoff });
         let Mirrored { alive, weight, origin, dir, spread } = &cones.mirrored;
         let prims = given.faces.prims();
         for i in (0..self.count.min(POINTS)).filter(|&i| alive[i] == 1) {
-            let (exclude, sample) = (prims[i], self.rays[i]);
+            let path = traced.path(self.rays[i] as usize);
+            if path.depth >= context.depth {
+                continue;
+            }
+            let (exclude, sample) = (prims[i], self.samples[i]);
             let (origin, dir) = (get(origin, i), get(dir, i));
             let ray = Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude, sample };
             debug_assert_ne!(exclude, NO_PRIM);
-            let eye = Path::from_eye(cones.width[i], spread[i]).turned(RayClass::Reflected, 0);
-            to.push(ray, Path { weight: get(weight, i), depth: 1, straight: false, ..eye }, Hit::MISS);
+            let (cone_width, cone_spread, weight) = (cones.width[i], spread[i], get(weight, i));
+            let depth = path.depth + 1;
+            let path = Path { weight, depth, straight: false, since: 0.0, cone_width, cone_spread, ..path };
+            to.push(ray, path.turned(RayClass::Reflected, 0), Hit::MISS);
         }
     }
 }
@@ -188,6 +198,7 @@ struct Mirror<'a> {
     cones: &'a mut Cones,
     points: usize,
     matter: &'a Matter,
+    weights: &'a Columns,
     cutoff: f32,
 }
 
@@ -196,33 +207,40 @@ impl Kernel for Mirror<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Self { painted, found, cones, points, matter, cutoff } = self;
-        let any = painted.any;
+        let Self { painted, found, cones, points, matter, weights, cutoff } = self;
+        let (any, rays) = (painted.any, (weights, cutoff));
         match &matter.model {
             Model::Unlit(_) => cones.mirrored.alive.fill(0),
             Model::Phong(m) => {
                 let m = *m;
-                mirror(found, cones, points, cutoff, |_, cosine| m.reflected(cosine));
+                mirror(found, cones, points, rays, |_, cosine| m.reflected(cosine));
             }
             Model::MetalRough(m) if any => {
                 let m = *m;
-                mirror(found, cones, points, cutoff, |i, cosine| painted.metal_rough(i, &m).reflected(cosine));
+                mirror(found, cones, points, rays, |i, cosine| painted.metal_rough(i, &m).reflected(cosine));
             }
             Model::MetalRough(m) => {
                 let m = *m;
-                mirror(found, cones, points, cutoff, |_, cosine| m.reflected(cosine));
+                mirror(found, cones, points, rays, |_, cosine| m.reflected(cosine));
             }
         }
     }
 }
 
-/// The rays of points that mirror such shares of light where the cosine of the view is so.
+/// The rays of points that mirror such shares of light where the cosine of the view is so; they follow rays of these
+/// weights, and are sent above the cutoff.
 #[inline(always)]
-fn mirror(found: &Found, cones: &mut Cones, points: usize, cutoff: f32, share: impl Fn(usize, f32) -> Vec3) {
+fn mirror(
+    found: &Found,
+    cones: &mut Cones,
+    points: usize,
+    (weights, cutoff): (&Columns, f32),
+    share: impl Fn(usize, f32) -> Vec3,
+) {
     let Cones { mirrored: to, bend, spread, .. } = cones;
     for i in 0..points.min(POINTS) {
         let seen = found.seen(i);
-        let weight = share(i, seen.normal.dot(seen.view));
+        let weight = get(weights, i) * share(i, seen.normal.dot(seen.view));
         let dir = seen.mirrored();
         put(&mut to.weight, i, weight);
         put(&mut to.dir, i, dir);

@@ -1,5 +1,6 @@
 //! The light that arrives at the points of a strip, and the shadow rays that ask whether it does.
 
+use super::around::Weigh;
 use super::columns::{Column, Columns, Found, LANES, POINTS, Strip, get, leave, padded, put};
 use super::cones::Cones;
 use super::painted::Painted;
@@ -54,29 +55,36 @@ impl Strip {
         let (found, lit, points, painted) = (&self.found, &mut self.lit, padded(self.count), &self.painted);
         let cones = shiny.then_some(&self.cones);
         self.level.run(Shine { found, lit, points, matter, painted, cones, light });
+        if let Some(weights) = &self.weights {
+            self.level.run(Weigh { weights, radiance: &mut self.lit.radiance, points });
+            for i in 0..points.min(POINTS) {
+                let radiance = get(&self.lit.radiance, i);
+                self.lit.seen[i] *= u32::from(radiance.is_finite() & (radiance.max_element() > 0.0));
+            }
+        }
     }
 
-    /// The points that it shines on: the place of the ray of each, and what it shows.
+    /// The points that it shines on: the sample of each, and what it shows.
     pub(crate) fn shone(&self) -> impl Iterator<Item = (u32, Vec3)> {
-        self.lit_as(|seen| seen != 0)
+        self.lit_as(&self.samples, |seen| seen != 0)
     }
 
-    /// Those of them whose shadow rays [`Self::send`] does not send.
+    /// Those of them whose shadow rays [`Self::send`] does not send, by the places of their rays.
     pub(crate) fn grazed(&self) -> impl Iterator<Item = (u32, Vec3)> {
         let any = self.lit.seen[..padded(self.count)].iter().fold(0, |all, seen| all | seen) & GRAZING != 0;
-        self.lit_as(move |seen| any && seen == GRAZING)
+        self.lit_as(&self.rays, move |seen| any && seen == GRAZING)
     }
 
-    fn lit_as(&self, wanted: impl Fn(u32) -> bool) -> impl Iterator<Item = (u32, Vec3)> {
+    fn lit_as(&self, names: &[u32; POINTS], wanted: impl Fn(u32) -> bool) -> impl Iterator<Item = (u32, Vec3)> {
         let points = (0..self.count.min(POINTS)).filter(move |&i| wanted(self.lit.seen[i]));
-        points.map(|i| (self.rays[i], get(&self.lit.radiance, i)))
+        points.map(|i| (names[i], get(&self.lit.radiance, i)))
     }
 
-    /// Sends the shadow rays that start on their triangles, for rays whose places in the wave are their samples;
+    /// Sends the shadow rays that start on their triangles;
     /// `media` is what they start inside of, where that matters.
     pub(crate) fn send(&mut self, shadows: &mut Shadows, media: Option<Media>) {
-        let (prims, rays, lit, sent) = (self.given.faces.prims(), &self.rays, &self.lit, &mut self.sent);
-        let count = self.level.run(Send { points: self.count.min(POINTS), prims, rays, lit, sent });
+        let (prims, samples, lit, sent) = (self.given.faces.prims(), &self.samples, &self.lit, &mut self.sent);
+        let count = self.level.run(Send { points: self.count.min(POINTS), prims, samples, lit, sent });
         shadows.push_all(&self.sent.rays[..count], &self.sent.light[..count], media);
     }
 }
@@ -97,7 +105,7 @@ impl Default for Sent {
 struct Send<'a> {
     points: usize,
     prims: &'a [u32],
-    rays: &'a [u32; POINTS],
+    samples: &'a [u32; POINTS],
     lit: &'a Lit,
     sent: &'a mut Sent,
 }
@@ -108,9 +116,9 @@ impl Kernel for Send<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> usize {
-        let Self { points, prims, rays, lit, sent } = self;
+        let Self { points, prims, samples, lit, sent } = self;
         let mut count = 0;
-        let eights = prims.as_chunks::<LANES>().0.iter().zip(rays.as_chunks::<LANES>().0);
+        let eights = prims.as_chunks::<LANES>().0.iter().zip(samples.as_chunks::<LANES>().0);
         for (k, (prims, samples)) in eights.enumerate().take(padded(points) / LANES) {
             let eight = |column: &Column| column.as_chunks::<LANES>().0[k];
             let three = |columns: &Columns| [eight(&columns[0]), eight(&columns[1]), eight(&columns[2])];

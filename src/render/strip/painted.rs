@@ -7,8 +7,8 @@ use super::columns::{Column, Columns, POINTS, Strip, get, put};
 use super::common::Common;
 use crate::accel::NO_PRIM;
 use crate::math::Vec3;
+use crate::render::beside::Traced;
 use crate::render::context::Context;
-use crate::render::eyes::Eyes;
 use crate::render::patch::Patch;
 use crate::render::shade::{
     Matter, MetalRoughMatter, MetalRoughPaint, Model, PhongMatter, PhongPaint, Reader, is_narrow,
@@ -140,7 +140,7 @@ impl Strip {
     pub(crate) fn read(
         &mut self,
         context: &Context,
-        eyes: &Eyes,
+        traced: Traced,
         (mesh, placement): (&Mesh, &Placement),
         common: &Common,
     ) {
@@ -156,7 +156,7 @@ impl Strip {
             if self.found.certain[i] != 1 || common.one_sided && self.found.front[i] != 1 {
                 continue;
             }
-            let hit = &eyes.hits[self.rays[i] as usize];
+            let hit = &traced.hits()[self.rays[i] as usize];
             if prim != hit.prim {
                 prim = hit.prim;
                 patch = Target::new(context.scene, context.world, prim).patch(context.world, hit.u, hit.v, Vec3::ZERO);

@@ -1,0 +1,234 @@
+//! What rays that were traced together have hit: sorted by instance and shaded side by side where that can be, one by one
+//! elsewhere.
+//!
+//! Where several rays of a wave belong to one sample, they are shaded one by one: what a sample gathers is added in the same
+//! order whichever rays are beside it.
+
+use super::context::Context;
+use super::curve::Feelers;
+use super::eyes::Eyes;
+use super::observer::Observer;
+use super::seam::is_same_crossing;
+use super::shade::LocalLight;
+use super::strip::{POINTS, Sorted, Strip};
+use super::surface::{Surface, Target};
+use super::wave::{Media, Path, RayClass, Wave};
+use super::whitted::{SPREAD, Tracer};
+use crate::accel::{Accel, Hit, Ray};
+use crate::math::Vec3;
+use crate::math::simd::LANES;
+
+/// Rays that were traced together.
+#[derive(Clone, Copy)]
+pub(crate) enum Traced<'a> {
+    /// From eyes: the `i`th is that of sample `i`.
+    Eyes(&'a Eyes),
+    /// Others of one class.
+    Wave(RayClass, &'a Wave),
+}
+
+impl<'a> Traced<'a> {
+    pub(crate) fn rays(self) -> &'a [Ray] {
+        match self {
+            Self::Eyes(eyes) => eyes.rays(),
+            Self::Wave(_, wave) => &wave.rays,
+        }
+    }
+
+    pub(crate) fn hits(self) -> &'a [Hit] {
+        match self {
+            Self::Eyes(eyes) => &eyes.hits,
+            Self::Wave(_, wave) => &wave.hits,
+        }
+    }
+
+    /// What the `i`th ray carries.
+    pub(crate) fn path(self, i: usize) -> Path {
+        match self {
+            Self::Eyes(eyes) => eyes.path(i),
+            Self::Wave(_, wave) => wave.paths[i],
+        }
+    }
+
+    fn class(self) -> RayClass {
+        match self {
+            Self::Eyes(_) => RayClass::Primary,
+            Self::Wave(class, _) => class,
+        }
+    }
+}
+
+/// Buffers of one worker.
+#[derive(Default)]
+pub(super) struct Beside {
+    /// Both are large: there is always one of each, but while it is at work.
+    sorted: Option<Sorted>,
+    strip: Option<Box<Strip>>,
+    /// Rays that met nothing and see the surroundings.
+    missed: Vec<u32>,
+    /// How many rays of a wave belong to each sample.
+    rays: Vec<u32>,
+}
+
+impl<A: Accel, P: Observer> Tracer<'_, A, P> {
+    /// Adds what eye rays see.
+    pub(super) fn shade_eyes(&mut self, eyes: &Eyes) {
+        let context = self.context;
+        let mut sorted = self.sort();
+        for (start, eight) in (0..).step_by(LANES).zip(eyes.hits.chunks(LANES)) {
+            // Neighbours mostly hit the same.
+            let first = eight[0].prim;
+            let alike = eight.iter().all(|hit| hit.prim == first);
+            if !(alike && eight[0].is_some() && sorted.take(context, (start, eight.len()), first)) {
+                (start..).zip(eight).for_each(|(i, hit)| self.shade_eye(eyes, &mut sorted, i, hit));
+            }
+        }
+        self.see_surroundings(Traced::Eyes(eyes));
+        self.shade_sorted(Traced::Eyes(eyes), sorted);
+    }
+
+    fn shade_eye(&mut self, eyes: &Eyes, sorted: &mut Sorted, i: u32, hit: &Hit) {
+        if hit.is_some() {
+            if !sorted.take(self.context, (i, 1), hit.prim) {
+                self.shade_one(Traced::Eyes(eyes), i as usize);
+            }
+        } else if self.context.shows_environment {
+            self.beside.missed.push(i);
+        } else {
+            self.samples[i as usize].through += Vec3::ONE;
+        }
+    }
+
+    /// Adds what the rays of a wave see.
+    pub(super) fn shade_wave(&mut self, class: RayClass, wave: &Wave) {
+        let context = self.context;
+        let traced = Traced::Wave(class, wave);
+        let mut sorted = self.sort();
+        let mut of_sample = std::mem::take(&mut self.beside.rays);
+        of_sample.clear();
+        of_sample.resize(self.samples.len(), 0);
+        wave.rays.iter().for_each(|ray| of_sample[ray.sample as usize] += 1);
+        for (i, index) in (0..wave.rays.len()).zip(0..) {
+            let (ray, path, hit) = (&wave.rays[i], &wave.paths[i], &wave.hits[i]);
+            let alone = of_sample[ray.sample as usize] == 1;
+            if !hit.is_some() {
+                if alone && !path.straight { self.beside.missed.push(index) } else { self.leave(ray, path) }
+            } else if is_same_crossing(|prim| context.world.prim(prim), ray, &wave.after[i], hit) {
+                self.continuing[class as usize].push(*ray, *path, *hit);
+            } else if !(alone && is_plain(context, path) && sorted.take(context, (index, 1), hit.prim)) {
+                self.shade_one(traced, i);
+            }
+        }
+        self.beside.rays = of_sample;
+        self.see_surroundings(traced);
+        self.shade_sorted(traced, sorted);
+    }
+
+    /// Shades what the `i`th ray has hit.
+    fn shade_one(&mut self, traced: Traced, i: usize) {
+        self.shade(traced.class(), &traced.rays()[i], &traced.path(i), &traced.hits()[i]);
+    }
+
+    fn sort(&mut self) -> Sorted {
+        let mut sorted = self.beside.sorted.take().unwrap_or_default();
+        sorted.clear(self.context.scene.instances.len());
+        sorted
+    }
+
+    /// Adds what rays that met nothing see.
+    fn see_surroundings(&mut self, traced: Traced) {
+        let mut missed = std::mem::take(&mut self.beside.missed);
+        match traced {
+            Traced::Eyes(eyes) => {
+                let rays = missed.iter().map(|&i| (i, eyes.rays()[i as usize].dir, eyes.cone_spread(i as usize)));
+                self.context.sky.each_radiance(rays, |i, radiance| self.samples[i as usize].radiance += radiance);
+            }
+            Traced::Wave(_, wave) => {
+                let rays = missed.iter().map(|&i| (i, wave.rays[i as usize].dir, wave.paths[i as usize].cone_spread));
+                self.context.sky.each_radiance(rays, |i, radiance| {
+                    let (ray, path) = (&wave.rays[i as usize], &wave.paths[i as usize]);
+                    self.samples[ray.sample as usize].radiance += path.weight * radiance;
+                });
+            }
+        }
+        missed.clear();
+        self.beside.missed = missed;
+    }
+
+    /// Shades the points that were taken, and gives the buffers back.
+    fn shade_sorted(&mut self, traced: Traced, sorted: Sorted) {
+        let mut strip = self.beside.strip.take().unwrap_or_default();
+        for k in 0..sorted.instances() {
+            let (instance, hits) = sorted.of(k);
+            for hits in hits.chunks(POINTS) {
+                self.shade_strip(traced, &sorted, (instance, hits), &mut strip);
+            }
+        }
+        self.beside.strip = Some(strip);
+        self.beside.sorted = Some(sorted);
+    }
+
+    /// Shades points of one instance side by side, as [`Self::shade`] does one by one.
+    fn shade_strip(
+        &mut self,
+        traced: Traced,
+        sorted: &Sorted,
+        (instance, hits): (u32, &[(u32, u32)]),
+        strip: &mut Strip,
+    ) {
+        let context = self.context;
+        let mesh = &context.scene.meshes[context.scene.instances[instance as usize].mesh as usize];
+        let Some(common) = &context.common[mesh.material as usize] else { return };
+        let (smooth, reads) = (!mesh.normals.is_empty(), common.mapped || !mesh.colors.is_empty());
+        let (matter, shiny, placement) = (&common.matter, common.shiny, context.world.placement(instance));
+        strip.take(hits, sorted, traced, smooth);
+        strip.find(smooth.then_some(placement));
+        if reads || shiny {
+            strip.widen(traced);
+        }
+        if reads {
+            strip.read(context, traced, (mesh, placement), common);
+        }
+        if shiny {
+            strip.bend(context, matter, smooth.then_some(placement));
+        }
+        for index in strip.left_out(common.one_sided) {
+            self.shade_one(traced, index as usize);
+        }
+        if !context.is_dark || matter.shines() {
+            strip.look_around(matter, &context.sky, context.scene.ambient);
+            strip.shown().for_each(|(sample, everywhere)| self.add(sample, everywhere));
+        }
+        let outside = context.absorption.is_some().then(Media::default);
+        for light in &context.lights {
+            strip.shine((matter, shiny), light);
+            if !light.shadows {
+                strip.shone().for_each(|(sample, radiance)| self.add(sample, radiance));
+                continue;
+            }
+            strip.send(&mut self.shadows, outside);
+            for (i, radiance) in strip.grazed() {
+                let (ray, hit) = (&traced.rays()[i as usize], &traced.hits()[i as usize]);
+                if let Some(feelers) = feelers(context, light, ray, hit) {
+                    self.shadows.push_feelers(&feelers, radiance, outside);
+                }
+            }
+        }
+        if shiny && context.depth > 0 {
+            strip.mirror(context, matter, traced, &mut self.starting[RayClass::Reflected as usize]);
+        }
+        self.relieve_shadows();
+    }
+}
+
+/// Whether a path leaves what it hits as it is: no roughness has blurred it, and nothing absorbs its light.
+fn is_plain(context: &Context, path: &Path) -> bool {
+    path.scattered <= SPREAD && !(context.absorption.is_some() && path.media.innermost().is_some())
+}
+
+/// What finds out whether a light shines on the round surface at `hit`.
+fn feelers(context: &Context, light: &LocalLight, ray: &Ray, hit: &Hit) -> Option<Feelers> {
+    let target = Target::new(context.scene, context.world, hit.prim);
+    let surface = Surface::new(context.world, target, ray, hit, 0.0);
+    surface.feelers(&light.incident(surface.position)?, ray.sample)
+}
