@@ -239,21 +239,32 @@ impl Kernel for TurnNormals<'_> {
     fn run<S: Simd>(self, _: S) {
         let Self { given, found, painted, points, placement, smooth, scale } = self;
         let placement = *placement;
+        // In several loops, between which numbers lie in columns of their own: so compilers make lanes of each.
+        let (mut own, mut tangent, mut turned) = ([[0.0; POINTS]; 3], [[0.0; POINTS]; 4], [[0.0; POINTS]; 3]);
         for i in 0..points.min(POINTS) {
             let (faces, [u, v]) = (&given.faces, [given.weights[0][i], given.weights[1][i]]);
-            let weights = [1.0 - u - v, u, v];
             let [a, b, c] = faces.normals(i);
-            let mixed = smooth_normal(&placement, a * weights[0] + b * weights[1] + c * weights[2]);
-            let own = if smooth { mixed.unwrap_or(faces.outward(i)) } else { faces.outward(i) };
+            let mixed = smooth_normal(&placement, a * (1.0 - u - v) + b * u + c * v);
+            put(&mut own, i, if smooth { mixed.unwrap_or(faces.outward(i)) } else { faces.outward(i) });
+        }
+        for i in 0..points.min(POINTS) {
+            let (faces, [u, v]) = (&given.faces, [given.weights[0][i], given.weights[1][i]]);
             let [a, b, c] = faces.tangents(i);
-            let tangent = given_tangent(&placement, a * weights[0] + b * weights[1] + c * weights[2], own);
-            let (tangent, sign) = tangent.unwrap_or((Vec3::NAN, 1.0));
-            let frame = [tangent, own.cross(tangent) * sign];
-            let turned = turned_by_texel(own, frame, painted.normal_texel(i), scale).unwrap_or(own);
-            let side = side_of(own, get(&found.geometric, i));
-            put(&mut found.normal, i, facing(turned * side, get(&found.view, i)));
+            let along = given_tangent(&placement, a * (1.0 - u - v) + b * u + c * v, get(&own, i));
+            let (along, sign) = along.unwrap_or((Vec3::NAN, 1.0));
+            (tangent[0][i], tangent[1][i], tangent[2][i], tangent[3][i]) = (along.x, along.y, along.z, sign);
+        }
+        for i in 0..points.min(POINTS) {
+            let (own, [x, y, z, sign]) = (get(&own, i), [tangent[0][i], tangent[1][i], tangent[2][i], tangent[3][i]]);
+            let along = Vec3::new(x, y, z);
+            let frame = [along, own.cross(along) * sign];
+            put(&mut turned, i, turned_by_texel(own, frame, painted.normal_texel(i), scale).unwrap_or(own));
+        }
+        for i in 0..points.min(POINTS) {
+            let side = side_of(get(&own, i), get(&found.geometric, i));
+            put(&mut found.normal, i, facing(get(&turned, i) * side, get(&found.view, i)));
             // Without a tangent it takes the coordinates around.
-            found.certain[i] &= u32::from(tangent.is_finite());
+            found.certain[i] &= u32::from(tangent[0][i].is_finite());
         }
     }
 }

@@ -323,12 +323,10 @@ impl Axis {
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "within ±2²³ both casts are exact")]
 fn floor(x: f32) -> f32 {
-    // Larger numbers are whole.
-    if x.abs() >= 8_388_608.0 {
-        return x;
-    }
     let truncated = x as i32 as f32;
-    if truncated > x { truncated - 1.0 } else { truncated }
+    let below = if truncated > x { truncated - 1.0 } else { truncated };
+    // Larger numbers are whole.
+    if x.abs() >= 8_388_608.0 { x } else { below }
 }
 
 /// The texel that stands at place `i` of a row that goes on for ever.

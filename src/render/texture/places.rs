@@ -4,9 +4,7 @@
 //! [`Lookup::filtered`](super::Lookup) finds one by one, and texels are summed in its order: the same bits.
 
 use super::pyramid::{self, Plane, Stored};
-use super::{
-    ColorSpace, Lookup, MAX_PROBES, TextureStore, apart, decode, doublings, floor, pixels, probes, size_of, wrapped,
-};
+use super::{ColorSpace, Lookup, MAX_PROBES, TextureStore, apart, decode, doublings, floor, pixels, probes, size_of};
 use crate::math::simd::LANES;
 use crate::math::{Vec2, Vec4};
 use crate::scene::{Filter, Mipmaps, Sampler, Wrap};
@@ -113,13 +111,13 @@ pub(crate) fn changes(
 /// The texel in which each coordinate along one axis lies.
 #[inline(always)]
 fn nearest(c: &Eight, sides: &[u32; LANES], wrap: Wrap) -> [u32; LANES] {
-    let (c, mut texels) = (periods(c, wrap), [0; LANES]);
+    let (c, mut places) = (periods(c, wrap), [0; LANES]);
     for i in 0..LANES {
         #[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "sides are below 2²³")]
         let at = floor(c[i] * sides[i] as f32) as i32;
-        texels[i] = inside(at, sides[i], wrap);
+        places[i] = at;
     }
-    texels
+    inside(&places, sides, wrap)
 }
 
 /// The sides of a map in the level so far above that of each point.
@@ -247,11 +245,17 @@ impl Places {
         let Some((sampler, source)) = store.find(texture) else { return };
         let pyramid = if space == ColorSpace::Srgb { &source.srgb } else { &source.linear };
         let lookup = Lookup { bitmap: source.bitmap, pyramid, space, sampler };
+        // Neighbours mostly read the same levels.
+        let (mut level, mut plane, mut above) = (self.level[0], lookup.plane(self.level[0] as usize), None);
         for (i, to) in to.iter_mut().enumerate().take(LANES) {
-            let level = self.level[i] as usize;
-            *to = self.of_level(&lookup.plane(level), 0, i);
+            if self.level[i] != level {
+                level = self.level[i];
+                (plane, above) = (lookup.plane(level as usize), None);
+            }
+            *to = self.of_level(&plane, 0, i);
             if self.between[i] == 1 {
-                let upper = self.of_level(&lookup.plane(level + 1), 1, i);
+                let above = above.get_or_insert_with(|| lookup.plane(level as usize + 1));
+                let upper = self.of_level(above, 1, i);
                 *to += (upper - *to) * self.share[i];
             }
         }
@@ -317,46 +321,53 @@ struct Pairs {
 impl Pairs {
     #[inline(always)]
     fn find(c: &Eight, sides: &[u32; LANES], wrap: Wrap) -> Self {
-        let period = periods(c, wrap);
-        let (mut near, mut share) = ([0_i32; LANES], [0.0; LANES]);
-        let mut outside = 0;
+        let (period, mut below, mut share) = (periods(c, wrap), [0; LANES], [0.0; LANES]);
         for i in 0..LANES {
             #[expect(clippy::cast_precision_loss, reason = "sides are below 2²³")]
             let place = period[i] * sides[i] as f32 - 0.5;
-            let below = floor(place);
-            share[i] = place - below;
+            let whole = floor(place);
             #[expect(clippy::cast_possible_truncation, reason = "no farther than two sides")]
-            let at = below as i32;
-            near[i] = at;
-            outside |= u32::from((at < 0) | (at.wrapping_add(1) >= sides[i].cast_signed()));
+            let at = whole as i32;
+            (below[i], share[i]) = (at, place - whole);
         }
-        let (mut first, mut second) = ([0; LANES], [0; LANES]);
-        if outside == 0 {
-            for i in 0..LANES {
-                (first[i], second[i]) = (near[i].cast_unsigned(), near[i].cast_unsigned() + 1);
-            }
-        } else {
-            for i in 0..LANES {
-                (first[i], second[i]) = (inside(near[i], sides[i], wrap), inside(near[i] + 1, sides[i], wrap));
-            }
-        }
-        Self { near: first, far: second, share }
+        let near = inside(&below, sides, wrap);
+        below.iter_mut().for_each(|at| *at += 1);
+        Self { near, far: inside(&below, sides, wrap), share }
     }
 }
 
-/// The texel that stands at place `i` of a row of so many that goes on for ever.
+/// The texels that stand at such places of rows that go on for ever, from one before the first on to one behind the last:
+/// that of the second row, of which every other is mirrored.
 #[inline(always)]
-fn inside(i: i32, len: u32, wrap: Wrap) -> u32 {
-    let signed = len.cast_signed();
+fn inside(places: &[i32; LANES], sides: &[u32; LANES], wrap: Wrap) -> [u32; LANES] {
+    let mut texels = [0; LANES];
     match wrap {
-        Wrap::Repeat if (-1..=signed).contains(&i) => {
-            let up = if i < 0 { signed - 1 } else { i };
-            (if up >= signed { up - signed } else { up }).cast_unsigned()
+        Wrap::Repeat => {
+            for i in 0..LANES {
+                texels[i] = again(places[i], sides[i].cast_signed()).cast_unsigned();
+            }
         }
-        Wrap::Clamp => i.clamp(0, signed - 1).cast_unsigned(),
-        #[expect(clippy::cast_possible_truncation, reason = "it is less than `len`")]
-        _ => wrapped(i64::from(i), len as usize, wrap) as u32,
+        Wrap::Mirror => {
+            for i in 0..LANES {
+                let both = 2 * sides[i].cast_signed();
+                let at = again(places[i], both);
+                texels[i] = at.min(both - 1 - at).cast_unsigned();
+            }
+        }
+        Wrap::Clamp => {
+            for i in 0..LANES {
+                texels[i] = places[i].max(0).min(sides[i].cast_signed() - 1).cast_unsigned();
+            }
+        }
     }
+    texels
+}
+
+/// A place of a row that is repeated, from −`len` to less than 2 `len`.
+#[inline(always)]
+fn again(place: i32, len: i32) -> i32 {
+    let up = if place < 0 { place + len } else { place };
+    if up >= len { up - len } else { up }
 }
 
 /// The whole part of what is not negative.
