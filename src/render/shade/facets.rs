@@ -167,9 +167,10 @@ fn between(n_v: f32, entry: impl Fn(usize) -> (f32, f32)) -> (f32, f32) {
 /// of 2 E(μ) μ over [`ALBEDO`]'s rows.
 const MEAN_ALBEDO: [f32; 9] = [1.000, 0.999, 0.987, 0.951, 0.883, 0.781, 0.657, 0.529, 0.410];
 
-/// [`MEAN_ALBEDO`] at any roughness.
+/// The mean over the hemisphere of what a white lobe of any roughness sends back.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "lies in 0 … 8")]
-fn mean_albedo(roughness: f32) -> f32 {
+#[inline(always)]
+pub(crate) fn mean_albedo(roughness: f32) -> f32 {
     let y = roughness.clamp(0.0, 1.0) * 8.0;
     let row = (y as usize).min(7);
     MEAN_ALBEDO[row] + (MEAN_ALBEDO[row + 1] - MEAN_ALBEDO[row]) * (y - row as f32)
@@ -180,9 +181,9 @@ fn mean_albedo(roughness: f32) -> f32 {
 ///
 /// The microfacet model follows light to one facet only and so loses what meets a second: two thirds on the roughest
 /// metal. This colours it once more by each bounce (C. Fdez-Agüera, "A Multiple-Scattering Microfacet Model for Real-Time
-/// Image-Based Lighting", 2019); `f0` is the metal's colour face on.
-pub(super) fn rebound(roughness: f32, f0: Vec3) -> Vec3 {
-    let mean = mean_albedo(roughness);
+/// Image-Based Lighting", 2019); `mean` is [`mean_albedo`], `f0` the metal's colour face on.
+#[inline(always)]
+pub(super) fn rebound(mean: f32, f0: Vec3) -> Vec3 {
     // The mean of Schlick's reflectance over the hemisphere.
     let f0 = f0.min(Vec3::ONE);
     let once = f0 + (Vec3::ONE - f0) / 21.0;
@@ -210,9 +211,9 @@ mod tests {
     fn white_metal_sends_everything_back_and_colours_deepen() {
         for roughness in [0.0, 0.3, 0.6, 1.0] {
             let (scale, bias) = albedo(roughness, 0.7);
-            assert!((rebound(roughness, Vec3::ONE).x - 1.0).abs() < 1e-6 && scale + bias <= 1.0);
+            assert!((rebound(mean_albedo(roughness), Vec3::ONE).x - 1.0).abs() < 1e-6 && scale + bias <= 1.0);
         }
-        let gold = rebound(0.8, Vec3::new(1.0, 0.7, 0.3));
+        let gold = rebound(mean_albedo(0.8), Vec3::new(1.0, 0.7, 0.3));
         assert!(gold.y / gold.x < 0.7 && gold.z / gold.y < 0.3 / 0.7, "{gold}");
     }
 }

@@ -10,7 +10,7 @@
 //! A translucent surface scatters a share of what enters it to its other side, evenly in all directions: half spaces
 //! change places, and Fresnel takes off as much as if the light stood where it is mirrored.
 
-use super::facets::{AlbedoRow, albedo, rebound};
+use super::facets::{AlbedoRow, albedo, mean_albedo, rebound};
 use super::{Balance, GrainMatter, Reader, Seen, Sky, film};
 use crate::math::{Vec3, Vec4};
 use crate::render::optics::{fresnel_dielectric, fresnel_schlick, transmittance};
@@ -320,7 +320,7 @@ impl MetalRoughMatter {
             open: if looked_up { open(n_v, self.occlusion, roughness) } else { 0.0 },
             outside: seen.outside,
         };
-        let rebound = if self.metallic > 0.0 { self.rebound() } else { Vec3::ZERO };
+        let rebound = if self.metallic > 0.0 { self.rebound(mean_albedo(roughness)) } else { Vec3::ZERO };
         let (mut sum, taken) = self.around(&around, rebound);
         if self.is_translucent() {
             let behind = sky.diffuse(-seen.normal) + ambient;
@@ -374,10 +374,10 @@ impl MetalRoughMatter {
         AlbedoRow::of(self.roughness)
     }
 
-    /// What comes of light that its facets send to each other.
+    /// What comes of light that its facets send to each other, by the mean albedo of its lobe.
     #[inline(always)]
-    pub(crate) fn rebound(&self) -> Vec3 {
-        rebound(self.mean_roughness(), self.metal_f0)
+    pub(crate) fn rebound(&self, mean_albedo: f32) -> Vec3 {
+        rebound(mean_albedo, self.metal_f0)
     }
 
     /// Perceptual roughness.

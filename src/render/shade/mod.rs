@@ -16,7 +16,7 @@ mod sheen;
 mod spectrum;
 
 pub(crate) use coat::CoatMatter;
-pub(crate) use facets::{AlbedoRow, albedo};
+pub(crate) use facets::{AlbedoRow, albedo, mean_albedo};
 pub(crate) use grain::GrainMatter;
 pub(crate) use light::{Incident, LocalLight, way};
 pub(crate) use lobe::Lobe;

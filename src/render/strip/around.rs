@@ -4,7 +4,9 @@ use super::columns::{Column, Columns, Found, POINTS, Strip, get, padded, put};
 use super::painted::Painted;
 use crate::math::Vec3;
 use crate::math::simd::{Kernel, Simd};
-use crate::render::shade::{AlbedoRow, Around, Matter, MetalRoughMatter, Model, PhongMatter, albedo, open};
+use crate::render::shade::{
+    AlbedoRow, Around, Matter, MetalRoughMatter, Model, PhongMatter, albedo, mean_albedo, open,
+};
 use crate::render::sky::Sky;
 use crate::render::studio;
 use crate::scene::UpAxis;
@@ -14,6 +16,8 @@ pub(super) struct Surroundings {
     /// Cosine of the view, and the shares of f0 and f90 there.
     n_v: Column,
     shares: [Column; 2],
+    /// Mean of both over the hemisphere.
+    mean: Column,
     /// Share of the mirrored surroundings that nothing stands in the way of.
     open: Column,
     mirrored_dir: Columns,
@@ -28,6 +32,7 @@ impl Default for Surroundings {
         Self {
             n_v: one,
             shares: [one; 2],
+            mean: one,
             open: one,
             mirrored_dir: three,
             diffuse: three,
@@ -108,7 +113,8 @@ impl Kernel for Look<'_> {
             }
             Model::MetalRough(m) if painted.any => look(&Mapped { m: *m, painted }, found, to, points, sky, ambient),
             Model::MetalRough(m) => {
-                look(&Even { m: m.in_the_open(), row: m.shares(), emission }, found, to, points, sky, ambient);
+                let even = Even { m: m.in_the_open(), row: m.shares(), mean: mean_albedo(m.roughness()), emission };
+                look(&even, found, to, points, sky, ambient);
             }
         }
     }
@@ -129,6 +135,8 @@ trait MetalRoughPoints {
     fn emission(&self, i: usize) -> Vec3;
     /// Shares of f0 and f90 in what its lobe sends back where the cosine of the view is `n_v`.
     fn shares(&self, i: usize, n_v: f32) -> (f32, f32);
+    /// Mean of what a white lobe sends back over the hemisphere.
+    fn mean_albedo(&self, i: usize) -> f32;
     /// Share of the mirrored surroundings that nothing stands in the way of.
     fn open(&self, i: usize, n_v: f32) -> f32;
 }
@@ -137,6 +145,7 @@ trait MetalRoughPoints {
 struct Even {
     m: MetalRoughMatter,
     row: AlbedoRow,
+    mean: f32,
     emission: Vec3,
 }
 
@@ -154,6 +163,11 @@ impl MetalRoughPoints for Even {
     #[inline(always)]
     fn shares(&self, _: usize, n_v: f32) -> (f32, f32) {
         self.row.at(n_v)
+    }
+
+    #[inline(always)]
+    fn mean_albedo(&self, _: usize) -> f32 {
+        self.mean
     }
 
     #[inline(always)]
@@ -185,6 +199,11 @@ impl MetalRoughPoints for Mapped<'_> {
     }
 
     #[inline(always)]
+    fn mean_albedo(&self, i: usize) -> f32 {
+        mean_albedo(self.painted.roughness[i])
+    }
+
+    #[inline(always)]
     fn open(&self, i: usize, n_v: f32) -> f32 {
         open(n_v, self.painted.occlusion[i], self.painted.roughness[i])
     }
@@ -199,6 +218,9 @@ fn look(m: &impl MetalRoughPoints, found: &Found, to: &mut Surroundings, points:
     }
     for i in 0..points.min(POINTS) {
         (to.shares[0][i], to.shares[1][i]) = m.shares(i, to.n_v[i]);
+    }
+    for i in 0..points.min(POINTS) {
+        to.mean[i] = m.mean_albedo(i);
     }
     for i in 0..points.min(POINTS) {
         to.open[i] = m.open(i, to.n_v[i]);
@@ -216,7 +238,7 @@ fn look(m: &impl MetalRoughPoints, found: &Found, to: &mut Surroundings, points:
             outside: true,
         };
         let matter = m.matter(i);
-        put(&mut to.radiance, i, m.emission(i) + matter.around(&around, matter.rebound()).0);
+        put(&mut to.radiance, i, m.emission(i) + matter.around(&around, matter.rebound(to.mean[i])).0);
     }
 }
 

@@ -325,11 +325,12 @@ impl Found {
 mod tests {
     use super::super::sorted::Face;
     use super::*;
-    use crate::accel::NO_PRIM;
+    use crate::accel::{Hit, NO_PRIM, Ray};
     use crate::math::random::Random;
     use crate::math::{DMat3, DVec3};
     use crate::render::shade::{LocalLight, Matter};
     use crate::render::texture::TextureStore;
+    use crate::render::wave::{Path, RayClass, Wave};
     use crate::scene::{Falloff, Light, LightKind, Material, Scene};
 
     /// Random triangles hit in their middles.
@@ -347,8 +348,13 @@ mod tests {
             faces.push(Face::of_triangle(i, &corners, Some(normals)));
         }
         let hit: Vec<(u32, u32)> = (0..61).map(|i| (i, i)).collect();
-        strip.take(&hit, &Sorted::of_faces(faces), &rays, &hits, true);
+        strip.take(&hit, &Sorted::of_faces(faces), Traced::Wave(RayClass::Reflected, &wave(rays, hits)), true);
         strip
+    }
+
+    fn wave(rays: Vec<Ray>, hits: Vec<Hit>) -> Wave {
+        let paths = vec![Path::from_eye(0.0, 0.0); rays.len()];
+        Wave { after: vec![Hit::MISS; rays.len()], rays, paths, hits }
     }
 
     fn found(level: Level, placement: Option<&Placement>) -> Vec<[u32; 20]> {
@@ -380,10 +386,11 @@ mod tests {
             dir: -Vec3::new(number(i), number(i) + 0.25, number(i) + 0.5),
             t_max: f32::INFINITY,
             exclude: NO_PRIM,
-            sample: 0,
+            sample: i as u32,
         };
         let rays: Vec<Ray> = (0..100).map(ray).collect();
         let hits: Vec<Hit> = (0..100).map(|i| Hit { t: 1.0, u: number(i), v: -number(i), prim: 7 }).collect();
+        let wave = wave(rays, hits);
         let face = |prim| {
             let corners = [(); 3].map(|()| random.cube());
             Face::of_triangle(prim, &corners, Some([(); 3].map(|()| random.direction())))
@@ -396,10 +403,11 @@ mod tests {
         for level in Level::all() {
             for count in [1, 7, 8, 40, POINTS] {
                 let mut strip = Strip { level, ..Strip::default() };
-                strip.take(&hit[..count], &sorted, &rays, &hits, true);
+                strip.take(&hit[..count], &sorted, Traced::Wave(RayClass::Reflected, &wave), true);
                 let given = &strip.given;
                 for (i, &(index, face)) in hit[..count].iter().enumerate() {
-                    let (ray, of_hit) = (&rays[index as usize], &hits[index as usize]);
+                    let (ray, of_hit) = (&wave.rays[index as usize], &wave.hits[index as usize]);
+                    assert_eq!(strip.samples[i], index);
                     assert_eq!((get(&given.origin, i), get(&given.dir, i)), (ray.origin, ray.dir));
                     assert_eq!((given.weights[0][i], given.weights[1][i]), (of_hit.u, of_hit.v));
                     let numbers = sorted.faces()[face as usize].numbers;

@@ -1,7 +1,8 @@
 //! What all points of a material have in common.
 
 use super::sheet::Sheet;
-use crate::render::shade::{Matter, Model};
+use crate::render::context::coverage;
+use crate::render::shade::{Matter, Model, lets_light_in};
 use crate::render::texture::TextureStore;
 use crate::scene::{Material, MetalRough};
 
@@ -20,10 +21,12 @@ pub(crate) struct Common {
 }
 
 impl Common {
-    /// `None` for materials with a grain, film, sheen or lacquer, and for those that let light through or scatter it through.
+    /// `None` for materials with a grain, film, sheen or lacquer, for those that let light through or scatter it through, and
+    /// for those that are nowhere there as a whole.
     pub(crate) fn of(material: &Material, store: &TextureStore, bounces: bool) -> Option<Self> {
         let metal_rough = material.metal_rough();
-        if !material.is_opaque()
+        if lets_light_in(material)
+            || coverage(material, material.opacity) < 1.0
             || metal_rough.is_some_and(|m| m.thick || m.has_lobes() || m.translucence.is_some() || has_other_maps(m))
         {
             return None;

@@ -8,7 +8,7 @@ use super::common::Common;
 use crate::accel::NO_PRIM;
 use crate::math::Vec3;
 use crate::render::beside::Traced;
-use crate::render::context::Context;
+use crate::render::context::{Context, coverage};
 use crate::render::patch::Patch;
 use crate::render::shade::{
     Matter, MetalRoughMatter, MetalRoughPaint, Model, PhongMatter, PhongPaint, Reader, is_narrow,
@@ -135,8 +135,8 @@ impl Painted {
 }
 
 impl Strip {
-    /// Reads what maps and vertices say at the points, of a mesh of `material` that an instance has placed so, and leaves out
-    /// those that cannot be shaded beside others then.
+    /// Reads what maps and vertices say at the points of a mesh that an instance has placed so, and leaves out those that are
+    /// not there as a whole.
     pub(crate) fn read(
         &mut self,
         context: &Context,
@@ -172,7 +172,12 @@ impl Strip {
 
     fn read_at(&mut self, i: usize, context: &Context, material: &Material, patch: &Patch, glows: bool) {
         let reader = Reader { store: context.textures, patch: Some(patch) };
-        self.painted.put(i, &Matter::read(material, reader.base(material).truncate(), &reader));
+        let base = reader.base(material);
+        if coverage(material, base.w) < 1.0 {
+            self.found.certain[i] = 0;
+            return;
+        }
+        self.painted.put(i, &Matter::read(material, base.truncate(), &reader));
         if material.normal_map.is_some() || material.bump_map.is_some() {
             let (view, geometric) = (get(&self.found.view, i), get(&self.found.geometric, i));
             let outward = if self.found.front[i] == 1 { geometric } else { -geometric };

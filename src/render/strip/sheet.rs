@@ -6,7 +6,7 @@ use super::faces::Faces;
 use super::painted::Painted;
 use crate::math::simd::{Kernel, Simd};
 use crate::math::{Vec2, Vec3, Vec4};
-use crate::render::context::Context;
+use crate::render::context::{Context, coverage};
 use crate::render::patch::{Turn, given_tangent, smooth_normal, turned_by_texel, turning_of};
 use crate::render::shade::{MetalRoughPaint, PhongPaint, base_color, occlusion};
 use crate::render::surface::{facing, side_of};
@@ -18,6 +18,7 @@ use crate::scene::{Material, Mesh, Surface, TextureRef};
 #[derive(Clone, Copy, Debug)]
 enum Slot {
     Base,
+    Opacity,
     Emission,
     Occlusion,
     Normal,
@@ -27,7 +28,7 @@ enum Slot {
     Shininess,
 }
 
-const SLOTS: usize = 8;
+const SLOTS: usize = 9;
 
 /// What the maps of eight points say.
 type Texels = [[Vec4; LANES]; SLOTS];
@@ -108,6 +109,7 @@ fn maps(material: &Material) -> Vec<(Slot, &TextureRef, ColorSpace)> {
     };
     let all = [
         (Slot::Base, material.base_color_map.as_ref(), ColorSpace::Srgb),
+        (Slot::Opacity, material.opacity_map.as_ref(), ColorSpace::Linear),
         (Slot::Emission, material.emission_map.as_ref(), ColorSpace::Srgb),
         (Slot::Occlusion, material.occlusion_map.as_ref(), ColorSpace::Linear),
         (Slot::Normal, material.normal_map.as_ref(), ColorSpace::Linear),
@@ -137,7 +139,8 @@ impl Strip {
         let widens = !context.lights.is_empty() && material.metal_rough().is_some();
         let turns = sheet.normal_map.as_ref().filter(|_| widens).map(|(texture, layout)| (*texture, layout, reach));
         let weights = &given.weights;
-        level.run(Read { sheet, material, store, faces, weights, cones, painted, places, turns, count });
+        let certain = &mut found.certain;
+        level.run(Read { sheet, material, store, faces, weights, certain, cones, painted, places, turns, count });
         if sheet.normal_map.is_some() {
             let points = padded(count);
             let scale = material.normal_scale;
@@ -152,6 +155,7 @@ struct Read<'a> {
     store: &'a TextureStore<'a>,
     faces: &'a Faces,
     weights: &'a [[f32; POINTS]; 2],
+    certain: &'a mut [u32; POINTS],
     cones: &'a mut Cones,
     painted: &'a mut Painted,
     places: &'a mut Places,
@@ -165,7 +169,7 @@ impl Kernel for Read<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Self { sheet, material, store, faces, weights, cones, painted, places, turns, count } = self;
+        let Self { sheet, material, store, faces, weights, certain, cones, painted, places, turns, count } = self;
         for start in (0..count.min(POINTS)).step_by(LANES) {
             let mut spots = Spots::default();
             for lane in 0..LANES {
@@ -186,7 +190,8 @@ impl Kernel for Read<'_> {
                 }
             }
             for lane in 0..points {
-                paint(painted, start + lane, material, |slot| texels[slot as usize][lane]);
+                let whole = paint(painted, start + lane, material, |slot| texels[slot as usize][lane]);
+                certain[start + lane] &= u32::from(whole);
             }
             if let Some((texture, layout, reach)) = turns {
                 let mut narrow = [false; LANES];
@@ -202,10 +207,11 @@ impl Kernel for Read<'_> {
     }
 }
 
-/// What maps make of a material at a point.
+/// What maps make of a material at a point; tells whether it is there as a whole.
 #[inline(always)]
-fn paint(painted: &mut Painted, i: usize, material: &Material, texel: impl Fn(Slot) -> Vec4) {
-    let base = base_color(material, texel(Slot::Base), 1.0, Vec4::ONE).truncate();
+fn paint(painted: &mut Painted, i: usize, material: &Material, texel: impl Fn(Slot) -> Vec4) -> bool {
+    let base = base_color(material, texel(Slot::Base), texel(Slot::Opacity).x, Vec4::ONE);
+    let (base, whole) = (base.truncate(), coverage(material, base.w) >= 1.0);
     painted.put_emission(i, material.emission * texel(Slot::Emission).truncate());
     painted.put_normal_texel(i, texel(Slot::Normal).truncate());
     match &material.surface {
@@ -219,6 +225,7 @@ fn paint(painted: &mut Painted, i: usize, material: &Material, texel: impl Fn(Sl
             painted.put_metal_rough(i, MetalRoughPaint::of(m, base, open, texel(Slot::MetalRough)));
         }
     }
+    whole
 }
 
 /// Turns normals by the texels of a normal map.

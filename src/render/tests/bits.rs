@@ -150,6 +150,11 @@ fn painted() -> Stage {
         material.occlusion_map = map(1);
         (material.emission, material.emission_map) = (Vec3::new(0.1, 0.2, 0.1), map(2));
         material.normal_map = map(1).filter(|_| i % 2 == 0);
+        material.alpha_mode = match i {
+            2 | 4 => AlphaMode::Mask { cutoff: 0.4 },
+            1 | 6 => AlphaMode::Blend,
+            _ => AlphaMode::Opaque,
+        };
         (material.bump_map, material.bump_scale) = (map(2).filter(|_| i % 3 == 0), 0.1);
         match &mut material.surface {
             Reflection::MetalRough(m) => (m.metal_rough_map, m.roughness) = (map(1), 1.0),
