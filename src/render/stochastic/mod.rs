@@ -107,7 +107,9 @@ fn pixels(rings: &[Tile], settings: &Settings) -> Vec<Pixel> {
     let mut pixels = Vec::with_capacity(rings[rings.len() - 1].pixels());
     for (k, ring) in rings.iter().enumerate() {
         let is_new = |&at: &(u32, u32)| k == 0 || !rings[k - 1].contains(at);
-        pixels.extend(ring.places().filter(is_new).map(|at| Pixel::new(settings.seed, at, settings.layers)));
+        let new = ring.places().filter(is_new);
+        // From inside the loops of places, which a `for` would leave and enter again for each.
+        new.for_each(|at| pixels.push(Pixel::new(settings.seed, at, settings.layers)));
     }
     pixels
 }

@@ -1,6 +1,6 @@
 //! Maps of a material that points of a strip read side by side: those that share their coordinates.
 
-use super::columns::{Found, Given, LANES, POINTS, Strip, get, padded, put};
+use super::columns::{Column, Columns, Found, Given, LANES, POINTS, Strip, get, padded, put};
 use super::cones::Cones;
 use super::faces::Faces;
 use super::painted::Painted;
@@ -246,32 +246,48 @@ impl Kernel for TurnNormals<'_> {
     fn run<S: Simd>(self, _: S) {
         let Self { given, found, painted, points, placement, smooth, scale } = self;
         let placement = *placement;
-        // In several loops, between which numbers lie in columns of their own: so compilers make lanes of each.
-        let (mut own, mut tangent, mut turned) = ([[0.0; POINTS]; 3], [[0.0; POINTS]; 4], [[0.0; POINTS]; 3]);
+        let mut turns = Turns::default();
         for i in 0..points.min(POINTS) {
             let (faces, [u, v]) = (&given.faces, [given.weights[0][i], given.weights[1][i]]);
             let [a, b, c] = faces.normals(i);
             let mixed = smooth_normal(&placement, a * (1.0 - u - v) + b * u + c * v);
-            put(&mut own, i, if smooth { mixed.unwrap_or(faces.outward(i)) } else { faces.outward(i) });
+            put(&mut turns.own, i, if smooth { mixed.unwrap_or(faces.outward(i)) } else { faces.outward(i) });
         }
         for i in 0..points.min(POINTS) {
             let (faces, [u, v]) = (&given.faces, [given.weights[0][i], given.weights[1][i]]);
             let [a, b, c] = faces.tangents(i);
-            let along = given_tangent(&placement, a * (1.0 - u - v) + b * u + c * v, get(&own, i));
-            let (along, sign) = along.unwrap_or((Vec3::NAN, 1.0));
-            (tangent[0][i], tangent[1][i], tangent[2][i], tangent[3][i]) = (along.x, along.y, along.z, sign);
+            let tangent = given_tangent(&placement, a * (1.0 - u - v) + b * u + c * v, get(&turns.own, i));
+            let (tangent, sign) = tangent.unwrap_or((Vec3::NAN, 1.0));
+            put(&mut turns.tangent, i, tangent);
+            turns.sign[i] = sign;
         }
         for i in 0..points.min(POINTS) {
-            let (own, [x, y, z, sign]) = (get(&own, i), [tangent[0][i], tangent[1][i], tangent[2][i], tangent[3][i]]);
-            let along = Vec3::new(x, y, z);
-            let frame = [along, own.cross(along) * sign];
-            put(&mut turned, i, turned_by_texel(own, frame, painted.normal_texel(i), scale).unwrap_or(own));
+            let (own, tangent) = (get(&turns.own, i), get(&turns.tangent, i));
+            let frame = [tangent, own.cross(tangent) * turns.sign[i]];
+            let turned = turned_by_texel(own, frame, painted.normal_texel(i), scale).unwrap_or(own);
+            put(&mut turns.turned, i, turned);
         }
         for i in 0..points.min(POINTS) {
-            let side = side_of(get(&own, i), get(&found.geometric, i));
-            put(&mut found.normal, i, facing(get(&turned, i) * side, get(&found.view, i)));
+            let side = side_of(get(&turns.own, i), get(&found.geometric, i));
+            put(&mut found.normal, i, facing(get(&turns.turned, i) * side, get(&found.view, i)));
             // Without a tangent it takes the coordinates around.
-            found.certain[i] &= u32::from(tangent[0][i].is_finite());
+            found.certain[i] &= u32::from(turns.tangent[0][i].is_finite());
         }
+    }
+}
+
+/// The steps from a mesh's own normal to the turned one: in columns that nothing else can point at, so that compilers make
+/// lanes of each.
+struct Turns {
+    own: Columns,
+    tangent: Columns,
+    sign: Column,
+    turned: Columns,
+}
+
+impl Default for Turns {
+    fn default() -> Self {
+        let three = [[0.0; POINTS]; 3];
+        Self { own: three, tangent: three, sign: [0.0; POINTS], turned: three }
     }
 }

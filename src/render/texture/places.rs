@@ -72,10 +72,10 @@ pub(crate) fn changes(
     let lookup = Lookup { bitmap: source.bitmap, pyramid: &source.linear, space: ColorSpace::Linear, sampler };
     let size = pixels((layout.width as usize, layout.height as usize));
     let mut level = [0; LANES];
-    for i in 0..LANES {
+    for (i, level) in level.iter_mut().enumerate() {
         let [along, across] = at.axes(i).map(|axis| (axis * size).length());
         let doublings = doublings(along.max(across)).min(layout.top);
-        level[i] = if layout.mipmaps == Mipmaps::None { 0 } else { doublings };
+        *level = if layout.mipmaps == Mipmaps::None { 0 } else { doublings };
     }
     let (width, height) = (sides(layout.width, &level, 0), sides(layout.height, &level, 0));
     // The point itself, and a step along each axis; how long that is.
@@ -300,8 +300,8 @@ impl Taps {
     fn find(&mut self, layout: &Layout, uv: &[Eight; 2], level: &[u32; LANES], above: u32) {
         let (width, height) = (sides(layout.width, level, above), sides(layout.height, level, above));
         let (x, y) = (Pairs::find(&uv[0], &width, layout.wrap[0]), Pairs::find(&uv[1], &height, layout.wrap[1]));
-        for i in 0..LANES {
-            let (upper, lower) = (y.near[i].wrapping_mul(width[i]), y.far[i].wrapping_mul(width[i]));
+        for (i, width) in width.into_iter().enumerate() {
+            let (upper, lower) = (y.near[i].wrapping_mul(width), y.far[i].wrapping_mul(width));
             self.corners[0][i] = upper.wrapping_add(x.near[i]);
             self.corners[1][i] = upper.wrapping_add(x.far[i]);
             self.corners[2][i] = lower.wrapping_add(x.near[i]);
