@@ -20,7 +20,10 @@ use meshray::math::{DVec3, Vec3};
 use meshray::render::texture::TextureStore;
 use meshray::render::view::Lens;
 use meshray::render::{Job, Settings, View, World, render};
-use meshray::scene::{Falloff, Light, LightKind, Material, default_light, framing};
+use meshray::scene::{
+    Bitmap, Falloff, Light, LightKind, Material, MetalRough, Pixels, Sampler, Scene, Surface, Texture, TextureRef,
+    UvTransform, default_light, framing,
+};
 
 /// Part by which a count may exceed its baseline.
 const ALLOWED: f64 = 0.03;
@@ -37,10 +40,12 @@ const WAYS: [(RayOrder, &str); 3] =
 const RUNS: [&str; 2] = ["alike", "apart"];
 const QUESTIONS: [&str; 2] = ["first", "any"];
 
-/// Pictures by what lights them: a sample for each of [`RAYS`] pixels. They are drawn with the best instructions that
-/// Valgrind knows, so that a formula that is no longer computed in lanes shows.
-const LIGHTS: [&str; 2] = ["lamp", "studio"];
+/// Pictures by what they show and what lights it: a sample for each of [`RAYS`] pixels. They are drawn with the best
+/// instructions that Valgrind knows, so that a formula that is no longer computed in lanes shows.
+const PICTURES: [[&str; 2]; 4] = [["plain", "lamp"], ["plain", "studio"], ["mapped", "lamp"], ["mapped", "studio"]];
 const SIDE: u32 = 64;
+/// Columns and rows of the maps.
+const MAP_SIDE: u32 = 256;
 
 /// One figure: level, way, how the rays run, and what is asked; or level, "picture", of what, and what lights it.
 type Case = [String; 4];
@@ -50,7 +55,7 @@ fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).filter(|w| w != "--bench").collect();
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     match words[..] {
-        ["trace", _, "picture", _, light] => picture(light),
+        ["trace", _, "picture", of, light] => picture(of, light),
         ["trace", level, way, run, question] => trace([level, way, run, question]),
         [] => compare(false),
         ["--record"] => compare(true),
@@ -126,7 +131,7 @@ fn cases() -> Vec<Case> {
         }
     }
     if here.iter().any(|level| level.name() == "AVX2") {
-        cases.extend(LIGHTS.map(|light| ["AVX2", "picture", "plain", light].map(String::from)));
+        cases.extend(PICTURES.map(|[of, light]| ["AVX2", "picture", of, light].map(String::from)));
     }
     cases
 }
@@ -166,11 +171,15 @@ fn trace([level, way, run, question]: [&str; 4]) -> ExitCode {
     if found > RAYS / 4 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// Renders a landscape of one material from above, most of it in [`counted_picture`].
-fn picture(light: &str) -> ExitCode {
+/// Renders a landscape of one material from above, plain or with maps that make it rough, smooth and bumpy in turn; most
+/// of it in [`counted_picture`].
+fn picture(of: &str, light: &str) -> ExitCode {
     let mut scene = Family::Mountain.scene(TRIANGLES);
     scene.materials.fill(Material::plain());
     scene.lights.clear();
+    if of == "mapped" {
+        paint(&mut scene);
+    }
     let (lo, hi) = World::new(&scene).bounds;
     let (middle, size) = ((lo + hi) * 0.5, hi - lo);
     let camera = framing::default_camera(&scene, &framing::robust_bounds(&scene), 1.0);
@@ -192,6 +201,35 @@ fn picture(light: &str) -> ExitCode {
     let shown = pool.install(|| counted_picture(&job));
     println!("{shown} of {RAYS} pixels show the landscape");
     if shown > RAYS / 2 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// Gives all meshes normals, tangents and coordinates, and all materials maps of noise.
+fn paint(scene: &mut Scene) {
+    let (lo, hi) = World::new(scene).bounds;
+    let scale = (1.0 / (hi - lo).max_element()) as f32;
+    for mesh in &mut scene.meshes {
+        let at = |p: &Vec3| p.truncate() * scale;
+        let leaning = |p: &Vec3| (p.truncate().fract() - 0.5).extend(2.0).normalize();
+        mesh.uvs = vec![mesh.positions.iter().map(at).collect()];
+        mesh.normals = mesh.positions.iter().map(leaning).collect();
+        mesh.tangents = vec![Vec3::X.extend(1.0); mesh.positions.len()];
+    }
+    let mut random = Random::new(3);
+    for texture in 0..3 {
+        let bytes = (0..MAP_SIDE * MAP_SIDE * 3).map(|_| 64 | random.bits().to_le_bytes()[0]).collect();
+        let pixels = Pixels::Rgb8(bytes);
+        scene.bitmaps.push(Bitmap { name: String::new(), width: MAP_SIDE, height: MAP_SIDE, pixels });
+        scene.textures.push(Texture { bitmap: texture, sampler: Sampler::default() });
+    }
+    let map = |texture| Some(TextureRef { texture, uv_set: 0, transform: UvTransform::default() });
+    let surface = MetalRough { roughness: 0.4, metallic: 0.5, metal_rough_map: map(1), ..MetalRough::default() };
+    scene.materials.fill(Material {
+        base_color_map: map(0),
+        normal_map: map(2),
+        occlusion_map: map(1),
+        surface: Surface::MetalRough(surface),
+        ..Material::plain()
+    });
 }
 
 /// What is counted of a picture; how many pixels show anything lit.

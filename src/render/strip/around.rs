@@ -135,8 +135,10 @@ trait MetalRoughPoints {
     fn emission(&self, i: usize) -> Vec3;
     /// Shares of f0 and f90 in what its lobe sends back where the cosine of the view is `n_v`.
     fn shares(&self, i: usize, n_v: f32) -> (f32, f32);
-    /// Mean of what a white lobe sends back over the hemisphere.
-    fn mean_albedo(&self, i: usize) -> f32;
+    /// Finds the means over the hemisphere of what white lobes send back, where they differ.
+    fn find_means(&self, points: usize, means: &mut Column);
+    /// That of a point.
+    fn mean_albedo(&self, means: &Column, i: usize) -> f32;
     /// Share of the mirrored surroundings that nothing stands in the way of.
     fn open(&self, i: usize, n_v: f32) -> f32;
 }
@@ -166,7 +168,10 @@ impl MetalRoughPoints for Even {
     }
 
     #[inline(always)]
-    fn mean_albedo(&self, _: usize) -> f32 {
+    fn find_means(&self, _: usize, _: &mut Column) {}
+
+    #[inline(always)]
+    fn mean_albedo(&self, _: &Column, _: usize) -> f32 {
         self.mean
     }
 
@@ -199,8 +204,15 @@ impl MetalRoughPoints for Mapped<'_> {
     }
 
     #[inline(always)]
-    fn mean_albedo(&self, i: usize) -> f32 {
-        mean_albedo(self.painted.roughness[i])
+    fn find_means(&self, points: usize, means: &mut Column) {
+        for (mean, &roughness) in means.iter_mut().zip(&self.painted.roughness).take(points) {
+            *mean = mean_albedo(roughness);
+        }
+    }
+
+    #[inline(always)]
+    fn mean_albedo(&self, means: &Column, i: usize) -> f32 {
+        means[i]
     }
 
     #[inline(always)]
@@ -219,9 +231,7 @@ fn look(m: &impl MetalRoughPoints, found: &Found, to: &mut Surroundings, points:
     for i in 0..points.min(POINTS) {
         (to.shares[0][i], to.shares[1][i]) = m.shares(i, to.n_v[i]);
     }
-    for i in 0..points.min(POINTS) {
-        to.mean[i] = m.mean_albedo(i);
-    }
+    m.find_means(points, &mut to.mean);
     for i in 0..points.min(POINTS) {
         to.open[i] = m.open(i, to.n_v[i]);
     }
@@ -238,7 +248,7 @@ fn look(m: &impl MetalRoughPoints, found: &Found, to: &mut Surroundings, points:
             outside: true,
         };
         let matter = m.matter(i);
-        put(&mut to.radiance, i, m.emission(i) + matter.around(&around, matter.rebound(to.mean[i])).0);
+        put(&mut to.radiance, i, m.emission(i) + matter.around(&around, matter.rebound(m.mean_albedo(&to.mean, i))).0);
     }
 }
 
