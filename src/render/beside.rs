@@ -1,8 +1,9 @@
 //! What rays that were traced together have hit: sorted by instance and shaded side by side where that can be, one by one
 //! elsewhere.
 //!
-//! Where several rays of a wave belong to one sample, they are shaded one by one: what a sample gathers is added in the same
-//! order whichever rays are beside it.
+//! Where several rays of a wave belong to one sample, they are shaded one by one: so what a sample gathers is added in the
+//! order of its rays, whichever others are beside them. (Where more rays wait than a wave takes, or more shadow rays than are
+//! kept, sums that are cut there may differ in their last bits from those of pictures that are shaded one by one.)
 
 use super::context::Context;
 use super::curve::Feelers;
@@ -66,8 +67,8 @@ pub(super) struct Beside {
     strip: Option<Box<Strip>>,
     /// Rays that met nothing and see the surroundings.
     missed: Vec<u32>,
-    /// How many rays of a wave belong to each sample.
-    rays: Vec<u32>,
+    /// How many rays of the wave at work belong to each sample; zeros in between.
+    rays_of_sample: Vec<u32>,
 }
 
 impl<A: Accel, P: Observer> Tracer<'_, A, P> {
@@ -104,22 +105,22 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let context = self.context;
         let traced = Traced::Wave(class, wave);
         let mut sorted = self.sort();
-        let mut of_sample = std::mem::take(&mut self.beside.rays);
-        of_sample.clear();
-        of_sample.resize(self.samples.len(), 0);
-        wave.rays.iter().for_each(|ray| of_sample[ray.sample as usize] += 1);
+        let mut rays_of_sample = std::mem::take(&mut self.beside.rays_of_sample);
+        rays_of_sample.resize(self.samples.len().max(rays_of_sample.len()), 0);
+        wave.rays.iter().for_each(|ray| rays_of_sample[ray.sample as usize] += 1);
         for (i, index) in (0..wave.rays.len()).zip(0..) {
             let (ray, path, hit) = (&wave.rays[i], &wave.paths[i], &wave.hits[i]);
-            let alone = of_sample[ray.sample as usize] == 1;
+            let is_only = rays_of_sample[ray.sample as usize] == 1;
             if !hit.is_some() {
-                if alone && !path.straight { self.beside.missed.push(index) } else { self.leave(ray, path) }
+                if is_only && !path.straight { self.beside.missed.push(index) } else { self.leave(ray, path) }
             } else if is_same_crossing(|prim| context.world.prim(prim), ray, &wave.after[i], hit) {
                 self.continuing[class as usize].push(*ray, *path, *hit);
-            } else if !(alone && is_plain(context, path) && sorted.take(context, (index, 1), hit.prim)) {
+            } else if !(is_only && is_plain(context, path) && sorted.take(context, (index, 1), hit.prim)) {
                 self.shade_one(traced, i);
             }
         }
-        self.beside.rays = of_sample;
+        wave.rays.iter().for_each(|ray| rays_of_sample[ray.sample as usize] = 0);
+        self.beside.rays_of_sample = rays_of_sample;
         self.see_surroundings(traced);
         self.shade_sorted(traced, sorted);
     }

@@ -211,7 +211,7 @@ impl MetalRoughMatter {
 
     /// α² of the highlights of lights at least, where narrow ones must be as wide as `to`; 0 where they are not narrow.
     #[inline(always)]
-    pub(crate) fn least_square(&self, to: f32) -> f32 {
+    pub(crate) fn least_square_where_narrow(&self, to: f32) -> f32 {
         if self.has_narrow_highlight() { least_square(self.roughness, to) } else { 0.0 }
     }
 
@@ -270,7 +270,7 @@ impl MetalRoughMatter {
 
     /// Whether a ray off the surface could be seen.
     pub(crate) fn mirrors(&self) -> bool {
-        self.thick || self.traced(true) > 0.0
+        self.traced(true) > 0.0
     }
 
     /// BRDF × N·L; all unit vectors, away from the surface.

@@ -15,12 +15,12 @@ use crate::render::shade::Seen;
 use crate::render::surface::{facing, side_of};
 use crate::render::texture::Places;
 use crate::render::world::Placement;
+use std::ops::{Add, Mul};
 
 /// Points of a strip at most.
 pub(crate) const POINTS: usize = 64;
 
-/// Points are computed so many at a time.
-pub(super) const LANES: usize = 8;
+pub(super) use crate::math::simd::LANES;
 
 /// One number of every point.
 pub(super) type Column = [f32; POINTS];
@@ -73,7 +73,8 @@ pub(crate) struct Strip {
 pub(super) struct Given {
     origin: Columns,
     dir: Columns,
-    pub weights: [Column; 2],
+    /// Those of the second and third corner.
+    weights: [Column; 2],
     pub faces: Faces,
 }
 
@@ -266,11 +267,7 @@ impl Kernel for Smooth<'_> {
         }
         for i in 0..points.min(POINTS) {
             given.turn(found, i);
-            let (u, v) = (given.weights[0][i], given.weights[1][i]);
-            let [a, b, c] = given.faces.normals(i);
-            let mixed = a * (1.0 - u - v) + b * u + c * v;
-            let own = smooth_normal(&placement, mixed).unwrap_or(given.faces.outward(i));
-            found.shade(i, own);
+            found.shade(i, given.own_normal(&placement, i));
         }
     }
 }
@@ -285,6 +282,26 @@ impl Given {
         put(&mut found.position, i, position);
         put(&mut found.error, i, error);
         found.certain[i] = u32::from(certain);
+    }
+
+    /// The weights of the corners.
+    #[inline(always)]
+    pub(super) fn corner_weights(&self, i: usize) -> [f32; 3] {
+        let (u, v) = (self.weights[0][i], self.weights[1][i]);
+        [1.0 - u - v, u, v]
+    }
+
+    /// What the corners have, mixed by their weights.
+    #[inline(always)]
+    pub(super) fn mix<T: Mul<f32, Output = T> + Add<Output = T>>(&self, i: usize, [a, b, c]: [T; 3]) -> T {
+        let [wa, wb, wc] = self.corner_weights(i);
+        a * wa + b * wb + c * wc
+    }
+
+    /// The mesh's own normal, of unit length.
+    #[inline(always)]
+    pub(super) fn own_normal(&self, placement: &Placement, i: usize) -> Vec3 {
+        smooth_normal(placement, self.mix(i, self.faces.normals(i))).unwrap_or(self.faces.outward(i))
     }
 
     /// Which side is seen, and from where.

@@ -21,13 +21,13 @@ pub(crate) struct Common {
 }
 
 impl Common {
-    /// `None` for materials with a grain, film, sheen or lacquer, for those that let light through or scatter it through, and
-    /// for those that are nowhere there as a whole.
+    /// `None` for materials with a grain, film, sheen or lacquer, for those that let light through or scatter it through, for
+    /// those with maps of their reflectance, and for those that are nowhere there as a whole.
     pub(crate) fn of(material: &Material, store: &TextureStore, bounces: bool) -> Option<Self> {
         let metal_rough = material.metal_rough();
         if lets_light_in(material)
             || coverage(material, material.opacity) < 1.0
-            || metal_rough.is_some_and(|m| m.thick || m.has_lobes() || m.translucence.is_some() || has_other_maps(m))
+            || metal_rough.is_some_and(|m| m.has_lobes() || m.translucence.is_some() || has_other_maps(m))
         {
             return None;
         }

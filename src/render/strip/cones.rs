@@ -158,10 +158,9 @@ impl Kernel for Bend<'_> {
         let Self { given, found, cones, points, placement } = self;
         let placement = *placement;
         for i in 0..points.min(POINTS) {
-            let (faces, [u, v]) = (&given.faces, [given.weights[0][i], given.weights[1][i]]);
+            let (faces, weights) = (&given.faces, given.corner_weights(i));
             let Footprint { along, across } = cones.footprint(i);
-            let (normals, weights) = (faces.normals(i), [1.0 - u - v, u, v]);
-            let [along, across] = faces.gradients(i).of_normal(&placement, normals, weights, [along, across]);
+            let [along, across] = faces.gradients(i).of_normal(&placement, faces.normals(i), weights, [along, across]);
             let bend = along.length_squared() + across.length_squared();
             cones.bend[i] = if found.curved[i] == 1 { bend } else { 0.0 };
         }
@@ -187,7 +186,7 @@ impl Kernel for WidenHighlights<'_> {
         for i in 0..points.min(POINTS) {
             let m = if any { painted.metal_rough(i, &even) } else { even };
             let turning = cones.bend[i] * (reach * reach) + cones.turning[i];
-            cones.least_square[i] = m.least_square(glint::least_of(turning, cones.spread[i], reach));
+            cones.least_square[i] = m.least_square_where_narrow(glint::least_of(turning, cones.spread[i], reach));
         }
     }
 }

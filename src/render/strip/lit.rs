@@ -80,8 +80,7 @@ impl Strip {
         points.map(|i| (names[i], get(&self.lit.radiance, i)))
     }
 
-    /// Sends the shadow rays that start on their triangles;
-    /// `media` is what they start inside of, where that matters.
+    /// Sends the shadow rays that start on their triangles; `media` is what they start inside of, where that matters.
     pub(crate) fn send(&mut self, shadows: &mut Shadows, media: Option<Media>) {
         let (prims, samples, lit, sent) = (self.given.faces.prims(), &self.samples, &self.lit, &mut self.sent);
         let count = self.level.run(Send { points: self.count.min(POINTS), prims, samples, lit, sent });

@@ -1,12 +1,12 @@
 //! Points of surfaces, shaded side by side: one number of all points, then the next.
 //!
-//! Where a material lets no light through and nothing lies over it, what a point shows, and what it mirrors, depends on a few
-//! numbers, and the same formulas are computed for all points. They are written once, for one point, in `surface`, `shade` and `accel::refine`; here loops
-//! over columns of numbers call them, which the compiler turns into lanes. So a point shaded here gives the same bits as
-//! one shaded by itself, on every instruction set.
+//! Where a material lets no light through and nothing lies over it, what a point shows, and what it mirrors, depends on a
+//! few numbers, and the same formulas are computed for all points. They are written once, for one point, in `surface`,
+//! `patch`, `shade`, `glint` and `accel::refine`; here loops over columns of numbers call them, which the compiler turns
+//! into lanes. So a point shaded here gives the same bits as one shaded by itself, on every instruction set.
 //!
 //! What a column cannot do is left to the tracer: hits near the edge of a face, those whose distance needs more than
-//! `f64`, and those on what is not there as a whole.
+//! `f64`, backs of one-sided faces, points whose mesh gives no tangent, and what is not there as a whole.
 
 mod around;
 mod columns;

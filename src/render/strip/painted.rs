@@ -146,9 +146,9 @@ impl Strip {
     ) {
         let material = &context.scene.materials[mesh.material as usize];
         self.painted.any = true;
-        let glows = !context.lights.is_empty() && material.metal_rough().is_some();
+        let widens = !context.lights.is_empty() && material.metal_rough().is_some();
         if let Some(sheet) = common.sheet.as_ref().filter(|sheet| sheet.covers(mesh)) {
-            self.read_sheet(context, (material, sheet), placement, !mesh.normals.is_empty());
+            self.read_sheet(context, (material, sheet), placement, !mesh.normals.is_empty(), widens);
             return;
         }
         let (mut prim, mut patch) = (NO_PRIM, None);
@@ -166,11 +166,11 @@ impl Strip {
                 continue;
             };
             patch.move_to([1.0 - hit.u - hit.v, hit.u, hit.v], self.cones.footprint(i));
-            self.read_at(i, context, material, patch, glows);
+            self.read_at(i, context, material, patch, widens);
         }
     }
 
-    fn read_at(&mut self, i: usize, context: &Context, material: &Material, patch: &Patch, glows: bool) {
+    fn read_at(&mut self, i: usize, context: &Context, material: &Material, patch: &Patch, widens: bool) {
         let reader = Reader { store: context.textures, patch: Some(patch) };
         let base = reader.base(material);
         if coverage(material, base.w) < 1.0 {
@@ -185,7 +185,7 @@ impl Strip {
             let normal = mapped_normal(patch, material, context.textures, own, side_of(own, geometric), view);
             put(&mut self.found.normal, i, normal);
         }
-        if let Some(map) = material.normal_map.as_ref().filter(|_| glows && self.painted.has_narrow_highlight(i)) {
+        if let Some(map) = material.normal_map.as_ref().filter(|_| widens && self.painted.has_narrow_highlight(i)) {
             let reach = context.highlight_reach;
             self.cones.turning[i] = patch.turning_of_map(map, material.normal_scale, context.textures, reach);
         }

@@ -2,12 +2,11 @@
 
 use super::columns::{Column, Columns, Found, Given, LANES, POINTS, Strip, get, padded, put};
 use super::cones::Cones;
-use super::faces::Faces;
 use super::painted::Painted;
 use crate::math::simd::{Kernel, Simd};
 use crate::math::{Vec2, Vec3, Vec4};
 use crate::render::context::{Context, coverage};
-use crate::render::patch::{Turn, given_tangent, smooth_normal, turned_by_texel, turning_of};
+use crate::render::patch::{Turn, given_tangent, turned_by_texel, turning_of};
 use crate::render::shade::{MetalRoughPaint, PhongPaint, base_color, occlusion};
 use crate::render::surface::{facing, side_of};
 use crate::render::texture::{ColorSpace, Layout, Places, Spots, TextureStore, changes};
@@ -122,25 +121,24 @@ fn maps(material: &Material) -> Vec<(Slot, &TextureRef, ColorSpace)> {
 }
 
 impl Strip {
-    /// Reads what the maps of a sheet say at the points, and turns their normals; `placement` where the mesh has normals of
-    /// its own.
+    /// Reads what the maps of a sheet say at the points of a mesh that an instance has placed so, and turns their normals: those
+    /// of the mesh's own if it is `smooth`. If lights show as highlights, which a normal map `widens`, it finds how far that turns
+    /// them.
     pub(super) fn read_sheet(
         &mut self,
         context: &Context,
         (material, sheet): (&Material, &Sheet),
         placement: &Placement,
         smooth: bool,
+        widens: bool,
     ) {
         let count = self.count.min(POINTS);
         let Self { given, found, painted, cones, places, level, .. } = self;
-        let (faces, store) = (&given.faces, context.textures);
-        // Where lights show as highlights, what turns normals makes narrow ones wider.
+        let store = context.textures;
         let reach = context.highlight_reach;
-        let widens = !context.lights.is_empty() && material.metal_rough().is_some();
         let turns = sheet.normal_map.as_ref().filter(|_| widens).map(|(texture, layout)| (*texture, layout, reach));
-        let weights = &given.weights;
         let certain = &mut found.certain;
-        level.run(Read { sheet, material, store, faces, weights, certain, cones, painted, places, turns, count });
+        level.run(Read { sheet, material, store, given, certain, cones, painted, places, turns, count });
         if sheet.normal_map.is_some() {
             let points = padded(count);
             let scale = material.normal_scale;
@@ -153,8 +151,7 @@ struct Read<'a> {
     sheet: &'a Sheet,
     material: &'a Material,
     store: &'a TextureStore<'a>,
-    faces: &'a Faces,
-    weights: &'a [[f32; POINTS]; 2],
+    given: &'a Given,
     certain: &'a mut [u32; POINTS],
     cones: &'a mut Cones,
     painted: &'a mut Painted,
@@ -169,14 +166,14 @@ impl Kernel for Read<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Self { sheet, material, store, faces, weights, certain, cones, painted, places, turns, count } = self;
+        let Self { sheet, material, store, given, certain, cones, painted, places, turns, count } = self;
         for start in (0..count.min(POINTS)).step_by(LANES) {
             let mut spots = Spots::default();
             for lane in 0..LANES {
                 let i = start + lane;
-                let ([a, b, c], [u, v]) = (faces.uvs(i), [weights[0][i], weights[1][i]]);
-                let [along, across] = faces.gradients(i).of_coordinates([b - a, c - a], &cones.footprint(i));
-                let uv = a * (1.0 - u - v) + b * u + c * v + sheet.offset;
+                let [a, b, c] = given.faces.uvs(i);
+                let [along, across] = given.faces.gradients(i).of_coordinates([b - a, c - a], &cones.footprint(i));
+                let uv = given.mix(i, [a, b, c]) + sheet.offset;
                 (spots.uv[0][lane], spots.uv[1][lane]) = (uv.x, uv.y);
                 (spots.along[0][lane], spots.along[1][lane]) = (along.x, along.y);
                 (spots.across[0][lane], spots.across[1][lane]) = (across.x, across.y);
@@ -248,15 +245,10 @@ impl Kernel for TurnNormals<'_> {
         let placement = *placement;
         let mut turns = Turns::default();
         for i in 0..points.min(POINTS) {
-            let (faces, [u, v]) = (&given.faces, [given.weights[0][i], given.weights[1][i]]);
-            let [a, b, c] = faces.normals(i);
-            let mixed = smooth_normal(&placement, a * (1.0 - u - v) + b * u + c * v);
-            put(&mut turns.own, i, if smooth { mixed.unwrap_or(faces.outward(i)) } else { faces.outward(i) });
+            put(&mut turns.own, i, if smooth { given.own_normal(&placement, i) } else { given.faces.outward(i) });
         }
         for i in 0..points.min(POINTS) {
-            let (faces, [u, v]) = (&given.faces, [given.weights[0][i], given.weights[1][i]]);
-            let [a, b, c] = faces.tangents(i);
-            let tangent = given_tangent(&placement, a * (1.0 - u - v) + b * u + c * v, get(&turns.own, i));
+            let tangent = given_tangent(&placement, given.mix(i, given.faces.tangents(i)), get(&turns.own, i));
             let (tangent, sign) = tangent.unwrap_or((Vec3::NAN, 1.0));
             put(&mut turns.tangent, i, tangent);
             turns.sign[i] = sign;

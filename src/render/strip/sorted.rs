@@ -13,7 +13,7 @@ use crate::scene::Mesh;
 /// Faces that are remembered: a block of pixels sees about as many.
 const REMEMBERED: usize = 256;
 
-/// No instance; also the mark of faces that must be shaded one by one.
+/// No instance, which marks faces that must be shaded one by one; also no skin.
 const NONE: u32 = u32::MAX;
 
 /// A face that was hit.

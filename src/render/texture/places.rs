@@ -336,8 +336,8 @@ impl Pairs {
     }
 }
 
-/// The texels that stand at such places of rows that go on for ever, from one before the first on to one behind the last:
-/// that of the second row, of which every other is mirrored.
+/// The texels at places of rows that go on for ever, from one before the first to one behind the last of the part that
+/// [`periods`] gives: one row, two where every other is mirrored.
 #[inline(always)]
 fn inside(places: &[i32; LANES], sides: &[u32; LANES], wrap: Wrap) -> [u32; LANES] {
     let mut texels = [0; LANES];
@@ -363,7 +363,7 @@ fn inside(places: &[i32; LANES], sides: &[u32; LANES], wrap: Wrap) -> [u32; LANE
     texels
 }
 
-/// A place of a row that is repeated, from −`len` to less than 2 `len`.
+/// The place in a row of `len` that is repeated; `place` is −`len` at least and less than 2 `len`.
 #[inline(always)]
 fn again(place: i32, len: i32) -> i32 {
     let up = if place < 0 { place + len } else { place };
