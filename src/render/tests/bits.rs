@@ -89,7 +89,7 @@ fn plain() -> Stage {
     s.mesh(
         round(0.7),
         turned(2.5, DVec3::new(-1.5, 1.2, 0.0)),
-        pbr(MetalRough { metallic: 0.3, ..MetalRough::default() }),
+        pbr(MetalRough { metallic: 0.3, thick: true, ..MetalRough::default() }),
     );
     let mirror = pbr(MetalRough { roughness: 0.04, metallic: 0.6, ..MetalRough::default() });
     s.mesh(round(0.5), turned(0.3, DVec3::new(1.2, 1.4, -0.5)), mirror);
