@@ -9,6 +9,8 @@
 //! - at each point: what is absorbed on the way to it, by materials that absorb nothing;
 //! - at each point where rays end: the balance of what is reflected and refracted, and its spectrum.
 //!
+//! Points are shaded one by one, since what is shaded side by side has no such code.
+//!
 //! Grain, film, sheen, lacquer and what is scattered through are not: a material has them, or there is nothing to be done.
 
 use super::surface::Surface;
