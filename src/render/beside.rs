@@ -1,9 +1,9 @@
 //! What rays that were traced together have hit: sorted by instance and shaded side by side where that can be, one by one
 //! elsewhere.
 //!
-//! Where several rays of a wave belong to one sample, they are shaded one by one: so what a sample gathers is added in the
-//! order of its rays, whichever others are beside them. (Where more rays wait than a wave takes, or more shadow rays than are
-//! kept, sums that are cut there may differ in their last bits from those of pictures that are shaded one by one.)
+//! Where several rays of a wave belong to one sample, they take turns: so what a sample gathers is added in the order of its
+//! rays, whichever others are beside them. (Where more rays wait than a wave takes, or more shadow rays than are kept, sums
+//! that are cut there may differ in their last bits from those of pictures that are shaded one by one.)
 
 use super::context::Context;
 use super::curve::Feelers;
@@ -18,6 +18,9 @@ use super::whitted::{SPREAD, Tracer};
 use crate::accel::{Accel, Hit, Ray};
 use crate::math::Vec3;
 use crate::math::simd::LANES;
+
+/// Fewer points than these are shaded sooner one by one.
+const FEW: usize = 3;
 
 /// Rays that were traced together.
 #[derive(Clone, Copy)]
@@ -67,8 +70,59 @@ pub(super) struct Beside {
     strip: Option<Box<Strip>>,
     /// Rays that met nothing and see the surroundings.
     missed: Vec<u32>,
-    /// How many rays of the wave at work belong to each sample; zeros in between.
-    rays_of_sample: Vec<u32>,
+    turns: Turns,
+}
+
+/// The rays of a wave in turns, of which each has one ray of a sample at most.
+#[derive(Default)]
+struct Turns {
+    /// By sample, how many of its rays have been given a turn; zeros in between.
+    given: Vec<u32>,
+    /// By ray, its turn.
+    of_ray: Vec<u32>,
+    /// The rays by their turns, and in each by their places in the wave.
+    rays: Vec<u32>,
+    /// Where those of each turn end.
+    ends: Vec<usize>,
+}
+
+impl Turns {
+    /// Gives every ray of a wave its turn: as many rays of its sample come before it.
+    fn give(&mut self, rays: &[Ray]) {
+        let Self { given, of_ray, rays: order, ends } = self;
+        let samples = rays.iter().map(|ray| ray.sample as usize + 1).max().unwrap_or(0);
+        given.resize(samples.max(given.len()), 0);
+        of_ray.clear();
+        ends.clear();
+        for ray in rays {
+            let given = &mut given[ray.sample as usize];
+            of_ray.push(*given);
+            if ends.len() <= *given as usize {
+                ends.push(0);
+            }
+            ends[*given as usize] += 1;
+            *given += 1;
+        }
+        rays.iter().for_each(|ray| given[ray.sample as usize] = 0);
+        // From how many there are to where they begin; where they begin grows to where they end.
+        let mut start = 0;
+        for end in ends.iter_mut() {
+            (*end, start) = (start, start + *end);
+        }
+        order.clear();
+        order.resize(rays.len(), 0);
+        for (ray, &turn) in (0..).zip(&*of_ray) {
+            let at = &mut ends[turn as usize];
+            order[*at] = ray;
+            *at += 1;
+        }
+    }
+
+    /// The rays of each turn.
+    fn iter(&self) -> impl Iterator<Item = &[u32]> {
+        let starts = std::iter::once(0).chain(self.ends.iter().copied());
+        starts.zip(&self.ends).map(|(start, &end)| &self.rays[start..end])
+    }
 }
 
 impl<A: Accel, P: Observer> Tracer<'_, A, P> {
@@ -102,25 +156,28 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
 
     /// Adds what the rays of a wave see.
     pub(super) fn shade_wave(&mut self, class: RayClass, wave: &Wave) {
+        let mut turns = std::mem::take(&mut self.beside.turns);
+        turns.give(&wave.rays);
+        turns.iter().for_each(|rays| self.shade_turn((class, wave), rays));
+        self.beside.turns = turns;
+    }
+
+    /// The same of these of its rays, which belong to different samples.
+    fn shade_turn(&mut self, (class, wave): (RayClass, &Wave), rays: &[u32]) {
         let context = self.context;
         let traced = Traced::Wave(class, wave);
         let mut sorted = self.sort();
-        let mut rays_of_sample = std::mem::take(&mut self.beside.rays_of_sample);
-        rays_of_sample.resize(self.samples.len().max(rays_of_sample.len()), 0);
-        wave.rays.iter().for_each(|ray| rays_of_sample[ray.sample as usize] += 1);
-        for (i, index) in (0..wave.rays.len()).zip(0..) {
+        for &index in rays {
+            let i = index as usize;
             let (ray, path, hit) = (&wave.rays[i], &wave.paths[i], &wave.hits[i]);
-            let is_only = rays_of_sample[ray.sample as usize] == 1;
             if !hit.is_some() {
-                if is_only && !path.straight { self.beside.missed.push(index) } else { self.leave(ray, path) }
+                if path.straight { self.leave(ray, path) } else { self.beside.missed.push(index) }
             } else if is_same_crossing(|prim| context.world.prim(prim), ray, &wave.after[i], hit) {
                 self.continuing[class as usize].push(*ray, *path, *hit);
-            } else if !(is_only && is_plain(context, path) && sorted.take(context, (index, 1), hit.prim)) {
+            } else if !(is_plain(context, path) && sorted.take(context, (index, 1), hit.prim)) {
                 self.shade_one(traced, i);
             }
         }
-        wave.rays.iter().for_each(|ray| rays_of_sample[ray.sample as usize] = 0);
-        self.beside.rays_of_sample = rays_of_sample;
         self.see_surroundings(traced);
         self.shade_sorted(traced, sorted);
     }
@@ -162,7 +219,11 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         for k in 0..sorted.instances() {
             let (instance, hits) = sorted.of(k);
             for hits in hits.chunks(POINTS) {
-                self.shade_strip(traced, &sorted, (instance, hits), &mut strip);
+                if hits.len() < FEW {
+                    hits.iter().for_each(|&(ray, _)| self.shade_one(traced, ray as usize));
+                } else {
+                    self.shade_strip(traced, &sorted, (instance, hits), &mut strip);
+                }
             }
         }
         self.beside.strip = Some(strip);
