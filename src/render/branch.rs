@@ -5,26 +5,44 @@ use super::draws::{Purpose, Spread};
 use super::glint::{self, MIRROR};
 use super::observer::Observer;
 use super::optics::{dispersed_index, reflect, refract};
-use super::shade::{Balance, Lobe, Matter, above, has_inside, lets_light_in};
-use super::surface::Surface;
+use super::shade::{Balance, Lobe, Matter, Seen, above, has_inside, lets_light_in};
 use super::wave::{Crossing, Medium, Path, RayClass};
 use super::whitted::Tracer;
 use crate::accel::{Accel, Hit, Ray};
 use crate::math::Vec3;
+use crate::scene::Material;
+
+/// What rays that go on ask of the surface they start on.
+pub(super) trait Ground {
+    /// Its material, by number too.
+    fn material(&self) -> (u32, &Material);
+
+    /// How it is seen.
+    fn seen(&self) -> Seen;
+
+    /// Whether the front of the face was hit.
+    fn is_front(&self) -> bool;
+
+    /// How far its normal turns over the ray's cone before maps turn it: the squares of the angles, summed over both axes.
+    fn bend(&self, context: &Context) -> f32;
+
+    /// A ray from here along `dir`, of unit length, without end.
+    fn ray(&self, dir: Vec3, sample: u32) -> Ray;
+}
 
 /// A shaded point and the ray that found it.
-pub(super) struct Point<'a> {
+pub(super) struct Point<'a, G> {
     pub ray: &'a Ray,
     pub hit: &'a Hit,
     /// The ray so far, its weight that of the surface.
     pub path: Path,
     /// Width of the ray's cone here.
     pub width: f32,
-    pub surface: &'a Surface<'a>,
+    pub surface: &'a G,
     pub matter: &'a Matter,
 }
 
-impl Point<'_> {
+impl<G: Ground> Point<'_, G> {
     /// The indices on both sides for light of `band`.
     pub(super) fn crossing(&self, context: &Context, band: Option<u8>) -> Crossing {
         let (ior, dispersion) = self.matter.refraction();
@@ -36,17 +54,18 @@ impl Point<'_> {
             }
             _ => ior,
         };
-        self.path.media.cross(Medium { material: self.surface.target.material_id, ior }, self.surface.front)
+        self.path.media.cross(Medium { material: self.surface.material().0, ior }, self.surface.is_front())
     }
 
     pub(super) fn balance(&self, crossing: &Crossing) -> Balance {
-        self.matter.balance(self.surface.normal.dot(self.surface.view), crossing)
+        let Seen { normal, view, .. } = self.surface.seen();
+        self.matter.balance(normal.dot(view), crossing)
     }
 
     /// What a ray that starts here carries; directions turn `factor` times as far as normals do.
     fn bounced(&self, context: &Context, weight: Vec3, factor: f32) -> Path {
         let depth = self.path.depth + 1;
-        let cone_spread = glint::bent(self.surface, context, self.path.cone_spread, factor);
+        let cone_spread = glint::behind(self.surface.bend(context), self.path.cone_spread, factor);
         Path { weight, depth, straight: false, since: 0.0, cone_width: self.width, cone_spread, ..self.path }
     }
 }
@@ -74,10 +93,10 @@ impl Rough {
 
 impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     /// Queues the secondary rays of a point that have enough weight.
-    pub(super) fn reflect_and_refract(&mut self, point: &Point, crossing: &Crossing) {
+    pub(super) fn reflect_and_refract<G: Ground>(&mut self, point: &Point<G>, crossing: &Crossing) {
         // A volume that bends nothing is clear however rough its surface is.
-        let bends = crossing.n_i != crossing.n_t || !has_inside(point.surface.target.material);
-        if let Some(lobe) = point.matter.lobe(point.surface).filter(|_| bends) {
+        let bends = crossing.n_i != crossing.n_t || !has_inside(point.surface.material().1);
+        if let Some(lobe) = point.matter.lobe(point.surface.seen().normal).filter(|_| bends) {
             return self.spread(point, crossing, lobe);
         }
         let balance = point.balance(crossing);
@@ -96,19 +115,19 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     }
 
     /// Whether light that is let in here has all its wavelengths still, and loses sight of some.
-    fn splits(&self, point: &Point) -> bool {
+    fn splits<G>(&self, point: &Point<G>) -> bool {
         point.matter.refraction().1 > 0.0 && point.path.band.is_none()
     }
 
     /// Spreads rays over what a rough surface mirrors and lets through: several off the first, one off what those find.
-    fn spread(&mut self, point: &Point, crossing: &Crossing, lobe: Lobe) {
+    fn spread<G: Ground>(&mut self, point: &Point<G>, crossing: &Crossing, lobe: Lobe) {
         let rays = if point.path.depth == 0 { self.context.gloss.rays } else { 1 };
         // The same facets mirror and let through, so that nothing is lost between both.
         let splits = self.splits(point);
         #[expect(clippy::cast_possible_truncation, reason = "a handful")]
         let points = if splits { rays.max(self.context.bands.len() as u32) } else { rays };
         let spread = self.draws(point, Purpose::Facets).spread(points);
-        let glass = lets_light_in(point.surface.target.material);
+        let glass = lets_light_in(point.surface.material().1);
         let mut rough = Rough { lobe, rays, glass, spread };
         self.send_lacquer(point);
         for k in 0..rays {
@@ -126,14 +145,14 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     }
 
     /// Mirrors the `k`th ray off a facet.
-    fn send_off_facet(&mut self, point: &Point, crossing: &Crossing, rough: &Rough, k: u32) {
-        let (surface, view) = (point.surface, point.surface.view);
+    fn send_off_facet<G: Ground>(&mut self, point: &Point<G>, crossing: &Crossing, rough: &Rough, k: u32) {
+        let Seen { normal, geometric, view, .. } = point.surface.seen();
         let facet = rough.lobe.facet(view, rough.spread.point(k));
         let share = point.matter.balance(view.dot(facet), crossing).reflected;
-        let to = rough.beyond(surface.normal, reflect(-view, facet));
-        if surface.normal.dot(to) > 0.0 {
+        let to = rough.beyond(normal, reflect(-view, facet));
+        if normal.dot(to) > 0.0 {
             let weight = point.path.weight * share * (rough.kept(view, to) / rough.rays as f32);
-            self.send_spread(point, above(to, surface.geometric), RayClass::Reflected, rough, |path| Path {
+            self.send_spread(point, above(to, geometric), RayClass::Reflected, rough, |path| Path {
                 weight,
                 ..path.turned(RayClass::Reflected, k + 1)
             });
@@ -141,16 +160,16 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     }
 
     /// Lets the `k`th ray through a facet.
-    fn send_through_facet(
+    fn send_through_facet<G: Ground>(
         &mut self,
-        point: &Point,
+        point: &Point<G>,
         crossing: &Crossing,
         rough: &Rough,
         k: u32,
         band: Option<u8>,
         color: Vec3,
     ) {
-        let (surface, view) = (point.surface, point.surface.view);
+        let Seen { normal, geometric, view, .. } = point.surface.seen();
         let facet = rough.lobe.facet(view, rough.spread.point(k));
         let share = point.matter.balance(view.dot(facet), crossing).refracted;
         if !self.context.is_alive(point.path.weight * share * color) {
@@ -160,15 +179,15 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let bent = if crossing.n_i == crossing.n_t {
             // Thin: both walls together spread light as a mirror does, on the other side.
             let mirrored = reflect(-view, facet);
-            Some(mirrored - surface.normal * (2.0 * surface.normal.dot(mirrored)))
+            Some(mirrored - normal * (2.0 * normal.dot(mirrored)))
         } else {
             refract(-view, facet, n_i, n_t)
         };
-        let Some(to) = bent.map(|to| rough.beyond(-surface.normal, to)) else { return };
+        let Some(to) = bent.map(|to| rough.beyond(-normal, to)) else { return };
         let weight = point.path.weight * share * color * (rough.kept(view, to) / rough.rays as f32);
         let media = crossing.beyond;
         let straight = point.path.straight && crossing.n_i == crossing.n_t;
-        self.send_spread(point, above(to, -surface.geometric), RayClass::Refracted, rough, |path| Path {
+        self.send_spread(point, above(to, -geometric), RayClass::Refracted, rough, |path| Path {
             weight,
             band,
             media,
@@ -177,9 +196,9 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         });
     }
 
-    fn send_spread(
+    fn send_spread<G: Ground>(
         &mut self,
-        point: &Point,
+        point: &Point<G>,
         dir: Vec3,
         class: RayClass,
         rough: &Rough,
@@ -191,20 +210,20 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
         let angle = rough.lobe.angle(rough.rays);
         let (cone_spread, scattered) = (path.cone_spread + angle, path.scattered + angle);
-        let ray = point.surface.ray(dir, f32::INFINITY, point.ray.sample);
+        let ray = point.surface.ray(dir, point.ray.sample);
         self.starting[class as usize].push(ray, Path { cone_spread, scattered, ..path }, Hit::MISS);
     }
 
     /// Queues what lacquer mirrors.
-    fn send_lacquer(&mut self, point: &Point) {
+    fn send_lacquer<G: Ground>(&mut self, point: &Point<G>) {
         if let Some((lacquer, share)) = point.matter.lacquer() {
             self.send_reflected(point, lacquer, point.path.weight * share, point.path.band);
         }
     }
 
     /// Queues what is mirrored by the surface and by lacquer over it: one ray where both have the same normal.
-    fn reflect(&mut self, point: &Point, reflected: Vec3) {
-        let (weight, normal, band) = (point.path.weight, point.surface.normal, point.path.band);
+    fn reflect<G: Ground>(&mut self, point: &Point<G>, reflected: Vec3) {
+        let (weight, normal, band) = (point.path.weight, point.surface.seen().normal, point.path.band);
         match point.matter.lacquer() {
             Some((lacquer, share)) if lacquer == normal => {
                 self.send_reflected(point, normal, weight * (reflected + share), band);
@@ -216,18 +235,18 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
     }
 
-    fn send_reflected(&mut self, point: &Point, normal: Vec3, weight: Vec3, band: Option<u8>) {
+    fn send_reflected<G: Ground>(&mut self, point: &Point<G>, normal: Vec3, weight: Vec3, band: Option<u8>) {
         if !self.context.is_alive(weight) {
             return;
         }
-        let surface = point.surface;
-        let dir = above(reflect(-surface.view, normal), surface.geometric);
+        let Seen { geometric, view, .. } = point.surface.seen();
+        let dir = above(reflect(-view, normal), geometric);
         let path = Path { band, ..point.bounced(self.context, weight, MIRROR).turned(RayClass::Reflected, 0) };
-        let ray = surface.ray(dir, f32::INFINITY, point.ray.sample);
+        let ray = point.surface.ray(dir, point.ray.sample);
         self.starting[RayClass::Reflected as usize].push(ray, path, Hit::MISS);
     }
 
-    fn send_refracted(&mut self, point: &Point, weight: Vec3, crossing: &Crossing, band: Option<u8>) {
+    fn send_refracted<G: Ground>(&mut self, point: &Point<G>, weight: Vec3, crossing: &Crossing, band: Option<u8>) {
         if !self.context.is_alive(weight) {
             return;
         }
@@ -238,18 +257,18 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             let path = Path { weight, band, depth: point.path.depth + 1, media: crossing.beyond, ..path };
             return self.continuing[RayClass::Refracted as usize].push(*point.ray, path, *point.hit);
         }
-        let surface = point.surface;
+        let Seen { normal, geometric, view, .. } = point.surface.seen();
         let (n_i, n_t) = (f64::from(crossing.n_i), f64::from(crossing.n_t));
-        let Some(bent) = refract(-surface.view, surface.normal, n_i, n_t) else {
+        let Some(bent) = refract(-view, normal, n_i, n_t) else {
             // Total reflection by a hair that the balance did not see.
-            return self.send_reflected(point, surface.normal, weight, band);
+            return self.send_reflected(point, normal, weight, band);
         };
-        let dir = above(bent, -surface.geometric);
+        let dir = above(bent, -geometric);
         // As far as directions turn when light falls in steeply.
         let turns = (1.0 - crossing.n_i / crossing.n_t).abs();
         let path = point.bounced(self.context, weight, turns).turned(RayClass::Refracted, turn);
         let path = Path { band, media: crossing.beyond, ..path };
-        let ray = surface.ray(dir, f32::INFINITY, point.ray.sample);
+        let ray = point.surface.ray(dir, point.ray.sample);
         self.starting[RayClass::Refracted as usize].push(ray, path, Hit::MISS);
     }
 }

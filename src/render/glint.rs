@@ -41,14 +41,8 @@ pub(super) fn least_of(turning: f32, spread: f32, reach: f32) -> f32 {
     turning + 0.5 * eye * eye
 }
 
-/// Growth of a ray's cone behind a surface that bends it, by how far normals turn within it; `factor` says how many times
-/// as far directions turn, 2 for mirrors.
-pub(super) fn bent(surface: &Surface, context: &Context, spread: f32, factor: f32) -> f32 {
-    let [along, across] = surface.bends(context);
-    behind(along.length_squared() + across.length_squared(), spread, factor)
-}
-
-/// The same where normals turn so far over the cone: the squares of the angles, summed over both axes.
+/// Growth of a ray's cone behind a surface whose normals turn so far within it, the squares of the angles summed over both
+/// axes; `factor` says how many times as far directions turn, 2 for mirrors.
 #[inline(always)]
 pub(super) fn behind(bend: f32, spread: f32, factor: f32) -> f32 {
     let turned = (0.5 * bend).sqrt();

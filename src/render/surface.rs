@@ -3,6 +3,7 @@
 //! Evaluated once, for the hit that counts. Nothing here knows of light; materials are only asked for their normal and
 //! bump maps. Whatever a file gives, normals come out finite and of unit length.
 
+use super::branch::Ground;
 use super::context::Context;
 use super::patch::{Footprint, Gradients, Patch};
 use super::shade::{Seen, has_inside};
@@ -275,6 +276,29 @@ impl<'a> Surface<'a> {
     /// Where rays towards `dir` start.
     pub(crate) fn origin(&self, dir: Vec3) -> Vec3 {
         offset_origin(self.start, self.error, self.geometric, dir)
+    }
+}
+
+impl Ground for Surface<'_> {
+    fn material(&self) -> (u32, &Material) {
+        (self.target.material_id, self.target.material)
+    }
+
+    fn seen(&self) -> Seen {
+        self.seen()
+    }
+
+    fn is_front(&self) -> bool {
+        self.front
+    }
+
+    fn bend(&self, context: &Context) -> f32 {
+        let [along, across] = self.bends(context);
+        along.length_squared() + across.length_squared()
+    }
+
+    fn ray(&self, dir: Vec3, sample: u32) -> Ray {
+        self.ray(dir, f32::INFINITY, sample)
     }
 }
 

@@ -275,7 +275,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     }
 
     /// Adds what a point shows by itself and of its surroundings, or sends the rays that find what hides those.
-    fn look_around(&mut self, point: &Point) {
+    fn look_around(&mut self, point: &Point<Surface>) {
         let (context, surface, matter) = (self.context, point.surface, point.matter);
         let (weight, sample) = (point.path.weight, point.ray.sample);
         let open = matter.ambient(&surface.seen(), &context.sky, context.scene.ambient);
@@ -305,7 +305,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     }
 
     /// Numbers for the random choices of a point.
-    pub(super) fn draws(&self, point: &Point, purpose: Purpose) -> Draws {
+    pub(super) fn draws<G>(&self, point: &Point<G>, purpose: Purpose) -> Draws {
         Draws::at(self.context.seed, &self.streams, point.path.branch, point.ray, point.hit, purpose)
     }
 
@@ -324,7 +324,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     }
 
     /// Direct light, of wide lights from several of their points.
-    fn light(&mut self, point: &Point, crossing: &Crossing) {
+    fn light(&mut self, point: &Point<Surface>, crossing: &Crossing) {
         let (context, position) = (self.context, point.surface.position);
         let mut draws = None;
         for light in &context.lights {
@@ -347,7 +347,14 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     }
 
     /// Light of one point of a light that is so much of it: without shadows at once, with them when its ray has come through.
-    fn shine(&mut self, point: &Point, crossing: &Crossing, light: &LocalLight, incident: &Incident, part: f32) {
+    fn shine(
+        &mut self,
+        point: &Point<Surface>,
+        crossing: &Crossing,
+        light: &LocalLight,
+        incident: &Incident,
+        part: f32,
+    ) {
         let (surface, to_light) = (point.surface, incident.to_light);
         let above = surface.horizon.dot(to_light) > 0.0;
         let seen = if above {

@@ -272,11 +272,11 @@ impl Matter {
         }
     }
 
-    /// The facets that spread rays; `None` where one ray does.
-    pub(crate) fn lobe(&self, surface: &Surface) -> Option<Lobe> {
+    /// The facets around this normal that spread rays; `None` where one ray does.
+    pub(crate) fn lobe(&self, normal: Vec3) -> Option<Lobe> {
         let Model::MetalRough(m) = &self.model else { return None };
         let alpha = m.spreads()?;
-        Some(self.grain.as_ref().map_or_else(|| Lobe::even(surface.normal, alpha), |g| g.lobe(surface.normal)))
+        Some(self.grain.as_ref().map_or_else(|| Lobe::even(normal, alpha), |g| g.lobe(normal)))
     }
 
     /// Roughness of the lobe that [`Self::ambient`] looks up, if there is one.
