@@ -1,6 +1,8 @@
 //! Which materials absorb the light that goes through their inside, and how strongly.
 
-use super::wave::Media;
+use super::optics::transmittance;
+use super::wave::{Media, Path};
+use crate::accel::{Hit, Ray};
 use crate::math::Vec3;
 use crate::scene::{Material, Surface};
 
@@ -32,6 +34,13 @@ impl Absorption {
     /// That of what a ray is inside of; `None` in empty space.
     pub(crate) fn within(&self, media: &Media) -> Option<Vec3> {
         self.by(media.innermost()?.material)
+    }
+
+    /// A path after what its ray is inside of has absorbed its part of the light up to `hit`.
+    pub(crate) fn lessened(&self, ray: &Ray, path: &Path, hit: &Hit) -> Path {
+        let length = (hit.t - path.since) * ray.dir.length();
+        let left = self.within(&path.media).map_or(Vec3::ONE, |a| transmittance(a, length));
+        Path { weight: path.weight * left, since: hit.t, ..*path }
     }
 }
 

@@ -5,15 +5,16 @@
 //! rays, whichever others are beside them. (Where more rays wait than a wave takes, or more shadow rays than are kept, sums
 //! that are cut there may differ in their last bits from those of pictures that are shaded one by one.)
 
+use super::branch::Point;
 use super::context::Context;
 use super::curve::Feelers;
 use super::eyes::Eyes;
 use super::observer::Observer;
 use super::seam::is_same_crossing;
-use super::shade::LocalLight;
-use super::strip::{POINTS, Sorted, Strip};
+use super::shade::{LocalLight, Model};
+use super::strip::{Common, Glass, POINTS, Sorted, Strip};
 use super::surface::{Surface, Target};
-use super::wave::{Media, Path, RayClass, Wave};
+use super::wave::{Path, RayClass, Wave};
 use super::whitted::{SPREAD, Tracer};
 use crate::accel::{Accel, Hit, Ray};
 use crate::math::Vec3;
@@ -174,7 +175,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
                 if path.straight { self.leave(ray, path) } else { self.beside.missed.push(index) }
             } else if is_same_crossing(|prim| context.world.prim(prim), ray, &wave.after[i], hit) {
                 self.continuing[class as usize].push(*ray, *path, *hit);
-            } else if !(is_plain(context, path) && sorted.take(context, (index, 1), hit.prim)) {
+            } else if !(is_plain(path) && sorted.take(context, (index, 1), hit.prim)) {
                 self.shade_one(traced, i);
             }
         }
@@ -243,7 +244,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let Some(common) = &context.common[mesh.material as usize] else { return };
         let (smooth, reads) = (!mesh.normals.is_empty(), common.mapped || !mesh.colors.is_empty());
         let (matter, shiny, placement) = (&common.matter, common.shiny, context.world.placement(instance));
-        strip.take(hits, sorted, traced, smooth);
+        strip.take(hits, sorted, (traced, &context.absorption), smooth);
         strip.find(smooth.then_some(placement));
         if reads || shiny {
             strip.widen(traced);
@@ -254,38 +255,75 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         if shiny {
             strip.bend(context, matter, smooth.then_some(placement));
         }
+        if common.glass.is_some() {
+            strip.retain(|ray| traced.path(ray).depth < context.depth);
+        }
         for index in strip.left_out(common.one_sided) {
             self.shade_one(traced, index as usize);
         }
-        if !context.is_dark || matter.shines() {
-            strip.look_around(matter, &context.sky, context.scene.ambient);
-            strip.shown().for_each(|(sample, everywhere)| self.add(sample, everywhere));
+        if !common.glass.is_some_and(|glass| glass.is_dark_inside && strip.sees_backs_alone()) {
+            self.show(traced, common, strip);
         }
-        let outside = context.absorption.is_some().then(Media::default);
-        for light in &context.lights {
-            strip.shine((matter, shiny), light);
-            if !light.shadows {
-                strip.shone().for_each(|(sample, radiance)| self.add(sample, radiance));
-                continue;
-            }
-            strip.send(&mut self.shadows, outside);
-            for (i, radiance) in strip.grazed() {
-                let (ray, hit) = (&traced.rays()[i as usize], &traced.hits()[i as usize]);
-                if let Some(feelers) = feelers(context, light, ray, hit) {
-                    self.shadows.push_feelers(&feelers, radiance, outside);
-                }
-            }
-        }
-        if shiny && context.depth > 0 {
+        if let Some(glass) = common.glass {
+            self.go_through(traced, (mesh.material, common, glass), strip);
+        } else if shiny && context.depth > 0 {
             strip.mirror(context, matter, traced, &mut self.starting[RayClass::Reflected as usize]);
         }
         self.relieve_shadows();
     }
+
+    /// Adds what the points show of their surroundings and of each light, or sends the rays that find whether it arrives.
+    fn show(&mut self, traced: Traced, common: &Common, strip: &mut Strip) {
+        let (context, matter) = (self.context, &common.matter);
+        let has_inside = common.glass.is_some_and(|glass| glass.has_inside);
+        if !context.is_dark || matter.shines() {
+            strip.look_around((matter, has_inside), &context.sky, context.scene.ambient);
+            strip.shown().for_each(|(sample, everywhere)| self.add(sample, everywhere));
+        }
+        let absorbs = context.absorption.is_some();
+        let within = absorbs && strip.certain().any(|i| traced.path(strip.ray(i).0).media.innermost().is_some());
+        for light in &context.lights {
+            strip.shine((matter, common.shiny, has_inside), light);
+            if !light.shadows {
+                strip.shone().for_each(|(sample, radiance)| self.add(sample, radiance));
+                continue;
+            }
+            if within {
+                strip.send_within(&mut self.shadows, traced);
+            } else {
+                strip.send(&mut self.shadows, absorbs);
+            }
+            for (i, radiance) in strip.grazed() {
+                let (ray, hit) = (&traced.rays()[i as usize], &traced.hits()[i as usize]);
+                if let Some(feelers) = feelers(context, light, ray, hit) {
+                    let media = absorbs.then(|| traced.path(i as usize).media);
+                    self.shadows.push_feelers(&feelers, radiance, media);
+                }
+            }
+        }
+    }
+
+    /// Sends the rays that go on from points of glass.
+    fn go_through(&mut self, traced: Traced, (id, common, glass): (u32, &Common, Glass), strip: &Strip) {
+        let context = self.context;
+        let Model::MetalRough(m) = &common.matter.model else { return };
+        let material = (id, &context.scene.materials[id as usize]);
+        for i in strip.certain() {
+            let (at, weight, width) = strip.ray(i);
+            let (ray, hit, path) = (&traced.rays()[at], &traced.hits()[at], traced.path(at));
+            let since = if context.absorption.is_some() { hit.t } else { path.since };
+            let ground = strip.ground(i, material, glass.has_inside);
+            let matter = ground.matter(m);
+            let path = Path { weight, since, ..path };
+            let point = Point { ray, hit, path, width, surface: &ground, matter: &matter };
+            self.reflect_and_refract(&point, &point.crossing(context, path.band));
+        }
+    }
 }
 
-/// Whether a path leaves what it hits as it is: no roughness has blurred it, and nothing absorbs its light.
-fn is_plain(context: &Context, path: &Path) -> bool {
-    path.scattered <= SPREAD && !(context.absorption.is_some() && path.media.innermost().is_some())
+/// Whether a path leaves what it hits as it is: no roughness has blurred it.
+fn is_plain(path: &Path) -> bool {
+    path.scattered <= SPREAD
 }
 
 /// What finds out whether a light shines on the round surface at `hit`.

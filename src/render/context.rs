@@ -78,7 +78,8 @@ pub(crate) struct Gloss {
 }
 
 impl Gloss {
-    fn new(asked: Option<u32>) -> Self {
+    /// What is asked for, `None`: what nobody says.
+    pub(crate) fn new(asked: Option<u32>) -> Self {
         /// Rays through frosted glass, when nobody says.
         const GLASS: u32 = 4;
         Self { rays: asked.unwrap_or(GLASS), all: asked.is_some_and(|rays| rays > 0) }
@@ -108,7 +109,7 @@ impl<'a> Context<'a> {
         let env_rays = env_rays.div_ceil(together).max(env_rays.min(if sky.is_map() { ENV_RAYS_LEAST } else { 2 }));
         let wide = scene.lights.iter().any(Light::is_wide);
         let alone = everything || settings.layers || wide || sky.is_map() || env_rays > 0 || gloss.all;
-        let common = |m: &Material| if alone { None } else { Common::of(m, textures, depth > 0) };
+        let common = |m: &Material| if alone { None } else { Common::of(m, textures, depth > 0, gloss) };
         let needs = |any: &[Feature]| everything || any.iter().any(|&f| features.has(f));
         Self {
             scene,

@@ -18,7 +18,6 @@ use super::eyes::Eyes;
 use super::glint;
 use super::layers::Facts;
 use super::observer::Observer;
-use super::optics::transmittance;
 use super::shade::{Incident, LocalLight, Matter, Reader, lets_light_in, terminator};
 use super::shadow::Shadows;
 use super::sky::{Arounds, Standpoint};
@@ -218,7 +217,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     /// Adds what the surface at `hit` shows by itself, and queues the rays that find the rest.
     pub(super) fn shade(&mut self, class: RayClass, ray: &Ray, path: &Path, hit: &Hit) {
         let context = self.context;
-        let lessened = context.absorption.is_some().then(|| absorbed(context, ray, path, hit));
+        let lessened = context.absorption.is_some().then(|| context.absorption.lessened(ray, path, hit));
         let path = lessened.as_ref().unwrap_or(path);
         let target = Target::new(context.scene, context.world, hit.prim);
         let material = target.material;
@@ -264,8 +263,10 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             look_up_in_vain(&surface, context.textures);
         }
         let crossing = point.crossing(context, path.band);
-        self.look_around(&point);
-        self.light(&point, &crossing);
+        if context.everything || !matter.is_dark() {
+            self.look_around(&point);
+            self.light(&point, &crossing);
+        }
 
         if path.depth < context.depth {
             self.reflect_and_refract(&point, &crossing);
@@ -379,11 +380,4 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             self.shadows.push_feelers(&feelers, radiance, inside);
         }
     }
-}
-
-/// A path after what its ray is inside of has absorbed its part of the light up to `hit`.
-fn absorbed(context: &Context, ray: &Ray, path: &Path, hit: &Hit) -> Path {
-    let length = (hit.t - path.since) * ray.dir.length();
-    let left = context.absorption.within(&path.media).map_or(Vec3::ONE, |a| transmittance(a, length));
-    Path { weight: path.weight * left, since: hit.t, ..*path }
 }

@@ -72,17 +72,20 @@ pub(crate) struct MetalRoughPaint {
     pub metallic: f32,
     pub roughness: f32,
     pub occlusion: f32,
+    pub transmission: f32,
 }
 
 impl MetalRoughPaint {
-    /// From the base colour, the share of the surroundings that is open, and what the map of roughness and metalness says.
+    /// From the base colour, the share of the surroundings that is open, and what the maps say of roughness and metalness, and
+    /// of light that is let through.
     #[inline(always)]
-    pub(crate) fn of(m: &MetalRough, base: Vec3, occlusion: f32, map: Vec4) -> Self {
+    pub(crate) fn of(m: &MetalRough, base: Vec3, occlusion: f32, (map, let_through): (Vec4, Vec4)) -> Self {
         Self {
             base: base.max(Vec3::ZERO),
             metallic: (m.metallic * map.z).clamp(0.0, 1.0),
             roughness: (m.roughness * map.y).clamp(0.0, 1.0),
             occlusion: occlusion.clamp(0.0, 1.0),
+            transmission: (m.transmission * let_through.x).clamp(0.0, 1.0),
         }
     }
 }
@@ -119,8 +122,9 @@ fn inside(m: &MetalRough, reader: &Reader) -> Vec3 {
 
 impl MetalRoughMatter {
     pub(super) fn new(m: &MetalRough, base: Vec3, occlusion: f32, reader: &Reader) -> Self {
-        let paint = MetalRoughPaint::of(m, base, occlusion, reader.linear(m.metal_rough_map.as_ref()));
-        let MetalRoughPaint { base, metallic, roughness, occlusion } = paint;
+        let maps = [&m.metal_rough_map, &m.transmission_map].map(|map| reader.linear(map.as_ref()));
+        let paint = MetalRoughPaint::of(m, base, occlusion, maps.into());
+        let MetalRoughPaint { base, metallic, roughness, occlusion, transmission } = paint;
         let specular = m.specular * reader.linear(m.specular_map.as_ref()).w;
         let color = m.specular_color * reader.srgb(m.specular_color_map.as_ref());
         let at_normal = (m.ior - 1.0) / (m.ior + 1.0);
@@ -135,7 +139,7 @@ impl MetalRoughMatter {
             by_rays: false,
             f0: (color * (at_normal * at_normal)).clamp(Vec3::ZERO, Vec3::ONE) * specular,
             f90: specular,
-            transmission: (m.transmission * reader.linear(m.transmission_map.as_ref()).x).clamp(0.0, 1.0),
+            transmission,
             share: 0.0,
             through: Vec3::ZERO,
             occlusion,
@@ -149,15 +153,15 @@ impl MetalRoughMatter {
 
     /// The numbers that maps have said.
     pub(crate) fn paint(&self) -> MetalRoughPaint {
-        let Self { base, metallic, roughness, occlusion, .. } = *self;
-        MetalRoughPaint { base, metallic, roughness, occlusion }
+        let Self { base, metallic, roughness, occlusion, transmission, .. } = *self;
+        MetalRoughPaint { base, metallic, roughness, occlusion, transmission }
     }
 
     /// The same with other numbers of maps, where no film is over it.
     #[inline(always)]
     pub(crate) fn painted(&self, paint: MetalRoughPaint) -> Self {
-        let MetalRoughPaint { base, metallic, roughness, occlusion } = paint;
-        Self { base, metal_f0: base, metallic, roughness, occlusion, ..*self }
+        let MetalRoughPaint { base, metallic, roughness, occlusion, transmission } = paint;
+        Self { base, metal_f0: base, metallic, roughness, occlusion, transmission, ..*self }
     }
 
     /// Lets it scatter light to its other side.
@@ -236,6 +240,16 @@ impl MetalRoughMatter {
         self.by_rays = true;
     }
 
+    /// Whether what is mirrored is looked up, in part at least.
+    pub(crate) fn looks_up(&self) -> bool {
+        !self.by_rays
+    }
+
+    /// Whether all light that enters it passes through.
+    pub(crate) fn is_clear(&self) -> bool {
+        self.transmission >= 1.0 && self.metallic <= 0.0
+    }
+
     /// How far its facets spread rays: the α of their distribution; `None` where one ray does.
     pub(super) fn spreads(&self) -> Option<f32> {
         (self.by_rays && self.roughness.max(self.roughness_along) >= NARROWEST_HIGHLIGHT)
@@ -278,6 +292,17 @@ impl MetalRoughMatter {
     pub(crate) fn lit(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
         let a2 = squared_width(self.roughness).max(self.least_square);
         let lobe = |half| highlight(normal, half, [normal.dot(to_light), normal.dot(view)], a2);
+        self.lit_by(normal, view, to_light, lobe)
+    }
+
+    /// The same, without highlights where it is seen from inside.
+    #[inline(always)]
+    pub(crate) fn lit_on_side(&self, normal: Vec3, view: Vec3, to_light: Vec3, outside: bool) -> Vec3 {
+        let a2 = squared_width(self.roughness).max(self.least_square);
+        let lobe = |half| {
+            let seen = highlight(normal, half, [normal.dot(to_light), normal.dot(view)], a2);
+            if outside { seen } else { 0.0 }
+        };
         self.lit_by(normal, view, to_light, lobe)
     }
 

@@ -181,6 +181,17 @@ impl Matter {
         Self { outside: true, emission, model, grain: None, sheen: None, coat: None }
     }
 
+    /// A surface of this model and nothing else, as it is asked what goes on from it.
+    pub(crate) fn bare(m: MetalRoughMatter, outside: bool) -> Self {
+        Self { outside, emission: Vec3::ZERO, model: Model::MetalRough(m), grain: None, sheen: None, coat: None }
+    }
+
+    /// Whether nothing is seen of its surface but what rays find that go on from it: clear glass from inside.
+    pub(crate) fn is_dark(&self) -> bool {
+        let Model::MetalRough(m) = &self.model else { return false };
+        !self.outside && self.emission == Vec3::ZERO && m.is_clear()
+    }
+
     /// Share of what is under the lacquer that is seen through it.
     fn below_coat(&self) -> f32 {
         self.coat.as_ref().map_or(1.0, CoatMatter::clear)

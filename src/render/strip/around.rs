@@ -43,10 +43,11 @@ impl Default for Surroundings {
 }
 
 impl Strip {
-    /// Finds what each point of a surface of `matter` shows of `sky` and of light from everywhere.
-    pub(crate) fn look_around(&mut self, matter: &Matter, sky: &Sky, ambient: Vec3) {
+    /// Finds what each point of a surface of `matter` shows of `sky` and of light from everywhere; backs of what `has_inside` are
+    /// seen from inside.
+    pub(crate) fn look_around(&mut self, (matter, has_inside): (&Matter, bool), sky: &Sky, ambient: Vec3) {
         let (found, painted, to, points) = (&self.found, &self.painted, &mut self.surroundings, padded(self.count));
-        self.level.run(Look { found, painted, to, points, matter, sky, ambient });
+        self.level.run(Look { found, painted, to, points, matter, has_inside, sky, ambient });
         if let Some(weights) = &self.weights {
             self.level.run(Weigh { weights, radiance: &mut self.surroundings.radiance, points });
         }
@@ -85,6 +86,7 @@ struct Look<'a> {
     to: &'a mut Surroundings,
     points: usize,
     matter: &'a Matter,
+    has_inside: bool,
     sky: &'a Sky,
     ambient: Vec3,
 }
@@ -95,7 +97,7 @@ impl Kernel for Look<'_> {
     // Whether maps change the material is asked outside the loops, which then are formulas.
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Self { found, painted, to, points, matter, sky, ambient } = self;
+        let Self { found, painted, to, points, matter, has_inside, sky, ambient } = self;
         let (points, emission) = (points.min(POINTS), matter.emission);
         match &matter.model {
             Model::Unlit(_) if painted.any => {
@@ -111,10 +113,21 @@ impl Kernel for Look<'_> {
                     scatter(to, points, ambient, |_| (emission, m));
                 }
             }
-            Model::MetalRough(m) if painted.any => look(&Mapped { m: *m, painted }, found, to, points, sky, ambient),
+            Model::MetalRough(m) if painted.any => {
+                let mapped = Mapped { m: *m, painted };
+                if has_inside {
+                    look(&mapped, found, |i| found.front[i] == 1, to, points, (sky, ambient));
+                } else {
+                    look(&mapped, found, |_| true, to, points, (sky, ambient));
+                }
+            }
             Model::MetalRough(m) => {
                 let even = Even { m: m.in_the_open(), row: m.shares(), mean: mean_albedo(m.roughness()), emission };
-                look(&even, found, to, points, sky, ambient);
+                if has_inside {
+                    look(&even, found, |i| found.front[i] == 1, to, points, (sky, ambient));
+                } else {
+                    look(&even, found, |_| true, to, points, (sky, ambient));
+                }
             }
         }
     }
@@ -141,6 +154,8 @@ trait MetalRoughPoints {
     fn mean_albedo(&self, means: &Column, i: usize) -> f32;
     /// Share of the mirrored surroundings that nothing stands in the way of.
     fn open(&self, i: usize, n_v: f32) -> f32;
+    /// Whether what is mirrored is looked up.
+    fn looks_up(&self) -> bool;
 }
 
 /// The same everywhere.
@@ -178,6 +193,11 @@ impl MetalRoughPoints for Even {
     #[inline(always)]
     fn open(&self, _: usize, _: f32) -> f32 {
         1.0
+    }
+
+    #[inline(always)]
+    fn looks_up(&self) -> bool {
+        self.m.looks_up()
     }
 }
 
@@ -219,10 +239,23 @@ impl MetalRoughPoints for Mapped<'_> {
     fn open(&self, i: usize, n_v: f32) -> f32 {
         open(n_v, self.painted.occlusion[i], self.painted.roughness[i])
     }
+
+    #[inline(always)]
+    fn looks_up(&self) -> bool {
+        self.m.looks_up()
+    }
 }
 
+/// What a metallic-rough material shows; `outside` tells whether a point is seen from outside.
 #[inline(always)]
-fn look(m: &impl MetalRoughPoints, found: &Found, to: &mut Surroundings, points: usize, sky: &Sky, ambient: Vec3) {
+fn look(
+    m: &impl MetalRoughPoints,
+    found: &Found,
+    outside: impl Fn(usize) -> bool,
+    to: &mut Surroundings,
+    points: usize,
+    (sky, ambient): (&Sky, Vec3),
+) {
     for i in 0..points.min(POINTS) {
         let seen = found.seen(i);
         to.n_v[i] = seen.normal.dot(seen.view).clamp(0.0, 1.0);
@@ -232,11 +265,15 @@ fn look(m: &impl MetalRoughPoints, found: &Found, to: &mut Surroundings, points:
         (to.shares[0][i], to.shares[1][i]) = m.shares(i, to.n_v[i]);
     }
     m.find_means(points, &mut to.mean);
-    for i in 0..points.min(POINTS) {
-        to.open[i] = m.open(i, to.n_v[i]);
-    }
     spread(sky, &found.normal, points, &mut to.diffuse);
-    blur(sky, |i| m.matter(i).roughness(), &to.mirrored_dir, points, &mut to.mirrored);
+    if m.looks_up() {
+        for i in 0..points.min(POINTS) {
+            to.open[i] = m.open(i, to.n_v[i]);
+        }
+        blur(sky, |i| m.matter(i).roughness(), &to.mirrored_dir, points, &mut to.mirrored);
+    } else {
+        (to.open, to.mirrored) = ([0.0; POINTS], [[0.0; POINTS]; 3]);
+    }
     for i in 0..points.min(POINTS) {
         let around = Around {
             n_v: to.n_v[i],
@@ -244,8 +281,7 @@ fn look(m: &impl MetalRoughPoints, found: &Found, to: &mut Surroundings, points:
             diffuse: get(&to.diffuse, i) + ambient,
             mirrored: get(&to.mirrored, i) + ambient,
             open: to.open[i],
-            // Nothing that light can enter is shaded here.
-            outside: true,
+            outside: outside(i),
         };
         let matter = m.matter(i);
         put(&mut to.radiance, i, m.emission(i) + matter.around(&around, matter.rebound(m.mean_albedo(&to.mean, i))).0);

@@ -9,6 +9,7 @@ use super::sorted::Sorted;
 use crate::math::Vec3;
 use crate::math::bounds::offset_origin;
 use crate::math::simd::{Kernel, Level, Simd};
+use crate::render::absorption::Absorption;
 use crate::render::beside::Traced;
 use crate::render::patch::smooth_normal;
 use crate::render::shade::Seen;
@@ -133,7 +134,13 @@ impl Default for Strip {
 impl Strip {
     /// Takes hits, at most [`POINTS`], each by the place of its ray in what was traced and that of its face, with the normals of its
     /// corners if the mesh is `smooth`.
-    pub(crate) fn take(&mut self, hit: &[(u32, u32)], sorted: &Sorted, traced: Traced, smooth: bool) {
+    pub(crate) fn take(
+        &mut self,
+        hit: &[(u32, u32)],
+        sorted: &Sorted,
+        (traced, absorption): (Traced, &Absorption),
+        smooth: bool,
+    ) {
         self.count = hit.len().min(POINTS);
         for (at, (ray, _)) in self.rays.iter_mut().zip(hit) {
             *at = *ray;
@@ -142,8 +149,11 @@ impl Strip {
         if let Traced::Wave(_, wave) = traced {
             let weights = self.weights.insert(EMPTY);
             for (i, &ray) in self.rays[..self.count].iter().enumerate() {
-                self.samples[i] = wave.rays[ray as usize].sample;
-                put(weights, i, wave.paths[ray as usize].weight);
+                let at = ray as usize;
+                let (ray, path, hit) = (&wave.rays[at], &wave.paths[at], &wave.hits[at]);
+                self.samples[i] = ray.sample;
+                let absorbs = absorption.is_some();
+                put(weights, i, if absorbs { absorption.lessened(ray, path, hit).weight } else { path.weight });
             }
         }
         self.level.run(Gather { given: &mut self.given, hit: &hit[..self.count], sorted, traced, smooth });
@@ -162,6 +172,18 @@ impl Strip {
 }
 
 impl Strip {
+    /// Leaves out the points whose rays, by their places in what was traced, are not wanted.
+    pub(crate) fn retain(&mut self, wanted: impl Fn(usize) -> bool) {
+        for (certain, &ray) in self.found.certain.iter_mut().zip(&self.rays).take(self.count) {
+            *certain &= u32::from(wanted(ray as usize));
+        }
+    }
+
+    /// Whether backs of faces are all that is seen.
+    pub(crate) fn sees_backs_alone(&self) -> bool {
+        self.found.front[..self.count.min(POINTS)].iter().all(|&front| front == 0)
+    }
+
     /// The rays whose points must be shaded one by one, from now on left out here.
     pub(crate) fn left_out(&mut self, one_sided: bool) -> impl Iterator<Item = u32> {
         let Found { certain, front, .. } = &mut self.found;
@@ -365,7 +387,9 @@ mod tests {
             faces.push(Face::of_triangle(i, &corners, Some(normals)));
         }
         let hit: Vec<(u32, u32)> = (0..61).map(|i| (i, i)).collect();
-        strip.take(&hit, &Sorted::of_faces(faces), Traced::Wave(RayClass::Reflected, &wave(rays, hits)), true);
+        let wave = wave(rays, hits);
+        let traced = (Traced::Wave(RayClass::Reflected, &wave), &Absorption::default());
+        strip.take(&hit, &Sorted::of_faces(faces), traced, true);
         strip
     }
 
@@ -380,7 +404,7 @@ mod tests {
         let kind = LightKind::Point { position: DVec3::new(1.0, 3.0, 2.0), falloff: Falloff::None };
         let light = Light { name: String::new(), intensity: Vec3::ONE, kind, shadows: true, size: 0.0 };
         let matter = Matter::without_maps(&Material::plain(), &TextureStore::new(&Scene::default()));
-        strip.shine((&matter, false), &LocalLight::new(&light, DVec3::ZERO));
+        strip.shine((&matter, false, false), &LocalLight::new(&light, DVec3::ZERO));
         let point = |i: usize| {
             let (f, l) = (&strip.found, &strip.lit);
             let columns = [&f.position, &f.error, &f.view, &f.normal, &l.radiance, &l.origin];
@@ -420,7 +444,8 @@ mod tests {
         for level in Level::all() {
             for count in [1, 7, 8, 40, POINTS] {
                 let mut strip = Strip { level, ..Strip::default() };
-                strip.take(&hit[..count], &sorted, Traced::Wave(RayClass::Reflected, &wave), true);
+                let traced = (Traced::Wave(RayClass::Reflected, &wave), &Absorption::default());
+                strip.take(&hit[..count], &sorted, traced, true);
                 let given = &strip.given;
                 for (i, &(index, face)) in hit[..count].iter().enumerate() {
                     let (ray, of_hit) = (&wave.rays[index as usize], &wave.hits[index as usize]);

@@ -1,8 +1,8 @@
 //! What all points of a material have in common.
 
 use super::sheet::Sheet;
-use crate::render::context::coverage;
-use crate::render::shade::{Matter, Model, lets_light_in};
+use crate::render::context::{Gloss, coverage};
+use crate::render::shade::{Matter, Model, has_inside, lets_light_in};
 use crate::render::texture::TextureStore;
 use crate::scene::{Material, MetalRough};
 
@@ -18,20 +18,36 @@ pub(crate) struct Common {
     pub sheet: Option<Sheet>,
     /// Whether it may mirror, where rays bounce, or show lights as narrow highlights.
     pub shiny: bool,
+    /// Where light enters it, which rays follow.
+    pub glass: Option<Glass>,
+}
+
+/// What is known of a material that lets light in.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Glass {
+    /// Whether backs of faces are seen from inside.
+    pub has_inside: bool,
+    /// Whether nothing of its surface is seen from inside but what rays find that go on.
+    pub is_dark_inside: bool,
 }
 
 impl Common {
-    /// `None` for materials with a grain, film, sheen or lacquer, for those that let light through or scatter it through, for
-    /// those with maps of their reflectance, and for those that are nowhere there as a whole.
-    pub(crate) fn of(material: &Material, store: &TextureStore, bounces: bool) -> Option<Self> {
+    /// `None` for materials with a grain, film, sheen or lacquer, for those that scatter light through, for those with maps of
+    /// their reflectance, for those that are nowhere there as a whole, and for those that let light through but in
+    /// metallic-rough ones that rays go through.
+    pub(crate) fn of(material: &Material, store: &TextureStore, bounces: bool, gloss: Gloss) -> Option<Self> {
         let metal_rough = material.metal_rough();
-        if lets_light_in(material)
-            || coverage(material, material.opacity) < 1.0
+        if coverage(material, material.opacity) < 1.0
             || metal_rough.is_some_and(|m| m.has_lobes() || m.translucence.is_some() || has_other_maps(m))
         {
             return None;
         }
-        let matter = Matter::without_maps(material, store);
+        let mut matter = Matter::without_maps(material, store);
+        let glass = lets_light_in(material);
+        if glass {
+            metal_rough.filter(|_| bounces && gloss.spreads(material))?;
+            matter.spread_by_rays();
+        }
         let mirrors = match &matter.model {
             Model::Unlit(_) => false,
             Model::Phong(m) => m.mirrors(),
@@ -40,16 +56,29 @@ impl Common {
         // A map can make it smoother.
         let smooth = metal_rough.is_some_and(|m| m.metal_rough_map.is_some());
         Some(Self {
-            shiny: smooth || matter.has_narrow_highlight() || bounces && mirrors,
-            matter,
-            one_sided: !material.double_sided,
+            shiny: glass || smooth || matter.has_narrow_highlight() || bounces && mirrors,
+            one_sided: !material.double_sided && !glass,
             mapped: material.textures().next().is_some(),
             sheet: Sheet::of(material, store),
+            glass: glass.then(|| Glass::of(material, &matter)),
+            matter,
         })
     }
 }
 
-/// Whether it has maps of more than its colour, roughness and metalness.
+impl Glass {
+    fn of(material: &Material, matter: &Matter) -> Self {
+        let has_inside = has_inside(material);
+        let changes = |m: &MetalRough| m.transmission_map.is_some() || m.metal_rough_map.is_some();
+        let is_clear = matches!(&matter.model, Model::MetalRough(m) if m.is_clear());
+        let is_the_same = !material.metal_rough().is_none_or(changes);
+        Self { has_inside, is_dark_inside: has_inside && is_clear && is_the_same && !matter.shines() }
+    }
+}
+
+/// Whether it has maps of more than its colour, roughness and metalness, and of what passes through. How thick it is matters
+/// only where that is looked up.
 fn has_other_maps(m: &MetalRough) -> bool {
-    m.maps().count() > usize::from(m.metal_rough_map.is_some())
+    let known = [&m.metal_rough_map, &m.transmission_map, &m.thickness_map];
+    m.maps().count() > known.into_iter().flatten().count()
 }

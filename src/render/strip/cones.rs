@@ -17,13 +17,13 @@ use crate::render::world::Placement;
 /// The cones.
 pub(crate) struct Cones {
     /// Width at the point, and growth.
-    width: Column,
+    pub(super) width: Column,
     spread: Column,
     /// Axes of the ellipse in which the cone meets the surface.
     along: Columns,
     across: Columns,
     /// Squares of the angles by which the mesh's own normal turns along both axes, summed, …
-    bend: Column,
+    pub(super) bend: Column,
     /// … and of those by which a normal map turns it in reach.
     pub(super) turning: Column,
     /// α² of the highlights of lights at least.

@@ -7,6 +7,7 @@ use super::painted::Painted;
 use crate::accel::Ray;
 use crate::math::Vec3;
 use crate::math::simd::{Kernel, Simd};
+use crate::render::beside::Traced;
 use crate::render::curve::STEEP;
 use crate::render::shade::{LocalLight, Matter, Model, PhongMatter, terminator, way};
 use crate::render::shadow::{Bound, Shadows};
@@ -50,11 +51,12 @@ impl Default for Lit {
 }
 
 impl Strip {
-    /// Finds what `light` does at each point of a surface of `matter`, on which highlights may be narrow if it is `shiny`.
-    pub(crate) fn shine(&mut self, (matter, shiny): (&Matter, bool), light: &LocalLight) {
+    /// Finds what `light` does at each point of a surface of `matter`, on which highlights may be narrow if it is `shiny`; backs of
+    /// what `has_inside`, which is shiny, are seen from inside.
+    pub(crate) fn shine(&mut self, (matter, shiny, has_inside): (&Matter, bool, bool), light: &LocalLight) {
         let (found, lit, points, painted) = (&self.found, &mut self.lit, padded(self.count), &self.painted);
         let cones = shiny.then_some(&self.cones);
-        self.level.run(Shine { found, lit, points, matter, painted, cones, light });
+        self.level.run(Shine { found, lit, points, matter, painted, cones, has_inside, light });
         if let Some(weights) = &self.weights {
             self.level.run(Weigh { weights, radiance: &mut self.lit.radiance, points });
             for i in 0..points.min(POINTS) {
@@ -80,11 +82,26 @@ impl Strip {
         points.map(|i| (names[i], get(&self.lit.radiance, i)))
     }
 
-    /// Sends the shadow rays that start on their triangles; `media` is what they start inside of, where that matters.
-    pub(crate) fn send(&mut self, shadows: &mut Shadows, media: Option<Media>) {
+    /// Sends the shadow rays that start on their triangles, outside of everything where that matters.
+    pub(crate) fn send(&mut self, shadows: &mut Shadows, absorbs: bool) {
+        let count = self.make_ready();
+        shadows.push_all(&self.sent.rays[..count], &self.sent.light[..count], absorbs.then(Media::default));
+    }
+
+    /// The same where each starts inside of what the rays of the points are inside of.
+    pub(crate) fn send_within(&mut self, shadows: &mut Shadows, traced: Traced) {
+        let count = self.make_ready();
+        let (seen, sent) = (&self.lit.seen, &self.sent);
+        let points = self.rays.iter().zip(seen).filter(|(_, seen)| **seen == PLAIN);
+        for ((&at, _), (ray, light)) in points.zip(sent.rays[..count].iter().zip(&sent.light)) {
+            shadows.push_bound(*ray, *light, Some(traced.path(at as usize).media));
+        }
+    }
+
+    /// Makes the shadow rays that start on their triangles ready to be sent; how many there are.
+    fn make_ready(&mut self) -> usize {
         let (prims, samples, lit, sent) = (self.given.faces.prims(), &self.samples, &self.lit, &mut self.sent);
-        let count = self.level.run(Send { points: self.count.min(POINTS), prims, samples, lit, sent });
-        shadows.push_all(&self.sent.rays[..count], &self.sent.light[..count], media);
+        self.level.run(Send { points: self.count.min(POINTS), prims, samples, lit, sent })
     }
 }
 
@@ -155,6 +172,7 @@ struct Shine<'a> {
     painted: &'a Painted,
     /// Where highlights may be narrow.
     cones: Option<&'a Cones>,
+    has_inside: bool,
     light: &'a LocalLight,
 }
 
@@ -163,7 +181,7 @@ impl Kernel for Shine<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Self { found, lit, points, matter, painted, cones, light } = self;
+        let Self { found, lit, points, matter, painted, cones, has_inside, light } = self;
         let (points, light) = (points.min(POINTS), *light);
         let in_lux = matches!(matter.model, Model::MetalRough(_));
         light.arriving_at(
@@ -197,6 +215,14 @@ impl Kernel for Shine<'_> {
             Model::MetalRough(m) => {
                 let m = *m;
                 match (painted.any, cones) {
+                    (true, Some(cones)) if has_inside => reflect(found, lit, points, |i, normal, view, to_light| {
+                        let m = painted.metal_rough(i, &m).at_least(cones.least_square[i]);
+                        m.lit_on_side(normal, view, to_light, found.front[i] == 1)
+                    }),
+                    (false, Some(cones)) if has_inside => reflect(found, lit, points, |i, normal, view, to_light| {
+                        let m = m.at_least(cones.least_square[i]);
+                        m.lit_on_side(normal, view, to_light, found.front[i] == 1)
+                    }),
                     (true, Some(cones)) => reflect(found, lit, points, |i, normal, view, to_light| {
                         painted.metal_rough(i, &m).at_least(cones.least_square[i]).lit(normal, view, to_light)
                     }),

@@ -26,6 +26,7 @@ pub(super) struct Painted {
     metallic: Column,
     pub(super) roughness: Column,
     pub(super) occlusion: Column,
+    transmission: Column,
     ambient: Columns,
     specular: Columns,
     shininess: Column,
@@ -43,6 +44,7 @@ impl Default for Painted {
             metallic: one,
             roughness: one,
             occlusion: one,
+            transmission: one,
             ambient: three,
             specular: three,
             shininess: one,
@@ -82,9 +84,10 @@ impl Painted {
 
     #[inline(always)]
     pub(super) fn put_metal_rough(&mut self, i: usize, paint: MetalRoughPaint) {
-        let MetalRoughPaint { base, metallic, roughness, occlusion } = paint;
+        let MetalRoughPaint { base, metallic, roughness, occlusion, transmission } = paint;
         put(&mut self.base, i, base);
         (self.metallic[i], self.roughness[i], self.occlusion[i]) = (metallic, roughness, occlusion);
+        self.transmission[i] = transmission;
     }
 
     #[inline(always)]
@@ -130,6 +133,7 @@ impl Painted {
             metallic: self.metallic[i],
             roughness: self.roughness[i],
             occlusion: self.occlusion[i],
+            transmission: self.transmission[i],
         })
     }
 }

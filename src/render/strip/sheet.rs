@@ -22,12 +22,13 @@ enum Slot {
     Occlusion,
     Normal,
     MetalRough,
+    Transmission,
     Ambient,
     Specular,
     Shininess,
 }
 
-const SLOTS: usize = 9;
+const SLOTS: usize = 10;
 
 /// What the maps of eight points say.
 type Texels = [[Vec4; LANES]; SLOTS];
@@ -55,7 +56,9 @@ impl Sheet {
     pub(super) fn of(material: &Material, store: &TextureStore) -> Option<Self> {
         let maps = maps(material);
         let (_, first, _) = maps.first()?;
-        if maps.len() < material.textures().count() {
+        // How thick glass is does not matter where rays go through it.
+        let thickness = material.metal_rough().is_some_and(|m| m.thickness_map.is_some());
+        if maps.len() + usize::from(thickness) < material.textures().count() {
             return None;
         }
         let mut sheet = Self {
@@ -101,10 +104,10 @@ impl Sheet {
 
 /// The maps that strips know, and what for.
 fn maps(material: &Material) -> Vec<(Slot, &TextureRef, ColorSpace)> {
-    let (metal_rough, [ambient, specular, shininess]) = match &material.surface {
-        Surface::MetalRough(m) => (m.metal_rough_map.as_ref(), [None; 3]),
-        Surface::Phong(p) => (None, [&p.ambient_map, &p.specular_map, &p.shininess_map].map(Option::as_ref)),
-        Surface::Unlit => (None, [None; 3]),
+    let ([metal_rough, transmission], [ambient, specular, shininess]) = match &material.surface {
+        Surface::MetalRough(m) => ([&m.metal_rough_map, &m.transmission_map].map(Option::as_ref), [None; 3]),
+        Surface::Phong(p) => ([None; 2], [&p.ambient_map, &p.specular_map, &p.shininess_map].map(Option::as_ref)),
+        Surface::Unlit => ([None; 2], [None; 3]),
     };
     let all = [
         (Slot::Base, material.base_color_map.as_ref(), ColorSpace::Srgb),
@@ -113,6 +116,7 @@ fn maps(material: &Material) -> Vec<(Slot, &TextureRef, ColorSpace)> {
         (Slot::Occlusion, material.occlusion_map.as_ref(), ColorSpace::Linear),
         (Slot::Normal, material.normal_map.as_ref(), ColorSpace::Linear),
         (Slot::MetalRough, metal_rough, ColorSpace::Linear),
+        (Slot::Transmission, transmission, ColorSpace::Linear),
         (Slot::Ambient, ambient, ColorSpace::Srgb),
         (Slot::Specular, specular, ColorSpace::Srgb),
         (Slot::Shininess, shininess, ColorSpace::Linear),
@@ -219,7 +223,10 @@ fn paint(painted: &mut Painted, i: usize, material: &Material, texel: impl Fn(Sl
         }
         Surface::MetalRough(m) => {
             let open = occlusion(material, texel(Slot::Occlusion).x);
-            painted.put_metal_rough(i, MetalRoughPaint::of(m, base, open, texel(Slot::MetalRough)));
+            painted.put_metal_rough(
+                i,
+                MetalRoughPaint::of(m, base, open, [Slot::MetalRough, Slot::Transmission].map(texel).into()),
+            );
         }
     }
     whole

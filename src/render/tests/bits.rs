@@ -3,6 +3,7 @@
 use super::*;
 use crate::math::Vec2;
 use crate::math::random::Random;
+use crate::render::context::Gloss;
 use crate::render::strip::Common;
 use crate::render::texture::TextureStore;
 use crate::scene::{
@@ -185,7 +186,8 @@ fn mapped_points_shaded_side_by_side_have_the_bits_of_points_shaded_one_by_one()
     for (depth, environment) in [(1, Environment::Studio), (0, Environment::Studio), (1, Environment::Black)] {
         let mut s = painted();
         let store = TextureStore::new(&s.scene);
-        let beside = |m: &Material| Common::of(m, &store, depth > 0).is_some_and(|common| common.mapped);
+        let beside =
+            |m: &Material| Common::of(m, &store, depth > 0, Gloss::new(None)).is_some_and(|common| common.mapped);
         assert!(s.scene.materials.iter().all(beside), "nothing would be compared");
         (s.settings.depth, s.scene.environment) = (Some(depth), environment);
         let together = s.render();
@@ -193,5 +195,75 @@ fn mapped_points_shaded_side_by_side_have_the_bits_of_points_shaded_one_by_one()
         let alone = s.render();
         assert_eq!(together.counts, alone.counts);
         assert!(together.picture.beauty == alone.picture.beauty, "depth {depth}, {environment:?}");
+    }
+}
+
+/// The same with glass: clear and coloured, smooth and rough, thin and thick, with things in it that absorb light, and maps.
+fn glazed(mut s: Stage, textures: usize) -> Stage {
+    s.settings = Settings { depth: Some(6), samples: 2, ..s.settings };
+    let pane = |half: f32, thick: f32| {
+        let (front, back) = (square(thick, half), square(0.0, half));
+        let mut mesh = front.clone();
+        mesh.positions.extend(&back.positions);
+        mesh.triangles.extend(back.triangles.iter().map(|&[a, b, c]| [a + 4, c + 4, b + 4]));
+        let lean = |p: &Vec3| Vec3::new(p.x * 0.3, p.y * 0.4, if p.z > 0.0 { 1.0 } else { -1.0 }).normalize();
+        mesh.normals = mesh.positions.iter().map(lean).collect();
+        mesh.uvs = vec![mesh.positions.iter().map(|p| p.truncate()).collect()];
+        mesh
+    };
+    let glass =
+        MetalRough { transmission: 1.0, thick: true, roughness: 0.0, metallic: 0.0, ior: 1.5, ..MetalRough::default() };
+    let absorption = Vec3::new(0.3, 0.1, 0.5);
+    let panes = [
+        (0.5, glass.clone()),
+        (0.2, MetalRough { dispersion: 1.0, ..glass.clone() }),
+        (0.6, MetalRough { transmission: 0.7, absorption, roughness: 0.02, ..glass.clone() }),
+        (0.3, MetalRough { roughness: 0.3, absorption, ..glass.clone() }),
+        (0.4, MetalRough { thick: false, roughness: 0.1, ..glass.clone() }),
+        (0.3, MetalRough { thick: false, transmission: 0.5, metallic: 0.4, ..glass.clone() }),
+        (0.3, MetalRough { ior: 1.0, absorption, ..glass }),
+    ];
+    for (i, (half, m)) in panes.into_iter().enumerate() {
+        let at = DVec3::new(-1.8 + 0.6 * i as f64, 0.9 - 0.5 * (i % 4) as f64, 1.6);
+        let placed = DAffine3::from_translation(at) * DAffine3::from_rotation_y(0.3 * i as f64 - 0.7);
+        let mut mapped = m;
+        let map = |texture: usize| {
+            (textures > 0).then(|| TextureRef { texture: texture as u32, uv_set: 0, transform: UvTransform::default() })
+        };
+        (mapped.transmission_map, mapped.thickness_map) =
+            (map(i % 3).filter(|_| i % 2 == 0), map(2).filter(|_| i % 3 == 0));
+        let base_color_map = map(1).filter(|_| i != 1);
+        let double_sided = i % 2 == 0;
+        let surface = Reflection::MetalRough(mapped);
+        let material = Material {
+            surface,
+            base_color: Vec3::new(0.9, 0.95, 0.8),
+            base_color_map,
+            double_sided,
+            ..Material::plain()
+        };
+        s.mesh(pane(half, 0.4), placed, material);
+        // Something in the middle of it.
+        s.mesh(square(0.2, 0.4 * half), placed, Material::plain());
+    }
+    s
+}
+
+#[test]
+fn glass_shaded_side_by_side_has_the_bits_of_glass_shaded_one_by_one() {
+    for (environment, textures) in [(Environment::Studio, 0), (Environment::Black, 3), (Environment::Studio, 3)] {
+        let mut s = glazed(if textures > 0 { painted() } else { plain() }, textures);
+        let store = TextureStore::new(&s.scene);
+        let beside =
+            |m: &&Material| Common::of(m, &store, true, Gloss::new(None)).is_some_and(|common| common.glass.is_some());
+        assert_eq!(s.scene.materials.iter().filter(beside).count(), 7, "nothing would be compared");
+        s.scene.environment = environment;
+        let together = s.render();
+        s.settings.layers = true;
+        let alone = s.render();
+        assert!(together.counts.refracted.queries > 2000, "{:?}", together.counts.refracted);
+        assert_eq!(together.counts, alone.counts);
+        let differ = together.picture.beauty.iter().zip(&alone.picture.beauty).filter(|(a, b)| a != b).count();
+        assert_eq!(differ, 0, "pixels, {environment:?}, {textures} textures");
     }
 }
