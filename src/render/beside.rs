@@ -15,7 +15,7 @@ use super::shade::{LocalLight, Model};
 use super::strip::{Common, Glass, POINTS, Sorted, Strip};
 use super::surface::{Surface, Target};
 use super::wave::{Path, RayClass, Wave};
-use super::whitted::{SPREAD, Tracer};
+use super::whitted::Tracer;
 use crate::accel::{Accel, Hit, Ray};
 use crate::math::Vec3;
 use crate::math::simd::LANES;
@@ -175,7 +175,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
                 if path.straight { self.leave(ray, path) } else { self.beside.missed.push(index) }
             } else if is_same_crossing(|prim| context.world.prim(prim), ray, &wave.after[i], hit) {
                 self.continuing[class as usize].push(*ray, *path, *hit);
-            } else if !(is_plain(path) && sorted.take(context, (index, 1), hit.prim)) {
+            } else if !sorted.take(context, (index, 1), hit.prim) {
                 self.shade_one(traced, i);
             }
         }
@@ -252,6 +252,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         if reads {
             strip.read(context, traced, (mesh, placement), common);
         }
+        strip.blur(traced, matter);
         if shiny {
             strip.bend(context, matter, smooth.then_some(placement));
         }
@@ -319,11 +320,6 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             self.reflect_and_refract(&point, &point.crossing(context, path.band));
         }
     }
-}
-
-/// Whether a path leaves what it hits as it is: no roughness has blurred it.
-fn is_plain(path: &Path) -> bool {
-    path.scattered <= SPREAD
 }
 
 /// What finds out whether a light shines on the round surface at `hit`.

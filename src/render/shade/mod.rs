@@ -260,7 +260,7 @@ impl Matter {
     /// for Holistic and Robust Light Transport", 2013).
     pub(crate) fn blur(&mut self, angle: f32) {
         if let Model::MetalRough(m) = &mut self.model {
-            m.blur((0.5 * angle).sqrt().min(0.5));
+            m.blur(blurred(angle));
         }
     }
 
@@ -370,6 +370,11 @@ impl Matter {
             _ => (1.0, 0.0),
         }
     }
+}
+
+/// How rough what is seen along a path that rough surfaces have spread to this angle across, radians, is at least.
+pub(crate) fn blurred(angle: f32) -> f32 {
+    (0.5 * angle).sqrt().min(0.5)
 }
 
 /// Share of the surroundings that the occlusion map leaves open, which says `shade`.

@@ -234,12 +234,12 @@ impl Kernel for Gather<'_> {
         let mut at = 0;
         for same in hit.chunk_by(|(_, a), (_, b)| a == b) {
             let (points, face) = (at..at + same.len(), &faces[same[0].1 as usize]);
-            given.faces.set(points.clone(), &face.numbers);
+            given.faces.set(&points, &face.numbers);
             if smooth {
-                given.faces.set_normals(points.clone(), &face.numbers);
+                given.faces.set_normals(&points, &face.numbers);
             }
             if let Some(skin) = skins.get(face.skin as usize) {
-                given.faces.set_skin(points, skin);
+                given.faces.set_skin(&points, skin);
             }
             at += same.len();
         }

@@ -83,32 +83,26 @@ impl Faces {
         skins: [[0.0; POINTS + LANES]; SKIN_NUMBERS],
     };
 
-    /// Sets the face of these points, but for the normals of its corners. What follows up to seven behind them is written,
+    /// Sets the face of these points, but for the normals of its corners. What follows up to seven behind them may be written,
     /// too, and must be set later.
     #[inline(always)]
-    pub(super) fn set(&mut self, points: Range<usize>, face: &FaceNumbers) {
-        for at in points.step_by(LANES) {
-            set_eight(&mut self.wide, at, &face.wide);
-            set_eight(&mut self.outward, at, &face.outward);
-            set_eight(std::array::from_mut(&mut self.prims), at, &[face.prim]);
-        }
+    pub(super) fn set(&mut self, points: &Range<usize>, face: &FaceNumbers) {
+        set(&mut self.wide, points, &face.wide);
+        set(&mut self.outward, points, &face.outward);
+        set(std::array::from_mut(&mut self.prims), points, &[face.prim]);
     }
 
     /// Sets the normals of its corners, in the same way.
     #[inline(always)]
-    pub(super) fn set_normals(&mut self, points: Range<usize>, face: &FaceNumbers) {
-        for at in points.step_by(LANES) {
-            set_eight(&mut self.normals, at, &face.normals);
-            set_eight(std::array::from_mut(&mut self.curved), at, &[face.curved]);
-        }
+    pub(super) fn set_normals(&mut self, points: &Range<usize>, face: &FaceNumbers) {
+        set(&mut self.normals, points, &face.normals);
+        set(std::array::from_mut(&mut self.curved), points, &[face.curved]);
     }
 
     /// Sets its skin, in the same way.
     #[inline(always)]
-    pub(super) fn set_skin(&mut self, points: Range<usize>, skin: &Skin) {
-        for at in points.step_by(LANES) {
-            set_eight(&mut self.skins, at, &skin.0);
-        }
+    pub(super) fn set_skin(&mut self, points: &Range<usize>, skin: &Skin) {
+        set(&mut self.skins, points, &skin.0);
     }
 
     /// How the weights of its corners grow.
@@ -182,11 +176,17 @@ impl Faces {
     }
 }
 
-/// Sets the numbers of eight points from `at` on.
+/// Sets the numbers of these points, and of up to seven behind them.
 #[inline(always)]
-fn set_eight<T: Copy, const N: usize>(columns: &mut [Roomy<T>; N], at: usize, numbers: &[T; N]) {
-    let at = at % POINTS;
-    for (column, &number) in columns.iter_mut().zip(numbers) {
-        column[at..at + LANES].copy_from_slice(&[number; LANES]);
+fn set<T: Copy, const N: usize>(columns: &mut [Roomy<T>; N], points: &Range<usize>, numbers: &[T; N]) {
+    let first = points.start % POINTS;
+    if points.len() == 1 {
+        columns.iter_mut().zip(numbers).for_each(|(column, &number)| column[first] = number);
+        return;
+    }
+    for at in points.clone().step_by(LANES).map(|at| at % POINTS) {
+        for (column, &number) in columns.iter_mut().zip(numbers) {
+            column[at..at + LANES].copy_from_slice(&[number; LANES]);
+        }
     }
 }

@@ -1,9 +1,10 @@
 //! What maps and colours of vertices say at the points of a strip.
 //!
 //! Maps that share their coordinates are read side by side ([`Sheet`](super::sheet::Sheet)), others and colours point by
-//! point, as [`Surface`](crate::render::surface::Surface) reads them; what follows from them is computed side by side.
+//! point, as [`Surface`](crate::render::surface::Surface) reads them; what follows from them is computed side by side. So is
+//! what follows from how far rough surfaces on the way have blurred what is seen, which makes any material rougher.
 
-use super::columns::{Column, Columns, POINTS, Strip, get, put};
+use super::columns::{Column, Columns, POINTS, Strip, get, padded, put};
 use super::common::Common;
 use crate::accel::NO_PRIM;
 use crate::math::Vec3;
@@ -11,9 +12,10 @@ use crate::render::beside::Traced;
 use crate::render::context::{Context, coverage};
 use crate::render::patch::Patch;
 use crate::render::shade::{
-    Matter, MetalRoughMatter, MetalRoughPaint, Model, PhongMatter, PhongPaint, Reader, is_narrow,
+    Matter, MetalRoughMatter, MetalRoughPaint, Model, PhongMatter, PhongPaint, Reader, blurred, is_narrow,
 };
 use crate::render::surface::{Target, mapped_normal, side_of};
+use crate::render::whitted::SPREAD;
 use crate::render::world::Placement;
 use crate::scene::{Material, Mesh};
 
@@ -139,6 +141,27 @@ impl Painted {
 }
 
 impl Strip {
+    /// Blurs a surface of `matter` where it is seen along paths that rough surfaces have spread, after its maps were read.
+    pub(crate) fn blur(&mut self, traced: Traced, matter: &Matter) {
+        let (Model::MetalRough(m), Traced::Wave(..)) = (&matter.model, traced) else { return };
+        let rays = &self.rays[..self.count.min(POINTS)];
+        let scattered = |ray: u32| traced.path(ray as usize).scattered;
+        if rays.iter().all(|&ray| scattered(ray) <= SPREAD) {
+            return;
+        }
+        let painted = &mut self.painted;
+        if !painted.any {
+            painted.any = true;
+            for i in 0..padded(self.count) {
+                painted.put_emission(i, matter.emission);
+                painted.put_metal_rough(i, m.paint());
+            }
+        }
+        for (roughness, &ray) in painted.roughness.iter_mut().zip(rays).filter(|(_, ray)| scattered(**ray) > SPREAD) {
+            *roughness = roughness.max(blurred(scattered(ray)));
+        }
+    }
+
     /// Reads what maps and vertices say at the points of a mesh that an instance has placed so, and leaves out those that are
     /// not there as a whole.
     pub(crate) fn read(
