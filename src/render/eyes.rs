@@ -217,13 +217,16 @@ impl Eyes {
         self.make_room(start + RUN);
         self.count += run.count.min(RUN);
         self.is_pencil &= eye.sees_from_one_place();
-        let Some(rays) = from(&mut self.rays, start) else { return };
+        let [x, y, z] = &mut self.dirs;
+        let columns = [x, y, z, &mut self.cone_width, &mut self.cone_spread].map(|column| from(column, start));
+        let (Some(rays), [Some(x), Some(y), Some(z), Some(width), Some(spread)]) =
+            (from(&mut self.rays, start), columns)
+        else {
+            return;
+        };
         #[expect(clippy::cast_possible_truncation, reason = "a wave has few samples")]
-        Level::best().run(Aim { eye, run, rays, sample: start as u32 });
-        let cones = [(&mut self.cone_width, &run.cone_width), (&mut self.cone_spread, &run.cone_spread)];
-        for (to, numbers) in self.dirs.iter_mut().zip(&run.dir).chain(cones) {
-            from(to, start).into_iter().for_each(|to| *to = *numbers);
-        }
+        let sample = start as u32;
+        Level::best().run(Aim { eye, run, rays, columns: [x, y, z, width, spread], sample });
         run.count = 0;
     }
 
@@ -297,6 +300,8 @@ struct Aim<'a> {
     run: &'a mut Run,
     /// Where the rays go.
     rays: &'a mut [Ray; RUN],
+    /// Where their directions and cones go, by axis, width and growth.
+    columns: [&'a mut [f32; RUN]; 5],
     /// That of the first ray.
     sample: u32,
 }
@@ -306,7 +311,7 @@ impl Kernel for Aim<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Self { eye, run, rays, sample } = self;
+        let Self { eye, run, rays, columns, sample } = self;
         let view = *eye.view;
         let eye = Eye { view: &view, ..*eye };
         // What all rays share is decided outside the loop, which then is a formula.
@@ -322,7 +327,7 @@ impl Kernel for Aim<'_> {
             (_, None) => run.each(&eye, |ray, _| eye.start(ray)),
             (_, Some(lens)) => run.each(&eye, |ray, at| eye.start(eye.through(lens, ray, at))),
         }
-        run.write_rays(s, rays, sample);
+        run.write_rays(s, rays, columns, sample);
     }
 }
 
@@ -339,15 +344,20 @@ impl Run {
         }
     }
 
-    /// Rays from their columns, as they lie in memory: four numbers at a time.
+    /// Rays from their columns, as they lie in memory: four numbers at a time; and the columns themselves.
     #[inline(always)]
-    fn write_rays<S: Simd>(&self, s: S, rays: &mut [Ray; RUN], mut sample: u32) {
+    fn write_rays<S: Simd>(&self, s: S, rays: &mut [Ray; RUN], columns: [&mut [f32; RUN]; 5], mut sample: u32) {
+        let mut columns = columns;
         let (zero, infinite) = (s.splat(0.0), s.splat(f32::INFINITY));
         let eights = self.count.div_ceil(LANES).min(RUN / LANES);
         for (k, rays) in rays.as_chunks_mut::<LANES>().0[..eights].iter_mut().enumerate() {
             let eight = |row: &[f32; RUN]| row.as_chunks::<LANES>().0[k];
             let [ox, oy, oz] = [eight(&self.origin[0]), eight(&self.origin[1]), eight(&self.origin[2])];
             let [dx, dy, dz] = [eight(&self.dir[0]), eight(&self.dir[1]), eight(&self.dir[2])];
+            let eights = [dx, dy, dz, eight(&self.cone_width), eight(&self.cone_spread)];
+            for (column, eight) in columns.iter_mut().zip(eights) {
+                column.as_chunks_mut().0[k] = eight;
+            }
             let from = s.rows([s.load(&ox), s.load(&oy), s.load(&oz), zero]);
             let towards = s.rows([s.load(&dx), s.load(&dy), s.load(&dz), infinite]);
             for (ray, (from, towards)) in rays.iter_mut().zip(from.into_iter().zip(towards)) {

@@ -9,6 +9,7 @@ use super::sampling::Sampling;
 use super::sobol::{self, mix};
 use super::view::View;
 use super::whitted::Sample;
+use crate::math::simd::{Kernel, LANES, Level, Simd};
 use crate::math::{DVec3, Vec3};
 use crate::scene::Background;
 
@@ -133,16 +134,48 @@ impl Sum {
     }
 }
 
-/// A pixel from all of its samples.
-pub(super) fn resolve(samples: &[Sample], background: Option<Vec3>) -> [f32; 4] {
-    // Six numbers side by side, which makes two additions of each sample.
-    let mut sum = [0.0; 6];
-    for Sample { radiance: r, through: t } in samples {
-        let numbers = [r.x, r.y, r.z, t.x, t.y, t.z];
-        (0..6).for_each(|k| sum[k] += numbers[k]);
+/// Adds pixels to `to`, each from as many samples: all of its own.
+pub(super) fn resolve_each(samples: &[Sample], per_pixel: usize, background: Option<Vec3>, to: &mut Vec<[f32; 4]>) {
+    Level::best().run(Resolve { samples, per_pixel, background, to });
+}
+
+struct Resolve<'a> {
+    samples: &'a [Sample],
+    per_pixel: usize,
+    background: Option<Vec3>,
+    to: &'a mut Vec<[f32; 4]>,
+}
+
+/// Numbers of a sample.
+const NUMBERS: usize = 6;
+
+impl Kernel for Resolve<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) {
+        let Self { samples, per_pixel, background, to } = self;
+        #[expect(clippy::cast_precision_loss, reason = "sample counts are small")]
+        let weight = per_pixel as f32;
+        let numbers: &[f32] = bytemuck::cast_slice(samples);
+        // All numbers of a sample side by side, which makes one addition of each. What the lanes behind them add is another
+        // sample's and does not count.
+        let mut first = 0;
+        while first < samples.len() {
+            let end = (first + per_pixel).min(samples.len());
+            let mut sum = s.splat(0.0);
+            for at in first..end {
+                let mut row = [0.0; LANES];
+                match numbers[at * NUMBERS..].first_chunk() {
+                    Some(whole) => row = *whole,
+                    None => row[..NUMBERS].copy_from_slice(&numbers[at * NUMBERS..(at + 1) * NUMBERS]),
+                }
+                sum = s.add(sum, s.load(&row));
+            }
+            let [r, g, b, x, y, z, ..] = s.store(sum);
+            let sum = Sum { radiance: Vec3::new(r, g, b), through: Vec3::new(x, y, z), weight };
+            to.push(sum.resolve(background));
+            first = end;
+        }
     }
-    let [r, g, b, through @ ..] = sum;
-    #[expect(clippy::cast_precision_loss, reason = "sample counts are small")]
-    let weight = samples.len() as f32;
-    Sum { radiance: Vec3::new(r, g, b), through: Vec3::from_array(through), weight }.resolve(background)
 }

@@ -43,6 +43,7 @@ pub mod story;
 mod strip;
 pub mod studio;
 mod surface;
+mod tail;
 mod target;
 #[cfg(test)]
 mod tests;

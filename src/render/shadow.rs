@@ -9,6 +9,7 @@ use super::optics::transmittance;
 use super::seam::is_same_crossing;
 use super::shade::{Reader, lets_light_in, shadow_filter};
 use super::surface::{Surface, Target};
+use super::tail::Tail;
 use super::wave::{Media, Medium};
 use crate::accel::{Accel, Hit, Ray};
 use crate::math::Vec3;
@@ -17,8 +18,8 @@ use bytemuck::{Pod, Zeroable};
 /// Shadow rays that wait, each with the light it lets through. Buffers of one worker.
 #[derive(Debug, Default)]
 pub(crate) struct Shadows {
-    rays: Vec<Ray>,
-    light: Vec<Bound>,
+    rays: Tail<Ray>,
+    light: Tail<Bound>,
     /// What each is inside of; empty where nothing absorbs light.
     inside: Vec<Inside>,
     /// The ways up to where some of the rays start, and which those are.
@@ -76,13 +77,17 @@ impl Shadows {
         self.inside.extend(media.map(|media| Inside { media, since: 0.0 }));
     }
 
-    /// The same of many.
-    pub(crate) fn push_all(&mut self, rays: &[Ray], light: &[Bound], media: Option<Media>) {
-        self.rays.extend_from_slice(rays);
-        self.light.extend_from_slice(light);
-        if let Some(media) = media {
-            self.inside.resize(self.rays.len(), Inside { media, since: 0.0 });
-        }
+    /// Room for `N` more rays, and for the light of each; [`Self::take`] takes those that came.
+    pub(crate) fn room<const N: usize>(&mut self) -> (&mut [Ray; N], &mut [Bound; N]) {
+        (self.rays.room(Ray::zeroed()), self.light.room(Bound::zeroed()))
+    }
+
+    /// Takes the first so many of the rays that were written into the [`Self::room`], with what each starts inside of where
+    /// something absorbs light.
+    pub(crate) fn take(&mut self, count: usize, media: impl Iterator<Item = Media>) {
+        self.rays.grow(count);
+        self.light.grow(count);
+        self.inside.extend(media.map(|media| Inside { media, since: 0.0 }));
     }
 
     pub(crate) fn clear(&mut self) {

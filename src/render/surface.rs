@@ -324,18 +324,24 @@ pub(crate) fn mapped_normal(
     facing(bumped * side, view)
 }
 
+/// Least cosine of the view with a normal for shading.
+const GRAZING: f32 = 1e-2;
+
+/// Whether `view` sees the front of what has this normal, and not too flat.
+#[inline(always)]
+pub(crate) fn faces(normal: Vec3, view: Vec3) -> bool {
+    normal.dot(view) >= GRAZING
+}
+
 /// `normal`, turned just far enough that `view` sees its front.
 ///
 /// Interpolated and mapped normals may point away at silhouettes; unturned they would make black rims.
 #[inline(always)]
 pub(crate) fn facing(normal: Vec3, view: Vec3) -> Vec3 {
-    /// Cosine that a turned normal keeps with the view.
-    const GRAZING: f32 = 1e-2;
-    let cosine = normal.dot(view);
-    if cosine >= GRAZING {
+    if faces(normal, view) {
         return normal;
     }
-    (normal + view * (GRAZING - cosine)).try_normalize().unwrap_or(view)
+    (normal + view * (GRAZING - normal.dot(view))).try_normalize().unwrap_or(view)
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "loading refuses scenes with 2^32 - 1 things of a kind")]

@@ -5,7 +5,7 @@
 
 use super::context::Context;
 use super::eyes::Ball;
-use super::frame::{Frame, resolve};
+use super::frame::{Frame, resolve_each};
 use super::layers::{self, Facts, LayerPixel};
 use super::observer::Observer;
 use super::pixel::sample_offsets;
@@ -343,7 +343,7 @@ impl Frame<'_> {
         let mut done = TilePixels::empty(tile);
         let per_pixel = self.offsets.len();
         self.trace(tracer, tile, batch_pixels(per_pixel), |tracer| {
-            done.beauty.extend(tracer.samples.chunks(per_pixel).map(|s| resolve(s, self.background)));
+            resolve_each(&tracer.samples, per_pixel, self.background, &mut done.beauty);
             let layer = |f: &[Facts]| LayerPixel::new(f, self.view.eye, self.view.forward);
             done.layers.extend(tracer.facts.chunks(per_pixel).map(layer));
         })?;

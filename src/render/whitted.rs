@@ -25,6 +25,7 @@ use super::surface::{Surface, Target};
 use super::wave::{Crossing, Path, Queue, RayClass, Wave};
 use crate::accel::{Accel, Hit, Ray};
 use crate::math::{DVec3, Vec3};
+use bytemuck::{Pod, Zeroable};
 use std::hint::black_box;
 
 /// Angle across a path's cone, radians, above which rough surfaces have spread it.
@@ -37,7 +38,8 @@ const SHADOW_LIMIT: usize = 1 << 14;
 const ON: u32 = u32::MAX >> 2;
 
 /// What a sample of the picture has gathered.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub(crate) struct Sample {
     pub radiance: Vec3,
     /// Share of the background that shows through.

@@ -3,7 +3,7 @@
 use super::around::Surroundings;
 use super::cones::Cones;
 use super::faces::Faces;
-use super::lit::{Lit, Sent};
+use super::lit::Lit;
 use super::painted::Painted;
 use super::sorted::Sorted;
 use crate::math::Vec3;
@@ -13,7 +13,7 @@ use crate::render::absorption::Absorption;
 use crate::render::beside::Traced;
 use crate::render::patch::smooth_normal;
 use crate::render::shade::Seen;
-use crate::render::surface::{facing, side_of};
+use crate::render::surface::{faces, facing, side_of};
 use crate::render::texture::Places;
 use crate::render::world::Placement;
 use std::ops::{Add, Mul};
@@ -66,7 +66,6 @@ pub(crate) struct Strip {
     pub(super) places: Places,
     pub(super) surroundings: Surroundings,
     pub(super) lit: Lit,
-    pub(super) sent: Sent,
 }
 
 /// What hits say.
@@ -126,7 +125,6 @@ impl Default for Strip {
             places: Places::default(),
             surroundings: Surroundings::default(),
             lit: Lit::default(),
-            sent: Sent::default(),
         }
     }
 }
@@ -142,10 +140,10 @@ impl Strip {
         smooth: bool,
     ) {
         self.count = hit.len().min(POINTS);
-        for (at, (ray, _)) in self.rays.iter_mut().zip(hit) {
-            *at = *ray;
+        for ((at, sample), (ray, _)) in self.rays.iter_mut().zip(&mut self.samples).zip(hit) {
+            (*at, *sample) = (*ray, *ray);
         }
-        (self.samples, self.weights) = (self.rays, None);
+        self.weights = None;
         if let Traced::Wave(_, wave) = traced {
             let weights = self.weights.insert(EMPTY);
             for (i, &ray) in self.rays[..self.count].iter().enumerate() {
@@ -261,11 +259,12 @@ impl Kernel for Faceted<'_> {
         for i in 0..points.min(POINTS) {
             given.place(found, i);
         }
-        found.curved = [0; POINTS];
         for i in 0..points.min(POINTS) {
             given.turn(found, i);
+            found.curved[i] = 0;
             found.shade(i, given.faces.outward(i));
         }
+        found.turn_to_view(points);
     }
 }
 
@@ -283,14 +282,16 @@ impl Kernel for Smooth<'_> {
     fn run<S: Simd>(self, _: S) {
         let Self { given, found, points, placement } = self;
         let placement = *placement;
-        found.curved.copy_from_slice(given.faces.curved());
         for i in 0..points.min(POINTS) {
             given.place(found, i);
         }
         for i in 0..points.min(POINTS) {
             given.turn(found, i);
+            // Not all at once, which would be a call.
+            found.curved[i] = given.faces.curved(i);
             found.shade(i, given.own_normal(&placement, i));
         }
+        found.turn_to_view(points);
     }
 }
 
@@ -350,13 +351,32 @@ impl Found {
         }
     }
 
-    /// The shading normal, from the mesh's own.
+    /// The shading normal, from the mesh's own, as it is before [`Self::turn_to_view`].
     #[inline(always)]
     fn shade(&mut self, i: usize, own: Vec3) {
         let geometric = get(&self.geometric, i);
-        let normal = facing(own * side_of(own, geometric), get(&self.view, i));
+        let normal = own * side_of(own, geometric);
         put(&mut self.normal, i, normal);
         put(&mut self.horizon, i, if self.curved[i] == 1 { normal } else { geometric });
+    }
+
+    /// Turns normals so far that their fronts are seen, which hardly any need.
+    #[inline(always)]
+    fn turn_to_view(&mut self, points: usize) {
+        let mut any = 0;
+        for i in 0..points.min(POINTS) {
+            any |= u32::from(!faces(get(&self.normal, i), get(&self.view, i)));
+        }
+        if any == 0 {
+            return;
+        }
+        for i in 0..points.min(POINTS) {
+            let normal = facing(get(&self.normal, i), get(&self.view, i));
+            put(&mut self.normal, i, normal);
+            if self.curved[i] == 1 {
+                put(&mut self.horizon, i, normal);
+            }
+        }
     }
 }
 

@@ -151,10 +151,10 @@ impl Faces {
         [Vec3::new(n(0), n(1), n(2)), Vec3::new(n(3), n(4), n(5)), Vec3::new(n(6), n(7), n(8))]
     }
 
-    /// By point, 1 where those differ.
+    /// 1 where those differ.
     #[inline(always)]
-    pub(super) fn curved(&self) -> &[u32] {
-        &self.curved[..POINTS]
+    pub(super) fn curved(&self, i: usize) -> u32 {
+        self.curved[i]
     }
 
     /// By point, the number of the face among all prims.
@@ -184,9 +184,12 @@ fn set<T: Copy, const N: usize>(columns: &mut [Roomy<T>; N], points: &Range<usiz
         columns.iter_mut().zip(numbers).for_each(|(column, &number)| column[first] = number);
         return;
     }
-    for at in points.clone().step_by(LANES).map(|at| at % POINTS) {
+    // From the second on they lie in whole cache lines.
+    let mut at = first;
+    while at < points.end.min(POINTS) {
         for (column, &number) in columns.iter_mut().zip(numbers) {
             column[at..at + LANES].copy_from_slice(&[number; LANES]);
         }
+        at = (at + 1).next_multiple_of(LANES);
     }
 }

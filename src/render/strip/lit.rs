@@ -12,7 +12,6 @@ use crate::render::curve::STEEP;
 use crate::render::shade::{LocalLight, Matter, Model, PhongMatter, terminator, way};
 use crate::render::shadow::{Bound, Shadows};
 use crate::render::wave::Media;
-use bytemuck::Zeroable;
 
 /// Light whose shadow ray starts on the triangle.
 const PLAIN: u32 = 1;
@@ -83,38 +82,22 @@ impl Strip {
     }
 
     /// Sends the shadow rays that start on their triangles, outside of everything where that matters.
-    pub(crate) fn send(&mut self, shadows: &mut Shadows, absorbs: bool) {
-        let count = self.make_ready();
-        shadows.push_all(&self.sent.rays[..count], &self.sent.light[..count], absorbs.then(Media::default));
+    pub(crate) fn send(&self, shadows: &mut Shadows, absorbs: bool) {
+        let count = self.write(shadows.room());
+        shadows.take(count, std::iter::repeat_n(Media::default(), if absorbs { count } else { 0 }));
     }
 
     /// The same where each starts inside of what the rays of the points are inside of.
-    pub(crate) fn send_within(&mut self, shadows: &mut Shadows, traced: Traced) {
-        let count = self.make_ready();
-        let (seen, sent) = (&self.lit.seen, &self.sent);
-        let points = self.rays.iter().zip(seen).filter(|(_, seen)| **seen == PLAIN);
-        for ((&at, _), (ray, light)) in points.zip(sent.rays[..count].iter().zip(&sent.light)) {
-            shadows.push_bound(*ray, *light, Some(traced.path(at as usize).media));
-        }
+    pub(crate) fn send_within(&self, shadows: &mut Shadows, traced: Traced) {
+        let count = self.write(shadows.room());
+        let rays = self.rays.iter().zip(&self.lit.seen).filter(|(_, seen)| **seen == PLAIN);
+        shadows.take(count, rays.map(|(&ray, _)| traced.path(ray as usize).media).take(count));
     }
 
-    /// Makes the shadow rays that start on their triangles ready to be sent; how many there are.
-    fn make_ready(&mut self) -> usize {
-        let (prims, samples, lit, sent) = (self.given.faces.prims(), &self.samples, &self.lit, &mut self.sent);
-        self.level.run(Send { points: self.count.min(POINTS), prims, samples, lit, sent })
-    }
-}
-
-/// Shadow rays, with what each brings: all of a strip together, because what is copied soon after it was gathered is read
-/// before it is there.
-pub(super) struct Sent {
-    rays: [Ray; POINTS],
-    light: [Bound; POINTS],
-}
-
-impl Default for Sent {
-    fn default() -> Self {
-        Self { rays: [Ray::zeroed(); POINTS], light: [Bound::zeroed(); POINTS] }
+    /// Writes the shadow rays that start on their triangles; how many there are.
+    fn write(&self, (rays, light): (&mut [Ray; POINTS], &mut [Bound; POINTS])) -> usize {
+        let (prims, samples, lit) = (self.given.faces.prims(), &self.samples, &self.lit);
+        self.level.run(Send { points: self.count.min(POINTS), prims, samples, lit, rays, light })
     }
 }
 
@@ -123,7 +106,8 @@ struct Send<'a> {
     prims: &'a [u32],
     samples: &'a [u32; POINTS],
     lit: &'a Lit,
-    sent: &'a mut Sent,
+    rays: &'a mut [Ray; POINTS],
+    light: &'a mut [Bound; POINTS],
 }
 
 impl Kernel for Send<'_> {
@@ -132,7 +116,7 @@ impl Kernel for Send<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> usize {
-        let Self { points, prims, samples, lit, sent } = self;
+        let Self { points, prims, samples, lit, rays, light: bound } = self;
         let mut count = 0;
         let eights = prims.as_chunks::<LANES>().0.iter().zip(samples.as_chunks::<LANES>().0);
         for (k, (prims, samples)) in eights.enumerate().take(padded(points) / LANES) {
@@ -150,8 +134,8 @@ impl Kernel for Send<'_> {
             // Numbers of samples only pass through the lanes, as bits.
             let light = s.rows([s.load(&r), s.load(&g), s.load(&b), s.load(bytemuck::cast_ref(samples))]);
             let mut put = |at: usize, i: usize| {
-                sent.rays[at % POINTS] = Ray::from_fours([from[i], to[i]], prims[i], samples[i]);
-                sent.light[at % POINTS] = bytemuck::cast(light[i]);
+                rays[at % POINTS] = Ray::from_fours([from[i], to[i]], prims[i], samples[i]);
+                bound[at % POINTS] = bytemuck::cast(light[i]);
             };
             if which == (1 << LANES) - 1 {
                 (0..LANES).for_each(|i| put(count + i, i));
