@@ -11,6 +11,7 @@ pub mod cone;
 pub mod ear_clip;
 pub mod expansion;
 pub mod fan;
+pub mod formula;
 pub mod frame;
 pub mod inset;
 pub mod meetings;

@@ -8,7 +8,7 @@ use crate::render::optics::reflect;
 use std::f32::consts::PI;
 
 /// Facets around a normal: a GGX distribution with a width along each of two axes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Lobe {
     along: Vec3,
     across: Vec3,
@@ -35,7 +35,7 @@ impl Lobe {
     }
 
     /// The same with cosine and sine of the turn that the second number stands for.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn facet_turned(&self, view: Vec3, at: f32, [cos, sin]: [f32; 2]) -> Vec3 {
         let [wide, narrow] = self.alpha;
         let view = Vec3::new(view.dot(self.along), view.dot(self.across), view.dot(self.normal).max(0.0));
@@ -49,6 +49,7 @@ impl Lobe {
     }
 
     /// Share of the light from `to`, on either side, that other facets leave of what the drawn facets send to `view`.
+    #[inline(always)]
     pub(crate) fn kept(&self, view: Vec3, to: Vec3) -> f32 {
         let (n_v, n_l) = (self.normal.dot(view).max(0.0), self.normal.dot(to).abs());
         let (wide_v, wide_l) = (self.length(view), self.length(to));
@@ -57,11 +58,13 @@ impl Lobe {
     }
 
     /// The same, and 0 for light from below the surface.
+    #[inline(always)]
     pub(crate) fn sent(&self, view: Vec3, to: Vec3) -> f32 {
         if self.normal.dot(to) > 0.0 { self.kept(view, to) } else { 0.0 }
     }
 
     /// How densely the directions that `view` is mirrored to lie where this facet mirrors it, 1/sr.
+    #[inline(always)]
     pub(crate) fn density(&self, view: Vec3, facet: Vec3) -> f32 {
         let [wide, narrow] = self.alpha;
         let stretched =
@@ -82,6 +85,7 @@ impl Lobe {
         (0..DRAWN).map(kept).sum::<f32>() / f32::from(DRAWN)
     }
 
+    #[inline(always)]
     fn length(&self, v: Vec3) -> f32 {
         let [wide, narrow] = self.alpha;
         Vec3::new(wide * v.dot(self.along), narrow * v.dot(self.across), v.dot(self.normal)).length()

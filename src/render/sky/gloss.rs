@@ -1,7 +1,8 @@
 //! What a rough surface mirrors of a panorama, without a ray: lookups along the directions that its facets send the view to.
 
-use super::panorama::Pyramid;
+use super::panorama::{Pyramid, coordinates};
 use crate::math::Vec3;
+use crate::math::simd::{Kernel, Level, Simd};
 use crate::render::optics::reflect;
 use crate::render::shade::Lobe;
 use std::f32::consts::PI;
@@ -13,15 +14,60 @@ const LOOKUPS: usize = 64;
 /// Width of the hills that stand for the lookups' shares of the sphere, in roots of those: as wide as they are apart.
 const HILL: f32 = 0.75;
 
+/// A number of every lookup.
+type Row = [f32; LOOKUPS];
+
 /// Numbers that draw facets for equal shares of a lobe: 0 … 1, and cosine and sine of a turn.
-static PATTERN: LazyLock<[(f32, [f32; 2]); LOOKUPS]> = LazyLock::new(|| {
+static PATTERN: LazyLock<[Row; 3]> = LazyLock::new(|| {
     /// The golden ratio's inverse: turns that never meet.
     const GOLDEN: f32 = 0.618_034;
-    std::array::from_fn(|k| {
-        let (sin, cos) = libm::sincosf(2.0 * PI * (k as f32 * GOLDEN).fract());
-        ((k as f32 + 0.5) / LOOKUPS as f32, [cos, sin])
-    })
+    let turn = |k: usize| libm::sincosf(2.0 * PI * (k as f32 * GOLDEN).fract());
+    let at = std::array::from_fn(|k| (k as f32 + 0.5) / LOOKUPS as f32);
+    [at, std::array::from_fn(|k| turn(k).1), std::array::from_fn(|k| turn(k).0)]
 });
+
+/// The lookups of a lobe, side by side.
+struct Lookups {
+    /// Where they go, in the panorama's frame, by axis.
+    dirs: [Row; 3],
+    /// Their coordinates in it.
+    around: Row,
+    down: Row,
+    /// How blurred each is, and how much it counts; 0 for those that do not.
+    angle: Row,
+    weight: Row,
+}
+
+/// Finds the lookups along which facets of `lobe` are seen from `view`.
+struct Find<'a, F> {
+    to: &'a mut Lookups,
+    lobe: &'a Lobe,
+    view: Vec3,
+    to_map: F,
+}
+
+impl<F: Fn(Vec3) -> Vec3> Kernel for Find<'_, F> {
+    type Output = ();
+
+    // The lanes are plain arrays: what the token stands for is only what the compiler may use for them.
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let Self { to, lobe, view, to_map } = self;
+        let (lobe, [at, cos, sin]) = (*lobe, &*PATTERN);
+        for k in 0..LOOKUPS {
+            let facet = lobe.facet_turned(view, at[k], [cos[k], sin[k]]);
+            let dir = reflect(-view, facet);
+            let area = 1.0 / (LOOKUPS as f32 * lobe.density(view, facet));
+            to.weight[k] = lobe.sent(view, dir);
+            to.angle[k] = HILL * area.min(4.0 * PI).sqrt();
+            let dir = to_map(dir);
+            (to.dirs[0][k], to.dirs[1][k], to.dirs[2][k]) = (dir.x, dir.y, dir.z);
+        }
+        for k in 0..LOOKUPS {
+            (to.around[k], to.down[k]) = coordinates(Vec3::new(to.dirs[0][k], to.dirs[1][k], to.dirs[2][k]));
+        }
+    }
+}
 
 impl Pyramid {
     /// Mean radiance as facets of `lobe` that are seen from `view` mirror it and others let it through; `to_map` turns
@@ -34,16 +80,14 @@ impl Pyramid {
         if lobe.angle(1) < self.finest() {
             return None;
         }
+        let row = [0.0; LOOKUPS];
+        let mut lookups = Lookups { dirs: [row; 3], around: row, down: row, angle: row, weight: row };
+        Level::best().run(Find { to: &mut lookups, lobe, view, to_map });
+        let Lookups { around, down, angle, weight, .. } = &lookups;
         let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
-        for &(at, turn) in PATTERN.iter() {
-            let facet = lobe.facet_turned(view, at, turn);
-            let to = reflect(-view, facet);
-            let weight = lobe.sent(view, to);
-            if weight > 0.0 {
-                let area = 1.0 / (LOOKUPS as f32 * lobe.density(view, facet));
-                sum += self.smooth_radiance(to_map(to), HILL * area.min(4.0 * PI).sqrt()) * weight;
-                weights += weight;
-            }
+        for k in (0..LOOKUPS).filter(|&k| weight[k] > 0.0) {
+            sum += self.smooth_radiance((around[k], down[k]), angle[k]) * weight[k];
+            weights += weight[k];
         }
         (weights > 0.0).then(|| sum / weights)
     }
@@ -52,7 +96,7 @@ impl Pyramid {
 #[cfg(test)]
 mod tests {
     use super::super::panorama::Level;
-    use super::*;
+    use super::{Lobe, Pyramid, Vec3, reflect};
     use crate::scene::Panorama;
     use std::sync::Arc;
 

@@ -1,6 +1,7 @@
 //! A panorama and smaller copies of it, asked for its radiance at any blur.
 
 use crate::math::Vec3;
+use crate::math::formula::{angle, floor, log2};
 use crate::scene::Panorama;
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -81,13 +82,13 @@ impl Pyramid {
         self.at_level(dir, if angle > finest { libm::log2f(angle / finest) } else { 0.0 })
     }
 
-    /// About the same without the borders of texels: the mean weighted by a smooth hill of this width.
-    pub(super) fn smooth_radiance(&self, dir: Vec3, angle: f32) -> Vec3 {
-        let level = libm::log2f((angle / self.levels[0].angle()).max(1.0)).min(self.soft.len() as f32);
+    /// About the same at a direction's [`coordinates`], without the borders of texels: the mean weighted by a smooth hill of
+    /// this width.
+    pub(super) fn smooth_radiance(&self, at: (f32, f32), angle: f32) -> Vec3 {
+        let level = log2((angle / self.finest()).max(1.0)).min(self.soft.len() as f32);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the levels there are")]
         let fine = level as usize;
         let plane = |k: usize| if k == 0 { &self.levels[0] } else { &self.soft[k - 1] };
-        let at = coordinates(dir);
         let sharp = plane(fine).at(at);
         sharp.lerp(plane((fine + 1).min(self.soft.len())).at(at), level - fine as f32)
     }
@@ -178,9 +179,10 @@ impl Pyramid {
 }
 
 /// Where a direction is in a panorama: 0 … 1 once around, and 0 … 1 from the zenith down.
-fn coordinates(dir: Vec3) -> (f32, f32) {
-    let around = libm::atan2f(dir.z, dir.x) / (2.0 * PI) + 0.5;
-    let down = libm::atan2f((dir.x * dir.x + dir.z * dir.z).sqrt(), dir.y) / PI;
+#[inline(always)]
+pub(super) fn coordinates(dir: Vec3) -> (f32, f32) {
+    let around = angle(dir.z, dir.x) / (2.0 * PI) + 0.5;
+    let down = angle((dir.x * dir.x + dir.z * dir.z).sqrt(), dir.y) / PI;
     (around, down)
 }
 
@@ -232,22 +234,25 @@ impl Level {
 
     /// Between the four nearest texels of a place, both its coordinates 0 … 1.
     fn at(&self, (x, y): (f32, f32)) -> Vec3 {
+        let (width, height) = (self.width.cast_signed(), self.height.cast_signed());
         let (x, y) = (x * self.width as f32 - 0.5, y * self.height as f32 - 0.5);
-        let (left, top) = (x.floor(), y.floor());
-        #[expect(clippy::cast_possible_truncation, reason = "a column or one beyond")]
-        let column = |k: i32| (left as i32 + k).rem_euclid(self.width.cast_signed()).cast_unsigned();
-        // Beyond a pole lies the same row, half a turn on.
-        #[expect(clippy::cast_possible_truncation, reason = "a row or one beyond")]
-        let row = |k: i32| match top as i32 + k {
-            row if row < 0 => (0, self.width / 2),
-            row if row >= self.height.cast_signed() => (self.height - 1, self.width / 2),
-            row => (row.cast_unsigned(), 0),
+        let (left, top) = (floor(x), floor(y));
+        #[expect(clippy::cast_possible_truncation, reason = "a column and a row, or one before")]
+        let (column, row) = (left as i32, top as i32);
+        // No more than a turn beyond.
+        let around = |column: i32| if column >= width { column - width } else { column };
+        let near = around(if column < 0 { column + width } else { column });
+        let mixed = |row: i32| {
+            // Beyond a pole lies the same row, half a turn on.
+            let (row, turn) = match row {
+                ..0 => (0, width / 2),
+                row if row >= height => (height - 1, width / 2),
+                row => (row, 0),
+            };
+            let texel = |column: i32| self.texel(around(column + turn).cast_unsigned(), row.cast_unsigned());
+            texel(near).lerp(texel(around(near + 1)), x - left)
         };
-        let mixed = |(row, turn): (u32, u32)| {
-            let at = |k: i32| self.texel((column(k) + turn) % self.width, row);
-            at(0).lerp(at(1), x - left)
-        };
-        mixed(row(0)).lerp(mixed(row(1)), y - top)
+        mixed(row).lerp(mixed(row + 1), y - top)
     }
 
     /// Smaller, each texel the mean of those around it by their area and by how near they are: light goes to the texels

@@ -12,6 +12,7 @@ mod pyramid;
 
 pub(crate) use places::{Layout, Places, Spots, changes};
 
+use crate::math::formula::floor;
 use crate::math::{Vec2, Vec4};
 use crate::scene::{Bitmap, Filter, Mipmaps, Pixels, Sampler, Scene, Texture, Wrap};
 use decode::Texels;
@@ -317,16 +318,6 @@ impl Axis {
         let near = signed(below);
         Self { near: wrapped(near, len, wrap), far: wrapped(near + 1, len, wrap), share: place - below }
     }
-}
-
-/// The greatest whole number that is not above `x`, which is no NaN, without the call that processors of 2003 need for it.
-#[inline(always)]
-#[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "within ±2²³ both casts are exact")]
-fn floor(x: f32) -> f32 {
-    let truncated = x as i32 as f32;
-    let below = if truncated > x { truncated - 1.0 } else { truncated };
-    // Larger numbers are whole.
-    if x.abs() >= 8_388_608.0 { x } else { below }
 }
 
 /// The texel that stands at place `i` of a row that goes on for ever.

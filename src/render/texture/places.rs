@@ -4,7 +4,8 @@
 //! [`Lookup::filtered`](super::Lookup) finds one by one, and texels are summed in its order: the same bits.
 
 use super::pyramid::{self, Plane, Stored};
-use super::{ColorSpace, Lookup, MAX_PROBES, TextureStore, apart, decode, doublings, floor, pixels, probes, size_of};
+use super::{ColorSpace, Lookup, MAX_PROBES, TextureStore, apart, decode, doublings, pixels, probes, size_of};
+use crate::math::formula::floor;
 use crate::math::simd::LANES;
 use crate::math::{Vec2, Vec4};
 use crate::scene::{Filter, Mipmaps, Sampler, Wrap};

@@ -1,0 +1,94 @@
+//! Functions as formulas without branches and calls, of which compilers make lanes: the same bits on every instruction set,
+//! in lanes and by themselves.
+
+use std::f32::consts::{FRAC_PI_2, PI};
+
+/// The greatest whole number that is not above `x`, which is no NaN, without the call that processors of 2003 need for it.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "within ±2²³ both casts are exact")]
+pub fn floor(x: f32) -> f32 {
+    let truncated = x as i32 as f32;
+    let below = if truncated > x { truncated - 1.0 } else { truncated };
+    // Larger numbers are whole.
+    if x.abs() >= 8_388_608.0 { x } else { below }
+}
+
+/// The angle of the place (`x`, `y`) from the x axis, −π … π, to 5e-7; 0 for the origin.
+#[inline(always)]
+pub fn angle(y: f32, x: f32) -> f32 {
+    /// Of t in powers of t², the arctangent over t: fitted to 0 ≤ t ≤ 1 for the least error at worst.
+    const FIT: [f32; 8] = [
+        0.999_999_4,
+        -0.333_300_32,
+        0.199_484_11,
+        -0.139_174_46,
+        0.096_638_1,
+        -0.056_195_922,
+        0.022_052_402,
+        -0.004_105_173,
+    ];
+    let (wide, high) = (x.abs(), y.abs());
+    let (least, most) = (wide.min(high), wide.max(high));
+    let t = if most > 0.0 { least / most } else { 0.0 };
+    let squared = t * t;
+    let [first @ .., last] = FIT;
+    let from_axis = t * first.iter().rev().fold(last, |sum, c| sum * squared + c);
+    let right = if high > wide { FRAC_PI_2 - from_axis } else { from_axis };
+    let upper = if x < 0.0 { PI - right } else { right };
+    upper.copysign(y)
+}
+
+/// The logarithm of a finite `x` ≥ 1 by 2, to 5e-6; exact for powers of two.
+#[inline(always)]
+#[expect(clippy::cast_precision_loss, reason = "an exponent")]
+pub fn log2(x: f32) -> f32 {
+    /// Of m in its powers, (log₂(1 + m) − m) / (m (1 − m)): fitted to 0 ≤ m ≤ 1 for the least error of the logarithm.
+    const FIT: [f32; 5] = [0.442_553_73, -0.275_708_32, 0.182_354, -0.096_543, 0.026_128_728];
+    let bits = x.to_bits();
+    let exponent = (bits >> 23).wrapping_sub(127).cast_signed() as f32;
+    let m = f32::from_bits(bits & 0x007f_ffff | 0x3f80_0000) - 1.0;
+    let [first @ .., last] = FIT;
+    exponent + (m + m * (1.0 - m) * first.iter().rev().fold(last, |sum, c| sum * m + c))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::Random;
+
+    #[test]
+    fn floors_are_those_of_the_standard_library() {
+        let some = [0.0, -0.0, 0.5, -0.5, 1.0, -1.0, 7.999_999_5, -3.000_000_2, 8_388_607.5, -8_388_607.5, 3e9, -3e9];
+        let infinite = [f32::INFINITY, f32::NEG_INFINITY];
+        for x in some.into_iter().chain(infinite) {
+            assert_eq!(floor(x), x.floor(), "{x}");
+        }
+    }
+
+    #[test]
+    fn angles_are_arctangents_all_around() {
+        let mut random = Random::new(3);
+        let mut worst = 0.0_f64;
+        for _ in 0..100_000 {
+            let (x, y) = (random.unit() * 2.0 - 1.0, random.unit() * 2.0 - 1.0);
+            worst = worst.max((f64::from(angle(y, x)) - f64::from(y).atan2(f64::from(x))).abs());
+        }
+        assert!(worst < 5e-7, "{worst}");
+        let axes = [(0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (-1.0, 0.0), (1.0, 1.0), (-1.0, -1.0), (0.0, 0.0)];
+        for (y, x) in axes {
+            assert!((angle(y, x) - libm::atan2f(y, x)).abs() < 5e-7, "{y} {x}: {}", angle(y, x));
+        }
+    }
+
+    #[test]
+    fn logarithms_are_near_and_those_of_powers_of_two_exact() {
+        let mut random = Random::new(4);
+        for k in 0..60_000_u16 {
+            let x = 1.0 + random.unit() * f32::from(k);
+            assert!((f64::from(log2(x)) - f64::from(x).log2()).abs() < 5e-6, "{x}");
+        }
+        for k in 0..100_u8 {
+            assert_eq!(log2(libm::exp2f(f32::from(k))), f32::from(k));
+        }
+    }
+}
