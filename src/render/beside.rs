@@ -11,8 +11,8 @@ use super::curve::Feelers;
 use super::eyes::Eyes;
 use super::observer::Observer;
 use super::seam::is_same_crossing;
-use super::shade::{LocalLight, Model};
-use super::strip::{Common, Glass, POINTS, Sorted, Strip};
+use super::shade::LocalLight;
+use super::strip::{Common, POINTS, Sorted, Spot, Strip};
 use super::surface::{Surface, Target};
 use super::wave::{Path, RayClass, Wave};
 use super::whitted::Tracer;
@@ -265,8 +265,10 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         if !common.glass.is_some_and(|glass| glass.is_dark_inside && strip.sees_backs_alone()) {
             self.show(traced, common, strip);
         }
-        if let Some(glass) = common.glass {
-            self.go_through(traced, (mesh.material, common, glass), strip);
+        if common.glass.is_some() {
+            self.each_point(traced, common, strip, |tracer, point| {
+                tracer.reflect_and_refract(point, &point.crossing(context, point.path.band));
+            });
         } else if shiny && context.depth > 0 {
             strip.mirror(context, matter, traced, &mut self.starting[RayClass::Reflected as usize]);
         }
@@ -277,7 +279,9 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     fn show(&mut self, traced: Traced, common: &Common, strip: &mut Strip) {
         let (context, matter) = (self.context, &common.matter);
         let has_inside = common.glass.is_some_and(|glass| glass.has_inside);
-        if !context.is_dark || matter.shines() {
+        if context.sky.is_map() || context.env_rays > 0 {
+            self.each_point(traced, common, strip, |tracer, point| tracer.look_around(point));
+        } else if !context.is_dark || matter.shines() {
             strip.look_around((matter, has_inside), &context.sky, context.scene.ambient);
             strip.shown().for_each(|(sample, everywhere)| self.add(sample, everywhere));
         }
@@ -304,20 +308,25 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
     }
 
-    /// Sends the rays that go on from points of glass.
-    fn go_through(&mut self, traced: Traced, (id, common, glass): (u32, &Common, Glass), strip: &Strip) {
+    /// Does what must be done point by point.
+    fn each_point(
+        &mut self,
+        traced: Traced,
+        common: &Common,
+        strip: &Strip,
+        mut act: impl FnMut(&mut Self, &Point<Spot>),
+    ) {
         let context = self.context;
-        let Model::MetalRough(m) = &common.matter.model else { return };
-        let material = (id, &context.scene.materials[id as usize]);
+        let material = (common.material, &context.scene.materials[common.material as usize]);
+        let has_inside = common.glass.is_some_and(|glass| glass.has_inside);
         for i in strip.certain() {
             let (at, weight, width) = strip.ray(i);
             let (ray, hit, path) = (&traced.rays()[at], &traced.hits()[at], traced.path(at));
             let since = if context.absorption.is_some() { hit.t } else { path.since };
-            let ground = strip.ground(i, material, glass.has_inside);
-            let matter = ground.matter(m);
+            let ground = strip.ground(i, material, has_inside);
+            let matter = ground.matter(&common.matter);
             let path = Path { weight, since, ..path };
-            let point = Point { ray, hit, path, width, surface: &ground, matter: &matter };
-            self.reflect_and_refract(&point, &point.crossing(context, path.band));
+            act(self, &Point { ray, hit, path, width, surface: &ground, matter: &matter });
         }
     }
 }

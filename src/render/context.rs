@@ -108,8 +108,8 @@ impl<'a> Context<'a> {
         // Each way of drawing a direction to a panorama needs a ray in each of both halves.
         let env_rays = env_rays.div_ceil(together).max(env_rays.min(if sky.is_map() { ENV_RAYS_LEAST } else { 2 }));
         let wide = scene.lights.iter().any(Light::is_wide);
-        let alone = everything || settings.layers || wide || sky.is_map() || env_rays > 0 || gloss.all;
-        let common = |m: &Material| if alone { None } else { Common::of(m, textures, depth > 0, gloss) };
+        let alone = everything || settings.layers || wide || gloss.all;
+        let common = |m: (u32, &Material)| if alone { None } else { Common::of(m, textures, depth > 0, gloss) };
         let needs = |any: &[Feature]| everything || any.iter().any(|&f| features.has(f));
         Self {
             scene,
@@ -123,7 +123,7 @@ impl<'a> Context<'a> {
             highlight_reach: glint::reach(settings),
             seed: settings.seed,
             lights: scene.lights.iter().map(|l| LocalLight::new(l, world.center)).collect(),
-            common: scene.materials.iter().map(common).collect(),
+            common: (0..).zip(&scene.materials).map(common).collect(),
             bands: if needs(&[Feature::Dispersion]) { bands() } else { Vec::new() },
             has_filters: needs(&[Feature::Mask, Feature::Blend, Feature::ThinTransmission, Feature::Refraction]),
             absorption: Absorption::of(&scene.materials, everything),

@@ -10,7 +10,7 @@
 use super::Progress;
 use super::asking::Asking;
 use super::beside::Beside;
-use super::branch::Point;
+use super::branch::{Ground, Point};
 use super::context::{Context, coverage};
 use super::draws::{Draws, Purpose, Stream};
 use super::everything::look_up_in_vain;
@@ -278,12 +278,12 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     }
 
     /// Adds what a point shows by itself and of its surroundings, or sends the rays that find what hides those.
-    fn look_around(&mut self, point: &Point<Surface>) {
+    pub(super) fn look_around<G: Ground>(&mut self, point: &Point<G>) {
         let (context, surface, matter) = (self.context, point.surface, point.matter);
         let (weight, sample) = (point.path.weight, point.ray.sample);
         let open = matter.ambient(&surface.seen(), &context.sky, context.scene.ambient);
         // What is looked up through glass is seen on its other side, where these rays do not go.
-        if context.env_rays == 0 || matter.is_unlit() || lets_light_in(surface.target.material) {
+        if context.env_rays == 0 || matter.is_unlit() || lets_light_in(surface.material().1) {
             return self.add(sample, weight * (matter.emission + open));
         }
         self.add(sample, weight * matter.emission);

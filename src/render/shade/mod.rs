@@ -181,9 +181,9 @@ impl Matter {
         Self { outside: true, emission, model, grain: None, sheen: None, coat: None }
     }
 
-    /// A surface of this model and nothing else, as it is asked what goes on from it.
-    pub(crate) fn bare(m: MetalRoughMatter, outside: bool) -> Self {
-        Self { outside, emission: Vec3::ZERO, model: Model::MetalRough(m), grain: None, sheen: None, coat: None }
+    /// A surface of this model without anything over it.
+    pub(crate) fn bare(model: Model, emission: Vec3, outside: bool) -> Self {
+        Self { outside, emission, model, grain: None, sheen: None, coat: None }
     }
 
     /// Whether nothing is seen of its surface but what rays find that go on from it: clear glass from inside.

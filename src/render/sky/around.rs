@@ -14,13 +14,13 @@ use super::Sky;
 use crate::accel::{Accel, Ray};
 use crate::math::Vec3;
 use crate::render::asking::Asking;
+use crate::render::branch::Ground;
 use crate::render::context::Context;
 use crate::render::draws::Draws;
 use crate::render::observer::Observer;
 use crate::render::optics::reflect;
 use crate::render::shade::Matter;
 use crate::render::shadow::{Bound, Shadows};
-use crate::render::surface::Surface;
 use crate::render::wave::Media;
 use std::f32::consts::PI;
 
@@ -58,8 +58,8 @@ struct Point {
 }
 
 /// A point of a surface that looks around.
-pub(crate) struct Standpoint<'a> {
-    pub surface: &'a Surface<'a>,
+pub(crate) struct Standpoint<'a, G> {
+    pub surface: &'a G,
     pub matter: &'a Matter,
     /// The ray that found it.
     pub ray: &'a Ray,
@@ -86,7 +86,7 @@ impl Arounds {
     }
 
     /// Sends `context.env_rays` rays, half of them each from numbers of its own.
-    pub(crate) fn push(&mut self, context: &Context, point: &Standpoint) {
+    pub(crate) fn push<G: Ground>(&mut self, context: &Context, point: &Standpoint<G>) {
         let seen = point.surface.seen();
         let lobe = point.matter.gloss().map(|roughness| Way::Lobe(roughness * roughness));
         let light = context.sky.is_map().then_some(Way::Light);
@@ -118,7 +118,7 @@ impl Arounds {
                 let share = shown * point.weight / (2.0 * density);
                 let share = if share.is_finite() { share } else { Vec3::ZERO };
                 if share.max_element() > 0.0 {
-                    let ray = point.surface.ray(dir, f32::INFINITY, point.ray.sample);
+                    let ray = point.surface.ray(dir, point.ray.sample);
                     #[expect(clippy::cast_possible_truncation, reason = "few shares wait, see LIMIT")]
                     let light = Bound { radiance: share, tag: self.shares.len() as u32 };
                     self.shadows.push_bound(ray, light, point.media);

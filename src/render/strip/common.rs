@@ -8,6 +8,8 @@ use crate::scene::{Material, MetalRough};
 
 /// What is known of a material for all points of it.
 pub(crate) struct Common {
+    /// Its number.
+    pub material: u32,
     /// As it is where its maps are white.
     pub matter: Matter,
     /// Whether backs of faces are passed.
@@ -35,7 +37,12 @@ impl Common {
     /// `None` for materials with a grain, film, sheen or lacquer, for those that scatter light through, for those with maps of
     /// their reflectance, for those that are nowhere there as a whole, and for those that let light through but in
     /// metallic-rough ones that rays go through.
-    pub(crate) fn of(material: &Material, store: &TextureStore, bounces: bool, gloss: Gloss) -> Option<Self> {
+    pub(crate) fn of(
+        (number, material): (u32, &Material),
+        store: &TextureStore,
+        bounces: bool,
+        gloss: Gloss,
+    ) -> Option<Self> {
         let metal_rough = material.metal_rough();
         if coverage(material, material.opacity) < 1.0
             || metal_rough.is_some_and(|m| m.has_lobes() || m.translucence.is_some() || has_other_maps(m))
@@ -56,6 +63,7 @@ impl Common {
         // A map can make it smoother.
         let smooth = metal_rough.is_some_and(|m| m.metal_rough_map.is_some());
         Some(Self {
+            material: number,
             shiny: glass || smooth || matter.has_narrow_highlight() || bounces && mirrors,
             one_sided: !material.double_sided && !glass,
             mapped: material.textures().next().is_some(),

@@ -1,11 +1,11 @@
-//! Points of a strip from which rays go on that no column knows: through glass.
+//! Points of a strip one by one, for what no column knows: rays that go on through glass, and rays to the surroundings.
 
 use super::columns::{Strip, get, leave};
 use crate::accel::{NO_PRIM, Ray};
 use crate::math::Vec3;
 use crate::render::branch::Ground;
 use crate::render::context::Context;
-use crate::render::shade::{Matter, MetalRoughMatter, Seen};
+use crate::render::shade::{Matter, Model, Seen};
 use crate::scene::Material;
 
 /// One of the points, as rays that go on ask for it.
@@ -36,10 +36,18 @@ impl Strip {
 }
 
 impl Spot<'_> {
-    /// The material there, of which `m` is what maps do not change.
-    pub(crate) fn matter(&self, m: &MetalRoughMatter) -> Matter {
-        let painted = &self.strip.painted;
-        Matter::bare(if painted.any { painted.metal_rough(self.i, m) } else { *m }, self.outside)
+    /// The material there, which is `even` where maps do not change it.
+    pub(crate) fn matter(&self, even: &Matter) -> Matter {
+        let (painted, i) = (&self.strip.painted, self.i);
+        let (model, emission) = match &even.model {
+            Model::Unlit(_) if painted.any => (Model::Unlit(painted.unlit(i)), painted.emission(i)),
+            Model::Phong(m) if painted.any => (Model::Phong(painted.phong(i, m)), painted.emission(i)),
+            Model::MetalRough(m) if painted.any => (Model::MetalRough(painted.metal_rough(i, m)), painted.emission(i)),
+            Model::Unlit(color) => (Model::Unlit(*color), even.emission),
+            Model::Phong(m) => (Model::Phong(*m), even.emission),
+            Model::MetalRough(m) => (Model::MetalRough(*m), even.emission),
+        };
+        Matter::bare(model, emission, self.outside)
     }
 }
 

@@ -20,5 +20,6 @@ mod sheet;
 mod sorted;
 
 pub(crate) use columns::{POINTS, Strip};
-pub(crate) use common::{Common, Glass};
+pub(crate) use common::Common;
+pub(crate) use ground::Spot;
 pub(crate) use sorted::Sorted;

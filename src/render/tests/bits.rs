@@ -7,8 +7,9 @@ use crate::render::context::Gloss;
 use crate::render::strip::Common;
 use crate::render::texture::TextureStore;
 use crate::scene::{
-    AlphaMode, Bitmap, Environment, MetalRough, Pixels, Sampler, Texture, TextureRef, UvTransform, Wrap,
+    AlphaMode, Bitmap, Environment, MetalRough, Panorama, Pixels, Sampler, Texture, TextureRef, UvTransform, Wrap,
 };
+use std::sync::Arc;
 
 /// A bit of everything: mirrors, glass, blending, textures aside.
 pub(super) fn busy() -> Stage {
@@ -187,7 +188,7 @@ fn mapped_points_shaded_side_by_side_have_the_bits_of_points_shaded_one_by_one()
         let mut s = painted();
         let store = TextureStore::new(&s.scene);
         let beside =
-            |m: &Material| Common::of(m, &store, depth > 0, Gloss::new(None)).is_some_and(|common| common.mapped);
+            |m: &Material| Common::of((0, m), &store, depth > 0, Gloss::new(None)).is_some_and(|common| common.mapped);
         assert!(s.scene.materials.iter().all(beside), "nothing would be compared");
         (s.settings.depth, s.scene.environment) = (Some(depth), environment);
         let together = s.render();
@@ -254,8 +255,9 @@ fn glass_shaded_side_by_side_has_the_bits_of_glass_shaded_one_by_one() {
     for (environment, textures) in [(Environment::Studio, 0), (Environment::Black, 3), (Environment::Studio, 3)] {
         let mut s = glazed(if textures > 0 { painted() } else { plain() }, textures);
         let store = TextureStore::new(&s.scene);
-        let beside =
-            |m: &&Material| Common::of(m, &store, true, Gloss::new(None)).is_some_and(|common| common.glass.is_some());
+        let beside = |m: &&Material| {
+            Common::of((0, m), &store, true, Gloss::new(None)).is_some_and(|common| common.glass.is_some())
+        };
         assert_eq!(s.scene.materials.iter().filter(beside).count(), 7, "nothing would be compared");
         s.scene.environment = environment;
         let together = s.render();
@@ -265,5 +267,24 @@ fn glass_shaded_side_by_side_has_the_bits_of_glass_shaded_one_by_one() {
         assert_eq!(together.counts, alone.counts);
         let differ = together.picture.beauty.iter().zip(&alone.picture.beauty).filter(|(a, b)| a != b).count();
         assert_eq!(differ, 0, "pixels, {environment:?}, {textures} textures");
+    }
+}
+
+#[test]
+fn points_that_look_around_by_rays_have_the_same_bits_side_by_side() {
+    let mut random = Random::new(12);
+    let texels = Arc::new((0..32 * 16).map(|_| [(); 3].map(|()| random.unit() * 2.0)).collect::<Vec<_>>());
+    let panorama = Panorama { name: String::new(), width: 32, height: 16, texels, rotation: 0.3 };
+    for (environment, rays) in
+        [(Environment::Panorama, None), (Environment::Panorama, Some(0)), (Environment::Studio, Some(4))]
+    {
+        let mut s = glazed(painted(), 3);
+        (s.scene.environment, s.scene.panorama, s.settings.env_rays) = (environment, Some(panorama.clone()), rays);
+        let together = s.render();
+        s.settings.layers = true;
+        let alone = s.render();
+        assert_eq!(together.counts, alone.counts);
+        let differ = together.picture.beauty.iter().zip(&alone.picture.beauty).filter(|(a, b)| a != b).count();
+        assert_eq!(differ, 0, "pixels, {environment:?}, {rays:?} rays");
     }
 }
