@@ -9,6 +9,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
+use std::sync::Arc;
 
 use meshray::accel::{
     Accel, AccelKind, AccelParams, AnyAccel, BitSet, Hit, NO_PRIM, NoProbe, Ray, RayOrder, Shapes, Splitting, Wide,
@@ -21,8 +22,8 @@ use meshray::render::texture::TextureStore;
 use meshray::render::view::Lens;
 use meshray::render::{Job, Settings, View, World, render};
 use meshray::scene::{
-    Bitmap, Falloff, Light, LightKind, Material, MetalRough, Pixels, Sampler, Scene, Surface, Texture, TextureRef,
-    UvTransform, default_light, framing,
+    Bitmap, Environment, Falloff, Light, LightKind, Material, MetalRough, Panorama, Pixels, Sampler, Scene, Surface,
+    Texture, TextureRef, UvTransform, default_light, framing,
 };
 
 /// Part by which a count may exceed its baseline.
@@ -42,10 +43,21 @@ const QUESTIONS: [&str; 2] = ["first", "any"];
 
 /// Pictures by what they show and what lights it: a sample for each of [`RAYS`] pixels. They are drawn with the best
 /// instructions that Valgrind knows, so that a formula that is no longer computed in lanes shows.
-const PICTURES: [[&str; 2]; 4] = [["plain", "lamp"], ["plain", "studio"], ["mapped", "lamp"], ["mapped", "studio"]];
+const PICTURES: [[&str; 2]; 6] = [
+    ["plain", "lamp"],
+    ["plain", "studio"],
+    ["mapped", "lamp"],
+    ["mapped", "studio"],
+    ["mapped", "panorama"],
+    ["glass", "studio"],
+];
 const SIDE: u32 = 64;
 /// Columns and rows of the maps.
 const MAP_SIDE: u32 = 256;
+/// Rows of the panorama, which has twice as many columns.
+const PANORAMA_ROWS: u32 = 64;
+/// Bounces in glass.
+const BOUNCES: u32 = 3;
 
 /// One figure: level, way, how the rays run, and what is asked; or level, "picture", of what, and what lights it.
 type Case = [String; 4];
@@ -177,14 +189,23 @@ fn picture(of: &str, light: &str) -> ExitCode {
     let mut scene = Family::Mountain.scene(TRIANGLES);
     scene.materials.fill(Material::plain());
     scene.lights.clear();
-    if of == "mapped" {
-        paint(&mut scene);
+    match of {
+        "mapped" => paint(&mut scene),
+        "glass" => {
+            let glass =
+                MetalRough { transmission: 1.0, thick: true, roughness: 0.0, metallic: 0.0, ..MetalRough::default() };
+            scene.materials.fill(Material { surface: Surface::MetalRough(glass), ..Material::plain() });
+        }
+        _ => {}
     }
     let (lo, hi) = World::new(&scene).bounds;
     let (middle, size) = ((lo + hi) * 0.5, hi - lo);
     let camera = framing::default_camera(&scene, &framing::robust_bounds(&scene), 1.0);
     let eye = middle + DVec3::new(-0.1, -0.6, 1.0) * size.length();
-    if light == "lamp" {
+    if light == "panorama" {
+        scene.environment = Environment::Panorama;
+        scene.panorama = Some(panorama());
+    } else if light == "lamp" {
         let kind = LightKind::Point { position: eye + DVec3::X * size.x, falloff: Falloff::None };
         scene.lights.push(Light { name: String::new(), intensity: Vec3::ONE, kind, shadows: true, size: 0.0 });
     } else {
@@ -192,7 +213,8 @@ fn picture(of: &str, light: &str) -> ExitCode {
     }
     let world = World::new(&scene);
     let accel = AnyAccel::build(AccelKind::default(), &world.shapes, &AccelParams::DEFAULT);
-    let settings = Settings { width: SIDE, height: SIDE, samples: 1, ..Settings::default() };
+    let depth = (of == "glass").then_some(BOUNCES);
+    let settings = Settings { width: SIDE, height: SIDE, samples: 1, depth, ..Settings::default() };
     let textures = TextureStore::new(&scene);
     let view = &View::look_at(eye, middle, DVec3::Z, Lens::perspective(0.3));
     let job = Job { scene: &scene, world: &world, accel: &accel, textures: &textures, view, settings: &settings };
@@ -201,6 +223,14 @@ fn picture(of: &str, light: &str) -> ExitCode {
     let shown = pool.install(|| counted_picture(&job));
     println!("{shown} of {RAYS} pixels show the landscape");
     if shown > RAYS / 2 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// Surroundings of noise.
+fn panorama() -> Panorama {
+    let mut random = Random::new(5);
+    let (width, height) = (2 * PANORAMA_ROWS, PANORAMA_ROWS);
+    let texels = (0..width * height).map(|_| [(); 3].map(|()| random.unit())).collect();
+    Panorama { name: String::new(), width, height, texels: Arc::new(texels), rotation: 0.0 }
 }
 
 /// Gives all meshes normals, tangents and coordinates, and all materials maps of noise.
