@@ -1,9 +1,10 @@
 //! What rays that were traced together have hit: sorted by instance and shaded side by side where that can be, one by one
 //! elsewhere.
 //!
-//! Where several rays of a wave belong to one sample, they take turns: so what a sample gathers is added in the order of its
-//! rays, whichever others are beside them. (Where more rays wait than a wave takes, or more shadow rays than are kept, sums
-//! that are cut there may differ in their last bits from those of pictures that are shaded one by one.)
+//! Where several rays of a wave belong to one sample, they go by rank: so what a sample gathers is added in the order of its
+//! rays, whichever others are beside them. (Where more rays wait than a wave takes, or more shadow rays or rays to the
+//! surroundings than are kept, sums that are cut there may differ in their last bits from those of pictures that are shaded
+//! one by one.)
 
 use super::branch::Point;
 use super::context::Context;
@@ -12,7 +13,7 @@ use super::eyes::Eyes;
 use super::observer::Observer;
 use super::seam::is_same_crossing;
 use super::shade::LocalLight;
-use super::strip::{Common, POINTS, Sorted, Spot, Strip};
+use super::strip::{Common, POINTS, Sorted, Strip, StripPoint};
 use super::surface::{Surface, Target};
 use super::wave::{Path, RayClass, Wave};
 use super::whitted::Tracer;
@@ -71,40 +72,39 @@ pub(super) struct Beside {
     strip: Option<Box<Strip>>,
     /// Rays that met nothing and see the surroundings.
     missed: Vec<u32>,
-    turns: Turns,
+    ranks: Ranks,
 }
 
-/// The rays of a wave in turns, of which each has one ray of a sample at most.
+/// The rays of a wave by rank: how many of the same sample come before.
 #[derive(Default)]
-struct Turns {
-    /// By sample, how many of its rays have been given a turn; zeros in between.
-    given: Vec<u32>,
-    /// By ray, its turn.
+struct Ranks {
+    /// By sample, how many of its rays have been ranked; zeros in between.
+    ranked: Vec<u32>,
+    /// By ray, its rank.
     of_ray: Vec<u32>,
-    /// The rays by their turns, and in each by their places in the wave.
+    /// The rays by their ranks, and in each by their places in the wave.
     rays: Vec<u32>,
-    /// Where those of each turn end.
+    /// Where those of each rank end.
     ends: Vec<usize>,
 }
 
-impl Turns {
-    /// Gives every ray of a wave its turn: as many rays of its sample come before it.
-    fn give(&mut self, rays: &[Ray]) {
-        let Self { given, of_ray, rays: order, ends } = self;
+impl Ranks {
+    fn rank(&mut self, rays: &[Ray]) {
+        let Self { ranked, of_ray, rays: order, ends } = self;
         let samples = rays.iter().map(|ray| ray.sample as usize + 1).max().unwrap_or(0);
-        given.resize(samples.max(given.len()), 0);
+        ranked.resize(samples.max(ranked.len()), 0);
         of_ray.clear();
         ends.clear();
         for ray in rays {
-            let given = &mut given[ray.sample as usize];
-            of_ray.push(*given);
-            if ends.len() <= *given as usize {
+            let rank = &mut ranked[ray.sample as usize];
+            of_ray.push(*rank);
+            if ends.len() <= *rank as usize {
                 ends.push(0);
             }
-            ends[*given as usize] += 1;
-            *given += 1;
+            ends[*rank as usize] += 1;
+            *rank += 1;
         }
-        rays.iter().for_each(|ray| given[ray.sample as usize] = 0);
+        rays.iter().for_each(|ray| ranked[ray.sample as usize] = 0);
         // From how many there are to where they begin; where they begin grows to where they end.
         let mut start = 0;
         for end in ends.iter_mut() {
@@ -112,14 +112,14 @@ impl Turns {
         }
         order.clear();
         order.resize(rays.len(), 0);
-        for (ray, &turn) in (0..).zip(&*of_ray) {
-            let at = &mut ends[turn as usize];
+        for (ray, &rank) in (0..).zip(&*of_ray) {
+            let at = &mut ends[rank as usize];
             order[*at] = ray;
             *at += 1;
         }
     }
 
-    /// The rays of each turn.
+    /// The rays of each rank.
     fn iter(&self) -> impl Iterator<Item = &[u32]> {
         let starts = std::iter::once(0).chain(self.ends.iter().copied());
         starts.zip(&self.ends).map(|(start, &end)| &self.rays[start..end])
@@ -157,14 +157,14 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
 
     /// Adds what the rays of a wave see.
     pub(super) fn shade_wave(&mut self, class: RayClass, wave: &Wave) {
-        let mut turns = std::mem::take(&mut self.beside.turns);
-        turns.give(&wave.rays);
-        turns.iter().for_each(|rays| self.shade_turn((class, wave), rays));
-        self.beside.turns = turns;
+        let mut ranks = std::mem::take(&mut self.beside.ranks);
+        ranks.rank(&wave.rays);
+        ranks.iter().for_each(|rays| self.shade_rank((class, wave), rays));
+        self.beside.ranks = ranks;
     }
 
     /// The same of these of its rays, which belong to different samples.
-    fn shade_turn(&mut self, (class, wave): (RayClass, &Wave), rays: &[u32]) {
+    fn shade_rank(&mut self, (class, wave): (RayClass, &Wave), rays: &[u32]) {
         let context = self.context;
         let traced = Traced::Wave(class, wave);
         let mut sorted = self.sort();
@@ -175,7 +175,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
                 if path.straight { self.leave(ray, path) } else { self.beside.missed.push(index) }
             } else if is_same_crossing(|prim| context.world.prim(prim), ray, &wave.after[i], hit) {
                 self.continuing[class as usize].push(*ray, *path, *hit);
-            } else if !sorted.take(context, (index, 1), hit.prim) {
+            } else if rays.len() < FEW || !sorted.take(context, (index, 1), hit.prim) {
                 self.shade_one(traced, i);
             }
         }
@@ -246,7 +246,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let (matter, shiny, placement) = (&common.matter, common.shiny, context.world.placement(instance));
         strip.take(hits, sorted, (traced, &context.absorption), smooth);
         strip.find(smooth.then_some(placement));
-        if reads || shiny {
+        if reads || shiny || context.looks_around_by_points() {
             strip.widen(traced);
         }
         if reads {
@@ -278,15 +278,15 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     /// Adds what the points show of their surroundings and of each light, or sends the rays that find whether it arrives.
     fn show(&mut self, traced: Traced, common: &Common, strip: &mut Strip) {
         let (context, matter) = (self.context, &common.matter);
-        let has_inside = common.glass.is_some_and(|glass| glass.has_inside);
-        if context.sky.is_map() || context.env_rays > 0 {
+        let has_inside = common.has_inside();
+        if context.looks_around_by_points() {
             self.each_point(traced, common, strip, |tracer, point| tracer.look_around(point));
         } else if !context.is_dark || matter.shines() {
             strip.look_around((matter, has_inside), &context.sky, context.scene.ambient);
             strip.shown().for_each(|(sample, everywhere)| self.add(sample, everywhere));
         }
         let absorbs = context.absorption.is_some();
-        let within = absorbs && strip.certain().any(|i| traced.path(strip.ray(i).0).media.innermost().is_some());
+        let within = absorbs && strip.certain().any(|i| traced.path(strip.arrival(i).0).media.innermost().is_some());
         for light in &context.lights {
             strip.shine((matter, common.shiny, has_inside), light);
             if !light.shadows {
@@ -314,13 +314,13 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         traced: Traced,
         common: &Common,
         strip: &Strip,
-        mut act: impl FnMut(&mut Self, &Point<Spot>),
+        mut act: impl FnMut(&mut Self, &Point<StripPoint>),
     ) {
         let context = self.context;
         let material = (common.material, &context.scene.materials[common.material as usize]);
-        let has_inside = common.glass.is_some_and(|glass| glass.has_inside);
+        let has_inside = common.has_inside();
         for i in strip.certain() {
-            let (at, weight, width) = strip.ray(i);
+            let (at, weight, width) = strip.arrival(i);
             let (ray, hit, path) = (&traced.rays()[at], &traced.hits()[at], traced.path(at));
             let since = if context.absorption.is_some() { hit.t } else { path.since };
             let ground = strip.ground(i, material, has_inside);

@@ -139,6 +139,11 @@ impl<'a> Context<'a> {
         Self { seed: settings.seed, highlight_reach: glint::reach(settings), ..self.clone() }
     }
 
+    /// Whether no formula tells what many points see of their surroundings.
+    pub(crate) fn looks_around_by_points(&self) -> bool {
+        self.sky.is_map() || self.env_rays > 0
+    }
+
     /// Whether a branch of this weight is worth its rays.
     pub(crate) fn is_alive(&self, weight: Vec3) -> bool {
         weight.max_element() >= self.cutoff.max(f32::MIN_POSITIVE)

@@ -155,14 +155,14 @@ impl Kernel for Resolve<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
         let Self { samples, per_pixel, background, to } = self;
-        #[expect(clippy::cast_precision_loss, reason = "sample counts are small")]
-        let weight = per_pixel as f32;
         let numbers: &[f32] = bytemuck::cast_slice(samples);
         // All numbers of a sample side by side, which makes one addition of each. What the lanes behind them add is another
         // sample's and does not count.
         let mut first = 0;
         while first < samples.len() {
-            let end = (first + per_pixel).min(samples.len());
+            let end = (first + per_pixel.max(1)).min(samples.len());
+            #[expect(clippy::cast_precision_loss, reason = "sample counts are small")]
+            let weight = (end - first) as f32;
             let mut sum = s.splat(0.0);
             for at in first..end {
                 let mut row = [0.0; LANES];

@@ -6,14 +6,17 @@
 
 use super::metal_rough::{NARROWEST_HIGHLIGHT, above, least_square};
 use super::{Lobe, Reader, Seen, Sky};
+use crate::math::formula::atan2;
+use crate::math::simd::{Kernel, Level, Simd};
 use crate::math::{Vec2, Vec3};
 use crate::render::optics::reflect;
+use crate::render::studio;
 use crate::render::surface::Surface;
-use crate::scene::Grain;
+use crate::scene::{Grain, UpAxis};
 use std::f32::consts::PI;
 
 /// Lookups of the surroundings along the grain.
-const LOOKUPS: u8 = 32;
+const LOOKUPS: usize = 32;
 
 /// The grain at one point.
 #[derive(Clone, Debug)]
@@ -95,28 +98,104 @@ impl GrainMatter {
 
     /// The surroundings as facets show them that lean along the grain, each as blurred as it is rough across.
     pub(super) fn mirrored(&self, seen: &Seen, sky: &Sky) -> Vec3 {
-        let [wide, narrow] = self.alpha;
+        let level = Level::best();
+        let mut leans = Leans::default();
+        level.run(Lean { grain: self, seen, to: &mut leans });
+        if let Some(up) = sky.studio() {
+            level.run(LookUp { leans: &mut leans, up });
+        }
+        let Leans { dirs: [x, y, z], blur, share, studio } = &leans;
+        let (mut sum, mut shares) = (Vec3::ZERO, 0.0);
+        for k in (0..LOOKUPS).filter(|&k| share[k] > 0.0) {
+            let light = match sky.studio() {
+                Some(_) => Vec3::splat(studio[k]),
+                None => sky.blurred(Vec3::new(x[k], y[k], z[k]), blur[k]),
+            };
+            sum += light * share[k];
+            shares += share[k];
+        }
+        if shares > 0.0 { sum / shares } else { sky.blurred(seen.mirrored(), self.roughness()) }
+    }
+}
+
+/// A number of every lookup.
+type Row = [f32; LOOKUPS];
+
+/// Lookups by facets that lean along a grain.
+#[derive(Default)]
+struct Leans {
+    /// Where each mirrors the view to, by axis.
+    dirs: [Row; 3],
+    /// How rough a mirror would show so much as it.
+    blur: Row,
+    /// What it counts; 0 for facets that are not seen.
+    share: Row,
+    /// The light there, in the studio.
+    studio: Row,
+}
+
+/// Finds the facets that stand for equal parts of a grain's distribution.
+struct Lean<'a> {
+    grain: &'a GrainMatter,
+    seen: &'a Seen,
+    to: &'a mut Leans,
+}
+
+impl Kernel for Lean<'_> {
+    type Output = ();
+
+    // The lanes are plain arrays: what the token stands for is only what the compiler may use for them.
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let Self { grain, seen, to } = self;
+        let (along, seen, [wide, narrow]) = (grain.along, *seen, grain.alpha);
         let spread = (wide * wide - narrow * narrow).max(0.0).sqrt();
         // Slopes that cut the distribution along one axis, α² / 2 (α² + s²)^³⁄₂, into equal parts.
         let slope = |part: f32| spread * part / (1.0 - part * part).max(f32::MIN_POSITIVE).sqrt();
-        let (mut sum, mut shares) = (Vec3::ZERO, 0.0);
-        let mut edge = -PI / 2.0;
+        let part = |k: usize| (2 * k + 1) as f32 / LOOKUPS as f32 - 1.0;
+        let mut ends = [0.0; LOOKUPS];
+        for (k, end) in ends.iter_mut().enumerate() {
+            *end = atan2(slope(part(k) + 1.0 / LOOKUPS as f32), 1.0);
+        }
         for k in 0..LOOKUPS {
-            let part = f32::from(2 * k + 1) / f32::from(LOOKUPS) - 1.0;
-            let slope_here = slope(part);
             // Wide enough that neighbours meet: a lookup reaches as far as its part of the slopes.
-            let next = libm::atanf(slope(part + 1.0 / f32::from(LOOKUPS)));
-            let blur = narrow.max(next - edge).sqrt();
-            edge = next;
-            let half = (seen.normal + self.along * slope_here).normalize_or(seen.normal);
-            let share = half.dot(seen.view).max(0.0);
-            if share > 0.0 {
-                let dir = above(reflect(-seen.view, half), seen.geometric);
-                sum += sky.blurred(dir, blur) * share;
-                shares += share;
+            let start = if k == 0 { -PI / 2.0 } else { ends[k - 1] };
+            to.blur[k] = narrow.max(ends[k] - start).sqrt();
+            let half = (seen.normal + along * slope(part(k))).normalize_or(seen.normal);
+            to.share[k] = half.dot(seen.view).max(0.0);
+            let dir = above(reflect(-seen.view, half), seen.geometric);
+            (to.dirs[0][k], to.dirs[1][k], to.dirs[2][k]) = (dir.x, dir.y, dir.z);
+        }
+    }
+}
+
+/// Looks all of them up in the studio.
+struct LookUp<'a> {
+    leans: &'a mut Leans,
+    up: UpAxis,
+}
+
+impl Kernel for LookUp<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let Self { leans: Leans { dirs: [x, y, z], blur, studio: to, .. }, up } = self;
+        // The axis is chosen outside the loops, which then are formulas.
+        match up {
+            UpAxis::Y => {
+                for k in 0..LOOKUPS {
+                    let dir = studio::from_world(UpAxis::Y, Vec3::new(x[k], y[k], z[k]));
+                    to[k] = studio::blurred(dir, blur[k]).x;
+                }
+            }
+            UpAxis::Z => {
+                for k in 0..LOOKUPS {
+                    let dir = studio::from_world(UpAxis::Z, Vec3::new(x[k], y[k], z[k]));
+                    to[k] = studio::blurred(dir, blur[k]).x;
+                }
             }
         }
-        if shares > 0.0 { sum / shares } else { sky.blurred(seen.mirrored(), self.roughness()) }
     }
 }
 

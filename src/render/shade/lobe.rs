@@ -4,8 +4,10 @@
 //! "Distributed Ray Tracing" (1984).
 
 use crate::math::Vec3;
+use crate::math::simd::{Kernel, Level, Simd};
 use crate::render::optics::reflect;
 use std::f32::consts::PI;
+use std::sync::LazyLock;
 
 /// Facets around a normal: a GGX distribution with a width along each of two axes.
 #[derive(Clone, Copy, Debug)]
@@ -76,13 +78,7 @@ impl Lobe {
 
     /// What all facets together send back to `view` of light from everywhere, if they mirror all of it.
     pub(super) fn albedo(&self, view: Vec3) -> f32 {
-        const DRAWN: u8 = 16;
-        let kept = |k: u8| {
-            let at = [(f32::from(k) + 0.5) / f32::from(DRAWN), (f32::from(k) * 0.618_034).fract()];
-            let to = reflect(-view, self.facet(view, at));
-            self.sent(view, to)
-        };
-        (0..DRAWN).map(kept).sum::<f32>() / f32::from(DRAWN)
+        Level::best().run(Albedo { lobe: self, view }) / DRAWN as f32
     }
 
     #[inline(always)]
@@ -95,6 +91,39 @@ impl Lobe {
     pub(crate) fn angle(&self, rays: u32) -> f32 {
         let [wide, narrow] = self.alpha;
         2.0 * (wide * narrow / rays.max(1) as f32).sqrt()
+    }
+}
+
+/// Facets that are drawn to find what all of them send back.
+const DRAWN: usize = 16;
+
+/// What draws them: a number 0 … 1, and cosine and sine of a turn.
+static PATTERN: LazyLock<[[f32; DRAWN]; 3]> = LazyLock::new(|| {
+    let turn = |k: usize| libm::sincosf(2.0 * PI * (k as f32 * 0.618_034).fract());
+    let at = std::array::from_fn(|k| (k as f32 + 0.5) / DRAWN as f32);
+    [at, std::array::from_fn(|k| turn(k).1), std::array::from_fn(|k| turn(k).0)]
+});
+
+/// Sums what drawn facets send back.
+struct Albedo<'a> {
+    lobe: &'a Lobe,
+    view: Vec3,
+}
+
+impl Kernel for Albedo<'_> {
+    type Output = f32;
+
+    // The lanes are plain arrays: what the token stands for is only what the compiler may use for them.
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> f32 {
+        let Self { lobe, view } = self;
+        let (lobe, [at, cos, sin]) = (*lobe, &*PATTERN);
+        let mut sent = [0.0; DRAWN];
+        for k in 0..DRAWN {
+            let facet = lobe.facet_turned(view, at[k], [cos[k], sin[k]]);
+            sent[k] = lobe.sent(view, reflect(-view, facet));
+        }
+        sent.iter().sum()
     }
 }
 

@@ -65,7 +65,7 @@ pub(crate) struct MetalRoughMatter {
     least_square: f32,
 }
 
-/// Those of its parameters that maps of its colour, roughness, metalness and occlusion change.
+/// Those of its parameters that maps of its colour, roughness, metalness, occlusion and transmission change.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MetalRoughPaint {
     pub base: Vec3,
@@ -290,9 +290,7 @@ impl MetalRoughMatter {
     /// BRDF × N·L; all unit vectors, away from the surface.
     #[inline(always)]
     pub(crate) fn lit(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
-        let a2 = squared_width(self.roughness).max(self.least_square);
-        let lobe = |half| highlight(normal, half, [normal.dot(to_light), normal.dot(view)], a2);
-        self.lit_by(normal, view, to_light, lobe)
+        self.lit_on_side(normal, view, to_light, true)
     }
 
     /// The same, without highlights where it is seen from inside.

@@ -70,6 +70,7 @@ pub(crate) struct Matter {
 }
 
 /// The reflection model at one point.
+#[derive(Clone, Copy)]
 pub(crate) enum Model {
     Unlit(Vec3),
     Phong(PhongMatter),
@@ -178,7 +179,7 @@ impl Matter {
                 Model::MetalRough(MetalRoughMatter::new(m, base, occlusion(material, shade), reader))
             }
         };
-        Self { outside: true, emission, model, grain: None, sheen: None, coat: None }
+        Self::bare(model, emission, true)
     }
 
     /// A surface of this model without anything over it.
@@ -186,10 +187,14 @@ impl Matter {
         Self { outside, emission, model, grain: None, sheen: None, coat: None }
     }
 
-    /// Whether nothing is seen of its surface but what rays find that go on from it: clear glass from inside.
+    /// Whether nothing is seen of its surface but what rays find that go on from it.
     pub(crate) fn is_dark(&self) -> bool {
-        let Model::MetalRough(m) = &self.model else { return false };
-        !self.outside && self.emission == Vec3::ZERO && m.is_clear()
+        !self.outside && self.is_dark_inside()
+    }
+
+    /// Whether that is so from inside: of clear glass.
+    pub(crate) fn is_dark_inside(&self) -> bool {
+        self.emission == Vec3::ZERO && matches!(&self.model, Model::MetalRough(m) if m.is_clear())
     }
 
     /// Share of what is under the lacquer that is seen through it.

@@ -1,7 +1,7 @@
 //! A panorama and smaller copies of it, asked for its radiance at any blur.
 
 use crate::math::Vec3;
-use crate::math::formula::{angle, floor, log2};
+use crate::math::formula::{atan2, floor, log2};
 use crate::scene::Panorama;
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -79,7 +79,7 @@ impl Pyramid {
     /// Mean radiance in a cone of this angle across.
     pub(super) fn radiance(&self, dir: Vec3, angle: f32) -> Vec3 {
         let finest = self.levels[0].angle();
-        self.at_level(dir, if angle > finest { libm::log2f(angle / finest) } else { 0.0 })
+        self.at_level(dir, if angle > finest { log2(angle / finest) } else { 0.0 })
     }
 
     /// About the same at a direction's [`coordinates`], without the borders of texels: the mean weighted by a smooth hill of
@@ -181,8 +181,8 @@ impl Pyramid {
 /// Where a direction is in a panorama: 0 … 1 once around, and 0 … 1 from the zenith down.
 #[inline(always)]
 pub(super) fn coordinates(dir: Vec3) -> (f32, f32) {
-    let around = angle(dir.z, dir.x) / (2.0 * PI) + 0.5;
-    let down = angle((dir.x * dir.x + dir.z * dir.z).sqrt(), dir.y) / PI;
+    let around = atan2(dir.z, dir.x) / (2.0 * PI) + 0.5;
+    let down = atan2((dir.x * dir.x + dir.z * dir.z).sqrt(), dir.y) / PI;
     (around, down)
 }
 

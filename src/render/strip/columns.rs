@@ -131,7 +131,7 @@ impl Default for Strip {
 
 impl Strip {
     /// Takes hits, at most [`POINTS`], each by the place of its ray in what was traced and that of its face, with the normals of its
-    /// corners if the mesh is `smooth`.
+    /// corners if the mesh is `smooth`. What absorbs light on the way lessens the weights of their rays.
     pub(crate) fn take(
         &mut self,
         hit: &[(u32, u32)],
@@ -167,9 +167,7 @@ impl Strip {
             None => self.level.run(Faceted { given, found, points }),
         }
     }
-}
 
-impl Strip {
     /// Leaves out the points whose rays, by their places in what was traced, are not wanted.
     pub(crate) fn retain(&mut self, wanted: impl Fn(usize) -> bool) {
         for (certain, &ray) in self.found.certain.iter_mut().zip(&self.rays).take(self.count) {
@@ -179,7 +177,7 @@ impl Strip {
 
     /// Whether backs of faces are all that is seen.
     pub(crate) fn sees_backs_alone(&self) -> bool {
-        self.found.front[..self.count.min(POINTS)].iter().all(|&front| front == 0)
+        self.certain().all(|i| self.found.front[i] == 0)
     }
 
     /// The rays whose points must be shaded one by one, from now on left out here.

@@ -35,8 +35,8 @@ pub(crate) struct Glass {
 
 impl Common {
     /// `None` for materials with a grain, film, sheen or lacquer, for those that scatter light through, for those with maps of
-    /// their reflectance, for those that are nowhere there as a whole, and for those that let light through but in
-    /// metallic-rough ones that rays go through.
+    /// their reflectance, for those that are nowhere there as a whole, and for what lets light through, unless it is
+    /// metallic-rough and rays go through it.
     pub(crate) fn of(
         (number, material): (u32, &Material),
         store: &TextureStore,
@@ -72,15 +72,19 @@ impl Common {
             matter,
         })
     }
+
+    /// Whether backs of faces are seen from inside.
+    pub(crate) fn has_inside(&self) -> bool {
+        self.glass.is_some_and(|glass| glass.has_inside)
+    }
 }
 
 impl Glass {
     fn of(material: &Material, matter: &Matter) -> Self {
         let has_inside = has_inside(material);
         let changes = |m: &MetalRough| m.transmission_map.is_some() || m.metal_rough_map.is_some();
-        let is_clear = matches!(&matter.model, Model::MetalRough(m) if m.is_clear());
-        let is_the_same = !material.metal_rough().is_none_or(changes);
-        Self { has_inside, is_dark_inside: has_inside && is_clear && is_the_same && !matter.shines() }
+        let changes = material.metal_rough().is_some_and(changes);
+        Self { has_inside, is_dark_inside: has_inside && !changes && matter.is_dark_inside() }
     }
 }
 

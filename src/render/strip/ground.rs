@@ -5,11 +5,11 @@ use crate::accel::{NO_PRIM, Ray};
 use crate::math::Vec3;
 use crate::render::branch::Ground;
 use crate::render::context::Context;
-use crate::render::shade::{Matter, Model, Seen};
+use crate::render::shade::{Matter, Seen};
 use crate::scene::Material;
 
 /// One of the points, as rays that go on ask for it.
-pub(crate) struct Spot<'a> {
+pub(crate) struct StripPoint<'a> {
     strip: &'a Strip,
     i: usize,
     material: (u32, &'a Material),
@@ -23,35 +23,30 @@ impl Strip {
         (0..self.count).filter(|&i| self.found.certain[i] == 1)
     }
 
-    /// The place of the ray of point `i` in what was traced, its weight there, and the width of its cone.
-    pub(crate) fn ray(&self, i: usize) -> (usize, Vec3, f32) {
+    /// The place in what was traced of the ray that came to point `i`, its weight there, and the width of its cone.
+    pub(crate) fn arrival(&self, i: usize) -> (usize, Vec3, f32) {
         let weight = self.weights.as_ref().map_or(Vec3::ONE, |weights| get(weights, i));
         (self.rays[i] as usize, weight, self.cones.width[i])
     }
 
     /// The ground at point `i` of this material, by number too, the back of which is seen from inside if it `has_inside`.
-    pub(crate) fn ground<'a>(&'a self, i: usize, material: (u32, &'a Material), has_inside: bool) -> Spot<'a> {
-        Spot { strip: self, i, material, outside: self.found.front[i] == 1 || !has_inside }
+    pub(crate) fn ground<'a>(&'a self, i: usize, material: (u32, &'a Material), has_inside: bool) -> StripPoint<'a> {
+        StripPoint { strip: self, i, material, outside: self.found.front[i] == 1 || !has_inside }
     }
 }
 
-impl Spot<'_> {
+impl StripPoint<'_> {
     /// The material there, which is `even` where maps do not change it.
     pub(crate) fn matter(&self, even: &Matter) -> Matter {
         let (painted, i) = (&self.strip.painted, self.i);
-        let (model, emission) = match &even.model {
-            Model::Unlit(_) if painted.any => (Model::Unlit(painted.unlit(i)), painted.emission(i)),
-            Model::Phong(m) if painted.any => (Model::Phong(painted.phong(i, m)), painted.emission(i)),
-            Model::MetalRough(m) if painted.any => (Model::MetalRough(painted.metal_rough(i, m)), painted.emission(i)),
-            Model::Unlit(color) => (Model::Unlit(*color), even.emission),
-            Model::Phong(m) => (Model::Phong(*m), even.emission),
-            Model::MetalRough(m) => (Model::MetalRough(*m), even.emission),
-        };
-        Matter::bare(model, emission, self.outside)
+        if painted.any {
+            return Matter::bare(painted.model(i, &even.model), painted.emission(i), self.outside);
+        }
+        Matter::bare(even.model, even.emission, self.outside)
     }
 }
 
-impl Ground for Spot<'_> {
+impl Ground for StripPoint<'_> {
     fn material(&self) -> (u32, &Material) {
         self.material
     }

@@ -1,12 +1,14 @@
 //! Points of surfaces, shaded side by side: one number of all points, then the next.
 //!
 //! Where nothing lies over a material, what a point shows, and what it mirrors, depends on a few numbers, and the same
-//! formulas are computed for all points; only the rays that go on from glass are found point by point. They are written once, for one point, in `surface`,
-//! `patch`, `shade`, `glint` and `accel::refine`; here loops over columns of numbers call them, which the compiler turns
-//! into lanes. So a point shaded here gives the same bits as one shaded by itself, on every instruction set.
+//! formulas are computed for all points. They are written once, for one point, in `surface`, `patch`, `shade`, `glint` and
+//! `accel::refine`; here loops over columns of numbers call them, which the compiler turns into lanes. So a point shaded
+//! here gives the same bits as one shaded by itself, on every instruction set. Rays that go on from glass, and what is seen
+//! of panoramas and by rays to the surroundings, are found point by point, from the numbers in the columns (`ground`).
 //!
 //! What a column cannot do is left to the tracer: hits near the edge of a face, those whose distance needs more than
-//! `f64`, backs of one-sided faces, points whose mesh gives no tangent, and what is not there as a whole.
+//! `f64`, backs of one-sided faces, points whose mesh gives no tangent, glass from which no ray goes on, and what is not
+//! there as a whole.
 
 mod around;
 mod columns;
@@ -21,5 +23,5 @@ mod sorted;
 
 pub(crate) use columns::{POINTS, Strip};
 pub(crate) use common::Common;
-pub(crate) use ground::Spot;
+pub(crate) use ground::StripPoint;
 pub(crate) use sorted::Sorted;

@@ -140,6 +140,17 @@ impl Painted {
     }
 }
 
+impl Painted {
+    /// A model at point `i`, which is `even` but for maps.
+    pub(super) fn model(&self, i: usize, even: &Model) -> Model {
+        match even {
+            Model::Unlit(_) => Model::Unlit(self.unlit(i)),
+            Model::Phong(m) => Model::Phong(self.phong(i, m)),
+            Model::MetalRough(m) => Model::MetalRough(self.metal_rough(i, m)),
+        }
+    }
+}
+
 impl Strip {
     /// Blurs a surface of `matter` where it is seen along paths that rough surfaces have spread, after its maps were read.
     pub(crate) fn blur(&mut self, traced: Traced, matter: &Matter) {
