@@ -21,7 +21,7 @@ use crate::accel::{Accel, Hit, Ray};
 use crate::math::Vec3;
 use crate::math::simd::LANES;
 
-/// Fewer points than these are shaded sooner one by one.
+/// Fewer points than these leave most of a register empty, and are shaded one by one.
 const FEW: usize = 3;
 
 /// Rays that were traced together.

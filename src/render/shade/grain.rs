@@ -180,21 +180,21 @@ impl Kernel for LookUp<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Self { leans: Leans { dirs: [x, y, z], blur, studio: to, .. }, up } = self;
-        // The axis is chosen outside the loops, which then are formulas.
-        match up {
-            UpAxis::Y => {
-                for k in 0..LOOKUPS {
-                    let dir = studio::from_world(UpAxis::Y, Vec3::new(x[k], y[k], z[k]));
-                    to[k] = studio::blurred(dir, blur[k]).x;
-                }
-            }
-            UpAxis::Z => {
-                for k in 0..LOOKUPS {
-                    let dir = studio::from_world(UpAxis::Z, Vec3::new(x[k], y[k], z[k]));
-                    to[k] = studio::blurred(dir, blur[k]).x;
-                }
-            }
+        // The axis is asked outside the loop, which then is a formula.
+        match self.up {
+            UpAxis::Y => self.leans.look_up(UpAxis::Y),
+            UpAxis::Z => self.leans.look_up(UpAxis::Z),
+        }
+    }
+}
+
+impl Leans {
+    #[inline(always)]
+    fn look_up(&mut self, up: UpAxis) {
+        let Self { dirs: [x, y, z], blur, studio: to, .. } = self;
+        for k in 0..LOOKUPS {
+            let dir = studio::from_world(up, Vec3::new(x[k], y[k], z[k]));
+            to[k] = studio::blurred(dir, blur[k]).x;
         }
     }
 }

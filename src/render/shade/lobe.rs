@@ -97,12 +97,17 @@ impl Lobe {
 /// Facets that are drawn to find what all of them send back.
 const DRAWN: usize = 16;
 
-/// What draws them: a number 0 … 1, and cosine and sine of a turn.
-static PATTERN: LazyLock<[[f32; DRAWN]; 3]> = LazyLock::new(|| {
-    let turn = |k: usize| libm::sincosf(2.0 * PI * (k as f32 * 0.618_034).fract());
-    let at = std::array::from_fn(|k| (k as f32 + 0.5) / DRAWN as f32);
+/// What draws them.
+static PATTERN: LazyLock<[[f32; DRAWN]; 3]> = LazyLock::new(pattern);
+
+/// Numbers that draw `N` facets for equal shares of a lobe: 0 … 1, and cosine and sine of a turn.
+pub(crate) fn pattern<const N: usize>() -> [[f32; N]; 3] {
+    /// The golden ratio's inverse: turns that never meet.
+    const GOLDEN: f32 = 0.618_034;
+    let turn = |k: usize| libm::sincosf(2.0 * PI * (k as f32 * GOLDEN).fract());
+    let at = std::array::from_fn(|k| (k as f32 + 0.5) / N as f32);
     [at, std::array::from_fn(|k| turn(k).1), std::array::from_fn(|k| turn(k).0)]
-});
+}
 
 /// Sums what drawn facets send back.
 struct Albedo<'a> {

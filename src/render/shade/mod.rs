@@ -19,7 +19,7 @@ pub(crate) use coat::CoatMatter;
 pub(crate) use facets::{AlbedoRow, albedo, mean_albedo};
 pub(crate) use grain::GrainMatter;
 pub(crate) use light::{Incident, LocalLight, way};
-pub(crate) use lobe::Lobe;
+pub(crate) use lobe::{Lobe, pattern};
 pub(crate) use metal_rough::{Around, MetalRoughMatter, MetalRoughPaint, above, is_narrow, open};
 pub(crate) use phong::{PhongMatter, PhongPaint};
 pub(crate) use sheen::SheenMatter;

@@ -4,7 +4,7 @@ use super::panorama::{Pyramid, coordinates};
 use crate::math::Vec3;
 use crate::math::simd::{Kernel, Level, Simd};
 use crate::render::optics::reflect;
-use crate::render::shade::Lobe;
+use crate::render::shade::{Lobe, pattern};
 use std::f32::consts::PI;
 use std::sync::LazyLock;
 
@@ -17,14 +17,8 @@ const HILL: f32 = 0.75;
 /// A number of every lookup.
 type Row = [f32; LOOKUPS];
 
-/// Numbers that draw facets for equal shares of a lobe: 0 … 1, and cosine and sine of a turn.
-static PATTERN: LazyLock<[Row; 3]> = LazyLock::new(|| {
-    /// The golden ratio's inverse: turns that never meet.
-    const GOLDEN: f32 = 0.618_034;
-    let turn = |k: usize| libm::sincosf(2.0 * PI * (k as f32 * GOLDEN).fract());
-    let at = std::array::from_fn(|k| (k as f32 + 0.5) / LOOKUPS as f32);
-    [at, std::array::from_fn(|k| turn(k).1), std::array::from_fn(|k| turn(k).0)]
-});
+/// What draws their facets.
+static PATTERN: LazyLock<[Row; 3]> = LazyLock::new(pattern);
 
 /// The lookups of a lobe, side by side.
 struct Lookups {
