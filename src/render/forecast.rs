@@ -82,10 +82,11 @@ pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
         (0..timed.squares.len()).map(|i| value(i) / timed.squares[i].beauty.len().max(1) as f64).collect()
     };
     let whole = pixels as f64 * work;
-    // Of the pixels around it a square has more, for its size, than a tile.
+    // Of the pixels around it a square has more, for its size, than a tile, which need not trace their first rays.
     let rays_of = |i: usize| {
         let square = &timed.squares[i];
-        square.rays as f64 - square.rays_around as f64 * (1.0 - f64::from(SIDE) / f64::from(TILE))
+        let around = square.rays_around as f64 * (1.0 - f64::from(SIDE) / f64::from(TILE));
+        (square.rays - square.rays_beyond) as f64 - around
     };
     let rays = Interval::of_mean(&per_pixel(&rays_of), whole);
     let seconds_of = |i: usize| timed.spent[i].as_secs_f64() * rays_of(i) / timed.squares[i].rays.max(1) as f64;

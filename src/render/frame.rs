@@ -80,8 +80,33 @@ pub(super) fn on_lens(lens: Option<ThinLens>, key: u32, i: u32) -> [f64; 2] {
 
 /// What tells the numbers of pixels apart.
 #[expect(clippy::cast_possible_truncation, reason = "both halves are mixed in")]
+#[inline(always)]
 pub(super) fn pixel_key(seed: u64, (x, y): (u32, u32)) -> u32 {
     mix(mix(mix(seed as u32, (seed >> 32) as u32), x), y)
+}
+
+/// The [`pixel_key`] of each of these pixels, appended.
+pub(super) fn pixel_keys(seed: u64, pixels: &[(u32, u32)], keys: &mut Vec<u32>) {
+    let start = keys.len();
+    keys.resize(start + pixels.len(), 0);
+    Level::best().run(Keys { seed, pixels, keys: &mut keys[start..] });
+}
+
+struct Keys<'a> {
+    seed: u64,
+    pixels: &'a [(u32, u32)],
+    keys: &'a mut [u32],
+}
+
+impl Kernel for Keys<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        for (key, &pixel) in self.keys.iter_mut().zip(self.pixels) {
+            *key = pixel_key(self.seed, pixel);
+        }
+    }
 }
 
 /// What samples have gathered together.
@@ -93,6 +118,12 @@ pub(super) struct Sum {
 }
 
 impl Sum {
+    /// A single sample.
+    #[inline(always)]
+    pub(super) fn of(sample: &Sample) -> Self {
+        Self { radiance: sample.radiance, through: sample.through, weight: 1.0 }
+    }
+
     pub(super) fn add(&mut self, sample: &Sample) {
         self.radiance += sample.radiance;
         self.through += sample.through;

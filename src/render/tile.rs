@@ -17,6 +17,7 @@ use crate::accel::Accel;
 use crate::image::{Channel, Layers, Picture, Values};
 use crate::stopwatch::{Spent, Stopwatch};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 /// Columns and rows of a tile.
@@ -29,7 +30,7 @@ const BLOCK: u32 = 4;
 pub(super) const TOGETHER: usize = 1 << 11;
 
 /// A part of the picture: pixels `x0..x1` of rows `y0..y1`.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Tile {
     pub x0: u32,
     pub y0: u32,
@@ -48,6 +49,8 @@ pub(super) struct TilePixels {
     pub rays: u64,
     /// Of them those through pixels around the tile.
     pub rays_around: u64,
+    /// And those first ones around it that neighbours would have traced, had they been rendered, too.
+    pub rays_beyond: u64,
 }
 
 /// How the sampling of a pixel went.
@@ -93,7 +96,7 @@ pub(super) fn render_some<A: Accel, P: Observer>(
     tiles: &[Tile],
 ) -> (Vec<(TilePixels, Duration)>, Vec<ByClass<P>>, bool) {
     let frame = Frame::new(context, view, settings);
-    let work = |tracer: &mut Tracer<A, P>, tile| {
+    let work = |tracer: &mut Tracer<A, P>, &tile: &Tile| {
         let watch = Stopwatch::of_this_thread();
         let pixels = render_tile(&frame, tracer, tile)?;
         let Spent { cpu, wall } = watch.read();
@@ -111,43 +114,68 @@ pub(crate) fn render_tiles<A: Accel, P: Observer>(
     progress: &dyn Progress,
 ) -> (Picture, Sampled, Vec<ByClass<P>>, bool) {
     let frame = Frame::new(context, view, settings);
-    let work = |tracer: &mut Tracer<A, P>, tile| render_tile(&frame, tracer, tile);
+    let whole = Mutex::new(Whole::new(settings));
+    // Every tile is kept at once or not at all.
+    let keep = |pixels: TilePixels| whole.lock().unwrap_or_else(PoisonError::into_inner).keep(&pixels);
     let tiles = tiles(settings.width, settings.height);
-    let (finished, counts, complete) = match &settings.sampling {
-        Sampling::Adaptive(how) => adaptive::render_all(&frame, how, (context, accel), progress, &tiles),
-        _ => each_tile(context, accel, &tiles, progress, work),
+    let (counts, complete) = match &settings.sampling {
+        Sampling::Uniform => {
+            let work = |tracer: &mut Tracer<A, P>, &tile: &Tile| frame.render(tracer, tile).map(keep);
+            let (_, counts, complete) = each_tile(context, accel, &tiles, progress, work);
+            (counts, complete)
+        }
+        Sampling::Adaptive(how) => adaptive::render_all(&frame, how, (context, accel), progress, &tiles, &keep),
+        Sampling::Stochastic(how) => stochastic::render_all(&frame, how, (context, accel), progress, &tiles, &keep),
     };
-    let mut picture = empty_picture(settings);
-    finished.iter().for_each(|pixels| pixels.store(&mut picture));
-    let sampled = sampled(settings, &finished);
+    let Whole { mut picture, sampled } = whole.into_inner().unwrap_or_else(PoisonError::into_inner);
     if let Some(layers) = &mut picture.layers {
         add_channels(&sampled, layers);
     }
     (picture, sampled, counts, complete)
 }
 
-/// How the pixels of finished tiles were sampled; the others had no rays.
-fn sampled(settings: &Settings, finished: &[TilePixels]) -> Sampled {
-    let pixels = settings.width as usize * settings.height as usize;
-    let rays = finished.iter().map(|tile| tile.rays).sum();
-    let mut sampled = Sampled { pixels: pixels as u64, rays, ..Sampled::default() };
-    if settings.sampling != Sampling::Uniform {
-        sampled.counts = vec![0; pixels];
-    }
-    if matches!(settings.sampling, Sampling::Stochastic(_)) {
-        sampled.errors = vec![0.0; pixels];
-    }
-    for tile in finished {
-        for ((x, y), facts) in tile.tile.places().zip(&tile.facts) {
-            let i = y as usize * settings.width as usize + x as usize;
-            sampled.counts[i] = facts.count;
-            sampled.errors.get_mut(i).into_iter().for_each(|error| *error = facts.error);
-            sampled.met += u64::from(facts.end == End::Met);
-            sampled.at_most += u64::from(facts.end == End::Ceiling);
-            sampled.spare += u64::from(facts.spare);
+/// The picture, as far as it is finished, and how its pixels were sampled; the others had no rays.
+struct Whole {
+    picture: Picture,
+    sampled: Sampled,
+}
+
+impl Whole {
+    /// Nothing yet.
+    fn new(settings: &Settings) -> Self {
+        let pixels = settings.width as usize * settings.height as usize;
+        let mut sampled = Sampled { pixels: pixels as u64, ..Sampled::default() };
+        if settings.sampling != Sampling::Uniform {
+            sampled.counts = vec![0; pixels];
         }
+        if matches!(settings.sampling, Sampling::Stochastic(_)) {
+            sampled.errors = vec![0.0; pixels];
+        }
+        Self { picture: empty_picture(settings), sampled }
     }
-    sampled
+
+    fn keep(&mut self, pixels: &TilePixels) {
+        let Self { picture, sampled } = self;
+        let (width, mut from) = (picture.width as usize, 0);
+        sampled.rays += pixels.rays;
+        pixels.tile.runs().for_each(|((x, y), count)| {
+            let start = y as usize * width + x as usize;
+            picture.beauty[start..start + count].copy_from_slice(&pixels.beauty[from..from + count]);
+            for (i, facts) in (start..).zip(pixels.facts.iter().skip(from).take(count)) {
+                sampled.counts[i] = facts.count;
+                sampled.errors.get_mut(i).into_iter().for_each(|error| *error = facts.error);
+                sampled.met += u64::from(facts.end == End::Met);
+                sampled.at_most += u64::from(facts.end == End::Ceiling);
+                sampled.spare += u64::from(facts.spare);
+            }
+            if let Some(layers) = &mut picture.layers {
+                (start..)
+                    .zip(pixels.layers.iter().skip(from).take(count))
+                    .for_each(|(i, pixel)| pixel.store(layers, i));
+            }
+            from += count;
+        });
+    }
 }
 
 /// What is known of the sampling of each pixel, as layers.
@@ -178,7 +206,7 @@ pub(crate) fn cost_tiles<A: Accel, P: Observer, T: Copy + Default + Send>(
         Together::Wave => batch_pixels(samples),
         Together::Pixel => 1,
     };
-    let work = |tracer: &mut Tracer<A, P>, tile: Tile| {
+    let work = |tracer: &mut Tracer<A, P>, &tile: &Tile| {
         let mut costs = Vec::new();
         let each = |tracer: &mut Tracer<A, P>| costs.extend(cost(&mut tracer.counts, samples));
         frame.trace(tracer, tile, pixels, each).map(|()| (tile, costs))
@@ -224,30 +252,29 @@ pub(crate) enum Together {
     Pixel,
 }
 
-/// Has every tile worked on by some thread: what came of them, what the threads counted, and whether that was all.
-fn each_tile<A: Accel, P: Observer, T: Send>(
+/// Has every tile, or part of the work on one, done by some thread, which take them in order: what came of them, what the
+/// threads counted, and whether that was all.
+pub(super) fn each_tile<A: Accel, P: Observer, W: Sync, T: Send>(
     context: &Context,
     accel: &A,
-    tiles: &[Tile],
+    all: &[W],
     progress: &dyn Progress,
-    work: impl Fn(&mut Tracer<A, P>, Tile) -> Option<T> + Sync,
+    work: impl Fn(&mut Tracer<A, P>, &W) -> Option<T> + Sync,
 ) -> (Vec<T>, Vec<ByClass<P>>, bool) {
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-
-    // Every thread takes tiles in order until none is left.
     let take = |_: rayon::BroadcastContext| {
         let mut tracer = Tracer::<A, P>::new(context, accel, progress);
         let mut finished = Vec::new();
-        while let Some(&tile) = tiles.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let Some(result) = work(&mut tracer, tile) else { break };
+        while let Some(one) = all.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let Some(result) = work(&mut tracer, one) else { break };
             finished.push(result);
-            progress.tiles(done.fetch_add(1, Ordering::Relaxed) + 1, tiles.len());
+            progress.tiles(done.fetch_add(1, Ordering::Relaxed) + 1, all.len());
         }
         (finished, tracer.counts)
     };
     let (finished, counts): (Vec<_>, Vec<_>) = rayon::broadcast(take).into_iter().unzip();
     let finished: Vec<T> = finished.into_iter().flatten().collect();
-    let complete = finished.len() == tiles.len();
+    let complete = finished.len() == all.len();
     (finished, counts, complete)
 }
 
@@ -300,6 +327,37 @@ impl Tile {
         })
     }
 
+    /// Its pixels that follow each other in a row, in the order of [`Self::places`]: the first of each run, and how many.
+    pub(super) fn runs(self) -> impl Iterator<Item = ((u32, u32), usize)> {
+        let starts = |from: u32, to: u32| (from..to).step_by(BLOCK as usize);
+        starts(self.y0, self.y1).flat_map(move |y0| {
+            starts(self.x0, self.x1).flat_map(move |x0| {
+                let count = (self.x1 - x0).min(BLOCK) as usize;
+                (y0..(y0 + BLOCK).min(self.y1)).map(move |y| ((x0, y), count))
+            })
+        })
+    }
+
+    /// The number of a pixel of it in the order of [`Self::places`].
+    pub(super) fn number(self, (x, y): (u32, u32)) -> usize {
+        let (across, down) = ((x - self.x0) / BLOCK * BLOCK, (y - self.y0) / BLOCK * BLOCK);
+        let rows = (self.y1 - self.y0 - down).min(BLOCK);
+        let columns = (self.x1 - self.x0 - across).min(BLOCK);
+        let before = down * (self.x1 - self.x0) + rows * across;
+        (before + (y - self.y0 - down) * columns + (x - self.x0 - across)) as usize
+    }
+
+    /// What is left of it around a tile in it: above, below, left and right of that.
+    pub(super) fn without(self, inner: Self) -> impl Iterator<Item = Self> + Clone {
+        let parts = [
+            Self { y1: inner.y0, ..self },
+            Self { y0: inner.y1, ..self },
+            Self { x1: inner.x0, ..Self { x0: self.x0, ..inner } },
+            Self { x0: inner.x1, ..Self { x1: self.x1, ..inner } },
+        ];
+        parts.into_iter().filter(|part| part.pixels() > 0)
+    }
+
     /// How many pixels it has.
     pub(super) fn pixels(self) -> usize {
         (self.x1 - self.x0) as usize * (self.y1 - self.y0) as usize
@@ -323,17 +381,15 @@ impl Tile {
 impl TilePixels {
     /// Nothing yet.
     pub(super) fn empty(tile: Tile) -> Self {
-        Self { tile, beauty: Vec::new(), layers: Vec::new(), facts: Vec::new(), rays: 0, rays_around: 0 }
-    }
-
-    fn store(&self, picture: &mut Picture) {
-        self.tile.places().enumerate().for_each(|(k, (x, y))| {
-            let i = y as usize * picture.width as usize + x as usize;
-            picture.beauty[i] = self.beauty[k];
-            if let (Some(layers), Some(pixel)) = (&mut picture.layers, self.layers.get(k)) {
-                pixel.store(layers, i);
-            }
-        });
+        Self {
+            tile,
+            beauty: Vec::new(),
+            layers: Vec::new(),
+            facts: Vec::new(),
+            rays: 0,
+            rays_around: 0,
+            rays_beyond: 0,
+        }
     }
 }
 
@@ -383,5 +439,35 @@ impl Ball {
         let radius = 0.5 * (hi - lo).length();
         let usable = context.scene.planes.is_empty() && radius.is_finite();
         Self { center: lo * 0.5 + hi * 0.5, radius: if usable { radius } else { f64::INFINITY } }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_runs_and_numbers_of_a_tile_are_in_one_order() {
+        for (x0, y0, x1, y1) in [(0, 0, 32, 32), (32, 64, 37, 71), (5, 3, 6, 9), (30, 30, 66, 66)] {
+            let tile = Tile { x0, y0, x1, y1 };
+            let places: Vec<(u32, u32)> = tile.places().collect();
+            assert_eq!(places.len(), tile.pixels());
+            assert!(places.iter().enumerate().all(|(i, &at)| tile.number(at) == i), "{tile:?}");
+            let along = |((x, y), count): ((u32, u32), usize)| (x..).take(count).map(move |x| (x, y));
+            assert!(tile.runs().flat_map(along).eq(places), "{tile:?}");
+        }
+    }
+
+    #[test]
+    fn around_a_tile_is_every_pixel_that_is_not_in_it_and_none_twice() {
+        let outer = Tile { x0: 3, y0: 5, x1: 13, y1: 12 };
+        for (x0, y0, x1, y1) in [(5, 7, 11, 10), (3, 5, 9, 12), (3, 6, 13, 12), (3, 5, 13, 12)] {
+            let inner = Tile { x0, y0, x1, y1 };
+            let mut around: Vec<(u32, u32)> = outer.without(inner).flat_map(Tile::places).collect();
+            around.sort_unstable();
+            let mut expected: Vec<(u32, u32)> = outer.places().filter(|&at| !inner.contains(at)).collect();
+            expected.sort_unstable();
+            assert_eq!(around, expected, "{inner:?}");
+        }
     }
 }

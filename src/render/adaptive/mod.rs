@@ -51,32 +51,35 @@ pub(super) fn render<A: Accel, P: Observer>(
     }
 }
 
-/// Renders all tiles, given row by row; what came of them, the counts of all threads, and whether nothing was cut short.
+/// Renders all tiles, given row by row, and has each kept that is finished; the counts of all threads, and whether nothing was
+/// cut short.
 pub(super) fn render_all<A: Accel, P: Observer>(
     frame: &Frame,
     how: &Adaptive,
     (context, accel): (&Context, &A),
     progress: &dyn Progress,
     tiles: &[Tile],
-) -> (Vec<TilePixels>, Vec<ByClass<P>>, bool) {
+    keep: &(impl Fn(TilePixels) + Sync),
+) -> (Vec<ByClass<P>>, bool) {
     let judge = Judge::new(frame, how);
     let tracer = |_| Mutex::new(Tracer::<_, P>::new(context, accel, progress));
     let tracers: Vec<_> = (0..rayon::current_num_threads()).map(tracer).collect();
     let crew = Crew { frame, tracers };
     let columns = tiles.iter().take_while(|tile| tile.y0 == tiles[0].y0).count().max(1);
-    let (mut finished, mut above) = (Vec::with_capacity(tiles.len()), Vec::new());
+    let (mut finished, mut above) = (0, Vec::new());
     for tiles_of_band in tiles.chunks(columns * BAND.div_ceil(columns)) {
         let mut band = Band::new(tiles_of_band, columns, how, &above, frame.settings.layers);
         if crew.finish(&mut band, &judge).is_none() {
             break;
         }
         above = band.lower_border();
-        finished.par_extend(band.plots.par_iter().map(|plot| plot.gather(frame)));
-        progress.tiles(finished.len(), tiles.len());
+        band.plots.par_iter().for_each(|plot| keep(plot.gather(frame)));
+        finished += tiles_of_band.len();
+        progress.tiles(finished, tiles.len());
     }
-    let complete = finished.len() == tiles.len();
+    let complete = finished == tiles.len();
     let counts = crew.tracers.into_iter().filter_map(|tracer| tracer.into_inner().ok()).map(|tracer| tracer.counts);
-    (finished, counts.collect(), complete)
+    (counts.collect(), complete)
 }
 
 /// A tracer for each thread.

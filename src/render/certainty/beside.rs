@@ -3,10 +3,11 @@
 //! The formulas of `frame` and of the developer are called in loops over pixels, of which the compiler makes lanes. So a
 //! pixel has the same bits beside any others, on every instruction set.
 
-use super::{Certainty, GROUPS, Range, Seen};
+use super::{Certainty, GROUPS, Range, Seen, Shown};
 use crate::math::simd::{Kernel, Simd};
 use crate::math::{Vec3, Vec4};
 use crate::render::frame::Sum;
+use crate::render::whitted::Sample;
 
 /// Pixels that are looked at together.
 const PIXELS: usize = 16;
@@ -77,6 +78,26 @@ impl Certainty<'_> {
         mut tell: impl FnMut(f32),
     ) {
         self.look_at_each(pixels, false, |found, i| tell(found.error[i]));
+    }
+
+    /// Appends what each of these single samples shows.
+    pub(in crate::render) fn see_samples(&self, samples: &[Sample], to: &mut Shown) {
+        let mut beside = Beside::new();
+        let mut last: &[Sample] = &[];
+        for some in samples.chunks(PIXELS) {
+            // Large parts of a picture are one colour.
+            if some != last {
+                for (i, sample) in some.iter().enumerate() {
+                    beside.sums[0].set(i, Sum::of(sample));
+                }
+                self.level.run(See { judge: self, sums: &beside.sums[..1], to: &mut beside.seen });
+                last = some;
+            }
+            for (column, row) in to.colors.iter_mut().zip(&beside.seen.color) {
+                column.extend_from_slice(&row[..some.len()]);
+            }
+            to.brightest.extend_from_slice(&beside.seen.brightest[..some.len()]);
+        }
     }
 
     fn look_at_each<'g>(

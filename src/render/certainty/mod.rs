@@ -12,6 +12,7 @@
 
 mod beside;
 mod confidence;
+mod even;
 
 use super::ErrorSpace;
 use super::frame::Sum;
@@ -19,6 +20,7 @@ use crate::image::{Developer, Output};
 use crate::math::simd::Level;
 use crate::math::{Vec3, Vec4};
 pub(in crate::render) use confidence::factor;
+pub(in crate::render) use even::{Even, Shown};
 
 /// Groups of a pixel's samples.
 pub(super) const GROUPS: usize = 8;
@@ -70,7 +72,7 @@ impl<'a> Certainty<'a> {
 
     /// Whether what makes a pixel uneven is thinner than it: of the nine pixels around and with it hardly any is of one of the
     /// colours that it lies between. An edge has at least three on each side.
-    pub(super) fn is_thin<'s>(&self, own: &Range, around: impl Iterator<Item = &'s Seen>) -> bool {
+    pub(super) fn is_thin(&self, own: &Range, around: impl Iterator<Item = Seen>) -> bool {
         let (wide, middle) = (own.most - own.least, (own.least + own.most) * 0.5);
         let channel = (0..self.channels()).fold(0, |most, c| if wide[c] > wide[most] { c } else { most });
         let (mut above, mut below) = (0, 0);
@@ -113,23 +115,17 @@ impl<'a> Certainty<'a> {
 
     /// Whether a pixel of so many samples looks so different from one beside it that something may lie between them.
     pub(super) fn differ(&self, a: Vec4, b: Vec4, samples: u32) -> bool {
-        // Times the error that is allowed. Few samples must show next to the same, as they tell nothing else; more may differ,
-        // for shading changes slower than that from pixel to pixel.
-        let steep = match samples {
+        (a - b).abs().cmpgt(Vec4::splat(Self::steep(samples) * self.error)).any()
+    }
+
+    /// How many times the error that is allowed pixels of so many samples may differ. Few must show next to the same, as they
+    /// tell nothing else; more may differ, for shading changes slower than that from pixel to pixel.
+    const fn steep(samples: u32) -> f32 {
+        match samples {
             1 => 0.25,
             2..SURE => 1.0,
             _ => 8.0,
-        };
-        (a - b).abs().cmpgt(Vec4::splat(steep * self.error)).any()
-    }
-
-    /// Standard error of a pixel of one sample, the root of the mean over its channels, from the range of nine samples: of it and
-    /// of the pixels beside it, which lie farther apart than it is wide.
-    pub(super) fn error_within(&self, nine: &Range) -> f32 {
-        /// What nine numbers lie between is so many times their standard deviation (L. H. C. Tippett, "On the Extreme
-        /// Individuals and the Range of Samples Taken from a Normal Population", 1925).
-        const RANGE: f32 = 2.970;
-        self.contrast(nine) / RANGE
+        }
     }
 
     /// What part of the error that is allowed a pixel with this standard error uses, when around it there is such a
@@ -231,23 +227,14 @@ mod tests {
         let judge = Certainty::new(None, None, false, 0.01, factor(0.95));
         let seen = |colors: [f32; 9]| colors.map(|light| see(&judge, &[grey(light, 1.0)]));
         let own = see(&judge, &[grey(0.0, 1.0), grey(1.0, 1.0)]);
-        let is_thin = |colors: [f32; 9]| judge.is_thin(&own.range, seen(colors).iter());
+        let is_thin = |colors: [f32; 9]| judge.is_thin(&own.range, seen(colors).into_iter());
         assert!(!is_thin([0.0, 0.0, 0.0, 0.3, 0.5, 0.9, 1.0, 1.0, 1.0]));
         assert!(is_thin([0.0, 0.0, 0.0, 0.3, 0.5, 0.9, 0.0, 0.0, 0.0]));
         assert!(is_thin([1.0, 1.0, 1.0, 1.0, 0.5, 1.0, 1.0, 1.0, 1.0]));
         // At the border of the picture, an edge with nothing behind it.
         let mut at_border = seen([0.0, 0.0, 0.0, 0.0, 0.5, 0.0, 1.0, 1.0, 1.0]);
         at_border[6..].fill(Seen::NOTHING);
-        assert!(judge.is_thin(&own.range, at_border.iter()));
-    }
-
-    #[test]
-    fn a_single_sample_is_as_certain_as_those_around_it_lie_together() {
-        let judge = Certainty::new(None, None, false, 0.01, factor(0.95));
-        let seen = |colors: [f32; 9]| colors.map(|light| see(&judge, &[grey(light, 1.0)]));
-        let nine = seen([0.0, 0.1, 0.2, 0.3, 0.3, 0.3, 0.3, 0.3, 0.2]);
-        let range = nine.iter().fold(Range::NOTHING, |all, seen| all.with(seen.range));
-        assert!((judge.error_within(&range) - 0.3 / 2.97).abs() < 1e-6);
+        assert!(judge.is_thin(&own.range, at_border.into_iter()));
     }
 
     #[test]

@@ -1,9 +1,9 @@
 //! The first two coordinates of many points at a time.
 //!
-//! The same numbers as [`Points::at`] gives, without its tables: of these two dimensions the bits of a point are a formula of
+//! The same numbers as [`super::point`] gives, without its tables: of these two dimensions the bits of a point are a formula of
 //! the bits of its index, which the compiler turns into lanes.
 
-use super::{Points, turned};
+use super::{mix, turned};
 use crate::math::simd::{Kernel, LANES, Level, Simd};
 
 /// Points that are found at a time.
@@ -14,27 +14,21 @@ pub(in crate::render) struct Many {
     count: usize,
     index: [u32; RUN],
     key: [u32; RUN],
-    axes: [[u32; RUN]; 2],
     found: [[f64; RUN]; 2],
 }
 
 impl Default for Many {
     fn default() -> Self {
-        Self { count: 0, index: [0; RUN], key: [0; RUN], axes: [[0; RUN]; 2], found: [[0.0; RUN]; 2] }
+        Self { count: 0, index: [0; RUN], key: [0; RUN], found: [[0.0; RUN]; 2] }
     }
 }
 
 impl Many {
     /// Appends a point of each of these keys, which are told with its index.
-    pub(in crate::render) fn find(
-        &mut self,
-        wanted: impl Iterator<Item = (Points<2>, u32)>,
-        found: &mut Vec<[f64; 2]>,
-    ) {
-        wanted.for_each(|(points, index)| {
+    pub(in crate::render) fn find(&mut self, wanted: impl Iterator<Item = (u32, u32)>, found: &mut Vec<[f64; 2]>) {
+        wanted.for_each(|(key, index)| {
             let at = self.count % RUN;
-            (self.index[at], self.key[at]) = (index, points.key);
-            (self.axes[0][at], self.axes[1][at]) = (points.axes[0], points.axes[1]);
+            (self.index[at], self.key[at]) = (index, key);
             self.count += 1;
             if self.count == RUN {
                 self.flush(found);
@@ -58,11 +52,11 @@ impl Kernel for Scatter<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Many { count, index, key, axes: [across, down], found: [x, y] } = self.0;
+        let Many { count, index, key, found: [x, y] } = self.0;
         for i in 0..count.next_multiple_of(LANES).min(RUN) {
             let index = turned(index[i].reverse_bits(), key[i]).reverse_bits();
-            x[i] = fraction(turned(index, across[i]).reverse_bits());
-            y[i] = fraction(turned(shifted(index), down[i]).reverse_bits());
+            x[i] = fraction(turned(index, mix(key[i], 1)).reverse_bits());
+            y[i] = fraction(turned(shifted(index), mix(key[i], 2)).reverse_bits());
         }
     }
 }
@@ -85,18 +79,17 @@ fn shifted(mut index: u32) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::mix;
+    use super::super::point;
     use super::*;
 
     #[test]
     fn many_points_are_those_of_one_by_one() {
         let (mut many, mut found) = (Many::default(), Vec::new());
         for count in [0, 1, 63, 64, 65, 500] {
-            let wanted =
-                (0..count).map(|i| (Points::of(mix(3, i)), if i % 3 == 0 { i } else { mix(4, i) >> (i % 32) }));
+            let wanted = (0..count).map(|i| (mix(3, i), if i % 3 == 0 { i } else { mix(4, i) >> (i % 32) }));
             found.clear();
             many.find(wanted.clone(), &mut found);
-            assert!(found.iter().copied().eq(wanted.map(|(points, index)| points.at(index))), "{count}");
+            assert!(found.iter().copied().eq(wanted.map(|(key, index)| point::<2>(index, key))), "{count}");
         }
     }
 }

@@ -91,6 +91,7 @@ fn turned(mut x: u32, key: u32) -> u32 {
 }
 
 /// Thirty-two bits that two numbers decide, no part of which shows in them.
+#[inline(always)]
 pub(super) fn mix(a: u32, b: u32) -> u32 {
     // The finalizer of A. Appleby's MurmurHash3 (2011), once for each word.
     let stir = |mut x: u32| {
@@ -103,34 +104,14 @@ pub(super) fn mix(a: u32, b: u32) -> u32 {
     stir(stir(a.wrapping_add(0x9e37_79b9)).wrapping_add(b).wrapping_mul(0x9e37_79b1))
 }
 
-/// The points of a key.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Points<const N: usize> {
-    key: u32,
-    /// What scrambles each axis.
-    axes: [u32; N],
-}
-
-impl<const N: usize> Points<N> {
-    #[inline]
-    pub(super) fn of(key: u32) -> Self {
-        #[expect(clippy::cast_possible_truncation, reason = "a small number")]
-        Self { key, axes: std::array::from_fn(|d| mix(key, d as u32 + 1)) }
-    }
-
-    /// The `index`th point of the sequence, each coordinate 0 ≤ x < 1; the first 2ᵏ points of every key lie in different
-    /// cells of each division of the first two axes into 2ᵏ.
-    #[inline]
-    pub(super) fn at(&self, index: u32) -> [f64; N] {
-        // A permutation that keeps aligned runs of 2ᵏ together.
-        let index = scramble(index, self.key);
-        std::array::from_fn(|d| f64::from(scramble(sobol(index, d), self.axes[d])) / 4_294_967_296.0)
-    }
-}
-
-/// The `index`th of a key's [`Points`].
+/// The `index`th point of a key's sequence, each coordinate 0 ≤ x < 1; the first 2ᵏ points of every key lie in different cells
+/// of each division of the first two axes into 2ᵏ.
 pub(super) fn point<const N: usize>(index: u32, key: u32) -> [f64; N] {
-    Points::of(key).at(index)
+    // A permutation that keeps aligned runs of 2ᵏ together.
+    let index = scramble(index, key);
+    #[expect(clippy::cast_possible_truncation, reason = "a small number")]
+    let axis = |d: usize| f64::from(scramble(sobol(index, d), mix(key, d as u32 + 1))) / 4_294_967_296.0;
+    std::array::from_fn(axis)
 }
 
 #[cfg(test)]

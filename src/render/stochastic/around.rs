@@ -6,32 +6,33 @@
 //! looked at as closely, and those near them if they are uneven, too ([`Around::reopen`]).
 
 use super::pixel::Pixel;
-use crate::render::certainty::{Certainty, GROUPS, Range, Seen};
-use crate::render::tile::{End, Tile};
+use crate::render::certainty::{Certainty, Even, GROUPS, Range, Seen, Shown};
+use crate::render::tile::Tile;
 
 /// How many columns and rows from a pixel others are looked at as closely: from one on an edge, and from one with something
 /// thin, of which the next pixels may well show nothing.
-const REACH: [usize; 2] = [1, 4];
+const REACH: [u32; 2] = [1, 4];
 
-/// What the first samples of a tile and of the pixels around it show.
+/// The number of no pixel.
+const NONE: usize = usize::MAX;
+
+/// What the samples of a tile and of the pixels around it show.
 pub(super) struct Around {
-    tile: Tile,
-    /// Row by row, with a place on every side where there is nothing.
-    seen: Vec<Seen>,
-    /// The pixels' numbers, likewise; where there is nothing, one that no pixel has.
+    /// All of these pixels.
+    pub tile: Tile,
+    /// What single samples show, row by row, with a place on every side where there is nothing.
+    pub shown: Shown,
+    /// Numbers of pixels that have more of them, or none yet, likewise.
     numbers: Vec<usize>,
+    /// What those pixels show, by number.
+    seen: Vec<Seen>,
 }
 
 impl Around {
-    /// Nothing yet of these pixels, which are all of `tile`.
-    pub(super) fn new(tile: Tile, pixels: &[Pixel]) -> Self {
+    /// Nothing yet.
+    pub(super) fn new(tile: Tile) -> Self {
         let places = (tile.x1 - tile.x0 + 2) as usize * (tile.y1 - tile.y0 + 2) as usize;
-        let mut around = Self { tile, seen: vec![Seen::NOTHING; places], numbers: vec![usize::MAX; places] };
-        for (number, pixel) in pixels.iter().enumerate() {
-            let at = around.at(pixel);
-            around.numbers[at] = number;
-        }
-        around
+        Self { tile, shown: Shown::nothing(places), numbers: vec![NONE; places], seen: Vec::new() }
     }
 
     fn columns(&self) -> usize {
@@ -39,79 +40,87 @@ impl Around {
     }
 
     /// The place of a pixel.
-    fn at(&self, pixel: &Pixel) -> usize {
-        (pixel.y - self.tile.y0 + 1) as usize * self.columns() + (pixel.x - self.tile.x0 + 1) as usize
+    pub(super) fn at(&self, (x, y): (u32, u32)) -> usize {
+        (y - self.tile.y0 + 1) as usize * self.columns() + (x - self.tile.x0 + 1) as usize
     }
 
-    /// Where the three rows of three begin that have a place in their middle.
-    fn rows(&self, at: usize) -> [usize; 3] {
-        [at - self.columns() - 1, at - 1, at + self.columns() - 1]
+    /// Which of these pixels that have one sample are done, and how certain they are then: those that look as all beside them.
+    pub(super) fn even(&self, judge: &Certainty, tile: Tile) -> Even {
+        let row = |y: u32| {
+            let start = self.at((tile.x0, y));
+            start..start + (tile.x1 - tile.x0) as usize
+        };
+        judge.compare(&self.shown, self.columns(), (tile.y0..tile.y1).map(row))
+    }
+
+    /// Knows a pixel by its number, all smaller ones of which are known.
+    pub(super) fn number(&mut self, pixel: (u32, u32), number: usize) {
+        let at = self.at(pixel);
+        self.numbers[at] = number;
+        self.seen.push(self.shown.at(at));
     }
 
     /// What is seen at a place and beside it.
-    #[inline(always)]
-    fn near(&self, at: usize) -> impl Iterator<Item = &Seen> + Clone {
-        self.rows(at).into_iter().flat_map(|start| &self.seen[start..start + 3])
+    fn near(&self, at: usize) -> impl Iterator<Item = Seen> + Clone {
+        let rows = [at - self.columns(), at, at + self.columns()];
+        let places = rows.into_iter().flat_map(|middle| middle - 1..middle + 2);
+        places.map(|at| self.seen.get(self.numbers[at]).copied().unwrap_or_else(|| self.shown.at(at)))
+    }
+
+    /// What the samples at a pixel and beside it lie between.
+    pub(super) fn range(&self, pixel: (u32, u32)) -> Range {
+        self.near(self.at(pixel)).fold(Range::NOTHING, |all, seen| all.with(seen.range))
     }
 
     /// Looks at the samples of these pixels, of which each has as many, up to as many as there are groups.
     pub(super) fn see(&mut self, judge: &Certainty, pixels: &[Pixel], some: &[usize]) {
         let mut each = some.iter();
         judge.see_each(some.iter().map(|&i| pixels[i].taken()), |seen| {
-            let at = each.next().map_or(0, |&i| self.at(&pixels[i]));
-            self.seen[at] = *seen;
+            each.next().into_iter().for_each(|&i| self.seen[i] = *seen);
         });
     }
 
-    /// The numbers at all places that are at most so many columns and rows from one.
-    fn numbers_within(&self, reach: usize, at: usize) -> impl Iterator<Item = &usize> {
-        let (columns, middle, row) = (self.columns(), at % self.columns(), at / self.columns());
-        let across = middle.saturating_sub(reach)..(middle + reach + 1).min(columns);
-        let rows = self.numbers.chunks(columns).skip(row.saturating_sub(reach)).take(row.min(reach) + 1 + reach);
-        rows.flat_map(move |row| &row[across.clone()])
-    }
-
-    /// The pixels that were done with `samples` samples and lie near uneven ones of these; they are not done any more.
-    pub(super) fn reopen(&self, judge: &Certainty, pixels: &mut [Pixel], some: &[usize], samples: u32) -> Vec<usize> {
-        let mut reopened = Vec::new();
+    /// Opens the pixels of `tile` that were done with one sample and lie near uneven ones of these; their numbers.
+    pub(super) fn reopen(
+        &mut self,
+        judge: &Certainty,
+        pixels: &mut Vec<Pixel>,
+        some: &[usize],
+        tile: Tile,
+        open: impl Fn((u32, u32)) -> Pixel,
+    ) -> Vec<usize> {
+        let first = pixels.len();
         for &pixel in some {
-            let at = self.at(&pixels[pixel]);
-            if judge.agree(&self.seen[at].range) {
+            let own = self.seen[pixel].range;
+            if judge.agree(&own) {
                 continue;
             }
-            let is_thin = judge.is_thin(&self.seen[at].range, self.near(at));
-            let reach = REACH[usize::from(is_thin)];
-            for &number in self.numbers_within(reach, at) {
-                let Some(pixel) = pixels.get_mut(number) else { continue };
-                if pixel.facts.end == End::Met && pixel.facts.count == samples {
-                    pixel.facts.end = End::Ceiling;
-                    reopened.push(number);
+            let (x, y) = pixels[pixel].at;
+            let reach = REACH[usize::from(judge.is_thin(&own, self.near(self.at((x, y)))))];
+            for y in y.saturating_sub(reach).max(tile.y0)..(y + reach + 1).min(tile.y1) {
+                for x in x.saturating_sub(reach).max(tile.x0)..(x + reach + 1).min(tile.x1) {
+                    if self.numbers[self.at((x, y))] == NONE {
+                        self.number((x, y), pixels.len());
+                        pixels.push(open((x, y)));
+                    }
                 }
             }
         }
-        reopened
+        (first..pixels.len()).collect()
     }
 
     /// Finds the pixels of these that are done: their samples and those of the pixels beside them agree each among
     /// themselves, and both are of the same colours. Of the others it finds the contrast around them.
     pub(super) fn judge(&self, judge: &Certainty, pixels: &mut [Pixel], some: &[usize]) {
         for &i in some {
-            let pixel = &mut pixels[i];
-            let at = self.at(pixel);
-            let (own, samples) = (&self.seen[at], pixel.facts.count);
-            // Nearly all are calm, so that all are asked without asking whether one was not.
-            let is_calm = |calm: bool, seen: &Seen| {
-                calm & judge.agree(&seen.range) & !judge.differ(own.color, seen.color, samples)
-            };
-            let is_done = samples < GROUPS as u32 && self.near(at).fold(true, is_calm);
-            let range = || self.near(at).fold(Range::NOTHING, |all, seen| all.with(seen.range));
-            match (is_done, samples) {
-                (true, 1) => pixel.done(judge.error_within(&range())),
-                (true, _) => pixel.done(own.error),
-                (false, _) => {
-                    pixel.facts.error = own.error;
-                    pixel.surround(judge, &range());
-                }
+            let (own, pixel) = (&self.seen[i], &mut pixels[i]);
+            let (near, samples) = (self.near(self.at(pixel.at)), pixel.facts.count);
+            let is_calm = |seen: Seen| judge.agree(&seen.range) && !judge.differ(own.color, seen.color, samples);
+            if samples < GROUPS as u32 && near.clone().all(is_calm) {
+                pixel.done(own.error);
+            } else {
+                pixel.facts.error = own.error;
+                pixel.surround(judge, &self.range(pixel.at));
             }
         }
     }

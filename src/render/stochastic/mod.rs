@@ -3,30 +3,37 @@
 //!
 //! What decides about a pixel are its own samples, and in the first rounds those of the pixels beside it ([`around`]): a
 //! pixel that happens to see nothing of what its neighbours see goes on with them. Pixels around the tile are therefore
-//! sampled in these rounds too, by this tile for itself, since no tile may wait for another; that their rays are traced again
-//! is counted.
+//! looked at in these rounds, too. Their first samples come from the tiles that they belong to ([`shared`]); those of the
+//! second look are traced by this tile for itself, as they are few, and counted.
 
 mod around;
+mod first;
 mod pixel;
+mod places;
+mod shared;
 
 use super::Settings;
 use super::certainty::{Certainty, GROUPS, SURE, output};
-use super::frame::Frame;
+use super::frame::{Frame, resolve_each};
+use super::layers::LayerPixel;
 use super::observer::Observer;
 use super::sampling::Stochastic;
-use super::sobol;
-use super::tile::{End, TOGETHER, Tile, TilePixels};
+use super::tile::{End, PixelFacts, TOGETHER, Tile, TilePixels};
 use super::whitted::Tracer;
 use crate::accel::Accel;
+use crate::image::Output;
 use crate::scene::Background;
 use around::Around;
+use first::First;
 use pixel::Pixel;
+use places::Places;
+pub(super) use shared::render_all;
 use std::ops::Range;
 
 /// Samples at which variances are first relied on: one in each group.
 const FIRST_LOOK: u32 = GROUPS as u32;
 
-/// Renders one tile; `None` when cancelled.
+/// Renders one tile for itself; `None` when cancelled.
 pub(super) fn render<A: Accel, P: Observer>(
     frame: &Frame,
     how: &Stochastic,
@@ -34,49 +41,210 @@ pub(super) fn render<A: Accel, P: Observer>(
     tile: Tile,
 ) -> Option<TilePixels> {
     let output = output(how.space, frame.background);
-    let transparent = matches!(tracer.context.scene.background, None | Some(Background::Transparent));
-    let judge = Certainty::new(output.as_ref(), frame.background, transparent, how.error, frame.standard_errors);
-    let rounds: Vec<u32> = rounds(how, frame.settings).collect();
-    let rings = rings(tile, frame.settings, &rounds);
-    let mut pixels = pixels(&rings, frame.settings);
-    let mut around = Around::new(rings[rings.len() - 1], &pixels);
-    let mut active: Vec<usize> = (0..pixels.len()).collect();
-    let (mut from, mut errors) = (0, Vec::new());
-    for (round, &to) in rounds.iter().enumerate() {
-        trace(frame, how, tracer, &mut pixels, &active, from..to)?;
-        if round < looks(&rounds) {
-            around.see(&judge, &pixels, &active);
-            let mut news = if from > 0 { active.clone() } else { Vec::new() };
-            while !news.is_empty() {
-                news = around.reopen(&judge, &mut pixels[..rings[1].pixels()], &news, from);
-                trace(frame, how, tracer, &mut pixels, &news, from..to)?;
-                around.see(&judge, &pixels, &news);
-                active.extend(&news);
-            }
-            // Of the outermost pixels nobody knows what lies beyond.
-            let known = rings[rings.len().saturating_sub(round + 2)].pixels();
-            active.retain(|&i| i < known);
-            around.judge(&judge, &mut pixels, &active);
-        }
-        if to >= FIRST_LOOK {
-            look(&judge, &mut pixels, &active, &mut errors);
-        }
-        active.retain(|&i| pixels[i].facts.end == End::Ceiling);
-        from = to;
+    let sampler = Sampler::new(frame, how, output.as_ref(), tracer.context.scene.background);
+    if !sampler.starts_with_one() {
+        return sampler.finish(tracer, tile, &[]);
     }
-    let rays = |pixels: &[Pixel]| pixels.iter().map(|pixel| u64::from(pixel.facts.count)).sum::<u64>();
-    let rays_around = rays(&pixels[tile.pixels()..]);
-    pixels.truncate(tile.pixels());
-    let rays = rays(&pixels) + rays_around;
-    let view = frame.view;
-    Some(TilePixels {
-        tile,
-        beauty: pixels.iter().map(|pixel| pixel.sum().resolve(frame.background)).collect(),
-        layers: pixels.iter().filter_map(|pixel| Some(pixel.layers.as_ref()?.pixel(view.eye, view.forward))).collect(),
-        facts: pixels.iter().map(|pixel| pixel.facts).collect(),
-        rays,
-        rays_around,
-    })
+    let outermost = sampler.grown(tile, sampler.reach());
+    let first = sampler.first(tracer, std::iter::once(tile).chain(outermost.without(tile)))?;
+    let mut done = sampler.finish(tracer, tile, &first.iter().collect::<Vec<_>>())?;
+    done.rays_beyond = (outermost.pixels() - tile.pixels()) as u64;
+    done.rays += done.rays_beyond;
+    Some(done)
+}
+
+/// What samples all tiles of a picture.
+struct Sampler<'a> {
+    frame: &'a Frame<'a>,
+    how: &'a Stochastic,
+    judge: Certainty<'a>,
+    /// Samples of a pixel after each round.
+    rounds: Vec<u32>,
+}
+
+impl<'a> Sampler<'a> {
+    fn new(frame: &'a Frame, how: &'a Stochastic, output: Option<&'a Output>, background: Option<Background>) -> Self {
+        let transparent = matches!(background, None | Some(Background::Transparent));
+        let judge = Certainty::new(output, frame.background, transparent, how.error, frame.standard_errors);
+        Self { frame, how, judge, rounds: rounds(how, frame.settings).collect() }
+    }
+
+    /// Whether all pixels get a single sample at first.
+    fn starts_with_one(&self) -> bool {
+        self.rounds[0] == 1
+    }
+
+    /// How far around a tile pixels are looked at: one farther for each look that decides something, which none does after the
+    /// last round.
+    fn reach(&self) -> usize {
+        looks(&self.rounds).min(self.rounds.len() - 1)
+    }
+
+    /// A tile with so many rings of pixels around it.
+    fn grown(&self, tile: Tile, rings: usize) -> Tile {
+        let Settings { width, height, .. } = *self.frame.settings;
+        (0..rings).fold(tile, |tile, _| tile.grown(width, height))
+    }
+
+    fn pixel(&self, at: (u32, u32)) -> Pixel {
+        Pixel::new(self.frame.settings.seed, at, self.frame.settings.layers)
+    }
+
+    /// Renders a tile, from the first samples of it and of all that is looked at around it where pixels start with one; `None`
+    /// when cancelled.
+    fn finish<A: Accel, P: Observer>(
+        &self,
+        tracer: &mut Tracer<A, P>,
+        tile: Tile,
+        first: &[&First],
+    ) -> Option<TilePixels> {
+        let Self { judge, rounds, .. } = self;
+        let reach = self.reach();
+        let mut around = Around::new(self.grown(tile, reach));
+        first.iter().for_each(|first| first.show(&mut around));
+        let known = self.grown(tile, reach.saturating_sub(1));
+        let (mut pixels, mut done) = (Vec::new(), TilePixels::empty(tile));
+        let start = if self.starts_with_one() {
+            self.take_first(first, &mut around, known, (&mut pixels, &mut done));
+            1
+        } else {
+            around.tile.places().for_each(|at| {
+                around.number(at, pixels.len());
+                pixels.push(self.pixel(at));
+            });
+            0
+        };
+        let (mut active, mut errors): (Vec<usize>, _) = ((0..pixels.len()).collect(), Vec::new());
+        let mut from = if start > 0 { 1 } else { 0 };
+        for (round, &to) in rounds.iter().enumerate().skip(start) {
+            self.trace(tracer, &mut pixels, &active, from..to)?;
+            if round < looks(rounds) {
+                around.see(judge, &pixels, &active);
+                let mut news = if from > 0 { active.clone() } else { Vec::new() };
+                while !news.is_empty() {
+                    let open = |at| self.opened(first, at);
+                    news = around.reopen(judge, &mut pixels, &news, known, open);
+                    self.trace(tracer, &mut pixels, &news, from..to)?;
+                    around.see(judge, &pixels, &news);
+                    active.extend(&news);
+                }
+                // Of the outermost pixels nobody knows what lies beyond.
+                let known = self.grown(tile, reach.saturating_sub(round + 1));
+                active.retain(|&i| known.contains(pixels[i].at));
+                around.judge(judge, &mut pixels, &active);
+            }
+            if to >= FIRST_LOOK {
+                look(judge, &mut pixels, &active, &mut errors);
+            }
+            active.retain(|&i| pixels[i].facts.end == End::Ceiling);
+            from = to;
+        }
+        self.put(&pixels, start, &mut done);
+        Some(done)
+    }
+
+    /// Takes what pixels of one sample are done, and opens the others, of those that are `known`.
+    fn take_first(
+        &self,
+        first: &[&First],
+        around: &mut Around,
+        known: Tile,
+        (pixels, done): (&mut Vec<Pixel>, &mut TilePixels),
+    ) {
+        let (frame, tile) = (self.frame, done.tile);
+        let even = around.even(&self.judge, known);
+        known.runs().for_each(|((x0, y), count)| {
+            let start = around.at((x0, y));
+            for (x, at) in (x0..).zip(start..start + count) {
+                if !even.is_even(at) {
+                    around.number((x, y), pixels.len());
+                    pixels.push(self.opened(first, (x, y)));
+                    let range = around.range((x, y));
+                    pixels.last_mut().into_iter().for_each(|pixel| pixel.surround(&self.judge, &range));
+                }
+            }
+        });
+        tile.runs().for_each(|(at, count)| {
+            let start = around.at(at);
+            let fact = |at| PixelFacts { count: 1, spare: 0, error: even.error(at), end: End::Met };
+            done.facts.extend((start..start + count).map(fact));
+        });
+        for own in first.iter().filter(|first| first.tile == tile) {
+            resolve_each(&own.samples, 1, frame.background, &mut done.beauty);
+            let layer = |facts| LayerPixel::new(std::slice::from_ref(facts), frame.view.eye, frame.view.forward);
+            done.layers.extend(own.facts.iter().map(layer));
+        }
+        done.rays = tile.pixels() as u64;
+    }
+
+    /// A pixel with its first sample.
+    fn opened(&self, first: &[&First], at: (u32, u32)) -> Pixel {
+        let mut pixel = self.pixel(at);
+        for first in first.iter().filter(|first| first.tile.contains(at)) {
+            let i = first.tile.number(at);
+            let facts = first.facts.get(i..=i).unwrap_or_default();
+            pixel.take(&first.samples[i..=i], facts, 1);
+        }
+        pixel
+    }
+
+    /// Puts pixels in their places, which are there where there were first samples; `start` of each are counted already.
+    fn put(&self, pixels: &[Pixel], start: usize, done: &mut TilePixels) {
+        let (frame, tile) = (self.frame, done.tile);
+        if start == 0 {
+            done.facts = vec![PixelFacts { count: 0, spare: 0, error: 0.0, end: End::Ceiling }; tile.pixels()];
+            done.beauty = vec![[0.0; 4]; tile.pixels()];
+            done.layers = vec![
+                LayerPixel::new(&[], frame.view.eye, frame.view.forward);
+                if frame.settings.layers { tile.pixels() } else { 0 }
+            ];
+        }
+        for pixel in pixels {
+            let rays = u64::from(pixel.facts.count) - start as u64;
+            done.rays += rays;
+            if !tile.contains(pixel.at) {
+                done.rays_around += rays;
+                continue;
+            }
+            let i = tile.number(pixel.at);
+            (done.beauty[i], done.facts[i]) = (pixel.sum().resolve(frame.background), pixel.facts);
+            if let Some(layers) = &pixel.layers {
+                done.layers[i] = layers.pixel(frame.view.eye, frame.view.forward);
+            }
+        }
+    }
+
+    /// Traces these samples of all active pixels, in batches.
+    fn trace<A: Accel, P: Observer>(
+        &self,
+        tracer: &mut Tracer<A, P>,
+        pixels: &mut [Pixel],
+        active: &[usize],
+        samples: Range<u32>,
+    ) -> Option<()> {
+        if samples.start as usize >= GROUPS {
+            active.iter().for_each(|&pixel| pixels[pixel].join_groups());
+        }
+        let in_group = (samples.end as usize).div_ceil(GROUPS);
+        let mut places = Places::default();
+        for some in active.chunks((TOGETHER / samples.len().max(1)).max(1)) {
+            for start in samples.clone().step_by(TOGETHER) {
+                let samples = start..samples.end.min(start + TOGETHER as u32);
+                let each = samples.len();
+                let wanted = some.iter().flat_map(|&pixel| {
+                    let pixel = &pixels[pixel];
+                    samples.clone().map(|i| pixel.wanted(i))
+                });
+                places.trace(self.frame, self.how, tracer, (wanted, some.len() * each))?;
+                for (k, &pixel) in some.iter().enumerate() {
+                    let of_pixel = k * each..(k + 1) * each;
+                    let facts = tracer.facts.get(of_pixel.clone()).unwrap_or_default();
+                    pixels[pixel].take(&tracer.samples[of_pixel], facts, in_group);
+                }
+            }
+        }
+        Some(())
+    }
 }
 
 /// Samples of a pixel after each round: the fewest, but then at least [`SURE`], then twice as many from round to round,
@@ -93,99 +261,6 @@ fn rounds(how: &Stochastic, settings: &Settings) -> impl Iterator<Item = u32> + 
 /// samples.
 fn looks(rounds: &[u32]) -> usize {
     if rounds[0] < SURE { 2 } else { 1 }
-}
-
-/// The tile, and around it what is sampled only to be looked at: a ring of pixels for each look that decides something, which
-/// none does after the last round.
-fn rings(tile: Tile, settings: &Settings, rounds: &[u32]) -> Vec<Tile> {
-    let grown = |ring: &Tile| Some(ring.grown(settings.width, settings.height));
-    std::iter::successors(Some(tile), grown).take(1 + looks(rounds).min(rounds.len() - 1)).collect()
-}
-
-/// Those of the tile in the order of its places, then those of each ring.
-fn pixels(rings: &[Tile], settings: &Settings) -> Vec<Pixel> {
-    let mut pixels = Vec::with_capacity(rings[rings.len() - 1].pixels());
-    for (k, ring) in rings.iter().enumerate() {
-        let is_new = |&at: &(u32, u32)| k == 0 || !rings[k - 1].contains(at);
-        let new = ring.places().filter(is_new);
-        // From inside the loops of places, which a `for` would leave and enter again for each.
-        new.for_each(|at| pixels.push(Pixel::new(settings.seed, at, settings.layers)));
-    }
-    pixels
-}
-
-/// Traces these samples of all active pixels, in batches.
-fn trace<A: Accel, P: Observer>(
-    frame: &Frame,
-    how: &Stochastic,
-    tracer: &mut Tracer<A, P>,
-    pixels: &mut [Pixel],
-    active: &[usize],
-    samples: Range<u32>,
-) -> Option<()> {
-    if samples.start as usize >= GROUPS {
-        active.iter().for_each(|&pixel| pixels[pixel].join_groups());
-    }
-    let in_group = (samples.end as usize).div_ceil(GROUPS);
-    let mut places = Places::default();
-    for some in active.chunks((TOGETHER / samples.len().max(1)).max(1)) {
-        for start in samples.clone().step_by(TOGETHER) {
-            let samples = start..samples.end.min(start + TOGETHER as u32);
-            trace_batch(frame, how, tracer, (pixels, some), (samples, in_group), &mut places)?;
-        }
-    }
-    Some(())
-}
-
-/// Where samples lie in their pixels; buffers.
-#[derive(Default)]
-struct Places {
-    many: sobol::Many,
-    squares: Vec<[f64; 2]>,
-}
-
-/// Traces the same samples of `some` pixels, of which so many go into each group, all together.
-fn trace_batch<A: Accel, P: Observer>(
-    frame: &Frame,
-    how: &Stochastic,
-    tracer: &mut Tracer<A, P>,
-    (pixels, some): (&mut [Pixel], &[usize]),
-    (samples, in_group): (Range<u32>, usize),
-    places: &mut Places,
-) -> Option<()> {
-    let each = samples.len();
-    tracer.reset(some.len() * each, frame.settings.layers);
-    let eye = frame.eye(tracer.center());
-    let all = &*pixels;
-    some.iter().for_each(|&pixel| tracer.streams.extend(samples.clone().map(|i| all[pixel].stream(i))));
-    if frame.settings.lens.is_some() {
-        let places = some.iter().flat_map(|&pixel| samples.clone().map(move |i| all[pixel].place_and_lens(how, i)));
-        tracer.eyes.send(&eye, places);
-    } else {
-        let Places { many, squares } = places;
-        squares.clear();
-        many.find(some.iter().flat_map(|&pixel| samples.clone().map(move |i| (all[pixel].places, i))), squares);
-        how.filter.place_each(squares.as_flattened_mut());
-        let places = some.iter().zip(squares.chunks(each)).flat_map(|(&pixel, squares)| {
-            let pixel = &all[pixel];
-            squares.iter().map(move |&place| pixel.place(place, [0.5; 2]))
-        });
-        tracer.eyes.send(&eye, places);
-    }
-    if !tracer.trace() {
-        return None;
-    }
-    for (k, &pixel) in some.iter().enumerate() {
-        let (pixel, of_pixel) = (&mut pixels[pixel], k * each..(k + 1) * each);
-        for (i, sample) in samples.clone().zip(&tracer.samples[of_pixel.clone()]) {
-            pixel.groups[i as usize / in_group].add(sample);
-        }
-        pixel.facts.count += samples.end - samples.start;
-        if let Some(layers) = &mut pixel.layers {
-            tracer.facts.get(of_pixel).into_iter().flatten().for_each(|facts| layers.add(facts));
-        }
-    }
-    Some(())
 }
 
 /// Finds out how certain the means of these pixels are.

@@ -1,22 +1,18 @@
 //! A pixel that is sampled until its mean is certain.
 
+use super::places::Wanted;
 use crate::render::certainty::{Certainty, GROUPS, Range};
-use crate::render::draws::Stream;
-use crate::render::eyes::Place;
 use crate::render::frame::{Sum, pixel_key};
-use crate::render::layers::LayerSum;
-use crate::render::sampling::Stochastic;
-use crate::render::sobol;
+use crate::render::layers::{Facts, LayerSum};
 use crate::render::tile::{End, PixelFacts};
+use crate::render::whitted::Sample;
 
 /// A pixel on its way.
 pub(super) struct Pixel {
-    pub x: u32,
-    pub y: u32,
+    /// Column and row.
+    pub at: (u32, u32),
     /// For all of its numbers.
     key: u32,
-    /// Where its samples lie.
-    pub places: sobol::Points<2>,
     /// Samples in the order of the sequence, the same number in each.
     pub groups: [Sum; GROUPS],
     /// If they are wanted.
@@ -29,19 +25,29 @@ pub(super) struct Pixel {
 }
 
 impl Pixel {
-    pub(super) fn new(seed: u64, (x, y): (u32, u32), layers: bool) -> Self {
-        let facts = PixelFacts { count: 0, spare: 0, error: 0.0, end: End::Ceiling };
-        let key = pixel_key(seed, (x, y));
+    pub(super) fn new(seed: u64, at: (u32, u32), layers: bool) -> Self {
         Self {
-            x,
-            y,
-            key,
-            places: sobol::Points::of(key),
+            at,
+            key: pixel_key(seed, at),
             groups: Default::default(),
             layers: layers.then(Box::default),
-            facts,
+            facts: PixelFacts { count: 0, spare: 0, error: 0.0, end: End::Ceiling },
             contrast: 0.0,
             brightest: 0.0,
+        }
+    }
+
+    /// Takes its first samples, or those that come next, of which so many go into each group.
+    pub(super) fn take(&mut self, samples: &[Sample], facts: &[Facts], in_group: usize) {
+        let start = self.facts.count as usize;
+        for (i, sample) in (start..).zip(samples) {
+            self.groups[i / in_group].add(sample);
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "far less than 2^32 samples")]
+        let count = samples.len() as u32;
+        self.facts.count += count;
+        if let Some(layers) = &mut self.layers {
+            facts.iter().for_each(|facts| layers.add(facts));
         }
     }
 
@@ -55,20 +61,9 @@ impl Pixel {
         (self.contrast, self.brightest) = (judge.contrast(range), range.brightest);
     }
 
-    /// The `i`th sample's numbers.
-    pub(super) fn stream(&self, i: u32) -> Stream {
-        Stream { key: self.key, index: i }
-    }
-
-    /// Where the `i`th sample goes through the picture and the lens. Its first two numbers are those without a lens.
-    pub(super) fn place_and_lens(&self, how: &Stochastic, i: u32) -> Place {
-        let [x, y, u, v] = sobol::point(i, self.key);
-        self.place([x, y].map(|number| how.filter.place(number)), [u, v])
-    }
-
-    /// The place so far from the pixel's upper left corner, seen through a point of the lens.
-    pub(super) fn place(&self, [x, y]: [f64; 2], lens: [f64; 2]) -> Place {
-        Place { x: f64::from(self.x) + x, y: f64::from(self.y) + y, lens }
+    /// The `index`th of its samples.
+    pub(super) fn wanted(&self, index: u32) -> Wanted {
+        Wanted { pixel: self.at, key: self.key, index }
     }
 
     /// Makes groups that hold as many samples as those that come next will.

@@ -1,7 +1,7 @@
 //! Eye rays, far eyes, layers, and cancelling.
 
 use super::*;
-use crate::render::{Progress, render};
+use crate::render::{Progress, Sampling, Stochastic, render};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 fn bumpy() -> Stage {
@@ -56,28 +56,35 @@ fn layers_of_nothing_say_so() {
 
 #[test]
 fn a_cancelled_picture_says_that_it_is_not_complete() {
-    struct After(usize, AtomicUsize);
+    /// So many of the steps that are done of so many.
+    struct After(usize, usize, AtomicUsize);
     impl Progress for After {
         fn tiles(&self, done: usize, total: usize) {
-            assert!(done <= total && total == 4);
-            self.1.fetch_max(done, Ordering::Relaxed);
+            assert!(done <= total && total == self.1);
+            self.2.fetch_max(done, Ordering::Relaxed);
         }
         fn cancelled(&self) -> bool {
-            self.1.load(Ordering::Relaxed) >= self.0
+            self.2.load(Ordering::Relaxed) >= self.0
         }
     }
     let s = bumpy();
     let world = World::new(&s.scene);
     let accel = AnyAccel::build(AccelKind::None, &world.shapes, &AccelParams::DEFAULT);
     let textures = TextureStore::new(&s.scene);
-    let settings = Settings { width: 64, height: 64, ..s.settings.clone() };
-    let job =
-        Job { scene: &s.scene, world: &world, accel: &accel, textures: &textures, view: &s.view, settings: &settings };
-    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
-    let cut = one_thread.install(|| render(&job, &After(1, AtomicUsize::new(0))));
-    assert!(!cut.complete);
-    let whole = one_thread.install(|| render(&job, &After(9, AtomicUsize::new(0))));
-    assert!(whole.complete);
-    assert_eq!(cut.picture.beauty[..32], whole.picture.beauty[..32]);
-    assert_eq!(cut.picture.beauty[64 * 64 - 1], [0.0; 4]);
+    // Of four tiles; those that are sampled stochastically are worked on twice.
+    for (sampling, first, steps) in [(Sampling::Uniform, 1, 4), (Sampling::Stochastic(Stochastic::default()), 5, 8)] {
+        let settings = Settings { width: 64, height: 64, sampling, ..s.settings.clone() };
+        let (scene, world, accel, textures, view, settings) = (&s.scene, &world, &accel, &textures, &s.view, &settings);
+        let job = Job { scene, world, accel, textures, view, settings };
+        for threads in [1, 3] {
+            let threads = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            let after = |done| threads.install(|| render(&job, &After(done, steps, AtomicUsize::new(0))));
+            let (cut, whole) = (after(first), after(9));
+            assert!(!cut.complete && whole.complete, "{sampling:?}");
+            if threads.current_num_threads() == 1 {
+                assert_eq!(cut.picture.beauty[..32], whole.picture.beauty[..32], "{sampling:?}");
+                assert_eq!(cut.picture.beauty[64 * 64 - 1], [0.0; 4], "{sampling:?}");
+            }
+        }
+    }
 }
