@@ -170,7 +170,7 @@ pub struct Job<'a> {
 
 /// Hears how far rendering has come, and may end it. Called from all threads.
 pub trait Progress: Sync {
-    /// `done` of `total` steps are finished: tiles, or parts of the work on them.
+    /// `done` of `total` tiles are finished.
     fn tiles(&self, done: usize, total: usize);
     /// Whether to stop; asked every few hundred rays.
     fn cancelled(&self) -> bool;

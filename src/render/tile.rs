@@ -252,8 +252,8 @@ pub(crate) enum Together {
     Pixel,
 }
 
-/// Has every tile, or part of the work on one, done by some thread, which take them in order: what came of them, what the
-/// threads counted, and whether that was all.
+/// Has every tile, however it is told, worked on by some thread, which take them in order: what came of them, what the threads
+/// counted, and whether that was all.
 pub(super) fn each_tile<A: Accel, P: Observer, W: Sync, T: Send>(
     context: &Context,
     accel: &A,
@@ -356,6 +356,22 @@ impl Tile {
             Self { x0: inner.x1, ..Self { x1: self.x1, ..inner } },
         ];
         parts.into_iter().filter(|part| part.pixels() > 0)
+    }
+
+    /// One of nine parts of a whole tile, row by row: its corners, a block wide and high, the sides between them and the middle.
+    /// A smaller tile may have nothing in some.
+    pub(super) fn zone(self, zone: usize) -> Self {
+        let part = |from: u32, to: u32, part: usize| {
+            let cuts = [from, from + BLOCK, from + TILE - BLOCK, from + TILE].map(|cut| cut.min(to));
+            (cuts[part], cuts[part + 1])
+        };
+        let ((x0, x1), (y0, y1)) = (part(self.x0, self.x1, zone % 3), part(self.y0, self.y1, zone / 3));
+        Self { x0, y0, x1, y1 }
+    }
+
+    /// Whether some pixel belongs to both.
+    pub(super) fn meets(self, other: Self) -> bool {
+        self.x0.max(other.x0) < self.x1.min(other.x1) && self.y0.max(other.y0) < self.y1.min(other.y1)
     }
 
     /// How many pixels it has.

@@ -80,8 +80,9 @@ impl Certainty<'_> {
         self.look_at_each(pixels, false, |found, i| tell(found.error[i]));
     }
 
-    /// Appends what each of these single samples shows.
-    pub(in crate::render) fn see_samples(&self, samples: &[Sample], to: &mut Shown) {
+    /// What each of these single samples shows.
+    pub(in crate::render) fn see_samples(&self, samples: &[Sample]) -> Shown {
+        let mut shown = Shown::with_capacity(samples.len());
         let mut beside = Beside::new();
         let mut last: &[Sample] = &[];
         for some in samples.chunks(PIXELS) {
@@ -93,11 +94,12 @@ impl Certainty<'_> {
                 self.level.run(See { judge: self, sums: &beside.sums[..1], to: &mut beside.seen });
                 last = some;
             }
-            for (column, row) in to.colors.iter_mut().zip(&beside.seen.color) {
+            for (column, row) in shown.colors.iter_mut().zip(&beside.seen.color) {
                 column.extend_from_slice(&row[..some.len()]);
             }
-            to.brightest.extend_from_slice(&beside.seen.brightest[..some.len()]);
+            shown.brightest.extend_from_slice(&beside.seen.brightest[..some.len()]);
         }
+        shown
     }
 
     fn look_at_each<'g>(

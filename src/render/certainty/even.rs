@@ -13,7 +13,6 @@ const PIXELS: usize = 16;
 const RANGE: f32 = 2.970;
 
 /// What single samples are written as: each number in a column of its own.
-#[derive(Default)]
 pub(in crate::render) struct Shown {
     /// RGB and alpha; not a number where nothing is known.
     pub(super) colors: [Vec<f32>; 4],
@@ -25,6 +24,11 @@ impl Shown {
     /// Nothing, so many times.
     pub(in crate::render) fn nothing(count: usize) -> Self {
         Self { colors: std::array::from_fn(|_| vec![f32::NAN; count]), brightest: vec![0.0; count] }
+    }
+
+    /// Room for so many.
+    pub(super) fn with_capacity(count: usize) -> Self {
+        Self { colors: std::array::from_fn(|_| Vec::with_capacity(count)), brightest: Vec::with_capacity(count) }
     }
 
     /// What is shown at a place.
@@ -40,7 +44,12 @@ impl Shown {
     pub(in crate::render) fn copy(&mut self, run: Run<usize>, from: &Self, start: usize) {
         let columns = self.colors.iter_mut().zip(&from.colors);
         for (column, from) in columns.chain(std::iter::once((&mut self.brightest, &from.brightest))) {
-            column[run.clone()].copy_from_slice(&from[start..start + run.len()]);
+            let (to, from) = (&mut column[run.clone()], &from[start..start + run.len()]);
+            // The usual run, without a call.
+            match (<&mut [f32; 4]>::try_from(&mut *to), <&[f32; 4]>::try_from(from)) {
+                (Ok(to), Ok(from)) => *to = *from,
+                _ => to.copy_from_slice(from),
+            }
         }
     }
 }
@@ -181,8 +190,7 @@ mod tests {
                     level: Level::best(),
                     ..Certainty::new(None, background, transparent, error, factor(0.95))
                 };
-                let mut shown = Shown::default();
-                judge.see_samples(&samples, &mut shown);
+                let shown = judge.see_samples(&samples);
                 let groups: Vec<[Sum; 1]> = samples.iter().map(|sample| [Sum::of(sample)]).collect();
                 let mut seen = Vec::new();
                 judge.see_each(groups.iter().map(|group| &group[..]), |one| seen.push(*one));

@@ -14,11 +14,10 @@ use crate::render::whitted::{Sample, Tracer};
 /// One sample of every pixel of a part of the picture.
 pub(super) struct First {
     pub tile: Tile,
-    /// In the order of the tile's places.
+    /// In the order of the tile's places, as all of this.
     pub samples: Vec<Sample>,
-    /// The same of what layers are made of; empty unless they are wanted.
+    /// What layers are made of; empty unless they are wanted.
     pub facts: Vec<Facts>,
-    /// Row by row.
     shown: Shown,
 }
 
@@ -29,10 +28,11 @@ impl Sampler<'_> {
         tracer: &mut Tracer<A, P>,
         tiles: impl Iterator<Item = Tile> + Clone,
     ) -> Option<Vec<First>> {
-        let (mut pixels, mut keys) = (Vec::new(), Vec::new());
+        let count = tiles.clone().map(Tile::pixels).sum();
+        let (mut pixels, mut keys) = (Vec::with_capacity(count), Vec::with_capacity(count));
         tiles.clone().for_each(|tile| tile.places().for_each(|at| pixels.push(at)));
         pixel_keys(self.frame.settings.seed, &pixels, &mut keys);
-        let (mut samples, mut facts) = (Vec::with_capacity(pixels.len()), Vec::new());
+        let (mut samples, mut facts) = (Vec::with_capacity(count), Vec::new());
         let mut places = Places::default();
         for (pixels, keys) in pixels.chunks(TOGETHER).zip(keys.chunks(TOGETHER)) {
             let wanted = pixels.iter().zip(keys).map(|(&pixel, &key)| Wanted { pixel, key, index: 0 });
@@ -40,19 +40,12 @@ impl Sampler<'_> {
             samples.extend_from_slice(&tracer.samples);
             facts.extend_from_slice(&tracer.facts);
         }
-        let (mut samples, mut facts) = (samples.into_iter(), facts.into_iter());
+        let mut end = 0;
         let each = tiles.map(|tile| {
-            let samples: Vec<Sample> = samples.by_ref().take(tile.pixels()).collect();
-            let mut in_places = Shown::default();
-            self.judge.see_samples(&samples, &mut in_places);
-            let mut shown = Shown::nothing(tile.pixels());
-            let mut from = 0;
-            for ((x, y), count) in tile.runs() {
-                let to = ((y - tile.y0) * (tile.x1 - tile.x0) + x - tile.x0) as usize;
-                shown.copy(to..to + count, &in_places, from);
-                from += count;
-            }
-            First { tile, samples, facts: facts.by_ref().take(tile.pixels()).collect(), shown }
+            let own = end..end + tile.pixels();
+            end = own.end;
+            let (samples, facts) = (samples[own.clone()].to_vec(), facts.get(own).unwrap_or_default().to_vec());
+            First { tile, shown: self.judge.see_samples(&samples), samples, facts }
         });
         Some(each.collect())
     }
@@ -61,12 +54,15 @@ impl Sampler<'_> {
 impl First {
     /// Copies what it shows of what lies around a tile.
     pub(super) fn show(&self, around: &mut Around) {
-        let (own, to) = (self.tile, around.tile);
-        let columns = own.x0.max(to.x0)..own.x1.min(to.x1);
-        for y in own.y0.max(to.y0)..own.y1.min(to.y1) {
-            let start = around.at((columns.start, y));
-            let from = (y - own.y0) * (own.x1 - own.x0) + columns.start - own.x0;
-            around.shown.copy(start..start + columns.len(), &self.shown, from as usize);
-        }
+        let (left, right) = (around.tile.x0, around.tile.x1);
+        let mut from = 0;
+        self.tile.runs().for_each(|((x, y), count)| {
+            let (start, end) = (x.max(left), (x + count as u32).min(right));
+            if start < end && around.tile.contains((start, y)) {
+                let at = around.at((start, y));
+                around.shown.copy(at..at + (end - start) as usize, &self.shown, from + (start - x) as usize);
+            }
+            from += count;
+        });
     }
 }

@@ -103,7 +103,7 @@ impl<'a> Sampler<'a> {
         let mut around = Around::new(self.grown(tile, reach));
         first.iter().for_each(|first| first.show(&mut around));
         let known = self.grown(tile, reach.saturating_sub(1));
-        let (mut pixels, mut done) = (Vec::new(), TilePixels::empty(tile));
+        let (mut pixels, mut done) = (Vec::new(), self.nothing(tile));
         let start = if self.starts_with_one() {
             self.take_first(first, &mut around, known, (&mut pixels, &mut done));
             1
@@ -117,6 +117,9 @@ impl<'a> Sampler<'a> {
         let (mut active, mut errors): (Vec<usize>, _) = ((0..pixels.len()).collect(), Vec::new());
         let mut from = if start > 0 { 1 } else { 0 };
         for (round, &to) in rounds.iter().enumerate().skip(start) {
+            if active.is_empty() {
+                break;
+            }
             self.trace(tracer, &mut pixels, &active, from..to)?;
             if round < looks(rounds) {
                 around.see(judge, &pixels, &active);
@@ -143,7 +146,19 @@ impl<'a> Sampler<'a> {
         Some(done)
     }
 
-    /// Takes what pixels of one sample are done, and opens the others, of those that are `known`.
+    /// A tile with nothing in its pixels.
+    fn nothing(&self, tile: Tile) -> TilePixels {
+        let frame = self.frame;
+        let (pixels, layers) = (tile.pixels(), if frame.settings.layers { tile.pixels() } else { 0 });
+        TilePixels {
+            beauty: vec![[0.0; 4]; pixels],
+            facts: vec![PixelFacts { count: 0, spare: 0, error: 0.0, end: End::Ceiling }; pixels],
+            layers: vec![LayerPixel::new(&[], frame.view.eye, frame.view.forward); layers],
+            ..TilePixels::empty(tile)
+        }
+    }
+
+    /// Takes the first sample of every pixel, and of those around the tile that are `known`; opens those that need more.
     fn take_first(
         &self,
         first: &[&First],
@@ -164,15 +179,26 @@ impl<'a> Sampler<'a> {
                 }
             }
         });
+        done.facts.clear();
         tile.runs().for_each(|(at, count)| {
             let start = around.at(at);
             let fact = |at| PixelFacts { count: 1, spare: 0, error: even.error(at), end: End::Met };
             done.facts.extend((start..start + count).map(fact));
         });
-        for own in first.iter().filter(|first| first.tile == tile) {
-            resolve_each(&own.samples, 1, frame.background, &mut done.beauty);
-            let layer = |facts| LayerPixel::new(std::slice::from_ref(facts), frame.view.eye, frame.view.forward);
-            done.layers.extend(own.facts.iter().map(layer));
+        let mut colors = Vec::new();
+        for first in first.iter().filter(|first| tile.contains((first.tile.x0, first.tile.y0))) {
+            colors.clear();
+            resolve_each(&first.samples, 1, frame.background, &mut colors);
+            let mut from = 0;
+            first.tile.runs().for_each(|(at, count)| {
+                // Zones are whole blocks of a tile, so that their runs are its own.
+                let to = tile.number(at);
+                done.beauty[to..to + count].copy_from_slice(&colors[from..from + count]);
+                for (layers, facts) in done.layers.iter_mut().skip(to).zip(first.facts.iter().skip(from).take(count)) {
+                    *layers = LayerPixel::new(std::slice::from_ref(facts), frame.view.eye, frame.view.forward);
+                }
+                from += count;
+            });
         }
         done.rays = tile.pixels() as u64;
     }
@@ -188,17 +214,9 @@ impl<'a> Sampler<'a> {
         pixel
     }
 
-    /// Puts pixels in their places, which are there where there were first samples; `start` of each are counted already.
+    /// Puts pixels in their places; the first `start` samples of each are counted already.
     fn put(&self, pixels: &[Pixel], start: usize, done: &mut TilePixels) {
         let (frame, tile) = (self.frame, done.tile);
-        if start == 0 {
-            done.facts = vec![PixelFacts { count: 0, spare: 0, error: 0.0, end: End::Ceiling }; tile.pixels()];
-            done.beauty = vec![[0.0; 4]; tile.pixels()];
-            done.layers = vec![
-                LayerPixel::new(&[], frame.view.eye, frame.view.forward);
-                if frame.settings.layers { tile.pixels() } else { 0 }
-            ];
-        }
         for pixel in pixels {
             let rays = u64::from(pixel.facts.count) - start as u64;
             done.rays += rays;

@@ -1,8 +1,8 @@
 //! All tiles of a picture, which share the first samples of their pixels.
 //!
-//! Every tile is worked on twice: its first samples are traced, and later it is finished, from these and from those of the
-//! tiles around it. First samples are some tiles ahead, so that hardly any thread ever waits for another, and are forgotten when
-//! all tiles around are finished.
+//! A tile needs these of some pixels around it, too. Whoever needs them first traces them, and they are kept until all tiles
+//! that need them are finished: so each is traced once, and all samples of a tile soon after each other, while what they meet
+//! is near in memory. They are handed over by zones, since of tiles beside it a tile needs no more than their borders.
 
 use super::first::First;
 use super::{Sampler, Stochastic};
@@ -16,6 +16,9 @@ use crate::render::tile::{Tile, TilePixels, each_tile};
 use crate::render::whitted::{ByClass, Tracer};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
+/// Zones of a tile.
+const ZONES: usize = 9;
+
 /// Renders all tiles, given row by row, and has each kept that is finished; the counts of all threads, and whether nothing was
 /// cut short.
 pub(in crate::render) fn render_all<A: Accel, P: Observer>(
@@ -28,142 +31,140 @@ pub(in crate::render) fn render_all<A: Accel, P: Observer>(
 ) -> (Vec<ByClass<P>>, bool) {
     let output = output(how.space, frame.background);
     let sampler = Sampler::new(frame, how, output.as_ref(), context.scene.background);
-    if !sampler.starts_with_one() {
-        let work = |tracer: &mut Tracer<A, P>, &tile: &Tile| sampler.finish(tracer, tile, &[]).map(keep);
-        let (_, counts, complete) = each_tile(context, accel, tiles, progress, work);
-        return (counts, complete);
-    }
-    let shared = Shared::new(tiles);
-    let work = |tracer: &mut Tracer<A, P>, step: &Step| match *step {
-        Step::First(i) => {
-            let mut promise = Promise { shared: &shared, tile: i, first: None };
-            promise.first = sampler.first(tracer, std::iter::once(tiles[i]))?.pop();
-            promise.first.is_some().then_some(())
+    let shared = Shared::new(tiles, tiles.iter().map(|&tile| sampler.grown(tile, sampler.reach())).collect());
+    let work = |tracer: &mut Tracer<A, P>, &i: &usize| {
+        if !sampler.starts_with_one() {
+            return sampler.finish(tracer, tiles[i], &[]).map(keep);
         }
-        Step::Finish(i) => {
-            let first = shared.around(i)?;
-            let first: Vec<&First> = first.iter().map(|first| &**first).collect();
-            keep(sampler.finish(tracer, tiles[i], &first)?);
-            shared.forget(i);
-            Some(())
-        }
+        let needed = shared.needed(i);
+        let mut promise = shared.promise(&needed);
+        promise.first = sampler.first(tracer, promise.zones.iter().map(|&zone| shared.zone(zone)))?;
+        drop(promise);
+        let first = shared.wait_for(&needed)?;
+        let first: Vec<&First> = first.iter().map(|first| &**first).collect();
+        keep(sampler.finish(tracer, tiles[i], &first)?);
+        shared.forget(&needed);
+        Some(())
     };
-    let (_, counts, complete) = each_tile(context, accel, &shared.steps(rayon::current_num_threads()), progress, work);
+    let (_, counts, complete) = each_tile(context, accel, &(0..tiles.len()).collect::<Vec<_>>(), progress, work);
     (counts, complete)
 }
 
-/// A part of the work on a tile, by number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Step {
-    /// Trace first samples.
-    First(usize),
-    /// Do all the rest.
-    Finish(usize),
-}
-
-/// First samples that some tile still needs.
-struct Shared {
-    /// Of how many tiles.
-    tiles: usize,
+/// First samples that some tile still needs, by zones.
+struct Shared<'t> {
+    tiles: &'t [Tile],
+    /// What each needs.
+    grown: Vec<Tile>,
     /// Tiles in a row.
     columns: usize,
-    first: Mutex<Vec<State>>,
+    states: Mutex<Vec<State>>,
     /// Some of them are there, or will never be.
     changed: Condvar,
 }
 
-/// What is known of the first samples of a tile.
+/// What is known of the first samples of a zone.
 enum State {
-    Awaited,
+    /// Nobody has needed them yet.
+    Untouched,
+    /// Somebody traces them.
+    Promised,
     /// They are there, and so many tiles still need them.
     There(Arc<First>, usize),
-    /// Nobody traces them: the user has given up.
+    /// Nobody will trace them: the user has given up.
     Never,
     /// Nobody needs them any more.
     Forgotten,
 }
 
-impl Shared {
-    fn new(tiles: &[Tile]) -> Self {
+impl<'t> Shared<'t> {
+    fn new(tiles: &'t [Tile], grown: Vec<Tile>) -> Self {
         let columns = tiles.iter().take_while(|tile| tile.y0 == tiles[0].y0).count().max(1);
-        let states = tiles.iter().map(|_| State::Awaited).collect();
-        Self { tiles: tiles.len(), columns, first: Mutex::new(states), changed: Condvar::new() }
+        let states = (0..tiles.len() * ZONES).map(|_| State::Untouched).collect();
+        Self { tiles, grown, columns, states: Mutex::new(states), changed: Condvar::new() }
     }
 
-    /// All steps, so that first samples are so many tiles ahead of what is needed next. Of what a tile needs, everything comes
-    /// before it is finished: whoever waits for it waits for a thread that is working on it.
-    fn steps(&self, ahead: usize) -> Vec<Step> {
-        let lead = self.columns + 1 + ahead;
-        let both = |step: usize| {
-            let first = (step < self.tiles).then_some(Step::First(step));
-            let finish = step.checked_sub(lead).map(Step::Finish);
-            first.into_iter().chain(finish)
-        };
-        (0..self.tiles + lead).flat_map(both).collect()
+    fn zone(&self, zone: usize) -> Tile {
+        self.tiles[zone / ZONES].zone(zone % ZONES)
     }
 
-    /// A tile and those beside it; what is looked at around a tile reaches no farther, as only the last tiles of a row or a
-    /// column are small.
-    fn beside(&self, tile: usize) -> impl Iterator<Item = usize> + Clone + use<> {
-        let (columns, rows) = (self.columns, self.tiles.div_ceil(self.columns));
+    /// A tile and those beside it. What a tile needs reaches no farther: only the last ones of a row or a column are small.
+    fn beside(&self, tile: usize) -> impl Iterator<Item = usize> + use<> {
+        let (columns, rows) = (self.columns, self.tiles.len().div_ceil(self.columns));
         let (row, column) = (tile / columns, tile % columns);
         let near = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
         near(row, rows).flat_map(move |row| near(column, columns).map(move |column| row * columns + column))
     }
 
-    fn states(&self) -> MutexGuard<'_, Vec<State>> {
-        // A thread that failed has told so, and every state is set at once.
-        self.first.lock().unwrap_or_else(PoisonError::into_inner)
+    /// The zones that a tile needs.
+    fn needed(&self, tile: usize) -> Vec<usize> {
+        let zones = self.beside(tile).flat_map(|tile| tile * ZONES..(tile + 1) * ZONES);
+        zones.filter(|&zone| self.grown[tile].meets(self.zone(zone))).collect()
     }
 
-    /// The first samples of a tile and of those beside it, when all are there; `None` when some will never be.
-    fn around(&self, tile: usize) -> Option<Vec<Arc<First>>> {
+    /// How many tiles need a zone.
+    fn needing(&self, zone: usize) -> usize {
+        self.beside(zone / ZONES).filter(|&tile| self.grown[tile].meets(self.zone(zone))).count()
+    }
+
+    fn states(&self) -> MutexGuard<'_, Vec<State>> {
+        // Every state is set at once, so that a thread that failed leaves none half set.
+        self.states.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Those of these zones that nobody traces yet: the caller will.
+    fn promise(&self, needed: &[usize]) -> Promise<'_, 't> {
         let mut states = self.states();
-        loop {
-            let mut found = Vec::new();
-            let mut waits = false;
-            for i in self.beside(tile) {
-                match &states[i] {
-                    State::There(first, _) => found.push(Arc::clone(first)),
-                    State::Awaited => waits = true,
-                    State::Never | State::Forgotten => return None,
-                }
-            }
-            if !waits {
-                return Some(found);
-            }
+        let is_untouched = |&zone: &usize| matches!(states[zone], State::Untouched);
+        let zones: Vec<usize> = needed.iter().copied().filter(is_untouched).collect();
+        zones.iter().for_each(|&zone| states[zone] = State::Promised);
+        Promise { shared: self, zones, first: Vec::new() }
+    }
+
+    /// The first samples of zones, all of which are promised, when they are there; `None` when some will never be. Nobody waits
+    /// who has promised any.
+    fn wait_for(&self, needed: &[usize]) -> Option<Vec<Arc<First>>> {
+        let mut states = self.states();
+        while needed.iter().any(|&zone| matches!(states[zone], State::Promised)) {
             states = self.changed.wait(states).unwrap_or_else(PoisonError::into_inner);
         }
+        let first = |&zone: &usize| match &states[zone] {
+            State::There(first, _) => Some(Arc::clone(first)),
+            _ => None,
+        };
+        needed.iter().map(first).collect()
     }
 
-    /// A tile is finished.
-    fn forget(&self, tile: usize) {
+    /// A tile that has needed these is finished.
+    fn forget(&self, needed: &[usize]) {
         let mut states = self.states();
-        for i in self.beside(tile) {
-            if let State::There(_, needed) = &mut states[i] {
-                *needed -= 1;
-                if *needed == 0 {
-                    states[i] = State::Forgotten;
+        for &zone in needed {
+            if let State::There(_, needing) = &mut states[zone] {
+                *needing -= 1;
+                if *needing == 0 {
+                    states[zone] = State::Forgotten;
                 }
             }
         }
     }
 }
 
-/// Tells in the end, however that comes, whether the first samples of a tile are there.
-struct Promise<'a> {
-    shared: &'a Shared,
-    tile: usize,
-    first: Option<First>,
+/// Hands over first samples in the end, however that comes.
+struct Promise<'a, 't> {
+    shared: &'a Shared<'t>,
+    zones: Vec<usize>,
+    /// Of all of these zones, or none.
+    first: Vec<First>,
 }
 
-impl Drop for Promise<'_> {
+impl Drop for Promise<'_, '_> {
     fn drop(&mut self) {
-        let needed = self.shared.beside(self.tile).count();
-        let first = self.first.take();
-        let state = first.map_or(State::Never, |first| State::There(Arc::new(first), needed));
-        self.shared.states()[self.tile] = state;
-        self.shared.changed.notify_all();
+        let shared = self.shared;
+        let mut first = std::mem::take(&mut self.first).into_iter();
+        let mut there = |zone| first.next().map(|first| State::There(Arc::new(first), shared.needing(zone)));
+        let new: Vec<State> = self.zones.iter().map(|&zone| there(zone).unwrap_or(State::Never)).collect();
+        let mut states = shared.states();
+        self.zones.iter().zip(new).for_each(|(&zone, state)| states[zone] = state);
+        shared.changed.notify_all();
     }
 }
 
@@ -171,19 +172,35 @@ impl Drop for Promise<'_> {
 mod tests {
     use super::*;
 
+    /// Tiles of a picture of this size, 32 pixels wide and high, and what they need.
+    fn tiles(width: u32, height: u32) -> (Vec<Tile>, Vec<Tile>) {
+        let rows = (0..height).step_by(32);
+        let corners = rows.flat_map(|y0| (0..width).step_by(32).map(move |x0| (x0, y0)));
+        let tile = |(x0, y0)| Tile { x0, y0, x1: width.min(x0 + 32), y1: height.min(y0 + 32) };
+        let tiles: Vec<Tile> = corners.map(tile).collect();
+        let grown = |tile: &Tile| tile.grown(width, height).grown(width, height);
+        (tiles.clone(), tiles.iter().map(grown).collect())
+    }
+
     #[test]
-    fn a_tile_is_finished_after_the_first_samples_of_all_around_it() {
-        for (columns, rows) in [(1, 1), (1, 7), (8, 8), (50, 3), (3, 90)] {
-            let tile = |i: u32| Tile { x0: i % columns, y0: i / columns, x1: i % columns + 1, y1: i / columns + 1 };
-            let tiles: Vec<Tile> = (0..columns * rows).map(tile).collect();
-            let shared = Shared::new(&tiles);
-            let steps = shared.steps(rows as usize);
-            assert_eq!(steps.len(), 2 * tiles.len());
-            let when = |step| steps.iter().position(|&other| other == step).expect("every step");
-            for i in 0..tiles.len() {
-                assert!(shared.beside(i).all(|other| when(Step::First(other)) < when(Step::Finish(i))));
-                assert!(shared.beside(i).any(|other| other == i) && shared.beside(i).all(|other| other < tiles.len()));
+    fn a_tile_needs_zones_that_cover_what_is_around_it_and_each_zone_is_traced_by_one() {
+        for (width, height) in [(1, 1), (33, 34), (96, 65), (250, 3)] {
+            let (tiles, grown) = tiles(width, height);
+            let shared = Shared::new(&tiles, grown.clone());
+            let mut traced = Vec::new();
+            for (i, grown) in grown.iter().enumerate() {
+                let needed = shared.needed(i);
+                assert!(needed.iter().all(|&zone| shared.needing(zone) > 0));
+                let promise = shared.promise(&needed);
+                traced.extend(promise.zones.iter().flat_map(|&zone| shared.zone(zone).places()));
+                let covered = |at| needed.iter().any(|&zone| shared.zone(zone).contains(at));
+                assert!(grown.places().all(covered), "{i} of {width}×{height}");
             }
+            traced.sort_unstable();
+            traced.dedup();
+            assert_eq!(traced.len(), (width * height) as usize);
+            assert!(shared.states().iter().all(|state| !matches!(state, State::Promised)), "nobody has kept a promise");
+            assert!(shared.wait_for(&shared.needed(0)).is_none());
         }
     }
 }
