@@ -212,6 +212,28 @@ impl Eyes {
         self.take(eye, &mut run);
     }
 
+    /// Adds the rays of the samples that lie at the same offsets in each of these pixels, seen through the middle of the lens;
+    /// numbered as by [`Self::send`].
+    pub(crate) fn send_each(&mut self, eye: &Eye, pixels: &[(u32, u32)], offsets: &[(f64, f64)]) {
+        let mut run = Run::default();
+        for (x, y) in pixels.iter().map(|&(x, y)| (f64::from(x), f64::from(y))) {
+            let mut rest = offsets;
+            while !rest.is_empty() {
+                let (now, later) = rest.split_at(rest.len().min(RUN - run.count));
+                let places = run.x.iter_mut().zip(&mut run.y).skip(run.count);
+                for ((to_x, to_y), (dx, dy)) in places.zip(now) {
+                    (*to_x, *to_y) = (x + dx, y + dy);
+                }
+                run.count += now.len();
+                rest = later;
+                if run.count == RUN {
+                    self.take(eye, &mut run);
+                }
+            }
+        }
+        self.take(eye, &mut run);
+    }
+
     fn take(&mut self, eye: &Eye, run: &mut Run) {
         let start = self.count;
         self.make_room(start + RUN);
@@ -403,6 +425,23 @@ mod tests {
         let points = (0..n * n).map(|i| on_disc([middle(i % n), middle(i / n)]));
         let inner = points.filter(|[x, y]| x * x + y * y < 0.25).count();
         assert!((inner as f64 / f64::from(n * n) - 0.25).abs() < 0.005, "{inner}");
+    }
+
+    #[test]
+    fn rays_of_equal_offsets_in_many_pixels_are_those_of_their_places() {
+        let view = View::look_at(DVec3::new(1.0, 2.0, 6.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.8));
+        let eye = eye(&view, None);
+        let pixels: Vec<(u32, u32)> = (0..37).map(|i| (i, i * 3 % 29)).collect();
+        for samples in [1, 3, 16, 100] {
+            let offsets: Vec<(f64, f64)> = (0..samples).map(|i| (0.3 / f64::from(1 + i), 0.7)).collect();
+            let at = |&(x, y): &(u32, u32), &(dx, dy): &(f64, f64)| Place::new(f64::from(x) + dx, f64::from(y) + dy);
+            let places = pixels.iter().flat_map(|pixel| offsets.iter().map(move |offset| at(pixel, offset)));
+            let (mut each, mut one_by_one) = (Eyes::default(), Eyes::default());
+            each.send_each(&eye, &pixels, &offsets);
+            one_by_one.send(&eye, places);
+            assert_eq!(each.rays(), one_by_one.rays());
+            assert_eq!(each.rays().len(), 37 * offsets.len());
+        }
     }
 
     #[test]

@@ -438,7 +438,11 @@ impl Frame<'_> {
         for places in places.chunks(pixels) {
             tracer.reset(places.len() * self.offsets.len(), self.settings.layers);
             let eye = self.eye(tracer.center());
-            tracer.eyes.send(&eye, places.iter().flat_map(|&at| self.places(at)));
+            if self.settings.lens.is_some() {
+                tracer.eyes.send(&eye, places.iter().flat_map(|&at| self.places(at)));
+            } else {
+                tracer.eyes.send_each(&eye, places, &self.offsets);
+            }
             if !tracer.trace() {
                 return None;
             }
