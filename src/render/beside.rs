@@ -9,6 +9,7 @@
 use super::branch::Point;
 use super::context::Context;
 use super::curve::Feelers;
+use super::draws::{Draws, Purpose};
 use super::eyes::Eyes;
 use super::observer::Observer;
 use super::seam::is_same_crossing;
@@ -73,6 +74,8 @@ pub(super) struct Beside {
     /// Rays that met nothing and see the surroundings.
     missed: Vec<u32>,
     ranks: Ranks,
+    /// Points of a strip with their numbers for wide lights, and how many places they draw.
+    draws: Vec<(usize, Draws, u32)>,
 }
 
 /// The rays of a wave by rank: how many of the same sample come before.
@@ -287,23 +290,54 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
         let absorbs = context.absorption.is_some();
         let within = absorbs && strip.certain().any(|i| traced.path(strip.arrival(i).0).media.innermost().is_some());
+        let what = (matter, common.shiny, has_inside);
+        let mut draws = std::mem::take(&mut self.beside.draws);
+        draws.clear();
         for light in &context.lights {
-            strip.shine((matter, common.shiny, has_inside), light);
-            if !light.shadows {
-                strip.shone().for_each(|(sample, radiance)| self.add(sample, radiance));
+            if !light.is_wide() {
+                strip.shine(what, light, None);
+                self.ask_for(traced, light, strip, (within, None));
                 continue;
             }
-            if within {
-                strip.send_within(&mut self.shadows, traced);
-            } else {
-                strip.send(&mut self.shadows, absorbs);
+            if draws.is_empty() {
+                draws.extend(strip.certain().map(|i| self.draws_for_lights(traced, strip, i)));
             }
-            for (i, radiance) in strip.grazed() {
-                let (ray, hit) = (&traced.rays()[i as usize], &traced.hits()[i as usize]);
-                if let Some(feelers) = feelers(context, light, ray, hit) {
-                    let media = absorbs.then(|| traced.path(i as usize).media);
-                    self.shadows.push_feelers(&feelers, radiance, media);
-                }
+            for place in 0..strip.draw(draws.iter_mut().map(|(i, draws, rays)| (*i, draws.spread(*rays), *rays))) {
+                strip.shine(what, light, Some(place));
+                self.ask_for(traced, light, strip, (within, Some(place)));
+            }
+        }
+        self.beside.draws = draws;
+    }
+
+    /// Point `i` with its numbers for wide lights, and how many places it draws of each.
+    fn draws_for_lights(&self, traced: Traced, strip: &Strip, i: usize) -> (usize, Draws, u32) {
+        let (context, (at, ..)) = (self.context, strip.arrival(i));
+        let (ray, hit, path) = (&traced.rays()[at], &traced.hits()[at], traced.path(at));
+        let draws = Draws::at(context.seed, &self.streams, path.branch, ray, hit, Purpose::Lights);
+        (i, draws, context.light_rays_at(path.depth))
+    }
+
+    /// Adds what points show of a light, of the `place`th that they have drawn of it, or sends rays that find whether it
+    /// arrives, `within` what is around the points.
+    fn ask_for(&mut self, traced: Traced, light: &LocalLight, strip: &Strip, (within, place): (bool, Option<u32>)) {
+        let context = self.context;
+        let absorbs = context.absorption.is_some();
+        if !light.shadows {
+            return strip.shone().for_each(|(sample, radiance)| self.add(sample, radiance));
+        }
+        if within {
+            strip.send_within(&mut self.shadows, traced);
+        } else {
+            strip.send(&mut self.shadows, absorbs);
+        }
+        for (i, radiance) in strip.grazed() {
+            let at = strip.arrival(i).0;
+            let (ray, hit) = (&traced.rays()[at], &traced.hits()[at]);
+            let drawn = place.map(|place| strip.drawn(i, place));
+            if let Some(feelers) = feelers(context, (light, drawn), ray, hit) {
+                let media = absorbs.then(|| traced.path(at).media);
+                self.shadows.push_feelers(&feelers, radiance, media);
             }
         }
     }
@@ -331,9 +365,18 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     }
 }
 
-/// What finds out whether a light shines on the round surface at `hit`.
-fn feelers(context: &Context, light: &LocalLight, ray: &Ray, hit: &Hit) -> Option<Feelers> {
+/// What finds out whether a light shines on the round surface at `hit`, one place of it if that was drawn.
+fn feelers(
+    context: &Context,
+    (light, drawn): (&LocalLight, Option<[f32; 2]>),
+    ray: &Ray,
+    hit: &Hit,
+) -> Option<Feelers> {
     let target = Target::new(context.scene, context.world, hit.prim);
     let surface = Surface::new(context.world, target, ray, hit, 0.0);
-    surface.feelers(&light.incident(surface.position)?, ray.sample)
+    let incident = match drawn {
+        Some(drawn) => light.incident_from(surface.position, drawn)?,
+        None => light.incident(surface.position)?,
+    };
+    surface.feelers(&incident, ray.sample)
 }

@@ -12,7 +12,7 @@ use super::texture::TextureStore;
 use super::world::World;
 use crate::math::Vec3;
 use crate::scene::features::{Feature, Features};
-use crate::scene::{AlphaMode, Background, Light, Material, Scene};
+use crate::scene::{AlphaMode, Background, Material, Scene};
 use std::sync::Arc;
 
 /// Rays to a panorama from each point, when nobody says.
@@ -107,8 +107,7 @@ impl<'a> Context<'a> {
         let env_rays = settings.env_rays.unwrap_or(if sky.is_map() { ENV_RAYS } else { 0 });
         // Each way of drawing a direction to a panorama needs a ray in each of both halves.
         let env_rays = env_rays.div_ceil(together).max(env_rays.min(if sky.is_map() { ENV_RAYS_LEAST } else { 2 }));
-        let wide = scene.lights.iter().any(Light::is_wide);
-        let alone = everything || settings.layers || wide || gloss.all;
+        let alone = everything || settings.layers || gloss.all;
         let common = |m: (u32, &Material)| if alone { None } else { Common::of(m, textures, depth > 0, gloss) };
         let needs = |any: &[Feature]| everything || any.iter().any(|&f| features.has(f));
         Self {
@@ -137,6 +136,11 @@ impl<'a> Context<'a> {
     /// The same with other random choices, and other samples.
     pub(super) fn resampled(&self, settings: &Settings) -> Self {
         Self { seed: settings.seed, highlight_reach: glint::reach(settings), ..self.clone() }
+    }
+
+    /// Shadow rays to each wide light after so many bounces: what mirrors show needs no more than a hint of soft edges.
+    pub(crate) fn light_rays_at(&self, depth: u32) -> u32 {
+        if depth == 0 { self.light_rays } else { self.light_rays.div_ceil(4) }
     }
 
     /// Whether no formula tells what many points see of their surroundings.

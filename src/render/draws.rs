@@ -74,15 +74,17 @@ impl Draws {
 
 impl Spread {
     /// Its `k`th point, both coordinates 0 ≤ x < 1.
+    #[inline(always)]
     pub(crate) fn point(self, k: u32) -> [f32; 2] {
         match self {
             Self::Moved(shift) => [0, 1].map(|axis: usize| (shift[axis] + k as f32 * STEPS[axis]).fract()),
-            Self::Part { key, first } => sobol::point::<2>(first.wrapping_add(k), key).map(below_one),
+            Self::Part { key, first } => sobol::square(first.wrapping_add(k), key).map(below_one),
         }
     }
 }
 
 /// Rounding must not reach 1.
+#[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what this does")]
 fn below_one(x: f64) -> f32 {
     (x as f32).min(1.0_f32.next_down())

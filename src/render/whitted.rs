@@ -337,8 +337,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
                 }
                 continue;
             }
-            // What mirrors show needs no more than a hint of soft edges.
-            let rays = if point.path.depth == 0 { context.light_rays } else { context.light_rays.div_ceil(4) };
+            let rays = context.light_rays_at(point.path.depth);
             let spread = draws.get_or_insert_with(|| self.draws(point, Purpose::Lights)).spread(rays);
             for k in 0..rays {
                 if let Some(incident) = light.incident_from(position, spread.point(k)) {

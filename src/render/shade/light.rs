@@ -7,6 +7,7 @@
 //! glTF gives candela and lux, of which such a surface shows the π-th part. Both become a *strength* in the first unit,
 //! so that a Phong and a metallic-roughness surface of one colour look alike under any light.
 
+use crate::math::formula::sin_cos_of_turns;
 use crate::math::{DVec3, Vec3};
 use crate::scene::{Falloff, Light, LightKind};
 use std::f32::consts::PI;
@@ -16,8 +17,9 @@ use std::f32::consts::PI;
 pub(crate) struct LocalLight {
     intensity: Vec3,
     pub shadows: bool,
-    /// Radius, or half the angle of a disc in the sky, as in [`Light`].
+    /// Radius, or half the angle of a disc in the sky, as in [`Light`]; and what its sine and cosine are, were it that.
     size: f32,
+    disc: (f32, f32),
     shape: Shape,
 }
 
@@ -108,7 +110,8 @@ impl LocalLight {
         };
         #[expect(clippy::cast_possible_truncation, reason = "a length like any other")]
         let size = light.size as f32;
-        Self { intensity: light.intensity, shadows: light.shadows, size, shape }
+        let disc = libm::sincosf(size.min(PI / 2.0));
+        Self { intensity: light.intensity, shadows: light.shadows, size, disc, shape }
     }
 
     /// Whether it is seen as many points.
@@ -119,39 +122,43 @@ impl LocalLight {
     /// What arrives from one point of it, drawn with two numbers from 0 … 1, as if all of it shone from there; the mean of
     /// many is what arrives from the whole. `None` where nothing does.
     pub(crate) fn incident_from(&self, position: Vec3, at: [f32; 2]) -> Option<Incident> {
+        if !self.is_wide() {
+            return self.incident(position);
+        }
+        let (incident, arrives) = self.arriving_from(position, at);
+        arrives.then_some(incident)
+    }
+
+    /// [`Self::incident_from`] of a wide light, and whether anything arrives.
+    #[inline(always)]
+    fn arriving_from(&self, position: Vec3, at: [f32; 2]) -> (Incident, bool) {
         let (to_light, share, end) = match self.shape {
-            _ if !self.is_wide() => return self.incident(position),
-            Shape::Directional(to_light) => {
-                let (sin, cos) = libm::sincosf(self.size.min(PI / 2.0));
-                (in_cone(to_light, sin, cos, at), 1.0 / PI, None)
-            }
+            Shape::Directional(to_light) => (in_cone(to_light, self.disc, at), 1.0 / PI, None),
             Shape::Point { position: light, falloff, cone } => {
                 let way = light - position;
                 let distance = way.length();
                 let sin = self.size / distance;
-                // Nothing is seen of a ball from inside.
-                if sin >= 1.0 || sin.is_nan() {
-                    return None;
-                }
-                let cos = (1.0 - sin * sin).sqrt();
-                let to_light = in_cone(way / distance, sin, cos, at);
+                let cos = (1.0 - sin * sin).max(0.0).sqrt();
+                let to_light = in_cone(way / distance, (sin, cos), at);
                 let along = way.dot(to_light);
                 let beside = (way - to_light * along).length();
                 let near = along - (self.size * self.size - beside * beside).max(0.0).sqrt();
                 // A ball fills more of the sky than its middle's distance says.
                 let fuller = if matches!(falloff, Falloff::None) { 1.0 } else { 2.0 / (1.0 + cos) };
                 let share = weaken(falloff, distance) * fuller * cone.map_or(1.0, |c| c.share(-to_light));
-                (to_light, share, Some(position + to_light * near))
+                // Nothing is seen of a ball from inside.
+                (to_light, if sin < 1.0 { share } else { 0.0 }, Some(position + to_light * near))
             }
             Shape::Rectangle { position: middle, sides: [a, b], normal, falloff } => {
                 let point = middle + a * (at[0] - 0.5) + b * (at[1] - 0.5);
                 let way = point - position;
-                let to_light = way.try_normalize()?;
+                let to_light = way.try_normalize().unwrap_or(Vec3::ZERO);
                 (to_light, weaken(falloff, way.length()) * (-normal.dot(to_light)).max(0.0), Some(point))
             }
         };
         let strength = (self.intensity * share).min(Vec3::splat(f32::MAX));
-        (strength.max_element() > 0.0).then_some(Incident { to_light, position: end, strength })
+        let arrives = (strength.max_element() > 0.0) & (to_light != Vec3::ZERO);
+        (Incident { to_light, position: end, strength }, arrives)
     }
 
     /// What arrives at `position` when nothing is in the way; `None` where nothing does.
@@ -181,6 +188,30 @@ impl LocalLight {
             Shape::Rectangle { position: middle, sides, normal, falloff } => {
                 let light = Self { shape: Shape::Rectangle { position: middle, sides, normal, falloff }, ..*self };
                 (0..points).for_each(|i| take(i, light.arriving(position(i))));
+            }
+        }
+    }
+
+    /// The same from one place of a wide light to each position.
+    #[inline(always)]
+    pub(crate) fn arriving_at_from(
+        &self,
+        points: usize,
+        (position, at): (impl Fn(usize) -> Vec3, impl Fn(usize) -> [f32; 2]),
+        mut take: impl FnMut(usize, (Incident, bool)),
+    ) {
+        match self.shape {
+            Shape::Directional(to_light) => {
+                let light = Self { shape: Shape::Directional(to_light), ..*self };
+                (0..points).for_each(|i| take(i, light.arriving_from(position(i), at(i))));
+            }
+            Shape::Point { position: from, falloff, cone } => {
+                let light = Self { shape: Shape::Point { position: from, falloff, cone }, ..*self };
+                (0..points).for_each(|i| take(i, light.arriving_from(position(i), at(i))));
+            }
+            Shape::Rectangle { position: middle, sides, normal, falloff } => {
+                let light = Self { shape: Shape::Rectangle { position: middle, sides, normal, falloff }, ..*self };
+                (0..points).for_each(|i| take(i, light.arriving_from(position(i), at(i))));
             }
         }
     }
@@ -247,12 +278,13 @@ impl Cone {
 }
 
 /// A direction in the cone around `axis` whose half angle has this sine and cosine, evenly by solid angle.
-fn in_cone(axis: Vec3, sin: f32, cos: f32, at: [f32; 2]) -> Vec3 {
+#[inline(always)]
+fn in_cone(axis: Vec3, (sin, cos): (f32, f32), at: [f32; 2]) -> Vec3 {
     // 1 − cos as sin² / (1 + cos), which keeps its digits in narrow cones.
     let down = at[0] * (sin * sin / (1.0 + cos));
     let ring = (down * (2.0 - down)).max(0.0).sqrt();
     let (tangent, bitangent) = axis.any_orthonormal_pair();
-    let (sin, cos) = libm::sincosf(2.0 * PI * at[1]);
+    let (sin, cos) = sin_cos_of_turns(at[1]);
     (axis * (1.0 - down) + (tangent * cos + bitangent * sin) * ring).normalize()
 }
 

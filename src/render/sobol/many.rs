@@ -54,11 +54,18 @@ impl Kernel for Scatter<'_> {
     fn run<S: Simd>(self, _: S) {
         let Many { count, index, key, found: [x, y] } = self.0;
         for i in 0..count.next_multiple_of(LANES).min(RUN) {
-            let index = turned(index[i].reverse_bits(), key[i]).reverse_bits();
-            x[i] = fraction(turned(index, mix(key[i], 1)).reverse_bits());
-            y[i] = fraction(turned(shifted(index), mix(key[i], 2)).reverse_bits());
+            [x[i], y[i]] = square(index[i], key[i]);
         }
     }
+}
+
+/// [`super::point`] of two dimensions.
+#[inline(always)]
+pub(in crate::render) fn square(index: u32, key: u32) -> [f64; 2] {
+    let index = turned(index.reverse_bits(), key).reverse_bits();
+    let across = turned(index, mix(key, 1)).reverse_bits();
+    let down = turned(shifted(index), mix(key, 2)).reverse_bits();
+    [fraction(across), fraction(down)]
 }
 
 #[inline(always)]

@@ -8,7 +8,7 @@
 
 mod many;
 
-pub(super) use many::Many;
+pub(super) use many::{Many, square};
 
 /// Dimensions that are stratified together.
 pub(super) const DIMENSIONS: usize = 4;

@@ -6,6 +6,7 @@ use super::faces::Faces;
 use super::lit::Lit;
 use super::painted::Painted;
 use super::sorted::Sorted;
+use super::wide::Drawn;
 use crate::math::Vec3;
 use crate::math::bounds::offset_origin;
 use crate::math::simd::{Kernel, Level, Simd};
@@ -66,6 +67,7 @@ pub(crate) struct Strip {
     pub(super) places: Places,
     pub(super) surroundings: Surroundings,
     pub(super) lit: Lit,
+    pub(super) drawn: Drawn,
 }
 
 /// What hits say.
@@ -125,6 +127,7 @@ impl Default for Strip {
             places: Places::default(),
             surroundings: Surroundings::default(),
             lit: Lit::default(),
+            drawn: Drawn::default(),
         }
     }
 }
@@ -385,7 +388,9 @@ mod tests {
     use crate::accel::{Hit, NO_PRIM, Ray};
     use crate::math::random::Random;
     use crate::math::{DMat3, DVec3};
+    use crate::render::draws::Spread;
     use crate::render::shade::{LocalLight, Matter};
+    use crate::render::sobol::mix;
     use crate::render::texture::TextureStore;
     use crate::render::wave::{Path, RayClass, Wave};
     use crate::scene::{Falloff, Light, LightKind, Material, Scene};
@@ -416,13 +421,15 @@ mod tests {
         Wave { after: vec![Hit::MISS; rays.len()], rays, paths, hits }
     }
 
-    fn found(level: Level, placement: Option<&Placement>) -> Vec<[u32; 20]> {
+    fn found(level: Level, placement: Option<&Placement>, size: f64) -> Vec<[u32; 20]> {
         let mut strip = filled(level);
         strip.find(placement);
         let kind = LightKind::Point { position: DVec3::new(1.0, 3.0, 2.0), falloff: Falloff::None };
-        let light = Light { name: String::new(), intensity: Vec3::ONE, kind, shadows: true, size: 0.0 };
+        let light = Light { name: String::new(), intensity: Vec3::ONE, kind, shadows: true, size };
         let matter = Matter::without_maps(&Material::plain(), &TextureStore::new(&Scene::default()));
-        strip.shine((&matter, false, false), &LocalLight::new(&light, DVec3::ZERO));
+        strip.draw((0..61).map(|i| (i, Spread::Part { key: mix(7, i as u32), first: 3 * i as u32 }, 3)));
+        let place = (size > 0.0).then_some(1);
+        strip.shine((&matter, false, false), &LocalLight::new(&light, DVec3::ZERO), place);
         let point = |i: usize| {
             let (f, l) = (&strip.found, &strip.lit);
             let columns = [&f.position, &f.error, &f.view, &f.normal, &l.radiance, &l.origin];
@@ -480,12 +487,13 @@ mod tests {
     #[test]
     fn every_instruction_set_finds_the_same_surfaces_and_light() {
         let turned = Placement::new(DMat3::from_rotation_y(0.4) * DMat3::from_diagonal(DVec3::new(1.0, 2.0, 0.5)));
-        for placement in [None, Some(&turned)] {
-            let plain = found(Level::PORTABLE, placement);
+        // One place of the light, or one that each point draws.
+        for (placement, size) in [(None, 0.0), (Some(&turned), 0.0), (Some(&turned), 0.7)] {
+            let plain = found(Level::PORTABLE, placement, size);
             let count = |k: usize| plain.iter().filter(|p| p[k] == 1).count();
             assert!(count(18) > 0 && count(19) > 30, "{} lit, {} certain", count(18), count(19));
             for level in Level::all() {
-                assert!(found(level, placement) == plain, "{}", level.name());
+                assert!(found(level, placement, size) == plain, "{}", level.name());
             }
         }
     }

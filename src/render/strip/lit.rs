@@ -4,12 +4,13 @@ use super::around::Weigh;
 use super::columns::{Column, Columns, Found, LANES, POINTS, Strip, get, leave, padded, put};
 use super::cones::Cones;
 use super::painted::Painted;
+use super::wide::Drawn;
 use crate::accel::Ray;
 use crate::math::Vec3;
 use crate::math::simd::{Kernel, Simd};
 use crate::render::beside::Traced;
 use crate::render::curve::STEEP;
-use crate::render::shade::{LocalLight, Matter, Model, PhongMatter, terminator, way};
+use crate::render::shade::{Incident, LocalLight, Matter, Model, PhongMatter, terminator, way};
 use crate::render::shadow::{Bound, Shadows};
 use crate::render::wave::Media;
 
@@ -51,13 +52,35 @@ impl Default for Lit {
 
 impl Strip {
     /// Finds what `light` does at each point of a surface of `matter`, on which highlights may be narrow if it is `shiny`; backs of
-    /// what `has_inside`, which is shiny, are seen from inside.
-    pub(crate) fn shine(&mut self, (matter, shiny, has_inside): (&Matter, bool, bool), light: &LocalLight) {
+    /// what `has_inside`, which is shiny, are seen from inside. Of a wide light it is the `place`th of those that each point has
+    /// drawn.
+    pub(crate) fn shine(
+        &mut self,
+        (matter, shiny, has_inside): (&Matter, bool, bool),
+        light: &LocalLight,
+        place: Option<u32>,
+    ) {
         let (found, lit, points, painted) = (&self.found, &mut self.lit, padded(self.count), &self.painted);
         let cones = shiny.then_some(&self.cones);
-        self.level.run(Shine { found, lit, points, matter, painted, cones, has_inside, light });
+        let drawn = place.map(|place| (&mut self.drawn, place));
+        match drawn {
+            None => {
+                self.level.run(Shine::<false> { found, lit, points, matter, painted, cones, has_inside, light, drawn })
+            }
+            Some(_) => {
+                self.level.run(Shine::<true> { found, lit, points, matter, painted, cones, has_inside, light, drawn })
+            }
+        }
         if let Some(weights) = &self.weights {
             self.level.run(Weigh { weights, radiance: &mut self.lit.radiance, points });
+        }
+        if place.is_some() {
+            for i in 0..points.min(POINTS) {
+                let part = get(&self.lit.radiance, i) * self.drawn.part(i);
+                put(&mut self.lit.radiance, i, part);
+            }
+        }
+        if self.weights.is_some() || place.is_some() {
             for i in 0..points.min(POINTS) {
                 let radiance = get(&self.lit.radiance, i);
                 self.lit.seen[i] *= u32::from(radiance.is_finite() & (radiance.max_element() > 0.0));
@@ -67,18 +90,18 @@ impl Strip {
 
     /// The points that it shines on: the sample of each, and what it shows.
     pub(crate) fn shone(&self) -> impl Iterator<Item = (u32, Vec3)> {
-        self.lit_as(&self.samples, |seen| seen != 0)
+        self.lit_as(|seen| seen != 0).map(|(i, radiance)| (self.samples[i], radiance))
     }
 
-    /// Those of them whose shadow rays [`Self::send`] does not send, by the places of their rays.
-    pub(crate) fn grazed(&self) -> impl Iterator<Item = (u32, Vec3)> {
+    /// Those of them whose shadow rays [`Self::send`] does not send: their numbers, and what they show.
+    pub(crate) fn grazed(&self) -> impl Iterator<Item = (usize, Vec3)> {
         let any = self.lit.seen[..padded(self.count)].iter().fold(0, |all, seen| all | seen) & GRAZING != 0;
-        self.lit_as(&self.rays, move |seen| any && seen == GRAZING)
+        self.lit_as(move |seen| any && seen == GRAZING)
     }
 
-    fn lit_as(&self, names: &[u32; POINTS], wanted: impl Fn(u32) -> bool) -> impl Iterator<Item = (u32, Vec3)> {
+    fn lit_as(&self, wanted: impl Fn(u32) -> bool) -> impl Iterator<Item = (usize, Vec3)> {
         let points = (0..self.count.min(POINTS)).filter(move |&i| wanted(self.lit.seen[i]));
-        points.map(|i| (names[i], get(&self.lit.radiance, i)))
+        points.map(|i| (i, get(&self.lit.radiance, i)))
     }
 
     /// Sends the shadow rays that start on their triangles, outside of everything where that matters.
@@ -148,7 +171,8 @@ impl Kernel for Send<'_> {
     }
 }
 
-struct Shine<'a> {
+/// Wide lights have a kernel of their own, which leaves the other one its lanes.
+struct Shine<'a, const WIDE: bool> {
     found: &'a Found,
     lit: &'a mut Lit,
     points: usize,
@@ -158,25 +182,29 @@ struct Shine<'a> {
     cones: Option<&'a Cones>,
     has_inside: bool,
     light: &'a LocalLight,
+    /// What was drawn of it, and which of that counts, if it is wide.
+    drawn: Option<(&'a mut Drawn, u32)>,
 }
 
-impl Kernel for Shine<'_> {
+impl<const WIDE: bool> Kernel for Shine<'_, WIDE> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Self { found, lit, points, matter, painted, cones, has_inside, light } = self;
+        let Self { found, lit, points, matter, painted, cones, has_inside, light, mut drawn } = self;
         let (points, light) = (points.min(POINTS), *light);
         let in_lux = matches!(matter.model, Model::MetalRough(_));
-        light.arriving_at(
-            points,
-            |i| get(&found.position, i),
-            |i, (incident, arrives)| {
-                put(&mut lit.to_light, i, incident.to_light);
-                put(&mut lit.light, i, if in_lux { incident.irradiance() } else { incident.strength() });
-                lit.seen[i] = u32::from(arrives);
-            },
-        );
+        match &mut drawn {
+            Some((drawn, place)) if WIDE => {
+                let [x, y] = drawn.places(*place, points);
+                let (position, at) = (|i| get(&found.position, i), |i| [x[i], y[i]]);
+                light.arriving_at_from(points, (position, at), |i, (incident, arrives)| {
+                    arrive(lit, i, (incident, arrives & drawn.has(i, *place)), in_lux);
+                    put(&mut drawn.ends, i, incident.position.unwrap_or(Vec3::ZERO));
+                });
+            }
+            _ => light.arriving_at(points, |i| get(&found.position, i), |i, it| arrive(lit, i, it, in_lux)),
+        }
         // The model is chosen outside the loop, which then is a formula.
         match &matter.model {
             Model::Unlit(_) => lit.seen.fill(0),
@@ -222,11 +250,20 @@ impl Kernel for Shine<'_> {
                 }
             }
         }
-        match light.position() {
-            Some(position) => start(found, lit, points, Some(position)),
-            None => start(found, lit, points, None),
+        match (light.position(), drawn) {
+            (None, _) => start(found, lit, points, |_| None),
+            (_, Some((drawn, _))) if WIDE => start(found, lit, points, |i| Some(get(&drawn.ends, i))),
+            (Some(position), _) => start(found, lit, points, |_| Some(position)),
         }
     }
+}
+
+/// Keeps the light that arrives at a point.
+#[inline(always)]
+fn arrive(lit: &mut Lit, i: usize, (incident, arrives): (Incident, bool), in_lux: bool) {
+    put(&mut lit.to_light, i, incident.to_light);
+    put(&mut lit.light, i, if in_lux { incident.irradiance() } else { incident.strength() });
+    lit.seen[i] = u32::from(arrives);
 }
 
 /// How bright Phong's highlight is at each point. Powers are found one by one, and only where there is something to see.
@@ -266,12 +303,12 @@ fn reflect(found: &Found, lit: &mut Lit, points: usize, share: impl Fn(usize, Ve
 
 /// Where shadow rays start, and where they go.
 #[inline(always)]
-fn start(found: &Found, lit: &mut Lit, points: usize, light: Option<Vec3>) {
+fn start(found: &Found, lit: &mut Lit, points: usize, light: impl Fn(usize) -> Option<Vec3>) {
     let mut turned = 0;
     for i in 0..points.min(POINTS) {
         let (geometric, to_light) = (get(&found.geometric, i), get(&lit.to_light, i));
         let origin = leave(found, i, to_light);
-        let (dir, end) = way(origin, to_light, light);
+        let (dir, end) = way(origin, to_light, light(i));
         put(&mut lit.origin, i, origin);
         put(&mut lit.dir, i, dir);
         lit.end[i] = end;

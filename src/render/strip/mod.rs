@@ -20,6 +20,7 @@ mod lit;
 mod painted;
 mod sheet;
 mod sorted;
+mod wide;
 
 pub(crate) use columns::{POINTS, Strip};
 pub(crate) use common::Common;

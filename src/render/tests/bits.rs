@@ -6,6 +6,7 @@ use crate::math::random::Random;
 use crate::render::context::Gloss;
 use crate::render::strip::Common;
 use crate::render::texture::TextureStore;
+use crate::render::{Sampling, Stochastic};
 use crate::scene::{
     AlphaMode, Bitmap, Environment, MetalRough, Panorama, Pixels, Sampler, Texture, TextureRef, UvTransform, Wrap,
 };
@@ -314,5 +315,29 @@ fn points_that_look_around_by_rays_have_the_same_bits_side_by_side() {
         assert_eq!(together.counts, alone.counts);
         let differ = together.picture.beauty.iter().zip(&alone.picture.beauty).filter(|(a, b)| a != b).count();
         assert_eq!(differ, 0, "pixels, {environment:?}, {rays:?} rays");
+    }
+}
+
+#[test]
+fn wide_lights_light_points_side_by_side_as_they_light_them_one_by_one() {
+    let sequence = Sampling::Stochastic(Stochastic { min_samples: 4, max_samples: 4, ..Stochastic::default() });
+    for (sampling, mut s) in [Sampling::Uniform, sequence]
+        .into_iter()
+        .flat_map(|sampling| [plain(), painted(), glazed(painted(), 3)].map(|stage| (sampling, stage)))
+    {
+        s.scene.lights.iter_mut().for_each(|light| light.size = 0.2);
+        let sides = [DVec3::X * 0.8, DVec3::Z * -0.8];
+        let kind = LightKind::Rectangle { position: DVec3::new(0.5, 3.5, 1.0), sides, falloff: Falloff::None };
+        let intensity = Vec3::new(0.4, 0.3, 0.2);
+        s.scene.lights.push(Light { name: String::new(), intensity, kind, shadows: true, size: 0.0 });
+        // Three of each light, and one of each in what mirrors show.
+        (s.settings.sampling, s.settings.light_rays) = (sampling, if sampling == Sampling::Uniform { 9 } else { 12 });
+        let together = s.render();
+        s.settings.layers = true;
+        let alone = s.render();
+        assert_eq!(together.counts, alone.counts, "{sampling:?}");
+        let differ = together.picture.beauty.iter().zip(&alone.picture.beauty).filter(|(a, b)| a != b).count();
+        assert_eq!(differ, 0, "pixels, {sampling:?}");
+        assert!(together.counts.shadow.queries > 2 * together.counts.primary.queries, "{:?}", together.counts);
     }
 }
