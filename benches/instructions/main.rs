@@ -43,8 +43,9 @@ const QUESTIONS: [&str; 2] = ["first", "any"];
 
 /// Pictures by what they show and what lights it: a sample for each of [`RAYS`] pixels. They are drawn with the best
 /// instructions that Valgrind knows, so that a formula that is no longer computed in lanes shows.
-const PICTURES: [[&str; 2]; 6] = [
+const PICTURES: [[&str; 2]; 7] = [
     ["plain", "lamp"],
+    ["plain", "ball"],
     ["plain", "studio"],
     ["mapped", "lamp"],
     ["mapped", "studio"],
@@ -205,9 +206,10 @@ fn picture(of: &str, light: &str) -> ExitCode {
     if light == "panorama" {
         scene.environment = Environment::Panorama;
         scene.panorama = Some(panorama());
-    } else if light == "lamp" {
+    } else if let "lamp" | "ball" = light {
         let kind = LightKind::Point { position: eye + DVec3::X * size.x, falloff: Falloff::None };
-        scene.lights.push(Light { name: String::new(), intensity: Vec3::ONE, kind, shadows: true, size: 0.0 });
+        let radius = if light == "ball" { 0.05 * size.x } else { 0.0 };
+        scene.lights.push(Light { name: String::new(), intensity: Vec3::ONE, kind, shadows: true, size: radius });
     } else {
         default_light::add_if_missing(&mut scene, &camera);
     }

@@ -39,21 +39,21 @@ impl Drawn {
     pub(super) fn places(&self, k: u32, points: usize) -> [Column; 2] {
         let (mut keys, mut firsts) = ([0; POINTS], [0; POINTS]);
         let (mut x, mut y) = ([0.0; POINTS], [0.0; POINTS]);
-        let mut is_sequence = true;
-        for (i, spread) in self.spreads.iter().enumerate().take(points) {
+        let mut is_sequence = false;
+        for (i, spread) in self.spreads.iter().enumerate().take(points).filter(|(i, _)| self.counts[*i] > 0) {
             match *spread {
-                Spread::Part { key, first } => (keys[i], firsts[i]) = (key, first),
-                Spread::Moved(_) => is_sequence = false,
+                Spread::Part { key, first } => (keys[i], firsts[i], is_sequence) = (key, first, true),
+                Spread::Moved(shift) => [x[i], y[i]] = shift,
             }
         }
-        // Known outside the loop, which then is a formula.
+        // All points of a picture draw in one way. It is known outside the loop, which then is a formula.
         if is_sequence {
             for i in 0..points.min(POINTS) {
                 [x[i], y[i]] = Spread::Part { key: keys[i], first: firsts[i] }.point(k);
             }
         } else {
             for i in 0..points.min(POINTS) {
-                [x[i], y[i]] = self.spreads[i].point(k);
+                [x[i], y[i]] = Spread::Moved([x[i], y[i]]).point(k);
             }
         }
         [x, y]
