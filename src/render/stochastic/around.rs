@@ -7,7 +7,7 @@
 
 use super::pixel::Pixel;
 use crate::render::certainty::{Certainty, Even, GROUPS, Range, Seen, Shown};
-use crate::render::tile::Tile;
+use crate::render::tile::{End, Tile};
 
 /// How many columns and rows from a pixel others are looked at as closely: from one on an edge, and from one with something
 /// thin, of which the next pixels may well show nothing.
@@ -54,7 +54,7 @@ impl Around {
     }
 
     /// Knows a pixel by its number, all smaller ones of which are known.
-    pub(super) fn number(&mut self, pixel: (u32, u32), number: usize) {
+    pub(super) fn know(&mut self, pixel: (u32, u32), number: usize) {
         let at = self.at(pixel);
         self.numbers[at] = number;
         self.seen.push(self.shown.at(at));
@@ -80,16 +80,17 @@ impl Around {
         });
     }
 
-    /// Opens the pixels of `tile` that were done with one sample and lie near uneven ones of these; their numbers.
+    /// Opens the pixels of `tile` that were done with so many samples and lie near uneven ones of these: those of one, which have no
+    /// numbers yet, and those of more, which have; their numbers.
     pub(super) fn reopen(
         &mut self,
         judge: &Certainty,
         pixels: &mut Vec<Pixel>,
-        some: &[usize],
+        (some, samples): (&[usize], u32),
         tile: Tile,
         open: impl Fn((u32, u32)) -> Pixel,
     ) -> Vec<usize> {
-        let first = pixels.len();
+        let mut opened = Vec::new();
         for &pixel in some {
             let own = self.seen[pixel].range;
             if judge.agree(&own) {
@@ -99,14 +100,21 @@ impl Around {
             let reach = REACH[usize::from(judge.is_thin(&own, self.near(self.at((x, y)))))];
             for y in y.saturating_sub(reach).max(tile.y0)..(y + reach + 1).min(tile.y1) {
                 for x in x.saturating_sub(reach).max(tile.x0)..(x + reach + 1).min(tile.x1) {
-                    if self.numbers[self.at((x, y))] == NONE {
-                        self.number((x, y), pixels.len());
-                        pixels.push(open((x, y)));
+                    let mut number = self.numbers[self.at((x, y))];
+                    match pixels.get_mut(number) {
+                        Some(pixel) if pixel.is_done_with(samples) => pixel.facts.end = End::Ceiling,
+                        Some(_) => continue,
+                        None => {
+                            number = pixels.len();
+                            self.know((x, y), number);
+                            pixels.push(open((x, y)));
+                        }
                     }
+                    opened.push(number);
                 }
             }
         }
-        (first..pixels.len()).collect()
+        opened
     }
 
     /// Finds the pixels of these that are done: their samples and those of the pixels beside them agree each among

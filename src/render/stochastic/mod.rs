@@ -3,8 +3,8 @@
 //!
 //! What decides about a pixel are its own samples, and in the first rounds those of the pixels beside it ([`around`]): a
 //! pixel that happens to see nothing of what its neighbours see goes on with them. Pixels around the tile are therefore
-//! looked at in these rounds, too. Their first samples come from the tiles that they belong to ([`shared`]); those of the
-//! second look are traced by this tile for itself, as they are few, and counted.
+//! looked at in these rounds, too. Where pixels start with one sample, tiles share these ([`shared`]); all others are traced by
+//! this tile for itself, since no tile may wait for another, and counted.
 
 mod around;
 mod first;
@@ -109,14 +109,14 @@ impl<'a> Sampler<'a> {
             1
         } else {
             around.tile.places().for_each(|at| {
-                around.number(at, pixels.len());
+                around.know(at, pixels.len());
                 pixels.push(self.pixel(at));
             });
             0
         };
         let (mut active, mut errors): (Vec<usize>, _) = ((0..pixels.len()).collect(), Vec::new());
-        let mut from = if start > 0 { 1 } else { 0 };
-        for (round, &to) in rounds.iter().enumerate().skip(start) {
+        let mut from = start;
+        for (round, &to) in rounds.iter().enumerate().skip(start as usize) {
             if active.is_empty() {
                 break;
             }
@@ -126,7 +126,7 @@ impl<'a> Sampler<'a> {
                 let mut news = if from > 0 { active.clone() } else { Vec::new() };
                 while !news.is_empty() {
                     let open = |at| self.opened(first, at);
-                    news = around.reopen(judge, &mut pixels, &news, known, open);
+                    news = around.reopen(judge, &mut pixels, (&news, from), known, open);
                     self.trace(tracer, &mut pixels, &news, from..to)?;
                     around.see(judge, &pixels, &news);
                     active.extend(&news);
@@ -172,7 +172,7 @@ impl<'a> Sampler<'a> {
             let start = around.at((x0, y));
             for (x, at) in (x0..).zip(start..start + count) {
                 if !even.is_even(at) {
-                    around.number((x, y), pixels.len());
+                    around.know((x, y), pixels.len());
                     pixels.push(self.opened(first, (x, y)));
                     let range = around.range((x, y));
                     pixels.last_mut().into_iter().for_each(|pixel| pixel.surround(&self.judge, &range));
@@ -215,10 +215,10 @@ impl<'a> Sampler<'a> {
     }
 
     /// Puts pixels in their places; the first `start` samples of each are counted already.
-    fn put(&self, pixels: &[Pixel], start: usize, done: &mut TilePixels) {
+    fn put(&self, pixels: &[Pixel], start: u32, done: &mut TilePixels) {
         let (frame, tile) = (self.frame, done.tile);
         for pixel in pixels {
-            let rays = u64::from(pixel.facts.count) - start as u64;
+            let rays = u64::from(pixel.facts.count - start);
             done.rays += rays;
             if !tile.contains(pixel.at) {
                 done.rays_around += rays;

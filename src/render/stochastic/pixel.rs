@@ -56,6 +56,11 @@ impl Pixel {
         (self.facts.error, self.facts.end) = (error, End::Met);
     }
 
+    /// Whether so many samples were enough.
+    pub(super) fn is_done_with(&self, samples: u32) -> bool {
+        self.facts.end == End::Met && self.facts.count == samples
+    }
+
     /// Remembers what its first samples and those of the pixels beside it lie between.
     pub(super) fn surround(&mut self, judge: &Certainty, range: &Range) {
         (self.contrast, self.brightest) = (judge.contrast(range), range.brightest);
