@@ -1,7 +1,8 @@
 //! The picture in tiles: each is one unit of work for one thread, and threads take the next tile when they are done.
 //!
-//! Nothing a tile computes depends on the thread, nor on another tile (but in [`adaptive`], where they take turns), so that
-//! every number of threads gives the same bits.
+//! Nothing a tile computes depends on the thread or on when others are computed, so that every number of threads gives the same
+//! bits. Where tiles tell each other what they have found, in [`adaptive`] and [`stochastic`], what is traced together does not
+//! depend on who does it.
 
 use super::context::Context;
 use super::eyes::Ball;
@@ -115,7 +116,6 @@ pub(crate) fn render_tiles<A: Accel, P: Observer>(
 ) -> (Picture, Sampled, Vec<ByClass<P>>, bool) {
     let frame = Frame::new(context, view, settings);
     let whole = Mutex::new(Whole::new(settings));
-    // Every tile is kept at once or not at all.
     let keep = |pixels: TilePixels| whole.lock().unwrap_or_else(PoisonError::into_inner).keep(&pixels);
     let tiles = tiles(settings.width, settings.height);
     let (counts, complete) = match &settings.sampling {
@@ -358,15 +358,16 @@ impl Tile {
         parts.into_iter().filter(|part| part.pixels() > 0)
     }
 
-    /// One of nine parts of a whole tile, row by row: its corners, a block wide and high, the sides between them and the middle.
-    /// A smaller tile may have nothing in some.
-    pub(super) fn zone(self, zone: usize) -> Self {
-        let part = |from: u32, to: u32, part: usize| {
+    /// Nine parts of a whole tile, row by row: its corners, a block wide and high, the sides between them and the middle. Those of
+    /// a smaller tile in which there is nothing are left out.
+    pub(super) fn zones(self) -> impl Iterator<Item = Self> {
+        let parts = |from: u32, to: u32| {
             let cuts = [from, from + BLOCK, from + TILE - BLOCK, from + TILE].map(|cut| cut.min(to));
-            (cuts[part], cuts[part + 1])
+            (0..3).map(move |part| (cuts[part], cuts[part + 1]))
         };
-        let ((x0, x1), (y0, y1)) = (part(self.x0, self.x1, zone % 3), part(self.y0, self.y1, zone / 3));
-        Self { x0, y0, x1, y1 }
+        let rows = parts(self.y0, self.y1);
+        let all = rows.flat_map(move |(y0, y1)| parts(self.x0, self.x1).map(move |(x0, x1)| Self { x0, y0, x1, y1 }));
+        all.filter(|zone| zone.pixels() > 0)
     }
 
     /// Whether some pixel belongs to both.

@@ -1,8 +1,10 @@
 //! All tiles of a picture, which share the first samples of their pixels.
 //!
-//! A tile needs these of some pixels around it, too. Whoever needs them first traces them, and they are kept until all tiles
-//! that need them are finished: so each is traced once, and all samples of a tile soon after each other, while what they meet
-//! is near in memory. They are handed over by zones, since of tiles beside it a tile needs no more than their borders.
+//! A tile needs these of some pixels around it, too. They are traced by zones, since of tiles beside it a tile needs no more
+//! than their borders: each zone belongs to the first tile that needs it, so that each is traced once, and all samples of a tile
+//! soon after each other, while what they meet is near in memory. All zones of a tile go together, whoever traces them: what a
+//! sample gathers may depend on those that are traced with it, where more rays wait than go into a wave. They are kept until
+//! all tiles that need them are finished.
 
 use super::first::First;
 use super::{Sampler, Stochastic};
@@ -14,10 +16,8 @@ use crate::render::frame::Frame;
 use crate::render::observer::Observer;
 use crate::render::tile::{Tile, TilePixels, each_tile};
 use crate::render::whitted::{ByClass, Tracer};
+use std::ops::Range;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-
-/// Zones of a tile.
-const ZONES: usize = 9;
 
 /// Renders all tiles, given row by row, and has each kept that is finished; the counts of all threads, and whether nothing was
 /// cut short.
@@ -31,176 +31,259 @@ pub(in crate::render) fn render_all<A: Accel, P: Observer>(
 ) -> (Vec<ByClass<P>>, bool) {
     let output = output(how.space, frame.background);
     let sampler = Sampler::new(frame, how, output.as_ref(), context.scene.background);
-    let shared = Shared::new(tiles, tiles.iter().map(|&tile| sampler.grown(tile, sampler.reach())).collect());
-    let work = |tracer: &mut Tracer<A, P>, &i: &usize| {
-        if !sampler.starts_with_one() {
-            return sampler.finish(tracer, tiles[i], &[]).map(keep);
-        }
-        let needed = shared.needed(i);
-        let mut promise = shared.promise(&needed);
-        promise.first = sampler.first(tracer, promise.zones.iter().map(|&zone| shared.zone(zone)))?;
-        drop(promise);
-        let first = shared.wait_for(&needed)?;
-        let first: Vec<&First> = first.iter().map(|first| &**first).collect();
-        keep(sampler.finish(tracer, tiles[i], &first)?);
-        shared.forget(&needed);
-        Some(())
+    let numbers: Vec<usize> = (0..tiles.len()).collect();
+    let (_, counts, complete) = if sampler.starts_with_one() {
+        let shared = Shared::new(tiles, |tile| sampler.grown(tile, sampler.reach()));
+        each_tile(context, accel, &numbers, progress, |tracer, &i| shared.finish(&sampler, tracer, i).map(keep))
+    } else {
+        each_tile(context, accel, tiles, progress, |tracer, &tile| sampler.finish(tracer, tile, &[]).map(keep))
     };
-    let (_, counts, complete) = each_tile(context, accel, &(0..tiles.len()).collect::<Vec<_>>(), progress, work);
     (counts, complete)
 }
 
-/// First samples that some tile still needs, by zones.
+/// First samples that some tile still needs.
 struct Shared<'t> {
     tiles: &'t [Tile],
-    /// What each needs.
-    grown: Vec<Tile>,
-    /// Tiles in a row.
-    columns: usize,
-    states: Mutex<Vec<State>>,
-    /// Some of them are there, or will never be.
+    /// Those of the first tile that owns any, then those of the next.
+    zones: Vec<Zone>,
+    /// The zones, by number, that each tile needs.
+    needs: Vec<Vec<usize>>,
+    states: Mutex<States>,
+    /// Some samples are there, or will never be.
     changed: Condvar,
 }
 
-/// What is known of the first samples of a zone.
-enum State {
+/// A part of a tile that is traced with the others of its owner.
+#[derive(Clone, Copy, Debug)]
+struct Zone {
+    part: Tile,
+    owner: usize,
+}
+
+/// What is known of the first samples.
+struct States {
+    /// Of all zones that belong to a tile.
+    steps: Vec<Step>,
+    /// Those of each zone, and how many tiles still need them.
+    first: Vec<(Option<Arc<First>>, usize)>,
+}
+
+/// How far they are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Step {
     /// Nobody has needed them yet.
     Untouched,
     /// Somebody traces them.
     Promised,
-    /// They are there, and so many tiles still need them.
-    There(Arc<First>, usize),
-    /// Nobody will trace them: the user has given up.
-    Never,
-    /// Nobody needs them any more.
-    Forgotten,
+    /// Somebody has traced them, or failed to.
+    Done,
 }
 
 impl<'t> Shared<'t> {
-    fn new(tiles: &'t [Tile], grown: Vec<Tile>) -> Self {
+    /// Of tiles row by row, each of which needs what it becomes when it is `grown`.
+    fn new(tiles: &'t [Tile], grown: impl Fn(Tile) -> Tile) -> Self {
         let columns = tiles.iter().take_while(|tile| tile.y0 == tiles[0].y0).count().max(1);
-        let states = (0..tiles.len() * ZONES).map(|_| State::Untouched).collect();
-        Self { tiles, grown, columns, states: Mutex::new(states), changed: Condvar::new() }
+        let grown: Vec<Tile> = tiles.iter().map(|&tile| grown(tile)).collect();
+        let needing = |i: usize, part: Tile| -> Vec<usize> {
+            beside(i, columns, tiles.len()).filter(|&tile| grown[tile].meets(part)).collect()
+        };
+        let parts = tiles.iter().enumerate().flat_map(|(i, tile)| tile.zones().map(move |part| (i, part)));
+        let mut needed: Vec<_> = parts.map(|(i, part)| (needing(i, part), part)).collect();
+        needed.sort_by_key(|(needing, _)| needing.first().copied());
+        let (mut zones, mut needs, mut first) = (Vec::new(), vec![Vec::new(); tiles.len()], Vec::new());
+        for (needing, part) in needed {
+            let Some(&owner) = needing.first() else { continue };
+            needing.iter().for_each(|&tile| needs[tile].push(zones.len()));
+            zones.push(Zone { part, owner });
+            first.push((None, needing.len()));
+        }
+        let states = Mutex::new(States { steps: vec![Step::Untouched; tiles.len()], first });
+        Self { tiles, zones, needs, states, changed: Condvar::new() }
     }
 
-    fn zone(&self, zone: usize) -> Tile {
-        self.tiles[zone / ZONES].zone(zone % ZONES)
+    /// Renders a tile by number; `None` when cancelled.
+    fn finish<A: Accel, P: Observer>(
+        &self,
+        sampler: &Sampler,
+        tracer: &mut Tracer<A, P>,
+        tile: usize,
+    ) -> Option<TilePixels> {
+        // Others have mostly traced what belongs to tiles before this one.
+        for &zone in &self.needs[tile] {
+            if let Some(mut promise) = self.promise(self.zones[zone].owner) {
+                let zones = &self.zones[promise.zones.clone()];
+                promise.first = sampler.first(tracer, zones.iter().map(|zone| zone.part))?;
+            }
+        }
+        let first = self.wait_for(tile)?;
+        let first: Vec<&First> = first.iter().map(|first| &**first).collect();
+        let done = sampler.finish(tracer, self.tiles[tile], &first)?;
+        self.forget(tile);
+        Some(done)
     }
 
-    /// A tile and those beside it. What a tile needs reaches no farther: only the last ones of a row or a column are small.
-    fn beside(&self, tile: usize) -> impl Iterator<Item = usize> + use<> {
-        let (columns, rows) = (self.columns, self.tiles.len().div_ceil(self.columns));
-        let (row, column) = (tile / columns, tile % columns);
-        let near = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
-        near(row, rows).flat_map(move |row| near(column, columns).map(move |column| row * columns + column))
-    }
-
-    /// The zones that a tile needs.
-    fn needed(&self, tile: usize) -> Vec<usize> {
-        let zones = self.beside(tile).flat_map(|tile| tile * ZONES..(tile + 1) * ZONES);
-        zones.filter(|&zone| self.grown[tile].meets(self.zone(zone))).collect()
-    }
-
-    /// How many tiles need a zone.
-    fn needing(&self, zone: usize) -> usize {
-        self.beside(zone / ZONES).filter(|&tile| self.grown[tile].meets(self.zone(zone))).count()
-    }
-
-    fn states(&self) -> MutexGuard<'_, Vec<State>> {
-        // Every state is set at once, so that a thread that failed leaves none half set.
+    fn states(&self) -> MutexGuard<'_, States> {
+        // Nothing that can fail is done while states change.
         self.states.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Those of these zones that nobody traces yet: the caller will.
-    fn promise(&self, needed: &[usize]) -> Promise<'_, 't> {
-        let mut states = self.states();
-        let is_untouched = |&zone: &usize| matches!(states[zone], State::Untouched);
-        let zones: Vec<usize> = needed.iter().copied().filter(is_untouched).collect();
-        zones.iter().for_each(|&zone| states[zone] = State::Promised);
-        Promise { shared: self, zones, first: Vec::new() }
+    /// The zones of a tile, if nobody traces them yet: the caller will.
+    fn promise(&self, owner: usize) -> Option<Promise<'_, 't>> {
+        let step = &mut self.states().steps[owner];
+        (*step == Step::Untouched).then(|| {
+            *step = Step::Promised;
+            let [start, end] = [owner, owner + 1].map(|tile| self.zones.partition_point(|zone| zone.owner < tile));
+            Promise { shared: self, owner, zones: start..end, first: Vec::new() }
+        })
     }
 
-    /// The first samples of zones, all of which are promised, when they are there; `None` when some will never be. Nobody waits
-    /// who has promised any.
-    fn wait_for(&self, needed: &[usize]) -> Option<Vec<Arc<First>>> {
-        let mut states = self.states();
-        while needed.iter().any(|&zone| matches!(states[zone], State::Promised)) {
+    /// The first samples that a tile needs, when all are there; `None` when some will never be. All must be promised, and
+    /// nobody waits who has promised any and not kept it.
+    fn wait_for(&self, tile: usize) -> Option<Vec<Arc<First>>> {
+        let (mut states, needs) = (self.states(), &self.needs[tile]);
+        while needs.iter().any(|&zone| states.steps[self.zones[zone].owner] != Step::Done) {
             states = self.changed.wait(states).unwrap_or_else(PoisonError::into_inner);
         }
-        let first = |&zone: &usize| match &states[zone] {
-            State::There(first, _) => Some(Arc::clone(first)),
-            _ => None,
-        };
-        needed.iter().map(first).collect()
+        needs.iter().map(|&zone| states.first[zone].0.clone()).collect()
     }
 
-    /// A tile that has needed these is finished.
-    fn forget(&self, needed: &[usize]) {
+    /// A tile is finished.
+    fn forget(&self, tile: usize) {
         let mut states = self.states();
-        for &zone in needed {
-            if let State::There(_, needing) = &mut states[zone] {
-                *needing -= 1;
-                if *needing == 0 {
-                    states[zone] = State::Forgotten;
-                }
+        for &zone in &self.needs[tile] {
+            let (first, needing) = &mut states.first[zone];
+            *needing -= 1;
+            if *needing == 0 {
+                *first = None;
             }
         }
     }
 }
 
+/// A tile and those beside it, by number, of so many that lie row by row. What a tile needs reaches no farther: only the last
+/// ones of a row or a column are small.
+fn beside(tile: usize, columns: usize, tiles: usize) -> impl Iterator<Item = usize> {
+    let (row, column) = (tile / columns, tile % columns);
+    let near = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
+    near(row, tiles.div_ceil(columns))
+        .flat_map(move |row| near(column, columns).map(move |column| row * columns + column))
+}
+
 /// Hands over first samples in the end, however that comes.
 struct Promise<'a, 't> {
     shared: &'a Shared<'t>,
-    zones: Vec<usize>,
+    owner: usize,
+    zones: Range<usize>,
     /// Of all of these zones, or none.
     first: Vec<First>,
 }
 
 impl Drop for Promise<'_, '_> {
     fn drop(&mut self) {
-        let shared = self.shared;
-        let mut first = std::mem::take(&mut self.first).into_iter();
-        let mut there = |zone| first.next().map(|first| State::There(Arc::new(first), shared.needing(zone)));
-        let new: Vec<State> = self.zones.iter().map(|&zone| there(zone).unwrap_or(State::Never)).collect();
-        let mut states = shared.states();
-        self.zones.iter().zip(new).for_each(|(&zone, state)| states[zone] = state);
-        shared.changed.notify_all();
+        let first: Vec<_> = self.first.drain(..).map(Arc::new).collect();
+        let mut states = self.shared.states();
+        states.steps[self.owner] = Step::Done;
+        states.first[self.zones.clone()].iter_mut().zip(first).for_each(|((kept, _), first)| *kept = Some(first));
+        self.shared.changed.notify_all();
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::accel::{AccelKind, AccelParams, AnyAccel, RayCounts};
+    use crate::math::DVec3;
+    use crate::render::sampling::Sampling;
+    use crate::render::texture::TextureStore;
+    use crate::render::view::{Lens, View};
+    use crate::render::{Settings, World};
+    use crate::scene::{Environment, Material, MetalRough, Scene, Sphere, Surface};
 
-    /// Tiles of a picture of this size, 32 pixels wide and high, and what they need.
-    fn tiles(width: u32, height: u32) -> (Vec<Tile>, Vec<Tile>) {
+    /// Tiles of a picture of this size, 32 pixels wide and high.
+    fn tiles(width: u32, height: u32) -> Vec<Tile> {
         let rows = (0..height).step_by(32);
         let corners = rows.flat_map(|y0| (0..width).step_by(32).map(move |x0| (x0, y0)));
-        let tile = |(x0, y0)| Tile { x0, y0, x1: width.min(x0 + 32), y1: height.min(y0 + 32) };
-        let tiles: Vec<Tile> = corners.map(tile).collect();
-        let grown = |tile: &Tile| tile.grown(width, height).grown(width, height);
-        (tiles.clone(), tiles.iter().map(grown).collect())
+        corners.map(|(x0, y0)| Tile { x0, y0, x1: width.min(x0 + 32), y1: height.min(y0 + 32) }).collect()
     }
 
     #[test]
-    fn a_tile_needs_zones_that_cover_what_is_around_it_and_each_zone_is_traced_by_one() {
+    fn a_tile_needs_zones_that_cover_what_is_around_it_and_each_zone_belongs_to_one() {
         for (width, height) in [(1, 1), (33, 34), (96, 65), (250, 3)] {
-            let (tiles, grown) = tiles(width, height);
-            let shared = Shared::new(&tiles, grown.clone());
-            let mut traced = Vec::new();
-            for (i, grown) in grown.iter().enumerate() {
-                let needed = shared.needed(i);
-                assert!(needed.iter().all(|&zone| shared.needing(zone) > 0));
-                let promise = shared.promise(&needed);
-                traced.extend(promise.zones.iter().flat_map(|&zone| shared.zone(zone).places()));
-                let covered = |at| needed.iter().any(|&zone| shared.zone(zone).contains(at));
-                assert!(grown.places().all(covered), "{i} of {width}×{height}");
+            let (tiles, grown) = (tiles(width, height), |tile: Tile| tile.grown(width, height).grown(width, height));
+            let shared = Shared::new(&tiles, grown);
+            for (i, &tile) in tiles.iter().enumerate() {
+                let zones = || shared.needs[i].iter().map(|&zone| shared.zones[zone]);
+                assert!(
+                    grown(tile).places().all(|at| zones().any(|zone| zone.part.contains(at))),
+                    "{i} of {width}×{height}"
+                );
+                assert!(zones().all(|zone| zone.owner <= i), "tiles before this one, which are taken before");
             }
+            let mut traced: Vec<_> = shared.zones.iter().flat_map(|zone| zone.part.places()).collect();
+            let count = traced.len();
             traced.sort_unstable();
             traced.dedup();
-            assert_eq!(traced.len(), (width * height) as usize);
-            assert!(shared.states().iter().all(|state| !matches!(state, State::Promised)), "nobody has kept a promise");
-            assert!(shared.wait_for(&shared.needed(0)).is_none());
+            assert_eq!((traced.len(), count), ((width * height) as usize, (width * height) as usize));
         }
+    }
+
+    #[test]
+    fn whoever_waits_for_a_promise_that_is_not_kept_hears_of_it() {
+        let tiles = tiles(70, 40);
+        let shared = Shared::new(&tiles, |tile| tile.grown(70, 40));
+        std::thread::scope(|threads| {
+            let owners = shared.needs[4].iter().map(|&zone| shared.zones[zone].owner);
+            let promises: Vec<_> = owners.filter_map(|owner| shared.promise(owner)).collect();
+            assert!(promises.len() > 1 && shared.promise(promises[0].owner).is_none(), "promised once");
+            let waiting = threads.spawn(|| shared.wait_for(4).is_none());
+            drop(promises);
+            assert!(waiting.join().expect("a thread"));
+        });
+    }
+
+    /// A ball of glass that bends every colour its own way, over all of the picture: each eye ray becomes so many that they do
+    /// not fit one wave, and where they are cut decides about the last bits of sums.
+    fn prism() -> Scene {
+        let glass = MetalRough {
+            transmission: 1.0,
+            thick: true,
+            roughness: 0.0,
+            metallic: 0.0,
+            dispersion: 4.0,
+            ..MetalRough::default()
+        };
+        let material = Material { surface: Surface::MetalRough(glass), ..Material::plain() };
+        let sphere = Sphere { name: String::new(), center: DVec3::ZERO, radius: 1.5, material: 0 };
+        Scene { materials: vec![material], spheres: vec![sphere], environment: Environment::Studio, ..Scene::default() }
+    }
+
+    #[test]
+    fn the_order_in_which_threads_take_tiles_changes_no_bit() {
+        let (scene, (width, height)) = (prism(), (130, 70));
+        let how = Stochastic { error: 0.25, max_samples: 4, ..Stochastic::default() };
+        let settings =
+            Settings { width, height, depth: Some(4), sampling: Sampling::Stochastic(how), ..Settings::default() };
+        let world = World::new(&scene);
+        let accel = AnyAccel::build(AccelKind::None, &world.shapes, &AccelParams::DEFAULT);
+        let textures = TextureStore::new(&scene);
+        let context = Context::new(&scene, &world, &textures, &settings);
+        let view = View::look_at(DVec3::new(0.3, 0.2, 4.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.3));
+        let frame = Frame::new(&context, &view, &settings);
+        let output = output(how.space, frame.background);
+        let sampler = Sampler::new(&frame, &how, output.as_ref(), scene.background);
+        let tiles = tiles(width, height);
+        let in_order = |order: &mut dyn Iterator<Item = usize>| {
+            let shared = Shared::new(&tiles, |tile| sampler.grown(tile, sampler.reach()));
+            let mut tracer = Tracer::<_, RayCounts>::new(&context, &accel, &());
+            let mut done: Vec<_> = order.filter_map(|i| shared.finish(&sampler, &mut tracer, i)).collect();
+            done.sort_by_key(|done| (done.tile.y0, done.tile.x0));
+            (done.into_iter().flat_map(|done| done.beauty).collect::<Vec<_>>(), tracer.counts)
+        };
+        let (forward, counts) = in_order(&mut (0..tiles.len()));
+        let refracted = counts.refracted.queries / counts.primary.queries;
+        assert!(forward.len() == 130 * 70 && refracted > 12, "{refracted} rays behind each");
+        let (backward, _) = in_order(&mut (0..tiles.len()).rev());
+        let differ = forward.iter().zip(&backward).filter(|(a, b)| a != b).count();
+        assert_eq!(differ, 0, "pixels");
     }
 }
