@@ -1,10 +1,9 @@
 //! What a picture will take and how wrong it will be, foretold from a part of it.
 
 use super::context::Context;
-use super::part::{Measure, Part, Quiet, SIDE, squared_errors, squares};
+use super::part::{Measure, Part, Quiet, squared_errors, squares};
 use super::sampling::Sampling;
 use super::target;
-use super::tile::TILE;
 use super::{Job, Progress, Settings};
 use crate::accel::{NoProbe, RayCounts};
 
@@ -82,14 +81,7 @@ pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
         (0..timed.squares.len()).map(|i| value(i) / timed.squares[i].beauty.len().max(1) as f64).collect()
     };
     let whole = pixels as f64 * work;
-    // Of the pixels around it a square has more, for its size, than a tile, which need not trace their first rays.
-    let rays_of = |i: usize| {
-        let square = &timed.squares[i];
-        let around = square.rays_around as f64 * (1.0 - f64::from(SIDE) / f64::from(TILE));
-        (square.rays - square.rays_beyond) as f64 - around
-    };
-    let rays = Interval::of_mean(&per_pixel(&rays_of), whole);
-    let seconds_of = |i: usize| timed.spent[i].as_secs_f64() * rays_of(i) / timed.squares[i].rays.max(1) as f64;
+    let rays = Interval::of_mean(&per_pixel(&|i| timed.rays_in_tiles(i)), whole);
     let tests: u64 =
         counted.counts.iter().flat_map(|c| [c.primary, c.shadow, c.reflected, c.refracted]).map(|c| c.n_it).sum();
     let per_ray = tests as f64 / counted.rays().max(1) as f64;
@@ -98,7 +90,7 @@ pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
     Some(Forecast {
         looked_at,
         pixels,
-        cpu: Interval::of_mean(&per_pixel(&seconds_of), whole),
+        cpu: Interval::of_mean(&per_pixel(&|i| timed.seconds_in_tiles(i)), whole),
         rays,
         tests: rays.map(|rays| rays * per_ray),
         rmse: is_random.then(|| Interval::of_mean(&squared, 1.0 / work).map(f64::sqrt)),

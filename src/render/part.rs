@@ -4,7 +4,7 @@ use super::certainty::output;
 use super::context::Context;
 use super::observer::Observer;
 use super::sampling::{ErrorSpace, Sampling};
-use super::tile::{Tile, TilePixels, render_some};
+use super::tile::{TILE, Tile, TilePixels, render_some};
 use super::whitted::ByClass;
 use super::{Job, Progress, Settings};
 use crate::image::Developer;
@@ -84,9 +84,23 @@ impl<P: Observer> Part<P> {
         self.squares.iter().map(|square| square.beauty.len()).sum()
     }
 
-    /// Of processor time, on the average.
+    /// Eye rays that a square would take as a part of whole tiles. Of the pixels around it a square has more, for its size, than
+    /// a tile, and of the first rays through these a tile traces none.
+    pub(super) fn rays_in_tiles(&self, square: usize) -> f64 {
+        let square = &self.squares[square];
+        let around = square.rays_around as f64 * (1.0 - f64::from(SIDE) / f64::from(TILE));
+        (square.rays - square.rays_beyond) as f64 - around
+    }
+
+    /// Processor time that it would take so.
+    pub(super) fn seconds_in_tiles(&self, square: usize) -> f64 {
+        self.spent[square].as_secs_f64() * self.rays_in_tiles(square) / self.squares[square].rays.max(1) as f64
+    }
+
+    /// Processor time of a pixel as a part of whole tiles, on the average.
     pub(super) fn seconds_per_pixel(&self) -> f64 {
-        self.spent.iter().sum::<Duration>().as_secs_f64() / self.pixels().max(1) as f64
+        let seconds: f64 = (0..self.squares.len()).map(|i| self.seconds_in_tiles(i)).sum();
+        seconds / self.pixels().max(1) as f64
     }
 
     /// Samples of each, on the average.
