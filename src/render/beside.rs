@@ -305,6 +305,8 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             for place in 0..strip.draw(draws.iter_mut().map(|(i, draws, rays)| (*i, draws.spread(*rays), *rays))) {
                 strip.shine(what, light, Some(place));
                 self.ask_for(traced, light, strip, (within, Some(place)));
+                // Their number is the user's to choose.
+                self.relieve_shadows();
             }
         }
         self.beside.draws = draws;
