@@ -244,6 +244,7 @@ impl Eyes {
         let (Some(rays), [Some(x), Some(y), Some(z), Some(width), Some(spread)]) =
             (from(&mut self.rays, start), columns)
         else {
+            run.count = 0;
             return;
         };
         #[expect(clippy::cast_possible_truncation, reason = "a wave has few samples")]

@@ -54,8 +54,7 @@ impl Shown {
     }
 }
 
-/// Which of single samples look as all of the eight beside them do.
-#[derive(Default)]
+/// Which of single samples look as all of the eight beside them do; of places that were compared.
 pub(in crate::render) struct Even {
     is_uneven: Vec<u32>,
     /// Standard error of the pixel, the root of the mean over its channels, from the range of nine samples: of it and of the

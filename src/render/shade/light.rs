@@ -167,52 +167,37 @@ impl LocalLight {
         arrives.then_some(incident)
     }
 
-    /// What arrives at the first so many positions, and whether anything does.
+    /// What arrives at the first so many positions, of a wide light from the place that is drawn for each with `at`, and whether
+    /// anything does.
     #[inline(always)]
     pub(crate) fn arriving_at(
         &self,
         points: usize,
-        position: impl Fn(usize) -> Vec3,
+        (position, at): (impl Fn(usize) -> Vec3, impl Fn(usize) -> Option<[f32; 2]>),
         mut take: impl FnMut(usize, (Incident, bool)),
     ) {
         // The shape is known outside the loop, which then is a formula.
         match self.shape {
             Shape::Directional(to_light) => {
                 let light = Self { shape: Shape::Directional(to_light), ..*self };
-                (0..points).for_each(|i| take(i, light.arriving(position(i))));
+                (0..points).for_each(|i| take(i, light.arriving_by(position(i), at(i))));
             }
             Shape::Point { position: from, falloff, cone } => {
                 let light = Self { shape: Shape::Point { position: from, falloff, cone }, ..*self };
-                (0..points).for_each(|i| take(i, light.arriving(position(i))));
+                (0..points).for_each(|i| take(i, light.arriving_by(position(i), at(i))));
             }
             Shape::Rectangle { position: middle, sides, normal, falloff } => {
                 let light = Self { shape: Shape::Rectangle { position: middle, sides, normal, falloff }, ..*self };
-                (0..points).for_each(|i| take(i, light.arriving(position(i))));
+                (0..points).for_each(|i| take(i, light.arriving_by(position(i), at(i))));
             }
         }
     }
 
-    /// The same from one place of a wide light to each position.
     #[inline(always)]
-    pub(crate) fn arriving_at_from(
-        &self,
-        points: usize,
-        (position, at): (impl Fn(usize) -> Vec3, impl Fn(usize) -> [f32; 2]),
-        mut take: impl FnMut(usize, (Incident, bool)),
-    ) {
-        match self.shape {
-            Shape::Directional(to_light) => {
-                let light = Self { shape: Shape::Directional(to_light), ..*self };
-                (0..points).for_each(|i| take(i, light.arriving_from(position(i), at(i))));
-            }
-            Shape::Point { position: from, falloff, cone } => {
-                let light = Self { shape: Shape::Point { position: from, falloff, cone }, ..*self };
-                (0..points).for_each(|i| take(i, light.arriving_from(position(i), at(i))));
-            }
-            Shape::Rectangle { position: middle, sides, normal, falloff } => {
-                let light = Self { shape: Shape::Rectangle { position: middle, sides, normal, falloff }, ..*self };
-                (0..points).for_each(|i| take(i, light.arriving_from(position(i), at(i))));
-            }
+    fn arriving_by(&self, position: Vec3, at: Option<[f32; 2]>) -> (Incident, bool) {
+        match at {
+            Some(at) => self.arriving_from(position, at),
+            None => self.arriving(position),
         }
     }
 

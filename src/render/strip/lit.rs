@@ -194,16 +194,17 @@ impl<const WIDE: bool> Kernel for Shine<'_, WIDE> {
         let Self { found, lit, points, matter, painted, cones, has_inside, light, mut drawn } = self;
         let (points, light) = (points.min(POINTS), *light);
         let in_lux = matches!(matter.model, Model::MetalRough(_));
+        debug_assert_eq!(WIDE, drawn.is_some());
+        let position = |i| get(&found.position, i);
         match &mut drawn {
             Some((drawn, place)) if WIDE => {
                 let [x, y] = drawn.places(*place, points);
-                let (position, at) = (|i| get(&found.position, i), |i| [x[i], y[i]]);
-                light.arriving_at_from(points, (position, at), |i, (incident, arrives)| {
+                light.arriving_at(points, (position, |i| Some([x[i], y[i]])), |i, (incident, arrives)| {
                     arrive(lit, i, (incident, arrives & drawn.has(i, *place)), in_lux);
                     put(&mut drawn.ends, i, incident.position.unwrap_or(Vec3::ZERO));
                 });
             }
-            _ => light.arriving_at(points, |i| get(&found.position, i), |i, it| arrive(lit, i, it, in_lux)),
+            _ => light.arriving_at(points, (position, |_| None), |i, it| arrive(lit, i, it, in_lux)),
         }
         // The model is chosen outside the loop, which then is a formula.
         match &matter.model {
