@@ -64,12 +64,60 @@ impl Bounds {
 pub fn robust_bounds(scene: &Scene) -> Bounds {
     let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let found = visit_corners(scene, |p| (lo, hi) = (lo.min(p), hi.max(p)));
-    found.and_then(|()| without_gaps(scene, (lo, hi))).unwrap_or_else(|| by_parts(scene))
+    found.and_then(|()| of_faces(scene, (lo, hi))).unwrap_or_else(|| by_parts(scene))
 }
 
 /// The same where the box of all corners is known, such as [`World::bounds`](crate::render::World::bounds).
 pub fn robust_bounds_within(scene: &Scene, whole: (DVec3, DVec3)) -> Bounds {
-    without_gaps(scene, whole).unwrap_or_else(|| by_parts(scene))
+    of_faces(scene, whole).unwrap_or_else(|| by_parts(scene))
+}
+
+/// The same of a model of faces all of whose corners are in the box `whole`; `None` for any other.
+fn of_faces(scene: &Scene, whole: (DVec3, DVec3)) -> Option<Bounds> {
+    let (lo, hi) = whole;
+    if !(scene.spheres.is_empty() && scene.cones.is_empty() && lo.is_finite() && hi.is_finite()) {
+        return None;
+    }
+    let bounds = Bounds { lo, hi, strays: 0, whole };
+    if has_no_gap(scene, &bounds)? {
+        return Some(bounds);
+    }
+    let slices = Slices::of(scene, &bounds);
+    (slices.parts() == faces(scene)).then(|| without_strays(scene, bounds, slices))
+}
+
+/// The same for any scene.
+fn by_parts(scene: &Scene) -> Bounds {
+    let Some(whole) = hull(scene, |_| true) else {
+        let unit = (DVec3::splat(-0.5), DVec3::splat(0.5));
+        return Bounds { lo: unit.0, hi: unit.1, strays: 0, whole: unit };
+    };
+    let bounds = Bounds { lo: whole.0, hi: whole.1, strays: 0, whole };
+    without_strays(scene, bounds, Slices::of(scene, &bounds))
+}
+
+/// What is left of all parts, which the slices of their box have.
+fn without_strays(scene: &Scene, mut bounds: Bounds, mut slices: Slices) -> Bounds {
+    // Each round zooms in by up to SLICES; the range of f64 needs far fewer than this many.
+    for _ in 0..128 {
+        if slices.has_no_gap() {
+            break;
+        }
+        let Some(core) = slices.core() else { break };
+        let kept = |part: &Part| bounds.contains(part.center) && slices.lies_in(&core, part.center);
+        let Some((lo, hi)) = hull(scene, kept) else { break };
+        if (lo, hi) == (bounds.lo, bounds.hi) {
+            break;
+        }
+        (bounds.lo, bounds.hi) = (lo, hi);
+        slices = Slices::of(scene, &bounds);
+    }
+    if (bounds.lo, bounds.hi) == bounds.whole {
+        return bounds;
+    }
+    let outside = |part: &Part| !bounds.contains(part.lo) || !bounds.contains(part.hi);
+    bounds.strays = gather(scene, || 0, |n, part| *n += u64::from(outside(part)), |n, more| *n += more);
+    bounds
 }
 
 /// Faces that are looked at between two questions whether all slices have been reached.
@@ -78,15 +126,10 @@ const FACES_AT_A_TIME: usize = 1024;
 /// How often faces from all over a mesh are looked at before all of them are.
 const LOOKS: usize = 16;
 
-/// The box of a model of triangles that reach into every slice, so that there is no gap and nothing can come off: what
-/// most models are, found by a look at some of the faces from all over it. `None`: it has to be looked at more closely.
-fn without_gaps(scene: &Scene, whole: (DVec3, DVec3)) -> Option<Bounds> {
-    let (lo, hi) = whole;
-    if !(scene.spheres.is_empty() && scene.cones.is_empty() && lo.is_finite() && hi.is_finite()) {
-        return None;
-    }
-    let bounds = Bounds { lo, hi, strays: 0, whole };
-    let mut slices = Slices::new(&bounds);
+/// Whether triangles reach into every slice, so that nothing can come off: true of most models, and found by a look at
+/// some of the faces from all over them. `None` where a corner is nowhere, if it was looked at.
+fn has_no_gap(scene: &Scene, bounds: &Bounds) -> Option<bool> {
+    let mut slices = Slices::new(bounds);
     for instance in &scene.instances {
         let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
         let corner = |i: u32| {
@@ -102,46 +145,26 @@ fn without_gaps(scene: &Scene, whole: (DVec3, DVec3)) -> Option<Bounds> {
                 slices.reach(a.min(b).min(c), a.max(b).max(c));
             }
             if slices.has_no_gap() {
-                return Some(bounds);
+                return Some(true);
             }
         }
         if stride > LOOKS {
             slices.cover(instance, mesh)?;
             if slices.has_no_gap() {
-                return Some(bounds);
+                return Some(true);
             }
         }
     }
-    None
+    Some(false)
 }
 
-/// The same for any scene, part by part.
-fn by_parts(scene: &Scene) -> Bounds {
-    let Some(whole) = hull(scene, |_| true) else {
-        let unit = (DVec3::splat(-0.5), DVec3::splat(0.5));
-        return Bounds { lo: unit.0, hi: unit.1, strays: 0, whole: unit };
+/// Triangles there are, polygons counted as their fans.
+fn faces(scene: &Scene) -> u64 {
+    let of_mesh = |mesh: &Mesh| {
+        let fans = mesh.polygons.iter().map(|polygon| u64::from(polygon.len.saturating_sub(2)));
+        mesh.triangles.len() as u64 + fans.sum::<u64>()
     };
-    let mut bounds = Bounds { lo: whole.0, hi: whole.1, strays: 0, whole };
-    // Each round zooms in by up to SLICES; the range of f64 needs far fewer than this many.
-    for _ in 0..128 {
-        let slices = Slices::of(scene, &bounds);
-        if slices.has_no_gap() {
-            break;
-        }
-        let Some(core) = slices.core() else { break };
-        let kept = |part: &Part| bounds.contains(part.center) && slices.lies_in(&core, part.center);
-        let Some((lo, hi)) = hull(scene, kept) else { break };
-        if (lo, hi) == (bounds.lo, bounds.hi) {
-            break;
-        }
-        (bounds.lo, bounds.hi) = (lo, hi);
-    }
-    if (bounds.lo, bounds.hi) == bounds.whole {
-        return bounds;
-    }
-    let outside = |part: &Part| !bounds.contains(part.lo) || !bounds.contains(part.hi);
-    bounds.strays = gather(scene, || 0, |n, part| *n += u64::from(outside(part)), |n, more| *n += more);
-    bounds
+    scene.instances.iter().filter_map(|instance| scene.meshes.get(instance.mesh as usize)).map(of_mesh).sum()
 }
 
 /// The mean direction of all faces weighted by area: length 1 for a card, 0 for a closed body.
@@ -249,7 +272,9 @@ impl Part {
     fn face([a, b, c]: [DVec3; 3]) -> Option<Self> {
         let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
         let normal = (b - a).cross(c - a) * 0.5;
-        let face = Self { lo, hi, center: (a + b + c) / 3.0, normal, area: normal.length() };
+        // The mean of three equal numbers may be another.
+        let center = ((a + b + c) / 3.0).clamp(lo, hi);
+        let face = Self { lo, hi, center, normal, area: normal.length() };
         (lo.is_finite() && hi.is_finite()).then_some(face)
     }
 }
@@ -293,8 +318,9 @@ fn visit_corners(scene: &Scene, mut f: impl FnMut(DVec3)) -> Option<()> {
 struct Slices {
     lo: DVec3,
     width: DVec3,
-    /// Per axis and slice: whether a part reaches in.
-    covered: [[bool; SLICES]; 3],
+    /// Slices to a unit of length; 0 where the box is flat.
+    per_unit: DVec3,
+    reached: Reached,
     /// Per axis and slice: area and number of the parts with their centre there.
     area: [[f64; SLICES]; 3],
     count: [[u64; SLICES]; 3],
@@ -303,10 +329,12 @@ struct Slices {
 impl Slices {
     /// Cuts the box of `bounds`.
     fn new(bounds: &Bounds) -> Self {
+        let width = (bounds.hi - bounds.lo) / SLICES as f64;
         Self {
             lo: bounds.lo,
-            width: (bounds.hi - bounds.lo) / SLICES as f64,
-            covered: [[false; SLICES]; 3],
+            width,
+            per_unit: DVec3::select(width.cmpgt(DVec3::ZERO), width.recip(), DVec3::ZERO),
+            reached: Reached::default(),
             area: [[0.0; SLICES]; 3],
             count: [[0; SLICES]; 3],
         }
@@ -325,9 +353,9 @@ impl Slices {
 
     /// Adds what other slices of the same box have.
     fn join(&mut self, other: Self) {
+        self.reached.join(&other.reached);
         for axis in 0..3 {
             for i in 0..SLICES {
-                self.covered[axis][i] |= other.covered[axis][i];
                 self.area[axis][i] += other.area[axis][i];
                 self.count[axis][i] += other.count[axis][i];
             }
@@ -338,15 +366,12 @@ impl Slices {
     #[inline]
     fn reach(&mut self, lo: DVec3, hi: DVec3) {
         for axis in 0..3 {
-            let (first, last) = (self.slice(axis, lo[axis]), self.slice(axis, hi[axis]));
-            self.covered[axis][first..=last].fill(true);
+            self.reached.note(axis, self.slice(axis, lo[axis]), self.slice(axis, hi[axis]));
         }
     }
 
     /// Notes how far every triangle of a mesh reaches; `None` when a corner of one is nowhere.
     fn cover(&mut self, instance: &Instance, mesh: &Mesh) -> Option<()> {
-        /// A flag for every slice along each axis.
-        type Covered = [[bool; SLICES]; 3];
         let cell = |p: &Vec3| {
             let p = instance.world_from_object.transform_point3(p.as_dvec3());
             #[expect(clippy::cast_possible_truncation, reason = "there are 256 slices")]
@@ -355,32 +380,25 @@ impl Slices {
         };
         let cells: Vec<Option<[u8; 3]>> = mesh.positions.par_iter().with_min_len(CHUNK).map(cell).collect();
         let of = |triangles: &[[u32; 3]]| {
-            let mut covered: Covered = [[false; SLICES]; 3];
+            let mut reached = Reached::default();
             for triangle in triangles {
                 let [a, b, c] = triangle.map(|i| cells.get(i as usize).copied().flatten());
                 let (a, b, c) = (a?, b?, c?);
-                for (axis, covered) in covered.iter_mut().enumerate() {
+                for axis in 0..3 {
                     let (first, last) = (a[axis].min(b[axis]).min(c[axis]), a[axis].max(b[axis]).max(c[axis]));
-                    let (first, last) = (usize::from(first), usize::from(last));
-                    // Mostly the same, and filling a run takes a call.
-                    covered[first] = true;
-                    if first < last {
-                        covered[first..=last].fill(true);
-                    }
+                    reached.note(axis, usize::from(first), usize::from(last));
                 }
             }
-            Some(covered)
+            Some(reached)
         };
-        let parts: Vec<Covered> = mesh.triangles.par_chunks(CHUNK).map(of).collect::<Option<_>>()?;
-        for part in &parts {
-            self.covered.iter_mut().flatten().zip(part.iter().flatten()).for_each(|(to, covered)| *to |= covered);
-        }
+        let parts: Vec<Reached> = mesh.triangles.par_chunks(CHUNK).map(of).collect::<Option<_>>()?;
+        parts.iter().for_each(|part| self.reached.join(part));
         Some(())
     }
 
     /// Whether no slice is empty, so that nothing can come off.
     fn has_no_gap(&self) -> bool {
-        self.covered.iter().flatten().all(|&covered| covered)
+        self.reached.covered().as_flattened().iter().all(|&covered| covered)
     }
 
     /// Adds a part to the slices that its middle is in.
@@ -392,12 +410,15 @@ impl Slices {
         }
     }
 
+    /// Parts whose middle is in the box.
+    fn parts(&self) -> u64 {
+        self.count[0].iter().sum()
+    }
+
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the slices there are")]
+    #[inline]
     fn slice(&self, axis: usize, x: f64) -> usize {
-        if self.width[axis] <= 0.0 {
-            return 0;
-        }
-        ((x - self.lo[axis]) / self.width[axis]).clamp(0.0, (SLICES - 1) as f64) as usize
+        ((x - self.lo[axis]) * self.per_unit[axis]).clamp(0.0, (SLICES - 1) as f64) as usize
     }
 
     /// First and last slice along each axis without the ends that come off; `None` when nothing comes off.
@@ -405,9 +426,10 @@ impl Slices {
     /// Slices, not coordinates: beside a stray at 1e20 the model's own box could not be told from its centre.
     fn core(&self) -> Option<[(usize, usize); 3]> {
         let size = (0..3).map(|axis| self.size(axis)).fold(0.0, f64::max);
+        let covered = self.reached.covered();
         let kept = [0, 1, 2].map(|axis| {
-            let last = SLICES - 1 - self.cut(axis, size, |i| SLICES - 1 - i);
-            (self.cut(axis, size, |i| i), last)
+            let last = SLICES - 1 - self.cut(axis, (size, &covered[axis]), |i| SLICES - 1 - i);
+            (self.cut(axis, (size, &covered[axis]), |i| i), last)
         });
         (kept != [(0, SLICES - 1); 3]).then_some(kept)
     }
@@ -433,13 +455,13 @@ impl Slices {
     }
 
     /// How many slices come off one end of `axis`; `from_end` numbers them from there.
-    fn cut(&self, axis: usize, size: f64, from_end: impl Fn(usize) -> usize) -> usize {
+    fn cut(&self, axis: usize, (size, covered): (f64, &[bool; SLICES]), from_end: impl Fn(usize) -> usize) -> usize {
         let total_area: f64 = self.area[axis].iter().sum();
         let total_count: u64 = self.count[axis].iter().sum();
         let (mut area, mut count, mut gap, mut cut) = (0.0, 0, 0usize, 0);
         for i in 0..SLICES {
             let slice = from_end(i);
-            if self.covered[axis][slice] {
+            if covered[slice] {
                 if gap as f64 * self.width[axis] >= GAP * size && gap > 0 {
                     cut = i;
                 }
@@ -454,6 +476,45 @@ impl Slices {
             }
         }
         cut
+    }
+}
+
+/// Which slices parts reach into, as how many more begin in each than end before it: noted without a branch.
+#[derive(Clone, Copy)]
+struct Reached([[i64; SLICES + 1]; 3]);
+
+impl Default for Reached {
+    fn default() -> Self {
+        Self([[0; SLICES + 1]; 3])
+    }
+}
+
+impl Reached {
+    /// A part reaches from slice to slice of an axis.
+    #[inline]
+    fn note(&mut self, axis: usize, first: usize, last: usize) {
+        let more = &mut self.0[axis];
+        more[first] += 1;
+        more[last + 1] -= 1;
+    }
+
+    /// Adds what others reach.
+    fn join(&mut self, other: &Self) {
+        let pairs = self.0.as_flattened_mut().iter_mut().zip(other.0.as_flattened());
+        pairs.for_each(|(more, other)| *more += other);
+    }
+
+    /// Whether some part reaches into a slice.
+    fn covered(&self) -> [[bool; SLICES]; 3] {
+        let mut covered = [[false; SLICES]; 3];
+        for (covered, more) in covered.iter_mut().zip(&self.0) {
+            let mut here = 0;
+            for (covered, more) in covered.iter_mut().zip(more) {
+                here += more;
+                *covered = here != 0;
+            }
+        }
+        covered
     }
 }
 
@@ -487,7 +548,9 @@ mod tests {
         for (faces, gap, short) in [(20_000, 0.0, true), (40, 0.0, true), (20_000, 30.0, false), (80_000, 30.0, false)]
         {
             let (scene, slow) = (spiral(faces, gap), by_parts(&spiral(faces, gap)));
-            assert_eq!(without_gaps(&scene, slow.whole).is_some(), short, "{faces} {gap}");
+            let whole = Bounds { lo: slow.whole.0, hi: slow.whole.1, strays: 0, whole: slow.whole };
+            assert_eq!(has_no_gap(&scene, &whole), Some(short), "{faces} {gap}");
+            assert!(of_faces(&scene, slow.whole).is_some(), "not by parts");
             assert_eq!(robust_bounds(&scene), slow, "{faces} {gap}");
             assert_eq!(robust_bounds_within(&scene, slow.whole), slow, "{faces} {gap}");
             assert_eq!(robust_bounds(&scene).strays > 0, gap > 0.0);
@@ -506,8 +569,9 @@ mod tests {
             }
             // Strays are outside, and reach into the outermost slices.
             let slow = Slices::of(&scene, &bounds);
-            let differ = slices.covered.iter().flatten().zip(slow.covered.iter().flatten()).filter(|(a, b)| a != b);
-            assert!(differ.count() <= 6 && (gap > 0.0 || slices.covered == slow.covered));
+            let (quick, slow) = (slices.reached.covered(), slow.reached.covered());
+            let differ = quick.iter().flatten().zip(slow.iter().flatten()).filter(|(a, b)| a != b);
+            assert!(differ.count() <= 6 && (gap > 0.0 || quick == slow));
         }
         let mut scene = spiral(80_000, 0.0);
         scene.meshes[0].positions[70_000].y = f32::NAN;
@@ -528,6 +592,29 @@ mod tests {
         let mut scene = spiral(20_000, 0.0);
         scene.meshes[0].positions[7].y = f32::NAN;
         let whole = by_parts(&scene).whole;
-        assert!(without_gaps(&scene, whole).is_none() && robust_bounds(&scene).hi.is_finite());
+        assert!(of_faces(&scene, whole).is_none() && robust_bounds(&scene).hi.is_finite());
+    }
+
+    #[test]
+    fn a_face_that_is_not_looked_at_and_has_a_corner_nowhere_is_left_to_the_long_way() {
+        let mut scene = spiral(2_000, 30.0);
+        // Of faces by the thousand, every second one would be looked at.
+        let last = scene.meshes[0].triangles.len() - 1;
+        scene.meshes[0].positions.push(Vec3::NAN);
+        scene.meshes[0].triangles[last][2] = 2_002;
+        let long = by_parts(&scene);
+        assert_eq!(of_faces(&scene, long.whole), None);
+        assert_eq!(robust_bounds_within(&scene, long.whole), long);
+    }
+
+    #[test]
+    fn strays_of_a_flat_model_come_off_where_the_mean_of_three_equal_numbers_is_another() {
+        let z = 0.1_f64;
+        assert_ne!((z + z + z) / 3.0, z);
+        let mut scene = spiral(20_000, 30.0);
+        scene.meshes[0].positions.iter_mut().for_each(|p| p.z = 0.0);
+        scene.instances[0].world_from_object.translation.z = z;
+        scene.instances[1].world_from_object.translation.z = z;
+        assert!(robust_bounds(&scene).strays > 0);
     }
 }
