@@ -39,22 +39,23 @@ pub(crate) struct Layout {
     height: u32,
     top: u32,
     wrap: [Wrap; 2],
+    magnify: Filter,
+    minify: Filter,
     mipmaps: Mipmaps,
 }
 
 impl Layout {
-    /// That of a texture; `None` for one that is not there, or whose texels are not mixed.
+    /// That of a texture; `None` for one that is not there, or too large.
     pub(crate) fn of(store: &TextureStore, texture: u32) -> Option<Self> {
         let (sampler, source) = store.find(texture)?;
-        let Sampler { magnify: Filter::Linear, minify: Filter::Linear, mipmaps, wrap_u, wrap_v, .. } = sampler else {
-            return None;
-        };
+        let Sampler { magnify, minify, mipmaps, wrap_u, wrap_v, .. } = sampler;
         let (width, height) = size_of(source.bitmap);
         // Numbers of texels are computed in 32 bits, and places in `f32`.
         let texels = u32::try_from(width.checked_mul(height)?).ok()?;
         let (width, height, top) = (u32::try_from(width).ok()?, u32::try_from(height).ok()?, source.srgb.top());
         let small = texels < u32::MAX / 2 && width.max(height) < 1 << 23;
-        small.then_some(Self { width, height, top: u32::try_from(top).ok()?, wrap: [wrap_u, wrap_v], mipmaps })
+        let (top, wrap) = (u32::try_from(top).ok()?, [wrap_u, wrap_v]);
+        small.then_some(Self { width, height, top, wrap, magnify, minify, mipmaps })
     }
 }
 
@@ -154,6 +155,8 @@ pub(crate) struct Places {
     /// 1 where the next level is read, too, and its share.
     between: [u32; LANES],
     share: Eight,
+    /// How far from a place, in texels, those that are mixed there begin: half of one, and 0 where only the nearest is read.
+    half: Eight,
     taps: [[Taps; PROBES]; 2],
 }
 
@@ -173,6 +176,7 @@ impl Default for Places {
             level: [0; LANES],
             between: [0; LANES],
             share: [0.0; LANES],
+            half: [0.5; LANES],
             taps: [[taps; PROBES]; 2],
         }
     }
@@ -196,7 +200,7 @@ impl Places {
                 }
             }
             for (above, taps) in (0..).zip(&mut self.taps).take(levels) {
-                taps[p % PROBES].find(layout, &uv, &self.level, above);
+                taps[p % PROBES].find(layout, (&uv, &self.half), &self.level, above);
             }
             (p, k) = (p + 1, k + 1.0);
         }
@@ -207,13 +211,15 @@ impl Places {
     fn choose_levels(&mut self, layout: &Layout, at: &Spots) -> [Eight; 2] {
         let size = pixels((layout.width as usize, layout.height as usize));
         let (mut axis, mut lod) = ([[0.0; LANES]; 2], [0.0; LANES]);
+        // Files that ask for nearest texels get one.
+        let is_mixed = layout.minify == Filter::Linear;
         for i in 0..LANES {
             let [along, across] = at.axes(i);
             let (dx, dy) = ((along * size).length(), (across * size).length());
             let (major, minor) = if dx >= dy { (dx, dy) } else { (dy, dx) };
             let longer = if dx >= dy { along } else { across };
             let bounded = major.is_finite() & minor.is_finite();
-            let probes = if bounded & (major > 1.0) { probes(major, minor) } else { 1.0 };
+            let probes = if bounded & (major > 1.0) & is_mixed { probes(major, minor) } else { 1.0 };
             (axis[0][i], axis[1][i], self.probes[i]) = (longer.x, longer.y, probes);
             // Up to one texel is read as it is; what has no bounds is as small as can be.
             lod[i] = if major <= 1.0 {
@@ -236,6 +242,11 @@ impl Places {
                 Mipmaps::Linear => (lower.min(top), u32::from((lod > 0.0) & (lower < top))),
             };
             (self.level[i], self.between[i], self.share[i]) = (level, between, lod - floor(lod));
+        }
+        let half = |filter| if filter == Filter::Linear { 0.5 } else { 0.0 };
+        let (smaller, larger) = (half(layout.minify), half(layout.magnify));
+        for (half, lod) in self.half.iter_mut().zip(&lod) {
+            *half = if *lod > 0.0 { smaller } else { larger };
         }
         axis
     }
@@ -284,7 +295,7 @@ impl Places {
         };
         let (taps, probes) = (&self.taps[above], self.probes[i]);
         if probes <= 1.0 {
-            return one(&taps[0]);
+            return if self.half[i] > 0.0 { one(&taps[0]) } else { texel(taps[0].corners[0][i]) };
         }
         let (mut sum, mut p, mut k) = (Vec4::ZERO, 0, 0.5);
         while k < probes {
@@ -296,11 +307,13 @@ impl Places {
 }
 
 impl Taps {
-    /// The four texels around each of `uv`, in the level so far above that of the point.
+    /// The four texels around each of `uv`, in the level so far above that of the point; four times the nearest one where
+    /// texels are not mixed.
     #[inline(always)]
-    fn find(&mut self, layout: &Layout, uv: &[Eight; 2], level: &[u32; LANES], above: u32) {
+    fn find(&mut self, layout: &Layout, (uv, half): (&[Eight; 2], &Eight), level: &[u32; LANES], above: u32) {
         let (width, height) = (sides(layout.width, level, above), sides(layout.height, level, above));
-        let (x, y) = (Pairs::find(&uv[0], &width, layout.wrap[0]), Pairs::find(&uv[1], &height, layout.wrap[1]));
+        let x = Pairs::find((&uv[0], half), &width, layout.wrap[0]);
+        let y = Pairs::find((&uv[1], half), &height, layout.wrap[1]);
         for (i, width) in width.into_iter().enumerate() {
             let (upper, lower) = (y.near[i].wrapping_mul(width), y.far[i].wrapping_mul(width));
             self.corners[0][i] = upper.wrapping_add(x.near[i]);
@@ -321,18 +334,18 @@ struct Pairs {
 
 impl Pairs {
     #[inline(always)]
-    fn find(c: &Eight, sides: &[u32; LANES], wrap: Wrap) -> Self {
+    fn find((c, half): (&Eight, &Eight), sides: &[u32; LANES], wrap: Wrap) -> Self {
         let (period, mut below, mut share) = (periods(c, wrap), [0; LANES], [0.0; LANES]);
         for i in 0..LANES {
             #[expect(clippy::cast_precision_loss, reason = "sides are below 2²³")]
-            let place = period[i] * sides[i] as f32 - 0.5;
+            let place = period[i] * sides[i] as f32 - half[i];
             let whole = floor(place);
             #[expect(clippy::cast_possible_truncation, reason = "no farther than two sides")]
             let at = whole as i32;
-            (below[i], share[i]) = (at, place - whole);
+            (below[i], share[i]) = (at, if half[i] > 0.0 { place - whole } else { 0.0 });
         }
         let near = inside(&below, sides, wrap);
-        below.iter_mut().for_each(|at| *at += 1);
+        below.iter_mut().zip(half).for_each(|(at, half)| *at += i32::from(*half > 0.0));
         Self { near, far: inside(&below, sides, wrap), share }
     }
 }
