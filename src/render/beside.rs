@@ -132,9 +132,18 @@ impl Ranks {
 impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     /// Adds what eye rays see.
     pub(super) fn shade_eyes(&mut self, eyes: &Eyes) {
+        let at_a_time = self.context.points_at_a_time;
+        for (start, hits) in (0..).step_by(at_a_time).zip(eyes.hits.chunks(at_a_time)) {
+            self.shade_some_eyes(eyes, (start, hits));
+            self.relieve();
+        }
+    }
+
+    /// The same of hits that follow each other.
+    fn shade_some_eyes(&mut self, eyes: &Eyes, (first, hits): (u32, &[Hit])) {
         let context = self.context;
         let mut sorted = self.sort();
-        for (start, eight) in (0..).step_by(LANES).zip(eyes.hits.chunks(LANES)) {
+        for (start, eight) in (first..).step_by(LANES).zip(hits.chunks(LANES)) {
             // Neighbours mostly hit the same.
             let first = eight[0].prim;
             let alike = eight.iter().all(|hit| hit.prim == first);
@@ -162,12 +171,15 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     pub(super) fn shade_wave(&mut self, class: RayClass, wave: &Wave) {
         let mut ranks = std::mem::take(&mut self.beside.ranks);
         ranks.rank(&wave.rays);
-        ranks.iter().for_each(|rays| self.shade_rank((class, wave), rays));
+        for rays in ranks.iter().flat_map(|rays| rays.chunks(self.context.points_at_a_time)) {
+            self.shade_some((class, wave), rays);
+            self.relieve();
+        }
         self.beside.ranks = ranks;
     }
 
     /// The same of these of its rays, which belong to different samples.
-    fn shade_rank(&mut self, (class, wave): (RayClass, &Wave), rays: &[u32]) {
+    fn shade_some(&mut self, (class, wave): (RayClass, &Wave), rays: &[u32]) {
         let context = self.context;
         let traced = Traced::Wave(class, wave);
         let mut sorted = self.sort();
@@ -275,7 +287,6 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         } else if shiny && context.depth > 0 {
             strip.mirror(context, matter, traced, &mut self.starting[RayClass::Reflected as usize]);
         }
-        self.relieve_shadows();
     }
 
     /// Adds what the points show of their surroundings and of each light, or sends the rays that find whether it arrives.
@@ -305,8 +316,6 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             for place in 0..strip.draw(draws.iter_mut().map(|(i, draws, rays)| (*i, draws.spread(*rays), *rays))) {
                 strip.shine(what, light, Some(place));
                 self.ask_for(traced, light, strip, (within, Some(place)));
-                // Their number is the user's to choose.
-                self.relieve_shadows();
             }
         }
         self.beside.draws = draws;

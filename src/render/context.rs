@@ -11,6 +11,7 @@ use super::strip::Common;
 use super::texture::TextureStore;
 use super::world::World;
 use crate::math::Vec3;
+use crate::math::simd::LANES;
 use crate::scene::features::{Feature, Features};
 use crate::scene::{AlphaMode, Background, Material, Scene};
 use std::sync::Arc;
@@ -20,6 +21,10 @@ const ENV_RAYS: u32 = 16;
 
 /// Fewest rays to a panorama from a point of which there are several samples.
 const ENV_RAYS_LEAST: u32 = 6;
+/// Shadow rays that wait before they are traced, and …
+pub(super) const SHADOW_LIMIT: usize = 1 << 14;
+/// … rays to the surroundings.
+pub(super) const AROUND_LIMIT: usize = 1 << 15;
 
 /// Samples of a pixel that share the rays which one sample would send from each point: of stochastic sampling as many as
 /// every pixel has that is not even, for more rays come with more samples where they are needed.
@@ -61,6 +66,8 @@ pub(crate) struct Context<'a> {
     pub seed: u64,
     /// Whether nothing is seen but lights, and what shines by itself.
     pub is_dark: bool,
+    /// Points that are shaded before what waits of their rays may be traced; a multiple of [`LANES`].
+    pub points_at_a_time: usize,
     /// Bounces after the eye ray.
     pub depth: u32,
     /// Branches whose largest weight is below this end.
@@ -107,6 +114,8 @@ impl<'a> Context<'a> {
         let env_rays = settings.env_rays.unwrap_or(if sky.is_map() { ENV_RAYS } else { 0 });
         // Each way of drawing a direction to a panorama needs a ray in each of both halves.
         let env_rays = env_rays.div_ceil(together).max(env_rays.min(if sky.is_map() { ENV_RAYS_LEAST } else { 2 }));
+        let lights: Vec<LocalLight> = scene.lights.iter().map(|l| LocalLight::new(l, world.center)).collect();
+        let light_rays = settings.light_rays.max(1).div_ceil(together);
         let alone = everything || settings.layers || gloss.all;
         let common = |m: (u32, &Material)| if alone { None } else { Common::of(m, textures, depth > 0, gloss) };
         let needs = |any: &[Feature]| everything || any.iter().any(|&f| features.has(f));
@@ -117,11 +126,12 @@ impl<'a> Context<'a> {
             is_dark: sky.is_dark() && scene.ambient == Vec3::ZERO,
             sky,
             env_rays,
-            light_rays: settings.light_rays.max(1).div_ceil(together),
+            light_rays,
             gloss,
             highlight_reach: glint::reach(settings),
             seed: settings.seed,
-            lights: scene.lights.iter().map(|l| LocalLight::new(l, world.center)).collect(),
+            points_at_a_time: points_at_a_time(&lights, light_rays, env_rays),
+            lights,
             common: (0..).zip(&scene.materials).map(common).collect(),
             bands: if needs(&[Feature::Dispersion]) { bands() } else { Vec::new() },
             has_filters: needs(&[Feature::Mask, Feature::Blend, Feature::ThinTransmission, Feature::Refraction]),
@@ -152,6 +162,14 @@ impl<'a> Context<'a> {
     pub(crate) fn is_alive(&self, weight: Vec3) -> bool {
         weight.max_element() >= self.cutoff.max(f32::MIN_POSITIVE)
     }
+}
+
+/// As many points as send hardly more rays together than may wait.
+fn points_at_a_time(lights: &[LocalLight], light_rays: u32, env_rays: u32) -> usize {
+    let rays = |light: &LocalLight| if light.is_wide() { light_rays as usize } else { 1 };
+    let to_lights: usize = lights.iter().filter(|light| light.shadows).map(rays).sum();
+    let points = (SHADOW_LIMIT / to_lights.max(1)).min(AROUND_LIMIT / (env_rays as usize).max(1));
+    points.max(1).next_multiple_of(LANES)
 }
 
 /// Bounces that a scene needs: none without mirrors or glass, a few between mirrors, more where every object is entered

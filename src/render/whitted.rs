@@ -11,7 +11,7 @@ use super::Progress;
 use super::asking::Asking;
 use super::beside::Beside;
 use super::branch::{Ground, Point};
-use super::context::{Context, coverage};
+use super::context::{AROUND_LIMIT, Context, SHADOW_LIMIT, coverage};
 use super::draws::{Draws, Purpose, Stream};
 use super::everything::look_up_in_vain;
 use super::eyes::Eyes;
@@ -32,8 +32,6 @@ use std::hint::black_box;
 pub(super) const SPREAD: f32 = 0.1;
 /// Rays traced together at most; bounds the memory of a worker.
 const WAVE_LIMIT: usize = 1 << 13;
-/// Shadow rays that wait at most.
-const SHADOW_LIMIT: usize = 1 << 14;
 /// The turn of a ray that goes on behind a surface.
 const ON: u32 = u32::MAX >> 2;
 
@@ -189,20 +187,16 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         if self.shadows.len() > 0 {
             self.shadows.trace(self.context, &mut self.asking, &mut self.counts.shadow, arrive);
         }
-        self.trace_arounds();
-    }
-
-    /// Traces shadow rays once many wait.
-    pub(super) fn relieve_shadows(&mut self) {
-        if self.shadows.len() >= SHADOW_LIMIT {
-            self.trace_shadows();
-        }
-    }
-
-    fn trace_arounds(&mut self) {
-        let samples = &mut self.samples;
         let arrive = |sample: u32, light: Vec3| samples[sample as usize].radiance += light;
         self.arounds.trace(self.context, &mut self.asking, &mut self.counts.shadow, arrive);
+    }
+
+    /// Traces shadow rays once many wait. In between a sample sees one point at most, so that in whatever order these are
+    /// shaded, what comes of the rays is added to the same.
+    pub(super) fn relieve(&mut self) {
+        if self.shadows.len() >= SHADOW_LIMIT || self.arounds.len() >= AROUND_LIMIT {
+            self.trace_shadows();
+        }
     }
 
     /// A ray that met nothing: the background shows where the line of sight is straight, else the environment is seen.
@@ -292,9 +286,6 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             let (ray, draws) = (point.ray, self.draws(point, Purpose::Surroundings));
             self.arounds.push(context, &Standpoint { surface, matter, ray, draws, weight, open, media });
         }
-        if self.arounds.is_full() {
-            self.trace_arounds();
-        }
     }
 
     /// Goes on behind a surface that covers only a part.
@@ -345,7 +336,6 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
                 }
             }
         }
-        self.relieve_shadows();
     }
 
     /// Light of one point of a light that is so much of it: without shadows at once, with them when its ray has come through.

@@ -24,9 +24,6 @@ use crate::render::shadow::{Bound, Shadows};
 use crate::render::wave::Media;
 use std::f32::consts::PI;
 
-/// Rays that wait at most.
-const LIMIT: usize = 1 << 15;
-
 /// Ways to draw a direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Way {
@@ -80,9 +77,9 @@ impl Arounds {
         self.shadows.clear();
     }
 
-    /// Whether it is time to trace.
-    pub(crate) fn is_full(&self) -> bool {
-        self.shares.len() >= LIMIT
+    /// Rays that wait.
+    pub(crate) fn len(&self) -> usize {
+        self.shares.len()
     }
 
     /// Sends `context.env_rays` rays, half of them each from numbers of its own.
@@ -119,7 +116,7 @@ impl Arounds {
                 let share = if share.is_finite() { share } else { Vec3::ZERO };
                 if share.max_element() > 0.0 {
                     let ray = point.surface.ray(dir, point.ray.sample);
-                    #[expect(clippy::cast_possible_truncation, reason = "few shares wait, see LIMIT")]
+                    #[expect(clippy::cast_possible_truncation, reason = "few shares wait, see AROUND_LIMIT")]
                     let light = Bound { radiance: share, tag: self.shares.len() as u32 };
                     self.shadows.push_bound(ray, light, point.media);
                 }
