@@ -22,11 +22,13 @@ pub(super) struct Faces {
     curved: Roomy<u32>,
     prims: Roomy<u32>,
     skins: [Roomy<f32>; SKIN_NUMBERS],
+    extras: [Roomy<f32>; EXTRA_NUMBERS],
 }
 
 const WIDE_NUMBERS: usize = 12;
 const NORMAL_NUMBERS: usize = 9;
 const SKIN_NUMBERS: usize = 24;
+const EXTRA_NUMBERS: usize = 18;
 
 /// What points of a face share.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,16 +46,28 @@ pub(super) struct FaceNumbers {
 /// What points of a face share where their surroundings on it count: how the weights of its corners grow, and the texture
 /// coordinates and tangents there.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Skin([f32; SKIN_NUMBERS]);
+pub(super) struct Skin {
+    numbers: [f32; SKIN_NUMBERS],
+    /// Other coordinates and the colours of the corners, which few have.
+    extras: Option<[f32; EXTRA_NUMBERS]>,
+}
 
 impl Skin {
     /// Coordinates are turned, but not moved yet.
     pub(super) fn new(gradients: &Gradients, [a, b, c]: [Vec2; 3], tangents: [Vec4; 3]) -> Self {
         let Gradients { second: p, third: q } = gradients;
-        let mut all = [0.0; SKIN_NUMBERS];
-        all[..12].copy_from_slice(&[p.x, p.y, p.z, q.x, q.y, q.z, a.x, a.y, b.x, b.y, c.x, c.y]);
-        all[12..].copy_from_slice(tangents.map(|t| t.to_array()).as_flattened());
-        Self(all)
+        let mut numbers = [0.0; SKIN_NUMBERS];
+        numbers[..12].copy_from_slice(&[p.x, p.y, p.z, q.x, q.y, q.z, a.x, a.y, b.x, b.y, c.x, c.y]);
+        numbers[12..].copy_from_slice(tangents.map(|t| t.to_array()).as_flattened());
+        Self { numbers, extras: None }
+    }
+
+    /// The same with other coordinates and colours at its corners.
+    pub(super) fn with(self, uvs: [Vec2; 3], colors: [Vec4; 3]) -> Self {
+        let mut extras = [0.0; EXTRA_NUMBERS];
+        extras[..6].copy_from_slice(uvs.map(|uv| uv.to_array()).as_flattened());
+        extras[6..].copy_from_slice(colors.map(|color| color.to_array()).as_flattened());
+        Self { extras: Some(extras), ..self }
     }
 }
 
@@ -81,6 +95,7 @@ impl Faces {
         curved: [0; POINTS + LANES],
         prims: [0; POINTS + LANES],
         skins: [[0.0; POINTS + LANES]; SKIN_NUMBERS],
+        extras: [[0.0; POINTS + LANES]; EXTRA_NUMBERS],
     };
 
     /// Sets the face of these points, but for the normals of its corners. What follows up to seven behind them may be written,
@@ -102,7 +117,10 @@ impl Faces {
     /// Sets its skin, in the same way.
     #[inline(always)]
     pub(super) fn set_skin(&mut self, points: &Range<usize>, skin: &Skin) {
-        set(&mut self.skins, points, &skin.0);
+        set(&mut self.skins, points, &skin.numbers);
+        if let Some(extras) = &skin.extras {
+            set(&mut self.extras, points, extras);
+        }
     }
 
     /// How the weights of its corners grow.
@@ -119,14 +137,23 @@ impl Faces {
         [Vec2::new(s(6), s(7)), Vec2::new(s(8), s(9)), Vec2::new(s(10), s(11))]
     }
 
+    /// Their other texture coordinates.
+    #[inline(always)]
+    pub(super) fn other_uvs(&self, i: usize) -> [Vec2; 3] {
+        let s = |k: usize| self.extras[k][i];
+        [Vec2::new(s(0), s(1)), Vec2::new(s(2), s(3)), Vec2::new(s(4), s(5))]
+    }
+
+    /// The colours of the corners.
+    #[inline(always)]
+    pub(super) fn colors(&self, i: usize) -> [Vec4; 3] {
+        [6, 10, 14].map(|k| four(&self.extras, k, i))
+    }
+
     /// The tangents of the corners.
     #[inline(always)]
     pub(super) fn tangents(&self, i: usize) -> [Vec4; 3] {
-        let four = |k: usize| {
-            let s = |j: usize| self.skins[k + j][i];
-            Vec4::new(s(0), s(1), s(2), s(3))
-        };
-        [four(12), four(16), four(20)]
+        [12, 16, 20].map(|k| four(&self.skins, k, i))
     }
 
     /// The plane and the rim.
@@ -174,6 +201,12 @@ impl Faces {
             prim: self.prims[i],
         }
     }
+}
+
+/// Four columns from the `k`th on at a point.
+#[inline(always)]
+fn four(columns: &[Roomy<f32>], k: usize, i: usize) -> Vec4 {
+    Vec4::new(columns[k][i], columns[k + 1][i], columns[k + 2][i], columns[k + 3][i])
 }
 
 /// Sets the numbers of these points, and of up to seven behind them.

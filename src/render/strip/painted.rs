@@ -1,8 +1,8 @@
 //! What maps and colours of vertices say at the points of a strip.
 //!
-//! Maps that share their coordinates are read side by side ([`Sheet`](super::sheet::Sheet)), others and colours point by
-//! point, as [`Surface`](crate::render::surface::Surface) reads them; what follows from them is computed side by side. So is
-//! what follows from how far rough surfaces on the way have blurred what is seen, which makes any material rougher.
+//! They are mostly read side by side ([`Sheet`](super::sheet::Sheet)), else point by point, as
+//! [`Surface`](crate::render::surface::Surface) reads them; what follows from them is computed side by side. So is what
+//! follows from how far rough surfaces on the way have blurred what is seen, which makes any material rougher.
 
 use super::columns::{Column, Columns, POINTS, Strip, get, padded, put};
 use super::common::Common;
@@ -186,7 +186,7 @@ impl Strip {
         self.painted.any = true;
         let widens = !context.lights.is_empty() && material.metal_rough().is_some();
         if let Some(sheet) = common.sheet.as_ref().filter(|sheet| sheet.covers(mesh)) {
-            self.read_sheet(context, (material, sheet), placement, !mesh.normals.is_empty(), widens);
+            self.read_sheet(context, (material, sheet), (mesh, placement), widens);
             return;
         }
         let (mut prim, mut patch) = (NO_PRIM, None);

@@ -1,4 +1,4 @@
-//! Maps of a material that points of a strip read side by side: those that share their coordinates.
+//! Maps of a material and colours of vertices that points of a strip read side by side.
 
 use super::columns::{Column, Columns, Found, Given, LANES, POINTS, Strip, get, padded, put};
 use super::cones::Cones;
@@ -11,7 +11,7 @@ use crate::render::shade::{MetalRoughPaint, PhongPaint, base_color, occlusion};
 use crate::render::surface::{facing, side_of};
 use crate::render::texture::{ColorSpace, Layout, Places, Spots, TextureStore, changes};
 use crate::render::world::Placement;
-use crate::scene::{Material, Mesh, Surface, TextureRef};
+use crate::scene::{Material, Mesh, Surface, TextureRef, UvTransform};
 
 /// What a map is read for.
 #[derive(Clone, Copy, Debug)]
@@ -33,15 +33,24 @@ const SLOTS: usize = 10;
 /// What the maps of eight points say.
 type Texels = [[Vec4; LANES]; SLOTS];
 
-/// The maps of a material, all of which have the same coordinates.
+/// Coordinates that the maps of a material may have.
+const GROUPS: usize = 2;
+
+/// The maps of a material.
 #[derive(Debug)]
 pub(crate) struct Sheet {
+    groups: Vec<Group>,
+    /// The texture of the normal map, how its texels lie, and its group.
+    normal_map: Option<(u32, Layout, usize)>,
+}
+
+/// Maps that have the same coordinates.
+#[derive(Debug)]
+struct Group {
     uv_set: u32,
+    transform: UvTransform,
     turn: Turn,
-    offset: Vec2,
     stacks: Vec<Stack>,
-    /// The texture of the normal map, and how its texels lie.
-    normal_map: Option<(u32, Layout)>,
 }
 
 /// Maps that are read in the same places.
@@ -52,53 +61,68 @@ struct Stack {
 }
 
 impl Sheet {
-    /// `None` for materials without maps, and for those of which one has its own coordinates or is read in another way.
+    /// `None` for materials whose maps have too many coordinates, and for those of which one is read in another way.
     pub(super) fn of(material: &Material, store: &TextureStore) -> Option<Self> {
         let maps = maps(material);
-        let (_, first, _) = maps.first()?;
         // How thick glass is does not matter where rays go through it.
         let thickness = material.metal_rough().is_some_and(|m| m.thickness_map.is_some());
         if maps.len() + usize::from(thickness) < material.textures().count() {
             return None;
         }
-        let mut sheet = Self {
-            uv_set: first.uv_set,
-            turn: Turn::new(&first.transform),
-            offset: first.transform.offset,
-            stacks: Vec::new(),
-            normal_map: None,
-        };
-        for &(slot, map, space) in &maps {
-            if (map.uv_set, map.transform) != (first.uv_set, first.transform) {
-                return None;
-            }
+        let mut sheet = Self { groups: Vec::new(), normal_map: None };
+        for (slot, map, space) in maps {
             let layout = Layout::of(store, map.texture)?;
-            sheet.add(layout, (slot, map.texture, space));
+            let group = sheet.group(map)?;
+            sheet.groups[group].add(layout, (slot, map.texture, space));
             if let Slot::Normal = slot {
-                sheet.normal_map = Some((map.texture, layout));
+                sheet.normal_map = Some((map.texture, layout, group));
             }
         }
         Some(sheet)
     }
 
+    /// The group of a map; `None` where there is no room for one more.
+    fn group(&mut self, map: &TextureRef) -> Option<usize> {
+        let is_same = |group: &Group| (group.uv_set, group.transform) == (map.uv_set, map.transform);
+        let found = self.groups.iter().position(is_same);
+        if found.is_none() && self.groups.len() < GROUPS {
+            let turn = Turn::new(&map.transform);
+            self.groups.push(Group { uv_set: map.uv_set, transform: map.transform, turn, stacks: Vec::new() });
+            return Some(self.groups.len() - 1);
+        }
+        found
+    }
+
+    /// Whether there is something to read on a mesh, and it has what it takes.
+    pub(super) fn covers(&self, mesh: &Mesh) -> bool {
+        let turns = self.normal_map.is_some();
+        let colored = !mesh.colors.is_empty();
+        (colored || !self.groups.is_empty())
+            && (!colored || mesh.colors.len() == mesh.positions.len())
+            && self.groups.iter().all(|group| mesh.uvs.len() > group.uv_set as usize)
+            && !(turns && mesh.tangents.is_empty())
+    }
+
+    /// Whether it wants colours of corners there, or more than their coordinates of the first group.
+    pub(super) fn wants_extras(&self, mesh: &Mesh) -> bool {
+        !mesh.colors.is_empty() || self.groups.len() > 1
+    }
+
+    /// The coordinates of the corners for the `k`th group, but for the offset.
+    pub(super) fn coordinates(&self, k: usize, mesh: &Mesh, corners: [u32; 3]) -> [Vec2; 3] {
+        let Some(group) = self.groups.get(k) else { return [Vec2::ZERO; 3] };
+        let set = mesh.uvs.get(group.uv_set as usize);
+        let corner = |i: u32| set.and_then(|set| set.get(i as usize)).map_or(Vec2::ZERO, |&uv| group.turn.apply(uv));
+        corners.map(corner)
+    }
+}
+
+impl Group {
     fn add(&mut self, layout: Layout, map: (Slot, u32, ColorSpace)) {
         match self.stacks.iter_mut().find(|stack| stack.layout == layout) {
             Some(stack) => stack.maps.push(map),
             None => self.stacks.push(Stack { layout, maps: vec![map] }),
         }
-    }
-
-    /// Whether a mesh has what it takes to read them, and nothing that they are mixed with.
-    pub(super) fn covers(&self, mesh: &Mesh) -> bool {
-        let turns = self.normal_map.is_some();
-        mesh.colors.is_empty() && mesh.uvs.len() > self.uv_set as usize && !(turns && mesh.tangents.is_empty())
-    }
-
-    /// The coordinates of the corners, but for the offset.
-    pub(super) fn coordinates(&self, mesh: &Mesh, corners: [u32; 3]) -> [Vec2; 3] {
-        let set = mesh.uvs.get(self.uv_set as usize);
-        let corner = |i: u32| set.and_then(|set| set.get(i as usize)).map_or(Vec2::ZERO, |&uv| self.turn.apply(uv));
-        corners.map(corner)
     }
 }
 
@@ -125,24 +149,23 @@ fn maps(material: &Material) -> Vec<(Slot, &TextureRef, ColorSpace)> {
 }
 
 impl Strip {
-    /// Reads what the maps of a sheet say at the points of a mesh that an instance has placed so, and turns their normals: those
-    /// of the mesh's own if it is `smooth`. If lights show as highlights, which a normal map `widens`, it finds how far that turns
-    /// them.
+    /// Reads what the maps of a sheet and the colours of vertices say at the points of a mesh that an instance has placed so, and
+    /// turns their normals. If lights show as highlights, which a normal map `widens`, it finds how far that turns them.
     pub(super) fn read_sheet(
         &mut self,
         context: &Context,
         (material, sheet): (&Material, &Sheet),
-        placement: &Placement,
-        smooth: bool,
+        (mesh, placement): (&Mesh, &Placement),
         widens: bool,
     ) {
         let count = self.count.min(POINTS);
+        let (smooth, colored) = (!mesh.normals.is_empty(), !mesh.colors.is_empty());
         let Self { given, found, painted, cones, places, level, .. } = self;
         let store = context.textures;
         let reach = context.highlight_reach;
-        let turns = sheet.normal_map.as_ref().filter(|_| widens).map(|(texture, layout)| (*texture, layout, reach));
+        let turns = sheet.normal_map.as_ref().filter(|_| widens).map(|map| (map, reach));
         let certain = &mut found.certain;
-        level.run(Read { sheet, material, store, given, certain, cones, painted, places, turns, count });
+        level.run(Read { sheet, material, store, given, certain, cones, painted, places, turns, colored, count });
         if sheet.normal_map.is_some() {
             let points = padded(count);
             let scale = material.normal_scale;
@@ -161,7 +184,8 @@ struct Read<'a> {
     painted: &'a mut Painted,
     places: &'a mut Places,
     /// The normal map, where its changes count within such a reach.
-    turns: Option<(u32, &'a Layout, f32)>,
+    turns: Option<(&'a (u32, Layout, usize), f32)>,
+    colored: bool,
     count: usize,
 }
 
@@ -170,35 +194,35 @@ impl Kernel for Read<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Self { sheet, material, store, given, certain, cones, painted, places, turns, count } = self;
+        let Self { sheet, material, store, given, certain, cones, painted, places, turns, colored, count } = self;
         for start in (0..count.min(POINTS)).step_by(LANES) {
-            let mut spots = Spots::default();
-            for lane in 0..LANES {
-                let i = start + lane;
-                let [a, b, c] = given.faces.uvs(i);
-                let [along, across] = given.faces.gradients(i).of_coordinates([b - a, c - a], &cones.footprint(i));
-                let uv = given.mix(i, [a, b, c]) + sheet.offset;
-                (spots.uv[0][lane], spots.uv[1][lane]) = (uv.x, uv.y);
-                (spots.along[0][lane], spots.along[1][lane]) = (along.x, along.y);
-                (spots.across[0][lane], spots.across[1][lane]) = (across.x, across.y);
-            }
+            let mut spots = [Spots::default(); GROUPS];
             let mut texels: Texels = [[Vec4::ONE; LANES]; SLOTS];
             let points = (count - start).min(LANES);
-            for stack in &sheet.stacks {
-                places.find(&stack.layout, &spots);
-                for &(slot, texture, space) in &stack.maps {
-                    places.read(store, (texture, space), &mut texels[slot as usize][..points]);
+            for (k, (group, spots)) in sheet.groups.iter().zip(&mut spots).enumerate() {
+                let offset = group.transform.offset;
+                if k == 0 {
+                    spread(spots, (given, cones), (start, offset), |i| given.faces.uvs(i));
+                } else {
+                    spread(spots, (given, cones), (start, offset), |i| given.faces.other_uvs(i));
+                }
+                for stack in &group.stacks {
+                    places.find(&stack.layout, spots);
+                    for &(slot, texture, space) in &stack.maps {
+                        places.read(store, (texture, space), &mut texels[slot as usize][..points]);
+                    }
                 }
             }
-            for lane in 0..points {
-                let whole = paint(painted, start + lane, material, |slot| texels[slot as usize][lane]);
-                certain[start + lane] &= u32::from(whole);
+            for i in start..start + points {
+                let vertex = if colored { given.mix(i, given.faces.colors(i)) } else { Vec4::ONE };
+                let whole = paint(painted, i, (material, vertex), |slot| texels[slot as usize][i - start]);
+                certain[i] &= u32::from(whole);
             }
-            if let Some((texture, layout, reach)) = turns {
+            if let Some(((texture, layout, group), reach)) = turns {
                 let mut narrow = [false; LANES];
                 (0..points).for_each(|lane| narrow[lane] = painted.has_narrow_highlight(start + lane));
                 if narrow != [false; LANES] {
-                    let [along, across] = changes(store, (texture, layout), &spots, reach, narrow);
+                    let [along, across] = changes(store, (*texture, layout), &spots[*group], reach, narrow);
                     for lane in 0..points {
                         cones.turning[start + lane] = turning_of([along[lane], across[lane]], material.normal_scale);
                     }
@@ -208,10 +232,29 @@ impl Kernel for Read<'_> {
     }
 }
 
-/// What maps make of a material at a point; tells whether it is there as a whole.
+/// Finds where eight points from `start` on read maps with these coordinates at the corners, and how far around.
 #[inline(always)]
-fn paint(painted: &mut Painted, i: usize, material: &Material, texel: impl Fn(Slot) -> Vec4) -> bool {
-    let base = base_color(material, texel(Slot::Base), texel(Slot::Opacity).x, Vec4::ONE);
+fn spread(
+    spots: &mut Spots,
+    (given, cones): (&Given, &Cones),
+    (start, offset): (usize, Vec2),
+    uvs: impl Fn(usize) -> [Vec2; 3],
+) {
+    for lane in 0..LANES {
+        let i = start + lane;
+        let [a, b, c] = uvs(i);
+        let [along, across] = given.faces.gradients(i).of_coordinates([b - a, c - a], &cones.footprint(i));
+        let uv = given.mix(i, [a, b, c]) + offset;
+        (spots.uv[0][lane], spots.uv[1][lane]) = (uv.x, uv.y);
+        (spots.along[0][lane], spots.along[1][lane]) = (along.x, along.y);
+        (spots.across[0][lane], spots.across[1][lane]) = (across.x, across.y);
+    }
+}
+
+/// What maps and the colour of vertices make of a material at a point; tells whether it is there as a whole.
+#[inline(always)]
+fn paint(painted: &mut Painted, i: usize, (material, vertex): (&Material, Vec4), texel: impl Fn(Slot) -> Vec4) -> bool {
+    let base = base_color(material, texel(Slot::Base), texel(Slot::Opacity).x, vertex);
     let (base, whole) = (base.truncate(), coverage(material, base.w) >= 1.0);
     painted.put_emission(i, material.emission * texel(Slot::Emission).truncate());
     painted.put_normal_texel(i, texel(Slot::Normal).truncate());
@@ -288,5 +331,45 @@ impl Default for Turns {
     fn default() -> Self {
         let three = [[0.0; POINTS]; 3];
         Self { own: three, tangent: three, sign: [0.0; POINTS], turned: three }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Bitmap, Pixels, Sampler, Scene, Texture};
+
+    #[test]
+    fn maps_with_two_kinds_of_coordinates_are_read_together_and_those_with_three_are_not() {
+        let pixels = Pixels::Rgb8(vec![90; 3]);
+        let scene = Scene {
+            bitmaps: vec![Bitmap { name: String::new(), width: 1, height: 1, pixels }],
+            textures: vec![Texture { bitmap: 0, sampler: Sampler::default() }],
+            ..Scene::default()
+        };
+        let store = TextureStore::new(&scene);
+        let map = |uv_set| Some(TextureRef { texture: 0, uv_set, transform: UvTransform::default() });
+        let material = |sets: [u32; 3]| Material {
+            base_color_map: map(sets[0]),
+            emission_map: map(sets[1]),
+            normal_map: map(sets[2]),
+            ..Material::plain()
+        };
+        let groups = |sets| Sheet::of(&material(sets), &store).map(|sheet| sheet.groups.len());
+        assert_eq!([[1; 3], [0, 1, 0], [0, 1, 2]].map(groups), [Some(1), Some(2), None]);
+        let sheet = Sheet::of(&material([0, 0, 1]), &store).expect("two");
+        assert_eq!(sheet.normal_map.map(|(_, _, group)| group), Some(1));
+        let mut mesh = Mesh { positions: vec![Vec3::ZERO], uvs: vec![vec![Vec2::ZERO]], ..Mesh::default() };
+        mesh.tangents = vec![Vec4::X];
+        assert!(!sheet.covers(&mesh), "it has one kind");
+        mesh.uvs.push(vec![Vec2::ONE]);
+        assert!(sheet.covers(&mesh) && sheet.wants_extras(&mesh));
+        mesh.colors = vec![Vec4::ONE; 2];
+        assert!(!sheet.covers(&mesh), "not a colour for each corner");
+        let bare = Sheet::of(&Material::plain(), &store).expect("nothing to read");
+        mesh.colors.pop();
+        assert!(bare.covers(&mesh) && bare.wants_extras(&mesh));
+        mesh.colors.clear();
+        assert!(!bare.covers(&mesh), "nothing");
     }
 }

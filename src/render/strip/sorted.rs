@@ -155,8 +155,13 @@ impl Face {
 
 /// The skin of a triangle of a mesh.
 fn skin_of(mesh: &Mesh, corners: [u32; 3], gradients: &Gradients, sheet: Option<&Sheet>) -> Skin {
-    let uvs = sheet.map_or_else(Default::default, |sheet| sheet.coordinates(mesh, corners));
+    let uvs = |k: usize| sheet.map_or_else(Default::default, |sheet| sheet.coordinates(k, mesh, corners));
     // Corners without a tangent give points without one, which are shaded one by one.
     let tangent = |i: u32| mesh.tangents.get(i as usize).copied().unwrap_or(Vec4::NAN);
-    Skin::new(gradients, uvs, corners.map(tangent))
+    let skin = Skin::new(gradients, uvs(0), corners.map(tangent));
+    if !sheet.is_some_and(|sheet| sheet.wants_extras(mesh)) {
+        return skin;
+    }
+    let color = |i: u32| mesh.colors.get(i as usize).copied().unwrap_or(Vec4::ONE);
+    skin.with(uvs(1), corners.map(color))
 }
