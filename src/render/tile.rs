@@ -295,7 +295,8 @@ pub(crate) fn batches(settings: &Settings) -> Vec<Vec<u32>> {
     batches
 }
 
-fn tiles(width: u32, height: u32) -> Vec<Tile> {
+/// Those of a picture, row by row.
+pub(super) fn tiles(width: u32, height: u32) -> Vec<Tile> {
     let starts = |end: u32| (0..end).step_by(TILE as usize);
     let tile = |x0: u32, y0: u32| Tile {
         x0,

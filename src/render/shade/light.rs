@@ -119,17 +119,15 @@ impl LocalLight {
         self.size > 0.0 || matches!(self.shape, Shape::Rectangle { .. })
     }
 
-    /// What arrives from one point of it, drawn with two numbers from 0 … 1, as if all of it shone from there; the mean of
+    /// What arrives from one point of it, which is wide, drawn with two numbers from 0 … 1, as if all of it shone from there; the mean of
     /// many is what arrives from the whole. `None` where nothing does.
     pub(crate) fn incident_from(&self, position: Vec3, at: [f32; 2]) -> Option<Incident> {
-        if !self.is_wide() {
-            return self.incident(position);
-        }
+        debug_assert!(self.is_wide());
         let (incident, arrives) = self.arriving_from(position, at);
         arrives.then_some(incident)
     }
 
-    /// [`Self::incident_from`] of a wide light, and whether anything arrives.
+    /// The same, and whether anything arrives.
     #[inline(always)]
     fn arriving_from(&self, position: Vec3, at: [f32; 2]) -> (Incident, bool) {
         let (to_light, share, end) = match self.shape {

@@ -4,7 +4,7 @@
 //! What decides about a pixel are its own samples, and in the first rounds those of the pixels beside it ([`around`]): a
 //! pixel that happens to see nothing of what its neighbours see goes on with them. Pixels around the tile are therefore
 //! looked at in these rounds, too. Where pixels start with one sample, tiles share these ([`shared`]); all others are traced by
-//! this tile for itself, since no tile may wait for another, and counted.
+//! this tile for itself, and counted: which there are depends on all of a tile, and no tile may wait for another to be done.
 
 mod around;
 mod first;
@@ -104,30 +104,30 @@ impl<'a> Sampler<'a> {
         first.iter().for_each(|first| first.show(&mut around));
         let known = self.grown(tile, reach.saturating_sub(1));
         let (mut pixels, mut done) = (Vec::new(), self.nothing(tile));
-        let start = if self.starts_with_one() {
+        // How many samples of each pixel are there already: those of the first round, or none.
+        let taken = u32::from(self.starts_with_one());
+        if taken == 1 {
             self.take_first(first, &mut around, known, (&mut pixels, &mut done));
-            1
         } else {
             around.tile.places().for_each(|at| {
                 around.know(at, pixels.len());
                 pixels.push(self.pixel(at));
             });
-            0
-        };
+        }
         let (mut active, mut errors): (Vec<usize>, _) = ((0..pixels.len()).collect(), Vec::new());
-        let mut from = start;
-        for (round, &to) in rounds.iter().enumerate().skip(start as usize) {
+        let (mut from, mut places) = (taken, Places::default());
+        for (round, &to) in rounds.iter().enumerate().skip(usize::from(taken == 1)) {
             if active.is_empty() {
                 break;
             }
-            self.trace(tracer, &mut pixels, &active, from..to)?;
+            self.trace(tracer, &mut places, (&mut pixels, &active), from..to)?;
             if round < looks(rounds) {
                 around.see(judge, &pixels, &active);
                 let mut news = if from > 0 { active.clone() } else { Vec::new() };
                 while !news.is_empty() {
                     let open = |at| self.opened(first, at);
                     news = around.reopen(judge, &mut pixels, (&news, from), known, open);
-                    self.trace(tracer, &mut pixels, &news, from..to)?;
+                    self.trace(tracer, &mut places, (&mut pixels, &news), from..to)?;
                     around.see(judge, &pixels, &news);
                     active.extend(&news);
                 }
@@ -142,7 +142,7 @@ impl<'a> Sampler<'a> {
             active.retain(|&i| pixels[i].facts.end == End::Ceiling);
             from = to;
         }
-        self.put(&pixels, start, &mut done);
+        self.put(&pixels, taken, &mut done);
         Some(done)
     }
 
@@ -214,11 +214,11 @@ impl<'a> Sampler<'a> {
         pixel
     }
 
-    /// Puts pixels in their places; the first `start` samples of each are counted already.
-    fn put(&self, pixels: &[Pixel], start: u32, done: &mut TilePixels) {
+    /// Puts pixels in their places; the first `counted` samples of each are counted already.
+    fn put(&self, pixels: &[Pixel], counted: u32, done: &mut TilePixels) {
         let (frame, tile) = (self.frame, done.tile);
         for pixel in pixels {
-            let rays = u64::from(pixel.facts.count - start);
+            let rays = u64::from(pixel.facts.count - counted);
             done.rays += rays;
             if !tile.contains(pixel.at) {
                 done.rays_around += rays;
@@ -236,15 +236,14 @@ impl<'a> Sampler<'a> {
     fn trace<A: Accel, P: Observer>(
         &self,
         tracer: &mut Tracer<A, P>,
-        pixels: &mut [Pixel],
-        active: &[usize],
+        places: &mut Places,
+        (pixels, active): (&mut [Pixel], &[usize]),
         samples: Range<u32>,
     ) -> Option<()> {
         if samples.start as usize >= GROUPS {
             active.iter().for_each(|&pixel| pixels[pixel].join_groups());
         }
         let in_group = (samples.end as usize).div_ceil(GROUPS);
-        let mut places = Places::default();
         for some in active.chunks((TOGETHER / samples.len().max(1)).max(1)) {
             for start in samples.clone().step_by(TOGETHER) {
                 let samples = start..samples.end.min(start + TOGETHER as u32);

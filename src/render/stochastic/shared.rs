@@ -195,16 +195,11 @@ mod tests {
     use crate::math::DVec3;
     use crate::render::sampling::Sampling;
     use crate::render::texture::TextureStore;
+    use crate::render::tile::tiles;
     use crate::render::view::{Lens, View};
     use crate::render::{Settings, World};
     use crate::scene::{Environment, Material, MetalRough, Scene, Sphere, Surface};
-
-    /// Tiles of a picture of this size, 32 pixels wide and high.
-    fn tiles(width: u32, height: u32) -> Vec<Tile> {
-        let rows = (0..height).step_by(32);
-        let corners = rows.flat_map(|y0| (0..width).step_by(32).map(move |x0| (x0, y0)));
-        corners.map(|(x0, y0)| Tile { x0, y0, x1: width.min(x0 + 32), y1: height.min(y0 + 32) }).collect()
-    }
+    use std::time::Duration;
 
     #[test]
     fn a_tile_needs_zones_that_cover_what_is_around_it_and_each_zone_belongs_to_one() {
@@ -229,16 +224,21 @@ mod tests {
 
     #[test]
     fn whoever_waits_for_a_promise_that_is_not_kept_hears_of_it() {
-        let tiles = tiles(70, 40);
-        let shared = Shared::new(&tiles, |tile| tile.grown(70, 40));
-        std::thread::scope(|threads| {
-            let owners = shared.needs[4].iter().map(|&zone| shared.zones[zone].owner);
-            let promises: Vec<_> = owners.filter_map(|owner| shared.promise(owner)).collect();
-            assert!(promises.len() > 1 && shared.promise(promises[0].owner).is_none(), "promised once");
-            let waiting = threads.spawn(|| shared.wait_for(4).is_none());
-            drop(promises);
-            assert!(waiting.join().expect("a thread"));
+        // They live on with a thread that hears of nothing.
+        let tiles: &'static [Tile] = tiles(70, 40).leak();
+        let shared: &'static Shared = Box::leak(Box::new(Shared::new(tiles, |tile| tile.grown(70, 40))));
+        let owners = shared.needs[4].iter().map(|&zone| shared.zones[zone].owner);
+        let promises: Vec<_> = owners.filter_map(|owner| shared.promise(owner)).collect();
+        assert!(promises.len() > 1 && shared.promise(promises[0].owner).is_none(), "promised once");
+        let (tell, heard) = std::sync::mpsc::channel();
+        std::thread::spawn(move || {
+            let _ = tell.send(false);
+            let _ = tell.send(shared.wait_for(4).is_none());
         });
+        assert_eq!(heard.recv(), Ok(false), "it begins to wait");
+        std::thread::sleep(Duration::from_millis(20));
+        drop(promises);
+        assert_eq!(heard.recv_timeout(Duration::from_secs(60)), Ok(true));
     }
 
     /// A ball of glass that bends every colour its own way, over all of the picture: each eye ray becomes so many that they do

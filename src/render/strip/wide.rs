@@ -6,7 +6,12 @@ use crate::render::draws::Spread;
 
 /// What each point draws of one light.
 pub(super) struct Drawn {
-    spreads: [Spread; POINTS],
+    /// Whether places are parts of a sequence, of the same that begin there; else they are moved so far. All points of a
+    /// picture draw in one way.
+    is_sequence: bool,
+    keys: [u32; POINTS],
+    firsts: [u32; POINTS],
+    shifts: [Column; 2],
     /// How many places of it; 0 where the point is not shaded here.
     counts: [u32; POINTS],
     /// What part of the light one of them stands for.
@@ -17,8 +22,9 @@ pub(super) struct Drawn {
 
 impl Default for Drawn {
     fn default() -> Self {
-        let zeros = [0.0; POINTS];
-        Self { spreads: [Spread::Moved([0.0; 2]); POINTS], counts: [0; POINTS], parts: zeros, ends: [zeros; 3] }
+        let (none, zeros) = ([0; POINTS], [0.0; POINTS]);
+        let (is_sequence, shifts, ends) = (false, [zeros; 2], [zeros; 3]);
+        Self { is_sequence, keys: none, firsts: none, shifts, counts: none, parts: zeros, ends }
     }
 }
 
@@ -37,26 +43,24 @@ impl Drawn {
     /// Numbers of the `k`th place of each point.
     #[inline(always)]
     pub(super) fn places(&self, k: u32, points: usize) -> [Column; 2] {
-        let (mut keys, mut firsts) = ([0; POINTS], [0; POINTS]);
         let (mut x, mut y) = ([0.0; POINTS], [0.0; POINTS]);
-        let mut is_sequence = false;
-        for (i, spread) in self.spreads.iter().enumerate().take(points).filter(|(i, _)| self.counts[*i] > 0) {
-            match *spread {
-                Spread::Part { key, first } => (keys[i], firsts[i], is_sequence) = (key, first, true),
-                Spread::Moved(shift) => [x[i], y[i]] = shift,
-            }
-        }
-        // All points of a picture draw in one way. It is known outside the loop, which then is a formula.
-        if is_sequence {
-            for i in 0..points.min(POINTS) {
-                [x[i], y[i]] = Spread::Part { key: keys[i], first: firsts[i] }.point(k);
-            }
+        // The way is known outside the loop, which then is a formula.
+        if self.is_sequence {
+            (0..points.min(POINTS)).for_each(|i| [x[i], y[i]] = self.part_of_sequence(i).point(k));
         } else {
-            for i in 0..points.min(POINTS) {
-                [x[i], y[i]] = Spread::Moved([x[i], y[i]]).point(k);
-            }
+            (0..points.min(POINTS)).for_each(|i| [x[i], y[i]] = self.moved(i).point(k));
         }
         [x, y]
+    }
+
+    #[inline(always)]
+    fn part_of_sequence(&self, i: usize) -> Spread {
+        Spread::Part { key: self.keys[i], first: self.firsts[i] }
+    }
+
+    #[inline(always)]
+    fn moved(&self, i: usize) -> Spread {
+        Spread::Moved([self.shifts[0][i], self.shifts[1][i]])
     }
 }
 
@@ -67,7 +71,13 @@ impl Strip {
         drawn.counts = [0; POINTS];
         let mut most = 0;
         for (i, spread, count) in points {
-            (drawn.spreads[i], drawn.counts[i], drawn.parts[i]) = (spread, count, 1.0 / count.max(1) as f32);
+            match spread {
+                Spread::Part { key, first } => (drawn.keys[i], drawn.firsts[i], drawn.is_sequence) = (key, first, true),
+                Spread::Moved([x, y]) => {
+                    (drawn.shifts[0][i], drawn.shifts[1][i], drawn.is_sequence) = (x, y, false);
+                }
+            }
+            (drawn.counts[i], drawn.parts[i]) = (count, 1.0 / count.max(1) as f32);
             most = most.max(count);
         }
         most
@@ -75,6 +85,7 @@ impl Strip {
 
     /// The numbers of the `k`th place that point `i` draws.
     pub(crate) fn drawn(&self, i: usize, k: u32) -> [f32; 2] {
-        self.drawn.spreads[i].point(k)
+        let drawn = &self.drawn;
+        if drawn.is_sequence { drawn.part_of_sequence(i).point(k) } else { drawn.moved(i).point(k) }
     }
 }

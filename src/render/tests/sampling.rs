@@ -210,6 +210,23 @@ fn every_structure_and_number_of_threads_gives_the_same_bits_in_every_kind_of_sa
 }
 
 #[test]
+fn tiles_that_share_first_samples_have_the_same_bits_whoever_traces_these() {
+    let mut s = soft();
+    (s.settings.width, s.settings.height) = (130, 70);
+    s.settings.sampling = Sampling::Stochastic(stochastic(0.08, 16));
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| s.render())
+    };
+    let one = with(1);
+    for threads in [2, 3, 7] {
+        let many = with(threads);
+        assert!(many.picture == one.picture && many.sampled == one.sampled, "{threads} threads");
+        assert_eq!(many.counts, one.counts, "{threads} threads");
+    }
+}
+
+#[test]
 fn layers_tell_how_certain_each_pixel_is_and_what_it_took() {
     let mut s = soft();
     (s.settings.width, s.settings.height, s.settings.layers) = (20, 15, true);
@@ -239,6 +256,7 @@ fn pixels_around_tiles_are_looked_at_only_where_that_can_decide_something() {
     assert_eq!(all - kept, 2 * 12 * 4);
     // Tiles tell each other what their first rays have met, so that only those that go on are traced twice.
     let (all, kept) = rays(1);
+    // Were the first ones traced twice, too, it would be 48 more.
     assert!((1..=2 * 12 * 3).contains(&(all - kept)), "{}", all - kept);
 }
 
@@ -428,6 +446,19 @@ fn a_forecast_holds_what_then_happens() {
     assert!(foretold.rmse.is_some_and(|e| e.value > 0.0) && foretold.cpu.value > 0.0);
     s.settings.sampling = Sampling::Uniform;
     assert_eq!(s.forecast().rmse, None, "nothing differs from one rendering to the next");
+}
+
+#[test]
+fn where_nothing_is_to_be_seen_a_forecast_knows_the_rays_exactly_though_squares_trace_those_around() {
+    let mut s = looking_down(1.0);
+    (s.settings.width, s.settings.height) = (160, 120);
+    s.mesh(square(0.0, 1000.0), DAffine3::IDENTITY, unlit(Vec3::ONE));
+    s.settings.sampling = Sampling::Stochastic(stochastic(0.1, 64));
+    let pixels: u32 = 160 * 120;
+    let foretold = s.forecast();
+    assert_eq!([foretold.rays.low, foretold.rays.value, foretold.rays.high], [f64::from(pixels); 3]);
+    assert!(foretold.looked_at < u64::from(pixels));
+    assert_eq!(s.render().sampled.rays, u64::from(pixels));
 }
 
 /// By what its quadrants could change a pixel.

@@ -126,8 +126,8 @@ const FACES_AT_A_TIME: usize = 1024;
 /// How often faces from all over a mesh are looked at before all of them are.
 const LOOKS: usize = 16;
 
-/// Whether triangles reach into every slice, so that nothing can come off: true of most models, and found by a look at
-/// some of the faces from all over them. `None` where a corner is nowhere, if it was looked at.
+/// Whether triangles reach into every slice, so that nothing can come off: true of most models, and of large ones mostly
+/// found by a look at some of their faces, from all over them. `None` where a corner is nowhere, if it was looked at.
 fn has_no_gap(scene: &Scene, bounds: &Bounds) -> Option<bool> {
     let mut slices = Slices::new(bounds);
     for instance in &scene.instances {
