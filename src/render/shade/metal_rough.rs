@@ -12,6 +12,7 @@
 
 use super::facets::{AlbedoRow, albedo, mean_albedo, rebound};
 use super::{Balance, GrainMatter, Reader, Seen, Sky, film};
+use crate::math::formula::{exp2, root};
 use crate::math::{Vec3, Vec4};
 use crate::render::optics::{fresnel_dielectric, fresnel_schlick, transmittance};
 use crate::render::wave::Crossing;
@@ -478,12 +479,10 @@ pub(super) fn traced(roughness: f32) -> f32 {
 
 /// Share of the mirrored surroundings that the occlusion map leaves open: less where few directions are open and the
 /// lobe is wide (S. Lagarde, C. de Rousiers, "Moving Frostbite to Physically Based Rendering", 2014).
+#[inline(always)]
 pub(crate) fn open(n_v: f32, occlusion: f32, roughness: f32) -> f32 {
-    if occlusion >= 1.0 {
-        return 1.0;
-    }
-    let exponent = libm::exp2f(-16.0 * roughness - 1.0);
-    (libm::powf(n_v + occlusion, exponent) - 1.0 + occlusion).clamp(0.0, 1.0)
+    let share = (root(n_v + occlusion, exp2(-16.0 * roughness - 1.0)) - 1.0 + occlusion).clamp(0.0, 1.0);
+    if occlusion >= 1.0 { 1.0 } else { share }
 }
 
 /// `dir`, mirrored to the front of a surface when a shading normal has sent it behind.
