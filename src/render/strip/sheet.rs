@@ -40,8 +40,8 @@ const GROUPS: usize = 2;
 #[derive(Debug)]
 pub(crate) struct Sheet {
     groups: Vec<Group>,
-    /// The texture of the normal map, how its texels lie, and its group.
-    normal_map: Option<(u32, Layout, usize)>,
+    /// The texture of the normal map, which is in the first group, and how its texels lie.
+    normal_map: Option<(u32, Layout)>,
 }
 
 /// Maps that have the same coordinates.
@@ -70,12 +70,15 @@ impl Sheet {
             return None;
         }
         let mut sheet = Self { groups: Vec::new(), normal_map: None };
+        if let Some((_, map, _)) = maps.iter().find(|(slot, ..)| matches!(slot, Slot::Normal)) {
+            sheet.group(map)?;
+        }
         for (slot, map, space) in maps {
             let layout = Layout::of(store, map.texture)?;
             let group = sheet.group(map)?;
             sheet.groups[group].add(layout, (slot, map.texture, space));
             if let Slot::Normal = slot {
-                sheet.normal_map = Some((map.texture, layout, group));
+                sheet.normal_map = Some((map.texture, layout));
             }
         }
         Some(sheet)
@@ -118,6 +121,22 @@ impl Sheet {
 }
 
 impl Group {
+    /// Reads what its maps say at so many of these spots.
+    #[inline(always)]
+    fn read(
+        &self,
+        store: &TextureStore,
+        (places, spots): (&mut Places, &Spots),
+        (texels, points): (&mut Texels, usize),
+    ) {
+        for stack in &self.stacks {
+            places.find(&stack.layout, spots);
+            for &(slot, texture, space) in &stack.maps {
+                places.read(store, (texture, space), &mut texels[slot as usize][..points]);
+            }
+        }
+    }
+
     fn add(&mut self, layout: Layout, map: (Slot, u32, ColorSpace)) {
         match self.stacks.iter_mut().find(|stack| stack.layout == layout) {
             Some(stack) => stack.maps.push(map),
@@ -184,7 +203,7 @@ struct Read<'a> {
     painted: &'a mut Painted,
     places: &'a mut Places,
     /// The normal map, where its changes count within such a reach.
-    turns: Option<(&'a (u32, Layout, usize), f32)>,
+    turns: Option<(&'a (u32, Layout), f32)>,
     colored: bool,
     count: usize,
 }
@@ -196,33 +215,28 @@ impl Kernel for Read<'_> {
     fn run<S: Simd>(self, _: S) {
         let Self { sheet, material, store, given, certain, cones, painted, places, turns, colored, count } = self;
         for start in (0..count.min(POINTS)).step_by(LANES) {
-            let mut spots = [Spots::default(); GROUPS];
+            let mut spots = Spots::default();
             let mut texels: Texels = [[Vec4::ONE; LANES]; SLOTS];
             let points = (count - start).min(LANES);
-            for (k, (group, spots)) in sheet.groups.iter().zip(&mut spots).enumerate() {
-                let offset = group.transform.offset;
-                if k == 0 {
-                    spread(spots, (given, cones), (start, offset), |i| given.faces.uvs(i));
-                } else {
-                    spread(spots, (given, cones), (start, offset), |i| given.faces.other_uvs(i));
-                }
-                for stack in &group.stacks {
-                    places.find(&stack.layout, spots);
-                    for &(slot, texture, space) in &stack.maps {
-                        places.read(store, (texture, space), &mut texels[slot as usize][..points]);
-                    }
-                }
+            if let Some(group) = sheet.groups.first() {
+                spread(&mut spots, (given, cones), (start, group.transform.offset), |i| given.faces.uvs(i));
+                group.read(store, (places, &spots), (&mut texels, points));
+            }
+            for group in sheet.groups.iter().skip(1) {
+                let mut spots = Spots::default();
+                spread(&mut spots, (given, cones), (start, group.transform.offset), |i| given.faces.other_uvs(i));
+                group.read(store, (places, &spots), (&mut texels, points));
             }
             for i in start..start + points {
                 let vertex = if colored { given.mix(i, given.faces.colors(i)) } else { Vec4::ONE };
                 let whole = paint(painted, i, (material, vertex), |slot| texels[slot as usize][i - start]);
                 certain[i] &= u32::from(whole);
             }
-            if let Some(((texture, layout, group), reach)) = turns {
+            if let Some(((texture, layout), reach)) = turns {
                 let mut narrow = [false; LANES];
                 (0..points).for_each(|lane| narrow[lane] = painted.has_narrow_highlight(start + lane));
                 if narrow != [false; LANES] {
-                    let [along, across] = changes(store, (*texture, layout), &spots[*group], reach, narrow);
+                    let [along, across] = changes(store, (*texture, layout), &spots, reach, narrow);
                     for lane in 0..points {
                         cones.turning[start + lane] = turning_of([along[lane], across[lane]], material.normal_scale);
                     }
@@ -358,7 +372,7 @@ mod tests {
         let groups = |sets| Sheet::of(&material(sets), &store).map(|sheet| sheet.groups.len());
         assert_eq!([[1; 3], [0, 1, 0], [0, 1, 2]].map(groups), [Some(1), Some(2), None]);
         let sheet = Sheet::of(&material([0, 0, 1]), &store).expect("two");
-        assert_eq!(sheet.normal_map.map(|(_, _, group)| group), Some(1));
+        assert!(sheet.normal_map.is_some() && sheet.groups[0].uv_set == 1, "it comes first");
         let mut mesh = Mesh { positions: vec![Vec3::ZERO], uvs: vec![vec![Vec2::ZERO]], ..Mesh::default() };
         mesh.tangents = vec![Vec4::X];
         assert!(!sheet.covers(&mesh), "it has one kind");

@@ -187,20 +187,30 @@ impl Places {
     #[inline(always)]
     pub(crate) fn find(&mut self, layout: &Layout, at: &Spots) {
         let axis = self.choose_levels(layout, at);
+        // Nearly all texels are mixed: these have a kernel without a choice.
+        if (layout.magnify, layout.minify) == (Filter::Linear, Filter::Linear) {
+            self.find_taps::<true>(layout, at, &axis);
+        } else {
+            self.find_taps::<false>(layout, at, &axis);
+        }
+    }
+
+    #[inline(always)]
+    fn find_taps<const MIXED: bool>(&mut self, layout: &Layout, at: &Spots, axis: &[Eight; 2]) {
         let most = self.probes.iter().fold(1.0_f32, |most, &probes| most.max(probes));
         let levels = if self.between == [0; LANES] { 1 } else { 2 };
         let (mut p, mut k) = (0, 0.5);
         while k < most {
             // Where there is one probe it lies in the middle.
             let mut uv = at.uv;
-            for (uv, axis) in uv.iter_mut().zip(&axis) {
+            for (uv, axis) in uv.iter_mut().zip(axis) {
                 for i in 0..LANES {
                     let moved = uv[i] + axis[i] * (k / self.probes[i] - 0.5);
                     uv[i] = if self.probes[i] > 1.0 { moved } else { uv[i] };
                 }
             }
             for (above, taps) in (0..).zip(&mut self.taps).take(levels) {
-                taps[p % PROBES].find(layout, (&uv, &self.half), &self.level, above);
+                taps[p % PROBES].find::<MIXED>(layout, (&uv, &self.half), &self.level, above);
             }
             (p, k) = (p + 1, k + 1.0);
         }
@@ -295,7 +305,7 @@ impl Places {
         };
         let (taps, probes) = (&self.taps[above], self.probes[i]);
         if probes <= 1.0 {
-            return if self.half[i] > 0.0 { one(&taps[0]) } else { texel(taps[0].corners[0][i]) };
+            return one(&taps[0]);
         }
         let (mut sum, mut p, mut k) = (Vec4::ZERO, 0, 0.5);
         while k < probes {
@@ -310,10 +320,16 @@ impl Taps {
     /// The four texels around each of `uv`, in the level so far above that of the point; four times the nearest one where
     /// texels are not mixed.
     #[inline(always)]
-    fn find(&mut self, layout: &Layout, (uv, half): (&[Eight; 2], &Eight), level: &[u32; LANES], above: u32) {
+    fn find<const MIXED: bool>(
+        &mut self,
+        layout: &Layout,
+        (uv, half): (&[Eight; 2], &Eight),
+        level: &[u32; LANES],
+        above: u32,
+    ) {
         let (width, height) = (sides(layout.width, level, above), sides(layout.height, level, above));
-        let x = Pairs::find((&uv[0], half), &width, layout.wrap[0]);
-        let y = Pairs::find((&uv[1], half), &height, layout.wrap[1]);
+        let x = Pairs::find::<MIXED>((&uv[0], half), &width, layout.wrap[0]);
+        let y = Pairs::find::<MIXED>((&uv[1], half), &height, layout.wrap[1]);
         for (i, width) in width.into_iter().enumerate() {
             let (upper, lower) = (y.near[i].wrapping_mul(width), y.far[i].wrapping_mul(width));
             self.corners[0][i] = upper.wrapping_add(x.near[i]);
@@ -334,18 +350,18 @@ struct Pairs {
 
 impl Pairs {
     #[inline(always)]
-    fn find((c, half): (&Eight, &Eight), sides: &[u32; LANES], wrap: Wrap) -> Self {
+    fn find<const MIXED: bool>((c, half): (&Eight, &Eight), sides: &[u32; LANES], wrap: Wrap) -> Self {
         let (period, mut below, mut share) = (periods(c, wrap), [0; LANES], [0.0; LANES]);
         for i in 0..LANES {
             #[expect(clippy::cast_precision_loss, reason = "sides are below 2²³")]
-            let place = period[i] * sides[i] as f32 - half[i];
+            let place = period[i] * sides[i] as f32 - if MIXED { 0.5 } else { half[i] };
             let whole = floor(place);
             #[expect(clippy::cast_possible_truncation, reason = "no farther than two sides")]
             let at = whole as i32;
-            (below[i], share[i]) = (at, if half[i] > 0.0 { place - whole } else { 0.0 });
+            (below[i], share[i]) = (at, if MIXED || half[i] > 0.0 { place - whole } else { 0.0 });
         }
         let near = inside(&below, sides, wrap);
-        below.iter_mut().zip(half).for_each(|(at, half)| *at += i32::from(*half > 0.0));
+        below.iter_mut().zip(half).for_each(|(at, half)| *at += i32::from(MIXED || *half > 0.0));
         Self { near, far: inside(&below, sides, wrap), share }
     }
 }
