@@ -16,7 +16,7 @@ pub(crate) struct Common {
     pub one_sided: bool,
     /// Whether maps change it from point to point.
     pub mapped: bool,
-    /// Those maps, where they can be read side by side.
+    /// Those maps and the colours of vertices, where they can be read side by side.
     pub sheet: Option<Sheet>,
     /// Whether it may mirror, where rays bounce, or show lights as narrow highlights.
     pub shiny: bool,
