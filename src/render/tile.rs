@@ -359,8 +359,8 @@ impl Tile {
         parts.into_iter().filter(|part| part.pixels() > 0)
     }
 
-    /// Nine parts of a whole tile, row by row: its corners, a block wide and high, the sides between them and the middle. Those of
-    /// a smaller tile in which there is nothing are left out.
+    /// Nine parts of a whole tile, row by row: its corners, a block wide and high, the sides between them and the middle.
+    /// Those of a smaller tile in which there is nothing are left out.
     pub(super) fn zones(self) -> impl Iterator<Item = Self> {
         let parts = |from: u32, to: u32| {
             let cuts = [from, from + BLOCK, from + TILE - BLOCK, from + TILE].map(|cut| cut.min(to));

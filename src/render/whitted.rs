@@ -183,11 +183,10 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
 
     fn trace_shadows(&mut self) {
         let samples = &mut self.samples;
-        let arrive = |sample: u32, light: Vec3| samples[sample as usize].radiance += light;
+        let mut arrive = |sample: u32, light: Vec3| samples[sample as usize].radiance += light;
         if self.shadows.len() > 0 {
-            self.shadows.trace(self.context, &mut self.asking, &mut self.counts.shadow, arrive);
+            self.shadows.trace(self.context, &mut self.asking, &mut self.counts.shadow, &mut arrive);
         }
-        let arrive = |sample: u32, light: Vec3| samples[sample as usize].radiance += light;
         self.arounds.trace(self.context, &mut self.asking, &mut self.counts.shadow, arrive);
     }
 

@@ -80,8 +80,8 @@ impl Around {
         });
     }
 
-    /// Opens the pixels of `tile` that were done with so many samples and lie near uneven ones of these: those of one, which have no
-    /// numbers yet, and those of more, which have; their numbers.
+    /// Opens the pixels of `tile` that were done with so many samples and lie near uneven ones of these: those of one, which
+    /// have no numbers yet, and those of more, which have; their numbers.
     pub(super) fn reopen(
         &mut self,
         judge: &Certainty,
