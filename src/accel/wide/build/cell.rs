@@ -10,6 +10,7 @@ use crate::accel::wide::split::{Bounds, Item};
 use crate::math::Vec4;
 use crate::math::aabb::Aabb;
 use rayon::prelude::*;
+use std::ops::AddAssign;
 
 /// Items that one thread takes at a time where several share a cell. The same for every number of threads: so is the tree.
 const CHUNK: usize = 1 << 12;
@@ -29,18 +30,32 @@ pub(super) struct Lattice {
 pub(super) struct Cell {
     planes: Vec4,
     bounds: [Bounds; 8],
-    counts: [u32; 8],
+    counts: [Count; 8],
     leaf: u32,
     /// Of each set of parts those that are cut off first; 0: it is not cut.
     first: [u8; 256],
     /// Where the items of each part begin.
     starts: [u32; 8],
-    /// How many items each [`CHUNK`] has in each part; empty where one thread does all.
-    chunks: Vec<[u32; 8]>,
+    /// What each [`CHUNK`] has in each part; empty where one thread does all.
+    chunks: Vec<[Count; 8]>,
+}
+
+/// How many items there are, and prims in them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Count {
+    pub items: u32,
+    pub prims: u32,
+}
+
+impl AddAssign for Count {
+    fn add_assign(&mut self, other: Self) {
+        self.items += other.items;
+        self.prims += other.prims;
+    }
 }
 
 /// The boxes around the parts of some items, and how many are in each.
-type Parts = ([Bounds; 8], [u32; 8]);
+type Parts = ([Bounds; 8], [Count; 8]);
 
 /// Parts with a bit clear on each axis.
 const BEFORE: [u8; 3] = [0b0101_0101, 0b0011_0011, 0b0000_1111];
@@ -79,7 +94,7 @@ impl Lattice {
         let plane = |k: usize| if differ[k] >> bit == 1 { (hi[k] >> bit << bit) as f32 } else { f32::INFINITY };
         let planes = Vec4::new(plane(0), plane(1), plane(2), f32::INFINITY);
 
-        let (mut bounds, mut counts, mut chunks) = ([Bounds::EMPTY; 8], [0; 8], Vec::new());
+        let (mut bounds, mut counts, mut chunks) = ([Bounds::EMPTY; 8], [Count::default(); 8], Vec::new());
         if shared {
             let parts: Vec<Parts> = items.par_chunks(CHUNK).map(|items| self.parts(items, planes)).collect();
             for (of_chunk, count) in parts {
@@ -98,11 +113,11 @@ impl Lattice {
     }
 
     fn parts(&self, items: &[Item], planes: Vec4) -> Parts {
-        let (mut bounds, mut counts) = ([Bounds::EMPTY; 8], [0; 8]);
+        let (mut bounds, mut counts) = ([Bounds::EMPTY; 8], [Count::default(); 8]);
         for item in items {
             let part = part(self.place(item.middle()), planes);
             bounds[part] = bounds[part].join(item.bounds());
-            counts[part] += 1;
+            counts[part] += Count { items: 1, prims: item.count() };
         }
         (bounds, counts)
     }
@@ -122,9 +137,11 @@ impl Cell {
         Some(self.first[set as usize]).filter(|&first| first != 0)
     }
 
-    /// How many items are in a set of parts.
-    pub(super) fn count(&self, set: u8) -> u32 {
-        members(set).map(|i| self.counts[i]).sum()
+    /// What is in a set of parts.
+    pub(super) fn count(&self, set: u8) -> Count {
+        let mut count = Count::default();
+        members(set).for_each(|i| count += self.counts[i]);
+        count
     }
 
     /// The box around a set of parts.
@@ -141,19 +158,19 @@ impl Cell {
         } else {
             for i in members(set) {
                 self.starts[i] = *start;
-                *start += self.counts[i];
+                *start += self.counts[i].items;
             }
         }
     }
 
     fn cheapest(&self, set: u8) -> Option<u8> {
-        if self.count(set) <= self.leaf {
+        if self.count(set).prims <= self.leaf {
             return None;
         }
         let mut best = (f32::INFINITY, None);
         for before in BEFORE {
             let sides = [set & before, set & !before];
-            let counts = sides.map(|side| self.count(side));
+            let counts = sides.map(|side| self.count(side).prims);
             if counts[0] == 0 || counts[1] == 0 {
                 continue;
             }
@@ -198,7 +215,7 @@ impl Cell {
         parts.sort_by_key(|&part| self.starts[part]);
         for part in parts {
             for (places, counts) in places.iter_mut().zip(&self.chunks) {
-                (places[part], sorted) = sorted.split_at_mut(counts[part] as usize);
+                (places[part], sorted) = sorted.split_at_mut(counts[part].items as usize);
             }
         }
         places
@@ -234,7 +251,7 @@ mod tests {
         let lattice = Lattice::over(&SIDE);
         let cell = lattice.cell(&items, 1).unwrap();
         let first = cell.cut(Cell::ALL).unwrap();
-        assert_eq!((cell.count(first), cell.count(!first)), (1, 2));
+        assert_eq!((cell.count(first).prims, cell.count(!first).prims), (1, 2));
         assert_eq!((cell.cut(first), cell.cut(!first)), (None, None));
         assert_eq!(sorted(&cell, &lattice, &items), [1, 0, 2]);
         assert_eq!(cell.bounds(!first).aabb().lo.x, 4.1 - 0.01);
@@ -250,7 +267,7 @@ mod tests {
         while let Some(set) = open.pop() {
             match cell.cut(set) {
                 Some(first) => open.extend([set & !first, first]),
-                None => leaves.push(cell.count(set)),
+                None => leaves.push(cell.count(set).prims),
             }
         }
         assert_eq!(leaves, [1; 8]);

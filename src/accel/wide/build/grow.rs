@@ -1,6 +1,6 @@
 //! A binary tree, from the root down.
 
-use super::cell::{Cell, Lattice};
+use super::cell::{Cell, Count, Lattice};
 use crate::accel::wide::split::{Bounds, Cut, Item, Splitting, cut_by_area};
 use crate::math::Vec3;
 use crate::math::aabb::Aabb;
@@ -78,11 +78,12 @@ pub(super) struct Grower {
 }
 
 impl<'w> Work<'w> {
-    fn split_at(self, at: usize) -> [Self; 2] {
+    /// Those items before `at`, with so many prims, and the others.
+    fn split_at(self, at: usize, prims: usize) -> [Self; 2] {
         let (a, b) = self.items.split_at_mut(at);
         let (spare_a, spare_b) = self.spare.split_at_mut(at.min(self.spare.len()));
-        let (prims_a, prims_b) = self.prims.split_at_mut(at);
-        let second = self.first + index(at);
+        let (prims_a, prims_b) = self.prims.split_at_mut(prims);
+        let second = self.first + index(prims);
         [
             Self { items: a, spare: spare_a, prims: prims_a, first: self.first },
             Self { items: b, spare: spare_b, prims: prims_b, first: second },
@@ -98,19 +99,19 @@ impl Grower {
     /// Adds the tree over some items, at least one, to `knots`; the same for every number of threads. `middles` is the box
     /// around their doubled middles, where known.
     pub(super) fn grow(&self, work: Work, bounds: Bounds, middles: Option<Bounds>, knots: &mut Vec<Knot>) {
-        let count = work.items.len();
+        let count = work.prims.len();
         if count <= self.leaf as usize {
             if let Some(cut) = self.cut_large_leaf(work.items, &bounds) {
                 return self.fork(work, &cut, bounds, knots);
             }
-            for (prim, item) in work.prims.iter_mut().zip(work.items.iter()) {
-                *prim = item.prim();
+            for (place, prim) in work.prims.iter_mut().zip(work.items.iter().flat_map(Item::prims)) {
+                *place = prim;
             }
             work.prims.sort_unstable();
             return knots.push(Knot::leaf(bounds.aabb(), work.first, index(count)));
         }
         if self.splitting == Splitting::Octree
-            && count > SMALL_CELL
+            && work.items.len() > SMALL_CELL
             && let Some(cell) = self.lattice.cell(work.items, self.leaf)
         {
             cell.sort(&self.lattice, work.items, work.spare);
@@ -135,7 +136,7 @@ impl Grower {
         let (count, [first, second]) = (work.items.len(), cut.bounds);
         let middles = |part: usize| cut.middles.map(|both| both[part]);
         let (first_middles, second_middles) = (middles(0), middles(1));
-        let [a, b] = work.split_at(cut.at);
+        let [a, b] = work.split_at(cut.at, cut.prims);
         fork(
             count,
             bounds,
@@ -150,7 +151,8 @@ impl Grower {
         let Some(first) = cell.cut(parts) else { return self.grow(work, bounds, None, knots) };
         let second = parts & !first;
         let count = work.items.len();
-        let [a, b] = work.split_at(cell.count(first) as usize);
+        let Count { items, prims } = cell.count(first);
+        let [a, b] = work.split_at(items as usize, prims as usize);
         let grow_a = |k: &mut Vec<Knot>| self.grow_cell(cell, first, a, cell.bounds(first), k);
         let grow_b = |k: &mut Vec<Knot>| self.grow_cell(cell, second, b, cell.bounds(second), k);
         fork(count, bounds, knots, grow_a, grow_b);

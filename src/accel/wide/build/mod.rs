@@ -87,13 +87,14 @@ fn depth_from(knots: &[Knot], levels: u32) -> usize {
 
 /// The binary tree over all bounded prims, and the prims of its leaves. A leaf holds triangles or other prims, never both.
 fn binary_tree(shapes: &Shapes, splitting: Splitting) -> (Vec<Knot>, Vec<u32>) {
-    let mut items: Vec<Item> =
-        (0..shapes.bounded()).into_par_iter().with_min_len(CHUNK).map(|prim| Item::of(shapes, prim)).collect();
-    let mut prims = vec![0; items.len()];
-    let (triangles, others) = items.split_at_mut(shapes.triangles.len());
-    let (triangle_prims, other_prims) = prims.split_at_mut(triangles.len());
-    let first_other = index(triangles.len());
-    let parts = [(triangles, triangle_prims, 0, LANES as u32), (others, other_prims, first_other, RUN)];
+    let first_other = index(shapes.triangles.len());
+    let mut triangles = items_of_triangles(shapes);
+    let others = (first_other..shapes.bounded()).into_par_iter().with_min_len(CHUNK);
+    let mut others: Vec<Item> = others.map(|prim| Item::of(shapes, prim)).collect();
+    let mut prims = vec![0; shapes.bounded() as usize];
+    let (triangle_prims, other_prims) = prims.split_at_mut(shapes.triangles.len());
+    let parts =
+        [(&mut triangles[..], triangle_prims, 0, LANES as u32), (&mut others[..], other_prims, first_other, RUN)];
 
     let mut knots = Vec::new();
     let mut both = Bounds::EMPTY;
@@ -117,6 +118,25 @@ fn binary_tree(shapes: &Shapes, splitting: Splitting) -> (Vec<Knot>, Vec<u32>) {
         grower.grow(Work { items, spare: &mut spare, prims, first }, bounds, Some(middles), &mut knots);
     }
     (knots, prims)
+}
+
+/// Items of all triangles, in their order.
+fn items_of_triangles(shapes: &Shapes) -> Vec<Item> {
+    // Each chunk has as many places as triangles; pages that nothing is written to cost nothing.
+    let mut items: Vec<Item> = bytemuck::zeroed_vec(shapes.triangles.len());
+    let chunks = items.par_chunks_mut(CHUNK).zip(shapes.triangles.par_chunks(CHUNK)).enumerate();
+    let counts: Vec<usize> =
+        chunks.map(|(i, (places, chunk))| Item::in_pairs(shapes, index(i * CHUNK), chunk, places)).collect();
+    let mut len = 0;
+    for (i, count) in counts.into_iter().enumerate() {
+        let start = i * CHUNK;
+        if start > len {
+            items.copy_within(start..start + count, len);
+        }
+        len += count;
+    }
+    items.truncate(len);
+    items
 }
 
 /// Where the prims of a leaf are, and how many.
@@ -175,6 +195,23 @@ mod tests {
     use super::*;
     use crate::accel::tests::scenes::mesh;
     use crate::math::Vec3;
+
+    #[test]
+    fn every_triangle_is_in_one_item_however_many_pairs_there_are() {
+        let mut random = crate::math::random::Random::new(5);
+        for (count, near) in [(1, 0), (CHUNK, 0), (3 * CHUNK + 1, 1), (5 * CHUNK + 7, 2), (4 * CHUNK, 3)] {
+            // Of three triangles so many are near the one before.
+            let (mut corner, mut vertices) = (Vec3::ZERO, Vec::new());
+            for i in 0..count {
+                corner = if i % 3 < near { corner } else { random.cube() * 100.0 };
+                vertices.extend([corner, corner + Vec3::new(1.0, 0.2, 0.1), corner + Vec3::new(0.1, 1.0, 0.3)]);
+            }
+            let faces = (0..count as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+            let items = items_of_triangles(&mesh(vertices, faces));
+            assert!(items.iter().flat_map(Item::prims).eq(0..count as u32), "{count} {near}");
+            assert_eq!(items.len() < count, near > 0);
+        }
+    }
 
     /// A mesh so far away that rounding leaves a few points of it.
     #[test]

@@ -60,11 +60,12 @@ impl<const N: usize> Bins<N> {
     fn add<'i>(&mut self, items: impl Iterator<Item = &'i Item>, ruler: &Ruler) {
         for item in items {
             let [x, y, z, _] = ruler.place(item).to_array();
+            let count = item.count().cast_signed();
             for (k, place) in [x, y, z].into_iter().enumerate() {
                 let bin = place.to_bits() as usize % N;
                 let bounds = &mut self.bounds[bin][k];
                 *bounds = bounds.join(item.bounds());
-                self.counts[bin][k] += 1;
+                self.counts[bin][k] += count;
             }
         }
     }
@@ -154,7 +155,8 @@ fn cut_in<const N: usize>(items: &mut [Item], leaf: u32, middles: Option<Bounds>
     let cut = if many {
         measured_partition(items, is_first)
     } else {
-        Cut { at: partition(items, is_first), bounds: bins.parts(axis, place), middles: None }
+        let prims = bins.counts[..place].iter().map(|counts| counts[axis]).sum::<i32>().cast_unsigned() as usize;
+        Cut { at: partition(items, is_first), prims, bounds: bins.parts(axis, place), middles: None }
     };
     // Only where boxes are so large that differences of places overflow is one part empty.
     if cut.at == 0 || cut.at == items.len() { halves(items) } else { cut }
@@ -174,7 +176,7 @@ fn partition(items: &mut [Item], first: impl Fn(&Item) -> bool) -> usize {
 
 /// The same, and the boxes of both parts.
 fn measured_partition(items: &mut [Item], first: impl Fn(&Item) -> bool) -> Cut {
-    let (mut at, mut bounds, mut middles) = (0, [Bounds::EMPTY; 2], [Bounds::EMPTY; 2]);
+    let (mut at, mut prims, mut bounds, mut middles) = (0, 0, [Bounds::EMPTY; 2], [Bounds::EMPTY; 2]);
     for i in 0..items.len() {
         let item = items[i];
         let is_first = first(&item);
@@ -183,8 +185,9 @@ fn measured_partition(items: &mut [Item], first: impl Fn(&Item) -> bool) -> Cut 
         middles[part] = middles[part].with(item.middle());
         items.swap(at, i);
         at += usize::from(is_first);
+        prims += usize::from(is_first) * item.count() as usize;
     }
-    Cut { at, bounds, middles: Some(middles) }
+    Cut { at, prims, bounds, middles: Some(middles) }
 }
 
 #[cfg(test)]
@@ -215,6 +218,25 @@ mod tests {
         let mut bins = Bins::<N>::EMPTY;
         bins.add(items.iter(), &Ruler::over(&around_middles(items), N));
         assert_eq!(bins.cheapest(leaf), defined(&bins, leaf), "{} items, leaves of {leaf}", items.len());
+    }
+
+    #[test]
+    fn prims_are_counted_in_each_part_however_many_an_item_has() {
+        let mut random = Random::new(4);
+        for count in [2, 9, 40, 2 * MANY as u32] {
+            for shape in [Vec3::ONE, Vec3::ZERO] {
+                let corners: Vec<Vec3> = (0..3 * count).map(|_| random.cube() * shape).collect();
+                let faces = (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+                let shapes = crate::accel::tests::scenes::mesh(corners, faces);
+                let mut items = vec![Item::of(&shapes, 0); count as usize];
+                let len = Item::in_pairs(&shapes, 0, &shapes.triangles, &mut items);
+                items.truncate(len);
+                let cut = cut_by_area(&mut items, 8, None);
+                let prims = items[..cut.at].iter().flat_map(Item::prims).count();
+                assert_eq!(cut.prims, prims, "{count} {shape}");
+                assert!(items.iter().flat_map(Item::prims).count() == count as usize);
+            }
+        }
     }
 
     #[test]

@@ -4,6 +4,7 @@ use crate::accel::Shapes;
 use crate::math::aabb::Aabb;
 use crate::math::{Vec3, Vec4};
 use bytemuck::Zeroable;
+use std::ops::Range;
 
 /// A box whose fourth lanes mean nothing.
 #[derive(Clone, Copy, Debug, Zeroable)]
@@ -12,8 +13,8 @@ pub(in crate::accel) struct Bounds {
     pub hi: Vec4,
 }
 
-/// A prim and its box, 32 bytes. The fourth lanes hold its number in the lowest bits of two ordinary numbers: the
-/// processor is slow with the tiny numbers that most integers are as floats.
+/// A prim, or two that follow each other, and the box around them, 32 bytes. The fourth lanes hold the number of the first
+/// in the lowest bits of two ordinary numbers: the processor is slow with the tiny numbers that most integers are as floats.
 #[derive(Clone, Copy, Debug, Zeroable)]
 pub(in crate::accel) struct Item(Bounds);
 
@@ -57,25 +58,58 @@ impl From<Aabb> for Bounds {
 const LOW_BITS: u32 = 23;
 const LOW: u32 = (1 << LOW_BITS) - 1;
 
+/// The bit beside the upper corner that says there are two.
+const TWO: u32 = 1 << (LOW_BITS - 1);
+
+/// Two are taken together where the box around them has no more than this part of the areas of both boxes.
+const TOGETHER: f32 = 0.75;
+
 impl Item {
     #[inline]
     pub(in crate::accel) fn new(bounds: Aabb, prim: u32) -> Self {
-        Self::numbered(bounds.into(), prim)
+        Self::numbered(bounds.into(), prim, 0)
     }
 
     /// Prim `prim` in the box around it.
     #[inline(always)]
     pub(in crate::accel) fn of(shapes: &Shapes, prim: u32) -> Self {
-        let Some(corners) = shapes.triangles.get(prim as usize) else { return Self::new(shapes.bounds(prim), prim) };
-        // Corners are finite: registers need not take care of what is no number, as `Aabb` does.
-        let [a, b, c] = shapes.corners(*corners).map(|corner| corner.extend(0.0));
-        Self::numbered(Bounds { lo: a.min(b).min(c), hi: a.max(b).max(c) }, prim)
+        match shapes.triangles.get(prim as usize) {
+            Some(corners) => Self::numbered(around_triangle(shapes, *corners), prim, 0),
+            None => Self::new(shapes.bounds(prim), prim),
+        }
+    }
+
+    /// Items of neighbouring triangles, from number `first` on, put at the front of as many `places`; how many they are.
+    ///
+    /// Neighbours in a file are mostly neighbours in space, and many are the halves of a quad. Two in one item are half as
+    /// much work, and leaves are as good.
+    pub(in crate::accel) fn in_pairs(
+        shapes: &Shapes,
+        first: u32,
+        triangles: &[[u32; 3]],
+        places: &mut [Self],
+    ) -> usize {
+        let mut boxes = triangles.iter().map(|corners| around_triangle(shapes, *corners));
+        let (mut count, mut prim, mut next) = (0, first, boxes.next());
+        while let Some(bounds) = next {
+            next = boxes.next();
+            let pair = next.map(|other| (bounds.join(other), (bounds.area() + other.area()) * TOGETHER));
+            (places[count], prim) = match pair {
+                Some((both, most)) if both.area() <= most => {
+                    next = boxes.next();
+                    (Self::numbered(both, prim, TWO), prim + 2)
+                }
+                _ => (Self::numbered(bounds, prim, 0), prim + 1),
+            };
+            count += 1;
+        }
+        count
     }
 
     #[inline(always)]
-    fn numbered(mut bounds: Bounds, prim: u32) -> Self {
+    fn numbered(mut bounds: Bounds, prim: u32, two: u32) -> Self {
         let number = |bits: u32| f32::from_bits(1f32.to_bits() | bits);
-        (bounds.lo.w, bounds.hi.w) = (number(prim & LOW), number(prim >> LOW_BITS));
+        (bounds.lo.w, bounds.hi.w) = (number(prim & LOW), number(prim >> LOW_BITS | two));
         Self(bounds)
     }
 
@@ -87,7 +121,19 @@ impl Item {
     #[inline(always)]
     pub(in crate::accel) fn prim(&self) -> u32 {
         let bits = |number: f32| number.to_bits() & LOW;
-        bits(self.0.lo.w) | bits(self.0.hi.w) << LOW_BITS
+        bits(self.0.lo.w) | (bits(self.0.hi.w) & !TWO) << LOW_BITS
+    }
+
+    /// How many prims: 1 or 2.
+    #[inline(always)]
+    pub(in crate::accel) fn count(&self) -> u32 {
+        1 + u32::from(self.0.hi.w.to_bits() & TWO != 0)
+    }
+
+    /// All of them.
+    #[inline(always)]
+    pub(in crate::accel) fn prims(&self) -> Range<u32> {
+        self.prim()..self.prim() + self.count()
     }
 
     /// The middle of the box, doubled.
@@ -95,6 +141,18 @@ impl Item {
     pub(in crate::accel) fn middle(&self) -> Vec4 {
         self.0.lo + self.0.hi
     }
+}
+
+/// Corners are finite: registers need not take care of what is no number, as `Aabb` does.
+#[inline(always)]
+fn around_triangle(shapes: &Shapes, corners: [u32; 3]) -> Bounds {
+    let [a, b, c] = shapes.corners(corners).map(|corner| corner.extend(0.0));
+    Bounds { lo: a.min(b).min(c), hi: a.max(b).max(c) }
+}
+
+/// How many prims are in them.
+pub(in crate::accel) fn count(items: &[Item]) -> usize {
+    items.iter().map(|item| item.count() as usize).sum()
 }
 
 /// The box around all items.
@@ -119,7 +177,37 @@ mod tests {
             let item = Item::new(bounds, prim);
             assert_eq!((item.prim(), item.bounds().aabb()), (prim, bounds));
             assert!(item.bounds().lo.w.is_normal() && item.bounds().hi.w.is_normal());
+            let pair = Item::numbered(bounds.into(), prim, TWO);
+            assert_eq!((item.prims(), pair.prims()), (prim..prim + 1, prim..prim + 2));
         }
+    }
+
+    /// The prims of each item that is made of these triangles, from number 7 on.
+    fn paired(corners: &[[Vec3; 3]]) -> Vec<Range<u32>> {
+        let shapes =
+            scenes::mesh(corners.concat(), (0..).step_by(3).map(|v| [v, v + 1, v + 2]).take(corners.len()).collect());
+        let mut places = vec![Item::zeroed(); corners.len()];
+        let count = Item::in_pairs(&shapes, 7, &shapes.triangles, &mut places);
+        for item in &places[..count] {
+            let bounds = item.prims().map(|prim| shapes.bounds(prim - 7)).fold(Aabb::EMPTY, Aabb::union);
+            assert_eq!(item.bounds().aabb(), bounds, "{:?}", item.prims());
+            assert_eq!(item.count(), item.prims().len() as u32);
+        }
+        assert_eq!(super::count(&places[..count]), corners.len());
+        places[..count].iter().map(Item::prims).collect()
+    }
+
+    #[test]
+    fn halves_of_quads_are_taken_together_and_what_lies_apart_is_not() {
+        let [a, b] = [[Vec3::ZERO, Vec3::X, Vec3::Y], [Vec3::X, Vec3::ONE - Vec3::Z, Vec3::Y]];
+        let away = |triangle: [Vec3; 3]| triangle.map(|corner| corner + Vec3::X * 9.0);
+        assert_eq!(paired(&[a, b]), [7..9]);
+        assert_eq!(paired(&[a, away(b)]), [7..8, 8..9]);
+        assert_eq!(paired(&[away(b), a, b]), [7..8, 8..10]);
+        assert_eq!(paired(&[a, b, away(a), away(b), a]), [7..9, 9..11, 11..12]);
+        // Of three that lie together the first two are taken.
+        assert_eq!(paired(&[a, b, a]), [7..9, 9..10]);
+        assert_eq!(paired(&[]), []);
     }
 
     #[test]

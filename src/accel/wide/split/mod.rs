@@ -20,6 +20,8 @@ pub enum Splitting {
 #[derive(Clone, Copy, Debug)]
 pub(in crate::accel) struct Cut {
     pub at: usize,
+    /// How many prims the first part has.
+    pub prims: usize,
     pub bounds: [Bounds; 2],
     /// Around the doubled middles of both parts, where that cost nothing to find out.
     pub middles: Option<[Bounds; 2]>,
@@ -29,7 +31,8 @@ pub(in crate::accel) struct Cut {
 fn halves(items: &mut [Item]) -> Cut {
     items.sort_unstable_by_key(Item::prim);
     let at = items.len() / 2;
-    Cut { at, bounds: [around(&items[..at]), around(&items[at..])], middles: None }
+    let (first, second) = items.split_at(at);
+    Cut { at, prims: item::count(first), bounds: [first, second].map(around), middles: None }
 }
 
 #[cfg(test)]
