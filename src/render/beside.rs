@@ -2,9 +2,7 @@
 //! elsewhere.
 //!
 //! Where several rays of a wave belong to one sample, they go by rank: so what a sample gathers is added in the order of its
-//! rays, whichever others are beside them. (Where more rays wait than a wave takes, or more shadow rays or rays to the
-//! surroundings than are kept, sums that are cut there may differ in their last bits from those of pictures that are shaded
-//! one by one.)
+//! rays, whichever others are beside them.
 
 use super::branch::Point;
 use super::context::Context;
@@ -136,6 +134,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         for (start, hits) in (0..).step_by(at_a_time).zip(eyes.hits.chunks(at_a_time)) {
             self.shade_some_eyes(eyes, (start, hits));
             self.relieve();
+            self.follow_eyes();
         }
     }
 

@@ -103,7 +103,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         self.reflect(point, balance.reflected);
 
         let weight = point.path.weight * balance.refracted;
-        if !self.splits(point) || !self.context.is_alive(weight) {
+        if !self.splits(point) || !self.context.is_alive(weight, point.path.part) {
             return self.send_refracted(point, weight, crossing, point.path.band);
         }
         // White light splits: each part of the spectrum has its own index from here on.
@@ -172,7 +172,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let Seen { normal, geometric, view, .. } = point.surface.seen();
         let facet = rough.lobe.facet(view, rough.spread.point(k));
         let share = point.matter.balance(view.dot(facet), crossing).refracted;
-        if !self.context.is_alive(point.path.weight * share * color) {
+        if !self.context.is_alive(point.path.weight * share * color, point.path.part) {
             return;
         }
         let (n_i, n_t) = (f64::from(crossing.n_i), f64::from(crossing.n_t));
@@ -205,13 +205,14 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         finish: impl FnOnce(Path) -> Path,
     ) {
         let path = finish(point.bounced(self.context, Vec3::ZERO, MIRROR));
-        if !self.context.is_alive(path.weight) {
+        let part = path.part * (1.0 / rough.rays as f32);
+        if !self.context.is_alive(path.weight, part) {
             return;
         }
         let angle = rough.lobe.angle(rough.rays);
         let (cone_spread, scattered) = (path.cone_spread + angle, path.scattered + angle);
         let ray = point.surface.ray(dir, point.ray.sample);
-        self.starting[class as usize].push(ray, Path { cone_spread, scattered, ..path }, Hit::MISS);
+        self.starting[class as usize].push(ray, Path { part, cone_spread, scattered, ..path }, Hit::MISS);
     }
 
     /// Queues what lacquer mirrors.
@@ -236,7 +237,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     }
 
     fn send_reflected<G: Ground>(&mut self, point: &Point<G>, normal: Vec3, weight: Vec3, band: Option<u8>) {
-        if !self.context.is_alive(weight) {
+        if !self.context.is_alive(weight, point.path.part) {
             return;
         }
         let Seen { geometric, view, .. } = point.surface.seen();
@@ -247,7 +248,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     }
 
     fn send_refracted<G: Ground>(&mut self, point: &Point<G>, weight: Vec3, crossing: &Crossing, band: Option<u8>) {
-        if !self.context.is_alive(weight) {
+        if !self.context.is_alive(weight, point.path.part) {
             return;
         }
         let turn = band.map_or(0, |band| u32::from(band) + 1);

@@ -19,18 +19,21 @@ use std::sync::Arc;
 /// Rays to a panorama from each point, when nobody says.
 const ENV_RAYS: u32 = 16;
 
-/// Fewest rays to a panorama from a point of which there are several samples.
-const ENV_RAYS_LEAST: u32 = 6;
 /// Shadow rays that wait before they are traced, and …
 pub(super) const SHADOW_LIMIT: usize = 1 << 14;
 /// … rays to the surroundings.
 pub(super) const AROUND_LIMIT: usize = 1 << 15;
+/// Rays behind those of eyes that wait before they are traced.
+pub(super) const FOLLOWERS: usize = 1 << 17;
 
 /// Samples of a pixel that share the rays which one sample would send from each point: of stochastic sampling as many as
 /// every pixel has that is not even, for more rays come with more samples where they are needed.
 fn samples_together(settings: &Settings) -> u32 {
     match settings.sampling {
-        Sampling::Stochastic(how) => how.min_samples.max(certainty::SURE).min(how.max_samples).max(1),
+        Sampling::Stochastic(how) => {
+            let (fewest, most) = how.powers();
+            fewest.max(certainty::SURE).min(most)
+        }
         Sampling::Uniform | Sampling::Adaptive(_) => 1,
     }
 }
@@ -112,8 +115,7 @@ impl<'a> Context<'a> {
         let depth = settings.depth.unwrap_or_else(|| auto_depth(&features, gloss.all, settings.cutoff));
         let sky = Arc::new(Sky::new(scene));
         let env_rays = settings.env_rays.unwrap_or(if sky.is_map() { ENV_RAYS } else { 0 });
-        // Each way of drawing a direction to a panorama needs a ray in each of both halves.
-        let env_rays = env_rays.div_ceil(together).max(env_rays.min(if sky.is_map() { ENV_RAYS_LEAST } else { 2 }));
+        let env_rays = shared_env_rays(env_rays, together, sky.is_map(), features.has(Feature::Translucence));
         let lights: Vec<LocalLight> = scene.lights.iter().map(|l| LocalLight::new(l, world.center)).collect();
         let light_rays = settings.light_rays.max(1).div_ceil(together);
         let alone = everything || settings.layers || gloss.all;
@@ -130,7 +132,7 @@ impl<'a> Context<'a> {
             gloss,
             highlight_reach: glint::reach(settings),
             seed: settings.seed,
-            points_at_a_time: points_at_a_time(&lights, light_rays, env_rays),
+            points_at_a_time: points_at_a_time(&lights, light_rays, env_rays, gloss),
             lights,
             common: (0..).zip(&scene.materials).map(common).collect(),
             bands: if needs(&[Feature::Dispersion]) { bands() } else { Vec::new() },
@@ -158,17 +160,40 @@ impl<'a> Context<'a> {
         self.sky.is_map() || self.env_rays > 0
     }
 
-    /// Whether a branch of this weight is worth its rays.
-    pub(crate) fn is_alive(&self, weight: Vec3) -> bool {
-        weight.max_element() >= self.cutoff.max(f32::MIN_POSITIVE)
+    /// Whether a branch of this weight is worth its rays, where it is such a part of what was spread.
+    pub(crate) fn is_alive(&self, weight: Vec3, part: f32) -> bool {
+        weight.max_element() >= self.cutoff_of(part)
+    }
+
+    /// No branch of less weight is.
+    pub(crate) fn least_cutoff(&self) -> f32 {
+        self.cutoff_of(1.0 / self.gloss.rays.max(1) as f32)
+    }
+
+    fn cutoff_of(&self, part: f32) -> f32 {
+        (self.cutoff * part).max(f32::MIN_POSITIVE)
     }
 }
 
+/// Rays from each of so many samples to its surroundings, where each would send `rays` alone, to a panorama or not, through
+/// translucent surfaces or not.
+fn shared_env_rays(rays: u32, together: u32, to_panorama: bool, translucent: bool) -> u32 {
+    if rays == 0 {
+        return 0;
+    }
+    // A ray to each side in each of both halves: none stands in for one to the other side.
+    let sides = if translucent { 4 } else { 2 };
+    // Without a ray of each way that a direction to a panorama is drawn in, there is much noise.
+    let ways = if to_panorama { sides + 4 } else { sides };
+    rays.div_ceil(together).max(rays.min(ways)).max(sides)
+}
+
 /// As many points as send hardly more rays together than may wait.
-fn points_at_a_time(lights: &[LocalLight], light_rays: u32, env_rays: u32) -> usize {
+fn points_at_a_time(lights: &[LocalLight], light_rays: u32, env_rays: u32, gloss: Gloss) -> usize {
     let rays = |light: &LocalLight| if light.is_wide() { light_rays as usize } else { 1 };
     let to_lights: usize = lights.iter().filter(|light| light.shadows).map(rays).sum();
     let points = (SHADOW_LIMIT / to_lights.max(1)).min(AROUND_LIMIT / (env_rays as usize).max(1));
+    let points = points.min(FOLLOWERS / (gloss.rays as usize).max(1));
     points.max(1).next_multiple_of(LANES)
 }
 
@@ -222,6 +247,20 @@ mod tests {
         assert_eq!(auto_depth(&glass, false, 0.002), 256);
         assert_eq!(auto_depth(&Features::default(), false, 0.002), 0);
         assert_eq!(auto_depth(&glass, false, 0.0), 12, "paths that nothing ends double with each bounce");
+    }
+
+    #[test]
+    fn samples_share_rays_to_the_surroundings_but_each_side_keeps_its_own() {
+        let shared = |rays, together| {
+            [(false, false), (true, false), (false, true), (true, true)]
+                .map(|(map, thin)| shared_env_rays(rays, together, map, thin))
+        };
+        assert_eq!(shared(0, 4), [0; 4]);
+        assert_eq!(shared(1, 1), [2, 2, 4, 4]);
+        assert_eq!(shared(16, 1), [16; 4]);
+        assert_eq!(shared(16, 4), [4, 6, 4, 8]);
+        assert_eq!(shared(4, 4), [2, 4, 4, 4]);
+        assert_eq!(shared(100, 4), [25; 4]);
     }
 
     #[test]

@@ -1,7 +1,6 @@
 //! Rendering with every code path on: what a scene does without is done all the same, and what comes of it thrown away.
 //!
-//! The picture stays what it is, bit for bit (but for sums that were cut, as `beside` says); what leaving things out saves is
-//! the difference in time. Done in vain are:
+//! The picture stays what it is, bit for bit; what leaving things out saves is the difference in time. Done in vain are:
 //!
 //! - for each shadow ray: no prim counts as opaque, so that none ends the ray, and each that it meets is asked what it lets
 //!   through ([`World::with_everything`](super::World::with_everything));

@@ -90,6 +90,15 @@ pub struct Stochastic {
     pub target: Option<f32>,
 }
 
+impl Stochastic {
+    /// Fewest and most samples of a pixel as they are taken, powers of two.
+    pub(super) fn powers(&self) -> (u32, u32) {
+        let most = 1 << self.max_samples.max(1).ilog2();
+        let fewest = self.min_samples.max(1).checked_next_power_of_two().unwrap_or(most);
+        (fewest.min(most), most)
+    }
+}
+
 impl Default for Stochastic {
     fn default() -> Self {
         Quality::default().stochastic()

@@ -28,6 +28,9 @@ impl RayClass {
 pub(crate) struct Path {
     /// Product of the weights from the eye to here.
     pub weight: Vec3,
+    /// The part of what was spread over several rays that this one stands for: whether a branch is worth its rays is judged
+    /// by what all of them carry together.
+    pub part: f32,
     /// Bounces since the eye.
     pub depth: u32,
     /// Whether the ray still runs along the line of sight, so that what lies behind shows through.
@@ -53,6 +56,7 @@ impl Path {
     pub(crate) fn from_eye(cone_width: f32, cone_spread: f32) -> Self {
         Self {
             weight: Vec3::ONE,
+            part: 1.0,
             depth: 0,
             straight: true,
             band: None,
@@ -149,11 +153,20 @@ pub(crate) struct Queue {
     paths: Vec<Path>,
     /// The hit after which the search goes on; [`Hit::MISS`] for rays that start.
     after: Vec<Hit>,
+    /// So many at the front are in the order of their samples.
+    in_order: usize,
+    /// Samples of others, and where their rays are: a buffer.
+    order: Vec<(u32, u32)>,
 }
 
 impl Queue {
     pub(crate) fn is_empty(&self) -> bool {
         self.rays.is_empty()
+    }
+
+    /// Rays that wait.
+    pub(crate) fn len(&self) -> usize {
+        self.rays.len()
     }
 
     /// Adds a ray; it goes on behind `after`, or starts when that is [`Hit::MISS`].
@@ -166,21 +179,53 @@ impl Queue {
     /// Moves the last rays, at most `limit`, into `wave`.
     ///
     /// Taking from the end bounds the memory that trees with many branches need: a slice is traced down to its leaves
-    /// before the rays in front of it.
-    pub(crate) fn take(&mut self, wave: &mut Wave, limit: usize) {
-        let start = self.rays.len().saturating_sub(limit);
+    /// before the rays in front of it. More than `whole` rays are put in the order of their samples before, so that where
+    /// they are cut does not depend on the order in which points were shaded.
+    pub(crate) fn take(&mut self, wave: &mut Wave, (limit, whole): (usize, usize)) {
         wave.clear();
+        if self.rays.len() > whole {
+            self.put_in_order(wave);
+        }
+        let start = self.rays.len().saturating_sub(limit);
+        self.in_order = self.in_order.min(start);
         wave.rays.extend(self.rays.drain(start..));
         wave.paths.extend(self.paths.drain(start..));
         wave.after.extend(self.after.drain(start..));
         wave.hits.resize(wave.rays.len(), Hit::MISS);
     }
 
+    /// Puts all rays in the order of their samples, those of one sample in the order in which they came. `spare` is empty
+    /// before and after.
+    fn put_in_order(&mut self, spare: &mut Wave) {
+        let Self { rays, paths, after, in_order, order } = self;
+        let (before, added) = rays.split_at(*in_order);
+        let Some(least) = added.iter().map(|ray| ray.sample).min() else { return };
+        let start = before.partition_point(|ray| ray.sample <= least);
+        *in_order = rays.len();
+        if rays[start..].is_sorted_by_key(|ray| ray.sample) {
+            return;
+        }
+        order.clear();
+        order.extend((0..).zip(&rays[start..]).map(|(i, ray)| (ray.sample, i)));
+        order.sort();
+        reorder(&mut rays[start..], order, &mut spare.rays);
+        reorder(&mut paths[start..], order, &mut spare.paths);
+        reorder(&mut after[start..], order, &mut spare.after);
+    }
+
     pub(crate) fn clear(&mut self) {
         self.rays.clear();
         self.paths.clear();
         self.after.clear();
+        self.in_order = 0;
     }
+}
+
+/// Puts items in an order, which says where each comes from.
+fn reorder<T: Copy>(items: &mut [T], order: &[(u32, u32)], spare: &mut Vec<T>) {
+    spare.extend(order.iter().map(|&(_, from)| items[from as usize]));
+    items.copy_from_slice(spare);
+    spare.clear();
 }
 
 /// Rays of one class that are traced together, and what they hit.
@@ -205,6 +250,11 @@ impl Wave {
 mod tests {
     use super::*;
     use crate::accel::NO_PRIM;
+    use crate::math::random::Random;
+
+    fn ray(sample: u32) -> Ray {
+        Ray { origin: Vec3::ZERO, t_min: 0.0, dir: Vec3::Z, t_max: 1.0, exclude: NO_PRIM, sample }
+    }
 
     const GLASS: Medium = Medium { material: 1, ior: 1.5 };
     const WATER: Medium = Medium { material: 2, ior: 1.33 };
@@ -252,15 +302,48 @@ mod tests {
     fn a_queue_gives_its_last_rays_first_and_keeps_the_rest() {
         let (mut queue, mut wave) = (Queue::default(), Wave::default());
         let path = Path::from_eye(0.0, 0.0);
-        for sample in 0..5 {
-            let ray = Ray { origin: Vec3::ZERO, t_min: 0.0, dir: Vec3::Z, t_max: 1.0, exclude: NO_PRIM, sample };
-            queue.push(ray, path, Hit::MISS);
-        }
-        queue.take(&mut wave, 3);
+        (0..5).for_each(|sample| queue.push(ray(sample), path, Hit::MISS));
+        queue.take(&mut wave, (3, 3));
         assert_eq!(wave.rays.iter().map(|r| r.sample).collect::<Vec<_>>(), [2, 3, 4]);
         assert_eq!(wave.hits.len(), 3);
-        queue.take(&mut wave, 3);
+        queue.take(&mut wave, (3, 3));
         assert_eq!(wave.rays.iter().map(|r| r.sample).collect::<Vec<_>>(), [0, 1]);
         assert!(queue.is_empty());
+    }
+
+    #[test]
+    fn what_is_taken_of_many_rays_does_not_depend_on_the_order_in_which_samples_sent_theirs() {
+        let mut random = Random::new(8);
+        let (mut queues, mut waves) = ([(); 2].map(|()| Queue::default()), [(); 2].map(|()| Wave::default()));
+        let mut sent = [0_u32; 90];
+        for round in 0..40 {
+            // Which samples send rays, each a few: once in their order, once in another.
+            let samples: Vec<u32> = (0..90).filter(|_| random.below(3) == 0).collect();
+            let mut other = samples.clone();
+            other.sort_by_key(|sample| sample.wrapping_mul(2_654_435_761).rotate_left(round));
+            for (queue, samples) in queues.iter_mut().zip([&samples, &other]) {
+                let mut sent = sent;
+                for &sample in samples {
+                    for _ in 0..1 + sample % 3 {
+                        let ray = Ray { t_min: sent[sample as usize] as f32, ..ray(sample) };
+                        queue.push(ray, Path { depth: sample, ..Path::from_eye(0.0, 0.0) }, Hit::MISS);
+                        sent[sample as usize] += 1;
+                    }
+                }
+            }
+            samples.iter().for_each(|&sample| sent[sample as usize] += 1 + sample % 3);
+            for (queue, wave) in queues.iter_mut().zip(&mut waves) {
+                queue.take(wave, (40, 30));
+                assert!(wave.rays.iter().zip(&wave.paths).all(|(ray, path)| ray.sample == path.depth));
+            }
+            let numbers = |wave: &Wave| {
+                let mut rays: Vec<_> = wave.rays.iter().map(|ray| (ray.sample, ray.t_min as u32)).collect();
+                // Few rays are taken as they came: among samples in any order, of one sample in that of its rays.
+                rays.sort_by_key(|ray| ray.0);
+                rays
+            };
+            assert_eq!(numbers(&waves[0]), numbers(&waves[1]), "round {round}");
+            assert!(numbers(&waves[0]).is_sorted(), "round {round}");
+        }
     }
 }

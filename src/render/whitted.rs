@@ -11,7 +11,7 @@ use super::Progress;
 use super::asking::Asking;
 use super::beside::Beside;
 use super::branch::{Ground, Point};
-use super::context::{AROUND_LIMIT, Context, SHADOW_LIMIT, coverage};
+use super::context::{AROUND_LIMIT, Context, FOLLOWERS, SHADOW_LIMIT, coverage};
 use super::draws::{Draws, Purpose, Stream};
 use super::everything::look_up_in_vain;
 use super::eyes::Eyes;
@@ -135,16 +135,29 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     /// Traces all trees to their leaves; false when the user gave up before the end.
     pub(crate) fn trace(&mut self) -> bool {
         self.trace_eyes();
+        self.trace_waves();
+        !self.asking.cancelled
+    }
+
+    /// Traces what follows eye rays, once so much waits that memory would fill.
+    pub(super) fn follow_eyes(&mut self) {
+        if self.starting.iter().chain(&self.continuing).map(Queue::len).sum::<usize>() >= FOLLOWERS {
+            self.trace_shadows();
+            self.trace_waves();
+        }
+    }
+
+    /// Traces all rays that wait, and what follows them.
+    fn trace_waves(&mut self) {
         while let Some(class) = self.next_wave() {
             if self.asking.cancelled {
-                return false;
+                return;
             }
             let wave = std::mem::take(&mut self.wave);
             self.shade_wave(class, &wave);
             self.wave = wave;
             self.trace_shadows();
         }
-        !self.asking.cancelled
     }
 
     /// Traces the rays of all eyes and shades what they hit.
@@ -162,10 +175,11 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     /// Takes the next wave and finds its hits. Rays that go on come before rays that start a deeper generation.
     fn next_wave(&mut self) -> Option<RayClass> {
         let wave = &mut self.wave;
+        let limits = (WAVE_LIMIT, WAVE_LIMIT.min(self.context.points_at_a_time));
         for class in RayClass::ALL {
             let queue = &mut self.continuing[class as usize];
             if !queue.is_empty() {
-                queue.take(wave, WAVE_LIMIT);
+                queue.take(wave, limits);
                 self.asking.next(&wave.rays, &wave.after, &mut wave.hits, self.counts.of(class));
                 return Some(class);
             }
@@ -173,7 +187,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         for class in RayClass::ALL {
             let queue = &mut self.starting[class as usize];
             if !queue.is_empty() {
-                queue.take(wave, WAVE_LIMIT);
+                queue.take(wave, limits);
                 self.asking.closest(&wave.rays, &mut wave.hits, self.counts.of(class));
                 return Some(class);
             }
@@ -291,7 +305,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     fn go_on(&mut self, class: RayClass, ray: &Ray, path: &Path, hit: &Hit, covered: f32) {
         let weight = path.weight * (1.0 - covered);
         let class = if covered > 0.0 { RayClass::Refracted } else { class };
-        if self.context.is_alive(weight) {
+        if self.context.is_alive(weight, path.part) {
             let path = Path { weight, ..path.turned(class, ON) };
             self.continuing[class as usize].push(*ray, path, *hit);
         }

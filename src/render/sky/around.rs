@@ -88,7 +88,8 @@ impl Arounds {
         let lobe = point.matter.gloss().map(|roughness| Way::Lobe(roughness * roughness));
         let light = context.sky.is_map().then_some(Way::Light);
         let behind = point.matter.is_translucent().then_some(Way::Behind);
-        let ways = [Some(Way::Cosine), lobe, light, behind];
+        // The first ones get a ray where there are few; what lies behind is found in no other way.
+        let ways = [Some(Way::Cosine), behind, lobe, light];
         let count = 1 + u32::from(lobe.is_some()) + u32::from(light.is_some()) + u32::from(behind.is_some());
         let half = context.env_rays.div_ceil(2);
         let view = View::new(seen.normal, seen.view);

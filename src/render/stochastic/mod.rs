@@ -174,8 +174,6 @@ impl<'a> Sampler<'a> {
                 if !even.is_even(at) {
                     around.know((x, y), pixels.len());
                     pixels.push(self.opened(first, (x, y)));
-                    let range = around.range((x, y));
-                    pixels.last_mut().into_iter().for_each(|pixel| pixel.surround(&self.judge, &range));
                 }
             }
         });
@@ -267,11 +265,12 @@ impl<'a> Sampler<'a> {
 /// Samples of a pixel after each round: the fewest, but then at least [`SURE`], then twice as many from round to round,
 /// powers of two throughout, as these many points of the sequence lie most evenly.
 fn rounds(how: &Stochastic, settings: &Settings) -> impl Iterator<Item = u32> + use<> {
-    let most = 1 << how.max_samples.max(1).ilog2();
+    let (fewest, most) = how.powers();
     // In a single row or column there are not enough pixels beside one.
     let least = if settings.width.min(settings.height) < 2 { SURE } else { 1 };
-    let fewest = how.min_samples.max(least).checked_next_power_of_two().unwrap_or(most).min(most);
-    std::iter::successors(Some(fewest), move |&last| (last < most).then(|| (2 * last).max(SURE).min(most)))
+    std::iter::successors(Some(fewest.max(least).min(most)), move |&last| {
+        (last < most).then(|| (2 * last).max(SURE).min(most))
+    })
 }
 
 /// After how many rounds the pixels beside each are looked at: after the first, and after that in which it gets [`SURE`]

@@ -99,14 +99,14 @@ impl Strip {
     /// Sends the rays that find what a surface of `matter` mirrors.
     pub(crate) fn mirror(&mut self, context: &Context, matter: &Matter, traced: Traced, to: &mut Queue) {
         let Self { cones, painted, found, given, weights, .. } = self;
-        let (points, cutoff) = (padded(self.count), context.cutoff.max(f32::MIN_POSITIVE));
+        let (points, cutoff) = (padded(self.count), context.least_cutoff());
         let weights = weights.as_ref().unwrap_or(&ONES);
         self.level.run(Mirror { painted, found, cones, points, matter, weights, cutoff });
         let Mirrored { alive, weight, origin, dir, spread } = &cones.mirrored;
         let prims = given.faces.prims();
         for i in (0..self.count.min(POINTS)).filter(|&i| alive[i] == 1) {
             let path = traced.path(self.rays[i] as usize);
-            if path.depth >= context.depth {
+            if path.depth >= context.depth || !context.is_alive(get(weight, i), path.part) {
                 continue;
             }
             let (exclude, sample) = (prims[i], self.samples[i]);
@@ -227,7 +227,7 @@ impl Kernel for Mirror<'_> {
 }
 
 /// The rays of points that mirror such shares of light where the cosine of the view is so; they follow rays of these
-/// weights, and are sent above the cutoff.
+/// weights, and may be sent above the cutoff.
 #[inline(always)]
 fn mirror(
     found: &Found,

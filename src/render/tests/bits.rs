@@ -307,6 +307,25 @@ fn glass_shaded_side_by_side_has_the_bits_of_glass_shaded_one_by_one() {
 }
 
 #[test]
+fn where_more_rays_wait_than_are_traced_together_points_side_by_side_have_the_same_bits() {
+    let mut s = glazed(plain(), 0);
+    for material in &mut s.scene.materials {
+        if let Reflection::MetalRough(m) = &mut material.surface {
+            m.dispersion = if m.thick { 4.0 } else { 0.0 };
+        }
+    }
+    s.scene.environment = Environment::Studio;
+    s.settings = Settings { width: 240, height: 180, samples: 8, depth: Some(6), cutoff: 1.0 / 512.0, ..s.settings };
+    let together = s.render_by(AccelKind::DEFAULT);
+    s.settings.layers = true;
+    let alone = s.render_by(AccelKind::DEFAULT);
+    assert!(together.counts.refracted.queries > 500_000, "{:?}", together.counts.refracted);
+    assert_eq!(together.counts, alone.counts);
+    let differ = together.picture.beauty.iter().zip(&alone.picture.beauty).filter(|(a, b)| a != b).count();
+    assert_eq!(differ, 0, "pixels");
+}
+
+#[test]
 fn points_that_look_around_by_rays_have_the_same_bits_side_by_side() {
     let mut random = Random::new(12);
     let texels = Arc::new((0..32 * 16).map(|_| [(); 3].map(|()| random.unit() * 2.0)).collect::<Vec<_>>());

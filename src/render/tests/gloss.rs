@@ -59,6 +59,25 @@ fn white_in_a_furnace_is_as_bright_as_the_furnace() {
 }
 
 #[test]
+fn many_rays_show_what_few_show_though_each_weighs_next_to_nothing() {
+    let of = |rays, metallic| {
+        let mut s = looking_down(5.0);
+        let model = MetalRough { metallic, roughness: 0.4, ..MetalRough::default() };
+        s.sphere(DVec3::new(0.3, 0.2, 0.0), 1.0, Material { base_color: Vec3::splat(metallic), ..rough(model) });
+        s.scene.environment = Environment::Constant(Vec3::ONE);
+        s.settings = Settings { samples: 4, gloss_rays: Some(rays), cutoff: 1.0 / 512.0, ..s.settings };
+        s.color().x
+    };
+    for metallic in [0.0, 1.0] {
+        let few = of(16, metallic);
+        for rays in [128, 2048] {
+            let many = of(rays, metallic);
+            assert!((many / few - 1.0).abs() < 0.06, "{metallic} {rays}: {many} for {few}");
+        }
+    }
+}
+
+#[test]
 fn frosted_glass_in_a_furnace_loses_next_to_nothing() {
     for (thick, roughness) in [(false, 0.3), (true, 0.2), (true, 0.5)] {
         let mut s = looking_down(5.0);
