@@ -184,11 +184,10 @@ mod tests {
         let (columns, rows) = (41, 9);
         let samples = samples(columns * rows);
         for (background, transparent) in [(None, true), (Some(Vec3::new(0.1, 0.5, 0.9)), false)] {
-            for error in [0.02, 0.08] {
-                let judge = Certainty {
-                    level: Level::best(),
-                    ..Certainty::new(None, background, transparent, error, factor(0.95))
-                };
+            for (error, level) in
+                [0.02, 0.08].iter().flat_map(|&error| Level::all().into_iter().map(move |l| (error, l)))
+            {
+                let judge = Certainty { level, ..Certainty::new(None, background, transparent, error, factor(0.95)) };
                 let shown = judge.see_samples(&samples);
                 let groups: Vec<[Sum; 1]> = samples.iter().map(|sample| [Sum::of(sample)]).collect();
                 let mut seen = Vec::new();

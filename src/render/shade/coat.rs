@@ -4,7 +4,7 @@
 //! is not bent on its way through. The share that is taken off is that of the view alone, as the extension says.
 
 use super::facets::albedo;
-use super::metal_rough::{NARROW_HIGHLIGHT, above, highlight, least_square, open, squared_width, traced};
+use super::metal_rough::{above, highlight, is_narrow, least_square, open, squared_width, traced};
 use super::{Reader, Seen, Sky};
 use crate::math::Vec3;
 use crate::render::optics::{fresnel_schlick, reflect};
@@ -47,7 +47,7 @@ impl CoatMatter {
 
     /// Whether its highlights are narrow.
     pub(super) fn has_narrow_highlight(&self) -> bool {
-        self.roughness < NARROW_HIGHLIGHT
+        is_narrow(self.roughness)
     }
 
     /// Widens the highlights of lights to this α².

@@ -109,13 +109,13 @@ const ALBEDO: [[(f32, f32); 9]; 9] = [
 
 /// [`ALBEDO`] at any roughness and N·V between its entries, off by at most 0.05.
 pub(crate) fn albedo(roughness: f32, n_v: f32) -> (f32, f32) {
-    let lobe = Lobe::of(roughness);
-    between(n_v, |column| lobe.entry(column))
+    let row = Row::of(roughness);
+    between(n_v, |column| row.entry(column))
 }
 
-/// [`ALBEDO`] at one roughness.
+/// The place of a roughness among the rows of [`ALBEDO`].
 #[derive(Clone, Copy)]
-struct Lobe {
+struct Row {
     row: usize,
     rest: f32,
 }
@@ -125,7 +125,7 @@ fn mix(a: (f32, f32), b: (f32, f32), t: f32) -> (f32, f32) {
     (a.0 + (b.0 - a.0) * t, a.1 + (b.1 - a.1) * t)
 }
 
-impl Lobe {
+impl Row {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "lies in 0 … 8")]
     fn of(roughness: f32) -> Self {
         let y = roughness.clamp(0.0, 1.0) * 8.0;
@@ -144,8 +144,8 @@ pub(crate) struct AlbedoRow([(f32, f32); 9]);
 
 impl AlbedoRow {
     pub(crate) fn of(roughness: f32) -> Self {
-        let lobe = Lobe::of(roughness);
-        Self(std::array::from_fn(|column| lobe.entry(column)))
+        let row = Row::of(roughness);
+        Self(std::array::from_fn(|column| row.entry(column)))
     }
 
     #[inline(always)]
@@ -168,12 +168,10 @@ fn between(n_v: f32, entry: impl Fn(usize) -> (f32, f32)) -> (f32, f32) {
 const MEAN_ALBEDO: [f32; 9] = [1.000, 0.999, 0.987, 0.951, 0.883, 0.781, 0.657, 0.529, 0.410];
 
 /// The mean over the hemisphere of what a white lobe of any roughness sends back.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "lies in 0 … 8")]
 #[inline(always)]
 pub(crate) fn mean_albedo(roughness: f32) -> f32 {
-    let y = roughness.clamp(0.0, 1.0) * 8.0;
-    let row = (y as usize).min(7);
-    MEAN_ALBEDO[row] + (MEAN_ALBEDO[row + 1] - MEAN_ALBEDO[row]) * (y - row as f32)
+    let Row { row, rest } = Row::of(roughness);
+    MEAN_ALBEDO[row] + (MEAN_ALBEDO[row + 1] - MEAN_ALBEDO[row]) * rest
 }
 
 /// The share of even light from all around that leaves a metal after more than one bounce between its facets, relative

@@ -78,22 +78,7 @@ impl GrainMatter {
 
     /// Distribution × visibility of a light without extent, before Fresnel; all unit vectors, on the front.
     pub(super) fn highlight(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> f32 {
-        let half = (view + to_light).normalize_or(normal);
-        self.facets(normal, half) * self.visibility(normal, view, to_light)
-    }
-
-    fn facets(&self, normal: Vec3, half: Vec3) -> f32 {
-        let [wide, narrow] = self.alpha;
-        let (x, y, z) = (half.dot(self.along) / wide, half.dot(self.across) / narrow, half.dot(normal));
-        let squared = x * x + y * y + z * z;
-        1.0 / (PI * wide * narrow * squared * squared)
-    }
-
-    fn visibility(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> f32 {
-        let [wide, narrow] = self.alpha;
-        let stretched =
-            |v: Vec3| Vec3::new(wide * v.dot(self.along), narrow * v.dot(self.across), normal.dot(v)).length();
-        0.5 / (normal.dot(to_light) * stretched(view) + normal.dot(view) * stretched(to_light))
+        self.lobe(normal).highlight(view, to_light)
     }
 
     /// The surroundings as facets show them that lean along the grain, each as blurred as it is rough across.
@@ -231,7 +216,7 @@ mod tests {
     fn facets_cover_the_surface_once() {
         for (strength, roughness) in [(0.0, 0.4), (0.5, 0.3), (1.0, 0.5), (0.7, 0.8)] {
             let grain = grain(strength, roughness);
-            let covered = over_hemisphere(|h| f64::from(grain.facets(Vec3::Z, h) * h.z));
+            let covered = over_hemisphere(|h| f64::from(grain.lobe(Vec3::Z).facets(h) * h.z));
             assert!((covered - 1.0).abs() < 0.01, "{strength} {roughness}: {covered}");
         }
     }

@@ -68,12 +68,25 @@ impl Lobe {
     /// How densely the directions that `view` is mirrored to lie where this facet mirrors it, 1/sr.
     #[inline(always)]
     pub(crate) fn density(&self, view: Vec3, facet: Vec3) -> f32 {
+        self.facets(facet) / (2.0 * (self.normal.dot(view).max(0.0) + self.length(view)))
+    }
+
+    /// Distribution × visibility of a light without extent, before Fresnel; all unit vectors, on the front.
+    #[inline(always)]
+    pub(super) fn highlight(&self, view: Vec3, to_light: Vec3) -> f32 {
+        let half = (view + to_light).normalize_or(self.normal);
+        let (n_v, n_l) = (self.normal.dot(view), self.normal.dot(to_light));
+        self.facets(half) * (0.5 / (n_l * self.length(view) + n_v * self.length(to_light)))
+    }
+
+    /// How many facets have this normal, 1/sr.
+    #[inline(always)]
+    pub(super) fn facets(&self, normal: Vec3) -> f32 {
         let [wide, narrow] = self.alpha;
         let stretched =
-            Vec3::new(facet.dot(self.along) / wide, facet.dot(self.across) / narrow, facet.dot(self.normal));
+            Vec3::new(normal.dot(self.along) / wide, normal.dot(self.across) / narrow, normal.dot(self.normal));
         let squared = stretched.length_squared();
-        let facets = 1.0 / (PI * wide * narrow * squared * squared);
-        facets / (2.0 * (self.normal.dot(view).max(0.0) + self.length(view)))
+        1.0 / (PI * wide * narrow * squared * squared)
     }
 
     /// What all facets together send back to `view` of light from everywhere, if they mirror all of it.

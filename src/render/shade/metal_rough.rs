@@ -30,7 +30,7 @@ const FROSTED_SHARE: f32 = 0.75;
 /// Highlights of lights without extent are never narrower than this roughness makes them.
 pub(super) const NARROWEST_HIGHLIGHT: f32 = 0.045;
 /// Below this roughness they are widened so that rays meet them (see [`crate::render::glint`]).
-pub(super) const NARROW_HIGHLIGHT: f32 = 0.35;
+const NARROW_HIGHLIGHT: f32 = 0.35;
 
 /// The model's parameters at one point.
 #[derive(Clone, Copy, Debug)]

@@ -251,6 +251,9 @@ impl<const WIDE: bool> Kernel for Shine<'_, WIDE> {
                 }
             }
         }
+        if !light.shadows {
+            return;
+        }
         match (light.position(), drawn) {
             (None, _) => start(found, lit, points, |_| None),
             (_, Some((drawn, _))) if WIDE => start(found, lit, points, |i| Some(get(&drawn.ends, i))),

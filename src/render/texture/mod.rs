@@ -34,7 +34,8 @@ const MAX_PROBES: f32 = 8.0;
 #[derive(Debug)]
 pub struct TextureStore<'a> {
     textures: &'a [Texture],
-    bitmaps: Vec<Source<'a>>,
+    /// `None`: those that are empty, or not as large as they say.
+    bitmaps: Vec<Option<Source<'a>>>,
     /// What is read where there is no map.
     stand_in: Option<Source<'static>>,
 }
@@ -50,19 +51,23 @@ struct Source<'a> {
     linear: Pyramid,
 }
 
+impl<'a> Source<'a> {
+    fn new(bitmap: &'a Bitmap) -> Self {
+        Self { bitmap, srgb: Pyramid::new(bitmap), linear: Pyramid::new(bitmap) }
+    }
+}
+
 impl<'a> TextureStore<'a> {
     /// Makes the scene's textures readable; copies and computes nothing.
     pub fn new(scene: &'a Scene) -> Self {
-        let source = |bitmap| Source { bitmap, srgb: Pyramid::new(bitmap), linear: Pyramid::new(bitmap) };
-        Self { textures: &scene.textures, bitmaps: scene.bitmaps.iter().map(source).collect(), stand_in: None }
+        let bitmaps = scene.bitmaps.iter().map(|bitmap| is_whole(bitmap).then(|| Source::new(bitmap)));
+        Self { textures: &scene.textures, bitmaps: bitmaps.collect(), stand_in: None }
     }
 
     /// The same, in which maps that are not there are read, too, for nothing (see [`everything`](super::everything)).
     #[must_use]
     pub fn with_everything(self) -> Self {
-        let bitmap: &'static Bitmap = &super::everything::GREY;
-        let source = Source { bitmap, srgb: Pyramid::new(bitmap), linear: Pyramid::new(bitmap) };
-        Self { stand_in: Some(source), ..self }
+        Self { stand_in: Some(Source::new(&super::everything::GREY)), ..self }
     }
 
     /// Columns and rows of a texture's bitmap; (1, 1) for a texture that does not exist.
@@ -95,8 +100,8 @@ impl<'a> TextureStore<'a> {
             return self.stand_in.as_ref().map(|source| (Sampler::default(), source));
         }
         let texture = self.textures.get(texture as usize)?;
-        let source = self.bitmaps.get(texture.bitmap as usize)?;
-        is_whole(source.bitmap).then_some((texture.sampler, source))
+        let source = self.bitmaps.get(texture.bitmap as usize)?.as_ref()?;
+        Some((texture.sampler, source))
     }
 }
 

@@ -65,11 +65,13 @@ impl Pyramid {
             let texels = match from.texels {
                 _ if !from.is_twice(to) => halve(&from, to, space),
                 Stored::Bitmap(Texels::Rgb8(texels, _)) if space == ColorSpace::Linear => {
-                    halve_evenly(texels, from.width, |block| solid8(block, |code| (u32::from(code) * 257) << FRACTION))
+                    halve_evenly(texels, from.width, |block| {
+                        mean_solid8(block, |code| (u32::from(code) * 257) << FRACTION)
+                    })
                 }
                 Stored::Bitmap(Texels::Rgb8(texels, _)) => {
                     let light = decode::fixed8(space);
-                    halve_evenly(texels, from.width, |block| solid8(block, |code| light[usize::from(code)]))
+                    halve_evenly(texels, from.width, |block| mean_solid8(block, |code| light[usize::from(code)]))
                 }
                 Stored::Bitmap(Texels::Rgba8(texels, colors)) => {
                     let light = decode::fixed8(space);
@@ -167,7 +169,7 @@ fn halve_evenly<T>(texels: &[T], width: usize, mean: impl Fn([&T; 4]) -> [u16; 4
 
 /// What is stored of the mean of four texels without alpha; `light` gives colours as [`decode::fixed8`] does.
 #[inline(always)]
-fn solid8([a, b, c, d]: [&[u8; 3]; 4], light: impl Fn(u8) -> u32) -> [u16; 4] {
+fn mean_solid8([a, b, c, d]: [&[u8; 3]; 4], light: impl Fn(u8) -> u32) -> [u16; 4] {
     let sum = |i: usize| rounded(light(a[i]) + light(b[i]) + light(c[i]) + light(d[i]));
     [sum(0), sum(1), sum(2), u16::MAX]
 }
