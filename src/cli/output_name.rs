@@ -113,8 +113,12 @@ pub(super) fn collision(names: &[PathBuf]) -> Option<(usize, usize)> {
     names.iter().enumerate().find_map(|(i, name)| seen.insert(identity(name), i).map(|earlier| (earlier, i)))
 }
 
-/// One spelling for every way of writing the path of one file; the file itself need not exist.
+/// One spelling for every way of writing the path of one file, through symbolic links too; the file itself need not
+/// exist. Of two hard links each is a file of its own: what is written replaces one name and leaves the other.
 pub(super) fn identity(name: &Path) -> PathBuf {
+    if let Ok(whole) = name.canonicalize() {
+        return whole;
+    }
     let parent = name.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let parent = parent.canonicalize().unwrap_or_else(|_| lexical(parent));
     parent.join(name.file_name().unwrap_or_default())
@@ -183,6 +187,17 @@ mod tests {
         let names = ["a.png", "b.png", "src/../a.png"].map(PathBuf::from);
         assert_eq!(collision(&names), Some((0, 2)));
         assert_eq!(collision(&[PathBuf::from("a.png"), PathBuf::from("b.png")]), None);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_and_what_it_leads_to_are_one_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let names = ["real.stl", "link.png"].map(|name| dir.path().join(name));
+        assert_eq!(collision(&names), None);
+        std::fs::write(&names[0], "precious").unwrap();
+        std::os::unix::fs::symlink(&names[0], &names[1]).unwrap();
+        assert_eq!(collision(&names), Some((0, 1)));
     }
 
     #[test]

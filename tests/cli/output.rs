@@ -1,6 +1,6 @@
 //! Where pictures go, of which type, and what may be replaced.
 
-use super::program::{CUBE, Folder, Run, picture};
+use super::program::{CUBE, Folder, Run, picture, textured_cube};
 
 #[test]
 fn the_extension_chooses_the_type() {
@@ -29,6 +29,25 @@ fn a_default_name_replaces_only_a_picture_that_meshray_wrote() {
     assert!(folder.read("cube.png").starts_with(b"\x89PNG"));
     folder.render(&["cube.obj", "--exposure", "-1"]).ends(0);
     assert_eq!(folder.names(), ["cube.obj", "cube.png"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_link_does_not_lead_a_picture_over_the_model_or_its_textures() {
+    use std::os::unix::fs::symlink;
+    let folder = textured_cube();
+    for target in ["cube.obj", "cube.mtl", "cube.jpg"] {
+        let before = folder.read(target);
+        symlink(folder.path(target), folder.path("link.png")).unwrap();
+        folder.render(&["cube.obj", "-o", "link.png"]).ends(1).says(&["link.png", "-o"]);
+        assert!(folder.read(target) == before, "{target}");
+        std::fs::remove_file(folder.path("link.png")).unwrap();
+    }
+    // Through a link to anything else the picture goes where it leads.
+    symlink(folder.path("real.png"), folder.path("link.png")).unwrap();
+    let folder = folder.file("real.png", "old");
+    folder.render(&["cube.obj", "-o", "link.png"]).ends(0);
+    assert!(folder.read("real.png").starts_with(b"\x89PNG"));
 }
 
 #[test]

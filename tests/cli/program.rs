@@ -1,6 +1,7 @@
 //! The program as its users meet it: a folder with files, a command line, an exit code, two streams.
 
 use assert_cmd::Command;
+use meshray::image::{FileKind, Metadata, Output, Picture, encode};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tempfile::TempDir;
@@ -23,6 +24,16 @@ pub const BROKEN_GLB: &[u8] = b"glTF\x02\0\0\0\xff\xff\0\0\x10\0\0\0JSON{\"asset
 
 /// A folder that lives as long as the test.
 pub struct Folder(TempDir);
+
+/// A folder with a cube whose material has a texture, `cube.jpg`.
+pub fn textured_cube() -> Folder {
+    let white = Picture { width: 2, height: 2, beauty: vec![[1.0; 4]; 4], layers: None };
+    let texture = encode(&white, FileKind::Jpeg, &Output::default(), &Metadata::default()).unwrap();
+    Folder::new()
+        .file("cube.obj", format!("mtllib cube.mtl\nusemtl a\n{CUBE}"))
+        .file("cube.mtl", "newmtl a\nmap_Kd cube.jpg\n")
+        .file("cube.jpg", texture)
+}
 
 /// How a run ended.
 pub struct Run {
