@@ -172,6 +172,7 @@ impl RenderJob {
         let sequence = sequence::of(args)?;
         let batches = batches(args, &choices, sequence.as_ref())?;
         let stats = stats(args);
+        check_stats_file(stats.as_ref(), &batches, &args.heatmap)?;
         let to_stdout = batches.iter().flat_map(|b| &b.shots).any(|s| s.target == Target::Stdout);
         if to_stdout && stats.as_ref().is_some_and(|s| s.file.is_none()) {
             return wrong("the picture goes to standard output, so the statistics cannot; add --stats-file PATH");
@@ -198,6 +199,11 @@ impl RenderJob {
             sequence,
             batches,
         })
+    }
+
+    /// Where statistics are written, if that is a file.
+    pub(super) fn stats_file(&self) -> Option<&Path> {
+        self.stats.as_ref()?.file.as_deref()
     }
 }
 
@@ -306,6 +312,20 @@ fn check_heatmaps(batches: &[Batch], heatmaps: &[Cost]) -> Result<(), Wrong> {
         Some(name) => wrong(format!("two pictures would be written to {}; choose another -o", name.display())),
         None => Ok(()),
     }
+}
+
+/// Statistics must not fall on a picture or a heat map.
+fn check_stats_file(stats: Option<&Stats>, batches: &[Batch], heatmaps: &[Cost]) -> Result<(), Wrong> {
+    let Some(file) = stats.and_then(|stats| stats.file.as_deref()) else { return Ok(()) };
+    let mut names = batches.iter().flat_map(|b| &b.shots).flat_map(|shot| cost_layers::names(shot, heatmaps));
+    let target = output_name::identity(file);
+    if names.any(|name| output_name::identity(&name) == target) {
+        let file = file.display();
+        return wrong(format!(
+            "a picture and the statistics would both be written to {file}; name another --stats-file"
+        ));
+    }
+    Ok(())
 }
 
 /// Flags that only one type of file can honour.
@@ -555,6 +575,8 @@ mod tests {
             "a.obj -o picture.tif",
             "a.obj -o -  --stats json".replace("  ", " ").as_str(),
             "a.obj --stats-file s.json",
+            "a.obj -o a.png --stats json --stats-file ./a.png",
+            "a.obj --heatmap tests --stats json --stats-file a-tests.png",
             "a.obj --grid-density 0",
             "a.obj --layers",
             "a.obj --layers=tests",

@@ -40,6 +40,7 @@ mod text;
 mod trace;
 mod verify;
 mod version;
+mod writable;
 
 pub use exit::Exit;
 

@@ -9,6 +9,7 @@ use super::progress::Progress;
 use super::sequence::{self, Step, Survey};
 use super::stats::{self, PictureStats, Times};
 use super::summary::Summary;
+use super::writable::{self, Sources};
 use super::{accident, again, cost_layers, dry_run, interrupt, meter, output_name, read, surroundings};
 use crate::accel::AnyAccel;
 use crate::accel::auto::Reason;
@@ -32,11 +33,17 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
             return Exit::Failed;
         }
     };
+    let mut so_far = SoFar { sources: Sources::of(job.batches.iter().flat_map(|b| &b.inputs)), pictures: Vec::new() };
+    if let Some(path) = job.stats_file()
+        && let Err(fault) = writable::check(path, "--stats-file", &so_far.sources)
+    {
+        messages.say(Severity::Error, &fault);
+        return Exit::Failed;
+    }
     let mut worst = Exit::Done;
-    let mut done = Vec::new();
     for batch in &job.batches {
         let name = batch.inputs[0].display().to_string();
-        let work = || pool.install(|| render_batch(job, batch, messages, &mut done));
+        let work = || pool.install(|| render_batch(job, batch, messages, &mut so_far));
         let exit = accident::guard(&name, messages, work);
         worst = worst.max(exit);
         if interrupt::raised() {
@@ -44,20 +51,36 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
         }
     }
     if job.batches.len() > 1 {
-        let (pictures, scenes) = (done.len(), job.batches.len());
+        let (pictures, scenes) = (so_far.pictures.len(), job.batches.len());
         messages.info("batch", format!("{pictures} pictures of {scenes} inputs, {} warnings", messages.warnings()));
     }
-    worst.max(stats::report(job, &done, messages))
+    worst.max(report(job, &so_far, messages))
+}
+
+/// What a run has read and made so far.
+struct SoFar {
+    /// All inputs, and the files that those loaded so far use.
+    sources: Sources,
+    pictures: Vec<PictureStats>,
+}
+
+/// Prints or writes the statistics, but never over what a model was read from.
+fn report(job: &RenderJob, so_far: &SoFar, messages: &Messages) -> Exit {
+    match job.stats_file().map_or(Ok(()), |path| so_far.sources.spared_by(path, "--stats-file")) {
+        Ok(()) => stats::report(job, &so_far.pictures, messages),
+        // It was said when that model was loaded.
+        Err(_) => Exit::Failed,
+    }
 }
 
 /// One scene and its pictures.
-fn render_batch(job: &RenderJob, batch: &Batch, messages: &Messages, done: &mut Vec<PictureStats>) -> Exit {
+fn render_batch(job: &RenderJob, batch: &Batch, messages: &Messages, so_far: &mut SoFar) -> Exit {
     let mut worst = Exit::Done;
     let mut shots = Vec::new();
     for shot in &batch.shots {
         let maps = job.heatmaps.iter().filter_map(|&cost| cost_layers::target(&shot.target, cost));
         let targets = std::iter::once(shot.target.clone()).chain(maps);
-        match targets.into_iter().try_for_each(|target| check_target(&target, &batch.inputs)) {
+        match targets.into_iter().try_for_each(|target| check_target(&target, &so_far.sources)) {
             Ok(()) => shots.push(shot),
             Err(fault) => {
                 messages.say(Severity::Error, &fault);
@@ -71,7 +94,7 @@ fn render_batch(job: &RenderJob, batch: &Batch, messages: &Messages, done: &mut 
     // The bar needs the room that folders would take.
     let name = batch.inputs[0].file_name().unwrap_or(batch.inputs[0].as_os_str()).to_string_lossy();
     let progress = Progress::new(&name, messages, job.quiet, job.keep_partial);
-    let mut profile = if done.is_empty() { Profile::of_process() } else { Profile::new() };
+    let mut profile = if so_far.pictures.is_empty() { Profile::of_process() } else { Profile::new() };
     let aspect = |scene: &Scene| Effective::new(&job.look, &scene.hints).map_or(1.0, |effective| effective.aspect());
     let survey = match Survey::of(job, batch, aspect, messages, &progress) {
         Ok(survey) => survey,
@@ -89,9 +112,16 @@ fn render_batch(job: &RenderJob, batch: &Batch, messages: &Messages, done: &mut 
             Ok(ready) => ready,
             Err(exit) => return worst.max(exit),
         };
+        so_far.sources.add(&ready.loaded.facts.files);
+        if let Some(path) = job.stats_file()
+            && let Err(fault) = so_far.sources.spared_by(path, "--stats-file")
+        {
+            messages.say(Severity::Error, &fault);
+            return worst.max(Exit::Failed);
+        }
         let mut stage = ready.stage(survey.as_ref());
         for shot in now {
-            worst = worst.max(render_shot(job, batch, shot, &mut stage, messages, &progress, done));
+            worst = worst.max(render_shot(job, batch, shot, &mut stage, messages, &progress, so_far));
             if interrupt::raised() {
                 return Exit::Interrupted;
             }
@@ -103,26 +133,17 @@ fn render_batch(job: &RenderJob, batch: &Batch, messages: &Messages, done: &mut 
 }
 
 /// Whether a picture may go there. Asked before any work is done for it.
-fn check_target(target: &Target, inputs: &[std::path::PathBuf]) -> Result<(), Diagnostic> {
+fn check_target(target: &Target, sources: &Sources) -> Result<(), Diagnostic> {
     let Some(path) = target.path() else {
         use std::io::IsTerminal;
         let text = "standard output is a terminal, which shows no pictures";
         let fault = Diagnostic::new("output-terminal", "", "", text).remedy("redirect it, or name a file with -o");
         return if std::io::stdout().is_terminal() { Err(fault) } else { Ok(()) };
     };
-    let fault = |code, text: &str, remedy: &str| Err(Diagnostic::new(code, path, "", text).remedy(remedy));
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    if !folder.is_dir() {
-        return fault("output-folder", "its folder is not there", "create it, or name another with -o");
-    }
-    if path.is_dir() {
-        return fault("output-is-folder", "is a folder", "write a / behind it to put the picture into it");
-    }
-    if inputs.iter().any(|input| output_name::identity(input) == output_name::identity(path)) {
-        return fault("output-is-input", "is the input itself", "name another file with -o");
-    }
+    writable::check(path, "-o", sources)?;
     if matches!(target, Target::Default(_)) && path.exists() && !was_written_by_meshray(path) {
-        return fault("output-not-ours", "exists and is no picture that meshray wrote", "name the output with -o");
+        let fault = Diagnostic::new("output-not-ours", path, "", "exists and is no picture that meshray wrote");
+        return Err(fault.remedy("name the output with -o"));
     }
     Ok(())
 }
@@ -236,7 +257,7 @@ fn render_shot(
     stage: &mut Stage,
     messages: &Messages,
     progress: &Progress,
-    done: &mut Vec<PictureStats>,
+    so_far: &mut SoFar,
 ) -> Exit {
     let Stage { loaded, world, bounds, load_seconds, profile, survey, built, metered } = stage;
     let file = &batch.inputs[0];
@@ -245,7 +266,7 @@ fn render_shot(
         exit
     };
     let names = cost_layers::names(shot, &job.heatmaps);
-    if let Some(fault) = names.iter().find_map(|path| overwrites_a_source(path, loaded)) {
+    if let Err(fault) = names.iter().try_for_each(|path| so_far.sources.spared_by(path, "-o")) {
         return fail(&fault, Exit::Failed);
     }
     let mut effective = match Effective::new(&job.look, &loaded.scene.hints) {
@@ -331,7 +352,7 @@ fn render_shot(
             profile.iter().for_each(|p| p.say(messages));
             let structure = accel.summary();
             let stats = PictureStats::new(&facts, &view_phrase, times, world, structure, counted, profile.as_ref());
-            done.push(stats);
+            so_far.pictures.push(stats);
             match cost_layers::write_maps(job, shot, effective.settings.width, &costs, accel_kind, messages) {
                 Ok(()) => Exit::Done,
                 Err(fault) => fail(&fault, Exit::Failed),
@@ -386,15 +407,6 @@ fn costs(job: &RenderJob, work: &Job, progress: &Progress) -> Option<Costs> {
     }
     progress.begin("counting");
     render_costs(work, &wanted, progress)
-}
-
-/// A picture must never replace a texture of its own model.
-fn overwrites_a_source(path: &Path, loaded: &Loaded) -> Option<Diagnostic> {
-    let target = output_name::identity(path);
-    let same = loaded.facts.files.iter().any(|file| output_name::identity(file) == target);
-    same.then(|| {
-        Diagnostic::new("output-is-input", path, "", "is a file that the model uses").remedy("name another with -o")
-    })
 }
 
 fn keep_partial(shot: &Shot, rendered: &Rendered, effective: &Effective, loaded: &Loaded, messages: &Messages) -> Exit {

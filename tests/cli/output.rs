@@ -51,6 +51,30 @@ fn a_link_does_not_lead_a_picture_over_the_model_or_its_textures() {
 }
 
 #[test]
+fn a_picture_does_not_replace_an_input_whose_turn_comes_later() {
+    let folder = Folder::with_cube().file("1.png", CUBE);
+    folder.render(&["cube.obj", "1.png", "-o", "{frame}.png"]).ends(1).says(&["1.png", "-o"]);
+    assert_eq!(folder.read("1.png"), CUBE.as_bytes());
+    assert!(folder.read("2.png").starts_with(b"\x89PNG"), "the other picture is drawn");
+}
+
+#[test]
+fn statistics_replace_neither_the_model_nor_its_files_nor_a_picture() {
+    let folder = textured_cube().file("other.obj", CUBE);
+    let stats = |name| folder.render(&["other.obj", "cube.obj", "--stats", "json", "--stats-file", name]);
+    for target in ["cube.obj", "cube.mtl", "cube.jpg"] {
+        let before = folder.read(target);
+        stats(target).ends(1).says(&[target, "--stats-file"]);
+        assert!(folder.read(target) == before, "{target}");
+    }
+    stats("other.png").ends(2).says(&["other.png", "--stats-file"]);
+    std::fs::remove_file(folder.path("other.png")).unwrap();
+    stats("nowhere/stats.json").ends(1).says(&["nowhere/stats.json", "folder"]);
+    assert!(!folder.has("other.png"), "told before any work");
+    stats("stats.json").ends(0);
+}
+
+#[test]
 fn two_inputs_with_one_name_are_an_error_before_any_work() {
     let folder = Folder::new().file("a/cube.obj", CUBE).file("b/cube.obj", CUBE);
     folder.render(&["a/cube.obj", "b/cube.obj"]).ends(2).says(&["cube.png", "a/cube.obj", "b/cube.obj"]);

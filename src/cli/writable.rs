@@ -1,0 +1,71 @@
+//! Whether a file may be written under a name: asked before any work is done for it.
+
+use super::output_name::identity;
+use crate::load::Diagnostic;
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+
+/// Files that are read, which nothing that is written may replace.
+#[derive(Debug, Default)]
+pub(super) struct Sources(HashSet<PathBuf>);
+
+impl Sources {
+    /// These files; `-`, standard input, is none.
+    pub(super) fn of(files: impl IntoIterator<Item: AsRef<Path>>) -> Self {
+        let mut sources = Self::default();
+        sources.add(files);
+        sources
+    }
+
+    /// These files, too.
+    pub(super) fn add(&mut self, files: impl IntoIterator<Item: AsRef<Path>>) {
+        let named = files.into_iter().filter(|file| file.as_ref() != Path::new("-"));
+        self.0.extend(named.map(|file| identity(file.as_ref())));
+    }
+
+    /// Refuses `path`, given with `flag`, where that is one of them.
+    pub(super) fn spared_by(&self, path: &Path, flag: &str) -> Result<(), Diagnostic> {
+        if self.0.contains(&identity(path)) {
+            let fault = Diagnostic::new("output-is-input", path, "", "would replace a file that is read");
+            return Err(fault.remedy(format!("name another with {flag}")));
+        }
+        Ok(())
+    }
+}
+
+/// Refuses `path`, given with `flag`, where its folder is not there, where it is a folder itself, or where it is one of
+/// `sources`.
+pub(super) fn check(path: &Path, flag: &str, sources: &Sources) -> Result<(), Diagnostic> {
+    let fault = |code, text: &str, remedy: &str| Err(Diagnostic::new(code, path, "", text).remedy(remedy));
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        return fault("output-folder", "its folder is not there", &format!("create it, or name another with {flag}"));
+    }
+    if path.is_dir() {
+        return fault("output-is-folder", "is a folder", &format!("name a file in it with {flag}"));
+    }
+    sources.spared_by(path, flag)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_and_files_that_are_read_are_refused_with_the_flag_that_names_another() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        let sources = Sources::of([at("model.obj"), "-".into()]);
+        let code = |path: &Path| check(path, "--plot", &sources).map_err(|fault| (fault.code, fault.remedy));
+        assert_eq!(code(&at("page.html")), Ok(()));
+        for (path, expected) in [
+            (at("none/page.html"), "output-folder"),
+            (dir.path().into(), "output-is-folder"),
+            (at("./model.obj"), "output-is-input"),
+        ] {
+            let (code, remedy) = code(&path).unwrap_err();
+            assert!(code == expected && remedy.contains("--plot"), "{code} {remedy}");
+        }
+        assert_eq!(code(Path::new("-")), Ok(()), "standard input is no file");
+    }
+}
