@@ -1,6 +1,6 @@
 //! `meshray trace`: the story of a ray.
 
-use super::program::{Folder, picture};
+use super::program::{Folder, picture, textured_cube};
 use serde_json::Value;
 
 fn trace(folder: &Folder, arguments: &[&str]) -> Value {
@@ -83,4 +83,16 @@ fn the_picture_of_a_ray_is_a_png_that_replaces_no_input() {
     folder.run(&[&arguments[..], &["-o", "ray.exr"]].concat()).ends(2);
     folder.run(&["trace", "cube.obj", "--pixel", "0,0", "-o", "cube.obj"]).ends(2);
     assert!(folder.read("cube.obj").starts_with(b"v "));
+}
+
+#[test]
+fn the_drawing_replaces_neither_the_model_nor_a_file_it_uses() {
+    let folder = textured_cube();
+    std::fs::rename(folder.path("cube.jpg"), folder.path("skin.png")).unwrap();
+    let folder = folder.file("cube.mtl", "newmtl a\nmap_Kd skin.png\n");
+    let before = folder.read("skin.png");
+    let words = ["trace", "cube.obj", "--size", "32x24", "--pixel", "16,12", "-o"];
+    folder.run(&[&words[..], &["skin.png"]].concat()).ends(1).says(&["skin.png", "-o"]);
+    assert!(folder.read("skin.png") == before);
+    folder.run(&[&words[..], &["nowhere/ray.png"]].concat()).ends(1).says(&["folder"]);
 }

@@ -29,7 +29,8 @@ use super::job::{self, Look, Wrong};
 use super::message::{Messages, Severity};
 use super::picture::{Effective, background};
 use super::sampling::SamplingArgs;
-use super::{accident, output_name, print, read};
+use super::writable::{self, Sources};
+use super::{accident, print, read};
 use crate::accel::{AccelKind, AccelParams, auto};
 use crate::image::{FileKind, Metadata, write_atomic};
 use crate::load::{Diagnostic, Loaded};
@@ -97,8 +98,13 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
             exit
         }
     };
-    check_output(args).map_err(fail(Exit::Failed))?;
+    if let Some(path) = &args.output {
+        writable::check(path, "-o", &Sources::of([file])).map_err(fail(Exit::Failed))?;
+    }
     let mut loaded = read::model(&args.model, messages)?;
+    if let Some(path) = &args.output {
+        Sources::of(&loaded.facts.files).spared_by(path, "-o").map_err(fail(Exit::Failed))?;
+    }
     let world = World::new(&loaded.scene);
     let wrong = |text: String| Diagnostic::new("scene-value", file, "", text);
     let effective = Effective::new(look, &loaded.scene.hints).map_err(wrong).map_err(fail(Exit::Input))?;
@@ -140,15 +146,6 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
         Some(path) => draw(path, &told, &job, messages).map_err(fail(Exit::Failed)),
         None => Ok(Exit::Done),
     }
-}
-
-/// A picture must not replace the model it shows.
-fn check_output(args: &TraceArgs) -> Result<(), Diagnostic> {
-    let Some(path) = &args.output else { return Ok(()) };
-    let same = output_name::identity(path) == output_name::identity(&args.model.input);
-    let fault =
-        || Diagnostic::new("output-is-input", path, "", "is the input itself").remedy("name another file with -o");
-    if same { Err(fault()) } else { Ok(()) }
 }
 
 /// Whether there is such a pixel with such a sample.
