@@ -101,3 +101,13 @@ fn what_cannot_be_compared_is_told() {
     folder.run(&["diff", "a.png", "text.png"]).ends(3).says(&["text.png", "neither"]);
     folder.run(&["diff", "a.png", "missing.png"]).ends(1).says(&["missing.png"]);
 }
+
+#[test]
+fn what_is_drawn_replaces_neither_picture_and_each_drawing_is_a_file_of_its_own() {
+    let folder = folder();
+    let (a, b) = (folder.read("a.png"), folder.read("b.png"));
+    folder.run(&["diff", "a.png", "b.png", "-o", "b.png"]).ends(1).says(&["b.png", "-o"]);
+    folder.run(&["diff", "a.png", "b.png", "--side-by-side", "./a.png"]).ends(1).says(&["a.png", "--side-by-side"]);
+    folder.run(&["diff", "a.png", "b.png", "-o", "c.png", "--side-by-side", "./c.png"]).ends(2);
+    assert!(folder.read("a.png") == a && folder.read("b.png") == b && !folder.has("c.png"));
+}

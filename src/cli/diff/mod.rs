@@ -14,7 +14,8 @@ mod report;
 
 use super::exit::Exit;
 use super::message::{Messages, Severity};
-use super::{accident, print};
+use super::writable::{self, Sources};
+use super::{accident, output_name, print};
 use crate::bench::report::number::short;
 use crate::image::diff::{
     Difference, LayerDifference, Looks, Space, compare, greatest, layer_differences, looks, side_by_side,
@@ -26,7 +27,7 @@ use crate::image::{FileKind, ImageError, Metadata, Output, Picture, ToneMap, enc
 use crate::load::Diagnostic;
 pub(super) use args::DiffArgs;
 use args::Show;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// How much stronger the difference is drawn between both pictures.
 const GAIN: f32 = 8.0;
@@ -46,7 +47,7 @@ struct Compared {
 pub(super) fn run(args: &DiffArgs) -> Exit {
     let messages = Messages::new(args.messages.into(), false);
     accident::guard(&args.actual.display().to_string(), &messages, || {
-        let done = compared(args).and_then(|compared| {
+        let done = check_outputs(args).and_then(|()| compared(args)).and_then(|compared| {
             draw(args, &compared)?;
             tell(args, &compared, &messages)
         });
@@ -59,6 +60,22 @@ pub(super) fn run(args: &DiffArgs) -> Exit {
 
 /// What went wrong, and how that ends.
 type Fault = Box<(Diagnostic, Exit)>;
+
+/// What is drawn replaces neither picture that is compared, and both drawings are files of their own.
+fn check_outputs(args: &DiffArgs) -> Result<(), Fault> {
+    let sources = Sources::of([&args.expected, &args.actual]);
+    let outputs = [("-o", &args.output), ("--side-by-side", &args.side_by_side)];
+    for (flag, path) in outputs {
+        let Some(path) = path else { continue };
+        writable::check(path, flag, &sources).map_err(|fault| Box::new((fault, Exit::Failed)))?;
+    }
+    let names: Vec<PathBuf> = outputs.into_iter().filter_map(|(_, path)| path.clone()).collect();
+    if output_name::collision(&names).is_some() {
+        let fault = Diagnostic::new("usage", "", "", "-o and --side-by-side name one file");
+        return Err(Box::new((fault, Exit::Usage)));
+    }
+    Ok(())
+}
 
 fn compared(args: &DiffArgs) -> Result<Compared, Fault> {
     let (expected, first) = read(&args.expected)?;
