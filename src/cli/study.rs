@@ -5,6 +5,7 @@ use super::exit::Exit;
 use super::job::Wrong;
 use super::message::{Messages, Severity};
 use super::seen::{self, Seen};
+use super::writable::{self, Sources};
 use super::{accident, interrupt, print};
 use crate::accel::{AccelParams, auto};
 use crate::bench::study::report::{Format, text};
@@ -27,6 +28,10 @@ pub(super) fn run(args: &StudyArgs) -> Exit {
             return Exit::Usage;
         }
     };
+    if let Err(fault) = writable::check_reports(&args.report, &Sources::of([&args.model.input])) {
+        messages.say(Severity::Error, &fault);
+        return Exit::Failed;
+    }
     let name = args.model.input.display().to_string();
     accident::guard(&name, &messages, || match threads::pool(args.threads.unwrap_or(0)) {
         Ok(pool) => pool.install(|| study(args, &files, &name, &messages).unwrap_or_else(|exit| exit)),

@@ -47,6 +47,11 @@ pub(super) fn check(path: &Path, flag: &str, sources: &Sources) -> Result<(), Di
     sources.spared_by(path, flag)
 }
 
+/// The same for every `--report`.
+pub(super) fn check_reports(paths: &[PathBuf], sources: &Sources) -> Result<(), Diagnostic> {
+    paths.iter().try_for_each(|path| check(path, "--report", sources))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -128,3 +128,14 @@ fn bench_says_what_it_cannot_do() {
     folder.run(&["bench", "cube.obj", "--accel", "none,none"]).ends(2).says(&["none twice"]);
     folder.run(&["bench", "gone.obj"]).ends(1).says(&["gone.obj"]);
 }
+
+#[test]
+fn reports_for_which_there_is_no_room_are_told_before_any_work() {
+    let folder = Folder::with_cube();
+    for words in [["bench", "--report"], ["study", "--report"], ["verify", "--plot"]] {
+        let [command, flag] = words;
+        let run = folder.run(&[command, "cube.obj", flag, "nowhere/x.html"]).ends(1);
+        assert!(run.stdout.is_empty() && run.stderr.lines().count() == 1, "{command}: {}", run.stderr);
+        run.says(&["nowhere/x.html", "folder", flag]);
+    }
+}

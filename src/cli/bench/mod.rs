@@ -7,7 +7,8 @@ mod spd;
 
 use super::exit::Exit;
 use super::job::{self, Wrong};
-use super::message::Messages;
+use super::message::{Messages, Severity};
+use super::writable::{self, Sources};
 use super::{accident, interrupt, print};
 use crate::accel::{AccelKind, AccelParams, auto};
 use crate::bench::compare::{Plan, compare};
@@ -39,6 +40,10 @@ pub(super) fn run(args: &BenchArgs) -> Exit {
             return Exit::Usage;
         }
     };
+    if let Err(fault) = writable::check_reports(&args.report, &Sources::of(&args.inputs)) {
+        messages.say(Severity::Error, &fault);
+        return Exit::Failed;
+    }
     let bench = Bench { args, files, messages };
     if let Some(folder) = &args.spd {
         return bench.published(folder);

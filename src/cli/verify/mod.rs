@@ -11,8 +11,9 @@ mod report;
 
 use super::args::VerifyArgs;
 use super::exit::Exit;
-use super::message::Messages;
+use super::message::{Messages, Severity};
 use super::progress::Progress;
+use super::writable::{self, Sources};
 use super::{accident, print, read};
 use crate::bench::verify::{Plan, kernels, verify};
 use crate::image::write_atomic;
@@ -24,6 +25,12 @@ pub(super) fn run(args: &VerifyArgs) -> Exit {
 }
 
 fn judge(args: &VerifyArgs, messages: &Messages) -> Exit {
+    if let Some(path) = &args.plot
+        && let Err(fault) = writable::check(path, "--plot", &Sources::of([&args.model.input]))
+    {
+        messages.say(Severity::Error, &fault);
+        return Exit::Failed;
+    }
     let loaded = match read::model(&args.model, messages) {
         Ok(loaded) => loaded,
         Err(exit) => return exit,
