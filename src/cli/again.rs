@@ -25,7 +25,7 @@ use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
 /// The flags that a picture may bring along.
-const FLAGS: [&str; 63] = [
+const FLAGS: [&str; 65] = [
     "size",
     "aa",
     "samples",
@@ -76,6 +76,8 @@ const FLAGS: [&str; 63] = [
     "turntable",
     "variant",
     "polygons",
+    "smooth",
+    "line-width",
     "mtl",
     "accel",
     "intersector",
@@ -145,7 +147,7 @@ impl Facts<'_> {
             }
         }
         match self.job.look.lens {
-            Some(LensChoice::Fov(radians)) => set("fov", radians.to_degrees().to_string()),
+            Some(LensChoice::Fov(radians)) => set("fov", degrees(radians)),
             Some(LensChoice::Ortho(height)) => set("ortho", height.map_or("auto".into(), |h| h.to_string())),
             None => {}
         }
@@ -186,6 +188,8 @@ impl Facts<'_> {
         if load.polygons == Polygons::Whole {
             set("polygons", "whole".into());
         }
+        load.smooth.iter().for_each(|&lean| set("smooth", degrees(lean)));
+        load.line_width.iter().for_each(|width| set("line-width", width.to_string()));
         if load.mtl == MtlMode::Literal {
             set("mtl", "literal".into());
         }
@@ -243,6 +247,13 @@ impl Facts<'_> {
 
 fn vector(v: DVec3) -> String {
     format!("{},{},{}", v.x, v.y, v.z)
+}
+
+/// Degrees that are read back as just so many radians: as they were typed, where that is a number of few digits.
+fn degrees(radians: f64) -> String {
+    let exact = radians.to_degrees();
+    let typed = (exact * 1e9).round() / 1e9;
+    if typed.to_radians() == radians { typed } else { exact }.to_string()
 }
 
 /// What a finished picture says about itself.
@@ -369,6 +380,32 @@ mod tests {
         for flag in FLAGS {
             assert!(render.get_arguments().any(|a| a.get_long() == Some(flag)), "{flag}");
         }
+    }
+
+    #[test]
+    fn every_flag_that_shapes_pixels_is_stored_and_cannot_be_typed_beside_again() {
+        // Where files may lie, what may be taken and how it ends, and a name for settings that are stored one by one.
+        const EXEMPT: [&str; 4] = ["root", "max-memory", "strict", "quality"];
+        const SHAPING: [&str; 5] = ["Loading", "Animation", "Camera", "Light and background", "Quality"];
+        let command = Cli::command();
+        let render = command.find_subcommand("render").unwrap();
+        let again = render.get_arguments().find(|a| a.get_id() == "again").unwrap();
+        let refused = render.get_arg_conflicts_with(again);
+        for flag in render.get_opts().filter(|a| a.get_help_heading().is_some_and(|h| SHAPING.contains(&h))) {
+            let name = flag.get_long().unwrap();
+            assert!(FLAGS.contains(&name) != EXEMPT.contains(&name), "{name}");
+            let is_refused = refused.iter().any(|other| other.get_id() == flag.get_id());
+            assert!(is_refused || !FLAGS.contains(&name), "{name}");
+        }
+    }
+
+    #[test]
+    fn angles_are_stored_as_they_were_typed() {
+        for typed in [0.0, 0.1, 1.0, 29.3, 30.0, 45.7, 90.0, 179.0, 180.0_f64] {
+            assert_eq!(degrees(typed.to_radians()), typed.to_string());
+        }
+        let odd = 0.1234567890123456_f64;
+        assert!((degrees(odd).parse::<f64>().unwrap().to_radians() - odd).abs() < 1e-16);
     }
 
     #[test]

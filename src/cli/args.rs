@@ -138,7 +138,7 @@ pub(super) struct RenderArgs {
         "light_rays", "sun_size", "aa", "quality", "samples", "pixel_error", "target_error", "confidence", "min_samples", "max_samples",
         "filter", "error_space", "aa_split", "aa_threshold", "aa_depth", "aa_min_depth", "aperture", "focus", "depth", "cutoff", "seed", "scene", "variant", "animation", "time", "frame", "fps",
         "frames", "turntable",
-        "polygons", "mtl", "allow_empty", "accel", "intersector",
+        "polygons", "smooth", "line_width", "mtl", "allow_empty", "accel", "intersector",
     ])]
     pub again: Option<PathBuf>,
 

@@ -1,6 +1,6 @@
 //! A picture carries what repeats it.
 
-use super::program::{CUBE, Folder};
+use super::program::{CUBE, Folder, picture};
 
 #[test]
 fn a_picture_is_repeated_byte_for_byte() {
@@ -16,6 +16,19 @@ fn a_picture_is_repeated_byte_for_byte() {
         folder.run(&["render", "--again", &first, "-o", &second]).ends(0);
         assert!(folder.read(&first) == folder.read(&second), "{extension}");
     }
+}
+
+#[test]
+fn how_a_mesh_was_made_smooth_and_how_wide_its_lines_are_is_repeated() {
+    let folder = Folder::new().file("cube.obj", format!("{CUBE}v 2 2 2\nl 1 9\n"));
+    let words = ["cube.obj", "--smooth=100", "--line-width", "0.3", "-o", "first.png"];
+    folder.render(&words).ends(0);
+    folder.render(&["cube.obj", "-o", "plain.png"]).ends(0);
+    folder.run(&["render", "--again", "first.png", "-o", "second.png"]).ends(0);
+    assert!(folder.read("first.png") == folder.read("second.png"));
+    let [first, plain] = ["first.png", "plain.png"].map(|name| picture(&folder.path(name)));
+    assert!(first != plain, "they show");
+    folder.run(&["render", "--again", "first.png", "--smooth", "-o", "third.png"]).ends(2);
 }
 
 #[test]
