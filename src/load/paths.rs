@@ -162,7 +162,8 @@ impl Resolver {
         &self.root
     }
 
-    /// The canonical path of an existing file below the root.
+    /// The canonical path of an existing plain file below the root: opening anything else, such as a pipe, could wait
+    /// for ever.
     pub fn locate(&self, name: &Path) -> Result<PathBuf, FileFault> {
         let shown = name.to_string_lossy().into_owned();
         if name.as_os_str().is_empty() || shown.contains('\0') {
@@ -171,7 +172,11 @@ impl Resolver {
         let outside = |path: &Path| FileFault::Outside { name: shown.clone(), root: common_folder(&self.root, path) };
         let wanted = self.base.join(name);
         match wanted.canonicalize() {
-            Ok(path) if path.starts_with(&self.root) => Ok(path),
+            Ok(path) if path.starts_with(&self.root) => match fs::metadata(&path) {
+                Ok(meta) if meta.is_file() => Ok(path),
+                Ok(_) => Err(FileFault::NotAFile(shown)),
+                Err(source) => Err(FileFault::Io { name: shown, source }),
+            },
             Ok(path) => Err(outside(&path)),
             // Whether a file outside the root exists is nobody's business.
             Err(_) if !lexical(&wanted).starts_with(&self.root) => Err(outside(&lexical(&wanted))),
@@ -296,6 +301,19 @@ mod tests {
         std::os::unix::fs::symlink(dir.path().join("secret.bin"), dir.path().join("model/link.bin")).unwrap();
         let fault = resolver(dir.path(), &LoadOptions::default()).read_uri("link.bin").unwrap_err();
         assert!(matches!(fault, FileFault::Outside { .. }), "{fault}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_is_refused_and_not_waited_for() {
+        let dir = folder();
+        let pipe = dir.path().join("model/pipe.bin");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let (done, answer) = std::sync::mpsc::channel();
+        let mut resolver = resolver(dir.path(), &LoadOptions::default());
+        std::thread::spawn(move || done.send(resolver.read_uri("pipe.bin")));
+        let read = answer.recv_timeout(std::time::Duration::from_secs(20)).expect("still waiting");
+        assert!(matches!(read, Err(FileFault::NotAFile(_))));
     }
 
     #[test]
