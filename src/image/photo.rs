@@ -40,7 +40,14 @@ pub(super) fn encode_webp(picture: &Picture, output: &Output, metadata: &Metadat
 pub(super) fn decode(bytes: &[u8], kind: FileKind, max_pixels: u64) -> Result<Picture, ImageError> {
     let fail = |e: ::image::ImageError| ImageError::decode(kind, e);
     let format = if kind == FileKind::Webp { ImageFormat::WebP } else { ImageFormat::Jpeg };
-    let reader = || ImageReader::with_format(Cursor::new(bytes), format);
+    // Four bytes a pixel; sizes are compared with `max_pixels` before any is read.
+    let mut limits = ::image::Limits::no_limits();
+    limits.max_alloc = Some(max_pixels.saturating_mul(4));
+    let reader = || {
+        let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+        reader.limits(limits.clone());
+        reader
+    };
     let (width, height) = reader().into_dimensions().map_err(fail)?;
     super::read::check_size(kind, width, height, max_pixels)?;
     let pixels = reader().decode().map_err(fail)?.into_rgba8();

@@ -45,6 +45,11 @@ impl Budget {
         Self { total: limits.memory, left: limits.memory }
     }
 
+    /// Bytes that are left.
+    pub fn left(&self) -> u64 {
+        self.left
+    }
+
     /// Takes `count` elements of `size` bytes, or says why not.
     pub fn take(&mut self, count: u64, size: u64) -> Result<(), OverBudget> {
         let asked = count.saturating_mul(size);

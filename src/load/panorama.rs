@@ -1,6 +1,7 @@
 //! Pictures of surroundings: Radiance HDR, OpenEXR, and 8- or 16-bit pictures, whose colours are sRGB.
 
 use super::limits::{Budget, Limits};
+use super::texture::within;
 use super::{Diagnostic, LoadError, Source};
 use crate::scene::Panorama;
 use crate::scene::color::from_srgb;
@@ -45,15 +46,24 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
     };
     let format = ::image::guess_format(&source.bytes)
         .map_err(|_| fault("is no picture that can surround a scene: its kind is unknown".into()))?;
-    let reader = || ImageReader::with_format(Cursor::new(&source.bytes), format);
-    let (width, height) = reader().into_dimensions().map_err(|e| fault(format!("cannot be decoded: {e}")))?;
+    let reader = |bytes| {
+        let mut reader = ImageReader::with_format(Cursor::new(&source.bytes), format);
+        reader.limits(within(bytes));
+        reader
+    };
+    let (width, height) =
+        reader(limits.memory).into_dimensions().map_err(|e| fault(format!("cannot be decoded: {e}")))?;
     let pixels = u64::from(width) * u64::from(height);
     if pixels == 0 || pixels > limits.image_pixels {
         return Err(fault(format!("is {width}×{height} pixels where 1 to {} are allowed", limits.image_pixels)));
     }
-    Budget::new(limits).take(pixels, PER_PIXEL).map_err(|over| fault(over.to_string()))?;
+    Budget::new(limits).take(pixels, PER_PIXEL).map_err(|over| {
+        let fault = Diagnostic::new("env-unusable", &source.path, "", over.to_string());
+        LoadError::from(fault.remedy("allow more with --max-memory"))
+    })?;
+    let most = pixels * PER_PIXEL;
     // The decoder of EXR files gives up on some damaged ones by a panic.
-    let decoded = std::panic::catch_unwind(|| threads::anywhere(|| reader().decode()));
+    let decoded = std::panic::catch_unwind(|| threads::anywhere(|| reader(most).decode()));
     let picture = match decoded {
         Ok(Ok(picture)) => picture,
         Ok(Err(e)) => return Err(fault(format!("cannot be decoded: {e}"))),

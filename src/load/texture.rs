@@ -8,7 +8,7 @@ use super::limits::{Budget, Limits};
 use super::{Diagnostic, Warnings, ktx};
 use crate::scene::{Bitmap, Pixels};
 use crate::stopwatch::{Spent, Stopwatch};
-use ::image::{ColorType, DynamicImage, ImageFormat, ImageReader};
+use ::image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 use rayon::prelude::*;
 use std::io::Cursor;
 use std::path::Path;
@@ -51,46 +51,111 @@ pub fn decode_all(
         })
         .collect();
     let spent = Spent { wall: start.elapsed(), cpu: decoded.iter().map(|d| d.1).sum() };
-    let mut warn = |image: &Encoded, why: String| {
+    let mut warn = |image: &Encoded, Unusable { why, remedy }: Unusable| {
         let text = format!("image '{}' cannot be used: {why}", super::paths::shorten(&image.name));
-        let remedy = "the material is drawn without it; convert it to PNG or JPEG";
+        let remedy = format!("the material is drawn without it; {remedy}");
         warnings.push(Diagnostic::new("image-unusable", file, &image.place, text).remedy(remedy));
     };
     let usable =
-        |(image, (result, _)): (&Encoded, (Result<Bitmap, String>, _))| result.map_err(|why| warn(image, why)).ok();
+        |(image, (result, _)): (&Encoded, (Result<Bitmap, Unusable>, _))| result.map_err(|why| warn(image, why)).ok();
     (images.iter().zip(decoded).map(usable).collect(), spent)
+}
+
+/// Why a picture cannot be used, and what helps.
+struct Unusable {
+    why: String,
+    remedy: &'static str,
+}
+
+impl Unusable {
+    fn new(why: impl Into<String>) -> Self {
+        Self { why: why.into(), remedy: "convert it to PNG or JPEG" }
+    }
+
+    fn too_large(why: impl Into<String>) -> Self {
+        Self { why: why.into(), remedy: "allow more with --max-memory" }
+    }
+}
+
+impl From<String> for Unusable {
+    fn from(why: String) -> Self {
+        Self::new(why)
+    }
+}
+
+impl From<ImageError> for Unusable {
+    fn from(error: ImageError) -> Self {
+        match error {
+            ImageError::Limits(_) => Self::too_large("it needs more memory than is left"),
+            other => Self::new(other.to_string()),
+        }
+    }
 }
 
 /// What reads a picture.
 #[derive(Clone, Copy)]
 enum Kind {
-    Image(ImageFormat),
+    Image {
+        format: ImageFormat,
+        /// Bytes that decoding may take.
+        bytes: u64,
+    },
     Ktx,
 }
 
+/// Bytes that a decoder may take beside the pixels: for rows, and for colour profiles and texts, which may be packed and
+/// are passed over where they take more.
+const BESIDE: u64 = 1 << 26;
+
+/// Limits of a decoder that may take so many bytes.
+pub(super) fn within(bytes: u64) -> ::image::Limits {
+    let mut limits = ::image::Limits::no_limits();
+    limits.max_alloc = Some(bytes);
+    limits
+}
+
 /// Reads only the header; refuses what is too large.
-fn check_size(bytes: &[u8], limits: &Limits, budget: &mut Budget) -> Result<Kind, String> {
-    let (kind, width, height, between) = if ktx::is(bytes) {
+///
+/// Taken from `budget` are the pixels as they are kept.
+fn check_size(bytes: &[u8], limits: &Limits, budget: &mut Budget) -> Result<Kind, Unusable> {
+    if ktx::is(bytes) {
         let ktx::Size { width, height, between } = ktx::size(bytes)?;
-        (Kind::Ktx, width, height, between)
-    } else {
-        let format = ::image::guess_format(bytes).map_err(|_| unknown_kind(bytes))?;
-        if matches!(format, ImageFormat::Hdr | ImageFormat::OpenExr) {
-            return Err("it holds radiance (HDR or EXR), not colours of a surface".into());
-        }
-        let reader = ImageReader::with_format(Cursor::new(bytes), format);
-        let (width, height) = reader.into_dimensions().map_err(|e| e.to_string())?;
-        (Kind::Image(format), width, height, 0)
-    };
+        take(width, height, (4, between), limits, budget)?;
+        return Ok(Kind::Ktx);
+    }
+    let format = ::image::guess_format(bytes).map_err(|_| unknown_kind(bytes))?;
+    if matches!(format, ImageFormat::Hdr | ImageFormat::OpenExr) {
+        return Err(Unusable::new("it holds radiance (HDR or EXR), not colours of a surface"));
+    }
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    reader.limits(within(BESIDE.min(budget.left())));
+    let decoder = reader.into_decoder()?;
+    let (width, height) = decoder.dimensions();
+    let texel = if is_deep(decoder.color_type()) { 8 } else { 4 };
+    take(width, height, (texel, 0), limits, budget)?;
+    Ok(Kind::Image { format, bytes: decoder.total_bytes().saturating_add(BESIDE.min(budget.left())) })
+}
+
+/// Takes what a picture needs: so many bytes a pixel, and so many more while it is decoded.
+fn take(
+    width: u32,
+    height: u32,
+    (texel, more): (u64, u64),
+    limits: &Limits,
+    budget: &mut Budget,
+) -> Result<(), Unusable> {
     let pixels = u64::from(width) * u64::from(height);
     if pixels == 0 {
-        return Err("it has no pixels".into());
+        return Err(Unusable::new("it has no pixels"));
     }
     if pixels > limits.image_pixels {
-        return Err(format!("{width}×{height} pixels where {} are allowed", limits.image_pixels));
+        let why = format!("{width}×{height} pixels where {} are allowed", limits.image_pixels);
+        let at_most = Limits::default().image_pixels;
+        let remedy = if pixels > at_most { "scale it down" } else { "allow more with --max-memory" };
+        return Err(Unusable { why, remedy });
     }
-    budget.take(pixels, 4).and_then(|()| budget.take(between, 1)).map_err(|over| over.to_string())?;
-    Ok(kind)
+    let bytes = pixels.saturating_mul(texel).saturating_add(more);
+    budget.take(bytes, 1).map_err(|over| Unusable::too_large(over.to_string()))
 }
 
 /// What bytes that no decoder knows look like.
@@ -106,21 +171,25 @@ fn unknown_kind(bytes: &[u8]) -> String {
     format!("it is {kind}")
 }
 
-fn decode(name: &str, bytes: &[u8], kind: Kind) -> Result<Bitmap, String> {
-    let Kind::Image(format) = kind else { return ktx::decode(name, bytes) };
-    let image = ImageReader::with_format(Cursor::new(bytes), format).decode().map_err(|e| e.to_string())?;
+fn decode(name: &str, bytes: &[u8], kind: Kind) -> Result<Bitmap, Unusable> {
+    let Kind::Image { format, bytes: most } = kind else { return Ok(ktx::decode(name, bytes)?) };
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    reader.limits(within(most));
+    let image = reader.decode()?;
     let (width, height) = (image.width(), image.height());
     Ok(Bitmap { name: name.into(), width, height, pixels: pixels_of(image) })
 }
 
+/// Whether its pixels are kept with 16 bits a channel.
+fn is_deep(color: ColorType) -> bool {
+    matches!(color, ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16)
+}
+
 fn pixels_of(image: DynamicImage) -> Pixels {
-    use ColorType::{L16, La16, Rgb16, Rgba16};
     match image {
         // What most pictures are: they stay as the decoder left them.
         DynamicImage::ImageRgb8(image) => Pixels::Rgb8(image.into_raw()),
-        image if matches!(image.color(), L16 | La16 | Rgb16 | Rgba16) => {
-            Pixels::Rgba16(image.into_rgba16().pixels().map(|p| p.0).collect())
-        }
+        image if is_deep(image.color()) => Pixels::Rgba16(image.into_rgba16().pixels().map(|p| p.0).collect()),
         image => Pixels::Rgba8(image.into_rgba8().as_raw().as_chunks::<4>().0.to_vec()),
     }
 }
@@ -180,5 +249,39 @@ mod tests {
         assert!(bitmap.is_none());
         assert!(warnings[0].text.contains("100×100 pixels where 9999 are allowed"));
         assert!(decode_one(&bytes, &Limits { memory: 30_000, ..Limits::default() }).0.is_none());
+    }
+
+    #[test]
+    fn pixels_of_sixteen_bits_take_twice_the_memory_and_what_is_too_large_names_the_remedy() {
+        for (image, bytes) in [(DynamicImage::new_rgba8(60, 50), 4), (DynamicImage::new_rgba16(60, 50), 8)] {
+            let file = png(image);
+            let memory = 60 * 50 * bytes;
+            let limits = |memory| Limits { memory, ..Limits::default() };
+            assert!(decode_one(&file, &limits(memory)).0.is_some());
+            let (bitmap, warnings) = decode_one(&file, &limits(memory - 1));
+            assert!(
+                bitmap.is_none() && warnings[0].remedy.ends_with("allow more with --max-memory"),
+                "{}",
+                warnings[0]
+            );
+        }
+        let small = Limits { image_pixels: 2_999, ..Limits::default() };
+        let warnings = decode_one(&png(DynamicImage::new_rgba8(60, 50)), &small).1;
+        assert!(warnings[0].remedy.ends_with("--max-memory"), "{}", warnings[0]);
+    }
+
+    #[test]
+    fn a_picture_that_the_budget_allows_is_not_too_large_for_its_decoder() {
+        // 12 000 × 12 000 pixels of four bytes, none of which are there.
+        let mut file = Vec::new();
+        let mut encoder = ::png::Encoder::new(&mut file, 12_000, 12_000);
+        encoder.set_color(::png::ColorType::Rgba);
+        drop(encoder.write_header().unwrap());
+        file.truncate(8 + 25);
+        file.extend(b"\0\0\0\0IDAT\x35\xaf\x06\x1e");
+        let (bitmap, warnings) = decode_one(&file, &Limits::default());
+        assert!(bitmap.is_none() && !warnings[0].to_string().contains("memory"), "{}", warnings[0]);
+        let warnings = decode_one(&file, &Limits { memory: 575_999_999, ..Limits::default() }).1;
+        assert!(warnings[0].remedy.ends_with("--max-memory"), "{}", warnings[0]);
     }
 }
