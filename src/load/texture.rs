@@ -107,6 +107,9 @@ enum Kind {
 /// are passed over where they take more.
 const BESIDE: u64 = 1 << 26;
 
+/// Bytes of a texel in the smaller copies of a picture, which hold a third as many texels together.
+const COPIED: u64 = 8;
+
 /// Limits of a decoder that may take so many bytes.
 pub(super) fn within(bytes: u64) -> ::image::Limits {
     let mut limits = ::image::Limits::no_limits();
@@ -116,7 +119,8 @@ pub(super) fn within(bytes: u64) -> ::image::Limits {
 
 /// Reads only the header; refuses what is too large.
 ///
-/// Taken from `budget` are the pixels as they are kept.
+/// Taken from `budget` are the pixels as they are kept, and the smaller copies that lookups make of them: once, as it is
+/// not known here which slots will read them, and whether some take them for colours and some for data.
 fn check_size(bytes: &[u8], limits: &Limits, budget: &mut Budget) -> Result<Kind, Unusable> {
     if ktx::is(bytes) {
         let ktx::Size { width, height, between } = ktx::size(bytes)?;
@@ -154,7 +158,8 @@ fn take(
         let remedy = if pixels > at_most { "scale it down" } else { "allow more with --max-memory" };
         return Err(Unusable { why, remedy });
     }
-    let bytes = pixels.saturating_mul(texel).saturating_add(more);
+    let copies = pixels.div_ceil(3).saturating_mul(COPIED);
+    let bytes = pixels.saturating_mul(texel).saturating_add(copies).saturating_add(more);
     budget.take(bytes, 1).map_err(|over| Unusable::too_large(over.to_string()))
 }
 
@@ -252,10 +257,11 @@ mod tests {
     }
 
     #[test]
-    fn pixels_of_sixteen_bits_take_twice_the_memory_and_what_is_too_large_names_the_remedy() {
+    fn pixels_are_counted_as_they_are_kept_with_smaller_copies_and_what_is_too_large_names_the_remedy() {
         for (image, bytes) in [(DynamicImage::new_rgba8(60, 50), 4), (DynamicImage::new_rgba16(60, 50), 8)] {
             let file = png(image);
-            let memory = 60 * 50 * bytes;
+            // A third as many are in smaller copies, with eight bytes each.
+            let memory = 60 * 50 * bytes + 1000 * 8;
             let limits = |memory| Limits { memory, ..Limits::default() };
             assert!(decode_one(&file, &limits(memory)).0.is_some());
             let (bitmap, warnings) = decode_one(&file, &limits(memory - 1));
@@ -281,7 +287,7 @@ mod tests {
         file.extend(b"\0\0\0\0IDAT\x35\xaf\x06\x1e");
         let (bitmap, warnings) = decode_one(&file, &Limits::default());
         assert!(bitmap.is_none() && !warnings[0].to_string().contains("memory"), "{}", warnings[0]);
-        let warnings = decode_one(&file, &Limits { memory: 575_999_999, ..Limits::default() }).1;
+        let warnings = decode_one(&file, &Limits { memory: 575_999_999 + 48_000_000 * 8, ..Limits::default() }).1;
         assert!(warnings[0].remedy.ends_with("--max-memory"), "{}", warnings[0]);
     }
 }

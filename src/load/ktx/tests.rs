@@ -170,7 +170,7 @@ fn lengths_that_do_not_fit_are_told_before_anything_is_unpacked() {
     let large = why(&file(0, (1 << 20, 1 << 20), (1, 163), &[0; 64]), &usual);
     assert!(large.contains("1048576×1048576 pixels where"), "{large}");
     let small = Limits { memory: 40, ..usual };
-    assert!(why(&file(RGBA, (3, 2), (0, 1), &[0; 24]), &small).contains("48 bytes are needed where 40 of 40"));
+    assert!(why(&file(RGBA, (3, 2), (0, 1), &[0; 24]), &small).contains("64 bytes are needed where 40 of 40"));
 }
 
 #[test]
