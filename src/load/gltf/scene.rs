@@ -119,6 +119,7 @@ impl Walk<'_, '_> {
             Some(attributes) => {
                 let copies = Copies::of(attributes);
                 self.budget.take(copies.bytes(self.reader), 1)?;
+                self.compare(i, &copies);
                 copies.read(self.reader)
             }
         };
@@ -136,6 +137,20 @@ impl Walk<'_, '_> {
             }
         }
         Ok(())
+    }
+
+    /// Warns of attributes that do not all hold as many copies.
+    fn compare(&mut self, i: usize, copies: &Copies) {
+        let counts: Vec<(&str, u64)> = copies.counts(self.reader).collect();
+        let all = counts.iter().map(|&(_, count)| count);
+        let (Some(least), Some(most)) = (all.clone().min(), all.max()) else { return };
+        if least == most {
+            return;
+        }
+        let list: Vec<String> = counts.iter().map(|(name, count)| format!("{name} has {count}")).collect();
+        let text = format!("attributes of copies differ in number: {}", list.join(", "));
+        let place = format!("nodes[{i}].extensions.EXT_mesh_gpu_instancing.attributes");
+        self.report.warn_with(Code::MeshPrimitiveUnequalAccessorCount, place, text, "copies without one are left out");
     }
 
     /// What is drawn when the places of copies cannot be read.
@@ -200,10 +215,15 @@ impl Copies {
         Self { translations: index("TRANSLATION"), rotations: index("ROTATION"), scales: index("SCALE") }
     }
 
+    /// How many elements each of them declares.
+    fn counts(&self, reader: Reader) -> impl Iterator<Item = (&'static str, u64)> {
+        let parts = [("TRANSLATION", self.translations), ("ROTATION", self.rotations), ("SCALE", self.scales)];
+        parts.into_iter().filter_map(move |(name, index)| Some((name, reader.count(index?))))
+    }
+
     /// Bytes that reading them takes.
     fn bytes(&self, reader: Reader) -> u64 {
-        let parts = [self.translations, self.rotations, self.scales].into_iter().flatten();
-        let counts = parts.map(|index| reader.count(index)).fold(0, u64::saturating_add);
+        let counts = self.counts(reader).map(|(_, count)| count).fold(0, u64::saturating_add);
         counts.saturating_mul((size_of::<[f32; 4]>() + size_of::<DAffine3>()) as u64)
     }
 

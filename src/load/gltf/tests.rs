@@ -618,6 +618,24 @@ fn instances_of_the_gpu_and_hidden_nodes_are_understood() {
 }
 
 #[test]
+fn copies_without_one_of_their_attributes_are_left_out_with_a_warning() {
+    let mut file = Builder::new();
+    let positions = file.triangle();
+    let places = file.floats("VEC3", &[1., 0., 0., 2., 0., 0., 3., 0., 0.]);
+    let sizes = file.floats("VEC3", &[1., 1., 1., 2., 2., 2.]);
+    file.primitive(json!({"attributes": {"POSITION": positions}}));
+    file.set("extensionsUsed", json!(["EXT_mesh_gpu_instancing"]));
+    let attributes = json!({"TRANSLATION": places, "SCALE": sizes});
+    file.set("nodes", json!([{"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {"attributes": attributes}}}]));
+    file.set("scenes", json!([{"nodes": [0]}]));
+    let loaded = file.load();
+    assert_eq!(loaded.scene.instances.len(), 2);
+    let place = "nodes[0].extensions.EXT_mesh_gpu_instancing.attributes";
+    let warning = loaded.warnings.iter().find(|warning| warning.place == place).unwrap().to_string();
+    assert!(warning.contains("TRANSLATION has 3, SCALE has 2; copies without one are left out"), "{warning}");
+}
+
+#[test]
 fn normals_that_are_not_unit_are_made_so_with_one_warning() {
     let mut file = Builder::new();
     let positions = file.triangle();
