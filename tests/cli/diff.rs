@@ -111,3 +111,16 @@ fn what_is_drawn_replaces_neither_picture_and_each_drawing_is_a_file_of_its_own(
     folder.run(&["diff", "a.png", "b.png", "-o", "c.png", "--side-by-side", "./c.png"]).ends(2);
     assert!(folder.read("a.png") == a && folder.read("b.png") == b && !folder.has("c.png"));
 }
+
+#[test]
+fn a_pixel_that_is_no_number_breaks_limits_and_is_not_called_equal() {
+    let grey = Picture { width: 4, height: 4, beauty: vec![[0.5, 0.5, 0.5, 1.0]; 16], layers: None };
+    let mut odd = grey.clone();
+    odd.beauty[5] = [f32::NAN, 0.5, 0.5, 1.0];
+    let folder = Folder::new().file("a.exr", bytes(&grey, FileKind::Exr)).file("b.exr", bytes(&odd, FileKind::Exr));
+    let run = folder.run(&["diff", "a.exr", "b.exr", "--fail-if", "flip>0.05"]).ends(1);
+    let line = |name: &str| run.text().lines().find(|l| l.trim_start().starts_with(name)).unwrap().to_owned();
+    assert!(line("PSNR").ends_with("-infinite") && line("bias").contains("not defined"), "{}", run.text());
+    assert!(line("FLIP").contains("1.00000 max at (1, 1)"), "{}", run.text());
+    folder.run(&["diff", "b.exr", "b.exr", "--fail-if", "flip>0,max>0"]).ends(0);
+}

@@ -23,7 +23,8 @@ pub(super) fn text(args: &DiffArgs, compared: &Compared) -> String {
     let (x, y) = d.worst;
     lines.push(("RMSE", figure(d.rmse)));
     lines.push(("relative RMSE", format!("{} of the root mean square expected", figure(d.relative_rmse))));
-    lines.push(("bias", format!("{:+.3e} mean of actual − expected", d.bias)));
+    let bias = if d.bias.is_finite() { format!("{:+.3e}", d.bias) } else { figure(d.bias) };
+    lines.push(("bias", format!("{bias} mean of actual − expected")));
     lines.push((
         "max",
         format!(
@@ -33,10 +34,7 @@ pub(super) fn text(args: &DiffArgs, compared: &Compared) -> String {
             at(compared, Side::Actual)
         ),
     ));
-    lines.push((
-        "PSNR",
-        if d.psnr.is_finite() { format!("{:.2} dB", d.psnr) } else { "infinite: they are equal".into() },
-    ));
+    lines.push(("PSNR", decibels(d.psnr)));
     let (x, y) = looks.worst;
     let exposures = looks.exposures.map_or_else(String::new, |e| {
         format!("; the worst of {} exposures, {:+.1} to {:+.1} stops", e.count, e.first, e.last)
@@ -133,11 +131,22 @@ fn at(compared: &Compared, side: Side) -> String {
     compared_values(compared, side).into_iter().map(|v| format!("{v:.4}")).collect::<Vec<_>>().join(" ")
 }
 
+/// A ratio of signal to noise.
+fn decibels(psnr: f64) -> String {
+    match psnr {
+        f64::INFINITY => "infinite: they are equal".into(),
+        finite if finite.is_finite() => format!("{finite:.2} dB"),
+        other => figure(other),
+    }
+}
+
 /// Four digits, as small errors need them.
 fn figure(x: f64) -> String {
     match x {
         0.0 => "0".into(),
-        x if !x.is_finite() => "infinite".into(),
+        f64::INFINITY => "infinite".into(),
+        f64::NEG_INFINITY => "-infinite".into(),
+        x if x.is_nan() => "not defined".into(),
         x if x.abs() >= 1e-3 && x.abs() < 1e4 => format!("{x:.5}"),
         x => format!("{x:.3e}"),
     }
@@ -150,5 +159,12 @@ mod tests {
     #[test]
     fn small_errors_keep_their_digits() {
         assert_eq!([0.0, 0.0123, 4.2e-7, f64::INFINITY].map(figure), ["0", "0.01230", "4.200e-7", "infinite"]);
+    }
+
+    #[test]
+    fn what_is_no_finite_number_is_called_what_it_is() {
+        assert_eq!([f64::NAN, f64::NEG_INFINITY].map(figure), ["not defined", "-infinite"]);
+        let ratios = [f64::INFINITY, 30.0, f64::NEG_INFINITY, f64::NAN].map(decibels);
+        assert_eq!(ratios, ["infinite: they are equal", "30.00 dB", "-infinite", "not defined"]);
     }
 }

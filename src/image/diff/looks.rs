@@ -23,10 +23,11 @@ pub struct Looks {
 /// Looks at two pictures of one size, at so many pixels a degree.
 ///
 /// Displayed pictures with transparent parts are looked at on black and on white, and the worse of both counts for each
-/// pixel. Linear pictures are looked at on black, at every exposure that suits them.
+/// pixel. Linear pictures are looked at on black, at every exposure that suits them. What is no number is black to its
+/// neighbours; where one picture alone has such a pixel they differ by 1 there, where both have one by nothing.
 pub fn looks(expected: &Picture, actual: &Picture, space: Space, pixels_per_degree: f64) -> Looks {
     let width = expected.width as usize;
-    let (values, exposures) = match space {
+    let (mut values, exposures) = match space {
         Space::Display => {
             let on = |back: f32| {
                 let [a, b] = [expected, actual].map(|picture| displayed(picture, back));
@@ -40,11 +41,19 @@ pub fn looks(expected: &Picture, actual: &Picture, space: Space, pixels_per_degr
             (values, None)
         }
         Space::Linear => {
-            let [a, b] = [expected, actual].map(|p| p.beauty.iter().map(|&[r, g, b, _]| [r, g, b]).collect::<Vec<_>>());
+            let [a, b] = [expected, actual].map(light);
             let exposures = Exposures::of(&a);
             (flip_of_any_range(width, &a, &b, exposures, pixels_per_degree), Some(exposures))
         }
     };
+    let pixels = expected.beauty.iter().zip(&actual.beauty);
+    for (value, (a, b)) in values.iter_mut().zip(pixels) {
+        match [a, b].map(|pixel| pixel.iter().any(|c| c.is_nan())) {
+            [false, false] => {}
+            [true, true] => *value = 0.0,
+            _ => *value = 1.0,
+        }
+    }
     let (mut sum, mut max, mut worst) = (0.0, 0.0, 0);
     for (i, &value) in values.iter().enumerate() {
         sum += f64::from(value);
@@ -54,6 +63,11 @@ pub fn looks(expected: &Picture, actual: &Picture, space: Space, pixels_per_degr
     }
     let mean = sum / values.len().max(1) as f64;
     Looks { mean, max, worst: place(worst, expected.width), values, exposures }
+}
+
+/// Linear pixels over black. What is no number is black.
+fn light(picture: &Picture) -> Vec<[f32; 3]> {
+    picture.beauty.iter().map(|&[r, g, b, _]| [r, g, b].map(|c| if c.is_nan() { 0.0 } else { c })).collect()
 }
 
 /// Premultiplied pixels over a grey, as light of the display. What is no number is black.
@@ -96,8 +110,14 @@ mod tests {
     }
 
     #[test]
-    fn values_that_are_no_numbers_are_looked_at_as_black() {
-        let (a, b) = (grey(9, f32::NAN, 1.0), grey(9, 0.0, 1.0));
-        assert_eq!(looks(&a, &b, Space::Display, PIXELS_PER_DEGREE).max, 0.0);
+    fn a_pixel_that_is_no_number_in_one_picture_alone_looks_as_different_as_can_be() {
+        let (a, mut b) = (grey(4, 0.5, 1.0), grey(4, 0.5, 1.0));
+        b.beauty[6] = [f32::NAN, 0.5, 0.5, 1.0];
+        for space in [Space::Display, Space::Linear] {
+            let found = looks(&a, &b, space, PIXELS_PER_DEGREE);
+            assert_eq!((found.max, found.values[6], found.worst), (1.0, 1.0, (2, 1)), "{space:?}");
+            assert!(found.values[5] > 0.0, "{space:?}: its neighbours see a black dot");
+            assert!(looks(&b, &b, space, PIXELS_PER_DEGREE).values.iter().all(|&v| v == 0.0), "{space:?}");
+        }
     }
 }
