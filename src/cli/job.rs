@@ -328,8 +328,13 @@ fn check_stats_file(stats: Option<&Stats>, batches: &[Batch], heatmaps: &[Cost])
     Ok(())
 }
 
-/// Flags that only one type of file can honour.
+/// Sizes that a type of file cannot hold, and flags that only one type can honour.
 fn check_kinds(args: &RenderArgs, batches: &[Batch]) -> Result<(), Wrong> {
+    if let Some((width, height)) = args.size {
+        for shot in batches.iter().flat_map(|b| &b.shots) {
+            shot.kind.fits(width, height).map_err(|e| Wrong(e.to_string()))?;
+        }
+    }
     let all = |kind| batches.iter().flat_map(|b| &b.shots).all(|s| s.kind == kind);
     if (args.layers.is_some() || args.float || args.half) && !all(FileKind::Exr) {
         return wrong("--layers, --half and --float belong to EXR; use -o NAME.exr or --format exr");
@@ -584,6 +589,8 @@ mod tests {
             "a.obj --heatmap tests,tests",
             "a.obj a-tests.obj --heatmap tests",
             "a.obj -o a.jpg --bits 16",
+            "a.obj -o a.webp --size 16385x1",
+            "a.obj --format webp --size 1x16385 --dry-run",
             "a.obj --env studio --env-rotate 90",
             "a.glb --fps 30",
             "a.glb --frames 0..3 --turntable 4",

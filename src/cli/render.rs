@@ -16,7 +16,7 @@ use crate::accel::auto::Reason;
 use crate::image::{FileKind, was_written_by_meshray};
 use crate::load::{Diagnostic, LoadOptions, Loaded};
 use crate::render::texture::TextureStore;
-use crate::render::{Costs, Job, Rendered, View, World, render_costs};
+use crate::render::{Costs, Job, Rendered, Settings, View, World, render_costs};
 use crate::scene::Scene;
 use crate::scene::framing::{Bounds, robust_bounds_within};
 use crate::threads;
@@ -275,6 +275,10 @@ fn render_shot(
     };
     if let Some(fault) = picture::too_large(&effective, cost_layers::wanted(job).len(), job.load.limits.memory) {
         return fail(&fault, Exit::Failed);
+    }
+    let Settings { width, height, .. } = effective.settings;
+    if let Err(error) = shot.kind.fits(width, height) {
+        return fail(&Diagnostic::new("picture-too-large", file, "", error.to_string()), Exit::Failed);
     }
 
     // The eye, then the light that belongs to it: each view has its own.

@@ -52,6 +52,22 @@ impl FileKind {
         }
     }
 
+    /// Whether it can hold so many columns and rows.
+    ///
+    /// # Errors
+    /// With the largest side that its size fields hold.
+    pub fn fits(self, width: u32, height: u32) -> Result<(), ImageError> {
+        let limit = match self {
+            Self::Png | Self::Exr => return Ok(()),
+            Self::Jpeg => 65_535,
+            Self::Webp => 16_384,
+        };
+        if width > limit || height > limit {
+            return Err(ImageError::TooLarge { kind: self, width, height, limit });
+        }
+        Ok(())
+    }
+
     /// Whether transparency survives.
     pub fn has_alpha(self) -> bool {
         self != Self::Jpeg

@@ -7,15 +7,12 @@ use ::image::codecs::webp::WebPEncoder;
 use ::image::{ExtendedColorType, ImageEncoder, ImageFormat, ImageReader};
 use std::io::Cursor;
 
-/// Largest side of a JPEG and of a WebP file: what their size fields hold.
-const JPEG_SIDE: u32 = 65_535;
-const WEBP_SIDE: u32 = 16_384;
 /// Room for EXIF in a JPEG's APP1 segment: 65 535 bytes less the length field and the six letters before it.
 const JPEG_EXIF: usize = 65_535 - 2 - 6;
 
 /// The bytes of a JPEG file; transparent pictures are laid on white when no background is given.
 pub(super) fn encode_jpeg(picture: &Picture, output: &Output, metadata: &Metadata) -> Result<Vec<u8>, ImageError> {
-    fits(picture, FileKind::Jpeg, JPEG_SIDE)?;
+    FileKind::Jpeg.fits(picture.width, picture.height)?;
     let exif = exif::write(metadata);
     if exif.len() > JPEG_EXIF {
         return Err(ImageError::MetadataTooLong { kind: FileKind::Jpeg, len: exif.len(), limit: JPEG_EXIF });
@@ -29,7 +26,7 @@ pub(super) fn encode_jpeg(picture: &Picture, output: &Output, metadata: &Metadat
 
 /// The bytes of a lossless WebP file.
 pub(super) fn encode_webp(picture: &Picture, output: &Output, metadata: &Metadata) -> Result<Vec<u8>, ImageError> {
-    fits(picture, FileKind::Webp, WEBP_SIDE)?;
+    FileKind::Webp.fits(picture.width, picture.height)?;
     let mut file = Vec::new();
     let encoder = WebPEncoder::new_lossless(&mut file);
     finish(encoder, &raster(picture, output), exif::write(metadata), FileKind::Webp)?;
@@ -71,14 +68,6 @@ fn finish(
     }
     let color = if raster.channels == 4 { ExtendedColorType::Rgba8 } else { ExtendedColorType::Rgb8 };
     encoder.write_image(&raster.samples, raster.width, raster.height, color).map_err(|e| ImageError::encode(kind, e))
-}
-
-fn fits(picture: &Picture, kind: FileKind, limit: u32) -> Result<(), ImageError> {
-    let (width, height) = (picture.width, picture.height);
-    if width > limit || height > limit {
-        return Err(ImageError::TooLarge { kind, width, height, limit });
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -160,3 +160,14 @@ fn sixteen_bits_are_written_when_asked_for() {
     // Byte 24 of a PNG is the depth of its samples.
     assert_eq!(folder.read("cube.png")[24], 16);
 }
+
+#[test]
+fn a_size_that_the_type_cannot_hold_is_told_before_any_work() {
+    let scene = "[render]\nsize = [16385, 1]\n[[spheres]]\ncenter = [0, 0, 0]\nradius = 1\n";
+    let folder = Folder::with_cube().file("wide.toml", scene);
+    let words = ["render", "cube.obj", "-o", "a.webp", "--size", "16385x8"];
+    folder.run(&words).ends(2).says(&["16384", ".exr"]);
+    folder.run(&[&words[..], &["--dry-run"]].concat()).ends(2).says(&["16384"]);
+    folder.run(&["render", "wide.toml", "-o", "a.webp", "--samples", "1"]).ends(1).says(&["wide.toml", "16384"]);
+    assert_eq!(folder.names(), ["cube.obj", "wide.toml"]);
+}
