@@ -335,8 +335,19 @@ fn parse_settings(settings: &Map<String, Value>) -> Result<RenderArgs, String> {
     }
 }
 
-/// Pixels from the picture, everything else as typed now.
+/// Pixels from the picture, everything else as typed now. Where the typed name is of another type, what only the
+/// picture's own can hold is left out.
 fn with_typed(pixels: RenderArgs, inputs: Vec<PathBuf>, typed: &RenderArgs) -> RenderArgs {
+    let named = typed.output.as_deref().and_then(|name| FileKind::from_path(Path::new(name)).ok());
+    let kind = named.or(pixels.format.map(FileKind::from));
+    let is = |wanted| kind.is_none_or(|kind| kind == wanted);
+    let pixels = RenderArgs {
+        format: if named.is_some() { None } else { pixels.format },
+        bits: pixels.bits.filter(|_| is(FileKind::Png)),
+        float: pixels.float && is(FileKind::Exr),
+        layers: pixels.layers.filter(|_| is(FileKind::Exr)),
+        ..pixels
+    };
     RenderArgs {
         inputs,
         again: None,

@@ -358,9 +358,13 @@ fn target(args: &RenderArgs, facts: &Facts, naming: Naming) -> Result<(Target, F
         None => output_name::default_template(None, naming, extension),
     };
     let path = output_name::fill(&template, facts).map_err(Wrong)?;
-    let kind = match format {
-        Some(kind) => kind,
-        None => FileKind::from_path(&path).map_err(|e| Wrong(format!("{e}, or say --format")))?,
+    let kind = match (format, FileKind::from_path(&path)) {
+        (Some(typed), Ok(named)) if typed != named => {
+            let (path, format) = (path.display(), typed.extension());
+            return wrong(format!("{path} is called {named}, but --format says {format}; say it in one place"));
+        }
+        (Some(kind), _) | (None, Ok(kind)) => kind,
+        (None, Err(e)) => return wrong(format!("{e}, or say --format")),
     };
     let target = if args.output.is_some() { Target::Named(path) } else { Target::Default(path) };
     Ok((target, kind))
@@ -534,6 +538,8 @@ mod tests {
         assert_eq!(outputs("a.glb -o out/"), [Target::Named("out/a.png".into())]);
         assert_eq!(outputs("a.glb --format exr"), [Target::Default("a.exr".into())]);
         assert_eq!(outputs("a.glb -o -"), [Target::Stdout]);
+        assert_eq!(outputs("a.glb -o a.tmp --format exr"), [Target::Named("a.tmp".into())]);
+        assert_eq!(outputs("a.glb -o a.JPEG --format jpg"), [Target::Named("a.JPEG".into())]);
     }
 
     #[test]
@@ -578,6 +584,7 @@ mod tests {
             "a.obj --eye 1,1,1 --view front",
             "- -",
             "a.obj -o picture.tif",
+            "a.obj -o picture.jpg --format png",
             "a.obj -o -  --stats json".replace("  ", " ").as_str(),
             "a.obj --stats-file s.json",
             "a.obj -o a.png --stats json --stats-file ./a.png",

@@ -32,6 +32,17 @@ fn how_a_mesh_was_made_smooth_and_how_wide_its_lines_are_is_repeated() {
 }
 
 #[test]
+fn a_picture_is_repeated_as_the_type_that_its_new_name_says() {
+    let folder = Folder::with_cube();
+    folder.render(&["cube.obj", "-o", "a.png", "--bits", "16"]).ends(0);
+    folder.run(&["render", "--again", "a.png", "-o", "b.jpg"]).ends(0);
+    assert!(folder.read("b.jpg").starts_with(&[0xff, 0xd8, 0xff]));
+    folder.render(&["cube.obj", "-o", "c.exr", "--float", "--layers"]).ends(0);
+    folder.run(&["render", "--again", "c.exr", "-o", "d.png"]).ends(0);
+    assert!(folder.read("d.png").starts_with(b"\x89PNG"));
+}
+
+#[test]
 fn another_input_under_the_same_name_is_refused() {
     let folder = Folder::with_cube();
     folder.render(&["cube.obj"]).ends(0);
