@@ -46,10 +46,10 @@ pub struct LoadOptions {
     pub polygons: Polygons,
     /// How MTL text is understood.
     pub mtl: MtlMode,
-    /// Which scene of a glTF file: an index, or a name; `None`: the default scene.
+    /// Which scene of a glTF file: an index, or a name; `None`: the default scene. Refused where the file has none.
     pub scene: Option<String>,
     /// Which variant of materials of a glTF file (KHR_materials_variants): a name, or a number from 0; `None`: the
-    /// materials that primitives name themselves.
+    /// materials that primitives name themselves. Refused where the file has none.
     pub variant: Option<String>,
     /// Overrides the up axis.
     pub up: Option<UpAxis>,
@@ -183,6 +183,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
     let reading = watch.read();
     let mut loaded = load_source(&source, options)?;
     loaded.facts.reading += reading;
+    check_wishes(&loaded, path, options)?;
     check_moment(&mut loaded, path, options)?;
     Ok(loaded)
 }
@@ -191,8 +192,22 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
 /// [`LoadOptions::root`], or else in the current folder.
 pub fn load_bytes(name: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Loaded, LoadError> {
     let mut loaded = load_source(&Source { path: name.into(), bytes }, options)?;
+    check_wishes(&loaded, name, options)?;
     check_moment(&mut loaded, name, options)?;
     Ok(loaded)
+}
+
+/// Refuses a scene or a variant that is asked for where a file has no such things.
+fn check_wishes(loaded: &Loaded, file: &Path, options: &LoadOptions) -> Result<(), LoadError> {
+    let refuse = |code, word: &str, wish: &Option<String>, names: &[String]| match wish {
+        Some(name) if names.is_empty() => {
+            let fault = Diagnostic::new(code, file, "", format!("there is no {word} '{name}'"));
+            Err(LoadError::from(fault.remedy("the file has none")))
+        }
+        _ => Ok(()),
+    };
+    refuse("scene-none", "scene", &options.scene, &loaded.facts.scenes)?;
+    refuse("variant-none", "variant", &options.variant, &loaded.facts.variants)
 }
 
 /// A moment of a file without animations: refused when one is named, else a warning.

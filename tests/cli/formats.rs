@@ -1,6 +1,6 @@
 //! Every kind of file through every command that loads one, and the choice of a variant.
 
-use super::program::{Folder, picture};
+use super::program::{CUBE, Folder, picture};
 use serde_json::{Value, json};
 
 const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
@@ -99,4 +99,14 @@ fn points_and_lines_are_drawn_as_thick_as_inspect_says() {
         "{}",
         text.text()
     );
+}
+
+#[test]
+fn scenes_and_variants_are_refused_where_a_file_has_none() {
+    let folder = Folder::new().file("a.stl", stl()).file("cube.obj", CUBE);
+    for (file, flag) in [("a.stl", "--scene"), ("cube.obj", "--scene"), ("cube.obj", "--variant")] {
+        folder.render(&[file, flag, "Winter"]).ends(3).says(&[file, "'Winter'", "the file has none"]);
+        folder.run(&["inspect", file, flag, "0"]).ends(3).says(&["the file has none"]);
+    }
+    assert_eq!(folder.names(), ["a.stl", "cube.obj"]);
 }

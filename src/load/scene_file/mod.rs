@@ -359,6 +359,13 @@ fn assemble(
         facts.wires.append(&part.facts.wires);
         facts.extensions.extend(part.facts.extensions);
         facts.animations.extend(part.facts.animations);
+        // A scene file has none of its own; those of its first model that has any are told.
+        if facts.scenes.is_empty() {
+            (facts.scenes, facts.scene_index) = (part.facts.scenes, part.facts.scene_index);
+        }
+        if facts.variants.is_empty() {
+            (facts.variants, facts.variant) = (part.facts.variants, part.facts.variant);
+        }
         facts.max_rounding = facts.max_rounding.max(part.facts.max_rounding);
         facts.reading += part.facts.reading;
         facts.decoding += part.facts.decoding;
