@@ -5,6 +5,7 @@
 
 use crate::load::{Diagnostic, LoadError};
 use indicatif::MultiProgress;
+use std::ffi::OsString;
 use std::io::Write;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -16,6 +17,25 @@ pub(super) enum Format {
     Text,
     /// For programs.
     Json,
+}
+
+impl Format {
+    /// What `--messages` says among words that may not be understood.
+    pub(super) fn asked_for(words: &[OsString]) -> Self {
+        let apart = |pair: &[OsString]| pair[0] == "--messages" && pair[1] == "json";
+        let is_json = words.iter().any(|word| word == "--messages=json") || words.windows(2).any(apart);
+        if is_json { Self::Json } else { Self::Text }
+    }
+}
+
+/// What the parser of the command line says, as one message: its first paragraph, and its tips as the remedy.
+pub(super) fn of_parser(said: &str) -> Diagnostic {
+    let line = |paragraph: &str| paragraph.split_whitespace().collect::<Vec<_>>().join(" ");
+    let mut paragraphs = said.split("\n\n").map(line).filter(|p| !p.is_empty());
+    let first = paragraphs.next().unwrap_or_default();
+    let tips: Vec<String> = paragraphs.filter_map(|p| Some(p.strip_prefix("tip: ")?.to_owned())).collect();
+    let text = first.strip_prefix("error: ").unwrap_or(&first);
+    Diagnostic::new("usage", "", "", text).remedy(tips.join("; "))
 }
 
 /// How bad a message is.

@@ -53,13 +53,11 @@ use std::path::Path;
 
 /// Runs the command line `words`, whose first is the program's name.
 pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
-    let cli = match Cli::try_parse_from(with_joined_layers(with_render(words.into_iter().collect()))) {
+    let words = with_joined_layers(with_render(words.into_iter().collect()));
+    let format = message::Format::asked_for(&words);
+    let cli = match Cli::try_parse_from(words) {
         Ok(cli) => cli,
-        Err(e) => {
-            let exit = if e.use_stderr() { Exit::Usage } else { Exit::Done };
-            let _ = e.print();
-            return exit;
-        }
+        Err(e) => return misunderstood(&e, format),
     };
     interrupt::install();
     accident::install();
@@ -77,6 +75,17 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
         Command::Completions { shell } => shell::completions(shell),
         Command::Man => shell::man(),
     }
+}
+
+/// Says what is wrong with the words, or prints the help that they ask for.
+fn misunderstood(error: &clap::Error, format: message::Format) -> Exit {
+    if error.use_stderr() && format == message::Format::Json {
+        let fault = message::of_parser(&error.render().to_string());
+        Messages::new(format, false).say(Severity::Error, &fault);
+        return Exit::Usage;
+    }
+    let _ = error.print();
+    if error.use_stderr() { Exit::Usage } else { Exit::Done }
 }
 
 fn render_command(typed: &RenderArgs) -> Exit {

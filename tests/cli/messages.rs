@@ -51,3 +51,24 @@ fn a_file_name_cannot_write_to_the_terminal() {
     let run = folder.render(&[name]).ends(3);
     assert!(!run.stderr.contains('\u{1b}') && run.errors().len() == 1, "{:?}", run.stderr);
 }
+
+#[test]
+fn words_that_are_not_understood_are_told_in_the_form_that_is_asked_for() {
+    let folder = Folder::with_cube();
+    for (words, part) in [
+        (&["render", "cube.obj", "--sampels", "4", "--messages", "json"][..], "--sampels"),
+        (&["render", "cube.obj", "--messages=json", "--size", "0x0"], "0x0"),
+        (&["render", "--messages=json"], "INPUT"),
+        (&["diff", "a.png", "--messages", "json"], "ACTUAL"),
+    ] {
+        let run = folder.run(words).ends(2);
+        let message: Value = serde_json::from_str(run.stderr.trim_end()).unwrap();
+        assert_eq!((&message["severity"], &message["code"]), (&"error".into(), &"usage".into()));
+        let text = message["text"].as_str().unwrap();
+        assert!(text.contains(part) && !text.contains("Usage:"), "{text}");
+    }
+    let run = folder.run(&["render", "cube.obj", "--sampels", "4", "--messages", "json"]);
+    run.says(&[r#""remedy":"a similar argument exists: '--samples'""#]);
+    folder.run(&["render", "cube.obj", "--sampels", "4"]).ends(2).says(&["error: unexpected argument"]);
+    assert!(folder.run(&["render", "--help", "--messages", "json"]).ends(0).text().contains("Usage:"));
+}
