@@ -156,7 +156,7 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "X,Y,Z", value_parser = parse::vec3, help_heading = "Camera", hide_short_help = true, allow_hyphen_values = true)]
     pub at: Option<[f64; 3]>,
     /// Direction that is up in the picture [default: the up axis]
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse::vec3, help_heading = "Camera", hide_short_help = true, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::direction, help_heading = "Camera", hide_short_help = true, allow_hyphen_values = true)]
     pub up_vector: Option<[f64; 3]>,
     /// Vertical field of view, degrees
     #[arg(long, value_name = "DEGREES", value_parser = parse::fov, help_heading = "Camera", hide_short_help = true)]
@@ -509,7 +509,7 @@ pub(super) struct TraceArgs {
     #[command(flatten)]
     pub eye: EyeArgs,
     /// Direction that is up in the picture [default: the up axis]
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse::vec3, help_heading = "Camera", allow_hyphen_values = true, requires = "eye")]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::direction, help_heading = "Camera", allow_hyphen_values = true, requires = "eye")]
     pub up_vector: Option<[f64; 3]>,
     /// Vertical field of view, degrees
     #[arg(long, value_name = "DEGREES", value_parser = parse::fov, help_heading = "Camera")]

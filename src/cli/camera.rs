@@ -189,14 +189,18 @@ fn find<'s>(name: &str, scene: &'s Scene, file: &Path) -> Result<&'s Camera, Dia
     let by_name = scene.cameras.iter().find(|c| c.name == name);
     let by_number = || name.parse::<usize>().ok().and_then(|i| scene.cameras.get(i));
     by_name.or_else(by_number).ok_or_else(|| {
-        let names = || scene.cameras.iter().map(|c| c.name.as_str());
+        // Those without a name are called by their number.
+        let called = |(i, c): (usize, &Camera)| if c.name.is_empty() { i.to_string() } else { c.name.clone() };
+        let all: Vec<String> = scene.cameras.iter().enumerate().map(called).collect();
+        let all = list(all.iter().map(String::as_str));
+        let names = scene.cameras.iter().map(|c| c.name.as_str()).filter(|n| !n.is_empty());
         let text = format!("no camera is called '{name}'");
         let remedy = if scene.cameras.is_empty() {
             "the file has no cameras; use --view or --eye".to_owned()
-        } else if let Some(near) = nearest(name, names().filter(|n| !n.is_empty())) {
-            format!("did you mean '{near}'? there are, from 0: {}", list(names()))
+        } else if let Some(near) = nearest(name, names) {
+            format!("did you mean '{near}'? there are, from 0: {all}")
         } else {
-            format!("there are, from 0: {}", list(names()))
+            format!("there are, from 0: {all}")
         };
         Diagnostic::new("camera-unknown", file, "", text).remedy(remedy)
     })
@@ -229,7 +233,7 @@ mod tests {
         assert_eq!(pick(Choice::Camera("Front".into()), None).unwrap().1, "camera 'Front'");
         assert!(pick(Choice::Camera("1".into()), None).is_ok());
         let error = pick(Choice::Camera("Frnt".into()), None).unwrap_err().to_string();
-        assert_eq!(error, "a.glb: no camera is called 'Frnt'; did you mean 'Front'? there are, from 0: `Front`, ``");
+        assert_eq!(error, "a.glb: no camera is called 'Frnt'; did you mean 'Front'? there are, from 0: `Front`, `1`");
     }
 
     #[test]

@@ -581,6 +581,7 @@ mod tests {
         for line in [
             "a.obj --at 0,0,0",
             "a.obj --eye 1,1,1 --at 1,1,1",
+            "a.obj --eye 1,1,1 --up-vector 0,0,0",
             "a.obj --eye 1,1,1 --view front",
             "- -",
             "a.obj -o picture.tif",

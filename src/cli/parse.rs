@@ -56,6 +56,16 @@ pub(super) fn vec3(text: &str) -> Result<[f64; 3], String> {
     parts.and_then(|p| <[f64; 3]>::try_from(p).ok()).ok_or_else(|| "write three numbers, such as 1,0.5,-2".into())
 }
 
+/// The same, not all 0.
+pub(super) fn direction(text: &str) -> Result<[f64; 3], String> {
+    let direction = vec3(text)?;
+    if direction == [0.0; 3] {
+        Err("three zeros are no direction; write one, such as 0,0,1".into())
+    } else {
+        Ok(direction)
+    }
+}
+
 fn finite(text: &str) -> Result<f64, String> {
     text.trim().parse::<f64>().ok().filter(|n| n.is_finite()).ok_or_else(|| "write a number".into())
 }
@@ -420,6 +430,7 @@ mod tests {
         for wrong in ["1,2", "1,2,3,4", "1,2,nan", "inf,0,0", ""] {
             assert!(vec3(wrong).is_err(), "{wrong}");
         }
+        assert_eq!((direction("0,0,-1"), direction("0,-0,0").is_err()), (Ok([0.0, 0.0, -1.0]), true));
     }
 
     #[test]
