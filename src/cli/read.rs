@@ -7,6 +7,7 @@ use super::message::{Messages, Severity};
 use super::moment;
 use crate::load::{Diagnostic, LoadError, LoadOptions, Loaded, load, load_bytes};
 use crate::math::DAffine3;
+use crate::render::World;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::slice;
@@ -59,7 +60,24 @@ pub(super) fn one_model(input: &PathBuf, args: &LoadArgs, messages: &Messages) -
         exit_of(&error)
     })?;
     loaded.warnings.iter().for_each(|w| messages.say(Severity::Warning, w));
+    check_flattened(&loaded, options.limits.memory, input, "allow more with --max-memory").map_err(|fault| {
+        messages.say(Severity::Error, &fault);
+        Exit::Failed
+    })?;
     Ok(loaded)
+}
+
+/// Refuses a scene whose instances, each stored by itself, take more memory than is allowed: a small file can name
+/// millions of them.
+pub(super) fn check_flattened(loaded: &Loaded, limit: u64, file: &Path, remedy: &str) -> Result<(), Diagnostic> {
+    let bytes = World::flattened_bytes(&loaded.scene);
+    if bytes <= limit {
+        return Ok(());
+    }
+    let count = loaded.scene.instances.len();
+    let text =
+        format!("its {count} instances, each stored by itself, take {bytes} bytes or more where {limit} are allowed");
+    Err(Diagnostic::new("instances-too-large", file, "", text).remedy(remedy))
 }
 
 /// Gives a frame that was loaded without pictures those of an earlier one, which are the same, with the materials that

@@ -16,7 +16,7 @@ use crate::accel::auto::Reason;
 use crate::image::{FileKind, was_written_by_meshray};
 use crate::load::{Diagnostic, LoadOptions, Loaded};
 use crate::render::texture::TextureStore;
-use crate::render::{Costs, Job, Rendered, Settings, View, World, render_costs};
+use crate::render::{Costs, Instancing, Job, Rendered, Settings, View, World, render_costs};
 use crate::scene::Scene;
 use crate::scene::framing::{Bounds, robust_bounds_within};
 use crate::threads;
@@ -228,6 +228,15 @@ fn prepare(
         again::check_hash(expected, &loaded, &batch.inputs[0]).map_err(|fault| {
             messages.say(Severity::Error, &fault);
             Exit::Input
+        })?;
+    }
+    if job.instances == Instancing::Flatten {
+        let remedy =
+            "leave it to a fast structure to keep them once (--instances auto), or allow more with --max-memory";
+        let fits = read::check_flattened(&loaded, job.load.limits.memory, &batch.inputs[0], remedy);
+        fits.map_err(|fault| {
+            messages.say(Severity::Error, &fault);
+            Exit::Failed
         })?;
     }
     let world = World::placing(&loaded.scene, job.instances);

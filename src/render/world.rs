@@ -15,6 +15,10 @@ use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 use crate::scene::{Mesh, Scene};
 use rayon::prelude::*;
 
+/// Bytes that a triangle takes at least when it is placed by itself, with the fast structure that takes least while it is
+/// built; measured on four million.
+const PLACED: u64 = 120;
+
 /// A [`Scene`] placed for tracing. World position = `center` + position in [`Shapes`].
 #[derive(Clone, Debug)]
 pub struct World {
@@ -83,6 +87,13 @@ impl World {
     /// Places every shape of the scene in the world, each instance by itself, finds the centre and rounds once.
     pub fn new(scene: &Scene) -> Self {
         Self::placing(scene, Instancing::Flatten)
+    }
+
+    /// Bytes that [`World::new`] and a structure over it take at least for the triangles of all instances, each stored by
+    /// itself, however few of them the scene stores.
+    pub fn flattened_bytes(scene: &Scene) -> u64 {
+        let of = |mesh: u32| scene.meshes.get(mesh as usize).map_or(0, |mesh| mesh.triangles.len() as u64);
+        scene.instances.iter().map(|instance| of(instance.mesh)).fold(0, u64::saturating_add).saturating_mul(PLACED)
     }
 
     /// The same, but for meshes with several instances, with which `how` is dealt: rays hit the same prims at the same

@@ -53,3 +53,16 @@ fn what_is_kept_is_told() {
     assert!(told("keep").contains("11 instances kept"), "{}", told("keep"));
     assert!(!told("auto").contains("instances kept"), "so few are stored one by one");
 }
+
+#[test]
+fn more_than_fits_is_refused_before_it_is_flattened() {
+    let folder = with_pots();
+    let limit = ["--max-memory", "2M"];
+    let flat = [&["pots.glb", "--instances", "flatten"], &limit[..]].concat();
+    folder.render(&flat).ends(1).says(&["11 instances", "2097152", "--instances auto", "--max-memory"]);
+    folder.render(&[&["pots.glb", "--instances", "keep"], &limit[..]].concat()).ends(0);
+    for command in ["verify", "trace", "inspect"] {
+        let pixel: &[&str] = if command == "trace" { &["--pixel", "0,0"] } else { &[] };
+        folder.run(&[&[command, "pots.glb"], pixel, &limit].concat()).ends(1).says(&["--max-memory"]);
+    }
+}
