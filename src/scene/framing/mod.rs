@@ -5,6 +5,8 @@
 
 mod bounds;
 mod fit;
+mod parts;
+mod slices;
 
 pub use bounds::{Bounds, robust_bounds, robust_bounds_within};
 pub use fit::{Fit, FrameLens, frame, frame_around};
@@ -135,11 +137,11 @@ pub fn default_direction(scene: &Scene, bounds: &Bounds) -> Direction {
 
     if z <= x.min(y) {
         let turned = turn(z, x.min(y));
-        let front = bounds::facing(scene).dot(in_world(scene.up, DVec3::Z)) >= bounds::AWAY;
+        let front = parts::facing(scene).dot(in_world(scene.up, DVec3::Z)) >= parts::AWAY;
         let side = if front { 0.0 } else { std::f64::consts::PI };
         Direction::around(scene.up, side + azimuth * turned, elevation * turned)
     } else if x < y.min(z) && turn(x, y.min(z)) == 0.0 {
-        let right = bounds::facing(scene).dot(in_world(scene.up, DVec3::X)) >= bounds::AWAY;
+        let right = parts::facing(scene).dot(in_world(scene.up, DVec3::X)) >= parts::AWAY;
         if right { NamedView::Right.direction(scene.up) } else { NamedView::Left.direction(scene.up) }
     } else if y < x.min(z) {
         let flat = 1.0 - turn(y, x.min(z));

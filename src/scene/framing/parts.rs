@@ -1,0 +1,145 @@
+//! What a model is made of, looked at one by one: faces, spheres and cones in world space.
+
+use crate::math::{DVec3, Vec3};
+use crate::scene::{Instance, Mesh, Scene};
+use rayon::prelude::*;
+
+/// Facing is told apart from not facing by this much: closed bodies, whose faces cancel, face no way.
+pub(super) const AWAY: f64 = -0.1;
+
+/// Triangles there are, polygons counted as their fans.
+pub(super) fn faces(scene: &Scene) -> u64 {
+    let of_mesh = |mesh: &Mesh| {
+        let fans = mesh.polygons.iter().map(|polygon| u64::from(polygon.len.saturating_sub(2)));
+        mesh.triangles.len() as u64 + fans.sum::<u64>()
+    };
+    scene.instances.iter().filter_map(|instance| scene.meshes.get(instance.mesh as usize)).map(of_mesh).sum()
+}
+
+/// The mean direction of all faces weighted by area: length 1 for a card, 0 for a closed body.
+pub(super) fn facing(scene: &Scene) -> DVec3 {
+    let add = |(sum, area): &mut (DVec3, f64), part: &Part| {
+        *sum += part.normal;
+        *area += part.normal.length();
+    };
+    let join = |all: &mut (DVec3, f64), more: (DVec3, f64)| *all = (all.0 + more.0, all.1 + more.1);
+    let (sum, area) = gather(scene, Default::default, add, join);
+    if area > 0.0 { sum / area } else { DVec3::ZERO }
+}
+
+/// A face, sphere or cone.
+pub(super) struct Part {
+    pub lo: DVec3,
+    pub hi: DVec3,
+    pub center: DVec3,
+    /// As long as the area.
+    pub normal: DVec3,
+    pub area: f64,
+}
+
+/// Box of the parts that `keep` wants; `None` when there are none.
+pub(super) fn hull(scene: &Scene, keep: impl Fn(&Part) -> bool + Sync) -> Option<(DVec3, DVec3)> {
+    let nothing = || (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let join = |all: &mut (DVec3, DVec3), more: (DVec3, DVec3)| *all = (all.0.min(more.0), all.1.max(more.1));
+    let add = |all: &mut (DVec3, DVec3), part: &Part| {
+        if keep(part) {
+            join(all, (part.lo, part.hi));
+        }
+    };
+    let (lo, hi) = gather(scene, nothing, add, join);
+    lo.cmple(hi).all().then_some((lo, hi))
+}
+
+/// Faces that one thread takes at a time: the same for every number of threads, so that sums are, too.
+pub(super) const CHUNK: usize = 1 << 15;
+
+/// Adds up every face, sphere and cone with finite corners, from `nothing`; `join` adds what others have added up.
+pub(super) fn gather<T: Send>(
+    scene: &Scene,
+    nothing: impl Fn() -> T + Sync,
+    add: impl Fn(&mut T, &Part) + Sync,
+    join: impl Fn(&mut T, T),
+) -> T {
+    let mut all = nothing();
+    for instance in &scene.instances {
+        let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
+        // Faces share their corners.
+        let world = |p: &Vec3| instance.world_from_object.transform_point3(p.as_dvec3());
+        let places: Vec<DVec3> = mesh.positions.par_iter().with_min_len(CHUNK).map(world).collect();
+        let faces = Faces { instance, mesh, places: &places };
+        let of = |triangles: &[[u32; 3]]| {
+            let mut sum = nothing();
+            faces.visit(triangles, |part| add(&mut sum, part));
+            sum
+        };
+        match mesh.triangles.len() {
+            ..=CHUNK => faces.visit(&mesh.triangles, |part| add(&mut all, part)),
+            _ => {
+                let sums: Vec<T> = mesh.triangles.par_chunks(CHUNK).map(of).collect();
+                sums.into_iter().for_each(|sum| join(&mut all, sum));
+            }
+        }
+        faces.visit_polygons(|part| add(&mut all, part));
+    }
+    visit_solids(scene, |part| add(&mut all, part));
+    all
+}
+
+/// The faces of an instance.
+struct Faces<'a> {
+    instance: &'a Instance,
+    mesh: &'a Mesh,
+    /// World space.
+    places: &'a [DVec3],
+}
+
+impl Faces<'_> {
+    fn corner(&self, i: u32) -> DVec3 {
+        self.places.get(i as usize).copied().unwrap_or(self.instance.world_from_object.translation)
+    }
+
+    fn visit(&self, triangles: &[[u32; 3]], mut f: impl FnMut(&Part)) {
+        for triangle in triangles {
+            Part::face(triangle.map(|i| self.corner(i))).iter().for_each(&mut f);
+        }
+    }
+
+    /// A polygon counts as the fan of triangles around its first corner.
+    fn visit_polygons(&self, mut f: impl FnMut(&Part)) {
+        for polygon in &self.mesh.polygons {
+            let run = polygon.first as usize..(polygon.first + polygon.len) as usize;
+            let corners = self.mesh.polygon_corners.get(run).unwrap_or_default();
+            for pair in corners.windows(2).skip(1) {
+                Part::face([corners[0], pair[0], pair[1]].map(|i| self.corner(i))).iter().for_each(&mut f);
+            }
+        }
+    }
+}
+
+impl Part {
+    /// `None` where a corner is nowhere.
+    fn face([a, b, c]: [DVec3; 3]) -> Option<Self> {
+        let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
+        let normal = (b - a).cross(c - a) * 0.5;
+        // The mean of three equal numbers may be another.
+        let center = ((a + b + c) / 3.0).clamp(lo, hi);
+        let face = Self { lo, hi, center, normal, area: normal.length() };
+        (lo.is_finite() && hi.is_finite()).then_some(face)
+    }
+}
+
+/// Calls `f` for every sphere and cone.
+fn visit_solids(scene: &Scene, mut f: impl FnMut(&Part)) {
+    for sphere in &scene.spheres {
+        let (lo, hi) = (sphere.center - sphere.radius, sphere.center + sphere.radius);
+        let area = 4.0 * std::f64::consts::PI * sphere.radius * sphere.radius;
+        f(&Part { lo, hi, center: sphere.center, normal: DVec3::ZERO, area });
+    }
+    for cone in &scene.cones {
+        let ((lo, hi), length, dr) =
+            (cone.bounds(), cone.base.distance(cone.apex), cone.base_radius - cone.apex_radius);
+        let slant = (length * length + dr * dr).sqrt();
+        let area = std::f64::consts::PI * (cone.base_radius + cone.apex_radius) * slant;
+        f(&Part { lo, hi, center: (lo + hi) * 0.5, normal: DVec3::ZERO, area });
+    }
+}

@@ -1,0 +1,221 @@
+//! Space in slices along each axis: how much of a model lies in each, which are empty, and which ends come off.
+
+use super::bounds::Bounds;
+use super::parts::{CHUNK, Part, gather};
+use crate::math::{DVec3, Vec3};
+use crate::scene::{Instance, Mesh, Scene};
+use rayon::prelude::*;
+
+/// Strays together own at most this share of the area …
+const STRAY_AREA: f64 = 0.01;
+/// … and at most this share of the faces …
+const STRAY_COUNT: f64 = 0.1;
+/// … and lie beyond an empty gap of at least this share of the model's size.
+const GAP: f64 = 0.5;
+
+/// Slices a box is cut into along each axis to look for gaps.
+const SLICES: usize = 256;
+
+/// How much of the model lies in each slice along each axis.
+pub(super) struct Slices {
+    lo: DVec3,
+    width: DVec3,
+    /// Slices to a unit of length; 0 where the box is flat.
+    per_unit: DVec3,
+    pub(super) reached: Reached,
+    /// Per axis and slice: area and number of the parts with their centre there.
+    area: [[f64; SLICES]; 3],
+    count: [[u64; SLICES]; 3],
+}
+
+impl Slices {
+    /// Cuts the box of `bounds`.
+    pub(super) fn new(bounds: &Bounds) -> Self {
+        let width = (bounds.hi - bounds.lo) / SLICES as f64;
+        Self {
+            lo: bounds.lo,
+            width,
+            per_unit: DVec3::select(width.cmpgt(DVec3::ZERO), width.recip(), DVec3::ZERO),
+            reached: Reached::default(),
+            area: [[0.0; SLICES]; 3],
+            count: [[0; SLICES]; 3],
+        }
+    }
+
+    /// Sorts the parts inside the box into its slices.
+    pub(super) fn of(scene: &Scene, bounds: &Bounds) -> Self {
+        let add = |slices: &mut Self, part: &Part| {
+            if bounds.contains(part.center) {
+                slices.reach(part.lo, part.hi);
+                slices.weigh(part);
+            }
+        };
+        gather(scene, || Self::new(bounds), add, Self::join)
+    }
+
+    /// Adds what other slices of the same box have.
+    fn join(&mut self, other: Self) {
+        self.reached.join(&other.reached);
+        for axis in 0..3 {
+            for i in 0..SLICES {
+                self.area[axis][i] += other.area[axis][i];
+                self.count[axis][i] += other.count[axis][i];
+            }
+        }
+    }
+
+    /// Notes that a part with this box reaches from slice to slice.
+    #[inline]
+    pub(super) fn reach(&mut self, lo: DVec3, hi: DVec3) {
+        for axis in 0..3 {
+            self.reached.note(axis, self.slice(axis, lo[axis]), self.slice(axis, hi[axis]));
+        }
+    }
+
+    /// Notes how far every triangle of a mesh reaches; `None` when a corner of one is nowhere.
+    pub(super) fn cover(&mut self, instance: &Instance, mesh: &Mesh) -> Option<()> {
+        let cell = |p: &Vec3| {
+            let p = instance.world_from_object.transform_point3(p.as_dvec3());
+            #[expect(clippy::cast_possible_truncation, reason = "there are 256 slices")]
+            let cell = || [0, 1, 2].map(|axis| self.slice(axis, p[axis]) as u8);
+            p.is_finite().then(cell)
+        };
+        let cells: Vec<Option<[u8; 3]>> = mesh.positions.par_iter().with_min_len(CHUNK).map(cell).collect();
+        let of = |triangles: &[[u32; 3]]| {
+            let mut reached = Reached::default();
+            for triangle in triangles {
+                let [a, b, c] = triangle.map(|i| cells.get(i as usize).copied().flatten());
+                let (a, b, c) = (a?, b?, c?);
+                for axis in 0..3 {
+                    let (first, last) = (a[axis].min(b[axis]).min(c[axis]), a[axis].max(b[axis]).max(c[axis]));
+                    reached.note(axis, usize::from(first), usize::from(last));
+                }
+            }
+            Some(reached)
+        };
+        let parts: Vec<Reached> = mesh.triangles.par_chunks(CHUNK).map(of).collect::<Option<_>>()?;
+        parts.iter().for_each(|part| self.reached.join(part));
+        Some(())
+    }
+
+    /// Whether no slice is empty, so that nothing can come off.
+    pub(super) fn has_no_gap(&self) -> bool {
+        self.reached.covered().as_flattened().iter().all(|&covered| covered)
+    }
+
+    /// Adds a part to the slices that its middle is in.
+    fn weigh(&mut self, part: &Part) {
+        for axis in 0..3 {
+            let middle = self.slice(axis, part.center[axis]);
+            self.area[axis][middle] += part.area;
+            self.count[axis][middle] += 1;
+        }
+    }
+
+    /// Parts whose middle is in the box.
+    pub(super) fn parts(&self) -> u64 {
+        self.count[0].iter().sum()
+    }
+
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the slices there are")]
+    #[inline]
+    fn slice(&self, axis: usize, x: f64) -> usize {
+        ((x - self.lo[axis]) * self.per_unit[axis]).clamp(0.0, (SLICES - 1) as f64) as usize
+    }
+
+    /// First and last slice along each axis without the ends that come off; `None` when nothing comes off.
+    ///
+    /// Slices, not coordinates: beside a stray at 1e20 the model's own box could not be told from its centre.
+    pub(super) fn core(&self) -> Option<[(usize, usize); 3]> {
+        let size = (0..3).map(|axis| self.size(axis)).fold(0.0, f64::max);
+        let covered = self.reached.covered();
+        let kept = [0, 1, 2].map(|axis| {
+            let last = SLICES - 1 - self.cut(axis, (size, &covered[axis]), |i| SLICES - 1 - i);
+            (self.cut(axis, (size, &covered[axis]), |i| i), last)
+        });
+        (kept != [(0, SLICES - 1); 3]).then_some(kept)
+    }
+
+    pub(super) fn lies_in(&self, core: &[(usize, usize); 3], p: DVec3) -> bool {
+        (0..3).all(|axis| (core[axis].0..=core[axis].1).contains(&self.slice(axis, p[axis])))
+    }
+
+    /// Length along `axis` of the middle 98 % of the area, to a slice.
+    fn size(&self, axis: usize) -> f64 {
+        let total: f64 = self.area[axis].iter().sum();
+        let reach = |from_end: fn(usize) -> usize| {
+            let mut sum = 0.0;
+            (0..SLICES).map(from_end).find(|&i| {
+                sum += self.area[axis][i];
+                sum > total * STRAY_AREA
+            })
+        };
+        match (reach(|i| i), reach(|i| SLICES - 1 - i)) {
+            (Some(first), Some(last)) if last >= first => self.width[axis] * (last + 1 - first) as f64,
+            _ => self.width[axis] * SLICES as f64,
+        }
+    }
+
+    /// How many slices come off one end of `axis`; `from_end` numbers them from there.
+    fn cut(&self, axis: usize, (size, covered): (f64, &[bool; SLICES]), from_end: impl Fn(usize) -> usize) -> usize {
+        let total_area: f64 = self.area[axis].iter().sum();
+        let total_count: u64 = self.count[axis].iter().sum();
+        let (mut area, mut count, mut gap, mut cut) = (0.0, 0, 0usize, 0);
+        for i in 0..SLICES {
+            let slice = from_end(i);
+            if covered[slice] {
+                if gap as f64 * self.width[axis] >= GAP * size && gap > 0 {
+                    cut = i;
+                }
+                gap = 0;
+            } else {
+                gap += 1;
+            }
+            area += self.area[axis][slice];
+            count += self.count[axis][slice];
+            if area > STRAY_AREA * total_area || count as f64 > STRAY_COUNT * total_count as f64 {
+                break;
+            }
+        }
+        cut
+    }
+}
+
+/// Which slices parts reach into, as how many more begin in each than end before it: noted without a branch.
+#[derive(Clone, Copy)]
+pub(super) struct Reached([[i64; SLICES + 1]; 3]);
+
+impl Default for Reached {
+    fn default() -> Self {
+        Self([[0; SLICES + 1]; 3])
+    }
+}
+
+impl Reached {
+    /// A part reaches from slice to slice of an axis.
+    #[inline]
+    fn note(&mut self, axis: usize, first: usize, last: usize) {
+        let more = &mut self.0[axis];
+        more[first] += 1;
+        more[last + 1] -= 1;
+    }
+
+    /// Adds what others reach.
+    fn join(&mut self, other: &Self) {
+        let pairs = self.0.as_flattened_mut().iter_mut().zip(other.0.as_flattened());
+        pairs.for_each(|(more, other)| *more += other);
+    }
+
+    /// Whether some part reaches into a slice.
+    pub(super) fn covered(&self) -> [[bool; SLICES]; 3] {
+        let mut covered = [[false; SLICES]; 3];
+        for (covered, more) in covered.iter_mut().zip(&self.0) {
+            let mut here = 0;
+            for (covered, more) in covered.iter_mut().zip(more) {
+                here += more;
+                *covered = here != 0;
+            }
+        }
+        covered
+    }
+}
