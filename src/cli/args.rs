@@ -192,7 +192,8 @@ pub(super) struct RenderArgs {
           help_heading = "Light and background", hide_short_help = true)]
     pub light_rays: Option<u32>,
     /// Rays that each point sends to what surrounds the scene, to find what hides it; with --env white: ambient
-    /// occlusion [default: 16 for pictures, else 0: nothing hides it]
+    /// occlusion. If any, at least 2, and 4 where something is translucent [default: 16 for pictures, else 0: nothing
+    /// hides it]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=65_536),
           help_heading = "Light and background", hide_short_help = true)]
     pub env_rays: Option<u32>,
