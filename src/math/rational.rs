@@ -45,6 +45,14 @@ pub fn along(origin: &Exact3, dir: &Exact3, t: &RBig) -> Exact3 {
     [0, 1, 2].map(|k| &origin[k] + &dir[k] * t)
 }
 
+/// The place of a triangle's plane that is nearest to a point; `None` where the triangle has no area.
+pub fn foot(p: &Exact3, triangle: &Triangle) -> Option<Exact3> {
+    let [a, b, c] = triangle.map(point);
+    let normal = cross(&minus(&b, &a), &minus(&c, &a));
+    let square = dot(&normal, &normal);
+    (!square.is_zero()).then(|| along(p, &normal, &(dot(&normal, &minus(&a, p)) / square)))
+}
+
 /// −1, 0 or 1.
 pub fn sign(x: &RBig) -> i32 {
     match (x.is_zero(), x.sign()) {

@@ -1,6 +1,8 @@
 //! Rays that start on a surface, as shadow rays do: do they hit what they start on, or slip through what is there?
 //!
-//! Judged from the exact place of the hit, in rational numbers: the rounded start may lie a little beside it.
+//! Judged in rational numbers from the exact place of the hit, and where the start keeps away from an edge from the place
+//! of the face that it keeps to: beside a corner where faces both rise and fall away these two do not see the same, and
+//! what either sees is right. The rounded start itself may lie a little beside both.
 
 use dashu::rational::RBig;
 use rayon::prelude::*;
@@ -11,6 +13,7 @@ use crate::accel::{Accel, AnyAccel, Hit, NoProbe, Ray, Shapes};
 use crate::bench::oracle::{Oracle, meets_from, place};
 use crate::math::Vec3;
 use crate::math::random::Random;
+use crate::math::rational::{Exact3, foot, point};
 
 /// A start's own error this many times over is beside it: what is hit within it may be the surface itself.
 const BESIDE: f32 = 16.0;
@@ -24,10 +27,10 @@ pub struct Spawned {
     /// Rays.
     pub rays: usize,
     /// Rays stopped beside their start by a face that shares a corner with the one they start on, though nothing there
-    /// is in their way, seen from the exact place of the hit.
+    /// is in their way, seen from any exact place.
     pub self_hits: usize,
-    /// Rays that are free though, seen from the exact place of the hit, a face that shares a corner with the one they
-    /// start on is in their way beside it.
+    /// Rays that are free though, seen from each exact place, a face that shares a corner with the one they start on is
+    /// in their way beside it.
     pub slips: usize,
     /// Rays that were answered as free though exact arithmetic finds something in their way.
     pub leaks: usize,
@@ -85,21 +88,16 @@ fn spawn(
     let away = Ray { origin: refined.origin(dir), t_min: 0.0, dir, t_max: f32::INFINITY, exclude: hit.prim, sample: 0 };
     let mut blocked = [false];
     accel.occluded(&[away], &mut blocked, scratch, &mut NoProbe);
-    let beside = Beside::new(hit.prim, place(ray, &shapes.triangle(hit.prim))?, &refined, dir)?;
+    let beside = Beside::new(shapes, ray, hit.prim, &refined, dir)?;
     let mut counts = Spawned { rays: 1, ..Spawned::default() };
     match (oracle.nearest(&away), blocked[0]) {
         (Some(_), false) => counts.leaks = 1,
         (None, true) => counts.false_shadows = 1,
         (Some(first), true) => {
             let near = first.t < f64::from(beside.reach) && joined(shapes, first.prim, hit.prim);
-            // What the place touches may stop the ray or not.
-            let stopped = || oracle.near(beside.middle, beside.reach).any(|p| beside.meets(shapes, p).is_some());
-            counts.self_hits = usize::from(near && !stopped());
+            counts.self_hits = usize::from(near && beside.is_free(shapes, oracle));
         }
-        (None, false) => {
-            let mut faces = oracle.near(beside.middle, beside.reach).filter(|&prim| joined(shapes, prim, hit.prim));
-            counts.slips = usize::from(faces.any(|prim| beside.meets(shapes, prim).is_some_and(|t| !t.is_zero())));
-        }
+        (None, false) => counts.slips = usize::from(beside.is_blocked(shapes, oracle)),
     }
     Some(counts)
 }
@@ -110,12 +108,13 @@ fn joined(shapes: &Shapes, a: u32, b: u32) -> bool {
     a.iter().any(|p| b.contains(p))
 }
 
-/// The first steps of a ray from the exact place of a hit.
+/// The first steps of a ray from the exact places of a hit.
 struct Beside {
     /// The face it starts on.
     source: u32,
-    place: [RBig; 3],
-    /// The place, rounded.
+    /// Where the face was hit, and where on it the start was moved to, if it was.
+    places: Vec<Exact3>,
+    /// The first of them, rounded.
     middle: Vec3,
     dir: Vec3,
     /// As far as what is beside the start may be from it.
@@ -125,15 +124,39 @@ struct Beside {
 
 impl Beside {
     /// `dir` is of unit length.
-    fn new(source: u32, place: [RBig; 3], refined: &Refined, dir: Vec3) -> Option<Self> {
+    fn new(shapes: &Shapes, ray: &Ray, source: u32, refined: &Refined, dir: Vec3) -> Option<Self> {
+        let face = shapes.triangle(source);
+        let mut places = vec![place(ray, &face)?];
+        if refined.start != refined.position {
+            places.push(foot(&point(refined.start), &face)?);
+        }
         let reach = refined.error.max_element() * BESIDE + 2.0 * refined.start.distance(refined.position);
-        Some(Self { source, place, middle: refined.position, dir, reach, end: RBig::try_from(2.0 * reach).ok()? })
+        Some(Self { source, places, middle: refined.position, dir, reach, end: RBig::try_from(2.0 * reach).ok()? })
     }
 
-    /// Where the ray meets a face other than the one it starts on.
-    fn meets(&self, shapes: &Shapes, prim: u32) -> Option<RBig> {
-        let others = prim != self.source;
-        others.then(|| meets_from(&self.place, self.dir, &shapes.triangle(prim), &self.end)).flatten()
+    /// Whether nothing is in the way, from each place. What a place touches may be in the way or not.
+    fn is_free(&self, shapes: &Shapes, oracle: &Oracle) -> bool {
+        let meets = |place, prim| self.meets(place, shapes, prim).is_some();
+        self.places.iter().all(|place| !self.others(oracle).any(|prim| meets(place, prim)))
+    }
+
+    /// Whether a face that has a corner in common with that of the start is in the way, from each place.
+    fn is_blocked(&self, shapes: &Shapes, oracle: &Oracle) -> bool {
+        let blocks = |place, prim| {
+            joined(shapes, prim, self.source) && self.meets(place, shapes, prim).is_some_and(|t| !t.is_zero())
+        };
+        self.places.iter().all(|place| self.others(oracle).any(|prim| blocks(place, prim)))
+    }
+
+    /// The faces that are near, but for that of the start.
+    fn others(&self, oracle: &Oracle) -> impl Iterator<Item = u32> {
+        let source = self.source;
+        oracle.near(self.middle, self.reach).filter(move |&prim| prim != source)
+    }
+
+    /// Where the ray from a place meets a face.
+    fn meets(&self, place: &Exact3, shapes: &Shapes, prim: u32) -> Option<RBig> {
+        meets_from(place, self.dir, &shapes.triangle(prim), &self.end)
     }
 }
 
@@ -145,11 +168,15 @@ mod tests {
     use crate::bench::aim::{Aim, Aimer};
 
     /// All counts for rays from hits of every aim on a closed mesh.
-    fn counts(mut shapes: Shapes) -> Spawned {
+    fn counts(shapes: Shapes) -> Spawned {
+        counts_of(shapes, 400)
+    }
+
+    fn counts_of(mut shapes: Shapes, rays: usize) -> Spawned {
         shapes.opaque = BitSet::filled(shapes.len(), true);
         let structures = [AnyAccel::build(AccelKind::DEFAULT, &shapes, &AccelParams::DEFAULT)];
         let mut aimer = Aimer::new(&shapes, 1).unwrap();
-        let sets: Vec<_> = Aim::ALL.iter().map(|&aim| aimer.rays(aim, 400)).collect();
+        let sets: Vec<_> = Aim::ALL.iter().map(|&aim| aimer.rays(aim, rays)).collect();
         spawned(&shapes, &structures, &Oracle::new(&shapes), &sets, 1)
     }
 
@@ -174,6 +201,33 @@ mod tests {
             side(1, 3, 7, 5),
         ];
         scenes::mesh((0..8).map(corner).collect(), sides.concat())
+    }
+
+    /// A pipe along z: at its rims the inside, where faces rise from each other, meets the ends, where they fall away.
+    fn pipe() -> Shapes {
+        const SIDES: u32 = 32;
+        #[expect(clippy::cast_precision_loss, reason = "a small number")]
+        let corner = |i: u32| {
+            let angle = std::f32::consts::TAU * (i / 4) as f32 / SIDES as f32;
+            let radius = if i & 1 == 0 { 7.0 } else { 13.0 };
+            Vec3::new(radius * angle.cos(), radius * angle.sin(), if i & 2 == 0 { -4.0 } else { 4.0 })
+        };
+        let quad = |[a, b, c, d]: [u32; 4]| [[a, b, c], [a, c, d]];
+        let segment = |k: u32| {
+            let next = (k + 1) % SIDES;
+            let at = |k: u32, i: u32| 4 * k + i;
+            // Inside, outside, below, above.
+            let walls = [[0, 2], [3, 1], [1, 0], [2, 3]];
+            walls.map(|[i, j]| quad([at(k, i), at(k, j), at(next, j), at(next, i)])).concat()
+        };
+        scenes::mesh((0..4 * SIDES).map(corner).collect(), (0..SIDES).flat_map(segment).collect())
+    }
+
+    #[test]
+    fn a_start_that_keeps_away_from_a_corner_sees_what_its_own_place_sees() {
+        let counts = counts_of(pipe(), 4000);
+        assert!(counts.rays > 10_000, "{counts:?}");
+        assert_eq!(Spawned { rays: 0, ..counts }, Spawned::default());
     }
 
     #[test]
