@@ -274,11 +274,6 @@ pub fn place(ray: &Ray, triangle: &Triangle) -> Option<[RBig; 3]> {
     Some(crate::math::rational::along(&o, &d, &t))
 }
 
-/// The distance, within 0 ≤ t < `end`, at which a ray from an exact place meets a triangle.
-pub fn meets_from(origin: &[RBig; 3], dir: Vec3, triangle: &Triangle, end: &RBig) -> Option<RBig> {
-    hit(origin, &point(dir), triangle).filter(|t| *t >= RBig::ZERO && t < end)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

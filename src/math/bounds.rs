@@ -232,8 +232,13 @@ pub const PLACED_ROOM: f32 = 1.0 / 1024.0;
 /// How far from the edges of its face a secondary ray starts, in units of the error of its position.
 ///
 /// [`offset_origin`] leaves the face by at most 3 errors. A face that rises from the edge at an angle α is at that
-/// distance from the edge higher than the start if tan α > 3/64: from 2.7° on. The way there is 4·10⁻⁶ of the position.
+/// distance from the edge higher than the start if tan α > 3/64 ([`EDGE_FOLD`]): from 2.7° on. The way there is 4·10⁻⁶ of
+/// the position.
 pub const EDGE_ROOM: f64 = 64.0;
+
+/// The tangent of the least angle at which a face may rise over another from an edge that they share, so that starts on
+/// that one lie below it.
+pub const EDGE_FOLD: f64 = 3.0 / EDGE_ROOM;
 
 /// The start of a secondary ray: outside the box `position ± error` on the side of the surface that `dir` leaves to.
 ///

@@ -8,9 +8,10 @@ use crate::math::triangle::Triangle;
 
 /// Whether `hit` is the same crossing of the same surface as `before`, the hit in front of it on the same ray.
 ///
-/// Two faces that turn the same side to a ray and share an edge lie on different sides of that edge as the ray sees
-/// them, so it can meet both only on the edge itself. Faces that share a corner only must be met at the same distance
-/// as well. Where one of two faces is seen from behind the surface is crossed twice, in and out again.
+/// Two faces that turn the same side to a ray and share an edge, each running along it its own way, lie on different
+/// sides of that edge as the ray sees them, so it can meet both only on the edge itself. Other faces that share a corner
+/// must be met at the same distance as well: leaves of a book run along its spine the same way, and one lies over the next.
+/// Where one of two faces is seen from behind the surface is crossed twice, in and out again.
 ///
 /// `prim` looks prims up by their numbers.
 pub(crate) fn is_same_crossing<'a>(prim: impl Fn(u32) -> Prim<'a>, ray: &Ray, before: &Hit, hit: &Hit) -> bool {
@@ -20,8 +21,8 @@ pub(crate) fn is_same_crossing<'a>(prim: impl Fn(u32) -> Prim<'a>, ray: &Ray, be
         return false;
     }
     let (Some(a), Some(b)) = (Corners::of(prim(before.prim)), Corners::of(prim(hit.prim))) else { return false };
-    let shared = a.positions().filter(|&p| b.positions().any(|q| p == q)).count();
-    let meet = shared >= 2 || (shared == 1 && hit.t - before.t <= hit.t.abs() * ROUNDING);
+    let touch = || a.positions().any(|p| b.positions().any(|q| p == q));
+    let meet = a.continues(&b) || (hit.t - before.t <= hit.t.abs() * ROUNDING && touch());
     meet && a.faces(ray) == b.faces(ray)
 }
 
@@ -59,6 +60,17 @@ impl<'a> Corners<'a> {
         (0..self.len()).map(|i| self.position(i))
     }
 
+    /// Its edges, from corner to corner in turn.
+    fn edges(&self) -> impl Iterator<Item = [Vec3; 2]> {
+        let len = self.len();
+        (0..len).map(move |i| [self.position(i), self.position((i + 1) % len)])
+    }
+
+    /// Whether the other face lies beyond one of its edges: that edge is one of the other's, too, the other way round.
+    fn continues(&self, other: &Self) -> bool {
+        self.edges().any(|[p, q]| other.edges().any(|[a, b]| [b, a] == [p, q]))
+    }
+
     /// Whether the ray meets the front of the face: the sign of its area as the ray sees it, summed over a fan.
     fn faces(&self, ray: &Ray) -> bool {
         let at = |i: usize| (self.position(i) - ray.origin).as_dvec3();
@@ -80,7 +92,7 @@ mod tests {
         Hit { t, u: 0.0, v: 0.0, prim }
     }
 
-    /// A square of two triangles, one that touches it in a corner, one far below.
+    /// A square of two triangles, one that touches it in a corner, one far below, and others along its diagonal.
     fn shapes() -> Shapes {
         let v = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
         Shapes {
@@ -96,8 +108,10 @@ mod tests {
                 v(-1.0, -1.0, -1.0),
                 v(1.0, -1.0, -1.0),
                 v(1.0, 1.0, -1.0),
+                // Over or under the corner (1, −1).
+                v(1.0, -1.0, -0.5),
             ],
-            triangles: vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [7, 8, 9], [0, 3, 2]],
+            triangles: vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [7, 8, 9], [0, 3, 2], [0, 10, 2], [0, 1, 2]],
             ..Shapes::default()
         }
     }
@@ -125,6 +139,19 @@ mod tests {
     fn a_fold_is_crossed_in_and_out() {
         let shapes = shapes();
         assert!(!is_same_crossing(|prim| shapes.prim(prim), &ray(), &at(0, 1.0), &at(4, 1.0)));
+    }
+
+    #[test]
+    fn leaves_of_a_book_are_crossed_one_by_one_but_at_the_spine() {
+        let shapes = shapes();
+        let crossed = |t| is_same_crossing(|prim| shapes.prim(prim), &ray(), &at(0, 1.0), &at(5, t));
+        assert!(!crossed(1.25) && crossed(1.0));
+    }
+
+    #[test]
+    fn a_copy_of_a_face_is_the_same_crossing() {
+        let shapes = shapes();
+        assert!(is_same_crossing(|prim| shapes.prim(prim), &ray(), &at(0, 1.0), &at(6, 1.0)));
     }
 
     #[test]
