@@ -55,6 +55,14 @@ impl<'a> Traced<'a> {
         }
     }
 
+    /// Whether a ray may see what it meets weakened.
+    pub(crate) fn has_weights(self) -> bool {
+        match self {
+            Self::Eyes(eyes) => eyes.are_immersed(),
+            Self::Wave(..) => true,
+        }
+    }
+
     fn class(self) -> RayClass {
         match self {
             Self::Eyes(_) => RayClass::Primary,

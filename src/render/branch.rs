@@ -45,7 +45,7 @@ pub(super) struct Point<'a, G> {
 impl<G: Ground> Point<'_, G> {
     /// The indices on both sides for light of `band`.
     pub(super) fn crossing(&self, context: &Context, band: Option<u8>) -> Crossing {
-        let (ior, dispersion) = self.matter.refraction();
+        let Some((ior, dispersion)) = self.matter.refraction() else { return self.path.media.pass() };
         let band = band.and_then(|i| context.bands.get(usize::from(i)));
         let ior = match band {
             #[expect(clippy::cast_possible_truncation, reason = "indices are given in f32")]
@@ -58,8 +58,13 @@ impl<G: Ground> Point<'_, G> {
     }
 
     pub(super) fn balance(&self, crossing: &Crossing) -> Balance {
+        self.matter.balance(self.cosine(), crossing)
+    }
+
+    /// Cosine of the view.
+    fn cosine(&self) -> f32 {
         let Seen { normal, view, .. } = self.surface.seen();
-        self.matter.balance(normal.dot(view), crossing)
+        normal.dot(view)
     }
 
     /// What a ray that starts here carries; directions turn `factor` times as far as normals do.
@@ -100,23 +105,36 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             return self.spread(point, crossing, lobe);
         }
         let balance = point.balance(crossing);
-        self.reflect(point, balance.reflected);
-
         let weight = point.path.weight * balance.refracted;
         if !self.splits(point) || !self.context.is_alive(weight, point.path.part) {
+            self.reflect(point, balance.reflected);
             return self.send_refracted(point, weight, crossing, point.path.band);
         }
-        // White light splits: each part of the spectrum has its own index from here on.
+        // White light splits: each part of the spectrum has its own index from here on, and its own share that is mirrored.
+        let cosine = point.cosine();
+        self.reflect(point, self.split_balance(point, cosine).reflected);
         for (i, band) in (0u8..).zip(&self.context.bands) {
             let crossing = point.crossing(self.context, Some(i));
-            let weight = point.path.weight * point.balance(&crossing).refracted * band.color;
+            let weight = point.path.weight * point.matter.balance(cosine, &crossing).refracted * band.color;
             self.send_refracted(point, weight, &crossing, Some(i));
         }
     }
 
+    /// The balance of light that has all its wavelengths, of which each has its own.
+    fn split_balance<G: Ground>(&self, point: &Point<G>, cosine: f32) -> Balance {
+        let mut all = Balance::default();
+        for (i, band) in (0u8..).zip(&self.context.bands) {
+            let balance = point.matter.balance(cosine, &point.crossing(self.context, Some(i)));
+            all.reflected += balance.reflected * band.color;
+            all.refracted += balance.refracted * band.color;
+        }
+        all
+    }
+
     /// Whether light that is let in here has all its wavelengths still, and loses sight of some.
     fn splits<G>(&self, point: &Point<G>) -> bool {
-        point.matter.refraction().1 > 0.0 && point.path.band.is_none()
+        let disperses = point.matter.refraction().is_some_and(|(_, dispersion)| dispersion > 0.0);
+        disperses && point.path.band.is_none()
     }
 
     /// Spreads rays over what a rough surface mirrors and lets through: several off the first, one off what those find.
@@ -148,7 +166,10 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     fn send_off_facet<G: Ground>(&mut self, point: &Point<G>, crossing: &Crossing, rough: &Rough, k: u32) {
         let Seen { normal, geometric, view, .. } = point.surface.seen();
         let facet = rough.lobe.facet(view, rough.spread.point(k));
-        let share = point.matter.balance(view.dot(facet), crossing).reflected;
+        let cosine = view.dot(facet);
+        let balance =
+            if self.splits(point) { self.split_balance(point, cosine) } else { point.matter.balance(cosine, crossing) };
+        let share = balance.reflected;
         let to = rough.beyond(normal, reflect(-view, facet));
         if normal.dot(to) > 0.0 {
             let weight = point.path.weight * share * (rough.kept(view, to) / rough.rays as f32);

@@ -183,9 +183,9 @@ fn shared_env_rays(rays: u32, together: u32, to_panorama: bool, translucent: boo
     }
     // A ray to each side in each of both halves: none stands in for one to the other side.
     let sides = if translucent { 4 } else { 2 };
-    // Without a ray of each way that a direction to a panorama is drawn in, there is much noise.
+    // Without a ray of each way that a direction to a panorama is drawn in, its sun is met by chance and throws no shadow.
     let ways = if to_panorama { sides + 4 } else { sides };
-    rays.div_ceil(together).max(rays.min(ways)).max(sides)
+    rays.div_ceil(together).max(ways)
 }
 
 /// As many points as send hardly more rays together than may wait.
@@ -256,10 +256,10 @@ mod tests {
                 .map(|(map, thin)| shared_env_rays(rays, together, map, thin))
         };
         assert_eq!(shared(0, 4), [0; 4]);
-        assert_eq!(shared(1, 1), [2, 2, 4, 4]);
+        assert_eq!(shared(1, 1), [2, 6, 4, 8]);
         assert_eq!(shared(16, 1), [16; 4]);
         assert_eq!(shared(16, 4), [4, 6, 4, 8]);
-        assert_eq!(shared(4, 4), [2, 4, 4, 4]);
+        assert_eq!(shared(4, 4), [2, 6, 4, 8]);
         assert_eq!(shared(100, 4), [25; 4]);
     }
 

@@ -1,7 +1,7 @@
 //! Rays from the eye: the first wave of every batch of pixels, many at a time.
 
 use super::view::{Lens, PrimaryRay, View};
-use super::wave::Path;
+use super::wave::{Media, Path};
 use crate::accel::{Hit, NO_PRIM, Pencil, Ray};
 use crate::math::simd::{Kernel, LANES, Level, Simd};
 use crate::math::{DVec3, Vec3};
@@ -22,6 +22,8 @@ pub(crate) struct Eyes {
     cone_spread: Vec<f32>,
     /// Whether all start where the eye is.
     is_pencil: bool,
+    /// What all start inside of.
+    inside: Media,
 }
 
 /// A lens with an opening: what is not at its focus is blurred.
@@ -66,6 +68,8 @@ pub(crate) struct Eye<'a> {
     pub scene: Ball,
     /// `None`: everything is sharp.
     pub lens: Option<ThinLens>,
+    /// What it is inside of.
+    pub inside: Media,
 }
 
 /// An eye farther from the scene than this many of its diagonals starts its rays just before the scene.
@@ -79,7 +83,7 @@ pub(crate) struct Ball {
 }
 
 /// An eye ray in the centred frame.
-pub(crate) struct EyeRay {
+struct EyeRay {
     origin: Vec3,
     dir: Vec3,
     /// Width of a sample at the origin, and its growth.
@@ -88,8 +92,14 @@ pub(crate) struct EyeRay {
 }
 
 impl Eye<'_> {
+    /// The ray of a place, and what it carries, as sample 0.
+    pub(crate) fn ray_with_path(&self, place: Place) -> (Ray, Path) {
+        let EyeRay { origin, dir, cone_width, cone_spread } = self.ray(place);
+        (ray(origin, dir, 0), Path::from_eye(cone_width, cone_spread, self.inside))
+    }
+
     /// The ray of a place, started before the scene when the eye is far away, in the centred frame.
-    pub(crate) fn ray(&self, place: Place) -> EyeRay {
+    fn ray(&self, place: Place) -> EyeRay {
         let eye = self.view.primary(place.x, place.y, self.width, self.height);
         self.start(match self.lens {
             Some(lens) => self.through(lens, eye, place.lens),
@@ -146,12 +156,6 @@ fn on_disc([u, v]: [f64; 2]) -> [f64; 2] {
     };
     let (sin, cos) = libm::sincos(angle);
     [radius * cos, radius * sin]
-}
-
-impl EyeRay {
-    pub(crate) fn with_path(&self, sample: u32) -> (Ray, Path) {
-        (ray(self.origin, self.dir, sample), Path::from_eye(self.cone_width, self.cone_spread))
-    }
 }
 
 fn ray(origin: Vec3, dir: Vec3, sample: u32) -> Ray {
@@ -239,6 +243,7 @@ impl Eyes {
         self.make_room(start + RUN);
         self.count += run.count.min(RUN);
         self.is_pencil &= eye.sees_from_one_place();
+        self.inside = eye.inside;
         let [x, y, z] = &mut self.dirs;
         let columns = [x, y, z, &mut self.cone_width, &mut self.cone_spread].map(|column| from(column, start));
         let (Some(rays), [Some(x), Some(y), Some(z), Some(width), Some(spread)]) =
@@ -280,9 +285,14 @@ impl Eyes {
         self.cone_spread[i]
     }
 
+    /// Whether they start inside of something.
+    pub(crate) fn are_immersed(&self) -> bool {
+        self.inside.innermost().is_some()
+    }
+
     /// What the `i`th ray carries.
     pub(crate) fn path(&self, i: usize) -> Path {
-        Path::from_eye(self.cone_width[i], self.cone_spread[i])
+        Path::from_eye(self.cone_width[i], self.cone_spread[i], self.inside)
     }
 }
 
@@ -397,7 +407,16 @@ mod tests {
 
     fn eye(view: &View, lens: Option<ThinLens>) -> Eye<'_> {
         let scene = Ball { center: DVec3::ZERO, radius: f64::INFINITY };
-        Eye { view, width: 40, height: 30, center: DVec3::ZERO, sample_width: 1.0, scene, lens }
+        Eye {
+            view,
+            width: 40,
+            height: 30,
+            center: DVec3::ZERO,
+            sample_width: 1.0,
+            scene,
+            lens,
+            inside: Media::default(),
+        }
     }
 
     #[test]
@@ -458,7 +477,7 @@ mod tests {
             eyes.send(&eye, (0..100).map(place));
             assert_eq!(eyes.rays().len(), 100);
             for (i, ray) in (0..100).zip(eyes.rays()) {
-                assert_eq!(*ray, eye.ray(place(i)).with_path(i).0, "{lens:?}");
+                assert_eq!(*ray, Ray { sample: i, ..eye.ray_with_path(place(i)).0 }, "{lens:?}");
             }
         }
     }

@@ -4,11 +4,14 @@ use super::Settings;
 use super::certainty;
 use super::context::Context;
 use super::eyes::{Ball, Eye, Place, ThinLens};
+use super::immersion::media_around;
 use super::pixel::sample_offsets;
 use super::sampling::Sampling;
 use super::sobol::{self, mix};
 use super::view::View;
+use super::wave::Media;
 use super::whitted::Sample;
+use crate::accel::Accel;
 use crate::math::simd::{Kernel, LANES, Level, Simd};
 use crate::math::{DVec3, Vec3};
 use crate::scene::Background;
@@ -25,6 +28,8 @@ pub(super) struct Frame<'a> {
     /// Sharpness of one sample relative to a pixel.
     sample_width: f32,
     scene: Ball,
+    /// What the eye is inside of.
+    inside: Media,
     pub background: Option<Vec3>,
     /// How many standard errors of a pixel its allowed error must be; found by a search, so once for all tiles.
     pub standard_errors: f32,
@@ -43,7 +48,7 @@ pub(super) fn sample_width(settings: &Settings) -> f32 {
 }
 
 impl<'a> Frame<'a> {
-    pub(super) fn new(context: &Context, view: &'a View, settings: &'a Settings) -> Self {
+    pub(super) fn new<A: Accel>(context: &Context, accel: &A, view: &'a View, settings: &'a Settings) -> Self {
         let offsets = sample_offsets(settings.samples);
         let background = match context.scene.background {
             Some(Background::Color(color)) => Some(color),
@@ -54,13 +59,15 @@ impl<'a> Frame<'a> {
             Sampling::Stochastic(how) => certainty::factor(how.confidence),
             Sampling::Uniform | Sampling::Adaptive(_) => 0.0,
         };
-        Self { view, settings, offsets, sample_width, scene: Ball::new(context), background, standard_errors }
+        let (scene, inside) = (Ball::new(context), media_around(context, accel, view));
+        Self { view, settings, offsets, sample_width, scene, inside, background, standard_errors }
     }
 
     /// Where eye rays come from.
     pub(super) fn eye(&self, center: DVec3) -> Eye<'_> {
         let Settings { width, height, lens, .. } = *self.settings;
-        Eye { view: self.view, width, height, center, sample_width: self.sample_width, scene: self.scene, lens }
+        let Self { view, sample_width, scene, inside, .. } = *self;
+        Eye { view, width, height, center, sample_width, scene, lens, inside }
     }
 
     /// The places of the samples of a pixel when they are the same in each, but for the lens.

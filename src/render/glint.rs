@@ -12,6 +12,7 @@ use super::Settings;
 use super::context::Context;
 use super::frame::sample_width;
 use super::surface::Surface;
+use crate::scene::TextureRef;
 
 /// Standard deviation of the part of a pixel over which a highlight is spread at least, in widths of the pixel …
 const OF_PIXEL: f32 = 0.25;
@@ -27,10 +28,12 @@ pub(super) fn reach(settings: &Settings) -> f32 {
     (OF_PIXEL / sample_width(settings)).max(OF_SAMPLE)
 }
 
-/// The squared width α² of a highlight on `surface` at least, seen along a ray whose cone grows by `spread`: twice the
-/// variance of the slopes of halfway directions along each axis, since GGX has α² where a Gaussian has that.
-pub(super) fn least_square(surface: &Surface, context: &Context, spread: f32) -> f32 {
-    least_of(surface.turning(context, context.highlight_reach), spread, context.highlight_reach)
+/// The squared width α² of a highlight on `surface` at least, whose normals this map turns with its scale, seen along a ray
+/// whose cone grows by `spread`: twice the variance of the slopes of halfway directions along each axis, since GGX has α²
+/// where a Gaussian has that.
+pub(super) fn least_square(surface: &Surface, map: (Option<&TextureRef>, f32), context: &Context, spread: f32) -> f32 {
+    let reach = context.highlight_reach;
+    least_of(surface.turning(context, reach, map), spread, reach)
 }
 
 /// The same where normals turn so far within reach: the squares of the angles, summed over both axes.

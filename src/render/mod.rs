@@ -24,6 +24,7 @@ mod eyes;
 mod forecast;
 mod frame;
 mod glint;
+mod immersion;
 mod keeping;
 mod layers;
 mod observer;

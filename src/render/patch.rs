@@ -7,8 +7,11 @@ use crate::math::{DVec3, Vec2, Vec3, Vec4};
 use crate::scene::{Material, Mesh, TextureRef, UvTransform};
 use std::cell::Cell;
 
+/// Lengths of edges whose fourth powers are ordinary numbers.
+const ORDINARY: std::ops::RangeInclusive<f32> = 1e-6..=1e6;
+
 /// How the weights of a triangle's second and third corner grow along its plane, per world unit.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Gradients {
     pub second: Vec3,
     pub third: Vec3,
@@ -18,6 +21,18 @@ impl Gradients {
     /// Zero for a triangle without area.
     pub(crate) fn new([a, b, c]: [Vec3; 3]) -> Self {
         let (e1, e2) = (b - a, c - a);
+        let longest = e1.abs().max(e2.abs()).max_element();
+        if ORDINARY.contains(&longest) {
+            return Self::of_edges(e1, e2);
+        }
+        // The same of edges about 1 long; powers of two change no digit.
+        let scale = libm::exp2f(-libm::floorf(libm::log2f(longest)).clamp(-126.0, 126.0));
+        let Self { second, third } = Self::of_edges(e1 * scale, e2 * scale);
+        Self { second: second * scale, third: third * scale }
+    }
+
+    #[inline(always)]
+    fn of_edges(e1: Vec3, e2: Vec3) -> Self {
         let normal = e1.cross(e2);
         let inverse = 1.0 / normal.length_squared();
         if !inverse.is_finite() {
@@ -313,4 +328,22 @@ fn perpendicular(v: Vec3, normal: Vec3) -> Option<Vec3> {
 pub(crate) fn smooth_normal(placement: &Placement, interpolated: Vec3) -> Option<Vec3> {
     let normal = (placement.normal_from_object * interpolated.as_dvec3()).try_normalize()?.as_vec3();
     normal.is_finite().then_some(normal)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_grow_as_much_faster_as_a_triangle_is_smaller() {
+        let triangle = [Vec3::new(0.1, 0.2, 0.3), Vec3::new(0.9, 0.1, 0.4), Vec3::new(0.2, 0.8, 0.7)];
+        let one = Gradients::new(triangle);
+        assert!(one.second.dot(triangle[1] - triangle[0]) > 0.999 && one.third.dot(triangle[1] - triangle[0]) < 1e-6);
+        for power in [-100, -40, -24, -10, 10, 24, 40, 100] {
+            let scale = libm::exp2f(power as f32);
+            let scaled = Gradients::new(triangle.map(|p| p * scale));
+            assert_eq!(Gradients { second: scaled.second * scale, third: scaled.third * scale }, one, "2^{power}");
+        }
+        assert_eq!(Gradients::new([Vec3::ONE; 3]), Gradients::default());
+    }
 }

@@ -7,7 +7,7 @@ use super::curve::Feelers;
 use super::observer::Observer;
 use super::optics::transmittance;
 use super::seam::is_same_crossing;
-use super::shade::{Reader, lets_light_in, shadow_filter};
+use super::shade::{Reader, has_inside, shadow_filter};
 use super::surface::{Surface, Target};
 use super::tail::Tail;
 use super::wave::{Media, Medium};
@@ -197,7 +197,7 @@ fn filter_at(context: &Context, ray: &Ray, hit: &Hit, inside: Option<&mut Inside
     let patch = target.patch(context.world, hit.u, hit.v, ray.origin + ray.dir * hit.t);
     let reader = Reader { store: context.textures, patch: patch.as_ref() };
     let filter = shadow_filter(target.material, &reader);
-    let Some(inside) = inside.filter(|_| lets_light_in(target.material)) else { return filter };
+    let Some(inside) = inside.filter(|_| has_inside(target.material)) else { return filter };
     let entering = Surface::new(context.world, target, ray, hit, 0.0).front;
     filter * inside.cross(target.material_id, entering, ray, hit, &context.absorption)
 }

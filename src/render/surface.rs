@@ -135,6 +135,8 @@ pub(crate) struct Surface<'a> {
     pub geometric: Vec3,
     /// Unit normal before maps turn it, on that side as a whole.
     smooth: Vec3,
+    /// 1 where a mesh's own normal is on that side, else −1.
+    side: f32,
     /// Unit normal for shading, never turned away from the ray.
     pub normal: Vec3,
     /// Unit normal of the plane that lights must be above to shine on it: where a mesh stands for something round, not that
@@ -173,6 +175,7 @@ impl<'a> Surface<'a> {
             error,
             geometric,
             smooth: geometric,
+            side: 1.0,
             normal: geometric,
             horizon: geometric,
             view,
@@ -189,7 +192,7 @@ impl<'a> Surface<'a> {
         let material = self.target.material;
         let own = patch.normal().unwrap_or(if self.front { self.geometric } else { -self.geometric });
         let side = self.side(own);
-        self.smooth = own * side;
+        (self.smooth, self.side) = (own * side, side);
         if patch.is_curved() {
             self.horizon = facing(self.smooth, self.view);
         }
@@ -203,8 +206,10 @@ impl<'a> Surface<'a> {
 
     /// The normal of lacquer with this normal map and its scale, to the side of the ray.
     pub(crate) fn coat_normal(&self, map: Option<&TextureRef>, scale: f32, store: &TextureStore) -> Vec3 {
-        let turned = |patch: &Patch| patch.normal_mapped(self.smooth, map?, scale, store);
-        facing(self.patch.as_ref().and_then(turned).unwrap_or(self.smooth), self.view)
+        // Maps turn the mesh's own normal: tangents belong to that side.
+        let turned = |patch: &Patch| patch.normal_mapped(self.smooth * self.side, map?, scale, store);
+        let turned = self.patch.as_ref().and_then(turned).map(|normal| normal * self.side);
+        facing(turned.unwrap_or(self.smooth), self.view)
     }
 
     /// Unit vectors on the surface for coordinates of a map: along and across; any two where nothing tells.
@@ -215,7 +220,7 @@ impl<'a> Surface<'a> {
             uv_set: 0,
             transform: UvTransform { offset: Vec2::ZERO, rotation: 0.0, scale: Vec2::ONE },
         };
-        let of = |patch: &Patch| patch.tangents(self.normal, map.unwrap_or(&FIRST));
+        let of = |patch: &Patch| patch.tangents(self.normal * self.side, map.unwrap_or(&FIRST));
         let (tangent, bitangent) =
             self.patch.as_ref().and_then(of).unwrap_or_else(|| self.normal.any_orthonormal_pair());
         [tangent, bitangent]
@@ -242,17 +247,13 @@ impl<'a> Surface<'a> {
         }
     }
 
-    /// How far its normal turns in `reach` of the ray's cone: the squares, summed over both axes. Bump maps are not asked.
-    pub(crate) fn turning(&self, context: &Context, reach: f32) -> f32 {
+    /// How far its normal turns in `reach` of the ray's cone, with this normal map and its scale: the squares, summed over both
+    /// axes. Bump maps are not asked.
+    pub(crate) fn turning(&self, context: &Context, reach: f32, (map, scale): (Option<&TextureRef>, f32)) -> f32 {
         let [along, across] = self.bends(context);
         let of_mesh = (along.length_squared() + across.length_squared()) * (reach * reach);
-        let material = self.target.material;
-        let of_map = self
-            .patch
-            .as_ref()
-            .zip(material.normal_map.as_ref())
-            .map_or(0.0, |(patch, map)| patch.turning_of_map(map, material.normal_scale, context.textures, reach));
-        of_mesh + of_map
+        let of_map = self.patch.as_ref().zip(map);
+        of_mesh + of_map.map_or(0.0, |(patch, map)| patch.turning_of_map(map, scale, context.textures, reach))
     }
 
     /// Whether it is seen from outside: from either side where there is no inside.

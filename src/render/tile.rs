@@ -96,7 +96,7 @@ pub(super) fn render_some<A: Accel, P: Observer>(
     progress: &dyn Progress,
     tiles: &[Tile],
 ) -> (Vec<(TilePixels, Duration)>, Vec<ByClass<P>>, bool) {
-    let frame = Frame::new(context, view, settings);
+    let frame = Frame::new(context, accel, view, settings);
     let work = |tracer: &mut Tracer<A, P>, &tile: &Tile| {
         let watch = Stopwatch::of_this_thread();
         let pixels = render_tile(&frame, tracer, tile)?;
@@ -114,7 +114,7 @@ pub(crate) fn render_tiles<A: Accel, P: Observer>(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> (Picture, Sampled, Vec<ByClass<P>>, bool) {
-    let frame = Frame::new(context, view, settings);
+    let frame = Frame::new(context, accel, view, settings);
     let whole = Mutex::new(Whole::new(settings));
     let keep = |pixels: TilePixels| whole.lock().unwrap_or_else(PoisonError::into_inner).keep(&pixels);
     let tiles = tiles(settings.width, settings.height);
@@ -200,7 +200,7 @@ pub(crate) fn cost_tiles<A: Accel, P: Observer, T: Copy + Default + Send>(
     together: Together,
     cost: impl Fn(&mut ByClass<P>, usize) -> Vec<T> + Sync,
 ) -> Option<Vec<T>> {
-    let frame = Frame::new(context, view, settings);
+    let frame = Frame::new(context, accel, view, settings);
     let samples = frame.offsets.len();
     let pixels = match together {
         Together::Wave => batch_pixels(samples),
@@ -231,14 +231,14 @@ pub(crate) fn trace_sample<A: Accel, P: Observer>(
     (x, y): (u32, u32),
     sample: u32,
 ) -> Option<(Sample, ByClass<P>)> {
-    let frame = Frame::new(context, view, settings);
+    let frame = Frame::new(context, accel, view, settings);
     if x >= settings.width || y >= settings.height {
         return None;
     }
     let place = frame.places((x, y)).nth(sample as usize)?;
     let mut tracer = Tracer::<A, P>::new(context, accel, &());
     tracer.reset(1, false);
-    let (ray, path) = frame.eye(tracer.center()).ray(place).with_path(0);
+    let (ray, path) = frame.eye(tracer.center()).ray_with_path(place);
     tracer.start(ray, path);
     tracer.trace().then(|| (tracer.samples[0], tracer.counts))
 }

@@ -52,15 +52,15 @@ pub(crate) struct Path {
 }
 
 impl Path {
-    /// That of a ray from the eye.
-    pub(crate) fn from_eye(cone_width: f32, cone_spread: f32) -> Self {
+    /// That of a ray from the eye, inside of `media`.
+    pub(crate) fn from_eye(cone_width: f32, cone_spread: f32, media: Media) -> Self {
         Self {
             weight: Vec3::ONE,
             part: 1.0,
             depth: 0,
             straight: true,
             band: None,
-            media: Media::default(),
+            media,
             since: 0.0,
             cone_width,
             cone_spread,
@@ -127,6 +127,11 @@ impl Media {
         }
         self.items[self.len as usize] = medium;
         self.len += 1;
+    }
+
+    /// A surface with the same on both sides, which rays pass straight.
+    pub(crate) fn pass(&self) -> Crossing {
+        Crossing { n_i: self.ior(), n_t: self.ior(), beyond: *self }
     }
 
     /// The indices on both sides of the surface of `medium`, and the media beyond it.
@@ -301,7 +306,7 @@ mod tests {
     #[test]
     fn a_queue_gives_its_last_rays_first_and_keeps_the_rest() {
         let (mut queue, mut wave) = (Queue::default(), Wave::default());
-        let path = Path::from_eye(0.0, 0.0);
+        let path = Path::from_eye(0.0, 0.0, Media::default());
         (0..5).for_each(|sample| queue.push(ray(sample), path, Hit::MISS));
         queue.take(&mut wave, (3, 3));
         assert_eq!(wave.rays.iter().map(|r| r.sample).collect::<Vec<_>>(), [2, 3, 4]);
@@ -326,7 +331,11 @@ mod tests {
                 for &sample in samples {
                     for _ in 0..1 + sample % 3 {
                         let ray = Ray { t_min: sent[sample as usize] as f32, ..ray(sample) };
-                        queue.push(ray, Path { depth: sample, ..Path::from_eye(0.0, 0.0) }, Hit::MISS);
+                        queue.push(
+                            ray,
+                            Path { depth: sample, ..Path::from_eye(0.0, 0.0, Media::default()) },
+                            Hit::MISS,
+                        );
                         sent[sample as usize] += 1;
                     }
                 }

@@ -18,7 +18,7 @@ use super::eyes::Eyes;
 use super::glint;
 use super::layers::Facts;
 use super::observer::Observer;
-use super::shade::{Incident, LocalLight, Matter, Reader, lets_light_in, terminator};
+use super::shade::{Incident, LocalLight, Matter, Reader, lets_light_in};
 use super::shadow::Shadows;
 use super::sky::{Arounds, Standpoint};
 use super::surface::{Surface, Target};
@@ -254,8 +254,15 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         if path.scattered > SPREAD {
             matter.blur(path.scattered);
         }
-        if !context.lights.is_empty() && matter.has_narrow_highlight() {
-            matter.widen_highlight(glint::least_square(&surface, context, path.cone_spread));
+        if !context.lights.is_empty() {
+            let least = |map| glint::least_square(&surface, map, context, path.cone_spread);
+            if matter.has_narrow_highlight() {
+                matter.widen_highlight(least((material.normal_map.as_ref(), material.normal_scale)));
+            }
+            if let Some(coat) = matter.coat.as_mut().filter(|coat| coat.has_narrow_highlight()) {
+                let of_coat = material.metal_rough().and_then(|m| m.coat.as_ref());
+                coat.widen_highlight(least(of_coat.map_or((None, 1.0), |c| (c.normal_map.as_ref(), c.normal_scale))));
+            }
         }
         if path.depth < context.depth && context.gloss.spreads(material) {
             matter.spread_by_rays();
@@ -288,13 +295,13 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     pub(super) fn look_around<G: Ground>(&mut self, point: &Point<G>) {
         let (context, surface, matter) = (self.context, point.surface, point.matter);
         let (weight, sample) = (point.path.weight, point.ray.sample);
-        let open = matter.ambient(&surface.seen(), &context.sky, context.scene.ambient);
-        // What is looked up through glass is seen on its other side, where these rays do not go.
-        if context.env_rays == 0 || matter.is_unlit() || lets_light_in(surface.material().1) {
-            return self.add(sample, weight * (matter.emission + open));
+        let [open, through] = matter.ambient(&surface.seen(), &context.sky, context.scene.ambient);
+        if context.env_rays == 0 || matter.is_unlit() {
+            return self.add(sample, weight * (matter.emission + open + through));
         }
-        self.add(sample, weight * matter.emission);
-        if open.is_finite() {
+        // What is looked up through glass is seen on its other side, where these rays do not go.
+        self.add(sample, weight * (matter.emission + through));
+        if open.is_finite() && open != Vec3::ZERO {
             let media = context.absorption.is_some().then_some(point.path.media);
             let (ray, draws) = (point.ray, self.draws(point, Purpose::Surroundings));
             self.arounds.push(context, &Standpoint { surface, matter, ray, draws, weight, open, media });
@@ -363,8 +370,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let (surface, to_light) = (point.surface, incident.to_light);
         let above = surface.horizon.dot(to_light) > 0.0;
         let seen = if above {
-            let smooth = terminator(surface.horizon, surface.normal, to_light);
-            point.matter.lit(surface.normal, surface.view, incident) * smooth
+            point.matter.lit(surface.horizon, surface.normal, surface.view, incident)
         } else {
             point.matter.lit_through(surface.normal, surface.view, incident, crossing)
         };

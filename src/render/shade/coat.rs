@@ -46,12 +46,12 @@ impl CoatMatter {
     }
 
     /// Whether its highlights are narrow.
-    pub(super) fn has_narrow_highlight(&self) -> bool {
+    pub(crate) fn has_narrow_highlight(&self) -> bool {
         is_narrow(self.roughness)
     }
 
     /// Widens the highlights of lights to this α².
-    pub(super) fn widen_highlight(&mut self, to: f32) {
+    pub(crate) fn widen_highlight(&mut self, to: f32) {
         self.least_square = least_square(self.roughness, to);
     }
 

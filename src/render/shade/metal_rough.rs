@@ -330,8 +330,8 @@ impl MetalRoughMatter {
         (diffuse + specular) * n_l
     }
 
-    /// The surroundings without a ray: scattered and looked-up mirrored light.
-    pub(super) fn ambient(&self, seen: &Seen, sky: &Sky, ambient: Vec3, grain: Option<&GrainMatter>) -> Vec3 {
+    /// The surroundings without a ray: scattered and looked-up mirrored light, and what is looked up through frosted glass.
+    pub(super) fn ambient(&self, seen: &Seen, sky: &Sky, ambient: Vec3, grain: Option<&GrainMatter>) -> [Vec3; 2] {
         let n_v = seen.normal.dot(seen.view).clamp(0.0, 1.0);
         let looked_up = self.traced(seen.outside) < 1.0;
         let roughness = self.mean_roughness();
@@ -351,14 +351,14 @@ impl MetalRoughMatter {
             sum += self.scattered_through() * behind * ((1.0 - taken).max(0.0) * self.occlusion);
         }
         let frosted = self.frosted(seen.outside);
-        if frosted > 0.0 {
-            let light = sky.blurred(-seen.view, self.roughness) + ambient;
-            sum += self.passed(1.0 - taken) * self.inside * light * frosted;
+        if frosted <= 0.0 {
+            return [sum, Vec3::ZERO];
         }
-        sum
+        let light = sky.blurred(-seen.view, self.roughness) + ambient;
+        [sum, self.passed(1.0 - taken) * self.inside * light * frosted]
     }
 
-    /// BRDF × N·L of what [`Self::ambient`] looks up.
+    /// BRDF × N·L of what [`Self::ambient`] looks up first.
     pub(super) fn lit_around(&self, seen: &Seen, to: Vec3, grain: Option<&GrainMatter>) -> Vec3 {
         let (normal, view) = (seen.normal, seen.view);
         let looked_up = 1.0 - self.traced(seen.outside);
@@ -419,7 +419,8 @@ impl MetalRoughMatter {
         let (mut dielectric, metal) = self.fresnel(cosine);
         let mut open = 1.0 - dielectric.max_element();
         let inside = crossing.n_i > crossing.n_t;
-        if self.transmission > 0.0 && self.thick {
+        // Index 0 stands for a reflectance of 1 from all sides, by Schlick's formula.
+        if self.transmission > 0.0 && self.thick && self.ior > 0.0 {
             let share = fresnel_dielectric(f64::from(cosine), f64::from(crossing.n_i), f64::from(crossing.n_t));
             #[expect(clippy::cast_possible_truncation, reason = "a share of light")]
             let share = share as f32;
@@ -427,7 +428,7 @@ impl MetalRoughMatter {
             if inside {
                 dielectric = Vec3::splat(share);
             } else if !self.filmed {
-                dielectric = Vec3::splat(share * self.f90);
+                dielectric = self.tinted(share, crossing);
             }
             open = 1.0 - dielectric.max_element();
         }
@@ -435,6 +436,16 @@ impl MetalRoughMatter {
             reflected: self.mirrored(dielectric, metal, outside),
             refracted: self.passed(open) * (1.0 - self.frosted(outside)),
         }
+    }
+
+    /// What is mirrored of light on clear glass of which Fresnel's equations mirror so much: with the strength and colour that
+    /// the material gives it face on, as far as it is not grazing.
+    fn tinted(&self, share: f32, crossing: &Crossing) -> Vec3 {
+        let square = |a: f32, b: f32| ((a - b) / (a + b)).powi(2);
+        let tint = self.f0 - Vec3::splat(square(self.ior, 1.0) * self.f90);
+        let face_on = square(crossing.n_i, crossing.n_t);
+        let steep = if face_on < 1.0 { (1.0 - share) / (1.0 - face_on) } else { 0.0 };
+        (Vec3::splat(share * self.f90) + tint * steep).clamp(Vec3::ZERO, Vec3::ONE)
     }
 
     #[inline(always)]
@@ -672,6 +683,23 @@ mod tests {
             }
         }
         assert_eq!(glass.balance(0.1, &out, false).refracted, Vec3::ZERO, "total reflection");
+    }
+
+    #[test]
+    fn thick_glass_mirrors_in_the_colour_that_its_specular_factors_give() {
+        let glass = MetalRoughMatter { roughness: 0.0, transmission: 1.0, thick: true, ..matter() };
+        let into = Media::default().cross(Medium { material: 0, ior: 1.5 }, true);
+        let mirrored = |m: MetalRoughMatter, cosine| m.balance(cosine, &into, true).reflected;
+        for color in [Vec3::X, Vec3::ZERO, Vec3::new(0.5, 2.0, 1.0)] {
+            let f0 = color * 0.04;
+            let tinted = MetalRoughMatter { f0, ..glass };
+            assert!((mirrored(tinted, 1.0) - f0).length() < 1e-6, "{color} face on");
+            assert!((mirrored(tinted, 0.0) - Vec3::ONE).length() < 1e-6, "{color} grazing");
+        }
+        assert!((mirrored(glass, 0.3).x - fresnel_dielectric(0.3, 1.0, 1.5) as f32).abs() < 1e-6);
+        assert_eq!(mirrored(MetalRoughMatter { f0: Vec3::ZERO, f90: 0.0, ..glass }, 0.3), Vec3::ZERO);
+        let all = MetalRoughMatter { f0: Vec3::ONE, ior: 0.0, ..glass };
+        assert_eq!(all.balance(0.7, &Media::default().pass(), true).reflected, Vec3::ONE, "index 0");
     }
 
     #[test]

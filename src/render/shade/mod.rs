@@ -33,7 +33,7 @@ use super::surface::Surface;
 use super::texture::{ColorSpace, TextureStore};
 use super::wave::Crossing;
 use crate::math::{Vec3, Vec4};
-use crate::scene::{Material, MetalRough, Surface as Reflection, TextureRef};
+use crate::scene::{AlphaMode, Material, MetalRough, Surface as Reflection, TextureRef};
 use std::f32::consts::PI;
 
 /// How a point of a surface is seen: unit vectors away from it, and from which side.
@@ -109,10 +109,18 @@ impl Reader<'_> {
 
     /// Base colour and opacity: factors × maps × vertex colour.
     pub(crate) fn base(&self, material: &Material) -> Vec4 {
-        let map = self.read(material.base_color_map.as_ref(), ColorSpace::Srgb);
+        let map = self.read(material.base_color_map.as_ref(), base_space(material));
         let opacity_map = self.linear(material.opacity_map.as_ref()).x;
         let vertex = self.patch.map_or(Vec4::ONE, Patch::color);
         base_color(material, map, opacity_map, vertex)
+    }
+}
+
+/// What the map of a material's base colour says with its alpha.
+pub(crate) fn base_space(material: &Material) -> ColorSpace {
+    match material.alpha_mode {
+        AlphaMode::Opaque => ColorSpace::Srgb,
+        AlphaMode::Mask { .. } | AlphaMode::Blend => ColorSpace::SrgbCutOut,
     }
 }
 
@@ -217,11 +225,11 @@ impl Matter {
         self.emission != Vec3::ZERO || self.is_unlit()
     }
 
-    /// What is seen of the light that arrives from everywhere, without a ray.
-    pub(crate) fn ambient(&self, seen: &Seen, sky: &Sky, ambient: Vec3) -> Vec3 {
-        let below = match &self.model {
-            Model::Unlit(color) => *color,
-            Model::Phong(m) => m.ambient * ambient + m.diffuse * sky.diffuse(seen.normal),
+    /// What is seen of the light that arrives from everywhere, without a ray: on this side, and through frosted glass.
+    pub(crate) fn ambient(&self, seen: &Seen, sky: &Sky, ambient: Vec3) -> [Vec3; 2] {
+        let [below, through] = match &self.model {
+            Model::Unlit(color) => [*color, Vec3::ZERO],
+            Model::Phong(m) => [m.ambient * ambient + m.diffuse * sky.diffuse(seen.normal), Vec3::ZERO],
             Model::MetalRough(m) => m.ambient(seen, sky, ambient, self.grain.as_ref()),
         };
         let mut all = below * self.clear();
@@ -231,11 +239,11 @@ impl Matter {
         if let Some(coat) = &self.coat {
             all += coat.ambient(seen, sky, ambient);
         }
-        all
+        [all, through * self.clear()]
     }
 
-    /// What is seen of light of this radiance from one direction `to`, per solid angle, of all that [`Self::ambient`] shows;
-    /// `ambient` comes from everywhere.
+    /// What is seen of light of this radiance from one direction `to`, per solid angle, of all that [`Self::ambient`] shows on
+    /// this side; `ambient` comes from everywhere.
     pub(crate) fn lit_around(&self, seen: &Seen, to: Vec3, radiance: Vec3, ambient: Vec3) -> Vec3 {
         let (normal, view, all) = (seen.normal, seen.view, radiance + ambient);
         let below = match &self.model {
@@ -269,22 +277,18 @@ impl Matter {
         }
     }
 
-    /// Whether lights without extent are seen in it so small that they must be widened.
+    /// Whether lights without extent are seen in what is under the lacquer so small that they must be widened.
     pub(crate) fn has_narrow_highlight(&self) -> bool {
-        let core = matches!(&self.model, Model::MetalRough(m) if m.has_narrow_highlight());
-        core || self.coat.as_ref().is_some_and(CoatMatter::has_narrow_highlight)
+        matches!(&self.model, Model::MetalRough(m) if m.has_narrow_highlight())
     }
 
-    /// Widens the highlights of lights to this squared width α², where they are narrower.
+    /// Widens the highlights of lights under the lacquer to this squared width α², where they are narrower.
     pub(crate) fn widen_highlight(&mut self, to: f32) {
         if let Model::MetalRough(m) = &mut self.model {
             m.widen_highlight(to);
         }
         if let Some(grain) = &mut self.grain {
             grain.widen_highlight(to);
-        }
-        if let Some(coat) = &mut self.coat {
-            coat.widen_highlight(to);
         }
     }
 
@@ -303,12 +307,12 @@ impl Matter {
         }
     }
 
-    /// What is seen of a light on the viewer's side of the surface.
+    /// What is seen of a light on the viewer's side of the surface, whose normal before maps turn it is `horizon`.
     ///
     /// From inside there is no highlight: what a light sends in was bent where it came in, so it does not arrive along the
     /// straight line, and never so flat that all of it is mirrored. Light that thin walls lead along hundreds of
     /// reflections would gain such a highlight at each.
-    pub(crate) fn lit(&self, normal: Vec3, view: Vec3, light: &Incident) -> Vec3 {
+    pub(crate) fn lit(&self, horizon: Vec3, normal: Vec3, view: Vec3, light: &Incident) -> Vec3 {
         let below = match &self.model {
             Model::Unlit(_) => Vec3::ZERO,
             Model::Phong(m) if !self.outside => m.scattered(normal, light.to_light) * light.strength(),
@@ -329,8 +333,10 @@ impl Matter {
         if let Some(sheen) = &self.sheen {
             all += sheen.lit(normal, view, light.to_light) * light.irradiance() * self.below_coat();
         }
+        all *= terminator(horizon, normal, light.to_light);
         if let Some(coat) = &self.coat {
-            all += light.irradiance() * coat.lit(view, light.to_light);
+            let seen = coat.lit(view, light.to_light) * terminator(horizon, coat.normal, light.to_light);
+            all += light.irradiance() * seen;
         }
         all
     }
@@ -367,13 +373,14 @@ impl Matter {
         self.coat.as_ref().map(|coat| (coat.normal, coat.mirrored()))
     }
 
-    /// Index of refraction of the inside (1: rays pass straight on), and its dispersion.
-    pub(crate) fn refraction(&self) -> (f32, f32) {
-        match &self.model {
-            Model::Phong(m) if m.ior > 0.0 => (m.ior, m.dispersion),
-            Model::MetalRough(m) if m.thick && m.ior > 0.0 => (m.ior, m.dispersion),
-            _ => (1.0, 0.0),
-        }
+    /// Index of refraction of the inside (1: rays pass straight on), and its dispersion; `None` where there is no inside.
+    pub(crate) fn refraction(&self) -> Option<(f32, f32)> {
+        let (ior, dispersion) = match &self.model {
+            Model::Phong(m) => (m.ior, m.dispersion),
+            Model::MetalRough(m) if m.thick => (m.ior, m.dispersion),
+            Model::MetalRough(_) | Model::Unlit(_) => return None,
+        };
+        Some(if ior > 0.0 { (ior, dispersion) } else { (1.0, 0.0) })
     }
 }
 

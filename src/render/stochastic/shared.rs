@@ -268,7 +268,7 @@ mod tests {
         let textures = TextureStore::new(&scene);
         let context = Context::new(&scene, &world, &textures, &settings);
         let view = View::look_at(DVec3::new(0.3, 0.2, 4.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.3));
-        let frame = Frame::new(&context, &view, &settings);
+        let frame = Frame::new(&context, &accel, &view, &settings);
         let output = output(how.space, frame.background);
         let sampler = Sampler::new(&frame, &how, output.as_ref(), scene.background);
         let tiles = tiles(width, height);

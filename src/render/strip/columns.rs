@@ -147,11 +147,11 @@ impl Strip {
             (*at, *sample) = (*ray, *ray);
         }
         self.weights = None;
-        if let Traced::Wave(_, wave) = traced {
+        if traced.has_weights() {
             let weights = self.weights.insert(EMPTY);
             for (i, &ray) in self.rays[..self.count].iter().enumerate() {
                 let at = ray as usize;
-                let (ray, path, hit) = (&wave.rays[at], &wave.paths[at], &wave.hits[at]);
+                let (ray, path, hit) = (&traced.rays()[at], &traced.path(at), &traced.hits()[at]);
                 self.samples[i] = ray.sample;
                 let absorbs = absorption.is_some();
                 put(weights, i, if absorbs { absorption.lessened(ray, path, hit).weight } else { path.weight });
@@ -392,7 +392,7 @@ mod tests {
     use crate::render::shade::{LocalLight, Matter};
     use crate::render::sobol::mix;
     use crate::render::texture::TextureStore;
-    use crate::render::wave::{Path, RayClass, Wave};
+    use crate::render::wave::{Media, Path, RayClass, Wave};
     use crate::scene::{Falloff, Light, LightKind, Material, Scene};
 
     /// Random triangles hit in their middles.
@@ -417,7 +417,7 @@ mod tests {
     }
 
     fn wave(rays: Vec<Ray>, hits: Vec<Hit>) -> Wave {
-        let paths = vec![Path::from_eye(0.0, 0.0); rays.len()];
+        let paths = vec![Path::from_eye(0.0, 0.0, Media::default()); rays.len()];
         Wave { after: vec![Hit::MISS; rays.len()], rays, paths, hits }
     }
 

@@ -7,7 +7,7 @@ use crate::math::simd::{Kernel, Simd};
 use crate::math::{Vec2, Vec3, Vec4};
 use crate::render::context::{Context, coverage};
 use crate::render::patch::{Turn, given_tangent, turned_by_texel, turning_of};
-use crate::render::shade::{MetalRoughPaint, PhongPaint, base_color, occlusion};
+use crate::render::shade::{MetalRoughPaint, PhongPaint, base_color, base_space, occlusion};
 use crate::render::surface::{facing, side_of};
 use crate::render::texture::{ColorSpace, Layout, Places, Spots, TextureStore, changes};
 use crate::render::world::Placement;
@@ -153,7 +153,7 @@ fn maps(material: &Material) -> Vec<(Slot, &TextureRef, ColorSpace)> {
         Surface::Unlit => ([None; 2], [None; 3]),
     };
     let all = [
-        (Slot::Base, material.base_color_map.as_ref(), ColorSpace::Srgb),
+        (Slot::Base, material.base_color_map.as_ref(), base_space(material)),
         (Slot::Opacity, material.opacity_map.as_ref(), ColorSpace::Linear),
         (Slot::Emission, material.emission_map.as_ref(), ColorSpace::Srgb),
         (Slot::Occlusion, material.occlusion_map.as_ref(), ColorSpace::Linear),

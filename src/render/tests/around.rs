@@ -77,6 +77,25 @@ fn the_sun_of_a_panorama_throws_a_shadow() {
 }
 
 #[test]
+fn it_throws_one_on_what_lets_some_light_in_and_by_few_rays() {
+    let (panorama, irradiance) = sun();
+    let floor = |rays, transmission| {
+        let mut s = under_a_ball();
+        (s.settings.samples, s.settings.env_rays, s.settings.gloss_rays) = (100, Some(rays), Some(0));
+        s.scene.environment = Environment::Panorama;
+        s.scene.panorama = Some(panorama.clone());
+        let m = MetalRough { metallic: 0.0, roughness: 1.0, specular: 0.0, transmission, ..MetalRough::default() };
+        s.scene.materials[0] = Material { surface: Reflection::MetalRough(m), ..Material::plain() };
+        s.color().x
+    };
+    assert!(irradiance / std::f32::consts::PI > 0.4, "the open floor");
+    for (rays, transmission) in [(2, 0.0), (4, 0.0), (16, 0.0), (16, 0.01)] {
+        let seen = floor(rays, transmission);
+        assert!((0.04..0.15).contains(&seen), "{rays} rays, transmission {transmission}: {seen}");
+    }
+}
+
+#[test]
 fn rough_metal_is_darkened_where_its_lobe_is_hidden() {
     let mut s = under_a_ball();
     let surface = Reflection::MetalRough(MetalRough { metallic: 1.0, roughness: 0.4, ..MetalRough::default() });

@@ -150,6 +150,61 @@ fn the_inside_of_a_volume_absorbs_light_by_the_length_of_the_way_through() {
     }
 }
 
+/// Clear glTF glass of this index, without reflections of its own where it is thin.
+fn clear(ior: f32, thick: bool, absorption: Vec3) -> Material {
+    let specular = if thick { 1.0 } else { 0.0 };
+    let m = MetalRough {
+        transmission: 1.0,
+        metallic: 0.0,
+        roughness: 0.0,
+        thick,
+        ior,
+        specular,
+        absorption,
+        ..MetalRough::default()
+    };
+    Material { surface: Reflection::MetalRough(m), ..Material::default() }
+}
+
+#[test]
+fn a_pane_without_an_inside_within_a_volume_changes_nothing() {
+    let absorption = Vec3::new(0.1, 0.5, 2.0);
+    let seen = |pane: bool| {
+        let mut s = aslant(40.0);
+        s.square(0.0, 9.0, clear(1.5, true, absorption)).square(-2.0, 9.0, unlit(Vec3::ZERO));
+        s.scene.meshes[1].material = 0;
+        s.scene.meshes[1].triangles.iter_mut().for_each(|t| t.swap(0, 1));
+        s.mesh(ruler(-3.0, 4.0), DAffine3::IDENTITY, unlit(Vec3::ONE));
+        if pane {
+            s.square(-1.0, 9.0, Material { double_sided: true, ..clear(1.5, false, Vec3::ZERO) });
+        }
+        s.color()
+    };
+    assert_near(seen(true), seen(false), 1e-6);
+}
+
+#[test]
+fn an_eye_within_a_volume_sees_what_that_leaves_of_the_light() {
+    let absorption = Vec3::new(0.1, 0.5, 2.0);
+    for (ior, lens) in [(1.0, Lens::perspective(0.1)), (1.5, Lens::perspective(0.1)), (1.0, Lens::orthographic(0.1))] {
+        let mut s = looking_down(0.0);
+        s.view = View::look_at(DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, lens);
+        s.sphere(DVec3::ZERO, 1.5, clear(ior, true, absorption));
+        s.sphere(DVec3::ZERO, 9.0, unlit(Vec3::ONE));
+        let open = 1.0 - optics::fresnel_dielectric(1.0, f64::from(ior), 1.0) as f32;
+        let left = (absorption * -1.5).exp();
+        // What is mirrored inside has come through at last: of each share as much less as its way is longer.
+        let all = left * open / (Vec3::ONE - left * left * (1.0 - open));
+        assert_near(s.color(), all, 1e-4);
+        // A pane that one sees from behind is no volume.
+        let mut s = looking_down(3.0);
+        s.square(0.0, 9.0, clear(1.0, true, absorption));
+        s.scene.meshes[0].triangles.iter_mut().for_each(|t| t.swap(0, 1));
+        s.square(-1.0, 9.0, unlit(Vec3::ONE));
+        assert_near(s.color(), Vec3::ONE, 1e-6);
+    }
+}
+
 #[test]
 fn a_prism_splits_white_light_and_bends_blue_more() {
     let split = |dispersion: f32| {
@@ -172,6 +227,11 @@ fn a_white_scene_seen_through_a_prism_stays_white() {
     let prism = Phong { transmission: Vec3::ONE, ior: 1.6, dispersion: 0.5, ..phong() };
     s.square(0.0, 9.0, material(Vec3::ZERO, prism));
     s.scene.environment = Environment::Constant(Vec3::ONE);
+    assert_near(s.color(), Vec3::ONE, 1e-5);
+    // What is mirrored is as much of each wavelength as is not let in.
+    let mirror =
+        Phong { transmission: Vec3::ONE, mirror: Vec3::ONE, fresnel: true, ior: 1.6, dispersion: 5.0, ..phong() };
+    s.scene.materials[0] = material(Vec3::ZERO, mirror);
     assert_near(s.color(), Vec3::ONE, 1e-5);
 }
 

@@ -7,6 +7,7 @@ mod glass;
 mod glints;
 mod gloss;
 mod instances;
+mod lacquer;
 mod leaf;
 mod light;
 mod mirrors;

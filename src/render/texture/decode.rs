@@ -27,7 +27,7 @@ pub(super) const FRACTION: u32 = 12;
 /// Linear value of a stored 8-bit colour, in units of 2⁻¹² steps of 1/65535.
 pub(super) fn fixed8(space: ColorSpace) -> &'static [u32; 256] {
     match space {
-        ColorSpace::Srgb => &FIXED_SRGB8,
+        ColorSpace::Srgb | ColorSpace::SrgbCutOut => &FIXED_SRGB8,
         ColorSpace::Linear => &FIXED_UNIT8,
     }
 }
@@ -95,7 +95,7 @@ impl<'a> Texels<'a> {
 /// The linear value of each 8-bit colour.
 fn table8(space: ColorSpace) -> &'static [f32; 256] {
     match space {
-        ColorSpace::Srgb => &SRGB8,
+        ColorSpace::Srgb | ColorSpace::SrgbCutOut => &SRGB8,
         ColorSpace::Linear => &UNIT8,
     }
 }
@@ -120,7 +120,7 @@ fn decode16([r, g, b, a]: [u16; 4], space: ColorSpace) -> Vec4 {
     let unit = |c: u16| f32::from(c) / 65535.0;
     match space {
         ColorSpace::Linear => Vec4::new(unit(r), unit(g), unit(b), unit(a)),
-        ColorSpace::Srgb => {
+        ColorSpace::Srgb | ColorSpace::SrgbCutOut => {
             let color = |c: u16| SRGB16[usize::from(c)];
             Vec4::new(color(r), color(g), color(b), unit(a))
         }

@@ -21,8 +21,10 @@ use pyramid::{Plane, Pyramid, Stored};
 /// What the numbers of a bitmap mean; the slot that reads it decides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColorSpace {
-    /// Colours: red, green and blue follow the sRGB curve, alpha is linear and weights them in smaller copies.
+    /// Colours: red, green and blue follow the sRGB curve, alpha is linear and a number of its own.
     Srgb,
+    /// The same where alpha says what is there: it weights the colours in smaller copies.
+    SrgbCutOut,
     /// Data: four independent linear channels.
     Linear,
 }
@@ -43,17 +45,29 @@ pub struct TextureStore<'a> {
 /// The texture of maps that are not there.
 pub(super) const STAND_IN: u32 = u32::MAX;
 
-/// A bitmap and its smaller copies in both colour spaces.
+/// A bitmap and its smaller copies by what its numbers mean.
 #[derive(Debug)]
 struct Source<'a> {
     bitmap: &'a Bitmap,
     srgb: Pyramid,
+    cut_out: Pyramid,
     linear: Pyramid,
 }
 
 impl<'a> Source<'a> {
     fn new(bitmap: &'a Bitmap) -> Self {
-        Self { bitmap, srgb: Pyramid::new(bitmap), linear: Pyramid::new(bitmap) }
+        let [srgb, cut_out, linear] = std::array::from_fn(|_| Pyramid::new(bitmap));
+        Self { bitmap, srgb, cut_out, linear }
+    }
+
+    /// The bitmap, read in one way.
+    fn lookup(&self, space: ColorSpace, sampler: Sampler) -> Lookup<'_> {
+        let pyramid = match space {
+            ColorSpace::Srgb => &self.srgb,
+            ColorSpace::SrgbCutOut => &self.cut_out,
+            ColorSpace::Linear => &self.linear,
+        };
+        Lookup { bitmap: self.bitmap, pyramid, space, sampler }
     }
 }
 
@@ -82,17 +96,14 @@ impl<'a> TextureStore<'a> {
     /// finite are safe: such a `uv` counts as 0, such a footprint as unbounded.
     pub fn sample(&self, texture: u32, space: ColorSpace, uv: Vec2, duvdx: Vec2, duvdy: Vec2) -> Vec4 {
         let Some((sampler, source)) = self.find(texture) else { return Vec4::ONE };
-        let pyramid = if space == ColorSpace::Srgb { &source.srgb } else { &source.linear };
-        let lookup = Lookup { bitmap: source.bitmap, pyramid, space, sampler };
-        lookup.filtered(uv, duvdx, duvdy)
+        source.lookup(space, sampler).filtered(uv, duvdx, duvdy)
     }
 
     /// How much linear texels change from `uv` to `reach` times each of two ways, which span a footprint as in [`Self::sample`]:
     /// between single texels, of the level that suits the footprint, that lie at least one apart.
     pub(super) fn changes(&self, texture: u32, uv: Vec2, ways: [Vec2; 2], reach: f32) -> [Vec4; 2] {
         let Some((sampler, source)) = self.find(texture) else { return [Vec4::ZERO; 2] };
-        let lookup = Lookup { bitmap: source.bitmap, pyramid: &source.linear, space: ColorSpace::Linear, sampler };
-        lookup.changes(uv, ways, reach)
+        source.lookup(ColorSpace::Linear, sampler).changes(uv, ways, reach)
     }
 
     fn find(&self, texture: u32) -> Option<(Sampler, &Source<'a>)> {

@@ -4,7 +4,7 @@
 //! [`Lookup::filtered`](super::Lookup) finds one by one, and texels are summed in its order: the same bits.
 
 use super::pyramid::{self, Plane, Stored};
-use super::{ColorSpace, Lookup, MAX_PROBES, TextureStore, apart, decode, doublings, pixels, probes, size_of};
+use super::{ColorSpace, MAX_PROBES, TextureStore, apart, decode, doublings, pixels, probes, size_of};
 use crate::math::formula::floor;
 use crate::math::simd::LANES;
 use crate::math::{Vec2, Vec4};
@@ -71,7 +71,7 @@ pub(crate) fn changes(
 ) -> [[Vec4; LANES]; 2] {
     let mut changes = [[Vec4::ZERO; LANES]; 2];
     let Some((sampler, source)) = store.find(texture) else { return changes };
-    let lookup = Lookup { bitmap: source.bitmap, pyramid: &source.linear, space: ColorSpace::Linear, sampler };
+    let lookup = source.lookup(ColorSpace::Linear, sampler);
     let size = pixels((layout.width as usize, layout.height as usize));
     let mut level = [0; LANES];
     for (i, level) in level.iter_mut().enumerate() {
@@ -265,8 +265,7 @@ impl Places {
     #[inline(always)]
     pub(crate) fn read(&self, store: &TextureStore, (texture, space): (u32, ColorSpace), to: &mut [Vec4]) {
         let Some((sampler, source)) = store.find(texture) else { return };
-        let pyramid = if space == ColorSpace::Srgb { &source.srgb } else { &source.linear };
-        let lookup = Lookup { bitmap: source.bitmap, pyramid, space, sampler };
+        let lookup = source.lookup(space, sampler);
         // Neighbours mostly read the same levels.
         let (mut level, mut plane, mut above) = (self.level[0], lookup.plane(self.level[0] as usize), None);
         for (i, to) in to.iter_mut().enumerate().take(LANES) {

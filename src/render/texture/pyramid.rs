@@ -2,7 +2,7 @@
 //!
 //! Each level is half the one before, rounded down, and each of its texels is the mean over exactly the area it covers:
 //! where a side is odd, texels that straddle a border count with the fraction that lies inside. Means are taken of linear
-//! values. Colours (sRGB slots) are weighted by alpha, so that what hides under transparent texels does not bleed out.
+//! values. Where alpha cuts colours out it weights them, so that what hides under transparent texels does not bleed out.
 
 use super::ColorSpace;
 use super::decode::{self, FRACTION, Texels};
@@ -77,7 +77,7 @@ impl Pyramid {
                     let light = decode::fixed8(space);
                     halve_evenly(texels, from.width, |block| mean8(block, colors, light, space))
                 }
-                Stored::Level(texels) if solid || space == ColorSpace::Linear => {
+                Stored::Level(texels) if solid || space != ColorSpace::SrgbCutOut => {
                     halve_evenly(texels, from.width, mean_of_codes)
                 }
                 Stored::Level(texels) => halve_evenly(texels, from.width, |[a, b, c, d]| {
@@ -220,7 +220,7 @@ fn mean8([a, b, c, d]: [&[u8; 4]; 4], colors: &[f32; 256], light: &[u32; 256], s
 /// two means are one.
 #[inline]
 fn is_plain(mean: Vec4, space: ColorSpace) -> bool {
-    space == ColorSpace::Linear || mean.w <= 0.0 || mean.w >= 1.0
+    space != ColorSpace::SrgbCutOut || mean.w <= 0.0 || mean.w >= 1.0
 }
 
 /// Which texels of the finer level one texel covers along one axis, and the share of each.
@@ -312,7 +312,7 @@ mod tests {
         let texels = (0..16 * 8 * 3).map(|i| hash(i, 1) as u8).collect();
         let without_alpha = Bitmap { name: String::new(), width: 16, height: 8, pixels: Pixels::Rgb8(texels) };
         for picture in [opaque, cut_out, without_alpha] {
-            for space in [ColorSpace::Srgb, ColorSpace::Linear] {
+            for space in [ColorSpace::Srgb, ColorSpace::SrgbCutOut, ColorSpace::Linear] {
                 let pyramid = Pyramid::new(&picture);
                 for level in 1..4 {
                     let below = pyramid.plane(&picture, space, level - 1);
@@ -331,10 +331,12 @@ mod tests {
     fn clear_texels_do_not_stain_their_neighbours() {
         // Red leaves cut out of clear black.
         let leaves = bitmap(4, 4, |x, _| if x % 2 == 0 { [255, 0, 0, 255] } else { [0, 0, 0, 0] });
-        let top = top_of(&leaves, ColorSpace::Srgb);
+        let top = top_of(&leaves, ColorSpace::SrgbCutOut);
         assert!((top - Vec4::new(1.0, 0.0, 0.0, 0.5)).abs().max_element() < 1e-4, "{top}");
-        // In a linear slot the channels have nothing to do with each other.
-        assert!((top_of(&leaves, ColorSpace::Linear).x - 0.5).abs() < 1e-4);
+        // Elsewhere the channels have nothing to do with each other: alpha is a roughness, or nobody asks for it.
+        for space in [ColorSpace::Srgb, ColorSpace::Linear] {
+            assert!((top_of(&leaves, space).x - 0.5).abs() < 1e-4, "{space:?}");
+        }
     }
 
     #[test]

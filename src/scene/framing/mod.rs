@@ -135,18 +135,25 @@ pub fn default_direction(scene: &Scene, bounds: &Bounds) -> Direction {
     let turn = |thin: f64, other: f64| ((thin / other - CARD) / (SOLID - CARD)).clamp(0.0, 1.0);
     let (azimuth, elevation) = (AZIMUTH.to_radians(), ELEVATION.to_radians());
 
+    // Asked of what is thin: what is solid has faces on all sides.
+    let turns_to = |axis: DVec3| parts::facing(scene).dot(in_world(scene.up, axis)) >= parts::AWAY;
     if z <= x.min(y) {
         let turned = turn(z, x.min(y));
-        let front = parts::facing(scene).dot(in_world(scene.up, DVec3::Z)) >= parts::AWAY;
-        let side = if front { 0.0 } else { std::f64::consts::PI };
+        let side = if turns_to(DVec3::Z) { 0.0 } else { std::f64::consts::PI };
         Direction::around(scene.up, side + azimuth * turned, elevation * turned)
-    } else if x < y.min(z) && turn(x, y.min(z)) == 0.0 {
-        let right = parts::facing(scene).dot(in_world(scene.up, DVec3::X)) >= parts::AWAY;
-        if right { NamedView::Right.direction(scene.up) } else { NamedView::Left.direction(scene.up) }
+    } else if x < y.min(z) && turn(x, y.min(z)) < 1.0 {
+        match (turn(x, y.min(z)) == 0.0, turns_to(DVec3::X)) {
+            (true, true) => NamedView::Right.direction(scene.up),
+            (true, false) => NamedView::Left.direction(scene.up),
+            (false, true) => Direction::around(scene.up, azimuth, elevation),
+            (false, false) => Direction::around(scene.up, -azimuth, elevation),
+        }
     } else if y < x.min(z) {
         let flat = 1.0 - turn(y, x.min(z));
         let high = LANDSCAPE_ELEVATION.to_radians();
-        Direction::around(scene.up, azimuth, elevation + (high - elevation) * flat)
+        let above = flat == 0.0 || turns_to(DVec3::Y);
+        let elevation = elevation + (high - elevation) * flat;
+        Direction::around(scene.up, azimuth, if above { elevation } else { -elevation })
     } else {
         Direction::around(scene.up, azimuth, elevation)
     }

@@ -193,6 +193,24 @@ fn a_card_is_looked_at_face_on_from_the_side_it_faces() {
     assert!((from(&card([0, 1, 2])) - DVec3::Z).length() < 1e-12);
     assert!((from(&card([2, 1, 0])) - DVec3::NEG_Z).length() < 1e-12);
 
+    // A floor that faces down, and a bent panel that faces left, thicker than a card.
+    let bent = |turned: bool| {
+        let corner =
+            |i: u32| Vec3::new([0.0, 0.2, 0.0][i as usize / 2], (i % 2) as f32, [0.0, 0.5, 1.0][i as usize / 2]);
+        let faces = [[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4]];
+        let faces = faces.map(|[a, b, c]: [u32; 3]| if turned { [a, c, b] } else { [a, b, c] });
+        (0..6).map(corner).collect::<Vec<_>>().into_iter().fold(mesh(Vec::new(), faces.to_vec()), |mut scene, p| {
+            scene.meshes[0].positions.push(p);
+            scene
+        })
+    };
+    assert!(from(&bent(false)).x * from(&bent(true)).x < 0.0, "each from the side that it faces");
+    let floor = |faces: [u32; 3]| {
+        let corners = vec![Vec3::ZERO, Vec3::X * 2.0, Vec3::new(2.0, 0.0, 2.0), Vec3::Z * 2.0];
+        mesh(corners, vec![faces, faces.map(|i| (i + 2) % 4)])
+    };
+    assert!(from(&floor([2, 1, 0])).y > 0.5 && from(&floor([0, 1, 2])).y < -0.5);
+
     let cube = from(&block(Vec3::ZERO, Vec3::ONE, 2));
     assert!(cube.x > 0.2 && cube.y > 0.2 && cube.z > 0.7, "{cube}");
     let floor = from(&block(Vec3::ZERO, Vec3::new(4.0, 0.1, 3.0), 2));

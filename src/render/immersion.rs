@@ -1,0 +1,74 @@
+//! What an eye is inside of: rays from it begin there, and what they cross absorbs light from the start.
+
+use super::context::Context;
+use super::shade::has_inside;
+use super::surface::{Surface, Target};
+use super::view::View;
+use super::wave::{Media, Medium};
+use crate::accel::{Accel, Hit, NO_PRIM, NoProbe, Ray};
+use crate::math::Vec3;
+use crate::scene::{Material, Surface as Reflection};
+
+/// Surfaces that are looked at along one way.
+const FACES: usize = 256;
+
+/// The substances around the eye of a view, where any absorb light: those that are left without having been entered,
+/// whichever way one goes. Panes without an inside are so left on some ways only.
+pub(super) fn media_around<A: Accel>(context: &Context, accel: &A, view: &View) -> Media {
+    if !context.absorption.is_some() {
+        return Media::default();
+    }
+    let mut scratch = accel.scratch();
+    let mut left = ways(view).map(|dir| left_along(context, accel, &mut scratch, view, dir));
+    let Some(first) = left.next() else { return Media::default() };
+    let around = left.fold(first, |around, left| around.into_iter().filter(|m| left.contains(m)).collect());
+    let mut media = Media::default();
+    // The first that is left is the innermost.
+    for &material in around.iter().rev() {
+        let ior = index(&context.scene.materials[material as usize]);
+        media = media.cross(Medium { material, ior }, true).beyond;
+    }
+    media
+}
+
+/// Along the view, and all around in the corners of a cube.
+fn ways(view: &View) -> impl Iterator<Item = Vec3> {
+    let corner = |i: u32| Vec3::from([0, 1, 2].map(|k| if i >> k & 1 == 1 { 1.0 } else { -1.0 }));
+    std::iter::once(view.forward.as_vec3()).chain((0..8).map(corner))
+}
+
+/// Materials that are left on one way without having been entered.
+fn left_along<A: Accel>(context: &Context, accel: &A, scratch: &mut A::Scratch, view: &View, dir: Vec3) -> Vec<u32> {
+    let origin = (view.eye - context.world.center).as_vec3();
+    let ray = Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude: NO_PRIM, sample: 0 };
+    let (mut entered, mut left) = (Media::default(), Vec::new());
+    let mut hit = [Hit::MISS];
+    accel.closest(&[ray], &mut hit, scratch, &mut NoProbe);
+    for _ in 0..FACES {
+        if !hit[0].is_some() {
+            break;
+        }
+        let target = Target::new(context.scene, context.world, hit[0].prim);
+        if has_inside(target.material) {
+            let entering = Surface::new(context.world, target, &ray, &hit[0], 0.0).front;
+            let beyond = entered.cross(Medium { material: target.material_id, ior: 1.0 }, entering).beyond;
+            if !entering && beyond == entered && !left.contains(&target.material_id) {
+                left.push(target.material_id);
+            }
+            entered = beyond;
+        }
+        let after = hit;
+        accel.next(&[ray], &after, &mut hit, scratch, &mut NoProbe);
+    }
+    left
+}
+
+/// Index of refraction of the inside of a material.
+fn index(material: &Material) -> f32 {
+    let ior = match &material.surface {
+        Reflection::Phong(phong) => phong.ior,
+        Reflection::MetalRough(m) => m.ior,
+        Reflection::Unlit => 0.0,
+    };
+    if ior > 0.0 { ior } else { 1.0 }
+}
