@@ -110,10 +110,16 @@ impl<'a, G: Goal> Query<'a, G> {
         self.t_max.min(self.goal.reach())
     }
 
+    /// Whether a prim is tested at all: not one that the ray excludes, or a hit of which would not matter.
+    #[inline]
+    pub fn asks_for(&self, prim: u32) -> bool {
+        prim != self.exclude && self.goal.wants(self.shapes, prim)
+    }
+
     /// Tests one prim and tells whether the query is answered.
     #[inline]
     pub fn test<P: Probe>(&mut self, prim: u32, probe: &mut P) -> bool {
-        if prim == self.exclude || !self.goal.wants(self.shapes, prim) {
+        if !self.asks_for(prim) {
             return false;
         }
         probe.prim_test();

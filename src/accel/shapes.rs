@@ -6,6 +6,7 @@
 use std::ops::Range;
 
 use crate::math::aabb::Aabb;
+use crate::math::bounds::ROUND_ROOM;
 use crate::math::cone::{self, Cone};
 use crate::math::polygon::{self, Polygon};
 use crate::math::shear::RaySpace;
@@ -183,15 +184,17 @@ impl Shapes {
         }
     }
 
-    /// The smallest box around prim `prim`, which is not a plane; those of spheres and cones are rounded outwards.
+    /// The smallest box around prim `prim`, which is not a plane; those of spheres and cones are rounded outwards, by
+    /// [`ROUND_ROOM`] at least.
     pub fn bounds(&self, prim: u32) -> Aabb {
         match self.prim(prim) {
             Prim::Triangle(corners) => Aabb::around(corners),
             Prim::Polygon(polygon) => Aabb::around(polygon.points()),
             Prim::Sphere(s) => {
-                Aabb { lo: (s.center - s.radius).map(f32::next_down), hi: (s.center + s.radius).map(f32::next_up) }
+                let (lo, hi) = (s.center - s.radius, s.center + s.radius);
+                Aabb { lo: lo.map(f32::next_down), hi: hi.map(f32::next_up) }.padded(s.radius * ROUND_ROOM)
             }
-            Prim::Cone(cone) => cone.bounds(),
+            Prim::Cone(cone) => cone.bounds().padded(cone.size() * ROUND_ROOM),
             Prim::Plane(..) => Aabb { lo: Vec3::NEG_INFINITY, hi: Vec3::INFINITY },
         }
     }

@@ -58,7 +58,9 @@ impl<'a> Aimer<'a> {
         }
         let corners = shapes.triangles.iter().flatten().map(|&i| shapes.vertices[i as usize]);
         let (lo, hi) = corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
-        let reach = (hi * 0.5 - lo * 0.5).length();
+        // Squares of what is very large or small are no numbers in `f32`.
+        #[expect(clippy::cast_possible_truncation, reason = "no longer than a few times the mesh")]
+        let reach = (hi * 0.5 - lo * 0.5).as_dvec3().length() as f32;
         Some(Self { shapes, middle: lo * 0.5 + hi * 0.5, reach, random: Random::new(seed) })
     }
 
@@ -104,7 +106,8 @@ impl<'a> Aimer<'a> {
 
     /// How many times `dir` the mesh is long.
     fn strides(&self, dir: Vec3) -> f32 {
-        let strides = self.reach / dir.length();
+        #[expect(clippy::cast_possible_truncation, reason = "an estimate")]
+        let strides = (f64::from(self.reach) / dir.as_dvec3().length()) as f32;
         if strides.is_finite() { strides } else { 1.0 }
     }
 }
@@ -116,11 +119,26 @@ fn ray(origin: Vec3, dir: Vec3) -> Ray {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::accel::tests::scenes;
     use crate::bench::oracle::Oracle;
 
     #[test]
+    fn rays_at_the_smallest_and_largest_meshes_hit_them() {
+        for scale in [1e-30, 1e24] {
+            let shapes = scenes::moved(scenes::star(24, 16), scale, Vec3::ZERO);
+            let oracle = Oracle::new(&shapes);
+            let mut aimer = Aimer::new(&shapes, 1).unwrap();
+            for aim in [Aim::Corners, Aim::InPlane, Aim::Random] {
+                let rays = aimer.rays(aim, 60);
+                let hits = rays.iter().filter(|r| oracle.nearest(r).is_some()).count();
+                assert!(hits > 30, "{scale}, {}: {hits} hits", aim.name());
+            }
+        }
+    }
+
+    #[test]
     fn rays_of_every_kind_are_finite_and_most_pass_near_the_mesh() {
-        let shapes = crate::accel::tests::scenes::star(24, 16);
+        let shapes = scenes::star(24, 16);
         let oracle = Oracle::new(&shapes);
         let mut aimer = Aimer::new(&shapes, 1).unwrap();
         for aim in Aim::ALL {

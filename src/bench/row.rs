@@ -112,6 +112,15 @@ impl Count {
     }
 }
 
+/// Half the width, in standard errors, of the 95 % interval of a mean whose error is estimated with so many degrees of
+/// freedom (E. A. Cornish, R. A. Fisher, *Moments and Cumulants in the Specification of Distributions*, 1937): from ten on
+/// within two thousandths.
+fn student(freedom: f64) -> f64 {
+    const NORMAL: f64 = 1.959_963_985;
+    let [z, z3, z5] = [1, 3, 5].map(|power| NORMAL.powi(power));
+    z + (z3 + z) / (4.0 * freedom) + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * freedom * freedom)
+}
+
 impl ClassRow {
     /// A count for each ray; 0 without rays.
     pub fn per_ray(&self, count: Count) -> f64 {
@@ -122,7 +131,7 @@ impl ClassRow {
     pub fn interval(&self, count: Count) -> f64 {
         let (n, mean) = (self.counts.queries as f64, self.per_ray(count));
         let variance = (self.squares[count as usize] / n - mean * mean).max(0.0) * n / (n - 1.0);
-        if n < 2.0 { f64::INFINITY } else { 1.96 * (variance / n).sqrt() }
+        if n < 2.0 { f64::INFINITY } else { student(n - 1.0) * (variance / n).sqrt() }
     }
 
     /// Hits required for each ray: the tests that no structure can save.
@@ -146,6 +155,18 @@ impl ClassRow {
         for (square, count) in self.squares.iter_mut().zip(Count::ALL) {
             let value = count.of(counts) as f64;
             *square += value * value;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn intervals_of_few_rays_are_wider() {
+        for (freedom, quantile) in [(10.0, 2.2281), (15.0, 2.1314), (30.0, 2.0423), (1e6, 1.96)] {
+            assert!((student(freedom) / quantile - 1.0).abs() < 2e-3, "{freedom}");
         }
     }
 }

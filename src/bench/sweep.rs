@@ -50,7 +50,9 @@ impl Parameter {
     pub fn changes(self, kind: AccelKind, params: &AccelParams) -> bool {
         use AccelKind::{Bvh, Grid, GridBvh, GridOctree, Octree};
         match self {
-            Self::GridDensity | Self::GridResolution => matches!(kind, Grid | GridOctree | GridBvh),
+            Self::GridDensity | Self::GridResolution => {
+                matches!(kind, Grid | GridOctree | GridBvh) && params.grid_cells.is_none()
+            }
             Self::MaxDepth => matches!(kind, GridOctree | Octree),
             Self::StepCost => matches!(kind, GridOctree | Octree) && params.leaf_size.is_none(),
             Self::LeafSize => matches!(kind, Bvh | GridBvh | GridOctree | Octree),

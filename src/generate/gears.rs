@@ -12,7 +12,8 @@ const PER_TOOTH: usize = 32;
 pub(super) fn scene(wanted: usize) -> Scene {
     let teeth = (wanted / PER_TOOTH).clamp(3, 24) / 2 * 2;
     let teeth = teeth.max(4);
-    let count = (wanted / (teeth * PER_TOOTH)).max(1);
+    let of_wheel = teeth * PER_TOOTH;
+    let count = ((wanted + of_wheel / 2) / of_wheel).max(1);
     let wheel = wheel(teeth);
     let (mut even, mut odd) = (Solid::default(), Solid::default());
     let side = (1..).find(|n| n * n * n >= count).unwrap_or(1);

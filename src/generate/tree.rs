@@ -16,7 +16,7 @@ struct Branch {
 
 /// 48 triangles a branch, and the floor.
 pub(super) fn scene(wanted: usize) -> Scene {
-    let branches = (wanted.saturating_sub(2) / 48).max(1);
+    let branches = ((wanted.saturating_sub(2) + 24) / 48).max(1);
     let knot = Solid::sphere(1.0, 1);
     let mut random = Random::new(11);
     let mut solid = Solid::default();

@@ -35,6 +35,11 @@ impl Aabb {
         Self { lo: self.lo.max(other.lo), hi: self.hi.min(other.hi) }
     }
 
+    /// Larger by so much on every side.
+    pub fn padded(self, by: f32) -> Self {
+        Self { lo: self.lo - by, hi: self.hi + by }
+    }
+
     /// Whether it holds no point.
     pub fn is_empty(&self) -> bool {
         !self.lo.cmple(self.hi).all()

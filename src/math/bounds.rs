@@ -136,6 +136,13 @@ pub const POSITION_T: f64 = 1.0 / (1u64 << 40) as f64;
 /// the mantle of a cone turned by 8 u; place, radius and sum add 6 u.
 pub const CONE_PROJECTION: f64 = 16.0 * U64;
 
+/// How much larger than they are spheres and cones are taken to be where boxes cull them, relative to their size: 2⁻⁴⁰.
+///
+/// Beside the start of a ray, where a distance is no more than that, its error is absolute: where the line is a tangent, by the
+/// root of what the discriminant errs by in numbers of 106 digits, 2⁻⁴⁷ of the size for rays from within 2⁸ of it; elsewhere
+/// it is relative. The same holds for how far the line may pass the rim and count as a hit.
+pub const ROUND_ROOM: f32 = 1.0 / (1u64 << 40) as f32;
+
 /// What the walk through cells may lag behind, relative to t: a prim not seen yet has an exact t beyond the exit of the
 /// cell, and its rounded t may be half an ulp (u) lower. Doubled twice for
 /// spheres and cones, whose t is not correctly rounded.

@@ -8,7 +8,7 @@ use super::params::{Assign, GridParams};
 use crate::accel::shapes::{Prim, Shapes};
 use crate::math::aabb::Aabb;
 use crate::math::bounds::{
-    CELL_PAD, GRID_ROOM, NEAR_CELL_PAD, NEAR_GRID_ROOM, NEAR_RAY_CELLS, NO_SLOPE, RAY_CELLS, WALK_MARGIN,
+    BOX_UNDERFLOW, CELL_PAD, GRID_ROOM, NEAR_CELL_PAD, NEAR_GRID_ROOM, NEAR_RAY_CELLS, NO_SLOPE, RAY_CELLS, WALK_MARGIN,
 };
 use crate::math::{DVec3, Vec3, Vec3Swizzles as _, triangle};
 
@@ -25,8 +25,10 @@ pub struct CellMargins {
     pub pad: f64,
     /// How much larger than its content the grid is on each side, relative to its extent.
     pub room: f64,
-    /// How far behind the best hit cells are still visited, relative to its distance.
+    /// How far behind the best hit cells are still visited, relative to its distance …
     pub lag: f64,
+    /// … and besides, where an ulp is no fraction of it.
+    pub underflow: f64,
     /// How far from the grid's corner a ray may start that is led through cells.
     pub ray_cells: f64,
     /// What a zero in a direction is replaced by.
@@ -36,11 +38,18 @@ pub struct CellMargins {
 }
 
 impl CellMargins {
+    /// How far before and behind a distance cells are visited for hits there.
+    #[inline]
+    pub fn behind(&self, t: f64) -> f64 {
+        t.abs() * self.lag + self.underflow
+    }
+
     /// Those that `math::bounds` derives.
     pub const DERIVED: Self = Self {
         pad: CELL_PAD,
         room: GRID_ROOM,
         lag: WALK_MARGIN,
+        underflow: BOX_UNDERFLOW as f64,
         ray_cells: RAY_CELLS,
         no_slope: NO_SLOPE,
         guarded: true,

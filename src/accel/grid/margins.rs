@@ -3,7 +3,7 @@
 
 use super::lattice::CellMargins;
 use super::{GridOctree, GridParams};
-use crate::accel::tests::scenes::{mesh, ray, soup};
+use crate::accel::tests::scenes::{mesh, moved, ray, soup};
 use crate::accel::tests::{far_rays, wrong};
 use crate::accel::{Accel as _, Hit, Probe, Ray, Shapes};
 use crate::math::Vec3;
@@ -108,6 +108,20 @@ fn a_walk_that_stops_at_the_best_hit_or_before_it_misses_others_as_near() {
     assert_needed("lag", CellMargins { lag: 0.0, ..DERIVED }, &GridParams::DEFAULT, &shapes, &far);
     let near = far_rays(&shapes, 400, 10.0..1000.0);
     assert_needed("0.1 % early", CellMargins { lag: -0.001, ..DERIVED }, &GridParams::DEFAULT, &shapes, &near);
+}
+
+/// Where an ulp is no fraction of a distance.
+#[test]
+fn a_walk_through_the_smallest_numbers_misses_hits_that_are_as_near() {
+    let shapes = moved(soup(700, 0.4), 1e-20, Vec3::ZERO);
+    let mut r = Random::new(17);
+    let mut aim = || {
+        let origin = r.direction() * 3e-20;
+        // So fast that all of the scene lies within a few of the smallest distances.
+        ray(origin, (r.cube() * 1e-20 - origin) * 1e30 * [1e13, 1e14][r.below(2)])
+    };
+    let rays: Vec<Ray> = (0..8000).map(|_| aim()).collect();
+    assert_needed("underflow", CellMargins { underflow: 0.0, ..DERIVED }, &GridParams::DEFAULT, &shapes, &rays);
 }
 
 /// From 2^60 lengths away not even `f64` knows the cells that a ray passes.

@@ -91,7 +91,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
     #[inline]
     fn limit<G: Goal>(&self, query: &Query<G>) -> f64 {
         let reach = f64::from(query.reach());
-        reach + reach.abs() * self.lattice.margins.lag
+        reach + self.lattice.margins.behind(reach)
     }
 
     /// Visits the cells along the ray in order.
@@ -108,7 +108,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
         };
         // A hit at t_min may lie half an ulp before it.
         let from = f64::from(query.t_min);
-        let from = from - from.abs() * self.lattice.margins.lag;
+        let from = from - self.lattice.margins.behind(from);
         let Some((mut enter, _)) = track.span(self.lattice.fine_dims(), from, self.limit(query)) else {
             return;
         };
@@ -261,6 +261,9 @@ impl<M: Mailbox> GridOctree<'_, M> {
     ) -> bool {
         let mut test = |prims: &[u32], query: &mut Query<G>, probe: &mut P| {
             for &prim in prims {
+                if !query.asks_for(prim) {
+                    continue;
+                }
                 if !mailbox.first_visit(prim) {
                     probe.repeat_skipped(prim);
                 } else if query.test(prim, probe) {

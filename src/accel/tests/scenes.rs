@@ -10,7 +10,7 @@ pub(crate) fn mesh(vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Shapes {
 }
 
 /// Every third prim lets light through.
-fn seal(mut shapes: Shapes) -> Shapes {
+pub(crate) fn seal(mut shapes: Shapes) -> Shapes {
     shapes.opaque = BitSet::filled(shapes.len(), true);
     for i in (0..shapes.len() as u32).step_by(3) {
         shapes.opaque.set(i, false);

@@ -20,13 +20,15 @@ const MOST_PIECES: usize = 1 << 18;
 const SHALLOW: u32 = 2;
 /// Cells along an axis in which a cluster is looked for.
 const CELLS: usize = 32;
+/// Triangles are crowded when they take up so many times fewer cells than if they were scattered evenly.
+const CROWDED: usize = 8;
 
 /// All that can be suspected, in the order of [`Cause::ALL`].
 pub(super) fn suspects(case: &Case) -> Vec<Suspect> {
     let size = Size::of(&case.scene);
     let found = [
         huge_triangles(case, &size),
-        dense_cluster(case, &size),
+        structure(case, &size),
         shells(case),
         slivers(case, &size),
         alpha_cards(case),
@@ -106,15 +108,33 @@ fn shells(case: &Case) -> Option<Suspect> {
     })
 }
 
-fn dense_cluster(case: &Case, size: &Size) -> Option<Suspect> {
+/// The structure itself: where it divides space of which a small part holds most triangles, that is named.
+fn structure(case: &Case, size: &Size) -> Option<Suspect> {
+    use AccelKind::{FastBvh, FastOctree, Grid, GridBvh, GridOctree, Octree};
     // Both fast structures have tight boxes; which of them is better is for `auto` to say.
-    if matches!(case.accel, AccelKind::FastBvh | AccelKind::FastOctree) || size.count == 0 {
+    if matches!(case.accel, FastBvh | FastOctree) || size.count == 0 {
         return None;
     }
-    // The fewest cells that hold the middles of half of the triangles.
+    let (needed, all) = cells_of_half(&case.scene, size);
+    // Half of the triangles, scattered evenly, lie in a cell each, or in half of all cells.
+    let even = (size.count / 2).min(all / 2);
+    let divides = matches!(case.accel, Grid | GridOctree | GridBvh | Octree);
+    let (cause, evidence) = if divides && needed * CROWDED < even {
+        let part = 100.0 * needed as f64 / all as f64;
+        let held = format!("half of the triangles lie in {part:.2} % of the scene's box, which {} divides", case.accel);
+        (Cause::DenseCluster, held)
+    } else {
+        (Cause::Structure, format!("{} is asked of every ray", case.accel))
+    };
+    let without = Case { accel: FastBvh, ..case.clone() };
+    Some(Suspect { cause, evidence, remedy: "--accel fast-bvh".into(), without })
+}
+
+/// The fewest of so many cells of the scene's box that hold the middles of half of the triangles.
+fn cells_of_half(scene: &Scene, size: &Size) -> (usize, usize) {
     let mut cells = vec![0usize; CELLS * CELLS * CELLS];
     let scale = (size.hi - size.lo).max(DVec3::splat(size.extent() * 1e-9)).recip() * CELLS as f64;
-    for corners in triangles(&case.scene) {
+    for corners in triangles(scene) {
         let place = ((corners.iter().sum::<DVec3>() / 3.0 - size.lo) * scale).to_array();
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` saturates, NaN is 0")]
         let [x, y, z] = place.map(|p| (p as usize).min(CELLS - 1));
@@ -127,13 +147,7 @@ fn dense_cluster(case: &Case, size: &Size) -> Option<Suspect> {
         held += n;
         before * 2 < size.count
     });
-    let part = 100.0 * needed.count() as f64 / cells.len() as f64;
-    Some(Suspect {
-        cause: Cause::DenseCluster,
-        evidence: format!("half of the triangles lie in {part:.2} % of the scene's box, which {} divides", case.accel),
-        remedy: "--accel fast-bvh".into(),
-        without: Case { accel: AccelKind::FastBvh, ..case.clone() },
-    })
+    (needed.count(), cells.len())
 }
 
 fn alpha_cards(case: &Case) -> Option<Suspect> {

@@ -30,14 +30,13 @@ pub(super) fn slimness(corners: &Corners) -> f64 {
     (b - a).cross(c - a).length() / length(corners).powi(2).max(f64::MIN_POSITIVE)
 }
 
-/// The scene in which every triangle for which `limit` gives a length is cut until no edge is longer. The pieces are
-/// flat, whatever the normals were. At most `most` pieces are made.
+/// The scene in which every triangle for which `limit` gives a length is cut until no edge is longer: of each instance those
+/// that are so large where it stands. The pieces are flat, whatever the normals were. At most `most` pieces are made.
 pub(super) fn cut(scene: &Scene, limit: impl Fn(&Corners) -> Option<f64>, most: usize) -> Scene {
     let mut mended = scene.clone();
     let mut made = 0;
-    for (m, mesh) in scene.meshes.iter().enumerate() {
-        // Where it stands first decides how large it is.
-        let Some(instance) = scene.instances.iter().find(|i| i.mesh as usize == m) else { continue };
+    for (i, instance) in scene.instances.iter().enumerate() {
+        let mesh = &scene.meshes[instance.mesh as usize];
         let mut kept = Vec::new();
         let mut pieces = Mesh { material: mesh.material, name: mesh.name.clone(), ..Mesh::default() };
         for triangle in &mesh.triangles {
@@ -53,12 +52,12 @@ pub(super) fn cut(scene: &Scene, limit: impl Fn(&Corners) -> Option<f64>, most: 
         if pieces.triangles.is_empty() {
             continue;
         }
-        mended.meshes[m].triangles = kept;
-        mended.meshes[m].face_of_triangle.clear();
+        // Others of its mesh may be of another size.
+        let rest = Mesh { triangles: kept, face_of_triangle: Vec::new(), ..mesh.clone() };
         let number = u32::try_from(mended.meshes.len()).unwrap_or(u32::MAX);
-        mended.meshes.push(pieces);
-        let copies = scene.instances.iter().filter(|i| i.mesh as usize == m);
-        mended.instances.extend(copies.map(|i| Instance { mesh: number, ..i.clone() }));
+        mended.meshes.extend([rest, pieces]);
+        mended.instances[i].mesh = number;
+        mended.instances.push(Instance { mesh: number + 1, ..instance.clone() });
     }
     mended
 }

@@ -36,6 +36,8 @@ pub enum Cause {
     HugeTriangles,
     /// Most prims lie in a small part of the space that the structure divides.
     DenseCluster,
+    /// Another structure has less to do.
+    Structure,
     /// Triangles that stand on the same corners as others.
     Shells,
     /// Long thin triangles, whose boxes are mostly empty.
@@ -50,9 +52,10 @@ pub enum Cause {
 
 impl Cause {
     /// All of them.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::HugeTriangles,
         Self::DenseCluster,
+        Self::Structure,
         Self::Shells,
         Self::Slivers,
         Self::AlphaCards,
@@ -65,6 +68,7 @@ impl Cause {
         match self {
             Self::HugeTriangles => "huge triangles",
             Self::DenseCluster => "dense cluster",
+            Self::Structure => "structure",
             Self::Shells => "duplicate shells",
             Self::Slivers => "slivers",
             Self::AlphaCards => "alpha cards",
@@ -75,7 +79,7 @@ impl Cause {
 
     /// Whether the picture stays what it is without the cause.
     pub const fn keeps_the_picture(self) -> bool {
-        matches!(self, Self::HugeTriangles | Self::DenseCluster | Self::Shells | Self::Slivers)
+        matches!(self, Self::HugeTriangles | Self::DenseCluster | Self::Structure | Self::Shells | Self::Slivers)
     }
 }
 

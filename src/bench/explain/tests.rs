@@ -109,6 +109,31 @@ fn a_cluster_in_a_large_box_is_found_and_the_hierarchy_recommended() {
 }
 
 #[test]
+fn triangles_are_huge_or_not_where_their_instance_stands() {
+    let turned = |first: f64, second: f64| {
+        let mut scene = scene(vec![(ball(Vec3::ZERO, 0.5, 24), matt()), (ball(Vec3::ZERO, 1.0, 3), matt())]);
+        scene.instances[1].world_from_object = DAffine3::from_scale(DVec3::splat(first));
+        let other = DAffine3::from_scale_rotation_translation(DVec3::splat(second), Default::default(), DVec3::X * 0.4);
+        scene.instances.push(Instance { world_from_object: other, ..scene.instances[1].clone() });
+        let suspects = suspects(&case(scene, AccelKind::FastBvh));
+        let huge = suspects.into_iter().find(|s| s.cause == Cause::HugeTriangles).unwrap();
+        (huge.evidence, mend::triangles(&huge.without.scene).count())
+    };
+    let (large_first, small_first) = (turned(4.0, 0.05), turned(0.05, 4.0));
+    assert!(large_first.1 > 24 * 24 * 2 + 500, "{large_first:?}");
+    assert_eq!(large_first, small_first);
+}
+
+#[test]
+fn a_structure_that_divides_no_space_is_not_said_to_divide_any() {
+    for accel in [AccelKind::None, AccelKind::Spheres, AccelKind::Bvh, AccelKind::Grid] {
+        let found = suspects(&case(scene(vec![(ball(Vec3::ZERO, 0.5, 6), matt())]), accel));
+        assert!(found.iter().all(|s| s.cause != Cause::DenseCluster), "{accel}");
+        assert!(found.iter().any(|s| s.cause == Cause::Structure && s.remedy == "--accel fast-bvh"), "{accel}");
+    }
+}
+
+#[test]
 fn shells_upon_shells_are_found() {
     let parts = (0..6).map(|_| (ball(Vec3::ZERO, 1.0, 24), matt())).collect();
     let found = assert_is_explained_by(&case(scene(parts), AccelKind::FastBvh), Cause::Shells);

@@ -130,8 +130,10 @@ fn law(report: &Report, kind: AccelKind, cost: Cost, class: Option<Class>) -> Va
 
 fn structure(model: &Model, row: &Row) -> Value {
     let s = row.made_of;
-    let class =
-        |(i, c): (usize, &ClassRow)| (model.rays[i].class.name().to_owned(), class(c, row.sampled, model.prims));
+    let class = |(i, c): (usize, &ClassRow)| {
+        let set = &model.rays[i];
+        (set.class.name().to_owned(), class(c, row.sampled || set.asked > c.counts.queries, model.prims))
+    };
     json!({
         "accel": row.kind.name(),
         "setting": row.setting.map(|s| json!({ "value": s.value, "is_default": s.is_default })),

@@ -24,8 +24,14 @@ pub struct Curve<'a> {
 pub fn curves<'a>(report: &Report, model: &'a Model) -> Vec<Curve<'a>> {
     let curve = |&kind: &AccelKind| {
         let rows: Vec<&Row> = model.rows.iter().filter(|r| r.kind == kind && r.setting.is_some()).collect();
-        let best = rows.iter().copied().min_by(|a, b| worth(report, model, a).total_cmp(&worth(report, model, b)))?;
-        let default = rows.iter().copied().find(|r| r.setting.is_some_and(|s| s.is_default));
+        let is_default = |row: &Row| row.setting.is_some_and(|s| s.is_default);
+        let default = rows.iter().copied().find(|row| is_default(row));
+        // Of equals the default.
+        let rank = |row: &&Row| (worth(report, model, row), !is_default(row));
+        let best = rows.iter().copied().min_by(|a, b| {
+            let ((a, other), (b, others)) = (rank(a), rank(b));
+            a.total_cmp(&b).then(other.cmp(&others))
+        })?;
         Some(Curve { kind, rows, best, default })
     };
     report.plan.kinds.iter().filter_map(curve).collect()
@@ -74,20 +80,22 @@ impl Curve<'_> {
                 format!("{kind}: {best} is best, {told}, {saved:.1} % less than the default, {than}{doubt}")
             }
         };
-        if let Some(end) = self.end() {
+        if let Some(end) = self.end(report, model) {
             text += &format!("; it is the {end} value measured, so the best may lie beyond");
         }
         text
     }
 
-    /// Which end of the values the best is at; the default is no end.
-    fn end(&self) -> Option<&'static str> {
+    /// Which end of the values the best is at, where the next one is worse; the default is no end.
+    fn end(&self, report: &Report, model: &Model) -> Option<&'static str> {
         let best = self.best.setting.filter(|s| !s.is_default)?.value?;
-        let values: Vec<f64> = self.rows.iter().filter_map(|r| r.setting?.value).collect();
-        match (values.first(), values.last()) {
-            _ if values.len() < 2 => None,
-            (Some(&first), _) if first == best => Some("lowest"),
-            (_, Some(&last)) if last == best => Some("highest"),
+        let rows: Vec<&Row> =
+            self.rows.iter().copied().filter(|r| r.setting.is_some_and(|s| s.value.is_some())).collect();
+        let is_best = |row: &Row| row.setting.is_some_and(|s| s.value == Some(best));
+        let is_worse = |row: &Row| worth(report, model, row) > worth(report, model, self.best);
+        match rows[..] {
+            [first, second, ..] if is_best(first) && is_worse(second) => Some("lowest"),
+            [.., second, last] if is_best(last) && is_worse(second) => Some("highest"),
             _ => None,
         }
     }

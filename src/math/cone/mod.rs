@@ -71,6 +71,12 @@ impl Cone {
         }
     }
 
+    /// The longest of its axis, measured along the coordinate axis along which it is longest, and its radii.
+    pub fn size(&self) -> f32 {
+        let length = (self.apex - self.base).abs().max_element();
+        length.max(self.base_radius).max(self.apex_radius).min(f32::MAX)
+    }
+
     /// The point of the mantle nearest to `p`, which is near to it, relative to the base; the size of what was rounded
     /// on the way; and the unit normal there, outwards.
     pub fn project(&self, p: DVec3) -> (DVec3, f64, DVec3) {

@@ -1,7 +1,7 @@
 //! Verdicts and distances where numbers are bad. Two more are elsewhere: P4 (moved far away) with whole pictures in the
 //! tests of the program, P9 (spheres) beside the sphere's test.
 
-use super::super::scenes::{mesh, moved, ray, rays, soup, star};
+use super::super::scenes::{mesh, moved, ray, rays, seal, soup, star};
 use super::*;
 use crate::math::random::Random;
 use crate::math::triangle;
@@ -163,5 +163,29 @@ fn tests_in_double_precision_hit_the_same_prims_away_from_edges() {
             let near_edge = [a.u, a.v, 1.0 - a.u - a.v].iter().any(|w| *w < 1e-9);
             assert!(near_edge || (a.prim == b.prim && (a.t - b.t).abs() <= a.t * f32::EPSILON), "{ray:?} {a:?} {b:?}");
         }
+    }
+}
+
+/// Spheres and cylinders that a ray meets where it starts, nearly: what is left of c = |f|² − r² is all that tells how near.
+#[test]
+fn round_shapes_that_touch_the_start_of_a_ray_are_where_every_structure_finds_them() {
+    let mut r = Random::new(58);
+    for exponent in [-8, -12, -17, -24, -29, -33, -40] {
+        let gap = libm::powf(10.0, exponent as f32);
+        let at = |y: f32, z: f32| Vec3::new(-0.9 * gap, y, z);
+        let mut shapes = mesh(vec![at(-0.3, -0.2), at(0.3, -0.2), at(0.0, 0.4)], vec![[0, 1, 2]]);
+        let sphere = |x: f32, y: f32| SpherePrim { center: Vec3::new(x, y, 0.0), radius: 0.25 };
+        shapes.spheres = vec![sphere(0.25, 0.0), sphere(-0.25, 0.4), sphere(-0.25, -0.4)];
+        let across = Vec3::new(0.25, 0.3, 0.0);
+        let around =
+            Cone { base: across * Vec3::new(1.0, -1.0, 1.0), base_radius: 0.25, apex: across, apex_radius: 0.25 };
+        shapes.cones = vec![around];
+        let shapes = seal(shapes);
+        let aim = |r: &mut Random| {
+            let beside = Vec3::new(0.0, r.unit() - 0.5, r.unit() - 0.5) * gap;
+            ray(Vec3::NEG_X * (gap * (0.5 + r.unit())) + beside, Vec3::new(1.0, r.unit() - 0.5, r.unit() - 0.5))
+        };
+        let rays: Vec<Ray> = (0..count(400, 20_000)).map(|_| aim(&mut r)).collect();
+        assert_all_agree(&format!("10^{exponent} apart"), &shapes, &rays);
     }
 }
