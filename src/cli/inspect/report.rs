@@ -2,10 +2,10 @@
 
 use super::super::text::grouped;
 use super::topology::Topology;
-use crate::accel::{AccelKind, AccelParams, AnyAccel};
+use crate::accel::{AccelChoice, AccelParams};
 use crate::load::{AnimationFacts, Loaded, WireFacts};
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
-use crate::render::World;
+use crate::render::{Instancing, World};
 use crate::scene::features::Features;
 use crate::scene::framing::{Bounds, robust_bounds};
 use crate::scene::{LightKind, Mesh, Pixels, Projection, Scene, UpAxis};
@@ -29,18 +29,22 @@ pub(super) struct Report<'a> {
 const SHOWN: usize = 8;
 
 impl<'a> Report<'a> {
-    /// Looks the scene through; builds the default structure to know its size.
+    /// Looks the scene through; builds the structure that rendering would, to know its size.
     pub(super) fn new(file: &'a Path, loaded: &'a Loaded) -> Self {
         let scene = &loaded.scene;
         let world = World::new(scene);
-        let structure = AnyAccel::build(AccelKind::default(), &world.shapes, &AccelParams::DEFAULT).summary();
+        // Only what stands in several places may be kept once.
+        let kept = scene.instances.len() > scene.meshes.len();
+        let kept = kept.then(|| World::placing(scene, Instancing::Auto));
+        let rendered = kept.as_ref().unwrap_or(&world);
+        let structure = rendered.structure(AccelChoice::Auto, &AccelParams::DEFAULT).0.summary();
         Self {
             file,
             loaded,
             bounds: robust_bounds(scene),
             topology: Topology::of(&world.shapes),
             features: Features::of(scene),
-            scene_bytes: scene_bytes(scene, &world),
+            scene_bytes: scene_bytes(scene, rendered),
             structure_bytes: structure.bytes,
             world,
         }
@@ -304,10 +308,8 @@ fn scene_bytes(scene: &Scene, world: &World) -> u64 {
         Pixels::Rgba8(texels) => texels.len() * 4,
         Pixels::Rgba16(texels) => texels.len() * 8,
     };
-    let shapes = &world.shapes;
-    let flat = shapes.vertices.len() * size_of::<Vec3>() + shapes.triangles.len() * size_of::<[u32; 3]>();
     let meshes: usize = scene.meshes.iter().map(mesh).sum();
-    (meshes + scene.bitmaps.iter().map(|b| pixels(&b.pixels)).sum::<usize>() + flat) as u64
+    (meshes + scene.bitmaps.iter().map(|b| pixels(&b.pixels)).sum::<usize>() + world.bytes()) as u64
 }
 
 #[cfg(test)]
