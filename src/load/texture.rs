@@ -51,19 +51,16 @@ pub fn decode_all(
         })
         .collect();
     let spent = Spent { wall: start.elapsed(), cpu: decoded.iter().map(|d| d.1).sum() };
-    let mut warn = |image: &Encoded, Unusable { why, remedy }: Unusable| {
-        let text = format!("image '{}' cannot be used: {why}", super::paths::shorten(&image.name));
-        let remedy = format!("the material is drawn without it; {remedy}");
-        warnings.push(Diagnostic::new("image-unusable", file, &image.place, text).remedy(remedy));
-    };
+    let mut warn = |image: &Encoded, why: Unusable| warnings.push(why.warning(&image.name, file, &image.place));
     let usable =
         |(image, (result, _)): (&Encoded, (Result<Bitmap, Unusable>, _))| result.map_err(|why| warn(image, why)).ok();
     (images.iter().zip(decoded).map(usable).collect(), spent)
 }
 
 /// Why a picture cannot be used, and what helps.
-struct Unusable {
-    why: String,
+#[derive(Debug)]
+pub(super) struct Unusable {
+    pub why: String,
     remedy: &'static str,
 }
 
@@ -74,6 +71,13 @@ impl Unusable {
 
     fn too_large(why: impl Into<String>) -> Self {
         Self { why: why.into(), remedy: "allow more with --max-memory" }
+    }
+
+    /// What is told of the image of this name, which `file` names at `place`.
+    pub(super) fn warning(self, name: &str, file: &Path, place: &str) -> Diagnostic {
+        let text = format!("image '{}' cannot be used: {}", super::paths::shorten(name), self.why);
+        let remedy = format!("the material is drawn without it; {}", self.remedy);
+        Diagnostic::new("image-unusable", file, place, text).remedy(remedy)
     }
 }
 
@@ -124,7 +128,7 @@ pub(super) fn within(bytes: u64) -> ::image::Limits {
 fn check_size(bytes: &[u8], limits: &Limits, budget: &mut Budget) -> Result<Kind, Unusable> {
     if ktx::is(bytes) {
         let ktx::Size { width, height, between } = ktx::size(bytes)?;
-        take(width, height, (4, between), limits, budget)?;
+        take_memory(width, height, (4, between), limits, budget)?;
         return Ok(Kind::Ktx);
     }
     let format = ::image::guess_format(bytes).map_err(|_| unknown_kind(bytes))?;
@@ -136,12 +140,12 @@ fn check_size(bytes: &[u8], limits: &Limits, budget: &mut Budget) -> Result<Kind
     let decoder = reader.into_decoder()?;
     let (width, height) = decoder.dimensions();
     let texel = if is_deep(decoder.color_type()) { 8 } else { 4 };
-    take(width, height, (texel, 0), limits, budget)?;
+    take_memory(width, height, (texel, 0), limits, budget)?;
     Ok(Kind::Image { format, bytes: decoder.total_bytes().saturating_add(BESIDE.min(budget.left())) })
 }
 
-/// Takes what a picture needs: so many bytes a pixel, and so many more while it is decoded.
-fn take(
+/// Takes what a picture needs: so many bytes a pixel, those of its smaller copies, and so many more while it is decoded.
+pub(super) fn take_memory(
     width: u32,
     height: u32,
     (texel, more): (u64, u64),

@@ -213,7 +213,8 @@ fn make(
     let mut meaning =
         Meaning { mtl, mode, file: library.file, warnings: reading.warnings, has_map: &has_map, all_invisible };
     let mut material = meaning.material();
-    Mapper { textures, library: &library, mtl, mode, warnings: reading.warnings }.apply(&mut material);
+    let (limits, budget) = (&reading.options.limits, &mut *reading.budget);
+    Mapper { textures, library: &library, mtl, mode, limits, budget, warnings: reading.warnings }.apply(&mut material);
     material
 }
 

@@ -4,6 +4,8 @@
 //! perhaps a channel, for each.
 
 use super::options::Channel;
+use crate::load::limits::{Budget, Limits};
+use crate::load::texture::{Unusable, take_memory};
 use crate::scene::color::to_srgb;
 use crate::scene::{Bitmap, Pixels};
 use std::collections::HashMap;
@@ -62,9 +64,15 @@ impl Pictures {
     }
 
     /// Index into [`Self::finish`]'s bitmaps of what is taken; made when first asked for.
-    pub(super) fn take(&mut self, take: Take) -> u32 {
+    ///
+    /// # Errors
+    /// When it would be larger than `limits` allow, or than what is left of `budget`.
+    pub(super) fn take(&mut self, take: Take, limits: &Limits, budget: &mut Budget) -> Result<u32, Unusable> {
         if let Some(&known) = self.known.get(&take) {
-            return known;
+            return Ok(known);
+        }
+        if let Some(((width, height), texel)) = self.size(take) {
+            take_memory(width, height, (texel, 0), limits, budget)?;
         }
         let made = match take {
             Take::Whole(i) => Made::Source(i),
@@ -79,7 +87,32 @@ impl Pictures {
         let index = self.made.len() as u32;
         self.made.push(made);
         self.known.insert(take, index);
-        index
+        Ok(index)
+    }
+
+    /// Width and height of what has to be made, and bytes of a texel; `None`: it is there.
+    fn size(&self, take: Take) -> Option<((u32, u32), u64)> {
+        let size = |i: usize| (self.sources[i].width, self.sources[i].height);
+        match take {
+            Take::Whole(_) => None,
+            Take::Opaque(i) | Take::Channel(i, _) | Take::Inverse(i, _) => {
+                let is_deep = matches!(self.sources[i].pixels, Pixels::Rgba16(_));
+                Some((size(i), if is_deep { 8 } else { 4 }))
+            }
+            Take::RoughMetal(rough, metal) => Some((self.size_of_pair([rough, metal]), 4)),
+            Take::Coded(i, _) => Some((size(i), 8)),
+            Take::Grain(strength, turn, _) => Some((self.size_of_pair([strength, turn]), 8)),
+        }
+    }
+
+    /// Names of the pictures that something is made of, for messages.
+    pub(super) fn name(&self, take: Take) -> String {
+        match take {
+            Take::Whole(i) | Take::Opaque(i) | Take::Channel(i, _) | Take::Inverse(i, _) | Take::Coded(i, _) => {
+                self.sources[i].name.clone()
+            }
+            Take::RoughMetal(first, second) | Take::Grain(first, second, _) => self.name_of_pair([first, second]),
+        }
     }
 
     /// The bitmaps that were taken.
@@ -135,35 +168,36 @@ impl Pictures {
     /// In sixteen bits, so that coding loses nothing.
     fn coded(&self, i: usize, channel: Channel) -> Bitmap {
         let Bitmap { name, width, height, .. } = &self.sources[i];
-        let mut pixels = Vec::new();
+        let mut pixels = Vec::with_capacity(*width as usize * *height as usize);
         each(&self.sources[i], |p| pixels.push(to16(grey(to_srgb(pick(p, channel))))));
         Bitmap { name: name.clone(), width: *width, height: *height, pixels: Pixels::Rgba16(pixels) }
     }
 
     fn rough_metal(&self, rough: Option<(usize, Channel)>, metal: Option<(usize, Channel)>) -> Bitmap {
-        let (bitmap, values) = self.pair([rough, metal]);
-        let pixels =
-            values.into_iter().map(|[rough, metal]| to8([1.0, rough.unwrap_or(1.0), metal.unwrap_or(1.0), 1.0]));
-        Bitmap { pixels: Pixels::Rgba8(pixels.collect()), ..bitmap }
+        let texel = |[rough, metal]: [Option<f32>; 2]| to8([1.0, rough.unwrap_or(1.0), metal.unwrap_or(1.0), 1.0]);
+        self.pair([rough, metal], texel, Pixels::Rgba8)
     }
 
     /// In sixteen bits, so that a grain that is not turned is not turned.
     fn grain(&self, strength: Option<(usize, Channel)>, turn: Option<(usize, Channel)>, most: f64) -> Bitmap {
-        let (bitmap, values) = self.pair([strength, turn]);
         #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
         let texel = |[strength, turn]: [Option<f32>; 2]| {
             let (sin, cos) = libm::sincos(f64::from(turn.unwrap_or(0.0)) * most * std::f64::consts::TAU);
             to16([0.5 + 0.5 * cos as f32, 0.5 + 0.5 * sin as f32, strength.unwrap_or(1.0), 1.0])
         };
-        Bitmap { pixels: Pixels::Rgba16(values.into_iter().map(texel).collect()), ..bitmap }
+        self.pair([strength, turn], texel, Pixels::Rgba16)
     }
 
-    /// The values of two pictures at each texel, and a bitmap for them without pixels.
+    /// A bitmap made of the values of two pictures at each texel.
     ///
     /// The smaller picture is repeated texel by texel to the larger one's size.
-    fn pair(&self, [first, second]: [Option<(usize, Channel)>; 2]) -> (Bitmap, Vec<[Option<f32>; 2]>) {
-        let sizes = [first, second].into_iter().flatten().map(|(i, _)| (self.sources[i].width, self.sources[i].height));
-        let (width, height) = sizes.fold((1, 1), |(w, h), (x, y)| (w.max(x), h.max(y)));
+    fn pair<T>(
+        &self,
+        [first, second]: [Option<(usize, Channel)>; 2],
+        make: impl Fn([Option<f32>; 2]) -> T,
+        pixels: impl Fn(Vec<T>) -> Pixels,
+    ) -> Bitmap {
+        let (width, height) = self.size_of_pair([first, second]);
         let read = |source: Option<(usize, Channel)>, x: u32, y: u32| match source {
             Some((i, channel)) => {
                 let bitmap = &self.sources[i];
@@ -174,11 +208,20 @@ impl Pictures {
             }
             None => None,
         };
-        let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
-        let values = texels.map(|(x, y)| [read(first, x, y), read(second, x, y)]).collect();
-        let names = [first, second].into_iter().flatten().map(|(i, _)| self.sources[i].name.as_str());
-        let name = names.collect::<Vec<_>>().join(" + ");
-        (Bitmap { name, width, height, pixels: Pixels::Rgba8(Vec::new()) }, values)
+        let mut texels = Vec::with_capacity(width as usize * height as usize);
+        let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        texels.extend(places.map(|(x, y)| make([read(first, x, y), read(second, x, y)])));
+        Bitmap { name: self.name_of_pair([first, second]), width, height, pixels: pixels(texels) }
+    }
+
+    fn size_of_pair(&self, sources: [Option<(usize, Channel)>; 2]) -> (u32, u32) {
+        let sizes = sources.into_iter().flatten().map(|(i, _)| (self.sources[i].width, self.sources[i].height));
+        sizes.fold((1, 1), |(w, h), (x, y)| (w.max(x), h.max(y)))
+    }
+
+    fn name_of_pair(&self, sources: [Option<(usize, Channel)>; 2]) -> String {
+        let names = sources.into_iter().flatten().map(|(i, _)| self.sources[i].name.as_str());
+        names.collect::<Vec<_>>().join(" + ")
     }
 }
 
@@ -256,6 +299,12 @@ mod tests {
         pictures.finish().into_iter().map(texels).collect()
     }
 
+    /// Takes something with the usual limits.
+    fn make(pictures: &mut Pictures, take: Take) -> u32 {
+        let limits = Limits::default();
+        pictures.take(take, &limits, &mut Budget::new(&limits)).ok().unwrap()
+    }
+
     #[test]
     fn channels_move_to_where_materials_read_them() {
         let mut p = pictures(&[(1, 1, &[[10, 20, 30, 40]])]);
@@ -267,7 +316,7 @@ mod tests {
             (Take::RoughMetal(Some((0, Channel::Red)), None), [255, 10, 255, 255]),
         ];
         for (i, (take, _)) in (0..).zip(takes) {
-            assert_eq!((p.take(take), p.take(take)), (i, i), "made once");
+            assert_eq!((make(&mut p, take), make(&mut p, take)), (i, i), "made once");
         }
         assert_eq!(texels(p), takes.map(|(_, expected)| vec![expected]));
     }
@@ -275,7 +324,7 @@ mod tests {
     #[test]
     fn roughness_and_metal_of_different_sizes_share_a_bitmap() {
         let mut p = pictures(&[(2, 1, &[[1; 4], [2; 4]]), (1, 2, &[[3; 4], [4; 4]])]);
-        p.take(Take::RoughMetal(Some((0, Channel::Red)), Some((1, Channel::Red))));
+        make(&mut p, Take::RoughMetal(Some((0, Channel::Red)), Some((1, Channel::Red))));
         assert_eq!(texels(p), [[[255, 1, 3, 255], [255, 2, 3, 255], [255, 1, 4, 255], [255, 2, 4, 255]]]);
     }
 
@@ -286,7 +335,7 @@ mod tests {
         let takes =
             [Take::Coded(0, Channel::Red), Take::Grain(red, None, quarter), Take::Grain(None, red, 5f64.to_bits())];
         for take in takes {
-            p.take(take);
+            make(&mut p, take);
         }
         let wide = |bitmap: Bitmap| match bitmap.pixels {
             Pixels::Rgba16(texels) => texels.into_iter().map(|t| t.map(|c| f32::from(c) / 65535.0)).collect(),
@@ -298,6 +347,28 @@ mod tests {
         let near = |texel: [f32; 4], expected: [f32; 3]| (0..3).all(|k| (texel[k] - expected[k]).abs() < 1e-4);
         assert!(near(made[1][0], [1.0, 0.5, 0.2]), "a strength turns nothing: {:?}", made[1]);
         assert!(near(made[2][0], [1.0, 0.5, 1.0]), "a fifth of five turns is a whole one: {:?}", made[2]);
+    }
+
+    #[test]
+    fn what_is_made_is_charged_before_it_is_made() {
+        // A row and a column, of which a pair is as wide as the one and as high as the other.
+        let mut p = pictures(&[(3000, 1, &[[1; 4]; 3000]), (1, 3000, &[[2; 4]; 3000])]);
+        let (row, column) = (Some((0, Channel::Red)), Some((1, Channel::Red)));
+        let pair = 3000 * 3000 * 4 + 3_000_000 * 8;
+        let mut budget = Budget::new(&Limits { memory: pair, ..Limits::default() });
+        let small = Limits { image_pixels: 3000 * 3000 - 1, ..Limits::default() };
+        let over = p.take(Take::RoughMetal(row, column), &small, &mut budget).unwrap_err();
+        assert!(over.why.contains("3000×3000 pixels"), "{}", over.why);
+        assert!(p.take(Take::RoughMetal(row, column), &Limits::default(), &mut budget).is_ok());
+        assert_eq!((budget.left(), p.name(Take::Grain(row, column, 0)).as_str()), (0, "p + p"));
+        for take in
+            [Take::Opaque(0), Take::Coded(0, Channel::Red), Take::Grain(row, None, 0), Take::Inverse(0, Channel::Red)]
+        {
+            assert!(p.take(take, &Limits::default(), &mut budget).is_err(), "{take:?}");
+        }
+        // What is there already costs nothing.
+        assert!(p.take(Take::Whole(0), &Limits::default(), &mut budget).is_ok());
+        assert!(p.take(Take::RoughMetal(row, column), &Limits::default(), &mut budget).is_ok());
     }
 
     #[test]

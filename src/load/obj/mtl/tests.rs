@@ -210,3 +210,21 @@ fn files_outside_the_models_folder_are_refused_with_the_root_that_would_do() {
     assert_eq!(codes(&loaded), ["file-outside-root"]);
     assert!(loaded.warnings[0].remedy.contains("--root"));
 }
+
+#[test]
+fn pictures_that_are_made_take_from_the_memory_that_may_be_taken() {
+    let dir = tempfile::tempdir().unwrap();
+    ::image::GrayImage::new(3000, 1).save(dir.path().join("row.png")).unwrap();
+    ::image::GrayImage::new(1, 3000).save(dir.path().join("column.png")).unwrap();
+    fs::write(dir.path().join("m.mtl"), "newmtl a\nKd 1 1 1\nmap_Pr row.png\nmap_Pm column.png\n").unwrap();
+    let source = Source { path: dir.path().join("m.obj"), bytes: OBJ.as_bytes().to_vec() };
+    let mut options = LoadOptions::default();
+    options.limits.memory = 10_000_000;
+    let loaded = crate::load::obj::load(&source, &options).unwrap();
+    assert_eq!(codes(&loaded), ["image-unusable"]);
+    let told = loaded.warnings[0].to_string();
+    let expected = "m.mtl:3: image 'row.png + column.png' cannot be used: 60000000 bytes are needed where";
+    assert!(told.contains(expected) && told.ends_with("drawn without it; allow more with --max-memory"), "{told}");
+    let Surface::MetalRough(m) = &loaded.scene.materials[0].surface else { panic!("not metal") };
+    assert!(m.metal_rough_map.is_none() && loaded.scene.bitmaps.is_empty());
+}

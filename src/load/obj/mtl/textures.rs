@@ -5,7 +5,7 @@ use super::options::{Channel, Map};
 use super::parse::{Mtl, Slot};
 use super::pictures::{Alpha, Pictures, Take};
 use crate::load::limits::{Budget, Limits};
-use crate::load::texture::{Encoded, decode_all};
+use crate::load::texture::{Encoded, Unusable, decode_all};
 use crate::load::{Diagnostic, MtlMode, Warnings};
 use crate::math::Vec2;
 use crate::scene::{AlphaMode, Bitmap, Material, MetalRough, Sampler, Surface, Texture, TextureRef, UvTransform, Wrap};
@@ -106,8 +106,13 @@ impl Textures {
     }
 
     /// A texture that shows `take` as the options of `map` say.
-    fn texture(&mut self, take: Take, map: &Map) -> TextureRef {
-        let bitmap = self.pictures.take(take);
+    fn texture(
+        &mut self,
+        take: Take,
+        map: &Map,
+        (limits, budget): (&Limits, &mut Budget),
+    ) -> Result<TextureRef, Unusable> {
+        let bitmap = self.pictures.take(take, limits, budget)?;
         let wrap = if map.clamp { Wrap::Clamp } else { Wrap::Repeat };
         let wanted = Texture { bitmap, sampler: Sampler { wrap_u: wrap, wrap_v: wrap, ..Sampler::default() } };
         let known = self.textures.iter().position(|t| *t == wanted);
@@ -124,7 +129,7 @@ impl Textures {
         };
         #[expect(clippy::cast_possible_truncation, reason = "a handful of textures for each material")]
         let texture = index as u32;
-        TextureRef { texture, uv_set: 0, transform }
+        Ok(TextureRef { texture, uv_set: 0, transform })
     }
 }
 
@@ -134,6 +139,8 @@ pub(super) struct Mapper<'a> {
     pub library: &'a Library<'a>,
     pub mtl: &'a Mtl,
     pub mode: MtlMode,
+    pub limits: &'a Limits,
+    pub budget: &'a mut Budget,
     pub warnings: &'a mut Warnings,
 }
 
@@ -167,11 +174,21 @@ impl Mapper<'_> {
         Some((map, self.textures.picture(self.library.number, self.mtl, slot)?))
     }
 
+    /// A texture that shows `take` as the options of `map` say; `None`, with a warning, where it takes too much memory.
+    fn texture(&mut self, take: Take, map: &Map) -> Option<TextureRef> {
+        let made = self.textures.texture(take, map, (self.limits, self.budget));
+        let warn = |why: Unusable| {
+            let name = self.textures.pictures.name(take);
+            self.warnings.push(why.warning(&name, self.library.file, &map.line.to_string()));
+        };
+        made.map_err(warn).ok()
+    }
+
     fn whole(&mut self, slot: Slot) -> Option<TextureRef> {
         let (map, picture) = self.picture(slot)?;
         let map = map.clone();
         self.options(&map);
-        Some(self.textures.texture(Take::Whole(picture), &map))
+        self.texture(Take::Whole(picture), &map)
     }
 
     /// A map of one number: the channel asked for, or the brightness.
@@ -180,7 +197,7 @@ impl Mapper<'_> {
         let map = map.clone();
         self.options(&map);
         let take = self.brightness(picture, map.channel);
-        Some(self.textures.texture(take, &map))
+        self.texture(take, &map)
     }
 
     fn brightness(&self, picture: usize, channel: Option<Channel>) -> Take {
@@ -198,8 +215,10 @@ impl Mapper<'_> {
         let diffuse = self.picture(Slot::Diffuse).map(|(map, picture)| (map.clone(), picture));
         let alpha = diffuse.as_ref().map_or(Alpha::Solid, |(_, picture)| self.textures.pictures.alpha(*picture));
         let (dissolve, by_diffuse) = self.dissolve(diffuse.as_ref().map(|d| d.1));
-        if let Some((take, map)) = dissolve {
-            material.opacity_map = Some(self.textures.texture(take, &map));
+        if let Some((take, map)) = dissolve
+            && let Some(texture) = self.texture(take, &map)
+        {
+            material.opacity_map = Some(texture);
             material.alpha_mode = AlphaMode::Blend;
         }
         let own_map = material.opacity_map.is_some();
@@ -214,7 +233,7 @@ impl Mapper<'_> {
             self.options(&map);
             let solid = alpha == Alpha::Solid || by_diffuse || guessed || material.alpha_mode == AlphaMode::Opaque;
             let take = if solid { Take::Whole(picture) } else { Take::Opaque(picture) };
-            material.base_color_map = Some(self.textures.texture(take, &map));
+            material.base_color_map = self.texture(take, &map);
         }
     }
 
@@ -246,7 +265,7 @@ impl Mapper<'_> {
         if let Some((map, picture)) = self.picture(Slot::Normal) {
             let map = map.clone();
             material.normal_scale = strength(&map);
-            material.normal_map = Some(self.textures.texture(Take::Whole(picture), &map));
+            material.normal_map = self.texture(Take::Whole(picture), &map);
         }
         // Faces stay where the file has them: what is proven of hits is proven of those.
         let displaced = self.picture(Slot::Bump).is_none();
@@ -264,7 +283,7 @@ impl Mapper<'_> {
         if guessing && !displaced && material.normal_map.is_none() && self.textures.pictures.is_normal_map(picture) {
             self.guess("mtl-normal-as-bump", "a bump map is a normal map by its texels and used as one");
             material.normal_scale = strength(&map);
-            material.normal_map = Some(self.textures.texture(Take::Whole(picture), &map));
+            material.normal_map = self.texture(Take::Whole(picture), &map);
             return;
         }
         if guessing {
@@ -274,15 +293,16 @@ impl Mapper<'_> {
         #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
         let unit = if guessing { BUMP_HEIGHT as f32 } else { 1.0 };
         material.bump_scale = strength(&map) * unit;
-        material.bump_map = Some(self.textures.texture(take, &map));
+        material.bump_map = self.texture(take, &map);
     }
 
     /// Maps of sheen, lacquer and grain.
     fn lobes(&mut self, m: &mut MetalRough) {
         if let Some(sheen) = &mut m.sheen {
-            sheen.color_map = self.picture(Slot::Sheen).map(|(map, picture)| (map.clone(), picture)).map(|(map, i)| {
-                let take = Take::Coded(i, map.channel.unwrap_or(Channel::Luminance));
-                self.textures.texture(take, &map)
+            let named = self.picture(Slot::Sheen).map(|(map, picture)| (map.clone(), picture));
+            sheen.color_map = named.and_then(|(map, picture)| {
+                let take = Take::Coded(picture, map.channel.unwrap_or(Channel::Luminance));
+                self.texture(take, &map)
             });
         }
         if let Some(coat) = &mut m.coat {
@@ -301,14 +321,14 @@ impl Mapper<'_> {
         let map = strength.or(turn)?.0.clone();
         let most = self.mtl.anisor.filter(|turns| *turns != 0.0 || self.mode == MtlMode::Literal).unwrap_or(1.0);
         let take = Take::Grain(strength.map(channel), turn.map(channel), most.to_bits());
-        Some(self.textures.texture(take, &map))
+        self.texture(take, &map)
     }
 
     /// The occlusion in a map that has it in blue.
     fn occlusion(&mut self) -> Option<TextureRef> {
         let (map, picture) = self.picture(Slot::RoughMetalOcclusion)?;
         let map = map.clone();
-        Some(self.textures.texture(Take::Channel(picture, Channel::Blue), &map))
+        self.texture(Take::Channel(picture, Channel::Blue), &map)
     }
 
     /// Roughness and metal in one texture; both go by the options of the first there is.
@@ -316,13 +336,13 @@ impl Mapper<'_> {
         if let Some((map, picture)) = self.picture(Slot::RoughMetalOcclusion) {
             let map = map.clone();
             let take = Take::RoughMetal(Some((picture, Channel::Red)), Some((picture, Channel::Green)));
-            return Some(self.textures.texture(take, &map));
+            return self.texture(take, &map);
         }
         let channel = |(map, picture): (&Map, usize)| (picture, map.channel.unwrap_or(Channel::Luminance));
         let (rough, metal) = (self.picture(Slot::Roughness), self.picture(Slot::Metallic));
         let map = rough.or(metal)?.0.clone();
         let take = Take::RoughMetal(rough.map(channel), metal.map(channel));
-        Some(self.textures.texture(take, &map))
+        self.texture(take, &map)
     }
 
     fn options(&mut self, map: &Map) {
