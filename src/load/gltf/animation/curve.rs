@@ -45,16 +45,22 @@ pub(super) struct Between {
 impl Between {
     /// Finds `time` among ascending times, of which there is at least one. Outside them the nearest key counts, and of
     /// two at one time the later.
+    ///
+    /// Times are stored as `f32`: a moment that is a key's when rounded has reached it, or every other frame of a
+    /// sequence would show the key before.
     pub(super) fn of(times: &[f32], time: f64) -> Self {
+        #[expect(clippy::cast_possible_truncation, reason = "compared as stored")]
+        let stored = time as f32;
         // The first key behind the moment.
-        let after = times.partition_point(|&t| f64::from(t) <= time);
+        let after = times.partition_point(|&t| t <= stored);
         let at = |key: usize| times.get(key).copied().map_or(0.0, f64::from);
         match after.checked_sub(1) {
             None => Self::at_key(0),
             Some(before) if after == times.len() => Self::at_key(before),
             Some(before) => {
                 let span = at(after) - at(before);
-                Self { before, after, span, part: (time - at(before)) / span }
+                // A key that rounding has reached may lie a little behind the moment.
+                Self { before, after, span, part: ((time - at(before)) / span).max(0.0) }
             }
         }
     }
@@ -153,6 +159,15 @@ mod tests {
         assert_eq!(Between::of(&[0.0], 7.0), Between::at_key(0));
         assert_eq!(Between::of(&[0.0, 1.0, 1.0, 2.0], 1.5), Between { before: 2, after: 3, span: 1.0, part: 0.5 });
         assert_eq!(Between::of(&[1.0, 1.0], 1.0), Between::at_key(1));
+    }
+
+    #[test]
+    fn a_frame_that_falls_on_a_key_when_rounded_shows_that_key() {
+        let times: Vec<f32> = (0..1000).map(|k| k as f32 / 24.0).collect();
+        for k in 0..1000 {
+            let between = Between::of(&times, f64::from(k) / 24.0);
+            assert_eq!((between.before, between.part < 1e-4), (k as usize, true), "frame {k}: {between:?}");
+        }
     }
 
     #[test]
