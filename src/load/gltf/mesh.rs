@@ -257,10 +257,18 @@ impl Task<'_, '_> {
     /// Adds the morph targets that have weight.
     fn morph(&mut self, mesh: &mut Mesh) {
         let primitive = self.job.primitive;
+        let mut changed = false;
         for (k, target) in primitive.targets.iter().flatten().enumerate() {
             if self.job.reads_target(k) {
                 self.add_target(mesh, target, k, self.job.weight(k));
+                changed |= self.job.weight(k) != 0.0;
             }
+        }
+        // Sums with unit vectors are no longer unit, once all is added; that is no fault of the file.
+        if changed {
+            mesh.normals.iter_mut().for_each(|n| *n = n.try_normalize().unwrap_or(*n));
+            let unit = |t: &mut Vec4| *t = t.truncate().try_normalize().map_or(*t, |d| d.extend(t.w));
+            mesh.tangents.iter_mut().for_each(unit);
         }
     }
 
@@ -282,12 +290,6 @@ impl Task<'_, '_> {
                 "NORMAL" => mesh.normals.iter_mut().zip(deltas).for_each(|(n, d)| *n += d),
                 _ => mesh.tangents.iter_mut().zip(deltas).for_each(|(t, d)| *t += d.extend(0.0)),
             }
-        }
-        // Sums of unit vectors are no longer unit; that is no fault of the file.
-        if weight != 0.0 {
-            mesh.normals.iter_mut().for_each(|n| *n = n.try_normalize().unwrap_or(*n));
-            let unit = |t: &mut Vec4| *t = t.truncate().try_normalize().map_or(*t, |d| d.extend(t.w));
-            mesh.tangents.iter_mut().for_each(unit);
         }
     }
 

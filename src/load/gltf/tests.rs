@@ -10,6 +10,7 @@ mod materials;
 mod memory;
 #[cfg(feature = "meshopt")]
 mod meshopt;
+mod morphs;
 mod mutated;
 mod variants;
 
