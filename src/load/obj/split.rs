@@ -16,14 +16,16 @@ pub(super) fn runs(text: &[u8], size: usize) -> Vec<&[u8]> {
 
 /// The first place after `from` where a line starts that stands for itself; only LF counts as a line end here.
 fn end_of_line(text: &[u8], from: usize) -> Option<usize> {
-    let mut at = from;
-    loop {
-        at += text[at..].iter().position(|&b| b == b'\n')? + 1;
-        // A backslash before it may join the next line.
-        if text[..at].trim_ascii_end().last() != Some(&b'\\') {
-            return Some(at);
+    // A backslash as the last sign before a line end, whatever blank lines lie between, may join the next line.
+    let mut last = text[..from].trim_ascii_end().last();
+    for (at, byte) in text.iter().enumerate().skip(from) {
+        match byte {
+            b'\n' if last != Some(&b'\\') => return Some(at + 1),
+            blank if blank.is_ascii_whitespace() => {}
+            _ => last = Some(byte),
         }
     }
+    None
 }
 
 #[cfg(test)]
@@ -45,5 +47,14 @@ mod tests {
     #[test]
     fn a_continued_line_stays_in_one_piece() {
         assert_eq!(cut("a\\\nb \\ \r\n \nc\nd\ne", 1), ["a\\\nb \\ \r\n \nc\n", "d\n", "e"]);
+    }
+
+    #[test]
+    fn a_continued_line_before_many_blank_ones_is_cut_in_one_pass() {
+        let text = format!("g a \\\n{}f 1 2 3\nf 1 2 3\n", "\n".repeat(4_000_000));
+        let start = std::time::Instant::now();
+        let runs = cut(&text, 2);
+        assert_eq!(runs[1..], ["f 1 2 3\n", ""]);
+        assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
     }
 }
