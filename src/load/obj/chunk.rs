@@ -38,7 +38,7 @@ pub(super) struct Chunk {
     pub uvs: Vec<DVec2>,
     /// Unit length; zero for those without a direction.
     pub normals: Vec<Vec3>,
-    /// As [`super::soup::Soup::colors`]; may end before the last position.
+    /// As written, [`NO_COLOR`] where there is none; may end before the last position.
     pub colors: Vec<[f32; 3]>,
     /// Corners of all faces: numbers of `v`, `vt`, `vn` from 1, for [`resolve`]; 0: none given.
     pub corners: Vec<[u32; 3]>,
@@ -104,6 +104,9 @@ const SILENT: [&[u8]; 29] = [
     b"csh",
     b"vw",
 ];
+
+/// The colour of a vertex that has none, which no file can say.
+pub(super) const NO_COLOR: [f32; 3] = [f32::NAN; 3];
 
 /// Reads a run of whole lines.
 pub(super) fn read(text: &[u8]) -> Chunk {
@@ -316,7 +319,7 @@ impl Reader {
     fn color(&mut self, words: [&[u8]; 3]) {
         let color = words.map(|w| number::check(w).word.parse::<f32>().unwrap_or(f32::NAN));
         if color.iter().all(|c| c.is_finite()) {
-            self.out.colors.resize(self.out.positions.len() - 1, [1.0; 3]);
+            self.out.colors.resize(self.out.positions.len() - 1, NO_COLOR);
             self.out.colors.push(color);
         }
     }
@@ -404,8 +407,9 @@ impl Reader {
         self.out.strokes.push(Stroke { run, line: self.line, arity, joined });
     }
 
-    /// `v`, `v/vt`, `v//vn` or `v/vt/vn`; numbers count from 1, or back from the last one with −1.
-    fn corner(&self, word: &[u8]) -> Option<[u32; 3]> {
+    /// `v`, `v/vt`, `v//vn` or `v/vt/vn`; numbers count from 1, or back from the last one with −1. Some programs write 0
+    /// for a coordinate or normal that is not there.
+    fn corner(&mut self, word: &[u8]) -> Option<[u32; 3]> {
         let known = [self.out.positions.len(), self.out.uvs.len(), self.out.normals.len()];
         let mut out = [0; 3];
         for (kind, part) in word.split(|&b| b == b'/').enumerate() {
@@ -414,6 +418,10 @@ impl Reader {
             }
             let number = whole(part).filter(|_| kind < 3)?;
             out[kind] = match u32::try_from(number) {
+                Ok(0) if kind > 0 => {
+                    self.out.odd.zero.note(self.line, ATTRIBUTES[kind].as_bytes());
+                    0
+                }
                 Ok(number) => Some(number).filter(|n| (1..=LARGEST).contains(n))?,
                 Err(_) => {
                     let biased = i64::try_from(known[kind]).ok()? + 1 + number + i64::from(LARGEST);
@@ -424,6 +432,9 @@ impl Reader {
         Some(out)
     }
 }
+
+/// What the numbers of a corner name.
+pub(super) const ATTRIBUTES: [&str; 3] = ["vertex", "texture coordinate", "normal"];
 
 /// What both kinds of lines end in.
 impl Reader {

@@ -1,6 +1,8 @@
 //! Vertex colours -> linear.
 
+use crate::load::Diagnostic;
 use crate::math::Vec4;
+use std::path::Path;
 
 /// Linear RGBA of a vertex colour as written.
 ///
@@ -25,9 +27,49 @@ pub(super) fn opacities(colors: &[[f32; 4]]) -> Vec<f32> {
     if means_something { alphas().collect() } else { Vec::new() }
 }
 
+/// How vertex colours are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Coding {
+    /// As 0…1.
+    Units,
+    /// As 0…255.
+    Bytes,
+    /// As neither; what is over 1 or below 0 is cut off when it is decoded.
+    Beyond,
+}
+
+/// Makes colours as written 0…1, and white where there is none (not finite).
+pub(super) fn settle(colors: &mut [[f32; 3]]) -> Coding {
+    /// What rounding may add to full light.
+    const ROUNDED: f32 = 1e-3;
+    let (bytes, mut beyond) = (are_bytes(colors), false);
+    let unit = if bytes { 255.0 } else { 1.0 };
+    for color in colors {
+        *color = if color.iter().all(|c| c.is_finite()) { color.map(|c| c / unit) } else { [1.0; 3] };
+        beyond |= color.iter().any(|c| !(-ROUNDED..=1.0 + ROUNDED).contains(c));
+    }
+    match (bytes, beyond) {
+        (true, _) => Coding::Bytes,
+        (false, true) => Coding::Beyond,
+        (false, false) => Coding::Units,
+    }
+}
+
+impl Coding {
+    /// What is told of colours that are not simply 0…1, by these codes for bytes and for what is beyond.
+    pub(super) fn warning(self, codes: [&'static str; 2], file: &Path) -> Option<Diagnostic> {
+        let (code, text) = match self {
+            Self::Units => return None,
+            Self::Bytes => (codes[0], "vertex colours above 1 are taken as 0 … 255"),
+            Self::Beyond => (codes[1], "vertex colours are neither 0 … 1 nor 0 … 255; they are cut to 0 … 1"),
+        };
+        Some(Diagnostic::new(code, file, "", text))
+    }
+}
+
 /// Whether colours were written as 0 … 255.
-pub(super) fn are_bytes(colors: &[[f32; 3]]) -> bool {
-    let all = || colors.iter().flatten();
+fn are_bytes(colors: &[[f32; 3]]) -> bool {
+    let all = || colors.iter().flatten().filter(|c| c.is_finite());
     all().any(|&c| c > 1.5) && all().all(|&c| (0.0..=255.0).contains(&c))
 }
 
@@ -45,5 +87,16 @@ mod tests {
     fn colors_above_one_are_bytes() {
         assert!(are_bytes(&[[1.0; 3], [255.0, 0.0, 128.0]]));
         assert!(!are_bytes(&[[1.0, 0.5, 0.0]]) && !are_bytes(&[[300.0, 0.0, 0.0]]));
+    }
+
+    #[test]
+    fn bytes_of_one_are_nearly_black_and_vertices_without_a_color_are_white() {
+        let mut colors = [[1.0; 3], [f32::NAN; 3], [255.0, 51.0, 0.0]];
+        assert_eq!(settle(&mut colors), Coding::Bytes);
+        assert_eq!(colors, [[1.0 / 255.0; 3], [1.0; 3], [1.0, 0.2, 0.0]]);
+        assert_eq!((settle(&mut colors), colors[1]), (Coding::Units, [1.0; 3]));
+        for odd in [300.0, 1.2, -0.1] {
+            assert_eq!(settle(&mut [[odd, 0.5, 0.5]]), Coding::Beyond, "{odd}");
+        }
     }
 }

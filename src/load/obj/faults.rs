@@ -1,7 +1,7 @@
 //! What is wrong with the corners of a text that cannot be read: a pass of its own, line after line, that only such texts
 //! pay for.
 
-use super::chunk::{count, whole};
+use super::chunk::{ATTRIBUTES, count, whole};
 use super::encoding::decode_name;
 use super::lines::{Lines, keyword, words};
 use super::statements::Tally;
@@ -53,6 +53,10 @@ impl Look<'_> {
                 continue;
             }
             let Some(number) = whole(part).filter(|_| kind < 3) else { return Err(self.unreadable(word, corner)) };
+            // None, which reading has counted.
+            if number == 0 && kind > 0 {
+                continue;
+            }
             let known = i64::from(self.counts[kind]);
             let absolute = if number < 0 { known + 1 + number } else { number };
             let absolute = u32::try_from(absolute).ok().filter(|&a| a > 0);
@@ -72,7 +76,7 @@ impl Look<'_> {
     }
 
     fn out_of_range(&self, line: u32, corner: u32, kind: usize, number: i64) -> Diagnostic {
-        let what = ["vertex", "texture coordinate", "normal"][kind];
+        let what = ATTRIBUTES[kind];
         let there = self.counts[kind];
         let (code, text) = match number {
             0 => ("obj-index-zero", format!("corner {corner} of the face names {what} 0, but numbers start at 1")),

@@ -1,6 +1,6 @@
 //! Runs of lines, read side by side -> the statements of the whole text, as if it had been read line after line.
 
-use super::chunk::{COMMENTS, Chunk, LARGEST, OPEN, count, resolve};
+use super::chunk::{COMMENTS, Chunk, LARGEST, NO_COLOR, OPEN, count, resolve};
 use super::soup::{Corner, NONE, Soup};
 use super::statements::{Run, Statements, Stroke};
 use crate::math::{DVec2, DVec3, Vec3};
@@ -160,7 +160,7 @@ impl Table {
 }
 
 fn all_colors(chunks: &[Chunk], begins: &[Before], positions: u32) -> Vec<[f32; 3]> {
-    let mut all = vec![[1.0; 3]; positions as usize];
+    let mut all = vec![NO_COLOR; positions as usize];
     for (chunk, before) in chunks.iter().zip(begins) {
         let first = before.counts[0] as usize;
         all[first..first + chunk.colors.len()].copy_from_slice(&chunk.colors);

@@ -53,7 +53,8 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
     // Geometry.
     let mut statements = statements::read(&encoding::to_ascii_superset(&source.bytes), file, &mut budget)?;
     statements.odd.warn(file, &mut warnings);
-    bytes_to_units(&mut statements, file, &mut warnings);
+    let coding = color::settle(&mut statements.soup.colors);
+    coding.warning(["obj-color-bytes", "obj-color-range"], file).into_iter().for_each(|told| warnings.push(told));
     let soup = std::mem::take(&mut statements.soup);
     let placed = place::place(&soup.positions);
     let flatness = assemble::flatness(&placed.positions, statements.places);
@@ -129,17 +130,6 @@ fn scene(mut meshes: Vec<Mesh>, materials: mtl::Materials, center: DVec3, up: Up
     let instance = |(mesh, m): (u32, &Mesh)| Instance { name: m.name.clone(), mesh, world_from_object };
     let instances = (0..).zip(&meshes).map(instance).collect();
     Scene { meshes, instances, materials, textures, bitmaps, up, ..Scene::default() }
-}
-
-/// Vertex colours written as 0 … 255 become 0 … 1.
-fn bytes_to_units(statements: &mut Statements, file: &Path, warnings: &mut Warnings) {
-    if color::are_bytes(&statements.soup.colors) {
-        for color in statements.soup.colors.iter_mut().filter(|c| **c != [1.0; 3]) {
-            *color = color.map(|c| c / 255.0);
-        }
-        let text = "vertex colours above 1 are taken as 0 … 255";
-        warnings.push(Diagnostic::new("obj-color-bytes", file, "", text));
-    }
 }
 
 /// Tells what became of faces, in the order of `codes`; `place` names the first of a kind.

@@ -26,7 +26,7 @@ pub(super) struct Soup {
     pub uvs: Vec<DVec2>,
     /// Unit length where corners name them.
     pub normals: Vec<Vec3>,
-    /// Per position, as written, white where none are; empty when the file has none.
+    /// Per position; as written until [`super::color::settle`] has looked at them, 0…1 then. Empty when the file has none.
     pub colors: Vec<[f32; 3]>,
     /// Opacity per position, 0…1; empty when everything is opaque.
     pub alphas: Vec<f32>,
@@ -96,7 +96,8 @@ mod tests {
 
     #[test]
     fn vertices_that_no_face_uses_have_no_place() {
-        let soup = of("v 9 9 9 1 1 0\nv 0 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 1 0\nf 4 2 3");
+        let mut soup = of("v 9 9 9 1 1 0\nv 0 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 1 0\nf 4 2 3");
+        super::super::color::settle(&mut soup.colors);
         assert!(soup.positions[0].is_nan());
         assert_eq!(soup.positions[1..], [DVec3::ZERO, DVec3::X, DVec3::Y]);
         assert_eq!(soup.colors, [[1.0, 1.0, 0.0], [1.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);

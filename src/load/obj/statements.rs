@@ -101,6 +101,8 @@ pub(super) struct Oddities {
     pub weight: Tally,
     pub columns: Tally,
     pub smoothing: Tally,
+    /// Corners that name texture coordinate or normal 0.
+    pub zero: Tally,
     absent: Tally,
 }
 
@@ -192,6 +194,7 @@ impl Oddities {
         self.weight.append(more.weight, lines);
         self.columns.append(more.columns, lines);
         self.smoothing.append(more.smoothing, lines);
+        self.zero.append(more.zero, lines);
     }
 
     /// One warning for each kind met.
@@ -219,6 +222,8 @@ impl Oddities {
         warn("obj-vertex-columns", &self.columns, columns.into(), "");
         let absent = format!("a corner names {}, but the file has none; it is drawn without", self.absent.word);
         warn("obj-absent-attribute", &self.absent, absent, "");
+        let zero = format!("a corner names {} 0, but numbers start at 1; it is drawn without", self.zero.word);
+        warn("obj-absent-attribute", &self.zero, zero, "");
         let smoothing = format!("smoothing group '{}' is not a number; faces are flat", self.smoothing.word);
         warn("obj-smoothing-group", &self.smoothing, smoothing, "");
     }
@@ -228,6 +233,7 @@ impl Oddities {
 mod tests {
     use super::*;
 
+    use super::super::color;
     use super::super::soup::NONE;
     use crate::load::Limits;
     use crate::math::{DVec2, DVec3, Vec3};
@@ -287,6 +293,21 @@ mod tests {
     }
 
     #[test]
+    fn zero_is_no_coordinate_and_no_normal_but_a_fault_as_a_vertex() {
+        let s = of(&format!("{TRIANGLE}vt 0 0\nvn 0 0 1\nf 1/0/1 2/1/0 3/0/0\nl 1/0 2"));
+        assert_eq!(corners(&s), [[1, 0, 1], [2, 1, 0], [3, 0, 0]]);
+        assert_eq!((s.strokes.len(), s.odd.zero.count), (1, 5));
+        let mut warnings = Warnings::default();
+        s.odd.warn(Path::new("m.obj"), &mut warnings);
+        let told: Vec<String> = warnings.into_vec().iter().map(ToString::to_string).collect();
+        let text = "m.obj:6: a corner names texture coordinate 0, but numbers start at 1; it is drawn without (×5)";
+        assert_eq!(told, [text]);
+        assert!(fault(&format!("{TRIANGLE}f 1/0 0/0 3/0")).contains("corner 2 of the face names vertex 0"));
+        // Beside numbers of what is not there at all, for which the text is looked through again.
+        assert_eq!(of(&format!("{TRIANGLE}f 1/0/1 2/0/1 3/0/1")).odd.absent.count, 3);
+    }
+
+    #[test]
     fn runs_with_the_same_names_and_material_are_one() {
         let text = "o a\nusemtl r\nf 1 2 3\nusemtl b\nf 1 2 3\nusemtl r\nf 1 2 3\ng x\nf 1 2 3\no b\nf 1 2 3";
         let s = of(&format!("{TRIANGLE}{text}"));
@@ -308,7 +329,8 @@ mod tests {
 
     #[test]
     fn colors_on_some_vertices_leave_the_others_white() {
-        let s = of("v 0 0 0\nv 1 0 0 1 0.5 0\nv 2 0 0\nv 3 0 0 0 0 1 0.5\nv 4 0 0 0.5");
+        let mut s = of("v 0 0 0\nv 1 0 0 1 0.5 0\nv 2 0 0\nv 3 0 0 0 0 1 0.5\nv 4 0 0 0.5");
+        assert_eq!(color::settle(&mut s.soup.colors), color::Coding::Units);
         assert_eq!(s.soup.colors, [[1.0; 3], [1.0, 0.5, 0.0], [1.0; 3], [0.0, 0.0, 1.0], [1.0; 3]]);
         assert_eq!(s.odd.weight.count, 1);
         assert!(of("v 0 0 0\nv 1 1 1").soup.colors.is_empty());
