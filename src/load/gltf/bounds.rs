@@ -51,8 +51,9 @@ pub(super) fn check(reader: Reader, report: &mut Report) {
 
 fn compare(extent: &Extent, declared: Option<&Value>, upper: bool, place: &str, report: &mut Report) {
     let name = if upper { "max" } else { "min" };
-    let list = declared.and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_f64);
+    let list = declared.and_then(Value::as_array).into_iter().flatten().map(Value::as_f64);
     for (k, (declared, (lo, hi))) in list.zip(extent).enumerate() {
+        let Some(declared) = declared else { continue };
         let actual = if upper { *hi } else { *lo };
         if !actual.is_finite() || (declared - actual).abs() <= ROUNDED * actual.abs().max(1.0) {
             continue;

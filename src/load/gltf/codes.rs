@@ -3,8 +3,9 @@
 //! The rule behind the rows: **refuse** when it is unknown what the file shows (it is not glTF 2.0, a part that must be
 //! there is missing, a number points outside); **warn** when a rule is broken but what is drawn is clear, or when a part
 //! can be left out; **accept** in silence what changes nothing. Faults in animations are at most warned about, because
-//! nodes that they do not move can be drawn at rest, and so are those in images, because a material can be drawn without a map
-//! ([`Code::verdict_at`]).
+//! nodes that they do not move can be drawn at rest, and so are those in images, because a material can be drawn without a
+//! map, in cameras, because there is always another view, and in the bounds that accessors declare, because nothing is
+//! drawn from them ([`Code::verdict_at`]).
 
 use std::sync::LazyLock;
 
@@ -254,12 +255,18 @@ impl Code {
 
     /// What becomes of it at a place: parts that a picture can do without are never a reason to refuse.
     pub fn verdict_at(self, place: &str) -> Verdict {
-        let spared = ["animations", "images"].iter().any(|part| place.starts_with(part) && place != *part);
+        let spared = ["animations", "cameras", "images"].iter().any(|part| place.starts_with(part) && place != *part);
         match self.row().verdict {
-            Verdict::Refuse if spared => Verdict::Warn,
+            Verdict::Refuse if spared || is_bound(place) => Verdict::Warn,
             verdict => verdict,
         }
     }
+}
+
+/// Whether a place is in the bounds that an accessor declares: `accessors[3].min[0]`.
+fn is_bound(place: &str) -> bool {
+    let property = place.strip_prefix("accessors[").and_then(|rest| rest.split_once("]."));
+    property.is_some_and(|(_, rest)| matches!(rest.split('[').next(), Some("min" | "max")))
 }
 
 #[cfg(test)]
@@ -320,7 +327,12 @@ mod tests {
     }
 
     #[test]
-    fn broken_animations_and_images_do_not_stop_a_still() {
+    fn broken_animations_images_cameras_and_bounds_do_not_stop_a_still() {
+        assert_eq!(Code::UndefinedProperty.verdict_at("cameras[0].perspective"), Verdict::Warn);
+        assert_eq!(Code::TypeMismatch.verdict_at("cameras"), Verdict::Refuse);
+        assert_eq!(Code::TypeMismatch.verdict_at("accessors[12].max[2]"), Verdict::Warn);
+        assert_eq!(Code::TypeMismatch.verdict_at("accessors[12].min"), Verdict::Warn);
+        assert_eq!(Code::TypeMismatch.verdict_at("accessors[12].count"), Verdict::Refuse);
         assert_eq!(Code::UnresolvedReference.verdict_at("animations[0].channels[1].sampler"), Verdict::Warn);
         assert_eq!(Code::TypeMismatch.verdict_at("images[3]"), Verdict::Warn);
         assert_eq!(Code::TypeMismatch.verdict_at("images"), Verdict::Refuse);

@@ -8,8 +8,9 @@ use super::codes::Code;
 use super::report::Report;
 use super::schema;
 use super::weight::{DEEPEST, Weight};
-use gltf::json::Root;
-use serde_json::{Map, Number, Value};
+use gltf::json::{Camera, Root};
+use serde::Deserialize;
+use serde_json::{Map, Number, Value, json};
 
 /// A document whose types and indices are right.
 pub(super) struct Document {
@@ -45,7 +46,7 @@ pub(super) fn parse(json: &[u8], report: &mut Report) -> Option<Value> {
     }
 }
 
-/// Turns checked JSON into the typed document; images that broke the schema become empty ones.
+/// Turns checked JSON into the typed document; images and cameras that broke the schema become empty ones.
 pub(super) fn typed(mut value: Value, report: &mut Report) -> Option<Document> {
     let animations = animation::all(&value);
     simplify(&mut value);
@@ -64,6 +65,9 @@ pub(super) fn typed(mut value: Value, report: &mut Report) -> Option<Document> {
     let views = map.get("bufferViews").and_then(Value::as_array).map_or(0, Vec::len);
     let images = map.get_mut("images").and_then(Value::as_array_mut).into_iter().flatten();
     images.filter(|image| !is_image(image, views)).for_each(|image| *image = Value::Object(Map::new()));
+    let cameras = map.get_mut("cameras").and_then(Value::as_array_mut).into_iter().flatten();
+    let is_camera = |camera: &Value| Camera::deserialize(camera).is_ok();
+    cameras.filter(|camera| !is_camera(camera)).for_each(|camera| *camera = json!({"type": "perspective"}));
     match serde_json::from_value(value) {
         Ok(root) => Some(Document { root, animations }),
         Err(e) => {

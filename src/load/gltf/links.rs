@@ -79,7 +79,8 @@ fn bounds_length(accessor: &Accessor, format: Format, place: &str, report: &mut 
         let Some(length) = bound.as_ref().and_then(|b| b.as_array()).map(Vec::len) else { continue };
         if length != format.width() {
             let text = format!("{length} numbers for elements of {}", format.width());
-            report.add(Code::ArrayLengthNotInList, format!("{place}.{name}"), text);
+            let (code, place) = (Code::ArrayLengthNotInList, format!("{place}.{name}"));
+            report.warn_with(code, place, text, Code::AccessorMinMismatch.row().why);
         }
     }
 }
@@ -200,10 +201,12 @@ fn cameras(root: &Root, report: &mut Report) {
         let Checked::Valid(kind) = camera.type_ else { continue };
         let name = if kind == gltf::json::camera::Type::Perspective { "perspective" } else { "orthographic" };
         let there = if name == "perspective" { camera.perspective.is_some() } else { camera.orthographic.is_some() };
-        if camera.perspective.is_some() && camera.orthographic.is_some() {
-            report.add(Code::OneOfMismatch, &place, "both perspective and orthographic are there");
-        } else if !there {
-            report.add(Code::UndefinedProperty, &place, format!("'{name}' is missing"));
+        if !there {
+            let text = format!("'{name}' is missing");
+            report.warn_with(Code::UndefinedProperty, &place, text, "the camera is left out");
+        } else if camera.perspective.is_some() && camera.orthographic.is_some() {
+            let text = "both perspective and orthographic are there";
+            report.warn_with(Code::OneOfMismatch, &place, text, "its type says which counts");
         }
         let planes = match (&camera.perspective, &camera.orthographic) {
             (Some(p), _) => p.zfar.map(|far| (p.znear, far)),

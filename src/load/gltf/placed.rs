@@ -24,7 +24,8 @@ pub(super) fn camera(root: &Root, node: &Node, world: DAffine3, report: &mut Rep
             let usable = x_mag > 0.0 && y_mag > 0.0 && x_mag.is_finite() && y_mag.is_finite();
             usable.then_some(Projection::Orthographic { x_mag, y_mag })
         }
-        _ => None,
+        // The checks have told of it.
+        _ => return None,
     };
     let placed = projection.zip(rigid(world));
     if placed.is_none() {

@@ -12,6 +12,7 @@ mod memory;
 mod meshopt;
 mod morphs;
 mod mutated;
+mod spared;
 mod variants;
 
 use crate::load::{Limits, LoadError, LoadOptions, Loaded, load_bytes};
