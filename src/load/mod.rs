@@ -12,6 +12,7 @@ pub mod nff;
 pub mod obj;
 pub mod panorama;
 pub mod paths;
+mod place;
 pub mod ply;
 #[cfg_attr(
     not(any(feature = "draco", feature = "basisu")),

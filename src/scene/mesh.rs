@@ -37,6 +37,16 @@ impl Mesh {
         3 * self.triangles.len() + self.polygon_corners.len()
     }
 
+    /// The number of faces of the file that its triangles and polygons are; those of one face follow each other.
+    pub fn faces(&self) -> usize {
+        let cut = if self.face_of_triangle.is_empty() {
+            self.triangles.len()
+        } else {
+            self.face_of_triangle.chunk_by(|a, b| a == b).count()
+        };
+        cut + self.polygons.len()
+    }
+
     /// Calls `look` with the corners of each face: triangles first, then polygons as they lie in
     /// [`Self::polygon_corners`].
     pub fn each_face(&self, mut look: impl FnMut(&[u32])) {

@@ -2,15 +2,24 @@
 
 use super::index;
 use crate::load::Polygons;
+use crate::load::limits::{Budget, OverBudget};
+use crate::load::place::{is_usable, leave_out_collapsed, place};
 use crate::math::ear_clip::{EarClipper, newell};
-use crate::math::frame::snapped_center;
 use crate::math::{DAffine3, DVec3, Vec3};
 use crate::scene::{Instance, Mesh, Polygon, Scene};
 use std::collections::HashMap;
+use std::mem::size_of;
 
 /// Half a unit of the sixth digit, which is what generators print: corners this far off a plane, relative to the
 /// largest coordinate of the polygon, still lie in it.
 const FLAT: f64 = 1e-6;
+
+/// Bytes that a corner takes until it is part of a mesh: as a vertex, twice in `f64` and in the mesh with its normal, in a
+/// table that is never less than half full once it has grown, and as that of a triangle.
+const CORNER: u64 = 2 * 24 + 3 * 12 + 2 * 64 + 2 * 16;
+
+/// Bytes that a mesh takes, empty.
+const PART: u64 = 2 * (size_of::<Part>() + size_of::<Mesh>() + size_of::<Instance>()) as u64;
 
 /// All faces of the file.
 pub(super) struct Faces {
@@ -19,10 +28,20 @@ pub(super) struct Faces {
     /// Of a material and whether there are normals.
     known: HashMap<(u32, bool), usize>,
     clipper: EarClipper,
-    /// Faces added.
+    /// Faces without area, which were not added.
+    pub flat: u64,
+    /// Faces with a corner too far away, which were not added.
+    pub far: u64,
+}
+
+/// What has become of the faces.
+pub(super) struct Finished {
+    /// Faces drawn.
     pub count: u64,
-    /// Faces without area, which were not.
-    pub dropped: u64,
+    /// Triangles that rounding has collapsed.
+    pub collapsed: u64,
+    /// The largest displacement by rounding to `f32`.
+    pub max_rounding: f64,
 }
 
 /// A mesh in the making, positions in `f64`.
@@ -38,23 +57,40 @@ struct Part {
 impl Faces {
     pub(super) fn new(polygons: Polygons) -> Self {
         let (parts, known) = (Vec::new(), HashMap::new());
-        Self { polygons, parts, known, clipper: EarClipper::default(), count: 0, dropped: 0 }
+        Self { polygons, parts, known, clipper: EarClipper::default(), flat: 0, far: 0 }
     }
 
     /// Adds one face; `normals` is empty or has one for each corner.
-    pub(super) fn add(&mut self, material: u32, points: &[DVec3], normals: &[DVec3]) {
+    ///
+    /// # Errors
+    /// When it would take more than is left of `budget`.
+    pub(super) fn add(
+        &mut self,
+        material: u32,
+        points: &[DVec3],
+        normals: &[DVec3],
+        budget: &mut Budget,
+    ) -> Result<(), OverBudget> {
+        if !points.iter().copied().all(is_usable) {
+            self.far += 1;
+            return Ok(());
+        }
         let area = newell(points);
         if area == DVec3::ZERO {
-            self.dropped += 1;
-            return;
+            self.flat += 1;
+            return Ok(());
         }
-        self.count += 1;
+        budget.take(points.len() as u64, CORNER)?;
         let key = (material, !normals.is_empty());
-        let parts = &mut self.parts;
-        let part = *self.known.entry(key).or_insert_with(|| {
-            parts.push(Part { mesh: Mesh { material, ..Mesh::default() }, ..Part::default() });
-            parts.len() - 1
-        });
+        let part = match self.known.get(&key) {
+            Some(&part) => part,
+            None => {
+                budget.take(1, PART)?;
+                self.parts.push(Part { mesh: Mesh { material, ..Mesh::default() }, ..Part::default() });
+                self.known.insert(key, self.parts.len() - 1);
+                self.parts.len() - 1
+            }
+        };
         let part = &mut self.parts[part];
         let own = area.normalize_or(DVec3::Z);
         let corners: Vec<u32> = points
@@ -69,29 +105,29 @@ impl Faces {
             let first = index(part.mesh.polygon_corners.len());
             part.mesh.polygons.push(Polygon { first, len: index(corners.len()), face });
             part.mesh.polygon_corners.extend(corners);
-            return;
+            return Ok(());
         }
         let mut cut = Vec::new();
         self.clipper.cut(points, &mut cut);
         part.mesh.face_of_triangle.extend(cut.iter().map(|_| face));
         part.mesh.triangles.extend(cut.iter().map(|t| t.map(|i| corners[i as usize])));
+        Ok(())
     }
 
-    /// Hands the meshes to the scene, each around its own centre; the largest displacement by rounding to `f32`.
-    pub(super) fn finish(self, scene: &mut Scene) -> f64 {
-        let mut worst = 0.0f64;
+    /// Hands the meshes to the scene, each around its own centre.
+    pub(super) fn finish(self, scene: &mut Scene) -> Finished {
+        let mut out = Finished { count: 0, collapsed: 0, max_rounding: 0.0 };
         for Part { mut mesh, positions, .. } in self.parts {
-            let lo = positions.iter().fold(DVec3::INFINITY, |a, p| a.min(*p));
-            let hi = positions.iter().fold(DVec3::NEG_INFINITY, |a, p| a.max(*p));
-            let center = snapped_center(lo, hi);
-            mesh.positions = positions.iter().map(|p| (p - center).as_vec3()).collect();
-            let moved = positions.iter().zip(&mesh.positions).map(|(p, q)| (p - center).distance(q.as_dvec3()));
-            worst = moved.fold(worst, f64::max);
-            let world_from_object = DAffine3::from_translation(center);
+            let placed = place(&positions);
+            mesh.positions = placed.positions;
+            out.max_rounding = out.max_rounding.max(placed.max_rounding);
+            out.collapsed += leave_out_collapsed(&mut mesh);
+            out.count += mesh.faces() as u64;
+            let world_from_object = DAffine3::from_translation(placed.center);
             scene.instances.push(Instance { name: String::new(), mesh: index(scene.meshes.len()), world_from_object });
             scene.meshes.push(mesh);
         }
-        worst
+        out
     }
 }
 

@@ -19,7 +19,10 @@
 mod faces;
 mod words;
 
+use super::limits::Budget;
+use super::obj::bare::over_memory;
 use super::paths::Resolver;
+use super::place::is_usable;
 use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
 use crate::math::{DVec3, Vec3};
 use crate::scene::{
@@ -27,37 +30,65 @@ use crate::scene::{
     Sphere, Surface, UpAxis,
 };
 use faces::Faces;
+use std::collections::HashMap;
+use std::mem::size_of;
+use std::path::Path;
 use words::Words;
 
 /// Loads an NFF file.
 ///
 /// # Errors
-/// At the first statement that is not NFF, with its line. A file without shapes is an empty scene.
+/// At the first statement that is not NFF, with its line, or when memory would exceed [`super::Limits`]. A file without
+/// shapes is an empty scene.
 pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
+    let mut budget = Budget::new(&options.limits);
+    if std::str::from_utf8(&source.bytes).is_err() {
+        // A sign of three bytes stands for each that is no text.
+        budget.take(source.bytes.len() as u64, 3).map_err(|over| over_memory(&source.path, over))?;
+    }
     let text = String::from_utf8_lossy(&source.bytes);
     let mut reader = Reader {
         words: Words::new(&source.path, text.trim_start_matches('\u{feff}')),
+        file: &source.path,
+        budget: &mut budget,
         scene: Scene::default(),
         material: None,
+        fills: HashMap::new(),
         faces: Faces::new(options.polygons),
         flat: 0,
+        far: 0,
     };
     reader.statements()?;
 
+    let Reader { mut scene, faces, flat, far, .. } = reader;
+    let (flat, far) = (flat + faces.flat, far + faces.far);
+    let drawn = faces.finish(&mut scene);
     let mut warnings = Warnings::default();
-    let dropped = reader.flat + reader.faces.dropped;
-    if dropped > 0 {
-        let text = format!("{dropped} shapes without extent are left out");
+    let mut dropped = Vec::new();
+    if flat > 0 {
+        let text = format!("{flat} shapes without extent are left out");
         warnings.push(Diagnostic::new("nff-no-extent", &source.path, "", text));
+        dropped.push(("without extent".into(), flat));
     }
-    let Reader { mut scene, faces, .. } = reader;
-    let face_count = faces.count;
-    let max_rounding = faces.finish(&mut scene);
+    for (code, reason, text, count) in [
+        ("shape-too-far", "a coordinate over 1e18", "a shape is left out: a coordinate or size is over 1e18", far),
+        (
+            "face-degenerate",
+            "two corners in one place",
+            "a triangle is left out: two corners are in one place once coordinates are rounded",
+            drawn.collapsed,
+        ),
+    ] {
+        if count > 0 {
+            let warning = Diagnostic::new(code, &source.path, "", text);
+            warnings.push(Diagnostic { count: u32::try_from(count).unwrap_or(u32::MAX), ..warning });
+            dropped.push((reason.into(), count));
+        }
+    }
     finish(&mut scene, options);
     let (files, hash) = Resolver::new(source, options).finish();
-    let dropped = if dropped > 0 { vec![("without extent".into(), dropped)] } else { Vec::new() };
-    let facts =
-        Facts { format: "NFF".into(), faces: face_count, dropped, max_rounding, files, hash, ..Facts::default() };
+    let (format, faces, max_rounding) = ("NFF".into(), drawn.count, drawn.max_rounding);
+    let facts = Facts { format, faces, dropped, max_rounding, files, hash, ..Facts::default() };
     Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
 }
 
@@ -80,13 +111,22 @@ fn finish(scene: &mut Scene, options: &LoadOptions) {
 
 struct Reader<'a> {
     words: Words<'a>,
+    file: &'a Path,
+    budget: &'a mut Budget,
     scene: Scene,
     /// The material of what follows.
     material: Option<u32>,
+    /// Materials by the bits of the numbers of their fill.
+    fills: HashMap<[u64; 8], u32>,
     faces: Faces,
     /// Spheres and cones without extent.
     flat: u64,
+    /// Spheres and cones too far away or too large.
+    far: u64,
 }
+
+/// Bytes that a material takes, with its name and its place in the table, in lists that have grown by doubling.
+const FILL: u64 = 2 * (size_of::<Material>() + 2 * size_of::<[u64; 8]>() + 128) as u64;
 
 impl Reader<'_> {
     fn statements(&mut self) -> Result<(), Diagnostic> {
@@ -146,15 +186,20 @@ impl Reader<'_> {
         let colored = self.words.peek().is_some_and(|word| word.parse::<f64>().is_ok());
         let intensity = if colored { self.words.point("l")?.as_vec3() } else { Vec3::ONE };
         let kind = LightKind::Point { position, falloff: Falloff::None };
+        self.take(2 * size_of::<Light>() as u64)?;
         self.scene.lights.push(Light { name: String::new(), intensity, kind, shadows: true, size: 0.0 });
         Ok(())
     }
 
     fn fill(&mut self) -> Result<(), Diagnostic> {
-        let [r, g, b, kd, ks, shine, t, ior] = self.words.numbers::<8>("f")?;
-        let name = [r, g, b, kd, ks, shine, t, ior].map(|x| x.to_string()).join(" ");
-        let known = self.scene.materials.iter().position(|m| m.name == name);
-        let id = known.unwrap_or_else(|| {
+        let numbers = self.words.numbers::<8>("f")?;
+        let key = numbers.map(f64::to_bits);
+        if !self.fills.contains_key(&key) {
+            self.take(FILL)?;
+        }
+        let id = *self.fills.entry(key).or_insert_with(|| {
+            let [r, g, b, kd, ks, shine, t, ior] = numbers;
+            let name = numbers.map(|x| x.to_string()).join(" ");
             let color = DVec3::new(r, g, b);
             let [diffuse, mirror, transmission] =
                 [color * kd, color * ks, color * t].map(|c| c.max(DVec3::ZERO).as_vec3());
@@ -175,9 +220,9 @@ impl Reader<'_> {
                 surface: Surface::Phong(phong),
                 ..Material::plain()
             });
-            self.scene.materials.len() - 1
+            index(self.scene.materials.len() - 1)
         });
-        self.material = Some(index(id));
+        self.material = Some(id);
         Ok(())
     }
 
@@ -187,6 +232,11 @@ impl Reader<'_> {
             self.scene.materials.push(Material::plain());
         }
         *self.material.get_or_insert(index(self.scene.materials.len() - 1))
+    }
+
+    /// Takes so many bytes, or refuses the file.
+    fn take(&mut self, bytes: u64) -> Result<(), Diagnostic> {
+        self.budget.take(bytes, 1).map_err(|over| over_memory(self.file, over))
     }
 
     fn polygon(&mut self, of: &str, smooth: bool) -> Result<(), Diagnostic> {
@@ -199,14 +249,17 @@ impl Reader<'_> {
             }
         }
         let material = self.material();
-        self.faces.add(material, &points, &normals);
-        Ok(())
+        let added = self.faces.add(material, &points, &normals, self.budget);
+        added.map_err(|over| over_memory(self.file, over))
     }
 
     fn sphere(&mut self) -> Result<(), Diagnostic> {
         let (center, radius) = (self.words.point("s")?, self.words.number("s")?.abs());
         let material = self.material();
-        if radius > 0.0 {
+        if !(is_usable(center) && is_usable(DVec3::splat(radius))) {
+            self.far += 1;
+        } else if radius > 0.0 {
+            self.take(2 * size_of::<Sphere>() as u64)?;
             self.scene.spheres.push(Sphere { name: String::new(), center, radius, material });
         } else {
             self.flat += 1;
@@ -218,7 +271,11 @@ impl Reader<'_> {
         let (base, base_radius) = (self.words.point("c")?, self.words.number("c")?.abs());
         let (apex, apex_radius) = (self.words.point("c")?, self.words.number("c")?.abs());
         let material = self.material();
-        if base != apex && base_radius.max(apex_radius) > 0.0 {
+        let radii = DVec3::new(base_radius, apex_radius, 0.0);
+        if ![base, apex, radii].into_iter().all(is_usable) {
+            self.far += 1;
+        } else if base != apex && base_radius.max(apex_radius) > 0.0 {
+            self.take(2 * size_of::<Cone>() as u64)?;
             self.scene.cones.push(Cone { name: String::new(), base, base_radius, apex, apex_radius, material });
         } else {
             self.flat += 1;
@@ -227,7 +284,7 @@ impl Reader<'_> {
     }
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "files are far smaller than 2^32 statements")]
+#[expect(clippy::cast_possible_truncation, reason = "memory for 2^32 of anything was not granted")]
 fn index(i: usize) -> u32 {
     i as u32
 }

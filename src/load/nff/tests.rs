@@ -91,3 +91,51 @@ fn equal_corners_are_shared_and_far_ones_keep_their_digits() {
     assert_eq!((mesh.positions.len(), mesh.triangles.len()), (4, 2));
     assert_eq!(place.transform_point3(mesh.positions[2].as_dvec3()), DVec3::new(1e7, 0.0, 0.125));
 }
+
+#[test]
+fn shapes_too_far_away_are_left_out_and_counted_and_move_nothing() {
+    let text = "p 3 1e200 0 0 2e200 0 0 1e200 1e200 0\np 3 1e39 0 0 2e39 0 0 1e39 1e39 0\np 3 0.1 0 0 1.1 0 0 0.1 1 0\n\
+                s 1e300 0 0 1e300\nc 0 0 0 1 1e308 0 0 1\ns 0 0 0 1e19\n";
+    let loaded = load_text(text).unwrap();
+    let told: Vec<String> = loaded.warnings.iter().map(ToString::to_string).collect();
+    assert_eq!(told, ["a.nff: a shape is left out: a coordinate or size is over 1e18 (×5)"]);
+    assert_eq!((loaded.facts.faces, loaded.facts.dropped[0].1), (1, 5));
+    assert!(loaded.facts.max_rounding < 1e-7, "{}", loaded.facts.max_rounding);
+    assert_eq!((loaded.scene.spheres.len(), loaded.scene.cones.len()), (0, 0));
+}
+
+#[test]
+fn triangles_that_a_far_one_makes_too_small_are_counted() {
+    let loaded = load_text("p 3 1e10 0 0 2e10 0 0 1e10 1e10 0\np 3 0 0 0 1 0 0 0 1 0\n").unwrap();
+    assert_eq!((loaded.facts.faces, loaded.warnings[0].code), (1, "face-degenerate"));
+}
+
+#[test]
+fn memory_over_the_budget_is_refused_before_it_is_taken() {
+    let of = |text: String, memory: u64| {
+        let mut options = LoadOptions::default();
+        options.limits.memory = memory;
+        load(&Source { path: "a.nff".into(), bytes: text.into() }, &options).map_err(|e| e.to_string())
+    };
+    let texts = [
+        "s 0 0 0 1\n".repeat(1000),
+        "c 0 0 0 1 1 1 1 1\n".repeat(1000),
+        "l 0 0 0\n".repeat(1000),
+        (0..1000).map(|i| format!("f {i} 0 0 1 0 1 0 0\n")).collect(),
+        (0..1000).map(|i| format!("p 3 {i} 0 0 1 0 1 0 1 0\n")).collect(),
+    ];
+    for text in texts {
+        let fault = of(text.clone(), 60_000).unwrap_err();
+        assert!(fault.starts_with("a.nff: ") && fault.ends_with("raise --max-memory"), "{fault}");
+        assert!(of(text, 10_000_000).is_ok());
+    }
+}
+
+#[test]
+fn many_fills_are_told_apart_in_little_time() {
+    let text: String = (0..200_000).map(|i| format!("f {i} 0 0 1 0 1 0 0\ns 0 0 0 1\n")).collect();
+    let start = std::time::Instant::now();
+    let scene = scene(&format!("{text}f 7 0 0 1 0 1 0 0\ns 0 0 0 1\n"));
+    assert_eq!((scene.materials.len(), scene.spheres[200_000].material), (200_000, 7));
+    assert!(start.elapsed().as_secs() < 30, "{:?}", start.elapsed());
+}

@@ -7,32 +7,52 @@ use std::path::Path;
 /// The words of the file, one after another.
 pub(super) struct Words<'a> {
     file: &'a Path,
-    list: Vec<(&'a str, u32)>,
-    at: usize,
+    /// What follows [`Self::next`].
+    rest: &'a str,
+    /// Line that `rest` starts in, from 1.
+    rest_line: u32,
+    /// The next word, and its line.
+    next: Option<(&'a str, u32)>,
     /// Line of the last word that was taken, from 1.
     pub(super) line: u32,
 }
 
 impl<'a> Words<'a> {
-    /// Splits the text; `#` starts a comment.
+    /// The words of a text; `#` starts a comment.
     pub(super) fn new(file: &'a Path, text: &'a str) -> Self {
-        let mut list = Vec::new();
-        for (number, line) in (1u32..).zip(text.lines().flat_map(|l| l.split('\r'))) {
-            let said = line.split('#').next().unwrap_or_default();
-            list.extend(said.split_ascii_whitespace().map(|word| (word, number)));
+        let mut words = Self { file, rest: text, rest_line: 1, next: None, line: 1 };
+        words.next = words.find();
+        words
+    }
+
+    /// Passes over blanks and comments, and takes the word behind them.
+    fn find(&mut self) -> Option<(&'a str, u32)> {
+        let bytes = self.rest.as_bytes();
+        let (mut at, mut in_comment) = (0, false);
+        while let Some(&byte) = bytes.get(at).filter(|b| in_comment || **b == b'#' || b.is_ascii_whitespace()) {
+            // CR LF is one line end, counted at its second half.
+            let ends = byte == b'\n' || (byte == b'\r' && bytes.get(at + 1) != Some(&b'\n'));
+            self.rest_line = self.rest_line.saturating_add(u32::from(ends));
+            in_comment = (in_comment || byte == b'#') && !matches!(byte, b'\n' | b'\r');
+            at += 1;
         }
-        Self { file, list, at: 0, line: 1 }
+        let ends = |b: &u8| *b == b'#' || b.is_ascii_whitespace();
+        let end = bytes[at..].iter().position(ends).map_or(bytes.len(), |length| at + length);
+        let word = self.rest.get(at..end).filter(|word| !word.is_empty())?;
+        self.rest = self.rest.get(end..).unwrap_or_default();
+        Some((word, self.rest_line))
     }
 
     /// The next word, left where it is.
     pub(super) fn peek(&self) -> Option<&'a str> {
-        self.list.get(self.at).map(|(word, _)| *word)
+        self.next.map(|(word, _)| word)
     }
 
     /// Takes the next word.
     pub(super) fn next(&mut self) -> Option<&'a str> {
-        let (word, line) = *self.list.get(self.at)?;
-        (self.at, self.line) = (self.at + 1, line);
+        let (word, line) = self.next?;
+        self.line = line;
+        self.next = self.find();
         Some(word)
     }
 
@@ -74,5 +94,22 @@ impl<'a> Words<'a> {
             return Ok(n as u32);
         }
         Err(self.fault(format!("`{of}` has {n}, which is no whole number from {low} to 1000000"), ""))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_come_with_their_lines_whatever_ends_these_and_without_comments() {
+        let text = "# v\n a  b#c\r\n\r\n#x # y\rd\r\r\te\n#\nf # last";
+        let mut words = Words::new(Path::new("a.nff"), text);
+        let mut all = Vec::new();
+        while let Some(word) = words.next() {
+            all.push((word, words.line));
+        }
+        assert_eq!(all, [("a", 2), ("b", 2), ("d", 5), ("e", 7), ("f", 9)]);
+        assert_eq!((words.peek(), words.next()), (None, None));
     }
 }

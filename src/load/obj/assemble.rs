@@ -1,11 +1,11 @@
 //! Faces -> meshes: one for each run of faces that share object, group and material.
 
 use super::pairs::Pairs;
-use super::place::Placed;
 use super::smooth::{Smooth, smooth};
 use super::soup::{Corner, NONE, Soup};
 use super::statements::{Face, Statements};
 use crate::load::Polygons;
+use crate::load::place::Placed;
 use crate::math::ear_clip::{EarClipper, Outcome, newell};
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
 use crate::scene::{Mesh, Polygon};

@@ -3,12 +3,12 @@
 //! They go the way of an OBJ's: centred and rounded, cut or kept whole, stood upright, plain where nothing is said of their
 //! material.
 
-use super::place::place;
 use super::soup::{Corner, NONE, Soup};
 use super::statements::{Face, Run, Statements, Stroke};
 use super::{assemble, chunk, color, generator, mtl, scene, strokes, up, warn_of_faces};
 use crate::load::limits::{Budget, OverBudget};
 use crate::load::paths::Resolver;
+use crate::load::place::place;
 use crate::load::wires::Wires;
 use crate::load::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
 use crate::math::{DVec2, DVec3, Vec3};

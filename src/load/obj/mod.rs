@@ -1,7 +1,7 @@
 //! Wavefront OBJ and MTL -> scene.
 //!
 //! The text goes through `statements` (lines, numbers, names, faces; every error with its line), which leave vertices and
-//! corners (`soup`). These are centred in `f64` and rounded (`place`), and become one mesh and one instance for each run of
+//! corners (`soup`). These are centred in `f64` and rounded (`load::place`), and become one mesh and one instance for each run of
 //! faces with the same object, group and material (`assemble`). Materials come from MTL files (`mtl`).
 //!
 //! Points and lines (`strokes`) get a width (`load::wires`).
@@ -21,7 +21,6 @@ mod lines;
 mod mtl;
 pub(super) mod number;
 mod pairs;
-mod place;
 mod smooth;
 mod soup;
 mod split;
@@ -31,6 +30,7 @@ mod up;
 
 use super::limits::Budget;
 use super::paths::Resolver;
+use super::place::place;
 use super::wires::{self, Wires};
 use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
 use crate::math::{DAffine3, DVec3};
@@ -56,7 +56,7 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
     let coding = color::settle(&mut statements.soup.colors);
     coding.warning(["obj-color-bytes", "obj-color-range"], file).into_iter().for_each(|told| warnings.push(told));
     let soup = std::mem::take(&mut statements.soup);
-    let placed = place::place(&soup.positions);
+    let placed = place(&soup.positions);
     let flatness = assemble::flatness(&placed.positions, statements.places);
     let mut assembled = assemble::assemble(&statements, &soup, &placed, options.polygons, flatness);
     let (wire_runs, mut wires): (Vec<u32>, Vec<Wires>) =

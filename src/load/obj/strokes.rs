@@ -2,9 +2,9 @@
 
 use super::assemble::{Key, fill_vertices, name};
 use super::pairs::Pairs;
-use super::place::Placed;
 use super::soup::{Corner, NONE, Soup};
 use super::statements::{Statements, Stroke};
+use crate::load::place::Placed;
 use crate::load::wires::Wires;
 use crate::math::Vec3;
 use crate::scene::Mesh;

@@ -141,11 +141,13 @@ mod shapes;
 mod view;
 
 use self::reader::{Faults, Table, color, number, string, word};
+use self::shapes::Lost;
 use super::paths::Resolver;
 use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
 use crate::math::DVec3;
 use crate::scene::{Background, Environment, Material, Panorama, Scene, UpAxis};
 use crate::stopwatch::Stopwatch;
+use std::collections::HashMap;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
@@ -164,18 +166,27 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
         }
     };
     let faults = Faults::new(source.path.clone(), text);
-    let (root, syntax) = DeTable::parse_recoverable(faults.text());
-    for error in &syntax {
-        faults.note("scene-syntax", &error.span().unwrap_or(0..0), error.message().replace('\n', ", "), "");
-    }
-    if !syntax.is_empty() {
-        return Err(faults.into_result().err().unwrap_or_else(|| Diagnostic::default().into()));
-    }
-    let parsed = parse(&faults, root.get_ref(), options);
-    let resolver = Resolver::new(source, options);
-    drop(root);
-    faults.into_result()?;
-    assemble(parsed, resolver, source, options)
+    let parsed = read(&faults, options)?;
+    assemble(parsed, &faults, source, options)
+}
+
+/// Reads the text.
+fn read(faults: &Faults, options: &LoadOptions) -> Result<Parsed, LoadError> {
+    /// Texts up to this size are read to their end for all faults of their syntax, each of which takes memory.
+    const SMALL: usize = 1 << 20;
+    let parsed = match DeTable::parse(faults.text()) {
+        Ok(root) => Some(parse(faults, root.get_ref(), options)),
+        Err(first) => {
+            let recover = || DeTable::parse_recoverable(faults.text()).1;
+            let all = if faults.text().len() <= SMALL { recover() } else { vec![first] };
+            for error in all {
+                faults.note("scene-syntax", &error.span().unwrap_or(0..0), error.message().replace('\n', ", "), "");
+            }
+            None
+        }
+    };
+    faults.check()?;
+    parsed.ok_or_else(|| Diagnostic::default().into())
 }
 
 /// What the text says, before any model is read.
@@ -183,19 +194,24 @@ struct Parsed {
     scene: Scene,
     models: Vec<Model>,
     panorama: Option<Surrounding>,
+    lost: Lost,
+    /// The largest displacement of a vertex by rounding to `f32`, world units.
+    max_rounding: f64,
 }
 
 /// A picture around the scene.
 struct Surrounding {
     file: String,
-    place: String,
+    /// The byte at which it is named.
+    at: usize,
     rotation: f32,
 }
 
 /// One `[[models]]` entry.
 struct Model {
     file: String,
-    place: String,
+    /// The byte at which it is named.
+    at: usize,
     up: Option<UpAxis>,
     material: Option<u32>,
     world_from_model: crate::math::DAffine3,
@@ -206,7 +222,7 @@ fn parse<'a>(faults: &'a Faults, root: &'a DeTable<'a>, options: &LoadOptions) -
     let mut scene = Scene { up: root.get("up", word(&UP)).or(options.up).unwrap_or_default(), ..Scene::default() };
     scene.up = options.up.unwrap_or(scene.up);
     scene.background = root.get("background", background);
-    let panorama = surrounding(faults, &root);
+    let panorama = surrounding(&root);
     match panorama {
         Some(_) => scene.environment = Environment::Panorama,
         None => scene.environment = root.get("environment", environment).unwrap_or_default(),
@@ -217,33 +233,34 @@ fn parse<'a>(faults: &'a Faults, root: &'a DeTable<'a>, options: &LoadOptions) -
         let read = |(name, table): (String, Table)| materials::material(&name, table);
         scene.materials = materials.named("material").into_iter().map(read).collect();
     }
+    let named = |(material, id): (&Material, u32)| (material.name.clone(), id);
+    let mut names = Names(scene.materials.iter().zip(0..).map(named).collect());
     let mut models = Vec::new();
     for table in root.tables("models", "model") {
-        models.extend(model(faults, &mut scene, table));
+        models.extend(model(&mut scene, &mut names, table));
     }
+    let mut lost = Lost::default();
+    let mut inline = Vec::new();
     for table in root.tables("meshes", "mesh") {
-        let material = material_of(&mut scene, &table);
-        if let Some((mesh, mut instance)) = shapes::mesh(table, material) {
-            instance.mesh = count(scene.meshes.len());
-            scene.meshes.push(mesh);
-            scene.instances.push(instance);
-        }
+        let material = names.material(&mut scene, &table);
+        inline.extend(shapes::mesh(table, material, &mut lost));
     }
+    let max_rounding = shapes::place(inline, &mut scene, &mut lost);
     for table in root.tables("spheres", "sphere") {
-        let material = material_of(&mut scene, &table);
-        scene.spheres.extend(shapes::sphere(table, material));
+        let material = names.material(&mut scene, &table);
+        scene.spheres.extend(shapes::sphere(table, material, &mut lost));
     }
     for table in root.tables("cones", "cone") {
-        let material = material_of(&mut scene, &table);
-        scene.cones.extend(shapes::cone(table, material));
+        let material = names.material(&mut scene, &table);
+        scene.cones.extend(shapes::cone(table, material, &mut lost));
     }
     for table in root.tables("cylinders", "cylinder") {
-        let material = material_of(&mut scene, &table);
-        scene.cones.extend(shapes::cylinder(table, material));
+        let material = names.material(&mut scene, &table);
+        scene.cones.extend(shapes::cylinder(table, material, &mut lost));
     }
     for table in root.tables("planes", "plane") {
-        let material = material_of(&mut scene, &table);
-        scene.planes.extend(shapes::plane(table, material));
+        let material = names.material(&mut scene, &table);
+        scene.planes.extend(shapes::plane(table, material, &mut lost));
     }
     for table in root.tables("lights", "light") {
         match view::light(table) {
@@ -258,39 +275,47 @@ fn parse<'a>(faults: &'a Faults, root: &'a DeTable<'a>, options: &LoadOptions) -
     }
     scene.hints.camera = (!scene.cameras.is_empty()).then_some(0);
     root.finish();
-    Parsed { scene, models, panorama }
+    Parsed { scene, models, panorama, lost, max_rounding }
 }
 
-fn model(faults: &Faults, scene: &mut Scene, table: Table) -> Option<Model> {
+fn model(scene: &mut Scene, names: &mut Names, table: Table) -> Option<Model> {
     let file = table.need("file", string);
-    let place = faults.place(table.place_of("file").start);
-    let material = table.has("material").then(|| material_of(scene, &table));
+    let at = table.place_of("file").start;
+    let material = table.has("material").then(|| names.material(scene, &table));
     let up = table.get("up", word(&UP));
     let world_from_model = shapes::transform(&table);
     table.finish();
-    Some(Model { file: file?, place, up, material, world_from_model })
+    Some(Model { file: file?, at, up, material, world_from_model })
 }
 
-/// The index of the material a shape names; one that names none gets the plain one.
-fn material_of(scene: &mut Scene, table: &Table) -> u32 {
-    let named = table.get("material", |value| {
-        let name = string(value)?;
-        if let Some(i) = scene.materials.iter().position(|m| m.name == name) {
-            return Ok(i);
-        }
-        let known = || scene.materials.iter().map(|m| m.name.as_str());
-        let near = super::suggest::nearest(&name, known());
-        let hint = near.map_or_else(|| super::suggest::list(known()), |near| format!("did you mean `{near}`?"));
-        Err(format!("is `{name}`, but no [materials.{name}] is there; {hint}"))
-    });
-    if let Some(i) = named {
-        return count(i);
+/// Materials by name.
+struct Names(HashMap<String, u32>);
+
+impl Names {
+    /// The index of the material a shape names; one that names none gets the plain one.
+    fn material(&mut self, scene: &mut Scene, table: &Table) -> u32 {
+        let is_listed = table.faults.lists(table.place_of("material").start);
+        let named = table.get("material", |value| {
+            let name = string(value)?;
+            self.0.get(&name).copied().ok_or_else(|| {
+                if !is_listed {
+                    return String::new();
+                }
+                let known = || scene.materials.iter().map(|m| m.name.as_str());
+                let near = super::suggest::nearest(&name, known());
+                let hint = near.map_or_else(|| super::suggest::list(known()), |near| format!("did you mean `{near}`?"));
+                format!("is `{name}`, but no [materials.{name}] is there; {hint}")
+            })
+        });
+        let plain = || {
+            let plain = Material::plain();
+            *self.0.entry(plain.name.clone()).or_insert_with(|| {
+                scene.materials.push(plain);
+                count(scene.materials.len() - 1)
+            })
+        };
+        named.unwrap_or_else(plain)
     }
-    let plain = scene.materials.iter().position(|m| m.name == "plain").unwrap_or_else(|| {
-        scene.materials.push(Material::plain());
-        scene.materials.len() - 1
-    });
-    count(plain)
 }
 
 fn background(value: &DeValue) -> Result<Background, String> {
@@ -302,7 +327,7 @@ fn background(value: &DeValue) -> Result<Background, String> {
 }
 
 /// The picture that `environment` names, if it names a file.
-fn surrounding(faults: &Faults, root: &Table) -> Option<Surrounding> {
+fn surrounding(root: &Table) -> Option<Surrounding> {
     let named = |value: &DeValue| Ok(value.as_str().filter(|name| is_picture(name)).map(str::to_owned));
     let file = root.get("environment", named).flatten();
     let degrees = root.get("environment_rotation", number);
@@ -315,7 +340,7 @@ fn surrounding(faults: &Faults, root: &Table) -> Option<Surrounding> {
     };
     #[expect(clippy::cast_possible_truncation, reason = "an angle")]
     let rotation = (degrees.unwrap_or(0.0) % 360.0).to_radians() as f32;
-    Some(Surrounding { file, place: faults.place(root.place_of("environment").start), rotation })
+    Some(Surrounding { file, at: root.place_of("environment").start, rotation })
 }
 
 fn is_picture(name: &str) -> bool {
@@ -332,27 +357,24 @@ fn environment(value: &DeValue) -> Result<Environment, String> {
 }
 
 /// Reads the models and puts everything together.
-fn assemble(
-    parsed: Parsed,
-    mut resolver: Resolver,
-    source: &Source,
-    options: &LoadOptions,
-) -> Result<Loaded, LoadError> {
-    let Parsed { mut scene, models, panorama } = parsed;
+fn assemble(parsed: Parsed, faults: &Faults, source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
+    let Parsed { mut scene, models, panorama, lost, max_rounding } = parsed;
     let mut warnings = Warnings::default();
-    let mut facts = Facts { format: "meshray scene".into(), ..Facts::default() };
-    facts.faces = scene.meshes.iter().map(faces).sum();
-    if let Some(Surrounding { file, place, rotation }) = panorama {
+    let mut facts = Facts { format: "meshray scene".into(), max_rounding, ..Facts::default() };
+    facts.faces = scene.meshes.iter().map(|mesh| mesh.faces() as u64).sum();
+    lost.tell(faults, &source.path, &mut facts, &mut warnings);
+    let mut resolver = Resolver::new(source, options);
+    if let Some(Surrounding { file, at, rotation }) = panorama {
         let bytes = resolver
             .read_file(Path::new(&file))
-            .map_err(|fault| LoadError::from(fault.diagnose(&source.path, &place)))?;
+            .map_err(|fault| LoadError::from(fault.diagnose(&source.path, &faults.place(at))))?;
         let picture = Source { path: source.path.with_file_name(&file), bytes };
         let read = super::panorama::decode(&picture, &options.limits)?;
         read.warnings.into_iter().for_each(|w| warnings.push(w));
         scene.panorama = Some(Panorama { rotation, ..read.panorama });
     }
     for model in models {
-        let mut part = read_model(&model, &mut resolver, source, options)?;
+        let mut part = read_model(&model, faults, &mut resolver, source, options)?;
         part.warnings.into_iter().for_each(|w| warnings.push(w));
         facts.faces += part.facts.faces;
         facts.dropped.extend(part.facts.dropped);
@@ -366,16 +388,19 @@ fn assemble(
         if facts.variants.is_empty() {
             (facts.variants, facts.variant) = (part.facts.variants, part.facts.variant);
         }
-        facts.max_rounding = facts.max_rounding.max(part.facts.max_rounding);
+        let moved = part.facts.max_rounding * shapes::stretch(&model.world_from_model);
+        facts.max_rounding = facts.max_rounding.max(moved);
         facts.reading += part.facts.reading;
         facts.decoding += part.facts.decoding;
+        // Shapes count on from this scene's materials once they are appended, so an override comes after.
+        let [meshes, spheres, cones, planes] =
+            [scene.meshes.len(), scene.spheres.len(), scene.cones.len(), scene.planes.len()];
+        scene.append(std::mem::take(&mut part.scene), &model.world_from_model);
         if let Some(material) = model.material {
-            // Meshes count on from this scene's materials once they are appended, so the override comes after.
-            let first = scene.meshes.len();
-            scene.append(std::mem::take(&mut part.scene), &model.world_from_model);
-            scene.meshes[first..].iter_mut().for_each(|m| m.material = material);
-        } else {
-            scene.append(std::mem::take(&mut part.scene), &model.world_from_model);
+            scene.meshes[meshes..].iter_mut().for_each(|mesh| mesh.material = material);
+            scene.spheres[spheres..].iter_mut().for_each(|sphere| sphere.material = material);
+            scene.cones[cones..].iter_mut().for_each(|cone| cone.material = material);
+            scene.planes[planes..].iter_mut().for_each(|plane| plane.material = material);
         }
     }
     facts.reading += resolver.reading();
@@ -383,19 +408,17 @@ fn assemble(
     Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
 }
 
-fn faces(mesh: &crate::scene::Mesh) -> u64 {
-    mesh.face_of_triangle.last().map_or(0, |&last| u64::from(last) + 1)
-}
-
 fn read_model(
     model: &Model,
+    faults: &Faults,
     resolver: &mut Resolver,
     source: &Source,
     options: &LoadOptions,
 ) -> Result<Loaded, LoadError> {
+    let place = || faults.place(model.at);
     let path = resolver
         .locate(Path::new(&model.file))
-        .map_err(|fault| LoadError::from(fault.diagnose(&source.path, &model.place)))?;
+        .map_err(|fault| LoadError::from(fault.diagnose(&source.path, &place())))?;
     let options = LoadOptions { root: Some(resolver.root().to_path_buf()), up: model.up, ..options.clone() };
     let watch = Stopwatch::of_this_thread();
     let model_source = super::read_source(&path, &options.limits)?;
@@ -403,7 +426,7 @@ fn read_model(
     // Asked before it is read, or a file that names itself would never end.
     if matches!(super::detect::detect(&model_source)?, super::detect::Format::SceneFile) {
         let text = format!("`{}` is a scene file, and scene files do not nest", model.file);
-        return Err(Diagnostic::new("scene-nested", &source.path, &model.place, text).remedy("name a model").into());
+        return Err(Diagnostic::new("scene-nested", &source.path, place(), text).remedy("name a model").into());
     }
     let mut loaded = super::load_source(&model_source, &options)?;
     loaded.facts.reading += reading;

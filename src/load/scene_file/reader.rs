@@ -1,12 +1,12 @@
 //! Tables of a scene file, read key by key: every fault is noted with its line and column, unknown keys with the
-//! nearest known one, and reading goes on so that all faults are told at once.
+//! nearest known one, and reading goes on so that all faults are told at once; of very many, the first ones.
 //!
 //! Knows TOML, not scenes.
 
 use crate::load::suggest::{list, nearest};
 use crate::load::{Diagnostic, LoadError};
 use crate::math::{DVec3, Vec3};
-use std::cell::RefCell;
+use std::cell::{Cell, OnceCell, RefCell};
 use std::ops::Range;
 use std::path::PathBuf;
 use toml::Spanned;
@@ -15,16 +15,25 @@ use toml::de::{DeTable, DeValue};
 /// Bytes of the file.
 pub(super) type Span = Range<usize>;
 
+/// Faults that are listed; the others are only counted.
+const SHOWN: usize = 20;
+
 /// The file and what is wrong with it.
 pub(super) struct Faults {
     file: PathBuf,
     text: String,
-    list: RefCell<Vec<Diagnostic>>,
+    /// Where each line starts; made when somebody asks.
+    lines: OnceCell<Vec<usize>>,
+    /// Those that are listed, each with the byte it is at, and a few more.
+    list: RefCell<Vec<(usize, Diagnostic)>>,
+    /// How many are not in the list.
+    hidden: Cell<u32>,
 }
 
 impl Faults {
     pub(super) fn new(file: PathBuf, text: String) -> Self {
-        Self { file, text, list: RefCell::default() }
+        let (lines, list, hidden) = (OnceCell::new(), RefCell::default(), Cell::new(0));
+        Self { file, text, lines, list, hidden }
     }
 
     pub(super) fn text(&self) -> &str {
@@ -33,28 +42,61 @@ impl Faults {
 
     /// `line:column` of a byte, both from 1, columns in characters.
     pub(super) fn place(&self, at: usize) -> String {
-        let before = self.text.get(..at).unwrap_or(&self.text);
-        let line_start = before.rfind('\n').map_or(0, |i| i + 1);
-        format!("{}:{}", before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
+        let ends = || self.text.bytes().zip(1..).filter(|(byte, _)| *byte == b'\n').map(|(_, after)| after);
+        let lines = self.lines.get_or_init(|| std::iter::once(0).chain(ends()).collect());
+        let at = if self.text.is_char_boundary(at) { at } else { self.text.len() };
+        let line = lines.partition_point(|&start| start <= at);
+        let start = line.checked_sub(1).and_then(|line| lines.get(line)).copied().unwrap_or_default();
+        format!("{line}:{}", self.text[start..at].chars().count() + 1)
     }
 
     pub(super) fn note(&self, code: &'static str, at: &Span, text: impl Into<String>, remedy: impl Into<String>) {
-        let fault = Diagnostic::new(code, &self.file, self.place(at.start), text).remedy(remedy);
-        self.list.borrow_mut().push(fault);
+        let fault = Diagnostic::new(code, &self.file, "", text).remedy(remedy);
+        let mut list = self.list.borrow_mut();
+        list.push((at.start, fault));
+        if list.len() >= 2 * SHOWN {
+            self.shorten(&mut list);
+        }
+    }
+
+    /// Whether a fault at this byte would be listed; one that is not costs no thought about what may have been meant.
+    pub(super) fn lists(&self, at: usize) -> bool {
+        self.list.borrow().iter().filter(|(start, _)| *start <= at).count() < SHOWN
+    }
+
+    /// Counts a fault that would not be listed.
+    pub(super) fn count(&self) {
+        self.hidden.set(self.hidden.get().saturating_add(1));
+    }
+
+    /// Keeps the first ones, in the order of the file.
+    fn shorten(&self, list: &mut Vec<(usize, Diagnostic)>) {
+        list.sort_by_key(|(start, _)| *start);
+        for _ in list.drain(SHOWN.min(list.len())..) {
+            self.count();
+        }
     }
 
     /// All faults, in the order of the file; or nothing, when there are none.
-    pub(super) fn into_result(self) -> Result<(), LoadError> {
-        let mut list = self.list.into_inner();
-        let line = |d: &Diagnostic| d.place.split(':').map(|n| n.parse().unwrap_or(0)).collect::<Vec<u64>>();
-        list.sort_by_key(line);
-        if list.is_empty() { Ok(()) } else { Err(LoadError::Input(list)) }
+    pub(super) fn check(&self) -> Result<(), LoadError> {
+        let mut list = self.list.take();
+        self.shorten(&mut list);
+        let place = |(at, fault): (usize, Diagnostic)| Diagnostic { place: self.place(at), ..fault };
+        let mut faults: Vec<Diagnostic> = list.into_iter().map(place).collect();
+        if faults.is_empty() {
+            return Ok(());
+        }
+        let hidden = self.hidden.take();
+        if hidden > 0 {
+            faults.push(Diagnostic::new("scene-more-faults", &self.file, "", format!("{hidden} more faults")));
+        }
+        Err(LoadError::Input(faults))
     }
 }
 
 /// One table; [`Table::finish`] complains about the keys nobody asked for.
 pub(super) struct Table<'a> {
-    faults: &'a Faults,
+    pub(super) faults: &'a Faults,
     /// What it describes, for messages: `light`, `material`.
     what: &'static str,
     /// Where it begins.
@@ -151,6 +193,10 @@ impl<'a> Table<'a> {
     pub(super) fn finish(self) {
         let asked = self.asked.into_inner();
         for key in self.map.keys().filter(|key| !asked.contains(&key.get_ref().as_ref())) {
+            if !self.faults.lists(key.span().start) {
+                self.faults.count();
+                continue;
+            }
             let name = key.get_ref();
             let remedy = match nearest(name, asked.iter().copied()) {
                 Some(near) => format!("did you mean `{near}`?"),

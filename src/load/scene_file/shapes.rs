@@ -1,13 +1,79 @@
 //! `[[meshes]]`, `[[spheres]]`, `[[cones]]`, `[[cylinders]]`, `[[planes]]` and the transform keys.
 
-use super::reader::{Table, direction, each, not_negative, number, numbers, positive, string, vec};
+use super::reader::{Faults, Table, direction, each, not_negative, number, numbers, positive, string, vec};
+use crate::load::place::{bounds, is_usable, leave_out_collapsed, place_around};
+use crate::load::{Diagnostic, Facts, Warnings};
 use crate::math::ear_clip::EarClipper;
+use crate::math::frame::snapped_center;
 use crate::math::{DAffine3, DMat3, DQuat, DVec3};
-use crate::scene::{Cone, Instance, Mesh, Plane, Sphere};
+use crate::scene::{Cone, Instance, Mesh, Plane, Scene, Sphere};
+use std::collections::HashMap;
+use std::path::Path;
 use toml::de::DeValue;
 
-/// Reads one inline mesh; the instance's `mesh` index is left 0 for the caller.
-pub(super) fn mesh(table: Table, material: u32) -> Option<(Mesh, Instance)> {
+/// What could not be drawn: how many, and the byte at which the first stands.
+#[derive(Default)]
+pub(super) struct Lost {
+    /// Shapes and faces with a coordinate or size that counts as infinite.
+    far: (u64, usize),
+    /// Triangles that rounding has collapsed.
+    collapsed: (u64, usize),
+}
+
+impl Lost {
+    /// Tells of what was lost in the facts and as warnings.
+    pub(super) fn tell(self, faults: &Faults, file: &Path, facts: &mut Facts, warnings: &mut Warnings) {
+        for (code, reason, text, (count, at)) in [
+            (
+                "shape-too-far",
+                "a coordinate over 1e18",
+                "a shape is left out: a coordinate or size is over 1e18",
+                self.far,
+            ),
+            (
+                "face-degenerate",
+                "two corners in one place",
+                "a triangle is left out: two corners are in one place once coordinates are rounded",
+                self.collapsed,
+            ),
+        ] {
+            if count > 0 {
+                let warning = Diagnostic::new(code, file, faults.place(at), text);
+                warnings.push(Diagnostic { count: u32::try_from(count).unwrap_or(u32::MAX), ..warning });
+                facts.dropped.push((reason.into(), count));
+            }
+        }
+    }
+
+    /// Whether a shape can be drawn by its places and sizes; counted if not.
+    fn is_drawn(&mut self, places: &[DVec3], at: usize) -> bool {
+        let drawn = places.iter().copied().all(is_usable);
+        if !drawn {
+            count(&mut self.far, at);
+        }
+        drawn
+    }
+}
+
+fn count((number, first): &mut (u64, usize), at: usize) {
+    if *number == 0 {
+        *first = at;
+    }
+    *number += 1;
+}
+
+/// An inline mesh before its coordinates are rounded.
+pub(super) struct Inline {
+    mesh: Mesh,
+    positions: Vec<DVec3>,
+    world_from_object: DAffine3,
+    /// The byte at which it stands.
+    at: usize,
+}
+
+/// Reads one inline mesh.
+pub(super) fn mesh(table: Table, material: u32, lost: &mut Lost) -> Option<Inline> {
+    let at = table.span.start;
     let name = table.get("name", string).unwrap_or_default();
     let positions = table.need("positions", each(vec));
     let faces = table.need("faces", each(each(index)));
@@ -18,15 +84,73 @@ pub(super) fn mesh(table: Table, material: u32) -> Option<(Mesh, Instance)> {
     table.finish();
     let (positions, faces) = (positions?, faces?);
 
-    let mut mesh = Mesh { name: name.clone(), material, ..Mesh::default() };
+    let mut mesh = Mesh { name, material, ..Mesh::default() };
+    let mut clipper = EarClipper::default();
     for (face, corners) in faces.iter().enumerate() {
-        let cut = cut(&positions, corners);
+        // None when a corner is out of range, a fault that is noted elsewhere.
+        let points: Option<Vec<DVec3>> = corners.iter().map(|&c| positions.get(c as usize).copied()).collect();
+        let points = points.unwrap_or_default();
+        if !lost.is_drawn(&points, at) {
+            continue;
+        }
+        let mut cut = Vec::new();
+        clipper.cut(&points, &mut cut);
         #[expect(clippy::cast_possible_truncation, reason = "a scene file is far smaller than 2^32 faces")]
         mesh.face_of_triangle.extend(cut.iter().map(|_| face as u32));
-        mesh.triangles.extend(cut);
+        mesh.triangles.extend(cut.iter().map(|triangle| triangle.map(|i| corners[i as usize])));
     }
-    mesh.positions = positions.iter().map(|p| p.as_vec3()).collect();
-    Some((mesh, Instance { name, mesh: 0, world_from_object }))
+    let positions = used(&mut mesh, positions);
+    Some(Inline { mesh, positions, world_from_object, at })
+}
+
+/// The positions that triangles use, in the order of the file; numbers these anew.
+fn used(mesh: &mut Mesh, positions: Vec<DVec3>) -> Vec<DVec3> {
+    let mut is_used = vec![false; positions.len()];
+    mesh.triangles.iter().flatten().for_each(|&corner| is_used[corner as usize] = true);
+    if is_used.iter().all(|&used| used) {
+        return positions;
+    }
+    let mut next = 0;
+    let numbers: Vec<u32> = is_used.iter().map(|&used| (next, next += u32::from(used)).0).collect();
+    mesh.triangles.iter_mut().flatten().for_each(|corner| *corner = numbers[*corner as usize]);
+    positions.into_iter().zip(is_used).filter(|(_, used)| *used).map(|(position, _)| position).collect()
+}
+
+/// Rounds the coordinates of inline meshes and puts them into the scene; the largest displacement by that, world units.
+///
+/// Those that are placed alike have one centre, so that what touches is still seen to stand together.
+pub(super) fn place(inline: Vec<Inline>, scene: &mut Scene, lost: &mut Lost) -> f64 {
+    let key = |place: &DAffine3| place.to_cols_array().map(f64::to_bits);
+    let mut boxes: HashMap<[u64; 12], (DVec3, DVec3)> = HashMap::new();
+    for part in &inline {
+        let (lo, hi) = bounds(&part.positions);
+        let all = boxes.entry(key(&part.world_from_object)).or_insert((lo, hi));
+        *all = (all.0.min(lo), all.1.max(hi));
+    }
+    let mut max_rounding = 0.0f64;
+    for Inline { mut mesh, positions, world_from_object, at } in inline {
+        let center = boxes.get(&key(&world_from_object)).map_or(DVec3::ZERO, |&(lo, hi)| snapped_center(lo, hi));
+        let placed = place_around(&positions, center);
+        max_rounding = max_rounding.max(placed.max_rounding * stretch(&world_from_object));
+        mesh.positions = placed.positions;
+        let collapsed = leave_out_collapsed(&mut mesh);
+        if collapsed > 0 {
+            count(&mut lost.collapsed, at);
+            lost.collapsed.0 += collapsed - 1;
+        }
+        let world_from_object = world_from_object * DAffine3::from_translation(center);
+        #[expect(clippy::cast_possible_truncation, reason = "a scene file is far smaller than 2^32 lines")]
+        let number = scene.meshes.len() as u32;
+        scene.instances.push(Instance { name: mesh.name.clone(), mesh: number, world_from_object });
+        scene.meshes.push(mesh);
+    }
+    max_rounding
+}
+
+/// How much longer a transform makes a line, at most: exact where its axes stay perpendicular.
+pub(super) fn stretch(transform: &DAffine3) -> f64 {
+    let DMat3 { x_axis, y_axis, z_axis } = transform.matrix3;
+    x_axis.length().max(y_axis.length()).max(z_axis.length())
 }
 
 fn index(value: &DeValue) -> Result<u32, String> {
@@ -47,25 +171,20 @@ fn check_faces(table: &Table, positions: usize, faces: &[Vec<u32>]) {
     }
 }
 
-/// Triangles of a face; none when a corner is out of range (that fault is noted elsewhere).
-fn cut(positions: &[DVec3], corners: &[u32]) -> Vec<[u32; 3]> {
-    let points: Option<Vec<DVec3>> = corners.iter().map(|&c| positions.get(c as usize).copied()).collect();
-    let mut triangles = Vec::new();
-    EarClipper::default().cut(&points.unwrap_or_default(), &mut triangles);
-    triangles.iter().map(|triangle| triangle.map(|i| corners[i as usize])).collect()
-}
-
 /// Reads one sphere.
-pub(super) fn sphere(table: Table, material: u32) -> Option<Sphere> {
+pub(super) fn sphere(table: Table, material: u32, lost: &mut Lost) -> Option<Sphere> {
+    let at = table.span.start;
     let name = table.get("name", string).unwrap_or_default();
     let center = table.need("center", vec);
     let radius = table.need("radius", positive);
     table.finish();
-    Some(Sphere { name, center: center?, radius: radius?, material })
+    let (center, radius) = (center?, radius?);
+    lost.is_drawn(&[center, DVec3::splat(radius)], at).then_some(Sphere { name, center, radius, material })
 }
 
 /// Reads one cone.
-pub(super) fn cone(table: Table, material: u32) -> Option<Cone> {
+pub(super) fn cone(table: Table, material: u32, lost: &mut Lost) -> Option<Cone> {
+    let at = table.span.start;
     let name = table.get("name", string).unwrap_or_default();
     let (base, apex) = ends(&table, "base", "apex");
     let base_radius = table.need("base_radius", not_negative);
@@ -75,16 +194,22 @@ pub(super) fn cone(table: Table, material: u32) -> Option<Cone> {
         table.note(&at, "both radii are 0, which leaves a line", "make one larger");
     }
     table.finish();
-    Some(Cone { name, base: base?, base_radius: base_radius?, apex: apex?, apex_radius, material })
+    drawn(Cone { name, base: base?, base_radius: base_radius?, apex: apex?, apex_radius, material }, at, lost)
 }
 
 /// Reads one cylinder: a cone with equal radii.
-pub(super) fn cylinder(table: Table, material: u32) -> Option<Cone> {
+pub(super) fn cylinder(table: Table, material: u32, lost: &mut Lost) -> Option<Cone> {
+    let at = table.span.start;
     let name = table.get("name", string).unwrap_or_default();
     let (base, top) = ends(&table, "base", "top");
     let radius = table.need("radius", positive);
     table.finish();
-    Some(Cone { name, base: base?, base_radius: radius?, apex: top?, apex_radius: radius?, material })
+    drawn(Cone { name, base: base?, base_radius: radius?, apex: top?, apex_radius: radius?, material }, at, lost)
+}
+
+fn drawn(cone: Cone, at: usize, lost: &mut Lost) -> Option<Cone> {
+    let radii = DVec3::new(cone.base_radius, cone.apex_radius, 0.0);
+    lost.is_drawn(&[cone.base, cone.apex, radii], at).then_some(cone)
 }
 
 /// The two ends of an axis; they must differ.
@@ -98,12 +223,14 @@ fn ends(table: &Table, first: &'static str, second: &'static str) -> (Option<DVe
 }
 
 /// Reads one plane.
-pub(super) fn plane(table: Table, material: u32) -> Option<Plane> {
+pub(super) fn plane(table: Table, material: u32, lost: &mut Lost) -> Option<Plane> {
+    let at = table.span.start;
     let name = table.get("name", string).unwrap_or_default();
     let normal = table.need("normal", direction);
     let point = table.get("point", vec).unwrap_or(DVec3::ZERO);
     table.finish();
-    normal.map(|normal| Plane { name, normal, offset: normal.dot(point), material })
+    let normal = normal?;
+    lost.is_drawn(&[point], at).then(|| Plane { name, normal, offset: normal.dot(point), material })
 }
 
 /// `matrix`, or `scale`, then `rotate`, then `translate`.

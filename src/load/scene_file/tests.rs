@@ -120,6 +120,82 @@ fn all_faults_are_told_in_the_order_of_the_file() {
 }
 
 #[test]
+fn of_many_faults_the_first_are_listed_in_little_time() {
+    // Names that are not there, whose nearest is looked for; in one line, where columns are far from its start.
+    let materials: String = (0..20_000).map(|i| format!("[materials.m{i}]\n")).collect();
+    let wrong = "{ center = [0, 0, 0], radius = 1, material = 'n', radios = 1 },".repeat(20_000);
+    let start = std::time::Instant::now();
+    let errors = faults(&format!("spheres = [{wrong}]\n{materials}"));
+    assert!(start.elapsed().as_secs() < 30, "{:?}", start.elapsed());
+    assert_eq!((errors.len(), errors[20].as_str()), (21, "dir/test.toml: 39980 more faults"));
+    assert!(
+        errors[0].starts_with("dir/test.toml:1:57: `material` is `n`, but no [materials.n] is there"),
+        "{}",
+        errors[0]
+    );
+    assert!(
+        errors[19].starts_with("dir/test.toml:1:629: unknown key `radios` in sphere; did you mean `radius`?"),
+        "{}",
+        errors[19]
+    );
+    // Those of syntax, too, and what is noted last may stand first.
+    let syntax = faults(&"=\n".repeat(100_000));
+    assert_eq!((syntax.len(), start.elapsed().as_secs() < 60), (21, true));
+    let first = faults(&format!("zzz = 1\n{}", "[[spheres]]\n".repeat(1000)));
+    assert!(first[0].starts_with("dir/test.toml:1:1: unknown key `zzz`"), "{}", first[0]);
+}
+
+#[test]
+fn many_materials_are_found_by_name_in_little_time() {
+    let text: String = (0..100_000)
+        .map(|i| format!("[materials.m{i}]\n[[spheres]]\ncenter=[0,0,0]\nradius=1\nmaterial='m{}'\n", 99_999 - i))
+        .collect();
+    let start = std::time::Instant::now();
+    let scene = load_text(&text).unwrap().scene;
+    assert_eq!((scene.materials.len(), scene.spheres[7].material), (100_000, 99_992));
+    assert!(start.elapsed().as_secs() < 30, "{:?}", start.elapsed());
+}
+
+#[test]
+fn meshes_far_from_the_origin_keep_their_digits_and_stand_together() {
+    let quad = |x: &str| {
+        format!(
+            "[[meshes]]\npositions=[[5000000.{x},4000000,0],[5000001,4000000.1,0],[5000001,4000001,0]]\nfaces=[[0,1,2]]\n"
+        )
+    };
+    let loaded = load_text(&format!(
+        "{}{}[[meshes]]\npositions=[[0.1,0,0],[1,0,0],[0,1,0]]\nfaces=[[0,1,2]]\nscale=2\n",
+        quad("1"),
+        quad("25")
+    ))
+    .unwrap();
+    assert!(loaded.facts.max_rounding < 1e-7 && loaded.warnings.is_empty(), "{:?}", loaded.facts);
+    let [a, b, c] = [0, 1, 2].map(|i| loaded.scene.instances[i].world_from_object);
+    assert_eq!((a, c.matrix3.x_axis), (b, DVec3::new(2.0, 0.0, 0.0)));
+    let corner = a.transform_point3(loaded.scene.meshes[0].positions[0].as_dvec3());
+    assert!(corner.distance(DVec3::new(5_000_000.1, 4e6, 0.0)) < 1e-7, "{corner}");
+}
+
+#[test]
+fn shapes_too_far_away_are_left_out_with_the_place_of_the_first() {
+    let text = "[[meshes]]\npositions=[[1e300,0,0],[0,0,0],[1,0,0],[0,1,0],[0,1e-40,0]]\nfaces=[[0,1,2],[1,2,3],[1,4,2]]\n\
+                [[spheres]]\ncenter=[1e308,0,0]\nradius=1e308\n[[cylinders]]\nbase=[0,0,0]\ntop=[1,0,0]\nradius=1e19\n\
+                [[cones]]\nbase=[0,0,0]\napex=[0,0,2e18]\nbase_radius=1\n[[planes]]\nnormal=[0,1,0]\npoint=[0,1e300,0]\n";
+    let loaded = load_text(text).unwrap();
+    let told: Vec<String> = loaded.warnings.iter().map(ToString::to_string).collect();
+    assert_eq!(
+        told,
+        [
+            "dir/test.toml:1:1: a shape is left out: a coordinate or size is over 1e18 (×5)",
+            "dir/test.toml:1:1: a triangle is left out: two corners are in one place once coordinates are rounded",
+        ]
+    );
+    let Scene { meshes, spheres, cones, planes, .. } = loaded.scene;
+    assert_eq!((spheres.len(), cones.len(), planes.len(), loaded.facts.faces), (0, 0, 0, 1));
+    assert!(meshes[0].positions.len() == 4 && meshes[0].positions.iter().all(|p| p.is_finite()));
+}
+
+#[test]
 fn transforms_act_in_the_order_scale_rotate_translate() {
     let at = |keys: &str| {
         let text = format!("[[meshes]]\npositions=[[1,0,0]]\nfaces=[]\n{keys}");
@@ -169,4 +245,25 @@ fn a_scene_file_that_names_itself_ends_in_a_message() {
     std::fs::write(&path, "[[models]]\nfile = \"a.toml\"\n").unwrap();
     let error = crate::load::load(&path, &LoadOptions::default()).unwrap_err().to_string();
     assert!(error.contains("a.toml:2:8") && error.contains("do not nest"), "{error}");
+}
+
+#[test]
+fn the_material_of_a_model_replaces_those_of_all_its_shapes() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(
+        dir.path().join("m.nff"),
+        "f 0 1 0 1 0 1 0 0\ns 0 0 0 1\nc 2 0 0 1 2 1 0 1\np 3 0 0 0 1 0 0 0 1 0\n",
+    )
+    .unwrap();
+    let text = "[materials.green]\n[materials.red]\n[[spheres]]\ncenter=[9,9,9]\nradius=1\nmaterial='green'\n\
+                [[models]]\nfile='m.nff'\nmaterial='red'\n[[models]]\nfile='m.nff'\n";
+    let source = Source { path: dir.path().join("a.toml"), bytes: text.into() };
+    let scene = load(&source, &LoadOptions::default()).unwrap().scene;
+    let named = |material: u32| scene.materials[material as usize].name.as_str();
+    assert_eq!(
+        scene.spheres.iter().map(|s| named(s.material)).collect::<Vec<_>>(),
+        ["green", "red", "0 1 0 1 0 1 0 0"]
+    );
+    assert_eq!(scene.cones.iter().map(|c| named(c.material)).collect::<Vec<_>>(), ["red", "0 1 0 1 0 1 0 0"]);
+    assert_eq!(scene.meshes.iter().map(|m| named(m.material)).collect::<Vec<_>>(), ["red", "0 1 0 1 0 1 0 0"]);
 }

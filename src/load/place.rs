@@ -2,6 +2,7 @@
 
 use crate::math::frame::snapped_center;
 use crate::math::{DVec3, Vec3};
+use crate::scene::Mesh;
 use rayon::prelude::*;
 
 /// Rounded positions, relative to `center`.
@@ -17,21 +18,35 @@ pub(super) struct Placed {
 /// Larger coordinates count as infinite, so that sums and products of a few of them stay within `f32`'s range.
 const LARGEST: f64 = 1e18;
 
+/// Whether a place or size is finite and not so large that it counts as infinite.
+pub(super) fn is_usable(p: DVec3) -> bool {
+    p.is_finite() && p.abs().max_element() <= LARGEST
+}
+
 /// Positions that one thread looks at at a time.
 const POSITIONS: usize = 1 << 13;
 
 /// Subtracts the centre of all finite positions in `f64`, then rounds.
 pub(super) fn place(positions: &[DVec3]) -> Placed {
-    let usable = |p: &&DVec3| p.is_finite() && p.abs().max_element() <= LARGEST;
+    let (lo, hi) = bounds(positions);
+    place_around(positions, snapped_center(lo, hi))
+}
+
+/// Least and greatest coordinates of all finite positions; infinite the wrong way round where there are none.
+pub(super) fn bounds(positions: &[DVec3]) -> (DVec3, DVec3) {
     let nothing = || (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let usable = |p: &&DVec3| is_usable(**p);
     let around = |part: &[DVec3]| part.iter().filter(usable).fold(nothing(), |(lo, hi), &p| (lo.min(p), hi.max(p)));
     let both = |(lo, hi): (DVec3, DVec3), (low, high): (DVec3, DVec3)| (lo.min(low), hi.max(high));
-    let (lo, hi) = positions.par_chunks(POSITIONS).map(around).reduce(nothing, both);
-    let center = snapped_center(lo, hi);
+    positions.par_chunks(POSITIONS).map(around).reduce(nothing, both)
+}
+
+/// Subtracts this centre in `f64`, then rounds.
+pub(super) fn place_around(positions: &[DVec3], center: DVec3) -> Placed {
     let mut rounded = vec![Vec3::NAN; positions.len()];
     let round = |(to, from): (&mut [Vec3], &[DVec3])| {
         let mut max_rounding = 0.0f64;
-        for (to, p) in to.iter_mut().zip(from).filter(|(_, p)| usable(p)) {
+        for (to, p) in to.iter_mut().zip(from).filter(|(_, p)| is_usable(**p)) {
             let exact = *p - center;
             *to = exact.as_vec3();
             max_rounding = max_rounding.max(to.as_dvec3().distance(exact));
@@ -41,6 +56,19 @@ pub(super) fn place(positions: &[DVec3]) -> Placed {
     let parts = rounded.par_chunks_mut(POSITIONS).zip(positions.par_chunks(POSITIONS));
     let max_rounding = parts.map(round).reduce(|| 0.0, f64::max);
     Placed { center, positions: rounded, max_rounding }
+}
+
+/// Leaves out triangles with two corners in one place, as coordinates are rounded; how many. Of each triangle the mesh
+/// says which face it was cut from.
+pub(super) fn leave_out_collapsed(mesh: &mut Mesh) -> u64 {
+    let place = |corner: u32| mesh.positions[corner as usize];
+    let is_wide = |[a, b, c]: &[u32; 3]| place(*a) != place(*b) && place(*b) != place(*c) && place(*c) != place(*a);
+    let wide: Vec<bool> = mesh.triangles.iter().map(is_wide).collect();
+    let mut kept = wide.iter();
+    mesh.triangles.retain(|_| kept.next().copied().unwrap_or(false));
+    let mut kept = wide.iter();
+    mesh.face_of_triangle.retain(|_| kept.next().copied().unwrap_or(false));
+    (wide.len() - mesh.triangles.len()) as u64
 }
 
 #[cfg(test)]
@@ -53,6 +81,15 @@ mod tests {
         let placed = place(&far);
         assert!((placed.center.x - 1e7).abs() < 1.0);
         assert!(placed.max_rounding > 0.0 && placed.max_rounding < 1e-8, "{}", placed.max_rounding);
+    }
+
+    #[test]
+    fn triangles_that_rounding_has_collapsed_are_left_out_with_their_faces() {
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::X];
+        let triangles = vec![[0, 1, 2], [1, 3, 2], [0, 2, 3]];
+        let mut mesh = Mesh { positions, triangles, face_of_triangle: vec![0, 1, 2], ..Mesh::default() };
+        assert_eq!(leave_out_collapsed(&mut mesh), 1);
+        assert_eq!((mesh.triangles, mesh.face_of_triangle), (vec![[0, 1, 2], [0, 2, 3]], vec![0, 2]));
     }
 
     #[test]
