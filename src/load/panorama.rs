@@ -1,7 +1,7 @@
 //! Pictures of surroundings: Radiance HDR, OpenEXR, and 8- or 16-bit pictures, whose colours are sRGB.
 
 use super::limits::{Budget, Limits};
-use super::texture::within;
+use super::texture::{format_of, within};
 use super::{Diagnostic, LoadError, Source};
 use crate::scene::Panorama;
 use crate::scene::color::from_srgb;
@@ -44,8 +44,8 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
         let remedy = "name an equirectangular .hdr or .exr, or `studio`, `white`, `black`";
         LoadError::from(Diagnostic::new("env-unusable", &source.path, "", text).remedy(remedy))
     };
-    let format = ::image::guess_format(&source.bytes)
-        .map_err(|_| fault("is no picture that can surround a scene: its kind is unknown".into()))?;
+    let format = format_of(&source.path.to_string_lossy(), &source.bytes)
+        .ok_or_else(|| fault("is no picture that can surround a scene: its kind is unknown".into()))?;
     let reader = |bytes| {
         let mut reader = ImageReader::with_format(Cursor::new(&source.bytes), format);
         reader.limits(within(bytes));

@@ -1,8 +1,8 @@
 //! Encoded pictures -> [`Bitmap`]s, for every loader.
 //!
-//! The kind of picture is found by its bytes, whatever its name or declared type says. Colour profiles, gamma chunks
-//! and EXIF orientation are ignored, as glTF demands. A picture that is missing or broken costs a warning; the
-//! material goes on without that map.
+//! The kind of picture is found by its bytes, whatever its name or declared type says, but for TGA, whose bytes say
+//! little. Colour profiles, gamma chunks and EXIF orientation are ignored, as glTF demands. A picture that is missing or
+//! broken costs a warning; the material goes on without that map.
 
 use super::limits::{Budget, Limits};
 use super::{Diagnostic, Warnings, ktx};
@@ -40,7 +40,7 @@ pub fn decode_all(
         return Default::default();
     }
     let start = Instant::now();
-    let sized: Vec<_> = images.iter().map(|image| check_size(&image.bytes, limits, budget)).collect();
+    let sized: Vec<_> = images.iter().map(|image| check_size(image, limits, budget)).collect();
     let decoded: Vec<_> = images
         .par_iter()
         .zip(sized)
@@ -121,17 +121,39 @@ pub(super) fn within(bytes: u64) -> ::image::Limits {
     limits
 }
 
+/// The kind of a picture: by its bytes, or where these are of no other kind and could be a TGA's, which begin with nothing
+/// of their own, by the ending of its name.
+pub(super) fn format_of(name: &str, bytes: &[u8]) -> Option<ImageFormat> {
+    let by_name = || (is_named_tga(name) && is_tga_header(bytes)).then_some(ImageFormat::Tga);
+    ::image::guess_format(bytes).ok().or_else(by_name)
+}
+
+fn is_named_tga(name: &str) -> bool {
+    let ending = Path::new(name).extension().unwrap_or_default();
+    ["tga", "targa", "icb", "vda", "vst"].iter().any(|known| ending.eq_ignore_ascii_case(known))
+}
+
+/// Whether a TGA may begin so: with a known type, bits a pixel, and pixels.
+fn is_tga_header(bytes: &[u8]) -> bool {
+    let Some(&[_, map, kind, .., w, wide, h, high, depth, _]) = bytes.first_chunk::<18>() else { return false };
+    map <= 1
+        && matches!(kind, 1..=3 | 9..=11)
+        && matches!(depth, 8 | 15 | 16 | 24 | 32)
+        && [[w, wide], [h, high]].into_iter().all(|size| u16::from_le_bytes(size) > 0)
+}
+
 /// Reads only the header; refuses what is too large.
 ///
 /// Taken from `budget` are the pixels as they are kept, and the smaller copies that lookups make of them: once, as it is
 /// not known here which slots will read them, and whether some take them for colours and some for data.
-fn check_size(bytes: &[u8], limits: &Limits, budget: &mut Budget) -> Result<Kind, Unusable> {
+fn check_size(image: &Encoded, limits: &Limits, budget: &mut Budget) -> Result<Kind, Unusable> {
+    let bytes = image.bytes.as_ref();
     if ktx::is(bytes) {
         let ktx::Size { width, height, between } = ktx::size(bytes)?;
         take_memory(width, height, (4, between), limits, budget)?;
         return Ok(Kind::Ktx);
     }
-    let format = ::image::guess_format(bytes).map_err(|_| unknown_kind(bytes))?;
+    let format = format_of(&image.name, bytes).ok_or_else(|| unknown_kind(bytes))?;
     if matches!(format, ImageFormat::Hdr | ImageFormat::OpenExr) {
         return Err(Unusable::new("it holds radiance (HDR or EXR), not colours of a surface"));
     }
@@ -140,7 +162,9 @@ fn check_size(bytes: &[u8], limits: &Limits, budget: &mut Budget) -> Result<Kind
     let decoder = reader.into_decoder()?;
     let (width, height) = decoder.dimensions();
     let texel = if is_deep(decoder.color_type()) { 8 } else { 4 };
-    take_memory(width, height, (texel, 0), limits, budget)?;
+    // A TGA of 16 bits or with a palette is unpacked from a copy.
+    let packed = if format == ImageFormat::Tga { 2 * u64::from(width) * u64::from(height) } else { 0 };
+    take_memory(width, height, (texel, packed), limits, budget)?;
     Ok(Kind::Image { format, bytes: decoder.total_bytes().saturating_add(BESIDE.min(budget.left())) })
 }
 
@@ -208,14 +232,22 @@ mod tests {
     use super::*;
     use std::borrow::Cow;
 
-    fn png(image: DynamicImage) -> Vec<u8> {
+    fn file(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
         let mut out = Cursor::new(Vec::new());
-        image.write_to(&mut out, ImageFormat::Png).unwrap();
+        image.write_to(&mut out, format).unwrap();
         out.into_inner()
     }
 
+    fn png(image: DynamicImage) -> Vec<u8> {
+        file(&image, ImageFormat::Png)
+    }
+
     fn decode_one(bytes: &[u8], limits: &Limits) -> (Option<Bitmap>, Vec<Diagnostic>) {
-        let image = Encoded { name: "a.png".into(), place: "7".into(), bytes: Cow::Borrowed(bytes) };
+        decode_named("a.png", bytes, limits)
+    }
+
+    fn decode_named(name: &str, bytes: &[u8], limits: &Limits) -> (Option<Bitmap>, Vec<Diagnostic>) {
+        let image = Encoded { name: name.into(), place: "7".into(), bytes: Cow::Borrowed(bytes) };
         let mut warnings = Warnings::default();
         let mut budget = Budget::new(limits);
         let bitmap = decode_all(&[image], Path::new("m.obj"), limits, &mut budget, &mut warnings).0.remove(0);
@@ -237,6 +269,66 @@ mod tests {
         let deep = DynamicImage::ImageRgb16(::image::ImageBuffer::from_pixel(1, 1, ::image::Rgb([1u16, 2, 40000])));
         let bitmap = decode_one(&png(deep), &limits).0.unwrap();
         assert!(matches!(&bitmap.pixels, Pixels::Rgba16(p) if p[..] == [[1, 2, 40000, 65535]]));
+    }
+
+    #[test]
+    fn a_bmp_is_known_by_its_bytes_and_a_tga_by_its_name_too() {
+        let colors = |image: &DynamicImage| image.to_rgba8().pixels().map(|p| p.0).collect::<Vec<_>>();
+        let image = ::image::RgbaImage::from_fn(3, 2, |x, y| ::image::Rgba([x as u8 * 90, y as u8 * 200, 7, 255]));
+        let image = DynamicImage::ImageRgba8(image);
+        let read = |name: &str, bytes: &[u8]| match decode_named(name, bytes, &Limits::default()).0?.pixels {
+            Pixels::Rgba8(texels) => Some(texels),
+            other => panic!("{other:?}"),
+        };
+        let (bmp, tga) = (file(&image, ImageFormat::Bmp), file(&image, ImageFormat::Tga));
+        for (name, bytes) in [("a.png", &bmp), ("a.tga", &bmp), ("dir/A.TGA", &tga)] {
+            assert_eq!(read(name, bytes), Some(colors(&image)), "{name}");
+        }
+        assert_eq!(read("a.png", &tga), None);
+        assert_eq!(decode_named("a.tga", b"<svg> that is no picture", &Limits::default()).1.len(), 1);
+    }
+
+    #[test]
+    fn limits_hold_for_pictures_without_compression_too() {
+        let image = DynamicImage::new_rgba8(100, 100);
+        for (name, format) in [("a.bmp", ImageFormat::Bmp), ("a.tga", ImageFormat::Tga)] {
+            let mut bytes = file(&image, format);
+            assert!(decode_named(name, &bytes, &Limits::default()).0.is_some());
+            for limits in
+                [Limits { image_pixels: 9_999, ..Limits::default() }, Limits { memory: 60_000, ..Limits::default() }]
+            {
+                let (bitmap, warnings) = decode_named(name, &bytes, &limits);
+                assert!(bitmap.is_none() && warnings[0].remedy.ends_with("--max-memory"), "{}", warnings[0]);
+            }
+            // As wide and high as can be said, with next to nothing behind.
+            let sides = if format == ImageFormat::Tga { 12..16 } else { 18..26 };
+            bytes[sides].fill(if format == ImageFormat::Tga { 0xff } else { 0x7f });
+            assert!(decode_named(name, &bytes, &Limits::default()).0.is_none());
+        }
+    }
+
+    #[test]
+    fn damaged_pictures_never_crash() {
+        let image =
+            DynamicImage::ImageRgba8(::image::RgbaImage::from_fn(9, 7, |x, y| ::image::Rgba([x as u8, 3, y as u8, 9])));
+        let limits = Limits { memory: 1 << 24, ..Limits::default() };
+        let mut random = crate::math::random::Random::new(5);
+        for (name, format) in [("a.bmp", ImageFormat::Bmp), ("a.tga", ImageFormat::Tga)] {
+            for image in [image.clone(), image.to_rgb8().into(), image.to_luma8().into()] {
+                let whole = file(&image, format);
+                for _ in 0..3000 {
+                    let mut bytes = whole.clone();
+                    for _ in 0..=random.below(5) {
+                        // Most often in the header.
+                        let end = if random.below(4) == 0 { bytes.len() } else { 60.min(bytes.len()) };
+                        let at = random.below(end);
+                        bytes[at] = random.bits().to_le_bytes()[0];
+                    }
+                    bytes.truncate(random.below(4 * bytes.len()).max(1));
+                    decode_named(name, &bytes, &limits);
+                }
+            }
+        }
     }
 
     #[test]

@@ -5,11 +5,11 @@ use super::codes::Code;
 use super::report::Report;
 use crate::load::limits::{Budget, Limits};
 use crate::load::paths::Resolver;
-use crate::load::texture::{Encoded, decode_all};
+use crate::load::texture::{Encoded, decode_all, format_of};
 use crate::load::{Diagnostic, ktx};
 use crate::scene::Bitmap;
 use crate::stopwatch::Spent;
-use ::image::{ImageFormat, guess_format};
+use ::image::ImageFormat;
 use gltf::json::{Index, Root, image::Image, texture::Texture};
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
@@ -156,12 +156,14 @@ fn name_of(i: usize, image: &Image) -> String {
     uri.or(image.name.as_ref()).filter(|n| !n.is_empty()).cloned().unwrap_or_else(|| format!("images[{i}]"))
 }
 
-/// The media type that bytes turn out to have, of those that glTF files hold.
-fn kind_of(bytes: &[u8]) -> Option<&'static str> {
-    match guess_format(bytes) {
-        Ok(ImageFormat::Png) => Some("image/png"),
-        Ok(ImageFormat::Jpeg) => Some("image/jpeg"),
-        Ok(ImageFormat::WebP) => Some("image/webp"),
+/// The media type that the bytes of an image of this name turn out to have, of those that glTF files hold.
+fn kind_of(name: &str, bytes: &[u8]) -> Option<&'static str> {
+    match format_of(name, bytes) {
+        Some(ImageFormat::Png) => Some("image/png"),
+        Some(ImageFormat::Jpeg) => Some("image/jpeg"),
+        Some(ImageFormat::WebP) => Some("image/webp"),
+        Some(ImageFormat::Bmp) => Some("image/bmp"),
+        Some(ImageFormat::Tga) => Some("image/x-tga"),
         _ if ktx::is(bytes) => Some("image/ktx2"),
         _ if bytes.starts_with(b"DDS ") => Some("image/vnd-ms.dds"),
         _ => None,
@@ -175,7 +177,7 @@ const EXTENDED: [(&str, &str, &str); 2] =
 /// Compares what an image says of itself with its bytes.
 fn check_kind(root: &Root, i: usize, image: &Image, bytes: &[u8], report: &mut Report) {
     let place = format!("images[{i}]");
-    let Some(kind) = kind_of(bytes) else {
+    let Some(kind) = kind_of(&name_of(i, image), bytes) else {
         return report.add(Code::ImageUnrecognizedFormat, place, "its bytes are no image of a known kind");
     };
     let declared = image.mime_type.as_ref().map(|m| m.0.as_str());
@@ -192,15 +194,14 @@ fn check_kind(root: &Root, i: usize, image: &Image, bytes: &[u8], report: &mut R
 
 /// Checks that each way to name an image leads to one of its kind.
 fn check_textures(root: &Root, images: &Images, report: &mut Report) {
-    let kind = |i: usize| images.of(i).and_then(kind_of);
+    let kind = |i: usize| kind_of(&name_of(i, root.images.get(i)?), images.of(i)?);
     for (i, texture) in root.textures.iter().enumerate() {
         let plain = kind(texture.source.value()).filter(|k| !["image/png", "image/jpeg"].contains(k));
         if let Some(kind) = plain {
-            report.add(
-                Code::TextureInvalidImageMimeType,
-                format!("textures[{i}].source"),
-                format!("{kind} needs an extension"),
-            );
+            let is_extended = EXTENDED.iter().any(|(_, extended, _)| *extended == kind) || kind == "image/vnd-ms.dds";
+            let text = if is_extended { "needs an extension" } else { "is no kind of image that glTF files hold" };
+            let place = format!("textures[{i}].source");
+            report.add(Code::TextureInvalidImageMimeType, place, format!("{kind} {text}"));
         }
         for (extension, right, name) in EXTENDED {
             if let Some(kind) = extension_source(texture, extension).and_then(kind).filter(|k| *k != right) {

@@ -345,7 +345,7 @@ fn surrounding(root: &Table) -> Option<Surrounding> {
 
 fn is_picture(name: &str) -> bool {
     let ending = Path::new(name).extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    ["hdr", "exr", "png", "jpg", "jpeg", "webp"].contains(&ending.as_str())
+    ["hdr", "exr", "png", "jpg", "jpeg", "webp", "tga", "bmp"].contains(&ending.as_str())
 }
 
 fn environment(value: &DeValue) -> Result<Environment, String> {

@@ -228,3 +228,12 @@ fn pictures_that_are_made_take_from_the_memory_that_may_be_taken() {
     let Surface::MetalRough(m) = &loaded.scene.materials[0].surface else { panic!("not metal") };
     assert!(m.metal_rough_map.is_none() && loaded.scene.bitmaps.is_empty());
 }
+
+#[test]
+fn maps_may_be_tga_and_bmp_pictures() {
+    for name in ["wood.tga", "wood.bmp", "Wood.TGA"] {
+        let (loaded, m) = guess(&format!("newmtl a\nKd 1 1 1\nmap_Kd {name}\n"), &[(name, [1, 2, 3, 255])]);
+        assert_eq!(texel(&loaded, m.base_color_map.as_ref()), [1, 2, 3, 255], "{:?}", loaded.warnings);
+        assert!(loaded.warnings.is_empty());
+    }
+}
