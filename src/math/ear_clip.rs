@@ -12,7 +12,10 @@
 //! after [`MAX_FORCED`] of those the rest becomes a fan. Every corner is still used, what is covered twice or lost
 //! there is undefined.
 
-use super::{DVec2, DVec3};
+mod blockers;
+
+use super::DVec3;
+use blockers::Blockers;
 use robust::{Coord, orient2d};
 use std::collections::VecDeque;
 
@@ -47,9 +50,7 @@ pub struct EarClipper {
     /// Whether a corner is strictly convex; others can block ears.
     convex: Vec<bool>,
     alive: Vec<bool>,
-    /// Corners that are not convex, ordered along the longer side.
-    blockers: Vec<u32>,
-    along_y: bool,
+    blockers: Blockers,
     /// Corners to look at, with the value of `ticket` that makes the entry valid.
     queue: VecDeque<(u32, u32)>,
     ticket: Vec<u32>,
@@ -165,7 +166,8 @@ impl EarClipper {
         for &i in ring {
             self.convex[i as usize] = self.alive[i as usize] && self.turn(i) > 0.0;
         }
-        self.sort_blockers(ring);
+        let blockers = ring.iter().copied().filter(|&i| self.alive[i as usize] && !self.convex[i as usize]);
+        self.blockers.fill(blockers, &self.flat);
         self.queue.clear();
         self.queue_all();
     }
@@ -201,26 +203,6 @@ impl EarClipper {
         } else {
             self.flat[before as usize] != self.flat[after as usize] && (left_of_first || left_of_second)
         }
-    }
-
-    fn sort_blockers(&mut self, ring: &[u32]) {
-        let (mut lo, mut hi) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-        for &i in ring {
-            let p = self.flat[i as usize];
-            (lo, hi) = (lo.min(DVec2::new(p.x, p.y)), hi.max(DVec2::new(p.x, p.y)));
-        }
-        self.along_y = hi.y - lo.y > hi.x - lo.x;
-        self.blockers.clear();
-        self.blockers.extend(ring.iter().filter(|&&i| self.alive[i as usize] && !self.convex[i as usize]));
-        let mut blockers = std::mem::take(&mut self.blockers);
-        blockers.sort_by(|&a, &b| self.along(a).total_cmp(&self.along(b)));
-        self.blockers = blockers;
-    }
-
-    /// Coordinate along the longer side.
-    fn along(&self, i: u32) -> f64 {
-        let p = self.flat[i as usize];
-        if self.along_y { p.y } else { p.x }
     }
 
     /// Positive where the boundary turns left at corner i.
@@ -263,13 +245,10 @@ impl EarClipper {
         if !self.convex[i as usize] {
             return false;
         }
-        let (p, n) = (self.prev[i as usize], self.next[i as usize]);
-        let corners = [p, i, n];
-        let lo = corners.iter().map(|&c| self.along(c)).fold(f64::INFINITY, f64::min);
-        let hi = corners.iter().map(|&c| self.along(c)).fold(f64::NEG_INFINITY, f64::max);
-        let first = self.blockers.partition_point(|&q| self.along(q) < lo);
-        let near = self.blockers[first..].iter().take_while(|&&q| self.along(q) <= hi);
-        !near.into_iter().any(|&q| self.alive[q as usize] && !self.convex[q as usize] && self.blocks(q, corners))
+        let corners = [self.prev[i as usize], i, self.next[i as usize]];
+        let triangle = corners.map(|corner| self.flat[corner as usize]);
+        let blocks = |q: u32| self.alive[q as usize] && !self.convex[q as usize] && self.blocks(q, corners);
+        !self.blockers.any(triangle, blocks)
     }
 
     /// Whether corner q lies in the closed triangle, but not in the place of one of its corners (the two sides of a
@@ -466,6 +445,16 @@ mod tests {
         assert_exact(&plane(&[(0, 0), (1, 0), (2, 0), (3, 0), (0, 3)]));
         assert_exact(&plane(&[(0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (0, 1)]));
         assert_exact(&plane(&[(0, 0), (1, 0), (2, 0), (2, 2)]));
+    }
+
+    #[test]
+    fn a_comb_of_many_teeth_is_cut_in_little_time() {
+        let teeth = 150_000;
+        let mut points = vec![(0, -1), (2 * teeth, -1)];
+        points.extend((0..2 * teeth).rev().map(|x| (x, if x % 2 == 0 { 10 } else { 0 })));
+        let start = std::time::Instant::now();
+        assert_exact(&plane(&points));
+        assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
     }
 
     #[test]
