@@ -32,6 +32,8 @@ pub use diagnostic::{Diagnostic, LoadError, Warnings};
 pub use limits::Limits;
 pub use wires::WireFacts;
 
+use limits::{Budget, OverBudget};
+
 use crate::scene::{Scene, UpAxis};
 use crate::stopwatch::{Spent, Stopwatch};
 use std::path::{Path, PathBuf};
@@ -224,21 +226,26 @@ fn check_moment(loaded: &mut Loaded, file: &Path, options: &LoadOptions) -> Resu
 }
 
 fn load_source(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
+    load_within(source, options, &mut Budget::new(&options.limits))
+}
+
+/// Loads what is in memory already; whatever that takes comes out of one budget.
+fn load_within(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Result<Loaded, LoadError> {
+    let too_large = |what: &str, over: OverBudget| {
+        let fault = Diagnostic::new("out-of-memory-limit", &source.path, "", format!("{what} too large: {over}"));
+        LoadError::from(fault.remedy("allow more with --max-memory"))
+    };
+    budget.take(source.bytes.len() as u64, 1).map_err(|over| too_large("the file is", over))?;
     let mut loaded = match detect::detect(source)? {
-        detect::Format::Gltf => gltf::load(source, options),
-        detect::Format::Nff => nff::load(source, options),
-        detect::Format::Obj => obj::load(source, options),
-        detect::Format::Ply => ply::load(source, options),
-        detect::Format::SceneFile => scene_file::load(source, options),
-        detect::Format::Stl(encoding) => stl::load(source, encoding, options),
+        detect::Format::Gltf => gltf::load(source, options, budget),
+        detect::Format::Nff => nff::load(source, options, budget),
+        detect::Format::Obj => obj::load(source, options, budget),
+        detect::Format::Ply => ply::load(source, options, budget),
+        detect::Format::SceneFile => scene_file::load(source, options, budget),
+        detect::Format::Stl(encoding) => stl::load(source, encoding, options, budget),
     }?;
     if let Some(angle) = options.smooth {
-        let mut budget = limits::Budget::new(&options.limits);
-        smooth::smooth(&mut loaded.scene, angle, &mut budget).map_err(|over| {
-            let text = format!("smooth normals are too large: {over}");
-            let fault = Diagnostic::new("out-of-memory-limit", &source.path, "", text);
-            LoadError::from(fault.remedy("allow more with --max-memory"))
-        })?;
+        smooth::smooth(&mut loaded.scene, angle, budget).map_err(|over| too_large("smooth normals are", over))?;
     }
     Ok(loaded)
 }

@@ -24,7 +24,7 @@ pub struct LoadedPanorama {
 }
 
 /// Bytes that a pixel takes while it is decoded, turned into radiance, and copied at all sizes.
-const PER_PIXEL: u64 = 48;
+pub(super) const PER_PIXEL: u64 = 48;
 
 /// Loads an equirectangular picture. Colours of HDR and EXR files are taken as linear Rec. 709.
 ///

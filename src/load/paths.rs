@@ -185,6 +185,11 @@ impl Resolver {
         }
     }
 
+    /// Bytes of a file that [`Self::locate`] has found; 0 where the system does not say.
+    pub fn length(&self, canonical: &Path) -> u64 {
+        fs::metadata(canonical).map_or(0, |meta| meta.len())
+    }
+
     fn note(&mut self, canonical: PathBuf, shown: PathBuf, bytes: &[u8]) {
         self.known.entry(canonical).or_insert_with(|| {
             self.read.push((shown, xxh3_128(bytes)));

@@ -69,7 +69,7 @@ impl Unusable {
         Self { why: why.into(), remedy: "convert it to PNG or JPEG" }
     }
 
-    fn too_large(why: impl Into<String>) -> Self {
+    pub(super) fn too_large(why: impl Into<String>) -> Self {
         Self { why: why.into(), remedy: "allow more with --max-memory" }
     }
 
@@ -168,6 +168,11 @@ fn check_size(image: &Encoded, limits: &Limits, budget: &mut Budget) -> Result<K
     Ok(Kind::Image { format, bytes: decoder.total_bytes().saturating_add(BESIDE.min(budget.left())) })
 }
 
+/// Bytes that the smaller copies of a picture of so many pixels take.
+pub(super) fn smaller_copies(pixels: u64) -> u64 {
+    pixels.div_ceil(3).saturating_mul(COPIED)
+}
+
 /// Takes what a picture needs: so many bytes a pixel, those of its smaller copies, and so many more while it is decoded.
 pub(super) fn take_memory(
     width: u32,
@@ -186,8 +191,7 @@ pub(super) fn take_memory(
         let remedy = if pixels > at_most { "scale it down" } else { "allow more with --max-memory" };
         return Err(Unusable { why, remedy });
     }
-    let copies = pixels.div_ceil(3).saturating_mul(COPIED);
-    let bytes = pixels.saturating_mul(texel).saturating_add(copies).saturating_add(more);
+    let bytes = pixels.saturating_mul(texel).saturating_add(smaller_copies(pixels)).saturating_add(more);
     budget.take(bytes, 1).map_err(|over| Unusable::too_large(over.to_string()))
 }
 

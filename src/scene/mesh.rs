@@ -1,6 +1,7 @@
 //! Geometry: indexed triangles (and whole n-gons), spheres, cones, planes, and where they stand.
 
 use crate::math::{DAffine3, DVec3, Vec2, Vec3, Vec4};
+use std::mem::size_of;
 
 /// One run of faces that share a material: a glTF primitive, or an OBJ `o`/`g`/`usemtl` run.
 ///
@@ -35,6 +36,17 @@ impl Mesh {
     /// The number of corners of all faces.
     pub fn corners(&self) -> usize {
         3 * self.triangles.len() + self.polygon_corners.len()
+    }
+
+    /// Bytes of its arrays.
+    pub fn bytes(&self) -> u64 {
+        let vertices = (self.positions.len() + self.normals.len()) * size_of::<Vec3>()
+            + (self.tangents.len() + self.colors.len()) * size_of::<Vec4>()
+            + self.uvs.iter().map(|set| set.len() * size_of::<Vec2>()).sum::<usize>();
+        let faces = self.triangles.len() * size_of::<[u32; 3]>()
+            + (self.face_of_triangle.len() + self.polygon_corners.len()) * size_of::<u32>()
+            + self.polygons.len() * size_of::<Polygon>();
+        (vertices + faces) as u64
     }
 
     /// The number of faces of the file that its triangles and polygons are; those of one face follow each other.

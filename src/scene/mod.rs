@@ -28,6 +28,7 @@ pub use panorama::Panorama;
 pub use texture::{Bitmap, Filter, Mipmaps, Pixels, Sampler, Texture, Wrap};
 
 use crate::math::Vec3;
+use std::mem::size_of;
 
 /// A whole scene. Indices in its parts point into the arrays here.
 #[derive(Clone, Debug, Default)]
@@ -66,6 +67,24 @@ pub struct Scene {
     pub up: UpAxis,
     /// Render settings that a scene file asks for.
     pub hints: RenderHints,
+}
+
+impl Scene {
+    /// Bytes of its lists, of the arrays of its meshes and of its pictures.
+    pub fn bytes(&self) -> u64 {
+        let lists = self.meshes.len() * size_of::<Mesh>()
+            + self.instances.len() * size_of::<Instance>()
+            + self.spheres.len() * size_of::<Sphere>()
+            + self.cones.len() * size_of::<Cone>()
+            + self.planes.len() * size_of::<Plane>()
+            + self.materials.len() * size_of::<Material>()
+            + self.textures.len() * size_of::<Texture>()
+            + self.bitmaps.len() * size_of::<Bitmap>()
+            + self.lights.len() * size_of::<Light>();
+        let meshes: u64 = self.meshes.iter().map(Mesh::bytes).sum();
+        let bitmaps: u64 = self.bitmaps.iter().map(Bitmap::bytes).sum();
+        lists as u64 + meshes + bitmaps
+    }
 }
 
 /// What secondary rays that leave the scene see, and diffuse light from afar.

@@ -71,6 +71,18 @@ pub struct Bitmap {
     pub pixels: Pixels,
 }
 
+impl Bitmap {
+    /// Bytes of its texels.
+    pub fn bytes(&self) -> u64 {
+        let bytes = match &self.pixels {
+            Pixels::Rgb8(bytes) => bytes.len(),
+            Pixels::Rgba8(texels) => texels.len() * 4,
+            Pixels::Rgba16(texels) => texels.len() * 8,
+        };
+        bytes as u64
+    }
+}
+
 /// Texels as the file stored them; whether 8-bit values are sRGB or linear is decided by the slot that reads them.
 #[derive(Clone, Debug)]
 pub enum Pixels {

@@ -4,11 +4,11 @@ use super::super::text::grouped;
 use super::topology::Topology;
 use crate::accel::{AccelChoice, AccelParams};
 use crate::load::{AnimationFacts, Loaded, WireFacts};
-use crate::math::{DVec3, Vec2, Vec3, Vec4};
+use crate::math::{DVec3, Vec3};
 use crate::render::{Instancing, World};
 use crate::scene::features::Features;
 use crate::scene::framing::{Bounds, robust_bounds};
-use crate::scene::{LightKind, Mesh, Pixels, Projection, Scene, UpAxis};
+use crate::scene::{Bitmap, LightKind, Mesh, Projection, Scene, UpAxis};
 use serde_json::{Value, json};
 use std::mem::size_of;
 use std::path::Path;
@@ -293,23 +293,11 @@ fn vector(v: DVec3) -> String {
     format!("({}, {}, {})", part(v.x), part(v.y), part(v.z))
 }
 
-/// Bytes of the large arrays of the scene and of its flattened form.
+/// Bytes of the large arrays of the scene and of the shapes made of it.
 fn scene_bytes(scene: &Scene, world: &World) -> u64 {
-    let mesh = |m: &Mesh| {
-        m.positions.len() * size_of::<Vec3>()
-            + m.normals.len() * size_of::<Vec3>()
-            + (m.tangents.len() + m.colors.len()) * size_of::<Vec4>()
-            + m.uvs.iter().map(|set| set.len() * size_of::<Vec2>()).sum::<usize>()
-            + m.triangles.len() * size_of::<[u32; 3]>()
-            + (m.face_of_triangle.len() + m.polygon_corners.len()) * size_of::<u32>()
-    };
-    let pixels = |p: &Pixels| match p {
-        Pixels::Rgb8(bytes) => bytes.len(),
-        Pixels::Rgba8(texels) => texels.len() * 4,
-        Pixels::Rgba16(texels) => texels.len() * 8,
-    };
-    let meshes: usize = scene.meshes.iter().map(mesh).sum();
-    (meshes + scene.bitmaps.iter().map(|b| pixels(&b.pixels)).sum::<usize>() + world.bytes()) as u64
+    let meshes: u64 = scene.meshes.iter().map(Mesh::bytes).sum();
+    let bitmaps: u64 = scene.bitmaps.iter().map(Bitmap::bytes).sum();
+    meshes + bitmaps + world.bytes() as u64
 }
 
 #[cfg(test)]

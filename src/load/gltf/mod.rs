@@ -78,13 +78,13 @@ use scene::Placed;
 use sparse::Replacements;
 use weight::Weight;
 
-/// Loads a glTF 2.0 file.
+/// Loads a glTF 2.0 file; whatever that takes comes out of `budget`.
 ///
 /// # Errors
 /// What the table in [`codes`] refuses, all faults of one stage at once.
-pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
+pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Result<Loaded, LoadError> {
     let mut report = Report::new(&source.path);
-    let loaded = Loading { source, options, report: &mut report }.run()?;
+    let loaded = Loading { source, options, report: &mut report }.run(budget)?;
     let warnings = report.warnings.into_vec();
     Ok(Loaded { warnings, ..loaded })
 }
@@ -99,16 +99,14 @@ struct Loading<'a> {
 }
 
 impl Loading<'_> {
-    fn run(&mut self) -> Result<Loaded, LoadError> {
+    fn run(&mut self, budget: &mut Budget) -> Result<Loaded, LoadError> {
         let file = &self.source.path;
         let container = container::split(&self.source.bytes, self.report);
         let container = self.passed(container)?;
-        let mut budget = Budget::new(&self.options.limits);
-        self.take(&mut budget, self.source.bytes.len() as u64, "the file")?;
         let weight = Weight::of(container.json);
         document::check_depth(&weight, self.report);
         self.report.check()?;
-        self.take(&mut budget, weight.bytes(), "the JSON, once it is parsed,")?;
+        self.take(budget, weight.bytes(), "the JSON, once it is parsed,")?;
         let value = document::parse(container.json, self.report);
         let value = self.passed(value)?;
         let right_version = version::check(&value, self.report).then_some(());
@@ -118,7 +116,7 @@ impl Loading<'_> {
         self.report.check()?;
         schema::check(&value, self.report);
         self.report.check()?;
-        self.take(&mut budget, weight::typed(&value), "the document")?;
+        self.take(budget, weight::typed(&value), "the document")?;
         let variants = variants::names(&value);
         let variant = self.variant(&variants)?;
         attributes::check(&value, variant, self.report);
@@ -132,7 +130,7 @@ impl Loading<'_> {
         let mut facts = facts(&document, container.binary);
         facts.extensions = extensions.facts();
         (facts.variants, facts.variant) = (variants, variant);
-        let scene = self.build(&document, &mut graph, container.bin, &mut budget, &mut facts)?;
+        let scene = self.build(&document, &mut graph, container.bin, budget, &mut facts)?;
         Ok(Loaded { scene, facts, warnings: Vec::new() })
     }
 

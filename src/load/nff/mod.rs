@@ -35,13 +35,12 @@ use std::mem::size_of;
 use std::path::Path;
 use words::Words;
 
-/// Loads an NFF file.
+/// Loads an NFF file; whatever that takes comes out of `budget`.
 ///
 /// # Errors
-/// At the first statement that is not NFF, with its line, or when memory would exceed [`super::Limits`]. A file without
-/// shapes is an empty scene.
-pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
-    let mut budget = Budget::new(&options.limits);
+/// At the first statement that is not NFF, with its line, or when it would take more than is left. A file without shapes
+/// is an empty scene.
+pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Result<Loaded, LoadError> {
     if std::str::from_utf8(&source.bytes).is_err() {
         // A sign of three bytes stands for each that is no text.
         budget.take(source.bytes.len() as u64, 3).map_err(|over| over_memory(&source.path, over))?;
@@ -50,7 +49,7 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
     let mut reader = Reader {
         words: Words::new(&source.path, text.trim_start_matches('\u{feff}')),
         file: &source.path,
-        budget: &mut budget,
+        budget,
         scene: Scene::default(),
         material: None,
         fills: HashMap::new(),

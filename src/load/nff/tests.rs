@@ -1,8 +1,13 @@
 use super::*;
 use crate::load::Polygons;
 
+fn load_with(text: &str, options: &LoadOptions) -> Result<Loaded, LoadError> {
+    let source = Source { path: "a.nff".into(), bytes: text.into() };
+    load(&source, options, &mut Budget::new(&options.limits))
+}
+
 fn load_text(text: &str) -> Result<Loaded, LoadError> {
-    load(&Source { path: "a.nff".into(), bytes: text.into() }, &LoadOptions::default())
+    load_with(text, &LoadOptions::default())
 }
 
 fn scene(text: &str) -> Scene {
@@ -80,7 +85,7 @@ fn a_concave_polygon_is_cut_or_stays_whole() {
     let cut = scene(text);
     assert_eq!((cut.meshes[0].triangles.len(), cut.meshes[0].polygons.len()), (3, 0));
     let options = LoadOptions { polygons: Polygons::Whole, ..LoadOptions::default() };
-    let whole = load(&Source { path: "a.nff".into(), bytes: text.into() }, &options).unwrap().scene;
+    let whole = load_with(text, &options).unwrap().scene;
     assert_eq!((whole.meshes[0].triangles.len(), whole.meshes[0].polygons[0].len), (0, 5));
 }
 
@@ -115,7 +120,7 @@ fn memory_over_the_budget_is_refused_before_it_is_taken() {
     let of = |text: String, memory: u64| {
         let mut options = LoadOptions::default();
         options.limits.memory = memory;
-        load(&Source { path: "a.nff".into(), bytes: text.into() }, &options).map_err(|e| e.to_string())
+        load_with(&text, &options).map_err(|e| e.to_string())
     };
     let texts = [
         "s 0 0 0 1\n".repeat(1000),

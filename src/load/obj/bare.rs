@@ -100,7 +100,7 @@ pub(in crate::load) fn load(
     otherwise: (UpAxis, &str),
     source: &Source,
     options: &LoadOptions,
-    mut budget: Budget,
+    budget: &mut Budget,
 ) -> Result<Loaded, LoadError> {
     let file = source.path.as_path();
     let mut warnings = Warnings::default();
@@ -135,8 +135,7 @@ pub(in crate::load) fn load(
     }
     let meshes: Vec<Mesh> = assembled.meshes.into_iter().map(|(_, mesh)| mesh).collect();
     let (guessed, reason) = up::guess(&statements.comments, &meshes, placed.center, otherwise);
-    let mut reading =
-        mtl::Reading { file, options, resolver: &mut resolver, budget: &mut budget, warnings: &mut warnings };
+    let mut reading = mtl::Reading { file, options, resolver: &mut resolver, budget, warnings: &mut warnings };
     let unnamed = vec![None; meshes.len() + wires.len()];
     let materials = mtl::load(&[], &unnamed, &mut reading);
     let mut scene = scene(meshes, materials, placed.center, options.up.unwrap_or(guessed));
@@ -155,7 +154,7 @@ pub(in crate::load) fn load(
         hash,
         ..Facts::default()
     };
-    let lost = super::draw(&wires, placed.center, &mut scene, &mut budget, &mut facts, file, options.line_width)?;
+    let lost = super::draw(&wires, placed.center, &mut scene, budget, &mut facts, file, options.line_width)?;
     lost.into_iter().for_each(|warning| warnings.push(warning));
     Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
 }

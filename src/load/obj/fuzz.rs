@@ -1,7 +1,7 @@
 //! Texts that nobody wrote: whatever comes in, the loader ends with a scene that holds together or with an error.
 
 use super::*;
-use crate::load::Polygons;
+use crate::load::{Polygons, load_source};
 use proptest::prelude::*;
 
 /// Words that OBJ and MTL texts are made of, and what breaks them.
@@ -70,7 +70,7 @@ fn check(text: &str) {
     for polygons in [Polygons::Cut, Polygons::Whole] {
         let options = LoadOptions { polygons, ..LoadOptions::default() };
         let source = Source { path: "fuzz.obj".into(), bytes: text.as_bytes().to_vec() };
-        if let Ok(loaded) = load(&source, &options) {
+        if let Ok(loaded) = load_source(&source, &options) {
             assert_sound(&loaded);
         }
     }
@@ -86,13 +86,13 @@ proptest! {
     fn any_mesh_ends_in_a_sound_scene(text in mesh()) {
         check(&text);
         let source = Source { path: "fuzz.obj".into(), bytes: text.into_bytes() };
-        prop_assert!(load(&source, &LoadOptions::default()).is_ok());
+        prop_assert!(load_source(&source, &LoadOptions::default()).is_ok());
     }
 
     #[test]
     fn any_bytes_end_in_a_sound_scene_or_an_error(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
         let source = Source { path: "fuzz.obj".into(), bytes };
-        if let Ok(loaded) = load(&source, &LoadOptions::default()) {
+        if let Ok(loaded) = load_source(&source, &LoadOptions::default()) {
             assert_sound(&loaded);
         }
     }

@@ -39,19 +39,18 @@ use assemble::Assembled;
 use statements::Statements;
 use std::path::Path;
 
-/// Loads an OBJ file and the MTL files and pictures it names.
+/// Loads an OBJ file and the MTL files and pictures it names; whatever that takes comes out of `budget`.
 ///
 /// # Errors
-/// When a face refers to what is not there, or memory would exceed [`super::Limits`]. A file without faces is an empty
+/// When a face refers to what is not there, or when it would take more than is left. A file without faces is an empty
 /// scene.
-pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
+pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Result<Loaded, LoadError> {
     let file = source.path.as_path();
     let mut warnings = Warnings::default();
-    let mut budget = Budget::new(&options.limits);
     let mut resolver = Resolver::new(source, options);
 
     // Geometry.
-    let mut statements = statements::read(&encoding::to_ascii_superset(&source.bytes), file, &mut budget)?;
+    let mut statements = statements::read(&encoding::to_ascii_superset(&source.bytes), file, budget)?;
     statements.odd.warn(file, &mut warnings);
     let coding = color::settle(&mut statements.soup.colors);
     coding.warning(["obj-color-bytes", "obj-color-range"], file).into_iter().for_each(|told| warnings.push(told));
@@ -74,8 +73,7 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
     let (guessed, reason) = up::guess(&statements.comments, &meshes, placed.center, up::UNSAID);
     let name = |run: &u32| statements.runs[*run as usize].material.map(|id| statements.names[id as usize].as_str());
     let names: Vec<Option<&str>> = runs.iter().chain(&wire_runs).map(name).collect();
-    let mut reading =
-        mtl::Reading { file, options, resolver: &mut resolver, budget: &mut budget, warnings: &mut warnings };
+    let mut reading = mtl::Reading { file, options, resolver: &mut resolver, budget, warnings: &mut warnings };
     let materials = mtl::load(&statements.libraries, &names, &mut reading);
     let (reading, decoding) = (resolver.reading(), materials.decoding);
     let of_wires = materials.of_name.get(meshes.len()..).unwrap_or_default();
@@ -96,7 +94,7 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
         decoding,
         ..Facts::default()
     };
-    let lost = draw(&wires, placed.center, &mut scene, &mut budget, &mut facts, file, options.line_width)?;
+    let lost = draw(&wires, placed.center, &mut scene, budget, &mut facts, file, options.line_width)?;
     lost.into_iter().for_each(|warning| warnings.push(warning));
     Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
 }

@@ -11,8 +11,11 @@ use super::join::{Joined, join};
 use super::soup::Soup;
 use super::{faults, split};
 use crate::load::limits::{Budget, OverBudget};
+use crate::load::wires::Wires;
 use crate::load::{Diagnostic, LoadError, Warnings};
+use crate::scene::{Instance, Material, Mesh};
 use rayon::prelude::*;
+use std::mem::size_of;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -176,10 +179,20 @@ fn bytes(chunk: &Chunk) -> u64 {
     const CORNER: u64 = 12 + 12 + 12 + 16;
     /// Twice in `f64`, then in `f32`, and in the mesh.
     const VERTEX: u64 = 2 * 24 + 12 + 12;
+    /// A name, four times with its place in a table: in the run of lines and in the whole.
+    const NAME: u64 = 4 * 56;
+    /// A mesh and its instance, or points and lines, with a few lists of their own.
+    const RUN: u64 =
+        2 * (size_of::<Run>() + size_of::<Mesh>() + size_of::<Instance>() + size_of::<Wires>() + 100) as u64;
     let vertices = chunk.positions.len() + chunk.uvs.len() + chunk.normals.len() + chunk.colors.len();
     let corners = chunk.corners.len() + chunk.stroke_corners.len();
     let faces = chunk.faces.len() + chunk.strokes.len();
-    faces as u64 * FACE + corners as u64 * CORNER + vertices as u64 * VERTEX
+    let texts = chunk.names.iter().chain(chunk.libraries.iter().map(|(_, names)| names));
+    let names: u64 = texts.map(|name| NAME + 4 * name.len() as u64).sum();
+    // One of its own each may have.
+    let materials = chunk.runs.iter().filter(|run| run.material.is_some()).count() * size_of::<Material>();
+    let runs = chunk.runs.len() as u64 * RUN + materials as u64;
+    faces as u64 * FACE + corners as u64 * CORNER + vertices as u64 * VERTEX + names + runs
 }
 
 impl Oddities {
@@ -368,7 +381,14 @@ mod tests {
     fn memory_over_the_budget_is_refused() {
         let text = format!("{TRIANGLE}f 1 2 3");
         assert!(read_with(&text, 200).unwrap_err().to_string().contains("--max-memory"));
-        assert!(read_with(&text, 2000).is_ok());
+        assert!(read_with(&text, 10_000).is_ok());
+        // Groups without faces leave names, those with faces meshes.
+        let empty: String = (0..1000).map(|i| format!("g {i}\n")).collect();
+        let full: String = (0..1000).map(|i| format!("g {i}\nf 1 2 3\n")).collect();
+        for (groups, memory) in [(empty, 200_000), (full, 800_000)] {
+            assert!(read_with(&format!("{TRIANGLE}{groups}"), memory).is_err());
+            assert!(read_with(&format!("{TRIANGLE}{groups}"), 10 * memory).is_ok());
+        }
     }
 
     /// Every kind of statement, so that each kind of state has to cross from one run of lines to the next.

@@ -13,7 +13,8 @@ fn of(text: &str) -> Loaded {
 }
 
 fn with(bytes: &[u8], options: &LoadOptions) -> Loaded {
-    load(&Source { path: "m.obj".into(), bytes: bytes.to_vec() }, options).unwrap()
+    let source = Source { path: "m.obj".into(), bytes: bytes.to_vec() };
+    load(&source, options, &mut Budget::new(&options.limits)).unwrap()
 }
 
 fn codes(loaded: &Loaded) -> Vec<(&str, u32)> {

@@ -23,15 +23,14 @@ use super::{LoadError, LoadOptions, Loaded, Source};
 use crate::scene::UpAxis;
 use header::{Encoding, Header};
 
-/// Loads a PLY file.
+/// Loads a PLY file; whatever that takes comes out of `budget`.
 ///
 /// # Errors
 /// When the header is not understood, values are missing or are no numbers, or a face names a vertex that is not there:
 /// with the line, or in binary files the byte. A file without vertices is an empty scene.
-pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
-    let mut budget = Budget::new(&options.limits);
+pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Result<Loaded, LoadError> {
     let header = Header::read(&source.bytes, &source.path)?;
-    let bare = geometry::read(&header, source, &mut budget)?;
+    let bare = geometry::read(&header, source, budget)?;
     let format = match header.encoding {
         Encoding::Text => "PLY (ascii)",
         Encoding::LittleEndian => "PLY (binary, little-endian)",

@@ -6,7 +6,8 @@ use crate::math::{Vec2, Vec3, Vec4};
 use crate::scene::AlphaMode;
 
 pub(super) fn of(bytes: &[u8], options: &LoadOptions) -> Result<Loaded, String> {
-    load(&Source { path: "a.ply".into(), bytes: bytes.to_vec() }, options).map_err(|e| e.to_string())
+    let source = Source { path: "a.ply".into(), bytes: bytes.to_vec() };
+    load(&source, options, &mut Budget::new(&options.limits)).map_err(|e| e.to_string())
 }
 
 fn plain(bytes: &[u8]) -> Loaded {

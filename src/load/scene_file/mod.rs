@@ -139,13 +139,18 @@ mod materials;
 mod reader;
 mod shapes;
 mod view;
+mod weight;
 
 use self::reader::{Faults, Table, color, number, string, word};
 use self::shapes::Lost;
+use self::weight::weight;
+use super::limits::{Budget, Limits};
+use super::obj::bare::over_memory;
 use super::paths::Resolver;
+use super::texture::smaller_copies;
 use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
 use crate::math::DVec3;
-use crate::scene::{Background, Environment, Material, Panorama, Scene, UpAxis};
+use crate::scene::{Background, Bitmap, Environment, Material, Panorama, Scene, UpAxis};
 use crate::stopwatch::Stopwatch;
 use std::collections::HashMap;
 use std::path::Path;
@@ -153,11 +158,11 @@ use toml::de::{DeTable, DeValue};
 
 const UP: [(&str, UpAxis); 2] = [("y", UpAxis::Y), ("z", UpAxis::Z)];
 
-/// Loads a scene file and the models it names.
+/// Loads a scene file and the models it names; whatever that takes comes out of `budget`.
 ///
 /// # Errors
-/// Every fault of the file with its line and column, or those of a model.
-pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
+/// Every fault of the file with its line and column, or those of a model; or when it would take more than is left.
+pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Result<Loaded, LoadError> {
     let text = match std::str::from_utf8(&source.bytes) {
         Ok(text) => text.strip_prefix('\u{feff}').unwrap_or(text).to_owned(),
         Err(e) => {
@@ -165,9 +170,10 @@ pub fn load(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError>
             return Err(Diagnostic::new("scene-syntax", &source.path, "", text).remedy("save it as UTF-8").into());
         }
     };
+    budget.take(weight(&text), 1).map_err(|over| over_memory(&source.path, over))?;
     let faults = Faults::new(source.path.clone(), text);
     let parsed = read(&faults, options)?;
-    assemble(parsed, &faults, source, options)
+    assemble(parsed, &faults, source, options, budget)
 }
 
 /// Reads the text.
@@ -357,7 +363,13 @@ fn environment(value: &DeValue) -> Result<Environment, String> {
 }
 
 /// Reads the models and puts everything together.
-fn assemble(parsed: Parsed, faults: &Faults, source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
+fn assemble(
+    parsed: Parsed,
+    faults: &Faults,
+    source: &Source,
+    options: &LoadOptions,
+    budget: &mut Budget,
+) -> Result<Loaded, LoadError> {
     let Parsed { mut scene, models, panorama, lost, max_rounding } = parsed;
     let mut warnings = Warnings::default();
     let mut facts = Facts { format: "meshray scene".into(), max_rounding, ..Facts::default() };
@@ -369,12 +381,19 @@ fn assemble(parsed: Parsed, faults: &Faults, source: &Source, options: &LoadOpti
             .read_file(Path::new(&file))
             .map_err(|fault| LoadError::from(fault.diagnose(&source.path, &faults.place(at))))?;
         let picture = Source { path: source.path.with_file_name(&file), bytes };
-        let read = super::panorama::decode(&picture, &options.limits)?;
+        let left = Limits { memory: budget.left(), ..options.limits };
+        let read = super::panorama::decode(&picture, &left)?;
+        let kept = read.panorama.texels.len() as u64;
+        budget.take(kept, super::panorama::PER_PIXEL).map_err(|over| over_memory(&source.path, over))?;
         read.warnings.into_iter().for_each(|w| warnings.push(w));
         scene.panorama = Some(Panorama { rotation, ..read.panorama });
     }
     for model in models {
-        let mut part = read_model(&model, faults, &mut resolver, source, options)?;
+        // What is needed only while a model is read is free for the next one.
+        let mut own = *budget;
+        let mut part = read_model(&model, faults, &mut resolver, source, options, &mut own)?;
+        let over = |over| Diagnostic { place: faults.place(model.at), ..over_memory(&source.path, over) };
+        budget.take(kept(&part.scene), 1).map_err(over)?;
         part.warnings.into_iter().for_each(|w| warnings.push(w));
         facts.faces += part.facts.faces;
         facts.dropped.extend(part.facts.dropped);
@@ -414,6 +433,7 @@ fn read_model(
     resolver: &mut Resolver,
     source: &Source,
     options: &LoadOptions,
+    budget: &mut Budget,
 ) -> Result<Loaded, LoadError> {
     let place = || faults.place(model.at);
     let path = resolver
@@ -428,10 +448,16 @@ fn read_model(
         let text = format!("`{}` is a scene file, and scene files do not nest", model.file);
         return Err(Diagnostic::new("scene-nested", &source.path, place(), text).remedy("name a model").into());
     }
-    let mut loaded = super::load_source(&model_source, &options)?;
+    let mut loaded = super::load_within(&model_source, &options, budget)?;
     loaded.facts.reading += reading;
     resolver.absorb(&loaded.facts.files, loaded.facts.hash);
     Ok(loaded)
+}
+
+/// Bytes that a model takes once it is read.
+fn kept(scene: &Scene) -> u64 {
+    let pixels = |bitmap: &Bitmap| u64::from(bitmap.width) * u64::from(bitmap.height);
+    scene.bytes() + scene.bitmaps.iter().map(|bitmap| smaller_copies(pixels(bitmap))).sum::<u64>()
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "a scene file is far smaller than 2^32 lines")]

@@ -2,9 +2,16 @@ use super::*;
 use crate::math::{DAffine3, Vec3};
 use crate::scene::{AlphaMode, Falloff, LightKind, Projection, Surface};
 
+fn load_source(source: &Source) -> Result<Loaded, LoadError> {
+    load_with(source, &LoadOptions::default())
+}
+
+fn load_with(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
+    load(source, options, &mut Budget::new(&options.limits))
+}
+
 fn load_text(text: &str) -> Result<Loaded, LoadError> {
-    let source = Source { path: "dir/test.toml".into(), bytes: text.into() };
-    load(&source, &LoadOptions::default())
+    load_source(&Source { path: "dir/test.toml".into(), bytes: text.into() })
 }
 
 fn faults(text: &str) -> Vec<String> {
@@ -40,7 +47,7 @@ fn a_picture_may_surround_the_scene() {
     ::image::Rgb32FImage::from_pixel(4, 2, ::image::Rgb([2.0, 1.0, 0.5])).save(dir.path().join("sky.exr")).unwrap();
     let text = "environment = 'sky.exr'\nenvironment_rotation = 90\n[[spheres]]\ncenter = [0, 0, 0]\nradius = 1\n";
     let source = Source { path: dir.path().join("a.toml"), bytes: text.into() };
-    let loaded = load(&source, &LoadOptions::default()).unwrap();
+    let loaded = load_source(&source).unwrap();
     assert_eq!(loaded.scene.environment, Environment::Panorama);
     let panorama = loaded.scene.panorama.unwrap();
     assert_eq!((panorama.width, panorama.texels[7]), (4, [2.0, 1.0, 0.5]));
@@ -68,7 +75,7 @@ fn broken_syntax_says_where() {
     let errors = faults("up = \"y\"\n[[spheres]\n");
     assert!(errors[0].starts_with("dir/test.toml:2:"), "{errors:?}");
     assert!(load_text("\u{feff}up = 'y'").is_ok());
-    assert!(load(&Source { path: "x.toml".into(), bytes: vec![0xff] }, &LoadOptions::default()).is_err());
+    assert!(load_source(&Source { path: "x.toml".into(), bytes: vec![0xff] }).is_err());
 }
 
 #[test]
@@ -258,7 +265,7 @@ fn the_material_of_a_model_replaces_those_of_all_its_shapes() {
     let text = "[materials.green]\n[materials.red]\n[[spheres]]\ncenter=[9,9,9]\nradius=1\nmaterial='green'\n\
                 [[models]]\nfile='m.nff'\nmaterial='red'\n[[models]]\nfile='m.nff'\n";
     let source = Source { path: dir.path().join("a.toml"), bytes: text.into() };
-    let scene = load(&source, &LoadOptions::default()).unwrap().scene;
+    let scene = load_source(&source).unwrap().scene;
     let named = |material: u32| scene.materials[material as usize].name.as_str();
     assert_eq!(
         scene.spheres.iter().map(|s| named(s.material)).collect::<Vec<_>>(),
@@ -266,4 +273,29 @@ fn the_material_of_a_model_replaces_those_of_all_its_shapes() {
     );
     assert_eq!(scene.cones.iter().map(|c| named(c.material)).collect::<Vec<_>>(), ["red", "0 1 0 1 0 1 0 0"]);
     assert_eq!(scene.meshes.iter().map(|m| named(m.material)).collect::<Vec<_>>(), ["red", "0 1 0 1 0 1 0 0"]);
+}
+
+#[test]
+fn the_text_and_all_models_share_one_budget() {
+    let dir = tempfile::tempdir().unwrap();
+    let cells = 100;
+    let mut obj: String = (0..cells * cells).map(|i| format!("v {} {} 0\n", i % cells, i / cells)).collect();
+    obj.extend((1..cells * (cells - 1)).map(|i| format!("f {i} {} {}\n", i + 1, i + cells)));
+    std::fs::write(dir.path().join("m.obj"), &obj).unwrap();
+    let fault = |text: String, memory: u64| {
+        let mut options = LoadOptions::default();
+        options.limits.memory = memory;
+        let source = Source { path: dir.path().join("a.toml"), bytes: text.into() };
+        load_with(&source, &options).map(|loaded| loaded.scene.meshes.len()).map_err(|e| e.to_string())
+    };
+    let models = |count: usize| "[[models]]\nfile='m.obj'\n".repeat(count);
+    // One needs most while it is read; what is kept of it is a fraction of that, but adds up.
+    assert_eq!(fault(models(10), 8_000_000), Ok(10));
+    let many = fault(models(100), 8_000_000).unwrap_err();
+    assert!(many.contains("bytes are needed where") && many.ends_with("--max-memory"), "{many}");
+    assert_eq!(fault(models(100), 80_000_000), Ok(100));
+    let positions = format!("[[meshes]]\npositions=[{}]\nfaces=[]\n", "[1,2,3],".repeat(10_000));
+    let text = fault(positions.clone(), 5_000_000).unwrap_err();
+    assert!(text.ends_with("raise --max-memory"), "{text}");
+    assert_eq!(fault(positions, 50_000_000), Ok(1));
 }

@@ -29,14 +29,18 @@ pub enum Encoding {
     Binary,
 }
 
-/// Loads an STL file.
+/// Loads an STL file; whatever that takes comes out of `budget`.
 ///
 /// # Errors
 /// When the text is not understood, or a binary file holds fewer triangles than it says: with the line or byte. A file
 /// without triangles is an empty scene.
-pub fn load(source: &Source, encoding: Encoding, options: &LoadOptions) -> Result<Loaded, LoadError> {
-    let mut budget = Budget::new(&options.limits);
-    let triangles = Triangles { file: &source.path, budget: &mut budget, bare: Bare::default(), known: HashMap::new() };
+pub fn load(
+    source: &Source,
+    encoding: Encoding,
+    options: &LoadOptions,
+    budget: &mut Budget,
+) -> Result<Loaded, LoadError> {
+    let triangles = Triangles { file: &source.path, budget, bare: Bare::default(), known: HashMap::new() };
     let (bare, format) = match encoding {
         Encoding::Text => (text::read(source, triangles)?, "STL (ascii)"),
         Encoding::Binary => (binary::read(source, triangles)?, "STL (binary)"),

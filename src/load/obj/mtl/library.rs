@@ -14,7 +14,18 @@ pub(super) struct Finder<'a> {
     pub base: PathBuf,
 }
 
-/// A file that was found.
+/// Where a file is.
+#[derive(Debug)]
+pub(super) struct Place {
+    /// Path relative to the model's folder, or absolute.
+    pub path: PathBuf,
+    /// The same for all names of one file.
+    pub canonical: PathBuf,
+    /// Whether it lies elsewhere than its name says.
+    pub guessed: bool,
+}
+
+/// A file that was read.
 #[derive(Debug)]
 pub(super) struct Found {
     /// Path relative to the model's folder, or absolute.
@@ -28,15 +39,22 @@ pub(super) struct Found {
 const LISTED: usize = 10_000;
 
 impl Finder<'_> {
-    /// Reads `name`, looking in `folders` (relative to the model's), first as written, then by the last part of its
-    /// name alone, then in any case. The fault is that of the name as written.
+    /// Finds and reads `name`.
     pub(super) fn read(&mut self, name: &str, folders: &[&Path]) -> Result<Found, FileFault> {
+        let Place { path, guessed, .. } = self.find(name, folders)?;
+        Ok(Found { bytes: self.resolver.read_file(&path)?, path, guessed })
+    }
+
+    /// Finds `name`, looking in `folders` (relative to the model's), first as written, then by the last part of its
+    /// name alone, then in any case. The fault is that of the name as written.
+    pub(super) fn find(&mut self, name: &str, folders: &[&Path]) -> Result<Place, FileFault> {
         let slashed = name.replace('\\', "/");
         let mut fault = None;
         for folder in folders {
             for name in [name, &slashed] {
-                match self.resolver.read_file(&folder.join(name)) {
-                    Ok(bytes) => return Ok(Found { path: folder.join(name), bytes, guessed: false }),
+                let path = folder.join(name);
+                match self.resolver.locate(&path) {
+                    Ok(canonical) => return Ok(Place { path, canonical, guessed: false }),
                     Err(e) => fault = fault.or(Some(e)),
                 }
             }
@@ -48,22 +66,14 @@ impl Finder<'_> {
         })
     }
 
-    fn elsewhere(&mut self, name: &str, folders: &[&Path]) -> Option<Found> {
+    fn elsewhere(&mut self, name: &str, folders: &[&Path]) -> Option<Place> {
         let last = Path::new(name).file_name()?.to_str()?;
-        for folder in folders {
-            let path = folder.join(last);
-            if let Ok(bytes) = self.resolver.read_file(&path) {
-                return Some(Found { path, bytes, guessed: true });
-            }
-        }
-        for folder in folders {
-            if let Some(path) = self.in_any_case(folder, last)
-                && let Ok(bytes) = self.resolver.read_file(&path)
-            {
-                return Some(Found { path, bytes, guessed: true });
-            }
-        }
-        None
+        let as_written = folders.iter().map(|folder| folder.join(last));
+        let in_any_case = folders.iter().filter_map(|folder| self.in_any_case(folder, last));
+        as_written.chain(in_any_case).find_map(|path| {
+            let canonical = self.resolver.locate(&path).ok()?;
+            Some(Place { path, canonical, guessed: true })
+        })
     }
 
     /// The first file of a folder, by name, whose name differs only in case.

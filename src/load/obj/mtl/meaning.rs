@@ -317,10 +317,14 @@ fn number(x: f64) -> f32 {
 mod tests {
     use super::super::parse::parse;
     use super::*;
+    use crate::load::Limits;
+    use crate::load::limits::Budget;
 
     fn of(text: &str, mode: MtlMode, maps: &[Slot]) -> (Material, Vec<&'static str>) {
         let mut warnings = Warnings::default();
-        let mtl = parse(format!("newmtl m\n{text}").as_bytes(), Path::new("m.mtl"), &mut warnings).remove(0);
+        let (text, file) = (format!("newmtl m\n{text}"), Path::new("m.mtl"));
+        let mut budget = Budget::new(&Limits::default());
+        let mtl = parse(text.as_bytes(), file, &mut budget, &mut warnings).remove(0);
         let has_map = |slot| maps.contains(&slot);
         let mut meaning = Meaning {
             mtl: &mtl,

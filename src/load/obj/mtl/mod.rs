@@ -133,7 +133,7 @@ fn read_library(found: Found, line: u32, names: &str, reading: &mut Reading) -> 
         reading.warnings.push(Diagnostic::new("mtl-file-elsewhere", reading.file, line.to_string(), text));
     }
     let file = folder_of(reading.file).join(&found.path);
-    let materials = parse::parse(&found.bytes, &file, reading.warnings);
+    let materials = parse::parse(&found.bytes, &file, reading.budget, reading.warnings);
     let folder = found.path.parent().map(Path::to_path_buf).unwrap_or_default();
     Read { file, folder, materials }
 }
@@ -221,7 +221,8 @@ fn make(
 /// Names of the materials in a text.
 #[cfg(test)]
 pub(super) fn parse_names(text: &[u8]) -> Vec<String> {
-    let materials = parse::parse(text, Path::new("m.mtl"), &mut Warnings::default());
+    let mut budget = Budget::new(&Limits::default());
+    let materials = parse::parse(text, Path::new("m.mtl"), &mut budget, &mut Warnings::default());
     materials.into_iter().map(|m| m.name).collect()
 }
 

@@ -1,6 +1,7 @@
 //! MTL text -> materials as written, before anything is made of them.
 
 use super::options::{self, Map};
+use crate::load::limits::{Budget, OverBudget};
 use crate::load::obj::encoding::{decode_name, to_ascii_superset};
 use crate::load::obj::lines::{Lines, keyword, words};
 use crate::load::obj::number;
@@ -8,6 +9,7 @@ use crate::load::paths::shorten;
 use crate::load::{Diagnostic, Warnings};
 use crate::math::DVec3;
 use crate::scene::color::rec_709_of_xyz;
+use std::mem::size_of;
 use std::path::Path;
 
 /// A material as written; `None`: not said.
@@ -136,8 +138,9 @@ impl Mtl {
     }
 }
 
-/// Reads all materials of `text`; what cannot be read costs a warning about `file`.
-pub(super) fn parse(text: &[u8], file: &Path, warnings: &mut Warnings) -> Vec<Mtl> {
+/// Reads all materials of `text`; what cannot be read costs a warning about `file`, and so do materials that would take
+/// more than is left of `budget`, which are left out.
+pub(super) fn parse(text: &[u8], file: &Path, budget: &mut Budget, warnings: &mut Warnings) -> Vec<Mtl> {
     let text = to_ascii_superset(text);
     let mut lines = Lines::new(&text);
     let mut parser = Parser { file, line: 0, warnings };
@@ -145,6 +148,10 @@ pub(super) fn parse(text: &[u8], file: &Path, warnings: &mut Warnings) -> Vec<Mt
     while let Some((line, text)) = lines.next() {
         let (word, rest) = keyword(text);
         parser.line = line;
+        if let Err(over) = budget.take(memory(word, rest), 1) {
+            parser.cut_off(over);
+            break;
+        }
         if word.eq_ignore_ascii_case(b"newmtl") {
             out.push(Mtl { name: decode_name(rest), line, ..Mtl::default() });
         } else if !word.is_empty()
@@ -161,6 +168,22 @@ pub(super) fn parse(text: &[u8], file: &Path, warnings: &mut Warnings) -> Vec<Mt
         }
     }
     out
+}
+
+/// Bytes that a statement leaves in memory.
+fn memory(word: &[u8], rest: &[u8]) -> u64 {
+    /// A material in a list that has grown by doubling, with its places in the table of names.
+    const MATERIAL: u64 = 2 * size_of::<Mtl>() as u64 + 2 * 96;
+    /// A map, likewise, and its picture's places in tables.
+    const MAP: u64 = 2 * size_of::<(Slot, Map)>() as u64 + 4 * 96;
+    let text = 4 * rest.len() as u64;
+    if word.eq_ignore_ascii_case(b"newmtl") {
+        MATERIAL + text
+    } else if MAPS.iter().any(|(name, _)| word.eq_ignore_ascii_case(name)) {
+        MAP + text
+    } else {
+        0
+    }
 }
 
 struct Parser<'a> {
@@ -223,6 +246,12 @@ impl Parser<'_> {
         }
     }
 
+    fn cut_off(&mut self, over: OverBudget) {
+        let text = format!("the materials from here on are left out: {over}");
+        let warning = Diagnostic::new("over-memory", self.file, self.line.to_string(), text);
+        self.warnings.push(warning.remedy("raise --max-memory"));
+    }
+
     fn not_drawn(&mut self, (what, instead): (&'static str, &'static str)) {
         let warning = Diagnostic::new("mtl-unsupported", self.file, self.line.to_string(), what.to_string());
         self.warnings.push(warning.remedy(instead));
@@ -279,10 +308,29 @@ impl Parser<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::load::Limits;
 
     fn of(text: &str) -> (Vec<Mtl>, Vec<Diagnostic>) {
+        within(text, &mut Budget::new(&Limits::default()))
+    }
+
+    fn within(text: &str, budget: &mut Budget) -> (Vec<Mtl>, Vec<Diagnostic>) {
         let mut warnings = Warnings::default();
-        (parse(text.as_bytes(), Path::new("m.mtl"), &mut warnings), warnings.into_vec())
+        (parse(text.as_bytes(), Path::new("m.mtl"), budget, &mut warnings), warnings.into_vec())
+    }
+
+    #[test]
+    fn materials_over_the_budget_are_left_out_with_a_warning() {
+        let materials: String = (0..1000).map(|i| format!("newmtl a{i}\nKd 1 0 0\n")).collect();
+        let maps = format!("newmtl a\n{}", "map_Kd a.png\n".repeat(1000));
+        for (text, left) in [(materials, 999), (maps, 1)] {
+            let mut budget = Budget::new(&Limits { memory: 200_000, ..Limits::default() });
+            let (read, warnings) = within(&text, &mut budget);
+            assert!(!read.is_empty() && read.len() <= left, "{}", read.len());
+            let told = warnings[0].to_string();
+            assert!(told.contains("are left out: ") && told.ends_with("raise --max-memory"), "{told}");
+            assert!(within(&text, &mut Budget::new(&Limits::default())).1.is_empty());
+        }
     }
 
     #[test]

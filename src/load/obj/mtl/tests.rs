@@ -1,6 +1,6 @@
 //! OBJ, MTL and pictures in a folder, through the whole loader.
 
-use crate::load::{LoadOptions, Loaded, MtlMode, Source};
+use crate::load::{LoadOptions, Loaded, MtlMode, Source, load_source};
 use crate::math::{Vec2, Vec3};
 use crate::scene::{AlphaMode, Material, Pixels, Surface, TextureRef, Wrap};
 use std::fs;
@@ -21,7 +21,7 @@ fn load(obj: &str, mtl: &str, pictures: &[(&str, [u8; 4])], mode: MtlMode) -> Lo
         png(&dir.path().join(name), *texel);
     }
     let source = Source { path: dir.path().join("m.obj"), bytes: obj.as_bytes().to_vec() };
-    crate::load::obj::load(&source, &LoadOptions { mtl: mode, ..LoadOptions::default() }).unwrap()
+    load_source(&source, &LoadOptions { mtl: mode, ..LoadOptions::default() }).unwrap()
 }
 
 fn guess(mtl: &str, pictures: &[(&str, [u8; 4])]) -> (Loaded, Material) {
@@ -220,7 +220,7 @@ fn pictures_that_are_made_take_from_the_memory_that_may_be_taken() {
     let source = Source { path: dir.path().join("m.obj"), bytes: OBJ.as_bytes().to_vec() };
     let mut options = LoadOptions::default();
     options.limits.memory = 10_000_000;
-    let loaded = crate::load::obj::load(&source, &options).unwrap();
+    let loaded = load_source(&source, &options).unwrap();
     assert_eq!(codes(&loaded), ["image-unusable"]);
     let told = loaded.warnings[0].to_string();
     let expected = "m.mtl:3: image 'row.png + column.png' cannot be used: 60000000 bytes are needed where";
@@ -236,4 +236,29 @@ fn maps_may_be_tga_and_bmp_pictures() {
         assert_eq!(texel(&loaded, m.base_color_map.as_ref()), [1, 2, 3, 255], "{:?}", loaded.warnings);
         assert!(loaded.warnings.is_empty());
     }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_picture_of_many_names_is_read_and_charged_once() {
+    let dir = tempfile::tempdir().unwrap();
+    fs::create_dir_all(dir.path().join("sub")).unwrap();
+    png(&dir.path().join("a.png"), [1, 2, 3, 255]);
+    let names = (0..60).map(|i| format!("newmtl m{i}\nKd 1 1 1\nmap_Kd {}a.png\n", "sub/../".repeat(i)));
+    fs::write(dir.path().join("m.mtl"), names.collect::<String>()).unwrap();
+    // Beside the picture there are bytes that no decoder looks at.
+    let mut bytes = fs::read(dir.path().join("a.png")).unwrap();
+    bytes.resize(1_000_000, 0);
+    fs::write(dir.path().join("a.png"), bytes).unwrap();
+    let uses: String = (0..60).map(|i| format!("usemtl m{i}\nf 1/1 2/2 3/3\n")).collect();
+    let obj = format!("{}{uses}", OBJ.replace("usemtl a\nf 1/1 2/2 3/3\n", ""));
+    let source = Source { path: dir.path().join("m.obj"), bytes: obj.into() };
+    let mut options = LoadOptions::default();
+    options.limits.memory = 1_800_000;
+    let loaded = load_source(&source, &options).unwrap();
+    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+    assert_eq!((loaded.scene.meshes.len(), loaded.scene.bitmaps.len()), (60, 1));
+    options.limits.memory = 900_000;
+    let told = load_source(&source, &options).unwrap().warnings;
+    assert_eq!((told.len(), told[0].code), (1, "image-unusable"));
 }

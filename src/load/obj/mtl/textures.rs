@@ -1,10 +1,11 @@
 //! Maps of materials -> textures of the scene.
 
-use super::library::Finder;
+use super::library::{Finder, Place};
 use super::options::{Channel, Map};
 use super::parse::{Mtl, Slot};
 use super::pictures::{Alpha, Pictures, Take};
-use crate::load::limits::{Budget, Limits};
+use crate::load::limits::{Budget, Limits, OverBudget};
+use crate::load::paths::{FileFault, shorten};
 use crate::load::texture::{Encoded, Unusable, decode_all};
 use crate::load::{Diagnostic, MtlMode, Warnings};
 use crate::math::Vec2;
@@ -24,10 +25,19 @@ const BUMP_HEIGHT: f64 = 1.0 / 64.0;
 pub(super) struct Textures {
     /// (Library, name as written) -> the picture's number, if it could be read.
     known: HashMap<(usize, String), Option<usize>>,
+    /// The same of the canonical path of each file: one may have many names.
+    files: HashMap<PathBuf, Option<usize>>,
     pictures: Pictures,
     textures: Vec<Texture>,
     /// Time that decoding took.
     pub(super) decoding: Spent,
+}
+
+/// Pictures to decode, and the canonical path of each.
+#[derive(Default)]
+struct Queue {
+    images: Vec<Encoded<'static>>,
+    files: Vec<PathBuf>,
 }
 
 /// A library whose materials are used.
@@ -56,43 +66,67 @@ impl Textures {
         (limits, budget): (&Limits, &mut Budget),
         warnings: &mut Warnings,
     ) {
-        let mut images: Vec<Encoded> = Vec::new();
-        let mut names: Vec<(usize, String)> = Vec::new();
-        let mut by_path: HashMap<PathBuf, usize> = HashMap::new();
+        let mut queue = Queue::default();
+        let mut names: Vec<(PathBuf, String)> = Vec::new();
         let maps = materials.flat_map(|m| &m.maps).filter(|(slot, _)| is_drawn(*slot, mode));
         for (_, map) in maps {
             let key = (library.number, map.file.clone());
             if self.known.contains_key(&key) {
                 continue;
             }
-            self.known.insert(key.clone(), None);
-            let place = map.line.to_string();
-            match finder.read(&map.file, &[library.folder, Path::new("")]) {
+            self.known.insert(key, None);
+            match self.queue(map, library, finder, budget, &mut queue) {
                 Ok(found) => {
                     if found.guessed {
-                        let text = format!("picture '{}' is taken from '{}'", map.file, found.path.display());
-                        warnings.push(Diagnostic::new("mtl-file-elsewhere", library.file, place.clone(), text));
+                        let text = format!("picture '{}' is taken from '{}'", shorten(&map.file), found.path.display());
+                        let place = map.line.to_string();
+                        warnings.push(Diagnostic::new("mtl-file-elsewhere", library.file, place, text));
                     }
-                    let image = *by_path.entry(found.path.clone()).or_insert(images.len());
-                    if image == images.len() {
-                        let name = found.path.to_string_lossy().into_owned();
-                        images.push(Encoded { name, place, bytes: found.bytes.into() });
-                    }
-                    names.push((image, map.file.clone()));
+                    names.push((found.canonical, map.file.clone()));
                 }
-                Err(fault) => {
-                    let warning = fault.diagnose(library.file, &place);
-                    let text = format!("picture {}; the material is drawn without it", warning.text);
-                    warnings.push(Diagnostic { text, ..warning });
-                }
+                Err(warning) => warnings.push(warning),
             }
         }
-        let (decoded, spent) = decode_all(&images, library.file, limits, budget, warnings);
+        let (decoded, spent) = decode_all(&queue.images, library.file, limits, budget, warnings);
         self.decoding += spent;
-        let numbers: Vec<_> = decoded.into_iter().map(|b: Option<Bitmap>| b.map(|b| self.pictures.add(b))).collect();
-        for (image, name) in names {
-            self.known.insert((library.number, name), numbers[image]);
+        for (file, bitmap) in queue.files.into_iter().zip(decoded) {
+            self.files.insert(file, bitmap.map(|bitmap| self.pictures.add(bitmap)));
         }
+        for (file, name) in names {
+            self.known.insert((library.number, name), self.files.get(&file).copied().flatten());
+        }
+    }
+
+    /// Finds the picture of a map, and reads it unless it was read before.
+    ///
+    /// # Errors
+    /// The warning that it is not there, or cannot be read.
+    fn queue(
+        &mut self,
+        map: &Map,
+        library: &Library,
+        finder: &mut Finder,
+        budget: &mut Budget,
+        queue: &mut Queue,
+    ) -> Result<Place, Diagnostic> {
+        let place = map.line.to_string();
+        let lost = |fault: FileFault| {
+            let warning = fault.diagnose(library.file, &place);
+            let text = format!("picture {}; the material is drawn without it", warning.text);
+            Diagnostic { text, ..warning }
+        };
+        let found = finder.find(&map.file, &[library.folder, Path::new("")]).map_err(lost)?;
+        if self.files.contains_key(&found.canonical) {
+            return Ok(found);
+        }
+        self.files.insert(found.canonical.clone(), None);
+        let name = found.path.to_string_lossy().into_owned();
+        let too_large = |over: OverBudget| Unusable::too_large(over.to_string()).warning(&name, library.file, &place);
+        budget.take(finder.resolver.length(&found.canonical), 1).map_err(too_large)?;
+        let bytes = finder.resolver.read_file(&found.path).map_err(lost)?;
+        queue.images.push(Encoded { name, place, bytes: bytes.into() });
+        queue.files.push(found.canonical.clone());
+        Ok(found)
     }
 
     /// The picture of a slot, if it could be read.
