@@ -9,7 +9,7 @@ mod play;
 
 pub(super) use play::{Pose, play};
 
-use super::accessor::Reader;
+use super::accessor::{Pick, Reader};
 use super::schema::whole;
 use crate::load::AnimationFacts;
 use curve::Interpolation;
@@ -107,15 +107,20 @@ impl Animation {
 
 /// What there is to say about all of them.
 ///
-/// The length of one is that of the `max` of its times, which glTF asks for; where it is missing, they are read.
+/// The length of one is that of the `max` of its times, which glTF asks for; where it is missing, the last of them, which
+/// ascend. That one alone is read: any number of accessors may lie over each other.
 pub(super) fn facts(animations: &[Animation], reader: Reader) -> Vec<AnimationFacts> {
     let mut ends: HashMap<usize, f64> = HashMap::new();
     let mut end = |input: Index<Accessor>| {
         *ends.entry(input.value()).or_insert_with(|| {
             let accessor = reader.root.accessors.get(input.value());
             let declared = accessor.and_then(|a| a.max.as_ref()?.get(0)?.as_f64());
-            let read = || reader.extent(input)?.ok().map(|extent| extent[0].1).filter(|end| end.is_finite());
-            declared.or_else(read).unwrap_or(0.0)
+            let last = || {
+                let last = u32::try_from(accessor?.count.0.checked_sub(1)?).ok()?;
+                let read = reader.floats::<1>(input, Pick::Only(&[last])).ok()?;
+                read.first().map(|[end]| f64::from(*end)).filter(|end| end.is_finite())
+            };
+            declared.or_else(last).unwrap_or(0.0)
         })
     };
     let of = |animation: &Animation| AnimationFacts {

@@ -290,3 +290,29 @@ fn times_that_need_more_memory_than_there_is_refuse_the_file() {
     let fault = load_bytes(Path::new("a.gltf"), file.gltf(), &options).unwrap_err().to_string();
     assert!(fault.contains("too large") && fault.contains("--max-memory"), "{fault}");
 }
+
+#[test]
+fn lengths_of_animations_whose_times_lie_over_each_other_are_found_in_little_time() {
+    let mut file = Builder::new();
+    let positions = file.triangle();
+    file.primitive(json!({"attributes": {"POSITION": positions}}));
+    let times: Vec<f32> = (0..1_000_000).map(|i| i as f32).collect();
+    let (first, values) = (file.floats("SCALAR", &times), file.floats("VEC3", &[0.; 3]));
+    let view = file.root["accessors"][first]["bufferView"].clone();
+    let samplers: Vec<Value> = (0..4000)
+        .map(|i| {
+            let accessor = json!({"bufferView": view, "componentType": 5126, "type": "SCALAR", "count": 1_000_000 - i});
+            json!({"input": file.push("accessors", accessor), "output": values})
+        })
+        .collect();
+    let channel = |k: usize| json!({"sampler": k, "target": {"node": 0, "path": "translation"}});
+    let channels: Vec<Value> = (0..samplers.len()).map(channel).collect();
+    file.set(
+        "animations",
+        json!([{"channels": channels, "samplers": samplers}, {"channels": [channel(0)], "samplers": [samplers[3999]]}]),
+    );
+    let start = std::time::Instant::now();
+    let lengths: Vec<f64> = file.load().facts.animations.iter().map(|animation| animation.seconds).collect();
+    assert_eq!(lengths, [999_999.0, 996_000.0]);
+    assert!(start.elapsed().as_secs() < 30, "{:?}", start.elapsed());
+}
