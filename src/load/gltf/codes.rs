@@ -156,8 +156,9 @@ codes! {
     MeshPrimitiveInvalidAttribute "MESH_PRIMITIVE_INVALID_ATTRIBUTE" Warn "the attribute is left out";
     MeshPrimitiveJointsWeightsMismatch "MESH_PRIMITIVE_JOINTS_WEIGHTS_MISMATCH" Warn "only whole pairs count";
     MeshPrimitiveMorphTargetInvalidAttributeCount "MESH_PRIMITIVE_MORPH_TARGET_INVALID_ATTRIBUTE_COUNT" Warn
-        "the target is left out";
-    MeshPrimitiveMorphTargetNoBaseAccessor "MESH_PRIMITIVE_MORPH_TARGET_NO_BASE_ACCESSOR" Warn "the target is left out";
+        "that attribute of the target is left out";
+    MeshPrimitiveMorphTargetNoBaseAccessor "MESH_PRIMITIVE_MORPH_TARGET_NO_BASE_ACCESSOR" Warn
+        "that attribute of the target is left out";
     MeshPrimitiveNoPosition "MESH_PRIMITIVE_NO_POSITION" Warn "the primitive is left out";
     MeshPrimitivePositionAccessorWithoutBounds "MESH_PRIMITIVE_POSITION_ACCESSOR_WITHOUT_BOUNDS" Warn
         "bounds are computed from the data";

@@ -119,7 +119,7 @@ impl Loading<'_> {
         self.take(budget, weight::typed(&value), "the document")?;
         let variants = variants::names(&value);
         let variant = self.variant(&variants)?;
-        attributes::check(&value, variant, self.report);
+        attributes::check(&value, variant, self.options.moment.is_some(), self.report);
         usage::check(&value, self.report);
         let mut graph = Graph::new(&value, self.report);
         let document = document::typed(value, self.report);

@@ -49,6 +49,13 @@ impl Report {
         self.warnings.push_kind(warning.remedy(remedy), kind);
     }
 
+    /// Files a warning for which the validator has no code.
+    pub(super) fn note(&mut self, code: &'static str, place: impl AsRef<str>, text: impl Into<String>, remedy: &str) {
+        let warning = Diagnostic::new(code, &self.file, place.as_ref(), text);
+        let kind = kind(&warning);
+        self.warnings.push_kind(warning.remedy(remedy), kind);
+    }
+
     /// Files a fault made elsewhere.
     pub(super) fn fault(&mut self, fault: Diagnostic) {
         self.faults.push(fault);

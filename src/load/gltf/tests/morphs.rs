@@ -26,3 +26,38 @@ fn normals_of_several_targets_are_added_up_before_they_are_made_unit() {
         assert_eq!(codes(&loaded), [""; 0]);
     }
 }
+
+#[test]
+fn of_a_target_that_changes_what_the_primitive_has_not_only_that_is_left_out() {
+    let mut file = Builder::new();
+    let positions = file.triangle();
+    let up = file.floats("VEC3", &[0., 0., 1., 0., 0., 1., 0., 0., 1.]);
+    let targets = json!([{"POSITION": up, "NORMAL": up}]);
+    let primitive = json!({"attributes": {"POSITION": positions}, "targets": targets});
+    let loaded = file.set("meshes", json!([{"primitives": [primitive], "weights": [1]}])).load();
+    assert_eq!(loaded.scene.meshes[0].positions[0].z, 1.0);
+    assert_eq!(codes(&loaded), ["gltf-mesh-primitive-morph-target-no-base-accessor"]);
+    let told = loaded.warnings.iter().map(ToString::to_string).find(|told| told.contains("NORMAL")).unwrap();
+    assert!(told.ends_with("; that attribute of the target is left out"), "{told}");
+}
+
+#[test]
+fn targets_that_move_texture_coordinates_in_vain_are_told_where_they_have_a_weight() {
+    let told = |weights: &[f32], node: Option<&[f32]>| {
+        let mut file = Builder::new();
+        let (positions, uvs) = (file.triangle(), file.floats("VEC2", &[0.5; 6]));
+        let attributes = json!({"POSITION": positions, "TEXCOORD_0": uvs});
+        let primitive = json!({"attributes": attributes, "targets": [{"POSITION": positions}, {"TEXCOORD_0": uvs}]});
+        file.set("meshes", json!([{"primitives": [primitive], "weights": weights}]));
+        if let Some(weights) = node {
+            file.root["nodes"][0]["weights"] = json!(weights);
+        }
+        let warnings = file.load().warnings;
+        warnings.iter().filter(|w| w.code == "gltf-morph-unsupported").map(ToString::to_string).collect::<Vec<_>>()
+    };
+    let text =
+        "a.gltf:meshes[0].primitives[0].targets[1].TEXCOORD_0: morphing of TEXCOORD_0 is not drawn; it stays as it is";
+    assert_eq!(told(&[0., 0.5], None), [text]);
+    assert_eq!(told(&[0., 0.], Some(&[0., 1.])), [text]);
+    assert_eq!(told(&[1., 0.], None), [""; 0]);
+}
