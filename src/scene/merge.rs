@@ -54,10 +54,7 @@ impl Scene {
         }));
         self.photometric |= part.photometric;
         self.lights.extend(part.lights.into_iter().map(|l| moved(l, &place)));
-        self.cameras.extend(part.cameras.into_iter().map(|mut c| {
-            c.world_from_camera = place * c.world_from_camera;
-            c
-        }));
+        self.cameras.extend(part.cameras.into_iter().map(|camera| camera.placed(&place)));
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::codes::Code;
 use super::report::Report;
-use crate::math::{DAffine3, DMat3, DVec3, Vec3};
+use crate::math::{DAffine3, DVec3, Vec3};
 use crate::scene::{Camera, Falloff, Light, LightKind, Projection};
 use gltf::json::extensions::scene::khr_lights_punctual as punctual;
 use gltf::json::validation::Checked;
@@ -27,7 +27,7 @@ pub(super) fn camera(root: &Root, node: &Node, world: DAffine3, report: &mut Rep
         // The checks have told of it.
         _ => return None,
     };
-    let placed = projection.zip(rigid(world));
+    let placed = projection.zip(Camera::rigid(world));
     if placed.is_none() {
         report.warn(
             Code::ValueNotInRange,
@@ -37,15 +37,6 @@ pub(super) fn camera(root: &Root, node: &Node, world: DAffine3, report: &mut Rep
     }
     let (projection, world_from_camera) = placed?;
     Some(Camera { name: name(&source.name, node), projection, world_from_camera })
-}
-
-/// A transform without scale, shear and mirror: the axes looked along and upwards are kept.
-fn rigid(world: DAffine3) -> Option<DAffine3> {
-    let back = world.matrix3.z_axis.try_normalize()?;
-    let up = world.matrix3.y_axis;
-    let up = (up - back * up.dot(back)).try_normalize()?;
-    let rigid = DAffine3::from_mat3_translation(DMat3::from_cols(up.cross(back), up, back), world.translation);
-    rigid.is_finite().then_some(rigid)
 }
 
 /// The light of a node.
@@ -89,19 +80,4 @@ fn cone(spot: &punctual::Spot) -> (f64, f64) {
 /// The name of a thing, or else of the node that holds it.
 fn name(own: &Option<String>, node: &Node) -> String {
     own.as_ref().filter(|n| !n.is_empty()).or(node.name.as_ref()).cloned().unwrap_or_default()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::math::DQuat;
-
-    #[test]
-    fn cameras_lose_scale_and_mirror_but_keep_where_they_look() {
-        let turn = DQuat::from_rotation_y(0.5);
-        let scaled = DAffine3::from_scale_rotation_translation(DVec3::new(-3.0, 2.0, 5.0), turn, DVec3::X);
-        let expected = DAffine3::from_rotation_translation(turn, DVec3::X);
-        assert!(rigid(scaled).unwrap().abs_diff_eq(expected, 1e-12));
-        assert!(rigid(DAffine3::from_scale(DVec3::ZERO)).is_none());
-    }
 }
