@@ -120,16 +120,23 @@ impl Resolver {
     /// `data:` URIs are not for this.
     pub fn read_uri(&mut self, uri: &str) -> Result<Vec<u8>, FileFault> {
         let name = file_name_of_uri(uri)?;
-        match self.read_file(Path::new(&name)) {
-            // Exporters write names with a literal '%' unescaped often enough.
-            Err(FileFault::Missing(_)) if name != uri => self.read_file(Path::new(uri)),
+        // Exporters write names with a literal '%' unescaped, or with another system's slashes, often enough.
+        let others = [uri.to_owned(), name.replace('\\', "/")];
+        let mut read = self.read_file(Path::new(&name));
+        for other in others.into_iter().filter(|other| *other != name) {
+            if matches!(read, Err(FileFault::Missing(_))) {
+                read = self.read_file(Path::new(&other));
+            }
+        }
+        match read {
+            Err(FileFault::Missing(_)) => Err(FileFault::Missing(shown(Path::new(&name)))),
             other => other,
         }
     }
 
     /// Reads a file named by a path, relative to the model or absolute.
     pub fn read_file(&mut self, name: &Path) -> Result<Vec<u8>, FileFault> {
-        let shown = || name.to_string_lossy().into_owned();
+        let shown = || shown(name);
         let io = |source| FileFault::Io { name: shown(), source };
         let path = self.locate(name)?;
         let watch = Stopwatch::of_this_thread();
@@ -165,8 +172,8 @@ impl Resolver {
     /// The canonical path of an existing plain file below the root: opening anything else, such as a pipe, could wait
     /// for ever.
     pub fn locate(&self, name: &Path) -> Result<PathBuf, FileFault> {
-        let shown = name.to_string_lossy().into_owned();
-        if name.as_os_str().is_empty() || shown.contains('\0') {
+        let shown = shown(name);
+        if name.as_os_str().is_empty() || name.as_os_str().as_encoded_bytes().contains(&0) {
             return Err(FileFault::BadUri(shown));
         }
         let outside = |path: &Path| FileFault::Outside { name: shown.clone(), root: common_folder(&self.root, path) };
@@ -228,6 +235,13 @@ fn file_name_of_uri(uri: &str) -> Result<String, FileFault> {
     percent_decode_str(uri).decode_utf8().map(|s| s.into_owned()).map_err(|_| FileFault::BadUri(shorten(uri)))
 }
 
+/// A file name in messages: whole, unless no system has names so long.
+pub(crate) fn shown(name: &Path) -> String {
+    const LONGEST: usize = 255;
+    let name = name.to_string_lossy();
+    if name.chars().nth(LONGEST).is_some() { shorten(&name) } else { name.into_owned() }
+}
+
 /// The beginning of a text that may be megabytes long.
 pub(crate) fn shorten(text: &str) -> String {
     const KEPT: usize = 80;
@@ -285,6 +299,21 @@ mod tests {
         assert_eq!(r.read_uri("100%.bin").unwrap(), b"percent");
         assert_eq!(r.read_uri("%E2%9D%A4.bin").unwrap(), b"heart");
         assert_eq!(r.finish().0.len(), 4, "the model and three files, each once");
+    }
+
+    #[test]
+    fn slashes_of_another_system_lead_to_files_and_not_out_of_the_root() {
+        let dir = folder();
+        fs::create_dir(dir.path().join("model/textures")).unwrap();
+        fs::write(dir.path().join("model/textures/red.png"), b"red").unwrap();
+        let mut r = resolver(dir.path(), &LoadOptions::default());
+        for uri in ["textures\\red.png", ".\\textures\\red.png", "textures%5Cred.png"] {
+            assert_eq!(r.read_uri(uri).unwrap(), b"red", "{uri}");
+        }
+        assert!(matches!(r.read_uri("..\\secret.bin"), Err(FileFault::Outside { .. })));
+        assert_eq!(r.read_uri("textures\\no.png").unwrap_err().to_string(), "'textures\\no.png' is not there");
+        // A message stays readable, whatever the file says.
+        assert!(r.read_uri(&"x".repeat(100_000)).unwrap_err().to_string().len() < 200);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! on one line although names may hold spaces. A file found elsewhere than its name says costs a warning; everything is
 //! read through the [`Resolver`], so nothing outside the root is.
 
-use crate::load::paths::{FileFault, Resolver};
+use crate::load::paths::{FileFault, Resolver, shown};
 use std::path::{Path, PathBuf};
 
 /// Reads files by careless names.
@@ -61,7 +61,7 @@ impl Finder<'_> {
         }
         self.elsewhere(&slashed, folders).ok_or_else(|| match fault {
             // As written, not with the folder it was looked for in.
-            Some(FileFault::Missing(_)) | None => FileFault::Missing(name.into()),
+            Some(FileFault::Missing(_)) | None => FileFault::Missing(shown(Path::new(name))),
             Some(fault) => fault,
         })
     }
@@ -184,6 +184,8 @@ mod tests {
         assert_eq!(libraries(&files, "no such.mtl a.mtl"), ["'no such.mtl' is not there", "a.mtl"]);
         assert_eq!(libraries(&files, "lost"), ["'lost' is not there"]);
         assert!(libraries(&files, "").is_empty());
+        let many = libraries(&files, &"word ".repeat(20_000));
+        assert!(many.iter().all(|told| told.len() < 200), "{}", many[0].len());
     }
 
     #[test]
