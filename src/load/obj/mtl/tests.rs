@@ -262,3 +262,17 @@ fn a_picture_of_many_names_is_read_and_charged_once() {
     let told = load_source(&source, &options).unwrap().warnings;
     assert_eq!((told.len(), told[0].code), (1, "image-unusable"));
 }
+
+#[test]
+fn a_comment_behind_the_name_of_a_picture_is_none_of_it_unless_there_is_such_a_file() {
+    let color = |line: &str, pictures: &[(&str, [u8; 4])]| {
+        let (loaded, m) = guess(&format!("newmtl a\nKd 1 1 1\n{line}\n"), pictures);
+        m.base_color_map.is_some().then(|| texel(&loaded, m.base_color_map.as_ref())[0])
+    };
+    let (red, odd) = (("red.png", [1, 0, 0, 255]), ("red.png # 2.png", [2, 0, 0, 255]));
+    for line in ["map_Kd red.png # the paint", "map_Kd -s 2 2 1 red.png #paint", "map_Kd red.png # -bm 2"] {
+        assert_eq!(color(line, &[red]), Some(1), "{line}");
+    }
+    assert_eq!(color("map_Kd red.png # 2.png", &[red, odd]), Some(2));
+    assert_eq!((color("map_Kd none.png # red.png", &[red]), color("map_Kd # red.png", &[red])), (None, None));
+}

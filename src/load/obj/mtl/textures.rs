@@ -50,6 +50,13 @@ pub(super) struct Library<'a> {
     pub folder: &'a Path,
 }
 
+/// The name of a file without what looks like a comment behind it; files whose name holds that come first.
+fn without_remark(name: &str) -> Option<&str> {
+    let starts = |pair: &[u8]| pair[0].is_ascii_whitespace() && pair[1] == b'#';
+    let name = name.get(..name.as_bytes().windows(2).position(starts)?)?.trim_end();
+    (!name.is_empty()).then_some(name)
+}
+
 /// Maps that are drawn. Ambient light sees the diffuse map unless the text counts.
 fn is_drawn(slot: Slot, mode: MtlMode) -> bool {
     slot != Slot::Ambient || mode == MtlMode::Literal
@@ -115,7 +122,11 @@ impl Textures {
             let text = format!("picture {}; the material is drawn without it", warning.text);
             Diagnostic { text, ..warning }
         };
-        let found = finder.find(&map.file, &[library.folder, Path::new("")]).map_err(lost)?;
+        let folders = [library.folder, Path::new("")];
+        let found = finder.find(&map.file, &folders).or_else(|fault| {
+            let other = without_remark(&map.file).and_then(|name| finder.find(name, &folders).ok());
+            other.ok_or_else(|| lost(fault))
+        })?;
         if self.files.contains_key(&found.canonical) {
             return Ok(found);
         }
