@@ -23,7 +23,7 @@ pub(in crate::load) struct Bare {
     pub normals: Vec<Vec3>,
     /// v points up.
     pub uvs: Vec<DVec2>,
-    /// sRGB-coded, 0…1, and opacity.
+    /// sRGB-coded, and opacity: 0…1 where whole numbers say so, floats as written.
     pub colors: Vec<[f32; 4]>,
     /// Vertices of all faces, one face after another; each is there.
     pub corners: Vec<u32>,
@@ -37,6 +37,8 @@ pub(in crate::load) struct Bare {
     pub places: Option<i32>,
     /// What the file says of itself.
     pub comments: Vec<String>,
+    /// What is told of it beside what becomes of faces.
+    pub told: Vec<Diagnostic>,
 }
 
 impl Bare {
@@ -95,7 +97,7 @@ pub(in crate::load) fn over_memory(file: &Path, over: OverBudget) -> Diagnostic 
 /// # Errors
 /// When points and lines would take more than is left of the budget.
 pub(in crate::load) fn load(
-    bare: Bare,
+    mut bare: Bare,
     format: &str,
     otherwise: (UpAxis, &str),
     source: &Source,
@@ -106,6 +108,9 @@ pub(in crate::load) fn load(
     let mut warnings = Warnings::default();
     let mut resolver = Resolver::new(source, options);
     let (few_corners, vertices) = (bare.few_corners, bare.positions.len());
+    std::mem::take(&mut bare.told).into_iter().for_each(|told| warnings.push(told));
+    let coding = color::settle(&mut bare.colors);
+    coding.warning(["color-bytes", "color-range"], file).into_iter().for_each(|told| warnings.push(told));
     budget.take(bare.strokes(), Bare::STROKE).map_err(|over| over_memory(file, over))?;
     let (statements, soup) = statements(bare);
     let placed = place(&soup.positions);

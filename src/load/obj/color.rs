@@ -38,15 +38,23 @@ pub(super) enum Coding {
     Beyond,
 }
 
-/// Makes colours as written 0…1, and white where there is none (not finite).
-pub(super) fn settle(colors: &mut [[f32; 3]]) -> Coding {
+/// Makes colours as written 0…1, and white where there is none (not finite). A fourth number of each, its opacity, is
+/// written as they are where any is above 1, and else from 0 to 1.
+pub(super) fn settle<const N: usize>(colors: &mut [[f32; N]]) -> Coding {
     /// What rounding may add to full light.
     const ROUNDED: f32 = 1e-3;
     let (bytes, mut beyond) = (are_bytes(colors), false);
-    let unit = if bytes { 255.0 } else { 1.0 };
+    let unit = |bytes: bool| if bytes { 255.0 } else { 1.0 };
+    let alphas_are_bytes = bytes && colors.iter().flat_map(|color| color.iter().skip(3)).any(|&alpha| alpha > 1.0);
     for color in colors {
-        *color = if color.iter().all(|c| c.is_finite()) { color.map(|c| c / unit) } else { [1.0; 3] };
-        beyond |= color.iter().any(|c| !(-ROUNDED..=1.0 + ROUNDED).contains(c));
+        let (light, alpha) = color.split_at_mut(3.min(N));
+        if light.iter().all(|c| c.is_finite()) {
+            light.iter_mut().for_each(|c| *c /= unit(bytes));
+        } else {
+            light.fill(1.0);
+        }
+        alpha.iter_mut().for_each(|alpha| *alpha /= unit(alphas_are_bytes));
+        beyond |= light.iter().any(|c| !(-ROUNDED..=1.0 + ROUNDED).contains(c));
     }
     match (bytes, beyond) {
         (true, _) => Coding::Bytes,
@@ -68,8 +76,8 @@ impl Coding {
 }
 
 /// Whether colours were written as 0 … 255.
-fn are_bytes(colors: &[[f32; 3]]) -> bool {
-    let all = || colors.iter().flatten().filter(|c| c.is_finite());
+fn are_bytes<const N: usize>(colors: &[[f32; N]]) -> bool {
+    let all = || colors.iter().flat_map(|color| color.iter().take(3)).filter(|c| c.is_finite());
     all().any(|&c| c > 1.5) && all().all(|&c| (0.0..=255.0).contains(&c))
 }
 
@@ -95,6 +103,12 @@ mod tests {
         assert_eq!(settle(&mut colors), Coding::Bytes);
         assert_eq!(colors, [[1.0 / 255.0; 3], [1.0; 3], [1.0, 0.2, 0.0]]);
         assert_eq!((settle(&mut colors), colors[1]), (Coding::Units, [1.0; 3]));
+        let mut with_opacity = [[51.0, 0.0, 0.0, 1.0], [255.0, 0.0, 0.0, 0.5]];
+        settle(&mut with_opacity);
+        assert_eq!(with_opacity, [[0.2, 0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.5]]);
+        let mut all_bytes = [[51.0, 0.0, 0.0, 255.0], [255.0, 0.0, 0.0, 51.0]];
+        settle(&mut all_bytes);
+        assert_eq!(all_bytes, [[0.2, 0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.2]]);
         for odd in [300.0, 1.2, -0.1] {
             assert_eq!(settle(&mut [[odd, 0.5, 0.5]]), Coding::Beyond, "{odd}");
         }

@@ -79,6 +79,19 @@ fn digits(text: &[u8], mut at: usize, mut number: u64) -> (u64, usize) {
     (number, at)
 }
 
+/// The number that a whole word is: as [`str::parse`] reads it, or one that is none as C libraries spell it.
+pub(in crate::load) fn value(word: &[u8]) -> Option<f64> {
+    let parsed = std::str::from_utf8(word).ok().and_then(|word| word.parse().ok());
+    parsed.or_else(|| is_none_spelled(word).then_some(f64::NAN))
+}
+
+/// Whether a word is `nan`, `inf` or what C libraries print for them: `-nan(ind)`, `1.#QNAN`.
+fn is_none_spelled(word: &[u8]) -> bool {
+    let text = String::from_utf8_lossy(word).to_ascii_lowercase();
+    let unsigned = text.trim_start_matches(['+', '-']);
+    ["nan", "inf", "1.#", "ind"].iter().any(|start| unsigned.starts_with(start))
+}
+
 /// Checks a word; one that is no number in any reading becomes `nan`.
 pub(super) fn check(word: &[u8]) -> Number<'_> {
     if let Some((end, places)) = scan(word)
@@ -123,8 +136,7 @@ fn scan(word: &[u8]) -> Option<(usize, i32)> {
 fn repair(word: &[u8]) -> Number<'_> {
     let odd = |word: String| Number { word: word.into(), places: None, odd: true };
     let text = String::from_utf8_lossy(word).to_ascii_lowercase();
-    let unsigned = text.trim_start_matches(['+', '-']);
-    if ["nan", "inf", "1.#", "-1.#", "ind"].iter().any(|s| unsigned.starts_with(s)) {
+    if is_none_spelled(word) {
         return Number { word: "nan".into(), places: None, odd: false };
     }
     let respelled = text.replace(',', ".").replace('d', "e").replace("+e", "e+").replace("-e", "e-");
@@ -204,6 +216,7 @@ mod tests {
         for word in ["nan", "-nan(ind)", "NaN", "inf", "-Infinity", "1.#IND", "-1.#INF", "1.#QNAN"] {
             let (value, odd) = value(word);
             assert!(value.is_nan() && !odd, "{word}");
+            assert!(super::value(word.as_bytes()).is_some_and(|value| !value.is_finite()), "{word}");
         }
     }
 

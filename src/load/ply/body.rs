@@ -117,8 +117,9 @@ impl<'a> Body<'a> {
             return Ok(plain.value);
         }
         let length = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
-        let word = String::from_utf8_lossy(&rest[..length]);
-        let value = word.parse::<f64>().map_err(|_| Missing::Word(word.to_string()))?;
+        let word = &rest[..length];
+        let lost = || Missing::Word(String::from_utf8_lossy(word).into_owned());
+        let value = number::value(word).ok_or_else(lost)?;
         self.at += length;
         Ok(value)
     }

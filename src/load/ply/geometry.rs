@@ -7,6 +7,7 @@ use crate::load::obj::bare::{Bare, over_memory};
 use crate::load::paths::shorten;
 use crate::load::{Diagnostic, Source};
 use crate::math::{DVec2, DVec3, Vec3};
+use std::path::Path;
 
 /// Reads every element in the order of the file.
 ///
@@ -22,7 +23,32 @@ pub(super) fn read(header: &Header, source: &Source, budget: &mut Budget) -> Res
     let Reader { body, mut bare, .. } = reader;
     bare.places = (header.encoding == Encoding::Text).then_some(body.places);
     bare.comments.clone_from(&header.comments);
+    bare.told = passed_over(header, &source.path);
     Ok(bare)
+}
+
+/// Warnings of what would change the look, and is not read.
+fn passed_over(header: &Header, file: &Path) -> Vec<Diagnostic> {
+    let faces = || header.elements.iter().filter(|element| element.name == "face" && element.count > 0);
+    let has = |list: bool, names: &[&str]| {
+        let mut properties = faces().flat_map(|element| &element.properties);
+        properties.any(|property| property.length.is_some() == list && names.contains(&property.name.as_str()))
+    };
+    let warning = |code, text: String, remedy: &str| Diagnostic::new(code, file, "", text).remedy(remedy);
+    let mut told = Vec::new();
+    if SLOTS[RED..RED + 3].iter().any(|names| has(false, names)) {
+        told.push(warning("ply-face-colors", "colours of faces are not drawn".into(), "give the vertices colours"));
+    }
+    if has(true, &["texcoord"]) {
+        let text = "texture coordinates of faces (texcoord) are not read".into();
+        told.push(warning("ply-face-texcoords", text, "export it as OBJ or glTF"));
+    }
+    let pictures = header.comments.iter().filter_map(|comment| comment.strip_prefix("TextureFile"));
+    for name in pictures.map(str::trim).filter(|name| !name.is_empty()) {
+        let text = format!("picture '{}' (comment TextureFile) is not drawn", shorten(name));
+        told.push(warning("ply-picture", text, "export it as OBJ or glTF"));
+    }
+    told
 }
 
 /// Numbers of a vertex that have a meaning here.
@@ -40,6 +66,9 @@ const SLOTS: [&[&str]; 12] = [
     &["blue", "b", "diffuse_blue"],
     &["alpha", "a", "opacity", "diffuse_alpha"],
 ];
+
+/// Where colours begin in [`SLOTS`].
+const RED: usize = 8;
 
 struct Reader<'a, 'b> {
     source: &'a Source,
@@ -93,7 +122,7 @@ impl Reader<'_, '_> {
                 match slot {
                     Some(slot) => {
                         let value = self.value(element, i, property)?;
-                        values[*slot] = if *slot < 8 { value } else { value / unit(property.kind) };
+                        values[*slot] = if *slot < RED { value } else { value / unit(property.kind) };
                     }
                     None => self.pass_property(element, i, property)?,
                 }

@@ -279,3 +279,48 @@ fn counts_in_a_header_take_no_memory() {
     let over = of(&square("ascii"), &small).unwrap_err();
     assert_eq!(over, "a.ply: 960 bytes are needed where 500 of 500 are left; raise --max-memory");
 }
+
+/// A triangle as text, with these lines of the header before the faces, and more to say of its vertices and its face.
+fn triangle(vertex: &str, comment: &str, face: &str, of_vertex: [&str; 3], of_face: &str) -> Loaded {
+    let [a, b, c] = of_vertex;
+    let text = format!(
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n{vertex}{comment}\
+         element face 1\nproperty list uchar int vertex_indices\n{face}end_header\n\
+         0 0 0 {a}\n1 0 0 {b}\n0 1 0 {c}\n3 0 1 2 {of_face}\n"
+    );
+    plain(text.as_bytes())
+}
+
+#[test]
+fn what_would_change_the_look_and_is_not_read_is_told() {
+    let told = |loaded: Loaded| loaded.warnings.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let colors = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+    let faces = triangle("", "", colors, [""; 3], "255 0 0");
+    assert_eq!(told(faces), ["a.ply: colours of faces are not drawn; give the vertices colours"]);
+    let corners = "property list uchar float texcoord\n";
+    let picture = triangle("", "comment TextureFile foo.png\n", corners, [""; 3], "6 0 0 1 0 0 1");
+    assert_eq!(
+        told(picture),
+        [
+            "a.ply: texture coordinates of faces (texcoord) are not read; export it as OBJ or glTF",
+            "a.ply: picture 'foo.png' (comment TextureFile) is not drawn; export it as OBJ or glTF",
+        ]
+    );
+}
+
+#[test]
+fn float_colours_above_one_are_bytes() {
+    let colors = "property float red\nproperty float green\nproperty float blue\n";
+    let loaded = triangle(colors, "", "", ["255 0 0", "0 255 0", "0 0 0"], "");
+    assert_eq!(loaded.scene.meshes[0].colors[..2], [Vec4::new(1.0, 0.0, 0.0, 1.0), Vec4::new(0.0, 1.0, 0.0, 1.0)]);
+    assert_eq!(loaded.warnings[0].code, "color-bytes");
+    let beyond = triangle(colors, "", "", ["1.5 0 0", "0 -1 0", "0 0 nan"], "");
+    assert_eq!((beyond.warnings[0].code, beyond.scene.meshes[0].colors[2]), ("color-range", Vec4::ONE));
+}
+
+#[test]
+fn normals_that_are_no_numbers_as_c_prints_them_are_none() {
+    let normals = "property float nx\nproperty float ny\nproperty float nz\n";
+    let loaded = triangle(normals, "", "", ["-nan(ind) -nan(ind) 1.#QNAN", "0 0 1", "0 0 1"], "");
+    assert_eq!((loaded.facts.faces, loaded.warnings.len()), (1, 0), "{:?}", loaded.warnings);
+}

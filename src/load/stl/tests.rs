@@ -137,3 +137,30 @@ fn coordinates_that_are_not_finite_drop_their_faces() {
     assert_eq!((loaded.facts.faces, loaded.warnings[0].code, loaded.warnings[0].count), (1, "face-not-finite", 3));
     assert!(loaded.scene.meshes[0].positions.iter().all(|p: &Vec3| p.is_finite()));
 }
+
+#[test]
+fn colours_in_attributes_are_told() {
+    let told = |bytes: &[u8]| plain(bytes).warnings.iter().map(|w| w.code).collect::<Vec<_>>();
+    let mut colored = binary("");
+    *colored.last_mut().unwrap() |= 0x80;
+    assert_eq!((told(&colored), told(&binary("COLOR=\x7f\x7f"))), (vec!["stl-colors"], vec!["stl-colors"]));
+    assert_eq!(told(&binary("")), [""; 0]);
+}
+
+#[test]
+fn triangles_behind_a_header_that_counts_none_are_drawn_and_told() {
+    let mut bytes = binary("");
+    bytes[80..84].fill(0);
+    let loaded = plain(&bytes);
+    let text = "a.stl:byte 80: the header claims 0 triangles, but 4 are there; they are drawn";
+    assert_eq!((loaded.facts.faces, loaded.warnings[0].to_string().as_str()), (4, text));
+    // What is no whole triangle is none.
+    bytes.pop();
+    assert_eq!(plain(&bytes).facts.faces, 0);
+}
+
+#[test]
+fn corners_that_are_no_numbers_as_c_prints_them_cost_their_facet() {
+    let loaded = plain(text().replacen("1.500", "-nan(ind)", 1).as_bytes());
+    assert_eq!((loaded.facts.faces, loaded.warnings[0].code), (3, "face-not-finite"));
+}

@@ -115,7 +115,6 @@ impl<'a> Words<'a> {
             self.places = self.places.max(plain.places);
             return Ok(plain.value);
         }
-        let value = std::str::from_utf8(word).ok().and_then(|word| word.parse::<f64>().ok());
-        value.ok_or_else(|| self.fault(word, "a number"))
+        number::value(word).ok_or_else(|| self.fault(word, "a number"))
     }
 }
