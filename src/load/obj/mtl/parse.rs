@@ -141,10 +141,14 @@ impl Mtl {
 /// Reads all materials of `text`; what cannot be read costs a warning about `file`, and so do materials that would take
 /// more than is left of `budget`, which are left out.
 pub(super) fn parse(text: &[u8], file: &Path, budget: &mut Budget, warnings: &mut Warnings) -> Vec<Mtl> {
+    let mut parser = Parser { file, line: 1, warnings };
+    let mut out: Vec<Mtl> = Vec::new();
+    if let Err(over) = budget.take(text.len() as u64, 1) {
+        parser.cut_off(over);
+        return out;
+    }
     let text = to_ascii_superset(text);
     let mut lines = Lines::new(&text);
-    let mut parser = Parser { file, line: 0, warnings };
-    let mut out: Vec<Mtl> = Vec::new();
     while let Some((line, text)) = lines.next() {
         let (word, rest) = keyword(text);
         parser.line = line;
