@@ -32,6 +32,13 @@ const REC_709: Chromaticities = Chromaticities {
     white: Vec2(0.3127, 0.3290),
 };
 
+/// Names of three channels of one layer.
+type Triple = [&'static str; 3];
+
+const ALBEDO: Triple = ["albedo.R", "albedo.G", "albedo.B"];
+const NORMAL: Triple = ["N.X", "N.Y", "N.Z"];
+const POSITION: Triple = ["P.X", "P.Y", "P.Z"];
+
 /// The bytes of an EXR file.
 pub(super) fn encode(picture: &Picture, output: &Output, metadata: &Metadata) -> Result<Vec<u8>, ImageError> {
     let channels = AnyChannels::sort(channels(picture, output));
@@ -80,13 +87,13 @@ fn channels(picture: &Picture, output: &Output) -> SmallVec<[AnyChannel<FlatSamp
     let axis = |values: &[[f32; 3]], i: usize| values.iter().map(|v| v[i]).collect::<Vec<f32>>();
     for i in 0..3 {
         if !layers.albedo.is_empty() {
-            list.push(color(["albedo.R", "albedo.G", "albedo.B"][i], axis(&layers.albedo, i)));
+            list.push(color(ALBEDO[i], axis(&layers.albedo, i)));
         }
         if !layers.normal.is_empty() {
-            list.push(color(["N.X", "N.Y", "N.Z"][i], axis(&layers.normal, i)));
+            list.push(color(NORMAL[i], axis(&layers.normal, i)));
         }
         if !layers.position.is_empty() {
-            list.push(floats(["P.X", "P.Y", "P.Z"][i], axis(&layers.position, i)));
+            list.push(floats(POSITION[i], axis(&layers.position, i)));
         }
     }
     if !layers.depth.is_empty() {
@@ -154,8 +161,11 @@ pub(super) fn read_metadata(file: impl BufRead) -> Result<Metadata, ImageError> 
     Ok(metadata)
 }
 
-/// Reads the first part of an EXR: beauty, and the layers that have the names of this module; at most `max_pixels`.
-pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Picture, ImageError> {
+/// Reads the first part of an EXR, at most `max_pixels`: beauty, the layers that have the names of this module, and every other
+/// channel; and says what it holds besides that is not read.
+///
+/// A picture of luminance alone (`Y`) is grey. Its chroma, which has fewer values than there are pixels, is left out.
+pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<(Picture, Vec<String>), ImageError> {
     let fail = |e: ::exr::error::Error| ImageError::decode(FileKind::Exr, e);
     let meta = MetaData::read_from_buffered(bytes, false).map_err(fail)?;
     for header in &meta.headers {
@@ -179,14 +189,20 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Picture, ImageErro
     let Vec2(width, height) = layer.size;
     let channels = Channels { list: &layer.channel_data.list, len: width * height };
     let as_u32 = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
-    let picture =
-        Picture { width: as_u32(width), height: as_u32(height), beauty: channels.beauty(), layers: channels.layers() };
-    Ok(picture)
+    let (beauty, layers) = (channels.beauty()?, channels.layers());
+    let mut left_out = channels.too_short();
+    left_out.extend(match meta.headers.len() {
+        0 | 1 => None,
+        2 => Some("part 2".to_owned()),
+        parts => Some(format!("parts 2 to {parts}")),
+    });
+    Ok((Picture { width: as_u32(width), height: as_u32(height), beauty, layers }, left_out))
 }
 
 /// The channels of a part, found by name.
 struct Channels<'a> {
     list: &'a [AnyChannel<FlatSamples>],
+    /// Pixels.
     len: usize,
 }
 
@@ -208,39 +224,67 @@ impl Channels<'_> {
         }
     }
 
-    fn beauty(&self) -> Vec<[f32; 4]> {
-        let or = |name: &str, default: f32| self.floats(name).unwrap_or_else(|| vec![default; self.len]);
-        let (r, g, b, a) = (or("R", 0.0), or("G", 0.0), or("B", 0.0), or("A", 1.0));
-        (0..self.len).map(|i| [r[i], g[i], b[i], a[i]]).collect()
+    /// The names of the three colours: those there are, or luminance for each.
+    fn colors(&self) -> Option<Triple> {
+        let colors = ["R", "G", "B"];
+        let is_there = |name: &&str| self.find(name).is_some();
+        if colors.iter().any(is_there) { Some(colors) } else { is_there(&"Y").then_some(["Y"; 3]) }
     }
 
-    fn triples(&self, names: [&str; 3]) -> Vec<[f32; 3]> {
+    fn beauty(&self) -> Result<Vec<[f32; 4]>, ImageError> {
+        let Some(colors) = self.colors() else {
+            let names: Vec<String> = self.list.iter().map(|c| c.name.to_string()).collect();
+            let reason = format!("it has no colours (R, G, B or Y); its channels are {}", names.join(", "));
+            return Err(ImageError::decode(FileKind::Exr, reason));
+        };
+        let or = |name: &str, default: f32| self.floats(name).unwrap_or_else(|| vec![default; self.len]);
+        let ([r, g, b], a) = (colors.map(|name| or(name, 0.0)), or("A", 1.0));
+        Ok((0..self.len).map(|i| [r[i], g[i], b[i], a[i]]).collect())
+    }
+
+    fn triples(&self, names: Triple) -> Vec<[f32; 3]> {
         let [Some(x), Some(y), Some(z)] = names.map(|name| self.floats(name)) else { return Vec::new() };
         (0..self.len).map(|i| [x[i], y[i], z[i]]).collect()
     }
 
-    /// Channels of layers that have no array of their own, unless they are halves.
+    /// Names of the channels that are part of the beauty or of an array of [`Layers`].
+    fn taken(&self) -> Vec<&'static str> {
+        let whole = |names: Triple| names.iter().all(|name| self.find(name).is_some());
+        let triples = [ALBEDO, NORMAL, POSITION].into_iter().filter(|names| whole(*names));
+        let ids = ["id.prim", "id.instance"].into_iter();
+        let ids = ids.filter(|name| matches!(self.find(name), Some(FlatSamples::U32(_))));
+        self.colors().into_iter().chain(triples).flatten().chain(["A", "Z"]).chain(ids).collect()
+    }
+
+    /// Channels that have no array of their own.
     fn others(&self) -> Vec<Channel> {
-        const OWN: [&str; 4] = ["albedo", "N", "P", "id"];
+        let taken = self.taken();
         let other = |channel: &AnyChannel<FlatSamples>| {
             let name = channel.name.to_string();
-            let (layer, _) = name.split_once('.')?;
+            if taken.contains(&name.as_str()) || channel.sample_data.len() != self.len {
+                return None;
+            }
             let values = match &channel.sample_data {
-                _ if OWN.contains(&layer) || channel.sample_data.len() != self.len => return None,
                 FlatSamples::U32(values) => Values::U32(values.clone()),
                 FlatSamples::F32(values) => Values::F32(values.clone()),
-                FlatSamples::F16(_) => return None,
+                FlatSamples::F16(values) => Values::F32(values.iter().map(|half| half.to_f32()).collect()),
             };
             Some(Channel { name, values })
         };
         self.list.iter().filter_map(other).collect()
     }
 
+    /// What is said of channels with fewer values than there are pixels.
+    fn too_short(&self) -> Vec<String> {
+        let short = self.list.iter().filter(|channel| channel.sample_data.len() != self.len);
+        short.map(|channel| format!("channel {}, which is subsampled", channel.name)).collect()
+    }
+
     fn layers(&self) -> Option<Layers> {
         let layers = Layers {
-            albedo: self.triples(["albedo.R", "albedo.G", "albedo.B"]),
-            normal: self.triples(["N.X", "N.Y", "N.Z"]),
-            position: self.triples(["P.X", "P.Y", "P.Z"]),
+            albedo: self.triples(ALBEDO),
+            normal: self.triples(NORMAL),
+            position: self.triples(POSITION),
             depth: self.floats("Z").unwrap_or_default(),
             prim: self.ids("id.prim"),
             instance: self.ids("id.instance"),
@@ -280,13 +324,13 @@ mod tests {
     #[test]
     fn floats_and_ids_come_back_bit_for_bit_whatever_the_tone_map_and_exposure() {
         let bytes = encode(&picture(), &output(ExrSamples::Float), &Metadata::new()).unwrap();
-        assert_eq!(decode(&bytes, 35).unwrap(), picture());
+        assert_eq!(decode(&bytes, 35).unwrap(), (picture(), Vec::new()));
     }
 
     #[test]
     fn halves_are_near_and_never_infinite() {
         let bytes = encode(&picture(), &output(ExrSamples::Half), &Metadata::new()).unwrap();
-        let back = decode(&bytes, 35).unwrap();
+        let (back, _) = decode(&bytes, 35).unwrap();
         for (a, b) in picture().beauty.iter().zip(&back.beauty) {
             assert!((a[0] - b[0]).abs() <= a[0] * 0.000_5 && b[2] == 65_504.0, "{a:?} {b:?}");
         }
@@ -321,7 +365,7 @@ mod tests {
         for _ in 0..8 {
             assert!(encode() == first);
         }
-        assert_eq!(decode(&first, 35).unwrap(), picture());
+        assert_eq!(decode(&first, 35).unwrap().0, picture());
     }
 
     #[test]
@@ -329,7 +373,46 @@ mod tests {
         let picture = Picture { width: 1, height: 1, beauty: vec![[2.0, 0.0, 0.25, 0.5]], layers: None };
         let output = Output { background: Some([1.0, 0.5, 0.0]), ..output(ExrSamples::Float) };
         let bytes = encode(&picture, &output, &Metadata::default()).unwrap();
-        assert_eq!(decode(&bytes, 1).unwrap().beauty, vec![[2.5, 0.25, 0.25, 1.0]]);
+        assert_eq!(decode(&bytes, 1).unwrap().0.beauty, vec![[2.5, 0.25, 0.25, 1.0]]);
+    }
+
+    /// An EXR of another program with these channels, two by two pixels, a part for each list.
+    fn foreign(parts: &[&[(&str, FlatSamples)]]) -> Vec<u8> {
+        let layer = |(number, channels): (usize, &&[(&str, FlatSamples)])| {
+            let channel = |(name, samples): &(&str, FlatSamples)| AnyChannel::new(text(name), samples.clone());
+            let channels = AnyChannels::sort(channels.iter().map(channel).collect());
+            let attributes = LayerAttributes::named(text(&format!("part {number}")));
+            Layer::new((2, 2), attributes, Encoding::UNCOMPRESSED, channels)
+        };
+        let layers: SmallVec<[_; 2]> = parts.iter().enumerate().map(layer).collect();
+        let attributes = ::exr::meta::header::ImageAttributes::with_size((2, 2));
+        let mut file = Cursor::new(Vec::new());
+        Image::from_layers(attributes, layers).write().to_buffered(&mut file).unwrap();
+        file.into_inner()
+    }
+
+    #[test]
+    fn luminance_is_grey_and_a_file_without_colours_is_refused() {
+        let grey = foreign(&[&[("Y", FlatSamples::F32(vec![0.0, 0.25, 0.5, 2.0]))]]);
+        let (picture, left_out) = decode(&grey, 4).unwrap();
+        assert_eq!((picture.beauty[3], picture.layers, left_out), ([2.0, 2.0, 2.0, 1.0], None, Vec::new()));
+        let depth = foreign(&[&[("Z", FlatSamples::F32(vec![1.0; 4])), ("mask", FlatSamples::F32(vec![1.0; 4]))]]);
+        let error = decode(&depth, 4).unwrap_err().to_string();
+        assert!(error.contains("no colours") && error.ends_with("Z, mask"), "{error}");
+    }
+
+    #[test]
+    fn every_channel_of_the_first_part_is_kept_and_what_is_not_read_is_named() {
+        let halves = FlatSamples::F16([0.5, 1.0, 2.0, 4.0].map(f16::from_f32).to_vec());
+        let floats = FlatSamples::F32(vec![3.0; 4]);
+        let names = ["AO", "N.X", "R", "diffuse.R", "id.prim"];
+        let first = names.map(|name| (name, if name == "diffuse.R" { halves.clone() } else { floats.clone() }));
+        let (picture, left_out) = decode(&foreign(&[&first, &[("R", floats)]]), 4).unwrap();
+        let channels = picture.layers.unwrap().channels;
+        let kept: Vec<&str> = channels.iter().map(|channel| channel.name.as_str()).collect();
+        assert_eq!(kept, ["AO", "N.X", "diffuse.R", "id.prim"]);
+        assert_eq!(channels[2].values, Values::F32(vec![0.5, 1.0, 2.0, 4.0]));
+        assert_eq!(left_out, ["part 2"]);
     }
 
     #[test]

@@ -7,26 +7,42 @@ use std::path::Path;
 /// Pixels that [`read_picture`] takes at most.
 pub const MAX_PIXELS: u64 = 1 << 28;
 
-/// Reads a picture file into premultiplied linear pixels.
-pub fn read_picture(path: &Path) -> Result<Picture, ImageError> {
-    read_picture_and_kind(path).map(|(picture, _)| picture)
+/// A picture file as it was read.
+#[derive(Clone, Debug)]
+pub struct PictureFile {
+    /// Premultiplied linear pixels, and the layers of an EXR.
+    pub picture: Picture,
+    /// What kind of file it is.
+    pub kind: FileKind,
+    /// What the file holds besides, in words: parts and channels of an EXR that are not read.
+    pub left_out: Vec<String>,
 }
 
-/// The same, and what kind of file it is.
-pub fn read_picture_and_kind(path: &Path) -> Result<(Picture, FileKind), ImageError> {
+/// Reads a picture file into premultiplied linear pixels.
+pub fn read_picture(path: &Path) -> Result<Picture, ImageError> {
+    read_picture_file(path).map(|file| file.picture)
+}
+
+/// The same, with what kind of file it is and what of it was not read.
+pub fn read_picture_file(path: &Path) -> Result<PictureFile, ImageError> {
     let bytes = std::fs::read(path).map_err(|source| ImageError::Read { path: path.to_owned(), source })?;
-    let kind = kind_of(&bytes).ok_or(ImageError::NotAPicture)?;
-    decode(&bytes, MAX_PIXELS).map(|picture| (picture, kind))
+    decode_file(&bytes, MAX_PIXELS)
 }
 
 /// Reads the bytes of a picture file, the kind found by content; more than `max_pixels` are refused before memory is
 /// taken for them.
 pub fn decode(bytes: &[u8], max_pixels: u64) -> Result<Picture, ImageError> {
-    match kind_of(bytes).ok_or(ImageError::NotAPicture)? {
-        FileKind::Png => png::decode(bytes, max_pixels),
-        FileKind::Exr => exr::decode(bytes, max_pixels),
-        kind @ (FileKind::Jpeg | FileKind::Webp) => photo::decode(bytes, kind, max_pixels),
-    }
+    decode_file(bytes, max_pixels).map(|file| file.picture)
+}
+
+fn decode_file(bytes: &[u8], max_pixels: u64) -> Result<PictureFile, ImageError> {
+    let kind = kind_of(bytes).ok_or(ImageError::NotAPicture)?;
+    let (picture, left_out) = match kind {
+        FileKind::Png => (png::decode(bytes, max_pixels)?, Vec::new()),
+        FileKind::Exr => exr::decode(bytes, max_pixels)?,
+        FileKind::Jpeg | FileKind::Webp => (photo::decode(bytes, kind, max_pixels)?, Vec::new()),
+    };
+    Ok(PictureFile { picture, kind, left_out })
 }
 
 pub(super) fn check_size(kind: FileKind, width: u32, height: u32, max_pixels: u64) -> Result<(), ImageError> {

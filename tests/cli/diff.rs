@@ -72,6 +72,23 @@ fn two_exr_files_are_compared_in_linear_light_with_their_layers() {
 }
 
 #[test]
+fn a_layer_that_differs_or_that_one_file_has_alone_is_told_and_can_be_limited() {
+    let deeper = Picture { beauty: picture(0.25).beauty, ..picture(8.0) };
+    let bare = Picture { layers: None, ..picture(0.25) };
+    let folder = folder().file("deep.exr", bytes(&deeper, FileKind::Exr)).file("bare.exr", bytes(&bare, FileKind::Exr));
+    folder.run(&["diff", "a.exr", "a.exr", "--fail-if", "layer-max>0"]).ends(0);
+    folder.run(&["diff", "a.exr", "deep.exr", "--fail-if", "rmse>0"]).ends(0);
+    folder.run(&["diff", "a.exr", "deep.exr", "--fail-if", "layer-max>7"]).ends(1).says(&["layer-max is 7.75"]);
+    for pair in [["a.exr", "bare.exr"], ["bare.exr", "a.exr"]] {
+        assert_eq!(figures(&folder, &pair)["layers_of_one"], serde_json::json!(["Z"]));
+        folder
+            .run(&[&["diff"], &pair[..], &["--fail-if", "layer-max>1e9"]].concat())
+            .ends(1)
+            .says(&["layer-max is inf"]);
+    }
+}
+
+#[test]
 fn a_broken_limit_ends_with_1_and_says_which() {
     let folder = folder();
     folder.run(&["diff", "a.png", "b.png", "--fail-if", "rmse>0.1,psnr<20"]).ends(0);

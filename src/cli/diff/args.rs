@@ -35,7 +35,8 @@ pub(in crate::cli) struct DiffArgs {
     #[arg(long, value_name = "N", value_parser = parse::above_zero, default_value_t = (PIXELS_PER_DEGREE * 100.0).round() / 100.0,
           help_heading = "Comparison")]
     pub pixels_per_degree: f64,
-    /// Exit with code 1 when a figure is beyond a limit, such as 'rmse>0.01,flip>0.05,psnr<40'
+    /// Exit with code 1 when a figure is beyond a limit, such as 'rmse>0.01,flip>0.05,psnr<40'; 'layer-max>0': when a layer
+    /// of two EXR files differs, or one of them has it alone
     #[arg(long, value_name = "LIMIT", value_delimiter = ',', help_heading = "Comparison")]
     pub fail_if: Vec<Limit>,
 

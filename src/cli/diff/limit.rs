@@ -7,7 +7,7 @@ use std::str::FromStr;
 /// A figure that can be limited: its name, and where it is found.
 type Figure = (&'static str, fn(&Compared) -> f64);
 
-const FIGURES: [Figure; 8] = [
+const FIGURES: [Figure; 9] = [
     ("rmse", |c| c.difference.rmse),
     ("relative-rmse", |c| c.difference.relative_rmse),
     ("bias", |c| c.difference.bias.abs()),
@@ -16,6 +16,7 @@ const FIGURES: [Figure; 8] = [
     ("flip", |c| c.looks.mean),
     ("flip-max", |c| c.looks.max),
     ("pixels", |c| c.difference.over as f64),
+    ("layer-max", Compared::layer_max),
 ];
 
 /// A limit, such as `rmse>0.01` or `psnr<40`.
@@ -62,7 +63,7 @@ mod tests {
 
     #[test]
     fn limits_are_read_and_wrong_ones_name_the_figures() {
-        for text in ["rmse>0.01", " psnr < 40", "flip-max>1"] {
+        for text in ["rmse>0.01", " psnr < 40", "flip-max>1", "layer-max>0"] {
             let limit: Limit = text.parse().unwrap();
             assert_eq!(limit.to_string(), text.replace(' ', ""));
         }

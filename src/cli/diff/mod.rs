@@ -5,8 +5,8 @@
 //! `channels` (3, or 4 with coverage), `rmse`, `relative_rmse`, `bias`, `max`, `worst` (`x`, `y`, `expected`, `actual`: the values
 //! compared), `psnr`, `threshold`, `pixels_over`, `pixels`, `flip` (`mean`, `max`, `worst` with `x` and `y`,
 //! `pixels_per_degree`, and for linear pictures `exposures` with `first`, `last` in stops and `count`), `layers` (`name`, `rmse`,
-//! `max`, `differing`, `values`), `layers_of_one` (names), `broken` (limits of `--fail-if`). What is not finite is null.
-//! Keys are only ever added.
+//! `max`, `differing`, `values`), `layers_of_one` (names), `left_out` (what of the files is not read), `broken` (limits of
+//! `--fail-if`). What is not finite is null. Keys are only ever added.
 
 mod args;
 mod limit;
@@ -22,8 +22,8 @@ use crate::image::diff::{
 };
 use crate::image::draw::heat::{Map, Scale};
 use crate::image::look::{as_is, developed};
-use crate::image::read::read_picture_and_kind;
-use crate::image::{FileKind, ImageError, Metadata, Output, Picture, ToneMap, encode, write_atomic};
+use crate::image::read::{PictureFile, read_picture_file};
+use crate::image::{FileKind, ImageError, Layers, Metadata, Output, Picture, ToneMap, encode, write_atomic};
 use crate::load::Diagnostic;
 pub(super) use args::DiffArgs;
 use args::Show;
@@ -41,13 +41,23 @@ struct Compared {
     looks: Looks,
     layers: Vec<LayerDifference>,
     layers_of_one: Vec<String>,
+    /// What neither was read nor compared: the file and what of it.
+    left_out: Vec<String>,
+}
+
+impl Compared {
+    /// The greatest difference of a value of any layer; infinite where something of the files has nothing to be compared with.
+    fn layer_max(&self) -> f64 {
+        let all = self.layers_of_one.is_empty() && self.left_out.is_empty();
+        self.layers.iter().map(|layer| layer.max).fold(if all { 0.0 } else { f64::INFINITY }, f64::max)
+    }
 }
 
 /// Compares, prints what was found, and draws it.
 pub(super) fn run(args: &DiffArgs) -> Exit {
     let messages = Messages::new(args.messages.into(), false);
     accident::guard(&args.actual.display().to_string(), &messages, || {
-        let done = check_outputs(args).and_then(|()| compared(args)).and_then(|compared| {
+        let done = check_outputs(args).and_then(|()| compared(args, &messages)).and_then(|compared| {
             draw(args, &compared)?;
             tell(args, &compared, &messages)
         });
@@ -77,9 +87,11 @@ fn check_outputs(args: &DiffArgs) -> Result<(), Fault> {
     Ok(())
 }
 
-fn compared(args: &DiffArgs) -> Result<Compared, Fault> {
-    let (expected, first) = read(&args.expected)?;
-    let (actual, second) = read(&args.actual)?;
+fn compared(args: &DiffArgs, messages: &Messages) -> Result<Compared, Fault> {
+    let (expected, actual) = (read(&args.expected)?, read(&args.actual)?);
+    let kinds = [expected.kind, actual.kind];
+    let left_out = told_left_out([(&args.expected, &expected), (&args.actual, &actual)], messages);
+    let (expected, actual) = (expected.picture, actual.picture);
     let size = |picture: &Picture| (picture.width, picture.height);
     if size(&expected) != size(&actual) {
         let [(w, h), (width, height)] = [&expected, &actual].map(size);
@@ -87,23 +99,33 @@ fn compared(args: &DiffArgs) -> Result<Compared, Fault> {
         let fault = Diagnostic::new("sizes-differ", &args.actual, "", text).remedy("compare pictures of one size");
         return Err(Box::new((fault, Exit::Input)));
     }
-    let both_linear = [first, second] == [FileKind::Exr; 2];
+    let both_linear = kinds == [FileKind::Exr; 2];
     let space = args.space.map_or(if both_linear { Space::Linear } else { Space::Display }, Into::into);
-    let layers = match (&expected.layers, &actual.layers) {
-        (Some(a), Some(b)) => layer_differences(a, b),
-        _ => Default::default(),
-    };
+    let none = Layers::default();
+    let [ours, theirs] = [&expected, &actual].map(|picture| picture.layers.as_ref().unwrap_or(&none));
+    let (layers, layers_of_one) = layer_differences(ours, theirs);
     let shown = |picture: Picture, kind| match space {
         Space::Display if kind == FileKind::Exr => developed(&picture, &development(args)),
         _ => picture,
     };
-    let (expected, actual) = (shown(expected, first), shown(actual, second));
+    let (expected, actual) = (shown(expected, kinds[0]), shown(actual, kinds[1]));
     let Some(difference) = compare(&expected, &actual, space, args.threshold) else {
         let fault = Diagnostic::new("picture-broken", &args.actual, "", "it has not as many pixels as its size says");
         return Err(Box::new((fault, Exit::Input)));
     };
     let looks = looks(&expected, &actual, space, args.pixels_per_degree);
-    Ok(Compared { expected, actual, space, difference, looks, layers: layers.0, layers_of_one: layers.1 })
+    Ok(Compared { expected, actual, space, difference, looks, layers, layers_of_one, left_out })
+}
+
+/// Warns of what is not compared since it is not read, and tells it.
+fn told_left_out(files: [(&PathBuf, &PictureFile); 2], messages: &Messages) -> Vec<String> {
+    let all = files.into_iter().flat_map(|(path, file)| file.left_out.iter().map(move |what| (path, what)));
+    all.map(|(path, what)| {
+        let warning = Diagnostic::new("not-compared", path, "", format!("{what}: not read, so not compared"));
+        messages.say(Severity::Warning, &warning);
+        format!("{}: {what}", path.display())
+    })
+    .collect()
 }
 
 /// How EXR files become display colour.
@@ -112,8 +134,8 @@ fn development(args: &DiffArgs) -> Output {
     Output { tone_map, exposure, ..Output::default() }
 }
 
-fn read(path: &Path) -> Result<(Picture, FileKind), Fault> {
-    read_picture_and_kind(path).map_err(|e| match e {
+fn read(path: &Path) -> Result<PictureFile, Fault> {
+    read_picture_file(path).map_err(|e| match e {
         ImageError::Read { source, .. } => {
             Box::new((Diagnostic::new("file-unreadable", path, "", source.to_string()), Exit::Failed))
         }

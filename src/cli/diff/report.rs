@@ -100,6 +100,7 @@ pub(super) fn json(args: &DiffArgs, compared: &Compared, broken: &[String]) -> S
         },
         "layers": layers,
         "layers_of_one": compared.layers_of_one,
+        "left_out": compared.left_out,
         "broken": broken,
     });
     format!("{report:#}\n")
@@ -134,7 +135,7 @@ fn at(compared: &Compared, side: Side) -> String {
 /// A ratio of signal to noise.
 fn decibels(psnr: f64) -> String {
     match psnr {
-        f64::INFINITY => "infinite: they are equal".into(),
+        f64::INFINITY => "infinite: the colours are equal".into(),
         finite if finite.is_finite() => format!("{finite:.2} dB"),
         other => figure(other),
     }
@@ -165,6 +166,6 @@ mod tests {
     fn what_is_no_finite_number_is_called_what_it_is() {
         assert_eq!([f64::NAN, f64::NEG_INFINITY].map(figure), ["not defined", "-infinite"]);
         let ratios = [f64::INFINITY, 30.0, f64::NEG_INFINITY, f64::NAN].map(decibels);
-        assert_eq!(ratios, ["infinite: they are equal", "30.00 dB", "-infinite", "not defined"]);
+        assert_eq!(ratios, ["infinite: the colours are equal", "30.00 dB", "-infinite", "not defined"]);
     }
 }
