@@ -1,15 +1,15 @@
 //! `--layers NAMES` and `--heatmap`: what each pixel of a picture cost, inside an EXR or as a picture of its own.
 
-use super::job::{RenderJob, Shot, Target};
+use super::job::{RenderJob, Shot};
 use super::message::{Messages, Severity};
-use super::output_name;
+use super::outputs;
 use crate::accel::AccelKind;
 use crate::bench::report::number::{short, whole};
 use crate::image::draw::heat::{Map, Scale};
 use crate::image::{Layers, Metadata, write_atomic};
 use crate::load::Diagnostic;
 use crate::render::{Cost, Costs};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Every cost that a picture is asked for.
 pub(super) fn wanted(job: &RenderJob) -> Vec<Cost> {
@@ -22,19 +22,6 @@ pub(super) fn add_channels(job: &RenderJob, costs: &Costs, layers: &mut Layers) 
     layers.channels.extend(job.look.costs.iter().flat_map(|&cost| costs.channels(cost).cloned()));
 }
 
-/// Where the heat map of a picture goes: `ship.png` -> `ship-tests.png`.
-pub(super) fn target(picture: &Target, cost: Cost) -> Option<Target> {
-    let name = |path: &Path| {
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        path.with_file_name(format!("{stem}-{cost}.png"))
-    };
-    match picture {
-        Target::Stdout => None,
-        Target::Named(path) => Some(Target::Named(name(path))),
-        Target::Default(path) => Some(Target::Default(name(path))),
-    }
-}
-
 /// Draws and writes the heat maps of a picture, and says what is in them.
 pub(super) fn write_maps(
     job: &RenderJob,
@@ -45,7 +32,9 @@ pub(super) fn write_maps(
     messages: &Messages,
 ) -> Result<(), Diagnostic> {
     for &cost in &job.heatmaps {
-        let Some(path) = target(&shot.target, cost).and_then(|t| t.path().map(Path::to_path_buf)) else { continue };
+        let Some(path) = outputs::heat_map(&shot.target, cost).and_then(|t| t.path().map(Path::to_path_buf)) else {
+            continue;
+        };
         let values = costs.total(cost);
         let (most, mean) = (values.iter().copied().fold(0.0, f64::max), mean(&values));
         let (what, unit, label): (_, _, fn(f64) -> String) = match cost {
@@ -73,17 +62,4 @@ fn trimmed(ms: f64) -> String {
 
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
-}
-
-/// The names of a picture and its heat maps.
-pub(super) fn names(shot: &Shot, heatmaps: &[Cost]) -> Vec<PathBuf> {
-    let maps = heatmaps.iter().filter_map(|&cost| target(&shot.target, cost));
-    let path = |target: &Target| target.path().map(Path::to_path_buf);
-    path(&shot.target).into_iter().chain(maps.filter_map(|map| path(&map))).collect()
-}
-
-/// Two outputs of one name, as the two names typed.
-pub(super) fn collision(shots: &[&Shot], heatmaps: &[Cost]) -> Option<PathBuf> {
-    let all: Vec<PathBuf> = shots.iter().flat_map(|shot| names(shot, heatmaps)).collect();
-    output_name::collision(&all).map(|(_, later)| all[later].clone())
 }

@@ -2,9 +2,9 @@
 
 use super::args::{AccelArgs, Axis, FileType, MessageFormat, MtlArg, PolygonsArg, RenderArgs, StatsFormat};
 use super::camera::{Choice, LensChoice};
-use super::cost_layers;
 use super::message;
-use super::output_name::{self, Facts, Naming};
+use super::output_name::{Facts, Naming};
+use super::outputs::{self, Target};
 use super::parse::{Back, Env};
 use super::sampling::SamplingArgs;
 use super::sequence::{self, Sequence, Step};
@@ -19,7 +19,8 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Wrong(pub String);
 
-fn wrong<T>(text: impl Into<String>) -> Result<T, Wrong> {
+/// The error of such a command line.
+pub(super) fn wrong<T>(text: impl Into<String>) -> Result<T, Wrong> {
     Err(Wrong(text.into()))
 }
 
@@ -90,27 +91,6 @@ pub(super) struct Shot {
     pub kind: FileKind,
 }
 
-/// Where a picture goes.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Target {
-    /// Standard output.
-    Stdout,
-    /// A file that is replaced whatever it holds.
-    Named(PathBuf),
-    /// A file of our own choosing: only a picture that meshray wrote is replaced.
-    Default(PathBuf),
-}
-
-impl Target {
-    /// The file, if it is one.
-    pub(super) fn path(&self) -> Option<&Path> {
-        match self {
-            Self::Stdout => None,
-            Self::Named(path) | Self::Default(path) => Some(path),
-        }
-    }
-}
-
 /// What the command line says about the picture; `None`: nothing.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Look {
@@ -172,7 +152,7 @@ impl RenderJob {
         let sequence = sequence::of(args)?;
         let batches = batches(args, &choices, sequence.as_ref())?;
         let stats = stats(args);
-        check_stats_file(stats.as_ref(), &batches, &args.heatmap)?;
+        outputs::check_stats_file(stats.as_ref(), &batches, &args.heatmap)?;
         let to_stdout = batches.iter().flat_map(|b| &b.shots).any(|s| s.target == Target::Stdout);
         if to_stdout && stats.as_ref().is_some_and(|s| s.file.is_none()) {
             return wrong("the picture goes to standard output, so the statistics cannot; add --stats-file PATH");
@@ -288,44 +268,15 @@ fn batches(args: &RenderArgs, choices: &[Choice], sequence: Option<&Sequence>) -
             frame += 1;
             let facts = Facts { input: &inputs[0], view: &choice.name(), frame: step.number.unwrap_or(frame) };
             let naming = Naming { several_views: choices.len() > 1, numbered: step.number.is_some() };
-            let (target, kind) = target(args, &facts, naming)?;
+            let (target, kind) = outputs::target(args, &facts, naming)?;
             shots.push(Shot { choice: choice.clone(), step: step.clone(), target, kind });
         }
         batches.push(Batch { inputs, shots });
     }
-    refuse_collisions(&batches)?;
-    check_heatmaps(&batches, &args.heatmap)?;
+    outputs::refuse_collisions(&batches)?;
+    outputs::check_heatmaps(&batches, &args.heatmap)?;
     check_kinds(args, &batches)?;
     Ok(batches)
-}
-
-/// Heat maps are named after their picture, and must not fall on another.
-fn check_heatmaps(batches: &[Batch], heatmaps: &[Cost]) -> Result<(), Wrong> {
-    let shots: Vec<&Shot> = batches.iter().flat_map(|b| &b.shots).collect();
-    if let Some(twice) = heatmaps.iter().enumerate().find(|(i, cost)| heatmaps[..*i].contains(cost)) {
-        return wrong(format!("--heatmap names {} twice", twice.1));
-    }
-    if !heatmaps.is_empty() && shots.iter().any(|s| s.target == Target::Stdout) {
-        return wrong("a heat map is named after its picture, and standard output has no name; use -o NAME");
-    }
-    match cost_layers::collision(&shots, heatmaps) {
-        Some(name) => wrong(format!("two pictures would be written to {}; choose another -o", name.display())),
-        None => Ok(()),
-    }
-}
-
-/// Statistics must not fall on a picture or a heat map.
-fn check_stats_file(stats: Option<&Stats>, batches: &[Batch], heatmaps: &[Cost]) -> Result<(), Wrong> {
-    let Some(file) = stats.and_then(|stats| stats.file.as_deref()) else { return Ok(()) };
-    let mut names = batches.iter().flat_map(|b| &b.shots).flat_map(|shot| cost_layers::names(shot, heatmaps));
-    let target = output_name::identity(file);
-    if names.any(|name| output_name::identity(&name) == target) {
-        let file = file.display();
-        return wrong(format!(
-            "a picture and the statistics would both be written to {file}; name another --stats-file"
-        ));
-    }
-    Ok(())
 }
 
 /// Sizes that a type of file cannot hold, and flags that only one type can honour.
@@ -343,57 +294,6 @@ fn check_kinds(args: &RenderArgs, batches: &[Batch]) -> Result<(), Wrong> {
         return wrong("--bits 16 belongs to PNG; an EXR stores floats, the other types 8 bits");
     }
     Ok(())
-}
-
-fn target(args: &RenderArgs, facts: &Facts, naming: Naming) -> Result<(Target, FileKind), Wrong> {
-    let format = args.format.map(FileKind::from);
-    let extension = format.unwrap_or(FileKind::Png).extension();
-    let template = match args.output.as_deref() {
-        Some("-") => return Ok((Target::Stdout, format.unwrap_or(FileKind::Png))),
-        Some("") => return wrong("-o needs a name"),
-        Some(folder) if folder.ends_with('/') || Path::new(folder).is_dir() => {
-            output_name::default_template(Some(folder), naming, extension)
-        }
-        Some(template) => template.to_owned(),
-        None => output_name::default_template(None, naming, extension),
-    };
-    let path = output_name::fill(&template, facts).map_err(Wrong)?;
-    let kind = match (format, FileKind::from_path(&path)) {
-        (Some(typed), Ok(named)) if typed != named => {
-            let (path, format) = (path.display(), typed.extension());
-            return wrong(format!("{path} is called {named}, but --format says {format}; say it in one place"));
-        }
-        (Some(kind), _) | (None, Ok(kind)) => kind,
-        (None, Err(e)) => return wrong(format!("{e}, or say --format")),
-    };
-    let target = if args.output.is_some() { Target::Named(path) } else { Target::Default(path) };
-    Ok((target, kind))
-}
-
-fn refuse_collisions(batches: &[Batch]) -> Result<(), Wrong> {
-    let shots: Vec<(&Path, &Shot)> =
-        batches.iter().flat_map(|b| b.shots.iter().map(|s| (b.inputs[0].as_path(), s))).collect();
-    let to_stdout = shots.iter().filter(|(_, s)| s.target == Target::Stdout).count();
-    if to_stdout > 1 {
-        let numbered = shots.iter().any(|(_, shot)| shot.step.number.is_some());
-        let name = if numbered { "{stem}.{frame:04}.png" } else { "{stem}-{view}.png" };
-        return wrong(format!("{to_stdout} pictures cannot all go to standard output; use -o '{name}'"));
-    }
-    let names: Vec<PathBuf> = shots.iter().filter_map(|(_, s)| s.target.path().map(Path::to_path_buf)).collect();
-    let Some((a, b)) = output_name::collision(&names) else { return Ok(()) };
-    let what = |i: usize| {
-        let (input, Shot { choice, step, .. }) = shots[i];
-        let view = (*choice != Choice::Default).then(|| choice.name());
-        let parts: Vec<String> = view.into_iter().chain(step.number.map(|n| format!("number {n}"))).collect();
-        let parts = if parts.is_empty() { String::new() } else { format!(" ({})", parts.join(", ")) };
-        format!("{}{parts}", input.display())
-    };
-    wrong(format!(
-        "{} and {} would both be written to {}; use {{dir}}, {{stem}}, {{view}} or {{frame:04}} in -o",
-        what(a),
-        what(b),
-        names[b].display()
-    ))
 }
 
 fn load_options(args: &RenderArgs) -> LoadOptions {

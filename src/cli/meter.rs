@@ -2,14 +2,13 @@
 //!
 //! A lamp of a room has hundreds of candela and the sun a hundred thousand lux, which no picture shows as they are; many a
 //! file on the other hand counts from 0 to 1. So a small picture is taken first, and where what it shows is far too bright or
-//! too dark, the exposure that makes it right is used and said. One exposure serves all pictures of a scene, or a sequence
-//! would flicker.
+//! too dark, the exposure that makes it right is used and said. Each view is exposed as if it were rendered alone; one exposure
+//! serves all pictures of a sequence, or it would flicker: that with which it begins, whichever of them are rendered.
 
-use super::picture::Effective;
+use super::camera::Choice;
 use crate::image::Picture;
 use crate::math::Vec3;
 use crate::render::{Job, Sampling, Settings, render};
-use crate::scene::Scene;
 
 /// Longest side of the small picture.
 const SIDE: u32 = 96;
@@ -23,12 +22,32 @@ const BRIGHT: f32 = 0.7;
 /// … where they are not between these already: such light is meant as it is.
 const FINE: std::ops::RangeInclusive<f32> = 0.15..=1.5;
 
+/// Stops that are added to the pictures of each view, once they are known.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Metered(Vec<(Choice, f32)>);
+
+impl Metered {
+    /// Those of a view.
+    pub(super) fn get(&self, view: &Choice) -> Option<f32> {
+        self.0.iter().find(|(known, _)| known == view).map(|(_, stops)| *stops)
+    }
+
+    /// The same, found by this picture of it where they are not known.
+    pub(super) fn get_or_find(&mut self, view: &Choice, job: &Job) -> f32 {
+        self.get(view).unwrap_or_else(|| {
+            let stops = exposure(job).unwrap_or(0.0);
+            self.0.push((view.clone(), stops));
+            stops
+        })
+    }
+}
+
 /// Stops to add; `None` where the scene is to be shown as it is.
-pub(super) fn exposure(scene: &Scene, job: &Job, effective: &Effective) -> Option<f32> {
-    if !scene.photometric {
+pub(super) fn exposure(job: &Job) -> Option<f32> {
+    if !job.scene.photometric {
         return None;
     }
-    let Settings { width, height, .. } = effective.settings;
+    let Settings { width, height, .. } = *job.settings;
     let shrink = |side: u32| (u64::from(side) * u64::from(SIDE)).div_ceil(u64::from(width.max(height)));
     #[expect(clippy::cast_possible_truncation, reason = "at most SIDE")]
     let small = |side: u32| (shrink(side) as u32).clamp(1, side);
@@ -42,7 +61,7 @@ pub(super) fn exposure(scene: &Scene, job: &Job, effective: &Effective) -> Optio
         env_rays: Some(0),
         gloss_rays: Some(0),
         everything: false,
-        ..effective.settings.clone()
+        ..job.settings.clone()
     };
     let picture = render(&Job { settings: &settings, ..*job }, &()).picture;
     let bright = bright(&picture)?;
@@ -74,7 +93,7 @@ mod tests {
     use crate::render::texture::TextureStore;
     use crate::render::view::Lens;
     use crate::render::{View, World};
-    use crate::scene::{Falloff, Light, LightKind, Material, Sphere};
+    use crate::scene::{Falloff, Light, LightKind, Material, Scene, Sphere};
 
     /// The exposure of a white ball under a lamp of so many candela, three units away.
     fn metered(candela: f32, photometric: bool) -> Option<f32> {
@@ -94,10 +113,8 @@ mod tests {
         let accel = AnyAccel::build(AccelKind::None, &world.shapes, &AccelParams::DEFAULT);
         let textures = TextureStore::new(&scene);
         let view = View::look_at(DVec3::Z * 9.0, DVec3::ZERO, DVec3::Y, Lens::orthographic(3.0));
-        let effective = Effective { settings: Settings::default(), output: Default::default(), metered: false };
-        let settings = &effective.settings;
-        let job = Job { scene: &scene, world: &world, accel: &accel, textures: &textures, view: &view, settings };
-        exposure(&scene, &job, &effective)
+        let settings = &Settings::default();
+        exposure(&Job { scene: &scene, world: &world, accel: &accel, textures: &textures, view: &view, settings })
     }
 
     #[test]

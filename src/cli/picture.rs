@@ -2,7 +2,8 @@
 //! way into a file.
 
 use super::interrupt;
-use super::job::{Look, Shot, Target};
+use super::job::{Look, Shot};
+use super::outputs::Target;
 use crate::image::{FileKind, Metadata, Output, Picture, ToneMap, encode, write_atomic};
 use crate::load::Diagnostic;
 use crate::render::Settings;

@@ -80,7 +80,30 @@ impl Turns {
     }
 }
 
+impl Sequence {
+    /// What a frame shows; `None`: the moment is the same for all.
+    fn moment(&self, frame: u32) -> Option<Moment> {
+        match self {
+            Self::Frames { fps, animation, .. } => {
+                Some(Moment { animation: animation.clone(), time: f64::from(frame) / fps })
+            }
+            Self::Turntable(_) => None,
+        }
+    }
+}
+
 impl RenderJob {
+    /// That with which the sequence of a picture begins; a picture by itself is its own.
+    pub(super) fn first_step(&self, step: &Step) -> Step {
+        match &self.sequence {
+            Some(sequence @ Sequence::Frames { frames, .. }) => {
+                Step { number: Some(frames.first), moment: sequence.moment(frames.first) }
+            }
+            Some(Sequence::Turntable(_)) => Step { number: Some(0), ..step.clone() },
+            None => step.clone(),
+        }
+    }
+
     /// How to load for a picture.
     pub(super) fn load_for(&self, step: &Step) -> LoadOptions {
         LoadOptions { moment: step.moment.clone(), ..self.load.clone() }
@@ -124,6 +147,8 @@ pub(super) fn camera(
 pub(super) struct Survey {
     /// The box of all.
     pub bounds: Bounds,
+    /// Whether their lamps are given as they are measured.
+    pub photometric: bool,
     /// The camera of each choice that is framed on the model.
     cameras: Vec<(Choice, Option<Camera>)>,
 }
@@ -139,16 +164,17 @@ impl Survey {
         messages: &Messages,
         progress: &Progress,
     ) -> Result<Option<Self>, Exit> {
-        let Some(Sequence::Frames { frames, fps, animation }) = &job.sequence else { return Ok(None) };
+        let Some(sequence @ Sequence::Frames { frames, .. }) = &job.sequence else { return Ok(None) };
         progress.stage("framing");
+        let mut photometric = false;
         let mut bounds: Option<Bounds> = None;
         let mut fits: Vec<(Choice, Option<Fit>)> = Vec::new();
         for frame in frames.first..frames.end {
             if interrupt::raised() {
                 return Err(Exit::Interrupted);
             }
-            let moment = Moment { animation: animation.clone(), time: f64::from(frame) / fps };
-            let options = LoadOptions { moment: Some(moment), without_pictures: true, ..job.load.clone() };
+            let moment = sequence.moment(frame);
+            let options = LoadOptions { moment, without_pictures: true, ..job.load.clone() };
             let loaded = read::scene(&batch.inputs, &options).map_err(|error| {
                 messages.load_error(&error);
                 read::exit_of(&error)
@@ -159,6 +185,7 @@ impl Survey {
                 return Err(Exit::Input);
             }
             let scene = &loaded.scene;
+            photometric |= scene.photometric;
             let here = robust_bounds(scene);
             if bounds.is_none() {
                 let first = &batch.shots[0].step;
@@ -175,7 +202,7 @@ impl Survey {
         }
         Ok(bounds.map(|bounds| {
             let camera = |(choice, fit): (Choice, Option<Fit>)| (choice, fit.map(|fit| fit.camera(bounds.radius())));
-            Self { bounds, cameras: fits.into_iter().map(camera).collect() }
+            Self { bounds, photometric, cameras: fits.into_iter().map(camera).collect() }
         }))
     }
 

@@ -2,6 +2,7 @@
 
 use super::job::Look;
 use super::parse::Env;
+use super::picture;
 use crate::load::panorama::{self, LoadedPanorama};
 use crate::load::{Limits, LoadError, Loaded};
 use crate::scene::default_light::{self, DefaultLight};
@@ -32,8 +33,26 @@ pub(super) fn place(look: &Look, limits: &Limits, loaded: &mut Loaded) -> Result
     Ok(())
 }
 
+/// Has `work` done with the scene as `camera` sees it: lit by lamps where it has none, with suns as wide as they were asked for,
+/// and with what is behind everything. The next view starts from the scene as it was loaded.
+pub(super) fn lit<T>(
+    look: &Look,
+    loaded: &mut Loaded,
+    camera: &Camera,
+    work: impl FnOnce(&Loaded, DefaultLight) -> T,
+) -> T {
+    let (lights, environment) = (loaded.scene.lights.clone(), loaded.scene.environment);
+    let background = loaded.scene.background;
+    let light = light(look, &mut loaded.scene, camera);
+    loaded.scene.background = Some(picture::background(look, &loaded.scene));
+    let done = work(loaded, light);
+    let scene = &mut loaded.scene;
+    (scene.lights, scene.environment, scene.background) = (lights, environment, background);
+    done
+}
+
 /// Lights the scene as `camera` sees it: with lamps where it has none, and suns as wide as they were asked for.
-pub(super) fn light(look: &Look, scene: &mut Scene, camera: &Camera) -> DefaultLight {
+fn light(look: &Look, scene: &mut Scene, camera: &Camera) -> DefaultLight {
     let light = default_light::add_if_missing(scene, camera);
     if let Some(degrees) = look.sun_size {
         let suns = scene.lights.iter_mut().filter(|l| matches!(l.kind, LightKind::Directional { .. }) && l.size == 0.0);

@@ -1,6 +1,8 @@
 //! Whether a file may be written under a name: asked before any work is done for it.
 
 use super::output_name::identity;
+use super::outputs::Target;
+use crate::image::was_written_by_meshray;
 use crate::load::Diagnostic;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -31,6 +33,11 @@ impl Sources {
         }
         Ok(())
     }
+
+    /// The same for where a picture goes.
+    pub(super) fn spared_by_target(&self, target: &Target) -> Result<(), Diagnostic> {
+        target.path().map_or(Ok(()), |path| self.spared_by(path, "-o"))
+    }
 }
 
 /// Refuses `path`, given with `flag`, where its folder is not there, where it is a folder itself, or where it is one of
@@ -47,7 +54,23 @@ pub(super) fn check(path: &Path, flag: &str, sources: &Sources) -> Result<(), Di
     sources.spared_by(path, flag)
 }
 
-/// The same for every `--report`.
+/// Whether a picture may go there: to a pipe or a file behind standard output, or under a name that it may replace.
+pub(super) fn check_target(target: &Target, sources: &Sources) -> Result<(), Diagnostic> {
+    let Some(path) = target.path() else {
+        use std::io::IsTerminal;
+        let text = "standard output is a terminal, which shows no pictures";
+        let fault = Diagnostic::new("output-terminal", "", "", text).remedy("redirect it, or name a file with -o");
+        return if std::io::stdout().is_terminal() { Err(fault) } else { Ok(()) };
+    };
+    check(path, "-o", sources)?;
+    if matches!(target, Target::Default(_)) && path.exists() && !was_written_by_meshray(path) {
+        let fault = Diagnostic::new("output-not-ours", path, "", "exists and is no picture that meshray wrote");
+        return Err(fault.remedy("name the output with -o"));
+    }
+    Ok(())
+}
+
+/// [`check`] for every `--report`.
 pub(super) fn check_reports(paths: &[PathBuf], sources: &Sources) -> Result<(), Diagnostic> {
     paths.iter().try_for_each(|path| check(path, "--report", sources))
 }

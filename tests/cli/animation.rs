@@ -158,3 +158,25 @@ fn a_turntable_shows_a_model_from_all_around() {
     let run = folder.render(&["a.gltf", "--turntable", "1/8", "--time", "0.5", "-o", "turned.png"]).ends(0);
     run.says(&["45.0° around", "animation 'Slide' at 0.500 s"]);
 }
+
+#[test]
+fn a_picture_is_exposed_as_its_sequence_begins_and_a_view_as_if_it_were_alone() {
+    // The lamp stands before the triangle, which slides away from it and is dark from behind.
+    let lamp = r#""nodes":[{"mesh":0},{"translation":[0,0,2],"extensions":{"KHR_lights_punctual":{"light":0}}}],
+        "extensionsUsed":["KHR_lights_punctual"],
+        "extensions":{"KHR_lights_punctual":{"lights":[{"type":"point","intensity":3000}]}}"#;
+    let lit = sliding().replace(r#""nodes":[0]"#, r#""nodes":[0,1]"#).replace(r#""nodes":[{"mesh":0},{}]"#, lamp);
+    let folder = Folder::new().file("a.gltf", lit);
+    let render = |words: &[&str]| folder.render(&[&["a.gltf", "--view", "front"], words].concat()).ends(0);
+    for (all, one, same) in [
+        (&["--turntable", "4"][..], &["--turntable", "2/4"][..], "2.png"),
+        (&["--frames", "0..4", "--fps", "4"], &["--frames", "0..4", "--fps", "4", "--frame", "3"], "3.png"),
+    ] {
+        render(&[all, &["-o", "{frame}.png"]].concat());
+        render(&[one, &["-o", "one.png"]].concat()).says(&["(metered)"]);
+        assert!(folder.read("one.png") == folder.read(same), "{one:?}");
+    }
+    folder.render(&["a.gltf", "--view", "front,back", "-o", "{view}.png"]).ends(0);
+    folder.render(&["a.gltf", "--view", "back", "-o", "alone.png"]).ends(0);
+    assert!(folder.read("back.png") == folder.read("alone.png"));
+}

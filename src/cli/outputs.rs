@@ -1,0 +1,139 @@
+//! Where pictures go and what is written beside them, and which of these names would fall on each other.
+
+use super::args::RenderArgs;
+use super::camera::Choice;
+use super::job::{Batch, Shot, Stats, Wrong, wrong};
+use super::output_name::{self, Facts, Naming};
+use crate::image::FileKind;
+use crate::render::Cost;
+use std::path::{Path, PathBuf};
+
+/// Where a picture goes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Target {
+    /// Standard output.
+    Stdout,
+    /// A file that is replaced whatever it holds.
+    Named(PathBuf),
+    /// A file of our own choosing: only a picture that meshray wrote is replaced.
+    Default(PathBuf),
+}
+
+impl Target {
+    /// The file, if it is one.
+    pub(super) fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Stdout => None,
+            Self::Named(path) | Self::Default(path) => Some(path),
+        }
+    }
+}
+
+/// Where the next picture goes, and as what.
+pub(super) fn target(args: &RenderArgs, facts: &Facts, naming: Naming) -> Result<(Target, FileKind), Wrong> {
+    let format = args.format.map(FileKind::from);
+    let extension = format.unwrap_or(FileKind::Png).extension();
+    let template = match args.output.as_deref() {
+        Some("-") => return Ok((Target::Stdout, format.unwrap_or(FileKind::Png))),
+        Some("") => return wrong("-o needs a name"),
+        Some(folder) if folder.ends_with('/') || Path::new(folder).is_dir() => {
+            output_name::default_template(Some(folder), naming, extension)
+        }
+        Some(template) => template.to_owned(),
+        None => output_name::default_template(None, naming, extension),
+    };
+    let path = output_name::fill(&template, facts).map_err(Wrong)?;
+    let kind = match (format, FileKind::from_path(&path)) {
+        (Some(typed), Ok(named)) if typed != named => {
+            let (path, format) = (path.display(), typed.extension());
+            return wrong(format!("{path} is called {named}, but --format says {format}; say it in one place"));
+        }
+        (Some(kind), _) | (None, Ok(kind)) => kind,
+        (None, Err(e)) => return wrong(format!("{e}, or say --format")),
+    };
+    let target = if args.output.is_some() { Target::Named(path) } else { Target::Default(path) };
+    Ok((target, kind))
+}
+
+/// Where the heat map of a picture goes: `ship.png` -> `ship-tests.png`.
+pub(super) fn heat_map(picture: &Target, cost: Cost) -> Option<Target> {
+    let name = |path: &Path| {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        path.with_file_name(format!("{stem}-{cost}.png"))
+    };
+    match picture {
+        Target::Stdout => None,
+        Target::Named(path) => Some(Target::Named(name(path))),
+        Target::Default(path) => Some(Target::Default(name(path))),
+    }
+}
+
+/// A picture and its heat maps.
+pub(super) fn of(shot: &Shot, heatmaps: &[Cost]) -> Vec<Target> {
+    let maps = heatmaps.iter().filter_map(|&cost| heat_map(&shot.target, cost));
+    std::iter::once(shot.target.clone()).chain(maps).collect()
+}
+
+/// The files of these pictures and of what is beside them.
+fn files<'a>(shots: impl Iterator<Item = &'a Shot>, heatmaps: &[Cost]) -> Vec<PathBuf> {
+    shots.flat_map(|shot| of(shot, heatmaps)).filter_map(|target| target.path().map(Path::to_path_buf)).collect()
+}
+
+/// Refuses two pictures of one name.
+pub(super) fn refuse_collisions(batches: &[Batch]) -> Result<(), Wrong> {
+    let shots: Vec<(&Path, &Shot)> =
+        batches.iter().flat_map(|b| b.shots.iter().map(|s| (b.inputs[0].as_path(), s))).collect();
+    let to_stdout = shots.iter().filter(|(_, s)| s.target == Target::Stdout).count();
+    if to_stdout > 1 {
+        let numbered = shots.iter().any(|(_, shot)| shot.step.number.is_some());
+        let name = if numbered { "{stem}.{frame:04}.png" } else { "{stem}-{view}.png" };
+        return wrong(format!("{to_stdout} pictures cannot all go to standard output; use -o '{name}'"));
+    }
+    let names: Vec<PathBuf> = shots.iter().filter_map(|(_, s)| s.target.path().map(Path::to_path_buf)).collect();
+    let Some((a, b)) = output_name::collision(&names) else { return Ok(()) };
+    let what = |i: usize| {
+        let (input, Shot { choice, step, .. }) = shots[i];
+        let view = (*choice != Choice::Default).then(|| choice.name());
+        let parts: Vec<String> = view.into_iter().chain(step.number.map(|n| format!("number {n}"))).collect();
+        let parts = if parts.is_empty() { String::new() } else { format!(" ({})", parts.join(", ")) };
+        format!("{}{parts}", input.display())
+    };
+    wrong(format!(
+        "{} and {} would both be written to {}; use {{dir}}, {{stem}}, {{view}} or {{frame:04}} in -o",
+        what(a),
+        what(b),
+        names[b].display()
+    ))
+}
+
+/// Heat maps are named after their picture, and must not fall on another.
+pub(super) fn check_heatmaps(batches: &[Batch], heatmaps: &[Cost]) -> Result<(), Wrong> {
+    let shots = || batches.iter().flat_map(|b| &b.shots);
+    if let Some(twice) = heatmaps.iter().enumerate().find(|(i, cost)| heatmaps[..*i].contains(cost)) {
+        return wrong(format!("--heatmap names {} twice", twice.1));
+    }
+    if !heatmaps.is_empty() && shots().any(|s| s.target == Target::Stdout) {
+        return wrong("a heat map is named after its picture, and standard output has no name; use -o NAME");
+    }
+    let all = files(shots(), heatmaps);
+    match output_name::collision(&all) {
+        Some((_, later)) => {
+            wrong(format!("two pictures would be written to {}; choose another -o", all[later].display()))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Statistics must not fall on a picture or a heat map.
+pub(super) fn check_stats_file(stats: Option<&Stats>, batches: &[Batch], heatmaps: &[Cost]) -> Result<(), Wrong> {
+    let Some(file) = stats.and_then(|stats| stats.file.as_deref()) else { return Ok(()) };
+    let names = files(batches.iter().flat_map(|b| &b.shots), heatmaps);
+    let target = output_name::identity(file);
+    if names.iter().any(|name| output_name::identity(name) == target) {
+        let file = file.display();
+        return wrong(format!(
+            "a picture and the statistics would both be written to {file}; name another --stats-file"
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,304 @@
+//! One picture of a scene that was loaded: its eye, its light, its exposure, its pixels, and its way into a file.
+
+use super::exit::Exit;
+use super::job::{Batch, RenderJob, Shot};
+use super::message::{Messages, Severity};
+use super::meter::Metered;
+use super::outputs::{self, Target};
+use super::picture::{self, Effective};
+use super::profile::Profile;
+use super::progress::Progress;
+use super::render::SoFar;
+use super::sequence::{self, Survey};
+use super::stats::{self, Counted, PictureStats, Times};
+use super::summary::Summary;
+use super::{again, cost_layers, dry_run, interrupt, output_name, surroundings};
+use crate::accel::AnyAccel;
+use crate::accel::auto::Reason;
+use crate::image::FileKind;
+use crate::load::{Diagnostic, Loaded};
+use crate::render::texture::TextureStore;
+use crate::render::{Costs, Job, Rendered, Settings, View, World, render_costs};
+use crate::scene::default_light::DefaultLight;
+use crate::scene::framing::Bounds;
+use crate::scene::{Camera, Scene};
+use std::path::Path;
+use std::time::Instant;
+
+/// What is done for a batch, and who hears of it.
+#[derive(Clone, Copy)]
+pub(super) struct Task<'a> {
+    pub job: &'a RenderJob,
+    pub batch: &'a Batch,
+    pub messages: &'a Messages,
+    pub progress: &'a Progress<'a>,
+}
+
+impl Task<'_> {
+    /// The first input, after which the batch is called.
+    pub(super) fn file(&self) -> &Path {
+        &self.batch.inputs[0]
+    }
+
+    /// Says what went wrong.
+    pub(super) fn fail(&self, fault: &Diagnostic, exit: Exit) -> Exit {
+        self.messages.say(Severity::Error, fault);
+        exit
+    }
+}
+
+/// A scene that is rendered, and the structure that all its pictures share.
+pub(super) struct Stage<'a> {
+    pub loaded: &'a mut Loaded,
+    pub world: &'a World,
+    pub bounds: &'a Bounds,
+    /// What loading took, until a picture has told it.
+    pub load_seconds: &'a mut f64,
+    pub profile: &'a mut Profile,
+    pub survey: Option<&'a Survey>,
+    pub built: Option<(AnyAccel<'a>, Option<Reason>)>,
+    pub metered: &'a mut Metered,
+}
+
+impl Stage<'_> {
+    fn camera(&self, task: &Task, shot: &Shot, effective: &Effective) -> Result<(Camera, String), Exit> {
+        let seen = (&self.loaded.scene, self.bounds);
+        let found = sequence::camera(task.job, shot, self.survey, seen, effective.aspect(), task.file());
+        found.map_err(|fault| task.fail(&fault, Exit::Input))
+    }
+
+    /// Finds the exposure of a view through the eye that this picture of it has, unless it is known or not asked for.
+    pub(super) fn meter(&mut self, task: &Task, shot: &Shot) -> Result<(), Exit> {
+        let effective = effective(task, &self.loaded.scene)?;
+        if !is_metered(&effective, shot, &self.loaded.scene) || self.metered.get(&shot.choice).is_some() {
+            return Ok(());
+        }
+        let (camera, _) = self.camera(task, shot, &effective)?;
+        let view = View::from_camera(&camera);
+        let Self { loaded, world, built, metered, profile, .. } = self;
+        let (accel, _) = &*built.get_or_insert_with(|| structure(task.job, world));
+        task.progress.stage("metering");
+        surroundings::lit(&task.job.look, loaded, &camera, |loaded, _| {
+            let (scene, textures) = (&loaded.scene, textures(task.job, &loaded.scene));
+            let settings = &effective.settings;
+            let work = Job { scene, world, accel, textures: &textures, view: &view, settings };
+            metered.get_or_find(&shot.choice, &work);
+        });
+        profile.done("meter");
+        Ok(())
+    }
+}
+
+/// The structure over a scene, and why that one.
+fn structure<'w>(job: &RenderJob, world: &'w World) -> (AnyAccel<'w>, Option<Reason>) {
+    let (accel, reason) = world.structure(job.accel, &job.params);
+    (accel.tested_by(job.intersector), reason)
+}
+
+fn textures<'s>(job: &RenderJob, scene: &'s Scene) -> TextureStore<'s> {
+    let textures = TextureStore::new(scene);
+    if job.everything { textures.with_everything() } else { textures }
+}
+
+/// The settings that apply to the pictures of a scene.
+fn effective(task: &Task, scene: &Scene) -> Result<Effective, Exit> {
+    match Effective::new(&task.job.look, &scene.hints) {
+        Ok(effective) => Ok(effective.with_everything(task.job.everything)),
+        Err(text) => Err(task.fail(&Diagnostic::new("scene-value", task.file(), "", text), Exit::Input)),
+    }
+}
+
+/// Whether the exposure of a picture is found by looking.
+fn is_metered(effective: &Effective, shot: &Shot, scene: &Scene) -> bool {
+    effective.metered && shot.kind != FileKind::Exr && scene.photometric
+}
+
+/// Whether a picture fits into the memory that is allowed, into a file of its type, and may still be written where it goes.
+fn check(task: &Task, shot: &Shot, effective: &Effective, so_far: &SoFar) -> Result<(), Exit> {
+    let Task { job, .. } = *task;
+    let mut targets = outputs::of(shot, &job.heatmaps).into_iter();
+    targets
+        .try_for_each(|target| so_far.sources.spared_by_target(&target))
+        .map_err(|fault| task.fail(&fault, Exit::Failed))?;
+    if let Some(fault) = picture::too_large(effective, cost_layers::wanted(job).len(), job.load.limits.memory) {
+        return Err(task.fail(&fault, Exit::Failed));
+    }
+    let Settings { width, height, .. } = effective.settings;
+    shot.kind.fits(width, height).map_err(|error| {
+        task.fail(&Diagnostic::new("picture-too-large", task.file(), "", error.to_string()), Exit::Failed)
+    })
+}
+
+/// Renders a picture and writes it, or foretells it. The error is how that ended, too, and was said.
+pub(super) fn render(task: &Task, shot: &Shot, stage: &mut Stage, so_far: &mut SoFar) -> Result<Exit, Exit> {
+    let Task { job, progress, .. } = *task;
+    let mut effective = effective(task, &stage.loaded.scene)?;
+    check(task, shot, &effective, so_far)?;
+
+    // The eye, then the light that belongs to it: each view has its own.
+    let (camera, phrase) = stage.camera(task, shot, &effective)?;
+    let view = View::from_camera(&camera);
+    let middle = (stage.bounds.lo + stage.bounds.hi) * 0.5;
+    let lens = job.look.sampling.lens(&view, middle, task.file());
+    effective.settings.lens = lens.map_err(|fault| task.fail(&fault, Exit::Input))?;
+    stage.profile.done("frame");
+
+    let mut times = Times { load: std::mem::take(stage.load_seconds), ..Times::default() };
+    progress.stage("building");
+    let start = Instant::now();
+    stage.built.get_or_insert_with(|| structure(job, stage.world));
+    times.build = start.elapsed().as_secs_f64();
+    stage.profile.done("build");
+    let first = job.first_step(&shot.step);
+    if first != shot.step && first.moment == shot.step.moment {
+        stage.meter(task, &Shot { step: first, ..shot.clone() })?;
+    }
+
+    let Stage { loaded, world, bounds, profile, built, metered, .. } = stage;
+    let (accel, reason) = &*built.get_or_insert_with(|| structure(job, world));
+    Ok(surroundings::lit(&job.look, loaded, &camera, |loaded, light| {
+        let (scene, textures) = (&loaded.scene, textures(job, &loaded.scene));
+        let work = Job { scene, world, accel, textures: &textures, view: &view, settings: &effective.settings };
+        if is_metered(&effective, shot, scene) {
+            progress.stage("metering");
+            effective.output.exposure = metered.get_or_find(&shot.choice, &work);
+            profile.done("meter");
+        }
+        effective.written_as(&job.look, shot.kind);
+        let work = Job { settings: &effective.settings, scene, world, accel, textures: &textures, view: &view };
+        let (effective, reason, phrase) = (&effective, *reason, phrase.as_str());
+        let prepared = Prepared { task, shot, effective, loaded, bounds, work, reason, phrase, light };
+        if job.dry_run { prepared.foretell() } else { prepared.draw(times, profile, so_far) }
+    }))
+}
+
+/// A picture of which all is known but its pixels.
+struct Prepared<'a> {
+    task: &'a Task<'a>,
+    shot: &'a Shot,
+    effective: &'a Effective,
+    loaded: &'a Loaded,
+    bounds: &'a Bounds,
+    work: Job<'a>,
+    /// Why its structure was chosen, if it was by counts.
+    reason: Option<Reason>,
+    /// What view it is, in words.
+    phrase: &'a str,
+    light: DefaultLight,
+}
+
+impl Prepared<'_> {
+    /// Says what the picture would take.
+    fn foretell(&self) -> Exit {
+        let Task { job, messages, progress, .. } = *self.task;
+        progress.begin("looking");
+        let found = crate::render::forecast(&self.work, progress);
+        progress.finish();
+        let format = job.stats.as_ref().map(|stats| stats.format);
+        match found.map(|forecast| dry_run::say(self.task.file(), &self.work, &forecast, format)) {
+            Some(Ok(())) => Exit::Done,
+            Some(Err(e)) => {
+                messages.error("output-unwritable", format!("standard output: {e}"), "");
+                Exit::Failed
+            }
+            None => Exit::Interrupted,
+        }
+    }
+
+    /// Renders the picture and writes it, and says and keeps what there is to say of it.
+    fn draw(&self, mut times: Times, profile: &mut Profile, so_far: &mut SoFar) -> Exit {
+        let Task { job, messages, progress, batch } = *self.task;
+        let Self { shot, effective, loaded, work, .. } = self;
+        let mut rendered = self.trace(&mut times, profile);
+        let costs = rendered.complete.then(|| self.costs());
+        progress.finish();
+        let Some(costs) = costs.flatten() else { return self.keep_partial(&rendered) };
+        if let Some(layers) = &mut rendered.picture.layers {
+            cost_layers::add_channels(job, &costs, layers);
+        }
+        let counted = job.stats.is_some().then(|| stats::count(work, &rendered, work.accel, messages));
+
+        let (depth, accel) = (rendered.depth, work.accel.kind());
+        let (sampled, reason) = (&rendered.sampled, self.reason);
+        let facts = again::Facts { job, batch, shot, effective, sampled, depth, accel, reason, loaded };
+        let metadata = again::metadata(&facts, counted.as_ref());
+        profile.skip();
+        let start = Instant::now();
+        let bytes = picture::encoded(shot, &rendered.picture, effective, work.scene.background, &metadata);
+        profile.done("encode");
+        let written = bytes.and_then(|bytes| picture::write(shot, &bytes));
+        profile.done("write");
+        times.write = start.elapsed().as_secs_f64();
+        match written {
+            Ok(()) => {}
+            Err(picture::WriteError::BrokenPipe) => return Exit::Done,
+            Err(picture::WriteError::Fault(fault)) => return self.task.fail(&fault, Exit::Failed),
+        }
+        let summary = Summary { shot, effective, loaded, bounds: self.bounds, view: self.phrase, light: self.light };
+        summary.say(&rendered, &times, messages);
+        let profile = job.profile.then(|| profile.take());
+        profile.iter().for_each(|p| p.say(messages));
+        so_far.pictures.push(self.stats(&facts, times, counted, profile.as_ref()));
+        match cost_layers::write_maps(job, shot, effective.settings.width, &costs, accel, messages) {
+            Ok(()) => Exit::Done,
+            Err(fault) => self.task.fail(&fault, Exit::Failed),
+        }
+    }
+
+    fn trace(&self, times: &mut Times, profile: &mut Profile) -> Rendered {
+        let Task { job, progress, .. } = *self.task;
+        progress.begin("rendering");
+        let _guard = job.keep_partial.then(interrupt::Guard::new);
+        let start = Instant::now();
+        let rendered = if job.profile {
+            let (rendered, parts) = crate::render::render_profiled(&self.work, progress);
+            profile.rendered(&parts);
+            rendered
+        } else {
+            crate::render::render(&self.work, progress)
+        };
+        times.render = start.elapsed().as_secs_f64();
+        rendered
+    }
+
+    /// What each pixel cost, in passes behind the picture's own; `None` when the user gave up.
+    fn costs(&self) -> Option<Costs> {
+        let Task { job, progress, .. } = *self.task;
+        let wanted = cost_layers::wanted(job);
+        if wanted.is_empty() {
+            return Some(Costs::default());
+        }
+        progress.begin("counting");
+        render_costs(&self.work, &wanted, progress)
+    }
+
+    fn stats(
+        &self,
+        facts: &again::Facts,
+        times: Times,
+        counted: Option<Counted>,
+        profile: Option<&Profile>,
+    ) -> PictureStats {
+        let Job { world, accel, .. } = self.work;
+        PictureStats::new(facts, self.phrase, times, world, accel.summary(), counted, profile)
+    }
+
+    fn keep_partial(&self, rendered: &Rendered) -> Exit {
+        let Task { messages, .. } = *self.task;
+        let Some(path) = self.shot.target.path() else { return Exit::Interrupted };
+        let path = output_name::partial(path);
+        let partial = Shot { target: Target::Named(path.clone()), ..self.shot.clone() };
+        // Without settings in it nobody will take it for a finished picture.
+        let metadata = crate::image::Metadata::new();
+        let background = self.work.scene.background;
+        let bytes = picture::encoded(&partial, &rendered.picture, self.effective, background, &metadata);
+        match bytes.and_then(|bytes| picture::write(&partial, &bytes)) {
+            Ok(()) => {
+                messages.info("partial", format!("interrupted; the tiles that were done are in {}", path.display()));
+            }
+            Err(picture::WriteError::Fault(fault)) => messages.say(Severity::Error, &fault),
+            Err(picture::WriteError::BrokenPipe) => {}
+        }
+        Exit::Interrupted
+    }
+}
