@@ -1,12 +1,13 @@
 //! `--layers NAMES` and `--heatmap`: what each pixel of a picture cost, inside an EXR or as a picture of its own.
 
+use super::interrupt;
 use super::job::{RenderJob, Shot};
 use super::message::{Messages, Severity};
 use super::outputs;
 use crate::accel::AccelKind;
 use crate::bench::report::number::{short, whole};
 use crate::image::draw::heat::{Map, Scale};
-use crate::image::{Layers, Metadata, write_atomic};
+use crate::image::{Layers, Metadata};
 use crate::load::Diagnostic;
 use crate::render::{Cost, Costs};
 use std::path::Path;
@@ -48,7 +49,7 @@ pub(super) fn write_maps(
         let map = Map { width, values: &values, scale, title: &text, label };
         let fault = |text: String| Diagnostic::new("output-unwritable", &path, "", text);
         let bytes = map.draw().png(&Metadata::new()).map_err(|e| fault(e.to_string()))?;
-        write_atomic(&path, &bytes, false).map_err(|e| fault(e.to_string()))?;
+        interrupt::write_atomic(&path, &bytes).map_err(|e| fault(e.to_string()))?;
         messages.say(Severity::Info, &Diagnostic::new("heatmap", &path, "", text));
     }
     Ok(())

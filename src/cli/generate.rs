@@ -2,10 +2,10 @@
 
 use super::args::GenerateArgs;
 use super::exit::Exit;
+use super::interrupt;
 use super::message::Messages;
 use super::text::grouped;
 use crate::generate::{Family, triangles};
-use crate::image::write_atomic;
 use crate::save::{glb, obj};
 use crate::scene::Scene;
 use std::path::{Path, PathBuf};
@@ -33,7 +33,7 @@ pub(super) fn run(args: &GenerateArgs) -> Exit {
         }
     };
     let scene = args.family.scene(args.size);
-    let written = write(&scene).and_then(|bytes| write_atomic(&path, &bytes, false).map_err(|e| e.to_string()));
+    let written = write(&scene).and_then(|bytes| interrupt::write_atomic(&path, &bytes).map_err(|e| e.to_string()));
     match written {
         Ok(()) => {
             messages.info("generated", summary(args.family, &path, &scene));

@@ -1,26 +1,47 @@
 //! Ctrl-C and termination signals: the command ends within a second and leaves no half file behind.
 //!
-//! While nothing has to be saved, the process ends at once. While a picture is being written, or when `--keep-partial`
+//! While nothing has to be saved, the process ends at once. While a file is being written, or when `--keep-partial`
 //! wants the tiles that are done, the first signal only raises a flag that the worker looks at; a second one ends the
 //! process whatever it does.
 
 use super::exit::Exit;
-use std::io::Write;
+use super::message::{self, Format};
+use crate::image;
+use std::io::{self, IsTerminal, Write};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 static RAISED: AtomicBool = AtomicBool::new(false);
-static SOMETHING_TO_SAVE: AtomicBool = AtomicBool::new(false);
+/// How many things have to be saved.
+static GUARDS: Mutex<usize> = Mutex::new(0);
+/// How the end is told.
+static FORMAT: OnceLock<Format> = OnceLock::new();
 
-/// Installs the handler. Where the system refuses one, signals keep their usual effect.
-pub(super) fn install() {
+fn guards() -> MutexGuard<'static, usize> {
+    GUARDS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Installs the handler, which tells the end in this form. Where the system refuses one, signals keep their usual effect.
+pub(super) fn install(format: Format) {
+    FORMAT.get_or_init(|| format);
     let _ = ctrlc::set_handler(|| {
+        // Held until the process has ended, so that nothing begins that would have to be saved.
+        let guards = guards();
         let second = RAISED.swap(true, Ordering::SeqCst);
-        if second || !SOMETHING_TO_SAVE.load(Ordering::SeqCst) {
-            // The progress bar may have left the cursor in mid-line.
-            let _ = writeln!(std::io::stderr(), "\nmeshray: interrupted");
-            std::process::exit(i32::from(Exit::Interrupted.code()));
+        if second || *guards == 0 {
+            end();
         }
     });
+}
+
+fn end() -> ! {
+    let mut stderr = io::stderr();
+    // The progress bar may have left the cursor in mid-line.
+    let line = if stderr.is_terminal() { "\n" } else { "" };
+    let format = FORMAT.get().copied().unwrap_or_default();
+    let _ = writeln!(stderr, "{line}{}", message::of_signal(format));
+    std::process::exit(i32::from(Exit::Interrupted.code()));
 }
 
 /// Whether a signal came.
@@ -35,13 +56,26 @@ pub(super) struct Guard(());
 impl Guard {
     /// Starts to guard.
     pub(super) fn new() -> Self {
-        SOMETHING_TO_SAVE.store(true, Ordering::SeqCst);
+        *guards() += 1;
         Self(())
     }
 }
 
 impl Drop for Guard {
     fn drop(&mut self) {
-        SOMETHING_TO_SAVE.store(false, Ordering::SeqCst);
+        *guards() -= 1;
     }
+}
+
+/// Writes a file whole or not at all (see [`image::write_atomic`]); a signal that comes meanwhile ends the process when that is
+/// done, unless something else is to be saved.
+pub(super) fn write_atomic(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let guard = Guard::new();
+    let written = image::write_atomic(path, bytes, false);
+    drop(guard);
+    let guards = guards();
+    if raised() && *guards == 0 {
+        end();
+    }
+    written
 }

@@ -38,6 +38,16 @@ pub(super) fn of_parser(said: &str) -> Diagnostic {
     Diagnostic::new("usage", "", "", text).remedy(tips.join("; "))
 }
 
+/// The last line of a process that a signal ends.
+pub(super) fn of_signal(format: Format) -> String {
+    match format {
+        Format::Text => "meshray: interrupted".into(),
+        Format::Json => {
+            line(format, Severity::Error, &Diagnostic::new("interrupted", "", "", "interrupted by a signal"))
+        }
+    }
+}
+
 /// How bad a message is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Severity {

@@ -61,7 +61,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
         Ok(cli) => cli,
         Err(e) => return misunderstood(&e, format),
     };
-    interrupt::install();
+    interrupt::install(format);
     accident::install();
     memory::keep_freed();
     match cli.command {

@@ -4,7 +4,7 @@
 use super::interrupt;
 use super::job::{Look, Shot};
 use super::outputs::Target;
-use crate::image::{FileKind, Metadata, Output, Picture, ToneMap, encode, write_atomic};
+use crate::image::{FileKind, Metadata, Output, Picture, ToneMap, encode};
 use crate::load::Diagnostic;
 use crate::render::Settings;
 use crate::scene::{Background, Environment, RenderHints, Scene};
@@ -131,9 +131,9 @@ pub(super) fn encoded(
 
 /// Puts the bytes where they belong.
 pub(super) fn write(shot: &Shot, bytes: &[u8]) -> Result<(), WriteError> {
-    let _guard = interrupt::Guard::new();
     match &shot.target {
         Target::Stdout => {
+            let _guard = interrupt::Guard::new();
             let mut out = io::stdout().lock();
             out.write_all(bytes).and_then(|()| out.flush()).map_err(|e| match e.kind() {
                 io::ErrorKind::BrokenPipe => WriteError::BrokenPipe,
@@ -141,7 +141,7 @@ pub(super) fn write(shot: &Shot, bytes: &[u8]) -> Result<(), WriteError> {
             })
         }
         Target::Named(path) | Target::Default(path) => {
-            write_atomic(path, bytes, false).map_err(|e| WriteError::new(shot, e.to_string()))
+            interrupt::write_atomic(path, bytes).map_err(|e| WriteError::new(shot, e.to_string()))
         }
     }
 }

@@ -25,6 +25,7 @@
 use super::again::Facts;
 use super::args::StatsFormat;
 use super::exit::Exit;
+use super::interrupt;
 use super::job::RenderJob;
 use super::message::Messages;
 use super::profile::Profile;
@@ -283,7 +284,7 @@ pub(super) fn report(job: &RenderJob, pictures: &[PictureStats], messages: &Mess
     };
     let result = match &wanted.file {
         None => super::print(&text),
-        Some(path) => crate::image::write_atomic(path, text.as_bytes(), false)
+        Some(path) => interrupt::write_atomic(path, text.as_bytes())
             .map_err(|e| io::Error::new(e.kind(), format!("{}: {e}", path.display()))),
     };
     match result {

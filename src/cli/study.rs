@@ -10,7 +10,7 @@ use super::{accident, interrupt, print};
 use crate::accel::{AccelParams, auto};
 use crate::bench::study::report::{Format, text};
 use crate::bench::study::{Plan, Study, Subject, measure, reference, settings};
-use crate::image::{Output, write_atomic};
+use crate::image::Output;
 use crate::load::Diagnostic;
 use crate::render::Settings;
 use crate::render::texture::TextureStore;
@@ -117,7 +117,7 @@ impl Told<'_> {
     fn write(&self, study: &Study) -> Result<(), Exit> {
         self.files.iter().try_for_each(|(path, format)| {
             let bytes = format.write(study).into_bytes();
-            write_atomic(path, &bytes, false).map_err(|e| self.unwritable(path, &e.to_string()))
+            interrupt::write_atomic(path, &bytes).map_err(|e| self.unwritable(path, &e.to_string()))
         })
     }
 

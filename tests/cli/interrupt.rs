@@ -2,24 +2,34 @@
 #![cfg(unix)]
 
 use super::program::Folder;
-use std::process::{Command, ExitStatus, Stdio};
+use serde_json::Value;
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-/// Starts a render that takes minutes, interrupts it while it draws, and tells how and how fast it ended.
-fn interrupted(folder: &Folder, arguments: &[&str]) -> (ExitStatus, Duration) {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_meshray"))
-        .args(["render", "cube.obj", "--size", "4000x4000", "--samples", "256"])
-        .args(arguments)
-        .current_dir(folder.path(""))
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    std::thread::sleep(Duration::from_millis(1500));
-    assert!(child.try_wait().unwrap().is_none(), "the render ended before it could be interrupted");
+fn start(folder: &Folder, arguments: &[&str]) -> Child {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_meshray"));
+    program.args(arguments).current_dir(folder.path("")).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+fn signal(child: &Child) {
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+}
+
+/// A render that takes minutes.
+const LONG: [&str; 6] = ["render", "cube.obj", "--size", "4000x4000", "--samples", "256"];
+
+/// Starts what takes long, interrupts it after a while, and tells how and how fast it ended.
+fn interrupted_after(folder: &Folder, arguments: &[&str], seconds: f64) -> (ExitStatus, Duration) {
+    let mut child = start(folder, arguments);
+    std::thread::sleep(Duration::from_secs_f64(seconds));
+    assert!(child.try_wait().unwrap().is_none(), "it ended before it could be interrupted");
     let start = Instant::now();
-    let signal = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-    assert!(signal.success());
+    signal(&child);
     (child.wait().unwrap(), start.elapsed())
+}
+
+fn interrupted(folder: &Folder, arguments: &[&str]) -> (ExitStatus, Duration) {
+    interrupted_after(folder, &[&LONG, arguments].concat(), 1.5)
 }
 
 /// A second is promised; a machine that is busy with other tests gets a few.
@@ -41,4 +51,33 @@ fn what_is_done_is_kept_when_asked_for() {
     assert_eq!(status.code(), Some(130));
     assert!(time < PATIENCE, "{time:?}");
     assert_eq!(folder.names(), ["cube.obj", "cube.partial.png"]);
+}
+
+#[test]
+fn a_file_that_is_being_written_when_the_signal_comes_is_finished() {
+    let folder = Folder::new();
+    let mut child = start(&folder, &["generate", "tetra", "--size", "4e6", "-o", "tetra.glb"]);
+    while folder.names().is_empty() {}
+    if child.try_wait().unwrap().is_none() {
+        signal(&child);
+    }
+    // On a fast disk it may be done before.
+    let code = child.wait().unwrap().code();
+    assert!(matches!(code, Some(0 | 130)), "{code:?}");
+    assert_eq!(folder.names(), ["tetra.glb"]);
+}
+
+#[test]
+fn the_end_is_told_in_the_form_that_is_asked_for() {
+    let folder = Folder::with_cube();
+    let said = |words: &[&str]| {
+        let child = start(&folder, &[&LONG, words].concat());
+        std::thread::sleep(Duration::from_millis(1500));
+        signal(&child);
+        String::from_utf8(child.wait_with_output().unwrap().stderr).unwrap()
+    };
+    let json = said(&["--messages", "json", "-q"]);
+    let message: Value = serde_json::from_str(json.trim_end()).unwrap();
+    assert_eq!((&message["severity"], &message["code"]), (&"error".into(), &"interrupted".into()), "{json}");
+    assert_eq!(said(&["-q"]), "meshray: interrupted\n");
 }

@@ -17,7 +17,6 @@ use crate::bench::rays;
 use crate::bench::report::{Format, Model, Rays, Report, text};
 use crate::bench::row::Row;
 use crate::bench::sweep::Sweep;
-use crate::image::write_atomic;
 pub(super) use args::BenchArgs;
 use gate::Gate;
 use scene::{Prepared, Subject};
@@ -256,7 +255,7 @@ impl Bench<'_> {
     fn write_as(&self, text: impl Fn(Format) -> String) -> Exit {
         let mut exit = Exit::Done;
         for (path, format) in &self.files {
-            if let Err(e) = write_atomic(path, text(*format).as_bytes(), false) {
+            if let Err(e) = interrupt::write_atomic(path, text(*format).as_bytes()) {
                 self.messages.error("output-unwritable", format!("{}: {e}", path.display()), "");
                 exit = Exit::Failed;
             }

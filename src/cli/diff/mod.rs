@@ -15,7 +15,7 @@ mod report;
 use super::exit::Exit;
 use super::message::{Messages, Severity};
 use super::writable::{self, Sources};
-use super::{accident, output_name, print};
+use super::{accident, interrupt, output_name, print};
 use crate::bench::report::number::short;
 use crate::image::diff::{
     Difference, LayerDifference, Looks, Space, compare, greatest, layer_differences, looks, side_by_side,
@@ -23,7 +23,7 @@ use crate::image::diff::{
 use crate::image::draw::heat::{Map, Scale};
 use crate::image::look::{as_is, developed};
 use crate::image::read::{PictureFile, read_picture_file};
-use crate::image::{FileKind, ImageError, Layers, Metadata, Output, Picture, ToneMap, encode, write_atomic};
+use crate::image::{FileKind, ImageError, Layers, Metadata, Output, Picture, ToneMap, encode};
 use crate::load::Diagnostic;
 pub(super) use args::DiffArgs;
 use args::Show;
@@ -177,7 +177,7 @@ fn finest(most: f64) -> f64 {
 
 fn write(path: &Path, bytes: Result<Vec<u8>, ImageError>) -> Result<(), Fault> {
     let fault = |text: String| Box::new((Diagnostic::new("output-unwritable", path, "", text), Exit::Failed));
-    write_atomic(path, &bytes.map_err(|e| fault(e.to_string()))?, false).map_err(|e| fault(e.to_string()))
+    interrupt::write_atomic(path, &bytes.map_err(|e| fault(e.to_string()))?).map_err(|e| fault(e.to_string()))
 }
 
 /// Prints the figures; a limit that is broken is said and decides how it ends.

@@ -30,9 +30,9 @@ use super::message::{Messages, Severity};
 use super::picture::{Effective, background};
 use super::sampling::SamplingArgs;
 use super::writable::{self, Sources};
-use super::{accident, print, read};
+use super::{accident, interrupt, print, read};
 use crate::accel::{AccelKind, AccelParams, auto};
-use crate::image::{FileKind, Metadata, write_atomic};
+use crate::image::{FileKind, Metadata};
 use crate::load::{Diagnostic, Loaded};
 use crate::render::story::{Story, tell};
 use crate::render::texture::TextureStore;
@@ -167,7 +167,7 @@ fn draw(path: &Path, told: &Told, job: &Job, messages: &Messages) -> Result<Exit
     let fault = |text: String| Diagnostic::new("output-unwritable", path, "", text);
     let canvas = picture::draw(told, job);
     let bytes = canvas.png(&Metadata::new()).map_err(|e| fault(e.to_string()))?;
-    write_atomic(path, &bytes, false).map_err(|e| fault(e.to_string()))?;
+    interrupt::write_atomic(path, &bytes).map_err(|e| fault(e.to_string()))?;
     let text = "the scene cut open along the ray, seen from the side, with what was visited";
     messages.say(Severity::Info, &Diagnostic::new("picture", path, "", text));
     Ok(Exit::Done)

@@ -14,9 +14,8 @@ use super::exit::Exit;
 use super::message::{Messages, Severity};
 use super::progress::Progress;
 use super::writable::{self, Sources};
-use super::{accident, print, read};
+use super::{accident, interrupt, print, read};
 use crate::bench::verify::{Plan, kernels, verify};
-use crate::image::write_atomic;
 
 /// Loads the file, judges it and prints what was found.
 pub(super) fn run(args: &VerifyArgs) -> Exit {
@@ -51,7 +50,7 @@ fn judge(args: &VerifyArgs, messages: &Messages) -> Exit {
     };
     if let Some(path) = &args.plot {
         let page = kernels::html(&name, &report::rays(&plan), &kernels::of(&findings));
-        if let Err(e) = write_atomic(path, page.as_bytes(), false) {
+        if let Err(e) = interrupt::write_atomic(path, page.as_bytes()) {
             messages.error("output-unwritable", format!("{}: {e}", path.display()), "");
             return Exit::Failed;
         }
