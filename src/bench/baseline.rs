@@ -1,7 +1,9 @@
 //! A gate of counts: they do not depend on the machine, so what goes beyond a limit is a change of the program.
 //!
-//! Two reports of schema `meshray-bench/1` are compared, model by model (by file name), structure by structure, class by
-//! class. Both must be of the same model and the same rays; otherwise counts say nothing about each other.
+//! Two reports of schema `meshray-bench/1` are compared, model by model, structure by structure, class by class. Models are
+//! found by file name, since reports are compared wherever the models lie; where several have that name, by the path as it
+//! was typed, or else by what is in the file. Both must be of the same model and the same rays; otherwise counts say nothing
+//! about each other.
 
 use serde_json::Value;
 use std::str::FromStr;
@@ -49,11 +51,11 @@ pub fn failures(baseline: &Value, now: &Value, limits: &[Limit]) -> Result<Vec<S
     if baseline["schema"] != now["schema"] {
         return Err(format!("its schema is {}, not {}", baseline["schema"], now["schema"]));
     }
-    let mut lines = Vec::new();
+    let (all, mut found, mut lines) = (items(&baseline["models"]), Vec::new(), Vec::new());
     for model in items(&now["models"]) {
-        let name = file_name(&model["file"]);
-        let before = items(&baseline["models"]).iter().find(|m| file_name(&m["file"]) == name);
-        let before = before.ok_or_else(|| format!("it has no model {name}"))?;
+        let at = earlier(all, model)?;
+        found.push(at);
+        let (before, name) = (&all[at], called(all, &all[at]));
         for (key, what) in [("hash", "another file"), ("picture", "another picture"), ("rays", "other numbers of rays")]
         {
             if before[key] != model[key] {
@@ -69,7 +71,33 @@ pub fn failures(baseline: &Value, now: &Value, limits: &[Limit]) -> Result<Vec<S
             }
         }
     }
+    let missing = all.iter().enumerate().filter(|(at, _)| !found.contains(at));
+    lines.extend(missing.map(|(_, model)| format!("{}: in the baseline, but not measured now", called(all, model))));
     Ok(lines)
+}
+
+/// Which of the models of a baseline this one was; an error where there is none or nobody can say.
+fn earlier(all: &[Value], model: &Value) -> Result<usize, String> {
+    let name = file_name(&model["file"]);
+    let same = |key: &'static str| move |at: &&usize| all[**at][key] == model[key];
+    let named: Vec<usize> = (0..all.len()).filter(|&at| file_name(&all[at]["file"]) == name).collect();
+    let known = || named.iter().find(same("file")).or_else(|| named.iter().find(same("hash")));
+    match named[..] {
+        [] => Err(format!("it has no model {name}")),
+        [only] => Ok(only),
+        _ => known().copied().ok_or_else(|| {
+            let files: Vec<&str> = named.iter().map(|&at| path(&all[at]["file"])).collect();
+            let file = path(&model["file"]);
+            format!("it has several models called {name} ({}), and none of them is {file}", files.join(", "))
+        }),
+    }
+}
+
+/// What a model of a baseline is called in messages: its file name, or its path where several have that.
+fn called<'a>(all: &'a [Value], model: &'a Value) -> &'a str {
+    let name = file_name(&model["file"]);
+    let several = all.iter().filter(|other| file_name(&other["file"]) == name).count() > 1;
+    if several { path(&model["file"]) } else { name }
 }
 
 fn compare(place: &str, before: &Value, now: &Value, limits: &[Limit], lines: &mut Vec<String>) {
@@ -95,9 +123,12 @@ fn items(list: &Value) -> &[Value] {
     list.as_array().map_or(&[], Vec::as_slice)
 }
 
-/// Reports are compared wherever the model lies.
-fn file_name(path: &Value) -> &str {
-    let path = path.as_str().unwrap_or_default();
+fn path(file: &Value) -> &str {
+    file.as_str().unwrap_or_default()
+}
+
+fn file_name(file: &Value) -> &str {
+    let path = path(file);
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
@@ -139,6 +170,29 @@ mod tests {
         now = report(1.0, 1);
         now["models"][0]["structures"] = json!([]);
         assert_eq!(judged(&before, &now, &[]), ["b.obj, grid: in the baseline, but not measured now"]);
+        now["models"] = json!([]);
+        assert_eq!(judged(&before, &now, &[]), ["b.obj: in the baseline, but not measured now"]);
+    }
+
+    #[test]
+    fn models_of_one_file_name_are_told_apart_by_path_or_content() {
+        let both = |files: [(&str, &str, f64); 2]| {
+            let mut all = report(0.0, 1);
+            all["models"] = json!(files.map(|(file, hash, n_it)| {
+                let mut model = report(n_it, 1)["models"][0].clone();
+                (model["file"], model["hash"]) = (file.into(), hash.into());
+                model
+            }));
+            all
+        };
+        let before = both([("a/b.obj", "7", 1.0), ("c/b.obj", "8", 2.0)]);
+        assert_eq!(judged(&before, &before, &["n_it>+1%", "n_it<-1%"]), [""; 0]);
+        let elsewhere = both([("d/b.obj", "8", 2.0), ("e/b.obj", "7", 3.0)]);
+        let lines = judged(&before, &elsewhere, &["n_it>+1%", "n_it<-1%"]);
+        assert!(lines.len() == 1 && lines[0].starts_with("a/b.obj, grid, shadow: n_it 3"), "{lines:?}");
+        let other = both([("a/b.obj", "7", 1.0), ("d/b.obj", "9", 2.0)]);
+        let error = failures(&before, &other, &[]).unwrap_err();
+        assert!(error.contains("a/b.obj, c/b.obj") && error.ends_with("d/b.obj"), "{error}");
     }
 
     #[test]

@@ -44,6 +44,11 @@ pub(super) fn run(args: &StudyArgs) -> Exit {
 
 fn study(args: &StudyArgs, files: &[(PathBuf, Format)], name: &str, messages: &Messages) -> Result<Exit, Exit> {
     let Seen { loaded, world, view, phrase } = seen::model(&args.model, &args.eye, args.size, messages)?;
+    let sources = Sources::of(&loaded.facts.files);
+    args.report.iter().try_for_each(|path| sources.spared_by(path, "--report")).map_err(|fault| {
+        messages.say(Severity::Error, &fault);
+        Exit::Failed
+    })?;
     let (width, height) = args.size;
     let hints = &loaded.scene.hints;
     let base = Settings { width, height, depth: hints.depth, seed: args.seed, ..Settings::default() };

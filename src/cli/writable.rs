@@ -70,7 +70,7 @@ pub(super) fn check_target(target: &Target, sources: &Sources) -> Result<(), Dia
     Ok(())
 }
 
-/// [`check`] for every `--report`.
+/// [`check`] for every `--report`, before any work.
 pub(super) fn check_reports(paths: &[PathBuf], sources: &Sources) -> Result<(), Diagnostic> {
     paths.iter().try_for_each(|path| check(path, "--report", sources))
 }

@@ -1,6 +1,6 @@
 //! `meshray bench`: how cost grows with size, and with a parameter.
 
-use super::program::Folder;
+use super::program::{CUBE, Folder};
 use serde_json::Value;
 
 const QUICK: [&str; 7] = ["bench", "--size", "16x12", "--passes", "0", "-q", "--accel"];
@@ -92,4 +92,53 @@ fn a_report_says_what_auto_would_choose_and_how_many_objects_there_are() {
     let model = &report["models"][0];
     assert_eq!((&model["objects"], &model["auto"]["kind"]), (&1.into(), &"fast-octree".into()));
     assert_eq!(model["auto"]["won_nodes"], 0.0, "both are one leaf");
+}
+
+#[test]
+fn a_baseline_is_not_replaced_by_the_report_that_is_compared_with_it() {
+    let folder = Folder::with_cube();
+    folder.run(&[&QUICK[..], &["bvh", "cube.obj", "--report", "r.json"]].concat()).ends(0);
+    let before = folder.read("r.json");
+    let words = ["bvh", "cube.obj", "--baseline", "r.json", "--fail-if", "n_it>+1%", "--report", "./r.json"];
+    folder.run(&[&QUICK[..], &words].concat()).ends(1).says(&["r.json", "--report"]);
+    assert!(folder.read("r.json") == before);
+}
+
+#[test]
+fn models_of_one_name_are_compared_with_their_own_report_and_one_that_is_missing_is_told() {
+    let folder = Folder::new().file("a/cube.obj", CUBE).file("b/cube.obj", format!("{CUBE}f 1 2 7 8\n"));
+    folder.run(&[&QUICK[..], &["bvh", "a/cube.obj", "b/cube.obj", "--report", "r.json"]].concat()).ends(0);
+    let gate = ["--baseline", "r.json", "--fail-if", "n_it>+0%,n_it<-0%"];
+    folder.run(&[&QUICK[..], &["bvh", "a/cube.obj", "b/cube.obj"], &gate].concat()).ends(0);
+    folder
+        .run(&[&QUICK[..], &["bvh", "b/cube.obj"], &gate].concat())
+        .ends(1)
+        .says(&["a/cube.obj: in the baseline, but not measured now"]);
+}
+
+#[test]
+fn a_report_or_a_plot_replaces_no_file_of_the_model() {
+    let bytes: Vec<u8> = [0., 0., 0., 1., 0., 0., 0., 1., 0.].iter().flat_map(|x: &f32| x.to_le_bytes()).collect();
+    let model = |buffer: &str| {
+        let accessor = r#"{"bufferView":0,"componentType":5126,"type":"VEC3","count":3,"min":[0,0,0],"max":[1,1,0]}"#;
+        format!(
+            r#"{{"asset":{{"version":"2.0"}},"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],
+            "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}}}}]}}],"accessors":[{accessor}],
+            "bufferViews":[{{"buffer":0,"byteLength":36}}],"buffers":[{{"byteLength":36,"uri":"{buffer}"}}]}}"#
+        )
+    };
+    let folder = Folder::new()
+        .file("json.gltf", model("geo.json"))
+        .file("html.gltf", model("geo.html"))
+        .file("geo.json", &bytes)
+        .file("geo.html", &bytes);
+    for words in [
+        &["bench", "json.gltf", "--passes", "0", "-q", "--report", "geo.json"][..],
+        &["study", "json.gltf", "-q", "--report", "geo.json"],
+        &["verify", "html.gltf", "--rays", "2", "-q", "--plot", "geo.html"],
+    ] {
+        let [flag, name] = words[words.len() - 2..] else { panic!("{words:?}") };
+        folder.run(words).ends(1).says(&[name, "would replace a file that is read", flag]);
+        assert!(folder.read(name) == bytes, "{words:?}");
+    }
 }

@@ -17,15 +17,19 @@ use crate::bench::rays;
 use crate::bench::report::{Format, Model, Rays, Report, text};
 use crate::bench::row::Row;
 use crate::bench::sweep::Sweep;
+use crate::load::{Diagnostic, Loaded};
 pub(super) use args::BenchArgs;
 use gate::Gate;
 use scene::{Prepared, Subject};
+use std::cell::RefCell;
 use std::path::PathBuf;
 
 /// What is to be done, checked.
 struct Bench<'a> {
     args: &'a BenchArgs,
     files: Vec<(PathBuf, Format)>,
+    /// All inputs, the baseline, and the files that the models loaded so far use.
+    sources: RefCell<Sources>,
     messages: Messages,
 }
 
@@ -39,11 +43,12 @@ pub(super) fn run(args: &BenchArgs) -> Exit {
             return Exit::Usage;
         }
     };
-    if let Err(fault) = writable::check_reports(&args.report, &Sources::of(&args.inputs)) {
+    let sources = Sources::of(args.inputs.iter().chain(&args.baseline));
+    if let Err(fault) = writable::check_reports(&args.report, &sources) {
         messages.say(Severity::Error, &fault);
         return Exit::Failed;
     }
-    let bench = Bench { args, files, messages };
+    let bench = Bench { args, files, sources: RefCell::new(sources), messages };
     if let Some(folder) = &args.spd {
         return bench.published(folder);
     }
@@ -153,6 +158,10 @@ impl Bench<'_> {
             Ok(prepared) => prepared,
             Err(exit) => return exit,
         };
+        if let Err(fault) = self.spares(&prepared.loaded) {
+            self.messages.say(Severity::Error, &fault);
+            return Exit::Failed;
+        }
         let name = subject.to_string();
         let (plan, left_out) = match self.bearable(report, &prepared) {
             Ok(plan) => plan,
@@ -221,6 +230,12 @@ impl Bench<'_> {
         Exit::Failed
     }
 
+    /// Refuses a model of which a report would replace a file.
+    fn spares(&self, loaded: &Loaded) -> Result<(), Diagnostic> {
+        self.sources.borrow_mut().add(&loaded.facts.files);
+        self.files.iter().try_for_each(|(path, _)| self.sources.borrow().spared_by(path, "--report"))
+    }
+
     /// The plan for one model, and the structures that it leaves out. Where sizes grow, slow structures end where they
     /// would take for ever, and a size whose scene was measured already is no new one.
     fn bearable(&self, report: &Report, prepared: &Prepared) -> Result<(Plan, Vec<AccelKind>), String> {
@@ -251,10 +266,14 @@ impl Bench<'_> {
         self.write_as(|format| format.write(report))
     }
 
-    /// Writes every file that was asked for.
+    /// Writes every file that was asked for, but none over what a model was read from: that was said when it was loaded.
     fn write_as(&self, text: impl Fn(Format) -> String) -> Exit {
         let mut exit = Exit::Done;
         for (path, format) in &self.files {
+            if self.sources.borrow().spared_by(path, "--report").is_err() {
+                exit = Exit::Failed;
+                continue;
+            }
             if let Err(e) = interrupt::write_atomic(path, text(*format).as_bytes()) {
                 self.messages.error("output-unwritable", format!("{}: {e}", path.display()), "");
                 exit = Exit::Failed;

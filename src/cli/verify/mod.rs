@@ -34,6 +34,12 @@ fn judge(args: &VerifyArgs, messages: &Messages) -> Exit {
         Ok(loaded) => loaded,
         Err(exit) => return exit,
     };
+    if let Some(path) = &args.plot
+        && let Err(fault) = Sources::of(&loaded.facts.files).spared_by(path, "--plot")
+    {
+        messages.say(Severity::Error, &fault);
+        return Exit::Failed;
+    }
     let name = args.model.input.display().to_string();
     let plan = Plan { rays: args.rays, seed: args.seed, ..Plan::DEFAULT };
     let progress = Progress::new(&name, messages, args.quiet, false);
