@@ -84,8 +84,8 @@ pub(super) struct RenderArgs {
     /// Where to write: a file (png, exr, jpg, webp by its ending), a folder, `-`, or a template with {dir} {stem}
     /// {view} {frame:04}
     ///
-    /// Without it the picture goes to STEM.png in the current folder, replacing only a picture that meshray wrote. A
-    /// name given here replaces whatever is there.
+    /// Without it the picture goes to STEM.png in the current folder. Names that are made up, in a folder given here and
+    /// of heat maps too, replace only a picture that meshray wrote; a name given here replaces whatever is there.
     #[arg(short, long, value_name = "PATH", help_heading = "Output", allow_hyphen_values = true)]
     pub output: Option<String>,
     /// Columns and rows of the picture [default: 1024x768]

@@ -4,7 +4,7 @@ use super::args::{AccelArgs, Axis, FileType, MessageFormat, MtlArg, PolygonsArg,
 use super::camera::{Choice, LensChoice};
 use super::message;
 use super::output_name::{Facts, Naming};
-use super::outputs::{self, Target};
+use super::outputs::{self, Beside, Target};
 use super::parse::{Back, Env};
 use super::sampling::SamplingArgs;
 use super::sequence::{self, Sequence, Step};
@@ -152,7 +152,7 @@ impl RenderJob {
         let sequence = sequence::of(args)?;
         let batches = batches(args, &choices, sequence.as_ref())?;
         let stats = stats(args);
-        outputs::check_stats_file(stats.as_ref(), &batches, &args.heatmap)?;
+        outputs::check_stats_file(stats.as_ref(), &batches, beside(args))?;
         let to_stdout = batches.iter().flat_map(|b| &b.shots).any(|s| s.target == Target::Stdout);
         if to_stdout && stats.as_ref().is_some_and(|s| s.file.is_none()) {
             return wrong("the picture goes to standard output, so the statistics cannot; add --stats-file PATH");
@@ -179,6 +179,11 @@ impl RenderJob {
             sequence,
             batches,
         })
+    }
+
+    /// What is written beside each picture.
+    pub(super) fn beside(&self) -> Beside<'_> {
+        Beside { heatmaps: &self.heatmaps, partial: self.keep_partial }
     }
 
     /// Where statistics are written, if that is a file.
@@ -274,9 +279,13 @@ fn batches(args: &RenderArgs, choices: &[Choice], sequence: Option<&Sequence>) -
         batches.push(Batch { inputs, shots });
     }
     outputs::refuse_collisions(&batches)?;
-    outputs::check_heatmaps(&batches, &args.heatmap)?;
+    outputs::check_beside(&batches, beside(args))?;
     check_kinds(args, &batches)?;
     Ok(batches)
+}
+
+fn beside(args: &RenderArgs) -> Beside<'_> {
+    Beside { heatmaps: &args.heatmap, partial: args.keep_partial }
 }
 
 /// Sizes that a type of file cannot hold, and flags that only one type can honour.
@@ -435,7 +444,7 @@ mod tests {
     fn pictures_go_to_the_current_folder_under_the_stem() {
         assert_eq!(outputs("some/where/a.glb"), [Target::Default("a.png".into())]);
         assert_eq!(outputs("a.glb b.obj -o {stem}.exr"), ["a.exr", "b.exr"].map(|n| Target::Named(n.into())));
-        assert_eq!(outputs("a.glb -o out/"), [Target::Named("out/a.png".into())]);
+        assert_eq!(outputs("a.glb -o out/"), [Target::Default("out/a.png".into())]);
         assert_eq!(outputs("a.glb --format exr"), [Target::Default("a.exr".into())]);
         assert_eq!(outputs("a.glb -o -"), [Target::Stdout]);
         assert_eq!(outputs("a.glb -o a.tmp --format exr"), [Target::Named("a.tmp".into())]);

@@ -32,15 +32,13 @@ impl Target {
 /// Where the next picture goes, and as what.
 pub(super) fn target(args: &RenderArgs, facts: &Facts, naming: Naming) -> Result<(Target, FileKind), Wrong> {
     let format = args.format.map(FileKind::from);
-    let extension = format.unwrap_or(FileKind::Png).extension();
-    let template = match args.output.as_deref() {
+    let usual = |folder| output_name::default_template(folder, naming, format.unwrap_or(FileKind::Png).extension());
+    let (template, kept): (String, fn(PathBuf) -> Target) = match args.output.as_deref() {
         Some("-") => return Ok((Target::Stdout, format.unwrap_or(FileKind::Png))),
         Some("") => return wrong("-o needs a name"),
-        Some(folder) if folder.ends_with('/') || Path::new(folder).is_dir() => {
-            output_name::default_template(Some(folder), naming, extension)
-        }
-        Some(template) => template.to_owned(),
-        None => output_name::default_template(None, naming, extension),
+        Some(folder) if folder.ends_with('/') || Path::new(folder).is_dir() => (usual(Some(folder)), Target::Default),
+        Some(template) => (template.to_owned(), Target::Named),
+        None => (usual(None), Target::Default),
     };
     let path = output_name::fill(&template, facts).map_err(Wrong)?;
     let kind = match (format, FileKind::from_path(&path)) {
@@ -51,32 +49,40 @@ pub(super) fn target(args: &RenderArgs, facts: &Facts, naming: Naming) -> Result
         (Some(kind), _) | (None, Ok(kind)) => kind,
         (None, Err(e)) => return wrong(format!("{e}, or say --format")),
     };
-    let target = if args.output.is_some() { Target::Named(path) } else { Target::Default(path) };
-    Ok((target, kind))
+    Ok((kept(path), kind))
+}
+
+/// What is written beside each picture, under a name made from its own.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Beside<'a> {
+    /// A heat map of each.
+    pub heatmaps: &'a [Cost],
+    /// What is done of it when it is interrupted.
+    pub partial: bool,
 }
 
 /// Where the heat map of a picture goes: `ship.png` -> `ship-tests.png`.
 pub(super) fn heat_map(picture: &Target, cost: Cost) -> Option<Target> {
-    let name = |path: &Path| {
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        path.with_file_name(format!("{stem}-{cost}.png"))
-    };
-    match picture {
-        Target::Stdout => None,
-        Target::Named(path) => Some(Target::Named(name(path))),
-        Target::Default(path) => Some(Target::Default(name(path))),
-    }
+    let path = picture.path()?;
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    Some(Target::Default(path.with_file_name(format!("{stem}-{cost}.png"))))
 }
 
-/// A picture and its heat maps.
-pub(super) fn of(shot: &Shot, heatmaps: &[Cost]) -> Vec<Target> {
-    let maps = heatmaps.iter().filter_map(|&cost| heat_map(&shot.target, cost));
-    std::iter::once(shot.target.clone()).chain(maps).collect()
+/// Where it goes as far as it is done when it is interrupted: `ship.png` -> `ship.partial.png`.
+pub(super) fn partial(picture: &Target) -> Option<Target> {
+    picture.path().map(|path| Target::Default(output_name::partial(path)))
+}
+
+/// A picture and what is beside it.
+pub(super) fn of(shot: &Shot, beside: Beside) -> Vec<Target> {
+    let maps = beside.heatmaps.iter().filter_map(|&cost| heat_map(&shot.target, cost));
+    let partial = beside.partial.then(|| partial(&shot.target)).flatten();
+    std::iter::once(shot.target.clone()).chain(maps).chain(partial).collect()
 }
 
 /// The files of these pictures and of what is beside them.
-fn files<'a>(shots: impl Iterator<Item = &'a Shot>, heatmaps: &[Cost]) -> Vec<PathBuf> {
-    shots.flat_map(|shot| of(shot, heatmaps)).filter_map(|target| target.path().map(Path::to_path_buf)).collect()
+fn files<'a>(shots: impl Iterator<Item = &'a Shot>, beside: Beside) -> Vec<PathBuf> {
+    shots.flat_map(|shot| of(shot, beside)).filter_map(|target| target.path().map(Path::to_path_buf)).collect()
 }
 
 /// Refuses two pictures of one name.
@@ -106,16 +112,17 @@ pub(super) fn refuse_collisions(batches: &[Batch]) -> Result<(), Wrong> {
     ))
 }
 
-/// Heat maps are named after their picture, and must not fall on another.
-pub(super) fn check_heatmaps(batches: &[Batch], heatmaps: &[Cost]) -> Result<(), Wrong> {
+/// What is beside a picture is named after it, and must not fall on another.
+pub(super) fn check_beside(batches: &[Batch], beside: Beside) -> Result<(), Wrong> {
     let shots = || batches.iter().flat_map(|b| &b.shots);
+    let heatmaps = beside.heatmaps;
     if let Some(twice) = heatmaps.iter().enumerate().find(|(i, cost)| heatmaps[..*i].contains(cost)) {
         return wrong(format!("--heatmap names {} twice", twice.1));
     }
     if !heatmaps.is_empty() && shots().any(|s| s.target == Target::Stdout) {
         return wrong("a heat map is named after its picture, and standard output has no name; use -o NAME");
     }
-    let all = files(shots(), heatmaps);
+    let all = files(shots(), beside);
     match output_name::collision(&all) {
         Some((_, later)) => {
             wrong(format!("two pictures would be written to {}; choose another -o", all[later].display()))
@@ -124,10 +131,10 @@ pub(super) fn check_heatmaps(batches: &[Batch], heatmaps: &[Cost]) -> Result<(),
     }
 }
 
-/// Statistics must not fall on a picture or a heat map.
-pub(super) fn check_stats_file(stats: Option<&Stats>, batches: &[Batch], heatmaps: &[Cost]) -> Result<(), Wrong> {
+/// Statistics must not fall on a picture or what is beside it.
+pub(super) fn check_stats_file(stats: Option<&Stats>, batches: &[Batch], beside: Beside) -> Result<(), Wrong> {
     let Some(file) = stats.and_then(|stats| stats.file.as_deref()) else { return Ok(()) };
-    let names = files(batches.iter().flat_map(|b| &b.shots), heatmaps);
+    let names = files(batches.iter().flat_map(|b| &b.shots), beside);
     let target = output_name::identity(file);
     if names.iter().any(|name| output_name::identity(name) == target) {
         let file = file.display();

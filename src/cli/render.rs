@@ -77,7 +77,7 @@ fn render_batch(job: &RenderJob, batch: &Batch, messages: &Messages, so_far: &mu
     let mut worst = Exit::Done;
     let mut shots = Vec::new();
     for shot in &batch.shots {
-        let mut targets = outputs::of(shot, &job.heatmaps).into_iter();
+        let mut targets = outputs::of(shot, job.beside()).into_iter();
         match targets.try_for_each(|target| writable::check_target(&target, &so_far.sources)) {
             Ok(()) => shots.push(shot),
             Err(fault) => {

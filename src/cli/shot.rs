@@ -4,7 +4,7 @@ use super::exit::Exit;
 use super::job::{Batch, RenderJob, Shot};
 use super::message::{Messages, Severity};
 use super::meter::Metered;
-use super::outputs::{self, Target};
+use super::outputs;
 use super::picture::{self, Effective};
 use super::profile::Profile;
 use super::progress::Progress;
@@ -12,7 +12,7 @@ use super::render::SoFar;
 use super::sequence::{self, Survey};
 use super::stats::{self, Counted, PictureStats, Times};
 use super::summary::Summary;
-use super::{again, cost_layers, dry_run, interrupt, output_name, surroundings};
+use super::{again, cost_layers, dry_run, interrupt, surroundings};
 use crate::accel::AnyAccel;
 use crate::accel::auto::Reason;
 use crate::image::FileKind;
@@ -116,7 +116,7 @@ fn is_metered(effective: &Effective, shot: &Shot, scene: &Scene) -> bool {
 /// Whether a picture fits into the memory that is allowed, into a file of its type, and may still be written where it goes.
 fn check(task: &Task, shot: &Shot, effective: &Effective, so_far: &SoFar) -> Result<(), Exit> {
     let Task { job, .. } = *task;
-    let mut targets = outputs::of(shot, &job.heatmaps).into_iter();
+    let mut targets = outputs::of(shot, job.beside()).into_iter();
     targets
         .try_for_each(|target| so_far.sources.spared_by_target(&target))
         .map_err(|fault| task.fail(&fault, Exit::Failed))?;
@@ -285,15 +285,15 @@ impl Prepared<'_> {
 
     fn keep_partial(&self, rendered: &Rendered) -> Exit {
         let Task { messages, .. } = *self.task;
-        let Some(path) = self.shot.target.path() else { return Exit::Interrupted };
-        let path = output_name::partial(path);
-        let partial = Shot { target: Target::Named(path.clone()), ..self.shot.clone() };
+        let Some(target) = outputs::partial(&self.shot.target) else { return Exit::Interrupted };
+        let partial = Shot { target, ..self.shot.clone() };
         // Without settings in it nobody will take it for a finished picture.
         let metadata = crate::image::Metadata::new();
         let background = self.work.scene.background;
         let bytes = picture::encoded(&partial, &rendered.picture, self.effective, background, &metadata);
         match bytes.and_then(|bytes| picture::write(&partial, &bytes)) {
             Ok(()) => {
+                let path = partial.target.path().unwrap_or(Path::new("-"));
                 messages.info("partial", format!("interrupted; the tiles that were done are in {}", path.display()));
             }
             Err(picture::WriteError::Fault(fault)) => messages.say(Severity::Error, &fault),

@@ -65,7 +65,7 @@ pub(super) fn check_target(target: &Target, sources: &Sources) -> Result<(), Dia
     check(path, "-o", sources)?;
     if matches!(target, Target::Default(_)) && path.exists() && !was_written_by_meshray(path) {
         let fault = Diagnostic::new("output-not-ours", path, "", "exists and is no picture that meshray wrote");
-        return Err(fault.remedy("name the output with -o"));
+        return Err(fault.remedy("move it away, or name another output with -o"));
     }
     Ok(())
 }

@@ -31,6 +31,19 @@ fn a_default_name_replaces_only_a_picture_that_meshray_wrote() {
     assert_eq!(folder.names(), ["cube.obj", "cube.png"]);
 }
 
+#[test]
+fn a_name_that_is_made_up_replaces_only_a_picture_that_meshray_wrote() {
+    let names = ["out/cube.png", "s-tests.png", "s.partial.png"];
+    let folder = names.iter().fold(Folder::with_cube(), |folder, name| folder.file(name, "precious"));
+    folder.render(&["cube.obj", "-o", "out"]).ends(1).says(&["out/cube.png", "no picture that meshray wrote", "-o"]);
+    folder.render(&["cube.obj", "-o", "out/"]).ends(1);
+    folder.render(&["cube.obj", "-o", "s.png", "--heatmap", "tests"]).ends(1).says(&["s-tests.png", "-o"]);
+    folder.render(&["cube.obj", "-o", "s.png", "--keep-partial"]).ends(1).says(&["s.partial.png", "-o"]);
+    assert!(!folder.has("s.png") && names.iter().all(|name| folder.read(name) == b"precious"));
+    folder.render(&["cube.obj", "-o", "t.png", "--heatmap", "tests", "--keep-partial"]).ends(0);
+    folder.render(&["cube.obj", "-o", "t.png", "--heatmap", "tests"]).ends(0);
+}
+
 #[cfg(unix)]
 #[test]
 fn a_link_does_not_lead_a_picture_over_the_model_or_its_textures() {
