@@ -72,6 +72,7 @@ impl<'a> Progress<'a> {
             How::Silent => {}
             How::Bar { bar, .. } => {
                 bar.disable_steady_tick();
+                bar.set_position(0);
                 bar.reset_eta();
                 bar.set_message(doing);
                 bar.set_style(style("{prefix}: {msg} [{wide_bar}] {percent:>3} %  {elapsed} (ETA {eta})"));

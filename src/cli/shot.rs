@@ -209,14 +209,15 @@ impl Prepared<'_> {
     fn draw(&self, mut times: Times, profile: &mut Profile, so_far: &mut SoFar) -> Exit {
         let Task { job, messages, progress, batch } = *self.task;
         let Self { shot, effective, loaded, work, .. } = self;
+        // Until the picture is written the first signal ends no more than its rays.
+        let _guard = job.keep_partial.then(interrupt::Guard::new);
         let mut rendered = self.trace(&mut times, profile);
-        let costs = rendered.complete.then(|| self.costs());
+        let costs = rendered.complete.then(|| self.costs(&rendered));
         progress.finish();
-        let Some(costs) = costs.flatten() else { return self.keep_partial(&rendered) };
+        let Some((costs, counted)) = costs.flatten() else { return self.keep_partial(&rendered) };
         if let Some(layers) = &mut rendered.picture.layers {
             cost_layers::add_channels(job, &costs, layers);
         }
-        let counted = job.stats.is_some().then(|| stats::count(work, &rendered, work.accel, messages));
 
         let (depth, accel) = (rendered.depth, work.accel.kind());
         let (sampled, reason) = (&rendered.sampled, self.reason);
@@ -240,15 +241,25 @@ impl Prepared<'_> {
         profile.iter().for_each(|p| p.say(messages));
         so_far.pictures.push(self.stats(&facts, times, counted, profile.as_ref()));
         match cost_layers::write_maps(job, shot, effective.settings.width, &costs, accel, messages) {
-            Ok(()) => Exit::Done,
+            Ok(()) => self.judge(counted.as_ref()),
             Err(fault) => self.task.fail(&fault, Exit::Failed),
         }
+    }
+
+    /// Whether the counts are those of the picture.
+    fn judge(&self, counted: Option<&Counted>) -> Exit {
+        if counted.is_none_or(|counted| counted.same) {
+            return Exit::Done;
+        }
+        let accel = self.work.accel.kind();
+        let text = format!("the counted run with {accel} gave other pixels than the timed one");
+        self.task.messages.error("counts-differ", text, "please report it with the model");
+        Exit::Failed
     }
 
     fn trace(&self, times: &mut Times, profile: &mut Profile) -> Rendered {
         let Task { job, progress, .. } = *self.task;
         progress.begin("rendering");
-        let _guard = job.keep_partial.then(interrupt::Guard::new);
         let start = Instant::now();
         let rendered = if job.profile {
             let (rendered, parts) = crate::render::render_profiled(&self.work, progress);
@@ -261,15 +272,20 @@ impl Prepared<'_> {
         rendered
     }
 
-    /// What each pixel cost, in passes behind the picture's own; `None` when the user gave up.
-    fn costs(&self) -> Option<Costs> {
+    /// What each pixel cost, and the counts of all for statistics, in passes behind the picture's own; `None` when the user
+    /// gave up.
+    fn costs(&self, rendered: &Rendered) -> Option<(Costs, Option<Counted>)> {
         let Task { job, progress, .. } = *self.task;
-        let wanted = cost_layers::wanted(job);
-        if wanted.is_empty() {
-            return Some(Costs::default());
+        let (mut costs, wanted) = (Costs::default(), cost_layers::wanted(job));
+        if !wanted.is_empty() {
+            progress.begin("counting");
+            costs = render_costs(&self.work, &wanted, progress)?;
+        }
+        if job.stats.is_none() {
+            return Some((costs, None));
         }
         progress.begin("counting");
-        render_costs(&self.work, &wanted, progress)
+        Some((costs, Some(stats::count(&self.work, rendered, progress)?)))
     }
 
     fn stats(
@@ -294,7 +310,8 @@ impl Prepared<'_> {
         match bytes.and_then(|bytes| picture::write(&partial, &bytes)) {
             Ok(()) => {
                 let path = partial.target.path().unwrap_or(Path::new("-"));
-                messages.info("partial", format!("interrupted; the tiles that were done are in {}", path.display()));
+                let what = if rendered.complete { "the picture is" } else { "the tiles that were done are" };
+                messages.info("partial", format!("interrupted; {what} in {}", path.display()));
             }
             Err(picture::WriteError::Fault(fault)) => messages.say(Severity::Error, &fault),
             Err(picture::WriteError::BrokenPipe) => {}

@@ -30,8 +30,8 @@ use super::job::RenderJob;
 use super::message::Messages;
 use super::profile::Profile;
 use super::sampling;
-use crate::accel::{AccelKind, AccelParams, AnyAccel, RayCounts, StructureStats};
-use crate::render::{CLASS_NAMES, ClassCounts, Job, Rendered, Sampling, World};
+use crate::accel::{AccelKind, AccelParams, RayCounts, StructureStats};
+use crate::render::{CLASS_NAMES, ClassCounts, Job, Progress, Rendered, Sampling, World};
 use serde_json::{Value, json};
 use std::io;
 use std::time::Instant;
@@ -89,18 +89,20 @@ pub(super) struct Counted {
     pub seconds: f64,
     /// Prims of all kinds.
     pub prims: u64,
+    /// Whether it gave the pixels of the timed run; otherwise it counted another picture.
+    pub same: bool,
 }
 
-/// Renders once more, counting; complains when the pixels differ, because then the counts belong to another picture.
-pub(super) fn count(work: &Job, timed: &Rendered, accel: &AnyAccel, messages: &Messages) -> Counted {
+/// Renders once more, counting. `None` when the user gave up.
+pub(super) fn count(work: &Job, timed: &Rendered, progress: &dyn Progress) -> Option<Counted> {
     let start = Instant::now();
-    let counted = crate::render::render_counted(work, &());
-    if counted.picture != timed.picture {
-        let text = format!("the counted run with {} gave other pixels than the timed one", accel.kind());
-        messages.error("counts-differ", text, "please report it with the model");
-    }
-    let prims = work.world.len() as u64;
-    Counted { counts: counted.counts, seconds: start.elapsed().as_secs_f64(), prims }
+    let counted = crate::render::render_counted(work, progress);
+    counted.complete.then(|| Counted {
+        counts: counted.counts,
+        seconds: start.elapsed().as_secs_f64(),
+        prims: work.world.len() as u64,
+        same: counted.picture == timed.picture,
+    })
 }
 
 impl Counted {
@@ -299,6 +301,12 @@ pub(super) fn report(job: &RenderJob, pictures: &[PictureStats], messages: &Mess
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::accel::AnyAccel;
+    use crate::math::DVec3;
+    use crate::render::texture::TextureStore;
+    use crate::render::view::Lens;
+    use crate::render::{Settings, View, render};
+    use crate::scene::{Material, Scene, Sphere};
 
     #[test]
     fn times_have_units_that_fit() {
@@ -307,10 +315,29 @@ mod tests {
     }
 
     #[test]
+    fn a_counted_run_with_other_pixels_is_told_from_one_with_the_same() {
+        let scene = Scene {
+            spheres: vec![Sphere { name: String::new(), center: DVec3::ZERO, radius: 1.0, material: 0 }],
+            materials: vec![Material::plain()],
+            ..Scene::default()
+        };
+        let world = World::new(&scene);
+        let accel = AnyAccel::build(AccelKind::None, &world.shapes, &AccelParams::DEFAULT);
+        let textures = TextureStore::new(&scene);
+        let view = View::look_at(DVec3::Z * 9.0, DVec3::ZERO, DVec3::Y, Lens::orthographic(3.0));
+        let settings = &Settings { width: 8, height: 6, ..Settings::default() };
+        let job = Job { scene: &scene, world: &world, accel: &accel, textures: &textures, view: &view, settings };
+        let mut timed = render(&job, &());
+        assert!(count(&job, &timed, &()).unwrap().same);
+        timed.picture.beauty[0][0] += 0.25;
+        assert!(!count(&job, &timed, &()).unwrap().same);
+    }
+
+    #[test]
     fn counts_per_ray_are_totals_divided_by_the_rays_asked() {
         let primary = RayCounts { queries: 4, found: 2, n_it: 10, ..RayCounts::default() };
         let counts = ClassCounts { primary, shadow: primary, ..ClassCounts::default() };
-        let json = Counted { counts, seconds: 0.0, prims: 10 }.json();
+        let json = Counted { counts, seconds: 0.0, prims: 10, same: true }.json();
         assert_eq!((&json["primary"]["n_it"], &json["all"]["tests"]), (&2.5.into(), &20.into()));
         assert_eq!(json["all"]["culled"], 0.75);
         assert_eq!(json["reflected"]["n_it"], 0.0, "no ray is no division by zero");

@@ -111,9 +111,13 @@ impl Costs {
 /// ray's walk takes is its class's, and all else is `ms.shading`.
 pub fn render_costs(job: &Job, wanted: &[Cost], progress: &dyn Progress) -> Option<Costs> {
     let mut costs = Costs::default();
-    if wanted.iter().any(|&c| c != Cost::Ms) {
+    let (counting, timing) = (wanted.iter().any(|&c| c != Cost::Ms), wanted.contains(&Cost::Ms));
+    let first = usize::from(counting);
+    let passes = first + if timing { TIMED } else { 0 };
+    if counting {
+        let progress = Pass { all: progress, number: 0, passes };
         let counts: Vec<[PixelCounts; 4]> =
-            pass(job, progress, Together::Wave, |classes: &mut ByClass<SampleCounts>, samples| {
+            pass(job, &progress, Together::Wave, |classes: &mut ByClass<SampleCounts>, samples| {
                 let [a, b, c, d] = classes.each_mut().map(|class| class.by_pixel(samples));
                 a.into_iter().zip(b).zip(c).zip(d).map(|(((a, b), c), d)| [a, b, c, d]).collect()
             })?;
@@ -124,28 +128,47 @@ pub fn render_costs(job: &Job, wanted: &[Cost], progress: &dyn Progress) -> Opti
             }
         }
     }
-    if wanted.contains(&Cost::Ms) {
+    if timing {
         let [a, b, c, d] = CLASS_NAMES;
-        costs.push(Cost::Ms, [a, b, c, d, SHADING], &times(job, progress)?, Values::F32);
+        let times = times(job, |number| Pass { all: progress, number: first + number, passes })?;
+        costs.push(Cost::Ms, [a, b, c, d, SHADING], &times, Values::F32);
     }
     Some(costs)
 }
 
+/// The progress of one of several passes over the picture, as a part of them all.
+struct Pass<'a> {
+    all: &'a dyn Progress,
+    /// From 0.
+    number: usize,
+    passes: usize,
+}
+
+impl Progress for Pass<'_> {
+    fn tiles(&self, done: usize, total: usize) {
+        self.all.tiles(self.number * total + done, self.passes * total);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.all.cancelled()
+    }
+}
+
 /// Times of each pixel by class, and of its shading: those of the pass in which it took least.
-fn times(job: &Job, progress: &dyn Progress) -> Option<Vec<[f32; 5]>> {
-    let timed = || {
+fn times<'p>(job: &Job, progress: impl Fn(usize) -> Pass<'p>) -> Option<Vec<[f32; 5]>> {
+    let timed = |number| {
         let pixel = |classes: &mut ByClass<Clock>, _: usize| vec![milliseconds(classes)];
-        pass(job, progress, Together::Pixel, pixel)
+        pass(job, &progress(number), Together::Pixel, pixel)
     };
-    let mut least = timed()?;
-    for _ in 1..TIMED {
+    let mut least = timed(0)?;
+    for number in 1..TIMED {
         let sum = |times: &[f32; 5]| times.iter().sum::<f32>();
         let shorter = |(least, times): (&mut [f32; 5], [f32; 5])| {
             if sum(&times) < sum(least) {
                 *least = times;
             }
         };
-        least.iter_mut().zip(timed()?).for_each(shorter);
+        least.iter_mut().zip(timed(number)?).for_each(shorter);
     }
     Some(least)
 }

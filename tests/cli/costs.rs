@@ -13,6 +13,7 @@ fn counts_lie_beside_the_other_layers_and_add_up_to_the_statistics() {
     let folder = Folder::with_cube();
     let run =
         folder.render(&["cube.obj", "-o", "a.exr", "--layers", "tests,steps", "--float", "--stats", "json"]).ends(0);
+    assert!(run.errors().is_empty(), "{}", run.stderr);
     let stats: Value = serde_json::from_str(run.text()).unwrap();
     folder.render(&["cube.obj", "-o", "b.exr", "--float", "--layers"]).ends(0);
     let (with, without) = (picture(&folder.path("a.exr")), picture(&folder.path("b.exr")));

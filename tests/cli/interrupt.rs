@@ -54,6 +54,18 @@ fn what_is_done_is_kept_when_asked_for() {
 }
 
 #[test]
+fn a_picture_is_kept_whose_costs_are_being_counted() {
+    let folder = Folder::with_cube();
+    // Rays of the picture go together, those that are timed one by one, three times.
+    let words =
+        ["render", "cube.obj", "--size", "1500x1500", "--quality", "draft", "--heatmap", "ms", "--keep-partial"];
+    let (status, time) = interrupted_after(&folder, &words, 5.0);
+    assert_eq!(status.code(), Some(130));
+    assert!(time < PATIENCE, "{time:?}");
+    assert_eq!(folder.names(), ["cube.obj", "cube.partial.png"]);
+}
+
+#[test]
 fn a_file_that_is_being_written_when_the_signal_comes_is_finished() {
     let folder = Folder::new();
     let mut child = start(&folder, &["generate", "tetra", "--size", "4e6", "-o", "tetra.glb"]);

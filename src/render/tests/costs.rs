@@ -72,3 +72,24 @@ fn who_gives_up_gets_no_costs() {
     let s = busy();
     assert_eq!(s.with_job(AccelKind::Bvh, |job| render_costs(job, &[Cost::Tests], &GivesUp)), None);
 }
+
+#[test]
+fn progress_runs_once_over_all_passes() {
+    #[derive(Default)]
+    struct Told(std::sync::Mutex<Vec<(usize, usize)>>);
+    impl crate::render::Progress for Told {
+        fn tiles(&self, done: usize, total: usize) {
+            self.0.lock().expect("nobody panics").push((done, total));
+        }
+        fn cancelled(&self) -> bool {
+            false
+        }
+    }
+    let (s, told) = (busy(), Told::default());
+    s.with_job(AccelKind::Bvh, |job| render_costs(job, &Cost::ALL, &told)).expect("nobody gives up");
+    let mut told = told.0.into_inner().expect("nobody panics");
+    told.sort_unstable();
+    let total = told[0].1;
+    assert!(total >= 4, "a tile at least in each of four passes");
+    assert_eq!(told, (1..=total).map(|done| (done, total)).collect::<Vec<_>>());
+}
