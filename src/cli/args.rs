@@ -302,7 +302,8 @@ pub(super) struct RenderArgs {
     /// Print where the time went: reading, parsing, building, each class of rays, shading, writing; wall and CPU
     #[arg(long, help_heading = "Run", hide_short_help = true)]
     pub profile: bool,
-    /// Write the statistics to a file instead of standard output
+    /// Write the statistics, or what --dry-run foretells, to a file instead of standard output; it stays as it is when there
+    /// are none
     #[arg(long, value_name = "PATH", help_heading = "Run", hide_short_help = true)]
     pub stats_file: Option<PathBuf>,
     /// How messages are written to standard error

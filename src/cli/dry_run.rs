@@ -7,17 +7,16 @@
 //! confidence; `memory` (bytes; null where the system does not tell). Keys are only ever added.
 
 use super::args::StatsFormat;
-use super::print;
 use crate::bench::report::number::{bytes, seconds, short};
 use crate::render::{Forecast, Interval, Job};
 use crate::stopwatch::peak_memory;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Prints what was foretold.
-pub(super) fn say(file: &Path, work: &Job, forecast: &Forecast, format: Option<StatsFormat>) -> std::io::Result<()> {
+/// What was foretold of one picture.
+pub(super) fn told(file: &Path, work: &Job, forecast: &Forecast, format: Option<StatsFormat>) -> String {
     let told = Told { file, work, forecast, memory: memory(work) };
-    print(&if format == Some(StatsFormat::Json) { told.json() } else { told.text() })
+    if format == Some(StatsFormat::Json) { told.json() } else { told.text() }
 }
 
 struct Told<'a> {

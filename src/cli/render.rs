@@ -31,7 +31,8 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
             return Exit::Failed;
         }
     };
-    let mut so_far = SoFar { sources: Sources::of(job.batches.iter().flat_map(|b| &b.inputs)), pictures: Vec::new() };
+    let sources = Sources::of(job.batches.iter().flat_map(|b| &b.inputs));
+    let mut so_far = SoFar { sources, pictures: Vec::new(), foretold: Vec::new() };
     if let Some(path) = job.stats_file()
         && let Err(fault) = writable::check(path, "--stats-file", &so_far.sources)
     {
@@ -61,12 +62,18 @@ pub(super) struct SoFar {
     pub sources: Sources,
     /// Statistics of each.
     pub pictures: Vec<PictureStats>,
+    /// What was foretold of each, where that goes to a file.
+    pub foretold: Vec<String>,
 }
 
-/// Prints or writes the statistics, but never over what a model was read from.
+/// Prints or writes the statistics, if there are any, but never over what a model was read from.
 fn report(job: &RenderJob, so_far: &SoFar, messages: &Messages) -> Exit {
+    let text = if job.dry_run { so_far.foretold.concat() } else { stats::text(job, &so_far.pictures) };
+    if text.is_empty() {
+        return Exit::Done;
+    }
     match job.stats_file().map_or(Ok(()), |path| so_far.sources.spared_by(path, "--stats-file")) {
-        Ok(()) => stats::report(job, &so_far.pictures, messages),
+        Ok(()) => stats::report(job, &text, messages),
         // It was said when that model was loaded.
         Err(_) => Exit::Failed,
     }

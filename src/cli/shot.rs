@@ -12,7 +12,7 @@ use super::render::SoFar;
 use super::sequence::{self, Survey};
 use super::stats::{self, Counted, PictureStats, Times};
 use super::summary::Summary;
-use super::{again, cost_layers, dry_run, interrupt, surroundings};
+use super::{again, cost_layers, dry_run, interrupt, print, surroundings};
 use crate::accel::AnyAccel;
 use crate::accel::auto::Reason;
 use crate::image::FileKind;
@@ -168,7 +168,7 @@ pub(super) fn render(task: &Task, shot: &Shot, stage: &mut Stage, so_far: &mut S
         let work = Job { settings: &effective.settings, scene, world, accel, textures: &textures, view: &view };
         let (effective, reason, phrase) = (&effective, *reason, phrase.as_str());
         let prepared = Prepared { task, shot, effective, loaded, bounds, work, reason, phrase, light };
-        if job.dry_run { prepared.foretell() } else { prepared.draw(times, profile, so_far) }
+        if job.dry_run { prepared.foretell(so_far) } else { prepared.draw(times, profile, so_far) }
     }))
 }
 
@@ -188,20 +188,24 @@ struct Prepared<'a> {
 }
 
 impl Prepared<'_> {
-    /// Says what the picture would take.
-    fn foretell(&self) -> Exit {
+    /// Says what the picture would take, or keeps it for the file of the statistics.
+    fn foretell(&self, so_far: &mut SoFar) -> Exit {
         let Task { job, messages, progress, .. } = *self.task;
         progress.begin("looking");
         let found = crate::render::forecast(&self.work, progress);
         progress.finish();
-        let format = job.stats.as_ref().map(|stats| stats.format);
-        match found.map(|forecast| dry_run::say(self.task.file(), &self.work, &forecast, format)) {
-            Some(Ok(())) => Exit::Done,
-            Some(Err(e)) => {
+        let Some(forecast) = found else { return Exit::Interrupted };
+        let told = dry_run::told(self.task.file(), &self.work, &forecast, job.stats.as_ref().map(|stats| stats.format));
+        if job.stats_file().is_some() {
+            so_far.foretold.push(told);
+            return Exit::Done;
+        }
+        match print(&told) {
+            Ok(()) => Exit::Done,
+            Err(e) => {
                 messages.error("output-unwritable", format!("standard output: {e}"), "");
                 Exit::Failed
             }
-            None => Exit::Interrupted,
         }
     }
 

@@ -277,15 +277,20 @@ fn count_table(counted: &Counted) -> Vec<String> {
     lines
 }
 
-/// Prints or writes the statistics of all pictures, if they were asked for.
-pub(super) fn report(job: &RenderJob, pictures: &[PictureStats], messages: &Messages) -> Exit {
-    let Some(wanted) = &job.stats else { return Exit::Done };
-    let text = match wanted.format {
-        StatsFormat::Json => pictures.iter().map(|p| format!("{}\n", p.json)).collect(),
-        StatsFormat::Text => pictures.iter().map(PictureStats::text).collect::<Vec<_>>().join("\n") + "\n",
+/// The statistics of all pictures, if they were asked for; empty where there are none.
+pub(super) fn text(job: &RenderJob, pictures: &[PictureStats]) -> String {
+    let line = |picture: &PictureStats| match job.stats.as_ref().map(|stats| stats.format) {
+        Some(StatsFormat::Json) => format!("{}\n", picture.json),
+        Some(StatsFormat::Text) => picture.text() + "\n",
+        None => String::new(),
     };
-    let result = match &wanted.file {
-        None => super::print(&text),
+    pictures.iter().map(line).collect()
+}
+
+/// Prints the statistics, or writes them to the file that was named.
+pub(super) fn report(job: &RenderJob, text: &str, messages: &Messages) -> Exit {
+    let result = match job.stats_file() {
+        None => super::print(text),
         Some(path) => interrupt::write_atomic(path, text.as_bytes())
             .map_err(|e| io::Error::new(e.kind(), format!("{}: {e}", path.display()))),
     };

@@ -88,6 +88,21 @@ fn statistics_replace_neither_the_model_nor_its_files_nor_a_picture() {
 }
 
 #[test]
+fn earlier_statistics_stay_when_no_picture_was_made_and_a_forecast_goes_to_their_file() {
+    let folder = Folder::with_cube().file("s.json", "earlier");
+    folder.render(&["gone.obj", "--stats", "json", "--stats-file", "s.json"]).ends(1);
+    assert_eq!(folder.read("s.json"), b"earlier");
+    for format in ["text", "json"] {
+        let words = ["cube.obj", "--dry-run", "--stats", format];
+        let shown = folder.render(&words).ends(0);
+        assert!(!shown.text().ends_with("\n\n") && shown.text().contains("rays"), "{}", shown.text());
+        let run = folder.render(&[&words[..], &["--stats-file", "s.json"]].concat()).ends(0);
+        assert!(run.stdout.is_empty() && String::from_utf8(folder.read("s.json")).unwrap().contains("rays"));
+    }
+    assert_eq!(folder.names(), ["cube.obj", "s.json"]);
+}
+
+#[test]
 fn two_inputs_with_one_name_are_an_error_before_any_work() {
     let folder = Folder::new().file("a/cube.obj", CUBE).file("b/cube.obj", CUBE);
     folder.render(&["a/cube.obj", "b/cube.obj"]).ends(2).says(&["cube.png", "a/cube.obj", "b/cube.obj"]);
