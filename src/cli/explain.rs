@@ -50,9 +50,7 @@ struct Told<'a> {
 
 fn judge(args: &ExplainArgs, params: AccelParams, name: &str, messages: &Messages) -> Result<Exit, Exit> {
     let Seen { loaded, world, view, phrase } = seen::model(&args.model, &args.eye, args.size, messages)?;
-    let (width, height) = args.size;
-    let depth = args.depth.or(loaded.scene.hints.depth);
-    let settings = Settings { width, height, samples: 1, depth, ..Settings::default() };
+    let settings = Settings { samples: 1, ..seen::settings(args.size, args.depth, &loaded.scene.hints) };
     let (accel, _) = auto::build(args.accel, &world.shapes, &params);
     let kind = accel.kind();
     let case = Case { scene: loaded.scene, view, settings, accel: kind, params };

@@ -69,6 +69,11 @@ pub(super) fn exposure(job: &Job) -> Option<f32> {
     (!FINE.contains(&bright)).then(|| (libm::log2f(BRIGHT / bright) * 10.0).round() / 10.0)
 }
 
+/// What is said of an exposure that was found.
+pub(super) fn phrase(stops: f32) -> String {
+    format!("exposure {stops:+.1} stops (metered)")
+}
+
 /// What all but [`ABOVE`] of the model's pixels are at most as bright as; `None` where nothing is lit.
 fn bright(picture: &Picture) -> Option<f32> {
     let prims = &picture.layers.as_ref()?.prim;

@@ -6,7 +6,8 @@ use super::exit::Exit;
 use super::message::{Messages, Severity};
 use super::read;
 use crate::load::{Diagnostic, Loaded};
-use crate::render::{View, World};
+use crate::render::{Settings, View, World};
+use crate::scene::RenderHints;
 use crate::scene::default_light;
 use crate::scene::framing::robust_bounds;
 
@@ -18,6 +19,12 @@ pub(super) struct Seen {
     pub view: View,
     /// What view that is, in words.
     pub phrase: String,
+}
+
+/// The settings of a picture of that many columns and rows: as typed, as the scene's file says, or as usual.
+pub(super) fn settings((width, height): (u32, u32), depth: Option<u32>, hints: &RenderHints) -> Settings {
+    let usual = Settings::default();
+    Settings { width, height, depth: depth.or(hints.depth), cutoff: hints.cutoff.unwrap_or(usual.cutoff), ..usual }
 }
 
 /// Loads a model for a picture of that many columns and rows; what is wrong with it is said.

@@ -6,14 +6,14 @@ use super::job::Wrong;
 use super::message::{Messages, Severity};
 use super::seen::{self, Seen};
 use super::writable::{self, Sources};
-use super::{accident, interrupt, print};
+use super::{accident, interrupt, meter, print};
 use crate::accel::{AccelParams, auto};
 use crate::bench::study::report::{Format, text};
 use crate::bench::study::{Plan, Study, Subject, measure, reference, settings};
 use crate::image::Output;
 use crate::load::Diagnostic;
-use crate::render::Settings;
 use crate::render::texture::TextureStore;
+use crate::render::{Job, Settings};
 use crate::threads;
 use std::path::{Path, PathBuf};
 
@@ -49,9 +49,8 @@ fn study(args: &StudyArgs, files: &[(PathBuf, Format)], name: &str, messages: &M
         messages.say(Severity::Error, &fault);
         Exit::Failed
     })?;
-    let (width, height) = args.size;
     let hints = &loaded.scene.hints;
-    let base = Settings { width, height, depth: hints.depth, seed: args.seed, ..Settings::default() };
+    let base = Settings { seed: args.seed, ..seen::settings(args.size, None, hints) };
     let tone_map = match hints.tone_map.as_deref().map(str::parse).transpose() {
         Ok(hinted) => args.tone_map.or(hinted).unwrap_or_default(),
         Err(e) => {
@@ -60,10 +59,16 @@ fn study(args: &StudyArgs, files: &[(PathBuf, Format)], name: &str, messages: &M
             return Err(Exit::Input);
         }
     };
-    let exposure = args.exposure.or(hints.exposure).unwrap_or(0.0);
-    let output = Output { tone_map, exposure, ..Output::default() };
     let (accel, _) = auto::build(args.accel, &world.shapes, &AccelParams::DEFAULT);
     let textures = TextureStore::new(&loaded.scene);
+    let given = args.exposure.or(hints.exposure);
+    let metered = given.is_none().then(|| {
+        let (scene, settings) = (&loaded.scene, &base);
+        meter::exposure(&Job { scene, world: &world, accel: &accel, textures: &textures, view: &view, settings })
+    });
+    let metered = metered.flatten();
+    let output = Output { tone_map, exposure: given.or(metered).unwrap_or(0.0), ..Output::default() };
+    let phrase = metered.map_or(phrase.clone(), |stops| format!("{phrase}, {}", meter::phrase(stops)));
     let subject = Subject {
         scene: &loaded.scene,
         world: &world,
@@ -83,7 +88,7 @@ fn study(args: &StudyArgs, files: &[(PathBuf, Format)], name: &str, messages: &M
         name: name.to_owned(),
         hash: loaded.facts.hash,
         view: phrase,
-        size: (width, height),
+        size: args.size,
         threads: rayon::current_num_threads(),
         plan,
         reference,

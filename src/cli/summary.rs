@@ -2,6 +2,7 @@
 
 use super::job::Shot;
 use super::message::{Messages, Severity};
+use super::meter;
 use super::picture::Effective;
 use super::sampling;
 use super::stats::Times;
@@ -57,7 +58,7 @@ impl Summary<'_> {
             parts.push(format!("light of {}", panorama.name));
         }
         if self.effective.metered && self.effective.output.exposure != 0.0 {
-            parts.push(format!("exposure {:+.1} stops (metered)", self.effective.output.exposure));
+            parts.push(meter::phrase(self.effective.output.exposure));
         }
         if self.bounds.strays > 0 {
             parts.push(format!("framing leaves out {} far-off faces", self.bounds.strays));

@@ -29,3 +29,33 @@ fn what_cannot_be_explained_is_refused() {
     folder.run(&["explain", "cube.obj", "--accel", "gird"]).ends(2);
     folder.run(&["explain", "cube.obj", "--camera", "9"]).ends(3).says(&["no camera"]);
 }
+
+#[test]
+fn the_cutoff_of_a_scene_file_counts_wherever_its_picture_is_judged() {
+    let mirror = |z: f64| {
+        format!(
+            "[[meshes]]\nmaterial = 'mirror'\npositions = [[-9, -9, {z}], [9, -9, {z}], [0, 9, {z}]]\nfaces = [[0, 1, 2]]\n"
+        )
+    };
+    let scene = format!(
+        "[render]\ncutoff = 0.6\ndepth = 5\n[[cameras]]\neye = [0, 0, 4]\nat = [1, 0, 0]\n\
+         [materials.mirror]\ndiffuse = 0.05\nmirror = 0.85\n{}{}",
+        mirror(-5.0),
+        mirror(5.0)
+    );
+    let folder = Folder::new().file("facing.toml", scene);
+    let words = ["facing.toml", "--size", "16x12"];
+    let json = |text: &[u8]| serde_json::from_slice::<Value>(text).unwrap();
+    let rendered = |more: &[&str]| {
+        let run = folder.run(&[&["render"], &words[..], &["--aa", "off", "--stats", "json"], more].concat());
+        json(&run.stdout)["counts"]["reflected"]["rays"].as_u64().unwrap()
+    };
+    let expected = rendered(&[]);
+    assert!((1..rendered(&["--cutoff", "0"])).contains(&expected));
+    let told = json(&folder.run(&[&["explain"], &words[..], &["--json"]].concat()).stdout);
+    assert_eq!(told["usual"]["reflected"]["rays"], expected);
+    folder
+        .run(&[&["bench"], &words[..], &["--accel", "bvh", "--passes", "0", "--report", "r.json", "-q"]].concat())
+        .ends(0);
+    assert_eq!(json(&folder.read("r.json"))["models"][0]["rays"]["reflected"]["asked"], expected);
+}

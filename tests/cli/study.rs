@@ -29,3 +29,26 @@ fn what_cannot_be_studied_is_told() {
     folder.run(&["study", "cube.obj", "--report", "a.txt"]).ends(2).says(&[".html"]);
     assert!(!folder.has("a.txt"));
 }
+
+#[test]
+fn measured_lamps_are_exposed_as_they_are_in_a_picture() {
+    // Nine little-endian floats: (-1, -1, 0), (1, -1, 0), (0, 1, 0).
+    let bytes = "AACAvwAAgL8AAAAAAACAPwAAgL8AAAAAAAAAAAAAgD8AAAAA";
+    let lit = format!(
+        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0,1]}}],
+        "nodes":[{{"mesh":0}},{{"translation":[0,0,2],"extensions":{{"KHR_lights_punctual":{{"light":0}}}}}}],
+        "extensionsUsed":["KHR_lights_punctual"],
+        "extensions":{{"KHR_lights_punctual":{{"lights":[{{"type":"point","intensity":3000}}]}}}},
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}}}}]}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[-1,-1,0],"max":[1,1,0]}}],
+        "bufferViews":[{{"buffer":0,"byteLength":36}}],
+        "buffers":[{{"byteLength":36,"uri":"data:application/octet-stream;base64,{bytes}"}}]}}"#
+    );
+    let folder = Folder::new().file("lit.gltf", lit);
+    let said = folder.run(&["render", "lit.gltf", "--size", "24x18"]).ends(0).stderr;
+    let exposure = said.split(", ").find(|part| part.contains("(metered)")).unwrap().lines().next().unwrap();
+    let words = ["study", "lit.gltf", "--size", "24x18", "--passes", "2", "--reference-samples", "64", "-q"];
+    let run = folder.run(&words).ends(0);
+    assert!(run.text().contains(exposure), "{exposure}\n{}", run.text());
+    assert!(!folder.run(&[&words[..], &["--exposure", "1"]].concat()).ends(0).text().contains("metered"));
+}

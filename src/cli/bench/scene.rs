@@ -3,7 +3,7 @@
 use super::super::camera::{self, Choice};
 use super::super::exit::Exit;
 use super::super::message::{Messages, Severity};
-use super::super::read;
+use super::super::{read, seen};
 use super::args::BenchArgs;
 use crate::accel::{AccelKind, AccelParams, AnyAccel};
 use crate::bench::pruning::Pruning;
@@ -97,14 +97,8 @@ impl Prepared {
             Exit::Input
         })?;
         default_light::add_if_missing(&mut loaded.scene, &camera);
-        let settings = Settings {
-            width,
-            height,
-            samples: args.samples,
-            depth: args.depth.or(loaded.scene.hints.depth),
-            seed: args.seed,
-            ..Settings::default()
-        };
+        let usual = seen::settings(args.size, args.depth, &loaded.scene.hints);
+        let settings = Settings { samples: args.samples, seed: args.seed, ..usual };
         let view = View::from_camera(&camera);
         Ok(Self { loaded, world, settings, view_phrase, view })
     }
