@@ -76,12 +76,13 @@ impl LensChoice {
         }
     }
 
-    /// The lens itself; `model` is the height that shows the whole model.
-    fn projection(self, aspect: f64, model: f64) -> Projection {
+    /// The lens itself; `radius` is that of a ball around the model, all of which parallel rays see unless they are given a
+    /// height.
+    fn projection(self, aspect: f64, radius: f64) -> Projection {
         match self {
             Self::Fov(y_fov) => Projection::Perspective { y_fov, aspect: None },
             Self::Ortho(height) => {
-                let y_mag = height.unwrap_or(model) * 0.5;
+                let y_mag = height.map_or(radius / aspect.min(1.0), |height| height * 0.5);
                 Projection::Orthographic { x_mag: y_mag * aspect, y_mag }
             }
         }
@@ -135,7 +136,7 @@ impl Shown<'_> {
         framed: Option<Camera>,
     ) -> Result<(Camera, String), Diagnostic> {
         let Self { choice, lens, aspect, file } = *self;
-        let model_height = 2.0 * bounds.radius();
+        let radius = bounds.radius();
         let is_framed = framed.is_some();
         let (mut camera, phrase) = match (choice, framed) {
             (Choice::Named(view), Some(framed)) => (framed, format!("{view} view")),
@@ -150,14 +151,14 @@ impl Shown<'_> {
                 let upright = if scene.up == UpAxis::Z { DVec3::Z } else { DVec3::Y };
                 let world_from_camera = Camera::look_at(*eye, at.unwrap_or(bounds.center()), up.unwrap_or(upright));
                 let lens = lens.unwrap_or(LensChoice::Fov(DEFAULT_FOV));
-                let projection = lens.projection(aspect, model_height);
+                let projection = lens.projection(aspect, radius);
                 (Camera { name: String::new(), projection, world_from_camera }, "given eye".to_owned())
             }
         };
         // Framed cameras have the chosen lens already, but for a height of the user's own.
         match lens {
             Some(LensChoice::Ortho(None)) | Some(LensChoice::Fov(_)) if is_framed => {}
-            Some(lens) => camera.projection = lens.projection(aspect, model_height),
+            Some(lens) => camera.projection = lens.projection(aspect, radius),
             None => {}
         }
         Ok((camera, phrase))
@@ -234,6 +235,13 @@ mod tests {
         assert!(pick(Choice::Camera("1".into()), None).is_ok());
         let error = pick(Choice::Camera("Frnt".into()), None).unwrap_err().to_string();
         assert_eq!(error, "a.glb: no camera is called 'Frnt'; did you mean 'Front'? there are, from 0: `Front`, `1`");
+    }
+
+    #[test]
+    fn parallel_rays_see_the_whole_model_in_an_upright_picture_too() {
+        let [wide, upright] = [2.0, 0.5].map(|aspect| LensChoice::Ortho(None).projection(aspect, 3.0));
+        assert_eq!(wide, Projection::Orthographic { x_mag: 6.0, y_mag: 3.0 });
+        assert_eq!(upright, Projection::Orthographic { x_mag: 3.0, y_mag: 6.0 });
     }
 
     #[test]
