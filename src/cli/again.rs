@@ -361,6 +361,7 @@ fn with_typed(pixels: RenderArgs, inputs: Vec<PathBuf>, typed: &RenderArgs) -> R
         heatmap_max: typed.heatmap_max,
         strict: typed.strict,
         threads: typed.threads,
+        profile: typed.profile,
         stats: typed.stats,
         stats_file: typed.stats_file.clone(),
         messages: typed.messages,
@@ -395,9 +396,10 @@ mod tests {
 
     #[test]
     fn every_flag_that_shapes_pixels_is_stored_and_cannot_be_typed_beside_again() {
-        // Where files may lie, what may be taken and how it ends, and a name for settings that are stored one by one.
-        const EXEMPT: [&str; 4] = ["root", "max-memory", "strict", "quality"];
-        const SHAPING: [&str; 5] = ["Loading", "Animation", "Camera", "Light and background", "Quality"];
+        // Where files may lie, what may be taken and how it ends, a name for settings that are stored one by one, and how what
+        // is shown several times is stored.
+        const EXEMPT: [&str; 5] = ["root", "max-memory", "strict", "quality", "instances"];
+        const SHAPING: [&str; 6] = ["Loading", "Animation", "Camera", "Light and background", "Quality", "Structure"];
         let command = Cli::command();
         let render = command.find_subcommand("render").unwrap();
         let again = render.get_arguments().find(|a| a.get_id() == "again").unwrap();
@@ -408,6 +410,27 @@ mod tests {
             let is_refused = refused.iter().any(|other| other.get_id() == flag.get_id());
             assert!(is_refused || !FLAGS.contains(&name), "{name}");
         }
+    }
+
+    #[test]
+    fn every_other_flag_that_may_be_typed_beside_again_is_carried_on() {
+        let words = "meshray render a.obj --output b.png --heatmap tests --heatmap-max 5 --keep-partial --root . \
+                     --max-memory 1G --strict --instances flatten --no-prune --threads 3 --stats json --stats-file s.json \
+                     --profile --messages json --quiet";
+        let command = Cli::command();
+        let render = command.find_subcommand("render").unwrap();
+        let refused = render.get_arg_conflicts_with(render.get_arguments().find(|a| a.get_id() == "again").unwrap());
+        for flag in render.get_opts().filter(|flag| !refused.contains(flag) && flag.get_id() != "again") {
+            let name = format!("--{}", flag.get_long().unwrap());
+            assert!(words.split_whitespace().any(|word| word == name), "{name} is not tried");
+        }
+        let parsed = |words: &str| match Cli::try_parse_from(words.split_whitespace()).unwrap().command {
+            Command::Render(args) => *args,
+            other => panic!("{other:?}"),
+        };
+        let typed = parsed(words);
+        let carried = with_typed(parsed("meshray render a.obj"), typed.inputs.clone(), &typed);
+        assert_eq!(format!("{carried:?}"), format!("{typed:?}"));
     }
 
     #[test]

@@ -139,6 +139,8 @@ pub(super) struct RenderArgs {
         "filter", "error_space", "aa_split", "aa_threshold", "aa_depth", "aa_min_depth", "aperture", "focus", "depth", "cutoff", "seed", "scene", "variant", "animation", "time", "frame", "fps",
         "frames", "turntable",
         "polygons", "smooth", "line_width", "mtl", "allow_empty", "accel", "intersector",
+        "grid_density", "grid_resolution", "max_depth", "step_cost", "leaf_size", "grid_cells", "max_references", "assign",
+        "mailbox",
     ])]
     pub again: Option<PathBuf>,
 
