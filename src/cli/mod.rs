@@ -49,13 +49,13 @@ pub use exit::Exit;
 use args::{Cli, Command, RenderArgs};
 use clap::{Parser, Subcommand};
 use message::{Messages, Severity};
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::io::{self, Write};
 use std::path::Path;
 
 /// Runs the command line `words`, whose first is the program's name.
 pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
-    let words = with_joined_layers(with_render(words.into_iter().collect()));
+    let words = JOINED.iter().fold(with_render(words.into_iter().collect()), with_joined);
     let format = message::Format::asked_for(&words);
     let cli = match Cli::try_parse_from(words) {
         Ok(cli) => cli,
@@ -118,27 +118,36 @@ fn render_command(typed: &RenderArgs) -> Exit {
 
 /// Lets `meshray MODEL` stand for `meshray render MODEL`: when the first word is no command but looks like a file.
 fn with_render(mut words: Vec<OsString>) -> Vec<OsString> {
-    let Some(first) = words.get(1).and_then(|w| w.to_str()) else { return words };
-    let is_command = Command::has_subcommand(first) || first == "help";
+    let Some(first) = words.get(1) else { return words };
+    let is_command = first.to_str().is_some_and(|word| Command::has_subcommand(word) || word == "help");
     if !is_command && (is_file(first) || first == "-") {
         words.insert(1, "render".into());
     }
     words
 }
 
-fn is_file(word: &str) -> bool {
-    !word.starts_with('-') && (word.contains(['.', '/', '\\']) || Path::new(word).exists())
+fn is_file(word: &OsStr) -> bool {
+    let letters = word.as_encoded_bytes();
+    !letters.starts_with(b"-") && (letters.iter().any(|c| b"./\\".contains(c)) || Path::new(word).exists())
 }
 
+/// Flags that may stand alone, and which words behind one are its value.
+const JOINED: [(&str, fn(&OsStr) -> bool); 3] = [
+    // What is no list of costs is one that is mistyped, unless it is a file.
+    ("--layers", |word| word.to_str().is_some_and(|list| parse::costs(list).is_ok()) || !is_file(word)),
+    ("--ortho", |word| word.to_str().is_some_and(|height| parse::ortho(height).is_ok())),
+    ("--smooth", |word| word.to_str().is_some_and(|lean| parse::lean(lean).is_ok())),
+];
+
 /// Lets `--layers tests,steps` stand for `--layers=tests,steps`, while in `--layers ship.glb` the flag stands alone.
-fn with_joined_layers(mut words: Vec<OsString>) -> Vec<OsString> {
-    let alone = |w: &OsString| w.to_str().is_some_and(|w| !w.starts_with('-') && !is_file(w));
-    if let Some(at) = words.iter().position(|w| w == "--layers")
-        && words.get(at + 1).is_some_and(alone)
+fn with_joined(mut words: Vec<OsString>, (flag, is_value): &(&str, fn(&OsStr) -> bool)) -> Vec<OsString> {
+    let flags = words.iter().position(|word| word == "--").unwrap_or(words.len());
+    if let Some(at) = words[..flags].iter().position(|word| word == flag)
+        && words[..flags].get(at + 1).is_some_and(|word| !word.as_encoded_bytes().starts_with(b"-") && is_value(word))
     {
-        let list = words.remove(at + 1);
+        let value = words.remove(at + 1);
         words[at].push("=");
-        words[at].push(list);
+        words[at].push(value);
     }
     words
 }
@@ -173,18 +182,35 @@ mod tests {
     }
 
     #[test]
-    fn layers_take_names_but_no_file() {
+    fn a_flag_that_may_stand_alone_takes_its_value_but_no_file() {
         let words = |line: &str| line.split(' ').map(OsString::from).collect::<Vec<_>>();
-        let joined = |line: &str| with_joined_layers(words(line));
-        assert_eq!(
-            joined("meshray render a.glb --layers tests,ms -q"),
-            words("meshray render a.glb --layers=tests,ms -q")
-        );
-        for line in
-            ["meshray render --layers a.glb", "meshray render a.glb --layers", "meshray render a.glb --layers -q"]
-        {
+        let joined = |line: &str| JOINED.iter().fold(words(line), with_joined);
+        for (line, expected) in [
+            ("meshray render a.glb --layers tests,ms -q", "meshray render a.glb --layers=tests,ms -q"),
+            ("meshray render a.glb --layers tets -q", "meshray render a.glb --layers=tets -q"),
+            ("meshray render --ortho 5 a.glb --smooth 60", "meshray render --ortho=5 a.glb --smooth=60"),
+            ("meshray trace a.glb --ortho auto", "meshray trace a.glb --ortho=auto"),
+        ] {
+            assert_eq!(joined(line), words(expected));
+        }
+        for line in [
+            "meshray render --layers a.glb",
+            "meshray render a.glb --layers",
+            "meshray render a.glb --layers -q",
+            "meshray render --ortho a.glb",
+            "meshray render -- --ortho 5",
+        ] {
             assert_eq!(joined(line), words(line));
         }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_model_whose_name_is_no_text_is_rendered_too() {
+        use std::os::unix::ffi::OsStringExt;
+        let model = OsString::from_vec(b"n\xff.glb".to_vec());
+        let words = with_render(vec!["meshray".into(), model.clone()]);
+        assert_eq!(words, ["meshray".into(), "render".into(), model]);
     }
 
     #[test]

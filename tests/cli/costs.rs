@@ -36,6 +36,9 @@ fn layers_of_costs_take_a_file_behind_them_for_a_file() {
     let folder = Folder::with_cube();
     folder.render(&["-o", "a.exr", "--layers", "cube.obj"]).ends(0);
     assert_eq!(channels(&picture(&folder.path("a.exr"))).len(), 0);
+    std::fs::create_dir(folder.path("tests")).unwrap();
+    folder.render(&["cube.obj", "-o", "a.exr", "--layers", "tests"]).ends(0);
+    assert_eq!(channels(&picture(&folder.path("a.exr"))).len(), 4, "a folder of that name is no model");
     folder.render(&["cube.obj", "-o", "a.exr", "--layers", "test"]).ends(2).says(&["tests, steps, mailbox, ms"]);
     folder.render(&["cube.obj", "-o", "a.png", "--layers", "tests"]).ends(2).says(&["EXR"]);
 }

@@ -67,16 +67,18 @@ fn a_picture_is_kept_whose_costs_are_being_counted() {
 
 #[test]
 fn a_file_that_is_being_written_when_the_signal_comes_is_finished() {
-    let folder = Folder::new();
-    let mut child = start(&folder, &["generate", "tetra", "--size", "4e6", "-o", "tetra.glb"]);
-    while folder.names().is_empty() {}
-    if child.try_wait().unwrap().is_none() {
-        signal(&child);
+    // Sometimes the file is finished before.
+    for _ in 0..5 {
+        let folder = Folder::new();
+        let mut child = start(&folder, &["generate", "tetra", "--size", "4e6", "-o", "tetra.glb"]);
+        while folder.names().is_empty() {}
+        if child.try_wait().unwrap().is_none() {
+            signal(&child);
+        }
+        let code = child.wait().unwrap().code();
+        assert!(matches!(code, Some(0 | 130)), "{code:?}");
+        assert_eq!(folder.names(), ["tetra.glb"]);
     }
-    // On a fast disk it may be done before.
-    let code = child.wait().unwrap().code();
-    assert!(matches!(code, Some(0 | 130)), "{code:?}");
-    assert_eq!(folder.names(), ["tetra.glb"]);
 }
 
 #[test]
