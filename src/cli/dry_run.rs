@@ -13,9 +13,9 @@ use crate::stopwatch::peak_memory;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// What was foretold of one picture.
-pub(super) fn told(file: &Path, work: &Job, forecast: &Forecast, format: Option<StatsFormat>) -> String {
-    let told = Told { file, work, forecast, memory: memory(work) };
+/// What was foretold of one picture, which by itself takes so many bytes of memory.
+pub(super) fn told(file: &Path, work: &Job, forecast: &Forecast, picture: u64, format: Option<StatsFormat>) -> String {
+    let told = Told { file, work, forecast, memory: peak_memory().map(|held| held + picture) };
     if format == Some(StatsFormat::Json) { told.json() } else { told.text() }
 }
 
@@ -23,18 +23,8 @@ struct Told<'a> {
     file: &'a Path,
     work: &'a Job<'a>,
     forecast: &'a Forecast,
+    /// The most that the whole run holds at once: what it has held so far, and the picture.
     memory: Option<u64>,
-}
-
-/// The most that the whole run holds at once: what it has held so far, and the picture with its file.
-fn memory(work: &Job) -> Option<u64> {
-    /// Bytes of a pixel: its colour, what is known of its sampling, and its samples in the file.
-    const PIXEL: u64 = 16 + 8 + 8;
-    /// Of its layers.
-    const LAYERS: u64 = 80;
-    let settings = work.settings;
-    let pixels = u64::from(settings.width) * u64::from(settings.height);
-    peak_memory().map(|held| held + pixels * (PIXEL + if settings.layers { LAYERS } else { 0 }))
 }
 
 impl Told<'_> {

@@ -4,9 +4,9 @@
 use super::interrupt;
 use super::job::{Look, Shot};
 use super::outputs::Target;
-use crate::image::{FileKind, Metadata, Output, Picture, ToneMap, encode};
+use crate::image::{ExrSamples, FileKind, Metadata, Output, Picture, PngDepth, ToneMap, encode};
 use crate::load::Diagnostic;
-use crate::render::Settings;
+use crate::render::{Sampling, Settings};
 use crate::scene::{Background, Environment, RenderHints, Scene};
 use std::io::{self, Write};
 
@@ -86,12 +86,46 @@ pub(super) fn background(look: &Look, scene: &Scene) -> Background {
     })
 }
 
-/// A fault when the picture alone, with so many costs of each pixel, needs more than the memory that is allowed.
-pub(super) fn too_large(effective: &Effective, costs: usize, limit: u64) -> Option<Diagnostic> {
-    let settings = &effective.settings;
-    // Beauty, its tiles and the encoder's copy; layers beside it; of costs the tiles, five channels, copies and sums.
-    let per_pixel = 16 * 3 + if settings.layers { 64 } else { 0 } + 8 + 128 * costs as u64;
-    let need = u64::from(settings.width) * u64::from(settings.height) * per_pixel;
+/// What is found out about a picture behind it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Behind {
+    /// Costs of each pixel.
+    pub costs: usize,
+    /// Whether it is rendered once more, to count.
+    pub counted: bool,
+}
+
+/// The most memory that a picture takes on its way into such a file, bytes: all that is known of its pixels, a second time
+/// while it is counted; then its samples as they are stored, and the file, which may hardly be smaller.
+pub(super) fn bytes(effective: &Effective, kind: FileKind, behind: Behind) -> u64 {
+    /// Of the costs of a pixel: those of its tile, five channels, copies and sums.
+    const COST: u64 = 128;
+    let Effective { settings, output, .. } = effective;
+    let pixels = u64::from(settings.width) * u64::from(settings.height);
+    // How many samples a pixel got, and how certain it is.
+    let sampled: u64 = match settings.sampling {
+        Sampling::Uniform => 0,
+        Sampling::Adaptive(_) => 4,
+        Sampling::Stochastic(_) => 8,
+    };
+    let in_layers = |bytes: u64| if settings.layers { bytes } else { 0 };
+    let known = 16 + sampled + in_layers(48 + sampled);
+    let stored = match kind {
+        FileKind::Exr => {
+            let color = if output.exr_samples == ExrSamples::Float { 4 } else { 2 };
+            2 * (4 * color + in_layers(6 * color + 24 + sampled))
+        }
+        // Its bytes are put into the order of the file first.
+        FileKind::Png if output.png_depth == PngDepth::Sixteen => 3 * 8,
+        FileKind::Png | FileKind::Jpeg | FileKind::Webp => 2 * 4,
+    };
+    let counted = if behind.counted { known } else { 0 };
+    pixels * (known + stored.max(counted) + COST * behind.costs as u64)
+}
+
+/// A fault when the picture alone needs more than the memory that is allowed.
+pub(super) fn too_large(effective: &Effective, kind: FileKind, behind: Behind, limit: u64) -> Option<Diagnostic> {
+    let (settings, need) = (&effective.settings, bytes(effective, kind, behind));
     (need > limit).then(|| {
         let text =
             format!("a {}×{} picture needs {need} bytes where {limit} are allowed", settings.width, settings.height);
@@ -163,8 +197,8 @@ mod tests {
     fn a_picture_beyond_the_memory_allowed_is_refused() {
         let big =
             Effective::new(&Look { size: Some((65_535, 65_535)), ..Look::default() }, &RenderHints::default()).unwrap();
-        assert!(too_large(&big, 0, 8 << 30).is_some());
+        assert!(too_large(&big, FileKind::Png, Behind::default(), 8 << 30).is_some());
         let usual = Effective::new(&Look::default(), &RenderHints::default()).unwrap();
-        assert!(too_large(&usual, 4, 8 << 30).is_none());
+        assert!(too_large(&usual, FileKind::Exr, Behind { costs: 4, counted: true }, 8 << 30).is_none());
     }
 }

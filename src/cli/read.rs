@@ -125,10 +125,12 @@ fn one(input: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
     load_bytes(input, bytes, options)
 }
 
-/// Whether trying again can help.
+/// Whether trying again can help: it does with more memory where that was all that was missing.
 pub(super) fn exit_of(error: &LoadError) -> Exit {
+    const OF_MEMORY: [&str; 3] = ["file-too-large", "out-of-memory-limit", "over-memory"];
     match error {
         LoadError::Read { .. } => Exit::Failed,
+        LoadError::Input(faults) if faults.iter().all(|fault| OF_MEMORY.contains(&fault.code)) => Exit::Failed,
         LoadError::Input(_) => Exit::Input,
     }
 }

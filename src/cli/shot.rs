@@ -5,7 +5,7 @@ use super::job::{Batch, RenderJob, Shot};
 use super::message::{Messages, Severity};
 use super::meter::Metered;
 use super::outputs;
-use super::picture::{self, Effective};
+use super::picture::{self, Behind, Effective};
 use super::profile::Profile;
 use super::progress::Progress;
 use super::render::SoFar;
@@ -113,6 +113,11 @@ fn is_metered(effective: &Effective, shot: &Shot, scene: &Scene) -> bool {
     effective.metered && shot.kind != FileKind::Exr && scene.photometric
 }
 
+/// What is found out about each picture behind it.
+fn behind(job: &RenderJob) -> Behind {
+    Behind { costs: cost_layers::wanted(job).len(), counted: job.stats.is_some() }
+}
+
 /// Whether a picture fits into the memory that is allowed, into a file of its type, and may still be written where it goes.
 fn check(task: &Task, shot: &Shot, effective: &Effective, so_far: &SoFar) -> Result<(), Exit> {
     let Task { job, .. } = *task;
@@ -120,7 +125,7 @@ fn check(task: &Task, shot: &Shot, effective: &Effective, so_far: &SoFar) -> Res
     targets
         .try_for_each(|target| so_far.sources.spared_by_target(&target))
         .map_err(|fault| task.fail(&fault, Exit::Failed))?;
-    if let Some(fault) = picture::too_large(effective, cost_layers::wanted(job).len(), job.load.limits.memory) {
+    if let Some(fault) = picture::too_large(effective, shot.kind, behind(job), job.load.limits.memory) {
         return Err(task.fail(&fault, Exit::Failed));
     }
     let Settings { width, height, .. } = effective.settings;
@@ -195,7 +200,9 @@ impl Prepared<'_> {
         let found = crate::render::forecast(&self.work, progress);
         progress.finish();
         let Some(forecast) = found else { return Exit::Interrupted };
-        let told = dry_run::told(self.task.file(), &self.work, &forecast, job.stats.as_ref().map(|stats| stats.format));
+        let picture = picture::bytes(self.effective, self.shot.kind, behind(job));
+        let format = job.stats.as_ref().map(|stats| stats.format);
+        let told = dry_run::told(self.task.file(), &self.work, &forecast, picture, format);
         if job.stats_file().is_some() {
             so_far.foretold.push(told);
             return Exit::Done;

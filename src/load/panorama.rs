@@ -58,7 +58,7 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
         return Err(fault(format!("is {width}×{height} pixels where 1 to {} are allowed", limits.image_pixels)));
     }
     Budget::new(limits).take(pixels, PER_PIXEL).map_err(|over| {
-        let fault = Diagnostic::new("env-unusable", &source.path, "", over.to_string());
+        let fault = Diagnostic::new("out-of-memory-limit", &source.path, "", over.to_string());
         LoadError::from(fault.remedy("allow more with --max-memory"))
     })?;
     let most = pixels * PER_PIXEL;

@@ -199,3 +199,28 @@ fn a_size_that_the_type_cannot_hold_is_told_before_any_work() {
     folder.run(&["render", "wide.toml", "-o", "a.webp", "--samples", "1"]).ends(1).says(&["wide.toml", "16384"]);
     assert_eq!(folder.names(), ["cube.obj", "wide.toml"]);
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_memory_of_a_picture_is_foretold_and_held_to_its_limit() {
+    let folder = Folder::with_cube();
+    let words = ["render", "cube.obj", "-o", "a.exr", "--size", "900x900", "--quality", "draft", "--layers", "--float"];
+    let json = |more: &[&str]| {
+        let run = folder.run(&[&words[..], &["--stats", "json"], more].concat()).ends(0);
+        serde_json::from_str::<serde_json::Value>(run.text()).unwrap()
+    };
+    let foretold = json(&["--dry-run"])["memory"].as_f64().unwrap();
+    let held = json(&["--profile"])["profile"]["peak_memory"].as_f64().unwrap();
+    assert!((0.6..1.05).contains(&(held / foretold)), "{held} held, {foretold} foretold");
+    let run = folder.run(&[&words[..], &["--max-memory", "150M"]].concat()).ends(1);
+    run.says(&["a 900×900 picture needs", "--max-memory"]);
+}
+
+#[test]
+fn a_model_that_takes_more_memory_than_is_allowed_ends_in_1_as_more_may_help() {
+    let folder = Folder::with_cube().file("long.obj", format!("{CUBE}{}", "#\n".repeat(1000)));
+    for (name, limit) in [("cube.obj", "200"), ("long.obj", "1K")] {
+        folder.render(&[name, "--max-memory", limit]).ends(1).says(&[name, "raise --max-memory"]);
+    }
+    folder.render(&["cube.obj", "--max-memory", "2K"]).ends(1).says(&["bytes are needed", "raise --max-memory"]);
+}
