@@ -19,7 +19,7 @@ use std::path::PathBuf;
 #[command(
     name = "meshray",
     version,
-    long_version = super::version::LONG,
+    long_version = super::version::LONG.as_str(),
     max_term_width = 100,
     subcommand_required = true,
     arg_required_else_help = true,

@@ -149,7 +149,14 @@ impl Shown<'_> {
             (Choice::Camera(name), None) => (find(name, scene, file)?.clone(), format!("camera {}", quoted(name))),
             (Choice::Free { eye, at, up }, None) => {
                 let upright = if scene.up == UpAxis::Z { DVec3::Z } else { DVec3::Y };
-                let world_from_camera = Camera::look_at(*eye, at.unwrap_or(bounds.center()), up.unwrap_or(upright));
+                let at = at.unwrap_or(bounds.center());
+                if (at - *eye).try_normalize().is_none() {
+                    let text = "the eye is in the middle of the model, at which it would look";
+                    return Err(
+                        Diagnostic::new("camera-nowhere", file, "", text).remedy("say where it looks with --at")
+                    );
+                }
+                let world_from_camera = Camera::look_at(*eye, at, up.unwrap_or(upright));
                 let lens = lens.unwrap_or(LensChoice::Fov(DEFAULT_FOV));
                 let projection = lens.projection(aspect, radius);
                 (Camera { name: String::new(), projection, world_from_camera }, "given eye".to_owned())
@@ -235,6 +242,13 @@ mod tests {
         assert!(pick(Choice::Camera("1".into()), None).is_ok());
         let error = pick(Choice::Camera("Frnt".into()), None).unwrap_err().to_string();
         assert_eq!(error, "a.glb: no camera is called 'Frnt'; did you mean 'Front'? there are, from 0: `Front`, `1`");
+    }
+
+    #[test]
+    fn an_eye_in_the_middle_of_the_model_must_be_told_where_to_look() {
+        let free = |at| Choice::Free { eye: robust_bounds(&scene()).center(), at, up: None };
+        assert!(pick(free(None), None).unwrap_err().to_string().ends_with("say where it looks with --at"));
+        assert!(pick(free(Some(DVec3::splat(7.0))), None).is_ok());
     }
 
     #[test]

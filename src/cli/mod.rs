@@ -86,8 +86,13 @@ fn misunderstood(error: &clap::Error, format: message::Format) -> Exit {
         Messages::new(format, false).say(Severity::Error, &fault);
         return Exit::Usage;
     }
-    let _ = error.print();
-    if error.use_stderr() { Exit::Usage } else { Exit::Done }
+    // Help is not printed before it has left the buffer; a reader that has enough is no fault.
+    let printed = error.print().and_then(|()| io::stdout().flush());
+    match printed {
+        _ if error.use_stderr() => Exit::Usage,
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => shell::unprintable(&e),
+        _ => Exit::Done,
+    }
 }
 
 fn render_command(typed: &RenderArgs) -> Exit {

@@ -3,6 +3,7 @@
 //! Templates know `{dir}` (the input's folder), `{stem}` (its name without extension), `{view}` and `{frame}` (number
 //! of the picture: in its sequence, or else in this run, from 1; `{frame:04}` pads it with zeros). `{{` and `}}` are plain braces.
 
+use crate::image::destination;
 use crate::load::suggest::nearest;
 use std::collections::HashMap;
 use std::path::{Component, Path, PathBuf};
@@ -116,8 +117,9 @@ pub(super) fn collision(names: &[PathBuf]) -> Option<(usize, usize)> {
 /// One spelling for every way of writing the path of one file, through symbolic links too; the file itself need not
 /// exist. Of two hard links each is a file of its own: what is written replaces one name and leaves the other.
 pub(super) fn identity(name: &Path) -> PathBuf {
-    if let Ok(whole) = name.canonicalize() {
-        return whole;
+    let name = &destination(name);
+    if name.exists() {
+        return name.clone();
     }
     let parent = name.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let parent = parent.canonicalize().unwrap_or_else(|_| lexical(parent));
@@ -198,6 +200,9 @@ mod tests {
         std::fs::write(&names[0], "precious").unwrap();
         std::os::unix::fs::symlink(&names[0], &names[1]).unwrap();
         assert_eq!(collision(&names), Some((0, 1)));
+        let to_come = ["to-come.png", "another.png"].map(|name| dir.path().join(name));
+        std::os::unix::fs::symlink("to-come.png", &to_come[1]).unwrap();
+        assert_eq!(collision(&to_come), Some((0, 1)), "also before there is a file");
     }
 
     #[test]

@@ -80,6 +80,12 @@ pub(super) fn check_flattened(loaded: &Loaded, limit: u64, file: &Path, remedy: 
     Err(Diagnostic::new("instances-too-large", file, "", text).remedy(remedy))
 }
 
+/// Why a model with warnings is not rendered where they are errors.
+pub(super) fn not_strict(loaded: &Loaded, file: &Path) -> Diagnostic {
+    let count = loaded.warnings.len();
+    Diagnostic::new("strict", file, "", format!("not rendered: --strict, and there are {count} kinds of warnings"))
+}
+
 /// Gives a frame that was loaded without pictures those of an earlier one, which are the same, with the materials that
 /// show them. Whether it can be done: other materials are a sign that the file has been changed in between.
 pub(super) fn take_pictures(frame: &mut Loaded, earlier: Loaded) -> bool {

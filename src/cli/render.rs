@@ -209,10 +209,7 @@ fn prepare(task: &Task, step: &Step, earlier: Option<Ready>, mut profile: Profil
         messages.say(Severity::Warning, warning);
     }
     if job.strict && !loaded.warnings.is_empty() {
-        let count = loaded.warnings.len();
-        let text = format!("not rendered: --strict, and there are {count} kinds of warnings");
-        messages.say(Severity::Error, &Diagnostic::new("strict", &batch.inputs[0], "", text));
-        return Err(Exit::Input);
+        return Err(task.fail(&read::not_strict(&loaded, task.file()), Exit::Input));
     }
     if let Some(expected) = &job.expected_hash {
         again::check_hash(expected, &loaded, &batch.inputs[0]).map_err(|fault| {

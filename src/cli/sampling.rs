@@ -318,7 +318,7 @@ pub(super) fn phrase(settings: &Settings, sampled: &Sampled) -> String {
 }
 
 /// The number as it was typed, not as its nearest `f32` looks in `f64`.
-fn plain(x: f32) -> f64 {
+pub(super) fn plain(x: f32) -> f64 {
     x.to_string().parse().unwrap_or_else(|_| x.into())
 }
 

@@ -10,7 +10,7 @@ use super::message::{Messages, Severity};
 use super::parse::{Frames, Turns};
 use super::progress::Progress;
 use super::{interrupt, moment, read};
-use crate::load::{Diagnostic, LoadOptions, Moment};
+use crate::load::{Diagnostic, LoadOptions, Loaded, Moment};
 use crate::scene::framing::{Bounds, Fit, frame, frame_around, robust_bounds, turned};
 use crate::scene::{Camera, Scene};
 use std::f64::consts::TAU;
@@ -143,6 +143,16 @@ pub(super) fn camera(
     Ok((turned(&camera, scene.up, pivot, angle), phrase))
 }
 
+/// Refuses what there are warnings of, which are said.
+fn refuse_warnings(loaded: &Loaded, file: &Path, messages: &Messages) -> Result<(), Exit> {
+    if loaded.warnings.is_empty() {
+        return Ok(());
+    }
+    loaded.warnings.iter().for_each(|warning| messages.say(Severity::Warning, warning));
+    messages.say(Severity::Error, &read::not_strict(loaded, file));
+    Err(Exit::Input)
+}
+
 /// What all frames of an animation take up, found before the first is rendered.
 pub(super) struct Survey {
     /// The box of all.
@@ -179,6 +189,9 @@ impl Survey {
                 messages.load_error(&error);
                 read::exit_of(&error)
             })?;
+            if job.strict && batch.shots.iter().any(|shot| shot.step.number == Some(frame)) {
+                refuse_warnings(&loaded, &batch.inputs[0], messages)?;
+            }
             if loaded.facts.animations.is_empty() {
                 let fault = Diagnostic::new("animation-none", &batch.inputs[0], "", "the file has no animation");
                 messages.say(Severity::Error, &fault.remedy("--turntable shows it from all around"));

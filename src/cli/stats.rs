@@ -12,7 +12,7 @@
 //! | `auto` | `null`, or why `--accel auto` took `accel`: `why` in words; `rays` and `prims` of the sample; cost of a ray through `fast-octree` and `fast-bvh`, in nodes of eight boxes |
 //! | `parameters` | of the structure, as used: `leaf_size` (`null`: by step cost); of grids and octrees `grid_density`, `grid_resolution`, `max_depth`, `step_cost`, `grid_cells` (`null`: by density), `max_references`, `assign`, `mailbox` as well |
 //! | `seconds` | of the timed run: `load`, `build`, `render`, `write`; `load` and `build` are 0 for further pictures of one scene |
-//! | `animation` | `null`, or which one is shown: its `number` in the file, and the `time` in seconds |
+//! | `animation` | `null`, or which one is shown: its `number` in the file, and the `time` in seconds, its end at most |
 //! | `scene` | as shown: `triangles`, `polygons`, `spheres`, `cones` (cylinders too), `planes`, `materials`, `textures`, `lights`; as stored: `vertices`, `stored_triangles`, `bytes` of all shapes; `kept_instances`: those of meshes that are stored once |
 //! | `structure` | V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`; `bytes` and `depth` |
 //! | `counts` | for each ray class `primary`, `shadow`, `reflected`, `refracted`, and `all`: exact `rays`, `hits`, `tests`, `steps`, `cells`, `empty_cells`, `volume_tests`, `tests_saved`, `transforms`; and per ray `n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`, `n_xf`; `culled` = 1 − n_it / N |
@@ -29,7 +29,7 @@ use super::interrupt;
 use super::job::RenderJob;
 use super::message::Messages;
 use super::profile::Profile;
-use super::sampling;
+use super::{sampling, summary};
 use crate::accel::{AccelKind, AccelParams, RayCounts, StructureStats};
 use crate::render::{CLASS_NAMES, ClassCounts, Job, Progress, Rendered, Sampling, World};
 use serde_json::{Value, json};
@@ -183,12 +183,12 @@ impl PictureStats {
             "output": facts.shot.target.path().map_or("-".into(), |p| p.to_string_lossy()),
             "input_hash": facts.hash(),
             "width": settings.width, "height": settings.height, "samples": samples, "sampling": sampling, "depth": facts.depth,
-            "cutoff": settings.cutoff, "seed": settings.seed, "view": view, "accel": facts.accel.name(),
+            "cutoff": sampling::plain(settings.cutoff), "seed": settings.seed, "view": view, "accel": facts.accel.name(),
             "intersector": facts.job.intersector.name(),
             "auto": facts.reason.map(|r| json!({
                 "why": r.to_string(), "rays": r.rays, "prims": r.prims, "fast-octree": r.octree, "fast-bvh": r.bvh,
             })),
-            "animation": facts.loaded.facts.shown.map(|(number, time)| json!({ "number": number, "time": time })),
+            "animation": summary::shown(&facts.loaded.facts).map(|(number, time)| json!({ "number": number, "time": time })),
             "parameters": parameters(facts.accel, &facts.job.params),
             "threads": rayon::current_num_threads(),
             "seconds": { "load": times.load, "build": times.build, "render": times.render, "write": times.write },

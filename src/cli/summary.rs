@@ -6,12 +6,19 @@ use super::meter;
 use super::picture::Effective;
 use super::sampling;
 use super::stats::Times;
-use crate::load::{Diagnostic, Loaded};
+use crate::load::{Diagnostic, Facts, Loaded};
 use crate::render::Rendered;
 use crate::scene::Environment;
 use crate::scene::default_light::DefaultLight;
 use crate::scene::framing::Bounds;
 use std::path::Path;
+
+/// Which animation is shown, and when: at its end where a later time was asked for.
+pub(super) fn shown(facts: &Facts) -> Option<(usize, f64)> {
+    let (number, time) = facts.shown?;
+    let end = facts.animations.get(number).map_or(time, |animation| animation.seconds);
+    Some((number, time.min(end)))
+}
 
 /// The lines at the end of a picture.
 pub(super) struct Summary<'a> {
@@ -41,7 +48,7 @@ impl Summary<'_> {
             self.view.to_owned(),
         ];
         let facts = &self.loaded.facts;
-        if let Some((number, time)) = facts.shown {
+        if let Some((number, time)) = shown(facts) {
             let name = facts.animations.get(number).map_or("", |animation| animation.name.as_str());
             let name = if name.is_empty() { number.to_string() } else { format!("'{name}'") };
             parts.push(format!("animation {name} at {time:.3} s"));

@@ -2,7 +2,7 @@
 
 use super::output_name::identity;
 use super::outputs::Target;
-use crate::image::was_written_by_meshray;
+use crate::image::{destination, was_written_by_meshray};
 use crate::load::Diagnostic;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -44,7 +44,8 @@ impl Sources {
 /// `sources`.
 pub(super) fn check(path: &Path, flag: &str, sources: &Sources) -> Result<(), Diagnostic> {
     let fault = |code, text: &str, remedy: &str| Err(Diagnostic::new(code, path, "", text).remedy(remedy));
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let goal = destination(path);
+    let folder = goal.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !folder.is_dir() {
         return fault("output-folder", "its folder is not there", &format!("create it, or name another with {flag}"));
     }

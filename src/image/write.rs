@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 
 /// Writes `bytes` to a temporary file in the same folder and renames it to `path`. On failure nothing is left.
 ///
-/// A file that is replaced keeps its permissions, a new one gets the usual ones; a link stays and the file it points
-/// to is replaced. What is no regular file (`/dev/stdout`, a pipe) is written straight. `fsync` waits until the bytes
+/// A file that is replaced keeps its permissions, a new one gets the usual ones; a link stays, and the file it points
+/// to is replaced or made. What is no regular file (`/dev/stdout`, a pipe) is written straight. `fsync` waits until the bytes
 /// are on the disk, so that they survive a power cut.
 ///
 /// # Errors
 /// What the system says, with the remedy where the folder is missing, `path` is a folder, or the file is read-only.
 pub fn write_atomic(path: &Path, bytes: &[u8], fsync: bool) -> io::Result<()> {
-    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let target = destination(path);
     let old = match fs::metadata(&target) {
         Ok(old) if old.is_dir() => return Err(fault(ErrorKind::IsADirectory, "is a folder; name a file in it")),
         Ok(old) if !old.is_file() => return fs::write(&target, bytes),
@@ -61,6 +61,21 @@ fn write_and_rename(
         fs::File::open(folder)?.sync_all()?;
     }
     Ok(())
+}
+
+/// Where a path leads through symbolic links, also where there is no file there yet.
+pub fn destination(path: &Path) -> PathBuf {
+    /// Links that lead to links, at most; those of a circle lead nowhere.
+    const LINKS: usize = 40;
+    let mut target = path.to_owned();
+    for _ in 0..LINKS {
+        if let Ok(whole) = fs::canonicalize(&target) {
+            return whole;
+        }
+        let Ok(next) = fs::read_link(&target) else { break };
+        target = folder_of(&target).join(next);
+    }
+    target
 }
 
 /// The folder a path lies in; that of a bare file name is the current one.
@@ -161,6 +176,22 @@ mod tests {
             write_atomic(&link, b"new", false).unwrap();
             assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
             assert_eq!(fs::read(&real).unwrap(), b"new");
+        }
+
+        #[test]
+        fn a_link_to_a_file_that_is_not_there_yet_stays_and_leads_there() {
+            let dir = tempfile::tempdir().unwrap();
+            let at = |name: &str| dir.path().join(name);
+            fs::create_dir(at("deep")).unwrap();
+            symlink("deep/link.png", at("first.png")).unwrap();
+            symlink("../real.png", at("deep/link.png")).unwrap();
+            write_atomic(&at("first.png"), b"new", false).unwrap();
+            assert!(
+                ["first.png", "deep/link.png"].iter().all(|name| fs::symlink_metadata(at(name)).unwrap().is_symlink())
+            );
+            assert_eq!(fs::read(at("real.png")).unwrap(), b"new");
+            symlink("circle.png", at("circle.png")).unwrap();
+            assert!(write_atomic(&at("circle.png"), b"new", false).is_err());
         }
 
         #[test]

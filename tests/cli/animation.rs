@@ -69,6 +69,17 @@ fn a_time_past_the_end_is_a_warning_with_the_length() {
     let folder = folder();
     wide(&folder, &["a.gltf", "--time", "3"]).ends(0).says(&["3 s is past the end of animation 'Slide'", "1 s long"]);
     wide(&folder, &["a.gltf", "--time", "3", "--strict"]).ends(3);
+    let frames = ["a.gltf", "--frames", "0..4", "--fps", "2", "--strict"];
+    wide(&folder, &frames).ends(3).says(&["past the end", "--strict"]);
+    assert!(
+        folder.names().iter().all(|name| !name.ends_with("0000.png")),
+        "no picture before the frame that has a warning"
+    );
+    wide(&folder, &[&frames[..], &["--frame", "2"]].concat()).ends(0);
+    let words = ["a.gltf", "--time", "3", "--stats", "json", "--cutoff", "0.6"];
+    let run = folder.render(&words).ends(0).says(&["animation 'Slide' at 1.000 s"]);
+    let stats: Value = serde_json::from_str(run.text()).unwrap();
+    assert_eq!((&stats["animation"]["time"], &stats["cutoff"]), (&1.0.into(), &0.6.into()));
 }
 
 #[test]

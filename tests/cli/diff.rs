@@ -126,6 +126,10 @@ fn what_is_drawn_replaces_neither_picture_and_each_drawing_is_a_file_of_its_own(
     folder.run(&["diff", "a.png", "b.png", "-o", "b.png"]).ends(1).says(&["b.png", "-o"]);
     folder.run(&["diff", "a.png", "b.png", "--side-by-side", "./a.png"]).ends(1).says(&["a.png", "--side-by-side"]);
     folder.run(&["diff", "a.png", "b.png", "-o", "c.png", "--side-by-side", "./c.png"]).ends(2);
+    for flag in ["-o", "--side-by-side"] {
+        folder.run(&["diff", "a.png", "b.png", flag, "c.jpg"]).ends(2).says(&["c.jpg", flag, "PNG"]);
+    }
+    assert!(!folder.has("c.jpg"));
     assert!(folder.read("a.png") == a && folder.read("b.png") == b && !folder.has("c.png"));
 }
 

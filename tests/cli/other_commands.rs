@@ -73,7 +73,23 @@ fn version_completions_and_manual_go_to_standard_output() {
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
         assert!(folder.run(&["completions", shell]).ends(0).text().contains("tone-map"), "{shell}");
     }
-    assert!(folder.run(&["man"]).ends(0).text().contains(".TH meshray"));
+    let manual = folder.run(&["man"]).ends(0);
+    for page in ["", "-render", "-bench", "-diff", "-completions"] {
+        assert!(manual.text().contains(&format!(".TH meshray{page} 1")), "{page}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn what_cannot_be_printed_is_an_error_that_says_so() {
+    let folder = Folder::new();
+    for words in [&["man"][..], &["completions", "bash"], &["--help"], &["render", "--help"], &["--version"]] {
+        let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+        let mut program = std::process::Command::new(env!("CARGO_BIN_EXE_meshray"));
+        let ended = program.args(words).current_dir(folder.path("")).stdout(full).output().unwrap();
+        let said = String::from_utf8(ended.stderr).unwrap();
+        assert!(ended.status.code() == Some(1) && said.starts_with("error: standard output: "), "{words:?}: {said}");
+    }
 }
 
 #[test]

@@ -77,6 +77,10 @@ fn check_outputs(args: &DiffArgs) -> Result<(), Fault> {
     let outputs = [("-o", &args.output), ("--side-by-side", &args.side_by_side)];
     for (flag, path) in outputs {
         let Some(path) = path else { continue };
+        if FileKind::from_path(path).ok() != Some(FileKind::Png) {
+            let fault = Diagnostic::new("usage", path, "", format!("{flag} writes a PNG; name it so"));
+            return Err(Box::new((fault, Exit::Usage)));
+        }
         writable::check(path, flag, &sources).map_err(|fault| Box::new((fault, Exit::Failed)))?;
     }
     let names: Vec<PathBuf> = outputs.into_iter().filter_map(|(_, path)| path.clone()).collect();

@@ -170,6 +170,9 @@ impl<'a> Report<'a> {
             true => json!({ "lo": lo.to_array(), "hi": hi.to_array() }),
             false => Value::Null,
         };
+        let bounds = hull(self.world.bounds.0, self.world.bounds.1);
+        // What is framed in nothing is no bounds.
+        let framed = if bounds.is_null() { Value::Null } else { hull(self.bounds.lo, self.bounds.hi) };
         let topology = &self.topology;
         let value = json!({
             "schema": "meshray-inspect/1",
@@ -180,8 +183,7 @@ impl<'a> Report<'a> {
             "spheres": shapes.spheres.len(), "cones": shapes.cones.len(), "planes": shapes.planes.len(),
             "meshes": scene.meshes.len(), "instances": scene.instances.len(),
             "materials": scene.materials.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(),
-            "bounds": hull(self.world.bounds.0, self.world.bounds.1),
-            "framed": hull(self.bounds.lo, self.bounds.hi), "strays": self.bounds.strays,
+            "bounds": bounds, "framed": framed, "strays": self.bounds.strays,
             "units": self.units(), "up": self.up(), "up_reason": facts.up_reason,
             "topology": {
                 "corners": topology.corners, "edges": topology.edges, "open": topology.open,
@@ -325,7 +327,8 @@ mod tests {
     #[test]
     fn an_empty_scene_has_no_bounds() {
         let report = report_of("up = 'z'");
-        assert_eq!((&report["bounds"], &report["up"]), (&Value::Null, &"+Z".into()));
+        assert_eq!([&report["bounds"], &report["framed"]], [&Value::Null; 2]);
+        assert_eq!(report["up"], "+Z");
     }
 
     #[test]
