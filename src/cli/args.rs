@@ -2,11 +2,13 @@
 
 use super::bench::BenchArgs;
 use super::diff::DiffArgs;
+use super::inspect::InspectArgs;
 use super::parse;
 use super::sampling::SamplingArgs;
+use super::trace::TraceArgs;
+use super::verify::VerifyArgs;
 use crate::accel::{AccelChoice, Assign, IntersectorKind, MailboxKind};
 use crate::bench::study::Plan as Study;
-use crate::bench::verify::Plan;
 use crate::generate::Family;
 use crate::image::ToneMap;
 use crate::render::{Cost, Instancing};
@@ -350,43 +352,6 @@ pub(super) struct AccelArgs {
     pub mailbox: MailboxKind,
 }
 
-/// What `meshray inspect` was given.
-#[derive(Debug, Clone, Args)]
-pub(super) struct InspectArgs {
-    /// What to look into.
-    #[command(flatten)]
-    pub model: ModelArgs,
-    /// Print JSON (schema `meshray-inspect/1`)
-    #[arg(long)]
-    pub json: bool,
-    /// Exit with code 3 when there are warnings
-    #[arg(long)]
-    pub strict: bool,
-}
-
-/// What `meshray verify` was given.
-#[derive(Debug, Clone, Args)]
-pub(super) struct VerifyArgs {
-    /// What to judge.
-    #[command(flatten)]
-    pub model: ModelArgs,
-    /// Rays of each kind for each place and size of the mesh
-    #[arg(long, value_name = "N", default_value_t = Plan::DEFAULT.rays, value_parser = parse::positive)]
-    pub rays: usize,
-    /// Other numbers give other rays
-    #[arg(long, value_name = "N", default_value_t = Plan::DEFAULT.seed)]
-    pub seed: u64,
-    /// Print JSON (schema `meshray-verify/1`)
-    #[arg(long)]
-    pub json: bool,
-    /// Write a page for a browser that plots the tests' speed against their wrong answers
-    #[arg(long, value_name = "FILE.html")]
-    pub plot: Option<PathBuf>,
-    /// Only warnings and errors on standard error
-    #[arg(short, long)]
-    pub quiet: bool,
-}
-
 /// From where the one picture of a command is seen.
 #[derive(Debug, Clone, Args)]
 pub(super) struct EyeArgs {
@@ -479,69 +444,6 @@ pub(super) struct StudyArgs {
     pub report: Vec<PathBuf>,
     /// Only the table, warnings and errors
     #[arg(short, long, help_heading = "Run")]
-    pub quiet: bool,
-}
-
-/// What `meshray trace` was given.
-#[derive(Debug, Clone, Args)]
-pub(super) struct TraceArgs {
-    /// The model that the ray goes through.
-    #[command(flatten)]
-    pub model: ModelArgs,
-
-    /// Column and row of the pixel, from 0 at the top left
-    #[arg(long, value_name = "X,Y", value_parser = parse::pixel, help_heading = "Ray")]
-    pub pixel: (u32, u32),
-    /// Samples a pixel; one goes through its centre
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536), default_value_t = 1,
-          help_heading = "Ray")]
-    pub samples: u32,
-    /// Which of them, from 0
-    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Ray")]
-    pub sample: u32,
-    /// Bounces after the eye ray [default: what the scene needs]
-    #[arg(long, value_name = "N", value_parser = parse::depth(), help_heading = "Ray")]
-    pub depth: Option<u32>,
-    /// Weight below which a branch of the ray tree ends [default: 0.001953125]
-    #[arg(long, value_name = "WEIGHT", value_parser = parse::cutoff, help_heading = "Ray")]
-    pub cutoff: Option<f32>,
-
-    /// Columns and rows of the picture [default: 1024x768]
-    #[arg(long, value_name = "WxH", value_parser = parse::size, help_heading = "Camera")]
-    pub size: Option<(u32, u32)>,
-    /// From where it is seen.
-    #[command(flatten)]
-    pub eye: EyeArgs,
-    /// Direction that is up in the picture [default: the up axis]
-    #[arg(long, value_name = "X,Y,Z", value_parser = parse::direction, help_heading = "Camera", allow_hyphen_values = true, requires = "eye")]
-    pub up_vector: Option<[f64; 3]>,
-    /// Vertical field of view, degrees
-    #[arg(long, value_name = "DEGREES", value_parser = parse::fov, help_heading = "Camera")]
-    pub fov: Option<f64>,
-    /// Parallel rays, seeing HEIGHT units [default: what the model needs]
-    #[arg(long, value_name = "HEIGHT", num_args = 0..=1, default_missing_value = "auto", value_parser = parse::ortho,
-          require_equals = true, conflicts_with = "fov", help_heading = "Camera")]
-    pub ortho: Option<parse::Ortho>,
-
-    /// Structure that the ray goes through; all find the same hits
-    #[arg(long, value_name = "NAME", value_parser = parse::accel_choice(), default_value = AccelChoice::AUTO,
-          help_heading = "Structure")]
-    pub accel: AccelChoice,
-    /// Parameters of the structure
-    #[command(flatten)]
-    pub params: AccelArgs,
-
-    /// List the steps of every ray, not of the eye's alone
-    #[arg(long, help_heading = "Output")]
-    pub all_steps: bool,
-    /// Print JSON (schema `meshray-trace/1`)
-    #[arg(long, help_heading = "Output")]
-    pub json: bool,
-    /// Draw the ray, too, and every node and cell that it visits: a PNG of the scene cut open along it
-    #[arg(short, long, value_name = "FILE", help_heading = "Output")]
-    pub output: Option<PathBuf>,
-    /// Only warnings and errors on standard error
-    #[arg(short, long, help_heading = "Output")]
     pub quiet: bool,
 }
 

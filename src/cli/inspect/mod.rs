@@ -11,13 +11,14 @@
 //! `animations` (`name`, `seconds`, `channels`); `cameras`, `lights` (`name`, `kind`); `features` (needed) and `left_out`;
 //! `memory` (bytes: `scene`, `structure`); `max_rounding`; `warnings` (messages). Keys are only ever added.
 
+mod args;
 mod report;
 mod topology;
 
-use super::args::InspectArgs;
 use super::exit::Exit;
 use super::message::Messages;
 use super::{accident, print, read};
+pub(super) use args::InspectArgs;
 
 /// Loads the file and prints what was found.
 pub(super) fn run(args: &InspectArgs) -> Exit {

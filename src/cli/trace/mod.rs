@@ -17,12 +17,12 @@
 //!
 //! Keys are only ever added.
 
+mod args;
 mod json;
 mod picture;
 mod text;
 mod words;
 
-use super::args::TraceArgs;
 use super::camera::{self, Choice, LensChoice};
 use super::exit::Exit;
 use super::job::{self, Look, Wrong};
@@ -39,6 +39,7 @@ use crate::render::texture::TextureStore;
 use crate::render::{Job, Settings, View, World};
 use crate::scene::default_light;
 use crate::scene::framing::robust_bounds;
+pub(super) use args::TraceArgs;
 use std::path::Path;
 
 /// What there is to tell.

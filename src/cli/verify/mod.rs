@@ -7,15 +7,16 @@
 //! `hits`, `missed`, `false_hits`, `wrong_order` (numbers of rays) and `t_ulps_max`, `t_ulps_rms`; `costs`
 //! (`intersector`, `ns_per_ray`); `choose` (an intersector), `trusted`. Keys are only ever added.
 
+mod args;
 mod report;
 
-use super::args::VerifyArgs;
 use super::exit::Exit;
 use super::message::{Messages, Severity};
 use super::progress::Progress;
 use super::writable::{self, Sources};
 use super::{accident, interrupt, print, read};
 use crate::bench::verify::{Plan, kernels, verify};
+pub(super) use args::VerifyArgs;
 
 /// Loads the file, judges it and prints what was found.
 pub(super) fn run(args: &VerifyArgs) -> Exit {

@@ -1,0 +1,30 @@
+//! What was typed after `meshray verify`.
+
+use super::super::args::ModelArgs;
+use super::super::parse;
+use crate::bench::verify::Plan;
+use clap::Args;
+use std::path::PathBuf;
+
+/// What `meshray verify` was given.
+#[derive(Debug, Clone, Args)]
+pub(in crate::cli) struct VerifyArgs {
+    /// What to judge.
+    #[command(flatten)]
+    pub model: ModelArgs,
+    /// Rays of each kind for each place and size of the mesh
+    #[arg(long, value_name = "N", default_value_t = Plan::DEFAULT.rays, value_parser = parse::positive)]
+    pub rays: usize,
+    /// Other numbers give other rays
+    #[arg(long, value_name = "N", default_value_t = Plan::DEFAULT.seed)]
+    pub seed: u64,
+    /// Print JSON (schema `meshray-verify/1`)
+    #[arg(long)]
+    pub json: bool,
+    /// Write a page for a browser that plots the tests' speed against their wrong answers
+    #[arg(long, value_name = "FILE.html")]
+    pub plot: Option<PathBuf>,
+    /// Only warnings and errors on standard error
+    #[arg(short, long)]
+    pub quiet: bool,
+}
