@@ -136,8 +136,10 @@ fn is_file(word: &OsStr) -> bool {
     !letters.starts_with(b"-") && (letters.iter().any(|c| b"./\\".contains(c)) || Path::new(word).exists())
 }
 
-/// Flags that may stand alone, and which words behind one are its value.
-const JOINED: [(&str, fn(&OsStr) -> bool); 3] = [
+/// A flag that may stand alone, and whether a word behind it is its value.
+type Joined = (&'static str, fn(&OsStr) -> bool);
+
+const JOINED: [Joined; 3] = [
     // What is no list of costs is one that is mistyped, unless it is a file.
     ("--layers", |word| word.to_str().is_some_and(|list| parse::costs(list).is_ok()) || !is_file(word)),
     ("--ortho", |word| word.to_str().is_some_and(|height| parse::ortho(height).is_ok())),
@@ -145,7 +147,7 @@ const JOINED: [(&str, fn(&OsStr) -> bool); 3] = [
 ];
 
 /// Lets `--layers tests,steps` stand for `--layers=tests,steps`, while in `--layers ship.glb` the flag stands alone.
-fn with_joined(mut words: Vec<OsString>, (flag, is_value): &(&str, fn(&OsStr) -> bool)) -> Vec<OsString> {
+fn with_joined(mut words: Vec<OsString>, (flag, is_value): &Joined) -> Vec<OsString> {
     let flags = words.iter().position(|word| word == "--").unwrap_or(words.len());
     if let Some(at) = words[..flags].iter().position(|word| word == flag)
         && words[..flags].get(at + 1).is_some_and(|word| !word.as_encoded_bytes().starts_with(b"-") && is_value(word))
