@@ -100,7 +100,7 @@ fn render_batch(job: &RenderJob, batch: &Batch, messages: &Messages, so_far: &mu
     let name = batch.inputs[0].file_name().unwrap_or(batch.inputs[0].as_os_str()).to_string_lossy();
     let progress = Progress::new(&name, messages, job.quiet, job.keep_partial);
     let task = Task { job, batch, messages, progress: &progress };
-    render_shots(&task, &shots, so_far).map_or_else(|exit| worst.max(exit), |exit| worst.max(exit))
+    worst.max(render_shots(&task, &shots, so_far).unwrap_or_else(|exit| exit))
 }
 
 /// The pictures of one scene; the error is how it ended when not all of them could be tried.

@@ -16,7 +16,8 @@ pub(super) fn completions(shell: Shell) -> Exit {
 
 /// Prints the manual page, the commands' pages behind it.
 pub(super) fn man() -> Exit {
-    let command = Cli::command();
+    // What `help` says stands in these pages.
+    let command = Cli::command().disable_help_subcommand(true);
     let mut page = Vec::new();
     let mut rendered = clap_mangen::Man::new(command.clone()).render(&mut page);
     for sub in command.get_subcommands() {
