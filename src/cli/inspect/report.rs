@@ -4,13 +4,12 @@ use super::super::text::grouped;
 use super::topology::Topology;
 use crate::accel::{AccelChoice, AccelParams};
 use crate::load::{AnimationFacts, Loaded, WireFacts};
-use crate::math::{DVec3, Vec3};
+use crate::math::DVec3;
 use crate::render::{Instancing, World};
 use crate::scene::features::Features;
 use crate::scene::framing::{Bounds, robust_bounds};
 use crate::scene::{Bitmap, LightKind, Mesh, Projection, Scene, UpAxis};
 use serde_json::{Value, json};
-use std::mem::size_of;
 use std::path::Path;
 
 /// Everything there is to say about a file.
