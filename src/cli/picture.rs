@@ -109,7 +109,9 @@ pub(super) fn bytes(effective: &Effective, kind: FileKind, behind: Behind) -> u6
         Sampling::Stochastic(_) => 8,
     };
     let in_layers = |bytes: u64| if settings.layers { bytes } else { 0 };
-    let known = 16 + sampled + in_layers(48 + sampled);
+    /// What comes through glass before a background, of which nothing is known yet.
+    const VEIL: u64 = 12;
+    let known = 16 + VEIL + sampled + in_layers(48 + sampled);
     let stored = match kind {
         FileKind::Exr => {
             let color = if output.exr_samples == ExrSamples::Float { 4 } else { 2 };

@@ -70,11 +70,16 @@ pub(super) fn raster<T: Sample>(picture: &Picture, output: &Output) -> Raster<T>
     let channels = if opaque { 3 } else { 4 };
     let mut samples = vec![T::default(); picture.beauty.len() * channels];
     let rows = samples.par_chunks_mut(width * channels).zip(picture.beauty.par_chunks(width));
-    let (developer, level) = (Developer::new(output), Level::best());
-    rows.for_each(|(out, row)| match opaque {
-        true => level.run(Row::<T, 3> { developer: &developer, row, out }),
-        false => level.run(Row::<T, 4> { developer: &developer, row, out }),
-    });
+    let (developer, level) = (&Developer::new(output), Level::best());
+    if output.background.is_some() && picture.veil.len() == picture.beauty.len() {
+        let rows = rows.zip(picture.veil.par_chunks(width));
+        rows.for_each(|((out, row), veil)| level.run(Row::<T, 3> { developer, row, veil: Some(veil), out }));
+    } else {
+        rows.for_each(|(out, row)| match opaque {
+            true => level.run(Row::<T, 3> { developer, row, veil: None, out }),
+            false => level.run(Row::<T, 4> { developer, row, veil: None, out }),
+        });
+    }
     Raster { width: picture.width, height: picture.height, channels: if opaque { 3 } else { 4 }, samples }
 }
 
@@ -82,6 +87,8 @@ pub(super) fn raster<T: Sample>(picture: &Picture, output: &Output) -> Raster<T>
 struct Row<'a, T, const CHANNELS: usize> {
     developer: &'a Developer<'a>,
     row: &'a [[f32; 4]],
+    /// [`Picture::veil`], where there is glass before a background.
+    veil: Option<&'a [[f32; 3]]>,
     out: &'a mut [T],
 }
 
@@ -93,6 +100,20 @@ impl<T: Sample, const CHANNELS: usize> Kernel for Row<'_, T, CHANNELS> {
     fn run<S: Simd>(self, _simd: S) {
         let codes = T::codes();
         let blocks = self.out.as_chunks_mut::<CHANNELS>().0.chunks_mut(LANES).zip(self.row.chunks(LANES));
+        if let Some(veil) = self.veil {
+            for ((out, pixels), veil) in blocks.zip(veil.chunks(LANES)) {
+                let (mut lanes, mut veils) = ([[0.0; LANES]; 4], [[0.0; LANES]; 3]);
+                for (i, (pixel, veil)) in pixels.iter().zip(veil).enumerate() {
+                    (0..4).for_each(|c| lanes[c][i] = pixel[c]);
+                    (0..3).for_each(|c| veils[c][i] = veil[c]);
+                }
+                self.developer.develop_glass(&mut lanes, &veils);
+                for (i, out) in out.iter_mut().enumerate() {
+                    *out = std::array::from_fn(|c| T::code(codes, lanes[c][i]));
+                }
+            }
+            return;
+        }
         let mut last = ([[f32::NAN; 4]; LANES], [[T::default(); 4]; LANES]);
         for (out, pixels) in blocks {
             // Large parts of a picture are one colour.
@@ -137,10 +158,29 @@ impl<'a> Developer<'a> {
         lanes.map(|[c]| c)
     }
 
+    /// The same before a background that comes through glass, too.
+    pub(crate) fn coded_through_glass(&self, pixel: [f32; 4], veil: [f32; 3]) -> [f32; 4] {
+        let mut lanes = pixel.map(|c| [c]);
+        self.coded_glass(&mut lanes, &veil.map(|c| [c]));
+        lanes.map(|[c]| c)
+    }
+
     /// The same for pixels side by side, each channel in a row of its own.
     #[inline(always)]
     pub(crate) fn coded_lanes<const N: usize>(&self, pixels: &mut [[f32; N]; 4]) {
         self.develop(pixels);
+        self.code(pixels);
+    }
+
+    /// The same before a background that comes through glass, too ([`Picture::veil`]).
+    #[inline(always)]
+    pub(crate) fn coded_glass<const N: usize>(&self, pixels: &mut [[f32; N]; 4], veil: &[[f32; N]; 3]) {
+        self.develop_glass(pixels, veil);
+        self.code(pixels);
+    }
+
+    #[inline(always)]
+    fn code<const N: usize>(&self, pixels: &mut [[f32; N]; 4]) {
         let [r, g, b, coverage] = pixels;
         for channel in [r, g, b] {
             for i in 0..N {
@@ -185,6 +225,27 @@ impl<'a> Developer<'a> {
             *coverage = [1.0; N];
         }
     }
+
+    /// The same where glass stands before the background. What is seen of a surface that covers a part of a pixel is developed as
+    /// if it covered all of it, and then taken as often; what glass shows by itself, a lamp in it, covers next to nothing and may
+    /// be brighter than that allows: it is developed as it is.
+    #[inline(always)]
+    fn develop_glass<const N: usize>(&self, pixels: &mut [[f32; N]; 4], veil: &[[f32; N]; 3]) {
+        let mut shown = [[0.0; N]; 3];
+        for (shown, channel) in shown.iter_mut().zip(&*pixels) {
+            (0..N).for_each(|i| shown[i] = channel[i] * self.gain);
+        }
+        self.output.tone_map.map_lanes(&mut shown);
+        let (covered, behind) = (pixels[3], self.output.background.unwrap_or_default());
+        self.develop(pixels);
+        for (c, ((channel, shown), veil)) in pixels.iter_mut().zip(&shown).zip(veil).enumerate() {
+            for i in 0..N {
+                let part = covered[i].clamp(0.0, 1.0);
+                let alone = shown[i] + behind[c] * (1.0 - part);
+                channel[i] = if alone > channel[i] { alone } else { channel[i] } + veil[i];
+            }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -193,7 +254,7 @@ mod tests {
     use crate::image::ToneMap;
 
     fn one(pixel: [f32; 4], output: &Output) -> (u32, Vec<u8>) {
-        let picture = Picture { width: 1, height: 1, beauty: vec![pixel], layers: None };
+        let picture = Picture::of(1, 1, vec![pixel]);
         let raster = raster(&picture, output);
         (raster.channels, raster.samples)
     }
@@ -251,9 +312,24 @@ mod tests {
     }
 
     #[test]
+    fn glass_takes_its_colour_off_the_background_at_every_exposure_and_shows_lamps() {
+        for exposure in [-3.0, 0.0, 3.0] {
+            let output = Output { exposure, background: Some([0.5; 3]), ..Output::default() };
+            // Glass of a red that lets 1, 0.2 and 0.2 through, and clear glass with a lamp in it.
+            let light = 44.0 * libm::exp2f(-exposure);
+            let beauty = vec![[0.0, 0.0, 0.0, 0.8], [light, light, light, 0.08]];
+            let veil = vec![[0.4, 0.0, 0.0], [0.0; 3]];
+            let raster: Raster<u8> = raster(&Picture { width: 2, height: 1, beauty, layers: None, veil }, &output);
+            let (glass, lamp) = raster.samples.split_at(3);
+            assert_eq!(glass, [0.5, 0.1, 0.1].map(srgb::encode8), "{exposure}");
+            assert!(lamp.iter().all(|&c| c > 250), "{lamp:?}");
+        }
+    }
+
+    #[test]
     fn sixteen_bits_hold_finer_steps() {
         let beauty = vec![[0.125, 0.125_02, 0.0, 0.25]];
-        let picture = Picture { width: 1, height: 1, beauty, layers: None };
+        let picture = Picture::of(1, 1, beauty);
         let raster: Raster<u16> = raster(&picture, &plain());
         assert_eq!(raster.samples[3], 16_384);
         assert_ne!(raster.samples[0], raster.samples[1]);

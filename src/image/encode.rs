@@ -21,6 +21,9 @@ fn check_shape(picture: &Picture) -> Result<(), ImageError> {
     if pixels == 0 || picture.beauty.len() != pixels {
         return Err(fault("beauty", picture.beauty.len()));
     }
+    if !picture.veil.is_empty() && picture.veil.len() != pixels {
+        return Err(fault("veil", picture.veil.len()));
+    }
     let Some(layers) = &picture.layers else { return Ok(()) };
     let own = [
         ("albedo", layers.albedo.len()),
@@ -45,8 +48,9 @@ mod tests {
         let layers = Layers { depth: vec![0.0; 3], ..Layers::default() };
         let faulty = [
             Picture::default(),
-            Picture { width: 2, height: 2, beauty: vec![[0.0; 4]; 3], layers: None },
-            Picture { width: 2, height: 2, beauty: vec![[0.0; 4]; 4], layers: Some(layers) },
+            Picture::of(2, 2, vec![[0.0; 4]; 3]),
+            Picture { layers: Some(layers), ..Picture::of(2, 2, vec![[0.0; 4]; 4]) },
+            Picture { veil: vec![[0.0; 3]; 2], ..Picture::of(2, 2, vec![[0.0; 4]; 4]) },
         ];
         for picture in &faulty {
             for kind in FileKind::ALL {
@@ -58,7 +62,7 @@ mod tests {
 
     #[test]
     fn one_pixel_is_a_picture_in_every_format() {
-        let picture = Picture { width: 1, height: 1, beauty: vec![[0.5; 4]], layers: None };
+        let picture = Picture::of(1, 1, vec![[0.5; 4]]);
         for kind in FileKind::ALL {
             assert!(encode(&picture, kind, &Output::default(), &Metadata::new()).is_ok(), "{kind}");
         }
@@ -67,7 +71,7 @@ mod tests {
     #[test]
     fn the_number_of_threads_does_not_show() {
         let beauty = (0..97 * 61).map(|i| [i as f32 * 1e-3, 0.3, 0.1, (i % 9) as f32 / 8.0]).collect();
-        let picture = Picture { width: 97, height: 61, beauty, layers: None };
+        let picture = Picture::of(97, 61, beauty);
         for kind in FileKind::ALL {
             let bytes = [1, 2, 7].map(|threads| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

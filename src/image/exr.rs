@@ -80,7 +80,7 @@ fn channels(picture: &Picture, output: &Output) -> SmallVec<[AnyChannel<FlatSamp
 
     let mut list = SmallVec::new();
     for (i, name) in ["R", "G", "B", "A"].into_iter().enumerate() {
-        let values = picture.beauty.iter().map(|&p| over(p, output.background)[i]);
+        let values = (0..).zip(&picture.beauty).map(|(at, &p)| over(p, output.background, picture.veil.get(at))[i]);
         list.push(color(name, values.collect()));
     }
     let Some(layers) = &picture.layers else { return list };
@@ -118,10 +118,11 @@ fn half(x: f32) -> f16 {
 }
 
 /// A premultiplied pixel over a background.
-fn over(pixel: [f32; 4], background: Option<[f32; 3]>) -> [f32; 4] {
-    let Some([r, g, b]) = background else { return pixel };
-    let through = 1.0 - pixel[3];
-    [pixel[0] + r * through, pixel[1] + g * through, pixel[2] + b * through, 1.0]
+fn over(pixel: [f32; 4], background: Option<[f32; 3]>, veil: Option<&[f32; 3]>) -> [f32; 4] {
+    let Some(behind) = background else { return pixel };
+    let (through, veil) = (1.0 - pixel[3], veil.copied().unwrap_or_default());
+    let [r, g, b] = [0, 1, 2].map(|c| pixel[c] + behind[c] * through + veil[c]);
+    [r, g, b, 1.0]
 }
 
 /// Puts the header's attributes into the order of their names. The encoder keeps ours in a hash map, whose order
@@ -196,7 +197,7 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<(Picture, Vec<Stri
         2 => Some("part 2".to_owned()),
         parts => Some(format!("parts 2 to {parts}")),
     });
-    Ok((Picture { width: as_u32(width), height: as_u32(height), beauty, layers }, left_out))
+    Ok((Picture { layers, ..Picture::of(as_u32(width), as_u32(height), beauty) }, left_out))
 }
 
 /// The channels of a part, found by name.
@@ -314,7 +315,7 @@ mod tests {
             ],
         };
         let beauty = (0..n).map(|i| [i as f32 * 0.123, 1e-3, 70_000.0, 0.7]).collect();
-        Picture { width: 7, height: 5, beauty, layers: Some(layers) }
+        Picture { layers: Some(layers), ..Picture::of(7, 5, beauty) }
     }
 
     fn output(exr_samples: ExrSamples) -> Output {
@@ -370,7 +371,7 @@ mod tests {
 
     #[test]
     fn a_background_is_laid_behind_in_linear_light() {
-        let picture = Picture { width: 1, height: 1, beauty: vec![[2.0, 0.0, 0.25, 0.5]], layers: None };
+        let picture = Picture::of(1, 1, vec![[2.0, 0.0, 0.25, 0.5]]);
         let output = Output { background: Some([1.0, 0.5, 0.0]), ..output(ExrSamples::Float) };
         let bytes = encode(&picture, &output, &Metadata::default()).unwrap();
         assert_eq!(decode(&bytes, 1).unwrap().0.beauty, vec![[2.5, 0.25, 0.25, 1.0]]);

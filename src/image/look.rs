@@ -47,15 +47,17 @@ pub fn as_is() -> Output {
     Output { tone_map: ToneMap::None, ..Output::default() }
 }
 
-/// A picture as light of the display, through the tone map and exposure of `output`: premultiplied, 0..=1.
+/// A picture as light of the display, through the tone map and exposure of `output`: premultiplied, 0..=1, and what comes through
+/// glass of a known background added.
 pub fn developed(picture: &Picture, output: &Output) -> Picture {
     let output = Output { background: None, ..output.clone() };
     let developer = Developer::new(&output);
-    let pixel = |&p: &[f32; 4]| {
+    let pixel = |(i, &p): (usize, &[f32; 4])| {
         let [r, g, b, a] = developer.pixel(p);
-        [r * a, g * a, b * a, a]
+        let [x, y, z] = picture.veil.get(i).copied().unwrap_or_default();
+        [r * a + x, g * a + y, b * a + z, a]
     };
-    Picture { beauty: picture.beauty.iter().map(pixel).collect(), layers: None, ..*picture }
+    Picture::of(picture.width, picture.height, picture.beauty.iter().enumerate().map(pixel).collect())
 }
 
 #[cfg(test)]
@@ -63,7 +65,7 @@ mod tests {
     use super::*;
 
     fn of(pixels: &[[f32; 4]]) -> Picture {
-        Picture { width: pixels.len() as u32, height: 1, beauty: pixels.to_vec(), layers: None }
+        Picture::of(pixels.len() as u32, 1, pixels.to_vec())
     }
 
     #[test]

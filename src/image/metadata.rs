@@ -146,7 +146,7 @@ mod tests {
 
     fn picture() -> Picture {
         let beauty = (0..6).map(|i| [i as f32 * 0.1, 0.5, 0.25, 0.5 + i as f32 * 0.1]).collect();
-        Picture { width: 3, height: 2, beauty, layers: None }
+        Picture::of(3, 2, beauty)
     }
 
     fn write(dir: &tempfile::TempDir, name: &str, bytes: &[u8]) -> std::path::PathBuf {

@@ -42,6 +42,16 @@ pub struct Picture {
     pub beauty: Vec<[f32; 4]>,
     /// What else was asked for (`--layers`).
     pub layers: Option<Layers>,
+    /// Light of a known background that comes through glass beyond what alpha leaves of it, by its colour: laid behind like the
+    /// background, neither exposed nor tone mapped. Empty, or `width × height` values where glass stands before a background.
+    pub veil: Vec<[f32; 3]>,
+}
+
+impl Picture {
+    /// The beauty alone.
+    pub fn of(width: u32, height: u32, beauty: Vec<[f32; 4]>) -> Self {
+        Self { width, height, beauty, layers: None, veil: Vec::new() }
+    }
 }
 
 /// Per-pixel facts beside the beauty; each array is empty or `width × height` long.

@@ -54,7 +54,7 @@ pub(super) fn decode(bytes: &[u8], kind: FileKind, max_pixels: u64) -> Result<Pi
         [r, g, b, part]
     };
     let (width, height) = pixels.dimensions();
-    Ok(Picture { width, height, beauty: pixels.pixels().map(|p| premultiplied(p.0)).collect(), layers: None })
+    Ok(Picture::of(width, height, pixels.pixels().map(|p| premultiplied(p.0)).collect()))
 }
 
 fn finish(
@@ -78,7 +78,7 @@ mod tests {
 
     fn picture() -> Picture {
         let beauty = (0..64 * 48).map(|i| if i % 64 < 32 { [0.5, 0.0, 0.0, 1.0] } else { [0.0; 4] }).collect();
-        Picture { width: 64, height: 48, beauty, layers: None }
+        Picture::of(64, 48, beauty)
     }
 
     fn output() -> Output {
@@ -119,7 +119,7 @@ mod tests {
 
     #[test]
     fn sizes_the_format_cannot_hold_are_refused_with_a_remedy() {
-        let wide = Picture { width: 16_385, height: 1, beauty: vec![[0.0; 4]; 16_385], layers: None };
+        let wide = Picture::of(16_385, 1, vec![[0.0; 4]; 16_385]);
         let message = encode_webp(&wide, &output(), &Metadata::default()).unwrap_err().to_string();
         assert!(message.contains("16385×1") && message.contains(".png"), "{message}");
         let long = Metadata::new().with(Metadata::COUNTS, "x".repeat(70_000));

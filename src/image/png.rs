@@ -103,7 +103,7 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<Picture, ImageErro
             [] => [0.0; 4],
         })
         .collect();
-    Ok(Picture { width, height, beauty, layers: None })
+    Ok(Picture::of(width, height, beauty))
 }
 
 #[cfg(test)]
@@ -117,7 +117,7 @@ mod tests {
             let a = (i % 5 + 1) as f32 / 5.0;
             [i as f32 * 0.01 % 1.0 * a, 0.5 * a, 0.25 * a, a]
         };
-        Picture { width, height, beauty: (0..width * height).map(pixel).collect(), layers: None }
+        Picture::of(width, height, (0..width * height).map(pixel).collect())
     }
 
     fn output(png_depth: PngDepth) -> Output {
@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn an_opaque_picture_is_rgb_and_says_srgb() {
-        let picture = Picture { width: 1, height: 1, beauty: vec![[0.5, 0.5, 0.5, 1.0]], layers: None };
+        let picture = Picture::of(1, 1, vec![[0.5, 0.5, 0.5, 1.0]]);
         let bytes = encode(&picture, &output(PngDepth::Eight), &Metadata::default()).unwrap();
         let reader = Decoder::new(Cursor::new(&bytes)).read_info().unwrap();
         assert_eq!(reader.info().color_type, ColorType::Rgb);

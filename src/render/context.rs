@@ -71,6 +71,8 @@ pub(crate) struct Context<'a> {
     pub is_dark: bool,
     /// Points that are shaded before what waits of their rays may be traced; a multiple of [`LANES`].
     pub points_at_a_time: usize,
+    /// Whether the background may be seen through glass.
+    pub lets_background_through: bool,
     /// Bounces after the eye ray.
     pub depth: u32,
     /// Branches whose largest weight is below this end.
@@ -139,6 +141,7 @@ impl<'a> Context<'a> {
             has_filters: needs(&[Feature::Mask, Feature::Blend, Feature::ThinTransmission, Feature::Refraction]),
             absorption: Absorption::of(&scene.materials, everything),
             shows_environment: scene.background == Some(Background::Environment),
+            lets_background_through: features.has(Feature::ThinTransmission) || features.has(Feature::Refraction),
             depth,
             cutoff: settings.cutoff,
             everything,

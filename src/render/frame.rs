@@ -31,6 +31,8 @@ pub(super) struct Frame<'a> {
     /// What the eye is inside of.
     inside: Media,
     pub background: Option<Vec3>,
+    /// Whether glass may stand before it.
+    pub has_veil: bool,
     /// How many standard errors of a pixel its allowed error must be; found by a search, so once for all tiles.
     pub standard_errors: f32,
 }
@@ -60,7 +62,8 @@ impl<'a> Frame<'a> {
             Sampling::Uniform | Sampling::Adaptive(_) => 0.0,
         };
         let (scene, inside) = (Ball::new(context), media_around(context, accel, view));
-        Self { view, settings, offsets, sample_width, scene, inside, background, standard_errors }
+        let has_veil = background.is_some() && context.lets_background_through;
+        Self { view, settings, offsets, sample_width, scene, inside, background, has_veil, standard_errors }
     }
 
     /// Where eye rays come from.
@@ -147,34 +150,42 @@ impl Sum {
         }
     }
 
-    /// A pixel from its samples: premultiplied RGBA.
+    /// A pixel from its samples: premultiplied RGBA, and its [`Picture::veil`].
     ///
     /// Alpha is one minus the share of the background that shows through. Coloured glass lets it through by channels; there
-    /// is one alpha, so before a known background colour the least channel is left to the image writer and what the others
-    /// show more is added here, and without one their mean is left to it.
+    /// is one alpha, so before a known background colour the least channel is left to it and what the others show more is the
+    /// veil, and without one it stands for their mean.
     #[inline(always)]
-    pub(super) fn resolve(&self, background: Option<Vec3>) -> [f32; 4] {
+    pub(super) fn resolve(&self, background: Option<Vec3>) -> ([f32; 4], Vec3) {
         let share = 1.0 / self.weight.max(f32::MIN_POSITIVE);
-        let mut color = self.radiance * share;
+        let color = self.radiance * share;
         let through = (self.through * share).clamp(Vec3::ZERO, Vec3::ONE);
-        let clear = match background {
+        let (clear, veil) = match background {
             Some(background) => {
                 let least = through.min_element();
-                color += (through - Vec3::splat(least)) * background;
-                least
+                (least, (through - Vec3::splat(least)) * background)
             }
-            None if through.x == through.y && through.y == through.z => through.x,
-            None => through.element_sum() / 3.0,
+            None if through.x == through.y && through.y == through.z => (through.x, Vec3::ZERO),
+            None => (through.element_sum() / 3.0, Vec3::ZERO),
         };
         // A sum of finite parts can still overflow.
         let color = if color.is_finite() { color } else { color.min(Vec3::splat(f32::MAX)).max(Vec3::ZERO) };
-        color.extend(1.0 - clear).to_array()
+        (color.extend(1.0 - clear).to_array(), veil)
     }
 }
 
 /// Adds pixels to `to`, each from as many samples: all of its own.
 pub(super) fn resolve_each(samples: &[Sample], per_pixel: usize, background: Option<Vec3>, to: &mut Vec<[f32; 4]>) {
     Level::best().run(Resolve { samples, per_pixel, background, to });
+}
+
+/// The veils of the same pixels.
+pub(super) fn veil_each(samples: &[Sample], per_pixel: usize, background: Option<Vec3>, to: &mut Vec<[f32; 3]>) {
+    for samples in samples.chunks(per_pixel.max(1)) {
+        let mut sum = Sum::default();
+        samples.iter().for_each(|sample| sum.add(sample));
+        to.push(sum.resolve(background).1.to_array());
+    }
 }
 
 struct Resolve<'a> {
@@ -212,7 +223,7 @@ impl Kernel for Resolve<'_> {
             }
             let [r, g, b, x, y, z, ..] = s.store(sum);
             let sum = Sum { radiance: Vec3::new(r, g, b), through: Vec3::new(x, y, z), weight };
-            to.push(sum.resolve(background));
+            to.push(sum.resolve(background).0);
             first = end;
         }
     }

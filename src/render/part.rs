@@ -7,7 +7,7 @@ use super::sampling::{ErrorSpace, Sampling};
 use super::tile::{TILE, Tile, TilePixels, render_some};
 use super::whitted::ByClass;
 use super::{Job, Progress, Settings};
-use crate::image::Developer;
+use crate::image::{Developer, Picture};
 use crate::math::Vec3;
 use crate::scene::Background;
 use std::collections::BTreeSet;
@@ -119,7 +119,7 @@ impl<P: Observer> Part<P> {
 
 /// Mean squared error of one of two renderings that have only noise in which to differ, for each square.
 pub(super) fn squared_errors<P, Q>(measure: &Measure, a: &Part<P>, b: &Part<Q>) -> Vec<f64> {
-    a.squares.iter().zip(&b.squares).map(|(a, b)| 0.5 * measure.mean_square(&a.beauty, &b.beauty)).collect()
+    a.squares.iter().zip(&b.squares).map(|(a, b)| 0.5 * measure.mean_square(a.into(), b.into())).collect()
 }
 
 /// The numbers in which errors of a picture are counted.
@@ -146,19 +146,47 @@ impl Measure {
     }
 
     /// Mean over pixels and channels of the squared difference of two pictures.
-    pub(super) fn mean_square(&self, a: &[[f32; 4]], b: &[[f32; 4]]) -> f64 {
+    pub(super) fn mean_square(&self, a: Shown, b: Shown) -> f64 {
         let developer = self.output.as_ref().map(Developer::new);
         let behind = self.background.unwrap_or(Vec3::ZERO).extend(1.0).to_array();
-        let written = |&pixel: &[f32; 4]| match &developer {
-            Some(developer) => developer.coded(pixel),
-            None if self.background.is_some() => [0, 1, 2, 3].map(|c: usize| pixel[c] + behind[c] * (1.0 - pixel[3])),
-            None => pixel,
+        let written = |shown: Shown, at: usize| {
+            let (pixel, veil) = (shown.beauty[at], shown.veil.get(at));
+            match (&developer, veil) {
+                (Some(developer), None) => developer.coded(pixel),
+                (Some(developer), Some(&veil)) => developer.coded_through_glass(pixel, veil),
+                (None, _) if self.background.is_some() => {
+                    let [x, y, z] = veil.copied().unwrap_or_default();
+                    let veil = [x, y, z, 0.0];
+                    [0, 1, 2, 3].map(|c: usize| pixel[c] + behind[c] * (1.0 - pixel[3]) + veil[c])
+                }
+                (None, _) => pixel,
+            }
         };
-        let square = |(a, b): (&[f32; 4], &[f32; 4])| {
-            let (a, b) = (written(a), written(b));
+        let square = |at| {
+            let (a, b) = (written(a, at), written(b, at));
             (0..self.channels).map(|c| f64::from(a[c] - b[c]).powi(2)).sum::<f64>()
         };
-        a.iter().zip(b).map(square).sum::<f64>() / (a.len() * self.channels).max(1) as f64
+        let pixels = a.beauty.len().min(b.beauty.len());
+        (0..pixels).map(square).sum::<f64>() / (pixels * self.channels).max(1) as f64
+    }
+}
+
+/// What pixels show: [`Picture::beauty`], and [`Picture::veil`] where there is any.
+#[derive(Clone, Copy)]
+pub(super) struct Shown<'a> {
+    pub beauty: &'a [[f32; 4]],
+    pub veil: &'a [[f32; 3]],
+}
+
+impl<'a> From<&'a Picture> for Shown<'a> {
+    fn from(picture: &'a Picture) -> Self {
+        Self { beauty: &picture.beauty, veil: &picture.veil }
+    }
+}
+
+impl<'a> From<&'a TilePixels> for Shown<'a> {
+    fn from(pixels: &'a TilePixels) -> Self {
+        Self { beauty: &pixels.beauty, veil: &pixels.veil }
     }
 }
 
@@ -176,6 +204,22 @@ impl Progress for Quiet<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::image::{ToneMap, srgb};
+
+    #[test]
+    fn what_comes_through_glass_is_a_part_of_what_differs() {
+        let background = Vec3::splat(0.5);
+        let (beauty, veils) = (vec![[0.0, 0.0, 0.0, 0.75]; 4], [vec![[0.25, 0.0, 0.0]; 4], vec![[0.0; 3]; 4]]);
+        for space in [ErrorSpace::Display { tone_map: ToneMap::default(), exposure: 0.0 }, ErrorSpace::Linear] {
+            let output = output(space, Some(background));
+            let measure = Measure { output, background: Some(background), channels: 3 };
+            let [a, b] = [0, 1].map(|i| Shown { beauty: &beauty, veil: &veils[i] });
+            let red = |veil: f64| if measure.output.is_some() { srgb::encode(0.125 + veil) } else { 0.125 + veil };
+            let expected = (red(0.25) - red(0.0)).powi(2) / 3.0;
+            assert!((measure.mean_square(a, b) - expected).abs() < 1e-4 * expected, "{}", measure.output.is_some());
+            assert_eq!(measure.mean_square(a, a), 0.0);
+        }
+    }
 
     #[test]
     fn squares_are_a_hundredth_of_a_large_picture_and_all_of_a_small_one() {

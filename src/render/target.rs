@@ -180,7 +180,7 @@ pub(super) fn render<P: Observer>(
         let measure = Measure::of(job);
         let other = one(&plan.settings(job.settings, 1));
         whole.complete = other.complete;
-        let both = measure.mean_square(&whole.picture.beauty, &other.picture.beauty);
+        let both = measure.mean_square((&whole.picture).into(), (&other.picture).into());
         // Half of the difference is what each is off their mean.
         estimate = 0.5 * both.sqrt();
         mix(&mut whole, &other, 0.5);
@@ -192,7 +192,7 @@ pub(super) fn render<P: Observer>(
             plan.aim(last, plan.missing(estimate, target));
             let other = one(&plan.settings(job.settings, number));
             whole.complete = other.complete;
-            let both = measure.mean_square(&whole.picture.beauty, &other.picture.beauty);
+            let both = measure.mean_square((&whole.picture).into(), (&other.picture).into());
             let own = (both - estimate * estimate).max(0.0);
             let part = estimate * estimate / (estimate * estimate + own);
             estimate = (estimate * estimate * (1.0 - part).powi(2) + own * part.powi(2)).sqrt();
@@ -233,6 +233,9 @@ fn mix(whole: &mut Rendered, other: &Rendered, part: f32) {
 fn mix_pictures(whole: &mut Picture, other: &Picture, part: f32) {
     for (pixel, more) in whole.beauty.iter_mut().zip(&other.beauty) {
         (0..4).for_each(|c| pixel[c] = pixel[c] * (1.0 - part) + more[c] * part);
+    }
+    for (veil, more) in whole.veil.iter_mut().zip(&other.veil) {
+        (0..3).for_each(|c| veil[c] = veil[c] * (1.0 - part) + more[c] * part);
     }
 }
 

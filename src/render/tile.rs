@@ -6,7 +6,7 @@
 
 use super::context::Context;
 use super::eyes::Ball;
-use super::frame::{Frame, resolve_each};
+use super::frame::{Frame, resolve_each, veil_each};
 use super::layers::{self, Facts, LayerPixel};
 use super::observer::Observer;
 use super::pixel::sample_offsets;
@@ -43,6 +43,8 @@ pub(super) struct Tile {
 pub(super) struct TilePixels {
     pub tile: Tile,
     pub beauty: Vec<[f32; 4]>,
+    /// Where the frame has any.
+    pub veil: Vec<[f32; 3]>,
     pub layers: Vec<LayerPixel>,
     /// Empty where every pixel has equally many samples.
     pub facts: Vec<PixelFacts>,
@@ -115,7 +117,7 @@ pub(crate) fn render_tiles<A: Accel, P: Observer>(
     progress: &dyn Progress,
 ) -> (Picture, Sampled, Vec<ByClass<P>>, bool) {
     let frame = Frame::new(context, accel, view, settings);
-    let whole = Mutex::new(Whole::new(settings));
+    let whole = Mutex::new(Whole::new(settings, frame.has_veil));
     let keep = |pixels: TilePixels| whole.lock().unwrap_or_else(PoisonError::into_inner).keep(&pixels);
     let tiles = tiles(settings.width, settings.height);
     let (counts, complete) = match &settings.sampling {
@@ -142,7 +144,7 @@ struct Whole {
 
 impl Whole {
     /// Nothing yet.
-    fn new(settings: &Settings) -> Self {
+    fn new(settings: &Settings, has_veil: bool) -> Self {
         let pixels = settings.width as usize * settings.height as usize;
         let mut sampled = Sampled { pixels: pixels as u64, ..Sampled::default() };
         if settings.sampling != Sampling::Uniform {
@@ -151,7 +153,8 @@ impl Whole {
         if matches!(settings.sampling, Sampling::Stochastic(_)) {
             sampled.errors = vec![0.0; pixels];
         }
-        Self { picture: empty_picture(settings), sampled }
+        let veil = vec![[0.0; 3]; if has_veil { pixels } else { 0 }];
+        Self { picture: Picture { veil, ..empty_picture(settings) }, sampled }
     }
 
     fn keep(&mut self, pixels: &TilePixels) {
@@ -161,6 +164,9 @@ impl Whole {
         pixels.tile.runs().for_each(|((x, y), count)| {
             let start = y as usize * width + x as usize;
             picture.beauty[start..start + count].copy_from_slice(&pixels.beauty[from..from + count]);
+            if let Some(veil) = picture.veil.get_mut(start..start + count) {
+                veil.copy_from_slice(&pixels.veil[from..from + count]);
+            }
             for (i, facts) in (start..).zip(pixels.facts.iter().skip(from).take(count)) {
                 sampled.counts[i] = facts.count;
                 sampled.errors.get_mut(i).into_iter().for_each(|error| *error = facts.error);
@@ -314,6 +320,7 @@ fn empty_picture(settings: &Settings) -> Picture {
         height: settings.height,
         beauty: vec![[0.0; 4]; pixels],
         layers: settings.layers.then(|| layers::empty(pixels)),
+        veil: Vec::new(),
     }
 }
 
@@ -402,6 +409,7 @@ impl TilePixels {
         Self {
             tile,
             beauty: Vec::new(),
+            veil: Vec::new(),
             layers: Vec::new(),
             facts: Vec::new(),
             rays: 0,
@@ -418,6 +426,9 @@ impl Frame<'_> {
         let per_pixel = self.offsets.len();
         self.trace(tracer, tile, batch_pixels(per_pixel), |tracer| {
             resolve_each(&tracer.samples, per_pixel, self.background, &mut done.beauty);
+            if self.has_veil {
+                veil_each(&tracer.samples, per_pixel, self.background, &mut done.veil);
+            }
             let layer = |f: &[Facts]| LayerPixel::new(f, self.view.eye, self.view.forward);
             done.layers.extend(tracer.facts.chunks(per_pixel).map(layer));
         })?;

@@ -8,7 +8,7 @@ fn picture(odd: f32) -> Picture {
     let mut beauty = vec![[0.25, 0.25, 0.25, 1.0]; 40 * 30];
     beauty[12 * 40 + 7] = [odd, 0.25, 0.25, 1.0];
     let layers = Layers { depth: vec![odd; 40 * 30], ..Layers::default() };
-    Picture { width: 40, height: 30, beauty, layers: Some(layers) }
+    Picture { layers: Some(layers), ..Picture::of(40, 30, beauty) }
 }
 
 fn bytes(picture: &Picture, kind: FileKind) -> Vec<u8> {
@@ -112,7 +112,7 @@ fn maps_are_drawn_and_kept_only_where_they_are_asked_for() {
 #[test]
 fn what_cannot_be_compared_is_told() {
     let folder = folder()
-        .file("small.png", bytes(&Picture { width: 1, height: 1, beauty: vec![[0.0; 4]], layers: None }, FileKind::Png))
+        .file("small.png", bytes(&Picture::of(1, 1, vec![[0.0; 4]]), FileKind::Png))
         .file("text.png", b"no picture");
     folder.run(&["diff", "a.png", "small.png"]).ends(3).says(&["small.png", "1×1", "40×30"]);
     folder.run(&["diff", "a.png", "text.png"]).ends(3).says(&["text.png", "neither"]);
@@ -135,7 +135,7 @@ fn what_is_drawn_replaces_neither_picture_and_each_drawing_is_a_file_of_its_own(
 
 #[test]
 fn a_pixel_that_is_no_number_breaks_limits_and_is_not_called_equal() {
-    let grey = Picture { width: 4, height: 4, beauty: vec![[0.5, 0.5, 0.5, 1.0]; 16], layers: None };
+    let grey = Picture::of(4, 4, vec![[0.5, 0.5, 0.5, 1.0]; 16]);
     let mut odd = grey.clone();
     odd.beauty[5] = [f32::NAN, 0.5, 0.5, 1.0];
     let folder = Folder::new().file("a.exr", bytes(&grey, FileKind::Exr)).file("b.exr", bytes(&odd, FileKind::Exr));

@@ -27,7 +27,7 @@ pub struct Folder(TempDir);
 
 /// A folder with a cube whose material has a texture, `cube.jpg`.
 pub fn textured_cube() -> Folder {
-    let white = Picture { width: 2, height: 2, beauty: vec![[1.0; 4]; 4], layers: None };
+    let white = Picture::of(2, 2, vec![[1.0; 4]; 4]);
     let texture = encode(&white, FileKind::Jpeg, &Output::default(), &Metadata::default()).unwrap();
     Folder::new()
         .file("cube.obj", format!("mtllib cube.mtl\nusemtl a\n{CUBE}"))

@@ -84,7 +84,7 @@ fn a_difference_fails_and_is_drawn() {
     let grey = |width: u32, odd: f32| {
         let mut beauty = vec![[0.5, 0.5, 0.5, 1.0]; width as usize * 10];
         beauty[7][0] = odd;
-        let picture = Picture { width, height: 10, beauty, layers: None };
+        let picture = Picture::of(width, 10, beauty);
         encode(&picture, FileKind::Png, &plain(), &Metadata::default()).unwrap()
     };
     let stored = grey(10, 0.5);

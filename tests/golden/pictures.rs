@@ -545,7 +545,7 @@ fn golden_tone_maps_bend_bright_light_each_in_its_way() {
         let hue = [[1.0, 1.0, 1.0], [1.0, 0.3, 0.1], [0.2, 0.9, 0.2], [0.15, 0.3, 1.0]][usize::from(y / 6)];
         [hue[0] * light, hue[1] * light, hue[2] * light, 1.0]
     };
-    let picture = Picture { width: 96, height: 24, beauty: (0..96 * 24).map(pixel).collect(), layers: None };
+    let picture = Picture::of(96, 24, (0..96 * 24).map(pixel).collect());
     let through = |tone_map: ToneMap| Output { tone_map, ..plain() };
     check_all(&[
         ("tone-map-none", &picture, &through(ToneMap::None)),
@@ -603,11 +603,8 @@ fn golden_layers_show_normals_and_albedo() {
     stage.sun([-0.3, -1.0, -0.4], 0.9);
     let picture = stage.render();
     let layers = picture.layers.as_ref().unwrap();
-    let show = |colors: Vec<[f32; 3]>| Picture {
-        width: picture.width,
-        height: picture.height,
-        beauty: colors.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect(),
-        layers: None,
+    let show = |colors: Vec<[f32; 3]>| {
+        Picture::of(picture.width, picture.height, colors.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect())
     };
     let normal = show(layers.normal.iter().map(|n| n.map(|c| c * 0.5 + 0.5)).collect());
     let albedo = show(layers.albedo.clone());

@@ -140,7 +140,7 @@ fn cut(width: u32, pixels: &[[f64; 4]], (x, y): (u32, u32)) -> Picture {
         [r, g, b, 1.0]
     };
     let beauty = down.flat_map(|y| across.clone().map(move |x| y * columns + x)).map(|i| opaque(&pixels[i])).collect();
-    Picture { width, height, beauty, layers: None }
+    Picture::of(width, height, beauty)
 }
 
 #[cfg(test)]

@@ -28,7 +28,7 @@ impl Reference {
     pub(super) fn render(subject: &Subject, plan: &Plan, go_on: &mut dyn FnMut(u32, u32) -> bool) -> Option<Self> {
         let samples = (plan.reference_samples / PARTS).max(8);
         let how = Stochastic { min_samples: samples, max_samples: samples, ..Stochastic::default() };
-        let mut sums: Vec<[f64; 4]> = Vec::new();
+        let (mut sums, mut veils): (Vec<[f64; 4]>, Vec<[f64; 3]>) = (Vec::new(), Vec::new());
         let mut parts: Vec<Vec<[f64; 4]>> = Vec::new();
         let mut width = 0;
         for part in 0..PARTS {
@@ -46,16 +46,12 @@ impl Reference {
             };
             let picture = render(&subject.job(&settings, subject.accel), &()).picture;
             width = picture.width;
-            sums.resize(picture.beauty.len(), [0.0; 4]);
-            for (sum, pixel) in sums.iter_mut().zip(&picture.beauty) {
-                (0..4).for_each(|c| sum[c] += f64::from(pixel[c]) / f64::from(PARTS));
-            }
+            add(&mut sums, &picture.beauty);
+            add(&mut veils, &picture.veil);
             parts.push(codes(&picture, subject));
         }
-        #[expect(clippy::cast_possible_truncation, reason = "the mean of single numbers as one of them")]
-        let beauty = sums.iter().map(|sum| sum.map(|c| c as f32)).collect();
         let height = u32::try_from(sums.len()).unwrap_or(u32::MAX).checked_div(width).unwrap_or(0);
-        let mean = Picture { width, height, beauty, layers: None };
+        let mean = Picture { veil: means(&veils), ..Picture::of(width, height, means(&sums)) };
         let is_transparent = mean.beauty.iter().any(|p| p[3] != 1.0);
         let pixels = codes(&mean, subject);
         let error = standard_error(&parts, channels(is_transparent));
@@ -66,6 +62,19 @@ impl Reference {
     pub fn channels(&self) -> usize {
         channels(self.is_transparent)
     }
+}
+
+/// Adds the share of one part.
+fn add<const N: usize>(sums: &mut Vec<[f64; N]>, part: &[[f32; N]]) {
+    sums.resize(part.len(), [0.0; N]);
+    for (sum, pixel) in sums.iter_mut().zip(part) {
+        (0..N).for_each(|c| sum[c] += f64::from(pixel[c]) / f64::from(PARTS));
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "the mean of single numbers as one of them")]
+fn means<const N: usize>(sums: &[[f64; N]]) -> Vec<[f32; N]> {
+    sums.iter().map(|sum| sum.map(|c| c as f32)).collect()
 }
 
 /// Bounces that leave nothing out; `None` where the scene needs none at all.

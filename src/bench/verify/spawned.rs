@@ -211,7 +211,7 @@ mod tests {
         let corner = |i: u32| match i {
             0 => Vec3::new(0.3, 0.7, -1.0),
             1 => Vec3::new(0.3, 0.7, 1.0),
-            _ => Vec3::new(1.3, 0.7 + apart * (i / 2) as f32, if i % 2 == 0 { -1.0 } else { 1.0 }),
+            _ => Vec3::new(1.3, 0.7 + apart * (i / 2) as f32, if i.is_multiple_of(2) { -1.0 } else { 1.0 }),
         };
         let leaf = |k: u32| [[0, 2 * k, 2 * k + 1], [0, 2 * k + 1, 1]];
         scenes::mesh((0..2 * LEAVES + 2).map(corner).collect(), (1..=LEAVES).flat_map(leaf).collect())

@@ -83,12 +83,7 @@ mod tests {
     use super::*;
 
     fn grey(width: u32, value: f32, alpha: f32) -> Picture {
-        Picture {
-            width,
-            height: width,
-            beauty: vec![[value, value, value, alpha]; (width * width) as usize],
-            layers: None,
-        }
+        Picture::of(width, width, vec![[value, value, value, alpha]; (width * width) as usize])
     }
 
     #[test]

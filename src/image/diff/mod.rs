@@ -135,7 +135,7 @@ pub fn side_by_side(expected: &Picture, actual: &Picture, gain: f32) -> Picture 
         beauty.extend(left.iter().zip(&right).map(|(&a, &b)| difference_color(a, b, gain)));
         beauty.extend(&right);
     }
-    Picture { width: width * 3, height, beauty, layers: None }
+    Picture::of(width * 3, height, beauty)
 }
 
 fn pixel(picture: &Picture, x: u32, y: u32) -> [f32; 4] {
@@ -167,7 +167,7 @@ mod tests {
     use super::*;
 
     fn of(pixels: &[[f32; 4]]) -> Picture {
-        Picture { width: pixels.len() as u32, height: 1, beauty: pixels.to_vec(), layers: None }
+        Picture::of(pixels.len() as u32, 1, pixels.to_vec())
     }
 
     #[test]

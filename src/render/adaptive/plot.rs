@@ -294,7 +294,11 @@ impl Plot {
         let mut done = TilePixels { rays: self.rays, ..TilePixels::empty(self.tile) };
         let mut points = Vec::new();
         for i in 0..self.pixels.len() {
-            done.beauty.push(self.sum(i).resolve(frame.background));
+            let (pixel, veil) = self.sum(i).resolve(frame.background);
+            done.beauty.push(pixel);
+            if frame.has_veil {
+                done.veil.push(veil.to_array());
+            }
             points.clear();
             self.points(i, &mut points);
             points.sort_unstable();

@@ -241,6 +241,10 @@ impl Certainty<'_> {
             Some(behind) => resolve(sums, Some(behind), &mut rows),
             None => resolve(sums, None, &mut rows),
         }
+        if let (Some(behind), true) = (self.background, self.has_veil) {
+            self.write_glass(&veils(sums, behind), behind, &mut rows);
+            return rows;
+        }
         match (&self.developer, self.background) {
             (Some(developer), _) => developer.coded_lanes(&mut rows),
             (None, None) => {}
@@ -255,6 +259,21 @@ impl Certainty<'_> {
             }
         }
         rows
+    }
+
+    /// Writes the numbers where glass stands before a background.
+    #[inline(always)]
+    fn write_glass(&self, veils: &[Row; 3], behind: Vec3, rows: &mut Rows) {
+        if let Some(developer) = &self.developer {
+            return developer.coded_glass(rows, veils);
+        }
+        let [r, g, b, coverage] = rows;
+        for ((channel, behind), veil) in [r, g, b].into_iter().zip(behind.to_array()).zip(veils) {
+            for i in 0..PIXELS {
+                channel[i] += behind * (1.0 - coverage[i]) + veil[i];
+            }
+        }
+        *coverage = [1.0; PIXELS];
     }
 
     /// What is written without each of the groups.
@@ -307,8 +326,19 @@ impl Certainty<'_> {
 fn resolve(sums: &Sums, background: Option<Vec3>, rows: &mut Rows) {
     let [red, green, blue, coverage] = rows;
     for i in 0..PIXELS {
-        [red[i], green[i], blue[i], coverage[i]] = sums.at(i).resolve(background);
+        [red[i], green[i], blue[i], coverage[i]] = sums.at(i).resolve(background).0;
     }
+}
+
+/// What comes through glass of the background.
+#[inline(always)]
+fn veils(sums: &Sums, background: Vec3) -> [Row; 3] {
+    let mut rows = [[0.0; PIXELS]; 3];
+    let [red, green, blue] = &mut rows;
+    for i in 0..PIXELS {
+        [red[i], green[i], blue[i]] = sums.at(i).resolve(Some(background)).1.to_array();
+    }
+    rows
 }
 
 #[inline(always)]

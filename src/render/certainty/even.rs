@@ -187,7 +187,8 @@ mod tests {
             for (error, level) in
                 [0.02, 0.08].iter().flat_map(|&error| Level::all().into_iter().map(move |l| (error, l)))
             {
-                let judge = Certainty { level, ..Certainty::new(None, background, transparent, error, factor(0.95)) };
+                let judge =
+                    Certainty { level, ..Certainty::new(None, (background, false), transparent, error, factor(0.95)) };
                 let shown = judge.see_samples(&samples);
                 let groups: Vec<[Sum; 1]> = samples.iter().map(|sample| [Sum::of(sample)]).collect();
                 let mut seen = Vec::new();

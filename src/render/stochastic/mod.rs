@@ -14,7 +14,7 @@ mod shared;
 
 use super::Settings;
 use super::certainty::{Certainty, GROUPS, SURE, output};
-use super::frame::{Frame, resolve_each};
+use super::frame::{Frame, resolve_each, veil_each};
 use super::layers::LayerPixel;
 use super::observer::Observer;
 use super::sampling::Stochastic;
@@ -65,7 +65,8 @@ struct Sampler<'a> {
 impl<'a> Sampler<'a> {
     fn new(frame: &'a Frame, how: &'a Stochastic, output: Option<&'a Output>, background: Option<Background>) -> Self {
         let transparent = matches!(background, None | Some(Background::Transparent));
-        let judge = Certainty::new(output, frame.background, transparent, how.error, frame.standard_errors);
+        let judge =
+            Certainty::new(output, (frame.background, frame.has_veil), transparent, how.error, frame.standard_errors);
         Self { frame, how, judge, rounds: rounds(how, frame.settings).collect() }
     }
 
@@ -152,6 +153,7 @@ impl<'a> Sampler<'a> {
         let (pixels, layers) = (tile.pixels(), if frame.settings.layers { tile.pixels() } else { 0 });
         TilePixels {
             beauty: vec![[0.0; 4]; pixels],
+            veil: vec![[0.0; 3]; if frame.has_veil { pixels } else { 0 }],
             facts: vec![PixelFacts { count: 0, spare: 0, error: 0.0, end: End::Ceiling }; pixels],
             layers: vec![LayerPixel::new(&[], frame.view.eye, frame.view.forward); layers],
             ..TilePixels::empty(tile)
@@ -183,15 +185,22 @@ impl<'a> Sampler<'a> {
             let fact = |at| PixelFacts { count: 1, spare: 0, error: even.error(at), end: End::Met };
             done.facts.extend((start..start + count).map(fact));
         });
-        let mut colors = Vec::new();
+        let (mut colors, mut veils) = (Vec::new(), Vec::new());
         for first in first.iter().filter(|first| tile.contains((first.tile.x0, first.tile.y0))) {
             colors.clear();
             resolve_each(&first.samples, 1, frame.background, &mut colors);
+            veils.clear();
+            if frame.has_veil {
+                veil_each(&first.samples, 1, frame.background, &mut veils);
+            }
             let mut from = 0;
             first.tile.runs().for_each(|(at, count)| {
                 // Zones are whole blocks of a tile, so that their runs are its own.
                 let to = tile.number(at);
                 done.beauty[to..to + count].copy_from_slice(&colors[from..from + count]);
+                if let Some(veil) = done.veil.get_mut(to..to + count) {
+                    veil.copy_from_slice(&veils[from..from + count]);
+                }
                 for (layers, facts) in done.layers.iter_mut().skip(to).zip(first.facts.iter().skip(from).take(count)) {
                     *layers = LayerPixel::new(std::slice::from_ref(facts), frame.view.eye, frame.view.forward);
                 }
@@ -223,7 +232,9 @@ impl<'a> Sampler<'a> {
                 continue;
             }
             let i = tile.number(pixel.at);
-            (done.beauty[i], done.facts[i]) = (pixel.sum().resolve(frame.background), pixel.facts);
+            let (color, veil) = pixel.sum().resolve(frame.background);
+            (done.beauty[i], done.facts[i]) = (color, pixel.facts);
+            done.veil.get_mut(i).into_iter().for_each(|to| *to = veil.to_array());
             if let Some(layers) = &pixel.layers {
                 done.layers[i] = layers.pixel(frame.view.eye, frame.view.forward);
             }

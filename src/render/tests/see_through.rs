@@ -103,7 +103,27 @@ fn colored_glass_tints_a_known_background() {
     let mut s = looking_down(5.0);
     let red = Phong { transmission: Vec3::new(1.0, 0.5, 0.25), ..phong() };
     s.square(0.0, 1.0, material(Vec3::ZERO, red)).scene.background = Some(Background::Color(Vec3::splat(0.5)));
-    let [r, g, b, a] = s.render().picture.beauty[0];
-    let over = |c: f32| c + (1.0 - a) * 0.5;
-    assert_eq!([over(r), over(g), over(b)], [0.5, 0.25, 0.125]);
+    let picture = s.render().picture;
+    let (pixel, veil) = (picture.beauty[0], picture.veil[0]);
+    assert_eq!([0, 1, 2].map(|c| pixel[c] + (1.0 - pixel[3]) * 0.5 + veil[c]), [0.5, 0.25, 0.125]);
+}
+
+#[test]
+fn colored_glass_leaves_the_rest_of_a_background_to_a_veil_however_pixels_are_sampled() {
+    use crate::render::sampling::{Adaptive, Sampling, Stochastic};
+    let mut s = looking_down(9.0);
+    let red = Vec3::new(1.0, 0.25, 0.5);
+    s.square(0.0, 9.0, material(Vec3::ZERO, Phong { transmission: red, ior: 1.0, ..phong() }));
+    (s.settings.width, s.settings.height) = (40, 5);
+    let both = [Sampling::Stochastic(Stochastic::default()), Sampling::Adaptive(Adaptive::default())];
+    for sampling in both.into_iter().chain([Sampling::Uniform]) {
+        s.settings.sampling = sampling;
+        s.scene.background = Some(Background::Color(Vec3::new(0.5, 1.0, 0.5)));
+        let picture = s.render().picture;
+        assert!(picture.beauty.iter().all(|&pixel| pixel == [0.0, 0.0, 0.0, 0.75]), "{:?}", s.settings.sampling);
+        assert_eq!(picture.veil.len(), 200);
+        assert!(picture.veil.iter().all(|&veil| veil == [0.375, 0.0, 0.125]), "{:?}", s.settings.sampling);
+        s.scene.background = None;
+        assert!(s.render().picture.veil.is_empty());
+    }
 }
