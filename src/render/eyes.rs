@@ -216,6 +216,17 @@ impl Eyes {
         self.take(eye, &mut run);
     }
 
+    /// Adds the rays of places seen through the middle of the lens, by column and row.
+    pub(crate) fn send_columns(&mut self, eye: &Eye, x: &[f64], y: &[f64]) {
+        let mut run = Run::default();
+        for (x, y) in x.chunks(RUN).zip(y.chunks(RUN)) {
+            run.count = x.len().min(y.len());
+            run.x[..run.count].copy_from_slice(&x[..run.count]);
+            run.y[..run.count].copy_from_slice(&y[..run.count]);
+            self.take(eye, &mut run);
+        }
+    }
+
     /// Adds the rays of the samples that lie at the same offsets in each of these pixels, seen through the middle of the lens;
     /// numbered as by [`Self::send`].
     pub(crate) fn send_each(&mut self, eye: &Eye, pixels: &[(u32, u32)], offsets: &[(f64, f64)]) {
@@ -476,6 +487,12 @@ mod tests {
             let mut eyes = Eyes::default();
             eyes.send(&eye, (0..100).map(place));
             assert_eq!(eyes.rays().len(), 100);
+            if lens.is_none() {
+                let (mut by_columns, places) = (Eyes::default(), (0..100).map(place));
+                let (x, y): (Vec<f64>, Vec<f64>) = places.map(|place| (place.x, place.y)).unzip();
+                by_columns.send_columns(&eye, &x, &y);
+                assert_eq!(by_columns.rays(), eyes.rays());
+            }
             for (i, ray) in (0..100).zip(eyes.rays()) {
                 assert_eq!(*ray, Ray { sample: i, ..eye.ray_with_path(place(i)).0 }, "{lens:?}");
             }

@@ -95,16 +95,17 @@ pub(super) fn pixel_key(seed: u64, (x, y): (u32, u32)) -> u32 {
     mix(mix(mix(seed as u32, (seed >> 32) as u32), x), y)
 }
 
-/// The [`pixel_key`] of each of these pixels, appended.
-pub(super) fn pixel_keys(seed: u64, pixels: &[(u32, u32)], keys: &mut Vec<u32>) {
-    let start = keys.len();
-    keys.resize(start + pixels.len(), 0);
-    Level::best().run(Keys { seed, pixels, keys: &mut keys[start..] });
+/// The [`pixel_key`] of each of the pixels in these columns and rows.
+pub(super) fn pixel_keys(seed: u64, (x, y): (&[u32], &[u32])) -> Vec<u32> {
+    let mut keys = vec![0; x.len().min(y.len())];
+    Level::best().run(Keys { seed, x, y, keys: &mut keys });
+    keys
 }
 
 struct Keys<'a> {
     seed: u64,
-    pixels: &'a [(u32, u32)],
+    x: &'a [u32],
+    y: &'a [u32],
     keys: &'a mut [u32],
 }
 
@@ -113,8 +114,8 @@ impl Kernel for Keys<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        for (key, &pixel) in self.keys.iter_mut().zip(self.pixels) {
-            *key = pixel_key(self.seed, pixel);
+        for (key, (&x, &y)) in self.keys.iter_mut().zip(self.x.iter().zip(self.y)) {
+            *key = pixel_key(self.seed, (x, y));
         }
     }
 }
@@ -129,7 +130,7 @@ pub(super) struct Sum {
 
 impl Sum {
     /// A single sample.
-    #[inline(always)]
+    #[cfg(test)]
     pub(super) fn of(sample: &Sample) -> Self {
         Self { radiance: sample.radiance, through: sample.through, weight: 1.0 }
     }

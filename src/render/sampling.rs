@@ -1,7 +1,6 @@
 //! How a picture is sampled: how many rays a pixel gets, where in it they lie, and when they are enough.
 
 use crate::image::ToneMap;
-use crate::math::simd::{Kernel, Level, Simd};
 use std::fmt;
 use std::str::FromStr;
 
@@ -287,26 +286,6 @@ impl Filter {
             }
         }
     }
-
-    /// Puts the place that each of these numbers draws in its place.
-    pub(super) fn place_each(self, numbers: &mut [f64]) {
-        if self == Self::Tent {
-            Level::best().run(InTent(numbers));
-        }
-    }
-}
-
-struct InTent<'a>(&'a mut [f64]);
-
-impl Kernel for InTent<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Simd>(self, _: S) {
-        for number in self.0 {
-            *number = Filter::Tent.place(*number);
-        }
-    }
 }
 
 #[cfg(test)]
@@ -322,12 +301,6 @@ mod tests {
         assert!((place(0.125) - 0.0).abs() < 1e-12 && (place(0.875) - 1.0).abs() < 1e-12);
         let mean = (0..1000).map(|i| place((f64::from(i) + 0.5) / 1000.0)).sum::<f64>() / 1000.0;
         assert!((mean - 0.5).abs() < 1e-9, "{mean}");
-        for filter in Filter::ALL.iter().copied() {
-            let numbers: Vec<f64> = (0..100).map(|i| f64::from(i) / 100.0).collect();
-            let mut places = numbers.clone();
-            filter.place_each(&mut places);
-            assert!(numbers.iter().zip(&places).all(|(&u, &place)| filter.place(u) == place));
-        }
     }
 
     #[test]

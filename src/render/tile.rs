@@ -161,26 +161,34 @@ impl Whole {
         let Self { picture, sampled } = self;
         let (width, mut from) = (picture.width as usize, 0);
         sampled.rays += pixels.rays;
-        pixels.tile.runs().for_each(|((x, y), count)| {
-            let start = y as usize * width + x as usize;
-            picture.beauty[start..start + count].copy_from_slice(&pixels.beauty[from..from + count]);
-            if let Some(veil) = picture.veil.get_mut(start..start + count) {
-                veil.copy_from_slice(&pixels.veil[from..from + count]);
+        for block in pixels.tile.blocks() {
+            let count = (block.x1 - block.x0) as usize;
+            for y in block.y0..block.y1 {
+                let start = y as usize * width + block.x0 as usize;
+                let (to, own) = (start..start + count, from..from + count);
+                picture.beauty[to.clone()].copy_from_slice(&pixels.beauty[own.clone()]);
+                if let Some(veil) = picture.veil.get_mut(to.clone()) {
+                    veil.copy_from_slice(&pixels.veil[own.clone()]);
+                }
+                if let Some(facts) = pixels.facts.get(own.clone()) {
+                    for (count, facts) in sampled.counts[to.clone()].iter_mut().zip(facts) {
+                        *count = facts.count;
+                    }
+                    for (error, facts) in sampled.errors.get_mut(to).into_iter().flatten().zip(facts) {
+                        *error = facts.error;
+                    }
+                }
+                if let Some(layers) = &mut picture.layers {
+                    (start..).zip(&pixels.layers[own]).for_each(|(i, pixel)| pixel.store(layers, i));
+                }
+                from += count;
             }
-            for (i, facts) in (start..).zip(pixels.facts.iter().skip(from).take(count)) {
-                sampled.counts[i] = facts.count;
-                sampled.errors.get_mut(i).into_iter().for_each(|error| *error = facts.error);
-                sampled.met += u64::from(facts.end == End::Met);
-                sampled.at_most += u64::from(facts.end == End::Ceiling);
-                sampled.spare += u64::from(facts.spare);
-            }
-            if let Some(layers) = &mut picture.layers {
-                (start..)
-                    .zip(pixels.layers.iter().skip(from).take(count))
-                    .for_each(|(i, pixel)| pixel.store(layers, i));
-            }
-            from += count;
-        });
+        }
+        for facts in &pixels.facts {
+            sampled.met += u64::from(facts.end == End::Met);
+            sampled.at_most += u64::from(facts.end == End::Ceiling);
+            sampled.spare += u64::from(facts.spare);
+        }
     }
 }
 
@@ -335,15 +343,33 @@ impl Tile {
         })
     }
 
-    /// Its pixels that follow each other in a row, in the order of [`Self::places`]: the first of each run, and how many.
-    pub(super) fn runs(self) -> impl Iterator<Item = ((u32, u32), usize)> {
+    /// Its blocks, whose pixels follow each other in the order of [`Self::places`].
+    pub(super) fn blocks(self) -> impl Iterator<Item = Self> {
         let starts = |from: u32, to: u32| (from..to).step_by(BLOCK as usize);
         starts(self.y0, self.y1).flat_map(move |y0| {
-            starts(self.x0, self.x1).flat_map(move |x0| {
-                let count = (self.x1 - x0).min(BLOCK) as usize;
-                (y0..(y0 + BLOCK).min(self.y1)).map(move |y| ((x0, y), count))
-            })
+            let y1 = (y0 + BLOCK).min(self.y1);
+            starts(self.x0, self.x1).map(move |x0| Self { x0, y0, x1: (x0 + BLOCK).min(self.x1), y1 })
         })
+    }
+
+    /// Adds the columns and rows of its pixels, in the order of [`Self::places`].
+    pub(super) fn list(self, (x, y): (&mut Vec<u32>, &mut Vec<u32>)) {
+        for block in self.blocks() {
+            // Whole blocks without a loop.
+            if block.pixels() == (BLOCK * BLOCK) as usize {
+                x.extend_from_slice(&std::array::from_fn::<_, { (BLOCK * BLOCK) as usize }, _>(|i| {
+                    block.x0 + i as u32 % BLOCK
+                }));
+                y.extend_from_slice(&std::array::from_fn::<_, { (BLOCK * BLOCK) as usize }, _>(|i| {
+                    block.y0 + i as u32 / BLOCK
+                }));
+            } else {
+                block.places().for_each(|(column, row)| {
+                    x.push(column);
+                    y.push(row);
+                });
+            }
+        }
     }
 
     /// The number of a pixel of it in the order of [`Self::places`].
@@ -381,6 +407,16 @@ impl Tile {
     /// Whether some pixel belongs to both.
     pub(super) fn meets(self, other: Self) -> bool {
         self.x0.max(other.x0) < self.x1.min(other.x1) && self.y0.max(other.y0) < self.y1.min(other.y1)
+    }
+
+    /// What of it lies in another, which it meets.
+    pub(super) fn within(self, other: Self) -> Self {
+        Self {
+            x0: self.x0.max(other.x0),
+            y0: self.y0.max(other.y0),
+            x1: self.x1.min(other.x1),
+            y1: self.y1.min(other.y1),
+        }
     }
 
     /// How many pixels it has.
@@ -480,14 +516,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn places_runs_and_numbers_of_a_tile_are_in_one_order() {
+    fn places_blocks_and_numbers_of_a_tile_are_in_one_order() {
         for (x0, y0, x1, y1) in [(0, 0, 32, 32), (32, 64, 37, 71), (5, 3, 6, 9), (30, 30, 66, 66)] {
             let tile = Tile { x0, y0, x1, y1 };
             let places: Vec<(u32, u32)> = tile.places().collect();
             assert_eq!(places.len(), tile.pixels());
             assert!(places.iter().enumerate().all(|(i, &at)| tile.number(at) == i), "{tile:?}");
-            let along = |((x, y), count): ((u32, u32), usize)| (x..).take(count).map(move |x| (x, y));
-            assert!(tile.runs().flat_map(along).eq(places), "{tile:?}");
+            assert!(tile.blocks().flat_map(Tile::places).eq(places.iter().copied()), "{tile:?}");
+            let (mut x, mut y) = (Vec::new(), Vec::new());
+            tile.list((&mut x, &mut y));
+            assert!(x.into_iter().zip(y).eq(places), "{tile:?}");
         }
     }
 

@@ -4,7 +4,7 @@
 //! pixel has the same bits beside any others, on every instruction set.
 
 use super::{Certainty, GROUPS, Range, Seen, Shown};
-use crate::math::simd::{Kernel, Simd};
+use crate::math::simd::{Kernel, LANES, Simd};
 use crate::math::{Vec3, Vec4};
 use crate::render::frame::Sum;
 use crate::render::whitted::Sample;
@@ -17,6 +17,15 @@ type Row = [f32; PIXELS];
 
 /// The written numbers of every pixel, RGB and alpha.
 type Rows = [Row; 4];
+
+/// Pixels of a picture.
+#[derive(Default)]
+pub(in crate::render) struct Pixels {
+    /// As [`Picture::beauty`](crate::image::Picture::beauty).
+    pub beauty: Vec<[f32; 4]>,
+    /// As [`Picture::veil`](crate::image::Picture::veil); empty where there is none.
+    pub veil: Vec<[f32; 3]>,
+}
 
 /// One group of samples of every pixel.
 #[derive(Clone, Copy)]
@@ -33,6 +42,22 @@ impl Sums {
     fn at(&self, i: usize) -> Sum {
         let three = |rows: &[Row; 3]| Vec3::new(rows[0][i], rows[1][i], rows[2][i]);
         Sum { radiance: three(&self.radiance), through: three(&self.through), weight: self.weight[i] }
+    }
+
+    /// Takes a sample for every pixel; the last of them for those that are not there.
+    #[inline(always)]
+    fn take<S: Simd>(&mut self, s: S, samples: &[Sample]) {
+        for k in 0..PIXELS / LANES {
+            let numbers =
+                |i: usize| -> &[f32; 6] { bytemuck::cast_ref(&samples[(k * LANES + i).min(samples.len() - 1)]) };
+            let first = s.columns(std::array::from_fn(|i| numbers(i).first_chunk().unwrap_or(&[0.0; 4])));
+            let last = s.columns(std::array::from_fn(|i| numbers(i).last_chunk().unwrap_or(&[0.0; 4])));
+            let rows = self.radiance.iter_mut().zip(&first).chain(self.through.iter_mut().zip(&last[1..]));
+            for (row, lanes) in rows {
+                row.as_chunks_mut().0[k] = s.store(*lanes);
+            }
+        }
+        self.weight = [1.0; PIXELS];
     }
 
     #[inline(always)]
@@ -80,26 +105,12 @@ impl Certainty<'_> {
         self.look_at_each(pixels, false, |found, i| tell(found.error[i]));
     }
 
-    /// What each of these single samples shows.
-    pub(in crate::render) fn see_samples(&self, samples: &[Sample]) -> Shown {
-        let mut shown = Shown::with_capacity(samples.len());
-        let mut beside = Beside::new();
-        let mut last: &[Sample] = &[];
-        for some in samples.chunks(PIXELS) {
-            // Large parts of a picture are one colour.
-            if some != last {
-                for (i, sample) in some.iter().enumerate() {
-                    beside.sums[0].set(i, Sum::of(sample));
-                }
-                self.level.run(See { judge: self, sums: &beside.sums[..1], to: &mut beside.seen });
-                last = some;
-            }
-            for (column, row) in shown.colors.iter_mut().zip(&beside.seen.color) {
-                column.extend_from_slice(&row[..some.len()]);
-            }
-            shown.brightest.extend_from_slice(&beside.seen.brightest[..some.len()]);
-        }
-        shown
+    /// What each of these single samples shows, and makes of its pixel where it is the only one.
+    pub(in crate::render) fn see_samples(&self, samples: &[Sample]) -> (Shown, Pixels) {
+        let (mut shown, mut pixels) = (Shown::with_capacity(samples.len()), Pixels::default());
+        pixels.beauty.reserve(samples.len());
+        self.level.run(Singles { judge: self, samples, shown: &mut shown, pixels: &mut pixels });
+        (shown, pixels)
     }
 
     fn look_at_each<'g>(
@@ -214,6 +225,50 @@ impl Kernel for See<'_, '_> {
     }
 }
 
+/// What single samples show.
+struct Singles<'a, 'j> {
+    judge: &'a Certainty<'j>,
+    samples: &'a [Sample],
+    shown: &'a mut Shown,
+    pixels: &'a mut Pixels,
+}
+
+impl Kernel for Singles<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) {
+        let Self { judge, samples, shown, pixels } = self;
+        let (mut sums, mut resolved, mut written) = (Sums::EMPTY, [[0.0; PIXELS]; 4], [[0.0; PIXELS]; 4]);
+        let (mut brightest, mut last): (Row, &[Sample]) = ([0.0; PIXELS], &[]);
+        for some in samples.chunks(PIXELS) {
+            // Large parts of a picture are one colour.
+            if some != last {
+                sums.take(s, some);
+                resolved = judge.resolved(&sums);
+                written = judge.written_of(&sums, resolved);
+                for (i, brightest) in brightest.iter_mut().enumerate() {
+                    *brightest = judge.light(&sums.at(i)).max(0.0);
+                }
+                last = some;
+            }
+            for (column, row) in shown.colors.iter_mut().zip(&written) {
+                column.extend_from_slice(&row[..some.len()]);
+            }
+            shown.brightest.extend_from_slice(&brightest[..some.len()]);
+            for k in 0..PIXELS / LANES {
+                let eight = s.rows(resolved.map(|row| s.load(&row.as_chunks().0[k])));
+                let there = some.len().saturating_sub(k * LANES).min(LANES);
+                pixels.beauty.extend_from_slice(&eight[..there]);
+            }
+            if let (Some(behind), true) = (judge.background, judge.has_veil) {
+                let [r, g, b] = veils(&sums, behind);
+                pixels.veil.extend((0..some.len()).map(|i| [r[i], g[i], b[i]]));
+            }
+        }
+    }
+}
+
 /// Standard errors alone.
 struct Doubt<'a, 'j> {
     judge: &'a Certainty<'j>,
@@ -236,11 +291,23 @@ impl Certainty<'_> {
     /// The numbers of the written picture for these sums, the colour premultiplied.
     #[inline(always)]
     fn written(&self, sums: &Sums) -> Rows {
+        self.written_of(sums, self.resolved(sums))
+    }
+
+    /// The pixels that these sums are.
+    #[inline(always)]
+    fn resolved(&self, sums: &Sums) -> Rows {
         let mut rows = [[0.0; PIXELS]; 4];
         match self.background {
             Some(behind) => resolve(sums, Some(behind), &mut rows),
             None => resolve(sums, None, &mut rows),
         }
+        rows
+    }
+
+    /// The numbers of the written picture for sums that are these pixels.
+    #[inline(always)]
+    fn written_of(&self, sums: &Sums, mut rows: Rows) -> Rows {
         if let (Some(behind), true) = (self.background, self.has_veil) {
             self.write_glass(&veils(sums, behind), behind, &mut rows);
             return rows;

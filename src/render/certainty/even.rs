@@ -5,8 +5,11 @@ use crate::math::Vec4;
 use crate::math::simd::{Kernel, Simd};
 use std::ops::Range as Run;
 
-/// Pixels that are compared together.
-const PIXELS: usize = 16;
+/// Pixels of a row that are compared together at most: those of a tile and a few around it …
+const PART: usize = 46;
+
+/// … with one more on each side.
+const WIDE: usize = PART + 2;
 
 /// What nine numbers lie between is so many times their standard deviation (L. H. C. Tippett, "On the Extreme Individuals and
 /// the Range of Samples Taken from a Normal Population", 1925).
@@ -40,17 +43,16 @@ impl Shown {
         Seen { color, range: Range { least: color, most: color, brightest: self.brightest[i] }, error: 0.0 }
     }
 
-    /// Takes over as many as the run has, from another's place `start` on.
-    pub(in crate::render) fn copy(&mut self, run: Run<usize>, from: &Self, start: usize) {
-        let columns = self.colors.iter_mut().zip(&from.colors);
-        for (column, from) in columns.chain(std::iter::once((&mut self.brightest, &from.brightest))) {
-            let (to, from) = (&mut column[run.clone()], &from[start..start + run.len()]);
-            // The usual run, without a call.
-            match (<&mut [f32; 4]>::try_from(&mut *to), <&[f32; 4]>::try_from(from)) {
-                (Ok(to), Ok(from)) => *to = *from,
-                _ => to.copy_from_slice(from),
-            }
-        }
+    /// Each of the columns.
+    pub(in crate::render) fn columns(&self) -> [&[f32]; 5] {
+        let [r, g, b, alpha] = &self.colors;
+        [r, g, b, alpha, &self.brightest]
+    }
+
+    /// The same, to be changed.
+    pub(in crate::render) fn columns_mut(&mut self) -> [&mut [f32]; 5] {
+        let [r, g, b, alpha] = &mut self.colors;
+        [r, g, b, alpha, &mut self.brightest]
     }
 }
 
@@ -107,8 +109,8 @@ impl<R: Iterator<Item = Run<usize>>> Kernel for Compare<'_, '_, R> {
         for run in runs {
             let mut start = run.start;
             while start < run.end {
-                let count = PIXELS.min(run.end - start);
-                let (differs, errors) = judge.beside(shown, columns, start, count);
+                let count = PART.min(run.end - start);
+                let (differs, errors) = judge.beside(shown, columns, start);
                 even.is_uneven[start..start + count].copy_from_slice(&differs[..count]);
                 even.errors[start..start + count].copy_from_slice(&errors[..count]);
                 start += count;
@@ -118,44 +120,56 @@ impl<R: Iterator<Item = Run<usize>>> Kernel for Compare<'_, '_, R> {
 }
 
 impl Certainty<'_> {
-    /// Of so many places from one on: whether any beside it looks different, and the standard error of its pixel.
+    /// Of places from one on: whether any beside it looks different, and the standard error of its pixel.
     #[inline(always)]
     #[expect(clippy::cast_precision_loss, reason = "a handful of channels")]
-    fn beside(&self, shown: &Shown, columns: usize, start: usize, count: usize) -> ([u32; PIXELS], [f32; PIXELS]) {
+    fn beside(&self, shown: &Shown, columns: usize, start: usize) -> ([u32; WIDE], [f32; WIDE]) {
         let (limit, channels) = (Self::steep(1) * self.error, self.channels());
-        let (mut differs, mut squares) = ([0; PIXELS], [0.0; PIXELS]);
-        for (c, column) in shown.colors.iter().enumerate() {
-            let own = some(column, start, count);
-            let (mut least, mut most) = (own, own);
-            for row in [start - columns, start, start + columns] {
-                for at in row - 1..row + 2 {
-                    let other = some(column, at, count);
-                    for i in 0..PIXELS {
-                        differs[i] |= u32::from((own[i] - other[i]).abs() > limit);
-                        // A number that is none changes nothing.
-                        least[i] = if other[i] < least[i] { other[i] } else { least[i] };
-                        most[i] = if other[i] > most[i] { other[i] } else { most[i] };
-                    }
-                }
+        let (mut differs, mut errors) = ([0; WIDE], [0.0; WIDE]);
+        // Alpha is the same everywhere where it is not written.
+        for column in &shown.colors[..channels] {
+            let [above, own, below] = [start - columns, start, start + columns].map(|at| some(column, at - 1));
+            // Of three above each other, and then of three such: room for two more behind.
+            let (mut low, mut high) = ([f32::INFINITY; WIDE + 2], [f32::NEG_INFINITY; WIDE + 2]);
+            for i in 0..WIDE {
+                low[i] = least(least(least(f32::INFINITY, above[i]), own[i]), below[i]);
+                high[i] = most(most(most(f32::NEG_INFINITY, above[i]), own[i]), below[i]);
             }
-            if c < channels {
-                for i in 0..PIXELS {
-                    squares[i] += (most[i] - least[i]) * (most[i] - least[i]);
-                }
+            for i in 0..WIDE {
+                let own = if i + 1 < WIDE { own[i + 1] } else { 0.0 };
+                let least = least(least(low[i], low[i + 1]), low[i + 2]);
+                let most = most(most(high[i], high[i + 1]), high[i + 2]);
+                differs[i] |= u32::from(most - own > limit) | u32::from(own - least > limit);
+                errors[i] += (most - least) * (most - least);
             }
         }
-        (differs, squares.map(|squares| (squares / channels as f32).sqrt() / RANGE))
+        for error in &mut errors {
+            *error = (*error / channels as f32).sqrt() / RANGE;
+        }
+        (differs, errors)
     }
 }
 
-/// So many numbers from a place on.
+/// The lesser of two numbers; a second one that is none changes nothing.
 #[inline(always)]
-fn some(column: &[f32], start: usize, count: usize) -> [f32; PIXELS] {
+fn least(a: f32, b: f32) -> f32 {
+    if b < a { b } else { a }
+}
+
+/// The greater one.
+#[inline(always)]
+fn most(a: f32, b: f32) -> f32 {
+    if b > a { b } else { a }
+}
+
+/// Numbers from a place on, as far as there are.
+#[inline(always)]
+fn some(column: &[f32], start: usize) -> [f32; WIDE] {
     match column[start..].first_chunk() {
         Some(whole) => *whole,
         None => {
-            let mut part = [f32::NAN; PIXELS];
-            part[..count].copy_from_slice(&column[start..start + count]);
+            let mut part = [f32::NAN; WIDE];
+            part[..column.len() - start].copy_from_slice(&column[start..]);
             part
         }
     }
@@ -189,8 +203,10 @@ mod tests {
             {
                 let judge =
                     Certainty { level, ..Certainty::new(None, (background, false), transparent, error, factor(0.95)) };
-                let shown = judge.see_samples(&samples);
+                let (shown, pixels) = judge.see_samples(&samples);
                 let groups: Vec<[Sum; 1]> = samples.iter().map(|sample| [Sum::of(sample)]).collect();
+                let resolved: Vec<_> = samples.iter().map(|sample| Sum::of(sample).resolve(background).0).collect();
+                assert_eq!(pixels.beauty, resolved);
                 let mut seen = Vec::new();
                 judge.see_each(groups.iter().map(|group| &group[..]), |one| seen.push(*one));
                 let even =

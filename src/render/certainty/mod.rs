@@ -19,6 +19,7 @@ use super::frame::Sum;
 use crate::image::{Developer, Output};
 use crate::math::simd::Level;
 use crate::math::{Vec3, Vec4};
+pub(in crate::render) use beside::Pixels;
 pub(in crate::render) use confidence::factor;
 pub(in crate::render) use even::{Even, Shown};
 

@@ -6,9 +6,9 @@
 //! Every scrambling by itself is distributed evenly over the cube, so that the mean of a function over its points is
 //! right on the average, and scramblings of different keys are independent.
 
-mod many;
+mod square;
 
-pub(super) use many::{Many, square};
+pub(super) use square::square;
 
 /// Dimensions that are stratified together.
 pub(super) const DIMENSIONS: usize = 4;

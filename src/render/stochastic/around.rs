@@ -14,7 +14,7 @@ use crate::render::tile::{End, Tile};
 const REACH: [u32; 2] = [1, 4];
 
 /// The number of no pixel.
-const NONE: usize = usize::MAX;
+const NONE: u32 = u32::MAX;
 
 /// What the samples of a tile and of the pixels around it show.
 pub(super) struct Around {
@@ -23,7 +23,7 @@ pub(super) struct Around {
     /// What single samples show, row by row, with a place on every side where there is nothing.
     pub shown: Shown,
     /// Numbers of pixels that have more of them, or none yet, likewise.
-    numbers: Vec<usize>,
+    numbers: Vec<u32>,
     /// What those pixels show, by number.
     seen: Vec<Seen>,
 }
@@ -35,7 +35,8 @@ impl Around {
         Self { tile, shown: Shown::nothing(places), numbers: vec![NONE; places], seen: Vec::new() }
     }
 
-    fn columns(&self) -> usize {
+    /// Places in a row.
+    pub(super) fn columns(&self) -> usize {
         (self.tile.x1 - self.tile.x0 + 2) as usize
     }
 
@@ -56,7 +57,7 @@ impl Around {
     /// Knows a pixel by its number, all smaller ones of which are known.
     pub(super) fn know(&mut self, pixel: (u32, u32), number: usize) {
         let at = self.at(pixel);
-        self.numbers[at] = number;
+        self.numbers[at] = u32::try_from(number).unwrap_or(NONE);
         self.seen.push(self.shown.at(at));
     }
 
@@ -64,7 +65,7 @@ impl Around {
     fn near(&self, at: usize) -> impl Iterator<Item = Seen> + Clone {
         let rows = [at - self.columns(), at, at + self.columns()];
         let places = rows.into_iter().flat_map(|middle| middle - 1..middle + 2);
-        places.map(|at| self.seen.get(self.numbers[at]).copied().unwrap_or_else(|| self.shown.at(at)))
+        places.map(|at| self.seen.get(self.numbers[at] as usize).copied().unwrap_or_else(|| self.shown.at(at)))
     }
 
     /// What the samples at a pixel and beside it lie between.
@@ -100,7 +101,7 @@ impl Around {
             let reach = REACH[usize::from(judge.is_thin(&own, self.near(self.at((x, y)))))];
             for y in y.saturating_sub(reach).max(tile.y0)..(y + reach + 1).min(tile.y1) {
                 for x in x.saturating_sub(reach).max(tile.x0)..(x + reach + 1).min(tile.x1) {
-                    let mut number = self.numbers[self.at((x, y))];
+                    let mut number = self.numbers[self.at((x, y))] as usize;
                     match pixels.get_mut(number) {
                         Some(pixel) if pixel.is_done_with(samples) => pixel.facts.end = End::Ceiling,
                         Some(_) => continue,

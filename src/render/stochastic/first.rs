@@ -2,67 +2,112 @@
 
 use super::Sampler;
 use super::around::Around;
-use super::places::{Places, Wanted};
+use super::pixel::Pixel;
+use super::places::Places;
 use crate::accel::Accel;
-use crate::render::certainty::Shown;
-use crate::render::frame::pixel_keys;
-use crate::render::layers::Facts;
+use crate::render::certainty::{Pixels, Shown};
+use crate::render::frame::Frame;
+use crate::render::layers::{Facts, LayerPixel};
 use crate::render::observer::Observer;
-use crate::render::tile::{TOGETHER, Tile};
+use crate::render::tile::{TOGETHER, Tile, TilePixels};
 use crate::render::whitted::{Sample, Tracer};
 
-/// One sample of every pixel of a part of the picture.
+/// One sample of every pixel of some parts of the picture: part after part, and each in the order of its places.
 pub(super) struct First {
-    pub tile: Tile,
-    /// In the order of the tile's places, as all of this.
-    pub samples: Vec<Sample>,
+    /// The parts, and the number of the first pixel of each.
+    parts: Vec<(Tile, usize)>,
+    samples: Vec<Sample>,
     /// What layers are made of; empty unless they are wanted.
-    pub facts: Vec<Facts>,
+    facts: Vec<Facts>,
+    /// The pixels that they are.
+    pixels: Pixels,
     shown: Shown,
 }
 
 impl Sampler<'_> {
-    /// Traces the first sample of every pixel of these tiles, all together; `None` when cancelled.
+    /// Traces the first sample of every pixel of these parts, all together; `None` when cancelled.
     pub(super) fn first<A: Accel, P: Observer>(
         &self,
         tracer: &mut Tracer<A, P>,
         tiles: impl Iterator<Item = Tile> + Clone,
-    ) -> Option<Vec<First>> {
+    ) -> Option<First> {
         let count = tiles.clone().map(Tile::pixels).sum();
-        let (mut pixels, mut keys) = (Vec::with_capacity(count), Vec::with_capacity(count));
-        tiles.clone().for_each(|tile| tile.places().for_each(|at| pixels.push(at)));
-        pixel_keys(self.frame.settings.seed, &pixels, &mut keys);
+        let (mut columns, mut rows) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        let mut parts = Vec::new();
+        for tile in tiles {
+            parts.push((tile, columns.len()));
+            tile.list((&mut columns, &mut rows));
+        }
         let (mut samples, mut facts) = (Vec::with_capacity(count), Vec::new());
         let mut places = Places::default();
-        for (pixels, keys) in pixels.chunks(TOGETHER).zip(keys.chunks(TOGETHER)) {
-            let wanted = pixels.iter().zip(keys).map(|(&pixel, &key)| Wanted { pixel, key, index: 0 });
-            places.trace(self.frame, self.how, tracer, (wanted, pixels.len()))?;
+        for some in columns.chunks(TOGETHER).zip(rows.chunks(TOGETHER)) {
+            places.trace_first(self.frame, self.how, tracer, some)?;
             samples.extend_from_slice(&tracer.samples);
             facts.extend_from_slice(&tracer.facts);
         }
-        let mut end = 0;
-        let each = tiles.map(|tile| {
-            let own = end..end + tile.pixels();
-            end = own.end;
-            let (samples, facts) = (samples[own.clone()].to_vec(), facts.get(own).unwrap_or_default().to_vec());
-            First { tile, shown: self.judge.see_samples(&samples), samples, facts }
-        });
-        Some(each.collect())
+        let (shown, pixels) = self.judge.see_samples(&samples);
+        Some(First { parts, samples, facts, pixels, shown })
     }
 }
 
 impl First {
+    /// Gives a pixel its first sample, if that is among these.
+    pub(super) fn give(&self, pixel: &mut Pixel) {
+        let Some(&(part, start)) = self.parts.iter().find(|(part, _)| part.contains(pixel.at)) else { return };
+        let own = start + part.number(pixel.at);
+        pixel.take(&self.samples[own..=own], self.facts.get(own..=own).unwrap_or_default(), 1);
+    }
+
     /// Copies what it shows of what lies around a tile.
     pub(super) fn show(&self, around: &mut Around) {
-        let (left, right) = (around.tile.x0, around.tile.x1);
-        let mut from = 0;
-        self.tile.runs().for_each(|((x, y), count)| {
-            let (start, end) = (x.max(left), (x + count as u32).min(right));
-            if start < end && around.tile.contains((start, y)) {
-                let at = around.at((start, y));
-                around.shown.copy(at..at + (end - start) as usize, &self.shown, from + (start - x) as usize);
+        let (inner, columns) = (around.tile, around.columns());
+        for &(part, mut from) in self.parts.iter().filter(|(part, _)| part.meets(inner)) {
+            for block in part.blocks() {
+                if block.meets(inner) {
+                    let seen = block.within(inner);
+                    let first = from + block.number((seen.x0, seen.y0));
+                    let step = (block.x1 - block.x0) as usize;
+                    let to = around.at((seen.x0, seen.y0));
+                    let size = [seen.x1 - seen.x0, seen.y1 - seen.y0].map(|side| side as usize);
+                    for (to_column, column) in around.shown.columns_mut().into_iter().zip(self.shown.columns()) {
+                        copy((&mut to_column[to..], columns), (&column[first..], step), size);
+                    }
+                }
+                from += block.pixels();
             }
-            from += count;
-        });
+        }
+    }
+
+    /// Puts the pixels of a tile into their places, as they are with one sample.
+    pub(super) fn put(&self, frame: &Frame, done: &mut TilePixels) {
+        let tile = done.tile;
+        for &(part, mut from) in self.parts.iter().filter(|(part, _)| tile.contains((part.x0, part.y0))) {
+            // Blocks of a part are blocks of its tile.
+            for block in part.blocks() {
+                let (to, count) = (tile.number((block.x0, block.y0)), block.pixels());
+                done.beauty[to..to + count].copy_from_slice(&self.pixels.beauty[from..from + count]);
+                if let Some(veil) = done.veil.get_mut(to..to + count) {
+                    veil.copy_from_slice(&self.pixels.veil[from..from + count]);
+                }
+                let facts = self.facts.iter().skip(from).take(count);
+                for (layers, facts) in done.layers.iter_mut().skip(to).zip(facts) {
+                    *layers = LayerPixel::new(std::slice::from_ref(facts), frame.view.eye, frame.view.forward);
+                }
+                from += count;
+            }
+        }
+    }
+}
+
+/// Copies a rectangle of numbers between arrays with so many to a row.
+#[inline(always)]
+fn copy((to, to_step): (&mut [f32], usize), (from, from_step): (&[f32], usize), [width, height]: [usize; 2]) {
+    for row in 0..height {
+        let (to, from) = (&mut to[row * to_step..][..width], &from[row * from_step..][..width]);
+        // The usual width, without a call.
+        match (<&mut [f32; 4]>::try_from(&mut *to), <&[f32; 4]>::try_from(from)) {
+            (Ok(to), Ok(from)) => *to = *from,
+            _ => to.copy_from_slice(from),
+        }
     }
 }

@@ -14,7 +14,7 @@ mod shared;
 
 use super::Settings;
 use super::certainty::{Certainty, GROUPS, SURE, output};
-use super::frame::{Frame, resolve_each, veil_each};
+use super::frame::Frame;
 use super::layers::LayerPixel;
 use super::observer::Observer;
 use super::sampling::Stochastic;
@@ -47,7 +47,7 @@ pub(super) fn render<A: Accel, P: Observer>(
     }
     let outermost = sampler.grown(tile, sampler.reach());
     let first = sampler.first(tracer, std::iter::once(tile).chain(outermost.without(tile)))?;
-    let mut done = sampler.finish(tracer, tile, &first.iter().collect::<Vec<_>>())?;
+    let mut done = sampler.finish(tracer, tile, &[&first])?;
     done.rays_beyond = (outermost.pixels() - tile.pixels()) as u64;
     done.rays += done.rays_beyond;
     Some(done)
@@ -168,56 +168,40 @@ impl<'a> Sampler<'a> {
         known: Tile,
         (pixels, done): (&mut Vec<Pixel>, &mut TilePixels),
     ) {
-        let (frame, tile) = (self.frame, done.tile);
         let even = around.even(&self.judge, known);
-        known.runs().for_each(|((x0, y), count)| {
-            let start = around.at((x0, y));
-            for (x, at) in (x0..).zip(start..start + count) {
-                if !even.is_even(at) {
-                    around.know((x, y), pixels.len());
-                    pixels.push(self.opened(first, (x, y)));
+        // Block by block, as rays of pixels near each other run alike.
+        for block in known.blocks() {
+            for y in block.y0..block.y1 {
+                for (x, at) in (block.x0..block.x1).zip(around.at((block.x0, y))..) {
+                    if !even.is_even(at) {
+                        around.know((x, y), pixels.len());
+                        pixels.push(self.opened(first, (x, y)));
+                    }
                 }
             }
-        });
-        done.facts.clear();
-        tile.runs().for_each(|(at, count)| {
-            let start = around.at(at);
-            let fact = |at| PixelFacts { count: 1, spare: 0, error: even.error(at), end: End::Met };
-            done.facts.extend((start..start + count).map(fact));
-        });
-        let (mut colors, mut veils) = (Vec::new(), Vec::new());
-        for first in first.iter().filter(|first| tile.contains((first.tile.x0, first.tile.y0))) {
-            colors.clear();
-            resolve_each(&first.samples, 1, frame.background, &mut colors);
-            veils.clear();
-            if frame.has_veil {
-                veil_each(&first.samples, 1, frame.background, &mut veils);
-            }
-            let mut from = 0;
-            first.tile.runs().for_each(|(at, count)| {
-                // Zones are whole blocks of a tile, so that their runs are its own.
-                let to = tile.number(at);
-                done.beauty[to..to + count].copy_from_slice(&colors[from..from + count]);
-                if let Some(veil) = done.veil.get_mut(to..to + count) {
-                    veil.copy_from_slice(&veils[from..from + count]);
-                }
-                for (layers, facts) in done.layers.iter_mut().skip(to).zip(first.facts.iter().skip(from).take(count)) {
-                    *layers = LayerPixel::new(std::slice::from_ref(facts), frame.view.eye, frame.view.forward);
-                }
-                from += count;
-            });
         }
+        let tile = done.tile;
+        done.facts.clear();
+        for block in tile.blocks() {
+            for y in block.y0..block.y1 {
+                let start = around.at((block.x0, y));
+                let own = start..start + (block.x1 - block.x0) as usize;
+                done.facts.extend(own.map(|at| PixelFacts {
+                    count: 1,
+                    spare: 0,
+                    error: even.error(at),
+                    end: End::Met,
+                }));
+            }
+        }
+        first.iter().for_each(|first| first.put(self.frame, done));
         done.rays = tile.pixels() as u64;
     }
 
     /// A pixel with its first sample.
     fn opened(&self, first: &[&First], at: (u32, u32)) -> Pixel {
         let mut pixel = self.pixel(at);
-        for first in first.iter().filter(|first| first.tile.contains(at)) {
-            let i = first.tile.number(at);
-            let facts = first.facts.get(i..=i).unwrap_or_default();
-            pixel.take(&first.samples[i..=i], facts, 1);
-        }
+        first.iter().for_each(|first| first.give(&mut pixel));
         pixel
     }
 
@@ -261,7 +245,7 @@ impl<'a> Sampler<'a> {
                     let pixel = &pixels[pixel];
                     samples.clone().map(|i| pixel.wanted(i))
                 });
-                places.trace(self.frame, self.how, tracer, (wanted, some.len() * each))?;
+                places.trace(self.frame, self.how, tracer, wanted)?;
                 for (k, &pixel) in some.iter().enumerate() {
                     let of_pixel = k * each..(k + 1) * each;
                     let facts = tracer.facts.get(of_pixel.clone()).unwrap_or_default();

@@ -1,11 +1,12 @@
 //! Where samples lie in their pixels, and the rays through these places.
 
 use crate::accel::Accel;
+use crate::math::simd::{Kernel, Level, Simd};
 use crate::render::draws::Stream;
 use crate::render::eyes::Place;
-use crate::render::frame::Frame;
+use crate::render::frame::{Frame, pixel_keys};
 use crate::render::observer::Observer;
-use crate::render::sampling::Stochastic;
+use crate::render::sampling::{Filter, Stochastic};
 use crate::render::sobol;
 use crate::render::whitted::Tracer;
 
@@ -20,50 +21,143 @@ pub(super) struct Wanted {
     pub index: u32,
 }
 
-/// Buffers.
+/// Samples that are traced together, one number of each in every column.
 #[derive(Default)]
 pub(super) struct Places {
-    many: sobol::Many,
-    squares: Vec<[f64; 2]>,
-}
-
-impl Wanted {
-    /// The place so far from the pixel's upper left corner, seen through a point of the lens.
-    fn place(self, [x, y]: [f64; 2], lens: [f64; 2]) -> Place {
-        Place { x: f64::from(self.pixel.0) + x, y: f64::from(self.pixel.1) + y, lens }
-    }
-
-    /// Where it goes through the picture and the lens. Its first two numbers are those without a lens.
-    fn place_and_lens(self, how: &Stochastic) -> Place {
-        let [x, y, u, v] = sobol::point(self.index, self.key);
-        self.place([x, y].map(|number| how.filter.place(number)), [u, v])
-    }
+    keys: Vec<u32>,
+    indices: Vec<u32>,
+    /// From the upper left corner of the picture: of the pixel, then of the sample.
+    x: Vec<f64>,
+    y: Vec<f64>,
 }
 
 impl Places {
-    /// Traces so many samples all together; `None` when cancelled.
+    /// Traces these samples all together; `None` when cancelled.
     pub(super) fn trace<A: Accel, P: Observer>(
         &mut self,
         frame: &Frame,
         how: &Stochastic,
         tracer: &mut Tracer<A, P>,
-        (wanted, count): (impl Iterator<Item = Wanted> + Clone, usize),
+        wanted: impl Iterator<Item = Wanted>,
     ) -> Option<()> {
-        tracer.reset(count, frame.settings.layers);
-        let eye = frame.eye(tracer.center());
+        self.clear();
+        let Self { keys, indices, x, y } = self;
         // Nested iterators are quick from inside, and slow one after another.
-        wanted.clone().for_each(|Wanted { key, index, .. }| tracer.streams.push(Stream { key, index }));
+        wanted.for_each(|Wanted { pixel, key, index }| {
+            keys.push(key);
+            indices.push(index);
+            x.push(f64::from(pixel.0));
+            y.push(f64::from(pixel.1));
+        });
+        self.send(frame, how, tracer)
+    }
+
+    /// The same for the first sample of each of the pixels in these columns and rows.
+    pub(super) fn trace_first<A: Accel, P: Observer>(
+        &mut self,
+        frame: &Frame,
+        how: &Stochastic,
+        tracer: &mut Tracer<A, P>,
+        (columns, rows): (&[u32], &[u32]),
+    ) -> Option<()> {
+        self.clear();
+        let Self { keys, indices, x, y } = self;
+        *keys = pixel_keys(frame.settings.seed, (columns, rows));
+        indices.resize(keys.len(), 0);
+        x.extend(columns.iter().map(|&column| f64::from(column)));
+        y.extend(rows.iter().map(|&row| f64::from(row)));
+        self.send(frame, how, tracer)
+    }
+
+    fn clear(&mut self) {
+        self.keys.clear();
+        self.indices.clear();
+        self.x.clear();
+        self.y.clear();
+    }
+
+    fn send<A: Accel, P: Observer>(
+        &mut self,
+        frame: &Frame,
+        how: &Stochastic,
+        tracer: &mut Tracer<A, P>,
+    ) -> Option<()> {
+        let Self { keys, indices, x, y } = self;
+        tracer.reset(keys.len(), frame.settings.layers);
+        let eye = frame.eye(tracer.center());
+        let streams = keys.iter().zip(&*indices).map(|(&key, &index)| Stream { key, index });
         if frame.settings.lens.is_some() {
-            tracer.eyes.send(&eye, wanted.map(|sample| sample.place_and_lens(how)));
+            let pixels = x.iter().zip(&*y);
+            tracer.eyes.send(&eye, streams.clone().zip(pixels).map(|(stream, (&x, &y))| through(how, stream, [x, y])));
         } else {
-            let Self { many, squares } = self;
-            squares.clear();
-            many.find(wanted.clone().map(|Wanted { key, index, .. }| (key, index)), squares);
-            how.filter.place_each(squares.as_flattened_mut());
-            let mut squares = squares.iter();
-            let mut next = || squares.next().copied().unwrap_or_default();
-            tracer.eyes.send(&eye, wanted.map(|sample| sample.place(next(), [0.5; 2])));
+            Level::best().run(Draw { filter: how.filter, keys, indices, x, y });
+            tracer.eyes.send_columns(&eye, x, y);
         }
+        tracer.streams.extend(streams);
         tracer.trace().then_some(())
+    }
+}
+
+/// Where a sample of the pixel with this corner goes through the picture and the lens. Its first two numbers are those without a
+/// lens.
+fn through(how: &Stochastic, Stream { key, index }: Stream, [x, y]: [f64; 2]) -> Place {
+    let [across, down, u, v] = sobol::point(index, key);
+    Place { x: x + how.filter.place(across), y: y + how.filter.place(down), lens: [u, v] }
+}
+
+/// Moves samples from the corners of their pixels to their places.
+struct Draw<'a> {
+    filter: Filter,
+    keys: &'a [u32],
+    indices: &'a [u32],
+    x: &'a mut [f64],
+    y: &'a mut [f64],
+}
+
+impl Kernel for Draw<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        // What all share is decided outside the loop, which then is a formula.
+        match self.filter {
+            Filter::Box => self.each(|u| u),
+            Filter::Tent => self.each(|u| Filter::Tent.place(u)),
+        }
+    }
+}
+
+impl Draw<'_> {
+    #[inline(always)]
+    fn each(self, place: impl Fn(f64) -> f64) {
+        let samples = self.x.iter_mut().zip(self.y).zip(self.keys.iter().zip(self.indices));
+        for ((x, y), (&key, &index)) in samples {
+            let [across, down] = sobol::square(index, key);
+            *x += place(across);
+            *y += place(down);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_drawn_side_by_side_lie_where_those_drawn_alone_do() {
+        for filter in Filter::ALL.iter().copied() {
+            let how = Stochastic { filter, ..Stochastic::default() };
+            for count in [0, 1, 63, 64, 500] {
+                let keys: Vec<u32> = (0..count).map(|i| sobol::mix(7, i)).collect();
+                let indices: Vec<u32> = (0..count).map(|i| i * i % 257).collect();
+                let mut x: Vec<f64> = (0..count).map(f64::from).collect();
+                let mut y: Vec<f64> = (0..count).map(|i| f64::from(3 * i)).collect();
+                let alone: Vec<Place> = (0..count as usize)
+                    .map(|i| through(&how, Stream { key: keys[i], index: indices[i] }, [x[i], y[i]]))
+                    .collect();
+                Level::best().run(Draw { filter, keys: &keys, indices: &indices, x: &mut x, y: &mut y });
+                assert!(alone.iter().zip(x.iter().zip(&y)).all(|(place, (&x, &y))| [place.x, place.y] == [x, y]));
+            }
+        }
     }
 }

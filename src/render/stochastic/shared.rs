@@ -4,7 +4,7 @@
 //! than their borders: each zone belongs to the first tile that needs it, so that each is traced once, and all samples of a tile
 //! soon after each other, while what they meet is near in memory. All zones of a tile go together, whoever traces them: what a
 //! sample gathers may depend on those that are traced with it, where more rays wait than go into a wave. They are kept until
-//! all tiles that need them are finished.
+//! all tiles that need any of them are finished.
 
 use super::first::First;
 use super::{Sampler, Stochastic};
@@ -16,7 +16,6 @@ use crate::render::frame::Frame;
 use crate::render::observer::Observer;
 use crate::render::tile::{Tile, TilePixels, each_tile};
 use crate::render::whitted::{ByClass, Tracer};
-use std::ops::Range;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 /// Renders all tiles, given row by row, and has each kept that is finished; the counts of all threads, and whether nothing was
@@ -44,28 +43,21 @@ pub(in crate::render) fn render_all<A: Accel, P: Observer>(
 /// First samples that some tile still needs.
 struct Shared<'t> {
     tiles: &'t [Tile],
-    /// Those of the first tile that owns any, then those of the next.
-    zones: Vec<Zone>,
-    /// The zones, by number, that each tile needs.
+    /// The zones that belong to each tile.
+    zones: Vec<Vec<Tile>>,
+    /// The tiles, by number, of whose zones each tile needs some.
     needs: Vec<Vec<usize>>,
-    states: Mutex<States>,
+    states: Mutex<Vec<State>>,
     /// Some samples are there, or will never be.
     changed: Condvar,
 }
 
-/// A part of a tile that is traced with the others of its owner.
-#[derive(Clone, Copy, Debug)]
-struct Zone {
-    part: Tile,
-    owner: usize,
-}
-
-/// What is known of the first samples.
-struct States {
-    /// Of all zones that belong to a tile.
-    steps: Vec<Step>,
-    /// Those of each zone, and how many tiles still need them.
-    first: Vec<(Option<Arc<First>>, usize)>,
+/// What is known of the first samples of all zones that belong to a tile.
+struct State {
+    step: Step,
+    first: Option<Arc<First>>,
+    /// How many tiles still need them.
+    needing: usize,
 }
 
 /// How far they are.
@@ -87,18 +79,24 @@ impl<'t> Shared<'t> {
         let needing = |i: usize, part: Tile| -> Vec<usize> {
             beside(i, columns, tiles.len()).filter(|&tile| grown[tile].meets(part)).collect()
         };
-        let parts = tiles.iter().enumerate().flat_map(|(i, tile)| tile.zones().map(move |part| (i, part)));
-        let mut needed: Vec<_> = parts.map(|(i, part)| (needing(i, part), part)).collect();
-        needed.sort_by_key(|(needing, _)| needing.first().copied());
-        let (mut zones, mut needs, mut first) = (Vec::new(), vec![Vec::new(); tiles.len()], Vec::new());
-        for (needing, part) in needed {
-            let Some(&owner) = needing.first() else { continue };
-            needing.iter().for_each(|&tile| needs[tile].push(zones.len()));
-            zones.push(Zone { part, owner });
-            first.push((None, needing.len()));
+        let mut zones = vec![Vec::new(); tiles.len()];
+        let mut needs = vec![Vec::new(); tiles.len()];
+        for (i, tile) in tiles.iter().enumerate() {
+            for zone in tile.zones() {
+                let needing = needing(i, zone);
+                let Some(&owner) = needing.first() else { continue };
+                zones[owner].push(zone);
+                needing.iter().for_each(|&tile| needs[tile].push(owner));
+            }
         }
-        let states = Mutex::new(States { steps: vec![Step::Untouched; tiles.len()], first });
-        Self { tiles, zones, needs, states, changed: Condvar::new() }
+        let mut states: Vec<_> =
+            tiles.iter().map(|_| State { step: Step::Untouched, first: None, needing: 0 }).collect();
+        for owners in &mut needs {
+            owners.sort_unstable();
+            owners.dedup();
+            owners.iter().for_each(|&owner| states[owner].needing += 1);
+        }
+        Self { tiles, zones, needs, states: Mutex::new(states), changed: Condvar::new() }
     }
 
     /// Renders a tile by number; `None` when cancelled.
@@ -109,10 +107,9 @@ impl<'t> Shared<'t> {
         tile: usize,
     ) -> Option<TilePixels> {
         // Others have mostly traced what belongs to tiles before this one.
-        for &zone in &self.needs[tile] {
-            if let Some(mut promise) = self.promise(self.zones[zone].owner) {
-                let zones = &self.zones[promise.zones.clone()];
-                promise.first = sampler.first(tracer, zones.iter().map(|zone| zone.part))?;
+        for &owner in &self.needs[tile] {
+            if let Some(mut promise) = self.promise(owner) {
+                promise.first = Some(sampler.first(tracer, self.zones[owner].iter().copied())?);
             }
         }
         let first = self.wait_for(tile)?;
@@ -122,18 +119,17 @@ impl<'t> Shared<'t> {
         Some(done)
     }
 
-    fn states(&self) -> MutexGuard<'_, States> {
+    fn states(&self) -> MutexGuard<'_, Vec<State>> {
         // Nothing that can fail is done while states change.
         self.states.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The zones of a tile, if nobody traces them yet: the caller will.
     fn promise(&self, owner: usize) -> Option<Promise<'_, 't>> {
-        let step = &mut self.states().steps[owner];
+        let step = &mut self.states()[owner].step;
         (*step == Step::Untouched).then(|| {
             *step = Step::Promised;
-            let [start, end] = [owner, owner + 1].map(|tile| self.zones.partition_point(|zone| zone.owner < tile));
-            Promise { shared: self, owner, zones: start..end, first: Vec::new() }
+            Promise { shared: self, owner, first: None }
         })
     }
 
@@ -141,20 +137,20 @@ impl<'t> Shared<'t> {
     /// nobody waits who has promised any and not kept it.
     fn wait_for(&self, tile: usize) -> Option<Vec<Arc<First>>> {
         let (mut states, needs) = (self.states(), &self.needs[tile]);
-        while needs.iter().any(|&zone| states.steps[self.zones[zone].owner] != Step::Done) {
+        while needs.iter().any(|&owner| states[owner].step != Step::Done) {
             states = self.changed.wait(states).unwrap_or_else(PoisonError::into_inner);
         }
-        needs.iter().map(|&zone| states.first[zone].0.clone()).collect()
+        needs.iter().map(|&owner| states[owner].first.clone()).collect()
     }
 
     /// A tile is finished.
     fn forget(&self, tile: usize) {
         let mut states = self.states();
-        for &zone in &self.needs[tile] {
-            let (first, needing) = &mut states.first[zone];
-            *needing -= 1;
-            if *needing == 0 {
-                *first = None;
+        for &owner in &self.needs[tile] {
+            let state = &mut states[owner];
+            state.needing -= 1;
+            if state.needing == 0 {
+                state.first = None;
             }
         }
     }
@@ -173,17 +169,15 @@ fn beside(tile: usize, columns: usize, tiles: usize) -> impl Iterator<Item = usi
 struct Promise<'a, 't> {
     shared: &'a Shared<'t>,
     owner: usize,
-    zones: Range<usize>,
-    /// Of all of these zones, or none.
-    first: Vec<First>,
+    /// Of all zones, or none.
+    first: Option<First>,
 }
 
 impl Drop for Promise<'_, '_> {
     fn drop(&mut self) {
-        let first: Vec<_> = self.first.drain(..).map(Arc::new).collect();
-        let mut states = self.shared.states();
-        states.steps[self.owner] = Step::Done;
-        states.first[self.zones.clone()].iter_mut().zip(first).for_each(|((kept, _), first)| *kept = Some(first));
+        let first = self.first.take().map(Arc::new);
+        let state = &mut self.shared.states()[self.owner];
+        (state.step, state.first) = (Step::Done, first);
         self.shared.changed.notify_all();
     }
 }
@@ -207,14 +201,17 @@ mod tests {
             let (tiles, grown) = (tiles(width, height), |tile: Tile| tile.grown(width, height).grown(width, height));
             let shared = Shared::new(&tiles, grown);
             for (i, &tile) in tiles.iter().enumerate() {
-                let zones = || shared.needs[i].iter().map(|&zone| shared.zones[zone]);
+                let zones = || shared.needs[i].iter().flat_map(|&owner| &shared.zones[owner]);
                 assert!(
-                    grown(tile).places().all(|at| zones().any(|zone| zone.part.contains(at))),
+                    grown(tile).places().all(|at| zones().any(|zone| zone.contains(at))),
                     "{i} of {width}×{height}"
                 );
-                assert!(zones().all(|zone| zone.owner <= i), "tiles before this one, which are taken before");
+                assert!(
+                    shared.needs[i].iter().all(|&owner| owner <= i),
+                    "tiles before this one, which are taken before"
+                );
             }
-            let mut traced: Vec<_> = shared.zones.iter().flat_map(|zone| zone.part.places()).collect();
+            let mut traced: Vec<_> = shared.zones.iter().flatten().flat_map(|zone| zone.places()).collect();
             let count = traced.len();
             traced.sort_unstable();
             traced.dedup();
@@ -227,8 +224,7 @@ mod tests {
         // They live on with a thread that hears of nothing.
         let tiles: &'static [Tile] = tiles(70, 40).leak();
         let shared: &'static Shared = Box::leak(Box::new(Shared::new(tiles, |tile| tile.grown(70, 40))));
-        let owners = shared.needs[4].iter().map(|&zone| shared.zones[zone].owner);
-        let promises: Vec<_> = owners.filter_map(|owner| shared.promise(owner)).collect();
+        let promises: Vec<_> = shared.needs[4].iter().filter_map(|&owner| shared.promise(owner)).collect();
         assert!(promises.len() > 1 && shared.promise(promises[0].owner).is_none(), "promised once");
         let (tell, heard) = std::sync::mpsc::channel();
         std::thread::spawn(move || {
