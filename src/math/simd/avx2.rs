@@ -37,6 +37,26 @@ impl Avx2 {
     }
 }
 
+impl Avx2 {
+    #[inline(always)]
+    fn masks_less(self, a: __m256, b: __m256) -> u32 {
+        // SAFETY: the token proves the features; so below.
+        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(a, b)).cast_unsigned() }
+    }
+
+    #[inline(always)]
+    fn masks_at_most(self, a: __m256, b: __m256) -> u32 {
+        // SAFETY: as above.
+        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)).cast_unsigned() }
+    }
+
+    #[inline(always)]
+    fn masks_choose(self, mask: u32, a: __m256, b: __m256) -> __m256 {
+        // SAFETY: as above.
+        unsafe { _mm256_blendv_ps(b, a, _mm256_castsi256_ps(lanes_in(mask))) }
+    }
+}
+
 /// Eight lanes for a token that proves AVX2.
 macro_rules! eight_lanes {
     ($token:ty, $wide:ty, $widened:expr, $larger:expr, $broad_fits:expr) => {
@@ -131,20 +151,17 @@ macro_rules! eight_lanes {
 
             #[inline(always)]
             fn less(self, a: __m256, b: __m256) -> u32 {
-                // SAFETY: as above.
-                unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(a, b)).cast_unsigned() }
+                self.masks_less(a, b)
             }
 
             #[inline(always)]
             fn at_most(self, a: __m256, b: __m256) -> u32 {
-                // SAFETY: as above.
-                unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)).cast_unsigned() }
+                self.masks_at_most(a, b)
             }
 
             #[inline(always)]
             fn choose(self, mask: u32, a: __m256, b: __m256) -> __m256 {
-                // SAFETY: as above.
-                unsafe { _mm256_blendv_ps(b, a, _mm256_castsi256_ps(lanes_in(mask))) }
+                self.masks_choose(mask, a, b)
             }
 
             #[inline(always)]

@@ -46,6 +46,27 @@ impl Avx512 {
     }
 }
 
+#[expect(clippy::cast_possible_truncation, reason = "a mask of eight lanes")]
+impl Avx512 {
+    #[inline(always)]
+    fn masks_less(self, a: __m256, b: __m256) -> u32 {
+        // SAFETY: the token proves the features; so below.
+        unsafe { u32::from(_mm256_cmp_ps_mask::<_CMP_LT_OQ>(a, b)) }
+    }
+
+    #[inline(always)]
+    fn masks_at_most(self, a: __m256, b: __m256) -> u32 {
+        // SAFETY: as above.
+        unsafe { u32::from(_mm256_cmp_ps_mask::<_CMP_LE_OQ>(a, b)) }
+    }
+
+    #[inline(always)]
+    fn masks_choose(self, mask: u32, a: __m256, b: __m256) -> __m256 {
+        // SAFETY: as above.
+        unsafe { _mm256_mask_blend_ps(mask as u8, b, a) }
+    }
+}
+
 eight_lanes!(Avx512, Sixteen, Sixteen, larger, true);
 
 #[inline(always)]
