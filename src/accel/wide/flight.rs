@@ -202,10 +202,10 @@ impl Slot {
         self.children[top % DEPTH]
     }
 
-    /// Puts the children that are met on the stack, the nearest last.
+    /// Puts the children that are met on the stack of a ray that runs to this octant, the nearest last.
     #[inline(always)]
-    fn push<S: Simd>(&mut self, s: S, node: &Node, near: S::Lanes, met: u32) {
-        let order = FARTHEST_FIRST[self.ray.slabs.octant as usize % LANES][met as usize % 256];
+    fn push<S: Simd>(&mut self, s: S, octant: u32, node: &Node, near: S::Lanes, met: u32) {
+        let order = FARTHEST_FIRST[octant as usize % LANES][met as usize % 256];
         let top = self.top % DEPTH;
         let (nears, children) = (self.near[top..].first_chunk_mut(), self.children[top..].first_chunk_mut());
         // There is room for eight above every top.
@@ -240,7 +240,8 @@ impl<W: Wave, B: BoxMargins> Flight<'_, W, B> {
                 let seeker = Seeker::new(ray, queue.ready.t_min[lane], i, queue.ready.exclude[lane]);
                 (slot.ray, slot.seeker) = (*ray, seeker);
                 slot.top = LANES;
-                slot.push(s, root, near, met);
+                // From where it was made ready: the slot's own is still on its way.
+                slot.push(s, ray.slabs.octant, root, near, met);
                 *at = slot.pop();
                 slots.taken |= 1 << number;
                 return;
@@ -269,7 +270,7 @@ impl<W: Wave, B: BoxMargins> Flight<'_, W, B> {
             nodes &= nodes - 1;
             let node = &tree_nodes[*at as usize];
             let (near, met) = slot.ray.slabs.meets(s, node, slot.seeker.limit);
-            slot.push(s, node, near, met);
+            slot.push(s, slot.ray.slabs.octant, node, near, met);
             *at = slot.pop();
             if FAR {
                 let (node, block) = Child::either(*at);
