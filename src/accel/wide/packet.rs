@@ -256,7 +256,14 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
                 }
             } else {
                 let below = top;
-                self.push(s, wide, &tree.nodes[branch.child as usize], branch.rays, &reach, (trip.stack, &mut top));
+                self.push(
+                    s,
+                    wide,
+                    (tree, &tree.nodes[branch.child as usize]),
+                    branch.rays,
+                    &reach,
+                    (trip.stack, &mut top),
+                );
                 nearer = top > below;
             }
             // Those that meet the nearest child were just found; rays that need no more have no limit above zero.
@@ -300,7 +307,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         &self,
         s: S,
         wide: T,
-        node: &Node,
+        (tree, node): (&Tree, &Node),
         rays: u32,
         reach: &Reach<T, N>,
         (stack, top): (&mut [Branch], &mut usize),
@@ -315,9 +322,13 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         for _ in 0..met.count_ones() {
             let slot = (order & 7) as usize;
             order >>= 4;
+            // Fetched while the rays are asked about its box.
+            let child = node.children[slot];
+            let (at, block) = Child::either(child);
+            s.prefetch_either(Child::is_leaf(child), (&tree.blocks, block), (&tree.nodes, at));
             // The only one is visited for the rays that visit the node: mostly there are some for it.
             let met = if only { rays } else { bundle.meet_child(wide, node, slot, reach.limit) & rays };
-            stack[*top] = Branch { near: near[slot], child: node.children[slot], rays: met };
+            stack[*top] = Branch { near: near[slot], child, rays: met };
             *top += usize::from(met != 0);
         }
     }
