@@ -47,7 +47,7 @@ mod writable;
 pub use exit::Exit;
 
 use args::{Cli, Command, RenderArgs};
-use clap::{Parser, Subcommand};
+use clap::{Args, FromArgMatches, Parser, Subcommand};
 use message::{Messages, Severity};
 use std::ffi::{OsStr, OsString};
 use std::io::{self, Write};
@@ -57,14 +57,14 @@ use std::path::Path;
 pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
     let words = JOINED.iter().fold(with_render(words.into_iter().collect()), with_joined);
     let format = message::Format::asked_for(&words);
-    let cli = match Cli::try_parse_from(words) {
-        Ok(cli) => cli,
+    let command = match render_alone(&words).map_or_else(|| Cli::try_parse_from(words).map(|cli| cli.command), Ok) {
+        Ok(command) => command,
         Err(e) => return misunderstood(&e, format),
     };
     interrupt::install(format);
     accident::install();
     memory::keep_freed();
-    match cli.command {
+    match command {
         Command::Render(args) => render_command(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Bench(args) => bench::run(&args),
@@ -77,6 +77,14 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
         Command::Completions { shell } => shell::completions(shell),
         Command::Man => shell::man(),
     }
+}
+
+/// What `meshray render …` asks for, where the words are right; what is wrong, or to be explained, is found with all commands
+/// at hand, whose flags take as long to list as a small model to load.
+fn render_alone(words: &[OsString]) -> Option<Command> {
+    let words = words.get(1..).filter(|words| words.first().is_some_and(|word| word == "render"))?;
+    let matches = RenderArgs::augment_args(clap::Command::new("render")).try_get_matches_from(words).ok()?;
+    RenderArgs::from_arg_matches(&matches).ok().map(|args| Command::Render(Box::new(args)))
 }
 
 /// Says what is wrong with the words, or prints the help that they ask for.
