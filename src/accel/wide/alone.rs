@@ -90,20 +90,21 @@ fn descend<B: BoxMargins, S: Simd, W: Wave>(
     stack: &mut [Entry],
 ) {
     let slabs = ray.slabs.spread(s);
-    let (mut node, mut top) = (&tree.nodes[0], 0);
+    let (mut child, mut top) = (0, 0);
     loop {
-        let (near, met) = slabs.meets(s, node, seeker.limit);
-        let mut child = if met != 0 {
-            nearest(s, node, near, met, stack, &mut top)
-        } else {
-            pop(stack, &mut top, seeker.limit).unwrap_or(Child::END)
-        };
-        while Child::is_leaf(child) {
-            if seeker.test::<B, _, _>(s, &ray.sight, tree, shapes, wave, child) {
-                return;
-            }
-            child = pop(stack, &mut top, seeker.limit).unwrap_or(Child::END);
+        // A loop of its own: what it needs stays in registers.
+        while !Child::is_leaf(child) {
+            let node = &tree.nodes[child as usize];
+            let (near, met) = slabs.meets(s, node, seeker.limit);
+            child = if met != 0 {
+                nearest(s, node, near, met, stack, &mut top)
+            } else {
+                pop(stack, &mut top, seeker.limit).unwrap_or(Child::END)
+            };
         }
-        node = &tree.nodes[child as usize];
+        if seeker.test::<B, _, _>(s, &ray.sight, tree, shapes, wave, child) {
+            return;
+        }
+        child = pop(stack, &mut top, seeker.limit).unwrap_or(Child::END);
     }
 }
