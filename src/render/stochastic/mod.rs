@@ -104,7 +104,7 @@ impl<'a> Sampler<'a> {
         let mut around = Around::new(self.grown(tile, reach));
         first.iter().for_each(|first| first.show(&mut around));
         let known = self.grown(tile, reach.saturating_sub(1));
-        let (mut pixels, mut done) = (Vec::new(), self.nothing(tile));
+        let (mut pixels, mut done) = (Vec::with_capacity(around.tile.pixels()), self.nothing(tile));
         // How many samples of each pixel are there already: those of the first round, or none.
         let taken = u32::from(self.starts_with_one());
         if taken == 1 {
