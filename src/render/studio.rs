@@ -119,18 +119,20 @@ const BOXES: SoftBoxes = SoftBoxes {
 impl SoftBoxes {
     /// Their light along `dir`, every edge softened by `blur` more.
     #[inline(always)]
-    fn along(&self, dir: Vec3, blur: f32) -> f32 {
-        let mut light = [0.0; 4];
-        for (k, light) in light.iter_mut().enumerate() {
+    fn along(&self, dir: Vec3, blur: f32) -> Fraction {
+        let mut lights = [Fraction { over: 0.0, under: 1.0 }; 4];
+        for (k, light) in lights.iter_mut().enumerate() {
             let cosine = |axis: &[Four; 3]| dir.x * axis[0][k] + dir.y * axis[1][k] + dir.z * axis[2][k];
             let edge_squared = self.edge_squared[k] + blur * blur;
             // The flat coordinates see the back of the room mirrored: fade it out around the edge of sight.
             let front = step(cosine(&self.toward), edge_squared.max(0.01));
             let across = slab(cosine(&self.right), self.half[0][k], edge_squared);
             let along = slab(cosine(&self.up), self.half[1][k], edge_squared);
-            *light = self.radiance[k] * front * across * along;
+            let Fraction { over, under } = front.times(across).times(along);
+            *light = Fraction { over: self.radiance[k] * over, under };
         }
-        (light[0] + light[1]) + (light[2] + light[3])
+        let [key, strip, panel, rim] = lights;
+        key.plus(strip).plus(panel.plus(rim))
     }
 }
 
@@ -140,22 +142,48 @@ fn room(dir: Vec3, alpha: f32) -> f32 {
     let blur = SPREAD_PER_ALPHA * alpha;
     // Walls brighten slowly to the ceiling; the floor and the wall behind are darker.
     let soft = |edge: f32| edge * edge + blur * blur;
-    let swallowed = BACKDROP * step(-dir.z - BACKDROP_FROM, soft(BACKDROP_EDGE));
-    let dome = (HORIZON + (ZENITH - HORIZON) * dir.y) * (1.0 - swallowed);
+    let behind = step(-dir.z - BACKDROP_FROM, soft(BACKDROP_EDGE));
+    let left = behind.under - BACKDROP * behind.over;
+    let dome = (HORIZON + (ZENITH - HORIZON) * dir.y) * left;
+    let brighter = Fraction { over: dome - NADIR * behind.under, under: behind.under };
     let above = step(dir.y, soft(FLOOR_EDGE));
-    NADIR + (dome - NADIR) * above + BOXES.along(dir, blur)
+    let Fraction { over, under } = brighter.times(above).plus(BOXES.along(dir, blur));
+    NADIR + over / under
 }
 
-/// A smooth step from 0 to 1 at `x` = 0, so wide: x/√(1+x²), whose slow ends are like those of a rough lobe.
-#[inline(always)]
-fn step(x: f32, width_squared: f32) -> f32 {
-    0.5 + 0.5 * x / (width_squared + x * x).sqrt()
+/// A quotient that is not divided yet: the room is a sum of products of them, and one division does for all. What is under
+/// the line lies between 10⁻²⁶ and 10⁵ for unit vectors and widths up to one.
+#[derive(Clone, Copy)]
+struct Fraction {
+    over: f32,
+    under: f32,
 }
 
-/// 1 for |x| < `half`, with smooth edges; its integral over x is 2·`half` for every width.
+impl Fraction {
+    #[inline(always)]
+    fn times(self, other: Self) -> Self {
+        Self { over: self.over * other.over, under: self.under * other.under }
+    }
+
+    #[inline(always)]
+    fn plus(self, other: Self) -> Self {
+        Self { over: self.over * other.under + other.over * self.under, under: self.under * other.under }
+    }
+}
+
+/// A smooth step from 0 to 1 at `x` = 0, so wide: ½ + ½ x/√(1+x²), whose slow ends are like those of a rough lobe.
 #[inline(always)]
-fn slab(x: f32, half: f32, width_squared: f32) -> f32 {
-    step(x + half, width_squared) - step(x - half, width_squared)
+fn step(x: f32, width_squared: f32) -> Fraction {
+    let root = (width_squared + x * x).sqrt();
+    Fraction { over: 0.5 * (root + x), under: root }
+}
+
+/// 1 for |x| < `half`, with smooth edges: the difference of two steps; its integral over x is 2·`half` for every width.
+#[inline(always)]
+fn slab(x: f32, half: f32, width_squared: f32) -> Fraction {
+    let (left, right) = (x + half, x - half);
+    let (left_root, right_root) = ((width_squared + left * left).sqrt(), (width_squared + right * right).sqrt());
+    Fraction { over: 0.5 * (left * right_root - right * left_root), under: left_root * right_root }
 }
 
 /// Number of harmonics: bands 0, 1, 2 and 4 (the cosine has no band 3).
