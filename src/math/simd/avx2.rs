@@ -443,6 +443,15 @@ macro_rules! eight_lanes {
             }
 
             #[inline(always)]
+            fn among(self, table: &Row, places: &[u32; LANES]) -> __m256 {
+                // SAFETY: as above; reads eight numbers and eight words, with no demand on alignment.
+                unsafe {
+                    let places = _mm256_loadu_si256(places.as_ptr().cast());
+                    _mm256_permutevar8x32_ps(_mm256_loadu_ps(table.as_ptr()), places)
+                }
+            }
+
+            #[inline(always)]
             fn prefetch_either<T, U>(self, first: bool, a: (&[T], usize), b: (&[U], usize)) {
                 let (a, b): (*const i8, *const i8) =
                     (a.0.as_ptr().wrapping_add(a.1).cast(), b.0.as_ptr().wrapping_add(b.1).cast());

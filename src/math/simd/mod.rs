@@ -172,6 +172,8 @@ pub trait Simd: Lanewise<LANES> {
     fn arrange(self, a: Self::Lanes, order: Order, to: &mut Row);
     /// The same for eight words.
     fn arrange_words(self, words: &[u32; LANES], order: Order, to: &mut [u32; LANES]);
+    /// Those of eight numbers that are at these places, by the lowest three bits of each.
+    fn among(self, table: &Row, places: &[u32; LANES]) -> Self::Lanes;
     /// Tells the processor that the first four cache lines of one of both are read soon, without a branch; elements that
     /// there are not do no harm.
     fn prefetch_either<T, U>(self, first: bool, a: (&[T], usize), b: (&[U], usize));

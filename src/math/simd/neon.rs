@@ -461,6 +461,15 @@ impl Simd for Neon {
     }
 
     #[inline(always)]
+    fn among(self, table: &Row, places: &[u32; LANES]) -> Floats {
+        let mut found = [0.0; LANES];
+        for (found, place) in found.iter_mut().zip(places) {
+            *found = table[*place as usize % LANES];
+        }
+        self.load(&found)
+    }
+
+    #[inline(always)]
     fn prefetch_either<T, U>(self, _: bool, _: (&[T], usize), _: (&[U], usize)) {}
 
     #[inline(always)]

@@ -265,6 +265,11 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
+    fn among(self, table: &Row, places: &[u32; LANES]) -> Row {
+        std::array::from_fn(|k| table[places[k] as usize % LANES])
+    }
+
+    #[inline(always)]
     fn prefetch_either<T, U>(self, _: bool, _: (&[T], usize), _: (&[U], usize)) {}
 
     #[inline(always)]

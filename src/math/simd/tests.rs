@@ -207,11 +207,11 @@ fn the_least_of_each_of_four_rows_is_found_wherever_it_stands() {
     }
 }
 
-/// Rows as columns, and back; a row in another order; one of six rows.
+/// Rows as columns, and back; a row in another order; one of six rows; numbers of a table.
 struct Moved([[f32; 4]; LANES]);
 
 impl Kernel for Moved {
-    type Output = (Vec<Row>, [[f32; 4]; LANES], Row, [u32; LANES], Row);
+    type Output = (Vec<Row>, [[f32; 4]; LANES], Row, [u32; LANES], [Row; 2]);
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Self::Output {
@@ -223,7 +223,8 @@ impl Kernel for Moved {
         let mut rows = [s.store(columns[0]); 6];
         rows[4] = s.store(columns[3]);
         let picked = s.store(s.pick(&rows, Pick::new(4)));
-        (columns.into_iter().map(|c| s.store(c)).collect(), s.rows(columns), arranged, words, picked)
+        let found = s.store(s.among(&s.store(columns[1]), &[4, 11, 5, 0, 2, 1, 6, u32::MAX]));
+        (columns.into_iter().map(|c| s.store(c)).collect(), s.rows(columns), arranged, words, [picked, found])
     }
 }
 
@@ -232,12 +233,13 @@ fn every_level_moves_numbers_to_the_same_places() {
     let rows: [[f32; 4]; LANES] = std::array::from_fn(|i| std::array::from_fn(|k| (4 * i + k) as f32));
     let order = [4, 3, 5, 0, 2, 1, 6, 7];
     for level in Level::all() {
-        let (columns, back, arranged, words, picked) = level.run(Moved(rows));
+        let (columns, back, arranged, words, [picked, found]) = level.run(Moved(rows));
         assert!((0..32).all(|i| columns[i % 4][i / 4] == rows[i / 4][i % 4]), "{}", level.name());
         assert_eq!(back, rows, "{}", level.name());
         assert_eq!(arranged, order.map(|lane| rows[lane][1]), "{}", level.name());
         assert_eq!(words, order.map(|lane: usize| rows[lane][2].to_bits()), "{}", level.name());
         assert_eq!(picked[..], columns[3], "{}", level.name());
+        assert_eq!(found, order.map(|lane| rows[lane][1]), "{}", level.name());
     }
 }
 

@@ -2,6 +2,7 @@
 //! several bounces between them ([`rebound`]).
 
 use crate::math::Vec3;
+use crate::math::simd::{LANES, Row as Eight, Simd};
 
 /// Directional albedo of the microfacet lobe as (scale of f0, scale of f90), the split sum of B. Karis, "Real Shading in
 /// Unreal Engine 4" (2013): rows by roughness 0 … 1, columns by the square root of N·V.
@@ -140,27 +141,53 @@ impl Row {
 
 /// [`albedo`] of one roughness for many points.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct AlbedoRow([(f32, f32); 9]);
+pub(crate) struct AlbedoRow {
+    /// Both numbers at the columns of [`ALBEDO`] but for the last, and how much larger the next ones are.
+    from: [Eight; 2],
+    rise: [Eight; 2],
+}
 
 impl AlbedoRow {
     pub(crate) fn of(roughness: f32) -> Self {
         let row = Row::of(roughness);
-        Self(std::array::from_fn(|column| row.entry(column)))
+        let (mut from, mut rise) = ([[0.0; LANES]; 2], [[0.0; LANES]; 2]);
+        for column in 0..LANES {
+            let (here, next) = (row.entry(column), row.entry(column + 1));
+            (from[0][column], from[1][column]) = here;
+            (rise[0][column], rise[1][column]) = (next.0 - here.0, next.1 - here.1);
+        }
+        Self { from, rise }
     }
 
+    /// Both numbers at each of eight N·V.
     #[inline(always)]
-    pub(crate) fn at(&self, n_v: f32) -> (f32, f32) {
-        between(n_v, |column| self.0[column])
+    pub(crate) fn at_each<S: Simd>(&self, s: S, n_v: &Eight) -> [Eight; 2] {
+        let (mut columns, mut rests) = ([0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            (columns[i], rests[i]) = column(n_v[i]);
+        }
+        let (rest, mut found) = (s.load(&rests), [[0.0; LANES]; 2]);
+        for ((found, from), rise) in found.iter_mut().zip(&self.from).zip(&self.rise) {
+            *found = s.store(s.add(s.among(from, &columns), s.mul(s.among(rise, &columns), rest)));
+        }
+        found
     }
+}
+
+/// The column of [`ALBEDO`] before this N·V, but for the last, and how far behind it that is.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss, reason = "0 … 8")]
+fn column(n_v: f32) -> (u32, f32) {
+    let x = n_v.clamp(0.0, 1.0).sqrt() * 8.0;
+    let column = (x as u32).min(7);
+    (column, x - column as f32)
 }
 
 /// Between the two entries that are nearest to N·V.
 #[inline(always)]
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "lies in 0 … 8")]
 fn between(n_v: f32, entry: impl Fn(usize) -> (f32, f32)) -> (f32, f32) {
-    let x = n_v.clamp(0.0, 1.0).sqrt() * 8.0;
-    let column = (x as usize).min(7);
-    mix(entry(column), entry(column + 1), x - column as f32)
+    let (column, rest) = column(n_v);
+    mix(entry(column as usize), entry(column as usize + 1), rest)
 }
 
 /// Mean of a white lobe's albedo over the hemisphere, weighted by the cosine, for roughness 0, 1/8, … 1: the integral

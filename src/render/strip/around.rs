@@ -3,7 +3,7 @@
 use super::columns::{Column, Columns, Found, POINTS, Strip, get, padded, put};
 use super::painted::Painted;
 use crate::math::Vec3;
-use crate::math::simd::{Kernel, Simd};
+use crate::math::simd::{Kernel, LANES, Simd};
 use crate::render::shade::{
     AlbedoRow, Around, Matter, MetalRoughMatter, Model, PhongMatter, albedo, mean_albedo, open,
 };
@@ -96,7 +96,7 @@ impl Kernel for Look<'_> {
 
     // Whether maps change the material is asked outside the loops, which then are formulas.
     #[inline(always)]
-    fn run<S: Simd>(self, _: S) {
+    fn run<S: Simd>(self, s: S) {
         let Self { found, painted, to, points, matter, has_inside, sky, ambient } = self;
         let (points, emission) = (points.min(POINTS), matter.emission);
         match &matter.model {
@@ -116,17 +116,17 @@ impl Kernel for Look<'_> {
             Model::MetalRough(m) if painted.any => {
                 let mapped = Mapped { m: *m, painted };
                 if has_inside {
-                    look(&mapped, found, |i| found.front[i] == 1, to, points, (sky, ambient));
+                    look(s, &mapped, (found, |i| found.front[i] == 1), to, points, (sky, ambient));
                 } else {
-                    look(&mapped, found, |_| true, to, points, (sky, ambient));
+                    look(s, &mapped, (found, |_| true), to, points, (sky, ambient));
                 }
             }
             Model::MetalRough(m) => {
                 let even = Even { m: m.in_the_open(), row: m.shares(), mean: mean_albedo(m.roughness()), emission };
                 if has_inside {
-                    look(&even, found, |i| found.front[i] == 1, to, points, (sky, ambient));
+                    look(s, &even, (found, |i| found.front[i] == 1), to, points, (sky, ambient));
                 } else {
-                    look(&even, found, |_| true, to, points, (sky, ambient));
+                    look(s, &even, (found, |_| true), to, points, (sky, ambient));
                 }
             }
         }
@@ -146,8 +146,8 @@ fn scatter(to: &mut Surroundings, points: usize, ambient: Vec3, matter: impl Fn(
 trait MetalRoughPoints {
     fn matter(&self, i: usize) -> MetalRoughMatter;
     fn emission(&self, i: usize) -> Vec3;
-    /// Shares of f0 and f90 in what its lobe sends back where the cosine of the view is `n_v`.
-    fn shares(&self, i: usize, n_v: f32) -> (f32, f32);
+    /// Finds the shares of f0 and f90 in what its lobe sends back where the cosines of the view are these.
+    fn find_shares<S: Simd>(&self, s: S, points: usize, n_v: &Column, to: &mut [Column; 2]);
     /// Finds the means over the hemisphere of what white lobes send back, where they differ.
     fn find_means(&self, points: usize, means: &mut Column);
     /// That of a point.
@@ -178,8 +178,11 @@ impl MetalRoughPoints for Even {
     }
 
     #[inline(always)]
-    fn shares(&self, _: usize, n_v: f32) -> (f32, f32) {
-        self.row.at(n_v)
+    fn find_shares<S: Simd>(&self, s: S, points: usize, n_v: &Column, [scale, bias]: &mut [Column; 2]) {
+        let eights = scale.as_chunks_mut().0.iter_mut().zip(bias.as_chunks_mut().0);
+        for (n_v, (scale, bias)) in n_v.as_chunks().0.iter().zip(eights).take(points.div_ceil(LANES)) {
+            [*scale, *bias] = self.row.at_each(s, n_v);
+        }
     }
 
     #[inline(always)]
@@ -219,8 +222,10 @@ impl MetalRoughPoints for Mapped<'_> {
     }
 
     #[inline(always)]
-    fn shares(&self, i: usize, n_v: f32) -> (f32, f32) {
-        albedo(self.painted.roughness[i], n_v)
+    fn find_shares<S: Simd>(&self, _: S, points: usize, n_v: &Column, [scale, bias]: &mut [Column; 2]) {
+        for i in 0..points.min(POINTS) {
+            (scale[i], bias[i]) = albedo(self.painted.roughness[i], n_v[i]);
+        }
     }
 
     #[inline(always)]
@@ -248,10 +253,10 @@ impl MetalRoughPoints for Mapped<'_> {
 
 /// What a metallic-rough material shows; `outside` tells whether a point is seen from outside.
 #[inline(always)]
-fn look(
+fn look<S: Simd>(
+    s: S,
     m: &impl MetalRoughPoints,
-    found: &Found,
-    outside: impl Fn(usize) -> bool,
+    (found, outside): (&Found, impl Fn(usize) -> bool),
     to: &mut Surroundings,
     points: usize,
     (sky, ambient): (&Sky, Vec3),
@@ -261,9 +266,7 @@ fn look(
         to.n_v[i] = seen.normal.dot(seen.view).clamp(0.0, 1.0);
         put(&mut to.mirrored_dir, i, seen.mirrored());
     }
-    for i in 0..points.min(POINTS) {
-        (to.shares[0][i], to.shares[1][i]) = m.shares(i, to.n_v[i]);
-    }
+    m.find_shares(s, points, &to.n_v, &mut to.shares);
     m.find_means(points, &mut to.mean);
     spread(sky, &found.normal, points, &mut to.diffuse);
     if m.looks_up() {
