@@ -221,8 +221,9 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let mut missed = std::mem::take(&mut self.beside.missed);
         match traced {
             Traced::Eyes(eyes) => {
-                let rays = missed.iter().map(|&i| (i, eyes.rays()[i as usize].dir, eyes.cone_spread(i as usize)));
-                self.context.sky.each_radiance(rays, |i, radiance| self.samples[i as usize].radiance += radiance);
+                let samples = &mut self.samples;
+                let tell = |i: u32, radiance: Vec3| samples[i as usize].radiance += radiance;
+                self.context.sky.each_radiance_of(&missed, eyes.columns(), tell);
             }
             Traced::Wave(_, wave) => {
                 let rays = missed.iter().map(|&i| (i, wave.rays[i as usize].dir, wave.paths[i as usize].cone_spread));

@@ -291,9 +291,9 @@ impl Eyes {
         (rays, pencil, hits)
     }
 
-    /// How wide the cone of the `i`th ray grows, radians.
-    pub(crate) fn cone_spread(&self, i: usize) -> f32 {
-        self.cone_spread[i]
+    /// Their directions by axis, and how wide their cones grow, radians.
+    pub(crate) fn columns(&self) -> ([&[f32]; 3], &[f32]) {
+        (self.dirs.each_ref().map(|row| &row[..self.count]), &self.cone_spread[..self.count])
     }
 
     /// Whether they start inside of something.

@@ -23,8 +23,7 @@ impl Sky {
     /// Tells what is seen along each of these directions by rays whose cones are so many radians across, as [`Self::radiance`]
     /// does; a ray is known by its number. Not in their order.
     pub(crate) fn each_radiance(&self, rays: impl Iterator<Item = (u32, Vec3, f32)>, mut tell: impl FnMut(u32, Vec3)) {
-        let mut looks = Looks { count: 0, rays: [0; RAYS], dir: [[0.0; RAYS]; 3], radiance: [0.0; RAYS] };
-        let studio = self.studio();
+        let (mut looks, studio) = (Looks::NONE, self.studio());
         for (ray, dir, angle) in rays {
             match studio {
                 Some(up) if angle <= WIDE => {
@@ -40,9 +39,46 @@ impl Sky {
             looks.tell(up, &mut tell);
         }
     }
+
+    /// The same for rays of a pencil by their numbers, in order; directions by axis, and how wide each cone is.
+    pub(crate) fn each_radiance_of(
+        &self,
+        rays: &[u32],
+        (dirs, angles): ([&[f32]; 3], &[f32]),
+        mut tell: impl FnMut(u32, Vec3),
+    ) {
+        let dir = |i: usize| Vec3::new(dirs[0][i], dirs[1][i], dirs[2][i]);
+        let mut looks = Looks::NONE;
+        for some in rays.chunks(RAYS) {
+            // Mostly these are all rays of a row of pixels.
+            let run = match (self.studio(), some) {
+                (Some(up), [first, .., last]) if last.wrapping_sub(*first) == RAYS as u32 - 1 && some.len() == RAYS => {
+                    let sharp = angles[*first as usize..=*last as usize].iter().all(|&angle| angle <= WIDE);
+                    sharp.then(|| looks.take(*first, dirs)).flatten().map(|()| up)
+                }
+                _ => None,
+            };
+            match run {
+                Some(up) => looks.tell(up, &mut tell),
+                None => self.each_radiance(some.iter().map(|&i| (i, dir(i as usize), angles[i as usize])), &mut tell),
+            }
+        }
+    }
 }
 
 impl Looks {
+    /// Nothing.
+    const NONE: Self = Self { count: 0, rays: [0; RAYS], dir: [[0.0; RAYS]; 3], radiance: [0.0; RAYS] };
+
+    /// Takes rays that follow each other from `first` on, if so many are there, instead of all others.
+    fn take(&mut self, first: u32, dirs: [&[f32]; 3]) -> Option<()> {
+        let row = |k: usize| dirs[k].get(first as usize..)?.first_chunk();
+        self.dir = [*row(0)?, *row(1)?, *row(2)?];
+        (first..).zip(&mut self.rays).for_each(|(ray, to)| *to = ray);
+        self.count = RAYS;
+        Some(())
+    }
+
     fn add(&mut self, ray: u32, dir: Vec3) {
         let i = self.count % RAYS;
         self.rays[i] = ray;
@@ -103,6 +139,18 @@ mod tests {
                 rays[40].1 = Vec3::ZERO;
                 let mut seen = vec![None; rays.len()];
                 sky.each_radiance(rays.iter().copied(), |ray, radiance| seen[ray as usize] = Some(radiance));
+                let columns = [0, 1, 2].map(|k| rays.iter().map(|ray| ray.1[k]).collect::<Vec<_>>());
+                let angles: Vec<_> = rays.iter().map(|ray| ray.2).collect();
+                for numbers in [(0..101).collect(), (0..101).filter(|i| i % 50 != 7).collect::<Vec<u32>>()] {
+                    let mut in_columns = vec![None; rays.len()];
+                    let columns = columns.each_ref().map(|column| &column[..]);
+                    sky.each_radiance_of(&numbers, (columns, &angles), |ray, radiance| {
+                        in_columns[ray as usize] = Some(radiance);
+                    });
+                    let expected = seen.iter().enumerate();
+                    let expected = expected.map(|(i, seen)| seen.filter(|_| numbers.contains(&(i as u32))));
+                    assert_eq!(in_columns, expected.collect::<Vec<_>>());
+                }
                 for ((_, dir, angle), seen) in rays.into_iter().zip(seen) {
                     let alone = sky.radiance(dir.try_normalize().unwrap_or(Vec3::Z), angle);
                     assert_eq!(seen.map(|v| v.to_array().map(f32::to_bits)), Some(alone.to_array().map(f32::to_bits)));
