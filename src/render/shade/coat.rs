@@ -66,8 +66,8 @@ impl CoatMatter {
         if n_l <= 0.0 || n_v <= 0.0 {
             return 0.0;
         }
-        let half = (view + to_light).normalize_or(self.normal);
-        self.strength * fresnel(view.dot(half)) * highlight(self.normal, half, [n_l, n_v], a2) * n_l
+        let between = view + to_light;
+        self.strength * fresnel(0.5 * between.length()) * highlight(self.normal, between, [n_l, n_v], a2) * n_l
     }
 
     /// BRDF × N·L of the part of it that [`Self::ambient`] looks up.

@@ -298,8 +298,8 @@ impl MetalRoughMatter {
     #[inline(always)]
     pub(crate) fn lit_on_side(&self, normal: Vec3, view: Vec3, to_light: Vec3, outside: bool) -> Vec3 {
         let a2 = squared_width(self.roughness).max(self.least_square);
-        let lobe = |half| {
-            let seen = highlight(normal, half, [normal.dot(to_light), normal.dot(view)], a2);
+        let lobe = |between| {
+            let seen = highlight(normal, between, [normal.dot(to_light), normal.dot(view)], a2);
             if outside { seen } else { 0.0 }
         };
         self.lit_by(normal, view, to_light, lobe)
@@ -316,17 +316,18 @@ impl MetalRoughMatter {
         self.scattered_through() * ((1.0 - dielectric.max_element()) / PI * n_l)
     }
 
-    /// The same with another lobe: what it gives for a half vector, before Fresnel.
+    /// The same with another lobe: what it gives for the sum of both unit vectors, before Fresnel.
     #[inline(always)]
     pub(super) fn lit_by(&self, normal: Vec3, view: Vec3, to_light: Vec3, lobe: impl Fn(Vec3) -> f32) -> Vec3 {
         let (n_l, n_v) = (normal.dot(to_light), normal.dot(view));
         if n_l <= 0.0 || n_v <= 0.0 {
             return Vec3::ZERO;
         }
-        let half = (view + to_light).normalize_or(normal);
-        let (dielectric, metal) = self.fresnel(view.dot(half));
+        // Half of its length is the cosine between either and the direction in the middle.
+        let between = view + to_light;
+        let (dielectric, metal) = self.fresnel(0.5 * between.length());
         let diffuse = self.scattered() * ((1.0 - dielectric.max_element()) / PI);
-        let specular = dielectric.lerp(metal, self.metallic) * lobe(half);
+        let specular = dielectric.lerp(metal, self.metallic) * lobe(between);
         (diffuse + specular) * n_l
     }
 
@@ -362,12 +363,12 @@ impl MetalRoughMatter {
     pub(super) fn lit_around(&self, seen: &Seen, to: Vec3, grain: Option<&GrainMatter>) -> Vec3 {
         let (normal, view) = (seen.normal, seen.view);
         let looked_up = 1.0 - self.traced(seen.outside);
-        let lobe = |half| match grain {
-            None => highlight(normal, half, [normal.dot(to), normal.dot(view)], squared_width(self.roughness)),
+        let lobe = |between| match grain {
+            None => highlight(normal, between, [normal.dot(to), normal.dot(view)], squared_width(self.roughness)),
             Some(grain) => grain.highlight(normal, view, to),
         };
         let through = if self.is_translucent() { self.lit_through(normal, view, to) } else { Vec3::ZERO };
-        (self.lit_by(normal, view, to, |half| lobe(half) * looked_up) + through) * self.occlusion
+        (self.lit_by(normal, view, to, |between| lobe(between) * looked_up) + through) * self.occlusion
     }
 
     /// Roughness of the lobe that is looked up, if one is.
@@ -525,29 +526,31 @@ pub(super) fn least_square(roughness: f32, to: f32) -> f32 {
     to.min(WIDE) * (1.0 - smoothstep(0.5 * NARROW_HIGHLIGHT, NARROW_HIGHLIGHT, roughness))
 }
 
-/// The microfacet lobe of a light without extent, before Fresnel: distribution × visibility, for a squared width α².
+/// The microfacet lobe of a light without extent, before Fresnel: distribution × visibility, for a squared width α² and the
+/// direction `between` light and view, of any length.
 #[inline(always)]
-pub(super) fn highlight(normal: Vec3, half: Vec3, [n_l, n_v]: [f32; 2], a2: f32) -> f32 {
-    ggx(normal, half, a2) * visibility(n_l, n_v, a2)
+pub(super) fn highlight(normal: Vec3, between: Vec3, [n_l, n_v]: [f32; 2], a2: f32) -> f32 {
+    0.5 / PI * ggx(normal, between, a2) / masking(n_l, n_v, a2)
 }
 
-/// Trowbridge and Reitz's distribution of facets (GGX), `a2` the fourth power of the roughness.
+/// π times Trowbridge and Reitz's distribution of facets (GGX), `a2` the fourth power of the roughness.
 #[inline(always)]
-fn ggx(normal: Vec3, half: Vec3, a2: f32) -> f32 {
-    let n_h = normal.dot(half).clamp(0.0, 1.0);
-    // 1 − (N·H)² as |N × H|², which keeps its digits in a narrow highlight.
-    let sine_squared = normal.cross(half).length_squared();
+fn ggx(normal: Vec3, between: Vec3, a2: f32) -> f32 {
+    let n_h = normal.dot(between).max(0.0);
+    // 1 − (N·H)² as |N × H|², which keeps its digits in a narrow highlight; both times the square of the length.
+    let sine_squared = normal.cross(between).length_squared();
     let f = n_h * n_h * a2 + sine_squared;
-    a2 / (PI * f * f)
+    let narrow = between.length_squared() / f.max(f32::MIN_POSITIVE);
+    a2 * narrow * narrow
 }
 
-/// Smith's height-correlated masking and shadowing over 4 N·L N·V (E. Heitz, "Understanding the Masking-Shadowing
-/// Function", 2014).
+/// What divides ½ in Smith's height-correlated masking and shadowing over 4 N·L N·V (E. Heitz, "Understanding the
+/// Masking-Shadowing Function", 2014).
 #[inline(always)]
-fn visibility(n_l: f32, n_v: f32, a2: f32) -> f32 {
+fn masking(n_l: f32, n_v: f32, a2: f32) -> f32 {
     let view = n_l * (n_v * n_v * (1.0 - a2) + a2).sqrt();
     let light = n_v * (n_l * n_l * (1.0 - a2) + a2).sqrt();
-    0.5 / (view + light)
+    view + light
 }
 
 #[inline(always)]
