@@ -40,7 +40,7 @@ impl Sky {
         }
     }
 
-    /// The same for rays of a pencil by their numbers, in order; directions by axis, and how wide each cone is.
+    /// The same for some of many rays, by their numbers in order; directions by axis, and how wide each cone is.
     pub(crate) fn each_radiance_of(
         &self,
         rays: &[u32],
@@ -50,7 +50,7 @@ impl Sky {
         let dir = |i: usize| Vec3::new(dirs[0][i], dirs[1][i], dirs[2][i]);
         let mut looks = Looks::NONE;
         for some in rays.chunks(RAYS) {
-            // Mostly these are all rays of a row of pixels.
+            // Where nothing is near, their numbers follow each other.
             let run = match (self.studio(), some) {
                 (Some(up), [first, .., last]) if last.wrapping_sub(*first) == RAYS as u32 - 1 && some.len() == RAYS => {
                     let sharp = angles[*first as usize..=*last as usize].iter().all(|&angle| angle <= WIDE);
