@@ -82,6 +82,7 @@ pub mod generate;
 pub mod image;
 pub mod load;
 pub mod math;
+mod pages;
 pub mod render;
 pub mod save;
 pub mod scene;

@@ -14,7 +14,7 @@ use crate::math::simd::{Kernel, LANES, Simd};
 
 /// A wave of rays.
 pub(super) struct Alone<'w, W, B> {
-    pub tree: &'w Tree,
+    pub tree: &'w Tree<'w>,
     pub shapes: &'w Shapes,
     pub wave: &'w mut W,
     pub stack: &'w mut [Entry],

@@ -84,7 +84,7 @@ impl Place {
 
     /// The corners in the block of a packed place, and its lane.
     #[inline(always)]
-    pub(super) fn rows(tree: &Tree, packed: u32) -> (&Corners8, usize) {
+    pub(super) fn rows<'a>(tree: &Tree<'a>, packed: u32) -> (&'a Corners8, usize) {
         (&tree.blocks[(packed >> 3) as usize].corners, packed as usize % LANES)
     }
 

@@ -11,11 +11,11 @@ impl Wide<'_> {
     /// Sizes, counted by visiting every node. Cells are leaves.
     pub fn summary(&self) -> StructureStats {
         let mut stats = StructureStats {
-            n_in: self.tree.nodes.len() as u64,
-            bytes: self.tree.bytes() as u64,
+            n_in: self.tree().nodes.len() as u64,
+            bytes: self.tree().bytes() as u64,
             ..StructureStats::default()
         };
-        if !self.tree.nodes.is_empty() {
+        if !self.tree().nodes.is_empty() {
             self.each_leaf(0, 0, &mut |depth, _, prims| {
                 stats.n_v += 1;
                 stats.n_oiv += prims.len() as u64;
@@ -30,7 +30,7 @@ impl Wide<'_> {
     pub fn check(&self) -> Result<StructureStats, String> {
         let mut leaves = vec![0u32; self.shapes.bounded() as usize];
         let mut failure = None;
-        if !self.tree.nodes.is_empty() {
+        if !self.tree().nodes.is_empty() {
             self.holds(0, &mut leaves, &mut failure);
         }
         failure.map_or_else(|| listed_once(&leaves, "leaves"), Err).map(|()| self.summary())
@@ -40,7 +40,7 @@ impl Wide<'_> {
     fn holds(&self, node: u32, leaves: &mut [u32], failure: &mut Option<String>) -> Aabb {
         let mut all = Aabb::EMPTY;
         for slot in 0..LANES {
-            let (child, bounds) = (self.child(node, slot), self.tree.nodes[node as usize].bounds(slot));
+            let (child, bounds) = (self.child(node, slot), self.tree().nodes[node as usize].bounds(slot));
             let content = match child {
                 Child::Node(below) => self.holds(below, leaves, failure),
                 leaf => self.prims(leaf).iter().fold(Aabb::EMPTY, |b, &p| {
@@ -61,7 +61,7 @@ impl Wide<'_> {
 
     fn block_differs(&self, child: Child) -> Option<String> {
         let Child::Block(i, count) = child else { return None };
-        let block = self.tree.blocks.get(i as usize)?;
+        let block = self.tree().blocks.get(i as usize)?;
         (0..count as usize).find_map(|lane| {
             let prim = block.prims[lane];
             let stored: Vec<_> = block.corners.iter().map(|c| [c[0][lane], c[1][lane], c[2][lane]]).collect();
@@ -71,15 +71,15 @@ impl Wide<'_> {
     }
 
     fn child(&self, node: u32, slot: usize) -> Child {
-        Child::unpack(self.tree.nodes[node as usize].children[slot])
+        Child::unpack(self.tree().nodes[node as usize].children[slot])
     }
 
     /// The prims of a leaf.
     fn prims(&self, leaf: Child) -> &[u32] {
         match leaf {
             Child::Node(_) | Child::Block(_, 0) => &[],
-            Child::Block(i, count) => &self.tree.blocks[i as usize].prims[..count as usize],
-            Child::Run(i) => self.tree.run(i),
+            Child::Block(i, count) => &self.tree().blocks[i as usize].prims[..count as usize],
+            Child::Run(i) => self.tree().run(i),
         }
     }
 
@@ -89,7 +89,7 @@ impl Wide<'_> {
             match self.child(node, slot) {
                 Child::Node(below) => self.each_leaf(below, depth + 1, found),
                 Child::Block(_, 0) => {}
-                leaf => found(depth, self.tree.nodes[node as usize].bounds(slot), self.prims(leaf)),
+                leaf => found(depth, self.tree().nodes[node as usize].bounds(slot), self.prims(leaf)),
             }
         }
     }

@@ -74,7 +74,7 @@ pub(super) struct InFlight<'w, W, B> {
 
 /// A wave of rays.
 pub(super) struct Flight<'w, W, B> {
-    pub tree: &'w Tree,
+    pub tree: &'w Tree<'w>,
     /// Whether it is worth fetching what is visited next.
     pub far: bool,
     pub shapes: &'w Shapes,
@@ -264,7 +264,7 @@ impl<W: Wave, B: BoxMargins> Flight<'_, W, B> {
     /// The same; `FAR`: what is visited next is fetched.
     #[inline(always)]
     fn step_each<S: Simd, const FAR: bool>(&self, s: S, slots: &mut Slots, mut nodes: u32) {
-        let tree_nodes = &self.tree.nodes[..];
+        let tree_nodes = self.tree.nodes;
         while nodes != 0 {
             let (slot, at) = slots.at(nodes.trailing_zeros());
             nodes &= nodes - 1;
@@ -274,7 +274,7 @@ impl<W: Wave, B: BoxMargins> Flight<'_, W, B> {
             *at = slot.pop();
             if FAR {
                 let (node, block) = Child::either(*at);
-                s.prefetch_either(Child::is_leaf(*at), (&self.tree.blocks, block), (&self.tree.nodes, node));
+                s.prefetch_either(Child::is_leaf(*at), (self.tree.blocks, block), (self.tree.nodes, node));
             }
         }
     }

@@ -45,7 +45,7 @@ use std::marker::PhantomData;
 
 use self::alone::Alone;
 use self::flight::{DEPTH, Flight, InFlight};
-use self::node::Tree;
+use self::node::{Arrays, Tree};
 use self::packet::InPackets;
 use self::slabs::{BoxMargins, Derived};
 pub(super) use self::walk::Stack;
@@ -100,7 +100,7 @@ impl RayOrder {
 pub struct Wide<'a> {
     shapes: &'a Shapes,
     splitting: Splitting,
-    tree: Tree,
+    arrays: Arrays,
     level: Level,
     rays: RayOrder,
 }
@@ -111,7 +111,7 @@ impl<'a> Wide<'a> {
         Self {
             shapes,
             splitting,
-            tree: build::build(shapes, splitting),
+            arrays: build::build(shapes, splitting),
             level: Level::best(),
             rays: RayOrder::Adaptive,
         }
@@ -132,7 +132,7 @@ impl<'a> Wide<'a> {
     /// Walks by given margins.
     #[inline]
     fn walk_within<B: BoxMargins, G: Goal, P: Probe>(&self, query: &mut Query<G>, stack: &mut Stack, probe: &mut P) {
-        self.run_narrow::<B, _>(Walk { tree: &self.tree, query, stack, probe, margins: PhantomData::<B> });
+        self.run_narrow::<B, _>(Walk { tree: &self.tree(), query, stack, probe, margins: PhantomData::<B> });
     }
 
     /// Runs a kernel that walks by margins `B`. What is not asked for is not compiled.
@@ -145,6 +145,11 @@ impl<'a> Wide<'a> {
     #[inline]
     fn run_narrow<B: BoxMargins, K: Kernel>(&self, kernel: K) -> K::Output {
         if B::EVERY_LEVEL { self.level.run_narrow(kernel) } else { self.level.run_vectors(kernel) }
+    }
+
+    #[inline]
+    fn tree(&self) -> Tree<'_> {
+        self.arrays.tree()
     }
 
     /// How the scene was cut.
@@ -161,7 +166,7 @@ impl Culling for Wide<'_> {
     }
 
     fn new_scratch(&self) -> Stack {
-        Stack::new(&self.tree)
+        Stack::new(&self.tree())
     }
 
     fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, stack: &mut Stack, probe: &mut P) {
@@ -189,13 +194,13 @@ impl Wide<'_> {
         if Together::<W, P>::MAY {
             return self.trace_together::<B, _>(wave, stack);
         }
-        let (tree, shapes) = (&self.tree, self.shapes);
+        let (tree, shapes) = (&self.tree(), self.shapes);
         let kernel = OneByOne { tree, shapes, wave, stack, probe, margins: PhantomData::<B> };
         if Together::<W, P>::ON_EVERY_LEVEL { self.run_narrow::<B, _>(kernel) } else { kernel.run(Portable) }
     }
 
     fn trace_together<B: BoxMargins, W: Wave>(&self, wave: &mut W, stack: &mut Stack) {
-        let (tree, shapes, margins) = (&self.tree, self.shapes, PhantomData::<B>);
+        let (tree, shapes, margins) = (&self.tree(), self.shapes, PhantomData::<B>);
         if !shapes.planes.is_empty() || !tree.runs.is_empty() || tree.nodes.is_empty() {
             return self.run::<B, _>(OneByOne { tree, shapes, wave, stack, probe: &mut NoProbe, margins });
         }

@@ -5,15 +5,19 @@ use crate::accel::{NO_PRIM, Shapes};
 use crate::math::aabb::Aabb;
 use crate::math::simd::{LANES, Row};
 use crate::math::triangles::{Corners8, NO_CORNERS};
+use crate::pages::Paged;
+use bytemuck::{Pod, Zeroable};
 
 /// Eight children: their boxes and what they are.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(super) struct Node {
     /// Planes of the children: lower and upper x, lower and upper y, lower and upper z.
     pub planes: [Row; 6],
     /// Packed [`Child`]ren.
     pub children: [u32; LANES],
+    /// Nothing, so that each begins where a cache line does.
+    room: [u32; LANES],
 }
 
 impl Node {
@@ -24,6 +28,7 @@ impl Node {
             [lower, upper, lower, upper, lower, upper]
         },
         children: [Child::NOTHING; LANES],
+        room: [0; LANES],
     };
 
     pub(super) fn set(&mut self, slot: usize, bounds: &Aabb, child: Child) {
@@ -100,20 +105,17 @@ impl Child {
         }
     }
 
-    /// The same child after its tree was appended to another.
-    fn moved(word: u32, by: &Offsets) -> u32 {
-        let moved = match Self::unpack(word) {
-            Self::Node(i) => Self::Node(i + by.nodes),
-            Self::Block(_, 0) => return word,
-            Self::Block(i, count) => Self::Block(i + by.blocks, count),
-            Self::Run(i) => Self::Run(i + by.runs),
-        };
-        moved.pack()
+    /// The same child after so many nodes were put before those of its tree.
+    fn behind(word: u32, nodes: u32) -> u32 {
+        match Self::unpack(word) {
+            Self::Node(i) => Self::Node(i + nodes).pack(),
+            _ => word,
+        }
     }
 }
 
 /// Up to eight triangles side by side.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(super) struct Block {
     pub corners: Corners8,
@@ -127,79 +129,83 @@ impl Block {
 
 /// Everything in arrays.
 #[derive(Clone, Debug)]
-pub(super) struct Tree {
+pub(super) struct Arrays {
     /// The first is the root; there is none when there are no bounded prims.
-    pub nodes: Vec<Node>,
-    pub blocks: Vec<Block>,
+    pub nodes: Paged<Node>,
+    pub blocks: Paged<Block>,
     /// Other prims than triangles: (first, number) in [`Self::prims`].
     pub runs: Vec<(u32, u32)>,
     pub prims: Vec<u32>,
     /// Around everything.
-    pub bounds: Aabb,
+    bounds: Aabb,
     /// Largest coordinate of a box, in size.
-    pub extent: f32,
+    extent: f32,
     /// Nodes on the longest way down.
+    depth: u32,
+}
+
+/// [`Arrays`] as they are walked.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tree<'a> {
+    pub nodes: &'a [Node],
+    pub blocks: &'a [Block],
+    pub runs: &'a [(u32, u32)],
+    pub prims: &'a [u32],
+    pub bounds: Aabb,
+    pub extent: f32,
     pub depth: u32,
 }
 
-impl Default for Tree {
+impl Default for Arrays {
     fn default() -> Self {
-        Self {
-            nodes: Vec::new(),
-            blocks: Vec::new(),
-            runs: Vec::new(),
-            prims: Vec::new(),
-            bounds: Aabb::EMPTY,
-            extent: 0.0,
-            depth: 0,
-        }
+        Self::new(Paged::default(), Paged::default(), (Vec::new(), Vec::new()), Aabb::EMPTY)
     }
 }
 
-struct Offsets {
-    nodes: u32,
-    blocks: u32,
-    runs: u32,
+impl Arrays {
+    /// With what walks must know of the whole.
+    pub(super) fn new(
+        nodes: Paged<Node>,
+        blocks: Paged<Block>,
+        (runs, prims): (Vec<(u32, u32)>, Vec<u32>),
+        bounds: Aabb,
+    ) -> Self {
+        let extent = bounds.lo.abs().max(bounds.hi.abs()).max_element();
+        let depth = if nodes.is_empty() { 0 } else { depth_below(&nodes, 0) };
+        Self { nodes, blocks, runs, prims, bounds, extent, depth }
+    }
+
+    pub(super) fn tree(&self) -> Tree<'_> {
+        let Self { nodes, blocks, runs, prims, bounds, extent, depth } = self;
+        Tree { nodes, blocks, runs, prims, bounds: *bounds, extent: *extent, depth: *depth }
+    }
 }
 
-impl Tree {
-    /// Adds what another builder made; its root is the child that is returned.
-    pub(super) fn append(&mut self, part: Self) -> Child {
-        let by =
-            Offsets { nodes: index(self.nodes.len()), blocks: index(self.blocks.len()), runs: index(self.runs.len()) };
-        let moved = |node: Node| Node { children: node.children.map(|c| Child::moved(c, &by)), ..node };
-        let prims = index(self.prims.len());
-        self.nodes.extend(part.nodes.into_iter().map(moved));
-        self.blocks.extend(part.blocks);
-        self.runs.extend(part.runs.into_iter().map(|(first, len)| (first + prims, len)));
-        self.prims.extend(part.prims);
-        Child::Node(by.nodes)
-    }
+fn depth_below(nodes: &[Node], node: u32) -> u32 {
+    let below = |&child: &u32| match Child::unpack(child) {
+        Child::Node(i) => depth_below(nodes, i),
+        _ => 0,
+    };
+    1 + nodes[node as usize].children.iter().map(below).max().unwrap_or(0)
+}
 
-    /// Notes what walks must know of the whole.
-    pub(super) fn finish(mut self, bounds: Aabb) -> Self {
-        self.bounds = bounds;
-        self.extent = bounds.lo.abs().max(bounds.hi.abs()).max_element();
-        self.depth = if self.nodes.is_empty() { 0 } else { self.depth_below(0) };
-        self
-    }
+/// Adds the nodes of a subtree; its root is the child that is returned.
+pub(super) fn append(nodes: &mut Vec<Node>, subtree: Vec<Node>) -> Child {
+    let before = index(nodes.len());
+    let moved = |node: Node| Node { children: node.children.map(|child| Child::behind(child, before)), ..node };
+    nodes.extend(subtree.into_iter().map(moved));
+    Child::Node(before)
+}
 
+impl<'a> Tree<'a> {
     /// How long a stack may become: every node on the way leaves up to seven children behind.
     pub(super) fn most_behind(&self) -> usize {
         (LANES - 1) * self.depth as usize + LANES
     }
 
-    fn depth_below(&self, node: u32) -> u32 {
-        let below = |&child: &u32| match Child::unpack(child) {
-            Child::Node(i) => self.depth_below(i),
-            _ => 0,
-        };
-        1 + self.nodes[node as usize].children.iter().map(below).max().unwrap_or(0)
-    }
-
     /// Bytes of the arrays.
     pub(super) fn bytes(&self) -> usize {
-        size_of_val(&*self.nodes) + size_of_val(&*self.blocks) + size_of_val(&*self.runs) + size_of_val(&*self.prims)
+        size_of_val(self.nodes) + size_of_val(self.blocks) + size_of_val(self.runs) + size_of_val(self.prims)
     }
 
     /// What is said of a child that is visited.
@@ -221,7 +227,7 @@ impl Tree {
 
     /// The prims of a run.
     #[inline]
-    pub(super) fn run(&self, run: u32) -> &[u32] {
+    pub(super) fn run(&self, run: u32) -> &'a [u32] {
         let (first, len) = self.runs[run as usize];
         &self.prims[first as usize..(first + len) as usize]
     }

@@ -57,7 +57,7 @@ pub(super) struct Branch {
 
 /// A wave of rays.
 pub(super) struct InPackets<'w, W, B> {
-    pub tree: &'w Tree,
+    pub tree: &'w Tree<'w>,
     pub shapes: &'w Shapes,
     pub wave: &'w mut W,
     pub stack: &'w mut [Branch],
@@ -68,7 +68,7 @@ pub(super) struct InPackets<'w, W, B> {
 
 /// What packets are traced through, and who takes their answers.
 struct Trip<'w, W> {
-    tree: &'w Tree,
+    tree: &'w Tree<'w>,
     shapes: &'w Shapes,
     wave: &'w mut W,
     stack: &'w mut [Branch],
@@ -325,7 +325,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
             // Fetched while the rays are asked about its box.
             let child = node.children[slot];
             let (at, block) = Child::either(child);
-            s.prefetch_either(Child::is_leaf(child), (&tree.blocks, block), (&tree.nodes, at));
+            s.prefetch_either(Child::is_leaf(child), (tree.blocks, block), (tree.nodes, at));
             // The only one is visited for the rays that visit the node: mostly there are some for it.
             let met = if only { rays } else { bundle.meet_child(wide, node, slot, reach.limit) & rays };
             stack[*top] = Branch { near: near[slot], child, rays: met };

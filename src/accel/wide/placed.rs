@@ -28,7 +28,7 @@ impl Wide<'_> {
         stack: &mut Stack,
         probe: &mut P,
     ) -> bool {
-        let (tree, stack) = (&self.tree, &mut *stack.entries);
+        let (tree, stack) = (&self.tree(), &mut *stack.entries);
         if tree.nodes.is_empty() {
             return false;
         }
@@ -78,7 +78,7 @@ fn slabs_of(tree: &Tree, place: &Place, ray: &RaySpace, t_min: f32) -> Option<Pa
 }
 
 struct Descent<'w, 'q, G: Goal, P, V> {
-    tree: &'w Tree,
+    tree: &'w Tree<'w>,
     spot: Spot<'w>,
     slabs: Option<PaddedSlabs>,
     query: &'w mut Query<'q, G>,
@@ -96,7 +96,7 @@ impl<G: Goal, P: Probe, V: Fn(u32) -> Visit> Kernel for Descent<'_, '_, G, P, V>
         let Self { tree, spot, slabs, query, stack, probe, visit } = self;
         let lanes = RayLanes::new(s, &query.ray, reach(query.ray.origin, &spot.place.bounds));
         let Some(slabs) = slabs else {
-            for block in &tree.blocks {
+            for block in tree.blocks {
                 if test(s, spot, block, &lanes, query, probe) {
                     return true;
                 }

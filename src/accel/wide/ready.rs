@@ -156,11 +156,12 @@ mod tests {
     use crate::math::simd::{Kernel, Level};
 
     /// A tree without nodes around a cube.
-    fn tree(extent: f32) -> Tree {
-        Tree::default().finish(Aabb { lo: Vec3::splat(-extent), hi: Vec3::splat(extent * 0.5) })
+    fn tree(extent: f32) -> Tree<'static> {
+        let bounds = Aabb { lo: Vec3::splat(-extent), hi: Vec3::splat(extent * 0.5) };
+        Tree { nodes: &[], blocks: &[], runs: &[], prims: &[], bounds, extent, depth: 0 }
     }
 
-    struct Take<'a, W>(&'a Tree, &'a W, usize);
+    struct Take<'a, W>(&'a Tree<'a>, &'a W, usize);
 
     impl<W: Wave> Kernel for Take<'_, W> {
         type Output = Ready;

@@ -46,7 +46,7 @@ impl Stack {
 
 /// Rays one after another.
 pub(super) struct OneByOne<'w, W, P, B> {
-    pub tree: &'w Tree,
+    pub tree: &'w Tree<'w>,
     pub shapes: &'w Shapes,
     pub wave: &'w mut W,
     pub stack: &'w mut Stack,
@@ -128,7 +128,7 @@ fn ask<B: BoxMargins, S: Simd, W: Wave, P: Probe>(
 
 /// One query under way.
 pub(super) struct Walk<'w, 'q, G: Goal, P, B> {
-    pub tree: &'w Tree,
+    pub tree: &'w Tree<'w>,
     pub query: &'w mut Query<'q, G>,
     pub stack: &'w mut Stack,
     pub probe: &'w mut P,

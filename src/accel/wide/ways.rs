@@ -225,7 +225,7 @@ fn trees_too_deep_for_rays_in_flight_are_answered() {
         ray(Vec3::splat(2.0), target - Vec3::splat(2.0))
     }));
     for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
-        let most = Wide::build(&shapes, splitting).tree.most_behind();
+        let most = Wide::build(&shapes, splitting).tree().most_behind();
         assert!(most >= DEPTH, "{splitting:?}: {most}");
     }
     let expected = answers(&Unculled::new(&shapes), &rays);

@@ -7,6 +7,7 @@
 use super::ColorSpace;
 use super::decode::{self, FRACTION, Texels};
 use crate::math::Vec4;
+use crate::pages::Paged;
 use crate::scene::{Bitmap, Pixels};
 use std::sync::OnceLock;
 
@@ -21,7 +22,7 @@ pub(super) struct Pyramid {
 /// A step of 1/65535 is a twentieth of the darkest step of an 8-bit sRGB file.
 #[derive(Debug)]
 struct Level {
-    texels: Vec<[u16; 4]>,
+    texels: Paged<[u16; 4]>,
     /// Whether every alpha is 1.
     solid: bool,
 }
@@ -144,27 +145,27 @@ pub(super) fn codes(&[r, g, b, a]: &[u16; 4]) -> Vec4 {
 }
 
 /// The next smaller copy of a level.
-fn halve(from: &Plane, to: (usize, usize), space: ColorSpace) -> Vec<[u16; 4]> {
+fn halve(from: &Plane, to: (usize, usize), space: ColorSpace) -> Paged<[u16; 4]> {
     let columns: Vec<Span> = (0..to.0).map(|x| Span::new(x, from.width, to.0)).collect();
-    let mut texels = Vec::with_capacity(to.0 * to.1);
-    for y in 0..to.1 {
+    let mut texels = Paged::zeroed(to.0 * to.1);
+    for (y, row) in texels.chunks_exact_mut(to.0).enumerate() {
         let rows = Span::new(y, from.height, to.1);
-        for columns in &columns {
-            texels.push(quantized(mean(columns, &rows, space, &|x, y| from.texel(x, y))));
+        for (texel, columns) in row.iter_mut().zip(&columns) {
+            *texel = quantized(mean(columns, &rows, space, &|x, y| from.texel(x, y)));
         }
     }
     texels
 }
 
 /// The same where each texel is the mean of exactly four, which come as upper left and right, lower left and right.
-fn halve_evenly<T>(texels: &[T], width: usize, mean: impl Fn([&T; 4]) -> [u16; 4]) -> Vec<[u16; 4]> {
-    let mut out = Vec::with_capacity(texels.len() / 4);
-    for rows in texels.chunks_exact(2 * width) {
+fn halve_evenly<T>(texels: &[T], width: usize, mean: impl Fn([&T; 4]) -> [u16; 4]) -> Paged<[u16; 4]> {
+    let mut halves = Paged::zeroed(texels.len() / 4);
+    for (row, rows) in halves.chunks_exact_mut(width / 2).zip(texels.chunks_exact(2 * width)) {
         let (upper, lower) = rows.split_at(width);
         let pairs = upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0);
-        out.extend(pairs.map(|([a, b], [c, d])| mean([a, b, c, d])));
+        row.iter_mut().zip(pairs).for_each(|(half, ([a, b], [c, d]))| *half = mean([a, b, c, d]));
     }
-    out
+    halves
 }
 
 /// What is stored of the mean of four texels without alpha; `light` gives colours as [`decode::fixed8`] does.

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::grow::Knot;
 use super::slots::slots;
-use crate::accel::wide::node::{Child, Node, Tree, index};
+use crate::accel::wide::node::{Child, Node, append, index};
 use crate::math::aabb::Aabb;
 use crate::math::simd::LANES;
 
@@ -71,9 +71,9 @@ fn plan(knots: &[Knot], plans: &mut [Plan]) {
 pub(super) fn nodes(knots: &[Knot]) -> Vec<Node> {
     let mut plans = bytemuck::zeroed_vec(knots.len());
     plan(knots, &mut plans);
-    let mut tree = Tree::default();
-    Collapse { knots, plans: &plans }.node(0..knots.len(), &mut tree);
-    tree.nodes
+    let mut nodes = Vec::new();
+    Collapse { knots, plans: &plans }.node(0..knots.len(), &mut nodes);
+    nodes
 }
 
 struct Collapse<'k> {
@@ -90,7 +90,7 @@ struct Children {
 
 impl Collapse<'_> {
     /// Adds the node of a knot, the first of these, and all below; its index.
-    fn node(&self, knots: Range<usize>, tree: &mut Tree) -> u32 {
+    fn node(&self, knots: Range<usize>, nodes: &mut Vec<Node>) -> u32 {
         let mut children = Children::default();
         self.expand(knots.clone(), LANES, &mut children);
         let children = &children.below[..children.len];
@@ -98,16 +98,16 @@ impl Collapse<'_> {
         for (bounds, child) in bounds.iter_mut().zip(children) {
             *bounds = self.knots[child.start].bounds();
         }
-        let at = tree.nodes.len();
-        tree.nodes.push(Node::EMPTY);
+        let at = nodes.len();
+        nodes.push(Node::EMPTY);
 
         let is_node = |child: &Range<usize>| !self.knots[child.start].is_leaf();
-        let mut built: Vec<Option<Tree>> = if knots.len() > PARALLEL {
+        let mut built: Vec<Option<Vec<Node>>> = if knots.len() > PARALLEL {
             let subtree = |child: &Range<usize>| {
                 is_node(child).then(|| {
-                    let mut tree = Tree::default();
-                    self.node(child.clone(), &mut tree);
-                    tree
+                    let mut nodes = Vec::new();
+                    self.node(child.clone(), &mut nodes);
+                    nodes
                 })
             };
             children.par_iter().map(subtree).collect()
@@ -117,11 +117,11 @@ impl Collapse<'_> {
         let slots = slots(&bounds[..children.len()]);
         for (i, below) in children.iter().enumerate() {
             let child = match built.get_mut(i).and_then(Option::take) {
-                Some(subtree) => tree.append(subtree),
-                None if is_node(below) => Child::Node(self.node(below.clone(), tree)),
+                Some(subtree) => append(nodes, subtree),
+                None if is_node(below) => Child::Node(self.node(below.clone(), nodes)),
                 None => Child::unpack(self.knots[below.start].at),
             };
-            tree.nodes[at].set(slots[i], &bounds[i], child);
+            nodes[at].set(slots[i], &bounds[i], child);
         }
         index(at)
     }

@@ -18,13 +18,14 @@ use rayon::prelude::*;
 
 use self::cell::Lattice;
 use self::grow::{Grower, Knot, Work};
-use super::node::{Block, Child, Tree, index};
+use super::node::{Arrays, Block, Child, index};
 use super::split::item::around_middles;
 use super::split::{Bounds, Item, Splitting, around};
 use crate::accel::Shapes;
 use crate::math::aabb::Aabb;
 use crate::math::simd::LANES;
 use crate::math::triangles::set_corners;
+use crate::pages::Paged;
 
 /// Prims of a run at most: they cost more than a triangle, and are tested one by one.
 const RUN: u32 = 2;
@@ -36,9 +37,9 @@ const CHUNK: usize = 1024;
 const ROOM: usize = 32;
 
 /// Builds the tree over all bounded prims.
-pub(super) fn build(shapes: &Shapes, splitting: Splitting) -> Tree {
+pub(super) fn build(shapes: &Shapes, splitting: Splitting) -> Arrays {
     if shapes.bounded() == 0 {
-        return Tree::default();
+        return Arrays::default();
     }
     let triangles = shapes.triangles.len();
     let (grown, prims) = binary_tree(shapes, splitting);
@@ -50,10 +51,10 @@ pub(super) fn build(shapes: &Shapes, splitting: Splitting) -> Tree {
     }
     let leaves = Leaves::list(&mut knots, &prims, index(triangles));
     let bounds = knots.first().map_or(Aabb::EMPTY, Knot::bounds);
-    let nodes = collapse::nodes(&knots);
+    let nodes = Paged::from(&*collapse::nodes(&knots));
     drop(knots);
     let blocks = leaves.blocks(shapes, &prims);
-    Tree { nodes, blocks, runs: leaves.runs, prims: prims[triangles..].to_vec(), ..Tree::default() }.finish(bounds)
+    Arrays::new(nodes, blocks, (leaves.runs, prims[triangles..].to_vec()), bounds)
 }
 
 /// Knots on the longest way down.
@@ -172,12 +173,15 @@ impl Leaves {
         all
     }
 
-    fn blocks(&self, shapes: &Shapes, prims: &[u32]) -> Vec<Block> {
+    fn blocks(&self, shapes: &Shapes, prims: &[u32]) -> Paged<Block> {
         if self.blocks.is_empty() {
             // Empty slots lead to block 0, and a ray that no box can turn away goes there too.
-            return vec![Block::EMPTY];
+            return [Block::EMPTY][..].into();
         }
-        self.blocks.par_iter().with_min_len(CHUNK).map(|&of| block(shapes, part(prims, of))).collect()
+        let mut blocks = Paged::zeroed(self.blocks.len());
+        let places = blocks.par_iter_mut().with_min_len(CHUNK).zip(&self.blocks);
+        places.for_each(|(place, &of)| *place = block(shapes, part(prims, of)));
+        blocks
     }
 }
 
@@ -226,7 +230,8 @@ mod tests {
             let deep = 2 * depth(&knots) + ROOM;
             let improved = depth(&reinsert::improve(knots, splitting).0);
             assert!(improved <= deep, "{splitting:?}: {improved}, places as good as another were taken for better");
-            let tree = build(&shapes, splitting);
+            let arrays = build(&shapes, splitting);
+            let tree = arrays.tree();
             assert!(tree.depth as usize <= deep, "{splitting:?}: {}", tree.depth);
         }
     }
