@@ -13,6 +13,13 @@ pub fn floor(x: f32) -> f32 {
     if x.abs() >= 8_388_608.0 { x } else { below }
 }
 
+/// 0 up to `from`, 1 from `to` on, and as smooth as a cubic can be between.
+#[inline(always)]
+pub fn smoothstep(from: f32, to: f32, x: f32) -> f32 {
+    let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
 /// The angle of the place (`x`, `y`) from the x axis, −π … π, to 5e-7; 0 for the origin.
 #[inline(always)]
 pub fn atan2(y: f32, x: f32) -> f32 {

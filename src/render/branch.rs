@@ -5,7 +5,7 @@ use super::draws::{Purpose, Spread};
 use super::glint::{self, MIRROR};
 use super::observer::Observer;
 use super::optics::{dispersed_index, reflect, refract};
-use super::shade::{Balance, Lobe, Matter, Seen, above, has_inside, lets_light_in};
+use super::shade::{Balance, Lobe, Matter, Seen, above, has_inside};
 use super::wave::{Crossing, Medium, Path, RayClass};
 use super::whitted::Tracer;
 use crate::accel::{Accel, Hit, Ray};
@@ -79,21 +79,7 @@ impl<G: Ground> Point<'_, G> {
 struct Rough {
     lobe: Lobe,
     rays: u32,
-    /// Whether light that other facets stop goes on through those.
-    glass: bool,
     spread: Spread,
-}
-
-impl Rough {
-    /// `to`, or where glass sends what runs into its surface again: to the side of `normal` after all.
-    fn beyond(&self, normal: Vec3, to: Vec3) -> Vec3 {
-        if self.glass { above(to, normal) } else { to }
-    }
-
-    /// Share of what a facet sends from `to` to `view` that others leave.
-    fn kept(&self, view: Vec3, to: Vec3) -> f32 {
-        if self.glass { 1.0 } else { self.lobe.kept(view, to) }
-    }
 }
 
 impl<A: Accel, P: Observer> Tracer<'_, A, P> {
@@ -126,6 +112,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         for (i, band) in (0u8..).zip(&self.context.bands) {
             let balance = point.matter.balance(cosine, &point.crossing(self.context, Some(i)));
             all.reflected += balance.reflected * band.color;
+            all.glass += balance.glass * band.color;
             all.refracted += balance.refracted * band.color;
         }
         all
@@ -145,8 +132,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         #[expect(clippy::cast_possible_truncation, reason = "a handful")]
         let points = if splits { rays.max(self.context.bands.len() as u32) } else { rays };
         let spread = self.draws(point, Purpose::Facets).spread(points);
-        let glass = lets_light_in(point.surface.material().1);
-        let mut rough = Rough { lobe, rays, glass, spread };
+        let mut rough = Rough { lobe, rays, spread };
         self.send_lacquer(point);
         for k in 0..rays {
             self.send_off_facet(point, crossing, &rough, k);
@@ -169,10 +155,12 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let cosine = view.dot(facet);
         let balance =
             if self.splits(point) { self.split_balance(point, cosine) } else { point.matter.balance(cosine, crossing) };
-        let share = balance.reflected;
-        let to = rough.beyond(normal, reflect(-view, facet));
-        if normal.dot(to) > 0.0 {
-            let weight = point.path.weight * share * (rough.kept(view, to) / rough.rays as f32);
+        let mirrored = reflect(-view, facet);
+        // What other facets stop goes on through glass, and what runs into glass again comes out after all.
+        let share = (balance.reflected - balance.glass) * rough.lobe.sent(view, mirrored) + balance.glass;
+        let to = above(mirrored, normal);
+        if share != Vec3::ZERO && normal.dot(to) > 0.0 {
+            let weight = point.path.weight * share * (1.0 / rough.rays as f32);
             self.send_spread(point, above(to, geometric), RayClass::Reflected, rough, |path| Path {
                 weight,
                 ..path.turned(RayClass::Reflected, k + 1)
@@ -204,8 +192,8 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         } else {
             refract(-view, facet, n_i, n_t)
         };
-        let Some(to) = bent.map(|to| rough.beyond(-normal, to)) else { return };
-        let weight = point.path.weight * share * color * (rough.kept(view, to) / rough.rays as f32);
+        let Some(to) = bent.map(|to| above(to, -normal)) else { return };
+        let weight = point.path.weight * share * color * (1.0 / rough.rays as f32);
         let media = crossing.beyond;
         let straight = point.path.straight && crossing.n_i == crossing.n_t;
         self.send_spread(point, above(to, -geometric), RayClass::Refracted, rough, |path| Path {
@@ -230,7 +218,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         if !self.context.is_alive(path.weight, part) {
             return;
         }
-        let angle = rough.lobe.angle(rough.rays);
+        let angle = rough.lobe.angle(rough.rays) * self.context.gloss.width;
         let (cone_spread, scattered) = (path.cone_spread + angle, path.scattered + angle);
         let ray = point.surface.ray(dir, point.ray.sample);
         self.starting[class as usize].push(ray, Path { part, cone_spread, scattered, ..path }, Hit::MISS);

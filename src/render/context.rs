@@ -3,6 +3,7 @@
 use super::Settings;
 use super::absorption::Absorption;
 use super::certainty;
+use super::frame::sample_width;
 use super::glint;
 use super::sampling::Sampling;
 use super::shade::{Band, LocalLight, bands, lets_light_in};
@@ -85,6 +86,8 @@ pub(crate) struct Context<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Gloss {
     pub rays: u32,
+    /// How much narrower the part of a lobe that a ray stands for is than among the rays of its sample alone.
+    pub width: f32,
     /// Whether all do, or only what lets light through.
     all: bool,
 }
@@ -94,7 +97,12 @@ impl Gloss {
     pub(crate) fn new(asked: Option<u32>) -> Self {
         /// Rays through frosted glass, when nobody says.
         const GLASS: u32 = 4;
-        Self { rays: asked.unwrap_or(GLASS), all: asked.is_some_and(|rays| rays > 0) }
+        Self { rays: asked.unwrap_or(GLASS), width: 1.0, all: asked.is_some_and(|rays| rays > 0) }
+    }
+
+    /// The same where pixels are sampled so: all samples that a pixel may have send rays, and together they cover the lobe.
+    fn of_samples(self, settings: &Settings) -> Self {
+        Self { width: sample_width(settings), ..self }
     }
 
     /// The same rays, shared by so many samples.
@@ -113,7 +121,7 @@ impl<'a> Context<'a> {
         let everything = settings.everything;
         let features = Features::of(scene);
         let together = samples_together(settings);
-        let gloss = Gloss::new(settings.gloss_rays).shared_by(together);
+        let gloss = Gloss::new(settings.gloss_rays).shared_by(together).of_samples(settings);
         let depth = settings.depth.unwrap_or_else(|| auto_depth(&features, gloss.all, settings.cutoff));
         let sky = Arc::new(Sky::new(scene));
         let env_rays = settings.env_rays.unwrap_or(if sky.is_map() { ENV_RAYS } else { 0 });
@@ -150,7 +158,8 @@ impl<'a> Context<'a> {
 
     /// The same with other random choices, and other samples.
     pub(super) fn resampled(&self, settings: &Settings) -> Self {
-        Self { seed: settings.seed, highlight_reach: glint::reach(settings), ..self.clone() }
+        let (highlight_reach, gloss) = (glint::reach(settings), self.gloss.of_samples(settings));
+        Self { seed: settings.seed, highlight_reach, gloss, ..self.clone() }
     }
 
     /// Shadow rays to each wide light after so many bounces: what mirrors show needs no more than a hint of soft edges.

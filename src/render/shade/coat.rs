@@ -4,7 +4,8 @@
 //! is not bent on its way through. The share that is taken off is that of the view alone, as the extension says.
 
 use super::facets::albedo;
-use super::metal_rough::{above, highlight, is_narrow, least_square, open, squared_width, traced};
+use super::highlight::{highlight, is_narrow, least_square, squared_width};
+use super::metal_rough::{above, open, traced};
 use super::{Reader, Seen, Sky};
 use crate::math::Vec3;
 use crate::render::optics::{fresnel_schlick, reflect};

@@ -4,7 +4,8 @@
 //! B. Burley, "Physically Based Shading at Disney" (2012) for the distribution of facets, E. Heitz, "Understanding the
 //! Masking-Shadowing Function" (2014) for how they hide each other.
 
-use super::metal_rough::{NARROWEST_HIGHLIGHT, above, least_square};
+use super::highlight::{NARROWEST_HIGHLIGHT, least_square};
+use super::metal_rough::above;
 use super::{Lobe, Reader, Seen, Sky};
 use crate::math::formula::atan2;
 use crate::math::simd::{Kernel, Level, Simd};
@@ -186,7 +187,7 @@ impl Leans {
 
 #[cfg(test)]
 mod tests {
-    use super::super::metal_rough::{highlight, squared_width};
+    use super::super::highlight::{highlight, squared_width};
     use super::*;
     use crate::scene::{Environment, Scene};
 

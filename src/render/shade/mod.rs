@@ -8,6 +8,7 @@ mod coat;
 mod facets;
 mod film;
 mod grain;
+mod highlight;
 mod light;
 mod lobe;
 mod metal_rough;
@@ -18,9 +19,10 @@ mod spectrum;
 pub(crate) use coat::CoatMatter;
 pub(crate) use facets::{AlbedoRow, albedo, mean_albedo};
 pub(crate) use grain::GrainMatter;
+pub(crate) use highlight::is_narrow;
 pub(crate) use light::{Incident, LocalLight, way};
 pub(crate) use lobe::{Lobe, pattern};
-pub(crate) use metal_rough::{Around, MetalRoughMatter, MetalRoughPaint, above, is_narrow, open};
+pub(crate) use metal_rough::{Around, MetalRoughMatter, MetalRoughPaint, above, open};
 pub(crate) use phong::{PhongMatter, PhongPaint};
 pub(crate) use sheen::SheenMatter;
 pub(crate) use spectrum::{Band, bands};
@@ -81,7 +83,16 @@ pub(crate) enum Model {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Balance {
     pub reflected: Vec3,
+    /// The part of this that clear glass reflects: facets that stop some of it send that on through themselves.
+    pub glass: Vec3,
     pub refracted: Vec3,
+}
+
+impl Balance {
+    /// Of a surface without facets.
+    pub(crate) fn smooth(reflected: Vec3, refracted: Vec3) -> Self {
+        Self { reflected, refracted, glass: Vec3::ZERO }
+    }
 }
 
 /// Reads the maps of one point.
@@ -359,13 +370,13 @@ impl Matter {
 
     /// How much of the mirrored and of the refracted direction is seen; `cosine` is that of the view.
     pub(crate) fn balance(&self, cosine: f32, crossing: &Crossing) -> Balance {
-        let Balance { reflected, refracted } = match &self.model {
+        let Balance { reflected, glass, refracted } = match &self.model {
             Model::Unlit(_) => Balance::default(),
             Model::Phong(m) => m.balance(cosine, crossing),
             Model::MetalRough(m) => m.balance(cosine, crossing, self.outside),
         };
         let clear = self.clear();
-        Balance { reflected: reflected * clear, refracted: refracted * clear }
+        Balance { reflected: reflected * clear, glass: glass * clear, refracted: refracted * clear }
     }
 
     /// The normal of the lacquer over it, and the weight of the mirror ray off that.

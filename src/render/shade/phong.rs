@@ -153,15 +153,15 @@ impl PhongMatter {
         let transparent = self.transmission != Vec3::ZERO;
         match (self.fresnel, transparent) {
             (false, true) if share == 1.0 && crossing.n_i > crossing.n_t => {
-                Balance { reflected: (self.mirror + self.transmission).min(Vec3::ONE), refracted: Vec3::ZERO }
+                Balance::smooth((self.mirror + self.transmission).min(Vec3::ONE), Vec3::ZERO)
             }
-            (false, _) => Balance { reflected: self.mirror, refracted: self.transmission },
-            (true, false) => Balance { reflected: self.reflected(cosine), refracted: Vec3::ZERO },
+            (false, _) => Balance::smooth(self.mirror, self.transmission),
+            (true, false) => Balance::smooth(self.reflected(cosine), Vec3::ZERO),
             (true, true) => {
                 // Inside, what is turned back has been let in before and is not the mirror's to weaken.
                 let inside = crossing.n_i > crossing.n_t;
                 let mirror = if inside { self.mirror.max(self.transmission) } else { self.mirror };
-                Balance { reflected: mirror * share, refracted: self.transmission * (1.0 - share) }
+                Balance::smooth(mirror * share, self.transmission * (1.0 - share))
             }
         }
     }
@@ -229,7 +229,7 @@ mod tests {
     #[test]
     fn without_fresnel_the_weights_are_the_materials() {
         let balance = matter().balance(0.3, &into_glass());
-        assert_eq!(balance, Balance { reflected: Vec3::splat(0.25), refracted: Vec3::splat(0.75) });
+        assert_eq!(balance, Balance::smooth(Vec3::splat(0.25), Vec3::splat(0.75)));
     }
 
     #[test]
@@ -237,7 +237,7 @@ mod tests {
         let out = into_glass().beyond.cross(Medium { material: 0, ior: 1.5 }, false);
         for fresnel in [false, true] {
             let glass = PhongMatter { fresnel, mirror: Vec3::ZERO, transmission: Vec3::ONE, ..matter() };
-            assert_eq!(glass.balance(0.1, &out), Balance { reflected: Vec3::ONE, refracted: Vec3::ZERO });
+            assert_eq!(glass.balance(0.1, &out), Balance::smooth(Vec3::ONE, Vec3::ZERO));
         }
     }
 

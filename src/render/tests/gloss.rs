@@ -92,6 +92,51 @@ fn frosted_glass_in_a_furnace_loses_next_to_nothing() {
     }
 }
 
+#[test]
+fn what_is_part_glass_and_part_metal_gives_off_no_more_than_it_gets() {
+    for (metallic, transmission) in [(1.0, 1.0), (0.5, 1.0), (0.5, 0.5), (0.0, 0.5), (1.0, 0.3)] {
+        for (roughness, thick, ior) in [(0.5, false, 1.5), (1.0, false, 1.5), (1.0, true, 1.5), (1.0, true, 3.0)] {
+            let mut s = looking_down(5.0);
+            let thickness = f32::from(thick);
+            let model =
+                MetalRough { metallic, roughness, transmission, thick, thickness, ior, ..MetalRough::default() };
+            s.sphere(DVec3::new(0.3, 0.2, 0.0), 1.0, rough(model));
+            s.scene.environment = Environment::Constant(Vec3::ONE);
+            s.scene.background = Some(crate::scene::Background::Environment);
+            (s.settings.samples, s.settings.gloss_rays) = (256, Some(4));
+            let color = s.color().x;
+            assert!((0.75..1.02).contains(&color), "{metallic} {transmission} {roughness} {thick} {ior}: {color}");
+        }
+    }
+}
+
+#[test]
+fn a_metal_is_the_same_whether_or_not_the_file_says_that_its_dielectric_part_is_glass() {
+    let of = |transmission| {
+        let mut s = under_a_ball(0.5);
+        let model = MetalRough { metallic: 1.0, roughness: 0.5, transmission, ..MetalRough::default() };
+        s.scene.materials[0] = rough(model);
+        s.color()
+    };
+    assert_near(of(1.0), of(0.0), 1e-6);
+}
+
+#[test]
+fn more_rays_and_more_samples_blur_less_of_what_rough_surfaces_mirror() {
+    // A sky that is white above the horizon and black below, seen in a metal that looks along the horizon.
+    let of = |samples, rays| {
+        let mut s = under_a_ball(0.6);
+        s.scene.environment = Environment::Studio;
+        (s.settings.samples, s.settings.gloss_rays) = (samples, Some(rays));
+        s.color().x
+    };
+    let exact = of(1024, 64);
+    for (samples, rays) in [(256, 1), (64, 16), (1024, 1)] {
+        let color = of(samples, rays);
+        assert!((color / exact - 1.0).abs() < 0.02, "{samples} × {rays}: {color} for {exact}");
+    }
+}
+
 /// What a white furnace shows of a thing of this glass.
 fn in_a_furnace(glass: MetalRough, from: f64, rays: Option<u32>) -> f32 {
     let mut s = looking_down(from);

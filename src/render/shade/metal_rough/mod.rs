@@ -11,8 +11,9 @@
 //! change places, and Fresnel takes off as much as if the light stood where it is mirrored.
 
 use super::facets::{AlbedoRow, albedo, mean_albedo, rebound};
+use super::highlight::{NARROWEST_HIGHLIGHT, highlight, is_narrow, least_square, squared_width};
 use super::{Balance, GrainMatter, Reader, Seen, Sky, film};
-use crate::math::formula::{exp2, root};
+use crate::math::formula::{exp2, root, smoothstep};
 use crate::math::{Vec3, Vec4};
 use crate::render::optics::{fresnel_dielectric, fresnel_schlick, transmittance};
 use crate::render::wave::Crossing;
@@ -27,11 +28,6 @@ const MATT_ROUGHNESS: f32 = crate::scene::features::SMOOTH;
 const FROSTED_ROUGHNESS: f32 = 0.6;
 /// That part; the rest goes straight through, so that glass never hides what it holds.
 const FROSTED_SHARE: f32 = 0.75;
-/// Highlights of lights without extent are never narrower than this roughness makes them.
-pub(super) const NARROWEST_HIGHLIGHT: f32 = 0.045;
-/// Below this roughness they are widened so that rays meet them (see [`crate::render::glint`]).
-const NARROW_HIGHLIGHT: f32 = 0.35;
-
 /// The model's parameters at one point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MetalRoughMatter {
@@ -305,17 +301,6 @@ impl MetalRoughMatter {
         self.lit_by(normal, view, to_light, lobe)
     }
 
-    /// BTDF × |N·L| of light on the other side.
-    pub(super) fn lit_through(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
-        let (n_l, n_v) = (-normal.dot(to_light), normal.dot(view));
-        if !self.is_translucent() || n_l <= 0.0 || n_v <= 0.0 {
-            return Vec3::ZERO;
-        }
-        let half = (view + to_light + 2.0 * n_l * normal).normalize_or(normal);
-        let (dielectric, _) = self.fresnel(view.dot(half));
-        self.scattered_through() * ((1.0 - dielectric.max_element()) / PI * n_l)
-    }
-
     /// The same with another lobe: what it gives for the sum of both unit vectors, before Fresnel.
     #[inline(always)]
     pub(super) fn lit_by(&self, normal: Vec3, view: Vec3, to_light: Vec3, lobe: impl Fn(Vec3) -> f32) -> Vec3 {
@@ -329,6 +314,17 @@ impl MetalRoughMatter {
         let diffuse = self.scattered() * ((1.0 - dielectric.max_element()) / PI);
         let specular = dielectric.lerp(metal, self.metallic) * lobe(between);
         (diffuse + specular) * n_l
+    }
+
+    /// BTDF × |N·L| of light on the other side.
+    pub(super) fn lit_through(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
+        let (n_l, n_v) = (-normal.dot(to_light), normal.dot(view));
+        if !self.is_translucent() || n_l <= 0.0 || n_v <= 0.0 {
+            return Vec3::ZERO;
+        }
+        let half = (view + to_light + 2.0 * n_l * normal).normalize_or(normal);
+        let (dielectric, _) = self.fresnel(view.dot(half));
+        self.scattered_through() * ((1.0 - dielectric.max_element()) / PI * n_l)
     }
 
     /// The surroundings without a ray: scattered and looked-up mirrored light, and what is looked up through frosted glass.
@@ -435,6 +431,7 @@ impl MetalRoughMatter {
         }
         Balance {
             reflected: self.mirrored(dielectric, metal, outside),
+            glass: dielectric * (self.transmission * (1.0 - self.metallic) * self.traced(outside)),
             refracted: self.passed(open) * (1.0 - self.frosted(outside)),
         }
     }
@@ -504,211 +501,5 @@ pub(crate) fn above(dir: Vec3, geometric: Vec3) -> Vec3 {
     if height < 0.0 { dir - 2.0 * height * geometric } else { dir }
 }
 
-/// α² of the highlights that a roughness gives: its fourth power.
-#[inline(always)]
-pub(super) fn squared_width(roughness: f32) -> f32 {
-    let alpha = roughness.max(NARROWEST_HIGHLIGHT) * roughness.max(NARROWEST_HIGHLIGHT);
-    alpha * alpha
-}
-
-/// Whether a roughness makes highlights of lights that must be widened.
-#[inline(always)]
-pub(crate) fn is_narrow(roughness: f32) -> bool {
-    roughness < NARROW_HIGHLIGHT
-}
-
-/// What that is at least where it should be `to`: all of it where roughness makes it narrow, up to what is wide, and less and
-/// less where roughness makes it wide by itself.
-#[inline(always)]
-pub(super) fn least_square(roughness: f32, to: f32) -> f32 {
-    /// α² of a roughness of 0.7.
-    const WIDE: f32 = 0.24;
-    to.min(WIDE) * (1.0 - smoothstep(0.5 * NARROW_HIGHLIGHT, NARROW_HIGHLIGHT, roughness))
-}
-
-/// The microfacet lobe of a light without extent, before Fresnel: distribution × visibility, for a squared width α² and the
-/// direction `between` light and view, of any length.
-#[inline(always)]
-pub(super) fn highlight(normal: Vec3, between: Vec3, [n_l, n_v]: [f32; 2], a2: f32) -> f32 {
-    0.5 / PI * ggx(normal, between, a2) / masking(n_l, n_v, a2)
-}
-
-/// π times Trowbridge and Reitz's distribution of facets (GGX), `a2` the fourth power of the roughness.
-#[inline(always)]
-fn ggx(normal: Vec3, between: Vec3, a2: f32) -> f32 {
-    let n_h = normal.dot(between).max(0.0);
-    // 1 − (N·H)² as |N × H|², which keeps its digits in a narrow highlight; both times the square of the length.
-    let sine_squared = normal.cross(between).length_squared();
-    let f = n_h * n_h * a2 + sine_squared;
-    let narrow = between.length_squared() / f.max(f32::MIN_POSITIVE);
-    a2 * narrow * narrow
-}
-
-/// What divides ½ in Smith's height-correlated masking and shadowing over 4 N·L N·V (E. Heitz, "Understanding the
-/// Masking-Shadowing Function", 2014).
-#[inline(always)]
-fn masking(n_l: f32, n_v: f32, a2: f32) -> f32 {
-    let view = n_l * (n_v * n_v * (1.0 - a2) + a2).sqrt();
-    let light = n_v * (n_l * n_l * (1.0 - a2) + a2).sqrt();
-    view + light
-}
-
-#[inline(always)]
-fn smoothstep(from: f32, to: f32, x: f32) -> f32 {
-    let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::render::wave::{Media, Medium};
-
-    fn matter() -> MetalRoughMatter {
-        MetalRoughMatter {
-            base: Vec3::new(0.8, 0.4, 0.2),
-            metal_f0: Vec3::new(0.8, 0.4, 0.2),
-            filmed: false,
-            metallic: 0.0,
-            roughness: 0.5,
-            roughness_along: 0.0,
-            sent_back: 1.0,
-            by_rays: false,
-            f0: Vec3::splat(0.04),
-            f90: 1.0,
-            transmission: 0.0,
-            share: 0.0,
-            through: Vec3::ZERO,
-            occlusion: 1.0,
-            ior: 1.5,
-            thick: false,
-            inside: Vec3::ONE,
-            dispersion: 0.0,
-            least_square: 0.0,
-        }
-    }
-
-    fn at(degrees: f32) -> Vec3 {
-        let (sin, cos) = libm::sincosf(degrees.to_radians());
-        Vec3::new(sin, 0.0, cos)
-    }
-
-    /// ∫ BRDF N·L over the hemisphere by midpoints.
-    fn reflected_in_all(m: &MetalRoughMatter, view: Vec3) -> Vec3 {
-        let (rows, columns) = (400u16, 200u16);
-        let mut sum = Vec3::ZERO;
-        for i in 0..rows {
-            for j in 0..columns {
-                let theta = (f32::from(i) + 0.5) / f32::from(rows) * PI / 2.0;
-                let phi = (f32::from(j) + 0.5) / f32::from(columns) * 2.0 * PI;
-                let (st, ct) = libm::sincosf(theta);
-                let (sp, cp) = libm::sincosf(phi);
-                sum += m.lit(Vec3::Z, view, Vec3::new(st * cp, st * sp, ct)) * st;
-            }
-        }
-        sum * (PI / 2.0 / f32::from(rows)) * (2.0 * PI / f32::from(columns))
-    }
-
-    #[test]
-    fn the_tabulated_albedo_is_that_of_the_lobe() {
-        for (roughness, degrees) in [(0.3, 0.0), (0.5, 45.0), (0.5, 80.0), (0.8, 60.0), (1.0, 20.0)] {
-            let white = MetalRoughMatter { f0: Vec3::ONE, base: Vec3::ZERO, roughness, ..matter() };
-            let black = MetalRoughMatter { f0: Vec3::ZERO, ..white };
-            let (sum, bias) = (reflected_in_all(&white, at(degrees)).x, reflected_in_all(&black, at(degrees)).x);
-            let known = albedo(roughness, at(degrees).z);
-            assert!((known.0 - (sum - bias)).abs() < 0.05, "{roughness} at {degrees}: {}, {known:?}", sum - bias);
-            assert!((known.1 - bias).abs() < 0.05, "{roughness} at {degrees}: {bias}, {known:?}");
-        }
-    }
-
-    #[test]
-    fn no_more_light_leaves_than_arrives() {
-        // Nearer to grazing the model itself gives off a little too much.
-        for roughness in [0.2, 0.5, 1.0] {
-            for degrees in [0.0, 30.0, 50.0] {
-                let white = MetalRoughMatter { base: Vec3::ONE, roughness, ..matter() };
-                let all = reflected_in_all(&white, at(degrees)).max_element();
-                assert!(all < 1.01, "{roughness} at {degrees}: {all}");
-            }
-        }
-    }
-
-    #[test]
-    fn a_matt_dielectric_is_lambertian_but_for_its_sheen() {
-        let dull = MetalRoughMatter { f0: Vec3::ZERO, f90: 0.0, ..matter() };
-        assert!((dull.lit(Vec3::Z, at(-20.0), at(60.0)) - dull.base * 0.5 / PI).length() < 1e-6);
-    }
-
-    #[test]
-    fn a_translucent_surface_shares_its_light_between_both_sides() {
-        let through = Vec3::new(0.2, 0.9, 0.1);
-        let leaf = MetalRoughMatter { f0: Vec3::ZERO, f90: 0.0, share: 0.25, through, ..matter() };
-        let (front, back) = (leaf.lit(Vec3::Z, at(-20.0), at(60.0)), leaf.lit_through(Vec3::Z, at(-20.0), at(120.0)));
-        assert!((front - leaf.base * (0.75 * 0.5 / PI)).length() < 1e-6);
-        assert!((back - through * (0.25 * 0.5 / PI)).length() < 1e-6);
-        assert_eq!(leaf.lit_through(Vec3::Z, at(-20.0), at(60.0)), Vec3::ZERO, "that is the front");
-        let metal = MetalRoughMatter { metallic: 1.0, ..leaf };
-        assert_eq!(metal.lit_through(Vec3::Z, at(-20.0), at(120.0)), Vec3::ZERO);
-        let glossy = MetalRoughMatter { f0: Vec3::splat(0.04), f90: 1.0, ..leaf };
-        let (there, back) = (glossy.lit_through(Vec3::Z, at(25.0), at(130.0)) / 50f32.to_radians().cos(), {
-            glossy.lit_through(Vec3::NEG_Z, at(130.0), at(25.0)) / 25f32.to_radians().cos()
-        });
-        assert!((there - back).length() < 1e-5, "seen and lit can change places: {there} {back}");
-    }
-
-    #[test]
-    fn seen_and_lit_can_change_places() {
-        let m = MetalRoughMatter { metallic: 0.4, ..matter() };
-        let (a, b) = (at(25.0), at(-65.0));
-        let there = m.lit(Vec3::Z, a, b) / b.z;
-        let back = m.lit(Vec3::Z, b, a) / a.z;
-        assert!((there - back).length() < 1e-5);
-    }
-
-    #[test]
-    fn a_mirror_of_metal_has_the_color_of_its_base() {
-        let metal = MetalRoughMatter { metallic: 1.0, roughness: 0.0, ..matter() };
-        let outside = Media::default().cross(Medium { material: 0, ior: 1.0 }, true);
-        assert_eq!(metal.balance(1.0, &outside, true).reflected, metal.base);
-        assert_eq!(metal.balance(1.0, &outside, true).refracted, Vec3::ZERO);
-        assert_eq!(MetalRoughMatter { roughness: 0.5, ..metal }.balance(1.0, &outside, true).reflected, Vec3::ZERO);
-    }
-
-    #[test]
-    fn clear_glass_splits_all_light_between_both_rays() {
-        let glass = MetalRoughMatter { base: Vec3::ONE, roughness: 0.0, transmission: 1.0, thick: true, ..matter() };
-        let into = Media::default().cross(Medium { material: 0, ior: 1.5 }, true);
-        let out = into.beyond.cross(Medium { material: 0, ior: 1.5 }, false);
-        for (crossing, outside) in [(into, true), (out, false)] {
-            for cosine in [0.1, 0.5, 0.8, 1.0] {
-                let balance = glass.balance(cosine, &crossing, outside);
-                assert!((balance.reflected + balance.refracted - Vec3::ONE).length() < 1e-6);
-            }
-        }
-        assert_eq!(glass.balance(0.1, &out, false).refracted, Vec3::ZERO, "total reflection");
-    }
-
-    #[test]
-    fn thick_glass_mirrors_in_the_colour_that_its_specular_factors_give() {
-        let glass = MetalRoughMatter { roughness: 0.0, transmission: 1.0, thick: true, ..matter() };
-        let into = Media::default().cross(Medium { material: 0, ior: 1.5 }, true);
-        let mirrored = |m: MetalRoughMatter, cosine| m.balance(cosine, &into, true).reflected;
-        for color in [Vec3::X, Vec3::ZERO, Vec3::new(0.5, 2.0, 1.0)] {
-            let f0 = color * 0.04;
-            let tinted = MetalRoughMatter { f0, ..glass };
-            assert!((mirrored(tinted, 1.0) - f0).length() < 1e-6, "{color} face on");
-            assert!((mirrored(tinted, 0.0) - Vec3::ONE).length() < 1e-6, "{color} grazing");
-        }
-        assert!((mirrored(glass, 0.3).x - fresnel_dielectric(0.3, 1.0, 1.5) as f32).abs() < 1e-6);
-        assert_eq!(mirrored(MetalRoughMatter { f0: Vec3::ZERO, f90: 0.0, ..glass }, 0.3), Vec3::ZERO);
-        let all = MetalRoughMatter { f0: Vec3::ONE, ior: 0.0, ..glass };
-        assert_eq!(all.balance(0.7, &Media::default().pass(), true).reflected, Vec3::ONE, "index 0");
-    }
-
-    #[test]
-    fn a_mirrored_direction_never_goes_into_the_surface() {
-        let dir = above(Vec3::new(0.6, 0.0, -0.8), Vec3::Z);
-        assert_eq!(dir, Vec3::new(0.6, 0.0, 0.8));
-        assert_eq!(above(dir, Vec3::Z), dir);
-    }
-}
+mod tests;
