@@ -1,7 +1,8 @@
 //! The sRGB transfer function (IEC 61966-2-1:1999) between linear light and coded values, rounded correctly.
 //!
-//! Coding goes by thresholds: code `c` begins at the linear value whose exact code is `c - 1/2`. They are found once
-//! with `libm`, so the same linear value has the same code on every machine, and no power is taken for a pixel.
+//! Exact codes go by thresholds: code `c` begins at the linear value whose exact code is `c - 1/2`. They are found once
+//! with `libm`, so the same linear value has the same code on every machine. Most 8-bit codes need none: [`curve`] is exact
+//! enough to be sure of them, and thresholds decide the others.
 
 use std::sync::LazyLock;
 
@@ -89,23 +90,16 @@ impl Codes {
     /// The code nearest to linear light.
     #[inline]
     pub(super) fn code(&self, linear: f32) -> u16 {
-        let (mut code, linear) = self.near(linear);
-        while linear >= self.begin[usize::from(code) + 1] {
-            code += 1;
-        }
-        code
-    }
-
-    /// The code where the bucket of linear light begins, or the next; of the 8-bit table, no bucket of which holds more than
-    /// one step, the code nearest to it. And the light within the table.
-    #[inline(always)]
-    pub(super) fn near(&self, linear: f32) -> (u16, f32) {
         // Comparisons that NaN fails, each one instruction.
         let linear = if linear > self.lowest { linear } else { self.lowest };
         let linear = if linear < 1.0 { linear } else { 1.0 };
         let bucket = &self.buckets[((linear.to_bits() - self.lowest.to_bits()) >> self.shift) as usize];
-        // An addition does what a branch would have to guess.
-        (bucket.code + u16::from(linear >= bucket.next), linear)
+        // Mostly the one or the other. An addition does what a branch would have to guess.
+        let mut code = bucket.code + u16::from(linear >= bucket.next);
+        while linear >= self.begin[usize::from(code) + 1] {
+            code += 1;
+        }
+        code
     }
 }
 
@@ -235,14 +229,6 @@ mod tests {
             assert!(near(f64::from(encode8(linear)), exact * 255.0), "{linear} {exact}");
             assert!(near(f64::from(encode16(linear)), exact * 65_535.0), "{linear} {exact}");
         }
-    }
-
-    #[test]
-    fn no_bucket_of_the_small_table_holds_two_steps() {
-        let codes = codes8();
-        let bucket = |&light: &f32| (light.to_bits() - codes.lowest.to_bits()) >> codes.shift;
-        let steps: Vec<u32> = codes.begin[1..=255].iter().map(bucket).collect();
-        assert!(steps.windows(2).all(|pair| pair[0] < pair[1]), "{steps:?}");
     }
 
     #[test]
