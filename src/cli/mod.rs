@@ -197,6 +197,33 @@ mod tests {
     }
 
     #[test]
+    fn words_of_render_mean_the_same_by_themselves_as_among_all_commands() {
+        let words = |line: &str| line.split(' ').map(OsString::from).collect::<Vec<_>>();
+        let among_all = |line: &str| Cli::try_parse_from(words(line)).ok().map(|cli| format!("{:?}", cli.command));
+        let alone = |line: &str| render_alone(&words(line)).map(|command| format!("{command:?}"));
+        for line in [
+            "meshray render a.glb -q",
+            "meshray render a.glb b.obj --size 64x48 --eye=-1,2,3 --layers -o out/{stem}.exr",
+            "meshray render --again a.png b.glb",
+            "meshray render - --samples 4 --up z --messages json",
+        ] {
+            let understood = alone(line);
+            assert!(understood.is_some() && understood == among_all(line), "{line}: {understood:?}");
+        }
+        for line in [
+            "meshray inspect a.glb",
+            "meshray render --help",
+            "meshray render -V",
+            "meshray render a.glb --sise 64x48",
+            "meshray render --again a.png --samples 4",
+            "meshray render",
+            "meshray",
+        ] {
+            assert_eq!(alone(line), None, "{line}");
+        }
+    }
+
+    #[test]
     fn a_flag_that_may_stand_alone_takes_its_value_but_no_file() {
         let words = |line: &str| line.split(' ').map(OsString::from).collect::<Vec<_>>();
         let joined = |line: &str| JOINED.iter().fold(words(line), with_joined);

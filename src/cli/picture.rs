@@ -96,7 +96,7 @@ pub(super) struct Behind {
 }
 
 /// The most memory that a picture takes on its way into such a file, bytes: all that is known of its pixels, a second time
-/// while it is counted; then its samples as they are stored, and the file, which may hardly be smaller.
+/// while it is counted or another is rendered beside it; then its samples as they are stored, and the file, which may hardly be smaller.
 pub(super) fn bytes(effective: &Effective, kind: FileKind, behind: Behind) -> u64 {
     /// Of the costs of a pixel: those of its tile, five channels, copies and sums.
     const COST: u64 = 128;
@@ -121,8 +121,10 @@ pub(super) fn bytes(effective: &Effective, kind: FileKind, behind: Behind) -> u6
         FileKind::Png if output.png_depth == PngDepth::Sixteen => 3 * 8,
         FileKind::Png | FileKind::Jpeg | FileKind::Webp => 2 * 4,
     };
-    let counted = if behind.counted { known } else { 0 };
-    pixels * (known + stored.max(counted) + COST * behind.costs as u64)
+    // For a given error of the picture two are rendered side by side.
+    let is_aimed = matches!(&settings.sampling, Sampling::Stochastic(how) if how.target.is_some());
+    let again = if behind.counted || is_aimed { known } else { 0 };
+    pixels * (known + stored.max(again) + COST * behind.costs as u64)
 }
 
 /// A fault when the picture alone needs more than the memory that is allowed.

@@ -133,10 +133,14 @@ fn one(input: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
 
 /// Whether trying again can help: it does with more memory where that was all that was missing.
 pub(super) fn exit_of(error: &LoadError) -> Exit {
-    const OF_MEMORY: [&str; 3] = ["file-too-large", "out-of-memory-limit", "over-memory"];
+    // A file that is too large whatever the memory has no remedy.
+    let of_memory = |fault: &Diagnostic| match fault.code {
+        "file-too-large" => !fault.remedy.is_empty(),
+        code => matches!(code, "out-of-memory-limit" | "over-memory"),
+    };
     match error {
         LoadError::Read { .. } => Exit::Failed,
-        LoadError::Input(faults) if faults.iter().all(|fault| OF_MEMORY.contains(&fault.code)) => Exit::Failed,
+        LoadError::Input(faults) if !faults.is_empty() && faults.iter().all(of_memory) => Exit::Failed,
         LoadError::Input(_) => Exit::Input,
     }
 }

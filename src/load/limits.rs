@@ -17,6 +17,13 @@ impl Default for Limits {
     }
 }
 
+impl Limits {
+    /// What lets a larger file in: more memory, unless a file may not be larger whatever the memory.
+    pub(super) fn remedy_for_file(&self) -> &'static str {
+        if self.file == self.memory { "raise --max-memory" } else { "" }
+    }
+}
+
 /// Memory that may still be taken.
 ///
 /// Loaders ask before they allocate anything whose size a file decides; a file of a few bytes cannot make them

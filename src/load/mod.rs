@@ -256,9 +256,7 @@ fn read_source(path: &Path, limits: &Limits) -> Result<Source, LoadError> {
     let fault = |source| LoadError::Read { what: what(), source };
     let too_large = |bytes: u64| {
         let text = format!("{bytes} bytes where {} are allowed", limits.file);
-        // More than the usual limit of a file is not read whatever the memory.
-        let remedy = if limits.file == limits.memory { "raise --max-memory" } else { "" };
-        LoadError::from(Diagnostic::new("file-too-large", path, "", text).remedy(remedy))
+        LoadError::from(Diagnostic::new("file-too-large", path, "", text).remedy(limits.remedy_for_file()))
     };
     let file = std::fs::File::open(path).map_err(fault)?;
     let meta = file.metadata().map_err(fault)?;

@@ -4,7 +4,7 @@
 //! symbolic links are resolved, and never from a network. Everything read is listed and hashed, so that a picture can
 //! say exactly what it was made from.
 
-use super::{Diagnostic, LoadOptions, Source, whole};
+use super::{Diagnostic, Limits, LoadOptions, Source, whole};
 use crate::stopwatch::{Spent, Stopwatch};
 use percent_encoding::percent_decode_str;
 use std::collections::HashMap;
@@ -20,7 +20,8 @@ pub struct Resolver {
     base: PathBuf,
     /// Nothing outside this folder is read; canonical.
     root: PathBuf,
-    max_bytes: u64,
+    /// Those of a file.
+    limits: Limits,
     read: Vec<(PathBuf, u128)>,
     /// Canonical path -> index into `read`.
     known: HashMap<PathBuf, usize>,
@@ -53,6 +54,8 @@ pub enum FileFault {
         bytes: u64,
         /// The limit.
         limit: u64,
+        /// What lets it in, if anything does.
+        remedy: &'static str,
     },
     /// The name is a URI of another machine or an unknown scheme.
     #[error("'{0}' is not a relative file name, and nothing is fetched from elsewhere")]
@@ -77,7 +80,7 @@ impl FileFault {
             Self::Outside { root, .. } => ("file-outside-root", format!("allow it with --root '{}'", root.display())),
             Self::Missing(_) => ("file-missing", "put it beside the model".into()),
             Self::NotAFile(_) => ("file-not-plain", String::new()),
-            Self::TooLarge { .. } => ("file-too-large", String::new()),
+            Self::TooLarge { remedy, .. } => ("file-too-large", (*remedy).into()),
             Self::Scheme(_) => ("uri-scheme", "download it and name it by a relative path".into()),
             Self::BadUri(_) => ("uri-invalid", String::new()),
             Self::Io { .. } => ("file-unreadable", String::new()),
@@ -105,7 +108,7 @@ impl Resolver {
         let mut resolver = Self {
             base,
             root,
-            max_bytes: options.limits.file,
+            limits: options.limits,
             read: Vec::new(),
             known: HashMap::new(),
             reading: Spent::default(),
@@ -145,13 +148,14 @@ impl Resolver {
         if !meta.is_file() {
             return Err(FileFault::NotAFile(shown()));
         }
-        let too_large = |bytes| FileFault::TooLarge { name: shown(), bytes, limit: self.max_bytes };
-        if meta.len() > self.max_bytes {
+        let (limit, remedy) = (self.limits.file, self.limits.remedy_for_file());
+        let too_large = |bytes| FileFault::TooLarge { name: shown(), bytes, limit, remedy };
+        if meta.len() > limit {
             return Err(too_large(meta.len()));
         }
         // What other threads would do meanwhile is not in this one's time.
-        let bytes = whole::read_in_turn(file, meta.len(), self.max_bytes).map_err(io)?;
-        if bytes.len() as u64 > self.max_bytes {
+        let bytes = whole::read_in_turn(file, meta.len(), limit).map_err(io)?;
+        if bytes.len() as u64 > limit {
             return Err(too_large(bytes.len() as u64));
         }
         self.reading += watch.read();

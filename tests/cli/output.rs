@@ -217,10 +217,40 @@ fn the_memory_of_a_picture_is_foretold_and_held_to_its_limit() {
 }
 
 #[test]
+fn a_picture_of_a_given_error_is_foretold_to_be_held_twice() {
+    let folder = Folder::with_cube();
+    let foretold = |more: &[&str]| {
+        let words = ["render", "cube.obj", "--size", "2000x2000", "--stats", "json", "--dry-run"];
+        let run = folder.run(&[&words[..], more].concat()).ends(0);
+        serde_json::from_str::<serde_json::Value>(run.text()).unwrap()["memory"].as_f64().unwrap()
+    };
+    let (once, twice) = (foretold(&[]), foretold(&["--target-error", "0.01"]));
+    // Sixteen bytes of colour a pixel at least.
+    assert!(twice >= once + 4e6 * 16.0, "{once} {twice}");
+}
+
+#[test]
 fn a_model_that_takes_more_memory_than_is_allowed_ends_in_1_as_more_may_help() {
     let folder = Folder::with_cube().file("long.obj", format!("{CUBE}{}", "#\n".repeat(1000)));
     for (name, limit) in [("cube.obj", "200"), ("long.obj", "1K")] {
         folder.render(&[name, "--max-memory", limit]).ends(1).says(&[name, "raise --max-memory"]);
     }
     folder.render(&["cube.obj", "--max-memory", "2K"]).ends(1).says(&["bytes are needed", "raise --max-memory"]);
+}
+
+#[test]
+fn a_file_that_a_model_names_and_that_is_too_large_ends_in_1_too() {
+    let buffers = r#"{"asset": {"version": "2.0"}, "buffers": [{"uri": "g.bin", "byteLength": 60000}]}"#;
+    let folder = Folder::new().file("g.gltf", buffers).file("g.bin", vec![0; 60_000]);
+    folder.render(&["g.gltf", "--max-memory", "30K"]).ends(1).says(&["'g.bin' has 60000 bytes", "raise --max-memory"]);
+}
+
+#[test]
+fn a_file_that_is_too_large_whatever_the_memory_ends_in_3() {
+    let folder = Folder::new();
+    let long = std::fs::File::create(folder.path("long.obj")).unwrap();
+    // A hole, which takes no room on the disk.
+    long.set_len(5 << 30).unwrap();
+    let run = folder.render(&["long.obj", "--max-memory", "64G"]).ends(3);
+    run.says(&["5368709120 bytes where 4294967296 are allowed"]);
 }
