@@ -350,7 +350,7 @@ fn with_typed(pixels: RenderArgs, inputs: Vec<PathBuf>, typed: &RenderArgs) -> R
     };
     RenderArgs {
         inputs,
-        again: None,
+        again: typed.again.clone(),
         output: typed.output.clone(),
         root: typed.root.clone(),
         max_memory: typed.max_memory,

@@ -148,6 +148,9 @@ impl RenderJob {
     pub(super) fn new(args: &RenderArgs) -> Result<Self, Wrong> {
         check_flags(args)?;
         args.sampling.check()?;
+        if args.again.is_none() {
+            args.sampling.check_target()?;
+        }
         let choices = choices(args)?;
         let sequence = sequence::of(args)?;
         let batches = batches(args, &choices, sequence.as_ref())?;

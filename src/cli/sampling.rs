@@ -35,7 +35,8 @@ pub(super) struct SamplingArgs {
     pub pixel_error: Option<f32>,
     /// Error of the whole picture to reach, and not much less: the root of its mean squared error, in the numbers of
     /// --error-space. A part of the picture is rendered first to find out how (see --dry-run); then it is rendered twice, the
-    /// difference of both tells the error, and what is missing is added
+    /// difference of both tells the error, and what is missing is added. It takes as many rays as that needs: not with
+    /// --max-samples
     #[arg(long, value_name = "E", value_parser = parse::error, help_heading = "Quality", hide_short_help = true,
           conflicts_with_all = ["pixel_error", "quality"])]
     pub target_error: Option<f32>,
@@ -140,6 +141,17 @@ impl SamplingArgs {
             return Err(Wrong(format!("--min-samples {fewest} is more than --max-samples {most}")));
         }
         Ok(())
+    }
+
+    /// Refuses a limit on the samples of a pixel where the error of the picture says how many there are. What a picture carries
+    /// to be repeated has both.
+    pub(super) fn check_target(&self) -> Result<(), Wrong> {
+        if self.target_error.is_none() || self.max_samples.is_none() {
+            return Ok(());
+        }
+        let text = "--target-error takes as many samples as the picture needs, so --max-samples cannot limit them; leave \
+                    one of them out, or use --pixel-error with --max-samples";
+        Err(Wrong(text.into()))
     }
 
     /// Flags of stochastic sampling alone, and whether they were typed.

@@ -1,6 +1,7 @@
 //! How pixels are sampled: flags, layers, statistics, and pictures that repeat themselves.
 
 use super::program::{Folder, picture};
+use meshray::image::{FileKind, Metadata, Output, encode, read_metadata};
 use serde_json::Value;
 
 const SMALL: [&str; 4] = ["render", "cube.obj", "--size", "32x24"];
@@ -27,6 +28,24 @@ fn pictures_of_every_kind_of_sampling_are_repeated_byte_for_byte() {
         folder.run(&["render", "--again", "first.png", "-o", "second.png"]).ends(0);
         assert!(folder.read("first.png") == folder.read("second.png"), "{kind}");
     }
+}
+
+#[test]
+fn a_picture_that_carries_an_error_to_reach_and_a_limit_of_samples_is_repeated_with_both() {
+    let folder = Folder::with_cube();
+    let settings = |name: &str| -> Value {
+        let metadata = read_metadata(&folder.path(name)).unwrap().unwrap();
+        serde_json::from_str(metadata.get(Metadata::SETTINGS).unwrap()).unwrap()
+    };
+    run(&folder, &["--target-error", "0.01", "-o", "free.png"]).ends(0);
+    let mut limited = settings("free.png");
+    limited["max-samples"] = "8".into();
+    let metadata = read_metadata(&folder.path("free.png")).unwrap().unwrap();
+    let metadata = metadata.with(Metadata::SETTINGS, limited.to_string());
+    let file = encode(&picture(&folder.path("free.png")), FileKind::Png, &Output::default(), &metadata).unwrap();
+    std::fs::write(folder.path("limited.png"), file).unwrap();
+    folder.run(&["render", "--again", "limited.png", "-o", "again.png"]).ends(0);
+    assert_eq!(settings("again.png"), limited);
 }
 
 #[test]
@@ -80,6 +99,7 @@ fn flags_that_contradict_each_other_are_refused() {
         ("--aa uniform --quality final", "--quality"),
         ("--aa-depth 2 --filter tent", "--aa-depth"),
         ("--min-samples 9 --max-samples 8", "--min-samples 9"),
+        ("--target-error 0.002 --max-samples 8", "--pixel-error with --max-samples"),
         ("--confidence 3", "50%"),
         ("--focus 3", "--aperture"),
         ("--aperture=-1", "radius"),
