@@ -130,7 +130,7 @@ pub(super) struct RenderArgs {
     /// Put all inputs into one scene and one picture
     #[arg(long, help_heading = "Output", hide_short_help = true)]
     pub merge: bool,
-    /// On Ctrl-C keep the tiles that are done as NAME.partial.png
+    /// On Ctrl-C keep the tiles that are done as NAME.partial.png; not with `-o -`, which has no name
     #[arg(long, help_heading = "Output", hide_short_help = true)]
     pub keep_partial: bool,
     /// Repeat a picture with the settings it carries; refuses when the input has changed

@@ -119,8 +119,14 @@ pub(super) fn check_beside(batches: &[Batch], beside: Beside) -> Result<(), Wron
     if let Some(twice) = heatmaps.iter().enumerate().find(|(i, cost)| heatmaps[..*i].contains(cost)) {
         return wrong(format!("--heatmap names {} twice", twice.1));
     }
-    if !heatmaps.is_empty() && shots().any(|s| s.target == Target::Stdout) {
+    let to_stdout = shots().any(|s| s.target == Target::Stdout);
+    if !heatmaps.is_empty() && to_stdout {
         return wrong("a heat map is named after its picture, and standard output has no name; use -o NAME");
+    }
+    if beside.partial && to_stdout {
+        let text = "--keep-partial names what it keeps after the picture, and standard output has no name; use -o NAME, \
+                    or leave --keep-partial out";
+        return wrong(text);
     }
     let all = files(shots(), beside);
     match output_name::collision(&all) {

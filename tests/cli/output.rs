@@ -134,6 +134,15 @@ fn standard_output_carries_the_picture_and_nothing_else() {
 }
 
 #[test]
+fn what_is_named_after_the_picture_is_refused_where_standard_output_has_no_name() {
+    let folder = Folder::with_cube();
+    for beside in ["--keep-partial", "--heatmap=tests"] {
+        let run = folder.render(&["cube.obj", "-o", "-", beside]).ends(2).says(&["standard output", "-o NAME"]);
+        assert!(run.stdout.is_empty(), "{beside}");
+    }
+}
+
+#[test]
 fn standard_input_is_read_for_a_dash() {
     let folder = Folder::with_cube();
     let arguments = ["render", "--size", "32x24", "--samples", "1", "-", "-o", "-"];
