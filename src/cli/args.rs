@@ -178,8 +178,8 @@ pub(super) struct RenderArgs {
     pub background: Option<parse::Back>,
     /// What surrounds the scene and lights it: an equirectangular picture (.hdr, .exr), or studio, white, black
     ///
-    /// It takes the place of default lights; lamps of the file keep shining. A picture's middle lies along +X, a quarter to
-    /// the right of it +Z, its upper edge overhead.
+    /// A model without lamps keeps its default ones in the studio, and anything else takes their place; lamps of the file
+    /// keep shining. A picture's middle lies along +X, a quarter to the right of it +Z, its upper edge overhead.
     #[arg(long, value_name = "FILE|NAME", value_parser = parse::env, help_heading = "Light and background")]
     pub env: Option<parse::Env>,
     /// Turn that picture about the up axis

@@ -51,9 +51,14 @@ pub(super) fn lit<T>(
     done
 }
 
-/// Lights the scene as `camera` sees it: with lamps where it has none, and suns as wide as they were asked for.
+/// Lights the scene as `camera` sees it: with lamps where it has none, unless darkness was asked for, and with suns as wide
+/// as was.
 fn light(look: &Look, scene: &mut Scene, camera: &Camera) -> DefaultLight {
-    let light = default_light::add_if_missing(scene, camera);
+    // Of a scene black is what it has when it says nothing; typed, it is meant.
+    let light = match look.env {
+        Some(Env::BuiltIn(Environment::Black)) => DefaultLight::NotWanted,
+        _ => default_light::add_if_missing(scene, camera),
+    };
     if let Some(degrees) = look.sun_size {
         let suns = scene.lights.iter_mut().filter(|l| matches!(l.kind, LightKind::Directional { .. }) && l.size == 0.0);
         suns.for_each(|light| light.size = 0.5 * degrees.to_radians());

@@ -17,7 +17,7 @@ pub enum DefaultLight {
     Added,
     /// The scene has its own light.
     NotMissing,
-    /// The scene file asked for none.
+    /// The scene file, or whoever has it drawn, wants none.
     NotWanted,
     /// Nothing in the scene answers to light: the studio was added as a backdrop.
     NotNeeded,

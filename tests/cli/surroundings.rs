@@ -60,6 +60,25 @@ fn the_studio_is_what_there_is_without_a_word_and_white_darkens_corners_only_wit
 }
 
 #[test]
+fn black_surroundings_take_the_place_of_default_lights_and_leave_lamps_of_the_file_alone() {
+    let lamp = "[[lights]]\nkind = \"directional\"\ndirection = [0, 0, -1]\n";
+    let ball = "[[spheres]]\ncenter = [0, 0, 0]\nradius = 1\n";
+    let folder = Folder::with_cube().file("lit.toml", format!("{lamp}{ball}")).file("bare.toml", ball);
+    let brightest = |model: &str, flags: &[&str]| {
+        let words = [&[model, "--background", "black", "--view", "front", "-o", "out.exr"], flags].concat();
+        folder.render(&words).ends(0);
+        picture(&folder.path("out.exr")).beauty.iter().map(|p| p[0]).fold(0.0, f32::max)
+    };
+    for model in ["cube.obj", "bare.toml"] {
+        assert_eq!(brightest(model, &["--env", "black"]), 0.0, "{model}");
+        // A scene that says nothing is lit, though nothing surrounds it.
+        assert!(brightest(model, &[]) > 0.1, "{model}");
+    }
+    let lit = brightest("lit.toml", &[]);
+    assert!(lit > 0.1 && brightest("lit.toml", &["--env", "black"]) == lit);
+}
+
+#[test]
 fn what_cannot_surround_a_scene_is_said_in_one_line() {
     let folder = with_sky().file("broken.exr", b"\x76\x2f\x31\x01 and no more".as_slice());
     folder.run(&["render", "cube.obj", "--env", "missing.hdr"]).ends(1).says(&["missing.hdr"]);
