@@ -7,7 +7,7 @@
 use super::args::{Cli, Command, RenderArgs};
 use super::camera::{Choice, LensChoice};
 use super::exit::Exit;
-use super::job::{Batch, RenderJob, Shot};
+use super::job::{Batch, Look, RenderJob, Shot};
 use super::parse::{self, Env};
 use super::picture::Effective;
 use super::sampling;
@@ -370,14 +370,26 @@ fn with_typed(pixels: RenderArgs, inputs: Vec<PathBuf>, typed: &RenderArgs) -> R
     }
 }
 
-/// Refuses inputs that are not those of the picture.
-pub(super) fn check_hash(expected: &str, loaded: &Loaded, file: &Path) -> Result<(), Diagnostic> {
+/// Refuses inputs that are not those of the picture. One hash stands for all files that were read, so it cannot be said
+/// which of them has changed.
+pub(super) fn check_hash(expected: &str, loaded: &Loaded, inputs: &[PathBuf], look: &Look) -> Result<(), Diagnostic> {
     let found = format!("{:032x}", loaded.facts.hash);
     if found == expected {
         return Ok(());
     }
-    let text = format!("has changed since the picture was made: hash {found}, the picture's is {expected}");
-    Err(Diagnostic::new("again-hash", file, "", text).remedy("name the file that was rendered then"))
+    let read = what_was_read(inputs, look);
+    let text = format!("{read} has changed since the picture was made: hash {found}, the picture's is {expected}");
+    let remedy = "bring back what was read then, or name the model that was rendered then";
+    Err(Diagnostic::new("again-hash", &inputs[0], "", text).remedy(remedy))
+}
+
+/// Everything that a hash of inputs stands for, in words.
+fn what_was_read(inputs: &[PathBuf], look: &Look) -> String {
+    let model = if inputs.len() > 1 { "one of the models" } else { "the model" };
+    match &look.env {
+        Some(Env::File(file)) => format!("{model}, a file that it names, or the panorama {}", file.display()),
+        _ => format!("{model}, or a file that it names,"),
+    }
 }
 
 #[cfg(test)]

@@ -212,7 +212,7 @@ fn prepare(task: &Task, step: &Step, earlier: Option<Ready>, mut profile: Profil
         return Err(task.fail(&read::not_strict(&loaded, task.file()), Exit::Input));
     }
     if let Some(expected) = &job.expected_hash {
-        again::check_hash(expected, &loaded, &batch.inputs[0]).map_err(|fault| {
+        again::check_hash(expected, &loaded, &batch.inputs, &job.look).map_err(|fault| {
             messages.say(Severity::Error, &fault);
             Exit::Input
         })?;

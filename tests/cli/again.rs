@@ -1,6 +1,6 @@
 //! A picture carries what repeats it.
 
-use super::program::{CUBE, Folder, picture};
+use super::program::{CUBE, Folder, picture, textured_cube};
 
 #[test]
 fn a_picture_is_repeated_byte_for_byte() {
@@ -50,6 +50,21 @@ fn another_input_under_the_same_name_is_refused() {
     let folder = folder.file("cube.obj", CUBE.replace("v 1 1 1\n", "v 1 1 2\n"));
     folder.run(&["render", "--again", "cube.png", "-o", "again.png"]).ends(3).says(&["cube.obj", "hash"]);
     assert!(!folder.has("again.png") && folder.read("cube.png") == before);
+}
+
+#[test]
+fn a_changed_file_that_the_model_names_and_a_changed_panorama_are_not_taken_for_the_model() {
+    let folder = textured_cube();
+    let sky = folder.read("cube.jpg");
+    let folder = folder.file("sky.jpg", &sky);
+    folder.render(&["cube.obj", "-o", "plain.png"]).ends(0);
+    folder.render(&["cube.obj", "--env", "sky.jpg", "-o", "sky.png"]).ends(0);
+    let folder = folder.file("cube.mtl", "newmtl a\n");
+    let again = |name: &str| folder.run(&["render", "--again", name, "-o", "again.png"]).ends(3);
+    let run = again("plain.png").says(&["cube.obj: the model, or a file that it names, has changed"]);
+    assert!(!run.stderr.contains("panorama"), "{}", run.stderr);
+    again("sky.png").says(&["the model, a file that it names, or the panorama sky.jpg has changed"]);
+    assert!(!folder.has("again.png"));
 }
 
 #[test]
