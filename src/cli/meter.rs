@@ -9,6 +9,7 @@ use super::camera::Choice;
 use crate::image::Picture;
 use crate::math::Vec3;
 use crate::render::{Job, Sampling, Settings, render};
+use std::time::Instant;
 
 /// Longest side of the small picture.
 const SIDE: u32 = 96;
@@ -24,21 +25,32 @@ const FINE: std::ops::RangeInclusive<f32> = 0.15..=1.5;
 
 /// Stops that are added to the pictures of each view, once they are known.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Metered(Vec<(Choice, f32)>);
+pub(super) struct Metered {
+    stops: Vec<(Choice, f32)>,
+    /// What finding them took, until a picture has told it.
+    seconds: f64,
+}
 
 impl Metered {
     /// Those of a view.
     pub(super) fn get(&self, view: &Choice) -> Option<f32> {
-        self.0.iter().find(|(known, _)| known == view).map(|(_, stops)| *stops)
+        self.stops.iter().find(|(known, _)| known == view).map(|(_, stops)| *stops)
     }
 
-    /// The same, found by this picture of it where they are not known.
-    pub(super) fn get_or_find(&mut self, view: &Choice, job: &Job) -> f32 {
+    /// The same, found where they are not known: 0 where the view is to be shown as it is.
+    pub(super) fn get_or_find(&mut self, view: &Choice, find: impl FnOnce() -> Option<f32>) -> f32 {
         self.get(view).unwrap_or_else(|| {
-            let stops = exposure(job).unwrap_or(0.0);
-            self.0.push((view.clone(), stops));
+            let start = Instant::now();
+            let stops = find().unwrap_or(0.0);
+            self.stops.push((view.clone(), stops));
+            self.seconds += start.elapsed().as_secs_f64();
             stops
         })
+    }
+
+    /// Seconds that finding them took since this was asked last.
+    pub(super) fn take_seconds(&mut self) -> f64 {
+        std::mem::take(&mut self.seconds)
     }
 }
 
@@ -127,6 +139,19 @@ mod tests {
         let (bright, dark) = (metered(30_000.0, true).unwrap(), metered(0.03, true).unwrap());
         assert!((dark - bright - libm::log2f(1e6)).abs() < 0.11, "{bright} {dark}");
         assert!(bright < -8.0 && dark > 6.0);
+    }
+
+    #[test]
+    fn the_time_of_metering_is_told_once_and_none_for_what_is_known() {
+        let mut metered = Metered::default();
+        let wait = || {
+            std::thread::sleep(std::time::Duration::from_millis(2));
+            Some(1.5)
+        };
+        assert_eq!(metered.get_or_find(&Choice::Default, wait), 1.5);
+        assert!(metered.take_seconds() >= 0.002);
+        assert_eq!(metered.get_or_find(&Choice::Default, wait), 1.5);
+        assert_eq!(metered.take_seconds(), 0.0);
     }
 
     #[test]

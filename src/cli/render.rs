@@ -189,9 +189,9 @@ fn prepare(task: &Task, step: &Step, earlier: Option<Ready>, mut profile: Profil
         messages.load_error(&error);
         read::exit_of(&error)
     })?;
-    let (mut told, mut metered) = (HashSet::new(), Metered::default());
+    let (mut told, mut metered, mut load_seconds) = (HashSet::new(), Metered::default(), 0.0);
     if let Some(earlier) = earlier {
-        (told, metered) = (earlier.told, earlier.metered);
+        (told, metered, load_seconds) = (earlier.told, earlier.metered, earlier.load_seconds);
         if !read::take_pictures(&mut loaded, earlier.loaded) {
             let fault = Diagnostic::new("input-changed", &batch.inputs[0], "", "was changed while it was rendered");
             messages.say(Severity::Error, &fault.remedy("render it again"));
@@ -235,7 +235,8 @@ fn prepare(task: &Task, step: &Step, earlier: Option<Ready>, mut profile: Profil
     profile.done("place");
     let bounds = robust_bounds_within(&loaded.scene, world.bounds);
     profile.done("frame");
-    Ok(Ready { loaded, world, bounds, load_seconds: start.elapsed().as_secs_f64(), profile, metered, told })
+    load_seconds += start.elapsed().as_secs_f64();
+    Ok(Ready { loaded, world, bounds, load_seconds, profile, metered, told })
 }
 
 fn nothing_to_draw(loaded: &Loaded, file: &Path) -> Diagnostic {

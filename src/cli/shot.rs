@@ -3,7 +3,7 @@
 use super::exit::Exit;
 use super::job::{Batch, RenderJob, Shot};
 use super::message::{Messages, Severity};
-use super::meter::Metered;
+use super::meter::{self, Metered};
 use super::outputs;
 use super::picture::{self, Behind, Effective};
 use super::profile::Profile;
@@ -76,13 +76,14 @@ impl Stage<'_> {
         let (camera, _) = self.camera(task, shot, &effective)?;
         let view = View::from_camera(&camera);
         let Self { loaded, world, built, metered, profile, .. } = self;
-        let (accel, _) = &*built.get_or_insert_with(|| structure(task.job, world));
         task.progress.stage("metering");
-        surroundings::lit(&task.job.look, loaded, &camera, |loaded, _| {
-            let (scene, textures) = (&loaded.scene, textures(task.job, &loaded.scene));
-            let settings = &effective.settings;
-            let work = Job { scene, world, accel, textures: &textures, view: &view, settings };
-            metered.get_or_find(&shot.choice, &work);
+        metered.get_or_find(&shot.choice, || {
+            let (accel, _) = &*built.get_or_insert_with(|| structure(task.job, world));
+            surroundings::lit(&task.job.look, loaded, &camera, |loaded, _| {
+                let (scene, textures) = (&loaded.scene, textures(task.job, &loaded.scene));
+                let settings = &effective.settings;
+                meter::exposure(&Job { scene, world, accel, textures: &textures, view: &view, settings })
+            })
         });
         profile.done("meter");
         Ok(())
@@ -166,9 +167,10 @@ pub(super) fn render(task: &Task, shot: &Shot, stage: &mut Stage, so_far: &mut S
         let work = Job { scene, world, accel, textures: &textures, view: &view, settings: &effective.settings };
         if is_metered(&effective, shot, scene) {
             progress.stage("metering");
-            effective.output.exposure = metered.get_or_find(&shot.choice, &work);
+            effective.output.exposure = metered.get_or_find(&shot.choice, || meter::exposure(&work));
             profile.done("meter");
         }
+        times.meter = metered.take_seconds();
         effective.written_as(&job.look, shot.kind);
         let work = Job { settings: &effective.settings, scene, world, accel, textures: &textures, view: &view };
         let (effective, reason, phrase) = (&effective, *reason, phrase.as_str());

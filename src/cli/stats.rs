@@ -11,7 +11,7 @@
 //! | `sampling` | `aa` and its settings (then `samples`, that of uniform sampling, is `null`); eye `rays`, `mean` and `most` of a pixel; of stochastic sampling pixels that `met` `pixel_error`, those stopped at the `ceiling`, and the picture's estimated `rmse` in `error_space` |
 //! | `auto` | `null`, or why `--accel auto` took `accel`: `why` in words; `rays` and `prims` of the sample; cost of a ray through `fast-octree` and `fast-bvh`, in nodes of eight boxes |
 //! | `parameters` | of the structure, as used: `leaf_size` (`null`: by step cost); of grids and octrees `grid_density`, `grid_resolution`, `max_depth`, `step_cost`, `grid_cells` (`null`: by density), `max_references`, `assign`, `mailbox` as well |
-//! | `seconds` | of the timed run: `load`, `build`, `render`, `write`; `load` and `build` are 0 for further pictures of one scene |
+//! | `seconds` | of the timed run: `load`, `build`, `meter` (finding the exposure of lamps in lux and candela), `render`, `write`; `load` and `build` are 0 for further pictures of one scene, `meter` is 0 for further pictures of one view and where no lamps are metered |
 //! | `animation` | `null`, or which one is shown: its `number` in the file, and the `time` in seconds, its end at most |
 //! | `scene` | as shown: `triangles`, `polygons`, `spheres`, `cones` (cylinders too), `planes`, `materials`, `textures`, `lights`; as stored: `vertices`, `stored_triangles`, `bytes` of all shapes; `kept_instances`: those of meshes that are stored once |
 //! | `structure` | V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`; `bytes` and `depth` |
@@ -43,6 +43,8 @@ pub(super) struct Times {
     pub load: f64,
     /// The structure.
     pub build: f64,
+    /// The exposure of lamps; 0 when nothing was metered.
+    pub meter: f64,
     /// Rays.
     pub render: f64,
     /// Encoding and writing.
@@ -52,14 +54,23 @@ pub(super) struct Times {
 impl Times {
     /// One line for people.
     pub(super) fn line(&self, eye_rays: u64) -> String {
-        format!(
-            "load {}, build {}, render {}, write {}; {} eye rays",
-            seconds(self.load),
-            seconds(self.build),
-            seconds(self.render),
-            seconds(self.write),
-            short(eye_rays as f64)
-        )
+        format!("{}; {} eye rays", self.told().join(", "), short(eye_rays as f64))
+    }
+
+    /// The stages by name, each with its time; metering only where there was any.
+    fn told(&self) -> Vec<String> {
+        let is_told = |(name, time): &(&str, f64)| *name != "meter" || *time > 0.0;
+        let told = self.stages().into_iter().filter(is_told);
+        told.map(|(name, time)| format!("{name} {}", seconds(time))).collect()
+    }
+
+    fn stages(&self) -> [(&'static str, f64); 5] {
+        let Self { load, build, meter, render, write } = *self;
+        [("load", load), ("build", build), ("meter", meter), ("render", render), ("write", write)]
+    }
+
+    fn json(&self) -> Value {
+        Value::from_iter(self.stages())
     }
 }
 
@@ -158,6 +169,7 @@ fn parameters(kind: AccelKind, params: &AccelParams) -> Value {
 /// Everything about one picture.
 pub(super) struct PictureStats {
     json: Value,
+    times: Times,
     counted: Option<Counted>,
 }
 
@@ -191,7 +203,7 @@ impl PictureStats {
             "animation": summary::shown(&facts.loaded.facts).map(|(number, time)| json!({ "number": number, "time": time })),
             "parameters": parameters(facts.accel, &facts.job.params),
             "threads": rayon::current_num_threads(),
-            "seconds": { "load": times.load, "build": times.build, "render": times.render, "write": times.write },
+            "seconds": times.json(),
             "scene": {
                 "triangles": world.triangles(), "polygons": shapes.polygons.len(),
                 "spheres": shapes.spheres.len(), "cones": shapes.cones.len(), "planes": shapes.planes.len(),
@@ -210,7 +222,7 @@ impl PictureStats {
             "profile": profile.map(Profile::json),
             "rounding": facts.loaded.facts.max_rounding,
         });
-        Self { json, counted }
+        Self { json, times, counted }
     }
 
     fn text(&self) -> String {
@@ -226,8 +238,7 @@ impl PictureStats {
             get("accel").as_str().unwrap_or_default(),
             get("threads"),
         )];
-        let times = ["load", "build", "render", "write"].map(|k| format!("{k} {}", seconds(number("seconds", k))));
-        lines.push(format!("  time       {}", times.join("  ")));
+        lines.push(format!("  time       {}", self.times.told().join("  ")));
         let shapes = ["triangles", "polygons", "spheres", "cones", "planes"];
         let shapes = shapes.map(|k| (number("scene", k), k)).into_iter().filter(|(n, _)| *n > 0.0);
         let shapes: Vec<String> = shapes.map(|(n, k)| format!("{} {k}", short(n))).collect();
@@ -317,6 +328,15 @@ mod tests {
     fn times_have_units_that_fit() {
         assert_eq!([0.0012, 0.0994, 0.5, 12.34].map(seconds), ["1 ms", "99 ms", "0.50 s", "12.3 s"]);
         assert_eq!([12.0, 12_345.0, 3_145_728.0].map(short), ["12", "12.3 k", "3.15 M"]);
+    }
+
+    #[test]
+    fn metering_is_named_where_there_was_any() {
+        let times = Times { load: 0.01, build: 0.02, meter: 0.0, render: 0.5, write: 0.03 };
+        assert_eq!(times.line(9), "load 10 ms, build 20 ms, render 0.50 s, write 30 ms; 9 eye rays");
+        let metered = Times { meter: 0.004, ..times };
+        assert_eq!(metered.line(9), "load 10 ms, build 20 ms, meter 4 ms, render 0.50 s, write 30 ms; 9 eye rays");
+        assert_eq!((&times.json()["meter"], &metered.json()["meter"]), (&0.0.into(), &0.004.into()));
     }
 
     #[test]

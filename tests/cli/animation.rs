@@ -170,14 +170,18 @@ fn a_turntable_shows_a_model_from_all_around() {
     run.says(&["45.0° around", "animation 'Slide' at 0.500 s"]);
 }
 
-#[test]
-fn a_picture_is_exposed_as_its_sequence_begins_and_a_view_as_if_it_were_alone() {
-    // The lamp stands before the triangle, which slides away from it and is dark from behind.
+/// The sliding triangle, lit by a lamp that stands before it: it slides away from it and is dark from behind.
+fn with_lamp() -> Folder {
     let lamp = r#""nodes":[{"mesh":0},{"translation":[0,0,2],"extensions":{"KHR_lights_punctual":{"light":0}}}],
         "extensionsUsed":["KHR_lights_punctual"],
         "extensions":{"KHR_lights_punctual":{"lights":[{"type":"point","intensity":3000}]}}"#;
     let lit = sliding().replace(r#""nodes":[0]"#, r#""nodes":[0,1]"#).replace(r#""nodes":[{"mesh":0},{}]"#, lamp);
-    let folder = Folder::new().file("a.gltf", lit);
+    Folder::new().file("a.gltf", lit)
+}
+
+#[test]
+fn a_picture_is_exposed_as_its_sequence_begins_and_a_view_as_if_it_were_alone() {
+    let folder = with_lamp();
     let render = |words: &[&str]| folder.render(&[&["a.gltf", "--view", "front"], words].concat()).ends(0);
     for (all, one, same) in [
         (&["--turntable", "4"][..], &["--turntable", "2/4"][..], "2.png"),
@@ -190,4 +194,24 @@ fn a_picture_is_exposed_as_its_sequence_begins_and_a_view_as_if_it_were_alone() 
     folder.render(&["a.gltf", "--view", "front,back", "-o", "{view}.png"]).ends(0);
     folder.render(&["a.gltf", "--view", "back", "-o", "alone.png"]).ends(0);
     assert!(folder.read("back.png") == folder.read("alone.png"));
+}
+
+#[test]
+fn the_time_that_metering_takes_is_told_once() {
+    let folder = with_lamp();
+    let metered = |words: &[&str]| -> Vec<f64> {
+        let run =
+            folder.render(&[&["a.gltf", "--view", "front", "--stats", "json", "-o", "{frame}.png"], words].concat());
+        let run = run.ends(0).says(&[", meter "]);
+        let seconds = |line: &str| serde_json::from_str::<Value>(line).unwrap()["seconds"]["meter"].as_f64().unwrap();
+        run.text().lines().map(seconds).collect()
+    };
+    // The beginning of a sequence is metered although none of its pictures may be that.
+    for words in [&["--turntable", "2/4"][..], &["--frames", "0..4", "--fps", "4", "--frame", "3"], &[]] {
+        assert!(metered(words)[0] > 0.0, "{words:?}");
+    }
+    let sequence = metered(&["--frames", "0..2", "--fps", "4"]);
+    assert!(sequence[0] > 0.0 && sequence[1] == 0.0, "{sequence:?}");
+    let run = folder.render(&["a.gltf", "--exposure", "1", "--stats", "json"]).ends(0);
+    assert!(!run.stderr.contains("meter") && run.text().contains(r#""meter":0.0"#), "{} {}", run.stderr, run.text());
 }
