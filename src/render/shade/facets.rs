@@ -218,6 +218,7 @@ pub(super) fn rebound(mean: f32, f0: Vec3) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::simd::{Kernel, Level};
 
     #[test]
     fn the_mean_albedo_is_that_of_the_table() {
@@ -229,6 +230,43 @@ mod tests {
             };
             let mean = (0..4000).map(at).sum::<f64>() * 2.0 / 4000.0;
             assert!((mean - f64::from(known)).abs() < 1e-3, "{i}: {mean} for {known}");
+        }
+    }
+
+    struct AtEach<'a>(&'a AlbedoRow, &'a Eight);
+
+    impl Kernel for AtEach<'_> {
+        type Output = [Eight; 2];
+
+        #[inline(always)]
+        fn run<S: Simd>(self, s: S) -> [Eight; 2] {
+            self.0.at_each(s, self.1)
+        }
+    }
+
+    #[test]
+    fn every_instruction_set_finds_the_same_albedos_side_by_side_as_one_by_one() {
+        let eights = [
+            [0.0, 1e-40, 1e-30, 1e-3, 0.3, 0.7, 1.0f32.next_down(), 1.0],
+            std::array::from_fn(|k| (k as f32 / 8.0).powi(2)),
+            std::array::from_fn(|k| (k as f32 / 8.0).powi(2).next_down()),
+        ];
+        for roughness in [0.0, 0.05, 0.3, 0.5, 0.99, 1.0] {
+            let row = AlbedoRow::of(roughness);
+            for n_v in &eights {
+                let alone = n_v.map(|n_v| albedo(roughness, n_v));
+                for level in Level::all() {
+                    let [scale, bias] = level.run(AtEach(&row, n_v));
+                    let same = |i: usize| {
+                        (scale[i].to_bits(), bias[i].to_bits()) == (alone[i].0.to_bits(), alone[i].1.to_bits())
+                    };
+                    assert!(
+                        (0..LANES).all(same),
+                        "{} {roughness} {n_v:?}: {scale:?} {bias:?}, {alone:?}",
+                        level.name()
+                    );
+                }
+            }
         }
     }
 

@@ -390,10 +390,11 @@ mod tests {
     use crate::math::{DMat3, DVec3};
     use crate::render::draws::Spread;
     use crate::render::shade::{LocalLight, Matter};
+    use crate::render::sky::Sky;
     use crate::render::sobol::mix;
     use crate::render::texture::TextureStore;
     use crate::render::wave::{Media, Path, RayClass, Wave};
-    use crate::scene::{Falloff, Light, LightKind, Material, Scene};
+    use crate::scene::{Environment, Falloff, Light, LightKind, Material, Scene};
 
     /// Random triangles hit in their middles.
     fn filled(level: Level) -> Strip {
@@ -421,7 +422,7 @@ mod tests {
         Wave { after: vec![Hit::MISS; rays.len()], rays, paths, hits }
     }
 
-    fn found(level: Level, placement: Option<&Placement>, size: f64) -> Vec<[u32; 20]> {
+    fn found(level: Level, placement: Option<&Placement>, size: f64) -> Vec<[u32; 23]> {
         let mut strip = filled(level);
         strip.find(placement);
         let kind = LightKind::Point { position: DVec3::new(1.0, 3.0, 2.0), falloff: Falloff::None };
@@ -429,14 +430,17 @@ mod tests {
         let matter = Matter::without_maps(&Material::plain(), &TextureStore::new(&Scene::default()));
         strip.draw((0..61).map(|i| (i, Spread::Part { key: mix(7, i as u32), first: 3 * i as u32 }, 3)));
         let place = (size > 0.0).then_some(1);
+        let studio = Scene { environment: Environment::Studio, ..Scene::default() };
+        strip.look_around((&matter, false), &Sky::new(&studio), Vec3::ONE);
         strip.shine((&matter, false, false), &LocalLight::new(&light, DVec3::ZERO), place);
         let point = |i: usize| {
             let (f, l) = (&strip.found, &strip.lit);
-            let columns = [&f.position, &f.error, &f.view, &f.normal, &l.radiance, &l.origin];
+            let around = &strip.surroundings.radiance;
+            let columns = [&f.position, &f.error, &f.view, &f.normal, &l.radiance, &l.origin, around];
             let numbers = columns.map(|c| get(c, i).to_array().map(f32::to_bits));
-            let mut all = [f.certain[i]; 20];
-            all[..18].copy_from_slice(numbers.as_flattened());
-            all[18] = l.seen[i];
+            let mut all = [f.certain[i]; 23];
+            all[..21].copy_from_slice(numbers.as_flattened());
+            all[21] = l.seen[i];
             all
         };
         (0..strip.count).map(point).collect()
@@ -491,7 +495,8 @@ mod tests {
         for (placement, size) in [(None, 0.0), (Some(&turned), 0.0), (Some(&turned), 0.7)] {
             let plain = found(Level::PORTABLE, placement, size);
             let count = |k: usize| plain.iter().filter(|p| p[k] == 1).count();
-            assert!(count(18) > 0 && count(19) > 30, "{} lit, {} certain", count(18), count(19));
+            assert!(plain.iter().all(|p| p[18..21].iter().all(|&light| f32::from_bits(light) > 0.0)));
+            assert!(count(21) > 0 && count(22) > 30, "{} lit, {} certain", count(21), count(22));
             for level in Level::all() {
                 assert!(found(level, placement, size) == plain, "{}", level.name());
             }
