@@ -110,7 +110,7 @@ pub(super) fn bytes(effective: &Effective, kind: FileKind, behind: Behind) -> u6
     };
     let in_layers = |bytes: u64| if settings.layers { bytes } else { 0 };
     /// What comes through glass before a background, of which nothing is known yet.
-    const VEIL: u64 = 12;
+    const VEIL: u64 = 16;
     let known = 16 + VEIL + sampled + in_layers(48 + sampled);
     let stored = match kind {
         FileKind::Exr => {

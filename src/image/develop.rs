@@ -87,7 +87,7 @@ struct Row<'a, T, const CHANNELS: usize> {
     developer: &'a Developer<'a>,
     row: &'a [[f32; 4]],
     /// [`Picture::veil`], where there is glass before a background.
-    veil: Option<&'a [[f32; 3]]>,
+    veil: Option<&'a [[f32; 4]]>,
     out: &'a mut [T],
 }
 
@@ -105,7 +105,7 @@ impl<T: Sample, const CHANNELS: usize> Kernel for Row<'_, T, CHANNELS> {
         if let Some(veil) = self.veil {
             for ((out, pixels), veil) in blocks.zip(veil.chunks(TOGETHER)) {
                 let mut lanes = columns(s, pixels);
-                let veils: [Channel; 3] =
+                let veils: [Channel; 4] =
                     std::array::from_fn(|c| std::array::from_fn(|i| veil.get(i).map_or(0.0, |veil| veil[c])));
                 self.developer.develop_glass(&mut lanes, &veils);
                 put(out, &coded(&lanes));
@@ -165,7 +165,7 @@ impl<'a> Developer<'a> {
     }
 
     /// The same before a background that comes through glass, too.
-    pub(crate) fn coded_through_glass(&self, pixel: [f32; 4], veil: [f32; 3]) -> [f32; 4] {
+    pub(crate) fn coded_through_glass(&self, pixel: [f32; 4], veil: [f32; 4]) -> [f32; 4] {
         let mut lanes = pixel.map(|c| [c]);
         self.coded_glass(&mut lanes, &veil.map(|c| [c]));
         lanes.map(|[c]| c)
@@ -180,7 +180,7 @@ impl<'a> Developer<'a> {
 
     /// The same before a background that comes through glass, too ([`Picture::veil`]).
     #[inline(always)]
-    pub(crate) fn coded_glass<const N: usize>(&self, pixels: &mut [[f32; N]; 4], veil: &[[f32; N]; 3]) {
+    pub(crate) fn coded_glass<const N: usize>(&self, pixels: &mut [[f32; N]; 4], veil: &[[f32; N]; 4]) {
         self.develop_glass(pixels, veil);
         self.code(pixels);
     }
@@ -234,9 +234,9 @@ impl<'a> Developer<'a> {
 
     /// The same where glass stands before the background. What is seen of a surface that covers a part of a pixel is developed as
     /// if it covered all of it, and then taken as often; what glass shows by itself, a lamp in it, covers next to nothing and may
-    /// be brighter than that allows: it is developed as it is.
+    /// be brighter than that allows: as far as glass covers the pixel it is developed as it is.
     #[inline(always)]
-    fn develop_glass<const N: usize>(&self, pixels: &mut [[f32; N]; 4], veil: &[[f32; N]; 3]) {
+    fn develop_glass<const N: usize>(&self, pixels: &mut [[f32; N]; 4], veil: &[[f32; N]; 4]) {
         let mut shown = [[0.0; N]; 3];
         for (shown, channel) in shown.iter_mut().zip(&*pixels) {
             (0..N).for_each(|i| shown[i] = channel[i] * self.gain);
@@ -244,11 +244,12 @@ impl<'a> Developer<'a> {
         self.output.tone_map.map_lanes(&mut shown);
         let (covered, behind) = (pixels[3], self.output.background.unwrap_or_default());
         self.develop(pixels);
+        let [.., glass] = veil;
         for (c, ((channel, shown), veil)) in pixels.iter_mut().zip(&shown).zip(veil).enumerate() {
             for i in 0..N {
                 let part = covered[i].clamp(0.0, 1.0);
-                let alone = shown[i] + behind[c] * (1.0 - part);
-                channel[i] = if alone > channel[i] { alone } else { channel[i] } + veil[i];
+                let more = shown[i] + behind[c] * (1.0 - part) - channel[i];
+                channel[i] += if more > 0.0 { more * glass[i] } else { 0.0 } + veil[i];
             }
         }
     }
@@ -324,12 +325,22 @@ mod tests {
             // Glass of a red that lets 1, 0.2 and 0.2 through, and clear glass with a lamp in it.
             let light = 44.0 * libm::exp2f(-exposure);
             let beauty = vec![[0.0, 0.0, 0.0, 0.8], [light, light, light, 0.08]];
-            let veil = vec![[0.4, 0.0, 0.0], [0.0; 3]];
+            let veil = vec![[0.4, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]];
             let raster: Raster<u8> = raster(&Picture { width: 2, height: 1, beauty, layers: None, veil }, &output);
             let (glass, lamp) = raster.samples.split_at(3);
             assert_eq!(glass, [0.5, 0.1, 0.1].map(srgb::encode8), "{exposure}");
             assert!(lamp.iter().all(|&c| c > 250), "{lamp:?}");
         }
+    }
+
+    #[test]
+    fn edges_of_what_is_bright_and_solid_look_alike_with_glass_elsewhere() {
+        let output = Output { background: Some([0.1; 3]), ..Output::default() };
+        let beauty = vec![[2.5, 5.0, 10.0, 0.5], [1.0, 1.0, 1.0, 1.0], [0.3, 0.0, 0.0, 0.01]];
+        let of = |veil| -> Vec<u8> {
+            raster(&Picture { width: 3, height: 1, beauty: beauty.clone(), layers: None, veil }, &output).samples
+        };
+        assert_eq!(of(vec![[0.0; 4]; 3]), of(Vec::new()));
     }
 
     #[test]

@@ -50,7 +50,7 @@ mod tests {
             Picture::default(),
             Picture::of(2, 2, vec![[0.0; 4]; 3]),
             Picture { layers: Some(layers), ..Picture::of(2, 2, vec![[0.0; 4]; 4]) },
-            Picture { veil: vec![[0.0; 3]; 2], ..Picture::of(2, 2, vec![[0.0; 4]; 4]) },
+            Picture { veil: vec![[0.0; 4]; 2], ..Picture::of(2, 2, vec![[0.0; 4]; 4]) },
         ];
         for picture in &faulty {
             for kind in FileKind::ALL {

@@ -118,7 +118,7 @@ fn half(x: f32) -> f16 {
 }
 
 /// A premultiplied pixel over a background.
-fn over(pixel: [f32; 4], background: Option<[f32; 3]>, veil: Option<&[f32; 3]>) -> [f32; 4] {
+fn over(pixel: [f32; 4], background: Option<[f32; 3]>, veil: Option<&[f32; 4]>) -> [f32; 4] {
     let Some(behind) = background else { return pixel };
     let (through, veil) = (1.0 - pixel[3], veil.copied().unwrap_or_default());
     let [r, g, b] = [0, 1, 2].map(|c| pixel[c] + behind[c] * through + veil[c]);

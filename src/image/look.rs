@@ -54,7 +54,7 @@ pub fn developed(picture: &Picture, output: &Output) -> Picture {
     let developer = Developer::new(&output);
     let pixel = |(i, &p): (usize, &[f32; 4])| {
         let [r, g, b, a] = developer.pixel(p);
-        let [x, y, z] = picture.veil.get(i).copied().unwrap_or_default();
+        let [x, y, z, _] = picture.veil.get(i).copied().unwrap_or_default();
         [r * a + x, g * a + y, b * a + z, a]
     };
     Picture::of(picture.width, picture.height, picture.beauty.iter().enumerate().map(pixel).collect())

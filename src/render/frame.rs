@@ -125,6 +125,8 @@ impl Kernel for Keys<'_> {
 pub(super) struct Sum {
     pub radiance: Vec3,
     pub through: Vec3,
+    /// Samples through which nothing of the background shows.
+    pub solid: f32,
     pub weight: f32,
 }
 
@@ -132,12 +134,13 @@ impl Sum {
     /// A single sample.
     #[cfg(test)]
     pub(super) fn of(sample: &Sample) -> Self {
-        Self { radiance: sample.radiance, through: sample.through, weight: 1.0 }
+        Self { radiance: sample.radiance, through: sample.through, solid: solid(sample), weight: 1.0 }
     }
 
     pub(super) fn add(&mut self, sample: &Sample) {
         self.radiance += sample.radiance;
         self.through += sample.through;
+        self.solid += solid(sample);
         self.weight += 1.0;
     }
 
@@ -147,6 +150,7 @@ impl Sum {
         Self {
             radiance: self.radiance + other.radiance * times,
             through: self.through + other.through * times,
+            solid: self.solid + other.solid * times,
             weight: self.weight + other.weight * times,
         }
     }
@@ -157,7 +161,7 @@ impl Sum {
     /// is one alpha, so before a known background colour the least channel is left to it and what the others show more is the
     /// veil, and without one it stands for their mean.
     #[inline(always)]
-    pub(super) fn resolve(&self, background: Option<Vec3>) -> ([f32; 4], Vec3) {
+    pub(super) fn resolve(&self, background: Option<Vec3>) -> ([f32; 4], [f32; 4]) {
         let share = 1.0 / self.weight.max(f32::MIN_POSITIVE);
         let color = self.radiance * share;
         let through = (self.through * share).clamp(Vec3::ZERO, Vec3::ONE);
@@ -171,8 +175,16 @@ impl Sum {
         };
         // A sum of finite parts can still overflow.
         let color = if color.is_finite() { color } else { color.min(Vec3::splat(f32::MAX)).max(Vec3::ZERO) };
-        (color.extend(1.0 - clear).to_array(), veil)
+        let covered = 1.0 - clear;
+        let glass = if covered > 0.0 { (1.0 - self.solid * share / covered).clamp(0.0, 1.0) } else { 1.0 };
+        (color.extend(covered).to_array(), veil.extend(glass).to_array())
     }
+}
+
+/// 1 where nothing of the background shows through a sample.
+#[inline(always)]
+fn solid(sample: &Sample) -> f32 {
+    if sample.through == Vec3::ZERO { 1.0 } else { 0.0 }
 }
 
 /// Adds pixels to `to`, each from as many samples: all of its own.
@@ -181,11 +193,11 @@ pub(super) fn resolve_each(samples: &[Sample], per_pixel: usize, background: Opt
 }
 
 /// The veils of the same pixels.
-pub(super) fn veil_each(samples: &[Sample], per_pixel: usize, background: Option<Vec3>, to: &mut Vec<[f32; 3]>) {
+pub(super) fn veil_each(samples: &[Sample], per_pixel: usize, background: Option<Vec3>, to: &mut Vec<[f32; 4]>) {
     for samples in samples.chunks(per_pixel.max(1)) {
         let mut sum = Sum::default();
         samples.iter().for_each(|sample| sum.add(sample));
-        to.push(sum.resolve(background).1.to_array());
+        to.push(sum.resolve(background).1);
     }
 }
 
@@ -223,7 +235,8 @@ impl Kernel for Resolve<'_> {
                 sum = s.add(sum, s.load(&row));
             }
             let [r, g, b, x, y, z, ..] = s.store(sum);
-            let sum = Sum { radiance: Vec3::new(r, g, b), through: Vec3::new(x, y, z), weight };
+            // The veil is not asked for here.
+            let sum = Sum { radiance: Vec3::new(r, g, b), through: Vec3::new(x, y, z), solid: 0.0, weight };
             to.push(sum.resolve(background).0);
             first = end;
         }

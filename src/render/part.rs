@@ -155,7 +155,7 @@ impl Measure {
                 (Some(developer), None) => developer.coded(pixel),
                 (Some(developer), Some(&veil)) => developer.coded_through_glass(pixel, veil),
                 (None, _) if self.background.is_some() => {
-                    let [x, y, z] = veil.copied().unwrap_or_default();
+                    let [x, y, z, _] = veil.copied().unwrap_or_default();
                     let veil = [x, y, z, 0.0];
                     [0, 1, 2, 3].map(|c: usize| pixel[c] + behind[c] * (1.0 - pixel[3]) + veil[c])
                 }
@@ -175,7 +175,7 @@ impl Measure {
 #[derive(Clone, Copy)]
 pub(super) struct Shown<'a> {
     pub beauty: &'a [[f32; 4]],
-    pub veil: &'a [[f32; 3]],
+    pub veil: &'a [[f32; 4]],
 }
 
 impl<'a> From<&'a Picture> for Shown<'a> {
@@ -209,7 +209,8 @@ mod tests {
     #[test]
     fn what_comes_through_glass_is_a_part_of_what_differs() {
         let background = Vec3::splat(0.5);
-        let (beauty, veils) = (vec![[0.0, 0.0, 0.0, 0.75]; 4], [vec![[0.25, 0.0, 0.0]; 4], vec![[0.0; 3]; 4]]);
+        let (beauty, veils) =
+            (vec![[0.0, 0.0, 0.0, 0.75]; 4], [[0.25, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]].map(|veil| vec![veil; 4]));
         for space in [ErrorSpace::Display { tone_map: ToneMap::default(), exposure: 0.0 }, ErrorSpace::Linear] {
             let output = output(space, Some(background));
             let measure = Measure { output, background: Some(background), channels: 3 };

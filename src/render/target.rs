@@ -235,7 +235,7 @@ fn mix_pictures(whole: &mut Picture, other: &Picture, part: f32) {
         (0..4).for_each(|c| pixel[c] = pixel[c] * (1.0 - part) + more[c] * part);
     }
     for (veil, more) in whole.veil.iter_mut().zip(&other.veil) {
-        (0..3).for_each(|c| veil[c] = veil[c] * (1.0 - part) + more[c] * part);
+        (0..4).for_each(|c| veil[c] = veil[c] * (1.0 - part) + more[c] * part);
     }
 }
 

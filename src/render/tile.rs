@@ -44,7 +44,7 @@ pub(super) struct TilePixels {
     pub tile: Tile,
     pub beauty: Vec<[f32; 4]>,
     /// Where the frame has any.
-    pub veil: Vec<[f32; 3]>,
+    pub veil: Vec<[f32; 4]>,
     pub layers: Vec<LayerPixel>,
     /// Empty where every pixel has equally many samples.
     pub facts: Vec<PixelFacts>,
@@ -153,7 +153,7 @@ impl Whole {
         if matches!(settings.sampling, Sampling::Stochastic(_)) {
             sampled.errors = vec![0.0; pixels];
         }
-        let veil = vec![[0.0; 3]; if has_veil { pixels } else { 0 }];
+        let veil = vec![[0.0; 4]; if has_veil { pixels } else { 0 }];
         Self { picture: Picture { veil, ..empty_picture(settings) }, sampled }
     }
 

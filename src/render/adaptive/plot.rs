@@ -297,7 +297,7 @@ impl Plot {
             let (pixel, veil) = self.sum(i).resolve(frame.background);
             done.beauty.push(pixel);
             if frame.has_veil {
-                done.veil.push(veil.to_array());
+                done.veil.push(veil);
             }
             points.clear();
             self.points(i, &mut points);

@@ -24,7 +24,7 @@ pub(in crate::render) struct Pixels {
     /// As [`Picture::beauty`](crate::image::Picture::beauty).
     pub beauty: Vec<[f32; 4]>,
     /// As [`Picture::veil`](crate::image::Picture::veil); empty where there is none.
-    pub veil: Vec<[f32; 3]>,
+    pub veil: Vec<[f32; 4]>,
 }
 
 /// One group of samples of every pixel.
@@ -32,16 +32,21 @@ pub(in crate::render) struct Pixels {
 struct Sums {
     radiance: [Row; 3],
     through: [Row; 3],
+    solid: Row,
     weight: Row,
 }
 
 impl Sums {
-    const EMPTY: Self = Self { radiance: [[0.0; PIXELS]; 3], through: [[0.0; PIXELS]; 3], weight: [0.0; PIXELS] };
+    const EMPTY: Self = {
+        let (row, three) = ([0.0; PIXELS], [[0.0; PIXELS]; 3]);
+        Self { radiance: three, through: three, solid: row, weight: row }
+    };
 
     #[inline(always)]
     fn at(&self, i: usize) -> Sum {
         let three = |rows: &[Row; 3]| Vec3::new(rows[0][i], rows[1][i], rows[2][i]);
-        Sum { radiance: three(&self.radiance), through: three(&self.through), weight: self.weight[i] }
+        let (radiance, through) = (three(&self.radiance), three(&self.through));
+        Sum { radiance, through, solid: self.solid[i], weight: self.weight[i] }
     }
 
     /// Takes a sample for every pixel; the last of them for those that are not there.
@@ -57,15 +62,19 @@ impl Sums {
                 row.as_chunks_mut().0[k] = s.store(*lanes);
             }
         }
+        let [x, y, z] = &self.through;
+        for i in 0..PIXELS {
+            self.solid[i] = if (x[i] == 0.0) & (y[i] == 0.0) & (z[i] == 0.0) { 1.0 } else { 0.0 };
+        }
         self.weight = [1.0; PIXELS];
     }
 
     #[inline(always)]
     fn set(&mut self, i: usize, sum: Sum) {
-        let Sum { radiance: r, through: t, weight } = sum;
+        let Sum { radiance: r, through: t, solid, weight } = sum;
         (self.radiance[0][i], self.radiance[1][i], self.radiance[2][i]) = (r.x, r.y, r.z);
         (self.through[0][i], self.through[1][i], self.through[2][i]) = (t.x, t.y, t.z);
-        self.weight[i] = weight;
+        (self.solid[i], self.weight[i]) = (solid, weight);
     }
 }
 
@@ -262,8 +271,8 @@ impl Kernel for Singles<'_, '_> {
                 pixels.beauty.extend_from_slice(&eight[..there]);
             }
             if let (Some(behind), true) = (judge.background, judge.has_veil) {
-                let [r, g, b] = veils(&sums, behind);
-                pixels.veil.extend((0..some.len()).map(|i| [r[i], g[i], b[i]]));
+                let [r, g, b, glass] = veils(&sums, behind);
+                pixels.veil.extend((0..some.len()).map(|i| [r[i], g[i], b[i], glass[i]]));
             }
         }
     }
@@ -330,7 +339,7 @@ impl Certainty<'_> {
 
     /// Writes the numbers where glass stands before a background.
     #[inline(always)]
-    fn write_glass(&self, veils: &[Row; 3], behind: Vec3, rows: &mut Rows) {
+    fn write_glass(&self, veils: &[Row; 4], behind: Vec3, rows: &mut Rows) {
         if let Some(developer) = &self.developer {
             return developer.coded_glass(rows, veils);
         }
@@ -397,13 +406,13 @@ fn resolve(sums: &Sums, background: Option<Vec3>, rows: &mut Rows) {
     }
 }
 
-/// What comes through glass of the background.
+/// What comes through glass of the background, and how much of what covers the pixels is glass.
 #[inline(always)]
-fn veils(sums: &Sums, background: Vec3) -> [Row; 3] {
-    let mut rows = [[0.0; PIXELS]; 3];
-    let [red, green, blue] = &mut rows;
+fn veils(sums: &Sums, background: Vec3) -> [Row; 4] {
+    let mut rows = [[0.0; PIXELS]; 4];
+    let [red, green, blue, glass] = &mut rows;
     for i in 0..PIXELS {
-        [red[i], green[i], blue[i]] = sums.at(i).resolve(Some(background)).1.to_array();
+        [red[i], green[i], blue[i], glass[i]] = sums.at(i).resolve(Some(background)).1;
     }
     rows
 }

@@ -213,7 +213,7 @@ mod tests {
     }
 
     fn grey(light: f32, samples: f32) -> Sum {
-        Sum { radiance: Vec3::splat(light * samples), through: Vec3::ZERO, weight: samples }
+        Sum { radiance: Vec3::splat(light * samples), through: Vec3::ZERO, solid: samples, weight: samples }
     }
 
     #[test]

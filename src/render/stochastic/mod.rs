@@ -153,7 +153,7 @@ impl<'a> Sampler<'a> {
         let (pixels, layers) = (tile.pixels(), if frame.settings.layers { tile.pixels() } else { 0 });
         TilePixels {
             beauty: vec![[0.0; 4]; pixels],
-            veil: vec![[0.0; 3]; if frame.has_veil { pixels } else { 0 }],
+            veil: vec![[0.0; 4]; if frame.has_veil { pixels } else { 0 }],
             facts: vec![PixelFacts { count: 0, spare: 0, error: 0.0, end: End::Ceiling }; pixels],
             layers: vec![LayerPixel::new(&[], frame.view.eye, frame.view.forward); layers],
             ..TilePixels::empty(tile)
@@ -218,7 +218,7 @@ impl<'a> Sampler<'a> {
             let i = tile.number(pixel.at);
             let (color, veil) = pixel.sum().resolve(frame.background);
             (done.beauty[i], done.facts[i]) = (color, pixel.facts);
-            done.veil.get_mut(i).into_iter().for_each(|to| *to = veil.to_array());
+            done.veil.get_mut(i).into_iter().for_each(|to| *to = veil);
             if let Some(layers) = &pixel.layers {
                 done.layers[i] = layers.pixel(frame.view.eye, frame.view.forward);
             }

@@ -122,7 +122,7 @@ fn colored_glass_leaves_the_rest_of_a_background_to_a_veil_however_pixels_are_sa
         let picture = s.render().picture;
         assert!(picture.beauty.iter().all(|&pixel| pixel == [0.0, 0.0, 0.0, 0.75]), "{:?}", s.settings.sampling);
         assert_eq!(picture.veil.len(), 200);
-        assert!(picture.veil.iter().all(|&veil| veil == [0.375, 0.0, 0.125]), "{:?}", s.settings.sampling);
+        assert!(picture.veil.iter().all(|&veil| veil == [0.375, 0.0, 0.125, 1.0]), "{:?}", s.settings.sampling);
         s.scene.background = None;
         assert!(s.render().picture.veil.is_empty());
     }
