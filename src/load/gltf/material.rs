@@ -14,27 +14,29 @@ use serde_json::Value;
 /// A closed volume that bends light and may absorb it.
 const VOLUME: &str = "KHR_materials_volume";
 
+/// Another way to describe a surface, beside which metallic-roughness is what programs draw that do not know it.
+const SPECULAR_GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
+
 /// Converts a material; its maps are noted in `textures`.
 pub(super) fn convert(i: usize, source: &json::Material, textures: &mut Textures, report: &mut Report) -> Material {
-    let pbr = &source.pbr_metallic_roughness;
-    let [r, g, b, a] = pbr.base_color_factor.0.map(|c| within(c, 0.0, 1.0, 1.0));
+    let is_unlit = source.extensions.as_ref().is_some_and(|e| e.unlit.is_some());
+    let extension = if is_unlit { None } else { specular_glossiness(i, source, report) };
     let mut material = Material {
         name: source.name.clone().unwrap_or_default(),
-        base_color: Vec3::new(r, g, b),
-        opacity: a,
-        base_color_map: textures.info(pbr.base_color_texture.as_ref()),
         alpha_mode: alpha_mode(source),
         double_sided: source.double_sided,
         ..Material::default()
     };
-    let extensions = source.extensions.as_ref();
-    if extensions.is_some_and(|e| e.unlit.is_some()) {
+    if extension.is_none() {
+        base(source, &mut material, textures);
+    }
+    if is_unlit {
         material.surface = Surface::Unlit;
         return material;
     }
     lit(source, &mut material, textures);
-    material.surface = Surface::MetalRough(match specular_glossiness(source) {
-        Some(extension) => from_specular_glossiness(i, extension, &mut material, textures, report),
+    material.surface = Surface::MetalRough(match extension {
+        Some(extension) => from_specular_glossiness(extension, &mut material, textures),
         None => metal_rough(source, textures),
     });
     material
@@ -66,6 +68,14 @@ fn alpha_mode(source: &json::Material) -> AlphaMode {
         Checked::Valid(source::AlphaMode::Blend) => AlphaMode::Blend,
         Checked::Valid(source::AlphaMode::Opaque) | Checked::Invalid => AlphaMode::Opaque,
     }
+}
+
+/// Colour and opacity.
+fn base(source: &json::Material, material: &mut Material, textures: &mut Textures) {
+    let pbr = &source.pbr_metallic_roughness;
+    let [r, g, b, a] = pbr.base_color_factor.0.map(|c| within(c, 0.0, 1.0, 1.0));
+    (material.base_color, material.opacity) = (Vec3::new(r, g, b), a);
+    material.base_color_map = textures.info(pbr.base_color_texture.as_ref());
 }
 
 /// Emission, normal and occlusion.
@@ -226,26 +236,37 @@ fn info_of(extension: Option<&Value>, name: &str) -> Option<json::texture::Info>
     serde_json::from_value(extension?.get(name)?.clone()).ok()
 }
 
-/// The extension's object, when the material says nothing in metallic-roughness terms.
-fn specular_glossiness(source: &json::Material) -> Option<&Value> {
+/// The extension's object, where it is what is drawn: whatever else the material says is a fallback.
+///
+/// Gloss maps are not read, and the number that stands in for one is mostly 1, a mirror: where the material has a
+/// fallback, that is nearer to what is meant.
+fn specular_glossiness<'a>(i: usize, source: &'a json::Material, report: &mut Report) -> Option<&'a Value> {
+    let extension = source.extensions.as_ref()?.others.get(SPECULAR_GLOSSINESS)?;
+    if extension.get("specularGlossinessTexture").is_none() {
+        return Some(extension);
+    }
+    let has_fallback = says_metal_rough(source);
+    let text = if has_fallback {
+        "the gloss in the alpha of specularGlossinessTexture is not read; pbrMetallicRoughness is drawn instead"
+    } else {
+        "the gloss in the alpha of specularGlossinessTexture is drawn as constant"
+    };
+    report.warn(Code::IncompleteExtensionSupport, format!("materials[{i}].extensions.{SPECULAR_GLOSSINESS}"), text);
+    (!has_fallback).then_some(extension)
+}
+
+/// Whether a material says anything in metallic-roughness terms.
+fn says_metal_rough(source: &json::Material) -> bool {
     let pbr = &source.pbr_metallic_roughness;
-    let silent = pbr.base_color_texture.is_none()
-        && pbr.metallic_roughness_texture.is_none()
-        && pbr.base_color_factor.0 == [1.0; 4]
-        && (pbr.metallic_factor.0, pbr.roughness_factor.0) == (1.0, 1.0);
-    let value = source.extensions.as_ref()?.others.get("KHR_materials_pbrSpecularGlossiness")?;
-    silent.then_some(value)
+    pbr.base_color_texture.is_some()
+        || pbr.metallic_roughness_texture.is_some()
+        || pbr.base_color_factor.0 != [1.0; 4]
+        || (pbr.metallic_factor.0, pbr.roughness_factor.0) != (1.0, 1.0)
 }
 
 /// KHR_materials_pbrSpecularGlossiness as a dielectric whose reflection has the given colour at normal incidence, the
 /// way KHR_materials_ior describes for its special index 0. Gloss maps are read as constant.
-fn from_specular_glossiness(
-    i: usize,
-    extension: &Value,
-    material: &mut Material,
-    textures: &mut Textures,
-    report: &mut Report,
-) -> MetalRough {
+fn from_specular_glossiness(extension: &Value, material: &mut Material, textures: &mut Textures) -> MetalRough {
     let number = |name: &str, k: Option<usize>| {
         let value = extension.get(name)?;
         let value = k.map_or(Some(value), |k| value.get(k))?.as_f64()?;
@@ -257,11 +278,6 @@ fn from_specular_glossiness(
     material.opacity = number("diffuseFactor", Some(3)).unwrap_or(1.0);
     material.base_color_map = map("diffuseTexture");
     let specular_color_map = map("specularGlossinessTexture");
-    if specular_color_map.is_some() {
-        let text = "the gloss in the alpha of specularGlossinessTexture is drawn as constant";
-        let place = format!("materials[{i}].extensions.KHR_materials_pbrSpecularGlossiness");
-        report.warn(Code::IncompleteExtensionSupport, place, text);
-    }
     MetalRough {
         metallic: 0.0,
         roughness: 1.0 - number("glossinessFactor", None).unwrap_or(1.0),

@@ -125,6 +125,45 @@ fn unlit_and_specular_glossiness_materials_keep_their_look() {
     assert_eq!(scene.materials[1].base_color, Vec3::splat(0.5));
 }
 
+/// A triangle whose material has both descriptions; its pictures are not there.
+fn both_descriptions(specular_glossiness: Value) -> Loaded {
+    let mut file = Builder::new();
+    let (positions, uvs) = (file.triangle(), file.floats("VEC2", &[0.; 6]));
+    file.primitive(json!({"attributes": {"POSITION": positions, "TEXCOORD_0": uvs}, "material": 0}));
+    file.set("extensionsUsed", json!(["KHR_materials_pbrSpecularGlossiness"]));
+    file.set("images", json!([{"uri": "none.png"}, {"uri": "gloss.png"}]));
+    file.set("textures", json!([{"source": 0}, {"source": 1}]));
+    file.set(
+        "materials",
+        json!([{
+            "pbrMetallicRoughness": {
+                "baseColorFactor": [0, 0, 1, 1], "baseColorTexture": {"index": 0}, "metallicFactor": 0},
+            "extensions": {"KHR_materials_pbrSpecularGlossiness": specular_glossiness},
+        }]),
+    );
+    file.load()
+}
+
+#[test]
+fn specular_glossiness_goes_before_its_fallback_of_which_nothing_is_read() {
+    let loaded = both_descriptions(json!({"diffuseFactor": [1, 0, 0, 0.5], "glossinessFactor": 0.75}));
+    let material = &loaded.scene.materials[0];
+    assert_eq!((material.base_color, material.opacity), (Vec3::X, 0.5));
+    let surface = material.metal_rough().unwrap();
+    assert_eq!((surface.roughness, surface.ior), (0.25, 0.0));
+    assert!(codes(&loaded).is_empty(), "{:?}", loaded.warnings);
+}
+
+#[test]
+fn the_fallback_is_drawn_and_told_where_gloss_is_in_a_map() {
+    let loaded = both_descriptions(json!({"specularGlossinessTexture": {"index": 1}}));
+    let material = &loaded.scene.materials[0];
+    assert_eq!((material.base_color, material.metal_rough().unwrap().roughness), (Vec3::Z, 1.0));
+    let told: Vec<String> = loaded.warnings.iter().map(ToString::to_string).collect();
+    assert!(told.iter().any(|text| text.contains("pbrMetallicRoughness is drawn instead")), "{told:?}");
+    assert!(!told.iter().any(|text| text.contains("gloss.png")), "{told:?}");
+}
+
 #[test]
 fn a_missing_or_broken_image_costs_its_map_and_a_warning() {
     for uri in ["none.png", "data:image/png;base64,AAAA"] {
