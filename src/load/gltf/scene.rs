@@ -9,7 +9,7 @@ use super::report::Report;
 use super::schema::whole;
 use crate::load::Diagnostic;
 use crate::load::limits::{Budget, OverBudget};
-use crate::math::{DAffine3, DQuat, DVec3};
+use crate::math::{DAffine3, DMat3, DQuat, DVec3};
 use crate::scene::{Camera, Instance, Light};
 use gltf::json::{Index, Root, accessor::Accessor, mesh::Mesh, scene::Node};
 use serde_json::{Map, Value};
@@ -113,22 +113,17 @@ impl Walk<'_, '_> {
     /// Places the mesh of a node, or its copies.
     fn mesh(&mut self, i: usize, node: &Node, world: DAffine3) -> Result<(), OverBudget> {
         let Some(mesh) = node.mesh.and_then(|mesh| self.reader.root.meshes.get(mesh.value())) else { return Ok(()) };
+        let mut places = self.copies(i, node)?;
+        places.iter_mut().for_each(|place| *place = world * *place);
+        places.retain(|place| node.skin.is_some() || !is_scaled_away(place));
+        if places.is_empty() {
+            return Ok(());
+        }
         let Some(variant) = self.variant(i, node, mesh) else { return Ok(()) };
-        let copies = match instancing(node) {
-            None => Ok(vec![DAffine3::IDENTITY]),
-            Some(attributes) => {
-                let copies = Copies::of(attributes);
-                self.budget.take(copies.bytes(self.reader), 1)?;
-                self.compare(i, &copies);
-                copies.read(self.reader)
-            }
-        };
-        let copies = copies.unwrap_or_else(|why| self.without_copies(i, why));
         let name = node.name.as_ref().map_or(0, String::len);
         let instances = mesh.primitives.len().saturating_mul(size_of::<Instance>() + name);
-        self.budget.take(copies.len() as u64, (size_of::<Draw>().saturating_add(instances)) as u64)?;
-        for local in copies {
-            let world = world * local;
+        self.budget.take(places.len() as u64, (size_of::<Draw>().saturating_add(instances)) as u64)?;
+        for world in places {
             if world.is_finite() {
                 self.placed.draws.push(Draw { node: i, variant, world });
             } else {
@@ -137,6 +132,15 @@ impl Walk<'_, '_> {
             }
         }
         Ok(())
+    }
+
+    /// Where a node shows its mesh, in the space of the node.
+    fn copies(&mut self, i: usize, node: &Node) -> Result<Vec<DAffine3>, OverBudget> {
+        let Some(attributes) = instancing(node) else { return Ok(vec![DAffine3::IDENTITY]) };
+        let copies = Copies::of(attributes);
+        self.budget.take(copies.bytes(self.reader), 1)?;
+        self.compare(i, &copies);
+        Ok(copies.read(self.reader).unwrap_or_else(|why| self.without_copies(i, why)))
     }
 
     /// Warns of attributes that do not all hold as many copies.
@@ -193,6 +197,13 @@ fn unused(root: &Root, placed: &mut Placed) {
 fn is_visible(node: &Node) -> bool {
     let extension = node.extensions.as_ref().and_then(|e| e.others.get("KHR_node_visibility"));
     extension.and_then(|e| e.get("visible")).and_then(Value::as_bool).unwrap_or(true)
+}
+
+/// Whether the scale is zero on all axes, by which glTF 2.0 (§3.5.3) lets animations hide meshes.
+///
+/// It does not hide what a skin places.
+fn is_scaled_away(world: &DAffine3) -> bool {
+    world.matrix3 == DMat3::ZERO
 }
 
 /// EXT_mesh_gpu_instancing: the attributes of copies.

@@ -620,6 +620,35 @@ fn instances_of_the_gpu_and_hidden_nodes_are_understood() {
 }
 
 #[test]
+fn nodes_and_copies_scaled_to_nothing_are_hidden_as_invisible_ones_are() {
+    let mut file = Builder::new();
+    let positions = file.triangle();
+    let sizes = file.floats("VEC3", &[0., 0., 0., 1., 0., 0.]);
+    file.primitive(json!({"attributes": {"POSITION": positions}, "material": 0}));
+    file.set("materials", json!([{"name": "hidden"}]));
+    file.set("extensionsUsed", json!(["EXT_mesh_gpu_instancing", "KHR_node_visibility"]));
+    let scaled = json!({"children": [1], "scale": [0, 0, -0.0], "translation": [1e6, 0, 0]});
+    let child = json!({"mesh": 0, "translation": [0, 5, 0]});
+    let copies = json!({"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {"attributes": {"SCALE": sizes}}}});
+    file.set("nodes", json!([scaled, child, copies]));
+    file.set("scenes", json!([{"nodes": [0, 2]}]));
+    let loaded = file.load();
+    let places: Vec<_> = loaded.scene.instances.iter().map(|i| i.world_from_object.matrix3.x_axis).collect();
+    assert_eq!((places, loaded.facts.faces), (vec![DVec3::X], 1), "a flat one is there");
+
+    let mut hidden = |nodes: Value| {
+        file.set("nodes", nodes).set("scenes", json!([{"nodes": [0]}]));
+        let Loaded { scene, facts, warnings } = file.load();
+        let counts = [scene.meshes.len(), scene.instances.len(), scene.materials.len()];
+        (counts, facts.faces, warnings.iter().map(ToString::to_string).collect::<Vec<_>>())
+    };
+    let invisible = json!({"children": [1], "extensions": {"KHR_node_visibility": {"visible": false}}});
+    let nothing = hidden(json!([scaled, child]));
+    assert_eq!(nothing, hidden(json!([invisible, child])));
+    assert_eq!((nothing.0, nothing.1), ([0; 3], 0));
+}
+
+#[test]
 fn copies_without_one_of_their_attributes_are_left_out_with_a_warning() {
     let mut file = Builder::new();
     let positions = file.triangle();
