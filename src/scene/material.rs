@@ -354,11 +354,36 @@ impl Material {
 
     /// Whether a hit always stops light and sight: what `accel` calls *opaque*.
     pub fn is_opaque(&self) -> bool {
-        let passes_light = match &self.surface {
-            Surface::MetalRough(m) => m.transmission > 0.0,
-            Surface::Phong(p) => p.transmission.max_element() > 0.0,
-            Surface::Unlit => false,
-        };
-        self.alpha_mode == AlphaMode::Opaque && !passes_light
+        self.alpha_mode == AlphaMode::Opaque && !self.surface.transmits()
+    }
+}
+
+impl Surface {
+    /// Whether light passes it as it passes glass.
+    pub fn transmits(&self) -> bool {
+        match self {
+            Self::MetalRough(m) => m.transmission > 0.0,
+            Self::Phong(p) => p.transmission.max_element() > 0.0,
+            Self::Unlit => false,
+        }
+    }
+
+    /// The same without glass: nothing passes it, and it has no inside.
+    #[must_use]
+    pub fn without_transmission(self) -> Self {
+        match self {
+            Self::MetalRough(m) => Self::MetalRough(MetalRough {
+                transmission: 0.0,
+                transmission_map: None,
+                thick: false,
+                absorption: Vec3::ZERO,
+                thickness: 0.0,
+                thickness_map: None,
+                dispersion: 0.0,
+                ..m
+            }),
+            Self::Phong(p) => Self::Phong(Phong { transmission: Vec3::ZERO, dispersion: 0.0, ..p }),
+            Self::Unlit => Self::Unlit,
+        }
     }
 }

@@ -99,7 +99,8 @@ pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Resu
     Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
 }
 
-/// Puts points and lines into the scene, moved to where the file has them; a warning when some have no place.
+/// Puts points and lines into the scene, moved to where the file has them; warnings of those that are not drawn as
+/// they are.
 fn draw(
     wires: &[Wires],
     center: DVec3,
@@ -108,7 +109,7 @@ fn draw(
     facts: &mut Facts,
     file: &Path,
     width: Option<f64>,
-) -> Result<Option<Diagnostic>, Diagnostic> {
+) -> Result<Vec<Diagnostic>, Diagnostic> {
     let world_from_object = DAffine3::from_translation(center);
     let place = |(mesh, of): (u32, &Wires)| Instance { name: of.mesh.name.clone(), mesh, world_from_object };
     let places: Vec<Instance> = (0..).zip(wires).map(place).collect();

@@ -8,8 +8,9 @@
 //!
 //! Where vertices have no normals nothing says how light meets a line: such ones are drawn without light, in their base
 //! colour plus emission, as the glTF 2.0 specification recommends (§3.9.6). Where they have, they are lit by these: points
-//! are squares then, lines low roofs, whose faces look where the normals do. Whatever their places do (scale, shear,
-//! mirror), widths are those of the world: solids are made there, once for all places that differ by a shift alone.
+//! are squares then, lines low roofs, whose faces look where the normals do. They are never of glass: they have no inside,
+//! and light that goes through thousands of them has no end. Whatever their places do (scale, shear, mirror), widths are
+//! those of the world: solids are made there, once for all places that differ by a shift alone.
 
 mod bake;
 mod solid;
@@ -101,7 +102,8 @@ impl Widths {
 /// Puts points and lines into the scene as solids; `places` are instances whose `mesh` counts `wires`.
 ///
 /// Meshes are in place before: the width goes by the box around all of it. Points and lines with an end that is not finite
-/// are left out, counted in `facts`, and told in the warning that is returned. `width` is what the user asked for.
+/// are left out and counted in `facts`; a warning is returned of them, and one of glass. `width` is what the user asked
+/// for.
 ///
 /// # Errors
 /// When the solids would take more than is left of `budget`.
@@ -113,12 +115,12 @@ pub(super) fn draw(
     facts: &mut Facts,
     file: &Path,
     width: Option<f64>,
-) -> Result<Option<Diagnostic>, OverBudget> {
+) -> Result<Vec<Diagnostic>, OverBudget> {
     let counts: Vec<[u64; 2]> = wires.iter().map(Wires::count).collect();
     let placed = places.iter().filter_map(|place| counts.get(place.mesh as usize));
     let count = placed.fold([0, 0], |[p, l], [q, m]| [p + q, l + m]);
     let widths = Widths::new(count, diagonal(wires, places, scene), width);
-    let mut drawing = Drawing { scene, budget, widths, materials: HashMap::new(), dropped: 0 };
+    let mut drawing = Drawing { scene, budget, widths, materials: HashMap::new(), dropped: 0, of_glass: 0 };
     let mut known: HashMap<(u32, [u64; 9]), Vec<Part>> = HashMap::new();
     for place in places {
         let Some(of) = wires.get(place.mesh as usize) else { continue };
@@ -134,18 +136,32 @@ pub(super) fn draw(
         drawing.place(place, parts);
     }
 
-    let dropped = drawing.dropped;
+    let (dropped, of_glass) = (drawing.dropped, drawing.of_glass);
     let [points, lines] = counts.iter().fold([0, 0], |[p, l], [q, m]| [p + q, l + m]);
     let or_none = |count: u64, width: f64| if count > 0 { width } else { 0.0 };
     let (point_width, line_width) = (or_none(points, widths.point), or_none(lines, widths.line));
     facts.wires = WireFacts { points, lines, point_width, line_width };
-    if dropped == 0 {
-        return Ok(None);
+    if dropped > 0 {
+        facts.dropped.push((NOT_FINITE.into(), dropped));
     }
-    const REASON: &str = "a point or line with an end that is not finite";
-    facts.dropped.push((REASON.into(), dropped));
-    let warning = Diagnostic::new("line-not-finite", file, "", format!("{REASON} is left out"));
-    Ok(Some(Diagnostic { count: u32::try_from(dropped).unwrap_or(u32::MAX), ..warning }))
+    Ok(told(file, dropped, of_glass))
+}
+
+/// Why points and lines are left out.
+const NOT_FINITE: &str = "a point or line with an end that is not finite";
+
+/// Warnings of so many points and lines that are left out, and so many materials that are not drawn as they are.
+fn told(file: &Path, dropped: u64, of_glass: u64) -> Vec<Diagnostic> {
+    let kinds = [
+        ("line-not-finite", format!("{NOT_FINITE} is left out"), dropped),
+        ("line-of-glass", "a material that light passes is drawn solid on points and lines".into(), of_glass),
+    ];
+    let met = kinds.into_iter().filter(|(.., count)| *count > 0);
+    met.map(|(code, text, count)| {
+        let count = u32::try_from(count).unwrap_or(u32::MAX);
+        Diagnostic { count, ..Diagnostic::new(code, file, "", text) }
+    })
+    .collect()
 }
 
 /// The number of a mesh of solids, and its place around that of the wires.
@@ -159,6 +175,8 @@ struct Drawing<'a> {
     /// The material that wires show, by that of the file and whether they are lit.
     materials: HashMap<(u32, bool), u32>,
     dropped: u64,
+    /// Materials that are drawn solid.
+    of_glass: u64,
 }
 
 impl Drawing<'_> {
@@ -185,33 +203,43 @@ impl Drawing<'_> {
         }
     }
 
-    /// What the wires show of their material: both sides where they are flat, no light where they have no normals.
+    /// What the wires show of their material: both sides where they are flat, no light where they have no normals, never
+    /// glass.
     fn material(&mut self, wires: &Wires) -> u32 {
-        let (from, lit) = (wires.mesh.material, wires.is_lit());
-        if let Some(&known) = self.materials.get(&(from, lit)) {
+        let (from, is_lit) = (wires.mesh.material, wires.is_lit());
+        if let Some(&known) = self.materials.get(&(from, is_lit)) {
             return known;
         }
         let Some(material) = self.scene.materials.get(from as usize) else { return from };
-        if lit && material.double_sided {
+        let is_glass = material.surface.transmits();
+        if is_lit && material.double_sided && !is_glass {
             return from;
         }
-        let material = if lit {
-            Material { double_sided: true, ..material.clone() }
-        } else {
-            Material {
-                double_sided: false,
-                normal_map: None,
-                bump_map: None,
-                occlusion_map: None,
-                surface: Surface::Unlit,
-                ..material.clone()
-            }
-        };
+        let material = if is_lit { lit(material) } else { unlit(material) };
+        self.of_glass += u64::from(is_lit && is_glass);
         #[expect(clippy::cast_possible_truncation, reason = "there are fewer materials than meshes")]
         let index = self.scene.materials.len() as u32;
         self.scene.materials.push(material);
-        self.materials.insert((from, lit), index);
+        self.materials.insert((from, is_lit), index);
         index
+    }
+}
+
+/// A material as wires with normals show it.
+fn lit(material: &Material) -> Material {
+    let surface = material.surface.clone().without_transmission();
+    Material { double_sided: true, surface, ..material.clone() }
+}
+
+/// A material as wires without normals show it.
+fn unlit(material: &Material) -> Material {
+    Material {
+        double_sided: false,
+        normal_map: None,
+        bump_map: None,
+        occlusion_map: None,
+        surface: Surface::Unlit,
+        ..material.clone()
     }
 }
 

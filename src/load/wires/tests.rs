@@ -1,6 +1,7 @@
 use super::*;
 use crate::load::Limits;
 use crate::math::{DQuat, Vec2, Vec3, Vec4};
+use crate::scene::{MetalRough, Phong};
 use std::collections::HashSet;
 
 fn budget() -> Budget {
@@ -21,10 +22,14 @@ fn red() -> Scene {
     Scene { materials: vec![material], ..Scene::default() }
 }
 
-fn drawn(wires: &[Wires], places: &[Instance]) -> (Scene, Facts, Option<Diagnostic>) {
-    let (mut scene, mut facts) = (red(), Facts::default());
-    let warning = draw(wires, places, &mut scene, &mut budget(), &mut facts, Path::new("a.gltf"), None).unwrap();
-    (scene, facts, warning)
+fn drawn(wires: &[Wires], places: &[Instance]) -> (Scene, Facts, Vec<Diagnostic>) {
+    drawn_in(red(), wires, places)
+}
+
+fn drawn_in(mut scene: Scene, wires: &[Wires], places: &[Instance]) -> (Scene, Facts, Vec<Diagnostic>) {
+    let mut facts = Facts::default();
+    let warnings = draw(wires, places, &mut scene, &mut budget(), &mut facts, Path::new("a.gltf"), None).unwrap();
+    (scene, facts, warnings)
 }
 
 /// Corners of an instance in the world.
@@ -49,7 +54,7 @@ fn thickness(corners: &[DVec3]) -> f64 {
 fn points_and_lines_stand_where_the_file_has_them() {
     let of = wires(&[[0.0, 0.0, 0.0], [3.0, 4.0, 0.0]], &[[0, 0], [0, 1]]);
     let shift = DAffine3::from_translation(DVec3::new(1e7, 0.0, -2.0));
-    let (scene, facts, warning) = drawn(&[of], &[place(0, shift)]);
+    let (scene, facts, warnings) = drawn(&[of], &[place(0, shift)]);
     let corners = corners(&scene, 0);
     assert_eq!((corners.len(), scene.meshes[0].triangles.len()), (6 + 6, 8 + 8));
     let width = 5.0 / 256.0;
@@ -60,7 +65,7 @@ fn points_and_lines_stand_where_the_file_has_them() {
     assert!((middle(&corners[9..]) - (shift.translation + DVec3::new(3.0, 4.0, 0.0) + half)).length() < 1e-6);
     assert_eq!(scene.meshes[0].face_of_triangle, [vec![0; 8], vec![1; 8]].concat());
     assert_eq!(facts.wires, WireFacts { points: 1, lines: 1, point_width: width, line_width: width });
-    assert!(warning.is_none() && facts.dropped.is_empty() && scene.instances[0].name == "here");
+    assert!(warnings.is_empty() && facts.dropped.is_empty() && scene.instances[0].name == "here");
 }
 
 #[test]
@@ -110,6 +115,32 @@ fn without_normals_they_are_unlit_and_with_them_lit() {
     assert_eq!((mesh.uvs[0].len(), mesh.uvs[1][2], mesh.uvs[1][9]), (0, Vec2::ZERO, Vec2::ONE));
 }
 
+#[test]
+fn nothing_passes_lit_wires_of_glass_which_is_told_once() {
+    let glass = |surface: Surface| Material { surface, ..Material::plain() };
+    let thick = MetalRough { transmission: 1.0, thick: true, thickness: 2.0, roughness: 0.5, ..MetalRough::default() };
+    let phong = Phong { transmission: Vec3::ONE, specular: Vec3::X, ..Phong::default() };
+    for surface in [Surface::MetalRough(thick), Surface::Phong(phong)] {
+        let scene = Scene { materials: vec![glass(surface)], ..Scene::default() };
+        let mut lit = wires(&[[0.0; 3], [1.0, 0.0, 0.0]], &[[0, 1]]);
+        let plain = lit.clone();
+        lit.mesh.normals = vec![Vec3::Y; 2];
+        let places = [0, 1, 2].map(|mesh| place(mesh, DAffine3::IDENTITY));
+        let (scene, _, warnings) = drawn_in(scene, &[lit.clone(), plain, lit], &places);
+        let shown = |k: usize| &scene.materials[scene.meshes[k].material as usize];
+        assert!(scene.materials[0].surface.transmits(), "faces keep the material");
+        assert!(shown(0).is_opaque() && shown(1).is_opaque() && shown(0).double_sided);
+        assert_eq!(scene.meshes[0].material, scene.meshes[2].material);
+        match &shown(0).surface {
+            Surface::MetalRough(m) => assert_eq!((m.thick, m.thickness, m.roughness), (false, 0.0, 0.5)),
+            Surface::Phong(p) => assert_eq!(p.specular, Vec3::X),
+            Surface::Unlit => panic!("it has lost its light"),
+        }
+        let told: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+        assert_eq!(told, ["a.gltf: a material that light passes is drawn solid on points and lines"]);
+    }
+}
+
 fn of_red() -> Vec4 {
     Vec4::new(1.0, 0.0, 0.0, 1.0)
 }
@@ -118,9 +149,9 @@ fn of_red() -> Vec4 {
 fn ends_that_are_not_finite_are_left_out_and_told() {
     let of =
         wires(&[[0.0; 3], [1.0, 0.0, 0.0], [f32::NAN, 0.0, 0.0], [0.0, f32::INFINITY, 0.0]], &[[0, 1], [1, 2], [3, 3]]);
-    let (scene, facts, warning) = drawn(&[of], &[place(0, DAffine3::IDENTITY)]);
+    let (scene, facts, warnings) = drawn(&[of], &[place(0, DAffine3::IDENTITY)]);
     assert_eq!(scene.meshes[0].triangles.len(), 8);
-    let warning = warning.unwrap();
+    let [warning] = warnings.as_slice() else { panic!("{warnings:?}") };
     assert_eq!((warning.code, warning.count, facts.dropped[0].1), ("line-not-finite", 2, 2));
     let nowhere = wires(&[[f32::NAN; 3]], &[[0, 0]]);
     let (scene, facts, _) = drawn(&[nowhere], &[place(0, DAffine3::IDENTITY)]);
@@ -130,8 +161,8 @@ fn ends_that_are_not_finite_are_left_out_and_told() {
 #[test]
 fn lines_without_length_and_a_place_without_size_are_points() {
     let of = wires(&[[2.0; 3], [2.0; 3]], &[[0, 1], [0, 0]]);
-    let (scene, facts, warning) = drawn(&[of], &[place(0, DAffine3::IDENTITY)]);
-    assert_eq!((scene.meshes[0].positions.len(), warning), (6 + 6, None));
+    let (scene, facts, warnings) = drawn(&[of], &[place(0, DAffine3::IDENTITY)]);
+    assert_eq!((scene.meshes[0].positions.len(), warnings), (6 + 6, Vec::new()));
     assert_eq!(facts.wires, WireFacts { points: 1, lines: 1, point_width: 1.0, line_width: 1.0 });
 }
 
@@ -170,7 +201,7 @@ fn more_than_memory_allows_is_refused_before_it_is_made() {
 fn no_corner_of_a_solid_meets_another() {
     // A line a million times as long as it is wide, far from where the file begins.
     let of = wires(&[[1e6, 0.0, 0.0], [1e6 + 1.0, 1.0, 0.0]], &[[0, 1], [0, 0]]);
-    let (scene, _, warning) = drawn(&[of], &[place(0, DAffine3::IDENTITY)]);
+    let (scene, _, warnings) = drawn(&[of], &[place(0, DAffine3::IDENTITY)]);
     let distinct: HashSet<_> = scene.meshes[0].positions.iter().map(|p| p.to_array().map(f32::to_bits)).collect();
-    assert_eq!((distinct.len(), warning), (12, None));
+    assert_eq!((distinct.len(), warnings), (12, Vec::new()));
 }
