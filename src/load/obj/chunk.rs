@@ -72,8 +72,11 @@ pub(super) const COMMENTS: usize = 64;
 /// Statements of free-form geometry that draw something.
 const CURVES: [&[u8]; 5] = [b"curv", b"curv2", b"surf", b"bzp", b"bsp"];
 
+/// Statements that stand for others: those of another file, or what a command writes.
+const CALLS: [&[u8]; 2] = [b"call", b"csh"];
+
 /// Statements that change nothing in what is drawn.
-const SILENT: [&[u8]; 29] = [
+const SILENT: [&[u8]; 27] = [
     b"vp",
     b"cstype",
     b"deg",
@@ -100,8 +103,6 @@ const SILENT: [&[u8]; 29] = [
     b"usemap",
     b"shadow_obj",
     b"trace_obj",
-    b"call",
-    b"csh",
     b"vw",
 ];
 
@@ -282,6 +283,7 @@ impl Reader {
             b"" => {}
             _ if word.starts_with(b"#") => self.comment(text),
             _ if CURVES.contains(&word) => self.out.odd.curves.note(self.line, word),
+            _ if CALLS.contains(&word) => self.out.odd.calls.note(self.line, word),
             _ if SILENT.contains(&word) => {}
             _ => self.out.odd.unknown.note(self.line, word),
         }

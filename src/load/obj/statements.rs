@@ -97,6 +97,8 @@ impl Tally {
 pub(super) struct Oddities {
     pub strokes: Tally,
     pub curves: Tally,
+    /// Statements that stand for others.
+    pub calls: Tally,
     pub few_corners: Tally,
     pub unknown: Tally,
     pub number: Tally,
@@ -200,6 +202,7 @@ impl Oddities {
     pub(super) fn append(&mut self, more: Self, lines: u32) {
         self.strokes.append(more.strokes, lines);
         self.curves.append(more.curves, lines);
+        self.calls.append(more.calls, lines);
         self.few_corners.append(more.few_corners, lines);
         self.unknown.append(more.unknown, lines);
         self.number.append(more.number, lines);
@@ -222,6 +225,8 @@ impl Oddities {
         warn("obj-bad-line", &self.strokes, stroke, "export the model again");
         let curve = format!("free-form geometry ('{}') is not drawn", self.curves.word);
         warn("obj-free-form", &self.curves, curve, "export it as polygons");
+        let call = format!("what '{}' stands for is not read", self.calls.word);
+        warn("obj-call", &self.calls, call, "put the statements into this file");
         let few = "a face with fewer than 3 corners is dropped";
         warn("obj-few-corners", &self.few_corners, few.into(), "");
         warn("obj-unknown-statement", &self.unknown, format!("'{}' is not an OBJ statement", self.unknown.word), "");
@@ -358,6 +363,15 @@ mod tests {
     }
 
     #[test]
+    fn statements_of_other_files_and_commands_are_told_and_not_read() {
+        let s = of(&format!("{TRIANGLE}call other.obj 1\ncsh -rm x\nf 1 2 3"));
+        let mut warnings = Warnings::default();
+        s.odd.warn(Path::new("m.obj"), &mut warnings);
+        let told: Vec<String> = warnings.into_vec().iter().map(ToString::to_string).collect();
+        assert_eq!(told, ["m.obj:4: what 'call' stands for is not read (×2); put the statements into this file"]);
+    }
+
+    #[test]
     fn points_and_lines_name_vertices_like_faces_and_bad_ones_are_left_out() {
         let text = format!("l 1/1 2 3 # side\n{TRIANGLE}vt 0 0\np -1 1\nl 1\nl 1 9\np x\np\nl 1 -4\nf 1 2 3\nl 2 3");
         let s = of(&text);
@@ -405,7 +419,7 @@ mod tests {
                 6 => text += "v 1,5 2\nl 1 2\np 1 2\n",
                 7 => text += "o b\r\nf 1/1/1\t2/2/2 3/3/1 \r\n",
                 8 => text += "usemtl n\n\n  f 4 3 2 1\n",
-                9 => text += "curv 0 1 1 2\nv 1 2 3 4\nmtllib b.mtl\n# more\n",
+                9 => text += "curv 0 1 1 2\ncall a.obj\nv 1 2 3 4\nmtllib b.mtl\n# more\n",
                 _ => text += "f 1 2 3\nf 1//1 2//1 100//60\n",
             }
         }
