@@ -10,6 +10,7 @@
 //! whether its map could be read.
 
 use super::parse::{Mtl, Slot};
+use crate::load::paths::shorten;
 use crate::load::{Diagnostic, MtlMode, Warnings};
 use crate::math::Vec3;
 use crate::scene::{AlphaMode, Coat, Grain, Material, MetalRough, Phong, Sheen, Surface};
@@ -219,8 +220,10 @@ impl Meaning<'_> {
         }
         match self.mtl.ns {
             Some(ns) if ns > 0.0 => (ks, number(ns)),
-            Some(_) if self.guessing() => {
-                self.warn("mtl-flat-highlight", "Ns 0 would spread the highlight over everything; there is none");
+            Some(ns) if self.guessing() => {
+                let ns = shorten(&ns.to_string());
+                let text = format!("Ns {ns} would spread the highlight over everything; there is none");
+                self.warn("mtl-flat-highlight", &text);
                 (Vec3::ZERO, 1.0)
             }
             None if self.guessing() => {
@@ -321,6 +324,11 @@ mod tests {
     use crate::load::limits::Budget;
 
     fn of(text: &str, mode: MtlMode, maps: &[Slot]) -> (Material, Vec<&'static str>) {
+        let (material, warnings) = read(text, mode, maps);
+        (material, warnings.iter().map(|w| w.code).collect())
+    }
+
+    fn read(text: &str, mode: MtlMode, maps: &[Slot]) -> (Material, Vec<Diagnostic>) {
         let mut warnings = Warnings::default();
         let (text, file) = (format!("newmtl m\n{text}"), Path::new("m.mtl"));
         let mut budget = Budget::new(&Limits::default());
@@ -335,7 +343,7 @@ mod tests {
             all_invisible: false,
         };
         let material = meaning.material();
-        (material, warnings.into_vec().iter().map(|w| w.code).collect())
+        (material, warnings.into_vec())
     }
 
     fn guess(text: &str) -> (Material, Vec<&'static str>) {
@@ -439,6 +447,8 @@ mod tests {
     fn a_highlight_without_width_is_none_and_without_exponent_satin() {
         let (m, warnings) = guess("Kd 1\nKs 1\nNs 0\nillum 2");
         assert_eq!((phong(&m).specular, warnings), (Vec3::ZERO, vec!["mtl-flat-highlight"]));
+        let told = read("Kd 1\nKs 1\nNs -3", MtlMode::Guess, &[]).1.remove(0).text;
+        assert!(told.starts_with("Ns -3 would spread the highlight"), "{told}");
         let (m, warnings) = guess("Kd 1\nKs 1");
         assert_eq!((phong(&m).shininess, warnings), (32.0, vec!["mtl-no-shininess"]));
         assert_eq!(phong(&literal("Kd 1\nKs 1\nNs 0")).shininess, 0.0);
