@@ -26,7 +26,7 @@ pub(in crate::load) fn is_exact(bytes: &[u8]) -> bool {
 /// some never come back to it.
 ///
 /// # Errors
-/// When there are fewer than the header claims. What follows them is not looked at.
+/// When there are fewer than the header claims. What follows them is not looked at; a warning counts it.
 pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnostic> {
     let bytes = source.bytes.as_slice();
     let fault = |at: usize, text: String| {
@@ -57,6 +57,7 @@ pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnost
         let warning = Diagnostic::new("stl-uncounted", &source.path, "byte 80", text);
         bare.told.push(warning.remedy("they are drawn"));
     }
+    bare.told.extend(behind(source, records.len()));
     if are_colored(&bytes[..80], records) {
         let text = "colours in the attribute bytes of triangles are not drawn";
         let warning = Diagnostic::new("stl-colors", &source.path, "", text);
@@ -65,6 +66,15 @@ pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnost
     let said = String::from_utf8_lossy(&bytes[..80]);
     bare.comments.push(said.trim_matches(|c: char| c.is_control() || c.is_whitespace()).into());
     Ok(bare)
+}
+
+/// A warning when bytes follow the triangles that are read.
+fn behind(source: &Source, triangles: usize) -> Option<Diagnostic> {
+    let end = HEADER + triangles * TRIANGLE;
+    let bytes = source.bytes.len().checked_sub(end).filter(|bytes| *bytes > 0)?;
+    let text = format!("{bytes} bytes follow the {triangles} triangles that the header claims");
+    let warning = Diagnostic::new("stl-bytes-behind", &source.path, format!("byte {end}"), text);
+    Some(warning.remedy("they are not read"))
 }
 
 /// Whether attributes mean colours: where the header has a colour of the whole, as Magics writes it, or a triangle has the

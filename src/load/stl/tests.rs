@@ -115,10 +115,12 @@ fn faults_name_the_line_or_the_byte() {
 }
 
 #[test]
-fn what_is_beyond_the_last_triangle_is_not_looked_at() {
+fn what_is_beyond_the_last_triangle_is_told_and_not_looked_at() {
     let mut longer = binary("");
     longer.extend(b"a footer");
-    assert_eq!(plain(&longer).facts.faces, 4);
+    let loaded = plain(&longer);
+    let text = "a.stl:byte 284: 8 bytes follow the 4 triangles that the header claims; they are not read";
+    assert_eq!((loaded.facts.faces, loaded.warnings[0].to_string().as_str()), (4, text));
     assert!(plain(b"solid nothing\nendsolid nothing\n").scene.meshes.is_empty());
 }
 
@@ -156,7 +158,8 @@ fn triangles_behind_a_header_that_counts_none_are_drawn_and_told() {
     assert_eq!((loaded.facts.faces, loaded.warnings[0].to_string().as_str()), (4, text));
     // What is no whole triangle is none.
     bytes.pop();
-    assert_eq!(plain(&bytes).facts.faces, 0);
+    let loaded = plain(&bytes);
+    assert_eq!((loaded.facts.faces, loaded.warnings[0].code), (0, "stl-bytes-behind"));
 }
 
 #[test]
