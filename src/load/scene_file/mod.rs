@@ -362,6 +362,22 @@ fn environment(value: &DeValue) -> Result<Environment, String> {
     }
 }
 
+/// Looks for all files that are named, before any is read, so that all that are not there are told at once.
+fn check_files(
+    models: &[Model],
+    panorama: Option<&Surrounding>,
+    faults: &Faults,
+    resolver: &Resolver,
+) -> Result<(), LoadError> {
+    let of_models = models.iter().map(|model| (&model.file, model.at));
+    for (file, at) in of_models.chain(panorama.map(|picture| (&picture.file, picture.at))) {
+        if let Err(fault) = resolver.locate(Path::new(file)) {
+            faults.note_file(at, &fault);
+        }
+    }
+    faults.check()
+}
+
 /// Reads the models and puts everything together.
 fn assemble(
     parsed: Parsed,
@@ -376,6 +392,7 @@ fn assemble(
     facts.faces = scene.meshes.iter().map(|mesh| mesh.faces() as u64).sum();
     lost.tell(faults, &source.path, &mut facts, &mut warnings);
     let mut resolver = Resolver::new(source, options);
+    check_files(&models, panorama.as_ref(), faults, &resolver)?;
     if let Some(Surrounding { file, at, rotation }) = panorama {
         let bytes = resolver
             .read_file(Path::new(&file))

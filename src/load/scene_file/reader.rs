@@ -3,6 +3,7 @@
 //!
 //! Knows TOML, not scenes.
 
+use crate::load::paths::FileFault;
 use crate::load::suggest::{list, nearest};
 use crate::load::{Diagnostic, LoadError};
 use crate::math::{DVec3, Vec3};
@@ -57,6 +58,12 @@ impl Faults {
         if list.len() >= 2 * SHOWN {
             self.shorten(&mut list);
         }
+    }
+
+    /// Notes that a file is named at this byte that cannot be read.
+    pub(super) fn note_file(&self, at: usize, fault: &FileFault) {
+        let Diagnostic { code, text, remedy, .. } = fault.diagnose(&self.file, "");
+        self.note(code, &(at..at), text, remedy);
     }
 
     /// Whether a fault at this byte would be listed; one that is not costs no thought about what may have been meant.

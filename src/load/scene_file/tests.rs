@@ -127,6 +127,21 @@ fn all_faults_are_told_in_the_order_of_the_file() {
 }
 
 #[test]
+fn all_files_that_are_not_there_are_told_at_once() {
+    let errors =
+        faults("environment='no.exr'\n[[models]]\nfile='a.obj'\n[[models]]\nfile='../b.obj'\n[[models]]\nfile='c.obj'");
+    let said = [
+        "test.toml:1:13: 'no.exr' is not there",
+        "3:6: 'a.obj' is not there",
+        "5:6: '../b.obj' lies outside",
+        "7:6: 'c.obj'",
+    ];
+    assert_eq!(errors.len(), said.len(), "{errors:?}");
+    assert!(errors.iter().zip(said).all(|(error, said)| error.contains(said)), "{errors:?}");
+    assert_eq!(faults(&"[[models]]\nfile='a.obj'\n".repeat(100)).len(), 21);
+}
+
+#[test]
 fn of_many_faults_the_first_are_listed_in_little_time() {
     // Names that are not there, whose nearest is looked for; in one line, where columns are far from its start.
     let materials: String = (0..20_000).map(|i| format!("[materials.m{i}]\n")).collect();
