@@ -25,7 +25,27 @@ pub struct Resolver {
     read: Vec<(PathBuf, u128)>,
     /// Canonical path -> index into `read`.
     known: HashMap<PathBuf, usize>,
+    /// What lies in the folders that were looked through for a name in another case: names by their small letters.
+    listed: HashMap<PathBuf, HashMap<String, String>>,
     reading: Spent,
+}
+
+/// A file that was read.
+#[derive(Debug)]
+pub struct Found {
+    /// Path relative to the model's folder, or absolute.
+    pub path: PathBuf,
+    /// What it holds.
+    pub bytes: Vec<u8>,
+    /// Whether it lies elsewhere than its name says.
+    pub guessed: bool,
+}
+
+impl Found {
+    /// A note that the file lies elsewhere than `name` says, about `place` in `file`.
+    pub fn note(&self, name: &str, file: &Path, place: &str) -> Option<Diagnostic> {
+        self.guessed.then(|| Diagnostic::new("file-elsewhere", file, place, taken_from(name, &self.path)))
+    }
 }
 
 /// Why a named file was not read.
@@ -111,6 +131,7 @@ impl Resolver {
             limits: options.limits,
             read: Vec::new(),
             known: HashMap::new(),
+            listed: HashMap::new(),
             reading: Spent::default(),
         };
         let canonical = source.path.canonicalize().unwrap_or_else(|_| source.path.clone());
@@ -121,20 +142,58 @@ impl Resolver {
     /// Reads a file that a URI reference (RFC 3986) names: percent escapes are decoded, schemes refused.
     ///
     /// `data:` URIs are not for this.
-    pub fn read_uri(&mut self, uri: &str) -> Result<Vec<u8>, FileFault> {
+    pub fn read_uri(&mut self, uri: &str) -> Result<Found, FileFault> {
         let name = file_name_of_uri(uri)?;
+        let (path, guessed) = self.find(&name, uri)?;
+        Ok(Found { bytes: self.read_file(&path)?, path, guessed })
+    }
+
+    /// Where a file is that a URI names, and whether that is a guess.
+    fn find(&mut self, name: &str, uri: &str) -> Result<(PathBuf, bool), FileFault> {
+        let slashed = name.replace('\\', "/");
         // Exporters write names with a literal '%' unescaped, or with another system's slashes, often enough.
-        let others = [uri.to_owned(), name.replace('\\', "/")];
-        let mut read = self.read_file(Path::new(&name));
-        for other in others.into_iter().filter(|other| *other != name) {
-            if matches!(read, Err(FileFault::Missing(_))) {
-                read = self.read_file(Path::new(&other));
+        for path in [name, uri, &slashed].map(PathBuf::from) {
+            match self.locate(&path) {
+                Ok(_) => return Ok((path, false)),
+                Err(FileFault::Missing(_)) => {}
+                Err(fault) => return Err(fault),
             }
         }
-        match read {
-            Err(FileFault::Missing(_)) => Err(FileFault::Missing(shown(Path::new(&name)))),
-            other => other,
+        let in_any_case = self.in_any_case(Path::new(&slashed));
+        in_any_case.map(|path| (path, true)).ok_or_else(|| FileFault::Missing(shown(Path::new(name))))
+    }
+
+    /// The path of an existing plain file below the root that differs from `name` only in the case of letters, be it of
+    /// the file or of folders; of several, the first by name.
+    pub fn in_any_case(&mut self, name: &Path) -> Option<PathBuf> {
+        let mut path = PathBuf::new();
+        for part in name.components() {
+            match part {
+                Component::CurDir => {}
+                Component::Normal(part) if !self.base.join(&path).join(part).exists() => {
+                    let part = part.to_str()?.to_ascii_lowercase();
+                    let listed = self.listed(&path)?.get(&part)?;
+                    path.push(listed);
+                }
+                part => path.push(part),
+            }
         }
+        self.locate(&path).is_ok().then_some(path)
+    }
+
+    /// What lies in a folder below the root: names by their small letters.
+    fn listed(&mut self, folder: &Path) -> Option<&HashMap<String, String>> {
+        /// Files of one folder that are looked at; bounds the time.
+        const LISTED: usize = 10_000;
+        let folder = self.base.join(folder).canonicalize().ok().filter(|folder| folder.starts_with(&self.root))?;
+        let list = |folder: &PathBuf| {
+            let entries = fs::read_dir(folder).into_iter().flatten().take(LISTED).flatten();
+            let mut names: Vec<String> = entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
+            // Of names that are the same in small letters, the first is the last to be put in.
+            names.sort_unstable_by(|a, b| b.cmp(a));
+            names.into_iter().map(|name| (name.to_ascii_lowercase(), name)).collect()
+        };
+        Some(self.listed.entry(folder).or_insert_with_key(list))
     }
 
     /// Reads a file named by a path, relative to the model or absolute.
@@ -246,6 +305,11 @@ pub(crate) fn shown(name: &Path) -> String {
     if name.chars().nth(LONGEST).is_some() { shorten(&name) } else { name.into_owned() }
 }
 
+/// That a file lies elsewhere than its name says.
+pub(crate) fn taken_from(name: &str, path: &Path) -> String {
+    format!("'{}' is taken from '{}'", shorten(name), path.display())
+}
+
 /// The beginning of a text that may be megabytes long.
 pub(crate) fn shorten(text: &str) -> String {
     const KEPT: usize = 80;
@@ -297,11 +361,11 @@ mod tests {
         let dir = folder();
         let mut r = resolver(dir.path(), &LoadOptions::default());
         for uri in ["a%20b.bin", "a b.bin", "./a b.bin", "../model/a%20b.bin"] {
-            assert_eq!(r.read_uri(uri).unwrap(), b"inside", "{uri}");
+            assert_eq!(r.read_uri(uri).unwrap().bytes, b"inside", "{uri}");
         }
-        assert_eq!(r.read_uri("100%25.bin").unwrap(), b"percent");
-        assert_eq!(r.read_uri("100%.bin").unwrap(), b"percent");
-        assert_eq!(r.read_uri("%E2%9D%A4.bin").unwrap(), b"heart");
+        assert_eq!(r.read_uri("100%25.bin").unwrap().bytes, b"percent");
+        assert_eq!(r.read_uri("100%.bin").unwrap().bytes, b"percent");
+        assert_eq!(r.read_uri("%E2%9D%A4.bin").unwrap().bytes, b"heart");
         assert_eq!(r.finish().0.len(), 4, "the model and three files, each once");
     }
 
@@ -312,7 +376,7 @@ mod tests {
         fs::write(dir.path().join("model/textures/red.png"), b"red").unwrap();
         let mut r = resolver(dir.path(), &LoadOptions::default());
         for uri in ["textures\\red.png", ".\\textures\\red.png", "textures%5Cred.png"] {
-            assert_eq!(r.read_uri(uri).unwrap(), b"red", "{uri}");
+            assert_eq!(r.read_uri(uri).unwrap().bytes, b"red", "{uri}");
         }
         assert!(matches!(r.read_uri("..\\secret.bin"), Err(FileFault::Outside { .. })));
         assert_eq!(r.read_uri("textures\\no.png").unwrap_err().to_string(), "'textures\\no.png' is not there");
@@ -330,6 +394,36 @@ mod tests {
             let mut wider = resolver(dir.path(), &LoadOptions { root: Some(root), ..LoadOptions::default() });
             assert!(!matches!(wider.read_uri(name), Err(FileFault::Outside { .. })), "{name}");
         }
+    }
+
+    // Where names in another case are other files.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn files_and_folders_are_found_in_another_case_below_the_root_alone() {
+        let dir = folder();
+        fs::create_dir_all(dir.path().join("model/Tex/Red")).unwrap();
+        for name in ["a.PNG", "A.png", "b.png"] {
+            fs::write(dir.path().join("model/Tex/Red").join(name), name).unwrap();
+        }
+        let mut r = resolver(dir.path(), &LoadOptions::default());
+        let mut read = |uri: &str| -> Result<(String, String, bool), String> {
+            let found = r.read_uri(uri).map_err(|e| e.to_string())?;
+            Ok((found.path.to_string_lossy().into_owned(), String::from_utf8(found.bytes).unwrap(), found.guessed))
+        };
+        let at = |path: &str, bytes: &str, guessed| Ok((path.to_owned(), bytes.to_owned(), guessed));
+        assert_eq!(read("Tex/Red/b.png"), at("Tex/Red/b.png", "b.png", false));
+        for uri in ["TEX/RED/B.PNG", "tex\\red\\b.png", "./tex/Red/b%2EPNG", "TEX/../tex/red/b.png"] {
+            let Ok((path, bytes, true)) = read(uri) else { panic!("{uri}") };
+            assert!(path.ends_with("Tex/Red/b.png") && bytes == "b.png", "{uri}: {path}");
+        }
+        assert_eq!(read("tex/red/a.png"), at("Tex/Red/A.png", "A.png", true));
+        assert_eq!(read("TEX/RED/C.PNG"), Err("'TEX/RED/C.PNG' is not there".into()));
+        assert_eq!(
+            read("../MODEL/a b.bin"),
+            Err("'../MODEL/a b.bin' lies outside the model's folder, where nothing is read".into())
+        );
+        assert_eq!(read("TEX"), Err("'TEX' is not there".into()));
+        assert!(read("../SECRET.bin").is_err() && read("Tex/../../SECRET.bin").is_err());
     }
 
     #[cfg(unix)]

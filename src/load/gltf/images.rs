@@ -99,13 +99,7 @@ impl<'a> Find<'a, '_> {
     fn bytes(&mut self, i: usize, image: &Image) -> Option<Cow<'a, [u8]>> {
         match (&image.uri, image.buffer_view) {
             (Some(uri), _) if is_data(uri) => self.data(i, uri).map(Cow::Owned),
-            (Some(uri), _) if is_wanted(image, self.drawn) => match self.resolver.read_uri(uri) {
-                Ok(bytes) => self.fits(i, bytes.len()).then_some(Cow::Owned(bytes)),
-                Err(why) => {
-                    self.report.warnings.push(why.diagnose(self.file, &format!("images[{i}].uri")));
-                    None
-                }
-            },
+            (Some(uri), _) if is_wanted(image, self.drawn) => self.named(i, uri).map(Cow::Owned),
             (None, Some(view)) => {
                 let bytes = self.buffers.view(view).ok().map(Cow::Borrowed);
                 if bytes.is_none() && self.drawn {
@@ -114,6 +108,20 @@ impl<'a> Find<'a, '_> {
                 bytes
             }
             _ => None,
+        }
+    }
+
+    fn named(&mut self, i: usize, uri: &str) -> Option<Vec<u8>> {
+        let place = format!("images[{i}].uri");
+        match self.resolver.read_uri(uri) {
+            Ok(found) => {
+                found.note(uri, self.file, &place).into_iter().for_each(|note| self.report.warnings.push(note));
+                self.fits(i, found.bytes.len()).then_some(found.bytes)
+            }
+            Err(why) => {
+                self.report.warnings.push(why.diagnose(self.file, &place));
+                None
+            }
         }
     }
 

@@ -180,6 +180,33 @@ fn a_missing_or_broken_image_costs_its_map_and_a_warning() {
     }
 }
 
+// Where names in another case are other files.
+#[cfg(target_os = "linux")]
+#[test]
+fn images_and_buffers_named_in_another_case_are_read_and_told() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::create_dir(dir.path().join("tex")).unwrap();
+    ::image::RgbImage::new(1, 1).save(dir.path().join("tex/a.png")).unwrap();
+    let mut file = Builder::new();
+    let (positions, uvs) = (file.triangle(), file.floats("VEC2", &[0.; 6]));
+    let bytes = std::mem::take(&mut file.bytes);
+    std::fs::write(dir.path().join("Data.bin"), &bytes).unwrap();
+    file.primitive(json!({"attributes": {"POSITION": positions, "TEXCOORD_0": uvs}, "material": 0}));
+    file.set("buffers", json!([{"uri": "data.BIN", "byteLength": bytes.len()}]));
+    file.set("images", json!([{"uri": "TEX/a.PNG"}]));
+    file.set("textures", json!([{"source": 0}]));
+    file.set("materials", json!([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]));
+    let loaded = load_bytes(&dir.path().join("a.gltf"), file.gltf(), &LoadOptions::default()).unwrap();
+    assert_eq!((loaded.facts.faces, loaded.scene.bitmaps.len(), loaded.facts.files.len()), (1, 1, 3));
+    let notes = loaded.warnings.iter().filter(|w| w.code == "file-elsewhere");
+    let told: Vec<_> = notes.map(|w| (w.place.as_str(), w.text.as_str())).collect();
+    let expected = [
+        ("buffers[0].uri", "'data.BIN' is taken from 'Data.bin'"),
+        ("images[0].uri", "'TEX/a.PNG' is taken from 'tex/a.png'"),
+    ];
+    assert_eq!(told, expected);
+}
+
 #[test]
 fn images_of_materials_that_are_not_drawn_are_not_decoded() {
     let mut file = Builder::new();

@@ -4,14 +4,12 @@
 //! on one line although names may hold spaces. A file found elsewhere than its name says costs a warning; everything is
 //! read through the [`Resolver`], so nothing outside the root is.
 
-use crate::load::paths::{FileFault, Resolver, shown};
+use crate::load::paths::{FileFault, Found, Resolver, shown};
 use std::path::{Path, PathBuf};
 
 /// Reads files by careless names.
 pub(super) struct Finder<'a> {
     pub resolver: &'a mut Resolver,
-    /// Folder of the model.
-    pub base: PathBuf,
 }
 
 /// Where a file is.
@@ -25,19 +23,6 @@ pub(super) struct Place {
     pub guessed: bool,
 }
 
-/// A file that was read.
-#[derive(Debug)]
-pub(super) struct Found {
-    /// Path relative to the model's folder, or absolute.
-    pub path: PathBuf,
-    pub bytes: Vec<u8>,
-    /// Whether it lies elsewhere than its name says.
-    pub guessed: bool,
-}
-
-/// Files of one folder that are looked through for a name in another case; bounds the time.
-const LISTED: usize = 10_000;
-
 impl Finder<'_> {
     /// Finds and reads `name`.
     pub(super) fn read(&mut self, name: &str, folders: &[&Path]) -> Result<Found, FileFault> {
@@ -45,8 +30,8 @@ impl Finder<'_> {
         Ok(Found { bytes: self.resolver.read_file(&path)?, path, guessed })
     }
 
-    /// Finds `name`, looking in `folders` (relative to the model's), first as written, then by the last part of its
-    /// name alone, then in any case. The fault is that of the name as written.
+    /// Finds `name`, looking in `folders` (relative to the model's), first as written, then in any case, then by the last
+    /// part of its name alone, as written and in any case. The fault is that of the name as written.
     pub(super) fn find(&mut self, name: &str, folders: &[&Path]) -> Result<Place, FileFault> {
         let slashed = name.replace('\\', "/");
         let mut fault = None;
@@ -67,20 +52,14 @@ impl Finder<'_> {
     }
 
     fn elsewhere(&mut self, name: &str, folders: &[&Path]) -> Option<Place> {
-        let last = Path::new(name).file_name()?.to_str()?;
-        let as_written = folders.iter().map(|folder| folder.join(last));
-        let in_any_case = folders.iter().filter_map(|folder| self.in_any_case(folder, last));
-        as_written.chain(in_any_case).find_map(|path| {
-            let canonical = self.resolver.locate(&path).ok()?;
-            Some(Place { path, canonical, guessed: true })
-        })
-    }
-
-    /// The first file of a folder, by name, whose name differs only in case.
-    fn in_any_case(&self, folder: &Path, name: &str) -> Option<PathBuf> {
-        let entries = std::fs::read_dir(self.base.join(folder)).ok()?.take(LISTED).flatten();
-        let names = entries.filter_map(|e| e.file_name().into_string().ok());
-        names.filter(|n| n.eq_ignore_ascii_case(name)).min().map(|n| folder.join(n))
+        let last = Path::new(name).file_name()?;
+        let resolver = &mut *self.resolver;
+        let in_any_case = folders.iter().find_map(|folder| resolver.in_any_case(&folder.join(name)));
+        let path = in_any_case
+            .or_else(|| folders.iter().map(|folder| folder.join(last)).find(|path| resolver.locate(path).is_ok()))
+            .or_else(|| folders.iter().find_map(|folder| resolver.in_any_case(&folder.join(last))))?;
+        let canonical = resolver.locate(&path).ok()?;
+        Some(Place { path, canonical, guessed: true })
     }
 
     /// Reads the libraries of one `mtllib` statement: one name with spaces, or several names.
@@ -161,7 +140,7 @@ mod tests {
         }
         let source = Source { path: dir.path().join("m.obj"), bytes: Vec::new() };
         let mut resolver = Resolver::new(&source, &LoadOptions::default());
-        run(&mut Finder { resolver: &mut resolver, base: dir.path().into() })
+        run(&mut Finder { resolver: &mut resolver })
     }
 
     fn libraries(files: &[&str], names: &str) -> Vec<String> {
@@ -201,6 +180,7 @@ mod tests {
         assert_eq!(read("C:\\Users\\me\\wood.png"), Ok(("maps/Wood.PNG".into(), true)));
         assert_eq!(read("..\\maps\\Wood.PNG"), Ok(("maps/../maps/Wood.PNG".into(), false)));
         assert_eq!(read("/else/where/here.png"), Ok(("here.png".into(), true)));
+        assert_eq!(read("MAPS\\wood.png"), Ok(("maps/Wood.PNG".into(), true)));
         assert_eq!(read("tex\\none.png"), Err("'tex\\none.png' is not there".into()));
         assert!(read("/etc/hostname").unwrap_err().contains("outside"));
     }

@@ -11,11 +11,11 @@ mod textures;
 
 use super::lines::without_comment;
 use crate::load::limits::{Budget, Limits};
-use crate::load::paths::{Resolver, shorten};
+use crate::load::paths::{Found, Resolver, shorten, taken_from};
 use crate::load::{Diagnostic, LoadOptions, MtlMode, Warnings};
 use crate::scene::{Bitmap, Material, Texture};
 use crate::stopwatch::Spent;
-use library::{Finder, Found};
+use library::Finder;
 use meaning::Meaning;
 use parse::{Mtl, Slot};
 use std::collections::{HashMap, HashSet};
@@ -72,7 +72,7 @@ pub(super) fn load(libraries: &[(u32, String)], names: &[Option<&str>], reading:
     for (number, library) in read.iter().enumerate() {
         let materials = used.iter().filter(|u| u.0 == number).map(|u| &library.materials[u.1]);
         let of = Library { number, file: &library.file, folder: &library.folder };
-        let mut finder = Finder { resolver: reading.resolver, base: folder_of(reading.file) };
+        let mut finder = Finder { resolver: reading.resolver };
         let limits: (&Limits, &mut Budget) = (&reading.options.limits, reading.budget);
         textures.read(&of, materials, reading.options.mtl, &mut finder, limits, reading.warnings);
     }
@@ -106,7 +106,7 @@ fn read_libraries(libraries: &[(u32, String)], reading: &mut Reading) -> Vec<Rea
     let mut out = Vec::new();
     let mut seen = HashSet::new();
     for (line, names) in libraries {
-        let mut finder = Finder { resolver: reading.resolver, base: folder_of(reading.file) };
+        let mut finder = Finder { resolver: reading.resolver };
         let mut found = finder.libraries(names);
         let cut = String::from_utf8_lossy(without_comment(names.as_bytes())).into_owned();
         if cut != *names && !found.iter().all(Result::is_ok) {
@@ -129,7 +129,7 @@ fn read_libraries(libraries: &[(u32, String)], reading: &mut Reading) -> Vec<Rea
 
 fn read_library(found: Found, line: u32, names: &str, reading: &mut Reading) -> Read {
     if found.guessed {
-        let text = format!("material library '{}' is taken from '{}'", shorten(names), found.path.display());
+        let text = format!("material library {}", taken_from(names, &found.path));
         reading.warnings.push(Diagnostic::new("mtl-file-elsewhere", reading.file, line.to_string(), text));
     }
     let file = folder_of(reading.file).join(&found.path);

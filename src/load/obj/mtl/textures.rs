@@ -5,7 +5,7 @@ use super::options::{Channel, Map};
 use super::parse::{Mtl, Slot};
 use super::pictures::{Alpha, Pictures, Take};
 use crate::load::limits::{Budget, Limits, OverBudget};
-use crate::load::paths::{FileFault, shorten};
+use crate::load::paths::{FileFault, taken_from};
 use crate::load::texture::{Encoded, Unusable, decode_all};
 use crate::load::{Diagnostic, MtlMode, Warnings};
 use crate::math::Vec2;
@@ -85,7 +85,7 @@ impl Textures {
             match self.queue(map, library, finder, budget, &mut queue) {
                 Ok(found) => {
                     if found.guessed {
-                        let text = format!("picture '{}' is taken from '{}'", shorten(&map.file), found.path.display());
+                        let text = format!("picture {}", taken_from(&map.file, &found.path));
                         let place = map.line.to_string();
                         warnings.push(Diagnostic::new("mtl-file-elsewhere", library.file, place, text));
                     }
