@@ -17,8 +17,9 @@ use memmap2::MmapMut;
 /// Bytes of a large page.
 const PAGE: usize = 1 << 21;
 
-/// A large page is asked for from this many bytes on, and so it is for what is left over at the end.
-const NEARLY_PAGE: usize = PAGE / 4 * 3;
+/// A large page is asked for from this many bytes on, and so it is for what is left over at the end: no more than twice the
+/// memory.
+const WORTH_PAGE: usize = PAGE / 2;
 
 /// A fixed number of `T`, zeros at first.
 pub(crate) struct Paged<T> {
@@ -44,10 +45,10 @@ impl<T: Pod> Paged<T> {
 /// Room for so many bytes in large pages, if it takes some and the system has them.
 #[cfg(target_os = "linux")]
 fn large<T>(bytes: usize) -> Option<Memory<T>> {
-    if bytes < NEARLY_PAGE {
+    if bytes < WORTH_PAGE {
         return None;
     }
-    let whole = if bytes % PAGE >= NEARLY_PAGE { bytes.checked_next_multiple_of(PAGE)? } else { bytes };
+    let whole = if bytes % PAGE >= WORTH_PAGE { bytes.checked_next_multiple_of(PAGE)? } else { bytes };
     // Nothing is ever written to what lies before the first large page and behind the last: it takes no memory.
     let map = MmapMut::map_anon(whole.checked_add(PAGE)?).ok()?;
     let start = map.as_ptr().align_offset(PAGE);
@@ -132,13 +133,13 @@ mod tests {
     #[test]
     #[cfg(target_os = "linux")]
     fn large_arrays_begin_where_large_pages_do() {
-        for bytes in [NEARLY_PAGE, PAGE, 3 * PAGE + 5] {
+        for bytes in [WORTH_PAGE, PAGE, 3 * PAGE + 5] {
             let bytes = Paged::<u8>::zeroed(bytes);
             // A kernel without large pages refuses.
             if let Memory::Large(..) = bytes.memory {
                 assert_eq!(bytes.as_ptr().align_offset(PAGE), 0);
             }
         }
-        assert!(matches!(Paged::<u8>::zeroed(NEARLY_PAGE - 1).memory, Memory::Usual(_)));
+        assert!(matches!(Paged::<u8>::zeroed(WORTH_PAGE - 1).memory, Memory::Usual(_)));
     }
 }

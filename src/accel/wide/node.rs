@@ -127,15 +127,26 @@ impl Block {
     pub(super) const EMPTY: Self = Self { corners: NO_CORNERS, prims: [NO_PRIM; LANES] };
 }
 
+/// A cache line.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C, align(64))]
+struct Line([u32; 16]);
+
+/// Cache lines of a node.
+const OF_NODE: usize = size_of::<Node>() / size_of::<Line>();
+
+/// Cache lines of a block.
+const OF_BLOCK: usize = size_of::<Block>() / size_of::<Line>();
+
 /// Everything in arrays.
 #[derive(Clone, Debug)]
 pub(super) struct Arrays {
-    /// The first is the root; there is none when there are no bounded prims.
-    pub nodes: Paged<Node>,
-    pub blocks: Paged<Block>,
+    /// The lines of all nodes, then those of all blocks: in one piece, so that they share large pages.
+    lines: Paged<Line>,
+    nodes: usize,
     /// Other prims than triangles: (first, number) in [`Self::prims`].
-    pub runs: Vec<(u32, u32)>,
-    pub prims: Vec<u32>,
+    runs: Vec<(u32, u32)>,
+    prims: Vec<u32>,
     /// Around everything.
     bounds: Aabb,
     /// Largest coordinate of a box, in size.
@@ -147,6 +158,7 @@ pub(super) struct Arrays {
 /// [`Arrays`] as they are walked.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tree<'a> {
+    /// The first is the root; there is none when there are no bounded prims.
     pub nodes: &'a [Node],
     pub blocks: &'a [Block],
     pub runs: &'a [(u32, u32)],
@@ -156,27 +168,30 @@ pub(super) struct Tree<'a> {
     pub depth: u32,
 }
 
-impl Default for Arrays {
-    fn default() -> Self {
-        Self::new(Paged::default(), Paged::default(), (Vec::new(), Vec::new()), Aabb::EMPTY)
-    }
-}
-
 impl Arrays {
-    /// With what walks must know of the whole.
-    pub(super) fn new(
-        nodes: Paged<Node>,
-        blocks: Paged<Block>,
-        (runs, prims): (Vec<(u32, u32)>, Vec<u32>),
-        bounds: Aabb,
-    ) -> Self {
+    /// These nodes, of which the first is the root, in these bounds, and room for so many blocks.
+    pub(super) fn new(nodes: &[Node], blocks: usize, bounds: Aabb) -> Self {
+        let of_nodes = OF_NODE * nodes.len();
+        let mut lines = Paged::zeroed(of_nodes + OF_BLOCK * blocks);
+        lines[..of_nodes].copy_from_slice(bytemuck::cast_slice(nodes));
         let extent = bounds.lo.abs().max(bounds.hi.abs()).max_element();
-        let depth = if nodes.is_empty() { 0 } else { depth_below(&nodes, 0) };
-        Self { nodes, blocks, runs, prims, bounds, extent, depth }
+        let depth = if nodes.is_empty() { 0 } else { depth_below(nodes, 0) };
+        Self { lines, nodes: nodes.len(), runs: Vec::new(), prims: Vec::new(), bounds, extent, depth }
+    }
+
+    /// With runs of these prims.
+    pub(super) fn with_runs(self, runs: Vec<(u32, u32)>, prims: Vec<u32>) -> Self {
+        Self { runs, prims, ..self }
+    }
+
+    pub(super) fn blocks_mut(&mut self) -> &mut [Block] {
+        bytemuck::cast_slice_mut(&mut self.lines[OF_NODE * self.nodes..])
     }
 
     pub(super) fn tree(&self) -> Tree<'_> {
-        let Self { nodes, blocks, runs, prims, bounds, extent, depth } = self;
+        let Self { lines, nodes, runs, prims, bounds, extent, depth } = self;
+        let (nodes, blocks) = lines.split_at(OF_NODE * nodes);
+        let (nodes, blocks) = (bytemuck::cast_slice(nodes), bytemuck::cast_slice(blocks));
         Tree { nodes, blocks, runs, prims, bounds: *bounds, extent: *extent, depth: *depth }
     }
 }

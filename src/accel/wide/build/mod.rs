@@ -25,7 +25,6 @@ use crate::accel::Shapes;
 use crate::math::aabb::Aabb;
 use crate::math::simd::LANES;
 use crate::math::triangles::set_corners;
-use crate::pages::Paged;
 
 /// Prims of a run at most: they cost more than a triangle, and are tested one by one.
 const RUN: u32 = 2;
@@ -39,7 +38,7 @@ const ROOM: usize = 32;
 /// Builds the tree over all bounded prims.
 pub(super) fn build(shapes: &Shapes, splitting: Splitting) -> Arrays {
     if shapes.bounded() == 0 {
-        return Arrays::default();
+        return Arrays::new(&[], 0, Aabb::EMPTY);
     }
     let triangles = shapes.triangles.len();
     let (grown, prims) = binary_tree(shapes, splitting);
@@ -51,10 +50,13 @@ pub(super) fn build(shapes: &Shapes, splitting: Splitting) -> Arrays {
     }
     let leaves = Leaves::list(&mut knots, &prims, index(triangles));
     let bounds = knots.first().map_or(Aabb::EMPTY, Knot::bounds);
-    let nodes = Paged::from(&*collapse::nodes(&knots));
+    let nodes = collapse::nodes(&knots);
     drop(knots);
-    let blocks = leaves.blocks(shapes, &prims);
-    Arrays::new(nodes, blocks, (leaves.runs, prims[triangles..].to_vec()), bounds)
+    // Empty slots lead to block 0, and a ray that no box can turn away goes there too.
+    let mut arrays = Arrays::new(&nodes, leaves.blocks.len().max(1), bounds);
+    drop(nodes);
+    leaves.fill(arrays.blocks_mut(), shapes, &prims);
+    arrays.with_runs(leaves.runs, prims[triangles..].to_vec())
 }
 
 /// Knots on the longest way down.
@@ -173,15 +175,13 @@ impl Leaves {
         all
     }
 
-    fn blocks(&self, shapes: &Shapes, prims: &[u32]) -> Paged<Block> {
+    /// Makes the blocks; where there are none, one without triangles.
+    fn fill(&self, blocks: &mut [Block], shapes: &Shapes, prims: &[u32]) {
         if self.blocks.is_empty() {
-            // Empty slots lead to block 0, and a ray that no box can turn away goes there too.
-            return [Block::EMPTY][..].into();
+            return blocks.fill(Block::EMPTY);
         }
-        let mut blocks = Paged::zeroed(self.blocks.len());
         let places = blocks.par_iter_mut().with_min_len(CHUNK).zip(&self.blocks);
         places.for_each(|(place, &of)| *place = block(shapes, part(prims, of)));
-        blocks
     }
 }
 
