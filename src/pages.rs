@@ -43,22 +43,17 @@ impl<T: Pod> Paged<T> {
 }
 
 /// Room for so many bytes in large pages, if it takes some and the system has them.
-#[cfg(target_os = "linux")]
 fn large<T>(bytes: usize) -> Option<Memory<T>> {
-    if bytes < WORTH_PAGE {
+    if !cfg!(target_os = "linux") || bytes < WORTH_PAGE {
         return None;
     }
     let whole = if bytes % PAGE >= WORTH_PAGE { bytes.checked_next_multiple_of(PAGE)? } else { bytes };
     // Nothing is ever written to what lies before the first large page and behind the last: it takes no memory.
     let map = MmapMut::map_anon(whole.checked_add(PAGE)?).ok()?;
     let start = map.as_ptr().align_offset(PAGE);
+    #[cfg(target_os = "linux")]
     map.advise_range(memmap2::Advice::HugePage, start, whole).ok()?;
     Some(Memory::Large(map, start))
-}
-
-#[cfg(not(target_os = "linux"))]
-fn large<T>(_: usize) -> Option<Memory<T>> {
-    None
 }
 
 impl<T: Pod> Deref for Paged<T> {
