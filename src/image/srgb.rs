@@ -1,7 +1,7 @@
 //! The sRGB transfer function (IEC 61966-2-1:1999) between linear light and coded values, rounded correctly.
 //!
 //! Exact codes go by thresholds: code `c` begins at the linear value whose exact code is `c - 1/2`. They are found once
-//! with `libm`, so the same linear value has the same code on every machine. Most 8-bit codes need none: [`curve`] is exact
+//! with `libm`, so the same linear value has the same code on every machine. Most 8-bit codes need none: a polynomial is exact
 //! enough to be sure of them, and thresholds decide the others.
 
 use std::sync::LazyLock;
