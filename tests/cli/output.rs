@@ -228,9 +228,9 @@ fn the_memory_of_a_picture_is_foretold_and_held_to_its_limit() {
 #[test]
 fn a_picture_of_a_given_error_is_foretold_to_be_held_twice() {
     let folder = Folder::with_cube();
-    let words = ["cube.obj", "--size", "2000x2000", "--dry-run", "--max-memory", "250M"];
-    folder.render(&words).ends(0);
-    let run = folder.render(&[&words[..], &["--target-error", "0.01"]].concat()).ends(1);
+    let words = ["render", "cube.obj", "--size", "2000x2000", "--dry-run", "--max-memory", "250M"];
+    folder.run(&words).ends(0);
+    let run = folder.run(&[&words[..], &["--target-error", "0.01"]].concat()).ends(1);
     run.says(&["a 2000×2000 picture needs 320000000 bytes", "--max-memory"]);
 }
 
