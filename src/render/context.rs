@@ -6,7 +6,7 @@ use super::certainty;
 use super::frame::sample_width;
 use super::glint;
 use super::sampling::Sampling;
-use super::shade::{Band, LocalLight, bands, lets_light_in};
+use super::shade::{Band, LocalLight, bands};
 use super::sky::Sky;
 use super::strip::Common;
 use super::texture::TextureStore;
@@ -112,7 +112,7 @@ impl Gloss {
 
     /// Whether a material spreads rays where it is rough.
     pub(crate) fn spreads(self, material: &Material) -> bool {
-        self.all || self.rays > 0 && lets_light_in(material)
+        self.all || self.rays > 0 && material.surface.transmits()
     }
 }
 

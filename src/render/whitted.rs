@@ -18,7 +18,7 @@ use super::eyes::Eyes;
 use super::glint;
 use super::layers::Facts;
 use super::observer::Observer;
-use super::shade::{Incident, LocalLight, Matter, Reader, lets_light_in};
+use super::shade::{Incident, LocalLight, Matter, Reader};
 use super::shadow::Shadows;
 use super::sky::{Arounds, Standpoint};
 use super::surface::{Surface, Target};
@@ -234,7 +234,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let mut surface = Surface::new(context.world, target, ray, hit, width);
 
         // Pass what is not there: backs of one-sided faces, absent texels, and part of what is blended.
-        if !surface.front && !material.double_sided && !lets_light_in(material) {
+        if !surface.front && !material.double_sided && !material.surface.transmits() {
             return self.continuing[class as usize].push(*ray, *path, *hit);
         }
         let reader = Reader { store: context.textures, patch: surface.patch.as_ref() };

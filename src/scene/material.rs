@@ -359,7 +359,7 @@ impl Material {
 }
 
 impl Surface {
-    /// Whether light passes it as it passes glass.
+    /// Whether light passes it as it passes glass: rays can enter it, and its back faces are seen from inside.
     pub fn transmits(&self) -> bool {
         match self {
             Self::MetalRough(m) => m.transmission > 0.0,

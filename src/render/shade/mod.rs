@@ -426,16 +426,7 @@ pub(crate) fn shadow_filter(material: &Material, reader: &Reader) -> Vec3 {
 
 /// Whether a material has an inside: back faces of what is thin are seen from outside, too.
 pub(crate) fn has_inside(material: &Material) -> bool {
-    lets_light_in(material) && material.metal_rough().is_none_or(|m| m.thick)
-}
-
-/// Whether rays can enter a material, so that its back faces are seen from inside.
-pub(crate) fn lets_light_in(material: &Material) -> bool {
-    match &material.surface {
-        Reflection::MetalRough(m) => m.transmission > 0.0,
-        Reflection::Phong(p) => p.transmission.max_element() > 0.0,
-        Reflection::Unlit => false,
-    }
+    material.surface.transmits() && material.metal_rough().is_none_or(|m| m.thick)
 }
 
 /// How much of a light a mapped surface shows near the line where it turns away from it: 1 away from that line, 0 on it, so

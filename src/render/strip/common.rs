@@ -2,7 +2,7 @@
 
 use super::sheet::Sheet;
 use crate::render::context::{Gloss, coverage};
-use crate::render::shade::{Matter, Model, has_inside, lets_light_in};
+use crate::render::shade::{Matter, Model, has_inside};
 use crate::render::texture::TextureStore;
 use crate::scene::{Material, MetalRough};
 
@@ -50,7 +50,7 @@ impl Common {
             return None;
         }
         let mut matter = Matter::without_maps(material, store);
-        let glass = lets_light_in(material);
+        let glass = material.surface.transmits();
         if glass {
             metal_rough.filter(|_| bounces && gloss.spreads(material))?;
             matter.spread_by_rays();
