@@ -1,0 +1,105 @@
+//! Which model, and how it is loaded.
+
+use super::super::parse;
+use super::MessageFormat;
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+
+/// One model and how to load it.
+#[derive(Debug, Clone, Args)]
+pub(in crate::cli) struct ModelArgs {
+    /// A model or scene file; `-` reads standard input
+    #[arg(value_name = "FILE")]
+    pub input: PathBuf,
+    /// How.
+    #[command(flatten)]
+    pub load: LoadArgs,
+}
+
+/// How to load a model that is not rendered.
+#[derive(Debug, Clone, Args)]
+pub(in crate::cli) struct LoadArgs {
+    /// Which scene of a glTF file, by name or number from 0
+    #[arg(long, value_name = "NAME")]
+    pub scene: Option<String>,
+    /// Which materials of a glTF file that offers variants, by name or number from 0 (`inspect` lists them)
+    #[arg(long, value_name = "NAME")]
+    pub variant: Option<String>,
+    /// Which moment of an animation.
+    #[command(flatten)]
+    pub moment: MomentArgs,
+    /// What becomes of OBJ and PLY faces with more than three corners
+    #[arg(long, value_name = "HOW", value_enum, default_value_t)]
+    pub polygons: PolygonsArg,
+    /// Give meshes without normals smooth ones, but for edges at which faces lean by more than so many degrees, 30 when
+    /// none are given
+    #[arg(long, value_name = "DEGREES", value_parser = parse::lean, num_args = 0..=1, require_equals = true,
+          default_missing_value = "30")]
+    pub smooth: Option<f64>,
+    /// How wide points and lines are, units of the model [default: 1/256 of its diagonal, less where there are very many]
+    #[arg(long, value_name = "WIDTH", value_parser = parse::above_zero)]
+    pub line_width: Option<f64>,
+    /// Understand MTL files as exporters mean them, or to the letter
+    #[arg(long, value_name = "HOW", value_enum, default_value_t)]
+    pub mtl: MtlArg,
+    /// Axis that points up in the file
+    #[arg(long, value_name = "AXIS", value_enum)]
+    pub up: Option<Axis>,
+    /// Read other files only below this folder [default: the model's folder]
+    #[arg(long, value_name = "DIR")]
+    pub root: Option<PathBuf>,
+    /// Refuse inputs that need more memory than this, such as 2G or 500M
+    #[arg(long, value_name = "SIZE", value_parser = parse::bytes)]
+    pub max_memory: Option<u64>,
+    /// How messages are written to standard error
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub messages: MessageFormat,
+}
+
+/// Which moment of an animation is shown; without any of it, the rest pose.
+#[derive(Debug, Clone, Args)]
+pub(in crate::cli) struct MomentArgs {
+    /// Animation of a glTF file, by name or number from 0 [default: the first, where a time is given]
+    #[arg(long, value_name = "NAME", help_heading = "Animation", hide_short_help = true)]
+    pub animation: Option<String>,
+    /// Pose at this time of the animation, such as 1.5, 1.5s or 250ms; past its end, the last one
+    #[arg(long, value_name = "TIME", value_parser = parse::time, help_heading = "Animation", hide_short_help = true,
+          conflicts_with = "frame")]
+    pub time: Option<f64>,
+    /// The same by a number from 0: the pose at N / FPS seconds. The camera is framed on that pose, so that for a
+    /// sequence it has to be fixed, by --eye, --camera or --frames
+    #[arg(long, value_name = "N", help_heading = "Animation", hide_short_help = true)]
+    pub frame: Option<u32>,
+    /// Frames a second [default: 24]
+    #[arg(long, value_name = "FPS", value_parser = parse::above_zero, help_heading = "Animation", hide_short_help = true)]
+    pub fps: Option<f64>,
+}
+
+/// An up axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(in crate::cli) enum Axis {
+    /// +Y, as glTF and most OBJ exporters
+    Y,
+    /// +Z, as CAD programs, printers and scanners
+    Z,
+}
+
+/// `--polygons`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(in crate::cli) enum PolygonsArg {
+    /// Cut into triangles
+    #[default]
+    Cut,
+    /// Planar ones stay whole
+    Whole,
+}
+
+/// `--mtl`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(in crate::cli) enum MtlArg {
+    /// Replace values that exporters write carelessly, with a warning each
+    #[default]
+    Guess,
+    /// What the text says
+    Literal,
+}

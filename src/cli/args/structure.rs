@@ -1,0 +1,39 @@
+//! Parameters of a structure.
+
+use super::super::parse;
+use crate::accel::{Assign, MailboxKind};
+use clap::Args;
+
+/// Parameters of the structures; what is left out follows from the kind of structure.
+#[derive(Debug, Clone, Args)]
+pub(in crate::cli) struct AccelArgs {
+    /// Cells of the grid per shape [default: 0.25 where crowded cells are refined, 4 for `grid`]
+    #[arg(long, value_name = "RATIO", help_heading = "Structure", hide_short_help = true)]
+    pub grid_density: Option<f64>,
+    /// Most cells of the grid along an axis [default: 256]
+    #[arg(long, value_name = "N", help_heading = "Structure", hide_short_help = true)]
+    pub grid_resolution: Option<u32>,
+    /// Most octree levels below a cell of the grid [default: 8; 10 for `octree`]
+    #[arg(long, value_name = "N", help_heading = "Structure", hide_short_help = true)]
+    pub max_depth: Option<u32>,
+    /// Cost of visiting a cell, counted in tests; cells are split when that should pay [default: 4]
+    #[arg(long, value_name = "COST", help_heading = "Structure", hide_short_help = true)]
+    pub step_cost: Option<f64>,
+    /// Most shapes in a leaf [default: 2 for `bvh` and `grid-bvh`; octrees go by --step-cost]
+    #[arg(long, value_name = "N", help_heading = "Structure", hide_short_help = true)]
+    pub leaf_size: Option<u32>,
+    /// Cells of the grid on each axis, such as 46x46x3, whatever the density
+    #[arg(long, value_name = "XxYxZ", value_parser = parse::cells, help_heading = "Structure", hide_short_help = true)]
+    pub grid_cells: Option<[u32; 3]>,
+    /// Most references per shape in the cells of octrees [default: 12]
+    #[arg(long, value_name = "N", help_heading = "Structure", hide_short_help = true)]
+    pub max_references: Option<f64>,
+    /// What puts a shape into a cell: its surface or its box (grids and octrees)
+    #[arg(long, value_name = "WHAT", value_parser = parse::assign(), default_value = Assign::Surface.name(),
+          help_heading = "Structure", hide_short_help = true)]
+    pub assign: Assign,
+    /// What a ray remembers of the shapes it met, so that they are tested once (grids and octrees)
+    #[arg(long, value_name = "KIND", value_parser = parse::mailbox(), default_value = MailboxKind::Exact.name(),
+          help_heading = "Structure", hide_short_help = true)]
+    pub mailbox: MailboxKind,
+}
