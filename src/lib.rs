@@ -60,6 +60,7 @@
 //! | [`image`] | linear pixels <-> files: tone mapping, formats, metadata, differences |
 //! | [`mod@bench`] | measures and compares: hard rays, exact answers, what came out |
 //! | [`stopwatch`] | time on the wall and of the processor |
+//! | [`pages`] | arrays in large pages
 //! | [`threads`] | worker threads, each on a processor of its own |
 //! | `cli` | words -> jobs -> messages and exit codes (feature `cli`) |
 //!
@@ -82,7 +83,7 @@ pub mod generate;
 pub mod image;
 pub mod load;
 pub mod math;
-mod pages;
+pub mod pages;
 pub mod render;
 pub mod save;
 pub mod scene;

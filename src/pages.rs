@@ -6,7 +6,8 @@
 //! `madvise` or `always`; elsewhere these are arrays like others.
 //!
 //! For arrays that are written and read once from end to end large pages do not pay (measured: loading and building took
-//! longer): two megabytes are cleared at once, long before the last of them is written.
+//! longer): two megabytes are cleared at once, long before the last of them is written. Pictures are decoded into them all
+//! the same, since lookups read them for as long as the picture takes.
 
 use std::fmt;
 use std::ops::{Deref, DerefMut};
@@ -21,8 +22,8 @@ const PAGE: usize = 1 << 21;
 /// memory.
 const WORTH_PAGE: usize = PAGE / 2;
 
-/// A fixed number of `T`, zeros at first.
-pub(crate) struct Paged<T> {
+/// A fixed number of `T`.
+pub struct Paged<T> {
     memory: Memory<T>,
     len: usize,
 }
@@ -35,7 +36,7 @@ enum Memory<T> {
 
 impl<T: Pod> Paged<T> {
     /// So many zeros.
-    pub(crate) fn zeroed(len: usize) -> Self {
+    pub fn zeroed(len: usize) -> Self {
         let large = len.checked_mul(size_of::<T>()).and_then(large);
         let memory = large.unwrap_or_else(|| Memory::Usual(bytemuck::zeroed_vec(len)));
         Self { memory, len }
@@ -54,6 +55,25 @@ fn large<T>(bytes: usize) -> Option<Memory<T>> {
     #[cfg(target_os = "linux")]
     map.advise_range(memmap2::Advice::HugePage, start, whole).ok()?;
     Some(Memory::Large(map, start))
+}
+
+impl<T> From<Vec<T>> for Paged<T> {
+    /// What is there already stays where it is.
+    fn from(items: Vec<T>) -> Self {
+        Self { len: items.len(), memory: Memory::Usual(items) }
+    }
+}
+
+impl<T> FromIterator<T> for Paged<T> {
+    fn from_iter<I: IntoIterator<Item = T>>(items: I) -> Self {
+        Vec::from_iter(items).into()
+    }
+}
+
+impl<T> Default for Paged<T> {
+    fn default() -> Self {
+        Vec::new().into()
+    }
 }
 
 impl<T: Pod> Deref for Paged<T> {

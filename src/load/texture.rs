@@ -6,9 +6,11 @@
 
 use super::limits::{Budget, Limits};
 use super::{Diagnostic, Warnings, ktx};
+use crate::pages::Paged;
 use crate::scene::{Bitmap, Pixels};
 use crate::stopwatch::{Spent, Stopwatch};
 use ::image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
+use bytemuck::Pod;
 use rayon::prelude::*;
 use std::io::Cursor;
 use std::path::Path;
@@ -212,9 +214,22 @@ fn decode(name: &str, bytes: &[u8], kind: Kind) -> Result<Bitmap, Unusable> {
     let Kind::Image { format, bytes: most } = kind else { return Ok(ktx::decode(name, bytes)?) };
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     reader.limits(within(most));
-    let image = reader.decode()?;
-    let (width, height) = (image.width(), image.height());
-    Ok(Bitmap { name: name.into(), width, height, pixels: pixels_of(image) })
+    let decoder = reader.into_decoder()?;
+    let (width, height) = decoder.dimensions();
+    let pixels = match decoder.color_type() {
+        // What most pictures are: they are decoded to where they stay.
+        ColorType::Rgb8 => Pixels::Rgb8(texels_of(decoder)?),
+        ColorType::Rgba8 => Pixels::Rgba8(texels_of(decoder)?),
+        _ => pixels_of(DynamicImage::from_decoder(decoder)?),
+    };
+    Ok(Bitmap { name: name.into(), width, height, pixels })
+}
+
+/// What a decoder gives whose pixels are `T`.
+fn texels_of<T: Pod>(decoder: impl ImageDecoder) -> Result<Paged<T>, Unusable> {
+    let mut texels = Paged::zeroed(usize::try_from(decoder.total_bytes()).map_or(0, |bytes| bytes / size_of::<T>()));
+    decoder.read_image(bytemuck::cast_slice_mut(&mut texels))?;
+    Ok(texels)
 }
 
 /// Whether its pixels are kept with 16 bits a channel.
@@ -224,10 +239,8 @@ fn is_deep(color: ColorType) -> bool {
 
 fn pixels_of(image: DynamicImage) -> Pixels {
     match image {
-        // What most pictures are: they stay as the decoder left them.
-        DynamicImage::ImageRgb8(image) => Pixels::Rgb8(image.into_raw()),
         image if is_deep(image.color()) => Pixels::Rgba16(image.into_rgba16().pixels().map(|p| p.0).collect()),
-        image => Pixels::Rgba8(image.into_rgba8().as_raw().as_chunks::<4>().0.to_vec()),
+        image => Pixels::Rgba8(image.into_rgba8().as_raw().as_chunks::<4>().0.to_vec().into()),
     }
 }
 
@@ -281,7 +294,7 @@ mod tests {
         let image = ::image::RgbaImage::from_fn(3, 2, |x, y| ::image::Rgba([x as u8 * 90, y as u8 * 200, 7, 255]));
         let image = DynamicImage::ImageRgba8(image);
         let read = |name: &str, bytes: &[u8]| match decode_named(name, bytes, &Limits::default()).0?.pixels {
-            Pixels::Rgba8(texels) => Some(texels),
+            Pixels::Rgba8(texels) => Some(texels.to_vec()),
             other => panic!("{other:?}"),
         };
         let (bmp, tga) = (file(&image, ImageFormat::Bmp), file(&image, ImageFormat::Tga));

@@ -28,7 +28,7 @@ pub(super) static GREY: LazyLock<Bitmap> = LazyLock::new(|| Bitmap {
     name: String::new(),
     width: 256,
     height: 256,
-    pixels: Pixels::Rgba8(vec![[128, 128, 255, 255]; 256 * 256]),
+    pixels: Pixels::Rgba8(vec![[128, 128, 255, 255]; 256 * 256].into()),
 });
 
 const fn stand_in() -> TextureRef {

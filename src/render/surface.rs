@@ -372,7 +372,7 @@ mod tests {
             meshes: vec![mesh],
             instances: vec![Instance { name: String::new(), mesh: 0, world_from_object: DAffine3::IDENTITY }],
             materials: vec![Material::plain()],
-            bitmaps: vec![Bitmap { name: String::new(), width, height, pixels: Pixels::Rgba8(texels) }],
+            bitmaps: vec![Bitmap { name: String::new(), width, height, pixels: Pixels::Rgba8(texels.into()) }],
             textures: vec![Texture { bitmap: 0, sampler: Sampler::default() }],
             ..Scene::default()
         }

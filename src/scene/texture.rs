@@ -1,5 +1,7 @@
 //! Pictures that cover surfaces.
 
+use crate::pages::Paged;
+
 /// A bitmap and how to read between and beyond its texels.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Texture {
@@ -87,15 +89,15 @@ impl Bitmap {
 #[derive(Clone, Debug)]
 pub enum Pixels {
     /// 8 bits a channel, RGB, opaque: three bytes each.
-    Rgb8(Vec<u8>),
+    Rgb8(Paged<u8>),
     /// 8 bits a channel, RGBA.
-    Rgba8(Vec<[u8; 4]>),
+    Rgba8(Paged<[u8; 4]>),
     /// 16 bits a channel, RGBA.
-    Rgba16(Vec<[u16; 4]>),
+    Rgba16(Paged<[u16; 4]>),
 }
 
 impl Default for Pixels {
     fn default() -> Self {
-        Self::Rgba8(Vec::new())
+        Self::Rgba8(Paged::default())
     }
 }

@@ -42,15 +42,15 @@ pub(super) fn pixels_of(layout: Layout, bytes: &[u8], width: u32, height: u32) -
     }
     let (width, height) = (width as usize, height as usize);
     Ok(match layout {
-        Layout::Rgb => Pixels::Rgb8(bytes.to_vec()),
-        Layout::Rgba => Pixels::Rgba8(bytes.as_chunks::<4>().0.to_vec()),
-        Layout::Bc1 { alpha: true } => Pixels::Rgba8(blocks::<8>(bytes, width, height, ::bcdec_rs::bc1)),
+        Layout::Rgb => Pixels::Rgb8(bytes.to_vec().into()),
+        Layout::Rgba => Pixels::Rgba8(bytes.as_chunks::<4>().0.to_vec().into()),
+        Layout::Bc1 { alpha: true } => Pixels::Rgba8(blocks::<8>(bytes, width, height, ::bcdec_rs::bc1).into()),
         Layout::Bc1 { alpha: false } => {
             let texels = blocks::<8>(bytes, width, height, ::bcdec_rs::bc1);
             Pixels::Rgb8(texels.into_iter().flat_map(|[r, g, b, _]| [r, g, b]).collect())
         }
-        Layout::Bc3 => Pixels::Rgba8(blocks::<16>(bytes, width, height, ::bcdec_rs::bc3)),
-        Layout::Bc7 => Pixels::Rgba8(blocks::<16>(bytes, width, height, ::bcdec_rs::bc7)),
+        Layout::Bc3 => Pixels::Rgba8(blocks::<16>(bytes, width, height, ::bcdec_rs::bc3).into()),
+        Layout::Bc7 => Pixels::Rgba8(blocks::<16>(bytes, width, height, ::bcdec_rs::bc7).into()),
         Layout::Blocks16 => return Err("its blocks are of an unknown kind".into()),
     })
 }

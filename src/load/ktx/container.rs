@@ -86,7 +86,7 @@ impl<'a> Container<'a> {
         }
         let texels = texels.as_chunks::<4>().0;
         Ok(match transcoder.has_alpha() {
-            true => Pixels::Rgba8(texels.to_vec()),
+            true => Pixels::Rgba8(texels.to_vec().into()),
             false => Pixels::Rgb8(texels.iter().flat_map(|&[r, g, b, _]| [r, g, b]).collect()),
         })
     }

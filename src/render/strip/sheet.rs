@@ -355,7 +355,7 @@ mod tests {
 
     #[test]
     fn maps_with_two_kinds_of_coordinates_are_read_together_and_those_with_three_are_not() {
-        let pixels = Pixels::Rgb8(vec![90; 3]);
+        let pixels = Pixels::Rgb8(vec![90; 3].into());
         let scene = Scene {
             bitmaps: vec![Bitmap { name: String::new(), width: 1, height: 1, pixels }],
             textures: vec![Texture { bitmap: 0, sampler: Sampler::default() }],

@@ -39,7 +39,7 @@ fn lacquered(normals: Option<[[u8; 3]; 2]>, direction: DVec3) -> Stage {
     let uvs = vec![vec![Vec2::new(0.0, 1.0), Vec2::ONE, Vec2::new(1.0, 0.0), Vec2::ZERO]];
     s.mesh(Mesh { uvs, ..square(0.0, 4.0) }, DAffine3::IDENTITY, material);
     if let Some(normals) = normals {
-        let pixels = Pixels::Rgb8(normals.concat());
+        let pixels = Pixels::Rgb8(normals.concat().into());
         s.scene.bitmaps.push(Bitmap { name: String::new(), width: 2, height: 1, pixels });
         let sampler = Sampler { magnify: Filter::Nearest, wrap_u: Wrap::Repeat, ..Sampler::default() };
         s.scene.textures.push(Texture { bitmap: 0, sampler });

@@ -170,12 +170,12 @@ impl Pictures {
         let Bitmap { name, width, height, .. } = &self.sources[i];
         let mut pixels = Vec::with_capacity(*width as usize * *height as usize);
         each(&self.sources[i], |p| pixels.push(to16(grey(to_srgb(pick(p, channel))))));
-        Bitmap { name: name.clone(), width: *width, height: *height, pixels: Pixels::Rgba16(pixels) }
+        Bitmap { name: name.clone(), width: *width, height: *height, pixels: Pixels::Rgba16(pixels.into()) }
     }
 
     fn rough_metal(&self, rough: Option<(usize, Channel)>, metal: Option<(usize, Channel)>) -> Bitmap {
         let texel = |[rough, metal]: [Option<f32>; 2]| to8([1.0, rough.unwrap_or(1.0), metal.unwrap_or(1.0), 1.0]);
-        self.pair([rough, metal], texel, Pixels::Rgba8)
+        self.pair([rough, metal], texel, |texels| Pixels::Rgba8(texels.into()))
     }
 
     /// In sixteen bits, so that a grain that is not turned is not turned.
@@ -185,7 +185,7 @@ impl Pictures {
             let (sin, cos) = libm::sincos(f64::from(turn.unwrap_or(0.0)) * most * std::f64::consts::TAU);
             to16([0.5 + 0.5 * cos as f32, 0.5 + 0.5 * sin as f32, strength.unwrap_or(1.0), 1.0])
         };
-        self.pair([strength, turn], texel, Pixels::Rgba16)
+        self.pair([strength, turn], texel, |texels| Pixels::Rgba16(texels.into()))
     }
 
     /// A bitmap made of the values of two pictures at each texel.
@@ -286,14 +286,14 @@ mod tests {
     fn pictures(bitmaps: &[(u32, u32, &[[u8; 4]])]) -> Pictures {
         let mut out = Pictures::default();
         for &(width, height, texels) in bitmaps {
-            out.add(Bitmap { name: "p".into(), width, height, pixels: Pixels::Rgba8(texels.to_vec()) });
+            out.add(Bitmap { name: "p".into(), width, height, pixels: Pixels::Rgba8(texels.to_vec().into()) });
         }
         out
     }
 
     fn texels(pictures: Pictures) -> Vec<Vec<[u8; 4]>> {
         let texels = |bitmap: Bitmap| match bitmap.pixels {
-            Pixels::Rgba8(texels) => texels,
+            Pixels::Rgba8(texels) => texels.to_vec(),
             Pixels::Rgb8(_) | Pixels::Rgba16(_) => Vec::new(),
         };
         pictures.finish().into_iter().map(texels).collect()
@@ -338,7 +338,7 @@ mod tests {
             make(&mut p, take);
         }
         let wide = |bitmap: Bitmap| match bitmap.pixels {
-            Pixels::Rgba16(texels) => texels.into_iter().map(|t| t.map(|c| f32::from(c) / 65535.0)).collect(),
+            Pixels::Rgba16(texels) => texels.iter().map(|t| t.map(|c| f32::from(c) / 65535.0)).collect(),
             other => panic!("{other:?}"),
         };
         let made: Vec<Vec<[f32; 4]>> = p.finish().into_iter().map(wide).collect();
