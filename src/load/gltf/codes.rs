@@ -97,7 +97,7 @@ codes! {
     IncompleteExtensionSupport "INCOMPLETE_EXTENSION_SUPPORT" Accept "told by our own list of what changes the look";
     UnusedExtensionRequired "UNUSED_EXTENSION_REQUIRED" Warn "what is required counts as used";
     NonRequiredExtension "NON_REQUIRED_EXTENSION" Warn "we know it, required or not";
-    MultipleExtensions "MULTIPLE_EXTENSIONS" Accept "unlit counts first, then metallic-roughness";
+    MultipleExtensions "MULTIPLE_EXTENSIONS" Accept "unlit counts first, then specular-glossiness";
 
     // Buffers, views, accessors.
     BufferDataUriMimeTypeInvalid "BUFFER_DATA_URI_MIME_TYPE_INVALID" Warn "the bytes are read all the same";

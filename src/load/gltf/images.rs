@@ -2,12 +2,14 @@
 
 use super::buffers::{Buffers, decode_data, is_data, media_type};
 use super::codes::Code;
+use super::gloss;
 use super::report::Report;
+use super::textures::Picture;
 use crate::load::limits::{Budget, Limits};
 use crate::load::paths::Resolver;
-use crate::load::texture::{Encoded, decode_all, format_of};
+use crate::load::texture::{Encoded, Unusable, decode_all, format_of, take_memory};
 use crate::load::{Diagnostic, ktx};
-use crate::scene::Bitmap;
+use crate::scene::{Bitmap, Pixels};
 use crate::stopwatch::Spent;
 use ::image::ImageFormat;
 use gltf::json::{Index, Root, image::Image, texture::Texture};
@@ -27,14 +29,14 @@ impl<'a> Images<'a> {
     pub(super) fn load(
         root: &Root,
         buffers: &'a Buffers<'a>,
-        drawn: &[usize],
+        drawn: &[Picture],
         file: &Path,
         resolver: &mut Resolver,
         budget: &mut Budget,
         report: &mut Report,
     ) -> Self {
         let mut images = Self { bytes: Vec::new(), same: HashMap::new() };
-        let drawn: HashSet<usize> = drawn.iter().copied().collect();
+        let drawn: HashSet<usize> = drawn.iter().map(|picture| picture.image).collect();
         let mut known: HashMap<&str, usize> = HashMap::new();
         for (i, image) in root.images.iter().enumerate() {
             let named = image.uri.as_deref().filter(|uri| !is_data(uri));
@@ -61,28 +63,49 @@ impl<'a> Images<'a> {
         self.bytes.get(self.same.get(&i).copied().unwrap_or(i)).and_then(Option::as_deref)
     }
 
-    /// Decodes the images with these indices, and tells the time that took.
+    /// Makes these pictures of images that are decoded once each, and tells the time that took.
     pub(super) fn decode(
         &self,
         root: &Root,
-        drawn: &[usize],
+        drawn: &[Picture],
         file: &Path,
         limits: &Limits,
         budget: &mut Budget,
         report: &mut Report,
     ) -> (Vec<Option<Bitmap>>, Spent) {
-        let (mut encoded, mut places) = (Vec::new(), Vec::new());
-        for (k, &i) in drawn.iter().enumerate() {
-            let Some(bytes) = self.of(i) else { continue };
+        let (mut encoded, mut places) = (Vec::new(), HashMap::new());
+        for &Picture { image: i, .. } in drawn {
+            let Some(bytes) = self.of(i).filter(|_| !places.contains_key(&i)) else { continue };
+            places.insert(i, encoded.len());
             let name = root.images.get(i).map(|image| name_of(i, image)).unwrap_or_default();
             encoded.push(Encoded { name, place: format!("images[{i}]"), bytes: Cow::Borrowed(bytes) });
-            places.push(k);
         }
-        let (bitmaps, spent) = decode_all(&encoded, file, limits, budget, &mut report.warnings);
-        let mut out: Vec<Option<Bitmap>> = drawn.iter().map(|_| None).collect();
-        places.into_iter().zip(bitmaps).for_each(|(k, bitmap)| out[k] = bitmap);
-        (out, spent)
+        let (mut bitmaps, spent) = decode_all(&encoded, file, limits, budget, &mut report.warnings);
+        let mut made: Vec<Option<Bitmap>> = drawn.iter().map(|_| None).collect();
+        let place = |picture: &Picture| places.get(&picture.image).copied();
+        for (made, picture) in made.iter_mut().zip(drawn) {
+            let decoded = place(picture).and_then(|at| bitmaps[at].as_ref());
+            let (Some(gloss), Some(bitmap)) = (picture.gloss(), decoded) else { continue };
+            match charge(bitmap, limits, budget) {
+                Ok(()) => *made = Some(gloss::roughness(bitmap, gloss)),
+                Err(why) => {
+                    let place = format!("images[{}]", picture.image);
+                    report.warnings.push(why.warning(&bitmap.name, file, &place));
+                }
+            }
+        }
+        // What is as it was decoded goes last, for then nothing is made of it any more.
+        for (made, picture) in made.iter_mut().zip(drawn).filter(|(_, picture)| picture.gloss().is_none()) {
+            *made = place(picture).and_then(|at| bitmaps[at].take());
+        }
+        (made, spent)
     }
+}
+
+/// Takes what a bitmap as large as this one needs.
+fn charge(bitmap: &Bitmap, limits: &Limits, budget: &mut Budget) -> Result<(), Unusable> {
+    let bytes = if matches!(bitmap.pixels, Pixels::Rgba16(_)) { 8 } else { 4 };
+    take_memory(bitmap.width, bitmap.height, (bytes, 0), limits, budget)
 }
 
 /// Where the bytes of one image are looked for.

@@ -1,8 +1,6 @@
 //! Materials: metallic-roughness with its extensions, and unlit.
 
-use super::codes::Code;
 use super::mesh::Needs;
-use super::report::Report;
 use super::textures::Textures;
 use crate::math::Vec3;
 use crate::scene::{AlphaMode, Coat, Film, Grain, Material, MetalRough, Sheen, Surface, Translucence};
@@ -18,9 +16,10 @@ const VOLUME: &str = "KHR_materials_volume";
 const SPECULAR_GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
 
 /// Converts a material; its maps are noted in `textures`.
-pub(super) fn convert(i: usize, source: &json::Material, textures: &mut Textures, report: &mut Report) -> Material {
+pub(super) fn convert(source: &json::Material, textures: &mut Textures) -> Material {
     let is_unlit = source.extensions.as_ref().is_some_and(|e| e.unlit.is_some());
-    let extension = if is_unlit { None } else { specular_glossiness(i, source, report) };
+    let extensions = source.extensions.as_ref().filter(|_| !is_unlit);
+    let extension = extensions.and_then(|e| e.others.get(SPECULAR_GLOSSINESS));
     let mut material = Material {
         name: source.name.clone().unwrap_or_default(),
         alpha_mode: alpha_mode(source),
@@ -236,36 +235,8 @@ fn info_of(extension: Option<&Value>, name: &str) -> Option<json::texture::Info>
     serde_json::from_value(extension?.get(name)?.clone()).ok()
 }
 
-/// The extension's object, where it is what is drawn: whatever else the material says is a fallback.
-///
-/// Gloss maps are not read, and the number that stands in for one is mostly 1, a mirror: where the material has a
-/// fallback, that is nearer to what is meant.
-fn specular_glossiness<'a>(i: usize, source: &'a json::Material, report: &mut Report) -> Option<&'a Value> {
-    let extension = source.extensions.as_ref()?.others.get(SPECULAR_GLOSSINESS)?;
-    if extension.get("specularGlossinessTexture").is_none() {
-        return Some(extension);
-    }
-    let has_fallback = says_metal_rough(source);
-    let text = if has_fallback {
-        "the gloss in the alpha of specularGlossinessTexture is not read; pbrMetallicRoughness is drawn instead"
-    } else {
-        "the gloss in the alpha of specularGlossinessTexture is drawn as constant"
-    };
-    report.warn(Code::IncompleteExtensionSupport, format!("materials[{i}].extensions.{SPECULAR_GLOSSINESS}"), text);
-    (!has_fallback).then_some(extension)
-}
-
-/// Whether a material says anything in metallic-roughness terms.
-fn says_metal_rough(source: &json::Material) -> bool {
-    let pbr = &source.pbr_metallic_roughness;
-    pbr.base_color_texture.is_some()
-        || pbr.metallic_roughness_texture.is_some()
-        || pbr.base_color_factor.0 != [1.0; 4]
-        || (pbr.metallic_factor.0, pbr.roughness_factor.0) != (1.0, 1.0)
-}
-
 /// KHR_materials_pbrSpecularGlossiness as a dielectric whose reflection has the given colour at normal incidence, the
-/// way KHR_materials_ior describes for its special index 0. Gloss maps are read as constant.
+/// way KHR_materials_ior describes for its special index 0. What else the material says is a fallback.
 fn from_specular_glossiness(extension: &Value, material: &mut Material, textures: &mut Textures) -> MetalRough {
     let number = |name: &str, k: Option<usize>| {
         let value = extension.get(name)?;
@@ -278,9 +249,13 @@ fn from_specular_glossiness(extension: &Value, material: &mut Material, textures
     material.opacity = number("diffuseFactor", Some(3)).unwrap_or(1.0);
     material.base_color_map = map("diffuseTexture");
     let specular_color_map = map("specularGlossinessTexture");
+    let gloss = number("glossinessFactor", None).unwrap_or(1.0);
+    let metal_rough_map = textures.roughness(info_of(Some(extension), "specularGlossinessTexture").as_ref(), gloss);
     MetalRough {
         metallic: 0.0,
-        roughness: 1.0 - number("glossinessFactor", None).unwrap_or(1.0),
+        // The map has all of it.
+        roughness: if metal_rough_map.is_some() { 1.0 } else { 1.0 - gloss },
+        metal_rough_map,
         specular_color: color("specularFactor"),
         specular_color_map,
         ior: 0.0,

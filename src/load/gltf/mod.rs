@@ -33,6 +33,7 @@ mod draco_stream;
 mod draco_survey;
 mod extensions;
 mod faces;
+mod gloss;
 mod graph;
 mod images;
 mod links;
@@ -171,16 +172,16 @@ impl Loading<'_> {
         let placed = placed.map_err(|over| self.too_large("what the nodes show", over))?;
         let skins = skin::joint_matrices(reader, graph, self.report);
         skin::check_scene(root, graph, facts.scene_index, &placed.draws, self.report);
-        let palette = Palette::new(root, &placed, facts.variant, self.report);
+        let palette = Palette::new(root, &placed, facts.variant);
 
-        let drawn_images = palette.textures.images.clone();
-        let read_images = if self.options.without_pictures { &[][..] } else { &drawn_images };
-        let images = Images::load(root, &buffers, read_images, file, &mut resolver, budget, self.report);
+        let drawn = palette.textures.pictures.clone();
+        let read = if self.options.without_pictures { &[][..] } else { &drawn };
+        let images = Images::load(root, &buffers, read, file, &mut resolver, budget, self.report);
         self.charge(reader, &placed, &skins, &palette, budget)?;
         let mut pictures = Report::new(file);
         let (reads, (bitmaps, decoding)) = rayon::join(
             || read_meshes(reader, &placed, &skins, &palette, file),
-            || images.decode(root, &drawn_images, file, &self.options.limits, budget, &mut pictures),
+            || images.decode(root, &drawn, file, &self.options.limits, budget, &mut pictures),
         );
         // glTF has no word for surroundings: its lights come on top of whatever the viewer puts around the model.
         let environment = Environment::Studio;

@@ -2,7 +2,6 @@
 
 use super::material;
 use super::mesh::{Job, Needs};
-use super::report::Report;
 use super::scene::{Placed, Variant};
 use super::textures::Textures;
 use super::variants;
@@ -24,7 +23,7 @@ pub(super) struct Palette<'a> {
 
 impl<'a> Palette<'a> {
     /// Converts the materials that drawn primitives name.
-    pub(super) fn new(root: &'a Root, placed: &Placed, variant: Option<usize>, report: &mut Report) -> Self {
+    pub(super) fn new(root: &'a Root, placed: &Placed, variant: Option<usize>) -> Self {
         let default = root.materials.len();
         let mut palette = Self {
             variant,
@@ -40,7 +39,7 @@ impl<'a> Palette<'a> {
                 continue;
             }
             let material = match root.materials.get(i) {
-                Some(source) => material::convert(i, source, &mut palette.textures, report),
+                Some(source) => material::convert(source, &mut palette.textures),
                 None => Material { name: "default".into(), ..Material::default() },
             };
             palette.index[i] = u32::try_from(palette.materials.len()).ok();

@@ -146,8 +146,13 @@ fn codes(loaded: &Loaded) -> Vec<&'static str> {
 
 /// A data URI with a PNG of one pixel.
 fn picture() -> String {
+    encoded(&image::DynamicImage::new_rgb8(1, 1))
+}
+
+/// A data URI with a PNG.
+fn encoded(image: &image::DynamicImage) -> String {
     let mut out = std::io::Cursor::new(Vec::new());
-    image::DynamicImage::new_rgb8(1, 1).write_to(&mut out, image::ImageFormat::Png).unwrap();
+    image.write_to(&mut out, image::ImageFormat::Png).unwrap();
     format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(out.into_inner()))
 }
 

@@ -15,17 +15,32 @@ pub(super) struct Textures<'a> {
     root: &'a Root,
     /// Textures of the scene; `bitmap` is an index into `images`.
     pub(super) list: Vec<Texture>,
-    /// Images of the file, in the order of bitmaps.
-    pub(super) images: Vec<usize>,
+    /// What the bitmaps are made of, in their order.
+    pub(super) pictures: Vec<Picture>,
     /// Where each is in its list.
     known_textures: HashMap<Texture, u32>,
-    known_images: HashMap<usize, u32>,
+    known_pictures: HashMap<Picture, u32>,
+}
+
+/// What a bitmap is made of: an image of the file …
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct Picture {
+    pub(super) image: usize,
+    /// … in whose alpha gloss is a part of that of the material, of which these are the bits, and becomes roughness.
+    gloss: Option<u32>,
+}
+
+impl Picture {
+    /// Gloss where alpha is 1, if the bitmap holds roughness.
+    pub(super) fn gloss(self) -> Option<f32> {
+        self.gloss.map(f32::from_bits)
+    }
 }
 
 impl<'a> Textures<'a> {
     pub(super) fn new(root: &'a Root) -> Self {
-        let (known_textures, known_images) = (HashMap::new(), HashMap::new());
-        Self { root, list: Vec::new(), images: Vec::new(), known_textures, known_images }
+        let (known_textures, known_pictures) = (HashMap::new(), HashMap::new());
+        Self { root, list: Vec::new(), pictures: Vec::new(), known_textures, known_pictures }
     }
 
     /// The texture of a slot; `None` when it names no image.
@@ -35,10 +50,20 @@ impl<'a> Textures<'a> {
         uv_set: u32,
         transform: Option<&TextureTransform>,
     ) -> Option<TextureRef> {
-        let image = image_of(self.root, index)?;
+        self.shown(index, uv_set, transform, None)
+    }
+
+    fn shown(
+        &mut self,
+        index: Index<texture::Texture>,
+        uv_set: u32,
+        transform: Option<&TextureTransform>,
+        gloss: Option<u32>,
+    ) -> Option<TextureRef> {
+        let picture = Picture { image: image_of(self.root, index)?, gloss };
         let sampler = self.root.textures.get(index.value())?.sampler;
         let sampler = sampler.and_then(|s| self.root.samplers.get(s.value())).map(sampler_of).unwrap_or_default();
-        let bitmap = number_of(image, &mut self.images, &mut self.known_images);
+        let bitmap = number_of(picture, &mut self.pictures, &mut self.known_pictures);
         let texture = number_of(Texture { bitmap, sampler }, &mut self.list, &mut self.known_textures);
         let uv_set = transform.and_then(|t| t.tex_coord).unwrap_or(uv_set);
         Some(TextureRef { texture, uv_set, transform: transform.map(transform_of).unwrap_or_default() })
@@ -46,9 +71,17 @@ impl<'a> Textures<'a> {
 
     /// The texture of a plain slot.
     pub(super) fn info(&mut self, info: Option<&texture::Info>) -> Option<TextureRef> {
-        let info = info?;
+        self.info_shown(info?, None)
+    }
+
+    /// The roughness that the alpha of a plain slot says, where it is gloss, a part of `gloss`.
+    pub(super) fn roughness(&mut self, info: Option<&texture::Info>, gloss: f32) -> Option<TextureRef> {
+        self.info_shown(info?, Some(gloss.to_bits()))
+    }
+
+    fn info_shown(&mut self, info: &texture::Info, gloss: Option<u32>) -> Option<TextureRef> {
         let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
-        self.of(info.index, info.tex_coord, transform)
+        self.shown(info.index, info.tex_coord, transform, gloss)
     }
 }
 
@@ -153,6 +186,6 @@ mod tests {
             let found = textures.of(Index::new(i), 0, None).unwrap();
             assert_eq!(found.texture, i);
         }
-        assert_eq!((textures.list.len(), textures.images.len()), (MANY as usize, MANY as usize));
+        assert_eq!((textures.list.len(), textures.pictures.len()), (MANY as usize, MANY as usize));
     }
 }

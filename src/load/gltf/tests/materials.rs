@@ -1,6 +1,7 @@
 //! Materials, their extensions and their images.
 
 use super::*;
+use crate::scene::TextureRef;
 
 #[test]
 fn materials_carry_every_factor_and_slot() {
@@ -155,13 +156,50 @@ fn specular_glossiness_goes_before_its_fallback_of_which_nothing_is_read() {
 }
 
 #[test]
-fn the_fallback_is_drawn_and_told_where_gloss_is_in_a_map() {
-    let loaded = both_descriptions(json!({"specularGlossinessTexture": {"index": 1}}));
-    let material = &loaded.scene.materials[0];
-    assert_eq!((material.base_color, material.metal_rough().unwrap().roughness), (Vec3::Z, 1.0));
-    let told: Vec<String> = loaded.warnings.iter().map(ToString::to_string).collect();
-    assert!(told.iter().any(|text| text.contains("pbrMetallicRoughness is drawn instead")), "{told:?}");
-    assert!(!told.iter().any(|text| text.contains("gloss.png")), "{told:?}");
+fn gloss_in_a_map_becomes_roughness_in_one() {
+    let mut file = Builder::new();
+    let (positions, uvs) = (file.triangle(), file.floats("VEC2", &[0.; 6]));
+    let primitive = |material| json!({"attributes": {"POSITION": positions, "TEXCOORD_0": uvs}, "material": material});
+    file.set("meshes", json!([{"primitives": [primitive(0), primitive(1), primitive(2)]}]));
+    file.set("extensionsUsed", json!(["KHR_materials_pbrSpecularGlossiness"]));
+    let texels = image::RgbaImage::from_raw(2, 1, vec![255, 0, 0, 255, 0, 0, 255, 51]).unwrap();
+    file.set("images", json!([{"uri": encoded(&texels.into())}, {"uri": "none.png"}]));
+    file.set("textures", json!([{"source": 0}, {"source": 1}]));
+    let material = |extension: Value| {
+        json!({
+            "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 1, 1], "metallicRoughnessTexture": {"index": 1}},
+            "extensions": {"KHR_materials_pbrSpecularGlossiness": extension}})
+    };
+    let (map, lost) = (json!({"index": 0}), json!({"index": 1}));
+    file.set(
+        "materials",
+        json!([
+            material(json!({"specularGlossinessTexture": map})),
+            material(json!({"specularGlossinessTexture": map, "glossinessFactor": 0.5, "specularFactor": [1, 0.5, 0]})),
+            material(json!({"specularGlossinessTexture": lost})),
+        ]),
+    );
+    let loaded = file.load();
+    assert_eq!(codes(&loaded), ["file-missing"]);
+    let scene = &loaded.scene;
+    let bitmap = |map: &Option<TextureRef>| {
+        let texture = &scene.textures[map.as_ref().unwrap().texture as usize];
+        match &scene.bitmaps[texture.bitmap as usize].pixels {
+            Pixels::Rgba8(texels) => texels.to_vec(),
+            other => panic!("{other:?}"),
+        }
+    };
+    let greens = |map: &Option<TextureRef>| bitmap(map).iter().map(|texel| texel[1]).collect::<Vec<_>>();
+    let surface = |i: usize| scene.materials[i].metal_rough().unwrap();
+    for (i, color, greens_there) in [(0, Vec3::ONE, [0, 204]), (1, Vec3::new(1.0, 0.5, 0.0), [128, 230])] {
+        let m = surface(i);
+        assert_eq!((m.roughness, m.metallic, m.specular_color), (1.0, 0.0, color), "{i}");
+        assert_eq!(bitmap(&m.specular_color_map), [[255, 0, 0, 255], [0, 0, 255, 51]], "{i}");
+        assert_eq!(greens(&m.metal_rough_map), greens_there, "{i}");
+    }
+    assert_eq!(scene.bitmaps.len(), 3, "colours once, roughness for each factor");
+    assert!(surface(2).metal_rough_map.is_none() && surface(2).specular_color_map.is_none());
+    assert!((0..3).all(|i| scene.materials[i].base_color == Vec3::ONE), "the fallback counts for nothing");
 }
 
 #[test]
