@@ -142,6 +142,8 @@ pub struct Facts {
     pub files: Vec<PathBuf>,
     /// xxh3-128 of the xxh3-128 hashes of all files in `files`, in that order (see [`paths::Resolver::finish`]).
     pub hash: u128,
+    /// Bytes of memory that loading was charged with.
+    pub charged: u64,
     /// Time that reading the bytes of all files took, of the thread that did it.
     pub reading: Spent,
     /// Time that decoding pictures took: from the first to the last, and of all threads together.
@@ -226,7 +228,10 @@ fn check_moment(loaded: &mut Loaded, file: &Path, options: &LoadOptions) -> Resu
 }
 
 fn load_source(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadError> {
-    load_within(source, options, &mut Budget::new(&options.limits))
+    let mut budget = Budget::new(&options.limits);
+    let mut loaded = load_within(source, options, &mut budget)?;
+    loaded.facts.charged = options.limits.memory - budget.left();
+    Ok(loaded)
 }
 
 /// Loads what is in memory already; whatever that takes comes out of one budget.

@@ -164,9 +164,14 @@ fn check_size(image: &Encoded, limits: &Limits, budget: &mut Budget) -> Result<K
     let decoder = reader.into_decoder()?;
     let (width, height) = decoder.dimensions();
     let texel = if is_deep(decoder.color_type()) { 8 } else { 4 };
+    let mut beside = match decoder.color_type() {
+        ColorType::Rgb8 | ColorType::Rgba8 | ColorType::Rgba16 => 0,
+        // What has other pixels is decoded to them first.
+        _ => decoder.total_bytes(),
+    };
     // A TGA of 16 bits or with a palette is unpacked from a copy.
-    let packed = if format == ImageFormat::Tga { 2 * u64::from(width) * u64::from(height) } else { 0 };
-    take_memory(width, height, (texel, packed), limits, budget)?;
+    beside += if format == ImageFormat::Tga { 2 * u64::from(width) * u64::from(height) } else { 0 };
+    take_memory(width, height, (texel, beside), limits, budget)?;
     Ok(Kind::Image { format, bytes: decoder.total_bytes().saturating_add(BESIDE.min(budget.left())) })
 }
 
@@ -220,6 +225,7 @@ fn decode(name: &str, bytes: &[u8], kind: Kind) -> Result<Bitmap, Unusable> {
         // What most pictures are: they are decoded to where they stay.
         ColorType::Rgb8 => Pixels::Rgb8(texels_of(decoder)?),
         ColorType::Rgba8 => Pixels::Rgba8(texels_of(decoder)?),
+        ColorType::Rgba16 => Pixels::Rgba16(texels_of(decoder)?),
         _ => pixels_of(DynamicImage::from_decoder(decoder)?),
     };
     Ok(Bitmap { name: name.into(), width, height, pixels })
@@ -239,9 +245,18 @@ fn is_deep(color: ColorType) -> bool {
 
 fn pixels_of(image: DynamicImage) -> Pixels {
     match image {
-        image if is_deep(image.color()) => Pixels::Rgba16(image.into_rgba16().pixels().map(|p| p.0).collect()),
-        image => Pixels::Rgba8(image.into_rgba8().as_raw().as_chunks::<4>().0.to_vec().into()),
+        image if is_deep(image.color()) => Pixels::Rgba16(fours(image.into_rgba16().into_raw())),
+        image => Pixels::Rgba8(fours(image.into_rgba8().into_raw())),
     }
+}
+
+/// Four numbers each, where they are if they can stay there.
+fn fours<T: Pod>(numbers: Vec<T>) -> Paged<[T; 4]>
+where
+    [T; 4]: Pod,
+{
+    let fours = bytemuck::allocation::try_cast_vec(numbers);
+    fours.unwrap_or_else(|(_, numbers)| numbers.as_chunks().0.to_vec()).into()
 }
 
 #[cfg(test)]

@@ -3,6 +3,10 @@
 /// Most bounces that may be asked for; the wall of a wine glass leads light along hundreds of total reflections.
 pub const MAX_DEPTH: u32 = 1024;
 
+/// Most stops that a picture may be made brighter or darker by: factors that `f32` holds, and enough for lamps a billion
+/// times as strong as the sun.
+pub const MAX_STOPS: f32 = 100.0;
+
 /// What a scene file asks for; `None`: it does not say.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RenderHints {

@@ -19,7 +19,7 @@ pub mod panorama;
 pub mod texture;
 
 pub use camera::{Camera, Projection};
-pub use hints::{MAX_DEPTH, RenderHints};
+pub use hints::{MAX_DEPTH, MAX_STOPS, RenderHints};
 pub use light::{Falloff, Light, LightKind};
 pub use lobes::{Coat, Film, Grain, Sheen, Translucence};
 pub use material::{AlphaMode, Material, MetalRough, Phong, Surface, TextureRef, UvTransform};

@@ -168,7 +168,8 @@ impl Loading<'_> {
         facts.animations = animation::facts(&document.animations, reader);
         let pose = self.pose(reader, graph, document, budget, facts)?;
         graph.place(&pose.moved);
-        let placed = scene::walk(reader, graph, facts.scene_index, &pose.weights, budget, self.report);
+        let moment = (self.options.moment.is_some(), &pose.weights);
+        let placed = scene::walk(reader, graph, facts.scene_index, moment, budget, self.report);
         let placed = placed.map_err(|over| self.too_large("what the nodes show", over))?;
         let skins = skin::joint_matrices(reader, graph, self.report);
         skin::check_scene(root, graph, facts.scene_index, &placed.draws, self.report);
@@ -181,7 +182,7 @@ impl Loading<'_> {
         let mut pictures = Report::new(file);
         let (reads, (bitmaps, decoding)) = rayon::join(
             || read_meshes(reader, &placed, &skins, &palette, file),
-            || images.decode(root, &drawn, file, &self.options.limits, budget, &mut pictures),
+            || images.decode(root, read, file, &self.options.limits, budget, &mut pictures),
         );
         // glTF has no word for surroundings: its lights come on top of whatever the viewer puts around the model.
         let environment = Environment::Studio;
@@ -191,7 +192,8 @@ impl Loading<'_> {
         let (wires, places) = self.assemble(&mut scene, root, &placed.draws, reads, facts)?;
         self.report.merge(pictures);
         scene.materials = palette.materials;
-        (scene.textures, scene.bitmaps) = textures::keep_decoded(&mut scene.materials, palette.textures.list, bitmaps);
+        (scene.textures, scene.bitmaps) =
+            textures::keep_decoded(&mut scene.materials, palette.textures.list, &drawn, bitmaps);
         let lost = wires::draw(&wires, &places, &mut scene, budget, facts, file, self.options.line_width)
             .map_err(|over| self.too_large("what points and lines become", over))?;
         lost.into_iter().for_each(|warning| self.report.warnings.push(warning));

@@ -29,11 +29,8 @@ pub(super) fn camera(root: &Root, node: &Node, world: DAffine3, report: &mut Rep
     };
     let placed = projection.zip(Camera::rigid(world));
     if placed.is_none() {
-        report.warn(
-            Code::ValueNotInRange,
-            format!("cameras[{index}]"),
-            "the camera cannot show anything and is left out",
-        );
+        let text = "the camera cannot show anything";
+        report.warn_with(Code::ValueNotInRange, format!("cameras[{index}]"), text, "it is left out");
     }
     let (projection, world_from_camera) = placed?;
     Some(Camera { name: name(&source.name, node), projection, world_from_camera })

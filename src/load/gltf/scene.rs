@@ -56,8 +56,8 @@ pub(super) fn choose(root: &Root, wish: Option<&str>, file: &Path) -> Result<usi
     choice::choose(&choice::SCENE, &names, wish, file)
 }
 
-/// Walks the nodes of a scene; a file without scenes shows all its nodes. `weights` are those that an animation gives to
-/// morph targets, by node.
+/// Walks the nodes of a scene; a file without scenes shows all its nodes. `moving` tells whether it is a moment of an
+/// animation; `weights` are those that it gives to morph targets, by node.
 ///
 /// # Errors
 /// When the scene would take more than is left of `budget`.
@@ -65,7 +65,7 @@ pub(super) fn walk(
     reader: Reader,
     graph: &Graph,
     scene: usize,
-    weights: &HashMap<usize, Vec<f32>>,
+    (moving, weights): (bool, &HashMap<usize, Vec<f32>>),
     budget: &mut Budget,
     report: &mut Report,
 ) -> Result<Placed, OverBudget> {
@@ -76,7 +76,7 @@ pub(super) fn walk(
     };
     stack.reverse();
     let mut seen = vec![false; root.nodes.len()];
-    let mut walk = Walk { reader, weights, placed: Placed::default(), known: HashMap::new(), budget, report };
+    let mut walk = Walk { reader, moving, weights, placed: Placed::default(), known: HashMap::new(), budget, report };
     while let Some(i) = stack.pop() {
         let Some(node) = root.nodes.get(i).filter(|node| is_visible(node)) else { continue };
         if std::mem::replace(&mut seen[i], true) {
@@ -100,6 +100,8 @@ type Kind = (usize, Option<usize>, Option<Vec<u32>>);
 
 struct Walk<'a, 'b> {
     reader: Reader<'a>,
+    /// Whether this is a moment of an animation.
+    moving: bool,
     /// Weights that an animation gives, by node.
     weights: &'b HashMap<usize, Vec<f32>>,
     placed: Placed,
@@ -116,7 +118,8 @@ impl Walk<'_, '_> {
         let mut places = self.copies(i, node)?;
         places.iter_mut().for_each(|place| *place = world * *place);
         places.retain(|place| node.skin.is_some() || !is_scaled_away(place));
-        if places.is_empty() {
+        // What is hidden at one moment of an animation is shown at another, and the same is read at all of them.
+        if places.is_empty() && !self.moving {
             return Ok(());
         }
         let Some(variant) = self.variant(i, node, mesh) else { return Ok(()) };

@@ -2,7 +2,7 @@
 
 use super::images::image_of;
 use crate::math::Vec2;
-use crate::scene::{Bitmap, Filter, Material, Mipmaps, Sampler, Texture, TextureRef, UvTransform, Wrap};
+use crate::scene::{Bitmap, Filter, Material, Mipmaps, Sampler, Surface, Texture, TextureRef, UvTransform, Wrap};
 use gltf::json::extensions::texture::TextureTransform;
 use gltf::json::texture::{self, MagFilter, MinFilter, WrappingMode};
 use gltf::json::validation::Checked;
@@ -132,8 +132,12 @@ fn sampler_of(sampler: &texture::Sampler) -> Sampler {
 pub(super) fn keep_decoded(
     materials: &mut [Material],
     textures: Vec<Texture>,
+    pictures: &[Picture],
     bitmaps: Vec<Option<Bitmap>>,
 ) -> (Vec<Texture>, Vec<Bitmap>) {
+    for material in materials.iter_mut() {
+        without_lost_gloss(material, &textures, pictures, &bitmaps);
+    }
     let mut next = 0;
     let number = |there: bool, next: &mut u32| there.then(|| (*next, *next += 1).0);
     let new_bitmap: Vec<_> = bitmaps.iter().map(|b| number(b.is_some(), &mut next)).collect();
@@ -146,6 +150,18 @@ pub(super) fn keep_decoded(
     }
     let kept = textures.iter().filter_map(|t| Some(Texture { bitmap: bitmap_of(t)?, ..t.clone() })).collect();
     (kept, bitmaps.into_iter().flatten().collect())
+}
+
+/// Gives a material whose roughness was in a map of gloss that is lost the roughness that is left when gloss is even.
+fn without_lost_gloss(material: &mut Material, textures: &[Texture], pictures: &[Picture], bitmaps: &[Option<Bitmap>]) {
+    let Surface::MetalRough(surface) = &mut material.surface else { return };
+    let map = surface.metal_rough_map.as_ref();
+    let bitmap = map.and_then(|map| Some(textures.get(map.texture as usize)?.bitmap as usize));
+    let lost =
+        bitmap.filter(|&at| bitmaps.get(at).is_none_or(Option::is_none)).and_then(|at| pictures.get(at)?.gloss());
+    if let Some(gloss) = lost {
+        surface.roughness = 1.0 - gloss;
+    }
 }
 
 #[cfg(test)]
@@ -163,7 +179,7 @@ mod tests {
         }];
         let texture = |bitmap, wrap_u| Texture { bitmap, sampler: Sampler { wrap_u, ..Sampler::default() } };
         let textures = vec![texture(0, Wrap::Repeat), texture(1, Wrap::Repeat), texture(1, Wrap::Clamp)];
-        let (textures, bitmaps) = keep_decoded(&mut materials, textures, vec![None, Some(Bitmap::default())]);
+        let (textures, bitmaps) = keep_decoded(&mut materials, textures, &[], vec![None, Some(Bitmap::default())]);
         assert_eq!((textures.len(), bitmaps.len()), (2, 1));
         assert!(textures.iter().all(|t| t.bitmap == 0));
         assert!(materials[0].base_color_map.is_none());

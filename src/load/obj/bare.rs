@@ -143,7 +143,8 @@ pub(in crate::load) fn load(
     let mut reading = mtl::Reading { file, options, resolver: &mut resolver, budget, warnings: &mut warnings };
     let unnamed = vec![None; meshes.len() + wires.len()];
     let materials = mtl::load(&[], &unnamed, &mut reading);
-    let mut scene = scene(meshes, materials, placed.center, options.up.unwrap_or(guessed));
+    let up = options.up.unwrap_or(guessed);
+    let mut scene = scene(meshes, materials, placed.center, up, budget).map_err(|over| over_memory(file, over))?;
     if is_see_through {
         scene.materials.iter_mut().for_each(|material| material.alpha_mode = AlphaMode::Blend);
     }

@@ -424,6 +424,8 @@ impl Reader {
                     self.out.odd.zero.note(self.line, ATTRIBUTES[kind].as_bytes());
                     0
                 }
+                // More than there can be: none that is there, like the largest.
+                Ok(number) if kind > 0 => number.min(LARGEST),
                 Ok(number) => Some(number).filter(|n| (1..=LARGEST).contains(n))?,
                 Err(_) => {
                     let biased = i64::try_from(known[kind]).ok()? + 1 + number + i64::from(LARGEST);

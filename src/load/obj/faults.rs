@@ -8,10 +8,10 @@ use super::statements::Tally;
 use crate::load::Diagnostic;
 use std::path::Path;
 
-/// The first fault, with the number of all; or, where there is none, the corners that name texture coordinates or normals
+/// The first fault, with the number of all of its kind; or, where there is none, the corners that name texture coordinates or normals
 /// of which the file has none at all: such faces can still be drawn.
 pub(super) fn find(text: &[u8], file: &Path) -> Result<Tally, Diagnostic> {
-    let mut look = Look { file, line: 0, counts: [0; 3], fault: None, forward: Vec::new() };
+    let mut look = Look { file, line: 0, counts: [0; 3], faults: Vec::new(), forward: Vec::new() };
     let mut lines = Lines::new(text);
     while let Some((line, text)) = lines.next() {
         look.line = line;
@@ -31,8 +31,8 @@ struct Look<'a> {
     line: u32,
     /// How many `v`, `vt` and `vn` there are so far.
     counts: [u32; 3],
-    /// The first fault, counting those after it.
-    fault: Option<Diagnostic>,
+    /// The first fault of each kind and its line, counting the others of its kind.
+    faults: Vec<(u32, Diagnostic)>,
     /// Numbers of vertices that were not there yet when a face named them: (line, corner, kind, number).
     forward: Vec<(u32, u32, usize, u32)>,
 }
@@ -41,7 +41,7 @@ impl Look<'_> {
     fn face(&mut self, rest: &[u8]) {
         for (i, word) in words(rest).enumerate() {
             if let Err(fault) = self.corner(word, count(i) + 1) {
-                return self.refuse(fault);
+                return self.refuse(self.line, fault);
             }
         }
     }
@@ -91,11 +91,15 @@ impl Look<'_> {
         Diagnostic::new(code, self.file, line.to_string(), text).remedy("export the model again")
     }
 
-    fn refuse(&mut self, fault: Diagnostic) {
-        match &mut self.fault {
-            Some(first) => first.count = first.count.saturating_add(1),
-            None => self.fault = Some(fault),
+    fn refuse(&mut self, line: u32, fault: Diagnostic) {
+        let Some((first, known)) = self.faults.iter_mut().find(|(_, known)| known.code == fault.code) else {
+            return self.faults.push((line, fault));
+        };
+        let count = known.count.saturating_add(1);
+        if line < *first {
+            (*first, *known) = (line, fault);
         }
+        known.count = count;
     }
 
     fn finish(mut self) -> Result<Tally, Diagnostic> {
@@ -105,9 +109,10 @@ impl Look<'_> {
                 absent.note(line, ["", "texture coordinates", "normals"][kind].as_bytes());
             } else if number > self.counts[kind] {
                 let fault = self.out_of_range(line, corner, kind, i64::from(number));
-                self.refuse(fault);
+                self.refuse(line, fault);
             }
         }
-        self.fault.map_or(Ok(absent), Err)
+        let first = self.faults.into_iter().min_by_key(|(line, _)| *line);
+        first.map_or(Ok(absent), |(_, fault)| Err(fault))
     }
 }

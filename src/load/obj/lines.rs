@@ -40,7 +40,7 @@ impl<'a> Lines<'a> {
             if line.is_empty() {
                 continue;
             }
-            if line[0] == b'#' || line[line.len() - 1] != b'\\' {
+            if !is_continued(line) {
                 return Some((number, line));
             }
             self.join(line);
@@ -77,17 +77,33 @@ impl<'a> Lines<'a> {
     }
 }
 
+/// Whether the next line belongs to this one, which is not blank: it ends in a backslash that is no part of a comment.
+fn is_continued(line: &[u8]) -> bool {
+    if line[line.len() - 1] != b'\\' {
+        return false;
+    }
+    match keyword(line) {
+        (b"v" | b"vt" | b"vn" | b"f" | b"fo" | b"l" | b"p" | b"s", rest) => comment(rest).is_none(),
+        // Names may hold what starts a comment elsewhere.
+        _ => line[0] != b'#' && without_comment(line).len() == line.len(),
+    }
+}
+
+/// Where a comment starts behind numbers. (`1.#IND` holds none: so did C libraries write infinities.)
+fn comment(rest: &[u8]) -> Option<usize> {
+    let starts = |at: &usize| rest[*at] == b'#' && (*at == 0 || rest[*at - 1] != b'.');
+    if rest.contains(&b'#') { (0..rest.len()).find(starts) } else { None }
+}
+
 /// Splits a line into its first word and the trimmed rest.
 pub(super) fn keyword(line: &[u8]) -> (&[u8], &[u8]) {
     let end = line.iter().position(u8::is_ascii_whitespace).unwrap_or(line.len());
     (&line[..end], line[end..].trim_ascii())
 }
 
-/// The words of `rest` up to a comment. (`1.#IND` holds none: so did C libraries write infinities.)
+/// The words of `rest` up to a comment.
 pub(super) fn words(rest: &[u8]) -> impl Iterator<Item = &[u8]> {
-    let starts = |at: &usize| rest[*at] == b'#' && (*at == 0 || rest[*at - 1] != b'.');
-    let end = if rest.contains(&b'#') { (0..rest.len()).find(starts).unwrap_or(rest.len()) } else { rest.len() };
-    rest[..end].split(u8::is_ascii_whitespace).filter(|w| !w.is_empty())
+    rest[..comment(rest).unwrap_or(rest.len())].split(u8::is_ascii_whitespace).filter(|w| !w.is_empty())
 }
 
 /// A name without the comment that may follow it: a `#` between white space starts one (names such as `Color#1` keep
@@ -127,6 +143,11 @@ mod tests {
     #[test]
     fn a_comment_that_ends_in_a_backslash_does_not_swallow_the_next_line() {
         assert_eq!(all("# C:\\tmp\\\nv 1"), [(1, "# C:\\tmp\\".into()), (2, "v 1".into())]);
+        for line in ["v 0 0 0 # C:\\tmp\\", "f 1 2 3#\\", "o a # C:\\"] {
+            assert_eq!(all(&format!("{line}\nv 1")), [(1, line.into()), (2, "v 1".into())]);
+        }
+        assert_eq!(all("v 1.#IND \\\n2"), [(1, "v 1.#IND  2".into())], "a number");
+        assert_eq!(all("o a#1 \\\n2"), [(1, "o a#1  2".into())], "a name");
     }
 
     #[test]

@@ -28,7 +28,7 @@ mod statements;
 mod strokes;
 mod up;
 
-use super::limits::Budget;
+use super::limits::{Budget, OverBudget};
 use super::paths::Resolver;
 use super::place::place;
 use super::wires::{self, Wires};
@@ -78,7 +78,9 @@ pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Resu
     let (reading, decoding) = (resolver.reading(), materials.decoding);
     let of_wires = materials.of_name.get(meshes.len()..).unwrap_or_default();
     wires.iter_mut().zip(of_wires).for_each(|(wires, &material)| wires.mesh.material = material);
-    let mut scene = scene(meshes, materials, placed.center, options.up.unwrap_or(guessed));
+    let up = options.up.unwrap_or(guessed);
+    let mut scene =
+        scene(meshes, materials, placed.center, up, budget).map_err(|over| bare::over_memory(file, over))?;
 
     let (files, hash) = resolver.finish();
     let mut facts = Facts {
@@ -116,19 +118,32 @@ fn draw(
     wires::draw(wires, &places, scene, budget, facts, file, width).map_err(|over| bare::over_memory(file, over))
 }
 
+/// Bytes that making tangents takes a corner: what the generator notes of it, and a vertex of its own.
+const OF_TANGENTS: u64 = 256 + 4 * 16;
+
 /// One instance of each mesh, moved to where the file has it.
-fn scene(mut meshes: Vec<Mesh>, materials: mtl::Materials, center: DVec3, up: UpAxis) -> Scene {
+///
+/// # Errors
+/// When tangents for normal maps would take more than is left of `budget`.
+fn scene(
+    mut meshes: Vec<Mesh>,
+    materials: mtl::Materials,
+    center: DVec3,
+    up: UpAxis,
+    budget: &mut Budget,
+) -> Result<Scene, OverBudget> {
     let mtl::Materials { materials, textures, bitmaps, of_name, .. } = materials;
     for (mesh, material) in meshes.iter_mut().zip(of_name) {
         mesh.material = material;
         if materials.get(material as usize).is_some_and(|m| m.normal_map.is_some()) {
+            budget.take(3 * mesh.triangles.len() as u64, OF_TANGENTS)?;
             super::tangents::generate(mesh, 0);
         }
     }
     let world_from_object = DAffine3::from_translation(center);
     let instance = |(mesh, m): (u32, &Mesh)| Instance { name: m.name.clone(), mesh, world_from_object };
     let instances = (0..).zip(&meshes).map(instance).collect();
-    Scene { meshes, instances, materials, textures, bitmaps, up, ..Scene::default() }
+    Ok(Scene { meshes, instances, materials, textures, bitmaps, up, ..Scene::default() })
 }
 
 /// Tells what became of faces, in the order of `codes`; `place` names the first of a kind.

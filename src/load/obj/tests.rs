@@ -1,7 +1,7 @@
 //! Whole OBJ texts through the loader.
 
 use super::*;
-use crate::load::Polygons;
+use crate::load::{Limits, Polygons};
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
 use crate::scene::{Material, Surface, UpAxis};
 
@@ -259,4 +259,42 @@ fn the_up_axis_is_guessed_with_a_reason_unless_it_is_given() {
     assert!(guessed.facts.up_reason.unwrap().contains("FreeCAD"));
     let given = with(text.as_bytes(), &LoadOptions { up: Some(UpAxis::Y), ..LoadOptions::default() });
     assert_eq!((given.scene.up, given.facts.up_reason), (UpAxis::Y, None));
+}
+
+#[test]
+fn a_coordinate_that_cannot_be_there_costs_no_corner_where_the_file_has_none_at_all() {
+    let face = "f 1/4294967295 2/2000000000 3/7 4";
+    let loaded = of(&format!("{SQUARE}{face}"));
+    assert_eq!((triangles(&loaded), codes(&loaded)), (2, vec![("obj-absent-attribute", 3)]));
+    let source = Source { path: "m.obj".into(), bytes: format!("{SQUARE}vt 0 0\n{face}").into_bytes() };
+    let options = LoadOptions::default();
+    let Err(LoadError::Input(faults)) = load(&source, &options, &mut Budget::new(&options.limits)) else { panic!() };
+    assert!(faults[0].to_string().contains("texture coordinate 4294967295, but there are 1"), "{}", faults[0]);
+}
+
+#[test]
+fn tangents_for_a_normal_map_are_charged_before_they_are_made() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    ::image::RgbImage::from_pixel(1, 1, ::image::Rgb([128, 128, 255])).save(path("flat.png")).unwrap();
+    std::fs::write(path("m.mtl"), "newmtl a\nnorm flat.png\n").unwrap();
+    let faces = "f 1/1 2/1 3/1\n".repeat(2000);
+    let read = |material: &str| {
+        let text = format!("mtllib m.mtl\n{TRIANGLE}vt 0 0\nusemtl {material}\n{faces}");
+        let source = Source { path: path("m.obj"), bytes: text.into_bytes() };
+        let options = LoadOptions::default();
+        load(&source, &options, &mut Budget::new(&Limits { memory: 1_500_000, ..Limits::default() }))
+    };
+    assert!(read("none").is_ok());
+    let Err(LoadError::Input(faults)) = read("a") else { panic!() };
+    assert_eq!(faults[0].code, "over-memory");
+}
+
+#[test]
+fn of_several_faults_the_first_is_told_with_the_number_of_its_kind() {
+    let source = Source { path: "m.obj".into(), bytes: format!("{TRIANGLE}f 1 2 9\nf 0 1 2\nf 1 2 8\n").into_bytes() };
+    let options = LoadOptions::default();
+    let Err(LoadError::Input(faults)) = load(&source, &options, &mut Budget::new(&options.limits)) else { panic!() };
+    let told = faults[0].to_string();
+    assert!(told.starts_with("m.obj:4: corner 3 of the face names vertex 9") && told.contains("(×2)"), "{told}");
 }

@@ -1,8 +1,8 @@
 //! `[[lights]]`, `[[cameras]]` and `[render]`.
 
-use super::reader::{Table, boolean, color, direction, number, numbers, positive, string, vec, whole, within, word};
+use super::reader::{Table, boolean, color, direction, numbers, positive, string, vec, whole, within, word};
 use crate::math::{DVec3, Vec3};
-use crate::scene::{Camera, Falloff, Light, LightKind, MAX_DEPTH, Projection, RenderHints};
+use crate::scene::{Camera, Falloff, Light, LightKind, MAX_DEPTH, MAX_STOPS, Projection, RenderHints};
 
 #[derive(Clone, Copy)]
 enum Kind {
@@ -130,7 +130,7 @@ pub(super) fn hints(table: Table) -> RenderHints {
         depth: table.get("depth", whole(0, MAX_DEPTH)),
         cutoff: table.get("cutoff", within(0.0, 1.0)).map(|n| n as f32),
         tone_map: table.get("tone_map", word(&maps)).map(str::to_owned),
-        exposure: table.get("exposure", number).map(|n| n as f32),
+        exposure: table.get("exposure", within(-f64::from(MAX_STOPS), f64::from(MAX_STOPS))).map(|n| n as f32),
         default_light: table.get("default_light", boolean),
         camera: None,
     };

@@ -116,6 +116,9 @@ pub(super) fn draw(
     file: &Path,
     width: Option<f64>,
 ) -> Result<Vec<Diagnostic>, OverBudget> {
+    if wires.is_empty() {
+        return Ok(Vec::new());
+    }
     let counts: Vec<[u64; 2]> = wires.iter().map(Wires::count).collect();
     let placed = places.iter().filter_map(|place| counts.get(place.mesh as usize));
     let count = placed.fold([0, 0], |[p, l], [q, m]| [p + q, l + m]);

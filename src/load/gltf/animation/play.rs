@@ -74,6 +74,9 @@ impl Place<'_> {
     }
 }
 
+/// Bytes that a weight of a morph target takes: in the pose, in the variant of the mesh, and in what tells variants apart.
+const WEIGHT: u64 = 3 * size_of::<f32>() as u64;
+
 /// The accessors of a sampler.
 const INPUT: &str = "input";
 const OUTPUT: &str = "output";
@@ -135,6 +138,9 @@ impl Player<'_, '_> {
         place: &Place,
     ) -> Result<Result<(), Fault>, OverBudget> {
         let times = self.times(channel.input, place)?;
+        if property == Property::Weights {
+            self.budget.take(self.targets(node) as u64, WEIGHT)?;
+        }
         Ok(times.ok_or(Fault::Told).and_then(|times| self.value(channel, node, property, &times)))
     }
 

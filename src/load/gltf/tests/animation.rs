@@ -316,3 +316,21 @@ fn lengths_of_animations_whose_times_lie_over_each_other_are_found_in_little_tim
     assert_eq!(lengths, [999_999.0, 996_000.0]);
     assert!(start.elapsed().as_secs() < 30, "{:?}", start.elapsed());
 }
+
+#[test]
+fn materials_are_the_same_at_every_moment_whatever_a_scale_of_zero_hides() {
+    let mut file = moving("scale", "STEP", &[0.0, 1.0], "VEC3", &[1., 1., 1., 0., 0., 0.]);
+    let positions = file.triangle();
+    let primitive = |material| json!([{"attributes": {"POSITION": positions}, "material": material}]);
+    file.set("meshes", json!([{"primitives": primitive(0)}, {"primitives": primitive(1)}]));
+    file.set("materials", json!([{"name": "red"}, {"name": "green"}]));
+    file.set("nodes", json!([{"mesh": 0}, {"mesh": 1}]));
+    file.set("scenes", json!([{"nodes": [0, 1]}]));
+    let shown = |time: f64| {
+        let scene = at(&file, time).scene;
+        let names: Vec<String> = scene.materials.iter().map(|material| material.name.clone()).collect();
+        (names, scene.instances.len())
+    };
+    let names = vec!["red".to_owned(), "green".into()];
+    assert_eq!((shown(0.0), shown(1.0)), ((names.clone(), 2), (names, 1)));
+}

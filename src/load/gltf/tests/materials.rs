@@ -199,6 +199,7 @@ fn gloss_in_a_map_becomes_roughness_in_one() {
     }
     assert_eq!(scene.bitmaps.len(), 3, "colours once, roughness for each factor");
     assert!(surface(2).metal_rough_map.is_none() && surface(2).specular_color_map.is_none());
+    assert_eq!(surface(2).roughness, 0.0, "as glossy as its factor says where the map is lost");
     assert!((0..3).all(|i| scene.materials[i].base_color == Vec3::ONE), "the fallback counts for nothing");
 }
 

@@ -121,3 +121,28 @@ fn morph_targets_without_weight_cost_nothing() {
         assert_eq!(load_bytes(Path::new("a.gltf"), file.gltf(), &limited(2_000_000)).is_ok(), fits, "{weight}");
     }
 }
+
+#[test]
+fn animated_weights_are_charged_for_every_node_that_has_them() {
+    const TARGETS: usize = 2_000;
+    const NODES: usize = 2_000;
+    let mut file = Builder::new();
+    let positions = file.triangle();
+    let targets: Vec<Value> = (0..TARGETS).map(|_| json!({})).collect();
+    file.primitive(json!({"attributes": {"POSITION": positions}, "targets": targets}));
+    file.set("nodes", (0..NODES).map(|_| json!({"mesh": 0})).collect());
+    file.set("scenes", json!([{"nodes": (0..NODES).collect::<Vec<_>>()}]));
+    let input = file.floats("SCALAR", &[0.0]);
+    let zeros = json!({"componentType": 5126, "type": "SCALAR", "count": TARGETS});
+    let output = file.push("accessors", zeros);
+    let channel = |node| json!({"sampler": 0, "target": {"node": node, "path": "weights"}});
+    let channels: Vec<Value> = (0..NODES).map(channel).collect();
+    file.set("animations", json!([{"channels": channels, "samplers": [{"input": input, "output": output}]}]));
+    let load = |moment: Option<crate::load::Moment>| {
+        let options = LoadOptions { moment, ..limited(40 << 20) };
+        load_bytes(Path::new("a.gltf"), file.gltf(), &options)
+    };
+    assert!(load(None).is_ok());
+    let at_start = crate::load::Moment { animation: None, time: 0.0 };
+    assert!(matches!(load(Some(at_start)), Err(LoadError::Input(faults)) if faults[0].code == "out-of-memory-limit"));
+}

@@ -78,6 +78,16 @@ impl Meaning<'_> {
         self.warnings.push(Diagnostic::new(code, self.file, line, text).remedy("--mtl literal follows the text"));
     }
 
+    /// A number from 0 to 1; the nearest of these, which is told, for any other.
+    fn part(&mut self, what: &str, value: f64) -> f32 {
+        let nearest = value.clamp(0.0, 1.0);
+        if nearest != value {
+            let text = format!("{what} is {value}, and counts as {nearest}");
+            self.warnings.push(Diagnostic::new("mtl-range", self.file, self.mtl.line.to_string(), text));
+        }
+        number(nearest)
+    }
+
     fn illum(&mut self) -> i32 {
         match self.mtl.illum {
             Some(0) if self.guessing() => {
@@ -126,7 +136,10 @@ impl Meaning<'_> {
                 d
             }
             (None, Some(tr)) if tr >= 1.0 && self.guessing() => {
-                self.warn("mtl-tr-as-opacity", "Tr 1 without d would hide the surface; it counts as opacity");
+                self.warn(
+                    "mtl-tr-as-opacity",
+                    "Tr of 1 or more without d would hide the surface; it counts as opacity",
+                );
                 1.0
             }
             (Some(d), _) => d,
@@ -138,7 +151,7 @@ impl Meaning<'_> {
             self.warn("mtl-invisible", "d 0 would hide everything, or a map; it counts as 1");
             return 1.0;
         }
-        number(opacity.clamp(0.0, 1.0))
+        self.part("opacity (d, or 1 - Tr)", opacity)
     }
 
     /// Whether light is refracted.
@@ -252,8 +265,8 @@ impl Meaning<'_> {
         };
         let ior = self.ior(glass);
         MetalRough {
-            metallic: number(metallic.clamp(0.0, 1.0)),
-            roughness: number(roughness.clamp(0.0, 1.0)),
+            metallic: self.part("Pm", metallic),
+            roughness: self.part("roughness (Pr)", roughness),
             // 1 is what programs write that have no such field; a dielectric without reflection is not meant.
             ior: if ior > 1.0 { ior } else { number(NO_IOR) },
             transmission: passed.max_element(),
@@ -429,6 +442,15 @@ mod tests {
         let (m, warnings) = guess("Kd 1\nTr 1");
         assert_eq!((m.opacity, warnings), (1.0, vec!["mtl-tr-as-opacity"]));
         assert_eq!(literal("Kd 1\nTr 1").opacity, 0.0);
+    }
+
+    #[test]
+    fn parts_outside_of_0_to_1_are_told_and_the_nearest_counts() {
+        let (m, warnings) = guess("Kd 1\nd -1");
+        assert_eq!((m.opacity, warnings), (0.0, vec!["mtl-range"]));
+        let (m, warnings) = guess("Kd 1\nPm 5\nPr 0.5");
+        assert_eq!((m.metal_rough().unwrap().metallic, warnings), (1.0, vec!["mtl-range"]));
+        assert!(guess("Kd 1\nPm 1\nPr 0\nd 1").1.is_empty());
     }
 
     #[test]
