@@ -1,26 +1,36 @@
 //! `--dry-run`: what a picture would take, without rendering it.
 //!
 //! # Schema `meshray-forecast/1`
-//! With `--stats json` one JSON object for each picture: `version`, `file`, `width`, `height`, `looked_at` (pixels that were rendered to
+//! With `--stats json` one JSON object for each picture, a line each: `version`, `file`, `output` (`-`: standard output),
+//! `view` (in words), `width`, `height`, `looked_at` (pixels that were rendered to
 //! find out), `cpu_seconds`, `wall_seconds`, `rays` (from the eye), `tests` (ray/prim) and `rmse` (in the numbers of
 //! `--error-space`; null where every rendering is the same), each with `value`, `low` and `high`, which hold it with 95 %
 //! confidence; `memory` (bytes; null where the system does not tell). Keys are only ever added.
 
 use super::args::StatsFormat;
+use super::outputs::Target;
 use crate::bench::report::number::{bytes, seconds, short};
 use crate::render::{Forecast, Interval, Job};
 use crate::stopwatch::peak_memory;
 use serde_json::{Value, json};
 use std::path::Path;
 
+/// Which picture: of what, seen how, written where.
+#[derive(Clone, Copy)]
+pub(super) struct Which<'a> {
+    pub file: &'a Path,
+    pub view: &'a str,
+    pub target: &'a Target,
+}
+
 /// What was foretold of one picture, which by itself takes so many bytes of memory.
-pub(super) fn told(file: &Path, work: &Job, forecast: &Forecast, picture: u64, format: Option<StatsFormat>) -> String {
-    let told = Told { file, work, forecast, memory: peak_memory().map(|held| held + picture) };
+pub(super) fn told(which: Which, work: &Job, forecast: &Forecast, picture: u64, format: Option<StatsFormat>) -> String {
+    let told = Told { which, work, forecast, memory: peak_memory().map(|held| held + picture) };
     if format == Some(StatsFormat::Json) { told.json() } else { told.text() }
 }
 
 struct Told<'a> {
-    file: &'a Path,
+    which: Which<'a>,
     work: &'a Job<'a>,
     forecast: &'a Forecast,
     /// The most that the whole run holds at once: what it has held so far, and the picture.
@@ -58,8 +68,9 @@ impl Told<'_> {
         ));
         lines.extend(self.memory.map(|held| ("memory", bytes(held))));
         let mut text = format!(
-            "{}: {}×{}, foretold from {:.1} % of the pixels, with 95 % confidence; nothing is written\n",
-            self.file.display(),
+            "{}, {}: {}×{}, foretold from {:.1} % of the pixels, with 95 % confidence; nothing is written\n",
+            self.which.file.display(),
+            self.which.view,
             settings.width,
             settings.height,
             100.0 * looked_at as f64 / pixels.max(1) as f64
@@ -74,7 +85,9 @@ impl Told<'_> {
         let value = json!({
             "schema": "meshray-forecast/1",
             "version": super::version::SHORT,
-            "file": self.file.to_string_lossy(),
+            "file": self.which.file.to_string_lossy(),
+            "output": self.which.target.path().map_or("-".into(), Path::to_string_lossy),
+            "view": self.which.view,
             "width": self.work.settings.width,
             "height": self.work.settings.height,
             "looked_at": looked_at,
@@ -85,6 +98,6 @@ impl Told<'_> {
             "rmse": rmse.map_or(Value::Null, interval),
             "memory": self.memory,
         });
-        format!("{value:#}\n")
+        format!("{value}\n")
     }
 }

@@ -65,6 +65,8 @@ pub(super) struct RenderJob {
     pub dry_run: bool,
     /// Keep the tiles that are done on Ctrl-C.
     pub keep_partial: bool,
+    /// The picture that is repeated.
+    pub again: Option<PathBuf>,
     /// The hash that the inputs must have (`--again`), in hexadecimal.
     pub expected_hash: Option<String>,
 }
@@ -178,6 +180,7 @@ impl RenderJob {
             allow_empty: args.allow_empty,
             dry_run: args.dry_run,
             keep_partial: args.keep_partial,
+            again: None,
             expected_hash: None,
             sequence,
             batches,

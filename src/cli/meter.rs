@@ -9,6 +9,7 @@ use super::camera::Choice;
 use crate::image::Picture;
 use crate::math::Vec3;
 use crate::render::{Job, Sampling, Settings, render};
+use crate::scene::MAX_STOPS;
 use std::time::Instant;
 
 /// Longest side of the small picture.
@@ -78,7 +79,8 @@ pub(super) fn exposure(job: &Job) -> Option<f32> {
     let picture = render(&Job { settings: &settings, ..*job }, &()).picture;
     let bright = bright(&picture)?;
     // Tenths of a stop: what is printed is what is used.
-    (!FINE.contains(&bright)).then(|| (libm::log2f(BRIGHT / bright) * 10.0).round() / 10.0)
+    let stops = || (libm::log2f(BRIGHT / bright) * 10.0).round() / 10.0;
+    (!FINE.contains(&bright)).then(|| stops().clamp(-MAX_STOPS, MAX_STOPS))
 }
 
 /// What is said of an exposure that was found.

@@ -121,7 +121,7 @@ fn render_command(typed: &RenderArgs) -> Exit {
         }
     }
     match job::RenderJob::new(&args) {
-        Ok(job) => render::run(&job::RenderJob { expected_hash, ..job }, &messages),
+        Ok(job) => render::run(&job::RenderJob { expected_hash, again: typed.again.clone(), ..job }, &messages),
         Err(job::Wrong(text)) => {
             messages.error("usage", text, "");
             Exit::Usage

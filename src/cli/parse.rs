@@ -7,7 +7,7 @@ use crate::image::ToneMap;
 use crate::math::Vec3;
 use crate::render::{Cost, Filter, Instancing, Quality, Split, UnknownCost};
 use crate::scene::framing::NamedView;
-use crate::scene::{Background, Environment, MAX_DEPTH};
+use crate::scene::{Background, Environment, MAX_DEPTH, MAX_STOPS};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::fmt;
 use std::path::PathBuf;
@@ -150,7 +150,8 @@ pub(super) fn turns(text: &str) -> Result<Turns, String> {
 /// Stops.
 #[expect(clippy::cast_possible_truncation, reason = "the range fits f32")]
 pub(super) fn exposure(text: &str) -> Result<f32, String> {
-    within(text, -30.0, 30.0).map(|n| n as f32)
+    let most = f64::from(MAX_STOPS);
+    within(text, -most, most).map(|n| n as f32)
 }
 
 /// A weight.
@@ -169,7 +170,11 @@ pub(super) fn error(text: &str) -> Result<f32, String> {
 pub(super) fn confidence(text: &str) -> Result<f64, String> {
     let n = match text.strip_suffix('%') {
         Some(percent) => finite(percent)? / 100.0,
-        None => finite(text)?,
+        // No probability is above 1.
+        None => match finite(text)? {
+            n if n > 1.0 => n / 100.0,
+            n => n,
+        },
     };
     let known = (0.5..=0.9999).contains(&n);
     if known { Ok(n) } else { Err("write a confidence from 50% to 99.99%".into()) }
@@ -470,6 +475,16 @@ mod tests {
         assert_eq!(turns("0/4"), Ok(Turns { count: 4, only: Some(0) }));
         for text in ["0", "4/4", "-1/4", "/4", "4/", "a"] {
             assert!(turns(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_confidence_is_a_probability_or_a_percentage() {
+        for (text, expected) in [("0.9", 0.9), ("90%", 0.9), ("90", 0.9), ("99.99", 0.9999), ("0.5", 0.5)] {
+            assert!((confidence(text).unwrap() - expected).abs() < 1e-12, "{text}");
+        }
+        for text in ["0.4", "1", "5", "49", "100", "100%", "-90", "nan"] {
+            assert!(confidence(text).is_err(), "{text}");
         }
     }
 

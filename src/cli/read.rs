@@ -5,7 +5,7 @@ use super::exit::Exit;
 use super::job::{self, Wrong};
 use super::message::{Messages, Severity};
 use super::moment;
-use crate::load::{Diagnostic, LoadError, LoadOptions, Loaded, load, load_bytes};
+use crate::load::{Diagnostic, Limits, LoadError, LoadOptions, Loaded, load, load_bytes};
 use crate::math::DAffine3;
 use crate::render::World;
 use std::io::Read;
@@ -13,22 +13,26 @@ use std::path::{Path, PathBuf};
 use std::slice;
 use xxhash_rust::xxh3::xxh3_128;
 
-/// Loads every input and puts all into the first one's scene.
+/// Loads every input and puts all into the first one's scene, in the memory that is allowed for all together.
 pub(super) fn scene(inputs: &[PathBuf], options: &LoadOptions) -> Result<Loaded, LoadError> {
-    let mut parts = inputs.iter().map(|input| one(input, options));
-    let Some(first) = parts.next() else { return Ok(Loaded::default()) };
-    let mut whole = first?;
-    if inputs.len() == 1 {
+    let Some((first, others)) = inputs.split_first() else { return Ok(Loaded::default()) };
+    let mut whole = one(first, options)?;
+    if others.is_empty() {
         return Ok(whole);
     }
     let mut hashes = whole.facts.hash.to_le_bytes().to_vec();
-    for part in parts {
-        let part = part?;
+    for input in others {
+        let part = one(input, &LoadOptions { limits: left(&options.limits, &whole), ..options.clone() })?;
         hashes.extend(part.facts.hash.to_le_bytes());
         append(&mut whole, part);
     }
     whole.facts.hash = xxh3_128(&hashes);
     Ok(whole)
+}
+
+/// What is left of the memory that may be taken after a model was loaded.
+pub(super) fn left(limits: &Limits, loaded: &Loaded) -> Limits {
+    Limits { memory: limits.memory.saturating_sub(loaded.facts.charged), ..*limits }
 }
 
 /// Loads one model and says what there is to warn of; a failure is said too.
@@ -89,7 +93,9 @@ pub(super) fn not_strict(loaded: &Loaded, file: &Path) -> Diagnostic {
 /// Gives a frame that was loaded without pictures those of an earlier one, which are the same, with the materials that
 /// show them. Whether it can be done: other materials are a sign that the file has been changed in between.
 pub(super) fn take_pictures(frame: &mut Loaded, earlier: Loaded) -> bool {
-    if frame.scene.materials.len() != earlier.scene.materials.len() {
+    let names =
+        |loaded: &Loaded| loaded.scene.materials.iter().map(|material| material.name.clone()).collect::<Vec<_>>();
+    if names(frame) != names(&earlier) {
         return false;
     }
     let (to, from) = (&mut frame.scene, earlier.scene);
@@ -109,6 +115,7 @@ fn append(whole: &mut Loaded, part: Loaded) {
     facts.extensions.extend(more.extensions);
     facts.max_rounding = facts.max_rounding.max(more.max_rounding);
     facts.files.extend(more.files);
+    facts.charged += more.charged;
     facts.reading += more.reading;
     facts.decoding += more.decoding;
 }

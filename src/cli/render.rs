@@ -33,8 +33,10 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
     };
     let sources = Sources::of(job.batches.iter().flat_map(|b| &b.inputs));
     let mut so_far = SoFar { sources, pictures: Vec::new(), foretold: Vec::new() };
+    // A picture that is repeated may be replaced by its repetition, but by nothing else.
+    let spared = |path| Sources::of(&job.again).spared_by(path, "--stats-file");
     if let Some(path) = job.stats_file()
-        && let Err(fault) = writable::check(path, "--stats-file", &so_far.sources)
+        && let Err(fault) = writable::check(path, "--stats-file", &so_far.sources).and_then(|()| spared(path))
     {
         messages.say(Severity::Error, &fault);
         return Exit::Failed;
@@ -117,7 +119,8 @@ fn render_shots(task: &Task, shots: &[&Shot], so_far: &mut SoFar) -> Result<Exit
         let same = left.iter().take_while(|shot| shot.step.moment == first.step.moment).count();
         let (now, later) = left.split_at(same);
         left = later;
-        let mut ready = prepare(task, &first.step, earlier.take(), profile).map_err(|exit| worst.max(exit))?;
+        let mut ready =
+            prepare(task, (&first.step, survey.is_some()), earlier.take(), profile).map_err(|exit| worst.max(exit))?;
         so_far.sources.add(&ready.loaded.facts.files);
         if let Some(path) = job.stats_file() {
             let spared = so_far.sources.spared_by(path, "--stats-file");
@@ -149,7 +152,7 @@ fn beginning(
     if !is_metered || step.moment == shots[0].step.moment {
         return Ok(None);
     }
-    let mut ready = prepare(task, &step, None, profile.take())?;
+    let mut ready = prepare(task, (&step, survey.is_some()), None, profile.take())?;
     let mut stage = ready.stage(survey);
     shots.iter().try_for_each(|shot| stage.meter(task, &Shot { step: step.clone(), ..(*shot).clone() }))?;
     drop(stage);
@@ -179,8 +182,13 @@ impl Ready {
     }
 }
 
-/// Loads a scene for a picture, and refuses what cannot or must not be drawn.
-fn prepare(task: &Task, step: &Step, earlier: Option<Ready>, mut profile: Profile) -> Result<Ready, Exit> {
+/// Loads a scene for a picture, and refuses what cannot or must not be drawn. A frame of several may show nothing.
+fn prepare(
+    task: &Task,
+    (step, is_frame): (&Step, bool),
+    earlier: Option<Ready>,
+    mut profile: Profile,
+) -> Result<Ready, Exit> {
     let Task { job, batch, messages, progress } = *task;
     let start = Instant::now();
     progress.stage("loading");
@@ -228,7 +236,7 @@ fn prepare(task: &Task, step: &Step, earlier: Option<Ready>, mut profile: Profil
     }
     let world = World::placing(&loaded.scene, job.instances);
     let world = if job.everything { world.with_everything() } else { world };
-    if world.is_empty() && !job.allow_empty {
+    if world.is_empty() && !job.allow_empty && !is_frame {
         messages.say(Severity::Error, &nothing_to_draw(&loaded, &batch.inputs[0]));
         return Err(Exit::Input);
     }

@@ -11,6 +11,7 @@ use super::parse::{Frames, Turns};
 use super::progress::Progress;
 use super::{interrupt, moment, read};
 use crate::load::{Diagnostic, LoadOptions, Loaded, Moment};
+use crate::render::World;
 use crate::scene::framing::{Bounds, Fit, frame, frame_around, robust_bounds, turned};
 use crate::scene::{Camera, Scene};
 use std::f64::consts::TAU;
@@ -164,9 +165,10 @@ pub(super) struct Survey {
 }
 
 impl Survey {
-    /// Loads the geometry of every frame. The default view looks from where the first of them looks good.
+    /// Loads the geometry of every frame. The default view looks from where the first of them looks good that shows
+    /// anything.
     ///
-    /// `None`: the pictures of this job are framed one by one.
+    /// `None`: the pictures of this job are framed one by one, or none of them shows anything.
     pub(super) fn of(
         job: &RenderJob,
         batch: &Batch,
@@ -199,6 +201,10 @@ impl Survey {
             }
             let scene = &loaded.scene;
             photometric |= scene.photometric;
+            // Animations hide things by a scale of zero.
+            if World::flattened_bytes(scene) == 0 {
+                continue;
+            }
             let here = robust_bounds(scene);
             if bounds.is_none() {
                 let first = &batch.shots[0].step;

@@ -204,7 +204,8 @@ impl Prepared<'_> {
         let Some(forecast) = found else { return Exit::Interrupted };
         let picture = picture::bytes(self.effective, self.shot.kind, behind(job));
         let format = job.stats.as_ref().map(|stats| stats.format);
-        let told = dry_run::told(self.task.file(), &self.work, &forecast, picture, format);
+        let which = dry_run::Which { file: self.task.file(), view: self.phrase, target: &self.shot.target };
+        let told = dry_run::told(which, &self.work, &forecast, picture, format);
         if job.stats_file().is_some() {
             so_far.foretold.push(told);
             return Exit::Done;

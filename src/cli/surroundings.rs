@@ -3,6 +3,7 @@
 use super::job::Look;
 use super::parse::Env;
 use super::picture;
+use super::read;
 use crate::load::panorama::{self, LoadedPanorama};
 use crate::load::{Limits, LoadError, Loaded};
 use crate::scene::default_light::{self, DefaultLight};
@@ -18,7 +19,7 @@ pub(super) fn place(look: &Look, limits: &Limits, loaded: &mut Loaded) -> Result
         None => {}
         Some(Env::BuiltIn(environment)) => loaded.scene.environment = *environment,
         Some(Env::File(file)) => {
-            let LoadedPanorama { mut panorama, warnings, hash } = panorama::load(file, limits)?;
+            let LoadedPanorama { mut panorama, warnings, hash } = panorama::load(file, &read::left(limits, loaded))?;
             #[expect(clippy::cast_possible_truncation, reason = "an angle")]
             let rotation = (look.env_rotate % 360.0).to_radians() as f32;
             panorama.rotation = rotation;

@@ -40,8 +40,8 @@ impl Sources {
     }
 }
 
-/// Refuses `path`, given with `flag`, where its folder is not there, where it is a folder itself, or where it is one of
-/// `sources`.
+/// Refuses `path`, given with `flag`, where its folder is not there, where it is a folder itself or read-only, or where it is
+/// one of `sources`.
 pub(super) fn check(path: &Path, flag: &str, sources: &Sources) -> Result<(), Diagnostic> {
     let fault = |code, text: &str, remedy: &str| Err(Diagnostic::new(code, path, "", text).remedy(remedy));
     let goal = destination(path);
@@ -51,6 +51,9 @@ pub(super) fn check(path: &Path, flag: &str, sources: &Sources) -> Result<(), Di
     }
     if path.is_dir() {
         return fault("output-is-folder", "is a folder", &format!("name a file in it with {flag}"));
+    }
+    if std::fs::metadata(&goal).is_ok_and(|old| old.is_file() && old.permissions().readonly()) {
+        return fault("output-read-only", "exists and is read-only", &format!("name another with {flag}"));
     }
     sources.spared_by(path, flag)
 }
@@ -96,5 +99,11 @@ mod tests {
             assert!(code == expected && remedy.contains("--plot"), "{code} {remedy}");
         }
         assert_eq!(code(Path::new("-")), Ok(()), "standard input is no file");
+        let kept = at("kept.html");
+        std::fs::write(&kept, "x").unwrap();
+        let mut permissions = std::fs::metadata(&kept).unwrap().permissions();
+        permissions.set_readonly(true);
+        std::fs::set_permissions(&kept, permissions).unwrap();
+        assert_eq!(code(&kept).map_err(|(code, _)| code), Err("output-read-only"));
     }
 }

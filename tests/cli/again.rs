@@ -75,3 +75,26 @@ fn a_picture_without_settings_cannot_be_repeated() {
     }
     folder.run(&["render", "--again", "missing.png"]).ends(1).says(&["missing.png"]);
 }
+
+#[test]
+fn a_picture_that_is_repeated_is_replaced_by_nothing_but_its_repetition() {
+    let folder = Folder::with_cube();
+    folder.render(&["cube.obj", "-o", "kept.png", "-q"]).ends(0);
+    let kept = folder.read("kept.png");
+    let again = |more: &[&str]| folder.run(&[&["render", "--again", "kept.png", "-q"], more].concat());
+    again(&["-o", "new.png", "--stats", "json", "--stats-file", "kept.png"])
+        .ends(1)
+        .says(&["kept.png", "--stats-file"]);
+    assert!(folder.read("kept.png") == kept && !folder.has("new.png"));
+    again(&["-o", "kept.png"]).ends(0);
+    assert!(folder.read("kept.png") == kept);
+}
+
+#[test]
+fn a_picture_of_a_very_bright_scene_is_repeated_too() {
+    let folder = Folder::with_cube();
+    folder.render(&["cube.obj", "-o", "a.png", "--exposure", "-45.6", "-q"]).ends(0);
+    folder.run(&["render", "--again", "a.png", "-o", "b.png", "-q"]).ends(0);
+    assert!(folder.read("a.png") == folder.read("b.png"));
+    folder.render(&["cube.obj", "--exposure", "101"]).ends(2).says(&["100"]);
+}

@@ -215,3 +215,13 @@ fn the_time_that_metering_takes_is_told_once() {
     let run = folder.render(&["a.gltf", "--exposure", "1", "--stats", "json"]).ends(0);
     assert!(!run.stderr.contains("meter") && run.text().contains(r#""meter":0.0"#), "{} {}", run.stderr, run.text());
 }
+
+#[test]
+fn frames_in_which_a_scale_of_zero_hides_everything_show_what_is_behind() {
+    let hiding = sliding().replace("\"path\":\"translation\"", "\"path\":\"scale\"");
+    let folder = Folder::new().file("a.gltf", hiding);
+    // Scales 0 0 0 at the start and 8 0 0 at the end: a line, which shows nothing either, but is no empty scene.
+    folder.render(&["a.gltf", "--frames", "0..2", "--fps", "1", "-q", "-o", "{frame}.png"]).ends(0);
+    assert!(folder.has("0.png") && folder.has("1.png"), "{:?}", folder.names());
+    folder.render(&["a.gltf", "--frame", "0", "--fps", "1"]).ends(3).says(&["nothing to draw"]);
+}

@@ -95,6 +95,8 @@ fn a_broken_limit_ends_with_1_and_says_which() {
     let run = folder.run(&["diff", "a.png", "b.png", "--fail-if", "rmse>0.1", "--fail-if", "max>0.2"]).ends(1);
     run.says(&["max is 0.46", "max>0.2"]);
     folder.run(&["diff", "a.png", "b.png", "--fail-if", "ssim>1"]).ends(2).says(&["relative-rmse"]);
+    folder.run(&["diff", "a.png", "b.png", "--fail-if", "layer-max>0"]).ends(2).says(&["two EXR files"]);
+    folder.run(&["diff", "a.png", "b.png", "--exposure", "2"]).ends(2).says(&["--space display"]);
 }
 
 #[test]

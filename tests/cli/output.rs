@@ -244,6 +244,17 @@ fn a_model_that_takes_more_memory_than_is_allowed_ends_in_1_as_more_may_help() {
 }
 
 #[test]
+fn models_in_one_scene_share_the_memory_that_is_allowed() {
+    let folder = Folder::new().file("cube.obj", format!("{CUBE}{}", "#\n".repeat(100_000)));
+    let render = |times: usize| {
+        let merged = ["--merge", "--dry-run", "--max-memory", "5M"];
+        folder.render(&[&vec!["cube.obj"; times][..], &merged].concat())
+    };
+    render(2).ends(0);
+    render(40).ends(1).says(&["cube.obj", "--max-memory"]);
+}
+
+#[test]
 fn a_file_that_a_model_names_and_that_is_too_large_ends_in_1_too() {
     let model = r#"{
         "asset": {"version": "2.0"},

@@ -126,6 +126,30 @@ fn a_dry_run_foretells_and_writes_nothing() {
     assert!(rays["low"].as_f64() <= rays["value"].as_f64() && rays["value"].as_f64() <= rays["high"].as_f64());
     assert!(rmse.as_f64().unwrap() > 0.0 && told["looked_at"].as_u64().unwrap() < 160 * 120, "{told}");
     assert_eq!(folder.names(), ["cube.obj"]);
+    let views = ["render", "cube.obj", "--size", "32x24", "--dry-run", "--view", "front,iso", "-o", "{view}.png"];
+    let run = folder.run(&views).ends(0);
+    assert!(
+        run.text().contains("cube.obj, front view: ") && run.text().contains("cube.obj, iso view: "),
+        "{}",
+        run.text()
+    );
+    let run = folder.run(&[&views[..], &["--stats", "json"]].concat()).ends(0);
+    let outputs = run.text().lines().map(|line| serde_json::from_str::<Value>(line).unwrap()["output"].clone());
+    assert_eq!(outputs.collect::<Vec<_>>(), ["front.png", "iso.png"]);
+}
+
+#[test]
+fn what_finding_out_takes_is_foretold_with_the_rest() {
+    let folder = Folder::with_cube();
+    let json = |more: &[&str]| {
+        let words = ["render", "cube.obj", "--size", "96x72", "--target-error", "0.002", "-q", "--stats", "json"];
+        let run = folder.run(&[&words[..], more].concat()).ends(0);
+        serde_json::from_str::<Value>(run.text()).unwrap()
+    };
+    let (foretold, took) = (json(&["--dry-run"]), json(&["-o", "a.png"]));
+    let (rays, eye) =
+        (foretold["rays"]["value"].as_f64().unwrap(), 96.0 * 72.0 * took["sampling"]["mean"].as_f64().unwrap());
+    assert!((0.75..1.33).contains(&(eye / rays)), "{rays} foretold, {eye} sent");
 }
 
 #[test]

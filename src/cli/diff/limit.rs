@@ -16,8 +16,10 @@ const FIGURES: [Figure; 9] = [
     ("flip", |c| c.looks.mean),
     ("flip-max", |c| c.looks.max),
     ("pixels", |c| c.difference.over as f64),
-    ("layer-max", Compared::layer_max),
+    (OF_LAYERS, Compared::layer_max),
 ];
+
+const OF_LAYERS: &str = "layer-max";
 
 /// A limit, such as `rmse>0.01` or `psnr<40`.
 #[derive(Clone, Copy, Debug)]
@@ -43,6 +45,11 @@ impl FromStr for Limit {
 }
 
 impl Limit {
+    /// Whether it is one of layers, which only EXR files have.
+    pub(super) fn is_of_layers(&self) -> bool {
+        self.figure.0 == OF_LAYERS
+    }
+
     /// What is wrong, if the figure is beyond it. What is no number is always beyond it.
     pub(super) fn broken_by(&self, compared: &Compared) -> Option<String> {
         let value = (self.figure.1)(compared);

@@ -105,6 +105,7 @@ fn compared(args: &DiffArgs, messages: &Messages) -> Result<Compared, Fault> {
     }
     let both_linear = kinds == [FileKind::Exr; 2];
     let space = args.space.map_or(if both_linear { Space::Linear } else { Space::Display }, Into::into);
+    check_use(args, kinds, space)?;
     let none = Layers::default();
     let [ours, theirs] = [&expected, &actual].map(|picture| picture.layers.as_ref().unwrap_or(&none));
     let (layers, layers_of_one) = layer_differences(ours, theirs);
@@ -119,6 +120,20 @@ fn compared(args: &DiffArgs, messages: &Messages) -> Result<Compared, Fault> {
     };
     let looks = looks(&expected, &actual, space, args.pixels_per_degree);
     Ok(Compared { expected, actual, space, difference, looks, layers, layers_of_one, left_out })
+}
+
+/// Refuses what would do nothing with files of these kinds.
+fn check_use(args: &DiffArgs, kinds: [FileKind; 2], space: Space) -> Result<(), Fault> {
+    let is_developed = space == Space::Display && kinds.contains(&FileKind::Exr);
+    let has_layers = kinds == [FileKind::Exr; 2];
+    let text = if (args.tone_map.is_some() || args.exposure.is_some()) && !is_developed {
+        "--tone-map and --exposure say how an EXR becomes display colour: they need one, and --space display"
+    } else if args.fail_if.iter().any(|limit| limit.is_of_layers()) && !has_layers {
+        "--fail-if layer-max needs two EXR files: others have no layers"
+    } else {
+        return Ok(());
+    };
+    Err(Box::new((Diagnostic::new("usage", &args.actual, "", text), Exit::Usage)))
 }
 
 /// Warns of what is not compared since it is not read, and tells it.
