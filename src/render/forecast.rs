@@ -63,12 +63,13 @@ pub struct Forecast {
 /// different random numbers. `None` when cancelled.
 pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
     let context = Context::new(job.scene, job.world, job.textures, job.settings);
-    let (settings, work) = match job.settings.sampling {
+    // What is asked for as an error is first found out how to reach; the rendering will do that again.
+    let (settings, work, before) = match job.settings.sampling {
         Sampling::Stochastic(how) if how.target.is_some() => {
             let plan = target::plan::<NoProbe>(job, &context, &how, &Quiet(progress))?;
-            (plan.settings(job.settings, 0), plan.work)
+            (plan.settings(job.settings, 0), plan.work, (plan.rays as f64, plan.spent))
         }
-        _ => (job.settings.clone(), 1.0),
+        _ => (job.settings.clone(), 1.0, (0.0, 0.0)),
     };
     let squares = squares(settings.width, settings.height);
     let timed = Part::<NoProbe>::render(job, &context, &settings, &squares, progress)?;
@@ -81,7 +82,7 @@ pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
         (0..timed.squares.len()).map(|i| value(i) / timed.squares[i].beauty.len().max(1) as f64).collect()
     };
     let whole = pixels as f64 * work;
-    let rays = Interval::of_mean(&per_pixel(&|i| timed.rays_in_tiles(i)), whole);
+    let rays = Interval::of_mean(&per_pixel(&|i| timed.rays_in_tiles(i)), whole).map(|rays| rays + before.0);
     let tests: u64 =
         counted.counts.iter().flat_map(|c| [c.primary, c.shadow, c.reflected, c.refracted]).map(|c| c.n_it).sum();
     let per_ray = tests as f64 / counted.rays().max(1) as f64;
@@ -90,7 +91,7 @@ pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
     Some(Forecast {
         looked_at,
         pixels,
-        cpu: Interval::of_mean(&per_pixel(&|i| timed.seconds_in_tiles(i)), whole),
+        cpu: Interval::of_mean(&per_pixel(&|i| timed.seconds_in_tiles(i)), whole).map(|cpu| cpu + before.1),
         rays,
         tests: rays.map(|rays| rays * per_ray),
         rmse: is_random.then(|| Interval::of_mean(&squared, 1.0 / work).map(f64::sqrt)),

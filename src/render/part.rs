@@ -97,6 +97,11 @@ impl<P: Observer> Part<P> {
         self.spent[square].as_secs_f64() * self.rays_in_tiles(square) / self.squares[square].rays.max(1) as f64
     }
 
+    /// Processor time that all took.
+    pub(super) fn seconds(&self) -> f64 {
+        self.spent.iter().map(Duration::as_secs_f64).sum()
+    }
+
     /// Processor time of a pixel as a part of whole tiles, on the average.
     pub(super) fn seconds_per_pixel(&self) -> f64 {
         let seconds: f64 = (0..self.squares.len()).map(|i| self.seconds_in_tiles(i)).sum();

@@ -124,6 +124,13 @@ pub(super) struct Coordinates {
     edges: [Vec2; 2],
 }
 
+/// The colour between those of three corners: exactly theirs where these agree, so that an alpha that is the same
+/// everywhere is not below itself anywhere.
+#[inline(always)]
+pub(crate) fn mixed_color([a, b, c]: [Vec4; 3], [_, second, third]: [f32; 3]) -> Vec4 {
+    a + (b - a) * second + (c - a) * third
+}
+
 impl Patch<'_> {
     /// Moves it to another point of its triangle.
     pub(super) fn move_to(&mut self, weights: [f32; 3], print: Footprint) {
@@ -141,7 +148,9 @@ impl Patch<'_> {
 
     /// Vertex colour, linear RGBA; white when the mesh has none.
     pub(crate) fn color(&self) -> Vec4 {
-        self.mix(&self.mesh.colors).unwrap_or(Vec4::ONE)
+        let color = |i: u32| self.mesh.colors.get(i as usize).copied();
+        let [a, b, c] = self.corners.map(color);
+        a.zip(b).zip(c).map_or(Vec4::ONE, |((a, b), c)| mixed_color([a, b, c], self.weights))
     }
 
     /// The texture at this point, linear RGBA.
@@ -333,6 +342,18 @@ pub(crate) fn smooth_normal(placement: &Placement, interpolated: Vec3) -> Option
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_colour_that_is_the_same_at_all_corners_is_the_same_between_them() {
+        let mut random = crate::math::random::Random::new(9);
+        for _ in 0..10_000 {
+            let (color, u, v) = (random.unit(), random.unit(), random.unit());
+            let all = Vec4::splat(color);
+            assert_eq!(mixed_color([all; 3], [1.0 - u - v, u, v]), all);
+        }
+        let [a, b, c] = [Vec4::X, Vec4::Y, Vec4::Z];
+        assert_eq!(mixed_color([a, b, c], [0.25, 0.5, 0.25]), Vec4::new(0.25, 0.5, 0.25, 0.0));
+    }
 
     #[test]
     fn weights_grow_as_much_faster_as_a_triangle_is_smaller() {

@@ -37,8 +37,10 @@ pub(super) struct Plan<P> {
     slope: f64,
     /// How many times the work of one rendering all together take: that many times less is the square of their error.
     pub work: f64,
-    /// Eye rays spent on finding this out.
-    rays: u64,
+    /// Eye rays spent on finding this out, …
+    pub rays: u64,
+    /// … and seconds of processor time.
+    pub spent: f64,
     /// Seconds of processor time of one rendering, as foretold.
     cpu: f64,
     counts: Vec<ByClass<P>>,
@@ -97,6 +99,7 @@ pub(super) fn plan<P: Observer>(
         slope: 1.0,
         work: 1.0,
         rays: 0,
+        spent: 0.0,
         cpu: 0.0,
         counts: Vec::new(),
     };
@@ -115,6 +118,7 @@ pub(super) fn plan<P: Observer>(
         let samples = parts.iter().map(|part| part.samples_per_pixel() * 0.5).sum();
         for part in parts {
             plan.rays += part.rays();
+            plan.spent += part.seconds();
             plan.counts.extend(part.counts);
         }
         let fewest = how.min_samples.max(fewest(samples)).min(how.max_samples.max(1));

@@ -98,8 +98,9 @@ fn error(reference: &Reference, pictures: &[Vec<[f64; 4]>]) -> Error {
         }
     }
     let values = (reference.pixels.len() * channels).max(1) as f64;
-    let square = (squares / values - reference.error * reference.error).max(0.0);
     let noise = variance / values;
+    // No error is below how far the pictures lie around their mean, whatever a reference that is off itself makes of it.
+    let square = (squares / values - reference.error * reference.error).max(noise * (n - 1.0) / n);
     let place = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
     let width = (reference.width as usize).max(1);
     Error {
@@ -164,6 +165,12 @@ mod tests {
         assert!((biased.bias - 0.1).abs() < 1e-12 && biased.noise == 0.0 && biased.flip > 0.0);
         let both = error(&reference(0.0), &[all(0.8), all(0.7), all(0.6)]);
         assert!((both.rmse.powi(2) - both.noise.powi(2) - both.bias.powi(2)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_reference_that_is_off_makes_no_error_smaller_than_how_far_pictures_lie_apart() {
+        let found = error(&reference(0.2), &[all(0.4), all(0.6)]);
+        assert!((found.rmse - 0.1).abs() < 1e-12, "{}", found.rmse);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use super::painted::Painted;
 use crate::math::simd::{Kernel, Simd};
 use crate::math::{Vec2, Vec3, Vec4};
 use crate::render::context::{Context, coverage};
-use crate::render::patch::{Turn, given_tangent, turned_by_texel, turning_of};
+use crate::render::patch::{Turn, given_tangent, mixed_color, turned_by_texel, turning_of};
 use crate::render::shade::{MetalRoughPaint, PhongPaint, base_color, base_space, occlusion};
 use crate::render::surface::{facing, side_of};
 use crate::render::texture::{ColorSpace, Layout, Places, Spots, TextureStore, changes};
@@ -228,7 +228,8 @@ impl Kernel for Read<'_> {
                 group.read(store, (places, &spots), (&mut texels, points));
             }
             for i in start..start + points {
-                let vertex = if colored { given.mix(i, given.faces.colors(i)) } else { Vec4::ONE };
+                let vertex =
+                    if colored { mixed_color(given.faces.colors(i), given.corner_weights(i)) } else { Vec4::ONE };
                 let whole = paint(painted, i, (material, vertex), |slot| texels[slot as usize][i - start]);
                 certain[i] &= u32::from(whole);
             }
