@@ -7,6 +7,9 @@ use crate::scene::Mesh;
 use bevy_mikktspace::{Geometry, Ops, TangentSpace};
 use std::collections::HashMap;
 
+/// Bytes that generating takes a corner: what is noted of it, beside the vertex of its own that it may become.
+pub const OF_CORNER: u64 = 256;
+
 /// Gives `mesh` tangents that follow texture coordinate set `uv_set`.
 ///
 /// Vertices whose corners need different tangents are split; a mesh without normals gets flat ones, vertex by vertex.

@@ -1,6 +1,6 @@
 //! The gloss in the alpha of specular-glossiness maps, as the roughness that our materials read.
 //!
-//! Roughness is what gloss is missing to one (KHR_materials_pbrSpecularGloss, *Conversion*), so a map of one is a map of the
+//! Roughness is what gloss is missing to one (KHR_materials_pbrSpecularGlossiness), so a map of one is a map of the
 //! other, made once after decoding: roughness in green and no metal in blue, as metallic-roughness maps have them.
 
 use crate::pages::Paged;

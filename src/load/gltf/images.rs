@@ -102,9 +102,14 @@ impl<'a> Images<'a> {
     }
 }
 
-/// Takes what a bitmap as large as this one needs.
+/// Takes what the roughness of a picture needs.
 fn charge(bitmap: &Bitmap, limits: &Limits, budget: &mut Budget) -> Result<(), Unusable> {
-    let bytes = if matches!(bitmap.pixels, Pixels::Rgba16(_)) { 8 } else { 4 };
+    let bytes = match bitmap.pixels {
+        // Without alpha it is one texel.
+        Pixels::Rgb8(_) => return Ok(()),
+        Pixels::Rgba8(_) => 4,
+        Pixels::Rgba16(_) => 8,
+    };
     take_memory(bitmap.width, bitmap.height, (bytes, 0), limits, budget)
 }
 

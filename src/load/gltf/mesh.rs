@@ -85,8 +85,7 @@ pub(super) fn cost(reader: Reader, job: &Job) -> u64 {
         Checked::Valid(Mode::TriangleStrip | Mode::TriangleFan) => 36,
         _ => 24,
     };
-    // What the generator notes of a corner, which may become a vertex of its own.
-    let tangents = if job.needs.tangents.is_some() { 256 + values * VALUE } else { 0 };
+    let tangents = if job.needs.tangents.is_some() { tangents::OF_CORNER + values * VALUE } else { 0 };
     let set = |semantic: &Checked<Semantic>| match semantic {
         Checked::Valid(Semantic::TexCoords(set)) => Some(*set as usize + 1),
         _ => None,

@@ -31,6 +31,7 @@ mod up;
 use super::limits::{Budget, OverBudget};
 use super::paths::Resolver;
 use super::place::place;
+use super::tangents;
 use super::wires::{self, Wires};
 use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
 use crate::math::{DAffine3, DVec3};
@@ -118,8 +119,8 @@ fn draw(
     wires::draw(wires, &places, scene, budget, facts, file, width).map_err(|over| bare::over_memory(file, over))
 }
 
-/// Bytes that making tangents takes a corner: what the generator notes of it, and a vertex of its own.
-const OF_TANGENTS: u64 = 256 + 4 * 16;
+/// Bytes that making tangents takes a corner; as a vertex of its own it has a place, a normal, coordinates and a colour.
+const OF_TANGENTS: u64 = tangents::OF_CORNER + 4 * 16;
 
 /// One instance of each mesh, moved to where the file has it.
 ///
@@ -137,7 +138,7 @@ fn scene(
         mesh.material = material;
         if materials.get(material as usize).is_some_and(|m| m.normal_map.is_some()) {
             budget.take(3 * mesh.triangles.len() as u64, OF_TANGENTS)?;
-            super::tangents::generate(mesh, 0);
+            tangents::generate(mesh, 0);
         }
     }
     let world_from_object = DAffine3::from_translation(center);
