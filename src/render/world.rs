@@ -12,7 +12,9 @@ use crate::accel::{AccelChoice, AccelParams, AnyAccel, BitSet, Cone, Hit, Kept, 
 use crate::math::frame::snapped_center;
 use crate::math::triangle::Triangle;
 use crate::math::{DAffine3, DMat3, DVec3, Vec3};
-use crate::scene::{Mesh, Scene};
+use crate::scene::Scene;
+use crate::scene::corners::{Hull, take_in};
+use crate::scene::mesh::normal_from_object;
 use rayon::prelude::*;
 
 /// Bytes that a triangle takes at least when it is placed by itself, with the fast structure that takes least while it is
@@ -42,7 +44,7 @@ pub struct World {
 pub(crate) struct Placement {
     /// Takes tangents to world space; lengths change.
     pub world_from_object: DMat3,
-    /// Takes normals to world space; lengths change. The inverse transpose of `world_from_object` up to a factor.
+    /// Takes normals to world space; lengths change.
     pub normal_from_object: DMat3,
     /// Whether the instance is mirrored: its faces keep the corner order of the file, so their winding is turned round.
     pub mirrored: bool,
@@ -50,11 +52,7 @@ pub(crate) struct Placement {
 
 impl Placement {
     pub(super) fn new(m: DMat3) -> Self {
-        let mirrored = m.determinant() < 0.0;
-        // The cofactors are det · (inverse transpose) and exist for flattened instances too.
-        let cofactors = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
-        let normal_from_object = if mirrored { cofactors * -1.0 } else { cofactors };
-        Self { world_from_object: m, normal_from_object, mirrored }
+        Self { world_from_object: m, normal_from_object: normal_from_object(&m), mirrored: m.determinant() < 0.0 }
     }
 }
 
@@ -278,36 +276,16 @@ fn centered(world_from_object: &DAffine3, center: DVec3) -> DAffine3 {
     DAffine3 { matrix3: world_from_object.matrix3, translation: world_from_object.translation - center }
 }
 
-/// Vertices or faces that are worth a thread's while.
+/// Vertices that are worth a thread's while.
 const PARALLEL_RUN: usize = 1 << 14;
 
 /// Box of all instances' vertices that a face uses, and of the spheres and cones.
 fn bounds(scene: &Scene) -> (DVec3, DVec3) {
-    let instances = scene.instances.iter().map(|i| mesh_bounds(&scene.meshes[i.mesh as usize], &i.world_from_object));
+    let mut faces = Hull::EMPTY;
+    take_in(scene, &mut faces);
     let spheres = scene.spheres.iter().map(|s| (s.center - s.radius, s.center + s.radius));
     let cones = scene.cones.iter().map(crate::scene::Cone::bounds);
-    instances.chain(spheres).chain(cones).fold(NO_BOX, join)
-}
-
-const NO_BOX: (DVec3, DVec3) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-
-fn join(a: (DVec3, DVec3), b: (DVec3, DVec3)) -> (DVec3, DVec3) {
-    (a.0.min(b.0), a.1.max(b.1))
-}
-
-fn mesh_bounds(mesh: &Mesh, world_from_object: &DAffine3) -> (DVec3, DVec3) {
-    // Faces share their corners, and placing one costs more than a note of it.
-    let mut used = vec![false; mesh.positions.len()];
-    mesh.triangles.iter().flatten().chain(&mesh.polygon_corners).for_each(|&i| used[i as usize] = true);
-    let grow = |(lo, hi): (DVec3, DVec3), (p, _): (&Vec3, &bool)| {
-        let p = world_from_object.transform_point3(p.as_dvec3());
-        (lo.min(p), hi.max(p))
-    };
-    let run = |(positions, used): (&[Vec3], &[bool])| {
-        positions.iter().zip(used).filter(|(_, used)| **used).fold(NO_BOX, grow)
-    };
-    let runs = mesh.positions.par_chunks(PARALLEL_RUN).zip(used.par_chunks(PARALLEL_RUN));
-    runs.map(run).reduce(|| NO_BOX, join)
+    spheres.chain(cones).fold((faces.lo, faces.hi), |(lo, hi), more| (lo.min(more.0), hi.max(more.1)))
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "loading refuses scenes with 2^32 - 1 prims or vertices")]
@@ -318,7 +296,7 @@ fn index(i: usize) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{AlphaMode, Cone, Instance, Material, Plane, Polygon, Sphere};
+    use crate::scene::{AlphaMode, Cone, Instance, Material, Mesh, Plane, Polygon, Sphere};
 
     fn triangle(material: u32) -> Mesh {
         Mesh { material, positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]], ..Mesh::default() }

@@ -1,6 +1,6 @@
 //! Geometry: indexed triangles (and whole n-gons), spheres, cones, planes, and where they stand.
 
-use crate::math::{DAffine3, DVec3, Vec2, Vec3, Vec4};
+use crate::math::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
 use std::mem::size_of;
 
 /// One run of faces that share a material: a glTF primitive, or an OBJ `o`/`g`/`usemtl` run.
@@ -96,6 +96,13 @@ pub struct Instance {
     pub mesh: u32,
     /// From object space to world space, composed in `f64`.
     pub world_from_object: DAffine3,
+}
+
+/// Takes normals of faces to where a matrix takes the faces; lengths change as their areas do. For a mirroring one it
+/// points to the same side of the faces still. The inverse transpose up to a factor, which exists for any matrix.
+pub(crate) fn normal_from_object(m: &DMat3) -> DMat3 {
+    let cofactors = DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
+    if m.determinant() < 0.0 { cofactors * -1.0 } else { cofactors }
 }
 
 /// A sphere in world space.

@@ -5,6 +5,7 @@
 
 pub mod camera;
 pub mod color;
+pub(crate) mod corners;
 pub mod default_light;
 pub mod features;
 pub mod framing;

@@ -3,7 +3,8 @@
 use super::parts::{Part, faces, gather, hull};
 use super::slices::Slices;
 use crate::math::DVec3;
-use crate::scene::Scene;
+use crate::scene::corners::{Hull, object_boxes, placed_box, take_in};
+use crate::scene::{Instance, Mesh, Scene};
 
 /// What there is to see.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,9 +51,10 @@ impl Bounds {
 /// Whatever is connected to the model, however thin, is part of it. A scene with nothing bounded gets the unit box
 /// around the origin.
 pub fn robust_bounds(scene: &Scene) -> Bounds {
-    let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let found = visit_corners(scene, |p| (lo, hi) = (lo.min(p), hi.max(p)));
-    found.and_then(|()| of_faces(scene, (lo, hi))).unwrap_or_else(|| by_parts(scene))
+    let mut corners = Hull::EMPTY;
+    take_in(scene, &mut corners);
+    let found = if corners.finite { of_faces(scene, (corners.lo, corners.hi)) } else { None };
+    found.unwrap_or_else(|| by_parts(scene))
 }
 
 /// The same where the box of all corners is known, such as [`World::bounds`](crate::render::World::bounds).
@@ -118,16 +120,19 @@ const LOOKS: usize = 16;
 /// found by a look at some of their faces, from all over them. `None` where a corner is nowhere, if it was looked at.
 fn has_no_gap(scene: &Scene, bounds: &Bounds) -> Option<bool> {
     let mut slices = Slices::new(bounds);
-    for instance in &scene.instances {
-        let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
-        let corner = |i: u32| {
-            let p = mesh.positions.get(i as usize)?;
-            Some(instance.world_from_object.transform_point3(p.as_dvec3())).filter(|p| p.is_finite())
-        };
-        // Neighbours in the file are neighbours in space: some from all over it reach far sooner than the first ones.
-        let stride = mesh.triangles.len() / FACES_AT_A_TIME + 1;
-        for first in 0..stride.min(LOOKS) {
-            for triangle in mesh.triangles.iter().skip(first).step_by(stride) {
+    let instances = || {
+        let mesh = |instance: &Instance| scene.meshes.get(instance.mesh as usize);
+        scene.instances.iter().filter_map(move |instance| Some((instance, mesh(instance)?)))
+    };
+    // Neighbours in the file are neighbours in space: some from all over it reach far sooner than the first ones.
+    let stride = |mesh: &Mesh| mesh.triangles.len() / FACES_AT_A_TIME + 1;
+    for look in 0..LOOKS {
+        for (instance, mesh) in instances().filter(|(_, mesh)| look < stride(mesh)) {
+            let corner = |i: u32| {
+                let p = mesh.positions.get(i as usize)?;
+                Some(instance.world_from_object.transform_point3(p.as_dvec3())).filter(|p| p.is_finite())
+            };
+            for triangle in mesh.triangles.iter().skip(look).step_by(stride(mesh)) {
                 let [a, b, c] = triangle.map(corner);
                 let (a, b, c) = (a?, b?, c?);
                 slices.reach(a.min(b).min(c), a.max(b).max(c));
@@ -136,33 +141,20 @@ fn has_no_gap(scene: &Scene, bounds: &Bounds) -> Option<bool> {
                 return Some(true);
             }
         }
-        if stride > LOOKS {
-            slices.cover(instance, mesh)?;
-            if slices.has_no_gap() {
-                return Some(true);
-            }
+    }
+    let large: Vec<_> = instances().filter(|(_, mesh)| stride(mesh) > LOOKS).collect();
+    let boxes = if large.is_empty() { Vec::new() } else { object_boxes(scene) };
+    for (instance, mesh) in large {
+        let place = boxes[instance.mesh as usize].map(|bounds| placed_box(bounds, instance));
+        if place.is_some_and(|place| slices.reached_throughout(&place)) {
+            continue;
+        }
+        slices.cover(instance, mesh)?;
+        if slices.has_no_gap() {
+            return Some(true);
         }
     }
     Some(false)
-}
-
-/// Calls `f` for every corner of the faces, for shared ones once; `None` when a corner is nowhere, or not all are faces.
-fn visit_corners(scene: &Scene, mut f: impl FnMut(DVec3)) -> Option<()> {
-    if !(scene.spheres.is_empty() && scene.cones.is_empty()) {
-        return None;
-    }
-    for instance in &scene.instances {
-        let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
-        let mut used = vec![false; mesh.positions.len()];
-        for &i in mesh.triangles.iter().flatten().chain(&mesh.polygon_corners) {
-            *used.get_mut(i as usize)? = true;
-        }
-        for (p, _) in mesh.positions.iter().zip(used).filter(|(_, used)| *used) {
-            let p = instance.world_from_object.transform_point3(p.as_dvec3());
-            f(Some(p).filter(|p| p.is_finite())?);
-        }
-    }
-    Some(())
 }
 
 #[cfg(test)]
@@ -170,7 +162,6 @@ mod tests {
     use super::*;
     use crate::math::{DAffine3, Vec3};
     use crate::scene::framing::parts::CHUNK;
-    use crate::scene::{Instance, Mesh};
 
     /// Triangles along a spiral, `gap` of it left out at the end, on two instances.
     fn spiral(faces: usize, gap: f32) -> Scene {

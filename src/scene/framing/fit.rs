@@ -2,6 +2,7 @@
 
 use super::{Bounds, Direction, in_world};
 use crate::math::{DAffine3, DMat3, DVec3};
+use crate::scene::corners::{Outline, take_in};
 use crate::scene::{Camera, Projection, Scene};
 
 /// Which kind of camera to place.
@@ -19,6 +20,9 @@ pub enum FrameLens {
 /// Share of the picture's width and height that the model may fill; the rest is border.
 const FILL: f64 = 0.92;
 
+/// Reaching further by less than this share of half the model's diagonal is left to rounding.
+const ROUNDING: f64 = 1e-12;
+
 /// A camera that sees the model in `bounds` from `direction`, filling a picture of `aspect` width / height.
 ///
 /// The fit is to the projected vertices, not to a box or ball around them: the outermost ones touch the border on two
@@ -35,11 +39,13 @@ pub fn frame_around(scene: &Scene, bounds: &Bounds, direction: Direction, lens: 
     let mut fit = Fit::new(direction, bounds.center(), lens, aspect);
     let up = in_world(scene.up, DVec3::Y);
     let up_in_camera = fit.camera_from_world * up;
-    visit_balls(scene, bounds, |p, radius| {
-        let p = p - fit.center;
+    let center = fit.center;
+    let add = |extremes: &mut Extremes, p: DVec3, radius: f64| {
+        let p = p - center;
         let height = p.dot(up);
-        fit.extremes.add_ring(up_in_camera, height, (p - up * height).length(), radius);
-    });
+        extremes.add_ring(up_in_camera, height, (p - up * height).length(), radius);
+    };
+    fit.extremes = Fitted { bounds, extremes: fit.extremes, add }.all(scene);
     fit.camera(bounds.radius())
 }
 
@@ -66,15 +72,17 @@ impl Fit {
             }
             FrameLens::Orthographic => (0.0, 0.0),
         };
-        let extremes = Extremes { sides: [f64::NEG_INFINITY; 4], near: f64::NEG_INFINITY, slopes };
+        let extremes = Extremes::none(slopes);
         Self { lens, aspect, axes, camera_from_world: axes.transpose(), center, extremes }
     }
 
     /// Takes in the model in `bounds`.
     pub fn add(&mut self, scene: &Scene, bounds: &Bounds) {
-        visit_balls(scene, bounds, |p, radius| {
-            self.extremes.add(self.camera_from_world * (p - self.center), radius);
-        });
+        let (camera_from_world, center) = (self.camera_from_world, self.center);
+        let add = |extremes: &mut Extremes, p: DVec3, radius: f64| {
+            extremes.add(camera_from_world * (p - center), radius);
+        };
+        self.extremes = Fitted { bounds, extremes: self.extremes, add }.all(scene);
     }
 
     /// The camera for all that was taken in; `radius` says how large that is.
@@ -104,39 +112,55 @@ fn axes(direction: Direction) -> DMat3 {
     DMat3::from_cols(x, z.cross(x), z)
 }
 
-/// Calls `f` with the place and radius of every ball of the model in `bounds`; vertices have the radius 0.
-fn visit_balls(scene: &Scene, bounds: &Bounds, mut f: impl FnMut(DVec3, f64)) {
-    for instance in &scene.instances {
-        let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
-        // Faces share their corners.
-        let mut seen = vec![false; mesh.positions.len()];
-        for &i in mesh.triangles.iter().flatten().chain(&mesh.polygon_corners) {
-            let Some(p) = mesh.positions.get(i as usize) else { continue };
-            if std::mem::replace(&mut seen[i as usize], true) {
-                continue;
-            }
-            let p = instance.world_from_object.transform_point3(p.as_dvec3());
-            if bounds.contains(p) {
-                f(p, 0.0);
+/// What a camera is fitted to: calls of `add` with the place and radius of every ball of the model in `bounds`. Vertices
+/// have the radius 0; those that reach no further than others do by more than rounding may be left out.
+#[derive(Clone)]
+struct Fitted<'a, F> {
+    bounds: &'a Bounds,
+    extremes: Extremes,
+    add: F,
+}
+
+impl<F: Fn(&mut Extremes, DVec3, f64) + Clone + Send + Sync> Fitted<'_, F> {
+    fn all(mut self, scene: &Scene) -> Extremes {
+        take_in(scene, &mut self);
+        for sphere in scene.spheres.iter().filter(|sphere| self.bounds.contains(sphere.center)) {
+            (self.add)(&mut self.extremes, sphere.center, sphere.radius);
+        }
+        for cone in &scene.cones {
+            let (lo, hi) = cone.bounds();
+            if self.bounds.contains((lo + hi) * 0.5) {
+                // Balls around the ends hold the mantle; those of a wide flat one reach too far.
+                (self.add)(&mut self.extremes, cone.base, cone.base_radius);
+                (self.add)(&mut self.extremes, cone.apex, cone.apex_radius);
             }
         }
+        self.extremes
     }
-    for sphere in scene.spheres.iter().filter(|sphere| bounds.contains(sphere.center)) {
-        f(sphere.center, sphere.radius);
-    }
-    for cone in &scene.cones {
-        let (lo, hi) = cone.bounds();
-        if bounds.contains((lo + hi) * 0.5) {
-            // Balls around the ends hold the mantle; those of a wide flat one reach too far.
-            f(cone.base, cone.base_radius);
-            f(cone.apex, cone.apex_radius);
+}
+
+impl<F: Fn(&mut Extremes, DVec3, f64) + Clone + Send + Sync> Outline for Fitted<'_, F> {
+    fn add(&mut self, p: DVec3) {
+        if self.bounds.contains(p) {
+            (self.add)(&mut self.extremes, p, 0.0);
         }
+    }
+
+    fn join(&mut self, other: &Self) {
+        self.extremes.join(&other.extremes);
+    }
+
+    fn holds(&self, p: DVec3) -> bool {
+        let mut with = Extremes::none(self.extremes.slopes);
+        (self.add)(&mut with, p, 0.0);
+        with.reach_no_further(&self.extremes, ROUNDING * self.bounds.radius())
     }
 }
 
 /// How far the model reaches past planes through the origin of camera space that lean like the sides of the picture.
 ///
 /// Right, left, top, bottom: the greatest `±x + slope·z`, `±y + slope·z`, z towards the eye; and the greatest z.
+#[derive(Clone, Copy)]
 struct Extremes {
     sides: [f64; 4],
     near: f64,
@@ -144,6 +168,25 @@ struct Extremes {
 }
 
 impl Extremes {
+    /// Those of nothing.
+    fn none(slopes: (f64, f64)) -> Self {
+        Self { sides: [f64::NEG_INFINITY; 4], near: f64::NEG_INFINITY, slopes }
+    }
+
+    /// Takes in what another has taken in.
+    fn join(&mut self, other: &Self) {
+        for (side, other) in self.sides.iter_mut().zip(other.sides) {
+            *side = side.max(other);
+        }
+        self.near = self.near.max(other.near);
+    }
+
+    /// Whether none reaches further than that of `other` by more than `slack`; `false` where one is no number.
+    fn reach_no_further(&self, other: &Self, slack: f64) -> bool {
+        let sides = self.sides.iter().zip(other.sides);
+        sides.chain([(&self.near, other.near)]).all(|(reach, other)| *reach <= other + slack)
+    }
+
     /// Takes in a ball, or a point of radius 0.
     fn add(&mut self, p: DVec3, radius: f64) {
         let (sx, sy) = self.slopes;

@@ -1,7 +1,8 @@
 //! What a model is made of, looked at one by one: faces, spheres and cones in world space.
 
-use crate::math::{DVec3, Vec3};
-use crate::scene::{Instance, Mesh, Scene};
+use crate::math::{DAffine3, DMat3, DVec3, Vec3};
+use crate::scene::mesh::normal_from_object;
+use crate::scene::{Mesh, Scene};
 use rayon::prelude::*;
 
 /// Facing is told apart from not facing by this much: closed bodies, whose faces cancel, face no way.
@@ -18,13 +19,58 @@ pub(super) fn faces(scene: &Scene) -> u64 {
 
 /// The mean direction of all faces weighted by area: length 1 for a card, 0 for a closed body.
 pub(super) fn facing(scene: &Scene) -> DVec3 {
-    let add = |(sum, area): &mut (DVec3, f64), part: &Part| {
-        *sum += part.normal;
-        *area += part.normal.length();
-    };
-    let join = |all: &mut (DVec3, f64), more: (DVec3, f64)| *all = (all.0 + more.0, all.1 + more.1);
-    let (sum, area) = gather(scene, Default::default, add, join);
-    if area > 0.0 { sum / area } else { DVec3::ZERO }
+    let mut own: Vec<Option<Facing>> = vec![None; scene.meshes.len()];
+    let mut all = Facing::default();
+    for instance in &scene.instances {
+        let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
+        let m = &instance.world_from_object.matrix3;
+        let faces = match area_scale(m) {
+            Some(scale) => {
+                let own = own[instance.mesh as usize].get_or_insert_with(|| Facing::of(mesh, &DAffine3::IDENTITY));
+                Facing { normal: normal_from_object(m) * own.normal, area: scale * own.area }
+            }
+            None if m.determinant() < 0.0 => Facing::of(mesh, &instance.world_from_object).turned_round(),
+            None => Facing::of(mesh, &instance.world_from_object),
+        };
+        all.join(faces);
+    }
+    if all.area > 0.0 { all.normal / all.area } else { DVec3::ZERO }
+}
+
+/// Which way faces look.
+#[derive(Clone, Copy, Default)]
+struct Facing {
+    /// The sum of their normals, each as long as the area of its face.
+    normal: DVec3,
+    area: f64,
+}
+
+impl Facing {
+    /// Of the faces of a mesh that stands somewhere.
+    fn of(mesh: &Mesh, world_from_object: &DAffine3) -> Self {
+        let mut all = Self::default();
+        let add = |all: &mut Self, part: &Part| all.join(Self { normal: part.normal, area: part.area });
+        gather_faces((mesh, world_from_object), &mut all, &Self::default, &add, &Self::join);
+        all
+    }
+
+    fn turned_round(self) -> Self {
+        Self { normal: -self.normal, ..self }
+    }
+
+    fn join(&mut self, other: Self) {
+        self.normal += other.normal;
+        self.area += other.area;
+    }
+}
+
+/// What areas grow by where a matrix makes all of them grow alike; `None` where it does not.
+fn area_scale(m: &DMat3) -> Option<f64> {
+    let squares = DVec3::from(m.to_cols_array_2d().map(|axis| DVec3::from(axis).length_squared()));
+    let across = DVec3::new(m.x_axis.dot(m.y_axis), m.y_axis.dot(m.z_axis), m.z_axis.dot(m.x_axis));
+    let scale = squares.element_sum() / 3.0;
+    let off = (squares - scale).abs().max(across.abs()).max_element();
+    (off <= 1e-6 * scale).then_some(scale)
 }
 
 /// A face, sphere or cone.
@@ -63,39 +109,51 @@ pub(super) fn gather<T: Send>(
     let mut all = nothing();
     for instance in &scene.instances {
         let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
-        // Faces share their corners.
-        let world = |p: &Vec3| instance.world_from_object.transform_point3(p.as_dvec3());
-        let places: Vec<DVec3> = mesh.positions.par_iter().with_min_len(CHUNK).map(world).collect();
-        let faces = Faces { instance, mesh, places: &places };
-        let of = |triangles: &[[u32; 3]]| {
-            let mut sum = nothing();
-            faces.visit(triangles, |part| add(&mut sum, part));
-            sum
-        };
-        match mesh.triangles.len() {
-            ..=CHUNK => faces.visit(&mesh.triangles, |part| add(&mut all, part)),
-            _ => {
-                let sums: Vec<T> = mesh.triangles.par_chunks(CHUNK).map(of).collect();
-                sums.into_iter().for_each(|sum| join(&mut all, sum));
-            }
-        }
-        faces.visit_polygons(|part| add(&mut all, part));
+        gather_faces((mesh, &instance.world_from_object), &mut all, &nothing, &add, &join);
     }
     visit_solids(scene, |part| add(&mut all, part));
     all
 }
 
+/// The same of the faces of a mesh that stands somewhere, to `all`.
+fn gather_faces<T: Send>(
+    (mesh, world_from_object): (&Mesh, &DAffine3),
+    all: &mut T,
+    nothing: &(impl Fn() -> T + Sync),
+    add: &(impl Fn(&mut T, &Part) + Sync),
+    join: &impl Fn(&mut T, T),
+) {
+    // Faces share their corners.
+    let world = |p: &Vec3| world_from_object.transform_point3(p.as_dvec3());
+    let places: Vec<DVec3> = mesh.positions.par_iter().with_min_len(CHUNK).map(world).collect();
+    let faces = Faces { mesh, origin: world_from_object.translation, places: &places };
+    let of = |triangles: &[[u32; 3]]| {
+        let mut sum = nothing();
+        faces.visit(triangles, |part| add(&mut sum, part));
+        sum
+    };
+    match mesh.triangles.len() {
+        ..=CHUNK => faces.visit(&mesh.triangles, |part| add(all, part)),
+        _ => {
+            let sums: Vec<T> = mesh.triangles.par_chunks(CHUNK).map(of).collect();
+            sums.into_iter().for_each(|sum| join(all, sum));
+        }
+    }
+    faces.visit_polygons(|part| add(all, part));
+}
+
 /// The faces of an instance.
 struct Faces<'a> {
-    instance: &'a Instance,
     mesh: &'a Mesh,
+    /// Where the instance stands, world space.
+    origin: DVec3,
     /// World space.
     places: &'a [DVec3],
 }
 
 impl Faces<'_> {
     fn corner(&self, i: u32) -> DVec3 {
-        self.places.get(i as usize).copied().unwrap_or(self.instance.world_from_object.translation)
+        self.places.get(i as usize).copied().unwrap_or(self.origin)
     }
 
     fn visit(&self, triangles: &[[u32; 3]], mut f: impl FnMut(&Part)) {

@@ -98,9 +98,20 @@ impl Slices {
         Some(())
     }
 
-    /// Whether no slice is empty, so that nothing can come off.
+    /// Whether no slice is empty, so that nothing can come off; where the box is flat, nothing can either.
     pub(super) fn has_no_gap(&self) -> bool {
-        self.reached.covered().as_flattened().iter().all(|&covered| covered)
+        let covered = self.reached.covered();
+        (0..3).all(|axis| self.per_unit[axis] == 0.0 || covered[axis].iter().all(|&covered| covered))
+    }
+
+    /// Whether parts reach into every slice that something with these outermost points could.
+    pub(super) fn reached_throughout(&self, outermost: &[DVec3]) -> bool {
+        let covered = self.reached.covered();
+        (0..3).all(|axis| {
+            let places = || outermost.iter().map(|p| self.slice(axis, p[axis]));
+            let (first, last) = (places().min().unwrap_or(0), places().max().unwrap_or(0));
+            covered[axis][first..=last].iter().all(|&covered| covered)
+        })
     }
 
     /// Adds a part to the slices that its middle is in.

@@ -216,3 +216,36 @@ fn a_card_is_looked_at_face_on_from_the_side_it_faces() {
     let floor = from(&block(Vec3::ZERO, Vec3::new(4.0, 0.1, 3.0), 2));
     assert!(floor.y > 0.5 && floor.z > 0.5, "{floor}");
 }
+
+#[test]
+fn a_crowd_is_framed_as_closely_as_if_each_corner_had_been_looked_at() {
+    let mut crowd = block(Vec3::ZERO, Vec3::new(1.0, 2.0, 0.5), 6);
+    let placed = |i: u32| {
+        let t = f64::from(i);
+        let place = DVec3::new(f64::from(i % 7) * 3.0, t * 0.01, f64::from(i % 11) * 3.0);
+        let world_from_object = DAffine3::from_translation(place) * DAffine3::from_rotation_y(t);
+        Instance { name: String::new(), mesh: 0, world_from_object }
+    };
+    crowd.instances = (0..300).map(placed).collect();
+    // The same as one mesh, of which every corner is looked at.
+    let mut melted = mesh(Vec::new(), Vec::new());
+    for instance in &crowd.instances {
+        let base = melted.meshes[0].positions.len() as u32;
+        let places = crowd.meshes[0].positions.iter();
+        let places = places.map(|p| instance.world_from_object.transform_point3(p.as_dvec3()).as_vec3());
+        melted.meshes[0].positions.extend(places);
+        melted.meshes[0].triangles.extend(crowd.meshes[0].triangles.iter().map(|t| t.map(|i| i + base)));
+    }
+    let bounds = robust_bounds(&crowd);
+    let direction = default_direction(&crowd, &bounds);
+    for lens in [PINHOLE, FrameLens::Orthographic] {
+        for way in [frame, frame_around] {
+            let camera = way(&crowd, &bounds, direction, lens, 1.5);
+            // Corners of the second were rounded to f32, and must not fall out of the box.
+            let room = Bounds { lo: bounds.lo - 1e-3, hi: bounds.hi + 1e-3, ..bounds };
+            let other = way(&melted, &room, direction, lens, 1.5);
+            let (a, b) = (camera.world_from_camera.translation, other.world_from_camera.translation);
+            assert!(a.distance(b) < 1e-4 * bounds.radius(), "{a} {b}");
+        }
+    }
+}
