@@ -3,7 +3,7 @@
 use crate::accel::Shapes;
 use crate::math::aabb::Aabb;
 use crate::math::bounds::{PLACED_CONDITION, PLACED_ROOM, PLACED_SCALE};
-use crate::math::simd::{LANES, Row, Simd};
+use crate::math::simd::{Kernel, LANES, Level, Row, Simd};
 use crate::math::triangles::Corners8;
 use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 
@@ -47,17 +47,12 @@ impl Place {
             return None;
         }
         let mut place = Self { frame_from_object, object_from_frame: n, room: Vec3::ZERO, bounds: Aabb::EMPTY };
-        let (mut room, mut own) = (DVec3::ZERO, Aabb::EMPTY);
-        for &corner in &object.vertices {
-            let there = place.corner(corner);
-            if !there.is_finite() {
-                return None;
-            }
-            room = room.max((place.carried(there) - corner.as_dvec3()).abs());
-            place.bounds = place.bounds.union(Aabb { lo: there, hi: there });
-            own = own.union(Aabb { lo: corner, hi: corner });
+        let Measured { room, bounds, own } =
+            Level::best().run_narrow(Measure { place: &place, corners: &object.vertices });
+        if !(bounds.lo.is_finite() && bounds.hi.is_finite() && room.is_finite()) {
+            return None;
         }
-        place.room = room.as_vec3().map(f32::next_up);
+        (place.room, place.bounds) = (room.as_vec3().map(f32::next_up), bounds);
         let size = (own.hi - own.lo).max_element();
         (place.room.max_element() <= size * PLACED_ROOM).then_some(place)
     }
@@ -113,7 +108,119 @@ impl Place {
     }
 }
 
+/// All corners of an object that stands somewhere, to be placed and carried back.
+struct Measure<'a> {
+    place: &'a Place,
+    corners: &'a [Vec3],
+}
+
+/// What came of it.
+#[derive(Debug, PartialEq)]
+struct Measured {
+    /// The furthest that one came back from where it was, on each axis; not finite where one is not.
+    room: DVec3,
+    /// Around all where they stand.
+    bounds: Aabb,
+    /// Around all in the object's own frame.
+    own: Aabb,
+}
+
+impl Kernel for Measure<'_> {
+    type Output = Measured;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> Measured {
+        let Self { place, corners } = self;
+        let (translation, n) = (place.frame_from_object.translation, place.object_from_frame);
+        let (mut lo, mut hi) = ([s.splat(f32::INFINITY); 6], [s.splat(f32::NEG_INFINITY); 6]);
+        let (mut room, mut finite) = ([s.splat_f64(0.0); 3], (1 << LANES) - 1);
+        // Loops and no closures: those are compiled without the instructions.
+        for run in corners.chunks(LANES) {
+            let mut corner = [[0.0; LANES]; 3];
+            // The last one fills up what is left.
+            let eight: [Vec3; LANES] = match run.first_chunk() {
+                Some(eight) => *eight,
+                None => std::array::from_fn(|lane| run[lane.min(run.len() - 1)]),
+            };
+            for (lane, p) in eight.iter().enumerate() {
+                (corner[0][lane], corner[1][lane], corner[2][lane]) = (p.x, p.y, p.z);
+            }
+            let there = place.row(s, &corner);
+            let mut from = [s.splat_f64(0.0); 3];
+            for k in 0..3 {
+                from[k] = s.sub_f64(s.widen(s.load(&there[k])), s.splat_f64(translation[k]));
+            }
+            for k in 0..3 {
+                // As `carried` has it.
+                let x = s.mul_f64(s.splat_f64(n.x_axis[k]), from[0]);
+                let y = s.mul_f64(s.splat_f64(n.y_axis[k]), from[1]);
+                let z = s.mul_f64(s.splat_f64(n.z_axis[k]), from[2]);
+                let back = s.add_f64(s.add_f64(x, y), z);
+                let off = s.sub_f64(back, s.widen(s.load(&corner[k])));
+                room[k] = s.greater_f64(s.abs_f64(off), room[k]);
+            }
+            for k in 0..3 {
+                let (there, own) = (s.load(&there[k]), s.load(&corner[k]));
+                finite &= s.at_most(s.abs(own), s.splat(f32::MAX));
+                (lo[k], hi[k]) = (s.smaller(there, lo[k]), s.greater(there, hi[k]));
+                (lo[k + 3], hi[k + 3]) = (s.smaller(own, lo[k + 3]), s.greater(own, hi[k + 3]));
+            }
+        }
+        let (mut least, mut greatest) = ([0.0; 6], [0.0; 6]);
+        for side in 0..6 {
+            (least[side], greatest[side]) = (s.least(lo[side]), s.greatest(hi[side]));
+        }
+        let of = |first: usize| Aabb {
+            lo: Vec3::from_slice(&least[first..first + 3]),
+            hi: Vec3::from_slice(&greatest[first..first + 3]),
+        };
+        let mut furthest = DVec3::ZERO;
+        for k in 0..3 {
+            furthest[k] = s.store_f64(room[k]).into_iter().fold(0.0, f64::max);
+        }
+        Measured { room: if finite == (1 << LANES) - 1 { furthest } else { DVec3::NAN }, bounds: of(0), own: of(3) }
+    }
+}
+
 /// The largest sum of the sizes of a row: how much the largest coordinate may grow.
 fn row_sum(m: &DMat3) -> f64 {
     (m.x_axis.abs() + m.y_axis.abs() + m.z_axis.abs()).max_element()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn corners_are_measured_eight_at_a_time_as_one_by_one() {
+        let at = |i: usize| Vec3::new(libm::sinf(i as f32), libm::cosf(i as f32 * 1.7) * 3.0, 0.1 + i as f32 * 0.01);
+        let matrix = DAffine3 {
+            matrix3: DMat3::from_rotation_y(0.7) * DMat3::from_rotation_x(2.3) * 1.9,
+            translation: DVec3::new(0.3, -17.7, 5.1),
+        };
+        for len in [3, 8, 9, 64, 101] {
+            let object = Shapes { vertices: (0..len).map(at).collect(), ..Shapes::default() };
+            let place = Place::new(matrix, &object).expect("an ordinary place");
+            let there = || object.vertices.iter().map(|&corner| place.corner(corner));
+            let off = |(there, corner): (Vec3, &Vec3)| (place.carried(there) - corner.as_dvec3()).abs();
+            let expected = Measured {
+                room: there().zip(&object.vertices).map(off).fold(DVec3::ZERO, DVec3::max),
+                bounds: Aabb::around(there()),
+                own: Aabb::around(object.vertices.iter().copied()),
+            };
+            assert!(place.room.cmpgt(Vec3::ZERO).all() && place.bounds == expected.bounds);
+            for level in Level::all() {
+                let found = level.run(Measure { place: &place, corners: &object.vertices });
+                assert_eq!(found, expected, "{len} {}", level.name());
+            }
+        }
+    }
+
+    #[test]
+    fn a_corner_that_is_nowhere_has_no_place() {
+        for far in [f32::NAN, f32::INFINITY, f32::MAX] {
+            let object = Shapes { vertices: vec![Vec3::ZERO, Vec3::X, Vec3::splat(far)], ..Shapes::default() };
+            assert!(Place::new(DAffine3::from_scale(DVec3::splat(2.0)), &object).is_none(), "{far}");
+        }
+    }
 }

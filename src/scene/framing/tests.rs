@@ -192,6 +192,12 @@ fn a_card_is_looked_at_face_on_from_the_side_it_faces() {
     let from = |scene: &Scene| default_direction(scene, &robust_bounds(scene)).from;
     assert!((from(&card([0, 1, 2])) - DVec3::Z).length() < 1e-12);
     assert!((from(&card([2, 1, 0])) - DVec3::NEG_Z).length() < 1e-12);
+    // Mirrored ones keep their front, scaled evenly or not.
+    for scale in [DVec3::new(-1.0, 1.0, 1.0), DVec3::new(-1.0, 1.5, 1.0)] {
+        let mut mirrored = card([0, 1, 2]);
+        mirrored.instances[0].world_from_object = DAffine3::from_scale(scale);
+        assert!((from(&mirrored) - DVec3::Z).length() < 1e-12, "{scale}");
+    }
 
     // A floor that faces down, and a bent panel that faces left, thicker than a card.
     let bent = |turned: bool| {
