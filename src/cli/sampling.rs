@@ -319,7 +319,7 @@ pub(super) fn phrase(settings: &Settings, sampled: &Sampled) -> String {
             let percent = |n: u64| 100.0 * n as f64 / sampled.pixels.max(1) as f64;
             let rmse = sampled.rmse().unwrap_or(0.0);
             format!(
-                "{rays}, {:.1} % of pixels within {} at {} %, estimated error {rmse:.4}, {:.0} % of the rays to spare",
+                "{rays}, {:.1} % of pixels within {} at {} %, error about {rmse:.4} at most, {:.0} % of the rays to spare",
                 percent(sampled.met),
                 how.error,
                 100.0 * how.confidence,

@@ -67,7 +67,7 @@ fn the_default_stops_when_it_is_certain_and_says_so() {
     let squares: f64 = channel("sampling.error").values.iter().map(|e| e * e).sum();
     assert!(((squares / (32.0 * 24.0)).sqrt() - number("rmse")).abs() < 1e-9);
     assert!(number("spare") > 0.0 && number("spare") < 0.8 * rays, "{sampling}");
-    let words = ["samples a pixel", "within 0.08", "at 95 %", "estimated error", "to spare"];
+    let words = ["samples a pixel", "within 0.08", "at 95 %", "error about", "at most, ", "to spare"];
     run(&folder, &["-o", "a.png"]).ends(0).says(&words);
 }
 
