@@ -60,6 +60,14 @@ impl AccelChoice {
         }
     }
 
+    /// The structures that may be built.
+    pub const fn kinds(&self) -> &[AccelKind] {
+        match self {
+            Self::Auto => &[AccelKind::FastOctree, AccelKind::FastBvh],
+            Self::Kind(kind) => std::slice::from_ref(kind),
+        }
+    }
+
     /// All names, in the order of the help text.
     pub fn names() -> impl Iterator<Item = &'static str> {
         std::iter::once(Self::AUTO).chain(AccelKind::ALL.map(AccelKind::name))

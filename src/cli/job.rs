@@ -8,7 +8,7 @@ use super::outputs::{self, Beside, Target};
 use super::parse::{Back, Env};
 use super::sampling::SamplingArgs;
 use super::sequence::{self, Sequence, Step};
-use crate::accel::{AccelChoice, AccelParams, IntersectorKind};
+use crate::accel::{AccelChoice, AccelKind, AccelParams, IntersectorKind};
 use crate::image::{ExrSamples, FileKind, PngDepth, ToneMap};
 use crate::load::{Limits, LoadOptions, MtlMode, Polygons};
 use crate::render::{Cost, Instancing};
@@ -165,7 +165,7 @@ impl RenderJob {
         Ok(Self {
             load: load_options(args),
             look: look(args),
-            params: params(&args.params)?,
+            params: params(&args.params, args.accel.kinds())?,
             accel: args.accel,
             intersector: args.intersector,
             instances: instances(args)?,
@@ -358,8 +358,9 @@ fn look(args: &RenderArgs) -> Look {
     }
 }
 
-/// The parameters of structures, checked.
-pub(super) fn params(args: &AccelArgs) -> Result<AccelParams, Wrong> {
+/// The parameters of the structures that may be built, checked.
+pub(super) fn params(args: &AccelArgs, kinds: &[AccelKind]) -> Result<AccelParams, Wrong> {
+    args.check_use(kinds).map_err(Wrong)?;
     let params = AccelParams {
         density: args.grid_density,
         max_resolution: args.grid_resolution,
@@ -505,7 +506,12 @@ mod tests {
             "a.obj --stats-file s.json",
             "a.obj -o a.png --stats json --stats-file ./a.png",
             "a.obj --heatmap tests --stats json --stats-file a-tests.png",
-            "a.obj --grid-density 0",
+            "a.obj --grid-density 0 --accel grid",
+            "a.obj --grid-density 2",
+            "a.obj --mailbox none --accel bvh",
+            "a.obj --leaf-size 8 --accel grid",
+            "a.obj --grid-cells 2x2x2 --accel octree",
+            "a.obj --assign box --accel fast-bvh",
             "a.obj --layers",
             "a.obj --layers=tests",
             "a.obj -o - --heatmap tests",

@@ -157,3 +157,18 @@ fn reports_for_which_there_is_no_room_are_told_before_any_work() {
         run.says(&["nowhere/x.html", "folder", flag]);
     }
 }
+
+#[test]
+fn options_that_would_change_nothing_are_bad_command_lines_that_say_what_they_are_for() {
+    let folder = Folder::with_cube();
+    let refused = |words: &[&str], says: &[&str]| {
+        folder.run(words).ends(2).says(says);
+    };
+    refused(&["render", "cube.obj", "--grid-density", "2"], &["--grid-density", "fast-octree", "--accel", "grid-bvh"]);
+    refused(&["explain", "cube.obj", "--mailbox", "none", "--accel", "bvh"], &["--mailbox", "of bvh"]);
+    refused(&["bench", "cube.obj", "--step-cost", "3", "--accel", "grid,bvh"], &["--step-cost", "of grid, bvh"]);
+    refused(&["bench", "cube.obj", "--heatmap-max", "9", "--report", "r.json"], &["--heatmap-max", ".html"]);
+    refused(&["verify", "cube.obj", "--plot", "page.txt"], &["page.txt", ".html"]);
+    refused(&["render", "cube.obj", "--dry-run", "--profile"], &["--profile"]);
+    assert_eq!(folder.names(), ["cube.obj"]);
+}

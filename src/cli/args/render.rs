@@ -237,7 +237,8 @@ pub(in crate::cli) struct RenderArgs {
     pub stats: Option<StatsFormat>,
     /// Render no picture: say what time, rays, tests and memory it would take and what error it would have, each with an
     /// interval, from about a hundredth of its pixels
-    #[arg(long, help_heading = "Run", hide_short_help = true, conflicts_with_all = ["again", "heatmap"])]
+    #[arg(long, help_heading = "Run", hide_short_help = true, conflicts_with_all = [
+        "again", "heatmap", "profile", "keep_partial"])]
     pub dry_run: bool,
     /// Print where the time went: reading, parsing, building, each class of rays, shading, writing; wall and CPU
     #[arg(long, help_heading = "Run", hide_short_help = true)]

@@ -1,7 +1,7 @@
 //! Parameters of a structure.
 
 use super::super::parse;
-use crate::accel::{Assign, MailboxKind};
+use crate::accel::{AccelKind, Assign, MailboxKind};
 use clap::Args;
 
 /// Parameters of the structures; what is left out follows from the kind of structure.
@@ -36,4 +36,39 @@ pub(in crate::cli) struct AccelArgs {
     #[arg(long, value_name = "KIND", value_parser = parse::mailbox(), default_value = MailboxKind::Exact.name(),
           help_heading = "Structure", hide_short_help = true)]
     pub mailbox: MailboxKind,
+}
+
+/// An option, and the structures that it is for.
+type Use = (&'static str, &'static [AccelKind]);
+
+impl AccelArgs {
+    /// Whether each that was typed changes one of these structures; the error says which one does not, and what it is for.
+    pub(in crate::cli) fn check_use(&self, kinds: &[AccelKind]) -> Result<(), String> {
+        let idle = self.typed().find(|(_, users)| !users.iter().any(|user| kinds.contains(user)));
+        let Some((option, users)) = idle else { return Ok(()) };
+        let names = |kinds: &[AccelKind]| kinds.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(", ");
+        let (these, users) = (names(kinds), names(users));
+        Err(format!("{option} changes nothing of {these}; it is for {users}: choose one of these with --accel"))
+    }
+
+    /// Those that were typed; a default cannot be told from its absence.
+    fn typed(&self) -> impl Iterator<Item = Use> {
+        use AccelKind::{Bvh, Grid, GridBvh, GridOctree, Octree};
+        const GRIDS: &[AccelKind] = &[Grid, GridOctree, GridBvh];
+        const OCTREES: &[AccelKind] = &[GridOctree, Octree];
+        const LEAVES: &[AccelKind] = &[Bvh, GridOctree, GridBvh, Octree];
+        const CELLS: &[AccelKind] = &[Grid, GridOctree, GridBvh, Octree];
+        let options: [(bool, Use); 9] = [
+            (self.grid_density.is_some(), ("--grid-density", GRIDS)),
+            (self.grid_resolution.is_some(), ("--grid-resolution", GRIDS)),
+            (self.grid_cells.is_some(), ("--grid-cells", GRIDS)),
+            (self.max_depth.is_some(), ("--max-depth", OCTREES)),
+            (self.step_cost.is_some(), ("--step-cost", OCTREES)),
+            (self.max_references.is_some(), ("--max-references", OCTREES)),
+            (self.leaf_size.is_some(), ("--leaf-size", LEAVES)),
+            (self.assign != Assign::Surface, ("--assign", CELLS)),
+            (self.mailbox != MailboxKind::Exact, ("--mailbox", CELLS)),
+        ];
+        options.into_iter().filter(|(typed, _)| *typed).map(|(_, of)| of)
+    }
 }

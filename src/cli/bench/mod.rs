@@ -114,7 +114,7 @@ fn plan(args: &BenchArgs) -> Result<Plan, Wrong> {
     } else if !args.compare.is_empty() {
         return Err(Wrong("--compare takes two structures, such as grid,fast-bvh".into()));
     }
-    let params = job::params(&args.params)?;
+    let params = job::params(&args.params, &kinds)?;
     if let Some(sweep) = &args.sweep {
         kinds = swept(sweep, kinds, &params)?;
     }
@@ -148,7 +148,14 @@ fn swept(sweep: &Sweep, kinds: Vec<AccelKind>, params: &AccelParams) -> Result<V
 
 fn files(args: &BenchArgs) -> Result<Vec<(PathBuf, Format)>, Wrong> {
     let typed = |path: &PathBuf| Ok((path.clone(), Format::from_path(path).map_err(Wrong)?));
-    args.report.iter().map(typed).collect()
+    let files: Vec<(PathBuf, Format)> = args.report.iter().map(typed).collect::<Result<_, Wrong>>()?;
+    let of_pages = [("--compare", !args.compare.is_empty()), ("--heatmap-max", args.heatmap_max.is_some())];
+    if let Some((flag, _)) = of_pages.iter().find(|(_, typed)| *typed)
+        && files.iter().all(|(_, format)| *format != Format::Html)
+    {
+        return Err(Wrong(format!("{flag} is for the heat maps of an HTML report: add --report PATH.html")));
+    }
+    Ok(files)
 }
 
 impl Bench<'_> {

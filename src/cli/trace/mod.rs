@@ -61,7 +61,7 @@ struct Told<'a> {
 /// Loads the model, traces the ray and prints its story.
 pub(super) fn run(args: &TraceArgs) -> Exit {
     let messages = Messages::new(args.model.load.messages.into(), args.quiet);
-    let checked = check(args).and_then(|look| Ok((look, job::params(&args.params)?)));
+    let checked = check(args).and_then(|look| Ok((look, job::params(&args.params, args.accel.kinds())?)));
     match checked {
         Ok((look, params)) => {
             let name = args.model.input.display().to_string();

@@ -15,6 +15,7 @@ use super::message::{Messages, Severity};
 use super::progress::Progress;
 use super::writable::{self, Sources};
 use super::{accident, interrupt, print, read};
+use crate::bench::report::Format;
 use crate::bench::verify::{Plan, kernels, verify};
 pub(super) use args::VerifyArgs;
 
@@ -25,6 +26,13 @@ pub(super) fn run(args: &VerifyArgs) -> Exit {
 }
 
 fn judge(args: &VerifyArgs, messages: &Messages) -> Exit {
+    if let Some(path) = &args.plot
+        && Format::from_path(path) != Ok(Format::Html)
+    {
+        let text = format!("--plot {}: a page for a browser ends in .html", path.display());
+        messages.error("usage", text, "");
+        return Exit::Usage;
+    }
     if let Some(path) = &args.plot
         && let Err(fault) = writable::check(path, "--plot", &Sources::of([&args.model.input]))
     {

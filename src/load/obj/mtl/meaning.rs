@@ -121,10 +121,28 @@ impl Meaning<'_> {
                 self.warn("mtl-black-under-map", &format!("{name} 0 under a map counts as 1"));
                 Vec3::ONE
             }
-            Some(factor) => color(factor),
+            Some(factor) => {
+                self.tell_unreal(slot, factor, name);
+                color(factor)
+            }
             None if mapped => Vec3::ONE,
             None => default,
         }
+    }
+
+    /// Tells of a colour that no light or surface has, which is taken as it is but for what is negative.
+    fn tell_unreal(&mut self, slot: Slot, factor: [f64; 3], name: &str) {
+        // Rounded conversions end a little beyond 1.
+        const MOST: f64 = 1.01;
+        let what = match slot {
+            _ if factor.iter().any(|x| *x < 0.0) => "parts below 0 count as 0",
+            Slot::Diffuse | Slot::Specular if factor.iter().any(|x| *x > MOST) => {
+                "it sends back more light than falls on it; parts run from 0 to 1"
+            }
+            _ => return,
+        };
+        let text = format!("{name} is {}: {what}", factor.map(|x| x.to_string()).join(" "));
+        self.warnings.push(Diagnostic::new("mtl-range", self.file, self.mtl.line.to_string(), text));
     }
 
     /// `d`, or 1 − `Tr`, 0 … 1.
@@ -451,6 +469,12 @@ mod tests {
         let (m, warnings) = guess("Kd 1\nPm 5\nPr 0.5");
         assert_eq!((m.metal_rough().unwrap().metallic, warnings), (1.0, vec!["mtl-range"]));
         assert!(guess("Kd 1\nPm 1\nPr 0\nd 1").1.is_empty());
+        // Colours stay as they are: light may be brighter than white.
+        let (m, warnings) = guess("Kd 255 128 0\nKe 4 4 4");
+        assert_eq!((m.base_color, warnings), (Vec3::new(255.0, 128.0, 0.0), vec!["mtl-range"]));
+        let (m, warnings) = guess("Kd 1 -1 0.5\nKe 0 -2 0");
+        assert_eq!((m.base_color, m.emission), (Vec3::new(1.0, 0.0, 0.5), Vec3::ZERO));
+        assert_eq!(warnings, ["mtl-range"; 2]);
     }
 
     #[test]
