@@ -42,6 +42,16 @@ pub(super) fn model(args: &ModelArgs, messages: &Messages) -> Result<Loaded, Exi
 
 /// The same for a command that takes several.
 pub(super) fn one_model(input: &PathBuf, args: &LoadArgs, messages: &Messages) -> Result<Loaded, Exit> {
+    let loaded = model_as_stored(input, args, messages)?;
+    check_flattened(&loaded, job::limits(args.max_memory).memory, input).map_err(|fault| {
+        messages.say(Severity::Error, &fault);
+        Exit::Failed
+    })?;
+    Ok(loaded)
+}
+
+/// The same for a command that does not need each instance by itself.
+pub(super) fn model_as_stored(input: &PathBuf, args: &LoadArgs, messages: &Messages) -> Result<Loaded, Exit> {
     let moment = moment::moment(&args.moment).map_err(|Wrong(text)| {
         messages.error("usage", text, "");
         Exit::Usage
@@ -64,23 +74,29 @@ pub(super) fn one_model(input: &PathBuf, args: &LoadArgs, messages: &Messages) -
         exit_of(&error)
     })?;
     loaded.warnings.iter().for_each(|w| messages.say(Severity::Warning, w));
-    check_flattened(&loaded, options.limits.memory, input, "allow more with --max-memory").map_err(|fault| {
-        messages.say(Severity::Error, &fault);
-        Exit::Failed
-    })?;
     Ok(loaded)
 }
 
 /// Refuses a scene whose instances, each stored by itself, take more memory than is allowed: a small file can name
 /// millions of them.
-pub(super) fn check_flattened(loaded: &Loaded, limit: u64, file: &Path, remedy: &str) -> Result<(), Diagnostic> {
+pub(super) fn check_flattened(loaded: &Loaded, limit: u64, file: &Path) -> Result<(), Diagnostic> {
     let bytes = World::flattened_bytes(&loaded.scene);
+    check_stored((loaded, bytes), limit, file, "allow more with --max-memory")
+}
+
+/// The same where those that are stored by themselves, all of them or some, take so many bytes.
+pub(super) fn check_stored(
+    (loaded, bytes): (&Loaded, u64),
+    limit: u64,
+    file: &Path,
+    remedy: &str,
+) -> Result<(), Diagnostic> {
     if bytes <= limit {
         return Ok(());
     }
     let count = loaded.scene.instances.len();
     let text =
-        format!("its {count} instances, each stored by itself, take {bytes} bytes or more where {limit} are allowed");
+        format!("its {count} instances, stored by themselves, take {bytes} bytes or more where {limit} are allowed");
     Err(Diagnostic::new("instances-too-large", file, "", text).remedy(remedy))
 }
 

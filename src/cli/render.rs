@@ -14,7 +14,7 @@ use super::stats::{self, PictureStats};
 use super::writable::{self, Sources};
 use super::{accident, again, interrupt, read, surroundings};
 use crate::load::{Diagnostic, LoadOptions, Loaded};
-use crate::render::{Instancing, World};
+use crate::render::{Instancing, Placing, World};
 use crate::scene::Scene;
 use crate::scene::framing::{Bounds, robust_bounds_within};
 use crate::threads;
@@ -225,16 +225,19 @@ fn prepare(
             Exit::Input
         })?;
     }
-    if job.instances == Instancing::Flatten {
-        let remedy =
-            "leave it to a fast structure to keep them once (--instances auto), or allow more with --max-memory";
-        let fits = read::check_flattened(&loaded, job.load.limits.memory, &batch.inputs[0], remedy);
-        fits.map_err(|fault| {
-            messages.say(Severity::Error, &fault);
-            Exit::Failed
-        })?;
-    }
-    let world = World::placing(&loaded.scene, job.instances);
+    let placing = Placing::new(&loaded.scene, job.instances);
+    let remedy = match job.instances {
+        Instancing::Flatten => {
+            "leave it to a fast structure to keep them once (--instances auto), or allow more with --max-memory"
+        }
+        Instancing::Keep | Instancing::Auto => "allow more with --max-memory",
+    };
+    let stored = (&loaded, placing.bytes());
+    read::check_stored(stored, job.load.limits.memory, &batch.inputs[0], remedy).map_err(|fault| {
+        messages.say(Severity::Error, &fault);
+        Exit::Failed
+    })?;
+    let world = placing.world();
     let world = if job.everything { world.with_everything() } else { world };
     if world.is_empty() && !job.allow_empty && !is_frame {
         messages.say(Severity::Error, &nothing_to_draw(&loaded, &batch.inputs[0]));

@@ -4,7 +4,8 @@
 //! One JSON object. `file`, `format`, `generator`, `hash`, `files` (all that were read); `triangles`, `polygons`,
 //! `faces`, `spheres`, `cones` (cylinders too), `planes`, `meshes`, `instances`, `materials`; `bounds` (`lo`, `hi`, metres) and `framed` (the same
 //! without strays) with `strays`; `units`, `up`, `up_reason`; `topology` (`corners`, `edges`, `open`, `non_manifold`,
-//! `duplicates`, `degenerate`; equal positions count as one corner); `dropped` (by reason); `points_and_lines`,
+//! `duplicates`, `degenerate`; equal positions count as one corner; `by_object`: but not those of instances that are kept
+//! once, where all by themselves would take more memory than is allowed); `dropped` (by reason); `points_and_lines`,
 //! `wires` (of these `points` and `lines`, with `point_width` and `line_width` as drawn, metres; 0: none);
 //! `textures` (`name`, `width`, `height`); `missing` (files that were named but not found); `extensions` (`name`,
 //! `required`, `supported`); `scenes`, `scene`; `variants`, `variant` (the number of the one asked for, or null);
@@ -15,10 +16,13 @@ mod args;
 mod report;
 mod topology;
 
+use super::args::ModelArgs;
 use super::exit::Exit;
-use super::message::Messages;
-use super::{accident, print, read};
+use super::message::{Messages, Severity};
+use super::{accident, job, print, read};
+use crate::render::{Instancing, Placing};
 pub(super) use args::InspectArgs;
+use report::Report;
 
 /// Loads the file and prints what was found.
 pub(super) fn run(args: &InspectArgs) -> Exit {
@@ -27,11 +31,18 @@ pub(super) fn run(args: &InspectArgs) -> Exit {
 }
 
 fn inspect(args: &InspectArgs, messages: &Messages) -> Exit {
-    let loaded = match read::model(&args.model, messages) {
+    let ModelArgs { input, load } = &args.model;
+    let loaded = match read::model_as_stored(input, load, messages) {
         Ok(loaded) => loaded,
         Err(exit) => return exit,
     };
-    let report = report::Report::new(&args.model.input, &loaded);
+    let (limit, placing) = (job::limits(load.max_memory).memory, Placing::new(&loaded.scene, Instancing::Auto));
+    let stored = (&loaded, placing.bytes());
+    if let Err(fault) = read::check_stored(stored, limit, input, "allow more with --max-memory") {
+        messages.say(Severity::Error, &fault);
+        return Exit::Failed;
+    }
+    let report = Report::new(input, &loaded, placing.world(), limit);
     let text = if args.json { report.json() } else { report.text() };
     match print(&text) {
         Err(e) => {

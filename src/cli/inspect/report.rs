@@ -5,9 +5,9 @@ use super::topology::Topology;
 use crate::accel::{AccelChoice, AccelParams};
 use crate::load::{AnimationFacts, Loaded, WireFacts};
 use crate::math::DVec3;
-use crate::render::{Instancing, World};
+use crate::render::World;
 use crate::scene::features::Features;
-use crate::scene::framing::{Bounds, robust_bounds};
+use crate::scene::framing::{Bounds, robust_bounds_within};
 use crate::scene::{Bitmap, LightKind, Mesh, Projection, Scene, UpAxis};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -28,22 +28,23 @@ pub(super) struct Report<'a> {
 const SHOWN: usize = 8;
 
 impl<'a> Report<'a> {
-    /// Looks the scene through; builds the structure that rendering would, to know its size.
-    pub(super) fn new(file: &'a Path, loaded: &'a Loaded) -> Self {
+    /// Looks the scene through, which is placed as rendering does it; builds the structure that rendering would, to know its
+    /// size. Instances are each stored by themselves for a while where that takes no more than `limit` bytes.
+    pub(super) fn new(file: &'a Path, loaded: &'a Loaded, world: World, limit: u64) -> Self {
         let scene = &loaded.scene;
-        let world = World::new(scene);
-        // Only what stands in several places may be kept once.
-        let kept = scene.instances.len() > scene.meshes.len();
-        let kept = kept.then(|| World::placing(scene, Instancing::Auto));
-        let rendered = kept.as_ref().unwrap_or(&world);
-        let structure = rendered.structure(AccelChoice::Auto, &AccelParams::DEFAULT).0.summary();
+        let topology = match World::flattened_bytes(scene) <= limit {
+            true if world.kept.is_empty() => Topology::of(&world.shapes),
+            true => Topology::of(&World::new(scene).shapes),
+            false => Topology::by_object(&world),
+        };
+        let structure = world.structure(AccelChoice::Auto, &AccelParams::DEFAULT).0.summary();
         Self {
             file,
             loaded,
-            bounds: robust_bounds(scene),
-            topology: Topology::of(&world.shapes),
+            bounds: robust_bounds_within(scene, world.bounds),
+            topology,
             features: Features::of(scene),
-            scene_bytes: scene_bytes(scene, rendered),
+            scene_bytes: scene_bytes(scene, &world),
             structure_bytes: structure.bytes,
             world,
         }
@@ -83,7 +84,7 @@ impl<'a> Report<'a> {
     fn contents(&self, lines: &mut Lines) {
         let (scene, shapes, facts) = (&self.loaded.scene, &self.world.shapes, &self.loaded.facts);
         lines.add("faces", grouped(facts.faces));
-        lines.add("triangles", grouped(shapes.triangles.len() as u64));
+        lines.add("triangles", grouped(u64::from(self.world.triangles())));
         lines.count("polygons", shapes.polygons.len() as u64, "kept whole");
         lines.count("spheres", shapes.spheres.len() as u64, "");
         lines.count("cones", shapes.cones.len() as u64, "or cylinders");
@@ -117,7 +118,8 @@ impl<'a> Report<'a> {
         let found: Vec<String> =
             edges.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{} {what}", grouped(*n))).collect();
         let state = if topology.edges == 0 { String::new() } else { format!(", {}", or_closed(&found)) };
-        lines.add("edges", format!("{}{state}", grouped(topology.edges)));
+        let by_object = if topology.by_object { ", each instance by itself" } else { "" };
+        lines.add("edges", format!("{}{state}{by_object}", grouped(topology.edges)));
         lines.count("duplicates", topology.duplicates, "faces with the corners of another");
         lines.count("degenerate", topology.degenerate, "faces with two corners in one place");
         for (reason, count) in &self.loaded.facts.dropped {
@@ -178,7 +180,7 @@ impl<'a> Report<'a> {
             "file": self.file.to_string_lossy(), "format": facts.format, "generator": facts.generator,
             "hash": format!("{:032x}", facts.hash),
             "files": facts.files.iter().map(|f| f.to_string_lossy()).collect::<Vec<_>>(),
-            "triangles": shapes.triangles.len(), "polygons": shapes.polygons.len(), "faces": facts.faces,
+            "triangles": self.world.triangles(), "polygons": shapes.polygons.len(), "faces": facts.faces,
             "spheres": shapes.spheres.len(), "cones": shapes.cones.len(), "planes": shapes.planes.len(),
             "meshes": scene.meshes.len(), "instances": scene.instances.len(),
             "materials": scene.materials.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(),
@@ -187,7 +189,7 @@ impl<'a> Report<'a> {
             "topology": {
                 "corners": topology.corners, "edges": topology.edges, "open": topology.open,
                 "non_manifold": topology.non_manifold, "duplicates": topology.duplicates,
-                "degenerate": topology.degenerate,
+                "degenerate": topology.degenerate, "by_object": topology.by_object,
             },
             "dropped": facts.dropped.iter().map(|(why, n)| json!({ "reason": why, "count": n })).collect::<Vec<_>>(),
             "points_and_lines": facts.wires.points + facts.wires.lines,
@@ -305,10 +307,35 @@ fn scene_bytes(scene: &Scene, world: &World) -> u64 {
 mod tests {
     use super::*;
     use crate::load::{LoadOptions, load_bytes};
+    use crate::math::DAffine3;
+    use crate::render::Instancing;
+    use crate::scene::Instance;
+
+    fn report(loaded: &Loaded, limit: u64) -> Report<'_> {
+        Report::new(Path::new("a.toml"), loaded, World::placing(&loaded.scene, Instancing::Auto), limit)
+    }
 
     fn report_of(text: &str) -> Value {
         let loaded = load_bytes(Path::new("a.toml"), text.into(), &LoadOptions::default()).unwrap();
-        serde_json::from_str(&Report::new(Path::new("a.toml"), &loaded).json()).unwrap()
+        serde_json::from_str(&report(&loaded, u64::MAX).json()).unwrap()
+    }
+
+    #[test]
+    fn what_stands_in_many_places_is_counted_there_and_looked_at_once_where_memory_is_short() {
+        let text = "[[spheres]]\ncenter=[0,0,0]\nradius=1";
+        let mut loaded = load_bytes(Path::new("a.toml"), text.into(), &LoadOptions::default()).unwrap();
+        let star = crate::accel::tests::scenes::star(120, 60);
+        let mesh = Mesh { positions: star.vertices.to_vec(), triangles: star.triangles.to_vec(), ..Mesh::default() };
+        let triangles = mesh.triangles.len();
+        loaded.scene.meshes.push(mesh);
+        let places = (0..40).map(|i| DAffine3::from_translation(DVec3::X * f64::from(i) * 10.0));
+        let placed = |world_from_object| Instance { name: String::new(), mesh: 0, world_from_object };
+        loaded.scene.instances = places.map(placed).collect();
+        let [whole, by_object] = [u64::MAX, 1 << 20].map(|limit| report(&loaded, limit));
+        assert!(!whole.world.kept.is_empty(), "kept once");
+        assert_eq!(whole.world.triangles() as usize, 40 * triangles);
+        assert_eq!(by_object.topology, Topology { by_object: true, ..whole.topology });
+        assert!(whole.topology.edges > 0 && by_object.text().contains("each instance by itself"));
     }
 
     #[test]
@@ -336,7 +363,7 @@ mod tests {
             "[[spheres]]\ncenter=[0,0,5]\nradius=1\nmaterial='a\tb'\n[materials.\"a\\tb\"]\n".replace('\t', "\\t");
         let text = text.replace("material='a\\tb'", "material=\"a\\tb\"");
         let loaded = load_bytes(Path::new("a.toml"), text.into(), &LoadOptions::default()).unwrap();
-        let shown = Report::new(Path::new("a.toml"), &loaded).text();
+        let shown = report(&loaded, u64::MAX).text();
         assert!(shown.lines().all(|l| l.as_bytes()[14] == b' ' && !l.contains('\t')), "{shown}");
         assert!(shown.contains("spheres        1\n"), "{shown}");
     }

@@ -2,6 +2,7 @@
 
 use crate::accel::Shapes;
 use crate::math::Vec3;
+use crate::render::World;
 
 /// Counts over all faces of a scene, as they stand in the world.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -18,9 +19,45 @@ pub(super) struct Topology {
     pub duplicates: u64,
     /// Faces with two corners in one place.
     pub degenerate: u64,
+    /// Whether instances of what is kept once count each by itself, although some may touch others.
+    pub by_object: bool,
 }
 
 impl Topology {
+    /// Looks at what is stored alone: of scenes that would take too much memory were each instance stored by itself.
+    pub(super) fn by_object(world: &World) -> Self {
+        let mut times = vec![0; world.kept.objects().len()];
+        world.kept.placed().iter().for_each(|placed| times[placed.object as usize] += 1);
+        let objects = world.kept.objects().iter().zip(times);
+        let objects = objects.map(|(object, times)| Self::of(object.shapes()).times(times));
+        let all = objects.fold(Self::of(&world.shapes), Self::plus);
+        Self { by_object: true, ..all }
+    }
+
+    fn times(self, n: u64) -> Self {
+        Self {
+            corners: self.corners * n,
+            edges: self.edges * n,
+            open: self.open * n,
+            non_manifold: self.non_manifold * n,
+            duplicates: self.duplicates * n,
+            degenerate: self.degenerate * n,
+            ..self
+        }
+    }
+
+    fn plus(self, other: Self) -> Self {
+        Self {
+            corners: self.corners + other.corners,
+            edges: self.edges + other.edges,
+            open: self.open + other.open,
+            non_manifold: self.non_manifold + other.non_manifold,
+            duplicates: self.duplicates + other.duplicates,
+            degenerate: self.degenerate + other.degenerate,
+            ..self
+        }
+    }
+
     /// Looks at the triangles and polygons of `shapes`.
     pub(super) fn of(shapes: &Shapes) -> Self {
         let corner = weld(&shapes.vertices);
