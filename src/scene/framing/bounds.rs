@@ -1,9 +1,10 @@
 //! The box of the model without its strays: parts so few, so small and so far away that nobody meant them to be seen.
 
-use super::parts::{Part, faces, gather, hull};
+use super::crowd::Crowd;
+use super::parts::{Grain, Part, faces, gather, hull, solids};
 use super::slices::Slices;
 use crate::math::DVec3;
-use crate::scene::corners::{Hull, object_boxes, placed_box, take_in};
+use crate::scene::corners::{Hull, Outline, object_boxes, placed_box, take_in};
 use crate::scene::{Instance, Mesh, Scene};
 
 /// What there is to see.
@@ -72,22 +73,25 @@ fn of_faces(scene: &Scene, whole: (DVec3, DVec3)) -> Option<Bounds> {
     if has_no_gap(scene, &bounds)? {
         return Some(bounds);
     }
-    let slices = Slices::of(scene, &bounds);
-    (slices.parts() == faces(scene)).then(|| without_strays(scene, bounds, slices))
+    let crowd = Crowd::of(scene);
+    let slices = Slices::of(scene, &crowd, &bounds);
+    (slices.parts() == faces(scene)).then(|| without_strays((scene, &crowd), bounds, slices))
 }
 
 /// The same for any scene.
 fn by_parts(scene: &Scene) -> Bounds {
-    let Some(whole) = hull(scene, |_| true) else {
+    let Some(whole) = hull(scene, Grain::Faces, |_| true) else {
         let unit = (DVec3::splat(-0.5), DVec3::splat(0.5));
         return Bounds { lo: unit.0, hi: unit.1, strays: 0, whole: unit };
     };
     let bounds = Bounds { lo: whole.0, hi: whole.1, strays: 0, whole };
-    without_strays(scene, bounds, Slices::of(scene, &bounds))
+    let crowd = Crowd::of(scene);
+    let slices = Slices::of(scene, &crowd, &bounds);
+    without_strays((scene, &crowd), bounds, slices)
 }
 
 /// What is left of all parts, which the slices of their box have.
-fn without_strays(scene: &Scene, mut bounds: Bounds, mut slices: Slices) -> Bounds {
+fn without_strays((scene, crowd): (&Scene, &Crowd), mut bounds: Bounds, mut slices: Slices) -> Bounds {
     // Each round zooms in by up to SLICES; the range of f64 needs far fewer than this many.
     for _ in 0..128 {
         if slices.has_no_gap() {
@@ -95,19 +99,61 @@ fn without_strays(scene: &Scene, mut bounds: Bounds, mut slices: Slices) -> Boun
         }
         let Some(core) = slices.core() else { break };
         let kept = |part: &Part| bounds.contains(part.center) && slices.lies_in(&core, part.center);
-        let Some((lo, hi)) = hull(scene, kept) else { break };
+        let Some((lo, hi)) = hull(scene, Grain::Crowd(crowd, &bounds), kept) else { break };
+        // Boxes of instances of a crowd may be too large.
+        let (lo, hi) = (lo.max(bounds.lo), hi.min(bounds.hi));
         if (lo, hi) == (bounds.lo, bounds.hi) {
             break;
         }
         (bounds.lo, bounds.hi) = (lo, hi);
-        slices = Slices::of(scene, &bounds);
+        slices = Slices::of(scene, crowd, &bounds);
     }
     if (bounds.lo, bounds.hi) == bounds.whole {
         return bounds;
     }
     let outside = |part: &Part| !bounds.contains(part.lo) || !bounds.contains(part.hi);
-    bounds.strays = gather(scene, || 0, |n, part| *n += u64::from(outside(part)), |n, more| *n += more);
+    let parts = (scene, Grain::Crowd(crowd, &bounds));
+    let add = |n: &mut u64, part: &Part| *n += if outside(part) { part.faces } else { 0 };
+    bounds.strays = gather(parts, || 0, add, |n, more| *n += more);
+    if !crowd.is_empty() {
+        (bounds.lo, bounds.hi) = tight(scene, bounds);
+    }
     bounds
+}
+
+/// The box of what lies in `bounds`, which instances of a crowd have made a little too large.
+fn tight(scene: &Scene, bounds: Bounds) -> (DVec3, DVec3) {
+    let mut inside = Inside { hull: Hull::EMPTY, bounds };
+    take_in(scene, &mut inside);
+    for part in solids(scene) {
+        inside.add(part.lo);
+        inside.add(part.hi);
+    }
+    let Hull { lo, hi, .. } = inside.hull;
+    if lo.cmple(hi).all() { (lo, hi) } else { (bounds.lo, bounds.hi) }
+}
+
+/// The box of all corners inside another.
+#[derive(Clone)]
+struct Inside {
+    hull: Hull,
+    bounds: Bounds,
+}
+
+impl Outline for Inside {
+    fn add(&mut self, p: DVec3) {
+        if self.bounds.contains(p) {
+            self.hull.add(p);
+        }
+    }
+
+    fn join(&mut self, other: &Self) {
+        self.hull.join(&other.hull);
+    }
+
+    fn holds(&self, p: DVec3) -> bool {
+        self.hull.holds(p)
+    }
 }
 
 /// Faces that are looked at between two questions whether all slices have been reached.
@@ -208,7 +254,7 @@ mod tests {
                 slices.cover(instance, &scene.meshes[0]).expect("no face has that corner");
             }
             // Strays are outside, and reach into the outermost slices.
-            let slow = Slices::of(&scene, &bounds);
+            let slow = Slices::of(&scene, &Crowd::of(&Scene::default()), &bounds);
             let (quick, slow) = (slices.reached.covered(), slow.reached.covered());
             let differ = quick.iter().flatten().zip(slow.iter().flatten()).filter(|(a, b)| a != b);
             assert!(differ.count() <= 6 && (gap > 0.0 || quick == slow));
@@ -219,10 +265,38 @@ mod tests {
         assert!(Slices::new(&bounds).cover(&scene.instances[0], &scene.meshes[0]).is_none());
     }
 
+    /// A large mesh in many places, and some of them far away.
+    fn crowd(far: f64) -> Scene {
+        let mut scene = spiral(2_000, 0.0);
+        let place = |i: u32| {
+            let t = f64::from(i);
+            let far = if i % 200 == 7 { far } else { 0.0 };
+            let place = DVec3::new(f64::from(i * 7 % 31) * 9.0, f64::from(i * 11 % 29) * 9.0, far + t * 0.7);
+            let m = DAffine3::from_translation(place) * DAffine3::from_rotation_y(t) * DAffine3::from_rotation_x(t);
+            let uneven = DAffine3::from_scale(DVec3::new(1.0, if i.is_multiple_of(9) { 0.4 } else { 1.0 }, 1.0));
+            Instance { name: String::new(), mesh: 0, world_from_object: m * uneven }
+        };
+        scene.instances = (0..400).map(place).collect();
+        scene
+    }
+
+    #[test]
+    fn a_crowd_has_the_bounds_and_strays_that_it_has_face_by_face() {
+        for far in [0.0, 900.0, 1e9] {
+            let scene = crowd(far);
+            let found = robust_bounds(&scene);
+            let whole = Bounds { lo: found.whole.0, hi: found.whole.1, strays: 0, whole: found.whole };
+            let by_faces = Crowd::of(&Scene::default());
+            let slow = without_strays((&scene, &by_faces), whole, Slices::of(&scene, &by_faces, &whole));
+            assert_eq!(found, slow, "{far}");
+            assert!(!Crowd::of(&scene).is_empty() && (found.strays > 0) == (far > 0.0), "{far}");
+        }
+    }
+
     #[test]
     fn every_face_counts_once_whoever_counts_it() {
         for faces in [40, CHUNK, CHUNK + 1, 3 * CHUNK + 5] {
-            let counted = gather(&spiral(faces, 0.0), || 0, |n, _| *n += 1, |n, more| *n += more);
+            let counted = gather((&spiral(faces, 0.0), Grain::Faces), || 0, |n, _| *n += 1, |n, more| *n += more);
             assert_eq!(counted, 2 * faces, "two instances");
         }
     }

@@ -4,6 +4,7 @@
 //! to look, and [`frame`] steps back just far enough. The result is an ordinary [`Camera`], as if the file had brought it.
 
 mod bounds;
+mod crowd;
 mod fit;
 mod parts;
 mod slices;

@@ -1,5 +1,7 @@
 //! What a model is made of, looked at one by one: faces, spheres and cones in world space.
 
+use super::bounds::Bounds;
+use super::crowd::Crowd;
 use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 use crate::scene::mesh::normal_from_object;
 use crate::scene::{Mesh, Scene};
@@ -10,11 +12,13 @@ pub(super) const AWAY: f64 = -0.1;
 
 /// Triangles there are, polygons counted as their fans.
 pub(super) fn faces(scene: &Scene) -> u64 {
-    let of_mesh = |mesh: &Mesh| {
-        let fans = mesh.polygons.iter().map(|polygon| u64::from(polygon.len.saturating_sub(2)));
-        mesh.triangles.len() as u64 + fans.sum::<u64>()
-    };
-    scene.instances.iter().filter_map(|instance| scene.meshes.get(instance.mesh as usize)).map(of_mesh).sum()
+    scene.instances.iter().filter_map(|instance| scene.meshes.get(instance.mesh as usize)).map(faces_of).sum()
+}
+
+/// The same of a mesh.
+pub(super) fn faces_of(mesh: &Mesh) -> u64 {
+    let fans = mesh.polygons.iter().map(|polygon| u64::from(polygon.len.saturating_sub(2)));
+    mesh.triangles.len() as u64 + fans.sum::<u64>()
 }
 
 /// The mean direction of all faces weighted by area: length 1 for a card, 0 for a closed body.
@@ -39,15 +43,15 @@ pub(super) fn facing(scene: &Scene) -> DVec3 {
 
 /// Which way faces look.
 #[derive(Clone, Copy, Default)]
-struct Facing {
+pub(super) struct Facing {
     /// The sum of their normals, each as long as the area of its face.
     normal: DVec3,
-    area: f64,
+    pub area: f64,
 }
 
 impl Facing {
     /// Of the faces of a mesh that stands somewhere.
-    fn of(mesh: &Mesh, world_from_object: &DAffine3) -> Self {
+    pub(super) fn of(mesh: &Mesh, world_from_object: &DAffine3) -> Self {
         let mut all = Self::default();
         let add = |all: &mut Self, part: &Part| all.join(Self { normal: part.normal, area: part.area });
         gather_faces((mesh, world_from_object), &mut all, &Self::default, &add, &Self::join);
@@ -65,7 +69,7 @@ impl Facing {
 }
 
 /// What areas grow by where a matrix makes all of them grow alike; `None` where it does not.
-fn area_scale(m: &DMat3) -> Option<f64> {
+pub(super) fn area_scale(m: &DMat3) -> Option<f64> {
     let squares = DVec3::from(m.to_cols_array_2d().map(|axis| DVec3::from(axis).length_squared()));
     let across = DVec3::new(m.x_axis.dot(m.y_axis), m.y_axis.dot(m.z_axis), m.z_axis.dot(m.x_axis));
     let scale = squares.element_sum() / 3.0;
@@ -73,7 +77,7 @@ fn area_scale(m: &DMat3) -> Option<f64> {
     (off <= 1e-6 * scale).then_some(scale)
 }
 
-/// A face, sphere or cone.
+/// A face, sphere or cone, or all faces of a small instance.
 pub(super) struct Part {
     pub lo: DVec3,
     pub hi: DVec3,
@@ -81,10 +85,21 @@ pub(super) struct Part {
     /// As long as the area.
     pub normal: DVec3,
     pub area: f64,
+    /// How many faces, spheres or cones it is.
+    pub faces: u64,
+}
+
+/// Which parts are looked at.
+#[derive(Clone, Copy)]
+pub(super) enum Grain<'a> {
+    /// Each face.
+    Faces,
+    /// Each face, but instances that are small in these bounds as one.
+    Crowd(&'a Crowd, &'a Bounds),
 }
 
 /// Box of the parts that `keep` wants; `None` when there are none.
-pub(super) fn hull(scene: &Scene, keep: impl Fn(&Part) -> bool + Sync) -> Option<(DVec3, DVec3)> {
+pub(super) fn hull(scene: &Scene, grain: Grain, keep: impl Fn(&Part) -> bool + Sync) -> Option<(DVec3, DVec3)> {
     let nothing = || (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let join = |all: &mut (DVec3, DVec3), more: (DVec3, DVec3)| *all = (all.0.min(more.0), all.1.max(more.1));
     let add = |all: &mut (DVec3, DVec3), part: &Part| {
@@ -92,7 +107,7 @@ pub(super) fn hull(scene: &Scene, keep: impl Fn(&Part) -> bool + Sync) -> Option
             join(all, (part.lo, part.hi));
         }
     };
-    let (lo, hi) = gather(scene, nothing, add, join);
+    let (lo, hi) = gather((scene, grain), nothing, add, join);
     lo.cmple(hi).all().then_some((lo, hi))
 }
 
@@ -101,7 +116,7 @@ pub(super) const CHUNK: usize = 1 << 15;
 
 /// Adds up every face, sphere and cone with finite corners, from `nothing`; `join` adds what others have added up.
 pub(super) fn gather<T: Send>(
-    scene: &Scene,
+    (scene, grain): (&Scene, Grain),
     nothing: impl Fn() -> T + Sync,
     add: impl Fn(&mut T, &Part) + Sync,
     join: impl Fn(&mut T, T),
@@ -109,9 +124,15 @@ pub(super) fn gather<T: Send>(
     let mut all = nothing();
     for instance in &scene.instances {
         let Some(mesh) = scene.meshes.get(instance.mesh as usize) else { continue };
+        if let Grain::Crowd(crowd, bounds) = grain
+            && let Some(part) = crowd.part(instance, bounds)
+        {
+            add(&mut all, &part);
+            continue;
+        }
         gather_faces((mesh, &instance.world_from_object), &mut all, &nothing, &add, &join);
     }
-    visit_solids(scene, |part| add(&mut all, part));
+    solids(scene).for_each(|part| add(&mut all, &part));
     all
 }
 
@@ -181,23 +202,24 @@ impl Part {
         let normal = (b - a).cross(c - a) * 0.5;
         // The mean of three equal numbers may be another.
         let center = ((a + b + c) / 3.0).clamp(lo, hi);
-        let face = Self { lo, hi, center, normal, area: normal.length() };
+        let face = Self { lo, hi, center, normal, area: normal.length(), faces: 1 };
         (lo.is_finite() && hi.is_finite()).then_some(face)
     }
 }
 
-/// Calls `f` for every sphere and cone.
-fn visit_solids(scene: &Scene, mut f: impl FnMut(&Part)) {
-    for sphere in &scene.spheres {
+/// Every sphere and cone.
+pub(super) fn solids(scene: &Scene) -> impl Iterator<Item = Part> {
+    let spheres = scene.spheres.iter().map(|sphere| {
         let (lo, hi) = (sphere.center - sphere.radius, sphere.center + sphere.radius);
         let area = 4.0 * std::f64::consts::PI * sphere.radius * sphere.radius;
-        f(&Part { lo, hi, center: sphere.center, normal: DVec3::ZERO, area });
-    }
-    for cone in &scene.cones {
+        Part { lo, hi, center: sphere.center, normal: DVec3::ZERO, area, faces: 1 }
+    });
+    let cones = scene.cones.iter().map(|cone| {
         let ((lo, hi), length, dr) =
             (cone.bounds(), cone.base.distance(cone.apex), cone.base_radius - cone.apex_radius);
         let slant = (length * length + dr * dr).sqrt();
         let area = std::f64::consts::PI * (cone.base_radius + cone.apex_radius) * slant;
-        f(&Part { lo, hi, center: (lo + hi) * 0.5, normal: DVec3::ZERO, area });
-    }
+        Part { lo, hi, center: (lo + hi) * 0.5, normal: DVec3::ZERO, area, faces: 1 }
+    });
+    spheres.chain(cones)
 }

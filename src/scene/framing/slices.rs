@@ -1,7 +1,8 @@
 //! Space in slices along each axis: how much of a model lies in each, which are empty, and which ends come off.
 
 use super::bounds::Bounds;
-use super::parts::{CHUNK, Part, gather};
+use super::crowd::Crowd;
+use super::parts::{CHUNK, Grain, Part, gather};
 use crate::math::{DVec3, Vec3};
 use crate::scene::{Instance, Mesh, Scene};
 use rayon::prelude::*;
@@ -23,7 +24,7 @@ pub(super) struct Slices {
     /// Slices to a unit of length; 0 where the box is flat.
     per_unit: DVec3,
     pub(super) reached: Reached,
-    /// Per axis and slice: area and number of the parts with their centre there.
+    /// Per axis and slice: area and faces of the parts with their centre there.
     area: [[f64; SLICES]; 3],
     count: [[u64; SLICES]; 3],
 }
@@ -43,14 +44,14 @@ impl Slices {
     }
 
     /// Sorts the parts inside the box into its slices.
-    pub(super) fn of(scene: &Scene, bounds: &Bounds) -> Self {
+    pub(super) fn of(scene: &Scene, crowd: &Crowd, bounds: &Bounds) -> Self {
         let add = |slices: &mut Self, part: &Part| {
             if bounds.contains(part.center) {
                 slices.reach(part.lo, part.hi);
                 slices.weigh(part);
             }
         };
-        gather(scene, || Self::new(bounds), add, Self::join)
+        gather((scene, Grain::Crowd(crowd, bounds)), || Self::new(bounds), add, Self::join)
     }
 
     /// Adds what other slices of the same box have.
@@ -119,11 +120,11 @@ impl Slices {
         for axis in 0..3 {
             let middle = self.slice(axis, part.center[axis]);
             self.area[axis][middle] += part.area;
-            self.count[axis][middle] += 1;
+            self.count[axis][middle] += part.faces;
         }
     }
 
-    /// Parts whose middle is in the box.
+    /// Faces of parts whose middle is in the box.
     pub(super) fn parts(&self) -> u64 {
         self.count[0].iter().sum()
     }

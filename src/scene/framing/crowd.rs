@@ -1,0 +1,74 @@
+//! Instances of large meshes that are small beside the model: each is a part by itself, and no face of it is looked at.
+
+use super::bounds::Bounds;
+use super::parts::{Facing, Part, area_scale, faces_of};
+use crate::math::{DAffine3, DVec3};
+use crate::scene::corners::{ObjectBox, object_boxes, placed_box};
+use crate::scene::{Instance, Scene};
+
+/// Faces from which on a mesh is worth a look at what all of them have together.
+const MANY: usize = 1024;
+
+/// Longest side of an instance that is one part, as a share of the model: two of the slices in which gaps are looked for.
+const SMALL: f64 = 1.0 / 128.0;
+
+/// What the faces of each mesh have together that stands in several places and has many; nothing of others.
+pub(super) struct Crowd {
+    members: Vec<Option<Member>>,
+}
+
+#[derive(Clone, Copy)]
+struct Member {
+    /// Around all corners.
+    bounds: ObjectBox,
+    /// Of all faces.
+    area: f64,
+    faces: u64,
+}
+
+impl Crowd {
+    pub(super) fn of(scene: &Scene) -> Self {
+        let mut times = vec![0_u32; scene.meshes.len()];
+        let standing = scene
+            .instances
+            .iter()
+            .filter_map(|instance| scene.meshes.get(instance.mesh as usize).map(|_| instance.mesh));
+        standing.for_each(|mesh| times[mesh as usize] += 1);
+        let is_one = |i: usize| times[i] > 1 && scene.meshes[i].triangles.len() > MANY;
+        if !(0..scene.meshes.len()).any(is_one) {
+            return Self { members: Vec::new() };
+        }
+        let member = |(i, bounds): (usize, Option<ObjectBox>)| {
+            let (mesh, bounds) = (&scene.meshes[i], bounds.filter(|_| is_one(i))?);
+            let area = Facing::of(mesh, &DAffine3::IDENTITY).area;
+            Some(Member { bounds, area, faces: faces_of(mesh) })
+        };
+        Self { members: object_boxes(scene).into_iter().enumerate().map(member).collect() }
+    }
+
+    /// Whether there are none.
+    pub(super) fn is_empty(&self) -> bool {
+        self.members.is_empty()
+    }
+
+    /// All faces of an instance as one part, the box a little too large; `None` where it is not small in `bounds`.
+    pub(super) fn part(&self, instance: &Instance, bounds: &Bounds) -> Option<Part> {
+        let member = self.members.get(instance.mesh as usize)?.as_ref()?;
+        let corners = placed_box(member.bounds, instance);
+        let (lo, hi) =
+            corners.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| (lo.min(*p), hi.max(*p)));
+        if !(hi - lo).cmple((bounds.hi - bounds.lo) * SMALL).all() {
+            return None;
+        }
+        let area = area_scale(&instance.world_from_object.matrix3)? * member.area;
+        let center = (lo * 0.5 + hi * 0.5).clamp(lo, hi);
+        (lo.is_finite() && hi.is_finite()).then_some(Part {
+            lo,
+            hi,
+            center,
+            normal: DVec3::ZERO,
+            area,
+            faces: member.faces,
+        })
+    }
+}
