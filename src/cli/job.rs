@@ -247,7 +247,7 @@ fn check_flags(args: &RenderArgs) -> Result<(), Wrong> {
     if args.merge && args.moment.animation.is_some() {
         return wrong("--animation chooses an animation of one file and cannot be used with --merge");
     }
-    if args.stats_file.is_some() && args.stats.is_none() {
+    if args.stats_file.is_some() && args.stats.is_none() && !args.dry_run {
         return wrong("--stats-file needs --stats text or --stats json");
     }
     Ok(())
@@ -379,7 +379,9 @@ pub(super) fn params(args: &AccelArgs, kinds: &[AccelKind]) -> Result<AccelParam
 
 fn stats(args: &RenderArgs) -> Option<Stats> {
     let file = args.stats_file.clone().filter(|f| f.as_path() != Path::new("-"));
-    args.stats.map(|format| Stats { format, file })
+    // A dry run tells what it foretells in any case.
+    let format = args.stats.or((args.dry_run && file.is_some()).then_some(StatsFormat::Text));
+    format.map(|format| Stats { format, file })
 }
 
 impl From<FileType> for FileKind {

@@ -243,11 +243,30 @@ fn prepare(
         messages.say(Severity::Error, &nothing_to_draw(&loaded, &batch.inputs[0]));
         return Err(Exit::Input);
     }
+    let coarse = coarse(&loaded, &world, &batch.inputs[0]);
+    for warning in coarse.iter().filter(|w| told.insert((w.code, w.place.clone()))) {
+        messages.say(Severity::Warning, warning);
+    }
     profile.done("place");
     let bounds = robust_bounds_within(&loaded.scene, world.bounds);
     profile.done("frame");
     load_seconds += start.elapsed().as_secs_f64();
     Ok(Ready { loaded, world, bounds, load_seconds, profile, metered, told })
+}
+
+/// What stands too far from the middle of the scene to be drawn as it is.
+fn coarse(loaded: &Loaded, world: &World, file: &Path) -> Option<Diagnostic> {
+    /// Part of an object's size that its corners may be off by.
+    const MOST: f64 = 0.01;
+    let (instance, part) = world.coarsest(&loaded.scene, MOST)?;
+    let name = match loaded.scene.instances[instance].name.as_str() {
+        "" => format!("object {instance}"),
+        name => format!("'{name}'"),
+    };
+    let text = format!(
+        "{name} stands so far from the middle of the scene that rounding moves its corners by up to {part:.3} of its size"
+    );
+    Some(Diagnostic::new("rounding", file, "", text).remedy("render parts that are far from each other by themselves"))
 }
 
 fn nothing_to_draw(loaded: &Loaded, file: &Path) -> Diagnostic {

@@ -189,6 +189,8 @@ impl PictureStats {
         let sampling = sampling::json(settings, facts.sampled);
         let (scene, shapes) = (&facts.loaded.scene, &world.shapes);
         let kept_vertices: usize = world.kept.objects().iter().map(|o| o.shapes().vertices.len()).sum();
+        // Every corner is looked at, which is not done for pictures without statistics.
+        let rounding = counted.as_ref().map(|_| facts.loaded.facts.max_rounding + world.rounding(scene));
         let json = json!({
             "schema": "meshray-stats/1", "version": super::version::SHORT,
             "inputs": facts.inputs(),
@@ -220,7 +222,7 @@ impl PictureStats {
             "counts": counted.as_ref().map(Counted::json),
             "counted_seconds": counted.as_ref().map(|c| c.seconds),
             "profile": profile.map(Profile::json),
-            "rounding": facts.loaded.facts.max_rounding,
+            "rounding": rounding,
         });
         Self { json, times, counted }
     }

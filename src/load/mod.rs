@@ -136,7 +136,8 @@ pub struct Facts {
     pub variant: Option<usize>,
     /// Why the up axis was chosen, when it was a guess.
     pub up_reason: Option<String>,
-    /// Largest displacement of a vertex by rounding to `f32`, world units.
+    /// Largest displacement of a vertex by rounding to `f32` while loading, world units; placing moves it once more
+    /// ([`World::rounding`](crate::render::World::rounding)).
     pub max_rounding: f64,
     /// Every file read: the model first, then buffers, images, MTLs. For the input hash and `inspect`.
     pub files: Vec<PathBuf>,

@@ -125,7 +125,8 @@ impl<'a> Context<'a> {
         let depth = settings.depth.unwrap_or_else(|| auto_depth(&features, gloss.all, settings.cutoff));
         let sky = Arc::new(Sky::new(scene));
         let env_rays = settings.env_rays.unwrap_or(if sky.is_map() { ENV_RAYS } else { 0 });
-        let env_rays = shared_env_rays(env_rays, together, sky.is_map(), features.has(Feature::Translucence));
+        let ways = ways_around(sky.is_map(), features.has(Feature::Translucence), features.has(Feature::MetalRough));
+        let env_rays = shared_env_rays(env_rays, together, ways);
         let lights: Vec<LocalLight> = scene.lights.iter().map(|l| LocalLight::new(l, world.center)).collect();
         let light_rays = settings.light_rays.max(1).div_ceil(together);
         let alone = everything || settings.layers || gloss.all;
@@ -187,17 +188,17 @@ impl<'a> Context<'a> {
     }
 }
 
-/// Rays from each of so many samples to its surroundings, where each would send `rays` alone, to a panorama or not, through
-/// translucent surfaces or not.
-fn shared_env_rays(rays: u32, together: u32, to_panorama: bool, translucent: bool) -> u32 {
-    if rays == 0 {
-        return 0;
-    }
-    // A ray to each side in each of both halves: none stands in for one to the other side.
-    let sides = if translucent { 4 } else { 2 };
-    // Without a ray of each way that a direction to a panorama is drawn in, its sun is met by chance and throws no shadow.
-    let ways = if to_panorama { sides + 4 } else { sides };
-    rays.div_ceil(together).max(ways)
+/// Ways in which directions to the surroundings are drawn, which are a panorama or not, from surfaces of which some are
+/// translucent or not, and rough mirrors or not.
+fn ways_around(to_panorama: bool, translucent: bool, glossy: bool) -> u32 {
+    // To each side. What a lobe gathers is met in it alone, and so is the sun of a panorama by its own light.
+    1 + u32::from(translucent) + if to_panorama { 2 } else { u32::from(glossy) }
+}
+
+/// Rays from each of so many samples to its surroundings, where each would send `rays` alone: at least one for each way in
+/// each of both halves, for one that is met by chance through another brings seldom and far too much.
+fn shared_env_rays(rays: u32, together: u32, ways: u32) -> u32 {
+    if rays == 0 { 0 } else { rays.div_ceil(together).max(2 * ways) }
 }
 
 /// As many points as send hardly more rays together than may wait.
@@ -262,17 +263,23 @@ mod tests {
     }
 
     #[test]
-    fn samples_share_rays_to_the_surroundings_but_each_side_keeps_its_own() {
+    fn samples_share_rays_to_the_surroundings_but_each_way_keeps_its_own() {
         let shared = |rays, together| {
-            [(false, false), (true, false), (false, true), (true, true)]
-                .map(|(map, thin)| shared_env_rays(rays, together, map, thin))
+            [
+                (false, false, false),
+                (false, false, true),
+                (true, false, false),
+                (false, true, false),
+                (true, true, true),
+            ]
+            .map(|(map, thin, glossy)| shared_env_rays(rays, together, ways_around(map, thin, glossy)))
         };
-        assert_eq!(shared(0, 4), [0; 4]);
-        assert_eq!(shared(1, 1), [2, 6, 4, 8]);
-        assert_eq!(shared(16, 1), [16; 4]);
-        assert_eq!(shared(16, 4), [4, 6, 4, 8]);
-        assert_eq!(shared(4, 4), [2, 6, 4, 8]);
-        assert_eq!(shared(100, 4), [25; 4]);
+        assert_eq!(shared(0, 4), [0; 5]);
+        assert_eq!(shared(1, 1), [2, 4, 6, 4, 8]);
+        assert_eq!(shared(16, 1), [16; 5]);
+        assert_eq!(shared(16, 4), [4, 4, 6, 4, 8]);
+        assert_eq!(shared(4, 4), [2, 4, 6, 4, 8]);
+        assert_eq!(shared(100, 4), [25; 5]);
     }
 
     #[test]

@@ -258,7 +258,7 @@ impl Features {
                 }
                 // A map can only lower the factor, so a rough factor may still hide smooth spots.
                 self.add_if(pbr.roughness < SMOOTH || pbr.metal_rough_map.is_some(), Feature::Mirrors);
-                if pbr.transmission > 0.0 {
+                if pbr.transmits() {
                     self.add_if(true, if pbr.thick { Feature::Refraction } else { Feature::ThinTransmission });
                     self.add_if(pbr.thick && pbr.dispersion > 0.0, Feature::Dispersion);
                     self.add_if(pbr.thick && pbr.absorption != Vec3::ZERO, Feature::Absorption);

@@ -247,6 +247,11 @@ impl MetalRough {
 }
 
 impl MetalRough {
+    /// Whether light passes any of it; metal lets nothing through, and a map can only lower how much of it is metal.
+    pub fn transmits(&self) -> bool {
+        self.transmission > 0.0 && (self.metallic < 1.0 || self.metal_rough_map.is_some())
+    }
+
     /// Whether it has anything besides the core model: what depends on the view at each point.
     pub fn has_lobes(&self) -> bool {
         self.grain.is_some() || self.film.is_some() || self.sheen.is_some() || self.coat.is_some()
@@ -362,7 +367,7 @@ impl Surface {
     /// Whether light passes it as it passes glass: rays can enter it, and its back faces are seen from inside.
     pub fn transmits(&self) -> bool {
         match self {
-            Self::MetalRough(m) => m.transmission > 0.0,
+            Self::MetalRough(m) => m.transmits(),
             Self::Phong(p) => p.transmission.max_element() > 0.0,
             Self::Unlit => false,
         }

@@ -172,3 +172,25 @@ fn options_that_would_change_nothing_are_bad_command_lines_that_say_what_they_ar
     refused(&["render", "cube.obj", "--dry-run", "--profile"], &["--profile"]);
     assert_eq!(folder.names(), ["cube.obj"]);
 }
+
+#[test]
+fn what_a_dry_run_foretells_goes_to_a_file_without_further_words() {
+    let folder = Folder::with_cube();
+    let run = folder.run(&["cube.obj", "--size", "64x48", "--dry-run", "--stats-file", "foretold.txt"]).ends(0);
+    assert!(run.text().is_empty() && String::from_utf8(folder.read("foretold.txt")).unwrap().contains("rays"));
+    folder.run(&["cube.obj", "--stats-file", "counts.txt"]).ends(2).says(&["--stats"]);
+}
+
+#[test]
+fn objects_too_far_apart_for_single_precision_are_told_and_rounding_is_measured() {
+    let triangle = "[[meshes]]\npositions=[[0,0,0],[1,0,0],[0,1,0]]\nfaces=[[0,1,2]]\n";
+    let far = |x: &str| format!("{triangle}translate=[{x},0,0]\n");
+    let folder = Folder::new().file("far.toml", [far("1e8"), far("-1e8")].concat()).file("near.toml", far("0.3"));
+    folder.render(&["far.toml", "-o", "far.png"]).ends(0).says(&["rounding moves its corners", "far from each other"]);
+    assert!(!folder.render(&["near.toml", "-o", "near.png"]).ends(0).stderr.contains("rounding"));
+    let rounding = |name: &str| -> f64 {
+        let run = folder.run(&["inspect", "--json", name]).ends(0);
+        serde_json::from_str::<Value>(run.text()).unwrap()["max_rounding"].as_f64().unwrap()
+    };
+    assert!(rounding("far.toml") >= 0.5 && rounding("near.toml") < 1e-6);
+}

@@ -22,6 +22,8 @@ pub(super) struct Report<'a> {
     features: Features,
     scene_bytes: u64,
     structure_bytes: u64,
+    /// Of a corner, by loading and by placing.
+    rounding: f64,
 }
 
 /// Longest list of names that the text shows in full.
@@ -46,6 +48,7 @@ impl<'a> Report<'a> {
             features: Features::of(scene),
             scene_bytes: scene_bytes(scene, &world),
             structure_bytes: structure.bytes,
+            rounding: loaded.facts.max_rounding + world.rounding(scene),
             world,
         }
     }
@@ -109,7 +112,7 @@ impl<'a> Report<'a> {
         }
         let reason = self.loaded.facts.up_reason.as_ref().map(|r| format!(" ({r})")).unwrap_or_default();
         lines.add("up", format!("{}{reason}", self.up()));
-        lines.add("rounding", format!("at most {:.3e} to single precision", self.loaded.facts.max_rounding));
+        lines.add("rounding", format!("at most {:.3e} to single precision", self.rounding));
     }
 
     fn faults(&self, lines: &mut Lines) {
@@ -208,7 +211,7 @@ impl<'a> Report<'a> {
             "features": self.features.present().map(|f| f.name()).collect::<Vec<_>>(),
             "left_out": self.features.absent().map(|f| f.name()).collect::<Vec<_>>(),
             "memory": { "scene": self.scene_bytes, "structure": self.structure_bytes },
-            "max_rounding": facts.max_rounding,
+            "max_rounding": self.rounding,
             "warnings": self.loaded.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
         });
         serde_json::to_string_pretty(&value).unwrap_or_default() + "\n"

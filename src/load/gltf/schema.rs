@@ -197,7 +197,12 @@ impl<'a> Walk<'a> {
                 (false, _) => format!("at most {max}"),
                 _ => format!("{min} to {max}"),
             };
-            self.fault(Code::ValueNotInRange, format!("{number} where {bounds} is allowed"));
+            let text = format!("{number} where {bounds} is allowed");
+            if self.path.contains(".rotation[") {
+                self.report.warn_with(Code::ValueNotInRange, self.path.as_str(), text, "the rotation is made unit");
+            } else {
+                self.fault(Code::ValueNotInRange, text);
+            }
         }
     }
 

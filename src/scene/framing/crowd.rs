@@ -9,8 +9,8 @@ use crate::scene::{Instance, Scene};
 /// Faces from which on a mesh is worth a look at what all of them have together.
 const MANY: usize = 1024;
 
-/// Longest side of an instance that is one part, as a share of the model: two of the slices in which gaps are looked for.
-const SMALL: f64 = 1.0 / 128.0;
+/// Longest side of an instance that is one part, as a share of the model's: what parts off strays is far wider.
+const SMALL: f64 = 1.0 / 32.0;
 
 /// What the faces of each mesh have together that stands in several places and has many; nothing of others.
 pub(super) struct Crowd {
@@ -57,12 +57,10 @@ impl Crowd {
         let corners = placed_box(member.bounds, instance);
         let (lo, hi) =
             corners.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| (lo.min(*p), hi.max(*p)));
-        if !(hi - lo).cmple((bounds.hi - bounds.lo) * SMALL).all() {
-            return None;
-        }
+        let is_small = (hi - lo).max_element() <= (bounds.hi - bounds.lo).max_element() * SMALL;
         let area = area_scale(&instance.world_from_object.matrix3)? * member.area;
         let center = (lo * 0.5 + hi * 0.5).clamp(lo, hi);
-        (lo.is_finite() && hi.is_finite()).then_some(Part {
+        (is_small && lo.is_finite() && hi.is_finite()).then_some(Part {
             lo,
             hi,
             center,
