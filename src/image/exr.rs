@@ -81,6 +81,8 @@ fn channels(picture: &Picture, output: &Output) -> SmallVec<[AnyChannel<FlatSamp
     let mut list = SmallVec::new();
     for (i, name) in ["R", "G", "B", "A"].into_iter().enumerate() {
         let values = (0..).zip(&picture.beauty).map(|(at, &p)| over(p, output.background, picture.veil.get(at))[i]);
+        // Noise of few rays around nothing falls below it; programs that read pictures take no light for less than none.
+        let values = values.map(|x| if x < 0.0 { 0.0 } else { x });
         list.push(color(name, values.collect()));
     }
     let Some(layers) = &picture.layers else { return list };
@@ -367,6 +369,14 @@ mod tests {
             assert!(encode() == first);
         }
         assert_eq!(decode(&first, 35).unwrap().0, picture());
+    }
+
+    #[test]
+    fn no_light_is_less_than_none_and_what_is_no_number_stays_so() {
+        let picture = Picture::of(1, 1, vec![[-0.25, f32::NAN, 0.5, 1.0]]);
+        let bytes = encode(&picture, &output(ExrSamples::Float), &Metadata::new()).unwrap();
+        let [r, g, b, _] = decode(&bytes, 35).unwrap().0.beauty[0];
+        assert!(r == 0.0 && g.is_nan() && b == 0.5, "{r} {g} {b}");
     }
 
     #[test]

@@ -82,8 +82,18 @@ pub enum Polygons {
     /// Cut into triangles by exact ear clipping.
     #[default]
     Cut,
-    /// Planar ones stay whole.
+    /// Planar ones of up to [`Polygons::MOST_CORNERS`] stay whole.
     Whole,
+}
+
+impl Polygons {
+    /// Corners of a face that may stay whole: every test of it looks at all of them.
+    pub const MOST_CORNERS: usize = 256;
+
+    /// Whether a face of so many corners is kept whole if it is planar.
+    pub(crate) fn keeps(self, corners: usize) -> bool {
+        self == Self::Whole && (4..=Self::MOST_CORNERS).contains(&corners)
+    }
 }
 
 /// How MTL text is understood.

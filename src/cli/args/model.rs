@@ -90,7 +90,7 @@ pub(in crate::cli) enum PolygonsArg {
     /// Cut into triangles
     #[default]
     Cut,
-    /// Planar ones stay whole
+    /// Planar ones of up to 256 corners stay whole
     Whole,
 }
 

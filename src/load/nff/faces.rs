@@ -101,7 +101,7 @@ impl Faces {
 
         let face = part.faces;
         part.faces += 1;
-        if self.polygons == Polygons::Whole && corners.len() > 3 && normals.is_empty() && is_flat(points, own) {
+        if self.polygons.keeps(corners.len()) && normals.is_empty() && is_flat(points, own) {
             let first = index(part.mesh.polygon_corners.len());
             part.mesh.polygons.push(Polygon { first, len: index(corners.len()), face });
             part.mesh.polygon_corners.extend(corners);

@@ -222,7 +222,8 @@ impl Builder<'_> {
         if self.turn_to_normals(face) {
             count(&mut out.turned, face);
         }
-        if self.flatness.is_some_and(|flatness| self.ring.len() > 3 && is_flat(&self.ring, flatness)) {
+        if self.flatness.is_some_and(|flatness| Polygons::Whole.keeps(self.ring.len()) && is_flat(&self.ring, flatness))
+        {
             self.keep_whole(face.number);
             out.faces += 1;
             return;

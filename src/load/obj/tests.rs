@@ -143,6 +143,14 @@ fn a_concave_face_is_cut_inside_and_a_whole_one_stays_whole() {
     let mesh = &loaded.scene.meshes[0];
     assert_eq!((mesh.triangles.len(), mesh.polygons.len(), mesh.polygon_corners.len()), (0, 1, 4));
     assert_eq!(loaded.facts.faces, 1);
+    let round = |corners: usize| {
+        let at = |i: usize| std::f64::consts::TAU * i as f64 / corners as f64;
+        let lines = (0..corners).map(|i| format!("v {} {} 0\n", libm::cos(at(i)), libm::sin(at(i))));
+        let corners: String = (1..=corners).map(|i| format!(" {i}")).collect();
+        let mesh = &with((lines.collect::<String>() + "f" + &corners).as_bytes(), &whole).scene.meshes[0];
+        (mesh.triangles.len(), mesh.polygons.len())
+    };
+    assert_eq!((round(256), round(257)), ((0, 1), (255, 0)), "every test looks at all corners");
     let bent = with(text.replace("1 1 0", "1 1 0.01").as_bytes(), &whole);
     assert_eq!((bent.scene.meshes[0].triangles.len(), bent.scene.meshes[0].polygons.len()), (2, 0));
     // A corner off by one unit of the last digit is off the plane by a quarter of it; half a unit is still planar.
