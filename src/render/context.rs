@@ -253,7 +253,13 @@ mod tests {
     fn the_depth_follows_from_the_materials() {
         let matt = Phong::default();
         let mirror = Phong { mirror: Vec3::splat(0.5), ..Phong::default() };
-        let glass = MetalRough { transmission: 0.5, ..MetalRough::default() };
+        let metal = MetalRough { transmission: 0.5, roughness: 0.5, ..MetalRough::default() };
+        let glass = MetalRough { metallic: 0.0, ..metal.clone() };
+        assert_eq!(
+            auto_depth(&Features::of(&scene_of(Surface::MetalRough(metal))), false, 0.002),
+            0,
+            "lets nothing through"
+        );
         assert_eq!(auto_depth(&Features::of(&scene_of(Surface::Phong(matt))), false, 0.002), 0);
         assert_eq!(auto_depth(&Features::of(&scene_of(Surface::Phong(mirror))), false, 0.002), 5);
         let glass = Features::of(&scene_of(Surface::MetalRough(glass)));

@@ -118,7 +118,14 @@ fn without_normals_they_are_unlit_and_with_them_lit() {
 #[test]
 fn nothing_passes_lit_wires_of_glass_which_is_told_once() {
     let glass = |surface: Surface| Material { surface, ..Material::plain() };
-    let thick = MetalRough { transmission: 1.0, thick: true, thickness: 2.0, roughness: 0.5, ..MetalRough::default() };
+    let thick = MetalRough {
+        metallic: 0.0,
+        transmission: 1.0,
+        thick: true,
+        thickness: 2.0,
+        roughness: 0.5,
+        ..MetalRough::default()
+    };
     let phong = Phong { transmission: Vec3::ONE, specular: Vec3::X, ..Phong::default() };
     for surface in [Surface::MetalRough(thick), Surface::Phong(phong)] {
         let scene = Scene { materials: vec![glass(surface)], ..Scene::default() };

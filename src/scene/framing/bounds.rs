@@ -111,7 +111,11 @@ fn without_strays((scene, crowd): (&Scene, &Crowd), mut bounds: Bounds, mut slic
     if (bounds.lo, bounds.hi) == bounds.whole {
         return bounds;
     }
-    let outside = |part: &Part| !bounds.contains(part.lo) || !bounds.contains(part.hi);
+    // Boxes of instances of a crowd may reach beyond what is in them.
+    let outside = |part: &Part| match part.faces {
+        1 => !bounds.contains(part.lo) || !bounds.contains(part.hi),
+        _ => !bounds.contains(part.center),
+    };
     let parts = (scene, Grain::Crowd(crowd, &bounds));
     let add = |n: &mut u64, part: &Part| *n += if outside(part) { part.faces } else { 0 };
     bounds.strays = gather(parts, || 0, add, |n, more| *n += more);
