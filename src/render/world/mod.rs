@@ -3,24 +3,21 @@
 //!
 //! Prims have the numbers of the flattened scene, whether or not anything is kept.
 
-use super::keeping::{self, Instancing, Keeping};
+mod placing;
+mod rounding;
+
+pub use placing::Placing;
+
+use super::keeping::{self, Instancing};
 use crate::accel::auto::{self, Reason};
-use crate::accel::instances::{Spot, placed};
+use crate::accel::instances::Spot;
 use crate::accel::refine::Refined;
 use crate::accel::shapes::Prim;
-use crate::accel::{AccelChoice, AccelParams, AnyAccel, BitSet, Cone, Hit, Kept, Ray, Shapes, SpherePrim};
-use crate::math::aabb::Aabb;
-use crate::math::frame::snapped_center;
+use crate::accel::{AccelChoice, AccelParams, AnyAccel, BitSet, Hit, Kept, Ray, Shapes};
 use crate::math::triangle::Triangle;
-use crate::math::{DAffine3, DMat3, DVec3, Vec3};
-use crate::scene::corners::{Hull, take_in};
+use crate::math::{DMat3, DVec3};
+use crate::scene::Scene;
 use crate::scene::mesh::normal_from_object;
-use crate::scene::{Instance, Scene};
-use rayon::prelude::*;
-
-/// Bytes that a triangle takes at least when it is placed by itself, with the fast structure that takes least while it is
-/// built; measured on four million.
-const PLACED: u64 = 120;
 
 /// A [`Scene`] placed for tracing. World position = `center` + position in [`Shapes`].
 #[derive(Clone, Debug)]
@@ -91,7 +88,7 @@ impl World {
     /// Bytes that [`World::new`] and a structure over it take at least for the triangles of all instances, each stored by
     /// itself, however few of them the scene stores.
     pub fn flattened_bytes(scene: &Scene) -> u64 {
-        placed_bytes(scene, scene.instances.iter())
+        placing::placed_bytes(scene, scene.instances.iter())
     }
 
     /// The same, but for meshes with several instances, with which `how` is dealt: rays hit the same prims at the same
@@ -103,51 +100,6 @@ impl World {
     /// The structure that was asked for over everything, and the reason where there was a choice.
     pub fn structure(&self, choice: AccelChoice, params: &AccelParams) -> (AnyAccel<'_>, Option<Reason>) {
         auto::build_with(choice, &self.shapes, &self.kept, params)
-    }
-
-    /// How far rounding to `f32` has moved corners of faces at most from where `scene` has them, of which this is the world;
-    /// world units. Corners of objects are not looked at one by one: of them, the most that can be.
-    pub fn rounding(&self, scene: &Scene) -> f64 {
-        let mut from = 0;
-        let stored = scene.instances.iter().enumerate().filter(|(i, _)| self.stored(*i)).map(|(_, instance)| {
-            let mesh = &scene.meshes[instance.mesh as usize];
-            let there = &self.shapes.vertices[from..from + mesh.positions.len()];
-            from += mesh.positions.len();
-            let to_frame = centered(&instance.world_from_object, self.center);
-            let off = |(p, there): (&Vec3, &Vec3)| to_frame.transform_point3(p.as_dvec3()).distance(there.as_dvec3());
-            let pairs = mesh.positions.par_iter().zip(there).with_min_len(PARALLEL_RUN);
-            pairs.map(off).filter(|off| off.is_finite()).reduce(|| 0.0, f64::max)
-        });
-        let stored = stored.fold(0.0, f64::max);
-        let kept = self.kept.placed().iter().map(|placed| half_steps(&placed.place.bounds));
-        kept.fold(stored, f64::max)
-    }
-
-    /// The instance whose faces rounding has moved by the largest part of its size, with that part, if it is more than `most`:
-    /// it stands so far from the middle of the scene that it is not what the file says.
-    pub fn coarsest(&self, scene: &Scene, most: f64) -> Option<(usize, f64)> {
-        let mut from = 0;
-        let mut worst: Option<(usize, f64)> = None;
-        // What is kept has been looked at, and one that stands alone is in the middle.
-        for (i, instance) in scene.instances.iter().enumerate().filter(|(i, _)| self.stored(*i)) {
-            let len = scene.meshes[instance.mesh as usize].positions.len();
-            let there = Aabb::around(self.shapes.vertices[from..from + len].iter().copied());
-            from += len;
-            let size = f64::from((there.hi - there.lo).max_element());
-            let part = half_steps(&there) / size;
-            // Points and what has collapsed have no size to compare with.
-            let is_worse = part > worst.map_or(most, |(_, part)| part);
-            if is_worse && part.is_finite() {
-                worst = Some((i, part));
-            }
-        }
-        worst
-    }
-
-    /// Whether an instance is stored by itself.
-    fn stored(&self, instance: usize) -> bool {
-        let (first, end) = (self.first_triangle[instance], self.first_triangle[instance + 1]);
-        first == end || matches!(self.kept.find(first), Spot::Stored(_))
     }
 
     /// Number of prims of all kinds, those of an object once for each place where it stands.
@@ -266,115 +218,6 @@ impl World {
     }
 }
 
-/// A scene of which is known what is kept and where it stands, before anything is stored.
-pub struct Placing<'a> {
-    scene: &'a Scene,
-    bounds: (DVec3, DVec3),
-    center: DVec3,
-    /// Of each material.
-    opaque: Vec<bool>,
-    keeping: Keeping,
-}
-
-impl<'a> Placing<'a> {
-    /// Finds the centre, chooses what is kept, and where it stands.
-    pub fn new(scene: &'a Scene, how: Instancing) -> Self {
-        let bounds = bounds(scene);
-        let center = snapped_center(bounds.0, bounds.1);
-        let opaque: Vec<bool> = scene.materials.iter().map(crate::scene::Material::is_opaque).collect();
-        let keeping = Keeping::of(scene, how, &opaque, |m| centered(m, center));
-        Self { scene, bounds, center, opaque, keeping }
-    }
-
-    /// Bytes that its world and a structure over it take at least for triangles of instances that are stored by themselves.
-    pub fn bytes(&self) -> u64 {
-        let each = self.scene.instances.iter().zip(&self.keeping.places).filter(|(_, place)| place.is_none());
-        placed_bytes(self.scene, each.map(|(instance, _)| instance))
-    }
-
-    /// Stores everything where it stands, rounded once.
-    pub fn world(self) -> World {
-        let Self { scene, bounds, center, opaque, keeping: Keeping { mut kept, places } } = self;
-        let mut shapes = Shapes::default();
-        let (mut first_triangle, mut first_polygon) = (Vec::new(), Vec::new());
-
-        // Triangles and polygons, instance by instance, so that prim ids follow the file's order.
-        for (instance, place) in scene.instances.iter().zip(places) {
-            let mesh = &scene.meshes[instance.mesh as usize];
-            first_triangle.push(index(shapes.triangles.len()) + kept.shown());
-            first_polygon.push(index(shapes.polygons.len()));
-            if let Some((object, place)) = place {
-                kept.put(object, index(shapes.triangles.len()) + kept.shown(), place);
-                continue;
-            }
-            let base = index(shapes.vertices.len());
-            shapes.face_runs.push([index(shapes.triangles.len()), index(shapes.polygons.len())]);
-            let to_frame = centered(&instance.world_from_object, center);
-            let place = |p: &Vec3| placed(&to_frame, *p);
-            shapes.vertices.par_extend(mesh.positions.par_iter().with_min_len(PARALLEL_RUN).map(place));
-            shapes.triangles.extend(mesh.triangles.iter().map(|t| t.map(|i| i + base)));
-            let corners = index(shapes.polygon_corners.len());
-            shapes.polygons.extend(mesh.polygons.iter().map(|p| (p.first + corners, p.len)));
-            shapes.polygon_corners.extend(mesh.polygon_corners.iter().map(|i| i + base));
-        }
-        first_triangle.push(index(shapes.triangles.len()) + kept.shown());
-        first_polygon.push(index(shapes.polygons.len()));
-
-        #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is what this does")]
-        {
-            let sphere = |s: &crate::scene::Sphere| SpherePrim {
-                center: (s.center - center).as_vec3(),
-                radius: s.radius as f32,
-            };
-            shapes.spheres = scene.spheres.iter().map(sphere).collect();
-            let cone = |c: &crate::scene::Cone| Cone {
-                base: (c.base - center).as_vec3(),
-                base_radius: c.base_radius as f32,
-                apex: (c.apex - center).as_vec3(),
-                apex_radius: c.apex_radius as f32,
-            };
-            shapes.cones = scene.cones.iter().map(cone).collect();
-            let plane = |p: &crate::scene::Plane| (p.normal.as_vec3(), (p.offset - p.normal.dot(center)) as f32);
-            shapes.planes = scene.planes.iter().map(plane).collect();
-        }
-
-        let placements = scene.instances.iter().map(|i| Placement::new(i.world_from_object.matrix3)).collect();
-        let mut world = World { center, bounds, shapes, kept, first_triangle, first_polygon, placements };
-        world.shapes.opaque = world.opaque_bits(scene, &opaque);
-        world
-    }
-}
-
-/// Bytes of the triangles of these instances, each stored by itself, with a structure over them, at least.
-fn placed_bytes<'a>(scene: &Scene, instances: impl Iterator<Item = &'a Instance>) -> u64 {
-    let of = |mesh: u32| scene.meshes.get(mesh as usize).map_or(0, |mesh| mesh.triangles.len() as u64);
-    instances.map(|instance| of(instance.mesh)).fold(0, u64::saturating_add).saturating_mul(PLACED)
-}
-
-/// `world_from_object` followed by the move to the centred frame, composed in `f64`.
-fn centered(world_from_object: &DAffine3, center: DVec3) -> DAffine3 {
-    DAffine3 { matrix3: world_from_object.matrix3, translation: world_from_object.translation - center }
-}
-
-/// How far rounding moves points of a box at most.
-fn half_steps(bounds: &Aabb) -> f64 {
-    let most = bounds.lo.abs().max(bounds.hi.abs());
-    let step = most.map(|x| x.next_up() - x).as_dvec3();
-    if step.is_finite() { (0.5 * step).length() } else { 0.0 }
-}
-
-/// Vertices that are worth a thread's while.
-const PARALLEL_RUN: usize = 1 << 14;
-
-/// Box of all instances' vertices that a face uses, and of the spheres and cones.
-fn bounds(scene: &Scene) -> (DVec3, DVec3) {
-    let mut faces = Hull::EMPTY;
-    take_in(scene, &mut faces);
-    let spheres = scene.spheres.iter().map(|s| (s.center - s.radius, s.center + s.radius));
-    let cones = scene.cones.iter().map(crate::scene::Cone::bounds);
-    spheres.chain(cones).fold((faces.lo, faces.hi), |(lo, hi), more| (lo.min(more.0), hi.max(more.1)))
-}
-
 #[expect(clippy::cast_possible_truncation, reason = "loading refuses scenes with 2^32 - 1 prims or vertices")]
 fn index(i: usize) -> u32 {
     i as u32
@@ -383,7 +226,8 @@ fn index(i: usize) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{AlphaMode, Cone, Material, Mesh, Plane, Polygon, Sphere};
+    use crate::math::{DAffine3, Vec3};
+    use crate::scene::{AlphaMode, Cone, Instance, Material, Mesh, Plane, Polygon, Sphere};
 
     fn triangle(material: u32) -> Mesh {
         Mesh { material, positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]], ..Mesh::default() }
