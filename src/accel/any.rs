@@ -82,6 +82,26 @@ impl AccelKind {
         }
     }
 
+    /// Whether it has a grid whose cells can be chosen.
+    pub const fn has_grid(self) -> bool {
+        matches!(self, Self::Grid | Self::GridOctree | Self::GridBvh)
+    }
+
+    /// Whether it has octrees.
+    pub const fn has_octrees(self) -> bool {
+        matches!(self, Self::GridOctree | Self::Octree)
+    }
+
+    /// Whether it has leaves whose size can be chosen.
+    pub const fn has_leaves(self) -> bool {
+        matches!(self, Self::Bvh | Self::GridBvh | Self::GridOctree | Self::Octree)
+    }
+
+    /// Whether it has cells that list shapes, so that a ray may meet one in several.
+    pub const fn has_cells(self) -> bool {
+        matches!(self, Self::Grid | Self::GridOctree | Self::GridBvh | Self::Octree)
+    }
+
     /// Whether it can hold objects that are stored once and stand in several places.
     pub fn keeps_instances(self) -> bool {
         matches!(self, Self::FastOctree | Self::FastBvh)

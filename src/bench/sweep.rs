@@ -48,14 +48,11 @@ impl Parameter {
 
     /// Whether it changes a structure of this kind with these other parameters.
     pub fn changes(self, kind: AccelKind, params: &AccelParams) -> bool {
-        use AccelKind::{Bvh, Grid, GridBvh, GridOctree, Octree};
         match self {
-            Self::GridDensity | Self::GridResolution => {
-                matches!(kind, Grid | GridOctree | GridBvh) && params.grid_cells.is_none()
-            }
-            Self::MaxDepth => matches!(kind, GridOctree | Octree),
-            Self::StepCost => matches!(kind, GridOctree | Octree) && params.leaf_size.is_none(),
-            Self::LeafSize => matches!(kind, Bvh | GridBvh | GridOctree | Octree),
+            Self::GridDensity | Self::GridResolution => kind.has_grid() && params.grid_cells.is_none(),
+            Self::MaxDepth => kind.has_octrees(),
+            Self::StepCost => kind.has_octrees() && params.leaf_size.is_none(),
+            Self::LeafSize => kind.has_leaves(),
         }
     }
 

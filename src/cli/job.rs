@@ -153,6 +153,8 @@ impl RenderJob {
         if args.again.is_none() {
             args.sampling.check_target()?;
         }
+        // Pictures may carry parameters that did nothing for them.
+        let kinds = if args.again.is_some() { &AccelKind::ALL[..] } else { args.accel.kinds() };
         let choices = choices(args)?;
         let sequence = sequence::of(args)?;
         let batches = batches(args, &choices, sequence.as_ref())?;
@@ -165,7 +167,7 @@ impl RenderJob {
         Ok(Self {
             load: load_options(args),
             look: look(args),
-            params: params(&args.params, args.accel.kinds())?,
+            params: params(&args.params, kinds)?,
             accel: args.accel,
             intersector: args.intersector,
             instances: instances(args)?,
@@ -467,6 +469,15 @@ mod tests {
         let Command::Render(args) = Cli::try_parse_from(words).unwrap().command else { panic!("not render") };
         let job = RenderJob::new(&args).unwrap();
         assert_eq!(job.batches[0].shots.iter().map(|s| s.target.clone()).collect::<Vec<_>>(), expected);
+    }
+
+    #[test]
+    fn a_picture_that_carries_a_parameter_that_did_nothing_is_repeated() {
+        let words = ["meshray", "render", "a.obj", "-o", "b.png", "--grid-density", "2"];
+        let Command::Render(mut args) = Cli::try_parse_from(words).unwrap().command else { panic!("not render") };
+        assert!(RenderJob::new(&args).is_err());
+        args.again = Some("a.png".into());
+        assert!(RenderJob::new(&args).is_ok());
     }
 
     #[test]

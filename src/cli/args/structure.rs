@@ -38,36 +38,32 @@ pub(in crate::cli) struct AccelArgs {
     pub mailbox: MailboxKind,
 }
 
-/// An option, and the structures that it is for.
-type Use = (&'static str, &'static [AccelKind]);
+/// An option, and whether a structure has what it chooses.
+type Use = (&'static str, fn(AccelKind) -> bool);
 
 impl AccelArgs {
     /// Whether each that was typed changes one of these structures; the error says which one does not, and what it is for.
     pub(in crate::cli) fn check_use(&self, kinds: &[AccelKind]) -> Result<(), String> {
-        let idle = self.typed().find(|(_, users)| !users.iter().any(|user| kinds.contains(user)));
-        let Some((option, users)) = idle else { return Ok(()) };
-        let names = |kinds: &[AccelKind]| kinds.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(", ");
-        let (these, users) = (names(kinds), names(users));
+        let idle = self.typed().find(|(_, has)| !kinds.iter().any(|kind| has(*kind)));
+        let Some((option, has)) = idle else { return Ok(()) };
+        let names = |kinds: Vec<AccelKind>| kinds.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(", ");
+        let users = names(AccelKind::ALL.into_iter().filter(|kind| has(*kind)).collect());
+        let these = names(kinds.to_vec());
         Err(format!("{option} changes nothing of {these}; it is for {users}: choose one of these with --accel"))
     }
 
     /// Those that were typed; a default cannot be told from its absence.
     fn typed(&self) -> impl Iterator<Item = Use> {
-        use AccelKind::{Bvh, Grid, GridBvh, GridOctree, Octree};
-        const GRIDS: &[AccelKind] = &[Grid, GridOctree, GridBvh];
-        const OCTREES: &[AccelKind] = &[GridOctree, Octree];
-        const LEAVES: &[AccelKind] = &[Bvh, GridOctree, GridBvh, Octree];
-        const CELLS: &[AccelKind] = &[Grid, GridOctree, GridBvh, Octree];
         let options: [(bool, Use); 9] = [
-            (self.grid_density.is_some(), ("--grid-density", GRIDS)),
-            (self.grid_resolution.is_some(), ("--grid-resolution", GRIDS)),
-            (self.grid_cells.is_some(), ("--grid-cells", GRIDS)),
-            (self.max_depth.is_some(), ("--max-depth", OCTREES)),
-            (self.step_cost.is_some(), ("--step-cost", OCTREES)),
-            (self.max_references.is_some(), ("--max-references", OCTREES)),
-            (self.leaf_size.is_some(), ("--leaf-size", LEAVES)),
-            (self.assign != Assign::Surface, ("--assign", CELLS)),
-            (self.mailbox != MailboxKind::Exact, ("--mailbox", CELLS)),
+            (self.grid_density.is_some(), ("--grid-density", AccelKind::has_grid)),
+            (self.grid_resolution.is_some(), ("--grid-resolution", AccelKind::has_grid)),
+            (self.grid_cells.is_some(), ("--grid-cells", AccelKind::has_grid)),
+            (self.max_depth.is_some(), ("--max-depth", AccelKind::has_octrees)),
+            (self.step_cost.is_some(), ("--step-cost", AccelKind::has_octrees)),
+            (self.max_references.is_some(), ("--max-references", AccelKind::has_octrees)),
+            (self.leaf_size.is_some(), ("--leaf-size", AccelKind::has_leaves)),
+            (self.assign != Assign::Surface, ("--assign", AccelKind::has_cells)),
+            (self.mailbox != MailboxKind::Exact, ("--mailbox", AccelKind::has_cells)),
         ];
         options.into_iter().filter(|(typed, _)| *typed).map(|(_, of)| of)
     }

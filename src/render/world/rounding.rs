@@ -32,7 +32,11 @@ impl World {
     pub fn coarsest(&self, scene: &Scene, most: f64) -> Option<(usize, f64)> {
         let mut from = 0;
         let mut worst: Option<(usize, f64)> = None;
-        // What is kept has been looked at, and one that stands alone is in the middle.
+        // One that stands alone is in the middle.
+        if scene.instances.len() < 2 {
+            return None;
+        }
+        // What is kept has been looked at.
         for (i, instance) in scene.instances.iter().enumerate().filter(|(i, _)| self.stored(*i)) {
             let len = scene.meshes[instance.mesh as usize].positions.len();
             let there = Aabb::around(self.shapes.vertices[from..from + len].iter().copied());
