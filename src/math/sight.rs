@@ -179,9 +179,10 @@ fn view<S: Lanewise<N>, const N: usize>(
     let height = s.larger(heights[0], s.larger(heights[1], heights[2]));
     let error = EdgeMargins::WITH_DISTANCES.error_by_height(s, height, spread);
     // Below zero where all edge values have one sign, as far as the nearest of them is from zero.
-    let zero = s.splat(0.0);
+    // One of both is below zero at most.
+    let zero = s.splat(-0.0);
     let (low, high) = (s.smaller(u, s.smaller(v, w)), s.greater(u, s.greater(v, w)));
-    let apart = s.smaller(s.sub(zero, low), high);
+    let apart = s.sooner(s.sub(zero, low), high);
     let (hit, miss) = (s.less(apart, s.sub(zero, error)), s.less(error, apart));
     let verdicts = Verdicts { hit, unsure: !(hit | miss) & (u32::MAX >> (u32::BITS as usize - N)) };
     (verdicts, View { edges: [u, v, w], error, heights, height })

@@ -7,8 +7,9 @@ use super::node::{Child, Tree};
 use super::ready::{Ready, ReadyRay};
 use super::settle::Settle;
 use super::slabs::BoxMargins;
-use super::walk::{Entry, ask_by_itself, nearest, pop};
+use super::walk::{Entry, FromZero, ask_by_itself, nearest, pop};
 use crate::accel::Shapes;
+use crate::accel::query::Goal;
 use crate::accel::wave::Wave;
 use crate::math::simd::{Kernel, LANES, Simd};
 
@@ -66,7 +67,11 @@ impl Lone {
             }
             let ray = &self.ready.rays[lane % LANES];
             let mut seeker = Seeker::new(ray, self.ready.t_min[lane % LANES], i, self.ready.exclude[lane % LANES]);
-            descend::<B, _, _>(s, tree, shapes, wave, ray, &mut seeker, stack);
+            if W::Goal::ANY {
+                descend_any::<B, _, _>(s, tree, shapes, wave, ray, &mut seeker, stack);
+            } else {
+                descend::<B, _, _>(s, tree, shapes, wave, ray, &mut seeker, stack);
+            }
             self.settle.answer(s, tree, wave, i, seeker.found());
         }
     }
@@ -97,14 +102,56 @@ fn descend<B: BoxMargins, S: Simd, W: Wave>(
             let node = &tree.nodes[child as usize];
             let (near, met) = slabs.meets(s, node, seeker.limit);
             child = if met != 0 {
-                nearest(s, node, near, met, stack, &mut top)
+                nearest::<FromZero, _>(s, &node.children, near, met, stack, &mut top)
             } else {
-                pop(stack, &mut top, seeker.limit).unwrap_or(Child::END)
+                pop::<FromZero>(stack, &mut top, seeker.limit).unwrap_or(Child::END)
             };
         }
         if seeker.test::<B, _, _>(s, &ray.sight, tree, shapes, wave, child) {
             return;
         }
-        child = pop(stack, &mut top, seeker.limit).unwrap_or(Child::END);
+        child = pop::<FromZero>(stack, &mut top, seeker.limit).unwrap_or(Child::END);
+    }
+}
+
+/// The same for a ray that any hit answers: how far it looks never changes, so that children need no distances, and to put
+/// them in order takes longer than it saves.
+#[inline(always)]
+fn descend_any<B: BoxMargins, S: Simd, W: Wave>(
+    s: S,
+    tree: &Tree,
+    shapes: &Shapes,
+    wave: &W,
+    ray: &ReadyRay,
+    seeker: &mut Seeker,
+    stack: &mut [Entry],
+) {
+    let (slabs, limit) = (ray.slabs.spread(s), seeker.limit);
+    stack[0] = Entry { near: 0, child: Child::END };
+    let (mut child, mut top) = (0, 1);
+    loop {
+        while !Child::is_leaf(child) {
+            let node = &tree.nodes[child as usize];
+            let (_, mut met) = slabs.meets(s, node, limit);
+            if met == 0 {
+                top -= 1;
+                child = stack[top].child;
+                continue;
+            }
+            let mut lane = met.trailing_zeros() as usize % LANES;
+            met &= met - 1;
+            while met != 0 {
+                stack[top] = Entry { near: 0, child: node.children[lane] };
+                top += 1;
+                lane = met.trailing_zeros() as usize % LANES;
+                met &= met - 1;
+            }
+            child = node.children[lane];
+        }
+        if seeker.test::<B, _, _>(s, &ray.sight, tree, shapes, wave, child) {
+            return;
+        }
+        top -= 1;
+        child = stack[top].child;
     }
 }

@@ -30,7 +30,7 @@ pub(super) struct Bundle<B, const N: usize> {
     last: [[f32; N]; 3],
     /// Where hits count, inclusive.
     pub t_min: [f32; N],
-    /// Where boxes matter.
+    /// Where boxes matter; not below zero.
     from: [f32; N],
     pub exclude: [u32; N],
     /// All rays as one.
@@ -139,7 +139,7 @@ impl<B: BoxMargins, const N: usize> Bundle<B, N> {
             self.first[k] = s.store(first[k]);
             self.last[k] = s.store(last[k]);
         }
-        self.from = s.store(B::started_lanes(s, t_min));
+        self.from = s.store(s.greater(B::started_lanes(s, t_min), zero));
         alike & all::<N>()
     }
 
@@ -159,10 +159,10 @@ impl<B: BoxMargins, const N: usize> Bundle<B, N> {
         let (mut near, mut far) = (s.load(&self.from), limit);
         for k in 0..3 {
             let inverse = s.load(&self.inverse[k]);
-            near = s.greater(s.mul_add(s.splat(first[k]), inverse, s.load(&self.first[k])), near);
-            far = s.smaller(s.mul_add(s.splat(last[k]), inverse, s.load(&self.last[k])), far);
+            near = s.later(s.mul_add(s.splat(first[k]), inverse, s.load(&self.first[k])), near);
+            far = s.sooner(s.mul_add(s.splat(last[k]), inverse, s.load(&self.last[k])), far);
         }
-        s.at_most(near, far)
+        s.in_order(near, far)
     }
 
     /// 1 over the largest component of each direction.
@@ -198,7 +198,7 @@ impl<B: BoxMargins, const N: usize> Bundle<B, N> {
             self.hull.first[k] = [fast, -front * fast - pad * fast.abs()];
             self.hull.last[k] = [slow, -rear * slow + pad * slow.abs()];
         }
-        self.hull.from = from.max(0.0);
+        self.hull.from = from;
     }
 
     /// Finds what bounds all origins.
@@ -247,10 +247,10 @@ impl<B: BoxMargins, const N: usize> Bundle<B, N> {
         let (mut near, mut far) = (s.splat(self.hull.from), s.splat(limit));
         for k in 0..3 {
             let ([a, b], [c, d]) = (self.hull.first[k], self.hull.last[k]);
-            near = s.greater(s.mul_add(first[k], s.splat(a), s.splat(b)), near);
-            far = s.smaller(s.mul_add(last[k], s.splat(c), s.splat(d)), far);
+            near = s.later(s.mul_add(first[k], s.splat(a), s.splat(b)), near);
+            far = s.sooner(s.mul_add(last[k], s.splat(c), s.splat(d)), far);
         }
-        (near, s.at_most(near, far))
+        (near, s.in_order(near, far))
     }
 
     /// Which of a node's boxes any ray may meet.

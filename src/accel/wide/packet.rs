@@ -243,7 +243,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         };
         let low = wide.splat(f32::INFINITY);
         let limit = wide.choose(self.active, limit, wide.splat(f32::NEG_INFINITY));
-        let mut reach: Reach<T, N> = Reach { low, high, limit, farthest: wide.greatest(limit) };
+        let mut reach: Reach<T, N> = Reach { low, high, limit, farthest: wide.latest(limit) };
         let (mut top, mut branch) = (0, Branch { near: 0.0, child: 0, rays: self.active });
         loop {
             let mut nearer = false;
@@ -298,7 +298,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         } else {
             reach.limit = wide.choose(changed, B::widened_lanes(wide, reach.high), reach.limit);
         }
-        reach.farthest = wide.greatest(reach.limit);
+        reach.farthest = wide.latest(reach.limit);
     }
 
     /// Puts the children that some ray meets on the stack, the nearest last.

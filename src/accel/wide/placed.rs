@@ -5,7 +5,7 @@
 use super::node::{Block, Child, Tree};
 use super::padded::PaddedSlabs;
 use super::slabs::{BoxMargins, Derived};
-use super::walk::{Entry, Stack, nearest, pop};
+use super::walk::{Entry, FromZero, Stack, nearest, pop};
 use super::{Culling, Wide};
 use crate::accel::Probe;
 use crate::accel::instances::Place;
@@ -62,11 +62,11 @@ fn slabs_of(tree: &Tree, place: &Place, ray: &RaySpace, t_min: f32) -> Option<Pa
     let (whole, length) = (extent + far.element_sum(), size.element_sum());
     // False for NaN.
     let within = |x: f32| (1.0 / BOX_RANGE..=BOX_RANGE).contains(&x);
-    if !(within(whole) && within(length)) {
+    if !(within(whole) && within(length) && t_min >= 0.0) {
         return None;
     }
     let parallel = size.max_element() * PARALLEL;
-    let mut slabs = PaddedSlabs { from: Derived::started(t_min), ..PaddedSlabs::default() };
+    let mut slabs = PaddedSlabs { from: Derived::started(t_min).max(0.0), ..PaddedSlabs::default() };
     for k in 0..3 {
         let inverse = 1.0 / size[k].max(parallel).copysign(dir[k]);
         let pad = place.room[k] + (extent + far[k]) * PLACED_PAD + whole * PLACED_DRIFT;
@@ -112,9 +112,9 @@ impl<G: Goal, P: Probe, V: Fn(u32) -> Visit> Kernel for Descent<'_, '_, G, P, V>
             probe.volume_tests(LANES);
             let (near, met) = slabs.meets(s, &tree.nodes[node as usize], limit);
             let mut child = if met != 0 {
-                nearest(s, &tree.nodes[node as usize], near, met, stack, &mut top)
+                nearest::<FromZero, _>(s, &tree.nodes[node as usize].children, near, met, stack, &mut top)
             } else {
-                pop(stack, &mut top, limit).unwrap_or(Child::END)
+                pop::<FromZero>(stack, &mut top, limit).unwrap_or(Child::END)
             };
             while Child::is_leaf(child) {
                 let Some(block) = tree.blocks.get(Child::block(child).0 as usize) else { return false };
@@ -125,7 +125,7 @@ impl<G: Goal, P: Probe, V: Fn(u32) -> Visit> Kernel for Descent<'_, '_, G, P, V>
                     return true;
                 }
                 limit = Derived::widened(query.reach());
-                child = pop(stack, &mut top, limit).unwrap_or(Child::END);
+                child = pop::<FromZero>(stack, &mut top, limit).unwrap_or(Child::END);
             }
             node = child;
         }

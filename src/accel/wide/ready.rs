@@ -53,10 +53,11 @@ impl Ready {
         let t_min = s.load(&self.t_min);
         // A distance that overflows is no hit; a NaN stays.
         let t_max = s.smaller(s.splat(f32::MAX), t_max);
-        let (from, limit) = (B::started_lanes(s, t_min), B::widened_lanes(s, t_max));
+        let zero = s.splat(0.0);
+        let (from, limit) = (s.greater(B::started_lanes(s, t_min), zero), B::widened_lanes(s, t_max));
 
         let Padding { inverse, first, last, allowed } = Padding::of::<B, _, LANES>(s, tree.extent, o, d);
-        self.allowed = allowed & s.at_most(t_min, t_max);
+        self.allowed = allowed & s.at_most(t_min, t_max) & s.at_most(zero, t_min);
 
         let size = [s.abs(d[0]), s.abs(d[1]), s.abs(d[2])];
         // Of equal components the first is the main one.
@@ -191,7 +192,7 @@ mod tests {
         let ready = ReadyRay {
             slabs: PaddedSlabs {
                 inverse,
-                from: Derived::started(ray.t_min),
+                from: Derived::started(ray.t_min).max(0.0),
                 first: [0, 1, 2].map(|k| (0.0 - ray.origin[k]) * inverse[k] - pad(k)),
                 limit: Derived::widened(t_max),
                 last: [0, 1, 2].map(|k| (0.0 - ray.origin[k]) * inverse[k] + pad(k)),
@@ -221,7 +222,7 @@ mod tests {
         while rays.len() < 2000 {
             let dir = Vec3::new(part(&mut random), part(&mut random), part(&mut random));
             let dir = if rays.len() % 2 == 0 { dir } else { random.cube() * 100.0 };
-            let range = [(0.0, f32::INFINITY), (-1.5, 2.0), (3.0, 3.0), (f32::MIN_POSITIVE, f32::MAX)];
+            let range = [(0.0, f32::INFINITY), (-0.0, 2.0), (3.0, 3.0), (f32::MIN_POSITIVE, f32::MAX)];
             let (t_min, t_max) = range[random.below(4)];
             rays.push(Ray { t_min, t_max, ..ray(random.cube() * 3.0, dir) });
             rays.retain(|ray| ray.dir.abs().max_element() > 1e-9);
@@ -282,6 +283,14 @@ mod tests {
                 let allowed = take(level, tree, &rays, 0).allowed >> lane & 1 == 1;
                 assert_eq!(allowed, expected, "lane {lane} on {}: {ray:?}", level.name());
             }
+        }
+    }
+
+    #[test]
+    fn rays_that_may_hit_behind_their_start_are_not_allowed() {
+        let good = ray(Vec3::splat(0.5), Vec3::new(0.3, -1.0, 0.2));
+        for (t_min, allowed) in [(0.0, true), (-0.0, true), (-f32::MIN_POSITIVE, false), (-1.5, false)] {
+            assert_allowed(&tree(2.0), Ray { t_min, ..good }, allowed);
         }
     }
 

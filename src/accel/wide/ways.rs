@@ -13,14 +13,19 @@ const WAYS: [RayOrder; 4] = [RayOrder::OneByOne, RayOrder::InFlight, RayOrder::P
 /// First hits, the hits behind them, and what is blocked.
 fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> String {
     let mut scratch = accel.scratch();
-    let mut hits = vec![Hit::MISS; rays.len()];
-    accel.closest(rays, &mut hits, &mut scratch, &mut NoProbe);
+    let hits = first_hits(accel, rays);
     let mut behind = vec![Hit::MISS; rays.len()];
     accel.next(rays, &hits, &mut behind, &mut scratch, &mut NoProbe);
     let mut blocked = vec![false; rays.len()];
     accel.occluded(rays, &mut blocked, &mut scratch, &mut NoProbe);
     let bits = |hits: &[Hit]| hits.iter().map(Hit::bits).collect::<Vec<_>>();
     format!("{:?} {:?} {blocked:?}", bits(&hits), bits(&behind))
+}
+
+fn first_hits<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<Hit> {
+    let mut hits = vec![Hit::MISS; rays.len()];
+    accel.closest(rays, &mut hits, &mut accel.scratch(), &mut NoProbe);
+    hits
 }
 
 /// For some rays sixteen side by side that start with them, every other time each from a place of its own: most bundles
@@ -243,6 +248,28 @@ fn rays_along_axes_from_far_away_hit_what_brute_force_hits() {
     let shapes = scenes::lattice(120);
     for far in [1e3, 1e5, 1e7] {
         assert_all_ways_agree("lattice", &shapes, &along_axes(&shapes, 240, far));
+    }
+}
+
+/// What they start on lies in boxes that they leave at once, or whose planes they start on.
+#[test]
+fn rays_that_start_on_what_they_hit_hit_it() {
+    let mut r = Random::new(74);
+    for (name, shapes) in
+        [("lattice", scenes::lattice(120)), ("soup", scenes::soup(120, 0.4)), ("star", scenes::star(12, 8))]
+    {
+        let mut start = |i: usize| {
+            let [a, b, c] = shapes.triangles[r.below(shapes.triangles.len())].map(|v| shapes.vertices[v as usize]);
+            let on = [a, (a + b) * 0.5, a + (b - a) * 0.25 + (c - a) * 0.5][i % 3];
+            let dir = if i.is_multiple_of(4) { Vec3::AXES[i / 4 % 3] * (0.5 - r.unit()) } else { r.cube() };
+            Ray { t_min: [0.0, -0.0, -1e-30][i / 3 % 3], ..ray(on, dir) }
+        };
+        let rays: Vec<Ray> = (0..300).map(&mut start).filter(|r| r.dir != Vec3::ZERO).collect();
+        let hits = Unculled::new(&shapes);
+        let at_once = first_hits(&hits, &rays).iter().filter(|hit| hit.t == 0.0).count();
+        assert!(at_once > 90, "{name}: {at_once}");
+        assert_all_ways_agree(name, &shapes, &rays);
+        assert_all_ways_agree(name, &shapes, &bundles(&rays));
     }
 }
 

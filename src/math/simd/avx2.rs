@@ -45,6 +45,11 @@ impl Avx2 {
     }
 
     #[inline(always)]
+    fn masks_in_order(self, a: __m256, b: __m256) -> u32 {
+        self.masks_at_most(a, b)
+    }
+
+    #[inline(always)]
     fn masks_at_most(self, a: __m256, b: __m256) -> u32 {
         // SAFETY: as above.
         unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)).cast_unsigned() }
@@ -147,6 +152,35 @@ macro_rules! eight_lanes {
             fn smaller(self, a: __m256, b: __m256) -> __m256 {
                 // SAFETY: as above.
                 unsafe { _mm256_min_ps(a, b) }
+            }
+
+            #[inline(always)]
+            fn later(self, a: __m256, b: __m256) -> __m256 {
+                // SAFETY: as above.
+                unsafe { _mm256_castsi256_ps(_mm256_max_epi32(_mm256_castps_si256(a), _mm256_castps_si256(b))) }
+            }
+
+            #[inline(always)]
+            fn sooner(self, a: __m256, b: __m256) -> __m256 {
+                // SAFETY: as above.
+                unsafe { _mm256_castsi256_ps(_mm256_min_epi32(_mm256_castps_si256(a), _mm256_castps_si256(b))) }
+            }
+
+            #[inline(always)]
+            fn latest(self, a: __m256) -> f32 {
+                // SAFETY: as above.
+                unsafe {
+                    let a = _mm256_castps_si256(a);
+                    let a = _mm_max_epi32(_mm256_castsi256_si128(a), _mm256_extracti128_si256::<1>(a));
+                    let a = _mm_max_epi32(a, _mm_shuffle_epi32::<0b01_00_11_10>(a));
+                    let a = _mm_max_epi32(a, _mm_shuffle_epi32::<0b10_11_00_01>(a));
+                    _mm_cvtss_f32(_mm_castsi128_ps(a))
+                }
+            }
+
+            #[inline(always)]
+            fn in_order(self, a: __m256, b: __m256) -> u32 {
+                self.masks_in_order(a, b)
             }
 
             #[inline(always)]

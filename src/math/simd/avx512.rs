@@ -55,6 +55,12 @@ impl Avx512 {
     }
 
     #[inline(always)]
+    fn masks_in_order(self, a: __m256, b: __m256) -> u32 {
+        // SAFETY: as above.
+        unsafe { u32::from(_mm256_cmp_epi32_mask::<_MM_CMPINT_LE>(_mm256_castps_si256(a), _mm256_castps_si256(b))) }
+    }
+
+    #[inline(always)]
     fn masks_at_most(self, a: __m256, b: __m256) -> u32 {
         // SAFETY: as above.
         unsafe { u32::from(_mm256_cmp_ps_mask::<_CMP_LE_OQ>(a, b)) }
@@ -171,6 +177,30 @@ impl Lanewise<WIDE> for Sixteen {
     fn smaller(self, a: __m512, b: __m512) -> __m512 {
         // SAFETY: as above.
         unsafe { _mm512_min_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn later(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: as above.
+        unsafe { _mm512_castsi512_ps(_mm512_max_epi32(_mm512_castps_si512(a), _mm512_castps_si512(b))) }
+    }
+
+    #[inline(always)]
+    fn sooner(self, a: __m512, b: __m512) -> __m512 {
+        // SAFETY: as above.
+        unsafe { _mm512_castsi512_ps(_mm512_min_epi32(_mm512_castps_si512(a), _mm512_castps_si512(b))) }
+    }
+
+    #[inline(always)]
+    fn latest(self, a: __m512) -> f32 {
+        let (low, high) = halves(a);
+        self.0.latest(self.0.later(low, high))
+    }
+
+    #[inline(always)]
+    fn in_order(self, a: __m512, b: __m512) -> u32 {
+        // SAFETY: as above.
+        unsafe { u32::from(_mm512_cmp_epi32_mask::<_MM_CMPINT_LE>(_mm512_castps_si512(a), _mm512_castps_si512(b))) }
     }
 
     #[inline(always)]

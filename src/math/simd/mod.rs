@@ -86,6 +86,27 @@ pub trait Lanewise<const N: usize>: Copy {
     }
     /// The smaller of both; b where one is NaN.
     fn smaller(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes;
+    /// The later of two distances along a ray, neither NaN; either where both have a negative sign or are zero. By their bits
+    /// where the machine compares words in less time.
+    #[inline(always)]
+    fn later(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+        self.greater(a, b)
+    }
+    /// The sooner of two distances along a ray, neither NaN; either where both have a negative sign or are zero.
+    #[inline(always)]
+    fn sooner(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+        self.smaller(a, b)
+    }
+    /// The latest of distances along a ray, none NaN; any of them where all have a negative sign, either of two zeros.
+    #[inline(always)]
+    fn latest(self, a: Self::Lanes) -> f32 {
+        self.greatest(a)
+    }
+    /// Where a distance that has no negative sign is no later than another, neither NaN; also false where that one is −0.
+    #[inline(always)]
+    fn in_order(self, a: Self::Lanes, b: Self::Lanes) -> u32 {
+        self.at_most(a, b)
+    }
     /// a < b; false where one is NaN.
     fn less(self, a: Self::Lanes, b: Self::Lanes) -> u32;
     /// a ≤ b; false where one is NaN.

@@ -99,6 +99,26 @@ macro_rules! pair {
             }
 
             #[inline(always)]
+            fn later(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+                [self.0.later(a[0], b[0]), self.0.later(a[1], b[1])]
+            }
+
+            #[inline(always)]
+            fn sooner(self, a: Self::Lanes, b: Self::Lanes) -> Self::Lanes {
+                [self.0.sooner(a[0], b[0]), self.0.sooner(a[1], b[1])]
+            }
+
+            #[inline(always)]
+            fn latest(self, [low, high]: Self::Lanes) -> f32 {
+                self.0.latest(self.0.later(low, high))
+            }
+
+            #[inline(always)]
+            fn in_order(self, a: Self::Lanes, b: Self::Lanes) -> u32 {
+                self.0.in_order(a[0], b[0]) | self.0.in_order(a[1], b[1]) << $half
+            }
+
+            #[inline(always)]
             fn abs(self, [low, high]: Self::Lanes) -> Self::Lanes {
                 [self.0.abs(low), self.0.abs(high)]
             }

@@ -252,6 +252,68 @@ fn the_second_operand_wins_over_nan() {
     assert_eq!((s.less(nan, one), s.at_most(one, nan), s.less(one, s.splat(2.0))), (0, 0, 255));
 }
 
+/// What is told of distances: the later ones, the sooner ones, which are in order, and the latest.
+#[inline(always)]
+fn distances<S: Lanewise<N>, const N: usize>(s: S, [a, b]: &[[f32; N]; 2]) -> ([[f32; N]; 2], u32, f32) {
+    let (a, b) = (s.load(a), s.load(b));
+    ([s.store(s.later(a, b)), s.store(s.sooner(a, b))], s.in_order(a, b), s.latest(a))
+}
+
+struct Distances([[f32; BROAD]; 2]);
+
+impl Kernel for Distances {
+    type Output = Vec<([Vec<f32>; 2], u32, f32)>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> Self::Output {
+        let [a, b] = self.0;
+        let (eight, sixteen) =
+            ([*a.first_chunk().unwrap(), *b.first_chunk().unwrap()], [a, b].map(|r| *r.first_chunk().unwrap()));
+        let (eight, sixteen, all) =
+            (distances(s, &eight), distances(s.wide(), &sixteen), distances(s.broad(), &self.0));
+        vec![
+            (eight.0.map(Vec::from), eight.1, eight.2),
+            (sixteen.0.map(Vec::from), sixteen.1, sixteen.2),
+            (all.0.map(Vec::from), all.1, all.2),
+        ]
+    }
+}
+
+#[test]
+fn every_level_knows_the_later_of_two_distances_from_zero_on() {
+    let all: Vec<f32> = HARD.into_iter().filter(|x| !x.is_nan()).chain([-1e-42, -1.0, 2.5]).collect();
+    let rows = |from: &[f32], step: usize| -> [[f32; BROAD]; 2] {
+        [std::array::from_fn(|k| from[k % from.len()]), std::array::from_fn(|k| all[(k * step + k / 7) % all.len()])]
+    };
+    let behind: Vec<f32> = all.iter().copied().filter(|x| x.is_sign_negative()).collect();
+    for (level, step) in Level::all().into_iter().flat_map(|level| (0..all.len()).map(move |step| (level, step))) {
+        for [a, b] in [rows(&all, step), rows(&behind, step)] {
+            for ([later, sooner], in_order, latest) in level.run(Distances([a, b])) {
+                for (k, (&later, &sooner)) in later.iter().zip(&sooner).enumerate() {
+                    let (a, b, name) = (a[k], b[k], level.name());
+                    let one_of_both = |x: f32| [a, b].iter().any(|y| y.to_bits() == x.to_bits());
+                    assert!(one_of_both(later) && one_of_both(sooner), "{name}: {later}, {sooner} of {a}, {b}");
+                    let ahead = a.max(b) > 0.0;
+                    assert!(!ahead || later == a.max(b), "{name}: {later} of {a}, {b}");
+                    let behind = a.is_sign_negative() && b.is_sign_negative();
+                    let expected = behind || if a.min(b) < 0.0 { sooner < 0.0 } else { sooner == a.min(b) };
+                    assert!(expected, "{name}: {sooner} of {a}, {b}");
+                    if a.is_sign_positive() && b.to_bits() != (-0.0f32).to_bits() {
+                        assert_eq!(in_order >> k & 1 == 1, a <= b, "{name}: {a} {b}");
+                    }
+                }
+                let row = &a[..later.len()];
+                let most = row.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+                assert!(
+                    row.contains(&latest) && (most <= 0.0 || latest == most),
+                    "{}: {latest} of {row:?}",
+                    level.name()
+                );
+            }
+        }
+    }
+}
+
 /// [`HARD`], and NaN with the other sign.
 fn hard() -> Vec<f32> {
     HARD.into_iter().chain([f32::from_bits(0xffc0_0001)]).collect()
