@@ -3,11 +3,11 @@
 use std::marker::PhantomData;
 
 use super::best::Seeker;
-use super::node::{Child, Tree};
+use super::node::{Child, Node, Tree};
 use super::ready::{Ready, ReadyRay};
 use super::settle::Settle;
 use super::slabs::BoxMargins;
-use super::walk::{Entry, FromZero, ask_by_itself, nearest, pop};
+use super::walk::{Entry, ask_by_itself};
 use crate::accel::Shapes;
 use crate::accel::query::Goal;
 use crate::accel::wave::Wave;
@@ -102,16 +102,58 @@ fn descend<B: BoxMargins, S: Simd, W: Wave>(
             let node = &tree.nodes[child as usize];
             let (near, met) = slabs.meets(s, node, seeker.limit);
             child = if met != 0 {
-                nearest::<FromZero, _>(s, &node.children, near, met, stack, &mut top)
+                nearest(s, node, near, met, stack, &mut top)
             } else {
-                pop::<FromZero>(stack, &mut top, seeker.limit).unwrap_or(Child::END)
+                pop(stack, &mut top, seeker.limit).unwrap_or(Child::END)
             };
         }
         if seeker.test::<B, _, _>(s, &ray.sight, tree, shapes, wave, child) {
             return;
         }
-        child = pop::<FromZero>(stack, &mut top, seeker.limit).unwrap_or(Child::END);
+        child = pop(stack, &mut top, seeker.limit).unwrap_or(Child::END);
     }
+}
+
+/// As [`walk::pop`](super::walk::pop): distances are not below zero here, so that their bits are in their order, and words
+/// are compared sooner than numbers.
+#[inline(always)]
+fn pop(stack: &[Entry], top: &mut usize, limit: f32) -> Option<u32> {
+    while *top > 0 {
+        *top -= 1;
+        let entry = stack[*top];
+        if entry.near.to_bits() <= limit.to_bits() {
+            return Some(entry.child);
+        }
+    }
+    None
+}
+
+/// As [`walk::nearest`](super::walk::nearest), by the bits of distances.
+#[inline(always)]
+fn nearest<S: Simd>(s: S, node: &Node, near: S::Lanes, mut met: u32, stack: &mut [Entry], top: &mut usize) -> u32 {
+    let lane = met.trailing_zeros() as usize % LANES;
+    met &= met - 1;
+    if met == 0 {
+        return node.children[lane];
+    }
+    let near = s.store(near).map(f32::to_bits);
+    let mut nearest = (near[lane], node.children[lane]);
+    let bottom = *top;
+    while met != 0 {
+        let lane = met.trailing_zeros() as usize % LANES;
+        let next = (near[lane], node.children[lane]);
+        met &= met - 1;
+        let farther = if next.0 < nearest.0 { std::mem::replace(&mut nearest, next) } else { next };
+        // Insertion: the farther ones lie deeper.
+        let mut at = *top;
+        while at > bottom && stack[at - 1].near.to_bits() < farther.0 {
+            stack[at] = stack[at - 1];
+            at -= 1;
+        }
+        stack[at] = Entry { near: f32::from_bits(farther.0), child: farther.1 };
+        *top += 1;
+    }
+    nearest.1
 }
 
 /// The same for a ray that any hit answers: how far it looks never changes, so that children need no distances, and to put
@@ -127,7 +169,7 @@ fn descend_any<B: BoxMargins, S: Simd, W: Wave>(
     stack: &mut [Entry],
 ) {
     let (slabs, limit) = (ray.slabs.spread(s), seeker.limit);
-    stack[0] = Entry { near: 0, child: Child::END };
+    stack[0] = Entry { near: 0.0, child: Child::END };
     let (mut child, mut top) = (0, 1);
     loop {
         while !Child::is_leaf(child) {
@@ -141,7 +183,7 @@ fn descend_any<B: BoxMargins, S: Simd, W: Wave>(
             let mut lane = met.trailing_zeros() as usize % LANES;
             met &= met - 1;
             while met != 0 {
-                stack[top] = Entry { near: 0, child: node.children[lane] };
+                stack[top] = Entry { near: 0.0, child: node.children[lane] };
                 top += 1;
                 lane = met.trailing_zeros() as usize % LANES;
                 met &= met - 1;

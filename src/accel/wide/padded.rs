@@ -5,10 +5,10 @@
 //! to the error of the hit's own distance, which `limit` allows for. Rays with numbers too large or too small for that
 //! ([`BOX_RANGE`]) go by `slabs`.
 //!
-//! Hits count from a distance of zero on, or a later one: a box that holds one is left after that, by more than the pad is
-//! wider than what rounding takes of it, 3 u (E + |o|) over |d|, which is above 2⁻⁹⁵. So what lies behind the start need not
-//! be told apart, and distances are compared by their bits, which takes a quarter of the time; what a step waits for is
-//! hardly more than that. A ray whose hits may lie behind its start goes by `slabs`.
+//! Hits count from a distance of zero on, or a later one, and a box that holds one is left later than that, if only by what
+//! [`PARALLEL`] adds to the pad: at the start nothing of it is used up, and over a direction's component it is more than any
+//! underflow, above 2⁻¹⁰³. So what lies behind the start need not be told apart, and distances are compared by their bits,
+//! in a quarter of the time that numbers take. A ray whose hits may lie behind its start goes by `slabs`.
 
 use bytemuck::{Pod, Zeroable};
 

@@ -5,7 +5,7 @@
 use super::node::{Block, Child, Tree};
 use super::padded::PaddedSlabs;
 use super::slabs::{BoxMargins, Derived};
-use super::walk::{Entry, FromZero, Stack, nearest, pop};
+use super::walk::{Entry, Stack, nearest, pop};
 use super::{Culling, Wide};
 use crate::accel::Probe;
 use crate::accel::instances::Place;
@@ -112,9 +112,9 @@ impl<G: Goal, P: Probe, V: Fn(u32) -> Visit> Kernel for Descent<'_, '_, G, P, V>
             probe.volume_tests(LANES);
             let (near, met) = slabs.meets(s, &tree.nodes[node as usize], limit);
             let mut child = if met != 0 {
-                nearest::<FromZero, _>(s, &tree.nodes[node as usize].children, near, met, stack, &mut top)
+                nearest(s, &tree.nodes[node as usize], near, met, stack, &mut top)
             } else {
-                pop::<FromZero>(stack, &mut top, limit).unwrap_or(Child::END)
+                pop(stack, &mut top, limit).unwrap_or(Child::END)
             };
             while Child::is_leaf(child) {
                 let Some(block) = tree.blocks.get(Child::block(child).0 as usize) else { return false };
@@ -125,7 +125,7 @@ impl<G: Goal, P: Probe, V: Fn(u32) -> Visit> Kernel for Descent<'_, '_, G, P, V>
                     return true;
                 }
                 limit = Derived::widened(query.reach());
-                child = pop::<FromZero>(stack, &mut top, limit).unwrap_or(Child::END);
+                child = pop(stack, &mut top, limit).unwrap_or(Child::END);
             }
             node = child;
         }

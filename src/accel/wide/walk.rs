@@ -3,7 +3,7 @@
 use std::marker::PhantomData;
 
 use super::flight::Slots;
-use super::node::{Child, Tree};
+use super::node::{Child, Node, Tree};
 use super::packet::Branch;
 use super::slabs::{BoxMargins, Slabs};
 use crate::accel::query::{Goal, Query};
@@ -13,41 +13,11 @@ use crate::math::Vec3;
 use crate::math::simd::{Kernel, LANES, Portable, Simd};
 use crate::math::triangles::{RayLanes, reach};
 
-/// A child still to be visited.
+/// A child still to be visited, and the distance at which the ray enters its box.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Entry {
-    /// The [`Rank`] of the distance at which the ray enters its box.
-    pub near: u32,
+    pub near: f32,
     pub child: u32,
-}
-
-/// Words in the order of distances, which are compared sooner than these.
-pub(super) trait Rank {
-    /// That of a distance, which is not NaN.
-    fn of(distance: f32) -> u32;
-}
-
-/// Of distances from zero on, not −0: their bits.
-pub(super) struct FromZero;
-
-impl Rank for FromZero {
-    #[inline(always)]
-    fn of(distance: f32) -> u32 {
-        distance.to_bits()
-    }
-}
-
-/// Of all distances: what is negative comes before, the largest first.
-pub(super) struct Anywhere;
-
-impl Rank for Anywhere {
-    #[inline(always)]
-    fn of(distance: f32) -> u32 {
-        // Zero has one rank.
-        let bits = (distance + 0.0).to_bits();
-        let negative = (bits.cast_signed() >> 31).cast_unsigned();
-        bits ^ (negative | 1 << 31)
-    }
 }
 
 /// Children still to be visited, the nearest last. As long as the tree is deep can make it.
@@ -214,9 +184,9 @@ fn descend<B: BoxMargins, S: Simd, G: Goal, P: Probe>(
         probe.step();
         probe.volume_tests(LANES);
         let mut child = if met != 0 {
-            nearest::<Anywhere, _>(s, &node.children, near, met, stack, &mut top)
+            nearest(s, node, near, met, stack, &mut top)
         } else {
-            match pop::<Anywhere>(stack, &mut top, limit) {
+            match pop(stack, &mut top, limit) {
                 Some(child) => child,
                 None => return,
             }
@@ -233,7 +203,7 @@ fn descend<B: BoxMargins, S: Simd, G: Goal, P: Probe>(
                 return;
             }
             limit = B::widened(query.reach());
-            match pop::<Anywhere>(stack, &mut top, limit) {
+            match pop(stack, &mut top, limit) {
                 Some(next) => child = next,
                 None => return,
             }
@@ -245,11 +215,11 @@ fn descend<B: BoxMargins, S: Simd, G: Goal, P: Probe>(
 
 /// The next child that may hold a hit up to `limit`.
 #[inline(always)]
-pub(super) fn pop<R: Rank>(stack: &[Entry], top: &mut usize, limit: f32) -> Option<u32> {
+pub(super) fn pop(stack: &[Entry], top: &mut usize, limit: f32) -> Option<u32> {
     while *top > 0 {
         *top -= 1;
         let entry = stack[*top];
-        if entry.near <= R::of(limit) {
+        if entry.near <= limit {
             return Some(entry.child);
         }
     }
@@ -292,9 +262,9 @@ fn test_all<G: Goal, P: Probe>(query: &mut Query<G>, probe: &mut P) {
 
 /// Puts the children that are met, one at least, on the stack, but for the nearest, which is returned.
 #[inline(always)]
-pub(super) fn nearest<R: Rank, S: Simd>(
+pub(super) fn nearest<S: Simd>(
     s: S,
-    children: &[u32; LANES],
+    node: &Node,
     near: S::Lanes,
     mut met: u32,
     stack: &mut [Entry],
@@ -303,10 +273,10 @@ pub(super) fn nearest<R: Rank, S: Simd>(
     let lane = met.trailing_zeros() as usize % LANES;
     met &= met - 1;
     if met == 0 {
-        return children[lane];
+        return node.children[lane];
     }
-    let near = s.store(near).map(R::of);
-    let entry = |lane: usize| Entry { near: near[lane], child: children[lane] };
+    let near = s.store(near);
+    let entry = |lane: usize| Entry { near: near[lane], child: node.children[lane] };
     let mut nearest = entry(lane);
     let bottom = *top;
     while met != 0 {
@@ -323,20 +293,4 @@ pub(super) fn nearest<R: Rank, S: Simd>(
         *top += 1;
     }
     nearest.child
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ranks_are_in_the_order_of_distances() {
-        let tiny = f32::from_bits(1);
-        let distances = [f32::NEG_INFINITY, -2.5, -1.0, -tiny, 0.0, tiny, 1.0, 2.5, f32::MAX, f32::INFINITY];
-        for (a, b) in distances.into_iter().flat_map(|a| distances.map(|b| (a, b))) {
-            assert_eq!(a < b, Anywhere::of(a) < Anywhere::of(b), "{a} {b}");
-            assert!(a.min(b) < 0.0 || (a < b) == (FromZero::of(a) < FromZero::of(b)), "{a} {b}");
-        }
-        assert_eq!(Anywhere::of(-0.0), Anywhere::of(0.0));
-    }
 }
