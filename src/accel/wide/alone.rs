@@ -114,48 +114,6 @@ fn descend<B: BoxMargins, S: Simd, W: Wave>(
     }
 }
 
-/// As [`walk::pop`](super::walk::pop): distances are not below zero here, so that their bits are in their order, and words
-/// are compared sooner than numbers.
-#[inline(always)]
-fn pop(stack: &[Entry], top: &mut usize, limit: f32) -> Option<u32> {
-    while *top > 0 {
-        *top -= 1;
-        let entry = stack[*top];
-        if entry.near.to_bits() <= limit.to_bits() {
-            return Some(entry.child);
-        }
-    }
-    None
-}
-
-/// As [`walk::nearest`](super::walk::nearest), by the bits of distances.
-#[inline(always)]
-fn nearest<S: Simd>(s: S, node: &Node, near: S::Lanes, mut met: u32, stack: &mut [Entry], top: &mut usize) -> u32 {
-    let lane = met.trailing_zeros() as usize % LANES;
-    met &= met - 1;
-    if met == 0 {
-        return node.children[lane];
-    }
-    let near = s.store(near).map(f32::to_bits);
-    let mut nearest = (near[lane], node.children[lane]);
-    let bottom = *top;
-    while met != 0 {
-        let lane = met.trailing_zeros() as usize % LANES;
-        let next = (near[lane], node.children[lane]);
-        met &= met - 1;
-        let farther = if next.0 < nearest.0 { std::mem::replace(&mut nearest, next) } else { next };
-        // Insertion: the farther ones lie deeper.
-        let mut at = *top;
-        while at > bottom && stack[at - 1].near.to_bits() < farther.0 {
-            stack[at] = stack[at - 1];
-            at -= 1;
-        }
-        stack[at] = Entry { near: f32::from_bits(farther.0), child: farther.1 };
-        *top += 1;
-    }
-    nearest.1
-}
-
 /// The same for a ray that any hit answers: how far it looks never changes, so that children need no distances, and to put
 /// them in order takes longer than it saves.
 #[inline(always)]
@@ -196,4 +154,46 @@ fn descend_any<B: BoxMargins, S: Simd, W: Wave>(
         top -= 1;
         child = stack[top].child;
     }
+}
+
+/// As [`walk::pop`](super::walk::pop): distances are not below zero here, so that their bits are in their order, and words
+/// are compared sooner than numbers.
+#[inline(always)]
+fn pop(stack: &[Entry], top: &mut usize, limit: f32) -> Option<u32> {
+    while *top > 0 {
+        *top -= 1;
+        let entry = stack[*top];
+        if entry.near.to_bits() <= limit.to_bits() {
+            return Some(entry.child);
+        }
+    }
+    None
+}
+
+/// As [`walk::nearest`](super::walk::nearest), by the bits of distances.
+#[inline(always)]
+fn nearest<S: Simd>(s: S, node: &Node, near: S::Lanes, mut met: u32, stack: &mut [Entry], top: &mut usize) -> u32 {
+    let lane = met.trailing_zeros() as usize % LANES;
+    met &= met - 1;
+    if met == 0 {
+        return node.children[lane];
+    }
+    let near = s.store(near).map(f32::to_bits);
+    let mut nearest = (near[lane], node.children[lane]);
+    let bottom = *top;
+    while met != 0 {
+        let lane = met.trailing_zeros() as usize % LANES;
+        let next = (near[lane], node.children[lane]);
+        met &= met - 1;
+        let farther = if next.0 < nearest.0 { std::mem::replace(&mut nearest, next) } else { next };
+        // Insertion: the farther ones lie deeper.
+        let mut at = *top;
+        while at > bottom && stack[at - 1].near.to_bits() < farther.0 {
+            stack[at] = stack[at - 1];
+            at -= 1;
+        }
+        stack[at] = Entry { near: f32::from_bits(farther.0), child: farther.1 };
+        *top += 1;
+    }
+    nearest.1
 }
