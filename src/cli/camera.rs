@@ -111,11 +111,20 @@ pub(super) fn framing(
     bounds: &Bounds,
 ) -> Option<(Direction, FrameLens)> {
     let direction = match choice {
-        Choice::Default if scene.hints.camera.is_none() => framing::default_direction(scene, bounds),
         Choice::Named(view) => view.direction(scene.up),
+        _ if is_framed(choice, scene) => framing::default_direction(scene, bounds),
         _ => return None,
     };
     Some((direction, framing_lens(lens)))
+}
+
+/// Whether all of the model is brought into the picture.
+pub(super) fn is_framed(choice: &Choice, scene: &Scene) -> bool {
+    match choice {
+        Choice::Default => scene.hints.camera.is_none(),
+        Choice::Named(_) => true,
+        Choice::Camera(_) | Choice::Free { .. } => false,
+    }
 }
 
 /// What is known of a picture's camera before the scene is looked at.

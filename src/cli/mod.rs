@@ -40,6 +40,7 @@ mod summary;
 mod surroundings;
 mod text;
 mod trace;
+mod unseen;
 mod verify;
 mod version;
 mod writable;

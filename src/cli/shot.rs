@@ -12,7 +12,7 @@ use super::render::SoFar;
 use super::sequence::{self, Survey};
 use super::stats::{self, Counted, PictureStats, Times};
 use super::summary::Summary;
-use super::{again, cost_layers, dry_run, interrupt, print, surroundings};
+use super::{again, cost_layers, dry_run, interrupt, print, surroundings, unseen};
 use crate::accel::AnyAccel;
 use crate::accel::auto::Reason;
 use crate::image::FileKind;
@@ -160,7 +160,8 @@ pub(super) fn render(task: &Task, shot: &Shot, stage: &mut Stage, so_far: &mut S
         stage.meter(task, &Shot { step: first, ..shot.clone() })?;
     }
 
-    let Stage { loaded, world, bounds, profile, built, metered, .. } = stage;
+    let Stage { loaded, world, bounds, profile, survey, built, metered, .. } = stage;
+    let is_frame = survey.is_some();
     let (accel, reason) = &*built.get_or_insert_with(|| structure(job, world));
     Ok(surroundings::lit(&job.look, loaded, &camera, |loaded, light| {
         let (scene, textures) = (&loaded.scene, textures(job, &loaded.scene));
@@ -174,7 +175,7 @@ pub(super) fn render(task: &Task, shot: &Shot, stage: &mut Stage, so_far: &mut S
         effective.written_as(&job.look, shot.kind);
         let work = Job { settings: &effective.settings, scene, world, accel, textures: &textures, view: &view };
         let (effective, reason, phrase) = (&effective, *reason, phrase.as_str());
-        let prepared = Prepared { task, shot, effective, loaded, bounds, work, reason, phrase, light };
+        let prepared = Prepared { task, shot, effective, loaded, bounds, work, reason, phrase, light, is_frame };
         if job.dry_run { prepared.foretell(so_far) } else { prepared.draw(times, profile, so_far) }
     }))
 }
@@ -192,6 +193,8 @@ struct Prepared<'a> {
     /// What view it is, in words.
     phrase: &'a str,
     light: DefaultLight,
+    /// Whether it is one of several, of which some may show nothing.
+    is_frame: bool,
 }
 
 impl Prepared<'_> {
@@ -248,6 +251,10 @@ impl Prepared<'_> {
             Ok(()) => {}
             Err(picture::WriteError::BrokenPipe) => return Exit::Done,
             Err(picture::WriteError::Fault(fault)) => return self.task.fail(&fault, Exit::Failed),
+        }
+        if !self.is_frame && !work.world.is_empty() {
+            let warning = unseen::warning(work, &shot.choice, self.task.file());
+            warning.iter().for_each(|warning| messages.say(Severity::Warning, warning));
         }
         let summary = Summary { shot, effective, loaded, bounds: self.bounds, view: self.phrase, light: self.light };
         summary.say(&rendered, &times, messages);

@@ -2,9 +2,11 @@
 
 use super::view::{Lens, PrimaryRay, View};
 use super::wave::{Media, Path};
+use super::world::World;
 use crate::accel::{Hit, NO_PRIM, Pencil, Ray};
 use crate::math::simd::{Kernel, LANES, Level, Simd};
 use crate::math::{DVec3, Vec3};
+use crate::scene::Scene;
 
 /// Rays that are set up at a time.
 const RUN: usize = 64;
@@ -172,6 +174,14 @@ struct SeenBall {
 }
 
 impl Ball {
+    /// Around all that is bounded; unbounded planes may lie anywhere before it, so that nothing can be skipped.
+    pub(super) fn around(scene: &Scene, world: &World) -> Self {
+        let (lo, hi) = world.bounds;
+        let radius = 0.5 * (hi - lo).length();
+        let usable = scene.planes.is_empty() && radius.is_finite();
+        Self { center: lo * 0.5 + hi * 0.5, radius: if usable { radius } else { f64::INFINITY } }
+    }
+
     #[inline(always)]
     fn seen_from(&self, origin: DVec3) -> SeenBall {
         let (to_center, radius) = (self.center - origin, self.radius);

@@ -61,7 +61,7 @@ impl<'a> Frame<'a> {
             Sampling::Stochastic(how) => certainty::factor(how.confidence),
             Sampling::Uniform | Sampling::Adaptive(_) => 0.0,
         };
-        let (scene, inside) = (Ball::new(context), media_around(context, accel, view));
+        let (scene, inside) = (Ball::around(context.scene, context.world), media_around(context, accel, view));
         let has_veil = background.is_some() && context.lets_background_through;
         Self { view, settings, offsets, sample_width, scene, inside, background, has_veil, standard_errors }
     }

@@ -17,6 +17,7 @@ mod branch;
 mod certainty;
 mod context;
 mod costs;
+mod coverage;
 mod curve;
 mod draws;
 pub mod everything;
@@ -56,6 +57,7 @@ mod whitted;
 pub mod world;
 
 pub use costs::{Cost, Costs, UnknownCost, render_costs};
+pub use coverage::{Coverage, coverage};
 pub use eyes::ThinLens;
 pub use forecast::{Forecast, Interval, forecast};
 pub use keeping::{Instancing, UnknownInstancing};

@@ -5,7 +5,6 @@
 //! depend on who does it.
 
 use super::context::Context;
-use super::eyes::Ball;
 use super::frame::{Frame, resolve_each, veil_each};
 use super::layers::{self, Facts, LayerPixel};
 use super::observer::Observer;
@@ -498,16 +497,6 @@ impl Frame<'_> {
             each(tracer);
         }
         Some(())
-    }
-}
-
-impl Ball {
-    /// Around the scene's box; unbounded planes may lie anywhere before it, so that nothing can be skipped.
-    pub(super) fn new(context: &Context) -> Self {
-        let (lo, hi) = context.world.bounds;
-        let radius = 0.5 * (hi - lo).length();
-        let usable = context.scene.planes.is_empty() && radius.is_finite();
-        Self { center: lo * 0.5 + hi * 0.5, radius: if usable { radius } else { f64::INFINITY } }
     }
 }
 

@@ -72,3 +72,17 @@ fn words_that_are_not_understood_are_told_in_the_form_that_is_asked_for() {
     folder.run(&["render", "cube.obj", "--sampels", "4"]).ends(2).says(&["error: unexpected argument"]);
     assert!(folder.run(&["render", "--help", "--messages", "json"]).ends(0).text().contains("Usage:"));
 }
+
+#[test]
+fn pictures_that_show_next_to_nothing_are_written_with_a_warning() {
+    let away = ["cube.obj", "--eye", "0,0,9", "--at", "0,0,99", "-o", "away.png"];
+    Folder::with_cube().render(&away).ends(0).says(&["warning: cube.obj: none of 4096 rays", "--at"]);
+    // Neither of two halves of the model can be called stray.
+    let apart = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 100000 0 0\nv 100001 0 0\nv 100000 1 0\nf 1 2 3\nf 4 5 6\n";
+    let folder = Folder::new().file("apart.obj", apart);
+    folder.render(&["apart.obj"]).ends(0).says(&["warning: apart.obj: none of 4096 rays", "far from each other"]);
+    let usual = Folder::with_cube().render(&["cube.obj"]).ends(0);
+    assert!(!usual.stderr.contains("warning"), "{}", usual.stderr);
+    let frames = ["cube.obj", "--turntable", "2", "--quiet"];
+    assert_eq!(Folder::with_cube().render(&frames).ends(0).stderr, "");
+}
