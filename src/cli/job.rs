@@ -200,12 +200,17 @@ impl RenderJob {
     }
 }
 
-/// What the structure and the test can do of what was asked.
-fn instances(args: &RenderArgs) -> Result<Instancing, Wrong> {
-    let able = match args.accel {
+/// Whether what is chosen can keep instances.
+pub(super) fn keeps_instances(choice: AccelChoice) -> bool {
+    match choice {
         AccelChoice::Auto => true,
         AccelChoice::Kind(kind) => kind.keeps_instances(),
-    };
+    }
+}
+
+/// What the structure and the test can do of what was asked.
+fn instances(args: &RenderArgs) -> Result<Instancing, Wrong> {
+    let able = keeps_instances(args.accel);
     let exact = args.intersector == IntersectorKind::Exact;
     match args.instances {
         Instancing::Keep if !able => wrong(format!(
@@ -309,6 +314,11 @@ fn check_kinds(args: &RenderArgs, batches: &[Batch]) -> Result<(), Wrong> {
     }
     if args.bits == Some(16) && !all(FileKind::Png) {
         return wrong("--bits 16 belongs to PNG; an EXR stores floats, the other types 8 bits");
+    }
+    // A picture that is repeated carries both, whatever it is.
+    let for_display = args.again.is_none() && (args.tone_map.is_some() || args.exposure.is_some());
+    if for_display && all(FileKind::Exr) {
+        return wrong("--tone-map and --exposure make colours for a display; an EXR keeps the light as it is");
     }
     Ok(())
 }
@@ -478,6 +488,16 @@ mod tests {
         assert!(RenderJob::new(&args).is_err());
         args.again = Some("a.png".into());
         assert!(RenderJob::new(&args).is_ok());
+    }
+
+    #[test]
+    fn what_makes_colours_for_a_display_is_refused_where_all_pictures_keep_the_light() {
+        for flag in ["--exposure 1", "--tone-map aces"] {
+            let Wrong(text) = job(&format!("a.glb -o a.exr {flag}")).unwrap_err();
+            assert!(text.contains("EXR keeps the light"), "{flag}: {text}");
+            assert!(job(&format!("a.glb -o a.png {flag}")).is_ok());
+        }
+        assert!(job("a.glb -o a.exr").is_ok());
     }
 
     #[test]
