@@ -136,23 +136,22 @@ pub fn build_with<'a>(
     if kept.is_empty() {
         return build(choice, shapes, params);
     }
-    let reason = match choice {
-        AccelChoice::Kind(_) => None,
+    let (kind, reason) = match choice {
+        AccelChoice::Kind(kind) => (kind, None),
         AccelChoice::Auto => {
-            let all = std::iter::once(shapes).chain(kept.objects().iter().map(Object::shapes));
-            all.max_by_key(|shapes| shapes.bounded()).map(|shapes| reason(shapes, params))
+            let reason = reason(shapes, kept, params);
+            (reason.kind, Some(reason))
         }
-    };
-    let kind = match (choice, reason) {
-        (AccelChoice::Kind(kind), _) => kind,
-        (AccelChoice::Auto, reason) => reason.map_or(AccelKind::DEFAULT, |reason| reason.kind),
     };
     (AnyAccel::build_with(kind, shapes, kept, params), reason)
 }
 
-/// What [`build`] would choose, and why; nothing of the whole scene is built where it is large.
-pub fn reason(shapes: &Shapes, params: &AccelParams) -> Reason {
-    judge(shapes, params).1
+/// What [`build_with`] would choose, and why, by the largest of what it builds trees over; nothing of it is built whole
+/// where it is large.
+pub fn reason(shapes: &Shapes, kept: &Kept, params: &AccelParams) -> Reason {
+    let objects = kept.objects().iter().map(Object::shapes);
+    let largest = objects.fold(shapes, |a, b| if b.bounded() >= a.bounded() { b } else { a });
+    judge(largest, params).1
 }
 
 /// Judges a scene by a part of it, or by all of it where that is no more; then what was chosen is built already.

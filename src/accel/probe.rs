@@ -74,6 +74,12 @@ pub enum Place {
     Block(u32),
     /// A leaf of other prims.
     Run(u32),
+    /// A node of the hierarchy over the places where kept objects stand.
+    Places(u32),
+    /// A node of the tree of a kept object: the first prim of the object where it stands, and the node.
+    PlacedNode(u32, u32),
+    /// A block of triangles of a kept object, likewise.
+    PlacedBlock(u32, u32),
     /// The volume around an object.
     Object(u32),
 }

@@ -130,11 +130,6 @@ impl Shapes {
         faces.chain((triangles + polygons..self.bounded()).map(single)).collect()
     }
 
-    /// Whether a ray that starts on prim `prim` cannot meet it again.
-    pub fn is_flat(&self, prim: u32) -> bool {
-        !matches!(self.prim(prim), Prim::Sphere(_) | Prim::Cone(_))
-    }
-
     /// What prim `prim` is.
     #[inline]
     pub fn prim(&self, prim: u32) -> Prim<'_> {

@@ -8,7 +8,8 @@ use super::rays::{Batch, Class, RaySet};
 use super::replay::{Answer, answers, counted, seconds};
 use super::row::{ClassRow, Row};
 use super::sweep::{Setting, Sweep};
-use crate::accel::{Accel, AccelKind, AccelParams, AnyAccel, Shapes};
+use crate::accel::{Accel, AccelChoice, AccelKind, AccelParams, AnyAccel};
+use crate::render::World;
 use crate::threads;
 
 /// How to compare.
@@ -44,8 +45,8 @@ impl Plan {
     pub const FEWEST: usize = 16;
 
     /// Rays that a slow structure gets of a class.
-    fn affordable(&self, shapes: &Shapes) -> usize {
-        self.within_slow_tests(shapes.len()).max(Self::FEWEST)
+    fn affordable(&self, prims: usize) -> usize {
+        self.within_slow_tests(prims).max(Self::FEWEST)
     }
 
     /// Whether a structure stays within what slow ones may take, with so many prims and the fewest rays.
@@ -92,12 +93,13 @@ pub type GoOn<'a> = dyn FnMut(&[Row], &str) -> bool + 'a;
 
 /// Compares. `go_on` hears of every step, with the rows as far as they are; `None` when it says to stop.
 ///
-/// The reference is the first structure that is not slow, or the first of all; the others must agree with it.
-pub fn compare(shapes: &Shapes, sets: &[RaySet], pixels: usize, plan: &Plan, go_on: &mut GoOn) -> Option<Vec<Row>> {
+/// The reference is the first structure that is not slow, or the first of all; the others must agree with it. Where the world
+/// keeps instances all of them must be such that can ([`AccelKind::keeps_instances`]).
+pub fn compare(world: &World, sets: &[RaySet], pixels: usize, plan: &Plan, go_on: &mut GoOn) -> Option<Vec<Row>> {
     let pool = threads::pool(plan.threads).ok()?;
-    let build = |c: &Candidate| pool.install(|| timed(|| AnyAccel::build(c.kind, shapes, &c.params)));
+    let build = |c: &Candidate| pool.install(|| timed(|| world.structure(AccelChoice::Kind(c.kind), &c.params).0));
     let candidates = plan.candidates();
-    let (whole, sampled) = tasks(shapes, sets, plan, &candidates, |candidate| build(candidate).0);
+    let (whole, sampled) = tasks(world.len(), sets, plan, &candidates, |candidate| build(candidate).0);
 
     // Each structure once, so that a row is there as soon as possible; then all in turn.
     let mut rows: Vec<Row> = Vec::new();
@@ -144,13 +146,13 @@ pub fn compare(shapes: &Shapes, sets: &[RaySet], pixels: usize, plan: &Plan, go_
 
 /// The rays for structures that get all of them, and for slow ones.
 fn tasks<'s>(
-    shapes: &'s Shapes,
+    prims: usize,
     sets: &[RaySet],
     plan: &Plan,
     candidates: &[Candidate],
     build: impl Fn(&Candidate) -> AnyAccel<'s>,
 ) -> (Vec<Task>, Vec<Task>) {
-    let slow = |set: &RaySet| set.sample(plan.affordable(shapes), plan.seed).0;
+    let slow = |set: &RaySet| set.sample(plan.affordable(prims), plan.seed).0;
     let Some(first) = candidates.iter().find(|c| !c.kind.is_slow()).or(candidates.first()) else {
         return Default::default();
     };

@@ -1,9 +1,9 @@
 //! The rays that structures are compared on: those of a real picture, and one diffuse bounce behind it.
 
-use crate::accel::{Accel, Hit, NO_PRIM, NoProbe, Ray, Shapes};
+use crate::accel::{Accel, Hit, NO_PRIM, NoProbe, Ray};
 use crate::math::Vec3;
 use crate::math::random::Random;
-use crate::render::{Asked, CLASS_NAMES, Job, Question, Tape, render_recorded};
+use crate::render::{Asked, CLASS_NAMES, Job, Question, Tape, World, render_recorded};
 use std::f32::consts::TAU;
 
 /// What sent a ray.
@@ -130,19 +130,18 @@ fn set(class: Class, tape: &Tape) -> RaySet {
 
 /// One ray from each hit of an eye ray, on the side it was seen from.
 fn diffuse(job: &Job, eye: &[Asked], seed: u64) -> Batch {
-    let shapes = &job.world.shapes;
     let eye: Vec<Ray> = eye.iter().map(|a| a.ray).collect();
     let mut hits = vec![Hit::MISS; eye.len()];
     job.accel.closest(&eye, &mut hits, &mut job.accel.scratch(), &mut NoProbe);
     let mut random = Random::new(seed);
     let found = eye.iter().zip(&hits).filter(|(_, hit)| hit.is_some());
-    let rays = found.filter_map(|(ray, hit)| bounce(shapes, ray, hit, &mut random)).collect();
+    let rays = found.filter_map(|(ray, hit)| bounce(job.world, ray, hit, &mut random)).collect();
     Batch { question: Question::Closest, rays, after: Vec::new() }
 }
 
 /// A ray drawn by the cosine law; `None` where a face has no normal.
-fn bounce(shapes: &Shapes, ray: &Ray, hit: &Hit, random: &mut Random) -> Option<Ray> {
-    let refined = shapes.refine(ray, hit);
+fn bounce(world: &World, ray: &Ray, hit: &Hit, random: &mut Random) -> Option<Ray> {
+    let refined = world.refine(ray, hit);
     let normal = if refined.normal.dot(ray.dir) > 0.0 { -refined.normal } else { refined.normal };
     if normal == Vec3::ZERO {
         return None;
@@ -153,7 +152,7 @@ fn bounce(shapes: &Shapes, ray: &Ray, hit: &Hit, random: &mut Random) -> Option<
     let (tangent, bitangent) = normal.any_orthonormal_pair();
     let aside = tangent * (radius * libm::cosf(turn)) + bitangent * (radius * libm::sinf(turn));
     let dir = aside + normal * (1.0 - square).max(f32::EPSILON).sqrt();
-    let exclude = if shapes.is_flat(hit.prim) { hit.prim } else { NO_PRIM };
+    let exclude = if world.is_flat(hit.prim) { hit.prim } else { NO_PRIM };
     Some(Ray { origin: refined.origin(dir), t_min: 0.0, dir, t_max: f32::INFINITY, exclude, sample: ray.sample })
 }
 

@@ -7,7 +7,7 @@ use super::machine::Machine;
 use super::rays::{Class, RaySet, record};
 use super::report::{Format, Model, Rays, Report, text};
 use super::row::{Count, Row};
-use crate::accel::{Accel, AccelKind, AccelParams, AnyAccel, Hit, Probe, Ray, RayCounts, Unculled, auto};
+use crate::accel::{Accel, AccelKind, AccelParams, AnyAccel, Hit, Probe, Ray, RayCounts, Unculled};
 use crate::load::{LoadOptions, load_bytes};
 use crate::render::texture::TextureStore;
 use crate::render::{ClassCounts, Job, Question, Settings, View, World, render_counted};
@@ -63,7 +63,7 @@ impl Stage {
     }
 
     fn rows(&self, rays: &[RaySet], plan: &Plan) -> Vec<Row> {
-        compare(&self.world.shapes, rays, (SIZE.0 * SIZE.1) as usize, plan, &mut |_, _| true).unwrap()
+        compare(&self.world, rays, (SIZE.0 * SIZE.1) as usize, plan, &mut |_, _| true).unwrap()
     }
 
     /// The whole way.
@@ -74,7 +74,7 @@ impl Stage {
             hash: 7,
             prims: self.world.shapes.len(),
             objects: self.world.shapes.objects().len(),
-            auto: plan.sweep.is_none().then(|| auto::reason(&self.world.shapes, &plan.params)),
+            auto: plan.sweep.is_none().then(|| self.world.judged(&plan.params)),
             width: SIZE.0,
             height: SIZE.1,
             samples: 1,
@@ -212,7 +212,7 @@ fn work_ends_when_it_is_told_to() {
         heard = rows.len();
         rows.is_empty()
     };
-    assert_eq!(compare(&stage.world.shapes, &stage.rays(), 0, &plan(), &mut stop), None);
+    assert_eq!(compare(&stage.world, &stage.rays(), 0, &plan(), &mut stop), None);
     assert_eq!(heard, 1);
 }
 

@@ -7,7 +7,7 @@ use super::message::{Messages, Severity};
 use super::moment;
 use crate::load::{Diagnostic, Limits, LoadError, LoadOptions, Loaded, load, load_bytes};
 use crate::math::DAffine3;
-use crate::render::World;
+use crate::render::{Instancing, Placing, World};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::slice;
@@ -98,6 +98,24 @@ pub(super) fn check_stored(
     let text =
         format!("its {count} instances, stored by themselves, take {bytes} bytes or more where {limit} are allowed");
     Err(Diagnostic::new("instances-too-large", file, "", text).remedy(remedy))
+}
+
+/// Stores a scene as is wanted, or, where the instances that are then stored by themselves take more memory than is allowed,
+/// in the other way.
+pub(super) fn placed(
+    loaded: &Loaded,
+    (wanted, other): (Instancing, Instancing),
+    limit: u64,
+    file: &Path,
+    remedy: &str,
+) -> Result<World, Diagnostic> {
+    let as_wanted = Placing::new(&loaded.scene, wanted);
+    if as_wanted.bytes() <= limit {
+        return Ok(as_wanted.world());
+    }
+    let otherwise = Placing::new(&loaded.scene, other);
+    check_stored((loaded, otherwise.bytes()), limit, file, remedy)?;
+    Ok(otherwise.world())
 }
 
 /// Why a model with warnings is not rendered where they are errors.

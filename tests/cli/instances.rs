@@ -61,8 +61,47 @@ fn more_than_fits_is_refused_before_it_is_flattened() {
     let flat = [&["pots.glb", "--instances", "flatten"], &limit[..]].concat();
     folder.render(&flat).ends(1).says(&["11 instances", "2097152", "--instances auto", "--max-memory"]);
     folder.render(&[&["pots.glb", "--instances", "keep"], &limit[..]].concat()).ends(0);
-    for command in ["verify", "trace", "inspect"] {
-        let pixel: &[&str] = if command == "trace" { &["--pixel", "0,0"] } else { &[] };
-        folder.run(&[&[command, "pots.glb"], pixel, &limit].concat()).ends(1).says(&["--max-memory"]);
+    for command in ["verify", "explain", "inspect"] {
+        folder.run(&[&[command, "pots.glb"], &limit[..]].concat()).ends(1).says(&["--max-memory"]);
     }
+}
+
+#[test]
+fn what_is_too_large_to_be_flattened_is_traced_and_measured_as_it_is_kept() {
+    let folder = with_pots();
+    let trace = |more: &[&str]| {
+        let line = ["trace", "pots.glb", "--size", "64x48", "--pixel", "32,24", "--json"];
+        folder.run(&[&line, more].concat())
+    };
+    let told = |more: &[&str]| -> Value { serde_json::from_str(trace(more).ends(0).text()).unwrap() };
+    let (flat, kept) = (told(&[]), told(&["--max-memory", "2M"]));
+    assert_eq!((&flat["prims"], &flat["ray"]["hit"]), (&kept["prims"], &kept["ray"]["hit"]));
+    assert!(flat["ray"]["hit"]["prim"].is_u64(), "{flat}");
+    let visits = |told: &Value| -> Vec<Value> {
+        let steps = told["ray"]["steps"].as_array().unwrap();
+        steps.iter().filter(|step| step.get("visit").is_some()).cloned().collect()
+    };
+    let named = |told: &Value, name: &str| visits(told).iter().any(|visit| visit["visit"] == name);
+    for name in ["places", "placed node", "placed block"] {
+        assert!(named(&kept, name) && !named(&flat, name), "{name}: {kept}");
+    }
+    // The hit lies in a box that the ray was told to have been in.
+    let t = kept["ray"]["hit"]["t"].as_f64().unwrap();
+    let around = |visit: &Value| visit["t"][0].as_f64() <= Some(t) && Some(t) <= visit["t"][1].as_f64();
+    assert!(visits(&kept).iter().any(|visit| visit["visit"] == "placed block" && around(visit)), "{kept}");
+    trace(&["--max-memory", "2M", "--accel", "grid"]).ends(1).says(&["11 instances", "fast structure"]);
+
+    let line = ["bench", "pots.glb", "--size", "32x24", "--passes", "0", "--max-memory", "2M", "--report", "a.json"];
+    folder.run(&line).ends(0).says(&["kept once", "left out: ", "grid-octree"]);
+    let report: Value = serde_json::from_slice(&std::fs::read(folder.path("a.json")).unwrap()).unwrap();
+    let model = &report["models"][0];
+    assert_eq!((&model["prims"], &model["objects"]), (&kept["prims"], &11.into()));
+    let rows = model["structures"].as_array().unwrap();
+    let names: Vec<&Value> = rows.iter().map(|row| &row["accel"]).collect();
+    assert_eq!(names, ["fast-octree", "fast-bvh"]);
+    assert!(model["left_out"].as_array().is_some_and(|left_out| left_out.contains(&"bvh".into())), "{model}");
+    folder
+        .run(&[&line[..], &["--accel", "grid,bvh"]].concat())
+        .ends(1)
+        .says(&["grid, bvh", "fast-octree and fast-bvh"]);
 }

@@ -35,6 +35,8 @@ pub enum Below<'a> {
 pub struct Tree {
     nodes: Vec<Node>,
     prims: Vec<u32>,
+    /// Whether what it calls prims are places where objects stand.
+    of_places: bool,
 }
 
 /// Nodes still to be visited with the distances at which the ray enters them, the nearest last.
@@ -42,6 +44,11 @@ pub struct Tree {
 pub struct Stack(Vec<(f64, u32)>);
 
 impl Tree {
+    /// One that is to be over places where objects stand.
+    pub(in crate::accel) fn of_places() -> Self {
+        Self { of_places: true, ..Self::default() }
+    }
+
     /// Adds the tree over some prims, at least one; its root. The same for every number of threads.
     pub(in crate::accel) fn add(&mut self, items: &mut [Item], leaf_size: usize) -> u32 {
         let root = index(self.nodes.len());
@@ -106,6 +113,7 @@ impl Tree {
 
     fn visit(&self, node: u32) -> Visit {
         let (place, listed) = match self.below(node) {
+            _ if self.of_places => (Place::Places(node), None),
             Below::Leaf(prims) => (Place::Leaf(node), Some(index(prims.len()))),
             Below::Children(_) => (Place::Node(node), None),
         };

@@ -41,7 +41,7 @@ impl<'a> TwoLevel<'a> {
     pub fn build(shapes: &'a Shapes, kept: &'a Kept, splitting: Splitting) -> Self {
         let objects = kept.objects().par_iter().map(|o| Wide::build(o.shapes(), splitting)).collect();
         let mut items: Vec<Item> = (0..).zip(kept.placed()).map(|(i, p)| Item::new(p.place.bounds, i)).collect();
-        let mut places = PlaceTree::default();
+        let mut places = PlaceTree::of_places();
         if !items.is_empty() {
             places.add(&mut items, 1);
         }

@@ -9,7 +9,7 @@ use super::walk::{Entry, Stack, nearest, pop};
 use super::{Culling, Wide};
 use crate::accel::Probe;
 use crate::accel::instances::Place;
-use crate::accel::probe::{Extent, Visit};
+use crate::accel::probe::{Extent, Place as At, Visit};
 use crate::accel::query::{Goal, Query};
 use crate::math::bounds::{BOX_RANGE, PARALLEL, PLACED_DRIFT, PLACED_PAD};
 use crate::math::shear::RaySpace;
@@ -40,7 +40,12 @@ impl Wide<'_> {
                 Extent::Box(bounds) => Extent::Box(place.around(bounds)),
                 other => *other,
             };
-            Visit { extent, ..visit }
+            let at = match visit.place {
+                At::Block(block) => At::PlacedBlock(first, block),
+                At::Node(node) => At::PlacedNode(first, node),
+                other => other,
+            };
+            Visit { place: at, extent, ..visit }
         };
         self.level.run_narrow(Descent { tree, spot, slabs, query, stack, probe, visit })
     }

@@ -10,7 +10,7 @@ use super::job::{self, Wrong};
 use super::message::{Messages, Severity};
 use super::writable::{self, Sources};
 use super::{accident, interrupt, print};
-use crate::accel::{AccelKind, AccelParams, auto};
+use crate::accel::{AccelKind, AccelParams};
 use crate::bench::compare::{Plan, compare};
 use crate::bench::machine::Machine;
 use crate::bench::rays;
@@ -170,12 +170,16 @@ impl Bench<'_> {
             return Exit::Failed;
         }
         let name = subject.to_string();
-        let (plan, left_out) = match self.bearable(report, &prepared) {
+        let (plan, mut left_out) = match self.bearable(report, &prepared) {
             Ok(plan) => plan,
             Err(why) => {
                 self.messages.info("size-left-out", format!("{name} is left out: {why}"));
                 return Exit::Done;
             }
+        };
+        let plan = match self.able(plan, &prepared, &name, &mut left_out) {
+            Ok(plan) => plan,
+            Err(exit) => return exit,
         };
         self.messages.info("progress", format!("{name}: recording rays"));
         let Some((sets, depth)) = prepared.with_job(|job| rays::record(job, plan.rays, plan.seed)) else {
@@ -186,9 +190,9 @@ impl Bench<'_> {
         report.models.push(Model {
             name: name.clone(),
             hash: prepared.loaded.facts.hash,
-            prims: prepared.world.shapes.len(),
-            objects: prepared.world.shapes.objects().len(),
-            auto: plan.sweep.is_none().then(|| auto::reason(&prepared.world.shapes, &plan.params)),
+            prims: prepared.world.len(),
+            objects: prepared.world.objects(),
+            auto: plan.sweep.is_none().then(|| prepared.world.judged(&plan.params)),
             width: settings.width,
             height: settings.height,
             samples: settings.samples,
@@ -213,7 +217,7 @@ impl Bench<'_> {
         };
         // Maps of each value would be too many to look at.
         let pixels = if plan.sweep.is_some() { 0 } else { settings.width as usize * settings.height as usize };
-        let Some(rows) = compare(&prepared.world.shapes, &sets, pixels, &plan, &mut go_on) else {
+        let Some(rows) = compare(&prepared.world, &sets, pixels, &plan, &mut go_on) else {
             return if interrupt::raised() { Exit::Interrupted } else { self.no_threads(&name, plan.threads) };
         };
         if plan.passes > 0 && plan.sweep.is_none() && report.family.is_none() {
@@ -250,7 +254,7 @@ impl Bench<'_> {
         if report.family.is_none() {
             return Ok((plan, Vec::new()));
         }
-        let (prims, hash) = (prepared.world.shapes.len(), prepared.loaded.facts.hash);
+        let (prims, hash) = (prepared.world.len(), prepared.loaded.facts.hash);
         if let Some(same) = report.models.iter().find(|m| m.hash == hash) {
             return Err(format!("the nearest scene of its family is {}, with {prims} prims", same.name));
         }
@@ -260,6 +264,32 @@ impl Bench<'_> {
             return Err(format!("{prims} prims are too many for slow structures; raise --slow-tests"));
         }
         Ok((plan, left_out))
+    }
+
+    /// The same plan for those of its structures that can keep instances, where these are kept.
+    fn able(&self, plan: Plan, prepared: &Prepared, name: &str, left_out: &mut Vec<AccelKind>) -> Result<Plan, Exit> {
+        if prepared.world.kept.is_empty() {
+            return Ok(plan);
+        }
+        let (kinds, others): (Vec<AccelKind>, Vec<AccelKind>) =
+            plan.kinds.iter().partition(|kind| kind.keeps_instances());
+        let named = |kinds: &[AccelKind]| kinds.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(", ");
+        if kinds.is_empty() {
+            let remedy = "measure fast-octree and fast-bvh, which keep them once, or allow more with --max-memory";
+            let text = format!("{name}: its instances are too large for {}, stored by themselves", named(&others));
+            self.messages.error("instances-too-large", text, remedy);
+            return Err(Exit::Failed);
+        }
+        if !others.is_empty() {
+            let text = format!(
+                "{name}: what stands in several places is kept once, since it is too large to be stored in each; left out: {}, \
+                 which cannot",
+                named(&others)
+            );
+            self.messages.info("instances-kept", text);
+        }
+        left_out.extend(others);
+        Ok(Plan { kinds, ..plan })
     }
 
     fn keep(&self, report: &mut Report, rows: &[Row]) -> Exit {

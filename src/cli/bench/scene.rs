@@ -3,14 +3,14 @@
 use super::super::camera::{self, Choice};
 use super::super::exit::Exit;
 use super::super::message::{Messages, Severity};
-use super::super::{read, seen};
+use super::super::{job, read, seen};
 use super::args::BenchArgs;
-use crate::accel::{AccelKind, AccelParams, AnyAccel};
+use crate::accel::{AccelChoice, AccelKind, AccelParams};
 use crate::bench::pruning::Pruning;
 use crate::generate::Family;
 use crate::load::{Diagnostic, Loaded};
 use crate::render::texture::TextureStore;
-use crate::render::{Job, Settings, View, World};
+use crate::render::{Instancing, Job, Settings, View, World};
 use crate::scene::framing::robust_bounds;
 use crate::scene::{Scene, default_light};
 use std::fmt;
@@ -45,7 +45,7 @@ impl Subject {
     /// Its scene; what is wrong is said.
     fn load(&self, args: &BenchArgs, messages: &Messages) -> Result<Loaded, Exit> {
         match self {
-            Self::File(path) => read::one_model(path, &args.load, messages),
+            Self::File(path) => read::model_as_stored(path, &args.load, messages),
             Self::Generated(family, size) => {
                 let mut loaded = Loaded { scene: family.scene(*size), ..Loaded::default() };
                 loaded.facts.hash = hash(&loaded.scene);
@@ -82,8 +82,15 @@ impl Prepared {
     pub(super) fn new(subject: &Subject, args: &BenchArgs, messages: &Messages) -> Result<Self, Exit> {
         let mut loaded = subject.load(args, messages)?;
         let input = subject.path();
-        let world = World::new(&loaded.scene);
-        if world.shapes.is_empty() {
+        let limit = job::limits(args.load.max_memory).memory;
+        let remedy = "allow more with --max-memory";
+        // All structures can store each instance by itself, where there is room.
+        let ways = (Instancing::Flatten, Instancing::Keep);
+        let world = read::placed(&loaded, ways, limit, input, remedy).map_err(|fault| {
+            messages.say(Severity::Error, &fault);
+            Exit::Failed
+        })?;
+        if world.is_empty() {
             let fault = Diagnostic::new("nothing-to-draw", input, "", "nothing to hit: it holds no faces");
             messages.say(Severity::Error, &fault);
             return Err(Exit::Input);
@@ -125,7 +132,7 @@ impl Prepared {
         settings: &Settings,
         work: impl FnOnce(&Job) -> T,
     ) -> T {
-        let accel = AnyAccel::build(AccelKind::DEFAULT, &world.shapes, &AccelParams::DEFAULT);
+        let (accel, _) = world.structure(AccelChoice::Kind(AccelKind::DEFAULT), &AccelParams::DEFAULT);
         let scene = &self.loaded.scene;
         work(&Job { scene, world, accel: &accel, textures, view: &self.view, settings })
     }

@@ -24,7 +24,7 @@ pub(super) fn write(told: &Told) -> String {
         "samples": settings.samples,
         "depth": told.story.depth,
         "accel": told.accel.name(),
-        "prims": told.world.shapes.len(),
+        "prims": told.world.len(),
         "radiance": told.story.radiance.to_array(),
         "through": told.story.through.to_array(),
         "ray": query(told, 0),
@@ -113,6 +113,9 @@ fn visit(told: &Told, query: &Query, visit: &Visit) -> Value {
         Place::Leaf(i) => ("leaf", json!(i)),
         Place::Block(i) => ("block", json!(i)),
         Place::Run(i) => ("run", json!(i)),
+        Place::Places(i) => ("places", json!(i)),
+        Place::PlacedNode(first, i) => ("placed node", json!([first, i])),
+        Place::PlacedBlock(first, i) => ("placed block", json!([first, i])),
         Place::Object(i) => ("object", json!(i)),
     };
     let bounds = visit.extent.bounds();

@@ -31,12 +31,12 @@ use super::picture::{Effective, background};
 use super::sampling::SamplingArgs;
 use super::writable::{self, Sources};
 use super::{accident, interrupt, print, read};
-use crate::accel::{AccelKind, AccelParams, auto};
+use crate::accel::{AccelKind, AccelParams};
 use crate::image::{FileKind, Metadata};
 use crate::load::{Diagnostic, Loaded};
 use crate::render::story::{Story, tell};
 use crate::render::texture::TextureStore;
-use crate::render::{Job, Settings, View, World};
+use crate::render::{Instancing, Job, Settings, View, World};
 use crate::scene::default_light;
 use crate::scene::framing::robust_bounds;
 pub(super) use args::TraceArgs;
@@ -102,11 +102,11 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
     if let Some(path) = &args.output {
         writable::check(path, "-o", &Sources::of([file])).map_err(fail(Exit::Failed))?;
     }
-    let mut loaded = read::model(&args.model, messages)?;
+    let mut loaded = read::model_as_stored(&args.model.input, &args.model.load, messages)?;
     if let Some(path) = &args.output {
         Sources::of(&loaded.facts.files).spared_by(path, "-o").map_err(fail(Exit::Failed))?;
     }
-    let world = World::new(&loaded.scene);
+    let world = world(args, &loaded).map_err(fail(Exit::Failed))?;
     let wrong = |text: String| Diagnostic::new("scene-value", file, "", text);
     let effective = Effective::new(look, &loaded.scene.hints).map_err(wrong).map_err(fail(Exit::Input))?;
     let settings = &effective.settings;
@@ -122,7 +122,7 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
     let (camera, view_phrase) = found.map_err(fail(Exit::Input))?;
     default_light::add_if_missing(&mut loaded.scene, &camera);
     loaded.scene.background = Some(background(look, &loaded.scene));
-    let (accel, _) = auto::build(args.accel, &world.shapes, params);
+    let (accel, _) = world.structure(args.accel, params);
     let textures = TextureStore::new(&loaded.scene);
     let view = View::from_camera(&camera);
     let job = Job { scene: &loaded.scene, world: &world, accel: &accel, textures: &textures, view: &view, settings };
@@ -147,6 +147,18 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
         Some(path) => draw(path, &told, &job, messages).map_err(fail(Exit::Failed)),
         None => Ok(Exit::Done),
     }
+}
+
+/// Stores a model as a picture of it would.
+fn world(args: &TraceArgs, loaded: &Loaded) -> Result<World, Diagnostic> {
+    let (ways, remedy) = match job::keeps_instances(args.accel) {
+        true => ((Instancing::Auto, Instancing::Keep), "allow more with --max-memory"),
+        false => (
+            (Instancing::Flatten, Instancing::Flatten),
+            "leave it to a fast structure to keep them once, or allow more with --max-memory",
+        ),
+    };
+    read::placed(loaded, ways, job::limits(args.model.load.max_memory).memory, &args.model.input, remedy)
 }
 
 /// Whether there is such a pixel with such a sample.
@@ -186,7 +198,7 @@ impl Told<'_> {
             self.pixel.1,
             self.view,
             self.accel,
-            crate::bench::report::number::grouped(self.world.shapes.len() as u64)
+            crate::bench::report::number::grouped(self.world.len() as u64)
         )
     }
 

@@ -6,7 +6,7 @@
 use super::Told;
 use super::words::{in_world, inside};
 use crate::accel::probe::{Extent, Outcome, Visit};
-use crate::accel::{AccelKind, AccelParams, AnyAccel};
+use crate::accel::{AccelChoice, AccelKind, AccelParams};
 use crate::bench::report::number::grouped;
 use crate::image::draw::{Canvas, Color, text_height, text_width};
 use crate::math::{DVec2, DVec3};
@@ -38,16 +38,18 @@ const REFRACTED: Color = [204, 121, 167];
 pub(super) fn draw(told: &Told, job: &Job) -> Canvas {
     let Some(eye) = told.story.queries.first() else { return Canvas::filled(1, 1, PAPER) };
     // Whatever the ray went through: all structures give the same picture, and this one soon.
-    let accel = AnyAccel::build(AccelKind::DEFAULT, &told.world.shapes, &AccelParams::DEFAULT);
+    let (accel, _) = told.world.structure(AccelChoice::Kind(AccelKind::DEFAULT), &AccelParams::DEFAULT);
     let job = &Job { accel: &accel, ..*job };
     let stage = Stage::new(told, eye);
     let legend = stage.legend();
     let line = text_height(DOT) + 8;
     let rows = u32::try_from(legend.len().div_ceil(2)).unwrap_or(0);
-    let mut canvas = Canvas::filled(2 * SIDE + 3 * GAP, SIDE + 3 * GAP + (rows + 1) * line, PAPER);
+    let mut canvas = Canvas::filled(2 * SIDE + 3 * GAP, SIDE + 3 * GAP + (rows + 2) * line, PAPER);
     let (whole, near) = (stage.whole(), stage.near());
-    canvas.write(GAP, GAP, &stage.title(), DOT, INK);
-    let top = GAP + line;
+    let [which, what] = stage.title();
+    canvas.write(GAP, GAP, &which, DOT, INK);
+    canvas.write(GAP, GAP + line, &what, DOT, INK);
+    let top = GAP + 2 * line;
     canvas.paste(&stage.panel(job, whole, Some(near)), GAP, top);
     canvas.paste(&stage.panel(job, near, None), 2 * GAP + SIDE, top);
     for (i, (color, text)) in (0..).zip(&legend) {
@@ -297,18 +299,17 @@ impl<'a> Stage<'a> {
         }
     }
 
-    fn title(&self) -> String {
+    /// Which ray it is, and what came of it.
+    fn title(&self) -> [String; 2] {
         let (x, y) = self.told.pixel;
         let c = &self.eye.counts;
         let end =
             if self.eye.hit.is_some() { format!("hits prim {}", self.eye.hit.prim) } else { "hits nothing".into() };
-        format!(
-            "{}: eye ray of pixel {x},{y} visits {} nodes and cells, tests {} of {} prims, {end}",
-            self.told.accel,
-            grouped(c.n_ts),
-            grouped(c.n_it),
-            grouped(self.told.world.shapes.len() as u64)
-        )
+        let prims = grouped(self.told.world.len() as u64);
+        [
+            format!("{} over {prims} prims: the eye ray of pixel {x},{y}", self.told.accel),
+            format!("visits {} nodes and cells, tests {} prims, {end}", grouped(c.n_ts), grouped(c.n_it)),
+        ]
     }
 
     /// Colours and what they mean, of what there is.

@@ -112,6 +112,9 @@ fn visit(told: &Told, query: &Query, visit: &Visit) -> String {
         Place::Leaf(i) => format!("leaf {i}"),
         Place::Block(i) => format!("block {i}"),
         Place::Run(i) => format!("run {i}"),
+        Place::Places(i) => format!("node {i} over places"),
+        Place::PlacedNode(first, i) => format!("node {i} of the object from prim {first} on"),
+        Place::PlacedBlock(first, i) => format!("block {i} of the object from prim {first} on"),
         Place::Object(i) => match visit.extent {
             Extent::Ball { .. } => format!("sphere around object {i}"),
             Extent::Box(_) => format!("box around object {i}"),

@@ -102,6 +102,11 @@ impl World {
         auto::build_with(choice, &self.shapes, &self.kept, params)
     }
 
+    /// Which structure [`AccelChoice::Auto`] is, and why.
+    pub fn judged(&self, params: &AccelParams) -> Reason {
+        auto::reason(&self.shapes, &self.kept, params)
+    }
+
     /// Number of prims of all kinds, those of an object once for each place where it stands.
     pub fn len(&self) -> usize {
         self.shapes.len() + self.kept.shown() as usize
@@ -126,6 +131,16 @@ impl World {
     #[inline]
     pub fn prim(&self, prim: u32) -> Prim<'_> {
         self.kept.prim(&self.shapes, prim)
+    }
+
+    /// Whether a ray that starts on prim `prim` cannot meet it again.
+    pub fn is_flat(&self, prim: u32) -> bool {
+        !matches!(self.prim(prim), Prim::Sphere(_) | Prim::Cone(_))
+    }
+
+    /// Number of objects with bounded prims: those of faces, each where it stands, then each sphere and cone.
+    pub fn objects(&self) -> usize {
+        self.shapes.objects().len() + self.kept.placed().len()
     }
 
     /// The corners of triangle `prim`, in the centred frame.
