@@ -37,13 +37,9 @@ pub(super) fn left(limits: &Limits, loaded: &Loaded) -> Limits {
 
 /// Loads one model and says what there is to warn of; a failure is said too.
 pub(super) fn model(args: &ModelArgs, messages: &Messages) -> Result<Loaded, Exit> {
-    one_model(&args.input, &args.load, messages)
-}
-
-/// The same for a command that takes several.
-pub(super) fn one_model(input: &PathBuf, args: &LoadArgs, messages: &Messages) -> Result<Loaded, Exit> {
-    let loaded = model_as_stored(input, args, messages)?;
-    check_flattened(&loaded, job::limits(args.max_memory).memory, input).map_err(|fault| {
+    let ModelArgs { input, load } = args;
+    let loaded = model_as_stored(input, load, messages)?;
+    check_flattened(&loaded, job::limits(load.max_memory).memory, input).map_err(|fault| {
         messages.say(Severity::Error, &fault);
         Exit::Failed
     })?;

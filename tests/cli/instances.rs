@@ -61,7 +61,7 @@ fn more_than_fits_is_refused_before_it_is_flattened() {
     let flat = [&["pots.glb", "--instances", "flatten"], &limit[..]].concat();
     folder.render(&flat).ends(1).says(&["11 instances", "2097152", "--instances auto", "--max-memory"]);
     folder.render(&[&["pots.glb", "--instances", "keep"], &limit[..]].concat()).ends(0);
-    for command in ["verify", "explain", "inspect"] {
+    for command in ["explain", "inspect"] {
         folder.run(&[&[command, "pots.glb"], &limit[..]].concat()).ends(1).says(&["--max-memory"]);
     }
 }
@@ -104,4 +104,17 @@ fn what_is_too_large_to_be_flattened_is_traced_and_measured_as_it_is_kept() {
         .run(&[&line[..], &["--accel", "grid,bvh"]].concat())
         .ends(1)
         .says(&["grid, bvh", "fast-octree and fast-bvh"]);
+}
+
+#[test]
+fn of_what_is_too_large_to_be_flattened_each_mesh_is_judged_in_one_place() {
+    let folder = with_pots();
+    let judged = |more: &[&str]| folder.run(&[&["verify", "pots.glb", "--rays", "3"], more].concat()).ends(0);
+    let figures = |more: &[&str]| -> (u64, u64) {
+        let report: Value = serde_json::from_str(judged(&[&["--json"], more].concat()).text()).unwrap();
+        (report["triangles"].as_u64().unwrap(), report["unjudged_instances"].as_u64().unwrap())
+    };
+    let ((all, none), (one, others)) = (figures(&[]), figures(&["--max-memory", "2M"]));
+    assert_eq!((none, others, all), (0, 10, 11 * one));
+    assert!(judged(&["--max-memory", "2M"]).text().contains("10 more places are too large"));
 }

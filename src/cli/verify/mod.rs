@@ -5,7 +5,8 @@
 //! for each variation), `seed`; `variations`, each with `what`, `amount`, `collapsed` (triangles that rounding left without area), `disagreements` (rays about which two structures differ), `spawned` (`rays`, `self_hits`, `slips`,
 //! `leaks`, `false_shadows`) and `rows`; a row has `intersector`, `accel` and, for `all` rays and for each kind of `aims`, `rays`,
 //! `hits`, `missed`, `false_hits`, `wrong_order` (numbers of rays) and `t_ulps_max`, `t_ulps_rms`; `costs`
-//! (`intersector`, `ns_per_ray`); `choose` (an intersector), `trusted`. Keys are only ever added.
+//! (`intersector`, `ns_per_ray`); `choose` (an intersector), `trusted`; `unjudged_instances` (further places of meshes, where
+//! all of them take more memory than is allowed). Keys are only ever added.
 
 mod args;
 mod report;
@@ -14,10 +15,12 @@ use super::exit::Exit;
 use super::message::{Messages, Severity};
 use super::progress::Progress;
 use super::writable::{self, Sources};
-use super::{accident, interrupt, print, read};
+use super::{accident, interrupt, job, print, read};
 use crate::bench::report::Format;
 use crate::bench::verify::{Plan, kernels, verify};
+use crate::load::{Diagnostic, Loaded};
 pub(super) use args::VerifyArgs;
+use std::path::Path;
 
 /// Loads the file, judges it and prints what was found.
 pub(super) fn run(args: &VerifyArgs) -> Exit {
@@ -39,7 +42,7 @@ fn judge(args: &VerifyArgs, messages: &Messages) -> Exit {
         messages.say(Severity::Error, &fault);
         return Exit::Failed;
     }
-    let loaded = match read::model(&args.model, messages) {
+    let mut loaded = match read::model_as_stored(&args.model.input, &args.model.load, messages) {
         Ok(loaded) => loaded,
         Err(exit) => return exit,
     };
@@ -49,6 +52,14 @@ fn judge(args: &VerifyArgs, messages: &Messages) -> Exit {
         messages.say(Severity::Error, &fault);
         return Exit::Failed;
     }
+    let limit = job::limits(args.model.load.max_memory).memory;
+    let unjudged = match reduce(&mut loaded, limit, &args.model.input) {
+        Ok(unjudged) => unjudged,
+        Err(fault) => {
+            messages.say(Severity::Error, &fault);
+            return Exit::Failed;
+        }
+    };
     let name = args.model.input.display().to_string();
     let plan = Plan { rays: args.rays, seed: args.seed, ..Plan::DEFAULT };
     let progress = Progress::new(&name, messages, args.quiet, false);
@@ -70,7 +81,7 @@ fn judge(args: &VerifyArgs, messages: &Messages) -> Exit {
             return Exit::Failed;
         }
     }
-    let report = report::Report { name: &name, hash: loaded.facts.hash, plan: &plan, findings: &findings };
+    let report = report::Report { name: &name, hash: loaded.facts.hash, unjudged, plan: &plan, findings: &findings };
     let text = if args.json { report.json() } else { report.text() };
     match print(&text) {
         Err(e) => {
@@ -87,4 +98,17 @@ fn judge(args: &VerifyArgs, messages: &Messages) -> Exit {
             Exit::Failed
         }
     }
+}
+
+/// Leaves each mesh in its first place alone, where all places together take more memory than is allowed; how many were left
+/// out.
+fn reduce(loaded: &mut Loaded, limit: u64, file: &Path) -> Result<usize, Diagnostic> {
+    let all = loaded.scene.instances.len();
+    if read::check_flattened(loaded, limit, file).is_ok() {
+        return Ok(0);
+    }
+    let mut stands = vec![false; loaded.scene.meshes.len()];
+    loaded.scene.instances.retain(|instance| !std::mem::replace(&mut stands[instance.mesh as usize], true));
+    read::check_flattened(loaded, limit, file)?;
+    Ok(all - loaded.scene.instances.len())
 }

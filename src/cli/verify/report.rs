@@ -14,6 +14,8 @@ pub(super) struct Report<'a> {
     pub name: &'a str,
     /// Of everything that was read.
     pub hash: u128,
+    /// Instances that were left out.
+    pub unjudged: usize,
     /// What was asked for.
     pub plan: &'a Plan,
     /// What came out.
@@ -45,6 +47,13 @@ impl Report<'_> {
         writeln!(out, "{}: {} triangles", self.name, count(f.triangles))?;
         if f.others > 0 {
             writeln!(out, "{} polygons, spheres, cones and planes are not judged", count(f.others))?;
+        }
+        if self.unjudged > 0 {
+            let left_out = count(self.unjudged);
+            writeln!(
+                out,
+                "each mesh is judged in its first place; {left_out} more places are too large for the memory allowed"
+            )?;
         }
         writeln!(out, "{} rays for each place and size, {} each at: {aims}", count(rays), count(self.plan.rays))?;
         let structures: Vec<&str> =
@@ -157,6 +166,7 @@ impl Report<'_> {
             "rays": self.plan.rays, "seed": self.plan.seed,
             "variations": f.sections.iter().map(section_json).collect::<Vec<_>>(),
             "costs": costs, "choose": self.choice().name(), "trusted": f.trusted(),
+            "unjudged_instances": self.unjudged,
         });
         format!("{value}\n")
     }
@@ -290,7 +300,7 @@ mod tests {
         let rows = AccelKind::ALL.len() + 2 * (IntersectorKind::ALL.len() - 1);
         assert!(findings.sections.iter().all(|s| s.rows.len() == rows) && findings.sections[0].spawned.rays > 100);
 
-        let report = Report { name: "box.toml", hash: 7, plan: &plan, findings: &findings };
+        let report = Report { name: "box.toml", hash: 7, unjudged: 0, plan: &plan, findings: &findings };
         let text = report.text();
         assert!(
             text.contains("as it is") && text.contains("moved in f32 by 1e9") && text.contains("Choose "),
