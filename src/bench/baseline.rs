@@ -62,6 +62,12 @@ pub fn failures(baseline: &Value, now: &Value, limits: &[Limit]) -> Result<Vec<S
                 return Err(format!("{name}: it is of {what} ({} before, {} now)", before[key], model[key]));
             }
         }
+        // Reports that do not say so are of models that keep nothing.
+        let kept = |model: &Value| model["kept_instances"].as_u64().unwrap_or(0);
+        if kept(before) != kept(model) {
+            let [before, now] = [kept(before), kept(model)];
+            return Err(format!("{name}: it keeps other numbers of instances ({before} before, {now} now)"));
+        }
         for row in items(&before["structures"]) {
             let current = items(&model["structures"]).iter().find(|r| r["accel"] == row["accel"]);
             let place = format!("{name}, {}", row["accel"].as_str().unwrap_or_default());

@@ -77,7 +77,7 @@ pub enum Count {
     Bit,
     /// Tests saved by the mailbox.
     Mb,
-    /// Points transformed into the ray's axes.
+    /// Points transformed into the ray's axes, or corners of a kept instance to where it stands.
     Xf,
 }
 

@@ -82,6 +82,7 @@ impl Stage {
             view: "default view".into(),
             rays: rays.iter().map(Rays::of).collect(),
             rows: self.rows(&rays, &plan),
+            kept: 0,
             left_out: Vec::new(),
             pruning: None,
         };

@@ -6,7 +6,7 @@ use super::message;
 use super::output_name::{Facts, Naming};
 use super::outputs::{self, Beside, Target};
 use super::parse::{Back, Env};
-use super::sampling::SamplingArgs;
+use super::sampling::{SamplingArgs, SpaceArg};
 use super::sequence::{self, Sequence, Step};
 use crate::accel::{AccelChoice, AccelKind, AccelParams, IntersectorKind};
 use crate::image::{ExrSamples, FileKind, PngDepth, ToneMap};
@@ -315,10 +315,13 @@ fn check_kinds(args: &RenderArgs, batches: &[Batch]) -> Result<(), Wrong> {
     if args.bits == Some(16) && !all(FileKind::Png) {
         return wrong("--bits 16 belongs to PNG; an EXR stores floats, the other types 8 bits");
     }
-    // A picture that is repeated carries both, whatever it is.
-    let for_display = args.again.is_none() && (args.tone_map.is_some() || args.exposure.is_some());
-    if for_display && all(FileKind::Exr) {
-        return wrong("--tone-map and --exposure make colours for a display; an EXR keeps the light as it is");
+    // A picture that is repeated carries both, whatever it is; and errors may be counted in colours for a display.
+    let serves = args.again.is_some() || args.sampling.error_space == Some(SpaceArg::Display);
+    if (args.tone_map.is_some() || args.exposure.is_some()) && all(FileKind::Exr) && !serves {
+        return wrong(
+            "--tone-map and --exposure make colours for a display; an EXR keeps the light as it is (with --error-space display \
+             its errors are counted in them)",
+        );
     }
     Ok(())
 }
@@ -498,6 +501,7 @@ mod tests {
             assert!(job(&format!("a.glb -o a.png {flag}")).is_ok());
         }
         assert!(job("a.glb -o a.exr").is_ok());
+        assert!(job("a.glb -o a.exr --error-space display --exposure 1").is_ok());
     }
 
     #[test]

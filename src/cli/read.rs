@@ -91,8 +91,9 @@ pub(super) fn check_stored(
         return Ok(());
     }
     let count = loaded.scene.instances.len();
-    let text =
-        format!("its {count} instances, stored by themselves, take {bytes} bytes or more where {limit} are allowed");
+    let text = format!(
+        "its {count} instances, as far as each is stored by itself, take {bytes} bytes or more where {limit} are allowed"
+    );
     Err(Diagnostic::new("instances-too-large", file, "", text).remedy(remedy))
 }
 
@@ -115,9 +116,9 @@ pub(super) fn placed(
 }
 
 /// Why a model with warnings is not rendered where they are errors.
-pub(super) fn not_strict(loaded: &Loaded, file: &Path) -> Diagnostic {
-    let count = loaded.warnings.len();
-    Diagnostic::new("strict", file, "", format!("not rendered: --strict, and there are {count} kinds of warnings"))
+pub(super) fn not_strict(count: usize, file: &Path) -> Diagnostic {
+    let kinds = if count == 1 { "is a warning".into() } else { format!("are {count} kinds of warnings") };
+    Diagnostic::new("strict", file, "", format!("not rendered: --strict, and there {kinds}"))
 }
 
 /// Gives a frame that was loaded without pictures those of an earlier one, which are the same, with the materials that

@@ -14,7 +14,7 @@ use super::stats::{self, PictureStats};
 use super::writable::{self, Sources};
 use super::{accident, again, interrupt, read, surroundings};
 use crate::load::{Diagnostic, LoadOptions, Loaded};
-use crate::render::{Instancing, Placing, World};
+use crate::render::{Instancing, World};
 use crate::scene::Scene;
 use crate::scene::framing::{Bounds, robust_bounds_within};
 use crate::threads;
@@ -217,7 +217,7 @@ fn prepare(
         messages.say(Severity::Warning, warning);
     }
     if job.strict && !loaded.warnings.is_empty() {
-        return Err(task.fail(&read::not_strict(&loaded, task.file()), Exit::Input));
+        return Err(task.fail(&read::not_strict(loaded.warnings.len(), task.file()), Exit::Input));
     }
     if let Some(expected) = &job.expected_hash {
         again::check_hash(expected, &loaded, &batch.inputs, &job.look).map_err(|fault| {
@@ -225,19 +225,17 @@ fn prepare(
             Exit::Input
         })?;
     }
-    let placing = Placing::new(&loaded.scene, job.instances);
-    let remedy = match job.instances {
-        Instancing::Flatten => {
-            "leave it to a fast structure to keep them once (--instances auto), or allow more with --max-memory"
-        }
-        Instancing::Keep | Instancing::Auto => "allow more with --max-memory",
+    let (ways, remedy) = match job.instances {
+        Instancing::Flatten => (
+            (Instancing::Flatten, Instancing::Flatten),
+            "leave it to a fast structure to keep them once (--instances auto), or allow more with --max-memory",
+        ),
+        how => ((how, Instancing::Keep), "allow more with --max-memory"),
     };
-    let stored = (&loaded, placing.bytes());
-    read::check_stored(stored, job.load.limits.memory, &batch.inputs[0], remedy).map_err(|fault| {
+    let world = read::placed(&loaded, ways, job.load.limits.memory, &batch.inputs[0], remedy).map_err(|fault| {
         messages.say(Severity::Error, &fault);
         Exit::Failed
     })?;
-    let world = placing.world();
     let world = if job.everything { world.with_everything() } else { world };
     if world.is_empty() && !job.allow_empty && !is_frame {
         messages.say(Severity::Error, &nothing_to_draw(&loaded, &batch.inputs[0]));
@@ -246,6 +244,9 @@ fn prepare(
     let coarse = coarse(&loaded, &world, &batch.inputs[0]);
     for warning in coarse.iter().filter(|w| told.insert((w.code, w.place.clone()))) {
         messages.say(Severity::Warning, warning);
+    }
+    if job.strict && coarse.is_some() {
+        return Err(task.fail(&read::not_strict(1, task.file()), Exit::Input));
     }
     profile.done("place");
     let bounds = robust_bounds_within(&loaded.scene, world.bounds);

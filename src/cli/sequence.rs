@@ -150,7 +150,7 @@ fn refuse_warnings(loaded: &Loaded, file: &Path, messages: &Messages) -> Result<
         return Ok(());
     }
     loaded.warnings.iter().for_each(|warning| messages.say(Severity::Warning, warning));
-    messages.say(Severity::Error, &read::not_strict(loaded, file));
+    messages.say(Severity::Error, &read::not_strict(loaded.warnings.len(), file));
     Err(Exit::Input)
 }
 

@@ -12,7 +12,7 @@ use super::render::SoFar;
 use super::sequence::{self, Survey};
 use super::stats::{self, Counted, PictureStats, Times};
 use super::summary::Summary;
-use super::{again, cost_layers, dry_run, interrupt, print, surroundings, unseen};
+use super::{again, cost_layers, dry_run, interrupt, print, read, surroundings, unseen};
 use crate::accel::AnyAccel;
 use crate::accel::auto::Reason;
 use crate::image::FileKind;
@@ -226,6 +226,15 @@ impl Prepared<'_> {
     fn draw(&self, mut times: Times, profile: &mut Profile, so_far: &mut SoFar) -> Exit {
         let Task { job, messages, progress, batch } = *self.task;
         let Self { shot, effective, loaded, work, .. } = self;
+        if !self.is_frame
+            && let Some(warning) = unseen::warning(work, &shot.choice, job.look.lens, self.task.file())
+        {
+            messages.say(Severity::Warning, &warning);
+            if job.strict {
+                return self.task.fail(&read::not_strict(1, self.task.file()), Exit::Input);
+            }
+        }
+        profile.skip();
         // Until the picture is written the first signal ends no more than its rays.
         let _guard = job.keep_partial.then(interrupt::Guard::new);
         let mut rendered = self.trace(&mut times, profile);
@@ -251,10 +260,6 @@ impl Prepared<'_> {
             Ok(()) => {}
             Err(picture::WriteError::BrokenPipe) => return Exit::Done,
             Err(picture::WriteError::Fault(fault)) => return self.task.fail(&fault, Exit::Failed),
-        }
-        if !self.is_frame && !work.world.is_empty() {
-            let warning = unseen::warning(work, &shot.choice, self.task.file());
-            warning.iter().for_each(|warning| messages.say(Severity::Warning, warning));
         }
         let summary = Summary { shot, effective, loaded, bounds: self.bounds, view: self.phrase, light: self.light };
         summary.say(&rendered, &times, messages);

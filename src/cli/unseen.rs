@@ -1,20 +1,29 @@
 //! Pictures that show nothing, or next to nothing: they are written as they are, but not without a word.
 
-use super::camera::{self, Choice};
+use super::camera::{self, Choice, LensChoice};
 use crate::load::Diagnostic;
 use crate::render::{Coverage, Job, coverage};
 use crate::scene::Scene;
 use std::path::Path;
 
 /// Of a picture that is framed on the model one ray in so many hits it, or its parts are too small to be seen.
-const FEW: usize = 1000;
+const FEW: usize = 10_000;
 
-/// What is to be said of a picture by such a choice of the eye; nothing of those that show something.
-pub(super) fn warning(job: &Job, choice: &Choice, file: &Path) -> Option<Diagnostic> {
-    said(coverage(job), choice, job.scene, file)
+/// What is to be said of a picture by such a choice of the eye; nothing of those that show something, nor of those that
+/// take so long that nobody renders them without looking.
+pub(super) fn warning(job: &Job, choice: &Choice, lens: Option<LensChoice>, file: &Path) -> Option<Diagnostic> {
+    if job.world.is_empty() || job.accel.kind().is_slow() {
+        return None;
+    }
+    said(coverage(job), (choice, lens), job.scene, file)
 }
 
-fn said(Coverage { rays, hits }: Coverage, choice: &Choice, scene: &Scene, file: &Path) -> Option<Diagnostic> {
+fn said(
+    Coverage { rays, hits }: Coverage,
+    (choice, lens): (&Choice, Option<LensChoice>),
+    scene: &Scene,
+    file: &Path,
+) -> Option<Diagnostic> {
     let framed = camera::is_framed(choice, scene);
     let (code, text) = match hits {
         0 => ("nothing-seen", format!("none of {rays} rays spread over the picture hits anything")),
@@ -23,13 +32,14 @@ fn said(Coverage { rays, hits }: Coverage, choice: &Choice, scene: &Scene, file:
         }
         _ => return None,
     };
-    let remedy = match choice {
-        _ if framed => {
-            "parts of the model are far from each other, or very thin: --eye and --at show some of it, --line-width widens \
-             points and lines"
+    let remedy = match (choice, lens) {
+        (_, Some(LensChoice::Ortho(Some(_)))) => "leave out the height of --ortho: what the model needs is then shown",
+        (Choice::Free { .. }, _) => "aim the eye with --at, or leave out --eye: the model is then framed",
+        _ if !framed => "this camera of the file shows nothing of what is there; --view front frames the model",
+        _ => {
+            "parts of the model are far from each other, very thin, or seen edge-on: another --view may show it, --eye and \
+             --at a part of it; --line-width widens points and lines"
         }
-        Choice::Free { .. } => "aim the eye with --at, or leave out --eye: the model is then framed",
-        _ => "this camera of the file looks past what is there; --view front frames the model",
     };
     Some(Diagnostic::new(code, file, "", text).remedy(remedy))
 }
@@ -41,11 +51,12 @@ mod tests {
     use crate::scene::framing::NamedView;
 
     fn code(hits: usize, choice: &Choice) -> Option<&'static str> {
-        said(Coverage { rays: 4096, hits }, choice, &Scene::default(), Path::new("a.glb")).map(|warning| warning.code)
+        let coverage = Coverage { rays: 40_960, hits };
+        said(coverage, (choice, None), &Scene::default(), Path::new("a.glb")).map(|warning| warning.code)
     }
 
     #[test]
-    fn a_framed_picture_must_show_a_thousandth_and_any_other_something() {
+    fn a_framed_picture_must_show_a_ten_thousandth_and_any_other_something() {
         let free = Choice::Free { eye: DVec3::Z, at: None, up: None };
         for choice in [&Choice::Default, &Choice::Named(NamedView::Front)] {
             assert_eq!([0, 4, 5].map(|n| code(n, choice)), [Some("nothing-seen"), Some("little-seen"), None]);

@@ -1,14 +1,22 @@
 //! How much of a picture shows something, as rays spread over it tell.
 
-use super::Job;
 use super::eyes::{Ball, Eye, Place};
 use super::wave::Media;
+use super::{Job, sobol};
 use crate::accel::{Accel, Hit, NoProbe, Ray};
+use rayon::prelude::*;
+use std::ops::Range;
 
-/// Columns and rows of these rays.
-const SIDE: u32 = 64;
+/// Rays that are sent first.
+const FIRST: u32 = 1 << 12;
 
-/// What became of them.
+/// Where no more than one of so many of them hits, there are as many as pixels.
+const RARE: usize = 100;
+
+/// But no more than this.
+const MOST: u32 = 1 << 20;
+
+/// What became of rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Coverage {
     /// So many were sent.
@@ -17,8 +25,22 @@ pub struct Coverage {
     pub hits: usize,
 }
 
-/// Sends 64 columns and rows of rays through a picture, at even distances. They are not among those that are counted.
+/// Sends rays through a picture, evenly spread but in no rows: models are framed in the middle, and thin ones would stand
+/// between two of them. They are not among the rays that are counted.
 pub fn coverage(job: &Job) -> Coverage {
+    let pixels = job.settings.width.saturating_mul(job.settings.height);
+    let all = pixels.clamp(FIRST, MOST);
+    let first = hits(job, 0..FIRST);
+    if first * RARE > FIRST as usize {
+        return Coverage { rays: FIRST as usize, hits: first };
+    }
+    let starts: Vec<u32> = (FIRST..all).step_by(FIRST as usize).collect();
+    let others = starts.into_par_iter().map(|start| hits(job, start..all.min(start + FIRST)));
+    Coverage { rays: all as usize, hits: first + others.sum::<usize>() }
+}
+
+/// How many of these rays hit something.
+fn hits(job: &Job, numbers: Range<u32>) -> usize {
     let Job { scene, world, accel, view, settings, .. } = *job;
     let (width, height) = (settings.width, settings.height);
     let eye = Eye {
@@ -31,10 +53,12 @@ pub fn coverage(job: &Job) -> Coverage {
         lens: None,
         inside: Media::default(),
     };
-    let along = |i: u32, pixels: u32| (f64::from(i) + 0.5) * f64::from(pixels) / f64::from(SIDE);
-    let places = (0..SIDE * SIDE).map(|i| Place::new(along(i % SIDE, width), along(i / SIDE, height)));
-    let rays: Vec<Ray> = places.map(|place| eye.ray_with_path(place).0).collect();
+    let place = |i: u32| {
+        let [x, y] = sobol::point(i, 0);
+        Place::new(x * f64::from(width), y * f64::from(height))
+    };
+    let rays: Vec<Ray> = numbers.map(|i| eye.ray_with_path(place(i)).0).collect();
     let mut hits = vec![Hit::MISS; rays.len()];
     accel.closest(&rays, &mut hits, &mut accel.scratch(), &mut NoProbe);
-    Coverage { rays: rays.len(), hits: hits.iter().filter(|hit| hit.is_some()).count() }
+    hits.iter().filter(|hit| hit.is_some()).count()
 }

@@ -60,8 +60,12 @@ fn more_than_fits_is_refused_before_it_is_flattened() {
     let limit = ["--max-memory", "2M"];
     let flat = [&["pots.glb", "--instances", "flatten"], &limit[..]].concat();
     folder.render(&flat).ends(1).says(&["11 instances", "2097152", "--instances auto", "--max-memory"]);
-    folder.render(&[&["pots.glb", "--instances", "keep"], &limit[..]].concat()).ends(0);
-    for command in ["explain", "inspect"] {
+    // So few are stored one by one where that fits.
+    for how in ["keep", "auto"] {
+        folder.render(&[&["pots.glb", "--instances", how], &limit[..]].concat()).ends(0);
+    }
+    folder.run(&[&["inspect", "pots.glb"], &limit[..]].concat()).ends(0);
+    for command in ["explain", "study"] {
         folder.run(&[&[command, "pots.glb"], &limit[..]].concat()).ends(1).says(&["--max-memory"]);
     }
 }
@@ -95,11 +99,17 @@ fn what_is_too_large_to_be_flattened_is_traced_and_measured_as_it_is_kept() {
     folder.run(&line).ends(0).says(&["kept once", "left out: ", "grid-octree"]);
     let report: Value = serde_json::from_slice(&std::fs::read(folder.path("a.json")).unwrap()).unwrap();
     let model = &report["models"][0];
-    assert_eq!((&model["prims"], &model["objects"]), (&kept["prims"], &11.into()));
+    assert_eq!(
+        (&model["prims"], &model["objects"], &model["kept_instances"]),
+        (&kept["prims"], &11.into(), &11.into())
+    );
     let rows = model["structures"].as_array().unwrap();
     let names: Vec<&Value> = rows.iter().map(|row| &row["accel"]).collect();
     assert_eq!(names, ["fast-octree", "fast-bvh"]);
     assert!(model["left_out"].as_array().is_some_and(|left_out| left_out.contains(&"bvh".into())), "{model}");
+    let flat = ["bench", "pots.glb", "--size", "32x24", "--passes", "0", "--accel", "fast-octree,fast-bvh"];
+    let gate = ["--baseline", "a.json", "--fail-if", "n_it>+1%"];
+    folder.run(&[&flat[..], &gate].concat()).ends(1).says(&["11 before, 0 now"]);
     folder
         .run(&[&line[..], &["--accel", "grid,bvh"]].concat())
         .ends(1)

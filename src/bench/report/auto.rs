@@ -33,7 +33,11 @@ impl Outcome {
         };
         let row = |kind| model.rows.iter().find(|r| r.kind == kind && r.setting.is_none());
         let (ours, theirs) = (row(chosen)?, row(other)?);
-        let share = |cost: &dyn Fn(&Row) -> f64| cost(theirs) / cost(ours) - 1.0;
+        let share = |cost: &dyn Fn(&Row) -> f64| match (cost(theirs), cost(ours)) {
+            // Rays that come near nothing.
+            (theirs, ours) if theirs == ours => 0.0,
+            (theirs, ours) => theirs / ours - 1.0,
+        };
         Some(Self {
             chosen,
             other,

@@ -18,7 +18,8 @@
 //! and `classes`. A class has exact sums (`rays`, `hits`, `tests`, `steps`, `cells`, `empty_cells`, `volume_tests`,
 //! `tests_saved`, `transforms`), `per_ray` (`n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`, `n_xf`, `n_min`), `interval` (half the 95 %
 //! interval of the same, or null when nothing was left out), `culled`, `differing`, `t_tr` (seconds of a ray) and
-//! `mrays`. `left_out` names structures that could not bear so many prims: slow ones, or those that
+//! `mrays`. `kept_instances` have their triangles
+//! stored once. `left_out` names structures that could not bear so many prims: slow ones, or those that
 //! store each instance by itself. `pruning` is null, or seconds of processor
 //! time of rendering the picture as `usual` and with `everything` on (each as `t_b`), `saved` (a share) and `same`
 //! (whether the pixels were).
@@ -71,7 +72,7 @@ fn model(report: &Report, model: &Model) -> Value {
     let rays = model.rays.iter().map(|r| (r.class.name().to_owned(), json!({ "asked": r.asked, "kept": r.kept })));
     json!({
         "file": model.name, "hash": format!("{:032x}", model.hash), "prims": model.prims,
-        "objects": model.objects, "auto": choice(report, model),
+        "objects": model.objects, "kept_instances": model.kept, "auto": choice(report, model),
         "picture": {
             "width": model.width, "height": model.height, "samples": model.samples, "depth": model.depth,
             "view": model.view,

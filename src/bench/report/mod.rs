@@ -53,6 +53,8 @@ pub struct Model {
     pub prims: usize,
     /// Objects that they belong to, as `spheres` and `boxes` have them.
     pub objects: usize,
+    /// Instances that are kept, so that their triangles are stored once.
+    pub kept: usize,
     /// What `auto` would choose and why, where that was asked.
     pub auto: Option<Reason>,
     /// Columns of the picture whose rays were recorded.
@@ -69,7 +71,7 @@ pub struct Model {
     pub rays: Vec<Rays>,
     /// One for each structure.
     pub rows: Vec<Row>,
-    /// Slow structures that could not bear so many prims.
+    /// Slow structures that could not bear so many prims, or those that cannot keep instances.
     pub left_out: Vec<AccelKind>,
     /// What is saved by leaving out what the scene does not need; `None`: not measured.
     pub pruning: Option<Pruning>,
@@ -157,6 +159,12 @@ impl Model {
     /// Its prims and objects.
     pub fn size(&self) -> String {
         let prims = number::grouped(self.prims as u64);
+        if self.kept > 0 {
+            let [objects, kept] = [self.objects, self.kept].map(|n| number::grouped(n as u64));
+            return format!(
+                "{prims} prims in {objects} objects, {kept} of which are instances whose triangles are kept once"
+            );
+        }
         match self.objects {
             0 => format!("{prims} prims in no object"),
             1 => format!("{prims} prims in one object: spheres and boxes can only bound the whole"),
@@ -249,7 +257,7 @@ pub const WORDS: [(&str, &str); 11] = [
     ("n_eets", "empty ones among them"),
     ("n_bit", "ray/volume tests a ray"),
     ("n_mb", "tests saved by the mailbox a ray"),
-    ("n_xf", "points transformed into the ray's axes a ray"),
+    ("n_xf", "points transformed a ray: into its axes, or corners of a kept instance to where it stands"),
     ("n_min", "hits a ray: tests that nothing can save"),
     ("culled", "share of all ray/prim tests not done"),
     ("n_oiv", "prims listed in all cells"),

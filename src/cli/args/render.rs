@@ -60,7 +60,7 @@ pub(in crate::cli) struct RenderArgs {
     /// How linear light becomes display colour; EXR stays linear [default: neutral]
     #[arg(long, value_name = "NAME", value_parser = parse::tone_map(), help_heading = "Output", hide_short_help = true)]
     pub tone_map: Option<ToneMap>,
-    /// Brighter (+) or darker (-) by this many stops (not EXR)
+    /// Brighter (+) or darker (-) by this many stops; EXR stays as it is
     #[arg(long, value_name = "STOPS", value_parser = parse::exposure, help_heading = "Output", allow_hyphen_values = true)]
     pub exposure: Option<f32>,
     /// Put all inputs into one scene and one picture

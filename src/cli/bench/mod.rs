@@ -192,6 +192,7 @@ impl Bench<'_> {
             hash: prepared.loaded.facts.hash,
             prims: prepared.world.len(),
             objects: prepared.world.objects(),
+            kept: prepared.world.kept.placed().len(),
             auto: plan.sweep.is_none().then(|| prepared.world.judged(&plan.params)),
             width: settings.width,
             height: settings.height,
@@ -275,7 +276,10 @@ impl Bench<'_> {
             plan.kinds.iter().partition(|kind| kind.keeps_instances());
         let named = |kinds: &[AccelKind]| kinds.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(", ");
         if kinds.is_empty() {
-            let remedy = "measure fast-octree and fast-bvh, which keep them once, or allow more with --max-memory";
+            let remedy = match plan.sweep {
+                None => "measure fast-octree and fast-bvh, which keep them once, or allow more with --max-memory",
+                Some(_) => "allow more with --max-memory",
+            };
             let text = format!("{name}: its instances are too large for {}, stored by themselves", named(&others));
             self.messages.error("instances-too-large", text, remedy);
             return Err(Exit::Failed);

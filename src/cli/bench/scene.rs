@@ -55,6 +55,20 @@ impl Subject {
     }
 }
 
+impl Subject {
+    /// Its scene as all structures can store it, each instance by itself, where there is room; sizes of a family must be
+    /// alike, and their largest is known.
+    fn world(&self, loaded: &Loaded, limit: u64) -> Result<World, Diagnostic> {
+        match self {
+            Self::File(path) => {
+                let ways = (Instancing::Flatten, Instancing::Keep);
+                read::placed(loaded, ways, limit, path, "allow more with --max-memory")
+            }
+            Self::Generated(..) => Ok(World::new(&loaded.scene)),
+        }
+    }
+}
+
 /// Of what a scene's meshes are made of; two sizes of a family with one hash are one scene.
 fn hash(scene: &Scene) -> u128 {
     let mut hash = Xxh3::new();
@@ -82,11 +96,7 @@ impl Prepared {
     pub(super) fn new(subject: &Subject, args: &BenchArgs, messages: &Messages) -> Result<Self, Exit> {
         let mut loaded = subject.load(args, messages)?;
         let input = subject.path();
-        let limit = job::limits(args.load.max_memory).memory;
-        let remedy = "allow more with --max-memory";
-        // All structures can store each instance by itself, where there is room.
-        let ways = (Instancing::Flatten, Instancing::Keep);
-        let world = read::placed(&loaded, ways, limit, input, remedy).map_err(|fault| {
+        let world = subject.world(&loaded, job::limits(args.load.max_memory).memory).map_err(|fault| {
             messages.say(Severity::Error, &fault);
             Exit::Failed
         })?;

@@ -20,7 +20,7 @@ use super::args::ModelArgs;
 use super::exit::Exit;
 use super::message::{Messages, Severity};
 use super::{accident, job, print, read};
-use crate::render::{Instancing, Placing};
+use crate::render::Instancing;
 pub(super) use args::InspectArgs;
 use report::Report;
 
@@ -36,13 +36,15 @@ fn inspect(args: &InspectArgs, messages: &Messages) -> Exit {
         Ok(loaded) => loaded,
         Err(exit) => return exit,
     };
-    let (limit, placing) = (job::limits(load.max_memory).memory, Placing::new(&loaded.scene, Instancing::Auto));
-    let stored = (&loaded, placing.bytes());
-    if let Err(fault) = read::check_stored(stored, limit, input, "allow more with --max-memory") {
-        messages.say(Severity::Error, &fault);
-        return Exit::Failed;
-    }
-    let report = Report::new(input, &loaded, placing.world(), limit);
+    let (limit, ways) = (job::limits(load.max_memory).memory, (Instancing::Auto, Instancing::Keep));
+    let world = match read::placed(&loaded, ways, limit, input, "allow more with --max-memory") {
+        Ok(world) => world,
+        Err(fault) => {
+            messages.say(Severity::Error, &fault);
+            return Exit::Failed;
+        }
+    };
+    let report = Report::new(input, &loaded, world, limit);
     let text = if args.json { report.json() } else { report.text() };
     match print(&text) {
         Err(e) => {

@@ -58,7 +58,9 @@ fn pair<'a>(report: &Report, model: &'a Model) -> Option<[&'a Row; 2]> {
 
 fn asked_in_vain(report: &Report) -> String {
     let Some([a, b]) = report.compare else { return String::new() };
-    format!("<p>No image of {a} minus {b}: one of them got a sample of the rays only, or is not done.</p>\n")
+    format!(
+        "<p>No image of {a} minus {b}: one of them got a sample of the rays only, was left out, or is not done.</p>\n"
+    )
 }
 
 /// The place of a difference, 0 to 254.
