@@ -8,13 +8,17 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Rays that are sent first.
-const FIRST: u32 = 1 << 12;
+const FIRST: u32 = 1 << 10;
 
 /// Where no more than one of so many of them hits, there are as many as pixels.
 const RARE: usize = 100;
 
-/// But no more than this.
+/// But no fewer and no more than these.
+const LEAST: u32 = 1 << 12;
 const MOST: u32 = 1 << 20;
+
+/// Rays that are sent together.
+const TOGETHER: u32 = 1 << 12;
 
 /// What became of rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,13 +33,13 @@ pub struct Coverage {
 /// between two of them. They are not among the rays that are counted.
 pub fn coverage(job: &Job) -> Coverage {
     let pixels = job.settings.width.saturating_mul(job.settings.height);
-    let all = pixels.clamp(FIRST, MOST);
+    let all = pixels.clamp(LEAST, MOST);
     let first = hits(job, 0..FIRST);
     if first * RARE > FIRST as usize {
         return Coverage { rays: FIRST as usize, hits: first };
     }
-    let starts: Vec<u32> = (FIRST..all).step_by(FIRST as usize).collect();
-    let others = starts.into_par_iter().map(|start| hits(job, start..all.min(start + FIRST)));
+    let starts: Vec<u32> = (FIRST..all).step_by(TOGETHER as usize).collect();
+    let others = starts.into_par_iter().map(|start| hits(job, start..all.min(start + TOGETHER)));
     Coverage { rays: all as usize, hits: first + others.sum::<usize>() }
 }
 

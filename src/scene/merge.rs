@@ -2,6 +2,14 @@
 
 use super::{Light, LightKind, Scene, UpAxis};
 use crate::math::{DAffine3, DMat3, DVec3};
+use std::mem::take;
+
+/// Where the meshes and materials of a part lie among those of the whole.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stored {
+    meshes: u32,
+    materials: u32,
+}
 
 impl Scene {
     /// Adds all of `part`, placed by `world_from_part`; a part whose up axis differs is turned upright first.
@@ -9,24 +17,51 @@ impl Scene {
     /// Ambient light, environment, background and hints stay this scene's own. Indices of `part` move up; those of
     /// this scene stay valid. Spheres, and the radii of cones, take the mean of a
     /// scale.
-    pub fn append(&mut self, part: Self, world_from_part: &DAffine3) {
-        let place = *world_from_part * upright(part.up, self.up);
+    pub fn append(&mut self, mut part: Self, world_from_part: &DAffine3) -> Stored {
+        let stored = self.store(&mut part);
+        self.place(part, stored, world_from_part);
+        stored
+    }
+
+    /// What of this scene stands somewhere, as [`Self::place`] takes it: it is small beside what it shows.
+    pub fn places(&self) -> Self {
+        Self {
+            up: self.up,
+            instances: self.instances.clone(),
+            spheres: self.spheres.clone(),
+            cones: self.cones.clone(),
+            planes: self.planes.clone(),
+            lights: self.lights.clone(),
+            cameras: self.cameras.clone(),
+            photometric: self.photometric,
+            ..Self::default()
+        }
+    }
+
+    /// Takes from `part` what does not depend on where it stands.
+    fn store(&mut self, part: &mut Self) -> Stored {
         let [meshes, materials, textures, bitmaps] =
             [self.meshes.len(), self.materials.len(), self.textures.len(), self.bitmaps.len()].map(count);
-
-        self.bitmaps.extend(part.bitmaps);
-        self.textures.extend(part.textures.into_iter().map(|mut t| {
+        self.bitmaps.append(&mut part.bitmaps);
+        self.textures.extend(take(&mut part.textures).into_iter().map(|mut t| {
             t.bitmap += bitmaps;
             t
         }));
-        self.materials.extend(part.materials.into_iter().map(|mut m| {
+        self.materials.extend(take(&mut part.materials).into_iter().map(|mut m| {
             m.textures_mut().into_iter().flatten().for_each(|t| t.texture += textures);
             m
         }));
-        self.meshes.extend(part.meshes.into_iter().map(|mut m| {
+        self.meshes.extend(take(&mut part.meshes).into_iter().map(|mut m| {
             m.material += materials;
             m
         }));
+        Stored { meshes, materials }
+    }
+
+    /// Puts the [`Self::places`] of a part, whose meshes and materials this scene has stored, somewhere; as often as is
+    /// wanted.
+    pub fn place(&mut self, part: Self, Stored { meshes, materials }: Stored, world_from_part: &DAffine3) {
+        let place = *world_from_part * upright(part.up, self.up);
         self.instances.extend(part.instances.into_iter().map(|mut i| {
             i.mesh += meshes;
             i.world_from_object = place * i.world_from_object;

@@ -114,7 +114,7 @@ pub enum Background {
 }
 
 /// The axis that points up in the file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum UpAxis {
     /// +Y, as glTF says and most OBJ exporters do.
     #[default]

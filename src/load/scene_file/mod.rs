@@ -150,9 +150,11 @@ use super::paths::Resolver;
 use super::texture::smaller_copies;
 use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
 use crate::math::DVec3;
+use crate::scene::merge::Stored;
 use crate::scene::{Background, Bitmap, Environment, Material, Panorama, Scene, UpAxis};
 use crate::stopwatch::Stopwatch;
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
@@ -405,33 +407,36 @@ fn assemble(
         read.warnings.into_iter().for_each(|w| warnings.push(w));
         scene.panorama = Some(Panorama { rotation, ..read.panorama });
     }
+    // What several models show is read and stored once.
+    let mut known: HashMap<(String, Option<UpAxis>, Option<u32>), Known> = HashMap::new();
     for model in models {
-        // What is needed only while a model is read is free for the next one.
-        let mut own = *budget;
-        let mut part = read_model(&model, faults, &mut resolver, source, options, &mut own)?;
         let over = |over| Diagnostic { place: faults.place(model.at), ..over_memory(&source.path, over) };
-        budget.take(kept(&part.scene), 1).map_err(over)?;
-        part.warnings.into_iter().for_each(|w| warnings.push(w));
-        facts.faces += part.facts.faces;
-        facts.dropped.extend(part.facts.dropped);
-        facts.wires.append(&part.facts.wires);
-        facts.extensions.extend(part.facts.extensions);
-        facts.animations.extend(part.facts.animations);
-        // A scene file has none of its own; those of its first model that has any are told.
-        if facts.scenes.is_empty() {
-            (facts.scenes, facts.scene_index) = (part.facts.scenes, part.facts.scene_index);
-        }
-        if facts.variants.is_empty() {
-            (facts.variants, facts.variant) = (part.facts.variants, part.facts.variant);
-        }
-        let moved = part.facts.max_rounding * shapes::stretch(&model.world_from_model);
-        facts.max_rounding = facts.max_rounding.max(moved);
-        facts.reading += part.facts.reading;
-        facts.decoding += part.facts.decoding;
-        // Shapes count on from this scene's materials once they are appended, so an override comes after.
         let [meshes, spheres, cones, planes] =
             [scene.meshes.len(), scene.spheres.len(), scene.cones.len(), scene.planes.len()];
-        scene.append(std::mem::take(&mut part.scene), &model.world_from_model);
+        let place = &model.world_from_model;
+        let key = (model.file.clone(), model.up, model.material);
+        let found = match known.entry(key) {
+            Entry::Occupied(known) => {
+                let Known { places, stored, .. } = known.get();
+                budget.take(places.bytes(), 1).map_err(over)?;
+                scene.place(places.clone(), *stored, place);
+                &known.into_mut().facts
+            }
+            Entry::Vacant(first) => {
+                // What is needed only while a model is read is free for the next one.
+                let part = read_model(&model, faults, &mut resolver, source, options, &mut budget.clone())?;
+                budget.take(kept(&part.scene), 1).map_err(over)?;
+                part.warnings.into_iter().for_each(|w| warnings.push(w));
+                facts.reading += part.facts.reading;
+                facts.decoding += part.facts.decoding;
+                let places = part.scene.places();
+                let stored = scene.append(part.scene, place);
+                &first.insert(Known { places, stored, facts: part.facts }).facts
+            }
+        };
+        resolver.absorb(&found.files, found.hash);
+        tell(&mut facts, found, shapes::stretch(place));
+        // Shapes count on from this scene's materials once they are appended, so an override comes after.
         if let Some(material) = model.material {
             scene.meshes[meshes..].iter_mut().for_each(|mesh| mesh.material = material);
             scene.spheres[spheres..].iter_mut().for_each(|sphere| sphere.material = material);
@@ -442,6 +447,30 @@ fn assemble(
     facts.reading += resolver.reading();
     (facts.files, facts.hash) = resolver.finish();
     Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
+}
+
+/// A model that was read.
+struct Known {
+    places: Scene,
+    stored: Stored,
+    facts: Facts,
+}
+
+/// Adds what was found out about a model that is shown once more, stretched so much.
+fn tell(facts: &mut Facts, found: &Facts, stretch: f64) {
+    facts.faces += found.faces;
+    facts.dropped.extend_from_slice(&found.dropped);
+    facts.wires.append(&found.wires);
+    facts.extensions.extend_from_slice(&found.extensions);
+    facts.animations.extend_from_slice(&found.animations);
+    // A scene file has none of its own; those of its first model that has any are told.
+    if facts.scenes.is_empty() {
+        (facts.scenes, facts.scene_index) = (found.scenes.clone(), found.scene_index);
+    }
+    if facts.variants.is_empty() {
+        (facts.variants, facts.variant) = (found.variants.clone(), found.variant);
+    }
+    facts.max_rounding = facts.max_rounding.max(found.max_rounding * stretch);
 }
 
 fn read_model(
@@ -467,7 +496,6 @@ fn read_model(
     }
     let mut loaded = super::load_within(&model_source, &options, budget)?;
     loaded.facts.reading += reading;
-    resolver.absorb(&loaded.facts.files, loaded.facts.hash);
     Ok(loaded)
 }
 

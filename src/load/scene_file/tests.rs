@@ -291,6 +291,35 @@ fn the_material_of_a_model_replaces_those_of_all_its_shapes() {
 }
 
 #[test]
+fn what_several_models_show_is_read_once_and_stands_as_if_it_were_read_for_each() {
+    let dir = tempfile::tempdir().unwrap();
+    let text = "f 0 1 0 1 0 1 0 0\ns 0 0 0 1\nc 2 0 0 1 2 1 0 1\np 3 0 0 0 1 0 0 0 1 0\nl 1 2 3\n";
+    ["m.nff", "copy.nff"].iter().for_each(|name| std::fs::write(dir.path().join(name), text).unwrap());
+    let load = |second: &str| {
+        let text = format!(
+            "[[models]]\nfile='m.nff'\ntranslate=[1,2,3]\n[[models]]\nfile='{second}'\nrotate=[10,20,30]\nscale=2\n\
+             [[models]]\nfile='m.nff'\nup='z'\n"
+        );
+        load_source(&Source { path: dir.path().join("a.toml"), bytes: text.into() }).unwrap()
+    };
+    let (once, each) = (load("m.nff"), load("copy.nff"));
+    let stored = |loaded: &Loaded| (loaded.scene.meshes.len(), loaded.scene.materials.len());
+    // The one that is turned upright is another.
+    assert_eq!((stored(&once), stored(&each)), ((2, 2), (3, 3)));
+    let placed = |loaded: &Loaded| {
+        let Scene { instances, spheres, cones, lights, cameras, .. } = &loaded.scene;
+        let instances: Vec<_> = instances.iter().map(|i| i.world_from_object).collect();
+        let spheres: Vec<_> = spheres.iter().map(|s| (s.center, s.radius)).collect();
+        let cones: Vec<_> = cones.iter().map(|c| (c.base, c.apex, c.base_radius)).collect();
+        format!("{instances:?} {spheres:?} {cones:?} {lights:?} {cameras:?} {}", loaded.facts.faces)
+    };
+    assert_eq!(placed(&once), placed(&each));
+    let materials: Vec<u32> = once.scene.spheres.iter().map(|s| s.material).collect();
+    assert_eq!(materials, [0, 0, 1]);
+    assert_eq!(once.scene.instances.iter().map(|i| i.mesh).collect::<Vec<_>>(), [0, 0, 1]);
+}
+
+#[test]
 fn the_text_and_all_models_share_one_budget() {
     let dir = tempfile::tempdir().unwrap();
     let cells = 100;
@@ -303,7 +332,9 @@ fn the_text_and_all_models_share_one_budget() {
         let source = Source { path: dir.path().join("a.toml"), bytes: text.into() };
         load_with(&source, &options).map(|loaded| loaded.scene.meshes.len()).map_err(|e| e.to_string())
     };
-    let models = |count: usize| "[[models]]\nfile='m.obj'\n".repeat(count);
+    // Each with a material of its own, or they would be read and stored once.
+    let model = |i: usize| format!("[materials.m{i}]\n[[models]]\nfile='m.obj'\nmaterial='m{i}'\n");
+    let models = |count: usize| (0..count).map(model).collect::<String>();
     // One needs most while it is read; what is kept of it is a fraction of that, but adds up.
     assert_eq!(fault(models(10), 8_000_000), Ok(10));
     let many = fault(models(100), 8_000_000).unwrap_err();
