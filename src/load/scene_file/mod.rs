@@ -424,7 +424,8 @@ fn assemble(
             }
             Entry::Vacant(first) => {
                 // What is needed only while a model is read is free for the next one.
-                let part = read_model(&model, faults, &mut resolver, source, options, &mut budget.clone())?;
+                let mut own = *budget;
+                let part = read_model(&model, faults, &mut resolver, source, options, &mut own)?;
                 budget.take(kept(&part.scene), 1).map_err(over)?;
                 part.warnings.into_iter().for_each(|w| warnings.push(w));
                 facts.reading += part.facts.reading;
