@@ -19,7 +19,7 @@ use crate::scene::Scene;
 use crate::scene::framing::{Bounds, robust_bounds_within};
 use crate::threads;
 use std::collections::HashSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Does the whole job and tells how it ended: as its worst picture.
@@ -32,7 +32,7 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
         }
     };
     let sources = Sources::of(job.batches.iter().flat_map(|b| &b.inputs));
-    let mut so_far = SoFar { sources, pictures: Vec::new(), foretold: Vec::new() };
+    let mut so_far = SoFar { unseen: HashSet::new(), sources, pictures: Vec::new(), foretold: Vec::new() };
     // A picture that is repeated may be replaced by its repetition, but by nothing else.
     let spared = |path| Sources::of(&job.again).spared_by(path, "--stats-file");
     if let Some(path) = job.stats_file()
@@ -60,6 +60,8 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
 
 /// What a run has read and made so far.
 pub(super) struct SoFar {
+    /// Files and views whose pictures show nothing, and that this was said of.
+    pub unseen: HashSet<(PathBuf, String)>,
     /// All inputs, and the files that those loaded so far use.
     pub sources: Sources,
     /// Statistics of each.

@@ -227,9 +227,12 @@ impl Prepared<'_> {
         let Task { job, messages, progress, batch } = *self.task;
         let Self { shot, effective, loaded, work, .. } = self;
         if !self.is_frame
-            && let Some(warning) = unseen::warning(work, &shot.choice, job.look.lens, self.task.file())
+            && let Some(warning) = unseen::warning(work, (&shot.choice, self.phrase), job.look.lens, self.task.file())
         {
-            messages.say(Severity::Warning, &warning);
+            // All around a model it is the same.
+            if so_far.unseen.insert((self.task.file().to_owned(), shot.choice.name())) {
+                messages.say(Severity::Warning, &warning);
+            }
             if job.strict {
                 return self.task.fail(&read::not_strict(1, self.task.file()), Exit::Input);
             }

@@ -9,13 +9,19 @@ use std::path::Path;
 /// Of a picture that is framed on the model one ray in so many hits it, or its parts are too small to be seen.
 const FEW: usize = 10_000;
 
-/// What is to be said of a picture by such a choice of the eye; nothing of those that show something, nor of those that
+/// What is to be said of a picture by such a choice of the eye, which is called so; nothing of those that show something, nor of those that
 /// take so long that nobody renders them without looking.
-pub(super) fn warning(job: &Job, choice: &Choice, lens: Option<LensChoice>, file: &Path) -> Option<Diagnostic> {
+pub(super) fn warning(
+    job: &Job,
+    (choice, view): (&Choice, &str),
+    lens: Option<LensChoice>,
+    file: &Path,
+) -> Option<Diagnostic> {
     if job.world.is_empty() || job.accel.kind().is_slow() {
         return None;
     }
-    said(coverage(job), (choice, lens), job.scene, file)
+    let warning = said(coverage(job), (choice, lens), job.scene, file)?;
+    Some(Diagnostic { text: format!("{view}: {}", warning.text), ..warning })
 }
 
 fn said(

@@ -76,21 +76,32 @@ fn words_that_are_not_understood_are_told_in_the_form_that_is_asked_for() {
 #[test]
 fn pictures_that_show_next_to_nothing_are_written_with_a_warning() {
     let away = ["cube.obj", "--eye", "0,0,9", "--at", "0,0,99", "-o", "away.png"];
-    Folder::with_cube().render(&away).ends(0).says(&["warning: cube.obj: none of 4096 rays", "aim the eye with --at"]);
+    Folder::with_cube()
+        .render(&away)
+        .ends(0)
+        .says(&["warning: cube.obj: given eye: none of 4096 rays", "aim the eye with --at"]);
     // Neither of two halves of the model can be called stray.
     let apart = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 100000 0 0\nv 100001 0 0\nv 100000 1 0\nf 1 2 3\nf 4 5 6\n";
     let folder = Folder::new().file("apart.obj", apart);
-    folder.render(&["apart.obj"]).ends(0).says(&["warning: apart.obj: none of 4096 rays", "far from each other"]);
+    folder
+        .render(&["apart.obj"])
+        .ends(0)
+        .says(&["warning: apart.obj: default view: none of 4096 rays", "far from each other"]);
     // It stands in the middle, where pixels of an even number of columns meet.
     let (x, y) = ([0.0, 0.3, 0.3, 0.0], [0.0, 0.0, 99.0, 99.0]);
     let thin: String = (0..4).map(|i| format!("v {} {} 0\n", x[i], y[i])).collect();
     let run = Folder::new().file("thin.obj", thin + "f 1 2 3 4\n").render(&["thin.obj", "--view", "front"]).ends(0);
     assert!(!run.stderr.contains("warning"), "{}", run.stderr);
     let far = ["cube.obj", "--ortho=1e6", "--view", "front"];
-    Folder::with_cube().render(&far).ends(0).says(&["warning: cube.obj: none of 4096 rays", "the height of --ortho"]);
+    Folder::with_cube()
+        .render(&far)
+        .ends(0)
+        .says(&["warning: cube.obj: front view: none of 4096 rays", "the height of --ortho"]);
     Folder::with_cube().render(&[&far[..], &["--strict"]].concat()).ends(3).says(&["none of 4096 rays", "--strict"]);
     let usual = Folder::with_cube().render(&["cube.obj"]).ends(0);
     assert!(!usual.stderr.contains("warning"), "{}", usual.stderr);
-    let frames = ["cube.obj", "--turntable", "2", "--quiet"];
-    assert_eq!(Folder::with_cube().render(&frames).ends(0).stderr, "");
+    for (ortho, lines) in [("--ortho", 0), ("--ortho=1e6", 1)] {
+        let run = Folder::with_cube().render(&["cube.obj", "--turntable", "3", "--quiet", ortho]).ends(0);
+        assert_eq!(run.stderr.lines().count(), lines, "{}", run.stderr);
+    }
 }
