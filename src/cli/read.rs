@@ -115,6 +115,18 @@ pub(super) fn placed(
     Ok(otherwise.world())
 }
 
+/// Stores a scene as a picture of it does: its instances are kept, too, where nothing else fits.
+pub(super) fn as_drawn(loaded: &Loaded, how: Instancing, limit: u64, file: &Path) -> Result<World, Diagnostic> {
+    let (other, remedy) = match how {
+        Instancing::Flatten => (
+            Instancing::Flatten,
+            "leave it to a fast structure to keep them once (render: --instances auto), or allow more with --max-memory",
+        ),
+        Instancing::Keep | Instancing::Auto => (Instancing::Keep, "allow more with --max-memory"),
+    };
+    placed(loaded, (how, other), limit, file, remedy)
+}
+
 /// Why a model with warnings is not rendered where they are errors.
 pub(super) fn not_strict(count: usize, file: &Path) -> Diagnostic {
     let kinds = if count == 1 { "is a warning".into() } else { format!("are {count} kinds of warnings") };

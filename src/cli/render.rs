@@ -14,7 +14,7 @@ use super::stats::{self, PictureStats};
 use super::writable::{self, Sources};
 use super::{accident, again, interrupt, read, surroundings};
 use crate::load::{Diagnostic, LoadOptions, Loaded};
-use crate::render::{Instancing, World};
+use crate::render::World;
 use crate::scene::Scene;
 use crate::scene::framing::{Bounds, robust_bounds_within};
 use crate::threads;
@@ -227,14 +227,7 @@ fn prepare(
             Exit::Input
         })?;
     }
-    let (ways, remedy) = match job.instances {
-        Instancing::Flatten => (
-            (Instancing::Flatten, Instancing::Flatten),
-            "leave it to a fast structure to keep them once (--instances auto), or allow more with --max-memory",
-        ),
-        how => ((how, Instancing::Keep), "allow more with --max-memory"),
-    };
-    let world = read::placed(&loaded, ways, job.load.limits.memory, &batch.inputs[0], remedy).map_err(|fault| {
+    let world = read::as_drawn(&loaded, job.instances, job.load.limits.memory, &batch.inputs[0]).map_err(|fault| {
         messages.say(Severity::Error, &fault);
         Exit::Failed
     })?;

@@ -72,7 +72,7 @@ pub enum RayOrder {
 /// fetch what they visit next, with trees of half a megabyte to four; 7 % slower with one of fourteen (measured).
 const NEAR: usize = 1 << 23;
 
-/// Packets of a wave that are asked how they run, at most about: asking all 256 of a wave of 4096 rays took some percent of the
+/// Packets of a wave that are asked how they run, at most: asking all 256 of a wave of 4096 rays took some percent of the
 /// time of rays that hit soon (measured).
 const ASKED: usize = 32;
 

@@ -8,7 +8,8 @@
 //! Hits count from a distance of zero on, or a later one, and a box that holds one is left later than that, if only by what
 //! [`PARALLEL`] adds to the pad: at the start nothing of it is used up, and over a direction's component it is more than any
 //! underflow, above 2⁻¹⁰³. So what lies behind the start need not be told apart, and distances are compared by their bits:
-//! a processor has the greater of two words sooner than that of two numbers. A ray whose hits may lie behind its start goes by `slabs`.
+//! a processor has the greater of two words sooner than that of two numbers. A ray whose hits may lie behind its start goes
+//! by `slabs`.
 
 use bytemuck::{Pod, Zeroable};
 

@@ -1,12 +1,12 @@
 //! However the rays of a wave are traced, on whatever instruction set: the answers are those of brute force.
 
 use super::flight::{DEPTH, FARTHEST_FIRST};
-use super::{MANY, RayOrder, Splitting, Wide};
+use super::{ASKED, MANY, RayOrder, Splitting, Wide};
 use crate::accel::tests::scenes::{self, ray};
 use crate::accel::{Accel, Hit, NoProbe, Pencil, Ray, Shapes, Unculled};
 use crate::math::Vec3;
 use crate::math::random::Random;
-use crate::math::simd::Level;
+use crate::math::simd::{Level, WIDE};
 
 const WAYS: [RayOrder; 4] = [RayOrder::OneByOne, RayOrder::InFlight, RayOrder::Packets, RayOrder::Adaptive];
 
@@ -162,6 +162,12 @@ fn a_wave_goes_in_packets_where_rays_run_alike_and_in_flight_where_not_and_there
     let toward = |k: usize| Ray { dir: Vec3::new(1.0, 2.0 + k as f32 * 0.01, 3.0), ..mixed[0] };
     assert_eq!(of(&(0..64).map(toward).collect::<Vec<_>>()), RayOrder::Packets);
     assert_eq!(of(&mixed[..9]), RayOrder::OneByOne);
+    // Of long waves some packets are asked, and not only the first.
+    let long = |rays: &dyn Fn(usize) -> Ray| (0..WIDE * ASKED * 3).map(rays).collect::<Vec<_>>();
+    let turning = |k: usize| mixed[k % mixed.len()];
+    let half = |first: bool| move |k: usize| if (k < WIDE * ASKED) == first { toward(k % 64) } else { turning(k) };
+    assert_eq!((of(&long(&toward)), of(&long(&turning))), (RayOrder::Packets, RayOrder::InFlight));
+    assert_eq!((of(&long(&half(true))), of(&long(&half(false)))), (RayOrder::InFlight, RayOrder::Packets));
 }
 
 #[test]

@@ -36,8 +36,8 @@ fn inspect(args: &InspectArgs, messages: &Messages) -> Exit {
         Ok(loaded) => loaded,
         Err(exit) => return exit,
     };
-    let (limit, ways) = (job::limits(load.max_memory).memory, (Instancing::Auto, Instancing::Keep));
-    let world = match read::placed(&loaded, ways, limit, input, "allow more with --max-memory") {
+    let limit = job::limits(load.max_memory).memory;
+    let world = match read::as_drawn(&loaded, Instancing::Auto, limit, input) {
         Ok(world) => world,
         Err(fault) => {
             messages.say(Severity::Error, &fault);

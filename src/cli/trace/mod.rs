@@ -106,7 +106,9 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
     if let Some(path) = &args.output {
         Sources::of(&loaded.facts.files).spared_by(path, "-o").map_err(fail(Exit::Failed))?;
     }
-    let world = world(args, &loaded).map_err(fail(Exit::Failed))?;
+    let how = if job::keeps_instances(args.accel) { Instancing::Auto } else { Instancing::Flatten };
+    let limit = job::limits(args.model.load.max_memory).memory;
+    let world = read::as_drawn(&loaded, how, limit, file).map_err(fail(Exit::Failed))?;
     let wrong = |text: String| Diagnostic::new("scene-value", file, "", text);
     let effective = Effective::new(look, &loaded.scene.hints).map_err(wrong).map_err(fail(Exit::Input))?;
     let settings = &effective.settings;
@@ -147,18 +149,6 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
         Some(path) => draw(path, &told, &job, messages).map_err(fail(Exit::Failed)),
         None => Ok(Exit::Done),
     }
-}
-
-/// Stores a model as a picture of it would.
-fn world(args: &TraceArgs, loaded: &Loaded) -> Result<World, Diagnostic> {
-    let (ways, remedy) = match job::keeps_instances(args.accel) {
-        true => ((Instancing::Auto, Instancing::Keep), "allow more with --max-memory"),
-        false => (
-            (Instancing::Flatten, Instancing::Flatten),
-            "leave it to a fast structure to keep them once, or allow more with --max-memory",
-        ),
-    };
-    read::placed(loaded, ways, job::limits(args.model.load.max_memory).memory, &args.model.input, remedy)
 }
 
 /// Whether there is such a pixel with such a sample.
