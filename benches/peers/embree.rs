@@ -4,6 +4,7 @@
 
 #![expect(unsafe_code, reason = "calls of a C library; every call is given what its documentation asks for")]
 
+use std::array;
 use std::ffi::{c_char, c_int, c_uint, c_void};
 use std::mem::ManuallyDrop;
 use std::path::Path;
@@ -12,8 +13,9 @@ use std::sync::atomic::{AtomicIsize, Ordering};
 
 use libloading::Library;
 use meshray::accel::{NO_PRIM, Ray, Shapes};
+use meshray::math::simd::Level;
 
-use crate::tracer::{Answer, PACKET, Rays, Tracer};
+use crate::tracer::{Answer, PACKET, Packet, Rays, Tracer};
 
 type Device = *mut c_void;
 type Scene = *mut c_void;
@@ -31,11 +33,14 @@ const COHERENT: c_int = 1 << 16;
 const COHERENT_3: c_int = 1;
 const ONLY_TRIANGLES: c_int = 1 << 1;
 
+/// Widths of packets that a device may trace as such, and the properties that tell.
+const WIDTHS: [(usize, c_int); 3] = [(16, 34), (8, 33), (4, 32)];
+
 /// Which lanes of a packet hold a ray: −1 where one does. The library wants it aligned.
 #[repr(C, align(64))]
-struct Valid([c_int; PACKET]);
+struct Valid<const N: usize>([c_int; N]);
 
-/// `RTCRayHit` and, with `N` = 16, `RTCRayHit16`; room for what either version appends.
+/// `RTCRayHit` and, with `N` of 4, 8, 16, `RTCRayHit4` and so on; room for what either version appends.
 #[repr(C, align(64))]
 #[derive(Clone, Copy)]
 struct RayHit<const N: usize> {
@@ -85,9 +90,12 @@ impl<const N: usize> RayHit<N> {
         self.prim[lane] = INVALID;
     }
 
-    /// All lanes: origin, direction, and where they end.
+    /// All lanes, from those of a packet that follow `first`: origin, direction, and where they end.
     #[inline(always)]
-    fn set_all(&mut self, [ox, oy, oz, dx, dy, dz, end]: &[[f32; N]; 7]) {
+    fn set_all(&mut self, packet: &Packet, first: usize) {
+        // Whole rows: the library loads them as vectors, and waits for rows that were stored number by number.
+        let [ox, oy, oz, dx, dy, dz, end] =
+            packet.each_ref().map(|row| row[first..].first_chunk().unwrap_or(&[0.0; N]));
         self.org = [*ox, *oy, *oz];
         self.dir = [*dx, *dy, *dz];
         self.tfar = *end;
@@ -134,6 +142,9 @@ pub(crate) struct Embree {
     library: ManuallyDrop<Library>,
     pub version: String,
     major: isize,
+    isa: &'static str,
+    /// Rays of the widest packets that it traces as such.
+    pub widest: usize,
 }
 
 /// A scene built by it.
@@ -142,14 +153,24 @@ pub(crate) struct Built<'e> {
     scene: Scene,
     device: Device,
     robust: bool,
-    packets: bool,
+    /// Rays of a packet; 1: ray by ray.
+    packet: usize,
     /// Bytes of its structure.
     pub bytes: usize,
 }
 
+/// What its device is told so that it keeps to a level.
+fn isa(level: Level) -> &'static str {
+    match level.word() {
+        "portable" if cfg!(target_arch = "x86_64") => ",isa=sse2",
+        "avx2" => ",isa=avx2",
+        _ => "",
+    }
+}
+
 impl Embree {
-    /// Loads the library, and first the TBB that lies beside it, if there is one.
-    pub(crate) fn load(path: &Path) -> Result<Self, String> {
+    /// Loads the library, and first the TBB that lies beside it, if there is one. It keeps to the instruction set of a level.
+    pub(crate) fn load(path: &Path, level: Level) -> Result<Self, String> {
         for entry in path.parent().into_iter().filter_map(|p| p.read_dir().ok()).flatten().flatten() {
             let name = entry.file_name();
             if name.to_string_lossy().starts_with("libtbb") {
@@ -159,12 +180,16 @@ impl Embree {
         }
         // SAFETY: as above.
         let library = unsafe { Library::new(path) }.map_err(|e| format!("{}: {e}", path.display()))?;
-        let mut embree = Self { library: ManuallyDrop::new(library), version: String::new(), major: 0 };
+        let mut embree =
+            Self { library: ManuallyDrop::new(library), version: String::new(), major: 0, widest: 1, isa: isa(level) };
         let device = embree.device(1);
-        // SAFETY: the signature is the documented one; 0 asks for the version.
-        let number = unsafe {
-            embree.function::<unsafe extern "C" fn(Device, c_int) -> isize>("rtcGetDeviceProperty")(device, 0)
+        // SAFETY: the signature is the documented one; 0 asks for the version, others for widths of packets.
+        let property = |which| unsafe {
+            embree.function::<unsafe extern "C" fn(Device, c_int) -> isize>("rtcGetDeviceProperty")(device, which)
         };
+        let number = property(0);
+        let widest = WIDTHS.into_iter().find(|&(_, which)| property(which) != 0).map_or(1, |(width, _)| width);
+        embree.widest = widest;
         embree.major = number / 10_000;
         embree.version = format!("Embree {}.{}.{}", number / 10_000, number / 100 % 100, number % 100);
         Ok(embree)
@@ -177,7 +202,7 @@ impl Embree {
     }
 
     fn device(&self, threads: usize) -> Device {
-        let config = format!("threads={threads},set_affinity=0\0");
+        let config = format!("threads={threads},set_affinity=0{}\0", self.isa);
         // SAFETY: a string that ends with 0.
         unsafe {
             self.function::<unsafe extern "C" fn(*const c_char) -> Device>("rtcNewDevice")(config.as_ptr().cast())
@@ -225,7 +250,7 @@ impl Embree {
             let before = HELD.load(Ordering::Relaxed);
             let timed = time(&mut || commit(scene));
             let bytes = usize::try_from(HELD.load(Ordering::Relaxed) - before).unwrap_or(0);
-            (Built { embree: self, scene, device, robust, packets: false, bytes }, timed)
+            (Built { embree: self, scene, device, robust, packet: 1, bytes }, timed)
         }
     }
 }
@@ -241,9 +266,9 @@ impl Drop for Built<'_> {
 }
 
 impl Built<'_> {
-    /// Asks with packets of sixteen, or ray by ray.
-    pub(crate) fn with_packets(&mut self, packets: bool) -> &mut Self {
-        self.packets = packets;
+    /// Asks with packets of 4, 8 or 16, or with 1 ray by ray.
+    pub(crate) fn with_packets(&mut self, rays: usize) -> &mut Self {
+        self.packet = rays;
         self
     }
 
@@ -263,19 +288,34 @@ impl Built<'_> {
         };
         let arguments = ptr::from_mut(&mut arguments).cast::<c_void>();
         let context = ptr::from_mut(&mut context).cast::<c_void>();
-        let verb = if any { "Occluded" } else { "Intersect" };
-        let four = self.embree.major >= 4;
-        if self.packets {
-            let query = self.embree.function::<QueryN>(&format!("rtc{verb}16"));
-            let mut packet = RayHit::<PACKET>::EMPTY;
-            for (rays, answers) in rays.packets.iter().zip(answers.chunks_mut(PACKET)) {
-                let valid = Valid(std::array::from_fn(|lane| if lane < answers.len() { -1 } else { 0 }));
-                packet.set_all(rays);
+        match self.packet {
+            4 => self.ask_packets::<4>(any, rays.packets, answers, arguments, context),
+            8 => self.ask_packets::<8>(any, rays.packets, answers, arguments, context),
+            16 => self.ask_packets::<16>(any, rays.packets, answers, arguments, context),
+            _ => self.ask_one_by_one(any, rays.all, answers, arguments, context),
+        }
+    }
+
+    /// `N` divides [`PACKET`].
+    fn ask_packets<const N: usize>(
+        &self,
+        any: bool,
+        packets: &[Packet],
+        answers: &mut [Answer],
+        arguments: *mut c_void,
+        context: *mut c_void,
+    ) {
+        let query = self.embree.function::<QueryN>(&format!("rtc{}{N}", verb(any)));
+        let mut packet = RayHit::<N>::EMPTY;
+        for (rays, answers) in packets.iter().zip(answers.chunks_mut(PACKET)) {
+            for (first, answers) in (0..PACKET).step_by(N).zip(answers.chunks_mut(N)) {
+                let valid = Valid::<N>(array::from_fn(|lane| if lane < answers.len() { -1 } else { 0 }));
+                packet.set_all(rays, first);
                 let packet_at = ptr::from_mut(&mut packet).cast();
                 // SAFETY: the packet has the documented layout and more room than either version writes to; version 4
                 // takes the arguments last, version 3 the context before the packet.
                 unsafe {
-                    if four {
+                    if self.embree.major >= 4 {
                         query(valid.0.as_ptr(), self.scene, packet_at, arguments);
                     } else {
                         query(valid.0.as_ptr(), self.scene, context, packet_at);
@@ -285,24 +325,38 @@ impl Built<'_> {
                     *answer = if any { blocked(packet.tfar[lane]) } else { packet.answer(lane) };
                 }
             }
-        } else {
-            let query = self.embree.function::<Query1>(&format!("rtc{verb}1"));
-            let mut one = RayHit::<1>::EMPTY;
-            for (ray, answer) in rays.all.iter().zip(answers) {
-                one.set(0, ray);
-                let one_at = ptr::from_mut(&mut one).cast();
-                // SAFETY: as above.
-                unsafe {
-                    if four {
-                        query(self.scene, one_at, arguments);
-                    } else {
-                        query(self.scene, context, one_at);
-                    }
-                }
-                *answer = if any { blocked(one.tfar[0]) } else { one.answer(0) };
-            }
         }
     }
+
+    fn ask_one_by_one(
+        &self,
+        any: bool,
+        rays: &[Ray],
+        answers: &mut [Answer],
+        arguments: *mut c_void,
+        context: *mut c_void,
+    ) {
+        let query = self.embree.function::<Query1>(&format!("rtc{}1", verb(any)));
+        let mut one = RayHit::<1>::EMPTY;
+        for (ray, answer) in rays.iter().zip(answers) {
+            one.set(0, ray);
+            let one_at = ptr::from_mut(&mut one).cast();
+            // SAFETY: as above.
+            unsafe {
+                if self.embree.major >= 4 {
+                    query(self.scene, one_at, arguments);
+                } else {
+                    query(self.scene, context, one_at);
+                }
+            }
+            *answer = if any { blocked(one.tfar[0]) } else { one.answer(0) };
+        }
+    }
+}
+
+/// What a query is called.
+fn verb(any: bool) -> &'static str {
+    if any { "Occluded" } else { "Intersect" }
 }
 
 fn blocked(tfar: f32) -> Answer {
@@ -312,7 +366,7 @@ fn blocked(tfar: f32) -> Answer {
 impl Tracer for Built<'_> {
     fn name(&self) -> String {
         let mode = if self.robust { " robust" } else { "" };
-        let how = if self.packets { "packets of 16" } else { "ray by ray" };
+        let how = if self.packet > 1 { format!("packets of {}", self.packet) } else { "ray by ray".into() };
         format!("{}{mode}, {how}", self.embree.version)
     }
 

@@ -18,6 +18,7 @@ use std::time::Instant;
 
 use meshray::accel::{AccelChoice, AccelParams, NO_PRIM, Pencil, RayOrder, Splitting, Wide, auto};
 use meshray::bench::clock::{Spread, processor_seconds};
+use meshray::math::simd::Level;
 
 use crate::embree::Embree;
 use crate::mesh::Mesh;
@@ -27,11 +28,12 @@ use crate::rays::{Kind, primary, secondary};
 use crate::tracer::{Answer, PACKET, Rays, Tracer, directions, packets};
 
 const USAGE: &str = "\
-usage: peers [--passes N] [--kinds LETTERS] [--only WORD] [--size TRIANGLES] [MESH...]
+usage: peers [--passes N] [--kinds LETTERS] [--only WORD] [--size TRIANGLES] [--simd LEVEL] [MESH...]
        --passes N   timed passes of each program over all rays of a kind (default 5)
        --kinds PDS  only these kinds of rays: from the eye, diffuse, shadow
        --only WORD  only programs whose names have this word
        --size N     triangles of the made mesh, mountain (default 2e6)
+       --simd LEVEL instruction set that all keep to, one that the machine has: portable, avx2, avx512, neon
        MESH         rocker, bunny, stadium, hall, mountain (default: all)
 environment: MESHRAY_SHARED, the folder with bench/ and peers/ (default ../shared); MESHRAY_EMBREE, a libembree3 or
 libembree4";
@@ -54,6 +56,7 @@ struct Words {
     kinds: String,
     only: String,
     size: f64,
+    simd: Level,
     meshes: Vec<String>,
 }
 
@@ -62,8 +65,13 @@ fn main() -> ExitCode {
         eprintln!("{USAGE}");
         return ExitCode::from(2);
     };
+    if let Err(chosen) = words.simd.choose() {
+        eprintln!("the kernels have begun with {}", chosen.name());
+        return ExitCode::FAILURE;
+    }
+    println!("{}", words.simd.name());
     let shared = std::env::var_os("MESHRAY_SHARED").map_or_else(|| PathBuf::from("../shared"), PathBuf::from);
-    let embree = std::env::var_os("MESHRAY_EMBREE").map(|path| Embree::load(Path::new(&path))).transpose();
+    let embree = std::env::var_os("MESHRAY_EMBREE").map(|path| Embree::load(Path::new(&path), words.simd)).transpose();
     let embree = match embree {
         Ok(embree) => embree,
         Err(message) => {
@@ -91,12 +99,20 @@ fn main() -> ExitCode {
 }
 
 fn parse(mut words: impl Iterator<Item = String>) -> Option<Words> {
-    let mut parsed = Words { passes: 5, kinds: "PDS".into(), only: String::new(), size: 2e6, meshes: Vec::new() };
+    let mut parsed = Words {
+        passes: 5,
+        kinds: "PDS".into(),
+        only: String::new(),
+        size: 2e6,
+        simd: *Level::all().last()?,
+        meshes: Vec::new(),
+    };
     while let Some(word) = words.next() {
         match word.as_str() {
             "--passes" => parsed.passes = words.next()?.parse().ok().filter(|&n| n > 0)?,
             "--kinds" => parsed.kinds = words.next()?,
             "--only" => parsed.only = words.next()?,
+            "--simd" => parsed.simd = words.next()?.parse().ok()?,
             "--size" => parsed.size = words.next()?.parse().ok()?,
             name if MESHES.contains(&name) => parsed.meshes.push(word),
             _ => return None,
@@ -132,9 +148,10 @@ fn compare(mesh: &Mesh, embree: Option<&Embree>, words: &Words) -> bool {
     let mut tracers: Vec<Box<dyn Tracer + '_>> = Vec::new();
     let mut reference: Option<Box<dyn Tracer + '_>> = None;
     if let Some(embree) = embree {
-        for (robust, packets) in [(false, false), (false, true), (true, false), (true, true)] {
+        let widest = embree.widest;
+        for (robust, rays) in [(false, 1), (false, widest), (true, 1), (true, widest)] {
             let (mut built, ()) = embree.build(shapes, robust, 1, |build| build());
-            built.with_packets(packets);
+            built.with_packets(rays);
             tracers.push(Box::new(built));
         }
         reference = Some(Box::new(embree.build(shapes, true, 1, |build| build()).0));

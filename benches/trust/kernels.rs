@@ -10,6 +10,7 @@ use meshray::bench::oracle::{Oracle, Truth};
 use meshray::bench::verify::kernels::{Kernel, html};
 use meshray::bench::verify::tally::{Rate, Tally};
 use meshray::load::{LoadOptions, load};
+use meshray::math::simd::Level;
 use meshray::render::World;
 use rayon::prelude::*;
 
@@ -40,7 +41,7 @@ pub(crate) fn run(file: &str, count: usize, page: &str) -> bool {
     let oracle = Oracle::new(&shapes);
     let truths: Vec<Option<Truth>> = rays.par_iter().map(|ray| oracle.nearest(ray)).collect();
     let accel = AnyAccel::build(AccelKind::DEFAULT, &shapes, &AccelParams::DEFAULT);
-    let embree = std::env::var_os("MESHRAY_EMBREE").map(|path| Embree::load(Path::new(&path)));
+    let embree = std::env::var_os("MESHRAY_EMBREE").map(|path| Embree::load(Path::new(&path), Level::best()));
     let embree = match embree.transpose() {
         Ok(embree) => embree,
         Err(error) => {
@@ -61,7 +62,7 @@ pub(crate) fn run(file: &str, count: usize, page: &str) -> bool {
     let modes = [(false, false), (false, true), (true, false), (true, true)];
     for (embree, (robust, packets)) in embree.iter().flat_map(|embree| modes.map(|mode| (embree, mode))) {
         let (mut built, ()) = embree.build(&shapes, robust, 1, |build| build());
-        built.with_packets(packets);
+        built.with_packets(if packets { embree.widest } else { 1 });
         let name = built.name();
         let mut answers = vec![Answer { prim: 0, t: 0.0 }; rays.len()];
         let trace = move |hits: &mut Vec<Hit>| {

@@ -361,6 +361,7 @@ fn with_typed(pixels: RenderArgs, inputs: Vec<PathBuf>, typed: &RenderArgs) -> R
         heatmap_max: typed.heatmap_max,
         strict: typed.strict,
         threads: typed.threads,
+        simd: typed.simd,
         profile: typed.profile,
         stats: typed.stats,
         stats_file: typed.stats_file.clone(),
@@ -427,7 +428,7 @@ mod tests {
     #[test]
     fn every_other_flag_that_may_be_typed_beside_again_is_carried_on() {
         let words = "meshray render a.obj --output b.png --heatmap tests --heatmap-max 5 --keep-partial --root . \
-                     --max-memory 1G --strict --instances flatten --no-prune --threads 3 --stats json --stats-file s.json \
+                     --max-memory 1G --strict --instances flatten --no-prune --threads 3 --simd portable --stats json --stats-file s.json \
                      --profile --messages json --quiet";
         let command = Cli::command();
         let render = command.find_subcommand("render").unwrap();

@@ -62,6 +62,13 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
         Ok(command) => command,
         Err(e) => return misunderstood(&e, format),
     };
+    if let Some(level) = command.simd()
+        && let Err(chosen) = level.choose()
+    {
+        let text = format!("--simd {}: this process has begun with {}", level.word(), chosen.word());
+        Messages::new(format, false).error("usage", text, "");
+        return Exit::Usage;
+    }
     interrupt::install(format);
     accident::install();
     memory::keep_freed();

@@ -5,6 +5,7 @@ use crate::bench::range::{Spacing, values};
 use crate::generate::{Family, MAX_TRIANGLES};
 use crate::image::ToneMap;
 use crate::math::Vec3;
+use crate::math::simd::{Level, UnknownLevel};
 use crate::render::{Cost, Filter, Instancing, Quality, Split, UnknownCost};
 use crate::scene::framing::NamedView;
 use crate::scene::{Background, Environment, MAX_DEPTH, MAX_STOPS};
@@ -385,6 +386,11 @@ pub(super) fn assign() -> impl TypedValueParser<Value = Assign> {
 pub(super) fn mailbox() -> impl TypedValueParser<Value = MailboxKind> {
     let parse = |name: String| name.parse::<MailboxKind>().map_err(|e| e.to_string());
     PossibleValuesParser::new(MailboxKind::ALL.map(MailboxKind::name)).try_map(parse)
+}
+
+/// The name of an instruction set that the machine has.
+pub(super) fn level(text: &str) -> Result<Level, String> {
+    text.parse().map_err(|e: UnknownLevel| e.to_string())
 }
 
 /// The names of all ray/triangle tests.

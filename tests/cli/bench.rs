@@ -1,6 +1,7 @@
 //! `meshray bench`: how cost grows with size, and with a parameter.
 
 use super::program::{CUBE, Folder};
+use meshray::math::simd::Level;
 use serde_json::Value;
 
 const QUICK: [&str; 7] = ["bench", "--size", "16x12", "--passes", "0", "-q", "--accel"];
@@ -23,6 +24,17 @@ fn growth_is_measured_on_generated_scenes_and_reported_by_size() {
     let exponent = none["classes"]["primary"]["n_it"]["exponent"].as_f64().unwrap();
     assert!((exponent - 1.0).abs() < 1e-9, "every eye ray is tested against everything: {exponent}");
     assert!(String::from_utf8(folder.read("r.html")).unwrap().contains("Growth: tetra"));
+}
+
+#[test]
+fn a_report_says_which_instruction_set_was_chosen() {
+    let folder = Folder::with_cube();
+    for level in Level::all() {
+        let words = ["fast-octree", "--simd", level.word(), "--report", "r.json", "cube.obj"];
+        folder.run(&[&QUICK[..], &words].concat()).ends(0);
+        let report: Value = serde_json::from_slice(&folder.read("r.json")).unwrap();
+        assert_eq!(report["machine"]["simd"], level.name());
+    }
 }
 
 #[test]

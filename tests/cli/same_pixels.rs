@@ -1,8 +1,9 @@
-//! Structure and number of threads do not show in the pixels.
+//! Structure, number of threads and instruction set do not show in the pixels.
 
 use super::program::{Folder, picture};
 use crate::common::{bits, models};
 use meshray::accel::AccelKind;
+use meshray::math::simd::Level;
 
 const THREADS: [&str; 3] = ["1", "2", "7"];
 
@@ -35,6 +36,22 @@ fn every_model_gives_the_same_bits_with_every_structure_and_any_threads() {
     all_agree(&folder, "cube.obj", "48x36", &all);
     for input in models() {
         all_agree(&folder, input.to_str().unwrap(), "48x36", &affordable);
+    }
+}
+
+#[test]
+fn every_instruction_set_of_the_machine_gives_the_same_bits() {
+    let folder = Folder::with_cube();
+    for input in models() {
+        let with = |level: &str| {
+            let how = ["--size", "48x36", "--max-samples", "8", "--simd", level, "-o", "out.exr"];
+            folder.run(&[&["render", "--float", "--layers", input.to_str().unwrap()], how.as_slice()].concat()).ends(0);
+            bits(&picture(&folder.path("out.exr")))
+        };
+        let first = with(Level::PORTABLE.word());
+        for level in Level::all() {
+            assert!(first == with(level.word()), "{}: {} differs", input.display(), level.name());
+        }
     }
 }
 

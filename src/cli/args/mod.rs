@@ -3,6 +3,7 @@
 mod explain;
 mod eye;
 mod generate;
+mod level;
 mod model;
 mod render;
 mod structure;
@@ -12,6 +13,7 @@ mod words;
 pub(super) use explain::ExplainArgs;
 pub(super) use eye::EyeArgs;
 pub(super) use generate::GenerateArgs;
+pub(super) use level::SimdArgs;
 pub(super) use model::{Axis, LoadArgs, ModelArgs, MomentArgs, MtlArg, PolygonsArg};
 pub(super) use render::RenderArgs;
 pub(super) use structure::AccelArgs;
@@ -23,6 +25,7 @@ use super::diff::DiffArgs;
 use super::inspect::InspectArgs;
 use super::trace::TraceArgs;
 use super::verify::VerifyArgs;
+use crate::math::simd::Level;
 use clap::{Parser, Subcommand};
 
 /// Render downloaded meshes (glTF 2.0, OBJ, PLY, STL) into pictures, on any CPU.
@@ -72,6 +75,19 @@ pub(super) enum Command {
     },
     /// Print the manual page (roff)
     Man,
+}
+
+impl Command {
+    /// The instruction set that the kernels are kept to.
+    pub(super) fn simd(&self) -> Option<Level> {
+        match self {
+            Self::Render(args) => args.simd.simd,
+            Self::Verify(args) => args.simd.simd,
+            Self::Bench(args) => args.simd.simd,
+            Self::Study(args) => args.simd.simd,
+            _ => None,
+        }
+    }
 }
 
 const RENDER_EXAMPLES: &str = "\

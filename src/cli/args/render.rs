@@ -2,6 +2,7 @@
 
 use super::super::parse;
 use super::super::sampling::SamplingArgs;
+use super::level::SimdArgs;
 use super::model::{Axis, MomentArgs, MtlArg, PolygonsArg};
 use super::structure::AccelArgs;
 use super::words::{FileType, MessageFormat, StatsFormat};
@@ -232,6 +233,9 @@ pub(in crate::cli) struct RenderArgs {
     /// Threads to use; 0: all
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u16).range(0..=1024), help_heading = "Run")]
     pub threads: u16,
+    /// What the kernels may use.
+    #[command(flatten)]
+    pub simd: SimdArgs,
     /// Print times and counts: a timed run, then a counted one
     #[arg(long, value_name = "FORMAT", value_enum, help_heading = "Run")]
     pub stats: Option<StatsFormat>,

@@ -1,7 +1,7 @@
 //! What was typed after `meshray study`.
 
 use super::super::parse;
-use super::{EyeArgs, ModelArgs};
+use super::{EyeArgs, ModelArgs, SimdArgs};
 use crate::accel::AccelChoice;
 use crate::bench::study::Plan as Study;
 use crate::image::ToneMap;
@@ -45,6 +45,9 @@ pub(in crate::cli) struct StudyArgs {
     /// Threads that render [default: all]
     #[arg(long, value_name = "N", value_parser = parse::positive, help_heading = "Run")]
     pub threads: Option<usize>,
+    /// What the kernels may use.
+    #[command(flatten)]
+    pub simd: SimdArgs,
     /// Write a report too, after each setting; what kind the ending says: json, csv, html
     #[arg(long, value_name = "PATH", action = ArgAction::Append, help_heading = "Run")]
     pub report: Vec<PathBuf>,

@@ -1,6 +1,6 @@
 //! What was typed after `meshray bench`.
 
-use super::super::args::{AccelArgs, EyeArgs, LoadArgs};
+use super::super::args::{AccelArgs, EyeArgs, LoadArgs, SimdArgs};
 use super::super::parse;
 use crate::accel::AccelKind;
 use crate::bench::baseline::Limit;
@@ -73,6 +73,9 @@ pub(in crate::cli) struct BenchArgs {
     /// Threads that build and trace
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Run")]
     pub threads: u16,
+    /// What the kernels may use.
+    #[command(flatten)]
+    pub simd: SimdArgs,
     /// Ray/prim tests of each class that a slow structure may take in a pass; it gets as few rays as that allows
     #[arg(long, value_name = "N", default_value_t = Plan::SLOW_TESTS, help_heading = "Run")]
     pub slow_tests: u64,

@@ -1,6 +1,6 @@
 //! What was typed after `meshray verify`.
 
-use super::super::args::ModelArgs;
+use super::super::args::{ModelArgs, SimdArgs};
 use super::super::parse;
 use crate::bench::verify::Plan;
 use clap::Args;
@@ -18,6 +18,9 @@ pub(in crate::cli) struct VerifyArgs {
     /// Other numbers give other rays
     #[arg(long, value_name = "N", default_value_t = Plan::DEFAULT.seed)]
     pub seed: u64,
+    /// What the kernels may use.
+    #[command(flatten)]
+    pub simd: SimdArgs,
     /// Print JSON (schema `meshray-verify/1`)
     #[arg(long)]
     pub json: bool,

@@ -18,7 +18,10 @@ mod portable;
 #[cfg(test)]
 mod tests;
 
-use std::sync::LazyLock;
+use std::str::FromStr;
+use std::sync::OnceLock;
+
+use thiserror::Error;
 
 pub use portable::Portable;
 
@@ -264,7 +267,29 @@ enum Set {
     Neon,
 }
 
-static BEST: LazyLock<Level> = LazyLock::new(|| *Level::all().last().unwrap_or(&Level::PORTABLE));
+/// What [`Level::best`] gives, once it has been asked for or chosen.
+static CHOSEN: OnceLock<Level> = OnceLock::new();
+
+/// A name that is no level of this machine.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("this machine has {}", names(.0))]
+pub struct UnknownLevel(Vec<Level>);
+
+/// As they are typed.
+fn names(levels: &[Level]) -> String {
+    levels.iter().map(|level| level.word()).collect::<Vec<_>>().join(", ")
+}
+
+impl FromStr for Level {
+    type Err = UnknownLevel;
+
+    /// One of [`Level::all`], by its name or [`Level::word`].
+    fn from_str(text: &str) -> Result<Self, UnknownLevel> {
+        let all = Self::all();
+        let named = |level: &&Self| [level.name(), level.word()].iter().any(|name| name.eq_ignore_ascii_case(text));
+        all.iter().find(named).copied().ok_or_else(|| UnknownLevel(all.clone()))
+    }
+}
 
 impl Level {
     /// What every machine has.
@@ -283,10 +308,20 @@ impl Level {
         all
     }
 
-    /// The fastest that this machine has.
+    /// The fastest that this machine has, unless another was chosen ([`Self::choose`]).
     #[inline]
     pub fn best() -> Self {
-        *BEST
+        *CHOSEN.get_or_init(|| *Self::all().last().unwrap_or(&Self::PORTABLE))
+    }
+
+    /// Makes this the level that [`Self::best`] gives to the whole process. Answers are the same on every level, times are not.
+    ///
+    /// # Errors
+    ///
+    /// The level that was given out before, where it is another.
+    pub fn choose(self) -> Result<(), Self> {
+        let chosen = *CHOSEN.get_or_init(|| self);
+        if chosen == self { Ok(()) } else { Err(chosen) }
     }
 
     /// As printed.
@@ -299,6 +334,19 @@ impl Level {
             Set::Avx512(_) => "AVX-512",
             #[cfg(target_arch = "aarch64")]
             Set::Neon => "NEON",
+        }
+    }
+
+    /// As typed: the name in small letters, without a hyphen.
+    pub fn word(self) -> &'static str {
+        match self.0 {
+            Set::Portable => "portable",
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx2(_) => "avx2",
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx512(_) => "avx512",
+            #[cfg(target_arch = "aarch64")]
+            Set::Neon => "neon",
         }
     }
 

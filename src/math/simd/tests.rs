@@ -3,6 +3,27 @@
 use super::*;
 use crate::math::random::Random;
 
+#[test]
+fn levels_are_named_as_they_are_printed_or_typed_if_the_machine_has_them() {
+    for level in Level::all() {
+        for name in [level.name(), level.word()] {
+            assert_eq!(name.to_lowercase().parse(), Ok(level));
+        }
+    }
+    let fault = "sse9".parse::<Level>().unwrap_err().to_string();
+    assert!(Level::all().iter().all(|level| fault.contains(level.word())), "{fault}");
+}
+
+#[test]
+fn a_level_that_was_given_out_stays() {
+    let best = Level::best();
+    assert_eq!(best.choose(), Ok(()));
+    for other in Level::all().into_iter().filter(|level| *level != best) {
+        assert_eq!(other.choose(), Err(best));
+    }
+    assert_eq!(Level::best(), best);
+}
+
 const HARD: [f32; 10] =
     [0.0, -0.0, 1.0, -3.5, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e-42, f32::MAX, f32::MIN_POSITIVE];
 
