@@ -6,13 +6,15 @@
 //! The polygon is seen along the axis of its Newell normal's largest component. An ear is cut only where no other
 //! corner lies in it or on its diagonal, so corners on straight runs stay corners of some triangle and no T-junction
 //! arises. A polygon with n corners whose boundary does not cross itself, bridges to holes included, gives n − 2
-//! triangles of positive area. Spikes that stick out are dropped first. Where no ear is left, three fallbacks follow:
+//! triangles of positive area. Spikes that stick out are dropped first. A polygon that touches itself in corners falls into
+//! parts there that are cut one by one ([`lobes`]). Where no ear is left, three fallbacks follow:
 //! straight corners are cut off with triangles of no area; a quad that crosses itself is cut along its shorter diagonal
 //! like every warped quad; a larger polygon that crosses itself loses its first convex corner whatever lies inside;
 //! after [`MAX_FORCED`] of those the rest becomes a fan. Every corner is still used, what is covered twice or lost
 //! there is undefined.
 
 mod blockers;
+mod lobes;
 
 use super::DVec3;
 use blockers::Blockers;
@@ -110,8 +112,34 @@ impl EarClipper {
                 out.extend(pair);
                 Outcome::Exact
             }
-            None => self.clip(ring, out),
+            None => {
+                let start = out.len();
+                let outcome = self.clip(ring, out);
+                if outcome != Outcome::Crossing {
+                    return outcome;
+                }
+                self.cut_lobes(ring, start, out).unwrap_or(outcome)
+            }
         }
+    }
+
+    /// Cuts what touches itself in corners alone, part by part, instead of what was appended from `start` on. `None`, and
+    /// nothing is changed, where it does not, or a part crosses itself.
+    fn cut_lobes(&mut self, ring: &[u32], start: usize, out: &mut Vec<[u32; 3]>) -> Option<Outcome> {
+        let rings = lobes::lobes(&self.flat, ring);
+        if rings.len() < 2 {
+            return None;
+        }
+        let (mut cut, mut outcome) = (Vec::new(), Outcome::Exact);
+        for ring in &rings {
+            outcome = outcome.max(self.clip(ring, &mut cut));
+            if outcome == Outcome::Crossing {
+                return None;
+            }
+        }
+        out.truncate(start);
+        out.append(&mut cut);
+        Some(outcome)
     }
 
     fn clip(&mut self, ring: &[u32], out: &mut Vec<[u32; 3]>) -> Outcome {
@@ -328,7 +356,11 @@ impl EarClipper {
 impl Outcome {
     /// The worse of both.
     fn max(self, other: Self) -> Self {
-        if matches!(self, Self::Crossing) { self } else { other }
+        match (self, other) {
+            (Self::Crossing, _) | (_, Self::Crossing) => Self::Crossing,
+            (Self::Degenerate, _) | (_, Self::Degenerate) => Self::Degenerate,
+            _ => Self::Exact,
+        }
     }
 }
 
@@ -481,6 +513,31 @@ mod tests {
             (5, 1),
         ];
         assert_exact(&plane(&two));
+    }
+
+    #[test]
+    fn a_polygon_that_touches_itself_in_corners_is_cut_lobe_by_lobe() {
+        let chain = |lobes: i32| {
+            let there = (0..lobes).flat_map(|i| [(4 * i, 0), (4 * i + 2, -2)]);
+            let back = (0..lobes).rev().flat_map(|i| [(4 * i + 4, 0), (4 * i + 2, 2)]);
+            plane(&there.chain(back).collect::<Vec<_>>())
+        };
+        let bow = plane(&[(-4, -4), (0, 0), (4, -4), (4, 4), (0, 0), (-4, 4)]);
+        for (mut points, area) in [(bow, 32.0), (chain(2), 16.0), (chain(50), 400.0)] {
+            for _ in 0..points.len() {
+                let (triangles, outcome) = cut(&points);
+                assert_ne!(outcome, Outcome::Crossing, "{points:?}");
+                let areas: Vec<f64> = triangles.iter().map(|&t| 0.5 * area2(&points, t)).collect();
+                assert!(areas.iter().all(|&a| a >= 0.0) && areas.iter().sum::<f64>() == area, "{points:?}: {areas:?}");
+                points.rotate_left(1);
+            }
+        }
+    }
+
+    #[test]
+    fn loops_that_turn_the_other_way_are_no_lobes() {
+        let eight = plane(&[(-4, -4), (0, 0), (4, 4), (4, -4), (0, 0), (-4, 4)]);
+        assert_eq!(cut(&eight).1, Outcome::Crossing);
     }
 
     #[test]
