@@ -71,7 +71,7 @@ pub(super) fn detect(source: &Source) -> Result<Format, Diagnostic> {
     if bytes.starts_with(b"glTF") {
         return Ok(Format::Gltf);
     }
-    if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
+    if text.starts_with(b"ply\n") || text.starts_with(b"ply\r") {
         return Ok(Format::Ply);
     }
     if stl::is_exact(&source.bytes) {

@@ -115,6 +115,7 @@ pub(in crate::cli) struct RenderArgs {
     pub background: Option<parse::Back>,
     /// What surrounds the scene and lights it: an equirectangular picture (.hdr, .exr), or studio, white, black
     ///
+    /// Black gives no light, but mirrors and glass see the --background in it, where that is a colour (dark grey if nobody says).
     /// A model without lamps keeps its default ones in the studio, and anything else takes their place; lamps of the file
     /// keep shining. A picture's middle lies along +X, a quarter to the right of it +Z, its upper edge overhead.
     #[arg(long, value_name = "FILE|NAME", value_parser = parse::env, help_heading = "Light and background")]

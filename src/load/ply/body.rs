@@ -56,6 +56,17 @@ impl<'a> Body<'a> {
         (self.bytes.len() - self.at.min(self.bytes.len())) as u64
     }
 
+    /// A warning when something follows what the header counts. Blanks do not count, nor does what the last line of a text
+    /// ends with.
+    pub(super) fn behind(&self) -> Option<Diagnostic> {
+        let rest = self.bytes.get(self.at..).unwrap_or_default();
+        let rest = if self.encoding == Encoding::Text { rest.trim_ascii() } else { rest };
+        (!rest.is_empty()).then(|| {
+            let text = format!("{} bytes follow what the header counts", rest.len());
+            Diagnostic { code: "ply-bytes-behind", ..self.fault(text, "they are not read") }
+        })
+    }
+
     /// Refuses an element that claims more than there are bytes for.
     pub(super) fn check_count(&self, element: &Element) -> Result<(), Diagnostic> {
         let (count, least, left) = (element.count, element.least(self.encoding), self.left());

@@ -21,9 +21,11 @@ pub(super) fn read(header: &Header, source: &Source, budget: &mut Budget) -> Res
         reader.element(element)?;
     }
     let Reader { body, mut bare, .. } = reader;
+    let behind = body.behind();
     bare.places = (header.encoding == Encoding::Text).then_some(body.places);
     bare.comments.clone_from(&header.comments);
     bare.told = passed_over(header, &source.path);
+    bare.told.extend(behind);
     Ok(bare)
 }
 

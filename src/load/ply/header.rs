@@ -136,12 +136,14 @@ struct Lines<'a> {
 impl<'a> Lines<'a> {
     fn new(bytes: &'a [u8]) -> Self {
         let first = bytes.iter().position(|b| matches!(b, b'\n' | b'\r')).unwrap_or(bytes.len());
+        // A byte-order mark.
+        let at = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
         let end: &[u8] = match &bytes[first..] {
             [b'\r', b'\n', ..] => b"\r\n",
             [b'\r', ..] => b"\r",
             _ => b"\n",
         };
-        Self { bytes, end, at: 0, count: 0 }
+        Self { bytes, end, at, count: 0 }
     }
 
     fn next(&mut self) -> Option<&'a [u8]> {

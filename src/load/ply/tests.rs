@@ -292,6 +292,26 @@ fn triangle(vertex: &str, comment: &str, face: &str, of_vertex: [&str; 3], of_fa
 }
 
 #[test]
+fn what_follows_the_elements_is_told_and_a_mark_before_them_is_none() {
+    let warnings = |file: &[u8]| plain(file).warnings.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let body = "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    assert_eq!(warnings(&text(&format!("{body} \n\r\n"))), [""; 0]);
+    let more = warnings(&text(&format!("{body}3 2 1 0\n")));
+    assert_eq!(more, ["a.ply:13: 7 bytes follow what the header counts; they are not read"]);
+    let mut marked = b"\xef\xbb\xbf".to_vec();
+    marked.extend(text(body));
+    assert_eq!(plain(&marked).facts.faces, 1);
+    let vertex = "element vertex 1\nproperty float x\nproperty float y\nproperty float z";
+    let mut binary =
+        encoded("binary_little_endian", vertex, &[Value::Float(1.0), Value::Float(2.0), Value::Float(3.0)]);
+    assert!(!warnings(&binary).iter().any(|w| w.contains("follow")));
+    let end = binary.len();
+    binary.push(0);
+    let told = format!("a.ply:byte {end}: 1 bytes follow what the header counts; they are not read");
+    assert!(warnings(&binary).contains(&told), "{:?}", warnings(&binary));
+}
+
+#[test]
 fn what_would_change_the_look_and_is_not_read_is_told() {
     let told = |loaded: Loaded| loaded.warnings.iter().map(ToString::to_string).collect::<Vec<_>>();
     let colors = "property uchar red\nproperty uchar green\nproperty uchar blue\n";

@@ -11,7 +11,8 @@
 //! up = "y"                      # or "z"; default "y"
 //! background = "white"          # colour, "transparent" or "environment"; default: the environment, dark grey if black
 //! environment = "studio"        # what rays that leave see: "studio", "black", a colour, or a file such as "sky.hdr",
-//!                               # an equirectangular picture; default "black"
+//!                               # an equirectangular picture; default "black": no light, but mirrors and glass see the
+//!                               # background in it, where that is a colour
 //! # environment_rotation = 90   # turns that picture about the up axis, degrees
 //!
 //! [render]                      # defaults that the command line overrides; every key optional

@@ -77,6 +77,19 @@ fn keywords_come_in_any_case_on_any_lines_in_several_solids() {
 }
 
 #[test]
+fn a_file_on_one_line_is_read_and_one_without_its_end_is_told_of() {
+    let whole = plain(text().as_bytes());
+    let one = plain(text().replace('\n', " ").as_bytes());
+    assert_eq!((one.facts.faces, one.warnings.len()), (whole.facts.faces, whole.warnings.len()));
+    let nameless = plain(text().replace("tetra of ours\n", " ").as_bytes());
+    assert_eq!(nameless.facts.faces, whole.facts.faces);
+    let open = plain(text().rsplit_once("endsolid").unwrap().0.as_bytes());
+    assert_eq!(open.facts.faces, whole.facts.faces);
+    let told = open.warnings.iter().map(ToString::to_string).find(|w| w.contains("endsolid")).unwrap();
+    assert_eq!(told, "a.stl:30: the file ends without `endsolid`; it may have been cut off");
+}
+
+#[test]
 fn both_zeros_are_one_place_and_near_places_are_two() {
     let facet =
         |x: &str| format!("facet normal 0 0 1 outer loop vertex {x} 0 0 vertex 1 0 0 vertex 0 1 0 endloop endfacet\n");

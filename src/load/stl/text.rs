@@ -14,21 +14,24 @@ use std::path::Path;
 /// Reads every triangle.
 ///
 /// # Errors
-/// At the first word that is out of place, with its line. A solid without its end is whole all the same.
+/// At the first word that is out of place, with its line. A solid without its end may be whole all the same; a warning says
+/// so.
 pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnostic> {
     let mut words = Words { file: &source.path, bytes: &source.bytes, at: 0, line: 1, places: 0 };
     // A byte-order mark.
     words.at = if source.bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
-    let mut names = Vec::new();
+    let (mut names, mut open) = (Vec::new(), false);
     while let Some(word) = words.next() {
         if is(word, "solid") {
-            let name = words.rest_of_line();
+            open = true;
+            let name = words.name();
             if names.is_empty() && !name.is_empty() {
                 names.push(name);
             }
         } else if is(word, "facet") {
             out.add(facet(&mut words)?)?;
         } else if is(word, "endsolid") {
+            open = false;
             words.rest_of_line();
         } else {
             return Err(words.fault(word, "`solid`, `facet` or `endsolid`"));
@@ -37,6 +40,11 @@ pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnost
     let mut bare = out.bare;
     bare.places = Some(words.places);
     bare.comments = names;
+    if open {
+        let place = words.line.to_string();
+        let warning = Diagnostic::new("stl-no-end", &source.path, place, "the file ends without `endsolid`");
+        bare.told.push(warning.remedy("it may have been cut off"));
+    }
     Ok(bare)
 }
 
@@ -87,7 +95,22 @@ impl<'a> Words<'a> {
         Some(&rest[..length]).filter(|word| !word.is_empty())
     }
 
-    /// The name of a solid, which may be of any words.
+    /// The name of a solid, which may be of any words: up to the end of the line, or the first facet on it.
+    fn name(&mut self) -> String {
+        let start = self.at;
+        let name = self.rest_of_line();
+        let words: Vec<&str> = name.split_ascii_whitespace().collect();
+        let Some(before) = words.windows(2).position(|w| is(w[0].as_bytes(), "facet") && is(w[1].as_bytes(), "normal"))
+        else {
+            return name;
+        };
+        self.at = start;
+        for _ in 0..before {
+            self.next();
+        }
+        words[..before].join(" ")
+    }
+
     fn rest_of_line(&mut self) -> String {
         let rest = &self.bytes[self.at..];
         let length = rest.iter().position(|b| matches!(b, b'\n' | b'\r')).unwrap_or(rest.len());
