@@ -14,7 +14,7 @@
 //!
 //! # Example
 //! ```
-//! use meshray::accel::{AccelKind, AnyAccel, AccelParams};
+//! use meshray::accel::{AccelChoice, AccelParams};
 //! use meshray::image::{FileKind, Metadata, Output};
 //! use meshray::load::{LoadOptions, load_bytes};
 //! use meshray::render::texture::TextureStore;
@@ -32,10 +32,11 @@
 //! default_light::add_if_missing(&mut scene, &camera);
 //!
 //! let world = World::new(&scene);
+//! let (accel, _) = world.structure(AccelChoice::Auto, &AccelParams::DEFAULT);
 //! let job = Job {
 //!     scene: &scene,
 //!     world: &world,
-//!     accel: &AnyAccel::build(AccelKind::default(), &world.shapes, &AccelParams::DEFAULT),
+//!     accel: &accel,
 //!     textures: &TextureStore::new(&scene),
 //!     view: &View::from_camera(&camera),
 //!     settings: &settings,
@@ -49,6 +50,50 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! # Rays of one's own
+//! A mesh that was made in memory, what rays hit of it, and how many tests that took:
+//! ```
+//! use meshray::accel::{Accel, AccelKind, AccelParams, AccelChoice, Hit, NoProbe, RayCounts};
+//! use meshray::math::{DAffine3, DVec3, Vec3};
+//! use meshray::render::World;
+//! use meshray::render::world::PrimSource;
+//! use meshray::scene::{Instance, Material, Mesh, Scene};
+//!
+//! let square = Mesh {
+//!     positions: vec![Vec3::ZERO, Vec3::X, Vec3::X + Vec3::Y, Vec3::Y],
+//!     triangles: vec![[0, 1, 2], [0, 2, 3]],
+//!     ..Mesh::default()
+//! };
+//! // A mesh is there where an instance places it.
+//! let place = DAffine3::from_translation(DVec3::new(100.0, 0.0, 0.0));
+//! let scene = Scene {
+//!     materials: vec![Material::plain()],
+//!     meshes: vec![square],
+//!     instances: vec![Instance { name: "square".into(), mesh: 0, world_from_object: place }],
+//!     ..Scene::default()
+//! };
+//! scene.check()?;
+//!
+//! // `new` keeps nothing back, so that every structure can hold it.
+//! let world = World::new(&scene);
+//! let (structure, _) = world.structure(AccelChoice::Kind(AccelKind::GridOctree), &AccelParams::DEFAULT);
+//! let rays = [100.75, 100.25, 99.0].map(|x| world.ray(DVec3::new(x, 0.5, 2.0), DVec3::NEG_Z));
+//! let (mut hits, mut scratch) = ([Hit::MISS; 3], structure.scratch());
+//! structure.closest(&rays, &mut hits, &mut scratch, &mut NoProbe);
+//!
+//! assert_eq!(hits.map(|hit| hit.is_some()), [true, true, false]);
+//! assert_eq!(world.source(hits[1].prim), PrimSource::Triangle { instance: 0, triangle: 1 });
+//! let there = world.refine(&rays[0], &hits[0]);
+//! assert_eq!((hits[0].t, there.normal), (2.0, Vec3::Z));
+//! assert_eq!(world.to_world(there.position), DVec3::new(100.75, 0.5, 0.0));
+//!
+//! // The same rays once more, counted; `NoProbe` costs nothing.
+//! let mut counts = RayCounts::default();
+//! structure.closest(&rays, &mut hits, &mut scratch, &mut counts);
+//! assert!(counts.n_it <= 6, "never more than each ray against each triangle");
+//! # Ok::<(), meshray::scene::SceneFault>(())
+//! ```
+//!
 //! # Modules
 //! | module | knows |
 //! |---|---|
@@ -59,8 +104,10 @@
 //! | [`mod@render`] | rays -> linear pixels: waves, shading models, lights and shadows, optics, textures |
 //! | [`image`] | linear pixels <-> files: tone mapping, formats, metadata, differences |
 //! | [`mod@bench`] | measures and compares: hard rays, exact answers, what came out |
+//! | [`generate`] | scenes of any size for measurements |
+//! | [`save`] | scenes -> glTF, OBJ |
 //! | [`stopwatch`] | time on the wall and of the processor |
-//! | [`pages`] | arrays in large pages
+//! | [`pages`] | arrays in large pages |
 //! | [`threads`] | worker threads, each on a processor of its own |
 //! | `cli` | words -> jobs -> messages and exit codes (feature `cli`) |
 //!

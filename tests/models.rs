@@ -14,6 +14,7 @@ fn every_model_is_drawn_the_same_with_every_structure() {
     for path in models() {
         let name = path.display();
         let loaded = load(&path, &LoadOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!(loaded.scene.check(), Ok(()), "{name}");
         let draw = |kind, fewer| {
             let picture = still(loaded.scene.clone(), kind, WIDTH / fewer, HEIGHT / fewer);
             picture.unwrap_or_else(|| panic!("{name}: nothing to draw"))

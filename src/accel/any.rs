@@ -47,7 +47,8 @@ impl Default for AccelKind {
 }
 
 impl AccelKind {
-    /// The one that is used when none is named.
+    /// The default of the fast ones. What the command line uses when none is named is
+    /// [`AccelChoice::Auto`](super::AccelChoice::Auto), which looks at the shapes.
     pub const DEFAULT: Self = Self::FastOctree;
 
     /// Every kind, in the order of the help text.
@@ -184,7 +185,12 @@ trait Question {
 }
 
 impl<'a> AnyAccel<'a> {
-    /// Builds a structure over `shapes`, asked with the exact test.
+    /// Builds a structure over `shapes`, asked with the exact test. A [`World`](crate::render::World) may keep more than its
+    /// shapes: [`World::structure`](crate::render::World::structure) builds over everything.
+    ///
+    /// # Panics
+    ///
+    /// It may, with parameters that [`AccelParams::validate`] refuses, and where a vertex is infinite.
     pub fn build(kind: AccelKind, shapes: &'a Shapes, params: &AccelParams) -> Self {
         let structure = match kind {
             AccelKind::None => Structure::None(Unculled::new(shapes)),
@@ -254,6 +260,7 @@ impl<'a> AnyAccel<'a> {
         scratch: &mut AnyScratch,
         probe: &mut P,
     ) {
+        assert_eq!(rays.len(), hits.len(), "a hit for each ray");
         if P::SILENT {
             self.ask(FirstHits { rays, pencil, hits, probe: &mut NoProbe }, scratch);
         } else {
@@ -330,6 +337,7 @@ impl Accel for AnyAccel<'_> {
     }
 
     fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut AnyScratch, probe: &mut P) {
+        assert_eq!(rays.len(), blocked.len(), "a verdict for each ray");
         if P::SILENT {
             self.ask(Blocked { rays, blocked, probe: &mut NoProbe }, scratch);
         } else {
@@ -338,6 +346,7 @@ impl Accel for AnyAccel<'_> {
     }
 
     fn next<P: Probe>(&self, rays: &[Ray], after: &[Hit], hits: &mut [Hit], scratch: &mut AnyScratch, probe: &mut P) {
+        assert_eq!([after.len(), hits.len()], [rays.len(); 2], "a hit before and after for each ray");
         if P::SILENT {
             self.ask(NextHits { rays, after, hits, probe: &mut NoProbe }, scratch);
         } else {

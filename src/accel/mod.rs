@@ -57,7 +57,8 @@ pub use crate::math::cone::Cone;
 /// The prim id of "nothing": the answer of a ray that misses, and the `exclude` of a ray that excludes nothing.
 pub const NO_PRIM: u32 = u32::MAX;
 
-/// One ray, in the centred frame of its [`Shapes`]. `dir` need not be of unit length; t counts in its lengths.
+/// One ray, in the centred frame of its [`Shapes`]: [`World::ray`](crate::render::World::ray) makes one of a place in the
+/// world. `dir` need not be of unit length; t counts in its lengths.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Ray {
@@ -76,6 +77,11 @@ pub struct Ray {
 }
 
 impl Ray {
+    /// From a place of the shapes' frame on without end, past nothing.
+    pub const fn new(origin: Vec3, dir: Vec3) -> Self {
+        Self { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude: NO_PRIM, sample: 0 }
+    }
+
     /// Origin and `t_min`, direction and `t_max`: four numbers in a row each, which lanes read at once.
     #[inline(always)]
     pub(crate) fn in_fours(&self) -> [&[f32; 4]; 2] {
@@ -108,11 +114,15 @@ pub struct Hit {
     pub u: f32,
     /// Barycentric weight of the triangle's third corner; 0 for other shapes.
     pub v: f32,
-    /// What was hit, an index over all shapes (see [`Shapes`]), or [`NO_PRIM`].
+    /// What was hit, an index over all shapes (see [`Shapes`]), or [`NO_PRIM`]. What of a scene that is says
+    /// [`World::source`](crate::render::World::source).
     pub prim: u32,
 }
 
 impl Hit {
+    /// Before every hit: what [`Accel::next`] begins with.
+    pub const BEFORE_ALL: Self = Self { t: f32::NEG_INFINITY, u: 0.0, v: 0.0, prim: 0 };
+
     /// No hit.
     pub const MISS: Self = Self { t: f32::INFINITY, u: 0.0, v: 0.0, prim: NO_PRIM };
 
@@ -146,7 +156,11 @@ impl Hit {
 
 /// One way of answering what rays hit. Built once, then only read.
 ///
-/// Slices in one call have equal lengths.
+/// Calls answer on the thread that asks: for several threads, cut the rays into parts and give each thread a scratch value.
+///
+/// # Panics
+///
+/// Slices of one call have equal lengths, and a scratch value comes from the structure that is asked; else a call may panic.
 pub trait Accel: Sync {
     /// What a query writes to (stack, mailbox): one per worker, reused for every wave.
     type Scratch: Send;
@@ -169,9 +183,11 @@ pub trait Accel: Sync {
         self.closest(rays, hits, scratch, probe);
     }
 
-    /// Whether anything *opaque* lies in `t_min..=t_max` of each ray.
+    /// Whether anything *opaque* lies in `t_min..=t_max` of each ray: prims with a bit in [`Shapes::opaque`]. In a scene, alpha
+    /// masks, blended and transmissive materials are never opaque; whether anything at all lies there says [`Self::closest`].
     fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut Self::Scratch, probe: &mut P);
 
-    /// The first hit of each ray that comes after `after` in the order (t, prim), up to `t_max`.
+    /// The first hit of each ray in `t_min..=t_max` that comes after `after` in the order (t, prim). All hits are found one
+    /// after the other from [`Hit::BEFORE_ALL`] on, until one is [`Hit::MISS`].
     fn next<P: Probe>(&self, rays: &[Ray], after: &[Hit], hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P);
 }

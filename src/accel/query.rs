@@ -324,7 +324,7 @@ impl<I: Intersector> Goal for Occluded<I> {
 
     #[inline]
     fn wants(&self, shapes: &Shapes, prim: u32) -> bool {
-        shapes.opaque.get(prim)
+        shapes.opaque.get_or_set(prim)
     }
     #[inline]
     fn offer(&mut self, _t: f32, _prim: u32) -> Outcome {

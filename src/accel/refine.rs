@@ -37,6 +37,10 @@ impl Refined {
 
 impl Shapes {
     /// Position, error bound, normal and weights of a hit that a query of these shapes found on `ray`.
+    ///
+    /// # Panics
+    ///
+    /// For a miss: [`Hit::is_some`] tells.
     pub fn refine(&self, ray: &Ray, hit: &Hit) -> Refined {
         self.prim(hit.prim).refine(ray, hit)
     }

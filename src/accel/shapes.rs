@@ -30,7 +30,7 @@ pub struct Shapes {
     pub cones: Vec<Cone>,
     /// Unbounded planes (unit normal n, offset d: n·p = d); tested before every structure.
     pub planes: Vec<(Vec3, f32)>,
-    /// One bit per prim: a hit always stops light.
+    /// One bit per prim: a hit always stops light. Prims beyond its end are opaque; empty: all are.
     pub opaque: BitSet,
     /// Where each object made of faces begins: its first triangle and its first polygon, both counted from 0; ascending.
     /// Empty: all faces are one object.
@@ -84,11 +84,25 @@ impl BitSet {
     }
 
     /// Bit `i`.
+    ///
+    /// # Panics
+    ///
+    /// Beyond the last.
     pub fn get(&self, i: u32) -> bool {
         self.words[i as usize / 64] >> (i % 64) & 1 == 1
     }
 
+    /// Bit `i`; set where there is none.
+    #[inline]
+    pub fn get_or_set(&self, i: u32) -> bool {
+        self.words.get(i as usize / 64).is_none_or(|word| word >> (i % 64) & 1 == 1)
+    }
+
     /// Sets bit `i`.
+    ///
+    /// # Panics
+    ///
+    /// Beyond the last.
     pub fn set(&mut self, i: u32, value: bool) {
         let mask = 1u64 << (i % 64);
         let word = &mut self.words[i as usize / 64];
@@ -131,6 +145,10 @@ impl Shapes {
     }
 
     /// What prim `prim` is.
+    ///
+    /// # Panics
+    ///
+    /// Where there is none of that number, such as [`NO_PRIM`](super::NO_PRIM).
     #[inline]
     pub fn prim(&self, prim: u32) -> Prim<'_> {
         let mut i = prim as usize;

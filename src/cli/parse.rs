@@ -4,6 +4,7 @@ use crate::accel::{AccelChoice, AccelKind, Assign, IntersectorKind, MailboxKind}
 use crate::bench::range::{Spacing, values};
 use crate::generate::{Family, MAX_TRIANGLES};
 use crate::image::ToneMap;
+use crate::image::diff::MOST_PIXELS_PER_DEGREE;
 use crate::math::Vec3;
 use crate::math::simd::{Level, UnknownLevel};
 use crate::render::{Cost, Filter, Instancing, Quality, Split, UnknownCost};
@@ -356,6 +357,12 @@ pub(super) fn lean(text: &str) -> Result<f64, String> {
 /// An angle in degrees.
 pub(super) fn degrees(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|d: &f64| d.is_finite()).ok_or_else(|| "write an angle in degrees such as 90".to_owned())
+}
+
+/// How finely somebody sees a picture.
+pub(super) fn pixels_per_degree(text: &str) -> Result<f64, String> {
+    let wrong = || format!("write a number above 0 and up to {MOST_PIXELS_PER_DEGREE}");
+    finite(text).ok().filter(|&n| n > 0.0 && n <= MOST_PIXELS_PER_DEGREE).ok_or_else(wrong)
 }
 
 /// The names of all structures.

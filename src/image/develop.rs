@@ -82,6 +82,15 @@ pub(super) fn raster<T: Sample>(picture: &Picture, output: &Output) -> Raster<T>
     Raster { width: picture.width, height: picture.height, channels: if opaque { 3 } else { 4 }, samples }
 }
 
+/// The pixels that a PNG of 8 bits would hold: sRGB codes and straight alpha, rows from the top.
+pub fn rgba8(picture: &Picture, output: &Output) -> Vec<[u8; 4]> {
+    let Raster { channels, samples, .. } = raster::<u8>(picture, output);
+    if channels == 4 {
+        return samples.as_chunks().0.to_vec();
+    }
+    samples.as_chunks().0.iter().map(|&[r, g, b]| [r, g, b, u8::MAX]).collect()
+}
+
 /// One row on its way to the file.
 struct Row<'a, T, const CHANNELS: usize> {
     developer: &'a Developer<'a>,

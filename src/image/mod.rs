@@ -1,6 +1,6 @@
 //! Linear pixels <-> files: tone mapping, PNG, EXR with layers, JPEG, WebP, metadata, difference metrics.
 //!
-//! [`encode`] turns a [`Picture`] into the bytes of a file, [`write_atomic`] puts them on the disk, [`read_metadata`] tells
+//! [`encode`] turns a [`Picture`] into the bytes of a file, [`rgba8`] into what is shown on a screen, [`write_atomic`] puts them on the disk, [`read_metadata`] tells
 //! how a picture was made. Knows nothing of scenes or rays.
 
 mod develop;
@@ -22,6 +22,7 @@ pub mod tone;
 mod write;
 
 pub(crate) use develop::Developer;
+pub use develop::rgba8;
 pub use encode::encode;
 pub use error::ImageError;
 pub use kind::FileKind;

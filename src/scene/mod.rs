@@ -17,6 +17,7 @@ pub mod material;
 pub mod merge;
 pub mod mesh;
 pub mod panorama;
+mod sound;
 pub mod texture;
 
 pub use camera::{Camera, Projection};
@@ -26,15 +27,16 @@ pub use lobes::{Coat, Film, Grain, Sheen, Translucence};
 pub use material::{AlphaMode, Material, MetalRough, Phong, Surface, TextureRef, UvTransform};
 pub use mesh::{Cone, Instance, Mesh, Plane, Polygon, Sphere};
 pub use panorama::Panorama;
+pub use sound::SceneFault;
 pub use texture::{Bitmap, Filter, Mipmaps, Pixels, Sampler, Texture, Wrap};
 
 use crate::math::Vec3;
 use std::mem::size_of;
 
-/// A whole scene. Indices in its parts point into the arrays here.
+/// A whole scene. Indices in its parts point into the arrays here ([`Self::check`]).
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
-    /// Geometry, each in its own object space.
+    /// Geometry, each in its own object space; drawn where an [`Instance`] places it, and nowhere without one.
     pub meshes: Vec<Mesh>,
     /// Where meshes stand in the world.
     pub instances: Vec<Instance>,

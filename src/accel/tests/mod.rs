@@ -180,6 +180,47 @@ fn among_copies_of_a_triangle_the_lowest_is_hit_and_the_next_follow_in_order() {
 }
 
 #[test]
+fn shapes_without_a_word_on_it_are_opaque() {
+    let shapes = scenes::soup(300, 0.4);
+    let silent = Shapes { opaque: BitSet::default(), ..shapes.clone() };
+    let opaque = Shapes { opaque: BitSet::filled(shapes.len(), true), ..shapes };
+    let rays = rays(&opaque, 20);
+    for kind in AccelKind::ALL {
+        let blocked = |shapes| {
+            let (accel, mut blocked) = (AnyAccel::build(kind, shapes, &AccelParams::DEFAULT), vec![false; rays.len()]);
+            accel.occluded(&rays, &mut blocked, &mut accel.scratch(), &mut NoProbe);
+            blocked
+        };
+        let found = blocked(&silent);
+        assert!(found == blocked(&opaque) && found.iter().any(|&b| b), "{kind}");
+    }
+}
+
+#[test]
+fn the_next_hit_before_all_is_the_first() {
+    let shapes = scenes::mix();
+    let mut rays = rays(&shapes, 20);
+    rays.iter_mut().step_by(3).for_each(|ray| ray.t_min = 1.5);
+    for kind in AccelKind::ALL {
+        let accel = AnyAccel::build(kind, &shapes, &AccelParams::DEFAULT);
+        let (mut first, mut next) = (vec![Hit::MISS; rays.len()], vec![Hit::MISS; rays.len()]);
+        let mut scratch = accel.scratch();
+        accel.closest(&rays, &mut first, &mut scratch, &mut NoProbe);
+        accel.next(&rays, &vec![Hit::BEFORE_ALL; rays.len()], &mut next, &mut scratch, &mut NoProbe);
+        let bits = |hits: &[Hit]| hits.iter().map(Hit::bits).collect::<Vec<_>>();
+        assert!(bits(&first) == bits(&next) && first.iter().any(Hit::is_some), "{kind}");
+    }
+}
+
+#[test]
+#[should_panic(expected = "a hit for each ray")]
+fn answers_that_are_fewer_than_rays_are_a_mistake() {
+    let shapes = scenes::mix();
+    let accel = AnyAccel::build(AccelKind::DEFAULT, &shapes, &AccelParams::DEFAULT);
+    accel.closest(&rays(&shapes, 2), &mut [Hit::MISS; 1], &mut accel.scratch(), &mut NoProbe);
+}
+
+#[test]
 fn a_direction_too_small_for_boxes_finds_its_way_without_triangles() {
     let spheres = vec![SpherePrim { center: Vec3::ZERO, radius: 1.0 }];
     let shapes = Shapes { spheres, opaque: BitSet::filled(1, true), ..Shapes::default() };

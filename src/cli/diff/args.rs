@@ -32,10 +32,11 @@ pub(in crate::cli) struct DiffArgs {
     #[arg(long, value_name = "VALUE", value_parser = parse::not_negative, default_value_t = 0.0, help_heading = "Comparison")]
     pub threshold: f64,
     /// Pixels a degree of the visual field, for FLIP: the default is a 3840-column screen, 0.7 m wide, from 0.7 m
-    #[arg(long, value_name = "N", value_parser = parse::above_zero, default_value_t = (PIXELS_PER_DEGREE * 100.0).round() / 100.0,
+    #[arg(long, value_name = "N", value_parser = parse::pixels_per_degree, default_value_t = (PIXELS_PER_DEGREE * 100.0).round() / 100.0,
           help_heading = "Comparison")]
     pub pixels_per_degree: f64,
-    /// Exit with code 1 when a figure is beyond a limit, such as 'rmse>0.01,flip>0.05,psnr<40'; 'layer-max>0': when a layer
+    /// Exit with code 1 when a figure is beyond a limit, such as 'rmse>0.01,flip>0.05,psnr<40'; 'bias<-0.01,bias>0.01': darker
+    /// or brighter than that; 'layer-max>0': when a layer
     /// of two EXR files differs, or one of them has it alone
     #[arg(long, value_name = "LIMIT", value_delimiter = ',', help_heading = "Comparison")]
     pub fail_if: Vec<Limit>,

@@ -114,11 +114,11 @@ fn compared(args: &DiffArgs, messages: &Messages) -> Result<Compared, Fault> {
         _ => picture,
     };
     let (expected, actual) = (shown(expected, kinds[0]), shown(actual, kinds[1]));
-    let Some(difference) = compare(&expected, &actual, space, args.threshold) else {
+    let difference = compare(&expected, &actual, space, args.threshold);
+    let Some((difference, looks)) = difference.zip(looks(&expected, &actual, space, args.pixels_per_degree)) else {
         let fault = Diagnostic::new("picture-broken", &args.actual, "", "it has not as many pixels as its size says");
         return Err(Box::new((fault, Exit::Input)));
     };
-    let looks = looks(&expected, &actual, space, args.pixels_per_degree);
     Ok(Compared { expected, actual, space, difference, looks, layers, layers_of_one, left_out })
 }
 
@@ -177,7 +177,8 @@ fn map(args: &DiffArgs, compared: &Compared) -> Result<Vec<u8>, ImageError> {
     let (what, values) = match args.show {
         Show::Flip => ("FLIP", compared.looks.values.iter().copied().map(f64::from).collect()),
         Show::Channel => {
-            ("greatest difference of a channel", greatest(&compared.expected, &compared.actual, compared.space))
+            let values = greatest(&compared.expected, &compared.actual, compared.space);
+            ("greatest difference of a channel", values.unwrap_or_default())
         }
     };
     let most = args.heatmap_max.unwrap_or_else(|| values.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max));

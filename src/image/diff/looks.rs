@@ -5,6 +5,10 @@ use super::flip::{Displayed, flip};
 use super::{Space, place};
 use crate::image::Picture;
 
+/// The finest that pictures are looked at, pixels a degree: what an eye sees at once is as many pixels then, and filters of
+/// that size take minutes.
+pub const MOST_PIXELS_PER_DEGREE: f64 = 1000.0;
+
 /// How different two pictures look.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Looks {
@@ -20,12 +24,17 @@ pub struct Looks {
     pub exposures: Option<Exposures>,
 }
 
-/// Looks at two pictures of one size, at so many pixels a degree.
+/// Looks at two pictures at so many pixels a degree, more than 0 and at most [`MOST_PIXELS_PER_DEGREE`]; `None` when their sizes
+/// differ, or pixels are missing, or for any other number.
 ///
 /// Displayed pictures with transparent parts are looked at on black and on white, and the worse of both counts for each
 /// pixel. Linear pictures are looked at on black, at every exposure that suits them. What is no number is black to its
 /// neighbours; where one picture alone has such a pixel they differ by 1 there, where both have one by nothing.
-pub fn looks(expected: &Picture, actual: &Picture, space: Space, pixels_per_degree: f64) -> Looks {
+pub fn looks(expected: &Picture, actual: &Picture, space: Space, pixels_per_degree: f64) -> Option<Looks> {
+    let can_be_seen = pixels_per_degree > 0.0 && pixels_per_degree <= MOST_PIXELS_PER_DEGREE;
+    if !(can_be_seen && super::are_alike(expected, actual)) {
+        return None;
+    }
     let width = expected.width as usize;
     let (mut values, exposures) = match space {
         Space::Display => {
@@ -62,7 +71,7 @@ pub fn looks(expected: &Picture, actual: &Picture, space: Space, pixels_per_degr
         }
     }
     let mean = sum / values.len().max(1) as f64;
-    Looks { mean, max, worst: place(worst, expected.width), values, exposures }
+    Some(Looks { mean, max, worst: place(worst, expected.width), values, exposures })
 }
 
 /// Linear pixels over black. What is no number is black.
@@ -89,8 +98,21 @@ mod tests {
     #[test]
     fn transparency_is_seen_though_both_are_alike_on_black() {
         let (clear, black) = (grey(9, 0.0, 0.0), grey(9, 0.0, 1.0));
-        let looks = looks(&clear, &black, Space::Display, PIXELS_PER_DEGREE);
+        let looks = looks(&clear, &black, Space::Display, PIXELS_PER_DEGREE).unwrap();
         assert!(looks.mean > 0.9 && looks.exposures.is_none(), "{}", looks.mean);
+    }
+
+    #[test]
+    fn nobody_looks_at_pictures_of_two_sizes_or_from_nowhere() {
+        let (small, large) = (grey(2, 0.5, 1.0), grey(3, 0.5, 1.0));
+        for space in [Space::Display, Space::Linear] {
+            let seen = |a: &Picture, b: &Picture, ppd| looks(a, b, space, ppd).is_some();
+            assert!(seen(&small, &small, PIXELS_PER_DEGREE) && !seen(&small, &large, PIXELS_PER_DEGREE));
+            assert!(!seen(&small, &Picture::of(2, 2, vec![[0.5; 4]; 3]), PIXELS_PER_DEGREE), "a pixel is missing");
+            for ppd in [0.0, -5.0, f64::NAN, f64::INFINITY, 1e6] {
+                assert!(!seen(&small, &small, ppd), "{ppd}");
+            }
+        }
     }
 
     #[test]
@@ -98,7 +120,7 @@ mod tests {
         let (a, mut b) = (grey(31, 0.2, 1.0), grey(31, 0.2, 1.0));
         b.beauty[31 * 17 + 4] = [1.0, 0.0, 0.0, 1.0];
         for space in [Space::Display, Space::Linear] {
-            let looks = looks(&a, &b, space, PIXELS_PER_DEGREE);
+            let looks = looks(&a, &b, space, PIXELS_PER_DEGREE).unwrap();
             assert_eq!(looks.worst, (4, 17), "{space:?}");
             assert!(looks.max > 0.2 && looks.mean < 0.1 * looks.max);
         }
@@ -109,10 +131,10 @@ mod tests {
         let (a, mut b) = (grey(4, 0.5, 1.0), grey(4, 0.5, 1.0));
         b.beauty[6] = [f32::NAN, 0.5, 0.5, 1.0];
         for space in [Space::Display, Space::Linear] {
-            let found = looks(&a, &b, space, PIXELS_PER_DEGREE);
+            let found = looks(&a, &b, space, PIXELS_PER_DEGREE).unwrap();
             assert_eq!((found.max, found.values[6], found.worst), (1.0, 1.0, (2, 1)), "{space:?}");
             assert!(found.values[5] > 0.0, "{space:?}: its neighbours see a black dot");
-            assert!(looks(&b, &b, space, PIXELS_PER_DEGREE).values.iter().all(|&v| v == 0.0), "{space:?}");
+            assert!(looks(&b, &b, space, PIXELS_PER_DEGREE).unwrap().values.iter().all(|&v| v == 0.0), "{space:?}");
         }
     }
 }

@@ -9,7 +9,7 @@ mod layers;
 mod looks;
 
 pub use layers::{LayerDifference, layer_differences};
-pub use looks::{Looks, looks};
+pub use looks::{Looks, MOST_PIXELS_PER_DEGREE, looks};
 
 use super::{Picture, srgb};
 
@@ -18,7 +18,8 @@ use super::{Picture, srgb};
 pub enum Space {
     /// Premultiplied linear values as they are.
     Linear,
-    /// sRGB codes 0..=1 of the colour over black, and coverage.
+    /// sRGB codes 0..=1 of the colour over black, and coverage. Linear pixels get neither exposure nor tone map: a picture that
+    /// was rendered is compared with another one, not with its own PNG.
     Display,
 }
 
@@ -46,9 +47,9 @@ pub struct Difference {
     pub pixels: u64,
 }
 
-/// Compares two pictures; `None` when their sizes differ.
+/// Compares two pictures; `None` when their sizes differ, or pixels are missing.
 pub fn compare(expected: &Picture, actual: &Picture, space: Space, threshold: f64) -> Option<Difference> {
-    if (expected.width, expected.height, expected.beauty.len()) != (actual.width, actual.height, actual.beauty.len()) {
+    if !are_alike(expected, actual) {
         return None;
     }
     let channels = if is_covered(expected) && is_covered(actual) { 3 } else { 4 };
@@ -85,10 +86,17 @@ pub fn compare(expected: &Picture, actual: &Picture, space: Space, threshold: f6
     })
 }
 
-/// Largest difference of a channel, at each pixel of two pictures of one size.
-pub fn greatest(expected: &Picture, actual: &Picture, space: Space) -> Vec<f64> {
-    let pixels = expected.beauty.iter().zip(&actual.beauty);
-    pixels.map(|(&a, &b)| channel_differences(a, b, space).into_iter().fold(0.0, f64::max)).collect()
+/// Largest difference of a channel, at each pixel of two pictures; `None` when their sizes differ, or pixels are missing.
+pub fn greatest(expected: &Picture, actual: &Picture, space: Space) -> Option<Vec<f64>> {
+    let pixels = are_alike(expected, actual).then(|| expected.beauty.iter().zip(&actual.beauty))?;
+    Some(pixels.map(|(&a, &b)| channel_differences(a, b, space).into_iter().fold(0.0, f64::max)).collect())
+}
+
+/// Whether two pictures have one size, and all their pixels.
+fn are_alike(expected: &Picture, actual: &Picture) -> bool {
+    let size = |picture: &Picture| (picture.width, picture.height);
+    let is_whole = |picture: &Picture| picture.beauty.len() == picture.width as usize * picture.height as usize;
+    size(expected) == size(actual) && is_whole(expected) && is_whole(actual)
 }
 
 fn is_covered(picture: &Picture) -> bool {
@@ -197,7 +205,7 @@ mod tests {
         let d = compare(&a, &b, Space::Linear, 0.0).unwrap();
         assert!((d.rmse - (0.09_f64 / 3.0).sqrt()).abs() < 1e-7 && d.channels == 3);
         assert!((d.relative_rmse - (0.09_f64 / 0.75).sqrt()).abs() < 1e-7 && (d.bias + 0.1).abs() < 1e-7);
-        assert_eq!(greatest(&a, &b, Space::Linear), [0.5 - f64::from(0.2_f32)]);
+        assert_eq!(greatest(&a, &b, Space::Linear).unwrap(), [0.5 - f64::from(0.2_f32)]);
         let black = of(&[[0.0, 0.0, 0.0, 1.0]]);
         assert_eq!(compare(&black, &a, Space::Linear, 0.0).unwrap().relative_rmse, f64::INFINITY);
     }

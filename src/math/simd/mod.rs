@@ -270,10 +270,10 @@ enum Set {
 /// What [`Level::best`] gives, once it has been asked for or chosen.
 static CHOSEN: OnceLock<Level> = OnceLock::new();
 
-/// A name that is no level of this machine.
+/// A name that is no level of this machine, and those that are.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("this machine has {}", names(.0))]
-pub struct UnknownLevel(Vec<Level>);
+#[error("no instruction set of this machine is named {0:?}; there are: {names}", names = names(.1))]
+pub struct UnknownLevel(String, Vec<Level>);
 
 /// As they are typed.
 fn names(levels: &[Level]) -> String {
@@ -287,7 +287,7 @@ impl FromStr for Level {
     fn from_str(text: &str) -> Result<Self, UnknownLevel> {
         let all = Self::all();
         let named = |level: &&Self| [level.name(), level.word()].iter().any(|name| name.eq_ignore_ascii_case(text));
-        all.iter().find(named).copied().ok_or_else(|| UnknownLevel(all.clone()))
+        all.iter().find(named).copied().ok_or_else(|| UnknownLevel(text.into(), all.clone()))
     }
 }
 
@@ -314,7 +314,9 @@ impl Level {
         *CHOSEN.get_or_init(|| *Self::all().last().unwrap_or(&Self::PORTABLE))
     }
 
-    /// Makes this the level that [`Self::best`] gives to the whole process. Answers are the same on every level, times are not.
+    /// Makes this the level that [`Self::best`] gives to the whole process: to be called before anything is loaded or built.
+    /// Answers are the same on every level, times are not. Levels are compared within a process by
+    /// [`Wide::at_level`](crate::accel::Wide::at_level).
     ///
     /// # Errors
     ///

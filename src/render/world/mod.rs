@@ -15,7 +15,7 @@ use crate::accel::refine::Refined;
 use crate::accel::shapes::Prim;
 use crate::accel::{AccelChoice, AccelParams, AnyAccel, BitSet, Hit, Kept, Ray, Shapes};
 use crate::math::triangle::Triangle;
-use crate::math::{DMat3, DVec3};
+use crate::math::{DMat3, DVec3, Vec3};
 use crate::scene::Scene;
 use crate::scene::mesh::normal_from_object;
 
@@ -26,7 +26,8 @@ pub struct World {
     pub center: DVec3,
     /// Box of everything but planes, world space; `lo > hi` when there is nothing.
     pub bounds: (DVec3, DVec3),
-    /// Every shape that is not kept, centred; all of them where nothing is kept.
+    /// Every shape that is not kept, centred; all of them where nothing is kept, as [`World::new`] does. A structure over
+    /// everything is [`Self::structure`].
     pub shapes: Shapes,
     /// What is stored once and stands in several places.
     pub kept: Kept,
@@ -81,6 +82,10 @@ pub enum PrimSource {
 
 impl World {
     /// Places every shape of the scene in the world, each instance by itself, finds the centre and rounds once.
+    ///
+    /// # Panics
+    ///
+    /// Where [`Scene::check`] finds a fault, which no scene has that was loaded.
     pub fn new(scene: &Scene) -> Self {
         Self::placing(scene, Instancing::Flatten)
     }
@@ -97,7 +102,12 @@ impl World {
         Placing::new(scene, how).world()
     }
 
-    /// The structure that was asked for over everything, and the reason where there was a choice.
+    /// A structure over everything, and the reason where there was a choice. Where anything is kept, kinds that cannot hold it
+    /// give way to `fast-octree`, as [`AnyAccel::kind`] tells: to compare structures, keep nothing ([`World::new`]).
+    ///
+    /// # Panics
+    ///
+    /// It may, with parameters that [`AccelParams::validate`] refuses.
     pub fn structure(&self, choice: AccelChoice, params: &AccelParams) -> (AnyAccel<'_>, Option<Reason>) {
         auto::build_with(choice, &self.shapes, &self.kept, params)
     }
@@ -157,12 +167,26 @@ impl World {
         self.shapes.polygons[(prim - self.triangles()) as usize]
     }
 
-    /// Position, error bound, normal and weights of a hit that a query found on `ray`.
+    /// A ray from a place in the world on without end; `dir` keeps its length, in which t counts.
+    pub fn ray(&self, origin: DVec3, dir: DVec3) -> Ray {
+        Ray::new((origin - self.center).as_vec3(), dir.as_vec3())
+    }
+
+    /// Where in the world a place of the centred frame is, such as [`Refined::position`].
+    pub fn to_world(&self, place: Vec3) -> DVec3 {
+        place.as_dvec3() + self.center
+    }
+
+    /// Position, error bound, normal and weights of a hit that a query found on `ray`, in the centred frame.
+    ///
+    /// # Panics
+    ///
+    /// For a miss: [`Hit::is_some`] tells.
     pub fn refine(&self, ray: &Ray, hit: &Hit) -> Refined {
         self.prim(hit.prim).refine(ray, hit)
     }
 
-    /// The same, in which every prim is asked what light it lets through (see [`everything`](super::everything)).
+    /// The same, in which no prim is opaque: each is asked what light it lets through (see [`everything`](super::everything)).
     #[must_use]
     pub fn with_everything(mut self) -> Self {
         self.shapes.opaque = BitSet::filled(self.shapes.len(), false);
@@ -170,7 +194,7 @@ impl World {
         self
     }
 
-    /// What prim `prim` came from.
+    /// What prim `prim` came from; of a number below [`Self::len`], others mean nothing.
     pub fn source(&self, prim: u32) -> PrimSource {
         let (triangles, polygons) = (self.triangles(), index(self.shapes.polygons.len()));
         let (spheres, cones) = (index(self.shapes.spheres.len()), index(self.shapes.cones.len()));

@@ -1,0 +1,200 @@
+//! Whether a scene that was made by hand can be placed and rendered.
+
+use super::{Bitmap, Mesh, Pixels, Scene};
+
+/// What is wrong with a scene, and where.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{place}: {text}")]
+pub struct SceneFault {
+    /// The part, as it is reached from the scene, such as `meshes[2].triangles[7]`.
+    pub place: String,
+    /// What is wrong with it, with the numbers.
+    pub text: String,
+}
+
+impl Scene {
+    /// Whether every index points at what is there, and arrays that belong together are equally long. Scenes from [`load`] are
+    /// sound; who builds one by hand asks before it is placed, since [`World`] and renderer rely on it.
+    ///
+    /// # Errors
+    ///
+    /// The first fault.
+    ///
+    /// [`load`]: mod@crate::load
+    /// [`World`]: crate::render::World
+    pub fn check(&self) -> Result<(), SceneFault> {
+        let materials = self.materials.len();
+        for (i, mesh) in self.meshes.iter().enumerate() {
+            mesh.check(&format!("meshes[{i}]"), materials)?;
+        }
+        for (i, instance) in self.instances.iter().enumerate() {
+            points(|| format!("instances[{i}].mesh"), instance.mesh, self.meshes.len(), "meshes")?;
+        }
+        for (i, sphere) in self.spheres.iter().enumerate() {
+            points(|| format!("spheres[{i}].material"), sphere.material, materials, "materials")?;
+            let (radius, place) = (sphere.radius, || format!("spheres[{i}].radius"));
+            holds(radius >= 0.0, place, || format!("{radius} is none"))?;
+        }
+        for (i, cone) in self.cones.iter().enumerate() {
+            points(|| format!("cones[{i}].material"), cone.material, materials, "materials")?;
+            let (radii, place) = ([cone.base_radius, cone.apex_radius], || format!("cones[{i}]"));
+            holds(radii.iter().all(|&radius| radius >= 0.0), place, || format!("{radii:?} are no radii"))?;
+        }
+        for (i, plane) in self.planes.iter().enumerate() {
+            points(|| format!("planes[{i}].material"), plane.material, materials, "materials")?;
+            let (length, place) = (plane.normal.length(), || format!("planes[{i}].normal"));
+            holds((length - 1.0).abs() < 1e-6, place, || format!("its length is {length}, not 1"))?;
+        }
+        for (i, material) in self.materials.iter().enumerate() {
+            for map in material.textures() {
+                points(|| format!("materials[{i}]"), map.texture, self.textures.len(), "textures")?;
+            }
+        }
+        for (i, texture) in self.textures.iter().enumerate() {
+            points(|| format!("textures[{i}].bitmap"), texture.bitmap, self.bitmaps.len(), "bitmaps")?;
+        }
+        for (i, bitmap) in self.bitmaps.iter().enumerate() {
+            let (expected, found) = (bitmap.width as usize * bitmap.height as usize, texels(bitmap));
+            holds(
+                found == expected,
+                || format!("bitmaps[{i}].pixels"),
+                || {
+                    let Bitmap { width, height, .. } = bitmap;
+                    format!("{found} texels where {width} × {height} are {expected}")
+                },
+            )?;
+        }
+        self.hints.camera.map_or(Ok(()), |i| points(|| "hints.camera".into(), i, self.cameras.len(), "cameras"))
+    }
+}
+
+impl Mesh {
+    fn check(&self, place: &str, materials: usize) -> Result<(), SceneFault> {
+        points(|| format!("{place}.material"), self.material, materials, "materials")?;
+        let positions = self.positions.len();
+        let sets = self.uvs.iter().enumerate().map(|(k, set)| (format!("uvs[{k}]"), set.len()));
+        let attributes = [
+            ("normals".to_owned(), self.normals.len()),
+            ("tangents".to_owned(), self.tangents.len()),
+            ("colors".to_owned(), self.colors.len()),
+        ];
+        for (name, len) in attributes.into_iter().chain(sets) {
+            holds(
+                len == 0 || len == positions,
+                || format!("{place}.{name}"),
+                || format!("{len} of them where there are {positions} positions"),
+            )?;
+        }
+        for (i, corner) in self.triangles.iter().enumerate().flat_map(|(i, t)| t.iter().map(move |corner| (i, *corner)))
+        {
+            points(|| format!("{place}.triangles[{i}]"), corner, positions, "positions")?;
+        }
+        let (faces, triangles) = (self.face_of_triangle.len(), self.triangles.len());
+        holds(
+            faces == 0 || faces == triangles,
+            || format!("{place}.face_of_triangle"),
+            || format!("{faces} of them where there are {triangles} triangles"),
+        )?;
+        for (i, &corner) in self.polygon_corners.iter().enumerate() {
+            points(|| format!("{place}.polygon_corners[{i}]"), corner, positions, "positions")?;
+        }
+        for (i, polygon) in self.polygons.iter().enumerate() {
+            let (first, len, corners) = (polygon.first as usize, polygon.len as usize, self.polygon_corners.len());
+            let fits = len >= 3 && first.checked_add(len).is_some_and(|end| end <= corners);
+            holds(
+                fits,
+                || format!("{place}.polygons[{i}]"),
+                || format!("{len} corners from {first} on: at least 3 are needed, and there are {corners}"),
+            )?;
+        }
+        Ok(())
+    }
+}
+
+fn texels(bitmap: &Bitmap) -> usize {
+    match &bitmap.pixels {
+        Pixels::Rgb8(bytes) => bytes.len() / 3,
+        Pixels::Rgba8(texels) => texels.len(),
+        Pixels::Rgba16(texels) => texels.len(),
+    }
+}
+
+/// An index points at one of `len` parts of a kind.
+fn points(place: impl Fn() -> String, index: u32, len: usize, kind: &str) -> Result<(), SceneFault> {
+    holds((index as usize) < len, place, || format!("{index} where there are {len} {kind}"))
+}
+
+fn holds(is_so: bool, place: impl Fn() -> String, text: impl Fn() -> String) -> Result<(), SceneFault> {
+    if is_so { Ok(()) } else { Err(SceneFault { place: place(), text: text() }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{DAffine3, DVec3, Vec2, Vec3};
+    use crate::scene::{Cone, Instance, Material, Plane, Polygon, Sampler, Sphere, Texture, TextureRef, UvTransform};
+
+    type Spoil = fn(&mut Scene);
+
+    /// One of everything.
+    fn sound() -> Scene {
+        let mesh = Mesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+            normals: vec![Vec3::Z; 3],
+            uvs: vec![vec![Vec2::ZERO; 3]],
+            triangles: vec![[0, 1, 2]],
+            polygons: vec![Polygon { first: 0, len: 3, face: 1 }],
+            polygon_corners: vec![0, 1, 2],
+            ..Mesh::default()
+        };
+        let map = TextureRef { texture: 0, uv_set: 0, transform: UvTransform::default() };
+        let pixels = Pixels::Rgb8([9; 6].into_iter().collect());
+        Scene {
+            meshes: vec![mesh],
+            instances: vec![Instance { name: String::new(), mesh: 0, world_from_object: DAffine3::IDENTITY }],
+            spheres: vec![Sphere { name: String::new(), center: DVec3::X, radius: 1.0, material: 0 }],
+            cones: vec![Cone {
+                name: String::new(),
+                base: DVec3::X,
+                base_radius: 1.0,
+                apex: DVec3::Y,
+                apex_radius: 0.0,
+                material: 0,
+            }],
+            planes: vec![Plane { name: String::new(), normal: DVec3::Y, offset: 0.0, material: 0 }],
+            materials: vec![Material { base_color_map: Some(map), ..Material::plain() }],
+            textures: vec![Texture { bitmap: 0, sampler: Sampler::default() }],
+            bitmaps: vec![Bitmap { name: String::new(), width: 2, height: 1, pixels }],
+            ..Scene::default()
+        }
+    }
+
+    #[test]
+    fn what_points_nowhere_or_is_too_short_is_named_with_its_place() {
+        assert_eq!(sound().check(), Ok(()));
+        assert_eq!(Scene::default().check(), Ok(()));
+        let faults: [(Spoil, &str); 15] = [
+            (|s| s.meshes[0].material = 1, "meshes[0].material: 1 where there are 1 materials"),
+            (|s| s.meshes[0].triangles.push([0, 1, 3]), "meshes[0].triangles[1]: 3 where there are 3 positions"),
+            (|s| s.meshes[0].normals.truncate(2), "meshes[0].normals: 2 of them where there are 3 positions"),
+            (|s| s.meshes[0].uvs[0].truncate(1), "meshes[0].uvs[0]: 1 of them where there are 3 positions"),
+            (|s| s.meshes[0].face_of_triangle = vec![0, 0], "meshes[0].face_of_triangle: 2 of them"),
+            (|s| s.meshes[0].polygons[0].first = u32::MAX, "meshes[0].polygons[0]: 3 corners from 4294967295 on"),
+            (|s| s.meshes[0].polygon_corners[1] = 9, "meshes[0].polygon_corners[1]: 9 where"),
+            (|s| s.instances[0].mesh = 1, "instances[0].mesh: 1 where there are 1 meshes"),
+            (|s| s.spheres[0].radius = -1.0, "spheres[0].radius: -1 is none"),
+            (|s| s.cones[0].apex_radius = f64::NAN, "cones[0]: [1.0, NaN] are no radii"),
+            (|s| s.planes[0].normal = DVec3::ZERO, "planes[0].normal: its length is 0, not 1"),
+            (|s| s.textures.clear(), "materials[0]: 0 where there are 0 textures"),
+            (|s| s.textures[0].bitmap = 2, "textures[0].bitmap: 2 where there are 1 bitmaps"),
+            (|s| s.bitmaps[0].height = 2, "bitmaps[0].pixels: 2 texels where 2 × 2 are 4"),
+            (|s| s.hints.camera = Some(0), "hints.camera: 0 where there are 0 cameras"),
+        ];
+        for (spoil, expected) in faults {
+            let mut scene = sound();
+            spoil(&mut scene);
+            let fault = scene.check().unwrap_err().to_string();
+            assert!(fault.starts_with(expected), "{fault} is not {expected}");
+        }
+    }
+}
