@@ -51,9 +51,16 @@ pub fn failures(baseline: &Value, now: &Value, limits: &[Limit]) -> Result<Vec<S
     if baseline["schema"] != now["schema"] {
         return Err(format!("its schema is {}, not {}", baseline["schema"], now["schema"]));
     }
+    if baseline["complete"] == false {
+        return Err("it is not complete: the run that wrote it was cut off".into());
+    }
+    let [before, seed] = [baseline, now].map(|report| &report["settings"]["seed"]);
+    if before != seed {
+        return Err(format!("its rays are those of seed {before}, not {seed}"));
+    }
     let (all, mut found, mut lines) = (items(&baseline["models"]), Vec::new(), Vec::new());
     for model in items(&now["models"]) {
-        let at = earlier(all, model)?;
+        let at = earlier(all, &found, model)?;
         found.push(at);
         let (before, name) = (&all[at], called(all, &all[at]));
         for (key, what) in [("hash", "another file"), ("picture", "another picture"), ("rays", "other numbers of rays")]
@@ -76,18 +83,29 @@ pub fn failures(baseline: &Value, now: &Value, limits: &[Limit]) -> Result<Vec<S
                 None => lines.push(format!("{place}: in the baseline, but not measured now")),
             }
         }
+        let known = |row: &&Value| items(&before["structures"]).iter().any(|earlier| earlier["accel"] == row["accel"]);
+        let new = items(&model["structures"]).iter().filter(|row| !known(row));
+        let new: Vec<&str> = new.filter_map(|row| row["accel"].as_str()).collect();
+        if !new.is_empty() {
+            return Err(format!("{name}: it has nothing of {}", new.join(", ")));
+        }
     }
     let missing = all.iter().enumerate().filter(|(at, _)| !found.contains(at));
     lines.extend(missing.map(|(_, model)| format!("{}: in the baseline, but not measured now", called(all, model))));
     Ok(lines)
 }
 
-/// Which of the models of a baseline this one was; an error where there is none or nobody can say.
-fn earlier(all: &[Value], model: &Value) -> Result<usize, String> {
+/// Which of the models of a baseline this one was, of those that are not `found` yet if it is there several times; an error
+/// where there is none or nobody can say.
+fn earlier(all: &[Value], found: &[usize], model: &Value) -> Result<usize, String> {
     let name = file_name(&model["file"]);
     let same = |key: &'static str| move |at: &&usize| all[**at][key] == model[key];
     let named: Vec<usize> = (0..all.len()).filter(|&at| file_name(&all[at]["file"]) == name).collect();
-    let known = || named.iter().find(same("file")).or_else(|| named.iter().find(same("hash")));
+    let left: Vec<usize> = named.iter().copied().filter(|at| !found.contains(at)).collect();
+    let known = || {
+        let by = |key| left.iter().find(same(key)).or_else(|| named.iter().find(same(key)));
+        by("file").or_else(|| by("hash"))
+    };
     match named[..] {
         [] => Err(format!("it has no model {name}")),
         [only] => Ok(only),
@@ -199,6 +217,31 @@ mod tests {
         let other = both([("a/b.obj", "7", 1.0), ("d/b.obj", "9", 2.0)]);
         let error = failures(&before, &other, &[]).unwrap_err();
         assert!(error.contains("a/b.obj, c/b.obj") && error.ends_with("d/b.obj"), "{error}");
+    }
+
+    #[test]
+    fn a_baseline_that_was_cut_off_or_has_other_rays_or_fewer_structures_is_none() {
+        let (before, now) = (report(1.0, 1), report(1.0, 1));
+        let with = |key: &str, value: Value| {
+            let mut changed = before.clone();
+            changed[key] = value;
+            changed
+        };
+        let refused = |before: &Value| failures(before, &now, &[]).unwrap_err();
+        assert!(refused(&with("complete", false.into())).contains("cut off"));
+        assert_eq!(judged(&with("complete", true.into()), &now, &[]), [""; 0]);
+        let other = refused(&with("settings", json!({ "seed": 3 })));
+        assert_eq!(other, "its rays are those of seed 3, not null");
+        let mut fewer = before.clone();
+        fewer["models"][0]["structures"] = json!([]);
+        assert_eq!(refused(&fewer), "b.obj: it has nothing of grid");
+    }
+
+    #[test]
+    fn a_model_that_is_measured_twice_is_compared_twice() {
+        let mut twice = report(1.0, 1);
+        twice["models"] = json!([twice["models"][0], twice["models"][0]]);
+        assert_eq!(judged(&twice, &twice, &["n_it>+1%"]), [""; 0]);
     }
 
     #[test]

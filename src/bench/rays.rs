@@ -82,12 +82,16 @@ impl RaySet {
 
     /// At most `limit` rays, evenly from all batches, and the places of the rays kept in each batch.
     pub fn sample(&self, limit: usize, seed: u64) -> (Self, Vec<Vec<usize>>) {
-        let all = self.len();
-        let places: Vec<Vec<usize>> = self
-            .batches
-            .iter()
-            .map(|b| even_places(b.rays.len(), (b.rays.len() * limit).div_ceil(all.max(1)), seed))
-            .collect();
+        let (all, mut seen, mut kept) = (self.len().max(1), 0, 0);
+        let limit = limit.min(all);
+        let mut share = |batch: &Batch| {
+            seen += batch.rays.len();
+            // What is kept of all batches so far, as near below its share as whole rays allow.
+            let count = seen * limit / all - kept;
+            kept += count;
+            even_places(batch.rays.len(), count, seed)
+        };
+        let places: Vec<Vec<usize>> = self.batches.iter().map(&mut share).collect();
         let batches = self.batches.iter().zip(&places).map(|(b, p)| b.pick(p)).collect();
         (Self { class: self.class, asked: self.asked, batches }, places)
     }
@@ -159,6 +163,21 @@ fn bounce(world: &World, ray: &Ray, hit: &Hit, random: &mut Random) -> Option<Ra
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_sample_is_as_large_as_it_may_be_and_no_larger() {
+        let batch = |(question, n)| {
+            let after = if question == Question::Next { vec![Hit::MISS; n] } else { Vec::new() };
+            Batch { question, rays: vec![Ray::new(Vec3::ZERO, Vec3::X); n], after }
+        };
+        let batches = Question::ALL.into_iter().zip([700, 40, 3]).map(batch).collect();
+        let set = RaySet { class: Class::Primary, asked: 743, batches };
+        for limit in [1, 2, 10, 100, 742, 743, 5000] {
+            let (sample, places) = set.sample(limit, 3);
+            assert_eq!(sample.len(), limit.min(743));
+            assert!(places.iter().zip(&sample.batches).all(|(places, batch)| places.len() == batch.rays.len()));
+        }
+    }
 
     #[test]
     fn an_even_sample_has_one_place_from_each_part() {

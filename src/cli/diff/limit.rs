@@ -10,7 +10,7 @@ type Figure = (&'static str, fn(&Compared) -> f64);
 const FIGURES: [Figure; 9] = [
     ("rmse", |c| c.difference.rmse),
     ("relative-rmse", |c| c.difference.relative_rmse),
-    ("bias", |c| c.difference.bias.abs()),
+    ("bias", |c| c.difference.bias),
     ("max", |c| c.difference.max),
     ("psnr", |c| c.difference.psnr),
     ("flip", |c| c.looks.mean),
