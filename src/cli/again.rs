@@ -301,7 +301,7 @@ fn repeat_from(metadata: Option<Metadata>, picture: &Path, typed: &RenderArgs) -
     let hash = entry(Metadata::INPUT_HASH)?.to_owned();
 
     let inputs: Vec<PathBuf> =
-        if typed.inputs.is_empty() { inputs.into_iter().map(Into::into).collect() } else { typed.inputs.clone() };
+        if typed.inputs.is_empty() { inputs.iter().map(|i| found(i, picture)).collect() } else { typed.inputs.clone() };
     if typed.inputs.is_empty() && inputs.iter().any(|i| i == Path::new("-")) {
         return Err(fault("was made from standard input".into()).remedy("name the model, or `-`, before --again"));
     }
@@ -312,6 +312,17 @@ fn repeat_from(metadata: Option<Metadata>, picture: &Path, typed: &RenderArgs) -
         Diagnostic::new("again-version", picture, "", text)
     });
     Ok(Repeat { args: with_typed(args, inputs, typed), hash, warning })
+}
+
+/// Where an input is that a picture names: where it was named from, or beside the picture, for which the hash will tell
+/// whether it is the same.
+fn found(input: &str, picture: &Path) -> PathBuf {
+    let (named, folder) = (PathBuf::from(input), picture.parent().unwrap_or(Path::new("")));
+    if input == "-" || named.exists() {
+        return named;
+    }
+    let beside = named.file_name().map(|name| folder.join(name));
+    [Some(folder.join(&named)), beside].into_iter().flatten().find(|path| path.exists()).unwrap_or(named)
 }
 
 fn parse_settings(settings: &Map<String, Value>) -> Result<RenderArgs, String> {

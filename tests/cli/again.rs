@@ -43,6 +43,23 @@ fn a_picture_is_repeated_as_the_type_that_its_new_name_says() {
 }
 
 #[test]
+fn a_picture_that_was_moved_with_its_model_is_repeated() {
+    let folder = Folder::with_cube();
+    folder.render(&["cube.obj"]).ends(0);
+    let (model, picture) = (folder.read("cube.obj"), folder.read("cube.png"));
+    for name in ["cube.obj", "cube.png"] {
+        std::fs::remove_file(folder.path(name)).unwrap();
+    }
+    std::fs::create_dir(folder.path("moved")).unwrap();
+    let folder = folder.file("moved/a.png", picture).file("moved/cube.obj", &model);
+    folder.run(&["render", "--again", "moved/a.png", "-o", "b.png"]).ends(0);
+    let [first, second] = ["moved/a.png", "b.png"].map(|name| super::program::picture(&folder.path(name)));
+    assert!(first == second);
+    let folder = folder.file("moved/cube.obj", [&model, "v 9 9 9\nf 1 2 9\n".as_bytes()].concat());
+    folder.run(&["render", "--again", "moved/a.png", "-o", "b.png"]).ends(3).says(&["has changed"]);
+}
+
+#[test]
 fn another_input_under_the_same_name_is_refused() {
     let folder = Folder::with_cube();
     folder.render(&["cube.obj"]).ends(0);
