@@ -55,7 +55,7 @@
 //! model = "unlit"
 //! color = "white"               # opacity, double_sided as above
 //!
-//! [[models]]                    # glTF or OBJ, relative to this file
+//! [[models]]                    # glTF, OBJ, PLY or STL, relative to this file
 //! file = "bunny.obj"
 //! material = "red"              # optional: replaces every material of the model
 //! up = "z"                      # optional: overrides the model's up axis
@@ -311,6 +311,9 @@ impl Names {
                     return String::new();
                 }
                 let known = || scene.materials.iter().map(|m| m.name.as_str());
+                if known().next().is_none() {
+                    return format!("is `{name}`, but no materials are there; write [materials.{name}]");
+                }
                 let near = super::suggest::nearest(&name, known());
                 let hint = near.map_or_else(|| super::suggest::list(known()), |near| format!("did you mean `{near}`?"));
                 format!("is `{name}`, but no [materials.{name}] is there; {hint}")

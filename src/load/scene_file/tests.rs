@@ -87,7 +87,7 @@ fn wrong_values_say_what_would_be_right() {
         ("[[spheres]]\ncenter=[0,0,0]\nradius=-1", "must be above 0"),
         ("[[spheres]]\ncenter=[0,0,inf]\nradius=1", "finite"),
         ("[[spheres]]\nradius=1", "no `center`"),
-        ("[[spheres]]\ncenter=[0,0,0]\nradius=1\nmaterial='x'", "no [materials.x]"),
+        ("[[spheres]]\ncenter=[0,0,0]\nradius=1\nmaterial='x'", "write [materials.x]"),
         ("spheres = 3", "list of tables"),
         ("[[cones]]\nbase=[0,0,0]\napex=[0,1,0]\nbase_radius=-1", "is -1, but must not be below 0"),
         ("[[cones]]\nbase=[0,0,0]\napex=[0,1,0]\nbase_radius=0", "both radii are 0"),

@@ -67,7 +67,8 @@ fn spot(table: &Table) -> Option<LightKind> {
     let inner = table.get("inner", within(0.0, 90.0)).unwrap_or(0.0);
     let outer = table.get("outer", within(0.0, 90.0)).unwrap_or(45.0);
     if inner > outer {
-        table.note(&table.place_of("inner"), format!("`inner` {inner} is above `outer` {outer}"), "swap them");
+        let remedy = if table.has("outer") { "swap them" } else { "write an `outer` above it: 45 is the default" };
+        table.note(&table.place_of("inner"), format!("`inner` {inner} is above `outer` {outer}"), remedy);
     }
     let falloff = falloff(table);
     let (inner, outer) = (inner.to_radians(), outer.to_radians());
