@@ -122,12 +122,13 @@ impl<'a> Certainty<'a> {
     }
 
     /// How many times the error that is allowed pixels of so many samples may differ. Few must show next to the same, as they
-    /// tell nothing else; more may differ, for shading changes slower than that from pixel to pixel.
+    /// tell nothing else; more may differ by what shading changes from pixel to pixel, but not as colours on both sides of an
+    /// edge do, which may reach into the pixel as far as samples lie apart.
     const fn steep(samples: u32) -> f32 {
         match samples {
             1 => 0.25,
             2..SURE => 1.0,
-            _ => 8.0,
+            _ => 2.0,
         }
     }
 
