@@ -45,7 +45,8 @@ pub fn values(text: &str, spacing: Spacing, whole: bool) -> Result<Vec<f64>, Str
         |why: &str| format!("{text:?}: {why}; write values such as 1,2,5 or a range such as 1..100 or 1..100:7");
     let number = |typed: &str| {
         let number = typed.trim().parse::<f64>().ok().filter(|n| n.is_finite() && *n >= 0.0);
-        number.ok_or_else(|| wrong(&format!("{typed:?} is no number from 0 on")))
+        let number = number.ok_or_else(|| wrong(&format!("{typed:?} is no number from 0 on")))?;
+        if whole && number.fract() != 0.0 { Err(wrong(&format!("{typed:?} is no whole number"))) } else { Ok(number) }
     };
     let mut values = match text.split_once("..") {
         None => text.split(',').map(number).collect::<Result<Vec<f64>, String>>()?,
@@ -114,6 +115,7 @@ mod tests {
             let error = values(wrong, Spacing::Tens, false).unwrap_err();
             assert!(error.contains("such as 1,2,5"), "{wrong}: {error}");
         }
+        assert!(values("0.5,2", Spacing::Even(6), true).unwrap_err().contains("\"0.5\" is no whole number"));
         let many: Vec<String> = (0..65).map(|i| i.to_string()).collect();
         assert!(values(&many.join(","), Spacing::Tens, true).unwrap_err().contains("more than 64"));
         assert!(values("1e-300..1e300", Spacing::Tens, false).is_err());

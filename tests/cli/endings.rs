@@ -77,6 +77,16 @@ fn points_and_lines_that_stand_nowhere_are_nothing_to_draw() {
 }
 
 #[test]
+fn every_command_about_rays_ends_alike_where_there_is_nothing_to_hit() {
+    let folder = Folder::new().file("dots.obj", NOTHING_TO_DRAW);
+    for command in
+        [&["trace", "--pixel", "0,0"][..], &["bench", "--passes", "0"], &["explain"], &["study"], &["verify"]]
+    {
+        folder.run(&[command, &["dots.obj"]].concat()).ends(3).says(&["error: dots.obj: "]);
+    }
+}
+
+#[test]
 fn an_empty_scene_is_drawn_when_that_is_allowed() {
     let folder = Folder::new().file("dots.obj", NOTHING_TO_DRAW);
     folder.render(&["--allow-empty", "--background", "#ff0000", "dots.obj"]).ends(0);

@@ -109,6 +109,10 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
     let how = if job::keeps_instances(args.accel) { Instancing::Auto } else { Instancing::Flatten };
     let limit = job::limits(args.model.load.max_memory).memory;
     let world = read::as_drawn(&loaded, how, limit, file).map_err(fail(Exit::Failed))?;
+    if world.is_empty() {
+        let fault = Diagnostic::new("nothing-to-draw", file, "", "nothing to hit: it holds no faces");
+        return Err(fail(Exit::Input)(fault));
+    }
     let wrong = |text: String| Diagnostic::new("scene-value", file, "", text);
     let effective = Effective::new(look, &loaded.scene.hints).map_err(wrong).map_err(fail(Exit::Input))?;
     let settings = &effective.settings;
