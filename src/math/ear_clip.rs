@@ -7,7 +7,7 @@
 //! corner lies in it or on its diagonal, so corners on straight runs stay corners of some triangle and no T-junction
 //! arises. A polygon with n corners whose boundary does not cross itself, bridges to holes included, gives n − 2
 //! triangles of positive area. Spikes that stick out are dropped first. A polygon that touches itself in corners falls into
-//! parts there that are cut one by one ([`lobes`]). Where no ear is left, three fallbacks follow:
+//! parts there that are cut one by one (`lobes`). Where no ear is left, three fallbacks follow:
 //! straight corners are cut off with triangles of no area; a quad that crosses itself is cut along its shorter diagonal
 //! like every warped quad; a larger polygon that crosses itself loses its first convex corner whatever lies inside;
 //! after [`MAX_FORCED`] of those the rest becomes a fan. Every corner is still used, what is covered twice or lost
