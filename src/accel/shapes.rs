@@ -95,7 +95,7 @@ impl BitSet {
     /// Bit `i`; set where there is none.
     #[inline]
     pub fn get_or_set(&self, i: u32) -> bool {
-        self.words.get(i as usize / 64).is_none_or(|word| word >> (i % 64) & 1 == 1)
+        self.words.get(i as usize / 64).copied().unwrap_or(u64::MAX) >> (i % 64) & 1 == 1
     }
 
     /// Sets bit `i`.
