@@ -293,6 +293,14 @@ mod tests {
     }
 
     #[test]
+    fn what_is_shown_on_a_screen_has_straight_alpha_whether_or_not_the_file_would() {
+        let (opaque, half) = ([1.0, 0.0, 0.0, 1.0], [0.5, 0.0, 0.0, 0.5]);
+        let shown = |pixels: Vec<[f32; 4]>| rgba8(&Picture::of(pixels.len() as u32, 1, pixels), &plain());
+        assert_eq!(shown(vec![opaque]), [[255, 0, 0, 255]]);
+        assert_eq!(shown(vec![half, opaque]), [[255, 0, 0, 128], [255, 0, 0, 255]]);
+    }
+
+    #[test]
     fn a_white_background_stays_white_under_every_tone_map() {
         for tone_map in ToneMap::ALL {
             let output = Output { tone_map, exposure: -3.0, background: Some([1.0; 3]), ..Output::default() };

@@ -1,7 +1,7 @@
 //! Linear pixels <-> files: tone mapping, PNG, EXR with layers, JPEG, WebP, metadata, difference metrics.
 //!
-//! [`encode`] turns a [`Picture`] into the bytes of a file, [`rgba8`] into what is shown on a screen, [`write_atomic`] puts them on the disk, [`read_metadata`] tells
-//! how a picture was made. Knows nothing of scenes or rays.
+//! [`encode`] turns a [`Picture`] into the bytes of a file, [`rgba8`] into what is shown on a screen, [`write_atomic`] puts
+//! them on the disk, [`read_metadata`] tells how a picture was made. Knows nothing of scenes or rays.
 
 mod develop;
 pub mod diff;

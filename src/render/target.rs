@@ -221,29 +221,68 @@ pub(super) fn render<P: Observer>(
 
 /// Mixes another rendering in, of which `part` is taken.
 fn mix(whole: &mut Rendered, other: &Rendered, part: f32) {
-    mix_pictures(&mut whole.picture, &other.picture, part);
     let (sampled, more): (&mut Sampled, &Sampled) = (&mut whole.sampled, &other.sampled);
+    let parts = parts(&sampled.counts, &more.counts, part);
+    mix_pictures(&mut whole.picture, &other.picture, &parts);
     sampled.rays += more.rays;
     sampled.met = sampled.met.max(more.met);
     sampled.at_most = sampled.at_most.min(more.at_most);
     sampled.spare += more.spare;
     sampled.counts.iter_mut().zip(&more.counts).for_each(|(count, more)| *count += more);
-    for (error, more) in sampled.errors.iter_mut().zip(&more.errors) {
+    for ((error, more), part) in sampled.errors.iter_mut().zip(&more.errors).zip(&parts) {
         let (a, b) = (*error * (1.0 - part), more * part);
         *error = (a * a + b * b).sqrt();
     }
 }
 
-fn mix_pictures(whole: &mut Picture, other: &Picture, part: f32) {
-    for (pixel, more) in whole.beauty.iter_mut().zip(&other.beauty) {
-        (0..4).for_each(|c| pixel[c] = pixel[c] * (1.0 - part) + more[c] * part);
-    }
-    for (veil, more) in whole.veil.iter_mut().zip(&other.veil) {
-        (0..4).for_each(|c| veil[c] = veil[c] * (1.0 - part) + more[c] * part);
-    }
+/// What is taken of each pixel of another rendering, of which `part` is taken in all: more where it has more of its samples
+/// than this one has of its own.
+///
+/// A pixel that saw nothing in its first samples has stopped; where the other rendering saw something it went on until it
+/// knew how much. Of two such means that one is nearly right. And where a rendering was cut short it has no samples.
+#[expect(clippy::cast_precision_loss, reason = "counts of rays")]
+fn parts(own: &[u32], other: &[u32], part: f32) -> Vec<f32> {
+    let all = |counts: &[u32]| counts.iter().map(|&n| u64::from(n)).sum::<u64>().max(1) as f32;
+    let (a, b) = ((1.0 - part) / all(own), part / all(other));
+    let each = own.iter().zip(other).map(|(&own, &other)| {
+        let (a, b) = (a * own as f32, b * other as f32);
+        if a + b > 0.0 { b / (a + b) } else { part }
+    });
+    each.collect()
+}
+
+fn mix_pictures(whole: &mut Picture, other: &Picture, parts: &[f32]) {
+    let mix = |own: &mut [[f32; 4]], other: &[[f32; 4]]| {
+        for ((own, more), part) in own.iter_mut().zip(other).zip(parts) {
+            (0..4).for_each(|c| own[c] = own[c] * (1.0 - part) + more[c] * part);
+        }
+    };
+    mix(&mut whole.beauty, &other.beauty);
+    mix(&mut whole.veil, &other.veil);
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "an error needs no more digits")]
 fn single(x: f64) -> f32 {
     x as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_two_renderings_that_one_counts_for_more_in_a_pixel_which_has_more_of_its_samples_there() {
+        // Of 100 samples each; the last pixel of the second was not reached before it was cut short.
+        let parts = parts(&[25, 4, 64, 7, 0], &[25, 64, 4, 0, 7], 0.5);
+        assert_eq!(parts[0], 0.5);
+        assert!((parts[1] - 64.0 / 68.0).abs() < 1e-6 && (parts[2] - 4.0 / 68.0).abs() < 1e-6, "{parts:?}");
+        assert_eq!([parts[3], parts[4]], [0.0, 1.0]);
+    }
+
+    #[test]
+    fn what_is_taken_in_all_is_what_was_asked_where_samples_are_spread_alike() {
+        let parts = parts(&[10, 20, 30], &[1, 2, 3], 0.25);
+        assert!(parts.iter().all(|part| (part - 0.25).abs() < 1e-6), "{parts:?}");
+        assert_eq!(super::parts(&[0, 0], &[0, 0], 0.25), [0.25; 2]);
+    }
 }

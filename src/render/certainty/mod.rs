@@ -218,6 +218,16 @@ mod tests {
     }
 
     #[test]
+    fn pixels_of_few_samples_must_look_more_alike_than_those_of_many() {
+        let judge = Certainty::new(None, (None, false), false, 0.1, 1.0);
+        let differ = |step: f32, samples| judge.differ(Vec4::ZERO, Vec4::splat(step), samples);
+        // One that shows next to the same, what is within the error, and what shading may change from pixel to pixel.
+        for (samples, most) in [(1, 0.025), (2, 0.1), (3, 0.1), (4, 0.2), (256, 0.2)] {
+            assert!(!differ(0.99 * most, samples) && differ(1.01 * most, samples), "{samples}");
+        }
+    }
+
+    #[test]
     fn what_is_the_same_in_all_groups_is_certain() {
         let output = output(ErrorSpace::default(), None);
         let judge = Certainty::new(output.as_ref(), (None, false), false, 0.01, factor(0.95));

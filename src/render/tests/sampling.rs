@@ -430,6 +430,32 @@ fn a_picture_is_as_exact_as_it_was_asked_to_be_and_hardly_more() {
 }
 
 #[test]
+fn a_picture_of_hard_edges_alone_is_as_exact_as_it_says() {
+    // Turned squares: a pixel that an edge touches shows one colour or two, by which of its samples met it.
+    let mut s = looking_down(1.0);
+    (s.settings.width, s.settings.height) = (64, 48);
+    s.scene.background = Some(Background::Color(Vec3::ZERO));
+    for i in 0..12 {
+        let place = DVec3::new(f64::from(i % 4) - 1.5, f64::from(i / 4) - 1.0, 0.0) * 0.3;
+        let at = DAffine3::from_rotation_translation(DQuat::from_rotation_z(0.1 + f64::from(i)), place);
+        s.mesh(square(0.0, 0.08), at, unlit(Vec3::ONE));
+    }
+    let mut render = |seed: u64, how: Stochastic| {
+        (s.settings.seed, s.settings.sampling) = (seed, Sampling::Stochastic(how));
+        s.render()
+    };
+    let linear = |error| Stochastic { space: ErrorSpace::Linear, ..stochastic(error, 4096) };
+    let reference = render(99, Stochastic { min_samples: 4096, ..linear(1e-6) });
+    let (mut squares, mut said) = (0.0, 0.0);
+    for seed in 0..8 {
+        let found = render(seed, Stochastic { target: Some(0.004), ..linear(0.5) });
+        squares += compare(&reference.picture, &found.picture, Space::Linear, 0.0).unwrap().rmse.powi(2);
+        said += found.sampled.targeted.unwrap().estimate.powi(2);
+    }
+    assert!(squares <= said, "{squares} where {said} was said");
+}
+
+#[test]
 fn a_forecast_holds_what_then_happens() {
     let mut s = soft();
     (s.settings.width, s.settings.height) = (160, 120);
