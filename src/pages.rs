@@ -2,7 +2,7 @@
 //!
 //! Rays visit the nodes of a tree in no order, and lookups the texels of a texture. A processor keeps the places of some
 //! thousand pages at hand: of an array of many megabytes it looks up most of them, and pages of two megabytes instead of
-//! four kilobytes spare that. Linux gives them to who asks where `/sys/kernel/mm/transparent_hugepage/enabled` says
+//! four kilobytes spare that. Linux grants them on request where `/sys/kernel/mm/transparent_hugepage/enabled` says
 //! `madvise` or `always`; elsewhere these are arrays like others.
 //!
 //! For arrays that are written and read once from end to end large pages do not pay (measured: loading and building took

@@ -82,14 +82,21 @@ fn main() -> ExitCode {
 /// Counts every case and holds it against the baseline, or records it.
 fn compare(record: bool) -> ExitCode {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/instructions/baseline.txt");
-    let baseline = std::fs::read_to_string(&file).unwrap_or_default();
+    let baseline = match std::fs::read_to_string(&file) {
+        Ok(baseline) => baseline,
+        Err(_) if record => String::new(),
+        Err(e) => {
+            eprintln!("{}: {e}; record what is counted now with --record", file.display());
+            return ExitCode::from(2);
+        }
+    };
     let (compiler, baseline) = baseline.split_once('\n').unwrap_or_default();
     let baseline: BTreeMap<&str, u64> = baseline
         .lines()
         .filter_map(|line| line.rsplit_once(' ').and_then(|(c, n)| Some((c, n.parse().ok()?))))
         .collect();
     let mut recorded = format!("{}\n", env!("MESHRAY_COMPILER"));
-    let mut worse = false;
+    let (mut worse, mut unknown) = (false, 0);
     println!("{:38}{:>14}{:>10}{:>10}", "instructions a ray", "now", "baseline", "ratio");
     for case in cases() {
         let name = case.join(" ");
@@ -108,7 +115,10 @@ fn compare(record: bool) -> ExitCode {
                 worse |= ratio > 1.0 + ALLOWED;
                 println!("{name:38}{:14.0}{:10.0}{ratio:10.3}", per_ray(count), per_ray(before));
             }
-            None => println!("{name:38}{:14.0}{:>10}", per_ray(count), "-"),
+            None => {
+                unknown += 1;
+                println!("{name:38}{:14.0}{:>10}", per_ray(count), "-");
+            }
         }
     }
     if record {
@@ -123,6 +133,10 @@ fn compare(record: bool) -> ExitCode {
     if compiler != env!("MESHRAY_COMPILER") {
         println!("recorded with {compiler}: ratios to another compiler's code are not judged");
         return ExitCode::SUCCESS;
+    }
+    if unknown > 0 {
+        eprintln!("the baseline has nothing of {unknown} of these; accept what is counted now with --record");
+        return ExitCode::FAILURE;
     }
     if worse {
         eprintln!("more than {:.0} % above the baseline; accept it with --record", ALLOWED * 100.0);

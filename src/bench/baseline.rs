@@ -59,21 +59,28 @@ pub fn failures(baseline: &Value, now: &Value, limits: &[Limit]) -> Result<Vec<S
         return Err(format!("its rays are those of seed {before}, not {seed}"));
     }
     let (all, mut found, mut lines) = (items(&baseline["models"]), Vec::new(), Vec::new());
+    if let Some(limit) =
+        limits.iter().find(|limit| !all.is_empty() && !all.iter().any(|model| counts(model, &limit.name)))
+    {
+        return Err(format!("it has no {}: an earlier meshray wrote it", limit.name));
+    }
     for model in items(&now["models"]) {
         let at = earlier(all, &found, model)?;
         found.push(at);
         let (before, name) = (&all[at], called(all, &all[at]));
-        for (key, what) in [("hash", "another file"), ("picture", "another picture"), ("rays", "other numbers of rays")]
-        {
-            if before[key] != model[key] {
-                return Err(format!("{name}: it is of {what} ({} before, {} now)", before[key], model[key]));
+        let alike =
+            [("hash", "a different file"), ("picture", "a different picture"), ("rays", "different numbers of rays")];
+        for (key, what) in alike {
+            let [before, now] = [before, model].map(|model| &model[key]);
+            if before != now {
+                return Err(format!("{name}: the baseline was made from {what} ({before} before, {now} now)"));
             }
         }
         // Reports that do not say so are of models that keep nothing.
         let kept = |model: &Value| model["kept_instances"].as_u64().unwrap_or(0);
         if kept(before) != kept(model) {
             let [before, now] = [kept(before), kept(model)];
-            return Err(format!("{name}: it keeps other numbers of instances ({before} before, {now} now)"));
+            return Err(format!("{name}: the baseline was made with {before} instances kept, not with {now}"));
         }
         for row in items(&before["structures"]) {
             let current = items(&model["structures"]).iter().find(|r| r["accel"] == row["accel"]);
@@ -87,12 +94,20 @@ pub fn failures(baseline: &Value, now: &Value, limits: &[Limit]) -> Result<Vec<S
         let new = items(&model["structures"]).iter().filter(|row| !known(row));
         let new: Vec<&str> = new.filter_map(|row| row["accel"].as_str()).collect();
         if !new.is_empty() {
-            return Err(format!("{name}: it has nothing of {}", new.join(", ")));
+            return Err(format!("{name}: the baseline has no rows for {}", new.join(", ")));
         }
     }
     let missing = all.iter().enumerate().filter(|(at, _)| !found.contains(at));
     lines.extend(missing.map(|(_, model)| format!("{}: in the baseline, but not measured now", called(all, model))));
     Ok(lines)
+}
+
+/// Whether a model of a report has this count.
+fn counts(model: &Value, key: &str) -> bool {
+    items(&model["structures"]).iter().any(|row| {
+        let mut classes = row["classes"].as_object().into_iter().flatten();
+        row[key].is_number() || classes.any(|(_, counts)| counts["per_ray"][key].is_number())
+    })
 }
 
 /// Which of the models of a baseline this one was, of those that are not `found` yet if it is there several times; an error
@@ -188,7 +203,7 @@ mod tests {
     fn reports_of_different_things_are_not_compared() {
         let (before, mut now) = (report(1.0, 1), report(1.0, 1));
         now["models"][0]["hash"] = "8".into();
-        assert!(failures(&before, &now, &[]).unwrap_err().contains("another file"));
+        assert!(failures(&before, &now, &[]).unwrap_err().contains("a different file"));
         now["models"][0]["file"] = "c.obj".into();
         assert!(failures(&before, &now, &[]).unwrap_err().contains("no model c.obj"));
         now = report(1.0, 1);
@@ -234,7 +249,10 @@ mod tests {
         assert_eq!(other, "its rays are those of seed 3, not null");
         let mut fewer = before.clone();
         fewer["models"][0]["structures"] = json!([]);
-        assert_eq!(refused(&fewer), "b.obj: it has nothing of grid");
+        assert_eq!(refused(&fewer), "b.obj: the baseline has no rows for grid");
+        let limits = ["n_xf>+1%".parse().unwrap()];
+        let error = failures(&before, &now, &limits).unwrap_err();
+        assert!(error.starts_with("it has no n_xf: "), "{error}");
     }
 
     #[test]

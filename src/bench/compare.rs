@@ -91,7 +91,8 @@ const SHORTEST: f64 = 4e-3;
 /// What happens while structures are compared; tells whether to go on.
 pub type GoOn<'a> = dyn FnMut(&[Row], &str) -> bool + 'a;
 
-/// Compares. `go_on` hears of every step, with the rows as far as they are; `None` when it says to stop.
+/// Compares. `go_on` hears of every step, with the rows as far as they are; `None` when it says to stop,
+/// or when no threads can be started.
 ///
 /// The reference is the first structure that is not slow, or the first of all; the others must agree with it. Where the world
 /// keeps instances all of them must be such that can ([`AccelKind::keeps_instances`]).
@@ -179,7 +180,7 @@ pub(super) fn count<A: Accel>(accel: &A, task: &Task, tests_by_pixel: &mut [u32]
         let answered = counted(accel, batch, |ray, counts| {
             row.add(counts);
             if let Some(tests) = tests_by_pixel.get_mut(ray.sample as usize).filter(|_| in_picture) {
-                *tests += u32::try_from(counts.n_it).unwrap_or(u32::MAX);
+                *tests = tests.saturating_add(u32::try_from(counts.n_it).unwrap_or(u32::MAX));
             }
         });
         let (plain, seconds) = timed(|| answers(accel, batch));

@@ -24,11 +24,13 @@ impl Spacing {
     }
 
     fn between(self, from: f64, to: f64) -> Vec<f64> {
+        // Three digits may be too few for values that lie close together.
+        let rounded = |value: f64| printable(value).clamp(from, to);
         let inner = |count: usize| (1..count - 1).map(move |i| i as f64 / (count - 1) as f64);
         let between: Vec<f64> = match self {
             Self::Tens => (1..).map(|i| from * 10f64.powi(i)).take_while(|v| *v < to * (1.0 - 1e-9)).collect(),
-            Self::Ratio(count) => inner(count).map(|p| printable(from * (to / from).powf(p))).collect(),
-            Self::Even(count) => inner(count).map(|p| printable(from + (to - from) * p)).collect(),
+            Self::Ratio(count) => inner(count).map(|p| rounded(from * (to / from).powf(p))).collect(),
+            Self::Even(count) => inner(count).map(|p| rounded(from + (to - from) * p)).collect(),
         };
         [vec![from], between, vec![to]].concat()
     }
@@ -97,6 +99,7 @@ mod tests {
         assert_eq!(values("0..10", Spacing::Even(6), true).unwrap(), [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]);
         assert_eq!(values("1..3:3", Spacing::Ratio(6), false).unwrap(), [1.0, 1.73, 3.0]);
         assert_eq!(values("0..3:2", Spacing::Even(6), true).unwrap(), [0.0, 3.0]);
+        assert_eq!(values("1006..1009:4", Spacing::Ratio(6), true).unwrap(), [1006.0, 1009.0]);
     }
 
     #[test]

@@ -48,11 +48,20 @@ impl Parameter {
 
     /// Whether it changes a structure of this kind with these other parameters.
     pub fn changes(self, kind: AccelKind, params: &AccelParams) -> bool {
-        match self {
-            Self::GridDensity | Self::GridResolution => kind.has_grid() && params.grid_cells.is_none(),
-            Self::MaxDepth => kind.has_octrees(),
-            Self::StepCost => kind.has_octrees() && params.leaf_size.is_none(),
+        let has_it = match self {
+            Self::GridDensity | Self::GridResolution => kind.has_grid(),
+            Self::MaxDepth | Self::StepCost => kind.has_octrees(),
             Self::LeafSize => kind.has_leaves(),
+        };
+        has_it && self.overruled_by(params).is_none()
+    }
+
+    /// The flag (without dashes) that fixes what this parameter would decide, if it is among these.
+    pub const fn overruled_by(self, params: &AccelParams) -> Option<&'static str> {
+        match self {
+            Self::GridDensity | Self::GridResolution if params.grid_cells.is_some() => Some("grid-cells"),
+            Self::StepCost if params.leaf_size.is_some() => Some("leaf-size"),
+            _ => None,
         }
     }
 

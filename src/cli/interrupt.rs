@@ -71,7 +71,7 @@ impl Drop for Guard {
 /// done, unless something else is to be saved.
 pub(super) fn write_atomic(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let guard = Guard::new();
-    let written = image::write_atomic(path, bytes, false);
+    let written = image::write_atomic(path, bytes);
     drop(guard);
     let guards = guards();
     if raised() && *guards == 0 {

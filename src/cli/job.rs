@@ -5,14 +5,14 @@ use super::camera::{Choice, LensChoice};
 use super::message;
 use super::output_name::{Facts, Naming};
 use super::outputs::{self, Beside, Target};
-use super::parse::{Back, Env};
+use super::parse::Env;
 use super::sampling::{SamplingArgs, SpaceArg};
 use super::sequence::{self, Sequence, Step};
 use crate::accel::{AccelChoice, AccelKind, AccelParams, IntersectorKind};
 use crate::image::{ExrSamples, FileKind, PngDepth, ToneMap};
 use crate::load::{Limits, LoadOptions, MtlMode, Polygons};
 use crate::render::{Cost, Instancing};
-use crate::scene::UpAxis;
+use crate::scene::{Background, UpAxis};
 use std::path::{Path, PathBuf};
 
 /// A command line that cannot be carried out: one line, exit code 2.
@@ -109,7 +109,7 @@ pub(super) struct Look {
     /// Field of view or parallel rays.
     pub lens: Option<LensChoice>,
     /// Behind everything.
-    pub background: Option<Back>,
+    pub background: Option<Background>,
     /// Around everything.
     pub env: Option<Env>,
     /// How far that is turned, degrees.

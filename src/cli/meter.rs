@@ -7,7 +7,7 @@
 
 use super::camera::Choice;
 use crate::image::Picture;
-use crate::math::Vec3;
+use crate::image::tone::luminance;
 use crate::render::{Job, Sampling, Settings, render};
 use crate::scene::MAX_STOPS;
 use std::time::Instant;
@@ -92,23 +92,18 @@ pub(super) fn phrase(stops: f32) -> String {
 fn bright(picture: &Picture) -> Option<f32> {
     let prims = &picture.layers.as_ref()?.prim;
     let seen = picture.beauty.iter().zip(prims).filter(|(_, prim)| **prim != u32::MAX);
-    let mut luminances: Vec<f32> = seen.map(|(p, _)| luminance(Vec3::from_slice(p))).filter(|l| *l > 0.0).collect();
+    let mut luminances: Vec<f32> = seen.map(|(p, _)| luminance([p[0], p[1], p[2]])).filter(|l| *l > 0.0).collect();
     luminances.sort_by(f32::total_cmp);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of the length")]
     let rank = (luminances.len() as f32 * (1.0 - ABOVE)) as usize;
     luminances.get(rank.min(luminances.len().saturating_sub(1))).copied().filter(|l| l.is_finite())
 }
 
-/// Rec. 709.
-fn luminance(color: Vec3) -> f32 {
-    color.dot(Vec3::new(0.2126, 0.7152, 0.0722))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::accel::{AccelKind, AccelParams, AnyAccel};
-    use crate::math::DVec3;
+    use crate::math::{DVec3, Vec3};
     use crate::render::texture::TextureStore;
     use crate::render::view::Lens;
     use crate::render::{View, World};

@@ -4,9 +4,10 @@
 //! of the picture: in its sequence, or else in this run, from 1; `{frame:04}` pads it with zeros). `{{` and `}}` are plain braces.
 
 use crate::image::destination;
+use crate::load::paths::lexical;
 use crate::load::suggest::nearest;
 use std::collections::HashMap;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 /// What a template is filled with.
 #[derive(Clone, Debug)]
@@ -65,7 +66,7 @@ fn value(field: &str, facts: &Facts) -> Result<String, String> {
         }
         _ => {
             let hint = nearest(name, FIELDS).map_or_else(String::new, |n| format!("; did you mean {{{n}}}?"));
-            Err(format!("`{{{field}}}` is no field of a name; there are {{dir}} {{stem}} {{view}} {{frame:04}}{hint}"))
+            Err(format!("`{{{field}}}` is not a known field; use {{dir}}, {{stem}}, {{view}} or {{frame:04}}{hint}"))
         }
     }
 }
@@ -124,20 +125,6 @@ pub(super) fn identity(name: &Path) -> PathBuf {
     let parent = name.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let parent = parent.canonicalize().unwrap_or_else(|_| lexical(parent));
     parent.join(name.file_name().unwrap_or_default())
-}
-
-fn lexical(path: &Path) -> PathBuf {
-    let mut clean = PathBuf::new();
-    for part in path.components() {
-        match part {
-            Component::CurDir => {}
-            Component::ParentDir if clean.file_name().is_some() => {
-                clean.pop();
-            }
-            other => clean.push(other),
-        }
-    }
-    clean
 }
 
 /// `shot.png` -> `shot.partial.png`.

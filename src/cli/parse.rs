@@ -17,9 +17,6 @@ use std::path::PathBuf;
 /// Longest side of a picture.
 pub(super) const MAX_SIDE: u32 = 65_535;
 
-/// `--background` as typed.
-pub(super) type Back = Background;
-
 /// `--ortho` as typed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Ortho {
@@ -298,20 +295,19 @@ pub(super) fn bytes(text: &str) -> Result<u64, String> {
     let wrong = || "write a size such as 500M or 2G".to_owned();
     let digits = text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
     let number: u64 = text[..digits].parse().map_err(|_| wrong())?;
-    let suffix = text[digits..].to_ascii_uppercase();
-    let shift = match suffix.trim_end_matches('B').trim_end_matches('I') {
-        "" => 0,
-        "K" => 10,
-        "M" => 20,
-        "G" => 30,
-        "T" => 40,
+    let shift = match text[digits..].to_ascii_uppercase().as_str() {
+        "" | "B" => 0,
+        "K" | "KB" | "KIB" => 10,
+        "M" | "MB" | "MIB" => 20,
+        "G" | "GB" | "GIB" => 30,
+        "T" | "TB" | "TIB" => 40,
         _ => return Err(wrong()),
     };
     number.checked_mul(1 << shift).filter(|&n| n > 0).ok_or_else(wrong)
 }
 
 /// A colour, `transparent` or `env`.
-pub(super) fn background(text: &str) -> Result<Back, String> {
+pub(super) fn background(text: &str) -> Result<Background, String> {
     match text {
         "transparent" => Ok(Background::Transparent),
         "env" | "environment" => Ok(Background::Environment),

@@ -5,6 +5,7 @@ use super::exit::Exit;
 use super::job::{self, Wrong};
 use super::message::{Messages, Severity};
 use super::moment;
+use crate::load::diagnostic::OVER_MEMORY;
 use crate::load::{Diagnostic, Limits, LoadError, LoadOptions, Loaded, load, load_bytes};
 use crate::math::DAffine3;
 use crate::render::{Instancing, Placing, World};
@@ -77,7 +78,7 @@ pub(super) fn model_as_stored(input: &PathBuf, args: &LoadArgs, messages: &Messa
 /// millions of them.
 pub(super) fn check_flattened(loaded: &Loaded, limit: u64, file: &Path) -> Result<(), Diagnostic> {
     let bytes = World::flattened_bytes(&loaded.scene);
-    check_stored((loaded, bytes), limit, file, "allow more with --max-memory")
+    check_stored((loaded, bytes), limit, file, "raise --max-memory")
 }
 
 /// The same where those that are stored by themselves, all of them or some, take so many bytes.
@@ -120,9 +121,9 @@ pub(super) fn as_drawn(loaded: &Loaded, how: Instancing, limit: u64, file: &Path
     let (other, remedy) = match how {
         Instancing::Flatten => (
             Instancing::Flatten,
-            "leave it to a fast structure to keep them once (render: --instances auto), or allow more with --max-memory",
+            "leave it to a fast structure to keep them once (render: --instances auto), or raise --max-memory",
         ),
-        Instancing::Keep | Instancing::Auto => (Instancing::Keep, "allow more with --max-memory"),
+        Instancing::Keep | Instancing::Auto => (Instancing::Keep, "raise --max-memory"),
     };
     placed(loaded, (how, other), limit, file, remedy)
 }
@@ -186,7 +187,7 @@ pub(super) fn exit_of(error: &LoadError) -> Exit {
     // A file that is too large whatever the memory has no remedy.
     let of_memory = |fault: &Diagnostic| match fault.code {
         "file-too-large" => !fault.remedy.is_empty(),
-        code => matches!(code, "out-of-memory-limit" | "over-memory"),
+        code => code == OVER_MEMORY,
     };
     match error {
         LoadError::Read { .. } => Exit::Failed,

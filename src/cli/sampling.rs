@@ -250,8 +250,8 @@ impl SamplingArgs {
         if focus > 0.0 && focus.is_finite() {
             return Ok(Some(ThinLens { radius, focus }));
         }
-        let text = format!("what should be sharp lies {focus} before the eye, so behind it");
-        Err(Diagnostic::new("focus", file, "", text).remedy("choose another --focus"))
+        let text = format!("the point to focus on is not in front of the camera: it lies {focus} along the view");
+        Err(Diagnostic::new("focus", file, "", text).remedy("give a --focus that is in front of it"))
     }
 }
 

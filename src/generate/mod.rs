@@ -83,7 +83,7 @@ impl fmt::Display for Family {
 
 /// A name that no family has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no family is named {0:?}; there are: tetra, gears, balls, tree, mountain, stadium, instances")]
+#[error("no family is named {0:?}; there are: {names}", names = Family::ALL.map(Family::name).join(", "))]
 pub struct UnknownFamily(String);
 
 impl FromStr for Family {

@@ -11,7 +11,7 @@ pub enum ImageError {
     UnknownKind {
         /// The output path as given.
         path: PathBuf,
-        /// Its extension with the dot and quotes, or `without extension`.
+        /// Its extension with the dot and quotes, or `(no extension)`.
         extension: String,
     },
     /// More columns or rows than the format can hold.

@@ -15,6 +15,7 @@
 
 use super::metadata::MAX_TEXT;
 use super::{Channel, ExrSamples, FileKind, ImageError, Layers, Metadata, Output, Picture, Values};
+use crate::quiet::attempt;
 use crate::threads;
 use ::exr::image::{Blocks, Encoding, FlatSamples, Image, Layer};
 use ::exr::meta::MetaData;
@@ -179,14 +180,15 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<(Picture, Vec<Stri
             return Err(ImageError::decode(FileKind::Exr, "deep pixels are not supported"));
         }
     }
-    let image = ::exr::image::read::read()
+    let reader = ::exr::image::read::read()
         .no_deep_data()
         .largest_resolution_level()
         .all_channels()
         .first_valid_layer()
         .all_attributes()
-        .non_parallel()
-        .from_buffered(Cursor::new(bytes))
+        .non_parallel();
+    let image = attempt(|| reader.from_buffered(Cursor::new(bytes)))
+        .ok_or_else(|| ImageError::decode(FileKind::Exr, "it is damaged"))?
         .map_err(fail)?;
     let layer = &image.layer_data;
     let Vec2(width, height) = layer.size;

@@ -7,12 +7,11 @@ use std::path::{Path, PathBuf};
 /// Writes `bytes` to a temporary file in the same folder and renames it to `path`. On failure nothing is left.
 ///
 /// A file that is replaced keeps its permissions, a new one gets the usual ones; a link stays, and the file it points
-/// to is replaced or made. What is no regular file (`/dev/stdout`, a pipe) is written straight. `fsync` waits until the bytes
-/// are on the disk, so that they survive a power cut.
+/// to is replaced or made. What is no regular file (`/dev/stdout`, a pipe) is written straight.
 ///
 /// # Errors
 /// What the system says, with the remedy where the folder is missing, `path` is a folder, or the file is read-only.
-pub fn write_atomic(path: &Path, bytes: &[u8], fsync: bool) -> io::Result<()> {
+pub fn write_atomic(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let target = destination(path);
     let old = match fs::metadata(&target) {
         Ok(old) if old.is_dir() => return Err(fault(ErrorKind::IsADirectory, "is a folder; name a file in it")),
@@ -29,16 +28,10 @@ pub fn write_atomic(path: &Path, bytes: &[u8], fsync: bool) -> io::Result<()> {
         let text = format!("folder {} does not exist; create it first", folder.display());
         return Err(io::Error::new(ErrorKind::NotFound, text));
     }
-    write_and_rename(&target, &folder, old, bytes, fsync)
+    write_and_rename(&target, &folder, old, bytes)
 }
 
-fn write_and_rename(
-    target: &Path,
-    folder: &Path,
-    old: Option<Permissions>,
-    bytes: &[u8],
-    fsync: bool,
-) -> io::Result<()> {
+fn write_and_rename(target: &Path, folder: &Path, old: Option<Permissions>, bytes: &[u8]) -> io::Result<()> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".meshray-");
     #[cfg(unix)]
@@ -52,14 +45,7 @@ fn write_and_rename(
     if let Some(permissions) = old {
         file.as_file().set_permissions(permissions)?;
     }
-    if fsync {
-        file.as_file().sync_all()?;
-    }
     file.persist(target).map_err(|e| e.error)?;
-    if fsync && cfg!(unix) {
-        // The new name itself.
-        fs::File::open(folder)?.sync_all()?;
-    }
     Ok(())
 }
 
@@ -105,8 +91,8 @@ mod tests {
     fn a_file_is_made_and_replaced_and_nothing_else_is_left() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.png");
-        for (bytes, fsync) in [(b"one".as_slice(), false), (b"two, longer", true), (b"", false)] {
-            write_atomic(&path, bytes, fsync).unwrap();
+        for bytes in [b"one".as_slice(), b"two, longer", b""] {
+            write_atomic(&path, bytes).unwrap();
             assert_eq!(fs::read(&path).unwrap(), bytes);
         }
         assert_eq!(names(dir.path()), ["a.png"]);
@@ -115,7 +101,7 @@ mod tests {
     #[test]
     fn a_missing_folder_is_named() {
         let dir = tempfile::tempdir().unwrap();
-        let fault = write_atomic(&dir.path().join("out/a.png"), b"x", false).unwrap_err();
+        let fault = write_atomic(&dir.path().join("out/a.png"), b"x").unwrap_err();
         assert_eq!(fault.kind(), ErrorKind::NotFound);
         assert!(fault.to_string().contains("out does not exist"), "{fault}");
     }
@@ -125,8 +111,8 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.png");
         fs::create_dir(&path).unwrap();
-        assert!(write_atomic(&path, b"x", false).unwrap_err().to_string().contains("is a folder"));
-        assert!(write_and_rename(&path, dir.path(), None, b"x", false).is_err());
+        assert!(write_atomic(&path, b"x").unwrap_err().to_string().contains("is a folder"));
+        assert!(write_and_rename(&path, dir.path(), None, b"x").is_err());
         assert_eq!(names(dir.path()), ["a.png"]);
     }
 
@@ -150,10 +136,10 @@ mod tests {
             let dir = tempfile::tempdir().unwrap();
             let (usual, ours) = (dir.path().join("usual"), dir.path().join("ours"));
             fs::write(&usual, "x").unwrap();
-            write_atomic(&ours, b"x", false).unwrap();
+            write_atomic(&ours, b"x").unwrap();
             assert_eq!(mode(&ours), mode(&usual));
             fs::set_permissions(&ours, Permissions::from_mode(0o640)).unwrap();
-            write_atomic(&ours, b"y", false).unwrap();
+            write_atomic(&ours, b"y").unwrap();
             assert_eq!(mode(&ours), 0o640);
         }
 
@@ -163,7 +149,7 @@ mod tests {
             let path = dir.path().join("a.png");
             fs::write(&path, "old").unwrap();
             fs::set_permissions(&path, Permissions::from_mode(0o444)).unwrap();
-            assert!(write_atomic(&path, b"new", false).unwrap_err().to_string().contains("read-only"));
+            assert!(write_atomic(&path, b"new").unwrap_err().to_string().contains("read-only"));
             assert_eq!(fs::read(&path).unwrap(), b"old");
         }
 
@@ -173,7 +159,7 @@ mod tests {
             let (real, link) = (dir.path().join("real.png"), dir.path().join("link.png"));
             fs::write(&real, "old").unwrap();
             symlink(&real, &link).unwrap();
-            write_atomic(&link, b"new", false).unwrap();
+            write_atomic(&link, b"new").unwrap();
             assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
             assert_eq!(fs::read(&real).unwrap(), b"new");
         }
@@ -185,18 +171,18 @@ mod tests {
             fs::create_dir(at("deep")).unwrap();
             symlink("deep/link.png", at("first.png")).unwrap();
             symlink("../real.png", at("deep/link.png")).unwrap();
-            write_atomic(&at("first.png"), b"new", false).unwrap();
+            write_atomic(&at("first.png"), b"new").unwrap();
             assert!(
                 ["first.png", "deep/link.png"].iter().all(|name| fs::symlink_metadata(at(name)).unwrap().is_symlink())
             );
             assert_eq!(fs::read(at("real.png")).unwrap(), b"new");
             symlink("circle.png", at("circle.png")).unwrap();
-            assert!(write_atomic(&at("circle.png"), b"new", false).is_err());
+            assert!(write_atomic(&at("circle.png"), b"new").is_err());
         }
 
         #[test]
         fn a_device_is_written_straight() {
-            write_atomic(Path::new("/dev/null"), b"x", false).unwrap();
+            write_atomic(Path::new("/dev/null"), b"x").unwrap();
             assert!(!fs::metadata("/dev/null").unwrap().is_file());
         }
     }

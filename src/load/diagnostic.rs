@@ -4,6 +4,12 @@ use std::collections::HashMap;
 use std::fmt;
 use std::path::PathBuf;
 
+/// The code of everything that takes more memory than is left.
+pub(crate) const OVER_MEMORY: &str = "over-memory";
+
+/// What helps against that.
+pub(super) const RAISE_MEMORY: &str = "raise --max-memory";
+
 /// One thing worth telling the user.
 ///
 /// Displayed as `file:place: text (×count); remedy`, one line, lower case after the place, no final period.
@@ -32,6 +38,11 @@ impl Diagnostic {
         text: impl Into<String>,
     ) -> Self {
         Self { code, file: file.into(), place: place.into(), text: text.into(), remedy: String::new(), count: 1 }
+    }
+
+    /// Something takes more memory than is left.
+    pub(super) fn over_memory(file: impl Into<PathBuf>, place: impl Into<String>, text: impl Into<String>) -> Self {
+        Self::new(OVER_MEMORY, file, place, text).remedy(RAISE_MEMORY)
     }
 
     /// Adds what the user can do.

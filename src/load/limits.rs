@@ -1,5 +1,7 @@
 //! Bounds that are checked before memory is taken.
 
+use super::diagnostic::RAISE_MEMORY;
+
 /// Largest sizes a file may ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
@@ -20,7 +22,7 @@ impl Default for Limits {
 impl Limits {
     /// What lets a larger file in: more memory, unless a file may not be larger whatever the memory.
     pub(super) fn remedy_for_file(&self) -> &'static str {
-        if self.file == self.memory { "raise --max-memory" } else { "" }
+        if self.file == self.memory { RAISE_MEMORY } else { "" }
     }
 }
 

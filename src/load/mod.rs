@@ -18,7 +18,6 @@ pub mod ply;
     not(any(feature = "draco", feature = "basisu")),
     expect(dead_code, reason = "only decoders of others panic")
 )]
-mod quiet;
 pub mod scene_file;
 mod smooth;
 pub mod stl;
@@ -151,7 +150,8 @@ pub struct Facts {
     pub max_rounding: f64,
     /// Every file read: the model first, then buffers, images, MTLs. For the input hash and `inspect`.
     pub files: Vec<PathBuf>,
-    /// xxh3-128 of the xxh3-128 hashes of all files in `files`, in that order (see [`paths::Resolver::finish`]).
+    /// xxh3-128 of the xxh3-128 hashes of all files in `files`, in that order (see [`paths::Resolver::finish`]); of the
+    /// files of a model that a scene file shows the first counts with the hash of the model, and the others with 0.
     pub hash: u128,
     /// Bytes of memory that loading was charged with.
     pub charged: u64,
@@ -248,8 +248,7 @@ fn load_source(source: &Source, options: &LoadOptions) -> Result<Loaded, LoadErr
 /// Loads what is in memory already; whatever that takes comes out of one budget.
 fn load_within(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Result<Loaded, LoadError> {
     let too_large = |what: &str, over: OverBudget| {
-        let fault = Diagnostic::new("out-of-memory-limit", &source.path, "", format!("{what} too large: {over}"));
-        LoadError::from(fault.remedy("allow more with --max-memory"))
+        LoadError::from(Diagnostic::over_memory(&source.path, "", format!("{what} too large: {over}")))
     };
     budget.take(source.bytes.len() as u64, 1).map_err(|over| too_large("the file is", over))?;
     let mut loaded = match detect::detect(source)? {

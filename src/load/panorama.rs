@@ -3,6 +3,7 @@
 use super::limits::{Budget, Limits};
 use super::texture::{format_of, within};
 use super::{Diagnostic, LoadError, Source};
+use crate::quiet::attempt;
 use crate::scene::Panorama;
 use crate::scene::color::from_srgb;
 use crate::threads;
@@ -57,17 +58,15 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
     if pixels == 0 || pixels > limits.image_pixels {
         return Err(fault(format!("is {width}×{height} pixels where 1 to {} are allowed", limits.image_pixels)));
     }
-    Budget::new(limits).take(pixels, PER_PIXEL).map_err(|over| {
-        let fault = Diagnostic::new("out-of-memory-limit", &source.path, "", over.to_string());
-        LoadError::from(fault.remedy("allow more with --max-memory"))
-    })?;
+    Budget::new(limits)
+        .take(pixels, PER_PIXEL)
+        .map_err(|over| LoadError::from(Diagnostic::over_memory(&source.path, "", over.to_string())))?;
     let most = pixels * PER_PIXEL;
     // The decoder of EXR files gives up on some damaged ones by a panic.
-    let decoded = std::panic::catch_unwind(|| threads::anywhere(|| reader(most).decode()));
-    let picture = match decoded {
-        Ok(Ok(picture)) => picture,
-        Ok(Err(e)) => return Err(fault(format!("cannot be decoded: {e}"))),
-        Err(_) => return Err(fault("cannot be decoded: it is damaged".into())),
+    let picture = match attempt(|| threads::anywhere(|| reader(most).decode())) {
+        Some(Ok(picture)) => picture,
+        Some(Err(e)) => return Err(fault(format!("cannot be decoded: {e}"))),
+        None => return Err(fault("cannot be decoded: it is damaged".into())),
     };
     let mut warnings = Vec::new();
     if u64::from(width) != 2 * u64::from(height) {
@@ -105,6 +104,7 @@ fn radiance(picture: DynamicImage, format: ImageFormat) -> (Vec<[f32; 3]>, usize
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::load::diagnostic::OVER_MEMORY;
     use ::image::{ImageBuffer, Rgb, Rgb32FImage};
 
     fn file(picture: &DynamicImage, format: ImageFormat) -> Source {
@@ -181,7 +181,10 @@ mod tests {
                     bytes[at] = random.bits().to_le_bytes()[0];
                 }
                 let limits = Limits { memory: 1 << 24, ..Limits::default() };
-                let _ = decode(&Source { path: "sky".into(), bytes }, &limits);
+                if let Err(error) = decode(&Source { path: "sky".into(), bytes }, &limits) {
+                    let LoadError::Input(faults) = error else { panic!("{error} is told as a fault of reading") };
+                    assert!(["env-unusable", OVER_MEMORY].contains(&faults[0].code), "{}", faults[0]);
+                }
             }
         }
     }

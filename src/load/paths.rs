@@ -267,7 +267,7 @@ impl Resolver {
         });
     }
 
-    /// Adds the files of a model that was loaded on behalf of this one.
+    /// Adds the files of a model that was loaded on behalf of this one; `hash` is that of all of them.
     pub fn absorb(&mut self, files: &[PathBuf], hash: u128) {
         let rest = files.iter().skip(1).map(|f| (f.clone(), 0));
         self.read.extend(files.first().map(|f| (f.clone(), hash)));
@@ -316,19 +316,20 @@ pub(crate) fn shorten(text: &str) -> String {
     if text.chars().nth(KEPT).is_none() { text.into() } else { text.chars().take(KEPT).chain(['…']).collect() }
 }
 
-/// `path` with `.` and `..` taken out by text alone.
-fn lexical(path: &Path) -> PathBuf {
-    let mut out = PathBuf::new();
+/// `path` with `.` and `..` taken out by text alone; above a root there is nothing, and `..` that lead out of a relative path
+/// stay.
+pub(crate) fn lexical(path: &Path) -> PathBuf {
+    let mut clean = PathBuf::new();
     for part in path.components() {
         match part {
             Component::CurDir => {}
-            Component::ParentDir => {
-                out.pop();
+            Component::ParentDir if clean.file_name().is_some() || clean.has_root() => {
+                clean.pop();
             }
-            other => out.push(other),
+            other => clean.push(other),
         }
     }
-    out
+    clean
 }
 
 /// The innermost folder that holds both.

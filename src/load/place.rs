@@ -1,9 +1,11 @@
 //! Coordinates in `f64` -> a centre in `f64` and coordinates around it in `f32`.
 
+use super::{Diagnostic, Warnings};
 use crate::math::frame::snapped_center;
 use crate::math::{DVec3, Vec3};
 use crate::scene::Mesh;
 use rayon::prelude::*;
+use std::path::Path;
 
 /// Rounded positions, relative to `center`.
 #[derive(Clone, Debug, Default)]
@@ -21,6 +23,44 @@ const LARGEST: f64 = 1e18;
 /// Whether a place or size is finite and not so large that it counts as infinite.
 pub(super) fn is_usable(p: DVec3) -> bool {
     p.is_finite() && p.abs().max_element() <= LARGEST
+}
+
+/// Why a shape cannot be placed.
+pub(super) struct LeftOut {
+    code: &'static str,
+    reason: &'static str,
+    text: &'static str,
+}
+
+impl LeftOut {
+    /// It lies where coordinates count as infinite.
+    pub(super) const TOO_FAR: Self = Self {
+        code: "shape-too-far",
+        reason: "a coordinate over 1e18",
+        text: "a shape is left out: a coordinate or size is over 1e18",
+    };
+
+    /// Rounding leaves nothing of it.
+    pub(super) const COLLAPSED: Self = Self {
+        code: "face-degenerate",
+        reason: "two corners in one place",
+        text: "a triangle is left out: two corners are in one place once coordinates are rounded",
+    };
+
+    /// Tells of so many, where there are any; the first is at that place of the file.
+    pub(super) fn tell(
+        &self,
+        count: u64,
+        (file, place): (&Path, String),
+        dropped: &mut Vec<(String, u64)>,
+        warnings: &mut Warnings,
+    ) {
+        if count > 0 {
+            let warning = Diagnostic::new(self.code, file, place, self.text);
+            warnings.push(Diagnostic { count: u32::try_from(count).unwrap_or(u32::MAX), ..warning });
+            dropped.push((self.reason.into(), count));
+        }
+    }
 }
 
 /// Positions that one thread looks at at a time.

@@ -4,6 +4,7 @@
 //! little. Colour profiles, gamma chunks and EXIF orientation are ignored, as glTF demands. A picture that is missing or
 //! broken costs a warning; the material goes on without that map.
 
+use super::diagnostic::RAISE_MEMORY;
 use super::limits::{Budget, Limits};
 use super::{Diagnostic, Warnings, ktx};
 use crate::pages::Paged;
@@ -72,7 +73,7 @@ impl Unusable {
     }
 
     pub(super) fn too_large(why: impl Into<String>) -> Self {
-        Self { why: why.into(), remedy: "allow more with --max-memory" }
+        Self { why: why.into(), remedy: RAISE_MEMORY }
     }
 
     /// What is told of the image of this name, which `file` names at `place`.
@@ -195,7 +196,7 @@ pub(super) fn take_memory(
     if pixels > limits.image_pixels {
         let why = format!("{width}×{height} pixels where {} are allowed", limits.image_pixels);
         let at_most = Limits::default().image_pixels;
-        let remedy = if pixels > at_most { "scale it down" } else { "allow more with --max-memory" };
+        let remedy = if pixels > at_most { "scale it down" } else { RAISE_MEMORY };
         return Err(Unusable { why, remedy });
     }
     let bytes = pixels.saturating_mul(texel).saturating_add(smaller_copies(pixels)).saturating_add(more);
@@ -393,11 +394,7 @@ mod tests {
             let limits = |memory| Limits { memory, ..Limits::default() };
             assert!(decode_one(&file, &limits(memory)).0.is_some());
             let (bitmap, warnings) = decode_one(&file, &limits(memory - 1));
-            assert!(
-                bitmap.is_none() && warnings[0].remedy.ends_with("allow more with --max-memory"),
-                "{}",
-                warnings[0]
-            );
+            assert!(bitmap.is_none() && warnings[0].remedy.ends_with("raise --max-memory"), "{}", warnings[0]);
         }
         let small = Limits { image_pixels: 2_999, ..Limits::default() };
         let warnings = decode_one(&png(DynamicImage::new_rgba8(60, 50)), &small).1;

@@ -3,7 +3,8 @@
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
-/// The greatest whole number that is not above `x`, which is no NaN, without the call that processors of 2003 need for it.
+/// The greatest whole number that is not above `x`, which is no NaN, without the library call that x86-64 needs
+/// for it before SSE4.1.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "within ±2²³ both casts are exact")]
 pub fn floor(x: f32) -> f32 {

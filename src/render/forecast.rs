@@ -83,9 +83,7 @@ pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
     };
     let whole = pixels as f64 * work;
     let rays = Interval::of_mean(&per_pixel(&|i| timed.rays_in_tiles(i)), whole).map(|rays| rays + before.0);
-    let tests: u64 =
-        counted.counts.iter().flat_map(|c| [c.primary, c.shadow, c.reflected, c.refracted]).map(|c| c.n_it).sum();
-    let per_ray = tests as f64 / counted.rays().max(1) as f64;
+    let tests = Interval::of_mean(&per_pixel(&|i| counted.tests_in_tiles(i)), whole);
     let squared = squared_errors(&Measure::of(job), &timed, &counted);
     let is_random = matches!(settings.sampling, Sampling::Stochastic(_));
     Some(Forecast {
@@ -93,7 +91,7 @@ pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
         pixels,
         cpu: Interval::of_mean(&per_pixel(&|i| timed.seconds_in_tiles(i)), whole).map(|cpu| cpu + before.1),
         rays,
-        tests: rays.map(|rays| rays * per_ray),
+        tests: tests.map(|tests| tests + before.0 * counted.tests_per_ray()),
         rmse: is_random.then(|| Interval::of_mean(&squared, 1.0 / work).map(f64::sqrt)),
     })
 }

@@ -4,9 +4,10 @@ use super::certainty::output;
 use super::context::Context;
 use super::observer::Observer;
 use super::sampling::{ErrorSpace, Sampling};
-use super::tile::{TILE, Tile, TilePixels, render_some};
+use super::tile::{Alone, TILE, Tile, TilePixels, render_some};
 use super::whitted::ByClass;
 use super::{Job, Progress, Settings};
+use crate::accel::RayCounts;
 use crate::image::{Developer, Picture};
 use crate::math::Vec3;
 use crate::scene::Background;
@@ -59,6 +60,7 @@ pub(super) struct Part<P> {
     pub squares: Vec<TilePixels>,
     /// Time of the processor for each.
     pub spent: Vec<Duration>,
+    /// Of each.
     pub counts: Vec<ByClass<P>>,
 }
 
@@ -72,12 +74,16 @@ impl<P: Observer> Part<P> {
         progress: &dyn Progress,
     ) -> Option<Self> {
         let context = context.resampled(settings);
-        let (mut finished, counts, complete) =
-            render_some(&context, job.accel, job.view, settings, &Quiet(progress), squares);
+        let (mut finished, complete) = render_some(&context, job.accel, job.view, settings, &Quiet(progress), squares);
         // Threads finish squares in any order; sums over them have one.
-        finished.sort_by_key(|(pixels, _)| (pixels.tile.x0, pixels.tile.y0));
-        let (squares, spent) = finished.into_iter().unzip();
-        complete.then_some(Self { squares, spent, counts })
+        finished.sort_by_key(|Alone { pixels, .. }| (pixels.tile.x0, pixels.tile.y0));
+        let mut part = Self { squares: Vec::new(), spent: Vec::new(), counts: Vec::new() };
+        for Alone { pixels, spent, counts } in finished {
+            part.squares.push(pixels);
+            part.spent.push(spent);
+            part.counts.push(counts);
+        }
+        complete.then_some(part)
     }
 
     fn pixels(&self) -> usize {
@@ -94,7 +100,12 @@ impl<P: Observer> Part<P> {
 
     /// Processor time that it would take so.
     pub(super) fn seconds_in_tiles(&self, square: usize) -> f64 {
-        self.spent[square].as_secs_f64() * self.rays_in_tiles(square) / self.squares[square].rays.max(1) as f64
+        self.spent[square].as_secs_f64() * self.kept_in_tiles(square)
+    }
+
+    /// The part of the rays of a square that it would take so.
+    fn kept_in_tiles(&self, square: usize) -> f64 {
+        self.rays_in_tiles(square) / self.squares[square].rays.max(1) as f64
     }
 
     /// Processor time that all took.
@@ -119,6 +130,25 @@ impl<P: Observer> Part<P> {
     /// Eye rays.
     pub(super) fn rays(&self) -> u64 {
         self.squares.iter().map(|square| square.rays).sum()
+    }
+}
+
+impl Part<RayCounts> {
+    /// Ray/prim tests of a square.
+    fn tests(&self, square: usize) -> u64 {
+        let ByClass { primary, shadow, reflected, refracted } = &self.counts[square];
+        [primary, shadow, reflected, refracted].map(|counts| counts.n_it).into_iter().sum()
+    }
+
+    /// Those that it would take as a part of whole tiles.
+    pub(super) fn tests_in_tiles(&self, square: usize) -> f64 {
+        self.tests(square) as f64 * self.kept_in_tiles(square)
+    }
+
+    /// Tests of an eye ray and all that come of it, on the average.
+    pub(super) fn tests_per_ray(&self) -> f64 {
+        let tests: u64 = (0..self.squares.len()).map(|i| self.tests(i)).sum();
+        tests as f64 / self.rays().max(1) as f64
     }
 }
 

@@ -87,8 +87,15 @@ fn render_tile<A: Accel, P: Observer>(frame: &Frame, tracer: &mut Tracer<A, P>, 
     }
 }
 
-/// Renders these tiles alone, in any order: what came of each with the time of the processor that it took, the counts of all
-/// threads, and whether nothing was cut short.
+/// A tile that was rendered alone.
+pub(super) struct Alone<P> {
+    pub pixels: TilePixels,
+    /// Time of the processor that it took.
+    pub spent: Duration,
+    pub counts: ByClass<P>,
+}
+
+/// Renders these tiles alone, in any order; and whether nothing was cut short.
 pub(super) fn render_some<A: Accel, P: Observer>(
     context: &Context,
     accel: &A,
@@ -96,15 +103,17 @@ pub(super) fn render_some<A: Accel, P: Observer>(
     settings: &Settings,
     progress: &dyn Progress,
     tiles: &[Tile],
-) -> (Vec<(TilePixels, Duration)>, Vec<ByClass<P>>, bool) {
+) -> (Vec<Alone<P>>, bool) {
     let frame = Frame::new(context, accel, view, settings);
     let work = |tracer: &mut Tracer<A, P>, &tile: &Tile| {
         let watch = Stopwatch::of_this_thread();
         let pixels = render_tile(&frame, tracer, tile)?;
         let Spent { cpu, wall } = watch.read();
-        Some((pixels, if cpu.is_zero() { wall } else { cpu }))
+        let spent = if cpu.is_zero() { wall } else { cpu };
+        Some(Alone { pixels, spent, counts: std::mem::take(&mut tracer.counts) })
     };
-    each_tile(context, accel, tiles, progress, work)
+    let (finished, _, complete) = each_tile(context, accel, tiles, progress, work);
+    (finished, complete)
 }
 
 /// Renders every tile; the picture, how it was sampled, the counts of all threads, and whether nothing was cut short by the user.
@@ -334,12 +343,7 @@ fn empty_picture(settings: &Settings) -> Picture {
 impl Tile {
     /// Its pixels, block by block and row by row in each, so that rays that follow each other run alike.
     pub(super) fn places(self) -> impl Iterator<Item = (u32, u32)> {
-        let starts = |from: u32, to: u32| (from..to).step_by(BLOCK as usize);
-        let blocks = starts(self.y0, self.y1).flat_map(move |y| starts(self.x0, self.x1).map(move |x| (x, y)));
-        blocks.flat_map(move |(x0, y0)| {
-            let (x1, y1) = ((x0 + BLOCK).min(self.x1), (y0 + BLOCK).min(self.y1));
-            (y0..y1).flat_map(move |y| (x0..x1).map(move |x| (x, y)))
-        })
+        self.blocks().flat_map(|Self { x0, y0, x1, y1 }| (y0..y1).flat_map(move |y| (x0..x1).map(move |x| (x, y))))
     }
 
     /// Its blocks, whose pixels follow each other in the order of [`Self::places`].

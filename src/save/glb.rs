@@ -2,9 +2,8 @@
 
 use serde_json::{Map, Value, json};
 
-use super::upright;
 use crate::math::{DAffine3, Vec3};
-use crate::scene::{Instance, Material, Mesh, Scene, Surface};
+use crate::scene::{Instance, Material, Mesh, Scene, Surface, UpAxis};
 
 /// Component types and buffer targets of the format.
 const FLOAT: u32 = 5126;
@@ -17,7 +16,8 @@ const INDICES: u32 = 34963;
 #[error("{0} bytes are more than a .glb can hold (4294967295); write .obj, or ask for less")]
 pub struct TooLarge(usize);
 
-/// The bytes of a .glb: triangles, instances, colours, and smooth glass; textures, lights and cameras are left out.
+/// The bytes of a .glb: triangles, instances, colours, and smooth glass; textures, lights, cameras, and
+/// shapes other than triangles are left out.
 ///
 /// # Errors
 /// [`TooLarge`].
@@ -26,7 +26,7 @@ pub fn bytes(scene: &Scene) -> Result<Vec<u8>, TooLarge> {
     let meshes: Vec<Value> = scene.meshes.iter().map(|m| mesh(m, &mut bin, &mut views, &mut accessors)).collect();
     let mut nodes: Vec<Value> = scene.instances.iter().map(node).collect();
     let children: Vec<usize> = (0..nodes.len()).collect();
-    nodes.push(json!({ "name": "upright", "matrix": columns(&upright(scene.up)), "children": children }));
+    nodes.push(json!({ "name": "upright", "matrix": columns(&scene.up.turned_to(UpAxis::Y)), "children": children }));
     let mut root = json!({
         "asset": { "version": "2.0", "generator": concat!("meshray ", env!("CARGO_PKG_VERSION")) },
         "scene": 0, "scenes": [{ "nodes": [nodes.len() - 1] }], "nodes": nodes, "meshes": meshes,
@@ -141,7 +141,7 @@ mod tests {
             assert_eq!(loaded.scene.instances.len(), scene.instances.len(), "{family}");
             assert_eq!(loaded.scene.materials.iter().any(is_glass), family == Family::Mountain);
             let read = loaded.scene.instances.last().unwrap().world_from_object;
-            let was = upright(scene.up) * scene.instances.last().unwrap().world_from_object;
+            let was = scene.up.turned_to(UpAxis::Y) * scene.instances.last().unwrap().world_from_object;
             assert!(read.abs_diff_eq(was, 1e-6), "{family}: {read:?} {was:?}");
         }
     }

@@ -1,10 +1,9 @@
-//! Wavefront OBJ: positions and triangles, an object for each instance. Materials are left out: they would be a second
-//! file.
+//! Wavefront OBJ: positions and triangles, an object for each instance. Materials are left out, as they would be a second
+//! file, and shapes other than triangles.
 
 use std::io::{self, Write};
 
-use super::upright;
-use crate::scene::Scene;
+use crate::scene::{Scene, UpAxis};
 
 /// Writes the triangles of a scene, instances turned into geometry; coordinates as the shortest decimals that give the
 /// same `f32` again.
@@ -12,7 +11,7 @@ use crate::scene::Scene;
 /// # Errors
 /// Those of `out`.
 pub fn write(scene: &Scene, out: &mut impl Write) -> io::Result<()> {
-    let turn = upright(scene.up);
+    let turn = scene.up.turned_to(UpAxis::Y);
     let mut before = 1;
     for instance in &scene.instances {
         let mesh = &scene.meshes[instance.mesh as usize];

@@ -61,7 +61,7 @@ impl Scene {
     /// Puts the [`Self::places`] of a part, whose meshes and materials this scene has stored, somewhere; as often as is
     /// wanted.
     pub fn place(&mut self, part: Self, Stored { meshes, materials }: Stored, world_from_part: &DAffine3) {
-        let place = *world_from_part * upright(part.up, self.up);
+        let place = *world_from_part * part.up.turned_to(self.up);
         self.instances.extend(part.instances.into_iter().map(|mut i| {
             i.mesh += meshes;
             i.world_from_object = place * i.world_from_object;
@@ -113,14 +113,16 @@ fn moved(mut light: Light, place: &DAffine3) -> Light {
     light
 }
 
-/// The quarter turn that makes `from` point where `to` does.
-fn upright(from: UpAxis, to: UpAxis) -> DAffine3 {
-    let matrix = match (from, to) {
-        (UpAxis::Z, UpAxis::Y) => DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y),
-        (UpAxis::Y, UpAxis::Z) => DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::NEG_Y),
-        _ => DMat3::IDENTITY,
-    };
-    DAffine3::from_mat3(matrix)
+impl UpAxis {
+    /// The quarter turn around x that makes this axis point where `to` does.
+    pub fn turned_to(self, to: Self) -> DAffine3 {
+        let matrix = match (self, to) {
+            (Self::Z, Self::Y) => DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y),
+            (Self::Y, Self::Z) => DMat3::from_cols(DVec3::X, DVec3::Z, DVec3::NEG_Y),
+            (Self::Y, Self::Y) | (Self::Z, Self::Z) => DMat3::IDENTITY,
+        };
+        DAffine3::from_mat3(matrix)
+    }
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "loading refuses scenes with 2^32 parts")]

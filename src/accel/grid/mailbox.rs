@@ -42,7 +42,7 @@ impl fmt::Display for MailboxKind {
 
 /// A name that no mailbox has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no mailbox is named {0:?}; there are: none, exact, hashed")]
+#[error("no mailbox is named {0:?}; there are: {names}", names = MailboxKind::ALL.map(MailboxKind::name).join(", "))]
 pub struct UnknownMailbox(String);
 
 impl FromStr for MailboxKind {

@@ -125,7 +125,7 @@ impl Report {
         self.scenes.iter().flat_map(|s| s.rows.iter().map(move |r| (s, r)))
     }
 
-    /// Whether hits agree and eye rays hit as often as published, up to 2.
+    /// Whether hits agree, eye rays hit as often as published, up to 2, and there are as many objects.
     pub fn is_right(&self) -> bool {
         let agree = self.scenes.iter().flat_map(|s| &s.rows).all(|r| r.differing == 0);
         agree && self.scenes.iter().all(|s| s.eye_hits_off().abs() <= 2 && s.objects == s.published.objects as usize)

@@ -9,6 +9,7 @@ use super::words::{FileType, MessageFormat, StatsFormat};
 use crate::accel::{AccelChoice, IntersectorKind};
 use crate::image::ToneMap;
 use crate::render::{Cost, Instancing};
+use crate::scene::Background;
 use crate::scene::framing::NamedView;
 use clap::{ArgAction, Args};
 use std::path::PathBuf;
@@ -112,7 +113,7 @@ pub(in crate::cli) struct RenderArgs {
 
     /// #rrggbb, a colour name, r,g,b (linear, 0 to 1), `transparent`, or `env`: what reflections see
     #[arg(long, value_name = "COLOR", value_parser = parse::background, help_heading = "Light and background")]
-    pub background: Option<parse::Back>,
+    pub background: Option<Background>,
     /// What surrounds the scene and lights it: an equirectangular picture (.hdr, .exr), or studio, white, black
     ///
     /// Black gives no light, but mirrors and glass see the --background in it, where that is a colour (dark grey if nobody says).

@@ -136,11 +136,14 @@ fn swept(sweep: &Sweep, kinds: Vec<AccelKind>, params: &AccelParams) -> Result<V
     if parameter.is_set(params) {
         return Err(Wrong(format!("--sweep {parameter} and --{parameter} set the same parameter; use one of them")));
     }
-    let changed = |params: AccelParams| move |kind: &AccelKind| parameter.changes(*kind, &params);
-    let kinds: Vec<AccelKind> = kinds.into_iter().filter(changed(*params)).collect();
+    if let Some(flag) = parameter.overruled_by(params) {
+        return Err(Wrong(format!("--sweep {parameter} changes nothing beside --{flag}; leave one of them out")));
+    }
+    let is_changed = |kind: &AccelKind| parameter.changes(*kind, params);
+    let kinds: Vec<AccelKind> = kinds.into_iter().filter(is_changed).collect();
     if kinds.is_empty() {
-        let others: Vec<&str> = AccelKind::ALL.iter().filter(|k| changed(*params)(k)).map(|k| k.name()).collect();
-        let others = if others.is_empty() { "nothing beside --leaf-size".into() } else { others.join(", ") };
+        let others: Vec<&str> = AccelKind::ALL.iter().filter(|kind| is_changed(kind)).map(|kind| kind.name()).collect();
+        let others = others.join(", ");
         return Err(Wrong(format!("--sweep {parameter} changes none of these structures; it changes {others}")));
     }
     Ok(kinds)
@@ -277,8 +280,8 @@ impl Bench<'_> {
         let named = |kinds: &[AccelKind]| kinds.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(", ");
         if kinds.is_empty() {
             let remedy = match plan.sweep {
-                None => "measure fast-octree and fast-bvh, which keep them once, or allow more with --max-memory",
-                Some(_) => "allow more with --max-memory",
+                None => "measure fast-octree and fast-bvh, which keep them once, or raise --max-memory",
+                Some(_) => "raise --max-memory",
             };
             let text = format!("{name}: its instances are too large for {}, stored by themselves", named(&others));
             self.messages.error("instances-too-large", text, remedy);

@@ -62,7 +62,7 @@ impl Subject {
         match self {
             Self::File(path) => {
                 let ways = (Instancing::Flatten, Instancing::Keep);
-                read::placed(loaded, ways, limit, path, "allow more with --max-memory")
+                read::placed(loaded, ways, limit, path, "raise --max-memory")
             }
             Self::Generated(..) => Ok(World::new(&loaded.scene)),
         }

@@ -31,7 +31,8 @@ pub struct Difference {
     pub channels: u32,
     /// Root of the mean squared difference.
     pub rmse: f64,
-    /// The same, relative to the root of the mean square of what was expected; infinite where that is black.
+    /// The same, relative to the root of the mean square of what was expected, of which values that are no finite numbers
+    /// count as 0; infinite where that is black.
     pub relative_rmse: f64,
     /// Mean of what is there less what was expected, over the colour channels: what no noise explains.
     pub bias: f64,
@@ -61,10 +62,10 @@ pub fn compare(expected: &Picture, actual: &Picture, space: Space, threshold: f6
         for c in 0..channels {
             let d = distance(a[c], b[c]);
             sum += d * d;
-            energy += a[c] * a[c];
+            energy += if a[c].is_finite() { a[c] * a[c] } else { 0.0 };
+            bias += if c < 3 && d > 0.0 { b[c] - a[c] } else { 0.0 };
             most = most.max(d);
         }
-        bias += (0..3).filter(|&c| a[c] != b[c]).map(|c| b[c] - a[c]).sum::<f64>();
         if most > max {
             (max, worst) = (most, i);
         }
@@ -184,7 +185,17 @@ mod tests {
         for space in [Space::Linear, Space::Display] {
             let d = compare(&picture, &picture, space, 0.0).unwrap();
             assert_eq!((d.rmse, d.max, d.psnr, d.over, d.pixels), (0.0, 0.0, f64::INFINITY, 0, 2));
+            assert_eq!((d.relative_rmse, d.bias), (0.0, 0.0), "{space:?}");
         }
+    }
+
+    #[test]
+    fn what_is_infinite_in_both_pictures_hides_nothing_of_the_rest() {
+        let [a, b] = [0.5, 1.0].map(|red| of(&[[f32::INFINITY, 0.0, 0.0, 1.0], [red, 0.0, 0.0, 1.0]]));
+        let d = compare(&a, &b, Space::Linear, 0.0).unwrap();
+        assert_eq!((d.relative_rmse, d.bias), (1.0, 0.5 / 6.0));
+        let d = compare(&a, &of(&[[0.0, 0.0, 0.0, 1.0]; 2]), Space::Linear, 0.0).unwrap();
+        assert_eq!((d.relative_rmse, d.bias), (f64::INFINITY, f64::NEG_INFINITY));
     }
 
     #[test]

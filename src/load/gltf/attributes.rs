@@ -5,7 +5,7 @@
 use super::codes::Code;
 use super::document::is_semantic;
 use super::report::Report;
-use super::schema::whole;
+use super::schema::{list, whole};
 use super::variants;
 use serde_json::{Map, Value};
 use std::collections::HashMap;
@@ -413,8 +413,4 @@ fn component_name(component: u64) -> &'static str {
         5126 => "floats",
         _ => "an unknown type",
     }
-}
-
-fn list<'a>(value: &'a Value, name: &str) -> &'a [Value] {
-    value.get(name).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }

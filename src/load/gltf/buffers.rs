@@ -230,9 +230,7 @@ impl<'a> Find<'a, '_> {
     }
 
     fn too_large(&mut self, place: &str, over: OverBudget) -> Slot<'a> {
-        let fault =
-            Diagnostic::new("out-of-memory-limit", self.file, place, format!("the buffer is too large: {over}"));
-        let fault = fault.remedy("allow more with --max-memory");
+        let fault = Diagnostic::over_memory(self.file, place, format!("the buffer is too large: {over}"));
         self.report.warnings.push(fault.clone());
         Slot::Failed(fault)
     }

@@ -143,8 +143,9 @@ impl<'a> Task<'a> {
 
     fn charge(&self, bytes: u64, budget: &mut Budget) -> Result<(), Diagnostic> {
         budget.take(bytes, 1).map_err(|over| {
-            let fault = self.fault("", format!("the decoded primitive is too large: {over}"));
-            Diagnostic { code: "out-of-memory-limit", ..fault }.remedy("allow more with --max-memory")
+            let Diagnostic { file, place, text, .. } =
+                self.fault("", format!("the decoded primitive is too large: {over}"));
+            Diagnostic::over_memory(file, place, text)
         })
     }
 

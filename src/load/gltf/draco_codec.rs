@@ -57,7 +57,7 @@ mod decoder {
     use super::{ComponentType, Output, Wanted};
     use crate::load::gltf::draco_points::Points;
     use crate::load::gltf::draco_survey::check;
-    use crate::load::quiet::attempt;
+    use crate::quiet::attempt;
     use draco_oxide_core::attribute::Attribute;
     use draco_oxide_core::mesh::Mesh;
     use draco_oxide_decoder::connectivity::Connectivity;

@@ -2,7 +2,7 @@
 
 use super::codes::Code;
 use super::report::Report;
-use super::schema::whole;
+use super::schema::{list, whole};
 use crate::math::{DAffine3, DMat3, DMat4, DQuat, DVec3};
 use serde_json::Value;
 use std::collections::HashMap;
@@ -120,10 +120,6 @@ impl Graph {
     fn tree_at(&self, number: usize) -> usize {
         self.tree_ends.partition_point(|&end| end <= number)
     }
-}
-
-fn list<'a>(root: &'a Value, name: &str) -> &'a [Value] {
-    root.get(name).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }
 
 fn indices<'a>(value: &'a Value, name: &str) -> impl Iterator<Item = usize> + use<'a> {

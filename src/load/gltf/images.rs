@@ -157,8 +157,7 @@ impl<'a> Find<'a, '_> {
     fn fits(&mut self, i: usize, bytes: usize) -> bool {
         let Err(over) = self.budget.take(bytes as u64, 1) else { return true };
         let text = format!("the image is too large: {over}");
-        let warning = Diagnostic::new("out-of-memory-limit", self.file, format!("images[{i}]"), text);
-        self.report.warnings.push(warning.remedy("allow more with --max-memory"));
+        self.report.warnings.push(Diagnostic::over_memory(self.file, format!("images[{i}]"), text));
         false
     }
 

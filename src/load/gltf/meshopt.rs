@@ -83,8 +83,9 @@ impl<'a> Task<'a> {
         }
         // Once as decoded, and once as bytes.
         budget.take(size, 2).map_err(|over| {
-            let fault = self.fault(name, "", format!("the decoded view is too large: {over}"));
-            Diagnostic { code: "out-of-memory-limit", ..fault }.remedy("allow more with --max-memory")
+            let Diagnostic { file, place, text, .. } =
+                self.fault(name, "", format!("the decoded view is too large: {over}"));
+            Diagnostic::over_memory(file, place, text)
         })?;
         let text = format!("the stream does not decode to {} elements of {} bytes", shape.count, shape.stride);
         Ok(Plan { bytes, shape, fault: self.fault(name, "", text) })

@@ -283,8 +283,7 @@ impl Loading<'_> {
 
     fn too_large(&self, what: &str, over: super::limits::OverBudget) -> LoadError {
         let text = format!("{what} is too large: {over}");
-        let fault = Diagnostic::new("out-of-memory-limit", &self.source.path, "", text);
-        fault.remedy("allow more with --max-memory").into()
+        Diagnostic::over_memory(&self.source.path, "", text).into()
     }
 
     /// Puts what was read into the scene; points and lines are given back with their places.

@@ -65,6 +65,11 @@ pub(super) struct Extension {
     pub(super) object: &'static Object,
 }
 
+/// What the list of this name holds; nothing where there is none.
+pub(super) fn list<'a>(value: &'a Value, name: &str) -> &'a [Value] {
+    value.get(name).and_then(Value::as_array).map_or(&[], Vec::as_slice)
+}
+
 /// Checks the whole document.
 pub(super) fn check(root: &Value, report: &mut Report) {
     let used = strings(root.get("extensionsUsed"));
@@ -75,9 +80,6 @@ pub(super) fn check(root: &Value, report: &mut Report) {
 
 /// Channels of animations refer to the samplers beside them.
 fn channels(root: &Value, report: &mut Report) {
-    fn list<'a>(value: &'a Value, name: &str) -> &'a [Value] {
-        value.get(name).and_then(Value::as_array).map_or(&[], Vec::as_slice)
-    }
     for (i, animation) in list(root, "animations").iter().enumerate() {
         let samplers = list(animation, "samplers").len() as u64;
         for (k, channel) in list(animation, "channels").iter().enumerate() {

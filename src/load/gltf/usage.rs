@@ -2,7 +2,7 @@
 
 use super::codes::Code;
 use super::report::Report;
-use super::schema::whole;
+use super::schema::{list, whole};
 use serde_json::Value;
 
 /// What data is used for.
@@ -113,10 +113,6 @@ impl<'a> Check<'a> {
 
 fn position(value: &Value) -> Option<usize> {
     usize::try_from(whole(value)?).ok()
-}
-
-fn list<'a>(value: &'a Value, name: &str) -> &'a [Value] {
-    value.get(name).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }
 
 #[cfg(test)]

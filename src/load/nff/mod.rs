@@ -22,7 +22,7 @@ mod words;
 use super::limits::Budget;
 use super::obj::bare::over_memory;
 use super::paths::Resolver;
-use super::place::is_usable;
+use super::place::{LeftOut, is_usable};
 use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
 use crate::math::{DVec3, Vec3};
 use crate::scene::{
@@ -69,20 +69,8 @@ pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Resu
         warnings.push(Diagnostic::new("nff-no-extent", &source.path, "", text));
         dropped.push(("without extent".into(), flat));
     }
-    for (code, reason, text, count) in [
-        ("shape-too-far", "a coordinate over 1e18", "a shape is left out: a coordinate or size is over 1e18", far),
-        (
-            "face-degenerate",
-            "two corners in one place",
-            "a triangle is left out: two corners are in one place once coordinates are rounded",
-            drawn.collapsed,
-        ),
-    ] {
-        if count > 0 {
-            let warning = Diagnostic::new(code, &source.path, "", text);
-            warnings.push(Diagnostic { count: u32::try_from(count).unwrap_or(u32::MAX), ..warning });
-            dropped.push((reason.into(), count));
-        }
+    for (why, count) in [(&LeftOut::TOO_FAR, far), (&LeftOut::COLLAPSED, drawn.collapsed)] {
+        why.tell(count, (&source.path, String::new()), &mut dropped, &mut warnings);
     }
     finish(&mut scene, options);
     let (files, hash) = Resolver::new(source, options).finish();

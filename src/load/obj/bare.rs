@@ -88,7 +88,7 @@ impl Bare {
 
 /// The line of a message about memory.
 pub(in crate::load) fn over_memory(file: &Path, over: OverBudget) -> Diagnostic {
-    Diagnostic::new("over-memory", file, "", over.to_string()).remedy("raise --max-memory")
+    Diagnostic::over_memory(file, "", over.to_string())
 }
 
 /// Makes the scene of faces and edges, or else of all vertices as points. `format` is the file's kind for reports;

@@ -8,7 +8,8 @@
 //! clouds that scanners write, they are points.
 //!
 //! What the format leaves open is decided as for OBJ: colours are sRGB-coded, faces without normals flat, and every
-//! surface is seen from both sides. Colours of whole bytes are 0…255, floats 0…1, or 0…255 where any is above 1.
+//! surface is seen from both sides. Colours of whole numbers are 0…255, or 0…65535 where they have 16 bits; floats 0…1, or 0…255
+//! where any is above 1.
 //!
 //! The reader is our own: the crates for PLY take memory by the counts that a header claims, or do not say where in the
 //! file a fault is.

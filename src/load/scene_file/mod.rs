@@ -228,7 +228,7 @@ struct Model {
 
 fn parse<'a>(faults: &'a Faults, root: &'a DeTable<'a>, options: &LoadOptions) -> Parsed {
     let root = Table::new(faults, "the scene", 0..0, root);
-    let mut scene = Scene { up: root.get("up", word(&UP)).or(options.up).unwrap_or_default(), ..Scene::default() };
+    let mut scene = Scene { up: root.get("up", word(&UP)).unwrap_or_default(), ..Scene::default() };
     scene.up = options.up.unwrap_or(scene.up);
     scene.background = root.get("background", background);
     let panorama = surrounding(&root);

@@ -1,8 +1,8 @@
 //! `[[meshes]]`, `[[spheres]]`, `[[cones]]`, `[[cylinders]]`, `[[planes]]` and the transform keys.
 
 use super::reader::{Faults, Table, direction, each, not_negative, number, numbers, positive, string, vec};
-use crate::load::place::{bounds, is_usable, leave_out_collapsed, place_around};
-use crate::load::{Diagnostic, Facts, Warnings};
+use crate::load::place::{LeftOut, bounds, is_usable, leave_out_collapsed, place_around};
+use crate::load::{Facts, Warnings};
 use crate::math::ear_clip::EarClipper;
 use crate::math::frame::snapped_center;
 use crate::math::{DAffine3, DMat3, DQuat, DVec3};
@@ -23,25 +23,8 @@ pub(super) struct Lost {
 impl Lost {
     /// Tells of what was lost in the facts and as warnings.
     pub(super) fn tell(self, faults: &Faults, file: &Path, facts: &mut Facts, warnings: &mut Warnings) {
-        for (code, reason, text, (count, at)) in [
-            (
-                "shape-too-far",
-                "a coordinate over 1e18",
-                "a shape is left out: a coordinate or size is over 1e18",
-                self.far,
-            ),
-            (
-                "face-degenerate",
-                "two corners in one place",
-                "a triangle is left out: two corners are in one place once coordinates are rounded",
-                self.collapsed,
-            ),
-        ] {
-            if count > 0 {
-                let warning = Diagnostic::new(code, file, faults.place(at), text);
-                warnings.push(Diagnostic { count: u32::try_from(count).unwrap_or(u32::MAX), ..warning });
-                facts.dropped.push((reason.into(), count));
-            }
+        for (why, (count, at)) in [(&LeftOut::TOO_FAR, self.far), (&LeftOut::COLLAPSED, self.collapsed)] {
+            why.tell(count, (file, faults.place(at)), &mut facts.dropped, warnings);
         }
     }
 

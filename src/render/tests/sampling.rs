@@ -8,7 +8,7 @@ use crate::image::{Output, Values, srgb};
 use crate::math::DQuat;
 use crate::render::context::Context;
 use crate::render::layers::empty;
-use crate::render::tile::{Tile, render_some};
+use crate::render::tile::{Alone, Tile, render_some};
 use crate::render::{
     Adaptive, ErrorSpace, Filter, Interval, Sampling, Split, Stochastic, ThinLens, render, render_costs,
     render_recorded,
@@ -271,11 +271,11 @@ fn a_tile_by_itself_is_what_it_is_among_others() {
         let tile = Tile { x0: 32, y0: 0, x1: 64, y1: 32 };
         let (pixels, rays) = s.with_job(AccelKind::None, |job| {
             let context = Context::new(job.scene, job.world, job.textures, job.settings);
-            let (mut done, mut counts, complete) =
+            let (mut done, complete) =
                 render_some::<_, RayCounts>(&context, job.accel, job.view, job.settings, &(), &[tile]);
             assert!(complete);
-            let traced = counts.iter_mut().map(|counts| counts.primary.queries).sum::<u64>();
-            (done.remove(0).0, traced)
+            let Alone { pixels, counts, .. } = done.remove(0);
+            (pixels, counts.primary.queries)
         });
         assert_eq!(pixels.rays, rays);
         let mut alone = empty(70 * 40);

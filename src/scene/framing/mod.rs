@@ -87,7 +87,7 @@ impl FromStr for NamedView {
 
 /// No view has this name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no view is called '{0}': it is one of front, back, left, right, top, bottom, iso")]
+#[error("no view is called '{0}': it is one of {names}", names = NamedView::ALL.map(NamedView::name).join(", "))]
 pub struct UnknownView(String);
 
 /// From where to look, and what is up in the picture; world space.

@@ -10,7 +10,7 @@ mod play;
 pub(super) use play::{Pose, play};
 
 use super::accessor::{Pick, Reader};
-use super::schema::whole;
+use super::schema::{list, whole};
 use crate::load::AnimationFacts;
 use curve::Interpolation;
 use gltf::json::{Index, accessor::Accessor};
@@ -143,10 +143,6 @@ fn target(target: &Value) -> Option<Target> {
             }
         }
     }
-}
-
-fn list<'a>(value: &'a Value, name: &str) -> &'a [Value] {
-    value.get(name).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }
 
 fn position(value: &Value) -> Option<usize> {

@@ -195,7 +195,7 @@ fn memory_for_decoding_is_charged() {
         let error = load_bytes(Path::new("a.gltf"), bytes.clone(), &with(40_000 + k * 1000)).err()?;
         Some(error.to_string()).filter(|text| text.contains("the decoded primitive is too large"))
     });
-    assert!(refused.is_some_and(|text| text.ends_with("; allow more with --max-memory")));
+    assert!(refused.is_some_and(|text| text.ends_with("; raise --max-memory")));
 }
 
 #[test]

@@ -21,7 +21,7 @@ fn parsed_json_is_charged_before_it_is_parsed() {
     assert!(load_bytes(Path::new("a.gltf"), text.clone().into_bytes(), &limited(20 << 20)).is_ok());
     let message = refused(Path::new("a.gltf"), text.as_bytes(), 5 << 20);
     assert!(message.starts_with("a.gltf: the JSON, once it is parsed, is too large: "), "{message}");
-    assert!(message.ends_with("; allow more with --max-memory"), "{message}");
+    assert!(message.ends_with("; raise --max-memory"), "{message}");
     let message = refused(Path::new("a.gltf"), text.as_bytes(), 100_000);
     assert!(message.starts_with("a.gltf: the file is too large: "), "{message}");
 }
@@ -64,7 +64,7 @@ fn a_file_that_is_named_many_times_is_read_and_charged_once() {
     let loaded = load_bytes(&path, file.gltf(), &limited(4 << 20)).unwrap();
     assert_eq!(loaded.scene.meshes[0].positions, [Vec3::ZERO, Vec3::X, Vec3::Y]);
     assert_eq!(loaded.facts.files.len(), 2);
-    assert!(!codes(&loaded).contains(&"out-of-memory-limit"), "{:?}", loaded.warnings);
+    assert!(!codes(&loaded).contains(&"over-memory"), "{:?}", loaded.warnings);
     let message = refused(&path, &file.gltf(), 1 << 20);
     assert!(message.contains("buffers[0].uri: the buffer is too large: 1048576 bytes are needed"), "{message}");
 }
@@ -84,7 +84,7 @@ fn data_in_the_file_is_charged_before_it_is_decoded() {
     file.set("images", json!([{"uri": format!("data:image/png;base64,{}", "A".repeat(1 << 20))}]));
     let bytes = file.gltf();
     let loaded = load_bytes(Path::new("a.gltf"), bytes.clone(), &limited(5 * bytes.len() as u64 / 2)).unwrap();
-    assert_eq!(codes(&loaded), ["out-of-memory-limit"]);
+    assert_eq!(codes(&loaded), ["over-memory"]);
 }
 
 #[test]
@@ -144,5 +144,5 @@ fn animated_weights_are_charged_for_every_node_that_has_them() {
     };
     assert!(load(None).is_ok());
     let at_start = crate::load::Moment { animation: None, time: 0.0 };
-    assert!(matches!(load(Some(at_start)), Err(LoadError::Input(faults)) if faults[0].code == "out-of-memory-limit"));
+    assert!(matches!(load(Some(at_start)), Err(LoadError::Input(faults)) if faults[0].code == "over-memory"));
 }

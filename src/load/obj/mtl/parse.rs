@@ -252,8 +252,7 @@ impl Parser<'_> {
 
     fn cut_off(&mut self, over: OverBudget) {
         let text = format!("the materials from here on are left out: {over}");
-        let warning = Diagnostic::new("over-memory", self.file, self.line.to_string(), text);
-        self.warnings.push(warning.remedy("raise --max-memory"));
+        self.warnings.push(Diagnostic::over_memory(self.file, self.line.to_string(), text));
     }
 
     fn not_drawn(&mut self, (what, instead): (&'static str, &'static str)) {

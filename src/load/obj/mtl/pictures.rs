@@ -158,7 +158,7 @@ impl Pictures {
     fn map(&self, i: usize, change: impl Fn([f32; 4]) -> [f32; 4]) -> Bitmap {
         let Bitmap { name, width, height, pixels } = &self.sources[i];
         let pixels = match pixels {
-            Pixels::Rgb8(bytes) => Pixels::Rgba8(solid(bytes).map(|t| to8(change(from8(t)))).collect()),
+            Pixels::Rgb8(bytes) => Pixels::Rgba8(threes(bytes).iter().map(|&t| to8(change(solid8(t)))).collect()),
             Pixels::Rgba8(texels) => Pixels::Rgba8(texels.iter().map(|&t| to8(change(from8(t)))).collect()),
             Pixels::Rgba16(texels) => Pixels::Rgba16(texels.iter().map(|&t| to16(change(from16(t)))).collect()),
         };
@@ -227,7 +227,7 @@ impl Pictures {
 
 fn texel(bitmap: &Bitmap, at: usize) -> Option<[f32; 4]> {
     match &bitmap.pixels {
-        Pixels::Rgb8(bytes) => solid(bytes).nth(at).map(from8),
+        Pixels::Rgb8(bytes) => threes(bytes).get(at).map(|&t| solid8(t)),
         Pixels::Rgba8(texels) => texels.get(at).map(|&t| from8(t)),
         Pixels::Rgba16(texels) => texels.get(at).map(|&t| from16(t)),
     }
@@ -235,15 +235,15 @@ fn texel(bitmap: &Bitmap, at: usize) -> Option<[f32; 4]> {
 
 fn each(bitmap: &Bitmap, mut look: impl FnMut([f32; 4])) {
     match &bitmap.pixels {
-        Pixels::Rgb8(bytes) => solid(bytes).for_each(|t| look(from8(t))),
+        Pixels::Rgb8(bytes) => threes(bytes).iter().for_each(|&t| look(solid8(t))),
         Pixels::Rgba8(texels) => texels.iter().for_each(|&t| look(from8(t))),
         Pixels::Rgba16(texels) => texels.iter().for_each(|&t| look(from16(t))),
     }
 }
 
-/// Texels without alpha, with it.
-fn solid(bytes: &[u8]) -> impl Iterator<Item = [u8; 4]> {
-    bytes.as_chunks::<3>().0.iter().map(|&[r, g, b]| [r, g, b, u8::MAX])
+/// Texels without alpha.
+fn threes(bytes: &[u8]) -> &[[u8; 3]] {
+    bytes.as_chunks().0
 }
 
 fn pick([r, g, b, a]: [f32; 4], channel: Channel) -> f32 {
@@ -263,6 +263,10 @@ fn grey(value: f32) -> [f32; 4] {
 
 fn from8(texel: [u8; 4]) -> [f32; 4] {
     texel.map(|c| f32::from(c) / 255.0)
+}
+
+fn solid8([r, g, b]: [u8; 3]) -> [f32; 4] {
+    from8([r, g, b, u8::MAX])
 }
 
 fn from16(texel: [u16; 4]) -> [f32; 4] {

@@ -224,7 +224,7 @@ fn pictures_that_are_made_take_from_the_memory_that_may_be_taken() {
     assert_eq!(codes(&loaded), ["image-unusable"]);
     let told = loaded.warnings[0].to_string();
     let expected = "m.mtl:3: image 'row.png + column.png' cannot be used: 60000000 bytes are needed where";
-    assert!(told.contains(expected) && told.ends_with("drawn without it; allow more with --max-memory"), "{told}");
+    assert!(told.contains(expected) && told.ends_with("drawn without it; raise --max-memory"), "{told}");
     let Surface::MetalRough(m) = &loaded.scene.materials[0].surface else { panic!("not metal") };
     assert!(m.metal_rough_map.is_none() && loaded.scene.bitmaps.is_empty());
 }
