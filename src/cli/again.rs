@@ -126,9 +126,9 @@ impl Facts<'_> {
         format!("{:032x}", self.loaded.facts.hash)
     }
 
+    /// The flags that render the same picture again.
     fn settings(&self) -> Map<String, Value> {
-        let (settings, output) = (&self.effective.settings, &self.effective.output);
-        let load = &self.job.load;
+        let settings = &self.effective.settings;
         let mut flags = Map::new();
         let mut set = |flag: &str, value: String| drop(flags.insert(flag.into(), Value::String(value)));
         set("size", format!("{}x{}", settings.width, settings.height));
@@ -136,6 +136,30 @@ impl Facts<'_> {
         set("depth", self.depth.to_string());
         set("cutoff", settings.cutoff.to_string());
         set("seed", settings.seed.to_string());
+        self.set_view(&mut set);
+        self.set_surroundings(&mut set);
+        self.set_written(&mut set);
+        self.set_loading(&mut set);
+        self.set_structure(&mut set);
+        if settings.layers && !self.job.look.costs.is_empty() {
+            let names: Vec<_> = self.job.look.costs.iter().map(|cost| cost.name()).collect();
+            set("layers", names.join(","));
+        }
+        let is_exr = self.shot.kind == FileKind::Exr;
+        let switches = [
+            ("float", is_exr && self.effective.output.exr_samples == ExrSamples::Float),
+            ("layers", settings.layers && self.job.look.costs.is_empty()),
+            ("merge", self.batch.inputs.len() > 1),
+            ("allow-empty", self.job.allow_empty),
+        ];
+        flags.extend(switches.into_iter().filter(|(_, on)| *on).map(|(flag, _)| (flag.into(), Value::Bool(true))));
+        flags
+    }
+}
+
+impl Facts<'_> {
+    /// From where it is seen.
+    fn set_view(&self, mut set: impl FnMut(&str, String)) {
         match &self.shot.choice {
             Choice::Default => {}
             Choice::Named(view) => set("view", view.name().into()),
@@ -151,37 +175,48 @@ impl Facts<'_> {
             Some(LensChoice::Ortho(height)) => set("ortho", height.map_or("auto".into(), |h| h.to_string())),
             None => {}
         }
-        match load.up {
-            Some(UpAxis::Y) => set("up", "y".into()),
-            Some(UpAxis::Z) => set("up", "z".into()),
-            None => {}
-        }
-        match self.job.look.background {
+    }
+
+    /// What is behind and around it, and the rays that light from there and from lamps takes.
+    fn set_surroundings(&self, mut set: impl FnMut(&str, String)) {
+        let (look, settings) = (&self.job.look, &self.effective.settings);
+        match look.background {
             Some(Background::Transparent) => set("background", "transparent".into()),
             Some(Background::Environment) => set("background", "env".into()),
             Some(Background::Color(color)) => set("background", parse::color_text(color)),
             None => {}
         }
-        match &self.job.look.env {
+        match &look.env {
             Some(Env::BuiltIn(Environment::Studio)) => set("env", "studio".into()),
             Some(Env::BuiltIn(Environment::Black)) => set("env", "black".into()),
             Some(Env::BuiltIn(_)) => set("env", "white".into()),
             Some(Env::File(file)) => {
                 set("env", file.to_string_lossy().into_owned());
-                set("env-rotate", self.job.look.env_rotate.to_string());
+                set("env-rotate", look.env_rotate.to_string());
             }
             None => {}
         }
         settings.env_rays.iter().for_each(|n| set("env-rays", n.to_string()));
         settings.gloss_rays.iter().for_each(|n| set("gloss-rays", n.to_string()));
-        self.job.look.light_rays.iter().for_each(|n| set("light-rays", n.to_string()));
-        self.job.look.sun_size.iter().for_each(|size| set("sun-size", size.to_string()));
+        look.light_rays.iter().for_each(|n| set("light-rays", n.to_string()));
+        look.sun_size.iter().for_each(|size| set("sun-size", size.to_string()));
+    }
+
+    /// How it is developed and written.
+    fn set_written(&self, mut set: impl FnMut(&str, String)) {
+        let output = &self.effective.output;
         set("tone-map", output.tone_map.name().into());
         set("exposure", output.exposure.to_string());
         set("format", self.shot.kind.extension().into());
         if self.shot.kind == FileKind::Png && output.png_depth == PngDepth::Sixteen {
             set("bits", "16".into());
         }
+    }
+
+    /// What of the file is shown, when, and how it is read.
+    fn set_loading(&self, mut set: impl FnMut(&str, String)) {
+        let load = &self.job.load;
+        load.up.iter().for_each(|up| set("up", if *up == UpAxis::Y { "y" } else { "z" }.into()));
         load.scene.iter().for_each(|scene| set("scene", scene.clone()));
         self.set_step(&mut set);
         load.variant.iter().for_each(|variant| set("variant", variant.clone()));
@@ -193,6 +228,10 @@ impl Facts<'_> {
         if load.mtl == MtlMode::Literal {
             set("mtl", "literal".into());
         }
+    }
+
+    /// What finds its hits.
+    fn set_structure(&self, mut set: impl FnMut(&str, String)) {
         set("accel", self.accel.name().into());
         set("intersector", self.job.intersector.name().into());
         let params = &self.job.params;
@@ -209,22 +248,8 @@ impl Facts<'_> {
         if params.mailbox != MailboxKind::default() {
             set("mailbox", params.mailbox.name().into());
         }
-        if settings.layers && !self.job.look.costs.is_empty() {
-            let names: Vec<_> = self.job.look.costs.iter().map(|cost| cost.name()).collect();
-            set("layers", names.join(","));
-        }
-        let switches = [
-            ("float", self.shot.kind == FileKind::Exr && output.exr_samples == ExrSamples::Float),
-            ("layers", settings.layers && self.job.look.costs.is_empty()),
-            ("merge", self.batch.inputs.len() > 1),
-            ("allow-empty", self.job.allow_empty),
-        ];
-        flags.extend(switches.into_iter().filter(|(_, on)| *on).map(|(flag, _)| (flag.into(), Value::Bool(true))));
-        flags
     }
-}
 
-impl Facts<'_> {
     /// The moment that is shown, and the sequence whose camera it has.
     fn set_step(&self, mut set: impl FnMut(&str, String)) {
         let step = &self.shot.step;

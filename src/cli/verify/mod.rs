@@ -17,87 +17,76 @@ use super::progress::Progress;
 use super::writable::{self, Sources};
 use super::{accident, interrupt, job, print, read};
 use crate::bench::report::Format;
-use crate::bench::verify::{Plan, kernels, verify};
+use crate::bench::verify::{Findings, Plan, kernels, verify};
 use crate::load::{Diagnostic, Loaded};
+use crate::scene::Scene;
 pub(super) use args::VerifyArgs;
 use std::path::Path;
 
 /// Loads the file, judges it and prints what was found.
 pub(super) fn run(args: &VerifyArgs) -> Exit {
     let messages = Messages::new(args.model.load.messages.into(), args.quiet);
-    accident::guard(&args.model.input.display().to_string(), &messages, || judge(args, &messages))
+    accident::guard(&args.model.input.display().to_string(), &messages, || {
+        judge(args, &messages).unwrap_or_else(|exit| exit)
+    })
 }
 
-fn judge(args: &VerifyArgs, messages: &Messages) -> Exit {
-    if let Some(path) = &args.plot
-        && Format::from_path(path) != Ok(Format::Html)
-    {
-        let text = format!("--plot {}: a page for a browser ends in .html", path.display());
-        messages.error("usage", text, "");
-        return Exit::Usage;
-    }
-    if let Some(path) = &args.plot
-        && let Err(fault) = writable::check(path, "--plot", &Sources::of([&args.model.input]))
-    {
+fn judge(args: &VerifyArgs, messages: &Messages) -> Result<Exit, Exit> {
+    let fail = |fault: Diagnostic| {
         messages.say(Severity::Error, &fault);
-        return Exit::Failed;
-    }
-    let mut loaded = match read::model_as_stored(&args.model.input, &args.model.load, messages) {
-        Ok(loaded) => loaded,
-        Err(exit) => return exit,
+        Exit::Failed
     };
-    if let Some(path) = &args.plot
-        && let Err(fault) = Sources::of(&loaded.facts.files).spared_by(path, "--plot")
-    {
-        messages.say(Severity::Error, &fault);
-        return Exit::Failed;
+    let unwritable = |what: String| {
+        messages.error("output-unwritable", what, "");
+        Exit::Failed
+    };
+    if let Some(path) = &args.plot {
+        if Format::from_path(path) != Ok(Format::Html) {
+            let text = format!("--plot {}: a page for a browser ends in .html", path.display());
+            messages.error("usage", text, "");
+            return Err(Exit::Usage);
+        }
+        writable::check(path, "--plot", &Sources::of([&args.model.input])).map_err(fail)?;
+    }
+    let mut loaded = read::model_as_stored(&args.model.input, &args.model.load, messages)?;
+    if let Some(path) = &args.plot {
+        Sources::of(&loaded.facts.files).spared_by(path, "--plot").map_err(fail)?;
     }
     let limit = job::limits(args.model.load.max_memory).memory;
-    let unjudged = match reduce(&mut loaded, limit, &args.model.input) {
-        Ok(unjudged) => unjudged,
-        Err(fault) => {
-            messages.say(Severity::Error, &fault);
-            return Exit::Failed;
-        }
-    };
+    let unjudged = reduce(&mut loaded, limit, &args.model.input).map_err(fail)?;
     let name = args.model.input.display().to_string();
     let plan = Plan { rays: args.rays, seed: args.seed, ..Plan::DEFAULT };
-    let progress = Progress::new(&name, messages, args.quiet, false);
+    let findings = findings(&loaded.scene, &plan, &Progress::new(&name, messages, args.quiet, false));
+    let findings = findings.ok_or_else(|| {
+        messages.error("nothing-to-verify", format!("{name}: no triangles to aim at"), "give a file with a mesh");
+        Exit::Input
+    })?;
+    if let Some(path) = &args.plot {
+        let page = kernels::html(&name, &report::rays(&plan), &kernels::of(&findings));
+        let written = interrupt::write_atomic(path, page.as_bytes());
+        written.map_err(|e| unwritable(format!("{}: {e}", path.display())))?;
+    }
+    let report = report::Report { name: &name, hash: loaded.facts.hash, unjudged, plan: &plan, findings: &findings };
+    let text = if args.json { report.json() } else { report.text() };
+    print(&text).map_err(|e| unwritable(format!("standard output: {e}")))?;
+    if findings.trusted() {
+        return Ok(Exit::Done);
+    }
+    let text = format!("{name}: the exact test or a structure gave a wrong hit");
+    messages.error("hits-not-exact", text, "please report it with the file");
+    Err(Exit::Failed)
+}
+
+/// What came of the hard rays; `None` where there is nothing to aim at.
+fn findings(scene: &Scene, plan: &Plan, progress: &Progress) -> Option<Findings> {
     progress.begin("judging");
     let go_on = |done: usize, of: usize| {
         progress.advance(done, of);
         true
     };
-    let findings = verify(&loaded.scene, &plan, go_on);
+    let findings = verify(scene, plan, go_on);
     progress.finish();
-    let Some(findings) = findings else {
-        messages.error("nothing-to-verify", format!("{name}: no triangles to aim at"), "give a file with a mesh");
-        return Exit::Input;
-    };
-    if let Some(path) = &args.plot {
-        let page = kernels::html(&name, &report::rays(&plan), &kernels::of(&findings));
-        if let Err(e) = interrupt::write_atomic(path, page.as_bytes()) {
-            messages.error("output-unwritable", format!("{}: {e}", path.display()), "");
-            return Exit::Failed;
-        }
-    }
-    let report = report::Report { name: &name, hash: loaded.facts.hash, unjudged, plan: &plan, findings: &findings };
-    let text = if args.json { report.json() } else { report.text() };
-    match print(&text) {
-        Err(e) => {
-            messages.error("output-unwritable", format!("standard output: {e}"), "");
-            Exit::Failed
-        }
-        Ok(()) if findings.trusted() => Exit::Done,
-        Ok(()) => {
-            messages.error(
-                "hits-not-exact",
-                format!("{name}: the exact test or a structure gave a wrong hit"),
-                "please report it with the file",
-            );
-            Exit::Failed
-        }
-    }
+    findings
 }
 
 /// Leaves each mesh in its first place alone, where all places together take more memory than is allowed; how many were left
