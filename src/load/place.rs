@@ -1,7 +1,7 @@
 //! Coordinates in `f64` -> a centre in `f64` and coordinates around it in `f32`.
 
 use super::{Diagnostic, Warnings};
-use crate::math::frame::snapped_center;
+use crate::math::frame::{center_of_most, spread};
 use crate::math::{DVec3, Vec3};
 use crate::scene::Mesh;
 use rayon::prelude::*;
@@ -66,10 +66,11 @@ impl LeftOut {
 /// Positions that one thread looks at at a time.
 const POSITIONS: usize = 1 << 13;
 
-/// Subtracts the centre of all finite positions in `f64`, then rounds.
+/// Subtracts the centre of all finite positions in `f64`, or of most of them where a few are far away, then rounds.
 pub(super) fn place(positions: &[DVec3]) -> Placed {
     let (lo, hi) = bounds(positions);
-    place_around(positions, snapped_center(lo, hi))
+    let sample = spread(positions.len()).map(|i| positions[i]).filter(|p| is_usable(*p));
+    place_around(positions, center_of_most(lo, hi, sample))
 }
 
 /// Least and greatest coordinates of all finite positions; infinite the wrong way round where there are none.

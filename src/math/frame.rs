@@ -21,9 +21,59 @@ pub fn snapped_center(lo: DVec3, hi: DVec3) -> DVec3 {
     if step < middle.abs().max_element() * f64::EPSILON { middle } else { (middle / step).round() * step }
 }
 
+/// Points that tell where most of a model lies.
+const SAMPLE: usize = 1 << 10;
+
+/// How many times as large as the room of half of the points a box may be to be centred on its middle: rounding to `f32` moves
+/// points by 2⁻¹⁷ of that room at most then.
+const FAR: f64 = 256.0;
+
+/// The centre to count points in the box `lo..hi` from: [`snapped_center`] of the box, or of the room that half of the points
+/// take, where others are so far away that rounding would show in these. `points` are some of them ([`spread`]).
+pub fn center_of_most(lo: DVec3, hi: DVec3, points: impl Iterator<Item = DVec3>) -> DVec3 {
+    let extent = |lo: DVec3, hi: DVec3| (hi - lo).max_element();
+    match half_of(points) {
+        Some((low, high)) if extent(lo, hi) > FAR * extent(low, high) => snapped_center(low, high),
+        _ => snapped_center(lo, hi),
+    }
+}
+
+/// The room, from corner to corner, that the middle half of the finite ones of these points takes on each axis; `None` where
+/// there are none.
+pub fn half_of(points: impl Iterator<Item = DVec3>) -> Option<(DVec3, DVec3)> {
+    let mut sample: Vec<DVec3> = points.filter(|p| p.is_finite()).collect();
+    let (quarter, last) = (sample.len() / 4, sample.len().checked_sub(1)?);
+    let (mut low, mut high) = (DVec3::ZERO, DVec3::ZERO);
+    for axis in 0..3 {
+        sample.sort_unstable_by(|a, b| a[axis].total_cmp(&b[axis]));
+        (low[axis], high[axis]) = (sample[quarter][axis], sample[last - quarter][axis]);
+    }
+    Some((low, high))
+}
+
+/// Numbers of some of so many points, spread evenly.
+pub fn spread(count: usize) -> impl Iterator<Item = usize> {
+    (0..count).step_by(count.div_ceil(SAMPLE).max(1))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_few_points_far_away_do_not_move_the_center_of_the_others() {
+        let near = |i: usize| DVec3::new(5e5 + i as f64 * 0.01, 4e6 - i as f64 * 0.02, 0.0);
+        let points = |strays: usize| (0..100 + strays).map(move |i| if i < strays { DVec3::ZERO } else { near(i) });
+        let center = |strays: usize| center_of_most(DVec3::ZERO, DVec3::new(5e5 + 2.0, 4e6, 0.0), points(strays));
+        for strays in [0, 1, 20] {
+            assert!((center(strays) - near(50)).length() < 4.0, "{strays}: {}", center(strays));
+        }
+        // Where a third lies there it is a part of the model.
+        assert!((center(60) - near(50)).length() > 1e6);
+        assert_eq!(center_of_most(-DVec3::ONE, DVec3::ONE, std::iter::empty()), DVec3::ZERO);
+        let all: Vec<usize> = spread(5000).collect();
+        assert!(all.len() == 1000 && all[999] == 4995 && spread(3).eq(0..3) && spread(0).count() == 0);
+    }
 
     #[test]
     fn a_box_moved_by_a_large_power_of_two_moves_its_center_by_exactly_that() {

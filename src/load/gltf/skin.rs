@@ -9,7 +9,7 @@ use super::graph::Graph;
 use super::links::is_bind_matrix;
 use super::report::Report;
 use super::scene::Draw;
-use crate::math::frame::snapped_center;
+use crate::math::frame::{center_of_most, spread};
 use crate::math::{DMat3, DMat4, DVec3, Vec3, Vec4};
 use crate::scene::Mesh;
 use gltf::json::{Root, Skin};
@@ -165,7 +165,7 @@ pub(super) fn pose(mesh: &mut Mesh, influences: &Influences, matrices: &[DMat4])
     let finite = || placed.iter().filter(|p| p.is_finite());
     let lo = finite().fold(DVec3::INFINITY, |lo, p| lo.min(*p));
     let hi = finite().fold(DVec3::NEG_INFINITY, |hi, p| hi.max(*p));
-    let center = snapped_center(lo, hi);
+    let center = center_of_most(lo, hi, spread(placed.len()).map(|i| placed[i]));
     mesh.positions = placed.iter().map(|p| (*p - center).as_vec3()).collect();
     (center, odd)
 }

@@ -2,7 +2,7 @@
 
 use super::solid::{Solid, octahedron, prism, roof, square, tetrahedron};
 use super::{Widths, Wires};
-use crate::math::frame::snapped_center;
+use crate::math::frame::{center_of_most, spread};
 use crate::math::{DMat3, DVec3, Vec3, Vec4};
 use crate::scene::Mesh;
 
@@ -43,7 +43,7 @@ pub(super) fn bake(wires: &Wires, linear: DMat3, widths: &Widths) -> Baked {
     for point in wires.ends.iter().flatten().map(|&vertex| place(vertex)).filter(|p| p.is_finite()) {
         (lo, hi) = (lo.min(point), hi.max(point));
     }
-    let center = snapped_center(lo, hi);
+    let center = center_of_most(lo, hi, spread(wires.ends.len()).map(|i| place(wires.ends[i][0])));
     let mut out = Baked { meshes: Vec::new(), center, dropped: 0 };
     for (run, ends) in wires.ends.chunks(RUN).enumerate() {
         let mut baker = Baker { from: &wires.mesh, turn: Turn::new(linear), mesh: named(&wires.mesh), dropped: 0 };

@@ -19,6 +19,7 @@ mod tests;
 
 use super::limits::{Budget, OverBudget};
 use super::{Diagnostic, Facts};
+use crate::math::frame::{half_of, spread};
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::scene::{Instance, Material, Mesh, Scene, Surface};
 use bake::Baked;
@@ -101,8 +102,8 @@ impl Widths {
 
 /// Puts points and lines into the scene as solids; `places` are instances whose `mesh` counts `wires`.
 ///
-/// Meshes are in place before: the width goes by the box around all of it. Points and lines with an end that is not finite
-/// are left out and counted in `facts`; a warning is returned of them, and one of glass. `width` is what the user asked
+/// Meshes are in place before: the width goes by the box around all of it. Points and lines with an end that is not finite,
+/// or so far away that rounding leaves nothing of their width, are left out and counted in `facts`; a warning is returned of them, and one of glass. `width` is what the user asked
 /// for.
 ///
 /// # Errors
@@ -151,7 +152,7 @@ pub(super) fn draw(
 }
 
 /// Why points and lines are left out.
-const NOT_FINITE: &str = "a point or line with an end that is not finite";
+const NOT_FINITE: &str = "a point or line with an end that is not finite or too far away to have a width";
 
 /// Warnings of so many points and lines that are left out, and so many materials that are not drawn as they are.
 fn told(file: &Path, dropped: u64, of_glass: u64) -> Vec<Diagnostic> {
@@ -246,16 +247,26 @@ fn unlit(material: &Material) -> Material {
     }
 }
 
-/// Diagonal of the box around all meshes and wires where they stand; not positive where there is nothing.
+/// How many times as large as the room of half of the points a box may be whose diagonal tells how wide they are: spread
+/// evenly over it, they make it twice as large.
+const STRAY: f64 = 16.0;
+
+/// Diagonal of the box around all meshes and wires where they stand, or twice that of the room of half of their points where
+/// others are far away, as returns of a scanner from nowhere are; not positive where there is nothing.
 fn diagonal(wires: &[Wires], places: &[Instance], scene: &Scene) -> f64 {
     let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let of_wires = places.iter().filter_map(|place| Some((place, &wires.get(place.mesh as usize)?.mesh)));
-    let of_meshes = scene.instances.iter().filter_map(|place| Some((place, scene.meshes.get(place.mesh as usize)?)));
-    for (place, mesh) in of_wires.chain(of_meshes) {
+    let of_wires = || places.iter().filter_map(|place| Some((place, &wires.get(place.mesh as usize)?.mesh)));
+    let of_meshes = || scene.instances.iter().filter_map(|place| Some((place, scene.meshes.get(place.mesh as usize)?)));
+    for (place, mesh) in of_wires().chain(of_meshes()) {
         let points = mesh.positions.iter().map(|p| place.world_from_object.transform_point3(p.as_dvec3()));
         for point in points.filter(|p| p.is_finite()) {
             (lo, hi) = (lo.min(point), hi.max(point));
         }
     }
-    if lo.cmple(hi).all() { (hi - lo).length() } else { 0.0 }
+    let whole = if lo.cmple(hi).all() { (hi - lo).length() } else { 0.0 };
+    let points = of_wires().chain(of_meshes()).flat_map(|(place, mesh)| {
+        spread(mesh.positions.len()).map(|i| place.world_from_object.transform_point3(mesh.positions[i].as_dvec3()))
+    });
+    let half = half_of(points).map_or(whole, |(low, high)| (high - low).length());
+    if half > 0.0 && whole > STRAY * half { 2.0 * half } else { whole }
 }

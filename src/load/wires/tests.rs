@@ -51,6 +51,19 @@ fn thickness(corners: &[DVec3]) -> f64 {
 }
 
 #[test]
+fn a_point_far_away_makes_the_others_no_wider() {
+    let near = |i: u16| [f32::from(i % 10) * 0.1, f32::from(i / 10) * 0.1, 0.0];
+    let cloud: Vec<[f32; 3]> = (0..100).map(near).collect();
+    let ends: Vec<[u32; 2]> = (0..101).map(|i| [i, i]).collect();
+    let width = |positions: &[[f32; 3]]| {
+        let of = wires(positions, &ends[..positions.len()]);
+        drawn(&[of], &[place(0, DAffine3::IDENTITY)]).1.wires.point_width
+    };
+    let (alone, with_stray) = (width(&cloud), width(&[&cloud[..], &[[1e4, 0.0, 0.0]]].concat()));
+    assert!((0.5..1.5).contains(&(with_stray / alone)), "{alone} alone, {with_stray} with a stray");
+}
+
+#[test]
 fn points_and_lines_stand_where_the_file_has_them() {
     let of = wires(&[[0.0, 0.0, 0.0], [3.0, 4.0, 0.0]], &[[0, 0], [0, 1]]);
     let shift = DAffine3::from_translation(DVec3::new(1e7, 0.0, -2.0));

@@ -325,6 +325,19 @@ mod tests {
     }
 
     #[test]
+    fn a_node_far_away_takes_nothing_from_the_precision_of_the_others() {
+        let there = |shift: DVec3| placed(0, DAffine3::from_translation(shift));
+        let near = (0..20).map(|i| there(DVec3::new(1e7 + 0.1 + f64::from(i), 0.3, 0.7)));
+        let instances = near.chain([there(DVec3::splat(-1e9))]).collect();
+        let scene =
+            Scene { meshes: vec![triangle(0)], materials: vec![Material::plain()], instances, ..Scene::default() };
+        let world = World::new(&scene);
+        let corner = |i: usize| world.center + world.shapes.vertices[i].as_dvec3();
+        assert!((corner(0) - DVec3::new(1e7 + 0.1, 0.3, 0.7)).length() < 1e-5, "{}", corner(0));
+        assert!((corner(60) - DVec3::splat(-1e9)).length() < 200.0, "{}", corner(60));
+    }
+
+    #[test]
     fn normals_stay_perpendicular_to_faces_under_uneven_scale_and_mirroring() {
         for scale in [DVec3::new(1.0, 4.0, 0.5), DVec3::new(-1.0, 4.0, 0.5)] {
             let m = DMat3::from_rotation_x(0.3) * DMat3::from_diagonal(scale);

@@ -3,7 +3,7 @@
 use super::{Placement, World, index};
 use crate::accel::instances::placed;
 use crate::accel::{Cone, Shapes, SpherePrim};
-use crate::math::frame::snapped_center;
+use crate::math::frame::{center_of_most, spread};
 use crate::math::{DAffine3, DVec3, Vec3};
 use crate::render::keeping::{Instancing, Keeping};
 use crate::scene::corners::{Hull, take_in};
@@ -28,7 +28,7 @@ impl<'a> Placing<'a> {
     /// Finds the centre, chooses what is kept, and where it stands.
     pub fn new(scene: &'a Scene, how: Instancing) -> Self {
         let bounds = bounds(scene);
-        let center = snapped_center(bounds.0, bounds.1);
+        let center = center_of_most(bounds.0, bounds.1, sample(scene).into_iter());
         let opaque: Vec<bool> = scene.materials.iter().map(crate::scene::Material::is_opaque).collect();
         let keeping = Keeping::of(scene, how, &opaque, |m| centered(m, center));
         Self { scene, bounds, center, opaque, keeping }
@@ -106,6 +106,35 @@ pub(super) fn centered(world_from_object: &DAffine3, center: DVec3) -> DAffine3 
 
 /// Vertices that are worth a thread's while.
 pub(super) const PARALLEL_RUN: usize = 1 << 14;
+
+/// Some of the corners of all faces and places of spheres and cones, spread evenly.
+fn sample(scene: &Scene) -> Vec<DVec3> {
+    let corners = |i: &Instance| {
+        let mesh = &scene.meshes[i.mesh as usize];
+        3 * mesh.triangles.len() + mesh.polygon_corners.len()
+    };
+    let faces: usize = scene.instances.iter().map(corners).sum();
+    let mut wanted = spread(faces + scene.spheres.len() + scene.cones.len()).peekable();
+    let (mut points, mut first) = (Vec::new(), 0);
+    for instance in &scene.instances {
+        let mesh = &scene.meshes[instance.mesh as usize];
+        let end = first + corners(instance);
+        while let Some(at) = wanted.next_if(|at| *at < end) {
+            let corner = at - first;
+            let vertex = match mesh.triangles.as_flattened().get(corner) {
+                Some(vertex) => vertex,
+                None => &mesh.polygon_corners[corner - 3 * mesh.triangles.len()],
+            };
+            let place = mesh.positions[*vertex as usize].as_dvec3();
+            points.push(instance.world_from_object.transform_point3(place));
+        }
+        first = end;
+    }
+    let rest = scene.spheres.iter().map(|sphere| sphere.center).chain(scene.cones.iter().map(|cone| cone.base));
+    let rest: Vec<DVec3> = rest.collect();
+    points.extend(wanted.map(|at| rest[at - faces]));
+    points
+}
 
 /// Box of all instances' vertices that a face uses, and of the spheres and cones.
 fn bounds(scene: &Scene) -> (DVec3, DVec3) {
