@@ -92,7 +92,7 @@ fn turned(mut x: u32, key: u32) -> u32 {
 
 /// Thirty-two bits that two numbers decide, no part of which shows in them.
 #[inline(always)]
-pub(super) fn mix(a: u32, b: u32) -> u32 {
+pub(in crate::render) fn mix(a: u32, b: u32) -> u32 {
     // The finalizer of A. Appleby's MurmurHash3 (2011), once for each word.
     let stir = |mut x: u32| {
         x ^= x >> 16;
