@@ -204,12 +204,12 @@ pub struct Rendered {
 
 /// Renders on all threads of the current rayon pool.
 pub fn render(job: &Job, progress: &dyn Progress) -> Rendered {
-    render_with::<NoProbe>(job, progress).0
+    render_with::<NoProbe>(job, progress, || {}).0
 }
 
 /// Renders and counts; slower, same pixels.
 pub fn render_counted(job: &Job, progress: &dyn Progress) -> Rendered {
-    let (mut rendered, counts) = render_with::<RayCounts>(job, progress);
+    let (mut rendered, counts) = render_with::<RayCounts>(job, progress, || {});
     for c in counts {
         rendered.counts.primary += c.primary;
         rendered.counts.shadow += c.shadow;
@@ -225,7 +225,7 @@ pub fn render_recorded(job: &Job, progress: &dyn Progress) -> Option<(Rendered, 
     let job = &Job { settings: &job.settings.fixed(), ..*job };
     // One thread takes the tiles in order, so that the rays come in the same order in every run.
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().ok()?;
-    let (rendered, mut tapes) = alone.install(|| render_with::<Tape>(job, progress));
+    let (rendered, mut tapes) = alone.install(|| render_with::<Tape>(job, progress, || {}));
     let tapes = tapes.pop().filter(|_| rendered.complete)?;
     let ByClass { primary, shadow, reflected, refracted } = tapes;
     let mut recording = Recording { primary, shadow, reflected, refracted };
@@ -249,15 +249,21 @@ pub struct Recording {
     pub refracted: Tape,
 }
 
-fn render_with<P: Observer>(job: &Job, progress: &dyn Progress) -> (Rendered, Vec<ByClass<P>>) {
+/// Renders, and tells `prepared` when what is computed once for an image is done and tiles begin.
+fn render_with<P: Observer>(
+    job: &Job,
+    progress: &dyn Progress,
+    prepared: impl FnOnce(),
+) -> (Rendered, Vec<ByClass<P>>) {
     let settings = job.settings;
+    let context = Context::new(job.scene, job.world, job.textures, settings);
+    prepared();
     if let Sampling::Stochastic(how) = &settings.sampling
         && how.target.is_some()
-        && let Some(done) = target::render(job, how, progress)
+        && let Some(done) = target::render(job, &context, how, progress)
     {
         return done;
     }
-    let context = Context::new(job.scene, job.world, job.textures, settings);
     let (picture, sampled, counts, complete) = tile::render_tiles(&context, job.accel, job.view, settings, progress);
     (Rendered { picture, counts: ClassCounts::default(), sampled, depth: context.depth, complete }, counts)
 }

@@ -1,9 +1,8 @@
 //! Where the time of a rendering goes: each class of rays in the structure, and all the rest.
 
-use super::context::Context;
 use super::observer::{Observer, Question};
 use super::whitted::ByClass;
-use super::{Job, Progress, Rendered, tile};
+use super::{Job, Progress, Rendered, render_with};
 use crate::accel::{Hit, Probe, Ray};
 use crate::stopwatch::{Spent, Stopwatch};
 use std::time::{Duration, Instant};
@@ -31,14 +30,10 @@ impl Profile {
 
 /// Renders on all threads of the current rayon pool and takes the time of each slice of rays; same pixels.
 pub fn render_profiled(job: &Job, progress: &dyn Progress) -> (Rendered, Profile) {
-    let mut watch = Stopwatch::of_all_threads();
-    let context = Context::new(job.scene, job.world, job.textures, job.settings);
-    let prepare = watch.lap();
-    let (picture, sampled, clocks, complete) =
-        tile::render_tiles::<_, Clock>(&context, job.accel, job.view, job.settings, progress);
+    let (mut watch, mut prepare) = (Stopwatch::of_all_threads(), Spent::default());
+    let (rendered, clocks) = render_with::<Clock>(job, progress, || prepare = watch.lap());
     let tiles = watch.lap();
     let (trace, rays) = shares(clocks, tiles.cpu);
-    let rendered = Rendered { picture, counts: Default::default(), sampled, depth: context.depth, complete };
     (rendered, Profile { prepare, tiles, trace, rays })
 }
 

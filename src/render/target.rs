@@ -162,12 +162,12 @@ fn fewest(samples: f64) -> u32 {
 /// Renders until the error of the picture is what was asked; the picture is the mean of several renderings.
 pub(super) fn render<P: Observer>(
     job: &Job,
+    context: &Context,
     how: &Stochastic,
     progress: &dyn Progress,
 ) -> Option<(Rendered, Vec<ByClass<P>>)> {
     let target = f64::from(how.target.unwrap_or(how.error));
-    let context = Context::new(job.scene, job.world, job.textures, job.settings);
-    let mut plan = plan::<P>(job, &context, how, &super::part::Quiet(progress))?;
+    let mut plan = plan::<P>(job, context, how, &super::part::Quiet(progress))?;
     let mut counts = std::mem::take(&mut plan.counts);
     let watch = Stopwatch::of_all_threads();
     let foretold = plan.rmse / plan.work.sqrt();

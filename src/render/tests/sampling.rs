@@ -11,7 +11,7 @@ use crate::render::layers::empty;
 use crate::render::tile::{Alone, Tile, render_some};
 use crate::render::{
     Adaptive, ErrorSpace, Filter, Interval, Sampling, Split, Stochastic, ThinLens, render, render_costs,
-    render_recorded,
+    render_profiled, render_recorded,
 };
 use crate::scene::Background;
 
@@ -423,8 +423,10 @@ fn a_picture_is_as_exact_as_it_was_asked_to_be_and_hardly_more() {
         let said = found.sampled.targeted.unwrap();
         assert!((0.75..1.2).contains(&(error / asked)), "{target}: {error}, {said:?}");
         assert!((0.8..=1.03).contains(&(said.estimate / asked)), "{said:?}");
-        // Counted are all rays, those for finding out among them.
+        // Counted are all rays, those for finding out among them, and so is their time.
         assert_eq!(found.counts.primary.queries, found.sampled.rays);
+        let (profiled, profile) = s.with_job(AccelKind::DEFAULT, |job| render_profiled(job, &()));
+        assert_eq!((profiled.picture, profile.rays[0]), (found.picture, found.sampled.rays));
         assert!(found.sampled.rays > found.sampled.counts.iter().map(|&n| u64::from(n)).sum::<u64>());
     }
 }
