@@ -8,6 +8,7 @@ use super::tile::trace_sample;
 use super::whitted::ByClass;
 use super::{CLASS_NAMES, Context, Job};
 use crate::accel::probe::{Outcome, Test, Visit};
+use crate::accel::refine::Refined;
 use crate::accel::{Hit, Probe, Ray, RayCounts};
 use crate::math::Vec3;
 use crate::math::simd::LANES;
@@ -70,6 +71,8 @@ pub struct Query {
     pub children: Vec<usize>,
     /// The light that a shadow ray looks for, an index into the scene's lights.
     pub light: Option<usize>,
+    /// Of a shadow ray: whether it leads only up to where one begins that starts above its surface.
+    pub riser: bool,
 }
 
 /// Everything that was asked for one sample of a pixel.
@@ -102,8 +105,12 @@ pub fn tell(job: &Job, pixel: (u32, u32), sample: u32) -> Option<Story> {
         }
     }
     sorted.iter_mut().for_each(|query| query.children.sort_unstable());
-    for query in sorted.iter_mut().filter(|q| q.class == Class::Shadow) {
-        query.light = light(&context, &query.ray);
+    for i in 0..sorted.len() {
+        if sorted[i].class == Class::Shadow {
+            let raised = raised(&sorted, &sorted[i]);
+            sorted[i].riser = raised.is_some();
+            sorted[i].light = light(&context, &raised.unwrap_or(sorted[i].ray));
+        }
     }
     queries.clear();
     Some(Story { queries: sorted, radiance: seen.radiance, through: seen.through, depth: context.depth })
@@ -128,11 +135,29 @@ fn parent(job: &Job, queries: &[Query], i: usize) -> Option<usize> {
             queries.iter().position(|q| same_ray(q) && q.question == Question::Occluded)
         }
         _ if query.class == Class::Primary => None,
-        _ => queries.iter().enumerate().position(|(k, q)| {
-            let could = k != i && q.class != Class::Shadow && q.hit.is_some();
-            could && job.world.refine(&q.ray, &q.hit).origin(query.ray.dir) == query.ray.origin
-        }),
+        _ => {
+            let surfaces = || {
+                let could = |(k, q): &(usize, &Query)| *k != i && q.class != Class::Shadow && q.hit.is_some();
+                queries.iter().enumerate().filter(could).map(|(k, q)| (k, job.world.refine(&q.ray, &q.hit)))
+            };
+            let left_by = |ray: &Ray| surfaces().find(|(_, s)| s.origin(ray.dir) == ray.origin).map(|(k, _)| k);
+            // Some start above their surface, where another ray leads.
+            let riser = || queries.iter().find(|q| raised(std::slice::from_ref(query), q).is_some());
+            let off = |surface: &Refined| (surface.start - query.ray.origin).length_squared();
+            let nearest = || surfaces().min_by(|(_, a), (_, b)| off(a).total_cmp(&off(b))).map(|(k, _)| k);
+            // Nothing comes of a shadow ray, so that whatever it is given to makes no circle.
+            let otherwise = || if query.class == Class::Shadow { nearest() } else { None };
+            left_by(&query.ray).or_else(|| left_by(&riser()?.ray)).or_else(otherwise)
+        }
     }
+}
+
+/// The one of these rays that starts above its surface, where this one leads up to.
+fn raised(queries: &[Query], riser: &Query) -> Option<Ray> {
+    let Ray { origin, dir, t_max, .. } = riser.ray;
+    let asks = |q: &Query| q.class == Class::Shadow && q.question == Question::Occluded;
+    let rises = asks(riser) && t_max == 1.0;
+    queries.iter().find(|q| rises && asks(q) && q.ray.origin == origin + dir && q.ray != riser.ray).map(|q| q.ray)
 }
 
 /// The queries in an order in which each comes behind its parent, the descendants of one before the next.
@@ -242,6 +267,7 @@ impl Observer for Listener {
             hit: Hit::MISS,
             children: Vec::new(),
             light: None,
+            riser: false,
         });
     }
 

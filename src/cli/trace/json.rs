@@ -41,6 +41,7 @@ fn query(told: &Told, i: usize) -> Value {
     set("question", question(query.question).into());
     if query.class == Class::Shadow {
         set("light", light(scene, query.light).into());
+        set("riser", query.riser.into());
     }
     set("origin", in_world(told.world, query.ray.origin).to_array().to_vec().into());
     set("direction", query.ray.dir.to_array().to_vec().into());

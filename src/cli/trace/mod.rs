@@ -9,7 +9,7 @@
 //! |---|---|
 //! | `class`, `question` | `primary`, `shadow`, `reflected`, `refracted`; `closest`, `occluded` (is anything opaque in the way), `next` (what is behind `after`) |
 //! | `origin`, `direction`, `t_min`, `t_max` | the ray, in world space; `t_max` is `null` where it has no end |
-//! | `light`, `after` | what a shadow ray looks for; `t` and `prim` of the hit behind which the search went on |
+//! | `light`, `riser`, `after` | what a shadow ray looks for; whether it leads only up to where another one starts, above a surface that stands for a round one; `t` and `prim` of the hit behind which the search went on |
 //! | `counts` | `n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`, `n_xf` of this query |
 //! | `hit` | `t`, `u`, `v`, `prim`, `object`, `material`, `position`, `normal` (geometric); `null`: nothing; of `occluded` the first prim found in the way |
 //! | `steps` | in order (of the eye ray; of all with `--all-steps`): `visit` with `at`, `shape`, `box`, `t` (entry and exit) and `prims`; `test` with `outcome` and `t`; `mailbox` (a prim that was not tested again); `volumes`, `transforms` (how many) |

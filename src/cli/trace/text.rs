@@ -40,6 +40,10 @@ fn headline(told: &Told, query: &Query) -> String {
     let from = format!("from {} towards {}", point(in_world(told.world, query.ray.origin)), vector(query.ray.dir));
     match (query.class, query.question) {
         (class, Question::Next) => format!("{} ray goes on behind prim {}", class.name(), query.after.prim),
+        (Class::Shadow, Question::Occluded) if query.riser => {
+            let light = light(scene, query.light);
+            format!("shadow ray up to the rounded surface, where the one to {light} starts, {from}")
+        }
         (Class::Shadow, Question::Occluded) => format!("shadow ray to {} {from}", light(scene, query.light)),
         (Class::Shadow, Question::Closest) => "shadow ray looks for what lets light through".into(),
         (Class::Primary, _) => format!("eye ray {from}"),

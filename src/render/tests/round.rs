@@ -1,6 +1,7 @@
 //! Coarse meshes that stand for something round.
 
 use super::*;
+use crate::render::story::{Class, tell};
 
 /// A ball of radius 1 about the y axis with so many faces around and from pole to pole, and its own normals.
 pub(super) fn ball(around: u32, down: u32) -> Mesh {
@@ -73,6 +74,24 @@ fn a_coarse_ball_is_lit_up_to_the_line_that_its_normals_tell() {
             assert!((cosine - shown).abs() < 1e-5, "{shown} where the cosine is {cosine}");
         }
     }
+}
+
+#[test]
+fn a_story_has_the_rays_that_start_above_a_coarse_ball_in_its_tree_and_knows_their_light() {
+    let mut s = lit_ball(ball(12, 6), DVec3::new(1.0, 0.2, 0.1));
+    (s.settings.width, s.settings.height) = (24, 24);
+    let mut risers = 0;
+    for pixel in (0..24).flat_map(|y| (0..24).map(move |x| (x, y))) {
+        let told = s.with_job(AccelKind::DEFAULT, |job| tell(job, pixel, 0)).expect("there is such a pixel");
+        let children: usize = told.queries.iter().map(|q| q.children.len()).sum();
+        assert_eq!(children + 1, told.queries.len(), "{pixel:?}");
+        let shadows = || told.queries.iter().filter(|q| q.class == Class::Shadow);
+        assert!(shadows().all(|q| q.light == Some(0)), "{pixel:?}");
+        let rising = shadows().filter(|q| q.riser).count();
+        assert!(rising == 0 || shadows().count() == 2 * rising, "{pixel:?}");
+        risers += rising;
+    }
+    assert!(risers > 20, "{risers}");
 }
 
 /// The ball, seen through the front of a one-sided mesh around it, each of whose faces is turned inwards.
