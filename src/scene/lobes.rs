@@ -5,7 +5,7 @@ use super::TextureRef;
 use crate::math::Vec3;
 
 /// A clear dielectric layer of index 1.5 over a surface (KHR_materials_clearcoat).
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Coat {
     /// 0: no lacquer … 1: it covers everything.
     pub strength: f32,
@@ -34,7 +34,7 @@ impl Coat {
 }
 
 /// A grain along which light is spread farther than across it (KHR_materials_anisotropy).
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Grain {
     /// 0: none … 1: along the grain the surface is as rough as can be.
     pub strength: f32,
@@ -45,7 +45,7 @@ pub struct Grain {
 }
 
 /// A film so thin that light reflected off both its sides interferes (KHR_materials_iridescence).
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Film {
     /// 0: no film … 1: it covers everything.
     pub strength: f32,
@@ -72,7 +72,7 @@ impl Film {
 }
 
 /// Fibres that stand off a surface and scatter light back where it grazes them (KHR_materials_sheen).
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Sheen {
     /// Colour and strength, linear, 0 … 1.
     pub color: Vec3,
@@ -99,7 +99,7 @@ impl Sheen {
 /// Light that is scattered through to the other side, as by leaves, paper and wax (KHR_materials_diffuse_transmission).
 ///
 /// The surface counts as thin: light comes out where it went in, whatever KHR_materials_volume says of its inside.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Translucence {
     /// 0: all light that is scattered comes back … 1: all of it goes through.
     pub share: f32,

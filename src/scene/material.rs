@@ -4,7 +4,7 @@ use super::{Coat, Film, Grain, Sheen, Translucence};
 use crate::math::{Vec2, Vec3};
 
 /// A material. `base_color`, alpha, emission and the normal are common to every [`Surface`] model.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     /// Name in the file, or an empty string.
     pub name: String,
@@ -41,7 +41,7 @@ pub struct Material {
 }
 
 /// The reflection model of a [`Material`].
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Surface {
     /// glTF 2.0 metallic-roughness (its Appendix B), with specular, ior and transmission extensions.
     MetalRough(MetalRough),
@@ -52,7 +52,7 @@ pub enum Surface {
 }
 
 /// Parameters of the glTF metallic-roughness model.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct MetalRough {
     /// 0 dielectric … 1 metal. A glTF that does not say is 1.
     pub metallic: f32,
@@ -102,7 +102,7 @@ pub struct MetalRough {
 /// Parameters of the Phong model: `I = Ia Ka + Σ I (Kd N·L + Ks cosⁿα) + mirror + transmission`.
 ///
 /// The diffuse colour is [`Material::base_color`].
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Phong {
     /// `Ka`, linear; multiplied with the scene's ambient light.
     pub ambient: Vec3,

@@ -1,6 +1,6 @@
 //! Scenes with their faults mended, as far as the cost of rays is concerned.
 
-use crate::math::{DVec3, Vec3};
+use crate::math::DVec3;
 use crate::scene::{Instance, Mesh, Scene};
 use std::collections::HashSet;
 
@@ -31,67 +31,102 @@ pub(super) fn slimness(corners: &Corners) -> f64 {
 }
 
 /// The scene in which every triangle for which `limit` gives a length is cut until no edge is longer: of each instance those
-/// that are so large where it stands. The pieces are flat, whatever the normals were. At most `most` pieces are made.
+/// that are so large where it stands. At most `most` pieces are made.
 pub(super) fn cut(scene: &Scene, limit: impl Fn(&Corners) -> Option<f64>, most: usize) -> Scene {
     let mut mended = scene.clone();
     let mut made = 0;
     for (i, instance) in scene.instances.iter().enumerate() {
-        let mesh = &scene.meshes[instance.mesh as usize];
-        let mut kept = Vec::new();
-        let mut pieces = Mesh { material: mesh.material, name: mesh.name.clone(), ..Mesh::default() };
-        for triangle in &mesh.triangles {
-            let placed = corners(mesh, instance, triangle);
-            match limit(&placed).filter(|_| made < most) {
-                Some(limit) => {
-                    let local = triangle.map(|i| mesh.positions[i as usize]);
-                    made += halve(local, placed, limit, &mut pieces);
-                }
-                None => kept.push(*triangle),
-            }
+        if made >= most {
+            break;
         }
-        if pieces.triangles.is_empty() {
+        let mesh = &scene.meshes[instance.mesh as usize];
+        let (mut own, mut pieces) = (mesh.clone(), Vec::new());
+        own.triangles.retain(|triangle| {
+            let placed = corners(mesh, instance, triangle);
+            let limit = limit(&placed);
+            pieces.extend(limit.map(|limit| (*triangle, placed, limit)));
+            limit.is_none()
+        });
+        if pieces.is_empty() {
             continue;
         }
+        for (triangle, placed, limit) in pieces {
+            let before = own.triangles.len();
+            halve(triangle, placed, if made < most { limit } else { f64::INFINITY }, &mut own);
+            made += own.triangles.len() - before;
+        }
+        own.face_of_triangle.clear();
         // Others of its mesh may be of another size.
-        let rest = Mesh { triangles: kept, face_of_triangle: Vec::new(), ..mesh.clone() };
-        let number = u32::try_from(mended.meshes.len()).unwrap_or(u32::MAX);
-        mended.meshes.extend([rest, pieces]);
-        mended.instances[i].mesh = number;
-        mended.instances.push(Instance { mesh: number + 1, ..instance.clone() });
+        mended.instances[i].mesh = u32::try_from(mended.meshes.len()).unwrap_or(u32::MAX);
+        mended.meshes.push(own);
     }
     mended
 }
 
-/// Halves a triangle at its longest edge until no edge is longer than `limit`; the pieces made.
-fn halve(local: [Vec3; 3], placed: Corners, limit: f64, pieces: &mut Mesh) -> usize {
+/// Halves a triangle at its longest edge until no edge is longer than `limit`, and puts the pieces into the mesh.
+fn halve(triangle: [u32; 3], placed: Corners, limit: f64, mesh: &mut Mesh) {
     let edges = [0, 1, 2].map(|k| (placed[(k + 1) % 3] - placed[k]).length());
     let k = (0..3).max_by(|&a, &b| edges[a].total_cmp(&edges[b])).unwrap_or(0);
     if edges[k] <= limit || !edges[k].is_finite() {
-        let base = u32::try_from(pieces.positions.len()).unwrap_or(u32::MAX);
-        pieces.positions.extend(local);
-        pieces.triangles.push([base, base + 1, base + 2]);
-        return 1;
+        mesh.triangles.push(triangle);
+        return;
     }
-    let [a, b, c] = [k, (k + 1) % 3, (k + 2) % 3];
-    let (middle, world_middle) = ((local[a] + local[b]) * 0.5, (placed[a] + placed[b]) * 0.5);
-    let first = halve([local[a], middle, local[c]], [placed[a], world_middle, placed[c]], limit, pieces);
-    first + halve([middle, local[b], local[c]], [world_middle, placed[b], placed[c]], limit, pieces)
+    let turned = |j: usize| (k + j) % 3;
+    let [a, b, c] = [0, 1, 2].map(|j| triangle[turned(j)]);
+    let [place_a, place_b, place_c] = [0, 1, 2].map(|j| placed[turned(j)]);
+    let (middle, place) = (halfway(mesh, a, b), (place_a + place_b) * 0.5);
+    halve([a, middle, c], [place_a, place, place_c], limit, mesh);
+    halve([middle, b, c], [place, place_b, place_c], limit, mesh);
 }
 
-/// The scene without triangles that stand on the same three points as one before them, and how many they were.
+/// A new vertex halfway between two, with what both say.
+fn halfway(mesh: &mut Mesh, a: u32, b: u32) -> u32 {
+    let number = u32::try_from(mesh.positions.len()).unwrap_or(u32::MAX);
+    let (a, b) = (a as usize, b as usize);
+    mesh.positions.push((mesh.positions[a] + mesh.positions[b]) * 0.5);
+    if let (Some(&first), Some(&second)) = (mesh.normals.get(a), mesh.normals.get(b)) {
+        mesh.normals.push((first + second).try_normalize().unwrap_or(first));
+    }
+    if let (Some(&first), Some(&second)) = (mesh.tangents.get(a), mesh.tangents.get(b)) {
+        let direction = (first + second).truncate().try_normalize().unwrap_or(first.truncate());
+        mesh.tangents.push(direction.extend(first.w));
+    }
+    if let (Some(&first), Some(&second)) = (mesh.colors.get(a), mesh.colors.get(b)) {
+        mesh.colors.push((first + second) * 0.5);
+    }
+    for set in &mut mesh.uvs {
+        if let (Some(&first), Some(&second)) = (set.get(a), set.get(b)) {
+            set.push((first + second) * 0.5);
+        }
+    }
+    number
+}
+
+/// The scene without triangles that are hidden by one before them, and how many they were: opaque ones that stand on the same
+/// three points, look to the same side or are seen from both, and are of the same material.
 pub(super) fn without_copies(scene: &Scene) -> (Scene, usize) {
+    let like: Vec<_> =
+        scene.materials.iter().map(|one| scene.materials.iter().position(|other| other == one)).collect();
     let mut mended = scene.clone();
     let mut seen = HashSet::new();
     let mut dropped = 0;
     let mut meshes = Vec::new();
     for instance in &mut mended.instances {
         let mesh = &scene.meshes[instance.mesh as usize];
+        let material = scene.materials.get(mesh.material as usize);
+        let (is_opaque, both_sides) = material.map_or((true, false), |m| (m.is_opaque(), m.double_sided));
+        let (number, mirrored) =
+            (like.get(mesh.material as usize), instance.world_from_object.matrix3.determinant() < 0.0);
         let mut own = mesh.clone();
         own.face_of_triangle.clear();
         own.triangles.retain(|triangle| {
             let mut key = corners(mesh, instance, triangle).map(|p| (p + 0.0).to_array().map(f64::to_bits));
-            key.sort_unstable();
-            let first = seen.insert(key);
+            // The least corner first: what is left of the order is the side it looks to.
+            let least = (0..3).min_by_key(|&k| key[k]).unwrap_or(0);
+            key.rotate_left(least);
+            let front = !both_sides && (key[1] < key[2]) != mirrored;
+            key[1..].sort_unstable();
+            let first = !is_opaque || seen.insert((key, front, number));
             dropped += usize::from(!first);
             first
         });

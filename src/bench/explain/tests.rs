@@ -3,7 +3,7 @@
 use super::*;
 use crate::generate::Family;
 use crate::math::random::Random;
-use crate::math::{DAffine3, DVec3, Vec3};
+use crate::math::{DAffine3, DVec3, Vec3, Vec4};
 use crate::render::view::Lens;
 use crate::scene::{AlphaMode, Falloff, Instance, Light, LightKind, Material, Mesh, MetalRough, Surface};
 
@@ -131,6 +131,51 @@ fn a_structure_that_divides_no_space_is_not_said_to_divide_any() {
         assert!(found.iter().all(|s| s.cause != Cause::DenseCluster), "{accel}");
         assert!(found.iter().any(|s| s.cause == Cause::Structure && s.remedy == "--accel fast-bvh"), "{accel}");
     }
+}
+
+#[test]
+fn what_is_cut_keeps_its_vertices_normals_colours_and_places_in_its_texture() {
+    let corners = vec![Vec3::ZERO, Vec3::X * 4.0, Vec3::Y * 4.0];
+    let mesh = Mesh {
+        normals: vec![Vec3::X, Vec3::Y, Vec3::Z],
+        colors: vec![Vec4::X, Vec4::Y, Vec4::Z],
+        uvs: vec![corners.iter().map(|p| p.truncate() * 0.25).collect()],
+        positions: corners,
+        triangles: vec![[0, 1, 2]],
+        ..Mesh::default()
+    };
+    let cut = mend::cut(&scene(vec![(mesh, matt())]), |_| Some(1.0), 1000);
+    let mesh = &cut.meshes[cut.instances[0].mesh as usize];
+    assert!(mesh.triangles.len() >= 32, "{}", mesh.triangles.len());
+    for (i, place) in mesh.positions.iter().enumerate() {
+        let [x, y] = [place.x, place.y].map(|c| c * 0.25);
+        assert_eq!(mesh.uvs[0][i], place.truncate() * 0.25);
+        assert!((mesh.colors[i] - Vec4::new(1.0 - x - y, x, y, 0.0)).length() < 1e-6);
+        assert!((mesh.normals[i].length() - 1.0).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn faces_that_show_another_side_or_material_or_let_light_through_are_no_copies() {
+    let copies = |second: Mesh, [a, b]: [Material; 2]| {
+        mend::without_copies(&scene(vec![(ball(Vec3::ZERO, 1.0, 4), a), (second, b)])).1
+    };
+    let all = ball(Vec3::ZERO, 1.0, 4).triangles.len();
+    let same = || ball(Vec3::ZERO, 1.0, 4);
+    let turned = || {
+        let mut mesh = same();
+        mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        mesh
+    };
+    let one_sided = || Material { double_sided: false, ..matt() };
+    let red = Material { base_color: Vec3::X, ..matt() };
+    let glassy = || Material { alpha_mode: AlphaMode::Blend, ..matt() };
+    assert_eq!(copies(same(), [matt(), matt()]), all);
+    assert_eq!(copies(turned(), [matt(), matt()]), all);
+    assert_eq!(copies(same(), [one_sided(), one_sided()]), all);
+    assert_eq!(copies(turned(), [one_sided(), one_sided()]), 0);
+    assert_eq!(copies(same(), [matt(), red]), 0);
+    assert_eq!(copies(same(), [glassy(), glassy()]), 0);
 }
 
 #[test]
