@@ -72,7 +72,7 @@ pub fn failures(baseline: &Value, now: &Value, limits: &[Limit]) -> Result<Vec<S
             [("hash", "a different file"), ("picture", "a different picture"), ("rays", "different numbers of rays")];
         for (key, what) in alike {
             let [before, now] = [before, model].map(|model| &model[key]);
-            if before != now {
+            if !is_same(before, now) {
                 return Err(format!("{name}: the baseline was made from {what} ({before} before, {now} now)"));
             }
         }
@@ -100,6 +100,14 @@ pub fn failures(baseline: &Value, now: &Value, limits: &[Limit]) -> Result<Vec<S
     let missing = all.iter().enumerate().filter(|(at, _)| !found.contains(at));
     lines.extend(missing.map(|(_, model)| format!("{}: in the baseline, but not measured now", called(all, model))));
     Ok(lines)
+}
+
+/// Whether two values are the same, or, of objects, whatever the earlier one has.
+fn is_same(before: &Value, now: &Value) -> bool {
+    match before.as_object() {
+        Some(before) => before.iter().all(|(key, value)| now[key] == *value),
+        None => before == now,
+    }
 }
 
 /// Whether a model of a report has this count.
@@ -260,6 +268,21 @@ mod tests {
         let mut twice = report(1.0, 1);
         twice["models"] = json!([twice["models"][0], twice["models"][0]]);
         assert_eq!(judged(&twice, &twice, &["n_it>+1%"]), [""; 0]);
+    }
+
+    #[test]
+    fn a_baseline_of_another_camera_is_none_and_one_that_does_not_tell_its_camera_is() {
+        let with = |eye: f64| {
+            let mut report = report(1.0, 1);
+            report["models"][0]["picture"] = json!({ "width": 3, "camera": { "eye": [eye, 0.0, 0.0] } });
+            report
+        };
+        let error = failures(&with(1.0), &with(2.0), &[]).unwrap_err();
+        assert!(error.starts_with("b.obj: the baseline was made from a different picture"), "{error}");
+        assert_eq!(judged(&with(1.0), &with(1.0), &[]), [""; 0]);
+        let mut silent = with(1.0);
+        silent["models"][0]["picture"] = json!({ "width": 3 });
+        assert_eq!(judged(&silent, &with(1.0), &[]), [""; 0]);
     }
 
     #[test]

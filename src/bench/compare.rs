@@ -173,7 +173,7 @@ impl Task {
 
 /// Counts, and compares every answer with what was expected: those of a counted walk, and those of a plain one.
 pub(super) fn count<A: Accel>(accel: &A, task: &Task, tests_by_pixel: &mut [u32]) -> ClassRow {
-    let mut row = ClassRow::default();
+    let mut row = ClassRow::of(task.set.asked);
     let mut total = 0.0;
     let in_picture = task.set.class != Class::Diffuse;
     for (batch, expected) in task.set.batches.iter().zip(&task.expected) {

@@ -50,7 +50,9 @@ impl Row {
 /// One structure and one class of rays.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ClassRow {
-    /// Sums over the rays.
+    /// Rays of the class that the picture asks.
+    pub asked: u64,
+    /// Sums over the rays that were sent.
     pub counts: RayCounts,
     /// Sums of the squares, in the order of [`Count::ALL`].
     squares: [f64; Count::ALL.len()],
@@ -122,16 +124,31 @@ fn student(freedom: f64) -> f64 {
 }
 
 impl ClassRow {
+    /// Nothing yet of so many rays that the picture asks.
+    pub(super) fn of(asked: u64) -> Self {
+        Self { asked, ..Self::default() }
+    }
+
     /// A count for each ray; 0 without rays.
     pub fn per_ray(&self, count: Count) -> f64 {
         count.of(&self.counts) as f64 / self.counts.queries.max(1) as f64
     }
 
-    /// Half the width of the 95 % interval of [`Self::per_ray`] if these rays are a sample of many more.
+    /// Whether these rays are a sample of more.
+    pub fn is_sampled(&self) -> bool {
+        self.counts.queries < self.asked
+    }
+
+    /// Half the width of the 95 % interval of [`Self::per_ray`] of all rays, of which these may be a sample; 0 where they are
+    /// all. Rays that are drawn only once err the less the more of all they are.
     pub fn interval(&self, count: Count) -> f64 {
+        if !self.is_sampled() {
+            return 0.0;
+        }
         let (n, mean) = (self.counts.queries as f64, self.per_ray(count));
         let variance = (self.squares[count as usize] / n - mean * mean).max(0.0) * n / (n - 1.0);
-        if n < 2.0 { f64::INFINITY } else { student(n - 1.0) * (variance / n).sqrt() }
+        let left_out = 1.0 - n / self.asked as f64;
+        if n < 2.0 { f64::INFINITY } else { student(n - 1.0) * (variance / n * left_out).sqrt() }
     }
 
     /// Hits required for each ray: the tests that no structure can save.

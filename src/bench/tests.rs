@@ -80,6 +80,7 @@ impl Stage {
             samples: 1,
             depth: 12,
             view: "default view".into(),
+            camera: self.view,
             rays: rays.iter().map(Rays::of).collect(),
             rows: self.rows(&rays, &plan),
             kept: 0,
@@ -192,6 +193,8 @@ fn a_slow_structure_gets_a_sample_with_its_interval() {
     let off = (shadow.0.per_ray(Count::It) - shadow.1.per_ray(Count::It)).abs();
     assert!(shadow.0.interval(Count::It) > 0.0 && off <= 2.0 * shadow.0.interval(Count::It), "{off}");
     assert!(none.classes[0].interval(Count::It) < 1.0, "every closest query tests every prim but an excluded one");
+    let exact = rows.iter().find(|r| !r.sampled).unwrap();
+    assert!(exact.classes.iter().all(|c| !c.is_sampled() && c.interval(Count::It) == 0.0), "nothing was left out");
 }
 
 #[test]

@@ -134,7 +134,7 @@ fn bench_fails_when_a_count_grew() {
     folder.run(&[&words[..], &gate[..]].concat()).ends(0);
     let worse = [&words[..], &gate[..], &["--leaf-size", "100"]].concat();
     folder.run(&worse).ends(1).says(&["cube.obj, bvh, primary: n_it", "is >+1%"]);
-    folder.run(&[&words[..6], &gate[..], &["-q", "--view", "back"]].concat()).ends(1).says(&["another picture"]);
+    folder.run(&[&words[..6], &gate[..], &["-q", "--view", "back"]].concat()).ends(1).says(&["a different picture"]);
     folder.run(&["bench", "cube.obj", "--baseline", "gone.json", "--fail-if", "n_it>+1%"]).ends(1).says(&["gone.json"]);
     folder.run(&["bench", "cube.obj", "--baseline", "gone.json", "--fail-if", "it>1"]).ends(2).says(&["n_it>+1%"]);
 }

@@ -12,7 +12,8 @@
 //! A model has `file`, `hash` (xxh3-128 of what was read), `prims` (N), `objects` (that `spheres` and `boxes` bound), `auto`
 //! (null, or what it would choose: `kind`, `why`, and `won_time` and `won_nodes`: how much more the other fast
 //! structure costs in time and nodes, as a share of the chosen one's cost), `picture` (`width`, `height`, `samples`, `depth`,
-//! `view`), `rays` (by class: `asked`, `kept`), `identical` (whether all hits were), `reference`, and `structures`. A
+//! `view`, `camera`: world-space `eye`, unit `forward` and `up`, `half_height` of what is seen, at a distance of 1 or, where rays
+//! are `parallel`, anywhere), `rays` (by class: `asked`, `kept`), `identical` (whether all hits were), `reference`, and `structures`. A
 //! structure has `accel`, `sampled`, `differing` (rays), `t_b` and `t_tr` (seconds, of a ray; each `median`, `min`, `max`,
 //! `passes`, or null without times), V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`, `bytes`, `break_even` (rays, or null),
 //! and `classes`. A class has exact sums (`rays`, `hits`, `tests`, `steps`, `cells`, `empty_cells`, `volume_tests`,
@@ -40,6 +41,8 @@ use crate::accel::AccelKind;
 use crate::bench::clock::Spread;
 use crate::bench::rays::Class;
 use crate::bench::row::{ClassRow, Count, Row};
+use crate::render::View;
+use crate::render::view::Lens;
 use serde_json::{Map, Value, json};
 
 /// The name of the schema.
@@ -74,7 +77,7 @@ fn model(report: &Report, model: &Model) -> Value {
         "objects": model.objects, "kept_instances": model.kept, "auto": choice(report, model),
         "picture": {
             "width": model.width, "height": model.height, "samples": model.samples, "depth": model.depth,
-            "view": model.view,
+            "view": model.view, "camera": camera(&model.camera),
         },
         "rays": rays.collect::<Map<_, _>>(),
         "identical": model.differing() == 0, "reference": model.reference().map(|k| k.name()),
@@ -85,6 +88,15 @@ fn model(report: &Report, model: &Model) -> Value {
             "usual": spread(&p.usual), "everything": spread(&p.everything), "saved": p.saved(), "same": p.same,
         })),
     })
+}
+
+fn camera(View { eye, right: _, up, forward, lens }: &View) -> Value {
+    let (half_height, parallel) = match *lens {
+        Lens::Perspective { half_height } => (half_height, false),
+        Lens::Orthographic { half_height } => (half_height, true),
+    };
+    let [eye, forward, up] = [eye, forward, up].map(|v| v.to_array());
+    json!({ "eye": eye, "forward": forward, "up": up, "half_height": half_height, "parallel": parallel })
 }
 
 fn choice(report: &Report, model: &Model) -> Value {
@@ -131,10 +143,7 @@ fn law(report: &Report, kind: AccelKind, cost: Cost, class: Option<Class>) -> Va
 
 fn structure(model: &Model, row: &Row) -> Value {
     let s = row.made_of;
-    let class = |(i, c): (usize, &ClassRow)| {
-        let set = &model.rays[i];
-        (set.class.name().to_owned(), class(c, row.sampled || set.asked > c.counts.queries, model.prims))
-    };
+    let class = |(i, c): (usize, &ClassRow)| (model.rays[i].class.name().to_owned(), class(c, model.prims));
     json!({
         "accel": row.kind.name(),
         "setting": row.setting.map(|s| json!({ "value": s.value, "is_default": s.is_default })),
@@ -145,7 +154,7 @@ fn structure(model: &Model, row: &Row) -> Value {
     })
 }
 
-fn class(class: &ClassRow, sampled: bool, prims: usize) -> Value {
+fn class(class: &ClassRow, prims: usize) -> Value {
     let c = &class.counts;
     let mut per_ray: Map<_, _> = Count::ALL.iter().map(|&n| (n.name().to_owned(), json!(class.per_ray(n)))).collect();
     per_ray.insert("n_min".into(), json!(class.n_min()));
@@ -153,7 +162,7 @@ fn class(class: &ClassRow, sampled: bool, prims: usize) -> Value {
     json!({
         "rays": c.queries, "hits": c.found, "tests": c.n_it, "steps": c.n_ts, "cells": c.n_ets,
         "empty_cells": c.n_eets, "volume_tests": c.n_bit, "tests_saved": c.n_mb, "transforms": c.n_xf, "per_ray": per_ray,
-        "interval": if sampled { Value::Object(interval.collect()) } else { Value::Null },
+        "interval": if class.is_sampled() { Value::Object(interval.collect()) } else { Value::Null },
         "culled": class.culled(prims), "differing": class.differing,
         "t_tr": spread(&class.seconds), "mrays": spread(&class.rate()),
     })

@@ -68,13 +68,14 @@ fn write_class(out: &mut String, report: &Report, model: &Model, i: usize, rays:
     head(out, &titles);
     for row in &model.rows {
         let Some(class) = row.classes.get(i) else { continue };
+        let sampled = row.sampled && class.is_sampled();
         let sample = format!("{} (sample: {} rays)", row.kind, grouped(class.counts.queries));
-        let mut cells = vec![if row.sampled { sample } else { row.kind.to_string() }];
+        let mut cells = vec![if sampled { sample } else { row.kind.to_string() }];
         if report.is_timed() {
             let rate = class.rate();
             cells.extend([short(rate.median()), format!("{}..{}", short(rate.min()), short(rate.max()))]);
         }
-        let shown = |c: Count| match row.sampled {
+        let shown = |c: Count| match sampled {
             true => format!("{} ±{}", short(class.per_ray(c)), short(class.interval(c))),
             false => short(class.per_ray(c)),
         };

@@ -21,6 +21,7 @@ use super::row::{Count, Row};
 use crate::accel::AccelKind;
 use crate::accel::auto::Reason;
 use crate::generate::Family;
+use crate::render::View;
 use std::path::Path;
 
 /// All models of one command.
@@ -65,8 +66,10 @@ pub struct Model {
     pub samples: u32,
     /// Bounces after the eye ray.
     pub depth: u32,
-    /// Seen from where.
+    /// Seen from where, in words, …
     pub view: String,
+    /// … and exactly.
+    pub camera: View,
     /// The rays.
     pub rays: Vec<Rays>,
     /// One for each structure.

@@ -32,9 +32,17 @@ pub fn curves<'a>(report: &Report, model: &'a Model) -> Vec<Curve<'a>> {
             let ((a, other), (b, others)) = (rank(a), rank(b));
             a.total_cmp(&b).then(other.cmp(&others))
         })?;
+        // Where values make the same structure no time tells them apart.
+        let best = default.into_iter().chain(rows.iter().copied()).find(|row| are_same(row, best)).unwrap_or(best);
         Some(Curve { kind, rows, best, default })
     };
     report.plan.kinds.iter().filter_map(curve).collect()
+}
+
+/// Whether two rows are of one structure: equal in size and in all counts.
+fn are_same(a: &Row, b: &Row) -> bool {
+    let counts = |row: &Row| row.classes.iter().map(|class| class.counts).collect::<Vec<_>>();
+    a.made_of == b.made_of && counts(a) == counts(b)
 }
 
 /// What is to be low: time where there is one, else tests and visits together.

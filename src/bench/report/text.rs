@@ -124,7 +124,7 @@ fn write_class(out: &mut String, report: &Report, model: &Model, i: usize, rays:
         }
         Count::ALL.iter().try_for_each(|&c| write!(out, "{:>10}", short(class.per_ray(c))))?;
         writeln!(out, "{:>10}", culled(class, model.prims))?;
-        if row.sampled {
+        if row.sampled && class.is_sampled() {
             write!(out, "  {:<12}", format!("{} rays", grouped(class.counts.queries)))?;
             if report.is_timed() {
                 write!(out, "{:25}", "")?;

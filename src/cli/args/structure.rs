@@ -7,7 +7,8 @@ use clap::Args;
 /// Parameters of the structures; what is left out follows from the kind of structure.
 #[derive(Debug, Clone, Args)]
 pub(in crate::cli) struct AccelArgs {
-    /// Cells of the grid per shape [default: 0.25 where crowded cells are refined, 4 for `grid`]
+    /// Cells of the grid per shape, or fewer where shapes would stand in more than about six cells each [default: 0.25
+    /// where crowded cells are refined, 4 for `grid`]
     #[arg(long, value_name = "RATIO", help_heading = "Structure", hide_short_help = true)]
     pub grid_density: Option<f64>,
     /// Most cells of the grid along an axis [default: 256]

@@ -202,6 +202,7 @@ impl Bench<'_> {
             samples: settings.samples,
             depth,
             view: prepared.view_phrase.clone(),
+            camera: prepared.view,
             rays: sets.iter().map(Rays::of).collect(),
             rows: Vec::new(),
             left_out,

@@ -88,7 +88,7 @@ pub(super) struct Prepared {
     pub world: World,
     pub settings: Settings,
     pub view_phrase: String,
-    view: View,
+    pub view: View,
 }
 
 impl Prepared {
