@@ -33,11 +33,18 @@ fn advise(study: &Study, purpose: Quality) -> Advice {
     let own = good.iter().copied().find(|&i| is_quality(&study.rows[i], purpose));
     let goal = format!("an error of at most {goal} ({:.1} of 255 steps)", 255.0 * goal);
     let Some(fastest) = fastest else {
-        return Advice { purpose, row: None, why: format!("no setting that was tried comes to {goal}") };
+        let off = study.reference.error;
+        let doubt = match off > purpose.good_enough() {
+            true => {
+                format!(", as far as the reference can tell, which is {off:.4} off itself: raise --reference-samples")
+            }
+            false => String::new(),
+        };
+        return Advice { purpose, row: None, why: format!("no setting that was tried comes to {goal}{doubt}") };
     };
     let row = own.filter(|&own| time(fastest) > (1.0 - WORTH) * time(own)).unwrap_or(fastest);
     let of_own = if own == Some(row) { "the program's own choice" } else { "not the program's own choice" };
-    let left = format!("{:.4}, {}", study.rows[row].error.rmse, rest(&study.rows[row]));
+    let left = format!("{:.4}, {}", study.rows[row].error.rmse, rest(&study.rows[row], study.reference.error));
     let saved = |own: usize| 100.0 * (1.0 - time(fastest) / time(own));
     let why = match own {
         Some(own) if row == own && row != fastest => {
@@ -53,10 +60,13 @@ fn advise(study: &Study, purpose: Quality) -> Advice {
     Advice { purpose, row: Some(row), why }
 }
 
-/// What kind of error is left.
-fn rest(row: &Row) -> &'static str {
+/// What kind of error is left, measured against a reference that is so far off itself.
+fn rest(row: &Row, reference: f64) -> &'static str {
     match row.setting.settings.sampling {
         _ if row.error.bias <= row.error.noise => "most of it noise",
+        Sampling::Stochastic(_) if row.error.bias <= reference => {
+            "of which the reference, as far off itself, does not tell what it is: raise --reference-samples"
+        }
         Sampling::Stochastic(_) => "most of it bias, which more samples do not lessen",
         Sampling::Uniform | Sampling::Adaptive(_) => {
             "the same in every rendering, as its rays go through the same places"
