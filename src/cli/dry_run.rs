@@ -1,17 +1,18 @@
 //! `--dry-run`: what a picture would take, without rendering it.
 //!
 //! # Schema `meshray-forecast/1`
-//! With `--stats json` one JSON object for each picture, a line each: `version`, `file`, `output` (`-`: standard output),
-//! `view` (in words), `width`, `height`, `looked_at` (pixels that were rendered to
-//! find out), `cpu_seconds`, `wall_seconds`, `rays` (from the eye), `tests` (ray/prim) and `rmse` (in the numbers of
-//! `--error-space`; null where every rendering is the same), each with `value`, `low` and `high`, which hold it with 95 %
-//! confidence; `memory` (bytes; null where the system does not tell). Keys are only ever added.
+//! With `--stats json` one JSON object for each picture, a line each: `version`, `file`, `output` (`-`: standard
+//! output), `view` (in words), `width`, `height`, `looked_at` (pixels that were rendered to find out), `cpu_seconds`,
+//! `wall_seconds` (if nothing else runs on the processors), `rays` (from the eye), `tests` (ray/prim) and `rmse` (in
+//! the numbers of `--error-space`; null where every rendering is the same), each with `value`, `low` and `high`, which
+//! hold it with 95 % confidence; `memory` (bytes; null where the system does not tell). Keys are only ever added.
 
 use super::args::StatsFormat;
 use super::outputs::Target;
 use crate::bench::report::number::{bytes, seconds, short};
 use crate::render::{Forecast, Interval, Job};
 use crate::stopwatch::peak_memory;
+use crate::threads;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -38,11 +39,11 @@ struct Told<'a> {
 }
 
 impl Told<'_> {
-    /// By all threads, each of which has a core of its own at best.
+    /// By all threads, where nothing else runs on the processors.
     fn wall(&self) -> Interval {
-        let threads = rayon::current_num_threads().max(1) as f64;
+        let side_by_side = rayon::current_num_threads().min(threads::available()).max(1) as f64;
         let Interval { value, low, high } = self.forecast.cpu;
-        Interval { value: value / threads, low: low / threads, high: high / threads }
+        Interval { value: value / side_by_side, low: low / side_by_side, high: high / side_by_side }
     }
 
     fn text(&self) -> String {
@@ -52,7 +53,10 @@ impl Told<'_> {
             |i: Interval, unit: fn(f64) -> String| format!("{} ({} to {})", unit(i.value), unit(i.low), unit(i.high));
         let mut lines = vec![
             ("processor time", range(cpu, seconds)),
-            ("time", format!("{} with {} threads", range(self.wall(), seconds), rayon::current_num_threads())),
+            ("time", {
+                let wall = range(self.wall(), seconds);
+                format!("{wall} with {} threads, if nothing else runs", rayon::current_num_threads())
+            }),
             (
                 "rays from the eye",
                 format!("{}, {} a pixel", range(rays, short), short(rays.value / pixels.max(1) as f64)),

@@ -44,7 +44,7 @@ pub(super) struct SamplingArgs {
     #[arg(long, value_name = "PERCENT", value_parser = parse::confidence, help_heading = "Quality", hide_short_help = true)]
     pub confidence: Option<f64>,
     /// Fewest rays of a pixel of stochastic sampling, enough where they and those of its neighbours agree; the next power of
-    /// two is taken. Light, gloss and environment rays are divided by it, by 4 at least [default: 1]
+    /// two is taken. Light, gloss and environment rays are divided by it, by 4 at least [default: 1, with --aperture 16]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536), help_heading = "Quality",
           hide_short_help = true)]
     pub min_samples: Option<u32>,
@@ -106,6 +106,10 @@ pub(super) enum SpaceArg {
     Display,
     Linear,
 }
+
+/// Samples that a pixel gets at least through an open lens: what is out of focus shows in a few rays of many pixels, and that
+/// one ray of each shows the same tells nothing.
+const FEWEST_OF_LENS: u32 = 16;
 
 impl SamplingArgs {
     /// Refuses flags that belong to different kinds of sampling.
@@ -207,12 +211,14 @@ impl SamplingArgs {
             }
             Aa::Stochastic => {
                 let usual = self.quality.unwrap_or_default().stochastic();
+                let is_open = self.aperture.is_some_and(|radius| radius > 0.0);
+                let usual_fewest = if is_open { usual.min_samples.max(FEWEST_OF_LENS) } else { usual.min_samples };
                 let usual_most = if self.target_error.is_some() { MOST_TO_TARGET } else { usual.max_samples };
                 let most = self.max_samples.unwrap_or(usual_most.max(self.min_samples.unwrap_or(0)));
                 let how = Stochastic {
                     error: self.pixel_error.unwrap_or(usual.error),
                     confidence: self.confidence.unwrap_or(usual.confidence),
-                    min_samples: self.min_samples.unwrap_or(usual.min_samples).min(most),
+                    min_samples: self.min_samples.unwrap_or(usual_fewest).min(most),
                     max_samples: most,
                     filter: self.filter.unwrap_or(usual.filter),
                     space: usual.space,

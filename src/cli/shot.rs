@@ -205,7 +205,8 @@ impl Prepared<'_> {
         let found = crate::render::forecast(&self.work, progress);
         progress.finish();
         let Some(forecast) = found else { return Exit::Interrupted };
-        let picture = picture::bytes(self.effective, self.shot.kind, behind(job));
+        let picture = picture::bytes(self.effective, self.shot.kind, behind(job))
+            + picture::bytes_of_rays(self.work.settings, forecast.rays.value);
         let format = job.stats.as_ref().map(|stats| stats.format);
         let which = dry_run::Which { file: self.task.file(), view: self.phrase, target: &self.shot.target };
         let told = dry_run::told(which, &self.work, &forecast, picture, format);

@@ -109,7 +109,7 @@ fn flags_that_contradict_each_other_are_refused() {
     }
     run(&folder, &["--aperture", "0.1", "--eye", "0,0,5", "--at", "0,0,0", "--focus", "0,0,9"])
         .ends(3)
-        .says(&["behind"]);
+        .says(&["not in front of the camera", "-4 along"]);
 }
 
 #[test]
