@@ -126,8 +126,10 @@ fn is_stl_text(text: &[u8]) -> bool {
 
 /// What an STL file was meant to be that is neither as long as it says nor begins as text should.
 fn damaged_stl(text: &[u8]) -> Encoding {
+    let start = &text[..text.len().min(512)];
     let begins = text.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
-    let is_text = begins && !text.iter().take(512).any(|&b| b == 0);
+    // Remarks may stand before it.
+    let is_text = (begins || has(&start.to_ascii_lowercase(), b"facet normal")) && !start.contains(&0);
     if is_text { Encoding::Text } else { Encoding::Binary }
 }
 

@@ -40,6 +40,8 @@ pub(super) struct Chunk {
     pub normals: Vec<Vec3>,
     /// As written, [`NO_COLOR`] where there is none; may end before the last position.
     pub colors: Vec<[f32; 3]>,
+    /// Colours that a program has written into comments, 0…255: of the first vertices of the file, one after the other.
+    pub paint: Vec<[u8; 3]>,
     /// Corners of all faces: numbers of `v`, `vt`, `vn` from 1, for [`resolve`]; 0: none given.
     pub corners: Vec<[u32; 3]>,
     /// Corners of faces that have too few.
@@ -68,6 +70,9 @@ pub(super) struct Chunk {
 
 /// Comments that are kept: generators write theirs first.
 pub(super) const COMMENTS: usize = 64;
+
+/// Comments in which ZBrush writes what vertices are painted with.
+const PAINT: &[u8] = b"#MRGB ";
 
 /// Statements of free-form geometry that draw something.
 const CURVES: [&[u8]; 5] = [b"curv", b"curv2", b"surf", b"bzp", b"bsp"];
@@ -290,6 +295,9 @@ impl Reader {
     }
 
     fn comment(&mut self, text: &[u8]) {
+        if let Some(paint) = text.trim_ascii().strip_prefix(PAINT) {
+            return self.paint(paint.trim_ascii());
+        }
         if self.out.comments.len() < COMMENTS {
             let text = decode_name(text);
             let text = text.trim_matches(|c: char| c == '#' || c.is_whitespace());
@@ -297,6 +305,16 @@ impl Reader {
                 self.out.comments.push(crate::load::paths::shorten(text));
             }
         }
+    }
+
+    /// Of each vertex a mask and red, green and blue, two hexadecimal digits each.
+    fn paint(&mut self, digits: &[u8]) {
+        let digit = |d: u8| char::from(d).to_digit(16).and_then(|d| u8::try_from(d).ok());
+        let byte = |[high, low]: [u8; 2]| Some(16 * digit(high)? + digit(low)?);
+        let of_vertices = digits.as_chunks::<8>().0.iter();
+        let colors =
+            of_vertices.map_while(|&[_, _, a, b, c, d, e, f]| Some([byte([a, b])?, byte([c, d])?, byte([e, f])?]));
+        self.out.paint.extend(colors);
     }
 
     /// A `v` statement: three coordinates, then perhaps a weight, or a colour, or a colour with alpha.
@@ -312,7 +330,13 @@ impl Reader {
         match extra {
             0 => {}
             1 => self.out.odd.weight.note(self.line, more[0]),
-            3 | 4 => self.color([more[0], more[1], more[2]]),
+            3 => self.color([more[0], more[1], more[2]]),
+            4 => {
+                self.color([more[0], more[1], more[2]]);
+                if number::check(more[3]).word.parse().is_ok_and(|alpha: f32| alpha < 1.0) {
+                    self.out.odd.alpha.note(self.line, more[3]);
+                }
+            }
             _ => self.out.odd.columns.note(self.line, more[0]),
         }
     }

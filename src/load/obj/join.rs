@@ -42,7 +42,7 @@ pub(super) fn join(mut chunks: Vec<Chunk>) -> Result<Joined, u64> {
     (out.names, out.runs) = (table.names, table.runs);
 
     let colors = chunks.iter().any(|c| !c.colors.is_empty());
-    let colors = if colors { all_colors(&chunks, &begins, out.counts[0]) } else { Vec::new() };
+    let colors = if colors { all_colors(&chunks, &begins, out.counts[0]) } else { painted(&chunks, out.counts[0]) };
     let (positions, uvs, normals) = vertices(&mut chunks);
     let there = There { counts: out.counts, uvs: &uvs, normals: &normals };
     let (corners, faulty) = corners(&chunks, &begins, &there);
@@ -165,6 +165,18 @@ fn all_colors(chunks: &[Chunk], begins: &[Before], positions: u32) -> Vec<[f32; 
         let first = before.counts[0] as usize;
         all[first..first + chunk.colors.len()].copy_from_slice(&chunk.colors);
     }
+    all
+}
+
+/// What comments say of the colours of so many vertices; nothing where they say nothing.
+fn painted(chunks: &[Chunk], positions: u32) -> Vec<[f32; 3]> {
+    let mut paint = chunks.iter().flat_map(|chunk| &chunk.paint).peekable();
+    if paint.peek().is_none() {
+        return Vec::new();
+    }
+    let unit = |color: &[u8; 3]| color.map(|c| f32::from(c) / 255.0);
+    let mut all: Vec<[f32; 3]> = paint.take(positions as usize).map(unit).collect();
+    all.resize(positions as usize, NO_COLOR);
     all
 }
 

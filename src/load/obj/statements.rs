@@ -106,6 +106,8 @@ pub(super) struct Oddities {
     pub short: Tally,
     pub weight: Tally,
     pub columns: Tally,
+    /// Opacities of vertices.
+    pub alpha: Tally,
     pub smoothing: Tally,
     /// Corners that name texture coordinate or normal 0.
     pub zero: Tally,
@@ -185,7 +187,8 @@ fn bytes(chunk: &Chunk) -> u64 {
     /// A mesh and its instance, or points and lines, with a few lists of their own.
     const RUN: u64 =
         2 * (size_of::<Run>() + size_of::<Mesh>() + size_of::<Instance>() + size_of::<Wires>() + 100) as u64;
-    let vertices = chunk.positions.len() + chunk.uvs.len() + chunk.normals.len() + chunk.colors.len();
+    let vertices =
+        chunk.positions.len() + chunk.uvs.len() + chunk.normals.len() + chunk.colors.len() + chunk.paint.len();
     let corners = chunk.corners.len() + chunk.stroke_corners.len();
     let faces = chunk.faces.len() + chunk.strokes.len();
     let texts = chunk.names.iter().chain(chunk.libraries.iter().map(|(_, names)| names));
@@ -208,6 +211,7 @@ impl Oddities {
         self.short.append(more.short, lines);
         self.weight.append(more.weight, lines);
         self.columns.append(more.columns, lines);
+        self.alpha.append(more.alpha, lines);
         self.smoothing.append(more.smoothing, lines);
         self.zero.append(more.zero, lines);
     }
@@ -237,6 +241,13 @@ impl Oddities {
         warn("obj-vertex-weight", &self.weight, weight.into(), "");
         let columns = "numbers after the coordinates are neither a weight nor a colour and are ignored";
         warn("obj-vertex-columns", &self.columns, columns.into(), "");
+        let alpha = "the opacity of a vertex is left out: its colour is opaque";
+        warn(
+            "obj-vertex-alpha",
+            &self.alpha,
+            alpha.into(),
+            "write the mesh as PLY or glTF, where vertices have opacities",
+        );
         let absent = format!("a corner names {}, but the file has none; it is drawn without", self.absent.word);
         warn("obj-absent-attribute", &self.absent, absent, "");
         let zero = format!("a corner names {} 0, but numbers start at 1; it is drawn without", self.zero.word);

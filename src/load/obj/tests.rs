@@ -224,6 +224,24 @@ fn vertex_colors_are_decoded_and_missing_ones_are_white() {
 }
 
 #[test]
+fn what_zbrush_paints_vertices_with_is_their_colour_where_they_have_none() {
+    let vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+    let painted = |paint: &str| of(&format!("{vertices}{paint}\nf 1 2 3")).scene.meshes[0].colors.clone();
+    let [red, black] = [Vec4::new(1.0, 0.0, 0.0, 1.0), Vec4::new(0.0, 0.0, 0.0, 1.0)];
+    assert_eq!(painted("#MRGB ffff0000ffffffff\n# more\n#MRGB 00000000ff123456"), [red, Vec4::ONE, black]);
+    assert_eq!(painted("#MRGB ffff0000ff00"), [red, Vec4::ONE, Vec4::ONE], "cut off");
+    assert!(painted("#MRGB zz").is_empty() && painted("#MRGB").is_empty());
+    let own = of("v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0\n#MRGB ff00ff00\nf 1 2 3");
+    assert_eq!(own.scene.meshes[0].colors, [red, Vec4::ONE, Vec4::ONE]);
+}
+
+#[test]
+fn an_opacity_of_a_vertex_is_not_left_out_without_a_word() {
+    let loaded = of("v 0 0 0 1 0 0 1\nv 1 0 0 1 0 0 0.5\nv 0 1 0 1 0 0 0.25\nf 1 2 3");
+    assert_eq!(codes(&loaded), [("obj-vertex-alpha", 2)]);
+}
+
+#[test]
 fn faces_without_three_finite_different_corners_are_dropped_and_counted() {
     let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan 0 0\nv 0 -inf 0\nv 1e99 0 0\nv 1 0 0\n";
     let loaded = of(&format!("{text}f 1 2 3\nf 1 2 4\nf 1 2 5\nf 1 2 6\nf 1 2 2\nf 1 2 7\nf 1 2\nf 1 2 2 3\n"));

@@ -45,6 +45,14 @@ fn passed_over(header: &Header, file: &Path) -> Vec<Diagnostic> {
         let text = "texture coordinates of faces (texcoord) are not read".into();
         told.push(warning("ply-face-texcoords", text, "export it as OBJ or glTF"));
     }
+    let colored = |element: &&Element| element.properties.iter().any(|p| SLOTS[RED].contains(&p.name.as_str()));
+    if header.elements.iter().filter(|e| e.name == "edge" && e.count > 0).any(|e| colored(&e)) {
+        told.push(warning("ply-edge-colors", "colours of edges are not drawn".into(), "give the vertices colours"));
+    }
+    if header.elements.iter().any(|element| element.name == "vertex" && are_splats(element)) {
+        let text = "Gaussian splats are drawn as points of their colours, opaque and of one size".into();
+        told.push(warning("ply-splats", text, "--line-width sets the size"));
+    }
     let pictures = header.comments.iter().filter_map(|comment| comment.strip_prefix("TextureFile"));
     for name in pictures.map(str::trim).filter(|name| !name.is_empty()) {
         let text = format!("picture '{}' (comment TextureFile) is not drawn", shorten(name));
@@ -63,14 +71,34 @@ const SLOTS: [&[&str]; 12] = [
     &["nz", "normal_z"],
     &["u", "s", "texture_u", "texture_s"],
     &["v", "t", "texture_v", "texture_t"],
-    &["red", "r", "diffuse_red"],
-    &["green", "g", "diffuse_green"],
-    &["blue", "b", "diffuse_blue"],
+    &["red", "r", "diffuse_red", SPLAT[0]],
+    &["green", "g", "diffuse_green", SPLAT[1]],
+    &["blue", "b", "diffuse_blue", SPLAT[2]],
     &["alpha", "a", "opacity", "diffuse_alpha"],
 ];
 
 /// Where colours begin in [`SLOTS`].
 const RED: usize = 8;
+
+/// Colours of Gaussian splats, as the constant part of spherical harmonics (B. Kerbl and others, "3D Gaussian Splatting for
+/// Real-Time Radiance Field Rendering", 2023).
+const SPLAT: [&str; 3] = ["f_dc_0", "f_dc_1", "f_dc_2"];
+
+/// Whether vertices are Gaussian splats. Their normals are 0, and their opacities are of a haze.
+fn are_splats(vertex: &Element) -> bool {
+    SPLAT.iter().all(|name| vertex.properties.iter().any(|property| property.name == *name))
+}
+
+/// A part of a colour, 0…1, as a property says it.
+fn light(property: &Property, value: f64) -> f64 {
+    /// 1 / (2 √π), the spherical harmonic that is the same all around.
+    const EVEN: f64 = 0.282_094_791_773_878_14;
+    if SPLAT.contains(&property.name.as_str()) {
+        (0.5 + EVEN * value).clamp(0.0, 1.0)
+    } else {
+        value / unit(property.kind)
+    }
+}
 
 struct Reader<'a, 'b> {
     source: &'a Source,
@@ -104,9 +132,11 @@ impl Reader<'_, '_> {
             let text = format!("{} vertices are more than {}", element.count, Bare::LARGEST);
             return Err(self.body.fault(text, "split the file"));
         }
+        let (splats, hazy) = (are_splats(element), [3, 4, 5, 11]);
         let slot = |property: &Property| {
             let name = property.name.as_str();
-            if property.length.is_some() { None } else { SLOTS.iter().position(|names| names.contains(&name)) }
+            let found = SLOTS.iter().position(|names| names.contains(&name));
+            found.filter(|slot| property.length.is_none() && !(splats && hazy.contains(slot)))
         };
         let slots: Vec<Option<usize>> = element.properties.iter().map(slot).collect();
         let has = |wanted: &[usize]| wanted.iter().all(|slot| slots.contains(&Some(*slot)));
@@ -124,7 +154,7 @@ impl Reader<'_, '_> {
                 match slot {
                     Some(slot) => {
                         let value = self.value(element, i, property)?;
-                        values[*slot] = if *slot < RED { value } else { value / unit(property.kind) };
+                        values[*slot] = if *slot < RED { value } else { light(property, value) };
                     }
                     None => self.pass_property(element, i, property)?,
                 }

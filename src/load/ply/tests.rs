@@ -191,6 +191,29 @@ fn opacity_of_vertices_is_drawn_and_an_empty_channel_is_not() {
 }
 
 #[test]
+fn gaussian_splats_are_points_of_their_colours_and_colours_of_edges_are_not_left_out_without_a_word() {
+    let xyz = "property float x\nproperty float y\nproperty float z\n";
+    let splats = format!(
+        "ply\nformat ascii 1.0\nelement vertex 2\n{xyz}property float nx\nproperty float ny\nproperty float nz\n\
+         property float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\nproperty float opacity\nend_header\n\
+         0 0 0 0 0 0 9 -9 -9 -3\n1 0 0 0 0 0 0 0 0 2\n"
+    );
+    let loaded = plain(splats.as_bytes());
+    assert_eq!(loaded.warnings.iter().map(|w| w.code).collect::<Vec<_>>(), ["ply-splats"]);
+    let colors = &loaded.scene.meshes[0].colors;
+    let grey = crate::scene::color::from_srgb([0.5; 3]).extend(1.0);
+    assert!(
+        colors[0] == Vec4::new(1.0, 0.0, 0.0, 1.0) && colors.iter().any(|c| (*c - grey).length() < 1e-6),
+        "{colors:?}"
+    );
+    let edges = format!(
+        "ply\nformat ascii 1.0\nelement vertex 2\n{xyz}element edge 1\nproperty int vertex1\nproperty int vertex2\n\
+         property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n0 0 0\n1 0 0\n0 1 255 0 0\n"
+    );
+    assert_eq!(plain(edges.as_bytes()).warnings[0].code, "ply-edge-colors");
+}
+
+#[test]
 fn what_cannot_be_drawn_is_counted() {
     let file = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
         element edge 2\nproperty int vertex1\nproperty int vertex2\n\

@@ -97,8 +97,8 @@
 //! [[lights]]
 //! kind = "point"                # point, directional, spot, ambient
 //! color = "white"               # default white
-//! intensity = 1.0               # factor, default 1: a white matt surface that faces the light shows it; candela when
-//!                               # the light fades
+//! intensity = 1.0               # factor, default 1: a white matt surface that faces the light shows it (less where the
+//!                               # light is so wide that much of it comes from the side); candela when the light fades
 //! position = [0, 10, 0]
 //! falloff = "inverse-square"    # or "none", the default
 //! range = 20                    # inverse-square: where it ends; default nowhere

@@ -47,6 +47,12 @@ fn fault(bytes: &[u8]) -> String {
 }
 
 #[test]
+fn remarks_before_and_between_solids_are_passed_over() {
+    let loaded = plain(format!("# exported\n# by somebody\n{}# the end\n", text()).as_bytes());
+    assert_eq!((loaded.facts.faces, loaded.warnings.len()), (4, 0), "{:?}", loaded.warnings);
+}
+
+#[test]
 fn text_and_binary_give_the_same_scene() {
     let (ascii, bytes) = (plain(text().as_bytes()), plain(&binary("a tetrahedron")));
     assert_eq!((ascii.facts.format.as_str(), bytes.facts.format.as_str()), ("STL (ascii)", "STL (binary)"));

@@ -33,6 +33,8 @@ pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnost
         } else if is(word, "endsolid") {
             open = false;
             words.rest_of_line();
+        } else if word.starts_with(b"#") {
+            words.rest_of_line();
         } else {
             return Err(words.fault(word, "`solid`, `facet` or `endsolid`"));
         }

@@ -10,7 +10,13 @@ use std::path::{Path, PathBuf};
 /// Reads files by careless names.
 pub(super) struct Finder<'a> {
     pub resolver: &'a mut Resolver,
+    /// Names that were not found anywhere.
+    pub missed: usize,
 }
+
+/// After so many names that were not found anywhere others are looked for only where they say: each takes many looks into
+/// folders.
+const MISSES: usize = 256;
 
 /// Where a file is.
 #[derive(Debug)]
@@ -52,6 +58,15 @@ impl Finder<'_> {
     }
 
     fn elsewhere(&mut self, name: &str, folders: &[&Path]) -> Option<Place> {
+        if self.missed >= MISSES {
+            return None;
+        }
+        let place = self.guess(name, folders);
+        self.missed += usize::from(place.is_none());
+        place
+    }
+
+    fn guess(&mut self, name: &str, folders: &[&Path]) -> Option<Place> {
         let last = Path::new(name).file_name()?;
         let resolver = &mut *self.resolver;
         let in_any_case = folders.iter().find_map(|folder| resolver.in_any_case(&folder.join(name)));
@@ -74,6 +89,10 @@ impl Finder<'_> {
         let mut out = Vec::new();
         let mut start = 0;
         while start < words.len() {
+            if self.missed >= MISSES {
+                out.push(Err(FileFault::Missing(shown(Path::new(&words[start..].join(" "))))));
+                break;
+            }
             let name = |end: usize| words[start..end].join(" ");
             let longest = (start + 1..=words.len()).rev().take(WORDS);
             let found = longest.map(|end| (end, self.as_written(&name(end)))).find(|(_, file)| file.is_ok());
@@ -121,7 +140,8 @@ fn words(names: &str) -> Vec<String> {
     out
 }
 
-fn unquote(name: &str) -> &str {
+/// A name without the quotes around it.
+pub(super) fn unquote(name: &str) -> &str {
     name.strip_prefix('"').and_then(|n| n.strip_suffix('"')).unwrap_or(name)
 }
 
@@ -140,7 +160,7 @@ mod tests {
         }
         let source = Source { path: dir.path().join("m.obj"), bytes: Vec::new() };
         let mut resolver = Resolver::new(&source, &LoadOptions::default());
-        run(&mut Finder { resolver: &mut resolver })
+        run(&mut Finder { resolver: &mut resolver, missed: 0 })
     }
 
     fn libraries(files: &[&str], names: &str) -> Vec<String> {
@@ -149,6 +169,16 @@ mod tests {
             Err(fault) => fault.to_string(),
         };
         with_files(files, |finder| finder.libraries(names).into_iter().map(shown).collect())
+    }
+
+    #[test]
+    fn a_thousand_names_of_nothing_are_not_looked_for_one_by_one() {
+        with_files(&["a.mtl"], |finder| {
+            let names: Vec<String> = (0..1000).map(|i| format!("{i}.mtl")).collect();
+            let found = finder.libraries(&names.join(" "));
+            assert!(found.len() == MISSES + 1 && found.iter().all(Result::is_err), "{}", found.len());
+            assert!(finder.libraries("a.mtl")[0].is_ok() && finder.find("A.mtl", &[Path::new("")]).is_err());
+        });
     }
 
     #[test]

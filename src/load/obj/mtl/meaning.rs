@@ -177,6 +177,9 @@ impl Meaning<'_> {
         let asked = matches!(illum, 4 | 6 | 7 | 9);
         // White lets everything pass and black nothing, and opaque materials are written with either.
         let filters = self.mtl.tf.is_some_and(|tf| tf != [1.0; 3] && tf != [0.0; 3]);
+        // A filter says nothing of what says in words that it lets nothing pass.
+        let says_opaque = opacity >= 1.0 && (self.mtl.d.is_some() || self.mtl.tr.is_some());
+        let filters = filters && (asked || !says_opaque);
         let passes = opacity < 1.0 || filters;
         if self.guessing() {
             let refracts = matches!(illum, 6 | 7) && self.mtl.tf.is_some_and(|tf| tf != [0.0; 3]);
@@ -435,6 +438,11 @@ mod tests {
         for text in ["Kd 1 1 1\nTf 1 1 1\nillum 2", "Kd 1 1 1\nTf 0 0 0\nillum 2", "Kd 1 1 1\nd 1\nTr 0\nillum 4"] {
             assert_eq!(phong(&guess(text).0).transmission, Vec3::ZERO, "{text}");
         }
+        for text in ["Kd 1 1 1\nTf 0.588 0.588 0.588\nd 1\nillum 2", "Kd 1 1 1\nTf 0.5 0.5 0.5\nTr 0\nillum 2"] {
+            assert_eq!(phong(&guess(text).0).transmission, Vec3::ZERO, "{text}");
+            assert_eq!(phong(&literal(text)).transmission, Vec3::ZERO, "{text}");
+        }
+        assert_ne!(phong(&guess("Kd 1 1 1\nTf 0.5 0.5 0.5\nd 1\nillum 6").0).transmission, Vec3::ZERO);
         assert_eq!(guess("Kd 1 1 1\nKs 1\nNs 9\nillum 7").1, ["mtl-opaque-glass"]);
         assert_ne!(phong(&literal("Kd 1 1 1\nillum 7\nTf 0.5")).transmission, Vec3::ZERO);
     }

@@ -68,13 +68,14 @@ pub(super) fn load(libraries: &[(u32, String)], names: &[Option<&str>], reading:
 
     // Pictures of the materials in use, library by library.
     let used: Vec<(usize, usize)> = first_of_each(found.iter().flatten().copied());
-    let mut textures = Textures::default();
+    let (mut textures, mut missed) = (Textures::default(), 0);
     for (number, library) in read.iter().enumerate() {
         let materials = used.iter().filter(|u| u.0 == number).map(|u| &library.materials[u.1]);
         let of = Library { number, file: &library.file, folder: &library.folder };
-        let mut finder = Finder { resolver: reading.resolver };
+        let mut finder = Finder { resolver: reading.resolver, missed };
         let limits: (&Limits, &mut Budget) = (&reading.options.limits, reading.budget);
         textures.read(&of, materials, reading.options.mtl, &mut finder, limits, reading.warnings);
+        missed = finder.missed;
     }
 
     // The materials themselves.
@@ -104,14 +105,15 @@ pub(super) fn load(libraries: &[(u32, String)], names: &[Option<&str>], reading:
 
 fn read_libraries(libraries: &[(u32, String)], reading: &mut Reading) -> Vec<Read> {
     let mut out = Vec::new();
-    let mut seen = HashSet::new();
+    let (mut seen, mut missed) = (HashSet::new(), 0);
     for (line, names) in libraries {
-        let mut finder = Finder { resolver: reading.resolver };
+        let mut finder = Finder { resolver: reading.resolver, missed };
         let mut found = finder.libraries(names);
         let cut = String::from_utf8_lossy(without_comment(names.as_bytes())).into_owned();
         if cut != *names && !found.iter().all(Result::is_ok) {
             found = finder.libraries(&cut);
         }
+        missed = finder.missed;
         for file in found {
             match file {
                 Ok(file) if seen.insert(file.path.clone()) => out.push(read_library(file, *line, names, reading)),
@@ -133,7 +135,13 @@ fn read_library(found: Found, line: u32, names: &str, reading: &mut Reading) -> 
         reading.warnings.push(Diagnostic::new("mtl-file-elsewhere", reading.file, line.to_string(), text));
     }
     let file = folder_of(reading.file).join(&found.path);
-    let materials = parse::parse(&found.bytes, &file, reading.budget, reading.warnings);
+    let mut materials = parse::parse(&found.bytes, &file, reading.budget, reading.warnings);
+    if reading.options.mtl != MtlMode::Literal {
+        for line in materials.iter_mut().filter_map(Mtl::take_ambient_map) {
+            let text = "map_Ka is drawn as map_Kd, which there is none of";
+            reading.warnings.push(Diagnostic::new("mtl-ambient-map", &file, line.to_string(), text));
+        }
+    }
     let folder = found.path.parent().map(Path::to_path_buf).unwrap_or_default();
     Read { file, folder, materials }
 }

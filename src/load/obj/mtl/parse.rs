@@ -113,6 +113,16 @@ impl Mtl {
         self.maps.iter().rev().find(|(s, _)| *s == slot).map(|(_, map)| map)
     }
 
+    /// Makes the ambient map the diffuse one where there is no other; its line.
+    pub(super) fn take_ambient_map(&mut self) -> Option<u32> {
+        if self.map(Slot::Diffuse).is_some() {
+            return None;
+        }
+        let (slot, map) = self.maps.iter_mut().rfind(|(slot, _)| *slot == Slot::Ambient)?;
+        *slot = Slot::Diffuse;
+        Some(map.line)
+    }
+
     /// Whether its specular colour, which reflections are multiplied by, is not black.
     fn is_shiny(&self) -> bool {
         self.ks.is_some_and(|ks| ks.iter().any(|&c| c > 0.0)) || self.map(Slot::Specular).is_some()

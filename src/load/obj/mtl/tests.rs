@@ -230,6 +230,24 @@ fn pictures_that_are_made_take_from_the_memory_that_may_be_taken() {
 }
 
 #[test]
+fn an_ambient_map_is_the_diffuse_one_where_there_is_no_other() {
+    let (loaded, m) = guess("newmtl a\nmap_Ka a.png\n", &[("a.png", [1, 2, 3, 255])]);
+    assert_eq!(texel(&loaded, m.base_color_map.as_ref()), [1, 2, 3, 255]);
+    assert_eq!(codes(&loaded), ["mtl-ambient-map"]);
+    let both = "newmtl a\nKd 1 1 1\nmap_Ka a.png\nmap_Kd b.png\n";
+    let (loaded, m) = guess(both, &[("a.png", [1, 2, 3, 255]), ("b.png", [4, 5, 6, 255])]);
+    assert_eq!(texel(&loaded, m.base_color_map.as_ref()), [4, 5, 6, 255]);
+    assert!(loaded.warnings.is_empty());
+}
+
+#[test]
+fn a_name_may_have_quotes_and_a_remark_behind_it() {
+    let text = "newmtl a\nKd 1 1 1\nmap_Kd \"tex a.png\" # bricks\n";
+    let (loaded, m) = guess(text, &[("tex a.png", [1, 2, 3, 255])]);
+    assert_eq!(texel(&loaded, m.base_color_map.as_ref()), [1, 2, 3, 255], "{:?}", loaded.warnings);
+}
+
+#[test]
 fn maps_may_be_tga_and_bmp_pictures() {
     for name in ["wood.tga", "wood.bmp", "Wood.TGA"] {
         let (loaded, m) = guess(&format!("newmtl a\nKd 1 1 1\nmap_Kd {name}\n"), &[(name, [1, 2, 3, 255])]);

@@ -1,6 +1,6 @@
 //! Maps of materials -> textures of the scene.
 
-use super::library::{Finder, Place};
+use super::library::{Finder, Place, unquote};
 use super::options::{Channel, Map};
 use super::parse::{Mtl, Slot};
 use super::pictures::{Alpha, Pictures, Take};
@@ -124,7 +124,7 @@ impl Textures {
         };
         let folders = [library.folder, Path::new("")];
         let found = finder.find(&map.file, &folders).or_else(|fault| {
-            let other = without_remark(&map.file).and_then(|name| finder.find(name, &folders).ok());
+            let other = without_remark(&map.file).and_then(|name| finder.find(unquote(name), &folders).ok());
             other.ok_or_else(|| lost(fault))
         })?;
         if self.files.contains_key(&found.canonical) {
