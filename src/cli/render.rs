@@ -270,5 +270,13 @@ fn nothing_to_draw(loaded: &Loaded, file: &Path) -> Diagnostic {
         0 => "nothing to draw: it holds no faces, lines or points".to_owned(),
         n => format!("nothing to draw: all of its {n} faces, lines and points had to be dropped"),
     };
-    Diagnostic::new("nothing-to-draw", file, "", held).remedy("--allow-empty draws the background")
+    let draw_nothing = "--allow-empty draws the background";
+    let remedy = match loaded.facts.scenes.len() {
+        0 | 1 => draw_nothing.to_owned(),
+        scenes => format!(
+            "it has {scenes} scenes, of which this is number {}: choose another with --scene; {draw_nothing}",
+            loaded.facts.scene_index
+        ),
+    };
+    Diagnostic::new("nothing-to-draw", file, "", held).remedy(remedy)
 }
