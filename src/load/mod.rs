@@ -14,10 +14,6 @@ pub mod panorama;
 pub mod paths;
 mod place;
 pub mod ply;
-#[cfg_attr(
-    not(any(feature = "draco", feature = "basisu")),
-    expect(dead_code, reason = "only decoders of others panic")
-)]
 pub mod scene_file;
 mod smooth;
 pub mod stl;

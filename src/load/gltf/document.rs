@@ -65,6 +65,7 @@ pub(super) fn typed(mut value: Value, report: &mut Report) -> Option<Document> {
     let views = map.get("bufferViews").and_then(Value::as_array).map_or(0, Vec::len);
     let images = map.get_mut("images").and_then(Value::as_array_mut).into_iter().flatten();
     images.filter(|image| !is_image(image, views)).for_each(|image| *image = Value::Object(Map::new()));
+    each(map, "cameras", planes);
     let cameras = map.get_mut("cameras").and_then(Value::as_array_mut).into_iter().flatten();
     let is_camera = |camera: &Value| Camera::deserialize(camera).is_ok();
     cameras.filter(|camera| !is_camera(camera)).for_each(|camera| *camera = json!({"type": "perspective"}));
@@ -82,6 +83,19 @@ fn is_image(value: &Value, views: usize) -> bool {
     let text = |name| value.get(name).is_none_or(Value::is_string);
     let view = |v: &Value| schema::whole(v).is_some_and(|index| index < views as u64);
     value.is_object() && text("uri") && text("mimeType") && text("name") && value.get("bufferView").is_none_or(view)
+}
+
+/// Gives a camera the planes that it must have and that rays do not need, which is told elsewhere.
+fn planes(camera: &mut Map<String, Value>) {
+    let mut need = |lens: &str, planes: &[(&str, f32)]| {
+        if let Some(lens) = camera.get_mut(lens).and_then(Value::as_object_mut) {
+            for (plane, at) in planes {
+                lens.entry(*plane).or_insert_with(|| json!(at));
+            }
+        }
+    };
+    need("perspective", &[("znear", f32::MIN_POSITIVE)]);
+    need("orthographic", &[("znear", 0.0), ("zfar", f32::MAX)]);
 }
 
 /// Does something to each object in a list.

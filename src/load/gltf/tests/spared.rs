@@ -40,6 +40,19 @@ fn seen_by(camera: Value) -> Loaded {
 }
 
 #[test]
+fn a_camera_without_the_planes_that_rays_do_not_need_is_kept() {
+    for camera in [
+        json!({"type": "perspective", "perspective": {"yfov": 0.8}}),
+        json!({"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1}}),
+    ] {
+        let loaded = seen_by(camera);
+        assert_eq!(loaded.scene.cameras.len(), 1);
+        let told = || loaded.warnings.iter().filter(|w| w.place.starts_with("cameras"));
+        assert!(told().count() > 0 && told().all(|w| w.text.ends_with("is missing")), "{:?}", loaded.warnings);
+    }
+}
+
+#[test]
 fn a_camera_that_cannot_be_read_is_left_out_of_a_model_that_can_be_drawn() {
     let told = |camera: Value| {
         let loaded = seen_by(camera);
