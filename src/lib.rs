@@ -112,7 +112,8 @@
 //! | `cli` | words -> jobs -> messages and exit codes (feature `cli`) |
 //!
 //! `scene` and `accel` use `math`; `load` uses `scene`; `render` uses `scene`, `accel` and `image`; `bench` uses
-//! `render`, `accel`, `scene`, `image` and `generate`; `cli` uses all. `accel` sees shapes only: another renderer could use it as it is.
+//! `render`, `accel`, `scene`, `image` and `generate`; `cli` uses all. `accel` sees shapes only:
+//! another renderer could use it as it is.
 //!
 //! # What a caller can rely on
 //! - The same scene and settings give the same pixels for every structure and number of threads.

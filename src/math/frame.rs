@@ -53,7 +53,12 @@ pub fn half_of(points: impl Iterator<Item = DVec3>) -> Option<(DVec3, DVec3)> {
 
 /// Numbers of some of so many points, spread evenly.
 pub fn spread(count: usize) -> impl Iterator<Item = usize> {
-    (0..count).step_by(count.div_ceil(SAMPLE).max(1))
+    (0..count).step_by(stride(count))
+}
+
+/// Of so many points every how many-th is looked at to tell where most of them lie.
+pub fn stride(count: usize) -> usize {
+    count.div_ceil(SAMPLE).max(1)
 }
 
 #[cfg(test)]

@@ -12,8 +12,9 @@
 //! A model has `file`, `hash` (xxh3-128 of what was read), `prims` (N), `objects` (that `spheres` and `boxes` bound), `auto`
 //! (null, or what it would choose: `kind`, `why`, and `won_time` and `won_nodes`: how much more the other fast
 //! structure costs in time and nodes, as a share of the chosen one's cost), `picture` (`width`, `height`, `samples`, `depth`,
-//! `view`, `camera`: world-space `eye`, unit `forward` and `up`, `half_height` of what is seen, at a distance of 1 or, where rays
-//! are `parallel`, anywhere), `rays` (by class: `asked`, `kept`), `identical` (whether all hits were), `reference`, and `structures`. A
+//! `view`, `camera`: world-space `eye`, unit `forward` and `up`, `half_height` of what is seen, at a distance of 1 or, where
+//! rays are `parallel`, anywhere), `rays` (by class: `asked`, `kept`), `identical` (whether all hits were), `reference`, and
+//! `structures`. A
 //! structure has `accel`, `sampled`, `differing` (rays), `t_b` and `t_tr` (seconds, of a ray; each `median`, `min`, `max`,
 //! `passes`, or null without times), V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`, `bytes`, `break_even` (rays, or null),
 //! and `classes`. A class has exact sums (`rays`, `hits`, `tests`, `steps`, `cells`, `empty_cells`, `volume_tests`,

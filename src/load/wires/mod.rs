@@ -2,8 +2,8 @@
 //!
 //! Formats give points and lines no width; programs that draw them in pixels choose one. Here they have a width in the
 //! world, so that they stand in perspective, hide and are hidden, and are hit like every other triangle: 1/256 of the
-//! diagonal of the box around everything in the file, or less where there are so many that they would run together
-//! (`Widths`). A point becomes an octahedron, or a tetrahedron where it is one of a crowd; a line a prism of three sides,
+//! diagonal of the box around everything in the file (but for a few points far away), or less where there are so many that
+//! they would run together (`Widths`). A point becomes an octahedron, or a tetrahedron where it is one of a crowd; a line a prism of three sides,
 //! half a width longer at each end, so that joints are closed.
 //!
 //! Where vertices have no normals nothing says how light meets a line: such ones are drawn without light, in their base
@@ -19,7 +19,7 @@ mod tests;
 
 use super::limits::{Budget, OverBudget};
 use super::{Diagnostic, Facts};
-use crate::math::frame::{half_of, spread};
+use crate::math::frame::{half_of, stride};
 use crate::math::{DAffine3, DMat3, DVec3};
 use crate::scene::{Instance, Material, Mesh, Scene, Surface};
 use bake::Baked;
@@ -103,8 +103,8 @@ impl Widths {
 /// Puts points and lines into the scene as solids; `places` are instances whose `mesh` counts `wires`.
 ///
 /// Meshes are in place before: the width goes by the box around all of it. Points and lines with an end that is not finite,
-/// or so far away that rounding leaves nothing of their width, are left out and counted in `facts`; a warning is returned of them, and one of glass. `width` is what the user asked
-/// for.
+/// or so far away that rounding leaves nothing of their width, are left out and counted in `facts`; a warning is returned
+/// of them, and one of glass. `width` is what the user asked for.
 ///
 /// # Errors
 /// When the solids would take more than is left of `budget`.
@@ -264,9 +264,9 @@ fn diagonal(wires: &[Wires], places: &[Instance], scene: &Scene) -> f64 {
         }
     }
     let whole = if lo.cmple(hi).all() { (hi - lo).length() } else { 0.0 };
-    let points = of_wires().chain(of_meshes()).flat_map(|(place, mesh)| {
-        spread(mesh.positions.len()).map(|i| place.world_from_object.transform_point3(mesh.positions[i].as_dvec3()))
-    });
-    let half = half_of(points).map_or(whole, |(low, high)| (high - low).length());
+    let count: usize = of_wires().chain(of_meshes()).map(|(_, mesh)| mesh.positions.len()).sum();
+    let points = of_wires().chain(of_meshes()).flat_map(|(place, mesh)| mesh.positions.iter().map(move |p| (place, p)));
+    let some = points.step_by(stride(count)).map(|(place, p)| place.world_from_object.transform_point3(p.as_dvec3()));
+    let half = half_of(some).map_or(whole, |(low, high)| (high - low).length());
     if half > 0.0 && whole > STRAY * half { 2.0 * half } else { whole }
 }
