@@ -3,8 +3,8 @@
 //! Two ways of cutting the scene share one memory layout (`node`), one proof (`check`) and three ways of tracing a wave:
 //!
 //! - `fast-octree` ([`Splitting::Octree`]): the uniform grid refined by octrees, kept as boxes. The scene's cube is cut at
-//!   dyadic planes, those of grid and octree cells; every part keeps the tight box of its prims instead of the cell, so
-//!   that empty space is never visited.
+//!   dyadic planes, those of grid and octree cells, and small cells by surface area; every part keeps the tight box of its
+//!   prims instead of the cell, so that empty space is never visited.
 //! - `fast-bvh` ([`Splitting::SurfaceArea`]): a hierarchy of boxes by the surface area heuristic in bins.
 //!
 //! In both, the binary cuts are improved and fused into nodes of eight (`build`). Each prim is listed once, so there is no

@@ -220,7 +220,7 @@ fn rays_along_axes_within_the_planes_of_boxes_hit_what_brute_force_hits() {
 /// Triangles ever smaller and nearer to the origin.
 fn progression(n: u32, ratio: f32) -> Shapes {
     let corners = |i: u32| {
-        let size = ratio.powi(i as i32);
+        let size = (1u64 << 60) as f32 * ratio.powi(i as i32);
         let lift = Vec3::new(1.0, 0.7, 0.4) + Vec3::new(0.0, 0.1, 0.2) * (i % 3) as f32;
         [Vec3::X, Vec3::Y, Vec3::Z].map(|p| (lift + p * 0.3) * size)
     };
@@ -229,11 +229,11 @@ fn progression(n: u32, ratio: f32) -> Shapes {
 
 #[test]
 fn trees_too_deep_for_rays_in_flight_are_answered() {
-    let shapes = progression(1200, 0.93);
+    let shapes = progression(1770, 0.93);
     let mut rays = scenes::rays(&shapes, 12);
     rays.extend((0..40).map(|i| {
-        let target = shapes.vertices[90 * i];
-        ray(Vec3::splat(2.0), target - Vec3::splat(2.0))
+        let (start, target) = (Vec3::splat(2.0 * (1u64 << 60) as f32), shapes.vertices[90 * i]);
+        ray(start, target - start)
     }));
     for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
         let most = Wide::build(&shapes, splitting).tree().most_behind();

@@ -4,17 +4,21 @@ use super::cell::{Cell, Count, Lattice};
 use crate::accel::wide::split::{Bounds, Cut, Item, Splitting, cut_by_area};
 use crate::math::Vec3;
 use crate::math::aabb::Aabb;
+use std::ops::RangeInclusive;
 
 /// Items that are worth a thread's while.
 const PARALLEL: usize = 1024;
 
-/// Cells of fewer items are not cut at their planes but by area: that fills leaves better.
-const SMALL_CELL: usize = 64;
+/// Cells of few items are not cut at their planes but by area, which fills leaves better: of no more than this part of all
+/// items and no more than so many, but always of so few.
+const SMALL_CELL: RangeInclusive<usize> = 64..=8192;
+const SMALL_PART: usize = 4;
 
 /// A leaf whose box has more than this part of the root's area is met by many rays. It is cut all the same if its parts
-/// have less than that part of its own.
+/// have less than that part of its own, or of its volume: rays that start beside a floor start in a box that is not as flat.
 const LARGE_LEAF: f32 = 1.0 / 2048.0;
 const WORTH_CUTTING: f32 = 0.7;
+const FLAT: f32 = 0.1;
 
 /// A node of the binary tree. They stand in an array, each followed by all that is below it, first side first.
 #[derive(Clone, Copy, Debug)]
@@ -69,12 +73,13 @@ pub(super) struct Work<'w> {
 /// How a tree is grown.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grower {
-    pub splitting: Splitting,
-    pub lattice: Lattice,
+    lattice: Lattice,
+    /// Cells of no more items are cut by area.
+    small_cell: usize,
     /// Prims of a leaf at most.
-    pub leaf: u32,
+    leaf: u32,
     /// Area of the root's box.
-    pub area: f32,
+    area: f32,
 }
 
 impl<'w> Work<'w> {
@@ -96,6 +101,15 @@ impl<'w> Work<'w> {
 }
 
 impl Grower {
+    /// Of a tree over so many items within these bounds, whose leaves have up to `leaf` prims, a power of two.
+    pub(super) fn new(splitting: Splitting, items: usize, bounds: &Bounds, leaf: u32) -> Self {
+        let small_cell = match splitting {
+            Splitting::Octree => (items / SMALL_PART).clamp(*SMALL_CELL.start(), *SMALL_CELL.end()),
+            Splitting::SurfaceArea => usize::MAX,
+        };
+        Self { lattice: Lattice::over(&bounds.aabb()), small_cell, leaf, area: bounds.area() }
+    }
+
     /// Adds the tree over some items, at least one, to `knots`; the same for every number of threads. `middles` is the box
     /// around their doubled middles, where known.
     pub(super) fn grow(&self, work: Work, bounds: Bounds, middles: Option<Bounds>, knots: &mut Vec<Knot>) {
@@ -110,8 +124,7 @@ impl Grower {
             work.prims.sort_unstable();
             return knots.push(Knot::leaf(bounds.aabb(), work.first, index(count)));
         }
-        if self.splitting == Splitting::Octree
-            && work.items.len() > SMALL_CELL
+        if work.items.len() > self.small_cell
             && let Some(cell) = self.lattice.cell(work.items, self.leaf)
         {
             cell.sort(&self.lattice, work.items, work.spare);
@@ -128,7 +141,9 @@ impl Grower {
             return None;
         }
         let cut = cut_by_area(items, 1, None);
-        Some(cut).filter(|cut| cut.bounds[0].area() + cut.bounds[1].area() < area * WORTH_CUTTING)
+        let [a, b] = &cut.bounds;
+        let worth = a.area() + b.area() < area * WORTH_CUTTING || a.volume() + b.volume() < bounds.volume() * FLAT;
+        Some(cut).filter(|_| worth)
     }
 
     /// Adds the knot of a cut, and all below.
@@ -218,10 +233,13 @@ pub(super) mod tests {
 
     fn grown(splitting: Splitting, at: &[Vec3]) -> (Vec<Knot>, Vec<u32>) {
         let item = |(prim, &p): (u32, &Vec3)| Item::new(Aabb { lo: p, hi: p + 0.25 }, prim);
-        let mut items: Vec<Item> = (0..).zip(at).map(item).collect();
+        grown_over(splitting, (0..).zip(at).map(item).collect())
+    }
+
+    fn grown_over(splitting: Splitting, mut items: Vec<Item>) -> (Vec<Knot>, Vec<u32>) {
         let (mut spare, mut prims, mut knots) = (items.clone(), vec![0; items.len()], Vec::new());
         let bounds = crate::accel::wide::split::around(&items);
-        let grower = Grower { splitting, lattice: Lattice::over(&bounds.aabb()), leaf: 8, area: bounds.area() };
+        let grower = Grower::new(splitting, items.len(), &bounds, 8);
         let work = Work { items: &mut items, spare: &mut spare, prims: &mut prims, first: 0 };
         grower.grow(work, bounds, None, &mut knots);
         (knots, prims)
@@ -247,5 +265,9 @@ pub(super) mod tests {
         let places = [0.0, 0.5, 1.0, 90.0, 90.5].map(Vec3::splat);
         assert_eq!(leaves(&grown(Splitting::SurfaceArea, &places).0), [0, 3]);
         assert_eq!(leaves(&grown(Splitting::SurfaceArea, &[Vec3::ZERO; 5]).0), [0]);
+        // A floor and a pin that stands on it: hardly less area, but nearly all of the volume is cut off.
+        let boxes = [Vec3::new(9.0, 0.0, 9.0), Vec3::new(0.1, 4.0, 0.1)].map(|hi| Aabb { lo: Vec3::ZERO, hi });
+        let items: Vec<Item> = (0..).zip(boxes).map(|(prim, bounds)| Item::new(bounds, prim)).collect();
+        assert_eq!(leaves(&grown_over(Splitting::SurfaceArea, items).0), [0, 1]);
     }
 }

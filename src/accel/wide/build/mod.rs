@@ -16,7 +16,6 @@ mod slots;
 
 use rayon::prelude::*;
 
-use self::cell::Lattice;
 use self::grow::{Grower, Knot, Work};
 use super::node::{Arrays, Block, Child, index};
 use super::split::item::around_middles;
@@ -43,7 +42,7 @@ pub(super) fn build(shapes: &Shapes, splitting: Splitting) -> Arrays {
     let triangles = shapes.triangles.len();
     let (grown, prims) = binary_tree(shapes, splitting);
     let deep = 2 * depth(&grown) + ROOM;
-    let (mut knots, moved) = reinsert::improve(grown, splitting);
+    let (mut knots, moved) = reinsert::improve(grown);
     if moved && depth(&knots) > deep {
         // Where boxes hardly have an area rounding makes places better, and knots may be hung one below the other.
         knots = binary_tree(shapes, splitting).0;
@@ -117,7 +116,7 @@ fn binary_tree(shapes: &Shapes, splitting: Splitting) -> (Vec<Knot>, Vec<u32>) {
             // One knot over both.
             knots.insert(0, Knot::fork(both.aabb(), index(knots.len() + 1)));
         }
-        let grower = Grower { splitting, lattice: Lattice::over(&bounds.aabb()), leaf, area: bounds.area() };
+        let grower = Grower::new(splitting, items.len(), &bounds, leaf);
         grower.grow(Work { items, spare: &mut spare, prims, first }, bounds, Some(middles), &mut knots);
     }
     (knots, prims)
@@ -228,7 +227,7 @@ mod tests {
         for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
             let (knots, _) = binary_tree(&shapes, splitting);
             let deep = 2 * depth(&knots) + ROOM;
-            let improved = depth(&reinsert::improve(knots, splitting).0);
+            let improved = depth(&reinsert::improve(knots).0);
             assert!(improved <= deep, "{splitting:?}: {improved}, places as good as another were taken for better");
             let arrays = build(&shapes, splitting);
             let tree = arrays.tree();

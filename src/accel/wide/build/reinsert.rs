@@ -7,7 +7,7 @@
 //! put where they do the least harm. One after the other, so that the result does not depend on threads.
 
 use super::grow::{Knot, index};
-use crate::accel::wide::split::{Bounds, Splitting};
+use crate::accel::wide::split::Bounds;
 use crate::math::aabb::Aabb;
 
 /// Knots that are tried before it is asked whether that paid.
@@ -42,9 +42,9 @@ struct Links {
 /// The root, which is never moved.
 const ROOT: u32 = 0;
 
-/// Improves a tree that was cut so; whether anything was moved.
-pub(super) fn improve(knots: Vec<Knot>, splitting: Splitting) -> (Vec<Knot>, bool) {
-    let order = promising(&knots, splitting);
+/// Improves a tree; whether anything was moved.
+pub(super) fn improve(knots: Vec<Knot>) -> (Vec<Knot>, bool) {
+    let order = promising(&knots);
     let mut links = Links::new(knots);
     let mut any = false;
     for batch in order.chunks(BATCH) {
@@ -59,18 +59,13 @@ pub(super) fn improve(knots: Vec<Knot>, splitting: Splitting) -> (Vec<Knot>, boo
 
 /// The knots that may be tried, by falling promise.
 ///
-/// Planes of cells leave small knots alone with large ones, in boxes much larger than they are, and what is saved by taking
-/// a knot out is that box. Cuts by area leave few such; there the largest knots come first.
-fn promising(knots: &[Knot], splitting: Splitting) -> Vec<(f32, u32)> {
+/// Cuts leave small knots alone with large ones, in boxes much larger than they are, and what is saved by taking a knot out
+/// is that box.
+fn promising(knots: &[Knot]) -> Vec<(f32, u32)> {
     let mut all = Vec::with_capacity(knots.len());
     for (i, above) in (0..).zip(knots).filter(|(_, knot)| !knot.is_leaf()) {
         for side in [i + 1, i + above.at] {
-            let own = knots[side as usize].area();
-            let promise = match splitting {
-                Splitting::Octree => above.area() - own * RETURNS,
-                Splitting::SurfaceArea => own,
-            };
-            all.push((promise, side));
+            all.push((above.area() - knots[side as usize].area() * RETURNS, side));
         }
     }
     let most = (all.len() / SHARE).min(MOST) + BATCH.min(all.len() / 4 + FEW);
@@ -224,34 +219,29 @@ mod tests {
         let large = leaf(6, 0.0, 5.5);
         let left = fork(fork(fork(small(0), large), small(1)), small(2));
         let knots = fork(left, fork(fork(small(3), small(4)), small(5)));
-        for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
-            let (improved, moved) = improve(knots.clone(), splitting);
-            assert!(moved);
-            assert!(cost(&improved) < 0.7 * cost(&knots), "{} {}", cost(&improved), cost(&knots));
-            // Checks the boxes and the links as well.
-            let (mut before, mut after) = (leaves(&knots), leaves(&improved));
-            before.sort_unstable();
-            after.sort_unstable();
-            assert_eq!(before, after);
-        }
+        let (improved, moved) = improve(knots.clone());
+        assert!(moved);
+        assert!(cost(&improved) < 0.7 * cost(&knots), "{} {}", cost(&improved), cost(&knots));
+        // Checks the boxes and the links as well.
+        let (mut before, mut after) = (leaves(&knots), leaves(&improved));
+        before.sort_unstable();
+        after.sort_unstable();
+        assert_eq!(before, after);
     }
 
     #[test]
-    fn what_is_small_beside_what_is_large_comes_first_in_trees_cut_at_planes_and_what_is_large_elsewhere() {
+    fn what_is_small_beside_what_is_large_comes_first() {
         let (small, large) = (leaf(0, 0.0, 0.5), leaf(1, 0.0, 5.5));
         let knots = fork(fork(small, large), fork(leaf(2, 6.0, 8.0), leaf(3, 8.0, 10.0)));
-        let first_leaf = |splitting| {
-            let tried = promising(&knots, splitting).into_iter().map(|(_, knot)| knots[knot as usize]);
-            tried.filter(Knot::is_leaf).map(|leaf| leaf.at).next()
-        };
-        assert_eq!([Splitting::Octree, Splitting::SurfaceArea].map(first_leaf), [Some(0), Some(1)]);
+        let tried = promising(&knots).into_iter().map(|(_, knot)| knots[knot as usize]);
+        assert_eq!(tried.filter(Knot::is_leaf).map(|leaf| leaf.at).next(), Some(0));
     }
 
     #[test]
     fn a_tree_that_cannot_be_improved_stays_as_it_is() {
         let small = |i: u32| leaf(i, i as f32, i as f32 + 0.5);
         let knots = fork(fork(small(0), small(1)), fork(small(2), small(3)));
-        assert_eq!(leaves(&improve(knots, Splitting::Octree).0), [0, 1, 2, 3]);
-        assert_eq!(leaves(&improve(small(7), Splitting::Octree).0), [7]);
+        assert_eq!(leaves(&improve(knots).0), [0, 1, 2, 3]);
+        assert_eq!(leaves(&improve(small(7)).0), [7]);
     }
 }

@@ -11,8 +11,8 @@ const BINS: usize = 16;
 const FEW: usize = 16;
 
 /// Of more items than these only one in so many is put into bins: that finds a cut as good, and memory is read less often.
-const MANY: usize = 1 << 13;
-const STRIDE: usize = 7;
+const MANY: usize = 1 << 11;
+const STRIDE: usize = 4;
 
 /// Adding it to a small number leaves its nearest integer in the lowest bits.
 const TO_INTEGER: f32 = (1 << 23) as f32;

@@ -39,6 +39,13 @@ impl Bounds {
         d.x * d.y + d.z * (d.x + d.y)
     }
 
+    /// Of what is in it.
+    #[inline(always)]
+    pub(in crate::accel) fn volume(&self) -> f32 {
+        let d = self.hi - self.lo;
+        d.x * d.y * d.z
+    }
+
     /// The same box in memory.
     #[inline]
     pub(in crate::accel) fn aabb(&self) -> Aabb {

@@ -9,7 +9,7 @@ pub(in crate::accel) use item::{Bounds, Item, around};
 /// Who decides where to cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Splitting {
-    /// Planes of the cells of a uniform grid refined by octrees.
+    /// Planes of the cells of a uniform grid refined by octrees; in small cells as below.
     Octree,
     /// Least expected cost by surface area (J. MacDonald, K. Booth, *Heuristics for Ray Tracing Using Space Subdivision*,
     /// 1990), in bins (I. Wald, *On Fast Construction of SAH-based Bounding Volume Hierarchies*, 2007).
