@@ -17,7 +17,7 @@ const SMALL_PART: usize = 4;
 /// A leaf whose box has more than this part of the root's area is met by many rays. It is cut all the same if its parts
 /// have less than that part of its own, or of its volume: rays that start beside a floor start in a box that is not as flat.
 const LARGE_LEAF: f32 = 1.0 / 2048.0;
-const WORTH_CUTTING: f32 = 0.7;
+const WORTH_CUTTING: f32 = 0.8;
 const FLAT: f32 = 0.1;
 
 /// A node of the binary tree. They stand in an array, each followed by all that is below it, first side first.
