@@ -5,7 +5,7 @@
 //! timed, so that the choice depends on neither the machine nor the number of threads; and large scenes are judged by a
 //! part of their prims, so that it costs little.
 //!
-//! Both are built equally fast, and mostly cost nearly the same; where fine detail stands in a wide scene the octree costs
+//! Both are built equally fast, and mostly cost nearly the same; where fine detail stands in a wide scene the octree may cost
 //! much less. So the hierarchy must save more than a sample may show by chance: a thirty-second part of the octree's cost in
 //! large scenes; in small ones, which smaller samples judge, more, an eleventh in the smallest.
 
