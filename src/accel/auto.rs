@@ -2,12 +2,13 @@
 //!
 //! After M. Hapala, O. Karlík, V. Havran, *When It Makes Sense to Use Uniform Grids for Ray Tracing*, 2011: both
 //! structures are built, some rays are traced through each, and what they cost decides. Here the cost is counted, never
-//! timed, so that the choice depends on neither the machine nor the number of threads; and large scenes are judged by a
-//! part of their prims, so that it costs little.
+//! timed, so that the choice depends on neither the machine nor the number of threads; and a scene is judged by a part of
+//! its prims, so that it costs little.
 //!
 //! Both are built equally fast, and mostly cost nearly the same; where fine detail stands in a wide scene the octree may cost
 //! much less. So the hierarchy must save more than a sample may show by chance: a thirty-second part of the octree's cost in
-//! large scenes; in small ones, which smaller samples judge, more, an eleventh in the smallest.
+//! the largest samples, an eleventh in the smallest. Few shapes are cut alike by both, and scenes that are not large take no
+//! sample: one in proportion would tell nothing, and a larger one takes longer than what it may save.
 
 use std::fmt;
 use std::str::FromStr;
@@ -15,19 +16,23 @@ use std::str::FromStr;
 use super::any::UnknownAccel;
 use super::instances::Object;
 use super::shapes::Prim;
-use super::{Accel, AccelKind, AccelParams, AnyAccel, BitSet, Hit, Kept, NO_PRIM, Ray, RayCounts, Shapes};
+use super::wide::ALIKE;
+use super::{
+    Accel, AccelKind, AccelParams, AnyAccel, BitSet, Hit, Kept, NO_PRIM, Ray, RayCounts, Shapes, Splitting, Wide,
+};
 use crate::math::Vec3;
 use crate::math::aabb::Aabb;
 use crate::math::random::Random;
 use crate::math::triangle;
 
-/// Of so many prims one is judged, but no fewer and no more than these: finding out must cost less than it can save.
+/// Of so many prims one is judged, and no more than these: finding out must cost less than it can save. Where that were
+/// fewer than so many, the octree is taken.
 const SHARE: u32 = 32;
 const FEWEST: u32 = 1 << 9;
 const MOST: u32 = 1 << 12;
 
-/// Runs of neighbours that these are taken in.
-const RUNS: u32 = 64;
+/// They are taken in runs of so many neighbours: longer ones leave out more of the scene.
+const RUN: u32 = 4;
 
 /// One ray of each of the two kinds for so many prims that are judged.
 const PRIMS_A_RAY: usize = 16;
@@ -89,14 +94,14 @@ impl FromStr for AccelChoice {
     }
 }
 
-/// Why a structure was chosen.
+/// Why a structure was chosen. Without a sample all numbers but that of prims are 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reason {
     /// What was chosen.
     pub kind: AccelKind,
     /// Rays of the sample.
     pub rays: u64,
-    /// Triangles and other prims that the sample was traced through.
+    /// Triangles and other prims that the sample was traced through; without one, all.
     pub prims: usize,
     /// Cost of a ray through `fast-octree`, in nodes.
     pub octree: f64,
@@ -106,9 +111,26 @@ pub struct Reason {
     pub worth: f64,
 }
 
+impl Reason {
+    /// Whether both structures are the same tree.
+    pub fn is_one_tree(&self) -> bool {
+        self.rays == 0 && self.prims <= ALIKE
+    }
+}
+
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { kind, rays, prims, octree, bvh, worth } = *self;
+        if self.is_one_tree() {
+            return write!(f, "{kind}: {prims} shapes, and up to {ALIKE} are cut alike by fast-octree and fast-bvh");
+        }
+        if rays == 0 {
+            let fewest = SHARE * FEWEST;
+            return write!(
+                f,
+                "{kind}: {prims} shapes, and with fewer than {fewest} a sample would take longer than it may save"
+            );
+        }
         write!(
             f,
             "{kind}: {rays} rays through {prims} shapes cost {octree:.1} nodes each with fast-octree, {bvh:.1} with \
@@ -123,8 +145,8 @@ pub fn build<'a>(choice: AccelChoice, shapes: &'a Shapes, params: &AccelParams) 
     if let AccelChoice::Kind(kind) = choice {
         return (AnyAccel::build(kind, shapes, params), None);
     }
-    let (accel, reason) = judge(shapes, params);
-    (accel.unwrap_or_else(|| AnyAccel::build(reason.kind, shapes, params)), Some(reason))
+    let reason = judge(shapes);
+    (AnyAccel::build(reason.kind, shapes, params), Some(reason))
 }
 
 /// The same over `shapes` and what is `kept`: the larger one of both, shapes or objects, is the one that is judged.
@@ -140,51 +162,40 @@ pub fn build_with<'a>(
     let (kind, reason) = match choice {
         AccelChoice::Kind(kind) => (kind, None),
         AccelChoice::Auto => {
-            let reason = reason(shapes, kept, params);
+            let reason = reason(shapes, kept);
             (reason.kind, Some(reason))
         }
     };
     (AnyAccel::build_with(kind, shapes, kept, params), reason)
 }
 
-/// What [`build_with`] would choose, and why, by the largest of what it builds trees over; nothing of it is built whole
-/// where it is large.
-pub fn reason(shapes: &Shapes, kept: &Kept, params: &AccelParams) -> Reason {
+/// What [`build_with`] would choose, and why, by the largest of what it builds trees over.
+pub fn reason(shapes: &Shapes, kept: &Kept) -> Reason {
     let objects = kept.objects().iter().map(Object::shapes);
     let largest = objects.fold(shapes, |a, b| if b.bounded() >= a.bounded() { b } else { a });
-    judge(largest, params).1
+    judge(largest)
 }
 
-/// Judges a scene by a part of it, or by all of it where that is no more; then what was chosen is built already.
-fn judge<'a>(shapes: &'a Shapes, params: &AccelParams) -> (Option<AnyAccel<'a>>, Reason) {
-    let judged = (shapes.bounded() / SHARE).clamp(FEWEST, MOST);
-    match part(shapes, judged) {
-        Some(part) => (None, try_both(&part, judged, params).1),
-        None => {
-            let (accel, reason) = try_both(shapes, judged, params);
-            (Some(accel), reason)
-        }
+/// Judges a scene by a part of it, where it is large.
+fn judge(shapes: &Shapes) -> Reason {
+    let bounded = shapes.bounded();
+    let judged = (bounded / SHARE).min(MOST);
+    if judged < FEWEST {
+        let (kind, prims) = (AccelKind::FastOctree, bounded as usize);
+        return Reason { kind, rays: 0, prims, octree: 0.0, bvh: 0.0, worth: 0.0 };
     }
-}
-
-/// Traces a sample through both, as long as `judged` prims are worth, and keeps the better one.
-fn try_both<'a>(shapes: &'a Shapes, judged: u32, params: &AccelParams) -> (AnyAccel<'a>, Reason) {
-    let rays = sample(shapes, judged as usize / PRIMS_A_RAY);
-    let tried = |kind| {
-        let accel = AnyAccel::build(kind, shapes, params);
-        let cost = cost(&accel, &rays);
-        (accel, cost)
-    };
-    let ((first, octree), (second, bvh)) = rayon::join(|| tried(AccelKind::FastOctree), || tried(AccelKind::FastBvh));
+    let part = part(shapes, judged);
+    let times = (bounded / part.bounded()) as usize;
+    let rays = sample(&part, judged as usize / PRIMS_A_RAY);
+    let cost = |splitting| cost(&Wide::build_sample(&part, splitting, times), &rays);
+    let (octree, bvh) = rayon::join(|| cost(Splitting::Octree), || cost(Splitting::SurfaceArea));
     let worth = WORTH / f64::from(judged).sqrt();
-    let accel = if bvh < octree * (1.0 - worth) { second } else { first };
-    let reason =
-        Reason { kind: accel.kind(), rays: rays.len() as u64, prims: shapes.bounded() as usize, octree, bvh, worth };
-    (accel, reason)
+    let kind = if bvh < octree * (1.0 - worth) { AccelKind::FastBvh } else { AccelKind::FastOctree };
+    Reason { kind, rays: rays.len() as u64, prims: part.bounded() as usize, octree, bvh, worth }
 }
 
 /// Of one ray, in nodes.
-fn cost(accel: &AnyAccel, rays: &[Ray]) -> f64 {
+fn cost(accel: &Wide, rays: &[Ray]) -> f64 {
     let mut counts = RayCounts::default();
     accel.closest(rays, &mut vec![Hit::MISS; rays.len()], &mut accel.scratch(), &mut counts);
     nodes(&counts)
@@ -196,20 +207,16 @@ pub fn nodes(counts: &RayCounts) -> f64 {
     (counts.n_ts as f64 - blocks + blocks * BLOCK) / counts.queries.max(1) as f64
 }
 
-/// About so many prims, in runs of neighbours spread over all; `None`: there are no more. Files list neighbours together, so
-/// that what is left still has surfaces.
-fn part(shapes: &Shapes, judged: u32) -> Option<Shapes> {
+/// About so many prims, at most, in runs of neighbours spread over all.
+fn part(shapes: &Shapes, judged: u32) -> Shapes {
     let bounded = shapes.bounded();
-    if bounded <= judged {
-        return None;
-    }
-    let (stride, run) = (bounded.div_ceil(RUNS), judged / RUNS);
+    let stride = bounded.div_ceil(judged / RUN);
     let mut part = Shapes::default();
     for first in (0..bounded).step_by(stride as usize) {
-        (first..bounded.min(first.saturating_add(run))).for_each(|prim| copy(shapes, prim, &mut part));
+        (first..bounded.min(first.saturating_add(RUN))).for_each(|prim| copy(shapes, prim, &mut part));
     }
     part.opaque = BitSet::filled(part.len(), true);
-    Some(part)
+    part
 }
 
 fn copy(shapes: &Shapes, prim: u32, part: &mut Shapes) {
@@ -302,20 +309,42 @@ mod tests {
 
     #[test]
     fn the_hierarchy_is_taken_where_it_saves_enough_and_the_octree_elsewhere() {
-        for (name, shapes) in scenes::all() {
+        let large = [("clumps", clumps(1000)), ("star", scenes::star(300, 150)), ("copies", scenes::copies(20_000))];
+        for (name, shapes) in large {
             let reason = chosen(&shapes);
+            assert!(reason.rays > 0 && reason.prims < shapes.len(), "{name}: {reason}");
             let saves = reason.bvh < reason.octree * (1.0 - reason.worth);
             let better = if saves { AccelKind::FastBvh } else { AccelKind::FastOctree };
             assert_eq!(reason.kind, better, "{name}: {reason}");
+            match name {
+                "clumps" => assert_eq!(reason.kind, AccelKind::FastBvh, "{reason}"),
+                // Nothing parts copies: both are the same tree.
+                "copies" => assert_eq!(reason.octree, reason.bvh, "{reason}"),
+                _ => {}
+            }
         }
-        let reason = chosen(&scenes::star(60, 30));
-        let (rays, prims) = (2 * u64::from(FEWEST) / PRIMS_A_RAY as u64, FEWEST as usize);
-        assert_eq!((reason.rays, reason.prims), (rays, prims), "{reason}");
-        let reason = chosen(&clumps(100));
-        assert_eq!(reason.kind, AccelKind::FastBvh, "{reason}");
-        // Nothing parts copies: both are the same tree.
-        let reason = chosen(&scenes::copies(1000));
-        assert!(reason.kind == AccelKind::FastOctree && reason.octree == reason.bvh, "{reason}");
+    }
+
+    #[test]
+    fn scenes_that_are_not_large_get_the_octree_without_a_sample() {
+        for (name, shapes) in scenes::all() {
+            let reason = chosen(&shapes);
+            assert_eq!((reason.kind, reason.rays), (AccelKind::FastOctree, 0), "{name}: {reason}");
+        }
+        let why = |each| chosen(&clumps(each)).to_string();
+        assert!(why(10).contains("270 shapes") && why(10).contains("cut alike"), "{}", why(10));
+        assert!(why(100).contains("2700 shapes") && why(100).contains("fewer than 16384"), "{}", why(100));
+    }
+
+    #[test]
+    fn up_to_so_few_shapes_both_splittings_give_one_tree() {
+        let counts = |shapes: &Shapes| {
+            let rays = sample(shapes, 200);
+            [Splitting::Octree, Splitting::SurfaceArea].map(|splitting| cost(&Wide::build(shapes, splitting), &rays))
+        };
+        let (few, more) = (clumps(u32::try_from(ALIKE).unwrap() / 27), clumps(300));
+        let ([a, b], [c, d]) = (counts(&few), counts(&more));
+        assert!(a == b && c != d, "{a} {b}, {c} {d}");
     }
 
     #[test]
@@ -327,7 +356,7 @@ mod tests {
         };
         let one = with(1).unwrap();
         let most = shapes.len() / SHARE as usize;
-        assert!(one.prims > most - RUNS as usize && one.prims <= most && most > 2 * FEWEST as usize, "{one}");
+        assert!(one.prims > most * 9 / 10 && one.prims <= most && most > 2 * FEWEST as usize, "{one}");
         assert_eq!([with(2), with(7)], [Some(one); 2]);
     }
 

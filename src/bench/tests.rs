@@ -74,7 +74,7 @@ impl Stage {
             hash: 7,
             prims: self.world.shapes.len(),
             objects: self.world.shapes.objects().len(),
-            auto: plan.sweep.is_none().then(|| self.world.judged(&plan.params)),
+            auto: plan.sweep.is_none().then(|| self.world.judged()),
             width: SIZE.0,
             height: SIZE.1,
             samples: 1,

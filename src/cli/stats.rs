@@ -9,7 +9,7 @@
 //! | `inputs`, `output`, `input_hash` | files as typed (`-`: standard streams); xxh3-128 of what was read, hexadecimal |
 //! | `width`, `height`, `samples`, `depth`, `cutoff`, `seed`, `view`, `accel`, `intersector`, `threads` | settings that were used |
 //! | `sampling` | `aa` and its settings (then `samples`, that of uniform sampling, is `null`); eye `rays`, `mean` and `most` of a pixel; of stochastic sampling pixels that `met` `pixel_error`, those stopped at the `ceiling`, and the picture's `rmse` in `error_space`: of several renderings estimated, of one a cautious bound |
-//! | `auto` | `null`, or why `--accel auto` took `accel`: `why` in words; `rays` and `prims` of the sample; cost of a ray through `fast-octree` and `fast-bvh`, in nodes of eight boxes |
+//! | `auto` | `null`, or why `--accel auto` took `accel`: `why` in words; `rays` and `prims` of the sample; cost of a ray through `fast-octree` and `fast-bvh`, in nodes of eight boxes, `null` where no sample was taken |
 //! | `parameters` | of the structure, as used: `leaf_size` (`null`: by step cost); of grids and octrees `grid_density`, `grid_resolution`, `max_depth`, `step_cost`, `grid_cells` (`null`: by density), `max_references`, `assign`, `mailbox` as well |
 //! | `seconds` | of the timed run: `load`, `build`, `meter` (finding the exposure of lamps in lux and candela), `render`, `write`; `load` and `build` are 0 for further pictures of one scene, `meter` is 0 for further pictures of one view and where no lamps are metered |
 //! | `animation` | `null`, or which one is shown: its `number` in the file, and the `time` in seconds, its end at most |
@@ -200,7 +200,8 @@ impl PictureStats {
             "cutoff": sampling::plain(settings.cutoff), "seed": settings.seed, "view": view, "accel": facts.accel.name(),
             "intersector": facts.job.intersector.name(),
             "auto": facts.reason.map(|r| json!({
-                "why": r.to_string(), "rays": r.rays, "prims": r.prims, "fast-octree": r.octree, "fast-bvh": r.bvh,
+                "why": r.to_string(), "rays": r.rays, "prims": r.prims,
+                "fast-octree": (r.rays > 0).then_some(r.octree), "fast-bvh": (r.rays > 0).then_some(r.bvh),
             })),
             "animation": summary::shown(&facts.loaded.facts).map(|(number, time)| json!({ "number": number, "time": time })),
             "parameters": parameters(facts.accel, &facts.job.params),

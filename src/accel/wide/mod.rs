@@ -38,6 +38,7 @@ mod walk;
 #[cfg(test)]
 mod ways;
 
+pub(super) use build::ALIKE;
 pub use listed::Listed;
 pub use split::Splitting;
 
@@ -113,10 +114,15 @@ pub struct Wide<'a> {
 impl<'a> Wide<'a> {
     /// Builds it over the bounded prims; the same for every number of threads.
     pub fn build(shapes: &'a Shapes, splitting: Splitting) -> Self {
+        Self::build_sample(shapes, splitting, 1)
+    }
+
+    /// Builds it over a sample of a scene, cut as one of `times` as many prims would be.
+    pub(super) fn build_sample(shapes: &'a Shapes, splitting: Splitting, times: usize) -> Self {
         Self {
             shapes,
             splitting,
-            arrays: build::build(shapes, splitting),
+            arrays: build::build(shapes, splitting, times),
             level: Level::best(),
             rays: RayOrder::Adaptive,
         }

@@ -1,5 +1,7 @@
 //! What `auto` would choose for a model, and whether that was right on its rays.
 
+use std::iter;
+
 use super::number::grouped;
 use super::table::Table;
 use super::{Model, Report};
@@ -88,10 +90,11 @@ fn counted(row: &Row) -> f64 {
 pub fn sentences(report: &Report, model: &Model) -> Vec<String> {
     let Some(reason) = model.auto else { return Vec::new() };
     let outcome = match Outcome::of(report, model) {
-        Some(outcome) => outcome.sentence(),
-        None => "Whether that is right was not measured: it takes both fast-octree and fast-bvh".into(),
+        Some(outcome) => Some(outcome.sentence()),
+        None if reason.is_one_tree() => None,
+        None => Some("Whether that is right was not measured: it takes both fast-octree and fast-bvh".into()),
     };
-    vec![format!("auto would choose {reason}"), outcome]
+    iter::once(format!("auto would choose {reason}")).chain(outcome).collect()
 }
 
 /// The choices over growing sizes, and what the other fast structure costs there; `None` where nothing was asked.

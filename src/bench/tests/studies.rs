@@ -131,6 +131,8 @@ fn what_auto_would_choose_is_held_against_the_rays() {
         assert!((auto["won_nodes"].as_f64().unwrap() - won).abs() < 1e-12 && auto["won_time"].is_null(), "{auto}");
     }
     report.models[0].rows.pop();
+    assert_eq!(auto_sentences(&report, &report.models[0]).len(), 1, "in one tree there is nothing to be measured");
+    report.models[0].auto.as_mut().unwrap().rays = 64;
     let said = auto_sentences(&report, &report.models[0]);
     assert!(said[1].contains("not measured"), "{said:?}");
 }

@@ -196,7 +196,7 @@ impl Bench<'_> {
             prims: prepared.world.len(),
             objects: prepared.world.objects(),
             kept: prepared.world.kept.placed().len(),
-            auto: plan.sweep.is_none().then(|| prepared.world.judged(&plan.params)),
+            auto: plan.sweep.is_none().then(|| prepared.world.judged()),
             width: settings.width,
             height: settings.height,
             samples: settings.samples,

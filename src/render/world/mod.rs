@@ -113,8 +113,8 @@ impl World {
     }
 
     /// Which structure [`AccelChoice::Auto`] is, and why.
-    pub fn judged(&self, params: &AccelParams) -> Reason {
-        auto::reason(&self.shapes, &self.kept, params)
+    pub fn judged(&self) -> Reason {
+        auto::reason(&self.shapes, &self.kept)
     }
 
     /// Number of prims of all kinds, those of an object once for each place where it stands.

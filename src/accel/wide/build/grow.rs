@@ -11,8 +11,11 @@ const PARALLEL: usize = 1024;
 
 /// Cells of few items are not cut at their planes but by area, which fills leaves better: of no more than this part of all
 /// items and no more than so many, but always of so few.
-const SMALL_CELL: RangeInclusive<usize> = 64..=8192;
+const SMALL_CELL: RangeInclusive<usize> = 1024..=8192;
 const SMALL_PART: usize = 4;
+
+/// So few prims are cut by area alone, whatever the splitting.
+pub(in crate::accel) const ALIKE: usize = *SMALL_CELL.start();
 
 /// A leaf whose box has more than this part of the root's area is met by many rays. It is cut all the same if its parts
 /// have less than that part of its own, or of its volume: rays that start beside a floor start in a box that is not as flat.
@@ -101,10 +104,13 @@ impl<'w> Work<'w> {
 }
 
 impl Grower {
-    /// Of a tree over so many items within these bounds, whose leaves have up to `leaf` prims, a power of two.
-    pub(super) fn new(splitting: Splitting, items: usize, bounds: &Bounds, leaf: u32) -> Self {
+    /// Of a tree over so many items within these bounds, whose leaves have up to `leaf` prims, a power of two. They stand for
+    /// `times` as many, and cells are cut as with those.
+    pub(super) fn new(splitting: Splitting, items: usize, times: usize, bounds: &Bounds, leaf: u32) -> Self {
         let small_cell = match splitting {
-            Splitting::Octree => (items / SMALL_PART).clamp(*SMALL_CELL.start(), *SMALL_CELL.end()),
+            Splitting::Octree => {
+                (items.saturating_mul(times) / SMALL_PART).clamp(*SMALL_CELL.start(), *SMALL_CELL.end()) / times.max(1)
+            }
             Splitting::SurfaceArea => usize::MAX,
         };
         Self { lattice: Lattice::over(&bounds.aabb()), small_cell, leaf, area: bounds.area() }
@@ -239,7 +245,7 @@ pub(super) mod tests {
     fn grown_over(splitting: Splitting, mut items: Vec<Item>) -> (Vec<Knot>, Vec<u32>) {
         let (mut spare, mut prims, mut knots) = (items.clone(), vec![0; items.len()], Vec::new());
         let bounds = crate::accel::wide::split::around(&items);
-        let grower = Grower::new(splitting, items.len(), &bounds, 8);
+        let grower = Grower::new(splitting, items.len(), 1, &bounds, 8);
         let work = Work { items: &mut items, spare: &mut spare, prims: &mut prims, first: 0 };
         grower.grow(work, bounds, None, &mut knots);
         (knots, prims)

@@ -16,6 +16,7 @@ mod slots;
 
 use rayon::prelude::*;
 
+pub(in crate::accel) use self::grow::ALIKE;
 use self::grow::{Grower, Knot, Work};
 use super::node::{Arrays, Block, Child, index};
 use super::split::item::around_middles;
@@ -34,18 +35,18 @@ const CHUNK: usize = 1024;
 /// How much more than twice as deep an improved tree may be: what is recursive must not run out of stack.
 const ROOM: usize = 32;
 
-/// Builds the tree over all bounded prims.
-pub(super) fn build(shapes: &Shapes, splitting: Splitting) -> Arrays {
+/// Builds the tree over all bounded prims, cut as if there were `times` as many.
+pub(super) fn build(shapes: &Shapes, splitting: Splitting, times: usize) -> Arrays {
     if shapes.bounded() == 0 {
         return Arrays::new(&[], 0, Aabb::EMPTY);
     }
     let triangles = shapes.triangles.len();
-    let (grown, prims) = binary_tree(shapes, splitting);
+    let (grown, prims) = binary_tree(shapes, splitting, times);
     let deep = 2 * depth(&grown) + ROOM;
     let (mut knots, moved) = reinsert::improve(grown);
     if moved && depth(&knots) > deep {
         // Where boxes hardly have an area rounding makes places better, and knots may be hung one below the other.
-        knots = binary_tree(shapes, splitting).0;
+        knots = binary_tree(shapes, splitting, times).0;
     }
     let leaves = Leaves::list(&mut knots, &prims, index(triangles));
     let bounds = knots.first().map_or(Aabb::EMPTY, Knot::bounds);
@@ -88,7 +89,7 @@ fn depth_from(knots: &[Knot], levels: u32) -> usize {
 }
 
 /// The binary tree over all bounded prims, and the prims of its leaves. A leaf holds triangles or other prims, never both.
-fn binary_tree(shapes: &Shapes, splitting: Splitting) -> (Vec<Knot>, Vec<u32>) {
+fn binary_tree(shapes: &Shapes, splitting: Splitting, times: usize) -> (Vec<Knot>, Vec<u32>) {
     let first_other = index(shapes.triangles.len());
     let mut triangles = items_of_triangles(shapes);
     let others = (first_other..shapes.bounded()).into_par_iter().with_min_len(CHUNK);
@@ -116,7 +117,7 @@ fn binary_tree(shapes: &Shapes, splitting: Splitting) -> (Vec<Knot>, Vec<u32>) {
             // One knot over both.
             knots.insert(0, Knot::fork(both.aabb(), index(knots.len() + 1)));
         }
-        let grower = Grower::new(splitting, items.len(), &bounds, leaf);
+        let grower = Grower::new(splitting, items.len(), times, &bounds, leaf);
         grower.grow(Work { items, spare: &mut spare, prims, first }, bounds, Some(middles), &mut knots);
     }
     (knots, prims)
@@ -225,11 +226,11 @@ mod tests {
         let faces = (0..side * (side - 1) - 1).map(|i| [i, i + 1, i + side].map(|v| v as u32)).collect();
         let shapes = mesh(vertices, faces);
         for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
-            let (knots, _) = binary_tree(&shapes, splitting);
+            let (knots, _) = binary_tree(&shapes, splitting, 1);
             let deep = 2 * depth(&knots) + ROOM;
             let improved = depth(&reinsert::improve(knots).0);
             assert!(improved <= deep, "{splitting:?}: {improved}, places as good as another were taken for better");
-            let arrays = build(&shapes, splitting);
+            let arrays = build(&shapes, splitting, 1);
             let tree = arrays.tree();
             assert!(tree.depth as usize <= deep, "{splitting:?}: {}", tree.depth);
         }
