@@ -6,7 +6,7 @@
 //! its prims, so that it costs little.
 //!
 //! Both are built equally fast, and mostly cost nearly the same; where fine detail stands in a wide scene the octree may cost
-//! much less. So the hierarchy must save more than a sample may show by chance: a thirty-second part of the octree's cost in
+//! much less. So the hierarchy must save more than a sample may show by chance: a twenty-third part of the octree's cost in
 //! the largest samples, an eleventh in the smallest. Few shapes are cut alike by both, and scenes that are not large take no
 //! sample: one in proportion would tell nothing, and a larger one takes longer than what it may save.
 
@@ -27,9 +27,9 @@ use crate::math::triangle;
 
 /// Of so many prims one is judged, and no more than these: finding out must cost less than it can save. Where that were
 /// fewer than so many, the octree is taken.
-const SHARE: u32 = 32;
+const SHARE: u32 = 64;
 const FEWEST: u32 = 1 << 9;
-const MOST: u32 = 1 << 12;
+const MOST: u32 = 1 << 11;
 
 /// They are taken in runs of so many neighbours: longer ones leave out more of the scene.
 const RUN: u32 = 4;
@@ -309,7 +309,7 @@ mod tests {
 
     #[test]
     fn the_hierarchy_is_taken_where_it_saves_enough_and_the_octree_elsewhere() {
-        let large = [("clumps", clumps(1000)), ("star", scenes::star(300, 150)), ("copies", scenes::copies(20_000))];
+        let large = [("clumps", clumps(2000)), ("star", scenes::star(300, 150)), ("copies", scenes::copies(40_000))];
         for (name, shapes) in large {
             let reason = chosen(&shapes);
             assert!(reason.rays > 0 && reason.prims < shapes.len(), "{name}: {reason}");
@@ -333,7 +333,7 @@ mod tests {
         }
         let why = |each| chosen(&clumps(each)).to_string();
         assert!(why(10).contains("270 shapes") && why(10).contains("cut alike"), "{}", why(10));
-        assert!(why(100).contains("2700 shapes") && why(100).contains("fewer than 16384"), "{}", why(100));
+        assert!(why(100).contains("2700 shapes") && why(100).contains("fewer than 32768"), "{}", why(100));
     }
 
     #[test]

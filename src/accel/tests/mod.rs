@@ -10,6 +10,7 @@ mod transform;
 mod volumes;
 mod watertight;
 
+use super::wide::ALIKE;
 use super::*;
 use crate::math::random::Random;
 use crate::math::shear::RaySpace;
@@ -101,12 +102,14 @@ fn every_wide_tree_agrees_with_brute_force_bit_for_bit_on_every_instruction_set(
     for (name, shapes) in all() {
         let rays = rays(&shapes, 100);
         let expected = answers(&Unculled::new(&shapes), &rays);
-        for splitting in [Splitting::Octree, Splitting::SurfaceArea] {
-            let tree = Wide::build(&shapes, splitting);
+        // Cut as large scenes are, so that planes of cells go all the way down, and as small ones.
+        let trees = [(Splitting::Octree, ALIKE), (Splitting::Octree, 1), (Splitting::SurfaceArea, 1)];
+        for (splitting, times) in trees {
+            let tree = Wide::build_sample(&shapes, splitting, times);
             assert!(tree.check().is_ok(), "{name}: {:?}", tree.check());
             for level in Level::all() {
                 let got = answers(&tree.clone().at_level(level), &rays);
-                assert_same(&format!("{name}, {splitting:?}, {}", level.name()), &rays, &got, &expected);
+                assert_same(&format!("{name}, {splitting:?} × {times}, {}", level.name()), &rays, &got, &expected);
             }
         }
     }
