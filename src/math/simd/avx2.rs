@@ -8,7 +8,7 @@
 use std::arch::x86_64::*;
 
 use super::pair::Pair;
-use super::{Axis, Kernel, LANES, Lanewise, MIDDLE, NEAR_MIDDLE, Order, Pick, Row, Simd};
+use super::{Axis, Kernel, LANES, Lanewise, LineOnStack, MIDDLE, NEAR_MIDDLE, Order, Pick, Row, Simd};
 
 /// Proof that the processor has AVX2 and the fused and bit instructions that came with it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,6 +30,7 @@ impl Avx2 {
     pub(super) fn run<K: Kernel>(self, kernel: K) -> K::Output {
         #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
         fn compiled<K: Kernel>(token: Avx2, kernel: K) -> K::Output {
+            LineOnStack::align();
             kernel.run(token)
         }
         // SAFETY: the token proves the features.

@@ -9,7 +9,7 @@ use std::arch::x86_64::*;
 
 use super::avx2::{Avx2, eight_lanes, lanes_in, lanes_of};
 use super::pair::Pair;
-use super::{Axis, Kernel, LANES, Lanewise, MIDDLE, NEAR_MIDDLE, Order, Pick, Row, Simd, WIDE};
+use super::{Axis, Kernel, LANES, Lanewise, LineOnStack, MIDDLE, NEAR_MIDDLE, Order, Pick, Row, Simd, WIDE};
 
 /// Proof that the processor has AVX-512 with 256-bit forms, double words and quad words, and what AVX2 came with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,6 +39,7 @@ impl Avx512 {
     pub(super) fn run<K: Kernel>(self, kernel: K) -> K::Output {
         #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
         fn compiled<K: Kernel>(token: Avx512, kernel: K) -> K::Output {
+            LineOnStack::align();
             kernel.run(token)
         }
         // SAFETY: the token proves the features.
