@@ -196,7 +196,8 @@ impl Faces<'_> {
 }
 
 impl Part {
-    /// `None` where a corner is nowhere.
+    /// `None` where a corner is nowhere. Inlined, so that what nobody asks for is not worked out.
+    #[inline(always)]
     fn face([a, b, c]: [DVec3; 3]) -> Option<Self> {
         let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
         let normal = (b - a).cross(c - a) * 0.5;

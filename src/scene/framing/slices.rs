@@ -69,50 +69,72 @@ impl Slices {
     #[inline]
     pub(super) fn reach(&mut self, lo: DVec3, hi: DVec3) {
         for axis in 0..3 {
-            self.reached.note(axis, self.slice(axis, lo[axis]), self.slice(axis, hi[axis]));
+            self.reached.note(axis, self.slice(axis, lo[axis]), self.slice(axis, hi[axis]), 1);
         }
     }
 
     /// Notes how far every triangle of a mesh reaches; `None` when a corner of one is nowhere.
-    pub(super) fn cover(&mut self, instance: &Instance, mesh: &Mesh) -> Option<()> {
+    ///
+    /// `cells` is room for the slices that its vertices are in.
+    pub(super) fn cover(&mut self, instance: &Instance, mesh: &Mesh, cells: &mut Vec<VertexCell>) -> Option<()> {
         let cell = |p: &Vec3| {
             let p = instance.world_from_object.transform_point3(p.as_dvec3());
             #[expect(clippy::cast_possible_truncation, reason = "there are 256 slices")]
             let cell = || [0, 1, 2].map(|axis| self.slice(axis, p[axis]) as u8);
             p.is_finite().then(cell)
         };
-        let cells: Vec<Option<[u8; 3]>> = mesh.positions.par_iter().with_min_len(CHUNK).map(cell).collect();
+        if mesh.triangles.len() <= CHUNK {
+            cells.clear();
+            cells.extend(mesh.positions.iter().map(cell));
+            return self.reached.note_all(&mesh.triangles, cells);
+        }
+        mesh.positions.par_iter().with_min_len(CHUNK).map(cell).collect_into_vec(cells);
         let of = |triangles: &[[u32; 3]]| {
             let mut reached = Reached::default();
-            for triangle in triangles {
-                let [a, b, c] = triangle.map(|i| cells.get(i as usize).copied().flatten());
-                let (a, b, c) = (a?, b?, c?);
-                for axis in 0..3 {
-                    let (first, last) = (a[axis].min(b[axis]).min(c[axis]), a[axis].max(b[axis]).max(c[axis]));
-                    reached.note(axis, usize::from(first), usize::from(last));
-                }
-            }
-            Some(reached)
+            reached.note_all(triangles, cells).map(|()| reached)
         };
         let parts: Vec<Reached> = mesh.triangles.par_chunks(CHUNK).map(of).collect::<Option<_>>()?;
         parts.iter().for_each(|part| self.reached.join(part));
         Some(())
     }
 
+    /// Notes `faces` of something with these outermost points, somewhere between which they reach.
+    pub(super) fn cover_between(&mut self, outermost: &[DVec3], faces: u64) {
+        for axis in 0..3 {
+            let (first, last) = self.slices_between(axis, outermost);
+            self.reached.note(axis, first, last, faces);
+        }
+    }
+
     /// Whether no slice is empty, so that nothing can come off; where the box is flat, nothing can either.
     pub(super) fn has_no_gap(&self) -> bool {
         let covered = self.reached.covered();
-        (0..3).all(|axis| self.per_unit[axis] == 0.0 || covered[axis].iter().all(|&covered| covered))
+        self.wide_axes().all(|axis| covered[axis].iter().all(|&covered| covered))
+    }
+
+    /// Whether too many faces lie before the first empty slice from every end for any to come off.
+    pub(super) fn holds_together(&self) -> bool {
+        self.wide_axes().all(|axis| self.reached.least_before_a_gap(axis) > STRAY_COUNT)
+    }
+
+    /// Axes along which the box is not flat.
+    fn wide_axes(&self) -> impl Iterator<Item = usize> {
+        (0..3).filter(|&axis| self.per_unit[axis] != 0.0)
     }
 
     /// Whether parts reach into every slice that something with these outermost points could.
     pub(super) fn reached_throughout(&self, outermost: &[DVec3]) -> bool {
         let covered = self.reached.covered();
         (0..3).all(|axis| {
-            let places = || outermost.iter().map(|p| self.slice(axis, p[axis]));
-            let (first, last) = (places().min().unwrap_or(0), places().max().unwrap_or(0));
+            let (first, last) = self.slices_between(axis, outermost);
             covered[axis][first..=last].iter().all(|&covered| covered)
         })
+    }
+
+    /// The first and last slice that something with these outermost points may reach into.
+    fn slices_between(&self, axis: usize, outermost: &[DVec3]) -> (usize, usize) {
+        let places = || outermost.iter().map(|p| self.slice(axis, p[axis]));
+        (places().min().unwrap_or(0), places().max().unwrap_or(0))
     }
 
     /// Adds a part to the slices that its middle is in.
@@ -193,41 +215,73 @@ impl Slices {
     }
 }
 
-/// Which slices parts reach into, as how many more begin in each than end before it: noted without a branch.
+/// The slice along each axis that a vertex is in; `None` where it is nowhere.
+pub(super) type VertexCell = Option<[u8; 3]>;
+
+/// Which slices parts reach into, as how many begin and how many end in each: noted without a branch.
 #[derive(Clone, Copy)]
-pub(super) struct Reached([[i64; SLICES + 1]; 3]);
+pub(super) struct Reached {
+    begin: [[u64; SLICES]; 3],
+    end: [[u64; SLICES]; 3],
+}
 
 impl Default for Reached {
     fn default() -> Self {
-        Self([[0; SLICES + 1]; 3])
+        Self { begin: [[0; SLICES]; 3], end: [[0; SLICES]; 3] }
     }
 }
 
 impl Reached {
-    /// A part reaches from slice to slice of an axis.
+    /// So many parts reach from slice to slice of an axis.
     #[inline]
-    fn note(&mut self, axis: usize, first: usize, last: usize) {
-        let more = &mut self.0[axis];
-        more[first] += 1;
-        more[last + 1] -= 1;
+    fn note(&mut self, axis: usize, first: usize, last: usize, parts: u64) {
+        self.begin[axis][first] += parts;
+        self.end[axis][last] += parts;
+    }
+
+    /// Notes triangles whose vertices are in these cells; `None` where one is nowhere.
+    fn note_all(&mut self, triangles: &[[u32; 3]], cells: &[VertexCell]) -> Option<()> {
+        for triangle in triangles {
+            let [a, b, c] = triangle.map(|i| cells.get(i as usize).copied().flatten());
+            let (a, b, c) = (a?, b?, c?);
+            for axis in 0..3 {
+                let (first, last) = (a[axis].min(b[axis]).min(c[axis]), a[axis].max(b[axis]).max(c[axis]));
+                self.note(axis, usize::from(first), usize::from(last), 1);
+            }
+        }
+        Some(())
     }
 
     /// Adds what others reach.
     fn join(&mut self, other: &Self) {
-        let pairs = self.0.as_flattened_mut().iter_mut().zip(other.0.as_flattened());
-        pairs.for_each(|(more, other)| *more += other);
+        for (mine, other) in [(&mut self.begin, &other.begin), (&mut self.end, &other.end)] {
+            let pairs = mine.as_flattened_mut().iter_mut().zip(other.as_flattened());
+            pairs.for_each(|(more, other)| *more += other);
+        }
     }
 
     /// Whether some part reaches into a slice.
     pub(super) fn covered(&self) -> [[bool; SLICES]; 3] {
-        let mut covered = [[false; SLICES]; 3];
-        for (covered, more) in covered.iter_mut().zip(&self.0) {
-            let mut here = 0;
-            for (covered, more) in covered.iter_mut().zip(more) {
-                here += more;
-                *covered = here != 0;
-            }
-        }
-        covered
+        [0, 1, 2].map(|axis| {
+            let mut open = 0;
+            std::array::from_fn(|i| {
+                open += self.begin[axis][i];
+                let covered = open > 0;
+                open -= self.end[axis][i];
+                covered
+            })
+        })
+    }
+
+    /// The part of all that lies before the first empty slice of an axis, from the end where that is less; 1 where no slice
+    /// is empty.
+    fn least_before_a_gap(&self, axis: usize) -> f64 {
+        let covered = &self.covered()[axis];
+        let (Some(first), Some(last)) = (covered.iter().position(|c| !c), covered.iter().rposition(|c| !c)) else {
+            return 1.0;
+        };
+        let (before, behind) = (&self.begin[axis][..first], &self.end[axis][last..]);
+        let all: u64 = self.begin[axis].iter().sum();
+        before.iter().sum::<u64>().min(behind.iter().sum()) as f64 / all as f64
     }
 }
