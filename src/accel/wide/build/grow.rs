@@ -6,8 +6,10 @@ use crate::math::Vec3;
 use crate::math::aabb::Aabb;
 use std::ops::RangeInclusive;
 
-/// Items that are worth a thread's while.
+/// Items that are worth a thread's while, and parts of all for each thread that are: what each part makes is copied behind
+/// the other's.
 const PARALLEL: usize = 1024;
+const PARTS: usize = 16;
 
 /// Cells of few items are not cut at their planes but by area, which fills leaves better: of no more than this part of all
 /// items and no more than so many, but always of so few.
@@ -83,6 +85,8 @@ pub(super) struct Grower {
     leaf: u32,
     /// Area of the root's box.
     area: f32,
+    /// Sides of more items are grown by several threads.
+    parallel: usize,
 }
 
 impl<'w> Work<'w> {
@@ -113,7 +117,11 @@ impl Grower {
             }
             Splitting::SurfaceArea => usize::MAX,
         };
-        Self { lattice: Lattice::over(&bounds.aabb()), small_cell, leaf, area: bounds.area() }
+        let parallel = match rayon::current_num_threads() {
+            1 => usize::MAX,
+            threads => PARALLEL.max(items / (PARTS * threads)),
+        };
+        Self { lattice: Lattice::over(&bounds.aabb()), small_cell, leaf, area: bounds.area(), parallel }
     }
 
     /// Adds the tree over some items, at least one, to `knots`; the same for every number of threads. `middles` is the box
@@ -158,7 +166,7 @@ impl Grower {
         let middles = |part: usize| cut.middles.map(|both| both[part]);
         let (first_middles, second_middles) = (middles(0), middles(1));
         let [a, b] = work.split_at(cut.at, cut.prims);
-        fork(
+        self.join(
             count,
             bounds,
             knots,
@@ -176,29 +184,30 @@ impl Grower {
         let [a, b] = work.split_at(items as usize, prims as usize);
         let grow_a = |k: &mut Vec<Knot>| self.grow_cell(cell, first, a, cell.bounds(first), k);
         let grow_b = |k: &mut Vec<Knot>| self.grow_cell(cell, second, b, cell.bounds(second), k);
-        fork(count, bounds, knots, grow_a, grow_b);
+        self.join(count, bounds, knots, grow_a, grow_b);
     }
-}
 
-/// Adds a knot over `count` items and its two sides, which are grown in parallel where it is worth it.
-fn fork(
-    count: usize,
-    bounds: Bounds,
-    knots: &mut Vec<Knot>,
-    first: impl FnOnce(&mut Vec<Knot>) + Send,
-    second: impl FnOnce(&mut Vec<Knot>) + Send,
-) {
-    let at = knots.len();
-    knots.push(Knot::fork(bounds.aabb(), 0));
-    if count > PARALLEL {
-        let mut beyond = Vec::new();
-        rayon::join(|| first(knots), || second(&mut beyond));
-        knots[at].at = index(knots.len() - at);
-        knots.append(&mut beyond);
-    } else {
-        first(knots);
-        knots[at].at = index(knots.len() - at);
-        second(knots);
+    /// Adds a knot over `count` items and its two sides, which are grown in parallel where it is worth it.
+    fn join(
+        &self,
+        count: usize,
+        bounds: Bounds,
+        knots: &mut Vec<Knot>,
+        first: impl FnOnce(&mut Vec<Knot>) + Send,
+        second: impl FnOnce(&mut Vec<Knot>) + Send,
+    ) {
+        let at = knots.len();
+        knots.push(Knot::fork(bounds.aabb(), 0));
+        if count > self.parallel {
+            let mut beyond = Vec::new();
+            rayon::join(|| first(knots), || second(&mut beyond));
+            knots[at].at = index(knots.len() - at);
+            knots.append(&mut beyond);
+        } else {
+            first(knots);
+            knots[at].at = index(knots.len() - at);
+            second(knots);
+        }
     }
 }
 
