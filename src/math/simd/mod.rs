@@ -255,8 +255,8 @@ pub trait Kernel {
 /// Room on the stack that begins where a cache line does, and makes the whole frame of the function that has it begin there.
 ///
 /// Without it a frame begins at any multiple of sixteen bytes, and where a compiler has no registers left it keeps vectors in
-/// places that lie across two lines: half of all eights, three of four sixteens. Where two pages meet among them, rays one by
-/// one are 20 to 40 % slower; where that is differs from one start of a program to the next.
+/// places that may lie across two lines. Where two pages meet in one of them, rays one by one are 20 to 40 % slower, and where
+/// the stack begins differs from one start of a program to the next.
 #[repr(align(64))]
 struct LineOnStack(#[expect(dead_code, reason = "it is there to be somewhere")] u8);
 

@@ -163,9 +163,9 @@ impl Outline for Inside {
 /// Faces of a mesh that are looked at between two questions whether all slices have been reached.
 const FACES_AT_A_TIME: usize = 1024;
 
-/// How often faces from all over a mesh are looked at before all of them are: of so many times as many faces once, and so
-/// often at most. A look costs three times as much a face.
+/// Before all of its faces, some from all over a mesh are looked at, once for each so many that it has …
 const FACES_A_LOOK: usize = 16 * FACES_AT_A_TIME;
+/// … and so often at most: a face costs three times as much as it does where all of them are.
 const LOOKS: usize = 16;
 
 /// Whether it is certain that nothing comes off a model of triangles: because they reach into every slice, which is true of
@@ -175,17 +175,17 @@ fn is_whole(scene: &Scene, bounds: &Bounds) -> Option<bool> {
     let mut sample = Slices::new(bounds);
     let looks = placed(scene).map(|(_, mesh)| looks_at(mesh)).max().unwrap_or(0);
     for look in 0..looks {
-        look_at_some(scene, look, &mut sample)?;
-        if sample.has_no_gap() {
+        if has_no_gap_at_a_look(scene, look, &mut sample)? {
             return Some(true);
         }
     }
+    let covered = sample.reached.covered();
     let (mut all, mut cells) = (Slices::new(bounds), Vec::new());
     let is_crowd = scene.instances.len() > scene.meshes.len();
     let boxes = if is_crowd { object_boxes(scene) } else { vec![None; scene.meshes.len()] };
     for (instance, mesh) in placed(scene) {
         let place = boxes[instance.mesh as usize].filter(|_| has_many(mesh)).map(|b| placed_box(b, instance));
-        match place.filter(|place| sample.reached_throughout(place)) {
+        match place.filter(|place| all.lies_throughout(&covered, place)) {
             Some(place) => all.cover_between(&place, mesh.triangles.len() as u64),
             None => all.cover(instance, mesh, &mut cells)?,
         }
@@ -213,8 +213,9 @@ fn looks_at(mesh: &Mesh) -> usize {
     if has_many(mesh) { (mesh.triangles.len() / FACES_A_LOOK + 1).min(LOOKS) } else { 0 }
 }
 
-/// Takes in how far some faces of meshes with many reach, others each time; `None` where a corner is nowhere.
-fn look_at_some(scene: &Scene, look: usize, slices: &mut Slices) -> Option<()> {
+/// Takes in how far some faces of meshes with many reach, others each time, until no slice is empty; whether that is so.
+/// `None` where a corner is nowhere.
+fn has_no_gap_at_a_look(scene: &Scene, look: usize, slices: &mut Slices) -> Option<bool> {
     for (instance, mesh) in placed(scene).filter(|(_, mesh)| look < looks_at(mesh)) {
         let corner = |i: u32| {
             let p = mesh.positions.get(i as usize)?;
@@ -227,8 +228,11 @@ fn look_at_some(scene: &Scene, look: usize, slices: &mut Slices) -> Option<()> {
             let (a, b, c) = (a?, b?, c?);
             slices.reach(a.min(b).min(c), a.max(b).max(c));
         }
+        if slices.has_no_gap() {
+            return Some(true);
+        }
     }
-    Some(())
+    Some(false)
 }
 
 #[cfg(test)]
@@ -321,20 +325,28 @@ mod tests {
         }
     }
 
-    /// Clusters of faces side by side, of any size and at any distance.
+    /// Clusters of faces side by side, of any size and at any distance. Every eighth seed has meshes of many faces, each in
+    /// many places near each other, some of them too small to be looked into.
     fn clusters(seed: u64) -> Scene {
         let mut random = crate::math::random::Random::new(seed);
         let mut scene = Scene::default();
         let mut x = 0.0;
         for cluster in 0..2 + seed as u32 % 4 {
-            let faces = 1 + (random.unit() * 6.0).exp2() as u32 * (random.unit() * 3.0) as u32;
+            let (faces, times) = match seed % 8 {
+                0 => (1025 + random.below(2000), 5 + random.below(36)),
+                _ => (1 + random.below(130) * random.below(3) / 2, 1),
+            };
             let positions = (0..faces + 2).map(|_| random.cube()).collect();
-            let triangles = (0..faces).map(|i| [i, i + 1, i + 2]).collect();
+            let triangles = (0..faces as u32).map(|i| [i, i + 1, i + 2]).collect();
             scene.meshes.push(Mesh { positions, triangles, ..Mesh::default() });
             let (size, y) = (f64::from(random.unit() * 4.0 - 2.0).exp2(), f64::from(random.unit()));
-            let m = DAffine3::from_scale(DVec3::splat(size));
-            let place = DAffine3::from_translation(DVec3::new(x, y, 0.0)) * m;
-            scene.instances.push(Instance { name: String::new(), mesh: cluster, world_from_object: place });
+            for _ in 0..times {
+                let part = if times > 1 { 0.1 + 0.3 * f64::from(random.unit()) } else { 1.0 };
+                let m = DAffine3::from_scale(DVec3::splat(size * part));
+                let at = DVec3::new(x, y, 0.0) + random.cube().as_dvec3() * (if times > 1 { size } else { 0.0 });
+                let place = DAffine3::from_translation(at) * m;
+                scene.instances.push(Instance { name: String::new(), mesh: cluster, world_from_object: place });
+            }
             x += size * 2.0 + f64::from(random.unit() * 8.0 - 4.0).exp2();
         }
         scene
@@ -342,19 +354,25 @@ mod tests {
 
     #[test]
     fn what_is_whole_at_a_look_is_whole_face_by_face() {
-        let (mut gaps, mut strays) = (0, 0);
-        for seed in 0..2000 {
+        let (mut gaps, mut crowds, mut strays) = (0, 0, 0);
+        for seed in 0..1000 {
             let scene = clusters(seed);
             let slow = by_parts(&scene);
             let whole = Bounds { lo: slow.whole.0, hi: slow.whole.1, strays: 0, whole: slow.whole };
-            let by_faces = Slices::of(&scene, &Crowd::of(&scene), &whole);
+            let crowd = Crowd::of(&scene);
+            let slices = Slices::of(&scene, &crowd, &whole);
             let is_whole = is_whole(&scene, &whole).expect("all corners are somewhere");
             assert!(!is_whole || slow == whole, "{seed}: {} came off", slow.strays);
             assert_eq!(robust_bounds(&scene), slow, "{seed}");
-            gaps += u32::from(is_whole && !by_faces.has_no_gap());
+            let in_spite_of_gaps = is_whole && !slices.has_no_gap();
+            gaps += u32::from(in_spite_of_gaps);
+            crowds += u32::from(in_spite_of_gaps && !crowd.is_empty());
             strays += u32::from(slow.strays > 0);
         }
-        assert!(gaps > 200 && strays > 50, "of 2000: {gaps} whole in spite of gaps, {strays} with strays");
+        assert!(
+            gaps > 100 && crowds > 10 && strays > 25,
+            "whole in spite of gaps: {gaps} ({crowds}); strays: {strays}"
+        );
     }
 
     #[test]

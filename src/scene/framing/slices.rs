@@ -83,7 +83,7 @@ impl Slices {
             let cell = || [0, 1, 2].map(|axis| self.slice(axis, p[axis]) as u8);
             p.is_finite().then(cell)
         };
-        if mesh.triangles.len() <= CHUNK {
+        if mesh.triangles.len().max(mesh.positions.len()) <= CHUNK {
             cells.clear();
             cells.extend(mesh.positions.iter().map(cell));
             return self.reached.note_all(&mesh.triangles, cells);
@@ -122,9 +122,8 @@ impl Slices {
         (0..3).filter(|&axis| self.per_unit[axis] != 0.0)
     }
 
-    /// Whether parts reach into every slice that something with these outermost points could.
-    pub(super) fn reached_throughout(&self, outermost: &[DVec3]) -> bool {
-        let covered = self.reached.covered();
+    /// Whether all slices that something with these outermost points could reach into are among those `covered`.
+    pub(super) fn lies_throughout(&self, covered: &Covered, outermost: &[DVec3]) -> bool {
         (0..3).all(|axis| {
             let (first, last) = self.slices_between(axis, outermost);
             covered[axis][first..=last].iter().all(|&covered| covered)
@@ -218,6 +217,9 @@ impl Slices {
 /// The slice along each axis that a vertex is in; `None` where it is nowhere.
 pub(super) type VertexCell = Option<[u8; 3]>;
 
+/// For each axis and slice whether some part reaches into it.
+pub(super) type Covered = [[bool; SLICES]; 3];
+
 /// Which slices parts reach into, as how many begin and how many end in each: noted without a branch.
 #[derive(Clone, Copy)]
 pub(super) struct Reached {
@@ -235,8 +237,9 @@ impl Reached {
     /// So many parts reach from slice to slice of an axis.
     #[inline]
     fn note(&mut self, axis: usize, first: usize, last: usize, parts: u64) {
-        self.begin[axis][first] += parts;
-        self.end[axis][last] += parts;
+        // What is inside out reaches as far.
+        self.begin[axis][first.min(last)] += parts;
+        self.end[axis][first.max(last)] += parts;
     }
 
     /// Notes triangles whose vertices are in these cells; `None` where one is nowhere.
@@ -261,7 +264,7 @@ impl Reached {
     }
 
     /// Whether some part reaches into a slice.
-    pub(super) fn covered(&self) -> [[bool; SLICES]; 3] {
+    pub(super) fn covered(&self) -> Covered {
         [0, 1, 2].map(|axis| {
             let mut open = 0;
             std::array::from_fn(|i| {

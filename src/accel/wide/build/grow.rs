@@ -6,9 +6,10 @@ use crate::math::Vec3;
 use crate::math::aabb::Aabb;
 use std::ops::RangeInclusive;
 
-/// Items that are worth a thread's while, and parts of all for each thread that are: what each part makes is copied behind
-/// the other's.
+/// Fewer items are not worth a thread's while.
 const PARALLEL: usize = 1024;
+
+/// Parts for each thread. More of them would balance better, but what a second side makes is copied behind the first's.
 const PARTS: usize = 16;
 
 /// Cells of few items are not cut at their planes but by area, which fills leaves better: of no more than this part of all
@@ -85,7 +86,7 @@ pub(super) struct Grower {
     leaf: u32,
     /// Area of the root's box.
     area: f32,
-    /// Sides of more items are grown by several threads.
+    /// The sides of a knot over more items are grown in parallel.
     parallel: usize,
 }
 
