@@ -53,6 +53,14 @@ fn passed_over(header: &Header, file: &Path) -> Vec<Diagnostic> {
         let text = "Gaussian splats are drawn as points of their colours, opaque and of one size".into();
         told.push(warning("ply-splats", text, "--line-width sets the size"));
     }
+    let vertices = header.elements.iter().find(|element| element.name == "vertex" && element.count > 0);
+    for [first, again] in vertices.map(|element| Meanings::of(element).twice).unwrap_or_default() {
+        let text = match first == again {
+            true => format!("'{again}' of a vertex is there twice, and the second is not read"),
+            false => format!("'{again}' of a vertex says what '{first}' has said, and is not read"),
+        };
+        told.push(warning("ply-property-twice", text, "keep one of them"));
+    }
     let pictures = header.comments.iter().filter_map(|comment| comment.strip_prefix("TextureFile"));
     for name in pictures.map(str::trim).filter(|name| !name.is_empty()) {
         let text = format!("picture '{}' (comment TextureFile) is not drawn", shorten(name));
@@ -87,6 +95,33 @@ const SPLAT: [&str; 3] = ["f_dc_0", "f_dc_1", "f_dc_2"];
 /// Whether vertices are Gaussian splats. Their normals are 0, and their opacities are of a haze.
 fn are_splats(vertex: &Element) -> bool {
     SPLAT.iter().all(|name| vertex.properties.iter().any(|property| property.name == *name))
+}
+
+/// What properties of a vertex mean.
+struct Meanings<'a> {
+    /// Of each property the place in [`SLOTS`]; of several with one meaning the first has it.
+    slots: Vec<Option<usize>>,
+    /// For each meaning that several have, the names of the first two.
+    twice: Vec<[&'a str; 2]>,
+}
+
+impl<'a> Meanings<'a> {
+    fn of(vertex: &'a Element) -> Self {
+        let (splats, hazy) = (are_splats(vertex), [3, 4, 5, 11]);
+        let mut said: [Vec<&str>; SLOTS.len()] = Default::default();
+        let slot = |property: &'a Property| {
+            let name = property.name.as_str();
+            let found = SLOTS.iter().position(|names| names.contains(&name));
+            let slot = found.filter(|slot| property.length.is_none() && !(splats && hazy.contains(slot)))?;
+            if said[slot].len() < 2 {
+                said[slot].push(name);
+            }
+            (said[slot].len() == 1).then_some(slot)
+        };
+        let slots = vertex.properties.iter().map(slot).collect();
+        let twice = said.iter().filter_map(|names| names.as_slice().try_into().ok());
+        Self { slots, twice: twice.collect() }
+    }
 }
 
 /// A part of a colour, 0…1, as a property says it.
@@ -132,13 +167,7 @@ impl Reader<'_, '_> {
             let text = format!("{} vertices are more than {}", element.count, Bare::LARGEST);
             return Err(self.body.fault(text, "split the file"));
         }
-        let (splats, hazy) = (are_splats(element), [3, 4, 5, 11]);
-        let slot = |property: &Property| {
-            let name = property.name.as_str();
-            let found = SLOTS.iter().position(|names| names.contains(&name));
-            found.filter(|slot| property.length.is_none() && !(splats && hazy.contains(slot)))
-        };
-        let slots: Vec<Option<usize>> = element.properties.iter().map(slot).collect();
+        let slots = Meanings::of(element).slots;
         let has = |wanted: &[usize]| wanted.iter().all(|slot| slots.contains(&Some(*slot)));
         if !has(&[0, 1, 2]) {
             return Err(self.body.fault("vertices have no x, y and z", "export it again"));

@@ -65,9 +65,10 @@ pub(super) fn load(libraries: &[(u32, String)], names: &[Option<&str>], reading:
         names.iter().map(|name| name.and_then(|name| lookup(&known, name))).collect()
     };
     warn_of_undefined(names, &found, reading);
+    let used: Vec<(usize, usize)> = first_of_each(found.iter().flatten().copied());
+    warn_of_redefined(&read, &used, reading.warnings);
 
     // Pictures of the materials in use, library by library.
-    let used: Vec<(usize, usize)> = first_of_each(found.iter().flatten().copied());
     let (mut textures, mut missed) = (Textures::default(), 0);
     for (number, library) in read.iter().enumerate() {
         let materials = used.iter().filter(|u| u.0 == number).map(|u| &library.materials[u.1]);
@@ -201,6 +202,28 @@ fn warn_of_undefined(names: &[Option<&str>], found: &[Option<(usize, usize)>], r
     let are = if lost.len() == 1 { "material is" } else { "materials are" };
     let text = format!("{} {are} not defined and drawn plain: {list}", lost.len());
     reading.warnings.push(Diagnostic::new("mtl-undefined-material", reading.file, "", text));
+}
+
+/// Warns once for each material in use of whose name there is another that is unlike it: pictures are named relative to their
+/// library.
+fn warn_of_redefined(read: &[Read], used: &[(usize, usize)], warnings: &mut Warnings) {
+    let mut first: HashMap<&str, (&Read, &Mtl)> =
+        used.iter().map(|&(l, m)| (&*read[l].materials[m].name, (&read[l], &read[l].materials[m]))).collect();
+    for library in read {
+        for other in &library.materials {
+            if let Some((of, kept)) = first.get(&*other.name)
+                && !std::ptr::eq(*kept, other)
+                && (library.folder != of.folder && !other.maps.is_empty() || !other.is_like(kept))
+            {
+                let place = format!("line {} of {}", kept.line, of.file.display());
+                let text = format!("material '{}' is defined again; {place} counts", shorten(&other.name));
+                let warning = Diagnostic::new("mtl-defined-twice", &library.file, other.line.to_string(), text);
+                warnings.push(warning.remedy("give one of them another name"));
+                // Others of the name are not compared: a file may have very many.
+                first.remove(&*other.name);
+            }
+        }
+    }
 }
 
 fn plain_material(name: &str) -> Material {

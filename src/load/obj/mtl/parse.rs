@@ -108,6 +108,15 @@ const REFLECTED: (&str, &str) =
 const SILENT: [&[u8]; 4] = [b"sharpness", b"map_aat", b"km", b"ke_strength"];
 
 impl Mtl {
+    /// Whether both say the same, wherever they say it.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        let placeless = |mtl: &Self| {
+            let maps = mtl.maps.iter().map(|(slot, map)| (*slot, Map { line: 0, ..map.clone() }));
+            Self { line: 0, refl: mtl.refl.map(|_| 0), maps: maps.collect(), ..mtl.clone() }
+        };
+        placeless(self) == placeless(other)
+    }
+
     /// The last map of a slot.
     pub(super) fn map(&self, slot: Slot) -> Option<&Map> {
         self.maps.iter().rev().find(|(s, _)| *s == slot).map(|(_, map)| map)

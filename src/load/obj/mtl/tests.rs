@@ -73,6 +73,21 @@ fn a_missing_library_is_a_warning_and_its_materials_are_plain_with_their_names()
 }
 
 #[test]
+fn a_material_that_is_defined_twice_is_the_first_and_told_where_they_differ() {
+    let load = |mtl: &str| load(OBJ, mtl, &[], MtlMode::Guess);
+    let loaded = load("newmtl a\nKd 1 0 0\nnewmtl b\n\nnewmtl a\nKd 0 1 0\nnewmtl b\nNs 3\n");
+    assert_eq!(codes(&loaded), ["mtl-defined-twice"], "no face is made of b");
+    let text = loaded.warnings[0].to_string();
+    assert!(
+        text.contains("m.mtl:5: material 'a' is defined again; line 1 of ") && text.contains("m.mtl counts"),
+        "{text}"
+    );
+    assert_eq!(loaded.scene.materials[0].base_color, Vec3::X);
+    let map = "newmtl a\nKd 1 0 0\nmap_Kd none.png\n";
+    assert_eq!(codes(&load(&format!("{map}\n{map}"))), ["file-missing"], "both say the same");
+}
+
+#[test]
 fn a_library_of_the_models_name_is_used_when_none_is_named() {
     let obj = OBJ.replace("mtllib m.mtl\n", "");
     let loaded = load(&obj, "newmtl a\nKd 1 0 0", &[], MtlMode::Guess);
@@ -96,7 +111,7 @@ fn names_with_spaces_signs_and_comments_meet() {
 fn the_first_definition_counts_and_unused_ones_cost_nothing() {
     let mtl = "newmtl a\nKd 1 0 0\nnewmtl a\nKd 0 1 0\nnewmtl b\nmap_Kd none.png";
     let loaded = load(OBJ, mtl, &[], MtlMode::Guess);
-    assert_eq!((loaded.scene.materials.len(), loaded.warnings.len()), (1, 0));
+    assert_eq!((loaded.scene.materials.len(), codes(&loaded)), (1, vec!["mtl-defined-twice"]));
     assert_eq!(loaded.scene.materials[0].base_color, Vec3::X);
 }
 
