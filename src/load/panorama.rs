@@ -7,7 +7,9 @@ use crate::quiet::attempt;
 use crate::scene::Panorama;
 use crate::scene::color::from_srgb;
 use crate::threads;
+use ::image::codecs::hdr::HdrDecoder;
 use ::image::{DynamicImage, ImageFormat, ImageReader};
+use std::borrow::Cow;
 use std::io::Cursor;
 use std::path::Path;
 use std::sync::Arc;
@@ -45,11 +47,12 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
         let remedy = "name an equirectangular .hdr or .exr, or `studio`, `white`, `black`";
         LoadError::from(Diagnostic::new("env-unusable", &source.path, "", text).remedy(remedy))
     };
-    let format = format_of(&source.path.to_string_lossy(), &source.bytes)
+    let bytes = &*as_radiance(&source.bytes);
+    let format = format_of(&source.path.to_string_lossy(), bytes)
         .ok_or_else(|| fault("is no picture that can surround a scene: its kind is unknown".into()))?;
-    let reader = |bytes| {
-        let mut reader = ImageReader::with_format(Cursor::new(&source.bytes), format);
-        reader.limits(within(bytes));
+    let reader = |memory| {
+        let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+        reader.limits(within(memory));
         reader
     };
     let (width, height) =
@@ -74,7 +77,12 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
             format!("is {width}×{height}: a panorama of all around is twice as wide as high, so it is stretched");
         warnings.push(Diagnostic::new("env-shape", &source.path, "", text));
     }
-    let (texels, odd) = radiance(picture, format);
+    let (mut texels, odd) = radiance(picture, format);
+    if format == ImageFormat::Hdr
+        && let Some(exposure) = exposure(bytes)
+    {
+        texels.iter_mut().flatten().for_each(|c| *c /= exposure);
+    }
     if odd > 0 {
         let text = format!("{odd} pixels are negative or no finite numbers, and taken as black");
         warnings.push(Diagnostic::new("env-pixels", &source.path, "", text));
@@ -82,6 +90,26 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
     let name = source.path.to_string_lossy().into_owned();
     let panorama = Panorama { name, width, height, texels: Arc::new(texels), rotation: 0.0 };
     Ok(LoadedPanorama { panorama, warnings, hash: xxh3_128(&source.bytes) })
+}
+
+/// A Radiance picture as its decoder knows it: the first line of one names the program that wrote it, mostly `#?RADIANCE` or
+/// `#?RGBE`. Others as they are.
+fn as_radiance(bytes: &[u8]) -> Cow<'_, [u8]> {
+    /// The longest such line.
+    const LINE: usize = 80;
+    let end = bytes.iter().take(LINE).position(|&byte| byte == b'\n');
+    match end {
+        Some(end) if bytes.starts_with(b"#?") && bytes[..end].trim_ascii_end() != b"#?RADIANCE" => {
+            [b"#?RADIANCE".as_slice(), &bytes[end..]].concat().into()
+        }
+        _ => bytes.into(),
+    }
+}
+
+/// What the numbers of a Radiance picture have been multiplied by, if that is known and not 1.
+fn exposure(bytes: &[u8]) -> Option<f32> {
+    let exposure = HdrDecoder::new(Cursor::new(bytes)).ok()?.metadata().exposure?;
+    Some(exposure).filter(|e| e.is_finite() && *e > 0.0 && *e != 1.0)
 }
 
 /// Linear radiance of all pixels, and how many of them had to be mended.
@@ -116,6 +144,22 @@ mod tests {
     fn bright(width: u32, height: u32) -> DynamicImage {
         let picture: Rgb32FImage = ImageBuffer::from_fn(width, height, |x, _| Rgb([x as f32 * 100.0, 0.5, 0.25]));
         DynamicImage::ImageRgb32F(picture)
+    }
+
+    #[test]
+    fn a_radiance_picture_may_name_any_program_and_is_as_bright_as_before_its_exposure() {
+        let Source { bytes, .. } = file(&bright(4, 2), ImageFormat::Hdr);
+        let texels = |head: &str| {
+            let bytes = [head.as_bytes(), &bytes["#?RADIANCE\n".len()..]].concat();
+            let source = Source { path: "sky.hdr".into(), bytes };
+            decode(&source, &Limits::default()).map(|loaded| loaded.panorama.texels.to_vec())
+        };
+        let plain = texels("#?RADIANCE\n").unwrap();
+        assert_eq!(texels("#?RGBE\n").unwrap(), plain);
+        assert_eq!(texels("#?AUTOPANO pro 2\r\n").unwrap(), plain);
+        let halved: Vec<[f32; 3]> = plain.iter().map(|texel| texel.map(|c| c / 2.0)).collect();
+        assert_eq!(texels("#?RGBE\nEXPOSURE=4\nEXPOSURE= 0.5\n").unwrap(), halved, "all of them count");
+        assert!(texels("RGBE\n").is_err());
     }
 
     #[test]
