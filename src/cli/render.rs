@@ -14,7 +14,7 @@ use super::stats::{self, PictureStats};
 use super::writable::{self, Sources};
 use super::{accident, again, interrupt, read, surroundings};
 use crate::load::{Diagnostic, LoadOptions, Loaded};
-use crate::render::World;
+use crate::render::{Moved, World};
 use crate::scene::Scene;
 use crate::scene::framing::{Bounds, robust_bounds_within};
 use crate::threads;
@@ -254,20 +254,23 @@ fn prepare(
 fn coarse(loaded: &Loaded, world: &World, file: &Path) -> Option<Diagnostic> {
     /// Part of an object's size that its corners may be off by.
     const MOST: f64 = 0.01;
-    let (instance, part) = world.coarsest(&loaded.scene, MOST)?;
-    let name = match loaded.scene.instances[instance].name.as_str() {
-        "" => format!("object {instance}"),
-        name => format!("'{name}'"),
+    let (which, part) = world.coarsest(&loaded.scene, MOST)?;
+    let scene = &loaded.scene;
+    let (kind, number, name) = match which {
+        Moved::Instance(i) => ("object", i, &scene.instances[i].name),
+        Moved::Sphere(i) => ("sphere", i, &scene.spheres[i].name),
+        Moved::Cone(i) => ("cone", i, &scene.cones[i].name),
     };
+    let name = if name.is_empty() { format!("{kind} {number}") } else { format!("'{name}'") };
     let text = format!(
-        "{name} stands so far from the middle of the scene that rounding moves its corners by up to {part:.3} of its size"
+        "{name} stands so far from the middle of the scene that rounding moves it by up to {part:.3} of its size"
     );
     Some(Diagnostic::new("rounding", file, "", text).remedy("render parts that are far from each other by themselves"))
 }
 
 fn nothing_to_draw(loaded: &Loaded, file: &Path) -> Diagnostic {
     let held = match loaded.facts.dropped.iter().map(|(_, n)| n).sum::<u64>() {
-        0 => "nothing to draw: it holds no faces, lines or points".to_owned(),
+        0 => "nothing to draw: it holds no faces, lines or points, or only such as are scaled to nothing".to_owned(),
         n => format!("nothing to draw: all of its {n} faces, lines and points had to be dropped"),
     };
     let draw_nothing = "--allow-empty draws the background";

@@ -66,7 +66,7 @@ pub use profile::{Profile, render_profiled};
 pub use sampling::{Adaptive, ErrorSpace, Filter, Quality, Sampled, Sampling, Split, Stochastic, Targeted};
 pub use surface::given_normal;
 pub use view::View;
-pub use world::{Placing, PrimSource, World};
+pub use world::{Moved, Placing, PrimSource, World};
 
 use crate::accel::{AnyAccel, NoProbe, RayCounts};
 use crate::image::Picture;

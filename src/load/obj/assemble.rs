@@ -26,6 +26,8 @@ pub(super) struct Assembled {
     pub not_finite: (u64, u32),
     /// Faces with fewer than three different corners.
     pub collapsed: (u64, u32),
+    /// Faces that have them, but rounding has made them fewer.
+    pub rounded: (u64, u32),
     /// Faces whose boundary crosses itself.
     pub crossing: (u64, u32),
     /// Faces turned round to agree with their normals.
@@ -103,6 +105,8 @@ fn keep<'s>(statements: &'s Statements, soup: &Soup, positions: &[Vec3], out: &m
         let (is_finite, is_wide) = (is_finite(face), is_wide(face));
         if !is_finite {
             count(&mut out.not_finite, face);
+        } else if !is_wide && has_three_places(corners(face).iter().map(|c| soup.positions[c.position as usize])) {
+            count(&mut out.rounded, face);
         } else if !is_wide {
             count(&mut out.collapsed, face);
         }
@@ -111,7 +115,7 @@ fn keep<'s>(statements: &'s Statements, soup: &Soup, positions: &[Vec3], out: &m
     Cow::Owned(faces.iter().filter(can_be_drawn).copied().collect())
 }
 
-fn has_three_places(mut places: impl Iterator<Item = Vec3>) -> bool {
+fn has_three_places<P: Copy + PartialEq>(mut places: impl Iterator<Item = P>) -> bool {
     let Some(a) = places.next() else { return false };
     let Some(b) = places.find(|&p| p != a) else { return false };
     places.any(|p| p != a && p != b)

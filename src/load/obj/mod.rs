@@ -62,7 +62,7 @@ pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Resu
     let (wire_runs, mut wires): (Vec<u32>, Vec<Wires>) =
         strokes::assemble(&statements, &soup, &placed).into_iter().unzip();
     drop(soup);
-    let codes = ["obj-not-finite", "obj-equal-corners", "obj-crossing-face", "obj-turned-face"];
+    let codes = ["obj-not-finite", "obj-equal-corners", "obj-rounded-face", "obj-crossing-face", "obj-turned-face"];
     warn_of_faces(&assembled, codes, |line| line.to_string(), file, &mut warnings);
     if statements.faces.is_empty() && wires.is_empty() {
         let text = format!("{} vertices and no face: there is nothing to draw", statements.counts[0]);
@@ -150,7 +150,7 @@ fn scene(
 /// Tells what became of faces, in the order of `codes`; `place` names the first of a kind.
 fn warn_of_faces(
     assembled: &Assembled,
-    codes: [&'static str; 4],
+    codes: [&'static str; 5],
     place: impl Fn(u32) -> String,
     file: &Path,
     warnings: &mut Warnings,
@@ -158,6 +158,10 @@ fn warn_of_faces(
     let told = [
         (assembled.not_finite, "a face is dropped: a corner is not a finite number, or over 1e18"),
         (assembled.collapsed, "a face is dropped: it has fewer than 3 different corners"),
+        (
+            assembled.rounded,
+            "a face is dropped: it is so small and so far from the middle that rounding joins its corners",
+        ),
         (assembled.crossing, "a face crosses itself; it is cut as well as can be"),
         (assembled.turned, "a face is wound against its normals; it is turned round"),
     ];
@@ -172,6 +176,7 @@ fn dropped(statements: &Statements, assembled: &Assembled) -> Vec<(String, u64)>
         ("fewer than 3 corners", u64::from(statements.odd.few_corners.count)),
         ("a corner that is not finite", assembled.not_finite.0),
         ("fewer than 3 different corners", assembled.collapsed.0),
+        ("corners that rounding joins, far from the middle", assembled.rounded.0),
     ];
     reasons.into_iter().filter(|r| r.1 > 0).map(|(reason, count)| (reason.into(), count)).collect()
 }

@@ -324,3 +324,13 @@ fn of_several_faults_the_first_is_told_with_the_number_of_its_kind() {
     let told = faults[0].to_string();
     assert!(told.starts_with("m.obj:4: corner 3 of the face names vertex 9") && told.contains("(×2)"), "{told}");
 }
+
+#[test]
+fn a_face_whose_corners_rounding_joins_is_told_as_such() {
+    let far =
+        "v .1 .1 0\nv .3 .1 0\nv .1 .3 0\nf 1 2 3\nv 20000000.1 .1 0\nv 20000000.3 .1 0\nv 20000000.1 .3 0\nf 4 5 6\n";
+    let obj = format!("{far}v 0 0 0\nv 20000000 0 0\nv 0 20000000 0\nf 7 8 9\nf 7 7 8\n");
+    let loaded = of(&obj);
+    assert_eq!(codes(&loaded), [("obj-equal-corners", 1), ("obj-rounded-face", 2)]);
+    assert_eq!(loaded.facts.dropped.iter().map(|(_, n)| n).sum::<u64>(), 3);
+}

@@ -6,6 +6,8 @@
 mod placing;
 mod rounding;
 
+pub use rounding::Moved;
+
 pub use placing::Placing;
 
 use super::keeping::{self, Instancing};

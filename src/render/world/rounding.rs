@@ -3,14 +3,26 @@
 use super::World;
 use super::placing::{PARALLEL_RUN, centered};
 use crate::accel::instances::Spot;
-use crate::math::Vec3;
 use crate::math::aabb::Aabb;
+use crate::math::{DVec3, Vec3};
 use crate::scene::Scene;
 use rayon::prelude::*;
 
+/// What rounding has moved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Moved {
+    /// Index into [`Scene::instances`].
+    Instance(usize),
+    /// Index into [`Scene::spheres`].
+    Sphere(usize),
+    /// Index into [`Scene::cones`].
+    Cone(usize),
+}
+
 impl World {
-    /// How far rounding to `f32` has moved corners of faces at most from where `scene` has them, of which this is the world;
-    /// world units. Corners of objects are not looked at one by one: of them, the most that can be.
+    /// How far rounding to `f32` has moved corners of faces, surfaces of spheres and ends of cones at most from where `scene`
+    /// has them, of which this is the world; world units. Corners of objects are not looked at one by one: of them, the most
+    /// that can be.
     pub fn rounding(&self, scene: &Scene) -> f64 {
         let mut from = 0;
         let stored = scene.instances.iter().enumerate().filter(|(i, _)| self.stored(*i)).map(|(_, instance)| {
@@ -24,12 +36,38 @@ impl World {
         });
         let stored = stored.fold(0.0, f64::max);
         let kept = self.kept.placed().iter().map(|placed| half_steps(&placed.place.bounds));
-        kept.fold(stored, f64::max)
+        let solids = self.solids_moved(scene).map(|(_, off, _)| off);
+        kept.chain(solids).fold(stored, f64::max)
     }
 
-    /// The instance whose faces rounding has moved by the largest part of its size, with that part, if it is more than `most`:
-    /// it stands so far from the middle of the scene that it is not what the file says.
-    pub fn coarsest(&self, scene: &Scene, most: f64) -> Option<(usize, f64)> {
+    /// How far rounding has moved each sphere and cone, and how large it is.
+    fn solids_moved(&self, scene: &Scene) -> impl Iterator<Item = (Moved, f64, f64)> {
+        let moved = |at: DVec3, there: Vec3| (at - self.center).distance(there.as_dvec3());
+        let resized = |radius: f64, there: f32| (radius - f64::from(there)).abs();
+        let spheres = scene.spheres.iter().zip(&self.shapes.spheres).enumerate().map(move |(i, (of, there))| {
+            let off = moved(of.center, there.center) + resized(of.radius, there.radius);
+            (Moved::Sphere(i), off, 2.0 * of.radius)
+        });
+        let cones = scene.cones.iter().zip(&self.shapes.cones).enumerate().map(move |(i, (of, there))| {
+            let base = moved(of.base, there.base) + resized(of.base_radius, there.base_radius);
+            let apex = moved(of.apex, there.apex) + resized(of.apex_radius, there.apex_radius);
+            let thick = 2.0 * of.base_radius.max(of.apex_radius);
+            (Moved::Cone(i), base.max(apex), thick.min(of.base.distance(of.apex)))
+        });
+        spheres.chain(cones).filter(|(_, off, _)| off.is_finite())
+    }
+
+    /// What rounding has moved by the largest part of its size, with that part, if it is more than `most`: it stands so far
+    /// from the middle of the scene that it is not what the file says.
+    pub fn coarsest(&self, scene: &Scene, most: f64) -> Option<(Moved, f64)> {
+        let worse = |a: &(Moved, f64), b: &(Moved, f64)| a.1.total_cmp(&b.1);
+        let solids = self.solids_moved(scene).map(|(which, off, size)| (which, off / size));
+        let instance = self.coarsest_instance(scene, most).map(|(i, part)| (Moved::Instance(i), part));
+        solids.filter(|(_, part)| *part > most && part.is_finite()).chain(instance).max_by(worse)
+    }
+
+    /// The same of instances.
+    fn coarsest_instance(&self, scene: &Scene, most: f64) -> Option<(usize, f64)> {
         let mut from = 0;
         let mut worst: Option<(usize, f64)> = None;
         // One that stands alone is in the middle.
@@ -64,4 +102,36 @@ fn half_steps(bounds: &Aabb) -> f64 {
     let most = bounds.lo.abs().max(bounds.hi.abs());
     let step = most.map(|x| x.next_up() - x).as_dvec3();
     if step.is_finite() { (0.5 * step).length() } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Cone, Sphere};
+
+    fn sphere(x: f64, radius: f64) -> Sphere {
+        Sphere { name: String::new(), center: DVec3::new(x, 0.0, 0.0), radius, material: 0 }
+    }
+
+    #[test]
+    fn spheres_and_cones_far_from_the_middle_are_told() {
+        let mut scene = Scene { spheres: vec![sphere(0.0, 0.1), sphere(0.3, 0.1)], ..Scene::default() };
+        let world = World::new(&scene);
+        assert!(world.rounding(&scene) < 1e-7 && world.coarsest(&scene, 0.01).is_none());
+        scene.spheres.push(sphere(1e7, 0.1));
+        let world = World::new(&scene);
+        let (which, part) = world.coarsest(&scene, 0.01).expect("half steps of 5e6 are 0.25");
+        assert!(matches!(which, Moved::Sphere(_)) && part > 0.1 && world.rounding(&scene) > 0.02, "{which:?} {part}");
+        let end = |x: f64| DVec3::new(x, 0.3, 0.1);
+        let cone = Cone {
+            name: String::new(),
+            base: end(0.3),
+            base_radius: 0.2,
+            apex: end(0.4),
+            apex_radius: 0.0,
+            material: 0,
+        };
+        let scene = Scene { spheres: vec![sphere(1e7, 1.0)], cones: vec![cone], ..Scene::default() };
+        assert_eq!(World::new(&scene).coarsest(&scene, 0.2).map(|(which, _)| which), Some(Moved::Cone(0)));
+    }
 }
