@@ -25,7 +25,7 @@ pub(super) fn warning(
 }
 
 fn said(
-    Coverage { rays, hits }: Coverage,
+    Coverage { rays, hits, shown }: Coverage,
     (choice, lens): (&Choice, Option<LensChoice>),
     scene: &Scene,
     file: &Path,
@@ -33,6 +33,14 @@ fn said(
     let framed = camera::is_framed(choice, scene);
     let (code, text) = match hits {
         0 => ("nothing-seen", format!("none of {rays} rays spread over the picture hits anything")),
+        n if !shown => {
+            let text = format!(
+                "{n} of {rays} rays spread over the picture hit the model, all of them backs of one-sided faces or what is \
+                 wholly transparent"
+            );
+            let remedy = "another --view may see its fronts; `inspect` lists its materials";
+            return Some(Diagnostic::new("nothing-seen", file, "", text).remedy(remedy));
+        }
         n if framed && n * FEW < rays => {
             ("little-seen", format!("only {n} of {rays} rays spread over the picture hit anything"))
         }
@@ -57,7 +65,7 @@ mod tests {
     use crate::scene::framing::NamedView;
 
     fn code(hits: usize, choice: &Choice) -> Option<&'static str> {
-        let coverage = Coverage { rays: 40_960, hits };
+        let coverage = Coverage { rays: 40_960, hits, shown: hits > 0 };
         said(coverage, (choice, None), &Scene::default(), Path::new("a.glb")).map(|warning| warning.code)
     }
 

@@ -1,6 +1,9 @@
 //! How much of a picture shows something, as rays spread over it tell.
 
+use super::context;
 use super::eyes::{Ball, Eye, Place};
+use super::shade::Reader;
+use super::surface::{Surface, Target};
 use super::wave::Media;
 use super::{Job, sobol};
 use crate::accel::{Accel, Hit, NoProbe, Ray};
@@ -20,6 +23,9 @@ const MOST: u32 = 1 << 20;
 /// Rays that are sent together.
 const TOGETHER: u32 = 1 << 12;
 
+/// So much that is not there is looked through to find something that is.
+const LAYERS: usize = 64;
+
 /// What became of rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Coverage {
@@ -27,6 +33,8 @@ pub struct Coverage {
     pub rays: usize,
     /// And so many hit something, be it transparent.
     pub hits: usize,
+    /// Whether one of them sees something: not only backs of one-sided faces and what is wholly transparent.
+    pub shown: bool,
 }
 
 /// Sends rays through a picture, evenly spread but in no rows: models are framed in the middle, and thin ones would stand
@@ -34,17 +42,19 @@ pub struct Coverage {
 pub fn coverage(job: &Job) -> Coverage {
     let pixels = job.settings.width.saturating_mul(job.settings.height);
     let all = pixels.clamp(LEAST, MOST);
-    let first = hits(job, 0..FIRST);
-    if first * RARE > FIRST as usize {
-        return Coverage { rays: FIRST as usize, hits: first };
+    let first = sent(job, 0..FIRST);
+    if first.shown && first.hits * RARE > FIRST as usize {
+        return first;
     }
     let starts: Vec<u32> = (FIRST..all).step_by(TOGETHER as usize).collect();
-    let others = starts.into_par_iter().map(|start| hits(job, start..all.min(start + TOGETHER)));
-    Coverage { rays: all as usize, hits: first + others.sum::<usize>() }
+    let others = starts.into_par_iter().map(|start| sent(job, start..all.min(start + TOGETHER)));
+    let both =
+        |a: Coverage, b: Coverage| Coverage { rays: a.rays + b.rays, hits: a.hits + b.hits, shown: a.shown || b.shown };
+    both(first, others.reduce(|| Coverage { rays: 0, hits: 0, shown: false }, both))
 }
 
-/// How many of these rays hit something.
-fn hits(job: &Job, numbers: Range<u32>) -> usize {
+/// What becomes of these rays.
+fn sent(job: &Job, numbers: Range<u32>) -> Coverage {
     let Job { scene, world, accel, view, settings, .. } = *job;
     let (width, height) = (settings.width, settings.height);
     let eye = Eye {
@@ -61,8 +71,36 @@ fn hits(job: &Job, numbers: Range<u32>) -> usize {
         let [x, y] = sobol::point(i, 0);
         Place::new(x * f64::from(width), y * f64::from(height))
     };
-    let rays: Vec<Ray> = numbers.map(|i| eye.ray_with_path(place(i)).0).collect();
+    let rays: Vec<Ray> = numbers.clone().map(|i| eye.ray_with_path(place(i)).0).collect();
     let mut hits = vec![Hit::MISS; rays.len()];
-    accel.closest(&rays, &mut hits, &mut accel.scratch(), &mut NoProbe);
-    hits.iter().filter(|hit| hit.is_some()).count()
+    let mut scratch = accel.scratch();
+    accel.closest(&rays, &mut hits, &mut scratch, &mut NoProbe);
+    let mut met = only_hits((rays, hits));
+    let (count, mut layers) = (met.0.len(), 1);
+    let is_shown =
+        |(rays, hits): &(Vec<Ray>, Vec<Hit>)| rays.iter().zip(hits).any(|(ray, hit)| is_there(job, ray, hit));
+    let mut shown = is_shown(&met);
+    while !shown && !met.0.is_empty() && layers < LAYERS {
+        let mut behind = vec![Hit::MISS; met.0.len()];
+        accel.next(&met.0, &met.1, &mut behind, &mut scratch, &mut NoProbe);
+        met = only_hits((met.0, behind));
+        shown = is_shown(&met);
+        layers += 1;
+    }
+    Coverage { rays: numbers.len(), hits: count, shown: shown || !met.0.is_empty() }
+}
+
+/// The rays that hit something, and what.
+fn only_hits((rays, hits): (Vec<Ray>, Vec<Hit>)) -> (Vec<Ray>, Vec<Hit>) {
+    rays.into_iter().zip(hits).filter(|(_, hit)| hit.is_some()).unzip()
+}
+
+/// Whether a ray sees what it hits.
+fn is_there(job: &Job, ray: &Ray, hit: &Hit) -> bool {
+    let target = Target::new(job.scene, job.world, hit.prim);
+    let material = target.material;
+    let surface = Surface::new(job.world, target, ray, hit, 0.0);
+    let reader = Reader { store: job.textures, patch: surface.patch.as_ref() };
+    (surface.front || material.double_sided || material.surface.transmits())
+        && context::coverage(material, reader.base(material).w) > 0.0
 }

@@ -1,6 +1,7 @@
 //! Alpha, straight transmission, and what lies behind.
 
 use super::*;
+use crate::render::coverage;
 use crate::scene::{AlphaMode, Background, Environment};
 
 fn blended(color: Vec3, opacity: f32) -> Material {
@@ -49,6 +50,25 @@ fn absent_texels_and_unseen_backs_are_passed_without_a_trace() {
     s.scene.meshes[2].triangles.iter_mut().for_each(|t| t.swap(0, 1));
     assert_eq!(s.color(), Vec3::Z, "its back is not");
     assert_eq!(s.alpha(), 1.0);
+}
+
+#[test]
+fn a_picture_of_backs_and_of_nothing_opaque_shows_nothing_and_what_lies_behind_them_is_shown() {
+    let absent = || Material { opacity: 0.4, alpha_mode: AlphaMode::Mask { cutoff: 0.5 }, ..unlit(Vec3::X) };
+    let one_sided = || Material { double_sided: false, ..unlit(Vec3::Y) };
+    let seen = |stack: &[&Material], from: f64| {
+        let mut s = looking_down(from);
+        for (i, material) in stack.iter().enumerate() {
+            s.square(i as f32, 9.0, (*material).clone());
+        }
+        s.with_job(AccelKind::DEFAULT, |job| coverage(job).shown)
+    };
+    for hidden in [absent(), blended(Vec3::X, 0.0)] {
+        assert!(!seen(&[&hidden], 9.0) && !seen(&[&hidden; 2], 9.0));
+        assert!(seen(&[&unlit(Vec3::Z), &hidden, &hidden], 9.0), "behind two that are not there");
+    }
+    assert!(seen(&[&one_sided()], 9.0) && !seen(&[&one_sided()], -9.0));
+    assert!(seen(&[&blended(Vec3::X, 0.1)], 9.0) && seen(&[&unlit(Vec3::X)], -9.0));
 }
 
 #[test]
