@@ -83,7 +83,7 @@ codes! {
     UnsatisfiedDependency "UNSATISFIED_DEPENDENCY" Warn "the lonely property is left out";
     ValueMultipleOf "VALUE_MULTIPLE_OF" Warn "unaligned data can be read";
     ValueNotInList "VALUE_NOT_IN_LIST" Warn "the default is taken, or the object left out";
-    ValueNotInRange "VALUE_NOT_IN_RANGE" Warn "the nearest allowed value is taken; a negative or endless size is refused";
+    ValueNotInRange "VALUE_NOT_IN_RANGE" Warn "a factor is taken as the nearest allowed value; what cannot be used otherwise is left out or refused";
     NonObjectExtras "NON_OBJECT_EXTRAS" Accept "extras are not read";
 
     // Version and extensions.

@@ -111,6 +111,10 @@ pub(in crate::load) fn load(
     std::mem::take(&mut bare.told).into_iter().for_each(|told| warnings.push(told));
     let coding = color::settle(&mut bare.colors);
     coding.warning(["color-bytes", "color-range"], file).into_iter().for_each(|told| warnings.push(told));
+    if color::are_all_clear(&bare.colors) {
+        let text = "all opacities of vertices are 0: they are taken to mean something else, and the model is opaque";
+        warnings.push(Diagnostic::new("color-clear", file, "", text));
+    }
     budget.take(bare.strokes(), Bare::STROKE).map_err(|over| over_memory(file, over))?;
     let (statements, soup) = statements(bare);
     let placed = place(&soup.positions);
@@ -122,7 +126,7 @@ pub(in crate::load) fn load(
     drop(soup);
 
     // What could not be drawn.
-    let codes = ["face-not-finite", "face-degenerate", "face-crossing", "face-turned"];
+    let codes = ["face-not-finite", "face-degenerate", "face-rounded", "face-crossing", "face-turned"];
     warn_of_faces(&assembled, codes, |face| format!("face {face}"), file, &mut warnings);
     if few_corners > 0 {
         let count = u32::try_from(few_corners).unwrap_or(u32::MAX);

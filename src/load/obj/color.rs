@@ -19,12 +19,19 @@ fn decode(coded: f32) -> f32 {
     if c <= 0.04045 { c / 12.92 } else { libm::powf((c + 0.055) / 1.055, 2.4) }
 }
 
-/// Opacities of vertices, 0…1; none where all are opaque. Where all are 0 the fourth number means something else: nobody
-/// writes a mesh that cannot be seen.
+/// Opacities of vertices, 0…1; none where all are opaque, or [`are_all_clear`].
 pub(super) fn opacities(colors: &[[f32; 4]]) -> Vec<f32> {
-    let alphas = || colors.iter().map(|c| if c[3].is_nan() { 1.0 } else { c[3].clamp(0.0, 1.0) });
-    let means_something = alphas().any(|a| a < 1.0) && alphas().any(|a| a > 0.0);
-    if means_something { alphas().collect() } else { Vec::new() }
+    let is_see_through = colors.iter().any(|c| opacity(c) < 1.0) && !are_all_clear(colors);
+    if is_see_through { colors.iter().map(opacity).collect() } else { Vec::new() }
+}
+
+/// Whether all opacities are 0. They mean something else then: nobody writes a mesh that cannot be seen.
+pub(super) fn are_all_clear(colors: &[[f32; 4]]) -> bool {
+    !colors.is_empty() && colors.iter().all(|c| opacity(c) == 0.0)
+}
+
+fn opacity(color: &[f32; 4]) -> f32 {
+    if color[3].is_nan() { 1.0 } else { color[3].clamp(0.0, 1.0) }
 }
 
 /// How vertex colours are written.

@@ -184,8 +184,10 @@ fn opacity_of_vertices_is_drawn_and_an_empty_channel_is_not() {
     assert_eq!(see_through.meshes[0].colors.iter().map(|c| c.w).collect::<Vec<_>>(), [1.0, 0.5, 0.0]);
     assert_eq!(see_through.materials[0].alpha_mode, AlphaMode::Blend);
     for alphas in [[1.0; 3], [0.0; 3]] {
-        let scene = plain(file(alphas).as_bytes()).scene;
+        let Loaded { scene, warnings, .. } = plain(file(alphas).as_bytes());
         assert!(scene.meshes[0].colors.is_empty(), "white and opaque");
+        let told: &[&str] = if alphas[0] == 0.0 { &["color-clear"] } else { &[] };
+        assert_eq!(warnings.iter().map(|w| w.code).collect::<Vec<_>>(), told);
         assert_eq!(scene.materials[0].alpha_mode, AlphaMode::Opaque);
     }
 }
@@ -366,4 +368,18 @@ fn normals_that_are_no_numbers_as_c_prints_them_are_none() {
     let normals = "property float nx\nproperty float ny\nproperty float nz\n";
     let loaded = triangle(normals, "", "", ["-nan(ind) -nan(ind) 1.#QNAN", "0 0 1", "0 0 1"], "");
     assert_eq!((loaded.facts.faces, loaded.warnings.len()), (1, 0), "{:?}", loaded.warnings);
+}
+
+#[test]
+fn what_two_properties_say_is_what_the_first_says_and_the_other_is_told() {
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+               property float s\nproperty float t\nproperty float u\nproperty float v\nproperty float x\n\
+               element face 1\nproperty list uchar int vertex_indices\nend_header\n\
+               0 0 0 .1 .2 .3 .4 9\n1 0 0 .1 .2 .3 .4 9\n0 1 0 .1 .2 .3 .4 9\n3 0 1 2\n";
+    let loaded = plain(ply.as_bytes());
+    assert_eq!(loaded.warnings.iter().map(|w| w.code).collect::<Vec<_>>(), ["ply-property-twice"; 3]);
+    assert_eq!(loaded.warnings[0].text, "'x' of a vertex is there twice, and the second is not read");
+    assert_eq!(loaded.warnings[1].text, "'u' of a vertex says what 's' has said, and is not read");
+    let mesh = &loaded.scene.meshes[0];
+    assert!(mesh.positions.iter().all(|p| p.x < 2.0) && mesh.uvs[0].iter().all(|uv| uv.x == 0.1), "{:?}", mesh.uvs);
 }
