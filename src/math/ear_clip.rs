@@ -47,6 +47,8 @@ pub fn newell(points: &[DVec3]) -> DVec3 {
 #[derive(Debug, Default)]
 pub struct EarClipper {
     flat: Vec<Coord<f64>>,
+    /// The corners that are cut now, by number: what the other lists say of others is of no account.
+    ring: Vec<u32>,
     prev: Vec<u32>,
     next: Vec<u32>,
     /// Whether a corner is strictly convex; others can block ears.
@@ -174,21 +176,23 @@ impl EarClipper {
 
     /// Makes the linked ring and the list of blockers.
     fn link(&mut self, ring: &[u32]) {
+        // Not cleared: a polygon may fall into very many parts.
         let n = self.flat.len();
         for list in [&mut self.prev, &mut self.next, &mut self.ticket] {
-            list.clear();
             list.resize(n, 0);
         }
-        self.alive.clear();
         self.alive.resize(n, false);
-        self.convex.clear();
         self.convex.resize(n, false);
+        self.ring.clear();
+        self.ring.extend_from_slice(ring);
+        self.ring.sort_unstable();
         self.left = ring.len();
         let followers = ring.iter().cycle().skip(1);
         for (&i, &j) in ring.iter().zip(followers) {
             self.next[i as usize] = j;
             self.prev[j as usize] = i;
             self.alive[i as usize] = true;
+            self.ticket[i as usize] = 0;
         }
         self.drop_antennas(ring);
         for &i in ring {
@@ -243,10 +247,10 @@ impl EarClipper {
     }
 
     fn queue_all(&mut self) {
-        for i in 0..self.flat.len() {
-            if self.alive[i] {
-                #[expect(clippy::cast_possible_truncation, reason = "corner numbers are u32")]
-                self.enqueue(i as u32);
+        for k in 0..self.ring.len() {
+            let i = self.ring[k];
+            if self.alive[i as usize] {
+                self.enqueue(i);
             }
         }
     }
@@ -313,9 +317,8 @@ impl EarClipper {
     /// Takes every straight corner and spike out of the ring; whether there was one.
     fn clip_straight(&mut self, out: &mut Vec<[u32; 3]>) -> bool {
         let before = self.left;
-        for i in 0..self.flat.len() {
-            #[expect(clippy::cast_possible_truncation, reason = "corner numbers are u32")]
-            let i = i as u32;
+        for k in 0..self.ring.len() {
+            let i = self.ring[k];
             if self.left > 3 && self.alive[i as usize] && self.turn(i) == 0.0 {
                 self.remove(i, out);
             }
@@ -325,8 +328,7 @@ impl EarClipper {
 
     /// The first corner left that is as wanted.
     fn first(&self, wanted: impl Fn(&Self, u32) -> bool) -> Option<u32> {
-        #[expect(clippy::cast_possible_truncation, reason = "corner numbers are u32")]
-        (0..self.flat.len() as u32).find(|&i| self.alive[i as usize] && wanted(self, i))
+        self.ring.iter().copied().find(|&i| self.alive[i as usize] && wanted(self, i))
     }
 
     /// The last triangle.

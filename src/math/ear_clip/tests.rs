@@ -192,6 +192,14 @@ fn a_comb_of_ten_thousand_teeth_is_cut_in_a_moment() {
     assert_exact(&plane(&points));
 }
 
+#[test]
+fn a_polygon_that_goes_round_a_triangle_very_often_is_cut_in_little_time() {
+    let points: Vec<_> = (0..300_000).map(|i| [(0, 0), (1, 0), (1, 1)][i % 3]).collect();
+    let mut triangles = Vec::new();
+    EarClipper::default().cut(&plane(&points), &mut triangles);
+    assert_eq!(triangles.len(), 100_000);
+}
+
 proptest! {
     /// Corners sorted around the origin make a polygon that does not cross itself; straight runs are frequent on
     /// so coarse a lattice.
