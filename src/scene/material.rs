@@ -301,7 +301,7 @@ impl Default for Material {
 }
 
 impl Material {
-    /// The material of geometry that names none: light grey, matt, seen from both sides.
+    /// The material of geometry that names none and has no colours of its own: light grey, matt, seen from both sides.
     pub fn plain() -> Self {
         Self {
             name: "plain".into(),

@@ -174,6 +174,10 @@ impl Loading<'_> {
         let skins = skin::joint_matrices(reader, graph, self.report);
         skin::check_scene(root, graph, facts.scene_index, &placed.draws, self.report);
         let palette = Palette::new(root, &placed, facts.variant);
+        for texture in &palette.textures.without_image {
+            let text = "the texture names no image that is read, and is not drawn";
+            self.report.warnings.push(Diagnostic::new("texture-no-image", file, format!("textures[{texture}]"), text));
+        }
 
         let drawn = palette.textures.pictures.clone();
         let read = if self.options.without_pictures { &[][..] } else { &drawn };

@@ -7,7 +7,7 @@ use gltf::json::extensions::texture::TextureTransform;
 use gltf::json::texture::{self, MagFilter, MinFilter, WrappingMode};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::hash::Hash;
 
 /// Collects the textures that materials show.
@@ -17,6 +17,8 @@ pub(super) struct Textures<'a> {
     pub(super) list: Vec<Texture>,
     /// What the bitmaps are made of, in their order.
     pub(super) pictures: Vec<Picture>,
+    /// Textures of the file that were asked for and name no image.
+    pub(super) without_image: BTreeSet<usize>,
     /// Where each is in its list.
     known_textures: HashMap<Texture, u32>,
     known_pictures: HashMap<Picture, u32>,
@@ -40,7 +42,8 @@ impl Picture {
 impl<'a> Textures<'a> {
     pub(super) fn new(root: &'a Root) -> Self {
         let (known_textures, known_pictures) = (HashMap::new(), HashMap::new());
-        Self { root, list: Vec::new(), pictures: Vec::new(), known_textures, known_pictures }
+        let (list, pictures, without_image) = (Vec::new(), Vec::new(), BTreeSet::new());
+        Self { root, list, pictures, without_image, known_textures, known_pictures }
     }
 
     /// The texture of a slot; `None` when it names no image.
@@ -60,7 +63,11 @@ impl<'a> Textures<'a> {
         transform: Option<&TextureTransform>,
         gloss: Option<u32>,
     ) -> Option<TextureRef> {
-        let picture = Picture { image: image_of(self.root, index)?, gloss };
+        let Some(image) = image_of(self.root, index) else {
+            self.without_image.insert(index.value());
+            return None;
+        };
+        let picture = Picture { image, gloss };
         let sampler = self.root.textures.get(index.value())?.sampler;
         let sampler = sampler.and_then(|s| self.root.samplers.get(s.value())).map(sampler_of).unwrap_or_default();
         let bitmap = number_of(picture, &mut self.pictures, &mut self.known_pictures);

@@ -117,6 +117,7 @@ pub(in crate::load) fn load(
     }
     budget.take(bare.strokes(), Bare::STROKE).map_err(|over| over_memory(file, over))?;
     let (statements, soup) = statements(bare);
+    let colored = !soup.colors.is_empty();
     let placed = place(&soup.positions);
     let flatness = assemble::flatness(&placed.positions, statements.places);
     let assembled = assemble::assemble(&statements, &soup, &placed, options.polygons, flatness);
@@ -143,8 +144,8 @@ pub(in crate::load) fn load(
         dropped.push(("fewer than 3 corners".into(), few_corners));
     }
     let meshes: Vec<Mesh> = assembled.meshes.into_iter().map(|(_, mesh)| mesh).collect();
-    let (guessed, reason) = up::guess(&statements.comments, &meshes, placed.center, otherwise);
-    let mut reading = mtl::Reading { file, options, resolver: &mut resolver, budget, warnings: &mut warnings };
+    let (guessed, reason) = up::guess(&statements.comments, &meshes, &placed, otherwise);
+    let mut reading = mtl::Reading { file, options, colored, resolver: &mut resolver, budget, warnings: &mut warnings };
     let unnamed = vec![None; meshes.len() + wires.len()];
     let materials = mtl::load(&[], &unnamed, &mut reading);
     let up = options.up.unwrap_or(guessed);

@@ -56,6 +56,7 @@ pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Resu
     let coding = color::settle(&mut statements.soup.colors);
     coding.warning(["obj-color-bytes", "obj-color-range"], file).into_iter().for_each(|told| warnings.push(told));
     let soup = std::mem::take(&mut statements.soup);
+    let colored = !soup.colors.is_empty();
     let placed = place(&soup.positions);
     let flatness = assemble::flatness(&placed.positions, statements.places);
     let mut assembled = assemble::assemble(&statements, &soup, &placed, options.polygons, flatness);
@@ -71,10 +72,10 @@ pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Resu
 
     // Which way is up, what everything is made of, and where it stands.
     let (runs, meshes): (Vec<u32>, Vec<Mesh>) = std::mem::take(&mut assembled.meshes).into_iter().unzip();
-    let (guessed, reason) = up::guess(&statements.comments, &meshes, placed.center, up::UNSAID);
+    let (guessed, reason) = up::guess(&statements.comments, &meshes, &placed, up::UNSAID);
     let name = |run: &u32| statements.runs[*run as usize].material.map(|id| statements.names[id as usize].as_str());
     let names: Vec<Option<&str>> = runs.iter().chain(&wire_runs).map(name).collect();
-    let mut reading = mtl::Reading { file, options, resolver: &mut resolver, budget, warnings: &mut warnings };
+    let mut reading = mtl::Reading { file, options, colored, resolver: &mut resolver, budget, warnings: &mut warnings };
     let materials = mtl::load(&statements.libraries, &names, &mut reading);
     let (reading, decoding) = (resolver.reading(), materials.decoding);
     let of_wires = materials.of_name.get(meshes.len()..).unwrap_or_default();

@@ -1,6 +1,9 @@
 //! Number words as exporters write them -> words that every number parser reads.
 
+use crate::load::Diagnostic;
+use crate::load::paths::shorten;
 use std::borrow::Cow;
+use std::path::Path;
 
 /// A number word, checked.
 pub(super) struct Number<'a> {
@@ -85,6 +88,42 @@ pub(in crate::load) fn value(word: &[u8]) -> Option<f64> {
     parsed.or_else(|| is_none_spelled(word).then_some(f64::NAN))
 }
 
+/// Numbers of a text that are spelled with a decimal comma or FORTRAN's `d`: read all the same, and told.
+#[derive(Default)]
+pub(in crate::load) struct Respelled {
+    /// The first word, and its line.
+    first: Option<(u32, String)>,
+    count: u32,
+}
+
+impl Respelled {
+    /// The number that a whole word is: by [`value`], or once it is respelled.
+    pub(in crate::load) fn value(&mut self, line: u32, word: &[u8]) -> Option<f64> {
+        if let Some(value) = value(word) {
+            return Some(value);
+        }
+        let respelled = respelled(&String::from_utf8_lossy(word).to_ascii_lowercase());
+        let (length, _) = scan(respelled.as_bytes())?;
+        let value = (length == respelled.len()).then(|| respelled.parse().ok())??;
+        self.first.get_or_insert_with(|| (line, String::from_utf8_lossy(word).into_owned()));
+        self.count = self.count.saturating_add(1);
+        Some(value)
+    }
+
+    /// Tells of them, where there are any.
+    pub(in crate::load) fn told(self, code: &'static str, file: &Path) -> Option<Diagnostic> {
+        let (line, word) = self.first?;
+        let text = format!("`{}` is read with a decimal point and `e`", shorten(&word));
+        let warning = Diagnostic::new(code, file, line.to_string(), text).remedy("export it with decimal points");
+        Some(Diagnostic { count: self.count, ..warning })
+    }
+}
+
+/// With decimal points for commas, `e` for FORTRAN's `d`, and signs behind it.
+fn respelled(lower: &str) -> String {
+    lower.replace(',', ".").replace('d', "e").replace("+e", "e+").replace("-e", "e-")
+}
+
 /// Whether a word is `nan`, `inf` or what C libraries print for them: `-nan(ind)`, `1.#QNAN`.
 fn is_none_spelled(word: &[u8]) -> bool {
     let text = String::from_utf8_lossy(word).to_ascii_lowercase();
@@ -139,7 +178,7 @@ fn repair(word: &[u8]) -> Number<'_> {
     if is_none_spelled(word) {
         return Number { word: "nan".into(), places: None, odd: false };
     }
-    let respelled = text.replace(',', ".").replace('d', "e").replace("+e", "e+").replace("-e", "e-");
+    let respelled = respelled(&text);
     match scan(respelled.as_bytes()) {
         Some((end, _)) => odd(respelled[..end].into()),
         None => odd("nan".into()),

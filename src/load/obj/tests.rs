@@ -213,6 +213,15 @@ fn texture_coordinates_point_down_and_may_be_given_on_some_corners() {
 }
 
 #[test]
+fn colours_of_vertices_without_a_material_are_shown_as_they_are() {
+    let base = |text: &str| of(text).scene.materials[0].base_color;
+    let (white, plain) = (Vec3::ONE, Material::plain().base_color);
+    assert_eq!(base("v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\nf 1 2 3"), white);
+    assert_eq!(base("v 0 0 0 1 1 1\nv 1 0 0 1 1 1\nv 0 1 0 1 1 1\nusemtl lost\nf 1 2 3"), white);
+    assert!(base("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3") == plain && plain != white);
+}
+
+#[test]
 fn vertex_colors_are_decoded_and_missing_ones_are_white() {
     let loaded = of("v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0 0 0 0\nf 1 2 3");
     let expected = [Vec4::new(1.0, 0.0, 0.0, 1.0), Vec4::ONE, Vec4::new(0.0, 0.0, 0.0, 1.0)];

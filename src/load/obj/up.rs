@@ -1,10 +1,12 @@
 //! Which axis points up: OBJ does not say, nor do PLY and STL.
 //!
-//! Where nothing speaks for an axis the kind of file decides: an OBJ is +Y. There +Z is chosen only on evidence: a comment that says so, a comment of a program known to write +Z,
-//! or a model that stands on z = 0 with a flat bottom there, reaches to both sides of y = 0, and is not a thin plate
-//! (which may as well lean against a wall).
+//! Where nothing speaks for an axis the kind of file decides: an OBJ is +Y. There +Z is chosen only on evidence: a comment
+//! that says so, a comment of a program known to write +Z, coordinates of a map, or a model that stands on z = 0 with a
+//! flat bottom there, reaches to both sides of y = 0, and is not a thin plate (which may as well lean against a wall).
 
+use crate::load::place::Placed;
 use crate::math::DVec3;
+use crate::math::frame::{half_of, spread};
 use crate::scene::{Mesh, UpAxis};
 
 /// Programs that write +Z unless told otherwise, as their comments name them, in lower case.
@@ -27,11 +29,11 @@ const Z_WRITERS: [&str; 13] = [
 /// The up axis of an OBJ that gives no sign.
 pub(super) const UNSAID: (UpAxis, &str) = (UpAxis::Y, "OBJ does not say, and nothing speaks for +Z");
 
-/// Guesses from the comments, then from the shape, or else takes `otherwise`; the text says why.
+/// Guesses from the comments, then from the shape of meshes around the centre of all vertices, or else takes `otherwise`; the text says why.
 pub(super) fn guess(
     comments: &[String],
     meshes: &[Mesh],
-    center: DVec3,
+    placed: &Placed,
     otherwise: (UpAxis, &str),
 ) -> (UpAxis, String) {
     for comment in comments {
@@ -46,10 +48,25 @@ pub(super) fn guess(
     if let Some(comment) = comments.iter().find(writes_z) {
         return (UpAxis::Z, format!("written by a program that uses +Z: '{comment}'"));
     }
-    if stands_on_z(meshes, center) {
+    if lies_on_a_map(placed) {
+        return (UpAxis::Z, "x and y are eastings and northings, as on maps, and z is a height".into());
+    }
+    if stands_on_z(meshes, placed.center) {
         return (UpAxis::Z, "it stands on z = 0 with a flat bottom there".into());
     }
     (otherwise.0, otherwise.1.into())
+}
+
+/// Whether x and y of most vertices are as far from 0 as metres are on maps, and z is not: grids of whole countries begin
+/// outside of them.
+fn lies_on_a_map(placed: &Placed) -> bool {
+    /// Metres from the beginning of a grid; and heights on Earth.
+    const FAR: f64 = 1e5;
+    const HIGH: f64 = 1e4;
+    let place = |i: usize| placed.positions[i].as_dvec3() + placed.center;
+    let is_far = |lo: f64, hi: f64| lo > FAR || hi < -FAR;
+    half_of(spread(placed.positions.len()).map(place))
+        .is_some_and(|(lo, hi)| is_far(lo.x, hi.x) && is_far(lo.y, hi.y) && -HIGH < lo.z && hi.z < HIGH)
 }
 
 /// Whether the shape is that of something standing on z = 0 and not on, or behind, y = 0.
@@ -89,7 +106,7 @@ mod tests {
 
     fn up(comments: &[&str], mesh: &Mesh) -> UpAxis {
         let comments: Vec<_> = comments.iter().map(|&c| c.to_owned()).collect();
-        guess(&comments, std::slice::from_ref(mesh), DVec3::ZERO, UNSAID).0
+        guess(&comments, std::slice::from_ref(mesh), &Placed::default(), UNSAID).0
     }
 
     /// A pyramid with its square bottom at height 0 of axis `up`, and its mirror image.
@@ -98,6 +115,21 @@ mod tests {
         let turn = |[a, b, c]: [f32; 3]| if up == 2 { Vec3::new(a, b, c) } else { Vec3::new(b, c, a) };
         let triangles = vec![[0, 2, 1], [0, 3, 2], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]];
         Mesh { positions: corners.map(turn).to_vec(), triangles, ..Mesh::default() }
+    }
+
+    #[test]
+    fn eastings_and_northings_speak_for_z() {
+        let at = |x: f64, y: f64, z: f64| {
+            let mut positions = vec![Vec3::ZERO, Vec3::new(600.0, 600.0, 80.0), Vec3::new(20.0, 7.0, 30.0)];
+            positions.resize(9, Vec3::ONE);
+            // A vertex that was left at 0.
+            positions.push(-DVec3::new(x, y, z).as_vec3());
+            guess(&[], &[], &Placed { center: DVec3::new(x, y, z), positions, ..Placed::default() }, UNSAID).0
+        };
+        assert_eq!([at(432_100.0, 5_411_222.0, 302.0), at(-3.2e5, -1.1e6, 0.0)], [UpAxis::Z; 2]);
+        // Heights along y, and things that just stand far away.
+        assert_eq!([at(432_100.0, 302.0, 5_411_222.0), at(1e5, 1e5, 1e5), at(0.0, 0.0, 0.0)], [UpAxis::Y; 3]);
+        assert_eq!(guess(&[], &[], &Placed::default(), UNSAID).0, UpAxis::Y, "nothing is nowhere");
     }
 
     #[test]

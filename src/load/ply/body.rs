@@ -1,7 +1,7 @@
 //! The values of a PLY file, one after another, as text or as bytes.
 
 use super::header::{Element, Encoding, Header, Kind};
-use crate::load::obj::number;
+use crate::load::obj::number::{self, Respelled};
 use crate::load::paths::shorten;
 use crate::load::{Diagnostic, Source};
 use std::path::Path;
@@ -16,6 +16,7 @@ pub(super) struct Body<'a> {
     line: u32,
     /// Decimal places of the finest number of a text.
     pub places: i32,
+    pub respelled: Respelled,
 }
 
 /// Why there is no value.
@@ -31,7 +32,15 @@ impl<'a> Body<'a> {
     pub(super) fn new(header: &Header, source: &'a Source) -> Self {
         let line = header.lines.saturating_add(1);
         let (file, bytes) = (source.path.as_path(), source.bytes.as_slice());
-        Self { file, bytes, at: header.length, encoding: header.encoding, line, places: 0 }
+        Self {
+            file,
+            bytes,
+            at: header.length,
+            encoding: header.encoding,
+            line,
+            places: 0,
+            respelled: Respelled::default(),
+        }
     }
 
     /// A fault of the value read last, or of the one that is missing.
@@ -130,7 +139,7 @@ impl<'a> Body<'a> {
         let length = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
         let word = &rest[..length];
         let lost = || Missing::Word(String::from_utf8_lossy(word).into_owned());
-        let value = number::value(word).ok_or_else(lost)?;
+        let value = self.respelled.value(self.line, word).ok_or_else(lost)?;
         self.at += length;
         Ok(value)
     }

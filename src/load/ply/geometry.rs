@@ -26,6 +26,7 @@ pub(super) fn read(header: &Header, source: &Source, budget: &mut Budget) -> Res
     bare.comments.clone_from(&header.comments);
     bare.told = passed_over(header, &source.path);
     bare.told.extend(behind);
+    bare.told.extend(body.respelled.told("ply-number", &source.path));
     Ok(bare)
 }
 

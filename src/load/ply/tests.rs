@@ -371,6 +371,16 @@ fn normals_that_are_no_numbers_as_c_prints_them_are_none() {
 }
 
 #[test]
+fn decimal_commas_are_read_and_told() {
+    let colors = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+    let loaded = triangle(colors, "", "", ["255 0 0", "0 255,0 0", "0 0 255"], "");
+    assert_eq!((loaded.warnings.len(), loaded.warnings[0].code), (1, "ply-number"), "{:?}", loaded.warnings);
+    assert!(loaded.warnings[0].text.starts_with("`255,0` is read"), "{}", loaded.warnings[0].text);
+    let mesh = &loaded.scene.meshes[0];
+    assert_eq!((mesh.colors[1], loaded.scene.materials[0].base_color), (Vec4::new(0.0, 1.0, 0.0, 1.0), Vec3::ONE));
+}
+
+#[test]
 fn what_two_properties_say_is_what_the_first_says_and_the_other_is_told() {
     let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
                property float s\nproperty float t\nproperty float u\nproperty float v\nproperty float x\n\

@@ -186,3 +186,15 @@ fn corners_that_are_no_numbers_as_c_prints_them_cost_their_facet() {
     let loaded = plain(text().replacen("1.500", "-nan(ind)", 1).as_bytes());
     assert_eq!((loaded.facts.faces, loaded.warnings[0].code), (3, "face-not-finite"));
 }
+
+#[test]
+fn decimal_commas_are_read_and_told_once() {
+    let told = |file: String| plain(file.as_bytes()).warnings.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let (points, commas) = (text(), text().replace("1.500", "1,500"));
+    assert_eq!(plain(commas.as_bytes()).scene.meshes[0].positions, plain(points.as_bytes()).scene.meshes[0].positions);
+    let count = commas.matches("1,500").count();
+    let warning = told(commas);
+    assert!(warning.len() == 1 && count > 1, "{warning:?}");
+    assert!(warning[0].starts_with("a.stl:13: `1,500` is read with a decimal point and `e`"), "{warning:?}");
+    assert!(warning[0].contains(&count.to_string()), "{warning:?}");
+}

@@ -5,7 +5,7 @@
 
 use super::Triangles;
 use crate::load::obj::bare::Bare;
-use crate::load::obj::number;
+use crate::load::obj::number::{self, Respelled};
 use crate::load::paths::shorten;
 use crate::load::{Diagnostic, Source};
 use crate::math::DVec3;
@@ -17,7 +17,8 @@ use std::path::Path;
 /// At the first word that is out of place, with its line. A solid without its end may be whole all the same; a warning says
 /// so.
 pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnostic> {
-    let mut words = Words { file: &source.path, bytes: &source.bytes, at: 0, line: 1, places: 0 };
+    let mut words =
+        Words { file: &source.path, bytes: &source.bytes, at: 0, line: 1, places: 0, respelled: Respelled::default() };
     // A byte-order mark.
     words.at = if source.bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
     let (mut names, mut open) = (Vec::new(), false);
@@ -42,6 +43,7 @@ pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnost
     let mut bare = out.bare;
     bare.places = Some(words.places);
     bare.comments = names;
+    bare.told.extend(words.respelled.told("stl-number", &source.path));
     if open {
         let place = words.line.to_string();
         let warning = Diagnostic::new("stl-no-end", &source.path, place, "the file ends without `endsolid`");
@@ -81,6 +83,7 @@ struct Words<'a> {
     line: u32,
     /// Decimal places of the finest number.
     places: i32,
+    respelled: Respelled,
 }
 
 impl<'a> Words<'a> {
@@ -140,6 +143,6 @@ impl<'a> Words<'a> {
             self.places = self.places.max(plain.places);
             return Ok(plain.value);
         }
-        number::value(word).ok_or_else(|| self.fault(word, "a number"))
+        self.respelled.value(self.line, word).ok_or_else(|| self.fault(word, "a number"))
     }
 }

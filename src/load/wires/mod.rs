@@ -61,6 +61,11 @@ pub struct WireFacts {
 }
 
 impl WireFacts {
+    /// Width of the narrower ones, world units; `None` where there are neither.
+    pub fn narrowest(&self) -> Option<f64> {
+        [self.point_width, self.line_width].into_iter().filter(|&width| width > 0.0).reduce(f64::min)
+    }
+
     /// Adds those of another file; the larger width is told.
     pub fn append(&mut self, more: &Self) {
         self.points += more.points;

@@ -219,6 +219,18 @@ fn a_missing_or_broken_image_costs_its_map_and_a_warning() {
     }
 }
 
+#[test]
+fn a_texture_without_an_image_is_told() {
+    let mut file = Builder::new();
+    let positions = file.triangle();
+    file.primitive(json!({"attributes": {"POSITION": positions}, "material": 0}));
+    file.set("textures", json!([{}]));
+    file.set("materials", json!([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]));
+    let loaded = file.load();
+    let told: Vec<String> = loaded.warnings.iter().map(ToString::to_string).collect();
+    assert_eq!(told.iter().filter(|t| t.contains("textures[0]: the texture names no image")).count(), 1, "{told:?}");
+}
+
 // Where names in another case are other files.
 #[cfg(target_os = "linux")]
 #[test]

@@ -13,6 +13,7 @@ use super::lines::without_comment;
 use crate::load::limits::{Budget, Limits};
 use crate::load::paths::{Found, Resolver, shorten, taken_from};
 use crate::load::{Diagnostic, LoadOptions, MtlMode, Warnings};
+use crate::math::Vec3;
 use crate::scene::{Bitmap, Material, Texture};
 use crate::stopwatch::Spent;
 use library::Finder;
@@ -39,6 +40,8 @@ pub(super) struct Reading<'a> {
     /// The model.
     pub file: &'a Path,
     pub options: &'a LoadOptions,
+    /// Whether vertices have colours: what has no material but those shows them as they are.
+    pub colored: bool,
     pub resolver: &'a mut Resolver,
     pub budget: &'a mut Budget,
     pub warnings: &'a mut Warnings,
@@ -93,7 +96,7 @@ pub(super) fn load(libraries: &[(u32, String)], names: &[Option<&str>], reading:
                 next
             }),
             None => *plain.entry(name.unwrap_or_default()).or_insert_with(|| {
-                out.materials.push(plain_material(name.unwrap_or_default()));
+                out.materials.push(plain_material(name.unwrap_or_default(), reading.colored));
                 next
             }),
         };
@@ -226,8 +229,11 @@ fn warn_of_redefined(read: &[Read], used: &[(usize, usize)], warnings: &mut Warn
     }
 }
 
-fn plain_material(name: &str) -> Material {
-    let plain = Material::plain();
+fn plain_material(name: &str, colored: bool) -> Material {
+    let mut plain = Material::plain();
+    if colored {
+        plain.base_color = Vec3::ONE;
+    }
     if name.is_empty() { plain } else { Material { name: name.into(), ..plain } }
 }
 
