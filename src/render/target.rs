@@ -6,6 +6,7 @@
 //! about the forecast, and as that is planned to be too large, a third rendering, seldom a fourth, makes it what was asked.
 
 use super::context::Context;
+use super::forecast::Interval;
 use super::observer::Observer;
 use super::part::{Measure, Part, squared_errors, squares};
 use super::sampling::{Sampled, Sampling, Stochastic, Targeted};
@@ -103,7 +104,7 @@ pub(super) fn plan<P: Observer>(
         cpu: 0.0,
         counts: Vec::new(),
     };
-    let (mut error, mut before) = (3.0 * wanted, None);
+    let (mut error, mut before, mut most) = (3.0 * wanted, None, f64::INFINITY);
     for left in (0..TRIES).rev() {
         error = error.clamp(*RANGE.start(), *RANGE.end());
         plan.how.error = single(error);
@@ -112,7 +113,8 @@ pub(super) fn plan<P: Observer>(
             parts.push(Part::<P>::render(job, context, &plan.settings(job.settings, number), &squares, progress)?);
         }
         let squared = squared_errors(&measure, &parts[0], &parts[1]);
-        plan.rmse = (squared.iter().sum::<f64>() / squared.len().max(1) as f64).sqrt();
+        let of_all = Interval::of_mean(&squared, 1.0).map(f64::sqrt);
+        (plan.rmse, most) = (of_all.value, of_all.high);
         let pixels = f64::from(job.settings.width) * f64::from(job.settings.height);
         plan.cpu = parts.iter().map(|part| part.seconds_per_pixel() * pixels * 0.5).sum();
         let samples = parts.iter().map(|part| part.samples_per_pixel() * 0.5).sum();
@@ -140,8 +142,14 @@ pub(super) fn plan<P: Observer>(
         plan.how.min_samples = fewest;
         error *= libm::pow(1.0 / off.clamp(0.05, 20.0), 1.0 / plan.slope);
     }
-    // Where the fewest samples do already, there is no use in doing it twice.
-    plan.work = if plan.rmse <= target { 1.0 } else { 2.0 * OVER * OVER };
+    // Where the fewest samples surely do already, there is no use in doing it twice; where they nearly do, twice is enough.
+    plan.work = if most <= target {
+        1.0
+    } else if plan.rmse <= CLOSE * std::f64::consts::SQRT_2 * target {
+        2.0
+    } else {
+        2.0 * OVER * OVER
+    };
     Some(plan)
 }
 
