@@ -121,7 +121,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     /// Whether light that is let in here has all its wavelengths still, and loses sight of some.
     fn splits<G>(&self, point: &Point<G>) -> bool {
         let disperses = point.matter.refraction().is_some_and(|(_, dispersion)| dispersion > 0.0);
-        disperses && point.path.band.is_none()
+        disperses && point.matter.lets_light_in() && point.path.band.is_none()
     }
 
     /// Spreads rays over what a rough surface mirrors and lets through: several off the first, one off what those find.

@@ -94,6 +94,17 @@ impl Lobe {
         Level::best().run(Albedo { lobe: self, view }) / DRAWN as f32
     }
 
+    /// The same seen at this cosine to the normal, where each facet mirrors a share by the cosine between it and the view; of a
+    /// lobe that has no grain.
+    pub(super) fn mirrored(&self, cosine: f32, share: impl Fn(f32) -> f32) -> f32 {
+        let cosine = cosine.clamp(0.0, 1.0);
+        let view = self.along * (1.0 - cosine * cosine).sqrt() + self.normal * cosine;
+        let [at, cos, sin] = &*PATTERN;
+        let facets = (0..DRAWN).map(|k| self.facet_turned(view, at[k], [cos[k], sin[k]]));
+        let sent = facets.map(|facet| share(view.dot(facet)) * self.sent(view, reflect(-view, facet)));
+        sent.sum::<f32>() / DRAWN as f32
+    }
+
     #[inline(always)]
     fn length(&self, v: Vec3) -> f32 {
         let [wide, narrow] = self.alpha;

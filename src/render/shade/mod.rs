@@ -327,9 +327,7 @@ impl Matter {
         let below = match &self.model {
             Model::Unlit(_) => Vec3::ZERO,
             Model::Phong(m) if !self.outside => m.scattered(normal, light.to_light) * light.strength(),
-            Model::MetalRough(m) if !self.outside => {
-                m.lit_by(normal, view, light.to_light, |_| 0.0) * light.irradiance()
-            }
+            Model::MetalRough(m) if !self.outside => m.lit_inside(normal, view, light.to_light) * light.irradiance(),
             Model::Phong(m) => m.lit(normal, view, light.to_light) * light.strength(),
             Model::MetalRough(m) => {
                 let to_light = light.to_light;
@@ -382,6 +380,15 @@ impl Matter {
     /// The normal of the lacquer over it, and the weight of the mirror ray off that.
     pub(crate) fn lacquer(&self) -> Option<(Vec3, f32)> {
         self.coat.as_ref().map(|coat| (coat.normal, coat.mirrored()))
+    }
+
+    /// Whether light passes through it here.
+    pub(crate) fn lets_light_in(&self) -> bool {
+        match &self.model {
+            Model::Phong(m) => m.transmission != Vec3::ZERO,
+            Model::MetalRough(m) => m.lets_light_in(),
+            Model::Unlit(_) => false,
+        }
     }
 
     /// Index of refraction of the inside (1: rays pass straight on), and its dispersion; `None` where there is no inside.

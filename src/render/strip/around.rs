@@ -285,6 +285,8 @@ fn look<S: Simd>(
             mirrored: get(&to.mirrored, i) + ambient,
             open: to.open[i],
             outside: outside(i),
+            // What scatters inside of itself has no strips.
+            turned_back: 0.0,
         };
         let matter = m.matter(i);
         put(&mut to.radiance, i, m.emission(i) + matter.around(&around, matter.rebound(m.mean_albedo(&to.mean, i))).0);

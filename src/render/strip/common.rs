@@ -36,7 +36,7 @@ pub(crate) struct Glass {
 impl Common {
     /// `None` for materials with a grain, film, sheen or lacquer, for those that scatter light through, for those with maps of
     /// their reflectance, for those that are nowhere there as a whole, and for what lets light through, unless it is
-    /// metallic-rough and rays go through it.
+    /// metallic-rough and rays go through it without being scattered inside.
     pub(crate) fn of(
         (number, material): (u32, &Material),
         store: &TextureStore,
@@ -52,7 +52,7 @@ impl Common {
         let mut matter = Matter::without_maps(material, store);
         let glass = material.surface.transmits();
         if glass {
-            metal_rough.filter(|_| bounces && gloss.spreads(material))?;
+            metal_rough.filter(|m| bounces && gloss.spreads(material) && !scatters_inside(m))?;
             matter.spread_by_rays();
         }
         let mirrors = match &matter.model {
@@ -86,6 +86,11 @@ impl Glass {
         let changes = material.metal_rough().is_some_and(changes);
         Self { has_inside, is_dark_inside: has_inside && !changes && matter.is_dark_inside() }
     }
+}
+
+/// Whether light that was let in may be scattered from inside: what is left for that is found for each point.
+fn scatters_inside(m: &MetalRough) -> bool {
+    m.thick && (m.transmission < 1.0 || m.transmission_map.is_some())
 }
 
 /// Whether it has maps of more than its colour, roughness and metalness, and of what passes through. How thick it is matters

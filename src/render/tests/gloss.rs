@@ -97,8 +97,14 @@ fn frosted_glass_in_a_furnace_loses_next_to_nothing() {
 #[test]
 fn what_is_part_glass_and_part_metal_gives_off_no_more_than_it_gets() {
     for (metallic, transmission) in [(1.0, 1.0), (0.5, 1.0), (0.5, 0.5), (0.0, 0.5), (1.0, 0.3)] {
-        let whole = transmission == 1.0;
-        for (roughness, thick, ior) in [(0.5, false, 1.5), (1.0, false, 1.5), (1.0, whole, 1.5), (1.0, whole, 3.0)] {
+        for (roughness, thick, ior) in [
+            (0.5, false, 1.5),
+            (1.0, false, 1.5),
+            (0.2, true, 1.5),
+            (0.5, true, 2.4),
+            (1.0, true, 1.5),
+            (1.0, true, 3.0),
+        ] {
             let mut s = looking_down(5.0);
             let thickness = f32::from(thick);
             let model =
@@ -134,6 +140,31 @@ fn a_spread_ray_stands_for_the_less_of_its_lobe_the_more_samples_a_pixel_may_hav
     assert_eq!([1, 4, 64].map(|samples| width(Sampling::Uniform, samples)), [1.0, 0.5, 0.125]);
     let most = Stochastic { max_samples: 256, ..Stochastic::default() };
     assert_eq!(width(Sampling::Stochastic(most), 1), 0.0625);
+}
+
+#[test]
+fn what_lets_no_light_in_does_not_disperse_it() {
+    for (metallic, transmission) in [(1.0, 1.0), (1.0, 0.0), (0.0, 0.0)] {
+        let of = |dispersion, everything| {
+            let model = MetalRough {
+                metallic,
+                transmission,
+                dispersion,
+                roughness: 0.4,
+                thick: true,
+                thickness: 1.0,
+                ..MetalRough::default()
+            };
+            let mut s = looking_down(5.0);
+            s.square(0.0, 9.0, rough(model));
+            s.scene.environment = Environment::Constant(Vec3::ONE);
+            (s.settings.samples, s.settings.gloss_rays, s.settings.everything) = (16, Some(4), everything);
+            s.color()
+        };
+        assert_near(of(5.0, false), of(0.0, false), 1e-6);
+        assert_near(of(5.0, true), of(5.0, false), 1e-6);
+        assert!(of(5.0, false).x > 0.9);
+    }
 }
 
 /// What a white furnace shows of a thing of this glass.

@@ -12,7 +12,7 @@
 
 use super::facets::{AlbedoRow, albedo, mean_albedo, rebound};
 use super::highlight::{NARROWEST_HIGHLIGHT, highlight, is_narrow, least_square, squared_width};
-use super::{Balance, GrainMatter, Reader, Seen, Sky, film};
+use super::{Balance, GrainMatter, Lobe, Reader, Seen, Sky, film};
 use crate::math::formula::{exp2, root, smoothstep};
 use crate::math::{Vec3, Vec4};
 use crate::render::optics::{fresnel_dielectric, fresnel_schlick, transmittance};
@@ -102,6 +102,8 @@ pub(crate) struct Around {
     pub open: f32,
     /// Whether it is seen from outside.
     pub outside: bool,
+    /// What is turned back from inside before it is scattered, at least.
+    pub turned_back: f32,
 }
 
 /// `metallic` with its map.
@@ -340,6 +342,7 @@ impl MetalRoughMatter {
             mirrored: if looked_up { mirrored() + ambient } else { Vec3::ZERO },
             open: if looked_up { open(n_v, self.occlusion, roughness) } else { 0.0 },
             outside: seen.outside,
+            turned_back: self.turned_back(n_v, seen.outside),
         };
         let rebound = if self.metallic > 0.0 { self.rebound(mean_albedo(roughness)) } else { Vec3::ZERO };
         let (mut sum, taken) = self.around(&around, rebound);
@@ -364,7 +367,28 @@ impl MetalRoughMatter {
             Some(grain) => grain.highlight(normal, view, to),
         };
         let through = if self.is_translucent() { self.lit_through(normal, view, to) } else { Vec3::ZERO };
-        (self.lit_by(normal, view, to, |between| lobe(between) * looked_up) + through) * self.occlusion
+        let left = 1.0 - self.turned_back(normal.dot(view), seen.outside);
+        (self.lit_by(normal, view, to, |between| lobe(between) * looked_up) * left + through) * self.occlusion
+    }
+
+    /// BRDF × N·L of what is seen from inside: no highlight, and nothing of what is turned back.
+    pub(super) fn lit_inside(&self, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
+        self.lit_by(normal, view, to_light, |_| 0.0) * (1.0 - self.turned_back(normal.dot(view), false))
+    }
+
+    /// Share of the light along a direction from inside that its facets turn back: what is scattered lies below, so that both
+    /// and what passes through are no more than there is. 0 from outside, and where nothing is scattered.
+    fn turned_back(&self, cosine: f32, outside: bool) -> f32 {
+        let scatters = self.transmission < 1.0 && self.metallic < 1.0;
+        if outside || !scatters || !self.thick || !self.lets_light_in() || self.ior <= 0.0 {
+            return 0.0;
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "a share of light")]
+        let share = |cosine: f32| fresnel_dielectric(f64::from(cosine), f64::from(self.ior), 1.0) as f32;
+        match self.spreads() {
+            Some(alpha) => Lobe::even(Vec3::Z, alpha).mirrored(cosine, share),
+            None => share(cosine),
+        }
     }
 
     /// Roughness of the lobe that is looked up, if one is.
@@ -382,7 +406,7 @@ impl MetalRoughMatter {
         let (scale, bias) = around.shares;
         let (dielectric, metal) = (self.f0 * scale + self.f90 * bias, self.metal_f0 * scale + bias);
 
-        let taken = self.fresnel(around.n_v).0.lerp(dielectric, rough).max_element();
+        let taken = self.fresnel(around.n_v).0.lerp(dielectric, rough).max_element().max(around.turned_back);
         let diffuse = self.scattered() * (1.0 - taken).max(0.0) * self.occlusion;
         let mirrored = dielectric.lerp(metal, self.metallic) * around.mirrored * (looked_up * around.open);
         let lost = (1.0 - scale - bias).max(0.0);
@@ -456,6 +480,11 @@ impl MetalRoughMatter {
     pub(crate) fn reflected(&self, cosine: f32) -> Vec3 {
         let (dielectric, metal) = self.fresnel(cosine);
         self.mirrored(dielectric, metal, true)
+    }
+
+    /// Whether light passes through it here.
+    pub(super) fn lets_light_in(&self) -> bool {
+        self.transmission > 0.0 && self.metallic < 1.0
     }
 
     /// What passes through of the light along one direction when `open` of it enters.
