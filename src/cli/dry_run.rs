@@ -66,15 +66,16 @@ impl Told<'_> {
         lines.push((
             "error",
             match rmse {
-                Some(rmse) => range(rmse, |e| format!("{e:.4}")),
+                Some(rmse) => range(rmse, |e| if 0.0 < e && e < 5e-4 { format!("{e:.1e}") } else { format!("{e:.4}") }),
                 None => "not known: every rendering has the same samples, so none tells how wrong they are".into(),
             },
         ));
         lines.extend(self.memory.map(|held| ("memory", bytes(held))));
         let mut text = format!(
-            "{}, {}: {}×{}, foretold from {:.1} % of the pixels, with 95 % confidence; nothing is written\n",
+            "{}, {}{}: {}×{}, foretold from {:.1} % of the pixels, with 95 % confidence; nothing is written\n",
             self.which.file.display(),
             self.which.view,
+            self.which.target.path().map_or(String::new(), |path| format!(", as {}", path.display())),
             settings.width,
             settings.height,
             100.0 * looked_at as f64 / pixels.max(1) as f64

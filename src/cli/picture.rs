@@ -62,6 +62,12 @@ impl Effective {
         self.settings.sampling = look.sampling.written(self.settings.sampling, kind, &self.output);
     }
 
+    /// The same for a picture of a model about so large that has points or lines so narrow, world units.
+    pub(super) fn of_wires(&mut self, look: &Look, narrowest: f64, size: f64) {
+        let pixels = narrowest / size * f64::from(self.settings.height.min(self.settings.width));
+        self.settings.sampling = look.sampling.of_wires(self.settings.sampling, pixels);
+    }
+
     /// Width / height.
     pub(super) fn aspect(&self) -> f64 {
         f64::from(self.settings.width) / f64::from(self.settings.height)
@@ -79,11 +85,19 @@ impl Effective {
 const BACKDROP: crate::math::Vec3 = crate::math::Vec3::splat(0.07);
 
 /// What is behind everything: as typed, as the file says, or what reflections see; dark grey where they see nothing.
-pub(super) fn background(look: &Look, scene: &Scene) -> Background {
-    look.background.or(scene.background).unwrap_or(match scene.environment {
+pub(super) fn background(typed: Option<Background>, scene: &Scene) -> Background {
+    typed.or(scene.background).unwrap_or(match scene.environment {
         Environment::Black => Background::Color(BACKDROP),
         Environment::Constant(_) | Environment::Studio | Environment::Panorama => Background::Environment,
     })
+}
+
+/// Writes pictures of a scene with that background.
+pub(super) fn before(background: Option<Background>, mut output: Output) -> Output {
+    if let Some(Background::Color(color)) = background {
+        output.background = Some(color.to_array());
+    }
+    output
 }
 
 /// What is found out about a picture behind it.
@@ -177,10 +191,7 @@ pub(super) fn encoded(
     background: Option<Background>,
     metadata: &Metadata,
 ) -> Result<Vec<u8>, WriteError> {
-    let mut output = effective.output.clone();
-    if let Some(Background::Color(color)) = background {
-        output.background = Some(color.to_array());
-    }
+    let output = before(background, effective.output.clone());
     encode(picture, shot.kind, &output, metadata).map_err(|e| WriteError::new(shot, e.to_string()))
 }
 

@@ -44,7 +44,7 @@ pub(super) struct SamplingArgs {
     #[arg(long, value_name = "PERCENT", value_parser = parse::confidence, help_heading = "Quality", hide_short_help = true)]
     pub confidence: Option<f64>,
     /// Fewest rays of a pixel of stochastic sampling, enough where they and those of its neighbours agree; the next power of
-    /// two is taken. Light, gloss and environment rays are divided by it, by 4 at least [default: 1, with --aperture 16]
+    /// two is taken. Light, gloss and environment rays are divided by it, by 4 at least [default: 1; 16 with --aperture, and for points and lines narrower than 2 pixels]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536), help_heading = "Quality",
           hide_short_help = true)]
     pub min_samples: Option<u32>,
@@ -110,6 +110,10 @@ pub(super) enum SpaceArg {
 /// Samples that a pixel gets at least through an open lens: what is out of focus shows in a few rays of many pixels, and that
 /// one ray of each shows the same tells nothing.
 const FEWEST_OF_LENS: u32 = 16;
+
+/// The same where points and lines are narrower than so many pixels: one ray in each pixel may pass them all.
+const FEWEST_OF_WIRES: u32 = 16;
+const NARROW: f64 = 2.0;
 
 impl SamplingArgs {
     /// Refuses flags that belong to different kinds of sampling.
@@ -229,6 +233,17 @@ impl SamplingArgs {
         }
     }
 
+    /// The same sampling for a picture of points and lines about so many pixels wide.
+    pub(super) fn of_wires(&self, sampling: Sampling, pixels: f64) -> Sampling {
+        match sampling {
+            Sampling::Stochastic(how) if self.min_samples.is_none() && pixels < NARROW => {
+                let min_samples = how.min_samples.max(FEWEST_OF_WIRES).min(how.max_samples);
+                Sampling::Stochastic(Stochastic { min_samples, ..how })
+            }
+            _ => sampling,
+        }
+    }
+
     /// The same sampling for a picture that is written as this kind of file, developed like that.
     pub(super) fn written(&self, sampling: Sampling, kind: FileKind, output: &Output) -> Sampling {
         let linear = match self.error_space {
@@ -325,7 +340,7 @@ pub(super) fn phrase(settings: &Settings, sampled: &Sampled) -> String {
             let percent = |n: u64| 100.0 * n as f64 / sampled.pixels.max(1) as f64;
             let rmse = sampled.rmse().unwrap_or(0.0);
             format!(
-                "{rays}, {:.1} % of pixels within {} at {} %, error about {rmse:.4} at most, {:.0} % of the rays to spare",
+                "{rays}, of what they met {:.1} % of pixels within {} at {} %, error about {rmse:.4} at most, {:.0} % of the rays to spare",
                 percent(sampled.met),
                 how.error,
                 100.0 * how.confidence,
@@ -370,6 +385,19 @@ mod tests {
     fn kind(args: SamplingArgs) -> (u32, Sampling) {
         args.check().unwrap();
         args.sampling(&RenderHints::default())
+    }
+
+    #[test]
+    fn narrow_points_and_lines_are_looked_for_in_every_pixel_unless_fewer_rays_are_asked_for() {
+        let fewest =
+            |args: &SamplingArgs, pixels: f64| match args.of_wires(args.sampling(&RenderHints::default()).1, pixels) {
+                Sampling::Stochastic(how) => how.min_samples,
+                other => panic!("{other:?}"),
+            };
+        let usual = SamplingArgs::default();
+        let fewer = SamplingArgs { min_samples: Some(2), ..usual.clone() };
+        let few = SamplingArgs { max_samples: Some(8), ..usual.clone() };
+        assert_eq!([fewest(&usual, 1.9), fewest(&usual, 2.1), fewest(&fewer, 0.1), fewest(&few, 0.1)], [16, 1, 2, 8]);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::args::{EyeArgs, ModelArgs};
 use super::camera::{self, Choice};
 use super::exit::Exit;
 use super::message::{Messages, Severity};
-use super::read;
+use super::{picture, read};
 use crate::load::{Diagnostic, Loaded};
 use crate::render::{Settings, View, World};
 use crate::scene::RenderHints;
@@ -49,5 +49,6 @@ pub(super) fn model(
     let (camera, phrase) =
         camera::camera(&Choice::of(eye, None), None, &loaded.scene, &bounds, aspect, file).map_err(fail)?;
     default_light::add_if_missing(&mut loaded.scene, &camera);
+    loaded.scene.background = Some(picture::background(None, &loaded.scene));
     Ok(Seen { loaded, world, view: View::from_camera(&camera), phrase })
 }

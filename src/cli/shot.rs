@@ -21,7 +21,7 @@ use crate::render::texture::TextureStore;
 use crate::render::{Costs, Job, Rendered, Settings, View, World, render_costs};
 use crate::scene::default_light::DefaultLight;
 use crate::scene::framing::Bounds;
-use crate::scene::{Camera, Scene};
+use crate::scene::{Background, Camera, Scene};
 use std::path::Path;
 use std::time::Instant;
 
@@ -173,6 +173,9 @@ pub(super) fn render(task: &Task, shot: &Shot, stage: &mut Stage, so_far: &mut S
         }
         times.meter = metered.take_seconds();
         effective.written_as(&job.look, shot.kind);
+        if let Some(narrowest) = loaded.facts.wires.narrowest() {
+            effective.of_wires(&job.look, narrowest, 2.0 * bounds.radius());
+        }
         let work = Job { settings: &effective.settings, scene, world, accel, textures: &textures, view: &view };
         let (effective, reason, phrase) = (&effective, *reason, phrase.as_str());
         let prepared = Prepared { task, shot, effective, loaded, bounds, work, reason, phrase, light, is_frame };
@@ -237,6 +240,11 @@ impl Prepared<'_> {
             if job.strict {
                 return self.task.fail(&read::not_strict(1, self.task.file()), Exit::Input);
             }
+        }
+        if shot.kind == FileKind::Jpeg && work.scene.background == Some(Background::Transparent) {
+            let text = "JPEG has no transparency: what is transparent is white";
+            let warning = Diagnostic::new("jpeg-opaque", shot.target.path().unwrap_or(Path::new("-")), "", text);
+            messages.say(Severity::Warning, &warning.remedy("write PNG or WebP"));
         }
         profile.skip();
         // Until the picture is written the first signal ends no more than its rays.

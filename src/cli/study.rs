@@ -6,7 +6,7 @@ use super::job::Wrong;
 use super::message::{Messages, Severity};
 use super::seen::{self, Seen};
 use super::writable::{self, Sources};
-use super::{accident, interrupt, meter, print};
+use super::{accident, interrupt, meter, picture, print};
 use crate::accel::{AccelParams, auto};
 use crate::bench::study::report::{Format, text};
 use crate::bench::study::{Plan, Study, Subject, measure, reference, settings};
@@ -68,6 +68,7 @@ fn study(args: &StudyArgs, files: &[(PathBuf, Format)], name: &str, messages: &M
     });
     let metered = metered.flatten();
     let output = Output { tone_map, exposure: given.or(metered).unwrap_or(0.0), ..Output::default() };
+    let output = picture::before(loaded.scene.background, output);
     let phrase = metered.map_or(phrase.clone(), |stops| format!("{phrase}, {}", meter::phrase(stops)));
     let subject = Subject {
         scene: &loaded.scene,

@@ -45,7 +45,7 @@ pub(super) fn lit<T>(
     let (lights, environment) = (loaded.scene.lights.clone(), loaded.scene.environment);
     let background = loaded.scene.background;
     let light = light(look, &mut loaded.scene, camera);
-    loaded.scene.background = Some(picture::background(look, &loaded.scene));
+    loaded.scene.background = Some(picture::background(look.background, &loaded.scene));
     let done = work(loaded, light);
     let scene = &mut loaded.scene;
     (scene.lights, scene.environment, scene.background) = (lights, environment, background);

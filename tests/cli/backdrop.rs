@@ -66,3 +66,11 @@ fn metal_is_neither_dark_nor_blown_out_and_stands_out_from_the_backdrop() {
         assert!(metal > 3.0 * behind, "{view}: {metal} before {behind}");
     }
 }
+
+#[test]
+fn a_jpeg_cannot_be_transparent_and_says_so() {
+    let folder = Folder::with_cube();
+    let words = |name| ["cube.obj", "-o", name, "--background", "transparent"];
+    folder.render(&words("a.jpg")).ends(0).says(&["a.jpg: JPEG has no transparency", "PNG"]);
+    assert!(!folder.render(&words("a.png")).ends(0).stderr.contains("transparency"));
+}

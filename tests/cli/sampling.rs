@@ -129,7 +129,8 @@ fn a_dry_run_foretells_and_writes_nothing() {
     let views = ["render", "cube.obj", "--size", "32x24", "--dry-run", "--view", "front,iso", "-o", "{view}.png"];
     let run = folder.run(&views).ends(0);
     assert!(
-        run.text().contains("cube.obj, front view: ") && run.text().contains("cube.obj, iso view: "),
+        run.text().contains("cube.obj, front view, as front.png: ")
+            && run.text().contains("cube.obj, iso view, as iso.png: "),
         "{}",
         run.text()
     );

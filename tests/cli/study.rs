@@ -52,3 +52,18 @@ fn measured_lamps_are_exposed_as_they_are_in_a_picture() {
     assert!(run.text().contains(exposure), "{exposure}\n{}", run.text());
     assert!(!folder.run(&[&words[..], &["--exposure", "1"]].concat()).ends(0).text().contains("metered"));
 }
+
+#[test]
+fn what_is_studied_is_the_picture_before_its_background() {
+    let ball = "[[spheres]]\ncenter = [0, 0, 0]\nradius = 1\n";
+    for (background, channels) in [("white", 3), ("transparent", 4)] {
+        let scene = format!("background = \"{background}\"\n{ball}");
+        let folder = Folder::new().file("ball.toml", &scene);
+        let words = ["study", "ball.toml", "--size", "16x12", "--passes", "2", "--reference-samples", "64", "-q"];
+        folder.run(&[words.as_slice(), &["--report", "a.json"]].concat()).ends(0);
+        let json: Value = serde_json::from_slice(&folder.read("a.json")).unwrap();
+        assert_eq!(json["reference"]["channels"], channels, "{background}");
+        let rows = json["rows"].as_array().unwrap();
+        assert!(!rows.iter().any(|row| row["knob"] == "gloss-rays"), "nothing is frosted");
+    }
+}

@@ -4,6 +4,7 @@ use super::Subject;
 use crate::accel::IntersectorKind;
 use crate::render::{Adaptive, Quality, Sampling, Settings, Stochastic};
 use crate::scene::features::{Feature, Features};
+use crate::scene::{Material, MetalRough, Scene};
 use std::fmt;
 
 /// What is turned.
@@ -87,7 +88,8 @@ impl Knob {
     }
 
     /// Whether the scene has it.
-    fn is_in(self, features: &Features) -> bool {
+    fn is_in(self, features: &Features, scene: &Scene) -> bool {
+        let is_frosted = |m: &MetalRough| m.transmits() && m.roughness > 0.0;
         let any = |of: &[Feature]| of.iter().any(|&f| features.has(f));
         match self {
             Self::Quality | Self::Uniform | Self::Adaptive | Self::Stochastic => true,
@@ -95,7 +97,7 @@ impl Knob {
             Self::Depth | Self::Cutoff => any(&[Feature::Mirrors, Feature::Refraction, Feature::ThinTransmission]),
             Self::LightRays => any(&[Feature::SoftShadows]),
             Self::EnvRays => any(&[Feature::Panorama]),
-            Self::GlossRays => any(&[Feature::Refraction, Feature::ThinTransmission]),
+            Self::GlossRays => scene.materials.iter().filter_map(Material::metal_rough).any(is_frosted),
         }
     }
 }
@@ -122,7 +124,11 @@ pub struct Setting {
 /// Every setting of every knob that the scene has. What a knob does not turn is as at the usual quality.
 pub(super) fn settings(subject: &Subject) -> Vec<Setting> {
     let features = Features::of(subject.scene);
-    Knob::ALL.into_iter().filter(|knob| knob.is_in(&features)).flat_map(|knob| of(knob, subject)).collect()
+    Knob::ALL
+        .into_iter()
+        .filter(|knob| knob.is_in(&features, subject.scene))
+        .flat_map(|knob| of(knob, subject))
+        .collect()
 }
 
 fn of(knob: Knob, subject: &Subject) -> Vec<Setting> {

@@ -34,6 +34,8 @@ pub struct Row {
 pub struct Error {
     /// Root of the mean squared error of a rendering, the reference's own taken off.
     pub rmse: f64,
+    /// What is less than this cannot be told from 0, as the reference is off itself.
+    pub least: f64,
     /// How far a rendering is off the mean of all: what more samples lessen.
     pub noise: f64,
     /// How far the mean of all is off the reference: what no number of samples lessens.
@@ -44,6 +46,13 @@ pub struct Error {
     pub flip: f64,
     /// The column and row with the greatest error.
     pub worst: (u32, u32),
+}
+
+impl Error {
+    /// [`Self::rmse`] with so many digits, as far as it can be told.
+    pub fn told(&self, digits: usize) -> String {
+        if self.rmse < self.least { format!("<{:.digits$}", self.least) } else { format!("{:.digits$}", self.rmse) }
+    }
 }
 
 /// A square of pixels around the worst one, as displayed on black.
@@ -78,6 +87,9 @@ pub(super) fn measure(subject: &Subject, plan: &Plan, reference: &Reference, set
     Row { setting, cpu, wall, samples, error, crop }
 }
 
+/// The part of the reference's own error, which is an estimate, below which an error is not told from 0.
+const TOLD: f64 = 0.5;
+
 /// `pictures` are renderings of one setting, two at least.
 fn error(reference: &Reference, pictures: &[Vec<[f64; 4]>]) -> Error {
     let channels = reference.channels();
@@ -105,6 +117,7 @@ fn error(reference: &Reference, pictures: &[Vec<[f64; 4]>]) -> Error {
     let width = (reference.width as usize).max(1);
     Error {
         rmse: square.sqrt(),
+        least: TOLD * reference.error,
         noise: noise.sqrt(),
         bias: (square - noise).max(0.0).sqrt(),
         max,
@@ -178,6 +191,12 @@ mod tests {
         let found = error(&reference(0.06), &[all(0.4), all(0.4)]);
         assert!((found.rmse - 0.08).abs() < 1e-12);
         assert_eq!(error(&reference(0.2), &[all(0.4), all(0.4)]).rmse, 0.0);
+    }
+
+    #[test]
+    fn an_error_far_below_that_of_the_reference_is_told_as_less_than_can_be_known() {
+        let told = |off: f64| error(&reference(off), &[all(0.4), all(0.4)]).told(4);
+        assert_eq!([0.0, 0.06, 0.099].map(told), ["0.1000", "0.0800", "<0.0495"]);
     }
 
     #[test]

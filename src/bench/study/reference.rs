@@ -1,8 +1,7 @@
 //! What pictures are compared with.
 
 use super::{Plan, Subject};
-use crate::image::look::developed;
-use crate::image::{Picture, srgb};
+use crate::image::{Developer, Picture};
 use crate::render::{Sampling, Settings, Stochastic, render};
 use crate::scene::MAX_DEPTH;
 
@@ -14,7 +13,7 @@ const PARTS: u32 = 8;
 pub struct Reference {
     /// Columns.
     pub width: u32,
-    /// Codes 0..=1 of the picture as it is displayed, over black, and coverage; row by row.
+    /// Codes 0..=1 of the picture as it is displayed, without a background over black, and coverage; row by row.
     pub pixels: Vec<[f64; 4]>,
     /// Whether some pixel is not covered in full, so that coverage counts.
     pub is_transparent: bool,
@@ -52,8 +51,8 @@ impl Reference {
         }
         let height = u32::try_from(sums.len()).unwrap_or(u32::MAX).checked_div(width).unwrap_or(0);
         let mean = Picture { veil: means(&veils), ..Picture::of(width, height, means(&sums)) };
-        let is_transparent = mean.beauty.iter().any(|p| p[3] != 1.0);
         let pixels = codes(&mean, subject);
+        let is_transparent = pixels.iter().any(|p| p[3] != 1.0);
         let error = standard_error(&parts, channels(is_transparent));
         Some(Self { width, pixels, is_transparent, error, samples: samples * PARTS })
     }
@@ -89,11 +88,15 @@ fn channels(is_transparent: bool) -> usize {
     if is_transparent { 4 } else { 3 }
 }
 
-/// The codes of a picture as it is displayed.
+/// The codes of a picture as it is displayed: before its background, or as they are laid over black.
 pub(super) fn codes(picture: &Picture, subject: &Subject) -> Vec<[f64; 4]> {
-    let code = |c: f32| srgb::encode(f64::from(c).clamp(0.0, 1.0));
-    let shown = developed(picture, subject.output);
-    shown.beauty.iter().map(|&[r, g, b, a]| [code(r), code(g), code(b), f64::from(a)]).collect()
+    let developer = Developer::new(subject.output);
+    let veil = |i: usize| picture.veil.get(i).filter(|_| subject.output.background.is_some());
+    let coded = |(i, &pixel): (usize, &[f32; 4])| match veil(i) {
+        Some(&veil) => developer.coded_through_glass(pixel, veil),
+        None => developer.coded(pixel),
+    };
+    picture.beauty.iter().enumerate().map(coded).map(|pixel| pixel.map(f64::from)).collect()
 }
 
 /// Of the mean of all parts, over all pixels and channels.

@@ -28,7 +28,7 @@ pub(in crate::cli) struct RenderArgs {
     /// of heat maps too, replace only a picture that meshray wrote; a name given here replaces whatever is there.
     #[arg(short, long, value_name = "PATH", help_heading = "Output", allow_hyphen_values = true)]
     pub output: Option<String>,
-    /// Columns and rows of the picture [default: 1024x768]
+    /// Columns and rows of the picture; one number is a square [default: 1024x768]
     #[arg(long, value_name = "WxH", value_parser = parse::size, help_heading = "Output")]
     pub size: Option<(u32, u32)>,
     /// File type when the name does not say, as with `-o -`
@@ -172,7 +172,7 @@ pub(in crate::cli) struct RenderArgs {
     /// --frame N, only that one of them
     ///
     /// Pictures go to STEM.0000.png and so on, or to a template with {frame:04}.
-    #[arg(long, value_name = "A..B", value_parser = parse::frames, help_heading = "Animation", hide_short_help = true,
+    #[arg(long, value_name = "A..B", value_parser = parse::frames, allow_hyphen_values = true, help_heading = "Animation", hide_short_help = true,
           conflicts_with_all = ["time", "turntable"])]
     pub frames: Option<parse::Frames>,
     /// N pictures from all around, about the up axis, the view or camera being the first; with I/N, only number I of

@@ -127,7 +127,7 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
     let found = camera::camera(&Choice::of(&args.eye, args.up_vector), look.lens, &loaded.scene, &bounds, aspect, file);
     let (camera, view_phrase) = found.map_err(fail(Exit::Input))?;
     default_light::add_if_missing(&mut loaded.scene, &camera);
-    loaded.scene.background = Some(background(look, &loaded.scene));
+    loaded.scene.background = Some(background(look.background, &loaded.scene));
     let (accel, _) = world.structure(args.accel, params);
     let textures = TextureStore::new(&loaded.scene);
     let view = View::from_camera(&camera);

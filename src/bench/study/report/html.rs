@@ -102,10 +102,10 @@ fn plot(study: &Study) -> String {
         let (px, py) = at(row);
         let _ = write!(
             svg,
-            "<path class=\"{class}\" transform=\"translate({px:.1} {py:.1})\" d=\"{shape}\"><title>{}: {}, RMSE {:.4}</title></path>",
+            "<path class=\"{class}\" transform=\"translate({px:.1} {py:.1})\" d=\"{shape}\"><title>{}: {}, RMSE {}</title></path>",
             escaped(&row.setting.flags),
             seconds(row.cpu.median()),
-            row.error.rmse
+            escaped(&row.error.told(4))
         );
     }
     svg + "</svg>"
@@ -158,7 +158,7 @@ fn table(study: &Study) -> String {
         let e = row.error;
         let _ = writeln!(
             out,
-            "<tr><th>{}</th><td>{}</td><td>{}..{}</td><td>{}</td><td>{:.1}</td><td>{:.5}</td><td>{:.5}</td><td>{:.5}</td><td>{:.3}</td>\
+            "<tr><th>{}</th><td>{}</td><td>{}..{}</td><td>{}</td><td>{:.1}</td><td>{}</td><td>{:.5}</td><td>{:.5}</td><td>{:.3}</td>\
              <td>{:.4}</td><td>{}</td></tr>",
             escaped(&row.setting.flags),
             seconds(row.cpu.median()),
@@ -166,7 +166,7 @@ fn table(study: &Study) -> String {
             seconds(row.cpu.max()),
             seconds(row.wall.median()),
             row.samples,
-            e.rmse,
+            escaped(&e.told(5)),
             e.noise,
             e.bias,
             e.max,

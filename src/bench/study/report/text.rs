@@ -32,11 +32,11 @@ pub fn head(study: &Study) -> String {
 pub fn row(row: &Row) -> String {
     let error = row.error;
     format!(
-        "{:<38}{:>10}{:>10.1}{:>9.4}{:>9.4}{:>9.4}{:>8.3}{:>8.4}\n",
+        "{:<38}{:>10}{:>10.1}{:>9}{:>9.4}{:>9.4}{:>8.3}{:>8.4}\n",
         row.setting.flags,
         seconds(row.cpu.median()),
         row.samples,
-        error.rmse,
+        error.told(4),
         error.noise,
         error.bias,
         error.max,
@@ -50,7 +50,7 @@ pub fn conclusion(study: &Study) -> String {
     for i in study.front() {
         let row = &study.rows[i];
         // Writing to a string does not fail.
-        let _ = writeln!(out, "  {:>10}  {:.4}  {}", seconds(row.cpu.median()), row.error.rmse, row.setting.flags);
+        let _ = writeln!(out, "  {:>10}  {:>7}  {}", seconds(row.cpu.median()), row.error.told(4), row.setting.flags);
     }
     out += "\nuse\n";
     for advice in study.advice() {
