@@ -48,7 +48,7 @@ mod writable;
 pub use exit::Exit;
 
 use args::{Cli, Command, RenderArgs};
-use clap::{Args, FromArgMatches, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Subcommand};
 use message::{Messages, Severity};
 use std::ffi::{OsStr, OsString};
 use std::io::{self, Write};
@@ -58,7 +58,7 @@ use std::path::Path;
 pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
     let words = JOINED.iter().fold(with_render(words.into_iter().collect()), with_joined);
     let format = message::Format::asked_for(&words);
-    let command = match render_alone(&words).map_or_else(|| Cli::try_parse_from(words).map(|cli| cli.command), Ok) {
+    let command = match render_alone(&words).map_or_else(|| any_command(words), Ok) {
         Ok(command) => command,
         Err(e) => return misunderstood(&e, format),
     };
@@ -93,6 +93,16 @@ fn render_alone(words: &[OsString]) -> Option<Command> {
     let words = words.get(1..).filter(|words| words.first().is_some_and(|word| word == "render"))?;
     let matches = RenderArgs::augment_args(clap::Command::new("render")).try_get_matches_from(words).ok()?;
     RenderArgs::from_arg_matches(&matches).ok().map(|args| Command::Render(Box::new(args)))
+}
+
+/// What the words ask for. `-1` behind a flag that takes a value is that value: the flag then says what is wrong with it.
+fn any_command(words: Vec<OsString>) -> Result<Command, clap::Error> {
+    let with_negative = |arg: clap::Arg| {
+        let has_value = arg.get_action().takes_values() && !arg.is_positional();
+        if has_value { arg.allow_negative_numbers(true) } else { arg }
+    };
+    let grammar = Cli::command().mut_subcommands(|command| command.mut_args(with_negative));
+    Cli::from_arg_matches(&grammar.try_get_matches_from(words)?).map(|cli| cli.command)
 }
 
 /// Says what is wrong with the words, or prints the help that they ask for.
@@ -207,7 +217,7 @@ mod tests {
     #[test]
     fn words_of_render_mean_the_same_by_themselves_as_among_all_commands() {
         let words = |line: &str| line.split(' ').map(OsString::from).collect::<Vec<_>>();
-        let among_all = |line: &str| Cli::try_parse_from(words(line)).ok().map(|cli| format!("{:?}", cli.command));
+        let among_all = |line: &str| any_command(words(line)).ok().map(|command| format!("{command:?}"));
         let alone = |line: &str| render_alone(&words(line)).map(|command| format!("{command:?}"));
         for line in [
             "meshray render a.glb -q",

@@ -26,14 +26,13 @@ pub(super) enum Ortho {
     Height(f64),
 }
 
-/// Columns and rows, each 1 to [`MAX_SIDE`].
+/// Columns and rows, each 1 to [`MAX_SIDE`]; a single number is both.
 pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
     let side = |s: &str| s.trim().parse::<u32>().ok().filter(|n| (1..=MAX_SIDE).contains(n));
-    let (w, h) = text.split_once(['x', 'X', '×']).ok_or("write width x height, such as 800x600")?;
-    match (side(w), side(h)) {
-        (Some(w), Some(h)) => Ok((w, h)),
-        _ => Err(format!("width and height are whole numbers from 1 to {MAX_SIDE}, such as 800x600")),
-    }
+    let (w, h) = text.split_once(['x', 'X', '×']).unwrap_or((text, text));
+    side(w).zip(side(h)).ok_or_else(|| {
+        format!("write width x height, such as 800x600, or one number for a square: each whole, from 1 to {MAX_SIDE}")
+    })
 }
 
 /// Column and row.
@@ -430,10 +429,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sizes_have_two_sides_of_at_least_one() {
+    fn sizes_have_two_sides_of_at_least_one_and_a_single_number_is_a_square() {
         assert_eq!(size("800x600"), Ok((800, 600)));
         assert_eq!(size("1X65535"), Ok((1, 65535)));
-        for wrong in ["800", "0x5", "5x0", "x", "-1x5", "65536x1", "1.5x2", "99999999999x1"] {
+        assert_eq!(size("256"), Ok((256, 256)));
+        for wrong in ["", "0", "65536", "800x", "x600", "0x5", "5x0", "x", "-1x5", "65536x1", "1.5x2", "99999999999x1"]
+        {
             assert!(size(wrong).is_err(), "{wrong}");
         }
     }

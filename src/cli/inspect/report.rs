@@ -295,7 +295,8 @@ fn bytes(n: u64) -> String {
 }
 
 fn vector(v: DVec3) -> String {
-    let part = |x: f64| if x == 0.0 || (1e-3..1e6).contains(&x.abs()) { format!("{x:.4}") } else { format!("{x:.4e}") };
+    let part =
+        |x: f64| if x == 0.0 || (1e-3..1e12).contains(&x.abs()) { format!("{x:.4}") } else { format!("{x:.4e}") };
     format!("({}, {}, {})", part(v.x), part(v.y), part(v.z))
 }
 

@@ -14,7 +14,7 @@ pub(in crate::cli) struct TraceArgs {
     pub model: ModelArgs,
 
     /// Column and row of the pixel, from 0 at the top left
-    #[arg(long, value_name = "X,Y", value_parser = parse::pixel, help_heading = "Ray")]
+    #[arg(long, value_name = "X,Y", value_parser = parse::pixel, allow_hyphen_values = true, help_heading = "Ray")]
     pub pixel: (u32, u32),
     /// Samples a pixel; one goes through its centre
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536), default_value_t = 1,
@@ -30,7 +30,7 @@ pub(in crate::cli) struct TraceArgs {
     #[arg(long, value_name = "WEIGHT", value_parser = parse::cutoff, help_heading = "Ray")]
     pub cutoff: Option<f32>,
 
-    /// Columns and rows of the picture [default: 1024x768]
+    /// Columns and rows of the picture; one number is a square [default: 1024x768]
     #[arg(long, value_name = "WxH", value_parser = parse::size, help_heading = "Camera")]
     pub size: Option<(u32, u32)>,
     /// From where it is seen.

@@ -82,10 +82,10 @@ fn color(place: u8) -> [u8; 3] {
 
 /// The colours with their numbers, and what the ends mean.
 fn legend(max: u64, first: AccelKind) -> String {
-    const LEFT: f64 = 20.0;
+    const LEFT: f64 = 36.0;
     const LONG: f64 = 400.0;
     let mut svg = String::from(
-        "<svg class=\"scale\" viewBox=\"0 0 440 52\" role=\"img\" aria-label=\"scale of the difference\"><defs>\
+        "<svg class=\"scale\" viewBox=\"0 0 472 52\" role=\"img\" aria-label=\"scale of the difference\"><defs>\
          <linearGradient id=\"difference\">",
     );
     // Writing to a string cannot fail, here and below.
