@@ -223,7 +223,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             Traced::Eyes(eyes) => {
                 let samples = &mut self.samples;
                 let tell = |i: u32, radiance: Vec3| samples[i as usize].radiance += radiance;
-                self.context.sky.each_radiance_of(&missed, eyes.columns(), tell);
+                self.context.sky.each_behind(&missed, eyes.columns(), tell);
             }
             Traced::Wave(_, wave) => {
                 let rays = missed.iter().map(|&i| (i, wave.rays[i as usize].dir, wave.paths[i as usize].cone_spread));

@@ -5,7 +5,9 @@
 //! front of a model sees it before the backdrop, from which dark and white things stand out. Everything is a formula of
 //! constant time, smooth, and known at every blur, so that rough metals see the same room as mirrors:
 //!
-//! - [`radiance`]: the room itself, for mirrors and the background.
+//! - [`radiance`]: the room itself, for mirrors.
+//! - [`backdrop`]: its walls without its lights, for the background: from whichever side a model is seen, it stands before
+//!   the wall that is behind it from the front.
 //! - [`blurred`]: the mean around a mirror direction as wide as a roughness makes it.
 //! - [`diffuse`]: the cosine-weighted mean over a hemisphere, from spherical harmonics up to band 4
 //!   (Ramamoorthi, Hanrahan, *An Efficient Representation for Irradiance Environment Maps*, 2001).
@@ -38,6 +40,14 @@ pub fn to_world(up: UpAxis, dir: Vec3) -> Vec3 {
 #[inline(always)]
 pub fn radiance(dir: Vec3) -> Vec3 {
     Vec3::splat(room(dir, 0.0))
+}
+
+/// What the eye sees behind a model along the unit vector `dir`.
+#[inline(always)]
+pub fn backdrop(dir: Vec3) -> Vec3 {
+    let dome = (HORIZON + (ZENITH - HORIZON) * dir.y) * (1.0 - BACKDROP);
+    let Fraction { over, under } = step(dir.y, FLOOR_EDGE * FLOOR_EDGE);
+    Vec3::splat(NADIR + (dome - NADIR) * (over / under))
 }
 
 /// Mean radiance around the unit mirror direction `dir` for a perceptual roughness of 0 (just [`radiance`]) … 1.
@@ -390,6 +400,20 @@ mod tests {
             (lo, hi) = (lo.min(value), hi.max(value));
         }
         assert!(lo > 0.05 && hi / lo > 10.0 && hi < 4.0, "{lo} … {hi}");
+    }
+
+    #[test]
+    fn a_model_stands_before_the_same_wall_from_all_sides_without_lights_in_it() {
+        for dir in probes() {
+            let (turned, behind) = (Vec3::new(dir.z, dir.y, -dir.x), backdrop(dir).x);
+            assert_eq!(backdrop(turned).x.to_bits(), behind.to_bits());
+            assert!((NADIR..0.14).contains(&behind), "{dir}: {behind}");
+        }
+        // The wall behind the model from the front, below the lights.
+        for down in [-0.3f32, -0.1, 0.0] {
+            let dir = Vec3::new(0.0, down, -1.0).normalize();
+            assert!((backdrop(dir).x / radiance(dir).x - 1.0).abs() < 0.2, "{down}");
+        }
     }
 
     #[test]

@@ -217,10 +217,11 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let sample = &mut self.samples[ray.sample as usize];
         if path.straight && !self.context.shows_environment {
             sample.through += path.weight;
-        } else {
-            let dir = ray.dir.try_normalize().unwrap_or(Vec3::Z);
-            sample.radiance += path.weight * self.context.sky.radiance(dir, path.cone_spread);
+            return;
         }
+        let (dir, sky) = (ray.dir.try_normalize().unwrap_or(Vec3::Z), &self.context.sky);
+        let seen = if path.straight { sky.behind(dir, path.cone_spread) } else { sky.radiance(dir, path.cone_spread) };
+        sample.radiance += path.weight * seen;
     }
 
     /// Adds what the surface at `hit` shows by itself, and queues the rays that find the rest.

@@ -111,7 +111,8 @@ pub(in crate::cli) struct RenderArgs {
     #[arg(long, value_name = "AXIS", value_enum, help_heading = "Camera")]
     pub up: Option<Axis>,
 
-    /// #rrggbb, a colour name, r,g,b (linear, 0 to 1), `transparent`, or `env`: what reflections see
+    /// #rrggbb, a colour name, r,g,b (linear, 0 to 1), `transparent`, or `env`: what reflections see, of
+    /// the studio its walls
     #[arg(long, value_name = "COLOR", value_parser = parse::background, help_heading = "Light and background")]
     pub background: Option<Background>,
     /// What surrounds the scene and lights it: an equirectangular picture (.hdr, .exr), or studio, white, black
@@ -179,7 +180,7 @@ pub(in crate::cli) struct RenderArgs {
     /// them, from 0
     ///
     /// Pictures go to STEM.0000.png and so on, or to a template with {frame:04}. The lamps of a model without its own go
-    /// with the camera, the studio around it stays; --background gives all pictures the same.
+    /// with the camera, the studio that mirrors see stays.
     #[arg(long, value_name = "N", value_parser = parse::turns, help_heading = "Camera", hide_short_help = true)]
     pub turntable: Option<parse::Turns>,
     /// What becomes of OBJ and PLY faces with more than three corners

@@ -29,39 +29,43 @@ impl Sky {
                 Some(up) if angle <= WIDE => {
                     looks.add(ray, dir);
                     if looks.count == RAYS {
-                        looks.tell(up, &mut tell);
+                        looks.tell::<false>(up, &mut tell);
                     }
                 }
                 _ => tell(ray, self.radiance(dir.try_normalize().unwrap_or(Vec3::Z), angle)),
             }
         }
         if let Some(up) = studio {
-            looks.tell(up, &mut tell);
+            looks.tell::<false>(up, &mut tell);
         }
     }
 
-    /// The same for some of many rays, by their numbers in order; directions by axis, and how wide each cone is.
-    pub(crate) fn each_radiance_of(
+    /// Tells what is behind everything for some of many rays from the eye, as [`Self::behind`] does, by their numbers in order;
+    /// directions by axis, and how wide each cone is.
+    pub(crate) fn each_behind(
         &self,
         rays: &[u32],
         (dirs, angles): ([&[f32]; 3], &[f32]),
         mut tell: impl FnMut(u32, Vec3),
     ) {
-        let dir = |i: usize| Vec3::new(dirs[0][i], dirs[1][i], dirs[2][i]);
+        let dir = |i: u32| Vec3::new(dirs[0][i as usize], dirs[1][i as usize], dirs[2][i as usize]);
+        let Some(up) = self.studio() else {
+            let behind = |i: u32| self.behind(dir(i).try_normalize().unwrap_or(Vec3::Z), angles[i as usize]);
+            return rays.iter().for_each(|&i| tell(i, behind(i)));
+        };
         let mut looks = Looks::NONE;
         for some in rays.chunks(RAYS) {
             // Where nothing is near, their numbers follow each other.
-            let run = match (self.studio(), some) {
-                (Some(up), [first, .., last]) if last.wrapping_sub(*first) == RAYS as u32 - 1 && some.len() == RAYS => {
-                    let sharp = angles[*first as usize..=*last as usize].iter().all(|&angle| angle <= WIDE);
-                    sharp.then(|| looks.take(*first, dirs)).flatten().map(|()| up)
+            let run = match some {
+                [first, .., last] if last.wrapping_sub(*first) == RAYS as u32 - 1 && some.len() == RAYS => {
+                    looks.take(*first, dirs)
                 }
                 _ => None,
             };
-            match run {
-                Some(up) => looks.tell(up, &mut tell),
-                None => self.each_radiance(some.iter().map(|&i| (i, dir(i as usize), angles[i as usize])), &mut tell),
+            if run.is_none() {
+                some.iter().for_each(|&i| looks.add(i, dir(i)));
             }
+            looks.tell::<true>(up, &mut tell);
         }
     }
 }
@@ -86,8 +90,9 @@ impl Looks {
         self.count += 1;
     }
 
-    fn tell(&mut self, up: UpAxis, tell: &mut impl FnMut(u32, Vec3)) {
-        Level::best().run(Look { looks: self, up });
+    /// Tells what each of them sees: `BEHIND` everything, or of the whole room.
+    fn tell<const BEHIND: bool>(&mut self, up: UpAxis, tell: &mut impl FnMut(u32, Vec3)) {
+        Level::best().run(Look::<BEHIND> { looks: self, up });
         for i in 0..self.count.min(RAYS) {
             tell(self.rays[i], Vec3::splat(self.radiance[i]));
         }
@@ -95,30 +100,31 @@ impl Looks {
     }
 }
 
-struct Look<'a> {
+struct Look<'a, const BEHIND: bool> {
     looks: &'a mut Looks,
     up: UpAxis,
 }
 
-impl Kernel for Look<'_> {
+impl<const BEHIND: bool> Kernel for Look<'_, BEHIND> {
     type Output = ();
 
     // The up axis is asked outside the loop, which then is a formula.
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
         match self.up {
-            UpAxis::Y => look(self.looks, UpAxis::Y),
-            UpAxis::Z => look(self.looks, UpAxis::Z),
+            UpAxis::Y => look::<BEHIND>(self.looks, UpAxis::Y),
+            UpAxis::Z => look::<BEHIND>(self.looks, UpAxis::Z),
         }
     }
 }
 
 #[inline(always)]
-fn look(looks: &mut Looks, up: UpAxis) {
+fn look<const BEHIND: bool>(looks: &mut Looks, up: UpAxis) {
     for i in 0..RAYS {
         let dir = Vec3::new(looks.dir[0][i], looks.dir[1][i], looks.dir[2][i]);
         let dir = dir.try_normalize().unwrap_or(Vec3::Z);
-        looks.radiance[i] = studio::radiance(studio::from_world(up, dir)).x;
+        let dir = studio::from_world(up, dir);
+        looks.radiance[i] = if BEHIND { studio::backdrop(dir).x } else { studio::radiance(dir).x };
     }
 }
 
@@ -139,21 +145,22 @@ mod tests {
                 rays[40].1 = Vec3::ZERO;
                 let mut seen = vec![None; rays.len()];
                 sky.each_radiance(rays.iter().copied(), |ray, radiance| seen[ray as usize] = Some(radiance));
+                let bits = |seen: Vec3| seen.to_array().map(f32::to_bits);
                 let columns = [0, 1, 2].map(|k| rays.iter().map(|ray| ray.1[k]).collect::<Vec<_>>());
                 let angles: Vec<_> = rays.iter().map(|ray| ray.2).collect();
                 for numbers in [(0..101).collect(), (0..101).filter(|i| i % 50 != 7).collect::<Vec<u32>>()] {
-                    let mut in_columns = vec![None; rays.len()];
                     let columns = columns.each_ref().map(|column| &column[..]);
-                    sky.each_radiance_of(&numbers, (columns, &angles), |ray, radiance| {
-                        in_columns[ray as usize] = Some(radiance);
+                    let mut told = Vec::new();
+                    sky.each_behind(&numbers, (columns, &angles), |ray, seen| told.push((ray, bits(seen))));
+                    let alone = numbers.iter().map(|&i| {
+                        let (_, dir, angle) = rays[i as usize];
+                        (i, bits(sky.behind(dir.try_normalize().unwrap_or(Vec3::Z), angle)))
                     });
-                    let expected = seen.iter().enumerate();
-                    let expected = expected.map(|(i, seen)| seen.filter(|_| numbers.contains(&(i as u32))));
-                    assert_eq!(in_columns, expected.collect::<Vec<_>>());
+                    assert_eq!(told, alone.collect::<Vec<_>>());
                 }
                 for ((_, dir, angle), seen) in rays.into_iter().zip(seen) {
                     let alone = sky.radiance(dir.try_normalize().unwrap_or(Vec3::Z), angle);
-                    assert_eq!(seen.map(|v| v.to_array().map(f32::to_bits)), Some(alone.to_array().map(f32::to_bits)));
+                    assert_eq!(seen.map(bits), Some(bits(alone)));
                 }
             }
         }

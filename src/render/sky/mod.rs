@@ -85,6 +85,12 @@ impl Sky {
         }
     }
 
+    /// What is behind everything along a unit direction in which the eye looks, averaged over such a cone: the same, but of the
+    /// studio its walls alone.
+    pub(crate) fn behind(&self, dir: Vec3, angle: f32) -> Vec3 {
+        self.studio().map_or_else(|| self.radiance(dir, angle), |up| studio::backdrop(studio::from_world(up, dir)))
+    }
+
     /// Mean radiance around a mirror direction, as wide as `roughness` (0 … 1) makes it.
     pub(crate) fn blurred(&self, dir: Vec3, roughness: f32) -> Vec3 {
         match (self.environment, &self.map) {
