@@ -44,7 +44,8 @@ pub(super) struct SamplingArgs {
     #[arg(long, value_name = "PERCENT", value_parser = parse::confidence, help_heading = "Quality", hide_short_help = true)]
     pub confidence: Option<f64>,
     /// Fewest rays of a pixel of stochastic sampling, enough where they and those of its neighbours agree; the next power of
-    /// two is taken. Light, gloss and environment rays are divided by it, by 4 at least [default: 1; 16 with --aperture, and for points and lines narrower than 2 pixels]
+    /// two is taken. Light, gloss and environment rays are divided by it, by 4 at least [default: 1; 16 with
+    /// --aperture, and for points and lines narrower than 2 pixels]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_536), help_heading = "Quality",
           hide_short_help = true)]
     pub min_samples: Option<u32>,

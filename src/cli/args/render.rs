@@ -173,8 +173,8 @@ pub(in crate::cli) struct RenderArgs {
     /// --frame N, only that one of them
     ///
     /// Pictures go to STEM.0000.png and so on, or to a template with {frame:04}.
-    #[arg(long, value_name = "A..B", value_parser = parse::frames, allow_hyphen_values = true, help_heading = "Animation", hide_short_help = true,
-          conflicts_with_all = ["time", "turntable"])]
+    #[arg(long, value_name = "A..B", value_parser = parse::frames, allow_hyphen_values = true, help_heading = "Animation",
+          hide_short_help = true, conflicts_with_all = ["time", "turntable"])]
     pub frames: Option<parse::Frames>,
     /// N pictures from all around, about the up axis, the view or camera being the first; with I/N, only number I of
     /// them, from 0
