@@ -2,16 +2,16 @@
 
 use std::marker::PhantomData;
 
-use super::node::{Node, Tree};
-use super::padded::{FIRST, Padding};
+use super::hull::Hull;
+use super::node::{Block, Node, Tree};
+use super::padded::Padding;
 use super::ready::Columns;
 use super::slabs::{BoxMargins, backwards};
 use crate::accel::{NO_PRIM, Ray};
 use crate::math::Vec3;
-use crate::math::bounds::PARALLEL;
 use crate::math::meetings::RowBounds;
 use crate::math::shear::main_axis;
-use crate::math::simd::{LANES, Lanewise, Pick, Simd};
+use crate::math::simd::{LANES, Lanewise, Row, Simd};
 
 /// A bit for every ray of a packet of `N`.
 pub(super) const fn all<const N: usize>() -> u32 {
@@ -45,16 +45,6 @@ pub(super) struct Bundle<B, const N: usize> {
     low: Vec3,
     high: Vec3,
     margins: PhantomData<B>,
-}
-
-/// Linear bounds of the distances at which any of the rays meets a plane: below those of planes that come first, where
-/// they are not below zero, and above those of planes that come last, where these are not.
-#[derive(Clone, Copy, Debug, Default)]
-struct Hull {
-    /// By axis: what a plane is multiplied with, and what is added.
-    first: [[f32; 2]; 3],
-    last: [[f32; 2]; 3],
-    from: f32,
 }
 
 impl<B: BoxMargins, const N: usize> Bundle<B, N> {
@@ -185,20 +175,8 @@ impl<B: BoxMargins, const N: usize> Bundle<B, N> {
         let [x, y, z, _] =
             s.least_of_each([s.sub(zero, inverse[0]), s.sub(zero, inverse[1]), s.sub(zero, inverse[2]), zero]);
         let greatest = [-x, -y, -z];
-        let farthest = self.low.abs().max(self.high.abs());
-        let drift = PARALLEL * (tree.extent + farthest.element_sum());
-        for k in 0..3 {
-            let pad = B::PAD * (tree.extent + farthest[k]) + drift;
-            // The fastest ray from the foremost origin meets planes first, the slowest from the hindmost last.
-            let (fast, slow, front, rear) = if self.octant >> k & 1 == 1 {
-                (greatest[k], least[k], self.low[k], self.high[k])
-            } else {
-                (least[k], greatest[k], self.high[k], self.low[k])
-            };
-            self.hull.first[k] = [fast, -front * fast - pad * fast.abs()];
-            self.hull.last[k] = [slow, -rear * slow + pad * slow.abs()];
-        }
-        self.hull.from = from;
+        let origins = [self.low, self.high];
+        self.hull = Hull::new::<B>(tree, self.octant, [least.into(), greatest.into()], origins, from);
     }
 
     /// Finds what bounds all origins.
@@ -225,7 +203,7 @@ impl<B: BoxMargins, const N: usize> Bundle<B, N> {
     #[inline(always)]
     pub(super) fn row_bounds(&self) -> RowBounds {
         // A reciprocal is rounded once.
-        let slowest = self.hull.first[self.z % 3][0].abs();
+        let slowest = self.hull.fastest(self.z);
         RowBounds {
             low: self.low.as_dvec3(),
             high: self.high.as_dvec3(),
@@ -234,31 +212,24 @@ impl<B: BoxMargins, const N: usize> Bundle<B, N> {
         }
     }
 
-    /// Which of eight boxes any ray may meet up to `limit`, and the least distances of that; by axis, the planes that come
-    /// first and those that come last.
+    /// Which of eight boxes any ray may meet up to `limit`, and the least distances of that; planes in the order of a node's.
     #[inline(always)]
-    pub(super) fn meets_any<S: Simd>(
-        &self,
-        s: S,
-        first: [S::Lanes; 3],
-        last: [S::Lanes; 3],
-        limit: f32,
-    ) -> (S::Lanes, u32) {
-        let (mut near, mut far) = (s.splat(self.hull.from), s.splat(limit));
-        for k in 0..3 {
-            let ([a, b], [c, d]) = (self.hull.first[k], self.hull.last[k]);
-            near = s.later(s.mul_add(first[k], s.splat(a), s.splat(b)), near);
-            far = s.sooner(s.mul_add(last[k], s.splat(c), s.splat(d)), far);
-        }
-        (near, s.in_order(near, far))
+    pub(super) fn meets_any<S: Simd>(&self, s: S, planes: &[Row; 6], limit: f32) -> (S::Lanes, u32) {
+        self.hull.meets(s, planes, self.octant, limit)
     }
 
-    /// Which of a node's boxes any ray may meet.
+    /// Whose triangles' own boxes any ray may meet, of a block.
     #[inline(always)]
-    pub(super) fn meets_any_child<S: Simd>(&self, s: S, node: &Node, limit: f32) -> (S::Lanes, u32) {
-        let [x, y, z] = FIRST[self.octant % LANES];
-        let pick = |p: Pick| s.pick(&node.planes, p);
-        self.meets_any(s, [pick(x), pick(y), pick(z)], [pick(x.other()), pick(y.other()), pick(z.other())], limit)
+    pub(super) fn meets_any_triangle<S: Simd>(&self, s: S, block: &Block, limit: f32) -> u32 {
+        let [a, b, c] = &block.corners;
+        let zero = s.splat(0.0);
+        let (mut first, mut last) = ([zero; 3], [zero; 3]);
+        for k in 0..3 {
+            let (a, b, c) = (s.load(&a[k]), s.load(&b[k]), s.load(&c[k]));
+            let (low, high) = (s.smaller(a, s.smaller(b, c)), s.greater(a, s.greater(b, c)));
+            (first[k], last[k]) = if self.octant >> k & 1 == 1 { (high, low) } else { (low, high) };
+        }
+        self.hull.between(s, first, last, limit).1
     }
 
     /// Which rays meet the box of a child up to their limits.

@@ -10,7 +10,8 @@
 //! In both, the binary cuts are improved and fused into nodes of eight (`build`). Each prim is listed once, so there is no
 //! mailbox: there would be nothing for it to save.
 //!
-//! Rays go one by one (`alone`), many in flight (`flight`) or sixteen side by side (`packet`), through triangles; where there
+//! Rays go one by one (`alone`), many in flight (`flight`) or sixteen side by side (`packet`; those from one place enter by
+//! crowds, `entrance`, and share what they see of blocks, `shelf`), through triangles; where there
 //! is anything else, or somebody counts, they go one by one through whatever there is (`walk`). Hits are ordered by (t, prim)
 //! and every test gives an exact verdict, so that neither the order of visits nor the company of other rays can change an
 //! answer. Counts are those of one ray at a time: whoever listens gets that.
@@ -22,7 +23,9 @@ mod best;
 mod build;
 mod bundle;
 mod check;
+mod entrance;
 mod flight;
+mod hull;
 mod listed;
 #[cfg(test)]
 mod margins;
@@ -32,6 +35,7 @@ mod padded;
 mod placed;
 mod ready;
 mod settle;
+mod shelf;
 mod slabs;
 pub(super) mod split;
 mod walk;
@@ -215,10 +219,12 @@ impl Wide<'_> {
         if !shapes.planes.is_empty() || !tree.runs.is_empty() || tree.nodes.is_empty() {
             return self.run::<B, _>(OneByOne { tree, shapes, wave, stack, probe: &mut NoProbe, margins });
         }
-        let Stack { entries, branches, slots } = stack;
+        let Stack { entries, branches, slots, shelf } = stack;
         let rays = if self.rays == RayOrder::Adaptive { RayOrder::of(wave) } else { self.rays };
         match rays {
-            RayOrder::Packets => self.run::<B, _>(InPackets { tree, shapes, wave, stack: branches, entries, margins }),
+            RayOrder::Packets => {
+                self.run::<B, _>(InPackets { tree, shapes, wave, stack: branches, shelf, entries, margins });
+            }
             RayOrder::InFlight if tree.most_behind() < DEPTH => {
                 let flight = Flight { tree, far: tree.bytes() > NEAR, shapes, wave, entries, margins };
                 // Eight lanes are all it has a use for: with AVX-512's masks it was 4 to 8 % slower on the one processor where

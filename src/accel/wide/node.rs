@@ -62,6 +62,8 @@ impl Child {
     pub(super) const NOTHING: u32 = Self::LEAF;
     /// No child, packed: the end of a stack. The last run there could be, which no tree has.
     pub(super) const END: u32 = u32::MAX;
+    /// The entrance of packets, packed: the last node there could be, which no tree has.
+    pub(super) const ENTRANCE: u32 = Self::LEAF - 1;
     const LEAF: u32 = 1 << 31;
     const COUNT: u32 = 27;
     /// A count that no block has marks a run.

@@ -4,7 +4,8 @@
 //! S. Boulos et al., *Packet-based Whitted and Distribution Ray Tracing*, 2007); of several boxes that are left each is asked
 //! about each ray. At a leaf the triangles' own boxes are asked about the hull, and what is left is tested against all rays
 //! at once. Best hits are known by intervals, as in `best`; exact distances are found at the end, those of all rays
-//! together.
+//! together. What rays from one place see of a block is found once for all packets that visit it one soon after the other
+//! (`shelf`).
 //!
 //! What a packet waits for is mostly itself: each test decides which is next. So thirty-two rays, where there are registers
 //! for them, take little more time than sixteen, as long as they stay together; where less than half of them visit what the
@@ -17,8 +18,10 @@ use std::marker::PhantomData;
 use super::alone::Lone;
 use super::best::{Best, Place, decide};
 use super::bundle::{Bundle, all};
+use super::entrance::{CROWD, Entrance, State};
 use super::flight::FARTHEST_FIRST;
 use super::node::{Block, Child, Node, Tree};
+use super::shelf::Shelf;
 use super::slabs::BoxMargins;
 use super::walk::Entry;
 use crate::accel::query::Goal;
@@ -61,6 +64,7 @@ pub(super) struct InPackets<'w, W, B> {
     pub shapes: &'w Shapes,
     pub wave: &'w mut W,
     pub stack: &'w mut [Branch],
+    pub shelf: &'w mut Shelf,
     /// For rays that go by themselves.
     pub entries: &'w mut [Entry],
     pub margins: PhantomData<B>,
@@ -72,7 +76,9 @@ struct Trip<'w, W> {
     shapes: &'w Shapes,
     wave: &'w mut W,
     stack: &'w mut [Branch],
+    shelf: &'w mut Shelf,
     entries: &'w mut [Entry],
+    entrance: Entrance,
     lone: Lone,
 }
 
@@ -130,16 +136,28 @@ impl<W: Wave, B: BoxMargins> Kernel for InPackets<'_, W, B> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Self { tree, shapes, wave, stack, entries, .. } = self;
+        let Self { tree, shapes, wave, stack, shelf, entries, .. } = self;
         let (mut narrow, mut broad) = (Packet::<B, WIDE>::empty(), Packet::<B, BROAD>::empty());
         if let Some(Pencil { origin, .. }) = wave.pencil() {
             broad.start_at(origin);
             narrow.start_at(origin);
         }
-        let mut trip = Trip { tree, shapes, wave, stack, entries, lone: Lone::default() };
+        shelf.clear();
+        let (entrance, lone) = (Entrance::new(), Lone::default());
+        let mut trip = Trip { tree, shapes, wave, stack, shelf, entries, entrance, lone };
         let (count, mut start) = (trip.wave.rays().len(), 0);
         let (mut apart, mut patience) = (0_usize, PATIENCE);
         while start < count {
+            if let Some(pencil) = trip.wave.pencil()
+                && trip.entrance.is_passed(start)
+            {
+                trip.entrance.find::<B, _>(s, tree, &pencil, start);
+                if trip.entrance.state == State::Closed {
+                    trip.wave.take_all(start, &[Hit::MISS; CROWD]);
+                    start += CROWD;
+                    continue;
+                }
+            }
             if S::BROAD_FITS && apart == 0 && start + BROAD <= count {
                 let alike = broad.gather(s, s.broad(), &trip, start);
                 if alike.count_ones() >= ENOUGH_BROAD {
@@ -238,13 +256,17 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         self.rays.bound(wide, tree);
         let (rays, per_length) = (&self.rays, self.rays.per_length());
         let sight = match rays.common {
-            Some(from) => Seen::Together(Fan::new(wide, from, &rays.dir, rays.z, per_length)),
+            Some(from) => {
+                trip.shelf.sit((from, rays.z, rays.octant));
+                Seen::Together(Fan::new(wide, from, &rays.dir, rays.z, per_length))
+            }
             None => Seen::Apart(RowSight::new(wide, &rays.origin, &rays.dir, rays.z, per_length)),
         };
         let low = wide.splat(f32::INFINITY);
         let limit = wide.choose(self.active, limit, wide.splat(f32::NEG_INFINITY));
         let mut reach: Reach<T, N> = Reach { low, high, limit, farthest: wide.latest(limit) };
-        let (mut top, mut branch) = (0, Branch { near: 0.0, child: 0, rays: self.active });
+        let (mut top, mut branch) =
+            (0, Branch { near: 0.0, child: trip.entrance.of(self.start, N), rays: self.active });
         loop {
             let mut nearer = false;
             company.visits += 1;
@@ -256,14 +278,9 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
                 }
             } else {
                 let below = top;
-                self.push(
-                    s,
-                    wide,
-                    (tree, &tree.nodes[branch.child as usize]),
-                    branch.rays,
-                    &reach,
-                    (trip.stack, &mut top),
-                );
+                // The entrance is no node of the tree.
+                let node = tree.nodes.get(branch.child as usize).unwrap_or(&trip.entrance.node);
+                self.push(s, wide, (tree, node), branch.rays, &reach, (trip.stack, &mut top));
                 nearer = top > below;
             }
             // Those that meet the nearest child were just found; rays that need no more have no limit above zero.
@@ -283,7 +300,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         &mut self,
         s: S,
         wide: T,
-        trip: &Trip<W>,
+        trip: &mut Trip<W>,
         branch: Branch,
         reach: &mut Reach<T, N>,
         sight: &Seen<T, N>,
@@ -313,7 +330,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         (stack, top): (&mut [Branch], &mut usize),
     ) {
         let bundle = &self.rays;
-        let (near, met) = bundle.meets_any_child(s, node, reach.farthest);
+        let (near, met) = bundle.meets_any(s, &node.planes, reach.farthest);
         if met == 0 {
             return;
         }
@@ -339,54 +356,51 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         &mut self,
         s: S,
         wide: T,
-        trip: &Trip<W>,
+        trip: &mut Trip<W>,
         branch: Branch,
         reach: &mut Reach<T, N>,
         sight: &Seen<T, N>,
     ) -> u32 {
         let (index, count) = Child::block(branch.child);
         let block = &trip.tree.blocks[index as usize];
-        let [a, b, c] = &block.corners;
-        let zero = s.splat(0.0);
-        let (mut first, mut last) = ([zero; 3], [zero; 3]);
-        for k in 0..3 {
-            let (a, b, c) = (s.load(&a[k]), s.load(&b[k]), s.load(&c[k]));
-            let (low, high) = (s.smaller(a, s.smaller(b, c)), s.greater(a, s.greater(b, c)));
-            (first[k], last[k]) = if self.rays.octant >> k & 1 == 1 { (high, low) } else { (low, high) };
-        }
-        let (_, met) = self.rays.meets_any(s, first, last, reach.farthest);
-        let lanes = met & ((1 << count) - 1);
-        if lanes == 0 {
-            return 0;
-        }
+        let used = (1 << count) - 1;
         match sight {
-            Seen::Together(fan) => self.test_each(s, wide, trip, (block, index, lanes), branch.rays, reach, fan),
-            Seen::Apart(rows) => self.test_each(s, wide, trip, (block, index, lanes), branch.rays, reach, rows),
+            Seen::Together(fan) => {
+                let place = trip.shelf.place(s, (index, block), fan);
+                let kept = trip.shelf.at(place);
+                let lanes = self.rays.meets_any(s, &kept.planes, reach.farthest).1 & used;
+                self.test_each(wide, trip, (block, index, lanes), branch.rays, reach, (fan, &kept.ready))
+            }
+            Seen::Apart(rows) => {
+                let lanes = self.rays.meets_any_triangle(s, block, reach.farthest) & used;
+                if lanes == 0 {
+                    return 0;
+                }
+                let ready = rows.ready(s, &block.corners);
+                self.test_each(wide, trip, (block, index, lanes), branch.rays, reach, (rows, &ready))
+            }
         }
     }
 
     /// Tests the triangles of a mask, and tells which of the rays have new hits.
     #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "one loop for both kinds of sight")]
-    fn test_each<S: Simd, T: Lanewise<N>, W: Wave, R: Rows<T, N>>(
+    fn test_each<T: Lanewise<N>, W: Wave, R: Rows<T, N>>(
         &mut self,
-        s: S,
         wide: T,
         trip: &Trip<W>,
         (block, index, lanes): (&Block, u32, u32),
         mut rays: u32,
         reach: &mut Reach<T, N>,
-        sight: &R,
+        (sight, ready): (&R, &R::Ready),
     ) -> u32 {
-        let ready = sight.ready(s, &block.corners);
         let (mut lanes, mut changed) = (lanes, 0);
         while lanes != 0 {
             let lane = lanes.trailing_zeros();
             lanes &= lanes - 1;
-            let (verdicts, look) = sight.look(wide, &ready, lane as usize);
+            let (verdicts, look) = sight.look(wide, ready, lane as usize);
             if (verdicts.hit | verdicts.unsure) & rays != 0 {
                 let place = Place { block: index, lane, prim: block.prims[lane as usize % LANES] };
-                let between = sight.distances(wide, &ready, lane as usize, &look);
+                let between = sight.distances(wide, ready, lane as usize, &look);
                 let hit = self.take(wide, trip, (place, rays), verdicts, between, reach);
                 changed |= hit;
                 if W::Goal::ANY {

@@ -5,6 +5,7 @@ use std::marker::PhantomData;
 use super::flight::Slots;
 use super::node::{Child, Node, Tree};
 use super::packet::Branch;
+use super::shelf::Shelf;
 use super::slabs::{BoxMargins, Slabs};
 use crate::accel::query::{Goal, Query};
 use crate::accel::wave::{Wave, begin, end};
@@ -27,6 +28,7 @@ pub struct Stack {
     pub(super) entries: Vec<Entry>,
     /// Of a packet.
     pub(super) branches: Vec<Branch>,
+    pub(super) shelf: Shelf,
     /// Of many rays.
     pub(super) slots: Slots,
 }
@@ -40,7 +42,7 @@ impl Stack {
     /// For walks down `tree`.
     pub(super) fn new(tree: &Tree) -> Self {
         let most = tree.most_behind();
-        Self { entries: vec![Entry::default(); most], branches: vec![Branch::default(); most], slots: Slots::default() }
+        Self { entries: vec![Entry::default(); most], branches: vec![Branch::default(); most], ..Self::default() }
     }
 }
 

@@ -1,5 +1,6 @@
 //! However the rays of a wave are traced, on whatever instruction set: the answers are those of brute force.
 
+use super::entrance::CROWD;
 use super::flight::{DEPTH, FARTHEST_FIRST};
 use super::{ASKED, MANY, RayOrder, Splitting, Wide};
 use crate::accel::tests::scenes::{self, ray};
@@ -118,20 +119,55 @@ fn the_rays_of_a_pencil_hit_what_they_hit_one_by_one() {
                 )
             };
             let rays: Vec<Ray> = (0..[75, 64, 17][k % 3]).map(turned).filter(|ray| ray.dir != Vec3::ZERO).collect();
-            let dirs = [0, 1, 2].map(|k| rays.iter().map(|ray| ray.dir[k]).collect::<Vec<f32>>());
-            let pencil = Pencil { origin: from.origin, dirs: dirs.each_ref().map(Vec::as_slice) };
-            let ask = |wide: &Wide| {
-                let mut hits = vec![Hit::MISS; rays.len()];
-                wide.closest_from(&pencil, &rays, &mut hits, &mut wide.scratch(), &mut NoProbe);
-                hits.iter().map(Hit::bits).collect::<Vec<_>>()
-            };
-            let (unculled, mut expected) = (Unculled::new(&shapes), vec![Hit::MISS; rays.len()]);
-            unculled.closest(&rays, &mut expected, &mut unculled.scratch(), &mut NoProbe);
-            let expected: Vec<_> = expected.iter().map(Hit::bits).collect();
-            for (level, way) in Level::all().into_iter().flat_map(|level| WAYS.map(|way| (level, way))) {
-                let wide = Wide::build(&shapes, Splitting::SurfaceArea).at_level(level).with_rays(way);
-                assert!(ask(&wide) == expected, "{name}: {way:?} on {}", level.name());
+            assert_a_pencil_hits(name, &shapes, &rays, &WAYS);
+        }
+    }
+}
+
+/// Rays that start together hit what brute force hits, however they are traced.
+fn assert_a_pencil_hits(name: &str, shapes: &Shapes, rays: &[Ray], ways: &[RayOrder]) {
+    let Some(Ray { origin, .. }) = rays.first().copied() else { return };
+    let dirs = [0, 1, 2].map(|k| rays.iter().map(|ray| ray.dir[k]).collect::<Vec<f32>>());
+    let pencil = Pencil { origin, dirs: dirs.each_ref().map(Vec::as_slice) };
+    let expected: Vec<_> = first_hits(&Unculled::new(shapes), rays).iter().map(Hit::bits).collect();
+    for (level, &way) in Level::all().into_iter().flat_map(|level| ways.iter().map(move |way| (level, way))) {
+        for splitting in [Splitting::SurfaceArea, Splitting::Octree] {
+            let wide = Wide::build(shapes, splitting).at_level(level).with_rays(way);
+            let mut hits = vec![Hit::MISS; rays.len()];
+            wide.closest_from(&pencil, rays, &mut hits, &mut wide.scratch(), &mut NoProbe);
+            let hits: Vec<_> = hits.iter().map(Hit::bits).collect();
+            assert!(hits == expected, "{name}: {way:?} on {}", level.name());
+        }
+    }
+}
+
+/// Crowds of packets enter the tree together: from outside and from within, wide and narrow, with a ray among them that runs
+/// otherwise or along an axis, or cannot be asked about boxes; and past everything.
+#[test]
+fn crowds_of_a_pencil_hit_what_brute_force_hits() {
+    let mut random = Random::new(78);
+    for (name, shapes) in scenes::all() {
+        for (k, from) in scenes::rays(&shapes, 2).iter().step_by(37).enumerate() {
+            let width = [0.01, 0.1, 0.4][k % 3] * from.dir.length();
+            let back = [0.0, 0.0, 5.0][k / 3 % 3];
+            let start = ray(from.origin - from.dir * back, from.dir * if k % 7 == 6 { -1.0 } else { 1.0 });
+            let mut rays: Vec<Ray> = (0..2 * CROWD + 70)
+                .map(|i| Ray { dir: start.dir + random.cube() * (width * if i < CROWD { 1.0 } else { 0.3 }), ..start })
+                .map(|ray| if ray.dir == Vec3::ZERO { start } else { ray })
+                .collect();
+            let odd = [CROWD + 3, 2 * CROWD - 1, 40];
+            for at in odd.into_iter().take(k % 4) {
+                let dir = rays[at].dir;
+                rays[at].dir = match k % 6 {
+                    0 => -dir,
+                    1 => Vec3::new(dir.x, 0.0, dir.z + 1.0),
+                    2 => Vec3::new(f32::NAN, dir.y, dir.z),
+                    3 => dir * 1e30,
+                    4 => Vec3::new(f32::INFINITY, dir.y, dir.z),
+                    _ => dir * 1e-30,
+                };
             }
+            assert_a_pencil_hits(name, &shapes, &rays, &[RayOrder::Packets]);
         }
     }
 }

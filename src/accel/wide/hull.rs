@@ -1,0 +1,80 @@
+//! Many rays as one: bounds of where any of them meets a plane.
+
+use super::node::Tree;
+use super::padded::FIRST;
+use super::slabs::BoxMargins;
+use crate::math::Vec3;
+use crate::math::bounds::PARALLEL;
+use crate::math::simd::{LANES, Pick, Row, Simd};
+
+/// Linear bounds of the distances at which any of the rays meets a plane: below those of planes that come first, where
+/// they are not below zero, and above those of planes that come last, where these are not.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Hull {
+    /// By axis: what a plane is multiplied with, and what is added.
+    first: [[f32; 2]; 3],
+    last: [[f32; 2]; 3],
+    from: f32,
+}
+
+impl Hull {
+    /// Of rays to one octant whose origins and reciprocals of directions ([`Padding`](super::padded::Padding)) lie between
+    /// these, with hits from `from` on.
+    #[inline(always)]
+    pub(super) fn new<B: BoxMargins>(
+        tree: &Tree,
+        octant: usize,
+        [least, greatest]: [Vec3; 2],
+        [low, high]: [Vec3; 2],
+        from: f32,
+    ) -> Self {
+        let mut hull = Self { from, ..Self::default() };
+        let farthest = low.abs().max(high.abs());
+        let drift = PARALLEL * (tree.extent + farthest.element_sum());
+        for k in 0..3 {
+            let pad = B::PAD * (tree.extent + farthest[k]) + drift;
+            // The fastest ray from the foremost origin meets planes first, the slowest from the hindmost last.
+            let (fast, slow, front, rear) = if octant >> k & 1 == 1 {
+                (greatest[k], least[k], low[k], high[k])
+            } else {
+                (least[k], greatest[k], high[k], low[k])
+            };
+            hull.first[k] = [fast, -front * fast - pad * fast.abs()];
+            hull.last[k] = [slow, -rear * slow + pad * slow.abs()];
+        }
+        hull
+    }
+
+    /// The least size of a reciprocal along an axis.
+    #[inline(always)]
+    pub(super) fn fastest(&self, axis: usize) -> f32 {
+        self.first[axis % 3][0].abs()
+    }
+
+    /// Which of eight boxes any ray may meet up to `limit`, and the least distances of that; by axis, the planes that come
+    /// first and those that come last.
+    #[inline(always)]
+    pub(super) fn between<S: Simd>(
+        &self,
+        s: S,
+        first: [S::Lanes; 3],
+        last: [S::Lanes; 3],
+        limit: f32,
+    ) -> (S::Lanes, u32) {
+        let (mut near, mut far) = (s.splat(self.from), s.splat(limit));
+        for k in 0..3 {
+            let ([a, b], [c, d]) = (self.first[k], self.last[k]);
+            near = s.later(s.mul_add(first[k], s.splat(a), s.splat(b)), near);
+            far = s.sooner(s.mul_add(last[k], s.splat(c), s.splat(d)), far);
+        }
+        (near, s.in_order(near, far))
+    }
+
+    /// Which of eight boxes any ray may meet, of rays to an octant; planes in the order of a node's.
+    #[inline(always)]
+    pub(super) fn meets<S: Simd>(&self, s: S, planes: &[Row; 6], octant: usize, limit: f32) -> (S::Lanes, u32) {
+        let [x, y, z] = FIRST[octant % LANES];
+        let pick = |p: Pick| s.pick(planes, p);
+        self.between(s, [pick(x), pick(y), pick(z)], [pick(x.other()), pick(y.other()), pick(z.other())], limit)
+    }
+}
