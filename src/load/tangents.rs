@@ -10,7 +10,7 @@ use std::collections::HashMap;
 /// Bytes that generating takes a corner: what is noted of it, beside the vertex of its own that it may become.
 pub const OF_CORNER: u64 = 256;
 
-/// Gives `mesh` tangents that follow texture coordinate set `uv_set`.
+/// Gives `mesh` tangents that follow texture coordinate set `uv_set`, which it notes.
 ///
 /// Vertices whose corners need different tangents are split; a mesh without normals gets flat ones, vertex by vertex.
 /// Leaves the mesh as it is when it has no such coordinates, or polygons instead of triangles.
@@ -33,6 +33,7 @@ pub fn generate(mesh: &mut Mesh, uv_set: u32) {
         corners[face as usize] = [of_face(mesh.triangles[face as usize], mesh, uvs); 3];
     }
     split(mesh, &corners);
+    mesh.tangent_set = Some(uv_set);
 }
 
 /// Faces that the generator takes, and those around a vertex where too many meet for it.

@@ -244,6 +244,17 @@ impl Patch<'_> {
         Some((tangent, sign))
     }
 
+    /// The same along the coordinates of a map as its transform turns them: what its texels are given in.
+    fn tangents_of_map(&self, normal: Vec3, map: &TextureRef) -> Option<(Vec3, Vec3)> {
+        let made_for_it = self.mesh.tangent_set.is_none_or(|set| set == map.uv_set);
+        let given = made_for_it.then(|| self.mix(&self.mesh.tangents)).flatten();
+        let given = given.and_then(|t| given_tangent(self.placement, t, normal));
+        let turn = FrameTurn::new(&map.transform);
+        let along_map = given.map(|frame| turn.map_or(frame, |turn| turn.apply(frame, normal)));
+        let (tangent, sign) = along_map.or_else(|| self.tangent_of_coordinates(normal, map))?;
+        Some((tangent, normal.cross(tangent) * sign))
+    }
+
     /// The normal as a normal map turns it, whose x and y are scaled.
     #[inline]
     pub(crate) fn normal_mapped(
@@ -254,7 +265,7 @@ impl Patch<'_> {
         store: &TextureStore,
     ) -> Option<Vec3> {
         let texel = self.texel(map, ColorSpace::Linear, store).truncate();
-        let (tangent, bitangent) = self.tangents(normal, map)?;
+        let (tangent, bitangent) = self.tangents_of_map(normal, map)?;
         turned_by_texel(normal, [tangent, bitangent], texel, scale)
     }
 
@@ -264,7 +275,7 @@ impl Patch<'_> {
     #[inline]
     pub(crate) fn bumped(&self, normal: Vec3, material: &Material, store: &TextureStore) -> Option<Vec3> {
         let map = material.bump_map.as_ref()?;
-        let (tangent, bitangent) = self.tangents(normal, map)?;
+        let (tangent, bitangent) = self.tangents_of_map(normal, map)?;
         let at = self.coordinates(map);
         let height = |uv: Vec2| store.sample(map.texture, ColorSpace::Linear, uv, at.along, at.across).x;
         let texel = Vec2::ONE / store.size(map.texture).max(Vec2::ONE);
@@ -323,6 +334,37 @@ impl Turn {
 
     pub(crate) fn apply(&self, uv: Vec2) -> Vec2 {
         self.x_axis * uv.x + self.y_axis * uv.y
+    }
+}
+
+/// How tangents that run along coordinates turn where a map's transform turns or mirrors these.
+///
+/// A texture that is laid out by transformed coordinates is the same as one on coordinates that were transformed before, and
+/// has the same frames (Khronos, *KHR_texture_transform*).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FrameTurn {
+    /// Where the transformed u grows, along the u and the v that it is made of; of unit length.
+    along: Vec2,
+    /// Negative where it mirrors.
+    sign: f32,
+}
+
+impl FrameTurn {
+    /// `None` where frames stay as they are.
+    pub(crate) fn new(transform: &UvTransform) -> Option<Self> {
+        let Turn { x_axis, y_axis } = Turn::new(transform);
+        let determinant = x_axis.perp_dot(y_axis);
+        // The inverse takes (1, 0) there.
+        let along = (Vec2::new(y_axis.y, -x_axis.y) * determinant.signum()).try_normalize()?;
+        let turns = along != Vec2::X || determinant < 0.0;
+        (turns && determinant != 0.0).then_some(Self { along, sign: determinant.signum() })
+    }
+
+    /// A tangent with the sign of its bitangent, turned about a normal. v runs down, against the bitangent.
+    #[inline(always)]
+    pub(crate) fn apply(&self, (tangent, sign): (Vec3, f32), normal: Vec3) -> (Vec3, f32) {
+        let bitangent = normal.cross(tangent) * sign;
+        (tangent * self.along.x - bitangent * self.along.y, sign * self.sign)
     }
 }
 

@@ -470,6 +470,42 @@ mod tests {
     }
 
     #[test]
+    fn the_transform_of_a_normal_map_turns_its_frame_as_transformed_coordinates_do() {
+        let turned = |scale: [f32; 2], rotation| UvTransform { offset: Vec2::ZERO, scale: scale.into(), rotation };
+        let quarter = std::f32::consts::FRAC_PI_2;
+        for (transform, expected) in [
+            (turned([1.0, 1.0], quarter), Vec3::new(0.2, -0.6, 0.77)),
+            (turned([1.0, -1.0], 0.0), Vec3::new(0.6, -0.2, 0.77)),
+            (turned([-3.0, 2.0], 0.0), Vec3::new(-0.6, 0.2, 0.77)),
+            (turned([2.0, 5.0], 0.0), Vec3::new(0.6, 0.2, 0.77)),
+            (turned([-1.0, -1.0], quarter), Vec3::new(-0.2, 0.6, 0.77)),
+        ] {
+            let mut scene = with_normal_map(0.6, 0.2, 0.77);
+            scene.materials[0].normal_map = Some(TextureRef { transform, ..map() });
+            assert_near(normal(&scene, 1.0), expected);
+            crate::load::tangents::generate(&mut scene.meshes[0], 0);
+            assert_near(normal(&scene, 1.0), expected);
+            scene.meshes[0].tangent_set = None;
+            assert_near(normal(&scene, 1.0), expected);
+        }
+    }
+
+    #[test]
+    fn tangents_that_were_made_for_one_set_of_coordinates_are_of_no_other() {
+        let mut scene = with_normal_map(0.6, 0.2, 0.77);
+        let turned = scene.meshes[0].uvs[0].iter().map(|uv| Vec2::new(-uv.y, uv.x)).collect();
+        scene.meshes[0].uvs.push(turned);
+        scene.materials[0].normal_map = Some(TextureRef { uv_set: 1, ..map() });
+        let expected = normal(&scene, 1.0);
+        assert!((expected - Vec3::new(0.6, 0.2, 0.77)).length() > 0.1, "{expected}");
+        crate::load::tangents::generate(&mut scene.meshes[0], 0);
+        assert_near(normal(&scene, 1.0), expected);
+        // Those of a file are of all.
+        scene.meshes[0].tangent_set = None;
+        assert_near(normal(&scene, 1.0), Vec3::new(0.6, 0.2, 0.77));
+    }
+
+    #[test]
     fn a_mirrored_instance_mirrors_its_normal_map() {
         for tangents in [vec![], vec![Vec4::new(1.0, 0.0, 0.0, 1.0); 4]] {
             for (x, y) in [(0.6, 0.0), (0.0, 0.6)] {

@@ -18,6 +18,8 @@ pub struct Mesh {
     pub normals: Vec<Vec3>,
     /// Unit tangents with handedness in `w`; empty unless a normal map needs them.
     pub tangents: Vec<Vec4>,
+    /// The set of texture coordinates that they were made from; `None`: the file gave them, for all sets.
+    pub tangent_set: Option<u32>,
     /// Vertex colours, linear RGBA, multiplied into the base colour; empty: white.
     pub colors: Vec<Vec4>,
     /// Texture coordinate sets (`TEXCOORD_0`, `TEXCOORD_1`, …), v pointing down as in glTF.

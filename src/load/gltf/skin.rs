@@ -10,8 +10,9 @@ use super::links::is_bind_matrix;
 use super::report::Report;
 use super::scene::Draw;
 use crate::math::frame::{center_of_most, spread};
-use crate::math::{DMat3, DMat4, DVec3, Vec3, Vec4};
+use crate::math::{DMat3, DMat4, DVec3, Vec3};
 use crate::scene::Mesh;
+use crate::scene::mesh::normal_from_object;
 use gltf::json::{Root, Skin};
 use std::collections::HashSet;
 
@@ -143,24 +144,26 @@ impl Influences {
 pub(super) fn pose(mesh: &mut Mesh, influences: &Influences, matrices: &[DMat4]) -> (DVec3, Oddities) {
     let mut odd = Oddities::default();
     let mut placed = Vec::with_capacity(mesh.positions.len());
-    let mut mirrored = 0usize;
+    let mut mirrored = vec![false; mesh.positions.len()];
     for (vertex, position) in mesh.positions.iter().enumerate() {
         let matrix = influences.blend(vertex, matrices, &mut odd);
         placed.push(matrix.transform_point3(position.as_dvec3()));
         let linear = DMat3::from_mat4(matrix);
-        mirrored += usize::from(linear.determinant() < 0.0);
+        mirrored[vertex] = linear.determinant() < 0.0;
         if let Some(normal) = mesh.normals.get_mut(vertex) {
-            *normal = unit(linear.inverse().transpose() * normal.as_dvec3(), *normal);
+            *normal = unit(normal_from_object(&linear) * normal.as_dvec3(), *normal);
         }
         if let Some(tangent) = mesh.tangents.get_mut(vertex) {
             let direction = unit(linear * tangent.truncate().as_dvec3(), tangent.truncate());
-            *tangent = direction.extend(tangent.w);
+            *tangent = direction.extend(if mirrored[vertex] { -tangent.w } else { tangent.w });
         }
     }
     // Joints that mirror turn faces inside out; glTF wants fronts to stay fronts.
-    if 2 * mirrored > mesh.positions.len() {
-        mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
-        mesh.tangents.iter_mut().for_each(|t| *t = Vec4::new(t.x, t.y, t.z, -t.w));
+    for triangle in &mut mesh.triangles {
+        let inside_out = triangle.iter().filter(|v| mirrored.get(**v as usize) == Some(&true)).count();
+        if inside_out >= 2 {
+            triangle.swap(1, 2);
+        }
     }
     let finite = || placed.iter().filter(|p| p.is_finite());
     let lo = finite().fold(DVec3::INFINITY, |lo, p| lo.min(*p));
@@ -177,7 +180,7 @@ fn unit(v: DVec3, otherwise: Vec3) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::DAffine3;
+    use crate::math::{DAffine3, Vec4};
 
     #[test]
     fn a_vertex_between_two_joints_goes_half_way_with_each() {
@@ -192,5 +195,46 @@ mod tests {
         assert_eq!(at(0), DVec3::new(0.0, 1.0, 0.0));
         assert_eq!(at(1), DVec3::new(1.0, 2.0, 0.0));
         assert!(odd.outside && odd.negative && odd.unequal);
+    }
+
+    /// One triangle that faces +z for each of these joints, alone; with tangents along x.
+    fn posed(matrices: &[DMat4]) -> Mesh {
+        let triangle = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        let each = |k: u32| [3 * k, 3 * k + 1, 3 * k + 2];
+        let mut mesh = Mesh {
+            positions: matrices.iter().flat_map(|_| triangle).collect(),
+            normals: vec![Vec3::Z; 3 * matrices.len()],
+            tangents: vec![Vec3::X.extend(1.0); 3 * matrices.len()],
+            triangles: (0..matrices.len() as u32).map(each).collect(),
+            ..Mesh::default()
+        };
+        let joints = (0..matrices.len() as u32).flat_map(|k| [[k, 0, 0, 0]; 3]).collect();
+        let weights = vec![[1.0, 0.0, 0.0, 0.0]; 3 * matrices.len()];
+        pose(&mut mesh, &Influences { joints: vec![joints], weights: vec![weights] }, matrices);
+        mesh
+    }
+
+    #[test]
+    fn faces_of_joints_that_mirror_are_turned_round_and_no_others() {
+        let mirror = DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0));
+        for matrices in [vec![DMat4::IDENTITY, mirror, mirror], vec![mirror, DMat4::IDENTITY, DMat4::IDENTITY]] {
+            let mesh = posed(&matrices);
+            for (k, matrix) in matrices.iter().enumerate() {
+                let [a, b, c] = mesh.triangles[k].map(|v| mesh.positions[v as usize]);
+                assert_eq!((b - a).cross(c - a).normalize(), Vec3::Z);
+                assert_eq!(mesh.normals[3 * k], Vec3::Z);
+                let side = if *matrix == mirror { -1.0 } else { 1.0 };
+                assert_eq!(mesh.tangents[3 * k], Vec4::new(side, 0.0, 0.0, side));
+            }
+        }
+    }
+
+    #[test]
+    fn what_a_joint_flattens_keeps_the_normal_of_where_it_turns_to() {
+        let turned = DMat4::from_rotation_x(-std::f64::consts::FRAC_PI_2);
+        for height in [1.0, 1e-9, 0.0] {
+            let mesh = posed(&[turned * DMat4::from_scale(DVec3::new(1.0, 1.0, height))]);
+            assert!((mesh.normals[0] - Vec3::Y).length() < 1e-6, "{}", mesh.normals[0]);
+        }
     }
 }

@@ -6,7 +6,7 @@ use super::painted::Painted;
 use crate::math::simd::{Kernel, Simd};
 use crate::math::{Vec2, Vec3, Vec4};
 use crate::render::context::{Context, coverage};
-use crate::render::patch::{Turn, given_tangent, mixed_color, turned_by_texel, turning_of};
+use crate::render::patch::{FrameTurn, Turn, given_tangent, mixed_color, turned_by_texel, turning_of};
 use crate::render::shade::{MetalRoughPaint, PhongPaint, base_color, base_space, occlusion};
 use crate::render::surface::{facing, side_of};
 use crate::render::texture::{ColorSpace, Layout, Places, Spots, TextureStore, changes};
@@ -188,7 +188,8 @@ impl Strip {
         if sheet.normal_map.is_some() {
             let points = padded(count);
             let scale = material.normal_scale;
-            level.run(TurnNormals { given, found, painted, points, placement, smooth, scale });
+            let turn = material.normal_map.as_ref().and_then(|map| FrameTurn::new(&map.transform));
+            level.run(TurnNormals { given, found, painted, points, placement, smooth, scale, turn });
         }
     }
 }
@@ -299,6 +300,7 @@ struct TurnNormals<'a> {
     placement: &'a Placement,
     smooth: bool,
     scale: f32,
+    turn: Option<FrameTurn>,
 }
 
 impl Kernel for TurnNormals<'_> {
@@ -306,7 +308,7 @@ impl Kernel for TurnNormals<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Self { given, found, painted, points, placement, smooth, scale } = self;
+        let Self { given, found, painted, points, placement, smooth, scale, turn } = self;
         let placement = *placement;
         let mut turns = Turns::default();
         for i in 0..points.min(POINTS) {
@@ -317,6 +319,14 @@ impl Kernel for TurnNormals<'_> {
             let (tangent, sign) = tangent.unwrap_or((Vec3::NAN, 1.0));
             put(&mut turns.tangent, i, tangent);
             turns.sign[i] = sign;
+        }
+        if let Some(turn) = turn {
+            for i in 0..points.min(POINTS) {
+                let (own, frame) = (get(&turns.own, i), (get(&turns.tangent, i), turns.sign[i]));
+                let (tangent, sign) = turn.apply(frame, own);
+                put(&mut turns.tangent, i, tangent);
+                turns.sign[i] = sign;
+            }
         }
         for i in 0..points.min(POINTS) {
             let (own, tangent) = (get(&turns.own, i), get(&turns.tangent, i));
