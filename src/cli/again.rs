@@ -224,7 +224,7 @@ impl Facts<'_> {
             set("polygons", "whole".into());
         }
         load.smooth.iter().for_each(|&lean| set("smooth", degrees(lean)));
-        load.line_width.iter().for_each(|width| set("line-width", width.to_string()));
+        load.wire_widths.iter().for_each(|[width, _]| set("line-width", width.to_string()));
         if load.mtl == MtlMode::Literal {
             set("mtl", "literal".into());
         }
@@ -330,7 +330,10 @@ fn repeat_from(metadata: Option<Metadata>, picture: &Path, typed: &RenderArgs) -
     if typed.inputs.is_empty() && inputs.iter().any(|i| i == Path::new("-")) {
         return Err(fault("was made from standard input".into()).remedy("name the model, or `-`, before --again"));
     }
-    let args = parse_settings(&settings).map_err(fault)?;
+    let mut args = parse_settings(&settings).map_err(fault)?;
+    if let Some(Env::File(panorama)) = &mut args.env {
+        *panorama = found(&panorama.to_string_lossy(), picture);
+    }
     let warning = entry(Metadata::VERSION).ok().filter(|v| *v != super::version::SHORT).map(|version| {
         let text =
             format!("written by meshray {version}; this is {}, which may draw it otherwise", super::version::SHORT);

@@ -333,11 +333,12 @@ fn load_options(args: &RenderArgs) -> LoadOptions {
         polygons: args.polygons.into(),
         mtl: args.mtl.into(),
         smooth: args.smooth,
-        line_width: args.line_width,
+        wire_widths: args.line_width.map(|width| [width; 2]),
         scene: args.scene.clone(),
         variant: args.variant.clone(),
         up: args.up.map(Into::into),
         moment: None,
+        animations_before: None,
         without_pictures: false,
     }
 }

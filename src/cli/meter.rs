@@ -3,7 +3,8 @@
 //! A lamp of a room has hundreds of candela and the sun a hundred thousand lux, which no picture shows as they are; many a
 //! file on the other hand counts from 0 to 1. So a small picture is taken first, and where what it shows is far too bright or
 //! too dark, the exposure that makes it right is used and said. Each view is exposed as if it were rendered alone; one exposure
-//! serves all pictures of a sequence, or it would flicker: that with which it begins, whichever of them are rendered.
+//! serves all pictures of a sequence, or it would flicker: that of the first that shows something lit, whichever of them are
+//! rendered.
 
 use super::camera::Choice;
 use crate::image::Picture;
@@ -38,12 +39,12 @@ impl Metered {
         self.stops.iter().find(|(known, _)| known == view).map(|(_, stops)| *stops)
     }
 
-    /// The same, found where they are not known: 0 where the view is to be shown as it is.
-    pub(super) fn get_or_find(&mut self, view: &Choice, find: impl FnOnce() -> Option<f32>) -> f32 {
-        self.get(view).unwrap_or_else(|| {
+    /// The same, found where they are not known, and known from then on; `None` where nothing tells.
+    pub(super) fn get_or_find(&mut self, view: &Choice, find: impl FnOnce() -> Option<f32>) -> Option<f32> {
+        self.get(view).or_else(|| {
             let start = Instant::now();
-            let stops = find().unwrap_or(0.0);
-            self.stops.push((view.clone(), stops));
+            let stops = find();
+            self.stops.extend(stops.map(|stops| (view.clone(), stops)));
             self.seconds += start.elapsed().as_secs_f64();
             stops
         })
@@ -55,10 +56,10 @@ impl Metered {
     }
 }
 
-/// Stops to add; `None` where the scene is to be shown as it is.
+/// Stops to add, 0 where the scene is to be shown as it is; `None` where nothing is lit.
 pub(super) fn exposure(job: &Job) -> Option<f32> {
     if !job.scene.photometric {
-        return None;
+        return Some(0.0);
     }
     let Settings { width, height, .. } = *job.settings;
     let shrink = |side: u32| (u64::from(side) * u64::from(SIDE)).div_ceil(u64::from(width.max(height)));
@@ -80,7 +81,7 @@ pub(super) fn exposure(job: &Job) -> Option<f32> {
     let bright = bright(&picture)?;
     // Tenths of a stop: what is printed is what is used.
     let stops = || (libm::log2f(BRIGHT / bright) * 10.0).round() / 10.0;
-    (!FINE.contains(&bright)).then(|| stops().clamp(-MAX_STOPS, MAX_STOPS))
+    Some(if FINE.contains(&bright) { 0.0 } else { stops().clamp(-MAX_STOPS, MAX_STOPS) })
 }
 
 /// What is said of an exposure that was found.
@@ -145,16 +146,17 @@ mod tests {
             std::thread::sleep(std::time::Duration::from_millis(2));
             Some(1.5)
         };
-        assert_eq!(metered.get_or_find(&Choice::Default, wait), 1.5);
+        assert_eq!(metered.get_or_find(&Choice::Default, || None), None);
+        assert_eq!(metered.get_or_find(&Choice::Default, wait), Some(1.5));
         assert!(metered.take_seconds() >= 0.002);
-        assert_eq!(metered.get_or_find(&Choice::Default, wait), 1.5);
+        assert_eq!(metered.get_or_find(&Choice::Default, wait), Some(1.5));
         assert_eq!(metered.take_seconds(), 0.0);
     }
 
     #[test]
     fn light_within_reach_and_light_without_units_stay_as_they_are() {
-        assert_eq!(metered(20.0, true), None);
-        assert_eq!(metered(30_000.0, false), None);
+        assert_eq!(metered(20.0, true), Some(0.0));
+        assert_eq!(metered(30_000.0, false), Some(0.0));
         assert_eq!(metered(0.0, true), None);
     }
 }

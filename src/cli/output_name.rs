@@ -127,10 +127,10 @@ pub(super) fn identity(name: &Path) -> PathBuf {
     parent.join(name.file_name().unwrap_or_default())
 }
 
-/// `shot.png` -> `shot.partial.png`.
+/// `shot.png` -> `shot.partial.png`, `shot` -> `shot.partial`.
 pub(super) fn partial(name: &Path) -> PathBuf {
-    let extension = name.extension().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();
-    name.with_extension(format!("partial.{extension}"))
+    let extension = name.extension().map(|e| format!(".{}", e.to_string_lossy())).unwrap_or_default();
+    name.with_extension(format!("partial{extension}"))
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use super::job::{self, Wrong};
 use super::message::{Messages, Severity};
 use super::moment;
 use crate::load::diagnostic::OVER_MEMORY;
-use crate::load::{Diagnostic, Limits, LoadError, LoadOptions, Loaded, load, load_bytes};
+use crate::load::{Diagnostic, Limits, LoadError, LoadOptions, Loaded, check_moment, load, load_bytes};
 use crate::math::DAffine3;
 use crate::render::{Instancing, Placing, World};
 use std::io::Read;
@@ -16,18 +16,21 @@ use xxhash_rust::xxh3::xxh3_128;
 
 /// Loads every input and puts all into the first one's scene, in the memory that is allowed for all together.
 pub(super) fn scene(inputs: &[PathBuf], options: &LoadOptions) -> Result<Loaded, LoadError> {
-    let Some((first, others)) = inputs.split_first() else { return Ok(Loaded::default()) };
-    let mut whole = one(first, options)?;
-    if others.is_empty() {
-        return Ok(whole);
-    }
+    let (first, others) = match inputs {
+        [] => return Ok(Loaded::default()),
+        [only] => return one(only, options),
+        [first, others @ ..] => (first, others),
+    };
+    let mut whole = one(first, &LoadOptions { animations_before: Some(0), ..options.clone() })?;
     let mut hashes = whole.facts.hash.to_le_bytes().to_vec();
     for input in others {
-        let part = one(input, &LoadOptions { limits: left(&options.limits, &whole), ..options.clone() })?;
+        let (limits, animations_before) = (left(&options.limits, &whole), Some(whole.facts.animations.len()));
+        let part = one(input, &LoadOptions { limits, animations_before, ..options.clone() })?;
         hashes.extend(part.facts.hash.to_le_bytes());
         append(&mut whole, part);
     }
     whole.facts.hash = xxh3_128(&hashes);
+    check_moment(&mut whole, first, options)?;
     Ok(whole)
 }
 
@@ -59,11 +62,12 @@ pub(super) fn model_as_stored(input: &PathBuf, args: &LoadArgs, messages: &Messa
         polygons: args.polygons.into(),
         mtl: args.mtl.into(),
         smooth: args.smooth,
-        line_width: args.line_width,
+        wire_widths: args.line_width.map(|width| [width; 2]),
         scene: args.scene.clone(),
         variant: args.variant.clone(),
         up: args.up.map(Into::into),
         moment,
+        animations_before: None,
         without_pictures: false,
     };
     let loaded = scene(slice::from_ref(input), &options).map_err(|error| {
@@ -153,6 +157,7 @@ fn append(whole: &mut Loaded, part: Loaded) {
     whole.scene.append(part.scene, &DAffine3::IDENTITY);
     whole.warnings.extend(part.warnings);
     let (facts, more) = (&mut whole.facts, part.facts);
+    facts.add_animations(&more);
     facts.faces += more.faces;
     facts.dropped.extend(more.dropped);
     facts.wires.append(&more.wires);

@@ -12,7 +12,7 @@ use super::sequence::{Step, Survey};
 use super::shot::{self, Stage, Task};
 use super::stats::{self, PictureStats};
 use super::writable::{self, Sources};
-use super::{accident, again, interrupt, read, surroundings};
+use super::{accident, again, interrupt, read, surroundings, unseen};
 use crate::load::{Diagnostic, LoadOptions, Loaded};
 use crate::render::{Moved, World};
 use crate::scene::Scene;
@@ -32,7 +32,8 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
         }
     };
     let sources = Sources::of(job.batches.iter().flat_map(|b| &b.inputs));
-    let mut so_far = SoFar { unseen: HashSet::new(), sources, pictures: Vec::new(), foretold: Vec::new() };
+    let mut so_far =
+        SoFar { shown: false, unseen: HashSet::new(), sources, pictures: Vec::new(), foretold: Vec::new() };
     // A picture that is repeated may be replaced by its repetition, but by nothing else.
     let spared = |path| Sources::of(&job.again).spared_by(path, "--stats-file");
     if let Some(path) = job.stats_file()
@@ -60,6 +61,8 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
 
 /// What a run has read and made so far.
 pub(super) struct SoFar {
+    /// Whether a frame of the sequence that is rendered shows something.
+    pub shown: bool,
     /// Files and views whose pictures show nothing, and that this was said of.
     pub unseen: HashSet<(PathBuf, String)>,
     /// All inputs, and the files that those loaded so far use.
@@ -114,6 +117,7 @@ fn render_shots(task: &Task, shots: &[&Shot], so_far: &mut SoFar) -> Result<Exit
     let aspect = |scene: &Scene| Effective::new(&job.look, &scene.hints).map_or(1.0, |effective| effective.aspect());
     let survey = Survey::of(job, batch, aspect, messages, progress)?;
     survey.iter().for_each(|_| profile.done("frame"));
+    so_far.shown = false;
     let mut earlier = beginning(task, shots, survey.as_ref(), &mut profile)?;
     let (mut worst, mut left) = (Exit::Done, shots);
     while let Some(first) = left.first() {
@@ -122,7 +126,7 @@ fn render_shots(task: &Task, shots: &[&Shot], so_far: &mut SoFar) -> Result<Exit
         let (now, later) = left.split_at(same);
         left = later;
         let mut ready =
-            prepare(task, (&first.step, survey.is_some()), earlier.take(), profile).map_err(|exit| worst.max(exit))?;
+            prepare(task, (&first.step, survey.as_ref()), earlier.take(), profile).map_err(|exit| worst.max(exit))?;
         so_far.sources.add(&ready.loaded.facts.files);
         if let Some(path) = job.stats_file() {
             let spared = so_far.sources.spared_by(path, "--stats-file");
@@ -138,28 +142,46 @@ fn render_shots(task: &Task, shots: &[&Shot], so_far: &mut SoFar) -> Result<Exit
         drop(stage);
         (earlier, profile) = (Some(ready), Profile::new());
     }
+    if survey.is_some() && !so_far.shown && !job.dry_run && worst == Exit::Done {
+        messages.say(Severity::Warning, &unseen::sequence(shots.len(), task.file()));
+        if job.strict {
+            let text = "--strict, and there is a warning; the pictures were written before it was known";
+            return Ok(task.fail(&Diagnostic::new("strict", task.file(), "", text), Exit::Input));
+        }
+    }
     Ok(worst)
 }
 
-/// The moment with which a sequence begins, its views metered, where they are exposed by that and it is none that is
-/// rendered first.
+/// The moment of an animation by which all its pictures are exposed, its views metered: the first that shows something lit,
+/// of all, whichever of them are rendered. `None` where they are not exposed by any.
 fn beginning(
     task: &Task,
     shots: &[&Shot],
     survey: Option<&Survey>,
     profile: &mut Profile,
 ) -> Result<Option<Ready>, Exit> {
-    let step = task.job.first_step(&shots[0].step);
-    let is_metered = survey.is_some_and(|survey| survey.photometric) && task.job.look.exposure.is_none();
-    if !is_metered || step.moment == shots[0].step.moment {
-        return Ok(None);
+    let mut earlier = None;
+    if !survey.is_some_and(|survey| survey.photometric) || task.job.look.exposure.is_some() {
+        return Ok(earlier);
     }
-    let mut ready = prepare(task, (&step, survey.is_some()), None, profile.take())?;
-    let mut stage = ready.stage(survey);
-    shots.iter().try_for_each(|shot| stage.meter(task, &Shot { step: step.clone(), ..(*shot).clone() }))?;
-    drop(stage);
-    *profile = ready.profile.take();
-    Ok(Some(ready))
+    for step in task.job.frames() {
+        let mut ready = prepare(task, (&step, survey), earlier.take(), profile.take())?;
+        let mut stage = ready.stage(survey);
+        let mut lit = true;
+        for shot in shots {
+            lit &= stage.meter(task, &Shot { step: step.clone(), ..(*shot).clone() })?;
+        }
+        drop(stage);
+        *profile = ready.profile.take();
+        earlier = Some(ready);
+        if lit {
+            break;
+        }
+        if interrupt::raised() {
+            return Err(Exit::Interrupted);
+        }
+    }
+    Ok(earlier)
 }
 
 /// A scene that can be rendered.
@@ -187,14 +209,15 @@ impl Ready {
 /// Loads a scene for a picture, and refuses what cannot or must not be drawn. A frame of several may show nothing.
 fn prepare(
     task: &Task,
-    (step, is_frame): (&Step, bool),
+    (step, survey): (&Step, Option<&Survey>),
     earlier: Option<Ready>,
     mut profile: Profile,
 ) -> Result<Ready, Exit> {
     let Task { job, batch, messages, progress } = *task;
     let start = Instant::now();
     progress.stage("loading");
-    let options = LoadOptions { without_pictures: earlier.is_some(), ..job.load_for(step) };
+    let options = survey.map_or_else(|| job.load_for(step), |survey| survey.load_for(job, step));
+    let options = LoadOptions { without_pictures: earlier.is_some(), ..options };
     let mut loaded = read::scene(&batch.inputs, &options).map_err(|error| {
         messages.load_error(&error);
         read::exit_of(&error)
@@ -232,7 +255,7 @@ fn prepare(
         Exit::Failed
     })?;
     let world = if job.everything { world.with_everything() } else { world };
-    if world.is_empty() && !job.allow_empty && !is_frame {
+    if world.is_empty() && !job.allow_empty && survey.is_none() {
         messages.say(Severity::Error, &nothing_to_draw(&loaded, &batch.inputs[0]));
         return Err(Exit::Input);
     }

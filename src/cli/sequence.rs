@@ -10,12 +10,12 @@ use super::message::{Messages, Severity};
 use super::parse::{Frames, Turns};
 use super::progress::Progress;
 use super::{interrupt, moment, read};
-use crate::load::{Diagnostic, LoadOptions, Loaded, Moment};
+use crate::load::{Diagnostic, LoadOptions, Loaded, Moment, WireFacts, scene_file};
 use crate::render::World;
 use crate::scene::framing::{Bounds, Fit, frame, frame_around, robust_bounds, turned};
 use crate::scene::{Camera, Scene};
 use std::f64::consts::TAU;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What the pictures of a scene have in common.
 #[derive(Clone, Debug)]
@@ -48,10 +48,12 @@ pub(super) fn of(args: &RenderArgs) -> Result<Option<Sequence>, Wrong> {
     if let Some(frame) = args.moment.frame.filter(|frame| !(frames.first..frames.end).contains(frame)) {
         return Err(Wrong(format!("--frame {frame} is none of --frames {frames}")));
     }
-    if args.inputs.iter().any(|input| input == Path::new("-")) {
-        return Err(Wrong(
-            "--frames reads the model for each frame, and standard input (`-`) can be read only once".into(),
-        ));
+    let is_stream = |input: &&PathBuf| {
+        *input == Path::new("-") || std::fs::metadata(input).is_ok_and(|file| !file.is_file() && !file.is_dir())
+    };
+    if let Some(input) = args.inputs.iter().find(is_stream) {
+        let name = if input == Path::new("-") { "standard input (`-`)".into() } else { input.display().to_string() };
+        return Err(Wrong(format!("--frames reads the model for each frame, and {name} can be read only once")));
     }
     let animation = args.moment.animation.clone();
     Ok(Some(Sequence::Frames { frames, fps: moment::fps(&args.moment), animation }))
@@ -97,12 +99,21 @@ impl RenderJob {
     /// That with which the sequence of a picture begins; a picture by itself is its own.
     pub(super) fn first_step(&self, step: &Step) -> Step {
         match &self.sequence {
-            Some(sequence @ Sequence::Frames { frames, .. }) => {
-                Step { number: Some(frames.first), moment: sequence.moment(frames.first) }
-            }
+            Some(Sequence::Frames { .. }) => self.frames().next().unwrap_or_else(|| step.clone()),
             Some(Sequence::Turntable(_)) => Step { number: Some(0), ..step.clone() },
             None => step.clone(),
         }
+    }
+
+    /// All frames of an animation, whichever of them are rendered.
+    pub(super) fn frames(&self) -> impl Iterator<Item = Step> {
+        let sequence = self.sequence.as_ref();
+        let frames = sequence.and_then(|sequence| match sequence {
+            Sequence::Frames { frames, .. } => Some(frames.first..frames.end),
+            Sequence::Turntable(_) => None,
+        });
+        let moment = move |frame| sequence.and_then(|sequence| sequence.moment(frame));
+        frames.into_iter().flatten().map(move |frame| Step { number: Some(frame), moment: moment(frame) })
     }
 
     /// How to load for a picture.
@@ -154,12 +165,40 @@ fn refuse_warnings(loaded: &Loaded, file: &Path, messages: &Messages) -> Result<
     Err(Exit::Input)
 }
 
+/// How wide points and lines are in each frame by itself.
+#[derive(Default)]
+struct Widths {
+    points: Vec<f64>,
+    lines: Vec<f64>,
+}
+
+impl Widths {
+    fn add(&mut self, wires: &WireFacts) {
+        self.points.push(wires.point_width);
+        self.lines.push(wires.line_width);
+    }
+
+    /// The medians: neither a moment at which all is in one place nor one at which something is far away decides.
+    fn usual(mut self) -> Option<[f64; 2]> {
+        let median = |all: &mut Vec<f64>| {
+            all.retain(|&width| width > 0.0);
+            all.sort_by(f64::total_cmp);
+            all.get(all.len().saturating_sub(1) / 2).copied()
+        };
+        let (points, lines) = (median(&mut self.points), median(&mut self.lines));
+        let any = points.or(lines)?;
+        Some([points.unwrap_or(any), lines.unwrap_or(any)])
+    }
+}
+
 /// What all frames of an animation take up, found before the first is rendered.
 pub(super) struct Survey {
     /// The box of all.
     pub bounds: Bounds,
     /// Whether their lamps are given as they are measured.
     pub photometric: bool,
+    /// How wide points and lines are in all frames.
+    pub wire_widths: Option<[f64; 2]>,
     /// The camera of each choice that is framed on the model.
     cameras: Vec<(Choice, Option<Camera>)>,
 }
@@ -179,6 +218,8 @@ impl Survey {
         let Some(sequence @ Sequence::Frames { frames, .. }) = &job.sequence else { return Ok(None) };
         progress.stage("framing");
         let mut photometric = false;
+        let mut widths = Widths::default();
+        let mut is_scene_file = false;
         let mut bounds: Option<Bounds> = None;
         let mut fits: Vec<(Choice, Option<Fit>)> = Vec::new();
         for frame in frames.first..frames.end {
@@ -199,8 +240,10 @@ impl Survey {
                 messages.say(Severity::Error, &fault.remedy("--turntable shows it from all around"));
                 return Err(Exit::Input);
             }
+            is_scene_file |= loaded.facts.format == scene_file::FORMAT;
             let scene = &loaded.scene;
             photometric |= scene.photometric;
+            widths.add(&loaded.facts.wires);
             // Animations hide things by a scale of zero.
             if World::flattened_bytes(scene) == 0 {
                 continue;
@@ -221,8 +264,16 @@ impl Survey {
         }
         Ok(bounds.map(|bounds| {
             let camera = |(choice, fit): (Choice, Option<Fit>)| (choice, fit.map(|fit| fit.camera(bounds.radius())));
-            Self { bounds, photometric, cameras: fits.into_iter().map(camera).collect() }
+            // Of several models each has its own.
+            let is_one = batch.inputs.len() == 1 && !is_scene_file;
+            let wire_widths = job.load.wire_widths.or_else(|| widths.usual().filter(|_| is_one));
+            Self { bounds, photometric, wire_widths, cameras: fits.into_iter().map(camera).collect() }
         }))
+    }
+
+    /// How to load for a picture.
+    pub(super) fn load_for(&self, job: &RenderJob, step: &Step) -> LoadOptions {
+        LoadOptions { wire_widths: self.wire_widths, ..job.load_for(step) }
     }
 
     /// The camera of a choice, if it is framed on the model.

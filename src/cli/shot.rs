@@ -68,16 +68,17 @@ impl Stage<'_> {
     }
 
     /// Finds the exposure of a view through the eye that this picture of it has, unless it is known or not asked for.
-    pub(super) fn meter(&mut self, task: &Task, shot: &Shot) -> Result<(), Exit> {
+    /// Whether there is something by which it is exposed.
+    pub(super) fn meter(&mut self, task: &Task, shot: &Shot) -> Result<bool, Exit> {
         let effective = effective(task, &self.loaded.scene)?;
         if !is_metered(&effective, shot, &self.loaded.scene) || self.metered.get(&shot.choice).is_some() {
-            return Ok(());
+            return Ok(true);
         }
         let (camera, _) = self.camera(task, shot, &effective)?;
         let view = View::from_camera(&camera);
         let Self { loaded, world, built, metered, profile, .. } = self;
         task.progress.stage("metering");
-        metered.get_or_find(&shot.choice, || {
+        let stops = metered.get_or_find(&shot.choice, || {
             let (accel, _) = &*built.get_or_insert_with(|| structure(task.job, world));
             surroundings::lit(&task.job.look, loaded, &camera, |loaded, _| {
                 let (scene, textures) = (&loaded.scene, textures(task.job, &loaded.scene));
@@ -86,7 +87,7 @@ impl Stage<'_> {
             })
         });
         profile.done("meter");
-        Ok(())
+        Ok(stops.is_some())
     }
 }
 
@@ -168,7 +169,8 @@ pub(super) fn render(task: &Task, shot: &Shot, stage: &mut Stage, so_far: &mut S
         let work = Job { scene, world, accel, textures: &textures, view: &view, settings: &effective.settings };
         if is_metered(&effective, shot, scene) {
             progress.stage("metering");
-            effective.output.exposure = metered.get_or_find(&shot.choice, || meter::exposure(&work));
+            let stops = metered.get_or_find(&shot.choice, || meter::exposure(&work));
+            effective.output.exposure = stops.unwrap_or_default();
             profile.done("meter");
         }
         times.meter = metered.take_seconds();
@@ -230,6 +232,7 @@ impl Prepared<'_> {
     fn draw(&self, mut times: Times, profile: &mut Profile, so_far: &mut SoFar) -> Exit {
         let Task { job, messages, progress, batch } = *self.task;
         let Self { shot, effective, loaded, work, .. } = self;
+        so_far.shown = so_far.shown || self.is_frame && unseen::shows_something(work);
         if !self.is_frame
             && let Some(warning) = unseen::warning(work, (&shot.choice, self.phrase), job.look.lens, self.task.file())
         {

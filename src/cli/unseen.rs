@@ -24,6 +24,21 @@ pub(super) fn warning(
     Some(Diagnostic { text: format!("{view}: {}", warning.text), ..warning })
 }
 
+/// Whether anything is to be seen in a picture; also where that takes too long to find out.
+pub(super) fn shows_something(job: &Job) -> bool {
+    job.accel.kind().is_slow() || !job.world.is_empty() && coverage(job).shown
+}
+
+/// What is to be said of a sequence of which no picture shows anything.
+pub(super) fn sequence(pictures: usize, file: &Path) -> Diagnostic {
+    let text = match pictures {
+        1 => "the picture of this sequence shows nothing".into(),
+        n => format!("none of the {n} pictures of this sequence shows anything"),
+    };
+    Diagnostic::new("nothing-seen", file, "", text)
+        .remedy("aim the eye with --at, or name a --view, which frames the model")
+}
+
 fn said(
     Coverage { rays, hits, shown }: Coverage,
     (choice, lens): (&Choice, Option<LensChoice>),

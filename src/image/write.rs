@@ -7,11 +7,15 @@ use std::path::{Path, PathBuf};
 /// Writes `bytes` to a temporary file in the same folder and renames it to `path`. On failure nothing is left.
 ///
 /// A file that is replaced keeps its permissions, a new one gets the usual ones; a link stays, and the file it points
-/// to is replaced or made. What is no regular file (`/dev/stdout`, a pipe) is written straight.
+/// to is replaced or made. What is no regular file (a device, a pipe) is written straight, and what the process has open
+/// already (`/dev/stdout`, `/dev/fd/3`) where it was left.
 ///
 /// # Errors
 /// What the system says, with the remedy where the folder is missing, `path` is a folder, or the file is read-only.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    if let Some(number) = descriptor(path) {
+        return write_on(number, path, bytes);
+    }
     let target = destination(path);
     let old = match fs::metadata(&target) {
         Ok(old) if old.is_dir() => return Err(fault(ErrorKind::IsADirectory, "is a folder; name a file in it")),
@@ -49,10 +53,39 @@ fn write_and_rename(target: &Path, folder: &Path, old: Option<Permissions>, byte
     Ok(())
 }
 
-/// Where a path leads through symbolic links, also where there is no file there yet.
+/// Links that lead to links, at most; those of a circle lead nowhere.
+const LINKS: usize = 40;
+
+/// The number under which the process has open what a path leads to, where that is how it is named.
+fn descriptor(path: &Path) -> Option<u32> {
+    let own = fs::canonicalize("/proc/self/fd").ok()?;
+    let mut target = path.to_owned();
+    for _ in 0..LINKS {
+        let folder = fs::canonicalize(folder_of(&target)).ok()?;
+        if folder == own {
+            return target.file_name()?.to_str()?.parse().ok();
+        }
+        target = folder.join(fs::read_link(&target).ok()?);
+    }
+    None
+}
+
+/// Writes behind what was written there before.
+fn write_on(number: u32, path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let all = |out: &mut dyn Write| out.write_all(bytes).and_then(|()| out.flush());
+    match number {
+        1 => all(&mut io::stdout().lock()),
+        2 => all(&mut io::stderr().lock()),
+        _ => all(&mut fs::OpenOptions::new().append(true).open(path)?),
+    }
+}
+
+/// Where a path leads through symbolic links, also where there is no file there yet; what the process has open already
+/// stays as it is named.
 pub fn destination(path: &Path) -> PathBuf {
-    /// Links that lead to links, at most; those of a circle lead nowhere.
-    const LINKS: usize = 40;
+    if descriptor(path).is_some() {
+        return path.to_owned();
+    }
     let mut target = path.to_owned();
     for _ in 0..LINKS {
         if let Ok(whole) = fs::canonicalize(&target) {
@@ -178,6 +211,30 @@ mod tests {
             assert_eq!(fs::read(at("real.png")).unwrap(), b"new");
             symlink("circle.png", at("circle.png")).unwrap();
             assert!(write_atomic(&at("circle.png"), b"new").is_err());
+        }
+
+        #[test]
+        fn what_is_open_already_is_written_on_where_it_was_left() {
+            use std::io::{Read, Seek};
+            use std::os::fd::AsRawFd;
+            let mut file = tempfile::tempfile().unwrap();
+            file.write_all(b"head ").unwrap();
+            let named = PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd()));
+            if !named.exists() {
+                return;
+            }
+            write_atomic(&named, b"one ").unwrap();
+            write_atomic(Path::new(&format!("/dev/fd/{}", file.as_raw_fd())), b"two").unwrap();
+            let mut text = String::new();
+            file.rewind().unwrap();
+            file.read_to_string(&mut text).unwrap();
+            assert_eq!(text, "head one two");
+            let (mut reader, writer) = io::pipe().unwrap();
+            write_atomic(Path::new(&format!("/proc/self/fd/{}", writer.as_raw_fd())), b"three").unwrap();
+            drop(writer);
+            text.clear();
+            reader.read_to_string(&mut text).unwrap();
+            assert_eq!(text, "three");
         }
 
         #[test]

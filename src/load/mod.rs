@@ -53,11 +53,14 @@ pub struct LoadOptions {
     pub up: Option<UpAxis>,
     /// Which moment of an animation of a glTF file is shown; `None`: the rest pose.
     pub moment: Option<Moment>,
+    /// For one of several models that are shown together: how many animations those before it have. Numbers of animations
+    /// count on from there, and one that it lacks may be another's: it is at rest then.
+    pub animations_before: Option<usize>,
     /// Gives meshes without normals smooth ones, but for edges at which faces lean by more than so many radians; `None`:
     /// their faces are flat.
     pub smooth: Option<f64>,
-    /// How wide lines and points are, world units; `None`: 1/256 of what is drawn, or less where there are very many.
-    pub line_width: Option<f64>,
+    /// How wide points and lines are, world units; `None`: 1/256 of what is drawn, or less where there are very many.
+    pub wire_widths: Option<[f64; 2]>,
     /// Leaves pictures out: for whoever needs the geometry of a glTF file alone.
     pub without_pictures: bool,
 }
@@ -127,7 +130,8 @@ pub struct Facts {
     pub wires: WireFacts,
     /// Animations in the file.
     pub animations: Vec<AnimationFacts>,
-    /// Which of them is shown, and when, seconds from its start; `None`: the rest pose.
+    /// Which of them is shown, and when, seconds from its start; `None`: the rest pose. Of several models the first that
+    /// is not at rest counts.
     pub shown: Option<(usize, f64)>,
     /// glTF extensions used: (name, required by the file, supported by us).
     pub extensions: Vec<(String, bool, bool)>,
@@ -155,6 +159,15 @@ pub struct Facts {
     pub reading: Spent,
     /// Time that decoding pictures took: from the first to the last, and of all threads together.
     pub decoding: Spent,
+}
+
+impl Facts {
+    /// Adds the animations of one more model of several.
+    pub(crate) fn add_animations(&mut self, more: &Self) {
+        let before = self.animations.len();
+        self.shown = self.shown.or(more.shown.map(|(number, time)| (before + number, time)));
+        self.animations.extend_from_slice(&more.animations);
+    }
 }
 
 /// An animation of a file.
@@ -222,9 +235,13 @@ fn check_wishes(loaded: &Loaded, file: &Path, options: &LoadOptions) -> Result<(
     refuse("variant-none", "variant", &options.variant, &loaded.facts.variants)
 }
 
-/// A moment of a file without animations: refused when one is named, else a warning.
-fn check_moment(loaded: &mut Loaded, file: &Path, options: &LoadOptions) -> Result<(), LoadError> {
-    let Some(moment) = options.moment.as_ref().filter(|_| loaded.facts.animations.is_empty()) else { return Ok(()) };
+/// A moment of what has no animations: refused when one is named, else a warning; and an animation that none of several
+/// models has. Parts of a whole are looked at together.
+pub(crate) fn check_moment(loaded: &mut Loaded, file: &Path, options: &LoadOptions) -> Result<(), LoadError> {
+    let Some(moment) = options.moment.as_ref().filter(|_| options.animations_before.is_none()) else { return Ok(()) };
+    if !loaded.facts.animations.is_empty() {
+        return Ok(gltf::check_animation(&loaded.facts, moment, file)?);
+    }
     if let Some(name) = &moment.animation {
         let fault = Diagnostic::new("animation-none", file, "", format!("there is no animation '{name}'"));
         return Err(fault.remedy("the file has none").into());

@@ -27,6 +27,8 @@ pub struct Fan<S: Lanewise<N>, const N: usize> {
 }
 
 /// Eight triangles made ready for a fan.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
 pub struct FanReady {
     /// By edge: what is multiplied with the shears, and what is added. Edge values of rays that hit are positive.
     edges: [[Row; 3]; 3],
@@ -37,6 +39,14 @@ pub struct FanReady {
     /// What the mean of the heights errs by: over the sum of the edge values, and in any case.
     moved: Row,
     rounded: Row,
+}
+
+impl FanReady {
+    /// Of no triangles.
+    pub const EMPTY: Self = {
+        let none = [0.0; LANES];
+        Self { edges: [[none; 3]; 3], error: none, heights: [none; 3], moved: none, rounded: none }
+    };
 }
 
 /// The edge values of rays.

@@ -115,3 +115,18 @@ fn a_picture_of_a_very_bright_scene_is_repeated_too() {
     assert!(folder.read("a.png") == folder.read("b.png"));
     folder.render(&["cube.obj", "--exposure", "101"]).ends(2).says(&["100"]);
 }
+
+#[test]
+fn a_panorama_is_found_beside_the_picture_too() {
+    let sky =
+        [b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n".as_slice(), &[90, 60, 30, 130, 30, 60, 90, 129]].concat();
+    let folder = Folder::with_cube().file("evening.hdr", sky);
+    folder.render(&["cube.obj", "--env", "evening.hdr", "-o", "a.png", "-q"]).ends(0);
+    let kept = picture(&folder.path("a.png")).beauty;
+    std::fs::create_dir(folder.path("moved")).unwrap();
+    for name in ["a.png", "cube.obj", "evening.hdr"] {
+        std::fs::rename(folder.path(name), folder.path("moved").join(name)).unwrap();
+    }
+    folder.run(&["render", "--again", "moved/a.png", "-o", "b.png", "-q"]).ends(0);
+    assert!(picture(&folder.path("b.png")).beauty == kept);
+}

@@ -170,6 +170,108 @@ fn a_turntable_shows_a_model_from_all_around() {
     run.says(&["45.0° around", "animation 'Slide' at 0.500 s"]);
 }
 
+#[test]
+fn of_several_models_each_that_has_the_animation_shows_it_and_the_others_rest() {
+    let (run, still) = (sliding().replace("Slide", "Run"), "v 30 0 0\nv 31 0 0\nv 30 1 0\nf 1 2 3\n");
+    let folder = folder().file("b.gltf", run).file("plate.obj", still);
+    let folder = folder.file("both.toml", "[[models]]\nfile = \"a.gltf\"\n[[models]]\nfile = \"b.gltf\"\n");
+    let shown = |words: &[&str]| {
+        let run = folder.run(&[&["inspect", "--json"], words].concat()).ends(0);
+        serde_json::from_str::<Value>(run.text()).unwrap()["bounds"]["hi"][0].as_f64().unwrap()
+    };
+    assert_eq!(shown(&["both.toml"]), 1.0);
+    // Both have a Stay; of Run and of 2, which is Run, only the second.
+    for (name, right) in [("Stay", 1.0), ("Run", 9.0), ("2", 9.0), ("Slide", 9.0), ("0", 9.0)] {
+        assert_eq!(shown(&["both.toml", "--animation", name, "--time", "1"]), right, "{name}");
+    }
+    let unknown = folder.run(&["inspect", "both.toml", "--animation", "Fly"]).ends(3);
+    unknown.says(&["both.toml", "there is no animation 'Fly'; it has 0 'Slide', 1 'Stay', 2 'Run', 3 'Stay'"]);
+    let stats = |words: &[&str]| {
+        let run = folder.render(&[words, &["--stats", "json", "-o", "{frame}.png"]].concat()).ends(0);
+        serde_json::from_str::<Value>(run.text().lines().next().unwrap()).unwrap()["animation"].clone()
+    };
+    assert_eq!(stats(&["both.toml", "--animation", "Run", "--time", "0.5"])["number"], 2);
+    // A still model may come first.
+    let merged = ["plate.obj", "b.gltf", "--merge", "-q"];
+    assert_eq!(stats(&[&merged[..], &["--frames", "0..2", "--fps", "4"]].concat())["time"], 0.0);
+    assert_eq!(stats(&[&merged[..], &["--time", "0.5"]].concat())["time"], 0.5);
+}
+
+/// Two lines side by side, each in a colour of its own: at each second the other is there.
+fn flashing() -> String {
+    let numbers = [0.0f32, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0];
+    let bytes: Vec<u8> = numbers.iter().chain(&[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]).flat_map(|x| x.to_le_bytes()).collect();
+    let data = base64::engine::general_purpose::STANDARD.encode(&bytes);
+    let material = |color: &str| format!(r#"{{"pbrMetallicRoughness":{{"baseColorFactor":[{color},1]}}}}"#);
+    let mesh = |m: u32| format!(r#"{{"primitives":[{{"attributes":{{"POSITION":0}},"mode":1,"material":{m}}}]}}"#);
+    let channel = |n: u32| format!(r#"{{"sampler":{n},"target":{{"node":{n},"path":"scale"}}}}"#);
+    let sampler = |n: u32| format!(r#"{{"input":1,"output":{},"interpolation":"STEP"}}"#, 2 + n);
+    let keys =
+        |at: u32| format!(r#"{{"bufferView":0,"byteOffset":{at},"componentType":5126,"count":2,"type":"VEC3"}}"#);
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0,1]}}],
+        "nodes":[{{"mesh":0,"translation":[-1,0,0]}},{{"mesh":1,"translation":[1,0,0]}}],"meshes":[{},{}],
+        "materials":[{},{}],"animations":[{{"channels":[{},{}],"samplers":[{},{}]}}],
+        "accessors":[
+            {{"bufferView":0,"componentType":5126,"count":2,"type":"VEC3","min":[0,-1,0],"max":[0,1,0]}},
+            {{"bufferView":0,"byteOffset":24,"componentType":5126,"count":2,"type":"SCALAR","min":[0],"max":[1]}},
+            {},{}],
+        "bufferViews":[{{"buffer":0,"byteLength":{}}}],
+        "buffers":[{{"byteLength":{},"uri":"data:application/octet-stream;base64,{data}"}}]}}"#,
+        mesh(0),
+        mesh(1),
+        material("1,0,0"),
+        material("0,0,1"),
+        channel(0),
+        channel(1),
+        sampler(0),
+        sampler(1),
+        keys(32),
+        keys(56),
+        bytes.len(),
+        bytes.len()
+    )
+}
+
+#[test]
+fn lines_that_come_and_go_keep_their_colours_and_their_width() {
+    let folder = Folder::new().file("a.gltf", flashing());
+    folder.render(&["a.gltf", "--frames", "0..4", "--fps", "1", "-q", "-o", "{frame}.png"]).ends(0);
+    let lit = |name: &str, channel: usize| {
+        let beauty = picture(&folder.path(name)).beauty;
+        let own = |p: &&[f32; 4]| p[channel] > 2.0 * p[2 - channel] && p[channel] > 0.05;
+        beauty.iter().filter(own).count()
+    };
+    let counts = |name: &str| (lit(name, 0), lit(name, 2));
+    let (red, blue) = (counts("0.png"), counts("1.png"));
+    assert!(red.0 > 0 && red.1 == 0 && blue.0 == 0 && blue.1 > 0, "{red:?} {blue:?}");
+    let moving = sliding().replace(r#""primitives":[{"#, r#""primitives":[{"mode":2,"#);
+    let folder = Folder::new().file(
+        "a.gltf",
+        moving
+            .replace(r#""scenes":[{"nodes":[0]}]"#, r#""scenes":[{"nodes":[0,1]}]"#)
+            .replace(r#"{"mesh":0},{}"#, r#"{"mesh":0},{"mesh":0}"#),
+    );
+    wide(&folder, &["a.gltf", "--frames", "0..=4", "--fps", "4", "-o", "{frame}.png"]).ends(0);
+    // The line at rest is as wide while the other goes away: the left half stays as it is.
+    let rest = |name: &str| {
+        let beauty = picture(&folder.path(name)).beauty;
+        (0..beauty.len()).filter(|i| i % 32 < 10).map(|i| beauty[i]).collect::<Vec<_>>()
+    };
+    assert!(rest("3.png") == rest("4.png"));
+}
+
+#[test]
+fn a_sequence_that_shows_nothing_says_so() {
+    let folder = folder();
+    let away = ["a.gltf", "--frames", "0..3", "--fps", "4", "--eye", "0,0,5", "--at", "0,0,9", "-q"];
+    let run = folder.render(&away).ends(0).says(&["none of the 3 pictures of this sequence shows anything"]);
+    assert_eq!(run.stderr.matches("shows anything").count(), 1, "{}", run.stderr);
+    folder.render(&[&away[..], &["--strict"]].concat()).ends(3);
+    let shown = wide(&folder, &["a.gltf", "--frames", "0..3", "--fps", "4"]).ends(0);
+    assert!(!shown.stderr.contains("anything"), "{}", shown.stderr);
+}
+
 /// The sliding triangle, lit by a lamp that stands before it: it slides away from it and is dark from behind.
 fn with_lamp() -> Folder {
     let lamp = r#""nodes":[{"mesh":0},{"translation":[0,0,2],"extensions":{"KHR_lights_punctual":{"light":0}}}],
@@ -194,6 +296,21 @@ fn a_picture_is_exposed_as_its_sequence_begins_and_a_view_as_if_it_were_alone() 
     folder.render(&["a.gltf", "--view", "front,back", "-o", "{view}.png"]).ends(0);
     folder.render(&["a.gltf", "--view", "back", "-o", "alone.png"]).ends(0);
     assert!(folder.read("back.png") == folder.read("alone.png"));
+}
+
+#[test]
+fn a_sequence_that_begins_in_the_dark_is_exposed_by_what_is_lit_first() {
+    // The triangle comes from far beyond the eye.
+    let folder = with_lamp();
+    let words =
+        ["a.gltf", "--frames", "0..=4", "--fps", "4", "--eye", "8,0,4", "--at", "8,0,0", "--background", "black"];
+    let words = [&words[..], &["-o", "{frame}.png"]].concat();
+    folder.render(&words).ends(0).says(&["(metered)"]);
+    let first = picture(&folder.path("0.png")).beauty;
+    assert!(first.iter().all(|p| p == &first[0]), "the first frame shows nothing");
+    let last = folder.read("4.png");
+    folder.render(&[&words[..], &["--frame", "4"]].concat()).ends(0).says(&["(metered)"]);
+    assert!(folder.read("4.png") == last);
 }
 
 #[test]

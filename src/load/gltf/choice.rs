@@ -1,6 +1,6 @@
 //! What the user wishes for by name or number: a scene, a variant of materials, an animation.
 
-use crate::load::Diagnostic;
+use crate::load::{Diagnostic, Facts, Moment};
 use std::path::Path;
 
 /// A list of the file that something is chosen from.
@@ -24,11 +24,24 @@ pub(super) const ANIMATION: Kind = Kind { word: "animation", list: "animations",
 /// Names in one message before the rest is only counted.
 const LISTED: usize = 20;
 
+/// The number of what is called `wish`, or has that number where numbers begin with `first`.
+pub(super) fn find(names: &[Option<&str>], wish: &str, first: usize) -> Option<usize> {
+    let by_number = || wish.parse::<usize>().ok()?.checked_sub(first).filter(|&i| i < names.len());
+    names.iter().position(|name| *name == Some(wish)).or_else(by_number)
+}
+
+/// Refuses a wish for an animation that none of several models has, whose animations these are.
+pub(in crate::load) fn check_animation(facts: &Facts, moment: &Moment, file: &Path) -> Result<(), Diagnostic> {
+    let names: Vec<Option<&str>> = facts.animations.iter().map(|animation| Some(animation.name.as_str())).collect();
+    match &moment.animation {
+        Some(wish) if facts.shown.is_none() => choose(&ANIMATION, &names, wish, file).map(|_| ()),
+        _ => Ok(()),
+    }
+}
+
 /// The number of what is called `wish`, or has that number; otherwise a message that lists what there is.
 pub(super) fn choose(kind: &Kind, names: &[Option<&str>], wish: &str, file: &Path) -> Result<usize, Diagnostic> {
-    let by_name = names.iter().position(|name| *name == Some(wish));
-    let by_number = wish.parse().ok().filter(|&i: &usize| i < names.len());
-    by_name.or(by_number).ok_or_else(|| {
+    find(names, wish, 0).ok_or_else(|| {
         let shown = |(i, name): (usize, &Option<&str>)| match name {
             None | Some("") => i.to_string(),
             Some(name) => format!("{i} '{name}'"),

@@ -66,6 +66,7 @@ use crate::scene::{Environment, Instance, Scene};
 use accessor::Reader;
 use animation::Pose;
 use buffers::Buffers;
+pub(super) use choice::check_animation;
 use document::Document;
 use gltf::json::Root;
 use gltf::json::mesh as source;
@@ -198,7 +199,7 @@ impl Loading<'_> {
         scene.materials = palette.materials;
         (scene.textures, scene.bitmaps) =
             textures::keep_decoded(&mut scene.materials, palette.textures.list, &drawn, bitmaps);
-        let lost = wires::draw(&wires, &places, &mut scene, budget, facts, file, self.options.line_width)
+        let lost = wires::draw(&wires, &places, &mut scene, budget, facts, file, self.options.wire_widths)
             .map_err(|over| self.too_large("what points and lines become", over))?;
         lost.into_iter().for_each(|warning| self.report.warnings.push(warning));
         scene.up = self.options.up.unwrap_or_default();
@@ -221,9 +222,13 @@ impl Loading<'_> {
             return Ok(Pose::default());
         };
         let names: Vec<Option<&str>> = animations.iter().map(|animation| animation.name.as_deref()).collect();
-        let number = match &moment.animation {
-            Some(wish) => choice::choose(&choice::ANIMATION, &names, wish, file)?,
-            None => 0,
+        let number = match (&moment.animation, self.options.animations_before) {
+            (Some(wish), None) => choice::choose(&choice::ANIMATION, &names, wish, file)?,
+            (Some(wish), Some(before)) => match choice::find(&names, wish, before) {
+                Some(number) => number,
+                None => return Ok(Pose::default()),
+            },
+            (None, _) => 0,
         };
         let Some(animation) = animations.get(number) else { return Ok(Pose::default()) };
         let pose = animation::play(reader, graph, (number, animation), moment.time, budget, self.report)

@@ -165,7 +165,7 @@ pub(in crate::load) fn load(
         hash,
         ..Facts::default()
     };
-    let lost = super::draw(&wires, placed.center, &mut scene, budget, &mut facts, file, options.line_width)?;
+    let lost = super::draw(&wires, placed.center, &mut scene, budget, &mut facts, file, options.wire_widths)?;
     lost.into_iter().for_each(|warning| warnings.push(warning));
     Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
 }

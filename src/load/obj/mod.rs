@@ -98,7 +98,7 @@ pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Resu
         decoding,
         ..Facts::default()
     };
-    let lost = draw(&wires, placed.center, &mut scene, budget, &mut facts, file, options.line_width)?;
+    let lost = draw(&wires, placed.center, &mut scene, budget, &mut facts, file, options.wire_widths)?;
     lost.into_iter().for_each(|warning| warnings.push(warning));
     Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
 }
@@ -112,12 +112,12 @@ fn draw(
     budget: &mut Budget,
     facts: &mut Facts,
     file: &Path,
-    width: Option<f64>,
+    widths: Option<[f64; 2]>,
 ) -> Result<Vec<Diagnostic>, Diagnostic> {
     let world_from_object = DAffine3::from_translation(center);
     let place = |(mesh, of): (u32, &Wires)| Instance { name: of.mesh.name.clone(), mesh, world_from_object };
     let places: Vec<Instance> = (0..).zip(wires).map(place).collect();
-    wires::draw(wires, &places, scene, budget, facts, file, width).map_err(|over| bare::over_memory(file, over))
+    wires::draw(wires, &places, scene, budget, facts, file, widths).map_err(|over| bare::over_memory(file, over))
 }
 
 /// Bytes that making tangents takes a corner; as a vertex of its own it has a place, a normal, coordinates and a colour.

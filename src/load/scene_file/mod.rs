@@ -384,6 +384,9 @@ fn check_files(
     faults.check()
 }
 
+/// What [`Facts::format`] says of scene files.
+pub const FORMAT: &str = "meshray scene";
+
 /// Reads the models and puts everything together.
 fn assemble(
     parsed: Parsed,
@@ -394,7 +397,7 @@ fn assemble(
 ) -> Result<Loaded, LoadError> {
     let Parsed { mut scene, models, panorama, lost, max_rounding } = parsed;
     let mut warnings = Warnings::default();
-    let mut facts = Facts { format: "meshray scene".into(), max_rounding, ..Facts::default() };
+    let mut facts = Facts { format: FORMAT.into(), max_rounding, ..Facts::default() };
     facts.faces = scene.meshes.iter().map(|mesh| mesh.faces() as u64).sum();
     lost.tell(faults, &source.path, &mut facts, &mut warnings);
     let mut resolver = Resolver::new(source, options);
@@ -429,7 +432,10 @@ fn assemble(
             Entry::Vacant(first) => {
                 // What is needed only while a model is read is free for the next one.
                 let mut own = *budget;
-                let part = read_model(&model, faults, &mut resolver, source, options, &mut own)?;
+                let before = options.animations_before.unwrap_or(0) + facts.animations.len();
+                let options = LoadOptions { animations_before: Some(before), ..options.clone() };
+                let part = read_model(&model, faults, &mut resolver, source, &options, &mut own)?;
+                facts.add_animations(&part.facts);
                 budget.take(kept(&part.scene), 1).map_err(over)?;
                 part.warnings.into_iter().for_each(|w| warnings.push(w));
                 facts.reading += part.facts.reading;
@@ -467,7 +473,6 @@ fn tell(facts: &mut Facts, found: &Facts, stretch: f64) {
     facts.dropped.extend_from_slice(&found.dropped);
     facts.wires.append(&found.wires);
     facts.extensions.extend_from_slice(&found.extensions);
-    facts.animations.extend_from_slice(&found.animations);
     // A scene file has none of its own; those of its first model that has any are told.
     if facts.scenes.is_empty() {
         (facts.scenes, facts.scene_index) = (found.scenes.clone(), found.scene_index);

@@ -96,12 +96,13 @@ impl Widths {
     /// N points spread over a surface as large as the box are about diagonal / √N apart: wider ones would run together.
     /// Lines are kept to a quarter of that, so that a mesh of wires shows what lies behind. `asked` goes before all that.
     #[expect(clippy::cast_precision_loss, reason = "counts of what is in memory")]
-    fn new([points, lines]: [u64; 2], diagonal: f64, asked: Option<f64>) -> Self {
+    fn new([points, lines]: [u64; 2], diagonal: f64, asked: Option<[f64; 2]>) -> Self {
         // A single place has no size: any will do, since the camera is framed on what is drawn.
         let diagonal = if diagonal > 0.0 && diagonal.is_finite() { diagonal } else { PARTS };
         let point = diagonal / (points as f64).sqrt().max(PARTS);
         let line = diagonal / (4.0 * (lines as f64).sqrt()).max(PARTS);
-        Self { point: asked.unwrap_or(point), line: asked.unwrap_or(line), crowd: points >= CROWD }
+        let [point, line] = asked.unwrap_or([point, line]);
+        Self { point, line, crowd: points >= CROWD }
     }
 }
 
@@ -109,7 +110,7 @@ impl Widths {
 ///
 /// Meshes are in place before: the width goes by the box around all of it. Points and lines with an end that is not finite,
 /// or so far away that rounding leaves nothing of their width, are left out and counted in `facts`; a warning is returned
-/// of them, and one of glass. `width` is what the user asked for.
+/// of them, and one of glass. `widths` of points and lines are those that were asked for.
 ///
 /// # Errors
 /// When the solids would take more than is left of `budget`.
@@ -120,7 +121,7 @@ pub(super) fn draw(
     budget: &mut Budget,
     facts: &mut Facts,
     file: &Path,
-    width: Option<f64>,
+    widths: Option<[f64; 2]>,
 ) -> Result<Vec<Diagnostic>, OverBudget> {
     if wires.is_empty() {
         return Ok(Vec::new());
@@ -128,8 +129,10 @@ pub(super) fn draw(
     let counts: Vec<[u64; 2]> = wires.iter().map(Wires::count).collect();
     let placed = places.iter().filter_map(|place| counts.get(place.mesh as usize));
     let count = placed.fold([0, 0], |[p, l], [q, m]| [p + q, l + m]);
-    let widths = Widths::new(count, diagonal(wires, places, scene), width);
+    let widths = Widths::new(count, diagonal(wires, places, scene), widths);
     let mut drawing = Drawing { scene, budget, widths, materials: HashMap::new(), dropped: 0, of_glass: 0 };
+    // Of all, in their order: the same materials at every moment of an animation, whatever it hides.
+    wires.iter().for_each(|of| _ = drawing.material(of));
     let mut known: HashMap<(u32, [u64; 9]), Vec<Part>> = HashMap::new();
     for place in places {
         let Some(of) = wires.get(place.mesh as usize) else { continue };

@@ -188,8 +188,8 @@ fn lines_without_length_and_a_place_without_size_are_points() {
 
 #[test]
 fn crowds_are_thinner_and_simpler() {
-    let asked = Widths::new([CROWD, 4096], 256.0, Some(0.3));
-    assert_eq!((asked.point, asked.line, asked.crowd), (0.3, 0.3, true));
+    let asked = Widths::new([CROWD, 4096], 256.0, Some([0.3, 0.2]));
+    assert_eq!((asked.point, asked.line, asked.crowd), (0.3, 0.2, true));
     let few = Widths::new([CROWD - 1, 4096], 256.0, None);
     assert_eq!(few, Widths { point: 1.0, line: 1.0, crowd: false });
     let many = Widths::new([4 * CROWD, 4 * 4096], 256.0, None);
