@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use meshray::accel::{AccelChoice, AccelParams, NO_PRIM, Pencil, RayOrder, Splitting, Wide, auto};
+use meshray::accel::{AccelChoice, AccelParams, Kept, NO_PRIM, Pencil, RayOrder, Splitting, Wide, auto};
 use meshray::bench::clock::{Spread, processor_seconds};
 use meshray::math::simd::Level;
 
@@ -141,6 +141,7 @@ fn compare(mesh: &Mesh, embree: Option<&Embree>, words: &Words) -> bool {
         rays[0].len(),
         rays[1].len()
     );
+    println!("auto takes {}", auto::reason(shapes, &Kept::default()));
 
     if words.only.is_empty() {
         builds(mesh, embree, words.passes);
