@@ -198,14 +198,17 @@ fn judge(shapes: &Shapes) -> Reason {
     let starts = over_surface(shapes, RAYS);
     let rays = sample(shapes, &starts);
     let count = (judged / PART).max(1);
-    let parts: Vec<Shapes> = (0..count).map(|k| part(shapes, judged / count, u64::from(k), &starts)).collect();
-    let of_part = |part: &Shapes, splitting| {
+    // Each part is asked by some of the rays, from all over the surface.
+    let of_part = |k: u32| {
+        let part = part(shapes, judged / count, u64::from(k), &starts);
+        let rays: Vec<Ray> = rays.iter().skip(k as usize).step_by(count as usize).copied().collect();
         let times = (bounded / part.bounded()) as usize;
-        cost(&Wide::build_sample(part, splitting, times), &rays)
+        let cost = |splitting| cost(&Wide::build_sample(&part, splitting, times), &rays);
+        let (octree, bvh) = rayon::join(|| cost(Splitting::Octree), || cost(Splitting::SurfaceArea));
+        (octree / f64::from(count), bvh / f64::from(count), part.bounded() as usize)
     };
-    let cost = |splitting| parts.iter().map(|part| of_part(part, splitting)).sum::<f64>() / f64::from(count);
-    let (octree, bvh) = rayon::join(|| cost(Splitting::Octree), || cost(Splitting::SurfaceArea));
-    let prims = parts.iter().map(|part| part.bounded() as usize).sum();
+    let costs: Vec<(f64, f64, usize)> = (0..count).into_par_iter().map(of_part).collect();
+    let (octree, bvh, prims) = costs.iter().fold((0.0, 0.0, 0), |(o, b, n), of| (o + of.0, b + of.1, n + of.2));
     let kind = if bvh < octree * (1.0 - WORTH) { AccelKind::FastBvh } else { AccelKind::FastOctree };
     Reason { kind, rays: rays.len() as u64, prims, octree, bvh }
 }
@@ -290,21 +293,34 @@ fn over_surface(shapes: &Shapes, count: usize) -> Vec<u32> {
     let sums: Vec<f64> = (0..bounded.div_ceil(CHUNK)).into_par_iter().map(sum).collect();
     #[expect(clippy::cast_precision_loss, reason = "a small number")]
     let step = sums.iter().sum::<f64>() / count as f64;
-    let (mut found, mut before, mut next) = (Vec::with_capacity(count), 0.0, step * 0.5);
-    for (i, sum) in (0..).zip(sums) {
-        let end = before + sum;
-        if next < end {
-            for prim in chunk(i) {
-                before += area(shapes, prim);
-                while next < before && found.len() < count {
-                    found.push(prim);
-                    next += step;
-                }
-            }
-        }
-        before = end;
+    if step <= 0.0 {
+        return Vec::new();
     }
-    found
+    let mut chunks = Vec::with_capacity(sums.len());
+    let mut before = 0.0;
+    for (i, sum) in (0..).zip(sums) {
+        chunks.push((i, before, before + sum));
+        before += sum;
+    }
+    // The places are half a step from whole ones.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to count")]
+    let first = |area: f64| ((area / step + 0.5) as usize).min(count);
+    let found = |(i, before, end): (u32, f64, f64)| {
+        let (mut prims, mut so_far) = (chunk(i), before);
+        let mut at = prims.start;
+        let place = |k: usize| {
+            #[expect(clippy::cast_precision_loss, reason = "a small number")]
+            let place = (k as f64 + 0.5) * step;
+            while so_far <= place
+                && let Some(prim) = prims.next()
+            {
+                (at, so_far) = (prim, so_far + area(shapes, prim));
+            }
+            at
+        };
+        (first(before)..first(end)).map(place).collect::<Vec<u32>>()
+    };
+    chunks.into_par_iter().flat_map_iter(found).collect()
 }
 
 /// A ray from somewhere on each of these prims in any direction.
