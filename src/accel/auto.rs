@@ -8,14 +8,15 @@
 //! The rays leave the surface as evenly as light does, by its area: what such a ray starts in it must visit, and where large
 //! faces make boxes overlap that tells the structures apart as nothing else does (after T. Aila, T. Karras, S. Laine, *On
 //! Quality Metrics of Bounding Volume Hierarchies*, 2013). A ray from the eye is one of them, too, backwards. Faces that are
-//! larger than a ray's share of the surface are always among those that are judged, and about half of the rays from these
-//! hit them at once, as the start is rounded to their other side: they count what they start in alone, without the way
-//! through a scene of which most is left out.
+//! larger than a ray's share of the surface are always among those that are judged, and rays from these whose start is
+//! rounded to their other side hit them at once: they count what they start in alone, without the way through a scene of
+//! which most is left out.
 //!
 //! Both are built equally fast, and mostly cost nearly the same; where fine detail stands in a wide scene the octree may cost
 //! much less. So the hierarchy must save more than a sample may show by chance, and a little more, as a part of a scene favours
-//! it: of five large samples each of two meshes that both serve alike none showed a twentieth. Few shapes are cut alike by both, and scenes that are not large take no sample: one in proportion would
-//! tell nothing, and a larger one takes longer than what it may save.
+//! it: of five large samples each of two meshes that both serve alike none showed a twentieth. Few shapes are cut alike by
+//! both, and scenes that are not large take no sample: one in proportion would tell nothing, and a larger one takes longer
+//! than what it may save.
 
 use std::fmt;
 use std::str::FromStr;
@@ -270,7 +271,7 @@ fn copy(shapes: &Shapes, prim: u32, part: &mut Shapes) {
     }
 }
 
-/// Half the surface of a triangle's parallelogram, or of another prim's box; 0 where that is no number.
+/// Twice the area of a triangle, or half the surface of another prim's box; 0 where that is no number.
 fn area(shapes: &Shapes, prim: u32) -> f64 {
     let area = match shapes.triangles.get(prim as usize) {
         Some(&corners) => {

@@ -352,6 +352,9 @@ pub(crate) struct FrameTurn {
 impl FrameTurn {
     /// `None` where frames stay as they are.
     pub(crate) fn new(transform: &UvTransform) -> Option<Self> {
+        if transform.rotation == 0.0 && transform.scale.cmpgt(Vec2::ZERO).all() {
+            return None;
+        }
         let Turn { x_axis, y_axis } = Turn::new(transform);
         let determinant = x_axis.perp_dot(y_axis);
         // The inverse takes (1, 0) there.

@@ -4,6 +4,7 @@
 //! packets, and what is left is laid out as one node more, from which each packet goes on (after A. Reshetov, A. Soupikov and
 //! J. Hurley, *Multi-Level Ray Tracing Algorithm*, 2005).
 
+use super::bundle::all;
 use super::flight::FARTHEST_FIRST;
 use super::hull::Hull;
 use super::node::{Child, Node, Tree};
@@ -156,7 +157,7 @@ impl Directions {
             sum = s.add(sum, s.add(s.add(d[0], d[1]), d[2]));
         }
         // A NaN stays in a sum.
-        if s.at_most(s.abs(sum), s.splat(f32::MAX)) & ALL != ALL {
+        if s.at_most(s.abs(sum), s.splat(f32::MAX)) & all::<WIDE>() != all::<WIDE>() {
             return None;
         }
         let [x, y, z, _] = s.least_of_each([least[0], least[1], least[2], zero]);
@@ -179,6 +180,3 @@ impl Directions {
         Some(Self { octant: backwards.bitmask() as usize, inverse })
     }
 }
-
-/// A bit for every lane.
-const ALL: u32 = u32::MAX >> (u32::BITS as usize - WIDE);
