@@ -272,7 +272,7 @@ fn copy(shapes: &Shapes, prim: u32, part: &mut Shapes) {
 }
 
 /// Twice the area of a triangle, or half the surface of another prim's box; 0 where that is no number.
-fn area(shapes: &Shapes, prim: u32) -> f64 {
+fn area(shapes: &Shapes, prim: u32) -> f32 {
     let area = match shapes.triangles.get(prim as usize) {
         Some(&corners) => {
             let [a, b, c] = shapes.corners(corners);
@@ -283,39 +283,44 @@ fn area(shapes: &Shapes, prim: u32) -> f64 {
             size.x * size.y + size.y * size.z + size.z * size.x
         }
     };
-    if area.is_finite() { f64::from(area) } else { 0.0 }
+    if area.is_finite() { area } else { 0.0 }
 }
 
 /// So many prims at even steps of the surface, in order: one that is larger than a step comes several times.
 fn over_surface(shapes: &Shapes, count: usize) -> Vec<u32> {
     let bounded = shapes.bounded();
     let chunk = |i: u32| i * CHUNK..bounded.min((i + 1).saturating_mul(CHUNK));
-    let sum = |i: u32| chunk(i).map(|prim| area(shapes, prim)).sum::<f64>();
-    let sums: Vec<f64> = (0..bounded.div_ceil(CHUNK)).into_par_iter().map(sum).collect();
+    let measured = |i: u32| {
+        let areas: Vec<f32> = chunk(i).map(|prim| area(shapes, prim)).collect();
+        let sum: f64 = areas.iter().copied().map(f64::from).sum();
+        (areas, sum)
+    };
+    let measured: Vec<(Vec<f32>, f64)> = (0..bounded.div_ceil(CHUNK)).into_par_iter().map(measured).collect();
+    let all: f64 = measured.iter().map(|(_, sum)| sum).sum();
     #[expect(clippy::cast_precision_loss, reason = "a small number")]
-    let step = sums.iter().sum::<f64>() / count as f64;
+    let step = all / count as f64;
     if step <= 0.0 {
         return Vec::new();
     }
-    let mut chunks = Vec::with_capacity(sums.len());
+    let mut chunks = Vec::with_capacity(measured.len());
     let mut before = 0.0;
-    for (i, sum) in (0..).zip(sums) {
-        chunks.push((i, before, before + sum));
+    for (i, (areas, sum)) in (0..).zip(measured) {
+        chunks.push((i, areas, before, before + sum));
         before += sum;
     }
     // The places are half a step from whole ones.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to count")]
     let first = |area: f64| ((area / step + 0.5) as usize).min(count);
-    let found = |(i, before, end): (u32, f64, f64)| {
-        let (mut prims, mut so_far) = (chunk(i), before);
-        let mut at = prims.start;
+    let found = |(i, areas, before, end): (u32, Vec<f32>, f64, f64)| {
+        let (mut at, mut so_far) = (chunk(i).start, before);
+        let mut prims = chunk(i).zip(areas);
         let place = |k: usize| {
             #[expect(clippy::cast_precision_loss, reason = "a small number")]
             let place = (k as f64 + 0.5) * step;
             while so_far <= place
-                && let Some(prim) = prims.next()
+                && let Some((prim, area)) = prims.next()
             {
-                (at, so_far) = (prim, so_far + area(shapes, prim));
+                (at, so_far) = (prim, so_far + f64::from(area));
             }
             at
         };
