@@ -13,6 +13,7 @@ use crate::stopwatch::{Spent, Stopwatch};
 use ::image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 use bytemuck::Pod;
 use rayon::prelude::*;
+use std::cmp::Reverse;
 use std::io::Cursor;
 use std::path::Path;
 use std::time::Instant;
@@ -43,21 +44,21 @@ pub fn decode_all(
         return Default::default();
     }
     let start = Instant::now();
-    let sized: Vec<_> = images.iter().map(|image| check_size(image, limits, budget)).collect();
-    let decoded: Vec<_> = images
-        .par_iter()
-        .zip(sized)
-        .map(|(image, kind)| {
-            let watch = Stopwatch::of_this_thread();
-            let decoded = kind.and_then(|kind| decode(&image.name, &image.bytes, kind));
-            (decoded, watch.read().cpu)
-        })
-        .collect();
-    let spent = Spent { wall: start.elapsed(), cpu: decoded.iter().map(|d| d.1).sum() };
+    let sized = images.iter().map(|image| (image, check_size(image, limits, budget)));
+    let mut waiting: Vec<_> = sized.enumerate().collect();
+    // The longest first: whoever is done takes the next, and none is left alone with a long one in the end.
+    waiting.sort_by_key(|(_, (image, _))| Reverse(image.bytes.len()));
+    let decoded = waiting.into_iter().par_bridge().map(|(i, (image, kind))| {
+        let watch = Stopwatch::of_this_thread();
+        let decoded = kind.and_then(|kind| decode(&image.name, &image.bytes, kind));
+        (i, decoded, watch.read().cpu)
+    });
+    let mut decoded: Vec<_> = decoded.collect();
+    decoded.sort_unstable_by_key(|(i, ..)| *i);
+    let spent = Spent { wall: start.elapsed(), cpu: decoded.iter().map(|d| d.2).sum() };
     let mut warn = |image: &Encoded, why: Unusable| warnings.push(why.warning(&image.name, file, &image.place));
-    let usable =
-        |(image, (result, _)): (&Encoded, (Result<Bitmap, Unusable>, _))| result.map_err(|why| warn(image, why)).ok();
-    (images.iter().zip(decoded).map(usable).collect(), spent)
+    let bitmaps = decoded.into_iter().map(|(i, result, _)| result.map_err(|why| warn(&images[i], why)).ok());
+    (bitmaps.collect(), spent)
 }
 
 /// Why a picture cannot be used, and what helps.
