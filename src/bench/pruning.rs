@@ -39,13 +39,19 @@ impl Pruning {
     pub fn sentence(&self) -> String {
         use super::report::number::seconds;
         let pixels = if self.same { "the pixels are the same" } else { "the pixels DIFFER" };
+        let saves = match 100.0 * self.saved() {
+            saved if saved >= 0.5 => format!("saves {saved:.0} % of rendering this picture"),
+            _ => "saves nothing that can be told in rendering this picture".into(),
+        };
+        let passes = match self.usual.len() {
+            1 => "one pass only, so of unknown spread".into(),
+            n => format!("medians of {n} interleaved"),
+        };
         format!(
-            "leaving out what the scene does not need saves {:.0} % of rendering this picture: {} of processor time, {} \
-             with everything on (--no-prune), medians of {} interleaved; {pixels}",
-            100.0 * self.saved(),
+            "leaving out what the scene does not need {saves}: {} of processor time, {} with everything on (--no-prune), \
+             {passes}; {pixels}",
             seconds(self.usual.median()),
             seconds(self.everything.median()),
-            self.usual.len()
         )
     }
 }

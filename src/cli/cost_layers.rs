@@ -5,11 +5,11 @@ use super::job::{RenderJob, Shot};
 use super::message::{Messages, Severity};
 use super::outputs;
 use crate::accel::AccelKind;
-use crate::bench::report::number::{short, whole};
+use crate::bench::report::number::{short, so_many, whole};
 use crate::image::draw::heat::{Map, Scale};
 use crate::image::{Layers, Metadata};
 use crate::load::Diagnostic;
-use crate::render::{Cost, Costs};
+use crate::render::{Cost, Costs, Settings};
 use std::path::Path;
 
 /// Every cost that a picture is asked for.
@@ -27,7 +27,7 @@ pub(super) fn add_channels(job: &RenderJob, costs: &Costs, layers: &mut Layers) 
 pub(super) fn write_maps(
     job: &RenderJob,
     shot: &Shot,
-    width: u32,
+    settings: &Settings,
     costs: &Costs,
     accel: AccelKind,
     messages: &Messages,
@@ -45,8 +45,10 @@ pub(super) fn write_maps(
             Cost::Ms => ("milliseconds", 1e-3, trimmed),
         };
         let scale = Scale::new(job.heatmap_max.unwrap_or(most), unit);
-        let text = format!("{what} per pixel, {accel}: mean {}, most {}", short(mean), label(most));
-        let map = Map { width, values: &values, scale, title: &text, label };
+        // Other rays than the picture's, whose number is not the same everywhere.
+        let rays = so_many(u64::from(settings.samples.max(1)), "ray");
+        let text = format!("{what} per pixel of {rays}, {accel}: mean {}, most {}", short(mean), label(most));
+        let map = Map { width: settings.width, values: &values, scale, title: &text, label };
         let fault = |text: String| Diagnostic::new("output-unwritable", &path, "", text);
         let bytes = map.draw().png(&Metadata::new()).map_err(|e| fault(e.to_string()))?;
         interrupt::write_atomic(&path, &bytes).map_err(|e| fault(e.to_string()))?;

@@ -4,8 +4,9 @@
 //! With `--stats json` one JSON object for each picture, a line each: `version`, `file`, `output` (`-`: standard
 //! output), `view` (in words), `width`, `height`, `looked_at` (pixels that were rendered to find out), `cpu_seconds`,
 //! `wall_seconds` (if nothing else runs on the processors), `rays` (from the eye), `tests` (ray/prim) and `rmse` (in
-//! the numbers of `--error-space`; null where every rendering is the same), each with `value`, `low` and `high`, which
-//! hold it with 95 % confidence; `memory` (bytes; null where the system does not tell). Keys are only ever added.
+//! the numbers of `--error-space`, of its noise: what two renderings differ by; null where every rendering is the same),
+//! each with `value`, `low` and `high`, which hold it with 95 % confidence (`high` is null where nobody knows, as only one
+//! part of the picture was looked at); `memory` (bytes; null where the system does not tell). Keys are only ever added.
 
 use super::args::StatsFormat;
 use super::outputs::Target;
@@ -49,8 +50,10 @@ impl Told<'_> {
     fn text(&self) -> String {
         let Forecast { looked_at, pixels, cpu, rays, tests, rmse } = *self.forecast;
         let settings = self.work.settings;
-        let range =
-            |i: Interval, unit: fn(f64) -> String| format!("{} ({} to {})", unit(i.value), unit(i.low), unit(i.high));
+        let range = |i: Interval, unit: fn(f64) -> String| match i.high.is_finite() {
+            true => format!("{} ({} to {})", unit(i.value), unit(i.low), unit(i.high)),
+            false => format!("{} (or any other: one part of the picture tells nothing of its spread)", unit(i.value)),
+        };
         let mut lines = vec![
             ("processor time", range(cpu, seconds)),
             ("time", {
@@ -64,9 +67,13 @@ impl Told<'_> {
             ("ray/prim tests", range(tests, short)),
         ];
         lines.push((
-            "error",
+            "noise",
             match rmse {
-                Some(rmse) => range(rmse, |e| if 0.0 < e && e < 5e-4 { format!("{e:.1e}") } else { format!("{e:.4}") }),
+                Some(rmse) => {
+                    let rmse =
+                        range(rmse, |e| if 0.0 < e && e < 5e-4 { format!("{e:.1e}") } else { format!("{e:.4}") });
+                    format!("{rmse}; pixels that look certain too early add to the error")
+                }
                 None => "not known: every rendering has the same samples, so none tells how wrong they are".into(),
             },
         ));

@@ -2,6 +2,7 @@
 
 use super::job::Wrong;
 use super::parse::{self, Focus};
+use crate::bench::report::number::so_many;
 use crate::image::{FileKind, Output};
 use crate::load::Diagnostic;
 use crate::math::DVec3;
@@ -335,7 +336,7 @@ pub(super) fn phrase(settings: &Settings, sampled: &Sampled) -> String {
         );
     }
     match settings.sampling {
-        Sampling::Uniform => format!("{} samples a pixel", settings.samples),
+        Sampling::Uniform => format!("{} a pixel", so_many(u64::from(settings.samples), "sample")),
         Sampling::Adaptive(_) => format!("adaptive, {rays}"),
         Sampling::Stochastic(how) => {
             let percent = |n: u64| 100.0 * n as f64 / sampled.pixels.max(1) as f64;

@@ -281,7 +281,7 @@ impl Prepared<'_> {
         let profile = job.profile.then(|| profile.take());
         profile.iter().for_each(|p| p.say(messages));
         so_far.pictures.push(self.stats(&facts, times, counted, profile.as_ref()));
-        match cost_layers::write_maps(job, shot, effective.settings.width, &costs, accel, messages) {
+        match cost_layers::write_maps(job, shot, &effective.settings, &costs, accel, messages) {
             Ok(()) => self.judge(counted.as_ref()),
             Err(fault) => self.task.fail(&fault, Exit::Failed),
         }

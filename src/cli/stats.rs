@@ -54,7 +54,8 @@ pub(super) struct Times {
 impl Times {
     /// One line for people.
     pub(super) fn line(&self, eye_rays: u64) -> String {
-        format!("{}; {} eye rays", self.told().join(", "), short(eye_rays as f64))
+        let plural = if eye_rays == 1 { "" } else { "s" };
+        format!("{}; {} eye ray{plural}", self.told().join(", "), short(eye_rays as f64))
     }
 
     /// The stages by name, each with its time; metering only where there was any.

@@ -19,14 +19,14 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// The mean of such values, times `scale`.
+    /// The mean of such values, times `scale`; of a single one nobody knows how far off it is.
     pub(super) fn of_mean(values: &[f64], scale: f64) -> Self {
         /// Standard errors to both sides.
         const REACH: f64 = 1.96;
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n.max(1.0);
-        let variance = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / (n - 1.0).max(1.0);
-        let half = REACH * (variance / n.max(1.0)).sqrt();
+        let variance = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / (n - 1.0);
+        let half = if values.len() < 2 { f64::INFINITY } else { REACH * (variance / n).sqrt() };
         Self { value: mean * scale, low: (mean - half).max(0.0) * scale, high: (mean + half) * scale }
     }
 
@@ -107,5 +107,7 @@ mod tests {
         let wide = Interval::of_mean(&[1.0, 3.0], 1.0);
         assert!((wide.high - wide.value - 1.96).abs() < 1e-12 && wide.low > 0.0 && wide.contains(2.5));
         assert_eq!(Interval::of_mean(&[0.0, 8.0], 1.0).low, 0.0);
+        let one = Interval::of_mean(&[4.0], 2.0);
+        assert_eq!((one.value, one.low, one.high), (8.0, 0.0, f64::INFINITY), "of one value");
     }
 }

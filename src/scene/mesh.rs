@@ -32,6 +32,8 @@ pub struct Mesh {
     pub polygons: Vec<Polygon>,
     /// Corners of all polygons, indices into the vertex arrays.
     pub polygon_corners: Vec<u32>,
+    /// Whether these are solids that were made of the points and lines of a file.
+    pub is_wire: bool,
 }
 
 impl Mesh {

@@ -14,9 +14,11 @@ const HUGE: f64 = 0.25;
 const PIECE: f64 = 1.0 / 16.0;
 /// A triangle is a sliver when its height is less than this part of its length.
 const SLIM: f64 = 0.05;
+/// … and not shorter than this part of the scene's extent: short ones hardly make boxes overlap.
+const SHORTEST_SLIVER: f64 = 1.0 / 32.0;
 /// Pieces that triangles are cut into at most.
 const MOST_PIECES: usize = 1 << 18;
-/// Bounces that are left of glass.
+/// Bounces that are left of mirrors and glass.
 const SHALLOW: u32 = 2;
 /// Cells along an axis in which a cluster is looked for.
 const CELLS: usize = 32;
@@ -32,7 +34,7 @@ pub(super) fn suspects(case: &Case) -> Vec<Suspect> {
         shells(case),
         slivers(case, &size),
         alpha_cards(case),
-        glass(case),
+        depth(case),
         lights(case),
     ];
     found.into_iter().flatten().collect()
@@ -70,7 +72,11 @@ fn huge_triangles(case: &Case, size: &Size) -> Option<Suspect> {
         let limit = PIECE * size.extent();
         Suspect {
             cause: Cause::HugeTriangles,
-            evidence: format!("{count} of {} triangles are longer than a quarter of the scene", size.count),
+            evidence: format!(
+                "{count} of {} triangles are longer than a quarter of the scene, and at least {:.0} % as high as long",
+                size.count,
+                100.0 * SLIM
+            ),
             remedy: format!("cut them into triangles with edges below {limit:.3} units"),
             without: with_scene(case, cut(&case.scene, |c| is_huge(c).then_some(limit), MOST_PIECES)),
         }
@@ -78,7 +84,7 @@ fn huge_triangles(case: &Case, size: &Size) -> Option<Suspect> {
 }
 
 fn slivers(case: &Case, size: &Size) -> Option<Suspect> {
-    let is_sliver = |corners: &Corners| slimness(corners) < SLIM && length(corners) > size.extent() * PIECE * 0.5;
+    let is_sliver = |corners: &Corners| slimness(corners) < SLIM && length(corners) > size.extent() * SHORTEST_SLIVER;
     let count = triangles(&case.scene).filter(is_sliver).count();
     (count > 0).then(|| {
         let limit = |corners: &Corners| {
@@ -88,8 +94,9 @@ fn slivers(case: &Case, size: &Size) -> Option<Suspect> {
         Suspect {
             cause: Cause::Slivers,
             evidence: format!(
-                "{count} of {} triangles are long and less than {:.0} % as high as long",
+                "{count} of {} triangles are longer than {:.0} % of the scene and less than {:.0} % as high as long",
                 size.count,
+                100.0 * SHORTEST_SLIVER,
                 100.0 * SLIM
             ),
             remedy: "remesh them, or cut them across into pieces about as long as high".into(),
@@ -172,12 +179,20 @@ fn alpha_cards(case: &Case) -> Option<Suspect> {
     })
 }
 
-fn glass(case: &Case) -> Option<Suspect> {
+fn depth(case: &Case) -> Option<Suspect> {
     let features = Features::of(&case.scene);
-    let clear = [Feature::Refraction, Feature::ThinTransmission, Feature::Mirrors].iter().any(|&f| features.has(f));
-    (clear && case.settings.depth.is_none_or(|depth| depth > SHALLOW)).then(|| Suspect {
-        cause: Cause::Glass,
-        evidence: "rays are mirrored and bent again and again".into(),
+    let is_clear = features.has(Feature::Refraction) || features.has(Feature::ThinTransmission);
+    let how = match (features.has(Feature::Mirrors), features.has(Feature::Refraction)) {
+        (true, true) => "mirrored and bent",
+        (true, false) if is_clear => "mirrored and let through",
+        (true, false) => "mirrored",
+        (false, true) => "bent",
+        (false, false) => "let through",
+    };
+    (is_clear || features.has(Feature::Mirrors)).then_some(())?;
+    (case.settings.depth.is_none_or(|depth| depth > SHALLOW)).then(|| Suspect {
+        cause: Cause::Depth,
+        evidence: format!("rays are {how} again and again"),
         remedy: format!("--depth {SHALLOW}"),
         without: Case { settings: Settings { depth: Some(SHALLOW), ..case.settings.clone() }, ..case.clone() },
     })

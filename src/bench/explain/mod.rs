@@ -45,7 +45,7 @@ pub enum Cause {
     /// Surfaces that rays go on behind: alpha masks and blending.
     AlphaCards,
     /// Rays that are bent and mirrored many times.
-    Glass,
+    Depth,
     /// Shadow rays to many lights.
     Lights,
 }
@@ -59,7 +59,7 @@ impl Cause {
         Self::Shells,
         Self::Slivers,
         Self::AlphaCards,
-        Self::Glass,
+        Self::Depth,
         Self::Lights,
     ];
 
@@ -72,7 +72,7 @@ impl Cause {
             Self::Shells => "duplicate shells",
             Self::Slivers => "slivers",
             Self::AlphaCards => "alpha cards",
-            Self::Glass => "depth of glass",
+            Self::Depth => "depth of mirrors and glass",
             Self::Lights => "lights",
         }
     }

@@ -178,8 +178,8 @@ impl Model {
     /// What picture the rays are from.
     pub fn picture(&self) -> String {
         let Self { width, height, samples, depth, view, .. } = self;
-        let plural = if *samples == 1 { "" } else { "s" };
-        format!("{width}×{height}, {samples} sample{plural} a pixel, depth {depth}, {view}")
+        let samples = number::so_many(u64::from(*samples), "sample");
+        format!("{width}×{height}, {samples} a pixel, depth {depth}, {view}")
     }
 }
 

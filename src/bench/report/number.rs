@@ -7,6 +7,11 @@ pub fn grouped(n: u64) -> String {
     groups.join(" ")
 }
 
+/// So many of what is called `one`: `1 ray`, `4 rays`.
+pub fn so_many(n: u64, one: &str) -> String {
+    format!("{} {one}{}", grouped(n), if n == 1 { "" } else { "s" })
+}
+
 /// About three digits in at most eight characters; `-` for what is not known.
 pub fn short(x: f64) -> String {
     match x {

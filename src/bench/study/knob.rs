@@ -159,8 +159,7 @@ fn of(knob: Knob, subject: &Subject) -> Vec<Setting> {
         }
         Knob::Stochastic => {
             let with = |error: f32| {
-                let how =
-                    Stochastic { error, max_samples: Quality::Final.stochastic().max_samples, ..Stochastic::default() };
+                let how = Stochastic { error, ..Quality::default().stochastic() };
                 setting(format!("--pixel-error {error}"), sampled(stochastic(how), usual.samples))
             };
             [0.16, 0.08, 0.04, 0.02].map(with).into()

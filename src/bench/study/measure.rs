@@ -51,7 +51,11 @@ pub struct Error {
 impl Error {
     /// [`Self::rmse`] with so many digits, as far as it can be told.
     pub fn told(&self, digits: usize) -> String {
-        if self.rmse < self.least { format!("<{:.digits$}", self.least) } else { format!("{:.digits$}", self.rmse) }
+        let (sign, error) = if self.rmse < self.least { ("<", self.least) } else { ("", self.rmse) };
+        let rounded = format!("{error:.digits$}");
+        // What is not nothing is not told as nothing.
+        let is_lost = error > 0.0 && rounded.bytes().all(|digit| matches!(digit, b'0' | b'.'));
+        if is_lost { format!("{sign}{error:.1e}") } else { format!("{sign}{rounded}") }
     }
 }
 

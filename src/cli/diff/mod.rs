@@ -5,7 +5,8 @@
 //! `channels` (3, or 4 with coverage), `rmse`, `relative_rmse`, `bias`, `max`, `worst` (`x`, `y`, `expected`, `actual`: the values
 //! compared), `psnr`, `threshold`, `pixels_over`, `pixels`, `flip` (`mean`, `max`, `worst` with `x` and `y`,
 //! `pixels_per_degree`, and for linear pictures `exposures` with `first`, `last` in stops and `count`), `layers` (`name`, `rmse`,
-//! `max`, `differing`, `values`), `layers_of_one` (names), `left_out` (what of the files is not read), `broken` (limits of
+//! `max`, `differing`, `of_one` (finite in one file alone, not in `rmse`), `values`; of names, such as `id.prim`, what differs
+//! counts 1), `layers_of_one` (names), `left_out` (what of the files is not read), `broken` (limits of
 //! `--fail-if`). What is not finite is null. Keys are only ever added.
 
 mod args;
@@ -181,10 +182,13 @@ fn map(args: &DiffArgs, compared: &Compared) -> Result<Vec<u8>, ImageError> {
             ("greatest difference of a channel", values.unwrap_or_default())
         }
     };
-    let most = args.heatmap_max.unwrap_or_else(|| values.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max));
+    let most = values.iter().copied().fold(0.0, f64::max);
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
-    let title = format!("{what}: mean {}, most {}", short(mean), short(most));
-    let scale = Scale::new(most, finest(most));
+    let told = |x: f64| if x.is_finite() { short(x) } else { "infinite".into() };
+    let title = format!("{what}: mean {}, most {}", told(mean), told(most));
+    let finite = || values.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max);
+    let end = args.heatmap_max.unwrap_or_else(finite);
+    let scale = Scale::new(end, finest(end));
     Map { width: compared.expected.width, values: &values, scale, title: &title, label: short }
         .draw()
         .png(&Metadata::new())

@@ -4,7 +4,7 @@ use super::Compared;
 use super::args::DiffArgs;
 use crate::bench::report::number::grouped;
 use crate::image::Picture;
-use crate::image::diff::Space;
+use crate::image::diff::{LayerDifference, Space};
 use crate::image::srgb;
 use serde_json::{Value, json};
 use std::fmt::Write;
@@ -44,13 +44,15 @@ pub(super) fn text(args: &DiffArgs, compared: &Compared) -> String {
     let beyond = if args.threshold > 0.0 { format!(" by more than {}", args.threshold) } else { String::new() };
     lines.push(("pixels", format!("{} of {} differ{beyond} ({share:.2} %)", grouped(d.over), grouped(d.pixels))));
     for layer in &compared.layers {
-        let what = format!(
-            "RMSE {}, max {}, {} of {} values differ",
-            figure(layer.rmse),
-            figure(layer.max),
-            grouped(layer.differing),
-            grouped(layer.values)
-        );
+        let differ = format!("{} of {} values differ", grouped(layer.differing), grouped(layer.values));
+        let what = match (LayerDifference::is_name(&layer.name), layer.of_one) {
+            (true, _) => differ,
+            (false, 0) => format!("RMSE {}, max {}, {differ}", figure(layer.rmse), figure(layer.max)),
+            (false, n) => {
+                let rmse = figure(layer.rmse);
+                format!("RMSE {rmse} without {} that only one of the files has, {differ}", grouped(n))
+            }
+        };
         lines.push((&layer.name, what));
     }
     for name in &compared.layers_of_one {
@@ -71,7 +73,7 @@ pub(super) fn json(args: &DiffArgs, compared: &Compared, broken: &[String]) -> S
     let layers: Vec<Value> = compared
         .layers
         .iter()
-        .map(|l| json!({"name": l.name, "rmse": l.rmse, "max": l.max, "differing": l.differing, "values": l.values}))
+        .map(|l| json!({"name": l.name, "rmse": l.rmse, "max": l.max, "differing": l.differing, "of_one": l.of_one, "values": l.values}))
         .collect();
     let report = json!({
         "schema": "meshray-diff/1",

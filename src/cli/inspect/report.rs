@@ -29,12 +29,22 @@ pub(super) struct Report<'a> {
 /// Longest list of names that the text shows in full.
 const SHOWN: usize = 8;
 
+/// What the file has of faces.
+fn without_wires(scene: &Scene) -> Scene {
+    let is_wire = |mesh: u32| scene.meshes.get(mesh as usize).is_some_and(|mesh| mesh.is_wire);
+    let instances = scene.instances.iter().filter(|place| !is_wire(place.mesh)).cloned().collect();
+    Scene { meshes: scene.meshes.clone(), instances, ..Scene::default() }
+}
+
 impl<'a> Report<'a> {
     /// Looks the scene through, which is placed as rendering does it; builds the structure that rendering would, to know its
     /// size. Instances are each stored by themselves for a while where that takes no more than `limit` bytes.
     pub(super) fn new(file: &'a Path, loaded: &'a Loaded, world: World, limit: u64) -> Self {
         let scene = &loaded.scene;
         let topology = match World::flattened_bytes(scene) <= limit {
+            true if scene.meshes.iter().any(|mesh| mesh.is_wire) => {
+                Topology::of(&World::new(&without_wires(scene)).shapes)
+            }
             true if world.kept.is_empty() => Topology::of(&world.shapes),
             true => Topology::of(&World::new(scene).shapes),
             false => Topology::by_object(&world),
@@ -92,8 +102,17 @@ impl<'a> Report<'a> {
         lines.count("spheres", shapes.spheres.len() as u64, "");
         lines.count("cones", shapes.cones.len() as u64, "or cylinders");
         lines.count("planes", shapes.planes.len() as u64, "");
-        let instances = scene.instances.len() + scene.spheres.len() + scene.cones.len() + scene.planes.len();
-        lines.add("objects", format!("{} of {} meshes", grouped(instances as u64), grouped(scene.meshes.len() as u64)));
+        let solids = (scene.spheres.len() + scene.cones.len() + scene.planes.len()) as u64;
+        let meshes = (scene.meshes.len() as u64, scene.instances.len() as u64);
+        let placed = match meshes {
+            (0, _) => String::new(),
+            (meshes, instances) => {
+                let plural = if meshes == 1 { "mesh" } else { "meshes" };
+                let place = if instances == 1 { "place" } else { "places" };
+                format!(": {} {plural} in {} {place}", grouped(meshes), grouped(instances))
+            }
+        };
+        lines.add("objects", format!("{}{placed}", grouped(meshes.1 + solids)));
         lines.add("materials", shorten(scene.materials.iter().map(|m| label(&m.name))));
         let wires = &facts.wires;
         lines.count("points", wires.points, &format!("drawn {:.4} wide", wires.point_width));
@@ -103,7 +122,9 @@ impl<'a> Report<'a> {
     fn place(&self, lines: &mut Lines) {
         let (lo, hi) = self.world.bounds;
         if lo.cmple(hi).all() {
-            lines.add("bounds", format!("{} to {}", vector(lo), vector(hi)));
+            let drawn =
+                if self.loaded.facts.wires.narrowest().is_some() { ", with the width of points and lines" } else { "" };
+            lines.add("bounds", format!("{} to {}{drawn}", vector(lo), vector(hi)));
             lines.add("size", format!("{} {}", vector(hi - lo), self.units()));
         }
         if self.bounds.strays > 0 {

@@ -146,9 +146,19 @@ impl Report<'_> {
         let total = self.findings.total(choice);
         let other = IntersectorKind::MollerTrumbore;
         let compared = self.findings.total(other);
+        let apart = self.findings.sections.iter().filter(|section| !section.centred);
+        let started: usize = apart.map(|section| section.spawned.self_hits + section.spawned.slips).sum();
+        let elsewhere = match started {
+            0 => String::new(),
+            n => format!(
+                " Moved in f32 alone, {} secondary rays began on the wrong side of a face: scenes that are rendered are \
+                 centred first.",
+                count(n)
+            ),
+        };
         format!(
             "Choose {choice} for this mesh: {} wrong answers in {} rays ({} per million); {other} gave {} ({} per million) \
-             in {:.2} times its time.",
+             in {:.2} times its time.{elsewhere}",
             count(total.wrong()),
             count(total.rays),
             rate(total.wrong(), total.rays),

@@ -8,12 +8,15 @@ use crate::image::Layers;
 pub struct LayerDifference {
     /// As in the file, such as `albedo`, `Z` or `id.prim`.
     pub name: String,
-    /// Root of the mean squared difference of its values.
+    /// Root of the mean squared difference of its values, of those that both have: a depth where something is seen, say. Of
+    /// numbers that are names, as `id.prim`'s are, those that differ count 1.
     pub rmse: f64,
-    /// The greatest difference; infinite where just one of two values is a number.
+    /// The greatest difference; infinite where just one of two values is finite.
     pub max: f64,
     /// Values that differ.
     pub differing: u64,
+    /// Of them those of which one is finite and the other is not.
+    pub of_one: u64,
     /// Values compared.
     pub values: u64,
 }
@@ -35,15 +38,28 @@ pub fn layer_differences(expected: &Layers, actual: &Layers) -> (Vec<LayerDiffer
 }
 
 fn difference(name: &str, expected: &[f64], actual: &[f64]) -> LayerDifference {
-    let (mut sum, mut max, mut differing) = (0.0, 0.0_f64, 0);
+    let is_name = LayerDifference::is_name(name);
+    let (mut sum, mut max, mut differing, mut of_one) = (0.0, 0.0_f64, 0, 0);
     for (&a, &b) in expected.iter().zip(actual) {
-        let d = distance(a, b);
-        sum += d * d;
+        let d = if is_name { f64::from(u8::from(a != b)) } else { distance(a, b) };
         max = max.max(d);
         differing += u64::from(d > 0.0);
+        if d.is_finite() {
+            sum += d * d;
+        } else {
+            of_one += 1;
+        }
     }
-    let rmse = (sum / expected.len().max(1) as f64).sqrt();
-    LayerDifference { name: name.to_owned(), rmse, max, differing, values: expected.len() as u64 }
+    let both = (expected.len() as u64 - of_one).max(1);
+    let rmse = (sum / both as f64).sqrt();
+    LayerDifference { name: name.to_owned(), rmse, max, differing, of_one, values: expected.len() as u64 }
+}
+
+impl LayerDifference {
+    /// Whether the numbers of a layer are names: two are the same one or not, and how far apart they are means nothing.
+    pub fn is_name(layer: &str) -> bool {
+        layer.starts_with("id.")
+    }
 }
 
 /// Every layer there is, by its name in the file.
@@ -86,5 +102,17 @@ mod tests {
         assert_eq!((both[0].max, both[0].differing, both[0].values), (0.5, 1, 2));
         assert_eq!((both[1].rmse, both[1].differing), (0.0, 0));
         assert_eq!(alone, ["tests.shadow", "albedo"]);
+    }
+
+    #[test]
+    fn names_differ_or_not_and_what_one_alone_has_is_counted() {
+        let a = Layers { depth: vec![1.0, 2.0, 4.0], prim: vec![3, 4, u32::MAX], ..Layers::default() };
+        let b = Layers { depth: vec![1.0, 2.5, f32::INFINITY], prim: vec![3, 9, 5], ..Layers::default() };
+        let (both, _) = layer_differences(&a, &b);
+        let [depth, prim] = &both[..] else { panic!("{both:?}") };
+        assert_eq!((depth.rmse, depth.max), (0.125_f64.sqrt(), f64::INFINITY));
+        assert_eq!((depth.differing, depth.of_one), (2, 1));
+        assert_eq!((prim.rmse, prim.max), ((2.0_f64 / 3.0).sqrt(), 1.0));
+        assert_eq!((prim.differing, prim.of_one), (2, 0));
     }
 }

@@ -203,7 +203,7 @@ impl Drawing<'_> {
             // Checked by the budget: each mesh takes hundreds of bytes.
             #[expect(clippy::cast_possible_truncation, reason = "scenes have fewer than 2^32 meshes")]
             parts.push((self.scene.meshes.len() as u32, center));
-            self.scene.meshes.push(Mesh { material, ..mesh });
+            self.scene.meshes.push(Mesh { material, is_wire: true, ..mesh });
         }
         Ok(parts)
     }
