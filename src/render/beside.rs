@@ -63,6 +63,14 @@ impl<'a> Traced<'a> {
         }
     }
 
+    /// Whether the `i`th ray has hit something where it has crossed another surface just before.
+    fn touches(self, i: usize) -> bool {
+        match self {
+            Self::Eyes(_) => false,
+            Self::Wave(_, wave) => wave.starts && wave.may_cross_again(i) && wave.after[i].is_some(),
+        }
+    }
+
     fn class(self) -> RayClass {
         match self {
             Self::Eyes(_) => RayClass::Primary,
@@ -195,7 +203,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             let (ray, path, hit) = (&wave.rays[i], &wave.paths[i], &wave.hits[i]);
             if !hit.is_some() {
                 if path.straight { self.leave(ray, path) } else { self.beside.missed.push(index) }
-            } else if is_same_crossing(|prim| context.world.prim(prim), ray, &wave.after[i], hit) {
+            } else if wave.may_cross_again(i) && is_same_crossing(|prim| context.face(prim), ray, &wave.after[i], hit) {
                 self.continuing[class as usize].push(*ray, *path, *hit);
             } else if rays.len() < FEW || !sorted.take(context, (index, 1), hit.prim) {
                 self.shade_one(traced, i);
@@ -207,7 +215,8 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
 
     /// Shades what the `i`th ray has hit.
     fn shade_one(&mut self, traced: Traced, i: usize) {
-        self.shade(traced.class(), &traced.rays()[i], &traced.path(i), &traced.hits()[i]);
+        let (ray, hit) = (&traced.rays()[i], &traced.hits()[i]);
+        self.shade(traced.class(), (ray, hit, traced.touches(i)), &traced.path(i));
     }
 
     fn sort(&mut self) -> Sorted {
@@ -379,7 +388,8 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             let ground = strip.ground(i, material, has_inside);
             let matter = ground.matter(&common.matter);
             let path = Path { weight, since, ..path };
-            act(self, &Point { ray, hit, path, width, surface: &ground, matter: &matter });
+            let touches = traced.touches(at);
+            act(self, &Point { ray, hit, path, width, surface: &ground, matter: &matter, touches });
         }
     }
 }

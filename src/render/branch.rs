@@ -8,7 +8,7 @@ use super::optics::{dispersed_index, reflect, refract};
 use super::shade::{Balance, Lobe, Matter, Seen, above, has_inside};
 use super::wave::{Crossing, Medium, Path, RayClass};
 use super::whitted::Tracer;
-use crate::accel::{Accel, Hit, Ray};
+use crate::accel::{Accel, Hit, NO_PRIM, Ray};
 use crate::math::Vec3;
 use crate::scene::Material;
 
@@ -28,6 +28,24 @@ pub(super) trait Ground {
 
     /// A ray from here along `dir`, of unit length, without end.
     fn ray(&self, dir: Vec3, sample: u32) -> Ray;
+
+    /// Where rays towards `dir` start.
+    fn origin(&self, dir: Vec3) -> Vec3;
+
+    /// A ray to the other side along `dir`, and how far it may go until it has left all that is the same surface.
+    ///
+    /// It starts on this side: what touches the surface from behind, as a table does a glass that stands on it, lies no farther
+    /// away than the error of the place, and a ray that starts beyond that would never meet it. Only round shapes, which such a
+    /// ray would meet again, are left first.
+    fn ray_through(&self, dir: Vec3, sample: u32) -> (Ray, f32) {
+        let ray = self.ray(dir, sample);
+        if ray.exclude == NO_PRIM {
+            return (ray, 0.0);
+        }
+        let (origin, normal) = (self.origin(-dir), self.seen().geometric);
+        let room = 2.0 * (normal.dot(ray.origin - origin) / normal.dot(dir)).abs();
+        (Ray { origin, ..ray }, room)
+    }
 }
 
 /// A shaded point and the ray that found it.
@@ -40,6 +58,8 @@ pub(super) struct Point<'a, G> {
     pub width: f32,
     pub surface: &'a G,
     pub matter: &'a Matter,
+    /// Whether it lies where the ray has crossed another surface just before.
+    pub touches: bool,
 }
 
 impl<G: Ground> Point<'_, G> {
@@ -59,6 +79,16 @@ impl<G: Ground> Point<'_, G> {
 
     pub(super) fn balance(&self, crossing: &Crossing) -> Balance {
         self.matter.balance(self.cosine(), crossing)
+    }
+
+    /// A ray that starts here, and what it comes from: see [`Queue`](super::wave::Queue).
+    fn start(&self, class: RayClass, dir: Vec3) -> (Ray, Hit) {
+        // Before this surface what was crossed before it would be met again.
+        if class != RayClass::Refracted || self.touches {
+            return (self.surface.ray(dir, self.ray.sample), Hit::MISS);
+        }
+        let (ray, room) = self.surface.ray_through(dir, self.ray.sample);
+        (ray, Hit { t: room, ..*self.hit })
     }
 
     /// Cosine of the view.
@@ -220,8 +250,8 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
         let angle = rough.lobe.angle(rough.rays) * self.context.gloss.width;
         let (cone_spread, scattered) = (path.cone_spread + angle, path.scattered + angle);
-        let ray = point.surface.ray(dir, point.ray.sample);
-        self.starting[class as usize].push(ray, Path { part, cone_spread, scattered, ..path }, Hit::MISS);
+        let (ray, after) = point.start(class, dir);
+        self.starting[class as usize].push(ray, Path { part, cone_spread, scattered, ..path }, after);
     }
 
     /// Queues what lacquer mirrors.
@@ -278,7 +308,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let turns = (1.0 - crossing.n_i / crossing.n_t).abs();
         let path = point.bounced(self.context, weight, turns).turned(RayClass::Refracted, turn);
         let path = Path { band, media: crossing.beyond, ..path };
-        let ray = point.surface.ray(dir, point.ray.sample);
-        self.starting[RayClass::Refracted as usize].push(ray, path, Hit::MISS);
+        let (ray, after) = point.start(RayClass::Refracted, dir);
+        self.starting[RayClass::Refracted as usize].push(ray, path, after);
     }
 }

@@ -9,8 +9,10 @@ use super::sampling::Sampling;
 use super::shade::{Band, LocalLight, bands};
 use super::sky::Sky;
 use super::strip::Common;
+use super::surface::Target;
 use super::texture::TextureStore;
 use super::world::World;
+use crate::accel::shapes::Prim;
 use crate::math::Vec3;
 use crate::math::simd::LANES;
 use crate::scene::features::{Feature, Features};
@@ -161,6 +163,11 @@ impl<'a> Context<'a> {
     pub(super) fn resampled(&self, settings: &Settings) -> Self {
         let (highlight_reach, gloss) = (glint::reach(settings), self.gloss.of_samples(settings));
         Self { seed: settings.seed, highlight_reach, gloss, ..self.clone() }
+    }
+
+    /// A prim and its material.
+    pub(super) fn face(&self, prim: u32) -> (Prim<'_>, u32) {
+        (self.world.prim(prim), Target::new(self.scene, self.world, prim).material_id)
     }
 
     /// Shadow rays to each wide light after so many bounces: what mirrors show needs no more than a hint of soft edges.

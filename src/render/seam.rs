@@ -10,19 +10,22 @@ use crate::math::triangle::Triangle;
 ///
 /// Two faces that turn the same side to a ray and share an edge, each running along it its own way, lie on different
 /// sides of that edge as the ray sees them, so it can meet both only on the edge itself. Other faces that share a corner
-/// must be met at the same distance as well: leaves of a book run along its spine the same way, and one lies over the next.
+/// must be met at the same distance as well: leaves of a book run along its spine the same way, and one lies over the next;
+/// and be of one material: what is glued to a face, or painted on it, shares corners with it and is met there, too.
 /// Where one of two faces is seen from behind the surface is crossed twice, in and out again.
 ///
-/// `prim` looks prims up by their numbers.
-pub(crate) fn is_same_crossing<'a>(prim: impl Fn(u32) -> Prim<'a>, ray: &Ray, before: &Hit, hit: &Hit) -> bool {
+/// `face` looks prims and their materials up by their numbers.
+pub(crate) fn is_same_crossing<'a>(face: impl Fn(u32) -> (Prim<'a>, u32), ray: &Ray, before: &Hit, hit: &Hit) -> bool {
     /// Relative difference of two distances to one corner: some roundings.
     const ROUNDING: f32 = 32.0 * f32::EPSILON;
     if !before.is_some() || before.prim == hit.prim {
         return false;
     }
-    let (Some(a), Some(b)) = (Corners::of(prim(before.prim)), Corners::of(prim(hit.prim))) else { return false };
+    let ((a, material), (b, other)) = (face(before.prim), face(hit.prim));
+    let (Some(a), Some(b)) = (Corners::of(a), Corners::of(b)) else { return false };
     let touch = || a.positions().any(|p| b.positions().any(|q| p == q));
-    let meet = a.continues(&b) || (hit.t - before.t <= hit.t.abs() * ROUNDING && touch());
+    let is_near = || material == other && hit.t - before.t <= hit.t.abs() * ROUNDING;
+    let meet = a.continues(&b) || (is_near() && touch());
     meet && a.faces(ray) == b.faces(ray)
 }
 
@@ -119,44 +122,47 @@ mod tests {
     #[test]
     fn both_faces_at_a_shared_edge_are_one_crossing() {
         let shapes = shapes();
-        assert!(is_same_crossing(|prim| shapes.prim(prim), &ray(), &at(0, 1.0), &at(1, 1.0)));
+        assert!(is_same_crossing(|prim| (shapes.prim(prim), 0), &ray(), &at(0, 1.0), &at(1, 1.0)));
     }
 
     #[test]
     fn faces_that_share_a_corner_are_one_crossing_at_that_corner_only() {
         let shapes = shapes();
-        assert!(is_same_crossing(|prim| shapes.prim(prim), &ray(), &at(0, 1.0), &at(2, 1.0)));
-        assert!(!is_same_crossing(|prim| shapes.prim(prim), &ray(), &at(0, 1.0), &at(2, 1.1)));
+        assert!(is_same_crossing(|prim| (shapes.prim(prim), 0), &ray(), &at(0, 1.0), &at(2, 1.0)));
+        assert!(!is_same_crossing(|prim| (shapes.prim(prim), 0), &ray(), &at(0, 1.0), &at(2, 1.1)));
     }
 
     #[test]
     fn a_face_behind_another_is_a_crossing_of_its_own() {
         let shapes = shapes();
-        assert!(!is_same_crossing(|prim| shapes.prim(prim), &ray(), &at(0, 1.0), &at(3, 2.0)));
+        assert!(!is_same_crossing(|prim| (shapes.prim(prim), 0), &ray(), &at(0, 1.0), &at(3, 2.0)));
     }
 
     #[test]
     fn a_fold_is_crossed_in_and_out() {
         let shapes = shapes();
-        assert!(!is_same_crossing(|prim| shapes.prim(prim), &ray(), &at(0, 1.0), &at(4, 1.0)));
+        assert!(!is_same_crossing(|prim| (shapes.prim(prim), 0), &ray(), &at(0, 1.0), &at(4, 1.0)));
     }
 
     #[test]
     fn leaves_of_a_book_are_crossed_one_by_one_but_at_the_spine() {
         let shapes = shapes();
-        let crossed = |t| is_same_crossing(|prim| shapes.prim(prim), &ray(), &at(0, 1.0), &at(5, t));
+        let crossed = |t| is_same_crossing(|prim| (shapes.prim(prim), 0), &ray(), &at(0, 1.0), &at(5, t));
         assert!(!crossed(1.25) && crossed(1.0));
     }
 
     #[test]
-    fn a_copy_of_a_face_is_the_same_crossing() {
+    fn a_copy_of_a_face_is_the_same_crossing_unless_it_is_of_another_material() {
         let shapes = shapes();
-        assert!(is_same_crossing(|prim| shapes.prim(prim), &ray(), &at(0, 1.0), &at(6, 1.0)));
+        let painted = |prim| (shapes.prim(prim), u32::from(prim == 6));
+        assert!(!is_same_crossing(painted, &ray(), &at(0, 1.0), &at(6, 1.0)));
+        assert!(is_same_crossing(|prim| (shapes.prim(prim), prim), &ray(), &at(0, 1.0), &at(1, 1.0)), "across an edge");
+        assert!(is_same_crossing(|prim| (shapes.prim(prim), 0), &ray(), &at(0, 1.0), &at(6, 1.0)));
     }
 
     #[test]
     fn the_first_hit_is_never_a_repetition() {
         let shapes = shapes();
-        assert!(!is_same_crossing(|prim| shapes.prim(prim), &ray(), &Hit::MISS, &at(0, 1.0)));
+        assert!(!is_same_crossing(|prim| (shapes.prim(prim), 0), &ray(), &Hit::MISS, &at(0, 1.0)));
     }
 }

@@ -156,7 +156,7 @@ impl Shadows {
                 arrive(light.tag, light.radiance);
                 return false;
             }
-            if !after.get(i).is_some_and(|before| is_same_crossing(|prim| context.world.prim(prim), ray, before, hit)) {
+            if !after.get(i).is_some_and(|before| is_same_crossing(|prim| context.face(prim), ray, before, hit)) {
                 light.radiance *= filter_at(context, ray, hit, inside);
             }
             let goes_on = light.radiance.max_element() > 0.0;

@@ -140,7 +140,10 @@ fn parent(job: &Job, queries: &[Query], i: usize) -> Option<usize> {
                 let could = |(k, q): &(usize, &Query)| *k != i && q.class != Class::Shadow && q.hit.is_some();
                 queries.iter().enumerate().filter(could).map(|(k, q)| (k, job.world.refine(&q.ray, &q.hit)))
             };
-            let left_by = |ray: &Ray| surfaces().find(|(_, s)| s.origin(ray.dir) == ray.origin).map(|(k, _)| k);
+            // What goes through a flat surface starts before it.
+            let before = |s: &Refined, ray: &Ray| query.class == Class::Refracted && s.origin(-ray.dir) == ray.origin;
+            let starts = |s: &Refined, ray: &Ray| s.origin(ray.dir) == ray.origin || before(s, ray);
+            let left_by = |ray: &Ray| surfaces().find(|(_, s)| starts(s, ray)).map(|(k, _)| k);
             // Some start above their surface, where another ray leads.
             let riser = || queries.iter().find(|q| raised(std::slice::from_ref(query), q).is_some());
             let off = |surface: &Refined| (surface.start - query.ray.origin).length_squared();

@@ -301,6 +301,10 @@ impl Ground for Surface<'_> {
     fn ray(&self, dir: Vec3, sample: u32) -> Ray {
         self.ray(dir, f32::INFINITY, sample)
     }
+
+    fn origin(&self, dir: Vec3) -> Vec3 {
+        self.origin(dir)
+    }
 }
 
 /// 1 for a normal of a mesh on the side that is seen, whose normal is `geometric`; −1 for one on the other.

@@ -156,7 +156,8 @@ impl Media {
 pub(crate) struct Queue {
     rays: Vec<Ray>,
     paths: Vec<Path>,
-    /// The hit after which the search goes on; [`Hit::MISS`] for rays that start.
+    /// The hit after which the search goes on; of a ray that starts the hit that it comes from, its `t` as far as it may meet
+    /// what is the same crossing, or [`Hit::MISS`].
     after: Vec<Hit>,
     /// So many at the front are in the order of their samples.
     in_order: usize,
@@ -174,7 +175,7 @@ impl Queue {
         self.rays.len()
     }
 
-    /// Adds a ray; it goes on behind `after`, or starts when that is [`Hit::MISS`].
+    /// Adds a ray, which goes on behind `after` or starts there.
     pub(crate) fn push(&mut self, ray: Ray, path: Path, after: Hit) {
         self.rays.push(ray);
         self.paths.push(path);
@@ -236,6 +237,8 @@ fn reorder<T: Copy>(items: &mut [T], order: &[(u32, u32)], spare: &mut Vec<T>) {
 /// Rays of one class that are traced together, and what they hit.
 #[derive(Debug, Default)]
 pub(crate) struct Wave {
+    /// Whether they start, and do not go on.
+    pub starts: bool,
     pub rays: Vec<Ray>,
     pub paths: Vec<Path>,
     pub after: Vec<Hit>,
@@ -243,6 +246,12 @@ pub(crate) struct Wave {
 }
 
 impl Wave {
+    /// Whether what the `i`th ray has hit may be what it has crossed already: a ray that starts before a surface that it
+    /// crosses meets it no farther than that.
+    pub(crate) fn may_cross_again(&self, i: usize) -> bool {
+        !self.starts || self.hits[i].t <= self.after[i].t
+    }
+
     fn clear(&mut self) {
         self.rays.clear();
         self.paths.clear();

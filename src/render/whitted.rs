@@ -180,6 +180,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             let queue = &mut self.continuing[class as usize];
             if !queue.is_empty() {
                 queue.take(wave, limits);
+                wave.starts = false;
                 self.asking.next(&wave.rays, &wave.after, &mut wave.hits, self.counts.of(class));
                 return Some(class);
             }
@@ -188,6 +189,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             let queue = &mut self.starting[class as usize];
             if !queue.is_empty() {
                 queue.take(wave, limits);
+                wave.starts = true;
                 self.asking.closest(&wave.rays, &mut wave.hits, self.counts.of(class));
                 return Some(class);
             }
@@ -224,8 +226,9 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         sample.radiance += path.weight * seen;
     }
 
-    /// Adds what the surface at `hit` shows by itself, and queues the rays that find the rest.
-    pub(super) fn shade(&mut self, class: RayClass, ray: &Ray, path: &Path, hit: &Hit) {
+    /// Adds what the surface at `hit` shows by itself, and queues the rays that find the rest; it may touch one that the ray has
+    /// crossed just before.
+    pub(super) fn shade(&mut self, class: RayClass, (ray, hit, touches): (&Ray, &Hit, bool), path: &Path) {
         let context = self.context;
         let lessened = context.absorption.is_some().then(|| context.absorption.lessened(ray, path, hit));
         let path = lessened.as_ref().unwrap_or(path);
@@ -274,6 +277,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             width,
             surface: &surface,
             matter: &matter,
+            touches,
             path: Path { weight: path.weight * covered, ..*path },
         };
         if context.everything {

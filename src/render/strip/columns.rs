@@ -419,7 +419,7 @@ mod tests {
 
     fn wave(rays: Vec<Ray>, hits: Vec<Hit>) -> Wave {
         let paths = vec![Path::from_eye(0.0, 0.0, Media::default()); rays.len()];
-        Wave { after: vec![Hit::MISS; rays.len()], rays, paths, hits }
+        Wave { starts: true, after: vec![Hit::MISS; rays.len()], rays, paths, hits }
     }
 
     fn found(level: Level, placement: Option<&Placement>, size: f64) -> Vec<[u32; 23]> {

@@ -68,4 +68,8 @@ impl Ground for StripPoint<'_> {
         debug_assert_ne!(exclude, NO_PRIM);
         Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude, sample }
     }
+
+    fn origin(&self, dir: Vec3) -> Vec3 {
+        leave(&self.strip.found, self.i, dir)
+    }
 }
