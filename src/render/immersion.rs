@@ -1,4 +1,4 @@
-//! What an eye is inside of: rays from it begin there, and what they cross absorbs light from the start.
+//! What an eye is inside of: rays from it begin there, are bent by what they leave, and absorbed from the start.
 
 use super::context::Context;
 use super::shade::has_inside;
@@ -12,10 +12,10 @@ use crate::scene::{Material, Surface as Reflection};
 /// Surfaces that are looked at along one way.
 const FACES: usize = 256;
 
-/// The substances around the eye of a view, where any absorb light: those that are left without having been entered,
+/// The substances around the eye of a view, where any have an inside: those that are left without having been entered,
 /// whichever way one goes. Panes without an inside are so left on some ways only.
 pub(super) fn media_around<A: Accel>(context: &Context, accel: &A, view: &View) -> Media {
-    if !context.absorption.is_some() {
+    if !context.absorption.is_some() && !context.scene.materials.iter().any(has_inside) {
         return Media::default();
     }
     let mut scratch = accel.scratch();

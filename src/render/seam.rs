@@ -10,9 +10,8 @@ use crate::math::triangle::Triangle;
 ///
 /// Two faces that turn the same side to a ray and share an edge, each running along it its own way, lie on different
 /// sides of that edge as the ray sees them, so it can meet both only on the edge itself. Other faces that share a corner
-/// must be met at the same distance as well: leaves of a book run along its spine the same way, and one lies over the next;
-/// and be of one material: what is glued to a face, or painted on it, shares corners with it and is met there, too.
-/// Where one of two faces is seen from behind the surface is crossed twice, in and out again.
+/// must be met at the same distance as well: leaves of a book run along its spine the same way, and one lies over the next.
+/// A surface is of one material: what is glued to a face, or painted on it, shares corners with it and is crossed, too. Where one of two faces is seen from behind the surface is crossed twice, in and out again.
 ///
 /// `face` looks prims and their materials up by their numbers.
 pub(crate) fn is_same_crossing<'a>(face: impl Fn(u32) -> (Prim<'a>, u32), ray: &Ray, before: &Hit, hit: &Hit) -> bool {
@@ -22,10 +21,12 @@ pub(crate) fn is_same_crossing<'a>(face: impl Fn(u32) -> (Prim<'a>, u32), ray: &
         return false;
     }
     let ((a, material), (b, other)) = (face(before.prim), face(hit.prim));
+    if material != other {
+        return false;
+    }
     let (Some(a), Some(b)) = (Corners::of(a), Corners::of(b)) else { return false };
     let touch = || a.positions().any(|p| b.positions().any(|q| p == q));
-    let is_near = || material == other && hit.t - before.t <= hit.t.abs() * ROUNDING;
-    let meet = a.continues(&b) || (is_near() && touch());
+    let meet = a.continues(&b) || (hit.t - before.t <= hit.t.abs() * ROUNDING && touch());
     meet && a.faces(ray) == b.faces(ray)
 }
 
@@ -156,7 +157,10 @@ mod tests {
         let shapes = shapes();
         let painted = |prim| (shapes.prim(prim), u32::from(prim == 6));
         assert!(!is_same_crossing(painted, &ray(), &at(0, 1.0), &at(6, 1.0)));
-        assert!(is_same_crossing(|prim| (shapes.prim(prim), prim), &ray(), &at(0, 1.0), &at(1, 1.0)), "across an edge");
+        assert!(
+            !is_same_crossing(|prim| (shapes.prim(prim), prim), &ray(), &at(0, 1.0), &at(1, 1.0)),
+            "across an edge"
+        );
         assert!(is_same_crossing(|prim| (shapes.prim(prim), 0), &ray(), &at(0, 1.0), &at(6, 1.0)));
     }
 

@@ -335,3 +335,66 @@ fn glass_and_mirrors_in_an_evenly_bright_room_cannot_be_seen() {
         assert_near(Vec3::from_slice(pixel), Vec3::ONE, 1e-6 * depth as f32);
     }
 }
+
+/// A square of glass whose inside lies above it: it is left there.
+fn lower(s: &mut Stage, z: f32, material: u32) {
+    s.square(z, 9.0, Material::default());
+    if let Some(mesh) = s.scene.meshes.last_mut() {
+        mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+        mesh.material = material;
+    }
+}
+
+#[test]
+fn what_touches_glass_from_behind_is_seen_whichever_comes_first_in_the_file() {
+    for glass_first in [true, false] {
+        let mut s = aslant(30.0);
+        let (slab, table) = (glass(1.5), unlit(Vec3::new(1.0, 0.5, 0.25)));
+        if !glass_first {
+            s.square(-1.0, 9.0, table.clone());
+        }
+        s.square(0.0, 9.0, slab);
+        let material = s.scene.materials.len() as u32 - 1;
+        lower(&mut s, -1.0, material);
+        if glass_first {
+            s.square(-1.0, 9.0, table);
+        }
+        assert_eq!(s.color(), Vec3::new(1.0, 0.5, 0.25), "glass first: {glass_first}");
+        assert_eq!(s.render_by(AccelKind::DEFAULT).picture, s.render().picture);
+    }
+}
+
+#[test]
+fn slabs_that_touch_bend_light_as_if_a_hair_were_between_them() {
+    let tangent = |sine: f64| sine / (1.0 - sine * sine).sqrt();
+    let sine = libm::sin(40f64.to_radians());
+    for (upper_first, indices) in [(true, [1.5, 2.0]), (false, [1.5, 2.0]), (true, [1.5, 1.5]), (false, [1.5, 1.5])] {
+        let mut s = aslant(40.0);
+        let [upper, below] = indices.map(|ior| s.add_material(glass(ior)));
+        // One material for both where they are alike.
+        let below = if indices[0] == indices[1] { upper } else { below };
+        let slabs = [(0.0, -0.5, upper), (-0.5, -1.25, below)];
+        for k in if upper_first { [0, 1] } else { [1, 0] } {
+            let (top, bottom, material) = slabs[k];
+            s.square(top, 9.0, Material::default());
+            s.scene.meshes.last_mut().unwrap().material = material;
+            lower(&mut s, bottom, material);
+        }
+        s.mesh(ruler(-2.0, 4.0), DAffine3::IDENTITY, unlit(Vec3::ONE));
+        let [n, m] = indices.map(f64::from);
+        let x = 0.5 * tangent(sine / n) + 0.75 * tangent(sine / m) + 0.75 * tangent(sine);
+        let seen = f64::from(s.color().x);
+        assert!((seen - (x + 4.0) / 8.0).abs() < 2e-6, "{seen}, upper first: {upper_first}, {indices:?}");
+    }
+}
+
+#[test]
+fn an_eye_in_clear_water_sees_by_its_index() {
+    let both = |ior| Phong { transmission: Vec3::ONE, mirror: Vec3::ONE, ior, fresnel: true, ..phong() };
+    let mut s = looking_down(10.0);
+    s.square(0.0, 9.0, material(Vec3::ZERO, both(1.8))).square(-3.0, 99.0, unlit(Vec3::X));
+    let share = |outside| 1.0 - optics::fresnel_dielectric(1.0, outside, 1.8) as f32;
+    assert_near(s.color(), Vec3::X * share(1.0), 1e-6);
+    s.sphere(DVec3::ZERO, 100.0, glass(1.33));
+    assert_near(s.color(), Vec3::X * share(1.33), 1e-6);
+}

@@ -53,6 +53,42 @@ fn absent_texels_and_unseen_backs_are_passed_without_a_trace() {
 }
 
 #[test]
+fn a_face_with_the_corners_of_one_that_is_not_there_is_seen() {
+    let absent = Material { opacity: 0.4, alpha_mode: AlphaMode::Mask { cutoff: 0.5 }, ..unlit(Vec3::X) };
+    let one_sided = Material { double_sided: false, ..unlit(Vec3::Y) };
+    for (over, color) in [(absent, Vec3::Z), (blended(Vec3::X, 0.5), Vec3::new(0.5, 0.0, 0.5)), (one_sided, Vec3::Z)] {
+        let mut s = looking_down(9.0);
+        s.square(0.0, 1.0, over).square(0.0, 1.0, unlit(Vec3::Z));
+        // Of the one-sided face the back is seen.
+        if !s.scene.materials[0].double_sided {
+            s.scene.meshes[0].triangles.iter_mut().for_each(|t| t.swap(0, 1));
+        }
+        assert_eq!((s.color(), s.alpha()), (color, 1.0));
+    }
+}
+
+#[test]
+fn shadows_are_those_of_all_that_lies_in_one_place() {
+    let clear = blended(Vec3::ZERO, 0.0);
+    let light = |over: &[Material]| {
+        let mut s = looking_down(9.0);
+        s.square(0.0, 1.0, material(Vec3::ONE, phong())).lamp(DVec3::new(0.1, 0.0, 8.0), 1.0);
+        s.settings.depth = Some(0);
+        s.view = View::look_at(DVec3::new(3.0, 0.0, 0.5), DVec3::ZERO, DVec3::Y, Lens::orthographic(0.01));
+        over.iter().for_each(|over| {
+            s.square(1.0, 0.6, over.clone());
+        });
+        s.color().x
+    };
+    let half = || blended(Vec3::ZERO, 0.5);
+    let open = light(&[]);
+    assert!(open > 0.0);
+    assert_eq!(light(&[half()]), 0.5 * open);
+    assert_eq!(light(&[clear.clone(), half()]), 0.5 * open);
+    assert_eq!(light(&[half(), clear]), 0.5 * open);
+}
+
+#[test]
 fn a_picture_of_backs_and_of_nothing_opaque_shows_nothing_and_what_lies_behind_them_is_shown() {
     let absent = || Material { opacity: 0.4, alpha_mode: AlphaMode::Mask { cutoff: 0.5 }, ..unlit(Vec3::X) };
     let one_sided = || Material { double_sided: false, ..unlit(Vec3::Y) };
