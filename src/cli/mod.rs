@@ -185,8 +185,10 @@ fn with_joined(mut words: Vec<OsString>, (flag, is_value): &Joined) -> Vec<OsStr
     words
 }
 
-/// Writes to stdout; a reader that has enough is no fault.
+/// Writes to stdout; a reader that has enough is no fault. Names of files may hold what steers a terminal, which is not written.
 fn print(text: &str) -> io::Result<()> {
+    let steers = |c: char| c.is_control() && !matches!(c, '\n' | '\t');
+    let text = text.replace(steers, "\u{fffd}");
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),

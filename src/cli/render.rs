@@ -194,7 +194,7 @@ struct Ready {
     profile: Profile,
     metered: Metered,
     /// Code and place of the warnings that have been said.
-    told: HashSet<(&'static str, String)>,
+    told: HashSet<Kind>,
 }
 
 impl Ready {
@@ -204,6 +204,14 @@ impl Ready {
         let bounds = survey.map_or(&*bounds, |survey| &survey.bounds);
         Stage { loaded, world, bounds, load_seconds, profile, survey, built: None, metered }
     }
+}
+
+/// What a warning is about, whatever the numbers in it: its code, file, place and words.
+type Kind = (&'static str, PathBuf, String, String);
+
+fn kind_of(warning: &Diagnostic) -> Kind {
+    let words = warning.text.chars().filter(|c| !c.is_ascii_digit()).collect();
+    (warning.code, warning.file.clone(), warning.place.clone(), words)
 }
 
 /// Loads a scene for a picture, and refuses what cannot or must not be drawn. A frame of several may show nothing.
@@ -223,6 +231,7 @@ fn prepare(
         read::exit_of(&error)
     })?;
     let (mut told, mut metered, mut load_seconds) = (HashSet::new(), Metered::default(), 0.0);
+    let is_later = earlier.is_some();
     if let Some(earlier) = earlier {
         (told, metered, load_seconds) = (earlier.told, earlier.metered, earlier.load_seconds);
         if !read::take_pictures(&mut loaded, earlier.loaded) {
@@ -237,9 +246,11 @@ fn prepare(
         })?;
     }
     profile.loaded(loaded.facts.reading, loaded.facts.decoding);
-    // What is wrong with one frame is wrong with most.
-    for warning in loaded.warnings.iter().filter(|w| told.insert((w.code, w.place.clone()))) {
-        messages.say(Severity::Warning, warning);
+    // What is wrong with one frame is wrong with most, in other numbers.
+    for warning in &loaded.warnings {
+        if told.insert(kind_of(warning)) || !is_later {
+            messages.say(Severity::Warning, warning);
+        }
     }
     if job.strict && !loaded.warnings.is_empty() {
         return Err(task.fail(&read::not_strict(loaded.warnings.len(), task.file()), Exit::Input));
@@ -260,7 +271,7 @@ fn prepare(
         return Err(Exit::Input);
     }
     let coarse = coarse(&loaded, &world, &batch.inputs[0]);
-    for warning in coarse.iter().filter(|w| told.insert((w.code, w.place.clone()))) {
+    for warning in coarse.iter().filter(|w| told.insert(kind_of(w)) || !is_later) {
         messages.say(Severity::Warning, warning);
     }
     if job.strict && coarse.is_some() {

@@ -56,7 +56,10 @@ fn heat_maps_lie_beside_the_picture_and_leave_it_as_it_is() {
     let folder = Folder::with_cube();
     folder.render(&["cube.obj"]).ends(0);
     let plain = folder.read("cube.png");
-    folder.render(&["cube.obj", "--heatmap", "tests,ms"]).ends(0).says(&["cube-tests.png: ray/prim tests per pixel"]);
+    folder
+        .render(&["cube.obj", "--heatmap", "tests,ms"])
+        .ends(0)
+        .says(&["cube-tests.png: ray/prim tests per pixel of 1 ray,"]);
     assert!(folder.read("cube.png") == plain);
     assert_eq!(folder.names(), ["cube-ms.png", "cube-tests.png", "cube.obj", "cube.png"]);
     let map = picture(&folder.path("cube-tests.png"));

@@ -105,6 +105,16 @@ fn warnings_do_not_stop_a_picture_unless_strict() {
 }
 
 #[test]
+fn warnings_of_one_kind_in_two_files_are_both_said() {
+    let mtl = |name: &str, picture: &str| format!("newmtl {name}\nKd 1 1 1\nmap_Kd {picture}\n");
+    let obj =
+        "mtllib a.mtl b.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\nusemtl b\nf 3/1 2/1 1/1\n";
+    let folder =
+        Folder::new().file("two.obj", obj).file("a.mtl", mtl("a", "lost-a.png")).file("b.mtl", mtl("b", "lost-b.png"));
+    folder.render(&["two.obj"]).ends(0).says(&["a.mtl:3", "lost-a.png", "b.mtl:3", "lost-b.png"]);
+}
+
+#[test]
 fn a_wrong_command_line_ends_in_2_and_names_the_nearest_word() {
     let folder = Folder::with_cube();
     folder.render(&["cube.obj", "--sampels", "4"]).ends(2).says(&["--sampels", "--samples"]);

@@ -343,7 +343,14 @@ impl Reader {
 
     /// The colour of the last vertex.
     fn color(&mut self, words: [&[u8]; 3]) {
-        let color = words.map(|w| number::check(w).word.parse::<f32>().unwrap_or(f32::NAN));
+        let color = words.map(|w| {
+            let checked = number::check(w);
+            let value = checked.word.parse::<f32>().unwrap_or(f32::NAN);
+            if checked.odd || !value.is_finite() {
+                self.out.odd.number.note(self.line, w);
+            }
+            value
+        });
         if color.iter().all(|c| c.is_finite()) {
             self.out.colors.resize(self.out.positions.len() - 1, NO_COLOR);
             self.out.colors.push(color);

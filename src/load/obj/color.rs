@@ -82,10 +82,17 @@ impl Coding {
     }
 }
 
-/// Whether colours were written as 0 … 255.
+/// Whether colours were written as 0 … 255: whole numbers, or their means, of which most are far above 1, and not light that
+/// is somewhat over-exposed.
 fn are_bytes<const N: usize>(colors: &[[f32; N]]) -> bool {
+    /// What no number over 1 is that stands for bright light.
+    const BRIGHT: f32 = 8.0;
     let all = || colors.iter().flat_map(|color| color.iter().take(3)).filter(|c| c.is_finite());
-    all().any(|&c| c > 1.5) && all().all(|&c| (0.0..=255.0).contains(&c))
+    let greatest = all().copied().fold(0.0, f32::max);
+    let whole = || all().all(|c| c.fract() == 0.0);
+    let mean = || all().copied().map(f64::from).sum::<f64>() / all().count().max(1) as f64;
+    let is_far_above = greatest > BRIGHT && (whole() || mean() > f64::from(BRIGHT));
+    is_far_above && all().all(|&c| (0.0..=255.0).contains(&c))
 }
 
 #[cfg(test)]
@@ -101,7 +108,10 @@ mod tests {
     #[test]
     fn colors_above_one_are_bytes() {
         assert!(are_bytes(&[[1.0; 3], [255.0, 0.0, 128.0]]));
+        assert!(are_bytes(&[[120.5, 99.25, 30.0]]), "means of bytes");
         assert!(!are_bytes(&[[1.0, 0.5, 0.0]]) && !are_bytes(&[[300.0, 0.0, 0.0]]));
+        assert!(!are_bytes(&[[0.8, 0.6, 0.4], [1.6, 1.2, 0.8]]) && !are_bytes(&[[2.0, 0.0, 0.0]]), "over-exposed");
+        assert!(!are_bytes(&[[0.5, 0.25, 0.5], [12.5, 9.0, 1.0]]), "a lamp among them");
     }
 
     #[test]

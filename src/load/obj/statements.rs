@@ -9,7 +9,7 @@ use super::bare::over_memory;
 use super::chunk::{self, Chunk, LARGEST};
 use super::encoding::decode_name;
 use super::join::{Joined, join};
-use super::soup::Soup;
+use super::soup::{Corner, NONE, Soup};
 use super::{faults, split};
 use crate::load::limits::{Budget, OverBudget};
 use crate::load::wires::Wires;
@@ -154,8 +154,39 @@ fn read_in_runs(text: &[u8], run: usize, file: &Path, budget: &mut Budget) -> Re
     if faulty {
         statements.odd.absent = faults::find(text, file)?;
     }
+    if statements.is_cloud() {
+        budget.take(statements.soup.positions.len() as u64, POINT).map_err(|over| over_memory(file, over))?;
+        statements.draw_points();
+    }
     statements.soup.leave_out_unused();
     Ok(statements)
+}
+
+/// Bytes of a point among the statements.
+const POINT: u64 = (size_of::<Stroke>() + size_of::<Corner>()) as u64;
+
+impl Statements {
+    /// Whether nothing joins vertices, nor was meant to: then they are points, as scanners write them.
+    fn is_cloud(&self) -> bool {
+        let odd = &self.odd;
+        let others = [&odd.strokes, &odd.curves, &odd.calls, &odd.few_corners, &odd.absent];
+        self.faces.is_empty() && self.strokes.is_empty() && others.iter().all(|tally| tally.count == 0)
+    }
+
+    /// Makes every vertex a point; the `i`th has the `i`th normal where there are as many.
+    #[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^32 vertices")]
+    fn draw_points(&mut self) {
+        let (count, has_normals) = (self.soup.positions.len(), self.soup.normals.len() == self.soup.positions.len());
+        let corner = |i: u32| Corner { position: i, uv: NONE, normal: if has_normals { i } else { NONE } };
+        self.soup.stroke_corners = (0..count as u32).map(corner).collect();
+        self.strokes = (0..count).map(|_| Stroke { run: 0, line: 0, arity: 1, joined: false }).collect();
+        if self.runs.is_empty() {
+            self.runs.push(Run::default());
+        }
+        if self.names.is_empty() {
+            self.names.push(String::new());
+        }
+    }
 }
 
 /// Reads every run; stops soon after the memory taken is over the budget, from which it is taken.

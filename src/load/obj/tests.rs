@@ -343,3 +343,27 @@ fn a_face_whose_corners_rounding_joins_is_told_as_such() {
     assert_eq!(codes(&loaded), [("obj-equal-corners", 1), ("obj-rounded-face", 2)]);
     assert_eq!(loaded.facts.dropped.iter().map(|(_, n)| n).sum::<u64>(), 3);
 }
+
+#[test]
+fn vertices_alone_are_points_in_their_colours_lit_by_their_normals() {
+    let cloud = |more: &str| of(&format!("v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\n{more}"));
+    let loaded = cloud("");
+    assert_eq!((loaded.facts.wires.points, loaded.facts.faces, codes(&loaded)), (3, 0, vec![]));
+    let colors: Vec<Vec4> = loaded.scene.meshes.iter().flat_map(|mesh| mesh.colors.clone()).collect();
+    for color in [Vec4::new(1.0, 0.0, 0.0, 1.0), Vec4::new(0.0, 0.0, 1.0, 1.0)] {
+        assert!(colors.contains(&color), "{colors:?}");
+    }
+    let is_lit = |loaded: &Loaded| loaded.scene.materials.iter().all(|m| m.surface != Surface::Unlit);
+    assert!(!is_lit(&loaded) && is_lit(&cloud("vn 0 0 1\nvn 0 0 1\nvn 0 0 1\n")));
+    // Where something joins vertices, or was meant to, those that are left are nothing.
+    assert_eq!(cloud("f 1 2 3\n").facts.wires.points, 0);
+    assert_eq!(cloud("f 1 2\n").facts.wires.points, 0);
+}
+
+#[test]
+fn colours_of_vertices_that_are_no_numbers_are_told() {
+    for color in ["1 0 zz", "nan 0 0", "1 0 0x"] {
+        let loaded = of(&format!("v 0 0 0 {color}\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"));
+        assert_eq!(codes(&loaded), [("obj-odd-number", 1)], "{color}");
+    }
+}

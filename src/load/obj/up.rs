@@ -37,11 +37,8 @@ pub(super) fn guess(
     otherwise: (UpAxis, &str),
 ) -> (UpAxis, String) {
     for comment in comments {
-        let text = comment.to_lowercase().replace([' ', '-', '_', ':', '=', '+'], "");
-        for (axis, said) in [(UpAxis::Z, "zup"), (UpAxis::Z, "upaxisz"), (UpAxis::Y, "yup"), (UpAxis::Y, "upaxisy")] {
-            if text.contains(said) {
-                return (axis, format!("a comment says so: '{comment}'"));
-            }
+        if let Some(axis) = said(comment) {
+            return (axis, format!("a comment says so: '{comment}'"));
         }
     }
     let writes_z = |c: &&String| Z_WRITERS.iter().any(|w| c.to_lowercase().contains(w));
@@ -55,6 +52,23 @@ pub(super) fn guess(
         return (UpAxis::Z, "it stands on z = 0 with a flat bottom there".into());
     }
     (otherwise.0, otherwise.1.into())
+}
+
+/// The axis that a comment says points up, in whole words: `z-up`, `Y_UP`, `Up Axis: Z`, `zup`, but not `copy_updated`.
+fn said(comment: &str) -> Option<UpAxis> {
+    let text = comment.to_lowercase();
+    let words: Vec<&str> = text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
+    let says = |axis: &str| {
+        let joined = format!("{axis}up");
+        let at = |words: &[&str]| match words {
+            [a, "up", ..] if *a == axis => true,
+            ["up", "axis", a, ..] | ["upaxis", a, ..] | ["up", "is", a, ..] if *a == axis => true,
+            [a, ..] => *a == joined,
+            [] => false,
+        };
+        (0..words.len()).any(|start| at(&words[start..]))
+    };
+    [(UpAxis::Z, "z"), (UpAxis::Y, "y")].into_iter().find_map(|(axis, name)| says(name).then_some(axis))
 }
 
 /// Whether x and y of most vertices are as far from 0 as metres are on maps, and z is not: grids of whole countries begin
@@ -136,7 +150,14 @@ mod tests {
     fn comments_decide_first() {
         assert_eq!(up(&["Exported, Up Axis: Z"], &pyramid(1)), UpAxis::Z);
         assert_eq!(up(&["y-up"], &pyramid(2)), UpAxis::Y);
+        assert_eq!(up(&["+Y_UP"], &pyramid(2)), UpAxis::Y);
+        assert_eq!(up(&["zUp"], &pyramid(1)), UpAxis::Z);
         assert_eq!(up(&["FreeCAD v0.21"], &pyramid(1)), UpAxis::Z);
+        assert_eq!(up(&["Created by Upton, FreeCAD"], &pyramid(1)), UpAxis::Z);
+        for name in ["body_copy_updated", "battery-upper-case", "key up", "Exported by UP Studio"] {
+            assert_eq!(up(&[name], &pyramid(2)), UpAxis::Z, "{name}");
+        }
+        assert_eq!([up(&["object quartz_upper"], &pyramid(1)), up(&["Hertz Up"], &pyramid(1))], [UpAxis::Y; 2]);
         assert_eq!(up(&["Blender v2.9 OBJ File"], &pyramid(1)), UpAxis::Y);
     }
 

@@ -122,14 +122,19 @@ impl<'a> Body<'a> {
         Ok(bytes)
     }
 
+    /// The line of the next word of a text, and that of the last one; `None` for other files, and behind the last word.
+    pub(super) fn lines(&mut self) -> Option<[u32; 2]> {
+        if self.encoding != Encoding::Text {
+            return None;
+        }
+        let last = self.line;
+        self.pass_blanks();
+        (self.at < self.bytes.len()).then_some([self.line, last])
+    }
+
     /// The next word of a text, which must be a number; words may stand on any lines.
     fn number(&mut self) -> Result<f64, Missing> {
-        while let Some(&b) = self.bytes.get(self.at).filter(|b| b.is_ascii_whitespace()) {
-            // CR LF is one line end, counted at its second half.
-            let ends = b == b'\n' || (b == b'\r' && self.bytes.get(self.at + 1) != Some(&b'\n'));
-            self.line = self.line.saturating_add(u32::from(ends));
-            self.at += 1;
-        }
+        self.pass_blanks();
         let rest = self.bytes.get(self.at..).filter(|rest| !rest.is_empty()).ok_or(Missing::End)?;
         if let Some(plain) = number::plain(rest) {
             self.at += plain.length;
@@ -142,6 +147,16 @@ impl<'a> Body<'a> {
         let value = self.respelled.value(self.line, word).ok_or_else(lost)?;
         self.at += length;
         Ok(value)
+    }
+
+    #[inline]
+    fn pass_blanks(&mut self) {
+        while let Some(&b) = self.bytes.get(self.at).filter(|b| b.is_ascii_whitespace()) {
+            // CR LF is one line end, counted at its second half.
+            let ends = b == b'\n' || (b == b'\r' && self.bytes.get(self.at + 1) != Some(&b'\n'));
+            self.line = self.line.saturating_add(u32::from(ends));
+            self.at += 1;
+        }
     }
 
     /// Passes over `count` values of a binary file, of `size` bytes each; whether there are so many.

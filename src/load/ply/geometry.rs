@@ -16,15 +16,16 @@ use std::path::Path;
 pub(super) fn read(header: &Header, source: &Source, budget: &mut Budget) -> Result<Bare, Diagnostic> {
     let body = Body::new(header, source);
     let vertices = header.element("vertex").map_or(0, |element| element.count);
-    let mut reader = Reader { source, body, vertices, budget, bare: Bare::default() };
+    let mut reader = Reader { source, body, vertices, budget, bare: Bare::default(), torn: None };
     for element in &header.elements {
         reader.element(element)?;
     }
-    let Reader { body, mut bare, .. } = reader;
+    let Reader { body, mut bare, torn, .. } = reader;
     let behind = body.behind();
     bare.places = (header.encoding == Encoding::Text).then_some(body.places);
     bare.comments.clone_from(&header.comments);
     bare.told = passed_over(header, &source.path);
+    bare.told.extend(torn);
     bare.told.extend(behind);
     bare.told.extend(body.respelled.told("ply-number", &source.path));
     Ok(bare)
@@ -53,6 +54,16 @@ fn passed_over(header: &Header, file: &Path) -> Vec<Diagnostic> {
     if header.elements.iter().any(|element| element.name == "vertex" && are_splats(element)) {
         let text = "Gaussian splats are drawn as points of their colours, opaque and of one size".into();
         told.push(warning("ply-splats", text, "--line-width sets the size"));
+    }
+    let is_read = |name: &str| matches!(name, "vertex" | "tristrips" | "edge");
+    for element in header.elements.iter().filter(|element| element.count > 0 && !is_read(&element.name)) {
+        // Numbers of vertices under other names; faces have them under one of two.
+        let list = element.properties.iter().find(|property| property.length.is_some_and(|_| property.kind.is_whole()));
+        let Some(list) = list.filter(|_| element.name != "face" || list_of(element).is_none()) else { continue };
+        let (name, list) = (shorten(&element.name), shorten(&list.name));
+        let text = format!("element `{name}` ({}) with a list `{list}` is not read", element.count);
+        let remedy = "faces are those of an element `face` with a list `vertex_indices`";
+        told.push(warning("ply-unread-element", text, remedy));
     }
     let vertices = header.elements.iter().find(|element| element.name == "vertex" && element.count > 0);
     for [first, again] in vertices.map(|element| Meanings::of(element).twice).unwrap_or_default() {
@@ -143,15 +154,32 @@ struct Reader<'a, 'b> {
     vertices: u64,
     budget: &'b mut Budget,
     bare: Bare,
+    /// A line that has not the numbers of one row.
+    torn: Option<Diagnostic>,
+}
+
+/// The rows of an element of a text, which programs write a line each, although blanks of any kind part numbers.
+#[derive(Default)]
+struct Rows {
+    /// Where the row begins that is read.
+    start: u32,
+    /// Whether two rows have shared a line from the beginning on: then lines mean nothing.
+    is_free: bool,
+}
+
+/// Which property lists the corners of faces.
+fn list_of(element: &Element) -> Option<usize> {
+    let lists = |property: &Property| {
+        property.length.is_some()
+            && matches!(property.name.as_str(), "vertex_indices" | "vertex_index" | "vertex_idx" | "vertex_ids")
+    };
+    element.properties.iter().position(lists)
 }
 
 impl Reader<'_, '_> {
     fn element(&mut self, element: &Element) -> Result<(), Diagnostic> {
         self.body.check_count(element)?;
-        let corners = element.properties.iter().position(|property| {
-            property.length.is_some() && matches!(property.name.as_str(), "vertex_indices" | "vertex_index")
-        });
-        match (element.name.as_str(), corners) {
+        match (element.name.as_str(), list_of(element)) {
             ("vertex", _) if self.bare.positions.is_empty() => self.vertices(element),
             ("face", Some(list)) => self.faces(element, list, false),
             ("tristrips", Some(list)) => self.faces(element, list, true),
@@ -161,6 +189,26 @@ impl Reader<'_, '_> {
                 if element.properties.is_empty() { Ok(()) } else { self.pass(element) }
             }
         }
+    }
+
+    /// Row `i` begins: tells when it begins in a line that belongs to the one before it, as all behind it will, then.
+    fn row(&mut self, rows: &mut Rows, element: &Element, i: u64) {
+        let Some([line, last]) = self.body.lines() else { return };
+        let start = std::mem::replace(&mut rows.start, line);
+        if i == 0 || line != last || rows.is_free || self.torn.is_some() {
+            return;
+        }
+        if i == 1 {
+            rows.is_free = true;
+            return;
+        }
+        let (name, row) = (shorten(&element.name), i - 1);
+        let how = if start == last { "more" } else { "fewer" };
+        let text = format!(
+            "{name} {row} has {how} numbers than the header says, so that all behind it are read from wrong places"
+        );
+        let torn = Diagnostic::new("ply-torn-line", &self.source.path, start.to_string(), text);
+        self.torn = Some(torn.remedy("repair that line"));
     }
 
     fn vertices(&mut self, element: &Element) -> Result<(), Diagnostic> {
@@ -178,7 +226,9 @@ impl Reader<'_, '_> {
 
         // The budget has room for so many, so memory has.
         self.bare.positions.reserve_exact(element.count as usize);
+        let mut rows = Rows::default();
         for i in 0..element.count {
+            self.row(&mut rows, element, i);
             let mut values = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
             for (property, slot) in element.properties.iter().zip(&slots) {
                 match slot {
@@ -207,7 +257,9 @@ impl Reader<'_, '_> {
     /// Lines.
     fn edges(&mut self, element: &Element) -> Result<(), Diagnostic> {
         let Some(slots) = ends(element) else { return self.pass(element) };
+        let mut rows = Rows::default();
         for i in 0..element.count {
+            self.row(&mut rows, element, i);
             let mut edge = [0; 2];
             for (k, property) in element.properties.iter().enumerate() {
                 match slots.iter().position(|&slot| slot == k) {
@@ -227,8 +279,9 @@ impl Reader<'_, '_> {
 
     /// Polygons, or strips of triangles.
     fn faces(&mut self, element: &Element, list: usize, strips: bool) -> Result<(), Diagnostic> {
-        let mut corners = Vec::new();
+        let (mut corners, mut rows) = (Vec::new(), Rows::default());
         for i in 0..element.count {
+            self.row(&mut rows, element, i);
             for (k, property) in element.properties.iter().enumerate() {
                 if k == list {
                     self.corners(element, i, property, strips, &mut corners)?;
@@ -259,7 +312,10 @@ impl Reader<'_, '_> {
         corners.clear();
         for k in 0..self.length(element, i, property)? {
             let value = self.value(element, i, property)?;
-            if strips && value == -1.0 {
+            // Where numbers have no sign, −1 is the greatest of them.
+            let ends = value == -1.0 || property.kind == Kind::U32 && value == f64::from(u32::MAX);
+            let ends = ends || property.kind == Kind::U16 && value == f64::from(u16::MAX) && self.vertices <= 0xffff;
+            if strips && ends {
                 corners.push(RESTART);
                 continue;
             }

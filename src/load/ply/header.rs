@@ -26,6 +26,11 @@ pub(super) enum Kind {
 }
 
 impl Kind {
+    /// Whether its values are whole numbers.
+    pub(super) fn is_whole(self) -> bool {
+        !matches!(self, Self::F32 | Self::F64)
+    }
+
     /// Bytes in a binary file.
     pub(super) fn size(self) -> usize {
         match self {
@@ -125,10 +130,11 @@ impl Header {
     }
 }
 
-/// Lines that all end as the first one does: in a binary file, what follows the last may look like half a line end.
+/// Lines that end with LF, before which CR may stand, or all with CR where the first one does: in a binary file, what follows
+/// the last may look like half a line end.
 struct Lines<'a> {
     bytes: &'a [u8],
-    end: &'static [u8],
+    end: u8,
     at: usize,
     count: u32,
 }
@@ -138,20 +144,21 @@ impl<'a> Lines<'a> {
         let first = bytes.iter().position(|b| matches!(b, b'\n' | b'\r')).unwrap_or(bytes.len());
         // A byte-order mark.
         let at = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
-        let end: &[u8] = match &bytes[first..] {
-            [b'\r', b'\n', ..] => b"\r\n",
-            [b'\r', ..] => b"\r",
-            _ => b"\n",
+        let end = match &bytes[first..] {
+            [b'\r', b'\n', ..] => b'\n',
+            [b'\r', ..] => b'\r',
+            _ => b'\n',
         };
         Self { bytes, end, at, count: 0 }
     }
 
     fn next(&mut self) -> Option<&'a [u8]> {
         let rest = self.bytes.get(self.at..).filter(|rest| !rest.is_empty())?;
-        let length = rest.windows(self.end.len()).position(|w| w == self.end)?;
-        self.at += length + self.end.len();
+        let length = rest.iter().position(|&b| b == self.end)?;
+        self.at += length + 1;
         self.count = self.count.saturating_add(1);
-        Some(&rest[..length])
+        let line = &rest[..length];
+        Some(if self.end == b'\n' { line.strip_suffix(b"\r").unwrap_or(line) } else { line })
     }
 }
 

@@ -136,8 +136,11 @@ fn words_may_stand_on_any_lines_and_lines_end_anyhow() {
     let expected = format!("{:?}", plain(&text("0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")).scene);
     let windows = String::from_utf8(text("0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")).unwrap().replace('\n', "\r\n");
     let old_mac = windows.replace("\r\n", "\r");
-    for file in [text("0 0 0 1 0 0\n\n0 1\n0 3 0 1 2"), windows.into(), old_mac.into()] {
-        assert_eq!(format!("{:?}", plain(&file).scene), expected);
+    let first_alone = windows.replacen("\r\n", "\r", 1).replace("\r\n", "\n").replacen('\r', "\r\n", 1);
+    for file in [text("0 0 0 1 0 0\n\n0 1\n0 3 0 1 2"), windows.into(), old_mac.into(), first_alone.into()] {
+        let loaded = plain(&file);
+        assert_eq!(format!("{:?}", loaded.scene), expected);
+        assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
     }
     // A comment in no encoding that we know is still a comment.
     let mut file = b"ply\nformat ascii 1.0\ncomment caf\xe9\n".to_vec();
@@ -392,4 +395,45 @@ fn what_two_properties_say_is_what_the_first_says_and_the_other_is_told() {
     assert_eq!(loaded.warnings[1].text, "'u' of a vertex says what 's' has said, and is not read");
     let mesh = &loaded.scene.meshes[0];
     assert!(mesh.positions.iter().all(|p| p.x < 2.0) && mesh.uvs[0].iter().all(|uv| uv.x == 0.1), "{:?}", mesh.uvs);
+}
+
+#[test]
+fn a_line_that_has_not_the_numbers_of_its_row_is_named() {
+    let header = TRIANGLE.replace("vertex 3", "vertex 5");
+    let told = |vertices: &str| -> Vec<String> {
+        let file = format!("ply\nformat ascii 1.0\n{header}{vertices}\n3 0 1 2\n3 0 1 2\n");
+        plain(file.as_bytes()).warnings.iter().filter(|w| w.code == "ply-torn-line").map(ToString::to_string).collect()
+    };
+    assert_eq!(told("0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1"), [""; 0]);
+    let fewer = told("0 0 0\n1 0 0\n0 1\n0 0 1\n1 1 1");
+    let wrong = "so that all behind it are read from wrong places; repair that line";
+    assert_eq!(fewer, [format!("a.ply:12: vertex 2 has fewer numbers than the header says, {wrong}")]);
+    let more = told("0 0 0\n1 0 0\n0 1 0 7\n0 0 1\n1 1");
+    assert_eq!(more, [format!("a.ply:12: vertex 2 has more numbers than the header says, {wrong}")]);
+}
+
+#[test]
+fn faces_under_names_that_are_not_known_are_told() {
+    let of = |from: &str, to: &str| {
+        let file = String::from_utf8(text("0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")).unwrap();
+        plain(file.replace(from, to).as_bytes())
+    };
+    assert_eq!(of("vertex_indices", "vertex_idx").facts.faces, 1);
+    for (from, to) in [("element face", "element polygon"), ("vertex_indices", "corners")] {
+        let loaded = of(from, to);
+        let codes: Vec<_> = loaded.warnings.iter().map(|w| w.code).collect();
+        assert_eq!((loaded.facts.faces, codes), (0, vec!["ply-unread-element"]), "{to}");
+    }
+}
+
+#[test]
+fn strips_of_numbers_without_sign_end_at_the_greatest() {
+    for (kind, end) in [("uint", "4294967295"), ("ushort", "65535"), ("int", "-1")] {
+        let header = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement tristrips 1\n";
+        let file = format!(
+            "ply\nformat ascii 1.0\n{header}property list int {kind} vertex_indices\nend_header\n\
+             0 0 0\n1 0 0\n0 1 0\n1 1 0\n7 0 1 2 {end} 1 3 2\n"
+        );
+        assert_eq!(plain(file.as_bytes()).facts.faces, 2, "{kind}");
+    }
 }

@@ -243,7 +243,7 @@ fn parse<'a>(faults: &'a Faults, root: &'a DeTable<'a>, options: &LoadOptions) -
         scene.materials = materials.named("material").into_iter().map(read).collect();
     }
     let named = |(material, id): (&Material, u32)| (material.name.clone(), id);
-    let mut names = Names(scene.materials.iter().zip(0..).map(named).collect());
+    let mut names = Names { of: scene.materials.iter().zip(0..).map(named).collect(), plain: None };
     let mut models = Vec::new();
     for table in root.tables("models", "model") {
         models.extend(model(&mut scene, &mut names, table));
@@ -297,8 +297,11 @@ fn model(scene: &mut Scene, names: &mut Names, table: Table) -> Option<Model> {
     Some(Model { file: file?, at, up, material, world_from_model })
 }
 
-/// Materials by name.
-struct Names(HashMap<String, u32>);
+/// Materials by name, and the plain one once a shape has it.
+struct Names {
+    of: HashMap<String, u32>,
+    plain: Option<u32>,
+}
 
 impl Names {
     /// The index of the material a shape names; one that names none gets the plain one.
@@ -306,7 +309,7 @@ impl Names {
         let is_listed = table.faults.lists(table.place_of("material").start);
         let named = table.get("material", |value| {
             let name = string(value)?;
-            self.0.get(&name).copied().ok_or_else(|| {
+            self.of.get(&name).copied().ok_or_else(|| {
                 if !is_listed {
                     return String::new();
                 }
@@ -320,9 +323,8 @@ impl Names {
             })
         });
         let plain = || {
-            let plain = Material::plain();
-            *self.0.entry(plain.name.clone()).or_insert_with(|| {
-                scene.materials.push(plain);
+            *self.plain.get_or_insert_with(|| {
+                scene.materials.push(Material::plain());
                 count(scene.materials.len() - 1)
             })
         };

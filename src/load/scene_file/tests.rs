@@ -345,3 +345,13 @@ fn the_text_and_all_models_share_one_budget() {
     assert!(text.ends_with("raise --max-memory"), "{text}");
     assert_eq!(fault(positions, 50_000_000), Ok(1));
 }
+
+#[test]
+fn a_material_called_plain_is_not_that_of_shapes_without_one() {
+    let text = "[materials.plain]\ndiffuse = [1, 0, 0]\n[[spheres]]\ncenter = [0, 0, 0]\nradius = 1\n\
+                [[spheres]]\ncenter = [3, 0, 0]\nradius = 1\nmaterial = \"plain\"\n[[spheres]]\ncenter = [6, 0, 0]\nradius = 1\n";
+    let scene = load_text(text).unwrap().scene;
+    let color = |sphere: usize| scene.materials[scene.spheres[sphere].material as usize].base_color;
+    assert_eq!(color(1), Vec3::X);
+    assert_eq!([color(0), color(2)], [Material::plain().base_color; 2]);
+}

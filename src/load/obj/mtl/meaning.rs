@@ -56,10 +56,12 @@ impl Meaning<'_> {
         };
         // Of glass, what does not pass is scattered; a physically based model finds that share itself.
         let kept = if glass && !physical && self.mtl.d.is_some() { opacity } else { 1.0 };
+        // A physically based model lets through as much of each colour as its base colour says.
+        let tint = if physical && passed != Vec3::ZERO { passed / passed.max_element() } else { Vec3::ONE };
         let blended = !glass && opacity < 1.0;
         Material {
             name: self.mtl.name.clone(),
-            base_color: kd * kept,
+            base_color: kd * kept * tint,
             opacity: if glass { 1.0 } else { opacity },
             alpha_mode: if blended { AlphaMode::Blend } else { AlphaMode::Opaque },
             double_sided: true,

@@ -287,7 +287,8 @@ impl Parser<'_> {
             self.warn("mtl-spectral", "a spectral curve (.rfl) is not read; the colour counts as not given".into());
             return None;
         }
-        let numbers: Vec<f64> = words.take(3).map_while(|w| number::check(w).word.parse().ok()).collect();
+        let given: Vec<&[u8]> = words.take(3).collect();
+        let numbers: Vec<f64> = given.iter().map_while(|w| number::check(w).word.parse().ok()).collect();
         let first = numbers.first().copied().filter(|n| n.is_finite());
         let Some(first) = first else {
             self.warn("mtl-bad-number", format!("'{}' is not a colour", shorten(&decode_name(rest))));
@@ -295,6 +296,14 @@ impl Parser<'_> {
         };
         let or_first = |i: usize| numbers.get(i).copied().filter(|n| n.is_finite()).unwrap_or(first);
         let color = [first, or_first(1), or_first(2)];
+        let is_odd = given.iter().any(|w| number::check(w).odd) || numbers.iter().any(|n| !n.is_finite());
+        if is_odd || given.len() == 2 || numbers.len() < given.len() {
+            let text = shorten(&decode_name(rest));
+            self.warn(
+                "mtl-bad-number",
+                format!("'{text}' is not a colour; it counts as {first} {} {}", color[1], color[2]),
+            );
+        }
         if kind.is_some() {
             self.warn("mtl-xyz", "a CIE XYZ colour is converted to Rec. 709".into());
             // What is out of gamut is cut.
@@ -304,9 +313,15 @@ impl Parser<'_> {
     }
 
     fn number(&mut self, rest: &[u8]) -> Option<f64> {
-        let value = words(rest).next().and_then(|w| number::check(w).word.parse().ok()).filter(|n: &f64| n.is_finite());
-        if value.is_none() {
-            self.warn("mtl-bad-number", format!("'{}' is not a number", shorten(&decode_name(rest))));
+        let word = words(rest).next().map(number::check);
+        let value = word.as_ref().and_then(|w| w.word.parse().ok()).filter(|n: &f64| n.is_finite());
+        let text = || shorten(&decode_name(rest)).to_string();
+        match value {
+            None => self.warn("mtl-bad-number", format!("'{}' is not a number", text())),
+            Some(read) if word.is_some_and(|w| w.odd) => {
+                self.warn("mtl-bad-number", format!("'{}' is not a number; it counts as {read}", text()));
+            }
+            Some(_) => {}
         }
         value
     }
@@ -357,7 +372,7 @@ mod tests {
 
     #[test]
     fn every_number_is_read_whatever_the_case_of_its_name() {
-        let text = "newmtl a b\n\tKa .1 .2 .3 # c\nkd 0.5\nKS 1 0\nNs 10\nNI 1.5\nd 0.5\nTr 0.25\nillum 7\nTf 1 1 0\nPr .1\nPm 1";
+        let text = "newmtl a b\n\tKa .1 .2 .3 # c\nkd 0.5\nKS 1 0 1\nNs 10\nNI 1.5\nd 0.5\nTr 0.25\nillum 7\nTf 1 1 0\nPr .1\nPm 1";
         let (materials, warnings) = of(text);
         let m = &materials[0];
         assert_eq!((m.name.as_str(), m.line), ("a b", 1));

@@ -144,12 +144,16 @@ impl Pictures {
         grey
     }
 
-    /// Whether nine in ten texels are unit vectors that point out of the surface: a normal map.
+    /// Whether nine in ten texels are unit vectors that point out of the surface: a normal map. Light grey is one, too, but that
+    /// is a height.
     pub(super) fn is_normal_map(&self, i: usize) -> bool {
+        /// How far the colours of grey lie apart that was compressed.
+        const GREY: f32 = 0.05;
         let (mut unit, mut all) = (0u64, 0u64);
         each(&self.sources[i], |[r, g, b, _]| {
             let n = crate::math::Vec3::new(r, g, b) * 2.0 - 1.0;
-            unit += u64::from((n.length() - 1.0).abs() < 0.1 && n.z > 0.0);
+            let is_grey = (n - n.z).abs().max_element() < GREY;
+            unit += u64::from((n.length() - 1.0).abs() < 0.1 && n.z > 0.0 && !is_grey);
             all += 1;
         });
         unit * 10 >= all * 9

@@ -309,3 +309,33 @@ fn a_comment_behind_the_name_of_a_picture_is_none_of_it_unless_there_is_such_a_f
     assert_eq!(color("map_Kd red.png # 2.png", &[red, odd]), Some(2));
     assert_eq!((color("map_Kd none.png # red.png", &[red]), color("map_Kd # red.png", &[red])), (None, None));
 }
+
+#[test]
+fn numbers_that_are_read_otherwise_than_written_are_told() {
+    for line in ["Kd 1 0 zz", "Kd 0.8 nan 0.2", "Kd 0.8 0.2", "Kd 0.8x 0.1 0.2", "Ns 10x", "d 0.5x"] {
+        let (loaded, _) = guess(&format!("newmtl a\nKd 1 1 1\n{line}\n"), &[]);
+        assert!(codes(&loaded).contains(&"mtl-bad-number"), "{line}: {:?}", loaded.warnings);
+    }
+    for line in ["Kd 0.8", "Kd 0.8 0.1 0.2", "Ns 10", "d 1"] {
+        let (loaded, _) = guess(&format!("newmtl a\nKd 1 1 1\n{line}\n"), &[]);
+        assert!(!codes(&loaded).contains(&"mtl-bad-number"), "{line}: {:?}", loaded.warnings);
+    }
+}
+
+#[test]
+fn glass_of_a_physically_based_material_has_the_colour_of_its_filter() {
+    let glass =
+        |filter: &str| guess(&format!("newmtl a\nKd 0.8 0.8 0.8\nillum 6\nNi 1.5\nTf {filter}\nPr 0\nPm 0\n"), &[]).1;
+    let (red, clear) = (glass("1 0.25 0.25"), glass("1 1 1"));
+    assert_eq!(red.base_color, clear.base_color * Vec3::new(1.0, 0.25, 0.25));
+    assert!(red.metal_rough().is_some_and(|m| m.transmission == 1.0));
+}
+
+#[test]
+fn a_light_grey_picture_is_a_height_and_no_normal_map() {
+    let of = |texel: [u8; 4]| guess("newmtl a\nKd 1 1 1\nmap_Bump b.png\n", &[("b.png", texel)]).1;
+    for grey in [195, 200, 205] {
+        assert!(of([grey, grey, grey, 255]).normal_map.is_none(), "{grey}");
+    }
+    assert!(of([128, 128, 255, 255]).normal_map.is_some());
+}
