@@ -306,6 +306,24 @@ mod tests {
     }
 
     #[test]
+    fn pictures_come_in_the_order_in_which_they_are_asked_for_whichever_takes_longest() {
+        let of = |side: u32| {
+            let noise = |x: u32, y: u32| [(x * 31 + y * 57) as u8 ^ (x * y) as u8, x as u8, y as u8, 255];
+            let image = ::image::RgbaImage::from_fn(side, side, |x, y| ::image::Rgba(noise(x, y)));
+            let bytes = Cow::Owned(png(DynamicImage::ImageRgba8(image)));
+            Encoded { name: side.to_string(), place: side.to_string(), bytes }
+        };
+        let mut images: Vec<Encoded> = [3, 40, 1, 17, 25].map(of).into();
+        images.insert(2, Encoded { name: "broken".into(), place: "7".into(), bytes: Cow::Borrowed(b"no picture") });
+        let (limits, mut warnings) = (Limits::default(), Warnings::default());
+        let mut budget = Budget::new(&limits);
+        let (decoded, _) = decode_all(&images, Path::new("m.obj"), &limits, &mut budget, &mut warnings);
+        let widths: Vec<Option<u32>> = decoded.iter().map(|bitmap| bitmap.as_ref().map(|b| b.width)).collect();
+        assert_eq!(widths, [Some(3), Some(40), None, Some(1), Some(17), Some(25)]);
+        assert_eq!(warnings.into_vec().len(), 1);
+    }
+
+    #[test]
     fn a_bmp_is_known_by_its_bytes_and_a_tga_by_its_name_too() {
         let colors = |image: &DynamicImage| image.to_rgba8().pixels().map(|p| p.0).collect::<Vec<_>>();
         let image = ::image::RgbaImage::from_fn(3, 2, |x, y| ::image::Rgba([x as u8 * 90, y as u8 * 200, 7, 255]));

@@ -10,7 +10,7 @@ use super::curve::Feelers;
 use super::draws::{Draws, Purpose};
 use super::eyes::Eyes;
 use super::observer::Observer;
-use super::seam::is_same_crossing;
+use super::seam::{is_same_crossing, is_same_surface};
 use super::shade::LocalLight;
 use super::strip::{Common, POINTS, Sorted, Strip, StripPoint};
 use super::surface::{Surface, Target};
@@ -203,7 +203,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             let (ray, path, hit) = (&wave.rays[i], &wave.paths[i], &wave.hits[i]);
             if !hit.is_some() {
                 if path.straight { self.leave(ray, path) } else { self.beside.missed.push(index) }
-            } else if wave.may_cross_again(i) && is_same_crossing(|prim| context.face(prim), ray, &wave.after[i], hit) {
+            } else if self.is_crossed(wave, i) {
                 self.continuing[class as usize].push(*ray, *path, *hit);
             } else if rays.len() < FEW || !sorted.take(context, (index, 1), hit.prim) {
                 self.shade_one(traced, i);
@@ -211,6 +211,16 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
         self.see_surroundings(traced);
         self.shade_sorted(traced, sorted);
+    }
+
+    /// Whether the `i`th ray has crossed already what it has hit.
+    fn is_crossed(&self, wave: &Wave, i: usize) -> bool {
+        let (ray, before, hit) = (&wave.rays[i], &wave.after[i], &wave.hits[i]);
+        let face = |prim| self.context.face(prim);
+        match wave.starts {
+            true => wave.may_cross_again(i) && is_same_surface(face, ray, before, hit),
+            false => is_same_crossing(face, ray, before, hit),
+        }
     }
 
     /// Shades what the `i`th ray has hit.

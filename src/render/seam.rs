@@ -30,6 +30,18 @@ pub(crate) fn is_same_crossing<'a>(face: impl Fn(u32) -> (Prim<'a>, u32), ray: &
     meet && a.faces(ray) == b.faces(ray)
 }
 
+/// The same of a ray that starts before the surface of `before`, which it crosses, and meets something no farther than the error
+/// of its start: all that is of the same material there and turns the same side to it is the same surface, however small
+/// its faces are, and however many lie in one place.
+pub(crate) fn is_same_surface<'a>(face: impl Fn(u32) -> (Prim<'a>, u32), ray: &Ray, before: &Hit, hit: &Hit) -> bool {
+    if !before.is_some() {
+        return false;
+    }
+    let ((a, material), (b, other)) = (face(before.prim), face(hit.prim));
+    let (Some(a), Some(b)) = (Corners::of(a), Corners::of(b)) else { return false };
+    material == other && a.faces(ray) == b.faces(ray)
+}
+
 /// The corners of a face.
 enum Corners<'a> {
     Triangle(Triangle),
@@ -162,6 +174,17 @@ mod tests {
             "across an edge"
         );
         assert!(is_same_crossing(|prim| (shapes.prim(prim), 0), &ray(), &at(0, 1.0), &at(6, 1.0)));
+    }
+
+    #[test]
+    fn a_ray_that_starts_before_a_surface_crosses_all_of_it_at_once() {
+        let shapes = shapes();
+        let is_same =
+            |prim: u32| is_same_surface(|prim| (shapes.prim(prim), prim / 3), &ray(), &at(0, 1.0), &at(prim, 1.0));
+        assert!(is_same(1) && is_same(2), "beside it, and farther away");
+        assert!(!is_same(3), "of another material");
+        let turned = is_same_surface(|prim| (shapes.prim(prim), 0), &ray(), &at(0, 1.0), &at(4, 1.0));
+        assert!(!turned, "seen from the other side");
     }
 
     #[test]

@@ -96,6 +96,12 @@ fn a_file_on_one_line_is_read_and_one_without_its_end_is_told_of() {
 }
 
 #[test]
+fn zeros_behind_a_text_are_no_part_of_it() {
+    let loaded = plain(format!("{}{}", text(), "\0".repeat(300)).as_bytes());
+    assert_eq!((loaded.facts.faces, loaded.warnings.len()), (4, 0));
+}
+
+#[test]
 fn both_zeros_are_one_place_and_near_places_are_two() {
     let facet =
         |x: &str| format!("facet normal 0 0 1 outer loop vertex {x} 0 0 vertex 1 0 0 vertex 0 1 0 endloop endfacet\n");

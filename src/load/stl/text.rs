@@ -17,8 +17,10 @@ use std::path::Path;
 /// At the first word that is out of place, with its line. A solid without its end may be whole all the same; a warning says
 /// so.
 pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnostic> {
-    let mut words =
-        Words { file: &source.path, bytes: &source.bytes, at: 0, line: 1, places: 0, respelled: Respelled::default() };
+    // Zeros fill the last block of what was copied in blocks.
+    let length = source.bytes.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
+    let bytes = &source.bytes[..length];
+    let mut words = Words { file: &source.path, bytes, at: 0, line: 1, places: 0, respelled: Respelled::default() };
     // A byte-order mark.
     words.at = if source.bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
     let (mut names, mut open) = (Vec::new(), false);

@@ -1,6 +1,6 @@
 //! Heat maps: the tests in each pixel, by one scale for all structures.
 
-use super::super::number::{grouped, whole};
+use super::super::number::{grouped, short, whole};
 use super::super::{Model, Report};
 use super::name;
 use crate::image::draw::heat::{COLORS, Scale, color};
@@ -27,12 +27,13 @@ pub(super) fn figure(report: &Report, model: &Model) -> String {
         let _ = writeln!(
             maps,
             "<li><img alt=\"tests in each pixel, {0}\" width=\"{1}\" height=\"{2}\" \
-             src=\"data:image/png;base64,{3}\"><b>{0}</b>: {mean:.1} on average, {4} at most</li>",
+             src=\"data:image/png;base64,{3}\"><b>{0}</b>: {5} on average, {4} at most</li>",
             name(row),
             model.width,
             model.height,
             STANDARD.encode(png),
             grouped(u64::from(most)),
+            short(mean),
         );
     }
     if maps.is_empty() {
