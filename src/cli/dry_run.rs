@@ -52,7 +52,7 @@ impl Told<'_> {
         let settings = self.work.settings;
         let range = |i: Interval, unit: fn(f64) -> String| match i.high.is_finite() {
             true => format!("{} ({} to {})", unit(i.value), unit(i.low), unit(i.high)),
-            false => format!("{} (or any other: one part of the picture tells nothing of its spread)", unit(i.value)),
+            false => format!("{} (of unknown spread)", unit(i.value)),
         };
         let mut lines = vec![
             ("processor time", range(cpu, seconds)),

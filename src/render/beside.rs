@@ -67,7 +67,7 @@ impl<'a> Traced<'a> {
     fn touches(self, i: usize) -> bool {
         match self {
             Self::Eyes(_) => false,
-            Self::Wave(_, wave) => wave.starts && wave.may_cross_again(i) && wave.after[i].is_some(),
+            Self::Wave(_, wave) => wave.touches(i),
         }
     }
 
@@ -218,7 +218,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let (ray, before, hit) = (&wave.rays[i], &wave.after[i], &wave.hits[i]);
         let face = |prim| self.context.face(prim);
         match wave.starts {
-            true => wave.may_cross_again(i) && is_same_surface(face, ray, before, hit),
+            true => wave.touches(i) && is_same_surface(face, ray, before, hit),
             false => is_same_crossing(face, ray, before, hit),
         }
     }

@@ -29,8 +29,11 @@ pub(super) trait Ground {
     /// A ray from here along `dir`, of unit length, without end.
     fn ray(&self, dir: Vec3, sample: u32) -> Ray;
 
-    /// Where rays towards `dir` start.
-    fn origin(&self, dir: Vec3) -> Vec3;
+    /// Where rays towards `dir` start, and where they would if nothing were rounded.
+    fn set_off(&self, dir: Vec3) -> [Vec3; 2];
+
+    /// The face that rays from here cannot meet again; [`NO_PRIM`] on round shapes, which they may.
+    fn excluded(&self) -> u32;
 
     /// A ray to the other side along `dir`, and how far it may go until it has left all that is the same surface.
     ///
@@ -38,13 +41,14 @@ pub(super) trait Ground {
     /// away than the error of the place, and a ray that starts beyond that would never meet it. Only round shapes, which such a
     /// ray would meet again, are left first.
     fn ray_through(&self, dir: Vec3, sample: u32) -> (Ray, f32) {
-        let ray = self.ray(dir, sample);
-        if ray.exclude == NO_PRIM {
-            return (ray, 0.0);
+        let exclude = self.excluded();
+        if exclude == NO_PRIM {
+            return (self.ray(dir, sample), 0.0);
         }
-        let (origin, normal) = (self.origin(-dir), self.seen().geometric);
-        let room = 2.0 * (normal.dot(ray.origin - origin) / normal.dot(dir)).abs();
-        (Ray { origin, ..ray }, room)
+        let ([origin, start], normal) = (self.set_off(-dir), self.seen().geometric);
+        // As far behind the surface as before it, and as much again.
+        let room = 4.0 * (normal.dot(start - origin) / normal.dot(dir)).abs();
+        (Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude, sample }, room)
     }
 }
 

@@ -11,7 +11,8 @@ use crate::math::triangle::Triangle;
 /// Two faces that turn the same side to a ray and share an edge, each running along it its own way, lie on different
 /// sides of that edge as the ray sees them, so it can meet both only on the edge itself. Other faces that share a corner
 /// must be met at the same distance as well: leaves of a book run along its spine the same way, and one lies over the next.
-/// A surface is of one material: what is glued to a face, or painted on it, shares corners with it and is crossed, too. Where one of two faces is seen from behind the surface is crossed twice, in and out again.
+/// A surface is of one material: what is glued to a face, or painted on it, shares corners with it and is crossed, too. Where
+/// one of two faces is seen from behind the surface is crossed twice, in and out again.
 ///
 /// `face` looks prims and their materials up by their numbers.
 pub(crate) fn is_same_crossing<'a>(face: impl Fn(u32) -> (Prim<'a>, u32), ray: &Ray, before: &Hit, hit: &Hit) -> bool {

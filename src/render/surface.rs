@@ -269,9 +269,12 @@ impl<'a> Surface<'a> {
     /// A ray from here along `dir` (of any length) up to `t_max`; it starts outside the error of the position, on the
     /// side it goes to, and cannot meet the flat face it starts on.
     pub(crate) fn ray(&self, dir: Vec3, t_max: f32, sample: u32) -> Ray {
-        let origin = self.origin(dir);
-        let exclude = if self.target.is_planar() { self.target.prim } else { NO_PRIM };
-        Ray { origin, t_min: 0.0, dir, t_max, exclude, sample }
+        Ray { origin: self.origin(dir), t_min: 0.0, dir, t_max, exclude: self.excluded(), sample }
+    }
+
+    /// The face that rays from here cannot meet again; [`NO_PRIM`] on round shapes, which they may.
+    fn excluded(&self) -> u32 {
+        if self.target.is_planar() { self.target.prim } else { NO_PRIM }
     }
 
     /// Where rays towards `dir` start.
@@ -302,8 +305,12 @@ impl Ground for Surface<'_> {
         self.ray(dir, f32::INFINITY, sample)
     }
 
-    fn origin(&self, dir: Vec3) -> Vec3 {
-        self.origin(dir)
+    fn set_off(&self, dir: Vec3) -> [Vec3; 2] {
+        [self.origin(dir), self.start]
+    }
+
+    fn excluded(&self) -> u32 {
+        self.excluded()
     }
 }
 

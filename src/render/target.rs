@@ -114,7 +114,8 @@ pub(super) fn plan<P: Observer>(
         }
         let squared = squared_errors(&measure, &parts[0], &parts[1]);
         let of_all = Interval::of_mean(&squared, 1.0).map(f64::sqrt);
-        (plan.rmse, most) = (of_all.value, of_all.high);
+        // A single square has all pixels of a small picture, or nothing tells how far off it is.
+        (plan.rmse, most) = (of_all.value, if of_all.high.is_finite() { of_all.high } else { of_all.value });
         let pixels = f64::from(job.settings.width) * f64::from(job.settings.height);
         plan.cpu = parts.iter().map(|part| part.seconds_per_pixel() * pixels * 0.5).sum();
         let samples = parts.iter().map(|part| part.samples_per_pixel() * 0.5).sum();

@@ -246,10 +246,19 @@ pub(crate) struct Wave {
 }
 
 impl Wave {
-    /// Whether what the `i`th ray has hit may be what it has crossed already: a ray that starts before a surface that it
-    /// crosses meets it no farther than that.
-    pub(crate) fn may_cross_again(&self, i: usize) -> bool {
-        !self.starts || self.hits[i].t <= self.after[i].t
+    /// Whether the `i`th ray has hit something where it has crossed a surface just before, or as near as places err: one that it
+    /// started before, or that it goes on behind.
+    pub(crate) fn touches(&self, i: usize) -> bool {
+        /// More than places err, in parts of what they are computed from, where a ray does not graze the surface.
+        const NEAR: f32 = 1.0 / (1 << 16) as f32;
+        let (ray, before, hit) = (&self.rays[i], &self.after[i], &self.hits[i]);
+        if !before.is_some() {
+            return false;
+        }
+        if self.starts {
+            return hit.t <= before.t;
+        }
+        hit.t - before.t <= NEAR * (hit.t + ray.origin.abs().max_element())
     }
 
     fn clear(&mut self) {

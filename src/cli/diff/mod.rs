@@ -184,7 +184,7 @@ fn map(args: &DiffArgs, compared: &Compared) -> Result<Vec<u8>, ImageError> {
     };
     let most = values.iter().copied().fold(0.0, f64::max);
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
-    let told = |x: f64| if x.is_finite() { short(x) } else { "infinite".into() };
+    let told = |x: f64| if x.is_infinite() { "infinite".into() } else { short(x) };
     let title = format!("{what}: mean {}, most {}", told(mean), told(most));
     let finite = || values.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max);
     let end = args.heatmap_max.unwrap_or_else(finite);

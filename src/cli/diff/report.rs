@@ -73,7 +73,12 @@ pub(super) fn json(args: &DiffArgs, compared: &Compared, broken: &[String]) -> S
     let layers: Vec<Value> = compared
         .layers
         .iter()
-        .map(|l| json!({"name": l.name, "rmse": l.rmse, "max": l.max, "differing": l.differing, "of_one": l.of_one, "values": l.values}))
+        .map(|l| {
+            json!({
+                "name": l.name, "rmse": l.rmse, "max": l.max,
+                "differing": l.differing, "of_one": l.of_one, "values": l.values,
+            })
+        })
         .collect();
     let report = json!({
         "schema": "meshray-diff/1",

@@ -29,25 +29,15 @@ pub(super) struct Report<'a> {
 /// Longest list of names that the text shows in full.
 const SHOWN: usize = 8;
 
-/// What the file has of faces.
-fn without_wires(scene: &Scene) -> Scene {
-    let is_wire = |mesh: u32| scene.meshes.get(mesh as usize).is_some_and(|mesh| mesh.is_wire);
-    let instances = scene.instances.iter().filter(|place| !is_wire(place.mesh)).cloned().collect();
-    Scene { meshes: scene.meshes.clone(), instances, ..Scene::default() }
-}
-
 impl<'a> Report<'a> {
     /// Looks the scene through, which is placed as rendering does it; builds the structure that rendering would, to know its
     /// size. Instances are each stored by themselves for a while where that takes no more than `limit` bytes.
     pub(super) fn new(file: &'a Path, loaded: &'a Loaded, world: World, limit: u64) -> Self {
         let scene = &loaded.scene;
         let topology = match World::flattened_bytes(scene) <= limit {
-            true if scene.meshes.iter().any(|mesh| mesh.is_wire) => {
-                Topology::of(&World::new(&without_wires(scene)).shapes)
-            }
-            true if world.kept.is_empty() => Topology::of(&world.shapes),
-            true => Topology::of(&World::new(scene).shapes),
-            false => Topology::by_object(&world),
+            true if world.kept.is_empty() => Topology::of(scene, &world),
+            true => Topology::of(scene, &World::new(scene)),
+            false => Topology::by_object(scene, &world),
         };
         let structure = world.structure(AccelChoice::Auto, &AccelParams::DEFAULT).0.summary();
         Self {
@@ -373,6 +363,17 @@ mod tests {
         assert_eq!((&report["topology"]["edges"], &report["topology"]["open"]), (&5.into(), &4.into()));
         assert_eq!(report["bounds"]["hi"], serde_json::json!([2.0, 1.0, 6.0]));
         assert_eq!(report["lights"][0], serde_json::json!({ "name": "lamp", "kind": "point" }));
+    }
+
+    #[test]
+    fn points_and_lines_have_no_faces_of_the_file() {
+        let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 5 5\nv 6 5 5\nf 1 2 3\np 4\nl 4 5\n";
+        let loaded = load_bytes(Path::new("a.obj"), obj.into(), &LoadOptions::default()).unwrap();
+        for limit in [u64::MAX, 1] {
+            let report = report(&loaded, limit);
+            assert_eq!((report.topology.edges, report.topology.open, report.topology.non_manifold), (3, 3, 0));
+            assert!(report.text().contains("with the width of points and lines"), "{}", report.text());
+        }
     }
 
     #[test]

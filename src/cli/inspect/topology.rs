@@ -2,7 +2,8 @@
 
 use crate::accel::Shapes;
 use crate::math::Vec3;
-use crate::render::World;
+use crate::render::{PrimSource, World};
+use crate::scene::Scene;
 
 /// Counts over all faces of a scene, as they stand in the world.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -25,13 +26,27 @@ pub(super) struct Topology {
 
 impl Topology {
     /// Looks at what is stored alone: of scenes that would take too much memory were each instance stored by itself.
-    pub(super) fn by_object(world: &World) -> Self {
+    pub(super) fn by_object(scene: &Scene, world: &World) -> Self {
         let mut times = vec![0; world.kept.objects().len()];
-        world.kept.placed().iter().for_each(|placed| times[placed.object as usize] += 1);
-        let objects = world.kept.objects().iter().zip(times);
-        let objects = objects.map(|(object, times)| Self::of(object.shapes()).times(times));
-        let all = objects.fold(Self::of(&world.shapes), Self::plus);
+        let placed = world.kept.placed().iter().filter(|placed| !is_wire(scene, world, placed.first));
+        placed.for_each(|placed| times[placed.object as usize] += 1);
+        let objects = world.kept.objects().iter().zip(times).filter(|(_, times)| *times > 0);
+        let objects = objects.map(|(object, times)| Self::of_faces(object.shapes(), |_| true).times(times));
+        // Beside what is kept once, what is stored has other numbers.
+        let stored = match world.kept.is_empty() {
+            true => Self::of(scene, world),
+            false => Self::of_faces(&world.shapes, |_| true),
+        };
+        let all = objects.fold(stored, Self::plus);
         Self { by_object: true, ..all }
+    }
+
+    /// Looks at the faces of a scene each instance of which is stored by itself; points and lines have none.
+    pub(super) fn of(scene: &Scene, world: &World) -> Self {
+        if !scene.meshes.iter().any(|mesh| mesh.is_wire) {
+            return Self::of_faces(&world.shapes, |_| true);
+        }
+        Self::of_faces(&world.shapes, |prim| !is_wire(scene, world, prim))
     }
 
     fn times(self, n: u64) -> Self {
@@ -58,10 +73,10 @@ impl Topology {
         }
     }
 
-    /// Looks at the triangles and polygons of `shapes`.
-    pub(super) fn of(shapes: &Shapes) -> Self {
+    /// Looks at the triangles and polygons of `shapes`: of triangles at those that are `wanted`, by number.
+    fn of_faces(shapes: &Shapes, wanted: impl Fn(u32) -> bool) -> Self {
         let corner = weld(&shapes.vertices);
-        let triangles = shapes.triangles.iter().map(|t| t.to_vec());
+        let triangles = (0..).zip(&shapes.triangles).filter(|(prim, _)| wanted(*prim)).map(|(_, t)| t.to_vec());
         let polygons = shapes.polygons.iter().map(|&(first, len)| {
             let (first, len) = (first as usize, len as usize);
             shapes.polygon_corners.get(first..first + len).unwrap_or_default().to_vec()
@@ -98,6 +113,14 @@ impl Topology {
     }
 }
 
+/// Whether a prim is a part of a point or a line, which the file has no faces for.
+fn is_wire(scene: &Scene, world: &World, prim: u32) -> bool {
+    match world.source(prim) {
+        PrimSource::Triangle { instance, .. } => scene.meshes[scene.instances[instance as usize].mesh as usize].is_wire,
+        _ => false,
+    }
+}
+
 /// For each vertex the lowest one in the same place; −0 and 0 are the same place.
 fn weld(vertices: &[Vec3]) -> Vec<u32> {
     let key = |v: u32| (vertices[v as usize] + Vec3::ZERO).to_array().map(f32::to_bits);
@@ -124,7 +147,7 @@ mod tests {
 
     #[test]
     fn a_tetrahedron_is_closed() {
-        let found = Topology::of(&shapes(&TETRA, &[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]));
+        let found = Topology::of_faces(&shapes(&TETRA, &[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]), |_| true);
         assert_eq!(found, Topology { corners: 4, edges: 6, ..Topology::default() });
     }
 
@@ -132,13 +155,13 @@ mod tests {
     fn faces_that_share_no_vertex_hang_together_where_positions_are_equal() {
         let mut vertices = TETRA.to_vec();
         vertices.extend([[-0.0, 0.0, 0.0], [1.0, -0.0, 0.0], [0.0, 0.0, 1.0]]);
-        let found = Topology::of(&shapes(&vertices, &[[0, 2, 1], [4, 5, 6]]));
+        let found = Topology::of_faces(&shapes(&vertices, &[[0, 2, 1], [4, 5, 6]]), |_| true);
         assert_eq!((found.corners, found.edges, found.open), (4, 5, 4));
     }
 
     #[test]
     fn a_third_face_on_an_edge_and_a_repeated_face_are_found() {
-        let found = Topology::of(&shapes(&TETRA, &[[0, 1, 2], [0, 1, 3], [1, 0, 2], [2, 2, 3]]));
+        let found = Topology::of_faces(&shapes(&TETRA, &[[0, 1, 2], [0, 1, 3], [1, 0, 2], [2, 2, 3]]), |_| true);
         assert_eq!((found.non_manifold, found.duplicates, found.degenerate), (1, 1, 1));
     }
 }

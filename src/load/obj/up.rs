@@ -59,11 +59,12 @@ fn said(comment: &str) -> Option<UpAxis> {
     let text = comment.to_lowercase();
     let words: Vec<&str> = text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
     let says = |axis: &str| {
-        let joined = format!("{axis}up");
+        let joined = [format!("{axis}up"), format!("upaxis{axis}"), format!("axis{axis}")];
         let at = |words: &[&str]| match words {
+            ["up", a, ..] if *a == joined[2] => true,
             [a, "up", ..] if *a == axis => true,
             ["up", "axis", a, ..] | ["upaxis", a, ..] | ["up", "is", a, ..] if *a == axis => true,
-            [a, ..] => *a == joined,
+            [a, ..] => joined[..2].iter().any(|joined| a == joined),
             [] => false,
         };
         (0..words.len()).any(|start| at(&words[start..]))
@@ -151,7 +152,9 @@ mod tests {
         assert_eq!(up(&["Exported, Up Axis: Z"], &pyramid(1)), UpAxis::Z);
         assert_eq!(up(&["y-up"], &pyramid(2)), UpAxis::Y);
         assert_eq!(up(&["+Y_UP"], &pyramid(2)), UpAxis::Y);
-        assert_eq!(up(&["zUp"], &pyramid(1)), UpAxis::Z);
+        for said in ["zUp", "UpAxisZ", "up_axisZ", "up-axis=Z", "Z is... up: +Z-up"] {
+            assert_eq!(up(&[said], &pyramid(1)), UpAxis::Z, "{said}");
+        }
         assert_eq!(up(&["FreeCAD v0.21"], &pyramid(1)), UpAxis::Z);
         assert_eq!(up(&["Created by Upton, FreeCAD"], &pyramid(1)), UpAxis::Z);
         for name in ["body_copy_updated", "battery-upper-case", "key up", "Exported by UP Studio"] {

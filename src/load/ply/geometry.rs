@@ -18,14 +18,18 @@ pub(super) fn read(header: &Header, source: &Source, budget: &mut Budget) -> Res
     let vertices = header.element("vertex").map_or(0, |element| element.count);
     let mut reader = Reader { source, body, vertices, budget, bare: Bare::default(), torn: None };
     for element in &header.elements {
-        reader.element(element)?;
+        if let Err(fault) = reader.element(element) {
+            // What makes no sense may come of a line far before it.
+            return Err(reader.torn.take().unwrap_or(fault));
+        }
     }
     let Reader { body, mut bare, torn, .. } = reader;
     let behind = body.behind();
     bare.places = (header.encoding == Encoding::Text).then_some(body.places);
     bare.comments.clone_from(&header.comments);
     bare.told = passed_over(header, &source.path);
-    bare.told.extend(torn);
+    // Rows may share lines; where they do by mistake, numbers are left in the end.
+    bare.told.extend(torn.filter(|_| behind.is_some()));
     bare.told.extend(behind);
     bare.told.extend(body.respelled.told("ply-number", &source.path));
     Ok(bare)
@@ -55,11 +59,14 @@ fn passed_over(header: &Header, file: &Path) -> Vec<Diagnostic> {
         let text = "Gaussian splats are drawn as points of their colours, opaque and of one size".into();
         told.push(warning("ply-splats", text, "--line-width sets the size"));
     }
-    let is_read = |name: &str| matches!(name, "vertex" | "tristrips" | "edge");
-    for element in header.elements.iter().filter(|element| element.count > 0 && !is_read(&element.name)) {
-        // Numbers of vertices under other names; faces have them under one of two.
-        let list = element.properties.iter().find(|property| property.length.is_some_and(|_| property.kind.is_whole()));
-        let Some(list) = list.filter(|_| element.name != "face" || list_of(element).is_none()) else { continue };
+    let is_read = |element: &Element| match element.name.as_str() {
+        "face" | "tristrips" => list_of(element).is_some(),
+        name => name == "vertex",
+    };
+    for element in header.elements.iter().filter(|element| element.count > 0 && !is_read(element)) {
+        // Numbers of vertices, under other names.
+        let mut lists = element.properties.iter().filter(|property| property.length.is_some());
+        let Some(list) = lists.find(|list| list.kind.is_whole()) else { continue };
         let (name, list) = (shorten(&element.name), shorten(&list.name));
         let text = format!("element `{name}` ({}) with a list `{list}` is not read", element.count);
         let remedy = "faces are those of an element `face` with a list `vertex_indices`";
@@ -312,10 +319,15 @@ impl Reader<'_, '_> {
         corners.clear();
         for k in 0..self.length(element, i, property)? {
             let value = self.value(element, i, property)?;
-            // Where numbers have no sign, −1 is the greatest of them.
-            let ends = value == -1.0 || property.kind == Kind::U32 && value == f64::from(u32::MAX);
-            let ends = ends || property.kind == Kind::U16 && value == f64::from(u16::MAX) && self.vertices <= 0xffff;
-            if strips && ends {
+            // Where numbers have no sign, −1 is the greatest of them, if no vertex is.
+            let greatest = match property.kind {
+                Kind::U8 => f64::from(u8::MAX),
+                Kind::U16 => f64::from(u16::MAX),
+                Kind::U32 => f64::from(u32::MAX),
+                _ => -1.0,
+            };
+            let is_end = value == -1.0 || value == greatest && value >= self.vertices as f64;
+            if strips && is_end {
                 corners.push(RESTART);
                 continue;
             }

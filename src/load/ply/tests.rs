@@ -401,15 +401,18 @@ fn what_two_properties_say_is_what_the_first_says_and_the_other_is_told() {
 fn a_line_that_has_not_the_numbers_of_its_row_is_named() {
     let header = TRIANGLE.replace("vertex 3", "vertex 5");
     let told = |vertices: &str| -> Vec<String> {
-        let file = format!("ply\nformat ascii 1.0\n{header}{vertices}\n3 0 1 2\n3 0 1 2\n");
+        let file = format!("ply\nformat ascii 1.0\n{header}{vertices}\n3 0 1 2\n");
         plain(file.as_bytes()).warnings.iter().filter(|w| w.code == "ply-torn-line").map(ToString::to_string).collect()
     };
     assert_eq!(told("0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1"), [""; 0]);
     let fewer = told("0 0 0\n1 0 0\n0 1\n0 0 1\n1 1 1");
     let wrong = "so that all behind it are read from wrong places; repair that line";
     assert_eq!(fewer, [format!("a.ply:12: vertex 2 has fewer numbers than the header says, {wrong}")]);
-    let more = told("0 0 0\n1 0 0\n0 1 0 7\n0 0 1\n1 1");
+    let more = told("0 0 0\n1 0 0\n0 1 0 7\n0 0 1\n1 1 1");
     assert_eq!(more, [format!("a.ply:12: vertex 2 has more numbers than the header says, {wrong}")]);
+    assert_eq!(told("0 0 0\n1 0 0\n0 1 0 0 0 1\n1 1 1"), [""; 0], "two rows in a line");
+    let lost = fault(format!("ply\nformat ascii 1.0\n{header}0 0 0\n1 0 0\n0 1\n0 0 1\n1 1 1\n3 9 1 2\n").as_bytes());
+    assert!(lost.starts_with("a.ply:12: vertex 2 has fewer numbers"), "{lost}");
 }
 
 #[test]
@@ -428,7 +431,7 @@ fn faces_under_names_that_are_not_known_are_told() {
 
 #[test]
 fn strips_of_numbers_without_sign_end_at_the_greatest() {
-    for (kind, end) in [("uint", "4294967295"), ("ushort", "65535"), ("int", "-1")] {
+    for (kind, end) in [("uint", "4294967295"), ("ushort", "65535"), ("uchar", "255"), ("int", "-1")] {
         let header = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement tristrips 1\n";
         let file = format!(
             "ply\nformat ascii 1.0\n{header}property list int {kind} vertex_indices\nend_header\n\

@@ -69,7 +69,11 @@ impl Ground for StripPoint<'_> {
         Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude, sample }
     }
 
-    fn origin(&self, dir: Vec3) -> Vec3 {
-        leave(&self.strip.found, self.i, dir)
+    fn set_off(&self, dir: Vec3) -> [Vec3; 2] {
+        [leave(&self.strip.found, self.i, dir), get(&self.strip.found.position, self.i)]
+    }
+
+    fn excluded(&self) -> u32 {
+        self.strip.given.faces.prims()[self.i]
     }
 }

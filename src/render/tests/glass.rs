@@ -3,7 +3,7 @@
 use super::*;
 use crate::math::Vec4;
 use crate::render::optics;
-use crate::scene::{Environment, MetalRough};
+use crate::scene::{AlphaMode, Environment, MetalRough};
 
 fn glass(ior: f32) -> Material {
     material(Vec3::ZERO, Phong { transmission: Vec3::ONE, ior, ..phong() })
@@ -361,6 +361,43 @@ fn what_touches_glass_from_behind_is_seen_whichever_comes_first_in_the_file() {
         }
         assert_eq!(s.color(), Vec3::new(1.0, 0.5, 0.25), "glass first: {glass_first}");
         assert_eq!(s.render_by(AccelKind::DEFAULT).picture, s.render().picture);
+    }
+}
+
+#[test]
+fn a_table_under_a_glass_is_seen_all_over_a_picture_by_points_and_by_strips_of_them() {
+    let mut s = stage(View::look_at(DVec3::new(1.0, -4.0, 6.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.3)));
+    (s.settings.width, s.settings.height) = (24, 16);
+    let slab = s.add_material(glass(1.5));
+    for (at, is_top) in [(0.0, true), (-1.0, false)] {
+        if is_top {
+            s.square(at, 9.0, Material::default()).scene.meshes[0].material = slab
+        } else {
+            lower(&mut s, at, slab)
+        }
+    }
+    s.square(-1.0, 9.0, unlit(Vec3::new(1.0, 0.5, 0.25)));
+    let picture = s.render().picture;
+    assert!(picture.beauty.iter().all(|pixel| *pixel == [1.0, 0.5, 0.25, 1.0]), "{:?}", picture.beauty);
+    assert_eq!(s.render_by(AccelKind::DEFAULT).picture, picture);
+}
+
+#[test]
+fn what_is_painted_on_glass_is_seen_once_whichever_comes_first_in_the_file() {
+    for (label_first, apart) in [(true, 0.0), (false, 0.0), (true, 0.01)] {
+        let mut s = aslant(30.0);
+        let label = Material { opacity: 0.5, alpha_mode: AlphaMode::Blend, ..unlit(Vec3::X) };
+        if label_first {
+            s.square(apart, 9.0, label.clone());
+        }
+        s.square(0.0, 9.0, glass(1.5));
+        let slab = s.scene.materials.len() as u32 - 1;
+        lower(&mut s, -1.0, slab);
+        if !label_first {
+            s.square(apart, 9.0, label);
+        }
+        s.square(-3.0, 9.0, unlit(Vec3::Z));
+        assert_eq!(s.color(), Vec3::new(0.5, 0.0, 0.5), "label first: {label_first}, {apart} apart");
     }
 }
 
