@@ -55,3 +55,24 @@ impl Pruning {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_one_pass_shows_is_told_as_such_and_a_loss_is_no_saving() {
+        let of = |usual: &[f64], everything: &[f64]| {
+            let spread = |times: &[f64]| {
+                let mut spread = Spread::default();
+                times.iter().for_each(|&seconds| spread.push(seconds));
+                spread
+            };
+            Pruning { usual: spread(usual), everything: spread(everything), same: true }.sentence()
+        };
+        let saved = of(&[1.0, 1.0, 1.0], &[4.0, 4.0, 4.0]);
+        assert!(saved.contains("saves 75 %") && saved.contains("medians of 3 interleaved"), "{saved}");
+        let lost = of(&[3.0], &[2.0]);
+        assert!(lost.contains("saves nothing that can be told") && lost.contains("one pass only"), "{lost}");
+    }
+}

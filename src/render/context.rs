@@ -9,7 +9,6 @@ use super::sampling::Sampling;
 use super::shade::{Band, LocalLight, bands};
 use super::sky::Sky;
 use super::strip::Common;
-use super::surface::Target;
 use super::texture::TextureStore;
 use super::world::World;
 use crate::accel::shapes::Prim;
@@ -167,7 +166,7 @@ impl<'a> Context<'a> {
 
     /// A prim and its material.
     pub(super) fn face(&self, prim: u32) -> (Prim<'_>, u32) {
-        (self.world.prim(prim), Target::new(self.scene, self.world, prim).material_id)
+        (self.world.prim(prim), self.world.material(self.scene, prim))
     }
 
     /// Shadow rays to each wide light after so many bounces: what mirrors show needs no more than a hint of soft edges.

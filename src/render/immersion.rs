@@ -15,7 +15,7 @@ const FACES: usize = 256;
 /// The substances around the eye of a view, where any have an inside: those that are left without having been entered,
 /// whichever way one goes. Panes without an inside are so left on some ways only.
 pub(super) fn media_around<A: Accel>(context: &Context, accel: &A, view: &View) -> Media {
-    if !context.absorption.is_some() && !context.scene.materials.iter().any(has_inside) {
+    if !context.scene.materials.iter().any(has_inside) {
         return Media::default();
     }
     let mut scratch = accel.scratch();

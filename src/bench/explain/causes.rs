@@ -189,8 +189,8 @@ fn depth(case: &Case) -> Option<Suspect> {
         (false, true) => "bent",
         (false, false) => "let through",
     };
-    (is_clear || features.has(Feature::Mirrors)).then_some(())?;
-    (case.settings.depth.is_none_or(|depth| depth > SHALLOW)).then(|| Suspect {
+    let goes_on = is_clear || features.has(Feature::Mirrors);
+    (goes_on && case.settings.depth.is_none_or(|depth| depth > SHALLOW)).then(|| Suspect {
         cause: Cause::Depth,
         evidence: format!("rays are {how} again and again"),
         remedy: format!("--depth {SHALLOW}"),

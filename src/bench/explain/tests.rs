@@ -218,6 +218,7 @@ fn glass_in_glass_is_found() {
     let parts = (0..4).map(|i| (ball(Vec3::ZERO, 1.0 - 0.2 * i as f32, 16), glass.clone())).collect();
     let found = assert_is_explained_by(&case(scene(parts), AccelKind::FastBvh), Cause::Depth);
     assert_eq!(found.remedy, "--depth 2");
+    assert_eq!(found.evidence, "rays are mirrored and bent again and again");
 }
 
 #[test]

@@ -185,6 +185,13 @@ mod tests {
     }
 
     #[test]
+    fn what_is_not_nothing_is_not_told_as_nothing() {
+        let told = |rmse: f64, least: f64| Error { rmse, least, ..error(&reference(0.0), &[all(0.5)]) }.told(4);
+        assert_eq!([told(0.012_34, 0.0), told(0.0, 0.0), told(1e-6, 0.0)], ["0.0123", "0.0000", "1.0e-6"]);
+        assert_eq!([told(0.0, 0.002), told(0.0, 2.5e-9)], ["<0.0020", "<2.5e-9"]);
+    }
+
+    #[test]
     fn a_reference_that_is_off_makes_no_error_smaller_than_how_far_pictures_lie_apart() {
         let found = error(&reference(0.2), &[all(0.4), all(0.6)]);
         assert!((found.rmse - 0.1).abs() < 1e-12, "{}", found.rmse);

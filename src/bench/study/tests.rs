@@ -78,6 +78,12 @@ fn more_samples_are_nearer_to_the_reference_and_what_is_the_same_each_time_is_bi
     assert!(off.noise == 0.0 && (off.bias - off.rmse).abs() < 1e-12 && off.max > off.rmse && off.flip > 0.0);
     let random = row(&study, "--pixel-error 0.04").error;
     assert!(random.noise > random.bias && random.rmse < 0.04, "{random:?}");
+    // What is measured is what the flag alone gives.
+    let most = Quality::default().stochastic().max_samples;
+    let rows: Vec<&Row> = study.rows.iter().filter(|row| row.setting.knob == Knob::Stochastic).collect();
+    let is_usual =
+        |row: &&Row| matches!(row.setting.settings.sampling, Sampling::Stochastic(how) if how.max_samples == most);
+    assert!(rows.len() == 4 && rows.iter().all(is_usual));
 }
 
 #[test]

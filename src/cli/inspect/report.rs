@@ -1,6 +1,6 @@
 //! The findings of `meshray inspect`, gathered once and shown twice: as text and as JSON.
 
-use super::super::text::grouped;
+use super::super::text::{grouped, so_many};
 use super::topology::Topology;
 use crate::accel::{AccelChoice, AccelParams};
 use crate::load::{AnimationFacts, Loaded, WireFacts};
@@ -98,8 +98,7 @@ impl<'a> Report<'a> {
             (0, _) => String::new(),
             (meshes, instances) => {
                 let plural = if meshes == 1 { "mesh" } else { "meshes" };
-                let place = if instances == 1 { "place" } else { "places" };
-                format!(": {} {plural} in {} {place}", grouped(meshes), grouped(instances))
+                format!(": {} {plural} in {}", grouped(meshes), so_many(instances, "place"))
             }
         };
         lines.add("objects", format!("{}{placed}", grouped(meshes.1 + solids)));
