@@ -41,20 +41,31 @@ impl Points {
         let mut around = Around { walked, corners, seams, left: steps };
         for (vertex, &corner) in walked.vertex_corners.iter().enumerate().filter(|(_, c)| usize::from(**c) != NONE) {
             let first = around.first(vertex, corner)?;
-            let mut at = Some(first);
+            let (mut at, mut before) = (Some(first), None);
             while let Some(corner) = at {
-                points.add(around.point(corner)?)?;
-                at = around.next(corner)?.filter(|&next| next != first);
+                let point = around.point(corner)?;
+                // Where a seam ends at a vertex nothing changes there, and the library makes two points of one.
+                let same = match before {
+                    Some(before) => around.is_same(before, point)?.then_some(before),
+                    None => None,
+                };
+                points.add(point, same)?;
+                (at, before) = (around.next(corner)?.filter(|&next| next != first), Some(point));
             }
         }
         let met = |&corner: &u32| points.number.get(corner as usize).is_some_and(|&number| number != u32::MAX);
         corners.iter().all(met).then_some(points)
     }
 
-    fn add(&mut self, point: u32) -> Option<()> {
+    /// Numbers a point, if it has none, as one before it that is the `same`, or as the next.
+    fn add(&mut self, point: u32, same: Option<u32>) -> Option<()> {
+        let known = same.and_then(|same| self.number.get(same as usize)).copied();
         let number = self.number.get_mut(point as usize)?;
-        if *number == u32::MAX {
-            *number = self.shown.len() as u32;
+        if *number != u32::MAX {
+            return Some(());
+        }
+        *number = known.unwrap_or(self.shown.len() as u32);
+        if known.is_none() {
             self.shown.push(point);
         }
         Some(())
@@ -102,5 +113,14 @@ impl Around<'_> {
 
     fn value(&self, seam: usize, corner: CornerIdx) -> Option<u32> {
         self.seams.get(seam)?.1.get(self.point(corner)? as usize).copied()
+    }
+
+    /// Whether two points of a vertex have the same values.
+    fn is_same(&self, one: u32, other: u32) -> Option<bool> {
+        let mut same = true;
+        for (_, values) in &self.seams {
+            same &= values.get(one as usize)? == values.get(other as usize)?;
+        }
+        Some(same)
     }
 }

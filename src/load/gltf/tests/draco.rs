@@ -30,6 +30,13 @@ const ROW: &str = "RFJBQ08CAgEAAAAMGAEAAgEAAwIEBQYEBgcICgkICwoMDQ4MDg8QEhEQExIUF
     AAAAAAAAAAAAAIA/AAEBAQEEASwDrRBVAxBCZNo8DNEzYaCu4e8cS5GAAAAAAAMAAAAAAQEBAQMdJ1UNkQsP2VFw4/C6Q9lWflwjCUeAAAAAAP8P\
     AAAAAAC/AAAAvwAAAL8AAIA/DA==";
 
+/// Four squares of the plane around the origin; towards −x there is a seam of texture coordinates, towards +x one of normals,
+/// and both end in the middle.
+const SEAMS: &str = "RFJBQ08CAgEBAAAACQgCCAIAA3/aB/8BEeADAD2B4APgOYEDAAEAAQEA/wAAAQMJAgEAAAEBCQMAAQABAAkDAAICAAAAPwAAAD8AAAAAAAAAPwAAAAAAAAAA\
+    AAAAPwAAAAAAAIA/AAAAPwAAgD8AAAAAAACAPwAAgD8AAAA/AACAPwAAQEAAAAA/AAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAA\
+    gD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD9DH5M+AAAAABo0dT8BAQEA\
+    DwOtKi9VFQMqYkz///9vZvz/AECZAQD8/wAAAAAAAAAA/z8AAAAAgL8AAIC/zczMvQAAAEAO";
+
 /// The numbers of the attributes in these streams, with the accessors that a file needs for them.
 const ATTRIBUTES: &[(&str, u32, u32, &str, bool)] = &[
     ("POSITION", 13, 5126, "VEC3", false),
@@ -239,5 +246,30 @@ fn vertices_are_numbered_as_by_the_encoder_of_the_format() {
         decode(&stream(WALK), ComponentType::U16, &[joints.clone(), colors, joints]).unwrap();
     let vertices = attributes[0].as_chunks::<4>().0.iter().map(|[a, b, c, _]| format!("{a}{b}{c}"));
     assert_eq!(vertices.collect::<Vec<_>>().join(" "), VERTICES);
+    assert_eq!(indices, INDICES.map(u16::to_le_bytes).concat());
+}
+
+/// A seam that ends at a vertex does not part its corners, nor do two of different attributes.
+#[test]
+fn seams_that_end_at_one_vertex_leave_it_whole() {
+    // As Google's decoder gives them.
+    const PLACES: [[f32; 2]; 11] = [
+        [-1.0, -1.0],
+        [0.0, 0.0],
+        [-1.0, 0.0],
+        [-1.0, 0.0],
+        [-1.0, 1.0],
+        [0.0, 1.0],
+        [1.0, 1.0],
+        [1.0, 0.0],
+        [1.0, 0.0],
+        [1.0, -1.0],
+        [0.0, -1.0],
+    ];
+    const INDICES: [u16; 24] = [0, 1, 3, 4, 2, 5, 2, 1, 5, 5, 1, 6, 6, 1, 8, 9, 7, 10, 7, 1, 10, 1, 0, 10];
+    let positions = Wanted { id: 2, name: String::new(), component: ComponentType::F32, width: 3, count: 11 };
+    let Output { attributes, indices } = decode(&stream(SEAMS), ComponentType::U16, &[positions]).unwrap();
+    let floats: Vec<f32> = attributes[0].as_chunks::<4>().0.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect();
+    assert!(floats.as_chunks::<3>().0.iter().map(|&[x, y, _]| [x.round(), y.round()]).eq(PLACES));
     assert_eq!(indices, INDICES.map(u16::to_le_bytes).concat());
 }
