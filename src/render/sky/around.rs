@@ -19,7 +19,7 @@ use crate::render::context::Context;
 use crate::render::draws::Draws;
 use crate::render::observer::Observer;
 use crate::render::optics::reflect;
-use crate::render::shade::Matter;
+use crate::render::shade::{Matter, above};
 use crate::render::shadow::{Bound, Shadows};
 use crate::render::wave::Media;
 use std::f32::consts::PI;
@@ -99,13 +99,9 @@ impl Arounds {
             for k in 0..half {
                 let way = ways.iter().flatten().nth((k % count) as usize).unwrap_or(&Way::Cosine);
                 let dir = way.draw(spread.point(k), &context.sky, &view);
-                let is_behind = dir.dot(seen.geometric) <= 0.0;
                 // Normals and the face itself may not agree on the side.
-                let is_lost = if behind.is_some() { is_behind != (dir.dot(seen.normal) <= 0.0) } else { is_behind };
-                if is_lost {
-                    self.shares.push(Vec3::ZERO);
-                    continue;
-                }
+                let side =
+                    if behind.is_some() && dir.dot(seen.normal) <= 0.0 { -seen.geometric } else { seen.geometric };
                 let (radiance, drawn) = context.sky.drawn(dir);
                 let density = |(i, way): (u32, &Way)| {
                     let rays = half / count + u32::from(i < half % count);
@@ -116,7 +112,7 @@ impl Arounds {
                 let share = shown * point.weight / (2.0 * density);
                 let share = if share.is_finite() { share } else { Vec3::ZERO };
                 if share.max_element() > 0.0 {
-                    let ray = point.surface.ray(dir, point.ray.sample);
+                    let ray = point.surface.ray(above(dir, side), point.ray.sample);
                     #[expect(clippy::cast_possible_truncation, reason = "few shares wait, see AROUND_LIMIT")]
                     let light = Bound { radiance: share, tag: self.shares.len() as u32 };
                     self.shadows.push_bound(ray, light, point.media);

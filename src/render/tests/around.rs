@@ -61,6 +61,33 @@ fn a_closed_room_is_dark() {
     assert_eq!(s.color(), Vec3::ZERO);
 }
 
+/// A square whose normals lean so far that a part of what they look at lies below it, in a black ball that a plane may close.
+fn leaning(shut_in: bool, samples: u32, env_rays: u32) -> Stage {
+    let mut s = looking_down(0.5);
+    s.view = View::look_at(DVec3::Z * 0.5, DVec3::ZERO, DVec3::Y, Lens::orthographic(0.01));
+    let normals = vec![Vec3::new(0.9, 0.0, 0.3).normalize(); 4];
+    let leaning = Mesh { normals, ..square(0.0, 1.0) };
+    s.mesh(leaning, DAffine3::IDENTITY, material(Vec3::ONE, phong()));
+    let (at, radius) = if shut_in { (DVec3::ZERO, 9.0) } else { (DVec3::new(2.0, 0.0, 1.0), 1.0) };
+    s.sphere(at, radius, unlit(Vec3::ZERO));
+    s.scene.environment = Environment::Constant(Vec3::ONE);
+    (s.settings.samples, s.settings.env_rays) = (samples, Some(env_rays));
+    s
+}
+
+#[test]
+fn normals_that_lean_beyond_a_face_let_no_light_in_through_it() {
+    for (samples, env_rays) in [(1, 2), (64, 2), (16, 4), (4, 16)] {
+        assert_eq!(leaning(true, samples, env_rays).color(), Vec3::ZERO, "{samples} × {env_rays}");
+    }
+    // However many rays a sample has, all together see the same.
+    let many = leaning(false, 64, 256).color();
+    assert!((0.3..0.9).contains(&many.x), "{many}");
+    for (samples, env_rays) in [(8192, 2), (4096, 4), (1024, 16)] {
+        assert_near(leaning(false, samples, env_rays).color(), many, 0.02);
+    }
+}
+
 #[test]
 fn the_sun_of_a_panorama_throws_a_shadow() {
     let (panorama, irradiance) = sun();
