@@ -312,7 +312,9 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
                 tracer.reflect_and_refract(point, &point.crossing(context, point.path.band));
             });
         } else if shiny && context.depth > 0 {
-            strip.mirror(context, matter, traced, &mut self.starting[RayClass::Reflected as usize]);
+            let (roulette, streams) = (self.roulette, &self.streams);
+            let goes_on = |sample, path| roulette.spin(streams, sample, path);
+            strip.mirror(context, matter, traced, (goes_on, &mut self.starting[RayClass::Reflected as usize]));
         }
     }
 

@@ -252,10 +252,11 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         if !self.context.is_alive(path.weight, part) {
             return;
         }
+        let Some(path) = self.roulette.spin(&self.streams, point.ray.sample, Path { part, ..path }) else { return };
         let angle = rough.lobe.angle(rough.rays) * self.context.gloss.width;
         let (cone_spread, scattered) = (path.cone_spread + angle, path.scattered + angle);
         let (ray, after) = point.start(class, dir);
-        self.starting[class as usize].push(ray, Path { part, cone_spread, scattered, ..path }, after);
+        self.starting[class as usize].push(ray, Path { cone_spread, scattered, ..path }, after);
     }
 
     /// Queues what lacquer mirrors.
@@ -283,9 +284,10 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         if !self.context.is_alive(weight, point.path.part) {
             return;
         }
+        let path = Path { band, ..point.bounced(self.context, weight, MIRROR).turned(RayClass::Reflected, 0) };
+        let Some(path) = self.roulette.spin(&self.streams, point.ray.sample, path) else { return };
         let Seen { geometric, view, .. } = point.surface.seen();
         let dir = above(reflect(-view, normal), geometric);
-        let path = Path { band, ..point.bounced(self.context, weight, MIRROR).turned(RayClass::Reflected, 0) };
         let ray = point.surface.ray(dir, point.ray.sample);
         self.starting[RayClass::Reflected as usize].push(ray, path, Hit::MISS);
     }
@@ -299,6 +301,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         if crossing.n_i == crossing.n_t {
             let path = point.path.turned(RayClass::Refracted, turn);
             let path = Path { weight, band, depth: point.path.depth + 1, media: crossing.beyond, ..path };
+            let Some(path) = self.roulette.spin(&self.streams, point.ray.sample, path) else { return };
             return self.continuing[RayClass::Refracted as usize].push(*point.ray, path, *point.hit);
         }
         let Seen { normal, geometric, view, .. } = point.surface.seen();
@@ -312,6 +315,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let turns = (1.0 - crossing.n_i / crossing.n_t).abs();
         let path = point.bounced(self.context, weight, turns).turned(RayClass::Refracted, turn);
         let path = Path { band, media: crossing.beyond, ..path };
+        let Some(path) = self.roulette.spin(&self.streams, point.ray.sample, path) else { return };
         let (ray, after) = point.start(RayClass::Refracted, dir);
         self.starting[RayClass::Refracted as usize].push(ray, path, after);
     }

@@ -43,6 +43,7 @@ pub(crate) enum Purpose {
     Lights,
     Facets,
     Surroundings,
+    Roulette,
 }
 
 impl Draws {
@@ -51,13 +52,18 @@ impl Draws {
     /// these together fill what they sample evenly; `branch` tells the hits of one sample's tree apart.
     pub(crate) fn at(seed: u64, streams: &[Stream], branch: u32, ray: &Ray, hit: &Hit, purpose: Purpose) -> Self {
         if let Some(&stream) = streams.get(ray.sample as usize) {
-            return Self(From::Stream(stream, mix(branch, purpose as u32)));
+            return Self::of(stream, branch, purpose);
         }
         let seed = if purpose == Purpose::Lights { !seed } else { seed };
         let words = ray.origin.to_array().into_iter().chain(ray.dir.to_array()).chain([hit.t, hit.u, hit.v]);
         let start = seed ^ u64::from(hit.prim);
         let mixed = words.fold(start, |mixed, word| Random::new(mixed ^ u64::from(word.to_bits())).bits());
         Self(From::Hit(Random::new(mixed)))
+    }
+
+    /// Those of a sample's place in its stream.
+    pub(crate) fn of(stream: Stream, branch: u32, purpose: Purpose) -> Self {
+        Self(From::Stream(stream, mix(branch, purpose as u32)))
     }
 
     /// A sequence that is independent of those taken before, for so many points.

@@ -34,6 +34,7 @@ mod part;
 mod patch;
 mod pixel;
 mod profile;
+mod roulette;
 mod sampling;
 mod seam;
 mod shade;

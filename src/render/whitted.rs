@@ -18,6 +18,7 @@ use super::eyes::Eyes;
 use super::glint;
 use super::layers::Facts;
 use super::observer::Observer;
+use super::roulette::Roulette;
 use super::shade::{Incident, LocalLight, Matter, Reader};
 use super::shadow::Shadows;
 use super::sky::{Arounds, Standpoint};
@@ -84,6 +85,8 @@ pub(crate) struct Tracer<'a, A: Accel, P> {
     pub samples: Vec<Sample>,
     /// The place of each sample among those of its pixel; empty where only rays decide random choices.
     pub streams: Vec<Stream>,
+    /// Which branches go on by chance.
+    pub roulette: Roulette,
     /// Facts of the first surface of each sample; empty unless layers are wanted.
     pub facts: Vec<Facts>,
     pub counts: ByClass<P>,
@@ -103,6 +106,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             arounds: Arounds::default(),
             samples: Vec::new(),
             streams: Vec::new(),
+            roulette: Roulette::default(),
             facts: Vec::new(),
             counts: ByClass::default(),
         }
@@ -121,6 +125,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         self.arounds.clear();
         self.eyes.clear();
         self.streams.clear();
+        self.roulette = Roulette::default();
         self.samples.clear();
         self.samples.resize(samples, Sample::default());
         self.facts.clear();
@@ -319,7 +324,9 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let class = if covered > 0.0 { RayClass::Refracted } else { class };
         if self.context.is_alive(weight, path.part) {
             let path = Path { weight, ..path.turned(class, ON) };
-            self.continuing[class as usize].push(*ray, path, *hit);
+            if let Some(path) = self.roulette.spin(&self.streams, ray.sample, path) {
+                self.continuing[class as usize].push(*ray, path, *hit);
+            }
         }
     }
 

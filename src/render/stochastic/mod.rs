@@ -17,6 +17,7 @@ use super::certainty::{Certainty, GROUPS, SURE, output};
 use super::frame::Frame;
 use super::layers::LayerPixel;
 use super::observer::Observer;
+use super::roulette::Roulette;
 use super::sampling::Stochastic;
 use super::tile::{End, PixelFacts, TOGETHER, Tile, TilePixels};
 use super::whitted::Tracer;
@@ -236,6 +237,7 @@ impl<'a> Sampler<'a> {
         if samples.start as usize >= GROUPS {
             active.iter().for_each(|&pixel| pixels[pixel].join_groups());
         }
+        let first = samples.start;
         let in_group = (samples.end as usize).div_ceil(GROUPS);
         for some in active.chunks((TOGETHER / samples.len().max(1)).max(1)) {
             for start in samples.clone().step_by(TOGETHER) {
@@ -245,7 +247,7 @@ impl<'a> Sampler<'a> {
                     let pixel = &pixels[pixel];
                     samples.clone().map(|i| pixel.wanted(i))
                 });
-                places.trace(self.frame, self.how, tracer, wanted)?;
+                places.trace(self.frame, self.how, tracer, (Roulette::after(first, self.how), wanted))?;
                 for (k, &pixel) in some.iter().enumerate() {
                     let of_pixel = k * each..(k + 1) * each;
                     let facts = tracer.facts.get(of_pixel.clone()).unwrap_or_default();

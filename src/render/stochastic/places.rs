@@ -6,6 +6,7 @@ use crate::render::draws::Stream;
 use crate::render::eyes::Place;
 use crate::render::frame::{Frame, pixel_keys};
 use crate::render::observer::Observer;
+use crate::render::roulette::Roulette;
 use crate::render::sampling::{Filter, Stochastic};
 use crate::render::sobol;
 use crate::render::whitted::Tracer;
@@ -38,7 +39,7 @@ impl Places {
         frame: &Frame,
         how: &Stochastic,
         tracer: &mut Tracer<A, P>,
-        wanted: impl Iterator<Item = Wanted>,
+        (roulette, wanted): (Roulette, impl Iterator<Item = Wanted>),
     ) -> Option<()> {
         self.clear();
         let Self { keys, indices, x, y } = self;
@@ -49,7 +50,7 @@ impl Places {
             x.push(f64::from(pixel.0));
             y.push(f64::from(pixel.1));
         });
-        self.send(frame, how, tracer)
+        self.send(frame, how, roulette, tracer)
     }
 
     /// The same for the first sample of each of the pixels in these columns and rows.
@@ -66,7 +67,7 @@ impl Places {
         indices.resize(keys.len(), 0);
         x.extend(columns.iter().map(|&column| f64::from(column)));
         y.extend(rows.iter().map(|&row| f64::from(row)));
-        self.send(frame, how, tracer)
+        self.send(frame, how, Roulette::default(), tracer)
     }
 
     fn clear(&mut self) {
@@ -80,10 +81,12 @@ impl Places {
         &mut self,
         frame: &Frame,
         how: &Stochastic,
+        roulette: Roulette,
         tracer: &mut Tracer<A, P>,
     ) -> Option<()> {
         let Self { keys, indices, x, y } = self;
         tracer.reset(keys.len(), frame.settings.layers);
+        tracer.roulette = roulette;
         let eye = frame.eye(tracer.center());
         let streams = keys.iter().zip(&*indices).map(|(&key, &index)| Stream { key, index });
         if frame.settings.lens.is_some() {

@@ -97,7 +97,13 @@ impl Strip {
     }
 
     /// Sends the rays that find what a surface of `matter` mirrors.
-    pub(crate) fn mirror(&mut self, context: &Context, matter: &Matter, traced: Traced, to: &mut Queue) {
+    pub(crate) fn mirror(
+        &mut self,
+        context: &Context,
+        matter: &Matter,
+        traced: Traced,
+        (goes_on, to): (impl Fn(u32, Path) -> Option<Path>, &mut Queue),
+    ) {
         let Self { cones, painted, found, given, weights, .. } = self;
         let (points, cutoff) = (padded(self.count), context.least_cutoff());
         let weights = weights.as_ref().unwrap_or(&ONES);
@@ -116,7 +122,9 @@ impl Strip {
             let (cone_width, cone_spread, weight) = (cones.width[i], spread[i], get(weight, i));
             let depth = path.depth + 1;
             let path = Path { weight, depth, straight: false, since: 0.0, cone_width, cone_spread, ..path };
-            to.push(ray, path.turned(RayClass::Reflected, 0), Hit::MISS);
+            if let Some(path) = goes_on(sample, path.turned(RayClass::Reflected, 0)) {
+                to.push(ray, path, Hit::MISS);
+            }
         }
     }
 }
