@@ -1,7 +1,7 @@
 //! Where pictures go: templates, default names, and names that would collide.
 //!
-//! Templates know `{dir}` (the input's folder), `{stem}` (its name without extension), `{view}` and `{frame}` (number
-//! of the picture: in its sequence, or else in this run, from 1; `{frame:04}` pads it with zeros). `{{` and `}}` are plain braces.
+//! Templates know `{dir}` (the input's folder), `{stem}` (its name without extension), `{ext}` (its extension), `{view}` and
+//! `{frame}` (number of the picture: in its sequence, or else in this run, from 1; `{frame:04}` pads it with zeros). `{{` and `}}` are plain braces.
 
 use crate::image::destination;
 use crate::load::paths::lexical;
@@ -20,7 +20,7 @@ pub(super) struct Facts<'a> {
     pub frame: u32,
 }
 
-const FIELDS: [&str; 4] = ["dir", "stem", "view", "frame"];
+const FIELDS: [&str; 5] = ["dir", "stem", "ext", "view", "frame"];
 
 /// The input's name without folder and extension; `stdin` for `-`.
 pub(super) fn stem(input: &Path) -> String {
@@ -59,6 +59,7 @@ fn value(field: &str, facts: &Facts) -> Result<String, String> {
     match name {
         "dir" => Ok(folder(facts.input)),
         "stem" => Ok(stem(facts.input)),
+        "ext" => Ok(facts.input.extension().unwrap_or_default().to_string_lossy().into_owned()),
         "view" => Ok(facts.view.replace(['/', '\\', '\0'], "_")),
         "frame" => {
             let width: usize = if width.is_empty() { 0 } else { width.parse().map_err(|_| bad_width(field))? };
@@ -66,7 +67,9 @@ fn value(field: &str, facts: &Facts) -> Result<String, String> {
         }
         _ => {
             let hint = nearest(name, FIELDS).map_or_else(String::new, |n| format!("; did you mean {{{n}}}?"));
-            Err(format!("`{{{field}}}` is not a known field; use {{dir}}, {{stem}}, {{view}} or {{frame:04}}{hint}"))
+            Err(format!(
+                "`{{{field}}}` is not a known field; use {{dir}}, {{stem}}, {{ext}}, {{view}} or {{frame:04}}{hint}"
+            ))
         }
     }
 }
@@ -147,6 +150,7 @@ mod tests {
         assert_eq!(name, Path::new("a/b/ship.v2-front.0007.7.png"));
         assert_eq!(fill("{dir}/x", &facts("ship.obj")).unwrap(), Path::new("./x"));
         assert_eq!(fill("{stem}.png", &facts("-")).unwrap(), Path::new("stdin.png"));
+        assert_eq!(fill("{stem}.{ext}.png", &facts("a/ship.v2.obj")).unwrap(), Path::new("ship.v2.obj.png"));
     }
 
     #[test]

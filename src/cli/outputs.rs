@@ -105,7 +105,7 @@ pub(super) fn refuse_collisions(batches: &[Batch]) -> Result<(), Wrong> {
         format!("{}{parts}", input.display())
     };
     wrong(format!(
-        "{} and {} would both be written to {}; use {{dir}}, {{stem}}, {{view}} or {{frame:04}} in -o",
+        "{} and {} would both be written to {}; use {{dir}}, {{stem}}, {{ext}}, {{view}} or {{frame:04}} in -o",
         what(a),
         what(b),
         names[b].display()

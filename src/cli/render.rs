@@ -13,6 +13,7 @@ use super::shot::{self, Stage, Task};
 use super::stats::{self, PictureStats};
 use super::writable::{self, Sources};
 use super::{accident, again, interrupt, read, surroundings, unseen};
+use crate::bench::report::number::so_many;
 use crate::load::{Diagnostic, LoadOptions, Loaded};
 use crate::render::{Moved, World};
 use crate::scene::Scene;
@@ -32,8 +33,14 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
         }
     };
     let sources = Sources::of(job.batches.iter().flat_map(|b| &b.inputs));
-    let mut so_far =
-        SoFar { shown: false, unseen: HashSet::new(), sources, pictures: Vec::new(), foretold: Vec::new() };
+    let mut so_far = SoFar {
+        shown: false,
+        missing: HashSet::new(),
+        unseen: HashSet::new(),
+        sources,
+        pictures: Vec::new(),
+        foretold: Vec::new(),
+    };
     // A picture that is repeated may be replaced by its repetition, but by nothing else.
     let spared = |path| Sources::of(&job.again).spared_by(path, "--stats-file");
     if let Some(path) = job.stats_file()
@@ -42,19 +49,23 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
         messages.say(Severity::Error, &fault);
         return Exit::Failed;
     }
-    let mut worst = Exit::Done;
+    let (mut worst, mut failed) = (Exit::Done, 0);
     for batch in &job.batches {
         let name = batch.inputs[0].display().to_string();
         let work = || pool.install(|| render_batch(job, batch, messages, &mut so_far));
         let exit = accident::guard(&name, messages, work);
         worst = worst.max(exit);
+        failed += usize::from(exit != Exit::Done);
         if interrupt::raised() {
             return Exit::Interrupted;
         }
     }
     if job.batches.len() > 1 {
-        let (pictures, scenes) = (so_far.pictures.len(), job.batches.len());
-        messages.info("batch", format!("{pictures} pictures of {scenes} inputs, {} warnings", messages.warnings()));
+        let (pictures, scenes) = (so_far.pictures.len() as u64, job.batches.len());
+        let failed = if failed == 0 { String::new() } else { format!(", {failed} of them failed") };
+        let pictures = so_many(pictures, "picture");
+        let warnings = so_many(u64::from(messages.warnings()), "warning");
+        messages.info("batch", format!("{pictures} of {scenes} inputs{failed}, {warnings}"));
     }
     worst.max(report(job, &so_far, messages))
 }
@@ -63,6 +74,8 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
 pub(super) struct SoFar {
     /// Whether a frame of the sequence that is rendered shows something.
     pub shown: bool,
+    /// Folders that are not there, and that this was said of.
+    pub missing: HashSet<PathBuf>,
     /// Files and views whose pictures show nothing, and that this was said of.
     pub unseen: HashSet<(PathBuf, String)>,
     /// All inputs, and the files that those loaded so far use.
@@ -95,7 +108,11 @@ fn render_batch(job: &RenderJob, batch: &Batch, messages: &Messages, so_far: &mu
         match targets.try_for_each(|target| writable::check_target(&target, &so_far.sources)) {
             Ok(()) => shots.push(shot),
             Err(fault) => {
-                messages.say(Severity::Error, &fault);
+                // Of pictures for a folder that is not there, one says so.
+                let folder = fault.file.parent().filter(|_| fault.code == writable::NO_FOLDER);
+                if folder.is_none_or(|folder| so_far.missing.insert(folder.to_path_buf())) {
+                    messages.say(Severity::Error, &fault);
+                }
                 worst = Exit::Failed;
             }
         }

@@ -319,10 +319,9 @@ pub(super) fn flags(settings: &Settings, mut set: impl FnMut(&str, String)) {
 
 /// How the picture was sampled, in words.
 pub(super) fn phrase(settings: &Settings, sampled: &Sampled) -> String {
-    let rays = format!("{:.1} samples a pixel (at most {})", sampled.mean(), sampled.most());
+    let own: u64 = sampled.counts.iter().copied().map(u64::from).sum();
+    let each = |rays: u64| rays as f64 / sampled.pixels.max(1) as f64;
     if let Some(to) = sampled.targeted {
-        let own: u64 = sampled.counts.iter().copied().map(u64::from).sum();
-        let each = |rays: u64| rays as f64 / sampled.pixels.max(1) as f64;
         return format!(
             "{:.1} samples a pixel (at most {}) and {:.1} to find out how many, error {:.4} where {} was asked for (foretold {:.4} and {:.1} s of processor time, took {:.1} s)",
             each(own),
@@ -337,12 +336,16 @@ pub(super) fn phrase(settings: &Settings, sampled: &Sampled) -> String {
     }
     match settings.sampling {
         Sampling::Uniform => format!("{} a pixel", so_many(u64::from(settings.samples), "sample")),
-        Sampling::Adaptive(_) => format!("adaptive, {rays}"),
+        Sampling::Adaptive(_) => {
+            format!("adaptive, {:.1} samples a pixel (at most {})", sampled.mean(), sampled.most())
+        }
         Sampling::Stochastic(how) => {
             let percent = |n: u64| 100.0 * n as f64 / sampled.pixels.max(1) as f64;
             let rmse = sampled.rmse().unwrap_or(0.0);
             format!(
-                "{rays}, of what they met {:.1} % of pixels within {} at {} %, error about {rmse:.4} at most, {:.0} % of the rays to spare",
+                "{:.1} samples a pixel (at most {}), of what they met {:.1} % of pixels within {} at {} %, error about {rmse:.4} at most, {:.0} % of the rays to spare",
+                each(own),
+                sampled.most(),
                 percent(sampled.met),
                 how.error,
                 100.0 * how.confidence,

@@ -40,6 +40,9 @@ impl Sources {
     }
 }
 
+/// The code of what is said where the folder of a file is not there.
+pub(super) const NO_FOLDER: &str = "output-folder";
+
 /// Refuses `path`, given with `flag`, where its folder is not there, where it is a folder itself or read-only, or where it is
 /// one of `sources`.
 pub(super) fn check(path: &Path, flag: &str, sources: &Sources) -> Result<(), Diagnostic> {
@@ -47,7 +50,7 @@ pub(super) fn check(path: &Path, flag: &str, sources: &Sources) -> Result<(), Di
     let goal = destination(path);
     let folder = goal.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !folder.is_dir() {
-        return fault("output-folder", "its folder is not there", &format!("create it, or name another with {flag}"));
+        return fault(NO_FOLDER, "its folder is not there", &format!("create it, or name another with {flag}"));
     }
     if path.is_dir() {
         return fault("output-is-folder", "is a folder", &format!("name a file in it with {flag}"));

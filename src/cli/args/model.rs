@@ -48,7 +48,7 @@ pub(in crate::cli) struct LoadArgs {
     /// Read other files only below this folder [default: the model's folder]
     #[arg(long, value_name = "DIR")]
     pub root: Option<PathBuf>,
-    /// Refuse inputs that need more memory than this, such as 2G or 500M
+    /// Refuse inputs that take more memory than this to load, such as 2G or 500M; what is built of them comes on top
     #[arg(long, value_name = "SIZE", value_parser = parse::bytes)]
     pub max_memory: Option<u64>,
     /// How messages are written to standard error

@@ -22,7 +22,7 @@ pub(in crate::cli) struct RenderArgs {
     pub inputs: Vec<PathBuf>,
 
     /// Where to write: a file (png, exr, jpg, webp by its ending), a folder, `-`, or a template with {dir} {stem}
-    /// {view} {frame:04}
+    /// {ext} {view} {frame:04}
     ///
     /// Without it the picture goes to STEM.png in the current folder. Names that are made up, in a folder given here and
     /// of heat maps too, replace only a picture that meshray wrote; a name given here replaces whatever is there.
@@ -136,8 +136,8 @@ pub(in crate::cli) struct RenderArgs {
           help_heading = "Light and background", hide_short_help = true)]
     pub light_rays: Option<u32>,
     /// Rays that each point sends to what surrounds the scene, to find what hides it; with --env white: ambient
-    /// occlusion. If any, at least 2, and 4 where something is translucent [default: 16 for pictures, else 0: nothing
-    /// hides it]
+    /// occlusion. If any, at least 2 in each way that the scene needs to draw them: by the cosine, for rough mirrors, for
+    /// a panorama, through what is translucent [default: 16 for pictures, else 0: nothing hides it]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=65_536),
           help_heading = "Light and background", hide_short_help = true)]
     pub env_rays: Option<u32>,
@@ -202,7 +202,7 @@ pub(in crate::cli) struct RenderArgs {
     /// Read other files only below this folder [default: the model's folder]
     #[arg(long, value_name = "DIR", help_heading = "Loading", hide_short_help = true)]
     pub root: Option<PathBuf>,
-    /// Refuse inputs that need more memory than this, such as 2G or 500M
+    /// Refuse inputs that take more memory than this to load, such as 2G or 500M; what is built of them comes on top
     #[arg(long, value_name = "SIZE", value_parser = parse::bytes, help_heading = "Loading", hide_short_help = true)]
     pub max_memory: Option<u64>,
     /// Draw the background when the file holds nothing to draw
