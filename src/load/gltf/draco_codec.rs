@@ -60,6 +60,7 @@ mod decoder {
     use crate::quiet::attempt;
     use draco_oxide_core::attribute::Attribute;
     use draco_oxide_core::mesh::Mesh;
+    use draco_oxide_decoder::Err as Failure;
     use draco_oxide_decoder::connectivity::Connectivity;
 
     pub(super) fn decode(stream: &[u8], indices: ComponentType, wanted: &[Wanted]) -> Result<Output, String> {
@@ -96,7 +97,14 @@ mod decoder {
     fn mesh(stream: &[u8], wanted: &[Wanted]) -> Result<(Mesh, Vec<u32>, Option<Points>), String> {
         let survey = check(stream, wanted)?;
         let mesh = draco_oxide_decoder::decode_mesh(stream);
-        let mesh = mesh.map_err(|why| format!("the stream cannot be decoded: {why}"))?;
+        let mesh = mesh.map_err(|why| match why {
+            Failure::Unimplemented => {
+                "values are foretold across seams, as encoders do at levels 9 and 10, and that cannot be \
+                                   decoded; compressed at level 8 it can"
+                    .to_owned()
+            }
+            why => format!("the stream cannot be decoded: {why}"),
+        })?;
         let corners: Vec<u32> = mesh.faces.iter().flatten().map(|&corner| usize::from(corner) as u32).collect();
         let Some(walked) = survey.connectivity.as_ref().and_then(Connectivity::edgebreaker) else {
             return Ok((mesh, corners, None));

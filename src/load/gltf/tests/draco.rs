@@ -37,6 +37,13 @@ const SEAMS: &str = "RFJBQ08CAgEBAAAACQgCCAIAA3/aB/8BEeADAD2B4APgOYEDAAEAAQEA/wA
     gD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD9DH5M+AAAAABo0dT8BAQEA\
     DwOtKi9VFQMqYkz///9vZvz/AECZAQD8/wAAAAAAAAAA/z8AAAAAgL8AAIC/zczMvQAAAEAO";
 
+/// A grid of quads whose colours have seams, as small as the encoder makes it (its level 10).
+const SLOW: &str = "RFJBQ08CAgEBAAAAQGIBYgcAHF/7VKtPVav6VFWrqk9V1VNV1aeqqlpVVX2qqgr/AREEBKhanIcCAAEA/wABAQICAwEAAQEACQMAAQIEAQEBBXs5MaEBHQH/\
+    z60DiQM1AqUClgEYl+HK16sn/GS3HxWGtDF/0Z4znH+f/9MyY/nDVx65sPkh/1SItj0wjV4vYwFsSs/P6BUEE/wQcJ4ZVf5d6Q6M3nRoEzL29atfIlFL5uV9\
+    lWB9Ja79mbUC4WBxOF66gKKJK03LZeP5Ex0lzvDYQxZsrC4ezNQ465BORfcQvNZPVyNE/ZmMTKi1+Staj2oq4GipgYgCboACAQEgAAAAAAAAALQAAAAEAQEA\
+    DwMBOAEFJwECAQEIAJxuir7vv4jb9rYtXyXJJNlXlCQA8CuICKgApAAAgggAAAAAAAAAAAAAAAAAAAAAGf8Cs0FIywkaLxcaE1UleoIAAAAAAAD/PwAAAACA\
+    vwAAgL+amZm+AAAAQA4=";
+
 /// The numbers of the attributes in these streams, with the accessors that a file needs for them.
 const ATTRIBUTES: &[(&str, u32, u32, &str, bool)] = &[
     ("POSITION", 13, 5126, "VEC3", false),
@@ -165,6 +172,13 @@ fn what_the_decoder_does_not_know_is_one_line() {
     assert!(told(6, 1).contains("the stream has version 2.1, and only 2.2 can be decoded"));
     assert!(told(7, 0).contains("a point cloud"));
     assert!(told(8, 7).contains("an unknown method, 7"));
+}
+
+#[test]
+fn what_cannot_be_decoded_yet_tells_which_level_of_compression_can() {
+    let colors = Wanted { id: 0, name: String::new(), component: ComponentType::U8, width: 3, count: 290 };
+    let told = decode(&stream(SLOW), ComponentType::U16, &[colors]).err().unwrap();
+    assert!(told.contains("at levels 9 and 10") && told.contains("at level 8 it can"), "{told}");
 }
 
 #[test]
