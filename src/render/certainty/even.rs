@@ -34,6 +34,11 @@ impl Shown {
         Self { colors: std::array::from_fn(|_| Vec::with_capacity(count)), brightest: Vec::with_capacity(count) }
     }
 
+    /// Whether anything is known of a place.
+    pub(in crate::render) fn is_known(&self, i: usize) -> bool {
+        !self.colors[0][i].is_nan()
+    }
+
     /// What is shown at a place.
     pub(in crate::render) fn at(&self, i: usize) -> Seen {
         let color = Vec4::from_array(std::array::from_fn(|c| self.colors[c][i]));

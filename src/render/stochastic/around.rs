@@ -81,6 +81,65 @@ impl Around {
         });
     }
 
+    /// How much the samples of the pixels beside one vary, of which each has its own variance: a little more than of half of
+    /// them. Those that nobody had to look at closer do not.
+    pub(super) fn variance(&self, pixels: &[Pixel], pixel: (u32, u32)) -> f32 {
+        let (at, columns) = (self.at(pixel), self.columns());
+        let (mut variances, mut known) = ([0.0_f32; 8], 0);
+        for at in [
+            at - columns - 1,
+            at - columns,
+            at - columns + 1,
+            at - 1,
+            at + 1,
+            at + columns - 1,
+            at + columns,
+            at + columns + 1,
+        ] {
+            let beside = pixels.get(self.numbers[at] as usize);
+            if beside.is_some() || self.shown.is_known(at) {
+                variances[known] = beside.and_then(Pixel::variance).unwrap_or(0.0);
+                known += 1;
+            }
+        }
+        let variances = &mut variances[..known];
+        variances.sort_unstable_by(f32::total_cmp);
+        variances.get(known / 2).copied().unwrap_or(0.0)
+    }
+
+    /// The pixels of `tile` beside some that seemed certain with fewer than so many samples, and are not, now that more is
+    /// known of these.
+    pub(super) fn late(
+        &self,
+        judge: &Certainty,
+        pixels: &mut [Pixel],
+        (some, samples): (&[usize], u32),
+        tile: Tile,
+    ) -> Vec<usize> {
+        let mut late = Vec::new();
+        for &pixel in some {
+            let (x, y) = pixels[pixel].at;
+            for y in y.saturating_sub(1).max(tile.y0)..(y + 2).min(tile.y1) {
+                for x in x.saturating_sub(1).max(tile.x0)..(x + 2).min(tile.x1) {
+                    let number = self.numbers[self.at((x, y))] as usize;
+                    let Some(stopped) = pixels.get(number) else { continue };
+                    let (end, count) = (stopped.facts.end, stopped.facts.count);
+                    if end != End::Met || count >= samples || stopped.variance().is_none() {
+                        continue;
+                    }
+                    let beside = self.variance(pixels, (x, y));
+                    let stopped = &mut pixels[number];
+                    stopped.compare(beside);
+                    if stopped.used(judge) > 1.0 {
+                        stopped.facts.end = End::Ceiling;
+                        late.push(number);
+                    }
+                }
+            }
+        }
+        late
+    }
+
     /// Opens the pixels of `tile` that were done with so many samples and lie near uneven ones of these: those of one, which
     /// have no numbers yet, and those of more, which have; their numbers.
     pub(super) fn reopen(
@@ -132,5 +191,85 @@ impl Around {
                 pixel.surround(judge, &self.range(pixel.at));
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+    use crate::render::certainty::factor;
+    use crate::render::whitted::Sample;
+
+    const TILE: Tile = Tile { x0: 4, y0: 7, x1: 7, y1: 10 };
+
+    /// Nine pixels that have eight samples each, those around the middle one half of the time this much lighter.
+    fn nine(judge: &Certainty, step: f32) -> (Around, Vec<Pixel>) {
+        let (mut around, mut pixels) = (Around::new(TILE), Vec::new());
+        for at in TILE.places() {
+            let step = if at == (5, 8) { 0.0 } else { step };
+            let mut pixel = Pixel::new(3, at, false);
+            add(&mut pixel, step);
+            around.know(at, pixels.len());
+            pixels.push(pixel);
+        }
+        learn(judge, &mut pixels);
+        (around, pixels)
+    }
+
+    fn add(pixel: &mut Pixel, step: f32) {
+        let light = |k: usize| Sample { radiance: Vec3::splat(step * (k % 2) as f32), through: Vec3::ZERO };
+        pixel.take(&std::array::from_fn::<_, GROUPS, _>(light), &[], 1);
+    }
+
+    fn learn(judge: &Certainty, pixels: &mut [Pixel]) {
+        for pixel in pixels {
+            let groups = pixel.groups;
+            judge.each_standard_error([&groups[..]].into_iter(), |error| pixel.learn(error));
+        }
+    }
+
+    #[test]
+    fn what_varies_less_than_all_around_it_is_no_more_certain_than_that() {
+        let judge = Certainty::new(None, (None, false), false, 0.05, factor(0.95));
+        for (step, certain) in [(0.0, true), (0.02, true), (0.5, false)] {
+            let (around, mut pixels) = nine(&judge, step);
+            let beside = around.variance(&pixels, (5, 8));
+            pixels[4].compare(beside);
+            pixels[4].look(&judge);
+            assert_eq!(pixels[4].facts.end == End::Met, certain, "{step}: {}", pixels[4].facts.error);
+            // Of 0 and `step`, four each.
+            let expected = (step * step / 4.0 / 7.0).sqrt();
+            assert!((pixels[4].facts.error - expected).abs() < 1e-6, "{step}: {}", pixels[4].facts.error);
+        }
+    }
+
+    #[test]
+    fn an_edge_beside_a_pixel_tells_nothing_of_it() {
+        let judge = Certainty::new(None, (None, false), false, 0.05, factor(0.95));
+        let (around, mut pixels) = nine(&judge, 0.5);
+        for i in [0, 1, 3, 6, 7] {
+            pixels[i].learn(0.0);
+        }
+        assert_eq!(around.variance(&pixels, (5, 8)), 0.0);
+        // In a corner of a picture there are three beside it.
+        assert!(around.variance(&pixels, (4, 7)) > 0.0);
+    }
+
+    #[test]
+    fn a_pixel_that_was_certain_goes_on_when_those_around_it_turn_out_not_to_be() {
+        let judge = Certainty::new(None, (None, false), false, 0.05, factor(0.95));
+        let (around, mut pixels) = nine(&judge, 0.0);
+        pixels.iter_mut().for_each(|pixel| pixel.look(&judge));
+        let some: Vec<usize> = (0..9).filter(|&i| i != 4).collect();
+        assert!(around.late(&judge, &mut pixels, (&some, 16), TILE).is_empty());
+        for &i in &some {
+            pixels[i].join_groups();
+            pixels[i].take(&[Sample { radiance: Vec3::ONE, through: Vec3::ZERO }; GROUPS], &[], 2);
+            pixels[i].facts.end = End::Ceiling;
+        }
+        learn(&judge, &mut pixels);
+        assert_eq!(around.late(&judge, &mut pixels, (&some, 16), TILE), [4]);
+        assert!(pixels[4].facts.end == End::Ceiling);
     }
 }

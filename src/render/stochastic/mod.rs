@@ -139,10 +139,23 @@ impl<'a> Sampler<'a> {
                 around.judge(judge, &mut pixels, &active);
             }
             if to >= FIRST_LOOK {
-                look(judge, &mut pixels, &active, &mut errors);
+                look((judge, &around), &mut pixels, &active, &mut errors);
+                let mut news = active.clone();
+                while !news.is_empty() {
+                    news = around.late(judge, &mut pixels, (&news, to), tile);
+                    self.catch_up(tracer, &mut places, (&mut pixels, &news), to)?;
+                    look((judge, &around), &mut pixels, &news, &mut errors);
+                    active.extend(&news);
+                }
             }
             active.retain(|&i| pixels[i].facts.end == End::Ceiling);
             from = to;
+        }
+        for i in 0..pixels.len() {
+            if pixels[i].variance().is_some() {
+                let beside = around.variance(&pixels, pixels[i].at);
+                pixels[i].compare(beside);
+            }
         }
         self.put(&pixels, taken, &mut done);
         Some(done)
@@ -226,6 +239,21 @@ impl<'a> Sampler<'a> {
         }
     }
 
+    /// Traces what these pixels are missing of so many samples, round by round.
+    fn catch_up<A: Accel, P: Observer>(
+        &self,
+        tracer: &mut Tracer<A, P>,
+        places: &mut Places,
+        (pixels, late): (&mut [Pixel], &[usize]),
+        samples: u32,
+    ) -> Option<()> {
+        for (&from, &to) in self.rounds.iter().zip(&self.rounds[1..]).filter(|(_, to)| **to <= samples) {
+            let now: Vec<usize> = late.iter().copied().filter(|&i| pixels[i].facts.count == from).collect();
+            self.trace(tracer, places, (pixels, &now), from..to)?;
+        }
+        Some(())
+    }
+
     /// Traces these samples of all active pixels, in batches.
     fn trace<A: Accel, P: Observer>(
         &self,
@@ -277,11 +305,16 @@ fn looks(rounds: &[u32]) -> usize {
 }
 
 /// Finds out how certain the means of these pixels are.
-fn look(judge: &Certainty, pixels: &mut [Pixel], active: &[usize], errors: &mut Vec<f32>) {
+///
+/// The few samples that see a light, or what glass shows of it, make both the mean of a pixel and what tells its error: where
+/// hardly any did, it looks dark and certain. So its samples are taken to vary no less than those of the pixels beside it.
+fn look((judge, around): (&Certainty, &Around), pixels: &mut [Pixel], active: &[usize], errors: &mut Vec<f32>) {
     errors.clear();
     judge.each_standard_error(active.iter().map(|&i| &pixels[i].groups[..]), |error| errors.push(error));
-    for (&i, &error) in active.iter().zip(&*errors) {
-        pixels[i].facts.error = error;
+    active.iter().zip(&*errors).for_each(|(&i, &error)| pixels[i].learn(error));
+    for &i in active {
+        let beside = around.variance(pixels, pixels[i].at);
+        pixels[i].compare(beside);
         pixels[i].look(judge);
     }
 }

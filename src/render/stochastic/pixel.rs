@@ -18,6 +18,8 @@ pub(super) struct Pixel {
     /// If they are wanted.
     pub layers: Option<Box<LayerSum>>,
     pub facts: PixelFacts,
+    /// Of one of its samples, as its groups tell it.
+    variance: f32,
     /// Between its first samples and those of the pixels beside it.
     contrast: f32,
     /// The brightest light among these.
@@ -32,6 +34,7 @@ impl Pixel {
             groups: Default::default(),
             layers: layers.then(Box::default),
             facts: PixelFacts { count: 0, spare: 0, error: 0.0, end: End::Ceiling },
+            variance: 0.0,
             contrast: 0.0,
             brightest: 0.0,
         }
@@ -89,13 +92,38 @@ impl Pixel {
         &self.groups[..GROUPS.min(self.facts.count as usize)]
     }
 
+    /// Learns the standard error of its mean from its own samples.
+    pub(super) fn learn(&mut self, error: f32) {
+        self.variance = error * error * self.samples();
+    }
+
+    /// The variance of one of its samples; `None` as long as there are too few.
+    pub(super) fn variance(&self) -> Option<f32> {
+        (self.facts.count as usize >= GROUPS).then_some(self.variance)
+    }
+
+    /// Takes its samples to vary as those of the pixels beside it, where its own vary less.
+    pub(super) fn compare(&mut self, beside: f32) {
+        self.facts.error = (self.variance.max(beside) / self.samples()).sqrt();
+    }
+
     /// Finds out how certain the mean is, whose standard error is known.
     pub(super) fn look(&mut self, judge: &Certainty) {
-        let contrast = self.contrast * judge.beyond_white(&self.groups, self.brightest);
-        let used = judge.used(self.facts.error, contrast, self.facts.count);
+        let used = self.used(judge);
         if used <= 1.0 {
             self.facts.end = End::Met;
             self.facts.spare = judge.spare(used, self.facts.count);
         }
+    }
+
+    /// The part of the error that is allowed which it uses.
+    pub(super) fn used(&self, judge: &Certainty) -> f32 {
+        let contrast = self.contrast * judge.beyond_white(&self.groups, self.brightest);
+        judge.used(self.facts.error, contrast, self.facts.count)
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "far less than 2^24 samples")]
+    fn samples(&self) -> f32 {
+        self.facts.count as f32
     }
 }
