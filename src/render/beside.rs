@@ -313,7 +313,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             });
         } else if shiny && context.depth > 0 {
             let (roulette, streams) = (self.roulette, &self.streams);
-            let goes_on = |sample, path| roulette.spin(streams, sample, path);
+            let goes_on = |sample, path: &mut _| roulette.spin(streams, sample, path);
             strip.mirror(context, matter, traced, (goes_on, &mut self.starting[RayClass::Reflected as usize]));
         }
     }

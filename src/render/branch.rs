@@ -252,7 +252,10 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         if !self.context.is_alive(path.weight, part) {
             return;
         }
-        let Some(path) = self.roulette.spin(&self.streams, point.ray.sample, Path { part, ..path }) else { return };
+        let mut path = Path { part, ..path };
+        if !self.goes_on(point, &mut path) {
+            return;
+        }
         let angle = rough.lobe.angle(rough.rays) * self.context.gloss.width;
         let (cone_spread, scattered) = (path.cone_spread + angle, path.scattered + angle);
         let (ray, after) = point.start(class, dir);
@@ -280,12 +283,19 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         }
     }
 
+    /// Whether a branch that begins here goes on, and with which weight.
+    fn goes_on<G>(&self, point: &Point<G>, path: &mut Path) -> bool {
+        self.roulette.spin(&self.streams, point.ray.sample, path)
+    }
+
     fn send_reflected<G: Ground>(&mut self, point: &Point<G>, normal: Vec3, weight: Vec3, band: Option<u8>) {
         if !self.context.is_alive(weight, point.path.part) {
             return;
         }
-        let path = Path { band, ..point.bounced(self.context, weight, MIRROR).turned(RayClass::Reflected, 0) };
-        let Some(path) = self.roulette.spin(&self.streams, point.ray.sample, path) else { return };
+        let mut path = Path { band, ..point.bounced(self.context, weight, MIRROR).turned(RayClass::Reflected, 0) };
+        if !self.goes_on(point, &mut path) {
+            return;
+        }
         let Seen { geometric, view, .. } = point.surface.seen();
         let dir = above(reflect(-view, normal), geometric);
         let ray = point.surface.ray(dir, point.ray.sample);
@@ -300,8 +310,10 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         // Equal indices leave the ray as it is: the same ray goes on behind this hit.
         if crossing.n_i == crossing.n_t {
             let path = point.path.turned(RayClass::Refracted, turn);
-            let path = Path { weight, band, depth: point.path.depth + 1, media: crossing.beyond, ..path };
-            let Some(path) = self.roulette.spin(&self.streams, point.ray.sample, path) else { return };
+            let mut path = Path { weight, band, depth: point.path.depth + 1, media: crossing.beyond, ..path };
+            if !self.goes_on(point, &mut path) {
+                return;
+            }
             return self.continuing[RayClass::Refracted as usize].push(*point.ray, path, *point.hit);
         }
         let Seen { normal, geometric, view, .. } = point.surface.seen();
@@ -314,8 +326,10 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         // As far as directions turn when light falls in steeply.
         let turns = (1.0 - crossing.n_i / crossing.n_t).abs();
         let path = point.bounced(self.context, weight, turns).turned(RayClass::Refracted, turn);
-        let path = Path { band, media: crossing.beyond, ..path };
-        let Some(path) = self.roulette.spin(&self.streams, point.ray.sample, path) else { return };
+        let mut path = Path { band, media: crossing.beyond, ..path };
+        if !self.goes_on(point, &mut path) {
+            return;
+        }
         let (ray, after) = point.start(RayClass::Refracted, dir);
         self.starting[RayClass::Refracted as usize].push(ray, path, after);
     }

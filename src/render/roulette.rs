@@ -26,17 +26,22 @@ impl Roulette {
         Self { least: (PART * how.error * how.error * samples as f32).min(MOST) }
     }
 
-    /// The path of a branch, if it goes on.
+    /// Whether a branch goes on; then its path has the weight that it carries.
     #[inline(always)]
-    pub(super) fn spin(self, streams: &[Stream], sample: u32, path: Path) -> Option<Path> {
+    pub(super) fn spin(self, streams: &[Stream], sample: u32, path: &mut Path) -> bool {
+        self.least == 0.0 || self.decide(streams, sample, path)
+    }
+
+    fn decide(self, streams: &[Stream], sample: u32, path: &mut Path) -> bool {
         let (weight, least) = (path.weight.max_element(), self.least * path.part);
         if weight >= least {
-            return Some(path);
+            return true;
         }
-        let Some(&stream) = streams.get(sample as usize) else { return Some(path) };
+        let Some(&stream) = streams.get(sample as usize) else { return true };
         let [drawn, _] = Draws::of(stream, path.branch, Purpose::Roulette).spread(1).point(0);
         let chance = weight / least;
-        (drawn < chance).then(|| Path { weight: path.weight * (1.0 / chance), ..path })
+        path.weight *= 1.0 / chance;
+        drawn < chance
     }
 }
 
@@ -55,8 +60,11 @@ mod tests {
         let streams: Vec<Stream> = (0..1024).map(|index| Stream { key: 3, index }).collect();
         let roulette = Roulette { least: 0.125 };
         for (weight, branch) in [(0.1, 0), (0.06, 9), (0.01, 77), (0.004, 8)] {
-            let gone_on = (0..1024).filter_map(|sample| roulette.spin(&streams, sample, path(weight, branch)));
-            let weights: Vec<Vec3> = gone_on.map(|path| path.weight).collect();
+            let spin = |sample| {
+                let mut path = path(weight, branch);
+                roulette.spin(&streams, sample, &mut path).then_some(path.weight)
+            };
+            let weights: Vec<Vec3> = (0..1024).filter_map(spin).collect();
             assert!(weights.iter().all(|w| (*w - Vec3::new(0.125, 0.0625, 0.0)).length() < 1e-6), "{weight}");
             let mean = weights.iter().sum::<Vec3>() / 1024.0;
             assert!((mean.x - weight).abs() < 1e-3 * weight.max(0.13), "{weight}: {mean}");
@@ -68,7 +76,8 @@ mod tests {
         let stream = [Stream { key: 3, index: 5 }];
         let goes_on = |least, part, streams: &[Stream], weight| {
             let path = Path { part, ..path(weight, 1) };
-            Roulette { least }.spin(streams, 0, path).is_some_and(|on| on.weight == path.weight)
+            let mut on = path;
+            Roulette { least }.spin(streams, 0, &mut on) && on.weight == path.weight
         };
         assert!((0..100).all(|k| goes_on(0.125, 1.0, &stream, 0.125 + 0.01 * k as f32)));
         assert!((0..100).all(|k| goes_on(0.125, 0.25, &stream, 0.03125 + 0.01 * k as f32)), "a quarter of a spread");

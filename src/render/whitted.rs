@@ -323,8 +323,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let weight = path.weight * (1.0 - covered);
         let class = if covered > 0.0 { RayClass::Refracted } else { class };
         if self.context.is_alive(weight, path.part) {
-            let path = Path { weight, ..path.turned(class, ON) };
-            if let Some(path) = self.roulette.spin(&self.streams, ray.sample, path) {
+            let mut path = Path { weight, ..path.turned(class, ON) };
+            if self.roulette.spin(&self.streams, ray.sample, &mut path) {
                 self.continuing[class as usize].push(*ray, path, *hit);
             }
         }

@@ -102,7 +102,7 @@ impl Strip {
         context: &Context,
         matter: &Matter,
         traced: Traced,
-        (goes_on, to): (impl Fn(u32, Path) -> Option<Path>, &mut Queue),
+        (goes_on, to): (impl Fn(u32, &mut Path) -> bool, &mut Queue),
     ) {
         let Self { cones, painted, found, given, weights, .. } = self;
         let (points, cutoff) = (padded(self.count), context.least_cutoff());
@@ -122,7 +122,8 @@ impl Strip {
             let (cone_width, cone_spread, weight) = (cones.width[i], spread[i], get(weight, i));
             let depth = path.depth + 1;
             let path = Path { weight, depth, straight: false, since: 0.0, cone_width, cone_spread, ..path };
-            if let Some(path) = goes_on(sample, path.turned(RayClass::Reflected, 0)) {
+            let mut path = path.turned(RayClass::Reflected, 0);
+            if goes_on(sample, &mut path) {
                 to.push(ray, path, Hit::MISS);
             }
         }
