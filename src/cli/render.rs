@@ -14,6 +14,7 @@ use super::stats::{self, PictureStats};
 use super::writable::{self, Sources};
 use super::{accident, again, interrupt, read, surroundings, unseen};
 use crate::bench::report::number::so_many;
+use crate::image::destination;
 use crate::load::{Diagnostic, LoadOptions, Loaded};
 use crate::render::{Moved, World};
 use crate::scene::Scene;
@@ -109,7 +110,8 @@ fn render_batch(job: &RenderJob, batch: &Batch, messages: &Messages, so_far: &mu
             Ok(()) => shots.push(shot),
             Err(fault) => {
                 // Of pictures for a folder that is not there, one says so.
-                let folder = fault.file.parent().filter(|_| fault.code == writable::NO_FOLDER);
+                let goal = destination(&fault.file);
+                let folder = goal.parent().filter(|_| fault.code == writable::NO_FOLDER);
                 if folder.is_none_or(|folder| so_far.missing.insert(folder.to_path_buf())) {
                     messages.say(Severity::Error, &fault);
                 }

@@ -26,10 +26,11 @@ impl Roulette {
         Self { least: (PART * how.error * how.error * samples as f32).min(MOST) }
     }
 
-    /// Whether a branch goes on; then its path has the weight that it carries.
+    /// Whether a branch goes on; then its path has the weight that it carries. What runs straight on always does: of a sample
+    /// that shows nothing of the background it is not known whether something solid or glass stood before it.
     #[inline(always)]
     pub(super) fn spin(self, streams: &[Stream], sample: u32, path: &mut Path) -> bool {
-        self.least == 0.0 || self.decide(streams, sample, path)
+        self.least == 0.0 || path.straight || self.decide(streams, sample, path)
     }
 
     fn decide(self, streams: &[Stream], sample: u32, path: &mut Path) -> bool {
@@ -52,7 +53,8 @@ mod tests {
     use crate::render::wave::Media;
 
     fn path(weight: f32, branch: u32) -> Path {
-        Path { weight: Vec3::new(weight, 0.5 * weight, 0.0), branch, ..Path::from_eye(0.0, 0.0, Media::default()) }
+        let weight = Vec3::new(weight, 0.5 * weight, 0.0);
+        Path { weight, branch, straight: false, ..Path::from_eye(0.0, 0.0, Media::default()) }
     }
 
     #[test]
@@ -83,6 +85,8 @@ mod tests {
         assert!((0..100).all(|k| goes_on(0.125, 0.25, &stream, 0.03125 + 0.01 * k as f32)), "a quarter of a spread");
         assert!(goes_on(0.0, 1.0, &stream, 1e-6));
         assert!(goes_on(0.125, 1.0, &[], 1e-6));
+        let mut straight = Path { straight: true, ..path(1e-6, 1) };
+        assert!(Roulette { least: 0.125 }.spin(&stream, 0, &mut straight) && straight.weight.x == 1e-6);
     }
 
     #[test]

@@ -98,11 +98,10 @@ mod decoder {
         let survey = check(stream, wanted)?;
         let mesh = draco_oxide_decoder::decode_mesh(stream);
         let mesh = mesh.map_err(|why| match why {
-            Failure::Unimplemented => {
-                "values are foretold across seams, as encoders do at levels 9 and 10, and that cannot be \
-                                   decoded; compressed at level 8 it can"
-                    .to_owned()
-            }
+            Failure::Unimplemented => String::from(
+                "the stream uses what cannot be decoded yet: mostly values that are foretold across seams, as encoders do at levels 9 \
+                 and 10 but not at 8",
+            ),
             why => format!("the stream cannot be decoded: {why}"),
         })?;
         let corners: Vec<u32> = mesh.faces.iter().flatten().map(|&corner| usize::from(corner) as u32).collect();

@@ -82,33 +82,35 @@ impl Around {
     }
 
     /// How much the samples of the pixels beside one vary, of which each has its own variance: a little more than of half of
-    /// them. Those that nobody had to look at closer do not.
+    /// them. A single sample that looks as all beside it does not.
     pub(super) fn variance(&self, pixels: &[Pixel], pixel: (u32, u32)) -> f32 {
-        let (at, columns) = (self.at(pixel), self.columns());
+        let middle = self.at(pixel);
         let (mut variances, mut known) = ([0.0_f32; 8], 0);
-        for at in [
-            at - columns - 1,
-            at - columns,
-            at - columns + 1,
-            at - 1,
-            at + 1,
-            at + columns - 1,
-            at + columns,
-            at + columns + 1,
-        ] {
-            let beside = pixels.get(self.numbers[at] as usize);
-            if beside.is_some() || self.shown.is_known(at) {
-                variances[known] = beside.and_then(Pixel::variance).unwrap_or(0.0);
+        for row in [middle - self.columns(), middle, middle + self.columns()] {
+            for at in (row - 1..row + 2).filter(|&at| at != middle) {
+                let number = self.numbers[at] as usize;
+                variances[known] = match pixels.get(number) {
+                    Some(beside) => beside.variance().unwrap_or_else(|| self.variance_seen(beside, number)),
+                    None if self.shown.is_known(at) => 0.0,
+                    None => continue,
+                };
                 known += 1;
             }
         }
         let variances = &mut variances[..known];
         variances.sort_unstable_by(f32::total_cmp);
-        variances.get(known / 2).copied().unwrap_or(0.0)
+        variances.get(known.saturating_sub(1) * 4 / 7).copied().unwrap_or(0.0)
     }
 
-    /// The pixels of `tile` beside some that seemed certain with fewer than so many samples, and are not, now that more is
-    /// known of these.
+    /// That of a pixel whose samples were only looked at together with those beside it.
+    #[expect(clippy::cast_precision_loss, reason = "a handful of samples")]
+    fn variance_seen(&self, pixel: &Pixel, number: usize) -> f32 {
+        let error = self.seen[number].error;
+        error * error * pixel.facts.count as f32
+    }
+
+    /// The pixels of `tile` beside some that seemed certain with so many samples or fewer, and are not, now that more is known
+    /// of these.
     pub(super) fn late(
         &self,
         judge: &Certainty,
@@ -124,14 +126,14 @@ impl Around {
                     let number = self.numbers[self.at((x, y))] as usize;
                     let Some(stopped) = pixels.get(number) else { continue };
                     let (end, count) = (stopped.facts.end, stopped.facts.count);
-                    if end != End::Met || count >= samples || stopped.variance().is_none() {
+                    if end != End::Met || count > samples || stopped.variance().is_none() {
                         continue;
                     }
                     let beside = self.variance(pixels, (x, y));
                     let stopped = &mut pixels[number];
                     stopped.compare(beside);
                     if stopped.used(judge) > 1.0 {
-                        stopped.facts.end = End::Ceiling;
+                        (stopped.facts.end, stopped.facts.spare) = (End::Ceiling, 0);
                         late.push(number);
                     }
                 }
@@ -254,6 +256,39 @@ mod tests {
         assert_eq!(around.variance(&pixels, (5, 8)), 0.0);
         // In a corner of a picture there are three beside it.
         assert!(around.variance(&pixels, (6, 9)) > 0.0);
+    }
+
+    /// As at the border of a tile, whose pixels alone get more samples.
+    #[test]
+    fn four_samples_of_the_pixels_around_a_tile_tell_how_much_they_vary() {
+        let judge = Certainty::new(None, (None, false), false, 0.05, factor(0.95));
+        let (mut around, mut pixels) = (Around::new(TILE), Vec::new());
+        for at in TILE.places() {
+            let mut pixel = Pixel::new(3, at, false);
+            let light = |k: usize| Sample { radiance: Vec3::splat(0.5 * (k % 2) as f32), through: Vec3::ZERO };
+            pixel.take(&[0, 1, 2, 3].map(light), &[], 1);
+            around.know(at, pixels.len());
+            pixels.push(pixel);
+        }
+        around.see(&judge, &pixels, &[0, 1, 2, 3, 4, 5, 6, 7, 8]);
+        // Of 0 and ½, two each.
+        let variance = around.variance(&pixels, (5, 8));
+        assert!((variance - 0.25 / 3.0).abs() < 1e-6, "{variance}");
+    }
+
+    #[test]
+    fn of_two_pixels_beside_one_in_a_single_row_an_edge_is_not_the_rule() {
+        let judge = Certainty::new(None, (None, false), false, 0.05, factor(0.95));
+        let tile = Tile { x0: 4, y0: 7, x1: 7, y1: 8 };
+        let (mut around, mut pixels) = (Around::new(tile), Vec::new());
+        for (at, step) in tile.places().zip([0.0, 0.0, 0.5]) {
+            let mut pixel = Pixel::new(3, at, false);
+            add(&mut pixel, step);
+            around.know(at, pixels.len());
+            pixels.push(pixel);
+        }
+        learn(&judge, &mut pixels);
+        assert_eq!(around.variance(&pixels, (5, 7)), 0.0);
     }
 
     #[test]

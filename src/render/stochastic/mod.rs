@@ -155,6 +155,9 @@ impl<'a> Sampler<'a> {
             if pixels[i].variance().is_some() {
                 let beside = around.variance(&pixels, pixels[i].at);
                 pixels[i].compare(beside);
+                if pixels[i].facts.end == End::Met {
+                    pixels[i].look(judge);
+                }
             }
         }
         self.put(&pixels, taken, &mut done);

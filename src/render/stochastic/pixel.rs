@@ -18,8 +18,8 @@ pub(super) struct Pixel {
     /// If they are wanted.
     pub layers: Option<Box<LayerSum>>,
     pub facts: PixelFacts,
-    /// Of one of its samples, as its groups tell it.
-    variance: f32,
+    /// Of one of its samples, as its groups tell it once each has one.
+    variance: Option<f32>,
     /// Between its first samples and those of the pixels beside it.
     contrast: f32,
     /// The brightest light among these.
@@ -34,7 +34,7 @@ impl Pixel {
             groups: Default::default(),
             layers: layers.then(Box::default),
             facts: PixelFacts { count: 0, spare: 0, error: 0.0, end: End::Ceiling },
-            variance: 0.0,
+            variance: None,
             contrast: 0.0,
             brightest: 0.0,
         }
@@ -94,17 +94,17 @@ impl Pixel {
 
     /// Learns the standard error of its mean from its own samples.
     pub(super) fn learn(&mut self, error: f32) {
-        self.variance = error * error * self.samples();
+        self.variance = Some(error * error * self.samples());
     }
 
     /// The variance of one of its samples; `None` as long as there are too few.
     pub(super) fn variance(&self) -> Option<f32> {
-        (self.facts.count as usize >= GROUPS).then_some(self.variance)
+        self.variance
     }
 
     /// Takes its samples to vary as those of the pixels beside it, where its own vary less.
     pub(super) fn compare(&mut self, beside: f32) {
-        self.facts.error = (self.variance.max(beside) / self.samples()).sqrt();
+        self.facts.error = (self.variance.unwrap_or(0.0).max(beside) / self.samples()).sqrt();
     }
 
     /// Finds out how certain the mean is, whose standard error is known.
