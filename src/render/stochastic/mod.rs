@@ -143,9 +143,10 @@ impl<'a> Sampler<'a> {
                 let mut news = active.clone();
                 while !news.is_empty() {
                     news = around.late(judge, &mut pixels, (&news, to), tile);
+                    // Those with as many samples are active still.
+                    active.extend(news.iter().filter(|&&i| pixels[i].facts.count < to));
                     self.catch_up(tracer, &mut places, (&mut pixels, &news), to)?;
                     look((judge, &around), &mut pixels, &news, &mut errors);
-                    active.extend(&news);
                 }
             }
             active.retain(|&i| pixels[i].facts.end == End::Ceiling);
