@@ -18,8 +18,8 @@ impl Roulette {
     /// 1 at most. With τ proportional to the samples that a pixel has, and to the square of what it may be wrong by, that is
     /// the same small part of the variance that its mean may have, however many samples that takes.
     pub(super) fn after(samples: u32, how: &Stochastic) -> Self {
-        /// Of the square of the error, for each sample: the mean squared error of pictures of glass grew by a hundredth, with 2 by
-        /// three to six.
+        /// Of the square of the error, for each sample: the mean squared error of two pictures with glass grew by 1.0 and 1.3 %,
+        /// with 2 that of three by 2.6 to 5.8 %.
         const PART: f32 = 0.75;
         /// So that what is bright by more than 1 is not carried by a few.
         const MOST: f32 = 0.125;

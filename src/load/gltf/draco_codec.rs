@@ -99,8 +99,8 @@ mod decoder {
         let mesh = draco_oxide_decoder::decode_mesh(stream);
         let mesh = mesh.map_err(|why| match why {
             Failure::Unimplemented => String::from(
-                "the stream uses what cannot be decoded yet: mostly values that are foretold across seams, as encoders do at levels 9 \
-                 and 10 but not at 8",
+                "the stream uses what cannot be decoded yet: mostly values that are foretold across seams, as encoders do \
+                 at levels 9 and 10 but not at 8",
             ),
             why => format!("the stream cannot be decoded: {why}"),
         })?;

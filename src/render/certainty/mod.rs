@@ -8,7 +8,7 @@
 //! leaving out each group in turn (J. W. Tukey's jackknife, 1958).
 //!
 //! Where few samples see what is bright, most pixels that have not met it yet look certain. So the samples of a pixel are taken
-//! to vary no less than those of the pixels beside it, of which half vary more.
+//! to vary no less than those of the fifth of the eight pixels beside it, in the order of how much they vary.
 //!
 //! A pixel is looked at again and again, and stops at the first look that is content. Were each look 95 % certain, all
 //! together would be less. See [`factor`] for what is done about it.

@@ -81,8 +81,8 @@ impl Around {
         });
     }
 
-    /// How much the samples of the pixels beside one vary, of which each has its own variance: a little more than of half of
-    /// them. A single sample that looks as all beside it does not.
+    /// How much the samples of the pixels beside one vary, of which each has its own variance: the fifth of eight in their
+    /// order, the middle of three and of five. A single sample that looks as all beside it does not.
     pub(super) fn variance(&self, pixels: &[Pixel], pixel: (u32, u32)) -> f32 {
         let middle = self.at(pixel);
         let (mut variances, mut known) = ([0.0_f32; 8], 0);
