@@ -5,9 +5,11 @@
 //! it crosses and not in others; so wherever a pixel that was looked at closer turns out to be uneven, all near it are
 //! looked at as closely, and those near them if they are uneven, too ([`Around::reopen`]).
 
+use super::first::First;
 use super::pixel::Pixel;
+use super::variances::Variances;
 use crate::render::certainty::{Certainty, Even, GROUPS, Range, Seen, Shown};
-use crate::render::tile::{End, Tile};
+use crate::render::tile::{End, PixelFacts, Tile};
 
 /// How many columns and rows from a pixel others are looked at as closely: from one on an edge, and from one with something
 /// thin, of which the next pixels may well show nothing.
@@ -26,13 +28,20 @@ pub(super) struct Around {
     numbers: Vec<u32>,
     /// What those pixels show, by number.
     seen: Vec<Seen>,
+    /// How much samples vary, place by place; a single one that looks as all beside it does not.
+    variances: Variances,
 }
 
 impl Around {
-    /// Nothing yet.
-    pub(super) fn new(tile: Tile) -> Self {
-        let places = (tile.x1 - tile.x0 + 2) as usize * (tile.y1 - tile.y0 + 2) as usize;
-        Self { tile, shown: Shown::nothing(places), numbers: vec![NONE; places], seen: Vec::new() }
+    /// What these first samples show of the pixels of a tile.
+    pub(super) fn new(tile: Tile, first: &[&First]) -> Self {
+        let columns = (tile.x1 - tile.x0 + 2) as usize;
+        let places = columns * (tile.y1 - tile.y0 + 2) as usize;
+        let (shown, variances) = (Shown::nothing(places), Variances::nothing(columns, places));
+        let mut around = Self { tile, shown, numbers: vec![NONE; places], seen: Vec::new(), variances };
+        first.iter().for_each(|first| first.show(&mut around));
+        (0..places).filter(|&at| around.shown.is_known(at)).for_each(|at| around.variances.learn(at, 0.0));
+        around
     }
 
     /// Places in a row.
@@ -59,6 +68,7 @@ impl Around {
         let at = self.at(pixel);
         self.numbers[at] = u32::try_from(number).unwrap_or(NONE);
         self.seen.push(self.shown.at(at));
+        self.variances.learn(at, 0.0);
     }
 
     /// What is seen at a place and beside it.
@@ -79,34 +89,38 @@ impl Around {
         judge.see_each(some.iter().map(|&i| pixels[i].taken()), |seen| {
             each.next().into_iter().for_each(|&i| self.seen[i] = *seen);
         });
+        for &i in some {
+            self.variances.learn(self.at(pixels[i].at), pixels[i].variance_of(self.seen[i].error));
+        }
     }
 
-    /// How much the samples of the pixels beside one vary, of which each has its own variance: the fifth of eight in their
-    /// order, the middle of three and of five. A single sample that looks as all beside it does not.
-    pub(super) fn variance(&self, pixels: &[Pixel], pixel: (u32, u32)) -> f32 {
-        let middle = self.at(pixel);
-        let (mut variances, mut known) = ([0.0_f32; 8], 0);
-        for row in [middle - self.columns(), middle, middle + self.columns()] {
-            for at in (row - 1..row + 2).filter(|&at| at != middle) {
-                let number = self.numbers[at] as usize;
-                variances[known] = match pixels.get(number) {
-                    Some(beside) => beside.variance().unwrap_or_else(|| self.variance_seen(beside, number)),
-                    None if self.shown.is_known(at) => 0.0,
-                    None => continue,
-                };
-                known += 1;
+    /// Finds out how certain the means of these pixels are, which have samples in each group.
+    ///
+    /// The few samples that see a light, or what glass shows of it, make both the mean of a pixel and what tells its error:
+    /// where hardly any did, it looks dark and certain. So its samples are taken to vary no less than those of the pixels
+    /// beside it.
+    pub(super) fn look(&mut self, judge: &Certainty, pixels: &mut [Pixel], some: &[usize], errors: &mut Vec<f32>) {
+        errors.clear();
+        judge.each_standard_error(some.iter().map(|&i| &pixels[i].groups[..]), |error| errors.push(error));
+        for (&i, &error) in some.iter().zip(&*errors) {
+            let variance = pixels[i].learn(error);
+            self.variances.learn(self.at(pixels[i].at), variance);
+        }
+        for &i in some {
+            let pixel = &mut pixels[i];
+            // What is not certain by itself is not with those beside it, either.
+            if pixel.used(judge) <= 1.0 {
+                self.compare(pixel);
+                pixel.look(judge);
             }
         }
-        let variances = &mut variances[..known];
-        variances.sort_unstable_by(f32::total_cmp);
-        variances.get(known.saturating_sub(1) * 4 / 7).copied().unwrap_or(0.0)
     }
 
-    /// That of a pixel whose samples were only looked at together with those beside it.
-    #[expect(clippy::cast_precision_loss, reason = "a handful of samples")]
-    fn variance_seen(&self, pixel: &Pixel, number: usize) -> f32 {
-        let error = self.seen[number].error;
-        error * error * pixel.facts.count as f32
+    /// Takes a pixel's samples to vary no less than those of the pixels beside it.
+    pub(super) fn compare(&self, pixel: &mut Pixel) {
+        if let Some(own) = pixel.variance() {
+            pixel.take_to_vary(self.variances.no_less_than(own, self.at(pixel.at)));
+        }
     }
 
     /// The pixels of `tile` beside some that seemed certain with so many samples or fewer, and are not, now that more is known
@@ -118,21 +132,19 @@ impl Around {
         (some, samples): (&[usize], u32),
         tile: Tile,
     ) -> Vec<usize> {
-        let mut late = Vec::new();
+        let (mut late, mut asked) = (Vec::new(), vec![false; pixels.len()]);
         for &pixel in some {
             let (x, y) = pixels[pixel].at;
             for y in y.saturating_sub(1).max(tile.y0)..(y + 2).min(tile.y1) {
                 for x in x.saturating_sub(1).max(tile.x0)..(x + 2).min(tile.x1) {
                     let number = self.numbers[self.at((x, y))] as usize;
-                    let Some(stopped) = pixels.get(number) else { continue };
-                    let (end, count) = (stopped.facts.end, stopped.facts.count);
-                    if end != End::Met || count > samples || stopped.variance().is_none() {
+                    let Some(stopped) = pixels.get_mut(number) else { continue };
+                    let PixelFacts { end, count, error, .. } = stopped.facts;
+                    if std::mem::replace(&mut asked[number], true) || end != End::Met || count > samples {
                         continue;
                     }
-                    let beside = self.variance(pixels, (x, y));
-                    let stopped = &mut pixels[number];
-                    stopped.compare(beside);
-                    if stopped.used(judge) > 1.0 {
+                    self.compare(stopped);
+                    if stopped.facts.error > error && stopped.used(judge) > 1.0 {
                         (stopped.facts.end, stopped.facts.spare) = (End::Ceiling, 0);
                         late.push(number);
                     }
@@ -205,97 +217,85 @@ mod tests {
 
     const TILE: Tile = Tile { x0: 4, y0: 7, x1: 7, y1: 10 };
 
-    /// Nine pixels that have eight samples each, those around the middle one half of the time this much lighter.
-    fn nine(judge: &Certainty, step: f32) -> (Around, Vec<Pixel>) {
-        let (mut around, mut pixels) = (Around::new(TILE), Vec::new());
-        for at in TILE.places() {
-            let step = if at == (5, 8) { 0.0 } else { step };
+    fn judge() -> Certainty<'static> {
+        Certainty::new(None, (None, false), false, 0.05, factor(0.95))
+    }
+
+    /// The pixels of a tile, each with so many samples, every other one of them this much lighter.
+    fn pixels(tile: Tile, samples: usize, step: impl Fn((u32, u32)) -> f32) -> (Around, Vec<Pixel>) {
+        let (mut around, mut pixels) = (Around::new(tile, &[]), Vec::new());
+        for at in tile.places() {
             let mut pixel = Pixel::new(3, at, false);
-            add(&mut pixel, step);
+            let light = |k: usize| Vec3::splat(step(at) * (k % 2) as f32);
+            let each = (0..samples).map(|k| Sample { radiance: light(k), through: Vec3::ZERO });
+            pixel.take(&each.collect::<Vec<_>>(), &[], 1);
             around.know(at, pixels.len());
             pixels.push(pixel);
         }
-        learn(judge, &mut pixels);
         (around, pixels)
     }
 
-    fn add(pixel: &mut Pixel, step: f32) {
-        let light = |k: usize| Sample { radiance: Vec3::splat(step * (k % 2) as f32), through: Vec3::ZERO };
-        pixel.take(&std::array::from_fn::<_, GROUPS, _>(light), &[], 1);
+    fn look(around: &mut Around, pixels: &mut [Pixel], some: &[usize]) {
+        around.look(&judge(), pixels, some, &mut Vec::new());
     }
 
-    fn learn(judge: &Certainty, pixels: &mut [Pixel]) {
-        for pixel in pixels {
-            let groups = pixel.groups;
-            judge.each_standard_error([&groups[..]].into_iter(), |error| pixel.learn(error));
-        }
+    /// The standard error of eight samples, four each of 0 and `step`.
+    fn error(step: f32) -> f32 {
+        (step * step / 4.0 / 7.0).sqrt()
+    }
+
+    /// What a pixel is told its error is, when all have been looked at.
+    fn told((around, pixels): &mut (Around, Vec<Pixel>), pixel: usize) -> f32 {
+        let all: Vec<usize> = (0..pixels.len()).collect();
+        look(around, pixels, &all);
+        around.compare(&mut pixels[pixel]);
+        pixels[pixel].facts.error
     }
 
     #[test]
     fn what_varies_less_than_all_around_it_is_no_more_certain_than_that() {
-        let judge = Certainty::new(None, (None, false), false, 0.05, factor(0.95));
         for (step, certain) in [(0.0, true), (0.02, true), (0.5, false)] {
-            let (around, mut pixels) = nine(&judge, step);
-            let beside = around.variance(&pixels, (5, 8));
-            pixels[4].compare(beside);
-            pixels[4].look(&judge);
-            assert_eq!(pixels[4].facts.end == End::Met, certain, "{step}: {}", pixels[4].facts.error);
-            // Of 0 and `step`, four each.
-            let expected = (step * step / 4.0 / 7.0).sqrt();
-            assert!((pixels[4].facts.error - expected).abs() < 1e-6, "{step}: {}", pixels[4].facts.error);
+            let mut nine = pixels(TILE, GROUPS, |at| if at == (5, 8) { 0.0 } else { step });
+            let told = told(&mut nine, 4);
+            assert!((told - error(step)).abs() < 1e-6, "{step}: {told}");
+            assert_eq!(nine.1[4].facts.end == End::Met, certain, "{step}: {told}");
         }
     }
 
     #[test]
     fn an_edge_beside_a_pixel_tells_nothing_of_it() {
-        let judge = Certainty::new(None, (None, false), false, 0.05, factor(0.95));
-        let (around, mut pixels) = nine(&judge, 0.5);
-        for i in [0, 1, 2, 3, 6] {
-            pixels[i].learn(0.0);
-        }
-        assert_eq!(around.variance(&pixels, (5, 8)), 0.0);
+        let light = |(x, y): (u32, u32)| if x == 4 || y == 7 && x < 7 { 0.0 } else { 0.5 };
+        let mut nine = pixels(TILE, GROUPS, |at| if at == (5, 8) { 0.0 } else { light(at) });
+        assert_eq!(told(&mut nine, 4), 0.0);
         // In a corner of a picture there are three beside it.
-        assert!(around.variance(&pixels, (6, 9)) > 0.0);
+        let mut nine = pixels(TILE, GROUPS, |at| if at == (6, 9) { 0.0 } else { light(at) });
+        assert!((told(&mut nine, 8) - error(0.5)).abs() < 1e-6);
     }
 
     /// As at the border of a tile, whose pixels alone get more samples.
     #[test]
     fn four_samples_of_the_pixels_around_a_tile_tell_how_much_they_vary() {
-        let judge = Certainty::new(None, (None, false), false, 0.05, factor(0.95));
-        let (mut around, mut pixels) = (Around::new(TILE), Vec::new());
-        for at in TILE.places() {
-            let mut pixel = Pixel::new(3, at, false);
-            let light = |k: usize| Sample { radiance: Vec3::splat(0.5 * (k % 2) as f32), through: Vec3::ZERO };
-            pixel.take(&[0, 1, 2, 3].map(light), &[], 1);
-            around.know(at, pixels.len());
-            pixels.push(pixel);
-        }
-        around.see(&judge, &pixels, &[0, 1, 2, 3, 4, 5, 6, 7, 8]);
+        let (mut around, mut pixels) = pixels(TILE, 4, |_| 0.5);
+        around.see(&judge(), &pixels, &[0, 1, 2, 3, 5, 6, 7, 8]);
+        pixels[4].take(&[Sample { radiance: Vec3::ZERO, through: Vec3::ZERO }; 4], &[], 1);
+        pixels[4].learn(0.0);
+        around.compare(&mut pixels[4]);
         // Of 0 and ½, two each.
-        let variance = around.variance(&pixels, (5, 8));
-        assert!((variance - 0.25 / 3.0).abs() < 1e-6, "{variance}");
+        let (told, expected) = (pixels[4].facts.error, (0.25_f32 / 3.0 / 8.0).sqrt());
+        assert!((told - expected).abs() < 1e-6, "{told}");
     }
 
     #[test]
     fn of_two_pixels_beside_one_in_a_single_row_an_edge_is_not_the_rule() {
-        let judge = Certainty::new(None, (None, false), false, 0.05, factor(0.95));
-        let tile = Tile { x0: 4, y0: 7, x1: 7, y1: 8 };
-        let (mut around, mut pixels) = (Around::new(tile), Vec::new());
-        for (at, step) in tile.places().zip([0.0, 0.0, 0.5]) {
-            let mut pixel = Pixel::new(3, at, false);
-            add(&mut pixel, step);
-            around.know(at, pixels.len());
-            pixels.push(pixel);
-        }
-        learn(&judge, &mut pixels);
-        assert_eq!(around.variance(&pixels, (5, 7)), 0.0);
+        let mut row = pixels(Tile { y1: 8, ..TILE }, GROUPS, |(x, _)| if x == 6 { 0.5 } else { 0.0 });
+        assert_eq!(told(&mut row, 1), 0.0);
     }
 
     #[test]
     fn a_pixel_that_was_certain_goes_on_when_those_around_it_turn_out_not_to_be() {
-        let judge = Certainty::new(None, (None, false), false, 0.05, factor(0.95));
-        let (around, mut pixels) = nine(&judge, 0.0);
-        pixels.iter_mut().for_each(|pixel| pixel.look(&judge));
+        let judge = judge();
+        let (mut around, mut pixels) = pixels(TILE, GROUPS, |_| 0.0);
+        look(&mut around, &mut pixels, &(0..9).collect::<Vec<_>>());
         let some: Vec<usize> = (0..9).filter(|&i| i != 4).collect();
         assert!(around.late(&judge, &mut pixels, (&some, 16), TILE).is_empty());
         for &i in &some {
@@ -303,7 +303,7 @@ mod tests {
             pixels[i].take(&[Sample { radiance: Vec3::ONE, through: Vec3::ZERO }; GROUPS], &[], 2);
             pixels[i].facts.end = End::Ceiling;
         }
-        learn(&judge, &mut pixels);
+        look(&mut around, &mut pixels, &some);
         assert_eq!(around.late(&judge, &mut pixels, (&some, 16), TILE), [4]);
         assert!(pixels[4].facts.end == End::Ceiling);
     }

@@ -11,6 +11,7 @@ mod first;
 mod pixel;
 mod places;
 mod shared;
+mod variances;
 
 use super::Settings;
 use super::certainty::{Certainty, GROUPS, SURE, output};
@@ -102,8 +103,7 @@ impl<'a> Sampler<'a> {
     ) -> Option<TilePixels> {
         let Self { judge, rounds, .. } = self;
         let reach = self.reach();
-        let mut around = Around::new(self.grown(tile, reach));
-        first.iter().for_each(|first| first.show(&mut around));
+        let mut around = Around::new(self.grown(tile, reach), first);
         let known = self.grown(tile, reach.saturating_sub(1));
         let (mut pixels, mut done) = (Vec::with_capacity(around.tile.pixels()), self.nothing(tile));
         // How many samples of each pixel are there already: those of the first round, or none.
@@ -139,26 +139,23 @@ impl<'a> Sampler<'a> {
                 around.judge(judge, &mut pixels, &active);
             }
             if to >= FIRST_LOOK {
-                look((judge, &around), &mut pixels, &active, &mut errors);
+                around.look(judge, &mut pixels, &active, &mut errors);
                 let mut news = active.clone();
                 while !news.is_empty() {
                     news = around.late(judge, &mut pixels, (&news, to), tile);
                     // Those with as many samples are active still.
                     active.extend(news.iter().filter(|&&i| pixels[i].facts.count < to));
                     self.catch_up(tracer, &mut places, (&mut pixels, &news), to)?;
-                    look((judge, &around), &mut pixels, &news, &mut errors);
+                    around.look(judge, &mut pixels, &news, &mut errors);
                 }
             }
             active.retain(|&i| pixels[i].facts.end == End::Ceiling);
             from = to;
         }
-        for i in 0..pixels.len() {
-            if pixels[i].variance().is_some() {
-                let beside = around.variance(&pixels, pixels[i].at);
-                pixels[i].compare(beside);
-                if pixels[i].facts.end == End::Met {
-                    pixels[i].look(judge);
-                }
+        for pixel in pixels.iter_mut().filter(|pixel| pixel.variance().is_some()) {
+            around.compare(pixel);
+            if pixel.facts.end == End::Met {
+                pixel.look(judge);
             }
         }
         self.put(&pixels, taken, &mut done);
@@ -306,21 +303,6 @@ fn rounds(how: &Stochastic, settings: &Settings) -> impl Iterator<Item = u32> + 
 /// samples.
 fn looks(rounds: &[u32]) -> usize {
     if rounds[0] < SURE { 2 } else { 1 }
-}
-
-/// Finds out how certain the means of these pixels are.
-///
-/// The few samples that see a light, or what glass shows of it, make both the mean of a pixel and what tells its error: where
-/// hardly any did, it looks dark and certain. So its samples are taken to vary no less than those of the pixels beside it.
-fn look((judge, around): (&Certainty, &Around), pixels: &mut [Pixel], active: &[usize], errors: &mut Vec<f32>) {
-    errors.clear();
-    judge.each_standard_error(active.iter().map(|&i| &pixels[i].groups[..]), |error| errors.push(error));
-    active.iter().zip(&*errors).for_each(|(&i, &error)| pixels[i].learn(error));
-    for &i in active {
-        let beside = around.variance(pixels, pixels[i].at);
-        pixels[i].compare(beside);
-        pixels[i].look(judge);
-    }
 }
 
 #[cfg(test)]

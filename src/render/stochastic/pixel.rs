@@ -92,9 +92,17 @@ impl Pixel {
         &self.groups[..GROUPS.min(self.facts.count as usize)]
     }
 
-    /// Learns the standard error of its mean from its own samples.
-    pub(super) fn learn(&mut self, error: f32) {
-        self.variance = Some(error * error * self.samples());
+    /// Learns the standard error of its mean from its own samples; the variance of one of these.
+    pub(super) fn learn(&mut self, error: f32) -> f32 {
+        let variance = self.variance_of(error);
+        self.take_to_vary(variance);
+        *self.variance.insert(variance)
+    }
+
+    /// The variance of one of its samples whose mean has this standard error.
+    pub(super) fn variance_of(&self, error: f32) -> f32 {
+        // Of light without end it is no number.
+        (error * error * self.samples()).max(0.0)
     }
 
     /// The variance of one of its samples; `None` as long as there are too few.
@@ -102,9 +110,9 @@ impl Pixel {
         self.variance
     }
 
-    /// Takes its samples to vary as those of the pixels beside it, where its own vary less.
-    pub(super) fn compare(&mut self, beside: f32) {
-        self.facts.error = (self.variance.unwrap_or(0.0).max(beside) / self.samples()).sqrt();
+    /// Takes its samples to vary so much.
+    pub(super) fn take_to_vary(&mut self, variance: f32) {
+        self.facts.error = (variance / self.samples()).sqrt();
     }
 
     /// Finds out how certain the mean is, whose standard error is known.

@@ -1,0 +1,88 @@
+//! How much the samples of pixels vary, place by place.
+
+/// The variance of one sample of each pixel; NaN where nothing is known of it.
+pub(super) struct Variances {
+    columns: usize,
+    each: Vec<f32>,
+}
+
+impl Variances {
+    /// Of as many places, so many in a row, nothing yet.
+    pub(super) fn nothing(columns: usize, places: usize) -> Self {
+        Self { columns, each: vec![f32::NAN; places] }
+    }
+
+    /// Learns that of a place.
+    pub(super) fn learn(&mut self, at: usize, variance: f32) {
+        self.each[at] = variance;
+    }
+
+    /// `own`, or that of the pixels beside a place if it is more: the fifth of eight in their order, the middle of three and
+    /// of five.
+    pub(super) fn no_less_than(&self, own: f32, at: usize) -> f32 {
+        let row = |middle: usize| [self.each[middle - 1], self.each[middle], self.each[middle + 1]];
+        let [a, b, c] = row(at - self.columns);
+        let [d, _, e] = row(at);
+        let [f, g, h] = row(at + self.columns);
+        let beside = [a, b, c, d, e, f, g, h];
+        let known = beside.iter().filter(|variance| !variance.is_nan()).count();
+        // How many are no less than the one that counts, it among them.
+        let upper = known - known.saturating_sub(1) * 4 / 7;
+        let more = beside.iter().filter(|&&variance| variance > own).count();
+        if more < upper || known == 0 {
+            return own;
+        }
+        let mut above = beside.map(|variance| if variance > own { variance } else { f32::NEG_INFINITY });
+        above.sort_unstable_by(|a, b| b.total_cmp(a));
+        above[upper - 1]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of the middle of nine places.
+    fn no_less_than(own: f32, beside: [f32; 8]) -> f32 {
+        let mut variances = Variances::nothing(3, 9);
+        for (at, variance) in [0, 1, 2, 3, 5, 6, 7, 8].into_iter().zip(beside) {
+            variances.learn(at, variance);
+        }
+        variances.no_less_than(own, 4)
+    }
+
+    #[test]
+    fn the_fifth_of_eight_counts_where_it_is_more_than_a_pixels_own() {
+        let beside = [3.0, 8.0, 1.0, 7.0, 4.0, 6.0, 5.0, 2.0];
+        for (own, expected) in [(0.0, 5.0), (4.9, 5.0), (5.0, 5.0), (5.1, 5.1), (9.0, 9.0)] {
+            assert_eq!(no_less_than(own, beside), expected, "{own}");
+        }
+    }
+
+    #[test]
+    fn at_the_border_of_a_picture_it_is_the_middle_of_those_there_are() {
+        let nan = f32::NAN;
+        assert_eq!(no_less_than(0.0, [nan, nan, nan, 3.0, 1.0, nan, 2.0, nan]), 2.0);
+        assert_eq!(no_less_than(0.0, [nan, nan, nan, 3.0, 1.0, 5.0, 2.0, 4.0]), 3.0);
+        assert_eq!(no_less_than(0.0, [nan, nan, nan, 3.0, 1.0, nan, nan, nan]), 1.0);
+        assert_eq!(no_less_than(0.0, [nan, nan, nan, 3.0, nan, nan, nan, nan]), 3.0);
+        assert_eq!(no_less_than(2.0, [nan; 8]), 2.0);
+    }
+
+    #[test]
+    fn it_is_what_putting_all_of_them_in_order_finds() {
+        let mut random = crate::math::random::Random::new(5);
+        for _ in 0..2000 {
+            let mut draw = || match random.below(5) {
+                0 => f32::NAN,
+                n => (n - 1) as f32 * 0.25 * random.below(3) as f32,
+            };
+            let beside: [f32; 8] = std::array::from_fn(|_| draw());
+            let own = draw().max(0.0);
+            let mut known: Vec<f32> = beside.into_iter().filter(|variance| !variance.is_nan()).collect();
+            known.sort_unstable_by(f32::total_cmp);
+            let middle = known.get(known.len().saturating_sub(1) * 4 / 7).copied().unwrap_or(0.0);
+            assert_eq!(no_less_than(own, beside), own.max(middle), "{beside:?}, {own}");
+        }
+    }
+}
