@@ -7,6 +7,7 @@
 use super::args::{Cli, Command, RenderArgs};
 use super::camera::{Choice, LensChoice};
 use super::exit::Exit;
+use super::fresh;
 use super::job::{Batch, Look, RenderJob, Shot};
 use super::parse::{self, Env};
 use super::picture::Effective;
@@ -287,6 +288,13 @@ pub(super) fn metadata(facts: &Facts, counted: Option<&Counted>) -> Metadata {
         .with(Metadata::SETTINGS, Value::Object(facts.settings()).to_string())
         .with(Metadata::INPUT, Value::from(facts.inputs()).to_string())
         .with(Metadata::INPUT_HASH, facts.hash());
+    let made_of = match &facts.job.again {
+        // As that of the picture that is repeated.
+        Some(_) => facts.job.made_of.clone(),
+        None if facts.job.update => fresh::made_of(facts.job, facts.batch, facts.shot, facts.loaded),
+        None => None,
+    };
+    let metadata = made_of.into_iter().fold(metadata, |metadata, text| metadata.with(Metadata::MADE_OF, text));
     match counted {
         Some(counted) => metadata.with(Metadata::COUNTS, counted.json().to_string()),
         None => metadata,
@@ -299,6 +307,8 @@ pub(super) struct Repeat {
     pub args: RenderArgs,
     /// The hash its inputs must have.
     pub hash: String,
+    /// What it was made of, if it says so.
+    pub made_of: Option<String>,
     /// Said when another version of meshray wrote it.
     pub warning: Option<Diagnostic>,
 }
@@ -339,7 +349,8 @@ fn repeat_from(metadata: Option<Metadata>, picture: &Path, typed: &RenderArgs) -
             format!("written by meshray {version}; this is {}, which may draw it otherwise", super::version::SHORT);
         Diagnostic::new("again-version", picture, "", text)
     });
-    Ok(Repeat { args: with_typed(args, inputs, typed), hash, warning })
+    let made_of = metadata.get(Metadata::MADE_OF).map(str::to_owned);
+    Ok(Repeat { args: with_typed(args, inputs, typed), hash, made_of, warning })
 }
 
 /// Where an input is that a picture names: where it was named from, or beside the picture, for which the hash will tell

@@ -2,12 +2,12 @@
 
 use super::args::{AccelArgs, Axis, FileType, MessageFormat, MtlArg, PolygonsArg, RenderArgs, StatsFormat};
 use super::camera::{Choice, LensChoice};
-use super::message;
 use super::output_name::{Facts, Naming};
-use super::outputs::{self, Beside, Target};
+use super::outputs::{self, Beside, Growth, Target};
 use super::parse::Env;
 use super::sampling::{SamplingArgs, SpaceArg};
 use super::sequence::{self, Sequence, Step};
+use super::{folders, message};
 use crate::accel::{AccelChoice, AccelKind, AccelParams, IntersectorKind};
 use crate::image::{ExrSamples, FileKind, PngDepth, ToneMap};
 use crate::load::{Limits, LoadOptions, MtlMode, Polygons};
@@ -63,10 +63,14 @@ pub(super) struct RenderJob {
     pub allow_empty: bool,
     /// Whether pictures are only foretold.
     pub dry_run: bool,
+    /// Pictures that are up to date are left alone, and the others say what they are made of.
+    pub update: bool,
     /// Keep the tiles that are done on Ctrl-C.
     pub keep_partial: bool,
     /// The picture that is repeated.
     pub again: Option<PathBuf>,
+    /// What that says it was made of.
+    pub made_of: Option<String>,
     /// The hash that the inputs must have (`--again`), in hexadecimal.
     pub expected_hash: Option<String>,
 }
@@ -91,6 +95,8 @@ pub(super) struct Shot {
     pub target: Target,
     /// As what.
     pub kind: FileKind,
+    /// Whether folders are made for it.
+    pub growth: Growth,
 }
 
 /// What the command line says about the picture; `None`: nothing.
@@ -181,8 +187,10 @@ impl RenderJob {
             strict: args.strict,
             allow_empty: args.allow_empty,
             dry_run: args.dry_run,
+            update: args.update,
             keep_partial: args.keep_partial,
             again: None,
+            made_of: None,
             expected_hash: None,
             sequence,
             batches,
@@ -281,13 +289,15 @@ fn batches(args: &RenderArgs, choices: &[Choice], sequence: Option<&Sequence>) -
     let mut batches = Vec::new();
     let mut frame = 0;
     for inputs in groups {
-        let mut shots = Vec::new();
+        let (mut shots, sub) = (Vec::new(), folders::way_below(&args.folders, &inputs[0]));
         for (step, choice) in steps.iter().flat_map(|step| choices.iter().map(move |choice| (step, choice))) {
             frame += 1;
-            let facts = Facts { input: &inputs[0], view: &choice.name(), frame: step.number.unwrap_or(frame) };
-            let naming = Naming { several_views: choices.len() > 1, numbered: step.number.is_some() };
-            let (target, kind) = outputs::target(args, &facts, naming)?;
-            shots.push(Shot { choice: choice.clone(), step: step.clone(), target, kind });
+            let facts =
+                Facts { input: &inputs[0], sub: &sub, view: &choice.name(), frame: step.number.unwrap_or(frame) };
+            let (several_views, numbered) = (choices.len() > 1, step.number.is_some());
+            let naming = Naming { several_views, numbered, mirrors: sub != Path::new(".") };
+            let (target, kind, growth) = outputs::target(args, &facts, naming)?;
+            shots.push(Shot { choice: choice.clone(), step: step.clone(), target, kind, growth });
         }
         batches.push(Batch { inputs, shots });
     }

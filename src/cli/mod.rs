@@ -13,6 +13,8 @@ mod diff;
 mod dry_run;
 mod exit;
 mod explain;
+mod folders;
+mod fresh;
 mod generate;
 mod inspect;
 mod interrupt;
@@ -123,14 +125,14 @@ fn misunderstood(error: &clap::Error, format: message::Format) -> Exit {
 
 fn render_command(typed: &RenderArgs) -> Exit {
     let messages = Messages::new(typed.messages.into(), typed.quiet);
-    let mut expected_hash = None;
+    let (mut expected_hash, mut made_of) = (None, None);
     let mut args = typed.clone();
     if let Some(picture) = &typed.again {
         match again::repeat(picture, typed) {
             Ok(repeat) => {
                 repeat.warning.iter().for_each(|w| messages.say(Severity::Warning, w));
                 args = repeat.args;
-                expected_hash = Some(repeat.hash);
+                (expected_hash, made_of) = (Some(repeat.hash), repeat.made_of);
             }
             Err((fault, exit)) => {
                 messages.say(Severity::Error, &fault);
@@ -138,8 +140,17 @@ fn render_command(typed: &RenderArgs) -> Exit {
             }
         }
     }
+    match folders::unfold(&args.inputs) {
+        Ok(models) => (args.folders, args.inputs) = (folders::of(&args.inputs), models),
+        Err((fault, exit)) => {
+            messages.say(Severity::Error, &fault);
+            return exit;
+        }
+    }
     match job::RenderJob::new(&args) {
-        Ok(job) => render::run(&job::RenderJob { expected_hash, again: typed.again.clone(), ..job }, &messages),
+        Ok(job) => {
+            render::run(&job::RenderJob { expected_hash, made_of, again: typed.again.clone(), ..job }, &messages)
+        }
         Err(job::Wrong(text)) => {
             messages.error("usage", text, "");
             Exit::Usage

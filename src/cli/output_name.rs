@@ -1,7 +1,8 @@
 //! Where pictures go: templates, default names, and names that would collide.
 //!
-//! Templates know `{dir}` (the input's folder), `{stem}` (its name without extension), `{ext}` (its extension), `{view}` and
-//! `{frame}` (number of the picture: in its sequence, or else in this run, from 1; `{frame:04}` pads it with zeros). `{{` and `}}` are plain braces.
+//! Templates know `{dir}` (the input's folder), `{sub}` (the way to there from the folder that was named, `.` if that is the
+//! same), `{stem}` (its name without extension), `{ext}` (its extension), `{view}` and `{frame}` (number of the picture: in
+//! its sequence, or else in this run, from 1; `{frame:04}` pads it with zeros). `{{` and `}}` are plain braces.
 
 use crate::image::destination;
 use crate::load::paths::lexical;
@@ -14,13 +15,15 @@ use std::path::{Path, PathBuf};
 pub(super) struct Facts<'a> {
     /// The input, or `-`.
     pub input: &'a Path,
+    /// The way to its folder from the one that was named.
+    pub sub: &'a Path,
     /// Name of the view or camera.
     pub view: &'a str,
     /// Number of the picture: in its sequence, or else in this run, from 1.
     pub frame: u32,
 }
 
-const FIELDS: [&str; 5] = ["dir", "stem", "ext", "view", "frame"];
+const FIELDS: [&str; 6] = ["dir", "sub", "stem", "ext", "view", "frame"];
 
 /// The input's name without folder and extension; `stdin` for `-`.
 pub(super) fn stem(input: &Path) -> String {
@@ -58,6 +61,7 @@ fn value(field: &str, facts: &Facts) -> Result<String, String> {
     }
     match name {
         "dir" => Ok(folder(facts.input)),
+        "sub" => Ok(facts.sub.to_string_lossy().into_owned()),
         "stem" => Ok(stem(facts.input)),
         "ext" => Ok(facts.input.extension().unwrap_or_default().to_string_lossy().into_owned()),
         "view" => Ok(facts.view.replace(['/', '\\', '\0'], "_")),
@@ -68,7 +72,7 @@ fn value(field: &str, facts: &Facts) -> Result<String, String> {
         _ => {
             let hint = nearest(name, FIELDS).map_or_else(String::new, |n| format!("; did you mean {{{n}}}?"));
             Err(format!(
-                "`{{{field}}}` is not a known field; use {{dir}}, {{stem}}, {{ext}}, {{view}} or {{frame:04}}{hint}"
+                "`{{{field}}}` is not a known field; use {{dir}}, {{sub}}, {{stem}}, {{ext}}, {{view}} or {{frame:04}}{hint}"
             ))
         }
     }
@@ -92,6 +96,15 @@ pub(super) struct Naming {
     pub several_views: bool,
     /// Pictures of a sequence.
     pub numbered: bool,
+    /// Inputs from below a folder, which is drawn as one.
+    pub mirrors: bool,
+}
+
+/// The folder below which a template makes folders of its own, that in front of `{sub}`; `None` if it has none such.
+pub(super) fn grows_in(template: &str, facts: &Facts) -> Result<Option<PathBuf>, String> {
+    let Some((before, _)) = template.split_once("{sub}") else { return Ok(None) };
+    let folder = before.rsplit_once('/').map_or(".", |(folder, _)| if folder.is_empty() { "/" } else { folder });
+    fill(folder, facts).map(Some)
 }
 
 /// The template that is used when none is given, or when only a folder is.
@@ -102,9 +115,10 @@ pub(super) fn default_template(folder: Option<&str>, naming: Naming, extension: 
         (false, true) => "{stem}.{frame:04}",
         (true, true) => "{stem}-{view}.{frame:04}",
     };
+    let sub = if naming.mirrors { "{sub}/" } else { "" };
     match folder {
-        Some(folder) => format!("{}/{name}.{extension}", escape(folder.trim_end_matches('/'))),
-        None => format!("{name}.{extension}"),
+        Some(folder) => format!("{}/{sub}{name}.{extension}", escape(folder.trim_end_matches('/'))),
+        None => format!("{sub}{name}.{extension}"),
     }
 }
 
@@ -141,7 +155,7 @@ mod tests {
     use super::*;
 
     fn facts(input: &str) -> Facts<'_> {
-        Facts { input: Path::new(input), view: "front", frame: 7 }
+        Facts { input: Path::new(input), sub: Path::new("b/c"), view: "front", frame: 7 }
     }
 
     #[test]
@@ -198,8 +212,21 @@ mod tests {
 
     #[test]
     fn a_folder_with_braces_is_taken_literally() {
-        let template = default_template(Some("{x}/"), Naming { several_views: true, numbered: false }, "exr");
+        let naming = Naming { several_views: true, ..Naming::default() };
+        let template = default_template(Some("{x}/"), naming, "exr");
         assert_eq!(fill(&template, &facts("a.obj")).unwrap(), Path::new("{x}/a-front.exr"));
+        let template = default_template(Some("{x}/"), Naming { mirrors: true, ..naming }, "exr");
+        assert_eq!(fill(&template, &facts("a.obj")).unwrap(), Path::new("{x}/b/c/a-front.exr"));
+        assert_eq!(grows_in(&template, &facts("a.obj")), Ok(Some("{x}".into())));
+    }
+
+    #[test]
+    fn folders_grow_where_the_way_below_one_begins() {
+        let grows_in = |template: &str| grows_in(template, &facts("a.obj")).unwrap();
+        assert_eq!(grows_in("{sub}/{stem}.png"), Some(".".into()));
+        assert_eq!(grows_in("/{sub}/{stem}.png"), Some("/".into()));
+        assert_eq!(grows_in("x/{view}/of-{sub}/{stem}.png"), Some("x/front".into()));
+        assert_eq!(grows_in("x/{stem}.png"), None);
     }
 
     #[test]

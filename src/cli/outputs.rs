@@ -5,7 +5,9 @@ use super::camera::Choice;
 use super::job::{Batch, Shot, Stats, Wrong, wrong};
 use super::output_name::{self, Facts, Naming};
 use crate::image::FileKind;
+use crate::load::Diagnostic;
 use crate::render::Cost;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Where a picture goes.
@@ -29,18 +31,22 @@ impl Target {
     }
 }
 
+/// The folder below which others may be made for a picture, if there is one.
+pub(super) type Growth = Option<PathBuf>;
+
 /// Where the next picture goes, and as what.
-pub(super) fn target(args: &RenderArgs, facts: &Facts, naming: Naming) -> Result<(Target, FileKind), Wrong> {
+pub(super) fn target(args: &RenderArgs, facts: &Facts, naming: Naming) -> Result<(Target, FileKind, Growth), Wrong> {
     let format = args.format.map(FileKind::from);
     let usual = |folder| output_name::default_template(folder, naming, format.unwrap_or(FileKind::Png).extension());
     let (template, kept): (String, fn(PathBuf) -> Target) = match args.output.as_deref() {
-        Some("-") => return Ok((Target::Stdout, format.unwrap_or(FileKind::Png))),
+        Some("-") => return Ok((Target::Stdout, format.unwrap_or(FileKind::Png), None)),
         Some("") => return wrong("-o needs a name"),
         Some(folder) if folder.ends_with('/') || Path::new(folder).is_dir() => (usual(Some(folder)), Target::Default),
         Some(template) => (template.to_owned(), Target::Named),
         None => (usual(None), Target::Default),
     };
     let path = output_name::fill(&template, facts).map_err(Wrong)?;
+    let growth = output_name::grows_in(&template, facts).map_err(Wrong)?;
     let kind = match (format, FileKind::from_path(&path)) {
         (Some(typed), Ok(named)) if typed != named => {
             let (path, format) = (path.display(), typed.extension());
@@ -49,7 +55,7 @@ pub(super) fn target(args: &RenderArgs, facts: &Facts, naming: Naming) -> Result
         (Some(kind), _) | (None, Ok(kind)) => kind,
         (None, Err(e)) => return wrong(format!("{e}, or say --format")),
     };
-    Ok((kept(path), kind))
+    Ok((kept(path), kind, growth))
 }
 
 /// What is written beside each picture, under a name made from its own.
@@ -85,6 +91,15 @@ fn files<'a>(shots: impl Iterator<Item = &'a Shot>, beside: Beside) -> Vec<PathB
     shots.flat_map(|shot| of(shot, beside)).filter_map(|target| target.path().map(Path::to_path_buf)).collect()
 }
 
+/// Makes the folder of a picture, if it is one that may be made.
+pub(super) fn make_folder(shot: &Shot) -> Result<(), Diagnostic> {
+    let folder = shot.growth.as_ref().and_then(|_| shot.target.path()?.parent());
+    let Some(folder) = folder.filter(|folder| !folder.as_os_str().is_empty()) else { return Ok(()) };
+    fs::create_dir_all(folder).map_err(|error| {
+        Diagnostic::new("output-folder", folder, "", format!("cannot be made: {error}")).remedy("name another with -o")
+    })
+}
+
 /// Refuses two pictures of one name.
 pub(super) fn refuse_collisions(batches: &[Batch]) -> Result<(), Wrong> {
     let shots: Vec<(&Path, &Shot)> =
@@ -104,8 +119,11 @@ pub(super) fn refuse_collisions(batches: &[Batch]) -> Result<(), Wrong> {
         let parts = if parts.is_empty() { String::new() } else { format!(" ({})", parts.join(", ")) };
         format!("{}{parts}", input.display())
     };
+    // Most often one model in two types of file.
+    let types = [a, b].map(|i| shots[i].0.extension());
+    let example = if types[0] == types[1] { "" } else { ", as in 'thumbs/{sub}/{stem}.{ext}.png'" };
     wrong(format!(
-        "{} and {} would both be written to {}; use {{dir}}, {{stem}}, {{ext}}, {{view}} or {{frame:04}} in -o",
+        "{} and {} would both be written to {}; use {{dir}}, {{sub}}, {{stem}}, {{ext}}, {{view}} or {{frame:04}} in -o{example}",
         what(a),
         what(b),
         names[b].display()

@@ -12,7 +12,7 @@ use super::sequence::{Step, Survey};
 use super::shot::{self, Stage, Task};
 use super::stats::{self, PictureStats};
 use super::writable::{self, Sources};
-use super::{accident, again, interrupt, read, surroundings, unseen};
+use super::{accident, again, fresh, interrupt, read, surroundings, unseen};
 use crate::bench::report::number::so_many;
 use crate::image::destination;
 use crate::load::{Diagnostic, LoadOptions, Loaded};
@@ -39,6 +39,7 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
         missing: HashSet::new(),
         unseen: HashSet::new(),
         sources,
+        up_to_date: 0,
         pictures: Vec::new(),
         foretold: Vec::new(),
     };
@@ -65,8 +66,19 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
         let (pictures, scenes) = (so_far.pictures.len() as u64, job.batches.len());
         let failed = if failed == 0 { String::new() } else { format!(", {failed} of them failed") };
         let pictures = so_many(pictures, "picture");
+        let fresh = if job.update { format!(", {} up to date", so_far.up_to_date) } else { String::new() };
         let warnings = so_many(u64::from(messages.warnings()), "warning");
-        messages.info("batch", format!("{pictures} of {scenes} inputs{failed}, {warnings}"));
+        messages.info("batch", format!("{pictures} of {scenes} inputs{fresh}{failed}, {warnings}"));
+    }
+    match &job.batches[..] {
+        [only] if so_far.up_to_date == 1 && only.shots.len() == 1 => {
+            let picture = only.shots[0].target.path().unwrap_or(Path::new("-")).display();
+            messages.info("up-to-date", format!("{picture} is up to date"));
+        }
+        [_] if so_far.up_to_date > 0 => {
+            messages.info("up-to-date", format!("{} are up to date", so_many(so_far.up_to_date, "picture")));
+        }
+        _ => {}
     }
     worst.max(report(job, &so_far, messages))
 }
@@ -81,6 +93,8 @@ pub(super) struct SoFar {
     pub unseen: HashSet<(PathBuf, String)>,
     /// All inputs, and the files that those loaded so far use.
     pub sources: Sources,
+    /// How many pictures were left alone, as they are up to date.
+    pub up_to_date: u64,
     /// Statistics of each.
     pub pictures: Vec<PictureStats>,
     /// What was foretold of each, where that goes to a file.
@@ -105,8 +119,13 @@ fn render_batch(job: &RenderJob, batch: &Batch, messages: &Messages, so_far: &mu
     let mut worst = Exit::Done;
     let mut shots = Vec::new();
     for shot in &batch.shots {
+        if job.update && fresh::is_up_to_date(job, batch, shot) {
+            so_far.up_to_date += 1;
+            continue;
+        }
         let mut targets = outputs::of(shot, job.beside()).into_iter();
-        match targets.try_for_each(|target| writable::check_target(&target, &so_far.sources)) {
+        let growth = shot.growth.as_deref();
+        match targets.try_for_each(|target| writable::check_target(&target, growth, &so_far.sources)) {
             Ok(()) => shots.push(shot),
             Err(fault) => {
                 // Of pictures for a folder that is not there, one says so.
@@ -153,6 +172,10 @@ fn render_shots(task: &Task, shots: &[&Shot], so_far: &mut SoFar) -> Result<Exit
         }
         let mut stage = ready.stage(survey.as_ref());
         for shot in now {
+            if job.update && fresh::is_as_loaded(job, batch, shot, stage.loaded) {
+                so_far.up_to_date += 1;
+                continue;
+            }
             worst = worst.max(shot::render(task, shot, &mut stage, so_far).unwrap_or_else(|exit| exit));
             if interrupt::raised() {
                 return Err(Exit::Interrupted);
@@ -161,7 +184,8 @@ fn render_shots(task: &Task, shots: &[&Shot], so_far: &mut SoFar) -> Result<Exit
         drop(stage);
         (earlier, profile) = (Some(ready), Profile::new());
     }
-    if survey.is_some() && !so_far.shown && !job.dry_run && worst == Exit::Done {
+    let all = shots.len() == batch.shots.len();
+    if survey.is_some() && all && !so_far.shown && !job.dry_run && worst == Exit::Done {
         messages.say(Severity::Warning, &unseen::sequence(shots.len(), task.file()));
         if job.strict {
             let text = "--strict, and there is a warning; the pictures were written before it was known";

@@ -5,6 +5,7 @@ use super::parse::Env;
 use super::picture;
 use super::read;
 use crate::load::panorama::{self, LoadedPanorama};
+use crate::load::paths::FileRead;
 use crate::load::{Limits, LoadError, Loaded};
 use crate::scene::default_light::{self, DefaultLight};
 use crate::scene::{Camera, Environment, LightKind, Scene};
@@ -26,7 +27,7 @@ pub(super) fn place(look: &Look, limits: &Limits, loaded: &mut Loaded) -> Result
             loaded.scene.environment = Environment::Panorama;
             loaded.scene.panorama = Some(panorama);
             loaded.warnings.extend(warnings);
-            loaded.facts.files.push(file.clone());
+            loaded.facts.files.push(FileRead { path: file.clone(), hash });
             let hashes = [loaded.facts.hash, hash].map(u128::to_le_bytes);
             loaded.facts.hash = xxh3_128(hashes.as_flattened());
         }

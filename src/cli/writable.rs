@@ -62,14 +62,22 @@ pub(super) fn check(path: &Path, flag: &str, sources: &Sources) -> Result<(), Di
 }
 
 /// Whether a picture may go there: to a pipe or a file behind standard output, or under a name that it may replace.
-pub(super) fn check_target(target: &Target, sources: &Sources) -> Result<(), Diagnostic> {
+///
+/// Below `growth` folders are made, and need not be there.
+pub(super) fn check_target(target: &Target, growth: Option<&Path>, sources: &Sources) -> Result<(), Diagnostic> {
     let Some(path) = target.path() else {
         use std::io::IsTerminal;
         let text = "standard output is a terminal, which shows no pictures";
         let fault = Diagnostic::new("output-terminal", "", "", text).remedy("redirect it, or name a file with -o");
         return if std::io::stdout().is_terminal() { Err(fault) } else { Ok(()) };
     };
-    check(path, "-o", sources)?;
+    let grows = |base: &Path| {
+        base.is_dir() && path.parent().is_some_and(|folder| folder.starts_with(base) || base == Path::new("."))
+    };
+    match check(path, "-o", sources) {
+        Err(fault) if fault.code == NO_FOLDER && growth.is_some_and(grows) => return Ok(()),
+        checked => checked?,
+    }
     if matches!(target, Target::Default(_)) && path.exists() && !was_written_by_meshray(path) {
         let fault = Diagnostic::new("output-not-ours", path, "", "exists and is no picture that meshray wrote");
         return Err(fault.remedy("move it away, or name another output with -o"));

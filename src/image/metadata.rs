@@ -36,6 +36,9 @@ impl Metadata {
     pub const INPUT: &'static str = "meshray:input";
     /// Hash of the bytes of every file read, in hexadecimal.
     pub const INPUT_HASH: &'static str = "meshray:input-hash";
+    /// What it was made of, by which `--update` knows whether it is up to date, as a JSON object: hashes of what was asked
+    /// and of each file, in hexadecimal.
+    pub const MADE_OF: &'static str = "meshray:made-of";
     /// Counts of a counted run, as a JSON object.
     pub const COUNTS: &'static str = "meshray:counts";
 

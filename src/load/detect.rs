@@ -4,6 +4,7 @@
 
 use super::stl::{self, Encoding};
 use super::{Diagnostic, Source};
+use std::path::Path;
 
 /// The kinds of file that can be loaded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,6 +103,12 @@ pub(super) fn detect(source: &Source) -> Result<Format, Diagnostic> {
         return Err(foreign(source, kind));
     }
     by_lines(text).ok_or_else(|| foreign(source, if bytes.is_empty() { "empty" } else { "of an unknown kind" }))
+}
+
+/// Whether a file is called as models are.
+pub(crate) fn is_called_a_model(path: &Path) -> bool {
+    let is = |known: &&str| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(known));
+    ["glb", "gltf", "obj", "ply", "stl", "nff"].iter().any(is)
 }
 
 fn foreign(source: &Source, kind: &str) -> Diagnostic {

@@ -3,7 +3,7 @@
 //! Files a user gives are not trusted: other files they name are read only below [`LoadOptions::root`], sizes are
 //! checked before memory is taken, and whatever is broken ends in a [`LoadError`] or in a warning, never in a panic.
 
-mod detect;
+pub(crate) mod detect;
 pub mod diagnostic;
 pub mod gltf;
 mod ktx;
@@ -28,6 +28,7 @@ pub use limits::Limits;
 pub use wires::WireFacts;
 
 use limits::{Budget, OverBudget};
+use paths::FileRead;
 
 use crate::scene::{Scene, UpAxis};
 use crate::stopwatch::{Spent, Stopwatch};
@@ -149,7 +150,7 @@ pub struct Facts {
     /// ([`World::rounding`](crate::render::World::rounding)).
     pub max_rounding: f64,
     /// Every file read: the model first, then buffers, images, MTLs. For the input hash and `inspect`.
-    pub files: Vec<PathBuf>,
+    pub files: Vec<FileRead>,
     /// xxh3-128 of the xxh3-128 hashes of all files in `files`, in that order (see [`paths::Resolver::finish`]); of the
     /// files of a model that a scene file shows the first counts with the hash of the model, and the others with 0.
     pub hash: u128,

@@ -13,6 +13,21 @@ use std::io;
 use std::path::{Component, Path, PathBuf};
 use xxhash_rust::xxh3::xxh3_128;
 
+/// A file that was read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FileRead {
+    /// As it was named, or beside the file that names it.
+    pub path: PathBuf,
+    /// xxh3-128 of its bytes.
+    pub hash: u128,
+}
+
+impl AsRef<Path> for FileRead {
+    fn as_ref(&self) -> &Path {
+        &self.path
+    }
+}
+
 /// Reads the files that a model names.
 #[derive(Clone, Debug)]
 pub struct Resolver {
@@ -22,7 +37,8 @@ pub struct Resolver {
     root: PathBuf,
     /// Those of a file.
     limits: Limits,
-    read: Vec<(PathBuf, u128)>,
+    /// Each with what it counts for in the hash of all.
+    read: Vec<(FileRead, u128)>,
     /// Canonical path -> index into `read`.
     known: HashMap<PathBuf, usize>,
     /// What lies in the folders that were looked through for a name in another case: names by their small letters.
@@ -262,23 +278,24 @@ impl Resolver {
 
     fn note(&mut self, canonical: PathBuf, shown: PathBuf, bytes: &[u8]) {
         self.known.entry(canonical).or_insert_with(|| {
-            self.read.push((shown, xxh3_128(bytes)));
+            let hash = xxh3_128(bytes);
+            self.read.push((FileRead { path: shown, hash }, hash));
             self.read.len() - 1
         });
     }
 
     /// Adds the files of a model that was loaded on behalf of this one; `hash` is that of all of them.
-    pub fn absorb(&mut self, files: &[PathBuf], hash: u128) {
-        let rest = files.iter().skip(1).map(|f| (f.clone(), 0));
-        self.read.extend(files.first().map(|f| (f.clone(), hash)));
+    pub fn absorb(&mut self, files: &[FileRead], hash: u128) {
+        let rest = files.iter().skip(1).map(|file| (file.clone(), 0));
+        self.read.extend(files.first().map(|file| (file.clone(), hash)));
         self.read.extend(rest);
     }
 
     /// Every file read, in the order first read, and the xxh3-128 of their xxh3-128 hashes (little-endian) in that
     /// order.
-    pub fn finish(self) -> (Vec<PathBuf>, u128) {
-        let hashes: Vec<u8> = self.read.iter().flat_map(|(_, hash)| hash.to_le_bytes()).collect();
-        (self.read.into_iter().map(|(path, _)| path).collect(), xxh3_128(&hashes))
+    pub fn finish(self) -> (Vec<FileRead>, u128) {
+        let hashes: Vec<u8> = self.read.iter().flat_map(|(_, counted)| counted.to_le_bytes()).collect();
+        (self.read.into_iter().map(|(file, _)| file).collect(), xxh3_128(&hashes))
     }
 }
 

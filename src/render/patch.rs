@@ -87,6 +87,8 @@ pub(crate) struct Patch<'a> {
     pub(super) print: Footprint,
     /// The coordinates that were asked for last: the maps of a material mostly share them.
     pub(super) last: Cell<Option<(TextureRef, Coordinates)>>,
+    /// What was read last: one texture often says several things.
+    pub(super) read: Cell<Option<(TextureRef, ColorSpace, Vec4)>>,
 }
 
 /// The two axes, world space, of the ellipse in which a ray's cone meets a surface; one pixel each.
@@ -136,6 +138,7 @@ impl Patch<'_> {
     pub(super) fn move_to(&mut self, weights: [f32; 3], print: Footprint) {
         (self.weights, self.print) = (weights, print);
         self.last.set(None);
+        self.read.set(None);
     }
 
     #[inline]
@@ -155,8 +158,24 @@ impl Patch<'_> {
 
     /// The texture at this point, linear RGBA.
     pub(crate) fn texel(&self, map: &TextureRef, space: ColorSpace, store: &TextureStore) -> Vec4 {
+        if let Some((last, meaning, texel)) = self.read.get()
+            && last == *map
+            && meaning == space
+        {
+            return texel;
+        }
         let at = self.coordinates(map);
-        store.sample(map.texture, space, at.uv, at.along, at.across)
+        let texel = store.sample(map.texture, space, at.uv, at.along, at.across);
+        self.read.set(Some((*map, space, texel)));
+        texel
+    }
+
+    /// The alpha of the texture at this point, which is the same whatever its colours mean.
+    pub(crate) fn alpha(&self, map: &TextureRef, store: &TextureStore) -> f32 {
+        match self.read.get() {
+            Some((last, _, texel)) if last == *map => texel.w,
+            _ => self.texel(map, ColorSpace::Linear, store).w,
+        }
     }
 
     pub(super) fn coordinates(&self, map: &TextureRef) -> Coordinates {

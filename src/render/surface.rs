@@ -68,7 +68,7 @@ impl<'a> Target<'a> {
         };
         let vertices = self.vertices(world, corners, mesh);
         let print = Footprint::default();
-        Some(Patch { mesh, placement, corners, weights, vertices, print, last: Cell::new(None) })
+        Some(Patch { mesh, placement, corners, weights, vertices, print, last: Cell::new(None), read: Cell::new(None) })
     }
 
     /// World positions (centred frame) of mesh vertices.

@@ -4,6 +4,7 @@ mod again;
 mod animation;
 mod backdrop;
 mod bench;
+mod collections;
 mod costs;
 mod diff;
 mod endings;

@@ -17,14 +17,18 @@ use std::path::PathBuf;
 /// What `meshray render` was given.
 #[derive(Debug, Clone, Args)]
 pub(in crate::cli) struct RenderArgs {
-    /// Models (.glb, .gltf, .obj, .ply, .stl, .nff) or scene files (.toml); `-` reads standard input
+    /// Models (.glb, .gltf, .obj, .ply, .stl, .nff), folders of them, or scene files (.toml); `-` reads standard input
     #[arg(value_name = "INPUT", required_unless_present = "again")]
     pub inputs: Vec<PathBuf>,
+    /// The folders among them.
+    #[arg(skip)]
+    pub folders: Vec<PathBuf>,
 
-    /// Where to write: a file (png, exr, jpg, webp by its ending), a folder, `-`, or a template with {dir} {stem}
+    /// Where to write: a file (png, exr, jpg, webp by its ending), a folder, `-`, or a template with {dir} {sub} {stem}
     /// {ext} {view} {frame:04}
     ///
-    /// Without it the picture goes to STEM.png in the current folder. Names that are made up, in a folder given here and
+    /// Without it the picture goes to STEM.png in the current folder. Pictures of models in the folders of a folder that was
+    /// named go to folders like these, which are made: {sub} is the way from the folder that was named to the model's own. Names that are made up, in a folder given here and
     /// of heat maps too, replace only a picture that meshray wrote; a name given here replaces whatever is there.
     #[arg(short, long, value_name = "PATH", help_heading = "Output", allow_hyphen_values = true)]
     pub output: Option<String>,
@@ -68,6 +72,13 @@ pub(in crate::cli) struct RenderArgs {
     /// Put all inputs into one scene and one picture
     #[arg(long, help_heading = "Output", hide_short_help = true)]
     pub merge: bool,
+    /// Leave pictures alone that are up to date: made with --update by this version, with the same flags, of the same files
+    ///
+    /// Which those are is told by hashes that the picture carries, not by times. Of standard input and of hundreds of files a
+    /// picture is made again.
+    #[arg(long, help_heading = "Output", hide_short_help = true,
+          conflicts_with_all = ["again", "stats", "heatmap", "profile"])]
+    pub update: bool,
     /// On Ctrl-C keep the tiles that are done as NAME.partial.png; not with `-o -`, which has no name
     #[arg(long, help_heading = "Output", hide_short_help = true)]
     pub keep_partial: bool,

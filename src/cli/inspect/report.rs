@@ -166,7 +166,7 @@ impl<'a> Report<'a> {
         let memory = format!("{} scene, {} structure", bytes(self.scene_bytes), bytes(self.structure_bytes));
         lines.add("memory", format!("about {memory}"));
         let facts = &self.loaded.facts;
-        lines.add("files", shorten(facts.files.iter().map(|f| f.display().to_string())));
+        lines.add("files", shorten(facts.files.iter().map(|f| f.path.display().to_string())));
         lines.add("hash", format!("{:032x}", facts.hash));
         lines.count("warnings", self.loaded.warnings.iter().map(|w| u64::from(w.count)).sum(), "");
     }
@@ -192,7 +192,7 @@ impl<'a> Report<'a> {
             "schema": "meshray-inspect/1",
             "file": self.file.to_string_lossy(), "format": facts.format, "generator": facts.generator,
             "hash": format!("{:032x}", facts.hash),
-            "files": facts.files.iter().map(|f| f.to_string_lossy()).collect::<Vec<_>>(),
+            "files": facts.files.iter().map(|f| f.path.to_string_lossy()).collect::<Vec<_>>(),
             "triangles": self.world.triangles(), "polygons": shapes.polygons.len(), "faces": facts.faces,
             "spheres": shapes.spheres.len(), "cones": shapes.cones.len(), "planes": shapes.planes.len(),
             "meshes": scene.meshes.len(), "instances": scene.instances.len(),

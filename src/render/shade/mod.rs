@@ -118,6 +118,14 @@ impl Reader<'_> {
         self.read(map, ColorSpace::Linear)
     }
 
+    /// The map's alpha; 1 where there is none.
+    fn alpha(&self, map: Option<&TextureRef>) -> f32 {
+        match (map, self.patch) {
+            (Some(map), Some(patch)) => patch.alpha(map, self.store),
+            _ => 1.0,
+        }
+    }
+
     /// Base colour and opacity: factors × maps × vertex colour.
     pub(crate) fn base(&self, material: &Material) -> Vec4 {
         let map = self.read(material.base_color_map.as_ref(), base_space(material));

@@ -38,7 +38,7 @@ impl SheenMatter {
     /// `None` where there are none; `n_v` is the cosine of the view.
     pub(super) fn new(sheen: &Sheen, n_v: f32, reader: &Reader) -> Option<Self> {
         let color = (sheen.color * reader.srgb(sheen.color_map.as_ref())).clamp(Vec3::ZERO, Vec3::ONE);
-        let roughness = (sheen.roughness * reader.linear(sheen.roughness_map.as_ref()).w).clamp(0.0, 1.0);
+        let roughness = (sheen.roughness * reader.alpha(sheen.roughness_map.as_ref())).clamp(0.0, 1.0);
         (color != Vec3::ZERO).then(|| Self { color, roughness, albedo: albedo(roughness, n_v) })
     }
 

@@ -57,7 +57,15 @@ struct Group {
 #[derive(Debug)]
 struct Stack {
     layout: Layout,
-    maps: Vec<(Slot, u32, ColorSpace)>,
+    maps: Vec<Map>,
+}
+
+/// A texture that is read in one way, and for what: mostly one thing, but occlusion often lies where metalness does.
+#[derive(Debug)]
+struct Map {
+    texture: u32,
+    space: ColorSpace,
+    slots: Vec<Slot>,
 }
 
 impl Sheet {
@@ -131,16 +139,23 @@ impl Group {
     ) {
         for stack in &self.stacks {
             places.find(&stack.layout, spots);
-            for &(slot, texture, space) in &stack.maps {
-                places.read(store, (texture, space), &mut texels[slot as usize][..points]);
+            for Map { texture, space, slots } in &stack.maps {
+                let mut read = [Vec4::ONE; LANES];
+                places.read(store, (*texture, *space), &mut read[..points]);
+                slots.iter().for_each(|&slot| texels[slot as usize] = read);
             }
         }
     }
 
-    fn add(&mut self, layout: Layout, map: (Slot, u32, ColorSpace)) {
-        match self.stacks.iter_mut().find(|stack| stack.layout == layout) {
-            Some(stack) => stack.maps.push(map),
-            None => self.stacks.push(Stack { layout, maps: vec![map] }),
+    fn add(&mut self, layout: Layout, (slot, texture, space): (Slot, u32, ColorSpace)) {
+        let known = self.stacks.iter().position(|stack| stack.layout == layout).unwrap_or_else(|| {
+            self.stacks.push(Stack { layout, maps: Vec::new() });
+            self.stacks.len() - 1
+        });
+        let maps = &mut self.stacks[known].maps;
+        match maps.iter_mut().find(|map| (map.texture, map.space) == (texture, space)) {
+            Some(map) => map.slots.push(slot),
+            None => maps.push(Map { texture, space, slots: vec![slot] }),
         }
     }
 }

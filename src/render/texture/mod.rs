@@ -32,6 +32,9 @@ pub enum ColorSpace {
 /// At most this many probes cover a long footprint.
 const MAX_PROBES: f32 = 8.0;
 
+/// As a number of places.
+const PROBES: usize = MAX_PROBES as usize;
+
 /// All textures of a scene, ready to be read.
 #[derive(Debug)]
 pub struct TextureStore<'a> {
@@ -231,45 +234,76 @@ impl<'a> Lookup<'a> {
 
     /// A lookup in one level: how texels are stored is asked once, not for each.
     fn level(&self, plane: &Plane, probes: &Probes, filter: Filter) -> Vec4 {
+        // First where all of them lie, then what they say: so none waits for another.
+        let taps = self.taps(plane, probes, filter);
         match plane.texels {
-            Stored::Level(texels) => {
-                let codes = self.mean(plane, probes, filter, |i| pyramid::codes(&texels[i]));
-                codes * (1.0 / 65535.0)
-            }
-            Stored::Bitmap(Texels::Rgb8(texels, colors)) => {
-                self.mean(plane, probes, filter, |i| decode::solid8(texels[i], colors))
-            }
-            Stored::Bitmap(texels) => self.mean(plane, probes, filter, |i| texels.get(i)),
+            Stored::Level(texels) => taps.mean(|i| pyramid::codes(&texels[i])) * (1.0 / 65535.0),
+            Stored::Bitmap(Texels::Rgb8(texels, colors)) => taps.mean(|i| decode::solid8(texels[i], colors)),
+            Stored::Bitmap(texels) => taps.mean(|i| texels.get(i)),
         }
     }
 
-    /// The mean of all probes.
-    #[inline(always)]
-    fn mean(&self, plane: &Plane, probes: &Probes, filter: Filter, texel: impl Fn(usize) -> Vec4) -> Vec4 {
-        let one = |uv: Vec2| {
+    /// What all probes read.
+    fn taps(&self, plane: &Plane, probes: &Probes, filter: Filter) -> Taps {
+        let at = |uv: Vec2| {
             let x = Axis::new(uv.x, plane.width, self.sampler.wrap_u, filter);
             let y = Axis::new(uv.y, plane.height, self.sampler.wrap_v, filter);
             let (near, far) = (y.near * plane.width, y.far * plane.width);
-            if filter == Filter::Nearest {
-                return texel(near + x.near);
-            }
-            let across = |row: usize| {
-                let (a, b) = (texel(row + x.near), texel(row + x.far));
-                a + (b - a) * x.share
-            };
-            let (upper, lower) = (across(near), across(far));
-            upper + (lower - upper) * y.share
+            let corners = [near + x.near, near + x.far, far + x.near, far + x.far];
+            Tap { corners, x: x.share, y: y.share, mixed: filter == Filter::Linear }
         };
+        let mut taps = Taps { each: [Tap::default(); PROBES], count: 1, probes: probes.count };
         if probes.count <= 1.0 {
-            return one(probes.uv);
+            taps.each[0] = at(probes.uv);
+            return taps;
         }
-        let mut sum = Vec4::ZERO;
-        let mut k = 0.5;
+        let (mut count, mut k) = (0, 0.5);
         while k < probes.count {
-            sum += one(probes.uv + probes.axis * (k / probes.count - 0.5));
-            k += 1.0;
+            taps.each[count % PROBES] = at(probes.uv + probes.axis * (k / probes.count - 0.5));
+            (count, k) = (count + 1, k + 1.0);
         }
-        sum / probes.count
+        Taps { count: count.min(PROBES), ..taps }
+    }
+}
+
+/// The four texels around a place, the shares of the right and the lower ones, and whether they are mixed; if not, the first
+/// is read alone.
+#[derive(Clone, Copy, Default)]
+struct Tap {
+    corners: [usize; 4],
+    x: f32,
+    y: f32,
+    mixed: bool,
+}
+
+impl Tap {
+    #[inline(always)]
+    fn read(&self, texel: impl Fn(usize) -> Vec4) -> Vec4 {
+        let [a, b, c, d] = self.corners;
+        if !self.mixed {
+            return texel(a);
+        }
+        let (a, b, c, d) = (texel(a), texel(b), texel(c), texel(d));
+        let (upper, lower) = (a + (b - a) * self.x, c + (d - c) * self.x);
+        upper + (lower - upper) * self.y
+    }
+}
+
+/// Those of all probes of a footprint.
+struct Taps {
+    each: [Tap; PROBES],
+    count: usize,
+    probes: f32,
+}
+
+impl Taps {
+    #[inline(always)]
+    fn mean(&self, texel: impl Fn(usize) -> Vec4) -> Vec4 {
+        if self.count == 1 {
+            return self.each[0].read(texel);
+        }
+        let taps = self.each.iter().take(self.count);
+        taps.fold(Vec4::ZERO, |sum, tap| sum + tap.read(&texel)) / self.probes
     }
 }
 

@@ -4,7 +4,7 @@
 //! [`Lookup::filtered`](super::Lookup) finds one by one, and texels are summed in its order: the same bits.
 
 use super::pyramid::{self, Plane, Stored};
-use super::{ColorSpace, MAX_PROBES, TextureStore, apart, decode, doublings, pixels, probes, size_of};
+use super::{ColorSpace, PROBES, TextureStore, apart, decode, doublings, pixels, probes, size_of};
 use crate::math::formula::floor;
 use crate::math::simd::LANES;
 use crate::math::{Vec2, Vec4};
@@ -13,9 +13,6 @@ use decode::Texels;
 
 /// One number of each of eight points.
 type Eight = [f32; LANES];
-
-/// Probes of a point at most.
-const PROBES: usize = MAX_PROBES as usize;
 
 /// Texture coordinates of eight points, and how they change along both axes of what a sample covers.
 #[derive(Clone, Copy, Debug, Default)]

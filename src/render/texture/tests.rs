@@ -267,3 +267,31 @@ fn what_is_not_there_is_left_to_single_lookups() {
     let plain = scene(4, 4, Sampler::default(), |_, _| grey(9));
     assert!(Layout::of(&TextureStore::new(&plain), 1).is_none() && Layout::of(&TextureStore::new(&plain), 0).is_some());
 }
+
+#[test]
+fn alpha_has_the_same_bits_whatever_the_colours_mean() {
+    let mut random = Random::new(8);
+    let bytes: Vec<u8> = (0..64 * 64).map(|_| random.below(256) as u8).collect();
+    for (width, height, solid) in [(64, 64, false), (64, 32, true), (37, 19, false), (5, 64, true)] {
+        let scene = scene(width, height, Sampler::default(), |x, y| {
+            let code = |k: u32| bytes[((x * 31 + y * 57 + k * 1009) % 4096) as usize];
+            // A block of clear texels among others, too.
+            let alpha = if solid && x > 2 {
+                255
+            } else if x < 8 && y < 8 {
+                0
+            } else {
+                code(3)
+            };
+            [code(0), code(1), code(2), alpha]
+        });
+        let store = TextureStore::new(&scene);
+        for _ in 0..500 {
+            let [uv, along, across] = [1.0, 0.3, 0.1].map(|size| Vec2::new(random.unit() * size, random.unit() * size));
+            let alpha = |space| store.sample(0, space, uv, along, across).w;
+            let expected = alpha(ColorSpace::Linear);
+            assert_eq!(alpha(ColorSpace::Srgb), expected, "{width}×{height} {uv} {along} {across}");
+            assert_eq!(alpha(ColorSpace::SrgbCutOut), expected, "{width}×{height} {uv} {along} {across}");
+        }
+    }
+}

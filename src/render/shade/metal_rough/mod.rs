@@ -124,8 +124,8 @@ impl MetalRoughMatter {
         let maps = [&m.metal_rough_map, &m.transmission_map].map(|map| reader.linear(map.as_ref()));
         let paint = MetalRoughPaint::of(m, base, occlusion, maps.into());
         let MetalRoughPaint { base, metallic, roughness, occlusion, transmission } = paint;
-        let specular = m.specular * reader.linear(m.specular_map.as_ref()).w;
         let color = m.specular_color * reader.srgb(m.specular_color_map.as_ref());
+        let specular = m.specular * reader.alpha(m.specular_map.as_ref());
         let at_normal = (m.ior - 1.0) / (m.ior + 1.0);
         Self {
             base,
@@ -165,8 +165,8 @@ impl MetalRoughMatter {
 
     /// Lets it scatter light to its other side.
     pub(super) fn thin(&mut self, translucence: &Translucence, reader: &Reader) {
-        self.share = (translucence.share * reader.linear(translucence.share_map.as_ref()).w).clamp(0.0, 1.0);
         let color = translucence.color * reader.srgb(translucence.color_map.as_ref());
+        self.share = (translucence.share * reader.alpha(translucence.share_map.as_ref())).clamp(0.0, 1.0);
         self.through = color.clamp(Vec3::ZERO, Vec3::ONE);
     }
 

@@ -1,0 +1,105 @@
+//! `--update`: which pictures are what rendering them would make again.
+//!
+//! A picture that was made with it carries what was asked for, as one hash, and the hash of each file that was read. It is up
+//! to date if all are the same still, whatever the times of the files say. (Other pictures carry nothing of how they were
+//! asked for: there are several ways to ask for one.)
+
+use super::job::{Batch, RenderJob, Shot};
+use crate::image::{Metadata, read_metadata};
+use crate::load::Loaded;
+use crate::load::paths::FileRead;
+use serde_json::{Map, Value};
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+use xxhash_rust::xxh3::{Xxh3, xxh3_128};
+
+/// Bytes that are read of a file at a time.
+const CHUNK: usize = 1 << 16;
+
+/// Letters that are carried at most: a JPEG has no room for many times as many.
+const MOST: usize = 1 << 15;
+
+/// What a picture was made of, as it carries it: `asked`, under `files` the hash of each, and how many were `missing`; `None`
+/// where a file has no name, and where there are hundreds of them.
+pub(super) fn made_of(job: &RenderJob, batch: &Batch, shot: &Shot, loaded: &Loaded) -> Option<String> {
+    if batch.inputs.iter().any(|input| input == Path::new("-")) {
+        return None;
+    }
+    let file = |FileRead { path, hash }: &FileRead| Some((path.to_str()?.to_owned(), Value::from(hex(*hash))));
+    let files: Map<String, Value> = loaded.facts.files.iter().map(file).collect::<Option<_>>()?;
+    let missing = loaded.warnings.iter().filter(|warning| warning.code.starts_with("file-")).count();
+    let asked = asked(job, batch, shot);
+    let text = serde_json::json!({ "asked": asked, "files": files, "missing": missing }).to_string();
+    (text.len() <= MOST).then_some(text)
+}
+
+/// Whether the picture is there and is what it would be if it were rendered now, as far as that is known before the model is
+/// loaded: what was looked for in vain may be there by now.
+pub(super) fn is_up_to_date(job: &RenderJob, batch: &Batch, shot: &Shot) -> bool {
+    let made_of = carried(shot).and_then(|text| serde_json::from_str(&text).ok());
+    let Some(Value::Object(made_of)) = made_of else { return false };
+    let Some(Value::Object(files)) = made_of.get("files") else { return false };
+    let is_same = |(path, hash): (&String, &Value)| {
+        hash_of_file(Path::new(path)).is_ok_and(|found| hash.as_str() == Some(hex(found).as_str()))
+    };
+    made_of.get("asked").and_then(Value::as_str) == Some(asked(job, batch, shot).as_str())
+        && made_of.get("missing").and_then(Value::as_u64) == Some(0)
+        && !files.is_empty()
+        && files.iter().all(is_same)
+}
+
+/// The same once the model is loaded.
+pub(super) fn is_as_loaded(job: &RenderJob, batch: &Batch, shot: &Shot, loaded: &Loaded) -> bool {
+    let made_of = made_of(job, batch, shot, loaded);
+    made_of.is_some() && made_of == carried(shot)
+}
+
+/// What the picture that is there says it was made of.
+fn carried(shot: &Shot) -> Option<String> {
+    let metadata = read_metadata(shot.target.path()?).ok().flatten()?;
+    metadata.get(Metadata::MADE_OF).map(str::to_owned)
+}
+
+/// The hash of all that decides about a picture but for what is in the files: the same words of the command line give the
+/// same to the same program.
+fn asked(job: &RenderJob, batch: &Batch, shot: &Shot) -> String {
+    let how = (&job.load, &job.look, &job.sequence, job.accel, job.intersector, &job.params, job.instances);
+    let which = (&batch.inputs, &shot.choice, &shot.step, shot.kind, job.allow_empty);
+    hex(xxh3_128(format!("{}\n{how:?}\n{which:?}", super::version::SHORT).as_bytes()))
+}
+
+fn hash_of_file(path: &Path) -> io::Result<u128> {
+    // Opening anything but a plain file could wait for ever.
+    if !path.metadata()?.is_file() {
+        return Err(io::ErrorKind::InvalidInput.into());
+    }
+    let (mut file, mut hash, mut chunk) = (File::open(path)?, Xxh3::new(), vec![0; CHUNK]);
+    loop {
+        match file.read(&mut chunk)? {
+            0 => return Ok(hash.digest128()),
+            read => hash.update(&chunk[..read]),
+        }
+    }
+}
+
+fn hex(hash: u128) -> String {
+    format!("{hash:032x}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_have_the_hash_that_loading_gives_them() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("large.bin");
+        for length in [0, 1, CHUNK - 1, CHUNK, 3 * CHUNK + 17] {
+            let bytes: Vec<u8> = (0..length).map(|i| (i * i) as u8).collect();
+            std::fs::write(&path, &bytes).unwrap();
+            assert_eq!(hash_of_file(&path).unwrap(), xxh3_128(&bytes));
+        }
+        assert!(hash_of_file(dir.path()).is_err(), "a folder");
+    }
+}

@@ -1,0 +1,120 @@
+//! Whole folders of models, and pictures of them that are up to date.
+
+use super::program::{CUBE, Folder, textured_cube};
+
+/// Three models in two folders, and what lies beside models.
+fn collection() -> Folder {
+    let names = ["all/a.obj", "all/deep/a.obj", "all/deep/er/b.OBJ"];
+    let folder = names.into_iter().fold(Folder::new(), |folder, name| folder.file(name, CUBE));
+    folder.file("all/readme.txt", "").file("all/deep/Cargo.toml", "").file("all/.hidden/c.obj", CUBE)
+}
+
+#[test]
+fn all_models_in_a_folder_are_rendered_into_folders_like_theirs() {
+    let folder = collection().file("thumbs/kept.txt", "");
+    folder.render(&["all", "-o", "thumbs/"]).ends(0).says(&["3 pictures of 3 inputs"]);
+    assert_eq!(folder.names(), ["all", "thumbs"]);
+    for name in ["thumbs/a.png", "thumbs/deep/a.png", "thumbs/deep/er/b.png"] {
+        assert!(folder.has(name), "{name}");
+    }
+    folder.render(&["all/deep"]).ends(0);
+    assert!(folder.has("a.png") && folder.has("er/b.png"));
+    folder.render(&["all", "-o", "{sub}/{stem}-{view}.jpg", "--view", "front,top"]).ends(0);
+    assert!(folder.has("a-top.jpg") && folder.has("deep/er/b-front.jpg"));
+}
+
+#[test]
+fn folders_are_made_only_in_one_that_is_there_and_for_pictures_that_are() {
+    let folder = collection().file("all/deep/broken/c.glb", "glTF").file("thumbs/er", "a file");
+    folder.render(&["all", "-o", "gone/"]).ends(1).says(&["gone", "its folder is not there"]);
+    let run = folder.render(&["all/deep", "-o", "thumbs/"]).says(&["1 picture of 3 inputs, 2 of them failed", "er"]);
+    assert!(run.code == Some(1) || run.code == Some(3), "{:?}", run.code);
+    assert!(folder.has("thumbs/a.png") && !folder.has("thumbs/broken"));
+    folder.render(&["all/deep", "-o", "other-{sub}/{stem}.png", "--dry-run"]);
+    assert!(!folder.has("other-er"), "nothing is made where pictures are only foretold");
+}
+
+#[test]
+fn pictures_of_one_name_and_folders_without_a_model_are_told() {
+    let folder = collection().file("none/readme.txt", "");
+    folder.render(&["all", "-o", "{stem}.png"]).ends(2).says(&["all/a.obj", "all/deep/a.obj", "{sub}"]);
+    folder.render(&["none"]).ends(3).says(&["none", "no model", ".glb"]);
+    assert_eq!(folder.names(), ["all", "none"]);
+}
+
+#[test]
+fn pictures_that_are_up_to_date_are_left_alone() {
+    let folder = collection().file("thumbs/kept.txt", "");
+    let words = ["all", "-o", "thumbs/", "--update"];
+    let update = |more: &[&str]| folder.render(&[&words[..], more].concat()).ends(0);
+    update(&[]).says(&["3 pictures of 3 inputs, 0 up to date"]);
+    let before = folder.read("thumbs/a.png");
+    std::fs::write(folder.path("thumbs/a.png"), before.iter().chain(b"appended").copied().collect::<Vec<u8>>())
+        .unwrap();
+    update(&[]).says(&["0 pictures of 3 inputs, 3 up to date"]);
+    assert!(folder.read("thumbs/a.png").ends_with(b"appended"), "it was not written");
+
+    // What is asked for, what is in a file, and what is there.
+    update(&["--depth", "3"]).says(&["3 pictures of 3 inputs, 0 up to date"]);
+    update(&["--depth", "3", "--threads", "1"]).says(&["0 pictures of 3 inputs, 3 up to date"]);
+    std::fs::write(folder.path("all/deep/a.obj"), CUBE.replacen("1", "1.25", 1)).unwrap();
+    std::fs::remove_file(folder.path("thumbs/a.png")).unwrap();
+    update(&["--depth", "3"]).says(&["2 pictures of 3 inputs, 1 up to date"]);
+    std::fs::write(folder.path("thumbs/a.png"), folder.read("thumbs/deep/a.png")).unwrap();
+    update(&["--depth", "3"]).says(&["1 picture of 3 inputs, 2 up to date"]);
+    folder.render(&[&words[..], &["--stats", "json"]].concat()).ends(2);
+    // A repetition is the same, byte by byte, and as new.
+    let made = folder.read("thumbs/deep/a.png");
+    folder.render(&["--again", "thumbs/deep/a.png", "-o", "thumbs/deep/a.png"]).ends(0);
+    assert!(folder.read("thumbs/deep/a.png") == made);
+    update(&["--depth", "3"]).says(&["0 pictures of 3 inputs, 3 up to date"]);
+}
+
+#[test]
+fn how_a_picture_was_asked_for_is_carried_only_where_it_is_wanted() {
+    let folder = Folder::with_cube();
+    let carried = |words: &[&str]| {
+        folder.render(&[&["cube.obj", "-o", "a.png"], words].concat()).ends(0);
+        let metadata = meshray::image::read_metadata(&folder.path("a.png")).unwrap().unwrap();
+        metadata.get(meshray::image::Metadata::MADE_OF).map(str::to_owned)
+    };
+    assert_eq!(carried(&[]), None);
+    let made_of = carried(&["--update"]).unwrap();
+    assert!(made_of.contains(r#""cube.obj":""#), "{made_of}");
+    assert_eq!(carried(&["--update", "--threads", "1"]), Some(made_of.clone()));
+    assert_ne!(carried(&["--update", "--seed", "1"]), Some(made_of));
+}
+
+#[test]
+fn what_a_model_reads_beside_its_own_file_counts_too() {
+    let folder = textured_cube();
+    let update = || folder.render(&["cube.obj", "--update"]);
+    update().ends(0);
+    update().ends(0).says(&["cube.png is up to date"]);
+    let names = folder.names();
+    let map = names.iter().find(|name| name.ends_with(".mtl")).expect("a library");
+    let library = String::from_utf8(folder.read(map)).unwrap();
+    std::fs::write(folder.path(map), library.clone() + "\n# changed\n").unwrap();
+    let run = update().ends(0);
+    assert!(!run.text().contains("up to date") && run.errors().is_empty());
+    // What was looked for in vain may be there the next time.
+    std::fs::remove_file(folder.path(map)).unwrap();
+    update().says(&[map]);
+    update().says(&[map, "cube.png is up to date"]);
+    std::fs::write(folder.path(map), library).unwrap();
+    let run = update().ends(0);
+    assert!(!run.text().contains("up to date"), "{}", run.text());
+    update().says(&["cube.png is up to date"]);
+}
+
+#[test]
+fn frames_that_are_up_to_date_are_left_alone() {
+    let folder = Folder::with_cube();
+    let update = |count: &str| folder.render(&["cube.obj", "--turntable", count, "--update"]).ends(0);
+    update("3");
+    std::fs::remove_file(folder.path("cube.0001.png")).unwrap();
+    update("3").says(&["2 pictures are up to date"]);
+    assert!(folder.has("cube.0001.png"));
+    let run = update("4");
+    assert!(!run.text().contains("up to date"), "every step is another: {}", run.text());
+}
