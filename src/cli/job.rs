@@ -53,6 +53,8 @@ pub(super) struct RenderJob {
     pub heatmap_max: Option<f64>,
     /// Statistics, if wanted.
     pub stats: Option<Stats>,
+    /// Whether memory has a bound that was typed.
+    pub bounded: bool,
     /// Whether to tell where the time went.
     pub profile: bool,
     /// Only warnings and errors.
@@ -182,6 +184,7 @@ impl RenderJob {
             heatmaps: args.heatmap.clone(),
             heatmap_max: args.heatmap_max,
             stats,
+            bounded: args.max_memory.is_some(),
             profile: args.profile,
             quiet: args.quiet,
             strict: args.strict,

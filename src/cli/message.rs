@@ -7,6 +7,7 @@ use crate::load::{Diagnostic, LoadError};
 use indicatif::MultiProgress;
 use std::ffi::OsString;
 use std::io::Write;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// How messages look.
@@ -76,6 +77,8 @@ pub(super) struct Messages {
     format: Format,
     quiet: bool,
     warnings: AtomicU32,
+    /// Lines that wait until it is their turn; `None`: none does.
+    kept: Option<Mutex<Vec<String>>>,
     /// Bars on the same terminal; they step aside while a line is written.
     pub(super) bars: MultiProgress,
 }
@@ -84,6 +87,27 @@ impl Messages {
     /// Messages in a format; `quiet` drops facts, never errors and warnings.
     pub(super) fn new(format: Format, quiet: bool) -> Self {
         Self { format, quiet, ..Self::default() }
+    }
+
+    /// Such messages that are kept until [`Self::tell`] writes them.
+    pub(super) fn apart(&self) -> Self {
+        Self { kept: Some(Mutex::default()), ..Self::new(self.format, self.quiet) }
+    }
+
+    /// Whether they are kept.
+    pub(super) fn are_kept(&self) -> bool {
+        self.kept.is_some()
+    }
+
+    /// Writes the messages that were kept apart.
+    pub(super) fn tell(&self, apart: &Self) {
+        self.warnings.fetch_add(apart.warnings(), Ordering::Relaxed);
+        if let Some(Ok(mut lines)) = apart.kept.as_ref().map(Mutex::lock)
+            && !lines.is_empty()
+        {
+            let lines = std::mem::take(&mut *lines).concat();
+            self.bars.suspend(|| drop(std::io::stderr().write_all(lines.as_bytes())));
+        }
     }
 
     /// Writes one message.
@@ -95,6 +119,10 @@ impl Messages {
             return;
         }
         let line = line(self.format, severity, message);
+        if let Some(Ok(mut lines)) = self.kept.as_ref().map(Mutex::lock) {
+            lines.push(line + "\n");
+            return;
+        }
         // Nobody left to read stderr is no reason to stop.
         self.bars.suspend(|| drop(writeln!(std::io::stderr(), "{line}")));
     }

@@ -19,6 +19,7 @@ mod generate;
 mod inspect;
 mod interrupt;
 mod job;
+mod lanes;
 mod memory;
 mod message;
 mod meter;

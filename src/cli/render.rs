@@ -12,7 +12,7 @@ use super::sequence::{Step, Survey};
 use super::shot::{self, Stage, Task};
 use super::stats::{self, PictureStats};
 use super::writable::{self, Sources};
-use super::{accident, again, fresh, interrupt, read, surroundings, unseen};
+use super::{again, fresh, interrupt, lanes, read, surroundings, unseen};
 use crate::bench::report::number::so_many;
 use crate::image::destination;
 use crate::load::{Diagnostic, LoadOptions, Loaded};
@@ -34,15 +34,7 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
         }
     };
     let sources = Sources::of(job.batches.iter().flat_map(|b| &b.inputs));
-    let mut so_far = SoFar {
-        shown: false,
-        missing: HashSet::new(),
-        unseen: HashSet::new(),
-        sources,
-        up_to_date: 0,
-        pictures: Vec::new(),
-        foretold: Vec::new(),
-    };
+    let mut so_far = SoFar::new(sources);
     // A picture that is repeated may be replaced by its repetition, but by nothing else.
     let spared = |path| Sources::of(&job.again).spared_by(path, "--stats-file");
     if let Some(path) = job.stats_file()
@@ -51,16 +43,9 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
         messages.say(Severity::Error, &fault);
         return Exit::Failed;
     }
-    let (mut worst, mut failed) = (Exit::Done, 0);
-    for batch in &job.batches {
-        let name = batch.inputs[0].display().to_string();
-        let work = || pool.install(|| render_batch(job, batch, messages, &mut so_far));
-        let exit = accident::guard(&name, messages, work);
-        worst = worst.max(exit);
-        failed += usize::from(exit != Exit::Done);
-        if interrupt::raised() {
-            return Exit::Interrupted;
-        }
+    let lanes::Ended { worst, failed } = lanes::run(job, &pool, messages, &mut so_far);
+    if interrupt::raised() {
+        return Exit::Interrupted;
     }
     if job.batches.len() > 1 {
         let (pictures, scenes) = (so_far.pictures.len() as u64, job.batches.len());
@@ -101,6 +86,34 @@ pub(super) struct SoFar {
     pub foretold: Vec<String>,
 }
 
+impl SoFar {
+    /// Nothing yet.
+    fn new(sources: Sources) -> Self {
+        Self {
+            shown: false,
+            missing: HashSet::new(),
+            unseen: HashSet::new(),
+            sources,
+            up_to_date: 0,
+            pictures: Vec::new(),
+            foretold: Vec::new(),
+        }
+    }
+
+    /// The same for one input among others that are rendered beside it.
+    pub(super) fn of_one(&self) -> Self {
+        Self::new(self.sources.clone())
+    }
+
+    /// Adds what came of an input that was rendered beside others.
+    pub(super) fn add(&mut self, one: Self) {
+        self.up_to_date += one.up_to_date;
+        self.pictures.extend(one.pictures);
+        self.foretold.extend(one.foretold);
+        self.unseen.extend(one.unseen);
+    }
+}
+
 /// Prints or writes the statistics, if there are any, but never over what a model was read from.
 fn report(job: &RenderJob, so_far: &SoFar, messages: &Messages) -> Exit {
     let text = if job.dry_run { so_far.foretold.concat() } else { stats::text(job, &so_far.pictures) };
@@ -114,15 +127,16 @@ fn report(job: &RenderJob, so_far: &SoFar, messages: &Messages) -> Exit {
     }
 }
 
-/// One scene and its pictures.
-fn render_batch(job: &RenderJob, batch: &Batch, messages: &Messages, so_far: &mut SoFar) -> Exit {
+/// The pictures of a scene that may be written where they go, and how the command ends because of the others.
+pub(super) fn writable_shots<'a>(
+    job: &RenderJob,
+    batch: &'a Batch,
+    messages: &Messages,
+    so_far: &mut SoFar,
+) -> (Vec<&'a Shot>, Exit) {
     let mut worst = Exit::Done;
     let mut shots = Vec::new();
     for shot in &batch.shots {
-        if job.update && fresh::is_up_to_date(job, batch, shot) {
-            so_far.up_to_date += 1;
-            continue;
-        }
         let mut targets = outputs::of(shot, job.beside()).into_iter();
         let growth = shot.growth.as_deref();
         match targets.try_for_each(|target| writable::check_target(&target, growth, &so_far.sources)) {
@@ -138,14 +152,28 @@ fn render_batch(job: &RenderJob, batch: &Batch, messages: &Messages, so_far: &mu
             }
         }
     }
-    if shots.is_empty() {
-        return worst;
+    (shots, worst)
+}
+
+/// One scene and these of its pictures.
+pub(super) fn render_batch(
+    job: &RenderJob,
+    batch: &Batch,
+    shots: &[&Shot],
+    messages: &Messages,
+    so_far: &mut SoFar,
+) -> Exit {
+    let is_old = |shot: &&&Shot| !(job.update && fresh::is_up_to_date(job, batch, shot));
+    let old: Vec<&Shot> = shots.iter().filter(is_old).copied().collect();
+    so_far.up_to_date += (shots.len() - old.len()) as u64;
+    if old.is_empty() {
+        return Exit::Done;
     }
     // The bar needs the room that folders would take.
     let name = batch.inputs[0].file_name().unwrap_or(batch.inputs[0].as_os_str()).to_string_lossy();
-    let progress = Progress::new(&name, messages, job.quiet, job.keep_partial);
+    let progress = Progress::new(&name, messages, job.quiet || messages.are_kept(), job.keep_partial);
     let task = Task { job, batch, messages, progress: &progress };
-    worst.max(render_shots(&task, &shots, so_far).unwrap_or_else(|exit| exit))
+    render_shots(&task, &old, so_far).unwrap_or_else(|exit| exit)
 }
 
 /// The pictures of one scene; the error is how it ended when not all of them could be tried.

@@ -6,28 +6,38 @@ use crate::image::{destination, was_written_by_meshray};
 use crate::load::Diagnostic;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Files that are read, which nothing that is written may replace.
-#[derive(Debug, Default)]
-pub(super) struct Sources(HashSet<PathBuf>);
+///
+/// Whoever has a clone of them knows what is added to any.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sources(Arc<Mutex<HashSet<PathBuf>>>);
 
 impl Sources {
     /// These files; `-`, standard input, is none.
     pub(super) fn of(files: impl IntoIterator<Item: AsRef<Path>>) -> Self {
-        let mut sources = Self::default();
+        let sources = Self::default();
         sources.add(files);
         sources
     }
 
     /// These files, too.
-    pub(super) fn add(&mut self, files: impl IntoIterator<Item: AsRef<Path>>) {
+    pub(super) fn add(&self, files: impl IntoIterator<Item: AsRef<Path>>) {
         let named = files.into_iter().filter(|file| file.as_ref() != Path::new("-"));
-        self.0.extend(named.map(|file| identity(file.as_ref())));
+        let files: Vec<PathBuf> = named.map(|file| identity(file.as_ref())).collect();
+        self.known().extend(files);
+    }
+
+    fn known(&self) -> MutexGuard<'_, HashSet<PathBuf>> {
+        // Nothing that can fail is done while it changes.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Refuses `path`, given with `flag`, where that is one of them.
     pub(super) fn spared_by(&self, path: &Path, flag: &str) -> Result<(), Diagnostic> {
-        if self.0.contains(&identity(path)) {
+        let path_itself = identity(path);
+        if self.known().contains(&path_itself) {
             let fault = Diagnostic::new("output-is-input", path, "", "would replace a file that is read");
             return Err(fault.remedy(format!("name another with {flag}")));
         }

@@ -170,10 +170,10 @@ impl Patch<'_> {
         texel
     }
 
-    /// The alpha of the texture at this point, which is the same whatever its colours mean.
+    /// The alpha of the texture at this point, which is the same whether or not its other numbers are colours.
     pub(crate) fn alpha(&self, map: &TextureRef, store: &TextureStore) -> f32 {
         match self.read.get() {
-            Some((last, _, texel)) if last == *map => texel.w,
+            Some((last, ColorSpace::Srgb, texel)) if last == *map => texel.w,
             _ => self.texel(map, ColorSpace::Linear, store).w,
         }
     }

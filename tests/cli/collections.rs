@@ -1,6 +1,6 @@
 //! Whole folders of models, and pictures of them that are up to date.
 
-use super::program::{CUBE, Folder, textured_cube};
+use super::program::{CUBE, Folder, cube_with_a_bad_face, textured_cube};
 
 /// Three models in two folders, and what lies beside models.
 fn collection() -> Folder {
@@ -65,7 +65,7 @@ fn pictures_that_are_up_to_date_are_left_alone() {
     folder.render(&[&words[..], &["--stats", "json"]].concat()).ends(2);
     // A repetition is the same, byte by byte, and as new.
     let made = folder.read("thumbs/deep/a.png");
-    folder.render(&["--again", "thumbs/deep/a.png", "-o", "thumbs/deep/a.png"]).ends(0);
+    folder.run(&["render", "--again", "thumbs/deep/a.png", "-o", "thumbs/deep/a.png"]).ends(0);
     assert!(folder.read("thumbs/deep/a.png") == made);
     update(&["--depth", "3"]).says(&["0 pictures of 3 inputs, 3 up to date"]);
 }
@@ -96,14 +96,14 @@ fn what_a_model_reads_beside_its_own_file_counts_too() {
     let library = String::from_utf8(folder.read(map)).unwrap();
     std::fs::write(folder.path(map), library.clone() + "\n# changed\n").unwrap();
     let run = update().ends(0);
-    assert!(!run.text().contains("up to date") && run.errors().is_empty());
+    assert!(!run.stderr.contains("up to date") && run.errors().is_empty());
     // What was looked for in vain may be there the next time.
     std::fs::remove_file(folder.path(map)).unwrap();
     update().says(&[map]);
     update().says(&[map, "cube.png is up to date"]);
     std::fs::write(folder.path(map), library).unwrap();
     let run = update().ends(0);
-    assert!(!run.text().contains("up to date"), "{}", run.text());
+    assert!(!run.stderr.contains("up to date"), "{}", run.stderr);
     update().says(&["cube.png is up to date"]);
 }
 
@@ -116,5 +116,43 @@ fn frames_that_are_up_to_date_are_left_alone() {
     update("3").says(&["2 pictures are up to date"]);
     assert!(folder.has("cube.0001.png"));
     let run = update("4");
-    assert!(!run.text().contains("up to date"), "every step is another: {}", run.text());
+    assert!(!run.stderr.contains("up to date"), "every step is another: {}", run.stderr);
+}
+
+/// Many models, of which some cannot be read, some are warned of, and some write where nothing can be written.
+fn many() -> Folder {
+    let folder = (0..40).fold(Folder::new().file("out/kept.txt", ""), |folder, i| {
+        let model = match i % 10 {
+            3 => cube_with_a_bad_face(),
+            7 => "v 0 0 0\nf 1 2 3\n".into(),
+            _ => CUBE.replacen('1', &format!("1.{i:02}"), 1),
+        };
+        folder.file(&format!("all/{i:02}.obj"), model)
+    });
+    folder.file("out/05.png", "not a picture").file("out/25.png", "nor this")
+}
+
+#[test]
+fn many_inputs_side_by_side_make_what_they_make_one_by_one_and_say_it_in_their_order() {
+    let run = |threads: &str| {
+        let folder = many();
+        let run = folder.render(&["all", "-o", "out/", "--threads", threads, "--quiet"]).ends(3);
+        let names = (0..40).map(|i| format!("out/{i:02}.png")).filter(|name| folder.has(name));
+        let pictures: Vec<_> = names.map(|name| folder.read(&name)).collect();
+        (run.stderr.clone(), pictures)
+    };
+    let (said, pictures) = run("1");
+    assert!(said.contains("05.png: exists and is no picture") && said.contains("37.obj"), "{said}");
+    assert_eq!(pictures.len(), 36, "those that were there, too");
+    for threads in ["2", "5"] {
+        let (other, same) = run(threads);
+        assert_eq!(said, other, "{threads} threads");
+        assert!(pictures == same, "{threads} threads");
+    }
+    let summary = "2 pictures of 40 inputs";
+    let folder = many();
+    folder.render(&["all", "-o", "out/", "--threads", "3", "--update"]).says(&["of 40 inputs, 0 up to date"]);
+    std::fs::remove_file(folder.path("out/01.png")).unwrap();
+    std::fs::remove_file(folder.path("out/31.png")).unwrap();
+    folder.render(&["all", "-o", "out/", "--threads", "3", "--update"]).says(&[summary, "6 of them failed"]);
 }
