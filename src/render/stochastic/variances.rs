@@ -32,10 +32,39 @@ impl Variances {
         if more < upper || known == 0 {
             return own;
         }
-        let mut above = beside.map(|variance| if variance > own { variance } else { f32::NEG_INFINITY });
-        above.sort_unstable_by(|a, b| b.total_cmp(a));
-        above[upper - 1]
+        descending(beside.map(|variance| if variance > own { variance } else { 0.0 }))[upper - 1]
     }
+}
+
+/// Eight numbers in order, the largest first, without a choice on the way (K. E. Batcher, "Sorting Networks and Their
+/// Applications", 1968).
+fn descending(mut numbers: [f32; 8]) -> [f32; 8] {
+    const PAIRS: [(usize, usize); 19] = [
+        (0, 1),
+        (2, 3),
+        (4, 5),
+        (6, 7),
+        (0, 2),
+        (1, 3),
+        (4, 6),
+        (5, 7),
+        (1, 2),
+        (5, 6),
+        (0, 4),
+        (1, 5),
+        (2, 6),
+        (3, 7),
+        (2, 4),
+        (3, 5),
+        (1, 2),
+        (3, 4),
+        (5, 6),
+    ];
+    for (i, j) in PAIRS {
+        let (a, b) = (numbers[i], numbers[j]);
+        (numbers[i], numbers[j]) = if a > b { (a, b) } else { (b, a) };
+    }
+    numbers
 }
 
 #[cfg(test)]
@@ -67,6 +96,17 @@ mod tests {
         assert_eq!(no_less_than(0.0, [nan, nan, nan, 3.0, 1.0, nan, nan, nan]), 1.0);
         assert_eq!(no_less_than(0.0, [nan, nan, nan, 3.0, nan, nan, nan, nan]), 3.0);
         assert_eq!(no_less_than(2.0, [nan; 8]), 2.0);
+    }
+
+    /// What puts all zeros and ones in order puts everything in order (D. E. Knuth, *The Art of Computer Programming*, 5.3.4).
+    #[test]
+    fn all_zeros_and_ones_are_put_in_order() {
+        for bits in 0..256_u32 {
+            let numbers = std::array::from_fn(|i| f32::from(u8::from(bits >> i & 1 == 1)));
+            let ones = bits.count_ones() as usize;
+            let expected = std::array::from_fn(|i| f32::from(u8::from(i < ones)));
+            assert_eq!(descending(numbers), expected, "{bits:b}");
+        }
     }
 
     #[test]
