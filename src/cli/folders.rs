@@ -3,68 +3,87 @@
 use super::exit::Exit;
 use crate::load::Diagnostic;
 use crate::load::detect::is_called_a_model;
+use std::collections::HashSet;
 use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
-/// The inputs, with all models in a folder, and in those in it, in its place, in the order of their names. What is hidden is
-/// left out, and links to folders are not followed. Scene files are no models: they are rendered where they are named.
+/// The inputs, with all models in a folder, and in those in it, in its place, in the order of their names, each once. What is
+/// hidden is left out, and links to folders are not followed. Scene files are no models: they are rendered where they are named.
 ///
-/// # Errors
-/// Of a folder without a model, and of one that cannot be read: how the command ends, too.
-pub(super) fn unfold(inputs: &[PathBuf]) -> Result<Vec<PathBuf>, (Box<Diagnostic>, Exit)> {
-    let mut models = Vec::new();
+/// `tell` hears of folders without a model, and of those that cannot be read; how the command ends because of these, too.
+pub(super) fn unfold(inputs: &[PathBuf], mut tell: impl FnMut(&Diagnostic)) -> (Vec<PathBuf>, Exit) {
+    let (mut models, mut ended) = (Vec::new(), Exit::Done);
+    let mut known: HashSet<PathBuf> = inputs.iter().filter(|input| !is_folder(input)).cloned().collect();
     for input in inputs {
-        if !input.is_dir() {
+        if !is_folder(input) {
             models.push(input.clone());
             continue;
         }
-        let found = models_in(input).map_err(|(folder, error)| {
-            (Box::new(Diagnostic::new("folder-unreadable", folder, "", error.to_string())), Exit::Failed)
-        })?;
-        if found.is_empty() {
-            let fault = Diagnostic::new("folder-empty", input, "", "no model is in this folder");
-            let remedy = "name one with .glb, .gltf, .obj, .ply, .stl or .nff files, or a scene file itself";
-            return Err((Box::new(fault.remedy(remedy)), Exit::Input));
+        let before = (models.len(), ended);
+        for found in models_in(input) {
+            match found {
+                Ok(model) if known.insert(model.clone()) => models.push(model),
+                Ok(_) => {}
+                Err((folder, error)) => {
+                    tell(&Diagnostic::new("folder-unreadable", folder, "", error.to_string()));
+                    ended = ended.max(Exit::Failed);
+                }
+            }
         }
-        models.extend(found);
+        if before == (models.len(), ended) && models_in(input).next().is_none() {
+            let remedy = "name one with .glb, .gltf, .obj, .ply, .stl or .nff files, or a scene file itself";
+            tell(&Diagnostic::new("folder-empty", input, "", "no model is in this folder").remedy(remedy));
+            ended = ended.max(Exit::Input);
+        }
     }
-    Ok(models)
+    (models, ended)
 }
 
 /// The folders among the inputs.
 pub(super) fn of(inputs: &[PathBuf]) -> Vec<PathBuf> {
-    inputs.iter().filter(|input| input.is_dir()).cloned().collect()
+    inputs.iter().filter(|input| is_folder(input)).cloned().collect()
 }
 
-/// The way from the first of these folders that an input lies in to the input's own; `.` if that is the same.
+/// Whether it is a folder, whatever lies there under the name of standard input.
+fn is_folder(input: &Path) -> bool {
+    input != Path::new("-") && input.is_dir()
+}
+
+/// The way from the first of these folders that an input lies in to the input's own; empty if that is the same.
 pub(super) fn way_below(folders: &[PathBuf], input: &Path) -> PathBuf {
     let rest = folders.iter().find_map(|folder| input.strip_prefix(folder).ok());
-    let is_below =
-        |way: &&Path| !way.as_os_str().is_empty() && way.components().all(|part| part != Component::ParentDir);
-    let way = rest.and_then(Path::parent).filter(is_below);
-    way.unwrap_or(Path::new(".")).to_path_buf()
+    let is_below = |way: &&Path| way.components().all(|part| part != Component::ParentDir);
+    rest.and_then(Path::parent).filter(is_below).map_or_else(PathBuf::new, Path::to_path_buf)
 }
 
-fn models_in(folder: &Path) -> Result<Vec<PathBuf>, (PathBuf, io::Error)> {
-    let (mut models, mut left) = (Vec::new(), vec![folder.to_path_buf()]);
+/// All models in a folder and in those in it, or what cannot be read of it.
+fn models_in(folder: &Path) -> impl Iterator<Item = Result<PathBuf, (PathBuf, io::Error)>> {
+    let (mut models, mut faults, mut left) = (Vec::new(), Vec::new(), vec![folder.to_path_buf()]);
     while let Some(folder) = left.pop() {
-        let fault = |error| (folder.clone(), error);
-        for entry in fs::read_dir(&folder).map_err(fault)? {
-            let entry = entry.map_err(fault)?;
-            if entry.file_name().as_encoded_bytes().starts_with(b".") {
-                continue;
-            }
-            let (path, kind) = (entry.path(), entry.file_type().map_err(fault)?);
-            if kind.is_dir() {
-                left.push(path);
-            } else if is_called_a_model(&path) && path.is_file() {
-                models.push(path);
-            }
+        if let Err(error) = look_into(&folder, &mut models, &mut left) {
+            faults.push((folder, error));
         }
     }
     models.sort_unstable();
-    Ok(models)
+    models.into_iter().map(Ok).chain(faults.into_iter().map(Err))
+}
+
+/// The models in a folder itself, and the folders in it.
+fn look_into(folder: &Path, models: &mut Vec<PathBuf>, folders: &mut Vec<PathBuf>) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        if entry.file_name().as_encoded_bytes().starts_with(b".") {
+            continue;
+        }
+        let (path, kind) = (entry.path(), entry.file_type()?);
+        if kind.is_dir() {
+            folders.push(path);
+        } else if is_called_a_model(&path) && path.is_file() {
+            models.push(path);
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -83,21 +102,22 @@ mod tests {
         {
             fs::write(at(name), "").unwrap();
         }
-        let found = unfold(&[at("all"), at("lone.toml"), "-".into(), at("gone.obj")]).unwrap();
+        let mut told = Vec::new();
+        let inputs = [at("all"), at("lone.toml"), "-".into(), at("none"), at("all/b"), at("gone.obj")];
+        let (found, ended) = unfold(&inputs, |fault| told.push((fault.code, fault.file.clone())));
         let expected = names.map(at).into_iter().chain([at("lone.toml"), "-".into(), at("gone.obj")]);
-        assert_eq!(found, expected.collect::<Vec<_>>());
-        let (fault, exit) = unfold(&[at("none")]).unwrap_err();
-        assert_eq!((fault.code, exit), ("folder-empty", Exit::Input));
+        assert_eq!(found, expected.collect::<Vec<_>>(), "each once");
+        assert_eq!((told, ended), (vec![("folder-empty", at("none"))], Exit::Input));
     }
 
     #[test]
     fn where_a_model_lies_is_told_from_the_folder_that_was_named() {
         let below = |folder: &str, input: &str| way_below(&[folder.into()], Path::new(input));
         assert_eq!(below("all", "all/b/c/x.glb"), Path::new("b/c"));
-        assert_eq!(below("all/", "all/x.glb"), Path::new("."));
+        assert_eq!(below("all/", "all/x.glb"), Path::new(""));
         assert_eq!(below(".", "./b/x.glb"), Path::new("b"));
-        assert_eq!(below("all", "other/b/x.glb"), Path::new("."));
-        assert_eq!(below("all", "all/../x/y.glb"), Path::new("."), "named beside the folder");
+        assert_eq!(below("all", "other/b/x.glb"), Path::new(""));
+        assert_eq!(below("all", "all/../x/y.glb"), Path::new(""), "named beside the folder");
     }
 
     #[cfg(unix)]
@@ -110,6 +130,6 @@ mod tests {
         std::os::unix::fs::symlink(at("all"), at("all/round")).unwrap();
         std::os::unix::fs::symlink(at("model.obj"), at("all/one.obj")).unwrap();
         std::os::unix::fs::symlink(at("gone.obj"), at("all/two.obj")).unwrap();
-        assert_eq!(unfold(&[at("all")]).unwrap(), [at("all/one.obj")]);
+        assert_eq!(unfold(&[at("all")], |fault| panic!("{fault}")), (vec![at("all/one.obj")], Exit::Done));
     }
 }

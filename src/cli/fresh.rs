@@ -11,7 +11,7 @@ use crate::load::paths::FileRead;
 use serde_json::{Map, Value};
 use std::fs::File;
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 
 /// Bytes that are read of a file at a time.
@@ -20,33 +20,32 @@ const CHUNK: usize = 1 << 16;
 /// Letters that are carried at most: a JPEG has no room for many times as many.
 const MOST: usize = 1 << 15;
 
-/// What a picture was made of, as it carries it: `asked`, under `files` the hash of each, and how many were `missing`; `None`
-/// where a file has no name, and where there are hundreds of them.
+/// What a picture was made of, as it carries it: `asked`, under `files` the hash of each, and whether there are `gaps`, where one
+/// was looked for that was not there; `None` where a file has no name, and where there are hundreds of them.
 pub(super) fn made_of(job: &RenderJob, batch: &Batch, shot: &Shot, loaded: &Loaded) -> Option<String> {
     if batch.inputs.iter().any(|input| input == Path::new("-")) {
         return None;
     }
     let file = |FileRead { path, hash }: &FileRead| Some((path.to_str()?.to_owned(), Value::from(hex(*hash))));
     let files: Map<String, Value> = loaded.facts.files.iter().map(file).collect::<Option<_>>()?;
-    let missing = loaded.warnings.iter().filter(|warning| warning.code.starts_with("file-")).count();
-    let asked = asked(job, batch, shot);
-    let text = serde_json::json!({ "asked": asked, "files": files, "missing": missing }).to_string();
+    let (asked, gaps) = (asked(job, batch, shot), loaded.facts.gaps);
+    let text = serde_json::json!({ "asked": asked, "files": files, "gaps": gaps }).to_string();
     (text.len() <= MOST).then_some(text)
 }
 
-/// Whether the picture is there and is what it would be if it were rendered now, as far as that is known before the model is
-/// loaded: what was looked for in vain may be there by now.
-pub(super) fn is_up_to_date(job: &RenderJob, batch: &Batch, shot: &Shot) -> bool {
-    let made_of = carried(shot).and_then(|text| serde_json::from_str(&text).ok());
-    let Some(Value::Object(made_of)) = made_of else { return false };
-    let Some(Value::Object(files)) = made_of.get("files") else { return false };
+/// The files that the picture was made of, if it is there and is what it would be if it were rendered now, as far as that is
+/// known before the model is loaded: what was looked for in vain may be there by now.
+pub(super) fn up_to_date(job: &RenderJob, batch: &Batch, shot: &Shot) -> Option<Vec<PathBuf>> {
+    let Value::Object(made_of) = serde_json::from_str(&carried(shot)?).ok()? else { return None };
+    let Value::Object(files) = made_of.get("files")? else { return None };
     let is_same = |(path, hash): (&String, &Value)| {
         hash_of_file(Path::new(path)).is_ok_and(|found| hash.as_str() == Some(hex(found).as_str()))
     };
-    made_of.get("asked").and_then(Value::as_str) == Some(asked(job, batch, shot).as_str())
-        && made_of.get("missing").and_then(Value::as_u64) == Some(0)
+    let same = made_of.get("asked").and_then(Value::as_str) == Some(asked(job, batch, shot).as_str())
+        && made_of.get("gaps").and_then(Value::as_bool) == Some(false)
         && !files.is_empty()
-        && files.iter().all(is_same)
+        && files.iter().all(is_same);
+    same.then(|| files.keys().map(PathBuf::from).collect())
 }
 
 /// The same once the model is loaded.
@@ -65,7 +64,7 @@ fn carried(shot: &Shot) -> Option<String> {
 /// same to the same program.
 fn asked(job: &RenderJob, batch: &Batch, shot: &Shot) -> String {
     let how = (&job.load, &job.look, &job.sequence, job.accel, job.intersector, &job.params, job.instances);
-    let which = (&batch.inputs, &shot.choice, &shot.step, shot.kind, job.allow_empty);
+    let which = (&batch.inputs, &shot.choice, &shot.step, shot.kind, job.allow_empty, job.strict);
     hex(xxh3_128(format!("{}\n{how:?}\n{which:?}", super::version::SHORT).as_bytes()))
 }
 

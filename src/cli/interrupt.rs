@@ -36,6 +36,7 @@ pub(super) fn install(format: Format) {
 }
 
 fn end() -> ! {
+    message::tell_all_apart();
     let mut stderr = io::stderr();
     // The progress bar may have left the cursor in mid-line.
     let line = if stderr.is_terminal() { "\n" } else { "" };

@@ -292,13 +292,15 @@ fn batches(args: &RenderArgs, choices: &[Choice], sequence: Option<&Sequence>) -
     let mut batches = Vec::new();
     let mut frame = 0;
     for inputs in groups {
-        let (mut shots, sub) = (Vec::new(), folders::way_below(&args.folders, &inputs[0]));
+        // Of several models in one picture none is where that belongs.
+        let sub = if args.merge { PathBuf::new() } else { folders::way_below(&args.folders, &inputs[0]) };
+        let mut shots = Vec::new();
         for (step, choice) in steps.iter().flat_map(|step| choices.iter().map(move |choice| (step, choice))) {
             frame += 1;
             let facts =
                 Facts { input: &inputs[0], sub: &sub, view: &choice.name(), frame: step.number.unwrap_or(frame) };
             let (several_views, numbered) = (choices.len() > 1, step.number.is_some());
-            let naming = Naming { several_views, numbered, mirrors: sub != Path::new(".") };
+            let naming = Naming { several_views, numbered, mirrors: !sub.as_os_str().is_empty() };
             let (target, kind, growth) = outputs::target(args, &facts, naming)?;
             shots.push(Shot { choice: choice.clone(), step: step.clone(), target, kind, growth });
         }

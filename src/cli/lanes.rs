@@ -2,7 +2,7 @@
 //!
 //! Much of what a small picture takes is no work for many threads: reading, parsing, encoding, writing, and all that waits
 //! for a disk. Where there are many of them, threads that have one each are all at work until the last. Pictures are the
-//! same bytes, and messages come as if one input had followed the other.
+//! same bytes, and messages come as if one of these inputs had followed the other; larger inputs come after them.
 
 use super::accident;
 use super::exit::Exit;
@@ -11,8 +11,13 @@ use super::job::{Batch, RenderJob, Shot};
 use super::message::Messages;
 use super::progress::Progress;
 use super::render::{self, SoFar};
+use crate::image::was_written_by_meshray;
+use crate::load::detect::is_called_a_model;
 use crate::threads;
 use rayon::ThreadPool;
+use std::collections::HashMap;
+use std::fs::Metadata;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Inputs for each lane at least: the last ones leave lanes idle.
@@ -20,6 +25,12 @@ const MANY: usize = 4;
 
 /// Bytes of a small input at most. What is larger takes many threads well, and memory.
 const SMALL: u64 = 8 << 20;
+
+/// Pixels of a small picture at most.
+const PIXELS: u64 = 1 << 20;
+
+/// Files and folders beside a model that are looked at.
+const LOOKED_AT: usize = 100_000;
 
 /// How a run over inputs ended: as its worst, and how many failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,11 +52,17 @@ impl Ended {
 /// others one by one.
 pub(super) fn run(job: &RenderJob, pool: &ThreadPool, messages: &Messages, so_far: &mut SoFar) -> Ended {
     let lanes = if may_go_side_by_side(job) { pool.current_num_threads() } else { 1 };
-    let all = || job.batches.iter();
-    let (small, large): (Vec<&Batch>, Vec<&Batch>) = all().partition(|batch| lanes > 1 && is_small(batch));
-    let pays = small.len() >= MANY * lanes;
-    let mut ended = if pays { side_by_side(job, &small, lanes, messages, so_far) } else { Ended::WELL };
-    for batch in if pays { large } else { all().collect() } {
+    let (mut small, mut others, mut sizes) = (Vec::new(), Vec::new(), Sizes::default());
+    for batch in &job.batches {
+        if lanes > 1 && sizes.are_small(batch) && spares_others(batch) { &mut small } else { &mut others }.push(batch);
+    }
+    let mut ended = Ended::WELL;
+    if small.len() >= MANY * lanes {
+        ended = side_by_side(job, &small, (lanes, pool), messages, so_far);
+    } else {
+        others = job.batches.iter().collect();
+    }
+    for batch in others {
         if interrupt::raised() {
             break;
         }
@@ -56,15 +73,66 @@ pub(super) fn run(job: &RenderJob, pool: &ThreadPool, messages: &Messages, so_fa
 }
 
 /// Not where memory has a bound of its own, which is that of one scene, nor where times are wanted, what is done by a signal, or
-/// single threads.
+/// large pictures.
 fn may_go_side_by_side(job: &RenderJob) -> bool {
-    let plain = !job.bounded && !job.profile && job.stats.is_none() && !job.dry_run && !job.keep_partial;
-    plain && job.again.is_none()
+    let (width, height) = job.look.size.unwrap_or_default();
+    let times = job.profile || job.stats.is_some() || !job.heatmaps.is_empty() || !job.look.costs.is_empty();
+    let small = u64::from(width) * u64::from(height) <= PIXELS;
+    small && !(job.bounded || times || job.dry_run || job.keep_partial || job.again.is_some())
 }
 
-fn is_small(batch: &Batch) -> bool {
-    let length = |input: &std::path::PathBuf| input.metadata().map_or(0, |file| file.len());
-    batch.inputs.iter().map(length).sum::<u64>() <= SMALL
+/// What lies beside models, folder by folder.
+#[derive(Default)]
+struct Sizes(HashMap<PathBuf, Option<u64>>);
+
+impl Sizes {
+    /// Whether what a scene is read from is small: a file that holds all, or one with its share of all that lies beside it and in
+    /// the folders there, since it may name any of that.
+    fn are_small(&mut self, batch: &Batch) -> bool {
+        let mut length = |input: &PathBuf| {
+            let own = input.metadata().ok().filter(Metadata::is_file)?.len();
+            let kind = input.extension()?.to_str()?.to_ascii_lowercase();
+            match kind.as_str() {
+                "glb" | "ply" | "stl" | "nff" => Some(own),
+                "gltf" | "obj" => {
+                    let folder = input.parent()?;
+                    Some(own + (*self.0.entry(folder.to_path_buf()).or_insert_with(|| beside(folder)))?)
+                }
+                _ => None,
+            }
+        };
+        batch.inputs.iter().map(&mut length).sum::<Option<u64>>().is_some_and(|bytes| bytes <= SMALL)
+    }
+}
+
+/// Bytes of what lies in a folder and in those in it beside models, for each model; `None` where that is much to look at.
+fn beside(folder: &Path) -> Option<u64> {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let (mut bytes, mut models, mut looked_at, mut left) = (0, 0, 0, vec![(folder.to_path_buf(), true)]);
+    while let Some((folder, is_own)) = left.pop() {
+        for entry in folder.read_dir().ok()? {
+            let entry = entry.ok()?;
+            looked_at += 1;
+            if looked_at > LOOKED_AT {
+                return None;
+            }
+            let (path, metadata) = (entry.path(), entry.metadata().ok()?);
+            if metadata.is_dir() && is_own {
+                left.push((path, false));
+            } else if is_called_a_model(&path) {
+                models += u64::from(is_own);
+            } else if metadata.is_file() {
+                bytes += metadata.len();
+            }
+        }
+    }
+    Some(bytes / models.max(1))
+}
+
+/// Whether its pictures replace nothing but pictures of ours: what another input reads is not known before that is loaded.
+fn spares_others(batch: &Batch) -> bool {
+    let spares = |path: &Path| !path.exists() || was_written_by_meshray(path);
+    batch.shots.iter().filter_map(|shot| shot.target.path()).all(spares)
 }
 
 /// Pictures of a scene that may be written, and how what was found out about the others ends.
@@ -84,23 +152,30 @@ fn guarded(
     worst.max(accident::guard(&name, messages, work))
 }
 
-fn side_by_side(job: &RenderJob, batches: &[&Batch], lanes: usize, messages: &Messages, so_far: &mut SoFar) -> Ended {
+fn side_by_side(
+    job: &RenderJob,
+    batches: &[&Batch],
+    (lanes, pool): (usize, &ThreadPool),
+    messages: &Messages,
+    so_far: &mut SoFar,
+) -> Ended {
     let progress = Progress::new(&format!("{} inputs", batches.len()), messages, job.quiet, false);
     progress.begin("rendering");
     let waiting = batches.iter().map(|_| None).collect();
     let state = State { next: 0, finished: 0, told: 0, waiting, so_far, ended: Ended::WELL };
     let queue = Queue { job, batches, messages, progress, state: Mutex::new(state) };
     std::thread::scope(|scope| {
-        let started: Vec<_> = (0..lanes).map(|_| scope.spawn(|| queue.work())).collect();
-        // A lane that could not start leaves its work to the others, and the first says why.
-        let faults: Vec<String> = started.into_iter().filter_map(|lane| lane.join().unwrap_or(None)).collect();
-        if faults.len() == lanes {
-            messages.error("threads", format!("cannot start a thread: {}", faults[0]), "ask for fewer");
-            queue.state().ended.and(Exit::Failed);
+        for _ in 0..lanes {
+            let lane = || threads::pool(1).map_or((), |pool| queue.work(&pool));
+            // Where the system starts no more threads there are fewer lanes.
+            if std::thread::Builder::new().spawn_scoped(scope, lane).is_err() {
+                break;
+            }
         }
     });
-    queue.tell_the_rest();
-    queue.state().ended
+    // And where it starts none, this one does it all.
+    queue.work(pool);
+    queue.end()
 }
 
 /// The inputs that wait for a lane.
@@ -137,18 +212,13 @@ impl<'a, 's> Queue<'a, 's> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What a lane does; why it could not start.
-    fn work(&self) -> Option<String> {
-        let pool = match threads::pool(1) {
-            Ok(pool) => pool,
-            Err(error) => return Some(error.to_string()),
-        };
+    /// What a lane does.
+    fn work(&self, pool: &ThreadPool) {
         while !interrupt::raised() {
             let Some((number, messages, shots, mut so_far)) = self.take() else { break };
-            let exit = guarded(self.job, self.batches[number], shots, &pool, &messages, &mut so_far);
+            let exit = guarded(self.job, self.batches[number], shots, pool, &messages, &mut so_far);
             self.put(number, Finished { messages, so_far, exit });
         }
-        None
     }
 
     /// The next input, with messages of its own. Whether its pictures may be written is asked in the order of inputs.
@@ -183,10 +253,42 @@ impl<'a, 's> Queue<'a, 's> {
     }
 
     /// Tells what was finished behind inputs that a signal has kept from being so.
-    fn tell_the_rest(&self) {
-        let mut state = self.state();
-        let rest: Vec<Finished> = state.waiting.iter_mut().filter_map(Option::take).collect();
-        rest.into_iter().for_each(|finished| self.tell(&mut state, finished));
+    fn end(self) -> Ended {
         self.progress.finish();
+        let mut state = self.state();
+        for finished in state.waiting.iter_mut().filter_map(Option::take).collect::<Vec<_>>() {
+            self.tell(&mut state, finished);
+        }
+        state.ended
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn small_is_what_a_model_may_read_and_not_its_own_file_alone() {
+        let dir = tempfile::tempdir().unwrap();
+        let small =
+            |name: &str| Sizes::default().are_small(&Batch { inputs: vec![dir.path().join(name)], shots: Vec::new() });
+        let write = |name: &str, bytes: u64| {
+            let path = dir.path().join(name);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::File::create(path).unwrap().set_len(bytes).unwrap();
+        };
+        for name in ["lone/a.gltf", "pair/a.obj", "pair/b.obj", "deep/a.gltf", "own/a.glb"] {
+            write(name, 10);
+        }
+        write("lone/a.bin", SMALL);
+        write("pair/all.png", SMALL);
+        write("deep/maps/a.png", SMALL - 10);
+        write("deep/maps/deeper/a.png", SMALL);
+        write("own/a.bin", SMALL);
+        write("own/large.glb", SMALL + 1);
+        write("own/a.toml", 10);
+        assert!(!small("lone/a.gltf") && small("pair/a.obj") && small("deep/a.gltf") && small("own/a.glb"));
+        assert!(!small("own/large.glb") && !small("own/a.toml") && !small("-") && !small("gone.obj"));
     }
 }

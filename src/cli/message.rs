@@ -7,8 +7,8 @@ use crate::load::{Diagnostic, LoadError};
 use indicatif::MultiProgress;
 use std::ffi::OsString;
 use std::io::Write;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 /// How messages look.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -71,6 +71,23 @@ impl Severity {
     }
 }
 
+/// Lines that wait.
+type Kept = Arc<Mutex<Vec<String>>>;
+
+/// All that wait, in the order in which they began to.
+static APART: Mutex<Vec<Weak<Mutex<Vec<String>>>>> = Mutex::new(Vec::new());
+
+/// Writes what still waits, before the process ends.
+pub(super) fn tell_all_apart() {
+    let all = APART.lock().unwrap_or_else(PoisonError::into_inner);
+    for apart in all.iter().filter_map(Weak::upgrade) {
+        // Whoever holds it writes.
+        if let Ok(mut lines) = apart.try_lock() {
+            drop(std::io::stderr().write_all(std::mem::take(&mut *lines).concat().as_bytes()));
+        }
+    }
+}
+
 /// Where messages go, and how many of them were warnings.
 #[derive(Debug, Default)]
 pub(super) struct Messages {
@@ -78,7 +95,7 @@ pub(super) struct Messages {
     quiet: bool,
     warnings: AtomicU32,
     /// Lines that wait until it is their turn; `None`: none does.
-    kept: Option<Mutex<Vec<String>>>,
+    kept: Option<Kept>,
     /// Bars on the same terminal; they step aside while a line is written.
     pub(super) bars: MultiProgress,
 }
@@ -91,7 +108,11 @@ impl Messages {
 
     /// Such messages that are kept until [`Self::tell`] writes them.
     pub(super) fn apart(&self) -> Self {
-        Self { kept: Some(Mutex::default()), ..Self::new(self.format, self.quiet) }
+        let kept = Kept::default();
+        let mut all = APART.lock().unwrap_or_else(PoisonError::into_inner);
+        all.retain(|apart| apart.strong_count() > 0);
+        all.push(Arc::downgrade(&kept));
+        Self { kept: Some(kept), ..Self::new(self.format, self.quiet) }
     }
 
     /// Whether they are kept.
@@ -102,7 +123,7 @@ impl Messages {
     /// Writes the messages that were kept apart.
     pub(super) fn tell(&self, apart: &Self) {
         self.warnings.fetch_add(apart.warnings(), Ordering::Relaxed);
-        if let Some(Ok(mut lines)) = apart.kept.as_ref().map(Mutex::lock)
+        if let Some(Ok(mut lines)) = apart.kept.as_ref().map(|kept| kept.lock())
             && !lines.is_empty()
         {
             let lines = std::mem::take(&mut *lines).concat();
@@ -119,7 +140,7 @@ impl Messages {
             return;
         }
         let line = line(self.format, severity, message);
-        if let Some(Ok(mut lines)) = self.kept.as_ref().map(Mutex::lock) {
+        if let Some(Ok(mut lines)) = self.kept.as_ref().map(|kept| kept.lock()) {
             lines.push(line + "\n");
             return;
         }

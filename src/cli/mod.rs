@@ -141,16 +141,15 @@ fn render_command(typed: &RenderArgs) -> Exit {
             }
         }
     }
-    match folders::unfold(&args.inputs) {
-        Ok(models) => (args.folders, args.inputs) = (folders::of(&args.inputs), models),
-        Err((fault, exit)) => {
-            messages.say(Severity::Error, &fault);
-            return exit;
-        }
+    let (models, unfolded) = folders::unfold(&args.inputs, |fault| messages.say(Severity::Error, fault));
+    if models.is_empty() && unfolded != Exit::Done {
+        return unfolded;
     }
+    (args.folders, args.inputs) = (folders::of(&args.inputs), models);
     match job::RenderJob::new(&args) {
         Ok(job) => {
-            render::run(&job::RenderJob { expected_hash, made_of, again: typed.again.clone(), ..job }, &messages)
+            let job = job::RenderJob { expected_hash, made_of, again: typed.again.clone(), ..job };
+            render::run(&job, &messages).max(unfolded)
         }
         Err(job::Wrong(text)) => {
             messages.error("usage", text, "");

@@ -1,7 +1,7 @@
 //! Where pictures go: templates, default names, and names that would collide.
 //!
-//! Templates know `{dir}` (the input's folder), `{sub}` (the way to there from the folder that was named, `.` if that is the
-//! same), `{stem}` (its name without extension), `{ext}` (its extension), `{view}` and `{frame}` (number of the picture: in
+//! Templates know `{dir}` (the input's folder), `{sub}` (the way to there from the folder that was named; nothing, and no slash
+//! behind it, if that is the same), `{stem}` (its name without extension), `{ext}` (its extension), `{view}` and `{frame}` (number of the picture: in
 //! its sequence, or else in this run, from 1; `{frame:04}` pads it with zeros). `{{` and `}}` are plain braces.
 
 use crate::image::destination;
@@ -35,6 +35,18 @@ pub(super) fn stem(input: &Path) -> String {
 
 /// Fills a template. Errors name the unknown field.
 pub(super) fn fill(template: &str, facts: &Facts) -> Result<PathBuf, String> {
+    filled(template, facts, None).map(|(name, _)| PathBuf::from(name))
+}
+
+/// The folder below which a template makes folders of its own, that in front of `{sub}`; `None` if it has none such.
+pub(super) fn grows_in(template: &str, facts: &Facts) -> Result<Option<PathBuf>, String> {
+    let (before, found) = filled(template, facts, Some("sub"))?;
+    let folder = before.rsplit_once('/').map_or(".", |(folder, _)| if folder.is_empty() { "/" } else { folder });
+    Ok(found.then(|| PathBuf::from(folder)))
+}
+
+/// What a template is filled to, up to a field if that is asked for, and whether it was there.
+fn filled(template: &str, facts: &Facts, until: Option<&str>) -> Result<(String, bool), String> {
     let mut name = String::new();
     let mut rest = template;
     while let Some(at) = rest.find(['{', '}']) {
@@ -44,14 +56,19 @@ pub(super) fn fill(template: &str, facts: &Facts) -> Result<PathBuf, String> {
             name.push_str(&tail[..1]);
             rest = after;
         } else if let Some((field, after)) = tail.strip_prefix('{').and_then(|t| t.split_once('}')) {
-            name.push_str(&value(field, facts)?);
-            rest = after;
+            if Some(field) == until {
+                return Ok((name, true));
+            }
+            let value = value(field, facts)?;
+            name.push_str(&value);
+            // No way at all is no folder.
+            rest = if value.is_empty() && field == "sub" { after.strip_prefix('/').unwrap_or(after) } else { after };
         } else {
             return Err(format!("`{template}`: a brace without its partner; write {{{{ or }}}} for a plain brace"));
         }
     }
     name.push_str(rest);
-    Ok(PathBuf::from(name))
+    Ok((name, false))
 }
 
 fn value(field: &str, facts: &Facts) -> Result<String, String> {
@@ -98,13 +115,6 @@ pub(super) struct Naming {
     pub numbered: bool,
     /// Inputs from below a folder, which is drawn as one.
     pub mirrors: bool,
-}
-
-/// The folder below which a template makes folders of its own, that in front of `{sub}`; `None` if it has none such.
-pub(super) fn grows_in(template: &str, facts: &Facts) -> Result<Option<PathBuf>, String> {
-    let Some((before, _)) = template.split_once("{sub}") else { return Ok(None) };
-    let folder = before.rsplit_once('/').map_or(".", |(folder, _)| if folder.is_empty() { "/" } else { folder });
-    fill(folder, facts).map(Some)
 }
 
 /// The template that is used when none is given, or when only a folder is.
@@ -227,6 +237,17 @@ mod tests {
         assert_eq!(grows_in("/{sub}/{stem}.png"), Some("/".into()));
         assert_eq!(grows_in("x/{view}/of-{sub}/{stem}.png"), Some("x/front".into()));
         assert_eq!(grows_in("x/{stem}.png"), None);
+        assert_eq!(grows_in("x/{{sub}}/{stem}.png"), None, "plain braces");
+    }
+
+    #[test]
+    fn in_the_folder_that_was_named_itself_there_is_no_way() {
+        let here = Facts { sub: Path::new(""), ..facts("a.obj") };
+        for (template, expected) in
+            [("{sub}/{stem}.png", "a.png"), ("x/{sub}/{stem}.png", "x/a.png"), ("of-{sub}.png", "of-.png")]
+        {
+            assert_eq!(fill(template, &here).unwrap(), Path::new(expected));
+        }
     }
 
     #[test]

@@ -6,9 +6,10 @@ use super::job::{Batch, Shot, Stats, Wrong, wrong};
 use super::output_name::{self, Facts, Naming};
 use crate::image::FileKind;
 use crate::load::Diagnostic;
+use crate::load::paths::lexical;
 use crate::render::Cost;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// Where a picture goes.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -46,7 +47,12 @@ pub(super) fn target(args: &RenderArgs, facts: &Facts, naming: Naming) -> Result
         None => (usual(None), Target::Default),
     };
     let path = output_name::fill(&template, facts).map_err(Wrong)?;
-    let growth = output_name::grows_in(&template, facts).map_err(Wrong)?;
+    // What leads out of it again is not made.
+    let holds = |base: &PathBuf| {
+        let (base, path) = (lexical(base), lexical(&path));
+        path.strip_prefix(&base).is_ok_and(|way| way.components().all(|part| matches!(part, Component::Normal(_))))
+    };
+    let growth = output_name::grows_in(&template, facts).map_err(Wrong)?.filter(holds);
     let kind = match (format, FileKind::from_path(&path)) {
         (Some(typed), Ok(named)) if typed != named => {
             let (path, format) = (path.display(), typed.extension());

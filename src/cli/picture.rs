@@ -3,7 +3,7 @@
 
 use super::interrupt;
 use super::job::{Look, Shot};
-use super::outputs::Target;
+use super::outputs::{self, Target};
 use crate::image::{ExrSamples, FileKind, Metadata, Output, Picture, PngDepth, ToneMap, encode};
 use crate::load::Diagnostic;
 use crate::render::{Sampling, Settings};
@@ -207,6 +207,7 @@ pub(super) fn write(shot: &Shot, bytes: &[u8]) -> Result<(), WriteError> {
             })
         }
         Target::Named(path) | Target::Default(path) => {
+            outputs::make_folder(shot).map_err(WriteError::Fault)?;
             interrupt::write_atomic(path, bytes).map_err(|e| WriteError::new(shot, e.to_string()))
         }
     }

@@ -149,7 +149,8 @@ pub(super) fn take_pictures(frame: &mut Loaded, earlier: Loaded) -> bool {
     let (to, from) = (&mut frame.scene, earlier.scene);
     (to.materials, to.textures, to.bitmaps) = (from.materials, from.textures, from.bitmaps);
     (to.environment, to.panorama) = (from.environment, from.panorama);
-    (frame.facts.files, frame.facts.hash) = (earlier.facts.files, earlier.facts.hash);
+    let facts = earlier.facts;
+    (frame.facts.files, frame.facts.hash, frame.facts.gaps) = (facts.files, facts.hash, facts.gaps);
     true
 }
 
@@ -164,6 +165,7 @@ fn append(whole: &mut Loaded, part: Loaded) {
     facts.extensions.extend(more.extensions);
     facts.max_rounding = facts.max_rounding.max(more.max_rounding);
     facts.files.extend(more.files);
+    facts.gaps |= more.gaps;
     facts.charged += more.charged;
     facts.reading += more.reading;
     facts.decoding += more.decoding;

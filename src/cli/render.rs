@@ -163,9 +163,18 @@ pub(super) fn render_batch(
     messages: &Messages,
     so_far: &mut SoFar,
 ) -> Exit {
-    let is_old = |shot: &&&Shot| !(job.update && fresh::is_up_to_date(job, batch, shot));
-    let old: Vec<&Shot> = shots.iter().filter(is_old).copied().collect();
-    so_far.up_to_date += (shots.len() - old.len()) as u64;
+    let mut old = shots.to_vec();
+    if job.update {
+        old.retain(|shot| match fresh::up_to_date(job, batch, shot) {
+            None => true,
+            Some(files) => {
+                // Other pictures must not replace them, either.
+                so_far.sources.add(files);
+                so_far.up_to_date += 1;
+                false
+            }
+        });
+    }
     if old.is_empty() {
         return Exit::Done;
     }
@@ -184,6 +193,7 @@ fn render_shots(task: &Task, shots: &[&Shot], so_far: &mut SoFar) -> Result<Exit
     let survey = Survey::of(job, batch, aspect, messages, progress)?;
     survey.iter().for_each(|_| profile.done("frame"));
     so_far.shown = false;
+    let up_to_date = so_far.up_to_date;
     let mut earlier = beginning(task, shots, survey.as_ref(), &mut profile)?;
     let (mut worst, mut left) = (Exit::Done, shots);
     while let Some(first) = left.first() {
@@ -212,7 +222,7 @@ fn render_shots(task: &Task, shots: &[&Shot], so_far: &mut SoFar) -> Result<Exit
         drop(stage);
         (earlier, profile) = (Some(ready), Profile::new());
     }
-    let all = shots.len() == batch.shots.len();
+    let all = shots.len() == batch.shots.len() && so_far.up_to_date == up_to_date;
     if survey.is_some() && all && !so_far.shown && !job.dry_run && worst == Exit::Done {
         messages.say(Severity::Warning, &unseen::sequence(shots.len(), task.file()));
         if job.strict {

@@ -249,9 +249,6 @@ impl Prepared<'_> {
             let warning = Diagnostic::new("jpeg-opaque", shot.target.path().unwrap_or(Path::new("-")), "", text);
             messages.say(Severity::Warning, &warning.remedy("write PNG or WebP"));
         }
-        if let Err(fault) = outputs::make_folder(shot) {
-            return self.task.fail(&fault, Exit::Failed);
-        }
         profile.skip();
         // Until the picture is written the first signal ends no more than its rays.
         let _guard = job.keep_partial.then(interrupt::Guard::new);

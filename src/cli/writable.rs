@@ -81,11 +81,8 @@ pub(super) fn check_target(target: &Target, growth: Option<&Path>, sources: &Sou
         let fault = Diagnostic::new("output-terminal", "", "", text).remedy("redirect it, or name a file with -o");
         return if std::io::stdout().is_terminal() { Err(fault) } else { Ok(()) };
     };
-    let grows = |base: &Path| {
-        base.is_dir() && path.parent().is_some_and(|folder| folder.starts_with(base) || base == Path::new("."))
-    };
     match check(path, "-o", sources) {
-        Err(fault) if fault.code == NO_FOLDER && growth.is_some_and(grows) => return Ok(()),
+        Err(fault) if fault.code == NO_FOLDER && growth.is_some_and(Path::is_dir) => return Ok(()),
         checked => checked?,
     }
     if matches!(target, Target::Default(_)) && path.exists() && !was_written_by_meshray(path) {

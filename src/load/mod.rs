@@ -154,6 +154,8 @@ pub struct Facts {
     /// xxh3-128 of the xxh3-128 hashes of all files in `files`, in that order (see [`paths::Resolver::finish`]); of the
     /// files of a model that a scene file shows the first counts with the hash of the model, and the others with 0.
     pub hash: u128,
+    /// Whether a file was looked for where it was not: in vain, or before it was found elsewhere.
+    pub gaps: bool,
     /// Bytes of memory that loading was charged with.
     pub charged: u64,
     /// Time that reading the bytes of all files took, of the thread that did it.

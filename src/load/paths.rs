@@ -7,6 +7,7 @@
 use super::{Diagnostic, Limits, LoadOptions, Source, whole};
 use crate::stopwatch::{Spent, Stopwatch};
 use percent_encoding::percent_decode_str;
+use std::cell::Cell;
 use std::collections::HashMap;
 use std::fs;
 use std::io;
@@ -16,7 +17,7 @@ use xxhash_rust::xxh3::xxh3_128;
 /// A file that was read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileRead {
-    /// As it was named, or beside the file that names it.
+    /// As it was named, from the folder of the model as that was.
     pub path: PathBuf,
     /// xxh3-128 of its bytes.
     pub hash: u128,
@@ -31,8 +32,10 @@ impl AsRef<Path> for FileRead {
 /// Reads the files that a model names.
 #[derive(Clone, Debug)]
 pub struct Resolver {
-    /// Folder that relative names start from.
+    /// Folder that relative names start from; canonical.
     base: PathBuf,
+    /// The same as it was named.
+    named: PathBuf,
     /// Nothing outside this folder is read; canonical.
     root: PathBuf,
     /// Those of a file.
@@ -44,6 +47,8 @@ pub struct Resolver {
     /// What lies in the folders that were looked through for a name in another case: names by their small letters.
     listed: HashMap<PathBuf, HashMap<String, String>>,
     reading: Spent,
+    /// Whether anything was looked for where it was not.
+    gaps: Cell<bool>,
 }
 
 /// A file that was read.
@@ -138,17 +143,20 @@ impl Resolver {
             None if source.is_stdin() => options.root.clone().unwrap_or_else(current),
             None => current(),
         };
+        let named = if folder.is_none() && base == current() { PathBuf::new() } else { base.clone() };
         let base = base.canonicalize().unwrap_or(base);
         let root = options.root.clone().unwrap_or_else(|| base.clone());
         let root = root.canonicalize().unwrap_or(root);
         let mut resolver = Self {
             base,
+            named,
             root,
             limits: options.limits,
             read: Vec::new(),
             known: HashMap::new(),
             listed: HashMap::new(),
             reading: Spent::default(),
+            gaps: Cell::new(false),
         };
         let canonical = source.path.canonicalize().unwrap_or_else(|_| source.path.clone());
         resolver.note(canonical, source.path.clone(), &source.bytes);
@@ -234,7 +242,7 @@ impl Resolver {
             return Err(too_large(bytes.len() as u64));
         }
         self.reading += watch.read();
-        self.note(path, self.base.join(name), &bytes);
+        self.note(path, self.named.join(name), &bytes);
         Ok(bytes)
     }
 
@@ -266,7 +274,10 @@ impl Resolver {
             Ok(path) => Err(outside(&path)),
             // Whether a file outside the root exists is nobody's business.
             Err(_) if !lexical(&wanted).starts_with(&self.root) => Err(outside(&lexical(&wanted))),
-            Err(e) if e.kind() == io::ErrorKind::NotFound => Err(FileFault::Missing(shown)),
+            Err(e) if e.kind() == io::ErrorKind::NotFound => {
+                self.gaps.set(true);
+                Err(FileFault::Missing(shown))
+            }
             Err(source) => Err(FileFault::Io { name: shown, source }),
         }
     }
@@ -285,17 +296,18 @@ impl Resolver {
     }
 
     /// Adds the files of a model that was loaded on behalf of this one; `hash` is that of all of them.
-    pub fn absorb(&mut self, files: &[FileRead], hash: u128) {
+    pub fn absorb(&mut self, files: &[FileRead], hash: u128, gaps: bool) {
+        self.gaps.set(self.gaps.get() || gaps);
         let rest = files.iter().skip(1).map(|file| (file.clone(), 0));
         self.read.extend(files.first().map(|file| (file.clone(), hash)));
         self.read.extend(rest);
     }
 
     /// Every file read, in the order first read, and the xxh3-128 of their xxh3-128 hashes (little-endian) in that
-    /// order.
-    pub fn finish(self) -> (Vec<FileRead>, u128) {
+    /// order, and whether any was looked for where it was not.
+    pub fn finish(self) -> (Vec<FileRead>, u128, bool) {
         let hashes: Vec<u8> = self.read.iter().flat_map(|(_, counted)| counted.to_le_bytes()).collect();
-        (self.read.into_iter().map(|(file, _)| file).collect(), xxh3_128(&hashes))
+        (self.read.into_iter().map(|(file, _)| file).collect(), xxh3_128(&hashes), self.gaps.get())
     }
 }
 

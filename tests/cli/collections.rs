@@ -1,6 +1,6 @@
 //! Whole folders of models, and pictures of them that are up to date.
 
-use super::program::{CUBE, Folder, cube_with_a_bad_face, textured_cube};
+use super::program::{CUBE, Folder, Run, cube_with_a_bad_face, textured_cube};
 
 /// Three models in two folders, and what lies beside models.
 fn collection() -> Folder {
@@ -32,6 +32,9 @@ fn folders_are_made_only_in_one_that_is_there_and_for_pictures_that_are() {
     assert!(folder.has("thumbs/a.png") && !folder.has("thumbs/broken"));
     folder.render(&["all/deep", "-o", "other-{sub}/{stem}.png", "--dry-run"]);
     assert!(!folder.has("other-er"), "nothing is made where pictures are only foretold");
+    folder.render(&["all/deep/er", "all/deep/a.obj", "-o", "thumbs/{sub}/../../{stem}.png"]).ends(0);
+    folder.render(&["all/deep", "-o", "thumbs/{sub}/../../gone/{stem}.png"]).ends(3).says(&["its folder is not there"]);
+    assert!(!folder.has("gone"));
 }
 
 #[test]
@@ -40,6 +43,10 @@ fn pictures_of_one_name_and_folders_without_a_model_are_told() {
     folder.render(&["all", "-o", "{stem}.png"]).ends(2).says(&["all/a.obj", "all/deep/a.obj", "{sub}"]);
     folder.render(&["none"]).ends(3).says(&["none", "no model", ".glb"]);
     assert_eq!(folder.names(), ["all", "none"]);
+    folder.render(&["none", "all/deep/er"]).ends(3).says(&["no model"]);
+    assert!(folder.has("b.png"), "the others are rendered");
+    folder.render(&["all", "all/deep", "--merge", "-o", "./"]).ends(0);
+    assert!(folder.has("a.png"));
 }
 
 #[test]
@@ -155,4 +162,67 @@ fn many_inputs_side_by_side_make_what_they_make_one_by_one_and_say_it_in_their_o
     std::fs::remove_file(folder.path("out/01.png")).unwrap();
     std::fs::remove_file(folder.path("out/31.png")).unwrap();
     folder.render(&["all", "-o", "out/", "--threads", "3", "--update"]).says(&[summary, "6 of them failed"]);
+}
+
+/// `b.png` is what `a.obj` shows, and where the picture of `b.obj` would go.
+fn with_a_texture_in_the_way() -> Folder {
+    let cubes = |folder: Folder| (0..9).fold(folder, |folder, i| folder.file(&format!("m/z{i}.obj"), CUBE));
+    let texture = textured_cube().read("cube.jpg");
+    cubes(Folder::new())
+        .file("m/a.obj", format!("mtllib a.mtl\nusemtl a\n{CUBE}"))
+        .file("m/a.mtl", "newmtl a\nmap_Kd b.png\n")
+        .file("m/b.png", texture)
+        .file("m/b.obj", CUBE)
+}
+
+#[test]
+fn no_picture_replaces_what_another_model_shows_neither_side_by_side_nor_when_that_is_up_to_date() {
+    let folder = with_a_texture_in_the_way();
+    let texture = folder.read("m/b.png");
+    for (threads, further) in
+        [("1", "--quiet"), ("2", "--quiet"), ("2", "--update"), ("2", "--update"), ("1", "--update")]
+    {
+        let words = ["m", "-o", "m/{sub}/{stem}.png", "--threads", threads, further];
+        folder.render(&words).ends(1).says(&["m/b.png: would replace a file that is read"]);
+        assert!(folder.read("m/b.png") == texture, "{words:?}");
+    }
+}
+
+#[test]
+fn a_copy_of_a_project_is_not_up_to_date_where_its_files_are_others() {
+    let texture = |grey: f32| {
+        let picture = meshray::image::Picture::of(2, 2, vec![[grey; 4]; 4]);
+        let kind = meshray::image::FileKind::Jpeg;
+        meshray::image::encode(&picture, kind, &Default::default(), &Default::default()).unwrap()
+    };
+    let model = format!("mtllib cube.mtl\nusemtl a\nvt 0 0\n{}", CUBE.replace("f 4 3 2 1", "f 4/1 3/1 2/1 1/1"));
+    let project = |name: &str, folder: Folder| {
+        let at = |file: &str| format!("{name}/{file}");
+        folder.file(&at("cube.obj"), &model).file(&at("cube.mtl"), "newmtl a\nmap_Kd cube.jpg\n")
+    };
+    let folder = project("two", project("one", Folder::new()));
+    let folder = folder.file("one/cube.jpg", texture(0.1)).file("two/cube.jpg", texture(0.9));
+    let update = |name: &str| {
+        let words = ["render", "cube.obj", "--size", "16", "--update"];
+        Run::of(folder.program(&words).current_dir(folder.path(name))).ends(0)
+    };
+    update("one");
+    std::fs::copy(folder.path("one/cube.png"), folder.path("two/cube.png")).unwrap();
+    assert!(update("one").stderr.contains("up to date"));
+    assert!(!update("two").stderr.contains("up to date"));
+    assert!(folder.read("one/cube.png") != folder.read("two/cube.png"));
+}
+
+#[test]
+fn what_would_be_found_before_what_was_found_is_noticed() {
+    let folder = textured_cube().file("t.PNG", "");
+    let update = || folder.render(&["cube.obj", "--update"]);
+    std::fs::write(folder.path("cube.mtl"), "newmtl a\nmap_Kd CUBE.jpg\n").unwrap();
+    update().ends(0);
+    update().ends(0).says(&["cube.png is up to date"]);
+    std::fs::copy(folder.path("cube.jpg"), folder.path("CUBE.jpg")).unwrap();
+    assert!(!update().ends(0).stderr.contains("up to date"));
+    update().ends(0).says(&["cube.png is up to date"]);
+    // With --strict it is another wish: there was to be no warning.
+    assert!(!folder.render(&["cube.obj", "--update", "--strict"]).stderr.contains("up to date"));
 }

@@ -204,7 +204,7 @@ impl Loading<'_> {
         lost.into_iter().for_each(|warning| self.report.warnings.push(warning));
         scene.up = self.options.up.unwrap_or_default();
         (facts.reading, facts.decoding) = (resolver.reading(), decoding);
-        (facts.files, facts.hash) = resolver.finish();
+        (facts.files, facts.hash, facts.gaps) = resolver.finish();
         Ok(scene)
     }
 

@@ -73,7 +73,7 @@ pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Resu
         why.tell(count, (&source.path, String::new()), &mut dropped, &mut warnings);
     }
     finish(&mut scene, options);
-    let (files, hash) = Resolver::new(source, options).finish();
+    let (files, hash, _) = Resolver::new(source, options).finish();
     let (format, faces, max_rounding) = ("NFF".into(), drawn.count, drawn.max_rounding);
     let facts = Facts { format, faces, dropped, max_rounding, files, hash, ..Facts::default() };
     Ok(Loaded { scene, warnings: warnings.into_vec(), facts })

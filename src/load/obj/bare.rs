@@ -153,7 +153,7 @@ pub(in crate::load) fn load(
     if is_see_through {
         scene.materials.iter_mut().for_each(|material| material.alpha_mode = AlphaMode::Blend);
     }
-    let (files, hash) = resolver.finish();
+    let (files, hash, gaps) = resolver.finish();
     let mut facts = Facts {
         format: format.into(),
         generator: generator(&statements.comments),
@@ -162,6 +162,7 @@ pub(in crate::load) fn load(
         up_reason: options.up.is_none().then_some(reason),
         max_rounding: placed.max_rounding,
         files,
+        gaps,
         hash,
         ..Facts::default()
     };

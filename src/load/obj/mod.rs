@@ -84,7 +84,7 @@ pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Resu
     let mut scene =
         scene(meshes, materials, placed.center, up, budget).map_err(|over| bare::over_memory(file, over))?;
 
-    let (files, hash) = resolver.finish();
+    let (files, hash, gaps) = resolver.finish();
     let mut facts = Facts {
         format: "Wavefront OBJ".into(),
         generator: generator(&statements.comments),
@@ -93,6 +93,7 @@ pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Resu
         up_reason: options.up.is_none().then_some(reason),
         max_rounding: placed.max_rounding,
         files,
+        gaps,
         hash,
         reading,
         decoding,

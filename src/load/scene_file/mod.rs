@@ -447,7 +447,7 @@ fn assemble(
                 &first.insert(Known { places, stored, facts: part.facts }).facts
             }
         };
-        resolver.absorb(&found.files, found.hash);
+        resolver.absorb(&found.files, found.hash, found.gaps);
         tell(&mut facts, found, shapes::stretch(place));
         // Shapes count on from this scene's materials once they are appended, so an override comes after.
         if let Some(material) = model.material {
@@ -458,7 +458,7 @@ fn assemble(
         }
     }
     facts.reading += resolver.reading();
-    (facts.files, facts.hash) = resolver.finish();
+    (facts.files, facts.hash, facts.gaps) = resolver.finish();
     Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
 }
 
