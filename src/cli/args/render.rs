@@ -28,8 +28,9 @@ pub(in crate::cli) struct RenderArgs {
     /// {ext} {view} {frame:04}
     ///
     /// Without it the picture goes to STEM.png in the current folder. Pictures of models in the folders of a folder that was
-    /// named go to folders like these, which are made: {sub} is the way from the folder that was named to the model's own. Names that are made up, in a folder given here and
-    /// of heat maps too, replace only a picture that meshray wrote; a name given here replaces whatever is there.
+    /// named go to folders like these, which are made: {sub} is the way from the folder that was named to the model's own.
+    /// Names that are made up, in a folder given here and of heat maps too, replace only a picture that meshray wrote; a name
+    /// given here replaces whatever is there.
     #[arg(short, long, value_name = "PATH", help_heading = "Output", allow_hyphen_values = true)]
     pub output: Option<String>,
     /// Columns and rows of the picture; one number is a square [default: 1024x768]
