@@ -16,7 +16,6 @@ use crate::load::detect::is_called_a_model;
 use crate::threads;
 use rayon::ThreadPool;
 use std::collections::HashMap;
-use std::fs::Metadata;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -90,8 +89,10 @@ impl Sizes {
     /// the folders there, since it may name any of that.
     fn are_small(&mut self, batch: &Batch) -> bool {
         let mut length = |input: &PathBuf| {
-            let own = input.metadata().ok().filter(Metadata::is_file)?.len();
             let kind = input.extension()?.to_str()?.to_ascii_lowercase();
+            // What is not there is soon said.
+            let Ok(file) = input.metadata() else { return Some(0) };
+            let own = file.is_file().then_some(file.len())?;
             match kind.as_str() {
                 "glb" | "ply" | "stl" | "nff" => Some(own),
                 "gltf" | "obj" => {
@@ -190,6 +191,7 @@ struct Queue<'a, 's> {
 struct State<'s> {
     /// The input that the next free lane takes.
     next: usize,
+    /// How many are done with.
     finished: usize,
     /// Of so many from the first on all was told.
     told: usize,
@@ -289,6 +291,6 @@ mod tests {
         write("own/large.glb", SMALL + 1);
         write("own/a.toml", 10);
         assert!(!small("lone/a.gltf") && small("pair/a.obj") && small("deep/a.gltf") && small("own/a.glb"));
-        assert!(!small("own/large.glb") && !small("own/a.toml") && !small("-") && !small("gone.obj"));
+        assert!(!small("own/large.glb") && !small("own/a.toml") && !small("-") && small("gone.obj"));
     }
 }
