@@ -9,6 +9,7 @@ use super::exit::Exit;
 use super::interrupt;
 use super::job::{Batch, RenderJob, Shot};
 use super::message::Messages;
+use super::outputs::Target;
 use super::progress::Progress;
 use super::render::{self, SoFar};
 use crate::image::was_written_by_meshray;
@@ -130,10 +131,13 @@ fn beside(folder: &Path) -> Option<u64> {
     Some(bytes / models.max(1))
 }
 
-/// Whether its pictures replace nothing but pictures of ours: what another input reads is not known before that is loaded.
+/// Whether its pictures replace nothing but pictures of ours: what another input reads is not known before that is loaded. Under
+/// names that are made up they never do.
 fn spares_others(batch: &Batch) -> bool {
-    let spares = |path: &Path| !path.exists() || was_written_by_meshray(path);
-    batch.shots.iter().filter_map(|shot| shot.target.path()).all(spares)
+    batch.shots.iter().all(|shot| match &shot.target {
+        Target::Named(path) => !path.exists() || was_written_by_meshray(path),
+        Target::Default(_) | Target::Stdout => true,
+    })
 }
 
 /// Pictures of a scene that may be written, and how what was found out about the others ends.
