@@ -20,22 +20,17 @@ pub(super) fn unfold(inputs: &[PathBuf], mut tell: impl FnMut(&Diagnostic)) -> (
             models.push(input.clone());
             continue;
         }
-        let before = (models.len(), ended);
-        for found in models_in(input) {
-            match found {
-                Ok(model) if known.insert(model.clone()) => models.push(model),
-                Ok(_) => {}
-                Err((folder, error)) => {
-                    tell(&Diagnostic::new("folder-unreadable", folder, "", error.to_string()));
-                    ended = ended.max(Exit::Failed);
-                }
-            }
-        }
-        if before == (models.len(), ended) && models_in(input).next().is_none() {
+        let (found, faults) = models_in(input);
+        if found.is_empty() && faults.is_empty() {
             let remedy = "name one with .glb, .gltf, .obj, .ply, .stl or .nff files, or a scene file itself";
             tell(&Diagnostic::new("folder-empty", input, "", "no model is in this folder").remedy(remedy));
             ended = ended.max(Exit::Input);
         }
+        for (folder, error) in faults {
+            tell(&Diagnostic::new("folder-unreadable", folder, "", error.to_string()));
+            ended = ended.max(Exit::Failed);
+        }
+        models.extend(found.into_iter().filter(|model| known.insert(model.clone())));
     }
     (models, ended)
 }
@@ -57,8 +52,8 @@ pub(super) fn way_below(folders: &[PathBuf], input: &Path) -> PathBuf {
     rest.and_then(Path::parent).filter(is_below).map_or_else(PathBuf::new, Path::to_path_buf)
 }
 
-/// All models in a folder and in those in it, or what cannot be read of it.
-fn models_in(folder: &Path) -> impl Iterator<Item = Result<PathBuf, (PathBuf, io::Error)>> {
+/// All models in a folder and in those in it, in the order of their names, and the folders that cannot be read.
+fn models_in(folder: &Path) -> (Vec<PathBuf>, Vec<(PathBuf, io::Error)>) {
     let (mut models, mut faults, mut left) = (Vec::new(), Vec::new(), vec![folder.to_path_buf()]);
     while let Some(folder) = left.pop() {
         if let Err(error) = look_into(&folder, &mut models, &mut left) {
@@ -66,7 +61,7 @@ fn models_in(folder: &Path) -> impl Iterator<Item = Result<PathBuf, (PathBuf, io
         }
     }
     models.sort_unstable();
-    models.into_iter().map(Ok).chain(faults.into_iter().map(Err))
+    (models, faults)
 }
 
 /// The models in a folder itself, and the folders in it.

@@ -95,3 +95,18 @@ fn the_end_is_told_in_the_form_that_is_asked_for() {
     assert_eq!((&message["severity"], &message["code"]), (&"error".into(), &"interrupted".into()), "{json}");
     assert_eq!(said(&["-q"]), "meshray: interrupted\n");
 }
+
+#[test]
+fn what_waits_behind_a_slow_input_is_told() {
+    let folder = (1..8).fold(Folder::with_cube(), |folder, i| folder.file(&format!("d{i}.obj"), "f 1 2 3\n"));
+    let words = ["render", "./", "--size", "1000x1000", "--samples", "4096", "--aa", "uniform", "--threads", "2"];
+    let child = start(&folder, &words);
+    std::thread::sleep(Duration::from_millis(1500));
+    signal(&child);
+    let end = child.wait_with_output().unwrap();
+    let said = String::from_utf8(end.stderr).unwrap();
+    assert_eq!(end.status.code(), Some(130), "{said}");
+    let lines: Vec<&str> = said.lines().collect();
+    let told = (1..8).all(|i| lines[i - 1].starts_with(&format!("error: ./d{i}.obj")));
+    assert!(told && lines[7].contains("interrupted"), "{said}");
+}
