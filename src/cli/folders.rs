@@ -2,7 +2,7 @@
 
 use super::exit::Exit;
 use crate::load::Diagnostic;
-use crate::load::detect::is_called_a_model;
+use crate::load::is_called_a_model;
 use std::collections::HashSet;
 use std::fs;
 use std::io;

@@ -13,7 +13,7 @@ use super::outputs::Target;
 use super::progress::Progress;
 use super::render::{self, SoFar};
 use crate::image::was_written_by_meshray;
-use crate::load::detect::is_called_a_model;
+use crate::load::is_called_a_model;
 use crate::threads;
 use rayon::ThreadPool;
 use std::collections::HashMap;

@@ -105,8 +105,9 @@ pub(super) fn detect(source: &Source) -> Result<Format, Diagnostic> {
     by_lines(text).ok_or_else(|| foreign(source, if bytes.is_empty() { "empty" } else { "of an unknown kind" }))
 }
 
-/// Whether a file is called as models are.
-pub(crate) fn is_called_a_model(path: &Path) -> bool {
+/// Whether a file has a name as models have: one that ends in `.glb`, `.gltf`, `.obj`, `.ply`, `.stl` or `.nff`, in letters of
+/// either case.
+pub fn is_called_a_model(path: &Path) -> bool {
     let is = |known: &&str| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(known));
     ["glb", "gltf", "obj", "ply", "stl", "nff"].iter().any(is)
 }

@@ -3,7 +3,7 @@
 //! Files a user gives are not trusted: other files they name are read only below [`LoadOptions::root`], sizes are
 //! checked before memory is taken, and whatever is broken ends in a [`LoadError`] or in a warning, never in a panic.
 
-pub(crate) mod detect;
+mod detect;
 pub mod diagnostic;
 pub mod gltf;
 mod ktx;
@@ -23,6 +23,7 @@ pub mod texture;
 mod whole;
 pub mod wires;
 
+pub use detect::is_called_a_model;
 pub use diagnostic::{Diagnostic, LoadError, Warnings};
 pub use limits::Limits;
 pub use wires::WireFacts;
