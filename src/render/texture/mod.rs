@@ -234,35 +234,43 @@ impl<'a> Lookup<'a> {
 
     /// A lookup in one level: how texels are stored is asked once, not for each.
     fn level(&self, plane: &Plane, probes: &Probes, filter: Filter) -> Vec4 {
-        // First where all of them lie, then what they say: so none waits for another.
-        let taps = self.taps(plane, probes, filter);
         match plane.texels {
-            Stored::Level(texels) => taps.mean(|i| pyramid::codes(&texels[i])) * (1.0 / 65535.0),
-            Stored::Bitmap(Texels::Rgb8(texels, colors)) => taps.mean(|i| decode::solid8(texels[i], colors)),
-            Stored::Bitmap(texels) => taps.mean(|i| texels.get(i)),
+            Stored::Level(texels) => {
+                let codes = self.mean(plane, probes, filter, |i| pyramid::codes(&texels[i]));
+                codes * (1.0 / 65535.0)
+            }
+            Stored::Bitmap(Texels::Rgb8(texels, colors)) => {
+                self.mean(plane, probes, filter, |i| decode::solid8(texels[i], colors))
+            }
+            Stored::Bitmap(texels) => self.mean(plane, probes, filter, |i| texels.get(i)),
         }
     }
 
-    /// What all probes read.
-    fn taps(&self, plane: &Plane, probes: &Probes, filter: Filter) -> Taps {
-        let at = |uv: Vec2| {
-            let x = Axis::new(uv.x, plane.width, self.sampler.wrap_u, filter);
-            let y = Axis::new(uv.y, plane.height, self.sampler.wrap_v, filter);
-            let (near, far) = (y.near * plane.width, y.far * plane.width);
-            let corners = [near + x.near, near + x.far, far + x.near, far + x.far];
-            Tap { corners, x: x.share, y: y.share, mixed: filter == Filter::Linear }
-        };
-        let mut taps = Taps { each: [Tap::default(); PROBES], count: 1, probes: probes.count };
+    /// The mean of all probes.
+    #[inline(always)]
+    fn mean(&self, plane: &Plane, probes: &Probes, filter: Filter, texel: impl Fn(usize) -> Vec4) -> Vec4 {
         if probes.count <= 1.0 {
-            taps.each[0] = at(probes.uv);
-            return taps;
+            return self.tap(plane, probes.uv, filter).read(&texel);
         }
-        let (mut count, mut k) = (0, 0.5);
+        // First where all of them lie, then what they say: so none waits for another.
+        let (mut taps, mut count, mut k) = ([Tap::default(); PROBES], 0, 0.5);
         while k < probes.count {
-            taps.each[count % PROBES] = at(probes.uv + probes.axis * (k / probes.count - 0.5));
+            let uv = probes.uv + probes.axis * (k / probes.count - 0.5);
+            taps[count % PROBES] = self.tap(plane, uv, filter);
             (count, k) = (count + 1, k + 1.0);
         }
-        Taps { count: count.min(PROBES), ..taps }
+        let taps = taps.iter().take(count);
+        taps.fold(Vec4::ZERO, |sum, tap| sum + tap.read(&texel)) / probes.count
+    }
+
+    /// What a probe reads.
+    #[inline(always)]
+    fn tap(&self, plane: &Plane, uv: Vec2, filter: Filter) -> Tap {
+        let x = Axis::new(uv.x, plane.width, self.sampler.wrap_u, filter);
+        let y = Axis::new(uv.y, plane.height, self.sampler.wrap_v, filter);
+        let (near, far) = (y.near * plane.width, y.far * plane.width);
+        let corners = [near + x.near, near + x.far, far + x.near, far + x.far];
+        Tap { corners, x: x.share, y: y.share, mixed: filter == Filter::Linear }
     }
 }
 
@@ -286,24 +294,6 @@ impl Tap {
         let (a, b, c, d) = (texel(a), texel(b), texel(c), texel(d));
         let (upper, lower) = (a + (b - a) * self.x, c + (d - c) * self.x);
         upper + (lower - upper) * self.y
-    }
-}
-
-/// Those of all probes of a footprint.
-struct Taps {
-    each: [Tap; PROBES],
-    count: usize,
-    probes: f32,
-}
-
-impl Taps {
-    #[inline(always)]
-    fn mean(&self, texel: impl Fn(usize) -> Vec4) -> Vec4 {
-        if self.count == 1 {
-            return self.each[0].read(texel);
-        }
-        let taps = self.each.iter().take(self.count);
-        taps.fold(Vec4::ZERO, |sum, tap| sum + tap.read(&texel)) / self.probes
     }
 }
 
