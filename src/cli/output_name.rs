@@ -1,8 +1,9 @@
 //! Where pictures go: templates, default names, and names that would collide.
 //!
 //! Templates know `{dir}` (the input's folder), `{sub}` (the way to there from the folder that was named; nothing, and no slash
-//! behind it, if that is the same), `{stem}` (its name without extension), `{ext}` (its extension), `{view}` and `{frame}` (number of the picture: in
-//! its sequence, or else in this run, from 1; `{frame:04}` pads it with zeros). `{{` and `}}` are plain braces.
+//! behind it, if that is the same), `{stem}` (its name without extension), `{ext}` (its extension), `{view}` and `{frame}`
+//! (number of the picture: in its sequence, or else in this run, from 1; `{frame:04}` pads it with zeros). `{{` and `}}` are
+//! plain braces.
 
 use crate::image::destination;
 use crate::load::paths::lexical;

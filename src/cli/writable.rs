@@ -36,8 +36,8 @@ impl Sources {
 
     /// Refuses `path`, given with `flag`, where that is one of them.
     pub(super) fn spared_by(&self, path: &Path, flag: &str) -> Result<(), Diagnostic> {
-        let path_itself = identity(path);
-        if self.known().contains(&path_itself) {
+        let file = identity(path);
+        if self.known().contains(&file) {
             let fault = Diagnostic::new("output-is-input", path, "", "would replace a file that is read");
             return Err(fault.remedy(format!("name another with {flag}")));
         }

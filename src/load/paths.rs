@@ -242,8 +242,13 @@ impl Resolver {
             return Err(too_large(bytes.len() as u64));
         }
         self.reading += watch.read();
-        self.note(path, self.named.join(name), &bytes);
+        self.note(path, self.as_named(name), &bytes);
         Ok(bytes)
+    }
+
+    /// A file as it is named, from the folder of the model as that was.
+    pub fn as_named(&self, name: &Path) -> PathBuf {
+        self.named.join(name)
     }
 
     /// Time that reading named files has taken.

@@ -198,24 +198,30 @@ fn a_copy_of_a_project_is_not_up_to_date_where_its_files_are_others() {
     let model = format!("mtllib cube.mtl\nusemtl a\nvt 0 0\n{}", CUBE.replace("f 4 3 2 1", "f 4/1 3/1 2/1 1/1"));
     let project = |name: &str, folder: Folder| {
         let at = |file: &str| format!("{name}/{file}");
-        folder.file(&at("cube.obj"), &model).file(&at("cube.mtl"), "newmtl a\nmap_Kd cube.jpg\n")
+        folder
+            .file(&at("cube.obj"), &model)
+            .file(&at("cube.mtl"), "newmtl a\nmap_Kd cube.jpg\n")
+            .file(&at("scene.toml"), "[[models]]\nfile = \"cube.obj\"\n")
     };
     let folder = project("two", project("one", Folder::new()));
     let folder = folder.file("one/cube.jpg", texture(0.1)).file("two/cube.jpg", texture(0.9));
-    let update = |name: &str| {
-        let words = ["render", "cube.obj", "--size", "16", "--update"];
-        Run::of(folder.program(&words).current_dir(folder.path(name))).ends(0)
-    };
-    update("one");
-    std::fs::copy(folder.path("one/cube.png"), folder.path("two/cube.png")).unwrap();
-    assert!(update("one").stderr.contains("up to date"));
-    assert!(!update("two").stderr.contains("up to date"));
-    assert!(folder.read("one/cube.png") != folder.read("two/cube.png"));
+    for (input, picture) in [("cube.obj", "cube.png"), ("scene.toml", "scene.png")] {
+        let update = |name: &str| {
+            let words = ["render", input, "--size", "16", "--update"];
+            Run::of(folder.program(&words).current_dir(folder.path(name))).ends(0)
+        };
+        let [one, two] = ["one", "two"].map(|name| format!("{name}/{picture}"));
+        update("one");
+        std::fs::copy(folder.path(&one), folder.path(&two)).unwrap();
+        assert!(update("one").stderr.contains("up to date"), "{input}");
+        assert!(!update("two").stderr.contains("up to date"), "{input}");
+        assert!(folder.read(&one) != folder.read(&two), "{input}");
+    }
 }
 
 #[test]
 fn what_would_be_found_before_what_was_found_is_noticed() {
-    let folder = textured_cube().file("t.PNG", "");
+    let folder = textured_cube();
     let update = || folder.render(&["cube.obj", "--update"]);
     std::fs::write(folder.path("cube.mtl"), "newmtl a\nmap_Kd CUBE.jpg\n").unwrap();
     update().ends(0);

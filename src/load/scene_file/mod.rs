@@ -508,6 +508,14 @@ fn read_model(
     }
     let mut loaded = super::load_within(&model_source, &options, budget)?;
     loaded.facts.reading += reading;
+    // It was read where it really lies; a copy of the whole would still name that.
+    let named = resolver.as_named(Path::new(&model.file));
+    for file in &mut loaded.facts.files {
+        let below = path.parent().and_then(|folder| file.path.strip_prefix(folder).ok());
+        if let (Some(below), Some(folder)) = (below, named.parent()) {
+            file.path = folder.join(below);
+        }
+    }
     Ok(loaded)
 }
 
