@@ -294,7 +294,9 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         if reads {
             strip.read(context, traced, (mesh, placement), common);
         }
-        strip.blur(traced, matter);
+        if common.layers.is_none() {
+            strip.blur(traced, matter);
+        }
         if shiny {
             strip.bend(context, matter, smooth.then_some(placement));
         }
@@ -304,12 +306,19 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         for index in strip.left_out(common.one_sided) {
             self.shade_one(traced, index as usize);
         }
+        strip.layer(context, traced, (mesh, placement), common);
         if !common.glass.is_some_and(|glass| glass.is_dark_inside && strip.sees_backs_alone()) {
             self.show(traced, common, strip);
         }
         if common.glass.is_some() {
             self.each_point(traced, common, strip, |tracer, point| {
                 tracer.reflect_and_refract(point, &point.crossing(context, point.path.band));
+            });
+        } else if common.layers.is_some() {
+            self.each_point(traced, common, strip, |tracer, point| {
+                if point.path.depth < context.depth {
+                    tracer.reflect_and_refract(point, &point.crossing(context, point.path.band));
+                }
             });
         } else if shiny && context.depth > 0 {
             let (roulette, streams) = (self.roulette, &self.streams);
@@ -322,7 +331,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     fn show(&mut self, traced: Traced, common: &Common, strip: &mut Strip) {
         let (context, matter) = (self.context, &common.matter);
         let has_inside = common.has_inside();
-        if context.looks_around_by_points() {
+        if context.looks_around_by_points() || common.layers.is_some() {
             self.each_point(traced, common, strip, |tracer, point| tracer.look_around(point));
         } else if !context.is_dark || matter.shines() {
             strip.look_around((matter, has_inside), &context.sky, context.scene.ambient);
@@ -398,10 +407,11 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             let (ray, hit, path) = (&traced.rays()[at], &traced.hits()[at], traced.path(at));
             let since = if context.absorption.is_some() { hit.t } else { path.since };
             let ground = strip.ground(i, material, has_inside);
-            let matter = ground.matter(&common.matter);
+            let bare = ground.bare(&common.matter);
+            let matter = strip.whole(i).unwrap_or(&bare);
             let path = Path { weight, since, ..path };
             let touches = traced.touches(at);
-            act(self, &Point { ray, hit, path, width, surface: &ground, matter: &matter, touches });
+            act(self, &Point { ray, hit, path, width, surface: &ground, matter, touches });
         }
     }
 }

@@ -22,6 +22,7 @@ mod curve;
 mod draws;
 pub mod everything;
 mod eyes;
+mod footing;
 mod forecast;
 mod frame;
 mod glint;

@@ -5,15 +5,16 @@
 
 use super::branch::Ground;
 use super::context::Context;
+use super::footing::Footing;
 use super::patch::{Footprint, Gradients, Patch};
 use super::shade::{Seen, has_inside};
 use super::texture::TextureStore;
 use super::world::{Placement, PrimSource, World};
 use crate::accel::refine::Refined;
 use crate::accel::{Hit, NO_PRIM, Ray};
+use crate::math::Vec3;
 use crate::math::bounds::offset_origin;
-use crate::math::{Vec2, Vec3};
-use crate::scene::{Material, Mesh, Scene, TextureRef, UvTransform};
+use crate::scene::{Material, Mesh, Scene, TextureRef};
 use std::cell::Cell;
 
 /// What was hit, before anything about it is computed.
@@ -204,26 +205,10 @@ impl<'a> Surface<'a> {
         side_of(own, self.geometric)
     }
 
-    /// The normal of lacquer with this normal map and its scale, to the side of the ray.
-    pub(crate) fn coat_normal(&self, map: Option<&TextureRef>, scale: f32, store: &TextureStore) -> Vec3 {
-        // Maps turn the mesh's own normal: tangents belong to that side.
-        let turned = |patch: &Patch| patch.normal_mapped(self.smooth * self.side, map?, scale, store);
-        let turned = self.patch.as_ref().and_then(turned).map(|normal| normal * self.side);
-        facing(turned.unwrap_or(self.smooth), self.view)
-    }
-
-    /// Unit vectors on the surface for coordinates of a map: along and across; any two where nothing tells.
-    pub(crate) fn tangents(&self, map: Option<&TextureRef>) -> [Vec3; 2] {
-        /// Where tangents come from when no map says: the first set of coordinates.
-        const FIRST: TextureRef = TextureRef {
-            texture: 0,
-            uv_set: 0,
-            transform: UvTransform { offset: Vec2::ZERO, rotation: 0.0, scale: Vec2::ONE },
-        };
-        let of = |patch: &Patch| patch.tangents(self.normal * self.side, map.unwrap_or(&FIRST));
-        let (tangent, bitangent) =
-            self.patch.as_ref().and_then(of).unwrap_or_else(|| self.normal.any_orthonormal_pair());
-        [tangent, bitangent]
+    /// What layers over it lie on.
+    pub(crate) fn footing(&self) -> Footing<'_> {
+        let Self { smooth, side, normal, view, .. } = *self;
+        Footing { patch: self.patch.as_ref(), smooth, side, normal, view }
     }
 
     /// How its normal turns along both axes of the ray's cone before maps turn it.
@@ -364,9 +349,11 @@ fn id(i: usize) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{DAffine3, DVec3, Vec4};
+    use crate::math::{DAffine3, DVec3, Vec2, Vec4};
     use crate::render::patch::Coordinates;
-    use crate::scene::{Bitmap, Instance, MetalRough, Pixels, Polygon, Sampler, Surface as Reflection, Texture};
+    use crate::scene::{
+        Bitmap, Instance, MetalRough, Pixels, Polygon, Sampler, Surface as Reflection, Texture, UvTransform,
+    };
 
     /// A unit square in z = 0 that faces +z: u runs along x, v down along −y; texture 0 covers it.
     fn scene(texels: Vec<[u8; 4]>, width: u32) -> Scene {

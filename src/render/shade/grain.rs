@@ -10,9 +10,9 @@ use super::{Lobe, Reader, Seen, Sky};
 use crate::math::formula::atan2;
 use crate::math::simd::{Kernel, Level, Simd};
 use crate::math::{Vec2, Vec3};
+use crate::render::footing::Footing;
 use crate::render::optics::reflect;
 use crate::render::studio;
-use crate::render::surface::Surface;
 use crate::scene::{Grain, UpAxis};
 use std::f32::consts::PI;
 
@@ -33,7 +33,7 @@ pub(crate) struct GrainMatter {
 
 impl GrainMatter {
     /// Of a surface with this roughness across the grain; `None` where it has none.
-    pub(super) fn new(grain: &Grain, roughness: f32, surface: &Surface, reader: &Reader) -> Option<Self> {
+    pub(super) fn new(grain: &Grain, roughness: f32, on: &Footing, reader: &Reader) -> Option<Self> {
         // A map's middle is no direction; without a map the grain runs along the tangent.
         let texel = match &grain.map {
             Some(map) => reader.linear(Some(map)).truncate() * Vec3::new(2.0, 2.0, 1.0) - Vec3::new(1.0, 1.0, 0.0),
@@ -45,9 +45,9 @@ impl GrainMatter {
         if strength == 0.0 {
             return None;
         }
-        let [tangent, bitangent] = surface.tangents(grain.map.as_ref());
+        let [tangent, bitangent] = on.tangents(grain.map.as_ref());
         let along = tangent * direction.x + bitangent * direction.y;
-        Some(Self::in_frame(along, surface.normal.cross(along), strength, roughness))
+        Some(Self::in_frame(along, on.normal.cross(along), strength, roughness))
     }
 
     fn in_frame(along: Vec3, across: Vec3, strength: f32, roughness: f32) -> Self {

@@ -28,6 +28,7 @@ pub(crate) use sheen::SheenMatter;
 pub(crate) use spectrum::{Band, bands};
 
 use super::context::coverage;
+use super::footing::Footing;
 use super::optics::reflect;
 use super::patch::Patch;
 use super::sky::Sky;
@@ -162,29 +163,35 @@ impl Matter {
             core.thin(translucence, &reader);
         }
         match material.metal_rough() {
-            Some(m) if matter.outside && m.has_lobes() => matter.with_lobes(m, surface, &reader),
+            Some(m) if matter.outside && m.has_lobes() => matter.with_lobes(m, &surface.footing(), &reader),
             _ => matter,
         }
     }
 
     /// The same with grain, film, sheen and lacquer.
     #[cold]
-    fn with_lobes(mut self, m: &MetalRough, surface: &Surface, reader: &Reader) -> Self {
-        let n_v = surface.normal.dot(surface.view).clamp(0.0, 1.0);
-        if let Model::MetalRough(core) = &mut self.model {
-            if let Some(film) = &m.film {
-                core.cover(film, n_v, reader);
-            }
-            self.grain = m.grain.as_ref().and_then(|grain| GrainMatter::new(grain, core.roughness(), surface, reader));
-            core.brush(self.grain.as_ref(), surface.normal, surface.view);
+    pub(crate) fn with_lobes(mut self, m: &MetalRough, on: &Footing, reader: &Reader) -> Self {
+        let Model::MetalRough(core) = &mut self.model else { return self };
+        let n_v = on.normal.dot(on.view).clamp(0.0, 1.0);
+        if let Some(film) = &m.film {
+            core.cover(film, n_v, reader);
         }
+        self.grain = m.grain.as_ref().and_then(|grain| GrainMatter::new(grain, core.roughness(), on, reader));
+        core.brush(self.grain.as_ref(), on.normal, on.view);
+        let occlusion = core.paint().occlusion;
         self.sheen = m.sheen.as_ref().and_then(|sheen| SheenMatter::new(sheen, n_v, reader));
         if let Some(coat) = &m.coat {
-            let normal = surface.coat_normal(coat.normal_map.as_ref(), coat.normal_scale, reader.store);
-            let material = surface.target.material;
-            let occlusion = occlusion(material, reader.linear(material.occlusion_map.as_ref()).x);
-            self.coat = CoatMatter::new(coat, normal, surface.view, occlusion, reader);
+            let normal = on.coat_normal(coat.normal_map.as_ref(), coat.normal_scale, reader.store);
+            self.coat = CoatMatter::new(coat, normal, on.view, occlusion, reader);
             self.emission *= self.below_coat();
+        }
+        self
+    }
+
+    /// The same as maps of its reflectance say at this point.
+    pub(crate) fn tinted(mut self, m: &MetalRough, reader: &Reader) -> Self {
+        if let Model::MetalRough(core) = &mut self.model {
+            core.tint(m, reader);
         }
         self
     }
@@ -337,23 +344,41 @@ impl Matter {
             Model::Phong(m) if !self.outside => m.scattered(normal, light.to_light) * light.strength(),
             Model::MetalRough(m) if !self.outside => m.lit_inside(normal, view, light.to_light) * light.irradiance(),
             Model::Phong(m) => m.lit(normal, view, light.to_light) * light.strength(),
-            Model::MetalRough(m) => {
-                let to_light = light.to_light;
-                let lit = match &self.grain {
-                    None => m.lit(normal, view, to_light),
-                    Some(grain) => m.lit_by(normal, view, to_light, |_| grain.widened(normal, view, to_light)),
-                };
-                lit * light.irradiance()
-            }
+            Model::MetalRough(m) => self.lit_below(m, normal, view, light.to_light) * light.irradiance(),
         };
+        self.lit_over(below, (horizon, normal, view), light.to_light, light.irradiance())
+    }
+
+    /// The same of a metallic-rough surface from outside, on which so much light falls from there.
+    pub(crate) fn lit_in_layers(&self, horizon: Vec3, normal: Vec3, view: Vec3, to_light: Vec3, light: Vec3) -> Vec3 {
+        let Model::MetalRough(m) = &self.model else { return Vec3::ZERO };
+        let below = self.lit_below(m, normal, view, to_light) * light;
+        self.lit_over(below, (horizon, normal, view), to_light, light)
+    }
+
+    /// What the surface under fibres and lacquer shows of light from outside: BRDF × N·L.
+    fn lit_below(&self, m: &MetalRoughMatter, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
+        match &self.grain {
+            None => m.lit(normal, view, to_light),
+            Some(grain) => m.lit_by(normal, view, to_light, |_| grain.widened(normal, view, to_light)),
+        }
+    }
+
+    /// What is seen where `below` comes from under fibres and lacquer, which show light of this irradiance, too.
+    fn lit_over(
+        &self,
+        below: Vec3,
+        (horizon, normal, view): (Vec3, Vec3, Vec3),
+        to_light: Vec3,
+        irradiance: Vec3,
+    ) -> Vec3 {
         let mut all = below * self.clear();
         if let Some(sheen) = &self.sheen {
-            all += sheen.lit(normal, view, light.to_light) * light.irradiance() * self.below_coat();
+            all += sheen.lit(normal, view, to_light) * irradiance * self.below_coat();
         }
-        all *= terminator(horizon, normal, light.to_light);
+        all *= terminator(horizon, normal, to_light);
         if let Some(coat) = &self.coat {
-            let seen = coat.lit(view, light.to_light) * terminator(horizon, coat.normal, light.to_light);
-            all += light.irradiance() * seen;
+            all += irradiance * (coat.lit(view, to_light) * terminator(horizon, coat.normal, to_light));
         }
         all
     }

@@ -13,7 +13,7 @@ use crate::math::simd::{Kernel, Level, Simd};
 use crate::render::absorption::Absorption;
 use crate::render::beside::Traced;
 use crate::render::patch::smooth_normal;
-use crate::render::shade::Seen;
+use crate::render::shade::{Matter, Seen};
 use crate::render::surface::{faces, facing, side_of};
 use crate::render::texture::Places;
 use crate::render::world::Placement;
@@ -68,6 +68,8 @@ pub(crate) struct Strip {
     pub(super) surroundings: Surroundings,
     pub(super) lit: Lit,
     pub(super) drawn: Drawn,
+    /// The whole matter of each point, where it has layers or maps of its reflectance; else empty.
+    pub(super) layered: Vec<Matter>,
 }
 
 /// What hits say.
@@ -128,6 +130,7 @@ impl Default for Strip {
             surroundings: Surroundings::default(),
             lit: Lit::default(),
             drawn: Drawn::default(),
+            layered: Vec::new(),
         }
     }
 }
@@ -147,6 +150,7 @@ impl Strip {
             (*at, *sample) = (*ray, *ray);
         }
         self.weights = None;
+        self.layered.clear();
         if traced.has_weights() {
             let weights = self.weights.insert(EMPTY);
             for (i, &ray) in self.rays[..self.count].iter().enumerate() {
@@ -389,7 +393,7 @@ mod tests {
     use crate::math::random::Random;
     use crate::math::{DMat3, DVec3};
     use crate::render::draws::Spread;
-    use crate::render::shade::{LocalLight, Matter};
+    use crate::render::shade::LocalLight;
     use crate::render::sky::Sky;
     use crate::render::sobol::mix;
     use crate::render::texture::TextureStore;

@@ -22,6 +22,17 @@ pub(crate) struct Common {
     pub shiny: bool,
     /// Where light enters it, which rays follow.
     pub glass: Option<Glass>,
+    /// What each point has over it, or reads for itself.
+    pub layers: Option<Layers>,
+}
+
+/// What is known of a material whose points have layers over them, or maps of their reflectance.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Layers {
+    /// Whether the mesh around a point must be known.
+    pub reads_mesh: bool,
+    /// Whether maps say how much it reflects.
+    pub reads_reflectance: bool,
 }
 
 /// What is known of a material that lets light in.
@@ -34,9 +45,9 @@ pub(crate) struct Glass {
 }
 
 impl Common {
-    /// `None` for materials with a grain, film, sheen or lacquer, for those that scatter light through, for those with maps of
-    /// their reflectance, for those that are nowhere there as a whole, and for what lets light through, unless it is
-    /// metallic-rough and rays go through it without being scattered inside.
+    /// `None` for materials that scatter light through, for those that are nowhere there as a whole, and for what lets light in,
+    /// unless it is metallic-rough without layers or maps of its reflectance, and rays go through it without being scattered
+    /// inside.
     pub(crate) fn of(
         (number, material): (u32, &Material),
         store: &TextureStore,
@@ -44,13 +55,15 @@ impl Common {
         gloss: Gloss,
     ) -> Option<Self> {
         let metal_rough = material.metal_rough();
-        if coverage(material, material.opacity) < 1.0
-            || metal_rough.is_some_and(|m| m.has_lobes() || m.translucence.is_some() || has_other_maps(m))
-        {
+        if coverage(material, material.opacity) < 1.0 || metal_rough.is_some_and(|m| m.translucence.is_some()) {
             return None;
         }
         let mut matter = Matter::without_maps(material, store);
         let glass = material.surface.transmits();
+        let layers = metal_rough.and_then(Layers::of);
+        if glass && layers.is_some() {
+            return None;
+        }
         if glass {
             metal_rough.filter(|m| bounces && gloss.spreads(material) && !scatters_inside(m))?;
             matter.spread_by_rays();
@@ -64,11 +77,12 @@ impl Common {
         let smooth = metal_rough.is_some_and(|m| m.metal_rough_map.is_some());
         Some(Self {
             material: number,
-            shiny: glass || smooth || matter.has_narrow_highlight() || bounces && mirrors,
+            shiny: glass || layers.is_some() || smooth || matter.has_narrow_highlight() || bounces && mirrors,
             one_sided: !material.double_sided && !glass,
-            mapped: material.textures().next().is_some(),
+            mapped: material.textures().count() > metal_rough.map_or(0, other_maps),
             sheet: Sheet::of(material, store),
             glass: glass.then(|| Glass::of(material, &matter)),
+            layers,
             matter,
         })
     }
@@ -76,6 +90,16 @@ impl Common {
     /// Whether backs of faces are seen from inside.
     pub(crate) fn has_inside(&self) -> bool {
         self.glass.is_some_and(|glass| glass.has_inside)
+    }
+}
+
+impl Layers {
+    /// `None` for materials without any.
+    fn of(m: &MetalRough) -> Option<Self> {
+        let other_maps = other_maps(m) > 0;
+        let reads_mesh = other_maps || m.grain.is_some();
+        let reads_reflectance = m.specular_map.is_some() || m.specular_color_map.is_some();
+        (m.has_lobes() || other_maps).then_some(Self { reads_mesh, reads_reflectance })
     }
 }
 
@@ -93,9 +117,9 @@ fn scatters_inside(m: &MetalRough) -> bool {
     m.thick && (m.transmission < 1.0 || m.transmission_map.is_some())
 }
 
-/// Whether it has maps of more than its colour, roughness and metalness, and of what passes through. How thick it is matters
-/// only where that is looked up.
-fn has_other_maps(m: &MetalRough) -> bool {
+/// How many maps it has of more than its colour, roughness and metalness, and of what passes through: of its reflectance, and of
+/// layers. How thick it is matters only where that is looked up.
+pub(super) fn other_maps(m: &MetalRough) -> usize {
     let known = [&m.metal_rough_map, &m.transmission_map, &m.thickness_map];
-    m.maps().count() > known.into_iter().flatten().count()
+    m.maps().count() - known.into_iter().flatten().count()
 }

@@ -18,7 +18,7 @@ use crate::render::world::Placement;
 pub(crate) struct Cones {
     /// Width at the point, and growth.
     pub(super) width: Column,
-    spread: Column,
+    pub(super) spread: Column,
     /// Axes of the ellipse in which the cone meets the surface.
     along: Columns,
     across: Columns,

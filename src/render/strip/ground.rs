@@ -29,6 +29,14 @@ impl Strip {
         (self.rays[i] as usize, weight, self.cones.width[i])
     }
 
+    /// The material at point `i`, which is `even` where maps do not change it, but for layers.
+    pub(super) fn bare(&self, i: usize, even: &Matter, outside: bool) -> Matter {
+        if self.painted.any {
+            return Matter::bare(self.painted.model(i, &even.model), self.painted.emission(i), outside);
+        }
+        Matter::bare(even.model, even.emission, outside)
+    }
+
     /// The ground at point `i` of this material, by number too, the back of which is seen from inside if it `has_inside`.
     pub(crate) fn ground<'a>(&'a self, i: usize, material: (u32, &'a Material), has_inside: bool) -> StripPoint<'a> {
         StripPoint { strip: self, i, material, outside: self.found.front[i] == 1 || !has_inside }
@@ -36,13 +44,9 @@ impl Strip {
 }
 
 impl StripPoint<'_> {
-    /// The material there, which is `even` where maps do not change it.
-    pub(crate) fn matter(&self, even: &Matter) -> Matter {
-        let (painted, i) = (&self.strip.painted, self.i);
-        if painted.any {
-            return Matter::bare(painted.model(i, &even.model), painted.emission(i), self.outside);
-        }
-        Matter::bare(even.model, even.emission, self.outside)
+    /// The material there, which is `even` where maps do not change it, but for layers.
+    pub(crate) fn bare(&self, even: &Matter) -> Matter {
+        self.strip.bare(self.i, even, self.outside)
     }
 }
 

@@ -60,16 +60,35 @@ impl Strip {
         light: &LocalLight,
         place: Option<u32>,
     ) {
-        let (found, lit, points, painted) = (&self.found, &mut self.lit, padded(self.count), &self.painted);
+        let (found, lit, points) = (&self.found, &mut self.lit, padded(self.count));
+        let (painted, layered) = (&self.painted, &self.layered);
         let cones = shiny.then_some(&self.cones);
         let drawn = place.map(|place| (&mut self.drawn, place));
         match drawn {
-            None => {
-                self.level.run(Shine::<false> { found, lit, points, matter, painted, cones, has_inside, light, drawn })
-            }
-            Some(_) => {
-                self.level.run(Shine::<true> { found, lit, points, matter, painted, cones, has_inside, light, drawn })
-            }
+            None => self.level.run(Shine::<false> {
+                found,
+                lit,
+                points,
+                matter,
+                painted,
+                layered,
+                cones,
+                has_inside,
+                light,
+                drawn,
+            }),
+            Some(_) => self.level.run(Shine::<true> {
+                found,
+                lit,
+                points,
+                matter,
+                painted,
+                layered,
+                cones,
+                has_inside,
+                light,
+                drawn,
+            }),
         }
         if let Some(weights) = &self.weights {
             self.level.run(Weigh { weights, radiance: &mut self.lit.radiance, points });
@@ -178,6 +197,8 @@ struct Shine<'a, const WIDE: bool> {
     points: usize,
     matter: &'a Matter,
     painted: &'a Painted,
+    /// What points with layers are made of.
+    layered: &'a [Matter],
     /// Where highlights may be narrow.
     cones: Option<&'a Cones>,
     has_inside: bool,
@@ -191,7 +212,7 @@ impl<const WIDE: bool> Kernel for Shine<'_, WIDE> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Self { found, lit, points, matter, painted, cones, has_inside, light, mut drawn } = self;
+        let Self { found, lit, points, matter, painted, layered, cones, has_inside, light, mut drawn } = self;
         let (points, light) = (points.min(POINTS), *light);
         let in_lux = matches!(matter.model, Model::MetalRough(_));
         debug_assert_eq!(WIDE, drawn.is_some());
@@ -208,6 +229,7 @@ impl<const WIDE: bool> Kernel for Shine<'_, WIDE> {
         }
         // The model is chosen outside the loop, which then is a formula.
         match &matter.model {
+            _ if !layered.is_empty() => reflect_in_layers(found, lit, layered),
             Model::Unlit(_) => lit.seen.fill(0),
             Model::Phong(m) if painted.any => {
                 let m = *m;
@@ -288,20 +310,42 @@ fn highlights(found: &Found, lit: &Lit, points: usize, matter: impl Fn(usize) ->
     highlights
 }
 
+/// Keeps what a point reflects of the light that arrives.
+#[inline(always)]
+fn reflect_by(found: &Found, lit: &mut Lit, i: usize, radiance: Vec3) {
+    let (geometric, to_light) = (get(&found.geometric, i), get(&lit.to_light, i));
+    let (horizon, curved) = (get(&found.horizon, i), found.curved[i] == 1);
+    let above = horizon.dot(to_light) > 0.0;
+    let grazes = curved & (geometric.dot(to_light) < STEEP);
+    let seen = above & radiance.is_finite() & (radiance.max_element() > 0.0) & (found.certain[i] == 1);
+    let how = if grazes { GRAZING } else { PLAIN };
+    lit.seen[i] *= if seen { how } else { 0 };
+    put(&mut lit.radiance, i, radiance);
+}
+
+/// What points with layers reflect of the light that arrives.
+fn reflect_in_layers(found: &Found, lit: &mut Lit, layered: &[Matter]) {
+    for (i, matter) in layered.iter().enumerate().take(POINTS) {
+        let (horizon, normal, view) = (get(&found.horizon, i), get(&found.normal, i), get(&found.view, i));
+        let wanted = (lit.seen[i] != 0) & (found.certain[i] == 1);
+        let radiance = if wanted {
+            matter.lit_in_layers(horizon, normal, view, get(&lit.to_light, i), get(&lit.light, i))
+        } else {
+            Vec3::ZERO
+        };
+        reflect_by(found, lit, i, radiance);
+    }
+    lit.seen[layered.len().min(POINTS)..].fill(0);
+}
+
 /// What the points reflect of the light that arrives.
 #[inline(always)]
 fn reflect(found: &Found, lit: &mut Lit, points: usize, share: impl Fn(usize, Vec3, Vec3, Vec3) -> Vec3) {
     for i in 0..points.min(POINTS) {
-        let (geometric, normal, to_light) = (get(&found.geometric, i), get(&found.normal, i), get(&lit.to_light, i));
-        let (horizon, curved) = (get(&found.horizon, i), found.curved[i] == 1);
-        let above = horizon.dot(to_light) > 0.0;
-        let grazes = curved & (geometric.dot(to_light) < STEEP);
-        let smooth = terminator(horizon, normal, to_light);
+        let (normal, to_light) = (get(&found.normal, i), get(&lit.to_light, i));
+        let smooth = terminator(get(&found.horizon, i), normal, to_light);
         let radiance = share(i, normal, get(&found.view, i), to_light) * get(&lit.light, i) * smooth;
-        let seen = above & radiance.is_finite() & (radiance.max_element() > 0.0) & (found.certain[i] == 1);
-        let how = if grazes { GRAZING } else { PLAIN };
-        lit.seen[i] *= if seen { how } else { 0 };
-        put(&mut lit.radiance, i, radiance);
+        reflect_by(found, lit, i, radiance);
     }
 }
 

@@ -17,6 +17,7 @@ mod common;
 mod cones;
 mod faces;
 mod ground;
+mod layered;
 mod lit;
 mod painted;
 mod sheet;

@@ -1,6 +1,7 @@
 //! Maps of a material and colours of vertices that points of a strip read side by side.
 
 use super::columns::{Column, Columns, Found, Given, LANES, POINTS, Strip, get, padded, put};
+use super::common::other_maps;
 use super::cones::Cones;
 use super::painted::Painted;
 use crate::math::simd::{Kernel, Simd};
@@ -11,7 +12,7 @@ use crate::render::shade::{MetalRoughPaint, PhongPaint, base_color, base_space, 
 use crate::render::surface::{facing, side_of};
 use crate::render::texture::{ColorSpace, Layout, Places, Spots, TextureStore, changes};
 use crate::render::world::Placement;
-use crate::scene::{Material, Mesh, Surface, TextureRef, UvTransform};
+use crate::scene::{Material, Mesh, MetalRough, Surface, TextureRef, UvTransform};
 
 /// What a map is read for.
 #[derive(Clone, Copy, Debug)]
@@ -72,9 +73,9 @@ impl Sheet {
     /// `None` for materials whose maps have too many coordinates, and for those of which one is read in another way.
     pub(super) fn of(material: &Material, store: &TextureStore) -> Option<Self> {
         let maps = maps(material);
-        // How thick glass is does not matter where rays go through it.
-        let thickness = material.metal_rough().is_some_and(|m| m.thickness_map.is_some());
-        if maps.len() + usize::from(thickness) < material.textures().count() {
+        // How thick glass is does not matter where rays go through it; maps of layers are read with these.
+        let others = |m: &MetalRough| usize::from(m.thickness_map.is_some()) + other_maps(m);
+        if maps.len() + material.metal_rough().map_or(0, others) < material.textures().count() {
             return None;
         }
         let mut sheet = Self { groups: Vec::new(), normal_map: None };

@@ -8,7 +8,8 @@ use crate::render::strip::Common;
 use crate::render::texture::TextureStore;
 use crate::render::{Sampling, Stochastic};
 use crate::scene::{
-    AlphaMode, Bitmap, Environment, MetalRough, Panorama, Pixels, Sampler, Texture, TextureRef, UvTransform, Wrap,
+    AlphaMode, Bitmap, Coat, Environment, Film, Grain, MetalRough, Panorama, Pixels, Sampler, Sheen, Texture,
+    TextureRef, UvTransform, Wrap,
 };
 use std::sync::Arc;
 
@@ -305,6 +306,73 @@ fn glass_shaded_side_by_side_has_the_bits_of_glass_shaded_one_by_one() {
         assert_eq!(together.counts, alone.counts);
         let differ = together.picture.beauty.iter().zip(&alone.picture.beauty).filter(|(a, b)| a != b).count();
         assert_eq!(differ, 0, "pixels, {environment:?}, {textures} textures");
+    }
+}
+
+/// The same with layers over what is metallic-rough, one or several over each: their maps and those of reflectance are of so many
+/// textures.
+fn layered(mut s: Stage, textures: u32) -> Stage {
+    let turned = UvTransform { scale: Vec2::new(2.0, -1.5), rotation: 0.7, ..UvTransform::default() };
+    let map = |i: usize, texture: u32| {
+        let transform = if i.is_multiple_of(2) { UvTransform::default() } else { turned };
+        (textures > 0).then(|| TextureRef { texture: texture % textures, uv_set: (i % 2) as u32, transform })
+    };
+    let opaque = |m: &&mut Material| !m.surface.transmits();
+    let matters = s.scene.materials.iter_mut().filter(opaque).filter_map(|material| match &mut material.surface {
+        Reflection::MetalRough(m) => Some(m),
+        Reflection::Phong(_) | Reflection::Unlit => None,
+    });
+    for (i, m) in matters.enumerate() {
+        let has = |layer: usize| i == layer || i == layer + 1 || i >= 5;
+        m.coat = has(0).then(|| {
+            let (strength_map, roughness_map) = (map(i, 0), map(i, 1).filter(|_| i > 0));
+            let roughness = if i == 0 { 0.04 } else { 0.5 };
+            let normal_map = map(i, 2).filter(|_| i != 1);
+            Box::new(Coat { strength: 0.8, strength_map, roughness, roughness_map, normal_map, normal_scale: 0.6 })
+        });
+        m.sheen = has(1).then(|| {
+            let (color, color_map) = (Vec3::new(0.5, 0.9, 0.2), map(i, 1));
+            Box::new(Sheen { color, color_map, roughness: 0.4, roughness_map: map(i, 1).filter(|_| i > 1) })
+        });
+        m.film = has(2).then(|| {
+            let (strength_map, thickness_map) = (map(i, 2), map(i, 0));
+            Box::new(Film { strength: 0.9, strength_map, ior: 1.4, thickness: [120.0, 480.0], thickness_map })
+        });
+        m.grain = has(3).then(|| Box::new(Grain { strength: 0.7, rotation: 0.3, map: map(i, 0).filter(|_| i != 3) }));
+        (m.specular, m.specular_map) = (0.7, map(i, 1).filter(|_| i % 3 == 0));
+        m.specular_color_map = map(i, 2).filter(|_| i % 3 == 1);
+    }
+    s
+}
+
+#[test]
+fn layers_shaded_side_by_side_have_the_bits_of_layers_shaded_one_by_one() {
+    let cases = [
+        (Environment::Studio, 0, 1, None),
+        (Environment::Studio, 3, 1, None),
+        (Environment::Black, 3, 1, None),
+        (Environment::Constant(Vec3::splat(0.2)), 3, 0, None),
+        (Environment::Studio, 3, 5, Some(2)),
+    ];
+    for (environment, textures, depth, env_rays) in cases {
+        let stage = if textures > 0 { painted() } else { plain() };
+        // Rough glass blurs what is seen through it.
+        let mut s = layered(if depth > 1 { glazed(stage, 3) } else { stage }, textures);
+        for light in &mut s.scene.lights {
+            light.size = if depth > 1 { 0.2 } else { 0.0 };
+        }
+        (s.settings.depth, s.settings.env_rays, s.scene.environment) = (Some(depth), env_rays, environment);
+        let store = TextureStore::new(&s.scene);
+        let beside = |m: &&Material| {
+            Common::of((0, m), &store, true, Gloss::new(None)).is_some_and(|common| common.layers.is_some())
+        };
+        assert!(s.scene.materials.iter().filter(beside).count() >= 5, "nothing would be compared");
+        let together = s.render();
+        s.settings.layers = true;
+        let alone = s.render();
+        assert_eq!(together.counts, alone.counts);
+        let differ = together.picture.beauty.iter().zip(&alone.picture.beauty).filter(|(a, b)| a != b).count();
+        assert_eq!(differ, 0, "pixels, {textures} textures, depth {depth}");
     }
 }
 

@@ -88,7 +88,8 @@ fn the_back_of_a_face_has_the_lacquer_and_the_grain_of_its_front() {
             let mut surface =
                 Surface::new(job.world, Target::new(job.scene, job.world, hit[0].prim), &ray, &hit[0], 0.0);
             surface.shade_smoothly(job.textures);
-            (surface.coat_normal(Some(&map()), 1.0, job.textures), surface.tangents(None))
+            let on = surface.footing();
+            (on.coat_normal(Some(&map()), 1.0, job.textures), on.tangents(None))
         })
     };
     let ((front, ahead), (back, behind)) = (from(1.0), from(-1.0));

@@ -124,10 +124,7 @@ impl MetalRoughMatter {
         let maps = [&m.metal_rough_map, &m.transmission_map].map(|map| reader.linear(map.as_ref()));
         let paint = MetalRoughPaint::of(m, base, occlusion, maps.into());
         let MetalRoughPaint { base, metallic, roughness, occlusion, transmission } = paint;
-        let color = m.specular_color * reader.srgb(m.specular_color_map.as_ref());
-        let specular = m.specular * reader.alpha(m.specular_map.as_ref());
-        let at_normal = (m.ior - 1.0) / (m.ior + 1.0);
-        Self {
+        let mut matter = Self {
             base,
             metal_f0: base,
             filmed: false,
@@ -136,8 +133,8 @@ impl MetalRoughMatter {
             roughness_along: 0.0,
             sent_back: 1.0,
             by_rays: false,
-            f0: (color * (at_normal * at_normal)).clamp(Vec3::ZERO, Vec3::ONE) * specular,
-            f90: specular,
+            f0: Vec3::ZERO,
+            f90: 0.0,
             transmission,
             share: 0.0,
             through: Vec3::ZERO,
@@ -147,7 +144,18 @@ impl MetalRoughMatter {
             inside: inside(m, reader),
             dispersion: m.dispersion,
             least_square: 0.0,
-        }
+        };
+        matter.tint(m, reader);
+        matter
+    }
+
+    /// Gives the dielectric part the reflectance that factors and maps say.
+    pub(super) fn tint(&mut self, m: &MetalRough, reader: &Reader) {
+        let color = m.specular_color * reader.srgb(m.specular_color_map.as_ref());
+        let specular = m.specular * reader.alpha(m.specular_map.as_ref());
+        let at_normal = (m.ior - 1.0) / (m.ior + 1.0);
+        self.f0 = (color * (at_normal * at_normal)).clamp(Vec3::ZERO, Vec3::ONE) * specular;
+        self.f90 = specular;
     }
 
     /// The numbers that maps have said.

@@ -1,0 +1,103 @@
+//! Points with layers over them, a grain, film, sheen or lacquer, or with maps of their reflectance: where they are and how they
+//! are seen is found side by side, what they are made of one by one.
+
+use super::columns::{POINTS, Strip, get};
+use super::common::Common;
+use crate::accel::NO_PRIM;
+use crate::math::Vec3;
+use crate::render::beside::Traced;
+use crate::render::context::Context;
+use crate::render::footing::Footing;
+use crate::render::glint;
+use crate::render::patch::Patch;
+use crate::render::shade::{Matter, Reader};
+use crate::render::surface::{Target, side_of};
+use crate::render::whitted::SPREAD;
+use crate::render::world::Placement;
+use crate::scene::{Mesh, MetalRough};
+
+impl Strip {
+    /// Finds what the points of a mesh that an instance has placed so are made of, once their common maps have been read and
+    /// cones bent.
+    pub(crate) fn layer(
+        &mut self,
+        context: &Context,
+        traced: Traced,
+        (mesh, placement): (&Mesh, &Placement),
+        common: &Common,
+    ) {
+        let metal_rough = context.scene.materials[mesh.material as usize].metal_rough();
+        let (Some(m), Some(layers)) = (metal_rough, common.layers) else { return };
+        let placement = (!mesh.normals.is_empty()).then_some(placement);
+        let mut layered = std::mem::take(&mut self.layered);
+        let (mut prim, mut patch) = (NO_PRIM, None);
+        for i in 0..self.count.min(POINTS) {
+            let bare = self.bare(i, &common.matter, true);
+            if self.found.certain[i] != 1 {
+                layered.push(bare);
+                continue;
+            }
+            let at = self.rays[i] as usize;
+            if layers.reads_mesh {
+                let hit = &traced.hits()[at];
+                if prim != hit.prim {
+                    prim = hit.prim;
+                    patch =
+                        Target::new(context.scene, context.world, prim).patch(context.world, hit.u, hit.v, Vec3::ZERO);
+                }
+                if let Some(patch) = &mut patch {
+                    patch.move_to([1.0 - hit.u - hit.v, hit.u, hit.v], self.cones.footprint(i));
+                }
+            }
+            let reader = Reader { store: context.textures, patch: patch.as_ref() };
+            let below = if layers.reads_reflectance { bare.tinted(m, &reader) } else { bare };
+            let mut matter = below.with_lobes(m, &self.footing(i, placement, patch.as_ref()), &reader);
+            let scattered = traced.path(at).scattered;
+            if scattered > SPREAD {
+                matter.blur(scattered);
+            }
+            self.widen_highlights(i, context, m, &mut matter, patch.as_ref());
+            layered.push(matter);
+        }
+        self.layered = layered;
+    }
+
+    /// What point `i` is made of with its layers, if it has any.
+    pub(crate) fn whole(&self, i: usize) -> Option<&Matter> {
+        self.layered.get(i)
+    }
+
+    /// What layers lie on at point `i` of a patch of a mesh, with `placement` where it has normals of its own.
+    fn footing<'a>(&self, i: usize, placement: Option<&Placement>, patch: Option<&'a Patch<'a>>) -> Footing<'a> {
+        let own = placement.map_or(self.given.faces.outward(i), |placement| self.given.own_normal(placement, i));
+        let side = side_of(own, get(&self.found.geometric, i));
+        let (normal, view) = (get(&self.found.normal, i), get(&self.found.view, i));
+        Footing { patch, smooth: own * side, side, normal, view }
+    }
+
+    /// Widens highlights at point `i` so far that they are met by rays.
+    fn widen_highlights(
+        &self,
+        i: usize,
+        context: &Context,
+        m: &MetalRough,
+        matter: &mut Matter,
+        patch: Option<&Patch>,
+    ) {
+        if context.lights.is_empty() {
+            return;
+        }
+        let (reach, cones) = (context.highlight_reach, &self.cones);
+        let of_mesh = cones.bend[i] * (reach * reach);
+        let least = |of_map: f32| glint::least_of(of_mesh + of_map, cones.spread[i], reach);
+        if matter.has_narrow_highlight() {
+            matter.widen_highlight(least(cones.turning[i]));
+        }
+        if let Some(coat) = matter.coat.as_mut().filter(|coat| coat.has_narrow_highlight()) {
+            let map = m.coat.as_ref().and_then(|coat| Some((coat.normal_map.as_ref()?, coat.normal_scale)));
+            let turning =
+                |(patch, (map, scale)): (&Patch, _)| patch.turning_of_map(map, scale, context.textures, reach);
+            coat.widen_highlight(least(patch.zip(map).map_or(0.0, turning)));
+        }
+    }
+}
