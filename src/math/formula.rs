@@ -79,6 +79,13 @@ pub fn root(x: f32, exponent: f32) -> f32 {
     if x > 0.0 { power } else { 0.0 }
 }
 
+/// `x` ≥ 0 to the power of `exponent`, 0 … 1000, to 5e-6 · `exponent` of it, or 1e-38.
+#[inline(always)]
+pub fn power(x: f32, exponent: f32) -> f32 {
+    let power = exp2((exponent * log2(x)).clamp(-126.0, 127.0));
+    if x > 0.0 { power } else { 0.0 }
+}
+
 /// Sine and cosine of so many full turns, 0 ≤ `turns` ≤ 1, to 2e-7.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "a number of eighths of a turn")]
@@ -168,6 +175,20 @@ mod tests {
             assert!((f64::from(root(x, exponent)) / expected - 1.0).abs() < 4e-6, "{x} {exponent}");
         }
         assert_eq!([root(0.0, 0.5), root(0.0, 1e-6), root(1.0, 0.3), root(0.25, 0.5)], [0.0, 0.0, 1.0, 0.5]);
+    }
+
+    #[test]
+    fn high_powers_are_those_of_the_standard_library() {
+        let mut random = Random::new(7);
+        for _ in 0..100_000 {
+            let (x, exponent) = (random.unit(), 1.0 + random.unit() * 250.0);
+            let (found, expected) = (f64::from(power(x, exponent)), f64::from(x).powf(f64::from(exponent)));
+            assert!((found - expected).abs() < 5e-6 * f64::from(exponent) * expected + 1.2e-38, "{x} {exponent}");
+        }
+        assert_eq!(
+            [power(0.0, 3.0), power(1.0, 204.0), power(0.5, 9.0), power(1e-30, 204.0)],
+            [0.0, 1.0, 0.001_953_125, 2f32.powi(-126)]
+        );
     }
 
     #[test]

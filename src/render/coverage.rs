@@ -100,7 +100,7 @@ fn is_there(job: &Job, ray: &Ray, hit: &Hit) -> bool {
     let target = Target::new(job.scene, job.world, hit.prim);
     let material = target.material;
     let surface = Surface::new(job.world, target, ray, hit, 0.0);
-    let reader = Reader { store: job.textures, patch: surface.patch.as_ref() };
+    let reader = Reader { store: job.textures, patch: surface.patch.as_ref(), known: &[] };
     (surface.front || material.double_sided || material.surface.transmits())
         && context::coverage(material, reader.base(material).w) > 0.0
 }

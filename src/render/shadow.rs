@@ -195,7 +195,7 @@ impl Shadows {
 fn filter_at(context: &Context, ray: &Ray, hit: &Hit, inside: Option<&mut Inside>) -> Vec3 {
     let target = Target::new(context.scene, context.world, hit.prim);
     let patch = target.patch(context.world, hit.u, hit.v, ray.origin + ray.dir * hit.t);
-    let reader = Reader { store: context.textures, patch: patch.as_ref() };
+    let reader = Reader { store: context.textures, patch: patch.as_ref(), known: &[] };
     let filter = shadow_filter(target.material, &reader);
     let Some(inside) = inside.filter(|_| has_inside(target.material)) else { return filter };
     let entering = Surface::new(context.world, target, ray, hit, 0.0).front;

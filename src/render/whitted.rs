@@ -246,7 +246,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         if !surface.front && !material.double_sided && !material.surface.transmits() {
             return self.continuing[class as usize].push(*ray, *path, *hit);
         }
-        let reader = Reader { store: context.textures, patch: surface.patch.as_ref() };
+        let reader = Reader { store: context.textures, patch: surface.patch.as_ref(), known: &[] };
         let base = reader.base(material);
         let covered = coverage(material, base.w);
         if covered < 1.0 {

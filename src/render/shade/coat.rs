@@ -110,7 +110,7 @@ mod tests {
             Coat { strength, strength_map: None, roughness, roughness_map: None, normal_map: None, normal_scale: 1.0 };
         let scene = Scene::default();
         let store = TextureStore::new(&scene);
-        let reader = Reader { store: &store, patch: None };
+        let reader = Reader { store: &store, patch: None, known: &[] };
         CoatMatter::new(&coat, Vec3::Z, view, 1.0, &reader)
     }
 

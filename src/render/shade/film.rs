@@ -4,9 +4,10 @@
 //! sum over the ways through the film, whose phases are integrated over the eye's sensitivity in closed form.
 
 use crate::math::Vec3;
+use crate::math::formula::{exp2, floor, sin_cos_of_turns};
 use crate::render::optics::fresnel_schlick;
 use crate::scene::color::rec_709_of_xyz;
-use std::f32::consts::PI;
+use std::f32::consts::{LOG2_E, PI};
 
 /// Films thinner than this many nanometres fade out: without a film there is no boundary to reflect at.
 const FADE: f32 = 0.03;
@@ -76,8 +77,10 @@ fn index_of(f0: f32) -> f32 {
 fn sensitivity(way: f32, shift: Vec3) -> Vec3 {
     let phase = 2.0 * PI * way * 1e-9;
     let gaussian = |height: f32, center: f32, variance: f32, shift: f32| {
-        let wave = libm::cosf(center * phase + shift) * libm::expf(-phase * phase * variance);
-        height * (2.0 * PI * variance).sqrt() * wave
+        let turns = (center * phase + shift) / (2.0 * PI);
+        let (_, cosine) = sin_cos_of_turns(turns - floor(turns));
+        let faded = exp2((-phase * phase * variance * LOG2_E).max(-126.0));
+        height * (2.0 * PI * variance).sqrt() * (cosine * faded)
     };
     let [height, center, variance] = SECOND_X;
     let part = |k: usize| gaussian(HEIGHTS[k], CENTERS[k], VARIANCES[k], shift[k]);

@@ -100,14 +100,27 @@ impl Balance {
 pub(crate) struct Reader<'a> {
     pub store: &'a TextureStore<'a>,
     pub patch: Option<&'a Patch<'a>>,
+    /// What has been read already.
+    pub known: &'a [Known],
+}
+
+/// What a map says at a point.
+#[derive(Clone, Copy)]
+pub(crate) struct Known {
+    pub map: TextureRef,
+    pub space: ColorSpace,
+    /// Linear RGBA.
+    pub texel: Vec4,
 }
 
 impl Reader<'_> {
     /// The map's linear RGBA; white where there is no map, or nothing to read it with.
+    #[inline]
     fn read(&self, map: Option<&TextureRef>, space: ColorSpace) -> Vec4 {
-        match (map, self.patch) {
-            (Some(map), Some(patch)) => patch.texel(map, space, self.store),
-            _ => Vec4::ONE,
+        let Some(map) = map else { return Vec4::ONE };
+        match self.known.iter().find(|known| known.map == *map && known.space == space) {
+            Some(known) => known.texel,
+            None => self.patch.map_or(Vec4::ONE, |patch| patch.texel(map, space, self.store)),
         }
     }
 
@@ -121,9 +134,10 @@ impl Reader<'_> {
 
     /// The map's alpha; 1 where there is none.
     fn alpha(&self, map: Option<&TextureRef>) -> f32 {
-        match (map, self.patch) {
-            (Some(map), Some(patch)) => patch.alpha(map, self.store),
-            _ => 1.0,
+        let Some(map) = map else { return 1.0 };
+        match self.known.iter().find(|known| known.map == *map && known.space != ColorSpace::SrgbCutOut) {
+            Some(known) => known.texel.w,
+            None => self.patch.map_or(1.0, |patch| patch.alpha(map, self.store)),
         }
     }
 
@@ -154,7 +168,7 @@ pub(crate) fn base_color(material: &Material, map: Vec4, opacity_map: f32, verte
 impl Matter {
     /// The material at `surface`, whose base colour has been read already.
     pub(crate) fn new(surface: &Surface, base: Vec3, store: &TextureStore) -> Self {
-        let reader = Reader { store, patch: surface.patch.as_ref() };
+        let reader = Reader { store, patch: surface.patch.as_ref(), known: &[] };
         let material = surface.target.material;
         let mut matter = Self { outside: surface.is_outside(), ..Self::read(material, base, &reader) };
         if let (Some(translucence), Model::MetalRough(core)) =
@@ -198,7 +212,7 @@ impl Matter {
 
     /// A material without maps, the same everywhere.
     pub(crate) fn without_maps(material: &Material, store: &TextureStore) -> Self {
-        let reader = Reader { store, patch: None };
+        let reader = Reader { store, patch: None, known: &[] };
         Self::read(material, reader.base(material).truncate(), &reader)
     }
 
@@ -342,23 +356,23 @@ impl Matter {
         let below = match &self.model {
             Model::Unlit(_) => Vec3::ZERO,
             Model::Phong(m) if !self.outside => m.scattered(normal, light.to_light) * light.strength(),
-            Model::MetalRough(m) if !self.outside => m.lit_inside(normal, view, light.to_light) * light.irradiance(),
             Model::Phong(m) => m.lit(normal, view, light.to_light) * light.strength(),
             Model::MetalRough(m) => self.lit_below(m, normal, view, light.to_light) * light.irradiance(),
         };
         self.lit_over(below, (horizon, normal, view), light.to_light, light.irradiance())
     }
 
-    /// The same of a metallic-rough surface from outside, on which so much light falls from there.
+    /// The same of a metallic-rough surface on which so much light falls from there.
     pub(crate) fn lit_in_layers(&self, horizon: Vec3, normal: Vec3, view: Vec3, to_light: Vec3, light: Vec3) -> Vec3 {
         let Model::MetalRough(m) = &self.model else { return Vec3::ZERO };
         let below = self.lit_below(m, normal, view, to_light) * light;
         self.lit_over(below, (horizon, normal, view), to_light, light)
     }
 
-    /// What the surface under fibres and lacquer shows of light from outside: BRDF × N·L.
+    /// What the metallic-rough surface under fibres and lacquer shows: BRDF × N·L.
     fn lit_below(&self, m: &MetalRoughMatter, normal: Vec3, view: Vec3, to_light: Vec3) -> Vec3 {
         match &self.grain {
+            _ if !self.outside => m.lit_inside(normal, view, to_light),
             None => m.lit(normal, view, to_light),
             Some(grain) => m.lit_by(normal, view, to_light, |_| grain.widened(normal, view, to_light)),
         }

@@ -6,6 +6,8 @@
 
 use super::{Reader, Seen, Sky};
 use crate::math::Vec3;
+use crate::math::formula::{power, sin_cos_of_turns};
+use crate::math::simd::{Kernel, Level, Simd};
 use crate::scene::Sheen;
 use std::f32::consts::PI;
 use std::sync::LazyLock;
@@ -14,10 +16,8 @@ use std::sync::LazyLock;
 const ENTRIES: usize = 17;
 
 /// Directional albedo of the white lobe: rows by roughness 0 … 1, columns by N·V 0 … 1. Found when it is first needed.
-static ALBEDO: LazyLock<[[f32; ENTRIES]; ENTRIES]> = LazyLock::new(|| {
-    let part = |i: usize| i as f32 / (ENTRIES - 1) as f32;
-    std::array::from_fn(|row| std::array::from_fn(|column| integral(alpha(part(row)), part(column))))
-});
+static ALBEDO: LazyLock<[[f32; ENTRIES]; ENTRIES]> =
+    LazyLock::new(|| std::array::from_fn(|row| Level::best().run(Integral { alpha: alpha(part(row)) })));
 
 /// The lobe is no thinner than this roughness makes it.
 const LEAST_ROUGHNESS: f32 = 0.07;
@@ -71,29 +71,54 @@ fn alpha(roughness: f32) -> f32 {
 }
 
 /// Distribution × visibility; `sine` is that of the half vector from the normal.
+#[inline(always)]
 fn lobe(alpha: f32, sine: f32, n_l: f32, n_v: f32) -> f32 {
     let exponent = 1.0 / alpha;
-    let distribution = (2.0 + exponent) * libm::powf(sine, exponent) / (2.0 * PI);
+    let distribution = (2.0 + exponent) * power(sine, exponent) / (2.0 * PI);
     distribution / (4.0 * (n_l + n_v - n_l * n_v))
 }
 
-/// ∫ BRDF N·L over the hemisphere by midpoints, at most 1.
-fn integral(alpha: f32, n_v: f32) -> f32 {
-    const ROWS: u16 = 64;
-    const COLUMNS: u16 = 32;
-    let n_v = n_v.max(1e-3);
-    let view = Vec3::new((1.0 - n_v * n_v).sqrt(), 0.0, n_v);
-    let mut sum = 0.0;
-    for i in 0..ROWS {
-        let (sin, cos) = libm::sincosf((f32::from(i) + 0.5) / f32::from(ROWS) * PI / 2.0);
-        // One half of the directions: the other mirrors it.
-        for j in 0..COLUMNS {
-            let (sp, cp) = libm::sincosf((f32::from(j) + 0.5) / f32::from(COLUMNS) * PI);
-            let half = (Vec3::new(sin * cp, sin * sp, cos) + view).normalize_or(Vec3::Z);
-            sum += lobe(alpha, Vec3::Z.cross(half).length(), cos, n_v) * cos * sin;
+/// ∫ BRDF N·L over the hemisphere by midpoints, at most 1, for [`ENTRIES`] N·V from 0 to 1.
+struct Integral {
+    alpha: f32,
+}
+
+/// Rows and columns of directions over one half of the hemisphere, which the other mirrors.
+const ROWS: usize = 64;
+const COLUMNS: usize = 32;
+
+impl Kernel for Integral {
+    type Output = [f32; ENTRIES];
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> [f32; ENTRIES] {
+        let mut around = [[0.0; COLUMNS]; 2];
+        let [x, y] = &mut around;
+        for (j, (x, y)) in x.iter_mut().zip(y).enumerate() {
+            (*y, *x) = sin_cos_of_turns((j as f32 + 0.5) / COLUMNS as f32 / 2.0);
         }
+        std::array::from_fn(|entry| {
+            let n_v = part(entry).max(1e-3);
+            let view = Vec3::new((1.0 - n_v * n_v).sqrt(), 0.0, n_v);
+            let mut sums = [0.0; COLUMNS];
+            for i in 0..ROWS {
+                let (sin, cos) = sin_cos_of_turns((i as f32 + 0.5) / ROWS as f32 / 4.0);
+                for j in 0..COLUMNS {
+                    let half = Vec3::new(sin * around[0][j], sin * around[1][j], cos) + view;
+                    let sine = (half.truncate().length_squared() / half.length_squared()).sqrt();
+                    sums[j] += lobe(self.alpha, sine, cos, n_v) * cos * sin;
+                }
+            }
+            let sum: f32 = sums.iter().sum();
+            (sum * (PI / 2.0 / ROWS as f32) * (2.0 * PI / COLUMNS as f32)).min(1.0)
+        })
     }
-    (sum * (PI / 2.0 / f32::from(ROWS)) * (2.0 * PI / f32::from(COLUMNS))).min(1.0)
+}
+
+/// The roughness or N·V of an entry of [`ALBEDO`].
+#[inline(always)]
+fn part(entry: usize) -> f32 {
+    entry as f32 / (ENTRIES - 1) as f32
 }
 
 /// [`ALBEDO`] between its entries.

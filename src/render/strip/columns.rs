@@ -5,11 +5,12 @@ use super::cones::Cones;
 use super::faces::Faces;
 use super::lit::Lit;
 use super::painted::Painted;
+use super::sheet::{LAYER_MAPS, LayerTexels};
 use super::sorted::Sorted;
 use super::wide::Drawn;
-use crate::math::Vec3;
 use crate::math::bounds::offset_origin;
 use crate::math::simd::{Kernel, Level, Simd};
+use crate::math::{Vec3, Vec4};
 use crate::render::absorption::Absorption;
 use crate::render::beside::Traced;
 use crate::render::patch::smooth_normal;
@@ -63,6 +64,8 @@ pub(crate) struct Strip {
     pub(super) given: Given,
     pub(super) found: Found,
     pub(super) painted: Painted,
+    /// Where a sheet reads them.
+    pub(super) of_layers: Box<LayerTexels>,
     pub(super) cones: Cones,
     pub(super) places: Places,
     pub(super) surroundings: Surroundings,
@@ -125,6 +128,7 @@ impl Default for Strip {
             given,
             found,
             painted: Painted::default(),
+            of_layers: Box::new([[Vec4::ONE; POINTS]; LAYER_MAPS]),
             cones: Cones::default(),
             places: Places::default(),
             surroundings: Surroundings::default(),

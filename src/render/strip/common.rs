@@ -29,8 +29,10 @@ pub(crate) struct Common {
 /// What is known of a material whose points have layers over them, or maps of their reflectance.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Layers {
-    /// Whether the mesh around a point must be known.
+    /// Whether the mesh around a point must be known, …
     pub reads_mesh: bool,
+    /// … or must if its sheet does not say what maps of layers do.
+    pub reads_maps: bool,
     /// Whether maps say how much it reflects.
     pub reads_reflectance: bool,
 }
@@ -46,8 +48,7 @@ pub(crate) struct Glass {
 
 impl Common {
     /// `None` for materials that scatter light through, for those that are nowhere there as a whole, and for what lets light in,
-    /// unless it is metallic-rough without layers or maps of its reflectance, and rays go through it without being scattered
-    /// inside.
+    /// unless it is metallic-rough and rays go through it without being scattered inside.
     pub(crate) fn of(
         (number, material): (u32, &Material),
         store: &TextureStore,
@@ -61,9 +62,6 @@ impl Common {
         let mut matter = Matter::without_maps(material, store);
         let glass = material.surface.transmits();
         let layers = metal_rough.and_then(Layers::of);
-        if glass && layers.is_some() {
-            return None;
-        }
         if glass {
             metal_rough.filter(|m| bounces && gloss.spreads(material) && !scatters_inside(m))?;
             matter.spread_by_rays();
@@ -79,7 +77,7 @@ impl Common {
             material: number,
             shiny: glass || layers.is_some() || smooth || matter.has_narrow_highlight() || bounces && mirrors,
             one_sided: !material.double_sided && !glass,
-            mapped: material.textures().count() > metal_rough.map_or(0, other_maps),
+            mapped: material.textures().next().is_some(),
             sheet: Sheet::of(material, store),
             glass: glass.then(|| Glass::of(material, &matter)),
             layers,
@@ -96,10 +94,10 @@ impl Common {
 impl Layers {
     /// `None` for materials without any.
     fn of(m: &MetalRough) -> Option<Self> {
-        let other_maps = other_maps(m) > 0;
-        let reads_mesh = other_maps || m.grain.is_some();
+        let reads_maps = other_maps(m) > 0;
+        let reads_mesh = m.grain.is_some() || m.coat.as_ref().is_some_and(|coat| coat.normal_map.is_some());
         let reads_reflectance = m.specular_map.is_some() || m.specular_color_map.is_some();
-        (m.has_lobes() || other_maps).then_some(Self { reads_mesh, reads_reflectance })
+        (m.has_lobes() || reads_maps).then_some(Self { reads_mesh, reads_maps, reads_reflectance })
     }
 }
 

@@ -3,14 +3,15 @@
 
 use super::columns::{POINTS, Strip, get};
 use super::common::Common;
+use super::sheet::Sheet;
 use crate::accel::NO_PRIM;
-use crate::math::Vec3;
+use crate::math::{Vec3, Vec4};
 use crate::render::beside::Traced;
 use crate::render::context::Context;
 use crate::render::footing::Footing;
 use crate::render::glint;
 use crate::render::patch::Patch;
-use crate::render::shade::{Matter, Reader};
+use crate::render::shade::{Known, Matter, Reader};
 use crate::render::surface::{Target, side_of};
 use crate::render::whitted::SPREAD;
 use crate::render::world::Placement;
@@ -28,17 +29,22 @@ impl Strip {
     ) {
         let metal_rough = context.scene.materials[mesh.material as usize].metal_rough();
         let (Some(m), Some(layers)) = (metal_rough, common.layers) else { return };
+        let by_sheet = common.sheet.as_ref().filter(|sheet| sheet.covers(mesh)).map_or(&[][..], Sheet::layers);
+        let unread = |&(map, space): &_| Known { map, space, texel: Vec4::ONE };
+        let mut known: Vec<Known> = by_sheet.iter().map(unread).collect();
+        let reads_mesh = layers.reads_mesh || layers.reads_maps && known.is_empty();
         let placement = (!mesh.normals.is_empty()).then_some(placement);
         let mut layered = std::mem::take(&mut self.layered);
         let (mut prim, mut patch) = (NO_PRIM, None);
         for i in 0..self.count.min(POINTS) {
-            let bare = self.bare(i, &common.matter, true);
+            let outside = self.found.front[i] == 1 || !common.has_inside();
+            let bare = self.bare(i, &common.matter, outside);
             if self.found.certain[i] != 1 {
                 layered.push(bare);
                 continue;
             }
             let at = self.rays[i] as usize;
-            if layers.reads_mesh {
+            if reads_mesh {
                 let hit = &traced.hits()[at];
                 if prim != hit.prim {
                     prim = hit.prim;
@@ -49,9 +55,11 @@ impl Strip {
                     patch.move_to([1.0 - hit.u - hit.v, hit.u, hit.v], self.cones.footprint(i));
                 }
             }
-            let reader = Reader { store: context.textures, patch: patch.as_ref() };
+            known.iter_mut().zip(&*self.of_layers).for_each(|(known, texels)| known.texel = texels[i]);
+            let reader = Reader { store: context.textures, patch: patch.as_ref(), known: &known };
             let below = if layers.reads_reflectance { bare.tinted(m, &reader) } else { bare };
-            let mut matter = below.with_lobes(m, &self.footing(i, placement, patch.as_ref()), &reader);
+            let mut matter =
+                if outside { below.with_lobes(m, &self.footing(i, placement, patch.as_ref()), &reader) } else { below };
             let scattered = traced.path(at).scattered;
             if scattered > SPREAD {
                 matter.blur(scattered);

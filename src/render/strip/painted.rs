@@ -209,7 +209,7 @@ impl Strip {
     }
 
     fn read_at(&mut self, i: usize, context: &Context, material: &Material, patch: &Patch, widens: bool) {
-        let reader = Reader { store: context.textures, patch: Some(patch) };
+        let reader = Reader { store: context.textures, patch: Some(patch), known: &[] };
         let base = reader.base(material);
         if coverage(material, base.w) < 1.0 {
             self.found.certain[i] = 0;

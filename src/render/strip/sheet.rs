@@ -8,7 +8,7 @@ use crate::math::simd::{Kernel, Simd};
 use crate::math::{Vec2, Vec3, Vec4};
 use crate::render::context::{Context, coverage};
 use crate::render::patch::{FrameTurn, Turn, given_tangent, mixed_color, turned_by_texel, turning_of};
-use crate::render::shade::{MetalRoughPaint, PhongPaint, base_color, base_space, occlusion};
+use crate::render::shade::{MetalRoughPaint, PhongPaint, base_color, base_space, has_inside, occlusion};
 use crate::render::surface::{facing, side_of};
 use crate::render::texture::{ColorSpace, Layout, Places, Spots, TextureStore, changes};
 use crate::render::world::Placement;
@@ -37,16 +37,24 @@ type Texels = [[Vec4; LANES]; SLOTS];
 /// Coordinates that the maps of a material may have.
 const GROUPS: usize = 2;
 
+/// Maps of layers that a material may have.
+pub(super) const LAYER_MAPS: usize = 9;
+
+/// What maps of layers say at every point.
+pub(super) type LayerTexels = [[Vec4; POINTS]; LAYER_MAPS];
+
 /// The maps of a material.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Sheet {
     groups: Vec<Group>,
     /// The texture of the normal map, which is in the first group, and how its texels lie.
     normal_map: Option<(u32, Layout)>,
+    /// Maps of layers and of reflectance, by their places among [`LayerTexels`]; empty where these are not read here.
+    layers: Vec<(TextureRef, ColorSpace)>,
 }
 
 /// Maps that have the same coordinates.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Group {
     uv_set: u32,
     transform: UvTransform,
@@ -55,18 +63,27 @@ struct Group {
 }
 
 /// Maps that are read in the same places.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Stack {
     layout: Layout,
     maps: Vec<Map>,
 }
 
 /// A texture that is read in one way, and for what: mostly one thing, but occlusion often lies where metalness does.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Map {
     texture: u32,
     space: ColorSpace,
     slots: Vec<Slot>,
+    /// Places among [`LayerTexels`].
+    layers: Vec<usize>,
+}
+
+/// What something read from a map is for.
+#[derive(Clone, Copy)]
+enum For {
+    Slot(Slot),
+    Layer(usize),
 }
 
 impl Sheet {
@@ -78,19 +95,36 @@ impl Sheet {
         if maps.len() + material.metal_rough().map_or(0, others) < material.textures().count() {
             return None;
         }
-        let mut sheet = Self { groups: Vec::new(), normal_map: None };
+        let mut sheet = Self { groups: Vec::new(), normal_map: None, layers: Vec::new() };
         if let Some((_, map, _)) = maps.iter().find(|(slot, ..)| matches!(slot, Slot::Normal)) {
             sheet.group(map)?;
         }
         for (slot, map, space) in maps {
             let layout = Layout::of(store, map.texture)?;
             let group = sheet.group(map)?;
-            sheet.groups[group].add(layout, (slot, map.texture, space));
+            sheet.groups[group].add(layout, (For::Slot(slot), map.texture, space));
             if let Slot::Normal = slot {
                 sheet.normal_map = Some((map.texture, layout));
             }
         }
-        Some(sheet)
+        let with_layers = material.metal_rough().and_then(|m| sheet.clone().with_layers(m, store));
+        Some(with_layers.unwrap_or(sheet))
+    }
+
+    /// The same with the maps of layers; `None` where one of them is read in another way, or there are too many coordinates.
+    fn with_layers(mut self, m: &MetalRough, store: &TextureStore) -> Option<Self> {
+        for (map, space) in layer_maps(m) {
+            let layout = Layout::of(store, map.texture)?;
+            let group = self.group(map)?;
+            self.groups[group].add(layout, (For::Layer(self.layers.len()), map.texture, space));
+            self.layers.push((*map, space));
+        }
+        Some(self)
+    }
+
+    /// The maps of layers that it reads, by their places among [`LayerTexels`].
+    pub(super) fn layers(&self) -> &[(TextureRef, ColorSpace)] {
+        &self.layers
     }
 
     /// The group of a map; `None` where there is no room for one more.
@@ -130,33 +164,43 @@ impl Sheet {
 }
 
 impl Group {
-    /// Reads what its maps say at so many of these spots.
+    /// Reads what its maps say at so many of these spots, those of layers from `start` on where there are any.
     #[inline(always)]
     fn read(
         &self,
         store: &TextureStore,
         (places, spots): (&mut Places, &Spots),
         (texels, points): (&mut Texels, usize),
+        (of_layers, start, has_layers): (&mut LayerTexels, usize, bool),
     ) {
         for stack in &self.stacks {
+            let wanted = |map: &Map| has_layers || !map.slots.is_empty();
+            if !has_layers && !stack.maps.iter().any(wanted) {
+                continue;
+            }
             places.find(&stack.layout, spots);
-            for Map { texture, space, slots } in &stack.maps {
+            for Map { texture, space, slots, layers } in stack.maps.iter().filter(|map| wanted(map)) {
                 let mut read = [Vec4::ONE; LANES];
                 places.read(store, (*texture, *space), &mut read[..points]);
                 slots.iter().for_each(|&slot| texels[slot as usize] = read);
+                layers.iter().for_each(|&layer| of_layers[layer].as_chunks_mut().0[start / LANES] = read);
             }
         }
     }
 
-    fn add(&mut self, layout: Layout, (slot, texture, space): (Slot, u32, ColorSpace)) {
+    fn add(&mut self, layout: Layout, (what, texture, space): (For, u32, ColorSpace)) {
         let known = self.stacks.iter().position(|stack| stack.layout == layout).unwrap_or_else(|| {
             self.stacks.push(Stack { layout, maps: Vec::new() });
             self.stacks.len() - 1
         });
         let maps = &mut self.stacks[known].maps;
-        match maps.iter_mut().find(|map| (map.texture, map.space) == (texture, space)) {
-            Some(map) => map.slots.push(slot),
-            None => maps.push(Map { texture, space, slots: vec![slot] }),
+        let known = maps.iter().position(|map| (map.texture, map.space) == (texture, space)).unwrap_or_else(|| {
+            maps.push(Map { texture, space, slots: Vec::new(), layers: Vec::new() });
+            maps.len() - 1
+        });
+        match what {
+            For::Slot(slot) => maps[known].slots.push(slot),
+            For::Layer(layer) => maps[known].layers.push(layer),
         }
     }
 }
@@ -183,6 +227,25 @@ fn maps(material: &Material) -> Vec<(Slot, &TextureRef, ColorSpace)> {
     all.into_iter().filter_map(|(slot, map, space)| Some((slot, map?, space))).collect()
 }
 
+/// Maps of layers and of reflectance, and what their numbers mean, but for that of the normals of lacquer. Where one gives a
+/// colour and with its alpha another number, it is named once.
+fn layer_maps(m: &MetalRough) -> impl Iterator<Item = (&TextureRef, ColorSpace)> {
+    let both = |color, alpha| [(color, ColorSpace::Srgb), (alone(alpha, color), ColorSpace::Linear)];
+    let numbers = |maps: [_; 2]| maps.map(|map: &Option<TextureRef>| (map.as_ref(), ColorSpace::Linear));
+    let reflectance = both(m.specular_color_map.as_ref(), m.specular_map.as_ref());
+    let grain = m.grain.iter().map(|grain| (grain.map.as_ref(), ColorSpace::Linear));
+    let film = m.film.iter().flat_map(move |film| numbers(film.maps()));
+    let sheen = m.sheen.iter().flat_map(move |sheen| both(sheen.color_map.as_ref(), sheen.roughness_map.as_ref()));
+    let coat = m.coat.iter().flat_map(move |coat| numbers([&coat.strength_map, &coat.roughness_map]));
+    let all = reflectance.into_iter().chain(grain).chain(film).chain(sheen).chain(coat);
+    all.filter_map(|(map, space)| Some((map?, space)))
+}
+
+/// A map of which alpha counts, if its colour is not read anyway.
+fn alone<'a>(alpha: Option<&'a TextureRef>, color: Option<&TextureRef>) -> Option<&'a TextureRef> {
+    alpha.filter(|_| alpha != color)
+}
+
 impl Strip {
     /// Reads what the maps of a sheet and the colours of vertices say at the points of a mesh that an instance has placed so, and
     /// turns their normals. If lights show as highlights, which a normal map `widens`, it finds how far that turns them.
@@ -195,12 +258,27 @@ impl Strip {
     ) {
         let count = self.count.min(POINTS);
         let (smooth, colored) = (!mesh.normals.is_empty(), !mesh.colors.is_empty());
-        let Self { given, found, painted, cones, places, level, .. } = self;
+        let Self { given, found, painted, of_layers, cones, places, level, .. } = self;
         let store = context.textures;
         let reach = context.highlight_reach;
         let turns = sheet.normal_map.as_ref().filter(|_| widens).map(|map| (map, reach));
-        let certain = &mut found.certain;
-        level.run(Read { sheet, material, store, given, certain, cones, painted, places, turns, colored, count });
+        let (certain, front, has_inside) = (&mut found.certain, &found.front, has_inside(material));
+        level.run(Read {
+            sheet,
+            material,
+            store,
+            given,
+            certain,
+            front,
+            has_inside,
+            cones,
+            painted,
+            of_layers,
+            places,
+            turns,
+            colored,
+            count,
+        });
         if sheet.normal_map.is_some() {
             let points = padded(count);
             let scale = material.normal_scale;
@@ -216,8 +294,11 @@ struct Read<'a> {
     store: &'a TextureStore<'a>,
     given: &'a Given,
     certain: &'a mut [u32; POINTS],
+    front: &'a [u32; POINTS],
+    has_inside: bool,
     cones: &'a mut Cones,
     painted: &'a mut Painted,
+    of_layers: &'a mut LayerTexels,
     places: &'a mut Places,
     /// The normal map, where its changes count within such a reach.
     turns: Option<(&'a (u32, Layout), f32)>,
@@ -230,19 +311,36 @@ impl Kernel for Read<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Self { sheet, material, store, given, certain, cones, painted, places, turns, colored, count } = self;
+        let Self {
+            sheet,
+            material,
+            store,
+            given,
+            certain,
+            front,
+            has_inside,
+            cones,
+            painted,
+            of_layers,
+            places,
+            turns,
+            colored,
+            count,
+        } = self;
         for start in (0..count.min(POINTS)).step_by(LANES) {
             let mut spots = Spots::default();
             let mut texels: Texels = [[Vec4::ONE; LANES]; SLOTS];
             let points = (count - start).min(LANES);
+            // Layers lie on the outside.
+            let has_layers = !has_inside || front[start..start + points].contains(&1);
             if let Some(group) = sheet.groups.first() {
                 spread(&mut spots, (given, cones), (start, group.transform.offset), |i| given.faces.uvs(i));
-                group.read(store, (places, &spots), (&mut texels, points));
+                group.read(store, (places, &spots), (&mut texels, points), (of_layers, start, has_layers));
             }
             for group in sheet.groups.iter().skip(1) {
                 let mut spots = Spots::default();
                 spread(&mut spots, (given, cones), (start, group.transform.offset), |i| given.faces.other_uvs(i));
-                group.read(store, (places, &spots), (&mut texels, points));
+                group.read(store, (places, &spots), (&mut texels, points), (of_layers, start, has_layers));
             }
             for i in start..start + points {
                 let vertex =

@@ -317,8 +317,7 @@ fn layered(mut s: Stage, textures: u32) -> Stage {
         let transform = if i.is_multiple_of(2) { UvTransform::default() } else { turned };
         (textures > 0).then(|| TextureRef { texture: texture % textures, uv_set: (i % 2) as u32, transform })
     };
-    let opaque = |m: &&mut Material| !m.surface.transmits();
-    let matters = s.scene.materials.iter_mut().filter(opaque).filter_map(|material| match &mut material.surface {
+    let matters = s.scene.materials.iter_mut().filter_map(|material| match &mut material.surface {
         Reflection::MetalRough(m) => Some(m),
         Reflection::Phong(_) | Reflection::Unlit => None,
     });

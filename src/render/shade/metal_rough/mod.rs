@@ -193,7 +193,14 @@ impl MetalRoughMatter {
                 let share = film::reflectance(film.ior, thickness, f0, cosine);
                 f0.lerp(film::seen_face_on(share, cosine), strength)
             };
-            (self.f0, self.metal_f0, self.filmed) = (under(self.f0), under(self.metal_f0), true);
+            // What there is nothing of shows no colours either.
+            if self.metallic < 1.0 {
+                self.f0 = under(self.f0);
+            }
+            if self.metallic > 0.0 {
+                self.metal_f0 = under(self.metal_f0);
+            }
+            self.filmed = true;
         }
     }
 
