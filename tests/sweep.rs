@@ -1,9 +1,10 @@
-//! Every model and broken file that others made, in one process: loads, renders small, stays sane, and looks as it did.
+//! Every model and broken file that others made, in one process: loads, renders small, stays sane, has the same
+//! bits whether points are shaded one by one or side by side, and looks as it did.
 //!
 //! Runs only when `MESHRAY_SHARED` names the folder that holds `models/`; it says how many files it saw, what they were
 //! warned about and what was refused.
 
-use crate::common::still;
+use crate::common::stills;
 use crate::golden::sheet::Sheet;
 use meshray::accel::AccelKind;
 use meshray::image::Picture;
@@ -202,9 +203,15 @@ fn draw(path: &Path) -> Outcome {
     }
     let triangles: usize = loaded.scene.meshes.iter().map(|mesh| mesh.triangles.len()).sum();
     let kind = if triangles > MANY { AccelKind::DEFAULT } else { AccelKind::GridOctree };
-    let Some(picture) = still(loaded.scene, kind, SIZE, SIZE) else {
+    // Layers are taken point by point; without them points are shaded side by side where they can be.
+    let Some([picture, beside]) = stills(loaded.scene, kind, (SIZE, SIZE), [true, false]) else {
         return Outcome::Empty;
     };
+    let bits = |color: &[f32; 4]| color.map(f32::to_bits);
+    let differ = picture.beauty.iter().zip(&beside.beauty).filter(|(a, b)| bits(a) != bits(b)).count();
+    if differ > 0 {
+        return Outcome::Broken(format!("{differ} pixels differ where points are shaded side by side"));
+    }
     if picture.beauty.iter().flatten().any(|v| !v.is_finite()) {
         return Outcome::Broken("a pixel is not a number".into());
     }

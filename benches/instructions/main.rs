@@ -22,8 +22,8 @@ use meshray::render::texture::TextureStore;
 use meshray::render::view::Lens;
 use meshray::render::{Job, Settings, View, World, render};
 use meshray::scene::{
-    Bitmap, Environment, Falloff, Light, LightKind, Material, MetalRough, Panorama, Pixels, Sampler, Scene, Surface,
-    Texture, TextureRef, UvTransform, default_light, framing,
+    Bitmap, Coat, Environment, Falloff, Light, LightKind, Material, MetalRough, Panorama, Pixels, Sampler, Scene,
+    Sheen, Surface, Texture, TextureRef, UvTransform, default_light, framing,
 };
 
 /// Part by which a count may exceed its baseline.
@@ -43,13 +43,15 @@ const QUESTIONS: [&str; 2] = ["first", "any"];
 
 /// Pictures by what they show and what lights it: a sample for each of [`RAYS`] pixels. They are drawn with the best
 /// instructions that Valgrind knows, so that a formula that is no longer computed in lanes shows.
-const PICTURES: [[&str; 2]; 7] = [
+const PICTURES: [[&str; 2]; 9] = [
     ["plain", "lamp"],
     ["plain", "ball"],
     ["plain", "studio"],
     ["mapped", "lamp"],
     ["mapped", "studio"],
     ["mapped", "panorama"],
+    ["layered", "lamp"],
+    ["layered", "studio"],
     ["glass", "studio"],
 ];
 const SIDE: u32 = 64;
@@ -206,6 +208,10 @@ fn picture(of: &str, light: &str) -> ExitCode {
     scene.lights.clear();
     match of {
         "mapped" => paint(&mut scene),
+        "layered" => {
+            paint(&mut scene);
+            cover(&mut scene);
+        }
         "glass" => {
             let glass =
                 MetalRough { transmission: 1.0, thick: true, roughness: 0.0, metallic: 0.0, ..MetalRough::default() };
@@ -276,6 +282,23 @@ fn paint(scene: &mut Scene) {
         surface: Surface::MetalRough(surface),
         ..Material::plain()
     });
+}
+
+/// Covers all materials with fibres and lacquer, and maps of both.
+fn cover(scene: &mut Scene) {
+    for material in &mut scene.materials {
+        let map = material.base_color_map;
+        let Surface::MetalRough(m) = &mut material.surface else { continue };
+        m.sheen = Some(Box::new(Sheen { color: Vec3::splat(0.5), color_map: map, roughness: 0.3, roughness_map: map }));
+        m.coat = Some(Box::new(Coat {
+            strength: 0.9,
+            strength_map: map,
+            roughness: 0.3,
+            roughness_map: None,
+            normal_map: None,
+            normal_scale: 1.0,
+        }));
+    }
 }
 
 /// What is counted of a picture; how many pixels show anything lit.
