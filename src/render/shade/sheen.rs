@@ -10,14 +10,13 @@ use crate::math::formula::{power, sin_cos_of_turns};
 use crate::math::simd::{Kernel, Level, Simd};
 use crate::scene::Sheen;
 use std::f32::consts::PI;
-use std::sync::LazyLock;
+use std::sync::OnceLock;
 
 /// Entries of [`ALBEDO`] by roughness and by N·V.
 const ENTRIES: usize = 17;
 
-/// Directional albedo of the white lobe: rows by roughness 0 … 1, columns by N·V 0 … 1. Found when it is first needed.
-static ALBEDO: LazyLock<[[f32; ENTRIES]; ENTRIES]> =
-    LazyLock::new(|| std::array::from_fn(|row| Level::best().run(Integral { alpha: alpha(part(row)) })));
+/// Directional albedo of the white lobe: rows by roughness 0 … 1, columns by N·V 0 … 1. Each row is found when it is first needed.
+static ALBEDO: [OnceLock<[f32; ENTRIES]>; ENTRIES] = [const { OnceLock::new() }; ENTRIES];
 
 /// The lobe is no thinner than this roughness makes it.
 const LEAST_ROUGHNESS: f32 = 0.07;
@@ -130,8 +129,16 @@ fn albedo(roughness: f32, n_v: f32) -> f32 {
         (i, x - i as f32)
     };
     let ((i, a), (j, b)) = (place(roughness), place(n_v));
-    let row = |i: usize| ALBEDO[i][j] + (ALBEDO[i][j + 1] - ALBEDO[i][j]) * b;
-    row(i) + (row(i + 1) - row(i)) * a
+    let [lower, upper] = [i, i + 1].map(|i| {
+        let row = row(i);
+        row[j] + (row[j + 1] - row[j]) * b
+    });
+    lower + (upper - lower) * a
+}
+
+/// A row of [`ALBEDO`].
+fn row(i: usize) -> &'static [f32; ENTRIES] {
+    ALBEDO[i].get_or_init(|| Level::best().run(Integral { alpha: alpha(part(i)) }))
 }
 
 #[cfg(test)]
@@ -144,7 +151,7 @@ mod tests {
 
     #[test]
     fn no_more_is_sent_back_than_arrives_and_rough_fibres_send_back_most_where_they_are_grazed() {
-        for row in ALBEDO.iter() {
+        for row in (0..ENTRIES).map(row) {
             assert!(row.iter().all(|a| (0.0..=1.0).contains(a)), "{row:?}");
         }
         for roughness in [0.3, 0.6, 1.0] {

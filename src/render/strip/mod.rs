@@ -4,8 +4,8 @@
 //! formulas are computed for all points. They are written once, for one point, in `surface`, `patch`, `shade`, `glint` and
 //! `accel::refine`; here loops over columns of numbers call them, which the compiler turns into lanes. So a point shaded
 //! here gives the same bits as one shaded by itself, on every instruction set. Of lights with an extent each point draws
-//! places of its own (`wide`). Rays that go on from glass, and what is seen of panoramas and by rays to the surroundings, are
-//! found point by point, from the numbers in the columns (`ground`).
+//! places of its own (`wide`). Rays that go on from glass, what layers over a material show, and what is seen of panoramas and
+//! by rays to the surroundings, are found point by point, from the numbers in the columns (`layered`, `ground`).
 //!
 //! What a column cannot do is left to the tracer: hits near the edge of a face, those whose distance needs more than
 //! `f64`, backs of one-sided faces, points whose mesh gives no tangent, glass from which no ray goes on, and what is not
