@@ -4,7 +4,7 @@
 //! Runs only when `MESHRAY_SHARED` names the folder that holds `models/`; it says how many files it saw, what they were
 //! warned about and what was refused.
 
-use crate::common::stills;
+use crate::common::{bits, stills};
 use crate::golden::sheet::Sheet;
 use meshray::accel::AccelKind;
 use meshray::image::Picture;
@@ -203,14 +203,12 @@ fn draw(path: &Path) -> Outcome {
     }
     let triangles: usize = loaded.scene.meshes.iter().map(|mesh| mesh.triangles.len()).sum();
     let kind = if triangles > MANY { AccelKind::DEFAULT } else { AccelKind::GridOctree };
-    // Layers are taken point by point; without them points are shaded side by side where they can be.
-    let Some([picture, beside]) = stills(loaded.scene, kind, (SIZE, SIZE), [true, false]) else {
+    let Some([picture, one_by_one]) = stills(loaded.scene, kind, (SIZE, SIZE), [false, true]) else {
         return Outcome::Empty;
     };
-    let bits = |color: &[f32; 4]| color.map(f32::to_bits);
-    let differ = picture.beauty.iter().zip(&beside.beauty).filter(|(a, b)| bits(a) != bits(b)).count();
+    let differ = bits(&picture).into_iter().zip(bits(&one_by_one)).filter(|(a, b)| a != b).count();
     if differ > 0 {
-        return Outcome::Broken(format!("{differ} pixels differ where points are shaded side by side"));
+        return Outcome::Broken(format!("{differ} numbers are others where points are shaded one by one"));
     }
     if picture.beauty.iter().flatten().any(|v| !v.is_finite()) {
         return Outcome::Broken("a pixel is not a number".into());

@@ -42,6 +42,7 @@ impl Effective {
                 gloss_rays: look.gloss_rays,
                 light_rays: look.light_rays.unwrap_or(usual.light_rays),
                 layers: look.layers,
+                one_by_one: false,
                 everything: false,
             },
             output: Output {

@@ -79,7 +79,7 @@ pub fn root(x: f32, exponent: f32) -> f32 {
     if x > 0.0 { power } else { 0.0 }
 }
 
-/// `x` ≥ 0 to the power of `exponent`, 0 … 1000, to 5e-6 · `exponent` of it, or 1e-38.
+/// `x` ≥ 0 to the power of `exponent`, 1 … 1000, to 5e-6 · `exponent` of it: 2⁻¹²⁶ … 2¹²⁷, and 0 for 0.
 #[inline(always)]
 pub fn power(x: f32, exponent: f32) -> f32 {
     let power = exp2((exponent * log2(x)).clamp(-126.0, 127.0));

@@ -11,7 +11,7 @@ use super::draws::{Draws, Purpose};
 use super::eyes::Eyes;
 use super::observer::Observer;
 use super::seam::{is_same_crossing, is_same_surface};
-use super::shade::LocalLight;
+use super::shade::{LocalLight, Matter};
 use super::strip::{Common, POINTS, Sorted, Strip, StripPoint};
 use super::surface::{Surface, Target};
 use super::wave::{Path, RayClass, Wave};
@@ -300,21 +300,18 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         if shiny {
             strip.bend(context, matter, smooth.then_some(placement));
         }
-        if common.glass.is_some() {
+        if common.spreads {
             strip.retain(|ray| traced.path(ray).depth < context.depth);
         }
         for index in strip.left_out(common.one_sided) {
             self.shade_one(traced, index as usize);
         }
+        self.note_strip(traced, (instance, matter), strip);
         strip.layer(context, traced, (mesh, placement), common);
         if !common.glass.is_some_and(|glass| glass.is_dark_inside && strip.sees_backs_alone()) {
             self.show(traced, common, strip);
         }
-        if common.glass.is_some() {
-            self.each_point(traced, common, strip, |tracer, point| {
-                tracer.reflect_and_refract(point, &point.crossing(context, point.path.band));
-            });
-        } else if common.layers.is_some() {
+        if common.sends_by_points() {
             self.each_point(traced, common, strip, |tracer, point| {
                 if point.path.depth < context.depth {
                     tracer.reflect_and_refract(point, &point.crossing(context, point.path.band));
@@ -324,6 +321,19 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             let (roulette, streams) = (self.roulette, &self.streams);
             let goes_on = |sample, path: &mut _| roulette.spin(streams, sample, path);
             strip.mirror(context, matter, traced, (goes_on, &mut self.starting[RayClass::Reflected as usize]));
+        }
+    }
+
+    /// Remembers the points of an instance, whose material is `even` but for maps, that are the first surfaces of their samples.
+    fn note_strip(&mut self, traced: Traced, (instance, even): (u32, &Matter), strip: &Strip) {
+        if self.facts.is_empty() {
+            return;
+        }
+        for (at, sample, found) in strip.facts(instance, even, self.context.world.center) {
+            let facts = &mut self.facts[sample as usize];
+            if !facts.is_some() && traced.path(at).straight {
+                *facts = found;
+            }
         }
     }
 
@@ -407,8 +417,14 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             let (ray, hit, path) = (&traced.rays()[at], &traced.hits()[at], traced.path(at));
             let since = if context.absorption.is_some() { hit.t } else { path.since };
             let ground = strip.ground(i, material, has_inside);
-            let bare = ground.bare(&common.matter);
-            let matter = strip.whole(i).unwrap_or(&bare);
+            let bare;
+            let matter = match strip.whole(i) {
+                Some(whole) => whole,
+                None => {
+                    bare = ground.bare(&common.matter);
+                    &bare
+                }
+            };
             let path = Path { weight, since, ..path };
             let touches = traced.touches(at);
             act(self, &Point { ray, hit, path, width, surface: &ground, matter, touches });

@@ -130,7 +130,7 @@ impl<'a> Context<'a> {
         let env_rays = shared_env_rays(env_rays, together, ways);
         let lights: Vec<LocalLight> = scene.lights.iter().map(|l| LocalLight::new(l, world.center)).collect();
         let light_rays = settings.light_rays.max(1).div_ceil(together);
-        let alone = everything || settings.layers || gloss.all;
+        let alone = everything || settings.one_by_one;
         let common = |m: (u32, &Material)| if alone { None } else { Common::of(m, textures, depth > 0, gloss) };
         let needs = |any: &[Feature]| everything || any.iter().any(|&f| features.has(f));
         Self {

@@ -1,6 +1,5 @@
 //! What a picture tells besides its colours: albedo, normal, position, depth and ids of the first surface seen.
 
-use super::surface::Surface;
 use crate::accel::NO_PRIM;
 use crate::image::Layers;
 use crate::math::{DVec3, Vec3};
@@ -21,14 +20,14 @@ impl Facts {
     pub(crate) const NONE: Self =
         Self { albedo: Vec3::ZERO, normal: Vec3::ZERO, position: DVec3::ZERO, prim: NO_PRIM, instance: NO_PRIM };
 
-    pub(crate) fn new(surface: &Surface, albedo: Vec3, center: DVec3) -> Self {
-        Self {
-            albedo,
-            normal: surface.normal,
-            position: center + surface.position.as_dvec3(),
-            prim: surface.target.prim,
-            instance: surface.target.instance,
-        }
+    /// Of a prim of an instance: position and normal in a frame with this `center`, and the albedo.
+    pub(crate) fn new(
+        (prim, instance): (u32, u32),
+        (position, normal): (Vec3, Vec3),
+        albedo: Vec3,
+        center: DVec3,
+    ) -> Self {
+        Self { albedo, normal, position: center + position.as_dvec3(), prim, instance }
     }
 
     pub(crate) fn is_some(&self) -> bool {

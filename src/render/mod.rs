@@ -111,6 +111,8 @@ pub struct Settings {
     pub gloss_rays: Option<u32>,
     /// Whether [`crate::image::Layers`] are wanted.
     pub layers: bool,
+    /// Whether each point of a surface is shaded by itself and none beside others: the same picture, later, to compare.
+    pub one_by_one: bool,
     /// Whether what the scene does without is done all the same, for nothing (see [`everything`]). The world and the
     /// textures of the [`Job`] must be such, too.
     pub everything: bool,
@@ -138,6 +140,7 @@ impl Default for Settings {
             light_rays: 16,
             gloss_rays: None,
             layers: false,
+            one_by_one: false,
             everything: false,
         }
     }

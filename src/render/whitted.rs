@@ -339,7 +339,9 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     fn note(&mut self, ray: &Ray, path: &Path, surface: &Surface, albedo: Vec3) {
         let Some(facts) = self.facts.get_mut(ray.sample as usize) else { return };
         if path.straight && !facts.is_some() {
-            *facts = Facts::new(surface, albedo, self.context.world.center);
+            let Target { prim, instance, .. } = surface.target;
+            let at = (surface.position, surface.normal);
+            *facts = Facts::new((prim, instance), at, albedo, self.context.world.center);
         }
     }
 

@@ -39,16 +39,16 @@ pub fn models() -> Vec<PathBuf> {
 /// A picture of a loaded scene as a user gets it who asks for nothing: framed and lit, on nothing, one sample a pixel,
 /// with layers. `None`: the scene holds nothing to draw.
 pub fn still(scene: Scene, kind: AccelKind, width: u32, height: u32) -> Option<Picture> {
-    let [picture] = stills(scene, kind, (width, height), [true])?;
+    let [picture] = stills(scene, kind, (width, height), [false])?;
     Some(picture)
 }
 
-/// The same several times, with layers or not.
+/// The same several times, the points of surfaces shaded one by one or not.
 pub fn stills<const N: usize>(
     mut scene: Scene,
     kind: AccelKind,
     (width, height): (u32, u32),
-    layers: [bool; N],
+    one_by_one: [bool; N],
 ) -> Option<[Picture; N]> {
     let bounds = framing::robust_bounds(&scene);
     let camera = framing::default_camera(&scene, &bounds, f64::from(width) / f64::from(height));
@@ -61,13 +61,13 @@ pub fn stills<const N: usize>(
     let accel = AnyAccel::build(kind, &world.shapes, &AccelParams::DEFAULT);
     let textures = TextureStore::new(&scene);
     let view = View::from_camera(&camera);
-    let picture = |layers| {
-        let settings = Settings { width, height, samples: 1, layers, ..Settings::default() };
+    let picture = |one_by_one| {
+        let settings = Settings { width, height, samples: 1, layers: true, one_by_one, ..Settings::default() };
         let job =
             Job { scene: &scene, world: &world, accel: &accel, textures: &textures, view: &view, settings: &settings };
         render(&job, &()).picture
     };
-    Some(layers.map(picture))
+    Some(one_by_one.map(picture))
 }
 
 /// Pixels and layers as bits, so that zeros of both signs and NaN are told apart.

@@ -80,6 +80,17 @@ pub(crate) enum Model {
     MetalRough(MetalRoughMatter),
 }
 
+impl Model {
+    /// Its base colour.
+    pub(crate) fn base(&self) -> Vec3 {
+        match self {
+            Self::Unlit(color) => *color,
+            Self::Phong(m) => m.diffuse,
+            Self::MetalRough(m) => m.paint().base,
+        }
+    }
+}
+
 /// Weights of the secondary rays of a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Balance {

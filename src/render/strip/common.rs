@@ -18,12 +18,15 @@ pub(crate) struct Common {
     pub mapped: bool,
     /// Those maps and the colours of vertices, where they can be read side by side.
     pub sheet: Option<Sheet>,
-    /// Whether it may mirror, where rays bounce, or show lights as narrow highlights.
+    /// Whether cones and how they bend must be known: it may mirror, where rays bounce, or show lights as narrow highlights, or
+    /// has layers that may.
     pub shiny: bool,
     /// Where light enters it, which rays follow.
     pub glass: Option<Glass>,
     /// What each point has over it, or reads for itself.
     pub layers: Option<Layers>,
+    /// Whether all that it mirrors and lets through is seen by rays, where any may go on.
+    pub spreads: bool,
 }
 
 /// What is known of a material whose points have layers over them, or maps of their reflectance.
@@ -62,8 +65,11 @@ impl Common {
         let mut matter = Matter::without_maps(material, store);
         let glass = material.surface.transmits();
         let layers = metal_rough.and_then(Layers::of);
+        let spreads = bounces && gloss.spreads(material);
         if glass {
-            metal_rough.filter(|m| bounces && gloss.spreads(material) && !scatters_inside(m))?;
+            metal_rough.filter(|m| spreads && !scatters_inside(m))?;
+        }
+        if spreads {
             matter.spread_by_rays();
         }
         let mirrors = match &matter.model {
@@ -81,8 +87,14 @@ impl Common {
             sheet: Sheet::of(material, store),
             glass: glass.then(|| Glass::of(material, &matter)),
             layers,
+            spreads: spreads && metal_rough.is_some(),
             matter,
         })
+    }
+
+    /// Whether rays that go on from it are found point by point.
+    pub(crate) fn sends_by_points(&self) -> bool {
+        self.glass.is_some() || self.layers.is_some() || self.spreads
     }
 
     /// Whether backs of faces are seen from inside.
@@ -96,7 +108,7 @@ impl Layers {
     fn of(m: &MetalRough) -> Option<Self> {
         let reads_maps = other_maps(m) > 0;
         let reads_mesh = m.grain.is_some() || m.coat.as_ref().is_some_and(|coat| coat.normal_map.is_some());
-        let reads_reflectance = m.specular_map.is_some() || m.specular_color_map.is_some();
+        let reads_reflectance = reads_reflectance(m);
         (m.has_lobes() || reads_maps).then_some(Self { reads_mesh, reads_maps, reads_reflectance })
     }
 }
@@ -113,6 +125,11 @@ impl Glass {
 /// Whether light that was let in may be scattered from inside: what is left for that is found for each point.
 fn scatters_inside(m: &MetalRough) -> bool {
     m.thick && (m.transmission < 1.0 || m.transmission_map.is_some())
+}
+
+/// Whether maps say how much it reflects.
+pub(super) fn reads_reflectance(m: &MetalRough) -> bool {
+    m.specular_map.is_some() || m.specular_color_map.is_some()
 }
 
 /// How many maps it has of more than its colour, roughness and metalness, and of what passes through: of its reflectance, and of

@@ -1,10 +1,12 @@
-//! Points of a strip one by one, for what no column knows: rays that go on through glass, and rays to the surroundings.
+//! Points of a strip one by one, for what no column knows: rays that go on through glass and off layers, rays to the
+//! surroundings, and what layers of a picture tell.
 
 use super::columns::{Strip, get, leave};
 use crate::accel::{NO_PRIM, Ray};
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 use crate::render::branch::Ground;
 use crate::render::context::Context;
+use crate::render::layers::Facts;
 use crate::render::shade::{Matter, Seen};
 use crate::scene::Material;
 
@@ -27,6 +29,22 @@ impl Strip {
     pub(crate) fn arrival(&self, i: usize) -> (usize, Vec3, f32) {
         let weight = self.weights.as_ref().map_or(Vec3::ONE, |weights| get(weights, i));
         (self.rays[i] as usize, weight, self.cones.width[i])
+    }
+
+    /// Of each point that is shaded here: the place in what was traced of its ray, its sample, and what layers of a picture tell of
+    /// it, whose material is `even` but for maps.
+    pub(crate) fn facts(
+        &self,
+        instance: u32,
+        even: &Matter,
+        center: DVec3,
+    ) -> impl Iterator<Item = (usize, u32, Facts)> {
+        let prims = self.given.faces.prims();
+        self.certain().map(move |i| {
+            let at = (get(&self.found.position, i), get(&self.found.normal, i));
+            let albedo = self.bare(i, even, true).model.base();
+            (self.rays[i] as usize, self.samples[i], Facts::new((prims[i], instance), at, albedo, center))
+        })
     }
 
     /// The material at point `i`, which is `even` where maps do not change it, but for layers.

@@ -1,7 +1,7 @@
 //! Maps of a material and colours of vertices that points of a strip read side by side.
 
 use super::columns::{Column, Columns, Found, Given, LANES, POINTS, Strip, get, padded, put};
-use super::common::other_maps;
+use super::common::{other_maps, reads_reflectance};
 use super::cones::Cones;
 use super::painted::Painted;
 use crate::math::simd::{Kernel, Simd};
@@ -37,10 +37,10 @@ type Texels = [[Vec4; LANES]; SLOTS];
 /// Coordinates that the maps of a material may have.
 const GROUPS: usize = 2;
 
-/// Maps of layers that a material may have.
+/// Maps of layers and of reflectance that a material may have.
 pub(super) const LAYER_MAPS: usize = 9;
 
-/// What maps of layers say at every point.
+/// What maps of layers and of reflectance say at every point.
 pub(super) type LayerTexels = [[Vec4; POINTS]; LAYER_MAPS];
 
 /// The maps of a material.
@@ -75,7 +75,7 @@ struct Map {
     texture: u32,
     space: ColorSpace,
     slots: Vec<Slot>,
-    /// Places among [`LayerTexels`].
+    /// Places among [`LayerTexels`], where it belongs to layers or reflectance.
     layers: Vec<usize>,
 }
 
@@ -164,18 +164,18 @@ impl Sheet {
 }
 
 impl Group {
-    /// Reads what its maps say at so many of these spots, those of layers from `start` on where there are any.
+    /// Reads what its maps say at so many of these spots; those of layers and reflectance from `start` on, if they are wanted.
     #[inline(always)]
     fn read(
         &self,
         store: &TextureStore,
         (places, spots): (&mut Places, &Spots),
         (texels, points): (&mut Texels, usize),
-        (of_layers, start, has_layers): (&mut LayerTexels, usize, bool),
+        (of_layers, start, reads_layers): (&mut LayerTexels, usize, bool),
     ) {
         for stack in &self.stacks {
-            let wanted = |map: &Map| has_layers || !map.slots.is_empty();
-            if !has_layers && !stack.maps.iter().any(wanted) {
+            let wanted = |map: &Map| reads_layers || !map.slots.is_empty();
+            if !reads_layers && !stack.maps.iter().any(wanted) {
                 continue;
             }
             places.find(&stack.layout, spots);
@@ -262,7 +262,9 @@ impl Strip {
         let store = context.textures;
         let reach = context.highlight_reach;
         let turns = sheet.normal_map.as_ref().filter(|_| widens).map(|map| (map, reach));
-        let (certain, front, has_inside) = (&mut found.certain, &found.front, has_inside(material));
+        let (certain, front) = (&mut found.certain, &found.front);
+        // Layers lie on the outside; how much is reflected counts on both sides.
+        let outside_alone = has_inside(material) && !material.metal_rough().is_some_and(reads_reflectance);
         level.run(Read {
             sheet,
             material,
@@ -270,7 +272,7 @@ impl Strip {
             given,
             certain,
             front,
-            has_inside,
+            outside_alone,
             cones,
             painted,
             of_layers,
@@ -295,7 +297,8 @@ struct Read<'a> {
     given: &'a Given,
     certain: &'a mut [u32; POINTS],
     front: &'a [u32; POINTS],
-    has_inside: bool,
+    /// Whether maps of layers count only where fronts are seen.
+    outside_alone: bool,
     cones: &'a mut Cones,
     painted: &'a mut Painted,
     of_layers: &'a mut LayerTexels,
@@ -318,7 +321,7 @@ impl Kernel for Read<'_> {
             given,
             certain,
             front,
-            has_inside,
+            outside_alone,
             cones,
             painted,
             of_layers,
@@ -331,16 +334,15 @@ impl Kernel for Read<'_> {
             let mut spots = Spots::default();
             let mut texels: Texels = [[Vec4::ONE; LANES]; SLOTS];
             let points = (count - start).min(LANES);
-            // Layers lie on the outside.
-            let has_layers = !has_inside || front[start..start + points].contains(&1);
+            let reads_layers = !outside_alone || front[start..start + points].contains(&1);
             if let Some(group) = sheet.groups.first() {
                 spread(&mut spots, (given, cones), (start, group.transform.offset), |i| given.faces.uvs(i));
-                group.read(store, (places, &spots), (&mut texels, points), (of_layers, start, has_layers));
+                group.read(store, (places, &spots), (&mut texels, points), (of_layers, start, reads_layers));
             }
             for group in sheet.groups.iter().skip(1) {
                 let mut spots = Spots::default();
                 spread(&mut spots, (given, cones), (start, group.transform.offset), |i| given.faces.other_uvs(i));
-                group.read(store, (places, &spots), (&mut texels, points), (of_layers, start, has_layers));
+                group.read(store, (places, &spots), (&mut texels, points), (of_layers, start, reads_layers));
             }
             for i in start..start + points {
                 let vertex =

@@ -76,7 +76,7 @@ fn counting_changes_no_bit() {
 /// Surfaces without maps of every model, seen from both sides, under every kind of light.
 fn plain() -> Stage {
     let mut s = stage(View::look_at(DVec3::new(1.0, 2.0, 6.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.8)));
-    s.settings = Settings { width: 61, height: 47, samples: 3, depth: Some(1), ..s.settings };
+    s.settings = Settings { width: 61, height: 47, samples: 3, depth: Some(1), layers: true, ..s.settings };
     let pbr = |m: MetalRough| Material { surface: Reflection::MetalRough(m), ..Material::plain() };
     let turned = |x: f64, at: DVec3| DAffine3::from_translation(at) * DAffine3::from_rotation_x(x);
     let round = |half: f32| {
@@ -126,11 +126,10 @@ fn points_shaded_side_by_side_have_the_bits_of_points_shaded_one_by_one() {
         let mut s = plain();
         s.scene.environment = environment;
         let together = s.render();
-        // Layers are taken point by point.
-        s.settings.layers = true;
+        s.settings.one_by_one = true;
         let alone = s.render();
         assert_eq!(together.counts, alone.counts);
-        assert!(together.picture.beauty == alone.picture.beauty, "{environment:?}");
+        assert!(together.picture == alone.picture, "{environment:?}");
         let seen = together.picture.beauty.iter().filter(|c| c[0] > 0.0).count();
         assert!(seen > 1500, "{seen}");
     }
@@ -201,10 +200,10 @@ fn mapped_points_shaded_side_by_side_have_the_bits_of_points_shaded_one_by_one()
         assert!(s.scene.materials.iter().all(beside), "nothing would be compared");
         (s.settings.depth, s.scene.environment) = (Some(depth), environment);
         let together = s.render();
-        s.settings.layers = true;
+        s.settings.one_by_one = true;
         let alone = s.render();
         assert_eq!(together.counts, alone.counts);
-        assert!(together.picture.beauty == alone.picture.beauty, "depth {depth}, {environment:?}");
+        assert!(together.picture == alone.picture, "depth {depth}, {environment:?}");
     }
 }
 
@@ -300,12 +299,13 @@ fn glass_shaded_side_by_side_has_the_bits_of_glass_shaded_one_by_one() {
             s.view = View::look_at(DVec3::new(-1.8, 0.9, 1.8), DVec3::ZERO, DVec3::Y, Lens::perspective(1.2));
         }
         let together = s.render();
-        s.settings.layers = true;
+        s.settings.one_by_one = true;
         let alone = s.render();
         assert!(together.counts.refracted.queries > 2000, "{:?}", together.counts.refracted);
         assert_eq!(together.counts, alone.counts);
         let differ = together.picture.beauty.iter().zip(&alone.picture.beauty).filter(|(a, b)| a != b).count();
         assert_eq!(differ, 0, "pixels, {environment:?}, {textures} textures");
+        assert!(together.picture.layers == alone.picture.layers, "layers");
     }
 }
 
@@ -321,6 +321,7 @@ fn layered(mut s: Stage, textures: u32) -> Stage {
         Reflection::MetalRough(m) => Some(m),
         Reflection::Phong(_) | Reflection::Unlit => None,
     });
+    let mut panes = 0;
     for (i, m) in matters.enumerate() {
         let has = |layer: usize| i == layer || i == layer + 1 || i >= 5;
         m.coat = has(0).then(|| {
@@ -338,8 +339,12 @@ fn layered(mut s: Stage, textures: u32) -> Stage {
             Box::new(Film { strength: 0.9, strength_map, ior: 1.4, thickness: [120.0, 480.0], thickness_map })
         });
         m.grain = has(3).then(|| Box::new(Grain { strength: 0.7, rotation: 0.3, map: map(i, 0).filter(|_| i != 3) }));
-        (m.specular, m.specular_map) = (0.7, map(i, 1).filter(|_| i % 3 == 0));
+        let pane = m.thick && m.transmission > 0.0;
+        (m.specular, m.specular_map) = (0.7, map(i, 1).filter(|_| pane || i % 3 == 0));
         m.specular_color_map = map(i, 2).filter(|_| i % 3 == 1);
+        // Of every other pane backs, too, reflect as these maps say.
+        panes += usize::from(pane);
+        m.ior = if pane && panes % 2 == 0 { 0.0 } else { m.ior };
     }
     s
 }
@@ -367,11 +372,33 @@ fn layers_shaded_side_by_side_have_the_bits_of_layers_shaded_one_by_one() {
         };
         assert!(s.scene.materials.iter().filter(beside).count() >= 5, "nothing would be compared");
         let together = s.render();
-        s.settings.layers = true;
+        s.settings.one_by_one = true;
         let alone = s.render();
         assert_eq!(together.counts, alone.counts);
         let differ = together.picture.beauty.iter().zip(&alone.picture.beauty).filter(|(a, b)| a != b).count();
         assert_eq!(differ, 0, "pixels, {textures} textures, depth {depth}");
+        assert!(together.picture.layers == alone.picture.layers, "layers");
+    }
+}
+
+#[test]
+fn rough_surfaces_that_spread_rays_have_the_same_bits_side_by_side() {
+    for (textures, depth) in [(0, 2), (3, 1), (3, 3)] {
+        let mut s = if textures > 0 { layered(painted(), textures) } else { plain() };
+        s.settings = Settings { gloss_rays: Some(2), depth: Some(depth), samples: 2, ..s.settings };
+        s.scene.environment = Environment::Studio;
+        let store = TextureStore::new(&s.scene);
+        let beside =
+            |m: &&Material| Common::of((0, m), &store, true, Gloss::new(Some(2))).is_some_and(|common| common.spreads);
+        assert!(s.scene.materials.iter().filter(beside).count() >= 5, "nothing would be compared");
+        let together = s.render();
+        s.settings.one_by_one = true;
+        let alone = s.render();
+        assert!(together.counts.reflected.queries > 2000, "{:?}", together.counts.reflected);
+        assert_eq!(together.counts, alone.counts);
+        let differ = together.picture.beauty.iter().zip(&alone.picture.beauty).filter(|(a, b)| a != b).count();
+        assert_eq!(differ, 0, "pixels, {textures} textures, depth {depth}");
+        assert!(together.picture.layers == alone.picture.layers, "layers");
     }
 }
 
@@ -386,12 +413,13 @@ fn where_more_rays_wait_than_are_traced_together_points_side_by_side_have_the_sa
     s.scene.environment = Environment::Studio;
     s.settings = Settings { width: 240, height: 180, samples: 8, depth: Some(6), cutoff: 1.0 / 512.0, ..s.settings };
     let together = s.render_by(AccelKind::DEFAULT);
-    s.settings.layers = true;
+    s.settings.one_by_one = true;
     let alone = s.render_by(AccelKind::DEFAULT);
     assert!(together.counts.refracted.queries > 500_000, "{:?}", together.counts.refracted);
     assert_eq!(together.counts, alone.counts);
     let differ = together.picture.beauty.iter().zip(&alone.picture.beauty).filter(|(a, b)| a != b).count();
     assert_eq!(differ, 0, "pixels");
+    assert!(together.picture.layers == alone.picture.layers, "layers");
 }
 
 #[test]
@@ -405,11 +433,12 @@ fn points_that_look_around_by_rays_have_the_same_bits_side_by_side() {
         let mut s = glazed(painted(), 3);
         (s.scene.environment, s.scene.panorama, s.settings.env_rays) = (environment, Some(panorama.clone()), rays);
         let together = s.render();
-        s.settings.layers = true;
+        s.settings.one_by_one = true;
         let alone = s.render();
         assert_eq!(together.counts, alone.counts);
         let differ = together.picture.beauty.iter().zip(&alone.picture.beauty).filter(|(a, b)| a != b).count();
         assert_eq!(differ, 0, "pixels, {environment:?}, {rays:?} rays");
+        assert!(together.picture.layers == alone.picture.layers, "layers");
     }
 }
 
@@ -431,11 +460,12 @@ fn wide_lights_light_points_side_by_side_as_they_light_them_one_by_one() {
         s.scene.lights.last_mut().into_iter().for_each(|light| light.shadows = false);
         (s.settings.sampling, s.settings.light_rays) = (sampling, light_rays);
         let together = s.render();
-        s.settings.layers = true;
+        s.settings.one_by_one = true;
         let alone = s.render();
         assert_eq!(together.counts, alone.counts, "{sampling:?}");
         let differ = together.picture.beauty.iter().zip(&alone.picture.beauty).filter(|(a, b)| a != b).count();
         assert_eq!(differ, 0, "pixels, {sampling:?}, {light_rays} rays");
+        assert!(together.picture.layers == alone.picture.layers, "layers");
         assert!(together.counts.shadow.queries > 2 * together.counts.primary.queries, "{:?}", together.counts);
     }
 }

@@ -45,7 +45,7 @@ pub(crate) struct MetalRoughMatter {
     f90: f32,
     /// Reflection of the metal part, face on.
     metal_f0: Vec3,
-    /// Whether a film changes both.
+    /// Whether a film changes both, or that of them which there is.
     filmed: bool,
     /// Share of the light entering the dielectric part that passes through instead of being scattered.
     transmission: f32,
@@ -193,7 +193,7 @@ impl MetalRoughMatter {
                 let share = film::reflectance(film.ior, thickness, f0, cosine);
                 f0.lerp(film::seen_face_on(share, cosine), strength)
             };
-            // What there is nothing of shows no colours either.
+            // A part of which there is nothing needs no colours.
             if self.metallic < 1.0 {
                 self.f0 = under(self.f0);
             }
