@@ -341,7 +341,7 @@ fn layered(mut s: Stage, textures: u32) -> Stage {
         m.grain = has(3).then(|| Box::new(Grain { strength: 0.7, rotation: 0.3, map: map(i, 0).filter(|_| i != 3) }));
         let pane = m.thick && m.transmission > 0.0;
         (m.specular, m.specular_map) = (0.7, map(i, 1).filter(|_| pane || i % 3 == 0));
-        m.specular_color_map = map(i, 2).filter(|_| i % 3 == 1);
+        m.specular_color_map = map(i, 2).filter(|_| pane || i % 3 == 1);
         // Of every other pane backs, too, reflect as these maps say.
         panes += usize::from(pane);
         m.ior = if pane && panes % 2 == 0 { 0.0 } else { m.ior };
