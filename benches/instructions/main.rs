@@ -50,8 +50,8 @@ const PICTURES: [[&str; 2]; 9] = [
     ["mapped", "lamp"],
     ["mapped", "studio"],
     ["mapped", "panorama"],
-    ["layered", "lamp"],
-    ["layered", "studio"],
+    ["lobes", "lamp"],
+    ["lobes", "studio"],
     ["glass", "studio"],
 ];
 const SIDE: u32 = 64;
@@ -208,7 +208,7 @@ fn picture(of: &str, light: &str) -> ExitCode {
     scene.lights.clear();
     match of {
         "mapped" => paint(&mut scene),
-        "layered" => {
+        "lobes" => {
             paint(&mut scene);
             cover(&mut scene);
         }

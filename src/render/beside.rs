@@ -294,7 +294,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         if reads {
             strip.read(context, traced, (mesh, placement), common);
         }
-        if common.layers.is_none() {
+        if common.lobes.is_none() {
             strip.blur(traced, matter);
         }
         if shiny {
@@ -307,7 +307,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             self.shade_one(traced, index as usize);
         }
         self.note_strip(traced, (instance, matter), strip);
-        strip.layer(context, traced, (mesh, placement), common);
+        strip.complete(context, traced, (mesh, placement), common);
         if !common.glass.is_some_and(|glass| glass.is_dark_inside && strip.sees_backs_alone()) {
             self.show(traced, common, strip);
         }
@@ -341,7 +341,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
     fn show(&mut self, traced: Traced, common: &Common, strip: &mut Strip) {
         let (context, matter) = (self.context, &common.matter);
         let has_inside = common.has_inside();
-        if context.looks_around_by_points() || common.layers.is_some() {
+        if context.looks_around_by_points() || common.lobes.is_some() {
             self.each_point(traced, common, strip, |tracer, point| tracer.look_around(point));
         } else if !context.is_dark || matter.shines() {
             strip.look_around((matter, has_inside), &context.sky, context.scene.ambient);

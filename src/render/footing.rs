@@ -1,4 +1,4 @@
-//! What layers over a surface lie on: lacquer that may have a normal map of its own, and a grain that runs along tangents.
+//! What lobes over a surface lie on: lacquer that may have a normal map of its own, and a grain that runs along tangents.
 
 use super::patch::Patch;
 use super::surface::facing;
@@ -6,7 +6,7 @@ use super::texture::TextureStore;
 use crate::math::{Vec2, Vec3};
 use crate::scene::{TextureRef, UvTransform};
 
-/// A point of a surface as layers over it ask for it: unit vectors in world space.
+/// A point of a surface as lobes over it ask for it: unit vectors in world space.
 #[derive(Clone, Copy)]
 pub(crate) struct Footing<'a> {
     /// The part of the mesh around it.

@@ -205,7 +205,7 @@ impl<'a> Surface<'a> {
         side_of(own, self.geometric)
     }
 
-    /// What layers over it lie on.
+    /// What lobes over it lie on.
     pub(crate) fn footing(&self) -> Footing<'_> {
         let Self { smooth, side, normal, view, .. } = *self;
         Footing { patch: self.patch.as_ref(), smooth, side, normal, view }

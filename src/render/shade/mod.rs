@@ -374,7 +374,7 @@ impl Matter {
     }
 
     /// The same of a metallic-rough surface on which so much light falls from there.
-    pub(crate) fn lit_in_layers(&self, horizon: Vec3, normal: Vec3, view: Vec3, to_light: Vec3, light: Vec3) -> Vec3 {
+    pub(crate) fn lit_with_lobes(&self, horizon: Vec3, normal: Vec3, view: Vec3, to_light: Vec3, light: Vec3) -> Vec3 {
         let Model::MetalRough(m) = &self.model else { return Vec3::ZERO };
         let below = self.lit_below(m, normal, view, to_light) * light;
         self.lit_over(below, (horizon, normal, view), to_light, light)

@@ -5,7 +5,7 @@ use super::cones::Cones;
 use super::faces::Faces;
 use super::lit::Lit;
 use super::painted::Painted;
-use super::sheet::{LAYER_MAPS, LayerTexels};
+use super::sheet::{LOBE_MAPS, LobeTexels};
 use super::sorted::Sorted;
 use super::wide::Drawn;
 use crate::math::bounds::offset_origin;
@@ -65,14 +65,14 @@ pub(crate) struct Strip {
     pub(super) found: Found,
     pub(super) painted: Painted,
     /// Where a sheet reads them.
-    pub(super) of_layers: Box<LayerTexels>,
+    pub(super) of_lobes: Box<LobeTexels>,
     pub(super) cones: Cones,
     pub(super) places: Places,
     pub(super) surroundings: Surroundings,
     pub(super) lit: Lit,
     pub(super) drawn: Drawn,
-    /// The whole matter of each point, where it has layers or maps of its reflectance; else empty.
-    pub(super) layered: Vec<Matter>,
+    /// The whole matter of each point, where it has more lobes or maps of its reflectance; else empty.
+    pub(super) whole: Vec<Matter>,
 }
 
 /// What hits say.
@@ -128,13 +128,13 @@ impl Default for Strip {
             given,
             found,
             painted: Painted::default(),
-            of_layers: Box::new([[Vec4::ONE; POINTS]; LAYER_MAPS]),
+            of_lobes: Box::new([[Vec4::ONE; POINTS]; LOBE_MAPS]),
             cones: Cones::default(),
             places: Places::default(),
             surroundings: Surroundings::default(),
             lit: Lit::default(),
             drawn: Drawn::default(),
-            layered: Vec::new(),
+            whole: Vec::new(),
         }
     }
 }
@@ -154,7 +154,7 @@ impl Strip {
             (*at, *sample) = (*ray, *ray);
         }
         self.weights = None;
-        self.layered.clear();
+        self.whole.clear();
         if traced.has_weights() {
             let weights = self.weights.insert(EMPTY);
             for (i, &ray) in self.rays[..self.count].iter().enumerate() {

@@ -19,22 +19,22 @@ pub(crate) struct Common {
     /// Those maps and the colours of vertices, where they can be read side by side.
     pub sheet: Option<Sheet>,
     /// Whether cones and how they bend must be known: it may mirror, where rays bounce, or show lights as narrow highlights, or
-    /// has layers that may.
+    /// has lobes that may.
     pub shiny: bool,
     /// Where light enters it, which rays follow.
     pub glass: Option<Glass>,
     /// What each point has over it, or reads for itself.
-    pub layers: Option<Layers>,
+    pub lobes: Option<Lobes>,
     /// Whether all that it mirrors and lets through is seen by rays, where any may go on.
     pub spreads: bool,
 }
 
-/// What is known of a material whose points have layers over them, or maps of their reflectance.
+/// What is known of a material whose points have more lobes than that of their facets, or maps of their reflectance.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Layers {
+pub(crate) struct Lobes {
     /// Whether the mesh around a point must be known, …
     pub reads_mesh: bool,
-    /// … or must if its sheet does not say what maps of layers do.
+    /// … or must if its sheet does not say what maps of lobes do.
     pub reads_maps: bool,
     /// Whether maps say how much it reflects.
     pub reads_reflectance: bool,
@@ -64,7 +64,7 @@ impl Common {
         }
         let mut matter = Matter::without_maps(material, store);
         let glass = material.surface.transmits();
-        let layers = metal_rough.and_then(Layers::of);
+        let lobes = metal_rough.and_then(Lobes::of);
         let spreads = bounces && gloss.spreads(material);
         if glass {
             metal_rough.filter(|m| spreads && !scatters_inside(m))?;
@@ -81,12 +81,12 @@ impl Common {
         let smooth = metal_rough.is_some_and(|m| m.metal_rough_map.is_some());
         Some(Self {
             material: number,
-            shiny: glass || layers.is_some() || smooth || matter.has_narrow_highlight() || bounces && mirrors,
+            shiny: glass || lobes.is_some() || smooth || matter.has_narrow_highlight() || bounces && mirrors,
             one_sided: !material.double_sided && !glass,
             mapped: material.textures().next().is_some(),
             sheet: Sheet::of(material, store),
             glass: glass.then(|| Glass::of(material, &matter)),
-            layers,
+            lobes,
             spreads: spreads && metal_rough.is_some(),
             matter,
         })
@@ -94,7 +94,7 @@ impl Common {
 
     /// Whether rays that go on from it are found point by point.
     pub(crate) fn sends_by_points(&self) -> bool {
-        self.glass.is_some() || self.layers.is_some() || self.spreads
+        self.glass.is_some() || self.lobes.is_some() || self.spreads
     }
 
     /// Whether backs of faces are seen from inside.
@@ -103,7 +103,7 @@ impl Common {
     }
 }
 
-impl Layers {
+impl Lobes {
     /// `None` for materials without any.
     fn of(m: &MetalRough) -> Option<Self> {
         let reads_maps = other_maps(m) > 0;
@@ -133,7 +133,7 @@ pub(super) fn reads_reflectance(m: &MetalRough) -> bool {
 }
 
 /// How many maps it has of more than its colour, roughness and metalness, and of what passes through: of its reflectance, and of
-/// layers. How thick it is matters only where that is looked up.
+/// lobes. How thick it is matters only where that is looked up.
 pub(super) fn other_maps(m: &MetalRough) -> usize {
     let known = [&m.metal_rough_map, &m.transmission_map, &m.thickness_map];
     m.maps().count() - known.into_iter().flatten().count()

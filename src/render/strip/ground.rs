@@ -1,4 +1,4 @@
-//! Points of a strip one by one, for what no column knows: rays that go on through glass and off layers, rays to the
+//! Points of a strip one by one, for what no column knows: rays that go on through glass and off several lobes, rays to the
 //! surroundings, and what layers of a picture tell.
 
 use super::columns::{Strip, get, leave};
@@ -47,7 +47,7 @@ impl Strip {
         })
     }
 
-    /// The material at point `i`, which is `even` where maps do not change it, but for layers.
+    /// The material at point `i`, which is `even` where maps do not change it, but for its lobes.
     pub(super) fn bare(&self, i: usize, even: &Matter, outside: bool) -> Matter {
         if self.painted.any {
             return Matter::bare(self.painted.model(i, &even.model), self.painted.emission(i), outside);
@@ -62,7 +62,7 @@ impl Strip {
 }
 
 impl StripPoint<'_> {
-    /// The material there, which is `even` where maps do not change it, but for layers.
+    /// The material there, which is `even` where maps do not change it, but for its lobes.
     pub(crate) fn bare(&self, even: &Matter) -> Matter {
         self.strip.bare(self.i, even, self.outside)
     }

@@ -61,7 +61,7 @@ impl Strip {
         place: Option<u32>,
     ) {
         let (found, lit, points) = (&self.found, &mut self.lit, padded(self.count));
-        let (painted, layered) = (&self.painted, &self.layered);
+        let (painted, whole) = (&self.painted, &self.whole);
         let cones = shiny.then_some(&self.cones);
         let drawn = place.map(|place| (&mut self.drawn, place));
         match drawn {
@@ -71,7 +71,7 @@ impl Strip {
                 points,
                 matter,
                 painted,
-                layered,
+                whole,
                 cones,
                 has_inside,
                 light,
@@ -83,7 +83,7 @@ impl Strip {
                 points,
                 matter,
                 painted,
-                layered,
+                whole,
                 cones,
                 has_inside,
                 light,
@@ -197,8 +197,8 @@ struct Shine<'a, const WIDE: bool> {
     points: usize,
     matter: &'a Matter,
     painted: &'a Painted,
-    /// What points with layers are made of.
-    layered: &'a [Matter],
+    /// What points with more lobes are made of.
+    whole: &'a [Matter],
     /// Where highlights may be narrow.
     cones: Option<&'a Cones>,
     has_inside: bool,
@@ -212,7 +212,7 @@ impl<const WIDE: bool> Kernel for Shine<'_, WIDE> {
 
     #[inline(always)]
     fn run<S: Simd>(self, _: S) {
-        let Self { found, lit, points, matter, painted, layered, cones, has_inside, light, mut drawn } = self;
+        let Self { found, lit, points, matter, painted, whole, cones, has_inside, light, mut drawn } = self;
         let (points, light) = (points.min(POINTS), *light);
         let in_lux = matches!(matter.model, Model::MetalRough(_));
         debug_assert_eq!(WIDE, drawn.is_some());
@@ -229,7 +229,7 @@ impl<const WIDE: bool> Kernel for Shine<'_, WIDE> {
         }
         // The model is chosen outside the loop, which then is a formula.
         match &matter.model {
-            _ if !layered.is_empty() => reflect_in_layers(found, lit, layered),
+            _ if !whole.is_empty() => reflect_with_lobes(found, lit, whole),
             Model::Unlit(_) => lit.seen.fill(0),
             Model::Phong(m) if painted.any => {
                 let m = *m;
@@ -323,19 +323,19 @@ fn reflect_by(found: &Found, lit: &mut Lit, i: usize, radiance: Vec3) {
     put(&mut lit.radiance, i, radiance);
 }
 
-/// What points with layers reflect of the light that arrives.
-fn reflect_in_layers(found: &Found, lit: &mut Lit, layered: &[Matter]) {
-    for (i, matter) in layered.iter().enumerate().take(POINTS) {
+/// What points with more lobes reflect of the light that arrives.
+fn reflect_with_lobes(found: &Found, lit: &mut Lit, whole: &[Matter]) {
+    for (i, matter) in whole.iter().enumerate().take(POINTS) {
         let (horizon, normal, view) = (get(&found.horizon, i), get(&found.normal, i), get(&found.view, i));
         let wanted = (lit.seen[i] != 0) & (found.certain[i] == 1);
         let radiance = if wanted {
-            matter.lit_in_layers(horizon, normal, view, get(&lit.to_light, i), get(&lit.light, i))
+            matter.lit_with_lobes(horizon, normal, view, get(&lit.to_light, i), get(&lit.light, i))
         } else {
             Vec3::ZERO
         };
         reflect_by(found, lit, i, radiance);
     }
-    lit.seen[layered.len().min(POINTS)..].fill(0);
+    lit.seen[whole.len().min(POINTS)..].fill(0);
 }
 
 /// What the points reflect of the light that arrives.

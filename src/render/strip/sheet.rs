@@ -37,11 +37,11 @@ type Texels = [[Vec4; LANES]; SLOTS];
 /// Coordinates that the maps of a material may have.
 const GROUPS: usize = 2;
 
-/// Maps of layers and of reflectance that a material may have.
-pub(super) const LAYER_MAPS: usize = 9;
+/// Maps of lobes and of reflectance that a material may have.
+pub(super) const LOBE_MAPS: usize = 9;
 
-/// What maps of layers and of reflectance say at every point.
-pub(super) type LayerTexels = [[Vec4; POINTS]; LAYER_MAPS];
+/// What maps of lobes and of reflectance say at every point.
+pub(super) type LobeTexels = [[Vec4; POINTS]; LOBE_MAPS];
 
 /// The maps of a material.
 #[derive(Clone, Debug)]
@@ -49,8 +49,8 @@ pub(crate) struct Sheet {
     groups: Vec<Group>,
     /// The texture of the normal map, which is in the first group, and how its texels lie.
     normal_map: Option<(u32, Layout)>,
-    /// Maps of layers and of reflectance, by their places among [`LayerTexels`]; empty where these are not read here.
-    layers: Vec<(TextureRef, ColorSpace)>,
+    /// Maps of lobes and of reflectance, by their places among [`LobeTexels`]; empty where these are not read here.
+    lobes: Vec<(TextureRef, ColorSpace)>,
 }
 
 /// Maps that have the same coordinates.
@@ -75,27 +75,27 @@ struct Map {
     texture: u32,
     space: ColorSpace,
     slots: Vec<Slot>,
-    /// Places among [`LayerTexels`], where it belongs to layers or reflectance.
-    layers: Vec<usize>,
+    /// Places among [`LobeTexels`], where it belongs to lobes or reflectance.
+    lobes: Vec<usize>,
 }
 
 /// What something read from a map is for.
 #[derive(Clone, Copy)]
 enum For {
     Slot(Slot),
-    Layer(usize),
+    Lobe(usize),
 }
 
 impl Sheet {
     /// `None` for materials whose maps have too many coordinates, and for those of which one is read in another way.
     pub(super) fn of(material: &Material, store: &TextureStore) -> Option<Self> {
         let maps = maps(material);
-        // How thick glass is does not matter where rays go through it; maps of layers are read with these.
+        // How thick glass is does not matter where rays go through it; maps of lobes are read with these.
         let others = |m: &MetalRough| usize::from(m.thickness_map.is_some()) + other_maps(m);
         if maps.len() + material.metal_rough().map_or(0, others) < material.textures().count() {
             return None;
         }
-        let mut sheet = Self { groups: Vec::new(), normal_map: None, layers: Vec::new() };
+        let mut sheet = Self { groups: Vec::new(), normal_map: None, lobes: Vec::new() };
         if let Some((_, map, _)) = maps.iter().find(|(slot, ..)| matches!(slot, Slot::Normal)) {
             sheet.group(map)?;
         }
@@ -107,24 +107,24 @@ impl Sheet {
                 sheet.normal_map = Some((map.texture, layout));
             }
         }
-        let with_layers = material.metal_rough().and_then(|m| sheet.clone().with_layers(m, store));
-        Some(with_layers.unwrap_or(sheet))
+        let with_lobes = material.metal_rough().and_then(|m| sheet.clone().with_lobes(m, store));
+        Some(with_lobes.unwrap_or(sheet))
     }
 
-    /// The same with the maps of layers; `None` where one of them is read in another way, or there are too many coordinates.
-    fn with_layers(mut self, m: &MetalRough, store: &TextureStore) -> Option<Self> {
-        for (map, space) in layer_maps(m) {
+    /// The same with the maps of lobes; `None` where one of them is read in another way, or there are too many coordinates.
+    fn with_lobes(mut self, m: &MetalRough, store: &TextureStore) -> Option<Self> {
+        for (map, space) in lobe_maps(m) {
             let layout = Layout::of(store, map.texture)?;
             let group = self.group(map)?;
-            self.groups[group].add(layout, (For::Layer(self.layers.len()), map.texture, space));
-            self.layers.push((*map, space));
+            self.groups[group].add(layout, (For::Lobe(self.lobes.len()), map.texture, space));
+            self.lobes.push((*map, space));
         }
         Some(self)
     }
 
-    /// The maps of layers that it reads, by their places among [`LayerTexels`].
-    pub(super) fn layers(&self) -> &[(TextureRef, ColorSpace)] {
-        &self.layers
+    /// The maps of lobes that it reads, by their places among [`LobeTexels`].
+    pub(super) fn lobes(&self) -> &[(TextureRef, ColorSpace)] {
+        &self.lobes
     }
 
     /// The group of a map; `None` where there is no room for one more.
@@ -164,26 +164,26 @@ impl Sheet {
 }
 
 impl Group {
-    /// Reads what its maps say at so many of these spots; those of layers and reflectance from `start` on, if they are wanted.
+    /// Reads what its maps say at so many of these spots; those of lobes and reflectance from `start` on, if they are wanted.
     #[inline(always)]
     fn read(
         &self,
         store: &TextureStore,
         (places, spots): (&mut Places, &Spots),
         (texels, points): (&mut Texels, usize),
-        (of_layers, start, reads_layers): (&mut LayerTexels, usize, bool),
+        (of_lobes, start, reads_lobes): (&mut LobeTexels, usize, bool),
     ) {
         for stack in &self.stacks {
-            let wanted = |map: &Map| reads_layers || !map.slots.is_empty();
-            if !reads_layers && !stack.maps.iter().any(wanted) {
+            let wanted = |map: &Map| reads_lobes || !map.slots.is_empty();
+            if !reads_lobes && !stack.maps.iter().any(wanted) {
                 continue;
             }
             places.find(&stack.layout, spots);
-            for Map { texture, space, slots, layers } in stack.maps.iter().filter(|map| wanted(map)) {
+            for Map { texture, space, slots, lobes } in stack.maps.iter().filter(|map| wanted(map)) {
                 let mut read = [Vec4::ONE; LANES];
                 places.read(store, (*texture, *space), &mut read[..points]);
                 slots.iter().for_each(|&slot| texels[slot as usize] = read);
-                layers.iter().for_each(|&layer| of_layers[layer].as_chunks_mut().0[start / LANES] = read);
+                lobes.iter().for_each(|&lobe| of_lobes[lobe].as_chunks_mut().0[start / LANES] = read);
             }
         }
     }
@@ -195,12 +195,12 @@ impl Group {
         });
         let maps = &mut self.stacks[known].maps;
         let known = maps.iter().position(|map| (map.texture, map.space) == (texture, space)).unwrap_or_else(|| {
-            maps.push(Map { texture, space, slots: Vec::new(), layers: Vec::new() });
+            maps.push(Map { texture, space, slots: Vec::new(), lobes: Vec::new() });
             maps.len() - 1
         });
         match what {
             For::Slot(slot) => maps[known].slots.push(slot),
-            For::Layer(layer) => maps[known].layers.push(layer),
+            For::Lobe(lobe) => maps[known].lobes.push(lobe),
         }
     }
 }
@@ -227,9 +227,9 @@ fn maps(material: &Material) -> Vec<(Slot, &TextureRef, ColorSpace)> {
     all.into_iter().filter_map(|(slot, map, space)| Some((slot, map?, space))).collect()
 }
 
-/// Maps of layers and of reflectance, and what their numbers mean, but for that of the normals of lacquer. Where one gives a
+/// Maps of lobes and of reflectance, and what their numbers mean, but for that of the normals of lacquer. Where one gives a
 /// colour and with its alpha another number, it is named once.
-fn layer_maps(m: &MetalRough) -> impl Iterator<Item = (&TextureRef, ColorSpace)> {
+fn lobe_maps(m: &MetalRough) -> impl Iterator<Item = (&TextureRef, ColorSpace)> {
     let both = |color, alpha| [(color, ColorSpace::Srgb), (alone(alpha, color), ColorSpace::Linear)];
     let numbers = |maps: [_; 2]| maps.map(|map: &Option<TextureRef>| (map.as_ref(), ColorSpace::Linear));
     let reflectance = both(m.specular_color_map.as_ref(), m.specular_map.as_ref());
@@ -258,12 +258,12 @@ impl Strip {
     ) {
         let count = self.count.min(POINTS);
         let (smooth, colored) = (!mesh.normals.is_empty(), !mesh.colors.is_empty());
-        let Self { given, found, painted, of_layers, cones, places, level, .. } = self;
+        let Self { given, found, painted, of_lobes, cones, places, level, .. } = self;
         let store = context.textures;
         let reach = context.highlight_reach;
         let turns = sheet.normal_map.as_ref().filter(|_| widens).map(|map| (map, reach));
         let (certain, front) = (&mut found.certain, &found.front);
-        // Layers lie on the outside; how much is reflected counts on both sides.
+        // Lobes lie on the outside; how much is reflected counts on both sides.
         let outside_alone = has_inside(material) && !material.metal_rough().is_some_and(reads_reflectance);
         level.run(Read {
             sheet,
@@ -275,7 +275,7 @@ impl Strip {
             outside_alone,
             cones,
             painted,
-            of_layers,
+            of_lobes,
             places,
             turns,
             colored,
@@ -297,11 +297,11 @@ struct Read<'a> {
     given: &'a Given,
     certain: &'a mut [u32; POINTS],
     front: &'a [u32; POINTS],
-    /// Whether maps of layers count only where fronts are seen.
+    /// Whether maps of lobes count only where fronts are seen.
     outside_alone: bool,
     cones: &'a mut Cones,
     painted: &'a mut Painted,
-    of_layers: &'a mut LayerTexels,
+    of_lobes: &'a mut LobeTexels,
     places: &'a mut Places,
     /// The normal map, where its changes count within such a reach.
     turns: Option<(&'a (u32, Layout), f32)>,
@@ -324,7 +324,7 @@ impl Kernel for Read<'_> {
             outside_alone,
             cones,
             painted,
-            of_layers,
+            of_lobes,
             places,
             turns,
             colored,
@@ -334,15 +334,15 @@ impl Kernel for Read<'_> {
             let mut spots = Spots::default();
             let mut texels: Texels = [[Vec4::ONE; LANES]; SLOTS];
             let points = (count - start).min(LANES);
-            let reads_layers = !outside_alone || front[start..start + points].contains(&1);
+            let reads_lobes = !outside_alone || front[start..start + points].contains(&1);
             if let Some(group) = sheet.groups.first() {
                 spread(&mut spots, (given, cones), (start, group.transform.offset), |i| given.faces.uvs(i));
-                group.read(store, (places, &spots), (&mut texels, points), (of_layers, start, reads_layers));
+                group.read(store, (places, &spots), (&mut texels, points), (of_lobes, start, reads_lobes));
             }
             for group in sheet.groups.iter().skip(1) {
                 let mut spots = Spots::default();
                 spread(&mut spots, (given, cones), (start, group.transform.offset), |i| given.faces.other_uvs(i));
-                group.read(store, (places, &spots), (&mut texels, points), (of_layers, start, reads_layers));
+                group.read(store, (places, &spots), (&mut texels, points), (of_lobes, start, reads_lobes));
             }
             for i in start..start + points {
                 let vertex =

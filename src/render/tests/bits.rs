@@ -309,9 +309,9 @@ fn glass_shaded_side_by_side_has_the_bits_of_glass_shaded_one_by_one() {
     }
 }
 
-/// The same with layers over what is metallic-rough, one or several over each: their maps and those of reflectance are of so many
+/// The same with more lobes over what is metallic-rough, one or several each: their maps and those of reflectance are of so many
 /// textures.
-fn layered(mut s: Stage, textures: u32) -> Stage {
+fn lobed(mut s: Stage, textures: u32) -> Stage {
     let turned = UvTransform { scale: Vec2::new(2.0, -1.5), rotation: 0.7, ..UvTransform::default() };
     let map = |i: usize, texture: u32| {
         let transform = if i.is_multiple_of(2) { UvTransform::default() } else { turned };
@@ -323,7 +323,7 @@ fn layered(mut s: Stage, textures: u32) -> Stage {
     });
     let mut panes = 0;
     for (i, m) in matters.enumerate() {
-        let has = |layer: usize| i == layer || i == layer + 1 || i >= 5;
+        let has = |lobe: usize| i == lobe || i == lobe + 1 || i >= 5;
         m.coat = has(0).then(|| {
             let (strength_map, roughness_map) = (map(i, 0), map(i, 1).filter(|_| i > 0));
             let roughness = if i == 0 { 0.04 } else { 0.5 };
@@ -350,7 +350,7 @@ fn layered(mut s: Stage, textures: u32) -> Stage {
 }
 
 #[test]
-fn layers_shaded_side_by_side_have_the_bits_of_layers_shaded_one_by_one() {
+fn lobes_shaded_side_by_side_have_the_bits_of_lobes_shaded_one_by_one() {
     let cases = [
         (Environment::Studio, 0, 1, None),
         (Environment::Studio, 3, 1, None),
@@ -361,14 +361,14 @@ fn layers_shaded_side_by_side_have_the_bits_of_layers_shaded_one_by_one() {
     for (environment, textures, depth, env_rays) in cases {
         let stage = if textures > 0 { painted() } else { plain() };
         // Rough glass blurs what is seen through it.
-        let mut s = layered(if depth > 1 { glazed(stage, 3) } else { stage }, textures);
+        let mut s = lobed(if depth > 1 { glazed(stage, 3) } else { stage }, textures);
         for light in &mut s.scene.lights {
             light.size = if depth > 1 { 0.2 } else { 0.0 };
         }
         (s.settings.depth, s.settings.env_rays, s.scene.environment) = (Some(depth), env_rays, environment);
         let store = TextureStore::new(&s.scene);
         let beside = |m: &&Material| {
-            Common::of((0, m), &store, true, Gloss::new(None)).is_some_and(|common| common.layers.is_some())
+            Common::of((0, m), &store, true, Gloss::new(None)).is_some_and(|common| common.lobes.is_some())
         };
         assert!(s.scene.materials.iter().filter(beside).count() >= 5, "nothing would be compared");
         let together = s.render();
@@ -384,7 +384,7 @@ fn layers_shaded_side_by_side_have_the_bits_of_layers_shaded_one_by_one() {
 #[test]
 fn rough_surfaces_that_spread_rays_have_the_same_bits_side_by_side() {
     for (textures, depth) in [(0, 2), (3, 1), (3, 3)] {
-        let mut s = if textures > 0 { layered(painted(), textures) } else { plain() };
+        let mut s = if textures > 0 { lobed(painted(), textures) } else { plain() };
         s.settings = Settings { gloss_rays: Some(2), depth: Some(depth), samples: 2, ..s.settings };
         s.scene.environment = Environment::Studio;
         let store = TextureStore::new(&s.scene);

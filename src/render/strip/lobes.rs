@@ -1,5 +1,5 @@
-//! Points with layers over them, a grain, film, sheen or lacquer, or with maps of their reflectance: where they are and how they
-//! are seen is found side by side, what they are made of one by one.
+//! Points with more lobes than that of their facets, those of a grain, film, sheen or lacquer, or with maps of their
+//! reflectance: where they are and how they are seen is found side by side, what they are made of one by one.
 
 use super::columns::{POINTS, Strip, get};
 use super::common::Common;
@@ -20,7 +20,7 @@ use crate::scene::{Mesh, MetalRough};
 impl Strip {
     /// Finds what the points of a mesh that an instance has placed so are made of, once their common maps have been read and
     /// cones bent.
-    pub(crate) fn layer(
+    pub(crate) fn complete(
         &mut self,
         context: &Context,
         traced: Traced,
@@ -28,19 +28,19 @@ impl Strip {
         common: &Common,
     ) {
         let metal_rough = context.scene.materials[mesh.material as usize].metal_rough();
-        let (Some(m), Some(layers)) = (metal_rough, common.layers) else { return };
-        let by_sheet = common.sheet.as_ref().filter(|sheet| sheet.covers(mesh)).map_or(&[][..], Sheet::layers);
+        let (Some(m), Some(lobes)) = (metal_rough, common.lobes) else { return };
+        let by_sheet = common.sheet.as_ref().filter(|sheet| sheet.covers(mesh)).map_or(&[][..], Sheet::lobes);
         let unread = |&(map, space): &_| Known { map, space, texel: Vec4::ONE };
         let mut known: Vec<Known> = by_sheet.iter().map(unread).collect();
-        let reads_mesh = layers.reads_mesh || layers.reads_maps && known.is_empty();
+        let reads_mesh = lobes.reads_mesh || lobes.reads_maps && known.is_empty();
         let placement = (!mesh.normals.is_empty()).then_some(placement);
-        let mut layered = std::mem::take(&mut self.layered);
+        let mut whole = std::mem::take(&mut self.whole);
         let (mut prim, mut patch) = (NO_PRIM, None);
         for i in 0..self.count.min(POINTS) {
             let outside = self.found.front[i] == 1 || !common.has_inside();
             let bare = self.bare(i, &common.matter, outside);
             if self.found.certain[i] != 1 {
-                layered.push(bare);
+                whole.push(bare);
                 continue;
             }
             let at = self.rays[i] as usize;
@@ -55,9 +55,9 @@ impl Strip {
                     patch.move_to([1.0 - hit.u - hit.v, hit.u, hit.v], self.cones.footprint(i));
                 }
             }
-            known.iter_mut().zip(&*self.of_layers).for_each(|(known, texels)| known.texel = texels[i]);
+            known.iter_mut().zip(&*self.of_lobes).for_each(|(known, texels)| known.texel = texels[i]);
             let reader = Reader { store: context.textures, patch: patch.as_ref(), known: &known };
-            let below = if layers.reads_reflectance { bare.tinted(m, &reader) } else { bare };
+            let below = if lobes.reads_reflectance { bare.tinted(m, &reader) } else { bare };
             let mut matter =
                 if outside { below.with_lobes(m, &self.footing(i, placement, patch.as_ref()), &reader) } else { below };
             let scattered = traced.path(at).scattered;
@@ -65,17 +65,17 @@ impl Strip {
                 matter.blur(scattered);
             }
             self.widen_highlights(i, context, m, &mut matter, patch.as_ref());
-            layered.push(matter);
+            whole.push(matter);
         }
-        self.layered = layered;
+        self.whole = whole;
     }
 
-    /// What point `i` is made of with its layers, if it has any.
+    /// What point `i` is made of with all its lobes, if it has more than one.
     pub(crate) fn whole(&self, i: usize) -> Option<&Matter> {
-        self.layered.get(i)
+        self.whole.get(i)
     }
 
-    /// What layers lie on at point `i` of a patch of a mesh, with `placement` where it has normals of its own.
+    /// What lobes lie on at point `i` of a patch of a mesh, with `placement` where it has normals of its own.
     fn footing<'a>(&self, i: usize, placement: Option<&Placement>, patch: Option<&'a Patch<'a>>) -> Footing<'a> {
         let own = placement.map_or(self.given.faces.outward(i), |placement| self.given.own_normal(placement, i));
         let side = side_of(own, get(&self.found.geometric, i));
