@@ -181,16 +181,18 @@ impl Matter {
     pub(crate) fn new(surface: &Surface, base: Vec3, store: &TextureStore) -> Self {
         let reader = Reader { store, patch: surface.patch.as_ref(), known: &[] };
         let material = surface.target.material;
-        let mut matter = Self { outside: surface.is_outside(), ..Self::read(material, base, &reader) };
-        if let (Some(translucence), Model::MetalRough(core)) =
-            (material.metal_rough().and_then(|m| m.translucence.as_ref()), &mut matter.model)
-        {
-            core.thin(translucence, &reader);
+        let matter = Self { outside: surface.is_outside(), ..Self::read(material, base, &reader) };
+        let Some(m) = material.metal_rough() else { return matter };
+        let matter = matter.thinned(m, &reader);
+        if matter.outside && m.has_lobes() { matter.with_lobes(m, &surface.footing(), &reader) } else { matter }
+    }
+
+    /// The same where it scatters light to its other side, if the material does.
+    pub(crate) fn thinned(mut self, m: &MetalRough, reader: &Reader) -> Self {
+        if let (Some(translucence), Model::MetalRough(core)) = (&m.translucence, &mut self.model) {
+            core.thin(translucence, reader);
         }
-        match material.metal_rough() {
-            Some(m) if matter.outside && m.has_lobes() => matter.with_lobes(m, &surface.footing(), &reader),
-            _ => matter,
-        }
+        self
     }
 
     /// The same with grain, film, sheen and lacquer.
@@ -412,10 +414,16 @@ impl Matter {
     pub(crate) fn lit_through(&self, normal: Vec3, view: Vec3, light: &Incident, crossing: &Crossing) -> Vec3 {
         match &self.model {
             Model::Phong(m) => m.lit_through(normal, view, light.to_light, crossing) * light.strength(),
-            Model::MetalRough(m) if m.is_translucent() => {
-                m.lit_through(normal, view, light.to_light) * light.irradiance() * self.clear()
-            }
-            Model::MetalRough(_) | Model::Unlit(_) => Vec3::ZERO,
+            Model::MetalRough(_) => self.lit_through_lobes(normal, view, light.to_light, light.irradiance()),
+            Model::Unlit(_) => Vec3::ZERO,
+        }
+    }
+
+    /// The same of a metallic-rough surface on which so much light falls from there.
+    pub(crate) fn lit_through_lobes(&self, normal: Vec3, view: Vec3, to_light: Vec3, light: Vec3) -> Vec3 {
+        match &self.model {
+            Model::MetalRough(m) if m.is_translucent() => m.lit_through(normal, view, to_light) * light * self.clear(),
+            _ => Vec3::ZERO,
         }
     }
 

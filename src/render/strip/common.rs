@@ -50,8 +50,8 @@ pub(crate) struct Glass {
 }
 
 impl Common {
-    /// `None` for materials that scatter light through, for those that are nowhere there as a whole, and for what lets light in,
-    /// unless it is metallic-rough and rays go through it without being scattered inside.
+    /// `None` for materials that are nowhere there as a whole, and for what lets light in, unless it is metallic-rough and rays go
+    /// through it without being scattered on their way.
     pub(crate) fn of(
         (number, material): (u32, &Material),
         store: &TextureStore,
@@ -59,7 +59,7 @@ impl Common {
         gloss: Gloss,
     ) -> Option<Self> {
         let metal_rough = material.metal_rough();
-        if coverage(material, material.opacity) < 1.0 || metal_rough.is_some_and(|m| m.translucence.is_some()) {
+        if coverage(material, material.opacity) < 1.0 {
             return None;
         }
         let mut matter = Matter::without_maps(material, store);
@@ -67,7 +67,7 @@ impl Common {
         let lobes = metal_rough.and_then(Lobes::of);
         let spreads = bounces && gloss.spreads(material);
         if glass {
-            metal_rough.filter(|m| spreads && !scatters_inside(m))?;
+            metal_rough.filter(|m| spreads && !scatters_inside(m) && m.translucence.is_none())?;
         }
         if spreads {
             matter.spread_by_rays();
@@ -109,7 +109,11 @@ impl Lobes {
         let reads_maps = other_maps(m) > 0;
         let reads_mesh = m.grain.is_some() || m.coat.as_ref().is_some_and(|coat| coat.normal_map.is_some());
         let reads_reflectance = reads_reflectance(m);
-        (m.has_lobes() || reads_maps).then_some(Self { reads_mesh, reads_maps, reads_reflectance })
+        (m.has_lobes() || m.translucence.is_some() || reads_maps).then_some(Self {
+            reads_mesh,
+            reads_maps,
+            reads_reflectance,
+        })
     }
 }
 

@@ -310,30 +310,29 @@ fn highlights(found: &Found, lit: &Lit, points: usize, matter: impl Fn(usize) ->
     highlights
 }
 
-/// Keeps what a point reflects of the light that arrives.
+/// Keeps what a point shows of a light that arrives, if that counts; it may lie above the horizon or below.
 #[inline(always)]
-fn reflect_by(found: &Found, lit: &mut Lit, i: usize, radiance: Vec3) {
-    let (geometric, to_light) = (get(&found.geometric, i), get(&lit.to_light, i));
-    let (horizon, curved) = (get(&found.horizon, i), found.curved[i] == 1);
-    let above = horizon.dot(to_light) > 0.0;
-    let grazes = curved & (geometric.dot(to_light) < STEEP);
-    let seen = above & radiance.is_finite() & (radiance.max_element() > 0.0) & (found.certain[i] == 1);
+fn keep(found: &Found, lit: &mut Lit, i: usize, (radiance, counts): (Vec3, bool), above: bool) {
+    let grazes = above & (found.curved[i] == 1) & (get(&found.geometric, i).dot(get(&lit.to_light, i)) < STEEP);
+    let seen = counts & radiance.is_finite() & (radiance.max_element() > 0.0) & (found.certain[i] == 1);
     let how = if grazes { GRAZING } else { PLAIN };
     lit.seen[i] *= if seen { how } else { 0 };
     put(&mut lit.radiance, i, radiance);
 }
 
-/// What points with more lobes reflect of the light that arrives.
+/// What points with more lobes reflect of the light that arrives, and what they let through.
 fn reflect_with_lobes(found: &Found, lit: &mut Lit, whole: &[Matter]) {
     for (i, matter) in whole.iter().enumerate().take(POINTS) {
         let (horizon, normal, view) = (get(&found.horizon, i), get(&found.normal, i), get(&found.view, i));
-        let wanted = (lit.seen[i] != 0) & (found.certain[i] == 1);
-        let radiance = if wanted {
-            matter.lit_with_lobes(horizon, normal, view, get(&lit.to_light, i), get(&lit.light, i))
-        } else {
-            Vec3::ZERO
+        let (to_light, light) = (get(&lit.to_light, i), get(&lit.light, i));
+        let counts = (lit.seen[i] != 0) & (found.certain[i] == 1);
+        let above = horizon.dot(to_light) > 0.0;
+        let radiance = match (counts, above) {
+            (true, true) => matter.lit_with_lobes(horizon, normal, view, to_light, light),
+            (true, false) => matter.lit_through_lobes(normal, view, to_light, light),
+            (false, _) => Vec3::ZERO,
         };
-        reflect_by(found, lit, i, radiance);
+        keep(found, lit, i, (radiance, counts), above);
     }
     lit.seen[whole.len().min(POINTS)..].fill(0);
 }
@@ -342,10 +341,11 @@ fn reflect_with_lobes(found: &Found, lit: &mut Lit, whole: &[Matter]) {
 #[inline(always)]
 fn reflect(found: &Found, lit: &mut Lit, points: usize, share: impl Fn(usize, Vec3, Vec3, Vec3) -> Vec3) {
     for i in 0..points.min(POINTS) {
-        let (normal, to_light) = (get(&found.normal, i), get(&lit.to_light, i));
-        let smooth = terminator(get(&found.horizon, i), normal, to_light);
+        let (horizon, normal, to_light) = (get(&found.horizon, i), get(&found.normal, i), get(&lit.to_light, i));
+        let above = horizon.dot(to_light) > 0.0;
+        let smooth = terminator(horizon, normal, to_light);
         let radiance = share(i, normal, get(&found.view, i), to_light) * get(&lit.light, i) * smooth;
-        reflect_by(found, lit, i, radiance);
+        keep(found, lit, i, (radiance, above), above);
     }
 }
 

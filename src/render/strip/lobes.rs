@@ -1,5 +1,5 @@
-//! Points with more lobes than that of their facets, those of a grain, film, sheen or lacquer, or with maps of their
-//! reflectance: where they are and how they are seen is found side by side, what they are made of one by one.
+//! Points with more lobes than that of their facets, those of a grain, film, sheen or lacquer, with maps of their reflectance, or
+//! that scatter light to their other side: where they are and how they are seen is found side by side, what they are made of one by one.
 
 use super::columns::{POINTS, Strip, get};
 use super::common::Common;
@@ -58,6 +58,7 @@ impl Strip {
             known.iter_mut().zip(&*self.of_lobes).for_each(|(known, texels)| known.texel = texels[i]);
             let reader = Reader { store: context.textures, patch: patch.as_ref(), known: &known };
             let below = if lobes.reads_reflectance { bare.tinted(m, &reader) } else { bare };
+            let below = below.thinned(m, &reader);
             let mut matter =
                 if outside { below.with_lobes(m, &self.footing(i, placement, patch.as_ref()), &reader) } else { below };
             let scattered = traced.path(at).scattered;

@@ -38,7 +38,7 @@ type Texels = [[Vec4; LANES]; SLOTS];
 const GROUPS: usize = 2;
 
 /// Maps of lobes and of reflectance that a material may have.
-pub(super) const LOBE_MAPS: usize = 9;
+pub(super) const LOBE_MAPS: usize = 11;
 
 /// What maps of lobes and of reflectance say at every point.
 pub(super) type LobeTexels = [[Vec4; POINTS]; LOBE_MAPS];
@@ -237,7 +237,8 @@ fn lobe_maps(m: &MetalRough) -> impl Iterator<Item = (&TextureRef, ColorSpace)> 
     let film = m.film.iter().flat_map(move |film| numbers(film.maps()));
     let sheen = m.sheen.iter().flat_map(move |sheen| both(sheen.color_map.as_ref(), sheen.roughness_map.as_ref()));
     let coat = m.coat.iter().flat_map(move |coat| numbers([&coat.strength_map, &coat.roughness_map]));
-    let all = reflectance.into_iter().chain(grain).chain(film).chain(sheen).chain(coat);
+    let through = m.translucence.iter().flat_map(move |t| both(t.color_map.as_ref(), t.share_map.as_ref()));
+    let all = reflectance.into_iter().chain(through).chain(grain).chain(film).chain(sheen).chain(coat);
     all.filter_map(|(map, space)| Some((map?, space)))
 }
 

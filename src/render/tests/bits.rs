@@ -9,7 +9,7 @@ use crate::render::texture::TextureStore;
 use crate::render::{Sampling, Stochastic};
 use crate::scene::{
     AlphaMode, Bitmap, Coat, Environment, Film, Grain, MetalRough, Panorama, Pixels, Sampler, Sheen, Texture,
-    TextureRef, UvTransform, Wrap,
+    TextureRef, Translucence, UvTransform, Wrap,
 };
 use std::sync::Arc;
 
@@ -339,6 +339,10 @@ fn lobed(mut s: Stage, textures: u32) -> Stage {
             Box::new(Film { strength: 0.9, strength_map, ior: 1.4, thickness: [120.0, 480.0], thickness_map })
         });
         m.grain = has(3).then(|| Box::new(Grain { strength: 0.7, rotation: 0.3, map: map(i, 0).filter(|_| i != 3) }));
+        m.translucence = (m.transmission == 0.0 && i % 2 == 0).then(|| {
+            let (color, color_map) = (Vec3::new(0.9, 0.6, 0.3), map(i, 1));
+            Box::new(Translucence { share: 0.7, share_map: map(i, 2).filter(|_| i > 0), color, color_map })
+        });
         let pane = m.thick && m.transmission > 0.0;
         (m.specular, m.specular_map) = (0.7, map(i, 1).filter(|_| pane || i % 3 == 0));
         m.specular_color_map = map(i, 2).filter(|_| pane || i % 3 == 1);
