@@ -298,7 +298,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             strip.blur(traced, matter);
         }
         if shiny {
-            strip.bend(context, matter, smooth.then_some(placement));
+            strip.bend(context, common, smooth.then_some(placement));
         }
         if common.spreads {
             strip.retain(|ray| traced.path(ray).depth < context.depth);

@@ -2,6 +2,7 @@
 //! be, and what the surface mirrors.
 
 use super::columns::{Column, Columns, Found, Given, POINTS, Strip, get, leave, padded, put};
+use super::common::Common;
 use super::painted::Painted;
 use crate::accel::{Hit, NO_PRIM, Ray};
 use crate::math::Vec3;
@@ -82,16 +83,17 @@ impl Strip {
         self.level.run(Print { found, cones, points: padded(count) });
     }
 
-    /// Finds how far a surface of `matter` bends where cones meet it, and how wide highlights must be; `placement` where the
-    /// mesh has normals of its own.
-    pub(crate) fn bend(&mut self, context: &Context, matter: &Matter, placement: Option<&Placement>) {
+    /// Finds how far a surface bends where cones meet it, and how wide highlights must be, unless points have lobes that find
+    /// that themselves; `placement` where the mesh has normals of its own.
+    pub(crate) fn bend(&mut self, context: &Context, common: &Common, placement: Option<&Placement>) {
+        let matter = &common.matter;
         let Self { cones, painted, given, found, .. } = self;
         let (points, reach) = (padded(self.count), context.highlight_reach);
         match placement {
             Some(placement) => self.level.run(Bend { given, found, cones, points, placement }),
             None => cones.bend.fill(0.0),
         }
-        if !context.lights.is_empty() {
+        if !context.lights.is_empty() && common.lobes.is_none() {
             self.level.run(WidenHighlights { painted, cones, points, matter, reach });
         }
     }

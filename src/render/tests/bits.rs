@@ -120,16 +120,26 @@ fn plain() -> Stage {
     s
 }
 
+/// Renders with points shaded side by side where they can be, and checks that one by one they have the same bits.
+#[track_caller]
+fn same_one_by_one(s: &mut Stage, what: &str) -> Rendered {
+    let together = s.render();
+    s.settings.one_by_one = true;
+    let alone = s.render();
+    s.settings.one_by_one = false;
+    assert_eq!(together.counts, alone.counts, "{what}");
+    let differ = together.picture.beauty.iter().zip(&alone.picture.beauty).filter(|(a, b)| a != b).count();
+    assert_eq!(differ, 0, "pixels, {what}");
+    assert!(together.picture == alone.picture, "layers, {what}");
+    together
+}
+
 #[test]
 fn points_shaded_side_by_side_have_the_bits_of_points_shaded_one_by_one() {
     for environment in [Environment::Black, Environment::Constant(Vec3::splat(0.2)), Environment::Studio] {
         let mut s = plain();
         s.scene.environment = environment;
-        let together = s.render();
-        s.settings.one_by_one = true;
-        let alone = s.render();
-        assert_eq!(together.counts, alone.counts);
-        assert!(together.picture == alone.picture, "{environment:?}");
+        let together = same_one_by_one(&mut s, &format!("{environment:?}"));
         let seen = together.picture.beauty.iter().filter(|c| c[0] > 0.0).count();
         assert!(seen > 1500, "{seen}");
     }
@@ -199,11 +209,7 @@ fn mapped_points_shaded_side_by_side_have_the_bits_of_points_shaded_one_by_one()
             |m: &Material| Common::of((0, m), &store, depth > 0, Gloss::new(None)).is_some_and(|common| common.mapped);
         assert!(s.scene.materials.iter().all(beside), "nothing would be compared");
         (s.settings.depth, s.scene.environment) = (Some(depth), environment);
-        let together = s.render();
-        s.settings.one_by_one = true;
-        let alone = s.render();
-        assert_eq!(together.counts, alone.counts);
-        assert!(together.picture == alone.picture, "depth {depth}, {environment:?}");
+        same_one_by_one(&mut s, &format!("depth {depth}, {environment:?}"));
     }
 }
 
@@ -298,14 +304,8 @@ fn glass_shaded_side_by_side_has_the_bits_of_glass_shaded_one_by_one() {
             // From inside of a pane.
             s.view = View::look_at(DVec3::new(-1.8, 0.9, 1.8), DVec3::ZERO, DVec3::Y, Lens::perspective(1.2));
         }
-        let together = s.render();
-        s.settings.one_by_one = true;
-        let alone = s.render();
+        let together = same_one_by_one(&mut s, &format!("{environment:?}, {textures} textures"));
         assert!(together.counts.refracted.queries > 2000, "{:?}", together.counts.refracted);
-        assert_eq!(together.counts, alone.counts);
-        let differ = together.picture.beauty.iter().zip(&alone.picture.beauty).filter(|(a, b)| a != b).count();
-        assert_eq!(differ, 0, "pixels, {environment:?}, {textures} textures");
-        assert!(together.picture.layers == alone.picture.layers, "layers");
     }
 }
 
@@ -375,13 +375,7 @@ fn lobes_shaded_side_by_side_have_the_bits_of_lobes_shaded_one_by_one() {
             Common::of((0, m), &store, true, Gloss::new(None)).is_some_and(|common| common.lobes.is_some())
         };
         assert!(s.scene.materials.iter().filter(beside).count() >= 5, "nothing would be compared");
-        let together = s.render();
-        s.settings.one_by_one = true;
-        let alone = s.render();
-        assert_eq!(together.counts, alone.counts);
-        let differ = together.picture.beauty.iter().zip(&alone.picture.beauty).filter(|(a, b)| a != b).count();
-        assert_eq!(differ, 0, "pixels, {textures} textures, depth {depth}");
-        assert!(together.picture.layers == alone.picture.layers, "layers");
+        same_one_by_one(&mut s, &format!("{textures} textures, depth {depth}"));
     }
 }
 
@@ -395,14 +389,8 @@ fn rough_surfaces_that_spread_rays_have_the_same_bits_side_by_side() {
         let beside =
             |m: &&Material| Common::of((0, m), &store, true, Gloss::new(Some(2))).is_some_and(|common| common.spreads);
         assert!(s.scene.materials.iter().filter(beside).count() >= 5, "nothing would be compared");
-        let together = s.render();
-        s.settings.one_by_one = true;
-        let alone = s.render();
+        let together = same_one_by_one(&mut s, &format!("{textures} textures, depth {depth}"));
         assert!(together.counts.reflected.queries > 2000, "{:?}", together.counts.reflected);
-        assert_eq!(together.counts, alone.counts);
-        let differ = together.picture.beauty.iter().zip(&alone.picture.beauty).filter(|(a, b)| a != b).count();
-        assert_eq!(differ, 0, "pixels, {textures} textures, depth {depth}");
-        assert!(together.picture.layers == alone.picture.layers, "layers");
     }
 }
 
@@ -436,13 +424,7 @@ fn points_that_look_around_by_rays_have_the_same_bits_side_by_side() {
     {
         let mut s = glazed(painted(), 3);
         (s.scene.environment, s.scene.panorama, s.settings.env_rays) = (environment, Some(panorama.clone()), rays);
-        let together = s.render();
-        s.settings.one_by_one = true;
-        let alone = s.render();
-        assert_eq!(together.counts, alone.counts);
-        let differ = together.picture.beauty.iter().zip(&alone.picture.beauty).filter(|(a, b)| a != b).count();
-        assert_eq!(differ, 0, "pixels, {environment:?}, {rays:?} rays");
-        assert!(together.picture.layers == alone.picture.layers, "layers");
+        same_one_by_one(&mut s, &format!("{environment:?}, {rays:?} rays"));
     }
 }
 
@@ -463,13 +445,7 @@ fn wide_lights_light_points_side_by_side_as_they_light_them_one_by_one() {
         s.lamp(DVec3::new(-2.0, 3.0, 2.0), 0.2);
         s.scene.lights.last_mut().into_iter().for_each(|light| light.shadows = false);
         (s.settings.sampling, s.settings.light_rays) = (sampling, light_rays);
-        let together = s.render();
-        s.settings.one_by_one = true;
-        let alone = s.render();
-        assert_eq!(together.counts, alone.counts, "{sampling:?}");
-        let differ = together.picture.beauty.iter().zip(&alone.picture.beauty).filter(|(a, b)| a != b).count();
-        assert_eq!(differ, 0, "pixels, {sampling:?}, {light_rays} rays");
-        assert!(together.picture.layers == alone.picture.layers, "layers");
+        let together = same_one_by_one(&mut s, &format!("{sampling:?}, {light_rays} rays"));
         assert!(together.counts.shadow.queries > 2 * together.counts.primary.queries, "{:?}", together.counts);
     }
 }
