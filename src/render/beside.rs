@@ -12,7 +12,7 @@ use super::eyes::Eyes;
 use super::observer::Observer;
 use super::seam::{is_same_crossing, is_same_surface};
 use super::shade::{LocalLight, Matter};
-use super::strip::{Common, POINTS, Sorted, Strip, StripPoint};
+use super::strip::{Common, POINTS, Passed, Sorted, Strip, StripPoint};
 use super::surface::{Surface, Target};
 use super::wave::{Path, RayClass, Wave};
 use super::whitted::Tracer;
@@ -303,8 +303,12 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         if common.spreads {
             strip.retain(|ray| traced.path(ray).depth < context.depth);
         }
-        for index in strip.left_out(common.one_sided) {
+        for index in strip.left_out() {
             self.shade_one(traced, index as usize);
+        }
+        strip.thin_out((common, reads), |at, passed| self.pass(traced, at, passed));
+        if strip.is_empty() {
+            return;
         }
         self.note_strip(traced, (instance, matter), strip);
         strip.complete(context, traced, (mesh, placement), common);
@@ -321,6 +325,18 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             let (roulette, streams) = (self.roulette, &self.streams);
             let goes_on = |sample, path: &mut _| roulette.spin(streams, sample, path);
             strip.mirror(context, matter, traced, (goes_on, &mut self.starting[RayClass::Reflected as usize]));
+        }
+    }
+
+    /// Sends the ray at this place of what was traced on behind what it has hit.
+    fn pass(&mut self, traced: Traced, at: usize, passed: Passed) {
+        let (context, class) = (self.context, traced.class());
+        let (ray, hit, path) = (&traced.rays()[at], &traced.hits()[at], traced.path(at));
+        let absorbs = context.absorption.is_some();
+        let path = if absorbs { context.absorption.lessened(ray, &path, hit) } else { path };
+        match passed {
+            Passed::Back => self.continuing[class as usize].push(*ray, path, *hit),
+            Passed::Covered(covered) => self.go_on(class, ray, &path, hit, covered),
         }
     }
 

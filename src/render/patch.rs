@@ -133,6 +133,24 @@ pub(crate) fn mixed_color([a, b, c]: [Vec4; 3], [_, second, third]: [f32; 3]) ->
     a + (b - a) * second + (c - a) * third
 }
 
+/// The colour of vertices at a point of a triangle with these corners, linear RGBA; white when the mesh has none.
+pub(super) fn color_at(mesh: &Mesh, corners: [u32; 3], weights: [f32; 3]) -> Vec4 {
+    let [a, b, c] = corners.map(|i| mesh.colors.get(i as usize).copied());
+    a.zip(b).zip(c).map_or(Vec4::ONE, |((a, b), c)| mixed_color([a, b, c], weights))
+}
+
+/// The coordinates of a map there, and those of the corners but for the offset; `None` when the mesh has none.
+pub(super) fn coordinates_at(
+    mesh: &Mesh,
+    corners: [u32; 3],
+    weights: [f32; 3],
+    map: &TextureRef,
+) -> Option<(Vec2, [Vec2; 3])> {
+    let (set, turn) = (mesh.uvs.get(map.uv_set as usize)?, Turn::new(&map.transform));
+    let [a, b, c] = corners.map(|i| set.get(i as usize).map_or(Vec2::ZERO, |&uv| turn.apply(uv)));
+    Some((a * weights[0] + b * weights[1] + c * weights[2] + map.transform.offset, [a, b, c]))
+}
+
 impl Patch<'_> {
     /// Moves it to another point of its triangle.
     pub(super) fn move_to(&mut self, weights: [f32; 3], print: Footprint) {
@@ -151,9 +169,7 @@ impl Patch<'_> {
 
     /// Vertex colour, linear RGBA; white when the mesh has none.
     pub(crate) fn color(&self) -> Vec4 {
-        let color = |i: u32| self.mesh.colors.get(i as usize).copied();
-        let [a, b, c] = self.corners.map(color);
-        a.zip(b).zip(c).map_or(Vec4::ONE, |((a, b), c)| mixed_color([a, b, c], self.weights))
+        color_at(self.mesh, self.corners, self.weights)
     }
 
     /// The texture at this point, linear RGBA.
@@ -190,16 +206,11 @@ impl Patch<'_> {
     }
 
     fn find_coordinates(&self, map: &TextureRef) -> Coordinates {
-        let Some(set) = self.mesh.uvs.get(map.uv_set as usize) else {
+        let Some((uv, [a, b, c])) = coordinates_at(self.mesh, self.corners, self.weights, map) else {
             return Coordinates { uv: Vec2::ZERO, along: Vec2::ZERO, across: Vec2::ZERO, edges: [Vec2::ZERO; 2] };
         };
-        let turn = Turn::new(&map.transform);
-        let [a, b, c] = self.corners;
-        let corner = |i: u32| set.get(i as usize).map_or(Vec2::ZERO, |&uv| turn.apply(uv));
-        let (a, b, c) = (corner(a), corner(b), corner(c));
         let edges = [b - a, c - a];
         let [along, across] = Gradients::new(self.vertices).of_coordinates(edges, &self.print);
-        let uv = a * self.weights[0] + b * self.weights[1] + c * self.weights[2] + map.transform.offset;
         Coordinates { uv, along, across, edges }
     }
 

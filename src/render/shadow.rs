@@ -2,12 +2,12 @@
 
 use super::absorption::Absorption;
 use super::asking::Asking;
-use super::context::Context;
+use super::context::{Context, coverage};
 use super::curve::Feelers;
 use super::observer::Observer;
 use super::optics::transmittance;
 use super::seam::is_same_crossing;
-use super::shade::{Reader, has_inside, shadow_filter};
+use super::shade::{Reader, has_inside, lets_light_through, shadow_filter};
 use super::surface::{Surface, Target};
 use super::tail::Tail;
 use super::wave::{Media, Medium};
@@ -106,9 +106,7 @@ impl Shadows {
         probe: &mut P,
         mut arrive: impl FnMut(u32, Vec3),
     ) {
-        self.blocked.clear();
-        self.blocked.resize(self.rays.len(), false);
-        asking.occluded(&self.rays, &mut self.blocked, probe);
+        self.ask_what_is_opaque(context, asking, probe);
         self.climb(asking, probe);
         if !context.has_filters {
             let open = self.light.iter().zip(&self.blocked).filter(|(_, blocked)| !**blocked);
@@ -116,7 +114,7 @@ impl Shadows {
             return self.clear();
         }
 
-        // What is left meets nothing opaque: walk through everything else on the way, one surface of each ray a time.
+        // Walk through what is on the way of those that are left, one surface of each ray a time.
         let blocked = std::mem::take(&mut self.blocked);
         self.keep(|i, _, _, _| !blocked[i]);
         self.blocked = blocked;
@@ -131,6 +129,28 @@ impl Shadows {
             asking.next(&self.rays, &self.after, &mut self.hits, probe);
         }
         self.clear();
+    }
+
+    /// Finds which rays are blocked by what is opaque. Where all but that stands in the way of most, only the first are asked: what
+    /// blocks the others is met when they walk.
+    fn ask_what_is_opaque<A: Accel, P: Observer>(
+        &mut self,
+        context: &Context,
+        asking: &mut Asking<A>,
+        probe: &mut P,
+    ) {
+        /// So many rays tell of the others.
+        const FIRST: usize = 64;
+        /// Of so many that are asked one must be blocked: asking takes about as long as a step of the walk.
+        const OF: usize = 4;
+        self.blocked.clear();
+        self.blocked.resize(self.rays.len(), false);
+        let first = if context.has_filters { self.rays.len().min(FIRST) } else { self.rays.len() };
+        let ((rays, others), (blocked, of_others)) = (self.rays.split_at(first), self.blocked.split_at_mut(first));
+        asking.occluded(rays, blocked, probe);
+        if OF * blocked.iter().filter(|&&blocked| blocked).count() >= first {
+            asking.occluded(others, of_others, probe);
+        }
     }
 
     /// Blocks the rays whose starts are cut off from their surfaces.
@@ -194,6 +214,14 @@ impl Shadows {
 /// What the surface at `hit` lets through. Maps are read at full sharpness: the shadow's own distance is unknown here.
 fn filter_at(context: &Context, ray: &Ray, hit: &Hit, inside: Option<&mut Inside>) -> Vec3 {
     let target = Target::new(context.scene, context.world, hit.prim);
+    if target.material.is_opaque() && !context.everything {
+        return Vec3::ZERO;
+    }
+    if !lets_light_through(target.material)
+        && let Some(opacity) = target.opacity(hit, context.textures)
+    {
+        return Vec3::splat(1.0 - coverage(target.material, if opacity.is_finite() { opacity } else { 1.0 }));
+    }
     let patch = target.patch(context.world, hit.u, hit.v, ray.origin + ray.dir * hit.t);
     let reader = Reader { store: context.textures, patch: patch.as_ref(), known: &[] };
     let filter = shadow_filter(target.material, &reader);

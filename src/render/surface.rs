@@ -6,13 +6,13 @@
 use super::branch::Ground;
 use super::context::Context;
 use super::footing::Footing;
-use super::patch::{Footprint, Gradients, Patch};
+use super::patch::{Footprint, Gradients, Patch, color_at, coordinates_at};
 use super::shade::{Seen, has_inside};
 use super::texture::TextureStore;
 use super::world::{Placement, PrimSource, World};
 use crate::accel::refine::Refined;
 use crate::accel::{Hit, NO_PRIM, Ray};
-use crate::math::Vec3;
+use crate::math::{Vec2, Vec3};
 use crate::math::bounds::offset_origin;
 use crate::scene::{Material, Mesh, Scene, TextureRef};
 use std::cell::Cell;
@@ -70,6 +70,19 @@ impl<'a> Target<'a> {
         let vertices = self.vertices(world, corners, mesh);
         let print = Footprint::default();
         Some(Patch { mesh, placement, corners, weights, vertices, print, last: Cell::new(None), read: Cell::new(None) })
+    }
+
+    /// The opacity where a ray has hit a triangle, of maps as sharp as they are; `None` on other shapes.
+    pub(crate) fn opacity(&self, hit: &Hit, store: &TextureStore) -> Option<f32> {
+        let PrimSource::Triangle { triangle, .. } = self.source else { return None };
+        let (mesh, _) = self.mesh?;
+        let (corners, weights) = (mesh.triangles[triangle as usize], [1.0 - hit.u - hit.v, hit.u, hit.v]);
+        let at = |map: &TextureRef| coordinates_at(mesh, corners, weights, map).map_or(Vec2::ZERO, |(uv, _)| uv);
+        let of_map = |map: &TextureRef| store.channel::<0>(map.texture, at(map));
+        let alpha = |map: &TextureRef| store.channel::<3>(map.texture, at(map));
+        let material = self.material;
+        let opacity = material.opacity * material.opacity_map.as_ref().map_or(1.0, of_map);
+        Some(opacity * material.base_color_map.as_ref().map_or(1.0, alpha) * color_at(mesh, corners, weights).w)
     }
 
     /// World positions (centred frame) of mesh vertices.

@@ -319,7 +319,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     }
 
     /// Goes on behind a surface that covers only a part.
-    fn go_on(&mut self, class: RayClass, ray: &Ray, path: &Path, hit: &Hit, covered: f32) {
+    pub(super) fn go_on(&mut self, class: RayClass, ray: &Ray, path: &Path, hit: &Hit, covered: f32) {
         let weight = path.weight * (1.0 - covered);
         let class = if covered > 0.0 { RayClass::Refracted } else { class };
         if self.context.is_alive(weight, path.part) {

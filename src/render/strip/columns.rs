@@ -191,11 +191,8 @@ impl Strip {
         self.certain().all(|i| self.found.front[i] == 0)
     }
 
-    /// The rays whose points must be shaded one by one, from now on left out here.
-    pub(crate) fn left_out(&mut self, one_sided: bool) -> impl Iterator<Item = u32> {
-        let Found { certain, front, .. } = &mut self.found;
-        let either = u32::from(!one_sided);
-        certain.iter_mut().zip(front).for_each(|(certain, front)| *certain &= *front | either);
+    /// The rays whose points must be shaded one by one: those that are not certain.
+    pub(crate) fn left_out(&self) -> impl Iterator<Item = u32> {
         let certain = &self.found.certain[..self.count.min(POINTS)];
         // Hardly ever any.
         let all = certain.iter().fold(1, |all, one| all & one) == 1;

@@ -14,6 +14,8 @@ pub(crate) struct Common {
     pub matter: Matter,
     /// Whether backs of faces are passed.
     pub one_sided: bool,
+    /// How much is seen of it where neither maps nor vertices say.
+    pub covered: f32,
     /// Whether maps change it from point to point.
     pub mapped: bool,
     /// Those maps and the colours of vertices, where they can be read side by side.
@@ -50,8 +52,7 @@ pub(crate) struct Glass {
 }
 
 impl Common {
-    /// `None` for materials that are nowhere there as a whole, and for what lets light in, unless it is metallic-rough and rays go
-    /// through it without being scattered on their way.
+    /// `None` for what lets light in, unless it is metallic-rough and rays go through it without being scattered on their way.
     pub(crate) fn of(
         (number, material): (u32, &Material),
         store: &TextureStore,
@@ -59,9 +60,6 @@ impl Common {
         gloss: Gloss,
     ) -> Option<Self> {
         let metal_rough = material.metal_rough();
-        if coverage(material, material.opacity) < 1.0 {
-            return None;
-        }
         let mut matter = Matter::without_maps(material, store);
         let glass = material.surface.transmits();
         let lobes = metal_rough.and_then(Lobes::of);
@@ -83,6 +81,7 @@ impl Common {
             material: number,
             shiny: glass || lobes.is_some() || smooth || matter.has_narrow_highlight() || bounces && mirrors,
             one_sided: !material.double_sided && !glass,
+            covered: coverage(material, material.opacity),
             mapped: material.textures().next().is_some(),
             sheet: Sheet::of(material, store),
             glass: glass.then(|| Glass::of(material, &matter)),

@@ -43,7 +43,7 @@ struct Mirrored {
 }
 
 /// The weights of eye rays.
-const ONES: Columns = [[1.0; POINTS]; 3];
+pub(super) const ONES: Columns = [[1.0; POINTS]; 3];
 
 impl Default for Cones {
     fn default() -> Self {

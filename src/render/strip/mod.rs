@@ -8,8 +8,7 @@
 //! by rays to the surroundings, are found point by point, from the numbers in the columns (`lobes`, `ground`).
 //!
 //! What a column cannot do is left to the tracer: hits near the edge of a face, those whose distance needs more than
-//! `f64`, backs of one-sided faces, points whose mesh gives no tangent, glass from which no ray goes on, and what is not
-//! there as a whole.
+//! `f64`, points whose mesh gives no tangent, and glass from which no ray goes on.
 
 mod around;
 mod columns;
@@ -22,9 +21,11 @@ mod lobes;
 mod painted;
 mod sheet;
 mod sorted;
+mod through;
 mod wide;
 
 pub(crate) use columns::{POINTS, Strip};
 pub(crate) use common::Common;
 pub(crate) use ground::StripPoint;
 pub(crate) use sorted::Sorted;
+pub(crate) use through::Passed;

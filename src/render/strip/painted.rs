@@ -23,6 +23,8 @@ use crate::scene::{Material, Mesh};
 pub(super) struct Painted {
     /// Whether they do; else nothing here counts.
     pub any: bool,
+    /// How much of each point is seen, where maps or vertices were read.
+    pub(super) covered: Column,
     base: Columns,
     emission: Columns,
     metallic: Column,
@@ -41,6 +43,7 @@ impl Default for Painted {
         let (one, three) = ([0.0; POINTS], [[0.0; POINTS]; 3]);
         Self {
             any: false,
+            covered: one,
             base: three,
             emission: three,
             metallic: one,
@@ -173,8 +176,7 @@ impl Strip {
         }
     }
 
-    /// Reads what maps and vertices say at the points of a mesh that an instance has placed so, and leaves out those that are
-    /// not there as a whole.
+    /// Reads what maps and vertices say at the points of a mesh that an instance has placed so.
     pub(crate) fn read(
         &mut self,
         context: &Context,
@@ -211,8 +213,8 @@ impl Strip {
     fn read_at(&mut self, i: usize, context: &Context, material: &Material, patch: &Patch, widens: bool) {
         let reader = Reader { store: context.textures, patch: Some(patch), known: &[] };
         let base = reader.base(material);
-        if coverage(material, base.w) < 1.0 {
-            self.found.certain[i] = 0;
+        self.painted.covered[i] = coverage(material, base.w);
+        if self.painted.covered[i] <= 0.0 {
             return;
         }
         self.painted.put(i, &Matter::read(material, base.truncate(), &reader));

@@ -263,7 +263,7 @@ impl Strip {
         let store = context.textures;
         let reach = context.highlight_reach;
         let turns = sheet.normal_map.as_ref().filter(|_| widens).map(|map| (map, reach));
-        let (certain, front) = (&mut found.certain, &found.front);
+        let front = &found.front;
         // Lobes lie on the outside; how much is reflected counts on both sides.
         let outside_alone = has_inside(material) && !material.metal_rough().is_some_and(reads_reflectance);
         level.run(Read {
@@ -271,7 +271,6 @@ impl Strip {
             material,
             store,
             given,
-            certain,
             front,
             outside_alone,
             cones,
@@ -296,7 +295,6 @@ struct Read<'a> {
     material: &'a Material,
     store: &'a TextureStore<'a>,
     given: &'a Given,
-    certain: &'a mut [u32; POINTS],
     front: &'a [u32; POINTS],
     /// Whether maps of lobes count only where fronts are seen.
     outside_alone: bool,
@@ -320,7 +318,6 @@ impl Kernel for Read<'_> {
             material,
             store,
             given,
-            certain,
             front,
             outside_alone,
             cones,
@@ -348,8 +345,7 @@ impl Kernel for Read<'_> {
             for i in start..start + points {
                 let vertex =
                     if colored { mixed_color(given.faces.colors(i), given.corner_weights(i)) } else { Vec4::ONE };
-                let whole = paint(painted, i, (material, vertex), |slot| texels[slot as usize][i - start]);
-                certain[i] &= u32::from(whole);
+                paint(painted, i, (material, vertex), |slot| texels[slot as usize][i - start]);
             }
             if let Some(((texture, layout), reach)) = turns {
                 let mut narrow = [false; LANES];
@@ -384,11 +380,12 @@ fn spread(
     }
 }
 
-/// What maps and the colour of vertices make of a material at a point; tells whether it is there as a whole.
+/// What maps and the colour of vertices make of a material at a point.
 #[inline(always)]
-fn paint(painted: &mut Painted, i: usize, (material, vertex): (&Material, Vec4), texel: impl Fn(Slot) -> Vec4) -> bool {
+fn paint(painted: &mut Painted, i: usize, (material, vertex): (&Material, Vec4), texel: impl Fn(Slot) -> Vec4) {
     let base = base_color(material, texel(Slot::Base), texel(Slot::Opacity).x, vertex);
-    let (base, whole) = (base.truncate(), coverage(material, base.w) >= 1.0);
+    painted.covered[i] = coverage(material, base.w);
+    let base = base.truncate();
     painted.put_emission(i, material.emission * texel(Slot::Emission).truncate());
     painted.put_normal_texel(i, texel(Slot::Normal).truncate());
     match &material.surface {
@@ -405,7 +402,6 @@ fn paint(painted: &mut Painted, i: usize, (material, vertex): (&Material, Vec4),
             );
         }
     }
-    whole
 }
 
 /// Turns normals by the texels of a normal map.

@@ -104,8 +104,20 @@ fn table8(space: ColorSpace) -> &'static [f32; 256] {
 #[inline(always)]
 pub(super) fn decode8([r, g, b, a]: [u8; 4], colors: &[f32; 256]) -> Vec4 {
     let color = |c: u8| colors[usize::from(c)];
-    // What a table of these holds, too: the quotient in `f64` is never so near the middle of two `f32` that it matters.
-    Vec4::new(color(r), color(g), color(b), f32::from(a) / 255.0)
+    Vec4::new(color(r), color(g), color(b), unit8(a))
+}
+
+/// A stored number that is no colour: what a table of these would hold, since the quotient in `f64` is never so near the middle of
+/// two `f32` that it matters.
+#[inline(always)]
+pub(super) fn unit8(code: u8) -> f32 {
+    f32::from(code) / 255.0
+}
+
+/// The same of more bits.
+#[inline(always)]
+pub(super) fn unit16(code: u16) -> f32 {
+    f32::from(code) / 65535.0
 }
 
 /// The same of a texel without alpha.
@@ -117,12 +129,11 @@ pub(super) fn solid8([r, g, b]: [u8; 3], colors: &[f32; 256]) -> Vec4 {
 
 #[inline]
 fn decode16([r, g, b, a]: [u16; 4], space: ColorSpace) -> Vec4 {
-    let unit = |c: u16| f32::from(c) / 65535.0;
     match space {
-        ColorSpace::Linear => Vec4::new(unit(r), unit(g), unit(b), unit(a)),
+        ColorSpace::Linear => Vec4::new(unit16(r), unit16(g), unit16(b), unit16(a)),
         ColorSpace::Srgb | ColorSpace::SrgbCutOut => {
             let color = |c: u16| SRGB16[usize::from(c)];
-            Vec4::new(color(r), color(g), color(b), unit(a))
+            Vec4::new(color(r), color(g), color(b), unit16(a))
         }
     }
 }

@@ -17,6 +17,7 @@ use crate::math::{Vec2, Vec4};
 use crate::scene::{Bitmap, Filter, Mipmaps, Pixels, Sampler, Scene, Texture, Wrap};
 use decode::Texels;
 use pyramid::{Plane, Pyramid, Stored};
+use std::ops::{Add, Mul, Sub};
 
 /// What the numbers of a bitmap mean; the slot that reads it decides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,6 +103,13 @@ impl<'a> TextureStore<'a> {
         source.lookup(space, sampler).filtered(uv, duvdx, duvdy)
     }
 
+    /// Number `CHANNEL` of the linear RGBA of `texture` at `uv`, as sharp as it is: that of [`Self::sample`] with a footprint of
+    /// zero.
+    pub(super) fn channel<const CHANNEL: usize>(&self, texture: u32, uv: Vec2) -> f32 {
+        let Some((sampler, source)) = self.find(texture) else { return 1.0 };
+        source.lookup(ColorSpace::Linear, sampler).channel::<CHANNEL>(uv)
+    }
+
     /// How much linear texels change from `uv` to `reach` times each of two ways, which span a footprint as in [`Self::sample`]:
     /// between single texels, of the level that suits the footprint, that lie at least one apart.
     pub(super) fn changes(&self, texture: u32, uv: Vec2, ways: [Vec2; 2], reach: f32) -> [Vec4; 2] {
@@ -178,6 +186,16 @@ impl<'a> Lookup<'a> {
         self.read(plan, &Probes { uv, axis, count })
     }
 
+    fn channel<const CHANNEL: usize>(&self, uv: Vec2) -> f32 {
+        let tap = || self.tap(size_of(self.bitmap), uv, self.sampler.magnify);
+        match &self.bitmap.pixels {
+            Pixels::Rgb8(_) if CHANNEL == 3 => 1.0,
+            Pixels::Rgb8(texels) => tap().read(|i| decode::unit8(texels[3 * i + CHANNEL])),
+            Pixels::Rgba8(texels) => tap().read(|i| decode::unit8(texels[i][CHANNEL])),
+            Pixels::Rgba16(texels) => tap().read(|i| decode::unit16(texels[i][CHANNEL])),
+        }
+    }
+
     fn changes(&self, uv: Vec2, ways: [Vec2; 2], reach: f32) -> [Vec4; 2] {
         let texels = pixels(size_of(self.bitmap));
         let widest = (ways[0] * texels).length().max((ways[1] * texels).length());
@@ -250,25 +268,25 @@ impl<'a> Lookup<'a> {
     #[inline(always)]
     fn mean(&self, plane: &Plane, probes: &Probes, filter: Filter, texel: impl Fn(usize) -> Vec4) -> Vec4 {
         if probes.count <= 1.0 {
-            return self.tap(plane, probes.uv, filter).read(&texel);
+            return self.tap((plane.width, plane.height), probes.uv, filter).read(&texel);
         }
         // First where all of them lie, then what they say: so none waits for another.
         let (mut taps, mut count, mut k) = ([Tap::default(); PROBES], 0, 0.5);
         while k < probes.count {
             let uv = probes.uv + probes.axis * (k / probes.count - 0.5);
-            taps[count % PROBES] = self.tap(plane, uv, filter);
+            taps[count % PROBES] = self.tap((plane.width, plane.height), uv, filter);
             (count, k) = (count + 1, k + 1.0);
         }
         let taps = taps.iter().take(count);
         taps.fold(Vec4::ZERO, |sum, tap| sum + tap.read(&texel)) / probes.count
     }
 
-    /// What a probe reads.
+    /// What a probe reads of so many columns and rows.
     #[inline(always)]
-    fn tap(&self, plane: &Plane, uv: Vec2, filter: Filter) -> Tap {
-        let x = Axis::new(uv.x, plane.width, self.sampler.wrap_u, filter);
-        let y = Axis::new(uv.y, plane.height, self.sampler.wrap_v, filter);
-        let (near, far) = (y.near * plane.width, y.far * plane.width);
+    fn tap(&self, (width, height): (usize, usize), uv: Vec2, filter: Filter) -> Tap {
+        let x = Axis::new(uv.x, width, self.sampler.wrap_u, filter);
+        let y = Axis::new(uv.y, height, self.sampler.wrap_v, filter);
+        let (near, far) = (y.near * width, y.far * width);
         let corners = [near + x.near, near + x.far, far + x.near, far + x.far];
         Tap { corners, x: x.share, y: y.share, mixed: filter == Filter::Linear }
     }
@@ -286,7 +304,7 @@ struct Tap {
 
 impl Tap {
     #[inline(always)]
-    fn read(&self, texel: impl Fn(usize) -> Vec4) -> Vec4 {
+    fn read<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f32, Output = T>>(&self, texel: impl Fn(usize) -> T) -> T {
         let [a, b, c, d] = self.corners;
         if !self.mixed {
             return texel(a);
