@@ -183,8 +183,9 @@ pub trait Accel: Sync {
         self.closest(rays, hits, scratch, probe);
     }
 
-    /// Whether anything *opaque* lies in `t_min..=t_max` of each ray: prims with a bit in [`Shapes::opaque`]. In a scene, alpha
-    /// masks, blended and transmissive materials are never opaque; whether anything at all lies there says [`Self::closest`].
+    /// Whether anything *opaque* lies in `t_min..=t_max` of each ray: prims with a bit in [`Shapes::opaque`]. In a scene, faces of
+    /// masked and blended materials are opaque only where their maps have no holes, those of transmissive ones never; whether
+    /// anything at all lies there says [`Self::closest`].
     fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut Self::Scratch, probe: &mut P);
 
     /// The first hit of each ray in `t_min..=t_max` that comes after `after` in the order (t, prim). All hits are found one

@@ -148,7 +148,7 @@ impl<'a> Context<'a> {
             lights,
             common: (0..).zip(&scene.materials).map(common).collect(),
             bands: if needs(&[Feature::Dispersion]) { bands() } else { Vec::new() },
-            has_filters: needs(&[Feature::Mask, Feature::Blend, Feature::ThinTransmission, Feature::Refraction]),
+            has_filters: everything || !world.is_opaque(),
             absorption: Absorption::of(&scene.materials, everything),
             shows_environment: scene.background == Some(Background::Environment),
             lets_background_through: features.has(Feature::ThinTransmission) || features.has(Feature::Refraction),

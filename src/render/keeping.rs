@@ -63,18 +63,18 @@ pub(super) struct Keeping {
 
 impl Keeping {
     /// Chooses, and finds where instances stand; those that stand in no ordinary way are flattened all the same.
-    /// `opaque` tells of each material whether it stops light, `to_frame` moves an instance into the scene's frame.
+    /// `opaque` tells of each mesh whether it stops light, `to_frame` moves an instance into the scene's frame.
     pub(super) fn of(
         scene: &Scene,
         how: Instancing,
-        opaque: &[bool],
+        opaque: impl Fn(usize) -> bool,
         to_frame: impl Fn(&DAffine3) -> DAffine3 + Sync,
     ) -> Self {
         let mut kept = Kept::default();
         let mut objects: Vec<Option<u32>> = vec![None; scene.meshes.len()];
         for i in chosen(scene, how) {
             let mesh = &scene.meshes[i];
-            objects[i] = Some(kept.add(Object::new(&mesh.positions, &mesh.triangles, opaque[mesh.material as usize])));
+            objects[i] = Some(kept.add(Object::new(&mesh.positions, &mesh.triangles, opaque(i))));
         }
         if kept.objects().is_empty() {
             return Self { kept, places: vec![None; scene.instances.len()] };

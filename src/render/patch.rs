@@ -92,13 +92,16 @@ pub(crate) struct Patch<'a> {
 }
 
 /// The two axes, world space, of the ellipse in which a ray's cone meets a surface; one pixel each.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Footprint {
     pub(super) along: Vec3,
     pub(super) across: Vec3,
 }
 
 impl Footprint {
+    /// That of a ray without width.
+    pub(crate) const NONE: Self = Self { along: Vec3::ZERO, across: Vec3::ZERO };
+
     /// Cone of diameter `width` along the unit vector `dir` on a surface with unit normal `normal`.
     ///
     /// After T. Akenine-Möller et al., "Improved Shader and Texture Level of Detail Using Ray Cones" (2021).
@@ -210,7 +213,10 @@ impl Patch<'_> {
             return Coordinates { uv: Vec2::ZERO, along: Vec2::ZERO, across: Vec2::ZERO, edges: [Vec2::ZERO; 2] };
         };
         let edges = [b - a, c - a];
-        let [along, across] = Gradients::new(self.vertices).of_coordinates(edges, &self.print);
+        let [along, across] = match self.print {
+            Footprint::NONE => [Vec2::ZERO; 2],
+            print => Gradients::new(self.vertices).of_coordinates(edges, &print),
+        };
         Coordinates { uv, along, across, edges }
     }
 

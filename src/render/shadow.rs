@@ -106,7 +106,12 @@ impl Shadows {
         probe: &mut P,
         mut arrive: impl FnMut(u32, Vec3),
     ) {
-        self.ask_what_is_opaque(context, asking, probe);
+        self.blocked.clear();
+        self.blocked.resize(self.rays.len(), false);
+        // Where hardly anything is opaque, what is will be met on the way.
+        if !context.world.is_mostly_open() {
+            asking.occluded(&self.rays, &mut self.blocked, probe);
+        }
         self.climb(asking, probe);
         if !context.has_filters {
             let open = self.light.iter().zip(&self.blocked).filter(|(_, blocked)| !**blocked);
@@ -129,28 +134,6 @@ impl Shadows {
             asking.next(&self.rays, &self.after, &mut self.hits, probe);
         }
         self.clear();
-    }
-
-    /// Finds which rays are blocked by what is opaque. Where all but that stands in the way of most, only the first are asked: what
-    /// blocks the others is met when they walk.
-    fn ask_what_is_opaque<A: Accel, P: Observer>(
-        &mut self,
-        context: &Context,
-        asking: &mut Asking<A>,
-        probe: &mut P,
-    ) {
-        /// So many rays tell of the others.
-        const FIRST: usize = 64;
-        /// Of so many that are asked one must be blocked: asking takes about as long as a step of the walk.
-        const OF: usize = 4;
-        self.blocked.clear();
-        self.blocked.resize(self.rays.len(), false);
-        let first = if context.has_filters { self.rays.len().min(FIRST) } else { self.rays.len() };
-        let ((rays, others), (blocked, of_others)) = (self.rays.split_at(first), self.blocked.split_at_mut(first));
-        asking.occluded(rays, blocked, probe);
-        if OF * blocked.iter().filter(|&&blocked| blocked).count() >= first {
-            asking.occluded(others, of_others, probe);
-        }
     }
 
     /// Blocks the rays whose starts are cut off from their surfaces.

@@ -12,8 +12,8 @@ use super::texture::TextureStore;
 use super::world::{Placement, PrimSource, World};
 use crate::accel::refine::Refined;
 use crate::accel::{Hit, NO_PRIM, Ray};
-use crate::math::{Vec2, Vec3};
 use crate::math::bounds::offset_origin;
+use crate::math::{Vec2, Vec3};
 use crate::scene::{Material, Mesh, Scene, TextureRef};
 use std::cell::Cell;
 
@@ -68,7 +68,7 @@ impl<'a> Target<'a> {
             _ => fan_triangle(mesh, world, self.prim, self.source, position),
         };
         let vertices = self.vertices(world, corners, mesh);
-        let print = Footprint::default();
+        let print = Footprint::NONE;
         Some(Patch { mesh, placement, corners, weights, vertices, print, last: Cell::new(None), read: Cell::new(None) })
     }
 

@@ -213,6 +213,38 @@ fn mapped_points_shaded_side_by_side_have_the_bits_of_points_shaded_one_by_one()
     }
 }
 
+/// The same with surfaces that are there in part, or nowhere, as maps, vertices or their materials say, and seen from behind.
+fn holed(mut s: Stage) -> Stage {
+    let mut random = Random::new(3);
+    for (i, material) in s.scene.materials.iter_mut().enumerate() {
+        (material.opacity, material.alpha_mode) = match i % 4 {
+            0 => (0.3 + 0.05 * i as f32, AlphaMode::Blend),
+            1 => (0.7, AlphaMode::Mask { cutoff: if i % 8 == 1 { 0.8 } else { 0.3 } }),
+            _ => (1.0, AlphaMode::Blend),
+        };
+        material.double_sided = i % 3 != 0;
+    }
+    for mesh in s.scene.meshes.iter_mut().step_by(3) {
+        mesh.colors = mesh.positions.iter().map(|_| random.cube().abs().extend(random.unit())).collect();
+        mesh.triangles.iter_mut().step_by(2).for_each(|t| t.swap(1, 2));
+    }
+    s
+}
+
+#[test]
+fn points_that_are_there_in_part_have_the_same_bits_side_by_side() {
+    for (environment, textures, depth) in
+        [(Environment::Studio, 0, 1), (Environment::Studio, 3, 2), (Environment::Black, 3, 6)]
+    {
+        let stage = if textures > 0 { painted() } else { plain() };
+        let stage = if depth > 1 { lobed(stage, textures) } else { stage };
+        let mut s = holed(if depth > 2 { glazed(stage, 3) } else { stage });
+        (s.settings.depth, s.scene.environment) = (Some(depth), environment);
+        let together = same_one_by_one(&mut s, &format!("{environment:?}, {textures} textures, depth {depth}"));
+        assert!(together.counts.refracted.queries > 1000, "{:?}", together.counts.refracted);
+    }
+}
+
 /// The same with glass: clear and coloured, smooth and rough, thin and thick, with things in it that absorb light, and maps.
 fn glazed(mut s: Stage, textures: usize) -> Stage {
     s.settings = Settings { depth: Some(6), samples: 2, ..s.settings };

@@ -183,3 +183,106 @@ fn colored_glass_leaves_the_rest_of_a_background_to_a_veil_however_pixels_are_sa
         assert!(s.render().picture.veil.is_empty());
     }
 }
+
+#[test]
+fn a_blended_surface_without_holes_has_the_bits_of_an_opaque_one() {
+    let mut s = super::bits::busy();
+    s.scene.materials.iter_mut().for_each(|m| (m.opacity, m.alpha_mode) = (1.0, AlphaMode::Opaque));
+    let opaque = s.render();
+    for alpha_mode in [AlphaMode::Blend, AlphaMode::Mask { cutoff: 0.5 }] {
+        s.scene.materials.iter_mut().for_each(|m| m.alpha_mode = alpha_mode);
+        let rendered = s.render();
+        assert!(rendered.picture == opaque.picture, "{alpha_mode:?}");
+        let seen = |r: &Rendered| [r.counts.primary, r.counts.reflected, r.counts.refracted];
+        assert_eq!(seen(&rendered), seen(&opaque), "{alpha_mode:?}");
+    }
+}
+
+/// Leaves before a wall and before what hides it from a lamp, one of them opaque; then what stands behind them, of so many faces.
+fn leaves(behind: usize) -> Stage {
+    let view = View::look_at(DVec3::new(3.0, 2.0, 6.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.9));
+    let mut s = stage(view);
+    s.settings = Settings { width: 60, height: 45, samples: 2, ..s.settings };
+    s.square(-1.5, 4.0, material(Vec3::splat(0.8), phong())).lamp(DVec3::new(0.0, 1.0, 9.0), 1.0);
+    s.square(-1.0, 0.4, material(Vec3::X, phong()));
+    for i in 0..14 {
+        let (x, y) = (f64::from(i % 4) - 1.5, f64::from(i / 4) - 1.5);
+        let place = DAffine3::from_translation(DVec3::new(x, y, 0.2 * f64::from(i % 3)));
+        let leaf = match i % 3 {
+            0 => blended(Vec3::Y, 0.4 + 0.05 * i as f32),
+            1 => Material { opacity: 0.05, alpha_mode: AlphaMode::Mask { cutoff: 0.1 }, ..unlit(Vec3::Z) },
+            _ => material(Vec3::ZERO, Phong { transmission: Vec3::new(0.5, 0.7, 0.2), ..phong() }),
+        };
+        s.mesh(square(0.0, 0.6), place, leaf);
+    }
+    let place = DAffine3::from_translation(DVec3::Z * -1e3);
+    for _ in 0..behind {
+        s.mesh(square(0.0, 0.01), place, material(Vec3::X, phong()));
+    }
+    s
+}
+
+#[test]
+fn shadows_of_opaque_things_among_leaves_do_not_depend_on_how_many_of_either_there_are() {
+    let (few, many) = (leaves(0), leaves(40));
+    assert!(World::new(&few.scene).is_mostly_open() && !World::new(&many.scene).is_mostly_open());
+    let (few, many) = (few.render(), many.render());
+    let differ = few.picture.beauty.iter().zip(&many.picture.beauty).filter(|(a, b)| a != b).count();
+    assert_eq!(differ, 0, "pixels");
+    let shadow = |rendered: &Rendered| rendered.counts.shadow.queries;
+    assert!(shadow(&few) < shadow(&many), "{} and {}", shadow(&few), shadow(&many));
+}
+
+#[test]
+fn the_opacity_that_shadow_rays_read_is_that_of_a_point_that_is_seen() {
+    use crate::math::random::Random;
+    use crate::math::{Vec2, Vec4};
+    use crate::render::shade::{Reader, shadow_filter};
+    use crate::render::surface::Target;
+    use crate::scene::{Bitmap, Filter, Pixels, Sampler, Texture, TextureRef, UvTransform, Wrap};
+    let mut random = Random::new(17);
+    let mut seen = 0;
+    for round in 0..40 {
+        let mut s = looking_down(9.0);
+        let mut code = || (random.unit() * 255.99) as u8;
+        let pixels = match round % 3 {
+            0 => Pixels::Rgb8((0..5 * 7 * 3).map(|_| code()).collect()),
+            1 => Pixels::Rgba8((0..5 * 7).map(|_| [(); 4].map(|()| code())).collect()),
+            _ => Pixels::Rgba16((0..5 * 7).map(|_| [(); 4].map(|()| u16::from(code()) * 251)).collect()),
+        };
+        let magnify = if round % 4 == 0 { Filter::Nearest } else { Filter::Linear };
+        let sampler = Sampler { wrap_u: Wrap::Mirror, magnify, ..Sampler::default() };
+        s.scene.bitmaps.push(Bitmap { name: String::new(), width: 5, height: 7, pixels });
+        s.scene.textures.push(Texture { bitmap: 0, sampler });
+        let transform =
+            UvTransform { rotation: 0.3 * (round % 2) as f32, scale: Vec2::new(1.5, 2.0), ..UvTransform::default() };
+        let map = |wanted: bool| wanted.then_some(TextureRef { texture: 0, uv_set: round % 5 / 4, transform });
+        let mode = if round % 2 == 0 { AlphaMode::Blend } else { AlphaMode::Mask { cutoff: 0.4 } };
+        let material = Material {
+            opacity: 0.9,
+            alpha_mode: mode,
+            base_color_map: map(round % 7 != 0),
+            opacity_map: map(round % 3 != 1),
+            ..Material::plain()
+        };
+        let mut mesh = square(0.0, 1.0);
+        mesh.uvs = vec![mesh.positions.iter().map(|p| p.truncate()).collect()];
+        if round % 3 == 2 {
+            mesh.colors = mesh.positions.iter().map(|p| Vec4::new(0.2, 0.3, 0.4, 0.75 + 0.25 * p.x)).collect();
+        }
+        s.mesh(mesh, DAffine3::IDENTITY, material);
+        let (world, store) = (World::new(&s.scene), TextureStore::new(&s.scene));
+        for _ in 0..50 {
+            let (u, v) = (random.unit() * 0.5, random.unit() * 0.5);
+            let hit = crate::accel::Hit { t: 1.0, u, v, prim: random.below(2) as u32 };
+            let target = Target::new(&s.scene, &world, hit.prim);
+            let patch = target.patch(&world, u, v, Vec3::ZERO);
+            let reader = Reader { store: &store, patch: patch.as_ref(), known: &[] };
+            let opacity = target.opacity(&hit, &store).expect("a triangle");
+            let filter = Vec3::splat(1.0 - crate::render::context::coverage(target.material, opacity));
+            assert_eq!(filter, shadow_filter(target.material, &reader), "round {round}");
+            seen += usize::from(filter.x > 0.0 && filter.x < 1.0);
+        }
+    }
+    assert!(seen > 500, "{seen}");
+}

@@ -304,7 +304,10 @@ struct Tap {
 
 impl Tap {
     #[inline(always)]
-    fn read<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f32, Output = T>>(&self, texel: impl Fn(usize) -> T) -> T {
+    fn read<T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f32, Output = T>>(
+        &self,
+        texel: impl Fn(usize) -> T,
+    ) -> T {
         let [a, b, c, d] = self.corners;
         if !self.mixed {
             return texel(a);

@@ -5,6 +5,7 @@
 
 mod placing;
 mod rounding;
+mod solid;
 
 pub use rounding::Moved;
 
@@ -18,8 +19,9 @@ use crate::accel::shapes::Prim;
 use crate::accel::{AccelChoice, AccelParams, AnyAccel, BitSet, Hit, Kept, Ray, Shapes};
 use crate::math::triangle::Triangle;
 use crate::math::{DMat3, DVec3, Vec3};
-use crate::scene::Scene;
 use crate::scene::mesh::normal_from_object;
+use crate::scene::{Material, Scene};
+use solid::Solid;
 
 /// A [`Scene`] placed for tracing. World position = `center` + position in [`Shapes`].
 #[derive(Clone, Debug)]
@@ -38,6 +40,8 @@ pub struct World {
     /// First polygon (counted from 0) of each instance, and one past the last.
     first_polygon: Vec<u32>,
     placements: Vec<Placement>,
+    /// How many faces of all instances light may pass.
+    open_faces: usize,
 }
 
 /// How an instance turns directions.
@@ -234,28 +238,45 @@ impl World {
     }
 
     /// Of what is not kept.
-    fn opaque_bits(&self, scene: &Scene, opaque: &[bool]) -> BitSet {
+    fn opaque_bits(&self, scene: &Scene, solids: &[Solid]) -> BitSet {
         let mut bits = BitSet::filled(self.shapes.len(), true);
-        if opaque.iter().all(|&o| o) {
+        if scene.materials.iter().all(Material::is_opaque) {
             return bits;
         }
         // An instance has one material, so that no prim of it needs to be looked up.
         let first_polygon = index(self.shapes.triangles.len());
         for (i, instance) in scene.instances.iter().enumerate() {
-            if !opaque[scene.meshes[instance.mesh as usize].material as usize] {
-                let polygons = self.first_polygon[i] + first_polygon..self.first_polygon[i + 1] + first_polygon;
-                let triangles = match self.kept.find(self.first_triangle[i]) {
-                    Spot::Stored(first) => first..first + (self.first_triangle[i + 1] - self.first_triangle[i]),
-                    Spot::Placed(..) => 0..0,
-                };
-                triangles.chain(polygons).for_each(|prim| bits.set(prim, false));
+            let solid = match &solids[instance.mesh as usize] {
+                Solid::All => continue,
+                Solid::Some(solid) => Some(solid),
+                Solid::None => None,
+            };
+            let polygons = self.first_polygon[i] + first_polygon..self.first_polygon[i + 1] + first_polygon;
+            polygons.for_each(|prim| bits.set(prim, false));
+            if let Spot::Stored(first) = self.kept.find(self.first_triangle[i]) {
+                let triangles = 0..self.first_triangle[i + 1] - self.first_triangle[i];
+                let open = triangles.filter(|&triangle| !solid.is_some_and(|solid| solid.get(triangle)));
+                open.for_each(|triangle| bits.set(first + triangle, false));
             }
         }
         let others = first_polygon + index(self.shapes.polygons.len());
         for prim in others..index(self.shapes.len()) {
-            bits.set(prim, opaque[self.material(scene, self.kept.number(prim)) as usize]);
+            let material = self.material(scene, self.kept.number(prim));
+            bits.set(prim, scene.materials[material as usize].is_opaque());
         }
         bits
+    }
+
+    /// Whether everything stops light.
+    pub(crate) fn is_opaque(&self) -> bool {
+        self.shapes.opaque.all(self.shapes.len()) && self.kept.objects().iter().all(|object| object.opaque)
+    }
+
+    /// Whether light may pass most faces: then it takes longer to ask first whether anything stops it.
+    pub(crate) fn is_mostly_open(&self) -> bool {
+        /// All but one of so many.
+        const MOST: usize = 4;
+        MOST * self.open_faces >= (MOST - 1) * self.len().max(1)
     }
 }
 
@@ -268,7 +289,7 @@ fn index(i: usize) -> u32 {
 mod tests {
     use super::*;
     use crate::math::{DAffine3, Vec3};
-    use crate::scene::{AlphaMode, Cone, Instance, Material, Mesh, Plane, Polygon, Sphere};
+    use crate::scene::{AlphaMode, Cone, Instance, Mesh, Plane, Polygon, Sphere};
 
     fn triangle(material: u32) -> Mesh {
         Mesh { material, positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]], ..Mesh::default() }
@@ -292,7 +313,10 @@ mod tests {
             spheres: vec![sphere],
             cones: vec![tip],
             planes: vec![Plane { name: String::new(), normal: DVec3::Y, offset: 1e7 - 1.0, material: 1 }],
-            materials: vec![Material::plain(), Material { alpha_mode: AlphaMode::Blend, ..Material::plain() }],
+            materials: vec![
+                Material::plain(),
+                Material { opacity: 0.5, alpha_mode: AlphaMode::Blend, ..Material::plain() },
+            ],
             ..Scene::default()
         }
     }

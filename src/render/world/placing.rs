@@ -1,5 +1,6 @@
 //! What is kept and where it stands, and then the whole world.
 
+use super::solid::{Solid, solids};
 use super::{Placement, World, index};
 use crate::accel::instances::placed;
 use crate::accel::{Cone, Shapes, SpherePrim};
@@ -19,8 +20,8 @@ pub struct Placing<'a> {
     scene: &'a Scene,
     bounds: (DVec3, DVec3),
     center: DVec3,
-    /// Of each material.
-    opaque: Vec<bool>,
+    /// What of each mesh stops light.
+    solids: Vec<Solid>,
     keeping: Keeping,
 }
 
@@ -29,9 +30,9 @@ impl<'a> Placing<'a> {
     pub fn new(scene: &'a Scene, how: Instancing) -> Self {
         let bounds = bounds(scene);
         let center = center_of_most(bounds.0, bounds.1, sample(scene).into_iter());
-        let opaque: Vec<bool> = scene.materials.iter().map(crate::scene::Material::is_opaque).collect();
-        let keeping = Keeping::of(scene, how, &opaque, |m| centered(m, center));
-        Self { scene, bounds, center, opaque, keeping }
+        let solids = solids(scene);
+        let keeping = Keeping::of(scene, how, |mesh| solids[mesh] == Solid::All, |m| centered(m, center));
+        Self { scene, bounds, center, solids, keeping }
     }
 
     /// Bytes that its world and a structure over it take at least for triangles of instances that are stored by themselves.
@@ -42,7 +43,7 @@ impl<'a> Placing<'a> {
 
     /// Stores everything where it stands, rounded once.
     pub fn world(self) -> World {
-        let Self { scene, bounds, center, opaque, keeping: Keeping { mut kept, places } } = self;
+        let Self { scene, bounds, center, solids, keeping: Keeping { mut kept, places } } = self;
         let mut shapes = Shapes::default();
         let (mut first_triangle, mut first_polygon) = (Vec::new(), Vec::new());
 
@@ -87,8 +88,10 @@ impl<'a> Placing<'a> {
         }
 
         let placements = scene.instances.iter().map(|i| Placement::new(i.world_from_object.matrix3)).collect();
-        let mut world = World { center, bounds, shapes, kept, first_triangle, first_polygon, placements };
-        world.shapes.opaque = world.opaque_bits(scene, &opaque);
+        let open_faces =
+            scene.instances.iter().map(|i| i.mesh as usize).map(|i| solids[i].open_faces(&scene.meshes[i])).sum();
+        let mut world = World { center, bounds, shapes, kept, first_triangle, first_polygon, placements, open_faces };
+        world.shapes.opaque = world.opaque_bits(scene, &solids);
         world
     }
 }

@@ -1,0 +1,410 @@
+//! Triangles of see-through materials that are there as a whole all the same: no texel that is read on them lets anything
+//! through, and no colour of their corners does.
+//!
+//! Many programs write that a material is blended or cut out where little of it is: one leaf on an atlas, or nothing at all.
+//! What is known to stop light need not be asked at every point.
+
+use crate::accel::BitSet;
+use crate::math::{Vec2, Vec4};
+use crate::render::patch::coordinates_at;
+use crate::render::shade::lets_light_through;
+use crate::scene::{AlphaMode, Bitmap, Material, Mesh, Pixels, Scene, TextureRef, Wrap};
+use rayon::prelude::*;
+
+/// Which faces of a mesh stop light.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Solid {
+    /// All.
+    All,
+    /// The triangles with a bit.
+    Some(BitSet),
+    /// None.
+    None,
+}
+
+impl Solid {
+    /// How many faces of the mesh light may pass.
+    pub(super) fn open_faces(&self, mesh: &Mesh) -> usize {
+        let open_triangles = match self {
+            Self::All => return 0,
+            Self::Some(solid) => (0..).zip(&mesh.triangles).filter(|(i, _)| !solid.get(*i)).count(),
+            Self::None => mesh.triangles.len(),
+        };
+        open_triangles + mesh.polygons.len()
+    }
+}
+
+/// Which faces of each mesh of a scene stop light; of textures that are not there nothing is known.
+pub(super) fn solids(scene: &Scene) -> Vec<Solid> {
+    let layers: Vec<Option<Vec<Layer>>> = scene.materials.iter().map(|material| layers(scene, material)).collect();
+    let of = |mesh: &Mesh| {
+        let material = mesh.material as usize;
+        match &layers[material] {
+            _ if scene.materials[material].is_opaque() => Solid::All,
+            Some(layers) => solid(mesh, layers),
+            None => Solid::None,
+        }
+    };
+    scene.meshes.iter().map(of).collect()
+}
+
+/// A map that must not let anything through.
+struct Layer {
+    map: TextureRef,
+    wrap: [Wrap; 2],
+    blocks: Blocks,
+}
+
+/// The maps of a material that is solid where all of them are, and the colour of vertices; `None` for what is nowhere, or where
+/// that is not known.
+fn layers(scene: &Scene, material: &Material) -> Option<Vec<Layer>> {
+    if material.is_opaque() || lets_light_through(material) {
+        return None;
+    }
+    let least = least(material)?;
+    let layer = |map: &TextureRef, channel, least| {
+        let texture = scene.textures.get(map.texture as usize)?;
+        let blocks = Blocks::of(scene.bitmaps.get(texture.bitmap as usize)?, channel, least)?;
+        Some(Layer { map: *map, wrap: [texture.sampler.wrap_u, texture.sampler.wrap_v], blocks })
+    };
+    let maps = [(&material.base_color_map, ALPHA, least), (&material.opacity_map, RED, 1.0)];
+    maps.into_iter().filter_map(|(map, channel, least)| Some(layer(map.as_ref()?, channel, least))).collect()
+}
+
+const RED: usize = 0;
+const ALPHA: usize = 3;
+
+/// The least alpha of a map of base colours, 0 … 1, with which a material is there as a whole; `None` if none suffices.
+fn least(material: &Material) -> Option<f32> {
+    /// More than the mean of four texels is rounded, in parts of them.
+    const ROUNDING: f32 = 1e-5;
+    let opacity = material.opacity;
+    let least = match material.alpha_mode {
+        AlphaMode::Opaque => 0.0,
+        AlphaMode::Mask { cutoff } if opacity >= cutoff => (cutoff / opacity * (1.0 + ROUNDING)).clamp(0.0, 1.0),
+        AlphaMode::Blend if opacity >= 1.0 => 1.0,
+        AlphaMode::Mask { .. } | AlphaMode::Blend => return None,
+    };
+    // Of an opacity of 0, which may be enough, any part is.
+    Some(if least.is_nan() { 0.0 } else { least })
+}
+
+fn solid(mesh: &Mesh, layers: &[Layer]) -> Solid {
+    let everywhere = layers.iter().all(|layer| layer.blocks.are_solid());
+    if everywhere && mesh.colors.is_empty() && mesh.polygons.is_empty() {
+        return Solid::All;
+    }
+    let colors = |corners: &[u32; 3]| {
+        let color = |i: u32| mesh.colors.get(i as usize).copied().unwrap_or(Vec4::ONE);
+        corners.iter().all(|&i| color(i).w == 1.0)
+    };
+    let is_solid = |corners: &[u32; 3]| colors(corners) && layers.iter().all(|layer| layer.is_solid_on(mesh, *corners));
+    let all: Vec<bool> = mesh.triangles.par_iter().with_min_len(TRIANGLES).map(is_solid).collect();
+    if mesh.polygons.is_empty() && all.iter().all(|&solid| solid) {
+        return Solid::All;
+    }
+    if !all.contains(&true) {
+        return Solid::None;
+    }
+    let mut bits = BitSet::filled(all.len(), false);
+    (0..).zip(&all).filter(|(_, solid)| **solid).for_each(|(i, _)| bits.set(i, true));
+    Solid::Some(bits)
+}
+
+/// Triangles that are worth a thread's while.
+const TRIANGLES: usize = 1 << 12;
+
+impl Layer {
+    /// Whether all that is read on a triangle is solid.
+    fn is_solid_on(&self, mesh: &Mesh, corners: [u32; 3]) -> bool {
+        if self.blocks.are_solid() {
+            return true;
+        }
+        let Some((_, uvs)) = coordinates_at(mesh, corners, [0.0; 3], &self.map) else { return false };
+        let [a, b, c] = uvs.map(|uv| uv + self.map.transform.offset);
+        if ![a, b, c].iter().all(|uv| uv.is_finite()) {
+            return false;
+        }
+        self.blocks.are_solid_between(a.min(b).min(c), a.max(b).max(c), self.wrap)
+    }
+}
+
+/// Columns and rows of texels in a block.
+const BLOCK: usize = 8;
+
+/// Which blocks of texels of a bitmap are solid.
+struct Blocks {
+    /// Columns and rows of the bitmap.
+    size: [usize; 2],
+    /// How many are not, above and to the left of each corner of a block, row by row; empty where all are.
+    sums: Vec<u32>,
+}
+
+impl Blocks {
+    /// Those whose numbers of a channel are so large at least, 0 … 1. `None` for a bitmap that is not there.
+    fn of(bitmap: &Bitmap, channel: usize, least: f32) -> Option<Self> {
+        let size = [bitmap.width as usize, bitmap.height as usize];
+        let texels = size[0].checked_mul(size[1]).filter(|&texels| texels > 0)?;
+        let open = match &bitmap.pixels {
+            Pixels::Rgb8(numbers) if numbers.len() != 3 * texels => return None,
+            Pixels::Rgb8(_) if channel == ALPHA => Vec::new(),
+            Pixels::Rgb8(numbers) => open(size, numbers.as_chunks::<3>().0, channel, code(least, 255)),
+            Pixels::Rgba8(all) => open(size, all.get(..texels)?, channel, code(least, 255)),
+            Pixels::Rgba16(all) => open(size, all.get(..texels)?, channel, code(least, 65535)),
+        };
+        Some(Self { size, sums: if open.contains(&1) { summed(size, &open) } else { Vec::new() } })
+    }
+
+    /// Whether all are solid.
+    fn are_solid(&self) -> bool {
+        self.sums.is_empty()
+    }
+
+    /// Whether all are from which anything is read between these coordinates.
+    fn are_solid_between(&self, lo: Vec2, hi: Vec2, wrap: [Wrap; 2]) -> bool {
+        let columns = spans([lo.x, hi.x], self.size[0], wrap[0]);
+        let rows = spans([lo.y, hi.y], self.size[1], wrap[1]);
+        let pitch = self.size[0].div_ceil(BLOCK) + 1;
+        let sum = |x: usize, y: usize| self.sums[y * pitch + x];
+        rows.into_iter().flatten().all(|[top, bottom]| {
+            columns.into_iter().flatten().all(|[left, right]| {
+                let ([left, top], [right, bottom]) =
+                    ([left / BLOCK, top / BLOCK], [right / BLOCK + 1, bottom / BLOCK + 1]);
+                sum(right, bottom) + sum(left, top) == sum(right, top) + sum(left, bottom)
+            })
+        })
+    }
+}
+
+/// The least stored number that is no less than `least` of `most`.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 … 65535")]
+fn code(least: f32, most: u16) -> u16 {
+    libm::ceil(f64::from(least) * f64::from(most)) as u16
+}
+
+/// Of each block of texels, row by row, 1 where one has less than `least` in a channel.
+fn open<T: Copy + Into<u16> + Sync, const N: usize>(
+    [width, height]: [usize; 2],
+    texels: &[[T; N]],
+    channel: usize,
+    least: u16,
+) -> Vec<u32> {
+    let columns = width.div_ceil(BLOCK);
+    let mut open = vec![0; columns * height.div_ceil(BLOCK)];
+    let rows = texels.par_chunks(width * BLOCK).zip(open.par_chunks_mut(columns));
+    rows.with_min_len(BLOCK).for_each(|(texels, open)| {
+        for row in texels.chunks(width) {
+            for (open, texels) in open.iter_mut().zip(row.chunks(BLOCK)) {
+                *open |= texels.iter().fold(0, |open, texel| open | u32::from(texel[channel].into() < least));
+            }
+        }
+    });
+    open
+}
+
+/// The sums over all blocks above and to the left of each corner.
+fn summed([width, height]: [usize; 2], open: &[u32]) -> Vec<u32> {
+    let (columns, rows) = (width.div_ceil(BLOCK), height.div_ceil(BLOCK));
+    let pitch = columns + 1;
+    let mut sums = vec![0; pitch * (rows + 1)];
+    for (y, row) in open.chunks(columns).enumerate() {
+        let mut so_far = 0;
+        for (x, open) in row.iter().enumerate() {
+            so_far += open;
+            sums[(y + 1) * pitch + x + 1] = sums[y * pitch + x + 1] + so_far;
+        }
+    }
+    sums
+}
+
+/// The first and last texels along an axis of all that is read between two coordinates: one run of them or two.
+#[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "places of some texels")]
+fn spans([lo, hi]: [f32; 2], len: usize, wrap: Wrap) -> [Option<[usize; 2]>; 2] {
+    /// Coordinates beyond this are rounded by more than a texel of large maps.
+    const FARTHEST: f32 = 64.0;
+    let all = [Some([0, len - 1]), None];
+    if !(lo >= -FARTHEST && hi <= FARTHEST) {
+        return all;
+    }
+    // Two texels are mixed; one more on each side is for rounding.
+    let place = |c: f32| libm::floor(f64::from(c) * len as f64 - 0.5) as i64;
+    let (first, last, count) = (place(lo) - 1, place(hi) + 2, len as i64);
+    let index = |i: i64| usize::try_from(i).unwrap_or(0).min(len - 1);
+    if last - first >= count - 1 {
+        return all;
+    }
+    match wrap {
+        Wrap::Clamp => [Some([index(first), index(last)]), None],
+        Wrap::Mirror if first < 0 || last >= count => all,
+        Wrap::Mirror => [Some([index(first), index(last)]), None],
+        Wrap::Repeat => {
+            let [first, last] = [first, last].map(|i| index(i.rem_euclid(count)));
+            if first <= last { [Some([first, last]), None] } else { [Some([0, last]), Some([first, len - 1])] }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+    use crate::math::random::Random;
+    use crate::render::context::coverage;
+    use crate::render::texture::TextureStore;
+    use crate::scene::{Filter, Phong, Sampler, Surface, Texture, UvTransform};
+
+    /// Mostly solid, with some holes: all of one or of several texels.
+    fn holed(random: &mut Random, [width, height]: [usize; 2]) -> Bitmap {
+        let mut texels = vec![[90, 120, 40, 255]; width * height];
+        for _ in 0..3 {
+            let (x, y, side) = (random.below(width), random.below(height), 1 + random.below(6));
+            for (x, y) in
+                (0..side * side).map(|i| (x + i % side, y + i / side)).filter(|&(x, y)| x < width && y < height)
+            {
+                texels[y * width + x][3] = [0, 100, 254][random.below(3)];
+            }
+        }
+        let (width, height) = (width as u32, height as u32);
+        Bitmap { name: String::new(), width, height, pixels: Pixels::Rgba8(texels.into()) }
+    }
+
+    /// A soup of triangles with coordinates as large as `size`.
+    fn soup(random: &mut Random, count: u32, size: f32) -> Mesh {
+        let corners = (0..count).flat_map(|_| {
+            let (at, reach) = (random.cube() * 3.0, size * random.unit() * random.unit());
+            [(); 3].map(|()| at + random.cube() * reach)
+        });
+        let positions: Vec<Vec3> = corners.collect();
+        let triangles = (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        Mesh { uvs: vec![positions.iter().map(|p| p.truncate()).collect()], positions, triangles, ..Mesh::default() }
+    }
+
+    /// What is stored as a scene with one mesh and one material with a map.
+    fn scene(bitmap: Bitmap, sampler: Sampler, mesh: Mesh, material: Material) -> Scene {
+        Scene {
+            bitmaps: vec![bitmap],
+            textures: vec![Texture { bitmap: 0, sampler }],
+            meshes: vec![mesh],
+            materials: vec![material],
+            ..Scene::default()
+        }
+    }
+
+    fn mapped(alpha_mode: AlphaMode, transform: UvTransform) -> Material {
+        let map = TextureRef { texture: 0, uv_set: 0, transform };
+        Material { alpha_mode, base_color_map: Some(map), ..Material::plain() }
+    }
+
+    #[test]
+    fn nothing_that_is_read_on_a_solid_triangle_lets_light_through() {
+        let mut random = Random::new(5);
+        let (mut solid, mut open) = (0, 0);
+        let wraps = [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp];
+        for round in 0..108 {
+            let sampler = Sampler {
+                wrap_u: wraps[round % 3],
+                wrap_v: wraps[round / 3 % 3],
+                magnify: if round % 4 == 0 { Filter::Nearest } else { Filter::Linear },
+                ..Sampler::default()
+            };
+            let transform = match round % 2 {
+                0 => UvTransform::default(),
+                _ => UvTransform { offset: Vec2::new(0.7, -1.3), rotation: 0.6, scale: Vec2::new(1.5, 0.4) },
+            };
+            let mode = if round % 5 < 3 { AlphaMode::Blend } else { AlphaMode::Mask { cutoff: 0.5 } };
+            let mut material = mapped(mode, transform);
+            material.opacity = if round % 5 == 4 { 0.6 } else { 1.0 };
+            let bitmap = holed(&mut random, [[64, 32], [50, 70], [7, 9]][round % 3]);
+            let mesh = soup(&mut random, 60, [0.1, 0.5, 3.0][round / 9 % 3]);
+            let scene = scene(bitmap, sampler, mesh, material);
+            let (mesh, material) = (&scene.meshes[0], &scene.materials[0]);
+            let store = TextureStore::new(&scene);
+            let map = material.base_color_map.expect("it has one");
+            let Solid::Some(bits) = &solids(&scene)[0] else { continue };
+            for (i, &corners) in (0..).zip(&mesh.triangles) {
+                if !bits.get(i) {
+                    open += 1;
+                    continue;
+                }
+                solid += 1;
+                for _ in 0..100 {
+                    let (u, v) = (random.unit(), random.unit());
+                    let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+                    let (uv, _) = coordinates_at(mesh, corners, [1.0 - u - v, u, v], &map).expect("coordinates");
+                    let opacity = material.opacity * store.channel::<3>(map.texture, uv);
+                    assert_eq!(coverage(material, opacity), 1.0, "round {round}, triangle {i}: {opacity} at {uv}");
+                }
+            }
+        }
+        assert!(solid > 500 && open > 500, "{solid} and {open}");
+    }
+
+    #[test]
+    fn what_is_called_see_through_and_has_no_holes_is_solid() {
+        let mut random = Random::new(9);
+        let numbers = |count: usize, of: u8| vec![of; count];
+        let of = |pixels, material: Material, colors: Option<f32>| {
+            let bitmap = Bitmap { name: String::new(), width: 4, height: 2, pixels };
+            let mut mesh = soup(&mut random, 3, 1.0);
+            if let Some(alpha) = colors {
+                mesh.colors = vec![Vec4::ONE; mesh.positions.len()];
+                mesh.colors[4].w = alpha;
+            }
+            solids(&scene(bitmap, Sampler::default(), mesh, material)).remove(0)
+        };
+        let mut of = of;
+        let blend = || mapped(AlphaMode::Blend, UvTransform::default());
+        let rgb = || Pixels::Rgb8(numbers(24, 7).into());
+        assert_eq!(of(rgb(), blend(), None), Solid::All, "no alpha");
+        assert_eq!(of(Pixels::Rgba8(vec![[9, 9, 9, 255]; 8].into()), blend(), None), Solid::All);
+        assert_eq!(of(Pixels::Rgba16(vec![[9, 9, 9, 65535]; 8].into()), blend(), None), Solid::All);
+        assert_eq!(of(Pixels::Rgba16(vec![[9, 9, 9, 65534]; 8].into()), blend(), None), Solid::None);
+        assert_eq!(of(Pixels::Rgba8(vec![[9, 9, 9, 254]; 8].into()), blend(), None), Solid::None);
+        assert_eq!(of(Pixels::Rgba8(Vec::new().into()), blend(), None), Solid::None, "not there yet");
+        assert_eq!(of(Pixels::Rgb8(Vec::new().into()), blend(), None), Solid::None, "not there yet");
+        assert_eq!(of(rgb(), blend(), Some(1.0)), Solid::All);
+        let Solid::Some(bits) = of(rgb(), blend(), Some(0.9)) else { panic!("one corner is not solid") };
+        assert_eq!([0, 1, 2].map(|i| bits.get(i)), [true, false, true]);
+        assert_eq!(of(rgb(), Material { opacity: 0.99, ..blend() }, None), Solid::None);
+        let glass = Surface::Phong(Phong { transmission: Vec3::X, ..Phong::default() });
+        assert_eq!(of(rgb(), Material { surface: glass, ..blend() }, None), Solid::None);
+        // The red of a map of opacity counts, not its alpha.
+        let map_d = |red| {
+            let opacity_map = blend().base_color_map;
+            let pixels = Pixels::Rgba8(vec![[red, 0, 0, 0]; 8].into());
+            (pixels, Material { opacity_map, base_color_map: None, ..blend() })
+        };
+        let cases = [(255, Solid::All), (254, Solid::None)];
+        for (red, expected) in cases {
+            let (pixels, material) = map_d(red);
+            assert_eq!(of(pixels, material, None), expected);
+        }
+    }
+
+    #[test]
+    fn a_mask_is_solid_from_its_cutoff_on() {
+        let with = |opacity, cutoff| Material { opacity, ..mapped(AlphaMode::Mask { cutoff }, UvTransform::default()) };
+        assert_eq!(least(&with(1.0, 0.0)), Some(0.0));
+        assert_eq!(least(&with(0.0, 0.0)), Some(0.0));
+        assert_eq!(least(&with(0.5, 0.5)), Some(1.0));
+        assert_eq!(least(&with(0.4, 0.5)), None);
+        assert!(least(&with(0.8, 0.4)).is_some_and(|least| least > 0.5 && least < 0.501));
+        assert_eq!([code(0.5, 255), code(1.0, 255), code(0.0, 255), code(1.0, 65535)], [128, 255, 0, 65535]);
+    }
+
+    #[test]
+    fn runs_of_texels_go_over_the_edge_where_a_map_repeats() {
+        let at = |lo: f32, hi: f32, wrap| {
+            spans([lo / 100.0, hi / 100.0], 100, wrap).into_iter().flatten().collect::<Vec<_>>()
+        };
+        assert_eq!(at(20.0, 30.0, Wrap::Repeat), [[18, 31]]);
+        assert_eq!(at(-5.0, 5.0, Wrap::Repeat), [[0, 6], [93, 99]]);
+        assert_eq!(at(995.0, 1005.0, Wrap::Repeat), [[0, 6], [93, 99]]);
+        assert_eq!(at(1.0, 99.0, Wrap::Repeat), [[0, 99]]);
+        assert_eq!(at(-50.0, -5.0, Wrap::Clamp), [[0, 0]]);
+        assert_eq!(at(50.0, 120.0, Wrap::Clamp), [[48, 99]]);
+        assert_eq!(at(-5.0, 5.0, Wrap::Mirror), [[0, 99]]);
+        assert_eq!(at(9990.0, 9991.0, Wrap::Repeat), [[0, 99]], "far away");
+        assert_eq!(at(f32::NAN, 1.0, Wrap::Repeat), [[0, 99]]);
+    }
+}
