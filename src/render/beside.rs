@@ -368,9 +368,10 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
         let what = (matter, common.shiny, has_inside);
         let mut draws = std::mem::take(&mut self.beside.draws);
         draws.clear();
-        for light in &context.lights {
+        for (number, light) in (0..).zip(&context.lights) {
             if !light.is_wide() {
                 strip.shine(what, light, None);
+                self.choose(traced, (light, number), strip);
                 self.ask_for(traced, light, strip, (within, None));
                 continue;
             }
@@ -379,10 +380,22 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             }
             for place in 0..strip.draw(draws.iter_mut().map(|(i, draws, rays)| (*i, draws.spread(*rays), *rays))) {
                 strip.shine(what, light, Some(place));
+                self.choose(traced, (light, number | place << 16), strip);
                 self.ask_for(traced, light, strip, (within, Some(place)));
             }
         }
         self.beside.draws = draws;
+    }
+
+    /// Leaves out points to which a light brings little, by chance.
+    fn choose(&self, traced: Traced, (light, number): (&LocalLight, u32), strip: &mut Strip) {
+        if !(light.shadows && self.chooses_shadow_rays()) {
+            return;
+        }
+        strip.choose(|at, sample, radiance| {
+            let path = traced.path(at);
+            self.roulette.sends(&self.streams, (sample, path.branch, path.part), number, radiance)
+        });
     }
 
     /// Point `i` with its numbers for wide lights, and how many places it draws of each.

@@ -44,6 +44,7 @@ pub(crate) enum Purpose {
     Facets,
     Surroundings,
     Roulette,
+    Shadows,
 }
 
 impl Draws {

@@ -1,8 +1,11 @@
-//! Branches of little weight go on by chance in pixels that need many samples, and carry then what all of their kind would.
+//! Branches of little weight, and shadow rays of little light, go on by chance in pixels that need many samples, and carry then
+//! what all of their kind would.
 
 use super::draws::{Draws, Purpose, Stream};
 use super::sampling::Stochastic;
+use super::sobol::mix;
 use super::wave::Path;
+use crate::math::Vec3;
 
 /// What the samples of a round share: J. Arvo, D. Kirk, *Particle Transport and Image Synthesis* (1990).
 #[derive(Clone, Copy, Debug, Default)]
@@ -33,6 +36,32 @@ impl Roulette {
         self.least == 0.0 || path.straight || self.decide(streams, sample, path)
     }
 
+    /// Whether anything ends by chance.
+    #[inline(always)]
+    pub(super) fn is_at_work(self) -> bool {
+        self.least > 0.0
+    }
+
+    /// Whether a shadow ray is sent; then its light is what it carries. It is that of light `number` at a point of this branch.
+    #[inline(always)]
+    pub(super) fn sends(
+        self,
+        streams: &[Stream],
+        (sample, branch, part): (u32, u32, f32),
+        number: u32,
+        radiance: &mut Vec3,
+    ) -> bool {
+        let (most, least) = (radiance.max_element(), self.least * part);
+        if most >= least {
+            return true;
+        }
+        let Some(&stream) = streams.get(sample as usize) else { return true };
+        let [drawn, _] = Draws::of(stream, mix(branch, number), Purpose::Shadows).spread(1).point(0);
+        let chance = most / least;
+        *radiance *= 1.0 / chance;
+        drawn < chance
+    }
+
     fn decide(self, streams: &[Stream], sample: u32, path: &mut Path) -> bool {
         let (weight, least) = (path.weight.max_element(), self.least * path.part);
         if weight >= least {
@@ -49,7 +78,6 @@ impl Roulette {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Vec3;
     use crate::render::wave::Media;
 
     fn path(weight: f32, branch: u32) -> Path {
@@ -71,6 +99,28 @@ mod tests {
             let mean = weights.iter().sum::<Vec3>() / 1024.0;
             assert!((mean.x - weight).abs() < 1e-3 * weight.max(0.13), "{weight}: {mean}");
         }
+    }
+
+    #[test]
+    fn shadow_rays_carry_on_average_what_all_of_them_would() {
+        let streams: Vec<Stream> = (0..1024).map(|index| Stream { key: 3, index }).collect();
+        let roulette = Roulette { least: 0.125 };
+        for (light, number) in [(0.1, 0), (0.06, 9), (0.01, 7 << 16), (0.2, 1)] {
+            let sends = |sample| {
+                let mut radiance = Vec3::new(light, 0.5 * light, 0.0);
+                roulette.sends(&streams, (sample, 5, 1.0), number, &mut radiance).then_some(radiance)
+            };
+            let sent: Vec<Vec3> = (0..1024).filter_map(sends).collect();
+            let carried = light.max(0.125);
+            assert!(sent.iter().all(|w| (*w - Vec3::new(carried, 0.5 * carried, 0.0)).length() < 1e-6), "{light}");
+            let mean = sent.iter().sum::<Vec3>() / 1024.0;
+            assert!((mean.x - light).abs() < 1e-3 * carried, "{light}: {mean}");
+        }
+        // What is spread over several rays is judged together, and lights by themselves.
+        let sends = |part, number, sample| roulette.sends(&streams, (sample, 5, part), number, &mut Vec3::splat(0.05));
+        assert!((0..100).all(|sample| sends(0.4, 0, sample)));
+        let differ = (0..1024).filter(|&sample| sends(1.0, 0, sample) != sends(1.0, 1, sample)).count();
+        assert!(differ > 300, "{differ}");
     }
 
     #[test]

@@ -335,6 +335,12 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         Draws::at(self.context.seed, &self.streams, point.path.branch, point.ray, point.hit, purpose)
     }
 
+    /// Whether shadow rays of little light are sent by chance: where they may have a long way, through what lets light pass.
+    /// Elsewhere they are so soon answered that certainty about a pixel costs less with all of them.
+    pub(super) fn chooses_shadow_rays(&self) -> bool {
+        self.context.has_filters && self.roulette.is_at_work()
+    }
+
     /// Remembers the first surface of a sample for the layers.
     fn note(&mut self, ray: &Ray, path: &Path, surface: &Surface, albedo: Vec3) {
         let Some(facts) = self.facts.get_mut(ray.sample as usize) else { return };
@@ -355,10 +361,10 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     fn light(&mut self, point: &Point<Surface>, crossing: &Crossing) {
         let (context, position) = (self.context, point.surface.position);
         let mut draws = None;
-        for light in &context.lights {
+        for (number, light) in (0..).zip(&context.lights) {
             if !light.is_wide() {
                 if let Some(incident) = light.incident(position) {
-                    self.shine(point, crossing, light, &incident, 1.0);
+                    self.shine(point, crossing, (light, number), &incident, 1.0);
                 }
                 continue;
             }
@@ -366,7 +372,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             let spread = draws.get_or_insert_with(|| self.draws(point, Purpose::Lights)).spread(rays);
             for k in 0..rays {
                 if let Some(incident) = light.incident_from(position, spread.point(k)) {
-                    self.shine(point, crossing, light, &incident, 1.0 / rays as f32);
+                    self.shine(point, crossing, (light, number | k << 16), &incident, 1.0 / rays as f32);
                 }
             }
         }
@@ -377,7 +383,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         &mut self,
         point: &Point<Surface>,
         crossing: &Crossing,
-        light: &LocalLight,
+        (light, number): (&LocalLight, u32),
         incident: &Incident,
         part: f32,
     ) {
@@ -388,15 +394,19 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         } else {
             point.matter.lit_through(surface.normal, surface.view, incident, crossing)
         };
-        let radiance = point.path.weight * seen * part;
+        let mut radiance = point.path.weight * seen * part;
         if !(radiance.is_finite() && radiance.max_element() > 0.0) {
             return;
         }
         if !light.shadows {
             return self.add(point.ray.sample, radiance);
         }
-        let inside = self.context.absorption.is_some().then_some(point.path.media);
         let sample = point.ray.sample;
+        let place = (sample, point.path.branch, point.path.part);
+        if self.chooses_shadow_rays() && !self.roulette.sends(&self.streams, place, number, &mut radiance) {
+            return;
+        }
+        let inside = self.context.absorption.is_some().then_some(point.path.media);
         if !above {
             return self.shadows.push(surface.straight_feeler(incident, sample), radiance, inside);
         }

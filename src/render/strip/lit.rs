@@ -123,6 +123,22 @@ impl Strip {
         points.map(|i| (i, get(&self.lit.radiance, i)))
     }
 
+    /// Leaves out the points whose shadow rays are not sent: asks for each, by the place of the ray that came to it in what was traced,
+    /// with its sample and what it shows.
+    pub(crate) fn choose(&mut self, mut sends: impl FnMut(usize, u32, &mut Vec3) -> bool) {
+        for i in 0..self.count.min(POINTS) {
+            if self.lit.seen[i] == 0 {
+                continue;
+            }
+            let mut radiance = get(&self.lit.radiance, i);
+            if sends(self.rays[i] as usize, self.samples[i], &mut radiance) {
+                put(&mut self.lit.radiance, i, radiance);
+            } else {
+                self.lit.seen[i] = 0;
+            }
+        }
+    }
+
     /// Sends the shadow rays that start on their triangles, outside of everything where that matters.
     pub(crate) fn send(&self, shadows: &mut Shadows, absorbs: bool) {
         let count = self.write(shadows.room());
