@@ -48,7 +48,7 @@ pub(super) fn solids(scene: &Scene) -> Vec<Solid> {
     scene.meshes.iter().map(of).collect()
 }
 
-/// A map that must not let anything through.
+/// A map whose numbers must be such that nothing is let through.
 struct Layer {
     map: TextureRef,
     wrap: [Wrap; 2],
@@ -58,17 +58,26 @@ struct Layer {
 /// The maps of a material that is solid where all of them are, and the colour of vertices; `None` for what is nowhere, or where
 /// that is not known.
 fn layers(scene: &Scene, material: &Material) -> Option<Vec<Layer>> {
-    if material.is_opaque() || lets_light_through(material) {
+    if material.is_opaque() {
         return None;
     }
     let least = least(material)?;
-    let layer = |map: &TextureRef, channel, least| {
+    let layer = |map: &TextureRef, channel, range| {
         let texture = scene.textures.get(map.texture as usize)?;
-        let blocks = Blocks::of(scene.bitmaps.get(texture.bitmap as usize)?, channel, least)?;
+        let blocks = Blocks::of(scene.bitmaps.get(texture.bitmap as usize)?, channel, range)?;
         Some(Layer { map: *map, wrap: [texture.sampler.wrap_u, texture.sampler.wrap_v], blocks })
     };
-    let maps = [(&material.base_color_map, ALPHA, least), (&material.opacity_map, RED, 1.0)];
-    maps.into_iter().filter_map(|(map, channel, least)| Some(layer(map.as_ref()?, channel, least))).collect()
+    let mut maps = Vec::new();
+    if material.alpha_mode != AlphaMode::Opaque {
+        maps.extend([(&material.base_color_map, ALPHA, [least, 1.0]), (&material.opacity_map, RED, [1.0; 2])]);
+    }
+    if lets_light_through(material) {
+        // Glass stops light where its map says so.
+        let map = &material.metal_rough()?.transmission_map;
+        map.as_ref()?;
+        maps.push((map, RED, [0.0; 2]));
+    }
+    maps.into_iter().filter_map(|(map, channel, range)| Some(layer(map.as_ref()?, channel, range))).collect()
 }
 
 const RED: usize = 0;
@@ -141,16 +150,16 @@ struct Blocks {
 }
 
 impl Blocks {
-    /// Those whose numbers of a channel are so large at least, 0 … 1. `None` for a bitmap that is not there.
-    fn of(bitmap: &Bitmap, channel: usize, least: f32) -> Option<Self> {
+    /// Those whose numbers of a channel are the least, or more, and the most, or less, 0 … 1. `None` for a bitmap that is not there.
+    fn of(bitmap: &Bitmap, channel: usize, range: [f32; 2]) -> Option<Self> {
         let size = [bitmap.width as usize, bitmap.height as usize];
         let texels = size[0].checked_mul(size[1]).filter(|&texels| texels > 0)?;
         let open = match &bitmap.pixels {
             Pixels::Rgb8(numbers) if numbers.len() != 3 * texels => return None,
             Pixels::Rgb8(_) if channel == ALPHA => Vec::new(),
-            Pixels::Rgb8(numbers) => open(size, numbers.as_chunks::<3>().0, channel, code(least, 255)),
-            Pixels::Rgba8(all) => open(size, all.get(..texels)?, channel, code(least, 255)),
-            Pixels::Rgba16(all) => open(size, all.get(..texels)?, channel, code(least, 65535)),
+            Pixels::Rgb8(numbers) => open(size, numbers.as_chunks::<3>().0, channel, range.map(|x| code(x, 255))),
+            Pixels::Rgba8(all) => open(size, all.get(..texels)?, channel, range.map(|x| code(x, 255))),
+            Pixels::Rgba16(all) => open(size, all.get(..texels)?, channel, range.map(|x| code(x, 65535))),
         };
         Some(Self { size, sums: if open.contains(&1) { summed(size, &open) } else { Vec::new() } })
     }
@@ -176,18 +185,18 @@ impl Blocks {
     }
 }
 
-/// The least stored number that is no less than `least` of `most`.
+/// The least stored number that is no less than such a part of the largest.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 … 65535")]
-fn code(least: f32, most: u16) -> u16 {
-    libm::ceil(f64::from(least) * f64::from(most)) as u16
+fn code(part: f32, largest: u16) -> u16 {
+    libm::ceil(f64::from(part) * f64::from(largest)) as u16
 }
 
-/// Of each block of texels, row by row, 1 where one has less than `least` in a channel.
+/// Of each block of texels, row by row, 1 where one has less or more in a channel.
 fn open<T: Copy + Into<u16> + Sync, const N: usize>(
     [width, height]: [usize; 2],
     texels: &[[T; N]],
     channel: usize,
-    least: u16,
+    [least, most]: [u16; 2],
 ) -> Vec<u32> {
     let columns = width.div_ceil(BLOCK);
     let mut open = vec![0; columns * height.div_ceil(BLOCK)];
@@ -195,7 +204,9 @@ fn open<T: Copy + Into<u16> + Sync, const N: usize>(
     rows.with_min_len(BLOCK).for_each(|(texels, open)| {
         for row in texels.chunks(width) {
             for (open, texels) in open.iter_mut().zip(row.chunks(BLOCK)) {
-                *open |= texels.iter().fold(0, |open, texel| open | u32::from(texel[channel].into() < least));
+                let number = |texel: &[T; N]| texel[channel].into();
+                let is_open = |texel| (number(texel) < least) | (number(texel) > most);
+                *open |= texels.iter().fold(0, |open, texel| open | u32::from(is_open(texel)));
             }
         }
     });
@@ -251,7 +262,7 @@ mod tests {
     use crate::math::random::Random;
     use crate::render::context::coverage;
     use crate::render::texture::TextureStore;
-    use crate::scene::{Filter, Phong, Sampler, Surface, Texture, UvTransform};
+    use crate::scene::{Filter, MetalRough, Phong, Sampler, Surface, Texture, UvTransform};
 
     /// Mostly solid, with some holes: all of one or of several texels.
     fn holed(random: &mut Random, [width, height]: [usize; 2]) -> Bitmap {
@@ -379,6 +390,28 @@ mod tests {
             let (pixels, material) = map_d(red);
             assert_eq!(of(pixels, material, None), expected);
         }
+    }
+
+    #[test]
+    fn glass_is_solid_where_its_map_lets_nothing_through() {
+        let of = |transmission: u8, alpha: u8, alpha_mode| {
+            let mut glass = MetalRough { transmission: 1.0, metallic: 0.0, ..MetalRough::default() };
+            let material = mapped(alpha_mode, UvTransform::default());
+            glass.transmission_map = material.base_color_map;
+            let material = Material { surface: Surface::MetalRough(glass), ..material };
+            let pixels = Pixels::Rgba8(vec![[transmission, 90, 90, alpha]; 8].into());
+            let bitmap = Bitmap { name: String::new(), width: 4, height: 2, pixels };
+            solids(&scene(bitmap, Sampler::default(), soup(&mut Random::new(3), 4, 1.0), material)).remove(0)
+        };
+        assert_eq!(of(0, 0, AlphaMode::Opaque), Solid::All, "alpha says nothing");
+        assert_eq!(of(1, 255, AlphaMode::Opaque), Solid::None);
+        assert_eq!(of(0, 255, AlphaMode::Blend), Solid::All);
+        assert_eq!(of(0, 254, AlphaMode::Blend), Solid::None);
+        let even = MetalRough { transmission: 0.5, metallic: 0.0, ..MetalRough::default() };
+        let material = Material { surface: Surface::MetalRough(even), ..Material::plain() };
+        let bitmap = Bitmap { name: String::new(), width: 0, height: 0, pixels: Pixels::Rgb8(Vec::new().into()) };
+        let scene = scene(bitmap, Sampler::default(), soup(&mut Random::new(3), 4, 1.0), material);
+        assert_eq!(solids(&scene), [Solid::None], "without a map it is glass everywhere");
     }
 
     #[test]
