@@ -22,8 +22,8 @@ use meshray::render::texture::TextureStore;
 use meshray::render::view::Lens;
 use meshray::render::{Job, Settings, View, World, render};
 use meshray::scene::{
-    Bitmap, Coat, Environment, Falloff, Light, LightKind, Material, MetalRough, Panorama, Pixels, Sampler, Scene,
-    Sheen, Surface, Texture, TextureRef, UvTransform, default_light, framing,
+    AlphaMode, Bitmap, Coat, Environment, Falloff, Light, LightKind, Material, MetalRough, Panorama, Pixels, Sampler,
+    Scene, Sheen, Surface, Texture, TextureRef, UvTransform, default_light, framing,
 };
 
 /// Part by which a count may exceed its baseline.
@@ -43,7 +43,7 @@ const QUESTIONS: [&str; 2] = ["first", "any"];
 
 /// Pictures by what they show and what lights it: a sample for each of [`RAYS`] pixels. They are drawn with the best
 /// instructions that Valgrind knows, so that a formula that is no longer computed in lanes shows.
-const PICTURES: [[&str; 2]; 9] = [
+const PICTURES: [[&str; 2]; 10] = [
     ["plain", "lamp"],
     ["plain", "ball"],
     ["plain", "studio"],
@@ -52,6 +52,7 @@ const PICTURES: [[&str; 2]; 9] = [
     ["mapped", "panorama"],
     ["lobes", "lamp"],
     ["lobes", "studio"],
+    ["holed", "lamp"],
     ["glass", "studio"],
 ];
 const SIDE: u32 = 64;
@@ -212,6 +213,10 @@ fn picture(of: &str, light: &str) -> ExitCode {
             paint(&mut scene);
             cover(&mut scene);
         }
+        "holed" => {
+            paint(&mut scene);
+            punch(&mut scene);
+        }
         "glass" => {
             let glass =
                 MetalRough { transmission: 1.0, thick: true, roughness: 0.0, metallic: 0.0, ..MetalRough::default() };
@@ -282,6 +287,14 @@ fn paint(scene: &mut Scene) {
         surface: Surface::MetalRough(surface),
         ..Material::plain()
     });
+}
+
+/// Cuts holes into all materials, where their map of colours is dim.
+fn punch(scene: &mut Scene) {
+    if let Pixels::Rgb8(numbers) = &scene.bitmaps[0].pixels {
+        scene.bitmaps[0].pixels = Pixels::Rgba8(numbers.as_chunks().0.iter().map(|&[r, g, b]| [r, g, b, r]).collect());
+    }
+    scene.materials.iter_mut().for_each(|material| material.alpha_mode = AlphaMode::Mask { cutoff: 0.4 });
 }
 
 /// Covers all materials with fibres and lacquer, and maps of both.

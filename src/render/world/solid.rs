@@ -10,6 +10,8 @@ use crate::render::patch::coordinates_at;
 use crate::render::shade::lets_light_through;
 use crate::scene::{AlphaMode, Bitmap, Material, Mesh, Pixels, Scene, TextureRef, Wrap};
 use rayon::prelude::*;
+use std::collections::HashMap;
+use std::sync::Arc;
 
 /// Which faces of a mesh stop light.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,14 +38,16 @@ impl Solid {
 
 /// Which faces of each mesh of a scene stop light; of textures that are not there nothing is known.
 pub(super) fn solids(scene: &Scene) -> Vec<Solid> {
-    let layers: Vec<Option<Vec<Layer>>> = scene.materials.iter().map(|material| layers(scene, material)).collect();
+    let mut known = Known { scene, blocks: HashMap::new() };
+    let mut layers: Vec<Option<Option<Vec<Layer>>>> = scene.materials.iter().map(|_| None).collect();
     let of = |mesh: &Mesh| {
-        let material = mesh.material as usize;
-        match &layers[material] {
-            _ if scene.materials[material].is_opaque() => Solid::All,
-            Some(layers) => solid(mesh, layers),
-            None => Solid::None,
+        let number = mesh.material as usize;
+        let material = &scene.materials[number];
+        if material.is_opaque() {
+            return Solid::All;
         }
+        let layers = layers[number].get_or_insert_with(|| known.layers(material));
+        layers.as_ref().map_or(Solid::None, |layers| solid(mesh, layers))
     };
     scene.meshes.iter().map(of).collect()
 }
@@ -52,32 +56,45 @@ pub(super) fn solids(scene: &Scene) -> Vec<Solid> {
 struct Layer {
     map: TextureRef,
     wrap: [Wrap; 2],
-    blocks: Blocks,
+    blocks: Arc<Blocks>,
 }
 
-/// The maps of a material that is solid where all of them are, and the colour of vertices; `None` for what is nowhere, or where
-/// that is not known.
-fn layers(scene: &Scene, material: &Material) -> Option<Vec<Layer>> {
-    if material.is_opaque() {
-        return None;
+/// What is known of bitmaps: materials often share them.
+struct Known<'a> {
+    scene: &'a Scene,
+    /// By number, channel, and the bits of what may be stored.
+    blocks: HashMap<(u32, usize, [u32; 2]), Option<Arc<Blocks>>>,
+}
+
+impl Known<'_> {
+    /// The maps of a material that is solid where all of them are, and the colour of vertices; `None` for what is nowhere, or
+    /// where that is not known.
+    fn layers(&mut self, material: &Material) -> Option<Vec<Layer>> {
+        let least = least(material)?;
+        let mut maps = Vec::new();
+        if material.alpha_mode != AlphaMode::Opaque {
+            maps.extend([(&material.base_color_map, ALPHA, [least, 1.0]), (&material.opacity_map, RED, [1.0; 2])]);
+        }
+        if lets_light_through(material) {
+            // Glass stops light where its map says so.
+            let map = &material.metal_rough()?.transmission_map;
+            map.as_ref()?;
+            maps.push((map, RED, [0.0; 2]));
+        }
+        maps.into_iter().filter_map(|(map, channel, range)| Some(self.layer(map.as_ref()?, channel, range))).collect()
     }
-    let least = least(material)?;
-    let layer = |map: &TextureRef, channel, range| {
-        let texture = scene.textures.get(map.texture as usize)?;
-        let blocks = Blocks::of(scene.bitmaps.get(texture.bitmap as usize)?, channel, range)?;
-        Some(Layer { map: *map, wrap: [texture.sampler.wrap_u, texture.sampler.wrap_v], blocks })
-    };
-    let mut maps = Vec::new();
-    if material.alpha_mode != AlphaMode::Opaque {
-        maps.extend([(&material.base_color_map, ALPHA, [least, 1.0]), (&material.opacity_map, RED, [1.0; 2])]);
+
+    fn layer(&mut self, map: &TextureRef, channel: usize, range: [f32; 2]) -> Option<Layer> {
+        let texture = self.scene.textures.get(map.texture as usize)?;
+        let bitmap = self.scene.bitmaps.get(texture.bitmap as usize)?;
+        let blocks = self.blocks.entry((texture.bitmap, channel, range.map(f32::to_bits)));
+        let blocks = blocks.or_insert_with(|| Blocks::of(bitmap, channel, range).map(Arc::new));
+        Some(Layer {
+            map: *map,
+            wrap: [texture.sampler.wrap_u, texture.sampler.wrap_v],
+            blocks: Arc::clone(blocks.as_ref()?),
+        })
     }
-    if lets_light_through(material) {
-        // Glass stops light where its map says so.
-        let map = &material.metal_rough()?.transmission_map;
-        map.as_ref()?;
-        maps.push((map, RED, [0.0; 2]));
-    }
-    maps.into_iter().filter_map(|(map, channel, range)| Some(layer(map.as_ref()?, channel, range))).collect()
 }
 
 const RED: usize = 0;
@@ -197,16 +214,16 @@ fn open<T: Copy + Into<u16> + Sync, const N: usize>(
     texels: &[[T; N]],
     channel: usize,
     [least, most]: [u16; 2],
-) -> Vec<u32> {
+) -> Vec<u8> {
     let columns = width.div_ceil(BLOCK);
-    let mut open = vec![0; columns * height.div_ceil(BLOCK)];
+    let mut open = vec![0_u8; columns * height.div_ceil(BLOCK)];
     let rows = texels.par_chunks(width * BLOCK).zip(open.par_chunks_mut(columns));
     rows.with_min_len(BLOCK).for_each(|(texels, open)| {
         for row in texels.chunks(width) {
             for (open, texels) in open.iter_mut().zip(row.chunks(BLOCK)) {
                 let number = |texel: &[T; N]| texel[channel].into();
                 let is_open = |texel| (number(texel) < least) | (number(texel) > most);
-                *open |= texels.iter().fold(0, |open, texel| open | u32::from(is_open(texel)));
+                *open |= texels.iter().fold(0, |open, texel| open | u8::from(is_open(texel)));
             }
         }
     });
@@ -214,14 +231,14 @@ fn open<T: Copy + Into<u16> + Sync, const N: usize>(
 }
 
 /// The sums over all blocks above and to the left of each corner.
-fn summed([width, height]: [usize; 2], open: &[u32]) -> Vec<u32> {
+fn summed([width, height]: [usize; 2], open: &[u8]) -> Vec<u32> {
     let (columns, rows) = (width.div_ceil(BLOCK), height.div_ceil(BLOCK));
     let pitch = columns + 1;
     let mut sums = vec![0; pitch * (rows + 1)];
     for (y, row) in open.chunks(columns).enumerate() {
         let mut so_far = 0;
         for (x, open) in row.iter().enumerate() {
-            so_far += open;
+            so_far += u32::from(*open);
             sums[(y + 1) * pitch + x + 1] = sums[y * pitch + x + 1] + so_far;
         }
     }
