@@ -184,8 +184,8 @@ pub trait Accel: Sync {
     }
 
     /// Whether anything *opaque* lies in `t_min..=t_max` of each ray: prims with a bit in [`Shapes::opaque`]. In a scene, faces of
-    /// masked and blended materials are opaque only where their maps have no holes, those of transmissive ones never; whether
-    /// anything at all lies there says [`Self::closest`].
+    /// masked, blended and transmissive materials are opaque only where their maps let nothing through; whether anything at all
+    /// lies there says [`Self::closest`].
     fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut Self::Scratch, probe: &mut P);
 
     /// The first hit of each ray in `t_min..=t_max` that comes after `after` in the order (t, prim). All hits are found one

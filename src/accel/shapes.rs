@@ -98,14 +98,6 @@ impl BitSet {
         self.words.get(i as usize / 64).copied().unwrap_or(u64::MAX) >> (i % 64) & 1 == 1
     }
 
-    /// Whether the first `len` bits are set, those that are not there among them.
-    pub fn all(&self, len: usize) -> bool {
-        (0..).zip(&self.words).all(|(i, word)| {
-            let bits = len.saturating_sub(64 * i).min(64);
-            bits == 0 || word.trailing_ones() as usize >= bits
-        })
-    }
-
     /// Sets bit `i`.
     ///
     /// # Panics

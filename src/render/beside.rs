@@ -12,6 +12,7 @@ use super::eyes::Eyes;
 use super::observer::Observer;
 use super::seam::{is_same_crossing, is_same_surface};
 use super::shade::{LocalLight, Matter};
+use super::sobol::mix;
 use super::strip::{Common, POINTS, Passed, Sorted, Strip, StripPoint};
 use super::surface::{Surface, Target};
 use super::wave::{Path, RayClass, Wave};
@@ -380,7 +381,7 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
             }
             for place in 0..strip.draw(draws.iter_mut().map(|(i, draws, rays)| (*i, draws.spread(*rays), *rays))) {
                 strip.shine(what, light, Some(place));
-                self.choose(traced, (light, number | place << 16), strip);
+                self.choose(traced, (light, mix(number, place + 1)), strip);
                 self.ask_for(traced, light, strip, (within, Some(place)));
             }
         }

@@ -112,7 +112,7 @@ impl Shadows {
         if !context.world.is_mostly_open() {
             asking.occluded(&self.rays, &mut self.blocked, probe);
         }
-        self.climb(asking, probe);
+        self.climb(context, asking, probe);
         if !context.has_filters {
             let open = self.light.iter().zip(&self.blocked).filter(|(_, blocked)| !**blocked);
             open.for_each(|(light, _)| arrive(light.tag, light.radiance));
@@ -136,15 +136,40 @@ impl Shadows {
         self.clear();
     }
 
-    /// Blocks the rays whose starts are cut off from their surfaces.
-    fn climb<A: Accel, P: Observer>(&mut self, asking: &mut Asking<A>, probe: &mut P) {
+    /// Blocks the rays whose starts are cut off from their surfaces, and weakens those that are so in part.
+    fn climb<A: Accel, P: Observer>(&mut self, context: &Context, asking: &mut Asking<A>, probe: &mut P) {
         if self.risers.is_empty() {
             return;
         }
-        let mut cut_off = vec![false; self.risers.len()];
-        asking.occluded(&self.risers, &mut cut_off, probe);
-        for (&i, _) in self.raised.iter().zip(cut_off).filter(|(_, cut_off)| *cut_off) {
-            self.blocked[i] = true;
+        if !context.has_filters {
+            let mut cut_off = vec![false; self.risers.len()];
+            asking.occluded(&self.risers, &mut cut_off, probe);
+            self.raised.iter().zip(cut_off).for_each(|(&i, cut_off)| self.blocked[i] |= cut_off);
+            return;
+        }
+        // What they meet is asked itself, so that it does not matter of what it is known that it stops light.
+        let (mut rays, mut raised) = (self.risers.clone(), self.raised.clone());
+        let mut hits = vec![Hit::MISS; rays.len()];
+        asking.closest(&rays, &mut hits, probe);
+        while !rays.is_empty() && !asking.cancelled {
+            let mut after = Vec::new();
+            for k in 0..rays.len() {
+                let (ray, i) = (rays[k], raised[k]);
+                if !hits[k].is_some() {
+                    continue;
+                }
+                let light = &mut self.light[i].radiance;
+                *light *= filter_at(context, &ray, &hits[k], None);
+                self.blocked[i] |= light.max_element() <= 0.0;
+                if !self.blocked[i] {
+                    (rays[after.len()], raised[after.len()]) = (ray, i);
+                    after.push(hits[k]);
+                }
+            }
+            rays.truncate(after.len());
+            raised.truncate(after.len());
+            hits.truncate(after.len());
+            asking.next(&rays, &after, &mut hits, probe);
         }
     }
 
@@ -203,7 +228,7 @@ fn filter_at(context: &Context, ray: &Ray, hit: &Hit, inside: Option<&mut Inside
     if !lets_light_through(target.material)
         && let Some(opacity) = target.opacity(hit, context.textures)
     {
-        return Vec3::splat(1.0 - coverage(target.material, if opacity.is_finite() { opacity } else { 1.0 }));
+        return Vec3::splat(1.0 - coverage(target.material, opacity));
     }
     let patch = target.patch(context.world, hit.u, hit.v, ray.origin + ray.dir * hit.t);
     let reader = Reader { store: context.textures, patch: patch.as_ref(), known: &[] };

@@ -7,7 +7,7 @@ use super::branch::Ground;
 use super::context::Context;
 use super::footing::Footing;
 use super::patch::{Footprint, Gradients, Patch, color_at, coordinates_at};
-use super::shade::{Seen, has_inside};
+use super::shade::{Seen, base_color, has_inside};
 use super::texture::TextureStore;
 use super::world::{Placement, PrimSource, World};
 use crate::accel::refine::Refined;
@@ -81,8 +81,9 @@ impl<'a> Target<'a> {
         let of_map = |map: &TextureRef| store.channel::<0>(map.texture, at(map));
         let alpha = |map: &TextureRef| store.channel::<3>(map.texture, at(map));
         let material = self.material;
-        let opacity = material.opacity * material.opacity_map.as_ref().map_or(1.0, of_map);
-        Some(opacity * material.base_color_map.as_ref().map_or(1.0, alpha) * color_at(mesh, corners, weights).w)
+        let alpha = Vec3::ONE.extend(material.base_color_map.as_ref().map_or(1.0, alpha));
+        let of_map = material.opacity_map.as_ref().map_or(1.0, of_map);
+        Some(base_color(material, alpha, of_map, color_at(mesh, corners, weights)).w)
     }
 
     /// World positions (centred frame) of mesh vertices.

@@ -22,6 +22,7 @@ use super::roulette::Roulette;
 use super::shade::{Incident, LocalLight, Matter, Reader};
 use super::shadow::Shadows;
 use super::sky::{Arounds, Standpoint};
+use super::sobol::mix;
 use super::surface::{Surface, Target};
 use super::wave::{Crossing, Path, Queue, RayClass, Wave};
 use crate::accel::{Accel, Hit, Ray};
@@ -338,7 +339,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     /// Whether shadow rays of little light are sent by chance: where they may have a long way, through what lets light pass.
     /// Elsewhere they are so soon answered that certainty about a pixel costs less with all of them.
     pub(super) fn chooses_shadow_rays(&self) -> bool {
-        self.context.has_filters && self.roulette.is_at_work()
+        !self.context.world.is_opaque() && self.roulette.is_at_work()
     }
 
     /// Remembers the first surface of a sample for the layers.
@@ -372,7 +373,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             let spread = draws.get_or_insert_with(|| self.draws(point, Purpose::Lights)).spread(rays);
             for k in 0..rays {
                 if let Some(incident) = light.incident_from(position, spread.point(k)) {
-                    self.shine(point, crossing, (light, number | k << 16), &incident, 1.0 / rays as f32);
+                    self.shine(point, crossing, (light, mix(number, k + 1)), &incident, 1.0 / rays as f32);
                 }
             }
         }

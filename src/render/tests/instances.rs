@@ -4,7 +4,7 @@ use super::*;
 use crate::accel::{AccelChoice, RayCounts};
 use crate::generate::Family;
 use crate::math::{DMat3, Vec2};
-use crate::render::Instancing;
+use crate::render::{Instancing, Sampling, Stochastic};
 use crate::scene::{AlphaMode, MetalRough};
 
 /// Objects of three meshes in front of a mirror: one mesh lets light through, and one has normals and colours; they are
@@ -87,6 +87,36 @@ fn a_picture_and_its_layers_are_the_same_bits_whether_or_not_instances_are_kept(
         assert_eq!(count, 15, "one is flat, and one mesh is seen once");
         assert!(kept.picture == flat.picture, "{kind}");
         assert_eq!(all(&kept.counts), all(&flat.counts), "{kind}: rays and hits");
+    }
+}
+
+#[test]
+fn what_is_known_to_stop_light_changes_no_bit() {
+    // A round mesh of which some faces are see-through: of kept ones it is not known which, and of nothing if all is done.
+    let mut stage = scene();
+    stage.scene.materials[0].alpha_mode = AlphaMode::Blend;
+    let star = &mut stage.scene.meshes[0];
+    star.colors = (0..star.positions.len()).map(|i| Vec3::ONE.extend(if i % 9 == 0 { 0.5 } else { 1.0 })).collect();
+    stage.scene.environment = crate::scene::Environment::Studio;
+    stage.lamp(DVec3::new(-6.0, -1.0, 0.5), 0.8).lamp(DVec3::new(4.0, 5.0, 1.0), 0.8);
+    let world = World::new(&stage.scene);
+    let open = (0..world.len() as u32).filter(|&prim| !world.shapes.opaque.get(prim)).count();
+    assert!(open > 100 && open < world.len() - 100, "{open} of {}", world.len());
+
+    let rare = Stochastic { min_samples: 4, max_samples: 32, error: 0.02, ..Stochastic::default() };
+    for sampling in [Sampling::Uniform, Sampling::Stochastic(rare)] {
+        stage.settings.sampling = sampling;
+        let (flat, _) = rendered(&stage, Instancing::Flatten, AccelKind::FastOctree);
+        let (kept, _) = rendered(&stage, Instancing::Keep, AccelKind::FastOctree);
+        assert!(kept.picture == flat.picture, "kept, {sampling:?}");
+
+        let world = world.clone().with_everything();
+        let (accel, _) = world.structure(AccelChoice::Kind(AccelKind::FastOctree), &AccelParams::DEFAULT);
+        let textures = TextureStore::new(&stage.scene).with_everything();
+        let settings = &Settings { everything: true, ..stage.settings };
+        let (scene, view) = (&stage.scene, &stage.view);
+        let job = Job { scene, world: &world, accel: &accel, textures: &textures, view, settings };
+        assert!(render_counted(&job, &()).picture == flat.picture, "everything, {sampling:?}");
     }
 }
 

@@ -1,7 +1,7 @@
 //! Alpha, straight transmission, and what lies behind.
 
 use super::*;
-use crate::render::coverage;
+use crate::render::{Sampling, Stochastic, coverage};
 use crate::scene::{AlphaMode, Background, Environment};
 
 fn blended(color: Vec3, opacity: f32) -> Material {
@@ -231,6 +231,25 @@ fn shadows_of_opaque_things_among_leaves_do_not_depend_on_how_many_of_either_the
     assert_eq!(differ, 0, "pixels");
     let shadow = |rendered: &Rendered| rendered.counts.shadow.queries;
     assert!(shadow(&few) < shadow(&many), "{} and {}", shadow(&few), shadow(&many));
+}
+
+#[test]
+fn opaque_scenes_send_the_same_rays_by_chance_when_everything_is_done() {
+    let mut s = super::bits::busy();
+    s.scene.materials.iter_mut().for_each(|m| (m.opacity, m.alpha_mode) = (1.0, AlphaMode::Opaque));
+    s.scene.spheres.clear();
+    s.scene.lights.iter_mut().for_each(|light| light.size = 0.3);
+    let how = Stochastic { min_samples: 4, max_samples: 32, error: 0.03, ..Stochastic::default() };
+    s.settings.sampling = Sampling::Stochastic(how);
+    let world = World::new(&s.scene);
+    assert!(world.is_opaque());
+    let world = world.with_everything();
+    let accel = AnyAccel::build(AccelKind::DEFAULT, &world.shapes, &AccelParams::DEFAULT);
+    let textures = TextureStore::new(&s.scene).with_everything();
+    let settings = &Settings { everything: true, ..s.settings };
+    let (scene, view) = (&s.scene, &s.view);
+    let job = Job { scene, world: &world, accel: &accel, textures: &textures, view, settings };
+    assert!(render_counted(&job, &()).picture == s.render().picture);
 }
 
 #[test]

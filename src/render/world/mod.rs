@@ -40,8 +40,8 @@ pub struct World {
     /// First polygon (counted from 0) of each instance, and one past the last.
     first_polygon: Vec<u32>,
     placements: Vec<Placement>,
-    /// How many faces of all instances light may pass.
-    open_faces: usize,
+    /// How many prims light may pass, whether or not anybody asks each of them.
+    open: usize,
 }
 
 /// How an instance turns directions.
@@ -269,14 +269,14 @@ impl World {
 
     /// Whether everything stops light.
     pub(crate) fn is_opaque(&self) -> bool {
-        self.shapes.opaque.all(self.shapes.len()) && self.kept.objects().iter().all(|object| object.opaque)
+        self.open == 0
     }
 
-    /// Whether light may pass most faces: then it takes longer to ask first whether anything stops it.
+    /// Whether light may pass most prims: then it takes longer to ask first whether anything stops it.
     pub(crate) fn is_mostly_open(&self) -> bool {
         /// All but one of so many.
         const MOST: usize = 4;
-        MOST * self.open_faces >= (MOST - 1) * self.len().max(1)
+        MOST * self.open >= (MOST - 1) * self.len().max(1)
     }
 }
 

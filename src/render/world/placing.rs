@@ -88,9 +88,15 @@ impl<'a> Placing<'a> {
         }
 
         let placements = scene.instances.iter().map(|i| Placement::new(i.world_from_object.matrix3)).collect();
-        let open_faces =
-            scene.instances.iter().map(|i| i.mesh as usize).map(|i| solids[i].open_faces(&scene.meshes[i])).sum();
-        let mut world = World { center, bounds, shapes, kept, first_triangle, first_polygon, placements, open_faces };
+        let is_open =
+            |material: u32| scene.materials.get(material as usize).is_some_and(|material| !material.is_opaque());
+        let spheres = scene.spheres.iter().map(|sphere| sphere.material);
+        let cones = scene.cones.iter().map(|cone| cone.material);
+        let others = spheres.chain(cones).chain(scene.planes.iter().map(|plane| plane.material));
+        let meshes = scene.instances.iter().map(|instance| instance.mesh as usize);
+        let open_faces: usize = meshes.map(|i| solids[i].open_faces(&scene.meshes[i])).sum();
+        let open = open_faces + others.filter(|&material| is_open(material)).count();
+        let mut world = World { center, bounds, shapes, kept, first_triangle, first_polygon, placements, open };
         world.shapes.opaque = world.opaque_bits(scene, &solids);
         world
     }

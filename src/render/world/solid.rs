@@ -147,10 +147,11 @@ impl Layer {
             return true;
         }
         let Some((_, uvs)) = coordinates_at(mesh, corners, [0.0; 3], &self.map) else { return false };
-        let [a, b, c] = uvs.map(|uv| uv + self.map.transform.offset);
-        if ![a, b, c].iter().all(|uv| uv.is_finite()) {
+        // What is far away is rounded by more than a texel, also where an offset brings it back.
+        if !uvs.iter().all(|uv| uv.abs().max_element() <= FARTHEST) {
             return false;
         }
+        let [a, b, c] = uvs.map(|uv| uv + self.map.transform.offset);
         self.blocks.are_solid_between(a.min(b).min(c), a.max(b).max(c), self.wrap)
     }
 }
@@ -245,11 +246,12 @@ fn summed([width, height]: [usize; 2], open: &[u8]) -> Vec<u32> {
     sums
 }
 
+/// Coordinates beyond this are rounded by more than a texel of large maps.
+const FARTHEST: f32 = 64.0;
+
 /// The first and last texels along an axis of all that is read between two coordinates: one run of them or two.
 #[expect(clippy::cast_possible_truncation, clippy::cast_precision_loss, reason = "places of some texels")]
 fn spans([lo, hi]: [f32; 2], len: usize, wrap: Wrap) -> [Option<[usize; 2]>; 2] {
-    /// Coordinates beyond this are rounded by more than a texel of large maps.
-    const FARTHEST: f32 = 64.0;
     let all = [Some([0, len - 1]), None];
     if !(lo >= -FARTHEST && hi <= FARTHEST) {
         return all;
