@@ -19,7 +19,7 @@ impl Strip {
     pub(crate) fn thin_out(&mut self, (common, reads): (&Common, bool), mut tell: impl FnMut(usize, Passed)) {
         let Self { count, rays, weights, found, painted, .. } = self;
         let (count, covered) = ((*count).min(POINTS), &painted.covered);
-        // Hardly ever any, and mostly all of them.
+        // Mostly there is nothing to do.
         let fronts = !common.one_sided || found.front[..count].iter().fold(1, |all, front| all & front) == 1;
         let whole = if reads { covered[..count].iter().all(|&covered| covered >= 1.0) } else { common.covered >= 1.0 };
         if fronts && whole {

@@ -272,11 +272,9 @@ impl World {
         self.open == 0
     }
 
-    /// Whether light may pass most prims: then it takes longer to ask first whether anything stops it.
+    /// Whether light may pass half of all prims: then it takes longer to ask first whether anything stops it.
     pub(crate) fn is_mostly_open(&self) -> bool {
-        /// All but one of so many.
-        const MOST: usize = 4;
-        MOST * self.open >= (MOST - 1) * self.len().max(1)
+        2 * self.open >= self.len().max(1)
     }
 }
 
