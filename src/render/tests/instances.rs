@@ -121,6 +121,33 @@ fn what_is_known_to_stop_light_changes_no_bit() {
 }
 
 #[test]
+fn ways_up_from_round_surfaces_meet_the_same_whether_or_not_instances_are_kept() {
+    // Under leaves of which some faces are see-through, within the bulge that the normals of a square describe; seen from aside.
+    let eye = DVec3::new(0.0, -6.0, 0.35);
+    let mut stage = stage(View::look_at(eye, DVec3::ZERO, DVec3::Z, Lens::perspective(0.3)));
+    stage.settings = Settings { width: 96, height: 48, samples: 4, ..Settings::default() };
+    let lean = |p: &Vec3| Vec3::new(p.x, p.y, 1.2).normalize();
+    let ground = square(0.0, 0.9);
+    let normals = ground.positions.iter().map(lean).collect();
+    stage.mesh(Mesh { normals, ..ground }, DAffine3::IDENTITY, material(Vec3::ONE, phong()));
+    let leaf = square(0.0, 0.2);
+    let colors = (0..4).map(|i| Vec3::ONE.extend(if i == 1 { 0.5 } else { 1.0 })).collect();
+    let blended = Material { alpha_mode: AlphaMode::Blend, ..unlit(Vec3::splat(0.1)) };
+    stage.mesh(Mesh { colors, ..leaf }, place(DMat3::IDENTITY, DVec3::new(-0.4, -0.3, 0.1)), blended);
+    for (x, y, z) in [(0.2, -0.3, 0.15), (-0.2, 0.2, 0.12), (0.45, 0.25, 0.08), (0.0, -0.05, 0.2)] {
+        let world_from_object = place(DMat3::from_rotation_z(x), DVec3::new(x, y, z));
+        stage.scene.instances.push(Instance { name: String::new(), mesh: 1, world_from_object });
+    }
+    for (x, y) in [(5.0, 1.0), (-5.0, 2.0), (1.0, 6.0), (-2.0, -5.0)] {
+        stage.lamp(DVec3::new(x, y, 0.3), 1.0);
+    }
+    let (flat, _) = rendered(&stage, Instancing::Flatten, AccelKind::FastOctree);
+    let (kept, _) = rendered(&stage, Instancing::Keep, AccelKind::FastOctree);
+    let differ = flat.picture.beauty.iter().zip(&kept.picture.beauty).filter(|(a, b)| a != b).count();
+    assert_eq!(differ, 0, "pixels");
+}
+
+#[test]
 fn prims_of_kept_instances_lead_back_to_where_they_came_from() {
     let scene = scene().scene;
     let (flat, kept) = (World::new(&scene), World::placing(&scene, Instancing::Keep));
