@@ -7,7 +7,7 @@ use super::curve::Feelers;
 use super::observer::Observer;
 use super::optics::transmittance;
 use super::seam::is_same_crossing;
-use super::shade::{Reader, has_inside, lets_light_through, shadow_filter};
+use super::shade::{Reader, has_inside, shadow_filter};
 use super::surface::{Surface, Target};
 use super::tail::Tail;
 use super::wave::{Media, Medium};
@@ -225,7 +225,7 @@ fn filter_at(context: &Context, ray: &Ray, hit: &Hit, inside: Option<&mut Inside
     if target.material.is_opaque() && !context.everything {
         return Vec3::ZERO;
     }
-    if !lets_light_through(target.material)
+    if !target.material.surface.transmits()
         && let Some(opacity) = target.opacity(hit, context.textures)
     {
         return Vec3::splat(1.0 - coverage(target.material, opacity));

@@ -497,15 +497,6 @@ pub(crate) fn shadow_filter(material: &Material, reader: &Reader) -> Vec3 {
     Vec3::splat(1.0 - solid) + passed.clamp(Vec3::ZERO, Vec3::ONE) * solid
 }
 
-/// Whether a material may let light through where it is there.
-pub(crate) fn lets_light_through(material: &Material) -> bool {
-    match &material.surface {
-        Reflection::Unlit => false,
-        Reflection::Phong(m) => m.transmission != Vec3::ZERO,
-        Reflection::MetalRough(m) => m.transmission > 0.0,
-    }
-}
-
 /// Whether a material has an inside: back faces of what is thin are seen from outside, too.
 pub(crate) fn has_inside(material: &Material) -> bool {
     material.surface.transmits() && material.metal_rough().is_none_or(|m| m.thick)

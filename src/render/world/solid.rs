@@ -7,7 +7,6 @@
 use crate::accel::BitSet;
 use crate::math::{Vec2, Vec4};
 use crate::render::patch::coordinates_at;
-use crate::render::shade::lets_light_through;
 use crate::scene::{AlphaMode, Bitmap, Material, Mesh, Pixels, Scene, TextureRef, Wrap};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -75,7 +74,7 @@ impl Known<'_> {
         if material.alpha_mode != AlphaMode::Opaque {
             maps.extend([(&material.base_color_map, ALPHA, [least, 1.0]), (&material.opacity_map, RED, [1.0; 2])]);
         }
-        if lets_light_through(material) {
+        if material.surface.transmits() {
             // Glass stops light where its map says so.
             let map = &material.metal_rough()?.transmission_map;
             map.as_ref()?;
