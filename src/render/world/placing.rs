@@ -93,8 +93,9 @@ impl<'a> Placing<'a> {
         let spheres = scene.spheres.iter().map(|sphere| sphere.material);
         let cones = scene.cones.iter().map(|cone| cone.material);
         let others = spheres.chain(cones).chain(scene.planes.iter().map(|plane| plane.material));
-        let meshes = scene.instances.iter().map(|instance| instance.mesh as usize);
-        let open_faces: usize = meshes.map(|i| solids[i].open_faces(&scene.meshes[i])).sum();
+        let of_mesh: Vec<usize> =
+            solids.iter().zip(&scene.meshes).map(|(solid, mesh)| solid.open_faces(mesh)).collect();
+        let open_faces: usize = scene.instances.iter().map(|instance| of_mesh[instance.mesh as usize]).sum();
         let open = open_faces + others.filter(|&material| is_open(material)).count();
         let mut world = World { center, bounds, shapes, kept, first_triangle, first_polygon, placements, open };
         world.shapes.opaque = world.opaque_bits(scene, &solids);
