@@ -8,8 +8,8 @@ use super::intersector::{IntersectorKind, Looked, MollerTrumbore, MollerTrumbore
 use super::query::{Culling, Tested};
 use super::volumes::{Ball, Volumes};
 use super::{
-    Accel, AccelParams, Bvh, GridOctree, Hit, Kept, NoProbe, Pencil, Probe, Ray, Shapes, Splitting, StructureStats,
-    Transformed, TwoLevel, Unculled, Wide,
+    Accel, AccelParams, Bvh, GridOctree, Hit, Holes, Kept, NoProbe, Pencil, Probe, Ray, Shapes, Splitting,
+    StructureStats, Transformed, TwoLevel, Unculled, Wide,
 };
 use crate::math::aabb::Aabb;
 
@@ -336,12 +336,19 @@ impl Accel for AnyAccel<'_> {
         self.ask_first(Some(pencil), rays, hits, scratch, probe);
     }
 
-    fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut AnyScratch, probe: &mut P) {
+    fn blocked<P: Probe>(
+        &self,
+        rays: &[Ray],
+        holes: Option<&dyn Holes>,
+        blocked: &mut [bool],
+        scratch: &mut AnyScratch,
+        probe: &mut P,
+    ) {
         assert_eq!(rays.len(), blocked.len(), "a verdict for each ray");
         if P::SILENT {
-            self.ask(Blocked { rays, blocked, probe: &mut NoProbe }, scratch);
+            self.ask(Blocked { rays, holes, blocked, probe: &mut NoProbe }, scratch);
         } else {
-            self.ask(Blocked { rays, blocked, probe }, scratch);
+            self.ask(Blocked { rays, holes, blocked, probe }, scratch);
         }
     }
 
@@ -375,6 +382,7 @@ impl<P: Probe> Question for FirstHits<'_, P> {
 
 struct Blocked<'q, P> {
     rays: &'q [Ray],
+    holes: Option<&'q dyn Holes>,
     blocked: &'q mut [bool],
     probe: &'q mut P,
 }
@@ -383,7 +391,7 @@ impl<P: Probe> Question for Blocked<'_, P> {
     const SILENT: bool = P::SILENT;
 
     fn ask<A: Accel>(self, accel: &A, scratch: &mut A::Scratch) {
-        accel.occluded(self.rays, self.blocked, scratch, self.probe);
+        accel.blocked(self.rays, self.holes, self.blocked, scratch, self.probe);
     }
 }
 

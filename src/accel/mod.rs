@@ -13,6 +13,7 @@ pub mod any;
 pub mod auto;
 pub mod bvh;
 pub mod grid;
+mod holes;
 pub mod instances;
 pub mod intersector;
 pub mod none;
@@ -35,6 +36,7 @@ pub use auto::AccelChoice;
 pub use bvh::Bvh;
 pub use grid::mailbox::MailboxKind;
 pub use grid::{Assign, GridOctree, GridParams};
+pub use holes::Holes;
 pub use instances::{Kept, TwoLevel};
 pub use intersector::{Intersector, IntersectorKind};
 pub use none::Unculled;
@@ -186,7 +188,19 @@ pub trait Accel: Sync {
     /// Whether anything *opaque* lies in `t_min..=t_max` of each ray: prims with a bit in [`Shapes::opaque`]. In a scene, faces of
     /// masked, blended and transmissive materials are opaque only where their maps let nothing through; whether anything at all
     /// lies there says [`Self::closest`].
-    fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut Self::Scratch, probe: &mut P);
+    fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut Self::Scratch, probe: &mut P) {
+        self.blocked(rays, None, blocked, scratch, probe);
+    }
+
+    /// The same, and whether any other prim is in the way that stops light where a ray meets it, as `holes` knows.
+    fn blocked<P: Probe>(
+        &self,
+        rays: &[Ray],
+        holes: Option<&dyn Holes>,
+        blocked: &mut [bool],
+        scratch: &mut Self::Scratch,
+        probe: &mut P,
+    );
 
     /// The first hit of each ray in `t_min..=t_max` that comes after `after` in the order (t, prim). All hits are found one
     /// after the other from [`Hit::BEFORE_ALL`] on, until one is [`Hit::MISS`].

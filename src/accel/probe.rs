@@ -133,6 +133,8 @@ pub enum Outcome {
     LeftOut,
     /// It is hit, but not within the range that is asked about.
     OutOfRange,
+    /// It is hit where it lets light through, or may do so in part, and what stops light is looked for.
+    LetThrough,
     /// It is hit, but a hit before it is known.
     Farther,
     /// It is hit, before everything known so far.
@@ -146,6 +148,7 @@ impl Outcome {
             Self::Miss => "miss",
             Self::LeftOut => "left out",
             Self::OutOfRange => "out of range",
+            Self::LetThrough => "lets light through",
             Self::Farther => "farther",
             Self::Hit => "hit",
         }

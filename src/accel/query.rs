@@ -6,7 +6,7 @@
 use super::intersector::{Exact, Intersector};
 use super::probe::{Outcome, Test};
 use super::wave::{ForAny, ForFirst, ForNext, Wave, begin, end};
-use super::{Accel, Hit, NO_PRIM, Pencil, Probe, Ray, Shapes};
+use super::{Accel, Hit, Holes, NO_PRIM, Pencil, Probe, Ray, Shapes};
 use crate::math::shear::RaySpace;
 use crate::math::simd::LANES;
 use crate::math::triangle::{self, Meeting, Triangle};
@@ -49,12 +49,19 @@ pub trait Goal {
     /// Whether any hit is the answer.
     const ANY: bool = false;
 
-    /// Whether a hit with `prim` would matter at all.
-    fn wants(&self, _shapes: &Shapes, _prim: u32) -> bool {
+    /// Whether hits with prims that are not opaque may matter at all.
+    #[inline(always)]
+    fn wants_open(&self) -> bool {
         true
     }
 
-    /// A hit within the ray's range was found; what that means.
+    /// Whether `prim`, which is hit within the ray's range, matters there.
+    #[inline(always)]
+    fn minds(&self, _opaque: bool, _prim: u32) -> bool {
+        true
+    }
+
+    /// A hit within the ray's range was found that matters; what that means.
     fn offer(&mut self, t: f32, prim: u32) -> Outcome;
 
     /// Hits beyond this distance do not matter any more.
@@ -79,6 +86,8 @@ pub struct Query<'a, G: Goal> {
     shapes: &'a Shapes,
     prepared: <G::Test as Intersector>::Prepared,
     pub(super) goal: G,
+    /// Whether what is tested stops light wherever it is met, where it is not among the shapes.
+    pub(super) opaque: Option<bool>,
     /// The triangle that was offered last and taken, where it came from a block.
     winner: Option<Winner>,
 }
@@ -101,7 +110,10 @@ impl<'a, G: Goal> Query<'a, G> {
         let (space, usable) = RaySpace::checked(ray.origin, ray.dir);
         let prepared = goal.test().prepare(&space);
         let usable = usable && t_min <= t_max && !ray.t_max.is_nan();
-        (Self { ray: space, t_min, t_max, exclude: ray.exclude, shapes, prepared, goal, winner: None }, usable)
+        (
+            Self { ray: space, t_min, t_max, exclude: ray.exclude, shapes, prepared, goal, opaque: None, winner: None },
+            usable,
+        )
     }
 
     /// Hits beyond this distance do not matter; shrinks as hits are found.
@@ -113,7 +125,7 @@ impl<'a, G: Goal> Query<'a, G> {
     /// Whether a prim is tested at all: not one that the ray excludes, or a hit of which would not matter.
     #[inline]
     pub fn asks_for(&self, prim: u32) -> bool {
-        prim != self.exclude && self.goal.wants(self.shapes, prim)
+        prim != self.exclude && (self.goal.wants_open() || self.is_opaque(prim))
     }
 
     /// Tests one prim and tells whether the query is answered.
@@ -147,12 +159,21 @@ impl<'a, G: Goal> Query<'a, G> {
     #[inline]
     fn offer(&mut self, t: f32, prim: u32) -> Outcome {
         if t >= self.t_min && t <= self.t_max {
+            if G::ANY && !self.goal.minds(self.is_opaque(prim), prim) {
+                return Outcome::LetThrough;
+            }
             self.goal.offer(t, prim)
         } else if t.is_nan() {
             Outcome::Miss
         } else {
             Outcome::OutOfRange
         }
+    }
+
+    /// Whether a prim stops light wherever it is met.
+    #[inline]
+    fn is_opaque(&self, prim: u32) -> bool {
+        self.opaque.unwrap_or_else(|| self.shapes.opaque.get_or_set(prim))
     }
 
     /// Takes the verdicts of a block's first `count` lanes, decides those that are open, and tells whether the query is
@@ -213,7 +234,7 @@ impl<'a, G: Goal> Query<'a, G> {
     /// Offers the hit with a triangle that is hit for certain, or may be.
     #[inline(never)]
     pub fn take<P: Probe>(&mut self, prim: u32, corners: &Triangle, certain: bool, probe: &mut P) -> bool {
-        if prim == self.exclude || !self.goal.wants(self.shapes, prim) {
+        if !self.asks_for(prim) {
             probe.tested(|| Test { prim, t: f32::NAN, outcome: Outcome::LeftOut });
             return false;
         }
@@ -312,19 +333,26 @@ impl<I: Intersector> Goal for Closest<I> {
     }
 }
 
-/// Whether anything opaque is hit.
-pub struct Occluded<I> {
+/// Whether anything is hit that stops light: what is opaque, and what others say does so where it is hit.
+pub struct Occluded<'w, I> {
     pub(super) found: bool,
+    /// Who knows of prims that are not opaque, and the ray's number there.
+    holes: Option<&'w dyn Holes>,
+    ray: usize,
     test: I,
 }
 
-impl<I: Intersector> Goal for Occluded<I> {
+impl<I: Intersector> Goal for Occluded<'_, I> {
     type Test = I;
     const ANY: bool = true;
 
     #[inline]
-    fn wants(&self, shapes: &Shapes, prim: u32) -> bool {
-        shapes.opaque.get_or_set(prim)
+    fn wants_open(&self) -> bool {
+        self.holes.is_some()
+    }
+    #[inline(always)]
+    fn minds(&self, opaque: bool, prim: u32) -> bool {
+        opaque || self.holes.is_some_and(|holes| holes.stops(self.ray, prim))
     }
     #[inline]
     fn offer(&mut self, _t: f32, _prim: u32) -> Outcome {
@@ -383,9 +411,11 @@ impl<I> Closest<I> {
     }
 }
 
-impl<I> Occluded<I> {
-    pub(super) fn nothing(test: I) -> Self {
-        Self { found: false, test }
+impl<'w, I> Occluded<'w, I> {
+    /// Nothing yet, of the ray of this number.
+    #[inline(always)]
+    pub(super) fn by(holes: Option<&'w dyn Holes>, ray: usize, test: I) -> Self {
+        Self { found: false, holes, ray, test }
     }
 }
 
@@ -422,8 +452,15 @@ impl<C: Culling> Accel for C {
         self.trace(&mut ForFirst { rays, pencil: Some(*pencil), hits, test: Exact }, scratch, probe);
     }
 
-    fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut Self::Scratch, probe: &mut P) {
-        occluded(Exact, self, rays, blocked, scratch, probe);
+    fn blocked<P: Probe>(
+        &self,
+        rays: &[Ray],
+        holes: Option<&dyn Holes>,
+        blocked: &mut [bool],
+        scratch: &mut Self::Scratch,
+        probe: &mut P,
+    ) {
+        self::blocked(Exact, self, (rays, holes), blocked, scratch, probe);
     }
 
     fn next<P: Probe>(
@@ -463,8 +500,15 @@ impl<I: Intersector, C: Culling> Accel for Tested<'_, I, C> {
         closest(self.test, self.structure, rays, hits, scratch, probe);
     }
 
-    fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut Self::Scratch, probe: &mut P) {
-        occluded(self.test, self.structure, rays, blocked, scratch, probe);
+    fn blocked<P: Probe>(
+        &self,
+        rays: &[Ray],
+        holes: Option<&dyn Holes>,
+        blocked: &mut [bool],
+        scratch: &mut Self::Scratch,
+        probe: &mut P,
+    ) {
+        self::blocked(self.test, self.structure, (rays, holes), blocked, scratch, probe);
     }
 
     fn next<P: Probe>(
@@ -490,15 +534,15 @@ fn closest<I: Intersector, C: Culling, P: Probe>(
     structure.trace(&mut ForFirst { rays, pencil: None, hits, test }, scratch, probe);
 }
 
-fn occluded<I: Intersector, C: Culling, P: Probe>(
+fn blocked<I: Intersector, C: Culling, P: Probe>(
     test: I,
     structure: &C,
-    rays: &[Ray],
+    (rays, holes): (&[Ray], Option<&dyn Holes>),
     blocked: &mut [bool],
     scratch: &mut C::Scratch,
     probe: &mut P,
 ) {
-    structure.trace(&mut ForAny { rays, blocked, test }, scratch, probe);
+    structure.trace(&mut ForAny { rays, holes, blocked, test }, scratch, probe);
 }
 
 fn next<I: Intersector, C: Culling, P: Probe>(

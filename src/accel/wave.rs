@@ -5,7 +5,7 @@
 use std::ops::Range;
 
 use super::query::{Closest, Goal, Next, Occluded, Query};
-use super::{Hit, Intersector, NO_PRIM, Probe, Ray, Shapes};
+use super::{Hit, Holes, Intersector, NO_PRIM, Probe, Ray, Shapes};
 use crate::math::Vec3;
 use crate::math::simd::{LANES, Row};
 
@@ -154,12 +154,13 @@ impl<I: Intersector> Wave for ForFirst<'_, I> {
 
 pub(super) struct ForAny<'w, I> {
     pub rays: &'w [Ray],
+    pub holes: Option<&'w dyn Holes>,
     pub blocked: &'w mut [bool],
     pub test: I,
 }
 
-impl<I: Intersector> Wave for ForAny<'_, I> {
-    type Goal = Occluded<I>;
+impl<'w, I: Intersector> Wave for ForAny<'w, I> {
+    type Goal = Occluded<'w, I>;
 
     #[inline(always)]
     fn rays(&self) -> &[Ray] {
@@ -167,8 +168,8 @@ impl<I: Intersector> Wave for ForAny<'_, I> {
     }
 
     #[inline(always)]
-    fn goal(&self, _: usize) -> Occluded<I> {
-        Occluded::nothing(self.test)
+    fn goal(&self, i: usize) -> Occluded<'w, I> {
+        Occluded::by(self.holes, i, self.test)
     }
 
     #[inline(always)]
@@ -183,7 +184,7 @@ impl<I: Intersector> Wave for ForAny<'_, I> {
     }
 
     #[inline]
-    fn answer(&mut self, i: usize, query: &Query<Occluded<I>>) -> bool {
+    fn answer(&mut self, i: usize, query: &Query<Occluded<'w, I>>) -> bool {
         self.blocked[i] = query.goal.found;
         self.blocked[i]
     }

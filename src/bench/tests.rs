@@ -7,7 +7,7 @@ use super::machine::Machine;
 use super::rays::{Class, RaySet, record};
 use super::report::{Format, Model, Rays, Report, text};
 use super::row::{Count, Row};
-use crate::accel::{Accel, AccelKind, AccelParams, AnyAccel, Hit, Probe, Ray, RayCounts, Unculled};
+use crate::accel::{Accel, AccelKind, AccelParams, AnyAccel, Hit, Holes, Probe, Ray, RayCounts, Unculled};
 use crate::load::{LoadOptions, load_bytes};
 use crate::render::texture::TextureStore;
 use crate::render::{ClassCounts, Job, Question, Settings, View, World, render_counted};
@@ -150,8 +150,15 @@ impl Accel for Blind<'_> {
         hits.iter_mut().filter(|h| h.prim == self.1).for_each(|h| *h = Hit::MISS);
     }
 
-    fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut (), probe: &mut P) {
-        self.0.occluded(rays, blocked, scratch, probe);
+    fn blocked<P: Probe>(
+        &self,
+        rays: &[Ray],
+        holes: Option<&dyn Holes>,
+        blocked: &mut [bool],
+        scratch: &mut (),
+        probe: &mut P,
+    ) {
+        self.0.blocked(rays, holes, blocked, scratch, probe);
     }
 
     fn next<P: Probe>(&self, rays: &[Ray], after: &[Hit], hits: &mut [Hit], scratch: &mut (), probe: &mut P) {

@@ -2,7 +2,8 @@
 
 use super::Progress;
 use super::observer::{Observer, Question};
-use crate::accel::{Accel, Hit, Pencil, Ray};
+use super::shadow::Through;
+use crate::accel::{Accel, Hit, Holes, Pencil, Ray};
 
 /// A structure, one worker's scratch for it, and whoever may end the work.
 pub(crate) struct Asking<'a, A: Accel> {
@@ -50,12 +51,24 @@ impl<'a, A: Accel> Asking<'a, A> {
 
     /// Whether anything opaque is hit by each ray.
     pub(crate) fn occluded<P: Observer>(&mut self, rays: &[Ray], blocked: &mut [bool], probe: &mut P) {
-        for (rays, blocked) in rays.chunks(P::SLICE).zip(blocked.chunks_mut(P::SLICE)) {
+        self.blocked(rays, None, blocked, probe);
+    }
+
+    /// The same, and whether anything else is hit where it stops light.
+    pub(crate) fn stopped<P: Observer>(&mut self, through: &Through, blocked: &mut [bool], probe: &mut P) {
+        self.blocked(through.rays, Some(through), blocked, probe);
+    }
+
+    fn blocked<P: Observer>(&mut self, rays: &[Ray], through: Option<&Through>, blocked: &mut [bool], probe: &mut P) {
+        let slices = rays.chunks(P::SLICE).zip(blocked.chunks_mut(P::SLICE));
+        for (start, (rays, blocked)) in (0..).step_by(P::SLICE).zip(slices) {
             if self.gives_up() {
                 return;
             }
             probe.asked(Question::Occluded, rays, &[]);
-            self.accel.occluded(rays, blocked, &mut self.scratch, probe);
+            let part = through.map(|through| through.part(start..start + rays.len()));
+            let holes = part.as_ref().map(|part| part as &dyn Holes);
+            self.accel.blocked(rays, holes, blocked, &mut self.scratch, probe);
             probe.answered(&[]);
         }
     }

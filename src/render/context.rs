@@ -55,6 +55,8 @@ pub(crate) struct Context<'a> {
     pub bands: Vec<Band>,
     /// Whether anything but opaque surfaces can stand before a light.
     pub has_filters: bool,
+    /// Whether anything stops light in some places and lets it through in others, as maps say.
+    pub has_holes: bool,
     /// How strongly the insides of materials absorb light.
     pub absorption: Absorption,
     /// Whether the environment is what is seen behind the scene.
@@ -149,6 +151,7 @@ impl<'a> Context<'a> {
             common: (0..).zip(&scene.materials).map(common).collect(),
             bands: if needs(&[Feature::Dispersion]) { bands() } else { Vec::new() },
             has_filters: everything || !world.is_opaque(),
+            has_holes: !everything && world.has_holes(),
             absorption: Absorption::of(&scene.materials, everything),
             shows_environment: scene.background == Some(Background::Environment),
             lets_background_through: features.has(Feature::ThinTransmission) || features.has(Feature::Refraction),

@@ -11,9 +11,13 @@ use super::shade::{Reader, has_inside, shadow_filter};
 use super::surface::{Surface, Target};
 use super::tail::Tail;
 use super::wave::{Media, Medium};
-use crate::accel::{Accel, Hit, Ray};
-use crate::math::Vec3;
+use crate::accel::shapes::Prim;
+use crate::accel::{Accel, Hit, Holes, Ray};
+use crate::math::shear::RaySpace;
+use crate::math::{Vec3, triangle};
 use bytemuck::{Pod, Zeroable};
+use std::cell::Cell;
+use std::ops::Range;
 
 /// Shadow rays that wait, each with the light it lets through. Buffers of one worker.
 #[derive(Debug, Default)]
@@ -26,10 +30,12 @@ pub(crate) struct Shadows {
     risers: Vec<Ray>,
     raised: Vec<usize>,
     blocked: Vec<bool>,
-    /// The hit that each ray has passed last.
+    /// Which of them meet something that lets light through in part.
+    in_part: Vec<Cell<bool>>,
+    /// Those that go on from surface to surface: their numbers, the rays, the hit that each has passed last and the one behind.
+    going: Vec<usize>,
+    on_way: Vec<Ray>,
     after: Vec<Hit>,
-    /// The same for the rays that go on, while they are picked out.
-    kept: Vec<Hit>,
     hits: Vec<Hit>,
 }
 
@@ -98,7 +104,7 @@ impl Shadows {
         self.raised.clear();
     }
 
-    /// Traces all rays and hands what arrives to `arrive`, as (sample or tag, light) in an order that is always the same.
+    /// Traces all rays and hands what arrives to `arrive`, as (sample or tag, light) in the order of the rays.
     pub(crate) fn trace<A: Accel, P: Observer>(
         &mut self,
         context: &Context,
@@ -108,32 +114,42 @@ impl Shadows {
     ) {
         self.blocked.clear();
         self.blocked.resize(self.rays.len(), false);
-        // Where hardly anything is opaque, what is will be met on the way.
-        if !context.world.is_mostly_open() {
+        let asks_holes = context.has_holes && P::HEARS_OF_HOLES;
+        if asks_holes {
+            self.in_part.clear();
+            self.in_part.resize(self.rays.len(), Cell::new(false));
+            let through = Through { context, rays: &self.rays, in_part: &self.in_part };
+            asking.stopped(&through, &mut self.blocked, probe);
+        } else if !context.world.is_mostly_clear() {
+            // Where hardly anything is opaque, what is will be met on the way.
             asking.occluded(&self.rays, &mut self.blocked, probe);
         }
         self.climb(context, asking, probe);
-        if !context.has_filters {
-            let open = self.light.iter().zip(&self.blocked).filter(|(_, blocked)| !**blocked);
-            open.for_each(|(light, _)| arrive(light.tag, light.radiance));
-            return self.clear();
+        if context.has_filters {
+            let wanted = |i: &usize| !self.blocked[*i] && (!asks_holes || self.in_part[*i].get());
+            self.going.clear();
+            self.going.extend((0..self.rays.len()).filter(wanted));
+            self.go_through(context, asking, probe);
         }
-
-        // Walk through what is on the way of those that are left, one surface of each ray a time.
-        let blocked = std::mem::take(&mut self.blocked);
-        self.keep(|i, _, _, _| !blocked[i]);
-        self.blocked = blocked;
-        self.after.clear();
-        self.hits.clear();
-        self.hits.resize(self.rays.len(), Hit::MISS);
-        asking.closest(&self.rays, &mut self.hits, probe);
-        while !self.rays.is_empty() {
-            self.filter(context, &mut arrive);
-            self.hits.clear();
-            self.hits.resize(self.rays.len(), Hit::MISS);
-            asking.next(&self.rays, &self.after, &mut self.hits, probe);
-        }
+        let open = self.light.iter().zip(&self.blocked).filter(|(_, blocked)| !**blocked);
+        open.for_each(|(light, _)| arrive(light.tag, light.radiance));
         self.clear();
+    }
+
+    /// Walks through what is on the way of those that go on, one surface of each ray a time.
+    fn go_through<A: Accel, P: Observer>(&mut self, context: &Context, asking: &mut Asking<A>, probe: &mut P) {
+        self.on_way.clear();
+        self.on_way.extend(self.going.iter().map(|&i| self.rays[i]));
+        self.after.clear();
+        self.after.resize(self.going.len(), Hit::MISS);
+        self.hits.clone_from(&self.after);
+        asking.closest(&self.on_way, &mut self.hits, probe);
+        while !self.going.is_empty() {
+            self.filter(context);
+            self.hits.clear();
+            self.hits.resize(self.going.len(), Hit::MISS);
+            asking.next(&self.on_way, &self.after, &mut self.hits, probe);
+        }
     }
 
     /// Blocks the rays whose starts are cut off from their surfaces, and weakens those that are so in part.
@@ -173,49 +189,74 @@ impl Shadows {
         }
     }
 
-    /// Hands over the light of rays that met nothing more, weakens that of the others, and drops those it leaves dark.
-    fn filter(&mut self, context: &Context, arrive: &mut impl FnMut(u32, Vec3)) {
-        let hits = std::mem::take(&mut self.hits);
-        let after = std::mem::take(&mut self.after);
-        let mut kept = std::mem::take(&mut self.kept);
-        self.keep(|i, ray, light, inside| {
-            let hit = &hits[i];
+    /// Weakens the light of rays that have met something more, and blocks those it leaves dark; the others go on.
+    fn filter(&mut self, context: &Context) {
+        let mut kept = 0;
+        for k in 0..self.going.len() {
+            let (i, hit) = (self.going[k], self.hits[k]);
             if !hit.is_some() {
-                arrive(light.tag, light.radiance);
-                return false;
+                continue;
             }
-            if !after.get(i).is_some_and(|before| is_same_crossing(|prim| context.face(prim), ray, before, hit)) {
-                light.radiance *= filter_at(context, ray, hit, inside);
+            let (ray, light) = (self.on_way[k], &mut self.light[i].radiance);
+            *light *= if is_same_crossing(|prim| context.face(prim), &ray, &self.after[k], &hit) {
+                // What stops light does so among others in its place, too.
+                let stops = filter_at(context, &ray, &hit, None).max_element() <= 0.0;
+                if stops { Vec3::ZERO } else { Vec3::ONE }
+            } else {
+                filter_at(context, &ray, &hit, self.inside.get_mut(i))
+            };
+            if light.max_element() <= 0.0 {
+                self.blocked[i] = true;
+                continue;
             }
-            let goes_on = light.radiance.max_element() > 0.0;
-            if goes_on {
-                kept.push(*hit);
-            }
-            goes_on
-        });
-        self.after = kept;
-        self.kept = after;
-        self.kept.clear();
-        self.hits = hits;
+            (self.going[kept], self.on_way[kept], self.after[kept]) = (i, ray, hit);
+            kept += 1;
+        }
+        self.going.truncate(kept);
+        self.on_way.truncate(kept);
+        self.after.truncate(kept);
+    }
+}
+
+/// Rays that ask what stops their light, and which of them have met what lets some through.
+#[derive(Clone, Copy)]
+pub(super) struct Through<'a> {
+    context: &'a Context<'a>,
+    pub rays: &'a [Ray],
+    in_part: &'a [Cell<bool>],
+}
+
+impl Through<'_> {
+    /// So many of the rays.
+    pub(super) fn part(&self, rays: Range<usize>) -> Self {
+        Self { rays: &self.rays[rays.clone()], in_part: &self.in_part[rays], ..*self }
     }
 
-    /// Drops the rays for which `wanted` (index, ray, light, what they are inside of) is false; the others keep their order.
-    fn keep(&mut self, mut wanted: impl FnMut(usize, &Ray, &mut Bound, Option<&mut Inside>) -> bool) {
-        let mut kept = 0;
-        for i in 0..self.rays.len() {
-            let (mut light, mut inside) = (self.light[i], self.inside.get(i).copied());
-            if wanted(i, &self.rays[i], &mut light, inside.as_mut()) {
-                self.rays[kept] = self.rays[i];
-                self.light[kept] = light;
-                if let Some(inside) = inside {
-                    self.inside[kept] = inside;
-                }
-                kept += 1;
-            }
+    /// What is left of light behind a prim where a ray meets it: all or nothing; `None` where it is neither, or where it
+    /// takes more to know.
+    fn left(&self, ray: &Ray, prim: u32) -> Option<bool> {
+        let target = Target::new(self.context.scene, self.context.world, prim);
+        if target.material.surface.transmits() {
+            return None;
         }
-        self.rays.truncate(kept);
-        self.light.truncate(kept);
-        self.inside.truncate(kept);
+        let Prim::Triangle(corners) = self.context.world.prim(prim) else { return None };
+        let (t, u, v) = triangle::place(&RaySpace::checked(ray.origin, ray.dir).0, &corners);
+        let opacity = target.opacity(&Hit { t, u, v, prim }, self.context.textures)?;
+        match 1.0 - coverage(target.material, opacity) {
+            0.0 => Some(false),
+            1.0 => Some(true),
+            _ => None,
+        }
+    }
+}
+
+impl Holes for Through<'_> {
+    fn stops(&self, ray: usize, prim: u32) -> bool {
+        let left = self.left(&self.rays[ray], prim);
+        if left.is_none() {
+            self.in_part[ray].set(true);
+        }
+        left == Some(false)
     }
 }
 

@@ -39,10 +39,6 @@ impl<T: Copy> Tail<T> {
         self.len += 1;
     }
 
-    pub(super) fn truncate(&mut self, len: usize) {
-        self.len = self.len.min(len);
-    }
-
     pub(super) fn clear(&mut self) {
         self.len = 0;
     }
@@ -74,10 +70,9 @@ mod tests {
         tail.grow(2);
         tail.push(6);
         assert_eq!(*tail, [1, 2, 3, 6]);
-        tail.truncate(3);
-        tail.push(7);
-        assert_eq!(*tail, [1, 2, 3, 7]);
         tail.clear();
         assert!(tail.is_empty());
+        tail.push(7);
+        assert_eq!(*tail, [7]);
     }
 }

@@ -8,7 +8,7 @@ use crate::accel::slabs::BoxRay;
 use crate::accel::stats::listed_once;
 use crate::accel::wide::split::Item;
 use crate::accel::wide::{Splitting, Stack};
-use crate::accel::{Accel, Hit, NO_PRIM, Probe, Ray, Shapes, StructureStats, Wide};
+use crate::accel::{Accel, Hit, Holes, NO_PRIM, Probe, Ray, Shapes, StructureStats, Wide};
 use crate::math::aabb::Aabb;
 use rayon::prelude::*;
 
@@ -128,9 +128,11 @@ impl<'a> TwoLevel<'a> {
         self.places.walk(0, &ray, query, &mut scratch.places, probe, |places, query, probe| {
             places.iter().any(|&i| {
                 let placed = &self.kept.placed()[i as usize];
-                let wanted = !G::ANY || self.kept.objects()[placed.object as usize].opaque;
+                let opaque = self.kept.objects()[placed.object as usize].opaque;
                 let tree = &self.objects[placed.object as usize];
-                wanted && tree.walk_placed(&placed.place, placed.first, query, stack, probe)
+                query.opaque = Some(opaque);
+                (opaque || query.goal.wants_open())
+                    && tree.walk_placed(&placed.place, placed.first, query, stack, probe)
             })
         });
     }
@@ -180,6 +182,18 @@ impl<'a> TwoLevel<'a> {
     }
 }
 
+/// Prims by the numbers that they have in the tree of what is stored.
+struct Numbered<'a> {
+    kept: &'a Kept,
+    holes: &'a dyn Holes,
+}
+
+impl Holes for Numbered<'_> {
+    fn stops(&self, ray: usize, prim: u32) -> bool {
+        self.holes.stops(ray, self.kept.number(prim))
+    }
+}
+
 impl Accel for TwoLevel<'_> {
     type Scratch = LevelScratch;
 
@@ -200,11 +214,20 @@ impl Accel for TwoLevel<'_> {
         self.go_on(rays, hits, scratch, probe, |i, known| (rays[i].t_min, Closest::before(known, Exact)));
     }
 
-    fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut LevelScratch, probe: &mut P) {
+    fn blocked<P: Probe>(
+        &self,
+        rays: &[Ray],
+        holes: Option<&dyn Holes>,
+        blocked: &mut [bool],
+        scratch: &mut LevelScratch,
+        probe: &mut P,
+    ) {
         self.renumber(rays, &mut scratch.rays);
-        self.stored.occluded(&scratch.rays, blocked, &mut scratch.stored, probe);
-        for (ray, blocked) in rays.iter().zip(blocked).filter(|(_, blocked)| !**blocked) {
-            let (mut query, usable) = Query::new(self.stored.shapes(), ray, ray.t_min, Occluded::nothing(Exact));
+        let numbered = holes.map(|holes| Numbered { kept: self.kept, holes });
+        let stored = numbered.as_ref().map(|holes| holes as &dyn Holes);
+        self.stored.blocked(&scratch.rays, stored, blocked, &mut scratch.stored, probe);
+        for (i, (ray, blocked)) in rays.iter().zip(blocked).enumerate().filter(|(_, (_, blocked))| !**blocked) {
+            let (mut query, usable) = Query::new(self.stored.shapes(), ray, ray.t_min, Occluded::by(holes, i, Exact));
             if usable {
                 self.walk(&mut query, scratch, probe);
             }

@@ -106,8 +106,8 @@ fn about(n: usize, size: f64, at: DVec3) -> Vec<(usize, DAffine3)> {
     (0..n).map(|i| (i % 3, standing(&mut r, i / 3, size, at))).collect()
 }
 
-/// The first hits, those behind them, and what is blocked.
-fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<[u32; 9]> {
+/// The first hits, those behind them, what is blocked, and what would be if some of the rest let light through.
+fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<[u32; 10]> {
     crate::accel::tests::answers(accel, rays)
 }
 

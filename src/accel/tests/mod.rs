@@ -25,20 +25,31 @@ const PARAMS: [GridParams; 5] = [
     GridParams { dims: Some([1, 2, 1]), max_depth: 5, leaf_size: Some(1), assign: Assign::Box, ..GridParams::DEFAULT },
 ];
 
-/// All hits of the three queries, as bits.
-pub(crate) fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<[u32; 9]> {
+/// Prims that are not opaque stop every third ray, each another third.
+pub(crate) struct Sieve;
+
+impl Holes for Sieve {
+    fn stops(&self, ray: usize, prim: u32) -> bool {
+        (ray + prim as usize * 7).is_multiple_of(3)
+    }
+}
+
+/// All hits of the three queries, what is blocked by what is opaque, and through [`Sieve`], as bits.
+pub(crate) fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<[u32; 10]> {
     let mut scratch = accel.scratch();
     let mut first = vec![Hit::MISS; rays.len()];
     let mut blocked = vec![false; rays.len()];
+    let mut stopped = vec![false; rays.len()];
     let mut second = first.clone();
+    accel.blocked(rays, Some(&Sieve), &mut stopped, &mut scratch, &mut NoProbe);
     accel.closest(rays, &mut first, &mut scratch, &mut NoProbe);
     accel.occluded(rays, &mut blocked, &mut scratch, &mut NoProbe);
     accel.next(rays, &first, &mut second, &mut scratch, &mut NoProbe);
-    let row = |((a, b), c): ((&Hit, &bool), &Hit)| {
+    let row = |(((a, b), c), d): (((&Hit, &bool), &Hit), &bool)| {
         let ([t, u, v, p], [t2, u2, v2, p2]) = (a.bits(), c.bits());
-        [t, u, v, p, u32::from(*b), t2, u2, v2, p2]
+        [t, u, v, p, u32::from(*b), t2, u2, v2, p2, u32::from(*d)]
     };
-    first.iter().zip(&blocked).zip(&second).map(row).collect()
+    first.iter().zip(&blocked).zip(&second).zip(&stopped).map(row).collect()
 }
 
 /// How many rays are answered otherwise than by brute force.
@@ -61,10 +72,37 @@ pub(crate) fn far_rays(shapes: &Shapes, n: usize, times: std::ops::Range<f32>) -
         .collect()
 }
 
-fn assert_same(what: &str, rays: &[Ray], got: &[[u32; 9]], expected: &[[u32; 9]]) {
+fn assert_same(what: &str, rays: &[Ray], got: &[[u32; 10]], expected: &[[u32; 10]]) {
     for ((ray, got), expected) in rays.iter().zip(got).zip(expected) {
         assert_eq!(got, expected, "{what}, {ray:?}");
     }
+}
+
+#[test]
+fn a_ray_is_stopped_by_whatever_it_hits_that_is_opaque_or_has_no_hole_there() {
+    let mut told_apart = 0;
+    for (name, shapes) in all() {
+        let rays = rays(&shapes, 30);
+        let accel = Unculled::new(&shapes);
+        let mut stops = vec![[false; 2]; rays.len()];
+        let (mut after, mut hits) = (vec![Hit::BEFORE_ALL; rays.len()], vec![Hit::MISS; rays.len()]);
+        loop {
+            accel.next(&rays, &after, &mut hits, &mut (), &mut NoProbe);
+            if !hits.iter().any(Hit::is_some) {
+                break;
+            }
+            for (i, hit) in hits.iter().enumerate().filter(|(_, hit)| hit.is_some()) {
+                let opaque = shapes.opaque.get_or_set(hit.prim);
+                stops[i][0] |= opaque;
+                stops[i][1] |= opaque || Sieve.stops(i, hit.prim);
+            }
+            after.clone_from(&hits);
+        }
+        let got: Vec<[bool; 2]> = answers(&accel, &rays).iter().map(|a| [a[4] == 1, a[9] == 1]).collect();
+        assert_eq!(got, stops, "{name}");
+        told_apart += stops.iter().filter(|[opaque, all]| opaque != all).count();
+    }
+    assert!(told_apart > 100, "{told_apart}");
 }
 
 #[test]
@@ -163,7 +201,7 @@ fn rays_that_are_not_numbers_or_go_nowhere_miss() {
     let tree = Wide::build(&shapes, Splitting::Octree);
     let all = [answers(&grid, &rays), answers(&tree, &rays), answers(&Unculled::new(&shapes), &rays)];
     for answer in all.into_iter().flatten() {
-        assert_eq!((answer[3], answer[4], answer[8]), (NO_PRIM, 0, NO_PRIM));
+        assert_eq!((answer[3], answer[4], answer[8], answer[9]), (NO_PRIM, 0, NO_PRIM, 0));
     }
 }
 

@@ -192,7 +192,7 @@ impl Seeker {
         match between {
             Some((low, high)) if low > self.best.high || high < self.t_min => false,
             Some((low, high)) if (low > self.t_min) & (high < self.best.low) & (high <= self.best.high) => {
-                if !wave.goal(self.number).wants(shapes, place.prim) {
+                if W::Goal::ANY && !wave.goal(self.number).minds(shapes.opaque.get_or_set(place.prim), place.prim) {
                     return false;
                 }
                 self.best = Best { low, high, place };
@@ -228,7 +228,8 @@ pub(super) fn decide<W: Wave>(
     }
     let t = triangle::distance_along(ray.origin, ray.dir, &corners);
     let (mut goal, within) = (wave.goal(i), wave.t_min(i)..=ray.t_max.min(f32::MAX));
-    if !within.contains(&t) || !goal.wants(shapes, place.prim) || goal.offer(t, place.prim) != Outcome::Hit {
+    let minds = |goal: &W::Goal| !W::Goal::ANY || goal.minds(shapes.opaque.get_or_set(place.prim), place.prim);
+    if !within.contains(&t) || !minds(&goal) || goal.offer(t, place.prim) != Outcome::Hit {
         return None;
     }
     if W::Goal::ANY {

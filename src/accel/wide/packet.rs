@@ -425,15 +425,18 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
     ) -> u32 {
         let prim = place.prim;
         let rays = rays & !s.find_word(prim, &self.rays.exclude);
-        if !trip.wave.goal(self.start).wants(trip.shapes, prim) {
+        if !trip.wave.goal(self.start).wants_open() && !trip.shapes.opaque.get_or_set(prim) {
             return 0;
         }
         let (hit, unsure) = (verdicts.hit & rays, verdicts.unsure & rays);
         let t_min = s.load(&self.rays.t_min);
-        let better = s.less(t_min, low) & s.less(high, reach.low) & s.at_most(high, reach.high) & hit;
+        let mut better = s.less(t_min, low) & s.less(high, reach.low) & s.at_most(high, reach.high) & hit;
         // The exact test decides about distances that may be equal, and about what lanes cannot tell.
         let in_time = s.at_most(low, reach.high) & s.at_most(t_min, high);
         let mut open = hit & in_time & !better | unsure;
+        if W::Goal::ANY && better != 0 && !trip.shapes.opaque.get_or_set(prim) {
+            better = self.minding(trip.wave, prim, better);
+        }
         (reach.low, reach.high) = (s.choose(better, low, reach.low), s.choose(better, high, reach.high));
         s.put_word(better, prim, &mut self.found.prim);
         s.put_word(better, place.packed(), &mut self.found.place);
@@ -458,6 +461,19 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
             (reach.low, reach.high) = (s.load(&low), s.load(&high));
         }
         changed
+    }
+
+    /// The rays of a mask that mind being hit by a prim that is not opaque.
+    #[cold]
+    #[inline(never)]
+    fn minding<W: Wave>(&self, wave: &W, prim: u32, rays: u32) -> u32 {
+        let (mut minding, mut left) = (0, rays);
+        while left != 0 {
+            let ray = left.trailing_zeros();
+            left &= left - 1;
+            minding |= u32::from(wave.goal(self.start + ray as usize).minds(false, prim)) << ray;
+        }
+        minding
     }
 
     /// Where the rays of a mask meet what they hit.

@@ -3,6 +3,7 @@
 use super::entrance::CROWD;
 use super::flight::{DEPTH, FARTHEST_FIRST};
 use super::{ASKED, MANY, RayOrder, Splitting, Wide};
+use crate::accel::tests::Sieve;
 use crate::accel::tests::scenes::{self, ray};
 use crate::accel::{Accel, Hit, NoProbe, Pencil, Ray, Shapes, Unculled};
 use crate::math::Vec3;
@@ -11,7 +12,7 @@ use crate::math::simd::{Level, WIDE};
 
 const WAYS: [RayOrder; 4] = [RayOrder::OneByOne, RayOrder::InFlight, RayOrder::Packets, RayOrder::Adaptive];
 
-/// First hits, the hits behind them, and what is blocked.
+/// First hits, the hits behind them, what is blocked, and what would be if some of the rest let light through.
 fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> String {
     let mut scratch = accel.scratch();
     let hits = first_hits(accel, rays);
@@ -19,8 +20,10 @@ fn answers<A: Accel>(accel: &A, rays: &[Ray]) -> String {
     accel.next(rays, &hits, &mut behind, &mut scratch, &mut NoProbe);
     let mut blocked = vec![false; rays.len()];
     accel.occluded(rays, &mut blocked, &mut scratch, &mut NoProbe);
+    let mut stopped = vec![false; rays.len()];
+    accel.blocked(rays, Some(&Sieve), &mut stopped, &mut scratch, &mut NoProbe);
     let bits = |hits: &[Hit]| hits.iter().map(Hit::bits).collect::<Vec<_>>();
-    format!("{:?} {:?} {blocked:?}", bits(&hits), bits(&behind))
+    format!("{:?} {:?} {blocked:?} {stopped:?}", bits(&hits), bits(&behind))
 }
 
 fn first_hits<A: Accel>(accel: &A, rays: &[Ray]) -> Vec<Hit> {

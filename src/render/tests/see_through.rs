@@ -1,8 +1,13 @@
 //! Alpha, straight transmission, and what lies behind.
 
 use super::*;
-use crate::render::{Sampling, Stochastic, coverage};
-use crate::scene::{AlphaMode, Background, Environment};
+use crate::accel::AccelChoice;
+use crate::math::Vec2;
+use crate::math::random::Random;
+use crate::render::{Instancing, Sampling, Stochastic, coverage};
+use crate::scene::{
+    AlphaMode, Background, Bitmap, Environment, Filter, Instance, Pixels, Sampler, Texture, TextureRef, UvTransform,
+};
 
 fn blended(color: Vec3, opacity: f32) -> Material {
     Material { opacity, alpha_mode: AlphaMode::Blend, ..unlit(color) }
@@ -198,8 +203,8 @@ fn a_blended_surface_without_holes_has_the_bits_of_an_opaque_one() {
     }
 }
 
-/// Leaves before a wall and before what hides it from a lamp, one of them opaque; then what stands behind them, of so many faces.
-fn leaves(behind: usize) -> Stage {
+/// Leaves before a wall and before what hides it from a lamp, some with holes; then what stands behind them, of so many faces.
+fn leaves(holes: bool, behind: usize) -> Stage {
     let view = View::look_at(DVec3::new(3.0, 2.0, 6.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.9));
     let mut s = stage(view);
     s.settings = Settings { width: 60, height: 45, samples: 2, ..s.settings };
@@ -210,7 +215,8 @@ fn leaves(behind: usize) -> Stage {
         let place = DAffine3::from_translation(DVec3::new(x, y, 0.2 * f64::from(i % 3)));
         let leaf = match i % 3 {
             0 => blended(Vec3::Y, 0.4 + 0.05 * i as f32),
-            1 => Material { opacity: 0.05, alpha_mode: AlphaMode::Mask { cutoff: 0.1 }, ..unlit(Vec3::Z) },
+            1 if holes => Material { opacity: 0.05, alpha_mode: AlphaMode::Mask { cutoff: 0.1 }, ..unlit(Vec3::Z) },
+            1 => blended(Vec3::Z, 0.05),
             _ => material(Vec3::ZERO, Phong { transmission: Vec3::new(0.5, 0.7, 0.2), ..phong() }),
         };
         s.mesh(square(0.0, 0.6), place, leaf);
@@ -224,13 +230,94 @@ fn leaves(behind: usize) -> Stage {
 
 #[test]
 fn shadows_of_opaque_things_among_leaves_do_not_depend_on_how_many_of_either_there_are() {
-    let (few, many) = (leaves(0), leaves(40));
-    assert!(World::new(&few.scene).is_mostly_open() && !World::new(&many.scene).is_mostly_open());
-    let (few, many) = (few.render(), many.render());
-    let differ = few.picture.beauty.iter().zip(&many.picture.beauty).filter(|(a, b)| a != b).count();
-    assert_eq!(differ, 0, "pixels");
-    let shadow = |rendered: &Rendered| rendered.counts.shadow.queries;
-    assert!(shadow(&few) < shadow(&many), "{} and {}", shadow(&few), shadow(&many));
+    for holes in [false, true] {
+        let (few, many) = (leaves(holes, 0), leaves(holes, 40));
+        assert_eq!(World::new(&few.scene).has_holes(), holes);
+        assert!(holes || World::new(&few.scene).is_mostly_clear() && !World::new(&many.scene).is_mostly_clear());
+        let (few, many) = (few.render(), many.render());
+        let differ = few.picture.beauty.iter().zip(&many.picture.beauty).filter(|(a, b)| a != b).count();
+        assert_eq!(differ, 0, "pixels");
+        let shadow = |rendered: &Rendered| rendered.counts.shadow.queries;
+        assert_eq!(shadow(&few) < shadow(&many), !holes, "{} and {}", shadow(&few), shadow(&many));
+    }
+}
+
+/// Sheets before a wall, between it and lamps, with a hole wherever a texel has none of the colour; some lie in one place,
+/// each with holes of its own.
+fn sheets(alpha_mode: AlphaMode, magnify: Filter) -> Stage {
+    let mut random = Random::new(31);
+    let view = View::look_at(DVec3::new(3.0, 2.0, 6.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.9));
+    let mut s = stage(view);
+    s.settings = Settings { width: 60, height: 45, samples: 2, ..s.settings };
+    s.square(-1.5, 4.0, material(Vec3::splat(0.8), phong()));
+    for x in 0..3 {
+        s.lamp(DVec3::new(f64::from(x), 1.0, 9.0), 1.0);
+    }
+    let texel = |_| [90, 120, 60, if random.unit() < 0.7 { 0 } else { 255 }];
+    let pixels = Pixels::Rgba8((0..8 * 8).map(texel).collect());
+    s.scene.bitmaps.push(Bitmap { name: String::new(), width: 8, height: 8, pixels });
+    s.scene.textures.push(Texture { bitmap: 0, sampler: Sampler { magnify, ..Sampler::default() } });
+    let map = TextureRef { texture: 0, uv_set: 0, transform: UvTransform::default() };
+    let leaf = Material { alpha_mode, base_color_map: Some(map), ..material(Vec3::ONE, phong()) };
+    for i in 0..24 {
+        let (x, y) = (f64::from(i % 4) - 1.5, f64::from(i / 4 % 3) - 1.0);
+        let place = DAffine3::from_translation(DVec3::new(0.5 * x, 0.5 * y, 0.2 * f64::from(i % 3)));
+        let mut mesh = square(0.0, 0.8);
+        let shift = Vec2::splat(0.37 * i as f32);
+        mesh.uvs = vec![mesh.positions.iter().map(|p| p.truncate() + shift).collect()];
+        if i % 5 == 0 {
+            // The same corners again.
+            mesh.positions.extend_from_within(..);
+            mesh.triangles.extend(mesh.triangles.clone().iter().map(|t| t.map(|i| i + 4)));
+            let more: Vec<Vec2> = mesh.uvs[0].iter().map(|uv| *uv + Vec2::new(0.3, 0.1)).collect();
+            mesh.uvs[0].extend(more);
+        }
+        s.mesh(mesh, place, leaf.clone());
+    }
+    // Some stand in two places.
+    for i in (1..24).step_by(4) {
+        let (once, by) = (s.scene.instances[i].clone(), DAffine3::from_translation(DVec3::new(0.1, 0.0, 0.07)));
+        let world_from_object = once.world_from_object * DAffine3::from_rotation_z(0.4) * by;
+        s.scene.instances.push(Instance { world_from_object, ..once });
+    }
+    s
+}
+
+#[test]
+fn light_through_holes_is_what_is_left_when_every_surface_is_asked() {
+    for alpha_mode in [AlphaMode::Mask { cutoff: 0.5 }, AlphaMode::Blend] {
+        for magnify in [Filter::Nearest, Filter::Linear] {
+            let s = sheets(alpha_mode, magnify);
+            let asked = with_everything(&s);
+            for instances in [Instancing::Flatten, Instancing::Keep] {
+                let world = World::placing(&s.scene, instances);
+                assert!(world.has_holes() && world.kept.is_empty() == (instances == Instancing::Flatten));
+                let rendered = render_in(&s, &world);
+                assert!(rendered.picture == asked.picture, "{alpha_mode:?}, {magnify:?}, {instances:?}");
+                // Where there is no more than all and nothing, one question answers a ray.
+                let [one, many] = [&rendered, &asked].map(|r| r.counts.shadow.queries);
+                let whole = magnify == Filter::Nearest || alpha_mode != AlphaMode::Blend;
+                assert!(many > 2 * one || !whole && many > one, "{one} and {many}");
+            }
+        }
+    }
+}
+
+/// With every surface asked what it lets through.
+fn with_everything(s: &Stage) -> Rendered {
+    let world = World::new(&s.scene).with_everything();
+    let accel = AnyAccel::build(AccelKind::DEFAULT, &world.shapes, &AccelParams::DEFAULT);
+    let textures = TextureStore::new(&s.scene).with_everything();
+    let settings = &Settings { everything: true, ..s.settings.clone() };
+    let (scene, view) = (&s.scene, &s.view);
+    render_counted(&Job { scene, world: &world, accel: &accel, textures: &textures, view, settings }, &())
+}
+
+fn render_in(s: &Stage, world: &World) -> Rendered {
+    let accel = world.structure(AccelChoice::Auto, &AccelParams::DEFAULT).0;
+    let textures = TextureStore::new(&s.scene);
+    let (scene, view, settings) = (&s.scene, &s.view, &s.settings);
+    render_counted(&Job { scene, world, accel: &accel, textures: &textures, view, settings }, &())
 }
 
 #[test]
@@ -243,22 +330,15 @@ fn opaque_scenes_send_the_same_rays_by_chance_when_everything_is_done() {
     s.settings.sampling = Sampling::Stochastic(how);
     let world = World::new(&s.scene);
     assert!(world.is_opaque());
-    let world = world.with_everything();
-    let accel = AnyAccel::build(AccelKind::DEFAULT, &world.shapes, &AccelParams::DEFAULT);
-    let textures = TextureStore::new(&s.scene).with_everything();
-    let settings = &Settings { everything: true, ..s.settings };
-    let (scene, view) = (&s.scene, &s.view);
-    let job = Job { scene, world: &world, accel: &accel, textures: &textures, view, settings };
-    assert!(render_counted(&job, &()).picture == s.render().picture);
+    assert!(with_everything(&s).picture == s.render().picture);
 }
 
 #[test]
 fn the_opacity_that_shadow_rays_read_is_that_of_a_point_that_is_seen() {
-    use crate::math::random::Random;
-    use crate::math::{Vec2, Vec4};
+    use crate::math::Vec4;
     use crate::render::shade::{Reader, shadow_filter};
     use crate::render::surface::Target;
-    use crate::scene::{Bitmap, Filter, Pixels, Sampler, Texture, TextureRef, UvTransform, Wrap};
+    use crate::scene::Wrap;
     let mut random = Random::new(17);
     let mut seen = 0;
     for round in 0..40 {

@@ -1,6 +1,6 @@
 //! What is kept and where it stands, and then the whole world.
 
-use super::solid::{Solid, solids};
+use super::solid::{Open, Solid, solids};
 use super::{Placement, World, index};
 use crate::accel::instances::placed;
 use crate::accel::{Cone, Shapes, SpherePrim};
@@ -93,10 +93,10 @@ impl<'a> Placing<'a> {
         let spheres = scene.spheres.iter().map(|sphere| sphere.material);
         let cones = scene.cones.iter().map(|cone| cone.material);
         let others = spheres.chain(cones).chain(scene.planes.iter().map(|plane| plane.material));
-        let of_mesh: Vec<usize> =
-            solids.iter().zip(&scene.meshes).map(|(solid, mesh)| solid.open_faces(mesh)).collect();
-        let open_faces: usize = scene.instances.iter().map(|instance| of_mesh[instance.mesh as usize]).sum();
-        let open = open_faces + others.filter(|&material| is_open(material)).count();
+        let of_mesh: Vec<Open> =
+            solids.iter().zip(&scene.meshes).map(|(solid, mesh)| solid.open_faces(scene, mesh)).collect();
+        let mut open: Open = scene.instances.iter().map(|instance| of_mesh[instance.mesh as usize]).sum();
+        open.clear += others.filter(|&material| is_open(material)).count();
         let mut world = World { center, bounds, shapes, kept, first_triangle, first_polygon, placements, open };
         world.shapes.opaque = world.opaque_bits(scene, &solids);
         world
