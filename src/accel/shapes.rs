@@ -188,13 +188,7 @@ impl Shapes {
     /// function of ray and prim alone. With `ahead`, negative distances may be left out.
     #[inline(never)]
     pub(super) fn other_distances(&self, prim: u32, ray: &RaySpace, ahead: bool) -> [f32; 2] {
-        match self.prim(prim) {
-            Prim::Triangle(corners) => one(triangle::intersect(ray, &corners)),
-            Prim::Polygon(polygon) => one(polygon::intersect(ray, polygon)),
-            Prim::Sphere(s) => sphere::intersect(ray, s.center, s.radius, ahead).unwrap_or([f32::NAN; 2]),
-            Prim::Cone(cone) => cone::intersect(ray, cone, ahead),
-            Prim::Plane(normal, offset) => one(plane::intersect(ray, normal, offset)),
-        }
+        self.prim(prim).distances(ray, ahead)
     }
 
     /// The smallest box around prim `prim`, which is not a plane; those of spheres and cones are rounded outwards, by
@@ -226,6 +220,21 @@ pub enum Prim<'a> {
     Cone(&'a Cone),
     /// An unbounded plane: unit normal n, offset d, n·p = d.
     Plane(Vec3, f32),
+}
+
+impl Prim<'_> {
+    /// Where the line through the ray meets it: up to two distances, NaN for "not". With `ahead`, negative distances may be left
+    /// out.
+    #[inline]
+    pub(crate) fn distances(&self, ray: &RaySpace, ahead: bool) -> [f32; 2] {
+        match *self {
+            Prim::Triangle(corners) => one(triangle::intersect(ray, &corners)),
+            Prim::Polygon(polygon) => one(polygon::intersect(ray, polygon)),
+            Prim::Sphere(s) => sphere::intersect(ray, s.center, s.radius, ahead).unwrap_or([f32::NAN; 2]),
+            Prim::Cone(cone) => cone::intersect(ray, cone, ahead),
+            Prim::Plane(normal, offset) => one(plane::intersect(ray, normal, offset)),
+        }
+    }
 }
 
 #[inline]

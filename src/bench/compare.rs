@@ -9,7 +9,7 @@ use super::replay::{Answer, answers, counted, seconds};
 use super::row::{ClassRow, Row};
 use super::sweep::{Setting, Sweep};
 use crate::accel::{Accel, AccelChoice, AccelKind, AccelParams, AnyAccel};
-use crate::render::World;
+use crate::render::{Filters, World};
 use crate::threads;
 
 /// How to compare.
@@ -91,16 +91,23 @@ const SHORTEST: f64 = 4e-3;
 /// What happens while structures are compared; tells whether to go on.
 pub type GoOn<'a> = dyn FnMut(&[Row], &str) -> bool + 'a;
 
-/// Compares. `go_on` hears of every step, with the rows as far as they are; `None` when it says to stop,
+/// Compares; `filters` are those of the picture. `go_on` hears of every step, with the rows as far as they are; `None` when it says to stop,
 /// or when no threads can be started.
 ///
 /// The reference is the first structure that is not slow, or the first of all; the others must agree with it. Where the world
 /// keeps instances all of them must be such that can ([`AccelKind::keeps_instances`]).
-pub fn compare(world: &World, sets: &[RaySet], pixels: usize, plan: &Plan, go_on: &mut GoOn) -> Option<Vec<Row>> {
+pub fn compare(
+    world: &World,
+    filters: Option<&Filters>,
+    sets: &[RaySet],
+    pixels: usize,
+    plan: &Plan,
+    go_on: &mut GoOn,
+) -> Option<Vec<Row>> {
     let pool = threads::pool(plan.threads).ok()?;
     let build = |c: &Candidate| pool.install(|| timed(|| world.structure(AccelChoice::Kind(c.kind), &c.params).0));
     let candidates = plan.candidates();
-    let (whole, sampled) = tasks(world.len(), sets, plan, &candidates, |candidate| build(candidate).0);
+    let (whole, sampled) = tasks((world.len(), filters), sets, plan, &candidates, |candidate| build(candidate).0);
 
     // Each structure once, so that a row is there as soon as possible; then all in turn.
     let mut rows: Vec<Row> = Vec::new();
@@ -124,10 +131,10 @@ pub fn compare(world: &World, sets: &[RaySet], pixels: usize, plan: &Plan, go_on
         };
         let pixels = if row.sampled || tasks.iter().any(|t| t.set.asked > t.set.len() as u64) { 0 } else { pixels };
         row.tests_by_pixel = vec![0; pixels];
-        row.classes = tasks.iter().map(|task| count(&accel, task, &mut row.tests_by_pixel)).collect();
+        row.classes = tasks.iter().map(|task| count(&accel, filters, task, &mut row.tests_by_pixel)).collect();
         if plan.passes > 0 {
             row.build.push(seconds);
-            time(&accel, tasks, plan.threads, &mut row.classes);
+            time(&accel, filters, tasks, plan.threads, &mut row.classes);
         }
         rows.push(row);
         structures.push(accel);
@@ -136,7 +143,7 @@ pub fn compare(world: &World, sets: &[RaySet], pixels: usize, plan: &Plan, go_on
         for ((row, accel), candidate) in rows.iter_mut().zip(&structures).zip(&candidates) {
             row.build.push(build(candidate).1);
             let tasks = if row.kind.is_slow() { &sampled } else { &whole };
-            time(accel, tasks, plan.threads, &mut row.classes);
+            time(accel, filters, tasks, plan.threads, &mut row.classes);
         }
         if !go_on(&rows, &format!("pass {} of {}", pass + 1, plan.passes)) {
             return None;
@@ -147,7 +154,7 @@ pub fn compare(world: &World, sets: &[RaySet], pixels: usize, plan: &Plan, go_on
 
 /// The rays for structures that get all of them, and for slow ones.
 fn tasks<'s>(
-    prims: usize,
+    (prims, filters): (usize, Option<&Filters>),
     sets: &[RaySet],
     plan: &Plan,
     candidates: &[Candidate],
@@ -158,32 +165,37 @@ fn tasks<'s>(
         return Default::default();
     };
     let reference = build(first);
-    let task = |set: RaySet| Task::new(&reference, set);
+    let task = |set: RaySet| Task::new(&reference, filters, set);
     let sampled = sets.iter().map(|set| task(slow(set))).collect();
     let whole = if first.kind.is_slow() { Vec::new() } else { sets.iter().map(|set| task(set.clone())).collect() };
     (whole, sampled)
 }
 
 impl Task {
-    pub(super) fn new<A: Accel>(reference: &A, set: RaySet) -> Self {
-        let expected = set.batches.iter().map(|b| answers(reference, b)).collect();
+    pub(super) fn new<A: Accel>(reference: &A, filters: Option<&Filters>, set: RaySet) -> Self {
+        let expected = set.batches.iter().map(|b| answers(reference, filters, b)).collect();
         Self { set, expected }
     }
 }
 
 /// Counts, and compares every answer with what was expected: those of a counted walk, and those of a plain one.
-pub(super) fn count<A: Accel>(accel: &A, task: &Task, tests_by_pixel: &mut [u32]) -> ClassRow {
+pub(super) fn count<A: Accel>(
+    accel: &A,
+    filters: Option<&Filters>,
+    task: &Task,
+    tests_by_pixel: &mut [u32],
+) -> ClassRow {
     let mut row = ClassRow::of(task.set.asked);
     let mut total = 0.0;
     let in_picture = task.set.class != Class::Diffuse;
     for (batch, expected) in task.set.batches.iter().zip(&task.expected) {
-        let answered = counted(accel, batch, |ray, counts| {
+        let answered = counted(accel, filters, batch, |ray, counts| {
             row.add(counts);
             if let Some(tests) = tests_by_pixel.get_mut(ray.sample as usize).filter(|_| in_picture) {
                 *tests = tests.saturating_add(u32::try_from(counts.n_it).unwrap_or(u32::MAX));
             }
         });
-        let (plain, seconds) = timed(|| answers(accel, batch));
+        let (plain, seconds) = timed(|| answers(accel, filters, batch));
         row.differing += differing(&answered, &plain, expected);
         total += seconds;
     }
@@ -203,9 +215,9 @@ fn differing(counted: &[Answer], plain: &[Answer], expected: &[Answer]) -> u64 {
 }
 
 /// One timed pass over all classes.
-fn time<A: Accel>(accel: &A, tasks: &[Task], threads: usize, rows: &mut [ClassRow]) {
+fn time<A: Accel>(accel: &A, filters: Option<&Filters>, tasks: &[Task], threads: usize, rows: &mut [ClassRow]) {
     for (task, row) in tasks.iter().zip(rows) {
-        let pass = |batch: &Batch| seconds(accel, batch, row.repeats, threads);
+        let pass = |batch: &Batch| seconds(accel, filters, batch, row.repeats, threads);
         let sum: f64 = task.set.batches.iter().map(pass).sum();
         row.seconds.push(sum / f64::from(row.repeats) / task.set.len().max(1) as f64);
     }

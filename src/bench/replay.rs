@@ -2,8 +2,8 @@
 
 use super::clock::timed;
 use super::rays::Batch;
-use crate::accel::{Accel, Hit, NoProbe, Probe, Ray, RayCounts};
-use crate::render::Question;
+use crate::accel::{Accel, Hit, Holes, NoProbe, Probe, Ray, RayCounts};
+use crate::render::{Filters, Noted, Question};
 use crate::threads;
 use std::thread;
 
@@ -14,18 +14,23 @@ const SLICE: usize = 256;
 pub type Answer = [u32; 4];
 
 /// Answers all rays of a batch.
-pub fn answers<A: Accel>(accel: &A, batch: &Batch) -> Vec<Answer> {
+pub fn answers<A: Accel>(accel: &A, filters: Option<&Filters>, batch: &Batch) -> Vec<Answer> {
     let mut answers = Vec::with_capacity(batch.rays.len());
-    let mut asking = Asking::new(accel);
+    let mut asking = Asking::new(accel, filters);
     Slice::cut(batch.question, &batch.rays, &batch.after)
         .for_each(|slice| asking.ask(&slice, &mut NoProbe, |answer| answers.push(answer)));
     answers
 }
 
 /// Answers all rays of a batch one by one and hands over what each one cost.
-pub fn counted<A: Accel>(accel: &A, batch: &Batch, mut each: impl FnMut(&Ray, &RayCounts)) -> Vec<Answer> {
+pub fn counted<A: Accel>(
+    accel: &A,
+    filters: Option<&Filters>,
+    batch: &Batch,
+    mut each: impl FnMut(&Ray, &RayCounts),
+) -> Vec<Answer> {
     let mut answers = Vec::with_capacity(batch.rays.len());
-    let mut asking = Asking::new(accel);
+    let mut asking = Asking::new(accel, filters);
     for i in 0..batch.rays.len() {
         let mut counts = RayCounts::default();
         let alone = Slice {
@@ -41,10 +46,10 @@ pub fn counted<A: Accel>(accel: &A, batch: &Batch, mut each: impl FnMut(&Ray, &R
 
 /// Seconds for all rays of a batch, asked `times` times, by so many threads that each take an equal share: from before the
 /// first to after the last.
-pub fn seconds<A: Accel>(accel: &A, batch: &Batch, times: u32, threads: usize) -> f64 {
+pub fn seconds<A: Accel>(accel: &A, filters: Option<&Filters>, batch: &Batch, times: u32, threads: usize) -> f64 {
     let share = batch.rays.len().div_ceil(threads.max(1)).max(1);
     let work = |slices: Vec<Slice>| {
-        let mut asking = Asking::new(accel);
+        let mut asking = Asking::new(accel, filters);
         for _ in 0..times {
             slices.iter().for_each(|slice| asking.ask_only(slice));
         }
@@ -80,14 +85,17 @@ impl<'a> Slice<'a> {
 /// A structure, its scratch, and room for the answers.
 struct Asking<'a, A: Accel> {
     accel: &'a A,
+    filters: Option<&'a Filters<'a>>,
+    noted: Noted,
     scratch: A::Scratch,
     hits: [Hit; SLICE],
     blocked: [bool; SLICE],
 }
 
 impl<'a, A: Accel> Asking<'a, A> {
-    fn new(accel: &'a A) -> Self {
-        Self { accel, scratch: accel.scratch(), hits: [Hit::MISS; SLICE], blocked: [false; SLICE] }
+    fn new(accel: &'a A, filters: Option<&'a Filters<'a>>) -> Self {
+        let noted = Noted::default();
+        Self { accel, filters, noted, scratch: accel.scratch(), hits: [Hit::MISS; SLICE], blocked: [false; SLICE] }
     }
 
     /// The answers stay where they are, so that nothing else is timed.
@@ -110,7 +118,11 @@ impl<'a, A: Accel> Asking<'a, A> {
         let (hits, blocked) = (&mut self.hits[..count], &mut self.blocked[..count]);
         match slice.question {
             Question::Closest => self.accel.closest(slice.rays, hits, &mut self.scratch, probe),
-            Question::Occluded => self.accel.occluded(slice.rays, blocked, &mut self.scratch, probe),
+            Question::Occluded => {
+                let holes = self.filters.map(|filters| filters.before(slice.rays, &mut self.noted));
+                let holes = holes.as_ref().map(|holes| holes as &dyn Holes);
+                self.accel.blocked(slice.rays, holes, blocked, &mut self.scratch, probe);
+            }
             Question::Next => self.accel.next(slice.rays, slice.after, hits, &mut self.scratch, probe),
         }
     }

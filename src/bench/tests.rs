@@ -10,7 +10,7 @@ use super::row::{Count, Row};
 use crate::accel::{Accel, AccelKind, AccelParams, AnyAccel, Hit, Holes, Probe, Ray, RayCounts, Unculled};
 use crate::load::{LoadOptions, load_bytes};
 use crate::render::texture::TextureStore;
-use crate::render::{ClassCounts, Job, Question, Settings, View, World, render_counted};
+use crate::render::{ClassCounts, Filters, Job, Question, Settings, View, World, render_counted};
 use crate::scene::framing::{default_camera, robust_bounds};
 use crate::scene::{Scene, default_light};
 
@@ -63,7 +63,10 @@ impl Stage {
     }
 
     fn rows(&self, rays: &[RaySet], plan: &Plan) -> Vec<Row> {
-        compare(&self.world, rays, (SIZE.0 * SIZE.1) as usize, plan, &mut |_, _| true).unwrap()
+        let textures = TextureStore::new(&self.scene);
+        let filters = Filters::of(&self.scene, &self.world, &textures, &self.settings);
+        assert!(filters.is_some(), "light passes a veil");
+        compare(&self.world, filters.as_ref(), rays, (SIZE.0 * SIZE.1) as usize, plan, &mut |_, _| true).unwrap()
     }
 
     /// The whole way.
@@ -170,9 +173,9 @@ impl Accel for Blind<'_> {
 fn a_structure_that_loses_hits_is_noticed() {
     let stage = Stage::new();
     let whole = Unculled::new(&stage.world.shapes);
-    let task = Task::new(&whole, stage.rays().swap_remove(0));
-    assert_eq!(count(&whole, &task, &mut []).differing, 0);
-    let lost: u64 = (0..15).map(|prim| count(&Blind(whole, prim), &task, &mut []).differing).sum();
+    let task = Task::new(&whole, None, stage.rays().swap_remove(0));
+    assert_eq!(count(&whole, None, &task, &mut []).differing, 0);
+    let lost: u64 = (0..15).map(|prim| count(&Blind(whole, prim), None, &task, &mut []).differing).sum();
     assert_eq!(lost, task.set.batches[0].rays.len() as u64 - misses(&whole, &task.set), "every hit is lost once");
 }
 
@@ -223,7 +226,7 @@ fn work_ends_when_it_is_told_to() {
         heard = rows.len();
         rows.is_empty()
     };
-    assert_eq!(compare(&stage.world, &stage.rays(), 0, &plan(), &mut stop), None);
+    assert_eq!(compare(&stage.world, None, &stage.rays(), 0, &plan(), &mut stop), None);
     assert_eq!(heard, 1);
 }
 

@@ -1,8 +1,8 @@
 //! Asking a structure what rays hit, in slices, so that a user who gives up need not wait for a whole wave.
 
 use super::Progress;
+use super::filters::Through;
 use super::observer::{Observer, Question};
-use super::shadow::Through;
 use crate::accel::{Accel, Hit, Holes, Pencil, Ray};
 
 /// A structure, one worker's scratch for it, and whoever may end the work.

@@ -55,8 +55,6 @@ pub(crate) struct Context<'a> {
     pub bands: Vec<Band>,
     /// Whether anything but opaque surfaces can stand before a light.
     pub has_filters: bool,
-    /// Whether anything stops light in some places and lets it through in others, as maps say.
-    pub has_holes: bool,
     /// How strongly the insides of materials absorb light.
     pub absorption: Absorption,
     /// Whether the environment is what is seen behind the scene.
@@ -151,7 +149,6 @@ impl<'a> Context<'a> {
             common: (0..).zip(&scene.materials).map(common).collect(),
             bands: if needs(&[Feature::Dispersion]) { bands() } else { Vec::new() },
             has_filters: everything || !world.is_opaque(),
-            has_holes: !everything && world.has_holes(),
             absorption: Absorption::of(&scene.materials, everything),
             shows_environment: scene.background == Some(Background::Environment),
             lets_background_through: features.has(Feature::ThinTransmission) || features.has(Feature::Refraction),
@@ -159,6 +156,11 @@ impl<'a> Context<'a> {
             cutoff: settings.cutoff,
             everything,
         }
+    }
+
+    /// Whether shadow rays ask on their way what lets light through, and how much.
+    pub(super) fn asks_filters(&self) -> bool {
+        self.has_filters && !self.everything
     }
 
     /// The same with other random choices, and other samples.

@@ -7,8 +7,7 @@ use crate::accel::{Hit, NoProbe, Probe, Ray, RayCounts};
 pub enum Question {
     /// Its first hit.
     Closest,
-    /// Whether anything stops it: what is opaque, and where maps are asked on the way ([`Tape`] hears of none such), what they
-    /// say does so.
+    /// Whether anything in its way stops light where it is hit. [`Filters`](super::Filters) know of what is not opaque.
     Occluded,
     /// Its first hit behind another.
     Next,
@@ -25,10 +24,6 @@ pub(crate) trait Observer: Probe {
     /// Rays asked at once at most: enough for packets, few enough for brute force over a large scene to stop within a
     /// second. 1 where the walk's calls must be told apart by ray.
     const SLICE: usize = 256;
-
-    /// Whether shadow rays may ask on the way whether maps stop them; else they walk from surface to surface, so that who
-    /// asks them again needs no maps.
-    const HEARS_OF_HOLES: bool = true;
 
     /// These rays are asked now; `after` has the hit of each behind which it goes on, where that is the question.
     fn asked(&mut self, _question: Question, _rays: &[Ray], _after: &[Hit]) {}
@@ -98,8 +93,6 @@ impl Probe for Tape {
 }
 
 impl Observer for Tape {
-    const HEARS_OF_HOLES: bool = false;
-
     fn asked(&mut self, question: Question, rays: &[Ray], after: &[Hit]) {
         let batch = self.batch;
         let after = after.iter().copied().chain(std::iter::repeat(Hit::MISS));

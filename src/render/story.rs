@@ -130,7 +130,7 @@ fn parent(job: &Job, queries: &[Query], i: usize) -> Option<usize> {
     match query.question {
         // Behind a hit; the class may have changed on the way.
         Question::Next => queries.iter().position(|q| same_ray(q) && q.hit.bits() == query.after.bits()),
-        // What lets light through is looked for where nothing opaque is in the way.
+        // What lets light through is walked through where nothing stops it.
         Question::Closest if query.class == Class::Shadow => {
             queries.iter().position(|q| same_ray(q) && q.question == Question::Occluded)
         }

@@ -243,8 +243,8 @@ fn replay(accel: &AnyAccel, recorder: &AnyAccel, rays: &RaySet) -> (RayCounts, u
         .map(|(question, rays)| {
             let batch = Batch { question, rays: rays.to_vec(), after: Vec::new() };
             let mut sum = RayCounts::default();
-            let found = counted(accel, &batch, |_, counts| sum += *counts);
-            let expected = answers(recorder, &batch);
+            let found = counted(accel, None, &batch, |_, counts| sum += *counts);
+            let expected = answers(recorder, None, &batch);
             (sum, found.iter().zip(&expected).filter(|(a, b)| a != b).count() as u64)
         })
         .collect();

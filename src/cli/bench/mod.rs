@@ -18,6 +18,8 @@ use crate::bench::report::{Format, Model, Rays, Report, text};
 use crate::bench::row::Row;
 use crate::bench::sweep::Sweep;
 use crate::load::{Diagnostic, Loaded};
+use crate::render::Filters;
+use crate::render::texture::TextureStore;
 pub(super) use args::BenchArgs;
 use gate::Gate;
 use scene::{Prepared, Subject};
@@ -222,7 +224,9 @@ impl Bench<'_> {
         };
         // Maps of each value would be too many to look at.
         let pixels = if plan.sweep.is_some() { 0 } else { settings.width as usize * settings.height as usize };
-        let Some(rows) = compare(&prepared.world, &sets, pixels, &plan, &mut go_on) else {
+        let textures = TextureStore::new(&prepared.loaded.scene);
+        let filters = Filters::of(&prepared.loaded.scene, &prepared.world, &textures, settings);
+        let Some(rows) = compare(&prepared.world, filters.as_ref(), &sets, pixels, &plan, &mut go_on) else {
             return if interrupt::raised() { Exit::Interrupted } else { self.no_threads(&name, plan.threads) };
         };
         if plan.passes > 0 && plan.sweep.is_none() && report.family.is_none() {

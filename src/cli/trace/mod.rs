@@ -7,7 +7,7 @@
 //!
 //! | key | what |
 //! |---|---|
-//! | `class`, `question` | `primary`, `shadow`, `reflected`, `refracted`; `closest`, `occluded` (is anything opaque in the way), `next` (what is behind `after`) |
+//! | `class`, `question` | `primary`, `shadow`, `reflected`, `refracted`; `closest`, `occluded` (does anything stop its light), `next` (what is behind `after`) |
 //! | `origin`, `direction`, `t_min`, `t_max` | the ray, in world space; `t_max` is `null` where it has no end |
 //! | `light`, `riser`, `after` | what a shadow ray looks for; whether it leads only up to where another one starts, above a surface that stands for a round one; `t` and `prim` of the hit behind which the search went on |
 //! | `counts` | `n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`, `n_xf` of this query |

@@ -54,7 +54,7 @@ fn headline(told: &Told, query: &Query) -> String {
 fn ending(told: &Told, query: &Query) -> String {
     let Some(place) = place(told.loaded, told.world, query) else {
         return match query.question {
-            Question::Occluded => "nothing opaque in the way".into(),
+            Question::Occluded => "nothing in the way stops its light".into(),
             _ if goes_on(&query.after) => "nothing more".into(),
             _ => "hits nothing".into(),
         };

@@ -21,7 +21,7 @@ use crate::math::triangle::Triangle;
 use crate::math::{DMat3, DVec3, Vec3};
 use crate::scene::mesh::normal_from_object;
 use crate::scene::{Material, Scene};
-use solid::{Open, Solid};
+use solid::Solid;
 
 /// A [`Scene`] placed for tracing. World position = `center` + position in [`Shapes`].
 #[derive(Clone, Debug)]
@@ -40,8 +40,8 @@ pub struct World {
     /// First polygon (counted from 0) of each instance, and one past the last.
     first_polygon: Vec<u32>,
     placements: Vec<Placement>,
-    /// How many prims light may pass, whether or not anybody asks each of them.
-    open: Open,
+    /// Whether no prim lets light pass, whether or not anybody asks each of them.
+    opaque: bool,
 }
 
 /// How an instance turns directions.
@@ -269,17 +269,7 @@ impl World {
 
     /// Whether everything stops light.
     pub(crate) fn is_opaque(&self) -> bool {
-        self.open.clear + self.open.with_holes == 0
-    }
-
-    /// Whether any prim stops light in some places and lets it through in others.
-    pub(crate) fn has_holes(&self) -> bool {
-        self.open.with_holes > 0
-    }
-
-    /// Whether some light may pass half of all prims anywhere: then it takes longer to ask first whether anything stops it.
-    pub(crate) fn is_mostly_clear(&self) -> bool {
-        2 * self.open.clear >= self.len().max(1)
+        self.opaque
     }
 }
 

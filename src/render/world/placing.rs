@@ -1,6 +1,6 @@
 //! What is kept and where it stands, and then the whole world.
 
-use super::solid::{Open, Solid, solids};
+use super::solid::{Solid, solids};
 use super::{Placement, World, index};
 use crate::accel::instances::placed;
 use crate::accel::{Cone, Shapes, SpherePrim};
@@ -93,11 +93,9 @@ impl<'a> Placing<'a> {
         let spheres = scene.spheres.iter().map(|sphere| sphere.material);
         let cones = scene.cones.iter().map(|cone| cone.material);
         let others = spheres.chain(cones).chain(scene.planes.iter().map(|plane| plane.material));
-        let of_mesh: Vec<Open> =
-            solids.iter().zip(&scene.meshes).map(|(solid, mesh)| solid.open_faces(scene, mesh)).collect();
-        let mut open: Open = scene.instances.iter().map(|instance| of_mesh[instance.mesh as usize]).sum();
-        open.clear += others.filter(|&material| is_open(material)).count();
-        let mut world = World { center, bounds, shapes, kept, first_triangle, first_polygon, placements, open };
+        let mut meshes = scene.instances.iter().map(|instance| &solids[instance.mesh as usize]);
+        let opaque = meshes.all(|solid| *solid == Solid::All) && !others.into_iter().any(is_open);
+        let mut world = World { center, bounds, shapes, kept, first_triangle, first_polygon, placements, opaque };
         world.shapes.opaque = world.opaque_bits(scene, &solids);
         world
     }

@@ -10,7 +10,6 @@ use crate::render::patch::coordinates_at;
 use crate::scene::{AlphaMode, Bitmap, Material, Mesh, Pixels, Scene, TextureRef, Wrap};
 use rayon::prelude::*;
 use std::collections::HashMap;
-use std::iter::Sum;
 use std::sync::Arc;
 
 /// Which faces of a mesh stop light.
@@ -22,52 +21,6 @@ pub(super) enum Solid {
     Some(BitSet),
     /// None.
     None,
-}
-
-impl Solid {
-    /// How many faces of the mesh light may pass.
-    pub(super) fn open_faces(&self, scene: &Scene, mesh: &Mesh) -> Open {
-        let triangles = match self {
-            Self::All => return Open::default(),
-            Self::Some(solid) => (0..).zip(&mesh.triangles).filter(|(i, _)| !solid.get(*i)).count(),
-            Self::None => mesh.triangles.len(),
-        };
-        let polygons = mesh.polygons.len();
-        if has_holes(&scene.materials[mesh.material as usize], mesh) {
-            Open { with_holes: triangles, clear: polygons }
-        } else {
-            Open { with_holes: 0, clear: triangles + polygons }
-        }
-    }
-}
-
-/// How many prims light may pass.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Open {
-    /// Triangles that stop it in some places and let it through in others.
-    pub with_holes: usize,
-    /// Those that let some through everywhere, and those of which nobody knows without following a ray.
-    pub clear: usize,
-}
-
-impl Sum for Open {
-    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
-        all.fold(Self::default(), |sum, more| Self {
-            with_holes: sum.with_holes + more.with_holes,
-            clear: sum.clear + more.clear,
-        })
-    }
-}
-
-/// Whether what triangles of such a material let through differs from place to place, and is mostly all or nothing.
-fn has_holes(material: &Material, mesh: &Mesh) -> bool {
-    let varies = material.base_color_map.is_some() || material.opacity_map.is_some() || !mesh.colors.is_empty();
-    match material.alpha_mode {
-        _ if material.surface.transmits() => false,
-        AlphaMode::Opaque => false,
-        AlphaMode::Mask { .. } => true,
-        AlphaMode::Blend => varies,
-    }
 }
 
 /// Which faces of each mesh of a scene stop light; of textures that are not there nothing is known.

@@ -1,0 +1,266 @@
+//! What lets light through on the way of shadow rays, and how much.
+//!
+//! While a structure looks for anything in the way of a ray, it asks of what is not opaque whether it stops the ray's light
+//! ([`Through`]). What does is the answer; holes are passed; all else is noted ([`Met`]) and weakens the light afterwards, in the
+//! order of the hits.
+
+use super::Settings;
+use super::absorption::Absorption;
+use super::context::{Context, coverage};
+use super::optics::transmittance;
+use super::seam::is_same_crossing;
+use super::shade::{Reader, has_inside, shadow_filter};
+use super::surface::{Surface, Target};
+use super::texture::TextureStore;
+use super::wave::{Media, Medium};
+use super::world::World;
+use crate::accel::shapes::Prim;
+use crate::accel::{Hit, Holes, Ray};
+use crate::math::shear::RaySpace;
+use crate::math::{Vec3, triangle};
+use crate::scene::Scene;
+use std::cell::RefCell;
+use std::ops::Range;
+
+/// What a ray is inside of.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Inside {
+    media: Media,
+    /// Up to this t of the ray its light has been lessened by what absorbs it there.
+    since: f32,
+}
+
+/// Weakens light by what a surface lets through at the hit that comes next on its way, behind one that was `crossed`, which it
+/// replaces unless it is a hole.
+pub(super) fn weaken(
+    context: &Context,
+    ray: &Ray,
+    (crossed, hit): (&mut Hit, &Hit),
+    light: &mut Vec3,
+    inside: Option<&mut Inside>,
+) {
+    let target = Target::new(context.scene, context.world, hit.prim);
+    let is_repeated = is_same_crossing(|prim| context.face(prim), ray, crossed, hit);
+    let filter = filter_at(context, &target, ray, hit, inside.filter(|_| !is_repeated));
+    // What stops light does so among others in its place, too.
+    if !is_repeated || filter.max_element() <= 0.0 {
+        *light *= filter;
+    }
+    let is_hole = filter == Vec3::ONE && !target.material.surface.transmits() && hit.prim < context.world.triangles();
+    if !is_hole {
+        *crossed = *hit;
+    }
+}
+
+/// Hits that let light through in part, each linked with the one before it of the same ray.
+#[derive(Debug, Default)]
+pub(super) struct Met {
+    hits: Vec<(Hit, u32)>,
+    /// The last hit of each ray.
+    last: Vec<u32>,
+}
+
+impl Met {
+    /// Of rays that have met nothing.
+    pub(super) const NOTHING: u32 = u32::MAX;
+    /// Of those that must find it again.
+    pub(super) const TOO_MUCH: u32 = u32::MAX - 1;
+    /// Hits that are noted at most: 5 MB of them.
+    const MOST: usize = 1 << 18;
+
+    pub(super) fn begin(&mut self, rays: usize) {
+        self.hits.clear();
+        self.last.clear();
+        self.last.resize(rays, Self::NOTHING);
+    }
+
+    fn note(&mut self, ray: usize, hit: Hit) {
+        let last = &mut self.last[ray];
+        if *last == Self::TOO_MUCH || self.hits.len() >= Self::MOST {
+            *last = Self::TOO_MUCH;
+            return;
+        }
+        // A distance of −0 is none of its own.
+        self.hits.push((Hit { t: hit.t + 0.0, ..hit }, *last));
+        *last = self.hits.len() as u32 - 1;
+    }
+
+    /// The last hit of a ray.
+    pub(super) fn last(&self, ray: usize) -> u32 {
+        self.last[ray]
+    }
+
+    /// The hits of a ray, from the last that was noted on, in their order, each once.
+    pub(super) fn list(&self, mut noted: u32, hits: &mut Vec<Hit>) {
+        hits.clear();
+        while let Some(&(hit, before)) = self.hits.get(noted as usize) {
+            hits.push(hit);
+            noted = before;
+        }
+        hits.sort_unstable_by(|a, b| a.t.total_cmp(&b.t).then(a.prim.cmp(&b.prim)));
+        hits.dedup_by_key(|hit| (hit.t.to_bits(), hit.prim));
+    }
+}
+
+/// What of a picture's scene lets light through, for whoever asks its shadow rays again.
+pub struct Filters<'a>(Context<'a>);
+
+/// What was met on the way of rays that are asked again: room that is used again.
+#[derive(Debug, Default)]
+pub struct Noted(RefCell<Met>);
+
+impl<'a> Filters<'a> {
+    /// `None` where nothing is asked but whether something opaque is in the way.
+    pub fn of(scene: &'a Scene, world: &'a World, textures: &'a TextureStore<'a>, settings: &Settings) -> Option<Self> {
+        let context = Context::new(scene, world, textures, settings);
+        context.asks_filters().then_some(Self(context))
+    }
+
+    /// Whether prims stop some rays.
+    pub fn before<'r>(&'r self, rays: &'r [Ray], noted: &'r mut Noted) -> Through<'r> {
+        noted.0.get_mut().begin(rays.len());
+        Through::new(&self.0, rays, &noted.0)
+    }
+}
+
+/// Rays that ask what stops their light, and what they meet that lets some through.
+#[derive(Clone, Copy)]
+pub struct Through<'a> {
+    context: &'a Context<'a>,
+    pub(super) rays: &'a [Ray],
+    /// The number of the first of them.
+    first: usize,
+    met: &'a RefCell<Met>,
+}
+
+impl<'a> Through<'a> {
+    /// All of these rays, for whose hits there is room.
+    pub(super) fn new(context: &'a Context<'a>, rays: &'a [Ray], met: &'a RefCell<Met>) -> Self {
+        Self { context, rays, first: 0, met }
+    }
+
+    /// So many of the rays.
+    pub(super) fn part(&self, rays: Range<usize>) -> Self {
+        Self { first: self.first + rays.start, rays: &self.rays[rays], ..*self }
+    }
+
+    fn note(&self, ray: usize, hit: Hit) {
+        self.met.borrow_mut().note(self.first + ray, hit);
+    }
+}
+
+impl Holes for Through<'_> {
+    fn stops(&self, number: usize, prim: u32) -> bool {
+        let (context, ray) = (self.context, &self.rays[number]);
+        let shape = context.world.prim(prim);
+        let space = RaySpace::checked(ray.origin, ray.dir).0;
+        let Prim::Triangle(corners) = shape else {
+            let within = |t: &f32| (ray.t_min..=ray.t_max.min(f32::MAX)).contains(t);
+            let ts = shape.distances(&space, ray.t_min >= 0.0).into_iter().filter(within);
+            ts.for_each(|t| self.note(number, Hit { t, u: 0.0, v: 0.0, prim }));
+            return false;
+        };
+        let (t, u, v) = triangle::place(&space, &corners);
+        let hit = Hit { t, u, v, prim };
+        let left = Left::behind(context, &Target::new(context.scene, context.world, prim), &hit);
+        if left.is_none() {
+            self.note(number, hit);
+        }
+        left == Some(Left::Nothing)
+    }
+}
+
+/// What is left of light behind a surface, where that is soon said.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Left {
+    Nothing,
+    Everything,
+}
+
+impl Left {
+    /// `None` where it is a part, or where it takes more to know.
+    fn behind(context: &Context, target: &Target, hit: &Hit) -> Option<Self> {
+        if target.material.surface.transmits() {
+            return None;
+        }
+        match 1.0 - coverage(target.material, target.opacity(hit, context.textures)?) {
+            0.0 => Some(Self::Nothing),
+            1.0 => Some(Self::Everything),
+            _ => None,
+        }
+    }
+}
+
+/// What the surface at `hit` lets through. Maps are read at full sharpness: the shadow's own distance is unknown here.
+pub(super) fn filter_at(context: &Context, target: &Target, ray: &Ray, hit: &Hit, inside: Option<&mut Inside>) -> Vec3 {
+    if target.material.is_opaque() && !context.everything {
+        return Vec3::ZERO;
+    }
+    if !target.material.surface.transmits()
+        && let Some(opacity) = target.opacity(hit, context.textures)
+    {
+        return Vec3::splat(1.0 - coverage(target.material, opacity));
+    }
+    let patch = target.patch(context.world, hit.u, hit.v, ray.origin + ray.dir * hit.t);
+    let reader = Reader { store: context.textures, patch: patch.as_ref(), known: &[] };
+    let filter = shadow_filter(target.material, &reader);
+    let Some(inside) = inside.filter(|_| has_inside(target.material)) else { return filter };
+    let entering = Surface::new(context.world, *target, ray, hit, 0.0).front;
+    filter * inside.cross(target.material_id, entering, ray, hit, &context.absorption)
+}
+
+impl Inside {
+    /// What a ray starts inside of.
+    pub(super) fn of(media: Media) -> Self {
+        Self { media, since: 0.0 }
+    }
+
+    /// Goes in or out through the surface of a material: what is left of the light before that.
+    fn cross(&mut self, material: u32, entering: bool, ray: &Ray, hit: &Hit, absorption: &Absorption) -> Vec3 {
+        let crossing = self.media.cross(Medium { material, ior: 1.0 }, entering);
+        // What is left without having been entered was all around from the start.
+        let before = if !entering && self.media == crossing.beyond {
+            absorption.by(material)
+        } else {
+            absorption.within(&self.media)
+        };
+        let length = (hit.t - self.since) * ray.dir.length();
+        *self = Self { media: crossing.beyond, since: hit.t };
+        before.map_or(Vec3::ONE, |absorption| transmittance(absorption, length))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::NO_PRIM;
+
+    const THIN: Vec3 = Vec3::new(0.0, 0.1, 1.0);
+    const DENSE: Vec3 = Vec3::new(2.0, 0.2, 0.0);
+
+    /// What is left where a ray of length 2 for each t meets faces of two volumes: (t, which, whether it enters).
+    fn left(crossings: &[(f32, u32, bool)]) -> Vec3 {
+        let dir = Vec3::new(0.0, 0.0, 2.0);
+        let ray = Ray { origin: Vec3::ZERO, t_min: 0.0, dir, t_max: 9.0, exclude: NO_PRIM, sample: 0 };
+        let mut inside = Inside { media: Media::default(), since: 0.0 };
+        let absorption = Absorption::from(vec![THIN, DENSE]);
+        let cross = |&(t, which, entering): &(f32, u32, bool)| {
+            inside.cross(which, entering, &ray, &Hit { t, ..Hit::MISS }, &absorption)
+        };
+        crossings.iter().map(cross).product()
+    }
+
+    #[test]
+    fn volumes_before_a_light_absorb_by_the_length_between_their_faces() {
+        let near = |a: Vec3, b: Vec3| (a - b).length() < 1e-6;
+        assert!(near(left(&[(1.0, 0, true), (2.5, 0, false)]), transmittance(THIN, 3.0)));
+        assert!(near(
+            left(&[(1.0, 0, true), (2.0, 0, false), (4.0, 0, true), (4.5, 0, false)]),
+            transmittance(THIN, 3.0)
+        ));
+        assert!(near(left(&[(1.5, 0, false)]), transmittance(THIN, 3.0)), "from inside");
+        // A dense one inside a thin one.
+        let nested = left(&[(1.0, 0, true), (2.0, 1, true), (2.25, 1, false), (4.0, 0, false)]);
+        assert!(near(nested, transmittance(THIN, 5.5) * transmittance(DENSE, 0.5)), "{nested}");
+    }
+}
