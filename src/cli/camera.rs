@@ -203,7 +203,15 @@ fn quoted(name: &str) -> String {
 }
 
 fn find<'s>(name: &str, scene: &'s Scene, file: &Path) -> Result<&'s Camera, Diagnostic> {
-    let by_name = scene.cameras.iter().find(|c| c.name == name);
+    let called = |camera: &Camera| camera.name == name && !name.is_empty();
+    let numbers: Vec<String> =
+        (0..).zip(&scene.cameras).filter(|(_, c)| called(c)).map(|(i, _): (usize, _)| i.to_string()).collect();
+    if numbers.len() > 1 {
+        let text = format!("{} cameras are called '{name}'", numbers.len());
+        let remedy = format!("name one by its number: {}", numbers.join(", "));
+        return Err(Diagnostic::new("camera-ambiguous", file, "", text).remedy(remedy));
+    }
+    let by_name = scene.cameras.iter().find(|camera| called(camera));
     let by_number = || name.parse::<usize>().ok().and_then(|i| scene.cameras.get(i));
     by_name.or_else(by_number).ok_or_else(|| {
         // Those without a name are called by their number.
@@ -251,6 +259,20 @@ mod tests {
         assert!(pick(Choice::Camera("1".into()), None).is_ok());
         let error = pick(Choice::Camera("Frnt".into()), None).unwrap_err().to_string();
         assert_eq!(error, "a.glb: no camera is called 'Frnt'; did you mean 'Front'? there are, from 0: `Front`, `1`");
+        assert!(pick(Choice::Camera(String::new()), None).is_err(), "one without a name has a number");
+    }
+
+    #[test]
+    fn a_name_that_two_cameras_have_is_refused() {
+        let mut scene = scene();
+        scene.cameras[1].name = "Front".into();
+        let pick = |name: &str| {
+            let choice = Choice::Camera(name.into());
+            camera(&choice, None, &scene, &robust_bounds(&scene), 2.0, Path::new("a.glb"))
+        };
+        let error = pick("Front").unwrap_err().to_string();
+        assert_eq!(error, "a.glb: 2 cameras are called 'Front'; name one by its number: 0, 1");
+        assert!(pick("1").is_ok());
     }
 
     #[test]

@@ -85,6 +85,26 @@ impl<'a> Progress<'a> {
         }
     }
 
+    /// Work of unknown length goes on.
+    fn goes_on(&self, doing: &'static str) {
+        match &self.how {
+            How::Silent => {}
+            How::Bar { bar, .. } => {
+                if bar.message() != doing {
+                    self.stage(doing);
+                }
+            }
+            How::Lines { name, messages, stage } => {
+                let Ok(mut stage) = stage.try_lock() else { return };
+                if stage.last_line.elapsed() >= LINE_EVERY {
+                    stage.last_line = Instant::now();
+                    let seconds = stage.started.elapsed().as_secs();
+                    messages.info("progress", format!("{name}: {doing}, for {seconds} s"));
+                }
+            }
+        }
+    }
+
     /// So many of `total` parts are done.
     pub(super) fn advance(&self, done: usize, total: usize) {
         match &self.how {
@@ -129,6 +149,14 @@ impl crate::render::Progress for Progress<'_> {
 
     fn cancelled(&self) -> bool {
         self.cancellable && interrupt::raised()
+    }
+
+    fn plans(&self) {
+        self.goes_on("rendering parts to find out what it takes");
+    }
+
+    fn begins(&self) {
+        self.begin("rendering");
     }
 }
 

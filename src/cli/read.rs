@@ -36,7 +36,8 @@ pub(super) fn scene(inputs: &[PathBuf], options: &LoadOptions) -> Result<Loaded,
 
 /// What is left of the memory that may be taken after a model was loaded.
 pub(super) fn left(limits: &Limits, loaded: &Loaded) -> Limits {
-    Limits { memory: limits.memory.saturating_sub(loaded.facts.charged), ..*limits }
+    let memory = limits.memory.saturating_sub(loaded.facts.charged);
+    Limits { memory, file: limits.file.min(memory), ..*limits }
 }
 
 /// Loads one model and says what there is to warn of; a failure is said too.

@@ -14,14 +14,19 @@ pub(super) fn pot(wanted: usize) -> Solid {
     };
     let parts = [
         Solid::tube(columns / 2, columns / 2, DVec3::Y, spout, |s| 0.09 - 0.045 * s),
-        Solid::tube(columns, columns / 3, DVec3::Y, handle, |_| 0.035),
+        Solid::tube(columns, around_handle(columns), DVec3::Y, handle, |_| 0.035),
     ];
     parts.iter().for_each(|part| pot.place(part, &DAffine3::IDENTITY));
     pot
 }
 
 fn triangles(columns: usize) -> usize {
-    2 * columns * columns - 2 * columns + 2 * (columns / 2) * (columns / 2) + 2 * columns * (columns / 3)
+    2 * columns * columns - 2 * columns + 2 * (columns / 2) * (columns / 2) + 2 * columns * around_handle(columns)
+}
+
+/// One column around it would have faces without an area.
+fn around_handle(columns: usize) -> usize {
+    (columns / 3).max(2)
 }
 
 /// Belly, shoulder, lid and knob, from the foot up.
@@ -37,6 +42,15 @@ fn body(s: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn faces_of_the_coarsest_pot_have_three_corners() {
+        let pot = pot(1);
+        for corners in &pot.triangles {
+            let [a, b, c] = corners.map(|i| pot.points[i as usize]);
+            assert!(a != b && b != c && c != a, "{corners:?}");
+        }
+    }
 
     #[test]
     fn a_pot_is_as_fine_as_is_wanted() {

@@ -6,8 +6,8 @@ use crate::scene::Mesh;
 /// A mesh under construction, in `f64` until it is handed over.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Solid {
-    points: Vec<DVec3>,
-    triangles: Vec<[u32; 3]>,
+    pub(super) points: Vec<DVec3>,
+    pub(super) triangles: Vec<[u32; 3]>,
 }
 
 impl Solid {

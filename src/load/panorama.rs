@@ -84,7 +84,8 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
         texels.iter_mut().flatten().for_each(|c| *c /= exposure);
     }
     if odd > 0 {
-        let text = format!("{odd} pixels are negative or no finite numbers, and taken as black");
+        let pixels = if odd == 1 { "1 pixel has".into() } else { format!("{odd} pixels have") };
+        let text = format!("{pixels} numbers that are negative or not finite, which are taken as 0");
         warnings.push(Diagnostic::new("env-pixels", &source.path, "", text));
     }
     let name = source.path.to_string_lossy().into_owned();

@@ -184,6 +184,10 @@ pub trait Progress: Sync {
     fn tiles(&self, done: usize, total: usize);
     /// Whether to stop; asked every few hundred rays.
     fn cancelled(&self) -> bool;
+    /// It takes time to find out how many samples are needed; said again and again.
+    fn plans(&self) {}
+    /// All tiles are rendered, from the first on; more than once where several renderings make the picture.
+    fn begins(&self) {}
 }
 
 /// Nobody listens.

@@ -225,11 +225,13 @@ impl<'a> From<&'a TilePixels> for Shown<'a> {
     }
 }
 
-/// Hears whether to stop, and tells nothing.
+/// Hears whether to stop, and tells no more than that there is work before that on the picture.
 pub(super) struct Quiet<'a>(pub &'a dyn Progress);
 
 impl Progress for Quiet<'_> {
-    fn tiles(&self, _done: usize, _total: usize) {}
+    fn tiles(&self, _done: usize, _total: usize) {
+        self.0.plans();
+    }
 
     fn cancelled(&self) -> bool {
         self.0.cancelled()

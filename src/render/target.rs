@@ -182,6 +182,7 @@ pub(super) fn render<P: Observer>(
     let foretold = plan.rmse / plan.work.sqrt();
     let mut one = |settings: &Settings| {
         let context = context.resampled(settings);
+        progress.begins();
         let (picture, sampled, more, complete) =
             render_tiles::<_, P>(&context, job.accel, job.view, settings, progress);
         counts.extend(more);

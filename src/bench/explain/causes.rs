@@ -161,11 +161,11 @@ fn alpha_cards(case: &Case) -> Option<Suspect> {
     let features = Features::of(&case.scene);
     (features.has(Feature::Mask) || features.has(Feature::Blend)).then(|| {
         let mut scene = case.scene.clone();
-        let seen_through = scene.materials.iter_mut().filter(|m| m.alpha_mode != AlphaMode::Opaque);
+        let seen_through = scene.materials.iter_mut().enumerate().filter(|(_, m)| m.alpha_mode != AlphaMode::Opaque);
         let mut names = Vec::new();
-        for material in seen_through {
+        for (i, material) in seen_through {
             material.alpha_mode = AlphaMode::Opaque;
-            names.push(material.name.clone());
+            names.push(if material.name.is_empty() { format!("material {i}") } else { material.name.clone() });
         }
         Suspect {
             cause: Cause::AlphaCards,

@@ -11,15 +11,23 @@ pub(super) struct Kind {
     list: &'static str,
     /// Code of the message when there is no such thing.
     code: &'static str,
+    /// The same when there are several of one name.
+    ambiguous: &'static str,
 }
 
 /// Scenes.
-pub(super) const SCENE: Kind = Kind { word: "scene", list: "scenes", code: "gltf-no-such-scene" };
+pub(super) const SCENE: Kind =
+    Kind { word: "scene", list: "scenes", code: "gltf-no-such-scene", ambiguous: "gltf-which-scene" };
 /// Variants of materials.
-pub(super) const VARIANT: Kind =
-    Kind { word: "variant", list: "extensions.KHR_materials_variants.variants", code: "gltf-no-such-variant" };
+pub(super) const VARIANT: Kind = Kind {
+    word: "variant",
+    list: "extensions.KHR_materials_variants.variants",
+    code: "gltf-no-such-variant",
+    ambiguous: "gltf-which-variant",
+};
 /// Animations.
-pub(super) const ANIMATION: Kind = Kind { word: "animation", list: "animations", code: "gltf-no-such-animation" };
+pub(super) const ANIMATION: Kind =
+    Kind { word: "animation", list: "animations", code: "gltf-no-such-animation", ambiguous: "gltf-which-animation" };
 
 /// Names in one message before the rest is only counted.
 const LISTED: usize = 20;
@@ -39,8 +47,21 @@ pub(in crate::load) fn check_animation(facts: &Facts, moment: &Moment, file: &Pa
     }
 }
 
+/// Refuses a name that several have.
+pub(super) fn check_name(kind: &Kind, names: &[Option<&str>], wish: &str, file: &Path) -> Result<(), Diagnostic> {
+    let called = (0..).zip(names).filter(|(_, name)| **name == Some(wish));
+    let called: Vec<String> = called.map(|(i, _): (usize, _)| i.to_string()).collect();
+    if called.len() < 2 {
+        return Ok(());
+    }
+    let text = format!("{} {}s are called '{wish}'", called.len(), kind.word);
+    let remedy = format!("name one by its number: {}", called.join(", "));
+    Err(Diagnostic::new(kind.ambiguous, file, kind.list, text).remedy(remedy))
+}
+
 /// The number of what is called `wish`, or has that number; otherwise a message that lists what there is.
 pub(super) fn choose(kind: &Kind, names: &[Option<&str>], wish: &str, file: &Path) -> Result<usize, Diagnostic> {
+    check_name(kind, names, wish, file)?;
     find(names, wish, 0).ok_or_else(|| {
         let shown = |(i, name): (usize, &Option<&str>)| match name {
             None | Some("") => i.to_string(),

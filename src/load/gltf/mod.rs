@@ -224,10 +224,13 @@ impl Loading<'_> {
         let names: Vec<Option<&str>> = animations.iter().map(|animation| animation.name.as_deref()).collect();
         let number = match (&moment.animation, self.options.animations_before) {
             (Some(wish), None) => choice::choose(&choice::ANIMATION, &names, wish, file)?,
-            (Some(wish), Some(before)) => match choice::find(&names, wish, before) {
-                Some(number) => number,
-                None => return Ok(Pose::default()),
-            },
+            (Some(wish), Some(before)) => {
+                choice::check_name(&choice::ANIMATION, &names, wish, file)?;
+                match choice::find(&names, wish, before) {
+                    Some(number) => number,
+                    None => return Ok(Pose::default()),
+                }
+            }
             (None, _) => 0,
         };
         let Some(animation) = animations.get(number) else { return Ok(Pose::default()) };

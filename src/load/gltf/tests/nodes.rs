@@ -55,6 +55,14 @@ fn a_scene_is_chosen_by_index_or_name_and_without_scenes_all_roots_show() {
     assert_eq!(shown(Some("1")), Ok(("b".into(), 1)));
     assert_eq!(shown(Some("second")), Ok(("b".into(), 1)));
     assert_eq!(shown(Some("third")), Err("a.gltf:scenes: there is no scene 'third'; it has 0, 1 'second'".to_string()));
+    file.set("scenes", json!([{"nodes": [0], "name": "same"}, {"nodes": [1], "name": "same"}]));
+    let shown = |wish: &str| {
+        let options = LoadOptions { scene: Some(wish.into()), ..LoadOptions::default() };
+        let loaded = load_bytes(Path::new("a.gltf"), file.gltf(), &options);
+        loaded.map(|l| l.facts.scene_index).map_err(|e| e.to_string())
+    };
+    let text = "a.gltf:scenes: 2 scenes are called 'same'; name one by its number: 0, 1";
+    assert_eq!((shown("same"), shown("1")), (Err(text.into()), Ok(1)));
     let mut file = file;
     file.root.as_object_mut().unwrap().remove("scenes");
     file.root.as_object_mut().unwrap().remove("scene");
