@@ -113,8 +113,10 @@ impl Shadows {
         } else {
             asking.occluded(&self.rays, &mut self.blocked, probe);
             self.climb(context, asking, probe);
-            let blocked = &self.blocked;
-            self.going.extend((0..self.rays.len()).filter(|&i| context.has_filters && !blocked[i]));
+            if context.has_filters {
+                let blocked = &self.blocked;
+                self.going.extend((0..self.rays.len()).filter(|&i| !blocked[i]));
+            }
         }
         self.go_through(context, asking, probe);
         let open = self.light.iter().zip(&self.blocked).filter(|(_, blocked)| !**blocked);

@@ -425,7 +425,8 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
     ) -> u32 {
         let prim = place.prim;
         let rays = rays & !s.find_word(prim, &self.rays.exclude);
-        if !trip.wave.goal(self.start).wants_open() && !trip.shapes.opaque.get_or_set(prim) {
+        let opaque = !W::Goal::ANY || trip.shapes.opaque.get_or_set(prim);
+        if !opaque && !trip.wave.goal(self.start).wants_open() {
             return 0;
         }
         let (hit, unsure) = (verdicts.hit & rays, verdicts.unsure & rays);
@@ -434,7 +435,7 @@ impl<B: BoxMargins, const N: usize> Packet<B, N> {
         // The exact test decides about distances that may be equal, and about what lanes cannot tell.
         let in_time = s.at_most(low, reach.high) & s.at_most(t_min, high);
         let mut open = hit & in_time & !better | unsure;
-        if W::Goal::ANY && better != 0 && !trip.shapes.opaque.get_or_set(prim) {
+        if !opaque && better != 0 {
             better = self.minding(trip.wave, prim, better);
         }
         (reach.low, reach.high) = (s.choose(better, low, reach.low), s.choose(better, high, reach.high));
