@@ -13,6 +13,9 @@ use std::time::{Duration, Instant};
 /// Lines that are not a terminal's come this far apart.
 const LINE_EVERY: Duration = Duration::from_secs(5);
 
+/// From a shorter time nothing is said of what is left.
+const TELLING: Duration = Duration::from_secs(1);
+
 /// The progress of one picture.
 pub(super) struct Progress<'a> {
     how: How<'a>,
@@ -119,9 +122,10 @@ impl<'a> Progress<'a> {
             How::Lines { name, messages, stage } => {
                 // Whoever finds another worker writing has nothing to add.
                 let Ok(mut stage) = stage.try_lock() else { return };
-                if stage.last_line.elapsed() >= LINE_EVERY && done < total {
+                let elapsed = stage.started.elapsed();
+                if stage.last_line.elapsed() >= LINE_EVERY && elapsed >= TELLING && done < total {
                     stage.last_line = Instant::now();
-                    messages.info("progress", plain_line(name, stage.doing, done, total, stage.started.elapsed()));
+                    messages.info("progress", plain_line(name, stage.doing, done, total, elapsed));
                 }
             }
         }

@@ -233,6 +233,10 @@ impl Progress for Quiet<'_> {
         self.0.plans();
     }
 
+    fn plans(&self) {
+        self.0.plans();
+    }
+
     fn cancelled(&self) -> bool {
         self.0.cancelled()
     }

@@ -432,6 +432,49 @@ fn a_picture_is_as_exact_as_it_was_asked_to_be_and_hardly_more() {
 }
 
 #[test]
+fn whoever_waits_hears_of_the_work_before_a_picture_of_a_given_error_and_when_it_begins() {
+    use std::sync::Mutex;
+
+    /// Runs of the same word.
+    #[derive(Default)]
+    struct Told(Mutex<Vec<&'static str>>);
+    impl Told {
+        fn hear(&self, word: &'static str) {
+            let mut told = self.0.lock().unwrap();
+            if told.last() != Some(&word) {
+                told.push(word);
+            }
+        }
+    }
+    impl crate::render::Progress for Told {
+        fn tiles(&self, _: usize, _: usize) {
+            self.hear("tiles");
+        }
+        fn cancelled(&self) -> bool {
+            false
+        }
+        fn plans(&self) {
+            self.hear("plans");
+        }
+        fn begins(&self) {
+            self.hear("begins");
+        }
+    }
+    let mut s = soft();
+    (s.settings.width, s.settings.height) = (40, 30);
+    s.settings.sampling = Sampling::Stochastic(Stochastic { target: Some(0.008), ..stochastic(0.5, 4096) });
+    let told = Told::default();
+    s.with_job(AccelKind::DEFAULT, |job| crate::render::render(job, &told));
+    let told = told.0.into_inner().unwrap();
+    assert_eq!(told[..3], ["plans", "begins", "tiles"], "{told:?}");
+    assert!(told.len() > 3 && told[3..].chunks(2).all(|more| *more == ["begins", "tiles"]), "{told:?}");
+    // A forecast renders parts alone.
+    let told = Told::default();
+    s.with_job(AccelKind::DEFAULT, |job| crate::render::forecast(job, &told)).unwrap();
+    assert_eq!(told.0.into_inner().unwrap(), ["plans"]);
+}
+
+#[test]
 fn a_picture_of_hard_edges_alone_is_as_exact_as_it_says() {
     // Turned squares: a pixel that an edge touches shows one colour or two, by which of its samples met it.
     let mut s = looking_down(1.0);
