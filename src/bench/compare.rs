@@ -91,8 +91,8 @@ const SHORTEST: f64 = 4e-3;
 /// What happens while structures are compared; tells whether to go on.
 pub type GoOn<'a> = dyn FnMut(&[Row], &str) -> bool + 'a;
 
-/// Compares; `filters` are those of the picture. `go_on` hears of every step, with the rows as far as they are; `None` when it says to stop,
-/// or when no threads can be started.
+/// Compares; `filters` are those of the picture. `go_on` hears of every step, with the rows as far as they are; `None` when
+/// it says to stop, or when no threads can be started.
 ///
 /// The reference is the first structure that is not slow, or the first of all; the others must agree with it. Where the world
 /// keeps instances all of them must be such that can ([`AccelKind::keeps_instances`]).

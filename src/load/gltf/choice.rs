@@ -47,10 +47,15 @@ pub(in crate::load) fn check_animation(facts: &Facts, moment: &Moment, file: &Pa
     }
 }
 
-/// Refuses a name that several have.
-pub(super) fn check_name(kind: &Kind, names: &[Option<&str>], wish: &str, file: &Path) -> Result<(), Diagnostic> {
-    let called = (0..).zip(names).filter(|(_, name)| **name == Some(wish));
-    let called: Vec<String> = called.map(|(i, _): (usize, _)| i.to_string()).collect();
+/// Refuses a name that several have; numbers begin with `first`.
+pub(super) fn check_name(
+    kind: &Kind,
+    names: &[Option<&str>],
+    (wish, first): (&str, usize),
+    file: &Path,
+) -> Result<(), Diagnostic> {
+    let called = (first..).zip(names).filter(|(_, name)| **name == Some(wish));
+    let called: Vec<String> = called.map(|(i, _)| i.to_string()).collect();
     if called.len() < 2 {
         return Ok(());
     }
@@ -61,7 +66,7 @@ pub(super) fn check_name(kind: &Kind, names: &[Option<&str>], wish: &str, file: 
 
 /// The number of what is called `wish`, or has that number; otherwise a message that lists what there is.
 pub(super) fn choose(kind: &Kind, names: &[Option<&str>], wish: &str, file: &Path) -> Result<usize, Diagnostic> {
-    check_name(kind, names, wish, file)?;
+    check_name(kind, names, (wish, 0), file)?;
     find(names, wish, 0).ok_or_else(|| {
         let shown = |(i, name): (usize, &Option<&str>)| match name {
             None | Some("") => i.to_string(),
@@ -76,4 +81,19 @@ pub(super) fn choose(kind: &Kind, names: &[Option<&str>], wish: &str, file: &Pat
         };
         Diagnostic::new(kind.code, file, kind.list, text).remedy(remedy)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_shares_a_name_is_told_by_numbers_that_count_the_models_before() {
+        let check = |wish: &str| {
+            check_name(&ANIMATION, &[Some("Run"), Some("Stay"), Some("Run")], (wish, 3), Path::new("b.glb"))
+        };
+        let error = check("Run").unwrap_err().to_string();
+        assert_eq!(error, "b.glb:animations: 2 animations are called 'Run'; name one by its number: 3, 5");
+        assert!(check("Stay").is_ok() && check("Fly").is_ok());
+    }
 }
