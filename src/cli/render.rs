@@ -306,16 +306,22 @@ fn prepare(
     let start = Instant::now();
     progress.stage("loading");
     let options = survey.map_or_else(|| job.load_for(step), |survey| survey.load_for(job, step));
-    let options = LoadOptions { without_pictures: earlier.is_some(), ..options };
+    // Pictures are those of an earlier frame, unless other moments may show others.
+    let has_pictures = earlier.as_ref().is_some_and(|earlier| !earlier.loaded.facts.changes_materials);
+    let options = LoadOptions { without_pictures: has_pictures, ..options };
     let mut loaded = read::scene(&batch.inputs, &options).map_err(|error| {
         messages.load_error(&error);
         read::exit_of(&error)
     })?;
     let (mut told, mut metered, mut load_seconds) = (HashSet::new(), Metered::default(), 0.0);
     let is_later = earlier.is_some();
+    let mut with_pictures = None;
     if let Some(earlier) = earlier {
         (told, metered, load_seconds) = (earlier.told, earlier.metered, earlier.load_seconds);
-        if !read::take_pictures(&mut loaded, earlier.loaded) {
+        with_pictures = has_pictures.then_some(earlier.loaded);
+    }
+    if let Some(earlier) = with_pictures {
+        if !read::take_pictures(&mut loaded, earlier) {
             let fault = Diagnostic::new("input-changed", &batch.inputs[0], "", "was changed while it was rendered");
             messages.say(Severity::Error, &fault.remedy("render it again"));
             return Err(Exit::Failed);

@@ -135,6 +135,8 @@ pub struct Facts {
     /// Which of them is shown, and when, seconds from its start; `None`: the rest pose. Of several models the first that
     /// is not at rest counts.
     pub shown: Option<(usize, f64)>,
+    /// Whether that changes materials, or which nodes are visible: other moments may show pictures that this one does not.
+    pub changes_materials: bool,
     /// glTF extensions used: (name, required by the file, supported by us).
     pub extensions: Vec<(String, bool, bool)>,
     /// Names of the scenes in the file; the loaded one is `scene_index`.
@@ -170,6 +172,7 @@ impl Facts {
     pub(crate) fn add_animations(&mut self, more: &Self) {
         let before = self.animations.len();
         self.shown = self.shown.or(more.shown.map(|(number, time)| (before + number, time)));
+        self.changes_materials |= more.changes_materials;
         self.animations.extend_from_slice(&more.animations);
     }
 }

@@ -342,3 +342,59 @@ fn frames_in_which_a_scale_of_zero_hides_everything_show_what_is_behind() {
     assert!(folder.has("0.png") && folder.has("1.png"), "{:?}", folder.names());
     folder.render(&["a.gltf", "--frame", "0", "--fps", "1"]).ends(3).says(&["nothing to draw"]);
 }
+
+/// A triangle that turns from red to black within a second, in front of a textured one that is there from then on.
+fn changing() -> String {
+    let corners = [-4.0f32, -1.0, 0.0, 12.0, -1.0, 0.0, 4.0, 8.0, 0.0];
+    let keys = [0.0f32, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0];
+    let mut bytes: Vec<u8> = corners.iter().chain(&keys).flat_map(|x| x.to_le_bytes()).collect();
+    bytes.extend([0, 1, 0, 0]);
+    let data = base64::engine::general_purpose::STANDARD.encode(&bytes);
+    let channel = |sampler: u32, pointer: &str| {
+        let extension = format!(r#"{{"KHR_animation_pointer":{{"pointer":"{pointer}"}}}}"#);
+        format!(r#"{{"sampler":{sampler},"target":{{"path":"pointer","extensions":{extension}}}}}"#)
+    };
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0,1]}}],
+        "extensionsUsed":["KHR_animation_pointer","KHR_materials_unlit","KHR_node_visibility"],
+        "nodes":[{{"mesh":0}},{{"mesh":1,"translation":[0,0,1],"extensions":{{"KHR_node_visibility":{{}}}}}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"material":0}}]}},
+            {{"primitives":[{{"attributes":{{"POSITION":0,"TEXCOORD_0":3}},"material":1}}]}}],
+        "materials":[{{"pbrMetallicRoughness":{{}},"extensions":{{"KHR_materials_unlit":{{}}}}}},
+            {{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}},"extensions":{{"KHR_materials_unlit":{{}}}}}}],
+        "textures":[{{"source":0}}],"images":[{{"uri":"green.png"}}],
+        "animations":[{{"channels":[{},{}],
+            "samplers":[{{"input":1,"output":2}},{{"input":1,"output":4,"interpolation":"STEP"}}]}}],
+        "accessors":[
+            {{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[-4,-1,0],"max":[12,8,0]}},
+            {{"bufferView":0,"byteOffset":36,"componentType":5126,"count":2,"type":"SCALAR","min":[0],"max":[1]}},
+            {{"bufferView":0,"byteOffset":44,"componentType":5126,"count":2,"type":"VEC4"}},
+            {{"bufferView":0,"byteOffset":76,"componentType":5126,"count":3,"type":"VEC2"}},
+            {{"bufferView":0,"byteOffset":100,"componentType":5121,"count":2,"type":"SCALAR"}}],
+        "bufferViews":[{{"buffer":0,"byteLength":{}}}],
+        "buffers":[{{"byteLength":{},"uri":"data:application/octet-stream;base64,{data}"}}]}}"#,
+        channel(0, "/materials/0/pbrMetallicRoughness/baseColorFactor"),
+        channel(1, "/nodes/1/extensions/KHR_node_visibility/visible"),
+        bytes.len(),
+        bytes.len()
+    )
+}
+
+#[test]
+fn a_sequence_has_the_materials_and_maps_of_each_moment() {
+    let mut green = std::io::Cursor::new(Vec::new());
+    image::RgbImage::from_pixel(2, 2, image::Rgb([0, 255, 0])).write_to(&mut green, image::ImageFormat::Png).unwrap();
+    let folder = Folder::new().file("a.gltf", changing()).file("green.png", green.into_inner());
+    wide(&folder, &["a.gltf", "--frames", "0..=2", "--fps", "2", "-o", "{frame}.exr"]).ends(0);
+    let seen = |name: &str| {
+        let beauty = picture(&folder.path(name)).beauty;
+        [0, 1].map(|channel| beauty[beauty.len() / 2 + 16][channel])
+    };
+    let found = ["0.exr", "1.exr", "2.exr"].map(seen);
+    assert_eq!(found, [[1.0, 0.0], [0.5, 0.0], [0.0, 1.0]]);
+    for frame in ["0", "1", "2"] {
+        wide(&folder, &["a.gltf", "--frame", frame, "--fps", "2", "-o", "alone.exr"]).ends(0);
+        assert!(picture(&folder.path("alone.exr")).beauty == picture(&folder.path(&format!("{frame}.exr"))).beauty);
+        folder.run(&["render", "--again", &format!("{frame}.exr"), "-o", "again.exr", "-q"]).ends(0);
+    }
+}

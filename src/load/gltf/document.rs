@@ -3,7 +3,7 @@
 //! The crate's own validation is not used: it refuses legal files and panics on some broken ones. Its structs are
 //! plain data; everything that could panic on access (`Checked::unwrap`, indexing) is avoided throughout this loader.
 
-use super::animation::{self, Animation};
+use super::animation::{self, Animation, Originals};
 use super::codes::Code;
 use super::report::Report;
 use super::schema;
@@ -15,7 +15,11 @@ use serde_json::{Map, Number, Value, json};
 /// A document whose types and indices are right.
 pub(super) struct Document {
     pub(super) root: Root,
+    /// What it was charged with.
+    pub(super) bytes: u64,
     pub(super) animations: Vec<Animation>,
+    /// What pointers of animations change.
+    pub(super) originals: Originals,
 }
 
 /// Refuses JSON that is nested deeper than the parser goes.
@@ -46,8 +50,8 @@ pub(super) fn parse(json: &[u8], report: &mut Report) -> Option<Value> {
     }
 }
 
-/// Turns checked JSON into the typed document; images and cameras that broke the schema become empty ones.
-pub(super) fn typed(mut value: Value, report: &mut Report) -> Option<Document> {
+/// Turns checked JSON into the typed document, which was charged with so many bytes; images and cameras that broke the schema become empty ones.
+pub(super) fn typed(mut value: Value, bytes: u64, report: &mut Report) -> Option<Document> {
     let animations = animation::all(&value);
     simplify(&mut value);
     let map = value.as_object_mut()?;
@@ -69,8 +73,9 @@ pub(super) fn typed(mut value: Value, report: &mut Report) -> Option<Document> {
     let cameras = map.get_mut("cameras").and_then(Value::as_array_mut).into_iter().flatten();
     let is_camera = |camera: &Value| Camera::deserialize(camera).is_ok();
     cameras.filter(|camera| !is_camera(camera)).for_each(|camera| *camera = json!({"type": "perspective"}));
+    let originals = Originals::of(&value, &animations);
     match serde_json::from_value(value) {
-        Ok(root) => Some(Document { root, animations }),
+        Ok(root) => Some(Document { root, bytes, animations, originals }),
         Err(e) => {
             report.refuse(Code::TypeMismatch, "", format!("the JSON is not glTF 2.0: {e}"));
             None
@@ -151,7 +156,7 @@ mod tests {
         let mut report = Report::new(Path::new("a.gltf"));
         let value = parse(json, &mut report).unwrap();
         schema::check(&value, &mut report);
-        let document = typed(value, &mut report).unwrap();
+        let document = typed(value, 0, &mut report).unwrap();
         report.check().unwrap();
         assert_eq!(document.root.scenes[0].nodes[0].value(), 1);
     }

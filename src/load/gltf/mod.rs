@@ -118,13 +118,14 @@ impl Loading<'_> {
         self.report.check()?;
         schema::check(&value, self.report);
         self.report.check()?;
-        self.take(budget, weight::typed(&value), "the document")?;
+        let bytes = weight::typed(&value);
+        self.take(budget, bytes, "the document")?;
         let variants = variants::names(&value);
         let variant = self.variant(&variants)?;
         attributes::check(&value, variant, self.options.moment.is_some(), self.report);
         usage::check(&value, self.report);
         let mut graph = Graph::new(&value, self.report);
-        let document = document::typed(value, self.report);
+        let document = document::typed(value, bytes, self.report);
         let document = self.passed(document)?;
         links::check(&document.root, self.report);
         self.report.check()?;
@@ -169,6 +170,10 @@ impl Loading<'_> {
         facts.animations = animation::facts(&document.animations, reader);
         let pose = self.pose(reader, graph, document, budget, facts)?;
         graph.place(&pose.moved);
+        facts.changes_materials = pose.changes_materials();
+        let posed = self.posed(document, &pose, budget)?;
+        let root = posed.as_ref().unwrap_or(root);
+        let reader = Reader { root, ..reader };
         let moment = (self.options.moment.is_some(), &pose.weights);
         let placed = scene::walk(reader, graph, facts.scene_index, moment, budget, self.report);
         let placed = placed.map_err(|over| self.too_large("what the nodes show", over))?;
@@ -247,6 +252,15 @@ impl Loading<'_> {
             self.report.warnings.push(warning.remedy("drawn as at its end"));
         }
         Ok(pose)
+    }
+
+    /// The document at that moment; `None`: it is as the file says.
+    fn posed(&self, document: &Document, pose: &Pose, budget: &mut Budget) -> Result<Option<Root>, LoadError> {
+        if !pose.changes_document() {
+            return Ok(None);
+        }
+        self.take(budget, document.bytes, "the document at that moment")?;
+        Ok(Some(pose.posed(&document.root, &document.originals)))
     }
 
     /// The variant of materials that is asked for.

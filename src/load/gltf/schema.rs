@@ -24,17 +24,45 @@ pub(super) struct Property {
     pub(super) required: bool,
 }
 
+/// The finite numbers from `min` to `max`; `open` excludes the lower end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Range {
+    pub(super) min: f64,
+    pub(super) max: f64,
+    pub(super) open: bool,
+}
+
+impl Range {
+    pub(super) fn holds(self, number: f64) -> bool {
+        (if self.open { number > self.min } else { number >= self.min }) && number <= self.max && number.is_finite()
+    }
+
+    /// The number in it that is nearest; of an open one a small one.
+    pub(super) fn nearest(self, number: f64) -> f64 {
+        let least = if self.open { self.min + f64::from(f32::MIN_POSITIVE) } else { self.min };
+        number.max(least).min(self.max)
+    }
+}
+
+/// What it allows, in words.
+impl std::fmt::Display for Range {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let Self { min, max, open } = self;
+        match (min.is_finite(), max.is_finite()) {
+            (_, false) if *open => write!(f, "above {min}"),
+            (_, false) => write!(f, "at least {min}"),
+            (false, _) => write!(f, "at most {max}"),
+            _ => write!(f, "{min} to {max}"),
+        }
+    }
+}
+
 /// What a value must be.
 pub(super) enum Kind {
     Any,
     Bool,
     Text,
-    /// A finite number in a closed range; `open` excludes the lower end.
-    Number {
-        min: f64,
-        max: f64,
-        open: bool,
-    },
+    Number(Range),
     /// A whole number in a closed range.
     Integer {
         min: u64,
@@ -167,7 +195,7 @@ impl<'a> Walk<'a> {
             Kind::Any => {}
             Kind::Bool => self.expect(value.is_boolean(), value, "true or false"),
             Kind::Text => self.expect(value.is_string(), value, "a text"),
-            Kind::Number { min, max, open } => self.number(value, *min, *max, *open),
+            Kind::Number(range) => self.number(value, *range),
             Kind::Integer { min, max } => self.integer(value, *min, *max),
             Kind::Index(list) => self.index(value, list),
             Kind::AnyIndex => self.expect(whole(value).is_some(), value, "an index"),
@@ -189,17 +217,10 @@ impl<'a> Walk<'a> {
         self.fault(Code::TypeMismatch, format!("{} where {what} should be", show(value)));
     }
 
-    fn number(&mut self, value: &Value, min: f64, max: f64, open: bool) {
+    fn number(&mut self, value: &Value, range: Range) {
         let Some(number) = value.as_f64() else { return self.wrong_type(value, "a number") };
-        let inside = if open { number > min } else { number >= min } && number <= max && number.is_finite();
-        if !inside {
-            let bounds = match (min.is_finite(), max.is_finite()) {
-                (_, false) if open => format!("above {min}"),
-                (_, false) => format!("at least {min}"),
-                (false, _) => format!("at most {max}"),
-                _ => format!("{min} to {max}"),
-            };
-            let text = format!("{number} where {bounds} is allowed");
+        if !range.holds(number) {
+            let text = format!("{number} where {range} is allowed");
             if self.path.contains(".rotation[") {
                 self.report.warn_with(Code::ValueNotInRange, self.path.as_str(), text, "the rotation is made unit");
             } else {

@@ -1,13 +1,13 @@
 //! The glTF 2.0 schema and those of its extensions, as tables for [`super::schema`].
 
-use super::schema::{Extension, Kind, Object, Property};
+use super::schema::{Extension, Kind, Object, Property, Range};
 use Kind::{Any, AnyIndex, Bool, Index, Integer, List, Map, Number, OneOf, Text, Word};
 
 const INF: f64 = f64::INFINITY;
-const NUMBER: Kind = Number { min: -INF, max: INF, open: false };
-const NOT_NEGATIVE: Kind = Number { min: 0.0, max: INF, open: false };
-const POSITIVE: Kind = Number { min: 0.0, max: INF, open: true };
-const UNIT: Kind = Number { min: 0.0, max: 1.0, open: false };
+const NUMBER: Kind = Number(Range { min: -INF, max: INF, open: false });
+const NOT_NEGATIVE: Kind = Number(Range { min: 0.0, max: INF, open: false });
+const POSITIVE: Kind = Number(Range { min: 0.0, max: INF, open: true });
+const UNIT: Kind = Number(Range { min: 0.0, max: 1.0, open: false });
 const SIZE: Kind = Integer { min: 1, max: u64::MAX };
 const OFFSET: Kind = Integer { min: 0, max: u64::MAX };
 const SET: Kind = Integer { min: 0, max: u32::MAX as u64 };
@@ -244,7 +244,7 @@ static NODE: Object = Object {
         may("skin", Index("skins")),
         may("matrix", exactly(16, &NUMBER)),
         may("mesh", Index("meshes")),
-        may("rotation", exactly(4, &Number { min: -1.0, max: 1.0, open: false })),
+        may("rotation", exactly(4, &Number(Range { min: -1.0, max: 1.0, open: false }))),
         may("scale", exactly(3, &NUMBER)),
         may("translation", exactly(3, &NUMBER)),
         may("weights", some(&NUMBER)),
@@ -372,8 +372,8 @@ static LIGHT: Object = Object {
 static SPOT: Object = Object {
     name: "a spot",
     properties: &[
-        may("innerConeAngle", Number { min: 0.0, max: std::f64::consts::FRAC_PI_2, open: false }),
-        may("outerConeAngle", Number { min: 0.0, max: std::f64::consts::FRAC_PI_2, open: true }),
+        may("innerConeAngle", Number(Range { min: 0.0, max: std::f64::consts::FRAC_PI_2, open: false })),
+        may("outerConeAngle", Number(Range { min: 0.0, max: std::f64::consts::FRAC_PI_2, open: true })),
     ],
 };
 
@@ -413,7 +413,7 @@ static IRIDESCENCE: Object = Object {
     properties: &[
         may("iridescenceFactor", UNIT),
         may("iridescenceTexture", object(&TEXTURE_INFO)),
-        may("iridescenceIor", Number { min: 1.0, max: INF, open: false }),
+        may("iridescenceIor", Number(Range { min: 1.0, max: INF, open: false })),
         may("iridescenceThicknessMinimum", NOT_NEGATIVE),
         may("iridescenceThicknessMaximum", NOT_NEGATIVE),
         may("iridescenceThicknessTexture", object(&TEXTURE_INFO)),

@@ -14,6 +14,7 @@ mod meshopt;
 mod morphs;
 mod mutated;
 mod nodes;
+mod pointers;
 mod spared;
 mod variants;
 

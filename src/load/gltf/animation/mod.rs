@@ -1,19 +1,24 @@
-//! Animations: which there are ([`Animation`]), how a value runs between keys ([`curve`]), and what a moment of one does to
-//! the nodes ([`play`]).
+//! Animations: which there are ([`Animation`]), what pointers aim at ([`pointer`]), how a value runs between keys ([`curve`]),
+//! what a moment of one does to nodes and numbers ([`play`]), and the document at that moment ([`posed`]).
 //!
 //! Only the moment that is asked for is read: all times of a sampler, and of its values those of the keys around it.
 //! Faults are warnings, each costs one channel: a picture can be drawn without.
 
 mod curve;
 mod play;
+mod pointer;
+mod posed;
 
 pub(super) use play::{Pose, play};
+pub(super) use posed::Originals;
 
-use super::accessor::{Pick, Reader};
+use super::accessor::{Format, Pick, Reader};
 use super::schema::{list, whole};
 use crate::load::AnimationFacts;
 use curve::Interpolation;
-use gltf::json::{Index, accessor::Accessor};
+use gltf::json::Index;
+use gltf::json::accessor::{Accessor, ComponentType};
+use pointer::{Entry, Pointed};
 use serde_json::Value;
 use std::collections::HashMap;
 
@@ -33,15 +38,64 @@ struct Channel {
     input: Index<Accessor>,
     output: Index<Accessor>,
     interpolation: Interpolation,
+    /// What the numbers of its output may be.
+    numbers: Numbers,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq)]
 enum Target {
     Node(usize, Property),
-    /// KHR_animation_pointer: any property of the document.
-    Pointer,
+    /// KHR_animation_pointer: other numbers of the document.
+    Pointed(Pointed),
+    /// A pointer to nothing, and why it is none.
+    Lost(String),
     /// No node, which means that an extension unknown here says what is changed.
     Nothing,
+}
+
+/// What numbers may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Numbers {
+    Floats,
+    /// Floats, or integers that stand for -1…1.
+    Units,
+    /// Floats and integers of all kinds.
+    All,
+    /// Unsigned bytes that stand for themselves.
+    Bytes,
+}
+
+impl Numbers {
+    /// Whether an accessor holds such numbers.
+    fn fits(self, format: Format) -> bool {
+        let is_float = format.component == ComponentType::F32;
+        match self {
+            Self::Floats => is_float,
+            Self::Units => is_float || (format.normalized && format.component != ComponentType::U32),
+            Self::All => true,
+            Self::Bytes => format.component == ComponentType::U8 && !format.normalized,
+        }
+    }
+
+    fn words(self) -> &'static str {
+        match self {
+            Self::Floats => "floats",
+            Self::Units => "floats or normalized integers",
+            Self::All => "numbers",
+            Self::Bytes => "unsigned bytes that are not normalized",
+        }
+    }
+}
+
+impl Target {
+    /// The node or mesh whose morph targets get other weights.
+    fn morphed(&self) -> Option<Entry> {
+        match self {
+            Self::Node(node, Property::Weights) => Some(Entry::Node(*node)),
+            Self::Pointed(pointed) => pointed.weights().map(|_| pointed.entry),
+            Self::Node(..) | Self::Lost(_) | Self::Nothing => None,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -66,16 +120,24 @@ impl Property {
             Self::Weights => "weights",
         }
     }
+
+    /// What keys of it may be made of, where no pointer leads to it: places and scales go beyond -1…1.
+    fn numbers(self) -> Numbers {
+        match self {
+            Self::Translation | Self::Scale => Numbers::Floats,
+            Self::Rotation | Self::Weights => Numbers::Units,
+        }
+    }
 }
 
 /// All animations of a document that the schema check has seen.
 pub(super) fn all(root: &Value) -> Vec<Animation> {
     let accessors = list(root, "accessors").len();
-    list(root, "animations").iter().map(|animation| Animation::of(animation, accessors)).collect()
+    list(root, "animations").iter().map(|animation| Animation::of(root, animation, accessors)).collect()
 }
 
 impl Animation {
-    fn of(animation: &Value, accessors: usize) -> Self {
+    fn of(root: &Value, animation: &Value, accessors: usize) -> Self {
         let samplers = list(animation, "samplers");
         let accessor = |value: &Value, name: &str| {
             let index = value.get(name).and_then(position).filter(|&i| i < accessors)?;
@@ -84,8 +146,10 @@ impl Animation {
         let channel = |channel: &Value| {
             let sampler = channel.get("sampler").and_then(position)?;
             let source = samplers.get(sampler)?;
+            let (target, numbers) = target(root, channel.get("target")?)?;
             Some(Channel {
-                target: target(channel.get("target")?)?,
+                target,
+                numbers,
                 sampler,
                 input: accessor(source, "input")?,
                 output: accessor(source, "output")?,
@@ -131,18 +195,22 @@ pub(super) fn facts(animations: &[Animation], reader: Reader) -> Vec<AnimationFa
     animations.iter().map(of).collect()
 }
 
-/// What a channel aims at; `None`: at a property or node that does not exist.
-fn target(target: &Value) -> Option<Target> {
-    match target.get("path").and_then(Value::as_str)? {
-        "pointer" => Some(Target::Pointer),
-        path => {
-            let property = Property::of(path)?;
-            match target.get("node") {
-                None => Some(Target::Nothing),
-                Some(node) => Some(Target::Node(position(node)?, property)),
-            }
-        }
+/// What a channel aims at, and with which numbers; `None`: at a property or node that does not exist.
+fn target(root: &Value, target: &Value) -> Option<(Target, Numbers)> {
+    let path = target.get("path").and_then(Value::as_str)?;
+    if path == "pointer" {
+        let pointer = target.get("extensions").and_then(|e| e.get("KHR_animation_pointer")?.get("pointer")?.as_str());
+        let Some(pointer) = pointer else { return Some((Target::Nothing, Numbers::All)) };
+        let target = pointer::target(root, pointer).unwrap_or_else(Target::Lost);
+        let numbers = if let Target::Pointed(pointed) = &target { pointed.numbers() } else { Numbers::All };
+        return Some((target, numbers));
     }
+    let property = Property::of(path)?;
+    let target = match target.get("node") {
+        None => Target::Nothing,
+        Some(node) => Target::Node(position(node)?, property),
+    };
+    Some((target, property.numbers()))
 }
 
 fn position(value: &Value) -> Option<usize> {

@@ -1,6 +1,7 @@
-//! What one moment of an animation does to the nodes.
+//! What one moment of an animation does to the nodes, and to numbers that pointers lead to.
 
 use super::curve::{self, Between, Interpolation, Key};
+use super::pointer::{Entry, Form, Pointed};
 use super::{Animation, Channel, Property, Target};
 use crate::load::Diagnostic;
 use crate::load::gltf::accessor::{Format, Pick, Reader, Unreadable};
@@ -11,6 +12,7 @@ use crate::load::limits::{Budget, OverBudget};
 use crate::math::DVec3;
 use gltf::json::Index;
 use gltf::json::accessor::{Accessor, ComponentType, Type};
+use serde_json::{Value, json};
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
@@ -21,6 +23,38 @@ pub(in crate::load::gltf) struct Pose {
     pub(in crate::load::gltf) moved: HashMap<usize, Moved>,
     /// Weights of morph targets, by node.
     pub(in crate::load::gltf) weights: HashMap<usize, Vec<f32>>,
+    /// The same, by mesh: those of its nodes that have none of their own.
+    pub(super) mesh_weights: HashMap<usize, Vec<f32>>,
+    /// What pointers lead to besides, in the order of the file.
+    pub(super) changes: Vec<Change>,
+}
+
+/// A value in the place of another.
+#[derive(Clone, Debug)]
+pub(super) struct Change {
+    pub(super) pointed: Pointed,
+    /// A number, a list of numbers, or a truth value.
+    pub(super) value: Value,
+}
+
+/// What channels of one animation aim at: no two may at the same.
+#[derive(Default)]
+struct Aims {
+    /// All that something aims at, as pointers.
+    whole: HashSet<String>,
+    /// Lists of which something aims at a part.
+    in_parts: HashSet<String>,
+}
+
+impl Aims {
+    /// Whether nothing aimed there before, or at a part of it, or at what it is a part of.
+    fn insert(&mut self, pointer: String, part_of: Option<String>) -> bool {
+        let is_free = match part_of {
+            Some(list) => !self.whole.contains(&list) && { self.in_parts.insert(list) | true },
+            None => !self.in_parts.contains(&pointer),
+        };
+        is_free && self.whole.insert(pointer)
+    }
 }
 
 /// Evaluates an animation, the `number`th of the file, at `time` seconds.
@@ -37,25 +71,24 @@ pub(in crate::load::gltf) fn play(
 ) -> Result<Pose, OverBudget> {
     let place = format!("animations[{number}]");
     let mut player = Player { reader, graph, time, budget, report, times: HashMap::new(), pose: Pose::default() };
-    let mut seen = HashSet::new();
+    let mut aims = Aims::default();
     for (k, channel) in animation.channels.iter().enumerate() {
         let Some(channel) = channel else { continue };
         let place = Place { channel: format!("{place}.channels[{k}]"), animation: &place, sampler: channel.sampler };
-        match channel.target {
-            Target::Pointer => {
-                let (code, text) = (Code::UnsupportedExtension, "KHR_animation_pointer is not supported");
-                player.report.warn_with(code, place.channel, text, "what the channel changes stays as it is");
+        let (pointer, whole) = match &channel.target {
+            Target::Nothing => continue,
+            Target::Lost(why) => {
+                Fault::Target(Code::AnimationPointerPath, why.clone()).tell(&place, player.report);
+                continue;
             }
-            Target::Nothing => {}
-            Target::Node(node, property) => {
-                if !seen.insert(channel.target) {
-                    let code = Code::AnimationDuplicateTargets;
-                    let text = format!("a second channel changes the {} of node {node}", property.name());
-                    player.report.warn_with(code, place.channel, text, "the first counts");
-                } else if let Err(fault) = player.channel(channel, node, property, &place)? {
-                    fault.tell(&place, player.report);
-                }
-            }
+            Target::Node(node, property) => (format!("{}/{}", Entry::Node(*node).pointer(), property.name()), None),
+            Target::Pointed(pointed) => (pointed.pointer(), pointed.whole()),
+        };
+        if !aims.insert(pointer, whole) {
+            let (code, text) = (Code::AnimationDuplicateTargets, player.again(&channel.target));
+            player.report.warn_with(code, place.channel, text, "the first counts");
+        } else if let Err(fault) = player.channel(channel, &place)? {
+            fault.tell(&place, player.report);
         }
     }
     Ok(player.pose)
@@ -129,19 +162,26 @@ struct Player<'a, 'b> {
 }
 
 impl Player<'_, '_> {
-    /// Evaluates one channel into the pose.
-    fn channel(
-        &mut self,
-        channel: &Channel,
-        node: usize,
-        property: Property,
-        place: &Place,
-    ) -> Result<Result<(), Fault>, OverBudget> {
-        let times = self.times(channel.input, place)?;
-        if property == Property::Weights {
-            self.budget.take(self.targets(node) as u64, WEIGHT)?;
+    /// What is said of a second channel.
+    fn again(&self, target: &Target) -> String {
+        match target {
+            Target::Node(node, property) => format!("a second channel changes the {} of node {node}", property.name()),
+            Target::Pointed(pointed) => format!("a second channel changes {}, or a part of it", pointed.pointer()),
+            Target::Lost(_) | Target::Nothing => String::new(),
         }
-        Ok(times.ok_or(Fault::Told).and_then(|times| self.value(channel, node, property, &times)))
+    }
+
+    /// Evaluates one channel into the pose.
+    fn channel(&mut self, channel: &Channel, place: &Place) -> Result<Result<(), Fault>, OverBudget> {
+        let times = self.times(channel.input, place)?;
+        if let Some(owner) = channel.target.morphed() {
+            self.budget.take(self.targets(owner) as u64, WEIGHT)?;
+        }
+        Ok(times.ok_or(Fault::Told).and_then(|times| match &channel.target {
+            Target::Node(node, property) => self.property(channel, *node, *property, &times),
+            Target::Pointed(pointed) => self.pointed(channel, pointed, &times, place),
+            Target::Lost(_) | Target::Nothing => Ok(()),
+        }))
     }
 
     /// The times of the keys, read and told of once.
@@ -168,56 +208,120 @@ impl Player<'_, '_> {
         Ok(times)
     }
 
-    /// The value of a channel at the moment, put into the pose.
-    fn value(&mut self, channel: &Channel, node: usize, property: Property, times: &[f32]) -> Result<(), Fault> {
+    /// The value of a node's property at the moment, put into the pose.
+    fn property(&mut self, channel: &Channel, node: usize, property: Property, times: &[f32]) -> Result<(), Fault> {
         let between = Between::of(times, self.time);
         let keys = Keys { reader: self.reader, channel, count: times.len() };
-        let interpolation = channel.interpolation;
         if property != Property::Weights && self.graph.has_matrix(node) {
             let text = format!("node {node} has a matrix, which cannot be animated");
             return Err(Fault::Target(Code::AnimationTargetMatrix, text));
         }
         match property {
             Property::Translation | Property::Scale => {
-                keys.check(Type::Vec3, 1)?;
-                let (before, after) = keys.around::<3>(between, 1)?;
-                let value = curve::numbers(interpolation, between, &before, &after);
-                let value = <[f64; 3]>::try_from(value).map(DVec3::from).map_err(|_| Fault::Told)?;
+                let value = <[f64; 3]>::try_from(keys.numbers(between, 3)?).map_err(|_| Fault::Told)?;
                 let moved = self.pose.moved.entry(node).or_default();
                 let slot = if property == Property::Scale { &mut moved.scale } else { &mut moved.translation };
-                *slot = Some(value);
+                *slot = Some(DVec3::from(value));
             }
             Property::Rotation => {
                 keys.check(Type::Vec4, 1)?;
                 let (before, after) = keys.around::<4>(between, 1)?;
-                let rotation = curve::rotation(interpolation, between, &before, &after).ok_or_else(|| {
+                let rotation = curve::rotation(channel.interpolation, between, &before, &after).ok_or_else(|| {
                     Fault::Sampler(OUTPUT, Code::AccessorAnimationQuaternion, "a rotation of length 0".into())
                 })?;
                 self.pose.moved.entry(node).or_default().rotation = Some(rotation);
             }
-            Property::Weights => {
-                let targets = self.targets(node);
-                if targets == 0 {
-                    let text = format!("node {node} has no morph targets");
-                    return Err(Fault::Target(Code::AnimationTargetNoMorphs, text));
+            Property::Weights => self.weights(&keys, between, Entry::Node(node), None)?,
+        }
+        Ok(())
+    }
+
+    /// What stands where a pointer leads at the moment, put into the pose.
+    fn pointed(&mut self, channel: &Channel, pointed: &Pointed, times: &[f32], place: &Place) -> Result<(), Fault> {
+        let between = Between::of(times, self.time);
+        let keys = Keys { reader: self.reader, channel, count: times.len() };
+        let value = match pointed.form {
+            Form::Weights(which) => return self.weights(&keys, between, pointed.entry, which),
+            Form::Switch => {
+                keys.check(Type::Scalar, 1)?;
+                let (before, _) = keys.around::<1>(between, 1)?;
+                json!(before.value.first().is_some_and(|&on| on != 0.0))
+            }
+            Form::Numbers(count, range) => {
+                let mut numbers = keys.numbers(between, count)?;
+                for number in numbers.iter_mut().filter(|number| !range.holds(**number)) {
+                    // Splines swing beyond their keys.
+                    if channel.interpolation != Interpolation::CubicSpline {
+                        let text = format!("{number} where {range} is allowed");
+                        let (code, place) = (Code::ValueNotInRange, place.of_sampler(OUTPUT));
+                        self.report.warn_with(code, place, text, "the nearest that is allowed is taken");
+                    }
+                    *number = range.nearest(*number);
                 }
-                keys.check(Type::Scalar, targets)?;
-                let (before, after) = keys.around::<1>(between, targets)?;
-                let value = curve::numbers(interpolation, between, &before, &after);
-                #[expect(clippy::cast_possible_truncation, reason = "morphing is done with f32 weights")]
-                let weights = value.into_iter().map(|w| w as f32).collect();
-                self.pose.weights.insert(node, weights);
+                if count == 1 { json!(numbers.first()) } else { json!(numbers) }
+            }
+        };
+        self.pose.changes.push(Change { pointed: pointed.clone(), value });
+        Ok(())
+    }
+
+    /// Weights of all morph targets of a node or mesh, or of one of them, at the moment, put into the pose.
+    fn weights(&mut self, keys: &Keys, between: Between, owner: Entry, which: Option<usize>) -> Result<(), Fault> {
+        let targets = self.targets(owner);
+        if which.map_or(targets == 0, |which| which >= targets) {
+            let morphs = if targets == 0 { "no morph targets".into() } else { format!("{targets} morph targets") };
+            let text = match owner {
+                Entry::Node(node) => format!("node {node} has {morphs}"),
+                _ => format!("{} has {morphs}", owner.pointer()),
+            };
+            return Err(Fault::Target(Code::AnimationTargetNoMorphs, text));
+        }
+        let each = if which.is_some() { 1 } else { targets };
+        keys.check(Type::Scalar, each)?;
+        let (before, after) = keys.around::<1>(between, each)?;
+        let value = curve::numbers(keys.channel.interpolation, between, &before, &after);
+        #[expect(clippy::cast_possible_truncation, reason = "morphing is done with f32 weights")]
+        let value: Vec<f32> = value.into_iter().map(|w| w as f32).collect();
+        let rest = self.weights_at_rest(owner, targets);
+        let slot = match owner {
+            Entry::Node(node) => self.pose.weights.entry(node),
+            Entry::Mesh(mesh) => self.pose.mesh_weights.entry(mesh),
+            Entry::Camera(_) | Entry::Light(_) | Entry::Material(_) => return Ok(()),
+        };
+        match which {
+            None => drop(slot.insert_entry(value)),
+            Some(which) => {
+                let weights = slot.or_insert(rest);
+                weights.iter_mut().skip(which).zip(value).take(1).for_each(|(weight, value)| *weight = value);
             }
         }
         Ok(())
     }
 
-    /// How many morph targets the mesh of a node has.
-    fn targets(&self, node: usize) -> usize {
+    /// The mesh of a node, or the mesh itself.
+    fn mesh(&self, owner: Entry) -> Option<&gltf::json::Mesh> {
         let root = self.reader.root;
-        let mesh = root.nodes.get(node).and_then(|node| root.meshes.get(node.mesh?.value()));
-        let primitive = mesh.and_then(|mesh| mesh.primitives.first());
+        let mesh = match owner {
+            Entry::Mesh(mesh) => mesh,
+            Entry::Node(node) => root.nodes.get(node)?.mesh?.value(),
+            Entry::Camera(_) | Entry::Light(_) | Entry::Material(_) => return None,
+        };
+        root.meshes.get(mesh)
+    }
+
+    /// How many morph targets it has.
+    fn targets(&self, owner: Entry) -> usize {
+        let primitive = self.mesh(owner).and_then(|mesh| mesh.primitives.first());
         primitive.and_then(|p| p.targets.as_ref()).map_or(0, Vec::len)
+    }
+
+    /// What its morph targets weigh when nothing is played.
+    fn weights_at_rest(&self, owner: Entry, targets: usize) -> Vec<f32> {
+        let node = if let Entry::Node(node) = owner { self.reader.root.nodes.get(node) } else { None };
+        let own = node.and_then(|node| node.weights.clone());
+        let mut weights = own.or_else(|| self.mesh(owner)?.weights.clone()).unwrap_or_default();
+        weights.resize(targets, 0.0);
+        weights
     }
 }
 
@@ -257,19 +361,15 @@ impl Keys<'_> {
         let accessor = self.reader.root.accessors.get(self.channel.output.value()).ok_or(Fault::Told)?;
         let format = Format::of(accessor).ok_or(Fault::Told)?;
         let fault = |code, text: String| Err(Fault::Sampler(OUTPUT, code, text));
-        let small = format.normalized && format.component != ComponentType::U32;
-        let numbers = match format.component {
-            ComponentType::F32 => true,
-            // Rotations and weights lie in -1…1; places and scales do not.
-            _ => small && shape != Type::Vec3,
-        };
-        if format.shape != shape || !numbers {
-            let kind = match shape {
-                Type::Vec3 => "three floats",
-                Type::Vec4 => "four floats or normalized integers",
-                _ => "single floats or normalized integers",
+        if format.shape != shape || !self.channel.numbers.fits(format) {
+            let count = match shape {
+                Type::Vec2 => "two",
+                Type::Vec3 => "three",
+                Type::Vec4 => "four",
+                _ => "single",
             };
-            return fault(Code::AnimationOutputFormat, format!("values must be {kind}"));
+            let text = format!("values must be {count} {}", self.channel.numbers.words());
+            return fault(Code::AnimationOutputFormat, text);
         }
         let each = (each as u64).saturating_mul(self.channel.interpolation.elements() as u64);
         if accessor.count.0 != each.saturating_mul(self.count as u64) {
@@ -277,6 +377,24 @@ impl Keys<'_> {
             return fault(Code::AnimationOutputCount, text);
         }
         Ok(())
+    }
+
+    /// So many numbers, up to four, at a moment.
+    fn numbers(&self, between: Between, count: usize) -> Result<Vec<f64>, Fault> {
+        let shape = match count {
+            1 => Type::Scalar,
+            2 => Type::Vec2,
+            3 => Type::Vec3,
+            _ => Type::Vec4,
+        };
+        self.check(shape, 1)?;
+        let (before, after) = match count {
+            1 => self.around::<1>(between, 1)?,
+            2 => self.around::<2>(between, 1)?,
+            3 => self.around::<3>(between, 1)?,
+            _ => self.around::<4>(between, 1)?,
+        };
+        Ok(curve::numbers(self.channel.interpolation, between, &before, &after))
     }
 
     /// The keys around a moment, `each` elements of `N` numbers to a value.

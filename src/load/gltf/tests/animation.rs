@@ -253,13 +253,6 @@ fn what_cannot_be_aimed_at_is_said() {
     let loaded = at(&twice, 0.5);
     assert_close(point(&loaded, DVec3::ZERO), [1.0, 0.0, 0.0]);
     assert_eq!(codes(&loaded), ["gltf-animation-duplicate-targets"]);
-
-    let mut pointer = linear();
-    pointer.set("extensionsUsed", json!(["KHR_animation_pointer"]));
-    let extension = json!({"KHR_animation_pointer": {"pointer": "/nodes/0/translation"}});
-    pointer.root["animations"][0]["channels"][0]["target"] = json!({"path": "pointer", "extensions": extension});
-    let lines = told(&at(&pointer, 1.0));
-    assert!(lines.len() == 1 && lines[0].contains("KHR_animation_pointer is not supported"), "{lines:?}");
 }
 
 #[test]
