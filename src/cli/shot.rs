@@ -15,7 +15,7 @@ use super::summary::Summary;
 use super::{again, cost_layers, dry_run, interrupt, print, read, surroundings, unseen};
 use crate::accel::AnyAccel;
 use crate::accel::auto::Reason;
-use crate::image::FileKind;
+use crate::image::{ExrSamples, FileKind, LARGEST_HALF, Picture, beyond_half};
 use crate::load::{Diagnostic, Loaded};
 use crate::render::texture::TextureStore;
 use crate::render::{Costs, Job, Rendered, Settings, View, World, render_costs};
@@ -278,12 +278,27 @@ impl Prepared<'_> {
         }
         let summary = Summary { shot, effective, loaded, bounds: self.bounds, view: self.phrase, light: self.light };
         summary.say(&rendered, &times, messages);
+        self.tell_of_clipped(&rendered.picture);
         let profile = job.profile.then(|| profile.take());
         profile.iter().for_each(|p| p.say(messages));
         so_far.pictures.push(self.stats(&facts, times, counted, profile.as_ref()));
         match cost_layers::write_maps(job, shot, &effective.settings, &costs, accel, messages) {
             Ok(()) => self.judge(counted.as_ref()),
             Err(fault) => self.task.fail(&fault, Exit::Failed),
+        }
+    }
+
+    /// Says where a picture is brighter than its file holds.
+    fn tell_of_clipped(&self, picture: &Picture) {
+        let is_half = self.shot.kind == FileKind::Exr && self.effective.output.exr_samples == ExrSamples::Half;
+        let count = if is_half { beyond_half(picture) } else { 0 };
+        if count > 0 {
+            let pixels = if count == 1 { "1 pixel is".into() } else { format!("{count} pixels are") };
+            let text =
+                format!("{pixels} brighter than the {} that half floats hold, and written as that", LARGEST_HALF);
+            let file = self.shot.target.path().unwrap_or(Path::new("-"));
+            let warning = Diagnostic::new("exr-clipped", file, "", text).remedy("--float keeps them");
+            self.task.messages.say(Severity::Warning, &warning);
         }
     }
 

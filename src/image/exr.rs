@@ -115,9 +115,18 @@ fn channels(picture: &Picture, output: &Output) -> SmallVec<[AnyChannel<FlatSamp
     list
 }
 
+/// The largest number that a half float holds.
+pub const LARGEST_HALF: f32 = 65_504.0;
+
 /// The nearest half; light beyond the largest half becomes that, as infinities spread through every later filter.
 fn half(x: f32) -> f16 {
-    f16::from_f32(if x.is_finite() { x.clamp(-65_504.0, 65_504.0) } else { x })
+    f16::from_f32(if x.is_finite() { x.clamp(-LARGEST_HALF, LARGEST_HALF) } else { x })
+}
+
+/// How many pixels of a picture are brighter than half floats hold.
+pub fn beyond_half(picture: &Picture) -> usize {
+    let is_beyond = |pixel: &&[f32; 4]| pixel.iter().any(|&c| c.is_finite() && c > LARGEST_HALF);
+    picture.beauty.iter().filter(is_beyond).count()
 }
 
 /// A premultiplied pixel over a background.
@@ -324,6 +333,13 @@ mod tests {
 
     fn output(exr_samples: ExrSamples) -> Output {
         Output { exr_samples, exposure: 3.0, ..Output::default() }
+    }
+
+    #[test]
+    fn pixels_that_half_floats_cannot_hold_are_counted() {
+        let beauty =
+            vec![[LARGEST_HALF, 0.0, 0.0, 1.0], [0.0, 65_505.0, 0.0, 1.0], [f32::INFINITY; 4], [1e9, 1e9, 0.0, 1.0]];
+        assert_eq!(beyond_half(&Picture::of(2, 2, beauty)), 2);
     }
 
     #[test]

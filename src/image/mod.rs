@@ -25,6 +25,7 @@ pub(crate) use develop::Developer;
 pub use develop::rgba8;
 pub use encode::encode;
 pub use error::ImageError;
+pub use exr::{LARGEST_HALF, beyond_half};
 pub use kind::FileKind;
 pub use metadata::{Metadata, read_metadata, was_written_by_meshray};
 pub use output::{ExrSamples, Output, PngDepth};

@@ -1,14 +1,16 @@
-//! Pictures of surroundings: Radiance HDR, OpenEXR, and 8- or 16-bit pictures, whose colours are sRGB.
+//! Pictures of surroundings: Radiance HDR, OpenEXR, and 8- or 16-bit pictures, whose colours are sRGB and which cameras turn.
 
 use super::limits::{Budget, Limits};
 use super::texture::{format_of, within};
 use super::{Diagnostic, LoadError, Source};
+use crate::math::{DMat3, DVec3};
 use crate::quiet::attempt;
 use crate::scene::Panorama;
-use crate::scene::color::from_srgb;
+use crate::scene::color::{Primaries, from_srgb};
 use crate::threads;
+use ::exr::meta::MetaData;
 use ::image::codecs::hdr::HdrDecoder;
-use ::image::{DynamicImage, ImageFormat, ImageReader};
+use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, ImageResult};
 use std::borrow::Cow;
 use std::io::Cursor;
 use std::path::Path;
@@ -29,7 +31,8 @@ pub struct LoadedPanorama {
 /// Bytes that a pixel takes while it is decoded, turned into radiance, and copied at all sizes.
 pub(super) const PER_PIXEL: u64 = 48;
 
-/// Loads an equirectangular picture. Colours of HDR and EXR files are taken as linear Rec. 709.
+/// Loads an equirectangular picture. Colours of HDR files are taken as linear Rec. 709, and those of EXR files become that from
+/// whatever primaries they have; what Rec. 709 cannot show loses the part that would be less than no light.
 ///
 /// # Errors
 /// [`LoadError::Read`] when the file cannot be read, [`LoadError::Input`] when it is no such picture or larger than
@@ -44,7 +47,7 @@ pub fn load(path: &Path, limits: &Limits) -> Result<LoadedPanorama, LoadError> {
 /// As [`load`].
 pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadError> {
     let fault = |text: String| {
-        let remedy = "name an equirectangular .hdr or .exr, or `studio`, `white`, `black`";
+        let remedy = "name an equirectangular picture (.hdr, .exr, .png, .jpg), or `studio`, `white`, `black`";
         LoadError::from(Diagnostic::new("env-unusable", &source.path, "", text).remedy(remedy))
     };
     let bytes = &*as_radiance(&source.bytes);
@@ -59,18 +62,22 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
         reader(limits.memory).into_dimensions().map_err(|e| fault(format!("cannot be decoded: {e}")))?;
     let pixels = u64::from(width) * u64::from(height);
     if pixels == 0 || pixels > limits.image_pixels {
-        return Err(fault(format!("is {width}×{height} pixels where 1 to {} are allowed", limits.image_pixels)));
+        let text = format!("is {width}×{height} pixels where 1 to {} are allowed", limits.image_pixels);
+        // Less memory allows less pixels.
+        let fits = (1..=Limits::default().image_pixels).contains(&pixels);
+        return Err(if fits { Diagnostic::over_memory(&source.path, "", text).into() } else { fault(text) });
     }
     Budget::new(limits)
         .take(pixels, PER_PIXEL)
         .map_err(|over| LoadError::from(Diagnostic::over_memory(&source.path, "", over.to_string())))?;
     let most = pixels * PER_PIXEL;
     // The decoder of EXR files gives up on some damaged ones by a panic.
-    let picture = match attempt(|| threads::anywhere(|| reader(most).decode())) {
+    let picture = match attempt(|| threads::anywhere(|| upright(reader(most)))) {
         Some(Ok(picture)) => picture,
         Some(Err(e)) => return Err(fault(format!("cannot be decoded: {e}"))),
         None => return Err(fault("cannot be decoded: it is damaged".into())),
     };
+    let (width, height) = (picture.width(), picture.height());
     let mut warnings = Vec::new();
     if u64::from(width) != 2 * u64::from(height) {
         let text =
@@ -82,6 +89,16 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
         && let Some(exposure) = exposure(bytes)
     {
         texels.iter_mut().flatten().for_each(|c| *c /= exposure);
+    }
+    if format == ImageFormat::OpenExr {
+        let meta = MetaData::read_from_buffered(bytes, false).map_err(|e| fault(format!("cannot be decoded: {e}")))?;
+        if meta.headers.len() > 1 {
+            let text = format!("has {} parts, of which one is shown", meta.headers.len());
+            warnings.push(Diagnostic::new("env-parts", &source.path, "", text).remedy("keep only the panorama in it"));
+        }
+        if let Some(turned) = other_colors(&meta) {
+            texels.iter_mut().for_each(|texel| *texel = in_rec_709(turned, *texel));
+        }
     }
     if odd > 0 {
         let pixels = if odd == 1 { "1 pixel has".into() } else { format!("{odd} pixels have") };
@@ -105,6 +122,35 @@ fn as_radiance(bytes: &[u8]) -> Cow<'_, [u8]> {
         }
         _ => bytes.into(),
     }
+}
+
+/// A picture as it is looked at: cameras note how they were held.
+fn upright(reader: ImageReader<Cursor<&[u8]>>) -> ImageResult<DynamicImage> {
+    let mut decoder = reader.into_decoder()?;
+    let orientation = decoder.orientation()?;
+    let mut picture = DynamicImage::from_decoder(decoder)?;
+    picture.apply_orientation(orientation);
+    Ok(picture)
+}
+
+/// What turns the colours of an EXR file into Rec. 709; `None`: they are that, or their primaries are none.
+fn other_colors(meta: &MetaData) -> Option<DMat3> {
+    /// Coordinates are written with three or four digits.
+    const ROUNDING: f64 = 1e-3;
+    let chromaticities = meta.headers.first()?.shared_attributes.chromaticities?;
+    let place = |at: ::exr::math::Vec2<f32>| [f64::from(at.x()), f64::from(at.y())];
+    let colors = [chromaticities.red, chromaticities.green, chromaticities.blue].map(place);
+    let primaries = Primaries { colors, white: place(chromaticities.white) };
+    let usual = Primaries::REC_709;
+    let pairs = colors.iter().zip(&usual.colors).chain([(&primaries.white, &usual.white)]);
+    let differs = pairs.flat_map(|(a, b)| a.iter().zip(b)).any(|(a, b)| (a - b).abs() > ROUNDING);
+    differs.then(|| primaries.to_rec_709()).flatten()
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "radiance is stored so")]
+fn in_rec_709(turned: DMat3, texel: [f32; 3]) -> [f32; 3] {
+    let color = turned * DVec3::from(texel.map(f64::from));
+    color.to_array().map(|c| (c as f32).clamp(0.0, f32::MAX))
 }
 
 /// What the numbers of a Radiance picture have been multiplied by, if that is known and not 1.
@@ -182,6 +228,70 @@ mod tests {
         let loaded = decode(&file(&grey, ImageFormat::Png), &Limits::default()).unwrap();
         let texel = loaded.panorama.texels[0];
         assert!((texel[0] - 0.5).abs() < 0.01 && texel[1] == 1.0 && texel[2] == 0.0);
+    }
+
+    /// An EXR of even colour in other primaries, once in each part.
+    fn exr(colors: [[f32; 2]; 3], color: [f32; 3], parts: usize) -> Source {
+        use ::exr::prelude::*;
+        let layer = |i: usize| {
+            let channel = |(name, value): (&str, f32)| AnyChannel::new(name, FlatSamples::F32(vec![value; 8]));
+            let channels = AnyChannels::sort(["R", "G", "B"].into_iter().zip(color).map(channel).collect());
+            Layer::new((4, 2), LayerAttributes::named(i.to_string().as_str()), Encoding::UNCOMPRESSED, channels)
+        };
+        let layers: Vec<_> = (0..parts).map(layer).collect();
+        let [red, green, blue] = colors.map(|[x, y]| Vec2(x, y));
+        let mut attributes = ImageAttributes::new(IntegerBounds::from_dimensions((4, 2)));
+        attributes.chromaticities =
+            Some(::exr::meta::attribute::Chromaticities { red, green, blue, white: Vec2(0.3127, 0.329) });
+        let mut out = Cursor::new(Vec::new());
+        Image::from_layers(attributes, layers).write().non_parallel().to_buffered(&mut out).unwrap();
+        Source { path: "sky.exr".into(), bytes: out.into_inner() }
+    }
+
+    #[test]
+    fn colours_of_other_primaries_become_rec_709() {
+        let usual = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]];
+        let p3 = [[0.68, 0.32], [0.265, 0.69], [0.15, 0.06]];
+        let texel = |colors, color| decode(&exr(colors, color, 1), &Limits::default()).unwrap().panorama.texels[3];
+        assert_eq!(texel(usual, [3.0, 0.5, 0.25]), [3.0, 0.5, 0.25]);
+        let white = texel(p3, [2.0; 3]);
+        assert!(white.iter().all(|c| (c - 2.0).abs() < 1e-5), "{white:?}");
+        let red = texel(p3, [1.0, 0.0, 0.0]);
+        assert!((red[0] - 1.2249).abs() < 1e-3 && red[1..] == [0.0, 0.0], "{red:?}");
+    }
+
+    #[test]
+    fn parts_that_are_not_shown_are_told() {
+        let usual = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]];
+        let loaded = decode(&exr(usual, [1.0; 3], 2), &Limits::default()).unwrap();
+        assert_eq!(
+            loaded.warnings[0].to_string(),
+            "sky.exr: has 2 parts, of which one is shown; keep only the panorama in it"
+        );
+    }
+
+    #[test]
+    fn a_photo_is_turned_as_its_camera_says() {
+        use ::image::ImageEncoder;
+        use ::image::codecs::jpeg::JpegEncoder;
+        // Little-endian TIFF with one entry: orientation (0x112), a short, upside down.
+        let exif = [b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0".as_slice(), &[3, 0, 0, 0, 0, 0, 0, 0]].concat();
+        let mut bytes = Vec::new();
+        let mut encoder = JpegEncoder::new_with_quality(&mut bytes, 100);
+        encoder.set_exif_metadata(exif).unwrap();
+        let rows = [[250u8; 16 * 8 * 3], [5; 16 * 8 * 3]].concat();
+        encoder.write_image(&rows, 16, 16, ::image::ExtendedColorType::Rgb8).unwrap();
+        let loaded = decode(&Source { path: "sky.jpg".into(), bytes }, &Limits::default()).unwrap();
+        let texels = &loaded.panorama.texels;
+        assert!(texels[0][0] < 0.1 && texels[255][0] > 0.9, "{:?} {:?}", texels[0], texels[255]);
+    }
+
+    #[test]
+    fn a_picture_that_less_memory_forbids_says_what_to_raise() {
+        let whole = file(&bright(64, 32), ImageFormat::OpenExr);
+        let limits = Limits { image_pixels: 2047, ..Limits::default() };
+        let text = decode(&whole, &limits).unwrap_err().to_string();
+        assert!(text.ends_with("where 1 to 2047 are allowed; raise --max-memory"), "{text}");
     }
 
     #[test]

@@ -64,10 +64,10 @@ pub(in crate::cli) struct RenderArgs {
     #[arg(long, value_name = "N", value_parser = parse::above_zero, requires = "heatmap", help_heading = "Output",
           hide_short_help = true)]
     pub heatmap_max: Option<f64>,
-    /// How linear light becomes display colour; EXR stays linear [default: neutral]
+    /// How linear light becomes display colour; not for EXR, which stays linear [default: neutral]
     #[arg(long, value_name = "NAME", value_parser = parse::tone_map(), help_heading = "Output", hide_short_help = true)]
     pub tone_map: Option<ToneMap>,
-    /// Brighter (+) or darker (-) by this many stops; EXR stays as it is
+    /// Brighter (+) or darker (-) by this many stops; not for EXR, which keeps light as it is
     #[arg(long, value_name = "STOPS", value_parser = parse::exposure, help_heading = "Output", allow_hyphen_values = true)]
     pub exposure: Option<f32>,
     /// Put all inputs into one scene and one picture
@@ -127,7 +127,8 @@ pub(in crate::cli) struct RenderArgs {
     /// the studio its walls
     #[arg(long, value_name = "COLOR", value_parser = parse::background, help_heading = "Light and background")]
     pub background: Option<Background>,
-    /// What surrounds the scene and lights it: an equirectangular picture (.hdr, .exr), or studio, white, black
+    /// What surrounds the scene and lights it: an equirectangular picture (.hdr, .exr, or one for
+    /// screens), or studio, white, black
     ///
     /// Black gives no light, but mirrors and glass see the --background in it, where that is a colour (dark grey if nobody says).
     /// A model without lamps keeps its default ones in the studio, and anything else takes their place; lamps of the file
@@ -195,7 +196,7 @@ pub(in crate::cli) struct RenderArgs {
     /// with the camera, the studio that mirrors see stays.
     #[arg(long, value_name = "N", value_parser = parse::turns, help_heading = "Camera", hide_short_help = true)]
     pub turntable: Option<parse::Turns>,
-    /// What becomes of OBJ and PLY faces with more than three corners
+    /// What becomes of OBJ, PLY and NFF faces with more than three corners
     #[arg(long, value_name = "HOW", value_enum, default_value_t, help_heading = "Loading", hide_short_help = true)]
     pub polygons: PolygonsArg,
     /// Give meshes without normals smooth ones, but for edges at which faces lean by more than so many degrees, 30 when
