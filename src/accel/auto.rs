@@ -25,9 +25,7 @@ use super::any::UnknownAccel;
 use super::instances::Object;
 use super::shapes::Prim;
 use super::wide::ALIKE;
-use super::{
-    Accel, AccelKind, AccelParams, AnyAccel, BitSet, Hit, Kept, NO_PRIM, Ray, RayCounts, Shapes, Splitting, Wide,
-};
+use super::{Accel, AccelKind, AccelParams, AnyAccel, BitSet, Hit, Kept, Ray, RayCounts, Shapes, Splitting, Wide};
 use crate::math::Vec3;
 use crate::math::random::Random;
 use crate::math::triangle;
@@ -334,7 +332,7 @@ fn sample(shapes: &Shapes, starts: &[u32]) -> Vec<Ray> {
     let mut random = Random::new(0);
     let mut ray = |&prim: &u32| {
         let (origin, dir) = (place(shapes, prim, &mut random), random.direction());
-        Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude: NO_PRIM, sample: 0 }
+        Ray::new(origin, dir)
     };
     starts.iter().map(&mut ray).collect()
 }

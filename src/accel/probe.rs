@@ -186,6 +186,21 @@ pub struct RayCounts {
     pub n_xf: u64,
 }
 
+impl RayCounts {
+    /// What is counted of rays, under Havran's names for it and ours, in the order of all tables.
+    pub const fn named(&self) -> [(&'static str, u64); 7] {
+        [
+            ("n_it", self.n_it),
+            ("n_ts", self.n_ts),
+            ("n_ets", self.n_ets),
+            ("n_eets", self.n_eets),
+            ("n_bit", self.n_bit),
+            ("n_mb", self.n_mb),
+            ("n_xf", self.n_xf),
+        ]
+    }
+}
+
 impl Probe for RayCounts {
     const OF_PICTURES: bool = true;
 

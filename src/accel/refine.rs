@@ -169,7 +169,6 @@ impl Located {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::NO_PRIM;
     use crate::math::random::Random;
 
     #[test]
@@ -185,7 +184,7 @@ mod tests {
             let origin = random.cube() * 9.0;
             let [a, b, c] = shapes.triangle(0);
             let dir = a * (1.0 - u - v) + b * u + c * v - origin;
-            let ray = Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude: NO_PRIM, sample: 0 };
+            let ray = Ray::new(origin, dir);
             let hit = Hit { t: 1.0, u, v, prim: 0 };
             assert_eq!(shapes.refine(&ray, &hit), shapes.prim(hit.prim).refine_with_care(&ray, &hit));
             placed += usize::from(Facet::of(&shapes.triangle(0)).place(origin, dir, (u, v)).2);

@@ -34,8 +34,7 @@ impl Pencil<'_> {
     #[inline(always)]
     pub(super) fn ray(&self, i: usize) -> Ray {
         let [x, y, z] = self.dirs;
-        let dir = Vec3::new(x[i], y[i], z[i]);
-        Ray { origin: self.origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude: NO_PRIM, sample: 0 }
+        Ray::new(self.origin, Vec3::new(x[i], y[i], z[i]))
     }
 
     /// These of its rays, or as many of them as there are.

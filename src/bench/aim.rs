@@ -1,6 +1,6 @@
 //! Rays that are hard on a mesh.
 
-use crate::accel::{NO_PRIM, Ray, Shapes};
+use crate::accel::{Ray, Shapes};
 use crate::math::Vec3;
 use crate::math::random::Random;
 use crate::math::triangle;
@@ -79,20 +79,20 @@ impl<'a> Aimer<'a> {
         let t = self.shapes.triangle(u32::try_from(self.random.below(self.shapes.triangles.len())).unwrap_or(0));
         let [a, b, c] = t;
         let (r, s) = (self.random.unit(), self.random.unit());
-        let at = |target: Vec3, origin: Vec3| ray(origin, target - origin);
+        let at = |target: Vec3, origin: Vec3| Ray::new(origin, target - origin);
         match aim {
             Aim::Corners => at(a, self.start(i)),
             Aim::EdgeMiddles => at((a + b) * 0.5, self.start(i)),
             Aim::Edges => at(a + (b - a) * r, self.start(i)),
             Aim::InPlane => {
                 let dir = (b - a) * (r - 0.5) + (c - a) * (s - 0.5);
-                ray(triangle::within(&t, r, s) - dir * self.strides(dir), dir)
+                Ray::new(triangle::within(&t, r, s) - dir * self.strides(dir), dir)
             }
             Aim::Grazing => {
                 let tilt = libm::powf(10.0, -1.0 - 6.0 * self.random.unit());
                 let along = ((b - a) * (r - 0.5) + (c - a) * (s - 0.5)).normalize_or(Vec3::X);
                 let dir = along + triangle::normal(&t) * tilt;
-                ray(triangle::within(&t, s, r) - dir * self.reach, dir)
+                Ray::new(triangle::within(&t, s, r) - dir * self.reach, dir)
             }
             Aim::Random => at(self.middle + self.random.cube() * self.reach, self.start(i)),
         }
@@ -110,10 +110,6 @@ impl<'a> Aimer<'a> {
         let strides = (f64::from(self.reach) / dir.as_dvec3().length()) as f32;
         if strides.is_finite() { strides } else { 1.0 }
     }
-}
-
-fn ray(origin: Vec3, dir: Vec3) -> Ray {
-    Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude: NO_PRIM, sample: 0 }
 }
 
 #[cfg(test)]

@@ -221,7 +221,7 @@ fn find<'s>(name: &str, scene: &'s Scene, file: &Path) -> Result<&'s Camera, Dia
         let names = scene.cameras.iter().map(|c| c.name.as_str()).filter(|n| !n.is_empty());
         let text = format!("no camera is called '{name}'");
         let remedy = if scene.cameras.is_empty() {
-            "the file has no cameras; use --view or --eye".to_owned()
+            "the scene that is shown has no camera in it; use --view or --eye".to_owned()
         } else if let Some(near) = nearest(name, names) {
             format!("did you mean '{near}'? there are, from 0: {all}")
         } else {

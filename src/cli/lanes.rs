@@ -14,6 +14,7 @@ use super::progress::Progress;
 use super::render::{self, SoFar};
 use crate::image::was_written_by_meshray;
 use crate::load::is_called_a_model;
+use crate::render::Settings;
 use crate::threads;
 use rayon::ThreadPool;
 use std::collections::HashMap;
@@ -52,7 +53,8 @@ impl Ended {
 /// others one by one.
 pub(super) fn run(job: &RenderJob, pool: &ThreadPool, messages: &Messages, so_far: &mut SoFar) -> Ended {
     let lanes = if may_go_side_by_side(job) { pool.current_num_threads() } else { 1 };
-    let (mut small, mut others, mut sizes) = (Vec::new(), Vec::new(), Sizes::default());
+    let (mut small, mut others) = (Vec::new(), Vec::new());
+    let mut sizes = Sizes { has_size: job.look.size.is_some(), beside: HashMap::new() };
     for batch in &job.batches {
         if lanes > 1 && sizes.are_small(batch) && spares_others(batch) { &mut small } else { &mut others }.push(batch);
     }
@@ -75,15 +77,20 @@ pub(super) fn run(job: &RenderJob, pool: &ThreadPool, messages: &Messages, so_fa
 /// Not where memory has a bound of its own, which is that of one scene, nor where times are wanted, what is done by a signal, or
 /// large pictures.
 fn may_go_side_by_side(job: &RenderJob) -> bool {
-    let (width, height) = job.look.size.unwrap_or_default();
+    let usual = Settings::default();
+    let (width, height) = job.look.size.unwrap_or((usual.width, usual.height));
     let times = job.profile || job.stats.is_some() || !job.heatmaps.is_empty() || !job.look.costs.is_empty();
     let small = u64::from(width) * u64::from(height) <= PIXELS;
     small && !(job.bounded || times || job.dry_run || job.keep_partial || job.again.is_some())
 }
 
-/// What lies beside models, folder by folder.
-#[derive(Default)]
-struct Sizes(HashMap<PathBuf, Option<u64>>);
+/// How large inputs are.
+struct Sizes {
+    /// Whether the size of their pictures was typed; NFF files say one themselves, which is known when they are read.
+    has_size: bool,
+    /// What lies beside models, folder by folder.
+    beside: HashMap<PathBuf, Option<u64>>,
+}
 
 impl Sizes {
     /// Whether what a scene is read from is small: a file that holds all, or one with its share of all that lies beside it and in
@@ -95,10 +102,11 @@ impl Sizes {
             let Ok(file) = input.metadata() else { return Some(0) };
             let own = file.is_file().then_some(file.len())?;
             match kind.as_str() {
-                "glb" | "ply" | "stl" | "nff" => Some(own),
+                "glb" | "ply" | "stl" => Some(own),
+                "nff" => self.has_size.then_some(own),
                 "gltf" | "obj" => {
                     let folder = input.parent()?;
-                    Some(own + (*self.0.entry(folder.to_path_buf()).or_insert_with(|| beside(folder)))?)
+                    Some(own + (*self.beside.entry(folder.to_path_buf()).or_insert_with(|| beside(folder)))?)
                 }
                 _ => None,
             }
@@ -277,13 +285,18 @@ mod tests {
     #[test]
     fn small_is_what_a_model_may_read_and_not_its_own_file_alone() {
         let dir = tempfile::tempdir().unwrap();
-        let small =
-            |name: &str| Sizes::default().are_small(&Batch { inputs: vec![dir.path().join(name)], shots: Vec::new() });
+        let of = |name: &str, has_size: bool| {
+            let batch = Batch { inputs: vec![dir.path().join(name)], shots: Vec::new() };
+            Sizes { has_size, beside: HashMap::new() }.are_small(&batch)
+        };
+        let small = |name: &str| of(name, true);
         let write = |name: &str, bytes: u64| {
             let path = dir.path().join(name);
             fs::create_dir_all(path.parent().unwrap()).unwrap();
             fs::File::create(path).unwrap().set_len(bytes).unwrap();
         };
+        write("own/a.nff", 10);
+        assert_eq!((of("own/a.nff", true), of("own/a.nff", false)), (true, false), "it says how large its picture is");
         for name in ["lone/a.gltf", "pair/a.obj", "pair/b.obj", "deep/a.gltf", "own/a.glb"] {
             write(name, 10);
         }

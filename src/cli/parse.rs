@@ -113,7 +113,9 @@ pub(super) fn frames(text: &str) -> Result<Frames, String> {
         Some(last) => whole(last).and_then(|last| last.checked_add(1)),
         None => whole(last),
     };
-    let (first, end) = whole(first).zip(end).ok_or("the ends are whole numbers from 0, such as 0..48")?;
+    let (first, end) = whole(first)
+        .zip(end)
+        .ok_or_else(|| format!("the ends are whole numbers from 0 to {}, such as 0..48", u32::MAX))?;
     match end.checked_sub(first) {
         None | Some(0) => Err("there are no frames between these ends".into()),
         Some(count) if count > MAX_PICTURES => Err(format!("at most {MAX_PICTURES} frames")),

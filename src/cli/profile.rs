@@ -53,17 +53,15 @@ impl Profile {
 
     /// The rendering ends here; `parts` are known when it was profiled.
     pub(super) fn rendered(&mut self, parts: &render::Profile) {
-        let all = self.watch.lap();
+        self.watch.lap();
         self.add("prepare", parts.prepare);
-        let tiles = all - parts.prepare;
-        self.rows.push(Row { name: "tiles", wall: Some(tiles.wall), cpu: tiles.cpu, rays: None });
+        self.rows.push(Row { name: "tiles", wall: Some(parts.tiles.wall), cpu: parts.tiles.cpu, rays: None });
         for ((name, cpu), rays) in CLASS_NAMES.into_iter().zip(parts.trace).zip(parts.rays) {
             if rays > 0 {
                 self.rows.push(Row { name, wall: None, cpu, rays: Some(rays) });
             }
         }
-        let cpu = tiles.cpu.saturating_sub(parts.trace.iter().sum());
-        self.rows.push(Row { name: "shade", wall: None, cpu, rays: None });
+        self.rows.push(Row { name: "shade", wall: None, cpu: parts.shade(), rays: None });
     }
 
     /// Leaves out what was done since the last stage.

@@ -58,8 +58,8 @@ pub(super) struct SamplingArgs {
     /// [default: box]
     #[arg(long, value_name = "NAME", value_parser = parse::filter(), help_heading = "Quality", hide_short_help = true)]
     pub filter: Option<Filter>,
-    /// In what numbers --pixel-error and --aa-threshold count: sRGB codes after exposure and tone map, or linear light
-    /// [default: linear for EXR, else display]
+    /// In what numbers --pixel-error, --target-error and --aa-threshold count: sRGB codes after exposure and tone map, or
+    /// linear light [default: linear for EXR, else display]
     #[arg(long, value_name = "SPACE", value_enum, help_heading = "Quality", hide_short_help = true)]
     pub error_space: Option<SpaceArg>,
     /// Which quarters of a pixel adaptive sampling looks at closer: `corners` those whose corner differs from the middle of the

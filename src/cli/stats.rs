@@ -265,24 +265,13 @@ impl PictureStats {
 }
 
 fn count_table(counted: &Counted) -> Vec<String> {
-    let mut lines = vec![format!(
-        "  {:<10} {:>12} {:>12} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}",
-        "counts", "rays", "hits", "n_it", "n_ts", "n_ets", "n_eets", "n_bit", "n_mb"
-    )];
     let mut all = RayCounts::default();
+    let names: String = all.named().map(|(name, _)| format!(" {name:>9}")).concat();
+    let mut lines = vec![format!("  {:<10} {:>12} {:>12}{names}", "counts", "rays", "hits")];
     let mut row = |name: &str, c: &RayCounts| {
         let per_ray = |n: u64| n as f64 / c.queries.max(1) as f64;
-        lines.push(format!(
-            "  {name:<10} {:>12} {:>12} {:>9.3} {:>9.3} {:>9.3} {:>9.3} {:>9.3} {:>9.3}",
-            c.queries,
-            c.found,
-            per_ray(c.n_it),
-            per_ray(c.n_ts),
-            per_ray(c.n_ets),
-            per_ray(c.n_eets),
-            per_ray(c.n_bit),
-            per_ray(c.n_mb),
-        ));
+        let numbers: String = c.named().map(|(_, n)| format!(" {:>9.3}", per_ray(n))).concat();
+        lines.push(format!("  {name:<10} {:>12} {:>12}{numbers}", c.queries, c.found));
     };
     for (name, counts) in counted.classes().into_iter().filter(|(_, c)| c.queries > 0) {
         all += *counts;

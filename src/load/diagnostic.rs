@@ -144,7 +144,13 @@ impl Warnings {
         // The name of no kind: texts have no control characters that matter.
         let rest = (warning.code, PathBuf::new(), "\0".to_owned());
         match self.known.get(&rest) {
-            Some(&at) => self.count(at, warning.count),
+            Some(&at) => {
+                let listed = &mut self.list[at].1;
+                if listed.file != warning.file {
+                    listed.file = PathBuf::new();
+                }
+                self.count(at, warning.count);
+            }
             None => {
                 let text = "more of this kind are not listed";
                 self.keep(
@@ -218,5 +224,15 @@ mod tests {
         assert_eq!(last, "a.obj: more of this kind are not listed (×99980)");
         let total: u32 = twice.into_vec().iter().map(|w| w.count).sum();
         assert_eq!(total, 200_000);
+    }
+
+    #[test]
+    fn what_is_only_counted_names_a_file_if_all_are_of_that() {
+        let mut warnings = Warnings::default();
+        for i in 0..Warnings::KEPT + 5 {
+            let file = if i < Warnings::KEPT + 2 { "a.obj" } else { "b.obj" };
+            warnings.push(Diagnostic { file: file.into(), ..warning("a", format!("text {i}")) });
+        }
+        assert_eq!(warnings.into_vec().last().unwrap().to_string(), "more of this kind are not listed (×5)");
     }
 }

@@ -5,7 +5,7 @@ use super::shade::has_inside;
 use super::surface::{Surface, Target};
 use super::view::View;
 use super::wave::{Media, Medium};
-use crate::accel::{Accel, Hit, NO_PRIM, NoProbe, Ray};
+use crate::accel::{Accel, Hit, NoProbe, Ray};
 use crate::math::Vec3;
 use crate::scene::{Material, Surface as Reflection};
 
@@ -40,7 +40,7 @@ fn ways(view: &View) -> impl Iterator<Item = Vec3> {
 /// Materials that are left on one way without having been entered.
 fn left_along<A: Accel>(context: &Context, accel: &A, scratch: &mut A::Scratch, view: &View, dir: Vec3) -> Vec<u32> {
     let origin = (view.eye - context.world.center).as_vec3();
-    let ray = Ray { origin, t_min: 0.0, dir, t_max: f32::INFINITY, exclude: NO_PRIM, sample: 0 };
+    let ray = Ray::new(origin, dir);
     let (mut entered, mut left) = (Media::default(), Vec::new());
     let mut hit = [Hit::MISS];
     accel.closest(&[ray], &mut hit, scratch, &mut NoProbe);

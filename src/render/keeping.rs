@@ -35,7 +35,7 @@ impl Instancing {
 
 /// A name that no way has.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("nothing is called {0:?} that instances could become; there are: auto, keep, flatten")]
+#[error("nothing is called {0:?} that instances could become; there are: {all}", all = Instancing::ALL.map(Instancing::name).join(", "))]
 pub struct UnknownInstancing(String);
 
 impl FromStr for Instancing {

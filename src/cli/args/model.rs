@@ -28,7 +28,7 @@ pub(in crate::cli) struct LoadArgs {
     /// Which moment of an animation.
     #[command(flatten)]
     pub moment: MomentArgs,
-    /// What becomes of OBJ and PLY faces with more than three corners
+    /// What becomes of OBJ, PLY and NFF faces with more than three corners
     #[arg(long, value_name = "HOW", value_enum, default_value_t)]
     pub polygons: PolygonsArg,
     /// Give meshes without normals smooth ones, but for edges at which faces lean by more than so many degrees, 30 when

@@ -3,6 +3,7 @@
 use super::Compared;
 use super::args::DiffArgs;
 use crate::bench::report::number::grouped;
+use crate::cli::version::SHORT;
 use crate::image::Picture;
 use crate::image::diff::{LayerDifference, Space};
 use crate::image::srgb;
@@ -82,7 +83,7 @@ pub(super) fn json(args: &DiffArgs, compared: &Compared, broken: &[String]) -> S
         .collect();
     let report = json!({
         "schema": "meshray-diff/1",
-        "version": env!("CARGO_PKG_VERSION"),
+        "version": SHORT,
         "expected": args.expected.to_string_lossy(),
         "actual": args.actual.to_string_lossy(),
         "width": compared.expected.width,

@@ -9,7 +9,7 @@
 //! `wires` (of these `points` and `lines`, with `point_width` and `line_width` as drawn, metres; 0: none);
 //! `textures` (`name`, `width`, `height`); `missing` (files that were named but not found); `extensions` (`name`,
 //! `required`, `supported`); `scenes`, `scene`; `variants`, `variant` (the number of the one asked for, or null);
-//! `animations` (`name`, `seconds`, `channels`); `cameras`, `lights` (`name`, `kind`); `features` (needed) and `left_out`;
+//! `animations` (`name`, `seconds`, `channels`); `cameras`, `lights` (`name`, `kind`); `ambient` (light from everywhere, linear); `features` (needed) and `left_out`;
 //! `memory` (bytes: `scene`, `structure`); `max_rounding`; `warnings` (messages). Keys are only ever added.
 
 mod args;

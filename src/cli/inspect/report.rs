@@ -4,7 +4,7 @@ use super::super::text::{grouped, so_many};
 use super::topology::Topology;
 use crate::accel::{AccelChoice, AccelParams};
 use crate::load::{AnimationFacts, Loaded, WireFacts};
-use crate::math::DVec3;
+use crate::math::{DVec3, Vec3};
 use crate::render::World;
 use crate::scene::features::Features;
 use crate::scene::framing::{Bounds, robust_bounds_within};
@@ -156,6 +156,9 @@ impl<'a> Report<'a> {
         lines.add("animations", shorten(self.loaded.facts.animations.iter().map(animation)));
         lines.add("cameras", shorten(scene.cameras.iter().map(|c| format!("{} ({})", label(&c.name), lens(c)))));
         lines.add("lights", shorten(scene.lights.iter().map(|l| format!("{} ({})", label(&l.name), kind(l)))));
+        if scene.ambient != Vec3::ZERO {
+            lines.add("ambient", format!("light of {}, {}, {}", scene.ambient.x, scene.ambient.y, scene.ambient.z));
+        }
         let bitmaps = scene.bitmaps.iter().map(|b| format!("{} {}×{}", label(&b.name), b.width, b.height));
         lines.add("images", shorten(bitmaps));
         lines.add("needs", self.features.present().map(|f| f.name()).collect::<Vec<_>>().join(", "));
@@ -218,6 +221,7 @@ impl<'a> Report<'a> {
             "variants": facts.variants, "variant": facts.variant,
             "cameras": scene.cameras.iter().map(|c| named(&c.name, lens(c))).collect::<Vec<_>>(),
             "lights": scene.lights.iter().map(|l| named(&l.name, kind(l))).collect::<Vec<_>>(),
+            "ambient": scene.ambient.to_array(),
             "features": self.features.present().map(|f| f.name()).collect::<Vec<_>>(),
             "left_out": self.features.absent().map(|f| f.name()).collect::<Vec<_>>(),
             "memory": { "scene": self.scene_bytes, "structure": self.structure_bytes },

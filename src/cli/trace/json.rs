@@ -69,10 +69,7 @@ const fn question(question: Question) -> &'static str {
 }
 
 fn counts(c: &RayCounts) -> Value {
-    json!({
-        "n_it": c.n_it, "n_ts": c.n_ts, "n_ets": c.n_ets, "n_eets": c.n_eets, "n_bit": c.n_bit, "n_mb": c.n_mb,
-        "n_xf": c.n_xf,
-    })
+    c.named().into_iter().map(|(name, n)| (name.to_owned(), Value::from(n))).collect()
 }
 
 fn hit(told: &Told, query: &Query) -> Value {

@@ -63,9 +63,10 @@ fn ending(told: &Told, query: &Query) -> String {
         let object = object(&told.loaded.scene, told.world, query.hit.prim);
         return format!("blocked by prim {} of {object} at t {}", query.hit.prim, query.hit.t);
     }
-    let material = if place.material.is_empty() { String::new() } else { format!(", material '{}'", place.material) };
+    let material =
+        if place.material.is_empty() { place.material_number.to_string() } else { format!("'{}'", place.material) };
     format!(
-        "hits prim {} of {}{material}, at t {}, u {}, v {}, position {}, normal {}",
+        "hits prim {} of {}, material {material}, at t {}, u {}, v {}, position {}, normal {}",
         query.hit.prim,
         place.object,
         query.hit.t,
@@ -77,17 +78,7 @@ fn ending(told: &Told, query: &Query) -> String {
 }
 
 fn counts(query: &Query) -> String {
-    let c = &query.counts;
-    let named = [
-        ("n_it", c.n_it),
-        ("n_ts", c.n_ts),
-        ("n_ets", c.n_ets),
-        ("n_eets", c.n_eets),
-        ("n_bit", c.n_bit),
-        ("n_mb", c.n_mb),
-        ("n_xf", c.n_xf),
-    ];
-    named.map(|(name, n)| format!("{name} {n}")).join("  ")
+    query.counts.named().map(|(name, n)| format!("{name} {n}")).join("  ")
 }
 
 /// A line for each node or cell, with the tests done in it.
@@ -203,7 +194,10 @@ fn point(p: DVec3) -> String {
 
 /// Six digits, without zeros behind.
 fn real(x: f64) -> String {
-    if x == 0.0 || !x.is_finite() {
+    if x == 0.0 {
+        return "0".into();
+    }
+    if !x.is_finite() {
         return x.to_string();
     }
     #[expect(clippy::cast_possible_truncation, reason = "a decimal exponent of f64")]

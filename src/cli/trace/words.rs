@@ -12,7 +12,9 @@ use crate::scene::Scene;
 pub(super) struct Place<'a> {
     /// Name of the object in the file, or its number.
     pub object: String,
-    /// Name of the material; empty where the file gives none.
+    /// The number of the material.
+    pub material_number: u32,
+    /// Its name; empty where the file gives none.
     pub material: &'a str,
     /// World space.
     pub position: DVec3,
@@ -27,9 +29,11 @@ pub(super) fn place<'a>(loaded: &'a Loaded, world: &World, query: &Query) -> Opt
     let scene = &loaded.scene;
     query.hit.is_some().then(|| {
         let refined = world.refine(&query.ray, &query.hit);
-        let material = scene.materials.get(world.material(scene, query.hit.prim) as usize);
+        let material_number = world.material(scene, query.hit.prim);
+        let material = scene.materials.get(material_number as usize);
         Place {
             object: object(scene, world, query.hit.prim),
+            material_number,
             material: material.map_or("", |m| m.name.as_str()),
             position: world.center + refined.position.as_dvec3(),
             normal: refined.normal,

@@ -1,6 +1,7 @@
 //! The findings of `meshray verify`, shown as text and as JSON.
 
 use super::super::text::grouped;
+use super::super::version::SHORT;
 use crate::accel::{AccelKind, IntersectorKind};
 use crate::bench::aim::Aim;
 use crate::bench::verify::tally::{Rate, Tally};
@@ -177,7 +178,7 @@ impl Report<'_> {
             .map(|c| json!({ "intersector": c.test.name(), "ns_per_ray": c.per_ray.as_secs_f64() * 1e9 }))
             .collect();
         let value = json!({
-            "schema": "meshray-verify/1", "version": env!("CARGO_PKG_VERSION"), "file": self.name,
+            "schema": "meshray-verify/1", "version": SHORT, "file": self.name,
             "hash": format!("{:032x}", self.hash), "triangles": f.triangles, "others": f.others,
             "rays": self.plan.rays, "seed": self.plan.seed,
             "variations": f.sections.iter().map(section_json).collect::<Vec<_>>(),

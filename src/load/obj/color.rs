@@ -2,6 +2,7 @@
 
 use crate::load::Diagnostic;
 use crate::math::Vec4;
+use crate::scene::color::from_srgb;
 use std::path::Path;
 
 /// Linear RGBA of a vertex colour as written.
@@ -9,14 +10,7 @@ use std::path::Path;
 /// Programs that write them (scanners, sculpting and mesh repair programs) take them from 8-bit pictures and divide by
 /// 255, so they are sRGB-coded, unlike the colours of MTL files.
 pub(super) fn linear(color: [f32; 3]) -> Vec4 {
-    let [r, g, b] = color.map(decode);
-    Vec4::new(r, g, b, 1.0)
-}
-
-/// The sRGB transfer function, IEC 61966-2-1.
-fn decode(coded: f32) -> f32 {
-    let c = coded.clamp(0.0, 1.0);
-    if c <= 0.04045 { c / 12.92 } else { libm::powf((c + 0.055) / 1.055, 2.4) }
+    from_srgb(color.map(|code| code.clamp(0.0, 1.0))).extend(1.0)
 }
 
 /// Opacities of vertices, 0…1; none where all are opaque, or [`are_all_clear`].

@@ -23,8 +23,10 @@ struct Before {
     smoothing: u32,
 }
 
-/// Joins runs in the order of the text. `None` when there are more vertices, corners or faces than [`LARGEST`], with how
-/// many.
+/// Joins runs in the order of the text.
+///
+/// # Errors
+/// How many vertices, corners or faces there are, when that is more than [`LARGEST`].
 pub(super) fn join(mut chunks: Vec<Chunk>) -> Result<Joined, u64> {
     let mut out = Statements::default();
     let mut table = Table::new();

@@ -2,14 +2,14 @@
 //! byte order, geometry only.
 //!
 //! A header lists elements and their properties (`header`); their values follow in that order (`body`). Of these are
-//! read: of `vertex` the place (`x y z`), normal (`nx ny nz`), texture coordinates (`u v`, `s t`, `texture_u texture_v`)
-//! and colour (`red green blue alpha`); of `face` its `vertex_indices`; of `tristrips` the same, where −1 starts another
-//! strip; of `edge` its `vertex1` and `vertex2`. Everything else is passed over. Where nothing joins the vertices, as in
-//! clouds that scanners write, they are points.
+//! read, under the names that programs give them (`geometry`): of `vertex` the place, normal, texture coordinates, colour
+//! and opacity; of `face` its list of vertices; of `tristrips` the same, where −1 starts another strip; of `edge` its
+//! `vertex1` and `vertex2`. Where nothing joins the vertices, as in clouds that scanners write, they are points. What a
+//! picture would show and is not read is told.
 //!
 //! What the format leaves open is decided as for OBJ: colours are sRGB-coded, faces without normals flat, and every
 //! surface is seen from both sides. Colours of whole numbers are 0…255, or 0…65535 where they have 16 bits; floats 0…1, or 0…255
-//! where any is above 1.
+//! where they are far above 1.
 //!
 //! The reader is our own: the crates for PLY take memory by the counts that a header claims, or do not say where in the
 //! file a fault is.

@@ -11,11 +11,8 @@ enum Model {
     Unlit,
 }
 
-/// Keys that only one model has: meeting one under another model means that `model` was forgotten.
-const ONLY: [(&str, &[&str]); 2] = [
-    ("pbr", &["base_color", "metallic", "roughness", "thick"]),
-    ("phong", &["diffuse", "ambient", "specular", "shininess", "mirror", "fresnel"]),
-];
+/// Keys that only the model `pbr` has: meeting one where there is no `model` means that it was forgotten.
+const PBR_KEYS: [&str; 4] = ["base_color", "metallic", "roughness", "thick"];
 
 /// Reads one material.
 pub(super) fn material(name: &str, table: Table) -> Material {
@@ -47,10 +44,9 @@ pub(super) fn material(name: &str, table: Table) -> Material {
 }
 
 fn hint_at_model(table: &Table) {
-    let (pbr, keys) = ONLY[0];
-    if let Some(key) = keys.iter().find(|key| table.has(key)) {
+    if let Some(key) = PBR_KEYS.iter().find(|key| table.has(key)) {
         let at = table.place_of(key);
-        table.note(&at, format!("`{key}` belongs to another model than phong"), format!("add model = \"{pbr}\""));
+        table.note(&at, format!("`{key}` belongs to another model than phong"), "add model = \"pbr\"");
     }
 }
 

@@ -55,7 +55,7 @@
 //! model = "unlit"
 //! color = "white"               # opacity, double_sided as above
 //!
-//! [[models]]                    # glTF, OBJ, PLY or STL, relative to this file
+//! [[models]]                    # glTF, OBJ, PLY, STL or NFF, relative to this file
 //! file = "bunny.obj"
 //! material = "red"              # optional: replaces every material of the model
 //! up = "z"                      # optional: overrides the model's up axis
