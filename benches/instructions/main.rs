@@ -22,8 +22,8 @@ use meshray::render::texture::TextureStore;
 use meshray::render::view::Lens;
 use meshray::render::{Job, Settings, View, World, render};
 use meshray::scene::{
-    AlphaMode, Bitmap, Coat, Environment, Falloff, Light, LightKind, Material, MetalRough, Panorama, Pixels, Sampler,
-    Scene, Sheen, Surface, Texture, TextureRef, UvTransform, default_light, framing,
+    AlphaMode, Bitmap, Coat, Environment, Falloff, Light, LightKind, Material, MetalRough, Panorama, Pixels,
+    Reflection, Sampler, Scene, Sheen, Texture, TextureRef, UvTransform, default_light, framing,
 };
 
 /// Part by which a count may exceed its baseline.
@@ -220,7 +220,7 @@ fn picture(of: &str, light: &str) -> ExitCode {
         "glass" => {
             let glass =
                 MetalRough { transmission: 1.0, thick: true, roughness: 0.0, metallic: 0.0, ..MetalRough::default() };
-            scene.materials.fill(Material { surface: Surface::MetalRough(glass), ..Material::plain() });
+            scene.materials.fill(Material { reflection: Reflection::MetalRough(glass), ..Material::plain() });
         }
         _ => {}
     }
@@ -284,7 +284,7 @@ fn paint(scene: &mut Scene) {
         base_color_map: map(0),
         normal_map: map(2),
         occlusion_map: map(1),
-        surface: Surface::MetalRough(surface),
+        reflection: Reflection::MetalRough(surface),
         ..Material::plain()
     });
 }
@@ -301,7 +301,7 @@ fn punch(scene: &mut Scene) {
 fn cover(scene: &mut Scene) {
     for material in &mut scene.materials {
         let map = material.base_color_map;
-        let Surface::MetalRough(m) = &mut material.surface else { continue };
+        let Reflection::MetalRough(m) = &mut material.reflection else { continue };
         m.sheen = Some(Box::new(Sheen { color: Vec3::splat(0.5), color_map: map, roughness: 0.3, roughness_map: map }));
         m.coat = Some(Box::new(Coat {
             strength: 0.9,

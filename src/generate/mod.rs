@@ -18,7 +18,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use crate::math::{DAffine3, Vec3};
-use crate::scene::{Instance, Material, Mesh, MetalRough, Scene, Surface, UpAxis};
+use crate::scene::{Instance, Material, Mesh, MetalRough, Reflection, Scene, UpAxis};
 
 /// The most triangles that can be asked for.
 pub const MAX_TRIANGLES: usize = 10_000_000;
@@ -101,8 +101,8 @@ pub fn triangles(scene: &Scene) -> usize {
 
 /// A matt or glossy colour.
 fn paint(name: &str, base_color: Vec3, metallic: f32, roughness: f32) -> Material {
-    let surface = Surface::MetalRough(MetalRough { metallic, roughness, ..MetalRough::default() });
-    Material { name: name.into(), base_color, double_sided: true, surface, ..Material::default() }
+    let reflection = Reflection::MetalRough(MetalRough { metallic, roughness, ..MetalRough::default() });
+    Material { name: name.into(), base_color, double_sided: true, reflection, ..Material::default() }
 }
 
 /// Meshes where they are, one instance each.

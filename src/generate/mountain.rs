@@ -4,7 +4,7 @@ use super::solid::Solid;
 use super::{paint, standing};
 use crate::math::random::Random;
 use crate::math::{DAffine3, DVec3, Vec3};
-use crate::scene::{Material, MetalRough, Scene, Surface};
+use crate::scene::{Material, MetalRough, Reflection, Scene};
 
 /// 2 · n² triangles and four balls.
 pub(super) fn scene(wanted: usize) -> Scene {
@@ -38,7 +38,7 @@ pub(super) fn scene(wanted: usize) -> Scene {
     let glass = Material {
         name: "glass".into(),
         base_color: Vec3::ONE,
-        surface: Surface::MetalRough(glass),
+        reflection: Reflection::MetalRough(glass),
         ..Material::default()
     };
     let materials = vec![paint("rock", Vec3::new(0.45, 0.4, 0.35), 0.0, 0.95), glass];

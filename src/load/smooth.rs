@@ -9,7 +9,7 @@
 use super::limits::{Budget, OverBudget};
 use crate::math::ear_clip::newell;
 use crate::math::{DVec3, Vec3};
-use crate::scene::{Mesh, Scene, Surface};
+use crate::scene::{Mesh, Reflection, Scene};
 use std::collections::HashMap;
 use std::mem::size_of;
 
@@ -24,7 +24,7 @@ const MOST_AROUND: usize = 512;
 pub(super) fn smooth(scene: &mut Scene, most: f64, budget: &mut Budget) -> Result<(), OverBudget> {
     let materials = &scene.materials;
     let is_unlit =
-        |mesh: &Mesh| materials.get(mesh.material as usize).is_some_and(|m| matches!(m.surface, Surface::Unlit));
+        |mesh: &Mesh| materials.get(mesh.material as usize).is_some_and(|m| matches!(m.reflection, Reflection::Unlit));
     let flat = |mesh: &Mesh| mesh.normals.is_empty() && mesh.corners() > 0 && !is_unlit(mesh);
     let corners: usize = scene.meshes.iter().filter(|&mesh| flat(mesh)).map(Mesh::corners).sum();
     // A corner, its place in a table and the vertex it may become.

@@ -4,7 +4,7 @@ use super::optics::transmittance;
 use super::wave::{Media, Path};
 use crate::accel::{Hit, Ray};
 use crate::math::Vec3;
-use crate::scene::{Material, Surface};
+use crate::scene::{Material, Reflection};
 
 /// Coefficients of Beer's law by material, 1 / unit of length; empty where nothing absorbs light.
 #[derive(Clone, Debug, Default)]
@@ -13,8 +13,8 @@ pub(crate) struct Absorption(Vec<Vec3>);
 impl Absorption {
     /// Those of all materials; with `everything` also where all are zero.
     pub(crate) fn of(materials: &[Material], everything: bool) -> Self {
-        let coefficient = |material: &Material| match &material.surface {
-            Surface::MetalRough(m) if m.thick && m.transmission > 0.0 => m.absorption,
+        let coefficient = |material: &Material| match &material.reflection {
+            Reflection::MetalRough(m) if m.thick && m.transmission > 0.0 => m.absorption,
             _ => Vec3::ZERO,
         };
         let all: Vec<Vec3> = materials.iter().map(coefficient).collect();

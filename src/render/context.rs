@@ -113,7 +113,7 @@ impl Gloss {
 
     /// Whether a material spreads rays where it is rough.
     pub(crate) fn spreads(self, material: &Material) -> bool {
-        self.all || self.rays > 0 && material.surface.transmits()
+        self.all || self.rays > 0 && material.reflection.transmits()
     }
 }
 
@@ -253,11 +253,15 @@ pub(crate) fn coverage(material: &Material, opacity: f32) -> f32 {
 mod tests {
     use super::*;
     use crate::math::DVec3;
-    use crate::scene::{MetalRough, Phong, Sphere, Surface};
+    use crate::scene::{MetalRough, Phong, Reflection, Sphere};
 
-    fn scene_of(surface: Surface) -> Scene {
+    fn scene_of(reflection: Reflection) -> Scene {
         let sphere = Sphere { name: String::new(), center: DVec3::ZERO, radius: 1.0, material: 0 };
-        Scene { materials: vec![Material { surface, ..Material::plain() }], spheres: vec![sphere], ..Scene::default() }
+        Scene {
+            materials: vec![Material { reflection, ..Material::plain() }],
+            spheres: vec![sphere],
+            ..Scene::default()
+        }
     }
 
     #[test]
@@ -267,13 +271,13 @@ mod tests {
         let metal = MetalRough { transmission: 0.5, roughness: 0.5, ..MetalRough::default() };
         let glass = MetalRough { metallic: 0.0, ..metal.clone() };
         assert_eq!(
-            auto_depth(&Features::of(&scene_of(Surface::MetalRough(metal))), false, 0.002),
+            auto_depth(&Features::of(&scene_of(Reflection::MetalRough(metal))), false, 0.002),
             0,
             "lets nothing through"
         );
-        assert_eq!(auto_depth(&Features::of(&scene_of(Surface::Phong(matt))), false, 0.002), 0);
-        assert_eq!(auto_depth(&Features::of(&scene_of(Surface::Phong(mirror))), false, 0.002), 5);
-        let glass = Features::of(&scene_of(Surface::MetalRough(glass)));
+        assert_eq!(auto_depth(&Features::of(&scene_of(Reflection::Phong(matt))), false, 0.002), 0);
+        assert_eq!(auto_depth(&Features::of(&scene_of(Reflection::Phong(mirror))), false, 0.002), 5);
+        let glass = Features::of(&scene_of(Reflection::MetalRough(glass)));
         assert_eq!(auto_depth(&glass, false, 0.002), 256);
         assert_eq!(auto_depth(&Features::default(), false, 0.002), 0);
         assert_eq!(auto_depth(&glass, false, 0.0), 12, "paths that nothing ends double with each bounce");

@@ -101,6 +101,6 @@ fn is_there(job: &Job, ray: &Ray, hit: &Hit) -> bool {
     let material = target.material;
     let surface = Surface::new(job.world, target, ray, hit, 0.0);
     let reader = Reader { store: job.textures, patch: surface.patch.as_ref(), known: &[] };
-    (surface.front || material.double_sided || material.surface.transmits())
+    (surface.front || material.double_sided || material.reflection.transmits())
         && context::coverage(material, reader.base(material).w) > 0.0
 }

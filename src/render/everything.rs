@@ -16,7 +16,7 @@
 use super::surface::Surface;
 use super::texture::{ColorSpace, STAND_IN, TextureStore};
 use crate::math::Vec2;
-use crate::scene::{Bitmap, Material, Pixels, Surface as Reflection, TextureRef, UvTransform};
+use crate::scene::{Bitmap, Material, Pixels, Reflection, TextureRef, UvTransform};
 use std::hint::black_box;
 use std::sync::LazyLock;
 
@@ -47,7 +47,7 @@ pub(super) fn look_up_in_vain(surface: &Surface, store: &TextureStore) {
     };
     let m = material;
     let mut maps = vec![&m.base_color_map, &m.opacity_map, &m.emission_map, &m.occlusion_map];
-    match &m.surface {
+    match &m.reflection {
         Reflection::Unlit => {}
         Reflection::Phong(p) => maps.extend([&p.ambient_map, &p.specular_map, &p.shininess_map]),
         Reflection::MetalRough(p) => {

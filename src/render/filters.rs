@@ -46,7 +46,8 @@ pub(super) fn weaken(
     if !is_repeated || filter.max_element() <= 0.0 {
         *light *= filter;
     }
-    let is_hole = filter == Vec3::ONE && !target.material.surface.transmits() && hit.prim < context.world.triangles();
+    let is_hole =
+        filter == Vec3::ONE && !target.material.reflection.transmits() && hit.prim < context.world.triangles();
     if !is_hole {
         *crossed = *hit;
     }
@@ -180,7 +181,7 @@ enum Left {
 impl Left {
     /// `None` where it is a part, or where it takes more to know.
     fn behind(context: &Context, target: &Target, hit: &Hit) -> Option<Self> {
-        if target.material.surface.transmits() {
+        if target.material.reflection.transmits() {
             return None;
         }
         match 1.0 - coverage(target.material, target.opacity(hit, context.textures)?) {
@@ -196,7 +197,7 @@ pub(super) fn filter_at(context: &Context, target: &Target, ray: &Ray, hit: &Hit
     if target.material.is_opaque() && !context.everything {
         return Vec3::ZERO;
     }
-    if !target.material.surface.transmits()
+    if !target.material.reflection.transmits()
         && let Some(opacity) = target.opacity(hit, context.textures)
     {
         return Vec3::splat(1.0 - coverage(target.material, opacity));

@@ -7,7 +7,7 @@ use super::view::View;
 use super::wave::{Media, Medium};
 use crate::accel::{Accel, Hit, NoProbe, Ray};
 use crate::math::Vec3;
-use crate::scene::{Material, Surface as Reflection};
+use crate::scene::{Material, Reflection};
 
 /// Surfaces that are looked at along one way.
 const FACES: usize = 256;
@@ -65,7 +65,7 @@ fn left_along<A: Accel>(context: &Context, accel: &A, scratch: &mut A::Scratch, 
 
 /// Index of refraction of the inside of a material.
 fn index(material: &Material) -> f32 {
-    let ior = match &material.surface {
+    let ior = match &material.reflection {
         Reflection::Phong(phong) => phong.ior,
         Reflection::MetalRough(m) => m.ior,
         Reflection::Unlit => 0.0,

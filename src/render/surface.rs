@@ -365,9 +365,7 @@ mod tests {
     use super::*;
     use crate::math::{DAffine3, DVec3, Vec2, Vec4};
     use crate::render::patch::Coordinates;
-    use crate::scene::{
-        Bitmap, Instance, MetalRough, Pixels, Polygon, Sampler, Surface as Reflection, Texture, UvTransform,
-    };
+    use crate::scene::{Bitmap, Instance, MetalRough, Pixels, Polygon, Reflection, Sampler, Texture, UvTransform};
 
     /// A unit square in z = 0 that faces +z: u runs along x, v down along −y; texture 0 covers it.
     fn scene(texels: Vec<[u8; 4]>, width: u32) -> Scene {
@@ -581,7 +579,7 @@ mod tests {
         let missing = TextureRef { texture: 7, uv_set: 3, transform: UvTransform::default() };
         scene.materials[0].normal_map = Some(missing);
         scene.materials[0].bump_map = Some(missing);
-        scene.materials[0].surface =
+        scene.materials[0].reflection =
             Reflection::MetalRough(MetalRough { metal_rough_map: Some(missing), ..MetalRough::default() });
         assert_near(normal(&scene, 1.0), Vec3::Z);
     }

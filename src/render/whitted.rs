@@ -244,7 +244,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         let mut surface = Surface::new(context.world, target, ray, hit, width);
 
         // Pass what is not there: backs of one-sided faces, absent texels, and part of what is blended.
-        if !surface.front && !material.double_sided && !material.surface.transmits() {
+        if !surface.front && !material.double_sided && !material.reflection.transmits() {
             return self.continuing[class as usize].push(*ray, *path, *hit);
         }
         let reader = Reader { store: context.textures, patch: surface.patch.as_ref(), known: &[] };

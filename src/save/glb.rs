@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use crate::math::{DAffine3, Vec3};
-use crate::scene::{Instance, Material, Mesh, Scene, Surface, UpAxis};
+use crate::scene::{Instance, Material, Mesh, Reflection, Scene, UpAxis};
 
 /// Component types and buffer targets of the format.
 const FLOAT: u32 = 5126;
@@ -83,7 +83,7 @@ fn columns(a: &DAffine3) -> Vec<f64> {
 }
 
 fn is_glass(material: &Material) -> bool {
-    matches!(&material.surface, Surface::MetalRough(s) if s.transmission > 0.0)
+    matches!(&material.reflection, Reflection::MetalRough(s) if s.transmission > 0.0)
 }
 
 fn material(material: &Material) -> Value {
@@ -92,7 +92,7 @@ fn material(material: &Material) -> Value {
         "name": material.name, "doubleSided": material.double_sided,
         "pbrMetallicRoughness": { "baseColorFactor": [color.x, color.y, color.z, 1.0] },
     });
-    if let Surface::MetalRough(surface) = &material.surface {
+    if let Reflection::MetalRough(surface) = &material.reflection {
         value["pbrMetallicRoughness"]["metallicFactor"] = json!(surface.metallic);
         value["pbrMetallicRoughness"]["roughnessFactor"] = json!(surface.roughness);
         if is_glass(material) {

@@ -69,7 +69,7 @@ fn lamp(name: &str, lux: f32, from: DVec3, shadows: bool, camera: &Camera) -> Li
 mod tests {
     use super::*;
     use crate::math::DAffine3;
-    use crate::scene::{Material, Projection, Sphere, Surface};
+    use crate::scene::{Material, Projection, Reflection, Sphere};
 
     fn behind() -> Camera {
         // Stands at −z and looks along +z.
@@ -109,7 +109,7 @@ mod tests {
 
     #[test]
     fn unlit_scenes_get_the_studio_alone_and_scenes_that_want_darkness_nothing() {
-        let unlit = Material { surface: Surface::Unlit, ..Material::default() };
+        let unlit = Material { reflection: Reflection::Unlit, ..Material::default() };
         let ball = Sphere { name: String::new(), center: DVec3::ZERO, radius: 1.0, material: 0 };
         // The second material is there, but on nothing.
         let mut scene = Scene { materials: vec![unlit, Material::plain()], spheres: vec![ball], ..Scene::default() };

@@ -3,7 +3,7 @@
 //! Only what can be seen counts: materials that no face, sphere, cone or plane names bring no features. The renderer leaves out
 //! the work of absent features; `inspect` lists both halves.
 
-use super::{AlphaMode, Environment, LightKind, Material, Mesh, Phong, Scene, Surface};
+use super::{AlphaMode, Environment, LightKind, Material, Mesh, Phong, Reflection, Scene};
 use crate::math::Vec3;
 use std::collections::BTreeSet;
 use std::fmt;
@@ -242,10 +242,10 @@ impl Features {
         self.add_if(matches!(m.alpha_mode, AlphaMode::Mask { .. }), Feature::Mask);
         self.add_if(m.alpha_mode == AlphaMode::Blend, Feature::Blend);
         self.add_if(m.emission.max_element() > 0.0, Feature::Emission);
-        match &m.surface {
-            Surface::Unlit => self.add_if(true, Feature::Unlit),
-            Surface::Phong(phong) => self.add_phong(phong),
-            Surface::MetalRough(pbr) => {
+        match &m.reflection {
+            Reflection::Unlit => self.add_if(true, Feature::Unlit),
+            Reflection::Phong(phong) => self.add_phong(phong),
+            Reflection::MetalRough(pbr) => {
                 self.add_if(true, Feature::MetalRough);
                 self.add_if(pbr.grain.is_some(), Feature::Grain);
                 self.add_if(pbr.film.is_some(), Feature::Film);
@@ -326,15 +326,15 @@ mod tests {
     use crate::math::DVec3;
     use crate::scene::{Light, MetalRough, Sphere};
 
-    fn ball(surface: Surface) -> Scene {
+    fn ball(reflection: Reflection) -> Scene {
         let sphere = Sphere { name: String::new(), center: DVec3::ZERO, radius: 1.0, material: 0 };
-        let material = Material { surface, ..Material::default() };
+        let material = Material { reflection, ..Material::default() };
         Scene { spheres: vec![sphere], materials: vec![material], ..Scene::default() }
     }
 
     #[test]
     fn a_scene_lists_what_it_needs_and_what_it_does_not() {
-        let mut scene = ball(Surface::Phong(Phong { mirror: Vec3::splat(0.5), ..Phong::default() }));
+        let mut scene = ball(Reflection::Phong(Phong { mirror: Vec3::splat(0.5), ..Phong::default() }));
         let kind = LightKind::Directional { direction: DVec3::NEG_Y };
         scene.lights.push(Light { name: String::new(), intensity: Vec3::ONE, kind, shadows: false, size: 0.0 });
         let features = Features::of(&scene);
@@ -346,9 +346,9 @@ mod tests {
 
     #[test]
     fn a_material_nobody_uses_needs_nothing() {
-        let mut scene = ball(Surface::Unlit);
+        let mut scene = ball(Reflection::Unlit);
         let glass = Phong { transmission: Vec3::ONE, ior: 1.5, ..Phong::default() };
-        scene.materials.push(Material { surface: Surface::Phong(glass), ..Material::default() });
+        scene.materials.push(Material { reflection: Reflection::Phong(glass), ..Material::default() });
         assert!(!Features::of(&scene).has(Feature::Refraction));
         scene.spheres[0].material = 1;
         assert!(Features::of(&scene).has(Feature::Refraction));
@@ -358,9 +358,9 @@ mod tests {
     fn glass_refracts_only_when_it_is_thick() {
         let glass =
             |thick| MetalRough { metallic: 0.0, roughness: 0.0, transmission: 1.0, thick, ..MetalRough::default() };
-        let thin = Features::of(&ball(Surface::MetalRough(glass(false))));
+        let thin = Features::of(&ball(Reflection::MetalRough(glass(false))));
         assert!(thin.has(Feature::ThinTransmission) && !thin.has(Feature::Refraction) && thin.has(Feature::Mirrors));
-        let thick = Features::of(&ball(Surface::MetalRough(glass(true))));
+        let thick = Features::of(&ball(Reflection::MetalRough(glass(true))));
         assert!(!thick.has(Feature::ThinTransmission) && thick.has(Feature::Refraction));
     }
 

@@ -3,7 +3,7 @@
 use super::{Coat, Film, Grain, Sheen, Translucence};
 use crate::math::{Vec2, Vec3};
 
-/// A material. `base_color`, alpha, emission and the normal are common to every [`Surface`] model.
+/// A material. `base_color`, alpha, emission and the normal are common to every [`Reflection`] model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     /// Name in the file, or an empty string.
@@ -37,12 +37,12 @@ pub struct Material {
     /// 0: occlusion map ignored … 1: fully applied.
     pub occlusion_strength: f32,
     /// The reflection model.
-    pub surface: Surface,
+    pub reflection: Reflection,
 }
 
 /// The reflection model of a [`Material`].
 #[derive(Clone, Debug, PartialEq)]
-pub enum Surface {
+pub enum Reflection {
     /// glTF 2.0 metallic-roughness (its Appendix B), with specular, ior and transmission extensions.
     MetalRough(MetalRough),
     /// Phong as in MTL and the founding texts.
@@ -295,7 +295,7 @@ impl Default for Material {
             bump_scale: 1.0,
             occlusion_map: None,
             occlusion_strength: 1.0,
-            surface: Surface::MetalRough(MetalRough::default()),
+            reflection: Reflection::MetalRough(MetalRough::default()),
         }
     }
 }
@@ -307,7 +307,7 @@ impl Material {
             name: "plain".into(),
             base_color: Vec3::splat(0.6),
             double_sided: true,
-            surface: Surface::MetalRough(MetalRough { metallic: 0.0, roughness: 0.7, ..MetalRough::default() }),
+            reflection: Reflection::MetalRough(MetalRough { metallic: 0.0, roughness: 0.7, ..MetalRough::default() }),
             ..Self::default()
         }
     }
@@ -322,10 +322,10 @@ impl Material {
             &self.bump_map,
             &self.occlusion_map,
         ];
-        let (metal_rough, phong) = match &self.surface {
-            Surface::MetalRough(m) => (Some(m), None),
-            Surface::Phong(p) => (None, Some([&p.ambient_map, &p.specular_map, &p.shininess_map])),
-            Surface::Unlit => (None, None),
+        let (metal_rough, phong) = match &self.reflection {
+            Reflection::MetalRough(m) => (Some(m), None),
+            Reflection::Phong(p) => (None, Some([&p.ambient_map, &p.specular_map, &p.shininess_map])),
+            Reflection::Unlit => (None, None),
         };
         let own = metal_rough.into_iter().flat_map(MetalRough::maps);
         common.into_iter().flatten().chain(own).chain(phong.into_iter().flatten().flatten())
@@ -341,29 +341,29 @@ impl Material {
             &mut self.bump_map,
             &mut self.occlusion_map,
         ];
-        match &mut self.surface {
-            Surface::MetalRough(m) => slots.extend(m.maps_mut()),
-            Surface::Phong(p) => slots.extend([&mut p.ambient_map, &mut p.specular_map, &mut p.shininess_map]),
-            Surface::Unlit => {}
+        match &mut self.reflection {
+            Reflection::MetalRough(m) => slots.extend(m.maps_mut()),
+            Reflection::Phong(p) => slots.extend([&mut p.ambient_map, &mut p.specular_map, &mut p.shininess_map]),
+            Reflection::Unlit => {}
         }
         slots
     }
 
     /// The metallic-roughness model, if that is what it is.
     pub fn metal_rough(&self) -> Option<&MetalRough> {
-        match &self.surface {
-            Surface::MetalRough(m) => Some(m),
-            Surface::Phong(_) | Surface::Unlit => None,
+        match &self.reflection {
+            Reflection::MetalRough(m) => Some(m),
+            Reflection::Phong(_) | Reflection::Unlit => None,
         }
     }
 
     /// Whether a hit always stops light and sight: what `accel` calls *opaque*.
     pub fn is_opaque(&self) -> bool {
-        self.alpha_mode == AlphaMode::Opaque && !self.surface.transmits()
+        self.alpha_mode == AlphaMode::Opaque && !self.reflection.transmits()
     }
 }
 
-impl Surface {
+impl Reflection {
     /// Whether light passes it as it passes glass: rays can enter it, and its back faces are seen from inside.
     pub fn transmits(&self) -> bool {
         match self {

@@ -8,7 +8,7 @@ use meshray::render::view::Lens;
 use meshray::render::{Job, Settings, View, World, render};
 use meshray::scene::{
     Background, Bitmap, Environment, Falloff, Instance, Light, LightKind, Material, Mesh, MetalRough, Phong, Pixels,
-    Plane, Sampler, Scene, Sphere, Surface, Texture, TextureRef, UvTransform,
+    Plane, Reflection, Sampler, Scene, Sphere, Texture, TextureRef, UvTransform,
 };
 
 /// A scene and an eye.
@@ -134,7 +134,12 @@ impl Stage {
 
 /// A Phong material seen from both sides.
 pub fn phong(color: [f32; 3], phong: Phong) -> Material {
-    Material { base_color: color.into(), double_sided: true, surface: Surface::Phong(phong), ..Material::default() }
+    Material {
+        base_color: color.into(),
+        double_sided: true,
+        reflection: Reflection::Phong(phong),
+        ..Material::default()
+    }
 }
 
 /// A metallic-roughness material seen from both sides.
@@ -142,12 +147,12 @@ pub fn metal_rough(color: [f32; 3], model: MetalRough) -> Material {
     Material {
         base_color: color.into(),
         double_sided: true,
-        surface: Surface::MetalRough(model),
+        reflection: Reflection::MetalRough(model),
         ..Material::default()
     }
 }
 
 /// A material that shows its colour whatever the light.
 pub fn unlit(color: [f32; 3]) -> Material {
-    Material { base_color: color.into(), double_sided: true, surface: Surface::Unlit, ..Material::default() }
+    Material { base_color: color.into(), double_sided: true, reflection: Reflection::Unlit, ..Material::default() }
 }

@@ -5,7 +5,7 @@ use crate::generate::Family;
 use crate::math::random::Random;
 use crate::math::{DAffine3, DVec3, Vec3, Vec4};
 use crate::render::view::Lens;
-use crate::scene::{AlphaMode, Falloff, Instance, Light, LightKind, Material, Mesh, MetalRough, Surface};
+use crate::scene::{AlphaMode, Falloff, Instance, Light, LightKind, Material, Mesh, MetalRough, Reflection};
 
 /// A ball of about 2 `side`² triangles.
 fn ball(center: Vec3, radius: f32, side: u32) -> Mesh {
@@ -36,8 +36,14 @@ fn triangle_soup(count: usize, mut corners: impl FnMut(&mut Random) -> [Vec3; 3]
 }
 
 fn matt() -> Material {
-    let surface = Surface::MetalRough(MetalRough { metallic: 0.0, roughness: 1.0, ..MetalRough::default() });
-    Material { name: "matt".into(), base_color: Vec3::splat(0.7), double_sided: true, surface, ..Material::default() }
+    let reflection = Reflection::MetalRough(MetalRough { metallic: 0.0, roughness: 1.0, ..MetalRough::default() });
+    Material {
+        name: "matt".into(),
+        base_color: Vec3::splat(0.7),
+        double_sided: true,
+        reflection,
+        ..Material::default()
+    }
 }
 
 /// Meshes of one material each, and one light.
@@ -214,7 +220,7 @@ fn cards_that_are_mostly_clear_are_found() {
 fn glass_in_glass_is_found() {
     let clear =
         MetalRough { metallic: 0.0, roughness: 0.0, transmission: 1.0, thick: true, ior: 1.5, ..MetalRough::default() };
-    let glass = Material { name: "glass".into(), surface: Surface::MetalRough(clear), ..matt() };
+    let glass = Material { name: "glass".into(), reflection: Reflection::MetalRough(clear), ..matt() };
     let parts = (0..4).map(|i| (ball(Vec3::ZERO, 1.0 - 0.2 * i as f32, 16), glass.clone())).collect();
     let found = assert_is_explained_by(&case(scene(parts), AccelKind::FastBvh), Cause::Depth);
     assert_eq!(found.remedy, "--depth 2");

@@ -9,7 +9,7 @@ use crate::accel::{Accel, Hit, NO_PRIM, NoProbe, Ray, Shapes};
 use crate::math::{DVec3, Vec3};
 use crate::render::optics::{reflect, refract};
 use crate::render::{World, given_normal};
-use crate::scene::{Camera, LightKind, Projection, Scene, Surface};
+use crate::scene::{Camera, LightKind, Projection, Reflection, Scene};
 use rayon::prelude::*;
 use std::ops::AddAssign;
 
@@ -161,14 +161,14 @@ struct Kind {
 }
 
 fn kinds(scene: &Scene) -> Vec<Kind> {
-    let kind = |surface: &Surface| match surface {
-        Surface::Phong(phong) => {
+    let kind = |surface: &Reflection| match surface {
+        Reflection::Phong(phong) => {
             let transmits = (phong.transmission.max_element() > 0.0).then_some(f64::from(phong.ior));
             Kind { reflects: phong.specular.max_element() > 0.0 || transmits.is_some(), transmits }
         }
         _ => Kind::default(),
     };
-    scene.materials.iter().map(|m| kind(&m.surface)).collect()
+    scene.materials.iter().map(|m| kind(&m.reflection)).collect()
 }
 
 struct Tracer<'a, A> {

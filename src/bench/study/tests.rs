@@ -4,13 +4,13 @@ use super::*;
 use crate::accel::{AccelKind, AccelParams};
 use crate::math::DVec3;
 use crate::render::{Quality, Sampling};
-use crate::scene::{Camera, Environment, Material, MetalRough, Projection, Sphere, Surface};
+use crate::scene::{Camera, Environment, Material, MetalRough, Projection, Reflection, Sphere};
 use std::path::Path;
 
 /// A mirror ball before a matt one, in the studio.
 fn balls() -> Scene {
     let metal = MetalRough { metallic: 1.0, roughness: 0.0, ..MetalRough::default() };
-    let mirror = Material { surface: Surface::MetalRough(metal), ..Material::plain() };
+    let mirror = Material { reflection: Reflection::MetalRough(metal), ..Material::plain() };
     let ball =
         |x: f64, material| Sphere { name: String::new(), center: DVec3::new(x, 0.0, 0.0), radius: 1.0, material };
     Scene {

@@ -3,7 +3,7 @@
 use super::mesh::Needs;
 use super::textures::Textures;
 use crate::math::Vec3;
-use crate::scene::{AlphaMode, Coat, Film, Grain, Material, MetalRough, Sheen, Surface, Translucence};
+use crate::scene::{AlphaMode, Coat, Film, Grain, Material, MetalRough, Reflection, Sheen, Translucence};
 use gltf::json;
 use gltf::json::material as source;
 use gltf::json::validation::Checked;
@@ -30,11 +30,11 @@ pub(super) fn convert(source: &json::Material, textures: &mut Textures) -> Mater
         base(source, &mut material, textures);
     }
     if is_unlit {
-        material.surface = Surface::Unlit;
+        material.reflection = Reflection::Unlit;
         return material;
     }
     lit(source, &mut material, textures);
-    material.surface = Surface::MetalRough(match extension {
+    material.reflection = Reflection::MetalRough(match extension {
         Some(extension) => from_specular_glossiness(extension, &mut material, textures),
         None => metal_rough(source, textures),
     });

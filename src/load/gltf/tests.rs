@@ -20,7 +20,7 @@ mod variants;
 
 use crate::load::{Limits, LoadError, LoadOptions, Loaded, load_bytes};
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
-use crate::scene::{AlphaMode, Falloff, Filter, LightKind, Mipmaps, Pixels, Projection, Surface, Wrap};
+use crate::scene::{AlphaMode, Falloff, Filter, LightKind, Mipmaps, Pixels, Projection, Reflection, Wrap};
 use base64::Engine as _;
 use serde_json::{Value, json};
 use std::path::Path;

@@ -2,7 +2,7 @@
 
 use super::images::image_of;
 use crate::math::Vec2;
-use crate::scene::{Bitmap, Filter, Material, Mipmaps, Sampler, Surface, Texture, TextureRef, UvTransform, Wrap};
+use crate::scene::{Bitmap, Filter, Material, Mipmaps, Reflection, Sampler, Texture, TextureRef, UvTransform, Wrap};
 use gltf::json::extensions::texture::TextureTransform;
 use gltf::json::texture::{self, MagFilter, MinFilter, WrappingMode};
 use gltf::json::validation::Checked;
@@ -161,7 +161,7 @@ pub(super) fn keep_decoded(
 
 /// Gives a material whose roughness was in a map of gloss that is lost the roughness that is left when gloss is even.
 fn without_lost_gloss(material: &mut Material, textures: &[Texture], pictures: &[Picture], bitmaps: &[Option<Bitmap>]) {
-    let Surface::MetalRough(surface) = &mut material.surface else { return };
+    let Reflection::MetalRough(surface) = &mut material.reflection else { return };
     let map = surface.metal_rough_map.as_ref();
     let bitmap = map.and_then(|map| Some(textures.get(map.texture as usize)?.bitmap as usize));
     let lost =

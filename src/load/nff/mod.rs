@@ -26,8 +26,8 @@ use super::place::{LeftOut, is_usable};
 use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
 use crate::math::{DVec3, Vec3};
 use crate::scene::{
-    Background, Camera, Cone, Environment, Falloff, Light, LightKind, Material, Phong, Projection, RenderHints, Scene,
-    Sphere, Surface, UpAxis,
+    Background, Camera, Cone, Environment, Falloff, Light, LightKind, Material, Phong, Projection, Reflection,
+    RenderHints, Scene, Sphere, UpAxis,
 };
 use faces::Faces;
 use std::collections::HashMap;
@@ -204,7 +204,7 @@ impl Reader<'_> {
             self.scene.materials.push(Material {
                 name,
                 base_color: diffuse,
-                surface: Surface::Phong(phong),
+                reflection: Reflection::Phong(phong),
                 ..Material::plain()
             });
             index(self.scene.materials.len() - 1)

@@ -41,8 +41,8 @@ fn a_fill_becomes_phong_with_mirror_and_glass() {
         "f 1 0.5 0 0.5 0.25 30 0 0\ns 0 0 0 1\nf 1 1 1 0 0.1 9 0.8 1.5\ns 0 0 0 2\nf 1 0.5 0 0.5 0.25 30 0 0\ns 0 0 0 3\n",
     );
     assert_eq!(scene.spheres.iter().map(|s| s.material).collect::<Vec<_>>(), [0, 1, 0]);
-    let phong = |i: usize| match &scene.materials[i].surface {
-        Surface::Phong(phong) => phong.clone(),
+    let phong = |i: usize| match &scene.materials[i].reflection {
+        Reflection::Phong(phong) => phong.clone(),
         other => panic!("{other:?}"),
     };
     assert_eq!(scene.materials[0].base_color, Vec3::new(0.5, 0.25, 0.0));

@@ -3,7 +3,7 @@
 use super::*;
 use crate::load::{Limits, Polygons};
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
-use crate::scene::{Material, Surface, UpAxis};
+use crate::scene::{Material, Reflection, UpAxis};
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
@@ -272,7 +272,7 @@ fn points_and_lines_are_drawn_in_the_colours_of_their_material_and_vertices() {
     assert_eq!((scene.meshes[0].name.as_str(), scene.instances[1].name.as_str()), ("ship", "ship"));
     let shown = scene.meshes.iter().map(|mesh| &scene.materials[mesh.material as usize]);
     assert_eq!(shown.clone().map(|m| m.name.as_str()).collect::<Vec<_>>(), [Material::plain().name.as_str(), "b"]);
-    assert!(shown.clone().all(|m| matches!(m.surface, Surface::Unlit)));
+    assert!(shown.clone().all(|m| matches!(m.reflection, Reflection::Unlit)));
     let ends = [scene.meshes[0].colors[0], scene.meshes[0].colors[5]].map(|c| c.truncate().to_array());
     assert_eq!(ends, [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
     fuzz::assert_sound(&loaded);
@@ -353,7 +353,7 @@ fn vertices_alone_are_points_in_their_colours_lit_by_their_normals() {
     for color in [Vec4::new(1.0, 0.0, 0.0, 1.0), Vec4::new(0.0, 0.0, 1.0, 1.0)] {
         assert!(colors.contains(&color), "{colors:?}");
     }
-    let is_lit = |loaded: &Loaded| loaded.scene.materials.iter().all(|m| m.surface != Surface::Unlit);
+    let is_lit = |loaded: &Loaded| loaded.scene.materials.iter().all(|m| m.reflection != Reflection::Unlit);
     assert!(!is_lit(&loaded) && is_lit(&cloud("vn 0 0 1\nvn 0 0 1\nvn 0 0 1\n")));
     // Where something joins vertices, or was meant to, those that are left are nothing.
     assert_eq!(cloud("f 1 2 3\n").facts.wires.points, 0);

@@ -2,7 +2,7 @@
 
 use super::reader::{Table, boolean, color, ior, within, within32, word};
 use crate::math::Vec3;
-use crate::scene::{AlphaMode, Material, MetalRough, Phong, Surface};
+use crate::scene::{AlphaMode, Material, MetalRough, Phong, Reflection};
 
 #[derive(Clone, Copy, PartialEq)]
 enum Model {
@@ -22,10 +22,10 @@ pub(super) fn material(name: &str, table: Table) -> Material {
     if model == Model::Phong && !table.has("model") {
         hint_at_model(&table);
     }
-    let (base_color, surface) = match model {
+    let (base_color, reflection) = match model {
         Model::Phong => phong(&table),
         Model::Pbr => metal_rough(&table),
-        Model::Unlit => (table.get("color", color).unwrap_or(Vec3::ONE), Surface::Unlit),
+        Model::Unlit => (table.get("color", color).unwrap_or(Vec3::ONE), Reflection::Unlit),
     };
     let opacity = table.get("opacity", within32(0.0, 1.0)).unwrap_or(1.0);
     let emission = if model == Model::Unlit { None } else { table.get("emission", color) };
@@ -36,7 +36,7 @@ pub(super) fn material(name: &str, table: Table) -> Material {
         alpha_mode: if opacity < 1.0 { AlphaMode::Blend } else { AlphaMode::Opaque },
         double_sided: table.get("double_sided", boolean).unwrap_or(true),
         emission: emission.unwrap_or(Vec3::ZERO),
-        surface,
+        reflection,
         ..Material::default()
     };
     table.finish();
@@ -60,7 +60,7 @@ fn dispersion(table: &Table) -> f32 {
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "materials are f32")]
-fn phong(table: &Table) -> (Vec3, Surface) {
+fn phong(table: &Table) -> (Vec3, Reflection) {
     let diffuse = table.get("diffuse", color).unwrap_or(Vec3::splat(0.6));
     let weight = |key| table.get(key, color).unwrap_or(Vec3::ZERO);
     let phong = Phong {
@@ -74,10 +74,10 @@ fn phong(table: &Table) -> (Vec3, Surface) {
         dispersion: dispersion(table),
         ..Phong::default()
     };
-    (diffuse, Surface::Phong(phong))
+    (diffuse, Reflection::Phong(phong))
 }
 
-fn metal_rough(table: &Table) -> (Vec3, Surface) {
+fn metal_rough(table: &Table) -> (Vec3, Reflection) {
     let part = |key, default| table.get(key, within32(0.0, 1.0)).unwrap_or(default);
     let surface = MetalRough {
         metallic: part("metallic", 0.0),
@@ -92,5 +92,5 @@ fn metal_rough(table: &Table) -> (Vec3, Surface) {
         dispersion: dispersion(table),
         ..MetalRough::default()
     };
-    (table.get("base_color", color).unwrap_or(Vec3::ONE), Surface::MetalRough(surface))
+    (table.get("base_color", color).unwrap_or(Vec3::ONE), Reflection::MetalRough(surface))
 }

@@ -1,6 +1,6 @@
 use super::*;
 use crate::math::{DAffine3, Vec3};
-use crate::scene::{AlphaMode, Falloff, LightKind, Projection, Surface};
+use crate::scene::{AlphaMode, Falloff, LightKind, Projection, Reflection};
 
 fn load_source(source: &Source) -> Result<Loaded, LoadError> {
     load_with(source, &LoadOptions::default())
@@ -239,7 +239,7 @@ fn colours_are_linear_numbers_or_srgb_words() {
     let material = load_text(text).unwrap().scene.materials.remove(0);
     assert_eq!(material.base_color, Vec3::new(0.5, 0.25, 0.125));
     assert_eq!(material.alpha_mode, AlphaMode::Blend);
-    let Surface::Phong(phong) = material.surface else { panic!("not Phong") };
+    let Reflection::Phong(phong) = material.reflection else { panic!("not Phong") };
     assert_eq!((phong.ambient, phong.specular), (material.base_color, Vec3::splat(0.5)));
     assert_eq!((phong.mirror, phong.ior), (Vec3::ONE, 1.33));
 }

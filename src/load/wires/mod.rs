@@ -21,7 +21,7 @@ use super::limits::{Budget, OverBudget};
 use super::{Diagnostic, Facts};
 use crate::math::frame::{half_of, stride};
 use crate::math::{DAffine3, DMat3, DVec3};
-use crate::scene::{Instance, Material, Mesh, Scene, Surface};
+use crate::scene::{Instance, Material, Mesh, Reflection, Scene};
 use bake::Baked;
 use std::collections::HashMap;
 use std::path::Path;
@@ -223,7 +223,7 @@ impl Drawing<'_> {
             return known;
         }
         let Some(material) = self.scene.materials.get(from as usize) else { return from };
-        let is_glass = material.surface.transmits();
+        let is_glass = material.reflection.transmits();
         if is_lit && material.double_sided && !is_glass {
             return from;
         }
@@ -239,8 +239,8 @@ impl Drawing<'_> {
 
 /// A material as wires with normals show it.
 fn lit(material: &Material) -> Material {
-    let surface = material.surface.clone().without_transmission();
-    Material { double_sided: true, surface, ..material.clone() }
+    let reflection = material.reflection.clone().without_transmission();
+    Material { double_sided: true, reflection, ..material.clone() }
 }
 
 /// A material as wires without normals show it.
@@ -250,7 +250,7 @@ fn unlit(material: &Material) -> Material {
         normal_map: None,
         bump_map: None,
         occlusion_map: None,
-        surface: Surface::Unlit,
+        reflection: Reflection::Unlit,
         ..material.clone()
     }
 }

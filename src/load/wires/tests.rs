@@ -110,9 +110,9 @@ fn without_normals_they_are_unlit_and_with_them_lit() {
     let mut of = wires(&[[0.0; 3], [1.0, 0.0, 0.0]], &[[0, 1], [1, 1]]);
     let (scene, ..) = drawn(std::slice::from_ref(&of), &[place(0, DAffine3::IDENTITY)]);
     let shown = &scene.materials[scene.meshes[0].material as usize];
-    assert!(matches!(shown.surface, Surface::Unlit) && !shown.double_sided);
+    assert!(matches!(shown.reflection, Reflection::Unlit) && !shown.double_sided);
     assert_eq!((shown.base_color, shown.emission), (Vec3::X, Vec3::Y));
-    assert!(!matches!(scene.materials[0].surface, Surface::Unlit), "faces keep the material");
+    assert!(!matches!(scene.materials[0].reflection, Reflection::Unlit), "faces keep the material");
 
     of.mesh.normals = vec![Vec3::Y, Vec3::Z];
     of.mesh.colors = vec![Vec4::ONE, Vec4::new(1.0, 0.0, 0.0, 1.0)];
@@ -121,7 +121,7 @@ fn without_normals_they_are_unlit_and_with_them_lit() {
     let (scene, ..) = drawn(&[of], &[mirror]);
     let mesh = &scene.meshes[0];
     let shown = &scene.materials[mesh.material as usize];
-    assert!(!matches!(shown.surface, Surface::Unlit) && shown.double_sided);
+    assert!(!matches!(shown.reflection, Reflection::Unlit) && shown.double_sided);
     assert_eq!(mesh.normals, [vec![Vec3::NEG_Y; 3], vec![Vec3::Z; 3 + 4]].concat());
     assert_eq!(mesh.positions.len(), 6 + 4, "points with normals are squares");
     assert_eq!((mesh.colors[0], mesh.colors[3], mesh.colors[9]), (Vec4::ONE, of_red(), of_red()));
@@ -130,7 +130,7 @@ fn without_normals_they_are_unlit_and_with_them_lit() {
 
 #[test]
 fn nothing_passes_lit_wires_of_glass_which_is_told_once() {
-    let glass = |surface: Surface| Material { surface, ..Material::plain() };
+    let glass = |reflection: Reflection| Material { reflection, ..Material::plain() };
     let thick = MetalRough {
         metallic: 0.0,
         transmission: 1.0,
@@ -140,7 +140,7 @@ fn nothing_passes_lit_wires_of_glass_which_is_told_once() {
         ..MetalRough::default()
     };
     let phong = Phong { transmission: Vec3::ONE, specular: Vec3::X, ..Phong::default() };
-    for surface in [Surface::MetalRough(thick), Surface::Phong(phong)] {
+    for surface in [Reflection::MetalRough(thick), Reflection::Phong(phong)] {
         let scene = Scene { materials: vec![glass(surface)], ..Scene::default() };
         let mut lit = wires(&[[0.0; 3], [1.0, 0.0, 0.0]], &[[0, 1]]);
         let plain = lit.clone();
@@ -148,13 +148,13 @@ fn nothing_passes_lit_wires_of_glass_which_is_told_once() {
         let places = [0, 1, 2].map(|mesh| place(mesh, DAffine3::IDENTITY));
         let (scene, _, warnings) = drawn_in(scene, &[lit.clone(), plain, lit], &places);
         let shown = |k: usize| &scene.materials[scene.meshes[k].material as usize];
-        assert!(scene.materials[0].surface.transmits(), "faces keep the material");
+        assert!(scene.materials[0].reflection.transmits(), "faces keep the material");
         assert!(shown(0).is_opaque() && shown(1).is_opaque() && shown(0).double_sided);
         assert_eq!(scene.meshes[0].material, scene.meshes[2].material);
-        match &shown(0).surface {
-            Surface::MetalRough(m) => assert_eq!((m.thick, m.thickness, m.roughness), (false, 0.0, 0.5)),
-            Surface::Phong(p) => assert_eq!(p.specular, Vec3::X),
-            Surface::Unlit => panic!("it has lost its light"),
+        match &shown(0).reflection {
+            Reflection::MetalRough(m) => assert_eq!((m.thick, m.thickness, m.roughness), (false, 0.0, 0.5)),
+            Reflection::Phong(p) => assert_eq!(p.specular, Vec3::X),
+            Reflection::Unlit => panic!("it has lost its light"),
         }
         let told: Vec<String> = warnings.iter().map(ToString::to_string).collect();
         assert_eq!(told, ["a.gltf: a material that light passes is drawn solid on points and lines"]);

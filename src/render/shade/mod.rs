@@ -36,7 +36,7 @@ use super::surface::Surface;
 use super::texture::{ColorSpace, TextureStore};
 use super::wave::Crossing;
 use crate::math::{Vec3, Vec4};
-use crate::scene::{AlphaMode, Material, MetalRough, Surface as Reflection, TextureRef};
+use crate::scene::{AlphaMode, Material, MetalRough, Reflection, TextureRef};
 use std::f32::consts::PI;
 
 /// How a point of a surface is seen: unit vectors away from it, and from which side.
@@ -232,7 +232,7 @@ impl Matter {
     /// The material as maps say, but for a grain, film, sheen and lacquer, as seen from outside.
     pub(crate) fn read(material: &Material, base: Vec3, reader: &Reader) -> Self {
         let emission = material.emission * reader.srgb(material.emission_map.as_ref());
-        let model = match &material.surface {
+        let model = match &material.reflection {
             Reflection::Unlit => Model::Unlit(base),
             Reflection::Phong(phong) => Model::Phong(PhongMatter::new(phong, base, reader)),
             Reflection::MetalRough(m) => {
@@ -485,7 +485,7 @@ pub(crate) fn occlusion(material: &Material, shade: f32) -> f32 {
 pub(crate) fn shadow_filter(material: &Material, reader: &Reader) -> Vec3 {
     let base = reader.base(material);
     let solid = coverage(material, base.w);
-    let passed = match &material.surface {
+    let passed = match &material.reflection {
         Reflection::Unlit => Vec3::ZERO,
         Reflection::Phong(m) => m.transmission,
         Reflection::MetalRough(m) if m.transmission > 0.0 => {
@@ -499,7 +499,7 @@ pub(crate) fn shadow_filter(material: &Material, reader: &Reader) -> Vec3 {
 
 /// Whether a material has an inside: back faces of what is thin are seen from outside, too.
 pub(crate) fn has_inside(material: &Material) -> bool {
-    material.surface.transmits() && material.metal_rough().is_none_or(|m| m.thick)
+    material.reflection.transmits() && material.metal_rough().is_none_or(|m| m.thick)
 }
 
 /// How much of a light a mapped surface shows near the line where it turns away from it: 1 away from that line, 0 on it, so

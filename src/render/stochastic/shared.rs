@@ -192,7 +192,7 @@ mod tests {
     use crate::render::tile::tiles;
     use crate::render::view::{Lens, View};
     use crate::render::{Settings, World};
-    use crate::scene::{Environment, Material, MetalRough, Scene, Sphere, Surface};
+    use crate::scene::{Environment, Material, MetalRough, Reflection, Scene, Sphere};
     use std::time::Duration;
 
     #[test]
@@ -248,7 +248,7 @@ mod tests {
             dispersion: 4.0,
             ..MetalRough::default()
         };
-        let material = Material { surface: Surface::MetalRough(glass), ..Material::plain() };
+        let material = Material { reflection: Reflection::MetalRough(glass), ..Material::plain() };
         let sphere = Sphere { name: String::new(), center: DVec3::ZERO, radius: 1.5, material: 0 };
         Scene { materials: vec![material], spheres: vec![sphere], environment: Environment::Studio, ..Scene::default() }
     }

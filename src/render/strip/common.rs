@@ -61,7 +61,7 @@ impl Common {
     ) -> Option<Self> {
         let metal_rough = material.metal_rough();
         let mut matter = Matter::without_maps(material, store);
-        let glass = material.surface.transmits();
+        let glass = material.reflection.transmits();
         let lobes = metal_rough.and_then(Lobes::of);
         let spreads = bounces && gloss.spreads(material);
         if glass {

@@ -12,7 +12,7 @@ use crate::render::shade::{MetalRoughPaint, PhongPaint, base_color, base_space, 
 use crate::render::surface::{facing, side_of};
 use crate::render::texture::{ColorSpace, Layout, Places, Spots, TextureStore, changes};
 use crate::render::world::Placement;
-use crate::scene::{Material, Mesh, MetalRough, Surface, TextureRef, UvTransform};
+use crate::scene::{Material, Mesh, MetalRough, Reflection, TextureRef, UvTransform};
 
 /// What a map is read for.
 #[derive(Clone, Copy, Debug)]
@@ -207,10 +207,10 @@ impl Group {
 
 /// The maps that strips know, and what for.
 fn maps(material: &Material) -> Vec<(Slot, &TextureRef, ColorSpace)> {
-    let ([metal_rough, transmission], [ambient, specular, shininess]) = match &material.surface {
-        Surface::MetalRough(m) => ([&m.metal_rough_map, &m.transmission_map].map(Option::as_ref), [None; 3]),
-        Surface::Phong(p) => ([None; 2], [&p.ambient_map, &p.specular_map, &p.shininess_map].map(Option::as_ref)),
-        Surface::Unlit => ([None; 2], [None; 3]),
+    let ([metal_rough, transmission], [ambient, specular, shininess]) = match &material.reflection {
+        Reflection::MetalRough(m) => ([&m.metal_rough_map, &m.transmission_map].map(Option::as_ref), [None; 3]),
+        Reflection::Phong(p) => ([None; 2], [&p.ambient_map, &p.specular_map, &p.shininess_map].map(Option::as_ref)),
+        Reflection::Unlit => ([None; 2], [None; 3]),
     };
     let all = [
         (Slot::Base, material.base_color_map.as_ref(), base_space(material)),
@@ -388,13 +388,13 @@ fn paint(painted: &mut Painted, i: usize, (material, vertex): (&Material, Vec4),
     let base = base.truncate();
     painted.put_emission(i, material.emission * texel(Slot::Emission).truncate());
     painted.put_normal_texel(i, texel(Slot::Normal).truncate());
-    match &material.surface {
-        Surface::Unlit => painted.put_unlit(i, base),
-        Surface::Phong(p) => {
+    match &material.reflection {
+        Reflection::Unlit => painted.put_unlit(i, base),
+        Reflection::Phong(p) => {
             let [ambient, specular] = [Slot::Ambient, Slot::Specular].map(|slot| texel(slot).truncate());
             painted.put_phong(i, PhongPaint::of(p, base, (ambient, specular, texel(Slot::Shininess).x)));
         }
-        Surface::MetalRough(m) => {
+        Reflection::MetalRough(m) => {
             let open = occlusion(material, texel(Slot::Occlusion).x);
             painted.put_metal_rough(
                 i,

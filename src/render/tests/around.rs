@@ -112,7 +112,7 @@ fn it_throws_one_on_what_lets_some_light_in_and_by_few_rays() {
         s.scene.environment = Environment::Panorama;
         s.scene.panorama = Some(panorama.clone());
         let m = MetalRough { metallic: 0.0, roughness: 1.0, specular: 0.0, transmission, ..MetalRough::default() };
-        s.scene.materials[0] = Material { surface: Reflection::MetalRough(m), ..Material::plain() };
+        s.scene.materials[0] = Material { reflection: Reflection::MetalRough(m), ..Material::plain() };
         s.color().x
     };
     assert!(irradiance / std::f32::consts::PI > 0.4, "the open floor");
@@ -125,8 +125,8 @@ fn it_throws_one_on_what_lets_some_light_in_and_by_few_rays() {
 #[test]
 fn rough_metal_is_darkened_where_its_lobe_is_hidden() {
     let mut s = under_a_ball();
-    let surface = Reflection::MetalRough(MetalRough { metallic: 1.0, roughness: 0.4, ..MetalRough::default() });
-    s.scene.materials[0] = Material { base_color: Vec3::ONE, surface, double_sided: true, ..Material::default() };
+    let reflection = Reflection::MetalRough(MetalRough { metallic: 1.0, roughness: 0.4, ..MetalRough::default() });
+    s.scene.materials[0] = Material { base_color: Vec3::ONE, reflection, double_sided: true, ..Material::default() };
     let hidden = s.color().x;
     s.scene.spheres[0].center = DVec3::new(4.0, 0.0, 0.5);
     let aside = s.color().x;

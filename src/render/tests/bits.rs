@@ -17,7 +17,7 @@ use std::sync::Arc;
 pub(super) fn busy() -> Stage {
     let mut s = stage(View::look_at(DVec3::new(1.0, 2.0, 6.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.8)));
     s.settings = Settings { width: 70, height: 50, samples: 3, cutoff: 1.0 / 512.0, layers: true, ..s.settings };
-    let pbr = |m: MetalRough| Material { surface: Reflection::MetalRough(m), ..Material::plain() };
+    let pbr = |m: MetalRough| Material { reflection: Reflection::MetalRough(m), ..Material::plain() };
     s.square(-2.0, 3.0, Material::plain());
     s.mesh(
         square(0.0, 1.5),
@@ -77,7 +77,7 @@ fn counting_changes_no_bit() {
 fn plain() -> Stage {
     let mut s = stage(View::look_at(DVec3::new(1.0, 2.0, 6.0), DVec3::ZERO, DVec3::Y, Lens::perspective(0.8)));
     s.settings = Settings { width: 61, height: 47, samples: 3, depth: Some(1), layers: true, ..s.settings };
-    let pbr = |m: MetalRough| Material { surface: Reflection::MetalRough(m), ..Material::plain() };
+    let pbr = |m: MetalRough| Material { reflection: Reflection::MetalRough(m), ..Material::plain() };
     let turned = |x: f64, at: DVec3| DAffine3::from_translation(at) * DAffine3::from_rotation_x(x);
     let round = |half: f32| {
         let lean = |x: f32, y: f32| Vec3::new(x, y, 2.0).normalize();
@@ -175,7 +175,7 @@ fn painted() -> Stage {
             _ => AlphaMode::Opaque,
         };
         (material.bump_map, material.bump_scale) = (map(2).filter(|_| i % 3 == 0), 0.1);
-        match &mut material.surface {
+        match &mut material.reflection {
             Reflection::MetalRough(m) => (m.metal_rough_map, m.roughness) = (map(1), 1.0),
             Reflection::Phong(p) => {
                 (p.ambient_map, p.specular_map) = (map(1), map(2));
@@ -292,9 +292,9 @@ fn glazed(mut s: Stage, textures: usize) -> Stage {
             _ => AlphaMode::Opaque,
         };
         let placed = if i == 2 { placed * DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0)) } else { placed };
-        let surface = Reflection::MetalRough(mapped);
+        let reflection = Reflection::MetalRough(mapped);
         let material = Material {
-            surface,
+            reflection,
             base_color: Vec3::new(0.9, 0.95, 0.8),
             base_color_map,
             normal_map,
@@ -349,7 +349,7 @@ fn lobed(mut s: Stage, textures: u32) -> Stage {
         let transform = if i.is_multiple_of(2) { UvTransform::default() } else { turned };
         (textures > 0).then(|| TextureRef { texture: texture % textures, uv_set: (i % 2) as u32, transform })
     };
-    let matters = s.scene.materials.iter_mut().filter_map(|material| match &mut material.surface {
+    let matters = s.scene.materials.iter_mut().filter_map(|material| match &mut material.reflection {
         Reflection::MetalRough(m) => Some(m),
         Reflection::Phong(_) | Reflection::Unlit => None,
     });
@@ -430,7 +430,7 @@ fn rough_surfaces_that_spread_rays_have_the_same_bits_side_by_side() {
 fn where_more_rays_wait_than_are_traced_together_points_side_by_side_have_the_same_bits() {
     let mut s = glazed(plain(), 0);
     for material in &mut s.scene.materials {
-        if let Reflection::MetalRough(m) = &mut material.surface {
+        if let Reflection::MetalRough(m) = &mut material.reflection {
             m.dispersion = if m.thick { 4.0 } else { 0.0 };
         }
     }

@@ -102,7 +102,7 @@ fn thick_gltf_glass_bends_and_thin_glass_does_not() {
     let pane = |thick: bool| {
         let mut s = aslant(50.0);
         let m = MetalRough { transmission: 1.0, metallic: 0.0, roughness: 0.0, thick, ..MetalRough::default() };
-        s.square(0.0, 9.0, Material { surface: Reflection::MetalRough(m), ..Material::default() });
+        s.square(0.0, 9.0, Material { reflection: Reflection::MetalRough(m), ..Material::default() });
         s.mesh(ruler(-1.0, 4.0), DAffine3::IDENTITY, unlit(Vec3::ONE));
         s.color().x
     };
@@ -129,7 +129,7 @@ fn the_inside_of_a_volume_absorbs_light_by_the_length_of_the_way_through() {
                 absorption,
                 ..MetalRough::default()
             };
-            s.square(z, 9.0, Material { surface: Reflection::MetalRough(m), ..Material::default() });
+            s.square(z, 9.0, Material { reflection: Reflection::MetalRough(m), ..Material::default() });
         }
         // One volume with two faces; the lower one looks down.
         s.scene.meshes[1].material = s.scene.meshes[0].material;
@@ -163,7 +163,7 @@ fn clear(ior: f32, thick: bool, absorption: Vec3) -> Material {
         absorption,
         ..MetalRough::default()
     };
-    Material { surface: Reflection::MetalRough(m), ..Material::default() }
+    Material { reflection: Reflection::MetalRough(m), ..Material::default() }
 }
 
 #[test]
@@ -253,7 +253,7 @@ fn a_lamp_is_seen_in_glass_from_outside_and_in_no_wall_from_inside() {
     let clear =
         MetalRough { transmission: 1.0, thick: true, metallic: 0.0, ior: 1.5, roughness: 0.3, ..MetalRough::default() };
     for glass in
-        [material(Vec3::ZERO, phong), Material { surface: Reflection::MetalRough(clear), ..Material::default() }]
+        [material(Vec3::ZERO, phong), Material { reflection: Reflection::MetalRough(clear), ..Material::default() }]
     {
         let mut s = looking_down(5.0);
         s.square(0.0, 9.0, glass).lamp(DVec3::Z * 4.0, 20.0);

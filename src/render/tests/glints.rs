@@ -8,7 +8,7 @@ use crate::scene::MetalRough;
 fn mirror_ball(radius: f64, at: DVec3, place: impl FnOnce(&mut Stage, f64, DVec3, Material)) -> Stage {
     let mut s = looking_down(3.0);
     let metal = MetalRough { metallic: 1.0, roughness: 0.0, ..MetalRough::default() };
-    let material = Material { base_color: Vec3::ONE, surface: Reflection::MetalRough(metal), ..Material::plain() };
+    let material = Material { base_color: Vec3::ONE, reflection: Reflection::MetalRough(metal), ..Material::plain() };
     place(&mut s, radius, at, material);
     let kind = LightKind::Directional { direction: DVec3::new(-0.4, -0.5, -1.0).normalize() };
     s.scene.lights.push(Light { name: String::new(), intensity: Vec3::ONE, kind, shadows: false, size: 0.0 });
@@ -53,7 +53,7 @@ fn a_light_in_a_large_ball_is_no_wider_than_it_was() {
     s.scene.lights[0].kind = kind;
     s.settings.samples = 64;
     let narrow = s.color().x;
-    let Reflection::MetalRough(metal) = &mut s.scene.materials[0].surface else { panic!("it is metal") };
+    let Reflection::MetalRough(metal) = &mut s.scene.materials[0].reflection else { panic!("it is metal") };
     metal.roughness = 0.1;
     assert!(narrow > 5.0 * s.color().x, "{narrow}, {}", s.color().x);
 }

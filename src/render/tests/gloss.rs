@@ -9,7 +9,7 @@ use crate::scene::{Environment, MetalRough};
 fn rough(model: MetalRough) -> Material {
     Material {
         base_color: Vec3::ONE,
-        surface: Reflection::MetalRough(model),
+        reflection: Reflection::MetalRough(model),
         double_sided: true,
         ..Material::default()
     }

@@ -16,7 +16,7 @@ fn scene() -> Stage {
     let solid = |base_color| Material {
         base_color,
         double_sided: true,
-        surface: Reflection::MetalRough(MetalRough { metallic: 0.0, roughness: 0.4, ..MetalRough::default() }),
+        reflection: Reflection::MetalRough(MetalRough { metallic: 0.0, roughness: 0.4, ..MetalRough::default() }),
         ..Material::default()
     };
     let star = crate::bench::star::star(12, 8);

@@ -32,7 +32,7 @@ fn lacquered(normals: Option<[[u8; 3]; 2]>, direction: DVec3) -> Stage {
     };
     let material = Material {
         base_color: Vec3::ZERO,
-        surface: Reflection::MetalRough(black),
+        reflection: Reflection::MetalRough(black),
         normal_map: normals.map(|_| map()),
         ..Material::plain()
     };

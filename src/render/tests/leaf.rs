@@ -13,7 +13,7 @@ fn leaf(share: f32) -> Material {
     let translucence =
         (share > 0.0).then(|| Box::new(Translucence { share, share_map: None, color: THROUGH, color_map: None }));
     let dull = MetalRough { metallic: 0.0, specular: 0.0, translucence, ..MetalRough::default() };
-    Material { base_color: BASE, double_sided: true, surface: Reflection::MetalRough(dull), ..Material::default() }
+    Material { base_color: BASE, double_sided: true, reflection: Reflection::MetalRough(dull), ..Material::default() }
 }
 
 /// A leaf at z = 0, seen from above, in an even light of 1 from everywhere.

@@ -111,8 +111,8 @@ fn white_in_a_furnace_is_as_bright_as_the_furnace() {
     {
         let mut s = looking_down(5.0);
         let model = MetalRough { metallic, roughness, ..MetalRough::default() };
-        let surface = Reflection::MetalRough(model);
-        s.sphere(DVec3::new(0.3, 0.2, 0.0), 1.0, Material { surface, ..Material::plain() });
+        let reflection = Reflection::MetalRough(model);
+        s.sphere(DVec3::new(0.3, 0.2, 0.0), 1.0, Material { reflection, ..Material::plain() });
         s.scene.materials[0].base_color = Vec3::ONE;
         s.scene.environment = Environment::Constant(Vec3::new(1.0, 2.0, 0.5));
         assert_near(s.color(), Vec3::new(1.0, 2.0, 0.5), 2e-3);
@@ -136,7 +136,7 @@ fn both_models_show_one_color_alike_under_every_light() {
         s.square(0.0, 1.0, material(Vec3::new(0.8, 0.4, 0.2), phong())).lamp(DVec3::ZERO, 3.0);
         s.scene.lights[0].kind = kind;
         let phong = s.color();
-        s.scene.materials[0].surface = Reflection::MetalRough(matt.clone());
+        s.scene.materials[0].reflection = Reflection::MetalRough(matt.clone());
         assert_near(s.color(), phong, 1e-5);
         assert!(phong.x > 0.1);
     }
@@ -145,8 +145,8 @@ fn both_models_show_one_color_alike_under_every_light() {
 #[test]
 fn lux_and_candela_follow_the_brdf() {
     let mut s = looking_down(1.0);
-    let surface = Reflection::MetalRough(MetalRough { specular: 0.0, metallic: 0.0, ..MetalRough::default() });
-    s.square(0.0, 1.0, Material { surface, ..Material::plain() }).lamp(DVec3::ZERO, 5.0);
+    let reflection = Reflection::MetalRough(MetalRough { specular: 0.0, metallic: 0.0, ..MetalRough::default() });
+    s.square(0.0, 1.0, Material { reflection, ..Material::plain() }).lamp(DVec3::ZERO, 5.0);
     s.scene.lights[0].kind = LightKind::Directional { direction: DVec3::new(0.6, 0.0, -0.8) };
     assert_near(s.color(), Vec3::splat(5.0 * 0.6 / std::f32::consts::PI * 0.8), 1e-5);
     let falloff = Falloff::InverseSquare { range: f64::INFINITY };

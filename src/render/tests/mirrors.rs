@@ -121,7 +121,7 @@ fn fifty_bounces_between_mirrors_do_not_drift() {
         [(-1.0, 0.0), (1.0, 0.0), (1.0, 1.0), (-1.0, 1.0)].map(|(y, z)| corner(y, z)).into_iter().unzip();
     let mesh = Mesh { positions, colors, triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() };
     s.mesh(mesh, DAffine3::IDENTITY, material(Vec3::ONE, phong()));
-    s.scene.materials[2] = Material { surface: Reflection::Unlit, ..s.scene.materials[2].clone() };
+    s.scene.materials[2] = Material { reflection: Reflection::Unlit, ..s.scene.materials[2].clone() };
     s.settings.depth = Some(60);
     // Unfolded, the way is straight: its height is folded into 0..1.
     let height = (0.5 + rise * f64::from(wall as f32)) % 2.0;

@@ -24,9 +24,7 @@ use super::{Forecast, forecast};
 use super::{Job, Rendered, Settings, World, render_counted};
 use crate::accel::{AccelKind, AccelParams, AnyAccel};
 use crate::math::{DAffine3, DVec3, Vec3};
-use crate::scene::{
-    Falloff, Instance, Light, LightKind, Material, Mesh, Phong, Plane, Scene, Sphere, Surface as Reflection,
-};
+use crate::scene::{Falloff, Instance, Light, LightKind, Material, Mesh, Phong, Plane, Reflection, Scene, Sphere};
 
 /// A scene under construction and how to look at it.
 struct Stage {
@@ -53,11 +51,11 @@ fn phong() -> Phong {
 }
 
 fn material(base_color: Vec3, phong: Phong) -> Material {
-    Material { base_color, double_sided: true, surface: Reflection::Phong(phong), ..Material::default() }
+    Material { base_color, double_sided: true, reflection: Reflection::Phong(phong), ..Material::default() }
 }
 
 fn unlit(color: Vec3) -> Material {
-    Material { base_color: color, double_sided: true, surface: Reflection::Unlit, ..Material::default() }
+    Material { base_color: color, double_sided: true, reflection: Reflection::Unlit, ..Material::default() }
 }
 
 impl Stage {

@@ -38,7 +38,7 @@ fn soft() -> Stage {
     s.plane(DVec3::Y, -0.8, material(Vec3::new(0.6, 0.5, 0.4), phong()));
     s.sphere(DVec3::new(-0.7, 0.0, 0.0), 0.7, material(Vec3::new(0.2, 0.4, 0.7), phong()));
     let frosted = crate::scene::MetalRough { roughness: 0.3, metallic: 1.0, ..Default::default() };
-    let frosted = Material { surface: Reflection::MetalRough(frosted), ..Material::plain() };
+    let frosted = Material { reflection: Reflection::MetalRough(frosted), ..Material::plain() };
     s.sphere(DVec3::new(0.9, -0.1, 0.3), 0.6, frosted);
     let kind = LightKind::Point { position: DVec3::new(2.0, 4.0, 3.0), falloff: Falloff::None };
     s.scene.lights.push(Light { name: String::new(), intensity: Vec3::ONE, kind, shadows: true, size: 0.6 });

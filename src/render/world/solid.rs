@@ -62,7 +62,7 @@ impl Known<'_> {
         if material.alpha_mode != AlphaMode::Opaque {
             maps.extend([(&material.base_color_map, ALPHA, [least, 1.0]), (&material.opacity_map, RED, [1.0; 2])]);
         }
-        if material.surface.transmits() {
+        if material.reflection.transmits() {
             // Glass stops light where its map says so.
             let map = &material.metal_rough()?.transmission_map;
             map.as_ref()?;
@@ -268,7 +268,7 @@ mod tests {
     use crate::math::random::Random;
     use crate::render::context::coverage;
     use crate::render::texture::TextureStore;
-    use crate::scene::{Filter, MetalRough, Phong, Sampler, Surface, Texture, UvTransform};
+    use crate::scene::{Filter, MetalRough, Phong, Reflection, Sampler, Texture, UvTransform};
 
     /// Mostly solid, with some holes: all of one or of several texels.
     fn holed(random: &mut Random, [width, height]: [usize; 2]) -> Bitmap {
@@ -383,8 +383,8 @@ mod tests {
         let Solid::Some(bits) = of(rgb(), blend(), Some(0.9)) else { panic!("one corner is not solid") };
         assert_eq!([0, 1, 2].map(|i| bits.get(i)), [true, false, true]);
         assert_eq!(of(rgb(), Material { opacity: 0.99, ..blend() }, None), Solid::None);
-        let glass = Surface::Phong(Phong { transmission: Vec3::X, ..Phong::default() });
-        assert_eq!(of(rgb(), Material { surface: glass, ..blend() }, None), Solid::None);
+        let glass = Reflection::Phong(Phong { transmission: Vec3::X, ..Phong::default() });
+        assert_eq!(of(rgb(), Material { reflection: glass, ..blend() }, None), Solid::None);
         // The red of a map of opacity counts, not its alpha.
         let map_d = |red| {
             let opacity_map = blend().base_color_map;
@@ -404,7 +404,7 @@ mod tests {
             let mut glass = MetalRough { transmission: 1.0, metallic: 0.0, ..MetalRough::default() };
             let material = mapped(alpha_mode, UvTransform::default());
             glass.transmission_map = material.base_color_map;
-            let material = Material { surface: Surface::MetalRough(glass), ..material };
+            let material = Material { reflection: Reflection::MetalRough(glass), ..material };
             let pixels = Pixels::Rgba8(vec![[transmission, 90, 90, alpha]; 8].into());
             let bitmap = Bitmap { name: String::new(), width: 4, height: 2, pixels };
             solids(&scene(bitmap, Sampler::default(), soup(&mut Random::new(3), 4, 1.0), material)).remove(0)
@@ -414,7 +414,7 @@ mod tests {
         assert_eq!(of(0, 255, AlphaMode::Blend), Solid::All);
         assert_eq!(of(0, 254, AlphaMode::Blend), Solid::None);
         let even = MetalRough { transmission: 0.5, metallic: 0.0, ..MetalRough::default() };
-        let material = Material { surface: Surface::MetalRough(even), ..Material::plain() };
+        let material = Material { reflection: Reflection::MetalRough(even), ..Material::plain() };
         let bitmap = Bitmap { name: String::new(), width: 0, height: 0, pixels: Pixels::Rgb8(Vec::new().into()) };
         let scene = scene(bitmap, Sampler::default(), soup(&mut Random::new(3), 4, 1.0), material);
         assert_eq!(solids(&scene), [Solid::None], "without a map it is glass everywhere");

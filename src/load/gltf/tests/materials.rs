@@ -67,7 +67,7 @@ fn materials_carry_every_factor_and_slot() {
     assert_eq!((material.alpha_mode, material.double_sided), (AlphaMode::Mask { cutoff: 0.25 }, true));
     assert_eq!(material.emission, Vec3::new(8.0, 4.0, 0.0));
     assert_eq!(material.occlusion_strength, 0.5);
-    let Surface::MetalRough(surface) = &material.surface else { panic!() };
+    let Reflection::MetalRough(surface) = &material.reflection else { panic!() };
     assert_eq!((surface.metallic, surface.roughness, surface.ior), (0.5, 0.25, 1.33));
     assert_eq!((surface.specular, surface.specular_color), (0.75, Vec3::new(2.0, 1.0, 1.0)));
     assert_eq!((surface.transmission, surface.thick, surface.dispersion), (0.9, true, 0.5));
@@ -118,9 +118,9 @@ fn unlit_and_specular_glossiness_materials_keep_their_look() {
         ]),
     );
     let scene = file.load().scene;
-    assert!(matches!(scene.materials[0].surface, Surface::Unlit));
+    assert!(matches!(scene.materials[0].reflection, Reflection::Unlit));
     assert_eq!(scene.materials[0].emission, Vec3::ZERO);
-    let Surface::MetalRough(surface) = &scene.materials[1].surface else { panic!() };
+    let Reflection::MetalRough(surface) = &scene.materials[1].reflection else { panic!() };
     assert_eq!((surface.metallic, surface.roughness, surface.ior), (0.0, 0.25, 0.0));
     assert_eq!(surface.specular_color, Vec3::new(0.2, 0.1, 0.0));
     assert_eq!(scene.materials[1].base_color, Vec3::splat(0.5));

@@ -13,7 +13,7 @@ use super::parse::{Mtl, Slot};
 use crate::load::paths::shorten;
 use crate::load::{Diagnostic, MtlMode, Warnings};
 use crate::math::Vec3;
-use crate::scene::{AlphaMode, Coat, Grain, Material, MetalRough, Phong, Sheen, Surface};
+use crate::scene::{AlphaMode, Coat, Grain, Material, MetalRough, Phong, Reflection, Sheen};
 use std::path::Path;
 
 /// Diffuse colour of a material that gives none: that of [`Material::plain`].
@@ -47,12 +47,12 @@ impl Meaning<'_> {
         let passed = self.passed(glass, opacity);
         let kd = self.diffuse();
         let physical = self.mtl.is_physical();
-        let surface = if physical {
-            Surface::MetalRough(self.metal_rough(glass, passed))
+        let reflection = if physical {
+            Reflection::MetalRough(self.metal_rough(glass, passed))
         } else if illum == 0 {
-            Surface::Unlit
+            Reflection::Unlit
         } else {
-            Surface::Phong(self.phong(illum, kd, passed))
+            Reflection::Phong(self.phong(illum, kd, passed))
         };
         // Of glass, what does not pass is scattered; a physically based model finds that share itself.
         let kept = if glass && !physical && self.mtl.d.is_some() { opacity } else { 1.0 };
@@ -66,7 +66,7 @@ impl Meaning<'_> {
             alpha_mode: if blended { AlphaMode::Blend } else { AlphaMode::Opaque },
             double_sided: true,
             emission: self.under_map(Slot::Emission, self.mtl.ke, Vec3::ZERO, "Ke"),
-            surface,
+            reflection,
             ..Material::default()
         }
     }
@@ -391,8 +391,8 @@ mod tests {
     }
 
     fn phong(material: &Material) -> &Phong {
-        match &material.surface {
-            Surface::Phong(phong) => phong,
+        match &material.reflection {
+            Reflection::Phong(phong) => phong,
             other => panic!("{other:?}"),
         }
     }
@@ -513,33 +513,33 @@ mod tests {
     #[test]
     fn physical_fields_make_a_metal_rough_material() {
         let (m, warnings) = guess("Kd 1 0 0\nPr 0.25\nPm 0.75\nNi 1.45\nKs 0.5 0.5 0.5");
-        let Surface::MetalRough(s) = &m.surface else { panic!() };
+        let Reflection::MetalRough(s) = &m.reflection else { panic!() };
         assert_eq!((s.roughness, s.metallic, s.ior, s.transmission), (0.25, 0.75, 1.45, 0.0));
         assert!(warnings.is_empty());
         let (m, _) = guess("Kd 1 1 1\nPr 0\nd 0.1\nillum 9\nNi 1.5");
-        let Surface::MetalRough(s) = &m.surface else { panic!() };
+        let Reflection::MetalRough(s) = &m.reflection else { panic!() };
         assert!((s.transmission - 0.9).abs() < 1e-6 && s.thick && m.base_color == Vec3::ONE);
         let (m, _) = guess("Kd 1\nPm 1\nNs 98");
-        let Surface::MetalRough(s) = &m.surface else { panic!() };
+        let Reflection::MetalRough(s) = &m.reflection else { panic!() };
         assert!((s.roughness - 0.02f32.sqrt().sqrt()).abs() < 1e-6);
     }
 
     #[test]
     fn illum_0_is_constant_only_literally() {
-        assert!(matches!(literal("Kd 1\nillum 0").surface, Surface::Unlit));
+        assert!(matches!(literal("Kd 1\nillum 0").reflection, Reflection::Unlit));
         assert_eq!(guess("Kd 1\nillum 0").1, ["mtl-constant"]);
     }
 
     #[test]
     fn sheen_clear_coat_and_anisotropy_are_drawn() {
         let (material, warnings) = guess("Kd 1 1 1\nPr 0.2\nPs 0.4\nPc 0.5\nPcr 0.6\naniso 0.7\nanisor 0.25");
-        let Surface::MetalRough(m) = &material.surface else { panic!("physically based") };
+        let Reflection::MetalRough(m) = &material.reflection else { panic!("physically based") };
         let (sheen, coat, grain) = (m.sheen.as_ref().unwrap(), m.coat.as_ref().unwrap(), m.grain.as_ref().unwrap());
         assert_eq!((sheen.color, coat.strength, coat.roughness), (Vec3::splat(0.4), 0.5, 0.6));
         assert_eq!((grain.strength, grain.rotation), (0.7, std::f32::consts::FRAC_PI_2));
         assert!(warnings.is_empty(), "{warnings:?}");
         let (plain, _) = guess("Pr 0.2\nPs 0\nPc 0\nPcr 0.03\naniso 0\nanisor 0");
-        let Surface::MetalRough(m) = &plain.surface else { panic!("physically based") };
+        let Reflection::MetalRough(m) = &plain.reflection else { panic!("physically based") };
         assert!(!m.has_lobes(), "exporters write zeros for what a material does not have");
     }
 }

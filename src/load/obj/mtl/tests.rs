@@ -2,7 +2,7 @@
 
 use crate::load::{LoadOptions, Loaded, MtlMode, Source, load_source};
 use crate::math::{Vec2, Vec3};
-use crate::scene::{AlphaMode, Material, Pixels, Surface, TextureRef, Wrap};
+use crate::scene::{AlphaMode, Material, Pixels, Reflection, TextureRef, Wrap};
 use std::fs;
 use std::path::Path;
 
@@ -171,7 +171,7 @@ fn a_displacement_is_drawn_as_bump_unless_there_is_one_and_it_is_said() {
 fn roughness_and_metal_maps_share_one_texture() {
     let mtl = "newmtl a\nKd 1 1 1\nPr 0\nPm 1\nmap_Pr r.png\nmap_Pm m.png\nnorm n.png";
     let (loaded, m) = guess(mtl, &[("r.png", [50; 4]), ("m.png", [70; 4]), ("n.png", [128, 128, 255, 255])]);
-    let Surface::MetalRough(s) = &m.surface else { panic!() };
+    let Reflection::MetalRough(s) = &m.reflection else { panic!() };
     assert_eq!((s.roughness, s.metallic), (1.0, 1.0));
     assert_eq!(texel(&loaded, s.metal_rough_map.as_ref())[1..3], [50, 70]);
     assert!(m.normal_map.is_some());
@@ -186,7 +186,7 @@ fn maps_of_sheen_lacquer_and_grain_are_drawn_and_zeros_under_them_count_as_1() {
     let files = [("s.png", [90; 4]), ("c.png", [20, 60, 20, 255]), ("a.png", [51; 4]), ("t.png", [255; 4])];
     let (loaded, m) = guess(&mtl, &files);
     assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
-    let Surface::MetalRough(s) = &m.surface else { panic!("physically based") };
+    let Reflection::MetalRough(s) = &m.reflection else { panic!("physically based") };
     let (sheen, coat, grain) = (s.sheen.as_ref().unwrap(), s.coat.as_ref().unwrap(), s.grain.as_ref().unwrap());
     assert_eq!((sheen.color, coat.strength, coat.roughness), (Vec3::ONE, 0.5, 1.0));
     assert_eq!((grain.strength, grain.rotation), (1.0, 0.0));
@@ -195,7 +195,7 @@ fn maps_of_sheen_lacquer_and_grain_are_drawn_and_zeros_under_them_count_as_1() {
     assert!(sheen.color_map.is_some() && grain.map.is_some());
 
     let (_, plain) = guess("newmtl a\nKd 1 1 1\nPc 1\naniso 0.5\nmap_Pc 0\nmap_aniso none.png", &[]);
-    let Surface::MetalRough(s) = &plain.surface else { panic!("physically based") };
+    let Reflection::MetalRough(s) = &plain.reflection else { panic!("physically based") };
     assert!(s.coat.as_ref().unwrap().strength_map.is_none() && s.grain.as_ref().unwrap().map.is_none());
     assert_eq!(s.grain.as_ref().unwrap().strength, 0.5, "a map that is not there changes nothing");
 }
@@ -203,7 +203,7 @@ fn maps_of_sheen_lacquer_and_grain_are_drawn_and_zeros_under_them_count_as_1() {
 #[test]
 fn a_packed_map_with_roughness_first_is_drawn() {
     let (loaded, m) = guess("newmtl a\nKd 1 1 1\nmap_RMA p.png", &[("p.png", [10, 20, 30, 255])]);
-    let Surface::MetalRough(s) = &m.surface else { panic!("physically based") };
+    let Reflection::MetalRough(s) = &m.reflection else { panic!("physically based") };
     assert_eq!((s.roughness, s.metallic, loaded.warnings.len()), (1.0, 1.0, 0));
     assert_eq!(texel(&loaded, s.metal_rough_map.as_ref())[1..3], [10, 20]);
     assert_eq!(texel(&loaded, m.occlusion_map.as_ref())[0], 30);
@@ -240,7 +240,7 @@ fn pictures_that_are_made_take_from_the_memory_that_may_be_taken() {
     let told = loaded.warnings[0].to_string();
     let expected = "m.mtl:3: image 'row.png + column.png' cannot be used: 60000000 bytes are needed where";
     assert!(told.contains(expected) && told.ends_with("drawn without it; raise --max-memory"), "{told}");
-    let Surface::MetalRough(m) = &loaded.scene.materials[0].surface else { panic!("not metal") };
+    let Reflection::MetalRough(m) = &loaded.scene.materials[0].reflection else { panic!("not metal") };
     assert!(m.metal_rough_map.is_none() && loaded.scene.bitmaps.is_empty());
 }
 

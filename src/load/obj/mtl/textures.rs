@@ -9,7 +9,9 @@ use crate::load::paths::{FileFault, taken_from};
 use crate::load::texture::{Encoded, Unusable, decode_all};
 use crate::load::{Diagnostic, MtlMode, Warnings};
 use crate::math::Vec2;
-use crate::scene::{AlphaMode, Bitmap, Material, MetalRough, Sampler, Surface, Texture, TextureRef, UvTransform, Wrap};
+use crate::scene::{
+    AlphaMode, Bitmap, Material, MetalRough, Reflection, Sampler, Texture, TextureRef, UvTransform, Wrap,
+};
 use crate::stopwatch::Spent;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -199,17 +201,17 @@ impl Mapper<'_> {
         let occlusion = packed.or_else(|| self.occlusion());
         let ambient = if self.mode == MtlMode::Literal { self.whole(Slot::Ambient) } else { material.base_color_map };
         let base_is_black = material.base_color == crate::math::Vec3::ZERO;
-        match &mut material.surface {
-            Surface::MetalRough(m) => {
+        match &mut material.reflection {
+            Reflection::MetalRough(m) => {
                 m.metal_rough_map = rough_metal;
                 self.lobes(m);
             }
-            Surface::Phong(p) => {
+            Reflection::Phong(p) => {
                 p.ambient_map = if base_is_black { None } else { ambient };
                 p.specular_map = self.whole(Slot::Specular);
                 p.shininess_map = self.scalar(Slot::Shininess);
             }
-            Surface::Unlit => {}
+            Reflection::Unlit => {}
         }
         material.occlusion_map = occlusion;
     }
