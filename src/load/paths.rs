@@ -115,11 +115,14 @@ pub enum FileFault {
 }
 
 impl FileFault {
+    /// The code of a file that is not there.
+    pub const MISSING: &str = "file-missing";
+
     /// This fault as a message about `place` in `file`.
     pub fn diagnose(&self, file: &Path, place: &str) -> Diagnostic {
         let (code, remedy) = match self {
             Self::Outside { root, .. } => ("file-outside-root", format!("allow it with --root '{}'", root.display())),
-            Self::Missing(_) => ("file-missing", "put it beside the model".into()),
+            Self::Missing(_) => (Self::MISSING, "put it beside the model".into()),
             Self::NotAFile(_) => ("file-not-plain", String::new()),
             Self::TooLarge { remedy, .. } => ("file-too-large", (*remedy).into()),
             Self::Scheme(_) => ("uri-scheme", "download it and name it by a relative path".into()),

@@ -3,6 +3,7 @@
 use super::super::text::{grouped, so_many};
 use super::topology::Topology;
 use crate::accel::{AccelChoice, AccelParams};
+use crate::load::paths::FileFault;
 use crate::load::{AnimationFacts, Loaded, WireFacts};
 use crate::math::{DVec3, Vec3};
 use crate::render::World;
@@ -244,7 +245,7 @@ impl<'a> Report<'a> {
 
     /// What was named but not there.
     fn missing(&self) -> Vec<String> {
-        let missing = self.loaded.warnings.iter().filter(|w| w.code.contains("missing"));
+        let missing = self.loaded.warnings.iter().filter(|w| w.code == FileFault::MISSING);
         missing.map(|w| w.text.clone()).collect()
     }
 }

@@ -10,6 +10,18 @@ use super::variants;
 use serde_json::{Map, Value};
 use std::collections::HashMap;
 
+/// Types of components (glTF 2.0, §3.6.2.2).
+const BYTE: u64 = 5120;
+const UNSIGNED_BYTE: u64 = 5121;
+const SHORT: u64 = 5122;
+const UNSIGNED_SHORT: u64 = 5123;
+const UNSIGNED_INT: u64 = 5125;
+const FLOAT: u64 = 5126;
+
+/// What views hold (§5.11.5): vertices, or their numbers.
+const ARRAY_BUFFER: u64 = 34962;
+const ELEMENT_ARRAY_BUFFER: u64 = 34963;
+
 /// Checks every primitive, with the material that it shows in a variant; `played` says that an animation is.
 pub(super) fn check(root: &Value, variant: Option<usize>, played: bool, report: &mut Report) {
     let quantized = list(root, "extensionsUsed").iter().any(|e| e == "KHR_mesh_quantization");
@@ -127,7 +139,7 @@ impl<'a> Check<'a> {
     }
 
     fn attribute(&mut self, name: &str, shape: &Shape, place: &str, morph: bool) {
-        if shape.component == 5125 {
+        if shape.component == UNSIGNED_INT {
             self.report.add(
                 Code::MeshPrimitiveAttributesAccessorUnsignedInt,
                 place,
@@ -174,7 +186,7 @@ impl<'a> Check<'a> {
                 "elements do not start at multiples of 4 bytes",
             );
         }
-        if view.get("target").and_then(whole) == Some(34963) {
+        if view.get("target").and_then(whole) == Some(ELEMENT_ARRAY_BUFFER) {
             self.report.add(Code::BufferViewTargetOverride, place, "vertices in a view of indices");
         }
         let first = *self.views.entry(index).or_insert(shape.index);
@@ -188,7 +200,10 @@ impl<'a> Check<'a> {
     fn indices(&mut self, primitive: &'a Value, place: &str) -> Option<u64> {
         let place = format!("{place}.indices");
         let shape = self.shape(primitive.get("indices")?)?;
-        if shape.kind != "SCALAR" || ![5121, 5123, 5125].contains(&shape.component) || shape.normalized {
+        if shape.kind != "SCALAR"
+            || ![UNSIGNED_BYTE, UNSIGNED_SHORT, UNSIGNED_INT].contains(&shape.component)
+            || shape.normalized
+        {
             let text = format!("indices cannot be {} of {}", shape.kind, component_name(shape.component));
             self.report.add(Code::MeshPrimitiveIndicesAccessorInvalidFormat, &place, text);
         }
@@ -200,7 +215,7 @@ impl<'a> Check<'a> {
                     "a stride on a view of indices",
                 );
             }
-            if view.get("target").and_then(whole) == Some(34962) {
+            if view.get("target").and_then(whole) == Some(ARRAY_BUFFER) {
                 self.report.add(Code::BufferViewTargetOverride, &place, "indices in a view of vertices");
             }
         }
@@ -320,11 +335,10 @@ enum Fit {
 }
 
 fn fit(name: &str, shape: &Shape, morph: bool) -> Fit {
-    const FLOAT: u64 = 5126;
     let (component, normalized) = (shape.component, shape.normalized);
     let float = component == FLOAT && !normalized;
-    let unsigned = component == 5121 || component == 5123;
-    let signed = component == 5120 || component == 5122;
+    let unsigned = component == UNSIGNED_BYTE || component == UNSIGNED_SHORT;
+    let signed = component == BYTE || component == SHORT;
     let small = signed || unsigned;
     let (right, core, quantized) = match name.split('_').next().unwrap_or(name) {
         "POSITION" => (shape.kind == "VEC3", float, if morph { signed } else { small }),
@@ -397,20 +411,20 @@ fn texture_slots<'a>(value: &'a Value, out: &mut Vec<(&'a str, u64)>) {
 
 fn component_size(component: u64) -> u64 {
     match component {
-        5120 | 5121 => 1,
-        5122 | 5123 => 2,
+        BYTE | UNSIGNED_BYTE => 1,
+        SHORT | UNSIGNED_SHORT => 2,
         _ => 4,
     }
 }
 
 fn component_name(component: u64) -> &'static str {
     match component {
-        5120 => "signed bytes",
-        5121 => "unsigned bytes",
-        5122 => "signed shorts",
-        5123 => "unsigned shorts",
-        5125 => "unsigned ints",
-        5126 => "floats",
+        BYTE => "signed bytes",
+        UNSIGNED_BYTE => "unsigned bytes",
+        SHORT => "signed shorts",
+        UNSIGNED_SHORT => "unsigned shorts",
+        UNSIGNED_INT => "unsigned ints",
+        FLOAT => "floats",
         _ => "an unknown type",
     }
 }

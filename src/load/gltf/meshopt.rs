@@ -43,8 +43,9 @@ pub(super) fn is_required(root: &Root) -> bool {
 
 /// Decodes every compressed view, in parallel, within `budget`.
 pub(super) fn decode_views(root: &Root, buffers: &Buffers, file: &Path, budget: &mut Budget) -> Decoded {
-    let compressed = root.buffer_views.iter().enumerate().filter(|(_, view)| extension(view).is_some());
-    let planned: Vec<_> = compressed.map(|(i, view)| (i, Task { buffers, file, i, view }.plan(budget))).collect();
+    let views = root.buffer_views.iter().enumerate();
+    let compressed = views.filter_map(|(i, view)| Some((Task { buffers, file, i, view }, extension(view)?)));
+    let planned: Vec<_> = compressed.map(|(task, extension)| (task.i, task.plan(extension, budget))).collect();
     let decoded = planned.into_par_iter().map(|(i, plan)| (i, plan.and_then(Plan::run)));
     decoded.collect()
 }
@@ -67,8 +68,11 @@ struct Plan<'a> {
 
 impl<'a> Task<'a> {
     /// Checks everything that can be known before decoding, and takes the memory.
-    fn plan(&self, budget: &mut Budget) -> Result<Plan<'a>, Diagnostic> {
-        let (name, properties) = extension(self.view).ok_or_else(|| self.fault("", "", "the extension is gone"))?;
+    fn plan(
+        &self,
+        (name, properties): (&'static str, &Map<String, Value>),
+        budget: &mut Budget,
+    ) -> Result<Plan<'a>, Diagnostic> {
         let bytes = self.stream(name, properties)?;
         let shape = self.shape(name, properties)?;
         let size = shape.size().ok_or_else(|| self.fault(name, ".count", "more elements than can be counted"))?;

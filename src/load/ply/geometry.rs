@@ -104,8 +104,13 @@ const SLOTS: [&[&str]; 12] = [
     &["alpha", "a", "opacity", "diffuse_alpha"],
 ];
 
-/// Where colours begin in [`SLOTS`].
+/// Where what belongs together stands in [`SLOTS`].
+const PLACE: [usize; 3] = [0, 1, 2];
+const NORMAL: [usize; 3] = [3, 4, 5];
+const UV: [usize; 2] = [6, 7];
+const COLOR: [usize; 3] = [RED, RED + 1, RED + 2];
 const RED: usize = 8;
+const ALPHA: usize = 11;
 
 /// Colours of Gaussian splats, as the constant part of spherical harmonics (B. Kerbl and others, "3D Gaussian Splatting for
 /// Real-Time Radiance Field Rendering", 2023).
@@ -126,7 +131,7 @@ struct Meanings<'a> {
 
 impl<'a> Meanings<'a> {
     fn of(vertex: &'a Element) -> Self {
-        let (splats, hazy) = (are_splats(vertex), [3, 4, 5, 11]);
+        let (splats, hazy) = (are_splats(vertex), [NORMAL[0], NORMAL[1], NORMAL[2], ALPHA]);
         let mut said: [Vec<&str>; SLOTS.len()] = Default::default();
         let slot = |property: &'a Property| {
             let name = property.name.as_str();
@@ -225,10 +230,10 @@ impl Reader<'_, '_> {
         }
         let slots = Meanings::of(element).slots;
         let has = |wanted: &[usize]| wanted.iter().all(|slot| slots.contains(&Some(*slot)));
-        if !has(&[0, 1, 2]) {
+        if !has(&PLACE) {
             return Err(self.body.fault("vertices have no x, y and z", "export it again"));
         }
-        let (has_normals, has_uvs, has_colors) = (has(&[3, 4, 5]), has(&[6, 7]), has(&[8, 9, 10]));
+        let (has_normals, has_uvs, has_colors) = (has(&NORMAL), has(&UV), has(&COLOR));
         Bare::charge_vertices(self.budget, element.count).map_err(|over| over_memory(&self.source.path, over))?;
 
         // The budget has room for so many, so memory has.

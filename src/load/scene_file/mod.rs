@@ -183,19 +183,23 @@ pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Resu
 fn read(faults: &Faults, options: &LoadOptions) -> Result<Parsed, LoadError> {
     /// Texts up to this size are read to their end for all faults of their syntax, each of which takes memory.
     const SMALL: usize = 1 << 20;
-    let parsed = match DeTable::parse(faults.text()) {
-        Ok(root) => Some(parse(faults, root.get_ref(), options)),
+    let root = match DeTable::parse(faults.text()) {
+        Ok(root) => root,
         Err(first) => {
-            let recover = || DeTable::parse_recoverable(faults.text()).1;
-            let all = if faults.text().len() <= SMALL { recover() } else { vec![first] };
+            let is_small = faults.text().len() <= SMALL;
+            let mut all = if is_small { DeTable::parse_recoverable(faults.text()).1 } else { Vec::new() };
+            if all.is_empty() {
+                all.push(first);
+            }
             for error in all {
                 faults.note("scene-syntax", &error.span().unwrap_or(0..0), error.message().replace('\n', ", "), "");
             }
-            None
+            return Err(faults.all());
         }
     };
+    let parsed = parse(faults, root.get_ref(), options);
     faults.check()?;
-    parsed.ok_or_else(|| Diagnostic::default().into())
+    Ok(parsed)
 }
 
 /// What the text says, before any model is read.

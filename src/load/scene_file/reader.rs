@@ -84,20 +84,22 @@ impl Faults {
         }
     }
 
-    /// All faults, in the order of the file; or nothing, when there are none.
+    /// Stops here when there are faults.
     pub(super) fn check(&self) -> Result<(), LoadError> {
+        if self.list.borrow().is_empty() { Ok(()) } else { Err(self.all()) }
+    }
+
+    /// All faults, of which there are some, in the order of the file.
+    pub(super) fn all(&self) -> LoadError {
         let mut list = self.list.take();
         self.shorten(&mut list);
         let place = |(at, fault): (usize, Diagnostic)| Diagnostic { place: self.place(at), ..fault };
         let mut faults: Vec<Diagnostic> = list.into_iter().map(place).collect();
-        if faults.is_empty() {
-            return Ok(());
-        }
         let hidden = self.hidden.take();
         if hidden > 0 {
             faults.push(Diagnostic::new("scene-more-faults", &self.file, "", format!("{hidden} more faults")));
         }
-        Err(LoadError::Input(faults))
+        LoadError::Input(faults)
     }
 }
 
