@@ -125,10 +125,11 @@ impl Primaries {
     }
 }
 
-/// CIE XYZ of a colour of brightness 1 by its place in the diagram; `None` where it has none.
+/// CIE XYZ of a colour of brightness 1 by its place in the diagram, where colours that nobody sees may lie below 0; `None` where
+/// it has no brightness.
 fn xyz_of([x, y]: [f64; 2]) -> Option<DVec3> {
     let xyz = DVec3::new(x / y, 1.0, (1.0 - x - y) / y);
-    (y > 0.0 && xyz.is_finite()).then_some(xyz)
+    xyz.is_finite().then_some(xyz)
 }
 
 #[cfg(test)]
