@@ -1,8 +1,9 @@
 //! What loading has to tell: one fault or warning is a value with a place, the numbers and a remedy. Only `cli` prints.
 
+use super::limits::OverBudget;
 use std::collections::HashMap;
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The code of everything that takes more memory than is left.
 pub(crate) const OVER_MEMORY: &str = "over-memory";
@@ -43,6 +44,11 @@ impl Diagnostic {
     /// Something takes more memory than is left.
     pub(super) fn over_memory(file: impl Into<PathBuf>, place: impl Into<String>, text: impl Into<String>) -> Self {
         Self::new(OVER_MEMORY, file, place, text).remedy(RAISE_MEMORY)
+    }
+
+    /// The same of all that a file holds.
+    pub(super) fn over_budget(file: &Path, over: OverBudget) -> Self {
+        Self::over_memory(file, "", over.to_string())
     }
 
     /// Adds what the user can do.

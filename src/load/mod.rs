@@ -9,6 +9,7 @@ pub mod gltf;
 mod ktx;
 pub mod limits;
 pub mod nff;
+mod number;
 pub mod obj;
 pub mod panorama;
 pub mod paths;

@@ -20,7 +20,6 @@ mod faces;
 mod words;
 
 use super::limits::Budget;
-use super::obj::bare::over_memory;
 use super::paths::Resolver;
 use super::place::{LeftOut, is_usable};
 use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
@@ -43,7 +42,7 @@ use words::Words;
 pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Result<Loaded, LoadError> {
     if std::str::from_utf8(&source.bytes).is_err() {
         // A sign of three bytes stands for each that is no text.
-        budget.take(source.bytes.len() as u64, 3).map_err(|over| over_memory(&source.path, over))?;
+        budget.take(source.bytes.len() as u64, 3).map_err(|over| Diagnostic::over_budget(&source.path, over))?;
     }
     let text = String::from_utf8_lossy(&source.bytes);
     let mut reader = Reader {
@@ -223,7 +222,7 @@ impl Reader<'_> {
 
     /// Takes so many bytes, or refuses the file.
     fn take(&mut self, bytes: u64) -> Result<(), Diagnostic> {
-        self.budget.take(bytes, 1).map_err(|over| over_memory(self.file, over))
+        self.budget.take(bytes, 1).map_err(|over| Diagnostic::over_budget(self.file, over))
     }
 
     fn polygon(&mut self, of: &str, smooth: bool) -> Result<(), Diagnostic> {
@@ -237,7 +236,7 @@ impl Reader<'_> {
         }
         let material = self.material();
         let added = self.faces.add(material, &points, &normals, self.budget);
-        added.map_err(|over| over_memory(self.file, over))
+        added.map_err(|over| Diagnostic::over_budget(self.file, over))
     }
 
     fn sphere(&mut self) -> Result<(), Diagnostic> {

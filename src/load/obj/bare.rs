@@ -3,17 +3,14 @@
 //! They go the way of an OBJ's: centred and rounded, cut or kept whole, stood upright, plain where nothing is said of their
 //! material.
 
+use super::finish::{Kind, finish};
 use super::soup::{Corner, NONE, Soup};
-use super::statements::{Face, Run, Statements, Stroke};
-use super::{assemble, chunk, color, generator, mtl, scene, strokes, up, warn_of_faces};
+use super::statements::{Face, Oddities, Run, Statements, Stroke};
+use super::{chunk, color};
 use crate::load::limits::{Budget, OverBudget};
-use crate::load::paths::Resolver;
-use crate::load::place::place;
-use crate::load::wires::Wires;
-use crate::load::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
+use crate::load::{Diagnostic, LoadError, LoadOptions, Loaded, Source, Warnings};
 use crate::math::{DVec2, DVec3, Vec3};
-use crate::scene::{AlphaMode, Mesh, UpAxis};
-use std::path::Path;
+use crate::scene::UpAxis;
 
 /// What a file of bare geometry holds. Lists that go with the vertices are as long as [`Self::positions`], or empty.
 #[derive(Clone, Debug, Default)]
@@ -86,11 +83,6 @@ impl Bare {
     }
 }
 
-/// The line of a message about memory.
-pub(in crate::load) fn over_memory(file: &Path, over: OverBudget) -> Diagnostic {
-    Diagnostic::over_memory(file, "", over.to_string())
-}
-
 /// Makes the scene of faces and edges, or else of all vertices as points. `format` is the file's kind for reports;
 /// `otherwise` the up axis where nothing speaks for one, and why.
 ///
@@ -106,8 +98,6 @@ pub(in crate::load) fn load(
 ) -> Result<Loaded, LoadError> {
     let file = source.path.as_path();
     let mut warnings = Warnings::default();
-    let mut resolver = Resolver::new(source, options);
-    let (few_corners, vertices) = (bare.few_corners, bare.positions.len());
     std::mem::take(&mut bare.told).into_iter().for_each(|told| warnings.push(told));
     let coding = color::settle(&mut bare.colors);
     coding.warning(["color-bytes", "color-range"], file).into_iter().for_each(|told| warnings.push(told));
@@ -115,66 +105,26 @@ pub(in crate::load) fn load(
         let text = "all opacities of vertices are 0: they are taken to mean something else, and the model is opaque";
         warnings.push(Diagnostic::new("color-clear", file, "", text));
     }
-    budget.take(bare.strokes(), Bare::STROKE).map_err(|over| over_memory(file, over))?;
-    let (statements, soup) = statements(bare);
-    let colored = !soup.colors.is_empty();
-    let placed = place(&soup.positions);
-    let flatness = assemble::flatness(&placed.positions, statements.places);
-    let assembled = assemble::assemble(&statements, &soup, &placed, options.polygons, flatness);
-    let is_see_through = !soup.alphas.is_empty();
-    let wires = strokes::assemble(&statements, &soup, &placed);
-    let wires: Vec<Wires> = wires.into_iter().map(|(_, wires)| wires).collect();
-    drop(soup);
-
-    // What could not be drawn.
-    let codes = ["face-not-finite", "face-degenerate", "face-rounded", "face-crossing", "face-turned"];
-    warn_of_faces(&assembled, codes, |face| format!("face {face}"), file, &mut warnings);
-    if few_corners > 0 {
-        let count = u32::try_from(few_corners).unwrap_or(u32::MAX);
+    if bare.few_corners > 0 {
+        let count = u32::try_from(bare.few_corners).unwrap_or(u32::MAX);
         let text = "a face is dropped: it has fewer than 3 corners";
         warnings.push(Diagnostic { count, ..Diagnostic::new("face-few-corners", file, "", text) });
     }
-    if statements.faces.is_empty() && wires.is_empty() {
-        let text = format!("{vertices} vertices and no face: there is nothing to draw");
-        warnings.push(Diagnostic::new("no-faces", file, "", text));
-    }
-
-    let mut dropped = super::dropped(&statements, &assembled);
-    if few_corners > 0 {
-        dropped.push(("fewer than 3 corners".into(), few_corners));
-    }
-    let meshes: Vec<Mesh> = assembled.meshes.into_iter().map(|(_, mesh)| mesh).collect();
-    let (guessed, reason) = up::guess(&statements.comments, &meshes, &placed, otherwise);
-    let mut reading = mtl::Reading { file, options, colored, resolver: &mut resolver, budget, warnings: &mut warnings };
-    let unnamed = vec![None; meshes.len() + wires.len()];
-    let materials = mtl::load(&[], &unnamed, &mut reading);
-    let up = options.up.unwrap_or(guessed);
-    let mut scene = scene(meshes, materials, placed.center, up, budget).map_err(|over| over_memory(file, over))?;
-    if is_see_through {
-        scene.materials.iter_mut().for_each(|material| material.alpha_mode = AlphaMode::Blend);
-    }
-    let (files, hash, gaps) = resolver.finish();
-    let mut facts = Facts {
-        format: format.into(),
-        generator: generator(&statements.comments),
-        faces: assembled.faces,
-        dropped,
-        up_reason: options.up.is_none().then_some(reason),
-        max_rounding: placed.max_rounding,
-        files,
-        gaps,
-        hash,
-        ..Facts::default()
+    budget.take(bare.strokes(), Bare::STROKE).map_err(|over| Diagnostic::over_budget(file, over))?;
+    let kind = Kind {
+        format,
+        of_faces: ["face-not-finite", "face-degenerate", "face-rounded", "face-crossing", "face-turned"],
+        no_faces: "no-faces",
+        place: |face| format!("face {face}"),
+        otherwise,
     };
-    let lost = super::draw(&wires, placed.center, &mut scene, budget, &mut facts, file, options.wire_widths)?;
-    lost.into_iter().for_each(|warning| warnings.push(warning));
-    Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
+    finish(statements(bare), &kind, (source, options), warnings, budget)
 }
 
 /// The same as statements of an OBJ would leave it: one run of faces, each attribute numbered as its vertex.
 #[expect(clippy::cast_possible_truncation, reason = "readers keep below Bare::LARGEST")]
-fn statements(bare: Bare) -> (Statements, Soup) {
-    let is_cloud = bare.is_cloud();
+fn statements(bare: Bare) -> Statements {
+    let (is_cloud, vertices) = (bare.is_cloud(), bare.positions.len());
     let Bare { positions, normals, uvs, colors, corners, arities, edges, .. } = bare;
     let normals: Vec<Vec3> = normals.into_iter().map(|n| n.as_dvec3().normalize_or_zero().as_vec3()).collect();
     let corner = |i: u32| {
@@ -204,8 +154,11 @@ fn statements(bare: Bare) -> (Statements, Soup) {
         Face { run: 0, smoothing: 0, arity, line: number, number, first }
     };
     let faces = (0..).zip(&arities).map(face);
-    let statements = Statements {
-        counts: [soup.positions.len() as u32, 0, 0],
+    let mut odd = Oddities::default();
+    odd.few_corners.count = u32::try_from(bare.few_corners).unwrap_or(u32::MAX);
+    Statements {
+        counts: [vertices as u32, 0, 0],
+        soup,
         faces: faces.collect(),
         strokes,
         runs: vec![Run::default()],
@@ -213,7 +166,7 @@ fn statements(bare: Bare) -> (Statements, Soup) {
         // So many digits that the rounding to `f32` alone counts.
         places: bare.places.unwrap_or(30),
         comments: bare.comments,
+        odd,
         ..Statements::default()
-    };
-    (statements, soup)
+    }
 }

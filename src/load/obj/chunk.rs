@@ -7,8 +7,8 @@
 
 use super::encoding::decode_name;
 use super::lines::{Lines, keyword, without_comment, words};
-use super::number::{self, Plain};
 use super::statements::{Face, Oddities, Run, Stroke};
+use crate::load::number::{self, Plain};
 use crate::math::{DVec2, DVec3, Vec3};
 use std::collections::HashMap;
 

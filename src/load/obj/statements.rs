@@ -5,7 +5,6 @@
 //! been read one after another (`join`). The text's own errors end here, with their line (`faults`): after this nothing
 //! refers to what is not there.
 
-use super::bare::over_memory;
 use super::chunk::{self, Chunk, LARGEST};
 use super::encoding::decode_name;
 use super::join::{Joined, join};
@@ -146,7 +145,8 @@ pub(super) fn read(text: &[u8], file: &Path, budget: &mut Budget) -> Result<Stat
 const RUN: usize = 1 << 18;
 
 fn read_in_runs(text: &[u8], run: usize, file: &Path, budget: &mut Budget) -> Result<Statements, LoadError> {
-    let chunks = read_side_by_side(&split::runs(text, run), budget).map_err(|over| over_memory(file, over))?;
+    let chunks =
+        read_side_by_side(&split::runs(text, run), budget).map_err(|over| Diagnostic::over_budget(file, over))?;
     let Joined { mut statements, faulty } = join(chunks).map_err(|largest| {
         let text = format!("{largest} vertices, corners or faces are more than {LARGEST}");
         Diagnostic::new("obj-too-large", file, "", text).remedy("split the file")
@@ -155,7 +155,9 @@ fn read_in_runs(text: &[u8], run: usize, file: &Path, budget: &mut Budget) -> Re
         statements.odd.absent = faults::find(text, file)?;
     }
     if statements.is_cloud() {
-        budget.take(statements.soup.positions.len() as u64, POINT).map_err(|over| over_memory(file, over))?;
+        budget
+            .take(statements.soup.positions.len() as u64, POINT)
+            .map_err(|over| Diagnostic::over_budget(file, over))?;
         statements.draw_points();
     }
     statements.soup.leave_out_unused();

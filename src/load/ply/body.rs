@@ -1,7 +1,7 @@
 //! The values of a PLY file, one after another, as text or as bytes.
 
 use super::header::{Element, Encoding, Header, Kind};
-use crate::load::obj::number::{self, Respelled};
+use crate::load::number::{self, Respelled};
 use crate::load::paths::shorten;
 use crate::load::{Diagnostic, Source};
 use std::path::Path;

@@ -3,7 +3,7 @@
 use super::body::{Body, Missing};
 use super::header::{Element, Encoding, Header, Kind, Property};
 use crate::load::limits::Budget;
-use crate::load::obj::bare::{Bare, over_memory};
+use crate::load::obj::bare::Bare;
 use crate::load::paths::shorten;
 use crate::load::{Diagnostic, Source};
 use crate::math::{DVec2, DVec3, Vec3};
@@ -234,7 +234,8 @@ impl Reader<'_, '_> {
             return Err(self.body.fault("vertices have no x, y and z", "export it again"));
         }
         let (has_normals, has_uvs, has_colors) = (has(&NORMAL), has(&UV), has(&COLOR));
-        Bare::charge_vertices(self.budget, element.count).map_err(|over| over_memory(&self.source.path, over))?;
+        Bare::charge_vertices(self.budget, element.count)
+            .map_err(|over| Diagnostic::over_budget(&self.source.path, over))?;
 
         // The budget has room for so many, so memory has.
         self.bare.positions.reserve_exact(element.count as usize);
@@ -283,7 +284,7 @@ impl Reader<'_, '_> {
                 }
             }
             // An edge takes what a face of two corners would.
-            Bare::charge_face(self.budget, 2).map_err(|over| over_memory(&self.source.path, over))?;
+            Bare::charge_face(self.budget, 2).map_err(|over| Diagnostic::over_budget(&self.source.path, over))?;
             self.bare.edges.push(edge);
         }
         Ok(())
@@ -367,7 +368,8 @@ impl Reader<'_, '_> {
     }
 
     fn face(&mut self, corners: &[u32]) -> Result<(), Diagnostic> {
-        Bare::charge_face(self.budget, corners.len()).map_err(|over| over_memory(&self.source.path, over))?;
+        Bare::charge_face(self.budget, corners.len())
+            .map_err(|over| Diagnostic::over_budget(&self.source.path, over))?;
         let most = self.bare.corners.len().max(self.bare.arities.len()) as u64 + corners.len() as u64;
         if most > Bare::LARGEST {
             let text = format!("more than {} faces or corners", Bare::LARGEST);

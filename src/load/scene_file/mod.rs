@@ -146,7 +146,6 @@ use self::reader::{Faults, Table, color, number, string, word};
 use self::shapes::Lost;
 use self::weight::weight;
 use super::limits::{Budget, Limits};
-use super::obj::bare::over_memory;
 use super::paths::Resolver;
 use super::texture::smaller_copies;
 use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
@@ -173,7 +172,7 @@ pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Resu
             return Err(Diagnostic::new("scene-syntax", &source.path, "", text).remedy("save it as UTF-8").into());
         }
     };
-    budget.take(weight(&text), 1).map_err(|over| over_memory(&source.path, over))?;
+    budget.take(weight(&text), 1).map_err(|over| Diagnostic::over_budget(&source.path, over))?;
     let faults = Faults::new(source.path.clone(), text);
     let parsed = read(&faults, options)?;
     assemble(parsed, &faults, source, options, budget)
@@ -416,14 +415,14 @@ fn assemble(
         let left = Limits { memory: budget.left(), ..options.limits };
         let read = super::panorama::decode(&picture, &left)?;
         let kept = read.panorama.texels.len() as u64;
-        budget.take(kept, super::panorama::PER_PIXEL).map_err(|over| over_memory(&source.path, over))?;
+        budget.take(kept, super::panorama::PER_PIXEL).map_err(|over| Diagnostic::over_budget(&source.path, over))?;
         read.warnings.into_iter().for_each(|w| warnings.push(w));
         scene.panorama = Some(Panorama { rotation, ..read.panorama });
     }
     // What several models show is read and stored once.
     let mut known: HashMap<(String, Option<UpAxis>, Option<u32>), Known> = HashMap::new();
     for model in models {
-        let over = |over| Diagnostic { place: faults.place(model.at), ..over_memory(&source.path, over) };
+        let over = |over| Diagnostic { place: faults.place(model.at), ..Diagnostic::over_budget(&source.path, over) };
         let [meshes, spheres, cones, planes] =
             [scene.meshes.len(), scene.spheres.len(), scene.cones.len(), scene.planes.len()];
         let place = &model.world_from_model;

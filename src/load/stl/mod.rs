@@ -11,7 +11,7 @@ mod binary;
 mod text;
 
 use super::limits::Budget;
-use super::obj::bare::{self, Bare, over_memory};
+use super::obj::bare::{self, Bare};
 use super::{Diagnostic, LoadError, LoadOptions, Loaded, Source};
 use crate::math::DVec3;
 use crate::scene::UpAxis;
@@ -64,7 +64,7 @@ impl Triangles<'_> {
     const KNOWN: u64 = 2 * 40;
 
     fn add(&mut self, corners: [DVec3; 3]) -> Result<(), Diagnostic> {
-        Bare::charge_face(self.budget, 3).map_err(|over| over_memory(self.file, over))?;
+        Bare::charge_face(self.budget, 3).map_err(|over| Diagnostic::over_budget(self.file, over))?;
         let mut numbers = [0; 3];
         for (number, place) in numbers.iter_mut().zip(corners) {
             *number = self.vertex(place)?;
@@ -80,7 +80,7 @@ impl Triangles<'_> {
             return Ok(number);
         }
         let taken = Bare::charge_vertices(self.budget, 1).and_then(|()| self.budget.take(1, Self::KNOWN));
-        taken.map_err(|over| over_memory(self.file, over))?;
+        taken.map_err(|over| Diagnostic::over_budget(self.file, over))?;
         let number = self.bare.positions.len();
         if number as u64 >= Bare::LARGEST {
             let text = format!("more than {} vertices", Bare::LARGEST);

@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use std::path::Path;
 
 /// A number word, checked.
-pub(super) struct Number<'a> {
+pub(in crate::load) struct Number<'a> {
     /// What to read.
     pub word: Cow<'a, str>,
     /// Decimal places of the last digit (negative: it stands for tens, hundreds, …); `None` where there is none.

@@ -1,0 +1,186 @@
+//! Faces, points and lines of statements -> scene: the way of OBJ files, and of files that hold geometry alone.
+
+use super::statements::Statements;
+use super::{assemble, mtl, strokes, up};
+use crate::load::limits::{Budget, OverBudget};
+use crate::load::paths::Resolver;
+use crate::load::place::place;
+use crate::load::tangents;
+use crate::load::wires::{self, Wires};
+use crate::load::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
+use crate::math::{DAffine3, DVec3};
+use crate::scene::{AlphaMode, Instance, Mesh, Scene, UpAxis};
+use assemble::Assembled;
+use std::path::Path;
+
+/// What a kind of file is called, and how its messages are.
+pub(super) struct Kind<'a> {
+    /// For reports.
+    pub format: &'a str,
+    /// Codes of what becomes of faces, in the order of [`warn_of_faces`].
+    pub of_faces: [&'static str; 5],
+    /// Code of a file without any.
+    pub no_faces: &'static str,
+    /// How the place of a face is named: by its line, or by its number.
+    pub place: fn(u32) -> String,
+    /// The up axis where nothing speaks for one, and why.
+    pub otherwise: (UpAxis, &'a str),
+}
+
+/// Makes the scene; `warnings` go on from those of reading.
+///
+/// # Errors
+/// When it would take more than is left of the budget.
+pub(super) fn finish(
+    mut statements: Statements,
+    kind: &Kind,
+    (source, options): (&Source, &LoadOptions),
+    mut warnings: Warnings,
+    budget: &mut Budget,
+) -> Result<Loaded, LoadError> {
+    let file = source.path.as_path();
+    let mut resolver = Resolver::new(source, options);
+    let soup = std::mem::take(&mut statements.soup);
+    let (colored, is_see_through) = (!soup.colors.is_empty(), !soup.alphas.is_empty());
+    let placed = place(&soup.positions);
+    let flatness = assemble::flatness(&placed.positions, statements.places);
+    let mut assembled = assemble::assemble(&statements, &soup, &placed, options.polygons, flatness);
+    let (wire_runs, mut wires): (Vec<u32>, Vec<Wires>) =
+        strokes::assemble(&statements, &soup, &placed).into_iter().unzip();
+    drop(soup);
+    warn_of_faces(&assembled, kind, file, &mut warnings);
+    if statements.faces.is_empty() && wires.is_empty() {
+        let text = format!("{} vertices and no face: there is nothing to draw", statements.counts[0]);
+        warnings.push(Diagnostic::new(kind.no_faces, file, "", text));
+    }
+
+    // Which way is up, what everything is made of, and where it stands.
+    let (runs, meshes): (Vec<u32>, Vec<Mesh>) = std::mem::take(&mut assembled.meshes).into_iter().unzip();
+    let (guessed, reason) = up::guess(&statements.comments, &meshes, &placed, kind.otherwise);
+    let name = |run: &u32| statements.runs[*run as usize].material.map(|id| statements.names[id as usize].as_str());
+    let names: Vec<Option<&str>> = runs.iter().chain(&wire_runs).map(name).collect();
+    let mut reading = mtl::Reading { file, options, colored, resolver: &mut resolver, budget, warnings: &mut warnings };
+    let mut materials = mtl::load(&statements.libraries, &names, &mut reading);
+    if is_see_through {
+        materials.materials.iter_mut().for_each(|material| material.alpha_mode = AlphaMode::Blend);
+    }
+    let (reading, decoding) = (resolver.reading(), materials.decoding);
+    let of_wires = materials.of_name.get(meshes.len()..).unwrap_or_default();
+    wires.iter_mut().zip(of_wires).for_each(|(wires, &material)| wires.mesh.material = material);
+    let up = options.up.unwrap_or(guessed);
+    let mut scene =
+        scene(meshes, materials, placed.center, up, budget).map_err(|over| Diagnostic::over_budget(file, over))?;
+
+    let (files, hash, gaps) = resolver.finish();
+    let mut facts = Facts {
+        format: kind.format.into(),
+        generator: generator(&statements.comments),
+        faces: assembled.faces,
+        dropped: dropped(&statements, &assembled),
+        up_reason: options.up.is_none().then_some(reason),
+        max_rounding: placed.max_rounding,
+        files,
+        gaps,
+        hash,
+        reading,
+        decoding,
+        ..Facts::default()
+    };
+    let lost = draw(&wires, placed.center, &mut scene, budget, &mut facts, file, options.wire_widths)?;
+    lost.into_iter().for_each(|warning| warnings.push(warning));
+    Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
+}
+
+/// Puts points and lines into the scene, moved to where the file has them; warnings of those that are not drawn as
+/// they are.
+fn draw(
+    wires: &[Wires],
+    center: DVec3,
+    scene: &mut Scene,
+    budget: &mut Budget,
+    facts: &mut Facts,
+    file: &Path,
+    widths: Option<[f64; 2]>,
+) -> Result<Vec<Diagnostic>, Diagnostic> {
+    let world_from_object = DAffine3::from_translation(center);
+    let place = |(mesh, of): (u32, &Wires)| Instance { name: of.mesh.name.clone(), mesh, world_from_object };
+    let places: Vec<Instance> = (0..).zip(wires).map(place).collect();
+    wires::draw(wires, &places, scene, budget, facts, file, widths).map_err(|over| Diagnostic::over_budget(file, over))
+}
+
+/// Bytes that making tangents takes a corner; as a vertex of its own it has a place, a normal, coordinates and a colour.
+const OF_TANGENTS: u64 = tangents::OF_CORNER + 4 * 16;
+
+/// One instance of each mesh, moved to where the file has it.
+///
+/// # Errors
+/// When tangents for normal maps would take more than is left of `budget`.
+fn scene(
+    mut meshes: Vec<Mesh>,
+    materials: mtl::Materials,
+    center: DVec3,
+    up: UpAxis,
+    budget: &mut Budget,
+) -> Result<Scene, OverBudget> {
+    let mtl::Materials { materials, textures, bitmaps, of_name, .. } = materials;
+    for (mesh, material) in meshes.iter_mut().zip(of_name) {
+        mesh.material = material;
+        if materials.get(material as usize).is_some_and(|m| m.normal_map.is_some()) {
+            budget.take(3 * mesh.triangles.len() as u64, OF_TANGENTS)?;
+            tangents::generate(mesh, 0);
+        }
+    }
+    let world_from_object = DAffine3::from_translation(center);
+    let instance = |(mesh, m): (u32, &Mesh)| Instance { name: m.name.clone(), mesh, world_from_object };
+    let instances = (0..).zip(&meshes).map(instance).collect();
+    Ok(Scene { meshes, instances, materials, textures, bitmaps, up, ..Scene::default() })
+}
+
+/// Tells what became of faces.
+fn warn_of_faces(assembled: &Assembled, kind: &Kind, file: &Path, warnings: &mut Warnings) {
+    let told = [
+        (assembled.not_finite, "a face is dropped: a corner is not a finite number, or over 1e18"),
+        (assembled.collapsed, "a face is dropped: it has fewer than 3 different corners"),
+        (
+            assembled.rounded,
+            "a face is dropped: it is so small and so far from the middle that rounding joins its corners",
+        ),
+        (assembled.crossing, "a face crosses itself; it is cut as well as can be"),
+        (assembled.turned, "a face is wound against its normals; it is turned round"),
+    ];
+    for (code, ((count, first), text)) in kind.of_faces.into_iter().zip(told).filter(|(_, ((count, _), _))| *count > 0)
+    {
+        let count = u32::try_from(count).unwrap_or(u32::MAX);
+        warnings.push(Diagnostic { count, ..Diagnostic::new(code, file, (kind.place)(first), text) });
+    }
+}
+
+fn dropped(statements: &Statements, assembled: &Assembled) -> Vec<(String, u64)> {
+    let reasons = [
+        ("fewer than 3 corners", u64::from(statements.odd.few_corners.count)),
+        ("a corner that is not finite", assembled.not_finite.0),
+        ("fewer than 3 different corners", assembled.collapsed.0),
+        ("corners that rounding joins, far from the middle", assembled.rounded.0),
+    ];
+    reasons.into_iter().filter(|r| r.1 > 0).map(|(reason, count)| (reason.into(), count)).collect()
+}
+
+/// The comment by which a program names itself, if any.
+fn generator(comments: &[String]) -> String {
+    const WORDS: [&str; 12] = [
+        "export",
+        "generated",
+        "created",
+        "written",
+        "converted",
+        "blender",
+        "rhino",
+        "maya",
+        "3ds",
+        "max2obj",
+        "zbrush",
+        "freecad",
+    ];
+    let names_a_program = |c: &&String| WORDS.iter().any(|w| c.to_lowercase().contains(w));
+    comments.iter().find(names_a_program).cloned().unwrap_or_default()
+}
