@@ -35,28 +35,48 @@ pub(super) struct Inside {
 pub(super) fn weaken(
     context: &Context,
     ray: &Ray,
-    (crossed, hit): (&mut Hit, &Hit),
+    crossed: &mut Hit,
+    Passed { hit, left }: &Passed,
     light: &mut Vec3,
     inside: Option<&mut Inside>,
 ) {
-    let target = Target::new(context.scene, context.world, hit.prim);
     let is_repeated = is_same_crossing(|prim| context.face(prim), ray, crossed, hit);
-    let filter = filter_at(context, &target, ray, hit, inside.filter(|_| !is_repeated));
+    let (filter, is_hole) = match *left {
+        Some(part) => (Vec3::splat(part), false),
+        None => {
+            let target = Target::new(context.scene, context.world, hit.prim);
+            let filter = filter_at(context, &target, ray, hit, inside.filter(|_| !is_repeated));
+            let may_have_holes = !target.material.reflection.transmits() && hit.prim < context.world.triangles();
+            (filter, may_have_holes && filter == Vec3::ONE)
+        }
+    };
     // What stops light does so among others in its place, too.
     if !is_repeated || filter.max_element() <= 0.0 {
         *light *= filter;
     }
-    let is_hole =
-        filter == Vec3::ONE && !target.material.reflection.transmits() && hit.prim < context.world.triangles();
     if !is_hole {
         *crossed = *hit;
     }
 }
 
-/// Hits that let light through in part, each linked with the one before it of the same ray.
+/// Something that light passes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Passed {
+    pub hit: Hit,
+    /// What part of it is left behind that, where it is known: neither nothing nor all.
+    pub left: Option<f32>,
+}
+
+impl From<Hit> for Passed {
+    fn from(hit: Hit) -> Self {
+        Self { hit, left: None }
+    }
+}
+
+/// What lets light through in part, each linked with the one before it of the same ray.
 #[derive(Debug, Default)]
 pub(super) struct Met {
-    hits: Vec<(Hit, u32)>,
+    passed: Vec<(Passed, u32)>,
     /// The last hit of each ray.
     last: Vec<u32>,
 }
@@ -66,40 +86,43 @@ impl Met {
     pub(super) const NOTHING: u32 = u32::MAX;
     /// Of those that must find it again.
     pub(super) const TOO_MUCH: u32 = u32::MAX - 1;
-    /// Hits that are noted at most: 5 MB of them.
+    /// How much is noted at most: 7 MB of it.
     const MOST: usize = 1 << 18;
 
     pub(super) fn begin(&mut self, rays: usize) {
-        self.hits.clear();
+        self.passed.clear();
         self.last.clear();
         self.last.resize(rays, Self::NOTHING);
     }
 
-    fn note(&mut self, ray: usize, hit: Hit) {
+    fn note(&mut self, ray: usize, passed: Passed) {
         let last = &mut self.last[ray];
-        if *last == Self::TOO_MUCH || self.hits.len() >= Self::MOST {
+        if *last == Self::TOO_MUCH || self.passed.len() >= Self::MOST {
             *last = Self::TOO_MUCH;
             return;
         }
         // A distance of −0 is none of its own.
-        self.hits.push((Hit { t: hit.t + 0.0, ..hit }, *last));
-        *last = self.hits.len() as u32 - 1;
+        let hit = Hit { t: passed.hit.t + 0.0, ..passed.hit };
+        self.passed.push((Passed { hit, ..passed }, *last));
+        *last = self.passed.len() as u32 - 1;
     }
 
-    /// The last hit of a ray.
+    /// What was last noted of a ray.
     pub(super) fn last(&self, ray: usize) -> u32 {
         self.last[ray]
     }
 
-    /// The hits of a ray, from the last that was noted on, in their order, each once.
-    pub(super) fn list(&self, mut noted: u32, hits: &mut Vec<Hit>) {
-        hits.clear();
-        while let Some(&(hit, before)) = self.hits.get(noted as usize) {
-            hits.push(hit);
+    /// What a ray passes, from the last that was noted on, in the order of its way, each once.
+    pub(super) fn list(&self, mut noted: u32, list: &mut Vec<Passed>) {
+        list.clear();
+        while let Some(&(passed, before)) = self.passed.get(noted as usize) {
+            list.push(passed);
             noted = before;
         }
-        hits.sort_unstable_by(|a, b| a.t.total_cmp(&b.t).then(a.prim.cmp(&b.prim)));
-        hits.dedup_by_key(|hit| (hit.t.to_bits(), hit.prim));
+        list.sort_unstable_by(|Passed { hit: a, .. }, Passed { hit: b, .. }| {
+            a.t.total_cmp(&b.t).then(a.prim.cmp(&b.prim))
+        });
+        list.dedup_by_key(|passed| (passed.hit.t.to_bits(), passed.hit.prim));
     }
 }
 
@@ -145,8 +168,8 @@ impl<'a> Through<'a> {
         Self { first: self.first + rays.start, rays: &self.rays[rays], ..*self }
     }
 
-    fn note(&self, ray: usize, hit: Hit) {
-        self.met.borrow_mut().note(self.first + ray, hit);
+    fn note(&self, ray: usize, passed: Passed) {
+        self.met.borrow_mut().note(self.first + ray, passed);
     }
 }
 
@@ -158,38 +181,26 @@ impl Holes for Through<'_> {
         let Prim::Triangle(corners) = shape else {
             let within = |t: &f32| (ray.t_min..=ray.t_max.min(f32::MAX)).contains(t);
             let ts = shape.distances(&space, ray.t_min >= 0.0).into_iter().filter(within);
-            ts.for_each(|t| self.note(number, Hit { t, u: 0.0, v: 0.0, prim }));
+            ts.for_each(|t| self.note(number, Hit { t, u: 0.0, v: 0.0, prim }.into()));
             return false;
         };
         let (t, u, v) = triangle::place(&space, &corners);
         let hit = Hit { t, u, v, prim };
-        let left = Left::behind(context, &Target::new(context.scene, context.world, prim), &hit);
-        if left.is_none() {
-            self.note(number, hit);
+        let left = left_behind(context, &Target::new(context.scene, context.world, prim), &hit);
+        let is_said = matches!(left, Some(0.0 | 1.0));
+        if !is_said {
+            self.note(number, Passed { hit, left });
         }
-        left == Some(Left::Nothing)
+        left == Some(0.0)
     }
 }
 
-/// What is left of light behind a surface, where that is soon said.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Left {
-    Nothing,
-    Everything,
-}
-
-impl Left {
-    /// `None` where it is a part, or where it takes more to know.
-    fn behind(context: &Context, target: &Target, hit: &Hit) -> Option<Self> {
-        if target.material.reflection.transmits() {
-            return None;
-        }
-        match 1.0 - coverage(target.material, target.opacity(hit, context.textures)?) {
-            0.0 => Some(Self::Nothing),
-            1.0 => Some(Self::Everything),
-            _ => None,
-        }
+/// What part of light is left behind a surface, where that is soon said.
+fn left_behind(context: &Context, target: &Target, hit: &Hit) -> Option<f32> {
+    if target.material.reflection.transmits() {
+        return None;
     }
+    Some(1.0 - coverage(target.material, target.opacity(hit, context.textures)?))
 }
 
 /// What the surface at `hit` lets through. Maps are read at full sharpness: the shadow's own distance is unknown here.
@@ -197,10 +208,8 @@ pub(super) fn filter_at(context: &Context, target: &Target, ray: &Ray, hit: &Hit
     if target.material.is_opaque() && !context.everything {
         return Vec3::ZERO;
     }
-    if !target.material.reflection.transmits()
-        && let Some(opacity) = target.opacity(hit, context.textures)
-    {
-        return Vec3::splat(1.0 - coverage(target.material, opacity));
+    if let Some(left) = left_behind(context, target, hit) {
+        return Vec3::splat(left);
     }
     let patch = target.patch(context.world, hit.u, hit.v, ray.origin + ray.dir * hit.t);
     let reader = Reader { store: context.textures, patch: patch.as_ref(), known: &[] };

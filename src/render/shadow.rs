@@ -3,7 +3,7 @@
 use super::asking::Asking;
 use super::context::Context;
 use super::curve::Feelers;
-use super::filters::{Inside, Met, Through, filter_at, weaken};
+use super::filters::{Inside, Met, Passed, Through, filter_at, weaken};
 use super::observer::Observer;
 use super::surface::Target;
 use super::tail::Tail;
@@ -24,9 +24,9 @@ pub(crate) struct Shadows {
     risers: Vec<Ray>,
     raised: Vec<usize>,
     blocked: Vec<bool>,
-    /// What they meet that lets light through in part, and the hits of one of them.
+    /// What they meet that lets light through in part, and that of one of them in order.
     met: RefCell<Met>,
-    in_order: Vec<Hit>,
+    in_order: Vec<Passed>,
     /// Those that go on from surface to surface: their numbers, the rays, the hit that each has passed last, the last that was
     /// no hole, and the one behind.
     going: Vec<usize>,
@@ -139,8 +139,8 @@ impl Shadows {
             }
             met.list(noted, &mut self.in_order);
             let (light, mut crossed) = (&mut self.light[i].radiance, Hit::MISS);
-            for hit in &self.in_order {
-                weaken(context, &self.rays[i], (&mut crossed, hit), light, self.inside.get_mut(i));
+            for passed in &self.in_order {
+                weaken(context, &self.rays[i], &mut crossed, passed, light, self.inside.get_mut(i));
                 self.blocked[i] = is_dark(*light);
                 if self.blocked[i] {
                     break;
@@ -216,7 +216,7 @@ impl Shadows {
                 continue;
             }
             let (ray, light, mut crossed) = (self.on_way[k], &mut self.light[i].radiance, self.crossed[k]);
-            weaken(context, &ray, (&mut crossed, &hit), light, self.inside.get_mut(i));
+            weaken(context, &ray, &mut crossed, &hit.into(), light, self.inside.get_mut(i));
             self.blocked[i] = is_dark(*light);
             if self.blocked[i] {
                 continue;
