@@ -1,5 +1,7 @@
 //! Exit codes. They tell a script whether trying again can help.
 
+use crate::load::diagnostic::OVER_MEMORY;
+use crate::load::{Diagnostic, LoadError};
 use std::process::ExitCode;
 
 /// How a command ended, from best to worst.
@@ -34,6 +36,22 @@ impl Exit {
 impl From<Exit> for ExitCode {
     fn from(exit: Exit) -> Self {
         Self::from(exit.code())
+    }
+}
+
+/// A model that cannot be loaded: trying again helps with more memory where that was all that was missing.
+impl From<&LoadError> for Exit {
+    fn from(error: &LoadError) -> Self {
+        // A file that is too large whatever the memory has no remedy.
+        let of_memory = |fault: &Diagnostic| match fault.code {
+            "file-too-large" => !fault.remedy.is_empty(),
+            code => code == OVER_MEMORY,
+        };
+        match error {
+            LoadError::Read { .. } => Self::Failed,
+            LoadError::Input(faults) if !faults.is_empty() && faults.iter().all(of_memory) => Self::Failed,
+            LoadError::Input(_) => Self::Input,
+        }
     }
 }
 

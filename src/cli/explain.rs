@@ -9,10 +9,10 @@
 
 use super::args::ExplainArgs;
 use super::exit::Exit;
-use super::job::{self, Wrong};
+use super::job;
 use super::message::Messages;
 use super::seen::{self, Seen};
-use super::{accident, interrupt, print};
+use super::{accident, interrupt};
 use crate::accel::{AccelParams, auto};
 use crate::bench::explain::{Bill, Case, Finding, Work, explain};
 use crate::bench::report::number::{grouped, short};
@@ -28,10 +28,7 @@ pub(super) fn run(args: &ExplainArgs) -> Exit {
     let messages = Messages::new(args.model.load.messages.into(), args.quiet);
     let params = match job::params(&args.params, args.accel.kinds()) {
         Ok(params) => params,
-        Err(Wrong(text)) => {
-            messages.error("usage", text, "");
-            return Exit::Usage;
-        }
+        Err(wrong) => return messages.wrong(wrong),
     };
     let name = args.model.input.display().to_string();
     accident::guard(&name, &messages, || judge(args, params, &name, &messages).unwrap_or_else(|exit| exit))
@@ -68,10 +65,7 @@ fn judge(args: &ExplainArgs, params: AccelParams, name: &str, messages: &Message
         usual: &usual,
         findings: &findings,
     };
-    print(&if args.json { told.json() } else { told.text() }).map_err(|e| {
-        messages.error("output-unwritable", format!("standard output: {e}"), "");
-        Exit::Failed
-    })?;
+    messages.print(&if args.json { told.json() } else { told.text() })?;
     Ok(Exit::Done)
 }
 

@@ -1,12 +1,14 @@
 //! Messages: one line each to stderr, as text or as JSON objects.
 //!
 //! The JSON form is one object a line: `{"severity","code","file","place","text","remedy","count"}`; `severity` is
-//! `error`, `warning` or `info`, codes are stable. stdout is never written here.
+//! `error`, `warning` or `info`, codes are stable. stdout holds only what was asked for, never a message.
 
+use super::exit::Exit;
+use super::job::Wrong;
 use crate::load::{Diagnostic, LoadError};
 use indicatif::MultiProgress;
 use std::ffi::OsString;
-use std::io::Write;
+use std::io::{self, Write};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
@@ -158,8 +160,31 @@ impl Messages {
         self.say(Severity::Info, &Diagnostic::new(code, "", "", text));
     }
 
+    /// Writes why something could not be done, and gives how that ends.
+    pub(super) fn fail(&self, fault: &Diagnostic, exit: Exit) -> Exit {
+        self.say(Severity::Error, fault);
+        exit
+    }
+
+    /// Writes what is wrong with the command line.
+    pub(super) fn wrong(&self, Wrong(text): Wrong) -> Exit {
+        self.error("usage", text, "");
+        Exit::Usage
+    }
+
+    /// Prints to stdout; whatever keeps it from that is said.
+    pub(super) fn print(&self, text: &str) -> Result<(), Exit> {
+        super::print(text).map_err(|why| self.unprintable(&why))
+    }
+
+    /// Writes why something could not be printed.
+    pub(super) fn unprintable(&self, why: &io::Error) -> Exit {
+        self.error("output-unwritable", format!("standard output: {why}"), "");
+        Exit::Failed
+    }
+
     /// Writes every fault that kept a file from being loaded.
-    pub(super) fn load_error(&self, error: &LoadError) {
+    pub(super) fn load_error(&self, error: &LoadError) -> Exit {
         match error {
             LoadError::Read { what, source } => {
                 let text = if what.text.is_empty() { source.to_string() } else { format!("{}: {source}", what.text) };
@@ -167,6 +192,7 @@ impl Messages {
             }
             LoadError::Input(faults) => faults.iter().for_each(|fault| self.say(Severity::Error, fault)),
         }
+        error.into()
     }
 
     /// Warnings so far, each counted as often as it was met.

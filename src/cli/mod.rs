@@ -69,8 +69,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
         && let Err(chosen) = level.choose()
     {
         let text = format!("--simd {}: this process has begun with {}", level.word(), chosen.word());
-        Messages::new(format, false).error("usage", text, "");
-        return Exit::Usage;
+        return Messages::new(format, false).wrong(job::Wrong(text));
     }
     interrupt::install(format);
     accident::install();
@@ -112,14 +111,13 @@ fn any_command(words: Vec<OsString>) -> Result<Command, clap::Error> {
 fn misunderstood(error: &clap::Error, format: message::Format) -> Exit {
     if error.use_stderr() && format == message::Format::Json {
         let fault = message::of_parser(&error.render().to_string());
-        Messages::new(format, false).say(Severity::Error, &fault);
-        return Exit::Usage;
+        return Messages::new(format, false).fail(&fault, Exit::Usage);
     }
     // Help is not printed before it has left the buffer; a reader that has enough is no fault.
     let printed = error.print().and_then(|()| io::stdout().flush());
     match printed {
         _ if error.use_stderr() => Exit::Usage,
-        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => shell::unprintable(&e),
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => Messages::default().unprintable(&e),
         _ => Exit::Done,
     }
 }
@@ -135,10 +133,7 @@ fn render_command(typed: &RenderArgs) -> Exit {
                 args = repeat.args;
                 (expected_hash, made_of) = (Some(repeat.hash), repeat.made_of);
             }
-            Err((fault, exit)) => {
-                messages.say(Severity::Error, &fault);
-                return exit;
-            }
+            Err((fault, exit)) => return messages.fail(&fault, exit),
         }
     }
     let (models, unfolded) = folders::unfold(&args.inputs, |fault| messages.say(Severity::Error, fault));
@@ -151,10 +146,7 @@ fn render_command(typed: &RenderArgs) -> Exit {
             let job = job::RenderJob { expected_hash, made_of, again: typed.again.clone(), ..job };
             render::run(&job, &messages).max(unfolded)
         }
-        Err(job::Wrong(text)) => {
-            messages.error("usage", text, "");
-            Exit::Usage
-        }
+        Err(wrong) => messages.wrong(wrong),
     }
 }
 

@@ -2,10 +2,9 @@
 
 use super::args::{LoadArgs, ModelArgs};
 use super::exit::Exit;
-use super::job::{self, Wrong};
+use super::job;
 use super::message::{Messages, Severity};
 use super::moment;
-use crate::load::diagnostic::OVER_MEMORY;
 use crate::load::{Diagnostic, Limits, LoadError, LoadOptions, Loaded, check_moment, load, load_bytes};
 use crate::math::DAffine3;
 use crate::render::{Instancing, Placing, World};
@@ -44,19 +43,14 @@ pub(super) fn left(limits: &Limits, loaded: &Loaded) -> Limits {
 pub(super) fn model(args: &ModelArgs, messages: &Messages) -> Result<Loaded, Exit> {
     let ModelArgs { input, load } = args;
     let loaded = model_as_stored(input, load, messages)?;
-    check_flattened(&loaded, job::limits(load.max_memory).memory, input).map_err(|fault| {
-        messages.say(Severity::Error, &fault);
-        Exit::Failed
-    })?;
+    check_flattened(&loaded, job::limits(load.max_memory).memory, input)
+        .map_err(|fault| messages.fail(&fault, Exit::Failed))?;
     Ok(loaded)
 }
 
 /// The same for a command that does not need each instance by itself.
 pub(super) fn model_as_stored(input: &PathBuf, args: &LoadArgs, messages: &Messages) -> Result<Loaded, Exit> {
-    let moment = moment::moment(&args.moment).map_err(|Wrong(text)| {
-        messages.error("usage", text, "");
-        Exit::Usage
-    })?;
+    let moment = moment::moment(&args.moment).map_err(|wrong| messages.wrong(wrong))?;
     let options = LoadOptions {
         root: args.root.clone(),
         limits: job::limits(args.max_memory),
@@ -71,10 +65,7 @@ pub(super) fn model_as_stored(input: &PathBuf, args: &LoadArgs, messages: &Messa
         animations_before: None,
         without_pictures: false,
     };
-    let loaded = scene(slice::from_ref(input), &options).map_err(|error| {
-        messages.load_error(&error);
-        exit_of(&error)
-    })?;
+    let loaded = scene(slice::from_ref(input), &options).map_err(|error| messages.load_error(&error))?;
     loaded.warnings.iter().for_each(|w| messages.say(Severity::Warning, w));
     Ok(loaded)
 }
@@ -188,18 +179,4 @@ fn one(input: &Path, options: &LoadOptions) -> Result<Loaded, LoadError> {
         return Err(Diagnostic::new("file-too-large", "-", "", text).remedy("raise --max-memory").into());
     }
     load_bytes(input, bytes, options)
-}
-
-/// Whether trying again can help: it does with more memory where that was all that was missing.
-pub(super) fn exit_of(error: &LoadError) -> Exit {
-    // A file that is too large whatever the memory has no remedy.
-    let of_memory = |fault: &Diagnostic| match fault.code {
-        "file-too-large" => !fault.remedy.is_empty(),
-        code => code == OVER_MEMORY,
-    };
-    match error {
-        LoadError::Read { .. } => Exit::Failed,
-        LoadError::Input(faults) if !faults.is_empty() && faults.iter().all(of_memory) => Exit::Failed,
-        LoadError::Input(_) => Exit::Input,
-    }
 }

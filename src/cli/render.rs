@@ -40,8 +40,7 @@ pub(super) fn run(job: &RenderJob, messages: &Messages) -> Exit {
     if let Some(path) = job.stats_file()
         && let Err(fault) = writable::check(path, "--stats-file", &so_far.sources).and_then(|()| spared(path))
     {
-        messages.say(Severity::Error, &fault);
-        return Exit::Failed;
+        return messages.fail(&fault, Exit::Failed);
     }
     let lanes::Ended { worst, failed } = lanes::run(job, &pool, messages, &mut so_far);
     if interrupt::raised() {
@@ -309,10 +308,7 @@ fn prepare(
     // Pictures are those of an earlier frame, unless other moments may show others.
     let has_pictures = earlier.as_ref().is_some_and(|earlier| !earlier.loaded.facts.changes_materials);
     let options = LoadOptions { without_pictures: has_pictures, ..options };
-    let mut loaded = read::scene(&batch.inputs, &options).map_err(|error| {
-        messages.load_error(&error);
-        read::exit_of(&error)
-    })?;
+    let mut loaded = read::scene(&batch.inputs, &options).map_err(|error| messages.load_error(&error))?;
     let (mut told, mut metered, mut load_seconds) = (HashSet::new(), Metered::default(), 0.0);
     let is_later = earlier.is_some();
     let mut with_pictures = None;
@@ -323,14 +319,10 @@ fn prepare(
     if let Some(earlier) = with_pictures {
         if !read::take_pictures(&mut loaded, earlier) {
             let fault = Diagnostic::new("input-changed", &batch.inputs[0], "", "was changed while it was rendered");
-            messages.say(Severity::Error, &fault.remedy("render it again"));
-            return Err(Exit::Failed);
+            return Err(task.fail(&fault.remedy("render it again"), Exit::Failed));
         }
     } else {
-        surroundings::place(&job.look, &job.load.limits, &mut loaded).map_err(|error| {
-            messages.load_error(&error);
-            read::exit_of(&error)
-        })?;
+        surroundings::place(&job.look, &job.load.limits, &mut loaded).map_err(|error| messages.load_error(&error))?;
     }
     profile.loaded(loaded.facts.reading, loaded.facts.decoding);
     // What is wrong with one frame is wrong with most, in other numbers.
@@ -343,19 +335,14 @@ fn prepare(
         return Err(task.fail(&read::not_strict(loaded.warnings.len(), task.file()), Exit::Input));
     }
     if let Some(expected) = &job.expected_hash {
-        again::check_hash(expected, &loaded, &batch.inputs, &job.look).map_err(|fault| {
-            messages.say(Severity::Error, &fault);
-            Exit::Input
-        })?;
+        again::check_hash(expected, &loaded, &batch.inputs, &job.look)
+            .map_err(|fault| task.fail(&fault, Exit::Input))?;
     }
-    let world = read::as_drawn(&loaded, job.instances, job.load.limits.memory, &batch.inputs[0]).map_err(|fault| {
-        messages.say(Severity::Error, &fault);
-        Exit::Failed
-    })?;
+    let world = read::as_drawn(&loaded, job.instances, job.load.limits.memory, &batch.inputs[0])
+        .map_err(|fault| task.fail(&fault, Exit::Failed))?;
     let world = if job.everything { world.with_everything() } else { world };
     if world.is_empty() && !job.allow_empty && survey.is_none() {
-        messages.say(Severity::Error, &nothing_to_draw(&loaded, &batch.inputs[0]));
-        return Err(Exit::Input);
+        return Err(task.fail(&nothing_to_draw(&loaded, &batch.inputs[0]), Exit::Input));
     }
     let coarse = coarse(&loaded, &world, &batch.inputs[0]);
     for warning in coarse.iter().filter(|w| told.insert(kind_of(w)) || !is_later) {

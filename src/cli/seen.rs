@@ -3,7 +3,7 @@
 use super::args::{EyeArgs, ModelArgs};
 use super::camera::{self, Choice};
 use super::exit::Exit;
-use super::message::{Messages, Severity};
+use super::message::Messages;
 use super::{picture, read};
 use crate::load::{Diagnostic, Loaded};
 use crate::render::{Settings, View, World};
@@ -35,10 +35,7 @@ pub(super) fn model(
     messages: &Messages,
 ) -> Result<Seen, Exit> {
     let file = args.input.as_path();
-    let fail = |fault: Diagnostic| {
-        messages.say(Severity::Error, &fault);
-        Exit::Input
-    };
+    let fail = |fault: Diagnostic| messages.fail(&fault, Exit::Input);
     let mut loaded = read::model(args, messages)?;
     let world = World::new(&loaded.scene);
     if world.shapes.is_empty() {

@@ -161,8 +161,7 @@ fn refuse_warnings(loaded: &Loaded, file: &Path, messages: &Messages) -> Result<
         return Ok(());
     }
     loaded.warnings.iter().for_each(|warning| messages.say(Severity::Warning, warning));
-    messages.say(Severity::Error, &read::not_strict(loaded.warnings.len(), file));
-    Err(Exit::Input)
+    Err(messages.fail(&read::not_strict(loaded.warnings.len(), file), Exit::Input))
 }
 
 /// How wide points and lines are in each frame by itself.
@@ -228,17 +227,13 @@ impl Survey {
             }
             let moment = sequence.moment(frame);
             let options = LoadOptions { moment, without_pictures: true, ..job.load.clone() };
-            let loaded = read::scene(&batch.inputs, &options).map_err(|error| {
-                messages.load_error(&error);
-                read::exit_of(&error)
-            })?;
+            let loaded = read::scene(&batch.inputs, &options).map_err(|error| messages.load_error(&error))?;
             if job.strict && batch.shots.iter().any(|shot| shot.step.number == Some(frame)) {
                 refuse_warnings(&loaded, &batch.inputs[0], messages)?;
             }
             if loaded.facts.animations.is_empty() {
                 let fault = Diagnostic::new("animation-none", &batch.inputs[0], "", "the file has no animation");
-                messages.say(Severity::Error, &fault.remedy("--turntable shows it from all around"));
-                return Err(Exit::Input);
+                return Err(messages.fail(&fault.remedy("--turntable shows it from all around"), Exit::Input));
             }
             is_scene_file |= loaded.facts.format == scene_file::FORMAT;
             let scene = &loaded.scene;

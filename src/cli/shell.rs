@@ -1,11 +1,10 @@
 //! `meshray completions` and `meshray man`: made from the same definitions as the parser.
 
+use super::Exit;
 use super::args::Cli;
 use super::message::Messages;
-use super::{Exit, print};
 use clap::CommandFactory;
 use clap_complete::Shell;
-use std::io;
 
 /// Prints a completion script.
 pub(super) fn completions(shell: Shell) -> Exit {
@@ -25,15 +24,9 @@ pub(super) fn man() -> Exit {
         let name: &'static str = format!("meshray-{}", sub.get_name()).leak();
         rendered = rendered.and_then(|()| clap_mangen::Man::new(sub.clone().name(name)).render(&mut page));
     }
-    rendered.map_or_else(|e| unprintable(&e), |()| show(&page))
+    rendered.map_or_else(|why| Messages::default().unprintable(&why), |()| show(&page))
 }
 
 fn show(text: &[u8]) -> Exit {
-    print(&String::from_utf8_lossy(text)).map_or_else(|e| unprintable(&e), |()| Exit::Done)
-}
-
-/// Says why something could not be printed.
-pub(super) fn unprintable(why: &io::Error) -> Exit {
-    Messages::default().error("output-unwritable", format!("standard output: {why}"), "");
-    Exit::Failed
+    Messages::default().print(&String::from_utf8_lossy(text)).err().unwrap_or_default()
 }

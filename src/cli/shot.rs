@@ -12,7 +12,7 @@ use super::render::SoFar;
 use super::sequence::{self, Survey};
 use super::stats::{self, Counted, PictureStats, Times};
 use super::summary::Summary;
-use super::{again, cost_layers, dry_run, interrupt, print, read, surroundings, unseen};
+use super::{again, cost_layers, dry_run, interrupt, read, surroundings, unseen};
 use crate::accel::AnyAccel;
 use crate::accel::auto::Reason;
 use crate::image::{ExrSamples, FileKind, LARGEST_HALF, Picture, beyond_half};
@@ -42,8 +42,7 @@ impl Task<'_> {
 
     /// Says what went wrong.
     pub(super) fn fail(&self, fault: &Diagnostic, exit: Exit) -> Exit {
-        self.messages.say(Severity::Error, fault);
-        exit
+        self.messages.fail(fault, exit)
     }
 }
 
@@ -219,13 +218,7 @@ impl Prepared<'_> {
             so_far.foretold.push(told);
             return Exit::Done;
         }
-        match print(&told) {
-            Ok(()) => Exit::Done,
-            Err(e) => {
-                messages.error("output-unwritable", format!("standard output: {e}"), "");
-                Exit::Failed
-            }
-        }
+        messages.print(&told).err().unwrap_or_default()
     }
 
     /// Renders the picture and writes it, and says and keeps what there is to say of it.

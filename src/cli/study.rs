@@ -3,10 +3,10 @@
 use super::args::StudyArgs;
 use super::exit::Exit;
 use super::job::Wrong;
-use super::message::{Messages, Severity};
+use super::message::Messages;
 use super::seen::{self, Seen};
 use super::writable::{self, Sources};
-use super::{accident, interrupt, meter, picture, print};
+use super::{accident, interrupt, meter, picture};
 use crate::accel::{AccelParams, auto};
 use crate::bench::study::report::{Format, text};
 use crate::bench::study::{Plan, Study, Subject, measure, reference, settings};
@@ -23,14 +23,10 @@ pub(super) fn run(args: &StudyArgs) -> Exit {
     let typed = |path: &PathBuf| Ok((path.clone(), Format::from_path(path).map_err(Wrong)?));
     let files: Vec<(PathBuf, Format)> = match args.report.iter().map(typed).collect() {
         Ok(files) => files,
-        Err(Wrong(text)) => {
-            messages.error("usage", text, "");
-            return Exit::Usage;
-        }
+        Err(wrong) => return messages.wrong(wrong),
     };
     if let Err(fault) = writable::check_reports(&args.report, &Sources::of([&args.model.input])) {
-        messages.say(Severity::Error, &fault);
-        return Exit::Failed;
+        return messages.fail(&fault, Exit::Failed);
     }
     let name = args.model.input.display().to_string();
     accident::guard(&name, &messages, || match threads::pool(args.threads.unwrap_or(0)) {
@@ -45,18 +41,17 @@ pub(super) fn run(args: &StudyArgs) -> Exit {
 fn study(args: &StudyArgs, files: &[(PathBuf, Format)], name: &str, messages: &Messages) -> Result<Exit, Exit> {
     let Seen { loaded, world, view, phrase } = seen::model(&args.model, &args.eye, args.size, messages)?;
     let sources = Sources::of(&loaded.facts.files);
-    args.report.iter().try_for_each(|path| sources.spared_by(path, "--report")).map_err(|fault| {
-        messages.say(Severity::Error, &fault);
-        Exit::Failed
-    })?;
+    args.report
+        .iter()
+        .try_for_each(|path| sources.spared_by(path, "--report"))
+        .map_err(|fault| messages.fail(&fault, Exit::Failed))?;
     let hints = &loaded.scene.hints;
     let base = Settings { seed: args.seed, ..seen::settings(args.size, None, hints) };
     let tone_map = match hints.tone_map.as_deref().map(str::parse).transpose() {
         Ok(hinted) => args.tone_map.or(hinted).unwrap_or_default(),
         Err(e) => {
             let fault = Diagnostic::new("scene-value", args.model.input.as_path(), "", e.to_string());
-            messages.say(Severity::Error, &fault);
-            return Err(Exit::Input);
+            return Err(messages.fail(&fault, Exit::Input));
         }
     };
     let (accel, _) = auto::build(args.accel, &world.shapes, &AccelParams::DEFAULT);
@@ -97,18 +92,18 @@ fn study(args: &StudyArgs, files: &[(PathBuf, Format)], name: &str, messages: &M
         complete: false,
     };
     let told = Told { files, messages };
-    told.print(&text::head(&study))?;
+    messages.print(&text::head(&study))?;
     for setting in settings(&subject) {
         if interrupt::raised() {
             break;
         }
         let row = measure(&subject, &plan, &study.reference, setting);
-        told.print(&text::row(&row))?;
+        messages.print(&text::row(&row))?;
         study.rows.push(row);
         told.write(&study)?;
     }
     study.complete = !interrupt::raised();
-    told.print(&text::conclusion(&study))?;
+    messages.print(&text::conclusion(&study))?;
     told.write(&study)?;
     Ok(if study.complete { Exit::Done } else { Exit::Interrupted })
 }
@@ -120,10 +115,6 @@ struct Told<'a> {
 }
 
 impl Told<'_> {
-    fn print(&self, text: &str) -> Result<(), Exit> {
-        print(text).map_err(|e| self.unwritable(Path::new("standard output"), &e.to_string()))
-    }
-
     /// Writes every report with what there is so far, so that a crash costs one row.
     fn write(&self, study: &Study) -> Result<(), Exit> {
         self.files.iter().try_for_each(|(path, format)| {

@@ -7,9 +7,9 @@ mod spd;
 
 use super::exit::Exit;
 use super::job::{self, Wrong};
-use super::message::{Messages, Severity};
+use super::message::Messages;
 use super::writable::{self, Sources};
-use super::{accident, interrupt, print};
+use super::{accident, interrupt};
 use crate::accel::{AccelKind, AccelParams};
 use crate::bench::compare::{Plan, compare};
 use crate::bench::machine::Machine;
@@ -40,15 +40,11 @@ pub(super) fn run(args: &BenchArgs) -> Exit {
     let messages = Messages::new(args.load.messages.into(), args.quiet);
     let (plan, files) = match (plan(args), files(args)) {
         (Ok(plan), Ok(files)) => (plan, files),
-        (Err(Wrong(text)), _) | (_, Err(Wrong(text))) => {
-            messages.error("usage", text, "");
-            return Exit::Usage;
-        }
+        (Err(wrong), _) | (_, Err(wrong)) => return messages.wrong(wrong),
     };
     let sources = Sources::of(args.inputs.iter().chain(&args.baseline));
     if let Err(fault) = writable::check_reports(&args.report, &sources) {
-        messages.say(Severity::Error, &fault);
-        return Exit::Failed;
+        return messages.fail(&fault, Exit::Failed);
     }
     let bench = Bench { args, files, sources: RefCell::new(sources), messages };
     if let Some(folder) = &args.spd {
@@ -171,8 +167,7 @@ impl Bench<'_> {
             Err(exit) => return exit,
         };
         if let Err(fault) = self.spares(&prepared.loaded) {
-            self.messages.say(Severity::Error, &fault);
-            return Exit::Failed;
+            return self.messages.fail(&fault, Exit::Failed);
         }
         let name = subject.to_string();
         let (plan, mut left_out) = match self.bearable(report, &prepared) {
@@ -338,13 +333,7 @@ impl Bench<'_> {
     }
 
     fn print(&self, text: &str) -> Exit {
-        match print(text) {
-            Ok(()) => Exit::Done,
-            Err(e) => {
-                self.messages.error("output-unwritable", format!("standard output: {e}"), "");
-                Exit::Failed
-            }
-        }
+        self.messages.print(text).err().unwrap_or_default()
     }
 
     fn no_threads(&self, name: &str, threads: usize) -> Exit {

@@ -2,7 +2,7 @@
 
 use super::super::camera::{self, Choice};
 use super::super::exit::Exit;
-use super::super::message::{Messages, Severity};
+use super::super::message::Messages;
 use super::super::{job, read, seen};
 use super::args::BenchArgs;
 use crate::accel::{AccelChoice, AccelKind, AccelParams};
@@ -96,23 +96,18 @@ impl Prepared {
     pub(super) fn new(subject: &Subject, args: &BenchArgs, messages: &Messages) -> Result<Self, Exit> {
         let mut loaded = subject.load(args, messages)?;
         let input = subject.path();
-        let world = subject.world(&loaded, job::limits(args.load.max_memory).memory).map_err(|fault| {
-            messages.say(Severity::Error, &fault);
-            Exit::Failed
-        })?;
+        let world = subject
+            .world(&loaded, job::limits(args.load.max_memory).memory)
+            .map_err(|fault| messages.fail(&fault, Exit::Failed))?;
         if world.is_empty() {
             let fault = Diagnostic::new("nothing-to-draw", input, "", "nothing to hit: it holds no faces");
-            messages.say(Severity::Error, &fault);
-            return Err(Exit::Input);
+            return Err(messages.fail(&fault, Exit::Input));
         }
         let (width, height) = args.size;
         let bounds = robust_bounds(&loaded.scene);
         let aspect = f64::from(width) / f64::from(height);
         let found = camera::camera(&Choice::of(&args.eye, None), None, &loaded.scene, &bounds, aspect, input);
-        let (camera, view_phrase) = found.map_err(|fault| {
-            messages.say(Severity::Error, &fault);
-            Exit::Input
-        })?;
+        let (camera, view_phrase) = found.map_err(|fault| messages.fail(&fault, Exit::Input))?;
         default_light::add_if_missing(&mut loaded.scene, &camera);
         let usual = seen::settings(args.size, args.depth, &loaded.scene.hints);
         let settings = Settings { samples: args.samples, seed: args.seed, ..usual };

@@ -1,8 +1,7 @@
 //! `meshray bench --spd FOLDER`: our counts beside those published in 1999.
 
 use super::super::exit::Exit;
-use super::super::message::Severity;
-use super::super::{interrupt, job, read};
+use super::super::{interrupt, job};
 use super::Bench;
 use crate::bench::machine::Machine;
 use crate::bench::spd::measure::{Measured, Plan, measure};
@@ -51,10 +50,8 @@ impl Bench<'_> {
         // Polygons stay whole: each is one object of the published counts.
         let limits = job::limits(self.args.load.max_memory);
         let options = LoadOptions { polygons: Polygons::Whole, limits, ..LoadOptions::default() };
-        let Loaded { scene: loaded, facts, .. } = load(path, &options).map_err(|error| {
-            self.messages.load_error(&error);
-            read::exit_of(&error)
-        })?;
+        let loaded = load(path, &options).map_err(|error| self.messages.load_error(&error))?;
+        let Loaded { scene: loaded, facts, .. } = loaded;
         let mut go_on = |_: &Measured, what: &str| {
             self.messages.info("progress", format!("{}: {what}", scene.name));
             !interrupt::raised()
@@ -64,8 +61,7 @@ impl Bench<'_> {
                 return Exit::Interrupted;
             }
             let fault = Diagnostic::new("no-camera", path, "", "the file has no `v`, so there is no picture");
-            self.messages.say(Severity::Error, &fault);
-            Exit::Input
+            self.messages.fail(&fault, Exit::Input)
         })
     }
 }

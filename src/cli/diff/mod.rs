@@ -16,7 +16,7 @@ mod report;
 use super::exit::Exit;
 use super::message::{Messages, Severity};
 use super::writable::{self, Sources};
-use super::{accident, interrupt, output_name, print};
+use super::{accident, interrupt, output_name};
 use crate::bench::report::number::short;
 use crate::image::diff::{
     Difference, LayerDifference, Looks, Space, compare, greatest, layer_differences, looks, side_by_side,
@@ -58,14 +58,14 @@ impl Compared {
 pub(super) fn run(args: &DiffArgs) -> Exit {
     let messages = Messages::new(args.messages.into(), false);
     accident::guard(&args.actual.display().to_string(), &messages, || {
-        let done = check_outputs(args).and_then(|()| compared(args, &messages)).and_then(|compared| {
+        let drawn = check_outputs(args).and_then(|()| compared(args, &messages)).and_then(|compared| {
             draw(args, &compared)?;
-            tell(args, &compared, &messages)
+            Ok(compared)
         });
-        done.unwrap_or_else(|fault| {
-            messages.say(Severity::Error, &fault.0);
-            fault.1
-        })
+        match drawn {
+            Ok(compared) => tell(args, &compared, &messages).unwrap_or_else(|exit| exit),
+            Err(fault) => messages.fail(&fault.0, fault.1),
+        }
     })
 }
 
@@ -205,12 +205,10 @@ fn write(path: &Path, bytes: Result<Vec<u8>, ImageError>) -> Result<(), Fault> {
 }
 
 /// Prints the figures; a limit that is broken is said and decides how it ends.
-fn tell(args: &DiffArgs, compared: &Compared, messages: &Messages) -> Result<Exit, Fault> {
+fn tell(args: &DiffArgs, compared: &Compared, messages: &Messages) -> Result<Exit, Exit> {
     let broken: Vec<String> = args.fail_if.iter().filter_map(|limit| limit.broken_by(compared)).collect();
     let text = if args.json { report::json(args, compared, &broken) } else { report::text(args, compared) };
-    print(&text).map_err(|e| {
-        Box::new((Diagnostic::new("output-unwritable", "", "", format!("standard output: {e}")), Exit::Failed))
-    })?;
+    messages.print(&text)?;
     broken.iter().for_each(|line| messages.error("pictures-differ", line, ""));
     Ok(if broken.is_empty() { Exit::Done } else { Exit::Failed })
 }

@@ -18,8 +18,8 @@ mod topology;
 
 use super::args::ModelArgs;
 use super::exit::Exit;
-use super::message::{Messages, Severity};
-use super::{accident, job, print, read};
+use super::message::Messages;
+use super::{accident, job, read};
 use crate::render::Instancing;
 pub(super) use args::InspectArgs;
 use report::Report;
@@ -39,18 +39,12 @@ fn inspect(args: &InspectArgs, messages: &Messages) -> Exit {
     let limit = job::limits(load.max_memory).memory;
     let world = match read::as_drawn(&loaded, Instancing::Auto, limit, input) {
         Ok(world) => world,
-        Err(fault) => {
-            messages.say(Severity::Error, &fault);
-            return Exit::Failed;
-        }
+        Err(fault) => return messages.fail(&fault, Exit::Failed),
     };
     let report = Report::new(input, &loaded, world, limit);
     let text = if args.json { report.json() } else { report.text() };
-    match print(&text) {
-        Err(e) => {
-            messages.error("output-unwritable", format!("standard output: {e}"), "");
-            Exit::Failed
-        }
+    match messages.print(&text) {
+        Err(exit) => exit,
         Ok(()) if args.strict && !loaded.warnings.is_empty() => Exit::Input,
         Ok(()) => Exit::Done,
     }

@@ -30,7 +30,7 @@ use super::message::{Messages, Severity};
 use super::picture::{Effective, background};
 use super::sampling::SamplingArgs;
 use super::writable::{self, Sources};
-use super::{accident, interrupt, print, read};
+use super::{accident, interrupt, read};
 use crate::accel::{AccelKind, AccelParams};
 use crate::image::{FileKind, Metadata};
 use crate::load::{Diagnostic, Loaded};
@@ -67,10 +67,7 @@ pub(super) fn run(args: &TraceArgs) -> Exit {
             let name = args.model.input.display().to_string();
             accident::guard(&name, &messages, || trace(args, &look, &params, &name, &messages).unwrap_or_else(|e| e))
         }
-        Err(Wrong(text)) => {
-            messages.error("usage", text, "");
-            Exit::Usage
-        }
+        Err(wrong) => messages.wrong(wrong),
     }
 }
 
@@ -93,12 +90,7 @@ fn check(args: &TraceArgs) -> Result<Look, Wrong> {
 
 fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messages: &Messages) -> Result<Exit, Exit> {
     let file = args.model.input.as_path();
-    let fail = |exit: Exit| {
-        move |fault: Diagnostic| {
-            messages.say(Severity::Error, &fault);
-            exit
-        }
-    };
+    let fail = |exit: Exit| move |fault: Diagnostic| messages.fail(&fault, exit);
     if let Some(path) = &args.output {
         writable::check(path, "-o", &Sources::of([file])).map_err(fail(Exit::Failed))?;
     }
@@ -116,10 +108,7 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
     let wrong = |text: String| Diagnostic::new("scene-value", file, "", text);
     let effective = Effective::new(look, &loaded.scene.hints).map_err(wrong).map_err(fail(Exit::Input))?;
     let settings = &effective.settings;
-    inside(args, settings).map_err(|Wrong(text)| {
-        messages.error("usage", text, "");
-        Exit::Usage
-    })?;
+    inside(args, settings).map_err(|wrong| messages.wrong(wrong))?;
 
     // The eye, its light, and the ray.
     let bounds = robust_bounds(&loaded.scene);
@@ -147,8 +136,7 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
     };
 
     let text = if args.json { json::write(&told) } else { text::write(&told) };
-    let unwritable = |e: std::io::Error| Diagnostic::new("output-unwritable", "", "", format!("standard output: {e}"));
-    print(&text).map_err(unwritable).map_err(fail(Exit::Failed))?;
+    messages.print(&text)?;
     match &args.output {
         Some(path) => draw(path, &told, &job, messages).map_err(fail(Exit::Failed)),
         None => Ok(Exit::Done),

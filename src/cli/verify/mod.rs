@@ -12,10 +12,11 @@ mod args;
 mod report;
 
 use super::exit::Exit;
-use super::message::{Messages, Severity};
+use super::job::{self, Wrong};
+use super::message::Messages;
 use super::progress::Progress;
 use super::writable::{self, Sources};
-use super::{accident, interrupt, job, print, read};
+use super::{accident, interrupt, read};
 use crate::bench::report::Format;
 use crate::bench::verify::{Findings, Plan, kernels, verify};
 use crate::load::{Diagnostic, Loaded};
@@ -32,19 +33,11 @@ pub(super) fn run(args: &VerifyArgs) -> Exit {
 }
 
 fn judge(args: &VerifyArgs, messages: &Messages) -> Result<Exit, Exit> {
-    let fail = |fault: Diagnostic| {
-        messages.say(Severity::Error, &fault);
-        Exit::Failed
-    };
-    let unwritable = |what: String| {
-        messages.error("output-unwritable", what, "");
-        Exit::Failed
-    };
+    let fail = |fault: Diagnostic| messages.fail(&fault, Exit::Failed);
     if let Some(path) = &args.plot {
         if Format::from_path(path) != Ok(Format::Html) {
             let text = format!("--plot {}: a page for a browser ends in .html", path.display());
-            messages.error("usage", text, "");
-            return Err(Exit::Usage);
+            return Err(messages.wrong(Wrong(text)));
         }
         writable::check(path, "--plot", &Sources::of([&args.model.input])).map_err(fail)?;
     }
@@ -64,11 +57,14 @@ fn judge(args: &VerifyArgs, messages: &Messages) -> Result<Exit, Exit> {
     if let Some(path) = &args.plot {
         let page = kernels::html(&name, &report::rays(&plan), &kernels::of(&findings));
         let written = interrupt::write_atomic(path, page.as_bytes());
-        written.map_err(|e| unwritable(format!("{}: {e}", path.display())))?;
+        written.map_err(|e| {
+            messages.error("output-unwritable", format!("{}: {e}", path.display()), "");
+            Exit::Failed
+        })?;
     }
     let report = report::Report { name: &name, hash: loaded.facts.hash, unjudged, plan: &plan, findings: &findings };
     let text = if args.json { report.json() } else { report.text() };
-    print(&text).map_err(|e| unwritable(format!("standard output: {e}")))?;
+    messages.print(&text)?;
     if findings.trusted() {
         return Ok(Exit::Done);
     }
