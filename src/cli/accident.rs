@@ -2,6 +2,7 @@
 
 use super::exit::Exit;
 use super::message::Messages;
+use crate::load::Diagnostic;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Mutex;
 
@@ -27,12 +28,8 @@ pub(super) fn guard(what: &str, messages: &Messages, work: impl FnOnce() -> Exit
     // The state that `work` may leave half changed belongs to this batch alone and is dropped with it.
     panic::catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| {
         let why = LAST.lock().ok().and_then(|mut last| last.take()).unwrap_or_default();
-        messages.error(
-            "internal",
-            format!("{what}: an error in meshray itself, at {why}"),
-            "please report it with the file",
-        );
-        Exit::Failed
+        let fault = Diagnostic::new("internal", what, "", format!("an error in meshray itself, at {why}"));
+        messages.fail(&fault.remedy("please report it with the file"), Exit::Failed)
     })
 }
 

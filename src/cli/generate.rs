@@ -6,6 +6,7 @@ use super::interrupt;
 use super::message::Messages;
 use super::text::grouped;
 use crate::generate::{Family, triangles};
+use crate::load::Diagnostic;
 use crate::save::{glb, obj};
 use crate::scene::Scene;
 use std::path::{Path, PathBuf};
@@ -27,9 +28,8 @@ pub(super) fn run(args: &GenerateArgs) -> Exit {
         "glb" => as_glb,
         "obj" => as_obj,
         _ => {
-            let text = format!("{}: a scene is written as .glb or .obj", path.display());
-            messages.error("usage", text, "give the output one of these endings");
-            return Exit::Usage;
+            let fault = Diagnostic::new("usage", path, "", "a scene is written as .glb or .obj");
+            return messages.fail(&fault.remedy("give the output one of these endings"), Exit::Usage);
         }
     };
     let scene = args.family.scene(args.size);
@@ -39,10 +39,7 @@ pub(super) fn run(args: &GenerateArgs) -> Exit {
             messages.info("generated", summary(args.family, &path, &scene));
             Exit::Done
         }
-        Err(text) => {
-            messages.error("output-unwritable", format!("{}: {text}", path.display()), "");
-            Exit::Failed
-        }
+        Err(text) => messages.unwritable(&path, &text),
     }
 }
 

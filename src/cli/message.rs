@@ -9,6 +9,7 @@ use crate::load::{Diagnostic, LoadError};
 use indicatif::MultiProgress;
 use std::ffi::OsString;
 use std::io::{self, Write};
+use std::path::Path;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
@@ -164,6 +165,11 @@ impl Messages {
     pub(super) fn fail(&self, fault: &Diagnostic, exit: Exit) -> Exit {
         self.say(Severity::Error, fault);
         exit
+    }
+
+    /// Writes why a file could not be written.
+    pub(super) fn unwritable(&self, file: &Path, why: &impl ToString) -> Exit {
+        self.fail(&Diagnostic::new("output-unwritable", file, "", why.to_string()), Exit::Failed)
     }
 
     /// Writes what is wrong with the command line.

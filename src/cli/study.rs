@@ -15,7 +15,7 @@ use crate::load::Diagnostic;
 use crate::render::texture::TextureStore;
 use crate::render::{Job, Settings};
 use crate::threads;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Loads the model, renders it with every setting, and prints and writes rows as they come.
 pub(super) fn run(args: &StudyArgs) -> Exit {
@@ -119,12 +119,7 @@ impl Told<'_> {
     fn write(&self, study: &Study) -> Result<(), Exit> {
         self.files.iter().try_for_each(|(path, format)| {
             let bytes = format.write(study).into_bytes();
-            interrupt::write_atomic(path, &bytes).map_err(|e| self.unwritable(path, &e.to_string()))
+            interrupt::write_atomic(path, &bytes).map_err(|e| self.messages.unwritable(path, &e))
         })
-    }
-
-    fn unwritable(&self, path: &Path, why: &str) -> Exit {
-        self.messages.error("output-unwritable", format!("{}: {why}", path.display()), "");
-        Exit::Failed
     }
 }

@@ -23,6 +23,25 @@ fn json_messages_are_one_object_a_line_with_stable_fields() {
 }
 
 #[test]
+fn faults_of_a_file_name_it_apart_in_json_and_first_in_text() {
+    let folder = Folder::with_cube().file("ball.toml", "[[spheres]]\ncenter=[0,0,0]\nradius=1\n");
+    for (line, exit, code, file) in [
+        ("generate tetra --size 10 -o none/tetra.glb", 1, "output-unwritable", "none/tetra.glb"),
+        ("generate tetra -o tetra.stl", 2, "usage", "tetra.stl"),
+        ("bench cube.obj --baseline none.json --fail-if n_it>+1%", 1, "baseline-unreadable", "none.json"),
+        ("bench --spd .", 3, "nothing-to-measure", "."),
+        ("verify ball.toml", 3, "nothing-to-verify", "ball.toml"),
+    ] {
+        let words: Vec<&str> = line.split(' ').collect();
+        let run = folder.run(&[&words[..], &["--messages", "json"]].concat()).ends(exit);
+        let last: Value = serde_json::from_str(run.stderr.lines().last().unwrap()).unwrap();
+        assert_eq!((&last["code"], &last["file"]), (&code.into(), &file.into()), "{line}");
+        let text = last["text"].as_str().unwrap();
+        folder.run(&words).ends(exit).says(&[&format!("error: {file}: {text}")]);
+    }
+}
+
+#[test]
 fn quiet_says_nothing_when_all_is_well() {
     let run = Folder::with_cube().render(&["--quiet", "cube.obj"]).ends(0);
     assert_eq!(run.stderr, "");

@@ -4,6 +4,7 @@ use super::super::exit::Exit;
 use super::super::message::Messages;
 use crate::bench::baseline::{Limit, failures};
 use crate::bench::report::{Report, json};
+use crate::load::Diagnostic;
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -19,12 +20,8 @@ impl Gate {
     /// Reads the baseline, so that a wrong name is told before any work.
     pub(super) fn read(path: &Path, limits: &[Limit], messages: &Messages) -> Result<Self, Exit> {
         let fail = |exit, text: String| {
-            messages.error(
-                "baseline-unreadable",
-                format!("{}: {text}", path.display()),
-                "write one with --report NAME.json",
-            );
-            exit
+            let fault = Diagnostic::new("baseline-unreadable", path, "", text);
+            messages.fail(&fault.remedy("write one with --report NAME.json"), exit)
         };
         let text = fs::read_to_string(path).map_err(|e| fail(Exit::Failed, e.to_string()))?;
         let baseline = serde_json::from_str(&text).map_err(|e| fail(Exit::Input, format!("not JSON: {e}")))?;

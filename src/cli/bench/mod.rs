@@ -183,8 +183,8 @@ impl Bench<'_> {
         };
         self.messages.info("progress", format!("{name}: recording rays"));
         let Some((sets, depth)) = prepared.with_job(|job| rays::record(job, plan.rays, plan.seed)) else {
-            self.messages.error("threads", format!("{name}: the rays could not be recorded"), "");
-            return Exit::Failed;
+            let fault = Diagnostic::new("threads", name, "", "the rays could not be recorded");
+            return self.messages.fail(&fault, Exit::Failed);
         };
         let settings = &prepared.settings;
         report.models.push(Model {
@@ -240,15 +240,15 @@ impl Bench<'_> {
     fn verdict(&self, model: &Model) -> Exit {
         let name = &model.name;
         if model.pruning.as_ref().is_some_and(|pruning| !pruning.same) {
-            let text = format!("{name}: the picture with every code path on differs from the usual one");
-            self.messages.error("pixels-differ", text, "please report it with the file");
-            return Exit::Failed;
+            let text = "the picture with every code path on differs from the usual one";
+            let fault = Diagnostic::new("pixels-differ", name, "", text).remedy("please report it with the file");
+            return self.messages.fail(&fault, Exit::Failed);
         }
         if model.differing() == 0 {
             return Exit::Done;
         }
-        self.messages.error("hits-differ", format!("{name}: {}", model.verdict()), "please report it with the file");
-        Exit::Failed
+        let fault = Diagnostic::new("hits-differ", name, "", model.verdict());
+        self.messages.fail(&fault.remedy("please report it with the file"), Exit::Failed)
     }
 
     /// Refuses a model of which a report would replace a file.
@@ -289,9 +289,9 @@ impl Bench<'_> {
                 None => "measure fast-octree and fast-bvh, which keep them once, or raise --max-memory",
                 Some(_) => "raise --max-memory",
             };
-            let text = format!("{name}: its instances are too large for {}, stored by themselves", named(&others));
-            self.messages.error("instances-too-large", text, remedy);
-            return Err(Exit::Failed);
+            let text = format!("its instances are too large for {}, stored by themselves", named(&others));
+            let fault = Diagnostic::new("instances-too-large", name, "", text).remedy(remedy);
+            return Err(self.messages.fail(&fault, Exit::Failed));
         }
         if !others.is_empty() {
             let text = format!(
@@ -325,8 +325,7 @@ impl Bench<'_> {
                 continue;
             }
             if let Err(e) = interrupt::write_atomic(path, text(*format).as_bytes()) {
-                self.messages.error("output-unwritable", format!("{}: {e}", path.display()), "");
-                exit = Exit::Failed;
+                exit = self.messages.unwritable(path, &e);
             }
         }
         exit
@@ -337,7 +336,7 @@ impl Bench<'_> {
     }
 
     fn no_threads(&self, name: &str, threads: usize) -> Exit {
-        self.messages.error("threads", format!("{name}: cannot start {threads} threads"), "ask for fewer");
-        Exit::Failed
+        let fault = Diagnostic::new("threads", name, "", format!("cannot start {threads} threads"));
+        self.messages.fail(&fault.remedy("ask for fewer"), Exit::Failed)
     }
 }

@@ -19,9 +19,8 @@ impl Bench<'_> {
             SCENES.iter().map(|scene| (scene, file(scene))).filter(|(_, path)| path.is_file()).collect();
         if here.is_empty() {
             let names = SCENES.map(|s| format!("{}.nff", s.name)).join(", ");
-            let text = format!("{}: holds none of {names}", folder.display());
-            self.messages.error("nothing-to-measure", text, "");
-            return Exit::Input;
+            let fault = Diagnostic::new("nothing-to-measure", folder, "", format!("holds none of {names}"));
+            return self.messages.fail(&fault, Exit::Input);
         }
         let plan = Plan { tests: self.args.slow_tests, seed: self.args.seed, pixels: PIXELS };
         let mut report = Report { machine: Machine::here(), tests: plan.tests, seed: plan.seed, scenes: Vec::new() };

@@ -51,16 +51,13 @@ fn judge(args: &VerifyArgs, messages: &Messages) -> Result<Exit, Exit> {
     let plan = Plan { rays: args.rays, seed: args.seed, ..Plan::DEFAULT };
     let findings = findings(&loaded.scene, &plan, &Progress::new(&name, messages, args.quiet, false));
     let findings = findings.ok_or_else(|| {
-        messages.error("nothing-to-verify", format!("{name}: no triangles to aim at"), "give a file with a mesh");
-        Exit::Input
+        let fault = Diagnostic::new("nothing-to-verify", &args.model.input, "", "no triangles to aim at");
+        messages.fail(&fault.remedy("give a file with a mesh"), Exit::Input)
     })?;
     if let Some(path) = &args.plot {
         let page = kernels::html(&name, &report::rays(&plan), &kernels::of(&findings));
         let written = interrupt::write_atomic(path, page.as_bytes());
-        written.map_err(|e| {
-            messages.error("output-unwritable", format!("{}: {e}", path.display()), "");
-            Exit::Failed
-        })?;
+        written.map_err(|e| messages.unwritable(path, &e))?;
     }
     let report = report::Report { name: &name, hash: loaded.facts.hash, unjudged, plan: &plan, findings: &findings };
     let text = if args.json { report.json() } else { report.text() };
@@ -68,9 +65,9 @@ fn judge(args: &VerifyArgs, messages: &Messages) -> Result<Exit, Exit> {
     if findings.trusted() {
         return Ok(Exit::Done);
     }
-    let text = format!("{name}: the exact test or a structure gave a wrong hit");
-    messages.error("hits-not-exact", text, "please report it with the file");
-    Err(Exit::Failed)
+    let text = "the exact test or a structure gave a wrong hit";
+    let fault = Diagnostic::new("hits-not-exact", &args.model.input, "", text);
+    Err(fail(fault.remedy("please report it with the file")))
 }
 
 /// What came of the hard rays; `None` where there is nothing to aim at.
