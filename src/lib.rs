@@ -107,6 +107,7 @@
 //! | [`generate`] | scenes of any size for measurements |
 //! | [`save`] | scenes -> glTF, OBJ |
 //! | [`stopwatch`] | time on the wall and of the processor |
+//! | [`named`] | kinds whose values have names, as typed and printed |
 //! | [`pages`] | arrays in large pages |
 //! | [`threads`] | worker threads, each on a processor of its own |
 //! | `cli` | words -> jobs -> messages and exit codes (feature `cli`) |
@@ -131,6 +132,7 @@ pub mod generate;
 pub mod image;
 pub mod load;
 pub mod math;
+pub mod named;
 pub mod pages;
 mod quiet;
 pub mod render;

@@ -1,8 +1,6 @@
 //! The choice of a structure and a test: the enums meet the user, the traits meet the ray.
 
 use std::any::Any;
-use std::fmt;
-use std::str::FromStr;
 
 use super::intersector::{IntersectorKind, Looked, MollerTrumbore, MollerTrumboreDouble, Watertight, WatertightDouble};
 use super::query::{Culling, Tested};
@@ -12,6 +10,7 @@ use super::{
     StructureStats, Transformed, TwoLevel, Unculled, Wide,
 };
 use crate::math::aabb::Aabb;
+use crate::named::names;
 
 /// Which structure culls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -40,6 +39,21 @@ pub enum AccelKind {
     FastBvh,
 }
 
+names!(
+    AccelKind, "structure",
+    None => "none",
+    Transform => "transform",
+    Spheres => "spheres",
+    Boxes => "boxes",
+    Bvh => "bvh",
+    Grid => "grid",
+    GridOctree => "grid-octree",
+    GridBvh => "grid-bvh",
+    Octree => "octree",
+    FastOctree => "fast-octree",
+    FastBvh => "fast-bvh",
+);
+
 impl Default for AccelKind {
     fn default() -> Self {
         Self::DEFAULT
@@ -50,38 +64,6 @@ impl AccelKind {
     /// The default of the fast ones. What the command line uses when none is named is
     /// [`AccelChoice::Auto`](super::AccelChoice::Auto), which looks at the shapes.
     pub const DEFAULT: Self = Self::FastOctree;
-
-    /// Every kind, in the order of the help text.
-    pub const ALL: [Self; 11] = [
-        Self::None,
-        Self::Transform,
-        Self::Spheres,
-        Self::Boxes,
-        Self::Bvh,
-        Self::Grid,
-        Self::GridOctree,
-        Self::GridBvh,
-        Self::Octree,
-        Self::FastOctree,
-        Self::FastBvh,
-    ];
-
-    /// As typed and printed.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Transform => "transform",
-            Self::Spheres => "spheres",
-            Self::Boxes => "boxes",
-            Self::Bvh => "bvh",
-            Self::Grid => "grid",
-            Self::GridOctree => "grid-octree",
-            Self::GridBvh => "grid-bvh",
-            Self::Octree => "octree",
-            Self::FastOctree => "fast-octree",
-            Self::FastBvh => "fast-bvh",
-        }
-    }
 
     /// Whether it has a grid whose cells can be chosen.
     pub const fn has_grid(self) -> bool {
@@ -112,25 +94,6 @@ impl AccelKind {
     /// a sample of them.
     pub fn is_slow(self) -> bool {
         matches!(self, Self::None | Self::Transform | Self::Spheres | Self::Boxes)
-    }
-}
-
-impl fmt::Display for AccelKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-/// A name that no structure has.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no structure is named {0:?}; there are: {names}", names = AccelKind::ALL.map(AccelKind::name).join(", "))]
-pub struct UnknownAccel(String);
-
-impl FromStr for AccelKind {
-    type Err = UnknownAccel;
-
-    fn from_str(name: &str) -> Result<Self, UnknownAccel> {
-        Self::ALL.into_iter().find(|k| k.name() == name).ok_or_else(|| UnknownAccel(name.into()))
     }
 }
 
@@ -407,20 +370,5 @@ impl<P: Probe> Question for NextHits<'_, P> {
 
     fn ask<A: Accel>(self, accel: &A, scratch: &mut A::Scratch) {
         accel.next(self.rays, self.after, self.hits, scratch, self.probe);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_kind_is_found_by_its_name() {
-        for kind in AccelKind::ALL {
-            assert_eq!(kind.name().parse(), Ok(kind));
-        }
-        let error = "gird".parse::<AccelKind>().map_err(|e| e.to_string());
-        let names = AccelKind::ALL.map(AccelKind::name).join(", ");
-        assert_eq!(error, Err(format!("no structure is named \"gird\"; there are: {names}")));
     }
 }

@@ -4,12 +4,12 @@
 //! be measured on a user's own mesh.
 
 use std::fmt;
-use std::str::FromStr;
 
 use crate::math::moller_trumbore;
 use crate::math::shear::RaySpace;
 use crate::math::triangle::{self, Triangle};
 use crate::math::watertight::{Shear, edges, edges_checked};
+use crate::named::names;
 
 /// A ray/triangle test.
 pub trait Intersector: Copy + Send + Sync {
@@ -173,56 +173,11 @@ pub enum IntersectorKind {
     MollerTrumboreDouble,
 }
 
-impl IntersectorKind {
-    /// Every kind, in the order of the help text.
-    pub const ALL: [Self; 5] =
-        [Self::Exact, Self::Watertight, Self::WatertightDouble, Self::MollerTrumbore, Self::MollerTrumboreDouble];
-
-    /// As typed and printed.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Exact => "exact",
-            Self::Watertight => "watertight",
-            Self::WatertightDouble => "watertight-double",
-            Self::MollerTrumbore => "moller-trumbore",
-            Self::MollerTrumboreDouble => "moller-trumbore-double",
-        }
-    }
-}
-
-impl fmt::Display for IntersectorKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-/// A name that no intersector has.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "no intersector is named {0:?}; there are: exact, watertight, watertight-double, moller-trumbore, \
-     moller-trumbore-double"
-)]
-pub struct UnknownIntersector(String);
-
-impl FromStr for IntersectorKind {
-    type Err = UnknownIntersector;
-
-    fn from_str(name: &str) -> Result<Self, UnknownIntersector> {
-        Self::ALL.into_iter().find(|k| k.name() == name).ok_or_else(|| UnknownIntersector(name.into()))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_kind_is_found_by_its_name() {
-        for kind in IntersectorKind::ALL {
-            assert_eq!(kind.name().parse(), Ok(kind));
-        }
-        let error = "woop".parse::<IntersectorKind>().map_err(|e| e.to_string());
-        let names = IntersectorKind::ALL.map(IntersectorKind::name).join(", ");
-        assert_eq!(error, Err(format!("no intersector is named \"woop\"; there are: {names}")));
-    }
-}
+names!(
+    IntersectorKind, "intersector",
+    Exact => "exact",
+    Watertight => "watertight",
+    WatertightDouble => "watertight-double",
+    MollerTrumbore => "moller-trumbore",
+    MollerTrumboreDouble => "moller-trumbore-double",
+);

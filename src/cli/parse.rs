@@ -1,14 +1,12 @@
 //! The words of single flags: sizes, vectors, angles, colours. Errors say what would be right.
 
-use crate::accel::{AccelChoice, AccelKind, Assign, IntersectorKind, MailboxKind};
 use crate::bench::range::{Spacing, values};
-use crate::generate::{Family, MAX_TRIANGLES};
-use crate::image::ToneMap;
+use crate::generate::MAX_TRIANGLES;
 use crate::image::diff::MOST_PIXELS_PER_DEGREE;
 use crate::math::Vec3;
 use crate::math::simd::{Level, UnknownLevel};
-use crate::render::{Cost, Filter, Instancing, Quality, Split, UnknownCost};
-use crate::scene::framing::NamedView;
+use crate::named::{Named, UnknownName};
+use crate::render::Cost;
 use crate::scene::{Background, Environment, MAX_DEPTH, MAX_STOPS};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use std::fmt;
@@ -199,24 +197,14 @@ pub(super) fn focus(text: &str) -> Result<Focus, String> {
     if text.contains(',') { vec3(text).map(Focus::Point) } else { above_zero(text).map(Focus::Distance) }
 }
 
-/// One of [`Quality::ALL`].
-pub(super) fn quality() -> impl TypedValueParser<Value = Quality> {
-    PossibleValuesParser::new(Quality::ALL.iter().map(|q| q.name())).try_map(|name: String| name.parse::<Quality>())
+/// The name of a value of this kind.
+pub(super) fn named<T: Named>() -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(T::names()).try_map(|name: String| name.parse::<T>())
 }
 
 /// Bounces after the eye ray.
 pub(super) fn depth() -> impl TypedValueParser<Value = u32> {
     clap::value_parser!(u32).range(0..=i64::from(MAX_DEPTH))
-}
-
-/// One of [`Filter::ALL`].
-pub(super) fn filter() -> impl TypedValueParser<Value = Filter> {
-    PossibleValuesParser::new(Filter::ALL.iter().map(|f| f.name())).try_map(|name: String| name.parse::<Filter>())
-}
-
-/// One of [`Split::ALL`].
-pub(super) fn split() -> impl TypedValueParser<Value = Split> {
-    PossibleValuesParser::new(Split::ALL.iter().map(|s| s.name())).try_map(|name: String| name.parse::<Split>())
 }
 
 /// A height, or `auto`.
@@ -246,18 +234,12 @@ pub(super) struct CostList(pub Vec<Cost>);
 pub(super) fn costs(text: &str) -> Result<CostList, String> {
     let mut costs = Vec::new();
     for name in text.split(',').filter(|_| !text.is_empty()) {
-        let cost: Cost = name.trim().parse().map_err(|e: UnknownCost| e.to_string())?;
+        let cost: Cost = name.trim().parse().map_err(|e: UnknownName| e.to_string())?;
         if !costs.contains(&cost) {
             costs.push(cost);
         }
     }
     Ok(CostList(costs))
-}
-
-/// One of [`Cost::ALL`].
-pub(super) fn cost() -> impl TypedValueParser<Value = Cost> {
-    let parse = |name: String| name.parse::<Cost>().map_err(|e| e.to_string());
-    PossibleValuesParser::new(Cost::ALL.map(Cost::name)).try_map(parse)
 }
 
 /// 8 or 16.
@@ -362,63 +344,9 @@ pub(super) fn pixels_per_degree(text: &str) -> Result<f64, String> {
     finite(text).ok().filter(|&n| n > 0.0 && n <= MOST_PIXELS_PER_DEGREE).ok_or_else(wrong)
 }
 
-/// The names of all structures.
-pub(super) fn accel() -> impl TypedValueParser<Value = AccelKind> {
-    let parse = |name: String| name.parse::<AccelKind>().map_err(|e| e.to_string());
-    PossibleValuesParser::new(AccelKind::ALL.map(AccelKind::name)).try_map(parse)
-}
-
-/// `auto`, or the name of a structure.
-pub(super) fn accel_choice() -> impl TypedValueParser<Value = AccelChoice> {
-    let parse = |name: String| name.parse::<AccelChoice>().map_err(|e| e.to_string());
-    PossibleValuesParser::new(AccelChoice::names()).try_map(parse)
-}
-
-/// What may become of meshes that are shown several times.
-pub(super) fn instancing() -> impl TypedValueParser<Value = Instancing> {
-    let parse = |name: String| name.parse::<Instancing>().map_err(|e| e.to_string());
-    PossibleValuesParser::new(Instancing::ALL.map(Instancing::name)).try_map(parse)
-}
-
-/// What may put a shape into a cell.
-pub(super) fn assign() -> impl TypedValueParser<Value = Assign> {
-    let parse = |name: String| name.parse::<Assign>().map_err(|e| e.to_string());
-    PossibleValuesParser::new(Assign::ALL.map(Assign::name)).try_map(parse)
-}
-
-/// The names of all mailboxes.
-pub(super) fn mailbox() -> impl TypedValueParser<Value = MailboxKind> {
-    let parse = |name: String| name.parse::<MailboxKind>().map_err(|e| e.to_string());
-    PossibleValuesParser::new(MailboxKind::ALL.map(MailboxKind::name)).try_map(parse)
-}
-
 /// The name of an instruction set that the machine has.
 pub(super) fn level(text: &str) -> Result<Level, String> {
     text.parse().map_err(|e: UnknownLevel| e.to_string())
-}
-
-/// The names of all ray/triangle tests.
-pub(super) fn intersector() -> impl TypedValueParser<Value = IntersectorKind> {
-    let parse = |name: String| name.parse::<IntersectorKind>().map_err(|e| e.to_string());
-    PossibleValuesParser::new(IntersectorKind::ALL.map(IntersectorKind::name)).try_map(parse)
-}
-
-/// The names of all families of generated scenes.
-pub(super) fn family() -> impl TypedValueParser<Value = Family> {
-    let parse = |name: String| name.parse::<Family>().map_err(|e| e.to_string());
-    PossibleValuesParser::new(Family::ALL.map(Family::name)).try_map(parse)
-}
-
-/// The names of all tone maps.
-pub(super) fn tone_map() -> impl TypedValueParser<Value = ToneMap> {
-    let parse = |name: String| name.parse::<ToneMap>().map_err(|e| e.to_string());
-    PossibleValuesParser::new(ToneMap::ALL.map(ToneMap::name)).try_map(parse)
-}
-
-/// The names of all views.
-pub(super) fn view() -> impl TypedValueParser<Value = NamedView> {
-    let parse = |name: String| name.parse::<NamedView>().map_err(|e| e.to_string());
-    PossibleValuesParser::new(NamedView::ALL.map(NamedView::name)).try_map(parse)
 }
 
 /// A linear colour as settings text that [`background`] reads back exactly.

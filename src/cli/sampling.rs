@@ -24,7 +24,7 @@ pub(super) struct SamplingArgs {
     pub aa: Option<Aa>,
     /// How good a stochastic picture is to be: draft (error per pixel 0.25, up to 64 rays), normal (0.08, up to 256) or final
     /// (0.035, up to 1024) [default: normal]
-    #[arg(long, value_name = "WORD", value_parser = parse::quality(), help_heading = "Quality")]
+    #[arg(long, value_name = "WORD", value_parser = parse::named::<Quality>(), help_heading = "Quality")]
     pub quality: Option<Quality>,
     /// Exactly N rays a pixel, at the same places in each (--aa uniform). Costs of pixels (--layers tests, --heatmap) are
     /// always those of N rays, 4 when nothing is said
@@ -56,7 +56,8 @@ pub(super) struct SamplingArgs {
     pub max_samples: Option<u32>,
     /// What of a pixel and around it counts in stochastic sampling: box, all of it alike; tent, its middle most, softer
     /// [default: box]
-    #[arg(long, value_name = "NAME", value_parser = parse::filter(), help_heading = "Quality", hide_short_help = true)]
+    #[arg(long, value_name = "NAME", value_parser = parse::named::<Filter>(), help_heading = "Quality",
+          hide_short_help = true)]
     pub filter: Option<Filter>,
     /// In what numbers --pixel-error, --target-error and --aa-threshold count: sRGB codes after exposure and tone map, or
     /// linear light [default: linear for EXR, else display]
@@ -65,7 +66,8 @@ pub(super) struct SamplingArgs {
     /// Which quarters of a pixel adaptive sampling looks at closer: `corners` those whose corner differs from the middle of the
     /// pixel, as the algorithm was published; `effect` those that, by all that was found on their border, could change the
     /// pixel: fewer rays for a smaller error [default: effect]
-    #[arg(long, value_name = "NAME", value_parser = parse::split(), help_heading = "Quality", hide_short_help = true)]
+    #[arg(long, value_name = "NAME", value_parser = parse::named::<Split>(), help_heading = "Quality",
+          hide_short_help = true)]
     pub aa_split: Option<Split>,
     /// What they are looked at above: what they could change the pixel by, 0 to 1 in the written picture, half of it for
     /// half again as many rays [default: 0.001]; of corners the difference of a channel, linear light after exposure

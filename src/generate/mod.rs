@@ -14,10 +14,8 @@ mod stadium;
 mod tetra;
 mod tree;
 
-use std::fmt;
-use std::str::FromStr;
-
 use crate::math::{DAffine3, Vec3};
+use crate::named::names;
 use crate::scene::{Instance, Material, Mesh, MetalRough, Reflection, Scene, UpAxis};
 
 /// The most triangles that can be asked for.
@@ -42,24 +40,18 @@ pub enum Family {
     Instances,
 }
 
+names!(
+    Family, "family",
+    Tetra => "tetra",
+    Gears => "gears",
+    Balls => "balls",
+    Tree => "tree",
+    Mountain => "mountain",
+    Stadium => "stadium",
+    Instances => "instances",
+);
+
 impl Family {
-    /// Every family.
-    pub const ALL: [Self; 7] =
-        [Self::Tetra, Self::Gears, Self::Balls, Self::Tree, Self::Mountain, Self::Stadium, Self::Instances];
-
-    /// As typed and printed.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Tetra => "tetra",
-            Self::Gears => "gears",
-            Self::Balls => "balls",
-            Self::Tree => "tree",
-            Self::Mountain => "mountain",
-            Self::Stadium => "stadium",
-            Self::Instances => "instances",
-        }
-    }
-
     /// The scene of about `triangles` triangles, 1 to [`MAX_TRIANGLES`], z upwards.
     pub fn scene(self, triangles: usize) -> Scene {
         let wanted = triangles.clamp(1, MAX_TRIANGLES);
@@ -72,25 +64,6 @@ impl Family {
             Self::Stadium => stadium::scene(wanted),
             Self::Instances => instances::scene(wanted),
         }
-    }
-}
-
-impl fmt::Display for Family {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-/// A name that no family has.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no family is named {0:?}; there are: {names}", names = Family::ALL.map(Family::name).join(", "))]
-pub struct UnknownFamily(String);
-
-impl FromStr for Family {
-    type Err = UnknownFamily;
-
-    fn from_str(name: &str) -> Result<Self, UnknownFamily> {
-        Self::ALL.into_iter().find(|f| f.name() == name).ok_or_else(|| UnknownFamily(name.into()))
     }
 }
 
@@ -143,8 +116,6 @@ mod tests {
     fn the_smallest_scene_of_every_family_has_something_to_see() {
         for family in Family::ALL {
             assert!(triangles(&family.scene(1)) > 0, "{family}");
-            assert_eq!(family.name().parse(), Ok(family));
         }
-        assert!("teapot".parse::<Family>().is_err());
     }
 }

@@ -4,8 +4,7 @@
 //! white; *Reinhard* on luminance (Reinhard, Stark, Shirley, Ferwerda, "Photographic Tone Reproduction for Digital
 //! Images", 2002); *ACES* as fitted by Stephen Hill (2016) to the reference rendering and Rec. 709 output transforms.
 
-use std::fmt;
-use std::str::FromStr;
+use crate::named::names;
 
 /// Curve from scene light to display light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -27,20 +26,9 @@ const BRIGHTEST: f32 = 1e12;
 /// Luminance weights of linear Rec. 709.
 pub const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
 
+names!(ToneMap, "tone map", None => "none", Reinhard => "reinhard", Aces => "aces", Neutral => "neutral");
+
 impl ToneMap {
-    /// Every curve.
-    pub const ALL: [Self; 4] = [Self::None, Self::Reinhard, Self::Aces, Self::Neutral];
-
-    /// Its name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Reinhard => "reinhard",
-            Self::Aces => "aces",
-            Self::Neutral => "neutral",
-        }
-    }
-
     /// Display light of a straight (not premultiplied) colour, each channel 0..=1; NaN and negative light are black.
     pub fn map(self, color: [f32; 3]) -> [f32; 3] {
         let mut lanes = color.map(|c| [c]);
@@ -158,22 +146,6 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-impl fmt::Display for ToneMap {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for ToneMap {
-    type Err = String;
-
-    fn from_str(name: &str) -> Result<Self, String> {
-        let known = || Self::ALL.map(Self::name).join(", ");
-        let unknown = || format!("no tone map is called '{name}': it is one of {}", known());
-        Self::ALL.into_iter().find(|t| t.name() == name).ok_or_else(unknown)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -257,13 +229,5 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn names_are_read_back() {
-        for curve in ToneMap::ALL {
-            assert_eq!(curve.name().parse(), Ok(curve));
-        }
-        assert!("filmic".parse::<ToneMap>().unwrap_err().contains("neutral"));
     }
 }

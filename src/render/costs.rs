@@ -9,8 +9,7 @@ use super::whitted::ByClass;
 use super::{CLASS_NAMES, Context, Job, Progress};
 use crate::accel::{Hit, Probe, Ray};
 use crate::image::{Channel, Values};
-use std::fmt;
-use std::str::FromStr;
+use crate::named::names;
 use std::time::Duration;
 
 /// What is told of each pixel, as a sum over its samples.
@@ -26,39 +25,7 @@ pub enum Cost {
     Ms,
 }
 
-impl Cost {
-    /// All of them, in the order of the help text.
-    pub const ALL: [Self; 4] = [Self::Tests, Self::Steps, Self::Mailbox, Self::Ms];
-
-    /// As typed, and what the names of its channels begin with.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Tests => "tests",
-            Self::Steps => "steps",
-            Self::Mailbox => "mailbox",
-            Self::Ms => "ms",
-        }
-    }
-}
-
-impl fmt::Display for Cost {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-/// A name that no cost has.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("nothing is counted under the name {0:?}; there are: {names}", names = Cost::ALL.map(Cost::name).join(", "))]
-pub struct UnknownCost(String);
-
-impl FromStr for Cost {
-    type Err = UnknownCost;
-
-    fn from_str(name: &str) -> Result<Self, UnknownCost> {
-        Self::ALL.into_iter().find(|c| c.name() == name).ok_or_else(|| UnknownCost(name.into()))
-    }
-}
+names!(Cost, "cost", Tests => "tests", Steps => "steps", Mailbox => "mailbox", Ms => "ms");
 
 /// What the time of a pixel has beside the classes: everything that is not spent in the structure.
 const SHADING: &str = "shading";

@@ -3,9 +3,9 @@
 use crate::accel::instances::{Object, Place};
 use crate::accel::{Cone, Kept};
 use crate::math::DAffine3;
+use crate::named::names;
 use crate::scene::{Mesh, Scene};
 use rayon::prelude::*;
-use std::str::FromStr;
 
 /// What becomes of meshes with several instances. What rays hit is the same.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,32 +19,7 @@ pub enum Instancing {
     Flatten,
 }
 
-impl Instancing {
-    /// Every way, in the order of the help text.
-    pub const ALL: [Self; 3] = [Self::Auto, Self::Keep, Self::Flatten];
-
-    /// As typed and printed.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Auto => "auto",
-            Self::Keep => "keep",
-            Self::Flatten => "flatten",
-        }
-    }
-}
-
-/// A name that no way has.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("nothing is called {0:?} that instances could become; there are: {all}", all = Instancing::ALL.map(Instancing::name).join(", "))]
-pub struct UnknownInstancing(String);
-
-impl FromStr for Instancing {
-    type Err = UnknownInstancing;
-
-    fn from_str(name: &str) -> Result<Self, UnknownInstancing> {
-        Self::ALL.into_iter().find(|how| how.name() == name).ok_or_else(|| UnknownInstancing(name.into()))
-    }
-}
+names!(Instancing, "way with instances", Auto => "auto", Keep => "keep", Flatten => "flatten");
 
 /// Triangles from which on a mesh is worth a tree of its own, where nobody says so.
 const WORTH_A_TREE: usize = 64;

@@ -59,12 +59,12 @@ mod wave;
 mod whitted;
 pub mod world;
 
-pub use costs::{Cost, Costs, UnknownCost, render_costs};
+pub use costs::{Cost, Costs, render_costs};
 pub use coverage::{Coverage, coverage};
 pub use eyes::ThinLens;
 pub use filters::{Filters, Noted};
 pub use forecast::{Forecast, Interval, forecast};
-pub use keeping::{Instancing, UnknownInstancing};
+pub use keeping::Instancing;
 pub use observer::{Asked, Question, Tape};
 pub use profile::{Profile, render_profiled};
 pub use sampling::{Adaptive, ErrorSpace, Filter, Quality, Sampled, Sampling, Split, Stochastic, Targeted};

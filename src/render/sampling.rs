@@ -1,8 +1,7 @@
 //! How a picture is sampled: how many rays a pixel gets, where in it they lie, and when they are enough.
 
 use crate::image::ToneMap;
-use std::fmt;
-use std::str::FromStr;
+use crate::named::names;
 
 /// Which rays a pixel gets.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -239,36 +238,6 @@ impl Sampled {
     }
 }
 
-macro_rules! names {
-    ($kind:ident, $what:literal, $($value:ident => $name:literal),+) => {
-        impl $kind {
-            /// Every one.
-            pub const ALL: &'static [Self] = &[$(Self::$value),+];
-
-            /// Its name on the command line.
-            pub const fn name(self) -> &'static str {
-                match self { $(Self::$value => $name),+ }
-            }
-        }
-
-        impl fmt::Display for $kind {
-            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str(self.name())
-            }
-        }
-
-        impl FromStr for $kind {
-            type Err = String;
-
-            fn from_str(name: &str) -> Result<Self, String> {
-                let known = || [$($name),+].join(", ");
-                let unknown = || format!(concat!("no ", $what, " is called '{}': it is one of {}"), name, known());
-                Self::ALL.iter().copied().find(|one| one.name() == name).ok_or_else(unknown)
-            }
-        }
-    };
-}
-
 names!(Filter, "filter", Box => "box", Tent => "tent");
 names!(Split, "rule for splitting", Corners => "corners", Effect => "effect");
 names!(Quality, "quality", Draft => "draft", Normal => "normal", Final => "final");
@@ -304,13 +273,6 @@ mod tests {
         assert!((place(0.125) - 0.0).abs() < 1e-12 && (place(0.875) - 1.0).abs() < 1e-12);
         let mean = (0..1000).map(|i| place((f64::from(i) + 0.5) / 1000.0)).sum::<f64>() / 1000.0;
         assert!((mean - 0.5).abs() < 1e-9, "{mean}");
-    }
-
-    #[test]
-    fn names_are_read_back() {
-        assert!(Filter::ALL.iter().all(|&f| f.name().parse() == Ok(f)));
-        assert!(Quality::ALL.iter().all(|&q| q.name().parse() == Ok(q)));
-        assert!("fine".parse::<Quality>().unwrap_err().contains("draft, normal, final"));
     }
 
     #[test]

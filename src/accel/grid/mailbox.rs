@@ -3,10 +3,8 @@
 //! After J. Amanatides, A. Woo, 1987, and B. Arnaldi, T. Priol, K. Bouatouch, 1987; the memory belongs to the worker, not
 //! to the prim, so that threads do not meet.
 
-use std::fmt;
-use std::str::FromStr;
-
 use crate::accel::NO_PRIM;
+use crate::named::names;
 
 /// The choice of a [`Mailbox`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -20,38 +18,7 @@ pub enum MailboxKind {
     Hashed,
 }
 
-impl MailboxKind {
-    /// Every kind, in the order of the help text.
-    pub const ALL: [Self; 3] = [Self::None, Self::Exact, Self::Hashed];
-
-    /// As typed and printed.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Exact => "exact",
-            Self::Hashed => "hashed",
-        }
-    }
-}
-
-impl fmt::Display for MailboxKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-/// A name that no mailbox has.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no mailbox is named {0:?}; there are: {names}", names = MailboxKind::ALL.map(MailboxKind::name).join(", "))]
-pub struct UnknownMailbox(String);
-
-impl FromStr for MailboxKind {
-    type Err = UnknownMailbox;
-
-    fn from_str(name: &str) -> Result<Self, UnknownMailbox> {
-        Self::ALL.into_iter().find(|k| k.name() == name).ok_or_else(|| UnknownMailbox(name.into()))
-    }
-}
+names!(MailboxKind, "mailbox", None => "none", Exact => "exact", Hashed => "hashed");
 
 /// Remembers which prims the current ray has met.
 ///
@@ -163,16 +130,6 @@ impl Mailbox for AnyMailbox {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn every_kind_is_found_by_its_name() {
-        for kind in MailboxKind::ALL {
-            assert_eq!(kind.name().parse(), Ok(kind));
-        }
-        let error = "lossy".parse::<MailboxKind>().map_err(|e| e.to_string());
-        let names = MailboxKind::ALL.map(MailboxKind::name).join(", ");
-        assert_eq!(error, Err(format!("no mailbox is named \"lossy\"; there are: {names}")));
-    }
 
     #[test]
     fn a_hashed_mailbox_forgets_a_prim_when_another_takes_its_place_and_everything_with_the_ray() {

@@ -1,7 +1,6 @@
 //! How fine the grid and its octrees are.
 
-use std::fmt;
-use std::str::FromStr;
+use crate::named::names;
 
 /// Parameters of [`GridOctree`](super::GridOctree), all settled; the default suits meshes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,37 +38,7 @@ pub enum Assign {
     Box,
 }
 
-impl Assign {
-    /// Every kind, in the order of the help text.
-    pub const ALL: [Self; 2] = [Self::Surface, Self::Box];
-
-    /// As typed and printed.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Surface => "surface",
-            Self::Box => "box",
-        }
-    }
-}
-
-impl fmt::Display for Assign {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-/// A name that no way of assigning has.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("prims are not assigned to cells by {0:?}; there are: surface, box")]
-pub struct UnknownAssign(String);
-
-impl FromStr for Assign {
-    type Err = UnknownAssign;
-
-    fn from_str(name: &str) -> Result<Self, UnknownAssign> {
-        Self::ALL.into_iter().find(|a| a.name() == name).ok_or_else(|| UnknownAssign(name.into()))
-    }
-}
+names!(Assign, "way of assigning", Surface => "surface", Box => "box");
 
 impl Default for GridParams {
     fn default() -> Self {

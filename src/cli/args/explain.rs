@@ -23,7 +23,7 @@ pub(in crate::cli) struct ExplainArgs {
     pub eye: EyeArgs,
 
     /// Structure whose tests and steps are counted
-    #[arg(long, value_name = "NAME", value_parser = parse::accel_choice(), default_value = AccelChoice::AUTO,
+    #[arg(long, value_name = "NAME", value_parser = parse::named::<AccelChoice>(), default_value = AccelChoice::AUTO,
           help_heading = "Structure")]
     pub accel: AccelChoice,
     /// Parameters of the structure

@@ -8,7 +8,8 @@ use clap::Args;
 #[derive(Debug, Clone, Args)]
 pub(in crate::cli) struct EyeArgs {
     /// Side of the model
-    #[arg(long, value_name = "NAME", value_parser = parse::view(), help_heading = "Camera", conflicts_with_all = ["camera", "eye"])]
+    #[arg(long, value_name = "NAME", value_parser = parse::named::<NamedView>(), help_heading = "Camera",
+          conflicts_with_all = ["camera", "eye"])]
     pub view: Option<NamedView>,
     /// A camera of the file, by name or number from 0
     #[arg(long, value_name = "NAME", help_heading = "Camera", conflicts_with = "eye")]

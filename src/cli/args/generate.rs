@@ -10,7 +10,7 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, Args)]
 pub(in crate::cli) struct GenerateArgs {
     /// Which kind of scene
-    #[arg(value_name = "NAME", value_parser = parse::family())]
+    #[arg(value_name = "NAME", value_parser = parse::named::<Family>())]
     pub family: Family,
     /// About how many triangles, up to 1e7; families that grow in steps take the step above
     #[arg(long, value_name = "N", default_value = "1e5", value_parser = parse::triangles)]

@@ -57,7 +57,7 @@ pub(in crate::cli) struct RenderArgs {
           default_missing_value = "", value_parser = parse::costs, help_heading = "Output", hide_short_help = true)]
     pub layers: Option<parse::CostList>,
     /// Write a heat map beside the picture, such as ship-tests.png: what each pixel cost, on a scale
-    #[arg(long, value_name = "tests|steps|mailbox|ms", value_parser = parse::cost(), value_delimiter = ',',
+    #[arg(long, value_name = "tests|steps|mailbox|ms", value_parser = parse::named::<Cost>(), value_delimiter = ',',
           help_heading = "Output", hide_short_help = true)]
     pub heatmap: Vec<Cost>,
     /// What the brightest colour of the heat map stands for [default: the most of any pixel]
@@ -65,7 +65,8 @@ pub(in crate::cli) struct RenderArgs {
           hide_short_help = true)]
     pub heatmap_max: Option<f64>,
     /// How linear light becomes display colour; not for EXR, which stays linear [default: neutral]
-    #[arg(long, value_name = "NAME", value_parser = parse::tone_map(), help_heading = "Output", hide_short_help = true)]
+    #[arg(long, value_name = "NAME", value_parser = parse::named::<ToneMap>(), help_heading = "Output",
+          hide_short_help = true)]
     pub tone_map: Option<ToneMap>,
     /// Brighter (+) or darker (-) by this many stops; not for EXR, which keeps light as it is
     #[arg(long, value_name = "STOPS", value_parser = parse::exposure, help_heading = "Output", allow_hyphen_values = true)]
@@ -97,8 +98,8 @@ pub(in crate::cli) struct RenderArgs {
     pub again: Option<PathBuf>,
 
     /// Side of the model; repeat for several pictures
-    #[arg(long, value_name = "NAME", value_parser = parse::view(), action = ArgAction::Append, value_delimiter = ',',
-          help_heading = "Camera")]
+    #[arg(long, value_name = "NAME", value_parser = parse::named::<NamedView>(), action = ArgAction::Append,
+          value_delimiter = ',', help_heading = "Camera")]
     pub view: Vec<NamedView>,
     /// A camera of the file, by name or number from 0; repeat for several pictures
     #[arg(long, value_name = "NAME", action = ArgAction::Append, help_heading = "Camera")]
@@ -227,20 +228,20 @@ pub(in crate::cli) struct RenderArgs {
 
     /// Structure that finds what rays hit; the picture is the same with each. `auto` counts what some rays cost in
     /// `fast-octree` and `fast-bvh` and takes the better one
-    #[arg(long, value_name = "NAME", value_parser = parse::accel_choice(), default_value = AccelChoice::AUTO,
+    #[arg(long, value_name = "NAME", value_parser = parse::named::<AccelChoice>(), default_value = AccelChoice::AUTO,
           help_heading = "Structure", hide_short_help = true)]
     pub accel: AccelChoice,
     /// Test of rays against triangles; all but `exact` are there to be compared with it
-    #[arg(long, value_name = "NAME", value_parser = parse::intersector(), default_value = IntersectorKind::Exact.name(),
-          help_heading = "Structure", hide_short_help = true)]
+    #[arg(long, value_name = "NAME", value_parser = parse::named::<IntersectorKind>(),
+          default_value = IntersectorKind::Exact.name(), help_heading = "Structure", hide_short_help = true)]
     pub intersector: IntersectorKind,
     /// Parameters of the structure
     #[command(flatten)]
     pub params: AccelArgs,
     /// What becomes of meshes that are shown several times; the picture is the same. `auto` stores them once where that
     /// saves much memory, `keep` wherever it can, `flatten` never
-    #[arg(long, value_name = "HOW", value_parser = parse::instancing(), default_value = Instancing::Auto.name(),
-          help_heading = "Structure", hide_short_help = true)]
+    #[arg(long, value_name = "HOW", value_parser = parse::named::<Instancing>(),
+          default_value = Instancing::Auto.name(), help_heading = "Structure", hide_short_help = true)]
     pub instances: Instancing,
     /// Do the work of every feature, of those too that the scene lacks (`inspect` lists them); the picture is the same
     #[arg(long, help_heading = "Run", hide_short_help = true)]

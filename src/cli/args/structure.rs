@@ -30,12 +30,12 @@ pub(in crate::cli) struct AccelArgs {
     #[arg(long, value_name = "N", help_heading = "Structure", hide_short_help = true)]
     pub max_references: Option<f64>,
     /// What puts a shape into a cell: its surface or its box (grids and octrees)
-    #[arg(long, value_name = "WHAT", value_parser = parse::assign(), default_value = Assign::Surface.name(),
+    #[arg(long, value_name = "WHAT", value_parser = parse::named::<Assign>(), default_value = Assign::Surface.name(),
           help_heading = "Structure", hide_short_help = true)]
     pub assign: Assign,
     /// What a ray remembers of the shapes it met, so that they are tested once (grids and octrees)
-    #[arg(long, value_name = "KIND", value_parser = parse::mailbox(), default_value = MailboxKind::Exact.name(),
-          help_heading = "Structure", hide_short_help = true)]
+    #[arg(long, value_name = "KIND", value_parser = parse::named::<MailboxKind>(),
+          default_value = MailboxKind::Exact.name(), help_heading = "Structure", hide_short_help = true)]
     pub mailbox: MailboxKind,
 }
 

@@ -22,7 +22,7 @@ pub(in crate::cli) struct StudyArgs {
     #[command(flatten)]
     pub eye: EyeArgs,
     /// How linear light becomes display colour [default: neutral]
-    #[arg(long, value_name = "NAME", value_parser = parse::tone_map(), help_heading = "Picture")]
+    #[arg(long, value_name = "NAME", value_parser = parse::named::<ToneMap>(), help_heading = "Picture")]
     pub tone_map: Option<ToneMap>,
     /// Brighter (+) or darker (-) by this many stops
     #[arg(long, value_name = "STOPS", value_parser = parse::exposure, allow_hyphen_values = true, help_heading = "Picture")]
@@ -40,7 +40,8 @@ pub(in crate::cli) struct StudyArgs {
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Run")]
     pub seed: u64,
     /// Structure that the rays go through; all find the same hits
-    #[arg(long, value_name = "NAME", value_parser = parse::accel_choice(), default_value = AccelChoice::AUTO, help_heading = "Run")]
+    #[arg(long, value_name = "NAME", value_parser = parse::named::<AccelChoice>(), default_value = AccelChoice::AUTO,
+          help_heading = "Run")]
     pub accel: AccelChoice,
     /// Threads that render [default: all]
     #[arg(long, value_name = "N", value_parser = parse::positive, help_heading = "Run")]

@@ -21,7 +21,8 @@ pub(in crate::cli) struct BenchArgs {
     pub load: LoadArgs,
 
     /// Measure how cost grows, on scenes of this family in the --sizes given, made in memory
-    #[arg(long, value_name = "NAME", value_parser = parse::family(), conflicts_with = "inputs", help_heading = "Growth")]
+    #[arg(long, value_name = "NAME", value_parser = parse::named::<Family>(), conflicts_with = "inputs",
+          help_heading = "Growth")]
     pub generate: Option<Family>,
     /// Triangles of the scenes, each made as near as its family can: a list 1e3,1e4, a range by tens 1e3..1e6 (with its
     /// end, 1e3..5e4 is 1e3, 1e4, 5e4), or so many with equal ratios, 1e3..1e6:7
@@ -41,7 +42,8 @@ pub(in crate::cli) struct BenchArgs {
     pub spd: Option<PathBuf>,
 
     /// Structures to compare, such as `grid-octree,fast-bvh` [default: all]
-    #[arg(long, value_name = "NAMES", value_parser = parse::accel(), value_delimiter = ',', help_heading = "Structure")]
+    #[arg(long, value_name = "NAMES", value_parser = parse::named::<AccelKind>(), value_delimiter = ',',
+          help_heading = "Structure")]
     pub accel: Vec<AccelKind>,
     /// Parameters of the structures
     #[command(flatten)]
@@ -87,8 +89,8 @@ pub(in crate::cli) struct BenchArgs {
     pub heatmap_max: Option<u32>,
     /// Two structures whose tests in each pixel an HTML report shows the difference of, such as grid,fast-bvh [default:
     /// the fast ones, or the first two]
-    #[arg(long, value_name = "A,B", value_parser = parse::accel(), value_delimiter = ',', conflicts_with = "sweep",
-          help_heading = "Run")]
+    #[arg(long, value_name = "A,B", value_parser = parse::named::<AccelKind>(), value_delimiter = ',',
+          conflicts_with = "sweep", help_heading = "Run")]
     pub compare: Vec<AccelKind>,
     /// An earlier JSON report of the same models and rays
     #[arg(long, value_name = "FILE", help_heading = "Run", requires = "fail_if")]

@@ -23,7 +23,7 @@ pub(in crate::cli) struct DiffArgs {
     #[arg(long, value_name = "SPACE", value_enum, help_heading = "Comparison")]
     pub space: Option<SpaceArg>,
     /// How the linear light of EXR files becomes display colour, where that is compared [default: none]
-    #[arg(long, value_name = "NAME", value_parser = parse::tone_map(), help_heading = "Comparison")]
+    #[arg(long, value_name = "NAME", value_parser = parse::named::<ToneMap>(), help_heading = "Comparison")]
     pub tone_map: Option<ToneMap>,
     /// EXR files brighter (+) or darker (-) by this many stops, where display colour is compared
     #[arg(long, value_name = "STOPS", value_parser = parse::exposure, allow_hyphen_values = true, help_heading = "Comparison")]

@@ -48,7 +48,7 @@ pub(in crate::cli) struct TraceArgs {
     pub ortho: Option<parse::Ortho>,
 
     /// Structure that the ray goes through; all find the same hits
-    #[arg(long, value_name = "NAME", value_parser = parse::accel_choice(), default_value = AccelChoice::AUTO,
+    #[arg(long, value_name = "NAME", value_parser = parse::named::<AccelChoice>(), default_value = AccelChoice::AUTO,
           help_heading = "Structure")]
     pub accel: AccelChoice,
     /// Parameters of the structure

@@ -14,8 +14,7 @@ pub use fit::{Fit, FrameLens, frame, frame_around};
 
 use super::{Camera, Scene, UpAxis};
 use crate::math::{DAffine3, DQuat, DVec3};
-use std::fmt;
-use std::str::FromStr;
+use crate::named::names;
 
 /// Vertical field of view when nothing else is asked for, radians (30°: a portrait lens, little distortion).
 pub const DEFAULT_FOV: f64 = std::f64::consts::PI / 6.0;
@@ -39,23 +38,18 @@ pub enum NamedView {
     Iso,
 }
 
+names!(
+    NamedView, "view",
+    Front => "front",
+    Back => "back",
+    Left => "left",
+    Right => "right",
+    Top => "top",
+    Bottom => "bottom",
+    Iso => "iso",
+);
+
 impl NamedView {
-    /// All of them, in the order help texts list them.
-    pub const ALL: [Self; 7] = [Self::Front, Self::Back, Self::Left, Self::Right, Self::Top, Self::Bottom, Self::Iso];
-
-    /// The word for it on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Front => "front",
-            Self::Back => "back",
-            Self::Left => "left",
-            Self::Right => "right",
-            Self::Top => "top",
-            Self::Bottom => "bottom",
-            Self::Iso => "iso",
-        }
-    }
-
     /// Where it looks from.
     pub fn direction(self, up: UpAxis) -> Direction {
         let (from, top) = match self {
@@ -70,25 +64,6 @@ impl NamedView {
         Direction::new(up, from, top)
     }
 }
-
-impl fmt::Display for NamedView {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for NamedView {
-    type Err = UnknownView;
-
-    fn from_str(name: &str) -> Result<Self, UnknownView> {
-        Self::ALL.into_iter().find(|view| view.name() == name).ok_or_else(|| UnknownView(name.into()))
-    }
-}
-
-/// No view has this name.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no view is called '{0}': it is one of {names}", names = NamedView::ALL.map(NamedView::name).join(", "))]
-pub struct UnknownView(String);
 
 /// From where to look, and what is up in the picture; world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
