@@ -108,6 +108,7 @@
 //! | [`save`] | scenes -> glTF, OBJ |
 //! | [`stopwatch`] | time on the wall and of the processor |
 //! | [`named`] | kinds whose values have names, as typed and printed |
+//! | [`number`] | numbers as people read them |
 //! | [`pages`] | arrays in large pages |
 //! | [`threads`] | worker threads, each on a processor of its own |
 //! | `cli` | words -> jobs -> messages and exit codes (feature `cli`) |
@@ -133,6 +134,7 @@ pub mod image;
 pub mod load;
 pub mod math;
 pub mod named;
+pub mod number;
 pub mod pages;
 mod quiet;
 pub mod render;

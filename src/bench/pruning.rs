@@ -37,7 +37,7 @@ impl Pruning {
 
     /// What was found, in a sentence.
     pub fn sentence(&self) -> String {
-        use super::report::number::seconds;
+        use crate::number::seconds;
         let pixels = if self.same { "the pixels are the same" } else { "the pixels DIFFER" };
         let saves = match 100.0 * self.saved() {
             saved if saved >= 0.5 => format!("saves {saved:.0} % of rendering this picture"),

@@ -5,10 +5,10 @@ use super::job::{RenderJob, Shot};
 use super::message::{Messages, Severity};
 use super::outputs;
 use crate::accel::AccelKind;
-use crate::bench::report::number::{short, so_many, whole};
 use crate::image::draw::heat::{Map, Scale};
 use crate::image::{Layers, Metadata};
 use crate::load::Diagnostic;
+use crate::number::{short, so_many, whole};
 use crate::render::{Cost, Costs, Settings};
 use std::path::Path;
 

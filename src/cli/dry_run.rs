@@ -10,7 +10,7 @@
 
 use super::args::StatsFormat;
 use super::outputs::Target;
-use crate::bench::report::number::{bytes, seconds, short};
+use crate::number::{bytes, seconds, short};
 use crate::render::{Forecast, Interval, Job};
 use crate::stopwatch::peak_memory;
 use crate::threads;

@@ -15,7 +15,7 @@ use super::seen::{self, Seen};
 use super::{accident, interrupt};
 use crate::accel::{AccelParams, auto};
 use crate::bench::explain::{Bill, Case, Finding, Work, explain};
-use crate::bench::report::number::{grouped, short};
+use crate::number::{grouped, short};
 use crate::render::{CLASS_NAMES, Settings};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;

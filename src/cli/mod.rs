@@ -41,7 +41,6 @@ mod stats;
 mod study;
 mod summary;
 mod surroundings;
-mod text;
 mod trace;
 mod unseen;
 mod verify;

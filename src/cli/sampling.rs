@@ -2,10 +2,10 @@
 
 use super::job::Wrong;
 use super::parse::{self, Focus};
-use crate::bench::report::number::so_many;
 use crate::image::{FileKind, Output};
 use crate::load::Diagnostic;
 use crate::math::DVec3;
+use crate::number::so_many;
 use crate::render::{
     Adaptive, ErrorSpace, Filter, Quality, Sampled, Sampling, Settings, Split, Stochastic, ThinLens, View,
 };

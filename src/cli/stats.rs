@@ -31,6 +31,7 @@ use super::message::Messages;
 use super::profile::Profile;
 use super::{sampling, summary};
 use crate::accel::{AccelKind, AccelParams, RayCounts, StructureStats};
+use crate::number::{bytes, grouped, seconds, so_many};
 use crate::render::{CLASS_NAMES, ClassCounts, Job, Progress, Rendered, Sampling, World};
 use serde_json::{Value, json};
 use std::io;
@@ -54,8 +55,7 @@ pub(super) struct Times {
 impl Times {
     /// One line for people.
     pub(super) fn line(&self, eye_rays: u64) -> String {
-        let plural = if eye_rays == 1 { "" } else { "s" };
-        format!("{}; {} eye ray{plural}", self.told().join(", "), short(eye_rays as f64))
+        format!("{}; {}", self.told().join(", "), so_many(eye_rays, "eye ray"))
     }
 
     /// The stages by name, each with its time; metering only where there was any.
@@ -72,23 +72,6 @@ impl Times {
 
     fn json(&self) -> Value {
         Value::from_iter(self.stages())
-    }
-}
-
-fn seconds(s: f64) -> String {
-    match s {
-        s if s < 0.0995 => format!("{:.0} ms", s * 1e3),
-        s if s < 9.95 => format!("{s:.2} s"),
-        s => format!("{s:.1} s"),
-    }
-}
-
-fn short(n: f64) -> String {
-    match n {
-        n if n >= 1e9 => format!("{:.2} G", n / 1e9),
-        n if n >= 1e6 => format!("{:.2} M", n / 1e6),
-        n if n >= 1e4 => format!("{:.1} k", n / 1e3),
-        n => format!("{n:.0}"),
     }
 }
 
@@ -170,8 +153,8 @@ fn parameters(kind: AccelKind, params: &AccelParams) -> Value {
 /// Everything about one picture.
 pub(super) struct PictureStats {
     json: Value,
-    times: Times,
-    counted: Option<Counted>,
+    /// The same for people, without all settings.
+    text: String,
 }
 
 impl PictureStats {
@@ -226,42 +209,48 @@ impl PictureStats {
             "profile": profile.map(Profile::json),
             "rounding": rounding,
         });
-        Self { json, times, counted }
+        let text = told(facts, &times, world, structure, counted.as_ref());
+        Self { json, text }
     }
+}
 
-    fn text(&self) -> String {
-        let get = |key: &str| &self.json[key];
-        let number = |group: &str, key: &str| self.json[group][key].as_f64().unwrap_or(0.0);
-        let mut lines = vec![format!(
-            "{}  {}×{}  {:.1} samples  depth {}  {}  {} threads",
-            get("output").as_str().unwrap_or_default(),
-            get("width"),
-            get("height"),
-            number("sampling", "mean"),
-            get("depth"),
-            get("accel").as_str().unwrap_or_default(),
-            get("threads"),
-        )];
-        lines.push(format!("  time       {}", self.times.told().join("  ")));
-        let shapes = ["triangles", "polygons", "spheres", "cones", "planes"];
-        let shapes = shapes.map(|k| (number("scene", k), k)).into_iter().filter(|(n, _)| *n > 0.0);
-        let shapes: Vec<String> = shapes.map(|(n, k)| format!("{} {k}", short(n))).collect();
-        lines.push(format!("  scene      {}", shapes.join("  ")));
-        let scene = |key| short(number("scene", key));
-        if number("scene", "kept_instances") > 0.0 {
-            let (kept, stored) = (scene("kept_instances"), scene("stored_triangles"));
-            lines.push(format!("  stored     {stored} triangles  bytes {}  {kept} instances kept", scene("bytes")));
-        }
-        let names = ["n_in", "n_v", "n_ev", "n_oiv", "bytes"].map(|k| format!("{k} {}", short(number("structure", k))));
-        lines.push(format!("  structure  {}", names.join("  ")));
-        if let Some(why) = get("auto")["why"].as_str() {
-            lines.push(format!("  auto       {why}"));
-        }
-        if let Some(counted) = &self.counted {
-            lines.extend(count_table(counted));
-        }
-        lines.join("\n")
+/// What people are told.
+fn told(facts: &Facts, times: &Times, world: &World, structure: StructureStats, counted: Option<&Counted>) -> String {
+    let (settings, shapes) = (&facts.effective.settings, &world.shapes);
+    let mut lines = vec![format!(
+        "{}  {}×{}  {:.1} samples  depth {}  {}  {} threads",
+        facts.shot.target.path().map_or("-".into(), |path| path.to_string_lossy()),
+        settings.width,
+        settings.height,
+        facts.sampled.mean(),
+        facts.depth,
+        facts.accel.name(),
+        rayon::current_num_threads(),
+    )];
+    lines.push(format!("  time       {}", times.told().join("  ")));
+    let shapes = [
+        (world.triangles() as usize, "triangles"),
+        (shapes.polygons.len(), "polygons"),
+        (shapes.spheres.len(), "spheres"),
+        (shapes.cones.len(), "cones"),
+        (shapes.planes.len(), "planes"),
+    ];
+    let shapes = shapes.into_iter().filter(|(n, _)| *n > 0);
+    let shapes: Vec<String> = shapes.map(|(n, kind)| format!("{} {kind}", grouped(n as u64))).collect();
+    lines.push(format!("  scene      {}", shapes.join("  ")));
+    let kept = world.kept.placed().len();
+    if kept > 0 {
+        let stored = grouped((world.shapes.triangles.len() + world.kept.stored()) as u64);
+        let size = bytes(world.bytes() as u64);
+        lines.push(format!("  stored     {stored} triangles  {size}  {} instances kept", grouped(kept as u64)));
     }
+    let StructureStats { n_in, n_v, n_ev, n_oiv, .. } = structure;
+    let numbers = [("n_in", n_in), ("n_v", n_v), ("n_ev", n_ev), ("n_oiv", n_oiv)];
+    let numbers = numbers.map(|(name, n)| format!("{name} {}", grouped(n as u64))).join("  ");
+    lines.push(format!("  structure  {numbers}  {}", bytes(structure.bytes as u64)));
+    lines.extend(facts.reason.map(|reason| format!("  auto       {reason}")));
+    lines.extend(counted.map(count_table).unwrap_or_default());
+    lines.join("\n")
 }
 
 fn count_table(counted: &Counted) -> Vec<String> {
@@ -285,7 +274,7 @@ fn count_table(counted: &Counted) -> Vec<String> {
 pub(super) fn text(job: &RenderJob, pictures: &[PictureStats]) -> String {
     let line = |picture: &PictureStats| match job.stats.as_ref().map(|stats| stats.format) {
         Some(StatsFormat::Json) => format!("{}\n", picture.json),
-        Some(StatsFormat::Text) => picture.text() + "\n",
+        Some(StatsFormat::Text) => format!("{}\n", picture.text),
         None => String::new(),
     };
     pictures.iter().map(line).collect()
@@ -318,17 +307,14 @@ mod tests {
     use crate::scene::{Material, Scene, Sphere};
 
     #[test]
-    fn times_have_units_that_fit() {
-        assert_eq!([0.0012, 0.0994, 0.5, 12.34].map(seconds), ["1 ms", "99 ms", "0.50 s", "12.3 s"]);
-        assert_eq!([12.0, 12_345.0, 3_145_728.0].map(short), ["12", "12.3 k", "3.15 M"]);
-    }
-
-    #[test]
     fn metering_is_named_where_there_was_any() {
         let times = Times { load: 0.01, build: 0.02, meter: 0.0, render: 0.5, write: 0.03 };
-        assert_eq!(times.line(9), "load 10 ms, build 20 ms, render 0.50 s, write 30 ms; 9 eye rays");
+        assert_eq!(times.line(9), "load 10.0 ms, build 20.0 ms, render 500 ms, write 30.0 ms; 9 eye rays");
         let metered = Times { meter: 0.004, ..times };
-        assert_eq!(metered.line(9), "load 10 ms, build 20 ms, meter 4 ms, render 0.50 s, write 30 ms; 9 eye rays");
+        assert_eq!(
+            metered.line(9),
+            "load 10.0 ms, build 20.0 ms, meter 4.00 ms, render 500 ms, write 30.0 ms; 9 eye rays"
+        );
         assert_eq!((&times.json()["meter"], &metered.json()["meter"]), (&0.0.into(), &0.004.into()));
     }
 

@@ -140,7 +140,7 @@ mod tests {
     fn white_stays_white_and_rec_709_as_it_is() {
         let ap0 = Primaries { colors: [[0.7347, 0.2653], [0.0, 1.0], [0.0001, -0.077]], white: [0.32168, 0.33767] };
         let p3 = Primaries { colors: [[0.68, 0.32], [0.265, 0.69], [0.15, 0.06]], ..Primaries::REC_709 };
-        for space in [ap0.clone(), p3, Primaries::REC_709] {
+        for space in [ap0, p3, Primaries::REC_709] {
             let white = space.to_rec_709().unwrap() * DVec3::ONE;
             assert!((white - DVec3::ONE).length() < 1e-12, "{white}");
         }

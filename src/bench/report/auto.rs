@@ -2,12 +2,12 @@
 
 use std::iter;
 
-use super::number::grouped;
 use super::table::Table;
 use super::{Model, Report};
 use crate::accel::auto::nodes;
 use crate::accel::{AccelKind, RayCounts};
 use crate::bench::row::Row;
+use crate::number::grouped;
 
 /// How the choice fared against the other fast structure. Shares are of the chosen one's cost, by which the other's is
 /// more; below 0 the choice lost.

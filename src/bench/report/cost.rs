@@ -1,9 +1,9 @@
 //! What a structure costs, as one number of one kind.
 
-use super::number::{bytes, seconds, short};
 use super::{Model, Report};
 use crate::bench::rays::Class;
 use crate::bench::row::{Count, Row};
+use crate::number::{bytes, seconds, short};
 
 /// Something that is better low.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,13 +2,13 @@
 
 use super::auto::over_sizes;
 use super::cost::{Cost, costs};
-use super::number::{grouped, seconds, short};
 use super::table::Table;
 use super::{Model, Report};
 use crate::accel::AccelKind;
 use crate::bench::fit::Fit;
 use crate::bench::rays::Class;
 use crate::bench::row::Row;
+use crate::number::{grouped, seconds, short};
 
 /// One cost of one structure over all models.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,8 +1,8 @@
 //! Tables for a document.
 
-use super::number::{bytes, grouped, seconds, short, whole};
 use super::{Model, Rays, Report, WORDS, auto, growth, sweep, text};
 use crate::bench::row::Count;
+use crate::number::{bytes, grouped, seconds, short, whole};
 
 /// The whole report.
 pub fn write(report: &Report) -> String {

@@ -7,7 +7,6 @@ pub mod growth;
 pub mod html;
 pub mod json;
 pub mod markdown;
-pub mod number;
 pub mod sweep;
 pub mod table;
 pub mod text;
@@ -21,6 +20,7 @@ use super::row::{Count, Row};
 use crate::accel::AccelKind;
 use crate::accel::auto::Reason;
 use crate::generate::Family;
+use crate::number::{grouped, so_many};
 use crate::render::View;
 use std::path::Path;
 
@@ -143,12 +143,12 @@ impl Model {
     pub fn verdict(&self) -> String {
         let rays: usize = self.rays.iter().map(|r| r.kept).sum();
         let (count, differing) = (self.rows.len(), self.differing());
-        let rays = number::grouped(rays as u64);
+        let rays = grouped(rays as u64);
         let reference = self.reference().map_or("", AccelKind::name);
         if differing > 0 {
             let wrong = self.rows.iter().filter(|r| r.differing() > 0);
             let wrong: Vec<String> =
-                wrong.map(|r| format!("{} in {} rays", r.name(), number::grouped(r.differing()))).collect();
+                wrong.map(|r| format!("{} in {} rays", r.name(), grouped(r.differing()))).collect();
             return format!("hits DIFFER from those of {reference}: {}", wrong.join(", "));
         }
         let sampled: Vec<&str> = self.rows.iter().filter(|r| r.sampled).map(|r| r.kind.name()).collect();
@@ -161,9 +161,9 @@ impl Model {
 
     /// Its prims and objects.
     pub fn size(&self) -> String {
-        let prims = number::grouped(self.prims as u64);
+        let prims = grouped(self.prims as u64);
         if self.kept > 0 {
-            let [objects, kept] = [self.objects, self.kept].map(|n| number::grouped(n as u64));
+            let [objects, kept] = [self.objects, self.kept].map(|n| grouped(n as u64));
             return format!(
                 "{prims} prims in {objects} objects, {kept} of which are instances whose triangles are kept once"
             );
@@ -171,14 +171,14 @@ impl Model {
         match self.objects {
             0 => format!("{prims} prims in no object"),
             1 => format!("{prims} prims in one object: spheres and boxes can only bound the whole"),
-            n => format!("{prims} prims in {} objects", number::grouped(n as u64)),
+            n => format!("{prims} prims in {} objects", grouped(n as u64)),
         }
     }
 
     /// What picture the rays are from.
     pub fn picture(&self) -> String {
         let Self { width, height, samples, depth, view, .. } = self;
-        let samples = number::so_many(u64::from(*samples), "sample");
+        let samples = so_many(u64::from(*samples), "sample");
         format!("{width}×{height}, {samples} a pixel, depth {depth}, {view}")
     }
 }
@@ -208,7 +208,7 @@ impl Report {
             (n, 1) => format!("times: wall clock of one thread, median and range of {n} interleaved passes"),
             (n, t) => format!("times: wall clock of {t} threads, median and range of {n} interleaved passes"),
         };
-        let tests = number::grouped(*slow_tests);
+        let tests = grouped(*slow_tests);
         format!(
             "{times}; counts from separate passes; slow structures get a sample of at most {tests} tests a class; seed {seed}"
         )

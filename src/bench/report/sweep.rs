@@ -1,11 +1,11 @@
 //! What a parameter costs over its values, and which value is best.
 
 use super::cost::{Cost, costs};
-use super::number::{seconds, short};
 use super::table::Table;
 use super::{Model, Report};
 use crate::accel::AccelKind;
 use crate::bench::row::Row;
+use crate::number::{seconds, short};
 
 /// One structure at all values of the parameter.
 #[derive(Clone, Debug)]

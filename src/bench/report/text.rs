@@ -1,9 +1,9 @@
 //! Tables for a terminal.
 
-use super::number::{bytes, grouped, seconds, short, whole};
 use super::{Model, Rays, Report, WORDS, auto, growth, sweep};
 use crate::bench::clock::Spread;
 use crate::bench::row::{ClassRow, Count, Row};
+use crate::number::{bytes, grouped, seconds, short, whole};
 use std::fmt::{Result, Write};
 
 /// One model: its structures, then each class of rays, then whether hits agree.

@@ -3,9 +3,9 @@
 use super::measure::{Measured, Row};
 use super::published::{Cost, HainesRays};
 use crate::bench::machine::Machine;
-use crate::bench::report::number::{grouped, short};
 use crate::bench::report::table::Table;
 use crate::bench::report::{Format, html};
+use crate::number::{grouped, short};
 use serde_json::{Value, json};
 
 /// Identifies the JSON of these reports.

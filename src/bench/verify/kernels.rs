@@ -5,7 +5,7 @@ use super::tally::{Rate, Tally};
 use crate::bench::machine::Machine;
 use crate::bench::report::html::svg::{Scale, open, plain, rule, words};
 use crate::bench::report::html::{escaped, page, paragraph};
-use crate::bench::report::number::{grouped, short};
+use crate::number::{grouped, short};
 use std::fmt::Write;
 
 /// One way to find hits, measured.

@@ -17,7 +17,6 @@ use super::exit::Exit;
 use super::message::{Messages, Severity};
 use super::writable::{self, Sources};
 use super::{accident, interrupt, output_name};
-use crate::bench::report::number::short;
 use crate::image::diff::{
     Difference, LayerDifference, Looks, Space, compare, greatest, layer_differences, looks, side_by_side,
 };
@@ -26,6 +25,7 @@ use crate::image::look::{as_is, developed};
 use crate::image::read::{PictureFile, read_picture_file};
 use crate::image::{FileKind, ImageError, Layers, Metadata, Output, Picture, ToneMap, encode};
 use crate::load::Diagnostic;
+use crate::number::short;
 pub(super) use args::DiffArgs;
 use args::Show;
 use std::path::{Path, PathBuf};

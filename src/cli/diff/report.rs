@@ -2,11 +2,11 @@
 
 use super::Compared;
 use super::args::DiffArgs;
-use crate::bench::report::number::grouped;
 use crate::cli::version::SHORT;
 use crate::image::Picture;
 use crate::image::diff::{LayerDifference, Space};
 use crate::image::srgb;
+use crate::number::grouped;
 use serde_json::{Value, json};
 use std::fmt::Write;
 

@@ -1,11 +1,11 @@
 //! The findings of `meshray inspect`, gathered once and shown twice: as text and as JSON.
 
-use super::super::text::{grouped, so_many};
 use super::topology::Topology;
 use crate::accel::{AccelChoice, AccelParams};
 use crate::load::paths::FileFault;
 use crate::load::{AnimationFacts, Loaded, WireFacts};
 use crate::math::{DVec3, Vec3};
+use crate::number::{bytes, grouped, so_many};
 use crate::render::World;
 use crate::scene::features::Features;
 use crate::scene::framing::{Bounds, robust_bounds_within};
@@ -298,14 +298,6 @@ fn kind(light: &crate::scene::Light) -> &'static str {
         LightKind::Directional { .. } => "directional",
         LightKind::Spot { .. } => "spot",
         LightKind::Rectangle { .. } => "rectangle",
-    }
-}
-
-fn bytes(n: u64) -> String {
-    match n {
-        n if n >= 1 << 30 => format!("{:.1} GiB", n as f64 / f64::from(1 << 30)),
-        n if n >= 1 << 20 => format!("{:.1} MiB", n as f64 / f64::from(1 << 20)),
-        n => format!("{:.1} KiB", n as f64 / 1024.0),
     }
 }
 

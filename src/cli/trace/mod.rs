@@ -180,7 +180,7 @@ impl Told<'_> {
             self.pixel.1,
             self.view,
             self.accel,
-            crate::bench::report::number::grouped(self.world.len() as u64)
+            crate::number::grouped(self.world.len() as u64)
         )
     }
 

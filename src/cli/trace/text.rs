@@ -3,8 +3,8 @@
 use super::Told;
 use super::words::{goes_on, in_world, inside, light, object, place};
 use crate::accel::probe::{Extent, Outcome, Place, Visit};
-use crate::bench::report::number::grouped;
 use crate::math::DVec3;
+use crate::number::grouped;
 use crate::render::Question;
 use crate::render::story::{Class, Event, Query};
 use std::fmt::Write;

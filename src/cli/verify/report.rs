@@ -1,11 +1,11 @@
 //! The findings of `meshray verify`, shown as text and as JSON.
 
-use super::super::text::grouped;
 use super::super::version::SHORT;
 use crate::accel::{AccelKind, IntersectorKind};
 use crate::bench::aim::Aim;
 use crate::bench::verify::tally::{Rate, Tally};
 use crate::bench::verify::{Findings, Plan, Row, Section};
+use crate::number::{grouped, short};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -277,16 +277,6 @@ fn rate(n: usize, rays: usize) -> String {
     match Rate::new(n, rays) {
         Rate::Seen(rate) => short(rate),
         Rate::Below(bound) => format!("< {}", short(bound)),
-    }
-}
-
-/// Three digits or so.
-fn short(x: f64) -> String {
-    match x {
-        x if x >= 1e6 => format!("{x:.1e}"),
-        x if x >= 100.0 || x == 0.0 => format!("{x:.0}"),
-        x if x >= 1.0 => format!("{x:.1}"),
-        x => format!("{x:.2}"),
     }
 }
 

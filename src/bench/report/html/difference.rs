@@ -1,10 +1,10 @@
 //! The difference image: where one structure tests more than another.
 
-use super::super::number::grouped;
 use super::super::{Model, Report};
 use super::heat::indexed;
 use crate::accel::AccelKind;
 use crate::bench::row::Row;
+use crate::number::grouped;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::fmt::Write;

@@ -3,10 +3,10 @@
 use super::super::Report;
 use super::super::cost::{Cost, costs};
 use super::super::growth::{Curve, METHOD, kinds, sentences, tables};
-use super::super::number::{bytes, grouped, short};
 use super::lines::{Lines, Series, plot};
 use super::svg::{plain, power, unit};
 use super::{escaped, figure, table_of};
+use crate::number::{bytes, grouped, short};
 
 /// The section; nothing where the models are not a family in growing sizes.
 pub(super) fn section(report: &Report) -> String {

@@ -1,9 +1,9 @@
 //! Heat maps: the tests in each pixel, by one scale for all structures.
 
-use super::super::number::{grouped, short, whole};
 use super::super::{Model, Report};
 use super::name;
 use crate::image::draw::heat::{COLORS, Scale, color};
+use crate::number::{grouped, short, whole};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use png::{BitDepth, ColorType, Compression, Encoder, EncodingError};

@@ -8,11 +8,11 @@ mod plot;
 pub(crate) mod svg;
 mod sweep;
 
-use super::number::{bytes, grouped, seconds, short, whole};
 use super::table::Table;
 use super::{Model, Rays, Report, WORDS, auto, text};
 use crate::accel::AccelKind;
 use crate::bench::row::{ClassRow, Count, Row};
+use crate::number::{bytes, grouped, seconds, short, whole};
 
 /// Rules of the page. The colours of the classes are M. Okabe and K. Ito's, which people with any kind of colour sight
 /// tell apart; each class has a shape of its own too.

@@ -1,10 +1,10 @@
 //! Plots of one model: what each structure costs.
 
 use super::super::Model;
-use super::super::number::{grouped, seconds, short};
 use super::svg::{Scale, WIDTH, open, rule, spread_out, unit, words};
 use crate::bench::rays::Class;
 use crate::bench::row::{Count, Row};
+use crate::number::{grouped, seconds, short};
 use std::fmt::Write;
 
 /// Each structure a row, each class a mark: its tests a ray.

@@ -1,6 +1,6 @@
 //! Scales, lines and words of plots as SVG, small enough for a phone: 440 units wide.
 
-use super::super::number::short;
+use crate::number::short;
 use std::fmt::Write;
 
 /// Units across.

@@ -3,10 +3,10 @@
 use crate::bench::machine::Machine;
 use crate::bench::report::html::svg::{Scale, WIDTH, open, plain, rule, unit, words};
 use crate::bench::report::html::{escaped, page, paragraph};
-use crate::bench::report::number::{seconds, short};
 use crate::bench::study::knob::Knob;
 use crate::bench::study::measure::Row;
 use crate::bench::study::{Study, png};
+use crate::number::{seconds, short};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::fmt::Write;

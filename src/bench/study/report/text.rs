@@ -1,8 +1,8 @@
 //! For people: a line for each setting as it is measured, then the front and what is advised.
 
-use crate::bench::report::number::seconds;
 use crate::bench::study::Study;
 use crate::bench::study::measure::Row;
+use crate::number::seconds;
 use std::fmt::Write;
 
 /// What stands above the rows.
