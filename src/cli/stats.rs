@@ -246,8 +246,8 @@ fn told(facts: &Facts, times: &Times, world: &World, structure: StructureStats, 
     }
     let StructureStats { n_in, n_v, n_ev, n_oiv, .. } = structure;
     let numbers = [("n_in", n_in), ("n_v", n_v), ("n_ev", n_ev), ("n_oiv", n_oiv)];
-    let numbers = numbers.map(|(name, n)| format!("{name} {}", grouped(n as u64))).join("  ");
-    lines.push(format!("  structure  {numbers}  {}", bytes(structure.bytes as u64)));
+    let numbers = numbers.map(|(name, n)| format!("{name} {}", grouped(n))).join("  ");
+    lines.push(format!("  structure  {numbers}  {}", bytes(structure.bytes)));
     lines.extend(facts.reason.map(|reason| format!("  auto       {reason}")));
     lines.extend(counted.map(count_table).unwrap_or_default());
     lines.join("\n")

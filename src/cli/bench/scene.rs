@@ -1,6 +1,6 @@
 //! What is measured, made ready for the one rendering whose rays are recorded.
 
-use super::super::camera::{self, Choice};
+use super::super::camera::Choice;
 use super::super::exit::Exit;
 use super::super::message::Messages;
 use super::super::{job, read, seen};
@@ -11,8 +11,7 @@ use crate::generate::Family;
 use crate::load::{Diagnostic, Loaded};
 use crate::render::texture::TextureStore;
 use crate::render::{Instancing, Job, Settings, View, World};
-use crate::scene::framing::robust_bounds;
-use crate::scene::{Scene, default_light};
+use crate::scene::Scene;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::Xxh3;
@@ -100,18 +99,12 @@ impl Prepared {
             .world(&loaded, job::limits(args.load.max_memory).memory)
             .map_err(|fault| messages.fail(&fault, Exit::Failed))?;
         if world.is_empty() {
-            let fault = Diagnostic::new("nothing-to-draw", input, "", "nothing to hit: it holds no faces");
-            return Err(messages.fail(&fault, Exit::Input));
+            return Err(messages.fail(&seen::nothing_to_hit(input), Exit::Input));
         }
-        let (width, height) = args.size;
-        let bounds = robust_bounds(&loaded.scene);
-        let aspect = f64::from(width) / f64::from(height);
-        let found = camera::camera(&Choice::of(&args.eye, None), None, &loaded.scene, &bounds, aspect, input);
-        let (camera, view_phrase) = found.map_err(|fault| messages.fail(&fault, Exit::Input))?;
-        default_light::add_if_missing(&mut loaded.scene, &camera);
+        let found = seen::eye(&mut loaded.scene, (&Choice::of(&args.eye, None), None), args.size, input);
+        let (view, view_phrase) = found.map_err(|fault| messages.fail(&fault, Exit::Input))?;
         let usual = seen::settings(args.size, args.depth, &loaded.scene.hints);
         let settings = Settings { samples: args.samples, seed: args.seed, ..usual };
-        let view = View::from_camera(&camera);
         Ok(Self { loaded, world, settings, view_phrase, view })
     }
 

@@ -23,22 +23,20 @@ mod picture;
 mod text;
 mod words;
 
-use super::camera::{self, Choice, LensChoice};
+use super::camera::{Choice, LensChoice};
 use super::exit::Exit;
 use super::job::{self, Look, Wrong};
 use super::message::{Messages, Severity};
 use super::picture::{Effective, background};
 use super::sampling::SamplingArgs;
 use super::writable::{self, Sources};
-use super::{accident, interrupt, read};
+use super::{accident, interrupt, read, seen};
 use crate::accel::{AccelKind, AccelParams};
 use crate::image::{FileKind, Metadata};
 use crate::load::{Diagnostic, Loaded};
 use crate::render::story::{Story, tell};
 use crate::render::texture::TextureStore;
-use crate::render::{Instancing, Job, Settings, View, World};
-use crate::scene::default_light;
-use crate::scene::framing::robust_bounds;
+use crate::render::{Instancing, Job, Settings, World};
 pub(super) use args::TraceArgs;
 use std::path::Path;
 
@@ -102,8 +100,7 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
     let limit = job::limits(args.model.load.max_memory).memory;
     let world = read::as_drawn(&loaded, how, limit, file).map_err(fail(Exit::Failed))?;
     if world.is_empty() {
-        let fault = Diagnostic::new("nothing-to-draw", file, "", "nothing to hit: it holds no faces");
-        return Err(fail(Exit::Input)(fault));
+        return Err(fail(Exit::Input)(seen::nothing_to_hit(file)));
     }
     let wrong = |text: String| Diagnostic::new("scene-value", file, "", text);
     let effective = Effective::new(look, &loaded.scene.hints).map_err(wrong).map_err(fail(Exit::Input))?;
@@ -111,15 +108,12 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
     inside(args, settings).map_err(|wrong| messages.wrong(wrong))?;
 
     // The eye, its light, and the ray.
-    let bounds = robust_bounds(&loaded.scene);
-    let aspect = f64::from(settings.width) / f64::from(settings.height);
-    let found = camera::camera(&Choice::of(&args.eye, args.up_vector), look.lens, &loaded.scene, &bounds, aspect, file);
-    let (camera, view_phrase) = found.map_err(fail(Exit::Input))?;
-    default_light::add_if_missing(&mut loaded.scene, &camera);
+    let (choice, size) = (Choice::of(&args.eye, args.up_vector), (settings.width, settings.height));
+    let (view, view_phrase) =
+        seen::eye(&mut loaded.scene, (&choice, look.lens), size, file).map_err(fail(Exit::Input))?;
     loaded.scene.background = Some(background(look.background, &loaded.scene));
     let (accel, _) = world.structure(args.accel, params);
     let textures = TextureStore::new(&loaded.scene);
-    let view = View::from_camera(&camera);
     let job = Job { scene: &loaded.scene, world: &world, accel: &accel, textures: &textures, view: &view, settings };
     let Some(story) = tell(&job, args.pixel, args.sample) else { return Err(Exit::Failed) };
     let told = Told {
