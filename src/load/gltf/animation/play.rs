@@ -49,11 +49,10 @@ struct Aims {
 impl Aims {
     /// Whether nothing aimed there before, or at a part of it, or at what it is a part of.
     fn insert(&mut self, pointer: String, part_of: Option<String>) -> bool {
-        let is_free = match part_of {
-            Some(list) => !self.whole.contains(&list) && { self.in_parts.insert(list) | true },
-            None => !self.in_parts.contains(&pointer),
-        };
-        is_free && self.whole.insert(pointer)
+        let is_in_a_whole = part_of.as_ref().is_some_and(|list| self.whole.contains(list));
+        let is_taken = is_in_a_whole || self.in_parts.contains(&pointer);
+        self.in_parts.extend(part_of);
+        !is_taken && self.whole.insert(pointer)
     }
 }
 
