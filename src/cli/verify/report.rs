@@ -329,6 +329,6 @@ mod tests {
 
     #[test]
     fn rates_say_how_much_is_known() {
-        assert_eq!([rate(0, 12_000), rate(3, 12_000), rate(0, 3_000_000)], ["< 250", "250", "< 1.0"]);
+        assert_eq!([rate(0, 12_000), rate(3, 12_000), rate(0, 3_000_000)], ["< 250", "250", "< 1.00"]);
     }
 }
