@@ -84,21 +84,17 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
             format!("is {width}×{height}: a panorama of all around is twice as wide as high, so it is stretched");
         warnings.push(Diagnostic::new("env-shape", &source.path, "", text));
     }
-    let (mut texels, odd) = radiance(picture, format);
+    let meta = if format == ImageFormat::OpenExr { MetaData::read_from_buffered(bytes, false).ok() } else { None };
+    let turned = meta.as_ref().and_then(|meta| other_colors(meta, &source.path, &mut warnings));
+    let (mut texels, odd) = radiance(picture, format, turned);
     if format == ImageFormat::Hdr
         && let Some(exposure) = exposure(bytes)
     {
         texels.iter_mut().flatten().for_each(|c| *c /= exposure);
     }
-    if format == ImageFormat::OpenExr {
-        let meta = MetaData::read_from_buffered(bytes, false).map_err(|e| fault(format!("cannot be decoded: {e}")))?;
-        if meta.headers.len() > 1 {
-            let text = format!("has {} parts, of which one is shown", meta.headers.len());
-            warnings.push(Diagnostic::new("env-parts", &source.path, "", text).remedy("keep only the panorama in it"));
-        }
-        if let Some(turned) = other_colors(&meta) {
-            texels.iter_mut().for_each(|texel| *texel = in_rec_709(turned, *texel));
-        }
+    if let Some(parts) = meta.map(|meta| meta.headers.len()).filter(|&parts| parts > 1) {
+        let text = format!("has {parts} parts, of which one is shown");
+        warnings.push(Diagnostic::new("env-parts", &source.path, "", text).remedy("keep only the panorama in it"));
     }
     if odd > 0 {
         let pixels = if odd == 1 { "1 pixel has".into() } else { format!("{odd} pixels have") };
@@ -133,24 +129,27 @@ fn upright(reader: ImageReader<Cursor<&[u8]>>) -> ImageResult<DynamicImage> {
     Ok(picture)
 }
 
-/// What turns the colours of an EXR file into Rec. 709; `None`: they are that, or their primaries are none.
-fn other_colors(meta: &MetaData) -> Option<DMat3> {
-    /// Coordinates are written with three or four digits.
-    const ROUNDING: f64 = 1e-3;
+/// What turns the colours of an EXR file into Rec. 709; `None`: they are that, or nobody knows, which is told.
+fn other_colors(meta: &MetaData, file: &Path, warnings: &mut Vec<Diagnostic>) -> Option<DMat3> {
     let chromaticities = meta.headers.first()?.shared_attributes.chromaticities?;
     let place = |at: ::exr::math::Vec2<f32>| [f64::from(at.x()), f64::from(at.y())];
     let colors = [chromaticities.red, chromaticities.green, chromaticities.blue].map(place);
     let primaries = Primaries { colors, white: place(chromaticities.white) };
-    let usual = Primaries::REC_709;
-    let pairs = colors.iter().zip(&usual.colors).chain([(&primaries.white, &usual.white)]);
-    let differs = pairs.flat_map(|(a, b)| a.iter().zip(b)).any(|(a, b)| (a - b).abs() > ROUNDING);
-    differs.then(|| primaries.to_rec_709()).flatten()
+    if primaries.are_near(&Primaries::REC_709) {
+        return None;
+    }
+    let turned = primaries.to_rec_709();
+    if turned.is_none() {
+        let text = "its chromaticities are those of no colours: it is taken as Rec. 709";
+        warnings.push(Diagnostic::new("env-colors", file, "", text));
+    }
+    turned
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "radiance is stored so")]
 fn in_rec_709(turned: DMat3, texel: [f32; 3]) -> [f32; 3] {
     let color = turned * DVec3::from(texel.map(f64::from));
-    color.to_array().map(|c| (c as f32).clamp(0.0, f32::MAX))
+    color.to_array().map(|c| (c as f32).min(f32::MAX))
 }
 
 /// What the numbers of a Radiance picture have been multiplied by, if that is known and not 1.
@@ -159,8 +158,9 @@ fn exposure(bytes: &[u8]) -> Option<f32> {
     Some(exposure).filter(|e| e.is_finite() && *e > 0.0 && *e != 1.0)
 }
 
-/// Linear radiance of all pixels, and how many of them had to be mended.
-fn radiance(picture: DynamicImage, format: ImageFormat) -> (Vec<[f32; 3]>, usize) {
+/// Linear radiance of all pixels, `turned` into Rec. 709, and how many of them had to be mended. What is negative in other
+/// primaries need not be so in these.
+fn radiance(picture: DynamicImage, format: ImageFormat, turned: Option<DMat3>) -> (Vec<[f32; 3]>, usize) {
     let picture = picture.into_rgb32f();
     let texels = picture.as_raw().as_chunks::<3>().0.iter();
     if !matches!(format, ImageFormat::Hdr | ImageFormat::OpenExr) {
@@ -168,9 +168,10 @@ fn radiance(picture: DynamicImage, format: ImageFormat) -> (Vec<[f32; 3]>, usize
     }
     let mut odd = 0;
     let mend = |texel: &[f32; 3]| {
-        let usable = texel.iter().all(|c| c.is_finite() && *c >= 0.0);
+        let usable = texel.iter().all(|c| c.is_finite() && (*c >= 0.0 || turned.is_some()));
         odd += usize::from(!usable);
-        texel.map(|c| if c.is_finite() { c.max(0.0) } else { 0.0 })
+        let finite = texel.map(|c| if c.is_finite() { c } else { 0.0 });
+        turned.map_or(finite, |turned| in_rec_709(turned, finite)).map(|c| c.max(0.0))
     };
     let texels = texels.map(mend).collect();
     (texels, odd)
@@ -258,6 +259,19 @@ mod tests {
         assert!(white.iter().all(|c| (c - 2.0).abs() < 1e-5), "{white:?}");
         let red = texel(p3, [1.0, 0.0, 0.0]);
         assert!((red[0] - 1.2249).abs() < 1e-3 && red[1..] == [0.0, 0.0], "{red:?}");
+    }
+
+    #[test]
+    fn what_is_negative_in_narrow_primaries_may_be_a_colour_of_rec_709() {
+        let smpte = [[0.63, 0.34], [0.31, 0.595], [0.155, 0.07]];
+        let loaded = decode(&exr(smpte, [-0.0554, 1.0364, 0.0044], 1), &Limits::default()).unwrap();
+        let green = loaded.panorama.texels[0];
+        assert!((green[1] - 1.0).abs() < 2e-3 && green[0].abs() < 2e-3 && green[2].abs() < 2e-3, "{green:?}");
+        assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+        let xyz = decode(&exr([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]], [0.3, 0.3, 0.3], 1), &Limits::default()).unwrap();
+        assert_eq!(xyz.warnings.len(), 0);
+        let none = decode(&exr([[0.3, 0.3]; 3], [0.25; 3], 1), &Limits::default()).unwrap();
+        assert_eq!((none.panorama.texels[0], none.warnings[0].code), ([0.25; 3], "env-colors"));
     }
 
     #[test]

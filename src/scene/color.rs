@@ -99,9 +99,22 @@ impl Primaries {
     /// ITU-R BT.709 (1990), which sRGB shares.
     pub const REC_709: Self = Self { colors: [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]], white: [0.3127, 0.3290] };
 
+    /// CIE XYZ itself, as OpenEXR writes it.
+    pub const CIE_XYZ: Self = Self { colors: [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]], white: [1.0 / 3.0, 1.0 / 3.0] };
+
+    /// Whether these are those of another space, but for rounding to three digits.
+    pub fn are_near(&self, other: &Self) -> bool {
+        const ROUNDING: f64 = 1e-3;
+        let pairs = self.colors.iter().zip(&other.colors).chain([(&self.white, &other.white)]);
+        pairs.flat_map(|(a, b)| a.iter().zip(b)).all(|(a, b)| (a - b).abs() <= ROUNDING)
+    }
+
     /// What turns colours of this space into linear Rec. 709; white stays white, as eyes adapt to it (K. M. Lam, "Metamerism
-    /// and Colour Constancy", 1985: Bradford's cones). `None`: they span no space.
+    /// and Colour Constancy", 1985: Bradford's cones), but for XYZ, which is what is seen. `None`: they span no space.
     pub fn to_rec_709(&self) -> Option<DMat3> {
+        if self.are_near(&Self::CIE_XYZ) {
+            return Some(Self::REC_709.to_xyz()?.inverse());
+        }
         let bradford = DMat3::from_cols_array_2d(&[
             [0.8951, -0.7502, 0.0389],
             [0.2664, 1.7135, -0.0685],
@@ -117,16 +130,15 @@ impl Primaries {
     fn to_xyz(self) -> Option<DMat3> {
         /// What three colours in a line span, but for rounding.
         const FLAT: f64 = 1e-6;
-        let [red, green, blue] = self.colors.map(xyz_of);
-        let colors = DMat3::from_cols(red?, green?, blue?);
+        let [red, green, blue] = self.colors.map(|[x, y]| DVec3::new(x, y, 1.0 - x - y));
+        let colors = DMat3::from_cols(red, green, blue);
         (colors.determinant().abs() > FLAT).then_some(())?;
         let parts = colors.inverse() * xyz_of(self.white)?;
         Some(colors * DMat3::from_diagonal(parts))
     }
 }
 
-/// CIE XYZ of a colour of brightness 1 by its place in the diagram, where colours that nobody sees may lie below 0; `None` where
-/// it has no brightness.
+/// CIE XYZ of a white of brightness 1 by its place in the diagram; `None` where it has no brightness.
 fn xyz_of([x, y]: [f64; 2]) -> Option<DVec3> {
     let xyz = DVec3::new(x / y, 1.0, (1.0 - x - y) / y);
     xyz.is_finite().then_some(xyz)
@@ -151,6 +163,10 @@ mod tests {
         // And for the archive space of ACES (S-2008-001), adapted likewise.
         let red = ap0.to_rec_709().unwrap() * DVec3::X;
         assert!((red - DVec3::new(2.5217, -0.2765, -0.0154)).length() < 5e-4, "{red}");
+        // XYZ is turned as it is, and so is what lies below the diagram.
+        assert!(
+            (Primaries::CIE_XYZ.to_rec_709().unwrap() * DVec3::new(0.9505, 1.0, 1.089) - DVec3::ONE).length() < 1e-3
+        );
         let flat = Primaries { colors: [[0.3, 0.3]; 3], ..Primaries::REC_709 };
         assert!(flat.to_rec_709().is_none());
         assert!(Primaries { white: [0.3, 0.0], ..Primaries::REC_709 }.to_rec_709().is_none());

@@ -76,7 +76,7 @@ use mesh::Read;
 use palette::Palette;
 use rayon::prelude::*;
 use report::Report;
-use scene::Placed;
+use scene::{Placed, Played};
 use sparse::Replacements;
 use weight::Weight;
 
@@ -170,12 +170,11 @@ impl Loading<'_> {
         facts.animations = animation::facts(&document.animations, reader);
         let pose = self.pose(reader, graph, document, budget, facts)?;
         graph.place(&pose.moved);
-        facts.changes_materials = pose.changes_materials();
         let posed = self.posed(document, &pose, budget)?;
         let root = posed.as_ref().unwrap_or(root);
         let reader = Reader { root, ..reader };
-        let moment = (self.options.moment.is_some(), &pose.weights);
-        let placed = scene::walk(reader, graph, facts.scene_index, moment, budget, self.report);
+        let played = Played { moving: self.options.moment.is_some(), switches: pose.switches, weights: &pose.weights };
+        let placed = scene::walk(reader, graph, facts.scene_index, played, budget, self.report);
         let placed = placed.map_err(|over| self.too_large("what the nodes show", over))?;
         let skins = skin::joint_matrices(reader, graph, self.report);
         skin::check_scene(root, graph, facts.scene_index, &placed.draws, self.report);
@@ -242,6 +241,7 @@ impl Loading<'_> {
         let pose = animation::play(reader, graph, (number, animation), moment.time, budget, self.report)
             .map_err(|over| self.too_large("an animation", over))?;
         facts.shown = Some((number, moment.time));
+        facts.changes_materials = animation.changes_materials();
         // Times are stored as `f32`: what falls on the last one when rounded is not past it.
         #[expect(clippy::cast_possible_truncation, reason = "compared as stored")]
         let past = |end: f64| (moment.time as f32) > end as f32;

@@ -9,7 +9,7 @@ use super::report::Report;
 use super::schema::whole;
 use crate::load::Diagnostic;
 use crate::load::limits::{Budget, OverBudget};
-use crate::math::{DAffine3, DMat3, DQuat, DVec3};
+use crate::math::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use crate::scene::{Camera, Instance, Light};
 use gltf::json::{Index, Root, accessor::Accessor, mesh::Mesh, scene::Node};
 use serde_json::{Map, Value};
@@ -56,8 +56,18 @@ pub(super) fn choose(root: &Root, wish: Option<&str>, file: &Path) -> Result<usi
     choice::choose(&choice::SCENE, &names, wish, file)
 }
 
-/// Walks the nodes of a scene; a file without scenes shows all its nodes. `moving` tells whether it is a moment of an
-/// animation; `weights` are those that it gives to morph targets, by node.
+/// What is played while a scene is walked.
+#[derive(Clone, Copy)]
+pub(super) struct Played<'a> {
+    /// Whether this is a moment of an animation.
+    pub(super) moving: bool,
+    /// Whether that switches nodes on and off.
+    pub(super) switches: bool,
+    /// Weights that it gives to morph targets, by node.
+    pub(super) weights: &'a HashMap<usize, Vec<f32>>,
+}
+
+/// Walks the nodes of a scene; a file without scenes shows all its nodes.
 ///
 /// # Errors
 /// When the scene would take more than is left of `budget`.
@@ -65,30 +75,34 @@ pub(super) fn walk(
     reader: Reader,
     graph: &Graph,
     scene: usize,
-    (moving, weights): (bool, &HashMap<usize, Vec<f32>>),
+    played: Played,
     budget: &mut Budget,
     report: &mut Report,
 ) -> Result<Placed, OverBudget> {
     let root = reader.root;
-    let mut stack: Vec<usize> = match root.scenes.get(scene) {
+    let tops: Vec<usize> = match root.scenes.get(scene) {
         Some(scene) => scene.nodes.iter().map(|node| node.value()).collect(),
         None => graph.roots().collect(),
     };
-    stack.reverse();
+    // Nodes, and whether what they hang on is visible.
+    let mut stack: Vec<(usize, bool)> = tops.into_iter().rev().map(|node| (node, true)).collect();
     let mut seen = vec![false; root.nodes.len()];
-    let mut walk = Walk { reader, moving, weights, placed: Placed::default(), known: HashMap::new(), budget, report };
-    while let Some(i) = stack.pop() {
-        let Some(node) = root.nodes.get(i).filter(|node| is_visible(node)) else { continue };
+    let mut walk = Walk { reader, played, placed: Placed::default(), known: HashMap::new(), budget, report };
+    while let Some((i, is_shown)) = stack.pop() {
+        let Some(node) = root.nodes.get(i) else { continue };
         if std::mem::replace(&mut seen[i], true) {
             continue;
         }
-        stack.extend(node.children.iter().flatten().rev().map(|child| child.value()));
+        let is_shown = is_shown && is_visible(node);
+        stack.extend(node.children.iter().flatten().rev().map(|child| (child.value(), is_shown)));
         let world = graph.world.get(i).copied().unwrap_or_default();
+        // What hides a node hides no camera (KHR_node_visibility).
         let camera = placed::camera(root, node, world, walk.report);
         walk.placed.cameras.extend(camera);
-        let light = placed::light(root, node, world, walk.report);
-        walk.placed.lights.extend(light);
-        walk.mesh(i, node, world)?;
+        walk.light(node, world, is_shown);
+        if is_shown {
+            walk.mesh(i, node, world)?;
+        }
     }
     let mut placed = walk.placed;
     unused(root, &mut placed);
@@ -100,10 +114,7 @@ type Kind = (usize, Option<usize>, Option<Vec<u32>>);
 
 struct Walk<'a, 'b> {
     reader: Reader<'a>,
-    /// Whether this is a moment of an animation.
-    moving: bool,
-    /// Weights that an animation gives, by node.
-    weights: &'b HashMap<usize, Vec<f32>>,
+    played: Played<'b>,
     placed: Placed,
     /// Where each variant is in the list.
     known: HashMap<Kind, usize>,
@@ -112,6 +123,19 @@ struct Walk<'a, 'b> {
 }
 
 impl Walk<'_, '_> {
+    /// Places the light of a node. One that an animation switches off is there and dark: whether the model has lamps of its own
+    /// is the same at all moments.
+    fn light(&mut self, node: &Node, world: DAffine3, is_shown: bool) {
+        if !is_shown && !self.played.switches {
+            return;
+        }
+        let mut light = placed::light(self.reader.root, node, world, self.report);
+        if let Some(light) = light.as_mut().filter(|_| !is_shown) {
+            light.intensity = Vec3::ZERO;
+        }
+        self.placed.lights.extend(light);
+    }
+
     /// Places the mesh of a node, or its copies.
     fn mesh(&mut self, i: usize, node: &Node, world: DAffine3) -> Result<(), OverBudget> {
         let Some(mesh) = node.mesh.and_then(|mesh| self.reader.root.meshes.get(mesh.value())) else { return Ok(()) };
@@ -119,7 +143,7 @@ impl Walk<'_, '_> {
         places.iter_mut().for_each(|place| *place = world * *place);
         places.retain(|place| node.skin.is_some() || !is_scaled_away(place));
         // What is hidden at one moment of an animation is shown at another, and the same is read at all of them.
-        if places.is_empty() && !self.moving {
+        if places.is_empty() && !self.played.moving {
             return Ok(());
         }
         let Some(variant) = self.variant(i, node, mesh) else { return Ok(()) };
@@ -174,7 +198,7 @@ impl Walk<'_, '_> {
     /// The variant that a node shows.
     fn variant(&mut self, i: usize, node: &Node, mesh: &Mesh) -> Option<usize> {
         let (index, skin) = (node.mesh?.value(), node.skin.map(|skin| skin.value()));
-        let own = self.weights.get(&i).or(node.weights.as_ref());
+        let own = self.played.weights.get(&i).or(node.weights.as_ref());
         let weights = own.filter(|own| mesh.weights.as_ref() != Some(*own));
         let bits = weights.map(|weights| weights.iter().map(|w| w.to_bits()).collect());
         let variants = &mut self.placed.variants;
@@ -196,7 +220,7 @@ fn unused(root: &Root, placed: &mut Placed) {
     placed.variants.extend(hidden.map(variant));
 }
 
-/// KHR_node_visibility: hidden nodes hide their children.
+/// KHR_node_visibility: hidden nodes hide their children, but no cameras.
 fn is_visible(node: &Node) -> bool {
     let extension = node.extensions.as_ref().and_then(|e| e.others.get("KHR_node_visibility"));
     extension.and_then(|e| e.get("visible")).and_then(Value::as_bool).unwrap_or(true)

@@ -18,7 +18,7 @@ use crate::load::AnimationFacts;
 use curve::Interpolation;
 use gltf::json::Index;
 use gltf::json::accessor::{Accessor, ComponentType};
-use pointer::{Entry, Pointed};
+use pointer::{Entry, Form, Pointed};
 use serde_json::Value;
 use std::collections::HashMap;
 
@@ -40,6 +40,8 @@ struct Channel {
     interpolation: Interpolation,
     /// What the numbers of its output may be.
     numbers: Numbers,
+    /// Whether it names a node beside a pointer.
+    has_needless_node: bool,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -146,10 +148,12 @@ impl Animation {
         let channel = |channel: &Value| {
             let sampler = channel.get("sampler").and_then(position)?;
             let source = samplers.get(sampler)?;
-            let (target, numbers) = target(root, channel.get("target")?)?;
+            let aim = channel.get("target")?;
+            let (target, numbers) = target(root, aim)?;
             Some(Channel {
                 target,
                 numbers,
+                has_needless_node: is_pointer(aim) && aim.get("node").is_some(),
                 sampler,
                 input: accessor(source, "input")?,
                 output: accessor(source, "output")?,
@@ -160,6 +164,22 @@ impl Animation {
             name: animation.get("name").and_then(Value::as_str).map(str::to_owned),
             channels: list(animation, "channels").iter().map(channel).collect(),
         }
+    }
+
+    /// What its pointers lead to, whether that can be played or not.
+    fn pointed(&self) -> impl Iterator<Item = &Pointed> {
+        let targets = self.channels.iter().flatten().map(|channel| &channel.target);
+        targets.filter_map(|target| if let Target::Pointed(pointed) = target { Some(pointed) } else { None })
+    }
+
+    /// Whether moments of it may show other materials, or other nodes, than others.
+    pub(super) fn changes_materials(&self) -> bool {
+        self.pointed().any(Pointed::changes_materials)
+    }
+
+    /// Whether it switches nodes on and off.
+    pub(super) fn switches(&self) -> bool {
+        self.pointed().any(|pointed| pointed.form == Form::Switch)
     }
 
     /// The name in quotes, or else the number: what messages call it.
@@ -195,17 +215,27 @@ pub(super) fn facts(animations: &[Animation], reader: Reader) -> Vec<AnimationFa
     animations.iter().map(of).collect()
 }
 
+/// The extension by which channels change other things than nodes.
+const POINTER: &str = "KHR_animation_pointer";
+
+fn is_pointer(target: &Value) -> bool {
+    target.get("path").and_then(Value::as_str) == Some("pointer")
+}
+
 /// What a channel aims at, and with which numbers; `None`: at a property or node that does not exist.
 fn target(root: &Value, target: &Value) -> Option<(Target, Numbers)> {
-    let path = target.get("path").and_then(Value::as_str)?;
-    if path == "pointer" {
-        let pointer = target.get("extensions").and_then(|e| e.get("KHR_animation_pointer")?.get("pointer")?.as_str());
-        let Some(pointer) = pointer else { return Some((Target::Nothing, Numbers::All)) };
-        let target = pointer::target(root, pointer).unwrap_or_else(Target::Lost);
+    if is_pointer(target) {
+        // The schema check has told of a word that the file does not declare.
+        if !list(root, "extensionsUsed").iter().any(|name| name == POINTER) {
+            return Some((Target::Nothing, Numbers::All));
+        }
+        let pointer = target.get("extensions").and_then(|extensions| extensions.get(POINTER)?.get("pointer")?.as_str());
+        let pointer = pointer.ok_or_else(|| format!("its path is 'pointer', and there is no pointer of {POINTER}"));
+        let target = pointer.and_then(|pointer| pointer::target(root, pointer)).unwrap_or_else(Target::Lost);
         let numbers = if let Target::Pointed(pointed) = &target { pointed.numbers() } else { Numbers::All };
         return Some((target, numbers));
     }
-    let property = Property::of(path)?;
+    let property = Property::of(target.get("path").and_then(Value::as_str)?)?;
     let target = match target.get("node") {
         None => Target::Nothing,
         Some(node) => Target::Node(position(node)?, property),

@@ -25,6 +25,8 @@ pub(in crate::load::gltf) struct Pose {
     pub(in crate::load::gltf) weights: HashMap<usize, Vec<f32>>,
     /// The same, by mesh: those of its nodes that have none of their own.
     pub(super) mesh_weights: HashMap<usize, Vec<f32>>,
+    /// Whether it switches nodes on and off.
+    pub(in crate::load::gltf) switches: bool,
     /// What pointers lead to besides, in the order of the file.
     pub(super) changes: Vec<Change>,
 }
@@ -69,7 +71,9 @@ pub(in crate::load::gltf) fn play(
     report: &mut Report,
 ) -> Result<Pose, OverBudget> {
     let place = format!("animations[{number}]");
-    let mut player = Player { reader, graph, time, budget, report, times: HashMap::new(), pose: Pose::default() };
+    let (times, morphed, pose) =
+        (HashMap::new(), HashSet::new(), Pose { switches: animation.switches(), ..Pose::default() });
+    let mut player = Player { reader, graph, time, budget, report, times, morphed, pose };
     let mut aims = Aims::default();
     for (k, channel) in animation.channels.iter().enumerate() {
         let Some(channel) = channel else { continue };
@@ -83,6 +87,10 @@ pub(in crate::load::gltf) fn play(
             Target::Node(node, property) => (format!("{}/{}", Entry::Node(*node).pointer(), property.name()), None),
             Target::Pointed(pointed) => (pointed.pointer(), pointed.whole()),
         };
+        if channel.has_needless_node {
+            let (code, place) = (Code::AnimationPointerNode, format!("{}.target.node", place.channel));
+            player.report.warn_with(code, place, "a node beside a pointer", "the pointer counts");
+        }
         if !aims.insert(pointer, whole) {
             let (code, text) = (Code::AnimationDuplicateTargets, player.again(&channel.target));
             player.report.warn_with(code, place.channel, text, "the first counts");
@@ -157,10 +165,12 @@ struct Player<'a, 'b> {
     report: &'b mut Report,
     /// Times by accessor: the channels of a skeleton share them. `None`: they cannot be used.
     times: HashMap<usize, Option<Rc<[f32]>>>,
+    /// The nodes and meshes whose weights have been charged.
+    morphed: HashSet<Entry>,
     pose: Pose,
 }
 
-impl Player<'_, '_> {
+impl<'a> Player<'a, '_> {
     /// What is said of a second channel.
     fn again(&self, target: &Target) -> String {
         match target {
@@ -173,7 +183,7 @@ impl Player<'_, '_> {
     /// Evaluates one channel into the pose.
     fn channel(&mut self, channel: &Channel, place: &Place) -> Result<Result<(), Fault>, OverBudget> {
         let times = self.times(channel.input, place)?;
-        if let Some(owner) = channel.target.morphed() {
+        if let Some(owner) = channel.target.morphed().filter(|owner| self.morphed.insert(*owner)) {
             self.budget.take(self.targets(owner) as u64, WEIGHT)?;
         }
         Ok(times.ok_or(Fault::Told).and_then(|times| match &channel.target {
@@ -244,6 +254,11 @@ impl Player<'_, '_> {
             Form::Switch => {
                 keys.check(Type::Scalar, 1)?;
                 let (before, _) = keys.around::<1>(between, 1)?;
+                if channel.interpolation != Interpolation::Step {
+                    let text = "there is nothing between true and false";
+                    let place = place.of_sampler("interpolation");
+                    self.report.note("gltf-animation-switch", place, text, "it is switched in steps");
+                }
                 json!(before.value.first().is_some_and(|&on| on != 0.0))
             }
             Form::Numbers(count, range) => {
@@ -281,7 +296,7 @@ impl Player<'_, '_> {
         let value = curve::numbers(keys.channel.interpolation, between, &before, &after);
         #[expect(clippy::cast_possible_truncation, reason = "morphing is done with f32 weights")]
         let value: Vec<f32> = value.into_iter().map(|w| w as f32).collect();
-        let rest = self.weights_at_rest(owner, targets);
+        let (reader, mesh) = (self.reader, self.mesh(owner));
         let slot = match owner {
             Entry::Node(node) => self.pose.weights.entry(node),
             Entry::Mesh(mesh) => self.pose.mesh_weights.entry(mesh),
@@ -290,7 +305,7 @@ impl Player<'_, '_> {
         match which {
             None => drop(slot.insert_entry(value)),
             Some(which) => {
-                let weights = slot.or_insert(rest);
+                let weights = slot.or_insert_with(|| weights_at_rest(reader, owner, mesh, targets));
                 weights.iter_mut().skip(which).zip(value).take(1).for_each(|(weight, value)| *weight = value);
             }
         }
@@ -298,7 +313,7 @@ impl Player<'_, '_> {
     }
 
     /// The mesh of a node, or the mesh itself.
-    fn mesh(&self, owner: Entry) -> Option<&gltf::json::Mesh> {
+    fn mesh(&self, owner: Entry) -> Option<&'a gltf::json::Mesh> {
         let root = self.reader.root;
         let mesh = match owner {
             Entry::Mesh(mesh) => mesh,
@@ -313,15 +328,15 @@ impl Player<'_, '_> {
         let primitive = self.mesh(owner).and_then(|mesh| mesh.primitives.first());
         primitive.and_then(|p| p.targets.as_ref()).map_or(0, Vec::len)
     }
+}
 
-    /// What its morph targets weigh when nothing is played.
-    fn weights_at_rest(&self, owner: Entry, targets: usize) -> Vec<f32> {
-        let node = if let Entry::Node(node) = owner { self.reader.root.nodes.get(node) } else { None };
-        let own = node.and_then(|node| node.weights.clone());
-        let mut weights = own.or_else(|| self.mesh(owner)?.weights.clone()).unwrap_or_default();
-        weights.resize(targets, 0.0);
-        weights
-    }
+/// What the morph targets of a node or mesh weigh when nothing is played.
+fn weights_at_rest(reader: Reader, owner: Entry, mesh: Option<&gltf::json::Mesh>, targets: usize) -> Vec<f32> {
+    let node = if let Entry::Node(node) = owner { reader.root.nodes.get(node) } else { None };
+    let own = node.and_then(|node| node.weights.clone());
+    let mut weights = own.or_else(|| mesh?.weights.clone()).unwrap_or_default();
+    weights.resize(targets, 0.0);
+    weights
 }
 
 /// Times that are finite and never go back.

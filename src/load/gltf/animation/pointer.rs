@@ -2,7 +2,7 @@
 //!
 //! What may be changed is what the glTF 2.0 Asset Object Model lists as mutable, which the tables of the schema tell: single
 //! numbers and up to four of them in cameras, lamps and materials, whether a node is visible, and weights of morph targets.
-//! A pointer (RFC 6901) leads to one of them only if all that encloses it is there.
+//! A pointer (RFC 6901) leads to one of them only if all that encloses it is there; itself it need not be.
 
 use super::{Numbers, Property, Target};
 use crate::load::gltf::schema::{Kind, Object, Range};
@@ -90,6 +90,11 @@ impl Pointed {
         if let Form::Weights(which) = self.form { Some(which) } else { None }
     }
 
+    /// Whether that may change materials, or which nodes are visible.
+    pub(super) fn changes_materials(&self) -> bool {
+        matches!(self.entry, Entry::Material(_)) || self.form == Form::Switch
+    }
+
     /// Which numbers the keys of its channel may be.
     pub(super) fn numbers(&self) -> Numbers {
         if self.form == Form::Switch { Numbers::Bytes } else { Numbers::All }
@@ -103,6 +108,10 @@ impl Pointed {
 pub(super) fn target(root: &Value, pointer: &str) -> Result<Target, String> {
     let lost = |why: &str| format!("the pointer '{}' {why}", shorten(pointer));
     let steps = steps(pointer).ok_or_else(|| lost("is none: every step starts with a slash"))?;
+    // What lies there is for others to know.
+    if steps.iter().any(|step| step == "extras") {
+        return Ok(Target::Nothing);
+    }
     let unknown = || lost("leads to nothing that can be animated");
     let entry = Entry::of(&steps).ok_or_else(unknown)?;
     if root.pointer(&entry.pointer()).is_none() {

@@ -29,11 +29,6 @@ impl Originals {
 }
 
 impl Pose {
-    /// Whether it may show other materials, or other nodes, than the file at rest.
-    pub(in crate::load::gltf) fn changes_materials(&self) -> bool {
-        self.changes.iter().any(|change| matches!(change.pointed.entry, Entry::Material(_) | Entry::Node(_)))
-    }
-
     /// Whether anything but nodes is changed.
     pub(in crate::load::gltf) fn changes_document(&self) -> bool {
         !self.changes.is_empty() || !self.mesh_weights.is_empty()

@@ -144,18 +144,103 @@ fn integers_stand_for_themselves_unless_they_are_normalized() {
     }
 }
 
-#[test]
-fn visibility_is_switched_in_steps_and_hides_what_hangs_on_a_node() {
+/// Whether node 1, with its camera, and node 2, with its lamp, are visible: not before 1 s.
+fn switching(node: usize, interpolation: &str, normalized: bool) -> Pointing {
     let mut file = Pointing::new();
+    file.file.root["nodes"][1]["extensions"] = json!({"KHR_node_visibility": {}});
     let view = file.file.view(&[0, 1], &[]);
-    let accessor = json!({"bufferView": view, "componentType": 5121, "type": "SCALAR", "count": 2});
+    let accessor =
+        json!({"bufferView": view, "componentType": 5121, "type": "SCALAR", "count": 2, "normalized": normalized});
     let output = file.file.push("accessors", accessor);
-    file.aim_at("/nodes/2/extensions/KHR_node_visibility/visible", output, "STEP");
-    let lights = |loaded: Loaded| (loaded.scene.lights.len(), loaded.facts.changes_materials);
-    assert_eq!([lights(file.at(0.9)), lights(file.at(1.0))], [(0, true), (1, true)]);
-    file.file.root["accessors"][output]["normalized"] = json!(true);
+    file.aim_at(&format!("/nodes/{node}/extensions/KHR_node_visibility/visible"), output, interpolation);
+    file
+}
+
+#[test]
+fn visibility_is_switched_in_steps_and_what_was_no_step_is_told() {
+    let lit = |loaded: &Loaded| (loaded.scene.lights[0].intensity != Vec3::ZERO, loaded.facts.changes_materials);
+    let mut file = switching(2, "STEP", false);
+    assert_eq!([0.9, 1.0].map(|time| lit(&file.at(time))), [(false, true), (true, true)]);
+    assert!(warning(&file.at(0.9)).is_empty(), "{}", warning(&file.at(0.9)));
+    let mut file = switching(2, "LINEAR", false);
+    assert!(!lit(&file.at(0.9)).0);
+    let text =
+        "animations[0].samplers[0].interpolation: there is nothing between true and false; it is switched in steps";
+    assert_eq!(warning(&file.at(0.9)), format!("a.gltf:{text}"));
     let text = "values must be single unsigned bytes that are not normalized; the channel is left out";
-    assert!(warning(&file.at(1.0)).ends_with(text), "{}", warning(&file.at(1.0)));
+    assert!(warning(&switching(2, "STEP", true).at(1.0)).ends_with(text));
+}
+
+#[test]
+fn what_is_switched_off_shows_no_mesh_keeps_its_camera_and_its_lamp_is_dark() {
+    let mut file = switching(1, "STEP", false);
+    file.file.root["nodes"][1]["mesh"] = json!(0);
+    for (time, meshes) in [(0.5, 1), (1.0, 2)] {
+        let scene = file.at(time).scene;
+        assert_eq!((scene.instances.len(), scene.cameras.len(), scene.lights.len()), (meshes, 1, 1), "{time}");
+        assert_eq!(scene.lights[0].intensity == Vec3::ZERO, time < 1.0);
+    }
+    // At rest, and where nothing switches it on, a hidden lamp is none.
+    file.file.root["nodes"][1]["extensions"] = json!({"KHR_node_visibility": {"visible": false}});
+    let scene = load(&file.file.gltf()).scene;
+    assert_eq!((scene.instances.len(), scene.cameras.len(), scene.lights.len()), (1, 1, 0));
+}
+
+#[test]
+fn that_materials_change_is_said_at_every_moment_though_some_cannot_be_played() {
+    let mut file = Pointing::new();
+    let output = file.file.floats("SCALAR", &[f32::NAN, 0.5]);
+    file.aim_at("/materials/0/pbrMetallicRoughness/metallicFactor", output, "STEP");
+    let metallic = |loaded: &Loaded| loaded.scene.materials[0].metal_rough().unwrap().metallic;
+    let (broken, whole) = (file.at(0.0), file.at(1.0));
+    assert_eq!((metallic(&broken), metallic(&whole)), (1.0, 0.5));
+    assert!(broken.facts.changes_materials && whole.facts.changes_materials);
+}
+
+#[test]
+fn what_is_odd_about_a_channel_with_a_pointer_is_told() {
+    let metallic = "/materials/0/pbrMetallicRoughness/metallicFactor";
+    let change = |change: &dyn Fn(&mut Pointing)| {
+        let mut file = Pointing::new();
+        file.aim(metallic, "SCALAR", &[0., 0.]);
+        change(&mut file);
+        let loaded = file.at(0.5);
+        (loaded.scene.materials[0].metal_rough().unwrap().metallic, warning(&loaded))
+    };
+    let (metallic, told) = change(&|file| file.channels[0]["target"]["node"] = json!(0));
+    let place = "a.gltf:animations[0].channels[0].target";
+    assert_eq!((metallic, told), (0.0, format!("{place}.node: a node beside a pointer; the pointer counts")));
+    let (metallic, told) = change(&|file| file.channels[0]["target"]["extensions"] = json!({}));
+    let why = "its path is 'pointer', and there is no pointer of KHR_animation_pointer; the channel is left out";
+    assert_eq!((metallic, told), (1.0, format!("{place}: {why}")));
+    let (metallic, told) = change(&|file| {
+        file.channels[0]["target"]["extensions"]["KHR_animation_pointer"]["pointer"] =
+            json!("/materials/0/extras/shine");
+    });
+    assert_eq!((metallic, told.as_str()), (1.0, ""), "what extras mean is for others to know");
+    let (metallic, _) = change(&|file| {
+        file.file.root["extensionsUsed"].as_array_mut().unwrap().retain(|e| e != "KHR_animation_pointer")
+    });
+    assert_eq!(metallic, 1.0, "what is not declared is not played");
+}
+
+#[test]
+fn weights_one_by_one_take_the_memory_of_all_of_them_once() {
+    let mut file = Pointing::new();
+    let target = file.file.root["meshes"][0]["primitives"][0]["targets"][0].clone();
+    file.file.root["meshes"][0]["primitives"][0]["targets"] = json!(vec![target; 2000]);
+    let output = file.file.floats("SCALAR", &[0., 1.]);
+    for k in 0..2000 {
+        file.aim_at(&format!("/meshes/0/weights/{k}"), output, "LINEAR");
+    }
+    let channel = json!({"channels": file.channels, "samplers": file.samplers});
+    file.file.set("animations", json!([channel]));
+    // Charged for each channel, these weights would be 48 MB.
+    let limits = Limits { memory: 40 << 20, ..Limits::default() };
+    let options = LoadOptions { moment: Some(Moment { animation: None, time: 0.5 }), limits, ..LoadOptions::default() };
+    let loaded = load_bytes(Path::new("a.gltf"), file.file.gltf(), &options).unwrap();
+    let z = loaded.scene.meshes[0].positions[0].z + loaded.scene.instances[0].world_from_object.translation.z as f32;
+    assert!((z - 1000.0).abs() < 1e-2, "{z}");
 }
 
 #[test]
