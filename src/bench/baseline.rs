@@ -22,18 +22,23 @@ pub struct Limit {
     percent: f64,
 }
 
+/// A limit as it is typed, such as `n_it>+1%`: what is limited, whether more of it is too much, and the bound.
+pub(crate) fn sides(text: &str) -> Option<(&str, bool, &str)> {
+    let (name, rest) = text.split_at(text.find(['<', '>'])?);
+    Some((name.trim(), rest.starts_with('>'), rest[1..].trim()))
+}
+
 impl FromStr for Limit {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong =
             || format!("{text:?}: write a count and its change, such as 'n_it>+1%'; counts: {}", NAMES.join(", "));
-        let place = text.find(['<', '>']).ok_or_else(wrong)?;
-        let (name, rest) = text.split_at(place);
-        let percent = rest[1..].trim().strip_suffix('%').and_then(|p| p.trim().parse::<f64>().ok());
+        let (name, above, bound) = sides(text).ok_or_else(wrong)?;
+        let percent = bound.strip_suffix('%').and_then(|p| p.trim().parse::<f64>().ok());
         let percent = percent.filter(|p| p.is_finite()).ok_or_else(wrong)?;
-        let name = NAMES.into_iter().find(|n| *n == name.trim()).ok_or_else(wrong)?;
-        Ok(Self { name: name.to_owned(), above: rest.starts_with('>'), percent })
+        let name = NAMES.into_iter().find(|n| *n == name).ok_or_else(wrong)?;
+        Ok(Self { name: name.to_owned(), above, percent })
     }
 }
 

@@ -4,7 +4,7 @@
 //! became). A picture may come from a stranger, so only flags that shape pixels are taken from it: never names of
 //! outputs, folders or limits.
 
-use super::args::{Cli, Command, RenderArgs};
+use super::args::{Cli, Command, LoadArgs, RenderArgs};
 use super::camera::{Choice, LensChoice};
 use super::exit::Exit;
 use super::fresh;
@@ -95,7 +95,7 @@ const FLAGS: [&str; 65] = [
 ];
 
 /// What there is to say about the making of a picture.
-pub(super) struct Facts<'a> {
+pub(super) struct Making<'a> {
     /// The whole job.
     pub job: &'a RenderJob,
     /// The inputs.
@@ -116,7 +116,7 @@ pub(super) struct Facts<'a> {
     pub loaded: &'a Loaded,
 }
 
-impl Facts<'_> {
+impl Making<'_> {
     /// Names of the inputs as typed.
     pub(super) fn inputs(&self) -> Vec<String> {
         self.batch.inputs.iter().map(|i| i.to_string_lossy().into_owned()).collect()
@@ -158,7 +158,7 @@ impl Facts<'_> {
     }
 }
 
-impl Facts<'_> {
+impl Making<'_> {
     /// From where it is seen.
     fn set_view(&self, mut set: impl FnMut(&str, String)) {
         match &self.shot.choice {
@@ -283,15 +283,15 @@ fn degrees(radians: f64) -> String {
 }
 
 /// What a finished picture says about itself.
-pub(super) fn metadata(facts: &Facts, counted: Option<&Counted>) -> Metadata {
+pub(super) fn metadata(making: &Making, counted: Option<&Counted>) -> Metadata {
     let metadata = Metadata::new()
-        .with(Metadata::SETTINGS, Value::Object(facts.settings()).to_string())
-        .with(Metadata::INPUT, Value::from(facts.inputs()).to_string())
-        .with(Metadata::INPUT_HASH, facts.hash());
-    let made_of = match &facts.job.again {
+        .with(Metadata::SETTINGS, Value::Object(making.settings()).to_string())
+        .with(Metadata::INPUT, Value::from(making.inputs()).to_string())
+        .with(Metadata::INPUT_HASH, making.hash());
+    let made_of = match &making.job.again {
         // As that of the picture that is repeated.
-        Some(_) => facts.job.made_of.clone(),
-        None if facts.job.update => fresh::made_of(facts.job, facts.batch, facts.shot, facts.loaded),
+        Some(_) => making.job.made_of.clone(),
+        None if making.job.update => fresh::made_of(making.job, making.batch, making.shot, making.loaded),
         None => None,
     };
     let metadata = made_of.into_iter().fold(metadata, |metadata, text| metadata.with(Metadata::MADE_OF, text));
@@ -402,8 +402,7 @@ fn with_typed(pixels: RenderArgs, inputs: Vec<PathBuf>, typed: &RenderArgs) -> R
         inputs,
         again: typed.again.clone(),
         output: typed.output.clone(),
-        root: typed.root.clone(),
-        max_memory: typed.max_memory,
+        load: LoadArgs { root: typed.load.root.clone(), max_memory: typed.load.max_memory, ..pixels.load },
         keep_partial: typed.keep_partial,
         no_prune: typed.no_prune,
         instances: typed.instances,

@@ -3,7 +3,7 @@
 use super::args::EyeArgs;
 use super::parse::Ortho;
 use crate::load::Diagnostic;
-use crate::load::suggest::{list, nearest};
+use crate::load::choice::{CAMERA, choose};
 use crate::math::DVec3;
 use crate::scene::framing::{self, Bounds, DEFAULT_FOV, Direction, FrameLens, NamedView, frame};
 use crate::scene::{Camera, Projection, Scene, UpAxis};
@@ -203,32 +203,8 @@ fn quoted(name: &str) -> String {
 }
 
 fn find<'s>(name: &str, scene: &'s Scene, file: &Path) -> Result<&'s Camera, Diagnostic> {
-    let called = |camera: &Camera| camera.name == name && !name.is_empty();
-    let numbers: Vec<String> =
-        (0..).zip(&scene.cameras).filter(|(_, c)| called(c)).map(|(i, _): (usize, _)| i.to_string()).collect();
-    if numbers.len() > 1 {
-        let text = format!("{} cameras are called '{name}'", numbers.len());
-        let remedy = format!("name one by its number: {}", numbers.join(", "));
-        return Err(Diagnostic::new("camera-ambiguous", file, "", text).remedy(remedy));
-    }
-    let by_name = scene.cameras.iter().find(|camera| called(camera));
-    let by_number = || name.parse::<usize>().ok().and_then(|i| scene.cameras.get(i));
-    by_name.or_else(by_number).ok_or_else(|| {
-        // Those without a name are called by their number.
-        let called = |(i, c): (usize, &Camera)| if c.name.is_empty() { i.to_string() } else { c.name.clone() };
-        let all: Vec<String> = scene.cameras.iter().enumerate().map(called).collect();
-        let all = list(all.iter().map(String::as_str));
-        let names = scene.cameras.iter().map(|c| c.name.as_str()).filter(|n| !n.is_empty());
-        let text = format!("no camera is called '{name}'");
-        let remedy = if scene.cameras.is_empty() {
-            "the scene that is shown has no camera in it; use --view or --eye".to_owned()
-        } else if let Some(near) = nearest(name, names) {
-            format!("did you mean '{near}'? there are, from 0: {all}")
-        } else {
-            format!("there are, from 0: {all}")
-        };
-        Diagnostic::new("camera-unknown", file, "", text).remedy(remedy)
-    })
+    let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
+    Ok(&scene.cameras[choose(&CAMERA, &names, name, file)?])
 }
 
 #[cfg(test)]
@@ -258,7 +234,7 @@ mod tests {
         assert_eq!(pick(Choice::Camera("Front".into()), None).unwrap().1, "camera 'Front'");
         assert!(pick(Choice::Camera("1".into()), None).is_ok());
         let error = pick(Choice::Camera("Frnt".into()), None).unwrap_err().to_string();
-        assert_eq!(error, "a.glb: no camera is called 'Frnt'; did you mean 'Front'? there are, from 0: `Front`, `1`");
+        assert_eq!(error, "a.glb: there is no camera 'Frnt'; did you mean 'Front'? it has 0 'Front', 1");
         assert!(pick(Choice::Camera(String::new()), None).is_err(), "one without a name has a number");
     }
 

@@ -25,7 +25,7 @@ const WORTH: f64 = 0.02;
 
 /// Loads the model, tries every cause and prints what was found.
 pub(super) fn run(args: &ExplainArgs) -> Exit {
-    let messages = Messages::new(args.model.load.messages.into(), args.quiet);
+    let messages = Messages::new(args.model.messages.into(), args.quiet);
     let params = match job::params(&args.params, args.accel.kinds()) {
         Ok(params) => params,
         Err(wrong) => return messages.wrong(wrong),

@@ -1,18 +1,18 @@
 //! What is to be done, checked: everything that can be known to be wrong before any work is told here.
 
-use super::args::{AccelArgs, Axis, FileType, MessageFormat, MtlArg, PolygonsArg, RenderArgs, StatsFormat};
+use super::args::{AccelArgs, FileType, MessageFormat, RenderArgs, SpaceArg, StatsFormat};
 use super::camera::{Choice, LensChoice};
-use super::output_name::{Facts, Naming};
+use super::output_name::{Fields, Naming};
 use super::outputs::{self, Beside, Growth, Target};
 use super::parse::Env;
-use super::sampling::{SamplingArgs, SpaceArg};
+use super::sampling::SamplingArgs;
 use super::sequence::{self, Sequence, Step};
 use super::{folders, message};
 use crate::accel::{AccelChoice, AccelKind, AccelParams, IntersectorKind};
 use crate::image::{ExrSamples, FileKind, PngDepth, ToneMap};
-use crate::load::{Limits, LoadOptions, MtlMode, Polygons};
+use crate::load::LoadOptions;
 use crate::render::{Cost, Instancing};
-use crate::scene::{Background, UpAxis};
+use crate::scene::Background;
 use std::path::{Path, PathBuf};
 
 /// A command line that cannot be carried out: one line, exit code 2.
@@ -173,7 +173,7 @@ impl RenderJob {
             return wrong("the picture goes to standard output, so the statistics cannot; add --stats-file PATH");
         }
         Ok(Self {
-            load: load_options(args),
+            load: args.load.options(),
             look: look(args),
             params: params(&args.params, kinds)?,
             accel: args.accel,
@@ -184,7 +184,7 @@ impl RenderJob {
             heatmaps: args.heatmap.clone(),
             heatmap_max: args.heatmap_max,
             stats,
-            bounded: args.max_memory.is_some(),
+            bounded: args.load.max_memory.is_some(),
             profile: args.profile,
             quiet: args.quiet,
             strict: args.strict,
@@ -253,16 +253,16 @@ fn check_flags(args: &RenderArgs) -> Result<(), Wrong> {
     if args.eye.is_some() && !(args.view.is_empty() && args.camera.is_empty()) {
         return wrong("--eye places the camera, so --view and --camera cannot; use one of them");
     }
-    if args.merge && args.scene.is_some() {
+    if args.merge && args.load.scene.is_some() {
         return wrong("--scene chooses a scene of one file and cannot be used with --merge");
     }
-    if args.merge && args.variant.is_some() {
+    if args.merge && args.load.variant.is_some() {
         return wrong("--variant chooses materials of one file and cannot be used with --merge");
     }
     if args.env_rotate.is_some() && !matches!(args.env, Some(Env::File(_))) {
         return wrong("--env-rotate turns a picture; the built-in surroundings stay with the model");
     }
-    if args.merge && args.moment.animation.is_some() {
+    if args.merge && args.load.moment.animation.is_some() {
         return wrong("--animation chooses an animation of one file and cannot be used with --merge");
     }
     if args.stats_file.is_some() && args.stats.is_none() && !args.dry_run {
@@ -297,11 +297,11 @@ fn batches(args: &RenderArgs, choices: &[Choice], sequence: Option<&Sequence>) -
         let mut shots = Vec::new();
         for (step, choice) in steps.iter().flat_map(|step| choices.iter().map(move |choice| (step, choice))) {
             frame += 1;
-            let facts =
-                Facts { input: &inputs[0], sub: &sub, view: &choice.name(), frame: step.number.unwrap_or(frame) };
+            let fields =
+                Fields { input: &inputs[0], sub: &sub, view: &choice.name(), frame: step.number.unwrap_or(frame) };
             let (several_views, numbered) = (choices.len() > 1, step.number.is_some());
             let naming = Naming { several_views, numbered, mirrors: !sub.as_os_str().is_empty() };
-            let (target, kind, growth) = outputs::target(args, &facts, naming)?;
+            let (target, kind, growth) = outputs::target(args, &fields, naming)?;
             shots.push(Shot { choice: choice.clone(), step: step.clone(), target, kind, growth });
         }
         batches.push(Batch { inputs, shots });
@@ -339,30 +339,6 @@ fn check_kinds(args: &RenderArgs, batches: &[Batch]) -> Result<(), Wrong> {
         );
     }
     Ok(())
-}
-
-fn load_options(args: &RenderArgs) -> LoadOptions {
-    LoadOptions {
-        root: args.root.clone(),
-        limits: limits(args.max_memory),
-        polygons: args.polygons.into(),
-        mtl: args.mtl.into(),
-        smooth: args.smooth,
-        wire_widths: args.line_width.map(|width| [width; 2]),
-        scene: args.scene.clone(),
-        variant: args.variant.clone(),
-        up: args.up.map(Into::into),
-        moment: None,
-        animations_before: None,
-        without_pictures: false,
-    }
-}
-
-/// The usual limits, none of them above `memory`.
-pub(super) fn limits(memory: Option<u64>) -> Limits {
-    let usual = Limits::default();
-    let Some(memory) = memory else { return usual };
-    Limits { memory, file: usual.file.min(memory), image_pixels: usual.image_pixels.min(memory / 4) }
 }
 
 fn look(args: &RenderArgs) -> Look {
@@ -422,33 +398,6 @@ impl From<FileType> for FileKind {
             FileType::Exr => Self::Exr,
             FileType::Jpg => Self::Jpeg,
             FileType::Webp => Self::Webp,
-        }
-    }
-}
-
-impl From<Axis> for UpAxis {
-    fn from(typed: Axis) -> Self {
-        match typed {
-            Axis::Y => Self::Y,
-            Axis::Z => Self::Z,
-        }
-    }
-}
-
-impl From<PolygonsArg> for Polygons {
-    fn from(typed: PolygonsArg) -> Self {
-        match typed {
-            PolygonsArg::Cut => Self::Cut,
-            PolygonsArg::Whole => Self::Whole,
-        }
-    }
-}
-
-impl From<MtlArg> for MtlMode {
-    fn from(typed: MtlArg) -> Self {
-        match typed {
-            MtlArg::Guess => Self::Guess,
-            MtlArg::Literal => Self::Literal,
         }
     }
 }

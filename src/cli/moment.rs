@@ -12,16 +12,9 @@ pub(super) fn moment(args: &MomentArgs) -> Result<Option<Moment>, Wrong> {
     if args.fps.is_some() && args.frame.is_none() {
         return Err(Wrong("--fps says how long a frame is; add --frame N".into()));
     }
-    if let Some(frame) = args.frame {
-        return Ok(Some(of_frame(frame, args)));
-    }
-    let any = args.time.is_some() || args.animation.is_some();
-    Ok(any.then(|| Moment { animation: args.animation.clone(), time: args.time.unwrap_or(0.0) }))
-}
-
-/// What a frame shows.
-pub(super) fn of_frame(frame: u32, args: &MomentArgs) -> Moment {
-    Moment { animation: args.animation.clone(), time: f64::from(frame) / fps(args) }
+    let time = args.time.or_else(|| Some(f64::from(args.frame?) / fps(args)));
+    let any = time.is_some() || args.animation.is_some();
+    Ok(any.then(|| Moment { animation: args.animation.clone(), time: time.unwrap_or(0.0) }))
 }
 
 /// Frames a second.

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 /// What a template is filled with.
 #[derive(Clone, Debug)]
-pub(super) struct Facts<'a> {
+pub(super) struct Fields<'a> {
     /// The input, or `-`.
     pub input: &'a Path,
     /// The way to its folder from the one that was named.
@@ -35,19 +35,19 @@ pub(super) fn stem(input: &Path) -> String {
 }
 
 /// Fills a template. Errors name the unknown field.
-pub(super) fn fill(template: &str, facts: &Facts) -> Result<PathBuf, String> {
-    filled(template, facts, None).map(|(name, _)| PathBuf::from(name))
+pub(super) fn fill(template: &str, fields: &Fields) -> Result<PathBuf, String> {
+    filled(template, fields, None).map(|(name, _)| PathBuf::from(name))
 }
 
 /// The folder below which a template makes folders of its own, that in front of `{sub}`; `None` if it has none such.
-pub(super) fn grows_in(template: &str, facts: &Facts) -> Result<Option<PathBuf>, String> {
-    let (before, found) = filled(template, facts, Some("sub"))?;
+pub(super) fn grows_in(template: &str, fields: &Fields) -> Result<Option<PathBuf>, String> {
+    let (before, found) = filled(template, fields, Some("sub"))?;
     let folder = before.rsplit_once('/').map_or(".", |(folder, _)| if folder.is_empty() { "/" } else { folder });
     Ok(found.then(|| PathBuf::from(folder)))
 }
 
 /// What a template is filled to, up to a field if that is asked for, and whether it was there.
-fn filled(template: &str, facts: &Facts, until: Option<&str>) -> Result<(String, bool), String> {
+fn filled(template: &str, fields: &Fields, until: Option<&str>) -> Result<(String, bool), String> {
     let mut name = String::new();
     let mut rest = template;
     while let Some(at) = rest.find(['{', '}']) {
@@ -60,7 +60,7 @@ fn filled(template: &str, facts: &Facts, until: Option<&str>) -> Result<(String,
             if Some(field) == until {
                 return Ok((name, true));
             }
-            let value = value(field, facts)?;
+            let value = value(field, fields)?;
             name.push_str(&value);
             // No way at all is no folder.
             rest = if value.is_empty() && field == "sub" { after.strip_prefix('/').unwrap_or(after) } else { after };
@@ -72,20 +72,20 @@ fn filled(template: &str, facts: &Facts, until: Option<&str>) -> Result<(String,
     Ok((name, false))
 }
 
-fn value(field: &str, facts: &Facts) -> Result<String, String> {
+fn value(field: &str, fields: &Fields) -> Result<String, String> {
     let (name, width) = field.split_once(':').unwrap_or((field, ""));
     if name != "frame" && !width.is_empty() {
         return Err(format!("`{{{field}}}`: only {{frame}} takes a width, as in {{frame:04}}"));
     }
     match name {
-        "dir" => Ok(folder(facts.input)),
-        "sub" => Ok(facts.sub.to_string_lossy().into_owned()),
-        "stem" => Ok(stem(facts.input)),
-        "ext" => Ok(facts.input.extension().unwrap_or_default().to_string_lossy().into_owned()),
-        "view" => Ok(facts.view.replace(['/', '\\', '\0'], "_")),
+        "dir" => Ok(folder(fields.input)),
+        "sub" => Ok(fields.sub.to_string_lossy().into_owned()),
+        "stem" => Ok(stem(fields.input)),
+        "ext" => Ok(fields.input.extension().unwrap_or_default().to_string_lossy().into_owned()),
+        "view" => Ok(fields.view.replace(['/', '\\', '\0'], "_")),
         "frame" => {
             let width: usize = if width.is_empty() { 0 } else { width.parse().map_err(|_| bad_width(field))? };
-            if width > 20 { Err(bad_width(field)) } else { Ok(format!("{:0width$}", facts.frame)) }
+            if width > 20 { Err(bad_width(field)) } else { Ok(format!("{:0width$}", fields.frame)) }
         }
         _ => {
             let hint = nearest(name, FIELDS).map_or_else(String::new, |n| format!("; did you mean {{{n}}}?"));
@@ -165,37 +165,37 @@ pub(super) fn partial(name: &Path) -> PathBuf {
 mod tests {
     use super::*;
 
-    fn facts(input: &str) -> Facts<'_> {
-        Facts { input: Path::new(input), sub: Path::new("b/c"), view: "front", frame: 7 }
+    fn fields(input: &str) -> Fields<'_> {
+        Fields { input: Path::new(input), sub: Path::new("b/c"), view: "front", frame: 7 }
     }
 
     #[test]
     fn every_field_is_filled() {
-        let name = fill("{dir}/{stem}-{view}.{frame:04}.{frame}.png", &facts("a/b/ship.v2.obj")).unwrap();
+        let name = fill("{dir}/{stem}-{view}.{frame:04}.{frame}.png", &fields("a/b/ship.v2.obj")).unwrap();
         assert_eq!(name, Path::new("a/b/ship.v2-front.0007.7.png"));
-        assert_eq!(fill("{dir}/x", &facts("ship.obj")).unwrap(), Path::new("./x"));
-        assert_eq!(fill("{stem}.png", &facts("-")).unwrap(), Path::new("stdin.png"));
-        assert_eq!(fill("{stem}.{ext}.png", &facts("a/ship.v2.obj")).unwrap(), Path::new("ship.v2.obj.png"));
+        assert_eq!(fill("{dir}/x", &fields("ship.obj")).unwrap(), Path::new("./x"));
+        assert_eq!(fill("{stem}.png", &fields("-")).unwrap(), Path::new("stdin.png"));
+        assert_eq!(fill("{stem}.{ext}.png", &fields("a/ship.v2.obj")).unwrap(), Path::new("ship.v2.obj.png"));
     }
 
     #[test]
     fn doubled_braces_are_plain_ones() {
-        assert_eq!(fill("{{{stem}}}.png", &facts("a.obj")).unwrap(), Path::new("{a}.png"));
+        assert_eq!(fill("{{{stem}}}.png", &fields("a.obj")).unwrap(), Path::new("{a}.png"));
     }
 
     #[test]
     fn an_unknown_field_names_the_nearest() {
-        let error = fill("{steam}.png", &facts("a.obj")).unwrap_err();
+        let error = fill("{steam}.png", &fields("a.obj")).unwrap_err();
         assert!(error.contains("did you mean {stem}?"), "{error}");
-        assert!(fill("{stem.png", &facts("a.obj")).is_err());
-        assert!(fill("{frame:9999}", &facts("a.obj")).is_err());
-        assert!(fill("{stem:04}", &facts("a.obj")).is_err());
+        assert!(fill("{stem.png", &fields("a.obj")).is_err());
+        assert!(fill("{frame:9999}", &fields("a.obj")).is_err());
+        assert!(fill("{stem:04}", &fields("a.obj")).is_err());
     }
 
     #[test]
     fn a_camera_name_cannot_lead_out_of_the_folder() {
-        let facts = Facts { view: "../../etc/x", ..facts("a.obj") };
-        assert_eq!(fill("{view}.png", &facts).unwrap(), Path::new(".._.._etc_x.png"));
+        let fields = Fields { view: "../../etc/x", ..fields("a.obj") };
+        assert_eq!(fill("{view}.png", &fields).unwrap(), Path::new(".._.._etc_x.png"));
     }
 
     #[test]
@@ -225,15 +225,15 @@ mod tests {
     fn a_folder_with_braces_is_taken_literally() {
         let naming = Naming { several_views: true, ..Naming::default() };
         let template = default_template(Some("{x}/"), naming, "exr");
-        assert_eq!(fill(&template, &facts("a.obj")).unwrap(), Path::new("{x}/a-front.exr"));
+        assert_eq!(fill(&template, &fields("a.obj")).unwrap(), Path::new("{x}/a-front.exr"));
         let template = default_template(Some("{x}/"), Naming { mirrors: true, ..naming }, "exr");
-        assert_eq!(fill(&template, &facts("a.obj")).unwrap(), Path::new("{x}/b/c/a-front.exr"));
-        assert_eq!(grows_in(&template, &facts("a.obj")), Ok(Some("{x}".into())));
+        assert_eq!(fill(&template, &fields("a.obj")).unwrap(), Path::new("{x}/b/c/a-front.exr"));
+        assert_eq!(grows_in(&template, &fields("a.obj")), Ok(Some("{x}".into())));
     }
 
     #[test]
     fn folders_grow_where_the_way_below_one_begins() {
-        let grows_in = |template: &str| grows_in(template, &facts("a.obj")).unwrap();
+        let grows_in = |template: &str| grows_in(template, &fields("a.obj")).unwrap();
         assert_eq!(grows_in("{sub}/{stem}.png"), Some(".".into()));
         assert_eq!(grows_in("/{sub}/{stem}.png"), Some("/".into()));
         assert_eq!(grows_in("x/{view}/of-{sub}/{stem}.png"), Some("x/front".into()));
@@ -243,7 +243,7 @@ mod tests {
 
     #[test]
     fn in_the_folder_that_was_named_itself_there_is_no_way() {
-        let here = Facts { sub: Path::new(""), ..facts("a.obj") };
+        let here = Fields { sub: Path::new(""), ..fields("a.obj") };
         for (template, expected) in
             [("{sub}/{stem}.png", "a.png"), ("x/{sub}/{stem}.png", "x/a.png"), ("of-{sub}.png", "of-.png")]
         {

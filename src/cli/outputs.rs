@@ -3,7 +3,7 @@
 use super::args::RenderArgs;
 use super::camera::Choice;
 use super::job::{Batch, Shot, Stats, Wrong, wrong};
-use super::output_name::{self, Facts, Naming};
+use super::output_name::{self, Fields, Naming};
 use crate::image::FileKind;
 use crate::load::Diagnostic;
 use crate::load::paths::lexical;
@@ -36,7 +36,7 @@ impl Target {
 pub(super) type Growth = Option<PathBuf>;
 
 /// Where the next picture goes, and as what.
-pub(super) fn target(args: &RenderArgs, facts: &Facts, naming: Naming) -> Result<(Target, FileKind, Growth), Wrong> {
+pub(super) fn target(args: &RenderArgs, fields: &Fields, naming: Naming) -> Result<(Target, FileKind, Growth), Wrong> {
     let format = args.format.map(FileKind::from);
     let usual = |folder| output_name::default_template(folder, naming, format.unwrap_or(FileKind::Png).extension());
     let (template, kept): (String, fn(PathBuf) -> Target) = match args.output.as_deref() {
@@ -46,13 +46,13 @@ pub(super) fn target(args: &RenderArgs, facts: &Facts, naming: Naming) -> Result
         Some(template) => (template.to_owned(), Target::Named),
         None => (usual(None), Target::Default),
     };
-    let path = output_name::fill(&template, facts).map_err(Wrong)?;
+    let path = output_name::fill(&template, fields).map_err(Wrong)?;
     // What leads out of it again is not made.
     let holds = |base: &PathBuf| {
         let (base, path) = (lexical(base), lexical(&path));
         path.strip_prefix(&base).is_ok_and(|way| way.components().all(|part| matches!(part, Component::Normal(_))))
     };
-    let growth = output_name::grows_in(&template, facts).map_err(Wrong)?.filter(holds);
+    let growth = output_name::grows_in(&template, fields).map_err(Wrong)?.filter(holds);
     let kind = match (format, FileKind::from_path(&path)) {
         (Some(typed), Ok(named)) if typed != named => {
             let (path, format) = (path.display(), typed.extension());

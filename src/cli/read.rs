@@ -2,7 +2,6 @@
 
 use super::args::{LoadArgs, ModelArgs};
 use super::exit::Exit;
-use super::job;
 use super::message::{Messages, Severity};
 use super::moment;
 use crate::load::{Diagnostic, Limits, LoadError, LoadOptions, Loaded, check_moment, load, load_bytes};
@@ -41,30 +40,16 @@ pub(super) fn left(limits: &Limits, loaded: &Loaded) -> Limits {
 
 /// Loads one model and says what there is to warn of; a failure is said too.
 pub(super) fn model(args: &ModelArgs, messages: &Messages) -> Result<Loaded, Exit> {
-    let ModelArgs { input, load } = args;
+    let ModelArgs { input, load, .. } = args;
     let loaded = model_as_stored(input, load, messages)?;
-    check_flattened(&loaded, job::limits(load.max_memory).memory, input)
-        .map_err(|fault| messages.fail(&fault, Exit::Failed))?;
+    check_flattened(&loaded, load.limits().memory, input).map_err(|fault| messages.fail(&fault, Exit::Failed))?;
     Ok(loaded)
 }
 
 /// The same for a command that does not need each instance by itself.
 pub(super) fn model_as_stored(input: &PathBuf, args: &LoadArgs, messages: &Messages) -> Result<Loaded, Exit> {
     let moment = moment::moment(&args.moment).map_err(|wrong| messages.wrong(wrong))?;
-    let options = LoadOptions {
-        root: args.root.clone(),
-        limits: job::limits(args.max_memory),
-        polygons: args.polygons.into(),
-        mtl: args.mtl.into(),
-        smooth: args.smooth,
-        wire_widths: args.line_width.map(|width| [width; 2]),
-        scene: args.scene.clone(),
-        variant: args.variant.clone(),
-        up: args.up.map(Into::into),
-        moment,
-        animations_before: None,
-        without_pictures: false,
-    };
+    let options = LoadOptions { moment, ..args.options() };
     let loaded = scene(slice::from_ref(input), &options).map_err(|error| messages.load_error(&error))?;
     loaded.warnings.iter().for_each(|w| messages.say(Severity::Warning, w));
     Ok(loaded)

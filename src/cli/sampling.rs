@@ -1,5 +1,6 @@
 //! The flags of pixel sampling and of the lens: what was typed, what it means together, and how it is stored in a picture.
 
+use super::args::SpaceArg;
 use super::job::Wrong;
 use super::parse::{self, Focus};
 use crate::image::{FileKind, Output};
@@ -102,13 +103,6 @@ pub(super) enum Aa {
     Uniform,
     Adaptive,
     Stochastic,
-}
-
-/// `--error-space`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum SpaceArg {
-    Display,
-    Linear,
 }
 
 /// Samples that a pixel gets at least through an open lens: what is out of focus shows in a few rays of many pixels, and that

@@ -45,7 +45,7 @@ pub(super) struct Step {
 /// The sequence that was typed.
 pub(super) fn of(args: &RenderArgs) -> Result<Option<Sequence>, Wrong> {
     let Some(frames) = args.frames else { return Ok(args.turntable.map(Sequence::Turntable)) };
-    if let Some(frame) = args.moment.frame.filter(|frame| !(frames.first..frames.end).contains(frame)) {
+    if let Some(frame) = args.load.moment.frame.filter(|frame| !(frames.first..frames.end).contains(frame)) {
         return Err(Wrong(format!("--frame {frame} is none of --frames {frames}")));
     }
     let is_stream = |input: &&PathBuf| {
@@ -55,24 +55,23 @@ pub(super) fn of(args: &RenderArgs) -> Result<Option<Sequence>, Wrong> {
         let name = if input == Path::new("-") { "standard input (`-`)".into() } else { input.display().to_string() };
         return Err(Wrong(format!("--frames reads the model for each frame, and {name} can be read only once")));
     }
-    let animation = args.moment.animation.clone();
-    Ok(Some(Sequence::Frames { frames, fps: moment::fps(&args.moment), animation }))
+    let animation = args.load.moment.animation.clone();
+    Ok(Some(Sequence::Frames { frames, fps: moment::fps(&args.load.moment), animation }))
 }
 
 /// The pictures of each view, in order.
 pub(super) fn steps(args: &RenderArgs, sequence: Option<&Sequence>) -> Result<Vec<Step>, Wrong> {
     Ok(match sequence {
-        Some(Sequence::Frames { frames, .. }) => {
-            let wanted = args.moment.frame.map_or(frames.first..frames.end, |only| only..only + 1);
-            let step = |frame| Step { number: Some(frame), moment: Some(moment::of_frame(frame, &args.moment)) };
-            wanted.map(step).collect()
+        Some(whole @ Sequence::Frames { frames, .. }) => {
+            let wanted = args.load.moment.frame.map_or(frames.first..frames.end, |only| only..only + 1);
+            wanted.map(|frame| Step { number: Some(frame), moment: whole.moment(frame) }).collect()
         }
         Some(Sequence::Turntable(turns)) => {
-            let moment = moment::moment(&args.moment)?;
+            let moment = moment::moment(&args.load.moment)?;
             let wanted = turns.only.map_or(0..turns.count, |only| only..only + 1);
             wanted.map(|turn| Step { number: Some(turn), moment: moment.clone() }).collect()
         }
-        None => vec![Step { number: None, moment: moment::moment(&args.moment)? }],
+        None => vec![Step { number: None, moment: moment::moment(&args.load.moment)? }],
     })
 }
 

@@ -255,8 +255,8 @@ impl Prepared<'_> {
 
         let (depth, accel) = (rendered.depth, work.accel.kind());
         let (sampled, reason) = (&rendered.sampled, self.reason);
-        let facts = again::Facts { job, batch, shot, effective, sampled, depth, accel, reason, loaded };
-        let metadata = again::metadata(&facts, counted.as_ref());
+        let making = again::Making { job, batch, shot, effective, sampled, depth, accel, reason, loaded };
+        let metadata = again::metadata(&making, counted.as_ref());
         profile.skip();
         let start = Instant::now();
         let bytes = picture::encoded(shot, &rendered.picture, effective, work.scene.background, &metadata);
@@ -274,7 +274,7 @@ impl Prepared<'_> {
         self.tell_of_clipped(&rendered.picture);
         let profile = job.profile.then(|| profile.take());
         profile.iter().for_each(|p| p.say(messages));
-        so_far.pictures.push(self.stats(&facts, times, counted, profile.as_ref()));
+        so_far.pictures.push(self.stats(&making, times, counted, profile.as_ref()));
         match cost_layers::write_maps(job, shot, &effective.settings, &costs, accel, messages) {
             Ok(()) => self.judge(counted.as_ref()),
             Err(fault) => self.task.fail(&fault, Exit::Failed),
@@ -339,13 +339,13 @@ impl Prepared<'_> {
 
     fn stats(
         &self,
-        facts: &again::Facts,
+        making: &again::Making,
         times: Times,
         counted: Option<Counted>,
         profile: Option<&Profile>,
     ) -> PictureStats {
         let Job { world, accel, .. } = self.work;
-        PictureStats::new(facts, self.phrase, times, world, accel.summary(), counted, profile)
+        PictureStats::new(making, self.phrase, times, world, accel.summary(), counted, profile)
     }
 
     fn keep_partial(&self, rendered: &Rendered) -> Exit {

@@ -22,7 +22,7 @@
 //!
 //! Keys are only ever added; a change of meaning gets another schema name.
 
-use super::again::Facts;
+use super::again::Making;
 use super::args::StatsFormat;
 use super::exit::Exit;
 use super::interrupt;
@@ -160,7 +160,7 @@ pub(super) struct PictureStats {
 impl PictureStats {
     /// Gathers it.
     pub(super) fn new(
-        facts: &Facts,
+        making: &Making,
         view: &str,
         times: Times,
         world: &World,
@@ -168,27 +168,27 @@ impl PictureStats {
         counted: Option<Counted>,
         profile: Option<&Profile>,
     ) -> Self {
-        let settings = &facts.effective.settings;
+        let settings = &making.effective.settings;
         let samples = (settings.sampling == Sampling::Uniform).then_some(settings.samples);
-        let sampling = sampling::json(settings, facts.sampled);
-        let (scene, shapes) = (&facts.loaded.scene, &world.shapes);
+        let sampling = sampling::json(settings, making.sampled);
+        let (scene, shapes) = (&making.loaded.scene, &world.shapes);
         let kept_vertices: usize = world.kept.objects().iter().map(|o| o.shapes().vertices.len()).sum();
         // Every corner is looked at, which is not done for pictures without statistics.
-        let rounding = counted.as_ref().map(|_| facts.loaded.facts.max_rounding + world.rounding(scene));
+        let rounding = counted.as_ref().map(|_| making.loaded.facts.max_rounding + world.rounding(scene));
         let json = json!({
             "schema": "meshray-stats/1", "version": super::version::SHORT,
-            "inputs": facts.inputs(),
-            "output": facts.shot.target.path().map_or("-".into(), |p| p.to_string_lossy()),
-            "input_hash": facts.hash(),
-            "width": settings.width, "height": settings.height, "samples": samples, "sampling": sampling, "depth": facts.depth,
-            "cutoff": sampling::plain(settings.cutoff), "seed": settings.seed, "view": view, "accel": facts.accel.name(),
-            "intersector": facts.job.intersector.name(),
-            "auto": facts.reason.map(|r| json!({
+            "inputs": making.inputs(),
+            "output": making.shot.target.path().map_or("-".into(), |p| p.to_string_lossy()),
+            "input_hash": making.hash(),
+            "width": settings.width, "height": settings.height, "samples": samples, "sampling": sampling, "depth": making.depth,
+            "cutoff": sampling::plain(settings.cutoff), "seed": settings.seed, "view": view, "accel": making.accel.name(),
+            "intersector": making.job.intersector.name(),
+            "auto": making.reason.map(|r| json!({
                 "why": r.to_string(), "rays": r.rays, "prims": r.prims,
                 "fast-octree": (r.rays > 0).then_some(r.octree), "fast-bvh": (r.rays > 0).then_some(r.bvh),
             })),
-            "animation": summary::shown(&facts.loaded.facts).map(|(number, time)| json!({ "number": number, "time": time })),
-            "parameters": parameters(facts.accel, &facts.job.params),
+            "animation": summary::shown(&making.loaded.facts).map(|(number, time)| json!({ "number": number, "time": time })),
+            "parameters": parameters(making.accel, &making.job.params),
             "threads": rayon::current_num_threads(),
             "seconds": times.json(),
             "scene": {
@@ -209,22 +209,22 @@ impl PictureStats {
             "profile": profile.map(Profile::json),
             "rounding": rounding,
         });
-        let text = told(facts, &times, world, structure, counted.as_ref());
+        let text = told(making, &times, world, structure, counted.as_ref());
         Self { json, text }
     }
 }
 
 /// What people are told.
-fn told(facts: &Facts, times: &Times, world: &World, structure: StructureStats, counted: Option<&Counted>) -> String {
-    let (settings, shapes) = (&facts.effective.settings, &world.shapes);
+fn told(making: &Making, times: &Times, world: &World, structure: StructureStats, counted: Option<&Counted>) -> String {
+    let (settings, shapes) = (&making.effective.settings, &world.shapes);
     let mut lines = vec![format!(
         "{}  {}×{}  {:.1} samples  depth {}  {}  {} threads",
-        facts.shot.target.path().map_or("-".into(), |path| path.to_string_lossy()),
+        making.shot.target.path().map_or("-".into(), |path| path.to_string_lossy()),
         settings.width,
         settings.height,
-        facts.sampled.mean(),
-        facts.depth,
-        facts.accel.name(),
+        making.sampled.mean(),
+        making.depth,
+        making.accel.name(),
         rayon::current_num_threads(),
     )];
     lines.push(format!("  time       {}", times.told().join("  ")));
@@ -248,7 +248,7 @@ fn told(facts: &Facts, times: &Times, world: &World, structure: StructureStats, 
     let numbers = [("n_in", n_in), ("n_v", n_v), ("n_ev", n_ev), ("n_oiv", n_oiv)];
     let numbers = numbers.map(|(name, n)| format!("{name} {}", grouped(n))).join("  ");
     lines.push(format!("  structure  {numbers}  {}", bytes(structure.bytes)));
-    lines.extend(facts.reason.map(|reason| format!("  auto       {reason}")));
+    lines.extend(making.reason.map(|reason| format!("  auto       {reason}")));
     lines.extend(counted.map(count_table).unwrap_or_default());
     lines.join("\n")
 }

@@ -19,7 +19,7 @@ use std::path::PathBuf;
 
 /// Loads the model, renders it with every setting, and prints and writes rows as they come.
 pub(super) fn run(args: &StudyArgs) -> Exit {
-    let messages = Messages::new(args.model.load.messages.into(), args.quiet);
+    let messages = Messages::new(args.model.messages.into(), args.quiet);
     let typed = |path: &PathBuf| Ok((path.clone(), Format::from_path(path).map_err(Wrong)?));
     let files: Vec<(PathBuf, Format)> = match args.report.iter().map(typed).collect() {
         Ok(files) => files,

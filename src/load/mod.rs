@@ -3,6 +3,7 @@
 //! Files a user gives are not trusted: other files they name are read only below [`LoadOptions::root`], sizes are
 //! checked before memory is taken, and whatever is broken ends in a [`LoadError`] or in a warning, never in a panic.
 
+pub(crate) mod choice;
 mod detect;
 pub mod diagnostic;
 pub mod gltf;
@@ -248,7 +249,7 @@ fn check_wishes(loaded: &Loaded, file: &Path, options: &LoadOptions) -> Result<(
 pub(crate) fn check_moment(loaded: &mut Loaded, file: &Path, options: &LoadOptions) -> Result<(), LoadError> {
     let Some(moment) = options.moment.as_ref().filter(|_| options.animations_before.is_none()) else { return Ok(()) };
     if !loaded.facts.animations.is_empty() {
-        return Ok(gltf::check_animation(&loaded.facts, moment, file)?);
+        return Ok(choice::check_animation(&loaded.facts, moment, file)?);
     }
     if let Some(name) = &moment.animation {
         let fault = Diagnostic::new("animation-none", file, "", format!("there is no animation '{name}'"));

@@ -343,13 +343,13 @@ impl<A: Accel, P: Observer> Tracer<'_, A, P> {
 
     /// Remembers the points of an instance, whose material is `even` but for maps, that are the first surfaces of their samples.
     fn note_strip(&mut self, traced: Traced, (instance, even): (u32, &Matter), strip: &Strip) {
-        if self.facts.is_empty() {
+        if self.firsts.is_empty() {
             return;
         }
-        for (at, sample, found) in strip.facts(instance, even, self.context.world.center) {
-            let facts = &mut self.facts[sample as usize];
-            if !facts.is_some() && traced.path(at).straight {
-                *facts = found;
+        for (at, sample, found) in strip.firsts(instance, even, self.context.world.center) {
+            let first = &mut self.firsts[sample as usize];
+            if !first.is_some() && traced.path(at).straight {
+                *first = found;
             }
         }
     }

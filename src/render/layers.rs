@@ -6,7 +6,7 @@ use crate::math::{DVec3, Vec3};
 
 /// The first surface of one sample.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Facts {
+pub(crate) struct FirstSurface {
     albedo: Vec3,
     normal: Vec3,
     /// World space.
@@ -15,7 +15,7 @@ pub(crate) struct Facts {
     instance: u32,
 }
 
-impl Facts {
+impl FirstSurface {
     /// Nothing was hit.
     pub(crate) const NONE: Self =
         Self { albedo: Vec3::ZERO, normal: Vec3::ZERO, position: DVec3::ZERO, prim: NO_PRIM, instance: NO_PRIM };
@@ -51,23 +51,23 @@ pub(crate) struct LayerPixel {
 pub(crate) struct LayerSum {
     albedo: Vec3,
     normal: Vec3,
-    first: Facts,
+    first: FirstSurface,
     samples: u32,
 }
 
 impl Default for LayerSum {
     fn default() -> Self {
-        Self { albedo: Vec3::ZERO, normal: Vec3::ZERO, first: Facts::NONE, samples: 0 }
+        Self { albedo: Vec3::ZERO, normal: Vec3::ZERO, first: FirstSurface::NONE, samples: 0 }
     }
 }
 
 impl LayerSum {
-    pub(crate) fn add(&mut self, facts: &Facts) {
-        self.albedo += facts.albedo;
-        self.normal += facts.normal;
+    pub(crate) fn add(&mut self, first: &FirstSurface) {
+        self.albedo += first.albedo;
+        self.normal += first.normal;
         self.samples += 1;
         if !self.first.is_some() {
-            self.first = *facts;
+            self.first = *first;
         }
     }
 
@@ -89,9 +89,9 @@ impl LayerSum {
 
 impl LayerPixel {
     /// From the samples of a pixel; depth counts from `eye` along the unit vector `forward`.
-    pub(crate) fn new(samples: &[Facts], eye: DVec3, forward: DVec3) -> Self {
+    pub(crate) fn new(samples: &[FirstSurface], eye: DVec3, forward: DVec3) -> Self {
         let mut sum = LayerSum::default();
-        samples.iter().for_each(|facts| sum.add(facts));
+        samples.iter().for_each(|first| sum.add(first));
         sum.pixel(eye, forward)
     }
 

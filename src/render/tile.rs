@@ -6,7 +6,7 @@
 
 use super::context::Context;
 use super::frame::{Frame, resolve_each, veil_each};
-use super::layers::{self, Facts, LayerPixel};
+use super::layers::{self, FirstSurface, LayerPixel};
 use super::observer::Observer;
 use super::pixel::sample_offsets;
 use super::sampling::{Sampled, Sampling};
@@ -468,8 +468,8 @@ impl Frame<'_> {
             if self.has_veil {
                 veil_each(&tracer.samples, per_pixel, self.background, &mut done.veil);
             }
-            let layer = |f: &[Facts]| LayerPixel::new(f, self.view.eye, self.view.forward);
-            done.layers.extend(tracer.facts.chunks(per_pixel).map(layer));
+            let layer = |f: &[FirstSurface]| LayerPixel::new(f, self.view.eye, self.view.forward);
+            done.layers.extend(tracer.firsts.chunks(per_pixel).map(layer));
         })?;
         done.rays = (done.beauty.len() * per_pixel) as u64;
         Some(done)

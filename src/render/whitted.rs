@@ -16,7 +16,7 @@ use super::draws::{Draws, Purpose, Stream};
 use super::everything::look_up_in_vain;
 use super::eyes::Eyes;
 use super::glint;
-use super::layers::Facts;
+use super::layers::FirstSurface;
 use super::observer::Observer;
 use super::roulette::Roulette;
 use super::shade::{Incident, LocalLight, Matter, Reader};
@@ -88,8 +88,8 @@ pub(crate) struct Tracer<'a, A: Accel, P> {
     pub streams: Vec<Stream>,
     /// Which branches go on by chance.
     pub roulette: Roulette,
-    /// Facts of the first surface of each sample; empty unless layers are wanted.
-    pub facts: Vec<Facts>,
+    /// The first surface of each sample; empty unless layers are wanted.
+    pub firsts: Vec<FirstSurface>,
     pub counts: ByClass<P>,
 }
 
@@ -108,7 +108,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
             samples: Vec::new(),
             streams: Vec::new(),
             roulette: Roulette::default(),
-            facts: Vec::new(),
+            firsts: Vec::new(),
             counts: ByClass::default(),
         }
     }
@@ -119,7 +119,7 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
     }
 
     /// Prepares for `samples` samples, whose eye rays are added to [`Self::eyes`].
-    pub(crate) fn reset(&mut self, samples: usize, facts: bool) {
+    pub(crate) fn reset(&mut self, samples: usize, layers: bool) {
         self.counts.each_mut().into_iter().for_each(|probe| probe.batch(samples));
         self.starting.iter_mut().chain(&mut self.continuing).for_each(Queue::clear);
         self.shadows.clear();
@@ -129,8 +129,8 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
         self.roulette = Roulette::default();
         self.samples.clear();
         self.samples.resize(samples, Sample::default());
-        self.facts.clear();
-        self.facts.resize(if facts { samples } else { 0 }, Facts::NONE);
+        self.firsts.clear();
+        self.firsts.resize(if layers { samples } else { 0 }, FirstSurface::NONE);
     }
 
     /// Adds an eye ray that goes by itself.
@@ -344,11 +344,11 @@ impl<'a, A: Accel, P: Observer> Tracer<'a, A, P> {
 
     /// Remembers the first surface of a sample for the layers.
     fn note(&mut self, ray: &Ray, path: &Path, surface: &Surface, albedo: Vec3) {
-        let Some(facts) = self.facts.get_mut(ray.sample as usize) else { return };
-        if path.straight && !facts.is_some() {
+        let Some(first) = self.firsts.get_mut(ray.sample as usize) else { return };
+        if path.straight && !first.is_some() {
             let Target { prim, instance, .. } = surface.target;
             let at = (surface.position, surface.normal);
-            *facts = Facts::new((prim, instance), at, albedo, self.context.world.center);
+            *first = FirstSurface::new((prim, instance), at, albedo, self.context.world.center);
         }
     }
 

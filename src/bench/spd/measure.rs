@@ -1,6 +1,6 @@
 //! Our counts on one of the scenes, by the rules that the published ones go by.
 
-use super::published::{self, Cost};
+use super::published::{self, Figures};
 #[cfg(doc)]
 use super::rules::PIXELS;
 use super::rules::{Facing, Sent, Tally, send};
@@ -49,10 +49,10 @@ impl Measured {
     ///
     /// Per ray; but tests of octrees per hit, all hits of all rays together. The source does not say so. But the quotient of
     /// the published column and the tests a ray is that of rays and hits in each of the eight scenes, at every depth.
-    pub fn comparable(&self, row: &Row) -> Cost {
+    pub fn comparable(&self, row: &Row) -> Figures {
         let rays_per_hit = self.outward.rays() as f64 / self.outward.hits().max(1) as f64;
         let n_it = if row.setting.is_octree() { row.ours.n_it * rays_per_hit } else { row.ours.n_it };
-        Cost { n_it, ..row.ours }
+        Figures { n_it, ..row.ours }
     }
 }
 
@@ -64,9 +64,9 @@ pub struct Row {
     /// How far the boxes of faces reached beyond them.
     pub thickness: f64,
     /// What was published.
-    pub theirs: Cost,
+    pub theirs: Figures,
     /// What was counted, all a ray.
-    pub ours: Cost,
+    pub ours: Figures,
     /// Rays it was given.
     pub rays: u64,
     /// Rays whose answer differed from that of the structure which recorded them.
@@ -92,7 +92,7 @@ pub enum Setting {
 
 impl Setting {
     /// All of a scene, with what was published.
-    pub fn all(scene: &published::Scene) -> Vec<(Self, Cost)> {
+    pub fn all(scene: &published::Scene) -> Vec<(Self, Figures)> {
         let grids = scene.grids.iter().map(|g| (Self::Grid { rule: g.setting, cells: g.cells }, g.cost));
         let octrees = scene.octrees.iter().map(|o| (Self::Octree { depth: o.depth }, o.cost));
         grids.chain(octrees).collect()
@@ -204,7 +204,7 @@ impl Row {
         let (counts, differing) = replay(&accel, recorder, sample);
         let made_of = accel.summary();
         let per_ray = |n: u64| n as f64 / counts.queries.max(1) as f64;
-        self.ours = Cost {
+        self.ours = Figures {
             // The one node above a grid's cells is none of theirs.
             n_in: made_of.n_in - 1,
             n_v: made_of.n_v,

@@ -52,7 +52,7 @@ pub struct HainesRays {
 
 /// What a structure is made of and what it costs a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cost {
+pub struct Figures {
     /// Interior nodes; 0 in a grid.
     pub n_in: u64,
     /// Cells.
@@ -79,7 +79,7 @@ pub struct Grid {
     /// Cells on each axis.
     pub cells: [u32; 3],
     /// Its cost.
-    pub cost: Cost,
+    pub cost: Figures,
 }
 
 /// Havran's *Octree84-C*: A. Glassner's of 1984, cut in the middle, at most one object in a leaf that is not of the greatest
@@ -89,12 +89,12 @@ pub struct Octree {
     /// Greatest depth; the root has 0.
     pub depth: u32,
     /// Its cost.
-    pub cost: Cost,
+    pub cost: Figures,
 }
 
 /// Numbers in the order of a printed row.
-const fn cost([n_in, n_v, n_ev, n_oiv]: [u64; 4], [n_it, n_ts, n_ets, n_eets]: [f64; 4]) -> Cost {
-    Cost { n_in, n_v, n_ev, n_oiv, n_it, n_ts, n_ets, n_eets }
+const fn cost([n_in, n_v, n_ev, n_oiv]: [u64; 4], [n_it, n_ts, n_ets, n_eets]: [f64; 4]) -> Figures {
+    Figures { n_in, n_v, n_ev, n_oiv, n_it, n_ts, n_ets, n_eets }
 }
 
 /// All eight.

@@ -1,7 +1,7 @@
 //! Our counts beside the published ones, in every format of a report.
 
 use super::measure::{Measured, Row};
-use super::published::{Cost, HainesRays};
+use super::published::{Figures, HainesRays};
 use crate::bench::machine::Machine;
 use crate::bench::report::table::Table;
 use crate::bench::report::{Format, html};
@@ -112,7 +112,7 @@ impl Report {
     fn cells_verdict(&self) -> String {
         let octrees = self.rows().map(|(_, r)| r).filter(|r| r.setting.is_octree() && r.thickness == 0.0);
         let rows: Vec<&Row> = octrees.collect();
-        let same = |of: fn(&Cost) -> u64| rows.iter().filter(|r| of(&r.ours) == of(&r.theirs)).count();
+        let same = |of: fn(&Figures) -> u64| rows.iter().filter(|r| of(&r.ours) == of(&r.theirs)).count();
         format!(
             "octrees with exactly the published number of cells: {} of {n}, of references: {} of {n}",
             same(|c| c.n_v),
@@ -247,7 +247,7 @@ fn structure_table(scene: &Measured) -> Table {
     let columns = ["structure", "rays", "n_in", "n_v", "n_ev", "n_oiv", "n_it", "n_ets", "n_eets", "n_ts"];
     let rows = scene.rows.iter().flat_map(|row| {
         let (ours, theirs) = (scene.comparable(row), row.theirs);
-        let shown = |c: Cost| {
+        let shown = |c: Figures| {
             let whole = [c.n_in, c.n_v, c.n_ev, c.n_oiv].map(grouped);
             let rates =
                 [c.n_it, c.n_ets, c.n_eets, c.n_ts].map(|x| if x < 1000.0 { format!("{x:.2}") } else { short(x) });
@@ -267,7 +267,7 @@ fn structure_table(scene: &Measured) -> Table {
 }
 
 /// In the order n_in, n_v, n_ev, n_oiv, n_it, n_ets, n_eets, n_ts.
-fn values(c: Cost) -> [f64; 8] {
+fn values(c: Figures) -> [f64; 8] {
     let [n_in, n_v, n_ev, n_oiv] = [c.n_in, c.n_v, c.n_ev, c.n_oiv].map(|n| n as f64);
     [n_in, n_v, n_ev, n_oiv, c.n_it, c.n_ets, c.n_eets, c.n_ts]
 }
@@ -306,7 +306,7 @@ fn scene_json(scene: &Measured) -> Value {
             "secondary_hits": t.secondary_hits, "shadow": t.shadow, "shadow_hits": t.shadow_hits,
         })
     };
-    let cost = |c: Cost| {
+    let cost = |c: Figures| {
         json!({
             "n_in": c.n_in, "n_v": c.n_v, "n_ev": c.n_ev, "n_oiv": c.n_oiv,
             "n_it": c.n_it, "n_ts": c.n_ts, "n_ets": c.n_ets, "n_eets": c.n_eets,

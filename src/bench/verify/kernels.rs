@@ -38,7 +38,7 @@ impl Kernel {
 
 /// Those of a mesh that was judged: the tests through the default structure, over all places and sizes.
 pub fn of(findings: &Findings) -> Vec<Kernel> {
-    let kernel = |cost: &super::Cost| Kernel {
+    let kernel = |cost: &super::TestTime| Kernel {
         name: cost.test.name().to_owned(),
         is_ours: true,
         seconds_per_ray: cost.per_ray.as_secs_f64(),

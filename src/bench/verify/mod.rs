@@ -74,9 +74,9 @@ pub struct Section {
     pub spawned: Spawned,
 }
 
-/// What a test costs.
+/// How long a test takes.
 #[derive(Clone, Copy, Debug)]
-pub struct Cost {
+pub struct TestTime {
     /// The test of triangles.
     pub test: IntersectorKind,
     /// Time of one ray in the default structure on one thread, median of [`PASSES`] passes over the rays of the unchanged mesh.
@@ -93,7 +93,7 @@ pub struct Findings {
     /// One for each variation, the unchanged mesh first.
     pub sections: Vec<Section>,
     /// One for each intersector.
-    pub costs: Vec<Cost>,
+    pub costs: Vec<TestTime>,
 }
 
 /// Times each test is measured.
@@ -196,7 +196,7 @@ fn hits(accel: &AnyAccel, rays: &[Ray]) -> Vec<Hit> {
 }
 
 /// Times of the tests on the same rays, one thread, pass by pass in turn.
-fn costs(variation: &Variation, plan: &Plan) -> Option<Vec<Cost>> {
+fn costs(variation: &Variation, plan: &Plan) -> Option<Vec<TestTime>> {
     let shapes = &variation.shapes;
     let mut aimer = Aimer::new(shapes, plan.seed)?;
     let rays: Vec<Ray> = Aim::ALL.iter().flat_map(|&aim| aimer.rays(aim, plan.rays)).collect();
@@ -215,7 +215,7 @@ fn costs(variation: &Variation, plan: &Plan) -> Option<Vec<Cost>> {
     let count = u32::try_from(rays.len()).unwrap_or(u32::MAX).max(1);
     let cost = |((test, _), mut times): (&(IntersectorKind, AnyAccel), Vec<Duration>)| {
         times.sort_unstable();
-        Cost { test: *test, per_ray: times[times.len() / 2] / count }
+        TestTime { test: *test, per_ray: times[times.len() / 2] / count }
     };
     Some(accels.iter().zip(times).map(cost).collect())
 }

@@ -14,11 +14,11 @@ pub(super) use explain::ExplainArgs;
 pub(super) use eye::EyeArgs;
 pub(super) use generate::GenerateArgs;
 pub(super) use level::SimdArgs;
-pub(super) use model::{Axis, LoadArgs, ModelArgs, MomentArgs, MtlArg, PolygonsArg};
+pub(super) use model::{LoadArgs, ModelArgs, MomentArgs};
 pub(super) use render::RenderArgs;
 pub(super) use structure::AccelArgs;
 pub(super) use study::StudyArgs;
-pub(super) use words::{FileType, MessageFormat, StatsFormat};
+pub(super) use words::{FileType, MessageFormat, SpaceArg, StatsFormat};
 
 use super::bench::BenchArgs;
 use super::diff::DiffArgs;

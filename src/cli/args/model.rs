@@ -2,6 +2,8 @@
 
 use super::super::parse;
 use super::MessageFormat;
+use crate::load::{Limits, LoadOptions, MtlMode, Polygons};
+use crate::scene::UpAxis;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -14,46 +16,74 @@ pub(in crate::cli) struct ModelArgs {
     /// How.
     #[command(flatten)]
     pub load: LoadArgs,
+    /// How messages are written to standard error
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub messages: MessageFormat,
 }
 
-/// How to load a model that is not rendered.
+/// How to load a model.
 #[derive(Debug, Clone, Args)]
 pub(in crate::cli) struct LoadArgs {
+    /// Axis that points up in the file [default: what the file says, or a guess]
+    #[arg(long, value_name = "AXIS", value_enum, help_heading = "Loading")]
+    pub up: Option<Axis>,
     /// Which scene of a glTF file, by name or number from 0
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Loading", hide_short_help = true)]
     pub scene: Option<String>,
     /// Which materials of a glTF file that offers variants, by name or number from 0 (`inspect` lists them)
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Loading", hide_short_help = true)]
     pub variant: Option<String>,
     /// Which moment of an animation.
     #[command(flatten)]
     pub moment: MomentArgs,
     /// What becomes of OBJ, PLY and NFF faces with more than three corners
-    #[arg(long, value_name = "HOW", value_enum, default_value_t)]
+    #[arg(long, value_name = "HOW", value_enum, default_value_t, help_heading = "Loading", hide_short_help = true)]
     pub polygons: PolygonsArg,
     /// Give meshes without normals smooth ones, but for edges at which faces lean by more than so many degrees, 30 when
     /// none are given
     #[arg(long, value_name = "DEGREES", value_parser = parse::lean, num_args = 0..=1, require_equals = true,
-          default_missing_value = "30")]
+          default_missing_value = "30", help_heading = "Loading", hide_short_help = true)]
     pub smooth: Option<f64>,
     /// How wide points and lines are, units of the model [default: 1/256 of its diagonal, less where there are very many]
-    #[arg(long, value_name = "WIDTH", value_parser = parse::above_zero)]
+    #[arg(long, value_name = "WIDTH", value_parser = parse::above_zero, help_heading = "Loading",
+          hide_short_help = true)]
     pub line_width: Option<f64>,
     /// Understand MTL files as exporters mean them, or to the letter
-    #[arg(long, value_name = "HOW", value_enum, default_value_t)]
+    #[arg(long, value_name = "HOW", value_enum, default_value_t, help_heading = "Loading", hide_short_help = true)]
     pub mtl: MtlArg,
-    /// Axis that points up in the file
-    #[arg(long, value_name = "AXIS", value_enum)]
-    pub up: Option<Axis>,
     /// Read other files only below this folder [default: the model's folder]
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = "Loading", hide_short_help = true)]
     pub root: Option<PathBuf>,
     /// Refuse inputs that take more memory than this to load, such as 2G or 500M; what is built of them comes on top
-    #[arg(long, value_name = "SIZE", value_parser = parse::bytes)]
+    #[arg(long, value_name = "SIZE", value_parser = parse::bytes, help_heading = "Loading", hide_short_help = true)]
     pub max_memory: Option<u64>,
-    /// How messages are written to standard error
-    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
-    pub messages: MessageFormat,
+}
+
+impl LoadArgs {
+    /// What is asked of the loaders; which moment is shown is told apart, since a sequence has many.
+    pub(in crate::cli) fn options(&self) -> LoadOptions {
+        LoadOptions {
+            root: self.root.clone(),
+            limits: self.limits(),
+            polygons: self.polygons.into(),
+            mtl: self.mtl.into(),
+            smooth: self.smooth,
+            wire_widths: self.line_width.map(|width| [width; 2]),
+            scene: self.scene.clone(),
+            variant: self.variant.clone(),
+            up: self.up.map(Into::into),
+            moment: None,
+            animations_before: None,
+            without_pictures: false,
+        }
+    }
+
+    /// The usual limits, none of them above `--max-memory`.
+    pub(in crate::cli) fn limits(&self) -> Limits {
+        let usual = Limits::default();
+        let Some(memory) = self.max_memory else { return usual };
+        Limits { memory, file: usual.file.min(memory), image_pixels: usual.image_pixels.min(memory / 4) }
+    }
 }
 
 /// Which moment of an animation is shown; without any of it, the rest pose.
@@ -102,4 +132,31 @@ pub(in crate::cli) enum MtlArg {
     Guess,
     /// What the text says
     Literal,
+}
+
+impl From<Axis> for UpAxis {
+    fn from(typed: Axis) -> Self {
+        match typed {
+            Axis::Y => Self::Y,
+            Axis::Z => Self::Z,
+        }
+    }
+}
+
+impl From<PolygonsArg> for Polygons {
+    fn from(typed: PolygonsArg) -> Self {
+        match typed {
+            PolygonsArg::Cut => Self::Cut,
+            PolygonsArg::Whole => Self::Whole,
+        }
+    }
+}
+
+impl From<MtlArg> for MtlMode {
+    fn from(typed: MtlArg) -> Self {
+        match typed {
+            MtlArg::Guess => Self::Guess,
+            MtlArg::Literal => Self::Literal,
+        }
+    }
 }

@@ -3,7 +3,7 @@
 use super::super::parse;
 use super::super::sampling::SamplingArgs;
 use super::level::SimdArgs;
-use super::model::{Axis, MomentArgs, MtlArg, PolygonsArg};
+use super::model::LoadArgs;
 use super::structure::AccelArgs;
 use super::words::{FileType, MessageFormat, StatsFormat};
 use crate::accel::{AccelChoice, IntersectorKind};
@@ -120,9 +120,6 @@ pub(in crate::cli) struct RenderArgs {
     #[arg(long, value_name = "HEIGHT", num_args = 0..=1, default_missing_value = "auto", value_parser = parse::ortho,
           require_equals = true, conflicts_with = "fov", help_heading = "Camera", hide_short_help = true)]
     pub ortho: Option<parse::Ortho>,
-    /// Axis that points up in the file [default: what the file says, or a guess]
-    #[arg(long, value_name = "AXIS", value_enum, help_heading = "Camera")]
-    pub up: Option<Axis>,
 
     /// #rrggbb, a colour name, r,g,b (linear, 0 to 1), `transparent`, or `env`: what reflections see, of
     /// the studio its walls
@@ -174,15 +171,9 @@ pub(in crate::cli) struct RenderArgs {
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Quality", hide_short_help = true)]
     pub seed: u64,
 
-    /// Which scene of a glTF file, by name or number from 0
-    #[arg(long, value_name = "NAME", help_heading = "Loading", hide_short_help = true)]
-    pub scene: Option<String>,
-    /// Which materials of a glTF file that offers variants, by name or number from 0 (`inspect` lists them)
-    #[arg(long, value_name = "NAME", help_heading = "Loading", hide_short_help = true)]
-    pub variant: Option<String>,
-    /// Which moment of an animation.
+    /// How models are loaded.
     #[command(flatten)]
-    pub moment: MomentArgs,
+    pub load: LoadArgs,
     /// Several frames, from A to before B (`A..=B`: with B), seen by one camera that has all of them in the picture; with
     /// --frame N, only that one of them
     ///
@@ -197,28 +188,6 @@ pub(in crate::cli) struct RenderArgs {
     /// with the camera, the studio that mirrors see stays.
     #[arg(long, value_name = "N", value_parser = parse::turns, help_heading = "Camera", hide_short_help = true)]
     pub turntable: Option<parse::Turns>,
-    /// What becomes of OBJ, PLY and NFF faces with more than three corners
-    #[arg(long, value_name = "HOW", value_enum, default_value_t, help_heading = "Loading", hide_short_help = true)]
-    pub polygons: PolygonsArg,
-    /// Give meshes without normals smooth ones, but for edges at which faces lean by more than so many degrees, 30 when
-    /// none are given
-    #[arg(long, value_name = "DEGREES", value_parser = parse::lean, num_args = 0..=1, require_equals = true,
-          default_missing_value = "30", help_heading = "Loading",
-          hide_short_help = true)]
-    pub smooth: Option<f64>,
-    /// How wide points and lines are, units of the model [default: 1/256 of its diagonal, less where there are very many]
-    #[arg(long, value_name = "WIDTH", value_parser = parse::above_zero, help_heading = "Loading",
-          hide_short_help = true)]
-    pub line_width: Option<f64>,
-    /// Understand MTL files as exporters mean them, or to the letter
-    #[arg(long, value_name = "HOW", value_enum, default_value_t, help_heading = "Loading", hide_short_help = true)]
-    pub mtl: MtlArg,
-    /// Read other files only below this folder [default: the model's folder]
-    #[arg(long, value_name = "DIR", help_heading = "Loading", hide_short_help = true)]
-    pub root: Option<PathBuf>,
-    /// Refuse inputs that take more memory than this to load, such as 2G or 500M; what is built of them comes on top
-    #[arg(long, value_name = "SIZE", value_parser = parse::bytes, help_heading = "Loading", hide_short_help = true)]
-    pub max_memory: Option<u64>,
     /// Draw the background when the file holds nothing to draw
     #[arg(long, help_heading = "Loading", hide_short_help = true)]
     pub allow_empty: bool,

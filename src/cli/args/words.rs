@@ -1,5 +1,6 @@
-//! Kinds of files and messages, by the words that name them.
+//! Kinds of files, messages and colours, by the words that name them.
 
+use crate::image::diff::Space;
 use clap::ValueEnum;
 
 /// Types of picture files.
@@ -32,4 +33,22 @@ pub(in crate::cli) enum MessageFormat {
     Text,
     /// One JSON object a line
     Json,
+}
+
+/// `--space` and `--error-space`: what errors are counted in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(in crate::cli) enum SpaceArg {
+    /// sRGB codes, 0 to 1
+    Display,
+    /// Light
+    Linear,
+}
+
+impl From<SpaceArg> for Space {
+    fn from(space: SpaceArg) -> Self {
+        match space {
+            SpaceArg::Display => Self::Display,
+            SpaceArg::Linear => Self::Linear,
+        }
+    }
 }

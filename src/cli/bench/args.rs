@@ -1,6 +1,6 @@
 //! What was typed after `meshray bench`.
 
-use super::super::args::{AccelArgs, EyeArgs, LoadArgs, SimdArgs};
+use super::super::args::{AccelArgs, EyeArgs, LoadArgs, MessageFormat, SimdArgs};
 use super::super::parse;
 use crate::accel::AccelKind;
 use crate::bench::baseline::Limit;
@@ -19,6 +19,9 @@ pub(in crate::cli) struct BenchArgs {
     /// How to load them.
     #[command(flatten)]
     pub load: LoadArgs,
+    /// How messages are written to standard error
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub messages: MessageFormat,
 
     /// Measure how cost grows, on scenes of this family in the --sizes given, made in memory
     #[arg(long, value_name = "NAME", value_parser = parse::named::<Family>(), conflicts_with = "inputs",

@@ -37,7 +37,7 @@ struct Bench<'a> {
 
 /// Compares on each model and tells how that ended: as the worst of them.
 pub(super) fn run(args: &BenchArgs) -> Exit {
-    let messages = Messages::new(args.load.messages.into(), args.quiet);
+    let messages = Messages::new(args.messages.into(), args.quiet);
     let (plan, files) = match (plan(args), files(args)) {
         (Ok(plan), Ok(files)) => (plan, files),
         (Err(wrong), _) | (_, Err(wrong)) => return messages.wrong(wrong),

@@ -3,7 +3,7 @@
 use super::super::camera::Choice;
 use super::super::exit::Exit;
 use super::super::message::Messages;
-use super::super::{job, read, seen};
+use super::super::{read, seen};
 use super::args::BenchArgs;
 use crate::accel::{AccelChoice, AccelKind, AccelParams};
 use crate::bench::pruning::Pruning;
@@ -95,9 +95,8 @@ impl Prepared {
     pub(super) fn new(subject: &Subject, args: &BenchArgs, messages: &Messages) -> Result<Self, Exit> {
         let mut loaded = subject.load(args, messages)?;
         let input = subject.path();
-        let world = subject
-            .world(&loaded, job::limits(args.load.max_memory).memory)
-            .map_err(|fault| messages.fail(&fault, Exit::Failed))?;
+        let world =
+            subject.world(&loaded, args.load.limits().memory).map_err(|fault| messages.fail(&fault, Exit::Failed))?;
         if world.is_empty() {
             return Err(messages.fail(&seen::nothing_to_hit(input), Exit::Input));
         }

@@ -1,7 +1,7 @@
 //! `meshray bench --spd FOLDER`: our counts beside those published in 1999.
 
 use super::super::exit::Exit;
-use super::super::{interrupt, job};
+use super::super::interrupt;
 use super::Bench;
 use crate::bench::machine::Machine;
 use crate::bench::spd::measure::{Measured, Plan, measure};
@@ -47,7 +47,7 @@ impl Bench<'_> {
 
     fn measured(&self, scene: &'static Scene, path: &Path, plan: Plan) -> Result<Measured, Exit> {
         // Polygons stay whole: each is one object of the published counts.
-        let limits = job::limits(self.args.load.max_memory);
+        let limits = self.args.load.limits();
         let options = LoadOptions { polygons: Polygons::Whole, limits, ..LoadOptions::default() };
         let loaded = load(path, &options).map_err(|error| self.messages.load_error(&error))?;
         let Loaded { scene: loaded, facts, .. } = loaded;

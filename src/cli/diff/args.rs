@@ -1,10 +1,9 @@
 //! What was typed after `meshray diff`.
 
-use super::super::args::MessageFormat;
+use super::super::args::{MessageFormat, SpaceArg};
 use super::super::parse;
 use super::limit::Limit;
 use crate::image::ToneMap;
-use crate::image::diff::Space;
 use crate::image::diff::flip::PIXELS_PER_DEGREE;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
@@ -59,24 +58,6 @@ pub(in crate::cli) struct DiffArgs {
     /// How messages are written to standard error
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t, help_heading = "Output")]
     pub messages: MessageFormat,
-}
-
-/// `--space`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(in crate::cli) enum SpaceArg {
-    /// sRGB codes, 0 to 1
-    Display,
-    /// Light
-    Linear,
-}
-
-impl From<SpaceArg> for Space {
-    fn from(space: SpaceArg) -> Self {
-        match space {
-            SpaceArg::Display => Self::Display,
-            SpaceArg::Linear => Self::Linear,
-        }
-    }
 }
 
 /// `--show`.

@@ -1,6 +1,7 @@
 //! `--fail-if`: figures of a difference that are too much, or too little.
 
 use super::Compared;
+use crate::bench::baseline::sides;
 use std::fmt;
 use std::str::FromStr;
 
@@ -36,11 +37,10 @@ impl FromStr for Limit {
     fn from_str(text: &str) -> Result<Self, String> {
         let names = FIGURES.map(|(name, _)| name).join(", ");
         let wrong = || format!("{text:?}: write a figure and its limit, such as 'rmse>0.01'; figures: {names}");
-        let place = text.find(['<', '>']).ok_or_else(wrong)?;
-        let (name, rest) = text.split_at(place);
-        let figure = FIGURES.into_iter().find(|(known, _)| *known == name.trim()).ok_or_else(wrong)?;
-        let bound = rest[1..].trim().parse::<f64>().ok().filter(|b| b.is_finite()).ok_or_else(wrong)?;
-        Ok(Self { figure, above: rest.starts_with('>'), bound })
+        let (name, above, bound) = sides(text).ok_or_else(wrong)?;
+        let figure = FIGURES.into_iter().find(|(known, _)| *known == name).ok_or_else(wrong)?;
+        let bound = bound.parse::<f64>().ok().filter(|b| b.is_finite()).ok_or_else(wrong)?;
+        Ok(Self { figure, above, bound })
     }
 }
 

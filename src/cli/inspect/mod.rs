@@ -19,24 +19,24 @@ mod topology;
 use super::args::ModelArgs;
 use super::exit::Exit;
 use super::message::Messages;
-use super::{accident, job, read};
+use super::{accident, read};
 use crate::render::Instancing;
 pub(super) use args::InspectArgs;
 use report::Report;
 
 /// Loads the file and prints what was found.
 pub(super) fn run(args: &InspectArgs) -> Exit {
-    let messages = Messages::new(args.model.load.messages.into(), false);
+    let messages = Messages::new(args.model.messages.into(), false);
     accident::guard(&args.model.input.display().to_string(), &messages, || inspect(args, &messages))
 }
 
 fn inspect(args: &InspectArgs, messages: &Messages) -> Exit {
-    let ModelArgs { input, load } = &args.model;
+    let ModelArgs { input, load, .. } = &args.model;
     let loaded = match read::model_as_stored(input, load, messages) {
         Ok(loaded) => loaded,
         Err(exit) => return exit,
     };
-    let limit = job::limits(load.max_memory).memory;
+    let limit = load.limits().memory;
     let world = match read::as_drawn(&loaded, Instancing::Auto, limit, input) {
         Ok(world) => world,
         Err(fault) => return messages.fail(&fault, Exit::Failed),

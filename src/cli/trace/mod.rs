@@ -58,7 +58,7 @@ struct Told<'a> {
 
 /// Loads the model, traces the ray and prints its story.
 pub(super) fn run(args: &TraceArgs) -> Exit {
-    let messages = Messages::new(args.model.load.messages.into(), args.quiet);
+    let messages = Messages::new(args.model.messages.into(), args.quiet);
     let checked = check(args).and_then(|look| Ok((look, job::params(&args.params, args.accel.kinds())?)));
     match checked {
         Ok((look, params)) => {
@@ -97,7 +97,7 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
         Sources::of(&loaded.facts.files).spared_by(path, "-o").map_err(fail(Exit::Failed))?;
     }
     let how = if job::keeps_instances(args.accel) { Instancing::Auto } else { Instancing::Flatten };
-    let limit = job::limits(args.model.load.max_memory).memory;
+    let limit = args.model.load.limits().memory;
     let world = read::as_drawn(&loaded, how, limit, file).map_err(fail(Exit::Failed))?;
     if world.is_empty() {
         return Err(fail(Exit::Input)(seen::nothing_to_hit(file)));

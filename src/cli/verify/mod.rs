@@ -12,7 +12,7 @@ mod args;
 mod report;
 
 use super::exit::Exit;
-use super::job::{self, Wrong};
+use super::job::Wrong;
 use super::message::Messages;
 use super::progress::Progress;
 use super::writable::{self, Sources};
@@ -26,7 +26,7 @@ use std::path::Path;
 
 /// Loads the file, judges it and prints what was found.
 pub(super) fn run(args: &VerifyArgs) -> Exit {
-    let messages = Messages::new(args.model.load.messages.into(), args.quiet);
+    let messages = Messages::new(args.model.messages.into(), args.quiet);
     accident::guard(&args.model.input.display().to_string(), &messages, || {
         judge(args, &messages).unwrap_or_else(|exit| exit)
     })
@@ -45,7 +45,7 @@ fn judge(args: &VerifyArgs, messages: &Messages) -> Result<Exit, Exit> {
     if let Some(path) = &args.plot {
         Sources::of(&loaded.facts.files).spared_by(path, "--plot").map_err(fail)?;
     }
-    let limit = job::limits(args.model.load.max_memory).memory;
+    let limit = args.model.load.limits().memory;
     let unjudged = reduce(&mut loaded, limit, &args.model.input).map_err(fail)?;
     let name = args.model.input.display().to_string();
     let plan = Plan { rays: args.rays, seed: args.seed, ..Plan::DEFAULT };

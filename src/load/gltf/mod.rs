@@ -20,7 +20,6 @@ mod animation;
 mod attributes;
 mod bounds;
 mod buffers;
-mod choice;
 pub mod codes;
 mod container;
 mod document;
@@ -57,6 +56,7 @@ mod variants;
 mod version;
 mod weight;
 
+use super::choice;
 use super::limits::Budget;
 use super::paths::Resolver;
 use super::wires::{self, Wires};
@@ -66,7 +66,6 @@ use crate::scene::{Environment, Instance, Scene};
 use accessor::Reader;
 use animation::Pose;
 use buffers::Buffers;
-pub(super) use choice::check_animation;
 use document::Document;
 use gltf::json::Root;
 use gltf::json::mesh as source;
@@ -225,7 +224,8 @@ impl Loading<'_> {
         let Some(moment) = self.options.moment.as_ref().filter(|_| !animations.is_empty()) else {
             return Ok(Pose::default());
         };
-        let names: Vec<Option<&str>> = animations.iter().map(|animation| animation.name.as_deref()).collect();
+        let names: Vec<&str> =
+            animations.iter().map(|animation| animation.name.as_deref().unwrap_or_default()).collect();
         let number = match (&moment.animation, self.options.animations_before) {
             (Some(wish), None) => choice::choose(&choice::ANIMATION, &names, wish, file)?,
             (Some(wish), Some(before)) => {
@@ -266,7 +266,7 @@ impl Loading<'_> {
     /// The variant of materials that is asked for.
     fn variant(&self, names: &[String]) -> Result<Option<usize>, LoadError> {
         let Some(wish) = &self.options.variant else { return Ok(None) };
-        let names: Vec<Option<&str>> = names.iter().map(|name| Some(name.as_str())).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
         Ok(Some(choice::choose(&choice::VARIANT, &names, wish, &self.source.path)?))
     }
 

@@ -52,7 +52,7 @@ pub(super) fn names(root: &Root) -> Vec<String> {
 /// The scene that is asked for by name or number; without a wish, the default one, or else the first.
 pub(super) fn choose(root: &Root, wish: Option<&str>, file: &Path) -> Result<usize, Diagnostic> {
     let Some(wish) = wish else { return Ok(root.scene.map_or(0, |scene| scene.value())) };
-    let names: Vec<Option<&str>> = root.scenes.iter().map(|scene| scene.name.as_deref()).collect();
+    let names: Vec<&str> = root.scenes.iter().map(|scene| scene.name.as_deref().unwrap_or_default()).collect();
     choice::choose(&choice::SCENE, &names, wish, file)
 }
 

@@ -2,7 +2,7 @@
 
 use crate::render::eyes::Place;
 use crate::render::frame::{Frame, on_lens, pixel_key};
-use crate::render::layers::Facts;
+use crate::render::layers::FirstSurface;
 use crate::render::sampling::Adaptive;
 use crate::render::whitted::Sample;
 use std::collections::HashMap;
@@ -23,7 +23,7 @@ pub(super) struct Point {
 pub(super) struct Found {
     pub at: Step,
     pub sample: Sample,
-    pub facts: Facts,
+    pub first: FirstSurface,
 }
 
 /// The points of a tile and of its border.
@@ -35,14 +35,14 @@ pub(super) struct Lattice {
     /// `None`: not traced yet.
     samples: Vec<Option<Sample>>,
     /// Empty unless layers are wanted.
-    facts: Vec<Facts>,
+    firsts: Vec<FirstSurface>,
     /// Points that nobody has asked for before.
     pub wanted: Vec<Point>,
 }
 
 impl Lattice {
     pub(super) fn new(pixel: u32) -> Self {
-        Self { pixel, numbers: HashMap::default(), samples: Vec::new(), facts: Vec::new(), wanted: Vec::new() }
+        Self { pixel, numbers: HashMap::default(), samples: Vec::new(), firsts: Vec::new(), wanted: Vec::new() }
     }
 
     /// The number of a point, which is wanted if it has none yet.
@@ -84,8 +84,8 @@ impl Lattice {
     }
 
     /// The first surface there, where layers are wanted.
-    pub(super) fn facts(&self, number: u32) -> Facts {
-        self.facts.get(number as usize).copied().unwrap_or(Facts::NONE)
+    pub(super) fn first(&self, number: u32) -> FirstSurface {
+        self.firsts.get(number as usize).copied().unwrap_or(FirstSurface::NONE)
     }
 
     /// The number of a point that was traced, the middle of no square.
@@ -94,18 +94,18 @@ impl Lattice {
     }
 
     /// Keeps what was found at a point with this number.
-    pub(super) fn store(&mut self, number: u32, sample: Sample, facts: Option<Facts>) {
+    pub(super) fn store(&mut self, number: u32, sample: Sample, first: Option<FirstSurface>) {
         self.samples[number as usize] = Some(sample);
-        if let Some(facts) = facts {
-            self.facts.resize(self.samples.len(), Facts::NONE);
-            self.facts[number as usize] = facts;
+        if let Some(first) = first {
+            self.firsts.resize(self.samples.len(), FirstSurface::NONE);
+            self.firsts[number as usize] = first;
         }
     }
 
     /// What was found at a point, the middle of no square.
     pub(super) fn found(&self, at: Step) -> Option<Found> {
         let number = self.traced(at)?;
-        self.sample(number).map(|&sample| Found { at, sample, facts: self.facts(number) })
+        self.sample(number).map(|&sample| Found { at, sample, first: self.first(number) })
     }
 
     /// What was found in the row of points `y`.

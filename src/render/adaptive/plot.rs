@@ -131,7 +131,7 @@ impl Plot {
                 return None;
             }
             for (i, point) in points.iter().enumerate() {
-                self.lattice.store(point.number, tracer.samples[i], tracer.facts.get(i).copied());
+                self.lattice.store(point.number, tracer.samples[i], tracer.firsts.get(i).copied());
             }
         }
         self.fresh.extend(points);
@@ -142,7 +142,7 @@ impl Plot {
     /// Takes what was found at a point of the border of this tile.
     pub(super) fn hear(&mut self, found: &Found, layers: bool) {
         let number = self.lattice.number(found.at);
-        self.lattice.store(number, found.sample, layers.then_some(found.facts));
+        self.lattice.store(number, found.sample, layers.then_some(found.first));
         self.fresh.push(Point { at: found.at, number });
     }
 
@@ -308,7 +308,7 @@ impl Plot {
             if frame.settings.layers {
                 let mut sum = LayerSum::default();
                 let five = std::iter::once(self.squares[i].middle).chain(self.squares[i].corners);
-                five.for_each(|point| sum.add(&self.lattice.facts(point)));
+                five.for_each(|point| sum.add(&self.lattice.first(point)));
                 done.layers.push(sum.pixel(frame.view.eye, frame.view.forward));
             }
         }

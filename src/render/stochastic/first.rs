@@ -7,7 +7,7 @@ use super::places::Places;
 use crate::accel::Accel;
 use crate::render::certainty::{Pixels, Shown};
 use crate::render::frame::Frame;
-use crate::render::layers::{Facts, LayerPixel};
+use crate::render::layers::{FirstSurface, LayerPixel};
 use crate::render::observer::Observer;
 use crate::render::tile::{TOGETHER, Tile, TilePixels};
 use crate::render::whitted::{Sample, Tracer};
@@ -18,7 +18,7 @@ pub(super) struct First {
     parts: Vec<(Tile, usize)>,
     samples: Vec<Sample>,
     /// What layers are made of; empty unless they are wanted.
-    facts: Vec<Facts>,
+    firsts: Vec<FirstSurface>,
     /// The pixels that they are.
     pixels: Pixels,
     shown: Shown,
@@ -38,15 +38,15 @@ impl Sampler<'_> {
             parts.push((tile, columns.len()));
             tile.list((&mut columns, &mut rows));
         }
-        let (mut samples, mut facts) = (Vec::with_capacity(count), Vec::new());
+        let (mut samples, mut firsts) = (Vec::with_capacity(count), Vec::new());
         let mut places = Places::default();
         for some in columns.chunks(TOGETHER).zip(rows.chunks(TOGETHER)) {
             places.trace_first(self.frame, self.how, tracer, some)?;
             samples.extend_from_slice(&tracer.samples);
-            facts.extend_from_slice(&tracer.facts);
+            firsts.extend_from_slice(&tracer.firsts);
         }
         let (shown, pixels) = self.judge.see_samples(&samples);
-        Some(First { parts, samples, facts, pixels, shown })
+        Some(First { parts, samples, firsts, pixels, shown })
     }
 }
 
@@ -55,7 +55,7 @@ impl First {
     pub(super) fn give(&self, pixel: &mut Pixel) {
         let Some(&(part, start)) = self.parts.iter().find(|(part, _)| part.contains(pixel.at)) else { return };
         let own = start + part.number(pixel.at);
-        pixel.take(&self.samples[own..=own], self.facts.get(own..=own).unwrap_or_default(), 1);
+        pixel.take(&self.samples[own..=own], self.firsts.get(own..=own).unwrap_or_default(), 1);
     }
 
     /// Copies what it shows of what lies around a tile.
@@ -89,9 +89,9 @@ impl First {
                 if let Some(veil) = done.veil.get_mut(to..to + count) {
                     veil.copy_from_slice(&self.pixels.veil[from..from + count]);
                 }
-                let facts = self.facts.iter().skip(from).take(count);
-                for (layers, facts) in done.layers.iter_mut().skip(to).zip(facts) {
-                    *layers = LayerPixel::new(std::slice::from_ref(facts), frame.view.eye, frame.view.forward);
+                let firsts = self.firsts.iter().skip(from).take(count);
+                for (layers, first) in done.layers.iter_mut().skip(to).zip(firsts) {
+                    *layers = LayerPixel::new(std::slice::from_ref(first), frame.view.eye, frame.view.forward);
                 }
                 from += count;
             }

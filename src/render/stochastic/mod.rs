@@ -279,8 +279,8 @@ impl<'a> Sampler<'a> {
                 places.trace(self.frame, self.how, tracer, (Roulette::after(first, self.how), wanted))?;
                 for (k, &pixel) in some.iter().enumerate() {
                     let of_pixel = k * each..(k + 1) * each;
-                    let facts = tracer.facts.get(of_pixel.clone()).unwrap_or_default();
-                    pixels[pixel].take(&tracer.samples[of_pixel], facts, in_group);
+                    let firsts = tracer.firsts.get(of_pixel.clone()).unwrap_or_default();
+                    pixels[pixel].take(&tracer.samples[of_pixel], firsts, in_group);
                 }
             }
         }

@@ -3,7 +3,7 @@
 use super::places::Wanted;
 use crate::render::certainty::{Certainty, GROUPS, Range};
 use crate::render::frame::{Sum, pixel_key};
-use crate::render::layers::{Facts, LayerSum};
+use crate::render::layers::{FirstSurface, LayerSum};
 use crate::render::tile::{End, PixelFacts};
 use crate::render::whitted::Sample;
 
@@ -41,7 +41,7 @@ impl Pixel {
     }
 
     /// Takes its first samples, or those that come next, of which so many go into each group.
-    pub(super) fn take(&mut self, samples: &[Sample], facts: &[Facts], in_group: usize) {
+    pub(super) fn take(&mut self, samples: &[Sample], firsts: &[FirstSurface], in_group: usize) {
         let start = self.facts.count as usize;
         for (i, sample) in (start..).zip(samples) {
             self.groups[i / in_group].add(sample);
@@ -50,7 +50,7 @@ impl Pixel {
         let count = samples.len() as u32;
         self.facts.count += count;
         if let Some(layers) = &mut self.layers {
-            facts.iter().for_each(|facts| layers.add(facts));
+            firsts.iter().for_each(|first| layers.add(first));
         }
     }
 

@@ -6,7 +6,7 @@ use crate::accel::{NO_PRIM, Ray};
 use crate::math::{DVec3, Vec3};
 use crate::render::branch::Ground;
 use crate::render::context::Context;
-use crate::render::layers::Facts;
+use crate::render::layers::FirstSurface;
 use crate::render::shade::{Matter, Seen};
 use crate::scene::Material;
 
@@ -33,17 +33,17 @@ impl Strip {
 
     /// Of each point that is shaded here: the place in what was traced of its ray, its sample, and what layers of a picture tell of
     /// it, whose material is `even` but for maps.
-    pub(crate) fn facts(
+    pub(crate) fn firsts(
         &self,
         instance: u32,
         even: &Matter,
         center: DVec3,
-    ) -> impl Iterator<Item = (usize, u32, Facts)> {
+    ) -> impl Iterator<Item = (usize, u32, FirstSurface)> {
         let prims = self.given.faces.prims();
         self.certain().map(move |i| {
             let at = (get(&self.found.position, i), get(&self.found.normal, i));
             let albedo = self.bare(i, even, true).model.base();
-            (self.rays[i] as usize, self.samples[i], Facts::new((prims[i], instance), at, albedo, center))
+            (self.rays[i] as usize, self.samples[i], FirstSurface::new((prims[i], instance), at, albedo, center))
         })
     }
 

@@ -1,0 +1,132 @@
+//! What the user wishes for by name or number: a scene, a variant of materials, an animation, a camera.
+
+use super::suggest::nearest;
+use super::{Diagnostic, Facts, Moment};
+use std::path::Path;
+
+/// A list of the file that something is chosen from; names in it may be empty, which is none.
+pub(crate) struct Kind {
+    /// One of them.
+    word: &'static str,
+    /// The list in the JSON of a glTF file.
+    list: &'static str,
+    /// Code of the message when there is no such thing.
+    code: &'static str,
+    /// The same when there are several of one name.
+    ambiguous: &'static str,
+    /// What there is to say where the list is empty.
+    empty: &'static str,
+}
+
+/// Scenes.
+pub(super) const SCENE: Kind = Kind {
+    word: "scene",
+    list: "scenes",
+    code: "gltf-no-such-scene",
+    ambiguous: "gltf-which-scene",
+    empty: "the file has none",
+};
+/// Variants of materials.
+pub(super) const VARIANT: Kind = Kind {
+    word: "variant",
+    list: "extensions.KHR_materials_variants.variants",
+    code: "gltf-no-such-variant",
+    ambiguous: "gltf-which-variant",
+    empty: "the file has none",
+};
+/// Animations.
+pub(super) const ANIMATION: Kind = Kind {
+    word: "animation",
+    list: "animations",
+    code: "gltf-no-such-animation",
+    ambiguous: "gltf-which-animation",
+    empty: "the file has none",
+};
+/// Cameras of a file or of a scene of several.
+pub(crate) const CAMERA: Kind = Kind {
+    word: "camera",
+    list: "",
+    code: "camera-unknown",
+    ambiguous: "camera-ambiguous",
+    empty: "the scene that is shown has no camera in it; use --view or --eye",
+};
+
+/// Names in one message before the rest is only counted.
+const LISTED: usize = 20;
+
+/// The number of what is called `wish`, or has that number where numbers begin with `first`.
+pub(super) fn find(names: &[&str], wish: &str, first: usize) -> Option<usize> {
+    let by_number = || wish.parse::<usize>().ok()?.checked_sub(first).filter(|&i| i < names.len());
+    names.iter().position(|name| is_called(name, wish)).or_else(by_number)
+}
+
+fn is_called(name: &str, wish: &str) -> bool {
+    name == wish && !name.is_empty()
+}
+
+/// Refuses a wish for an animation that none of several models has, whose animations these are.
+pub(super) fn check_animation(facts: &Facts, moment: &Moment, file: &Path) -> Result<(), Diagnostic> {
+    let names: Vec<&str> = facts.animations.iter().map(|animation| animation.name.as_str()).collect();
+    match &moment.animation {
+        Some(wish) if facts.shown.is_none() => choose(&ANIMATION, &names, wish, file).map(|_| ()),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses a name that several have; numbers begin with `first`.
+pub(super) fn check_name(
+    kind: &Kind,
+    names: &[&str],
+    (wish, first): (&str, usize),
+    file: &Path,
+) -> Result<(), Diagnostic> {
+    let called = (first..).zip(names).filter(|(_, name)| is_called(name, wish));
+    let called: Vec<String> = called.map(|(i, _)| i.to_string()).collect();
+    if called.len() < 2 {
+        return Ok(());
+    }
+    let text = format!("{} {}s are called '{wish}'", called.len(), kind.word);
+    let remedy = format!("name one by its number: {}", called.join(", "));
+    Err(Diagnostic::new(kind.ambiguous, file, kind.list, text).remedy(remedy))
+}
+
+/// The number of what is called `wish`, or has that number.
+///
+/// # Errors
+/// When there is no such thing, with a list of what there is; when several are called so.
+pub(crate) fn choose(kind: &Kind, names: &[&str], wish: &str, file: &Path) -> Result<usize, Diagnostic> {
+    check_name(kind, names, (wish, 0), file)?;
+    find(names, wish, 0).ok_or_else(|| {
+        let text = format!("there is no {} '{wish}'", kind.word);
+        Diagnostic::new(kind.code, file, kind.list, text).remedy(instead(kind, names, wish))
+    })
+}
+
+/// What there is instead of what was wished for.
+fn instead(kind: &Kind, names: &[&str], wish: &str) -> String {
+    if names.is_empty() {
+        return kind.empty.into();
+    }
+    let shown = |(i, name): (usize, &&str)| if name.is_empty() { i.to_string() } else { format!("{i} '{name}'") };
+    let list: Vec<String> = names.iter().enumerate().take(LISTED).map(shown).collect();
+    let near = nearest(wish, names.iter().copied().filter(|name| !name.is_empty()));
+    let near = near.map_or(String::new(), |near| format!("did you mean '{near}'? "));
+    let more = match names.len().saturating_sub(LISTED) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    format!("{near}it has {}{more}", list.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_shares_a_name_is_told_by_numbers_that_count_the_models_before() {
+        let check = |wish: &str| check_name(&ANIMATION, &["Run", "Stay", "Run"], (wish, 3), Path::new("b.glb"));
+        let error = check("Run").unwrap_err().to_string();
+        assert_eq!(error, "b.glb:animations: 2 animations are called 'Run'; name one by its number: 3, 5");
+        assert!(check("Stay").is_ok() && check("Fly").is_ok());
+    }
+}
