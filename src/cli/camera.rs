@@ -3,7 +3,7 @@
 use super::args::EyeArgs;
 use super::parse::Ortho;
 use crate::load::Diagnostic;
-use crate::load::choice::{CAMERA, choose};
+use crate::load::choice::{Kind, choose};
 use crate::math::DVec3;
 use crate::scene::framing::{self, Bounds, DEFAULT_FOV, Direction, FrameLens, NamedView, frame};
 use crate::scene::{Camera, Projection, Scene, UpAxis};
@@ -201,6 +201,15 @@ fn framing_lens(lens: Option<LensChoice>) -> FrameLens {
 fn quoted(name: &str) -> String {
     if name.is_empty() { String::new() } else { format!("'{name}'") }
 }
+
+/// Cameras that are chosen by name or number.
+const CAMERA: Kind = Kind {
+    word: "camera",
+    list: "",
+    code: "camera-unknown",
+    ambiguous: "camera-ambiguous",
+    empty: "the scene that is shown has no camera in it; use --view or --eye",
+};
 
 fn find<'s>(name: &str, scene: &'s Scene, file: &Path) -> Result<&'s Camera, Diagnostic> {
     let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();

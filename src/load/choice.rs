@@ -7,15 +7,15 @@ use std::path::Path;
 /// A list of the file that something is chosen from; names in it may be empty, which is none.
 pub(crate) struct Kind {
     /// One of them.
-    word: &'static str,
+    pub(crate) word: &'static str,
     /// The list in the JSON of a glTF file.
-    list: &'static str,
+    pub(crate) list: &'static str,
     /// Code of the message when there is no such thing.
-    code: &'static str,
+    pub(crate) code: &'static str,
     /// The same when there are several of one name.
-    ambiguous: &'static str,
+    pub(crate) ambiguous: &'static str,
     /// What there is to say where the list is empty.
-    empty: &'static str,
+    pub(crate) empty: &'static str,
 }
 
 /// Scenes.
@@ -42,15 +42,6 @@ pub(super) const ANIMATION: Kind = Kind {
     ambiguous: "gltf-which-animation",
     empty: "the file has none",
 };
-/// Cameras of a file or of a scene of several.
-pub(crate) const CAMERA: Kind = Kind {
-    word: "camera",
-    list: "",
-    code: "camera-unknown",
-    ambiguous: "camera-ambiguous",
-    empty: "the scene that is shown has no camera in it; use --view or --eye",
-};
-
 /// Names in one message before the rest is only counted.
 const LISTED: usize = 20;
 

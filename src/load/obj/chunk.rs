@@ -5,18 +5,16 @@
 //! groups that were set before are [`OPEN`]. Most lines are plain (`v`, `vt`, `vn` or `f` with numbers as programs print
 //! them) and read in one pass over their bytes; everything else goes word by word.
 
-use super::encoding::decode_name;
-use super::lines::{Lines, keyword, without_comment, words};
-use super::statements::{Face, Oddities, Run, Stroke};
+use super::statements::Oddities;
+use crate::load::geometry::{Face, LARGEST, Run, Stroke};
 use crate::load::number::{self, Plain};
+use crate::load::text::encoding::decode_name;
+use crate::load::text::lines::{Lines, keyword, without_comment, words};
 use crate::math::{DVec2, DVec3, Vec3};
 use std::collections::HashMap;
 
 /// A name, smoothing group or material that was set before the run.
 pub(super) const OPEN: u32 = u32::MAX;
-
-/// The largest number of a vertex, so that counts of corners, faces and normals can be added up.
-pub(super) const LARGEST: u32 = u32::MAX / 4;
 
 /// Marks the number of a vertex as relative to the start of the run; the rest of its bits hold it plus [`LARGEST`].
 const RELATIVE: u32 = 1 << 31;

@@ -2,10 +2,10 @@
 //! pay for.
 
 use super::chunk::{ATTRIBUTES, count, whole};
-use super::encoding::decode_name;
-use super::lines::{Lines, keyword, words};
 use super::statements::Tally;
 use crate::load::Diagnostic;
+use crate::load::text::encoding::decode_name;
+use crate::load::text::lines::{Lines, keyword, words};
 use std::path::Path;
 
 /// The first fault, with the number of all of its kind; or, where there is none, the corners that name texture coordinates or normals

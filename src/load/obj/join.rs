@@ -1,8 +1,8 @@
 //! Runs of lines, read side by side -> the statements of the whole text, as if it had been read line after line.
 
-use super::chunk::{COMMENTS, Chunk, LARGEST, NO_COLOR, OPEN, count, resolve};
-use super::soup::{Corner, NONE, Soup};
-use super::statements::{Run, Statements, Stroke};
+use super::chunk::{COMMENTS, Chunk, NO_COLOR, OPEN, count, resolve};
+use super::statements::Statements;
+use crate::load::geometry::{Corner, Geometry, LARGEST, NONE, Run, Soup, Stroke};
 use crate::math::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -40,13 +40,12 @@ pub(super) fn join(mut chunks: Vec<Chunk>) -> Result<Joined, u64> {
         gather(&mut out, chunk, before.lines);
         before.advance(chunk);
     }
-    out.counts = before.counts;
-    (out.names, out.runs) = (table.names, table.runs);
+    let counts = before.counts;
 
     let colors = chunks.iter().any(|c| !c.colors.is_empty());
-    let colors = if colors { all_colors(&chunks, &begins, out.counts[0]) } else { painted(&chunks, out.counts[0]) };
+    let colors = if colors { all_colors(&chunks, &begins, counts[0]) } else { painted(&chunks, counts[0]) };
     let (positions, uvs, normals) = vertices(&mut chunks);
-    let there = There { counts: out.counts, uvs: &uvs, normals: &normals };
+    let there = There { counts, uvs: &uvs, normals: &normals };
     let (corners, faulty) = corners(&chunks, &begins, &there);
 
     // Faces come last: they are read more often than they are written.
@@ -61,9 +60,10 @@ pub(super) fn join(mut chunks: Vec<Chunk>) -> Result<Joined, u64> {
         }
         first += count(chunk.corners.len());
     }
-    out.faces = flat(chunks.iter_mut().map(|c| std::mem::take(&mut c.faces)));
+    let faces = flat(chunks.iter_mut().map(|c| std::mem::take(&mut c.faces)));
     let stroke_corners = strokes(&chunks, &begins, &runs, &there, &mut out);
-    out.soup = Soup { positions, uvs, normals, colors, alphas: Vec::new(), corners, stroke_corners };
+    let soup = Soup { positions, uvs, normals, colors, alphas: Vec::new(), corners, stroke_corners };
+    out.geometry = Geometry { soup, faces, names: table.names, runs: table.runs, ..out.geometry };
     let faulty = faulty || chunks.iter().any(|c| c.faulty);
     Ok(Joined { statements: out, faulty })
 }
@@ -99,11 +99,12 @@ impl Before {
 
 /// What is collected and not counted on.
 fn gather(out: &mut Statements, chunk: &mut Chunk, lines: u32) {
+    let geometry = &mut out.geometry;
     let library = |(line, name): (u32, String)| (line.saturating_add(lines), name);
-    out.libraries.extend(std::mem::take(&mut chunk.libraries).into_iter().map(library));
-    let room = COMMENTS - out.comments.len();
-    out.comments.extend(std::mem::take(&mut chunk.comments).into_iter().take(room));
-    out.places = out.places.max(chunk.places);
+    geometry.libraries.extend(std::mem::take(&mut chunk.libraries).into_iter().map(library));
+    let room = COMMENTS - geometry.comments.len();
+    geometry.comments.extend(std::mem::take(&mut chunk.comments).into_iter().take(room));
+    geometry.places = geometry.places.max(chunk.places);
     out.odd.append(std::mem::take(&mut chunk.odd), lines);
 }
 
@@ -243,7 +244,7 @@ fn strokes(chunks: &[Chunk], begins: &[Before], runs: &[Vec<u32>], there: &There
                 corners.truncate(first);
                 out.odd.strokes.note(line, if stroke.joined { b"l" } else { b"p" });
             } else {
-                out.strokes.push(Stroke { run: runs[stroke.run as usize], line, ..*stroke });
+                out.geometry.strokes.push(Stroke { run: runs[stroke.run as usize], line, ..*stroke });
             }
         }
     }

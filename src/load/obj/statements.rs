@@ -5,66 +5,19 @@
 //! been read one after another (`join`). The text's own errors end here, with their line (`faults`): after this nothing
 //! refers to what is not there.
 
-use super::chunk::{self, Chunk, LARGEST};
-use super::encoding::decode_name;
+use super::chunk::{self, Chunk};
 use super::join::{Joined, join};
-use super::soup::{Corner, NONE, Soup};
 use super::{faults, split};
+use crate::load::geometry::{Corner, Geometry, LARGEST, Run, Stroke};
 use crate::load::limits::{Budget, OverBudget};
+use crate::load::text::encoding::decode_name;
 use crate::load::wires::Wires;
 use crate::load::{Diagnostic, LoadError, Warnings};
 use crate::scene::{Instance, Material, Mesh};
 use rayon::prelude::*;
 use std::mem::size_of;
-use std::ops::Range;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
-
-/// One face, without its corners.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Face {
-    /// Which of [`Statements::runs`].
-    pub run: u32,
-    /// Smoothing group; 0: none.
-    pub smoothing: u32,
-    /// Number of corners, at least 3.
-    pub arity: u32,
-    /// Where it starts in the file.
-    pub line: u32,
-    /// Which of the file's faces, from 0; those that are not kept count.
-    pub number: u32,
-    /// The first of its corners in [`Soup::corners`].
-    pub first: u32,
-}
-
-impl Face {
-    /// Its corners in [`Soup::corners`].
-    pub(super) fn corners(&self) -> Range<usize> {
-        self.first as usize..self.first as usize + self.arity as usize
-    }
-}
-
-/// One `p` or `l` statement, without its corners.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Stroke {
-    /// Which of [`Statements::runs`].
-    pub run: u32,
-    /// Where it stands in the file.
-    pub line: u32,
-    /// Number of corners, at least 1, or 2 of a line.
-    pub arity: u32,
-    /// Whether its corners are joined.
-    pub joined: bool,
-}
-
-/// What faces between two `o`, `g` or `usemtl` statements share; indices into [`Statements::names`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub(super) struct Run {
-    pub object: u32,
-    pub group: u32,
-    /// `None` before the first `usemtl`.
-    pub material: Option<u32>,
-}
 
 /// How often something odd was met, and where first.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -116,20 +69,7 @@ pub(super) struct Oddities {
 /// A whole file's statements.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Statements {
-    /// How many `v`, `vt` and `vn` there are.
-    pub counts: [u32; 3],
-    pub soup: Soup,
-    pub faces: Vec<Face>,
-    pub strokes: Vec<Stroke>,
-    pub runs: Vec<Run>,
-    /// Names; 0 is the empty one.
-    pub names: Vec<String>,
-    /// `mtllib` arguments, with their lines.
-    pub libraries: Vec<(u32, String)>,
-    /// Decimal places of the finest coordinate.
-    pub places: i32,
-    /// The first comments, without their signs.
-    pub comments: Vec<String>,
+    pub geometry: Geometry,
     pub odd: Oddities,
 }
 
@@ -156,11 +96,12 @@ fn read_in_runs(text: &[u8], run: usize, file: &Path, budget: &mut Budget) -> Re
     }
     if statements.is_cloud() {
         budget
-            .take(statements.soup.positions.len() as u64, POINT)
+            .take(statements.geometry.soup.positions.len() as u64, POINT)
             .map_err(|over| Diagnostic::over_budget(file, over))?;
-        statements.draw_points();
+        statements.geometry.draw_points();
     }
-    statements.soup.leave_out_unused();
+    statements.geometry.soup.leave_out_unused();
+    statements.geometry.few_corners = statements.odd.few_corners.count;
     Ok(statements)
 }
 
@@ -172,22 +113,8 @@ impl Statements {
     fn is_cloud(&self) -> bool {
         let odd = &self.odd;
         let others = [&odd.strokes, &odd.curves, &odd.calls, &odd.few_corners, &odd.absent];
-        self.faces.is_empty() && self.strokes.is_empty() && others.iter().all(|tally| tally.count == 0)
-    }
-
-    /// Makes every vertex a point; the `i`th has the `i`th normal where there are as many.
-    #[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^32 vertices")]
-    fn draw_points(&mut self) {
-        let (count, has_normals) = (self.soup.positions.len(), self.soup.normals.len() == self.soup.positions.len());
-        let corner = |i: u32| Corner { position: i, uv: NONE, normal: if has_normals { i } else { NONE } };
-        self.soup.stroke_corners = (0..count as u32).map(corner).collect();
-        self.strokes = (0..count).map(|_| Stroke { run: 0, line: 0, arity: 1, joined: false }).collect();
-        if self.runs.is_empty() {
-            self.runs.push(Run::default());
-        }
-        if self.names.is_empty() {
-            self.names.push(String::new());
-        }
+        let Geometry { faces, strokes, .. } = &self.geometry;
+        faces.is_empty() && strokes.is_empty() && others.iter().all(|tally| tally.count == 0)
     }
 }
 
@@ -293,10 +220,8 @@ impl Oddities {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    use super::super::color;
-    use super::super::soup::NONE;
     use crate::load::Limits;
+    use crate::load::geometry::{Face, NONE, color};
     use crate::math::{DVec2, DVec3, Vec3};
 
     fn read_with(text: &str, memory: u64) -> Result<Statements, LoadError> {
@@ -314,7 +239,7 @@ mod tests {
     /// Numbers of vertices, coordinates and normals as the text counts them; 0: none.
     fn corners(s: &Statements) -> Vec<[u32; 3]> {
         let number = |index: u32| if index == NONE { 0 } else { index + 1 };
-        s.soup.corners.iter().map(|c| [c.position, c.uv, c.normal].map(number)).collect()
+        s.geometry.soup.corners.iter().map(|c| [c.position, c.uv, c.normal].map(number)).collect()
     }
 
     const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
@@ -327,7 +252,7 @@ mod tests {
 
     #[test]
     fn a_face_may_name_a_vertex_that_comes_later() {
-        assert_eq!(of(&format!("f 1 2 3\n{TRIANGLE}")).soup.corners.len(), 3);
+        assert_eq!(of(&format!("f 1 2 3\n{TRIANGLE}")).geometry.soup.corners.len(), 3);
     }
 
     #[test]
@@ -357,7 +282,7 @@ mod tests {
     fn zero_is_no_coordinate_and_no_normal_but_a_fault_as_a_vertex() {
         let s = of(&format!("{TRIANGLE}vt 0 0\nvn 0 0 1\nf 1/0/1 2/1/0 3/0/0\nl 1/0 2"));
         assert_eq!(corners(&s), [[1, 0, 1], [2, 1, 0], [3, 0, 0]]);
-        assert_eq!((s.strokes.len(), s.odd.zero.count), (1, 5));
+        assert_eq!((s.geometry.strokes.len(), s.odd.zero.count), (1, 5));
         let mut warnings = Warnings::default();
         s.odd.warn(Path::new("m.obj"), &mut warnings);
         let told: Vec<String> = warnings.into_vec().iter().map(ToString::to_string).collect();
@@ -372,10 +297,10 @@ mod tests {
     fn runs_with_the_same_names_and_material_are_one() {
         let text = "o a\nusemtl r\nf 1 2 3\nusemtl b\nf 1 2 3\nusemtl r\nf 1 2 3\ng x\nf 1 2 3\no b\nf 1 2 3";
         let s = of(&format!("{TRIANGLE}{text}"));
-        assert_eq!(s.faces.iter().map(|f| f.run).collect::<Vec<_>>(), [0, 1, 0, 2, 3]);
+        assert_eq!(s.geometry.faces.iter().map(|f| f.run).collect::<Vec<_>>(), [0, 1, 0, 2, 3]);
         let named = |run: usize| {
-            let Run { object, group, material } = s.runs[run];
-            let name = |id: u32| s.names[id as usize].as_str();
+            let Run { object, group, material } = s.geometry.runs[run];
+            let name = |id: u32| s.geometry.names[id as usize].as_str();
             (name(object), name(group), name(material.unwrap()))
         };
         assert_eq!((named(2), named(3)), (("a", "x", "r"), ("b", "", "r")));
@@ -384,17 +309,17 @@ mod tests {
     #[test]
     fn smoothing_groups_are_numbers_on_or_off() {
         let s = of(&format!("{TRIANGLE}f 1 2 3\ns 7\nf 1 2 3\ns off\nf 1 2 3\ns on\nf 1 2 3\ns x\nf 1 2 3"));
-        assert_eq!(s.faces.iter().map(|f| f.smoothing).collect::<Vec<_>>(), [0, 7, 0, 1, 0]);
+        assert_eq!(s.geometry.faces.iter().map(|f| f.smoothing).collect::<Vec<_>>(), [0, 7, 0, 1, 0]);
         assert_eq!(s.odd.smoothing.count, 1);
     }
 
     #[test]
     fn colors_on_some_vertices_leave_the_others_white() {
         let mut s = of("v 0 0 0\nv 1 0 0 1 0.5 0\nv 2 0 0\nv 3 0 0 0 0 1 0.5\nv 4 0 0 0.5");
-        assert_eq!(color::settle(&mut s.soup.colors), color::Coding::Units);
-        assert_eq!(s.soup.colors, [[1.0; 3], [1.0, 0.5, 0.0], [1.0; 3], [0.0, 0.0, 1.0], [1.0; 3]]);
+        assert_eq!(color::settle(&mut s.geometry.soup.colors), color::Coding::Units);
+        assert_eq!(s.geometry.soup.colors, [[1.0; 3], [1.0, 0.5, 0.0], [1.0; 3], [0.0, 0.0, 1.0], [1.0; 3]]);
         assert_eq!(s.odd.weight.count, 1);
-        assert!(of("v 0 0 0\nv 1 1 1").soup.colors.is_empty());
+        assert!(of("v 0 0 0\nv 1 1 1").geometry.soup.colors.is_empty());
     }
 
     #[test]
@@ -402,7 +327,7 @@ mod tests {
         let s = of(&format!("{TRIANGLE}p 1 2 3\nl 1 2 3\nsurf 0 1 0 1 1\nf 1 2\nf\nf 1 2 3\nhello"));
         assert_eq!((s.odd.strokes.count, s.odd.curves.count), (0, 1));
         assert_eq!((s.odd.few_corners.count, s.odd.unknown.count), (2, 1));
-        assert_eq!(s.faces, [Face { run: 0, smoothing: 0, arity: 3, line: 9, number: 2, first: 0 }]);
+        assert_eq!(s.geometry.faces, [Face { run: 0, smoothing: 0, arity: 3, line: 9, number: 2, first: 0 }]);
     }
 
     #[test]
@@ -419,8 +344,8 @@ mod tests {
         let text = format!("l 1/1 2 3 # side\n{TRIANGLE}vt 0 0\np -1 1\nl 1\nl 1 9\np x\np\nl 1 -4\nf 1 2 3\nl 2 3");
         let s = of(&text);
         let stroke = |line, arity, joined| Stroke { run: 0, line, arity, joined };
-        assert_eq!(s.strokes, [stroke(1, 3, true), stroke(6, 2, false), stroke(13, 2, true)]);
-        let numbers: Vec<_> = s.soup.stroke_corners.iter().map(|c| (c.position, c.uv == NONE)).collect();
+        assert_eq!(s.geometry.strokes, [stroke(1, 3, true), stroke(6, 2, false), stroke(13, 2, true)]);
+        let numbers: Vec<_> = s.geometry.soup.stroke_corners.iter().map(|c| (c.position, c.uv == NONE)).collect();
         let at = |i| (i, true);
         assert_eq!(numbers, [(0, false), at(1), at(2), at(2), at(0), at(1), at(2)]);
         assert_eq!(s.odd.strokes.count, 5);
@@ -429,8 +354,11 @@ mod tests {
     #[test]
     fn odd_and_missing_numbers_are_read_and_counted() {
         let s = of("v 1,5 0 # hi\nvt 0.5\nvn 1 0\nv 1 2 3 # hi\nvt 1 2 3\nf 1 2 1");
-        assert_eq!(s.soup.positions, [DVec3::new(1.5, 0.0, 0.0), DVec3::new(1.0, 2.0, 3.0)]);
-        assert_eq!((s.soup.uvs, s.soup.normals), (vec![DVec2::new(0.5, 0.0), DVec2::new(1.0, 2.0)], vec![Vec3::ZERO]));
+        assert_eq!(s.geometry.soup.positions, [DVec3::new(1.5, 0.0, 0.0), DVec3::new(1.0, 2.0, 3.0)]);
+        assert_eq!(
+            (s.geometry.soup.uvs, s.geometry.soup.normals),
+            (vec![DVec2::new(0.5, 0.0), DVec2::new(1.0, 2.0)], vec![Vec3::ZERO])
+        );
         assert_eq!((s.odd.short.count, s.odd.number.count), (2, 1));
     }
 

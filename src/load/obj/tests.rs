@@ -1,6 +1,9 @@
 //! Whole OBJ texts through the loader.
 
+mod corners;
+
 use super::*;
+use crate::load::geometry::sound::assert_sound;
 use crate::load::{Limits, Polygons};
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
 use crate::scene::{Material, Reflection, UpAxis};
@@ -275,7 +278,7 @@ fn points_and_lines_are_drawn_in_the_colours_of_their_material_and_vertices() {
     assert!(shown.clone().all(|m| matches!(m.reflection, Reflection::Unlit)));
     let ends = [scene.meshes[0].colors[0], scene.meshes[0].colors[5]].map(|c| c.truncate().to_array());
     assert_eq!(ends, [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
-    fuzz::assert_sound(&loaded);
+    assert_sound(&loaded);
 }
 
 #[test]

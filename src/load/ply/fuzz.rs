@@ -1,7 +1,7 @@
 //! Files that nobody wrote: whatever comes in, the loader ends with a scene that holds together or with an error.
 
 use super::tests::{FORMATS, of, square};
-use crate::load::obj::fuzz::assert_sound;
+use crate::load::geometry::sound::assert_sound;
 use crate::load::{LoadOptions, Polygons};
 use proptest::prelude::*;
 

@@ -2,8 +2,8 @@
 
 use super::body::{Body, Missing};
 use super::header::{Element, Encoding, Header, Kind, Property};
+use crate::load::geometry::bare::Bare;
 use crate::load::limits::Budget;
-use crate::load::obj::bare::Bare;
 use crate::load::paths::shorten;
 use crate::load::{Diagnostic, Source};
 use crate::math::{DVec2, DVec3, Vec3};

@@ -18,8 +18,8 @@ mod body;
 mod geometry;
 mod header;
 
+use super::geometry::bare;
 use super::limits::Budget;
-use super::obj::bare;
 use super::{LoadError, LoadOptions, Loaded, Source};
 use crate::scene::UpAxis;
 use header::{Encoding, Header};

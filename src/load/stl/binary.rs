@@ -1,7 +1,7 @@
 //! Binary STL: 80 bytes of anything, the number of triangles, and 50 bytes for each.
 
 use super::Triangles;
-use crate::load::obj::bare::Bare;
+use crate::load::geometry::bare::Bare;
 use crate::load::{Diagnostic, Source};
 use crate::math::DVec3;
 

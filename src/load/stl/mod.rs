@@ -10,8 +10,8 @@
 mod binary;
 mod text;
 
+use super::geometry::bare::{self, Bare};
 use super::limits::Budget;
-use super::obj::bare::{self, Bare};
 use super::{Diagnostic, LoadError, LoadOptions, Loaded, Source};
 use crate::math::DVec3;
 use crate::scene::UpAxis;

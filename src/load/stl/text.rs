@@ -4,8 +4,8 @@
 //! Words may stand on any lines and in any case, as programs write them.
 
 use super::Triangles;
+use crate::load::geometry::bare::Bare;
 use crate::load::number::{self, Respelled};
-use crate::load::obj::bare::Bare;
 use crate::load::paths::shorten;
 use crate::load::{Diagnostic, Source};
 use crate::math::DVec3;

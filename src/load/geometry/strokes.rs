@@ -1,20 +1,20 @@
-//! Points and lines -> what `load::wires` draws: one part for each run of statements that share object, group and material.
+//! Points and lines -> what `load::wires` draws: one part for each run of geometry that share object, group and material.
 
 use super::assemble::{Key, fill_vertices, name};
 use super::pairs::Pairs;
 use super::soup::{Corner, NONE, Soup};
-use super::statements::{Statements, Stroke};
+use super::{Geometry, Stroke};
 use crate::load::place::Placed;
 use crate::load::wires::Wires;
 use crate::math::Vec3;
 use crate::scene::Mesh;
 use std::collections::BTreeMap;
 
-/// The points and lines of each of [`Statements::runs`] that has any, with its index.
-pub(super) fn assemble(statements: &Statements, soup: &Soup, placed: &Placed) -> Vec<(u32, Wires)> {
+/// The points and lines of each of [`Geometry::runs`] that has any, with its index.
+pub(super) fn assemble(geometry: &Geometry, soup: &Soup, placed: &Placed) -> Vec<(u32, Wires)> {
     let mut of_run: BTreeMap<u32, Vec<(Stroke, &[Corner])>> = BTreeMap::new();
     let mut rest = soup.stroke_corners.as_slice();
-    for stroke in &statements.strokes {
+    for stroke in &geometry.strokes {
         let (corners, after) = rest.split_at(stroke.arity as usize);
         rest = after;
         of_run.entry(stroke.run).or_default().push((*stroke, corners));
@@ -26,7 +26,7 @@ pub(super) fn assemble(statements: &Statements, soup: &Soup, placed: &Placed) ->
     let mut build = |(run, strokes): (u32, Vec<(Stroke, &[Corner])>)| {
         vertices.clear();
         let mut wires = wires(&strokes, soup, placed, &mut vertices);
-        wires.mesh.name = name(statements, run);
+        wires.mesh.name = name(geometry, run);
         (run, wires)
     };
     of_run.into_iter().map(&mut build).collect()

@@ -7,9 +7,9 @@
 //! A face in no group is flat, and so is every face of a file that has neither normals nor groups, such as most scans:
 //! that is what the OBJ text says and what most viewers show.
 
+use super::Face;
 use super::pairs::Pairs;
 use super::soup::{NONE, Soup};
-use super::statements::Face;
 use crate::load::smooth::angle;
 use crate::math::ear_clip::newell;
 use crate::math::{DVec3, Vec3};

@@ -1,8 +1,9 @@
-//! Faces, points and lines of statements -> scene: the way of OBJ files, and of files that hold geometry alone.
+//! Faces, points and lines -> scene: the way of OBJ files, and of files that hold geometry alone.
 
-use super::statements::Statements;
-use super::{assemble, mtl, strokes, up};
+use super::Geometry;
+use super::{assemble, strokes, up};
 use crate::load::limits::{Budget, OverBudget};
+use crate::load::mtl;
 use crate::load::paths::Resolver;
 use crate::load::place::place;
 use crate::load::tangents;
@@ -14,7 +15,7 @@ use assemble::Assembled;
 use std::path::Path;
 
 /// What a kind of file is called, and how its messages are.
-pub(super) struct Kind<'a> {
+pub(in crate::load) struct Kind<'a> {
     /// For reports.
     pub format: &'a str,
     /// Codes of what becomes of faces, in the order of [`warn_of_faces`].
@@ -31,8 +32,8 @@ pub(super) struct Kind<'a> {
 ///
 /// # Errors
 /// When it would take more than is left of the budget.
-pub(super) fn finish(
-    mut statements: Statements,
+pub(in crate::load) fn finish(
+    mut geometry: Geometry,
     kind: &Kind,
     (source, options): (&Source, &LoadOptions),
     mut warnings: Warnings,
@@ -40,27 +41,28 @@ pub(super) fn finish(
 ) -> Result<Loaded, LoadError> {
     let file = source.path.as_path();
     let mut resolver = Resolver::new(source, options);
-    let soup = std::mem::take(&mut statements.soup);
+    let soup = std::mem::take(&mut geometry.soup);
+    let vertices = soup.positions.len();
     let (colored, is_see_through) = (!soup.colors.is_empty(), !soup.alphas.is_empty());
     let placed = place(&soup.positions);
-    let flatness = assemble::flatness(&placed.positions, statements.places);
-    let mut assembled = assemble::assemble(&statements, &soup, &placed, options.polygons, flatness);
+    let flatness = assemble::flatness(&placed.positions, geometry.places);
+    let mut assembled = assemble::assemble(&geometry, &soup, &placed, options.polygons, flatness);
     let (wire_runs, mut wires): (Vec<u32>, Vec<Wires>) =
-        strokes::assemble(&statements, &soup, &placed).into_iter().unzip();
+        strokes::assemble(&geometry, &soup, &placed).into_iter().unzip();
     drop(soup);
     warn_of_faces(&assembled, kind, file, &mut warnings);
-    if statements.faces.is_empty() && wires.is_empty() {
-        let text = format!("{} vertices and no face: there is nothing to draw", statements.counts[0]);
+    if geometry.faces.is_empty() && wires.is_empty() {
+        let text = format!("{} vertices and no face: there is nothing to draw", vertices);
         warnings.push(Diagnostic::new(kind.no_faces, file, "", text));
     }
 
     // Which way is up, what everything is made of, and where it stands.
     let (runs, meshes): (Vec<u32>, Vec<Mesh>) = std::mem::take(&mut assembled.meshes).into_iter().unzip();
-    let (guessed, reason) = up::guess(&statements.comments, &meshes, &placed, kind.otherwise);
-    let name = |run: &u32| statements.runs[*run as usize].material.map(|id| statements.names[id as usize].as_str());
+    let (guessed, reason) = up::guess(&geometry.comments, &meshes, &placed, kind.otherwise);
+    let name = |run: &u32| geometry.runs[*run as usize].material.map(|id| geometry.names[id as usize].as_str());
     let names: Vec<Option<&str>> = runs.iter().chain(&wire_runs).map(name).collect();
     let mut reading = mtl::Reading { file, options, colored, resolver: &mut resolver, budget, warnings: &mut warnings };
-    let mut materials = mtl::load(&statements.libraries, &names, &mut reading);
+    let mut materials = mtl::load(&geometry.libraries, &names, &mut reading);
     if is_see_through {
         materials.materials.iter_mut().for_each(|material| material.alpha_mode = AlphaMode::Blend);
     }
@@ -74,9 +76,9 @@ pub(super) fn finish(
     let (files, hash, gaps) = resolver.finish();
     let mut facts = Facts {
         format: kind.format.into(),
-        generator: generator(&statements.comments),
+        generator: generator(&geometry.comments),
         faces: assembled.faces,
-        dropped: dropped(&statements, &assembled),
+        dropped: dropped(&geometry, &assembled),
         up_reason: options.up.is_none().then_some(reason),
         max_rounding: placed.max_rounding,
         files,
@@ -155,9 +157,9 @@ fn warn_of_faces(assembled: &Assembled, kind: &Kind, file: &Path, warnings: &mut
     }
 }
 
-fn dropped(statements: &Statements, assembled: &Assembled) -> Vec<(String, u64)> {
+fn dropped(geometry: &Geometry, assembled: &Assembled) -> Vec<(String, u64)> {
     let reasons = [
-        ("fewer than 3 corners", u64::from(statements.odd.few_corners.count)),
+        ("fewer than 3 corners", u64::from(geometry.few_corners)),
         ("a corner that is not finite", assembled.not_finite.0),
         ("fewer than 3 different corners", assembled.collapsed.0),
         ("corners that rounding joins, far from the middle", assembled.rounded.0),

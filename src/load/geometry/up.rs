@@ -27,10 +27,10 @@ const Z_WRITERS: [&str; 13] = [
 ];
 
 /// The up axis of an OBJ that gives no sign.
-pub(super) const UNSAID: (UpAxis, &str) = (UpAxis::Y, "OBJ does not say, and nothing speaks for +Z");
+pub(in crate::load) const UNSAID: (UpAxis, &str) = (UpAxis::Y, "OBJ does not say, and nothing speaks for +Z");
 
 /// Guesses from the comments, then from the shape of meshes around the centre of all vertices, or else takes `otherwise`; the text says why.
-pub(super) fn guess(
+pub(in crate::load) fn guess(
     comments: &[String],
     meshes: &[Mesh],
     placed: &Placed,

@@ -9,9 +9,9 @@ mod parse;
 mod pictures;
 mod textures;
 
-use super::lines::without_comment;
 use crate::load::limits::{Budget, Limits};
 use crate::load::paths::{Found, Resolver, shorten, taken_from};
+use crate::load::text::lines::without_comment;
 use crate::load::{Diagnostic, LoadOptions, MtlMode, Warnings};
 use crate::math::Vec3;
 use crate::scene::{Bitmap, Material, Texture};

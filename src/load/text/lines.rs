@@ -4,7 +4,7 @@
 //! paths into comments, and a path may end in a backslash.
 
 /// Reads logical lines one after another; allocates only for joined ones.
-pub(super) struct Lines<'a> {
+pub(in crate::load) struct Lines<'a> {
     rest: &'a [u8],
     joined: Vec<u8>,
     /// Physical line the next one starts at, from 1.
@@ -12,28 +12,28 @@ pub(super) struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    pub(super) fn new(text: &'a [u8]) -> Self {
+    pub(in crate::load) fn new(text: &'a [u8]) -> Self {
         Self { rest: text, joined: Vec::new(), number: 1 }
     }
 
     /// What has not been read.
-    pub(super) fn rest(&self) -> &'a [u8] {
+    pub(in crate::load) fn rest(&self) -> &'a [u8] {
         self.rest
     }
 
     /// Number of the physical line that starts with [`Self::rest`].
-    pub(super) fn number(&self) -> u32 {
+    pub(in crate::load) fn number(&self) -> u32 {
         self.number
     }
 
     /// Passes a physical line of so many bytes, its end included.
-    pub(super) fn pass(&mut self, length: usize) {
+    pub(in crate::load) fn pass(&mut self, length: usize) {
         self.rest = &self.rest[length..];
         self.number = self.number.saturating_add(1);
     }
 
     /// The next line that is not blank, and the number of the physical line it starts at.
-    pub(super) fn next(&mut self) -> Option<(u32, &[u8])> {
+    pub(in crate::load) fn next(&mut self) -> Option<(u32, &[u8])> {
         loop {
             let number = self.number;
             let line = self.physical()?;
@@ -96,19 +96,19 @@ fn comment(rest: &[u8]) -> Option<usize> {
 }
 
 /// Splits a line into its first word and the trimmed rest.
-pub(super) fn keyword(line: &[u8]) -> (&[u8], &[u8]) {
+pub(in crate::load) fn keyword(line: &[u8]) -> (&[u8], &[u8]) {
     let end = line.iter().position(u8::is_ascii_whitespace).unwrap_or(line.len());
     (&line[..end], line[end..].trim_ascii())
 }
 
 /// The words of `rest` up to a comment.
-pub(super) fn words(rest: &[u8]) -> impl Iterator<Item = &[u8]> {
+pub(in crate::load) fn words(rest: &[u8]) -> impl Iterator<Item = &[u8]> {
     rest[..comment(rest).unwrap_or(rest.len())].split(u8::is_ascii_whitespace).filter(|w| !w.is_empty())
 }
 
 /// A name without the comment that may follow it: a `#` between white space starts one (names such as `Color#1` keep
 /// theirs).
-pub(super) fn without_comment(name: &[u8]) -> &[u8] {
+pub(in crate::load) fn without_comment(name: &[u8]) -> &[u8] {
     let starts = |w: &[u8]| w[0].is_ascii_whitespace() && w[1] == b'#' && w[2].is_ascii_whitespace();
     name.windows(3).position(starts).map_or(name, |at| name[..at].trim_ascii())
 }

@@ -1,7 +1,7 @@
 //! One map statement of an MTL file: its options and the name of its file.
 
-use super::super::encoding::decode_name;
 use crate::load::number;
+use crate::load::text::encoding::decode_name;
 use crate::math::DVec2;
 
 /// Which channel of a picture a scalar map reads (`-imfchan`).

@@ -3,9 +3,9 @@
 use super::options::{self, Map};
 use crate::load::limits::{Budget, OverBudget};
 use crate::load::number;
-use crate::load::obj::encoding::{decode_name, to_ascii_superset};
-use crate::load::obj::lines::{Lines, keyword, words};
 use crate::load::paths::shorten;
+use crate::load::text::encoding::{decode_name, to_ascii_superset};
+use crate::load::text::lines::{Lines, keyword, words};
 use crate::load::{Diagnostic, Warnings};
 use crate::math::DVec3;
 use crate::scene::color::rec_709_of_xyz;

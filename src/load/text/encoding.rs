@@ -6,7 +6,7 @@
 use std::borrow::Cow;
 
 /// Strips a UTF-8 mark and converts UTF-16, with a mark or without.
-pub(super) fn to_ascii_superset(bytes: &[u8]) -> Cow<'_, [u8]> {
+pub(in crate::load) fn to_ascii_superset(bytes: &[u8]) -> Cow<'_, [u8]> {
     match bytes {
         [0xef, 0xbb, 0xbf, rest @ ..] => rest.into(),
         [0xff, 0xfe, rest @ ..] => utf16(rest, u16::from_le_bytes).into(),
@@ -24,7 +24,7 @@ fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Vec<u8> {
 
 /// A name or path as text: UTF-8, or else Latin-1, which maps every byte to some character and different bytes to
 /// different characters, so that names in another encoding still match each other.
-pub(super) fn decode_name(bytes: &[u8]) -> String {
+pub(in crate::load) fn decode_name(bytes: &[u8]) -> String {
     match std::str::from_utf8(bytes) {
         Ok(text) => text.into(),
         Err(_) => bytes.iter().map(|&b| char::from(b)).collect(),

@@ -4,9 +4,7 @@
 //! material.
 
 use super::finish::{Kind, finish};
-use super::soup::{Corner, NONE, Soup};
-use super::statements::{Face, Oddities, Run, Statements, Stroke};
-use super::{chunk, color};
+use super::{Corner, Face, Geometry, LARGEST, NONE, Run, Soup, Stroke, color};
 use crate::load::limits::{Budget, OverBudget};
 use crate::load::{Diagnostic, LoadError, LoadOptions, Loaded, Source, Warnings};
 use crate::math::{DVec2, DVec3, Vec3};
@@ -49,7 +47,7 @@ impl Bare {
     /// Bytes that a point or edge takes as a statement, with its corners and their vertices.
     const STROKE: u64 = 192;
     /// The most vertices, corners or faces.
-    pub(in crate::load) const LARGEST: u64 = chunk::LARGEST as u64;
+    pub(in crate::load) const LARGEST: u64 = LARGEST as u64;
 
     /// Takes the memory of so many vertices from a budget, before they are read.
     pub(in crate::load) fn charge_vertices(budget: &mut Budget, count: u64) -> Result<(), OverBudget> {
@@ -118,13 +116,13 @@ pub(in crate::load) fn load(
         place: |face| format!("face {face}"),
         otherwise,
     };
-    finish(statements(bare), &kind, (source, options), warnings, budget)
+    finish(geometry(bare), &kind, (source, options), warnings, budget)
 }
 
-/// The same as statements of an OBJ would leave it: one run of faces, each attribute numbered as its vertex.
+/// The same as the statements of an OBJ would leave it: one run of faces, each attribute numbered as its vertex.
 #[expect(clippy::cast_possible_truncation, reason = "readers keep below Bare::LARGEST")]
-fn statements(bare: Bare) -> Statements {
-    let (is_cloud, vertices) = (bare.is_cloud(), bare.positions.len());
+fn geometry(bare: Bare) -> Geometry {
+    let is_cloud = bare.is_cloud();
     let Bare { positions, normals, uvs, colors, corners, arities, edges, .. } = bare;
     let normals: Vec<Vec3> = normals.into_iter().map(|n| n.as_dvec3().normalize_or_zero().as_vec3()).collect();
     let corner = |i: u32| {
@@ -154,10 +152,7 @@ fn statements(bare: Bare) -> Statements {
         Face { run: 0, smoothing: 0, arity, line: number, number, first }
     };
     let faces = (0..).zip(&arities).map(face);
-    let mut odd = Oddities::default();
-    odd.few_corners.count = u32::try_from(bare.few_corners).unwrap_or(u32::MAX);
-    Statements {
-        counts: [vertices as u32, 0, 0],
+    Geometry {
         soup,
         faces: faces.collect(),
         strokes,
@@ -166,7 +161,7 @@ fn statements(bare: Bare) -> Statements {
         // So many digits that the rounding to `f32` alone counts.
         places: bare.places.unwrap_or(30),
         comments: bare.comments,
-        odd,
-        ..Statements::default()
+        few_corners: u32::try_from(bare.few_corners).unwrap_or(u32::MAX),
+        ..Geometry::default()
     }
 }

@@ -9,18 +9,18 @@ use std::path::Path;
 ///
 /// Programs that write them (scanners, sculpting and mesh repair programs) take them from 8-bit pictures and divide by
 /// 255, so they are sRGB-coded, unlike the colours of MTL files.
-pub(super) fn linear(color: [f32; 3]) -> Vec4 {
+pub(in crate::load) fn linear(color: [f32; 3]) -> Vec4 {
     from_srgb(color.map(|code| code.clamp(0.0, 1.0))).extend(1.0)
 }
 
 /// Opacities of vertices, 0…1; none where all are opaque, or [`are_all_clear`].
-pub(super) fn opacities(colors: &[[f32; 4]]) -> Vec<f32> {
+pub(in crate::load) fn opacities(colors: &[[f32; 4]]) -> Vec<f32> {
     let is_see_through = colors.iter().any(|c| opacity(c) < 1.0) && !are_all_clear(colors);
     if is_see_through { colors.iter().map(opacity).collect() } else { Vec::new() }
 }
 
 /// Whether all opacities are 0. They mean something else then: nobody writes a mesh that cannot be seen.
-pub(super) fn are_all_clear(colors: &[[f32; 4]]) -> bool {
+pub(in crate::load) fn are_all_clear(colors: &[[f32; 4]]) -> bool {
     !colors.is_empty() && colors.iter().all(|c| opacity(c) == 0.0)
 }
 
@@ -30,7 +30,7 @@ fn opacity(color: &[f32; 4]) -> f32 {
 
 /// How vertex colours are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Coding {
+pub(in crate::load) enum Coding {
     /// As 0…1.
     Units,
     /// As 0…255.
@@ -41,7 +41,7 @@ pub(super) enum Coding {
 
 /// Makes colours as written 0…1, and white where there is none (not finite). A fourth number of each, its opacity, is
 /// written as they are where any is above 1, and else from 0 to 1.
-pub(super) fn settle<const N: usize>(colors: &mut [[f32; N]]) -> Coding {
+pub(in crate::load) fn settle<const N: usize>(colors: &mut [[f32; N]]) -> Coding {
     /// What rounding may add to full light.
     const ROUNDED: f32 = 1e-3;
     let (bytes, mut beyond) = (are_bytes(colors), false);
@@ -66,7 +66,7 @@ pub(super) fn settle<const N: usize>(colors: &mut [[f32; N]]) -> Coding {
 
 impl Coding {
     /// What is told of colours that are not simply 0…1, by these codes for bytes and for what is beyond.
-    pub(super) fn warning(self, codes: [&'static str; 2], file: &Path) -> Option<Diagnostic> {
+    pub(in crate::load) fn warning(self, codes: [&'static str; 2], file: &Path) -> Option<Diagnostic> {
         let (code, text) = match self {
             Self::Units => return None,
             Self::Bytes => (codes[0], "vertex colours above 1 are taken as 0 … 255"),

@@ -3,7 +3,7 @@
 use super::pairs::Pairs;
 use super::smooth::{Smooth, smooth};
 use super::soup::{Corner, NONE, Soup};
-use super::statements::{Face, Statements};
+use super::{Face, Geometry};
 use crate::load::Polygons;
 use crate::load::place::Placed;
 use crate::math::ear_clip::{EarClipper, Outcome, newell};
@@ -18,7 +18,7 @@ const FACES: usize = 1 << 12;
 /// The meshes of a file, and what became of its faces.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Assembled {
-    /// One for each of [`Statements::runs`] that has anything to draw: its index, and the mesh without a material.
+    /// One for each of [`Geometry::runs`] that has anything to draw: its index, and the mesh without a material.
     pub meshes: Vec<(u32, Mesh)>,
     /// Faces drawn.
     pub faces: u64,
@@ -36,20 +36,20 @@ pub(super) struct Assembled {
 
 /// Builds the meshes. `flatness`: how far corners may lie from the plane of a face that is kept whole.
 pub(super) fn assemble(
-    statements: &Statements,
+    geometry: &Geometry,
     soup: &Soup,
     placed: &Placed,
     polygons: Polygons,
     flatness: f64,
 ) -> Assembled {
     let mut out = Assembled::default();
-    let faces = keep(statements, soup, &placed.positions, &mut out);
+    let faces = keep(geometry, soup, &placed.positions, &mut out);
     let smooth = smooth(soup, &placed.positions, &faces);
     if smooth.of_corner.is_empty()
-        && let Some(triangles) = triangles_alone(statements, soup, &placed.positions, &faces)
+        && let Some(triangles) = triangles_alone(geometry, soup, &placed.positions, &faces)
     {
         out.faces = faces.len() as u64;
-        let (name, positions) = (name(statements, 0), placed.positions.clone());
+        let (name, positions) = (name(geometry, 0), placed.positions.clone());
         out.meshes.push((0, Mesh { name, positions, triangles, ..Mesh::default() }));
         return out;
     }
@@ -66,8 +66,8 @@ pub(super) fn assemble(
         cut: Vec::new(),
         mesh: Mesh::default(),
     };
-    for (run, faces) in by_run(&faces, statements.runs.len()) {
-        let mesh = builder.build(&faces, name(statements, run), &mut out);
+    for (run, faces) in by_run(&faces, geometry.runs.len()) {
+        let mesh = builder.build(&faces, name(geometry, run), &mut out);
         if !mesh.triangles.is_empty() || !mesh.polygons.is_empty() {
             out.meshes.push((run, mesh));
         }
@@ -77,10 +77,10 @@ pub(super) fn assemble(
 
 /// The triangles of a file that has nothing else, where they use all of its positions: these are the vertices then, in the
 /// file's order. Most scans are such files.
-fn triangles_alone(statements: &Statements, soup: &Soup, positions: &[Vec3], faces: &[Face]) -> Option<Vec<[u32; 3]>> {
+fn triangles_alone(geometry: &Geometry, soup: &Soup, positions: &[Vec3], faces: &[Face]) -> Option<Vec<[u32; 3]>> {
     let Soup { positions: _, uvs, normals, colors, alphas, corners, stroke_corners } = soup;
     let (corners, rest) = corners.as_chunks::<3>();
-    let alone = statements.runs.len() == 1
+    let alone = geometry.runs.len() == 1
         && (uvs.is_empty() && normals.is_empty() && colors.is_empty() && alphas.is_empty())
         && (rest.is_empty() && stroke_corners.is_empty() && corners.len() == faces.len());
     let in_order = |(face, i): (&Face, u32)| face.arity == 3 && face.number == i && face.first == 3 * i;
@@ -92,12 +92,12 @@ fn triangles_alone(statements: &Statements, soup: &Soup, positions: &[Vec3], fac
 }
 
 /// The faces that can be drawn; mostly all, which are not copied.
-fn keep<'s>(statements: &'s Statements, soup: &Soup, positions: &[Vec3], out: &mut Assembled) -> Cow<'s, [Face]> {
+fn keep<'s>(geometry: &'s Geometry, soup: &Soup, positions: &[Vec3], out: &mut Assembled) -> Cow<'s, [Face]> {
     let corners = |face: &Face| soup.corners.get(face.corners()).unwrap_or_default();
     let place = |c: &Corner| positions[c.position as usize];
     let is_finite = |face: &Face| corners(face).iter().all(|c| place(c).is_finite());
     let is_wide = |face: &Face| has_three_places(corners(face).iter().map(place));
-    let faces = &statements.faces;
+    let faces = &geometry.faces;
     if faces.par_iter().with_min_len(FACES).all(|face| is_finite(face) && is_wide(face)) {
         return Cow::Borrowed(faces);
     }
@@ -141,9 +141,9 @@ fn by_run(faces: &[Face], runs: usize) -> Vec<(u32, Cow<'_, [Face]>)> {
 }
 
 /// `object/group`, whichever there is.
-pub(super) fn name(statements: &Statements, run: u32) -> String {
-    let run = statements.runs[run as usize];
-    let name = |id: u32| statements.names[id as usize].as_str();
+pub(super) fn name(geometry: &Geometry, run: u32) -> String {
+    let run = geometry.runs[run as usize];
+    let name = |id: u32| geometry.names[id as usize].as_str();
     match (name(run.object), name(run.group)) {
         (object, "") => object.into(),
         ("", group) => group.into(),

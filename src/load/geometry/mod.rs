@@ -1,0 +1,107 @@
+//! Geometry without a hierarchy -> scene: vertices, faces, points and lines, in runs that share a name and a material.
+//!
+//! The text of an OBJ leaves it ([`obj`](super::obj)), files of other formats hold nothing else ([`bare`]). It is centred in
+//! `f64` and rounded ([`place`](super::place)), and becomes one mesh and one instance for each run (`assemble`), points and
+//! lines (`strokes`) get a width ([`wires`](super::wires)), materials come from the MTL files that it names
+//! ([`mtl`](super::mtl)); `finish` is the whole way.
+
+mod assemble;
+pub(super) mod bare;
+pub(super) mod color;
+pub(super) mod finish;
+mod pairs;
+mod smooth;
+#[cfg(test)]
+pub(super) mod sound;
+mod soup;
+mod strokes;
+pub(super) mod up;
+
+pub(super) use soup::{Corner, NONE, Soup};
+
+use std::ops::Range;
+
+/// The largest number of a vertex, so that counts of corners, faces and normals can be added up.
+pub(super) const LARGEST: u32 = u32::MAX / 4;
+
+/// What a file holds, before it has a place in a scene.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Geometry {
+    pub soup: Soup,
+    pub faces: Vec<Face>,
+    pub strokes: Vec<Stroke>,
+    pub runs: Vec<Run>,
+    /// Names; 0 is the empty one.
+    pub names: Vec<String>,
+    /// MTL files, with the lines that name them.
+    pub libraries: Vec<(u32, String)>,
+    /// Decimal places of the finest coordinate.
+    pub places: i32,
+    /// What the file says of itself: the first comments, without their signs.
+    pub comments: Vec<String>,
+    /// Faces that had fewer than 3 corners.
+    pub few_corners: u32,
+}
+
+/// One face, without its corners.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Face {
+    /// Which of [`Geometry::runs`].
+    pub run: u32,
+    /// Smoothing group; 0: none.
+    pub smoothing: u32,
+    /// Number of corners, at least 3.
+    pub arity: u32,
+    /// Where it starts in the file.
+    pub line: u32,
+    /// Which of the file's faces, from 0; those that are not kept count.
+    pub number: u32,
+    /// The first of its corners in [`Soup::corners`].
+    pub first: u32,
+}
+
+impl Face {
+    /// Its corners in [`Soup::corners`].
+    pub(super) fn corners(&self) -> Range<usize> {
+        self.first as usize..self.first as usize + self.arity as usize
+    }
+}
+
+/// One `p` or `l` statement, without its corners.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Stroke {
+    /// Which of [`Geometry::runs`].
+    pub run: u32,
+    /// Where it stands in the file.
+    pub line: u32,
+    /// Number of corners, at least 1, or 2 of a line.
+    pub arity: u32,
+    /// Whether its corners are joined.
+    pub joined: bool,
+}
+
+/// What faces between two `o`, `g` or `usemtl` statements share; indices into [`Geometry::names`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(super) struct Run {
+    pub object: u32,
+    pub group: u32,
+    /// `None` before the first `usemtl`.
+    pub material: Option<u32>,
+}
+
+impl Geometry {
+    /// Makes every vertex a point; the `i`th has the `i`th normal where there are as many.
+    #[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^32 vertices")]
+    pub(super) fn draw_points(&mut self) {
+        let (count, has_normals) = (self.soup.positions.len(), self.soup.normals.len() == self.soup.positions.len());
+        let corner = |i: u32| Corner { position: i, uv: NONE, normal: if has_normals { i } else { NONE } };
+        self.soup.stroke_corners = (0..count as u32).map(corner).collect();
+        self.strokes = (0..count).map(|_| Stroke { run: 0, line: 0, arity: 1, joined: false }).collect();
+        if self.runs.is_empty() {
+            self.runs.push(Run::default());
+        }
+        if self.names.is_empty() {
+            self.names.push(String::new());
+        }
+    }
+}

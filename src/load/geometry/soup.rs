@@ -1,0 +1,52 @@
+//! Vertices, and the corners of faces that name them.
+
+use crate::math::{DVec2, DVec3, Vec3};
+use bytemuck::Zeroable;
+use rayon::prelude::*;
+use std::sync::atomic::AtomicBool;
+use std::sync::atomic::Ordering::Relaxed;
+
+/// An index that stands for "none".
+pub(in crate::load) const NONE: u32 = u32::MAX;
+
+/// A corner of a face: indices into the arrays of [`Soup`]; the last two may be [`NONE`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Zeroable)]
+pub(in crate::load) struct Corner {
+    pub position: u32,
+    pub uv: u32,
+    pub normal: u32,
+}
+
+/// The vertices of a file in its order, and the corners of all faces one after another.
+#[derive(Clone, Debug, Default)]
+pub(in crate::load) struct Soup {
+    /// Those that no face, line or point uses are not finite.
+    pub positions: Vec<DVec3>,
+    /// v points up, as in the file. Those that corners name are finite.
+    pub uvs: Vec<DVec2>,
+    /// Unit length where corners name them.
+    pub normals: Vec<Vec3>,
+    /// Per position; as written until [`super::color::settle`] has looked at them, 0…1 then. Empty when the file has none.
+    pub colors: Vec<[f32; 3]>,
+    /// Opacity per position, 0…1; empty when everything is opaque.
+    pub alphas: Vec<f32>,
+    pub corners: Vec<Corner>,
+    /// Corners of all points and lines, one statement after another.
+    pub stroke_corners: Vec<Corner>,
+}
+
+impl Soup {
+    /// Takes the places of vertices that nothing uses, so that they move neither the centre nor the frame.
+    pub(in crate::load) fn leave_out_unused(&mut self) {
+        /// Corners and positions that one thread looks at at a time.
+        const MANY: usize = 1 << 13;
+        let used: Vec<AtomicBool> = std::iter::repeat_with(AtomicBool::default).take(self.positions.len()).collect();
+        self.corners.par_iter().with_min_len(MANY).chain(&self.stroke_corners).for_each(|corner| {
+            if let Some(used) = used.get(corner.position as usize) {
+                used.store(true, Relaxed);
+            }
+        });
+        let positions = self.positions.par_iter_mut().with_min_len(MANY).zip(used);
+        positions.filter(|(_, used)| !used.load(Relaxed)).for_each(|(position, _)| *position = DVec3::NAN);
+    }
+}
