@@ -187,20 +187,9 @@ impl<'a, G: Goal> Query<'a, G> {
         verdicts: Verdicts,
         probe: &mut P,
     ) -> bool {
-        probe.prim_tests(count);
-        let all = (1 << count) - 1;
-        let mut open = (verdicts.hit | verdicts.unsure) & all;
-        probe.lanes_tested(prims, all & !open, Outcome::Miss);
-        while open != 0 {
-            let lane = open.trailing_zeros() as usize % LANES;
-            open &= open - 1;
-            let certain = verdicts.hit >> lane & 1 == 1;
-            if self.take(prims[lane], &corners_of(corners, lane), certain, probe) {
-                probe.lanes_tested(prims, open, Outcome::LeftOut);
-                return true;
-            }
-        }
-        false
+        self.decide_open(prims, count, verdicts, probe, |query, lane, certain, probe| {
+            query.take(prims[lane], &corners_of(corners, lane), certain, probe)
+        })
     }
 
     /// [`Self::test_block`] for triangles of which the caller knows that they are wanted; they need not be among the shapes.
@@ -213,6 +202,27 @@ impl<'a, G: Goal> Query<'a, G> {
         verdicts: Verdicts,
         probe: &mut P,
     ) -> bool {
+        self.decide_open(prims, count, verdicts, probe, |query, lane, certain, probe| {
+            let prim = prims[lane];
+            if prim == query.exclude {
+                probe.tested(|| Test { prim, t: f32::NAN, outcome: Outcome::LeftOut });
+                return false;
+            }
+            query.take_wanted(prim, &corners_of(corners, lane), certain, probe)
+        })
+    }
+
+    /// Has `take` decide each lane that is not missed for certain, told whether it is hit for certain, until the query is
+    /// answered.
+    #[inline(always)]
+    fn decide_open<P: Probe>(
+        &mut self,
+        prims: &[u32; LANES],
+        count: u32,
+        verdicts: Verdicts,
+        probe: &mut P,
+        take: impl Fn(&mut Self, usize, bool, &mut P) -> bool,
+    ) -> bool {
         probe.prim_tests(count);
         let all = (1 << count) - 1;
         let mut open = (verdicts.hit | verdicts.unsure) & all;
@@ -220,10 +230,7 @@ impl<'a, G: Goal> Query<'a, G> {
         while open != 0 {
             let lane = open.trailing_zeros() as usize % LANES;
             open &= open - 1;
-            let (prim, certain) = (prims[lane], verdicts.hit >> lane & 1 == 1);
-            if prim == self.exclude {
-                probe.tested(|| Test { prim, t: f32::NAN, outcome: Outcome::LeftOut });
-            } else if self.take_wanted(prim, &corners_of(corners, lane), certain, probe) {
+            if take(self, lane, verdicts.hit >> lane & 1 == 1, probe) {
                 probe.lanes_tested(prims, open, Outcome::LeftOut);
                 return true;
             }
