@@ -20,6 +20,7 @@ pub(super) struct Surroundings {
     mean: Column,
     /// Share of the mirrored surroundings that nothing stands in the way of.
     open: Column,
+    /// Where that is looked for, in the studio.
     mirrored_dir: Columns,
     diffuse: Columns,
     mirrored: Columns,
@@ -264,7 +265,6 @@ fn look<S: Simd>(
     for i in 0..points.min(POINTS) {
         let seen = found.seen(i);
         to.n_v[i] = seen.normal.dot(seen.view).clamp(0.0, 1.0);
-        put(&mut to.mirrored_dir, i, seen.mirrored());
     }
     m.find_shares(s, points, &to.n_v, &mut to.shares);
     m.find_means(points, &mut to.mean);
@@ -272,6 +272,11 @@ fn look<S: Simd>(
     if m.looks_up() {
         for i in 0..points.min(POINTS) {
             to.open[i] = m.open(i, to.n_v[i]);
+        }
+        if sky.studio().is_some() {
+            for i in 0..points.min(POINTS) {
+                put(&mut to.mirrored_dir, i, found.seen(i).mirrored());
+            }
         }
         blur(sky, |i| m.matter(i).roughness(), &to.mirrored_dir, points, &mut to.mirrored);
     } else {
@@ -307,7 +312,7 @@ fn spread(sky: &Sky, normals: &Columns, points: usize, to: &mut Columns) {
                 put(to, i, studio::diffuse(studio::from_world(UpAxis::Z, get(normals, i))));
             }
         }
-        None => (0..points.min(POINTS)).for_each(|i| put(to, i, sky.diffuse(Vec3::Z))),
+        None => fill(to, points, sky.diffuse(Vec3::Z)),
     }
 }
 
@@ -325,6 +330,12 @@ fn blur(sky: &Sky, roughness: impl Fn(usize) -> f32, dirs: &Columns, points: usi
                 put(to, i, studio::blurred(studio::from_world(UpAxis::Z, get(dirs, i)), roughness(i)));
             }
         }
-        None => (0..points.min(POINTS)).for_each(|i| put(to, i, sky.blurred(Vec3::Z, roughness(i)))),
+        None => fill(to, points, sky.radiance(Vec3::Z, 0.0)),
     }
+}
+
+/// The same for every point: such surroundings look alike in all directions.
+#[inline(always)]
+fn fill(to: &mut Columns, points: usize, radiance: Vec3) {
+    (0..points.min(POINTS)).for_each(|i| put(to, i, radiance));
 }
