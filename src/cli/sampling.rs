@@ -222,6 +222,7 @@ impl SamplingArgs {
                     confidence: self.confidence.unwrap_or(usual.confidence),
                     min_samples: self.min_samples.unwrap_or(usual_fewest).min(most),
                     max_samples: most,
+                    sharpness: None,
                     filter: self.filter.unwrap_or(usual.filter),
                     space: usual.space,
                     target: self.target_error,
@@ -318,12 +319,13 @@ pub(super) fn phrase(settings: &Settings, sampled: &Sampled) -> String {
     let own: u64 = sampled.counts.iter().copied().map(u64::from).sum();
     let each = |rays: u64| rays as f64 / sampled.pixels.max(1) as f64;
     if let Some(to) = sampled.targeted {
+        let at_most = if to.estimate.is_none() { "at most " } else { "" };
         return format!(
-            "{:.1} samples a pixel (at most {}) and {:.1} to find out how many, error {:.4} where {} was asked for (foretold {:.4} and {:.1} s of processor time, took {:.1} s)",
+            "{:.1} samples a pixel (at most {}) and {:.1} to find out how many, error {at_most}{:.4} where {} was asked for (foretold {:.4} and {:.1} s of processor time, took {:.1} s)",
             each(own),
             sampled.most(),
             each(sampled.rays.saturating_sub(own)),
-            to.estimate,
+            sampled.rmse().unwrap_or(to.foretold),
             to.target,
             to.foretold,
             to.foretold_cpu,

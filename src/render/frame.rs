@@ -44,7 +44,7 @@ pub(super) fn sample_width(settings: &Settings) -> f32 {
     let samples = match settings.sampling {
         Sampling::Uniform => settings.samples.max(1) as f32,
         Sampling::Adaptive(how) => (4_u32 << (2 * how.levels.min(SHARPEST))) as f32,
-        Sampling::Stochastic(how) => how.max_samples.max(1) as f32,
+        Sampling::Stochastic(how) => how.sharpness.unwrap_or(how.max_samples).max(1) as f32,
     };
     1.0 / samples.sqrt()
 }

@@ -79,6 +79,8 @@ pub struct Stochastic {
     pub min_samples: u32,
     /// Rays of a pixel at most; lowered to a power of two.
     pub max_samples: u32,
+    /// Each ray is as sharp as one of so many in a pixel; `None`: of the most of them.
+    pub sharpness: Option<u32>,
     /// Weights of the places in and around a pixel.
     pub filter: Filter,
     /// In which numbers errors are counted.
@@ -169,6 +171,7 @@ impl Quality {
             confidence: 0.95,
             min_samples,
             max_samples,
+            sharpness: None,
             filter: Filter::default(),
             space: ErrorSpace::default(),
             target: None,
@@ -204,8 +207,8 @@ pub struct Targeted {
     pub target: f32,
     /// What was expected from a part of the picture, before it was rendered.
     pub foretold: f64,
-    /// What was estimated from all of it, by how its renderings differ.
-    pub estimate: f64,
+    /// What was estimated from all of it, by how its renderings differ; `None` of a single one.
+    pub estimate: Option<f64>,
     /// Seconds of processor time that were expected, without those for finding out.
     pub foretold_cpu: f64,
     /// What it took.
@@ -230,8 +233,8 @@ impl Sampled {
     /// shut-in room under a white sky, whose light hardly any ray finds, no more than that.
     #[expect(clippy::cast_precision_loss, reason = "a ratio")]
     pub fn rmse(&self) -> Option<f64> {
-        if let Some(targeted) = self.targeted {
-            return Some(targeted.estimate);
+        if let Some(estimate) = self.targeted.and_then(|targeted| targeted.estimate) {
+            return Some(estimate);
         }
         let sum: f64 = self.errors.iter().map(|&e| f64::from(e) * f64::from(e)).sum();
         (!self.errors.is_empty()).then(|| (sum / self.errors.len() as f64).sqrt())

@@ -28,7 +28,7 @@ fn advise(study: &Study, purpose: Quality) -> Advice {
     let goal = purpose.good_enough();
     // As the table has it.
     let time = |i: usize| study.rows[i].cpu.median();
-    let good: Vec<usize> = (0..study.rows.len()).filter(|&i| study.rows[i].error.rmse <= goal).collect();
+    let good: Vec<usize> = (0..study.rows.len()).filter(|&i| study.rows[i].error.known() <= goal).collect();
     let fastest = good.iter().copied().min_by(|&a, &b| time(a).total_cmp(&time(b)));
     let own = good.iter().copied().find(|&i| is_quality(&study.rows[i], purpose));
     let goal = format!("an error of at most {goal} ({:.1} of 255 steps)", 255.0 * goal);

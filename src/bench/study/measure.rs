@@ -49,9 +49,14 @@ pub struct Error {
 }
 
 impl Error {
+    /// What [`Self::rmse`] is at most, as far as can be told.
+    pub fn known(&self) -> f64 {
+        self.rmse.max(self.least)
+    }
+
     /// [`Self::rmse`] with so many digits, as far as it can be told.
     pub fn told(&self, digits: usize) -> String {
-        let (sign, error) = if self.rmse < self.least { ("<", self.least) } else { ("", self.rmse) };
+        let (sign, error) = (if self.rmse < self.least { "<" } else { "" }, self.known());
         let rounded = format!("{error:.digits$}");
         // What is not nothing is not told as nothing.
         let is_lost = error > 0.0 && rounded.bytes().all(|digit| matches!(digit, b'0' | b'.'));
@@ -72,7 +77,7 @@ pub(super) fn measure(subject: &Subject, plan: &Plan, reference: &Reference, set
     let accel = subject.accel.clone().tested_by(setting.test);
     let (mut cpu, mut wall, mut samples) = (Spread::default(), Spread::default(), 0.0);
     let mut pictures = Vec::new();
-    for pass in 0..plan.passes.max(2) {
+    for pass in 0..plan.renderings() {
         let settings = Settings { seed: plan.seed.wrapping_add(u64::from(pass)), ..setting.settings.clone() };
         let watch = Stopwatch::of_all_threads();
         let rendered = render(&subject.job(&settings, &accel), &());

@@ -59,7 +59,7 @@ impl<'a> Subject<'a> {
 /// How a study is done.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
-    /// Renderings of each setting, at least 2: noise is what differs between them.
+    /// Renderings of each setting; 2 at least are done, as noise is what differs between them.
     pub passes: u32,
     /// Samples of each pixel of the reference.
     pub reference_samples: u32,
@@ -68,6 +68,11 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// Renderings of each setting.
+    pub fn renderings(&self) -> u32 {
+        self.passes.max(2)
+    }
+
     /// What is done unless something else is asked.
     pub const DEFAULT: Self = Self { passes: 3, reference_samples: 1024, seed: 0 };
 }
@@ -96,9 +101,10 @@ pub struct Study {
 }
 
 impl Study {
-    /// Places of the rows that no other beats in time and error, from fast to exact.
+    /// Places of the rows that no other beats in time and error, from fast to exact. Errors that cannot be told from none
+    /// are equal.
     pub fn front(&self) -> Vec<usize> {
-        front::front(&self.rows.iter().map(|row| (row.cpu.median(), row.error.rmse)).collect::<Vec<_>>())
+        front::front(&self.rows.iter().map(|row| (row.cpu.median(), row.error.known())).collect::<Vec<_>>())
     }
 
     /// Which settings to use for what.

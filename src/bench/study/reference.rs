@@ -26,7 +26,9 @@ pub struct Reference {
 impl Reference {
     pub(super) fn render(subject: &Subject, plan: &Plan, go_on: &mut dyn FnMut(u32, u32) -> bool) -> Option<Self> {
         let samples = (plan.reference_samples / PARTS).max(8);
-        let how = Stochastic { min_samples: samples, max_samples: samples, ..Stochastic::default() };
+        // What a ray blurs stays blurred in the mean of all parts, whose own differences do not show it.
+        let sharpness = Some(samples * PARTS);
+        let how = Stochastic { min_samples: samples, max_samples: samples, sharpness, ..Stochastic::default() };
         let (mut sums, mut veils): (Vec<[f64; 4]>, Vec<[f64; 4]>) = (Vec::new(), Vec::new());
         let mut parts: Vec<Vec<[f64; 4]>> = Vec::new();
         let mut width = 0;

@@ -2,9 +2,12 @@ use super::knob::Knob;
 use super::report::{Format, text};
 use super::*;
 use crate::accel::{AccelKind, AccelParams};
-use crate::math::DVec3;
+use crate::math::{DAffine3, DVec3, Vec2, Vec3};
 use crate::render::{Quality, Sampling};
-use crate::scene::{Camera, Environment, Material, MetalRough, Projection, Reflection, Sphere};
+use crate::scene::{
+    Bitmap, Camera, Environment, Instance, Material, Mesh, MetalRough, Pixels, Projection, Reflection, Sampler, Sphere,
+    Texture, TextureRef, UvTransform,
+};
 use std::path::Path;
 
 /// A mirror ball before a matt one, in the studio.
@@ -21,28 +24,53 @@ fn balls() -> Scene {
     }
 }
 
+/// A wall of noise, three texels to a pixel across.
+fn noise() -> Scene {
+    const SIDE: u32 = 96;
+    let code = |i: u32| if i.wrapping_mul(0x9e37_79b9) >> 13 & 1 == 1 { [255; 4] } else { [0, 0, 0, 255] };
+    let texels: Vec<[u8; 4]> = (0..SIDE * SIDE).map(|i| code(i ^ i >> 5)).collect();
+    let bitmap = Bitmap { name: String::new(), width: SIDE, height: SIDE, pixels: Pixels::Rgba8(texels.into()) };
+    let painted = Material {
+        reflection: Reflection::Unlit,
+        base_color_map: Some(TextureRef { texture: 0, uv_set: 0, transform: UvTransform::default() }),
+        ..Material::plain()
+    };
+    let corner = |x: f32, y: f32| Vec3::new(1.3 * x, 1.3 * y, 0.0);
+    let wall = Mesh {
+        positions: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
+        uvs: vec![vec![Vec2::Y, Vec2::ONE, Vec2::X, Vec2::ZERO]],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
+    };
+    let instance = Instance { name: String::new(), mesh: 0, world_from_object: DAffine3::IDENTITY };
+    Scene {
+        bitmaps: vec![bitmap],
+        textures: vec![Texture { bitmap: 0, sampler: Sampler::default() }],
+        materials: vec![painted],
+        meshes: vec![wall],
+        instances: vec![instance],
+        ..Scene::default()
+    }
+}
+
 fn study(knobs: &[Knob]) -> Study {
-    let scene = balls();
-    let world = World::new(&scene);
+    study_of(&balls(), 512, knobs)
+}
+
+fn study_of(scene: &Scene, reference_samples: u32, knobs: &[Knob]) -> Study {
+    let world = World::new(scene);
     let accel = AnyAccel::build(AccelKind::DEFAULT, &world.shapes, &AccelParams::DEFAULT);
     let camera = Camera {
         name: String::new(),
         projection: Projection::Perspective { y_fov: 0.7, aspect: None },
-        world_from_camera: crate::math::DAffine3::from_translation(DVec3::Z * 7.0),
+        world_from_camera: DAffine3::from_translation(DVec3::Z * 7.0),
     };
-    let (textures, view) = (TextureStore::new(&scene), View::from_camera(&camera));
+    let (textures, view) = (TextureStore::new(scene), View::from_camera(&camera));
     let base = Settings { width: 48, height: 32, ..Settings::default() };
     let output = Output::default();
-    let subject = Subject {
-        scene: &scene,
-        world: &world,
-        accel: &accel,
-        textures: &textures,
-        view: &view,
-        base: &base,
-        output: &output,
-    };
-    let plan = Plan { passes: 2, reference_samples: 512, seed: 7 };
+    let subject =
+        Subject { scene, world: &world, accel: &accel, textures: &textures, view: &view, base: &base, output: &output };
+    let plan = Plan { passes: 2, reference_samples, seed: 7 };
     let reference = reference(&subject, &plan, &mut |_, _| true).unwrap();
     let rows: Vec<Row> = settings(&subject)
         .into_iter()
@@ -87,6 +115,14 @@ fn more_samples_are_nearer_to_the_reference_and_what_is_the_same_each_time_is_bi
 }
 
 #[test]
+fn a_reference_is_no_farther_off_than_it_says() {
+    let [few, many] = [64, 4096].map(|samples| study_of(&noise(), samples, &[]).reference);
+    let squares = few.pixels.iter().zip(&many.pixels).flat_map(|(a, b)| (0..3).map(|c| (a[c] - b[c]).powi(2)));
+    let off = (squares.sum::<f64>() / (3 * few.pixels.len()) as f64).sqrt();
+    assert!(few.error > 0.001 && off < 1.5 * few.error, "{off} where {} is said", few.error);
+}
+
+#[test]
 fn bounces_that_are_missing_show_as_bias() {
     let study = study(&[Knob::Depth]);
     let [none, many] = ["--depth 0", "--depth 8"].map(|flags| row(&study, flags).error);
@@ -108,11 +144,11 @@ fn every_report_has_every_row_and_says_what_to_use() {
     assert_eq!(advice.len(), 3);
     for advice in &advice {
         assert!(!advice.why.is_empty());
-        let chosen = advice.row.map(|i| study.rows[i].error.rmse);
+        let chosen = advice.row.map(|i| study.rows[i].error.known());
         assert!(chosen.is_none_or(|rmse| rmse <= advice.purpose.good_enough()));
         let least =
             |rows: &mut dyn Iterator<Item = &Row>| rows.map(|row| row.cpu.median()).fold(f64::INFINITY, f64::min);
-        let good = |row: &&Row| row.error.rmse <= advice.purpose.good_enough();
+        let good = |row: &&Row| row.error.known() <= advice.purpose.good_enough();
         let is_fastest =
             advice.row.is_some_and(|i| study.rows[i].cpu.median() == least(&mut study.rows.iter().filter(good)));
         assert_eq!(advice.why.contains("the fastest with"), is_fastest, "{}", advice.why);

@@ -19,7 +19,7 @@ pub fn write(study: &Study) -> String {
         cells.extend([error.worst.0, error.worst.1].map(|n| n.to_string()));
         cells.extend([error.flip.to_string(), front.contains(&i).to_string(), study.reference.error.to_string()]);
         cells.extend([study.size.0, study.size.1].map(|n| n.to_string()));
-        cells.extend([study.threads.to_string(), study.plan.passes.to_string(), study.plan.seed.to_string()]);
+        cells.extend([study.threads.to_string(), study.plan.renderings().to_string(), study.plan.seed.to_string()]);
         cells.push(quoted(env!("CARGO_PKG_VERSION")));
         text += &(cells.join(",") + "\n");
     }

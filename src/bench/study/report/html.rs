@@ -29,7 +29,7 @@ pub fn write(study: &Study) -> String {
         study.view,
         study.reference.samples,
         study.reference.error,
-        study.plan.passes.max(2)
+        study.plan.renderings()
     ));
     out += &advice(study);
     out += &format!(

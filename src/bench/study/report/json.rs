@@ -52,7 +52,7 @@ pub fn write(study: &Study) -> String {
         "height": study.size.1,
         "threads": study.threads,
         "machine": Machine::here().line(),
-        "passes": study.plan.passes,
+        "passes": study.plan.renderings(),
         "seed": study.plan.seed,
         "reference": {
             "samples": study.reference.samples,

@@ -16,7 +16,7 @@ pub fn head(study: &Study) -> String {
         study.view,
         study.reference.samples,
         study.reference.error,
-        study.plan.passes.max(2),
+        study.plan.renderings(),
         "",
         "CPU time",
         "samples",
