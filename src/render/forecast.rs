@@ -19,15 +19,17 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// The mean of such values, times `scale`; of a single one nobody knows how far off it is.
-    pub(super) fn of_mean(values: &[f64], scale: f64) -> Self {
+    /// The sum of such values over that of their weights, times `scale`; of a single one nobody knows how far off it is.
+    /// (W. G. Cochran, *Sampling Techniques*, 1977, §6.4: how far a ratio is off.)
+    pub(super) fn of_ratio(weighted: &[(f64, f64)], scale: f64) -> Self {
         /// Standard errors to both sides.
         const REACH: f64 = 1.96;
-        let n = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / n.max(1.0);
-        let variance = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / (n - 1.0);
-        let half = if values.len() < 2 { f64::INFINITY } else { REACH * (variance / n).sqrt() };
-        Self { value: mean * scale, low: (mean - half).max(0.0) * scale, high: (mean + half) * scale }
+        let n = weighted.len() as f64;
+        let (values, weights) = weighted.iter().fold((0.0, 0.0), |(vs, ws), (v, w)| (vs + v, ws + w));
+        let ratio = if weights > 0.0 { values / weights } else { 0.0 };
+        let variance = weighted.iter().map(|(v, w)| (v - ratio * w) * (v - ratio * w)).sum::<f64>() / (n - 1.0);
+        let half = if weighted.len() < 2 { f64::INFINITY } else { REACH * (variance / n).sqrt() / (weights / n) };
+        Self { value: ratio * scale, low: (ratio - half).max(0.0) * scale, high: (ratio + half) * scale }
     }
 
     /// Each number as `f` of it, which must grow with it.
@@ -77,22 +79,22 @@ pub fn forecast(job: &Job, progress: &dyn Progress) -> Option<Forecast> {
     let counted = Part::<RayCounts>::render(job, &context, &other, &squares, progress)?;
     let pixels = u64::from(settings.width) * u64::from(settings.height);
     let looked_at: u64 = timed.squares.iter().map(|square| square.beauty.len() as u64).sum();
-    // For a pixel of each square: a small square at the edge counts as much as its pixels do.
-    let per_pixel = |value: &dyn Fn(usize) -> f64| -> Vec<f64> {
-        (0..timed.squares.len()).map(|i| value(i) / timed.squares[i].beauty.len().max(1) as f64).collect()
+    // A small square at the edge counts as much as its pixels do.
+    let per_pixel = |value: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
+        timed.squares.iter().enumerate().map(|(i, square)| (value(i), square.beauty.len() as f64)).collect()
     };
     let whole = pixels as f64 * work;
-    let rays = Interval::of_mean(&per_pixel(&|i| timed.rays_in_tiles(i)), whole).map(|rays| rays + before.0);
-    let tests = Interval::of_mean(&per_pixel(&|i| counted.tests_in_tiles(i)), whole);
+    let rays = Interval::of_ratio(&per_pixel(&|i| timed.rays_in_tiles(i)), whole).map(|rays| rays + before.0);
+    let tests = Interval::of_ratio(&per_pixel(&|i| counted.tests_in_tiles(i)), whole);
     let squared = squared_errors(&Measure::of(job), &timed, &counted);
     let is_random = matches!(settings.sampling, Sampling::Stochastic(_));
     Some(Forecast {
         looked_at,
         pixels,
-        cpu: Interval::of_mean(&per_pixel(&|i| timed.seconds_in_tiles(i)), whole).map(|cpu| cpu + before.1),
+        cpu: Interval::of_ratio(&per_pixel(&|i| timed.seconds_in_tiles(i)), whole).map(|cpu| cpu + before.1),
         rays,
         tests: tests.map(|tests| tests + before.0 * counted.tests_per_ray()),
-        rmse: is_random.then(|| Interval::of_mean(&squared, 1.0 / work).map(f64::sqrt)),
+        rmse: is_random.then(|| Interval::of_ratio(&squared, 1.0 / work).map(f64::sqrt)),
     })
 }
 
@@ -102,12 +104,15 @@ mod tests {
 
     #[test]
     fn an_interval_is_as_wide_as_the_values_lie_apart() {
-        let even = Interval::of_mean(&[2.0; 10], 3.0);
+        let each = |values: &[f64]| values.iter().map(|&v| (v, 1.0)).collect::<Vec<_>>();
+        let even = Interval::of_ratio(&each(&[2.0; 10]), 3.0);
         assert_eq!((even.value, even.low, even.high), (6.0, 6.0, 6.0));
-        let wide = Interval::of_mean(&[1.0, 3.0], 1.0);
+        let wide = Interval::of_ratio(&each(&[1.0, 3.0]), 1.0);
         assert!((wide.high - wide.value - 1.96).abs() < 1e-12 && wide.low > 0.0 && wide.contains(2.5));
-        assert_eq!(Interval::of_mean(&[0.0, 8.0], 1.0).low, 0.0);
-        let one = Interval::of_mean(&[4.0], 2.0);
+        assert_eq!(Interval::of_ratio(&each(&[0.0, 8.0]), 1.0).low, 0.0);
+        let one = Interval::of_ratio(&each(&[4.0]), 2.0);
         assert_eq!((one.value, one.low, one.high), (8.0, 0.0, f64::INFINITY), "of one value");
+        let of_parts = Interval::of_ratio(&[(8.0, 4.0), (2.0, 1.0), (4.0, 2.0)], 1.0);
+        assert_eq!((of_parts.value, of_parts.low, of_parts.high), (2.0, 2.0, 2.0), "as much of each for its size");
     }
 }

@@ -152,9 +152,14 @@ impl Part<RayCounts> {
     }
 }
 
-/// Mean squared error of one of two renderings that have only noise in which to differ, for each square.
-pub(super) fn squared_errors<P, Q>(measure: &Measure, a: &Part<P>, b: &Part<Q>) -> Vec<f64> {
-    a.squares.iter().zip(&b.squares).map(|(a, b)| 0.5 * measure.mean_square(a.into(), b.into())).collect()
+/// Squared error of one of two renderings that have only noise in which to differ, for each square: the sum over its pixels,
+/// and how many these are.
+pub(super) fn squared_errors<P, Q>(measure: &Measure, a: &Part<P>, b: &Part<Q>) -> Vec<(f64, f64)> {
+    let of_square = |(a, b): (&TilePixels, &TilePixels)| {
+        let pixels = a.beauty.len() as f64;
+        (0.5 * measure.mean_square(a.into(), b.into()) * pixels, pixels)
+    };
+    a.squares.iter().zip(&b.squares).map(of_square).collect()
 }
 
 /// The numbers in which errors of a picture are counted.

@@ -113,7 +113,7 @@ pub(super) fn plan<P: Observer>(
             parts.push(Part::<P>::render(job, context, &plan.settings(job.settings, number), &squares, progress)?);
         }
         let squared = squared_errors(&measure, &parts[0], &parts[1]);
-        let of_all = Interval::of_mean(&squared, 1.0).map(f64::sqrt);
+        let of_all = Interval::of_ratio(&squared, 1.0).map(f64::sqrt);
         // A single square has all pixels of a small picture, or nothing tells how far off it is.
         (plan.rmse, most) = (of_all.value, if of_all.high.is_finite() { of_all.high } else { of_all.value });
         let pixels = f64::from(job.settings.width) * f64::from(job.settings.height);
@@ -189,14 +189,14 @@ pub(super) fn render<P: Observer>(
         Rendered { picture, counts: ClassCounts::default(), sampled, depth: context.depth, complete }
     };
     let mut whole = one(&plan.settings(job.settings, 0));
-    let mut estimate = plan.rmse;
+    let mut estimated = None;
     if plan.work > 1.0 && whole.complete {
         let measure = Measure::of(job);
         let other = one(&plan.settings(job.settings, 1));
         whole.complete = other.complete;
         let both = measure.mean_square((&whole.picture).into(), (&other.picture).into());
         // Half of the difference is what each is off their mean.
-        estimate = 0.5 * both.sqrt();
+        let mut estimate = 0.5 * both.sqrt();
         mix(&mut whole, &other, 0.5);
         let mut last = (0.5 * both).sqrt();
         for number in 2..2 + MENDS {
@@ -213,12 +213,13 @@ pub(super) fn render<P: Observer>(
             mix(&mut whole, &other, single(part));
             last = own.sqrt().max(f64::MIN_POSITIVE);
         }
+        estimated = Some(estimate);
     }
     whole.sampled.rays += plan.rays;
     whole.sampled.targeted = Some(Targeted {
         target: single(target),
         foretold,
-        estimate,
+        estimate: estimated,
         foretold_cpu: plan.cpu * plan.work,
         cpu: watch.read().cpu.as_secs_f64(),
     });
