@@ -55,9 +55,8 @@ impl Draws {
         if let Some(&stream) = streams.get(ray.sample as usize) {
             return Self::of(stream, branch, purpose);
         }
-        let seed = if purpose == Purpose::Lights { !seed } else { seed };
         let words = ray.origin.to_array().into_iter().chain(ray.dir.to_array()).chain([hit.t, hit.u, hit.v]);
-        let start = seed ^ u64::from(hit.prim);
+        let start = seed ^ u64::from(hit.prim) ^ ((purpose as u64) << 32);
         let mixed = words.fold(start, |mixed, word| Random::new(mixed ^ u64::from(word.to_bits())).bits());
         Self(From::Hit(Random::new(mixed)))
     }

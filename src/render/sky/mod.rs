@@ -15,7 +15,8 @@ use crate::scene::{Background, Environment, Scene, UpAxis};
 use chance::Chance;
 use panorama::Pyramid;
 
-/// Angle across of cones, radians, from which the studio is blurred: no ray is so wide that has met smooth surfaces only.
+/// Angle across of cones, radians, from which the studio is blurred, little by little up to twice that: where smooth surfaces
+/// spread rays so far that they stand for much of it.
 const WIDE: f32 = 0.1;
 
 /// The environment of a scene, asked with world directions.
@@ -77,7 +78,8 @@ impl Sky {
             (Environment::Constant(radiance), _) => radiance,
             // A cone as wide as rough facets spread one.
             (Environment::Studio, _) if angle > WIDE => {
-                studio::blurred(studio::from_world(self.up, dir), (0.5 * angle).min(1.0).sqrt())
+                let spread = 0.5 * angle * (angle / WIDE - 1.0).min(1.0);
+                studio::blurred(studio::from_world(self.up, dir), spread.min(1.0).sqrt())
             }
             (Environment::Studio, _) => studio::radiance(studio::from_world(self.up, dir)),
             (Environment::Panorama, Some(map)) => map.pyramid.radiance(self.to_map(map, dir), angle),
@@ -172,6 +174,17 @@ mod tests {
         assert_eq!(seen(Vec3::NEG_X), [0.0, 0.0, 1.0]);
         assert_eq!(seen(Vec3::NEG_Z), [1.0, 1.0, 1.0]);
         assert_eq!(quarters(0.0, UpAxis::Z).radiance(Vec3::NEG_Y, 0.0).to_array(), [0.0, 1.0, 0.0]);
+    }
+
+    #[test]
+    fn the_studio_blurs_little_by_little_as_cones_widen() {
+        let sky = Sky::new(&Scene { environment: Environment::Studio, ..Scene::default() });
+        let dirs = (0..64_u8).map(|i| Vec3::new(libm::cosf(f32::from(i)), 0.4 * libm::sinf(f32::from(3 * i)), 0.7));
+        for dir in dirs.map(Vec3::normalize) {
+            let along = (0..400_u16).map(|i| sky.radiance(dir, f32::from(i) * 0.001).x).collect::<Vec<_>>();
+            let steps = along.windows(2).map(|pair| (pair[1] / pair[0] - 1.0).abs());
+            assert!(steps.fold(0.0, f32::max) < 0.02, "{dir}");
+        }
     }
 
     #[test]
