@@ -14,7 +14,9 @@
 //! is what compositing programs and libraries agree on. Equal pictures and metadata give equal bytes.
 
 use super::metadata::MAX_TEXT;
+use super::primaries::Primaries;
 use super::{Channel, ExrSamples, FileKind, ImageError, Layers, Metadata, Output, Picture, Values};
+use crate::math::{DMat3, DVec3};
 use crate::quiet::attempt;
 use crate::threads;
 use ::exr::image::{Blocks, Encoding, FlatSamples, Image, Layer};
@@ -177,7 +179,7 @@ pub(super) fn read_metadata(file: impl BufRead) -> Result<Metadata, ImageError> 
 /// Reads the first part of an EXR, at most `max_pixels`: beauty, the layers that have the names of this module, and every other
 /// channel; and says what it holds besides that is not read.
 ///
-/// A picture of luminance alone (`Y`) is grey. Its chroma, which has fewer values than there are pixels, is left out.
+/// Colours of other primaries become those of Rec. 709. A picture of luminance alone (`Y`) is grey. Its chroma, which has fewer values than there are pixels, is left out.
 pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<(Picture, Vec<String>), ImageError> {
     let fail = |e: ::exr::error::Error| ImageError::decode(FileKind::Exr, e);
     let meta = MetaData::read_from_buffered(bytes, false).map_err(fail)?;
@@ -203,14 +205,27 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<(Picture, Vec<Stri
     let Vec2(width, height) = layer.size;
     let channels = Channels { list: &layer.channel_data.list, len: width * height };
     let as_u32 = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
-    let (beauty, layers) = (channels.beauty()?, channels.layers());
+    let (mut beauty, layers) = (channels.beauty()?, channels.layers());
     let mut left_out = channels.too_short();
+    match Primaries::of_exr(&meta).map(|primaries| primaries.to_rec_709()) {
+        Some(Some(turned)) => beauty.iter_mut().for_each(|pixel| turn(turned, pixel)),
+        Some(None) => left_out.push("chromaticities, which are those of no colours".into()),
+        None => {}
+    }
     left_out.extend(match meta.headers.len() {
         0 | 1 => None,
         2 => Some("part 2".to_owned()),
         parts => Some(format!("parts 2 to {parts}")),
     });
     Ok((Picture { layers, ..Picture::of(as_u32(width), as_u32(height), beauty) }, left_out))
+}
+
+/// Turns the colour of a pixel, which is weighed by its coverage in any space.
+#[expect(clippy::cast_possible_truncation, reason = "colours are stored so")]
+fn turn(turned: DMat3, pixel: &mut [f32; 4]) {
+    let [r, g, b, _] = pixel.map(f64::from);
+    let color = turned * DVec3::new(r, g, b);
+    [pixel[0], pixel[1], pixel[2]] = color.to_array().map(|c| c as f32);
 }
 
 /// The channels of a part, found by name.
@@ -407,6 +422,10 @@ mod tests {
 
     /// An EXR of another program with these channels, two by two pixels, a part for each list.
     fn foreign(parts: &[&[(&str, FlatSamples)]]) -> Vec<u8> {
+        foreign_in(None, parts)
+    }
+
+    fn foreign_in(chromaticities: Option<Chromaticities>, parts: &[&[(&str, FlatSamples)]]) -> Vec<u8> {
         let layer = |(number, channels): (usize, &&[(&str, FlatSamples)])| {
             let channel = |(name, samples): &(&str, FlatSamples)| AnyChannel::new(text(name), samples.clone());
             let channels = AnyChannels::sort(channels.iter().map(channel).collect());
@@ -414,10 +433,25 @@ mod tests {
             Layer::new((2, 2), attributes, Encoding::UNCOMPRESSED, channels)
         };
         let layers: SmallVec<[_; 2]> = parts.iter().enumerate().map(layer).collect();
-        let attributes = ::exr::meta::header::ImageAttributes::with_size((2, 2));
+        let mut attributes = ::exr::meta::header::ImageAttributes::with_size((2, 2));
+        attributes.chromaticities = chromaticities;
         let mut file = Cursor::new(Vec::new());
         Image::from_layers(attributes, layers).write().to_buffered(&mut file).unwrap();
         file.into_inner()
+    }
+
+    #[test]
+    fn colors_of_other_primaries_become_those_of_rec_709() {
+        let p3 = Chromaticities { red: Vec2(0.68, 0.32), green: Vec2(0.265, 0.69), ..REC_709 };
+        let channels =
+            [("R", 1.0), ("G", 0.0), ("B", 0.0)].map(|(name, value)| (name, FlatSamples::F32(vec![value; 4])));
+        let of = |said| decode(&foreign_in(said, &[&channels]), 4).unwrap();
+        let [plain, same, wider] = [None, Some(REC_709), Some(p3)].map(|said| of(said).0.beauty[0]);
+        assert_eq!([plain, same], [[1.0, 0.0, 0.0, 1.0]; 2]);
+        assert!(wider[0] > 1.2 && wider[1] < -0.04 && wider[3] == 1.0, "{wider:?}");
+        let nowhere = Chromaticities { red: REC_709.white, green: REC_709.white, blue: REC_709.white, ..REC_709 };
+        let (picture, left_out) = of(Some(nowhere));
+        assert_eq!((picture.beauty[0], left_out.len()), (plain, 1));
     }
 
     #[test]

@@ -3,10 +3,11 @@
 use super::limits::{Budget, Limits};
 use super::texture::{format_of, within};
 use super::{Diagnostic, LoadError, Source};
+use crate::image::primaries::Primaries;
 use crate::math::{DMat3, DVec3};
 use crate::quiet::attempt;
 use crate::scene::Panorama;
-use crate::scene::color::{Primaries, from_srgb};
+use crate::scene::color::from_srgb;
 use crate::threads;
 use ::exr::meta::MetaData;
 use ::image::codecs::hdr::HdrDecoder;
@@ -131,14 +132,7 @@ fn upright(reader: ImageReader<Cursor<&[u8]>>) -> ImageResult<DynamicImage> {
 
 /// What turns the colours of an EXR file into Rec. 709; `None`: they are that, or nobody knows, which is told.
 fn other_colors(meta: &MetaData, file: &Path, warnings: &mut Vec<Diagnostic>) -> Option<DMat3> {
-    let chromaticities = meta.headers.first()?.shared_attributes.chromaticities?;
-    let place = |at: ::exr::math::Vec2<f32>| [f64::from(at.x()), f64::from(at.y())];
-    let colors = [chromaticities.red, chromaticities.green, chromaticities.blue].map(place);
-    let primaries = Primaries { colors, white: place(chromaticities.white) };
-    if primaries.are_near(&Primaries::REC_709) {
-        return None;
-    }
-    let turned = primaries.to_rec_709();
+    let turned = Primaries::of_exr(meta)?.to_rec_709();
     if turned.is_none() {
         let text = "its chromaticities are those of no colours: it is taken as Rec. 709";
         warnings.push(Diagnostic::new("env-colors", file, "", text));

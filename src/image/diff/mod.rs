@@ -157,18 +157,8 @@ fn pixel(picture: &Picture, x: u32, y: u32) -> [f32; 4] {
 fn difference_color(a: [f32; 4], b: [f32; 4], gain: f32) -> [f32; 4] {
     let [r, g, blue, coverage] = channel_differences(a, b, Space::Display).map(|d| d as f32 * gain);
     // Where only the coverage differs, grey shows it.
-    [r, g, blue].map(|c| srgb::decode(f64::from(c.max(coverage).min(1.0))) as f32).into_rgba()
-}
-
-/// A colour with full coverage.
-trait IntoRgba {
-    fn into_rgba(self) -> [f32; 4];
-}
-
-impl IntoRgba for [f32; 3] {
-    fn into_rgba(self) -> [f32; 4] {
-        [self[0], self[1], self[2], 1.0]
-    }
+    let [r, g, b] = [r, g, blue].map(|c| srgb::decode(f64::from(c.max(coverage).min(1.0))) as f32);
+    [r, g, b, 1.0]
 }
 
 #[cfg(test)]

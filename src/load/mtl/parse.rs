@@ -1,6 +1,7 @@
 //! MTL text -> materials as written, before anything is made of them.
 
 use super::options::{self, Map};
+use crate::image::primaries::rec_709_of_xyz;
 use crate::load::limits::{Budget, OverBudget};
 use crate::load::number;
 use crate::load::paths::shorten;
@@ -8,7 +9,6 @@ use crate::load::text::encoding::{decode_name, to_ascii_superset};
 use crate::load::text::lines::{Lines, keyword, words};
 use crate::load::{Diagnostic, Warnings};
 use crate::math::DVec3;
-use crate::scene::color::rec_709_of_xyz;
 use std::mem::size_of;
 use std::path::Path;
 
