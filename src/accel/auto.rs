@@ -137,8 +137,11 @@ impl fmt::Display for Reason {
         if self.is_one_tree() {
             return write!(f, "{kind}: {prims} shapes, and up to {ALIKE} are cut alike by fast-octree and fast-bvh");
         }
+        let fewest = SHARE * FEWEST;
+        if rays == 0 && prims >= fewest as usize {
+            return write!(f, "{kind}: {prims} shapes without an area from which rays of a sample could start");
+        }
         if rays == 0 {
-            let fewest = SHARE * FEWEST;
             return write!(
                 f,
                 "{kind}: {prims} shapes, and with fewer than {fewest} a sample would take longer than it may save"
@@ -193,11 +196,11 @@ pub fn reason(shapes: &Shapes, kept: &Kept) -> Reason {
 fn judge(shapes: &Shapes) -> Reason {
     let bounded = shapes.bounded();
     let judged = (bounded / SHARE).min(MOST);
-    if judged < FEWEST {
+    let starts = if judged < FEWEST { Vec::new() } else { over_surface(shapes, RAYS) };
+    if starts.is_empty() {
         let (kind, prims) = (AccelKind::FastOctree, bounded as usize);
         return Reason { kind, rays: 0, prims, octree: 0.0, bvh: 0.0 };
     }
-    let starts = over_surface(shapes, RAYS);
     let rays = sample(shapes, &starts);
     let count = (judged / PART).max(1);
     // Each part is asked by some of the rays, from all over the surface.
@@ -346,7 +349,7 @@ fn place(shapes: &Shapes, prim: u32, random: &mut Random) -> Vec3 {
         Some(&corners) => triangle::within(&shapes.corners(corners), random.unit(), random.unit()),
         None => {
             let bounds = shapes.bounds(prim);
-            bounds.lo + (bounds.hi - bounds.lo) * random.unit()
+            bounds.lo + (bounds.hi - bounds.lo) * Vec3::new(random.unit(), random.unit(), random.unit())
         }
     }
 }

@@ -4,7 +4,7 @@
 //! meant and as `f64` where points are. A top cell is 2^levels finest cells wide, the cell of an octree node half of its
 //! parent's.
 
-use super::params::{Assign, GridParams};
+use super::params::{Assign, GridParams, MOST_CELLS};
 use crate::accel::shapes::{Prim, Shapes};
 use crate::math::aabb::Aabb;
 use crate::math::bounds::{
@@ -214,7 +214,8 @@ fn dims(shapes: &Shapes, params: &GridParams, extent: DVec3) -> [u32; 3] {
     let most_references = f64::from(shapes.bounded()) * TOP_REFERENCES;
     let mut factor = 1.0;
     let mut dims = resolution(factor);
-    while dims != [1; 3] && sizes.references(dims, extent) > most_references {
+    let cells = |dims: [u32; 3]| dims.map(f64::from).into_iter().product::<f64>();
+    while dims != [1; 3] && (sizes.references(dims, extent) > most_references || cells(dims) > MOST_CELLS) {
         factor *= 0.75;
         dims = resolution(factor);
     }

@@ -16,7 +16,7 @@ pub struct GridParams {
     pub step_cost: f64,
     /// Instead of the step cost: every cell that lists more prims is split, as deep as `max_depth` and `references` allow.
     pub leaf_size: Option<u32>,
-    /// Cells of the top grid on each axis, 1 to 1024, whatever the density; `None`: what density and resolution say.
+    /// Cells of the top grid on each axis, 1 to 1024 and at most [`MOST_CELLS`] in all, whatever the density; `None`: what density and resolution say.
     pub dims: Option<[u32; 3]>,
     /// References there may be for each prim in the cells of all octrees together, 1 to 1000.
     pub references: f64,
@@ -45,6 +45,9 @@ impl Default for GridParams {
         Self::DEFAULT
     }
 }
+
+/// Cells of a top grid at most: lists of so many take a gigabyte and a half.
+pub const MOST_CELLS: f64 = (1_u32 << 27) as f64;
 
 /// A parameter out of its range.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -86,8 +89,10 @@ impl GridParams {
         check("step cost", cost, (0.1..=100.0).contains(&cost), "0.1 to 100")?;
         check("references of a shape", self.references, (1.0..=1000.0).contains(&self.references), "1 to 1000")?;
         check("thickness of faces", self.thickness, (0.0..=1e6).contains(&self.thickness), "0 to 1e6")?;
-        let mut cells = self.dims.into_iter().flatten();
-        cells.try_for_each(|n| check("number of cells on an axis", f64::from(n), (1..=1024).contains(&n), "1 to 1024"))
+        let mut axes = self.dims.into_iter().flatten();
+        axes.try_for_each(|n| check("number of cells on an axis", f64::from(n), (1..=1024).contains(&n), "1 to 1024"))?;
+        let cells: f64 = self.dims.unwrap_or([1; 3]).map(f64::from).into_iter().product();
+        check("number of cells", cells, cells <= MOST_CELLS, "at most 134217728 (512 on each axis)")
     }
 }
 
@@ -112,6 +117,7 @@ mod tests {
             GridParams { step_cost: 0.0, ..default },
             GridParams { references: 0.5, ..default },
             GridParams { dims: Some([4, 0, 4]), ..default },
+            GridParams { dims: Some([1024, 512, 512]), ..default },
             GridParams { thickness: -1.0, ..default },
         ] {
             assert!(bad.validate().is_err(), "{bad:?}");
