@@ -100,6 +100,10 @@ pub fn failures(baseline: &Value, now: &Value, limits: &[Limit]) -> Result<Vec<S
         for row in items(&before["structures"]) {
             let current = items(&model["structures"]).iter().find(|r| r["accel"] == row["accel"]);
             let place = format!("{name}, {}", row["accel"].as_str().unwrap_or_default());
+            if let Some(sampled) = current.and_then(|current| sampled_otherwise(row, current)) {
+                let [before, now] = [baseline, now].map(|report| &report["settings"]["slow_tests"]);
+                return Err(format!("{place}: {sampled} (tests of slow structures: {before} before, {now} now)"));
+            }
             match current {
                 Some(current) => compare(&place, row, current, limits, &mut lines),
                 None => lines.push(format!("{place}: in the baseline, but not measured now")),
@@ -179,6 +183,14 @@ fn compare(place: &str, before: &Value, now: &Value, limits: &[Limit], lines: &m
             judge(&place, &counts["per_ray"][key], &now["classes"][class]["per_ray"][key]);
         }
     }
+}
+
+/// In what other rays of a class were sent through a structure: slow ones get a sample.
+fn sampled_otherwise(before: &Value, now: &Value) -> Option<String> {
+    let classes = before["classes"].as_object().into_iter().flatten();
+    let numbers = classes.map(|(class, counts)| (class, &counts["rays"], &now["classes"][class]["rays"]));
+    let (class, before, now) = numbers.into_iter().find(|(_, before, now)| now.is_number() && before != now)?;
+    Some(format!("the baseline was made with {before} rays of class {class}, not with {now}"))
 }
 
 fn items(list: &Value) -> &[Value] {

@@ -22,9 +22,14 @@ pub fn write(report: &Report) -> String {
     out
 }
 
+/// Names of files and cameras are not trusted: what steers a terminal is left out.
+fn printable(name: &str) -> String {
+    name.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
+}
+
 fn write_model(out: &mut String, report: &Report, model: &Model) {
-    *out += &format!("\n## {}\n\n", model.name.replace('|', "\\|"));
-    *out += &format!("{}; rays of {}. **{}.**\n\n", model.size(), model.picture(), model.verdict());
+    *out += &format!("\n## {}\n\n", printable(&model.name));
+    *out += &format!("{}; rays of {}. **{}.**\n\n", model.size(), printable(&model.picture()), model.verdict());
     auto::sentences(report, model).iter().for_each(|text| *out += &format!("{text}.\n"));
     if model.auto.is_some() {
         out.push('\n');

@@ -203,10 +203,11 @@ impl Report {
     /// How times were taken, in a sentence.
     pub fn method(&self) -> String {
         let Plan { passes, threads, seed, slow_tests, .. } = &self.plan;
-        let times = match (*passes, *threads) {
-            (0, _) => "no times were taken".to_owned(),
-            (n, 1) => format!("times: wall clock of one thread, median and range of {n} interleaved passes"),
-            (n, t) => format!("times: wall clock of {t} threads, median and range of {n} interleaved passes"),
+        let on = if *threads == 1 { "one thread".to_owned() } else { format!("{threads} threads") };
+        let times = match *passes {
+            0 => "no times were taken".to_owned(),
+            1 => format!("times: wall clock of {on}, one pass only, so of unknown spread"),
+            n => format!("times: wall clock of {on}, median and range of {n} interleaved passes"),
         };
         let tests = grouped(*slow_tests);
         format!(

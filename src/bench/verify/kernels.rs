@@ -41,7 +41,7 @@ pub fn of(findings: &Findings) -> Vec<Kernel> {
     let kernel = |cost: &super::TestTime| Kernel {
         name: cost.test.name().to_owned(),
         is_ours: true,
-        seconds_per_ray: cost.per_ray.as_secs_f64(),
+        seconds_per_ray: cost.per_ray.median(),
         tally: findings.total(cost.test),
     };
     findings.costs.iter().map(kernel).collect()

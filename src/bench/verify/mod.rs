@@ -9,14 +9,13 @@ pub mod spawned;
 pub mod tally;
 pub mod variation;
 
-use std::time::{Duration, Instant};
-
 use rayon::prelude::*;
 
 use self::spawned::{Spawned, spawned};
 use self::tally::Tally;
 use self::variation::{Variation, Variations};
 use super::aim::{Aim, Aimer};
+use super::clock::{Spread, timed};
 use super::oracle::{Oracle, Truth};
 use crate::accel::{Accel, AccelKind, AccelParams, AnyAccel, Hit, IntersectorKind, NoProbe, Ray};
 use crate::scene::Scene;
@@ -64,7 +63,7 @@ pub struct Section {
     pub amount: f64,
     /// Whether the frame is centred, as the scenes that are rendered are.
     pub centred: bool,
-    /// Triangles that rounding left without area, though they had some.
+    /// Triangles that rounding left without three different corners, though they had some.
     pub collapsed: usize,
     /// Rows by intersector, then structure.
     pub rows: Vec<Row>,
@@ -75,12 +74,12 @@ pub struct Section {
 }
 
 /// How long a test takes.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct TestTime {
     /// The test of triangles.
     pub test: IntersectorKind,
-    /// Time of one ray in the default structure on one thread, median of [`PASSES`] passes over the rays of the unchanged mesh.
-    pub per_ray: Duration,
+    /// Seconds of one ray in the default structure on one thread, of [`PASSES`] passes over the rays of the unchanged mesh.
+    pub per_ray: Spread,
 }
 
 /// Everything that was found.
@@ -204,18 +203,12 @@ fn costs(variation: &Variation, plan: &Plan) -> Option<Vec<TestTime>> {
     let accels = IntersectorKind::ALL.map(|test| (test, accel.clone().tested_by(test)));
     let mut scratch = accel.scratch();
     let mut answers = vec![Hit::MISS; rays.len()];
-    let mut times = vec![Vec::new(); accels.len()];
+    let mut times = vec![Spread::default(); accels.len()];
     for _ in 0..PASSES {
         for ((_, accel), times) in accels.iter().zip(&mut times) {
-            let start = Instant::now();
-            accel.closest(&rays, &mut answers, &mut scratch, &mut NoProbe);
-            times.push(start.elapsed());
+            let ((), seconds) = timed(|| accel.closest(&rays, &mut answers, &mut scratch, &mut NoProbe));
+            times.push(seconds / rays.len().max(1) as f64);
         }
     }
-    let count = u32::try_from(rays.len()).unwrap_or(u32::MAX).max(1);
-    let cost = |((test, _), mut times): (&(IntersectorKind, AnyAccel), Vec<Duration>)| {
-        times.sort_unstable();
-        TestTime { test: *test, per_ray: times[times.len() / 2] / count }
-    };
-    Some(accels.iter().zip(times).map(cost).collect())
+    Some(accels.iter().zip(times).map(|((test, _), per_ray)| TestTime { test: *test, per_ray }).collect())
 }

@@ -110,11 +110,14 @@ impl Report<'_> {
             "\ntime of these rays on one thread, {accel}, against {exact}, which alone tests eight triangles at once"
         )?;
         for cost in &self.findings.costs {
+            let ns = cost.per_ray.map(|seconds| 1e9 * seconds);
             writeln!(
                 out,
-                "  {:24}{:>10.0} ns a ray {:>8.2}",
+                "  {:24}{:>10.1} ns a ray ({:.1}..{:.1}) {:>8.2}",
                 cost.test.name(),
-                cost.per_ray.as_secs_f64() * 1e9,
+                ns.median(),
+                ns.min(),
+                ns.max(),
                 self.ratio(cost.test)
             )?;
         }
@@ -125,7 +128,7 @@ impl Report<'_> {
     fn ratio(&self, test: IntersectorKind) -> f64 {
         let time = |test| {
             let cost = self.findings.costs.iter().find(|c| c.test == test);
-            cost.map_or(f64::NAN, |c| c.per_ray.as_secs_f64())
+            cost.map_or(f64::NAN, |c| c.per_ray.median())
         };
         time(test) / time(IntersectorKind::Exact)
     }
@@ -175,7 +178,13 @@ impl Report<'_> {
         let costs: Vec<Value> = f
             .costs
             .iter()
-            .map(|c| json!({ "intersector": c.test.name(), "ns_per_ray": c.per_ray.as_secs_f64() * 1e9 }))
+            .map(|c| (c.test.name(), c.per_ray.map(|seconds| 1e9 * seconds)))
+            .map(|(name, ns)| {
+                let (median, least, most) = (ns.median(), ns.min(), ns.max());
+                json!({
+                    "intersector": name, "ns_per_ray": median, "ns_per_ray_min": least, "ns_per_ray_max": most,
+                })
+            })
             .collect();
         let value = json!({
             "schema": "meshray-verify/1", "version": SHORT, "file": self.name,
