@@ -36,10 +36,6 @@ impl Culling for Unculled<'_> {
     fn new_scratch(&self) {}
 
     fn walk<G: Goal, P: Probe>(&self, query: &mut Query<G>, (): &mut (), probe: &mut P) {
-        for prim in 0..self.shapes.bounded() {
-            if query.test(prim, probe) {
-                return;
-            }
-        }
+        query.test_all(probe);
     }
 }

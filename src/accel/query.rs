@@ -128,6 +128,16 @@ impl<'a, G: Goal> Query<'a, G> {
         prim != self.exclude && (self.goal.wants_open() || self.is_opaque(prim))
     }
 
+    /// Tests every prim that has bounds, until the query is answered.
+    #[inline(never)]
+    pub fn test_all<P: Probe>(&mut self, probe: &mut P) {
+        for prim in 0..self.shapes.bounded() {
+            if self.test(prim, probe) {
+                return;
+            }
+        }
+    }
+
     /// Tests one prim and tells whether the query is answered.
     #[inline]
     pub fn test<P: Probe>(&mut self, prim: u32, probe: &mut P) -> bool {
@@ -445,7 +455,7 @@ impl<C: Culling> Accel for C {
     }
 
     fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
-        closest(Exact, self, rays, hits, scratch, probe);
+        self.trace(&mut ForFirst { rays, pencil: None, hits, test: Exact }, scratch, probe);
     }
 
     fn closest_from<P: Probe>(
@@ -467,7 +477,7 @@ impl<C: Culling> Accel for C {
         scratch: &mut Self::Scratch,
         probe: &mut P,
     ) {
-        self::blocked(Exact, self, (rays, holes), blocked, scratch, probe);
+        self.trace(&mut ForAny { rays, holes, blocked, test: Exact }, scratch, probe);
     }
 
     fn next<P: Probe>(
@@ -478,7 +488,7 @@ impl<C: Culling> Accel for C {
         scratch: &mut Self::Scratch,
         probe: &mut P,
     ) {
-        next(Exact, self, rays, after, hits, scratch, probe);
+        self.trace(&mut ForNext { rays, after, hits, test: Exact }, scratch, probe);
     }
 }
 
@@ -504,7 +514,7 @@ impl<I: Intersector, C: Culling> Accel for Tested<'_, I, C> {
     }
 
     fn closest<P: Probe>(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut Self::Scratch, probe: &mut P) {
-        closest(self.test, self.structure, rays, hits, scratch, probe);
+        self.structure.trace(&mut ForFirst { rays, pencil: None, hits, test: self.test }, scratch, probe);
     }
 
     fn blocked<P: Probe>(
@@ -515,7 +525,7 @@ impl<I: Intersector, C: Culling> Accel for Tested<'_, I, C> {
         scratch: &mut Self::Scratch,
         probe: &mut P,
     ) {
-        self::blocked(self.test, self.structure, (rays, holes), blocked, scratch, probe);
+        self.structure.trace(&mut ForAny { rays, holes, blocked, test: self.test }, scratch, probe);
     }
 
     fn next<P: Probe>(
@@ -526,40 +536,6 @@ impl<I: Intersector, C: Culling> Accel for Tested<'_, I, C> {
         scratch: &mut Self::Scratch,
         probe: &mut P,
     ) {
-        next(self.test, self.structure, rays, after, hits, scratch, probe);
+        self.structure.trace(&mut ForNext { rays, after, hits, test: self.test }, scratch, probe);
     }
-}
-
-fn closest<I: Intersector, C: Culling, P: Probe>(
-    test: I,
-    structure: &C,
-    rays: &[Ray],
-    hits: &mut [Hit],
-    scratch: &mut C::Scratch,
-    probe: &mut P,
-) {
-    structure.trace(&mut ForFirst { rays, pencil: None, hits, test }, scratch, probe);
-}
-
-fn blocked<I: Intersector, C: Culling, P: Probe>(
-    test: I,
-    structure: &C,
-    (rays, holes): (&[Ray], Option<&dyn Holes>),
-    blocked: &mut [bool],
-    scratch: &mut C::Scratch,
-    probe: &mut P,
-) {
-    structure.trace(&mut ForAny { rays, holes, blocked, test }, scratch, probe);
-}
-
-fn next<I: Intersector, C: Culling, P: Probe>(
-    test: I,
-    structure: &C,
-    rays: &[Ray],
-    after: &[Hit],
-    hits: &mut [Hit],
-    scratch: &mut C::Scratch,
-    probe: &mut P,
-) {
-    structure.trace(&mut ForNext { rays, after, hits, test }, scratch, probe);
 }

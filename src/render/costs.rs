@@ -71,8 +71,8 @@ impl Costs {
     }
 }
 
-/// Traces the picture again, as many samples in each pixel as [`super::Settings::samples`] says, for each kind of cost: once for all counts, once for the times. The counts are exact and the
-/// same for every number of threads. `None` when cancelled.
+/// Traces the picture again, as many samples in each pixel as [`super::Settings::samples`] says: once for all counts, three
+/// times for the times. The counts are exact and the same for every number of threads. `None` when cancelled.
 ///
 /// Times are those of one pixel after the other on each thread, by the clock, and of three passes the least: what a
 /// ray's walk takes is its class's, and all else is `ms.shading`.

@@ -269,8 +269,6 @@ impl Features {
 
     fn add_phong(&mut self, phong: &Phong) {
         self.add_if(true, Feature::Phong);
-        let maps = [&phong.ambient_map, &phong.specular_map, &phong.shininess_map];
-        self.add_if(maps.iter().any(|map| map.is_some()), Feature::Textures);
         self.add_if(phong.mirror.max_element() > 0.0, Feature::Mirrors);
         if phong.transmission.max_element() > 0.0 {
             let bends = phong.ior != 1.0;

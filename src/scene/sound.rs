@@ -1,6 +1,7 @@
 //! Whether a scene that was made by hand can be placed and rendered.
 
-use super::{Bitmap, Mesh, Pixels, Scene};
+use super::{Mesh, Pixels, Scene};
+use crate::math::DVec3;
 
 /// What is wrong with a scene, and where.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -33,17 +34,24 @@ impl Scene {
         for (i, sphere) in self.spheres.iter().enumerate() {
             points(|| format!("spheres[{i}].material"), sphere.material, materials, "materials")?;
             let (radius, place) = (sphere.radius, || format!("spheres[{i}].radius"));
-            holds(radius >= 0.0, place, || format!("{radius} is none"))?;
+            holds(radius > 0.0 && radius.is_finite(), place, || format!("{radius} is none"))?;
+            is_finite(|| format!("spheres[{i}].center"), sphere.center)?;
         }
         for (i, cone) in self.cones.iter().enumerate() {
             points(|| format!("cones[{i}].material"), cone.material, materials, "materials")?;
             let (radii, place) = ([cone.base_radius, cone.apex_radius], || format!("cones[{i}]"));
-            holds(radii.iter().all(|&radius| radius >= 0.0), place, || format!("{radii:?} are no radii"))?;
+            let are_radii = radii.iter().all(|&radius| radius >= 0.0 && radius.is_finite()) && radii != [0.0; 2];
+            holds(are_radii, place, || format!("{radii:?} are no radii"))?;
+            is_finite(|| format!("cones[{i}].base"), cone.base)?;
+            is_finite(|| format!("cones[{i}].apex"), cone.apex)?;
+            holds(cone.base != cone.apex, place, || format!("both ends are at {}", cone.base))?;
         }
         for (i, plane) in self.planes.iter().enumerate() {
             points(|| format!("planes[{i}].material"), plane.material, materials, "materials")?;
             let (length, place) = (plane.normal.length(), || format!("planes[{i}].normal"));
             holds((length - 1.0).abs() < 1e-6, place, || format!("its length is {length}, not 1"))?;
+            let offset = plane.offset;
+            holds(offset.is_finite(), || format!("planes[{i}].offset"), || format!("{offset} is not finite"))?;
         }
         for (i, material) in self.materials.iter().enumerate() {
             for map in material.textures() {
@@ -54,15 +62,15 @@ impl Scene {
             points(|| format!("textures[{i}].bitmap"), texture.bitmap, self.bitmaps.len(), "bitmaps")?;
         }
         for (i, bitmap) in self.bitmaps.iter().enumerate() {
-            let (expected, found) = (bitmap.width as usize * bitmap.height as usize, texels(bitmap));
-            holds(
-                found == expected,
-                || format!("bitmaps[{i}].pixels"),
-                || {
-                    let Bitmap { width, height, .. } = bitmap;
-                    format!("{found} texels where {width} × {height} are {expected}")
-                },
-            )?;
+            // A pixel that is cut off counts.
+            let found = match &bitmap.pixels {
+                Pixels::Rgb8(bytes) => bytes.len().div_ceil(3),
+                _ => bitmap.texels(),
+            };
+            covers(|| format!("bitmaps[{i}].pixels"), found, (bitmap.width, bitmap.height))?;
+        }
+        if let Some(panorama) = &self.panorama {
+            covers(|| "panorama.texels".into(), panorama.texels.len(), (panorama.width, panorama.height))?;
         }
         self.hints.camera.map_or(Ok(()), |i| points(|| "hints.camera".into(), i, self.cameras.len(), "cameras"))
     }
@@ -111,17 +119,19 @@ impl Mesh {
     }
 }
 
-fn texels(bitmap: &Bitmap) -> usize {
-    match &bitmap.pixels {
-        Pixels::Rgb8(bytes) => bytes.len() / 3,
-        Pixels::Rgba8(texels) => texels.len(),
-        Pixels::Rgba16(texels) => texels.len(),
-    }
-}
-
 /// An index points at one of `len` parts of a kind.
 fn points(place: impl Fn() -> String, index: u32, len: usize, kind: &str) -> Result<(), SceneFault> {
     holds((index as usize) < len, place, || format!("{index} where there are {len} {kind}"))
+}
+
+/// So many texels are all of a picture.
+fn covers(place: impl Fn() -> String, found: usize, (width, height): (u32, u32)) -> Result<(), SceneFault> {
+    let expected = width as usize * height as usize;
+    holds(found == expected, place, || format!("{found} texels where {width} × {height} are {expected}"))
+}
+
+fn is_finite(place: impl Fn() -> String, point: DVec3) -> Result<(), SceneFault> {
+    holds(point.is_finite(), place, || format!("{point} is not finite"))
 }
 
 fn holds(is_so: bool, place: impl Fn() -> String, text: impl Fn() -> String) -> Result<(), SceneFault> {
@@ -132,7 +142,11 @@ fn holds(is_so: bool, place: impl Fn() -> String, text: impl Fn() -> String) -> 
 mod tests {
     use super::*;
     use crate::math::{DAffine3, DVec3, Vec2, Vec3};
-    use crate::scene::{Cone, Instance, Material, Plane, Polygon, Sampler, Sphere, Texture, TextureRef, UvTransform};
+    use crate::scene::{
+        Bitmap, Cone, Instance, Material, Panorama, Plane, Polygon, Sampler, Sphere, Texture, TextureRef, UvTransform,
+    };
+
+    use std::sync::Arc;
 
     type Spoil = fn(&mut Scene);
 
@@ -173,7 +187,7 @@ mod tests {
     fn what_points_nowhere_or_is_too_short_is_named_with_its_place() {
         assert_eq!(sound().check(), Ok(()));
         assert_eq!(Scene::default().check(), Ok(()));
-        let faults: [(Spoil, &str); 15] = [
+        let faults: [(Spoil, &str); 22] = [
             (|s| s.meshes[0].material = 1, "meshes[0].material: 1 where there are 1 materials"),
             (|s| s.meshes[0].triangles.push([0, 1, 3]), "meshes[0].triangles[1]: 3 where there are 3 positions"),
             (|s| s.meshes[0].normals.truncate(2), "meshes[0].normals: 2 of them where there are 3 positions"),
@@ -183,11 +197,25 @@ mod tests {
             (|s| s.meshes[0].polygon_corners[1] = 9, "meshes[0].polygon_corners[1]: 9 where"),
             (|s| s.instances[0].mesh = 1, "instances[0].mesh: 1 where there are 1 meshes"),
             (|s| s.spheres[0].radius = -1.0, "spheres[0].radius: -1 is none"),
+            (|s| s.spheres[0].radius = 0.0, "spheres[0].radius: 0 is none"),
+            (|s| s.spheres[0].center.y = f64::NAN, "spheres[0].center: [1, NaN, 0] is not finite"),
             (|s| s.cones[0].apex_radius = f64::NAN, "cones[0]: [1.0, NaN] are no radii"),
+            (|s| s.cones[0].base_radius = 0.0, "cones[0]: [0.0, 0.0] are no radii"),
+            (|s| s.cones[0].apex = DVec3::X, "cones[0]: both ends are at [1, 0, 0]"),
+            (|s| s.planes[0].offset = f64::INFINITY, "planes[0].offset: inf is not finite"),
             (|s| s.planes[0].normal = DVec3::ZERO, "planes[0].normal: its length is 0, not 1"),
             (|s| s.textures.clear(), "materials[0]: 0 where there are 0 textures"),
             (|s| s.textures[0].bitmap = 2, "textures[0].bitmap: 2 where there are 1 bitmaps"),
             (|s| s.bitmaps[0].height = 2, "bitmaps[0].pixels: 2 texels where 2 × 2 are 4"),
+            (|s| s.bitmaps[0].pixels = Pixels::Rgb8([9; 7].into_iter().collect()), "bitmaps[0].pixels: 3 texels where"),
+            (
+                |s| {
+                    let texels = Arc::new(vec![[0.0; 3]]);
+                    let name = String::new();
+                    s.panorama = Some(Panorama { name, width: 0, height: 1, texels, rotation: 0.0 });
+                },
+                "panorama.texels: 1 texels where 0 × 1 are 0",
+            ),
             (|s| s.hints.camera = Some(0), "hints.camera: 0 where there are 0 cameras"),
         ];
         for (spoil, expected) in faults {

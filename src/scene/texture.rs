@@ -74,6 +74,20 @@ pub struct Bitmap {
 }
 
 impl Bitmap {
+    /// How many whole texels are stored.
+    pub fn texels(&self) -> usize {
+        match &self.pixels {
+            Pixels::Rgb8(bytes) => bytes.len() / 3,
+            Pixels::Rgba8(texels) => texels.len(),
+            Pixels::Rgba16(texels) => texels.len(),
+        }
+    }
+
+    /// Whether there is one for each place.
+    pub fn is_whole(&self) -> bool {
+        self.texels() as u64 == u64::from(self.width) * u64::from(self.height)
+    }
+
     /// Bytes of its texels.
     pub fn bytes(&self) -> u64 {
         let bytes = match &self.pixels {

@@ -26,24 +26,17 @@ impl Bvh<'_> {
     /// Visits everything: each bounded prim is in one leaf, and the box of every node holds all that is below it.
     pub fn check(&self) -> Result<StructureStats, String> {
         let mut leaves = vec![0u32; self.shapes.bounded() as usize];
-        let mut failure = None;
-        if self.shapes.bounded() > 0 {
-            self.tree.each(0, 0, &mut |node, _, below| {
-                let content = match below {
-                    Below::Children(children) => {
-                        children.into_iter().fold(Aabb::EMPTY, |b, c| b.union(*self.tree.bounds(c)))
-                    }
-                    Below::Leaf(prims) => prims.iter().fold(Aabb::EMPTY, |b, &p| {
-                        leaves[p as usize] += 1;
-                        b.union(self.shapes.bounds(p))
-                    }),
-                };
-                let bounds = *self.tree.bounds(node);
-                if bounds.union(content) != bounds {
-                    failure = Some(format!("node {node} is {bounds:?}, below it is {content:?}"));
-                }
-            });
+        let leaf = |prims: &[u32]| {
+            prims.iter().fold(Aabb::EMPTY, |b, &prim| {
+                leaves[prim as usize] += 1;
+                b.union(self.shapes.bounds(prim))
+            })
+        };
+        if self.shapes.bounded() > 0
+            && let Some((node, content)) = self.tree.fault(0, leaf)
+        {
+            return Err(format!("node {node} is {:?}, below it is {content:?}", self.tree.bounds(node)));
         }
-        failure.map_or_else(|| listed_once(&leaves, "leaves"), Err).map(|()| self.summary())
+        listed_once(&leaves, "leaves").map(|()| self.summary())
     }
 }

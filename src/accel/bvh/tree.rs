@@ -134,6 +134,22 @@ impl Tree {
         }
     }
 
+    /// A node below a root whose box does not hold all that is below it, and the box of that; `leaf` finds the box of what a
+    /// leaf holds, and hears of each leaf once.
+    pub fn fault(&self, root: u32, mut leaf: impl FnMut(&[u32]) -> Aabb) -> Option<(u32, Aabb)> {
+        let mut fault = None;
+        self.each(root, 0, &mut |node, _, below| {
+            let content = match below {
+                Below::Children(children) => children.into_iter().fold(Aabb::EMPTY, |b, c| b.union(*self.bounds(c))),
+                Below::Leaf(prims) => leaf(prims),
+            };
+            if self.bounds(node).union(content) != *self.bounds(node) {
+                fault = Some((node, content));
+            }
+        });
+        fault
+    }
+
     /// Leads a ray from a root to the leaves whose boxes it enters, nearer ones first; whether `visit`, which tests the
     /// prims of a leaf, answered the query.
     #[inline]

@@ -99,21 +99,15 @@ impl<M> GridOctree<'_, M> {
         let root = self.trees.root(cell)?;
         let bounds = self.lattice.padded_bounds(cube);
         let tree = &self.trees.tree;
-        let (mut held, mut fault) = (Vec::<u32>::new(), None);
-        tree.each(root, 0, &mut |node, _, below| {
-            let content = match below {
-                Below::Children(children) => children.into_iter().fold(Aabb::EMPTY, |b, c| b.union(*tree.bounds(c))),
-                Below::Leaf(prims) => {
-                    held.extend(prims);
-                    prims.iter().fold(Aabb::EMPTY, |b, &p| b.union(clipped(self.shapes, p, &bounds)))
-                }
-            };
-            if tree.bounds(node).union(content) != *tree.bounds(node) {
-                fault = Some(format!("node {node} of cell {cell} does not hold {content:?} below it"));
-            }
+        let mut held = Vec::<u32>::new();
+        let fault = tree.fault(root, |prims| {
+            held.extend(prims);
+            prims.iter().fold(Aabb::EMPTY, |b, &p| b.union(clipped(self.shapes, p, &bounds)))
         });
+        if let Some((node, content)) = fault {
+            return Some(format!("node {node} of cell {cell} does not hold {content:?} below it"));
+        }
         held.sort_unstable();
-        let differs = held != self.cells.list(cell);
-        fault.or_else(|| differs.then(|| format!("the hierarchy of cell {cell} holds {held:?}")))
+        (held != self.cells.list(cell)).then(|| format!("the hierarchy of cell {cell} holds {held:?}"))
     }
 }

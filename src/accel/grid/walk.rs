@@ -103,7 +103,7 @@ impl<M: Mailbox> GridOctree<'_, M> {
     ) {
         scratch.mailbox.next_ray();
         let Some(track) = Track::new(&self.lattice, query, !self.trees.is_empty()) else {
-            self.test_all(query, probe);
+            query.test_all(probe);
             return;
         };
         // A hit at t_min may lie half an ulp before it.
@@ -278,14 +278,6 @@ impl<M: Mailbox> GridOctree<'_, M> {
         }
         probe.cell(false);
         test(self.cells.list(cell), query, probe)
-    }
-
-    fn test_all<G: Goal, P: Probe>(&self, query: &mut Query<G>, probe: &mut P) {
-        for prim in 0..self.shapes.bounded() {
-            if query.test(prim, probe) {
-                return;
-            }
-        }
     }
 }
 

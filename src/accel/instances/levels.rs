@@ -83,25 +83,19 @@ impl<'a> TwoLevel<'a> {
             object.check().map_err(|e| format!("object {i}: {e}"))?;
         }
         let mut leaves = vec![0u32; self.kept.placed().len()];
-        let mut failure = None;
-        if !self.kept.is_empty() {
-            self.places.each(0, 0, &mut |node, _, below| {
-                let content = match below {
-                    Below::Children(children) => {
-                        children.into_iter().fold(Aabb::EMPTY, |b, c| b.union(*self.places.bounds(c)))
-                    }
-                    Below::Leaf(places) => places.iter().fold(Aabb::EMPTY, |b, &i| {
-                        leaves[i as usize] += 1;
-                        b.union(self.kept.placed()[i as usize].place.bounds)
-                    }),
-                };
-                let bounds = *self.places.bounds(node);
-                if bounds.union(content) != bounds {
-                    failure = Some(format!("node {node} of the places is {bounds:?}, below it is {content:?}"));
-                }
-            });
+        let leaf = |places: &[u32]| {
+            places.iter().fold(Aabb::EMPTY, |b, &i| {
+                leaves[i as usize] += 1;
+                b.union(self.kept.placed()[i as usize].place.bounds)
+            })
+        };
+        if !self.kept.is_empty()
+            && let Some((node, content)) = self.places.fault(0, leaf)
+        {
+            let bounds = self.places.bounds(node);
+            return Err(format!("node {node} of the places is {bounds:?}, below it is {content:?}"));
         }
-        failure.map_or_else(|| listed_once(&leaves, "leaves of places"), Err)?;
+        listed_once(&leaves, "leaves of places")?;
         for (i, placed) in self.kept.placed().iter().enumerate() {
             self.holds(placed).map_err(|e| format!("place {i}: {e}"))?;
         }

@@ -159,7 +159,7 @@ fn walk<B: BoxMargins, S: Simd, G: Goal, P: Probe>(
         return;
     }
     if !B::allow(tree, query.ray.origin) {
-        return test_all(query, probe);
+        return query.test_all(probe);
     }
     let slabs = Slabs::<B>::new(query.ray.origin, query.ray.dir, query.t_min);
     let met = slabs.meets(s, &tree.nodes[0], B::widened(query.reach()));
@@ -249,16 +249,6 @@ fn test_leaf<S: Simd, G: Goal, P: Probe>(
         }
         Child::Run(run) => tree.run(run).iter().any(|&prim| query.test(prim, probe)),
         Child::Node(_) => false,
-    }
-}
-
-#[cold]
-#[inline(never)]
-fn test_all<G: Goal, P: Probe>(query: &mut Query<G>, probe: &mut P) {
-    for prim in 0..query.shapes().bounded() {
-        if query.test(prim, probe) {
-            return;
-        }
     }
 }
 

@@ -129,12 +129,7 @@ impl<'a> TextureStore<'a> {
 
 /// Whether there is anything to read, and as much as width and height promise.
 fn is_whole(bitmap: &Bitmap) -> bool {
-    let texels = match &bitmap.pixels {
-        Pixels::Rgb8(texels) => texels.len() / 3,
-        Pixels::Rgba8(texels) => texels.len(),
-        Pixels::Rgba16(texels) => texels.len(),
-    };
-    texels > 0 && texels as u64 == u64::from(bitmap.width) * u64::from(bitmap.height)
+    bitmap.texels() > 0 && bitmap.is_whole()
 }
 
 fn size_of(bitmap: &Bitmap) -> (usize, usize) {
