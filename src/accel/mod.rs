@@ -185,9 +185,9 @@ pub trait Accel: Sync {
         self.closest(rays, hits, scratch, probe);
     }
 
-    /// Whether anything *opaque* lies in `t_min..=t_max` of each ray: prims with a bit in [`Shapes::opaque`]. In a scene, faces of
-    /// masked, blended and transmissive materials are opaque only where their maps let nothing through; whether anything at all
-    /// lies there says [`Self::closest`].
+    /// Whether anything *opaque* lies in `t_min..=t_max` of each ray: prims with a bit in [`Shapes::opaque`]. In a
+    /// scene, faces of masked, blended and transmissive materials are opaque only where their maps let nothing through;
+    /// whether anything at all lies there says [`Self::closest`].
     fn occluded<P: Probe>(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut Self::Scratch, probe: &mut P) {
         self.blocked(rays, None, blocked, scratch, probe);
     }

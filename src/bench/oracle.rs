@@ -1,8 +1,9 @@
 //! What a ray really hits: exact for the `f32` ray and triangles, from all of them, by arithmetic of its own.
 //!
 //! Every triangle is looked at in `f64` with bounds of its own; where those cannot tell, adaptive predicates and rational
-//! numbers decide ([`rational`](crate::math::rational)). To be affordable on large meshes, runs of triangles are skipped when the ray
-//! misses their box by more than a millionth of its size: nothing else is shared with the structures that it judges.
+//! numbers decide ([`rational`](crate::math::rational)). To be affordable on large meshes, runs of triangles are
+//! skipped when the ray misses their box by more than a millionth of its size: nothing else is shared with the
+//! structures that it judges.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;

@@ -128,7 +128,8 @@ pub(super) fn bytes_of_rays(settings: &Settings, rays: f64) -> u64 {
 }
 
 /// The most memory that a picture takes on its way into such a file, bytes: all that is known of its pixels, a second time
-/// while it is counted or another is rendered beside it; then its samples as they are stored, and the file, which may hardly be smaller.
+/// while it is counted or another is rendered beside it; then its samples as they are stored, and the file, which may
+/// hardly be smaller.
 pub(super) fn bytes(effective: &Effective, kind: FileKind, behind: Behind) -> u64 {
     /// Of the costs of a pixel: those of its tile, five channels, copies and sums.
     const COST: u64 = 128;

@@ -9,8 +9,8 @@ use std::path::Path;
 /// Of a picture that is framed on the model one ray in so many hits it, or its parts are too small to be seen.
 const FEW: usize = 10_000;
 
-/// What is to be said of a picture by such a choice of the eye, which is called so; nothing of those that show something, nor of those that
-/// take so long that nobody renders them without looking.
+/// What is to be said of a picture by such a choice of the eye, which is called so; nothing of those that show
+/// something, nor of those that take so long that nobody renders them without looking.
 pub(super) fn warning(
     job: &Job,
     (choice, view): (&Choice, &str),

@@ -179,7 +179,8 @@ pub(super) fn read_metadata(file: impl BufRead) -> Result<Metadata, ImageError> 
 /// Reads the first part of an EXR, at most `max_pixels`: beauty, the layers that have the names of this module, and every other
 /// channel; and says what it holds besides that is not read.
 ///
-/// Colours of other primaries become those of Rec. 709. A picture of luminance alone (`Y`) is grey. Its chroma, which has fewer values than there are pixels, is left out.
+/// Colours of other primaries become those of Rec. 709. A picture of luminance alone (`Y`) is grey. Its chroma, which
+/// has fewer values than there are pixels, is left out.
 pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<(Picture, Vec<String>), ImageError> {
     let fail = |e: ::exr::error::Error| ImageError::decode(FileKind::Exr, e);
     let meta = MetaData::read_from_buffered(bytes, false).map_err(fail)?;

@@ -47,7 +47,8 @@ pub struct Picture {
     pub layers: Option<Layers>,
     /// Light of a known background that comes through glass beyond what alpha leaves of it, by its colour: laid behind like the
     /// background, neither exposed nor tone mapped;
-    /// and which part of what covers the pixel is glass. Empty, or `width × height` values where glass stands before a background.
+    /// and which part of what covers the pixel is glass. Empty, or `width × height` values where glass stands before a
+    /// background.
     pub veil: Vec<[f32; 4]>,
 }
 

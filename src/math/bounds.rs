@@ -213,8 +213,8 @@ pub const BOX_PAD: f32 = 8.0 * U32;
 pub const PARALLEL: f32 = 1.0 / (1u32 << 30) as f32;
 
 /// Largest size of E + |o| and of a direction (sums of the sizes of components), and the reciprocal of the smallest, for
-/// which these bounds hold: reciprocals are then below 2⁶⁸ and their products below 2¹⁰⁵, edge values and heights below 2¹¹⁶, and the pad
-/// over a direction's component, what [`PARALLEL`] adds to it alone, is above 2⁻¹⁰³.
+/// which these bounds hold: reciprocals are then below 2⁶⁸ and their products below 2¹⁰⁵, edge values and heights below
+/// 2¹¹⁶, and the pad over a direction's component, what [`PARALLEL`] adds to it alone, is above 2⁻¹⁰³.
 pub const BOX_RANGE: f32 = (1u64 << 36) as f32;
 
 /// As [`BOX_PAD`], for a ray that was carried into the frame of an object: its origin is rounded there, and its direction,

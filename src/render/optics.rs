@@ -1,7 +1,8 @@
 //! What light does at a smooth boundary: reflect, refract, how much of each, and how the index depends on the wavelength.
 //!
 //! Pure functions of directions and indices of refraction; which surface they belong to is the caller's business.
-//! Indices by name are in [`crate::scene::ior`]. Directions are unit vectors along the ray; `normal` is a unit vector turned against the incident direction.
+//! Indices by name are in [`crate::scene::ior`]. Directions are unit vectors along the ray; `normal` is a unit vector
+//! turned against the incident direction.
 
 use crate::math::{DVec3, Vec3};
 

@@ -34,7 +34,8 @@ const FILL_FROM: DVec3 = DVec3::new(0.85, 0.15, 0.55);
 /// Adds key, fill and studio, as seen from `camera`, to a scene without any light.
 ///
 /// Light is a lamp, an ambient term or an environment; a material that glows is not. A scene in which everything is
-/// unlit needs no lamps and gets the studio alone, to be seen before the same backdrop as others. The fill throws no shadows: it stands for light from all over that side.
+/// unlit needs no lamps and gets the studio alone, to be seen before the same backdrop as others. The fill throws no
+/// shadows: it stands for light from all over that side.
 pub fn add_if_missing(scene: &mut Scene, camera: &Camera) -> DefaultLight {
     if scene.hints.default_light == Some(false) {
         return DefaultLight::NotWanted;

@@ -2,8 +2,9 @@
 //!
 //! A grid of cells as near to cubes as possible lies over the shapes ([`lattice`]); every cell lists the prims whose
 //! surface touches it, padded ([`overlap`], `build`). Where a list is so long that smaller cells are expected to pay, the
-//! cell becomes an octree (`octree`), or is given a hierarchy of boxes (`trees`). A ray visits cells in order and stops behind the first hit that nothing can precede
-//! (`walk`); the mailbox saves repeated tests of prims listed in several cells ([`mailbox`]).
+//! cell becomes an octree (`octree`), or is given a hierarchy of boxes (`trees`). A ray visits cells in order and stops
+//! behind the first hit that nothing can precede (`walk`); the mailbox saves repeated tests of prims listed in several
+//! cells ([`mailbox`]).
 
 mod build;
 mod check;

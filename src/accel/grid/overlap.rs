@@ -4,8 +4,9 @@
 //! the triangle, its plane, and its three edges in each of the three projections; the same answer as the separating axes
 //! of T. Akenine-Möller, 2001, but with all that depends on the triangle alone computed once.
 //!
-//! Every comparison is in favour of overlap by the padding of [`CellMargins`](super::lattice::CellMargins). Rounding here is far below that: points
-//! and edge values err by at most 2⁻⁴⁸ R cells; only a plane's normal may err more, and has its own slack.
+//! Every comparison is in favour of overlap by the padding of [`CellMargins`](super::lattice::CellMargins). Rounding
+//! here is far below that: points and edge values err by at most 2⁻⁴⁸ R cells; only a plane's normal may err more, and
+//! has its own slack.
 
 use super::lattice::{Cube, Lattice, thick_box};
 use super::params::Assign;

@@ -16,7 +16,8 @@ pub struct GridParams {
     pub step_cost: f64,
     /// Instead of the step cost: every cell that lists more prims is split, as deep as `max_depth` and `references` allow.
     pub leaf_size: Option<u32>,
-    /// Cells of the top grid on each axis, 1 to 1024 and at most [`MOST_CELLS`] in all, whatever the density; `None`: what density and resolution say.
+    /// Cells of the top grid on each axis, 1 to 1024 and at most [`MOST_CELLS`] in all, whatever the density; `None`:
+    /// what density and resolution say.
     pub dims: Option<[u32; 3]>,
     /// References there may be for each prim in the cells of all octrees together, 1 to 1000.
     pub references: f64,

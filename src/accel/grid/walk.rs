@@ -8,9 +8,10 @@
 //! # Why no hit is lost
 //! Exit distances split the ray into intervals; the cell visited in an interval holds the ray there up to the error of
 //! computing positions in `f64`, less than an eighth of [`CELL_PAD`](crate::math::bounds::CELL_PAD) for origins within
-//! [`RAY_CELLS`](crate::math::bounds::RAY_CELLS). Prims are listed in every cell that they touch within the padding, so a hit with exact distance t is
-//! tested at the latest in the cell of t's interval. The walk ends behind a cell when no later hit can come before the
-//! best one: when that lies, by [`WALK_MARGIN`](crate::math::bounds::WALK_MARGIN), before the exit. A hit found beyond the exit is kept but is not final.
+//! [`RAY_CELLS`](crate::math::bounds::RAY_CELLS). Prims are listed in every cell that they touch within the padding, so
+//! a hit with exact distance t is tested at the latest in the cell of t's interval. The walk ends behind a cell when no
+//! later hit can come before the best one: when that lies, by [`WALK_MARGIN`](crate::math::bounds::WALK_MARGIN), before
+//! the exit. A hit found beyond the exit is kept but is not final.
 
 use super::lattice::{Cube, Lattice};
 use super::mailbox::Mailbox;

@@ -12,8 +12,9 @@
 //!
 //! Rays go one by one (`alone`), many in flight (`flight`) or sixteen side by side (`packet`; those from one place enter by
 //! crowds, `entrance`, and share what they see of blocks, `shelf`), through triangles; where there is anything else, or
-//! somebody counts, they go one by one through whatever there is (`walk`). Hits are ordered by (t, prim) and every test gives an exact verdict, so that neither the order of visits nor the company of other rays can change an
-//! answer. Counts are those of one ray at a time: whoever listens gets that.
+//! somebody counts, they go one by one through whatever there is (`walk`). Hits are ordered by (t, prim) and every test
+//! gives an exact verdict, so that neither the order of visits nor the company of other rays can change an answer.
+//! Counts are those of one ray at a time: whoever listens gets that.
 //!
 //! An object that stands in several places has a tree in its own frame, through which rays go one by one (`placed`).
 

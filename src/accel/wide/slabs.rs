@@ -3,8 +3,9 @@
 //! # Why no hit is lost
 //! A prim lies in the boxes above it, exactly: they are made of its own `f32` coordinates. The distances to a box's planes
 //! err by [`SLAB_F32`] at most, relative, and [`BOX_UNDERFLOW`], so a box is entered whenever the exact ray meets it within
-//! its range, widened by [`BOX_MARGIN`]. Only where that holds are boxes asked at all: a direction whose reciprocal is not a normal number
-//! constrains nothing on its axis, and with coordinates beyond [`BOX_COORDINATES`] every prim is tested.
+//! its range, widened by [`BOX_MARGIN`]. Only where that holds are boxes asked at all: a direction whose reciprocal is
+//! not a normal number constrains nothing on its axis, and with coordinates beyond [`BOX_COORDINATES`] every prim is
+//! tested.
 
 use std::marker::PhantomData;
 
@@ -25,7 +26,8 @@ pub(in crate::accel) trait BoxMargins {
     const PAD: f32 = BOX_PAD;
     /// Largest coordinate with which boxes are asked.
     const COORDINATES: f32 = BOX_COORDINATES;
-    /// Whether walks are compiled for every instruction set, or for vectors alone ([`Level::run_vectors`](crate::math::simd::Level::run_vectors)).
+    /// Whether walks are compiled for every instruction set, or for vectors alone
+    /// ([`Level::run_vectors`](crate::math::simd::Level::run_vectors)).
     const EVERY_LEVEL: bool = false;
 
     /// Whether boxes can be asked about a ray from here; not if it is not finite.

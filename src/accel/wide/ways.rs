@@ -77,8 +77,8 @@ fn rays_that_run_alike_hit_what_brute_force_hits() {
     }
 }
 
-/// Of sixteen rays that run alike, or thirty-two, some, the first among them or not, run back, along another axis, or have no range or
-/// no place that boxes could be asked about.
+/// Of sixteen rays that run alike, or thirty-two, some, the first among them or not, run back, along another axis, or
+/// have no range or no place that boxes could be asked about.
 #[test]
 fn rays_among_others_that_run_otherwise_hit_what_brute_force_hits() {
     let mut r = Random::new(72);

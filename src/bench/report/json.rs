@@ -15,15 +15,15 @@
 //! `view`, `camera`: world-space `eye`, unit `forward` and `up`, `half_height` of what is seen, at a distance of 1 or, where
 //! rays are `parallel`, anywhere), `rays` (by class: `asked`, `kept`), `identical` (whether all hits were), `reference`, and
 //! `structures`. A
-//! structure has `accel`, `sampled`, `differing` (rays), `t_b` (seconds: `median`, `min`, `max`, `passes`, or null without times), `t_tr`
-//! (seconds of a ray, or null), V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`, `bytes`, `break_even` (rays, or null),
-//! and `classes`. A class has exact sums (`rays`, `hits`, `tests`, `steps`, `cells`, `empty_cells`, `volume_tests`,
-//! `tests_saved`, `transforms`), `per_ray` (`n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`, `n_mb`, `n_xf`, `n_min`), `interval` (half the 95 %
-//! interval of the same, or null when nothing was left out), `culled`, `differing`, `t_tr` (seconds of a ray, as `t_b`) and
-//! `mrays`. `kept_instances` have their triangles stored once. `left_out` names structures that could not bear so many
-//! prims: slow ones, or those that store each instance by itself. `pruning` is null, or seconds of processor time of
-//! rendering the picture as `usual` and with `everything` on (each as `t_b`), `saved` (a share) and `same` (whether the
-//! pixels were).
+//! structure has `accel`, `sampled`, `differing` (rays), `t_b` (seconds: `median`, `min`, `max`, `passes`, or null
+//! without times), `t_tr` (seconds of a ray, or null), V. Havran's `n_in`, `n_v`, `n_ev`, `n_oiv`, `bytes`,
+//! `break_even` (rays, or null), and `classes`. A class has exact sums (`rays`, `hits`, `tests`, `steps`, `cells`,
+//! `empty_cells`, `volume_tests`, `tests_saved`, `transforms`), `per_ray` (`n_it`, `n_ts`, `n_ets`, `n_eets`, `n_bit`,
+//! `n_mb`, `n_xf`, `n_min`), `interval` (half the 95 % interval of the same, or null when nothing was left out),
+//! `culled`, `differing`, `t_tr` (seconds of a ray, as `t_b`) and `mrays`. `kept_instances` have their triangles stored
+//! once. `left_out` names structures that could not bear so many prims: slow ones, or those that store each instance by
+//! itself. `pruning` is null, or seconds of processor time of rendering the picture as `usual` and with `everything` on
+//! (each as `t_b`), `saved` (a share) and `same` (whether the pixels were).
 //!
 //! Where a parameter is swept, a structure's `setting` has its `value` (null: another parameter rules) and `is_default`,
 //! and the model has `best`: of each `accel` the best `value`, `by` (`t_tr`, or `n_it+n_ts` without times), and `saved`

@@ -1,9 +1,9 @@
 //! What each knob buys: time against error, measured on one scene.
 //!
 //! Every setting renders the same view several times with different random numbers, and its pictures are compared with a
-//! reference that is as good as patience allows ([`mod@reference`]). What differs from rendering to rendering is noise, what they all
-//! have in common is bias ([`mod@measure`]). Settings that no other beats in both time and error are the front ([`front`]), and
-//! from these one is advised for each purpose ([`advice`]).
+//! reference that is as good as patience allows ([`mod@reference`]). What differs from rendering to rendering is noise,
+//! what they all have in common is bias ([`mod@measure`]). Settings that no other beats in both time and error are the
+//! front ([`front`]), and from these one is advised for each purpose ([`advice`]).
 
 pub mod advice;
 pub mod front;

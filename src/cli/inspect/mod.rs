@@ -2,15 +2,16 @@
 //!
 //! # Schema `meshray-inspect/1`
 //! One JSON object. `file`, `format`, `generator`, `hash`, `files` (all that were read); `triangles`, `polygons`,
-//! `faces`, `spheres`, `cones` (cylinders too), `planes`, `meshes`, `instances`, `materials`; `bounds` (`lo`, `hi`, metres) and `framed` (the same
-//! without strays) with `strays`; `units`, `up`, `up_reason`; `topology` (`corners`, `edges`, `open`, `non_manifold`,
-//! `duplicates`, `degenerate`; equal positions count as one corner; `by_object`: but not those of instances that are kept
-//! once, where all by themselves would take more memory than is allowed); `dropped` (by reason); `points_and_lines`,
-//! `wires` (of these `points` and `lines`, with `point_width` and `line_width` as drawn, metres; 0: none);
-//! `textures` (`name`, `width`, `height`); `missing` (files that were named but not found); `extensions` (`name`,
-//! `required`, `supported`); `scenes`, `scene`; `variants`, `variant` (the number of the one asked for, or null);
-//! `animations` (`name`, `seconds`, `channels`); `cameras`, `lights` (`name`, `kind`); `ambient` (light from everywhere, linear); `features` (needed) and `left_out`;
-//! `memory` (bytes: `scene`, `structure`); `max_rounding`; `warnings` (messages). Keys are only ever added.
+//! `faces`, `spheres`, `cones` (cylinders too), `planes`, `meshes`, `instances`, `materials`; `bounds` (`lo`, `hi`,
+//! metres) and `framed` (the same without strays) with `strays`; `units`, `up`, `up_reason`; `topology` (`corners`,
+//! `edges`, `open`, `non_manifold`, `duplicates`, `degenerate`; equal positions count as one corner; `by_object`: but
+//! not those of instances that are kept once, where all by themselves would take more memory than is allowed);
+//! `dropped` (by reason); `points_and_lines`, `wires` (of these `points` and `lines`, with `point_width` and
+//! `line_width` as drawn, metres; 0: none); `textures` (`name`, `width`, `height`); `missing` (files that were named
+//! but not found); `extensions` (`name`, `required`, `supported`); `scenes`, `scene`; `variants`, `variant` (the number
+//! of the one asked for, or null); `animations` (`name`, `seconds`, `channels`); `cameras`, `lights` (`name`, `kind`);
+//! `ambient` (light from everywhere, linear); `features` (needed) and `left_out`; `memory` (bytes: `scene`,
+//! `structure`); `max_rounding`; `warnings` (messages). Keys are only ever added.
 
 mod args;
 mod report;

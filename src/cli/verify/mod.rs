@@ -4,10 +4,11 @@
 //! One JSON object: `version`, `file`, `hash`, `triangles`, `others` (prims that were not judged), `rays` (of each kind,
 //! for each variation), `seed`; `variations`, each with `what`, `amount`, `collapsed` (triangles that rounding
 //! left without three different corners), `disagreements` (rays about which two structures differ), `spawned` (`rays`,
-//! `self_hits`, `slips`, `leaks`, `false_shadows`) and `rows`; a row has `intersector`, `accel` and, for `all` rays and for each kind of `aims`, `rays`,
-//! `hits`, `missed`, `false_hits`, `wrong_order` (numbers of rays) and `t_ulps_max`, `t_ulps_rms`; `costs`
-//! (`intersector`, `ns_per_ray`, the median of passes, `ns_per_ray_min`, `ns_per_ray_max`); `choose` (an intersector), `trusted`; `unjudged_instances` (further places of meshes, where
-//! all of them take more memory than is allowed). Keys are only ever added.
+//! `self_hits`, `slips`, `leaks`, `false_shadows`) and `rows`; a row has `intersector`, `accel` and, for `all` rays and
+//! for each kind of `aims`, `rays`, `hits`, `missed`, `false_hits`, `wrong_order` (numbers of rays) and `t_ulps_max`,
+//! `t_ulps_rms`; `costs` (`intersector`, `ns_per_ray`, the median of passes, `ns_per_ray_min`, `ns_per_ray_max`);
+//! `choose` (an intersector), `trusted`; `unjudged_instances` (further places of meshes, where all of them take more
+//! memory than is allowed). Keys are only ever added.
 
 mod args;
 mod report;

@@ -29,7 +29,8 @@ const Z_WRITERS: [&str; 13] = [
 /// The up axis of an OBJ that gives no sign.
 pub(in crate::load) const UNSAID: (UpAxis, &str) = (UpAxis::Y, "OBJ does not say, and nothing speaks for +Z");
 
-/// Guesses from the comments, then from the shape of meshes around the centre of all vertices, or else takes `otherwise`; the text says why.
+/// Guesses from the comments, then from the shape of meshes around the centre of all vertices, or else takes
+/// `otherwise`; the text says why.
 pub(in crate::load) fn guess(
     comments: &[String],
     meshes: &[Mesh],

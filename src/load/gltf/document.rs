@@ -50,7 +50,8 @@ pub(super) fn parse(json: &[u8], report: &mut Report) -> Option<Value> {
     }
 }
 
-/// Turns checked JSON into the typed document, which was charged with so many bytes; images and cameras that broke the schema become empty ones.
+/// Turns checked JSON into the typed document, which was charged with so many bytes; images and cameras that broke the
+/// schema become empty ones.
 pub(super) fn typed(mut value: Value, bytes: u64, report: &mut Report) -> Option<Document> {
     let animations = animation::all(&value);
     simplify(&mut value);

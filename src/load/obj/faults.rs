@@ -8,8 +8,8 @@ use crate::load::text::encoding::decode_name;
 use crate::load::text::lines::{Lines, keyword, words};
 use std::path::Path;
 
-/// The first fault, with the number of all of its kind; or, where there is none, the corners that name texture coordinates or normals
-/// of which the file has none at all: such faces can still be drawn.
+/// The first fault, with the number of all of its kind; or, where there is none, the corners that name texture
+/// coordinates or normals of which the file has none at all: such faces can still be drawn.
 pub(super) fn find(text: &[u8], file: &Path) -> Result<Tally, Diagnostic> {
     let mut look = Look { file, line: 0, counts: [0; 3], faults: Vec::new(), forward: Vec::new() };
     let mut lines = Lines::new(text);

@@ -3,8 +3,8 @@
 //! Formats give points and lines no width; programs that draw them in pixels choose one. Here they have a width in the
 //! world, so that they stand in perspective, hide and are hidden, and are hit like every other triangle: 1/256 of the
 //! diagonal of the box around everything in the file (but for a few points far away), or less where there are so many that
-//! they would run together (`Widths`). A point becomes an octahedron, or a tetrahedron where it is one of a crowd; a line a prism of three sides,
-//! half a width longer at each end, so that joints are closed.
+//! they would run together (`Widths`). A point becomes an octahedron, or a tetrahedron where it is one of a crowd; a
+//! line a prism of three sides, half a width longer at each end, so that joints are closed.
 //!
 //! Where vertices have no normals nothing says how light meets a line: such ones are drawn without light, in their base
 //! colour plus emission, as the glTF 2.0 specification recommends (§3.9.6). Where they have, they are lit by these: points

@@ -15,7 +15,8 @@ use std::sync::OnceLock;
 /// Entries of [`ALBEDO`] by roughness and by N·V.
 const ENTRIES: usize = 17;
 
-/// Directional albedo of the white lobe: rows by roughness 0 … 1, columns by N·V 0 … 1. Each row is found when it is first needed.
+/// Directional albedo of the white lobe: rows by roughness 0 … 1, columns by N·V 0 … 1. Each row is found when it is
+/// first needed.
 static ALBEDO: [OnceLock<[f32; ENTRIES]>; ENTRIES] = [const { OnceLock::new() }; ENTRIES];
 
 /// The lobe is no thinner than this roughness makes it.

@@ -140,8 +140,8 @@ impl Default for Strip {
 }
 
 impl Strip {
-    /// Takes hits, at most [`POINTS`], each by the place of its ray in what was traced and that of its face, with the normals of its
-    /// corners if the mesh is `smooth`. What absorbs light on the way lessens the weights of their rays.
+    /// Takes hits, at most [`POINTS`], each by the place of its ray in what was traced and that of its face, with the
+    /// normals of its corners if the mesh is `smooth`. What absorbs light on the way lessens the weights of their rays.
     pub(crate) fn take(
         &mut self,
         hit: &[(u32, u32)],

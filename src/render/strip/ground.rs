@@ -31,8 +31,8 @@ impl Strip {
         (self.rays[i] as usize, weight, self.cones.width[i])
     }
 
-    /// Of each point that is shaded here: the place in what was traced of its ray, its sample, and what layers of a picture tell of
-    /// it, whose material is `even` but for maps.
+    /// Of each point that is shaded here: the place in what was traced of its ray, its sample, and what layers of a
+    /// picture tell of it, whose material is `even` but for maps.
     pub(crate) fn firsts(
         &self,
         instance: u32,

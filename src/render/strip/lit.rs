@@ -51,9 +51,9 @@ impl Default for Lit {
 }
 
 impl Strip {
-    /// Finds what `light` does at each point of a surface of `matter`, on which highlights may be narrow if it is `shiny`; backs of
-    /// what `has_inside`, which is shiny, are seen from inside. Of a wide light it is the `place`th of those that each point has
-    /// drawn.
+    /// Finds what `light` does at each point of a surface of `matter`, on which highlights may be narrow if it is
+    /// `shiny`; backs of what `has_inside`, which is shiny, are seen from inside. Of a wide light it is the `place`th
+    /// of those that each point has drawn.
     pub(crate) fn shine(
         &mut self,
         (matter, shiny, has_inside): (&Matter, bool, bool),
@@ -123,8 +123,8 @@ impl Strip {
         points.map(|i| (i, get(&self.lit.radiance, i)))
     }
 
-    /// Leaves out the points whose shadow rays are not sent: asks for each, by the place of the ray that came to it in what was traced,
-    /// with its sample and what it shows.
+    /// Leaves out the points whose shadow rays are not sent: asks for each, by the place of the ray that came to it in
+    /// what was traced, with its sample and what it shows.
     pub(crate) fn choose(&mut self, mut sends: impl FnMut(usize, u32, &mut Vec3) -> bool) {
         for i in 0..self.count.min(POINTS) {
             if self.lit.seen[i] == 0 {

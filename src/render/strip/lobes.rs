@@ -1,5 +1,6 @@
 //! Points with more lobes than that of their facets, those of a grain, film, sheen or lacquer, with maps of their reflectance, or
-//! that scatter light to their other side: where they are and how they are seen is found side by side, what they are made of one by one.
+//! that scatter light to their other side: where they are and how they are seen is found side by side, what they are
+//! made of one by one.
 
 use super::columns::{POINTS, Strip, get};
 use super::common::Common;

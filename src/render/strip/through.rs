@@ -1,4 +1,5 @@
-//! What lies behind the points of a strip that are not there as a whole: backs of one-sided faces, absent texels, what is blended.
+//! What lies behind the points of a strip that are not there as a whole: backs of one-sided faces, absent texels, what
+//! is blended.
 
 use super::columns::{POINTS, Strip, get, put};
 use super::common::Common;

@@ -107,8 +107,8 @@ pub(super) fn decode8([r, g, b, a]: [u8; 4], colors: &[f32; 256]) -> Vec4 {
     Vec4::new(color(r), color(g), color(b), unit8(a))
 }
 
-/// A stored number that is no colour: what a table of these would hold, since the quotient in `f64` is never so near the middle of
-/// two `f32` that it matters.
+/// A stored number that is no colour: what a table of these would hold, since the quotient in `f64` is never so near
+/// the middle of two `f32` that it matters.
 #[inline(always)]
 pub(super) fn unit8(code: u8) -> f32 {
     f32::from(code) / 255.0

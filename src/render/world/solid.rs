@@ -155,7 +155,8 @@ struct Blocks {
 }
 
 impl Blocks {
-    /// Those whose numbers of a channel are the least, or more, and the most, or less, 0 … 1. `None` for a bitmap that is not there.
+    /// Those whose numbers of a channel are the least, or more, and the most, or less, 0 … 1. `None` for a bitmap that
+    /// is not there.
     fn of(bitmap: &Bitmap, channel: usize, range: [f32; 2]) -> Option<Self> {
         let size = [bitmap.width as usize, bitmap.height as usize];
         let texels = size[0].checked_mul(size[1]).filter(|&texels| texels > 0)?;
