@@ -286,6 +286,7 @@ fn load_within(source: &Source, options: &LoadOptions, budget: &mut Budget) -> R
     }?;
     if let Some(angle) = options.smooth {
         smooth::smooth(&mut loaded.scene, angle, budget).map_err(|over| too_large("smooth normals are", over))?;
+        tangents::generate_left(&mut loaded.scene);
     }
     Ok(loaded)
 }

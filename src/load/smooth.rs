@@ -187,6 +187,28 @@ mod tests {
     }
 
     #[test]
+    fn what_has_a_normal_map_is_smooth_too_and_has_tangents_along_its_smooth_normals() {
+        let folder = tempfile::tempdir().unwrap();
+        let roof = ROOF.replace("f 1 2 3 4", "f 1/1 2/2 3/3 4/4").replace("f 6 5 2 1", "f 6/1 5/2 2/3 1/4");
+        let text = format!("mtllib m.mtl\nusemtl a\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n{roof}");
+        std::fs::write(folder.path().join("m.mtl"), "newmtl a\nKd 1 1 1\nnorm n.png\n").unwrap();
+        ::image::RgbImage::from_pixel(2, 2, ::image::Rgb([128, 128, 255])).save(folder.path().join("n.png")).unwrap();
+        let file = folder.path().join("a.obj");
+        let load = |smooth: Option<f64>| {
+            load_bytes(&file, text.as_bytes().to_vec(), &LoadOptions { smooth, ..LoadOptions::default() }).unwrap()
+        };
+        let plain = self::load(ROOF, 61.0);
+        for (smooth, plain) in load(Some(61_f64.to_radians())).scene.meshes.iter().zip(&plain.scene.meshes) {
+            assert!(smooth.tangents.len() == smooth.positions.len() && smooth.tangent_set == Some(0));
+            let along = |t: &crate::math::Vec4, n: &Vec3| t.truncate().dot(*n).abs() < 1e-5;
+            assert!(smooth.tangents.iter().zip(&smooth.normals).all(|(t, n)| along(t, n)));
+            let has = |normal: &Vec3| plain.normals.iter().any(|n| (*n - *normal).length() < 1e-6);
+            assert!(smooth.normals.iter().all(has), "{:?} {:?}", smooth.normals, plain.normals);
+        }
+        assert!(load(None).scene.meshes.iter().all(|mesh| !mesh.tangents.is_empty()));
+    }
+
+    #[test]
     fn a_cube_keeps_its_edges_and_a_vertex_for_each_side() {
         let cube = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
             f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";

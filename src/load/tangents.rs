@@ -3,7 +3,7 @@
 //! M. S. Mikkelsen, *Simulation of Wrinkled Surfaces Revisited*, 2008.
 
 use crate::math::{Vec2, Vec3, Vec4};
-use crate::scene::Mesh;
+use crate::scene::{Mesh, Scene};
 use bevy_mikktspace::{Geometry, Ops, TangentSpace};
 use std::collections::HashMap;
 
@@ -34,6 +34,15 @@ pub fn generate(mesh: &mut Mesh, uv_set: u32) {
     }
     split(mesh, &corners);
     mesh.tangent_set = Some(uv_set);
+}
+
+/// Gives meshes their tangents that were left without until their normals are smooth: those that note a set and have none.
+pub fn generate_left(scene: &mut Scene) {
+    for mesh in scene.meshes.iter_mut().filter(|mesh| mesh.tangents.is_empty()) {
+        if let Some(set) = mesh.tangent_set.take() {
+            generate(mesh, set);
+        }
+    }
 }
 
 /// Faces that the generator takes, and those around a vertex where too many meet for it.

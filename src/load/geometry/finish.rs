@@ -70,8 +70,9 @@ pub(in crate::load) fn finish(
     let of_wires = materials.of_name.get(meshes.len()..).unwrap_or_default();
     wires.iter_mut().zip(of_wires).for_each(|(wires, &material)| wires.mesh.material = material);
     let up = options.up.unwrap_or(guessed);
+    let how = (up, options.smooth.is_some());
     let mut scene =
-        scene(meshes, materials, placed.center, up, budget).map_err(|over| Diagnostic::over_budget(file, over))?;
+        scene(meshes, materials, placed.center, how, budget).map_err(|over| Diagnostic::over_budget(file, over))?;
 
     let (files, hash, gaps) = resolver.finish();
     let mut facts = Facts {
@@ -113,7 +114,7 @@ fn draw(
 /// Bytes that making tangents takes a corner; as a vertex of its own it has a place, a normal, coordinates and a colour.
 const OF_TANGENTS: u64 = tangents::OF_CORNER + 4 * 16;
 
-/// One instance of each mesh, moved to where the file has it.
+/// One instance of each mesh, moved to where the file has it. Where normals will be made smooth, tangents wait for them.
 ///
 /// # Errors
 /// When tangents for normal maps would take more than is left of `budget`.
@@ -121,7 +122,7 @@ fn scene(
     mut meshes: Vec<Mesh>,
     materials: mtl::Materials,
     center: DVec3,
-    up: UpAxis,
+    (up, smooths): (UpAxis, bool),
     budget: &mut Budget,
 ) -> Result<Scene, OverBudget> {
     let mtl::Materials { materials, textures, bitmaps, of_name, .. } = materials;
@@ -129,7 +130,11 @@ fn scene(
         mesh.material = material;
         if materials.get(material as usize).is_some_and(|m| m.normal_map.is_some()) {
             budget.take(3 * mesh.triangles.len() as u64, OF_TANGENTS)?;
-            tangents::generate(mesh, 0);
+            if smooths && mesh.normals.is_empty() {
+                mesh.tangent_set = Some(0);
+            } else {
+                tangents::generate(mesh, 0);
+            }
         }
     }
     let world_from_object = DAffine3::from_translation(center);

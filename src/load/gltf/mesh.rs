@@ -26,6 +26,8 @@ pub(super) struct Job<'a> {
     pub(super) needs: Needs,
     /// Whether anything of it is drawn; if not it is read only to be checked.
     pub(super) drawn: bool,
+    /// Whether normals that are missing will be made smooth; tangents wait for them.
+    pub(super) smooths: bool,
 }
 
 /// What the material reads of the vertices.
@@ -131,7 +133,11 @@ impl Task<'_, '_> {
         }
         let dropped = faces::clean(&mut mesh, mode == Mode::TriangleStrip);
         if let Some(set) = self.job.needs.tangents.filter(|_| mesh.tangents.is_empty()) {
-            tangents::generate(&mut mesh, set);
+            if self.job.smooths && mesh.normals.is_empty() {
+                mesh.tangent_set = Some(set);
+            } else {
+                tangents::generate(&mut mesh, set);
+            }
         }
         Some(Read { mesh, center, dropped, lines })
     }

@@ -177,7 +177,7 @@ impl Loading<'_> {
         let placed = placed.map_err(|over| self.too_large("what the nodes show", over))?;
         let skins = skin::joint_matrices(reader, graph, self.report);
         skin::check_scene(root, graph, facts.scene_index, &placed.draws, self.report);
-        let palette = Palette::new(root, &placed, facts.variant);
+        let palette = Palette::new(root, &placed, facts.variant, self.options.smooth.is_some());
         for texture in &palette.textures.without_image {
             let text = "the texture names no image that is read, and is not drawn";
             self.report.warnings.push(Diagnostic::new("texture-no-image", file, format!("textures[{texture}]"), text));

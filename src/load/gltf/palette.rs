@@ -14,6 +14,8 @@ use gltf::json::mesh as source;
 pub(super) struct Palette<'a> {
     /// The variant of materials that is asked for.
     variant: Option<usize>,
+    /// Whether normals that are missing will be made smooth.
+    smooths: bool,
     pub(super) materials: Vec<Material>,
     needs: Vec<Needs>,
     /// For each material of the file, and last for the default one, its index here.
@@ -23,10 +25,11 @@ pub(super) struct Palette<'a> {
 
 impl<'a> Palette<'a> {
     /// Converts the materials that drawn primitives name.
-    pub(super) fn new(root: &'a Root, placed: &Placed, variant: Option<usize>) -> Self {
+    pub(super) fn new(root: &'a Root, placed: &Placed, variant: Option<usize>, smooths: bool) -> Self {
         let default = root.materials.len();
         let mut palette = Self {
             variant,
+            smooths,
             materials: Vec::new(),
             needs: Vec::new(),
             index: vec![None; default + 1],
@@ -74,6 +77,7 @@ impl<'a> Palette<'a> {
             joints: variant.skin.and_then(|s| skins.get(s)).and_then(Option::as_deref),
             needs: needs.cloned().unwrap_or_default(),
             drawn: variant.drawn,
+            smooths: self.smooths,
         }
     }
 }
