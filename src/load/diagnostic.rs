@@ -24,7 +24,7 @@ pub struct Diagnostic {
     pub place: String,
     /// What is wrong, with the numbers.
     pub text: String,
-    /// What the user can do; may be empty.
+    /// What the user can do, or what is drawn all the same; may be empty.
     pub remedy: String,
     /// How often it was met; the place is the first.
     pub count: u32,

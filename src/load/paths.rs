@@ -4,6 +4,7 @@
 //! symbolic links are resolved, and never from a network. Everything read is listed and hashed, so that a picture can
 //! say exactly what it was made from.
 
+use super::limits::{Budget, OverBudget};
 use super::{Diagnostic, Limits, LoadOptions, Source, whole};
 use crate::stopwatch::{Spent, Stopwatch};
 use percent_encoding::percent_decode_str;
@@ -73,10 +74,12 @@ impl Found {
 #[derive(Debug, thiserror::Error)]
 pub enum FileFault {
     /// It lies outside the root.
-    #[error("'{name}' lies outside the model's folder, where nothing is read")]
+    #[error("'{name}' lies outside {within}, where nothing is read")]
     Outside {
         /// As written in the model.
         name: String,
+        /// What it lies outside of, in words.
+        within: String,
         /// The `--root` that would allow it.
         root: PathBuf,
     },
@@ -122,9 +125,13 @@ impl FileFault {
     pub fn diagnose(&self, file: &Path, place: &str) -> Diagnostic {
         let (code, remedy) = match self {
             Self::Outside { root, .. } => ("file-outside-root", format!("allow it with --root '{}'", root.display())),
+            Self::Missing(name) if name.contains(['/', '\\']) => {
+                (Self::MISSING, "put it there, as seen from the model's folder".into())
+            }
             Self::Missing(_) => (Self::MISSING, "put it beside the model".into()),
             Self::NotAFile(_) => ("file-not-plain", String::new()),
             Self::TooLarge { remedy, .. } => ("file-too-large", (*remedy).into()),
+            Self::Scheme(uri) if is_on_a_drive(uri) => ("uri-scheme", "name it by a relative path".into()),
             Self::Scheme(_) => ("uri-scheme", "download it and name it by a relative path".into()),
             Self::BadUri(_) => ("uri-invalid", String::new()),
             Self::Io { .. } => ("file-unreadable", String::new()),
@@ -173,6 +180,13 @@ impl Resolver {
         let name = file_name_of_uri(uri)?;
         let (path, guessed) = self.find(&name, uri)?;
         Ok(Found { bytes: self.read_file(&path)?, path, guessed })
+    }
+
+    /// The same, if the file's bytes are left of the budget, from which they are taken before it is read.
+    pub fn read_uri_within(&mut self, uri: &str, budget: &mut Budget) -> Result<Result<Found, OverBudget>, FileFault> {
+        let name = file_name_of_uri(uri)?;
+        let (path, guessed) = self.find(&name, uri)?;
+        Ok(self.read_file_within(&path, budget)?.map(|bytes| Found { bytes, path, guessed }))
     }
 
     /// Where a file is that a URI names, and whether that is a guess.
@@ -249,6 +263,23 @@ impl Resolver {
         Ok(bytes)
     }
 
+    /// The same, if its bytes are left of the budget, from which they are taken before it is read.
+    pub fn read_file_within(
+        &mut self,
+        name: &Path,
+        budget: &mut Budget,
+    ) -> Result<Result<Vec<u8>, OverBudget>, FileFault> {
+        let said = self.length(&self.locate(name)?);
+        if said <= self.limits.file
+            && let Err(over) = budget.take(said, 1)
+        {
+            return Ok(Err(over));
+        }
+        let bytes = self.read_file(name)?;
+        // It may have grown meanwhile, or the system does not say how long it is.
+        Ok(budget.take((bytes.len() as u64).saturating_sub(said), 1).map(|()| bytes))
+    }
+
     /// A file as it is named, from the folder of the model as that was.
     pub fn as_named(&self, name: &Path) -> PathBuf {
         self.named.join(name)
@@ -271,7 +302,14 @@ impl Resolver {
         if name.as_os_str().is_empty() || name.as_os_str().as_encoded_bytes().contains(&0) {
             return Err(FileFault::BadUri(shown));
         }
-        let outside = |path: &Path| FileFault::Outside { name: shown.clone(), root: common_folder(&self.root, path) };
+        let outside = |path: &Path| FileFault::Outside {
+            name: shown.clone(),
+            within: match self.root == self.base {
+                true => "the model's folder".into(),
+                false => format!("'{}'", self.root.display()),
+            },
+            root: common_folder(&self.root, path),
+        };
         let wanted = self.base.join(name);
         match wanted.canonicalize() {
             Ok(path) if path.starts_with(&self.root) => match fs::metadata(&path) {
@@ -333,6 +371,12 @@ fn file_name_of_uri(uri: &str) -> Result<String, FileFault> {
         return Err(FileFault::Scheme(shorten(uri)));
     }
     percent_decode_str(uri).decode_utf8().map(|s| s.into_owned()).map_err(|_| FileFault::BadUri(shorten(uri)))
+}
+
+/// Whether a name begins with the letter of a drive, as other systems' do.
+fn is_on_a_drive(name: &str) -> bool {
+    let mut chars = name.chars();
+    chars.next().is_some_and(|letter| letter.is_ascii_alphabetic()) && chars.next() == Some(':')
 }
 
 /// A file name in messages: whole, unless no system has names so long.
@@ -428,7 +472,8 @@ mod tests {
         let secret = dir.path().join("secret.bin").to_string_lossy().into_owned();
         for name in ["../secret.bin", "..%2Fsecret.bin", "../no-such-file", secret.as_str()] {
             let fault = resolver(dir.path(), &LoadOptions::default()).read_uri(name).unwrap_err();
-            let FileFault::Outside { root, .. } = fault else { panic!("{name}: {fault}") };
+            let FileFault::Outside { root, within, .. } = fault else { panic!("{name}: {fault}") };
+            assert_eq!(within, "the model's folder");
             let mut wider = resolver(dir.path(), &LoadOptions { root: Some(root), ..LoadOptions::default() });
             assert!(!matches!(wider.read_uri(name), Err(FileFault::Outside { .. })), "{name}");
         }
@@ -462,6 +507,31 @@ mod tests {
         );
         assert_eq!(read("TEX"), Err("'TEX' is not there".into()));
         assert!(read("../SECRET.bin").is_err() && read("Tex/../../SECRET.bin").is_err());
+    }
+
+    #[test]
+    fn what_is_to_be_done_helps() {
+        let dir = folder();
+        let told = |root: Option<PathBuf>, name: &str| {
+            let mut r = resolver(dir.path(), &LoadOptions { root, ..LoadOptions::default() });
+            r.read_uri(name).unwrap_err().diagnose(Path::new("a.gltf"), "").to_string()
+        };
+        assert!(told(None, "no.png").ends_with("put it beside the model"));
+        assert!(told(None, "textures/no.png").ends_with("put it there, as seen from the model's folder"));
+        assert!(told(None, "C:\\tex\\no.png").ends_with("elsewhere; name it by a relative path"));
+        let wider = dir.path().canonicalize().unwrap();
+        let outside = told(Some(wider.clone()), "../../no.png");
+        assert!(outside.contains(&format!("lies outside '{}', where", wider.display())), "{outside}");
+    }
+
+    #[test]
+    fn nothing_is_read_that_is_not_left_of_the_budget() {
+        let dir = folder();
+        let mut r = resolver(dir.path(), &LoadOptions::default());
+        let mut budget = Budget::new(&Limits { memory: 10, ..Limits::default() });
+        assert_eq!(r.read_uri_within("a b.bin", &mut budget).unwrap().unwrap().bytes.len(), 6);
+        let over = r.read_uri_within("a b.bin", &mut budget).unwrap().unwrap_err();
+        assert_eq!((over.asked, over.left, budget.left()), (6, 4, 4));
     }
 
     #[cfg(unix)]

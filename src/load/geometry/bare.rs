@@ -55,8 +55,8 @@ impl Bare {
     }
 
     /// Takes the memory of a face of so many corners from a budget, before it is added.
-    pub(in crate::load) fn charge_face(budget: &mut Budget, arity: usize) -> Result<(), OverBudget> {
-        budget.take(1, Self::FACE + Self::CORNER * arity as u64)
+    pub(in crate::load) fn charge_face(budget: &mut Budget, arity: u64) -> Result<(), OverBudget> {
+        budget.take(1, Self::FACE.saturating_add(Self::CORNER.saturating_mul(arity)))
     }
 
     /// Whether there is nothing that joins its vertices: then they are points.

@@ -210,14 +210,12 @@ impl<'a> Find<'a, '_> {
     }
 
     fn named(&mut self, uri: &str, place: &str) -> Slot<'a> {
-        match self.resolver.read_uri(uri) {
-            Ok(found) => {
+        match self.resolver.read_uri_within(uri, self.budget) {
+            Ok(Ok(found)) => {
                 found.note(uri, self.file, place).into_iter().for_each(|note| self.report.warnings.push(note));
-                match self.budget.take(found.bytes.len() as u64, 1) {
-                    Ok(()) => Slot::Bytes(Cow::Owned(found.bytes)),
-                    Err(over) => self.too_large(place, over),
-                }
+                Slot::Bytes(Cow::Owned(found.bytes))
             }
+            Ok(Err(over)) => self.too_large(place, over),
             Err(why) => {
                 let fault = why.diagnose(self.file, place);
                 match why {

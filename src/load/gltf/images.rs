@@ -5,7 +5,7 @@ use super::codes::Code;
 use super::gloss;
 use super::report::Report;
 use super::textures::Picture;
-use crate::load::limits::{Budget, Limits};
+use crate::load::limits::{Budget, Limits, OverBudget};
 use crate::load::paths::Resolver;
 use crate::load::texture::{Encoded, Unusable, decode_all, format_of, take_memory};
 use crate::load::{Diagnostic, ktx};
@@ -141,10 +141,14 @@ impl<'a> Find<'a, '_> {
 
     fn named(&mut self, i: usize, uri: &str) -> Option<Vec<u8>> {
         let place = format!("images[{i}].uri");
-        match self.resolver.read_uri(uri) {
-            Ok(found) => {
+        match self.resolver.read_uri_within(uri, self.budget) {
+            Ok(Ok(found)) => {
                 found.note(uri, self.file, &place).into_iter().for_each(|note| self.report.warnings.push(note));
-                self.fits(i, found.bytes.len()).then_some(found.bytes)
+                Some(found.bytes)
+            }
+            Ok(Err(over)) => {
+                self.leave_out(i, over);
+                None
             }
             Err(why) => {
                 self.report.warnings.push(why.diagnose(self.file, &place));
@@ -156,9 +160,13 @@ impl<'a> Find<'a, '_> {
     /// Whether so many bytes may still be taken; else the image is left out with a warning.
     fn fits(&mut self, i: usize, bytes: usize) -> bool {
         let Err(over) = self.budget.take(bytes as u64, 1) else { return true };
+        self.leave_out(i, over);
+        false
+    }
+
+    fn leave_out(&mut self, i: usize, over: OverBudget) {
         let text = format!("the image is too large: {over}");
         self.report.warnings.push(Diagnostic::over_memory(self.file, format!("images[{i}]"), text));
-        false
     }
 
     fn data(&mut self, i: usize, uri: &str) -> Option<Vec<u8>> {

@@ -60,8 +60,13 @@ impl<'a> Body<'a> {
         }
     }
 
+    /// Bytes that a value takes at least.
+    pub(super) fn least(&self, kind: Kind) -> u64 {
+        if self.encoding == Encoding::Text { 1 } else { kind.size() as u64 }
+    }
+
     /// Bytes that have not been read.
-    fn left(&self) -> u64 {
+    pub(super) fn left(&self) -> u64 {
         (self.bytes.len() - self.at.min(self.bytes.len())) as u64
     }
 

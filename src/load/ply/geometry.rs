@@ -322,8 +322,11 @@ impl Reader<'_, '_> {
         strips: bool,
         corners: &mut Vec<u32>,
     ) -> Result<(), Diagnostic> {
+        let length = self.length(element, i, property)?;
+        self.take_list(length, element, i, property, strips)?;
         corners.clear();
-        for k in 0..self.length(element, i, property)? {
+        corners.reserve_exact(usize::try_from(length).unwrap_or(usize::MAX));
+        for k in 0..length {
             let value = self.value(element, i, property)?;
             // Where numbers have no sign, −1 is the greatest of them, if no vertex is.
             let greatest = match property.kind {
@@ -340,6 +343,25 @@ impl Reader<'_, '_> {
             corners.push(self.index(value, k, element, i)?);
         }
         Ok(())
+    }
+
+    /// Asks for the memory of a list before it is read: that of a face, or, of strips, of what is forgotten with the next.
+    fn take_list(
+        &mut self,
+        length: u64,
+        element: &Element,
+        i: u64,
+        property: &Property,
+        strips: bool,
+    ) -> Result<(), Diagnostic> {
+        // Lengths fit into 32 bits.
+        if length * self.body.least(property.kind) > self.body.left() {
+            return Err(self.missing(&Missing::End, element, i, property));
+        }
+        let mut for_now = *self.budget;
+        let granted =
+            if strips { for_now.take(length, size_of::<u32>() as u64) } else { Bare::charge_face(self.budget, length) };
+        granted.map_err(|over| Diagnostic::over_budget(&self.source.path, over))
     }
 
     /// The number of a vertex that is there.
@@ -361,15 +383,15 @@ impl Reader<'_, '_> {
             // Two equal corners only turn the strip.
             if a != b && b != c && c != a {
                 let [a, b] = if i % 2 == 0 { [a, b] } else { [b, a] };
+                Bare::charge_face(self.budget, 3).map_err(|over| Diagnostic::over_budget(&self.source.path, over))?;
                 self.face(&[a, b, c])?;
             }
         }
         Ok(())
     }
 
+    /// Adds a face whose memory was granted.
     fn face(&mut self, corners: &[u32]) -> Result<(), Diagnostic> {
-        Bare::charge_face(self.budget, corners.len())
-            .map_err(|over| Diagnostic::over_budget(&self.source.path, over))?;
         let most = self.bare.corners.len().max(self.bare.arities.len()) as u64 + corners.len() as u64;
         if most > Bare::LARGEST {
             let text = format!("more than {} faces or corners", Bare::LARGEST);

@@ -107,7 +107,7 @@ impl Header {
     /// At the first line that is not understood.
     pub(super) fn read(bytes: &[u8], file: &Path) -> Result<Self, Diagnostic> {
         let mut lines = Lines::new(bytes);
-        let mut parts = Parts { file, line: 1, encoding: None, elements: Vec::new(), comments: Vec::new() };
+        let mut parts = Parts { file, line: 1, encoding: None, elements: Vec::new(), parts: 0, comments: Vec::new() };
         if lines.next().is_none_or(|line| line.trim_ascii() != b"ply") {
             return Err(parts.fault("the file does not begin with a line `ply`", "name a PLY file"));
         }
@@ -168,8 +168,13 @@ struct Parts<'a> {
     line: u32,
     encoding: Option<Encoding>,
     elements: Vec<Element>,
+    /// Elements and properties so far.
+    parts: usize,
     comments: Vec<String>,
 }
+
+/// Elements and properties of a header at most, far more than programs write.
+const MOST: usize = 4096;
 
 /// Comments that are kept: programs write theirs first.
 const COMMENTS: usize = 64;
@@ -198,6 +203,7 @@ impl Parts<'_> {
                     let text = format!("`{}` is no number of elements `{}`", shorten(count), shorten(name));
                     self.fault(text, "export it again")
                 })?;
+                self.count()?;
                 self.elements.push(Element { name: name.into(), count, properties: Vec::new() });
             }
             ["property", "list", length, kind, name] => {
@@ -236,7 +242,17 @@ impl Parts<'_> {
         Kind::of(word).ok_or_else(|| self.fault(format!("`{}` is no type of PLY", shorten(word)), known))
     }
 
+    /// Counts an element or property, of which there are not too many.
+    fn count(&mut self) -> Result<(), Diagnostic> {
+        self.parts += 1;
+        if self.parts > MOST {
+            return Err(self.fault(format!("more than {MOST} elements and properties"), "export it again"));
+        }
+        Ok(())
+    }
+
     fn property(&mut self, property: Property) -> Result<(), Diagnostic> {
+        self.count()?;
         let Some(element) = self.elements.last_mut() else {
             return Err(self.fault("a property before the first element", "export it again"));
         };

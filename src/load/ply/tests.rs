@@ -308,6 +308,22 @@ fn counts_in_a_header_take_no_memory() {
     assert_eq!(over, "a.ply: 960 bytes are needed where 500 of 500 are left; raise --max-memory");
 }
 
+#[test]
+fn lists_and_headers_take_no_memory_that_was_not_granted() {
+    let header = "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty uchar x\nproperty uchar y\n\
+        property uchar z\nelement face 1\nproperty list uint uchar vertex_indices\nend_header\n";
+    let bytes = [header.as_bytes(), &[0, 0, 0, 1, 0, 0, 0, 1, 0], &100_000_u32.to_le_bytes(), &[1; 100_000]].concat();
+    let small = LoadOptions { limits: Limits { memory: 1_000_000, ..Limits::default() }, ..LoadOptions::default() };
+    // The file, three vertices, and of the list what a face of so many corners takes.
+    let over = of(&bytes, &small).unwrap_err();
+    assert!(over.starts_with("a.ply: 4000056 bytes are needed"), "{over}");
+    assert!(of(&bytes, &LoadOptions::default()).is_ok());
+    let cut = fault(&bytes[..bytes.len() - 1]);
+    assert!(cut.contains("the file ends before `vertex_indices` of face 0"), "{cut}");
+    let many = format!("ply\nformat ascii 1.0\n{}end_header\n", "element a 0\n".repeat(5000));
+    assert!(fault(many.as_bytes()).contains("more than 4096 elements and properties"));
+}
+
 /// A triangle as text, with these lines of the header before the faces, and more to say of its vertices and its face.
 fn triangle(vertex: &str, comment: &str, face: &str, of_vertex: [&str; 3], of_face: &str) -> Loaded {
     let [a, b, c] = of_vertex;

@@ -146,6 +146,7 @@ use self::reader::{Faults, Table, color, number, string, word};
 use self::shapes::Lost;
 use self::weight::weight;
 use super::limits::{Budget, Limits};
+use super::panorama::{self, LoadedPanorama};
 use super::paths::Resolver;
 use super::texture::smaller_copies;
 use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
@@ -407,17 +408,10 @@ fn assemble(
     lost.tell(faults, &source.path, &mut facts, &mut warnings);
     let mut resolver = Resolver::new(source, options);
     check_files(&models, panorama.as_ref(), faults, &resolver)?;
-    if let Some(Surrounding { file, at, rotation }) = panorama {
-        let bytes = resolver
-            .read_file(Path::new(&file))
-            .map_err(|fault| LoadError::from(fault.diagnose(&source.path, &faults.place(at))))?;
-        let picture = Source { path: source.path.with_file_name(&file), bytes };
-        let left = Limits { memory: budget.left(), ..options.limits };
-        let read = super::panorama::decode(&picture, &left)?;
-        let kept = read.panorama.texels.len() as u64;
-        budget.take(kept, super::panorama::PER_PIXEL).map_err(|over| Diagnostic::over_budget(&source.path, over))?;
+    if let Some(surrounding) = panorama {
+        let read = look_around(surrounding, faults, &mut resolver, source, options, budget)?;
         read.warnings.into_iter().for_each(|w| warnings.push(w));
-        scene.panorama = Some(Panorama { rotation, ..read.panorama });
+        scene.panorama = Some(read.panorama);
     }
     // What several models show is read and stored once.
     let mut known: HashMap<(String, Option<UpAxis>, Option<u32>), Known> = HashMap::new();
@@ -463,6 +457,28 @@ fn assemble(
     facts.reading += resolver.reading();
     (facts.files, facts.hash, facts.gaps) = resolver.finish();
     Ok(Loaded { scene, warnings: warnings.into_vec(), facts })
+}
+
+/// Reads the picture of what surrounds the scene.
+fn look_around(
+    Surrounding { file, at, rotation }: Surrounding,
+    faults: &Faults,
+    resolver: &mut Resolver,
+    source: &Source,
+    options: &LoadOptions,
+    budget: &mut Budget,
+) -> Result<LoadedPanorama, LoadError> {
+    let over = |over| Diagnostic::over_budget(&source.path, over);
+    // The file itself is needed no longer than until it is decoded.
+    let bytes = resolver
+        .read_file_within(Path::new(&file), &mut budget.clone())
+        .map_err(|fault| LoadError::from(fault.diagnose(&source.path, &faults.place(at))))?
+        .map_err(over)?;
+    let picture = Source { path: source.path.with_file_name(&file), bytes };
+    let left = Limits { memory: budget.left(), ..options.limits };
+    let read = panorama::decode(&picture, &left)?;
+    budget.take(read.panorama.texels.len() as u64, panorama::PER_PIXEL).map_err(over)?;
+    Ok(LoadedPanorama { panorama: Panorama { rotation, ..read.panorama }, ..read })
 }
 
 /// A model that was read.
