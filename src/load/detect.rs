@@ -30,7 +30,7 @@ const FOREIGN: &[(&[u8], &str)] = &[
     (b"xof ", "a DirectX file"),
     (b"DRACO", "a bare Draco mesh"),
     (b"# vtk", "a VTK file"),
-    (b"PK\x03\x04", "a zip archive"),
+    (ZIP, "a zip archive"),
     (b"\x1f\x8b", "a gzip archive"),
     (b"\x28\xb5\x2f\xfd", "a zstd archive"),
     (b"7z\xbc\xaf", "a 7z archive"),
@@ -43,6 +43,12 @@ const FOREIGN: &[(&[u8], &str)] = &[
     (b"version https://git-lfs", "a Git LFS pointer, not the file itself"),
 ];
 
+/// How a zip archive begins.
+const ZIP: &[u8] = b"PK\x03\x04";
+
+/// Extensions of kinds that are zip archives of what they hold.
+const ZIPPED: [&str; 2] = ["usdz", "3mf"];
+
 /// Extensions of kinds that have no sure beginning.
 const FOREIGN_EXTENSIONS: &[(&str, &str)] = &[
     ("fbx", "an FBX file"),
@@ -51,12 +57,12 @@ const FOREIGN_EXTENSIONS: &[(&str, &str)] = &[
     ("max", "a 3ds Max file"),
     ("c4d", "a Cinema 4D file"),
     ("usd", "a USD file"),
-    ("usdz", "a USD archive"),
+    ("usdz", "a USD file"),
     ("abc", "an Alembic file"),
     ("step", "a STEP file"),
     ("stp", "a STEP file"),
     ("iges", "an IGES file"),
-    ("3mf", "a 3MF archive"),
+    ("3mf", "a 3MF file"),
     ("off", "an OFF file"),
     ("lwo", "a LightWave file"),
     ("mtl", "a material library, not a model"),
@@ -82,7 +88,9 @@ pub(super) fn detect(source: &Source) -> Result<Format, Diagnostic> {
         return Ok(Format::Stl(Encoding::Text));
     }
     if let Some((_, kind)) = FOREIGN.iter().find(|(start, _)| bytes.starts_with(start)) {
-        return Err(foreign(source, kind));
+        // Some kinds are archives of a certain content.
+        let inner = FOREIGN_EXTENSIONS.iter().find(|(ending, _)| *ending == extension && ZIPPED.contains(ending));
+        return Err(foreign(source, inner.filter(|_| bytes.starts_with(ZIP)).map_or(kind, |(_, kind)| kind)));
     }
     if text.starts_with(b"<") {
         return Err(foreign(source, if has(text, b"<COLLADA") { "a COLLADA file" } else { "an XML or HTML file" }));
@@ -185,6 +193,7 @@ mod tests {
         assert_eq!(of("-", b"# a scene\n[camera]\n"), Ok(Format::SceneFile));
         assert_eq!(of("-", b"background = 'white'\n"), Ok(Format::SceneFile));
         assert!(of("a.obj", b"PK\x03\x04...").unwrap_err().contains("a zip archive; unpack it first"));
+        assert!(of("a.3mf", b"PK\x03\x04...").unwrap_err().contains("a 3MF file; meshray reads"));
         assert!(of("a.gltf", b"version https://git-lfs.github.com/spec/v1").unwrap_err().contains("Git LFS"));
     }
 

@@ -270,8 +270,8 @@ impl Reader {
                 self.out.uvs.push(DVec2::new(u, v));
             }
             b"vn" => {
-                let normal = self.numbers(3, rest, f64::NAN);
-                self.push_normal(normal.into());
+                let normal = self.normal(rest);
+                self.push_normal(normal);
             }
             b"f" | b"fo" => self.face(rest),
             b"o" => self.rename(|run, name| *run = Run { object: name, group: 0, ..*run }, without_comment(rest)),
@@ -370,6 +370,18 @@ impl Reader {
             self.out.odd.short.note(self.line, rest);
         }
         numbers
+    }
+
+    /// A normal is nothing without all three of its numbers.
+    fn normal(&mut self, rest: &[u8]) -> DVec3 {
+        let mut normal = [f64::NAN; 3];
+        for (number, word) in normal.iter_mut().zip(words(rest)) {
+            *number = number::check(word).word.parse().unwrap_or(f64::NAN);
+        }
+        if normal.iter().any(|number| number.is_nan()) {
+            self.out.odd.normal.note(self.line, rest);
+        }
+        normal.into()
     }
 
     fn smoothing_group(&mut self, rest: &[u8]) {

@@ -55,6 +55,8 @@ pub(super) struct Oddities {
     pub few_corners: Tally,
     pub unknown: Tally,
     pub number: Tally,
+    /// Normals that are not three numbers.
+    pub normal: Tally,
     pub short: Tally,
     pub weight: Tally,
     pub columns: Tally,
@@ -168,6 +170,7 @@ impl Oddities {
         self.few_corners.append(more.few_corners, lines);
         self.unknown.append(more.unknown, lines);
         self.number.append(more.number, lines);
+        self.normal.append(more.normal, lines);
         self.short.append(more.short, lines);
         self.weight.append(more.weight, lines);
         self.columns.append(more.columns, lines);
@@ -195,6 +198,8 @@ impl Oddities {
         warn("obj-unknown-statement", &self.unknown, format!("'{}' is not an OBJ statement", self.unknown.word), "");
         let odd = format!("'{}' is not a number as OBJ writes them; what could be read is used", self.number.word);
         warn("obj-odd-number", &self.number, odd, "");
+        let normal = format!("'{}' is not the three numbers of a normal, which is not used", self.normal.word);
+        warn("obj-odd-normal", &self.normal, normal, "");
         let short = format!("too few numbers: '{}'", self.short.word);
         warn("obj-short-vector", &self.short, short, "the missing ones count as 0");
         let weight = "a vertex weight (fourth number) is ignored: it is for rational curves";
