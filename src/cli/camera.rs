@@ -1,6 +1,7 @@
 //! From what the user chose to a camera in the scene.
 
 use super::args::EyeArgs;
+use super::job::{Wrong, wrong};
 use super::parse::Ortho;
 use crate::load::Diagnostic;
 use crate::load::choice::{Kind, choose};
@@ -31,12 +32,13 @@ pub(super) enum Choice {
 
 impl Choice {
     /// What was typed for a single picture; `up` belongs to the place of an eye.
-    pub(super) fn of(args: &EyeArgs, up: Option<[f64; 3]>) -> Self {
+    pub(super) fn of(args: &EyeArgs, up: Option<[f64; 3]>) -> Result<Self, Wrong> {
         if let Some(eye) = args.eye {
-            return Self::Free { eye: eye.into(), at: args.at.map(Into::into), up: up.map(Into::into) };
+            check_eye(args.eye, args.at)?;
+            return Ok(Self::Free { eye: eye.into(), at: args.at.map(Into::into), up: up.map(Into::into) });
         }
         let camera = args.camera.clone().map(Self::Camera);
-        args.view.map(Self::Named).or(camera).unwrap_or(Self::Default)
+        Ok(args.view.map(Self::Named).or(camera).unwrap_or(Self::Default))
     }
 
     /// The word for it in file names and messages.
@@ -179,6 +181,14 @@ impl Shown<'_> {
         }
         Ok((camera, phrase))
     }
+}
+
+/// Refuses an eye that looks at itself.
+pub(super) fn check_eye(eye: Option<[f64; 3]>, at: Option<[f64; 3]>) -> Result<(), Wrong> {
+    if eye.is_some() && eye == at {
+        return wrong("--eye and --at are one point, so the camera looks nowhere");
+    }
+    Ok(())
 }
 
 /// Says that the file brings cameras, because nothing in the picture does.

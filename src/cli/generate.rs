@@ -4,6 +4,7 @@ use super::args::GenerateArgs;
 use super::exit::Exit;
 use super::interrupt;
 use super::message::Messages;
+use super::writable::{self, Sources};
 use crate::generate::{Family, triangles};
 use crate::load::Diagnostic;
 use crate::number::grouped;
@@ -32,6 +33,9 @@ pub(super) fn run(args: &GenerateArgs) -> Exit {
             return messages.fail(&fault.remedy("give the output one of these endings"), Exit::Usage);
         }
     };
+    if let Err(fault) = writable::check(&path, "-o", &Sources::default()) {
+        return messages.fail(&fault, Exit::Failed);
+    }
     let scene = args.family.scene(args.size);
     let written = write(&scene).and_then(|bytes| interrupt::write_atomic(&path, &bytes).map_err(|e| e.to_string()));
     match written {

@@ -1,7 +1,7 @@
 //! What is to be done, checked: everything that can be known to be wrong before any work is told here.
 
 use super::args::{AccelArgs, FileType, MessageFormat, RenderArgs, SpaceArg, StatsFormat};
-use super::camera::{Choice, LensChoice};
+use super::camera::{self, Choice, LensChoice};
 use super::output_name::{Fields, Naming};
 use super::outputs::{self, Beside, Growth, Target};
 use super::parse::Env;
@@ -247,9 +247,7 @@ fn check_flags(args: &RenderArgs) -> Result<(), Wrong> {
     if args.eye.is_none() && (args.at.is_some() || args.up_vector.is_some()) {
         return wrong("--at and --up-vector belong to --eye; say where the camera stands");
     }
-    if args.eye.is_some() && args.eye == args.at {
-        return wrong("--eye and --at are one point, so the camera looks nowhere");
-    }
+    camera::check_eye(args.eye, args.at)?;
     if args.eye.is_some() && !(args.view.is_empty() && args.camera.is_empty()) {
         return wrong("--eye places the camera, so --view and --camera cannot; use one of them");
     }

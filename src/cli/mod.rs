@@ -73,6 +73,11 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> Exit {
     interrupt::install(format);
     accident::install();
     memory::keep_freed();
+    // What goes wrong outside of a model's own guard is said, too.
+    accident::guard("meshray", &Messages::new(format, false), || carry_out(command))
+}
+
+fn carry_out(command: Command) -> Exit {
     match command {
         Command::Render(args) => render_command(&args),
         Command::Inspect(args) => inspect::run(&args),
@@ -129,6 +134,9 @@ fn render_command(typed: &RenderArgs) -> Exit {
         match again::repeat(picture, typed) {
             Ok(repeat) => {
                 repeat.warning.iter().for_each(|w| messages.say(Severity::Warning, w));
+                if typed.strict && repeat.warning.is_some() {
+                    return messages.fail(&read::not_strict(1, picture), Exit::Input);
+                }
                 args = repeat.args;
                 (expected_hash, made_of) = (Some(repeat.hash), repeat.made_of);
             }

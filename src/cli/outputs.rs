@@ -125,6 +125,9 @@ pub(super) fn refuse_collisions(batches: &[Batch]) -> Result<(), Wrong> {
         let parts = if parts.is_empty() { String::new() } else { format!(" ({})", parts.join(", ")) };
         format!("{}{parts}", input.display())
     };
+    if what(a) == what(b) {
+        return wrong(format!("{} is asked for twice", what(a)));
+    }
     // Most often one model in two types of file.
     let types = [a, b].map(|i| shots[i].0.extension());
     let example = if types[0] == types[1] { "" } else { ", as in 'thumbs/{sub}/{stem}.{ext}.png'" };

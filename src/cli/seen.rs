@@ -52,12 +52,13 @@ pub(super) fn eye(
 pub(super) fn model(args: &ModelArgs, eye: &EyeArgs, size: (u32, u32), messages: &Messages) -> Result<Seen, Exit> {
     let file = args.input.as_path();
     let fail = |fault: Diagnostic| messages.fail(&fault, Exit::Input);
+    let choice = Choice::of(eye, None).map_err(|wrong| messages.wrong(wrong))?;
     let mut loaded = read::model(args, messages)?;
     let world = World::new(&loaded.scene);
     if world.shapes.is_empty() {
         return Err(fail(nothing_to_hit(file)));
     }
-    let (view, phrase) = self::eye(&mut loaded.scene, (&Choice::of(eye, None), None), size, file).map_err(fail)?;
+    let (view, phrase) = self::eye(&mut loaded.scene, (&choice, None), size, file).map_err(fail)?;
     loaded.scene.background = Some(picture::background(None, &loaded.scene));
     Ok(Seen { loaded, world, view, phrase })
 }

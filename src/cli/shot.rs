@@ -234,13 +234,16 @@ impl Prepared<'_> {
                 messages.say(Severity::Warning, &warning);
             }
             if job.strict {
-                return self.task.fail(&read::not_strict(1, self.task.file()), Exit::Input);
+                return self.refuse_warned();
             }
         }
         if shot.kind == FileKind::Jpeg && work.scene.background == Some(Background::Transparent) {
             let text = "JPEG has no transparency: what is transparent is white";
             let warning = Diagnostic::new("jpeg-opaque", shot.target.path().unwrap_or(Path::new("-")), "", text);
             messages.say(Severity::Warning, &warning.remedy("write PNG or WebP"));
+            if job.strict {
+                return self.refuse_warned();
+            }
         }
         profile.skip();
         // Until the picture is written the first signal ends no more than its rays.
@@ -251,6 +254,12 @@ impl Prepared<'_> {
         let Some((costs, counted)) = costs.flatten() else { return self.keep_partial(&rendered) };
         if let Some(layers) = &mut rendered.picture.layers {
             cost_layers::add_channels(job, &costs, layers);
+        }
+
+        let clipped = self.clipped(&rendered.picture);
+        if let Some(warning) = clipped.as_ref().filter(|_| job.strict) {
+            messages.say(Severity::Warning, warning);
+            return self.refuse_warned();
         }
 
         let (depth, accel) = (rendered.depth, work.accel.kind());
@@ -271,7 +280,7 @@ impl Prepared<'_> {
         }
         let summary = Summary { shot, effective, loaded, bounds: self.bounds, view: self.phrase, light: self.light };
         summary.say(&rendered, &times, messages);
-        self.tell_of_clipped(&rendered.picture);
+        clipped.iter().for_each(|warning| messages.say(Severity::Warning, warning));
         let profile = job.profile.then(|| profile.take());
         profile.iter().for_each(|p| p.say(messages));
         so_far.pictures.push(self.stats(&making, times, counted, profile.as_ref()));
@@ -281,18 +290,22 @@ impl Prepared<'_> {
         }
     }
 
-    /// Says where a picture is brighter than its file holds.
-    fn tell_of_clipped(&self, picture: &Picture) {
+    /// Says that there is no picture, as warnings are errors and there was one.
+    fn refuse_warned(&self) -> Exit {
+        self.task.fail(&read::not_strict(1, self.task.file()), Exit::Input)
+    }
+
+    /// Where a picture is brighter than its file holds.
+    fn clipped(&self, picture: &Picture) -> Option<Diagnostic> {
         let is_half = self.shot.kind == FileKind::Exr && self.effective.output.exr_samples == ExrSamples::Half;
         let count = if is_half { beyond_half(picture) } else { 0 };
-        if count > 0 {
+        (count > 0).then(|| {
             let pixels = if count == 1 { "1 pixel is".into() } else { format!("{count} pixels are") };
             let text =
                 format!("{pixels} brighter than the {} that half floats hold, and written as that", LARGEST_HALF);
             let file = self.shot.target.path().unwrap_or(Path::new("-"));
-            let warning = Diagnostic::new("exr-clipped", file, "", text).remedy("--float keeps them");
-            self.task.messages.say(Severity::Warning, &warning);
-        }
+            Diagnostic::new("exr-clipped", file, "", text).remedy("--float keeps them")
+        })
     }
 
     /// Whether the counts are those of the picture.

@@ -95,6 +95,44 @@ fn an_empty_scene_is_drawn_when_that_is_allowed() {
 }
 
 #[test]
+fn what_a_picture_cannot_hold_stops_it_where_warnings_are_errors() {
+    let folder = Folder::with_cube();
+    let words = ["cube.obj", "--background", "transparent", "-o", "cube.jpg"];
+    folder.render(&words).ends(0).says(&["JPEG has no transparency"]);
+    std::fs::remove_file(folder.path("cube.jpg")).unwrap();
+    folder.render(&[&words[..], &["--strict"]].concat()).ends(3).says(&["JPEG has no transparency", "--strict"]);
+    assert!(!folder.has("cube.jpg"));
+    let bright = "background = [1e6, 1e6, 1e6]\n[[models]]\nfile = \"cube.obj\"\n";
+    let folder = folder.file("bright.toml", bright);
+    folder.render(&["bright.toml", "-o", "bright.exr"]).ends(0).says(&["half floats", "--float keeps them"]);
+    std::fs::remove_file(folder.path("bright.exr")).unwrap();
+    folder.render(&["bright.toml", "-o", "bright.exr", "--strict"]).ends(3).says(&["half floats", "--strict"]);
+    assert!(!folder.has("bright.exr"));
+    folder.render(&["bright.toml", "-o", "bright.exr", "--strict", "--float"]).ends(0);
+}
+
+#[test]
+fn an_eye_that_looks_at_itself_is_refused_by_every_command() {
+    let folder = Folder::with_cube();
+    let eye = ["--eye", "1,2,3", "--at", "1,2,3"];
+    for command in [
+        &["render", "cube.obj"][..],
+        &["trace", "cube.obj", "--pixel", "1,1"],
+        &["explain", "cube.obj"],
+        &["study", "cube.obj"],
+        &["bench", "cube.obj"],
+    ] {
+        folder.run(&[command, &eye[..]].concat()).ends(2).says(&["--eye and --at are one point"]);
+    }
+}
+
+#[test]
+fn a_scene_that_cannot_be_written_is_not_made() {
+    let folder = Folder::new();
+    folder.run(&["generate", "tetra", "--size", "1e3", "-o", "gone/a.glb"]).ends(1).says(&["its folder is not there"]);
+}
+
+#[test]
 fn warnings_do_not_stop_a_picture_unless_strict() {
     let folder = Folder::new().file("cube.obj", cube_with_a_bad_face());
     folder.render(&["cube.obj"]).ends(0).says(&["warning: cube.obj"]);

@@ -71,7 +71,11 @@ fn a_file_that_is_being_written_when_the_signal_comes_is_finished() {
     for _ in 0..5 {
         let folder = Folder::new();
         let mut child = start(&folder, &["generate", "tetra", "--size", "4e6", "-o", "tetra.glb"]);
-        while folder.names().is_empty() {}
+        let begun = Instant::now();
+        while folder.names().is_empty() && child.try_wait().unwrap().is_none() {
+            assert!(begun.elapsed() < PATIENCE, "no file yet");
+            std::thread::yield_now();
+        }
         if child.try_wait().unwrap().is_none() {
             signal(&child);
         }

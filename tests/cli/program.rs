@@ -111,7 +111,8 @@ impl Run {
     #[track_caller]
     pub fn ends(self, code: i32) -> Self {
         assert_eq!(self.code, Some(code), "exit code, with this on stderr:\n{}", self.stderr);
-        assert!(!self.stderr.contains("panicked at"), "{}", self.stderr);
+        let panics = ["panicked at", "an error in meshray itself"];
+        assert!(!panics.iter().any(|word| self.stderr.contains(word)), "{}", self.stderr);
         self
     }
 

@@ -23,7 +23,6 @@ use crate::render::texture::TextureStore;
 pub(super) use args::BenchArgs;
 use gate::Gate;
 use scene::{Prepared, Subject};
-use std::cell::RefCell;
 use std::path::PathBuf;
 
 /// What is to be done, checked.
@@ -31,7 +30,7 @@ struct Bench<'a> {
     args: &'a BenchArgs,
     files: Vec<(PathBuf, Format)>,
     /// All inputs, the baseline, and the files that the models loaded so far use.
-    sources: RefCell<Sources>,
+    sources: Sources,
     messages: Messages,
 }
 
@@ -46,7 +45,7 @@ pub(super) fn run(args: &BenchArgs) -> Exit {
     if let Err(fault) = writable::check_reports(&args.report, &sources) {
         return messages.fail(&fault, Exit::Failed);
     }
-    let bench = Bench { args, files, sources: RefCell::new(sources), messages };
+    let bench = Bench { args, files, sources: sources, messages };
     if let Some(folder) = &args.spd {
         return bench.published(folder);
     }
@@ -253,8 +252,8 @@ impl Bench<'_> {
 
     /// Refuses a model of which a report would replace a file.
     fn spares(&self, loaded: &Loaded) -> Result<(), Diagnostic> {
-        self.sources.borrow_mut().add(&loaded.facts.files);
-        self.files.iter().try_for_each(|(path, _)| self.sources.borrow().spared_by(path, "--report"))
+        self.sources.add(&loaded.facts.files);
+        self.files.iter().try_for_each(|(path, _)| self.sources.spared_by(path, "--report"))
     }
 
     /// The plan for one model, and the structures that it leaves out. Where sizes grow, slow structures end where they
@@ -320,7 +319,7 @@ impl Bench<'_> {
     fn write_as(&self, text: impl Fn(Format) -> String) -> Exit {
         let mut exit = Exit::Done;
         for (path, format) in &self.files {
-            if self.sources.borrow().spared_by(path, "--report").is_err() {
+            if self.sources.spared_by(path, "--report").is_err() {
                 exit = Exit::Failed;
                 continue;
             }

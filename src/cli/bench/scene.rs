@@ -93,6 +93,7 @@ pub(super) struct Prepared {
 impl Prepared {
     /// Loads and frames; what is wrong is said.
     pub(super) fn new(subject: &Subject, args: &BenchArgs, messages: &Messages) -> Result<Self, Exit> {
+        let choice = Choice::of(&args.eye, None).map_err(|wrong| messages.wrong(wrong))?;
         let mut loaded = subject.load(args, messages)?;
         let input = subject.path();
         let world =
@@ -100,7 +101,7 @@ impl Prepared {
         if world.is_empty() {
             return Err(messages.fail(&seen::nothing_to_hit(input), Exit::Input));
         }
-        let found = seen::eye(&mut loaded.scene, (&Choice::of(&args.eye, None), None), args.size, input);
+        let found = seen::eye(&mut loaded.scene, (&choice, None), args.size, input);
         let (view, view_phrase) = found.map_err(|fault| messages.fail(&fault, Exit::Input))?;
         let usual = seen::settings(args.size, args.depth, &loaded.scene.hints);
         let settings = Settings { samples: args.samples, seed: args.seed, ..usual };

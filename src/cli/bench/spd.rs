@@ -2,6 +2,7 @@
 
 use super::super::exit::Exit;
 use super::super::interrupt;
+use super::super::message::Severity;
 use super::Bench;
 use crate::bench::machine::Machine;
 use crate::bench::spd::measure::{Measured, Plan, measure};
@@ -50,7 +51,8 @@ impl Bench<'_> {
         let limits = self.args.load.limits();
         let options = LoadOptions { polygons: Polygons::Whole, limits, ..LoadOptions::default() };
         let loaded = load(path, &options).map_err(|error| self.messages.load_error(&error))?;
-        let Loaded { scene: loaded, facts, .. } = loaded;
+        let Loaded { scene: loaded, facts, warnings } = loaded;
+        warnings.iter().for_each(|warning| self.messages.say(Severity::Warning, warning));
         let mut go_on = |_: &Measured, what: &str| {
             self.messages.info("progress", format!("{}: {what}", scene.name));
             !interrupt::raised()

@@ -108,14 +108,18 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
     inside(args, settings).map_err(|wrong| messages.wrong(wrong))?;
 
     // The eye, its light, and the ray.
-    let (choice, size) = (Choice::of(&args.eye, args.up_vector), (settings.width, settings.height));
+    let choice = Choice::of(&args.eye, args.up_vector).map_err(|wrong| messages.wrong(wrong))?;
+    let size = (settings.width, settings.height);
     let (view, view_phrase) =
         seen::eye(&mut loaded.scene, (&choice, look.lens), size, file).map_err(fail(Exit::Input))?;
     loaded.scene.background = Some(background(look.background, &loaded.scene));
     let (accel, _) = world.structure(args.accel, params);
     let textures = TextureStore::new(&loaded.scene);
     let job = Job { scene: &loaded.scene, world: &world, accel: &accel, textures: &textures, view: &view, settings };
-    let Some(story) = tell(&job, args.pixel, args.sample) else { return Err(Exit::Failed) };
+    let story = tell(&job, args.pixel, args.sample).ok_or_else(|| {
+        let text = format!("the picture has no pixel {:?} or no sample {} of it", args.pixel, args.sample);
+        messages.wrong(Wrong(text))
+    })?;
     let told = Told {
         name,
         loaded: &loaded,
