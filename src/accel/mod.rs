@@ -41,7 +41,7 @@ pub use instances::{Kept, TwoLevel};
 pub use intersector::{Intersector, IntersectorKind};
 pub use none::Unculled;
 pub use params::AccelParams;
-pub use probe::{NoProbe, Probe, RayCounts};
+pub use probe::{Count, NoProbe, Probe, RayCounts};
 pub use query::Tested;
 pub use refine::Refined;
 pub use shapes::{BitSet, Object, Shapes, SpherePrim};

@@ -187,17 +187,59 @@ pub struct RayCounts {
 }
 
 impl RayCounts {
-    /// What is counted of rays, under Havran's names for it and ours, in the order of all tables.
-    pub const fn named(&self) -> [(&'static str, u64); 7] {
-        [
-            ("n_it", self.n_it),
-            ("n_ts", self.n_ts),
-            ("n_ets", self.n_ets),
-            ("n_eets", self.n_eets),
-            ("n_bit", self.n_bit),
-            ("n_mb", self.n_mb),
-            ("n_xf", self.n_xf),
-        ]
+    /// What is counted of rays, with the names of all tables and in their order.
+    pub fn named(&self) -> [(&'static str, u64); Count::ALL.len()] {
+        Count::ALL.map(|count| (count.name(), count.of(self)))
+    }
+}
+
+/// A count of [`RayCounts`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Count {
+    /// Ray/prim tests.
+    It,
+    /// Nodes and cells visited.
+    Ts,
+    /// Leaf cells visited.
+    Ets,
+    /// Empty ones among them.
+    Eets,
+    /// Ray/volume tests.
+    Bit,
+    /// Tests saved by the mailbox.
+    Mb,
+    /// Points transformed into the ray's axes, or corners of a kept instance to where it stands.
+    Xf,
+}
+
+impl Count {
+    /// Every count, in the order of reports.
+    pub const ALL: [Self; 7] = [Self::It, Self::Ts, Self::Ets, Self::Eets, Self::Bit, Self::Mb, Self::Xf];
+
+    /// V. Havran's name, or ours in his manner.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::It => "n_it",
+            Self::Ts => "n_ts",
+            Self::Ets => "n_ets",
+            Self::Eets => "n_eets",
+            Self::Bit => "n_bit",
+            Self::Mb => "n_mb",
+            Self::Xf => "n_xf",
+        }
+    }
+
+    /// Its value.
+    pub const fn of(self, counts: &RayCounts) -> u64 {
+        match self {
+            Self::It => counts.n_it,
+            Self::Ts => counts.n_ts,
+            Self::Ets => counts.n_ets,
+            Self::Eets => counts.n_eets,
+            Self::Bit => counts.n_bit,
+            Self::Mb => counts.n_mb,
+            Self::Xf => counts.n_xf,
+        }
     }
 }
 

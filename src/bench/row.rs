@@ -2,7 +2,7 @@
 
 use super::clock::Spread;
 use super::sweep::Setting;
-use crate::accel::{AccelKind, RayCounts, StructureStats};
+use crate::accel::{AccelKind, Count, RayCounts, StructureStats};
 
 /// What was found out about one structure.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,56 +62,6 @@ pub struct ClassRow {
     pub differing: u64,
     /// Passes over the rays for one time, so that the clock's grain does not matter.
     pub(super) repeats: u32,
-}
-
-/// A count of [`RayCounts`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Count {
-    /// Ray/prim tests.
-    It,
-    /// Nodes and cells visited.
-    Ts,
-    /// Leaf cells visited.
-    Ets,
-    /// Empty ones among them.
-    Eets,
-    /// Ray/volume tests.
-    Bit,
-    /// Tests saved by the mailbox.
-    Mb,
-    /// Points transformed into the ray's axes, or corners of a kept instance to where it stands.
-    Xf,
-}
-
-impl Count {
-    /// Every count, in the order of reports.
-    pub const ALL: [Self; 7] = [Self::It, Self::Ts, Self::Ets, Self::Eets, Self::Bit, Self::Mb, Self::Xf];
-
-    /// V. Havran's name, or ours in his manner.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::It => "n_it",
-            Self::Ts => "n_ts",
-            Self::Ets => "n_ets",
-            Self::Eets => "n_eets",
-            Self::Bit => "n_bit",
-            Self::Mb => "n_mb",
-            Self::Xf => "n_xf",
-        }
-    }
-
-    /// Its value.
-    pub const fn of(self, counts: &RayCounts) -> u64 {
-        match self {
-            Self::It => counts.n_it,
-            Self::Ts => counts.n_ts,
-            Self::Ets => counts.n_ets,
-            Self::Eets => counts.n_eets,
-            Self::Bit => counts.n_bit,
-            Self::Mb => counts.n_mb,
-            Self::Xf => counts.n_xf,
-        }
-    }
 }
 
 /// Half the width, in standard errors, of the 95 % interval of a mean whose error is estimated with so many degrees of

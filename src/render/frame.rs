@@ -52,10 +52,7 @@ pub(super) fn sample_width(settings: &Settings) -> f32 {
 impl<'a> Frame<'a> {
     pub(super) fn new<A: Accel>(context: &Context, accel: &A, view: &'a View, settings: &'a Settings) -> Self {
         let offsets = sample_offsets(settings.samples);
-        let background = match context.scene.background {
-            Some(Background::Color(color)) => Some(color),
-            _ => None,
-        };
+        let background = context.scene.background.and_then(Background::color);
         let sample_width = sample_width(settings);
         let standard_errors = match settings.sampling {
             Sampling::Stochastic(how) => certainty::factor(how.confidence),

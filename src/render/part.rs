@@ -177,10 +177,7 @@ impl Measure {
             Sampling::Stochastic(how) => how.space,
             _ => ErrorSpace::default(),
         };
-        let background = match job.scene.background {
-            Some(Background::Color(color)) => Some(color),
-            _ => None,
-        };
+        let background = job.scene.background.and_then(Background::color);
         let transparent = matches!(job.scene.background, None | Some(Background::Transparent));
         Self { output: output(space, background), background, channels: if transparent { 4 } else { 3 } }
     }

@@ -115,6 +115,13 @@ pub enum Background {
     Environment,
 }
 
+impl Background {
+    /// The one colour that it is, linear.
+    pub fn color(self) -> Option<Vec3> {
+        if let Self::Color(color) = self { Some(color) } else { None }
+    }
+}
+
 /// The axis that points up in the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum UpAxis {

@@ -1,8 +1,9 @@
 //! What a structure costs, as one number of one kind.
 
 use super::{Model, Report};
+use crate::accel::Count;
 use crate::bench::rays::Class;
-use crate::bench::row::{Count, Row};
+use crate::bench::row::Row;
 use crate::number::{bytes, seconds, short};
 
 /// Something that is better low.

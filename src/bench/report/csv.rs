@@ -6,7 +6,8 @@
 use super::cost::Cost;
 use super::growth::Curve;
 use super::{Model, Rays, Report};
-use crate::bench::row::{ClassRow, Count, Row};
+use crate::accel::Count;
+use crate::bench::row::{ClassRow, Row};
 
 const COLUMNS: &str = "file,prims,structure,class,rays,asked,sampled,differing,t_b,t_b_min,t_b_max,bytes,n_in,n_v,n_ev,\
                        n_oiv,break_even,mrays,mrays_min,mrays_max,n_it,n_ts,n_ets,n_eets,n_bit,n_mb,n_xf,n_min,culled,\

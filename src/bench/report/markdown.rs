@@ -1,7 +1,7 @@
 //! Tables for a document.
 
 use super::{Model, Rays, Report, WORDS, auto, growth, sweep, text};
-use crate::bench::row::Count;
+use crate::accel::Count;
 use crate::number::{bytes, grouped, seconds, short, whole};
 
 /// The whole report.

@@ -1,8 +1,9 @@
 //! Tables for a terminal.
 
 use super::{Model, Rays, Report, WORDS, auto, growth, sweep};
+use crate::accel::Count;
 use crate::bench::clock::Spread;
-use crate::bench::row::{ClassRow, Count, Row};
+use crate::bench::row::{ClassRow, Row};
 use crate::number::{bytes, grouped, seconds, short, whole};
 use std::fmt::{Result, Write};
 

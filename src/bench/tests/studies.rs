@@ -1,12 +1,12 @@
 //! Growth, sweeps, choices and differences, as reports tell them.
 
 use super::{SIZE, Stage, plan};
-use crate::accel::{AccelKind, RayCounts, auto};
+use crate::accel::{AccelKind, Count, RayCounts, auto};
 use crate::bench::compare::Plan;
 use crate::bench::rays::Class;
 use crate::bench::report::auto::sentences as auto_sentences;
 use crate::bench::report::{Format, Model, Report, text};
-use crate::bench::row::{Count, Row};
+use crate::bench::row::Row;
 
 /// Three sizes of a family whose structures cost what laws say, to the digit.
 fn grown() -> Report {

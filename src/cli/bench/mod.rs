@@ -45,7 +45,7 @@ pub(super) fn run(args: &BenchArgs) -> Exit {
     if let Err(fault) = writable::check_reports(&args.report, &sources) {
         return messages.fail(&fault, Exit::Failed);
     }
-    let bench = Bench { args, files, sources: sources, messages };
+    let bench = Bench { args, files, sources, messages };
     if let Some(folder) = &args.spd {
         return bench.published(folder);
     }

@@ -40,10 +40,7 @@ struct Map {
 
 impl Sky {
     pub(crate) fn new(scene: &Scene) -> Self {
-        let backdrop = match scene.background {
-            Some(Background::Color(color)) => color,
-            _ => Vec3::ZERO,
-        };
+        let backdrop = scene.background.and_then(Background::color).unwrap_or(Vec3::ZERO);
         let panorama = scene.panorama.as_ref().filter(|_| scene.environment == Environment::Panorama);
         let map = panorama.filter(|p| !p.texels.is_empty()).map(|panorama| {
             let pyramid = Pyramid::new(panorama);

@@ -10,8 +10,8 @@ mod sweep;
 
 use super::table::Table;
 use super::{Model, Rays, Report, WORDS, auto, text};
-use crate::accel::AccelKind;
-use crate::bench::row::{ClassRow, Count, Row};
+use crate::accel::{AccelKind, Count};
+use crate::bench::row::{ClassRow, Row};
 use crate::number::{bytes, grouped, seconds, short, whole};
 
 /// Rules of the page. The colours of the classes are M. Okabe and K. Ito's, which people with any kind of colour sight
@@ -177,7 +177,7 @@ fn class_table(report: &Report, model: &Model, i: usize, rays: &Rays) -> String 
             let rate = class.rate();
             cells.extend([short(rate.median()), format!("{}..{}", short(rate.min()), short(rate.max()))]);
         }
-        let shown = |c: Count| match row.sampled && class.interval(c) > 0.0 {
+        let shown = |c: Count| match class.is_sampled() {
             true => format!("{} ±{}", short(class.per_ray(c)), short(class.interval(c))),
             false => short(class.per_ray(c)),
         };

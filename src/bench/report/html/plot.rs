@@ -2,8 +2,9 @@
 
 use super::super::Model;
 use super::svg::{Scale, WIDTH, open, rule, spread_out, unit, words};
+use crate::accel::Count;
 use crate::bench::rays::Class;
-use crate::bench::row::{Count, Row};
+use crate::bench::row::Row;
 use crate::number::{grouped, seconds, short};
 use std::fmt::Write;
 
