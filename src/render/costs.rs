@@ -2,10 +2,10 @@
 //!
 //! Counting and timing are passes of their own, so that the picture itself is rendered without either.
 
+use super::by_class::ByClass;
 use super::observer::{Observer, Question};
 use super::profile::Clock;
 use super::tile::{Together, cost_tiles};
-use super::whitted::ByClass;
 use super::{CLASS_NAMES, Context, Job, Progress};
 use crate::accel::{Hit, Probe, Ray};
 use crate::image::{Channel, Values};

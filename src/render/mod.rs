@@ -14,6 +14,7 @@ mod adaptive;
 mod asking;
 mod beside;
 mod branch;
+mod by_class;
 mod certainty;
 mod context;
 mod costs;
@@ -59,6 +60,7 @@ mod wave;
 mod whitted;
 pub mod world;
 
+pub use by_class::ByClass;
 pub use costs::{Cost, Costs, render_costs};
 pub use coverage::{Coverage, coverage};
 pub use eyes::ThinLens;
@@ -78,7 +80,6 @@ use crate::scene::Scene;
 use context::Context;
 use observer::Observer;
 use texture::TextureStore;
-use whitted::ByClass;
 
 /// Classes of rays as they are typed and printed, in the order of counts.
 pub const CLASS_NAMES: [&str; 4] = ["primary", "shadow", "reflected", "refracted"];
@@ -148,18 +149,8 @@ impl Default for Settings {
     }
 }
 
-/// Counts of a counted run, by ray class.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ClassCounts {
-    /// From the eye.
-    pub primary: RayCounts,
-    /// To the lights.
-    pub shadow: RayCounts,
-    /// Reflected.
-    pub reflected: RayCounts,
-    /// Refracted or passed through.
-    pub refracted: RayCounts,
-}
+/// Counts of a counted run.
+pub type ClassCounts = ByClass<RayCounts>;
 
 /// What to render, and with what.
 #[derive(Clone, Copy)]
@@ -221,11 +212,9 @@ pub fn render(job: &Job, progress: &dyn Progress) -> Rendered {
 /// Renders and counts; slower, same pixels.
 pub fn render_counted(job: &Job, progress: &dyn Progress) -> Rendered {
     let (mut rendered, counts) = render_with::<RayCounts>(job, progress, || {});
-    for c in counts {
-        rendered.counts.primary += c.primary;
-        rendered.counts.shadow += c.shadow;
-        rendered.counts.reflected += c.reflected;
-        rendered.counts.refracted += c.refracted;
+    for mut more in counts {
+        let each = rendered.counts.each_mut().into_iter().zip(more.each_mut());
+        each.for_each(|(sum, more)| *sum += *more);
     }
     rendered
 }
@@ -237,28 +226,14 @@ pub fn render_recorded(job: &Job, progress: &dyn Progress) -> Option<(Rendered, 
     // One thread takes the tiles in order, so that the rays come in the same order in every run.
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().ok()?;
     let (rendered, mut tapes) = alone.install(|| render_with::<Tape>(job, progress, || {}));
-    let tapes = tapes.pop().filter(|_| rendered.complete)?;
-    let ByClass { primary, shadow, reflected, refracted } = tapes;
-    let mut recording = Recording { primary, shadow, reflected, refracted };
+    let mut recording = tapes.pop().filter(|_| rendered.complete)?;
     let batches = tile::batches(job.settings);
-    for tape in [&mut recording.primary, &mut recording.shadow, &mut recording.reflected, &mut recording.refracted] {
-        tape.name_pixels(&batches);
-    }
+    recording.each_mut().into_iter().for_each(|tape| tape.name_pixels(&batches));
     Some((rendered, recording))
 }
 
-/// The rays of a rendering, by class; the `sample` of each is its pixel, counted row by row.
-#[derive(Clone, Debug, Default)]
-pub struct Recording {
-    /// From the eye.
-    pub primary: Tape,
-    /// To the lights.
-    pub shadow: Tape,
-    /// Reflected.
-    pub reflected: Tape,
-    /// Refracted or passed through.
-    pub refracted: Tape,
-}
+/// The rays of a rendering; the `sample` of each is its pixel, counted row by row.
+pub type Recording = ByClass<Tape>;
 
 /// Renders, and tells `prepared` when what is computed once for an image is done and tiles begin.
 fn render_with<P: Observer>(

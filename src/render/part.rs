@@ -1,11 +1,11 @@
 //! A part of a picture that tells about the whole: small squares of its pixels, spread evenly.
 
+use super::by_class::ByClass;
 use super::certainty::output;
 use super::context::Context;
 use super::observer::Observer;
 use super::sampling::{ErrorSpace, Sampling};
 use super::tile::{Alone, TILE, Tile, TilePixels, render_some};
-use super::whitted::ByClass;
 use super::{Job, Progress, Settings};
 use crate::accel::RayCounts;
 use crate::image::{Developer, Picture};

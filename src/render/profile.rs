@@ -1,7 +1,7 @@
 //! Where the time of a rendering goes: each class of rays in the structure, and all the rest.
 
+use super::by_class::ByClass;
 use super::observer::{Observer, Question};
-use super::whitted::ByClass;
 use super::{Job, Progress, Rendered, render_with};
 use crate::accel::{Hit, Probe, Ray};
 use crate::stopwatch::{Spent, Stopwatch};

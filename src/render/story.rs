@@ -3,9 +3,9 @@
 //! Rays of a picture travel in waves that know no parents. A ray that starts on a surface starts at a point that follows
 //! bit for bit from the ray that found it, so that the tree is put together again from the rays themselves.
 
+use super::by_class::ByClass;
 use super::observer::{Observer, Question};
 use super::tile::trace_sample;
-use super::whitted::ByClass;
 use super::{CLASS_NAMES, Context, Job};
 use crate::accel::probe::{Outcome, Test, Visit};
 use crate::accel::refine::Refined;

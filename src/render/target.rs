@@ -5,13 +5,13 @@
 //! the whole picture is rendered twice; the difference of both tells the error of their mean, whatever was right or wrong
 //! about the forecast, and as that is planned to be too large, a third rendering, seldom a fourth, makes it what was asked.
 
+use super::by_class::ByClass;
 use super::context::Context;
 use super::forecast::Interval;
 use super::observer::Observer;
 use super::part::{Measure, Part, squared_errors, squares};
 use super::sampling::{Sampled, Sampling, Stochastic, Targeted};
 use super::tile::{add_channels, render_tiles};
-use super::whitted::ByClass;
 use super::{ClassCounts, Job, Progress, Rendered, Settings};
 use crate::image::Picture;
 use crate::stopwatch::Stopwatch;

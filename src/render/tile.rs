@@ -4,6 +4,7 @@
 //! bits. Where tiles tell each other what they have found, in [`adaptive`] and [`stochastic`], what is traced together does not
 //! depend on who does it.
 
+use super::by_class::ByClass;
 use super::context::Context;
 use super::frame::{Frame, resolve_each, veil_each};
 use super::layers::{self, FirstSurface, LayerPixel};
@@ -11,7 +12,7 @@ use super::observer::Observer;
 use super::pixel::sample_offsets;
 use super::sampling::{Sampled, Sampling};
 use super::view::View;
-use super::whitted::{ByClass, Sample, Tracer};
+use super::whitted::{Sample, Tracer};
 use super::{Progress, Settings, adaptive, stochastic};
 use crate::accel::Accel;
 use crate::image::{Channel, Layers, Picture, Values};

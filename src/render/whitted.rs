@@ -11,6 +11,7 @@ use super::Progress;
 use super::asking::Asking;
 use super::beside::Beside;
 use super::branch::{Ground, Point};
+use super::by_class::ByClass;
 use super::context::{AROUND_LIMIT, Context, FOLLOWERS, SHADOW_LIMIT, coverage};
 use super::draws::{Draws, Purpose, Stream};
 use super::everything::look_up_in_vain;
@@ -44,30 +45,6 @@ pub(crate) struct Sample {
     pub radiance: Vec3,
     /// Share of the background that shows through.
     pub through: Vec3,
-}
-
-/// One value for each class of rays.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct ByClass<P> {
-    pub primary: P,
-    pub shadow: P,
-    pub reflected: P,
-    pub refracted: P,
-}
-
-impl<P> ByClass<P> {
-    /// All of them, in the order of the fields.
-    pub(crate) fn each_mut(&mut self) -> [&mut P; 4] {
-        [&mut self.primary, &mut self.shadow, &mut self.reflected, &mut self.refracted]
-    }
-
-    fn of(&mut self, class: RayClass) -> &mut P {
-        match class {
-            RayClass::Primary => &mut self.primary,
-            RayClass::Reflected => &mut self.reflected,
-            RayClass::Refracted => &mut self.refracted,
-        }
-    }
 }
 
 /// One worker: its buffers are reused from tile to tile.

@@ -16,12 +16,13 @@ mod lattice;
 mod plot;
 
 use super::Progress;
+use super::by_class::ByClass;
 use super::context::Context;
 use super::frame::Frame;
 use super::observer::Observer;
 use super::sampling::Adaptive;
 use super::tile::{Tile, TilePixels};
-use super::whitted::{ByClass, Tracer};
+use super::whitted::Tracer;
 use crate::accel::Accel;
 use judge::Judge;
 use lattice::{Found, Point, Step};

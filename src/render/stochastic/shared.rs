@@ -10,12 +10,13 @@ use super::first::First;
 use super::{Sampler, Stochastic};
 use crate::accel::Accel;
 use crate::render::Progress;
+use crate::render::by_class::ByClass;
 use crate::render::certainty::output;
 use crate::render::context::Context;
 use crate::render::frame::Frame;
 use crate::render::observer::Observer;
 use crate::render::tile::{Tile, TilePixels, each_tile};
-use crate::render::whitted::{ByClass, Tracer};
+use crate::render::whitted::Tracer;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
 /// Renders all tiles, given row by row, and has each kept that is finished; the counts of all threads, and whether nothing was
