@@ -4,9 +4,9 @@ use super::accessor::{Format, Pick, Reader, Unreadable};
 use super::codes::Code;
 use super::faces::{self, Dropped};
 use super::report::Report;
-use super::skin::{self, Influences};
+use super::skin::{self, Influences, Skin};
 use crate::load::tangents;
-use crate::math::{DMat4, DVec3, Vec2, Vec3, Vec4};
+use crate::math::{DVec3, Vec2, Vec3, Vec4};
 use crate::scene::Mesh;
 use gltf::json::Index;
 use gltf::json::accessor::{Accessor, ComponentType, Type};
@@ -21,8 +21,7 @@ pub(super) struct Job<'a> {
     pub(super) name: &'a str,
     /// Weights of the morph targets; missing ones are zero.
     pub(super) weights: &'a [f32],
-    /// Matrices of the skin's joints.
-    pub(super) joints: Option<&'a [DMat4]>,
+    pub(super) skin: Option<&'a Skin>,
     pub(super) needs: Needs,
     /// Whether anything of it is drawn; if not it is read only to be checked.
     pub(super) drawn: bool,
@@ -300,7 +299,7 @@ impl Task<'_, '_> {
 
     /// Places a skinned mesh by its joints.
     fn pose(&mut self, mesh: &mut Mesh) -> Option<DVec3> {
-        let matrices = self.job.joints?;
+        let skin = self.job.skin?;
         let mut influences = Influences::default();
         for set in 0.. {
             let (Some(joints), Some(weights)) =
@@ -318,7 +317,7 @@ impl Task<'_, '_> {
         if influences.joints.is_empty() {
             return None;
         }
-        let (center, odd) = skin::pose(mesh, &influences, matrices);
+        let odd = skin::pose(mesh, &influences, skin);
         let faults = [
             (odd.outside, Code::AccessorJointsIndexOob, "attributes.JOINTS_0", "joints that the skin does not have"),
             (odd.negative, Code::AccessorWeightsNegative, "attributes.WEIGHTS_0", "negative weights"),
@@ -328,7 +327,7 @@ impl Task<'_, '_> {
             let place = self.place(part);
             self.report.add(code, place, text);
         }
-        Some(center)
+        Some(skin.center)
     }
 
     /// Repairs normals and tangents.

@@ -61,7 +61,7 @@ use super::limits::Budget;
 use super::paths::Resolver;
 use super::wires::{self, Wires};
 use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source};
-use crate::math::{DAffine3, DMat4};
+use crate::math::DAffine3;
 use crate::scene::{Environment, Instance, Scene};
 use accessor::Reader;
 use animation::Pose;
@@ -76,6 +76,7 @@ use palette::Palette;
 use rayon::prelude::*;
 use report::Report;
 use scene::{Placed, Played};
+use skin::Skin;
 use sparse::Replacements;
 use weight::Weight;
 
@@ -175,7 +176,7 @@ impl Loading<'_> {
         let played = Played { moving: self.options.moment.is_some(), switches: pose.switches, weights: &pose.weights };
         let placed = scene::walk(reader, graph, facts.scene_index, played, budget, self.report);
         let placed = placed.map_err(|over| self.too_large("what the nodes show", over))?;
-        let skins = skin::joint_matrices(reader, graph, self.report);
+        let skins = skin::load(reader, graph, &placed.variants, self.report);
         skin::check_scene(root, graph, facts.scene_index, &placed.draws, self.report);
         let palette = Palette::new(root, &placed, facts.variant, self.options.smooth.is_some());
         for texture in &palette.textures.without_image {
@@ -292,7 +293,7 @@ impl Loading<'_> {
         &self,
         reader: Reader,
         placed: &Placed,
-        skins: &[Option<Vec<DMat4>>],
+        skins: &[Option<Skin>],
         palette: &Palette,
         budget: &mut Budget,
     ) -> Result<(), LoadError> {
@@ -381,7 +382,7 @@ impl Loading<'_> {
 fn read_meshes(
     reader: Reader,
     placed: &Placed,
-    skins: &[Option<Vec<DMat4>>],
+    skins: &[Option<Skin>],
     palette: &Palette,
     file: &std::path::Path,
 ) -> Vec<Vec<(Option<Read>, Report)>> {

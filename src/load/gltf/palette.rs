@@ -3,9 +3,9 @@
 use super::material;
 use super::mesh::{Job, Needs};
 use super::scene::{Placed, Variant};
+use super::skin::Skin;
 use super::textures::Textures;
 use super::variants;
-use crate::math::DMat4;
 use crate::scene::Material;
 use gltf::json::Root;
 use gltf::json::mesh as source;
@@ -66,7 +66,7 @@ impl<'a> Palette<'a> {
         mesh: &'j source::Mesh,
         k: usize,
         primitive: &'j source::Primitive,
-        skins: &'j [Option<Vec<DMat4>>],
+        skins: &'j [Option<Skin>],
     ) -> Job<'j> {
         let needs = self.material(variant, primitive).and_then(|material| self.needs.get(material as usize));
         Job {
@@ -74,7 +74,7 @@ impl<'a> Palette<'a> {
             place: format!("meshes[{}].primitives[{k}]", variant.mesh),
             name: mesh.name.as_deref().unwrap_or_default(),
             weights: variant.weights.as_deref().or(mesh.weights.as_deref()).unwrap_or_default(),
-            joints: variant.skin.and_then(|s| skins.get(s)).and_then(Option::as_deref),
+            skin: variant.skin.and_then(|s| skins.get(s)).and_then(Option::as_ref),
             needs: needs.cloned().unwrap_or_default(),
             drawn: variant.drawn,
             smooths: self.smooths,

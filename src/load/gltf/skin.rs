@@ -8,23 +8,69 @@ use super::codes::Code;
 use super::graph::Graph;
 use super::links::is_bind_matrix;
 use super::report::Report;
-use super::scene::Draw;
+use super::scene::{Draw, Variant};
 use crate::math::frame::{center_of_most, spread};
 use crate::math::{DMat3, DMat4, DVec3, Vec3};
 use crate::scene::Mesh;
 use crate::scene::mesh::normal_from_object;
-use gltf::json::{Root, Skin};
+use gltf::json::mesh::{Primitive, Semantic};
+use gltf::json::validation::Checked;
+use gltf::json::{Root, Skin as Source};
+use serde_json::Value;
 use std::collections::HashSet;
 
-/// For each skin, the matrices from mesh space to world space of its joints; `None`: the skin cannot be used.
-pub(super) fn joint_matrices(reader: Reader, graph: &Graph, report: &mut Report) -> Vec<Option<Vec<DMat4>>> {
+/// What poses the meshes of a skin.
+pub(super) struct Skin {
+    /// From mesh space to world space, for each joint.
+    pub(super) matrices: Vec<DMat4>,
+    /// The place that posed positions are relative to, the same for all that has this skin.
+    pub(super) center: DVec3,
+}
+
+/// The skins that these variants of meshes have, by number; `None`: one that cannot be used.
+pub(super) fn load(reader: Reader, graph: &Graph, variants: &[Variant], report: &mut Report) -> Vec<Option<Skin>> {
     let root = reader.root;
+    let middles = middles(root, variants);
     (0..root.skins.len())
         .map(|i| {
             check_skeleton(root, graph, i, report);
-            matrices_of(reader, graph, i, report)
+            let matrices = matrices_of(reader, graph, i, report)?;
+            let posed = |matrix: &DMat4| matrix.transform_point3(middles[i]);
+            let (lo, hi) = around(matrices.iter().map(posed));
+            let center = center_of_most(lo, hi, spread(matrices.len()).map(|joint| posed(&matrices[joint])));
+            Some(Skin { matrices, center })
         })
         .collect()
+}
+
+/// The middle of what has each skin, before it is posed, by what accessors say of their bounds; zero where they do not.
+fn middles(root: &Root, variants: &[Variant]) -> Vec<DVec3> {
+    let corner = |said: &Option<Value>| {
+        let numbers = said.as_ref()?.as_array()?.iter().map(Value::as_f64).collect::<Option<Vec<f64>>>()?;
+        <[f64; 3]>::try_from(numbers).ok().map(DVec3::from)
+    };
+    let bounds = |primitive: &Primitive| {
+        let index = primitive.attributes.get(&Checked::Valid(Semantic::Positions))?;
+        let accessor = root.accessors.get(index.value())?;
+        Some([corner(&accessor.min)?, corner(&accessor.max)?])
+    };
+    let mut corners: Vec<Vec<DVec3>> = vec![Vec::new(); root.skins.len()];
+    for variant in variants {
+        let Some(of_skin) = variant.skin.and_then(|skin| corners.get_mut(skin)) else { continue };
+        let primitives = root.meshes.get(variant.mesh).into_iter().flat_map(|mesh| &mesh.primitives);
+        of_skin.extend(primitives.filter_map(bounds).flatten());
+    }
+    let middle = |corners: Vec<DVec3>| {
+        let (lo, hi) = around(corners.into_iter());
+        if lo.cmple(hi).all() { lo * 0.5 + hi * 0.5 } else { DVec3::ZERO }
+    };
+    corners.into_iter().map(middle).collect()
+}
+
+/// Least and greatest corner of the box around those of these points that are finite.
+fn around(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
+    let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    points.filter(|p| p.is_finite()).fold(empty, |(lo, hi), p| (lo.min(p), hi.max(p)))
 }
 
 fn matrices_of(reader: Reader, graph: &Graph, i: usize, report: &mut Report) -> Option<Vec<DMat4>> {
@@ -73,7 +119,7 @@ fn matrices_of(reader: Reader, graph: &Graph, i: usize, report: &mut Report) -> 
 pub(super) fn check_scene(root: &Root, graph: &Graph, scene: usize, draws: &[Draw], report: &mut Report) {
     let Some(scene) = root.scenes.get(scene) else { return };
     let trees: HashSet<usize> = scene.nodes.iter().map(|node| graph.tree(node.value())).collect();
-    let elsewhere = |skin: &Skin| skin.joints.iter().any(|joint| !trees.contains(&graph.tree(joint.value())));
+    let elsewhere = |skin: &Source| skin.joints.iter().any(|joint| !trees.contains(&graph.tree(joint.value())));
     let elsewhere: Vec<bool> = root.skins.iter().map(elsewhere).collect();
     let mut nodes: Vec<usize> = draws.iter().map(|draw| draw.node).collect();
     nodes.dedup();
@@ -140,8 +186,9 @@ impl Influences {
     }
 }
 
-/// Puts a mesh into the pose of its joints; returns the place that its positions are relative to.
-pub(super) fn pose(mesh: &mut Mesh, influences: &Influences, matrices: &[DMat4]) -> (DVec3, Oddities) {
+/// Puts a mesh into the pose of its joints; its positions are relative to the skin's centre then, so that what several
+/// primitives share is rounded alike.
+pub(super) fn pose(mesh: &mut Mesh, influences: &Influences, Skin { matrices, center }: &Skin) -> Oddities {
     let mut odd = Oddities::default();
     let mut placed = Vec::with_capacity(mesh.positions.len());
     let mut mirrored = vec![false; mesh.positions.len()];
@@ -165,12 +212,8 @@ pub(super) fn pose(mesh: &mut Mesh, influences: &Influences, matrices: &[DMat4])
             triangle.swap(1, 2);
         }
     }
-    let finite = || placed.iter().filter(|p| p.is_finite());
-    let lo = finite().fold(DVec3::INFINITY, |lo, p| lo.min(*p));
-    let hi = finite().fold(DVec3::NEG_INFINITY, |hi, p| hi.max(*p));
-    let center = center_of_most(lo, hi, spread(placed.len()).map(|i| placed[i]));
-    mesh.positions = placed.iter().map(|p| (*p - center).as_vec3()).collect();
-    (center, odd)
+    mesh.positions = placed.iter().map(|p| (*p - *center).as_vec3()).collect();
+    odd
 }
 
 fn unit(v: DVec3, otherwise: Vec3) -> Vec3 {
@@ -190,8 +233,9 @@ mod tests {
             weights: vec![vec![[0.5, 0.5, 0.25, 0.0], [2.0, -1.0, 0.0, 0.0]]],
         };
         let matrices = [DMat4::IDENTITY, DAffine3::from_translation(DVec3::new(0.0, 2.0, 0.0)).into()];
-        let (center, odd) = pose(&mut mesh, &influences, &matrices);
-        let at = |i: usize| mesh.positions[i].as_dvec3() + center;
+        let skin = Skin { matrices: matrices.to_vec(), center: DVec3::Y };
+        let odd = pose(&mut mesh, &influences, &skin);
+        let at = |i: usize| mesh.positions[i].as_dvec3() + skin.center;
         assert_eq!(at(0), DVec3::new(0.0, 1.0, 0.0));
         assert_eq!(at(1), DVec3::new(1.0, 2.0, 0.0));
         assert!(odd.outside && odd.negative && odd.unequal);
@@ -210,7 +254,8 @@ mod tests {
         };
         let joints = (0..matrices.len() as u32).flat_map(|k| [[k, 0, 0, 0]; 3]).collect();
         let weights = vec![[1.0, 0.0, 0.0, 0.0]; 3 * matrices.len()];
-        pose(&mut mesh, &Influences { joints: vec![joints], weights: vec![weights] }, matrices);
+        let skin = Skin { matrices: matrices.to_vec(), center: DVec3::ZERO };
+        pose(&mut mesh, &Influences { joints: vec![joints], weights: vec![weights] }, &skin);
         mesh
     }
 

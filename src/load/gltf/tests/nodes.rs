@@ -1,6 +1,7 @@
 //! Where nodes put things: scenes, skins, copies, what is hidden.
 
 use super::*;
+use crate::scene::Instance;
 
 #[test]
 fn nodes_place_meshes_cameras_and_lights() {
@@ -124,6 +125,31 @@ fn a_mirrored_node_leaves_its_mesh_alone_and_mirroring_joints_turn_theirs() {
     let determinant = |i: usize| scene.instances[i].world_from_object.matrix3.determinant();
     assert_eq!((determinant(0), determinant(1)), (-1.0, 1.0));
     assert_eq!((&scene.meshes[0].triangles[..], &scene.meshes[1].triangles[..]), (&[[0, 1, 2]][..], &[[0, 2, 1]][..]));
+}
+
+#[test]
+fn what_primitives_of_a_skin_share_is_at_one_place() {
+    // A narrow triangle and a wide one, which share two corners, turned by a joint.
+    let mut file = Builder::new();
+    let shared = [0.1, 0.0, 0.0, 0.3, 0.7, 0.0];
+    let narrow = file.floats("VEC3", &[&shared[..], &[0.2, 0.4, 0.05]].concat());
+    let wide = file.floats("VEC3", &[&shared[..], &[9.0, 0.3, 0.7]].concat());
+    let joints = file.accessor(&[0; 12], 5121, "VEC4", 3, false);
+    let weights = file.floats("VEC4", &[1., 0., 0., 0.].repeat(3));
+    let primitive =
+        |positions| json!({"attributes": {"POSITION": positions, "JOINTS_0": joints, "WEIGHTS_0": weights}});
+    file.set("meshes", json!([{"primitives": [primitive(narrow), primitive(wide)]}]));
+    let turned = json!({"rotation": [0.36, 0.48, 0, 0.8], "translation": [0.7, 0.1, 0.3]});
+    file.set("nodes", json!([{"mesh": 0, "skin": 0}, turned]));
+    file.set("scenes", json!([{"nodes": [0, 1]}]));
+    file.set("skins", json!([{"joints": [1]}]));
+    let scene = file.load().scene;
+    let place = |i: usize, corner: usize| {
+        let Instance { mesh, world_from_object, .. } = &scene.instances[i];
+        world_from_object.transform_point3(scene.meshes[*mesh as usize].positions[corner].as_dvec3())
+    };
+    assert_eq!([place(0, 0), place(0, 1)], [place(1, 0), place(1, 1)]);
+    assert!(scene.instances.len() == 2 && place(0, 2).distance(place(1, 2)) > 5.0);
 }
 
 #[test]
