@@ -29,6 +29,7 @@ pub(crate) struct PhongPaint {
     pub ambient: Vec3,
     pub diffuse: Vec3,
     pub specular: Vec3,
+    pub mirror: Vec3,
     pub shininess: f32,
 }
 
@@ -40,6 +41,8 @@ impl PhongPaint {
             ambient: phong.ambient * ambient,
             diffuse,
             specular: phong.specular * specular,
+            // In MTL files both are Ks.
+            mirror: phong.mirror * specular,
             shininess: (phong.shininess * shininess).max(0.0),
         }
     }
@@ -49,14 +52,14 @@ impl PhongMatter {
     pub(super) fn new(phong: &Phong, diffuse: Vec3, reader: &Reader) -> Self {
         let [ambient, specular] = [&phong.ambient_map, &phong.specular_map].map(|map| reader.srgb(map.as_ref()));
         let shininess = reader.linear(phong.shininess_map.as_ref()).x;
-        let PhongPaint { ambient, diffuse, specular, shininess } =
+        let PhongPaint { ambient, diffuse, specular, mirror, shininess } =
             PhongPaint::of(phong, diffuse, (ambient, specular, shininess));
         Self {
             ambient,
             diffuse,
             specular,
             shininess,
-            mirror: phong.mirror,
+            mirror,
             transmission: phong.transmission,
             ior: phong.ior,
             fresnel: phong.fresnel,
@@ -66,15 +69,15 @@ impl PhongMatter {
 
     /// The numbers that maps have said.
     pub(crate) fn paint(&self) -> PhongPaint {
-        let Self { ambient, diffuse, specular, shininess, .. } = *self;
-        PhongPaint { ambient, diffuse, specular, shininess }
+        let Self { ambient, diffuse, specular, mirror, shininess, .. } = *self;
+        PhongPaint { ambient, diffuse, specular, mirror, shininess }
     }
 
     /// The same with other numbers of a map.
     #[inline(always)]
     pub(crate) fn painted(&self, paint: PhongPaint) -> Self {
-        let PhongPaint { ambient, diffuse, specular, shininess } = paint;
-        Self { ambient, diffuse, specular, shininess, ..*self }
+        let PhongPaint { ambient, diffuse, specular, mirror, shininess } = paint;
+        Self { ambient, diffuse, specular, mirror, shininess, ..*self }
     }
 
     /// Whether a ray off the surface could be seen.

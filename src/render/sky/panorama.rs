@@ -200,9 +200,14 @@ impl Level {
 
     /// Solid angle of a texel in this row.
     pub(super) fn area(&self, row: u32) -> f32 {
-        let edge = |row: u32| libm::cos(std::f64::consts::PI * f64::from(row) / f64::from(self.height));
+        self.area_between(f64::from(row), f64::from(row + 1))
+    }
+
+    /// The same of what is as wide as a texel and reaches from here to there, in rows.
+    fn area_between(&self, from: f64, to: f64) -> f32 {
+        let edge = |row: f64| libm::cos(std::f64::consts::PI * row / f64::from(self.height));
         #[expect(clippy::cast_possible_truncation, reason = "an area of the unit sphere")]
-        let ring = (edge(row) - edge(row + 1)) as f32;
+        let ring = (edge(from) - edge(to)) as f32;
         ring * 2.0 * PI / self.width as f32
     }
 
@@ -302,26 +307,39 @@ impl Level {
             return None;
         }
         let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
-        let split = |i: u32, whole: u32, parts: u32| u64::from(i) * u64::from(whole) / u64::from(parts);
-        #[expect(clippy::cast_possible_truncation, reason = "at most the whole")]
-        let range = |i: u32, whole: u32, parts: u32| split(i, whole, parts) as u32..split(i + 1, whole, parts) as u32;
+        let columns: Vec<_> = (0..width).map(|x| covered(x, self.width, width).collect::<Vec<_>>()).collect();
         let row = |y: u32| {
-            let rows: Vec<(u32, f32)> = range(y, self.height, height).map(|row| (row, self.area(row))).collect();
-            let texel = move |x: u32| {
+            let area = |(row, from, to): (u32, f64, f64)| (row, self.area_between(from, to));
+            let rows: Vec<(u32, f32)> = covered(y, self.height, height).map(area).collect();
+            let texel = move |columns: &Vec<(u32, f64, f64)>| {
                 let (mut sum, mut areas) = (Vec3::ZERO, 0.0);
                 for &(row, area) in &rows {
-                    for column in range(x, self.width, width) {
+                    for &(column, from, to) in columns {
+                        #[expect(clippy::cast_possible_truncation, reason = "a share")]
+                        let area = area * (to - from) as f32;
                         sum += self.texel(column, row) * area;
                         areas += area;
                     }
                 }
                 (sum / areas).to_array()
             };
-            (0..width).map(texel).collect::<Vec<_>>()
+            columns.iter().map(texel).collect::<Vec<_>>()
         };
         let texels = (0..height).into_par_iter().flat_map_iter(row).collect();
         Some(Self { width, height, texels: Arc::new(texels) })
     }
+}
+
+/// Of a side of so many texels that becomes one of `to`: those that texel `i` covers, and from where to where it does.
+#[expect(clippy::cast_possible_truncation, reason = "texels of a side")]
+fn covered(i: u32, from: u32, to: u32) -> impl Iterator<Item = (u32, f64, f64)> {
+    let edge = move |i: u32| u64::from(i) * u64::from(from);
+    let place = move |edge: u64| edge as f64 / f64::from(to);
+    let (first, last) = (edge(i) / u64::from(to), edge(i + 1).div_ceil(u64::from(to)));
+    (first as u32..last as u32).map(move |k| {
+        let (begins, ends) = (place(edge(i)).max(f64::from(k)), place(edge(i + 1)).min(f64::from(k + 1)));
+        (k, begins, ends)
+    })
 }
 
 #[cfg(test)]
@@ -349,6 +367,34 @@ mod tests {
                 let soft = angles.map(|angle| sky.smooth_radiance(coordinates(dir), angle));
                 for seen in sharp.into_iter().chain(soft) {
                     assert!((seen - Vec3::new(2.0, 1.0, 0.5)).length() < 1e-4, "{width}×{height} {dir}: {seen}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn smaller_copies_of_any_size_have_the_light_of_their_places() {
+        let light =
+            |dir: Vec3| Vec3::new(1.0 + 0.6 * dir.x, 1.0 + 0.6 * dir.y, 1.0 + 0.4 * dir.z + 0.3 * dir.x * dir.y);
+        // The mean over a texel, of places in it by their area.
+        let mean = |level: &Level, column: u32, row: u32| {
+            const PARTS: u8 = 12;
+            let part = |k: u8| (f32::from(k) + 0.5) / f32::from(PARTS);
+            let places = (0..PARTS).flat_map(|j| (0..PARTS).map(move |i| (i, j)));
+            let (sum, areas) = places.fold((Vec3::ZERO, 0.0), |(sum, areas), (i, j)| {
+                let dir = level.direction(column as f32 + part(i), row as f32 + part(j));
+                let area = dir.x.hypot(dir.z);
+                (sum + light(dir) * area, areas + area)
+            });
+            sum / areas
+        };
+        for (width, height) in [(1024, 512), (1000, 500), (1022, 511), (300, 150), (960, 480)] {
+            let grid = Level { width, height, texels: Arc::default() };
+            let sky = pyramid(width, height, |x, y| light(grid.direction(x as f32 + 0.5, y as f32 + 0.5)).to_array());
+            for level in sky.levels.iter().filter(|level| (6..=64).contains(&level.height)) {
+                for (column, row) in (0..level.height).map(|row| (row * 5 % level.width, row)) {
+                    let off = (level.texel(column, row) - mean(level, column, row)).abs().max_element();
+                    assert!(off < 0.01, "{width}×{height} at {}×{}: {off}", level.width, level.height);
                 }
             }
         }

@@ -221,6 +221,10 @@ impl Kernel for Mirror<'_> {
         let (any, rays) = (painted.any, (weights, cutoff));
         match &matter.model {
             Model::Unlit(_) => cones.mirrored.alive.fill(0),
+            Model::Phong(m) if any => {
+                let m = *m;
+                mirror(found, cones, points, rays, |i, cosine| painted.phong(i, &m).reflected(cosine));
+            }
             Model::Phong(m) => {
                 let m = *m;
                 mirror(found, cones, points, rays, |_, cosine| m.reflected(cosine));

@@ -33,6 +33,7 @@ pub(super) struct Painted {
     transmission: Column,
     ambient: Columns,
     specular: Columns,
+    mirror: Columns,
     shininess: Column,
     /// The texel of a normal map of a sheet.
     normal: Columns,
@@ -52,6 +53,7 @@ impl Default for Painted {
             transmission: one,
             ambient: three,
             specular: three,
+            mirror: three,
             shininess: one,
             normal: three,
         }
@@ -80,10 +82,11 @@ impl Painted {
 
     #[inline(always)]
     pub(super) fn put_phong(&mut self, i: usize, paint: PhongPaint) {
-        let PhongPaint { ambient, diffuse, specular, shininess } = paint;
+        let PhongPaint { ambient, diffuse, specular, mirror, shininess } = paint;
         put(&mut self.ambient, i, ambient);
         put(&mut self.base, i, diffuse);
         put(&mut self.specular, i, specular);
+        put(&mut self.mirror, i, mirror);
         self.shininess[i] = shininess;
     }
 
@@ -127,6 +130,7 @@ impl Painted {
             ambient: get(&self.ambient, i),
             diffuse: get(&self.base, i),
             specular: get(&self.specular, i),
+            mirror: get(&self.mirror, i),
             shininess: self.shininess[i],
         })
     }

@@ -250,7 +250,7 @@ impl<'a> Lookup<'a> {
         match plane.texels {
             Stored::Level(texels) => {
                 let codes = self.mean(plane, probes, filter, |i| pyramid::codes(&texels[i]));
-                codes * (1.0 / 65535.0)
+                codes / 65535.0
             }
             Stored::Bitmap(Texels::Rgb8(texels, colors)) => {
                 self.mean(plane, probes, filter, |i| decode::solid8(texels[i], colors))
@@ -272,8 +272,10 @@ impl<'a> Lookup<'a> {
             taps[count % PROBES] = self.tap((plane.width, plane.height), uv, filter);
             (count, k) = (count + 1, k + 1.0);
         }
-        let taps = taps.iter().take(count);
-        taps.fold(Vec4::ZERO, |sum, tap| sum + tap.read(&texel)) / probes.count
+        // So that the mean of what is the same everywhere is just that.
+        let first = taps[0].read(&texel);
+        let rest = taps.iter().take(count).skip(1);
+        first + rest.fold(Vec4::ZERO, |sum, tap| sum + (tap.read(&texel) - first)) / probes.count
     }
 
     /// What a probe reads of so many columns and rows.

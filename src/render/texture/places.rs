@@ -282,7 +282,7 @@ impl Places {
     #[inline(always)]
     fn of_level(&self, plane: &Plane, above: usize, i: usize) -> Vec4 {
         match plane.texels {
-            Stored::Level(texels) => self.mean(above, i, |at| pyramid::codes(&texels[at as usize])) * (1.0 / 65535.0),
+            Stored::Level(texels) => self.mean(above, i, |at| pyramid::codes(&texels[at as usize])) / 65535.0,
             Stored::Bitmap(Texels::Rgb8(texels, colors)) => {
                 self.mean(above, i, |at| decode::solid8(texels[at as usize], colors))
             }
@@ -303,12 +303,14 @@ impl Places {
         if probes <= 1.0 {
             return one(&taps[0]);
         }
-        let (mut sum, mut p, mut k) = (Vec4::ZERO, 0, 0.5);
+        // So that the mean of what is the same everywhere is just that.
+        let first = one(&taps[0]);
+        let (mut sum, mut p, mut k) = (Vec4::ZERO, 1, 1.5);
         while k < probes {
-            sum += one(&taps[p % PROBES]);
+            sum += one(&taps[p % PROBES]) - first;
             (p, k) = (p + 1, k + 1.0);
         }
-        sum / probes
+        first + sum / probes
     }
 }
 
