@@ -191,14 +191,14 @@ impl Volume for Ball {
     }
 }
 
-/// The distance from a point to the farthest of a prim: of its corners, of a sphere, of a cone's box.
+/// The distance from a point to the farthest of a prim: of its corners, of a sphere, of the box of a cone, or of a polygon,
+/// which may be hit anywhere in it as its corners need not lie in one plane.
 fn reach(shapes: &Shapes, prim: u32, from: DVec3) -> f64 {
     let distance = |p: Vec3| (p.as_dvec3() - from).length();
     match shapes.prim(prim) {
         Prim::Triangle(corners) => corners.into_iter().map(distance).fold(0.0, f64::max),
-        Prim::Polygon(polygon) => polygon.points().map(distance).fold(0.0, f64::max),
         Prim::Sphere(s) => distance(s.center) + f64::from(s.radius),
-        Prim::Cone(_) | Prim::Plane(..) => {
+        Prim::Polygon(_) | Prim::Cone(_) | Prim::Plane(..) => {
             let Aabb { lo, hi } = shapes.bounds(prim);
             let (lo, hi) = (lo.as_dvec3() - from, hi.as_dvec3() - from);
             lo.abs().max(hi.abs()).length()

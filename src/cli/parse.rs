@@ -2,7 +2,7 @@
 
 use crate::bench::range::{Spacing, values};
 use crate::generate::MAX_TRIANGLES;
-use crate::image::diff::MOST_PIXELS_PER_DEGREE;
+use crate::image::diff::PIXELS_PER_DEGREES;
 use crate::math::Vec3;
 use crate::math::simd::{Level, UnknownLevel};
 use crate::named::{Named, UnknownName};
@@ -340,8 +340,8 @@ pub(super) fn degrees(text: &str) -> Result<f64, String> {
 
 /// How finely somebody sees a picture.
 pub(super) fn pixels_per_degree(text: &str) -> Result<f64, String> {
-    let wrong = || format!("write a number above 0 and up to {MOST_PIXELS_PER_DEGREE}");
-    finite(text).ok().filter(|&n| n > 0.0 && n <= MOST_PIXELS_PER_DEGREE).ok_or_else(wrong)
+    let wrong = || format!("write a number from {} to {}", PIXELS_PER_DEGREES.start(), PIXELS_PER_DEGREES.end());
+    finite(text).ok().filter(|n| PIXELS_PER_DEGREES.contains(n)).ok_or_else(wrong)
 }
 
 /// The name of an instruction set that the machine has.

@@ -20,8 +20,8 @@ pub(super) fn scene(wanted: usize) -> Scene {
     for i in 0..count {
         let (x, y, z) = (i % side, i / side % side, i / (side * side));
         let second = (x + y) % 2 == 1;
-        // Teeth of one in the gaps of the other.
-        let turn = if second { std::f64::consts::PI / teeth as f64 } else { 0.0 };
+        // Teeth of one in the gaps of the other, whose outline runs the other way round: a quarter of a tooth and gap.
+        let turn = if second { std::f64::consts::FRAC_PI_2 / teeth as f64 } else { 0.0 };
         let at = DVec3::new(x as f64 * 2.0, y as f64 * 2.0, z as f64 * 0.7);
         let solid = if second { &mut odd } else { &mut even };
         solid.place(&wheel, &DAffine3::from_rotation_translation(DQuat::from_rotation_z(turn), at));

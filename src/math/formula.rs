@@ -46,7 +46,8 @@ pub fn atan2(y: f32, x: f32) -> f32 {
     upper.copysign(y)
 }
 
-/// The logarithm of a positive finite `x` that is no subnormal by 2, to 5e-6; exact for powers of two. Of 0 it is −127.
+/// The logarithm of a positive finite `x` that is no subnormal by 2, to 5e-6 between 2⁻⁶⁰ and 2⁶⁰ and
+/// 7e-6 beyond; exact for powers of two. Of 0 it is −127.
 #[inline(always)]
 #[expect(clippy::cast_precision_loss, reason = "an exponent")]
 pub fn log2(x: f32) -> f32 {
@@ -72,7 +73,7 @@ pub fn exp2(x: f32) -> f32 {
     f32::from_bits((whole as i32 + 127).cast_unsigned() << 23) * part
 }
 
-/// `x` ≥ 0 to the power of `exponent`, 0 … 1, to 4e-6 of it.
+/// `x` ≥ 0 to the power of `exponent`, 0 … 1, to 5e-6 of it between 2⁻⁶⁰ and 2⁶⁰ and 7e-6 beyond.
 #[inline(always)]
 pub fn root(x: f32, exponent: f32) -> f32 {
     let power = exp2((exponent * log2(x)).max(-126.0));

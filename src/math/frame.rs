@@ -18,7 +18,11 @@ pub fn snapped_center(lo: DVec3, hi: DVec3) -> DVec3 {
     }
     let step = libm::exp2(libm::floor(libm::log2(extent)) - 3.0);
     // A step too small for the numbers' own spacing would change nothing but could overflow.
-    if step < middle.abs().max_element() * f64::EPSILON { middle } else { (middle / step).round() * step }
+    if step == 0.0 || step < middle.abs().max_element() * f64::EPSILON {
+        middle
+    } else {
+        (middle / step).round() * step
+    }
 }
 
 /// Points that tell where most of a model lies.

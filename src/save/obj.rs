@@ -21,7 +21,10 @@ pub fn write(scene: &Scene, out: &mut impl Write) -> io::Result<()> {
             let p = world.transform_point3(p.as_dvec3()).as_vec3();
             writeln!(out, "v {} {} {}", p.x, p.y, p.z)?;
         }
+        // Where a mirror has turned faces round, they are wound the other way.
+        let is_mirrored = world.matrix3.determinant() < 0.0;
         for [a, b, c] in mesh.triangles.iter().map(|t| t.map(|i| i as usize + before)) {
+            let [b, c] = if is_mirrored { [c, b] } else { [b, c] };
             writeln!(out, "f {a} {b} {c}")?;
         }
         before += mesh.positions.len();
@@ -40,6 +43,29 @@ mod tests {
     use crate::generate::{Family, triangles};
     use crate::load::{LoadOptions, load_bytes};
     use crate::render::World;
+
+    #[test]
+    fn faces_of_mirrored_instances_still_look_outwards() {
+        let mut scene = Family::Tetra.scene(4);
+        let volume = |scene: &Scene| {
+            let shapes = World::new(scene).shapes;
+            let sum = |t: &[u32; 3]| {
+                let [a, b, c] = t.map(|i| shapes.vertices[i as usize]);
+                a.dot(b.cross(c))
+            };
+            shapes.triangles.iter().map(sum).sum::<f32>()
+        };
+        let read = |scene: &Scene| {
+            let mut bytes = Vec::new();
+            write(scene, &mut bytes).unwrap();
+            load_bytes("a.obj".as_ref(), bytes, &LoadOptions::default()).unwrap().scene
+        };
+        let plain = volume(&read(&scene));
+        for instance in &mut scene.instances {
+            instance.world_from_object.matrix3.x_axis *= -1.0;
+        }
+        assert!(plain > 0.0 && (volume(&read(&scene)) / plain - 1.0).abs() < 1e-3, "{plain}");
+    }
 
     #[test]
     fn every_triangle_is_read_back_where_it_was() {

@@ -1,6 +1,7 @@
 //! One volume for each object, judged by counts.
 
 use super::*;
+use crate::accel::probe::Extent;
 use crate::accel::volumes::{Ball, Volume, Volumes};
 use crate::math::aabb::Aabb;
 
@@ -46,6 +47,18 @@ fn a_sphere_around_46_polygons_that_an_eighth_of_the_rays_enter_saves_six_tests_
     assert_eq!((with.queries, with.n_bit, with.n_it), (16_384, 16_384, 94_208));
     assert_eq!(with.n_bit + with.n_it, 110_592);
     assert_eq!(with.found, without.found);
+}
+
+/// A polygon that is not quite flat is hit anywhere in its box.
+#[test]
+fn a_sphere_around_a_polygon_holds_its_box() {
+    let vertices = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.01], [0.0, 1.0, 0.0]].map(Vec3::from).to_vec();
+    let shapes = Shapes { vertices, polygons: vec![(0, 4)], polygon_corners: vec![0, 1, 2, 3], ..Shapes::default() };
+    let Aabb { lo, hi } = shapes.bounds(0);
+    let Extent::Ball { center, radius } = <Ball as Volume>::around(&shapes, 0..1).extent() else { panic!() };
+    for corner in [lo, hi, Vec3::new(lo.x, lo.y, hi.z), Vec3::new(hi.x, lo.y, hi.z)] {
+        assert!((corner.as_dvec3() - center).length() <= radius, "{corner}");
+    }
 }
 
 /// Four separate clusters, three of them runs and one of a triangle.

@@ -4,10 +4,11 @@ use super::flip::range::{Exposures, flip_of_any_range};
 use super::flip::{Displayed, flip};
 use super::{Space, place};
 use crate::image::Picture;
+use std::ops::RangeInclusive;
 
-/// The finest that pictures are looked at, pixels a degree: what an eye sees at once is as many pixels then, and filters of
-/// that size take minutes.
-pub const MOST_PIXELS_PER_DEGREE: f64 = 1000.0;
+/// How pictures can be looked at, pixels a degree. At the finest what an eye sees at once is as many pixels, and filters of
+/// that size take minutes; at the coarsest a pixel is larger than all that is seen.
+pub const PIXELS_PER_DEGREES: RangeInclusive<f64> = 0.01..=1000.0;
 
 /// How different two pictures look.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,14 +25,14 @@ pub struct Looks {
     pub exposures: Option<Exposures>,
 }
 
-/// Looks at two pictures at so many pixels a degree, more than 0 and at most [`MOST_PIXELS_PER_DEGREE`]; `None` when their sizes
+/// Looks at two pictures at so many pixels a degree, of [`PIXELS_PER_DEGREES`]; `None` when their sizes
 /// differ, or pixels are missing, or for any other number.
 ///
 /// Displayed pictures with transparent parts are looked at on black and on white, and the worse of both counts for each
 /// pixel. Linear pictures are looked at on black, at every exposure that suits them. What is no number is black to its
 /// neighbours; where one picture alone has such a pixel they differ by 1 there, where both have one by nothing.
 pub fn looks(expected: &Picture, actual: &Picture, space: Space, pixels_per_degree: f64) -> Option<Looks> {
-    let can_be_seen = pixels_per_degree > 0.0 && pixels_per_degree <= MOST_PIXELS_PER_DEGREE;
+    let can_be_seen = PIXELS_PER_DEGREES.contains(&pixels_per_degree);
     if !(can_be_seen && super::are_alike(expected, actual)) {
         return None;
     }

@@ -9,7 +9,7 @@ mod layers;
 mod looks;
 
 pub use layers::{LayerDifference, layer_differences};
-pub use looks::{Looks, MOST_PIXELS_PER_DEGREE, looks};
+pub use looks::{Looks, PIXELS_PER_DEGREES, looks};
 
 use super::{Picture, srgb};
 

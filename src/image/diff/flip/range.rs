@@ -12,7 +12,7 @@ const CURVE: [f64; 6] = [2.51 * 0.36, 0.03 * 0.6, 0.0, 2.43 * 0.36, 0.59 * 0.6, 
 const BRIGHT: f64 = 0.85;
 
 /// Exposures, in stops: from the one at which the brightest pixel of the reference is just not blown out, to the one at
-/// which its median pixel (of those that are not black) is not.
+/// which its median pixel is not; where that is black, the median of those that are not.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exposures {
     /// The darkest.
@@ -30,14 +30,13 @@ impl Exposures {
     /// Those for a picture, linear Rec. 709.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most a few tens")]
     pub fn of(reference: &[[f32; 3]]) -> Self {
-        let mut lights: Vec<f32> =
-            reference.iter().map(|&p| luminance(p)).filter(|&y| y > 0.0 && y.is_finite()).collect();
-        if lights.is_empty() {
-            return Self { first: 0.0, last: 0.0, count: 1 };
-        }
+        let mut lights: Vec<f32> = reference.iter().map(|&p| luminance(p)).filter(|y| y.is_finite()).collect();
         lights.sort_unstable_by(f32::total_cmp);
-        let (most, median) = (lights[lights.len() - 1], lights[lights.len() / 2]);
-        let stops = |light: f32| libm::log2(shown_at(BRIGHT) / f64::from(light)).clamp(-Self::MOST, Self::MOST);
+        let lit = &lights[lights.partition_point(|&y| y <= 0.0)..];
+        let Some(&most) = lit.last() else { return Self { first: 0.0, last: 0.0, count: 1 } };
+        let median = Some(middle(&lights)).filter(|&y| y > 0.0).unwrap_or_else(|| middle(lit));
+        let stops = |light: f64| libm::log2(shown_at(BRIGHT) / light).clamp(-Self::MOST, Self::MOST);
+        let most = f64::from(most);
         let (first, last) = (stops(most), stops(median));
         Self { first, last, count: ((last - first).ceil() as u32).max(2) }
     }
@@ -46,6 +45,12 @@ impl Exposures {
     pub fn stops(&self, k: u32) -> f64 {
         self.first + (self.last - self.first) * f64::from(k) / f64::from(self.count.max(2) - 1)
     }
+}
+
+/// The median of some numbers in order, one at least: the mean of the two in the middle.
+fn middle(sorted: &[f32]) -> f64 {
+    let n = sorted.len();
+    0.5 * (f64::from(sorted[(n - 1) / 2]) + f64::from(sorted[n / 2]))
 }
 
 /// FLIP of each pixel: the greatest of all exposures. Pictures of `width` columns and one size, linear Rec. 709.
@@ -93,11 +98,20 @@ mod tests {
     fn exposures_run_from_the_brightest_to_the_median_pixel() {
         assert!((curve(shown_at(BRIGHT)) - BRIGHT).abs() < 1e-12);
         let grey = |y: f32| [y; 3];
-        let exposures = Exposures::of(&[grey(0.0), grey(0.0), grey(1.0), grey(1.0), grey(16.0)]);
+        let exposures = Exposures::of(&[grey(0.0), grey(0.5), grey(1.0), grey(1.0), grey(16.0)]);
         assert!((exposures.last - exposures.first - 4.0).abs() < 1e-6 && exposures.count == 4, "{exposures:?}");
         assert!((curve(16.0 * libm::exp2(exposures.stops(0))) - BRIGHT).abs() < 1e-6);
         assert!((curve(libm::exp2(exposures.stops(3))) - BRIGHT).abs() < 1e-6);
         assert_eq!(Exposures::of(&[grey(0.0)]).count, 1);
+        // As the authors' program finds them: black pixels count, and of two in the middle the mean.
+        let stops = |lights: &[f32]| {
+            let Exposures { first, last, .. } = Exposures::of(&lights.iter().map(|&y| grey(y)).collect::<Vec<_>>());
+            [first, last].map(|stops| (1000.0 * stops).round())
+        };
+        assert_eq!(stops(&[0.1, 0.2, 0.4, 0.8]), [1405.0, 2820.0]);
+        assert_eq!(stops(&[0.01, 0.01, 1.0, 1.0]), [1083.0, 2069.0]);
+        // Most of it black.
+        assert_eq!(stops(&[0.0, 0.0, 0.0, 1.0]), [1083.0, 1083.0]);
     }
 
     #[test]
