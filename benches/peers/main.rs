@@ -92,7 +92,10 @@ fn main() -> ExitCode {
         };
         match mesh {
             Ok(mesh) => clean &= compare(&mesh, embree.as_ref(), &words),
-            Err(message) => println!("left out: {message}"),
+            Err(message) => {
+                println!("left out: {message}");
+                clean = false;
+            }
         }
     }
     if clean { ExitCode::SUCCESS } else { ExitCode::FAILURE }
@@ -173,15 +176,17 @@ fn compare(mesh: &Mesh, embree: Option<&Embree>, words: &Words) -> bool {
         pencil: (kind == Kind::Primary).then(|| Pencil { origin, dirs: dirs.each_ref().map(Vec::as_slice) }),
     };
     let rates: Vec<_> = kinds.iter().map(|&kind| measure(&tracers, kind, of(kind), words.passes)).collect();
-    let wrong: Vec<_> = kinds.iter().map(|&kind| verdicts(&tracers, reference.as_deref(), kind, of(kind))).collect();
+    let wrong: Option<Vec<_>> =
+        reference.map(|reference| kinds.iter().map(|&kind| verdicts(&tracers, &*reference, kind, of(kind))).collect());
     let letters: String = kinds.iter().map(|kind| format!("{:>9}", kind.letter())).collect();
     println!("{:44}{letters}{:>12}", "Mrays/s, one thread", "verdicts");
     let mut clean = true;
     for (i, tracer) in tracers.iter().enumerate() {
         let row: String = rates.iter().map(|r| format!("{:9.2}", r[i])).collect();
-        let differ: usize = wrong.iter().map(|w| w[i]).sum();
-        println!("{:44}{row}{differ:>12}", tracer.name());
-        clean &= !tracer.name().starts_with("meshray") || differ == 0;
+        let differ = wrong.as_ref().map(|wrong| wrong.iter().map(|w| w[i]).sum::<usize>());
+        let shown = differ.map_or_else(|| "-".to_owned(), |differ| differ.to_string());
+        println!("{:44}{row}{shown:>12}", tracer.name());
+        clean &= !tracer.name().starts_with("meshray") || differ.is_none_or(|differ| differ == 0);
     }
     clean
 }
@@ -265,9 +270,8 @@ fn measure(tracers: &[Box<dyn Tracer + '_>], kind: Kind, rays: Rays, passes: usi
     spreads.iter().map(|s| rays.all.len() as f64 / s.median() * 1e-6).collect()
 }
 
-/// How many rays each program calls a hit that the reference calls a miss, or the other way round; 0 without a reference.
-fn verdicts(tracers: &[Box<dyn Tracer + '_>], reference: Option<&dyn Tracer>, kind: Kind, rays: Rays) -> Vec<usize> {
-    let Some(reference) = reference else { return vec![0; tracers.len()] };
+/// How many rays each program calls a hit that the reference calls a miss, or the other way round.
+fn verdicts(tracers: &[Box<dyn Tracer + '_>], reference: &dyn Tracer, kind: Kind, rays: Rays) -> Vec<usize> {
     let ask = |tracer: &dyn Tracer| {
         let mut answers = vec![Answer { prim: NO_PRIM, t: 0.0 }; rays.all.len()];
         tracer.trace(kind == Kind::Shadow, kind != Kind::Diffuse, rays, &mut answers);

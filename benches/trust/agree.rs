@@ -50,23 +50,28 @@ pub(crate) fn run(files: &[String], rays: f64, tests: f64) -> bool {
         "model", "triangles", "rays", "hits", "differ", "brute rays", "tests", "differ"
     );
     let share = 1.0 / files.len() as f64;
-    let mut total = Count::default();
+    let (mut total, mut missed) = (Count::default(), 0);
     for file in files {
         let scene = match load(file.as_ref(), &LoadOptions::default()) {
             Ok(loaded) => loaded.scene,
             Err(error) => {
                 eprintln!("{file}: {error}");
+                missed += 1;
                 continue;
             }
         };
         let shapes = World::new(&scene).shapes;
         let count = model(&shapes, rays * share, tests * share);
+        if count.rays == 0 {
+            eprintln!("{file}: has nothing that rays could be aimed at");
+            missed += 1;
+        }
         let name = std::path::Path::new(file).file_stem().unwrap_or_default().to_string_lossy().into_owned();
         print(&name, shapes.triangles.len(), count);
         total = total + count;
     }
     print("together", 0, total);
-    total.differ == 0 && total.brute_differ == 0 && total.rays > 0
+    missed == 0 && total.differ == 0 && total.brute_differ == 0 && total.rays > 0
 }
 
 fn print(name: &str, triangles: usize, c: Count) {
