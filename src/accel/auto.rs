@@ -459,4 +459,13 @@ mod tests {
         let shapes = Shapes { planes: vec![(Vec3::Y, 0.0)], opaque: BitSet::filled(1, true), ..Shapes::default() };
         assert_eq!(chosen(&shapes).rays, 0);
     }
+
+    #[test]
+    fn many_shapes_without_an_area_are_told_as_what_they_are() {
+        let count = SHARE * FEWEST + 1;
+        let along = (0..count + 2).map(|i| Vec3::X * i as f32).collect();
+        let shapes = scenes::mesh(along, (0..count).map(|i| [i, i + 1, i + 2]).collect());
+        let reason = chosen(&shapes);
+        assert!(reason.rays == 0 && reason.to_string().contains("without an area"), "{reason}");
+    }
 }

@@ -1,7 +1,8 @@
 //! Reflected rays: weights, depth, counts.
 
 use super::*;
-use crate::scene::{Background, Environment};
+use crate::math::Vec2;
+use crate::scene::{Background, Bitmap, Environment, Pixels, Sampler, Texture, TextureRef, UvTransform};
 
 fn mirror(weight: f32) -> Material {
     material(Vec3::ZERO, Phong { mirror: Vec3::splat(weight), ..phong() })
@@ -21,6 +22,20 @@ fn a_mirror_shows_exactly_its_weight_of_the_surroundings() {
     s.square(0.0, 1.0, mirror(0.25));
     s.scene.environment = Environment::Constant(Vec3::new(1.0, 0.5, 2.0));
     assert_eq!(s.color(), Vec3::new(0.25, 0.125, 0.5));
+}
+
+#[test]
+fn a_map_of_the_specular_color_is_one_of_the_mirror_too() {
+    let map = TextureRef { texture: 0, uv_set: 0, transform: UvTransform::default() };
+    let mut s = looking_down(5.0);
+    let painted = Phong { mirror: Vec3::splat(0.5), specular_map: Some(map), ..phong() };
+    s.square(0.0, 1.0, material(Vec3::ZERO, painted));
+    s.scene.meshes[0].uvs = vec![vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y]];
+    let pixels = Pixels::Rgba8([[255, 255, 0, 255]; 4].into_iter().collect());
+    s.scene.bitmaps.push(Bitmap { name: String::new(), width: 2, height: 2, pixels });
+    s.scene.textures.push(Texture { bitmap: 0, sampler: Sampler::default() });
+    s.scene.environment = Environment::Constant(Vec3::ONE);
+    assert_eq!(s.color(), Vec3::new(0.5, 0.5, 0.0));
 }
 
 #[test]

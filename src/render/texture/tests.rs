@@ -269,6 +269,25 @@ fn what_is_not_there_is_left_to_single_lookups() {
 }
 
 #[test]
+fn what_is_the_same_everywhere_is_read_as_just_that_from_near_and_far() {
+    let mut random = Random::new(3);
+    for code in [1, 2, 64, 97, 128, 200, 254] {
+        for (width, height) in [(64, 64), (37, 19)] {
+            let scene = scene(width, height, Sampler::default(), |_, _| [9, 90, 200, code]);
+            let store = TextureStore::new(&scene);
+            for round in 0..300_u32 {
+                let size = 2_f32.powi(-(round.cast_signed() % 12));
+                let mut way = |size: f32| Vec2::new(random.unit() * size, random.unit() * size);
+                let (uv, along, across) = (way(1.0), way(size), way(0.2 * size));
+                let alpha = store.sample(0, ColorSpace::Linear, uv, along, across).w;
+                // A cutoff of just that lets it stand.
+                assert_eq!(alpha, f32::from(code) / 255.0, "{code} {width}×{height} {uv} {along} {across}");
+            }
+        }
+    }
+}
+
+#[test]
 fn alpha_has_the_same_bits_whether_or_not_the_other_numbers_are_colours() {
     let mut random = Random::new(8);
     let bytes: Vec<u8> = (0..64 * 64).map(|_| random.below(256) as u8).collect();
