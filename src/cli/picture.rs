@@ -4,7 +4,7 @@
 use super::interrupt;
 use super::job::{Look, Shot};
 use super::outputs::{self, Target};
-use crate::image::{ExrSamples, FileKind, Metadata, Output, Picture, PngDepth, encode};
+use crate::image::{ExrSamples, FileKind, Metadata, Output, Picture, PngDepth, ToneMap, encode};
 use crate::load::Diagnostic;
 use crate::render::{Sampling, Settings};
 use crate::scene::{Background, Environment, RenderHints, Scene};
@@ -23,11 +23,12 @@ pub(super) struct Effective {
 
 impl Effective {
     /// The command line first, then the scene file, then the defaults.
-    pub(super) fn new(look: &Look, hints: &RenderHints) -> Self {
+    pub(super) fn new(look: &Look, hints: &RenderHints) -> Result<Self, String> {
         let usual = Settings::default();
         let (width, height) = look.size.or(hints.size).unwrap_or((usual.width, usual.height));
+        let hinted = hints.tone_map.as_deref().map(str::parse::<ToneMap>).transpose().map_err(|e| e.to_string())?;
         let (samples, sampling) = look.sampling.sampling(hints);
-        Self {
+        Ok(Self {
             settings: Settings {
                 width,
                 height,
@@ -45,14 +46,14 @@ impl Effective {
                 everything: false,
             },
             output: Output {
-                tone_map: look.tone_map.or(hints.tone_map).unwrap_or_default(),
+                tone_map: look.tone_map.or(hinted).unwrap_or_default(),
                 exposure: look.exposure.or(hints.exposure).unwrap_or(0.0),
                 png_depth: look.png,
                 exr_samples: look.exr,
                 ..Output::default()
             },
             metered: look.exposure.or(hints.exposure).is_none(),
-        }
+        })
     }
 }
 
@@ -217,22 +218,22 @@ pub(super) fn write(shot: &Shot, bytes: &[u8]) -> Result<(), WriteError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::ToneMap;
 
     #[test]
     fn the_command_line_overrides_the_scene_file_which_overrides_the_defaults() {
         let hints =
-            RenderHints { depth: Some(5), samples: Some(9), tone_map: Some(ToneMap::Aces), ..Default::default() };
-        let effective = Effective::new(&Look { depth: Some(1), ..Look::default() }, &hints);
+            RenderHints { depth: Some(5), samples: Some(9), tone_map: Some("aces".into()), ..Default::default() };
+        let effective = Effective::new(&Look { depth: Some(1), ..Look::default() }, &hints).unwrap();
         assert_eq!((effective.settings.depth, effective.settings.samples), (Some(1), 9));
         assert_eq!((effective.settings.width, effective.output.tone_map), (1024, ToneMap::Aces));
     }
 
     #[test]
     fn a_picture_beyond_the_memory_allowed_is_refused() {
-        let big = Effective::new(&Look { size: Some((65_535, 65_535)), ..Look::default() }, &RenderHints::default());
+        let big =
+            Effective::new(&Look { size: Some((65_535, 65_535)), ..Look::default() }, &RenderHints::default()).unwrap();
         assert!(too_large(&big, FileKind::Png, Behind::default(), 8 << 30).is_some());
-        let usual = Effective::new(&Look::default(), &RenderHints::default());
+        let usual = Effective::new(&Look::default(), &RenderHints::default()).unwrap();
         assert!(too_large(&usual, FileKind::Exr, Behind { costs: 4, counted: true }, 8 << 30).is_none());
     }
 }

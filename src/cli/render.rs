@@ -188,7 +188,7 @@ pub(super) fn render_batch(
 fn render_shots(task: &Task, shots: &[&Shot], so_far: &mut SoFar) -> Result<Exit, Exit> {
     let Task { job, batch, messages, progress } = *task;
     let mut profile = if so_far.pictures.is_empty() { Profile::of_process() } else { Profile::new() };
-    let aspect = |scene: &Scene| Effective::new(&job.look, &scene.hints).aspect();
+    let aspect = |scene: &Scene| Effective::new(&job.look, &scene.hints).map_or(1.0, |effective| effective.aspect());
     let survey = Survey::of(job, batch, aspect, messages, progress)?;
     survey.iter().for_each(|_| profile.done("frame"));
     so_far.shown = false;

@@ -69,7 +69,7 @@ impl Stage<'_> {
     /// Finds the exposure of a view through the eye that this picture of it has, unless it is known or not asked for.
     /// Whether there is something by which it is exposed.
     pub(super) fn meter(&mut self, task: &Task, shot: &Shot) -> Result<bool, Exit> {
-        let effective = effective(task, &self.loaded.scene);
+        let effective = effective(task, &self.loaded.scene)?;
         if !is_metered(&effective, shot, &self.loaded.scene) || self.metered.get(&shot.choice).is_some() {
             return Ok(true);
         }
@@ -102,8 +102,11 @@ fn textures<'s>(job: &RenderJob, scene: &'s Scene) -> TextureStore<'s> {
 }
 
 /// The settings that apply to the pictures of a scene.
-fn effective(task: &Task, scene: &Scene) -> Effective {
-    Effective::new(&task.job.look, &scene.hints).with_everything(task.job.everything)
+fn effective(task: &Task, scene: &Scene) -> Result<Effective, Exit> {
+    match Effective::new(&task.job.look, &scene.hints) {
+        Ok(effective) => Ok(effective.with_everything(task.job.everything)),
+        Err(text) => Err(task.fail(&Diagnostic::new("scene-value", task.file(), "", text), Exit::Input)),
+    }
 }
 
 /// Whether the exposure of a picture is found by looking.
@@ -135,7 +138,7 @@ fn check(task: &Task, shot: &Shot, effective: &Effective, so_far: &SoFar) -> Res
 /// Renders a picture and writes it, or foretells it. The error is how that ended, too, and was said.
 pub(super) fn render(task: &Task, shot: &Shot, stage: &mut Stage, so_far: &mut SoFar) -> Result<Exit, Exit> {
     let Task { job, progress, .. } = *task;
-    let mut effective = effective(task, &stage.loaded.scene);
+    let mut effective = effective(task, &stage.loaded.scene)?;
     check(task, shot, &effective, so_far)?;
 
     // The eye, then the light that belongs to it: each view has its own.

@@ -11,6 +11,7 @@ use crate::accel::{AccelParams, auto};
 use crate::bench::study::report::{Format, text};
 use crate::bench::study::{Plan, Study, Subject, measure, reference, settings};
 use crate::image::Output;
+use crate::load::Diagnostic;
 use crate::render::texture::TextureStore;
 use crate::render::{Job, Settings};
 use crate::threads;
@@ -46,7 +47,13 @@ fn study(args: &StudyArgs, files: &[(PathBuf, Format)], name: &str, messages: &M
         .map_err(|fault| messages.fail(&fault, Exit::Failed))?;
     let hints = &loaded.scene.hints;
     let base = Settings { seed: args.seed, ..seen::settings(args.size, None, hints) };
-    let tone_map = args.tone_map.or(hints.tone_map).unwrap_or_default();
+    let tone_map = match hints.tone_map.as_deref().map(str::parse).transpose() {
+        Ok(hinted) => args.tone_map.or(hinted).unwrap_or_default(),
+        Err(e) => {
+            let fault = Diagnostic::new("scene-value", args.model.input.as_path(), "", e.to_string());
+            return Err(messages.fail(&fault, Exit::Input));
+        }
+    };
     let (accel, _) = auto::build(args.accel, &world.shapes, &AccelParams::DEFAULT);
     let textures = TextureStore::new(&loaded.scene);
     let given = args.exposure.or(hints.exposure);

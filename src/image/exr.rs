@@ -14,8 +14,8 @@
 //! is what compositing programs and libraries agree on. Equal pictures and metadata give equal bytes.
 
 use super::metadata::MAX_TEXT;
-use super::primaries::Primaries;
 use super::{Channel, ExrSamples, FileKind, ImageError, Layers, Metadata, Output, Picture, Values};
+use crate::math::primaries::Primaries;
 use crate::math::{DMat3, DVec3};
 use crate::quiet::attempt;
 use crate::threads;
@@ -208,7 +208,7 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<(Picture, Vec<Stri
     let as_u32 = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
     let (mut beauty, layers) = (channels.beauty()?, channels.layers());
     let mut left_out = channels.too_short();
-    match Primaries::of_exr(&meta).map(|primaries| primaries.to_rec_709()) {
+    match other_primaries(&meta).map(|primaries| primaries.to_rec_709()) {
         Some(Some(turned)) => beauty.iter_mut().for_each(|pixel| turn(turned, pixel)),
         Some(None) => left_out.push("chromaticities, which are those of no colours".into()),
         None => {}
@@ -219,6 +219,13 @@ pub(super) fn decode(bytes: &[u8], max_pixels: u64) -> Result<(Picture, Vec<Stri
         parts => Some(format!("parts 2 to {parts}")),
     });
     Ok((Picture { layers, ..Picture::of(as_u32(width), as_u32(height), beauty) }, left_out))
+}
+
+/// What a file says of its colours; `None` where it says nothing, or that they are those of Rec. 709.
+fn other_primaries(meta: &MetaData) -> Option<Primaries> {
+    let said = meta.headers.first()?.shared_attributes.chromaticities?;
+    let primaries = Primaries::of([said.red, said.green, said.blue, said.white].map(|at| [at.x(), at.y()]));
+    (!primaries.are_near(&Primaries::REC_709)).then_some(primaries)
 }
 
 /// Turns the colour of a pixel, which is weighed by its coverage in any space.

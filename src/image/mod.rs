@@ -16,7 +16,6 @@ pub mod metadata;
 mod output;
 mod photo;
 mod png;
-pub mod primaries;
 pub mod read;
 pub mod srgb;
 pub mod tone;

@@ -3,7 +3,7 @@
 use super::limits::{Budget, Limits};
 use super::texture::{format_of, within};
 use super::{Diagnostic, LoadError, Source};
-use crate::image::primaries::Primaries;
+use crate::math::primaries::Primaries;
 use crate::math::{DMat3, DVec3};
 use crate::quiet::attempt;
 use crate::scene::Panorama;
@@ -132,7 +132,12 @@ fn upright(reader: ImageReader<Cursor<&[u8]>>) -> ImageResult<DynamicImage> {
 
 /// What turns the colours of an EXR file into Rec. 709; `None`: they are that, or nobody knows, which is told.
 fn other_colors(meta: &MetaData, file: &Path, warnings: &mut Vec<Diagnostic>) -> Option<DMat3> {
-    let turned = Primaries::of_exr(meta)?.to_rec_709();
+    let said = meta.headers.first()?.shared_attributes.chromaticities?;
+    let primaries = Primaries::of([said.red, said.green, said.blue, said.white].map(|at| [at.x(), at.y()]));
+    if primaries.are_near(&Primaries::REC_709) {
+        return None;
+    }
+    let turned = primaries.to_rec_709();
     if turned.is_none() {
         let text = "its chromaticities are those of no colours: it is taken as Rec. 709";
         warnings.push(Diagnostic::new("env-colors", file, "", text));

@@ -20,6 +20,7 @@ pub mod moller_trumbore;
 mod oracle;
 pub mod plane;
 pub mod polygon;
+pub mod primaries;
 pub mod quotient;
 pub mod random;
 pub mod rational;

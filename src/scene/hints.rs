@@ -1,7 +1,5 @@
 //! Render settings that a scene file brings along; the command line overrides each of them.
 
-use crate::image::ToneMap;
-
 /// Most bounces that may be asked for; the wall of a wine glass leads light along hundreds of total reflections.
 pub const MAX_DEPTH: u32 = 1024;
 
@@ -20,8 +18,8 @@ pub struct RenderHints {
     pub depth: Option<u32>,
     /// Weight below which a branch ends.
     pub cutoff: Option<f32>,
-    /// How linear light becomes display colour.
-    pub tone_map: Option<ToneMap>,
+    /// Name of the tone map.
+    pub tone_map: Option<String>,
     /// Exposure, stops.
     pub exposure: Option<f32>,
     /// Whether a scene without lights gets some.

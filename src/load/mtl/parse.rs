@@ -1,7 +1,6 @@
 //! MTL text -> materials as written, before anything is made of them.
 
 use super::options::{self, Map};
-use crate::image::primaries::rec_709_of_xyz;
 use crate::load::limits::{Budget, OverBudget};
 use crate::load::number;
 use crate::load::paths::shorten;
@@ -9,6 +8,7 @@ use crate::load::text::encoding::{decode_name, to_ascii_superset};
 use crate::load::text::lines::{Lines, keyword, words};
 use crate::load::{Diagnostic, Warnings};
 use crate::math::DVec3;
+use crate::math::primaries::rec_709_of_xyz;
 use std::mem::size_of;
 use std::path::Path;
 

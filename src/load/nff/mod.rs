@@ -23,7 +23,6 @@ use super::limits::Budget;
 use super::paths::Resolver;
 use super::place::{LeftOut, is_usable};
 use super::{Diagnostic, Facts, LoadError, LoadOptions, Loaded, Source, Warnings};
-use crate::image::ToneMap;
 use crate::math::{DVec3, Vec3};
 use crate::scene::{
     Background, Camera, Cone, Environment, Falloff, Light, LightKind, Material, Phong, Projection, Reflection,
@@ -93,7 +92,7 @@ fn finish(scene: &mut Scene, options: &LoadOptions) {
     scene.up = options.up.unwrap_or(scene.up);
     // The text's own depth, the eye ray counted: 5.
     scene.hints.depth = Some(4);
-    scene.hints.tone_map = Some(ToneMap::None);
+    scene.hints.tone_map = Some("none".into());
 }
 
 struct Reader<'a> {

@@ -1,7 +1,6 @@
 //! `[[lights]]`, `[[cameras]]` and `[render]`.
 
 use super::reader::{Table, boolean, color, direction, numbers, positive, string, vec, whole, within, word};
-use crate::image::ToneMap;
 use crate::math::{DVec3, Vec3};
 use crate::scene::{Camera, Falloff, Light, LightKind, MAX_DEPTH, MAX_STOPS, Projection, RenderHints};
 
@@ -121,7 +120,7 @@ pub(super) fn camera(table: Table, up: DVec3) -> Option<Camera> {
 /// Reads `[render]`.
 #[expect(clippy::cast_possible_truncation, reason = "settings are f32")]
 pub(super) fn hints(table: Table) -> RenderHints {
-    let maps = ToneMap::ALL.map(|map| (map.name(), map));
+    let maps = [("none", "none"), ("reinhard", "reinhard"), ("aces", "aces"), ("neutral", "neutral")];
     let side = |n: f64| (n.fract() == 0.0 && (1.0..=65_535.0).contains(&n)).then_some(n as u32);
     let hints = RenderHints {
         size: table.get("size", |value| {
@@ -131,7 +130,7 @@ pub(super) fn hints(table: Table) -> RenderHints {
         samples: table.get("samples", whole(1, 65_536)),
         depth: table.get("depth", whole(0, MAX_DEPTH)),
         cutoff: table.get("cutoff", within(0.0, 1.0)).map(|n| n as f32),
-        tone_map: table.get("tone_map", word(&maps)),
+        tone_map: table.get("tone_map", word(&maps)).map(str::to_owned),
         exposure: table.get("exposure", within(-f64::from(MAX_STOPS), f64::from(MAX_STOPS))).map(|n| n as f32),
         default_light: table.get("default_light", boolean),
         camera: None,

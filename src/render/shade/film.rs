@@ -3,9 +3,9 @@
 //! L. Belcour, P. Barla, "A Practical Extension to Microfacet Theory for the Modeling of Varying Iridescence" (2017): the
 //! sum over the ways through the film, whose phases are integrated over the eye's sensitivity in closed form.
 
-use crate::image::primaries::rec_709_of_xyz;
 use crate::math::Vec3;
 use crate::math::formula::{exp2, floor, sin_cos_of_turns};
+use crate::math::primaries::rec_709_of_xyz;
 use crate::render::optics::fresnel_schlick;
 use std::f32::consts::{LOG2_E, PI};
 

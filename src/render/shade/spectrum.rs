@@ -1,7 +1,7 @@
 //! White light in a few wavelengths, for materials whose index depends on the wavelength.
 
-use crate::image::primaries::rec_709_of_xyz;
 use crate::math::Vec3;
+use crate::math::primaries::rec_709_of_xyz;
 
 /// Number of parts that white light is split into.
 pub(crate) const BANDS: u8 = 12;

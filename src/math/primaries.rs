@@ -1,8 +1,6 @@
 //! The primaries of colours, and what turns them into those of Rec. 709.
 
-use crate::math::{DMat3, DVec3};
-use ::exr::math::Vec2;
-use ::exr::meta::MetaData;
+use super::{DMat3, DVec3};
 
 /// CIE XYZ, white D65, as linear Rec. 709 (IEC 61966-2-1); a colour out of its gamut has negative parts.
 pub fn rec_709_of_xyz(xyz: DVec3) -> DVec3 {
@@ -30,12 +28,10 @@ impl Primaries {
     /// CIE XYZ itself, as OpenEXR writes it.
     pub const CIE_XYZ: Self = Self { colors: [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]], white: [1.0 / 3.0, 1.0 / 3.0] };
 
-    /// What an EXR file says of its colours; `None` where it says nothing, or that they are those of Rec. 709.
-    pub fn of_exr(meta: &MetaData) -> Option<Self> {
-        let said = meta.headers.first()?.shared_attributes.chromaticities?;
-        let place = |at: Vec2<f32>| [f64::from(at.x()), f64::from(at.y())];
-        let primaries = Self { colors: [said.red, said.green, said.blue].map(place), white: place(said.white) };
-        (!primaries.are_near(&Self::REC_709)).then_some(primaries)
+    /// Those at these places: red, green, blue and white.
+    pub fn of(places: [[f32; 2]; 4]) -> Self {
+        let [red, green, blue, white] = places.map(|place| place.map(f64::from));
+        Self { colors: [red, green, blue], white }
     }
 
     /// Whether these are those of another space, but for rounding to three digits.
