@@ -158,6 +158,7 @@ fn give(mesh: &mut Mesh, normals: &[Vec3]) {
 mod tests {
     use super::*;
     use crate::load::{LoadOptions, Loaded, load_bytes};
+    use crate::scene::TexCoords;
     use std::path::Path;
 
     fn load(text: &str, degrees: f64) -> Loaded {
@@ -199,7 +200,9 @@ mod tests {
         };
         let plain = self::load(ROOF, 61.0);
         for (smooth, plain) in load(Some(61_f64.to_radians())).scene.meshes.iter().zip(&plain.scene.meshes) {
-            assert!(smooth.tangents.len() == smooth.positions.len() && smooth.tangent_set == Some(0));
+            assert!(
+                smooth.tangents.len() == smooth.positions.len() && smooth.tangents_along == Some(TexCoords::default())
+            );
             let along = |t: &crate::math::Vec4, n: &Vec3| t.truncate().dot(*n).abs() < 1e-5;
             assert!(smooth.tangents.iter().zip(&smooth.normals).all(|(t, n)| along(t, n)));
             let has = |normal: &Vec3| plain.normals.iter().any(|n| (*n - *normal).length() < 1e-6);

@@ -3,19 +3,20 @@
 //! M. S. Mikkelsen, *Simulation of Wrinkled Surfaces Revisited*, 2008.
 
 use crate::math::{Vec2, Vec3, Vec4};
-use crate::scene::{Mesh, Scene};
+use crate::scene::{Mesh, Scene, TexCoords, UvTransform};
 use bevy_mikktspace::{Geometry, Ops, TangentSpace};
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 /// Bytes that generating takes a corner: what is noted of it, beside the vertex of its own that it may become.
 pub const OF_CORNER: u64 = 256;
 
-/// Gives `mesh` tangents that follow texture coordinate set `uv_set`, which it notes.
+/// Gives `mesh` tangents along texture coordinates, which it notes.
 ///
 /// Vertices whose corners need different tangents are split; a mesh without normals gets flat ones, vertex by vertex.
 /// Leaves the mesh as it is when it has no such coordinates, or polygons instead of triangles.
-pub fn generate(mesh: &mut Mesh, uv_set: u32) {
-    let set = uv_set as usize;
+pub fn generate(mesh: &mut Mesh, along: TexCoords) {
+    let set = along.set as usize;
     let known = mesh.uvs.get(set).is_some_and(|uvs| uvs.len() == mesh.positions.len());
     if !known || mesh.triangles.is_empty() || !mesh.polygons.is_empty() {
         return;
@@ -23,7 +24,8 @@ pub fn generate(mesh: &mut Mesh, uv_set: u32) {
     if mesh.normals.is_empty() {
         flatten(mesh);
     }
-    let uvs = &mesh.uvs[set];
+    let (along, uvs) = transformed(along, &mesh.uvs[set]);
+    let uvs = &*uvs;
     let (calm, crowded) = sort_out(mesh, uvs);
     let mut corners = vec![[Vec4::X; 3]; mesh.triangles.len()];
     let mut view = View { mesh, uvs, faces: &calm, corners: &mut corners };
@@ -33,14 +35,25 @@ pub fn generate(mesh: &mut Mesh, uv_set: u32) {
         corners[face as usize] = [of_face(mesh.triangles[face as usize], mesh, uvs); 3];
     }
     split(mesh, &corners);
-    mesh.tangent_set = Some(uv_set);
+    mesh.tangents_along = Some(along);
 }
 
-/// Gives meshes their tangents that were left without until their normals are smooth: those that note a set and have none.
+/// The coordinates as their transform turns them, and along which that makes tangents: along those of the file where it
+/// leaves nothing of them.
+fn transformed(along: TexCoords, uvs: &[Vec2]) -> (TexCoords, Cow<'_, [Vec2]>) {
+    let [x_axis, y_axis] = along.transform.axes();
+    let area = x_axis.perp_dot(y_axis);
+    if along.transform.keeps_directions() || area == 0.0 || !area.is_finite() {
+        return (TexCoords { transform: UvTransform::default(), ..along }, uvs.into());
+    }
+    (along, uvs.iter().map(|uv| x_axis * uv.x + y_axis * uv.y).collect())
+}
+
+/// Gives meshes their tangents that were left without until their normals are smooth: those that note coordinates and have none.
 pub fn generate_left(scene: &mut Scene) {
     for mesh in scene.meshes.iter_mut().filter(|mesh| mesh.tangents.is_empty()) {
-        if let Some(set) = mesh.tangent_set.take() {
-            generate(mesh, set);
+        if let Some(along) = mesh.tangents_along.take() {
+            generate(mesh, along);
         }
     }
 }
@@ -214,7 +227,7 @@ mod tests {
     #[test]
     fn the_tangent_points_along_u_and_the_bitangent_up_the_picture() {
         let mut mesh = Mesh { normals: vec![Vec3::Z; 4], ..square() };
-        generate(&mut mesh, 0);
+        generate(&mut mesh, TexCoords::default());
         assert_eq!(mesh.positions.len(), 4, "nothing needs splitting");
         for tangent in &mesh.tangents {
             assert_eq!(*tangent, Vec4::new(1.0, 0.0, 0.0, 1.0));
@@ -227,7 +240,7 @@ mod tests {
         let mut mesh = Mesh { normals: vec![Vec3::Z; 4], ..square() };
         // The second triangle runs u the other way.
         mesh.uvs[0][3] = Vec2::new(2.0, 0.0);
-        generate(&mut mesh, 0);
+        generate(&mut mesh, TexCoords::default());
         assert_eq!(mesh.positions.len(), 6);
         let signs = mesh.triangles.iter().map(|t| t.map(|v| mesh.tangents[v as usize].w));
         assert_eq!(signs.collect::<Vec<_>>(), [[1.0; 3], [-1.0; 3]]);
@@ -236,11 +249,11 @@ mod tests {
     #[test]
     fn a_mesh_without_normals_becomes_flat_and_one_without_coordinates_stays() {
         let mut mesh = square();
-        generate(&mut mesh, 0);
+        generate(&mut mesh, TexCoords::default());
         assert_eq!(mesh.normals, [Vec3::Z; 6]);
         assert_eq!(mesh.tangents.len(), 6);
         let mut bare = Mesh { uvs: Vec::new(), ..square() };
-        generate(&mut bare, 0);
+        generate(&mut bare, TexCoords::default());
         assert!(bare.tangents.is_empty());
     }
 
@@ -260,7 +273,7 @@ mod tests {
     fn where_very_many_faces_meet_each_has_its_own_tangent() {
         for (faces, welded) in [(200, true), (50_000, true), (50_000, false)] {
             let mut mesh = disc(faces, welded);
-            generate(&mut mesh, 0);
+            generate(&mut mesh, TexCoords::default());
             assert_eq!(mesh.tangents.len(), mesh.positions.len());
             let off = |t: &Vec4| (*t - Vec4::new(1.0, 0.0, 0.0, 1.0)).length();
             assert!(mesh.tangents.iter().all(|t| off(t) < 2e-2), "{faces}");

@@ -4,7 +4,7 @@ use super::curve::Curve;
 use super::texture::{ColorSpace, TextureStore};
 use super::world::Placement;
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
-use crate::scene::{Material, Mesh, TextureRef, UvTransform};
+use crate::scene::{Material, Mesh, TexCoords, TextureRef, UvTransform};
 use std::cell::Cell;
 
 /// Lengths of edges whose fourth powers are ordinary numbers.
@@ -282,10 +282,11 @@ impl Patch<'_> {
 
     /// The same along the coordinates of a map as its transform turns them: what its texels are given in.
     fn tangents_of_map(&self, normal: Vec3, map: &TextureRef) -> Option<(Vec3, Vec3)> {
-        let made_for_it = self.mesh.tangent_set.is_none_or(|set| set == map.uv_set);
+        let made_along = self.mesh.tangents_along;
+        let made_for_it = made_along.is_none_or(|along| along.set == map.uv_set);
         let given = made_for_it.then(|| self.mix(&self.mesh.tangents)).flatten();
         let given = given.and_then(|t| given_tangent(self.placement, t, normal));
-        let turn = FrameTurn::new(&map.transform);
+        let turn = FrameTurn::new(made_along, map);
         let along_map = given.map(|frame| turn.map_or(frame, |turn| turn.apply(frame, normal)));
         let (tangent, sign) = along_map.or_else(|| self.tangent_of_coordinates(normal, map))?;
         Some((tangent, normal.cross(tangent) * sign))
@@ -363,9 +364,9 @@ pub(crate) struct Turn {
 }
 
 impl Turn {
-    pub(crate) fn new(t: &UvTransform) -> Self {
-        let (sin, cos) = if t.rotation == 0.0 { (0.0, 1.0) } else { libm::sincosf(t.rotation) };
-        Self { x_axis: Vec2::new(cos, -sin) * t.scale.x, y_axis: Vec2::new(sin, cos) * t.scale.y }
+    pub(crate) fn new(transform: &UvTransform) -> Self {
+        let [x_axis, y_axis] = transform.axes();
+        Self { x_axis, y_axis }
     }
 
     pub(crate) fn apply(&self, uv: Vec2) -> Vec2 {
@@ -373,13 +374,14 @@ impl Turn {
     }
 }
 
-/// How tangents that run along coordinates turn where a map's transform turns or mirrors these.
+/// How tangents turn to run along the coordinates of a map, where its transform turns or mirrors those that they were made
+/// along.
 ///
 /// A texture that is laid out by transformed coordinates is the same as one on coordinates that were transformed before, and
-/// has the same frames (Khronos, *KHR_texture_transform*).
+/// has the same frames (Khronos, *KHR_texture_transform*). Those of a file run along its coordinates as they are.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FrameTurn {
-    /// Where the transformed u grows, along the u and the v that it is made of; of unit length.
+    /// Where the u of the map grows, along the u and the v of the tangents; of unit length.
     along: Vec2,
     /// Negative where it mirrors.
     sign: f32,
@@ -387,14 +389,19 @@ pub(crate) struct FrameTurn {
 
 impl FrameTurn {
     /// `None` where frames stay as they are.
-    pub(crate) fn new(transform: &UvTransform) -> Option<Self> {
-        if transform.rotation == 0.0 && transform.scale.cmpgt(Vec2::ZERO).all() {
+    pub(crate) fn new(made_along: Option<TexCoords>, map: &TextureRef) -> Option<Self> {
+        let (from, to) = (made_along.unwrap_or_default().transform, map.transform);
+        if (from.rotation, from.scale) == (to.rotation, to.scale)
+            || [from, to].iter().all(UvTransform::keeps_directions)
+        {
             return None;
         }
-        let Turn { x_axis, y_axis } = Turn::new(transform);
-        let determinant = x_axis.perp_dot(y_axis);
+        let (from, to) = (Turn::new(&from), Turn::new(&to));
+        let determinants = [from, to].map(|turn| turn.x_axis.perp_dot(turn.y_axis));
         // The inverse takes (1, 0) there.
-        let along = (Vec2::new(y_axis.y, -x_axis.y) * determinant.signum()).try_normalize()?;
+        let along_map = Vec2::new(to.y_axis.y, -to.x_axis.y) * determinants[1].signum();
+        let along = from.apply(along_map).try_normalize()?;
+        let determinant = determinants[0] * determinants[1];
         let turns = along != Vec2::X || determinant < 0.0;
         (turns && determinant != 0.0).then_some(Self { along, sign: determinant.signum() })
     }

@@ -365,7 +365,9 @@ mod tests {
     use super::*;
     use crate::math::{DAffine3, DVec3, Vec2, Vec4};
     use crate::render::patch::Coordinates;
-    use crate::scene::{Bitmap, Instance, MetalRough, Pixels, Polygon, Reflection, Sampler, Texture, UvTransform};
+    use crate::scene::{
+        Bitmap, Instance, MetalRough, Pixels, Polygon, Reflection, Sampler, TexCoords, Texture, UvTransform,
+    };
 
     /// A unit square in z = 0 that faces +z: u runs along x, v down along −y; texture 0 covers it.
     fn scene(texels: Vec<[u8; 4]>, width: u32) -> Scene {
@@ -493,10 +495,37 @@ mod tests {
             let mut scene = with_normal_map(0.6, 0.2, 0.77);
             scene.materials[0].normal_map = Some(TextureRef { transform, ..map() });
             assert_near(normal(&scene, 1.0), expected);
-            crate::load::tangents::generate(&mut scene.meshes[0], 0);
+            crate::load::tangents::generate(&mut scene.meshes[0], TexCoords::default());
             assert_near(normal(&scene, 1.0), expected);
-            scene.meshes[0].tangent_set = None;
+            scene.meshes[0].tangents_along = None;
             assert_near(normal(&scene, 1.0), expected);
+        }
+    }
+
+    #[test]
+    fn tangents_made_along_turned_coordinates_of_unequal_sides_are_those_of_the_coordinates() {
+        for (scale, rotation) in [([1.0, 1.0], 0.6), ([2.0, -0.5], 0.0), ([-3.0, 2.0], -1.1)] {
+            let mut scene = with_normal_map(0.6, 0.2, 0.77);
+            // Four times as long as it is wide.
+            scene.meshes[0].positions.iter_mut().for_each(|p| p.x *= 4.0);
+            let transform = UvTransform { offset: Vec2::new(0.1, 0.2), scale: scale.into(), rotation };
+            let mapped = TextureRef { transform, ..map() };
+            scene.materials[0].normal_map = Some(mapped);
+            let expected = normal(&scene, 1.0);
+            crate::load::tangents::generate(&mut scene.meshes[0], mapped.coordinates());
+            assert_near(normal(&scene, 1.0), expected);
+        }
+    }
+
+    #[test]
+    fn tangents_made_along_turned_coordinates_turn_back_for_a_map_that_is_not() {
+        for (scale, rotation) in [([1.0, 1.0], 0.6), ([1.0, -1.0], 0.0), ([-3.0, 3.0], -1.1)] {
+            let transform = UvTransform { offset: Vec2::ZERO, scale: scale.into(), rotation };
+            let mut scene = with_normal_map(0.6, 0.2, 0.77);
+            let turned = TextureRef { transform, ..map() };
+            crate::load::tangents::generate(&mut scene.meshes[0], turned.coordinates());
+            assert_eq!(scene.meshes[0].tangents_along, Some(turned.coordinates()));
+            assert_near(normal(&scene, 1.0), Vec3::new(0.6, 0.2, 0.77));
         }
     }
 
@@ -508,10 +537,10 @@ mod tests {
         scene.materials[0].normal_map = Some(TextureRef { uv_set: 1, ..map() });
         let expected = normal(&scene, 1.0);
         assert!((expected - Vec3::new(0.6, 0.2, 0.77)).length() > 0.1, "{expected}");
-        crate::load::tangents::generate(&mut scene.meshes[0], 0);
+        crate::load::tangents::generate(&mut scene.meshes[0], TexCoords::default());
         assert_near(normal(&scene, 1.0), expected);
         // Those of a file are of all.
-        scene.meshes[0].tangent_set = None;
+        scene.meshes[0].tangents_along = None;
         assert_near(normal(&scene, 1.0), Vec3::new(0.6, 0.2, 0.77));
     }
 

@@ -154,6 +154,22 @@ pub struct TextureRef {
     pub transform: UvTransform,
 }
 
+impl TextureRef {
+    /// The coordinates that it is looked up at.
+    pub fn coordinates(&self) -> TexCoords {
+        TexCoords { set: self.uv_set, transform: self.transform }
+    }
+}
+
+/// A set of texture coordinates as a transform moves them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TexCoords {
+    /// Which set of [`super::Mesh::uvs`].
+    pub set: u32,
+    /// What moves them.
+    pub transform: UvTransform,
+}
+
 /// `uv' = offset + rotation · (scale · uv)`, as KHR_texture_transform.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UvTransform {
@@ -163,6 +179,19 @@ pub struct UvTransform {
     pub rotation: f32,
     /// Applied first.
     pub scale: Vec2,
+}
+
+impl UvTransform {
+    /// What it takes the steps (1, 0) and (0, 1) to.
+    pub fn axes(&self) -> [Vec2; 2] {
+        let (sin, cos) = if self.rotation == 0.0 { (0.0, 1.0) } else { libm::sincosf(self.rotation) };
+        [Vec2::new(cos, -sin) * self.scale.x, Vec2::new(sin, cos) * self.scale.y]
+    }
+
+    /// Whether u and v grow the same ways as before.
+    pub fn keeps_directions(&self) -> bool {
+        self.rotation == 0.0 && self.scale.cmpgt(Vec2::ZERO).all()
+    }
 }
 
 impl Default for UvTransform {

@@ -1,5 +1,6 @@
 //! Geometry: indexed triangles (and whole n-gons), spheres, cones, planes, and where they stand.
 
+use super::TexCoords;
 use crate::math::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
 use std::mem::size_of;
 
@@ -18,8 +19,8 @@ pub struct Mesh {
     pub normals: Vec<Vec3>,
     /// Unit tangents with handedness in `w`; empty unless a normal map needs them.
     pub tangents: Vec<Vec4>,
-    /// The set of texture coordinates that they were made from; `None`: the file gave them, for all sets.
-    pub tangent_set: Option<u32>,
+    /// The texture coordinates that they were made along; `None`: the file gave them, for all.
+    pub tangents_along: Option<TexCoords>,
     /// Vertex colours, linear RGBA, multiplied into the base colour; empty: white.
     pub colors: Vec<Vec4>,
     /// Texture coordinate sets (`TEXCOORD_0`, `TEXCOORD_1`, …), v pointing down as in glTF.

@@ -128,12 +128,12 @@ fn scene(
     let mtl::Materials { materials, textures, bitmaps, of_name, .. } = materials;
     for (mesh, material) in meshes.iter_mut().zip(of_name) {
         mesh.material = material;
-        if materials.get(material as usize).is_some_and(|m| m.normal_map.is_some()) {
+        if let Some(map) = materials.get(material as usize).and_then(|m| m.normal_map.as_ref()) {
             budget.take(3 * mesh.triangles.len() as u64, OF_TANGENTS)?;
             if smooths && mesh.normals.is_empty() {
-                mesh.tangent_set = Some(0);
+                mesh.tangents_along = Some(map.coordinates());
             } else {
-                tangents::generate(mesh, 0);
+                tangents::generate(mesh, map.coordinates());
             }
         }
     }

@@ -3,7 +3,9 @@
 use super::mesh::Needs;
 use super::textures::Textures;
 use crate::math::Vec3;
-use crate::scene::{AlphaMode, Coat, Film, Grain, Material, MetalRough, Reflection, Sheen, Translucence};
+use crate::scene::{
+    AlphaMode, Coat, Film, Grain, Material, MetalRough, Reflection, Sheen, TexCoords, TextureRef, Translucence,
+};
 use gltf::json;
 use gltf::json::material as source;
 use gltf::json::validation::Checked;
@@ -45,10 +47,15 @@ pub(super) fn convert(source: &json::Material, textures: &mut Textures) -> Mater
 pub(super) fn needs(material: &Material) -> Needs {
     let m = material.metal_rough();
     let of_coat = m.and_then(|m| m.coat.as_ref()?.normal_map.as_ref());
-    // A grain without a map runs along the tangents of the first set.
-    let of_grain = || Some(m?.grain.as_ref()?.map.as_ref().map_or(0, |map| map.uv_set));
-    let tangents = material.normal_map.as_ref().or(of_coat).map(|map| map.uv_set).or_else(of_grain);
-    let mut uv_sets: Vec<u32> = material.textures().map(|map| map.uv_set).chain(tangents).collect();
+    let grain = m.and_then(|m| m.grain.as_ref());
+    // One without a map runs along the tangents of the first set.
+    let of_grain = grain.map(|grain| grain.map.as_ref().map_or(TexCoords::default(), TextureRef::coordinates));
+    let tangents = material.normal_map.as_ref().or(of_coat).map(TextureRef::coordinates).or(of_grain);
+    // It follows coordinates as they are: a transform of its map moves what the map says, not what that is about.
+    let tangents = tangents
+        .map(|along| if grain.is_some() { TexCoords { set: along.set, ..TexCoords::default() } } else { along });
+    let mut uv_sets: Vec<u32> =
+        material.textures().map(|map| map.uv_set).chain(tangents.map(|along| along.set)).collect();
     uv_sets.sort_unstable();
     uv_sets.dedup();
     Needs { uv_sets, tangents }

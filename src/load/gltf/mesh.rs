@@ -7,7 +7,7 @@ use super::report::Report;
 use super::skin::{self, Influences, Skin};
 use crate::load::tangents;
 use crate::math::{DVec3, Vec2, Vec3, Vec4};
-use crate::scene::Mesh;
+use crate::scene::{Mesh, TexCoords};
 use gltf::json::Index;
 use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::mesh::{Mode, MorphTarget, Primitive, Semantic};
@@ -34,8 +34,8 @@ pub(super) struct Job<'a> {
 pub(super) struct Needs {
     /// Texture coordinate sets.
     pub(super) uv_sets: Vec<u32>,
-    /// The set that a normal map is laid out by.
-    pub(super) tangents: Option<u32>,
+    /// The coordinates that tangents follow: those of a normal map.
+    pub(super) tangents: Option<TexCoords>,
 }
 
 impl Job<'_> {
@@ -131,11 +131,11 @@ impl Task<'_, '_> {
             return Some(Read { mesh, center, lines, dropped: Dropped::default() });
         }
         let dropped = faces::clean(&mut mesh, mode == Mode::TriangleStrip);
-        if let Some(set) = self.job.needs.tangents.filter(|_| mesh.tangents.is_empty()) {
+        if let Some(along) = self.job.needs.tangents.filter(|_| mesh.tangents.is_empty()) {
             if self.job.smooths && mesh.normals.is_empty() {
-                mesh.tangent_set = Some(set);
+                mesh.tangents_along = Some(along);
             } else {
-                tangents::generate(&mut mesh, set);
+                tangents::generate(&mut mesh, along);
             }
         }
         Some(Read { mesh, center, dropped, lines })

@@ -284,7 +284,7 @@ impl Strip {
         if sheet.normal_map.is_some() {
             let points = padded(count);
             let scale = material.normal_scale;
-            let turn = material.normal_map.as_ref().and_then(|map| FrameTurn::new(&map.transform));
+            let turn = material.normal_map.as_ref().and_then(|map| FrameTurn::new(mesh.tangents_along, map));
             level.run(TurnNormals { given, found, painted, points, placement, smooth, scale, turn });
         }
     }
