@@ -119,16 +119,18 @@ impl Lobe {
 }
 
 /// Facets that are drawn to find what all of them send back.
-const DRAWN: usize = 16;
+const DRAWN: usize = 32;
 
-/// What draws them.
-static PATTERN: LazyLock<[[f32; DRAWN]; 3]> = LazyLock::new(pattern);
+/// What draws them. From this turn on they are off by .009 of all light over grains of all widths (root mean square), by .03
+/// at most and by .001 in the mean.
+static PATTERN: LazyLock<[[f32; DRAWN]; 3]> = LazyLock::new(|| pattern(0.859_375));
 
-/// Numbers that draw `N` facets for equal shares of a lobe: 0 … 1, and cosine and sine of a turn.
-pub(crate) fn pattern<const N: usize>() -> [[f32; N]; 3] {
+/// Numbers that draw `N` facets for equal shares of a lobe: 0 … 1, and cosine and sine of a turn, of which the first is so
+/// much of a whole one.
+pub(crate) fn pattern<const N: usize>(first: f32) -> [[f32; N]; 3] {
     /// The golden ratio's inverse: turns that never meet.
     const GOLDEN: f32 = 0.618_034;
-    let turn = |k: usize| libm::sincosf(2.0 * PI * (k as f32 * GOLDEN).fract());
+    let turn = |k: usize| libm::sincosf(2.0 * PI * (k as f32 * GOLDEN + first).fract());
     let at = std::array::from_fn(|k| (k as f32 + 0.5) / N as f32);
     [at, std::array::from_fn(|k| turn(k).1), std::array::from_fn(|k| turn(k).0)]
 }
@@ -145,8 +147,10 @@ impl Kernel for Albedo<'_> {
     // The lanes are plain arrays: what the token stands for is only what the compiler may use for them.
     #[inline(always)]
     fn run<S: Simd>(self, _: S) -> f32 {
-        let Self { lobe, view } = self;
-        let (lobe, [at, cos, sin]) = (*lobe, &*PATTERN);
+        let Self { lobe: Lobe { along, across, normal, alpha }, view } = self;
+        // All that matters are lengths along the axes: a mirror image sends back the same.
+        let view = Vec3::new(view.dot(*along).abs(), view.dot(*across).abs(), view.dot(*normal));
+        let (lobe, [at, cos, sin]) = (Lobe::new([Vec3::X, Vec3::Y], Vec3::Z, *alpha), &*PATTERN);
         let mut sent = [0.0; DRAWN];
         for k in 0..DRAWN {
             let facet = lobe.facet_turned(view, at[k], [cos[k], sin[k]]);
@@ -192,6 +196,31 @@ mod tests {
             (x, y) = (x + half.x.abs(), y + half.y.abs());
         }
         assert!(x > 5.0 * y, "{x} {y}");
+    }
+
+    #[test]
+    fn a_few_facets_tell_what_a_grain_sends_back_and_the_same_of_its_mirror_image() {
+        let (mut off, mut count) = (0.0, 0.0);
+        for alpha in [[0.1, 0.02], [0.25, 0.25], [0.5, 0.05], [0.8, 0.3], [1.0, 0.6]] {
+            for (turn, degrees) in (0..24u8).map(|k| (f32::from(k) * 0.3, f32::from(k * 7 % 24) * 3.6)) {
+                let ((sin, cos), (y, x)) = (libm::sincosf(degrees.to_radians()), libm::sincosf(turn));
+                let view = Vec3::new(sin * x, sin * y, cos);
+                let lobe = Lobe::new([Vec3::X, Vec3::Y], Vec3::Z, alpha);
+                let few = lobe.albedo(view);
+                for axes in [[-Vec3::X, Vec3::Y], [Vec3::X, -Vec3::Y], [-Vec3::X, -Vec3::Y]] {
+                    assert_eq!(Lobe::new(axes, Vec3::Z, alpha).albedo(view).to_bits(), few.to_bits());
+                }
+                let n = 4000;
+                let all = (0..n).map(|k| {
+                    let at = [(k as f32 + 0.5) / n as f32, (k as f32 * 0.618_034).fract()];
+                    lobe.sent(view, reflect(-view, lobe.facet(view, at))) / n as f32
+                });
+                let all: f32 = all.sum();
+                assert!((few - all).abs() < 0.035, "{alpha:?} {view}: {few} {all}");
+                (off, count) = (off + few - all, count + 1.0);
+            }
+        }
+        assert!(f32::abs(off / count) < 0.004, "{} in the mean", off / count);
     }
 
     #[test]

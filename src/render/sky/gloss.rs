@@ -19,7 +19,7 @@ const HILL: f32 = 0.75;
 type Row = [f32; LOOKUPS];
 
 /// What draws their facets.
-static PATTERN: LazyLock<[Row; 3]> = LazyLock::new(pattern);
+static PATTERN: LazyLock<[Row; 3]> = LazyLock::new(|| pattern(0.0));
 
 /// The lookups of a lobe, side by side.
 struct Lookups {
