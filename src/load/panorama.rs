@@ -10,8 +10,11 @@ use crate::scene::Panorama;
 use crate::scene::color::from_srgb;
 use crate::threads;
 use ::exr::meta::MetaData;
+use ::exr::meta::header::Header;
+use ::exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel, read};
 use ::image::codecs::hdr::HdrDecoder;
-use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, ImageResult};
+use ::image::error::DecodingError;
+use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, ImageResult, Rgb, Rgb32FImage};
 use std::borrow::Cow;
 use std::io::Cursor;
 use std::path::Path;
@@ -59,8 +62,10 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
         reader.limits(within(memory));
         reader
     };
-    let (width, height) =
-        reader(limits.memory).into_dimensions().map_err(|e| fault(format!("cannot be decoded: {e}")))?;
+    let meta = if format == ImageFormat::OpenExr { MetaData::read_from_buffered(bytes, false).ok() } else { None };
+    let luminance = meta.as_ref().and_then(of_luminance);
+    let size = luminance.map_or_else(|| reader(limits.memory).into_dimensions(), |part| Ok(size_of(part)));
+    let (width, height) = size.map_err(|e| fault(format!("cannot be decoded: {e}")))?;
     let pixels = u64::from(width) * u64::from(height);
     if pixels == 0 || pixels > limits.image_pixels {
         let text = format!("is {width}×{height} pixels where 1 to {} are allowed", limits.image_pixels);
@@ -72,8 +77,9 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
         .take(pixels, PER_PIXEL)
         .map_err(|over| LoadError::from(Diagnostic::over_memory(&source.path, "", over.to_string())))?;
     let most = pixels * PER_PIXEL;
+    let decode = || if luminance.is_some() { grey(bytes) } else { upright(reader(most)) };
     // The decoder of EXR files gives up on some damaged ones by a panic.
-    let picture = match attempt(|| threads::anywhere(|| upright(reader(most)))) {
+    let picture = match attempt(|| threads::anywhere(decode)) {
         Some(Ok(picture)) => picture,
         Some(Err(e)) => return Err(fault(format!("cannot be decoded: {e}"))),
         None => return Err(fault("cannot be decoded: it is damaged".into())),
@@ -85,7 +91,6 @@ pub fn decode(source: &Source, limits: &Limits) -> Result<LoadedPanorama, LoadEr
             format!("is {width}×{height}: a panorama of all around is twice as wide as high, so it is stretched");
         warnings.push(Diagnostic::new("env-shape", &source.path, "", text));
     }
-    let meta = if format == ImageFormat::OpenExr { MetaData::read_from_buffered(bytes, false).ok() } else { None };
     let turned = meta.as_ref().and_then(|meta| other_colors(meta, &source.path, &mut warnings));
     let (mut texels, odd) = radiance(picture, format, turned);
     if format == ImageFormat::Hdr
@@ -128,6 +133,31 @@ fn upright(reader: ImageReader<Cursor<&[u8]>>) -> ImageResult<DynamicImage> {
     let mut picture = DynamicImage::from_decoder(decoder)?;
     picture.apply_orientation(orientation);
     Ok(picture)
+}
+
+/// The first part of an EXR file, if it has luminance instead of colours, which the usual decoder refuses.
+fn of_luminance(meta: &MetaData) -> Option<&Header> {
+    let part = meta.headers.first()?;
+    let has = |name: &str| part.channels.find_index_of_channel(&name.into()).is_some();
+    (has("Y") && !["R", "G", "B"].into_iter().any(has)).then_some(part)
+}
+
+/// Pixels across and down.
+fn size_of(part: &Header) -> (u32, u32) {
+    let pixels = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+    (pixels(part.layer_size.width()), pixels(part.layer_size.height()))
+}
+
+/// The luminance of an EXR file, for all three channels.
+fn grey(bytes: &[u8]) -> ImageResult<DynamicImage> {
+    let blank = |size: ::exr::math::Vec2<usize>, _: &_| Rgb32FImage::new(size.width() as u32, size.height() as u32);
+    let set = |picture: &mut Rgb32FImage, at: ::exr::math::Vec2<usize>, (y,): (f32,)| {
+        picture.put_pixel(at.x() as u32, at.y() as u32, Rgb([y; 3]));
+    };
+    let layer = read().no_deep_data().largest_resolution_level().specific_channels().required("Y");
+    let read = layer.collect_pixels(blank, set).first_valid_layer().all_attributes().from_buffered(Cursor::new(bytes));
+    let decoding = |e| ImageError::Decoding(DecodingError::new(ImageFormat::OpenExr.into(), e));
+    Ok(DynamicImage::ImageRgb32F(read.map_err(decoding)?.layer_data.channel_data.pixels))
 }
 
 /// What turns the colours of an EXR file into Rec. 709; `None`: they are that, or nobody knows, which is told.
@@ -180,7 +210,7 @@ fn radiance(picture: DynamicImage, format: ImageFormat, turned: Option<DMat3>) -
 mod tests {
     use super::*;
     use crate::load::diagnostic::OVER_MEMORY;
-    use ::image::{ImageBuffer, Rgb, Rgb32FImage};
+    use ::image::ImageBuffer;
 
     fn file(picture: &DynamicImage, format: ImageFormat) -> Source {
         let mut out = Cursor::new(Vec::new());
@@ -231,11 +261,16 @@ mod tests {
     }
 
     /// An EXR of even colour in other primaries, once in each part.
-    fn exr(colors: [[f32; 2]; 3], color: [f32; 3], parts: usize) -> Source {
+    fn exr(colors: [[f32; 2]; 3], [r, g, b]: [f32; 3], parts: usize) -> Source {
+        exr_of(colors, &[("R", r), ("G", g), ("B", b)], parts)
+    }
+
+    /// The same with channels of these names.
+    fn exr_of(colors: [[f32; 2]; 3], channels: &[(&str, f32)], parts: usize) -> Source {
         use ::exr::prelude::*;
         let layer = |i: usize| {
-            let channel = |(name, value): (&str, f32)| AnyChannel::new(name, FlatSamples::F32(vec![value; 8]));
-            let channels = AnyChannels::sort(["R", "G", "B"].into_iter().zip(color).map(channel).collect());
+            let channel = |(name, value): &(&str, f32)| AnyChannel::new(*name, FlatSamples::F32(vec![*value; 8]));
+            let channels = AnyChannels::sort(channels.iter().map(channel).collect());
             Layer::new((4, 2), LayerAttributes::named(i.to_string().as_str()), Encoding::UNCOMPRESSED, channels)
         };
         let layers: Vec<_> = (0..parts).map(layer).collect();
@@ -271,6 +306,18 @@ mod tests {
         assert_eq!(xyz.warnings.len(), 0);
         let none = decode(&exr([[0.3, 0.3]; 3], [0.25; 3], 1), &Limits::default()).unwrap();
         assert_eq!((none.panorama.texels[0], none.warnings[0].code), ([0.25; 3], "env-colors"));
+    }
+
+    #[test]
+    fn luminance_alone_is_grey() {
+        let usual = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]];
+        let loaded = decode(&exr_of(usual, &[("A", 0.5), ("Y", 7.25)], 1), &Limits::default()).unwrap();
+        let panorama = loaded.panorama;
+        assert_eq!((panorama.width, panorama.height, &panorama.texels[..]), (4, 2, &[[7.25; 3]; 8][..]));
+        assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+        let limits = Limits { image_pixels: 7, ..Limits::default() };
+        assert!(decode(&exr_of(usual, &[("Y", 1.0)], 1), &limits).unwrap_err().to_string().contains("4×2"));
+        assert!(decode(&exr_of(usual, &[("Z", 1.0)], 1), &Limits::default()).is_err());
     }
 
     #[test]
