@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    meshray::cli::run(std::env::args_os()).into()
+    meshray::cli::run(wild::args_os()).into()
 }

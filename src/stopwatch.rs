@@ -103,9 +103,17 @@ fn processor(whose: Whose) -> Duration {
     time.map(Duration::from).unwrap_or_default()
 }
 
+/// Of a thread the time on the wall: what Windows counts of one are whole ticks of a sixty-fourth of a second.
 #[cfg(not(unix))]
-fn processor(_whose: Whose) -> Duration {
-    Duration::ZERO
+fn processor(whose: Whose) -> Duration {
+    static FIRST: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
+    match whose {
+        Whose::Thread => FIRST.elapsed(),
+        #[cfg(windows)]
+        Whose::Process => cpu_time::ProcessTime::now().as_duration(),
+        #[cfg(not(windows))]
+        Whose::Process => Duration::ZERO,
+    }
 }
 
 /// The most memory the process has held at once, bytes; only Linux tells.

@@ -9,7 +9,7 @@ use crate::image::destination;
 use crate::load::paths::lexical;
 use crate::load::suggest::nearest;
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::{Path, PathBuf, is_separator};
 
 /// What a template is filled with.
 #[derive(Clone, Debug)]
@@ -42,7 +42,8 @@ pub(super) fn fill(template: &str, fields: &Fields) -> Result<PathBuf, String> {
 /// The folder below which a template makes folders of its own, that in front of `{sub}`; `None` if it has none such.
 pub(super) fn grows_in(template: &str, fields: &Fields) -> Result<Option<PathBuf>, String> {
     let (before, found) = filled(template, fields, Some("sub"))?;
-    let folder = before.rsplit_once('/').map_or(".", |(folder, _)| if folder.is_empty() { "/" } else { folder });
+    let folder =
+        before.rsplit_once(is_separator).map_or(".", |(folder, _)| if folder.is_empty() { "/" } else { folder });
     Ok(found.then(|| PathBuf::from(folder)))
 }
 
@@ -63,7 +64,11 @@ fn filled(template: &str, fields: &Fields, until: Option<&str>) -> Result<(Strin
             let value = value(field, fields)?;
             name.push_str(&value);
             // No way at all is no folder.
-            rest = if value.is_empty() && field == "sub" { after.strip_prefix('/').unwrap_or(after) } else { after };
+            rest = if value.is_empty() && field == "sub" {
+                after.strip_prefix(is_separator).unwrap_or(after)
+            } else {
+                after
+            };
         } else {
             return Err(format!("`{template}`: a brace without its partner; write {{{{ or }}}} for a plain brace"));
         }
@@ -82,7 +87,7 @@ fn value(field: &str, fields: &Fields) -> Result<String, String> {
         "sub" => Ok(fields.sub.to_string_lossy().into_owned()),
         "stem" => Ok(stem(fields.input)),
         "ext" => Ok(fields.input.extension().unwrap_or_default().to_string_lossy().into_owned()),
-        "view" => Ok(fields.view.replace(['/', '\\', '\0'], "_")),
+        "view" => Ok(fields.view.replace(is_of_no_name, "_")),
         "frame" => {
             let width: usize = if width.is_empty() { 0 } else { width.parse().map_err(|_| bad_width(field))? };
             if width > 20 { Err(bad_width(field)) } else { Ok(format!("{:0width$}", fields.frame)) }
@@ -94,6 +99,12 @@ fn value(field: &str, fields: &Fields) -> Result<String, String> {
             ))
         }
     }
+}
+
+/// Whether a file cannot be called so, or it would lie elsewhere. Windows takes what stands behind a colon for a part of a file
+/// that few programs show.
+fn is_of_no_name(c: char) -> bool {
+    matches!(c, '/' | '\\' | '\0') || cfg!(windows) && (c.is_control() || "<>:\"|?*".contains(c))
 }
 
 fn bad_width(field: &str) -> String {
@@ -128,7 +139,7 @@ pub(super) fn default_template(folder: Option<&str>, naming: Naming, extension: 
     };
     let sub = if naming.mirrors { "{sub}/" } else { "" };
     match folder {
-        Some(folder) => format!("{}/{sub}{name}.{extension}", escape(folder.trim_end_matches('/'))),
+        Some(folder) => format!("{}/{sub}{name}.{extension}", escape(folder.trim_end_matches(is_separator))),
         None => format!("{sub}{name}.{extension}"),
     }
 }
@@ -148,11 +159,18 @@ pub(super) fn collision(names: &[PathBuf]) -> Option<(usize, usize)> {
 pub(super) fn identity(name: &Path) -> PathBuf {
     let name = &destination(name);
     if name.exists() {
-        return name.clone();
+        return in_one_case(name.clone());
     }
     let parent = name.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let parent = parent.canonicalize().unwrap_or_else(|_| lexical(parent));
-    parent.join(name.file_name().unwrap_or_default())
+    in_one_case(parent.join(name.file_name().unwrap_or_default()))
+}
+
+/// Whether names in another case are, but for some disks, those of the same files.
+const CASE_IS_IGNORED: bool = cfg!(any(windows, target_os = "macos"));
+
+fn in_one_case(name: PathBuf) -> PathBuf {
+    if CASE_IS_IGNORED { name.to_string_lossy().to_lowercase().into() } else { name }
 }
 
 /// `shot.png` -> `shot.partial.png`, `shot` -> `shot.partial`.
@@ -201,10 +219,13 @@ mod tests {
     #[test]
     fn two_spellings_of_one_file_collide() {
         let names = ["a.png", "b.png", "./nowhere/../a.png"].map(PathBuf::from);
-        assert_eq!(collision(&names), None, "nowhere/.. is no folder, so nobody can say where it leads");
+        // What is no folder leads nowhere, but on Windows.
+        assert_eq!(collision(&names), cfg!(windows).then_some((0, 2)));
         let names = ["a.png", "b.png", "src/../a.png"].map(PathBuf::from);
         assert_eq!(collision(&names), Some((0, 2)));
         assert_eq!(collision(&[PathBuf::from("a.png"), PathBuf::from("b.png")]), None);
+        let names = ["to-come/a.png", "to-come/A.png"].map(PathBuf::from);
+        assert_eq!(collision(&names), CASE_IS_IGNORED.then_some((0, 1)));
     }
 
     #[cfg(unix)]

@@ -9,7 +9,7 @@ use crate::load::Diagnostic;
 use crate::load::paths::lexical;
 use crate::render::Cost;
 use std::fs;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Component, Path, PathBuf, is_separator};
 
 /// Where a picture goes.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -42,7 +42,9 @@ pub(super) fn target(args: &RenderArgs, fields: &Fields, naming: Naming) -> Resu
     let (template, kept): (String, fn(PathBuf) -> Target) = match args.output.as_deref() {
         Some("-") => return Ok((Target::Stdout, format.unwrap_or(FileKind::Png), None)),
         Some("") => return wrong("-o needs a name"),
-        Some(folder) if folder.ends_with('/') || Path::new(folder).is_dir() => (usual(Some(folder)), Target::Default),
+        Some(folder) if folder.ends_with(is_separator) || Path::new(folder).is_dir() => {
+            (usual(Some(folder)), Target::Default)
+        }
         Some(template) => (template.to_owned(), Target::Named),
         None => (usual(None), Target::Default),
     };
@@ -114,7 +116,7 @@ pub(super) fn refuse_collisions(batches: &[Batch]) -> Result<(), Wrong> {
     if to_stdout > 1 {
         let numbered = shots.iter().any(|(_, shot)| shot.step.number.is_some());
         let name = if numbered { "{stem}.{frame:04}.png" } else { "{stem}-{view}.png" };
-        return wrong(format!("{to_stdout} pictures cannot all go to standard output; use -o '{name}'"));
+        return wrong(format!("{to_stdout} pictures cannot all go to standard output; use -o \"{name}\""));
     }
     let names: Vec<PathBuf> = shots.iter().filter_map(|(_, s)| s.target.path().map(Path::to_path_buf)).collect();
     let Some((a, b)) = output_name::collision(&names) else { return Ok(()) };

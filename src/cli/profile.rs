@@ -101,7 +101,8 @@ impl Profile {
 
     fn lines(&self, peak: Option<u64>) -> Vec<String> {
         let total = self.total();
-        let share = |cpu: Duration| 100.0 * cpu.as_secs_f64() / total.cpu.as_secs_f64().max(1e-9);
+        // Where nobody tells what the processors do, nothing is a share of it.
+        let share = |cpu: Duration| if total.cpu.is_zero() { 0.0 } else { 100.0 * cpu.div_duration_f64(total.cpu) };
         let line = |name: &str, wall: Option<Duration>, cpu: Duration, note: &str| {
             let wall = wall.map(milliseconds).unwrap_or_default();
             let line = format!("  {name:<12} {wall:>10} {:>10} {:>4.0} %  {note}", milliseconds(cpu), share(cpu));

@@ -470,7 +470,9 @@ mod tests {
     fn files_outside_the_root_are_refused_with_the_root_that_would_work() {
         let dir = folder();
         let secret = dir.path().join("secret.bin").to_string_lossy().into_owned();
-        for name in ["../secret.bin", "..%2Fsecret.bin", "../no-such-file", secret.as_str()] {
+        // With the letter of a drive it would be a URI of another kind.
+        let absolute = Some(secret.as_str()).filter(|_| !cfg!(windows));
+        for name in ["../secret.bin", "..%2Fsecret.bin", "../no-such-file"].into_iter().chain(absolute) {
             let fault = resolver(dir.path(), &LoadOptions::default()).read_uri(name).unwrap_err();
             let FileFault::Outside { root, within, .. } = fault else { panic!("{name}: {fault}") };
             assert_eq!(within, "the model's folder");

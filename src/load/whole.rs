@@ -6,9 +6,6 @@ use std::io::{self, Read};
 /// Files from this size on are read by all threads.
 const LARGE: u64 = 1 << 22;
 
-/// What one thread reads at a time.
-const PART: usize = 1 << 20;
-
 /// Reads a file of `length` bytes, or of more by now: up to `most` and one more, which tells that there are too many.
 ///
 /// # Errors
@@ -39,6 +36,8 @@ pub(super) fn read_in_turn(file: File, length: u64, most: u64) -> io::Result<Vec
 fn read_in_parts(file: &File, length: u64) -> Option<Vec<u8>> {
     use rayon::prelude::*;
     use std::os::unix::fs::FileExt;
+    /// What one thread reads at a time.
+    const PART: usize = 1 << 20;
 
     let mut bytes = vec![0; usize::try_from(length).ok()?];
     let starts = (0..).step_by(PART);

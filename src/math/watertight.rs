@@ -110,7 +110,7 @@ mod tests {
     #[test]
     fn fused_edge_values_have_wrong_signs_and_let_rays_through() {
         fn fused([a, b, c]: [[f32; 3]; 3]) -> [f32; 3] {
-            let edge = |p: [f32; 3], q: [f32; 3]| p[0].mul_add(q[1], -(p[1] * q[0]));
+            let edge = |p: [f32; 3], q: [f32; 3]| libm::fmaf(p[0], q[1], -(p[1] * q[0]));
             [edge(c, b), edge(a, c), edge(b, a)]
         }
         let escaped = |edges: fn([[f32; 3]; 3]) -> [f32; 3]| {

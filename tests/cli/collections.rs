@@ -39,7 +39,7 @@ fn folders_are_made_only_in_one_that_is_there_and_for_pictures_that_are() {
 #[test]
 fn pictures_of_one_name_and_folders_without_a_model_are_told() {
     let folder = collection().file("none/readme.txt", "");
-    folder.render(&["all", "-o", "{stem}.png"]).ends(2).says(&["all/a.obj", "all/deep/a.obj", "{sub}"]);
+    folder.render(&["all", "-o", "{stem}.png"]).ends(2).says(&["a.obj and all", "{sub}"]);
     folder.render(&["none"]).ends(3).says(&["none", "no model", ".glb"]);
     assert_eq!(folder.names(), ["all", "none"]);
     folder.render(&["none", "all/deep/er"]).ends(3).says(&["no model"]);
@@ -225,9 +225,12 @@ fn what_would_be_found_before_what_was_found_is_noticed() {
     std::fs::write(folder.path("cube.mtl"), "newmtl a\nmap_Kd CUBE.jpg\n").unwrap();
     update().ends(0);
     update().ends(0).says(&["cube.png is up to date"]);
-    std::fs::copy(folder.path("cube.jpg"), folder.path("CUBE.jpg")).unwrap();
-    assert!(!update().ends(0).stderr.contains("up to date"));
-    update().ends(0).says(&["cube.png is up to date"]);
+    // Where that is another file.
+    if !folder.has("CUBE.jpg") {
+        std::fs::copy(folder.path("cube.jpg"), folder.path("CUBE.jpg")).unwrap();
+        assert!(!update().ends(0).stderr.contains("up to date"));
+        update().ends(0).says(&["cube.png is up to date"]);
+    }
     // With --strict it is another wish: there was to be no warning.
     assert!(!folder.render(&["cube.obj", "--update", "--strict"]).stderr.contains("up to date"));
 }

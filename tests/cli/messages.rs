@@ -63,6 +63,8 @@ fn no_bar_and_no_colour_reach_a_pipe() {
     }
 }
 
+// No file of Windows can be called so.
+#[cfg(unix)]
 #[test]
 fn a_file_name_cannot_write_to_the_terminal() {
     let name = "bad\u{1b}[31m\nname.obj";

@@ -93,10 +93,10 @@ impl Command {
 const RENDER_EXAMPLES: &str = "\
 Examples:
   meshray render ship.glb                            writes ship.png
-  meshray render *.obj -o 'thumbs/{stem}.png' --size 256x256
-  meshray render ship.glb --view front --view iso -o '{stem}-{view}.exr' --layers
+  meshray render *.obj -o \"thumbs/{stem}.png\" --size 256x256
+  meshray render ship.glb --view front --view iso -o \"{stem}-{view}.exr\" --layers
   meshray render ship.glb --time 1.5                 a moment of its first animation
-  meshray render ship.glb --turntable 36 -o 'turn/{frame:04}.png'
+  meshray render ship.glb --turntable 36 -o \"turn/{frame:04}.png\"
   meshray render ship.glb --heatmap tests            writes ship.png and ship-tests.png
   curl -s https://example.org/ship.glb | meshray render - -o - > ship.png
   meshray render --again ship.png                    renders that picture again";

@@ -125,7 +125,7 @@ impl<'a> Check<'a> {
         let mut counts = Vec::new();
         for prefix in ["TEXCOORD_", "COLOR_", "JOINTS_", "WEIGHTS_"] {
             let known = attributes.keys().filter(|name| is_semantic(name));
-            let sets: Vec<u16> = known.filter_map(|name| name.strip_prefix(prefix)?.parse().ok()).collect();
+            let sets: Vec<u16> = known.filter_map(|name| name.strip_prefix(prefix)?.parse::<u16>().ok()).collect();
             if sets.iter().max().is_some_and(|&max| usize::from(max) + 1 != sets.len()) {
                 let text = format!("the {prefix} sets are not numbered 0, 1, 2, …");
                 self.report.add(Code::MeshPrimitiveIndexedSemanticContinuity, at, text);

@@ -177,7 +177,10 @@ mod tests {
             let names: Vec<String> = (0..1000).map(|i| format!("{i}.mtl")).collect();
             let found = finder.libraries(&names.join(" "));
             assert!(found.len() == MISSES + 1 && found.iter().all(Result::is_err), "{}", found.len());
-            assert!(finder.libraries("a.mtl")[0].is_ok() && finder.find("A.mtl", &[Path::new("")]).is_err());
+            assert!(finder.libraries("a.mtl")[0].is_ok());
+            if cfg!(target_os = "linux") {
+                assert!(finder.find("A.mtl", &[Path::new("")]).is_err());
+            }
         });
     }
 
@@ -197,6 +200,8 @@ mod tests {
         assert!(many.iter().all(|told| told.len() < 200), "{}", many[0].len());
     }
 
+    // Where names in another case are other files.
+    #[cfg(target_os = "linux")]
     #[test]
     fn files_are_found_by_their_last_name_and_in_another_case() {
         let read = |name: &str| {

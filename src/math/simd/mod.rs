@@ -257,9 +257,11 @@ pub trait Kernel {
 /// Without it a frame begins at any multiple of sixteen bytes, and where a compiler has no registers left it keeps vectors in
 /// places that may lie across two lines. Where two pages meet in one of them, rays one by one are 20 to 40 % slower, and where
 /// the stack begins differs from one start of a program to the next.
+#[cfg(target_arch = "x86_64")]
 #[repr(align(64))]
 struct LineOnStack(#[expect(dead_code, reason = "it is there to be somewhere")] u8);
 
+#[cfg(target_arch = "x86_64")]
 impl LineOnStack {
     /// Makes the caller's frame begin there. What is constant, or not looked at, would not be on the stack.
     #[inline(always)]
@@ -313,15 +315,14 @@ impl Level {
 
     /// All that this machine has, the fastest last.
     pub fn all() -> Vec<Self> {
-        let mut all = vec![Self::PORTABLE];
+        let all = [Self::PORTABLE].into_iter();
         #[cfg(target_arch = "x86_64")]
-        {
-            all.extend(avx2::Avx2::detect().map(|token| Self(Set::Avx2(token))));
-            all.extend(avx512::Avx512::detect().map(|token| Self(Set::Avx512(token))));
-        }
+        let all = all
+            .chain(avx2::Avx2::detect().map(|token| Self(Set::Avx2(token))))
+            .chain(avx512::Avx512::detect().map(|token| Self(Set::Avx512(token))));
         #[cfg(target_arch = "aarch64")]
-        all.push(Self(Set::Neon));
-        all
+        let all = all.chain([Self(Set::Neon)]);
+        all.collect()
     }
 
     /// The fastest that this machine has, unless another was chosen ([`Self::choose`]).
@@ -395,6 +396,10 @@ impl Level {
     ///
     /// Where there are no such vectors.
     #[inline]
+    #[cfg_attr(
+        not(any(target_arch = "x86_64", target_arch = "aarch64")),
+        expect(unused_variables, reason = "no other machine has such vectors")
+    )]
     pub(crate) fn run_vectors<K: Kernel>(self, kernel: K) -> K::Output {
         match self.0 {
             #[cfg(target_arch = "x86_64")]
