@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 pub struct Spent {
     /// By the clock on the wall.
     pub wall: Duration,
-    /// By the processors, all threads together; zero where the system does not say (anything but Unix).
+    /// By the processors, all threads together; zero where the system does not say (anything but Unix and Windows).
     pub cpu: Duration,
 }
 
@@ -103,7 +103,7 @@ fn processor(whose: Whose) -> Duration {
     time.map(Duration::from).unwrap_or_default()
 }
 
-/// Of a thread the time on the wall: what Windows counts of one are whole ticks of a sixty-fourth of a second.
+/// Of a thread the time on the wall: what Windows counts of one are whole ticks, about sixty-four a second.
 #[cfg(not(unix))]
 fn processor(whose: Whose) -> Duration {
     static FIRST: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
@@ -135,6 +135,7 @@ mod tests {
         }
     }
 
+    #[cfg(unix)]
     #[test]
     fn a_sleeping_thread_spends_time_on_the_wall_and_none_of_the_processor() {
         let watch = Stopwatch::of_this_thread();

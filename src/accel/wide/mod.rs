@@ -27,7 +27,8 @@ mod entrance;
 mod flight;
 mod hull;
 mod listed;
-#[cfg(test)]
+// Its kernels are not compiled without vectors.
+#[cfg(all(test, any(target_arch = "x86_64", target_arch = "aarch64")))]
 mod margins;
 mod node;
 mod packet;
