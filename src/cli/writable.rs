@@ -2,7 +2,7 @@
 
 use super::output_name::identity;
 use super::outputs::Target;
-use crate::image::{destination, was_written_by_meshray};
+use crate::image::{destination, folder_takes, was_written_by_meshray};
 use crate::load::Diagnostic;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -61,6 +61,9 @@ pub(super) fn check(path: &Path, flag: &str, sources: &Sources) -> Result<(), Di
     let folder = goal.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if !folder.is_dir() {
         return fault(NO_FOLDER, "its folder is not there", &format!("create it, or name another with {flag}"));
+    }
+    if !folder_takes(path) {
+        return fault("output-read-only", "its folder takes no files", &format!("name another with {flag}"));
     }
     if path.is_dir() {
         return fault("output-is-folder", "is a folder", &format!("name a file in it with {flag}"));

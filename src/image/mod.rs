@@ -31,7 +31,7 @@ pub use metadata::{Metadata, read_metadata, was_written_by_meshray};
 pub use output::{ExrSamples, Output, PngDepth};
 pub use read::{decode, read_picture};
 pub use tone::ToneMap;
-pub use write::{destination, write_atomic};
+pub use write::{destination, folder_takes, write_atomic};
 
 /// A rendered picture: linear Rec. 709, rows from the top.
 #[derive(Clone, Debug, Default, PartialEq)]

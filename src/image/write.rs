@@ -35,6 +35,25 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write_and_rename(&target, &folder, old, bytes)
 }
 
+/// Whether [`write_atomic`] may make its file in the folder of `path`, as far as the system says before it does. Where what is
+/// there already is written straight, it is not made.
+pub fn folder_takes(path: &Path) -> bool {
+    let target = destination(path);
+    let is_written_straight = descriptor(path).is_some() || fs::metadata(&target).is_ok_and(|old| !old.is_file());
+    is_written_straight || takes_files(&folder_of(&target))
+}
+
+#[cfg(unix)]
+fn takes_files(folder: &Path) -> bool {
+    use nix::unistd::{AccessFlags, access};
+    access(folder, AccessFlags::W_OK | AccessFlags::X_OK).is_ok()
+}
+
+#[cfg(not(unix))]
+fn takes_files(_: &Path) -> bool {
+    true
+}
+
 fn write_and_rename(target: &Path, folder: &Path, old: Option<Permissions>, bytes: &[u8]) -> io::Result<()> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".meshray-");
@@ -44,8 +63,11 @@ fn write_and_rename(target: &Path, folder: &Path, old: Option<Permissions>, byte
         // What creating a file asks for; the umask takes its part. Temporary files are private otherwise.
         builder.permissions(Permissions::from_mode(0o666));
     }
-    let mut file = builder.tempfile_in(folder)?;
-    file.write_all(bytes)?;
+    // Its own message would name the temporary file.
+    let unmade =
+        |e: io::Error| fault(e.kind(), &format!("no file can be made in folder {}: {}", folder.display(), e.kind()));
+    let mut file = builder.tempfile_in(folder).map_err(unmade)?;
+    file.as_file_mut().write_all(bytes)?;
     if let Some(permissions) = old {
         file.as_file().set_permissions(permissions)?;
     }
@@ -184,6 +206,19 @@ mod tests {
             fs::set_permissions(&path, Permissions::from_mode(0o444)).unwrap();
             assert!(write_atomic(&path, b"new").unwrap_err().to_string().contains("read-only"));
             assert_eq!(fs::read(&path).unwrap(), b"old");
+        }
+
+        #[test]
+        fn a_folder_that_takes_no_files_is_known_before() {
+            let dir = tempfile::tempdir().unwrap();
+            let picture = dir.path().join("a.png");
+            assert!(folder_takes(&picture) && folder_takes(Path::new("/dev/null")));
+            fs::set_permissions(dir.path(), Permissions::from_mode(0o555)).unwrap();
+            // Some users may all the same.
+            let takes = write_atomic(&picture, b"x").map_err(|e| e.to_string());
+            assert_eq!(folder_takes(&picture), takes.is_ok());
+            assert!(takes.is_ok() || takes.is_err_and(|text| text.ends_with("permission denied")));
+            fs::set_permissions(dir.path(), Permissions::from_mode(0o755)).unwrap();
         }
 
         #[test]
