@@ -81,18 +81,23 @@ pub type Exact3 = [Expansion<2>; 3];
 
 /// p − q, exactly.
 pub fn difference(p: [f32; 3], q: [f32; 3]) -> Exact3 {
-    [0, 1, 2].map(|k| Expansion::difference(p[k], q[k]))
+    // Filled in place: to map an array of such numbers copies each more than once.
+    let mut difference = [Expansion::ZERO; 3];
+    for (k, e) in difference.iter_mut().enumerate() {
+        *e = Expansion::difference(p[k], q[k]);
+    }
+    difference
 }
 
 /// p × q, exactly.
 pub fn cross(p: &Exact3, q: &Exact3) -> [Expansion<16>; 3] {
-    [0, 1, 2].map(|k| {
+    let mut cross = [Expansion::ZERO; 3];
+    for (k, e) in cross.iter_mut().enumerate() {
         let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-        let mut e = Expansion::ZERO;
         e.add_product(p[i].terms(), q[j].terms(), 1.0);
         e.add_product(p[j].terms(), q[i].terms(), -1.0);
-        e
-    })
+    }
+    cross
 }
 
 /// n · d, exactly.

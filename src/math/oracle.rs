@@ -8,6 +8,7 @@ use proptest::test_runner::RngSeed;
 
 use super::bounds::ROUND_ROOM;
 use super::polygon::{self, Polygon};
+use super::random::Random;
 use super::rational::{self, cross, dot, exact, minus, point, sign};
 use super::shear::RaySpace;
 use super::triangle::{self, Triangle};
@@ -253,6 +254,29 @@ proptest! {
         let height = &a[ray.y] * &d[ray.z] - &a[ray.z] * &d[ray.y];
         prop_assert_eq!(ray.height_sign(p), sign(&height) * forwards);
     }
+}
+
+/// Points of a grid so small that corners often coincide, with each other and with where the ray starts.
+#[test]
+fn triangles_without_area_and_rays_from_corners_are_decided_as_rational_numbers_are() {
+    let mut random = Random::new(77);
+    let mut at = || Vec3::from([(); 3].map(|()| random.below(3) as f32 - 1.0)) * 0.3;
+    let (mut without_area, mut from_corners) = (0, 0);
+    for _ in 0..20_000 {
+        let (o, d, t) = (at(), at(), [at(), at(), at()]);
+        let Some(ray) = RaySpace::new(o, d) else { continue };
+        let (got, expected) = (triangle::intersect(&ray, &t), hit(o, d, &t));
+        assert_eq!(got.is_some(), expected.is_some(), "{o} along {d} at {t:?}");
+        without_area += usize::from(t[0] == t[1] || t[1] == t[2] || t[2] == t[0]);
+        if let (Some(got), Some(expected)) = (got, expected) {
+            assert!(is_nearest(got, &expected), "{got} for {}", expected.to_f64().value());
+            // Nothing is a negative distance away that is not behind.
+            assert!(!expected.is_zero() || got.to_bits() == 0, "{got}");
+            from_corners += usize::from(t.contains(&o));
+        }
+        assert_eq!(ray.edge_sign(t[0], t[1]), -ray.edge_sign(t[1], t[0]));
+    }
+    assert!(without_area > 1000 && from_corners > 300, "{without_area} {from_corners}");
 }
 
 #[test]

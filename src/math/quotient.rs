@@ -67,6 +67,9 @@ fn rounded_within<const N: usize, const M: usize>(
     denominator: &Expansion<96>,
     doubt: f64,
 ) -> f32 {
+    if numerator.sign() == 0 {
+        return 0.0;
+    }
     let t = approximate(numerator, denominator);
     let (lo, hi) = (round(t - t.abs() * doubt), round(t + t.abs() * doubt));
     if lo.to_bits() == hi.to_bits() {

@@ -95,6 +95,10 @@ impl RaySpace {
     /// x'ₚ y'_q − y'ₚ x'_q = d · (p × q) / d_z with p, q relative to the origin.
     #[cold]
     fn edge_sign_exact(&self, p: Vec3, q: Vec3) -> i32 {
+        // Where rounding made an edge a point, or the ray starts at its end, as at a corner where many meet.
+        if p == q || p == self.origin || q == self.origin {
+            return 0;
+        }
         let o = self.origin.to_array();
         let normal = cross(&difference(p.to_array(), o), &difference(q.to_array(), o));
         dot_f32(&normal, self.dir.to_array()).sign() * self.direction_sign()

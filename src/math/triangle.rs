@@ -69,6 +69,10 @@ fn is_hit_along<const Z: usize>(ray: &RaySpace, triangle: &Triangle) -> bool {
 #[cold]
 #[inline(never)]
 pub fn is_hit_near_edge(ray: &RaySpace, &[a, b, c]: &Triangle) -> bool {
+    // The signs of two edges that are one, there and back, never agree.
+    if a == b || b == c || c == a {
+        return false;
+    }
     let first = ray.edge_sign(b, c);
     let second = ray.edge_sign(c, a);
     if first * second < 0 {
@@ -119,6 +123,10 @@ pub fn distance_along(origin: Vec3, dir: Vec3, triangle: &Triangle) -> f32 {
 #[cold]
 #[inline(never)]
 fn exact_distance(ray: &RaySpace, triangle: &Triangle) -> f32 {
+    // It starts there.
+    if triangle.contains(&ray.origin) {
+        return 0.0;
+    }
     let (numerator, denominator) = exact_plane_terms(ray, triangle);
     rounded::<192, 384>(&numerator, &denominator)
 }
