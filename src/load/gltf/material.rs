@@ -48,12 +48,14 @@ pub(super) fn needs(material: &Material) -> Needs {
     let m = material.metal_rough();
     let of_coat = m.and_then(|m| m.coat.as_ref()?.normal_map.as_ref());
     let grain = m.and_then(|m| m.grain.as_ref());
+    // It follows coordinates as they are: the transform of a map moves what that says.
+    let along = |map: &TextureRef| match grain {
+        Some(_) => TexCoords { set: map.uv_set, ..TexCoords::default() },
+        None => map.coordinates(),
+    };
     // One without a map runs along the tangents of the first set.
-    let of_grain = grain.map(|grain| grain.map.as_ref().map_or(TexCoords::default(), TextureRef::coordinates));
-    let tangents = material.normal_map.as_ref().or(of_coat).map(TextureRef::coordinates).or(of_grain);
-    // It follows coordinates as they are: a transform of its map moves what the map says, not what that is about.
-    let tangents = tangents
-        .map(|along| if grain.is_some() { TexCoords { set: along.set, ..TexCoords::default() } } else { along });
+    let of_grain = grain.map(|grain| grain.map.as_ref().map(along).unwrap_or_default());
+    let tangents = material.normal_map.as_ref().or(of_coat).map(along).or(of_grain);
     let mut uv_sets: Vec<u32> =
         material.textures().map(|map| map.uv_set).chain(tangents.map(|along| along.set)).collect();
     uv_sets.sort_unstable();
