@@ -26,6 +26,8 @@ pub(in crate::load) struct Kind<'a> {
     pub place: fn(u32) -> String,
     /// The up axis where nothing speaks for one, and why.
     pub otherwise: (UpAxis, &'a str),
+    /// Makes the materials that runs name, of the files that the geometry does.
+    pub materials: mtl::Make,
 }
 
 /// Makes the scene; `warnings` go on from those of reading.
@@ -62,7 +64,7 @@ pub(in crate::load) fn finish(
     let name = |run: &u32| geometry.runs[*run as usize].material.map(|id| geometry.names[id as usize].as_str());
     let names: Vec<Option<&str>> = runs.iter().chain(&wire_runs).map(name).collect();
     let mut reading = mtl::Reading { file, options, colored, resolver: &mut resolver, budget, warnings: &mut warnings };
-    let mut materials = mtl::load(&geometry.libraries, &names, &mut reading);
+    let mut materials = (kind.materials)(&geometry.sources, &names, &mut reading);
     if is_see_through {
         materials.materials.iter_mut().for_each(|material| material.alpha_mode = AlphaMode::Blend);
     }

@@ -2,8 +2,8 @@
 //!
 //! The text of an OBJ leaves it ([`obj`](super::obj)), files of other formats hold nothing else ([`bare`]). It is centred in
 //! `f64` and rounded ([`place`](super::place)), and becomes one mesh and one instance for each run (`assemble`), points and
-//! lines (`strokes`) get a width ([`wires`](super::wires)), materials come from the MTL files that it names
-//! ([`mtl`](super::mtl)); `finish` is the whole way.
+//! lines (`strokes`) get a width ([`wires`](super::wires)), materials come from the MTL files or pictures that it names
+//! ([`mtl`](super::mtl), `bare::pictures`); `finish` is the whole way.
 
 mod assemble;
 pub(super) mod bare;
@@ -33,8 +33,8 @@ pub(super) struct Geometry {
     pub runs: Vec<Run>,
     /// Names; 0 is the empty one.
     pub names: Vec<String>,
-    /// MTL files, with the lines that name them.
-    pub libraries: Vec<(u32, String)>,
+    /// What runs have their materials from: MTL files, or pictures, which these name; with the lines that name them.
+    pub sources: Vec<(u32, String)>,
     /// Decimal places of the finest coordinate.
     pub places: i32,
     /// What the file says of itself: the first comments, without their signs.

@@ -8,7 +8,7 @@ use crate::load::paths::{FileFault, Found, Resolver, shown};
 use std::path::{Path, PathBuf};
 
 /// Reads files by careless names.
-pub(super) struct Finder<'a> {
+pub(in crate::load) struct Finder<'a> {
     pub resolver: &'a mut Resolver,
     /// Names that were not found anywhere.
     pub missed: usize,
@@ -20,7 +20,7 @@ const MISSES: usize = 256;
 
 /// Where a file is.
 #[derive(Debug)]
-pub(super) struct Place {
+pub(in crate::load) struct Place {
     /// Path relative to the model's folder, or absolute.
     pub path: PathBuf,
     /// The same for all names of one file.
@@ -31,14 +31,14 @@ pub(super) struct Place {
 
 impl Finder<'_> {
     /// Finds and reads `name`.
-    pub(super) fn read(&mut self, name: &str, folders: &[&Path]) -> Result<Found, FileFault> {
+    pub(in crate::load) fn read(&mut self, name: &str, folders: &[&Path]) -> Result<Found, FileFault> {
         let Place { path, guessed, .. } = self.find(name, folders)?;
         Ok(Found { bytes: self.resolver.read_file(&path)?, path, guessed })
     }
 
     /// Finds `name`, looking in `folders` (relative to the model's), first as written, then in any case, then by the last
     /// part of its name alone, as written and in any case. The fault is that of the name as written.
-    pub(super) fn find(&mut self, name: &str, folders: &[&Path]) -> Result<Place, FileFault> {
+    pub(in crate::load) fn find(&mut self, name: &str, folders: &[&Path]) -> Result<Place, FileFault> {
         let slashed = name.replace('\\', "/");
         let mut fault = None;
         for folder in folders {
@@ -78,7 +78,7 @@ impl Finder<'_> {
     }
 
     /// Reads the libraries of one `mtllib` statement: one name with spaces, or several names.
-    pub(super) fn libraries(&mut self, names: &str) -> Vec<Result<Found, FileFault>> {
+    pub(in crate::load) fn libraries(&mut self, names: &str) -> Vec<Result<Found, FileFault>> {
         let here = [Path::new("")];
         let unescaped = names.replace("\\ ", " ");
         if let Ok(found) = self.as_written(unquote(&unescaped)) {
@@ -141,7 +141,7 @@ fn words(names: &str) -> Vec<String> {
 }
 
 /// A name without the quotes around it.
-pub(super) fn unquote(name: &str) -> &str {
+pub(in crate::load) fn unquote(name: &str) -> &str {
     name.strip_prefix('"').and_then(|n| n.strip_suffix('"')).unwrap_or(name)
 }
 

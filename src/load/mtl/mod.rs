@@ -16,7 +16,7 @@ use crate::load::{Diagnostic, LoadOptions, MtlMode, Warnings};
 use crate::math::Vec3;
 use crate::scene::{Bitmap, Material, Texture};
 use crate::stopwatch::Spent;
-use library::Finder;
+pub(super) use library::{Finder, unquote};
 use meaning::Meaning;
 use parse::{Mtl, Slot};
 use std::collections::{HashMap, HashSet};
@@ -46,6 +46,9 @@ pub(super) struct Reading<'a> {
     pub budget: &'a mut Budget,
     pub warnings: &'a mut Warnings,
 }
+
+/// Reads the files that a model names, in these lines, and makes a material for each name; `None` is what has none.
+pub(super) type Make = fn(&[(u32, String)], &[Option<&str>], &mut Reading) -> Materials;
 
 /// A library that was read.
 struct Read {
@@ -229,7 +232,8 @@ fn warn_of_redefined(read: &[Read], used: &[(usize, usize)], warnings: &mut Warn
     }
 }
 
-fn plain_material(name: &str, colored: bool) -> Material {
+/// The material of what names none that is known, or has vertices with colours of their own.
+pub(super) fn plain_material(name: &str, colored: bool) -> Material {
     let mut plain = Material::plain();
     if colored {
         plain.base_color = Vec3::ONE;

@@ -101,7 +101,7 @@ impl Before {
 fn gather(out: &mut Statements, chunk: &mut Chunk, lines: u32) {
     let geometry = &mut out.geometry;
     let library = |(line, name): (u32, String)| (line.saturating_add(lines), name);
-    geometry.libraries.extend(std::mem::take(&mut chunk.libraries).into_iter().map(library));
+    geometry.sources.extend(std::mem::take(&mut chunk.libraries).into_iter().map(library));
     let room = COMMENTS - geometry.comments.len();
     geometry.comments.extend(std::mem::take(&mut chunk.comments).into_iter().take(room));
     geometry.places = geometry.places.max(chunk.places);

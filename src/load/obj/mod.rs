@@ -16,6 +16,7 @@ mod statements;
 use super::geometry::finish::{Kind, finish};
 use super::geometry::{color, up};
 use super::limits::Budget;
+use super::mtl;
 use super::text::encoding::to_ascii_superset;
 use super::{LoadError, LoadOptions, Loaded, Source, Warnings};
 
@@ -37,6 +38,7 @@ pub fn load(source: &Source, options: &LoadOptions, budget: &mut Budget) -> Resu
         no_faces: "obj-no-faces",
         place: |line| line.to_string(),
         otherwise: up::UNSAID,
+        materials: mtl::load,
     };
     finish(statements.geometry, &kind, (source, options), warnings, budget)
 }

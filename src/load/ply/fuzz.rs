@@ -1,12 +1,13 @@
 //! Files that nobody wrote: whatever comes in, the loader ends with a scene that holds together or with an error.
 
+use super::tests::painted::roof;
 use super::tests::{FORMATS, of, square};
 use crate::load::geometry::sound::assert_sound;
 use crate::load::{LoadOptions, Polygons};
 use proptest::prelude::*;
 
 /// Words that headers are made of, and what breaks them.
-const WORDS: [&str; 26] = [
+const WORDS: [&str; 30] = [
     "comment",
     "element",
     "property",
@@ -25,6 +26,10 @@ const WORDS: [&str; 26] = [
     "int",
     "float",
     "double",
+    "TextureFile",
+    "texcoord",
+    "texnumber",
+    "edge",
     "0",
     "1",
     "3",
@@ -47,11 +52,12 @@ proptest! {
     #[test]
     fn a_file_with_wrong_bytes_ends_in_a_sound_scene_or_an_error(
         format in prop::sample::select(&FORMATS[..]),
+        is_painted in any::<bool>(),
         wrong in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
         cut in any::<prop::sample::Index>(),
         is_cut in any::<bool>(),
     ) {
-        let mut bytes = square(format);
+        let mut bytes = if is_painted { roof(format) } else { square(format) };
         for (at, byte) in wrong {
             let at = at.index(bytes.len());
             bytes[at] = byte;

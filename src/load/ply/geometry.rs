@@ -2,7 +2,12 @@
 
 use super::body::{Body, Missing};
 use super::header::{Element, Encoding, Header, Kind, Property};
-use crate::load::geometry::bare::Bare;
+use super::meaning::{
+    COLOR, Meanings, NORMAL, PLACE, RED, UV, Use, Wanted, ends, light, list_of, uses_in_edges, uses_in_faces,
+};
+use super::told::passed_over;
+use crate::load::geometry::NONE;
+use crate::load::geometry::bare::{Bare, Said};
 use crate::load::limits::Budget;
 use crate::load::paths::shorten;
 use crate::load::{Diagnostic, Source};
@@ -16,18 +21,20 @@ use std::path::Path;
 pub(super) fn read(header: &Header, source: &Source, budget: &mut Budget) -> Result<Bare, Diagnostic> {
     let body = Body::new(header, source);
     let vertices = header.element("vertex").map_or(0, |element| element.count);
-    let mut reader = Reader { source, body, vertices, budget, bare: Bare::default(), torn: None };
+    let (wanted, bare) = (Wanted::of(header), Bare::showing(header.pictures.clone()));
+    let mut reader = Reader { source, body, vertices, wanted, budget, bare, torn: None, odd: Odd::default() };
     for element in &header.elements {
         if let Err(fault) = reader.element(element) {
             // What makes no sense may come of a line far before it.
             return Err(reader.torn.take().unwrap_or(fault));
         }
     }
-    let Reader { body, mut bare, torn, .. } = reader;
+    let Reader { body, mut bare, torn, odd, .. } = reader;
     let behind = body.behind();
     bare.places = (header.encoding == Encoding::Text).then_some(body.places);
     bare.comments.clone_from(&header.comments);
     bare.told = passed_over(header, &source.path);
+    bare.told.extend(odd.told(&source.path));
     // Rows may share lines; where they do by mistake, numbers are left in the end.
     bare.told.extend(torn.filter(|_| behind.is_some()));
     bare.told.extend(behind);
@@ -35,139 +42,57 @@ pub(super) fn read(header: &Header, source: &Source, budget: &mut Budget) -> Res
     Ok(bare)
 }
 
-/// Warnings of what would change the look, and is not read.
-fn passed_over(header: &Header, file: &Path) -> Vec<Diagnostic> {
-    let faces = || header.elements.iter().filter(|element| element.name == "face" && element.count > 0);
-    let has = |list: bool, names: &[&str]| {
-        let mut properties = faces().flat_map(|element| &element.properties);
-        properties.any(|property| property.length.is_some() == list && names.contains(&property.name.as_str()))
-    };
-    let warning = |code, text: String, remedy: &str| Diagnostic::new(code, file, "", text).remedy(remedy);
-    let mut told = Vec::new();
-    if SLOTS[RED..RED + 3].iter().any(|names| has(false, names)) {
-        told.push(warning("ply-face-colors", "colours of faces are not drawn".into(), "give the vertices colours"));
-    }
-    if has(true, &["texcoord"]) {
-        let text = "texture coordinates of faces (texcoord) are not read".into();
-        told.push(warning("ply-face-texcoords", text, "export it as OBJ or glTF"));
-    }
-    let colored = |element: &&Element| element.properties.iter().any(|p| SLOTS[RED].contains(&p.name.as_str()));
-    if header.elements.iter().filter(|e| e.name == "edge" && e.count > 0).any(|e| colored(&e)) {
-        told.push(warning("ply-edge-colors", "colours of edges are not drawn".into(), "give the vertices colours"));
-    }
-    if header.elements.iter().any(|element| element.name == "vertex" && are_splats(element)) {
-        let text = "Gaussian splats are drawn as points of their colours, opaque and of one size".into();
-        told.push(warning("ply-splats", text, "--line-width sets the size"));
-    }
-    let is_read = |element: &Element| match element.name.as_str() {
-        "face" | "tristrips" => list_of(element).is_some(),
-        name => name == "vertex",
-    };
-    for element in header.elements.iter().filter(|element| element.count > 0 && !is_read(element)) {
-        // Numbers of vertices, under other names.
-        let mut lists = element.properties.iter().filter(|property| property.length.is_some());
-        let Some(list) = lists.find(|list| list.kind.is_whole()) else { continue };
-        let (name, list) = (shorten(&element.name), shorten(&list.name));
-        let text = format!("element `{name}` ({}) with a list `{list}` is not read", element.count);
-        let remedy = "faces are those of an element `face` with a list `vertex_indices`";
-        told.push(warning("ply-unread-element", text, remedy));
-    }
-    let vertices = header.elements.iter().find(|element| element.name == "vertex" && element.count > 0);
-    for [first, again] in vertices.map(|element| Meanings::of(element).twice).unwrap_or_default() {
-        let text = match first == again {
-            true => format!("'{again}' of a vertex is there twice, and the second is not read"),
-            false => format!("'{again}' of a vertex says what '{first}' has said, and is not read"),
-        };
-        told.push(warning("ply-property-twice", text, "keep one of them"));
-    }
-    let pictures = header.comments.iter().filter_map(|comment| comment.strip_prefix("TextureFile"));
-    for name in pictures.map(str::trim).filter(|name| !name.is_empty()) {
-        let text = format!("picture '{}' (comment TextureFile) is not drawn", shorten(name));
-        told.push(warning("ply-picture", text, "export it as OBJ or glTF"));
-    }
-    told
-}
-
-/// Numbers of a vertex that have a meaning here.
-const SLOTS: [&[&str]; 12] = [
-    &["x"],
-    &["y"],
-    &["z"],
-    &["nx", "normal_x"],
-    &["ny", "normal_y"],
-    &["nz", "normal_z"],
-    &["u", "s", "texture_u", "texture_s"],
-    &["v", "t", "texture_v", "texture_t"],
-    &["red", "r", "diffuse_red", SPLAT[0]],
-    &["green", "g", "diffuse_green", SPLAT[1]],
-    &["blue", "b", "diffuse_blue", SPLAT[2]],
-    &["alpha", "a", "opacity", "diffuse_alpha"],
-];
-
-/// Where what belongs together stands in [`SLOTS`].
-const PLACE: [usize; 3] = [0, 1, 2];
-const NORMAL: [usize; 3] = [3, 4, 5];
-const UV: [usize; 2] = [6, 7];
-const COLOR: [usize; 3] = [RED, RED + 1, RED + 2];
-const RED: usize = 8;
-const ALPHA: usize = 11;
-
-/// Colours of Gaussian splats, as the constant part of spherical harmonics (B. Kerbl and others, "3D Gaussian Splatting for
-/// Real-Time Radiance Field Rendering", 2023).
-const SPLAT: [&str; 3] = ["f_dc_0", "f_dc_1", "f_dc_2"];
-
-/// Whether vertices are Gaussian splats. Their normals are 0, and their opacities are of a haze.
-fn are_splats(vertex: &Element) -> bool {
-    SPLAT.iter().all(|name| vertex.properties.iter().any(|property| property.name == *name))
-}
-
-/// What properties of a vertex mean.
-struct Meanings<'a> {
-    /// Of each property the place in [`SLOTS`]; of several with one meaning the first has it.
-    slots: Vec<Option<usize>>,
-    /// For each meaning that several have, the names of the first two.
-    twice: Vec<[&'a str; 2]>,
-}
-
-impl<'a> Meanings<'a> {
-    fn of(vertex: &'a Element) -> Self {
-        let (splats, hazy) = (are_splats(vertex), [NORMAL[0], NORMAL[1], NORMAL[2], ALPHA]);
-        let mut said: [Vec<&str>; SLOTS.len()] = Default::default();
-        let slot = |property: &'a Property| {
-            let name = property.name.as_str();
-            let found = SLOTS.iter().position(|names| names.contains(&name));
-            let slot = found.filter(|slot| property.length.is_none() && !(splats && hazy.contains(slot)))?;
-            if said[slot].len() < 2 {
-                said[slot].push(name);
-            }
-            (said[slot].len() == 1).then_some(slot)
-        };
-        let slots = vertex.properties.iter().map(slot).collect();
-        let twice = said.iter().filter_map(|names| names.as_slice().try_into().ok());
-        Self { slots, twice: twice.collect() }
-    }
-}
-
-/// A part of a colour, 0…1, as a property says it.
-fn light(property: &Property, value: f64) -> f64 {
-    /// 1 / (2 √π), the spherical harmonic that is the same all around.
-    const EVEN: f64 = 0.282_094_791_773_878_14;
-    if SPLAT.contains(&property.name.as_str()) {
-        (0.5 + EVEN * value).clamp(0.0, 1.0)
-    } else {
-        value / unit(property.kind)
-    }
-}
-
 struct Reader<'a, 'b> {
     source: &'a Source,
     body: Body<'a>,
     /// How many vertices the header claims; faces may come before them.
     vertices: u64,
+    wanted: Wanted,
     budget: &'b mut Budget,
     bare: Bare,
     /// A line that has not the numbers of one row.
     torn: Option<Diagnostic>,
+    odd: Odd,
+}
+
+/// Faces whose place in a picture is not understood: how many, and the number of the first.
+#[derive(Default)]
+struct Odd {
+    /// They have not two coordinates for each corner.
+    uneven: (u32, u64),
+    /// They name a picture that is not there.
+    no_picture: (u32, u64),
+}
+
+impl Odd {
+    fn count((count, first): &mut (u32, u64), face: u64) {
+        if *count == 0 {
+            *first = face;
+        }
+        *count = count.saturating_add(1);
+    }
+
+    fn told(&self, file: &Path) -> impl Iterator<Item = Diagnostic> {
+        let of = |(count, first): (u32, u64), code, text: &str| {
+            let warning = Diagnostic::new(code, file, format!("face {first}"), text).remedy("it is drawn plain");
+            (count > 0).then_some(Diagnostic { count, ..warning })
+        };
+        let uneven = "a face has not two texture coordinates for each corner";
+        let no_picture = "a face names a picture (texnumber) of which there is no comment TextureFile";
+        [of(self.uneven, "ply-uneven-texcoords", uneven), of(self.no_picture, "ply-no-such-picture", no_picture)]
+            .into_iter()
+            .flatten()
+    }
+}
+
+/// A face as it is read, one after another in the same memory.
+#[derive(Default)]
+struct Row {
+    corners: Vec<u32>,
+    /// u and v of each corner.
+    uvs: Vec<f64>,
+    color: Option<[f32; 4]>,
+    picture: Option<f64>,
 }
 
 /// The rows of an element of a text, which programs write a line each, although blanks of any kind part numbers.
@@ -177,15 +102,6 @@ struct Rows {
     start: u32,
     /// Whether two rows have shared a line from the beginning on: then lines mean nothing.
     is_free: bool,
-}
-
-/// Which property lists the corners of faces.
-fn list_of(element: &Element) -> Option<usize> {
-    let lists = |property: &Property| {
-        property.length.is_some()
-            && matches!(property.name.as_str(), "vertex_indices" | "vertex_index" | "vertex_idx" | "vertex_ids")
-    };
-    element.properties.iter().position(lists)
 }
 
 impl Reader<'_, '_> {
@@ -269,48 +185,116 @@ impl Reader<'_, '_> {
 
     /// Lines.
     fn edges(&mut self, element: &Element) -> Result<(), Diagnostic> {
-        let Some(slots) = ends(element) else { return self.pass(element) };
-        let mut rows = Rows::default();
+        let Some(ends) = ends(element) else { return self.pass(element) };
+        let (uses, mut rows) = (uses_in_edges(element, ends, self.wanted), Rows::default());
         for i in 0..element.count {
             self.row(&mut rows, element, i);
-            let mut edge = [0; 2];
-            for (k, property) in element.properties.iter().enumerate() {
-                match slots.iter().position(|&slot| slot == k) {
-                    Some(end) => {
+            let (mut edge, mut color) = ([0; 2], None);
+            for (property, used) in element.properties.iter().zip(&uses) {
+                match *used {
+                    Use::End(end) => {
                         let value = self.value(element, i, property)?;
                         edge[end] = self.index(value, end as u64, element, i)?;
                     }
-                    None => self.pass_property(element, i, property)?,
+                    Use::Light(part) => self.light(element, i, property, (part, &mut color))?,
+                    _ => self.pass_property(element, i, property)?,
                 }
             }
             // An edge takes what a face of two corners would.
             Bare::charge_face(self.budget, 2).map_err(|over| Diagnostic::over_budget(&self.source.path, over))?;
-            self.bare.edges.push(edge);
+            if color.is_some() {
+                self.take(1, Bare::COLOR)?;
+            }
+            self.bare.edge(edge, color);
         }
         Ok(())
     }
 
     /// Polygons, or strips of triangles.
     fn faces(&mut self, element: &Element, list: usize, strips: bool) -> Result<(), Diagnostic> {
-        let (mut corners, mut rows) = (Vec::new(), Rows::default());
+        let uses = uses_in_faces(element, list, self.wanted);
+        let (mut row, mut rows) = (Row::default(), Rows::default());
         for i in 0..element.count {
             self.row(&mut rows, element, i);
-            for (k, property) in element.properties.iter().enumerate() {
-                if k == list {
-                    self.corners(element, i, property, strips, &mut corners)?;
-                } else {
-                    self.pass_property(element, i, property)?;
+            (row.color, row.picture) = (None, None);
+            for (property, used) in element.properties.iter().zip(&uses) {
+                match *used {
+                    Use::Corners => self.corners(element, i, property, strips, &mut row.corners)?,
+                    Use::Uvs => self.uvs(element, i, property, &mut row.uvs)?,
+                    Use::Picture => row.picture = Some(self.value(element, i, property)?),
+                    Use::Light(part) => self.light(element, i, property, (part, &mut row.color))?,
+                    Use::End(_) | Use::Nothing => self.pass_property(element, i, property)?,
                 }
             }
             if strips {
-                for strip in corners.split(|&corner| corner == RESTART) {
-                    self.strip(strip)?;
+                for strip in row.corners.split(|&corner| corner == RESTART) {
+                    self.strip(strip, row.color)?;
                 }
             } else {
-                self.face(&corners)?;
+                self.polygon(i, &row)?;
             }
         }
         Ok(())
+    }
+
+    /// Adds a face that was read, with its colour and its place in a picture.
+    fn polygon(&mut self, i: u64, row: &Row) -> Result<(), Diagnostic> {
+        let (uvs, rest) = row.uvs.as_chunks();
+        let are_even = uvs.is_empty() || uvs.len() == row.corners.len();
+        if !are_even || !rest.is_empty() {
+            Odd::count(&mut self.odd.uneven, i);
+        }
+        let uvs = if are_even && rest.is_empty() { uvs } else { &[] };
+        let picture = row.picture.map(|number| self.picture(i, number));
+        if row.color.is_some() {
+            self.take(1, Bare::COLOR)?;
+        }
+        self.face(&row.corners, &Said { uvs, color: row.color, picture })
+    }
+
+    /// The picture of a number that face `i` says; none below 0.
+    fn picture(&mut self, i: u64, number: f64) -> u32 {
+        let is_there = number >= 0.0 && number < self.bare.pictures.len() as f64 && number.fract() == 0.0;
+        if !is_there {
+            if number >= 0.0 || number.is_nan() {
+                Odd::count(&mut self.odd.no_picture, i);
+            }
+            return NONE;
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked just before")]
+        let number = number as u32;
+        number
+    }
+
+    /// Reads a part of a colour, of which the rest is white.
+    fn light(
+        &mut self,
+        element: &Element,
+        i: u64,
+        property: &Property,
+        (part, color): (usize, &mut Option<[f32; 4]>),
+    ) -> Result<(), Diagnostic> {
+        let value = light(property, self.value(element, i, property)?);
+        color.get_or_insert([1.0; 4])[part] = value as f32;
+        Ok(())
+    }
+
+    /// Reads a list of texture coordinates.
+    fn uvs(&mut self, element: &Element, i: u64, property: &Property, uvs: &mut Vec<f64>) -> Result<(), Diagnostic> {
+        let length = self.length(element, i, property)?;
+        if length * self.body.least(property.kind) > self.body.left() {
+            return Err(self.missing(&Missing::End, element, i, property));
+        }
+        self.take(length, Bare::CORNER_UV / 2)?;
+        uvs.clear();
+        for _ in 0..length {
+            uvs.push(self.value(element, i, property)?);
+        }
+        Ok(())
+    }
+
+    fn take(&mut self, count: u64, bytes: u64) -> Result<(), Diagnostic> {
+        self.budget.take(count, bytes).map_err(|over| Diagnostic::over_budget(&self.source.path, over))
     }
 
     /// Reads a list of vertices into `corners`.
@@ -377,27 +361,30 @@ impl Reader<'_, '_> {
         Ok(value as u32)
     }
 
-    fn strip(&mut self, strip: &[u32]) -> Result<(), Diagnostic> {
+    fn strip(&mut self, strip: &[u32], color: Option<[f32; 4]>) -> Result<(), Diagnostic> {
         for (i, window) in strip.windows(3).enumerate() {
             let &[a, b, c] = window else { continue };
             // Two equal corners only turn the strip.
             if a != b && b != c && c != a {
                 let [a, b] = if i % 2 == 0 { [a, b] } else { [b, a] };
                 Bare::charge_face(self.budget, 3).map_err(|over| Diagnostic::over_budget(&self.source.path, over))?;
-                self.face(&[a, b, c])?;
+                if color.is_some() {
+                    self.take(1, Bare::COLOR)?;
+                }
+                self.face(&[a, b, c], &Said { color, ..Said::default() })?;
             }
         }
         Ok(())
     }
 
     /// Adds a face whose memory was granted.
-    fn face(&mut self, corners: &[u32]) -> Result<(), Diagnostic> {
+    fn face(&mut self, corners: &[u32], said: &Said) -> Result<(), Diagnostic> {
         let most = self.bare.corners.len().max(self.bare.arities.len()) as u64 + corners.len() as u64;
         if most > Bare::LARGEST {
             let text = format!("more than {} faces or corners", Bare::LARGEST);
             return Err(self.body.fault(text, "split the file"));
         }
-        self.bare.face(corners);
+        self.bare.face(corners, said);
         Ok(())
     }
 
@@ -437,24 +424,8 @@ impl Reader<'_, '_> {
     }
 }
 
-/// Which properties of an edge are its ends.
-fn ends(element: &Element) -> Option<[usize; 2]> {
-    let number = |property: &Property, name: &str| property.length.is_none() && property.name == name;
-    let slot = |name| element.properties.iter().position(|property| number(property, name));
-    Some([slot("vertex1")?, slot("vertex2")?])
-}
-
 /// Stands between two strips; more than there can be vertices.
 const RESTART: u32 = u32::MAX;
-
-/// What stands for full light.
-fn unit(kind: Kind) -> f64 {
-    match kind {
-        Kind::F32 | Kind::F64 => 1.0,
-        Kind::U16 => 65535.0,
-        _ => 255.0,
-    }
-}
 
 fn named(element: &Element, i: u64, property: &Property) -> String {
     format!("`{}` of {} {i}", shorten(&property.name), shorten(&element.name))

@@ -1,6 +1,7 @@
 //! The header of a PLY file: lines of words that end with `end_header`.
 
 use crate::load::Diagnostic;
+use crate::load::mtl::unquote;
 use crate::load::paths::shorten;
 use std::path::Path;
 
@@ -94,6 +95,8 @@ pub(super) struct Header {
     pub elements: Vec<Element>,
     /// Comments and object information, without those words.
     pub comments: Vec<String>,
+    /// Pictures that comments name, as MeshLab writes them (`comment TextureFile`), with their lines.
+    pub pictures: Vec<(u32, String)>,
     /// Bytes before the first value.
     pub length: usize,
     /// Lines before the first value.
@@ -107,7 +110,15 @@ impl Header {
     /// At the first line that is not understood.
     pub(super) fn read(bytes: &[u8], file: &Path) -> Result<Self, Diagnostic> {
         let mut lines = Lines::new(bytes);
-        let mut parts = Parts { file, line: 1, encoding: None, elements: Vec::new(), parts: 0, comments: Vec::new() };
+        let mut parts = Parts {
+            file,
+            line: 1,
+            encoding: None,
+            elements: Vec::new(),
+            parts: 0,
+            comments: Vec::new(),
+            pictures: Vec::new(),
+        };
         if lines.next().is_none_or(|line| line.trim_ascii() != b"ply") {
             return Err(parts.fault("the file does not begin with a line `ply`", "name a PLY file"));
         }
@@ -117,8 +128,8 @@ impl Header {
                 let Some(encoding) = parts.encoding else {
                     return Err(parts.fault("the header has no line `format`", "export it again"));
                 };
-                let Parts { elements, comments, .. } = parts;
-                return Ok(Self { encoding, elements, comments, length: lines.at, lines: lines.count });
+                let Parts { elements, comments, pictures, .. } = parts;
+                return Ok(Self { encoding, elements, comments, pictures, length: lines.at, lines: lines.count });
             }
         }
         Err(parts.fault("the file ends inside the header, before `end_header`", "it was cut off; get it again"))
@@ -171,9 +182,10 @@ struct Parts<'a> {
     /// Elements and properties so far.
     parts: usize,
     comments: Vec<String>,
+    pictures: Vec<(u32, String)>,
 }
 
-/// Elements and properties of a header at most, far more than programs write.
+/// Elements, properties and pictures of a header at most, far more than programs write.
 const MOST: usize = 4096;
 
 /// Comments that are kept: programs write theirs first.
@@ -191,10 +203,8 @@ impl Parts<'_> {
             [] => {}
             ["end_header", ..] => return Ok(true),
             ["comment" | "obj_info", ..] => {
-                if let Some((_, said)) = line.trim().split_once(char::is_whitespace)
-                    && self.comments.len() < COMMENTS
-                {
-                    self.comments.push(said.trim().into());
+                if let Some((_, said)) = line.trim().split_once(char::is_whitespace) {
+                    self.comment(said.trim())?;
                 }
             }
             ["format", name, _version] => self.encoding = Some(self.encoding(name)?),
@@ -225,6 +235,17 @@ impl Parts<'_> {
         Ok(false)
     }
 
+    fn comment(&mut self, said: &str) -> Result<(), Diagnostic> {
+        let picture = said.split_once(char::is_whitespace).filter(|(word, _)| word.eq_ignore_ascii_case("TextureFile"));
+        if let Some((_, name)) = picture {
+            self.count()?;
+            self.pictures.push((self.line, unquote(name.trim()).into()));
+        } else if self.comments.len() < COMMENTS {
+            self.comments.push(said.into());
+        }
+        Ok(())
+    }
+
     fn encoding(&self, name: &str) -> Result<Encoding, Diagnostic> {
         Ok(match name {
             "ascii" => Encoding::Text,
@@ -242,11 +263,11 @@ impl Parts<'_> {
         Kind::of(word).ok_or_else(|| self.fault(format!("`{}` is no type of PLY", shorten(word)), known))
     }
 
-    /// Counts an element or property, of which there are not too many.
+    /// Counts an element, a property or a picture, of which there are not too many.
     fn count(&mut self) -> Result<(), Diagnostic> {
         self.parts += 1;
         if self.parts > MOST {
-            return Err(self.fault(format!("more than {MOST} elements and properties"), "export it again"));
+            return Err(self.fault(format!("more than {MOST} elements, properties and pictures"), "export it again"));
         }
         Ok(())
     }

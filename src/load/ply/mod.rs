@@ -1,11 +1,12 @@
 //! PLY, the Stanford triangle format (G. Turk, *The PLY Polygon File Format*, 1994) -> scene: text or binary in either
-//! byte order, geometry only.
+//! byte order, and the pictures that it names.
 //!
 //! A header lists elements and their properties (`header`); their values follow in that order (`body`). Of these are
-//! read, under the names that programs give them (`geometry`): of `vertex` the place, normal, texture coordinates, colour
-//! and opacity; of `face` its list of vertices; of `tristrips` the same, where −1 starts another strip; of `edge` its
-//! `vertex1` and `vertex2`. Where nothing joins the vertices, as in clouds that scanners write, they are points. What a
-//! picture would show and is not read is told.
+//! read (`geometry`), under the names that programs give them (`meaning`): of `vertex` the place, normal, texture
+//! coordinates, colour and opacity; of `face` its list of vertices, its colour, and of each corner the place in a picture
+//! (`texcoord`, `texnumber`); of `tristrips` the vertices, where −1 starts another strip; of `edge` its `vertex1` and
+//! `vertex2`, and its colour. Pictures are those of comments `TextureFile`. Where nothing joins the vertices, as in clouds
+//! that scanners write, they are points. What a picture would show and is not read is told (`told`).
 //!
 //! What the format leaves open is decided as for OBJ: colours are sRGB-coded, faces without normals flat, and every
 //! surface is seen from both sides. Colours of whole numbers are 0…255, or 0…65535 where they have 16 bits; floats 0…1, or 0…255
@@ -17,6 +18,8 @@
 mod body;
 mod geometry;
 mod header;
+mod meaning;
+mod told;
 
 use super::geometry::bare;
 use super::limits::Budget;

@@ -5,6 +5,8 @@ use crate::load::{Limits, Polygons};
 use crate::math::{Vec2, Vec3, Vec4};
 use crate::scene::AlphaMode;
 
+pub(super) mod painted;
+
 pub(super) fn of(bytes: &[u8], options: &LoadOptions) -> Result<Loaded, String> {
     let source = Source { path: "a.ply".into(), bytes: bytes.to_vec() };
     load(&source, options, &mut Budget::new(&options.limits)).map_err(|e| e.to_string())
@@ -196,7 +198,7 @@ fn opacity_of_vertices_is_drawn_and_an_empty_channel_is_not() {
 }
 
 #[test]
-fn gaussian_splats_are_points_of_their_colours_and_colours_of_edges_are_not_left_out_without_a_word() {
+fn gaussian_splats_are_points_of_their_colours() {
     let xyz = "property float x\nproperty float y\nproperty float z\n";
     let splats = format!(
         "ply\nformat ascii 1.0\nelement vertex 2\n{xyz}property float nx\nproperty float ny\nproperty float nz\n\
@@ -211,11 +213,6 @@ fn gaussian_splats_are_points_of_their_colours_and_colours_of_edges_are_not_left
         colors[0] == Vec4::new(1.0, 0.0, 0.0, 1.0) && colors.iter().any(|c| (*c - grey).length() < 1e-6),
         "{colors:?}"
     );
-    let edges = format!(
-        "ply\nformat ascii 1.0\nelement vertex 2\n{xyz}element edge 1\nproperty int vertex1\nproperty int vertex2\n\
-         property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n0 0 0\n1 0 0\n0 1 255 0 0\n"
-    );
-    assert_eq!(plain(edges.as_bytes()).warnings[0].code, "ply-edge-colors");
 }
 
 #[test]
@@ -321,7 +318,7 @@ fn lists_and_headers_take_no_memory_that_was_not_granted() {
     let cut = fault(&bytes[..bytes.len() - 1]);
     assert!(cut.contains("the file ends before `vertex_indices` of face 0"), "{cut}");
     let many = format!("ply\nformat ascii 1.0\n{}end_header\n", "element a 0\n".repeat(5000));
-    assert!(fault(many.as_bytes()).contains("more than 4096 elements and properties"));
+    assert!(fault(many.as_bytes()).contains("more than 4096 elements, properties and pictures"));
 }
 
 /// A triangle as text, with these lines of the header before the faces, and more to say of its vertices and its face.
@@ -359,17 +356,8 @@ fn what_follows_the_elements_is_told_and_a_mark_before_them_is_none() {
 fn what_would_change_the_look_and_is_not_read_is_told() {
     let told = |loaded: Loaded| loaded.warnings.iter().map(ToString::to_string).collect::<Vec<_>>();
     let colors = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
-    let faces = triangle("", "", colors, [""; 3], "255 0 0");
-    assert_eq!(told(faces), ["a.ply: colours of faces are not drawn; give the vertices colours"]);
-    let corners = "property list uchar float texcoord\n";
-    let picture = triangle("", "comment TextureFile foo.png\n", corners, [""; 3], "6 0 0 1 0 0 1");
-    assert_eq!(
-        told(picture),
-        [
-            "a.ply: texture coordinates of faces (texcoord) are not read; export it as OBJ or glTF",
-            "a.ply: picture 'foo.png' (comment TextureFile) is not drawn; export it as OBJ or glTF",
-        ]
-    );
+    let faces = triangle(colors, "", colors, ["0 255 0"; 3], "255 0 0");
+    assert_eq!(told(faces), ["a.ply: colours of faces are not drawn: the vertices have some, too; keep one of both"]);
 }
 
 #[test]

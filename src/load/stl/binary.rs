@@ -4,6 +4,8 @@ use super::Triangles;
 use crate::load::geometry::bare::Bare;
 use crate::load::{Diagnostic, Source};
 use crate::math::DVec3;
+use crate::scene::Material;
+use crate::scene::color::to_srgb;
 
 /// Bytes before the first triangle.
 const HEADER: usize = 84;
@@ -43,13 +45,15 @@ pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnost
     let uncounted = claimed == 0 && !records.is_empty() && rest.is_empty();
     // As many as there are in memory.
     let records = if uncounted { records } else { &records[..claimed as usize] };
+    let paint = Paint::of(&bytes[..80], records);
     for record in records {
         let number = |k: usize| {
             let bytes = [record[k], record[k + 1], record[k + 2], record[k + 3]];
             f64::from(f32::from_le_bytes(bytes))
         };
         let place = |k: usize| DVec3::new(number(k), number(k + 4), number(k + 8));
-        out.add([place(12), place(24), place(36)])?;
+        let color = paint.as_ref().map(|paint| paint.color(attributes(record)));
+        out.add([place(12), place(24), place(36)], color)?;
     }
     let mut bare = out.bare;
     if uncounted {
@@ -58,11 +62,6 @@ pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnost
         bare.told.push(warning.remedy("they are drawn"));
     }
     bare.told.extend(behind(source, records.len()));
-    if are_colored(&bytes[..80], records) {
-        let text = "colours in the attribute bytes of triangles are not drawn";
-        let warning = Diagnostic::new("stl-colors", &source.path, "", text);
-        bare.told.push(warning.remedy("export it as PLY or glTF"));
-    }
     let said = String::from_utf8_lossy(&bytes[..80]);
     bare.comments.push(said.trim_matches(|c: char| c.is_control() || c.is_whitespace()).into());
     Ok(bare)
@@ -77,9 +76,47 @@ fn behind(source: &Source, triangles: usize) -> Option<Diagnostic> {
     Some(warning.remedy("they are not read"))
 }
 
-/// Whether attributes mean colours: where the header has a colour of the whole, as Magics writes it, or a triangle has the
-/// bit by which VisCAM and SolidView say that it has one.
-fn are_colored(header: &[u8], records: &[[u8; TRIANGLE]]) -> bool {
-    let by_header = header.windows(6).any(|word| word == b"COLOR=");
-    by_header || records.iter().any(|record| record[TRIANGLE - 1] & 0x80 != 0)
+/// The two bytes behind the corners.
+fn attributes(record: &[u8; TRIANGLE]) -> u16 {
+    u16::from_le_bytes([record[TRIANGLE - 2], record[TRIANGLE - 1]])
+}
+
+/// What attributes mean where they are colours, five bits to a part.
+struct Paint {
+    /// Where red, green and blue begin.
+    parts: [u32; 3],
+    /// The highest bit of triangles that have a colour of their own.
+    own: u16,
+    /// The colour of the others; none of them has one where this is everything that the file says.
+    whole: [f32; 4],
+    is_all: bool,
+}
+
+impl Paint {
+    /// In either of the two ways in use: Materialise Magics writes `COLOR=` and four bytes into the header, the colour of the
+    /// whole, and a triangle has its own where the highest bit is clear; VisCAM and SolidView write no more than triangles with
+    /// the highest bit set, and the other order of parts. `None` where there is no sign of either.
+    fn of(header: &[u8], records: &[[u8; TRIANGLE]]) -> Option<Self> {
+        const SIGN: &[u8] = b"COLOR=";
+        const OWN: u16 = 1 << 15;
+        let sign = header.windows(SIGN.len()).position(|word| word == SIGN);
+        if let Some(&[red, green, blue]) = sign.and_then(|at| header[at + SIGN.len()..].first_chunk()) {
+            let [r, g, b] = [red, green, blue].map(|c| f32::from(c) / 255.0);
+            // Programs that know the colour of the whole alone leave the attributes 0, which would be black.
+            let is_all = records.iter().all(|record| attributes(record) == 0);
+            return Some(Self { parts: [0, 5, 10], own: 0, whole: [r, g, b, 1.0], is_all });
+        }
+        let [r, g, b] = Material::plain().base_color.to_array().map(to_srgb);
+        let is_painted = records.iter().any(|record| attributes(record) & OWN != 0);
+        is_painted.then_some(Self { parts: [10, 5, 0], own: OWN, whole: [r, g, b, 1.0], is_all: false })
+    }
+
+    /// sRGB-coded, and opaque.
+    fn color(&self, attributes: u16) -> [f32; 4] {
+        if self.is_all || attributes & (1 << 15) != self.own {
+            return self.whole;
+        }
+        let [r, g, b] = self.parts.map(|part| f32::from((attributes >> part) & 31) / 31.0);
+        [r, g, b, 1.0]
+    }
 }

@@ -1,8 +1,8 @@
-//! STL, the format of stereolithography (3D Systems, 1988) -> scene: triangles as text or in binary, geometry only.
+//! STL, the format of stereolithography (3D Systems, 1988) -> scene: triangles as text or in binary.
 //!
 //! Every triangle brings places of its own; those that are equal bit for bit become one vertex, so that faces are
 //! connected. Surfaces are flat: the normal that the file gives for a facet says nothing that its corners do not, and is
-//! often wrong, so that it is not read; nor are the two bytes of attributes, which mean something else in every program.
+//! often wrong, so that it is not read. Its two bytes of attributes are a colour where something says so.
 //!
 //! The reader is our own: crates for STL take a binary file that begins with `solid` for text, and do not say where in the
 //! file a fault is.
@@ -10,7 +10,7 @@
 mod binary;
 mod text;
 
-use super::geometry::bare::{self, Bare};
+use super::geometry::bare::{self, Bare, Said};
 use super::limits::Budget;
 use super::{Diagnostic, LoadError, LoadOptions, Loaded, Source};
 use crate::math::DVec3;
@@ -63,13 +63,15 @@ impl Triangles<'_> {
     /// Bytes that a vertex takes in the table, which is never less than half full once it has grown.
     const KNOWN: u64 = 2 * 40;
 
-    fn add(&mut self, corners: [DVec3; 3]) -> Result<(), Diagnostic> {
-        Bare::charge_face(self.budget, 3).map_err(|over| Diagnostic::over_budget(self.file, over))?;
+    fn add(&mut self, corners: [DVec3; 3], color: Option<[f32; 4]>) -> Result<(), Diagnostic> {
+        let painted = u64::from(color.is_some());
+        let taken = Bare::charge_face(self.budget, 3).and_then(|()| self.budget.take(painted, Bare::COLOR));
+        taken.map_err(|over| Diagnostic::over_budget(self.file, over))?;
         let mut numbers = [0; 3];
         for (number, place) in numbers.iter_mut().zip(corners) {
             *number = self.vertex(place)?;
         }
-        self.bare.face(&numbers);
+        self.bare.face(&numbers, &Said { color, ..Said::default() });
         Ok(())
     }
 

@@ -4,6 +4,7 @@ use super::*;
 use crate::load::{Limits, load_bytes};
 use crate::math::Vec3;
 use crate::scene::UpAxis;
+use crate::scene::color::to_srgb;
 
 /// A tetrahedron above the xy plane: four triangles on four places.
 const CORNERS: [[[f32; 3]; 3]; 4] = {
@@ -166,12 +167,38 @@ fn coordinates_that_are_not_finite_drop_their_faces() {
 }
 
 #[test]
-fn colours_in_attributes_are_told() {
-    let told = |bytes: &[u8]| plain(bytes).warnings.iter().map(|w| w.code).collect::<Vec<_>>();
-    let mut colored = binary("");
-    *colored.last_mut().unwrap() |= 0x80;
-    assert_eq!((told(&colored), told(&binary("COLOR=\x7f\x7f"))), (vec!["stl-colors"], vec!["stl-colors"]));
-    assert_eq!(told(&binary("")), [""; 0]);
+fn attributes_are_colours_in_either_order_where_something_says_so() {
+    /// The tetrahedron with these attributes, and the sRGB codes of each triangle, 0…31.
+    fn painted(header: &str, attributes: [u16; 4]) -> Vec<[f32; 3]> {
+        let mut bytes = binary(header);
+        for (record, attributes) in bytes[84..].as_chunks_mut::<50>().0.iter_mut().zip(attributes) {
+            record[48..].copy_from_slice(&attributes.to_le_bytes());
+        }
+        let loaded = plain(&bytes);
+        assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+        let mesh = &loaded.scene.meshes[0];
+        let codes =
+            |color: crate::math::Vec4| color.truncate().to_array().map(|c| (to_srgb(c) * 31.0 * 1e3).round() / 1e3);
+        let color = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|i| mesh.colors[i as usize]);
+            assert!(a == b && b == c && a.w == 1.0);
+            codes(a)
+        };
+        mesh.triangles.iter().map(color).collect()
+    }
+    let own = 1 << 15;
+    let (low, high) = ([31.0, 15.0, 0.0], [0.0, 15.0, 31.0]);
+    let parts = 31 | 15 << 5;
+    let grey = (to_srgb(0.6) * 31.0 * 1e3).round() / 1e3;
+    assert_eq!(painted("VisCAM", [own | parts, parts, own, own | parts]), [high, [grey; 3], [0.0; 3], high]);
+    // The header is text here: bytes of codes below 128.
+    let header = "COLOR=\x33\x66\x00\x7f,MATERIAL=";
+    let whole = [31.0 * 0.2, 31.0 * 0.4, 0.0].map(|c: f32| (c * 1e3).round() / 1e3);
+    assert_eq!(painted(header, [parts, own | parts, 0, parts]), [low, whole, [0.0; 3], low]);
+    assert_eq!(painted(header, [0; 4]), [whole; 4], "nothing but the colour of the whole");
+    for plain_header in ["", "COLOR"] {
+        assert!(plain(&binary(plain_header)).scene.meshes[0].colors.is_empty(), "{plain_header}");
+    }
 }
 
 #[test]

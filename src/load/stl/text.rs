@@ -32,7 +32,7 @@ pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnost
                 names.push(name);
             }
         } else if is(word, "facet") {
-            out.add(facet(&mut words)?)?;
+            out.add(facet(&mut words)?, None)?;
         } else if is(word, "endsolid") {
             open = false;
             words.rest_of_line();

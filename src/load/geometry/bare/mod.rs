@@ -1,14 +1,19 @@
 //! Vertices and faces that come without a text of statements, as in PLY and STL files -> scene.
 //!
-//! They go the way of an OBJ's: centred and rounded, cut or kept whole, stood upright, plain where nothing is said of their
-//! material.
+//! They go the way of an OBJ's: centred and rounded, cut or kept whole, stood upright. What faces and corners have of their
+//! own goes to vertices (`wedges`); their material shows a picture (`pictures`), or is plain.
+
+mod pictures;
+mod wedges;
 
 use super::finish::{Kind, finish};
 use super::{Corner, Face, Geometry, LARGEST, NONE, Run, Soup, Stroke, color};
 use crate::load::limits::{Budget, OverBudget};
+use crate::load::paths::shorten;
 use crate::load::{Diagnostic, LoadError, LoadOptions, Loaded, Source, Warnings};
 use crate::math::{DVec2, DVec3, Vec3};
 use crate::scene::UpAxis;
+use std::path::Path;
 
 /// What a file of bare geometry holds. Lists that go with the vertices are as long as [`Self::positions`], or empty.
 #[derive(Clone, Debug, Default)]
@@ -24,6 +29,16 @@ pub(in crate::load) struct Bare {
     pub corners: Vec<u32>,
     /// Corners of each face, at least 3.
     pub arities: Vec<u32>,
+    /// Texture coordinates of corners, before those of vertices: of the first ones, up to the last that has some.
+    corner_uvs: Vec<[f64; 2]>,
+    /// Colours of faces and of edges, as those of vertices, of which there are none then: of the first ones, up to the last
+    /// that has one.
+    face_colors: Vec<[f32; 4]>,
+    edge_colors: Vec<[f32; 4]>,
+    /// Pictures that the file names, and in which line.
+    pub pictures: Vec<(u32, String)>,
+    /// Which of them faces show, or [`NONE`]: of the first ones, up to the last that says so; the others show the first.
+    face_pictures: Vec<u32>,
     /// Faces that had fewer.
     pub few_corners: u64,
     /// The vertices at both ends of each edge; each is there.
@@ -36,6 +51,17 @@ pub(in crate::load) struct Bare {
     pub told: Vec<Diagnostic>,
 }
 
+/// What a file may say of a face beside its corners.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::load) struct Said<'a> {
+    /// Texture coordinates of its corners, v upwards; empty, or of each.
+    pub uvs: &'a [[f64; 2]],
+    /// As those of vertices.
+    pub color: Option<[f32; 4]>,
+    /// Which of [`Bare::pictures`] it shows; [`NONE`]: none of them.
+    pub picture: Option<u32>,
+}
+
 impl Bare {
     /// Bytes that a vertex takes until it is part of a mesh: what the file says of it, twice in `f64`, in the mesh, and
     /// its place in tables.
@@ -46,8 +72,17 @@ impl Bare {
     const FACE: u64 = 56;
     /// Bytes that a point or edge takes as a statement, with its corners and their vertices.
     const STROKE: u64 = 192;
+    /// Bytes that the colour of a face or edge takes.
+    pub(in crate::load) const COLOR: u64 = 16;
+    /// Bytes that the texture coordinates of a corner take: as read, and as those of a vertex, looked for in a table.
+    pub(in crate::load) const CORNER_UV: u64 = 88;
     /// The most vertices, corners or faces.
     pub(in crate::load) const LARGEST: u64 = LARGEST as u64;
+
+    /// What a file holds that names these pictures, before anything of it is read.
+    pub(in crate::load) fn showing(pictures: Vec<(u32, String)>) -> Self {
+        Self { pictures, ..Self::default() }
+    }
 
     /// Takes the memory of so many vertices from a budget, before they are read.
     pub(in crate::load) fn charge_vertices(budget: &mut Budget, count: u64) -> Result<(), OverBudget> {
@@ -71,13 +106,34 @@ impl Bare {
 
     /// Adds a face, or counts one with too few corners.
     #[expect(clippy::cast_possible_truncation, reason = "memory for 2^32 corners was not granted")]
-    pub(in crate::load) fn face(&mut self, corners: &[u32]) {
+    pub(in crate::load) fn face(&mut self, corners: &[u32], said: &Said) {
         if corners.len() < 3 {
             self.few_corners += 1;
             return;
         }
+        if !said.uvs.is_empty() {
+            self.corner_uvs.resize(self.corners.len(), [f64::NAN; 2]);
+            self.corner_uvs.extend_from_slice(said.uvs);
+        }
+        if let Some(color) = said.color {
+            self.face_colors.resize(self.arities.len(), [f32::NAN; 4]);
+            self.face_colors.push(color);
+        }
+        if let Some(picture) = said.picture {
+            self.face_pictures.resize(self.arities.len(), 0);
+            self.face_pictures.push(picture);
+        }
         self.arities.push(corners.len() as u32);
         self.corners.extend_from_slice(corners);
+    }
+
+    /// Adds an edge.
+    pub(in crate::load) fn edge(&mut self, ends: [u32; 2], color: Option<[f32; 4]>) {
+        if let Some(color) = color {
+            self.edge_colors.resize(self.edges.len(), [f32::NAN; 4]);
+            self.edge_colors.push(color);
+        }
+        self.edges.push(ends);
     }
 }
 
@@ -97,6 +153,7 @@ pub(in crate::load) fn load(
     let file = source.path.as_path();
     let mut warnings = Warnings::default();
     std::mem::take(&mut bare.told).into_iter().for_each(|told| warnings.push(told));
+    bare.color_vertices(budget).map_err(|over| Diagnostic::over_budget(file, over))?;
     let coding = color::settle(&mut bare.colors);
     coding.warning(["color-bytes", "color-range"], file).into_iter().for_each(|told| warnings.push(told));
     if color::are_all_clear(&bare.colors) {
@@ -115,15 +172,22 @@ pub(in crate::load) fn load(
         no_faces: "no-faces",
         place: |face| format!("face {face}"),
         otherwise,
+        materials: pictures::load,
     };
-    finish(geometry(bare), &kind, (source, options), warnings, budget)
+    let geometry = geometry(bare, file, &mut warnings);
+    let mut loaded = finish(geometry, &kind, (source, options), warnings, budget)?;
+    let told = pictures::leave_out_colors(&mut loaded, file);
+    loaded.warnings.extend(told);
+    Ok(loaded)
 }
 
-/// The same as the statements of an OBJ would leave it: one run of faces, each attribute numbered as its vertex.
+/// The same as the statements of an OBJ would leave it: a run of plain faces, points and lines, and one of the faces that show
+/// each picture.
 #[expect(clippy::cast_possible_truncation, reason = "readers keep below Bare::LARGEST")]
-fn geometry(bare: Bare) -> Geometry {
+fn geometry(mut bare: Bare, file: &Path, warnings: &mut Warnings) -> Geometry {
     let is_cloud = bare.is_cloud();
-    let Bare { positions, normals, uvs, colors, corners, arities, edges, .. } = bare;
+    let numbers = bare.number_uvs();
+    let Bare { positions, normals, uvs, colors, corners, arities, edges, pictures, face_pictures, .. } = bare;
     let normals: Vec<Vec3> = normals.into_iter().map(|n| n.as_dvec3().normalize_or_zero().as_vec3()).collect();
     let corner = |i: u32| {
         let (uv, normal) = (uvs.get(i as usize), normals.get(i as usize));
@@ -139,7 +203,7 @@ fn geometry(bare: Bare) -> Geometry {
     } else {
         (edges.iter().map(|_| stroke(2, true)).collect(), edges.iter().flatten().map(|&i| corner(i)).collect())
     };
-    let corners = corners.into_iter().map(corner).collect();
+    let corners = corners.into_iter().zip(&numbers).map(|(i, &uv)| Corner { uv, ..corner(i) }).collect();
     let alphas = color::opacities(&colors);
     let colors = colors.into_iter().map(|[r, g, b, _]| [r, g, b]).collect();
     let mut soup = Soup { positions, uvs, normals, colors, alphas, corners, stroke_corners };
@@ -149,19 +213,28 @@ fn geometry(bare: Bare) -> Geometry {
     let face = |(number, &arity): (u32, &u32)| {
         let first = next;
         next += arity;
-        Face { run: 0, smoothing: 0, arity, line: number, number, first }
+        let picture = face_pictures.get(number as usize).copied().unwrap_or(0);
+        let is_shown = (picture as usize) < pictures.len();
+        let shows = is_shown && numbers[first as usize..next as usize].iter().all(|&uv| uv != NONE);
+        let run = if shows { picture + 1 } else { 0 };
+        Face { run, smoothing: 0, arity, line: number, number, first }
     };
-    let faces = (0..).zip(&arities).map(face);
+    let faces: Vec<Face> = (0..).zip(&arities).map(face).collect();
+    if let Some((line, name)) = pictures.first().filter(|_| faces.iter().all(|face| face.run == 0)) {
+        let text = format!("picture '{}' is not drawn: no face says where it shows which part of it", shorten(name));
+        warnings.push(Diagnostic::new("picture-unused", file, line.to_string(), text));
+    }
+    let of_picture = |number| Run { material: Some(number), ..Run::default() };
     Geometry {
         soup,
-        faces: faces.collect(),
+        faces,
         strokes,
-        runs: vec![Run::default()],
-        names: vec![String::new()],
+        runs: std::iter::once(Run::default()).chain((1..=pictures.len() as u32).map(of_picture)).collect(),
+        names: std::iter::once(String::new()).chain(pictures.iter().map(|(_, name)| name.clone())).collect(),
+        sources: pictures,
         // So many digits that the rounding to `f32` alone counts.
         places: bare.places.unwrap_or(30),
         comments: bare.comments,
         few_corners: u32::try_from(bare.few_corners).unwrap_or(u32::MAX),
-        ..Geometry::default()
     }
 }

@@ -1,0 +1,108 @@
+//! Pictures that files of bare geometry name -> the materials that show them.
+
+use crate::load::mtl::{Finder, Materials, Reading, plain_material};
+use crate::load::paths::Found;
+use crate::load::texture::{Encoded, Unusable, decode_all};
+use crate::load::{Diagnostic, Loaded};
+use crate::math::{Vec3, Vec4};
+use crate::scene::{Material, Sampler, Texture, TextureRef, UvTransform};
+use std::collections::HashMap;
+use std::path::Path;
+
+/// Reads the `pictures` of a file, which it names in these lines, and makes a material for each of `names`: one that shows the
+/// picture of that name, or a plain one where that cannot be, and for `None`.
+pub(super) fn load(pictures: &[(u32, String)], names: &[Option<&str>], reading: &mut Reading) -> Materials {
+    let mut images: Vec<Encoded> = Vec::new();
+    // Of each name the place among them.
+    let mut known: HashMap<&str, usize> = HashMap::new();
+    let mut missed = 0;
+    for (line, name) in pictures {
+        if names.contains(&Some(name)) && !known.contains_key(name.as_str()) {
+            let read = read(name, *line, &mut missed, reading);
+            match read {
+                Ok(found) => {
+                    known.insert(name, images.len());
+                    let name = found.path.to_string_lossy().into_owned();
+                    images.push(Encoded { name, place: line.to_string(), bytes: found.bytes.into() });
+                }
+                Err(warning) => reading.warnings.push(warning),
+            }
+        }
+    }
+    let limits = &reading.options.limits;
+    let (decoded, decoding) = decode_all(&images, reading.file, limits, reading.budget, reading.warnings);
+    drop(images);
+
+    let mut out = Materials { decoding, ..Materials::default() };
+    let mut shown: Vec<Option<u32>> = Vec::new();
+    for bitmap in decoded {
+        shown.push(bitmap.map(|bitmap| {
+            let number = index(out.bitmaps.len());
+            out.bitmaps.push(bitmap);
+            out.textures.push(Texture { bitmap: number, sampler: Sampler::default() });
+            number
+        }));
+    }
+    let mut made: HashMap<Option<u32>, u32> = HashMap::new();
+    for name in names {
+        let texture = name.and_then(|name| shown[*known.get(name)?]);
+        let material = *made.entry(texture).or_insert_with(|| {
+            out.materials.push(match (texture, name) {
+                (Some(texture), Some(name)) => showing(name, texture),
+                _ => plain_material("", reading.colored),
+            });
+            index(out.materials.len() - 1)
+        });
+        out.of_name.push(material);
+    }
+    out
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "headers name fewer than 2^32 pictures")]
+fn index(at: usize) -> u32 {
+    at as u32
+}
+
+fn showing(name: &str, texture: u32) -> Material {
+    let map = TextureRef { texture, uv_set: 0, transform: UvTransform::default() };
+    Material { name: name.into(), base_color: Vec3::ONE, base_color_map: Some(map), ..Material::plain() }
+}
+
+/// Finds and reads a picture.
+///
+/// # Errors
+/// The warning that it is not there, or cannot be read.
+fn read(name: &str, line: u32, missed: &mut usize, reading: &mut Reading) -> Result<Found, Diagnostic> {
+    let place = line.to_string();
+    let mut finder = Finder { resolver: reading.resolver, missed: *missed };
+    let found = finder.find(name, &[Path::new("")]);
+    *missed = finder.missed;
+    let read = found.and_then(|found| {
+        let within = reading.resolver.read_file_within(&found.path, reading.budget)?;
+        Ok(within.map(|bytes| Found { bytes, path: found.path, guessed: found.guessed }))
+    });
+    let found = read.map_err(|fault| {
+        let warning = fault.diagnose(reading.file, &place);
+        Diagnostic { text: format!("picture {}; faces are drawn without it", warning.text), ..warning }
+    })?;
+    let found = found.map_err(|over| Unusable::too_large(over.to_string()).warning(name, reading.file, &place))?;
+    found.note(name, reading.file, &place).into_iter().for_each(|note| reading.warnings.push(note));
+    Ok(found)
+}
+
+/// Takes colours from the vertices of meshes that show a picture: of what was scanned, both show the same light. What is told
+/// of that.
+pub(super) fn leave_out_colors(loaded: &mut Loaded, file: &Path) -> Option<Diagnostic> {
+    let scene = &mut loaded.scene;
+    let shows = |material: u32| scene.materials.get(material as usize).is_some_and(|m| m.base_color_map.is_some());
+    let mut had_colors = false;
+    for mesh in scene.meshes.iter_mut().filter(|mesh| shows(mesh.material)) {
+        had_colors |= mesh.colors.iter().any(|color| color.truncate() != Vec3::ONE);
+        mesh.colors.iter_mut().for_each(|color| *color = Vec3::ONE.extend(color.w));
+        if mesh.colors.iter().all(|&color| color == Vec4::ONE) {
+            mesh.colors.clear();
+        }
+    }
+    let text = "vertices have colours, which are not drawn where faces show a picture";
+    had_colors.then(|| Diagnostic::new("colors-under-picture", file, "", text))
+}

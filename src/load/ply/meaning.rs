@@ -1,0 +1,168 @@
+//! What properties of elements mean, by the names that programs give them.
+
+use super::header::{Element, Header, Kind, Property};
+
+/// Numbers of a vertex that have a meaning here.
+pub(super) const SLOTS: [&[&str]; 12] = [
+    &["x"],
+    &["y"],
+    &["z"],
+    &["nx", "normal_x"],
+    &["ny", "normal_y"],
+    &["nz", "normal_z"],
+    &["u", "s", "texture_u", "texture_s"],
+    &["v", "t", "texture_v", "texture_t"],
+    &["red", "r", "diffuse_red", SPLAT[0]],
+    &["green", "g", "diffuse_green", SPLAT[1]],
+    &["blue", "b", "diffuse_blue", SPLAT[2]],
+    &["alpha", "a", "opacity", "diffuse_alpha"],
+];
+
+/// Where what belongs together stands in [`SLOTS`].
+pub(super) const PLACE: [usize; 3] = [0, 1, 2];
+pub(super) const NORMAL: [usize; 3] = [3, 4, 5];
+pub(super) const UV: [usize; 2] = [6, 7];
+pub(super) const COLOR: [usize; 3] = [RED, RED + 1, RED + 2];
+pub(super) const RED: usize = 8;
+const ALPHA: usize = 11;
+
+/// Colours of Gaussian splats, as the constant part of spherical harmonics (B. Kerbl and others, "3D Gaussian Splatting for
+/// Real-Time Radiance Field Rendering", 2023).
+const SPLAT: [&str; 3] = ["f_dc_0", "f_dc_1", "f_dc_2"];
+
+/// Whether vertices are Gaussian splats. Their normals are 0, and their opacities are of a haze.
+pub(super) fn are_splats(vertex: &Element) -> bool {
+    SPLAT.iter().all(|name| vertex.properties.iter().any(|property| property.name == *name))
+}
+
+/// What properties of a vertex mean.
+pub(super) struct Meanings<'a> {
+    /// Of each property the place in [`SLOTS`]; of several with one meaning the first has it.
+    pub slots: Vec<Option<usize>>,
+    /// For each meaning that several have, the names of the first two.
+    pub twice: Vec<[&'a str; 2]>,
+}
+
+impl<'a> Meanings<'a> {
+    pub(super) fn of(vertex: &'a Element) -> Self {
+        let (splats, hazy) = (are_splats(vertex), [NORMAL[0], NORMAL[1], NORMAL[2], ALPHA]);
+        let mut said: [Vec<&str>; SLOTS.len()] = Default::default();
+        let slot = |property: &'a Property| {
+            let name = property.name.as_str();
+            let found = SLOTS.iter().position(|names| names.contains(&name));
+            let slot = found.filter(|slot| property.length.is_none() && !(splats && hazy.contains(slot)))?;
+            if said[slot].len() < 2 {
+                said[slot].push(name);
+            }
+            (said[slot].len() == 1).then_some(slot)
+        };
+        let slots = vertex.properties.iter().map(slot).collect();
+        let twice = said.iter().filter_map(|names| names.as_slice().try_into().ok());
+        Self { slots, twice: twice.collect() }
+    }
+}
+
+/// A part of a colour, 0…1, as a property says it.
+pub(super) fn light(property: &Property, value: f64) -> f64 {
+    /// 1 / (2 √π), the spherical harmonic that is the same all around.
+    const EVEN: f64 = 0.282_094_791_773_878_14;
+    if SPLAT.contains(&property.name.as_str()) {
+        (0.5 + EVEN * value).clamp(0.0, 1.0)
+    } else {
+        value / unit(property.kind)
+    }
+}
+
+/// Which property lists the corners of faces.
+pub(super) fn list_of(element: &Element) -> Option<usize> {
+    let lists = |property: &Property| {
+        property.length.is_some()
+            && matches!(property.name.as_str(), "vertex_indices" | "vertex_index" | "vertex_idx" | "vertex_ids")
+    };
+    element.properties.iter().position(lists)
+}
+
+/// Which properties of an edge are its ends.
+pub(super) fn ends(element: &Element) -> Option<[usize; 2]> {
+    let number = |property: &Property, name: &str| property.length.is_none() && property.name == name;
+    let slot = |name| element.properties.iter().position(|property| number(property, name));
+    Some([slot("vertex1")?, slot("vertex2")?])
+}
+
+/// What stands for full light.
+fn unit(kind: Kind) -> f64 {
+    match kind {
+        Kind::F32 | Kind::F64 => 1.0,
+        Kind::U16 => 65535.0,
+        _ => 255.0,
+    }
+}
+
+/// What is worth reading of faces and edges.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wanted {
+    /// Their colours: those of vertices are finer, where these have some.
+    pub colors: bool,
+    /// Which part of which picture their corners show: whether there are pictures.
+    pub pictures: bool,
+}
+
+impl Wanted {
+    pub(super) fn of(header: &Header) -> Self {
+        let vertex = header.elements.iter().find(|element| element.name == "vertex" && element.count > 0);
+        let slots = vertex.map(|element| Meanings::of(element).slots).unwrap_or_default();
+        let has_colors = COLOR.iter().all(|slot| slots.contains(&Some(*slot)));
+        Self { colors: !has_colors, pictures: !header.pictures.is_empty() }
+    }
+}
+
+/// What a property of a face or an edge is read for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Use {
+    /// The list of its corners.
+    Corners,
+    /// Which end of an edge it is.
+    End(usize),
+    /// The texture coordinates of its corners, u and v of one after another.
+    Uvs,
+    /// The number of its picture; below 0: none.
+    Picture,
+    /// Part of its colour: red, green, blue or opacity.
+    Light(usize),
+    Nothing,
+}
+
+/// What each property of faces whose corners are in `list` is read for.
+pub(super) fn uses_in_faces(face: &Element, list: usize, wanted: Wanted) -> Vec<Use> {
+    let of = |(k, property): (usize, &Property)| match (property.name.as_str(), property.length) {
+        _ if k == list => Use::Corners,
+        ("texcoord", Some(_)) if wanted.pictures => Use::Uvs,
+        ("texnumber", None) if wanted.pictures => Use::Picture,
+        _ => light_in(face, property, wanted),
+    };
+    face.properties.iter().enumerate().map(of).collect()
+}
+
+/// What each property of edges with these ends is read for.
+pub(super) fn uses_in_edges(edge: &Element, ends: [usize; 2], wanted: Wanted) -> Vec<Use> {
+    let of = |(k, property): (usize, &Property)| match ends.iter().position(|&end| end == k) {
+        Some(end) => Use::End(end),
+        None => light_in(edge, property, wanted),
+    };
+    edge.properties.iter().enumerate().map(of).collect()
+}
+
+/// Whether elements have colours.
+pub(super) fn are_colored(element: &Element) -> bool {
+    let has = |slot: &usize| element.properties.iter().any(|property| is_in(property, *slot));
+    COLOR.iter().all(has)
+}
+
+fn light_in(element: &Element, property: &Property, wanted: Wanted) -> Use {
+    let part = (RED..=ALPHA).find(|&slot| is_in(property, slot));
+    part.filter(|_| wanted.colors && are_colored(element)).map_or(Use::Nothing, |slot| Use::Light(slot - RED))
+}
+
+fn is_in(property: &Property, slot: usize) -> bool {
+    property.length.is_none() && SLOTS[slot].contains(&property.name.as_str())
+}
