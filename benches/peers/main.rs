@@ -144,7 +144,7 @@ fn compare(mesh: &Mesh, embree: Option<&Embree>, words: &Words) -> bool {
         rays[0].len(),
         rays[1].len()
     );
-    println!("auto takes {}", auto::reason(shapes, &Kept::default()));
+    println!("auto takes {}", auto::reason(shapes, &Kept::default(), u64::MAX));
 
     if words.only.is_empty() {
         builds(mesh, embree, words.passes);

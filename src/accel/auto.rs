@@ -16,7 +16,7 @@
 //! much less. So the hierarchy must save more than a sample may show by chance, and a little more, as a part of a scene favours
 //! it: of five large samples each of two meshes that both serve alike none showed a twentieth. Few shapes are cut alike by
 //! both, and scenes that are not large take no sample: one in proportion would tell nothing, and a larger one takes longer
-//! than what it may save.
+//! than what it may save. So it does in pictures with few pixels.
 
 use std::fmt;
 use std::str::FromStr;
@@ -52,6 +52,10 @@ const CHUNK: u32 = 1 << 12;
 
 /// The part of the octree's cost that the hierarchy must save.
 const WORTH: f64 = 1.0 / 20.0;
+
+/// Eye rays of a picture for each prim that is judged, at least: judging one takes as long as tracing a dozen eye rays and what
+/// comes of them, of which the better structure saves a part.
+const RAYS_A_PRIM: u64 = 64;
 
 /// What a block of eight triangles costs, in nodes of eight boxes.
 const BLOCK: f64 = 1.5;
@@ -118,6 +122,8 @@ pub struct Reason {
     pub rays: u64,
     /// Triangles and other prims that the sample was traced through; without one, all.
     pub prims: usize,
+    /// How many eye rays are too few for a sample, where that is why there is none.
+    pub few_rays: Option<u64>,
     /// Cost of a ray through `fast-octree`, in nodes.
     pub octree: f64,
     /// Cost of a ray through `fast-bvh`, in nodes.
@@ -133,9 +139,15 @@ impl Reason {
 
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { kind, rays, prims, octree, bvh } = *self;
+        let Self { kind, rays, prims, few_rays, octree, bvh } = *self;
         if self.is_one_tree() {
             return write!(f, "{kind}: {prims} shapes, and up to {ALIKE} are cut alike by fast-octree and fast-bvh");
+        }
+        if let Some(few) = few_rays {
+            return write!(
+                f,
+                "{kind}: {prims} shapes, and in a picture of {few} eye rays a sample would take longer than it may save"
+            );
         }
         let fewest = SHARE * FEWEST;
         if rays == 0 && prims >= fewest as usize {
@@ -156,29 +168,40 @@ impl fmt::Display for Reason {
     }
 }
 
-/// Builds what was asked for; the reason, where there was a choice. The same for every number of threads.
+/// Builds what was asked for, for however many rays; the reason, where there was a choice. The same for every number of
+/// threads.
 pub fn build<'a>(choice: AccelChoice, shapes: &'a Shapes, params: &AccelParams) -> (AnyAccel<'a>, Option<Reason>) {
+    build_for(u64::MAX, choice, shapes, params)
+}
+
+fn build_for<'a>(
+    eye_rays: u64,
+    choice: AccelChoice,
+    shapes: &'a Shapes,
+    params: &AccelParams,
+) -> (AnyAccel<'a>, Option<Reason>) {
     if let AccelChoice::Kind(kind) = choice {
         return (AnyAccel::build(kind, shapes, params), None);
     }
-    let reason = judge(shapes);
+    let reason = judge(shapes, eye_rays);
     (AnyAccel::build(reason.kind, shapes, params), Some(reason))
 }
 
-/// The same over `shapes` and what is `kept`: the larger one of both, shapes or objects, is the one that is judged.
+/// The same over `shapes` and what is `kept`, for so many eye rays: the larger one of both, shapes or objects, is the one that
+/// is judged.
 pub fn build_with<'a>(
+    eye_rays: u64,
     choice: AccelChoice,
-    shapes: &'a Shapes,
-    kept: &'a Kept,
+    (shapes, kept): (&'a Shapes, &'a Kept),
     params: &AccelParams,
 ) -> (AnyAccel<'a>, Option<Reason>) {
     if kept.is_empty() {
-        return build(choice, shapes, params);
+        return build_for(eye_rays, choice, shapes, params);
     }
     let (kind, reason) = match choice {
         AccelChoice::Kind(kind) => (kind, None),
         AccelChoice::Auto => {
-            let reason = reason(shapes, kept);
+            let reason = reason(shapes, kept, eye_rays);
             (reason.kind, Some(reason))
         }
     };
@@ -186,20 +209,21 @@ pub fn build_with<'a>(
 }
 
 /// What [`build_with`] would choose, and why, by the largest of what it builds trees over.
-pub fn reason(shapes: &Shapes, kept: &Kept) -> Reason {
+pub fn reason(shapes: &Shapes, kept: &Kept, eye_rays: u64) -> Reason {
     let objects = kept.objects().iter().map(Object::shapes);
     let largest = objects.fold(shapes, |a, b| if b.bounded() >= a.bounded() { b } else { a });
-    judge(largest)
+    judge(largest, eye_rays)
 }
 
-/// Judges a scene by a part of it, where it is large.
-fn judge(shapes: &Shapes) -> Reason {
+/// Judges a scene by a part of it, where it is large and so many eye rays pay for that.
+fn judge(shapes: &Shapes, eye_rays: u64) -> Reason {
     let bounded = shapes.bounded();
     let judged = (bounded / SHARE).min(MOST);
-    let starts = if judged < FEWEST { Vec::new() } else { over_surface(shapes, RAYS) };
+    let few_rays = (judged >= FEWEST && eye_rays < RAYS_A_PRIM * u64::from(judged)).then_some(eye_rays);
+    let starts = if judged < FEWEST || few_rays.is_some() { Vec::new() } else { over_surface(shapes, RAYS) };
     if starts.is_empty() {
         let (kind, prims) = (AccelKind::FastOctree, bounded as usize);
-        return Reason { kind, rays: 0, prims, octree: 0.0, bvh: 0.0 };
+        return Reason { kind, rays: 0, prims, few_rays, octree: 0.0, bvh: 0.0 };
     }
     let rays = sample(shapes, &starts);
     let count = (judged / PART).max(1);
@@ -215,7 +239,7 @@ fn judge(shapes: &Shapes) -> Reason {
     let costs: Vec<(f64, f64, usize)> = (0..count).into_par_iter().map(of_part).collect();
     let (octree, bvh, prims) = costs.iter().fold((0.0, 0.0, 0), |(o, b, n), of| (o + of.0, b + of.1, n + of.2));
     let kind = if bvh < octree * (1.0 - WORTH) { AccelKind::FastBvh } else { AccelKind::FastOctree };
-    Reason { kind, rays: rays.len() as u64, prims, octree, bvh }
+    Reason { kind, rays: rays.len() as u64, prims, few_rays: None, octree, bvh }
 }
 
 /// Of one ray, in nodes.
@@ -411,6 +435,16 @@ mod tests {
             assert_eq!((reason.kind, reason.rays), (AccelKind::FastOctree, 0), "{name}: {reason}");
         }
         let why = |each| chosen(&clumps(each)).to_string();
+        let clumps = clumps(2000);
+        let for_rays = |rays| build_for(rays, AccelChoice::Auto, &clumps, &AccelParams::DEFAULT).1.unwrap();
+        let judged = u64::from(clumps.bounded() / SHARE);
+        let (few, enough) = (for_rays(RAYS_A_PRIM * judged - 1), for_rays(RAYS_A_PRIM * judged));
+        assert_eq!(
+            (few.kind, few.rays, enough.kind),
+            (AccelKind::FastOctree, 0, AccelKind::FastBvh),
+            "{few}, {enough}"
+        );
+        assert!(few.to_string().contains(&format!("a picture of {} eye rays", RAYS_A_PRIM * judged - 1)), "{few}");
         assert!(why(10).contains("270 shapes") && why(10).contains("cut alike"), "{}", why(10));
         assert!(why(100).contains("2700 shapes") && why(100).contains("fewer than 32768"), "{}", why(100));
     }

@@ -108,12 +108,16 @@ impl<'a> Corners<'a> {
     fn of(mesh: &'a Mesh) -> Self {
         let mut used = vec![false; mesh.positions.len()];
         let mut there = true;
-        for &i in mesh.triangles.iter().flatten().chain(&mesh.polygon_corners) {
-            match used.get_mut(i as usize) {
-                Some(used) => *used = true,
-                None => there = false,
+        let mut mark = |corners: &[u32]| {
+            for &i in corners {
+                match used.get_mut(i as usize) {
+                    Some(used) => *used = true,
+                    None => there = false,
+                }
             }
-        }
+        };
+        mark(mesh.triangles.as_flattened());
+        mark(&mesh.polygon_corners);
         let mut corners = Self { mesh, used, bounds: None };
         let nothing = (Vec3::INFINITY, Vec3::NEG_INFINITY, there);
         let grow = |(lo, hi, finite): (Vec3, Vec3, bool), p: &Vec3| (lo.min(*p), hi.max(*p), finite && p.is_finite());

@@ -157,6 +157,14 @@ impl<'a> Reader<'a> {
         index: Index<Accessor>,
         pick: Pick,
     ) -> Result<Vec<[f32; N]>, Unreadable> {
+        let packed = |bytes: &[u8]| {
+            bytes.as_chunks::<4>().0.as_chunks::<N>().0.iter().map(|e| e.map(f32::from_le_bytes)).collect()
+        };
+        if let Pick::All = pick
+            && let Some(bytes) = self.packed(index, |format| is_floats::<N>(format))
+        {
+            return Ok(packed(bytes));
+        }
         self.elements(index, pick, [0.0; N], |element, format| match stored::<N>(element, format) {
             Some(floats) => floats,
             None => std::array::from_fn(|k| if k < format.width() { float(element, format, k) } else { 0.0 }),
@@ -172,6 +180,27 @@ impl<'a> Reader<'a> {
         self.elements(index, pick, [0; N], |element, format| {
             std::array::from_fn(|k| if k < format.width() { integer(element, format, k) } else { 0 })
         })
+    }
+
+    /// Reads scalars of unsigned integers, all of them.
+    pub(super) fn indices(&self, index: Index<Accessor>) -> Result<Vec<u32>, Unreadable> {
+        let packed = |component| self.packed(index, |format| format.component == component && format.width() == 1);
+        if let Some(bytes) = packed(ComponentType::U32) {
+            return Ok(bytes.as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect());
+        }
+        if let Some(bytes) = packed(ComponentType::U16) {
+            return Ok(bytes.as_chunks().0.iter().map(|bytes| u32::from(u16::from_le_bytes(*bytes))).collect());
+        }
+        self.elements(index, Pick::All, 0, |element, format| integer(element, format, 0))
+    }
+
+    /// The bytes of all elements of an accessor that lie one after the other, are there, and are of such a format: most are.
+    fn packed(&self, index: Index<Accessor>, is_wanted: impl Fn(Format) -> bool) -> Option<&'a [u8]> {
+        let accessor = self.root.accessors.get(index.value()).filter(|accessor| accessor.sparse.is_none())?;
+        let format = Format::of(accessor).filter(|format| is_wanted(*format))?;
+        let run = self.run(index, accessor, format).ok()??;
+        let bytes = usize::try_from(accessor.count.0).ok()?.checked_mul(format.size())?;
+        run.bytes.get(..bytes).filter(|_| run.stride == format.size())
     }
 
     /// How many elements an accessor declares.
@@ -233,10 +262,14 @@ impl<'a> Reader<'a> {
         let mut values = match self.run(index, accessor, format)? {
             Some(run) => {
                 let read = |element| read(element, format);
-                let values: Vec<T> = match pick {
-                    Pick::All => run.elements(count).map(read).collect(),
-                    Pick::Only(list) => list.iter().map_while(|&i| run.element(i as usize)).map(read).collect(),
-                };
+                // There is a byte for each at least, so that so many fit.
+                let mut values: Vec<T> = Vec::with_capacity(wanted.min(run.len()));
+                match pick {
+                    Pick::All => values.extend(run.elements(count).map(read)),
+                    Pick::Only(list) => {
+                        values.extend(list.iter().map_while(|&i| run.element(i as usize)).map(read));
+                    }
+                }
                 if values.len() < wanted {
                     return Err(short(count, run.len()));
                 }
@@ -289,11 +322,14 @@ fn short(count: usize, found: usize) -> Unreadable {
 /// The floats of an element that holds just `N`, one after the other: nearly all of them.
 #[inline(always)]
 fn stored<const N: usize>(element: &[u8], format: Format) -> Option<[f32; N]> {
-    if format.component != ComponentType::F32 || format.is_matrix() || format.width() != N {
-        return None;
-    }
-    let floats = element.as_chunks::<4>().0.first_chunk::<N>()?;
+    let floats = element.as_chunks::<4>().0.first_chunk::<N>().filter(|_| is_floats::<N>(format))?;
     Some(floats.map(f32::from_le_bytes))
+}
+
+/// Whether elements are `N` floats, one after the other.
+#[inline(always)]
+fn is_floats<const N: usize>(format: Format) -> bool {
+    format.component == ComponentType::F32 && !format.is_matrix() && format.width() == N
 }
 
 /// `N` bytes of an element; zeros past its end, where nobody reads.

@@ -2,15 +2,20 @@
 
 use crate::math::{Vec2, Vec3, Vec4};
 use crate::scene::Mesh;
+use bytemuck::allocation::try_cast_vec;
 use gltf::json::mesh::Mode;
 
 /// The triangles of a primitive as glTF 2.0 §3.7.2.1 orders their corners.
 ///
 /// `None` for points and lines. Corners left over make no face.
-pub(super) fn triangles(mode: Mode, corners: &[u32]) -> Option<Vec<[u32; 3]>> {
+pub(super) fn triangles(mode: Mode, mut corners: Vec<u32>) -> Option<Vec<[u32; 3]>> {
     let mut triangles: Vec<[u32; 3]> = Vec::new();
     match mode {
-        Mode::Triangles => triangles.extend(corners.chunks_exact(3).map(|t| [t[0], t[1], t[2]])),
+        Mode::Triangles => {
+            corners.truncate(corners.len() / 3 * 3);
+            // In the same memory, where there is just enough of it.
+            return Some(try_cast_vec(corners).unwrap_or_else(|(_, corners)| corners.as_chunks().0.to_vec()));
+        }
         Mode::TriangleStrip => {
             let strip = corners.windows(3).enumerate();
             triangles.extend(strip.map(|(i, t)| if i % 2 == 0 { [t[0], t[1], t[2]] } else { [t[0], t[2], t[1]] }));
@@ -82,24 +87,29 @@ pub(super) struct Dropped {
 /// `joined` says that repeated indices join strips and are no fault.
 pub(super) fn clean(mesh: &mut Mesh, joined: bool) -> Dropped {
     let mut dropped = Dropped::default();
-    let mut faces = Vec::new();
-    let mut kept = Vec::with_capacity(mesh.triangles.len());
-    for (face, triangle) in mesh.triangles.iter().enumerate() {
-        let p = triangle.map(|v| mesh.positions.get(v as usize).copied().unwrap_or(Vec3::NAN));
-        let [a, b, c] = *triangle;
-        if !p.iter().all(|p| p.is_finite()) {
-            dropped.not_finite += 1;
-        } else if p[0] == p[1] || p[1] == p[2] || p[2] == p[0] {
-            let joint = joined && (a == b || b == c || c == a);
-            dropped.degenerate += u64::from(!joint);
-        } else {
-            kept.push(*triangle);
-            faces.push(face as u32);
+    let places = |triangle: &[u32; 3]| triangle.map(|v| mesh.positions.get(v as usize).copied().unwrap_or(Vec3::NAN));
+    let is_finite = |[a, b, c]: [Vec3; 3]| a.is_finite() && b.is_finite() && c.is_finite();
+    let has_three = |[a, b, c]: [Vec3; 3]| a != b && b != c && c != a;
+    let can_be_drawn = |triangle: &[u32; 3]| {
+        let places = places(triangle);
+        is_finite(places) && has_three(places)
+    };
+    // Mostly all of them.
+    if !mesh.triangles.iter().all(can_be_drawn) {
+        let (mut kept, mut faces) = (Vec::new(), Vec::new());
+        for (face, triangle) in mesh.triangles.iter().enumerate() {
+            let (places, [a, b, c]) = (places(triangle), *triangle);
+            if !is_finite(places) {
+                dropped.not_finite += 1;
+            } else if !has_three(places) {
+                let joint = joined && (a == b || b == c || c == a);
+                dropped.degenerate += u64::from(!joint);
+            } else {
+                kept.push(*triangle);
+                faces.push(face as u32);
+            }
         }
-    }
-    if kept.len() < mesh.triangles.len() {
-        mesh.face_of_triangle = faces;
-        mesh.triangles = kept;
+        (mesh.triangles, mesh.face_of_triangle) = (kept, faces);
     }
     compact(mesh);
     dropped
@@ -108,9 +118,7 @@ pub(super) fn clean(mesh: &mut Mesh, joined: bool) -> Dropped {
 /// Takes out vertices that no triangle uses.
 fn compact(mesh: &mut Mesh) {
     let mut used = vec![false; mesh.positions.len()];
-    for &vertex in mesh.triangles.iter().flatten() {
-        used[vertex as usize] = true;
-    }
+    mesh.triangles.as_flattened().iter().for_each(|&vertex| used[vertex as usize] = true);
     if used.iter().all(|&used| used) {
         return;
     }
@@ -208,12 +216,17 @@ mod tests {
 
     #[test]
     fn strips_turn_every_second_face_and_fans_share_their_first_corner() {
-        let corners = [10, 11, 12, 13, 14];
-        assert_eq!(triangles(Mode::Triangles, &corners), Some(vec![[10, 11, 12]]));
-        assert_eq!(triangles(Mode::TriangleStrip, &corners), Some(vec![[10, 11, 12], [11, 13, 12], [12, 13, 14]]));
-        assert_eq!(triangles(Mode::TriangleFan, &corners), Some(vec![[11, 12, 10], [12, 13, 10], [13, 14, 10]]));
-        assert_eq!(triangles(Mode::TriangleFan, &[]), Some(vec![]));
-        assert_eq!(triangles(Mode::LineStrip, &corners), None);
+        let of = |mode| triangles(mode, vec![10, 11, 12, 13, 14]);
+        assert_eq!(of(Mode::Triangles), Some(vec![[10, 11, 12]]));
+        assert_eq!(of(Mode::TriangleStrip), Some(vec![[10, 11, 12], [11, 13, 12], [12, 13, 14]]));
+        assert_eq!(of(Mode::TriangleFan), Some(vec![[11, 12, 10], [12, 13, 10], [13, 14, 10]]));
+        assert_eq!(triangles(Mode::TriangleFan, Vec::new()), Some(vec![]));
+        assert_eq!(of(Mode::LineStrip), None);
+        for room in 6..10 {
+            let mut corners = Vec::with_capacity(room);
+            corners.extend([0, 1, 2, 2, 1, 3]);
+            assert_eq!(triangles(Mode::Triangles, corners), Some(vec![[0, 1, 2], [2, 1, 3]]), "room for {room}");
+        }
     }
 
     #[test]

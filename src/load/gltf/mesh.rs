@@ -119,10 +119,8 @@ impl Task<'_, '_> {
             Some(corners) => corners,
             None => (0..u32::try_from(mesh.positions.len()).ok()?).collect(),
         };
-        let triangles = faces::triangles(mode, &corners);
         let lines = faces::lines(mode, &corners);
-        drop(corners);
-        mesh.triangles = triangles.unwrap_or_default();
+        mesh.triangles = faces::triangles(mode, corners).unwrap_or_default();
         self.attributes(&mut mesh);
         self.morph(&mut mesh);
         self.directions(&mut mesh);
@@ -181,8 +179,8 @@ impl Task<'_, '_> {
         if format.shape != Type::Scalar || !is_unsigned(format.component) {
             return None;
         }
-        let result = self.reader.integers::<1>(index, Pick::All);
-        let mut corners: Vec<u32> = self.sort_out(result, "indices")?.into_iter().map(|[i]| i).collect();
+        let result = self.reader.indices(index);
+        let mut corners = self.sort_out(result, "indices")?;
         let restart = match format.component {
             ComponentType::U8 => 0xff,
             ComponentType::U16 => 0xffff,

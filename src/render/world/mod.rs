@@ -115,12 +115,27 @@ impl World {
     ///
     /// It may, with parameters that [`AccelParams::validate`] refuses.
     pub fn structure(&self, choice: AccelChoice, params: &AccelParams) -> (AnyAccel<'_>, Option<Reason>) {
-        auto::build_with(choice, &self.shapes, &self.kept, params)
+        self.structure_for(u64::MAX, choice, params)
+    }
+
+    /// The same for pictures that begin with so many eye rays together: where these are few, finding out what suits them takes
+    /// longer than it may save, and [`AccelChoice::Auto`] is `fast-octree`.
+    ///
+    /// # Panics
+    ///
+    /// It may, with parameters that [`AccelParams::validate`] refuses.
+    pub fn structure_for(
+        &self,
+        eye_rays: u64,
+        choice: AccelChoice,
+        params: &AccelParams,
+    ) -> (AnyAccel<'_>, Option<Reason>) {
+        auto::build_with(eye_rays, choice, (&self.shapes, &self.kept), params)
     }
 
     /// Which structure [`AccelChoice::Auto`] is, and why.
     pub fn judged(&self) -> Reason {
-        auto::reason(&self.shapes, &self.kept)
+        auto::reason(&self.shapes, &self.kept, u64::MAX)
     }
 
     /// Number of prims of all kinds, those of an object once for each place where it stands.

@@ -8,7 +8,7 @@ use crate::math::frame::{center_of_most, spread};
 use crate::math::{DAffine3, DVec3, Vec3};
 use crate::render::keeping::{Instancing, Keeping};
 use crate::scene::corners::{Hull, take_in};
-use crate::scene::{Instance, Scene};
+use crate::scene::{Instance, Mesh, Scene};
 use rayon::prelude::*;
 
 /// Bytes that a triangle takes at least when it is placed by itself, with the fast structure that takes least while it is
@@ -45,6 +45,12 @@ impl<'a> Placing<'a> {
     pub fn world(self) -> World {
         let Self { scene, bounds, center, solids, keeping: Keeping { mut kept, places } } = self;
         let mut shapes = Shapes::default();
+        let alone = || scene.instances.iter().zip(&places).filter(|(_, place)| place.is_none());
+        let all = |size: fn(&Mesh) -> usize| alone().map(|(i, _)| size(&scene.meshes[i.mesh as usize])).sum();
+        shapes.vertices.reserve_exact(all(|mesh| mesh.positions.len()));
+        shapes.triangles.reserve_exact(all(|mesh| mesh.triangles.len()));
+        shapes.polygons.reserve_exact(all(|mesh| mesh.polygons.len()));
+        shapes.polygon_corners.reserve_exact(all(|mesh| mesh.polygon_corners.len()));
         let (mut first_triangle, mut first_polygon) = (Vec::new(), Vec::new());
 
         // Triangles and polygons, instance by instance, so that prim ids follow the file's order.

@@ -144,42 +144,51 @@ fn gather_faces<T: Send>(
     add: &(impl Fn(&mut T, &Part) + Sync),
     join: &impl Fn(&mut T, T),
 ) {
+    let origin = world_from_object.translation;
+    if *world_from_object == DAffine3::IDENTITY {
+        let place = |i: u32| mesh.positions.get(i as usize).map_or(origin, |p| p.as_dvec3());
+        return Faces { mesh, place }.gather(all, nothing, add, join);
+    }
     // Faces share their corners.
     let world = |p: &Vec3| world_from_object.transform_point3(p.as_dvec3());
     let places: Vec<DVec3> = mesh.positions.par_iter().with_min_len(CHUNK).map(world).collect();
-    let faces = Faces { mesh, origin: world_from_object.translation, places: &places };
-    let of = |triangles: &[[u32; 3]]| {
-        let mut sum = nothing();
-        faces.visit(triangles, |part| add(&mut sum, part));
-        sum
-    };
-    match mesh.triangles.len() {
-        ..=CHUNK => faces.visit(&mesh.triangles, |part| add(all, part)),
-        _ => {
-            let sums: Vec<T> = mesh.triangles.par_chunks(CHUNK).map(of).collect();
-            sums.into_iter().for_each(|sum| join(all, sum));
-        }
-    }
-    faces.visit_polygons(|part| add(all, part));
+    let place = |i: u32| places.get(i as usize).copied().unwrap_or(origin);
+    Faces { mesh, place }.gather(all, nothing, add, join);
 }
 
 /// The faces of an instance.
-struct Faces<'a> {
+struct Faces<'a, P> {
     mesh: &'a Mesh,
-    /// Where the instance stands, world space.
-    origin: DVec3,
-    /// World space.
-    places: &'a [DVec3],
+    /// Where vertices are, world space; where the instance is, if there is none of a number.
+    place: P,
 }
 
-impl Faces<'_> {
-    fn corner(&self, i: u32) -> DVec3 {
-        self.places.get(i as usize).copied().unwrap_or(self.origin)
+impl<P: Fn(u32) -> DVec3 + Sync> Faces<'_, P> {
+    fn gather<T: Send>(
+        &self,
+        all: &mut T,
+        nothing: &(impl Fn() -> T + Sync),
+        add: &(impl Fn(&mut T, &Part) + Sync),
+        join: &impl Fn(&mut T, T),
+    ) {
+        let of = |triangles: &[[u32; 3]]| {
+            let mut sum = nothing();
+            self.visit(triangles, |part| add(&mut sum, part));
+            sum
+        };
+        match self.mesh.triangles.len() {
+            ..=CHUNK => self.visit(&self.mesh.triangles, |part| add(all, part)),
+            _ => {
+                let sums: Vec<T> = self.mesh.triangles.par_chunks(CHUNK).map(of).collect();
+                sums.into_iter().for_each(|sum| join(all, sum));
+            }
+        }
+        self.visit_polygons(|part| add(all, part));
     }
 
     fn visit(&self, triangles: &[[u32; 3]], mut f: impl FnMut(&Part)) {
         for triangle in triangles {
-            Part::face(triangle.map(|i| self.corner(i))).iter().for_each(&mut f);
+            Part::face(triangle.map(&self.place)).iter().for_each(&mut f);
         }
     }
 
@@ -189,7 +198,7 @@ impl Faces<'_> {
             let run = polygon.first as usize..(polygon.first + polygon.len) as usize;
             let corners = self.mesh.polygon_corners.get(run).unwrap_or_default();
             for pair in corners.windows(2).skip(1) {
-                Part::face([corners[0], pair[0], pair[1]].map(|i| self.corner(i))).iter().for_each(&mut f);
+                Part::face([corners[0], pair[0], pair[1]].map(&self.place)).iter().for_each(&mut f);
             }
         }
     }

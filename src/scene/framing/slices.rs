@@ -17,6 +17,11 @@ const GAP: f64 = 0.5;
 /// Slices a box is cut into along each axis to look for gaps.
 const SLICES: usize = 256;
 
+/// Triangles of a mesh are noted in so many rounds, one from all over it after the other: the first mostly leaves no gap …
+const ROUNDS: usize = 8;
+/// … unless there are so few that asking would take longer.
+const FEW: usize = 1 << 10;
+
 /// How much of the model lies in each slice along each axis.
 pub(super) struct Slices {
     lo: DVec3,
@@ -73,7 +78,8 @@ impl Slices {
         }
     }
 
-    /// Notes how far every triangle of a mesh reaches; `None` when a corner of one is nowhere.
+    /// Notes how far every triangle of a mesh reaches, or some from all over it where these leave no gap; `None` when a
+    /// corner of one is nowhere.
     ///
     /// `cells` is room for the slices that its vertices are in.
     pub(super) fn cover(&mut self, instance: &Instance, mesh: &Mesh, cells: &mut Vec<VertexCell>) -> Option<()> {
@@ -83,18 +89,27 @@ impl Slices {
             let cell = || [0, 1, 2].map(|axis| self.slice(axis, p[axis]) as u8);
             p.is_finite().then(cell)
         };
-        if mesh.triangles.len().max(mesh.positions.len()) <= CHUNK {
+        if mesh.positions.len() <= CHUNK {
             cells.clear();
             cells.extend(mesh.positions.iter().map(cell));
-            return self.reached.note_all(&mesh.triangles, cells);
+        } else {
+            mesh.positions.par_iter().with_min_len(CHUNK).map(cell).collect_into_vec(cells);
         }
-        mesh.positions.par_iter().with_min_len(CHUNK).map(cell).collect_into_vec(cells);
-        let of = |triangles: &[[u32; 3]]| {
-            let mut reached = Reached::default();
-            reached.note_all(triangles, cells).map(|()| reached)
-        };
-        let parts: Vec<Reached> = mesh.triangles.par_chunks(CHUNK).map(of).collect::<Option<_>>()?;
-        parts.iter().for_each(|part| self.reached.join(part));
+        if mesh.triangles.len() <= FEW {
+            return self.reached.note_all(mesh.triangles.iter(), cells);
+        }
+        for round in 0..ROUNDS {
+            let of = |triangles: &[[u32; 3]]| {
+                let mut reached = Reached::default();
+                let some = triangles.iter().skip(round).step_by(ROUNDS);
+                reached.note_all(some, cells).map(|()| reached)
+            };
+            let parts: Vec<Reached> = mesh.triangles.par_chunks(CHUNK).map(of).collect::<Option<_>>()?;
+            parts.iter().for_each(|part| self.reached.join(part));
+            if self.has_no_gap() {
+                break;
+            }
+        }
         Some(())
     }
 
@@ -153,7 +168,8 @@ impl Slices {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the slices there are")]
     #[inline]
     fn slice(&self, axis: usize, x: f64) -> usize {
-        ((x - self.lo[axis]) * self.per_unit[axis]).clamp(0.0, (SLICES - 1) as f64) as usize
+        // In 32 bits, which processors convert to at once.
+        ((x - self.lo[axis]) * self.per_unit[axis]).clamp(0.0, (SLICES - 1) as f64) as u32 as usize
     }
 
     /// First and last slice along each axis without the ends that come off; `None` when nothing comes off.
@@ -243,7 +259,7 @@ impl Reached {
     }
 
     /// Notes triangles whose vertices are in these cells; `None` where one is nowhere.
-    fn note_all(&mut self, triangles: &[[u32; 3]], cells: &[VertexCell]) -> Option<()> {
+    fn note_all<'t>(&mut self, triangles: impl Iterator<Item = &'t [u32; 3]>, cells: &[VertexCell]) -> Option<()> {
         for triangle in triangles {
             let [a, b, c] = triangle.map(|i| cells.get(i as usize).copied().flatten());
             let (a, b, c) = (a?, b?, c?);
