@@ -146,7 +146,7 @@ impl fmt::Display for Reason {
         if let Some(few) = few_rays {
             return write!(
                 f,
-                "{kind}: {prims} shapes, and in a picture of {few} eye rays a sample would take longer than it may save"
+                "{kind}: {prims} shapes, and for what begins with {few} eye rays a sample would take longer than it may save"
             );
         }
         let fewest = SHARE * FEWEST;
@@ -444,7 +444,7 @@ mod tests {
             (AccelKind::FastOctree, 0, AccelKind::FastBvh),
             "{few}, {enough}"
         );
-        assert!(few.to_string().contains(&format!("a picture of {} eye rays", RAYS_A_PRIM * judged - 1)), "{few}");
+        assert!(few.to_string().contains(&format!("begins with {} eye rays", RAYS_A_PRIM * judged - 1)), "{few}");
         assert!(why(10).contains("270 shapes") && why(10).contains("cut alike"), "{}", why(10));
         assert!(why(100).contains("2700 shapes") && why(100).contains("fewer than 32768"), "{}", why(100));
     }

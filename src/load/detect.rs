@@ -3,6 +3,7 @@
 //! Kinds that cannot be read are named, so that the user knows what to do.
 
 use super::stl::{self, Encoding};
+use super::text::without_mark;
 use super::{Diagnostic, Source};
 use std::path::Path;
 
@@ -71,7 +72,7 @@ const FOREIGN_EXTENSIONS: &[(&str, &str)] = &[
 
 /// Names the kind of `source`, or says what it is instead.
 pub(super) fn detect(source: &Source) -> Result<Format, Diagnostic> {
-    let bytes = source.bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&source.bytes);
+    let bytes = without_mark(&source.bytes);
     let text = bytes.trim_ascii_start();
     let extension = source.path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
 

@@ -9,6 +9,7 @@ pub mod json;
 pub mod markdown;
 pub mod sweep;
 pub mod table;
+mod tables;
 pub mod text;
 
 use super::clock::Spread;

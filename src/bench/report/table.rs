@@ -12,11 +12,13 @@ pub struct Table {
 }
 
 impl Table {
-    /// For a terminal: each column as wide as it must be, all but the first flush right.
+    /// For a terminal: each column as wide as it must be, and so wide at least that those of most tables stand below each other;
+    /// all but the first flush right.
     pub fn text(&self) -> String {
         let lines = || std::iter::once(&self.columns).chain(&self.rows);
         let width = |i: usize| lines().filter_map(|l| l.get(i)).map(|c| c.chars().count()).max().unwrap_or(0);
-        let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
+        let least = |i: usize| if i == 0 { 12 } else { 8 };
+        let widths: Vec<usize> = (0..self.columns.len()).map(|i| width(i).max(least(i))).collect();
         let mut out = format!("{}\n", self.title);
         for line in lines() {
             let mut text = String::new();
@@ -47,18 +49,19 @@ mod tests {
         Table {
             title: "Legs".into(),
             columns: words(&["beast", "legs"]),
-            rows: vec![words(&["cow", "4"]), words(&["millipede", "1 306"])],
+            rows: vec![words(&["cow", "4"]), words(&["a millipede's", "1 306"])],
         }
     }
 
     #[test]
     fn columns_of_text_are_flush() {
-        assert_eq!(table().text(), "Legs\nbeast       legs\ncow            4\nmillipede  1 306\n");
+        let expected = ["Legs", "beast              legs", "cow                   4", "a millipede's     1 306"];
+        assert_eq!(table().text().lines().collect::<Vec<_>>(), expected);
     }
 
     #[test]
     fn markdown_has_a_rule_under_its_heads() {
-        let expected = "### Legs\n\n| beast | legs |\n|---|--:|\n| cow | 4 |\n| millipede | 1 306 |\n";
+        let expected = "### Legs\n\n| beast | legs |\n|---|--:|\n| cow | 4 |\n| a millipede's | 1 306 |\n";
         assert_eq!(table().markdown(), expected);
     }
 }

@@ -142,7 +142,7 @@ impl Report {
             }
             Format::Html => {
                 let said: String = self.verdicts().iter().map(|v| html::paragraph(v)).collect();
-                let tables: String = self.tables().iter().map(html::table_of).collect();
+                let tables: String = self.tables().iter().map(html::table).collect();
                 let notes: String = self.note_lines().iter().map(|n| html::paragraph(n)).collect();
                 let body = format!("{said}{tables}<section><h2>How to read it</h2>{notes}</section>");
                 html::page("Standard Procedural Databases, ours beside the figures of 1999", &body)

@@ -90,12 +90,10 @@ pub(super) fn clean(mesh: &mut Mesh, joined: bool) -> Dropped {
     let places = |triangle: &[u32; 3]| triangle.map(|v| mesh.positions.get(v as usize).copied().unwrap_or(Vec3::NAN));
     let is_finite = |[a, b, c]: [Vec3; 3]| a.is_finite() && b.is_finite() && c.is_finite();
     let has_three = |[a, b, c]: [Vec3; 3]| a != b && b != c && c != a;
-    let can_be_drawn = |triangle: &[u32; 3]| {
-        let places = places(triangle);
-        is_finite(places) && has_three(places)
-    };
-    // Mostly all of them.
-    if !mesh.triangles.iter().all(can_be_drawn) {
+    // Mostly all of them can be drawn.
+    let are_finite = mesh.positions.iter().fold(true, |all, p| all & p.is_finite());
+    let is_there = |triangle: &[u32; 3]| triangle.iter().all(|&v| (v as usize) < mesh.positions.len());
+    if !are_finite || !mesh.triangles.iter().all(|triangle| is_there(triangle) && has_three(places(triangle))) {
         let (mut kept, mut faces) = (Vec::new(), Vec::new());
         for (face, triangle) in mesh.triangles.iter().enumerate() {
             let (places, [a, b, c]) = (places(triangle), *triangle);

@@ -1,22 +1,17 @@
 //! The values of a PLY file, one after another, as text or as bytes.
 
 use super::header::{Element, Encoding, Header, Kind};
-use crate::load::number::{self, Respelled};
 use crate::load::paths::shorten;
+use crate::load::text::words::Words;
 use crate::load::{Diagnostic, Source};
 use std::path::Path;
 
 /// Where the reading is. Whole numbers of every kind are exact in `f64`.
 pub(super) struct Body<'a> {
     file: &'a Path,
-    bytes: &'a [u8],
-    at: usize,
+    /// Of a text; elsewhere only where the reading is.
+    pub words: Words<'a>,
     encoding: Encoding,
-    /// Line of the last value of a text.
-    line: u32,
-    /// Decimal places of the finest number of a text.
-    pub places: i32,
-    pub respelled: Respelled,
 }
 
 /// Why there is no value.
@@ -30,24 +25,15 @@ pub(super) enum Missing {
 impl<'a> Body<'a> {
     /// The values behind the header.
     pub(super) fn new(header: &Header, source: &'a Source) -> Self {
-        let line = header.lines.saturating_add(1);
-        let (file, bytes) = (source.path.as_path(), source.bytes.as_slice());
-        Self {
-            file,
-            bytes,
-            at: header.length,
-            encoding: header.encoding,
-            line,
-            places: 0,
-            respelled: Respelled::default(),
-        }
+        let words = Words::new(&source.bytes, header.length, header.lines.saturating_add(1));
+        Self { file: &source.path, words, encoding: header.encoding }
     }
 
     /// A fault of the value read last, or of the one that is missing.
     pub(super) fn fault(&self, text: impl Into<String>, remedy: &str) -> Diagnostic {
         let place = match self.encoding {
-            Encoding::Text => self.line.to_string(),
-            _ => format!("byte {}", self.at),
+            Encoding::Text => self.words.line.to_string(),
+            _ => format!("byte {}", self.words.at),
         };
         Diagnostic::new("ply-body", self.file, place, text).remedy(remedy)
     }
@@ -67,13 +53,13 @@ impl<'a> Body<'a> {
 
     /// Bytes that have not been read.
     pub(super) fn left(&self) -> u64 {
-        (self.bytes.len() - self.at.min(self.bytes.len())) as u64
+        self.words.rest().len() as u64
     }
 
     /// A warning when something follows what the header counts. Blanks do not count, nor does what the last line of a text
     /// ends with.
     pub(super) fn behind(&self) -> Option<Diagnostic> {
-        let rest = self.bytes.get(self.at..).unwrap_or_default();
+        let rest = self.words.rest();
         let rest = if self.encoding == Encoding::Text { rest.trim_ascii() } else { rest };
         (!rest.is_empty()).then(|| {
             let text = format!("{} bytes follow what the header counts", rest.len());
@@ -119,8 +105,8 @@ impl<'a> Body<'a> {
     /// The next bytes, lowest first.
     #[inline]
     fn take<const N: usize>(&mut self, big: bool) -> Result<[u8; N], Missing> {
-        let mut bytes = *self.bytes.get(self.at..).and_then(<[u8]>::first_chunk::<N>).ok_or(Missing::End)?;
-        self.at += N;
+        let mut bytes = *self.words.rest().first_chunk::<N>().ok_or(Missing::End)?;
+        self.words.at += N;
         if big {
             bytes.reverse();
         }
@@ -132,43 +118,24 @@ impl<'a> Body<'a> {
         if self.encoding != Encoding::Text {
             return None;
         }
-        let last = self.line;
-        self.pass_blanks();
-        (self.at < self.bytes.len()).then_some([self.line, last])
+        let last = self.words.line;
+        self.words.find().then(|| [self.words.line, last])
     }
 
-    /// The next word of a text, which must be a number; words may stand on any lines.
-    fn number(&mut self) -> Result<f64, Missing> {
-        self.pass_blanks();
-        let rest = self.bytes.get(self.at..).filter(|rest| !rest.is_empty()).ok_or(Missing::End)?;
-        if let Some(plain) = number::plain(rest) {
-            self.at += plain.length;
-            self.places = self.places.max(plain.places);
-            return Ok(plain.value);
-        }
-        let length = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
-        let word = &rest[..length];
-        let lost = || Missing::Word(String::from_utf8_lossy(word).into_owned());
-        let value = self.respelled.value(self.line, word).ok_or_else(lost)?;
-        self.at += length;
-        Ok(value)
-    }
-
+    /// The next word of a text, which must be a number.
     #[inline]
-    fn pass_blanks(&mut self) {
-        while let Some(&b) = self.bytes.get(self.at).filter(|b| b.is_ascii_whitespace()) {
-            // CR LF is one line end, counted at its second half.
-            let ends = b == b'\n' || (b == b'\r' && self.bytes.get(self.at + 1) != Some(&b'\n'));
-            self.line = self.line.saturating_add(u32::from(ends));
-            self.at += 1;
-        }
+    fn number(&mut self) -> Result<f64, Missing> {
+        self.words.number().map_err(|word| match word {
+            [] => Missing::End,
+            word => Missing::Word(String::from_utf8_lossy(word).into_owned()),
+        })
     }
 
     /// Passes over `count` values of a binary file, of `size` bytes each; whether there are so many.
     fn skip(&mut self, count: u64, size: usize) -> bool {
         let bytes = count.checked_mul(size as u64).filter(|&bytes| bytes <= self.left());
         // As many bytes as there are in memory.
-        self.at += bytes.map_or(0, |bytes| bytes as usize);
+        self.words.at += bytes.map_or(0, |bytes| bytes as usize);
         bytes.is_some()
     }
 

@@ -31,14 +31,14 @@ pub(super) fn read(header: &Header, source: &Source, budget: &mut Budget) -> Res
     }
     let Reader { body, mut bare, torn, odd, .. } = reader;
     let behind = body.behind();
-    bare.places = (header.encoding == Encoding::Text).then_some(body.places);
+    bare.places = (header.encoding == Encoding::Text).then_some(body.words.places);
     bare.comments.clone_from(&header.comments);
     bare.told = passed_over(header, &source.path);
     bare.told.extend(odd.told(&source.path));
     // Rows may share lines; where they do by mistake, numbers are left in the end.
     bare.told.extend(torn.filter(|_| behind.is_some()));
     bare.told.extend(behind);
-    bare.told.extend(body.respelled.told("ply-number", &source.path));
+    bare.told.extend(body.words.respelled.told("ply-number", &source.path));
     Ok(bare)
 }
 

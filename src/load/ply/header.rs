@@ -3,6 +3,7 @@
 use crate::load::Diagnostic;
 use crate::load::mtl::unquote;
 use crate::load::paths::shorten;
+use crate::load::text::without_mark;
 use std::path::Path;
 
 /// How values are written.
@@ -153,8 +154,7 @@ struct Lines<'a> {
 impl<'a> Lines<'a> {
     fn new(bytes: &'a [u8]) -> Self {
         let first = bytes.iter().position(|b| matches!(b, b'\n' | b'\r')).unwrap_or(bytes.len());
-        // A byte-order mark.
-        let at = if bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
+        let at = bytes.len() - without_mark(bytes).len();
         let end = match &bytes[first..] {
             [b'\r', b'\n', ..] => b'\n',
             [b'\r', ..] => b'\r',

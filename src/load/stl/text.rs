@@ -5,8 +5,8 @@
 
 use super::Triangles;
 use crate::load::geometry::bare::Bare;
-use crate::load::number::{self, Respelled};
 use crate::load::paths::shorten;
+use crate::load::text::{without_mark, words};
 use crate::load::{Diagnostic, Source};
 use crate::math::DVec3;
 use std::path::Path;
@@ -19,10 +19,8 @@ use std::path::Path;
 pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnostic> {
     // Zeros fill the last block of what was copied in blocks.
     let length = source.bytes.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
-    let bytes = &source.bytes[..length];
-    let mut words = Words { file: &source.path, bytes, at: 0, line: 1, places: 0, respelled: Respelled::default() };
-    // A byte-order mark.
-    words.at = if source.bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
+    let bytes = without_mark(&source.bytes[..length]);
+    let mut words = Words { file: &source.path, words: words::Words::new(bytes, 0, 1) };
     let (mut names, mut open) = (Vec::new(), false);
     while let Some(word) = words.next() {
         if is(word, "solid") {
@@ -35,14 +33,15 @@ pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnost
             out.add(facet(&mut words)?, None)?;
         } else if is(word, "endsolid") {
             open = false;
-            words.rest_of_line();
+            words.words.rest_of_line();
         } else if word.starts_with(b"#") {
-            words.rest_of_line();
+            words.words.rest_of_line();
         } else {
             return Err(words.fault(word, "`solid`, `facet` or `endsolid`"));
         }
     }
     let mut bare = out.bare;
+    let words = words.words;
     bare.places = Some(words.places);
     bare.comments = names;
     bare.told.extend(words.respelled.told("stl-number", &source.path));
@@ -79,50 +78,28 @@ fn is(word: &[u8], keyword: &str) -> bool {
 
 struct Words<'a> {
     file: &'a Path,
-    bytes: &'a [u8],
-    at: usize,
-    /// Of the word read last.
-    line: u32,
-    /// Decimal places of the finest number.
-    places: i32,
-    respelled: Respelled,
+    words: words::Words<'a>,
 }
 
 impl<'a> Words<'a> {
     fn next(&mut self) -> Option<&'a [u8]> {
-        while let Some(&b) = self.bytes.get(self.at).filter(|b| b.is_ascii_whitespace()) {
-            // CR LF is one line end, counted at its second half.
-            let ends = b == b'\n' || (b == b'\r' && self.bytes.get(self.at + 1) != Some(&b'\n'));
-            self.line = self.line.saturating_add(u32::from(ends));
-            self.at += 1;
-        }
-        let rest = &self.bytes[self.at..];
-        let length = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
-        self.at += length;
-        Some(&rest[..length]).filter(|word| !word.is_empty())
+        self.words.next()
     }
 
     /// The name of a solid, which may be of any words: up to the end of the line, or the first facet on it.
     fn name(&mut self) -> String {
-        let start = self.at;
-        let name = self.rest_of_line();
+        let start = self.words.at;
+        let name = String::from_utf8_lossy(self.words.rest_of_line().trim_ascii()).into_owned();
         let words: Vec<&str> = name.split_ascii_whitespace().collect();
         let Some(before) = words.windows(2).position(|w| is(w[0].as_bytes(), "facet") && is(w[1].as_bytes(), "normal"))
         else {
             return name;
         };
-        self.at = start;
+        self.words.at = start;
         for _ in 0..before {
             self.next();
         }
         words[..before].join(" ")
-    }
-
-    fn rest_of_line(&mut self) -> String {
-        let rest = &self.bytes[self.at..];
-        let length = rest.iter().position(|b| matches!(b, b'\n' | b'\r')).unwrap_or(rest.len());
-        self.at += length;
-        String::from_utf8_lossy(rest[..length].trim_ascii()).into_owned()
     }
 
     fn fault(&self, word: &[u8], expected: &str) -> Diagnostic {
@@ -131,7 +108,7 @@ impl<'a> Words<'a> {
             word => format!("`{}` where {expected} should be", shorten(&String::from_utf8_lossy(word))),
         };
         let remedy = if word.is_empty() { "it was cut off; get it again" } else { "it is damaged; export it again" };
-        Diagnostic::new("stl-syntax", self.file, self.line.to_string(), text).remedy(remedy)
+        Diagnostic::new("stl-syntax", self.file, self.words.line.to_string(), text).remedy(remedy)
     }
 
     fn expect(&mut self, keyword: &str) -> Result<(), Diagnostic> {
@@ -140,11 +117,6 @@ impl<'a> Words<'a> {
     }
 
     fn number(&mut self) -> Result<f64, Diagnostic> {
-        let word = self.next().unwrap_or_default();
-        if let Some(plain) = number::plain(word) {
-            self.places = self.places.max(plain.places);
-            return Ok(plain.value);
-        }
-        self.respelled.value(self.line, word).ok_or_else(|| self.fault(word, "a number"))
+        self.words.number().map_err(|word| self.fault(word, "a number"))
     }
 }

@@ -165,12 +165,16 @@ struct Extremes {
     sides: [f64; 4],
     near: f64,
     slopes: (f64, f64),
+    /// How long normals of these planes are: a ball reaches past one by its radius times that.
+    lengths: (f64, f64),
 }
 
 impl Extremes {
     /// Those of nothing.
     fn none(slopes: (f64, f64)) -> Self {
-        Self { sides: [f64::NEG_INFINITY; 4], near: f64::NEG_INFINITY, slopes }
+        let length = |slope: f64| (1.0 + slope * slope).sqrt();
+        let lengths = (length(slopes.0), length(slopes.1));
+        Self { sides: [f64::NEG_INFINITY; 4], near: f64::NEG_INFINITY, slopes, lengths }
     }
 
     /// Takes in what another has taken in.
@@ -190,8 +194,7 @@ impl Extremes {
     /// Takes in a ball, or a point of radius 0.
     fn add(&mut self, p: DVec3, radius: f64) {
         let (sx, sy) = self.slopes;
-        // A ball reaches past a plane by its radius times the length of the plane's normal.
-        let (rx, ry) = (radius * (1.0 + sx * sx).sqrt(), radius * (1.0 + sy * sy).sqrt());
+        let (rx, ry) = (radius * self.lengths.0, radius * self.lengths.1);
         let reach = [p.x + sx * p.z + rx, -p.x + sx * p.z + rx, p.y + sy * p.z + ry, -p.y + sy * p.z + ry];
         for (side, reach) in self.sides.iter_mut().zip(reach) {
             *side = side.max(reach);

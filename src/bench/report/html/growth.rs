@@ -5,7 +5,7 @@ use super::super::cost::{Cost, costs};
 use super::super::growth::{Curve, METHOD, kinds, sentences, tables};
 use super::lines::{Lines, Series, plot};
 use super::svg::{plain, power, unit};
-use super::{escaped, figure, table_of};
+use super::{escaped, figure, table};
 use crate::number::{bytes, grouped, short};
 
 /// The section; nothing where the models are not a family in growing sizes.
@@ -15,7 +15,7 @@ pub(super) fn section(report: &Report) -> String {
     let mut out = format!("<section><h2>Growth: {family}</h2>\n<p>Scenes of {} prims (N).</p>\n", sizes.join(", "));
     sentences(report).iter().for_each(|text| out += &format!("<p>{}.</p>\n", escaped(text)));
     costs(report).for_each(|cost| out += &curves(report, cost));
-    tables(report).iter().for_each(|table| out += &table_of(table));
+    tables(report).iter().for_each(|shown| out += &table(shown));
     out + &format!("<p>{}.</p>\n</section>\n", escaped(METHOD))
 }
 

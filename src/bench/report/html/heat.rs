@@ -1,7 +1,7 @@
 //! Heat maps: the tests in each pixel, by one scale for all structures.
 
 use super::super::{Model, Report};
-use super::name;
+use super::tables::name;
 use crate::image::draw::heat::{COLORS, Scale, color};
 use crate::number::{grouped, short, whole};
 use base64::Engine;

@@ -9,10 +9,10 @@ pub(crate) mod svg;
 mod sweep;
 
 use super::table::Table;
-use super::{Model, Rays, Report, WORDS, auto, text};
-use crate::accel::{AccelKind, Count};
-use crate::bench::row::{ClassRow, Row};
-use crate::number::{bytes, grouped, seconds, short, whole};
+use super::{Model, Rays, Report, WORDS, auto, tables};
+use crate::accel::AccelKind;
+use crate::bench::row::Row;
+use crate::number::{grouped, seconds, short};
 
 /// Rules of the page. The colours of the classes are M. Okabe and K. Ito's, which people with any kind of colour sight
 /// tell apart; each class has a shape of its own too.
@@ -89,8 +89,10 @@ fn section(report: &Report, model: &Model) -> String {
     }
     out += &heat::figure(report, model);
     out += &difference::figure(report, model);
-    out += &structures(report, model);
-    model.rays.iter().enumerate().for_each(|(i, rays)| out += &class_table(report, model, i, rays));
+    out += &table(&tables::structures(report, model));
+    for (i, rays) in model.rays.iter().enumerate() {
+        out += &table(&tables::class(report, model, i, rays));
+    }
     out + "</section>\n"
 }
 
@@ -144,76 +146,20 @@ fn figure(title: &str, caption: &str, svg: &str) -> String {
     format!("<figure><h3>{title}</h3><figcaption>{caption}</figcaption>{svg}</figure>\n")
 }
 
-fn structures(report: &Report, model: &Model) -> String {
-    let mut titles = vec!["structure", "memory", "n_in", "n_v", "n_ev", "n_oiv"];
-    if report.is_timed() {
-        titles.extend(["t_b", "min..max", "Mrays/s", "break-even"]);
-    }
-    let cells = |row: &Row| {
-        let s = row.made_of;
-        let mut cells = vec![name(row), bytes(s.bytes)];
-        cells.extend([s.n_in, s.n_v, s.n_ev, s.n_oiv].map(grouped));
-        if report.is_timed() {
-            cells.push(seconds(row.build.median()));
-            cells.push(format!("{}..{}", seconds(row.build.min()), seconds(row.build.max())));
-            cells.push(short(1e-6 / model.seconds_per_ray(row)));
-            cells.push(model.break_even(row).map_or("-".into(), whole));
-        }
-        cells
-    };
-    table("Structures", &titles, model.rows.iter().map(cells).collect())
-}
-
-fn class_table(report: &Report, model: &Model, i: usize, rays: &Rays) -> String {
-    let mut titles = vec!["structure"];
-    if report.is_timed() {
-        titles.extend(["Mrays/s", "min..max"]);
-    }
-    titles.extend(Count::ALL.map(Count::name));
-    titles.extend(["n_min", "culled"]);
-    let cells = |row: &Row, class: &ClassRow| {
-        let mut cells = vec![name(row)];
-        if report.is_timed() {
-            let rate = class.rate();
-            cells.extend([short(rate.median()), format!("{}..{}", short(rate.min()), short(rate.max()))]);
-        }
-        let shown = |c: Count| match class.is_sampled() {
-            true => format!("{} ±{}", short(class.per_ray(c)), short(class.interval(c))),
-            false => short(class.per_ray(c)),
-        };
-        cells.extend(Count::ALL.map(shown));
-        cells.extend([format!("{:.3}", class.n_min()), text::culled(class, model.prims)]);
-        cells
-    };
-    let rows = model.rows.iter().filter_map(|row| Some(cells(row, row.classes.get(i)?))).collect();
-    table(&format!("{}: {} rays", rays.class.name(), grouped(rays.kept as u64)), &titles, rows)
-}
-
-/// A star marks a structure that got a sample.
-fn name(row: &Row) -> String {
-    format!("{}{}", row.kind, if row.sampled { "*" } else { "" })
-}
-
-fn table(title: &str, titles: &[&str], rows: Vec<Vec<String>>) -> String {
-    let head: String = titles.iter().map(|t| format!("<th scope=\"col\">{t}</th>")).collect();
-    let line = |cells: Vec<String>| {
-        let mut cells = cells.into_iter();
+/// A table with its title.
+pub fn table(shown: &Table) -> String {
+    let head: String = shown.columns.iter().map(|title| format!("<th scope=\"col\">{}</th>", escaped(title))).collect();
+    let line = |cells: &Vec<String>| {
+        let mut cells = cells.iter().map(|cell| escaped(cell));
         let first = cells.next().unwrap_or_default();
         let rest: String = cells.map(|c| format!("<td>{c}</td>")).collect();
         format!("<tr><th scope=\"row\">{first}</th>{rest}</tr>\n")
     };
-    let body: String = rows.into_iter().map(line).collect();
+    let body: String = shown.rows.iter().map(line).collect();
+    let title = escaped(&shown.title);
     format!(
         "<h3>{title}</h3><div class=\"wide\"><table><thead><tr>{head}</tr></thead><tbody>\n{body}</tbody></table></div>\n"
     )
-}
-
-/// A table with its title.
-pub fn table_of(shown: &Table) -> String {
-    let titles: Vec<String> = shown.columns.iter().map(|c| escaped(c)).collect();
-    let titles: Vec<&str> = titles.iter().map(String::as_str).collect();
-    let rows = shown.rows.iter().map(|row| row.iter().map(|cell| escaped(cell)).collect()).collect();
-    table(&escaped(&shown.title), &titles, rows)
 }
 
 fn notes(report: &Report) -> String {

@@ -30,7 +30,7 @@ pub(super) fn tests(model: &Model) -> String {
     words(&mut svg, all.min(WIDTH - 2.0), bottom + 32.0, "end", "soft", "dashed: N, every prim tested");
     for (row, y) in model.rows.iter().zip(0..).map(|(row, i)| (row, TOP + ROW * f64::from(i))) {
         rule(&mut svg, [LEFT, y + ROW], [WIDTH - 8.0, y + ROW], "");
-        words(&mut svg, LEFT - 4.0, y + ROW * 0.5 + 4.0, "end", "", &super::name(row));
+        words(&mut svg, LEFT - 4.0, y + ROW * 0.5 + 4.0, "end", "", &super::tables::name(row));
         let lanes = row.classes.len().max(1) as f64;
         for (i, (class, rays)) in row.classes.iter().zip(&model.rays).enumerate() {
             let value = class.per_ray(Count::It);
@@ -77,7 +77,7 @@ pub(super) fn times(model: &Model) -> String {
             svg,
             "<circle class=\"dot\" cx=\"{px:.1}\" cy=\"{place:.1}\" r=\"4.5\"><title>{told}</title></circle>"
         );
-        words(&mut svg, RIGHT + 11.0, label + 4.0, "start", "", &super::name(row));
+        words(&mut svg, RIGHT + 11.0, label + 4.0, "start", "", &super::tables::name(row));
     }
     svg + "</svg>"
 }

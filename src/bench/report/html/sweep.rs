@@ -6,7 +6,7 @@ use super::super::{Model, Report};
 use super::growth::tick;
 use super::lines::{Lines, Series, plot};
 use super::svg::plain;
-use super::{escaped, figure, table_of};
+use super::{escaped, figure, table};
 use crate::bench::row::Row;
 use crate::bench::sweep::Sweep;
 
@@ -14,7 +14,7 @@ use crate::bench::sweep::Sweep;
 pub(super) fn figures(report: &Report, model: &Model, sweep: &Sweep) -> String {
     let said: String = sentences(report, model).iter().map(|text| format!("<p>{}.</p>\n", escaped(text))).collect();
     let plots: String = costs(report).map(|cost| one(report, model, sweep, cost)).collect();
-    let tables: String = tables(report, model).iter().map(table_of).collect();
+    let tables: String = tables(report, model).iter().map(table).collect();
     said + &plots + &tables
 }
 

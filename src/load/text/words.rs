@@ -1,0 +1,99 @@
+//! Text -> words between blanks, which may stand on any lines, and the numbers that they are.
+
+use crate::load::number::{self, Respelled};
+
+/// Where the reading of a text is.
+pub(in crate::load) struct Words<'a> {
+    pub bytes: &'a [u8],
+    /// The next byte.
+    pub at: usize,
+    /// Line of the word read last, from 1.
+    pub line: u32,
+    /// Decimal places of the finest number.
+    pub places: i32,
+    pub respelled: Respelled,
+}
+
+impl<'a> Words<'a> {
+    /// The words from byte `at` on, which stands in this line.
+    pub(in crate::load) fn new(bytes: &'a [u8], at: usize, line: u32) -> Self {
+        Self { bytes, at, line, places: 0, respelled: Respelled::default() }
+    }
+
+    /// What has not been read.
+    #[inline]
+    pub(in crate::load) fn rest(&self) -> &'a [u8] {
+        self.bytes.get(self.at..).unwrap_or_default()
+    }
+
+    /// Goes to the next word; whether there is one.
+    #[inline]
+    pub(in crate::load) fn find(&mut self) -> bool {
+        while let Some(&b) = self.bytes.get(self.at).filter(|b| b.is_ascii_whitespace()) {
+            // CR LF is one line end, counted at its second half.
+            let ends = b == b'\n' || (b == b'\r' && self.bytes.get(self.at + 1) != Some(&b'\n'));
+            self.line = self.line.saturating_add(u32::from(ends));
+            self.at += 1;
+        }
+        self.at < self.bytes.len()
+    }
+
+    /// The next word.
+    pub(in crate::load) fn next(&mut self) -> Option<&'a [u8]> {
+        self.find().then(|| self.take())
+    }
+
+    /// The next word, which must be a number.
+    ///
+    /// # Errors
+    /// The word that is none; the empty one where there is no more.
+    #[inline]
+    pub(in crate::load) fn number(&mut self) -> Result<f64, &'a [u8]> {
+        self.find();
+        if let Some(plain) = number::plain(self.rest()) {
+            self.at += plain.length;
+            self.places = self.places.max(plain.places);
+            return Ok(plain.value);
+        }
+        let word = self.take();
+        self.respelled.value(self.line, word).ok_or(word)
+    }
+
+    /// What there is up to the end of the line.
+    pub(in crate::load) fn rest_of_line(&mut self) -> &'a [u8] {
+        self.take_until(|b| matches!(b, b'\n' | b'\r'))
+    }
+
+    fn take(&mut self) -> &'a [u8] {
+        self.take_until(u8::is_ascii_whitespace)
+    }
+
+    fn take_until(&mut self, ends: impl Fn(&u8) -> bool) -> &'a [u8] {
+        let rest = self.rest();
+        let length = rest.iter().position(ends).unwrap_or(rest.len());
+        self.at += length;
+        &rest[..length]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_and_numbers_come_with_their_lines_whatever_ends_these() {
+        let mut words = Words::new(b"x\r\n a\r\r1.50\n\n2e1 1,5 no\r\n", 1, 1);
+        assert_eq!((words.next(), words.line), (Some(&b"a"[..]), 2));
+        assert_eq!((words.number(), words.line, words.places), (Ok(1.5), 4, 2));
+        assert_eq!((words.number(), words.number(), words.line), (Ok(20.0), Ok(1.5), 6));
+        assert_eq!((words.number(), words.line), (Err(&b"no"[..]), 6));
+        assert_eq!((words.number(), words.next(), words.rest_of_line()), (Err(&[][..]), None, &[][..]));
+        assert_eq!(words.line, 7);
+    }
+
+    #[test]
+    fn the_rest_of_a_line_is_taken_as_it_is() {
+        let mut words = Words::new(b"solid  a b \r\nfacet", 5, 1);
+        assert_eq!((words.rest_of_line(), words.next(), words.line), (&b"  a b "[..], Some(&b"facet"[..]), 2));
+    }
+}
