@@ -18,7 +18,7 @@ use crate::accel::auto::Reason;
 use crate::image::{ExrSamples, FileKind, LARGEST_HALF, Picture, beyond_half};
 use crate::load::{Diagnostic, Loaded};
 use crate::render::texture::TextureStore;
-use crate::render::{Costs, Job, Rendered, Sampling, Settings, View, World, render_costs};
+use crate::render::{Costs, Job, Rendered, Settings, View, World, render_costs};
 use crate::scene::default_light::DefaultLight;
 use crate::scene::framing::Bounds;
 use crate::scene::{Background, Camera, Scene};
@@ -78,7 +78,7 @@ impl Stage<'_> {
         let Self { loaded, world, built, metered, profile, .. } = self;
         task.progress.stage("metering");
         let stops = metered.get_or_find(&shot.choice, || {
-            let (accel, _) = &*built.get_or_insert_with(|| structure(task, world, &effective.settings));
+            let (accel, _) = &*built.get_or_insert_with(|| structure(task, shot, world, &effective.settings));
             surroundings::lit(&task.job.look, loaded, &camera, |loaded, _| {
                 let (scene, textures) = (&loaded.scene, textures(task.job, &loaded.scene));
                 let settings = &effective.settings;
@@ -90,15 +90,10 @@ impl Stage<'_> {
     }
 }
 
-/// The structure over a scene, and why that one: the best for all pictures of it, if they are like this one.
-fn structure<'w>(task: &Task, world: &'w World, settings: &Settings) -> (AnyAccel<'w>, Option<Reason>) {
-    let samples = match settings.sampling {
-        Sampling::Uniform => settings.samples,
-        Sampling::Adaptive(_) => 1,
-        Sampling::Stochastic(how) => how.min_samples,
-    };
-    let pixels = u64::from(settings.width) * u64::from(settings.height) * u64::from(samples.max(1));
-    let eye_rays = pixels.saturating_mul(task.batch.shots.len() as u64);
+/// The structure over a scene, and why that one: for all pictures of the moment that it shows, which are like this one.
+fn structure<'w>(task: &Task, shot: &Shot, world: &'w World, settings: &Settings) -> (AnyAccel<'w>, Option<Reason>) {
+    let pictures = task.batch.shots.iter().filter(|other| other.step.moment == shot.step.moment).count();
+    let eye_rays = settings.fewest_eye_rays().saturating_mul(pictures as u64);
     let (accel, reason) = world.structure_for(eye_rays, task.job.accel, &task.job.params);
     (accel.tested_by(task.job.intersector), reason)
 }
@@ -159,7 +154,7 @@ pub(super) fn render(task: &Task, shot: &Shot, stage: &mut Stage, so_far: &mut S
     let mut times = Times { load: std::mem::take(stage.load_seconds), ..Times::default() };
     progress.stage("building");
     let start = Instant::now();
-    stage.built.get_or_insert_with(|| structure(task, stage.world, &effective.settings));
+    stage.built.get_or_insert_with(|| structure(task, shot, stage.world, &effective.settings));
     times.build = start.elapsed().as_secs_f64();
     stage.profile.done("build");
     let first = job.first_step(&shot.step);
@@ -169,7 +164,7 @@ pub(super) fn render(task: &Task, shot: &Shot, stage: &mut Stage, so_far: &mut S
 
     let Stage { loaded, world, bounds, profile, survey, built, metered, .. } = stage;
     let is_frame = survey.is_some();
-    let (accel, reason) = &*built.get_or_insert_with(|| structure(task, world, &effective.settings));
+    let (accel, reason) = &*built.get_or_insert_with(|| structure(task, shot, world, &effective.settings));
     Ok(surroundings::lit(&job.look, loaded, &camera, |loaded, light| {
         let (scene, textures) = (&loaded.scene, textures(job, &loaded.scene));
         let work = Job { scene, world, accel, textures: &textures, view: &view, settings: &effective.settings };

@@ -122,6 +122,16 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// Rays that the eye sends at least.
+    pub fn fewest_eye_rays(&self) -> u64 {
+        let samples = match self.sampling {
+            Sampling::Uniform => self.samples.max(1),
+            Sampling::Adaptive(_) => 1,
+            Sampling::Stochastic(how) => how.powers().0,
+        };
+        u64::from(self.width) * u64::from(self.height) * u64::from(samples)
+    }
+
     /// The same with as many samples in each pixel.
     fn fixed(&self) -> Self {
         Self { sampling: Sampling::Uniform, ..self.clone() }

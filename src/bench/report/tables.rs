@@ -34,8 +34,8 @@ pub(super) fn class(report: &Report, model: &Model, i: usize, rays: &Rays) -> Ta
         true => String::new(),
         false => format!(", an even sample of {}", grouped(rays.asked)),
     };
-    let whole = model.rows.iter().find(|row| !row.sampled).and_then(|row| row.classes.get(i));
-    let required = whole.map_or(String::new(), |class| format!(", n_min {:.3}", class.n_min()));
+    let complete = model.rows.iter().find(|row| !row.sampled).and_then(|row| row.classes.get(i));
+    let required = complete.map_or(String::new(), |class| format!(", n_min {:.3}", class.n_min()));
     let title = format!("{}: {} rays{sample}{required}", rays.class.name(), grouped(rays.kept as u64));
 
     let mut columns = vec!["structure"];

@@ -113,7 +113,7 @@ fn trace(args: &TraceArgs, look: &Look, params: &AccelParams, name: &str, messag
     let (view, view_phrase) =
         seen::eye(&mut loaded.scene, (&choice, look.lens), size, file).map_err(fail(Exit::Input))?;
     loaded.scene.background = Some(background(look.background, &loaded.scene));
-    let (accel, _) = world.structure(args.accel, params);
+    let (accel, _) = world.structure_for(settings.fewest_eye_rays(), args.accel, params);
     let textures = TextureStore::new(&loaded.scene);
     let job = Job { scene: &loaded.scene, world: &world, accel: &accel, textures: &textures, view: &view, settings };
     let story = tell(&job, args.pixel, args.sample).ok_or_else(|| {

@@ -69,8 +69,8 @@ impl Coding {
     pub(in crate::load) fn warning(self, codes: [&'static str; 2], file: &Path) -> Option<Diagnostic> {
         let (code, text) = match self {
             Self::Units => return None,
-            Self::Bytes => (codes[0], "vertex colours above 1 are taken as 0 … 255"),
-            Self::Beyond => (codes[1], "vertex colours are neither 0 … 1 nor 0 … 255; they are cut to 0 … 1"),
+            Self::Bytes => (codes[0], "colours above 1 are taken as 0 … 255"),
+            Self::Beyond => (codes[1], "colours are neither 0 … 1 nor 0 … 255; they are cut to 0 … 1"),
         };
         Some(Diagnostic::new(code, file, "", text))
     }

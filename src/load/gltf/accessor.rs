@@ -157,13 +157,11 @@ impl<'a> Reader<'a> {
         index: Index<Accessor>,
         pick: Pick,
     ) -> Result<Vec<[f32; N]>, Unreadable> {
-        let packed = |bytes: &[u8]| {
-            bytes.as_chunks::<4>().0.as_chunks::<N>().0.iter().map(|e| e.map(f32::from_le_bytes)).collect()
-        };
         if let Pick::All = pick
-            && let Some(bytes) = self.packed(index, |format| is_floats::<N>(format))
+            && let Some(bytes) = self.packed(index, is_floats::<N>)
         {
-            return Ok(packed(bytes));
+            let elements = bytes.as_chunks::<4>().0.as_chunks::<N>().0;
+            return Ok(elements.iter().map(|element| element.map(f32::from_le_bytes)).collect());
         }
         self.elements(index, pick, [0.0; N], |element, format| match stored::<N>(element, format) {
             Some(floats) => floats,

@@ -16,7 +16,7 @@ use crate::load::{Diagnostic, LoadOptions, MtlMode, Warnings};
 use crate::math::Vec3;
 use crate::scene::{Bitmap, Material, Texture};
 use crate::stopwatch::Spent;
-pub(super) use library::{Finder, unquote};
+pub(super) use library::{Finder, Place, unquote};
 use meaning::Meaning;
 use parse::{Mtl, Slot};
 use std::collections::{HashMap, HashSet};

@@ -119,7 +119,7 @@ impl<'a> Body<'a> {
             return None;
         }
         let last = self.words.line;
-        self.words.find().then(|| [self.words.line, last])
+        self.words.find().then_some([self.words.line, last])
     }
 
     /// The next word of a text, which must be a number.

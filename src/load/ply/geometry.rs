@@ -21,6 +21,9 @@ use std::path::Path;
 pub(super) fn read(header: &Header, source: &Source, budget: &mut Budget) -> Result<Bare, Diagnostic> {
     let body = Body::new(header, source);
     let vertices = header.element("vertex").map_or(0, |element| element.count);
+    // Each name is kept here, in the header and as that of a material, and stands in paths.
+    let names: usize = header.pictures.iter().map(|(_, name)| name.len()).sum();
+    budget.take(names as u64, 4).map_err(|over| Diagnostic::over_budget(&source.path, over))?;
     let (wanted, bare) = (Wanted::of(header), Bare::showing(header.pictures.clone()));
     let mut reader = Reader { source, body, vertices, wanted, budget, bare, torn: None, odd: Odd::default() };
     for element in &header.elements {
@@ -187,6 +190,7 @@ impl Reader<'_, '_> {
     fn edges(&mut self, element: &Element) -> Result<(), Diagnostic> {
         let Some(ends) = ends(element) else { return self.pass(element) };
         let (uses, mut rows) = (uses_in_edges(element, ends, self.wanted), Rows::default());
+        self.take_colors(element.count, &uses)?;
         for i in 0..element.count {
             self.row(&mut rows, element, i);
             let (mut edge, mut color) = ([0; 2], None);
@@ -202,9 +206,6 @@ impl Reader<'_, '_> {
             }
             // An edge takes what a face of two corners would.
             Bare::charge_face(self.budget, 2).map_err(|over| Diagnostic::over_budget(&self.source.path, over))?;
-            if color.is_some() {
-                self.take(1, Bare::COLOR)?;
-            }
             self.bare.edge(edge, color);
         }
         Ok(())
@@ -212,7 +213,10 @@ impl Reader<'_, '_> {
 
     /// Polygons, or strips of triangles.
     fn faces(&mut self, element: &Element, list: usize, strips: bool) -> Result<(), Diagnostic> {
-        let uses = uses_in_faces(element, list, self.wanted);
+        let uses = uses_in_faces(element, list, strips, self.wanted);
+        if !strips {
+            self.take_colors(element.count, &uses)?;
+        }
         let (mut row, mut rows) = (Row::default(), Rows::default());
         for i in 0..element.count {
             self.row(&mut rows, element, i);
@@ -239,16 +243,14 @@ impl Reader<'_, '_> {
 
     /// Adds a face that was read, with its colour and its place in a picture.
     fn polygon(&mut self, i: u64, row: &Row) -> Result<(), Diagnostic> {
-        let (uvs, rest) = row.uvs.as_chunks();
-        let are_even = uvs.is_empty() || uvs.len() == row.corners.len();
-        if !are_even || !rest.is_empty() {
-            Odd::count(&mut self.odd.uneven, i);
-        }
-        let uvs = if are_even && rest.is_empty() { uvs } else { &[] };
+        let uvs = match row.uvs.as_chunks() {
+            (uvs, []) if uvs.is_empty() || uvs.len() == row.corners.len() => uvs,
+            _ => {
+                Odd::count(&mut self.odd.uneven, i);
+                &[]
+            }
+        };
         let picture = row.picture.map(|number| self.picture(i, number));
-        if row.color.is_some() {
-            self.take(1, Bare::COLOR)?;
-        }
         self.face(&row.corners, &Said { uvs, color: row.color, picture })
     }
 
@@ -291,6 +293,12 @@ impl Reader<'_, '_> {
             uvs.push(self.value(element, i, property)?);
         }
         Ok(())
+    }
+
+    /// Asks for the memory of the colours of so many faces or edges, if they have some.
+    fn take_colors(&mut self, count: u64, uses: &[Use]) -> Result<(), Diagnostic> {
+        let is_colored = uses.iter().any(|used| matches!(used, Use::Light(_)));
+        self.take(if is_colored { count } else { 0 }, Bare::COLOR)
     }
 
     fn take(&mut self, count: u64, bytes: u64) -> Result<(), Diagnostic> {

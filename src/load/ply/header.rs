@@ -3,6 +3,7 @@
 use crate::load::Diagnostic;
 use crate::load::mtl::unquote;
 use crate::load::paths::shorten;
+use crate::load::text::encoding::decode_name;
 use crate::load::text::without_mark;
 use std::path::Path;
 
@@ -125,7 +126,7 @@ impl Header {
         }
         while let Some(line) = lines.next() {
             parts.line = lines.count;
-            if parts.take(&String::from_utf8_lossy(line))? {
+            if parts.take(&decode_name(line))? {
                 let Some(encoding) = parts.encoding else {
                     return Err(parts.fault("the header has no line `format`", "export it again"));
                 };
@@ -188,6 +189,9 @@ struct Parts<'a> {
 /// Elements, properties and pictures of a header at most, far more than programs write.
 const MOST: usize = 4096;
 
+/// Bytes of the name of a picture at most: no system has longer ones.
+const LONGEST_NAME: usize = 4096;
+
 /// Comments that are kept: programs write theirs first.
 const COMMENTS: usize = 64;
 
@@ -236,7 +240,9 @@ impl Parts<'_> {
     }
 
     fn comment(&mut self, said: &str) -> Result<(), Diagnostic> {
-        let picture = said.split_once(char::is_whitespace).filter(|(word, _)| word.eq_ignore_ascii_case("TextureFile"));
+        let picture = said
+            .split_once(char::is_whitespace)
+            .filter(|(word, name)| word.eq_ignore_ascii_case("TextureFile") && name.len() <= LONGEST_NAME);
         if let Some((_, name)) = picture {
             self.count()?;
             self.pictures.push((self.line, unquote(name.trim()).into()));

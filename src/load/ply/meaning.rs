@@ -132,24 +132,25 @@ pub(super) enum Use {
     Nothing,
 }
 
-/// What each property of faces whose corners are in `list` is read for.
-pub(super) fn uses_in_faces(face: &Element, list: usize, wanted: Wanted) -> Vec<Use> {
+/// What each property of faces whose corners are in `list` is read for; of strips, whose triangles share corners, only these
+/// and colours are.
+pub(super) fn uses_in_faces(face: &Element, list: usize, strips: bool, wanted: Wanted) -> Vec<Use> {
     let of = |(k, property): (usize, &Property)| match (property.name.as_str(), property.length) {
         _ if k == list => Use::Corners,
-        ("texcoord", Some(_)) if wanted.pictures => Use::Uvs,
-        ("texnumber", None) if wanted.pictures => Use::Picture,
-        _ => light_in(face, property, wanted),
+        ("texcoord", Some(_)) if wanted.pictures && !strips => Use::Uvs,
+        ("texnumber", None) if wanted.pictures && !strips => Use::Picture,
+        _ => light_in(face, k, wanted),
     };
     face.properties.iter().enumerate().map(of).collect()
 }
 
 /// What each property of edges with these ends is read for.
 pub(super) fn uses_in_edges(edge: &Element, ends: [usize; 2], wanted: Wanted) -> Vec<Use> {
-    let of = |(k, property): (usize, &Property)| match ends.iter().position(|&end| end == k) {
+    let of = |k| match ends.iter().position(|&end| end == k) {
         Some(end) => Use::End(end),
-        None => light_in(edge, property, wanted),
+        None => light_in(edge, k, wanted),
     };
-    edge.properties.iter().enumerate().map(of).collect()
+    (0..edge.properties.len()).map(of).collect()
 }
 
 /// Whether elements have colours.
@@ -158,9 +159,12 @@ pub(super) fn are_colored(element: &Element) -> bool {
     COLOR.iter().all(has)
 }
 
-fn light_in(element: &Element, property: &Property, wanted: Wanted) -> Use {
-    let part = (RED..=ALPHA).find(|&slot| is_in(property, slot));
-    part.filter(|_| wanted.colors && are_colored(element)).map_or(Use::Nothing, |slot| Use::Light(slot - RED))
+/// The part of a colour that the `k`th property is, if it is the first that says it.
+fn light_in(element: &Element, k: usize, wanted: Wanted) -> Use {
+    let (before, rest) = element.properties.split_at(k);
+    let part = (RED..=ALPHA).find(|&slot| rest.first().is_some_and(|property| is_in(property, slot)));
+    let first = part.filter(|&slot| !before.iter().any(|property| is_in(property, slot)));
+    first.filter(|_| wanted.colors && are_colored(element)).map_or(Use::Nothing, |slot| Use::Light(slot - RED))
 }
 
 fn is_in(property: &Property, slot: usize) -> bool {

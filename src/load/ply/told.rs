@@ -18,6 +18,12 @@ pub(super) fn passed_over(header: &Header, file: &Path) -> Vec<Diagnostic> {
             told.push(warning(code, text, "keep one of both"));
         }
     }
+    let has_places = |element: &Element| element.properties.iter().any(|p| p.name == "texcoord" && p.length.is_some());
+    let mut faces = header.elements.iter().filter(|element| element.name == "face" && element.count > 0);
+    if !wanted.pictures && faces.any(has_places) {
+        let text = "texture coordinates of faces (texcoord) say nothing: no picture is named (comment TextureFile)";
+        told.push(warning("ply-no-picture", text.into(), "name it, or export it as glTF"));
+    }
     if header.elements.iter().any(|element| element.name == "vertex" && are_splats(element)) {
         let text = "Gaussian splats are drawn as points of their colours, opaque and of one size".into();
         told.push(warning("ply-splats", text, "--line-width sets the size"));

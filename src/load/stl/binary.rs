@@ -95,7 +95,8 @@ struct Paint {
 impl Paint {
     /// In either of the two ways in use: Materialise Magics writes `COLOR=` and four bytes into the header, the colour of the
     /// whole, and a triangle has its own where the highest bit is clear; VisCAM and SolidView write no more than triangles with
-    /// the highest bit set, and the other order of parts. `None` where there is no sign of either.
+    /// the highest bit set, and the other order of parts. `None` where there is no sign of either. MeshLab writes Magics' sign
+    /// and sets the bit of all triangles, which have colours of their own all the same.
     fn of(header: &[u8], records: &[[u8; TRIANGLE]]) -> Option<Self> {
         const SIGN: &[u8] = b"COLOR=";
         const OWN: u16 = 1 << 15;
@@ -104,7 +105,10 @@ impl Paint {
             let [r, g, b] = [red, green, blue].map(|c| f32::from(c) / 255.0);
             // Programs that know the colour of the whole alone leave the attributes 0, which would be black.
             let is_all = records.iter().all(|record| attributes(record) == 0);
-            return Some(Self { parts: [0, 5, 10], own: 0, whole: [r, g, b, 1.0], is_all });
+            let all_set = records.iter().all(|record| attributes(record) & OWN != 0);
+            let differ = records.windows(2).any(|pair| attributes(&pair[0]) != attributes(&pair[1]));
+            let own = if all_set && differ { OWN } else { 0 };
+            return Some(Self { parts: [0, 5, 10], own, whole: [r, g, b, 1.0], is_all });
         }
         let [r, g, b] = Material::plain().base_color.to_array().map(to_srgb);
         let is_painted = records.iter().any(|record| attributes(record) & OWN != 0);

@@ -97,6 +97,17 @@ fn a_file_on_one_line_is_read_and_one_without_its_end_is_told_of() {
 }
 
 #[test]
+fn several_solids_on_one_line_are_read_in_time_that_is_proportional_to_them() {
+    let one = text().replace('\n', " ");
+    let named = one.replace("endsolid tetra of ours", "endsolid a solid name");
+    let solids = |count| plain(named.repeat(count).as_bytes());
+    assert_eq!((solids(1).facts.faces, solids(3).facts.faces, solids(3).warnings.len()), (4, 12, 0));
+    let start = std::time::Instant::now();
+    assert_eq!(solids(10_000).facts.faces, 40_000);
+    assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
+}
+
+#[test]
 fn zeros_behind_a_text_are_no_part_of_it() {
     let loaded = plain(format!("{}{}", text(), "\0".repeat(300)).as_bytes());
     assert_eq!((loaded.facts.faces, loaded.warnings.len()), (4, 0));
@@ -196,6 +207,8 @@ fn attributes_are_colours_in_either_order_where_something_says_so() {
     let whole = [31.0 * 0.2, 31.0 * 0.4, 0.0].map(|c: f32| (c * 1e3).round() / 1e3);
     assert_eq!(painted(header, [parts, own | parts, 0, parts]), [low, whole, [0.0; 3], low]);
     assert_eq!(painted(header, [0; 4]), [whole; 4], "nothing but the colour of the whole");
+    assert_eq!(painted(header, [own | parts, own, own | parts, own]), [low, [0.0; 3], low, [0.0; 3]], "MeshLab's");
+    assert_eq!(painted(header, [own | parts; 4]), [whole; 4], "nothing differs: no colours of their own");
     for plain_header in ["", "COLOR"] {
         assert!(plain(&binary(plain_header)).scene.meshes[0].colors.is_empty(), "{plain_header}");
     }

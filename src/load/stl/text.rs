@@ -33,7 +33,7 @@ pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnost
             out.add(facet(&mut words)?, None)?;
         } else if is(word, "endsolid") {
             open = false;
-            words.words.rest_of_line();
+            words.pass_name();
         } else if word.starts_with(b"#") {
             words.words.rest_of_line();
         } else {
@@ -88,18 +88,32 @@ impl<'a> Words<'a> {
 
     /// The name of a solid, which may be of any words: up to the end of the line, or the first facet on it.
     fn name(&mut self) -> String {
-        let start = self.words.at;
-        let name = String::from_utf8_lossy(self.words.rest_of_line().trim_ascii()).into_owned();
-        let words: Vec<&str> = name.split_ascii_whitespace().collect();
-        let Some(before) = words.windows(2).position(|w| is(w[0].as_bytes(), "facet") && is(w[1].as_bytes(), "normal"))
-        else {
-            return name;
-        };
-        self.words.at = start;
-        for _ in 0..before {
-            self.next();
+        let (start, mut end) = (self.words.at, self.words.at);
+        while let Some(word) = self.words.next_in_line() {
+            let behind = self.words.at;
+            if is(word, "facet") && self.words.next_in_line().is_some_and(|word| is(word, "normal")) {
+                self.words.at = end;
+                break;
+            }
+            (self.words.at, end) = (behind, behind);
         }
-        words[..before].join(" ")
+        let name = String::from_utf8_lossy(&self.words.bytes[start..end]);
+        name.split_ascii_whitespace().collect::<Vec<_>>().join(" ")
+    }
+
+    /// Passes over the name behind `endsolid`: up to the end of the line, or the solid that has a facet on it.
+    fn pass_name(&mut self) {
+        let mut solid = None;
+        loop {
+            let before = self.words.at;
+            match self.words.next_in_line() {
+                Some(word) if is(word, "solid") => solid = Some(before),
+                Some(word) if is(word, "facet") && solid.is_some() => break,
+                Some(_) => {}
+                None => return,
+            }
+        }
+        self.words.at = solid.unwrap_or(self.words.at);
     }
 
     fn fault(&self, word: &[u8], expected: &str) -> Diagnostic {

@@ -43,6 +43,13 @@ impl<'a> Words<'a> {
         self.find().then(|| self.take())
     }
 
+    /// The next word of this line.
+    pub(in crate::load) fn next_in_line(&mut self) -> Option<&'a [u8]> {
+        let is_blank = |b: &&u8| b.is_ascii_whitespace() && !ends_line(b);
+        self.at += self.rest().iter().take_while(is_blank).count();
+        Some(self.take()).filter(|word| !word.is_empty())
+    }
+
     /// The next word, which must be a number.
     ///
     /// # Errors
@@ -61,7 +68,7 @@ impl<'a> Words<'a> {
 
     /// What there is up to the end of the line.
     pub(in crate::load) fn rest_of_line(&mut self) -> &'a [u8] {
-        self.take_until(|b| matches!(b, b'\n' | b'\r'))
+        self.take_until(ends_line)
     }
 
     fn take(&mut self) -> &'a [u8] {
@@ -74,6 +81,10 @@ impl<'a> Words<'a> {
         self.at += length;
         &rest[..length]
     }
+}
+
+fn ends_line(byte: &u8) -> bool {
+    matches!(byte, b'\n' | b'\r')
 }
 
 #[cfg(test)]
@@ -95,5 +106,8 @@ mod tests {
     fn the_rest_of_a_line_is_taken_as_it_is() {
         let mut words = Words::new(b"solid  a b \r\nfacet", 5, 1);
         assert_eq!((words.rest_of_line(), words.next(), words.line), (&b"  a b "[..], Some(&b"facet"[..]), 2));
+        words.at = 5;
+        let in_line: [_; 3] = std::array::from_fn(|_| words.next_in_line());
+        assert_eq!((in_line, words.at), ([Some(&b"a"[..]), Some(b"b"), None], 11));
     }
 }

@@ -29,7 +29,8 @@ pub(in crate::load) struct Bare {
     pub corners: Vec<u32>,
     /// Corners of each face, at least 3.
     pub arities: Vec<u32>,
-    /// Texture coordinates of corners, before those of vertices: of the first ones, up to the last that has some.
+    /// Texture coordinates of corners: of the first ones, up to the last that has some. Where any has, those of vertices do not
+    /// count.
     corner_uvs: Vec<[f64; 2]>,
     /// Colours of faces and of edges, as those of vertices, of which there are none then: of the first ones, up to the last
     /// that has one.
@@ -50,6 +51,9 @@ pub(in crate::load) struct Bare {
     /// What is told of it beside what becomes of faces.
     pub told: Vec<Diagnostic>,
 }
+
+/// The colour of what has none: taken for no colour of a file, and still there when colours have been settled.
+const UNSAID: [f32; 4] = [f32::NAN, f32::NAN, f32::NAN, f32::NEG_INFINITY];
 
 /// What a file may say of a face beside its corners.
 #[derive(Clone, Copy, Debug, Default)]
@@ -75,7 +79,7 @@ impl Bare {
     /// Bytes that the colour of a face or edge takes.
     pub(in crate::load) const COLOR: u64 = 16;
     /// Bytes that the texture coordinates of a corner take: as read, and as those of a vertex, looked for in a table.
-    pub(in crate::load) const CORNER_UV: u64 = 88;
+    pub(in crate::load) const CORNER_UV: u64 = 112;
     /// The most vertices, corners or faces.
     pub(in crate::load) const LARGEST: u64 = LARGEST as u64;
 
@@ -116,7 +120,7 @@ impl Bare {
             self.corner_uvs.extend_from_slice(said.uvs);
         }
         if let Some(color) = said.color {
-            self.face_colors.resize(self.arities.len(), [f32::NAN; 4]);
+            self.face_colors.resize(self.arities.len(), UNSAID);
             self.face_colors.push(color);
         }
         if let Some(picture) = said.picture {
@@ -130,7 +134,7 @@ impl Bare {
     /// Adds an edge.
     pub(in crate::load) fn edge(&mut self, ends: [u32; 2], color: Option<[f32; 4]>) {
         if let Some(color) = color {
-            self.edge_colors.resize(self.edges.len(), [f32::NAN; 4]);
+            self.edge_colors.resize(self.edges.len(), UNSAID);
             self.edge_colors.push(color);
         }
         self.edges.push(ends);
@@ -153,9 +157,11 @@ pub(in crate::load) fn load(
     let file = source.path.as_path();
     let mut warnings = Warnings::default();
     std::mem::take(&mut bare.told).into_iter().for_each(|told| warnings.push(told));
+    for colors in [&mut bare.colors, &mut bare.face_colors, &mut bare.edge_colors] {
+        let told = color::settle(colors).warning(["color-bytes", "color-range"], file);
+        told.into_iter().for_each(|told| warnings.push(told));
+    }
     bare.color_vertices(budget).map_err(|over| Diagnostic::over_budget(file, over))?;
-    let coding = color::settle(&mut bare.colors);
-    coding.warning(["color-bytes", "color-range"], file).into_iter().for_each(|told| warnings.push(told));
     if color::are_all_clear(&bare.colors) {
         let text = "all opacities of vertices are 0: they are taken to mean something else, and the model is opaque";
         warnings.push(Diagnostic::new("color-clear", file, "", text));
@@ -186,6 +192,7 @@ pub(in crate::load) fn load(
 #[expect(clippy::cast_possible_truncation, reason = "readers keep below Bare::LARGEST")]
 fn geometry(mut bare: Bare, file: &Path, warnings: &mut Warnings) -> Geometry {
     let is_cloud = bare.is_cloud();
+    let is_by_corner = !bare.corner_uvs.is_empty();
     let numbers = bare.number_uvs();
     let Bare { positions, normals, uvs, colors, corners, arities, edges, pictures, face_pictures, .. } = bare;
     let normals: Vec<Vec3> = normals.into_iter().map(|n| n.as_dvec3().normalize_or_zero().as_vec3()).collect();
@@ -201,7 +208,8 @@ fn geometry(mut bare: Bare, file: &Path, warnings: &mut Warnings) -> Geometry {
     let (strokes, stroke_corners) = if is_cloud {
         ((0..positions.len()).map(|_| stroke(1, false)).collect(), (0..positions.len() as u32).map(corner).collect())
     } else {
-        (edges.iter().map(|_| stroke(2, true)).collect(), edges.iter().flatten().map(|&i| corner(i)).collect())
+        let end = |&i: &u32| if is_by_corner { Corner { uv: NONE, ..corner(i) } } else { corner(i) };
+        (edges.iter().map(|_| stroke(2, true)).collect(), edges.iter().flatten().map(end).collect())
     };
     let corners = corners.into_iter().zip(&numbers).map(|(i, &uv)| Corner { uv, ..corner(i) }).collect();
     let alphas = color::opacities(&colors);
@@ -220,16 +228,22 @@ fn geometry(mut bare: Bare, file: &Path, warnings: &mut Warnings) -> Geometry {
         Face { run, smoothing: 0, arity, line: number, number, first }
     };
     let faces: Vec<Face> = (0..).zip(&arities).map(face).collect();
-    if let Some((line, name)) = pictures.first().filter(|_| faces.iter().all(|face| face.run == 0)) {
-        let text = format!("picture '{}' is not drawn: no face says where it shows which part of it", shorten(name));
+    let is_plain = faces.iter().all(|face| face.run == 0);
+    if let Some((line, name)) = pictures.first().filter(|_| is_plain) {
+        let why = match numbers.iter().all(|&uv| uv == NONE) {
+            true => "no face says where it shows which part of it",
+            false => "no face shows it",
+        };
+        let text = format!("picture '{}' is not drawn: {why}", shorten(name));
         warnings.push(Diagnostic::new("picture-unused", file, line.to_string(), text));
     }
     let of_picture = |number| Run { material: Some(number), ..Run::default() };
+    let shown = if is_plain { 0 } else { pictures.len() as u32 };
     Geometry {
         soup,
         faces,
         strokes,
-        runs: std::iter::once(Run::default()).chain((1..=pictures.len() as u32).map(of_picture)).collect(),
+        runs: std::iter::once(Run::default()).chain((1..=shown).map(of_picture)).collect(),
         names: std::iter::once(String::new()).chain(pictures.iter().map(|(_, name)| name.clone())).collect(),
         sources: pictures,
         // So many digits that the rounding to `f32` alone counts.

@@ -1,30 +1,37 @@
 //! Pictures that files of bare geometry name -> the materials that show them.
 
-use crate::load::mtl::{Finder, Materials, Reading, plain_material};
-use crate::load::paths::Found;
+use crate::load::mtl::{Finder, Materials, Place, Reading, plain_material};
+use crate::load::paths::{FileFault, taken_from};
 use crate::load::texture::{Encoded, Unusable, decode_all};
 use crate::load::{Diagnostic, Loaded};
 use crate::math::{Vec3, Vec4};
 use crate::scene::{Material, Sampler, Texture, TextureRef, UvTransform};
-use std::collections::HashMap;
-use std::path::Path;
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
 
 /// Reads the `pictures` of a file, which it names in these lines, and makes a material for each of `names`: one that shows the
 /// picture of that name, or a plain one where that cannot be, and for `None`.
 pub(super) fn load(pictures: &[(u32, String)], names: &[Option<&str>], reading: &mut Reading) -> Materials {
     let mut images: Vec<Encoded> = Vec::new();
-    // Of each name the place among them.
-    let mut known: HashMap<&str, usize> = HashMap::new();
-    let mut missed = 0;
-    for (line, name) in pictures {
-        if names.contains(&Some(name)) && !known.contains_key(name.as_str()) {
-            let read = read(name, *line, &mut missed, reading);
-            match read {
-                Ok(found) => {
-                    known.insert(name, images.len());
-                    let name = found.path.to_string_lossy().into_owned();
-                    images.push(Encoded { name, place: line.to_string(), bytes: found.bytes.into() });
-                }
+    // Of each name the place among them, and of each file: one may have many names.
+    let (mut known, mut files): (HashMap<&str, usize>, HashMap<PathBuf, usize>) = Default::default();
+    let (wanted, mut missed): (HashSet<&str>, _) = (names.iter().flatten().copied().collect(), 0);
+    for (line, name) in pictures.iter().filter(|(_, name)| wanted.contains(name.as_str())) {
+        let place = line.to_string();
+        let mut found = |place: &str| -> Result<usize, Diagnostic> {
+            let found = find(name, place, &mut missed, reading)?;
+            if let Some(&at) = files.get(&found.canonical) {
+                return Ok(at);
+            }
+            let bytes = read(&found.path, name, place, reading)?.into();
+            files.insert(found.canonical, images.len());
+            let name = found.path.to_string_lossy().into_owned();
+            images.push(Encoded { name, place: place.into(), bytes });
+            Ok(images.len() - 1)
+        };
+        if !known.contains_key(name.as_str()) {
+            match found(&place) {
+                Ok(at) => _ = known.insert(name, at),
                 Err(warning) => reading.warnings.push(warning),
             }
         }
@@ -68,26 +75,35 @@ fn showing(name: &str, texture: u32) -> Material {
     Material { name: name.into(), base_color: Vec3::ONE, base_color_map: Some(map), ..Material::plain() }
 }
 
-/// Finds and reads a picture.
+/// Finds a picture.
 ///
 /// # Errors
-/// The warning that it is not there, or cannot be read.
-fn read(name: &str, line: u32, missed: &mut usize, reading: &mut Reading) -> Result<Found, Diagnostic> {
-    let place = line.to_string();
+/// The warning that it is not there.
+fn find(name: &str, place: &str, missed: &mut usize, reading: &mut Reading) -> Result<Place, Diagnostic> {
     let mut finder = Finder { resolver: reading.resolver, missed: *missed };
     let found = finder.find(name, &[Path::new("")]);
     *missed = finder.missed;
-    let read = found.and_then(|found| {
-        let within = reading.resolver.read_file_within(&found.path, reading.budget)?;
-        Ok(within.map(|bytes| Found { bytes, path: found.path, guessed: found.guessed }))
-    });
-    let found = read.map_err(|fault| {
-        let warning = fault.diagnose(reading.file, &place);
-        Diagnostic { text: format!("picture {}; faces are drawn without it", warning.text), ..warning }
-    })?;
-    let found = found.map_err(|over| Unusable::too_large(over.to_string()).warning(name, reading.file, &place))?;
-    found.note(name, reading.file, &place).into_iter().for_each(|note| reading.warnings.push(note));
+    let found = found.map_err(|fault| lost(&fault, place, reading.file))?;
+    if found.guessed {
+        let text = taken_from(name, &found.path);
+        reading.warnings.push(Diagnostic::new("file-elsewhere", reading.file, place, text));
+    }
     Ok(found)
+}
+
+/// Reads a picture.
+///
+/// # Errors
+/// The warning that it cannot be read.
+fn read(path: &Path, name: &str, place: &str, reading: &mut Reading) -> Result<Vec<u8>, Diagnostic> {
+    let within = reading.resolver.read_file_within(path, reading.budget);
+    let bytes = within.map_err(|fault| lost(&fault, place, reading.file))?;
+    bytes.map_err(|over| Unusable::too_large(over.to_string()).warning(name, reading.file, place))
+}
+
+fn lost(fault: &FileFault, place: &str, file: &Path) -> Diagnostic {
+    let warning = fault.diagnose(file, place);
+    Diagnostic { text: format!("picture {}; faces are drawn without it", warning.text), ..warning }
 }
 
 /// Takes colours from the vertices of meshes that show a picture: of what was scanned, both show the same light. What is told
@@ -103,6 +119,6 @@ pub(super) fn leave_out_colors(loaded: &mut Loaded, file: &Path) -> Option<Diagn
             mesh.colors.clear();
         }
     }
-    let text = "vertices have colours, which are not drawn where faces show a picture";
+    let text = "there are colours, which are not drawn where faces show a picture";
     had_colors.then(|| Diagnostic::new("colors-under-picture", file, "", text))
 }

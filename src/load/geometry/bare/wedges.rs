@@ -1,14 +1,17 @@
 //! What files say of faces and of the corners of faces -> vertices: one for each colour that meets in a place, and one number
 //! for all equal texture coordinates there.
 
-use super::Bare;
+use super::{Bare, UNSAID};
 use crate::load::geometry::NONE;
 use crate::load::geometry::pairs::Pairs;
 use crate::load::limits::{Budget, OverBudget};
 use crate::math::DVec2;
+use crate::scene::Material;
+use crate::scene::color::to_srgb;
 
 impl Bare {
-    /// Gives the colours of faces and edges to their corners. A vertex where several meet becomes several in one place.
+    /// Gives the colours of faces and edges, which are settled, to their corners. A vertex where several meet becomes several in
+    /// one place.
     ///
     /// # Errors
     /// When these would take more than is left of the budget.
@@ -20,8 +23,11 @@ impl Bare {
         self.edge_colors.resize(self.edges.len(), UNSAID);
         let corners = self.corners.len() + 2 * self.edges.len();
         budget.take(corners as u64, PAIR)?;
+        let [r, g, b] = Material::plain().base_color.to_array().map(to_srgb);
+        let said = |color: &[f32; 4]| if color[3] == UNSAID[3] { [r, g, b, 1.0] } else { *color };
         let mut pairs = Pairs::new(self.positions.len());
-        let mut number = |vertex: &mut u32, color: &[f32; 4]| *vertex = pairs.number(*vertex, color.map(f32::to_bits));
+        let mut number =
+            |vertex: &mut u32, color: &[f32; 4]| *vertex = pairs.number(*vertex, said(color).map(f32::to_bits));
         let mut rest = self.corners.as_mut_slice();
         for (&arity, color) in self.arities.iter().zip(&self.face_colors) {
             let (corners, after) = rest.split_at_mut(arity as usize);
@@ -32,7 +38,7 @@ impl Bare {
             edge.iter_mut().for_each(|end| number(end, color));
         }
 
-        Self::charge_vertices(budget, pairs.len() as u64)?;
+        Self::charge_vertices(budget, pairs.len().saturating_sub(self.positions.len()) as u64)?;
         self.colors = pairs.iter().map(|(_, color)| color.map(f32::from_bits)).collect();
         let vertices = || pairs.iter().map(|(vertex, _)| vertex as usize);
         self.positions = vertices().map(|vertex| self.positions[vertex]).collect();
@@ -64,9 +70,6 @@ impl Bare {
         numbers
     }
 }
-
-/// The colour of what has none: white once it is settled, and opaque.
-const UNSAID: [f32; 4] = [f32::NAN; 4];
 
 /// Bytes that a corner takes while its vertex is looked for: its entry, and its share of a table.
 const PAIR: u64 = 48;

@@ -169,6 +169,72 @@ fn pictures_are_shown_by_coordinates_of_vertices_and_not_without_any() {
 }
 
 #[test]
+fn what_has_no_colour_beside_what_has_one_is_plain_and_each_is_written_in_its_own_way() {
+    let xyz = "property float x\nproperty float y\nproperty float z\n";
+    let text = format!(
+        "ply\nformat ascii 1.0\nelement vertex 4\n{xyz}element face 1\nproperty list uchar int vertex_indices\n\
+         property float red\nproperty float green\nproperty float blue\nelement tristrips 1\n\
+         property list int int vertex_indices\nelement edge 1\nproperty int vertex1\nproperty int vertex2\n{COLORS}\
+         end_header\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2 255 0 128\n3 1 3 2\n0 3 0 255 0\n"
+    );
+    let loaded = plain(text.as_bytes());
+    assert_eq!(codes(&loaded), ["color-bytes"]);
+    let mesh = &loaded.scene.meshes[0];
+    let grey = crate::scene::Material::plain().base_color;
+    let seen = corners(mesh);
+    assert_eq!(seen[0][0], from_srgb([1.0, 0.0, 128.0 / 255.0]).extend(1.0));
+    assert!((seen[1][0].truncate() - grey).abs().max_element() < 1e-5, "{:?}", seen[1]);
+    let wire = &loaded.scene.meshes[1];
+    assert!(wire.is_wire && wire.colors.iter().all(|&c| c == Vec4::new(0.0, 1.0, 0.0, 1.0)), "{:?}", wire.colors);
+}
+
+#[test]
+fn of_two_colours_of_a_face_the_first_counts() {
+    let twice =
+        format!("{COLORS}property uchar diffuse_red\nproperty uchar diffuse_green\nproperty uchar diffuse_blue\n");
+    let loaded = fan("", &twice, ["255 0 0 0 0 255"; 3]);
+    assert_eq!(corners(&loaded.scene.meshes[0]), [[Vec4::new(1.0, 0.0, 0.0, 1.0); 3]; 3]);
+}
+
+#[test]
+fn names_of_pictures_are_read_as_those_of_other_files() {
+    let vertices =
+        "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nproperty float s\nproperty float t\n";
+    let body = format!(
+        "{vertices}element face 1\nproperty list uchar int vertex_indices\nend_header\n\
+         0 0 0 0 0\n1 0 0 1 0\n0 1 0 0 1\n3 0 1 2\n"
+    );
+    let file = |name: &[u8]| [b"ply\nformat ascii 1.0\ncomment TextureFile ", name, b"\n", body.as_bytes()].concat();
+    let latin = plain(&file(b"Fl\xe4che.png"));
+    assert!(latin.warnings[0].text.contains("'Fläche.png' is not there"), "{:?}", latin.warnings);
+    let long = plain(&file(&[b'a'; 5000]));
+    assert!(long.warnings.is_empty(), "no name, but a comment: {:?}", long.warnings);
+    let no_room = LoadOptions { limits: Limits { memory: 800, ..Limits::default() }, ..LoadOptions::default() };
+    assert!(of(&file(&[b'a'; 4000]), &no_room).unwrap_err().contains("16000 bytes are needed"));
+}
+
+#[test]
+fn a_picture_of_several_names_is_read_once() {
+    let other = PICTURE.replacen('/', "/./", 1);
+    let pictures = format!("comment TextureFile {PICTURE}\ncomment TextureFile {other}\n");
+    let numbered = format!("{UVS}property int texnumber\n");
+    let loaded = fan(&pictures, &numbered, ["6 0 0 .5 0 1 1 0", "6 0 0 .5 0 1 1 1", "6 0 0 .5 0 1 1 0"]);
+    assert_eq!((loaded.scene.bitmaps.len(), loaded.scene.materials.len(), loaded.scene.meshes.len()), (1, 1, 2));
+    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+}
+
+#[test]
+fn coordinates_without_a_picture_and_pictures_without_a_face_are_told() {
+    let without = fan("", UVS, ["6 0 0 .5 0 1 1"; 3]);
+    assert_eq!((codes(&without), without.scene.meshes[0].uvs.len()), (vec!["ply-no-picture"], 0));
+    let numbered = format!("{UVS}property int texnumber\n");
+    let picture = format!("comment TextureFile {PICTURE}\n");
+    let unused = fan(&picture, &numbered, ["6 0 0 .5 0 1 1 -1"; 3]);
+    assert_eq!((codes(&unused), unused.scene.meshes.len()), (vec!["picture-unused"], 1));
+    assert!(unused.warnings[0].text.ends_with("no face shows it"), "{}", unused.warnings[0]);
+}
+
+#[test]
 fn pictures_and_colours_take_no_memory_that_was_not_granted() {
     let memory = |memory| LoadOptions { limits: Limits { memory, ..Limits::default() }, ..LoadOptions::default() };
     // The file, four vertices, two faces with their colours and coordinates; then the vertices that these make, and a picture.
