@@ -113,7 +113,7 @@ pub(super) fn framing(
     bounds: &Bounds,
 ) -> Option<(Direction, FrameLens)> {
     let direction = match choice {
-        Choice::Named(view) => view.direction(scene.up),
+        Choice::Named(view) => framing::named_direction(scene, *view),
         _ if is_framed(choice, scene) => framing::default_direction(scene, bounds),
         _ => return None,
     };

@@ -22,7 +22,7 @@ pub(super) fn unfold(inputs: &[PathBuf], mut tell: impl FnMut(&Diagnostic)) -> (
         }
         let (found, faults) = models_in(input);
         if found.is_empty() && faults.is_empty() {
-            let remedy = "name one with .glb, .gltf, .obj, .ply, .stl or .nff files, or a scene file itself";
+            let remedy = "name one with .glb, .gltf, .vrm, .obj, .ply, .stl or .nff files, or a scene file itself";
             tell(&Diagnostic::new("folder-empty", input, "", "no model is in this folder").remedy(remedy));
             ended = ended.max(Exit::Input);
         }

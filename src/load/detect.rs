@@ -114,18 +114,18 @@ pub(super) fn detect(source: &Source) -> Result<Format, Diagnostic> {
     by_lines(text).ok_or_else(|| foreign(source, if bytes.is_empty() { "empty" } else { "of an unknown kind" }))
 }
 
-/// Whether a file has a name as models have: one that ends in `.glb`, `.gltf`, `.obj`, `.ply`, `.stl` or `.nff`, in letters of
-/// either case.
+/// Whether a file has a name as models have: one that ends in `.glb`, `.gltf`, `.vrm` (avatars in GLB), `.obj`, `.ply`, `.stl` or
+/// `.nff`, in letters of either case.
 pub fn is_called_a_model(path: &Path) -> bool {
     let is = |known: &&str| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(known));
-    ["glb", "gltf", "obj", "ply", "stl", "nff"].iter().any(is)
+    ["glb", "gltf", "vrm", "obj", "ply", "stl", "nff"].iter().any(is)
 }
 
 fn foreign(source: &Source, kind: &str) -> Diagnostic {
     let remedy = if kind.ends_with("archive") {
         "unpack it first"
     } else {
-        "meshray reads .glb, .gltf, .obj, .ply, .stl, .nff and .toml scenes"
+        "meshray reads .glb, .gltf, .vrm, .obj, .ply, .stl, .nff and .toml scenes"
     };
     Diagnostic::new("unsupported-format", &source.path, "", format!("this is {kind}")).remedy(remedy)
 }

@@ -68,6 +68,8 @@ pub struct Scene {
     pub background: Option<Background>,
     /// Which axis of the file points up.
     pub up: UpAxis,
+    /// Whether the front is where the back of other scenes is: along −Z where +Y points up, as that of avatars in VRM 0.x.
+    pub faces_back: bool,
     /// Render settings that a scene file asks for.
     pub hints: RenderHints,
 }

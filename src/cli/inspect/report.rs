@@ -123,6 +123,9 @@ impl<'a> Report<'a> {
         }
         let reason = self.loaded.facts.up_reason.as_ref().map(|r| format!(" ({r})")).unwrap_or_default();
         lines.add("up", format!("{}{reason}", self.up()));
+        if self.loaded.scene.faces_back {
+            lines.add("front", "on the other side, as that of avatars of VRM 0.x: views turn with it");
+        }
         lines.add("rounding", format!("at most {:.3e} to single precision", self.rounding));
     }
 
@@ -192,7 +195,7 @@ impl<'a> Report<'a> {
         // What is framed in nothing is no bounds.
         let framed = if bounds.is_null() { Value::Null } else { hull(self.bounds.lo, self.bounds.hi) };
         let topology = &self.topology;
-        let value = json!({
+        let mut value = json!({
             "schema": "meshray-inspect/1",
             "file": self.file.to_string_lossy(), "format": facts.format, "generator": facts.generator,
             "hash": format!("{:032x}", facts.hash),
@@ -229,6 +232,8 @@ impl<'a> Report<'a> {
             "max_rounding": self.rounding,
             "warnings": self.loaded.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
         });
+        // One more in the macro would be too many.
+        value["faces_back"] = scene.faces_back.into();
         serde_json::to_string_pretty(&value).unwrap_or_default() + "\n"
     }
 

@@ -207,6 +207,8 @@ impl Loading<'_> {
             .map_err(|over| self.too_large("what points and lines become", over))?;
         lost.into_iter().for_each(|warning| self.report.warnings.push(warning));
         scene.up = self.options.up.unwrap_or_default();
+        // VRM 0.x says so; from 1.0 on, whose extension has another name, avatars face as glTF says.
+        scene.faces_back = root.extensions_used.iter().any(|name| name == "VRM");
         (facts.reading, facts.decoding) = (resolver.reading(), decoding);
         (facts.files, facts.hash, facts.gaps) = resolver.finish();
         Ok(scene)

@@ -99,12 +99,34 @@ const SOLID: f64 = 0.4;
 /// Elevation from which models flatter than high are seen: terrain, floor plans.
 const LANDSCAPE_ELEVATION: f64 = 38.0;
 
+impl Direction {
+    /// The same of a scene that may face back.
+    fn towards_front(self, scene: &Scene) -> Self {
+        if !scene.faces_back {
+            return self;
+        }
+        let axis = in_world(scene.up, DVec3::Y);
+        let half_a_turn = |v: DVec3| axis * (2.0 * axis.dot(v)) - v;
+        Self { from: half_a_turn(self.from), up: half_a_turn(self.up) }
+    }
+}
+
+/// From which side a view sees a scene.
+pub fn named_direction(scene: &Scene, view: NamedView) -> Direction {
+    view.direction(scene.up).towards_front(scene)
+}
+
 /// From where a model looks good when nobody says.
 ///
 /// A three-quarter view, slightly from above. Cards, panels and rows of test objects are looked at face on, from the side
 /// their faces turn to, and things between card and solid from in between; a model that is flat on the ground is seen
 /// from higher up.
 pub fn default_direction(scene: &Scene, bounds: &Bounds) -> Direction {
+    by_extent(scene, bounds).towards_front(scene)
+}
+
+/// The same of a scene that does not face back.
+fn by_extent(scene: &Scene, bounds: &Bounds) -> Direction {
     // The model's extents in the Y-up frame.
     let extent = in_studio(scene.up, bounds.hi - bounds.lo).abs();
     let (x, y, z) = (extent.x, extent.y, extent.z);
@@ -112,7 +134,11 @@ pub fn default_direction(scene: &Scene, bounds: &Bounds) -> Direction {
     let (azimuth, elevation) = (AZIMUTH.to_radians(), ELEVATION.to_radians());
 
     // Asked of what is thin: what is solid has faces on all sides.
-    let turns_to = |axis: DVec3| parts::facing(scene).dot(in_world(scene.up, axis)) >= parts::AWAY;
+    let facing = |axis: DVec3| {
+        let there = Direction { from: in_world(scene.up, axis), up: DVec3::ZERO }.towards_front(scene).from;
+        parts::facing(scene).dot(there)
+    };
+    let turns_to = |axis: DVec3| facing(axis) >= parts::AWAY;
     if z <= x.min(y) {
         let turned = turn(z, x.min(y));
         let side = if turns_to(DVec3::Z) { 0.0 } else { std::f64::consts::PI };

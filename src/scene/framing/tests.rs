@@ -255,3 +255,25 @@ fn a_crowd_is_framed_as_closely_as_if_each_corner_had_been_looked_at() {
         }
     }
 }
+
+#[test]
+fn a_scene_that_faces_back_is_seen_as_one_that_was_turned_to_the_front() {
+    let turned = |v: DVec3| DVec3::new(-v.x, v.y, -v.z);
+    for size in
+        [Vec3::new(1.0, 2.0, 0.5), Vec3::new(0.1, 2.0, 1.0), Vec3::new(1.0, 0.1, 2.0), Vec3::new(1.0, 2.0, 0.02)]
+    {
+        let front = block(-size, size, 2);
+        let mut back = front.clone();
+        back.faces_back = true;
+        back.meshes[0].positions.iter_mut().for_each(|p| *p = turned(p.as_dvec3()).as_vec3());
+        let bounds = robust_bounds(&front);
+        let seen = |scene| [default_direction(scene, &bounds), named_direction(scene, NamedView::Top)];
+        for (front, back) in seen(&front).into_iter().zip(seen(&back)) {
+            assert!(back.from.distance(turned(front.from)) < 1e-12, "{size}: {front:?} {back:?}");
+            assert!(back.up.distance(turned(front.up)) < 1e-12, "{size}: {front:?} {back:?}");
+        }
+    }
+    let mut upright_z = block(Vec3::ZERO, Vec3::ONE, 1);
+    (upright_z.up, upright_z.faces_back) = (UpAxis::Z, true);
+    assert_eq!(named_direction(&upright_z, NamedView::Front).from, DVec3::Y);
+}

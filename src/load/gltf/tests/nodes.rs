@@ -236,3 +236,17 @@ fn copies_without_one_of_their_attributes_are_left_out_with_a_warning() {
     let warning = loaded.warnings.iter().find(|warning| warning.place == place).unwrap().to_string();
     assert!(warning.contains("TRANSLATION has 3, SCALE has 2; copies without one are left out"), "{warning}");
 }
+
+#[test]
+fn avatars_face_back_before_vrm_1_and_as_others_do_from_then_on() {
+    let faces_back = |extension: &str| {
+        let mut file = Builder::new();
+        let positions = file.triangle();
+        file.primitive(json!({"attributes": {"POSITION": positions}}));
+        file.set("extensionsUsed", json!([extension]));
+        let loaded = file.load();
+        assert!(loaded.warnings.iter().all(|w| !w.text.contains(extension)), "{:?}", loaded.warnings);
+        loaded.scene.faces_back
+    };
+    assert_eq!(["VRM", "VRMC_vrm", "KHR_materials_unlit"].map(faces_back), [true, false, false]);
+}
