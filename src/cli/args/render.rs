@@ -17,7 +17,7 @@ use std::path::PathBuf;
 /// What `meshray render` was given.
 #[derive(Debug, Clone, Args)]
 pub(in crate::cli) struct RenderArgs {
-    /// Models (.glb, .gltf, .obj, .ply, .stl, .nff), folders of them, or scene files (.toml); `-` reads standard input
+    /// Models (.glb, .gltf, .vrm, .obj, .ply, .stl, .nff), folders of them, or scene files (.toml); `-` reads standard input
     #[arg(value_name = "INPUT", required_unless_present = "again")]
     pub inputs: Vec<PathBuf>,
     /// The folders among them.
