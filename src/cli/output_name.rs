@@ -36,19 +36,20 @@ pub(super) fn stem(input: &Path) -> String {
 
 /// Fills a template. Errors name the unknown field.
 pub(super) fn fill(template: &str, fields: &Fields) -> Result<PathBuf, String> {
-    filled(template, fields, None).map(|(name, _)| PathBuf::from(name))
+    filled(template, fields, |_| false).map(|(name, _)| PathBuf::from(name))
 }
 
-/// The folder below which a template makes folders of its own, that in front of `{sub}`; `None` if it has none such.
+/// The folder below which a template makes folders of its own: that in front of its first field, but for `{dir}`, which is
+/// there; `None` of a name without fields.
 pub(super) fn grows_in(template: &str, fields: &Fields) -> Result<Option<PathBuf>, String> {
-    let (before, found) = filled(template, fields, Some("sub"))?;
+    let (before, found) = filled(template, fields, |field| field != "dir")?;
     let folder =
         before.rsplit_once(is_separator).map_or(".", |(folder, _)| if folder.is_empty() { "/" } else { folder });
     Ok(found.then(|| PathBuf::from(folder)))
 }
 
-/// What a template is filled to, up to a field if that is asked for, and whether it was there.
-fn filled(template: &str, fields: &Fields, until: Option<&str>) -> Result<(String, bool), String> {
+/// What a template is filled to, up to the first field that is called so, and whether there was one.
+fn filled(template: &str, fields: &Fields, ends: impl Fn(&str) -> bool) -> Result<(String, bool), String> {
     let mut name = String::new();
     let mut rest = template;
     while let Some(at) = rest.find(['{', '}']) {
@@ -58,7 +59,7 @@ fn filled(template: &str, fields: &Fields, until: Option<&str>) -> Result<(Strin
             name.push_str(&tail[..1]);
             rest = after;
         } else if let Some((field, after)) = tail.strip_prefix('{').and_then(|t| t.split_once('}')) {
-            if Some(field) == until {
+            if ends(field) {
                 return Ok((name, true));
             }
             let value = value(field, fields)?;
@@ -253,13 +254,17 @@ mod tests {
     }
 
     #[test]
-    fn folders_grow_where_the_way_below_one_begins() {
-        let grows_in = |template: &str| grows_in(template, &fields("a.obj")).unwrap();
+    fn folders_grow_where_the_fields_of_a_template_begin() {
+        let grows_in = |template: &str| grows_in(template, &fields("a/b.obj")).unwrap();
         assert_eq!(grows_in("{sub}/{stem}.png"), Some(".".into()));
         assert_eq!(grows_in("/{sub}/{stem}.png"), Some("/".into()));
-        assert_eq!(grows_in("x/{view}/of-{sub}/{stem}.png"), Some("x/front".into()));
-        assert_eq!(grows_in("x/{stem}.png"), None);
-        assert_eq!(grows_in("x/{{sub}}/{stem}.png"), None, "plain braces");
+        assert_eq!(grows_in("x/{view}/of-{sub}/{stem}.png"), Some("x".into()));
+        assert_eq!(grows_in("x/of-{stem}.png"), Some("x".into()));
+        assert_eq!(grows_in("x/{{sub}}/{stem}.png"), Some("x/{sub}".into()), "plain braces");
+        assert_eq!(grows_in("{dir}/{stem}.png"), Some("a".into()));
+        assert_eq!(grows_in("{dir}/x/{stem}.png"), Some("a/x".into()));
+        assert_eq!(grows_in("{dir}/x.png"), None);
+        assert_eq!(grows_in("x/y.png"), None);
     }
 
     #[test]

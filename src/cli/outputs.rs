@@ -32,7 +32,7 @@ impl Target {
     }
 }
 
-/// The folder below which others may be made for a picture, if there is one.
+/// The folder that may be made for a picture, in one that is there, and below which others may, if there is one.
 pub(super) type Growth = Option<PathBuf>;
 
 /// Where the next picture goes, and as what.

@@ -76,7 +76,7 @@ pub(super) fn check(path: &Path, flag: &str, sources: &Sources) -> Result<(), Di
 
 /// Whether a picture may go there: to a pipe or a file behind standard output, or under a name that it may replace.
 ///
-/// Below `growth` folders are made, and need not be there.
+/// `growth` and folders below it are made, and need not be there; what that lies in must.
 pub(super) fn check_target(target: &Target, growth: Option<&Path>, sources: &Sources) -> Result<(), Diagnostic> {
     let Some(path) = target.path() else {
         use std::io::IsTerminal;
@@ -85,7 +85,7 @@ pub(super) fn check_target(target: &Target, growth: Option<&Path>, sources: &Sou
         return if std::io::stdout().is_terminal() { Err(fault) } else { Ok(()) };
     };
     match check(path, "-o", sources) {
-        Err(fault) if fault.code == NO_FOLDER && growth.is_some_and(Path::is_dir) => return Ok(()),
+        Err(fault) if fault.code == NO_FOLDER && growth.is_some_and(can_be) => return Ok(()),
         checked => checked?,
     }
     if matches!(target, Target::Default(_)) && path.exists() && !was_written_by_meshray(path) {
@@ -93,6 +93,12 @@ pub(super) fn check_target(target: &Target, growth: Option<&Path>, sources: &Sou
         return Err(fault.remedy("move it away, or name another output with -o"));
     }
     Ok(())
+}
+
+/// Whether a folder is there or can be made in one that is.
+fn can_be(folder: &Path) -> bool {
+    let parent = folder.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    folder.is_dir() || !folder.exists() && parent.is_dir() && folder_takes(folder)
 }
 
 /// [`check`] for every `--report`, before any work.

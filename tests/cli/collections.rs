@@ -25,9 +25,26 @@ fn all_models_in_a_folder_are_rendered_into_folders_like_theirs() {
 }
 
 #[test]
+fn the_folder_that_is_named_is_made_where_the_one_around_it_is_there() {
+    let folder = collection().file("file", "");
+    folder.render(&["all", "-o", "new/"]).ends(0).says(&["3 pictures of 3 inputs"]);
+    assert!(folder.has("new/a.png") && folder.has("new/deep/er/b.png"));
+    folder.render(&["all/deep/a.obj", "all/deep/er/b.OBJ", "-o", "shots/{view}/{stem}.jpg", "--view", "iso"]).ends(0);
+    assert!(folder.has("shots/iso/a.jpg") && folder.has("shots/iso/b.jpg"));
+    folder.render(&["all/a.obj", "-o", "{dir}/beside/{stem}.png"]).ends(0);
+    assert!(folder.has("all/beside/a.png"));
+    for elsewhere in ["gone/deeper/", "gone/deeper/{stem}.png", "gone/a.png", "file/", "file/{stem}.png"] {
+        folder.render(&["all/a.obj", "-o", elsewhere]).ends(1).says(&["its folder is not there"]);
+    }
+    assert!(!folder.has("gone"));
+    folder.render(&["file", "-o", "never/"]).ends(3);
+    folder.render(&["all/a.obj", "-o", "never/", "--dry-run"]).ends(0);
+    assert!(!folder.has("never"), "nothing is made where there is no picture");
+}
+
+#[test]
 fn folders_are_made_only_in_one_that_is_there_and_for_pictures_that_are() {
     let folder = collection().file("all/deep/broken/c.glb", "glTF").file("thumbs/er", "a file");
-    folder.render(&["all", "-o", "gone/"]).ends(1).says(&["gone", "its folder is not there"]);
     folder.render(&["all/deep", "-o", "thumbs/"]).ends(3).says(&["1 picture of 3 inputs, 2 of them failed", "er"]);
     assert!(folder.has("thumbs/a.png") && !folder.has("thumbs/broken"));
     folder.render(&["all/deep", "-o", "other-{sub}/{stem}.png", "--dry-run"]);

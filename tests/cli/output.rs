@@ -122,7 +122,7 @@ fn a_missing_folder_is_told_and_nothing_is_left() {
 #[test]
 fn a_missing_folder_of_many_pictures_is_told_once_and_what_failed_is_counted() {
     let folder = Folder::with_cube().file("other.obj", CUBE);
-    let run = folder.render(&["cube.obj", "other.obj", "--turntable", "3", "-o", "nowhere/"]).ends(1);
+    let run = folder.render(&["cube.obj", "other.obj", "--turntable", "3", "-o", "nowhere/at/all/"]).ends(1);
     assert_eq!(run.errors().len(), 1, "{:?}", run.errors());
     let run = run.says(&["its folder is not there", "0 pictures of 2 inputs, 2 of them failed, 0 warnings"]);
     assert!(run.errors()[0].contains("nowhere"));
