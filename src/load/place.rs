@@ -75,11 +75,15 @@ pub(super) fn place(positions: &[DVec3]) -> Placed {
 
 /// Least and greatest coordinates of all finite positions; infinite the wrong way round where there are none.
 pub(super) fn bounds(positions: &[DVec3]) -> (DVec3, DVec3) {
+    bounds_of(positions.par_iter().map(|&p| if is_usable(p) { p } else { DVec3::NAN }))
+}
+
+/// The same of any places.
+pub(super) fn bounds_of(places: impl IndexedParallelIterator<Item = DVec3>) -> (DVec3, DVec3) {
     let nothing = || (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    let usable = |p: &&DVec3| is_usable(**p);
-    let around = |part: &[DVec3]| part.iter().filter(usable).fold(nothing(), |(lo, hi), &p| (lo.min(p), hi.max(p)));
     let both = |(lo, hi): (DVec3, DVec3), (low, high): (DVec3, DVec3)| (lo.min(low), hi.max(high));
-    positions.par_chunks(POSITIONS).map(around).reduce(nothing, both)
+    let with = |all, p: DVec3| if p.is_finite() { both(all, (p, p)) } else { all };
+    places.with_min_len(POSITIONS).fold(nothing, with).reduce(nothing, both)
 }
 
 /// Subtracts this centre in `f64`, then rounds.

@@ -65,8 +65,12 @@ pub(crate) fn take_in(scene: &Scene, outline: &mut impl Outline) {
     let corners: Vec<Option<Corners>> = scene.meshes.par_iter().zip(&standing).map(of).collect();
     let placed = || instances().filter_map(|instance| Some((instance, corners[instance.mesh as usize].as_ref()?)));
 
-    // A few corners of every instance hold most other instances.
-    let outermost: Vec<Vec<Vec3>> = corners.iter().map(|of| of.as_ref().map_or(vec![], Corners::outermost)).collect();
+    // A few corners of every instance of a crowd hold most of the others.
+    let outermost = |(of, &times): (&Option<Corners>, &u32)| match of {
+        Some(corners) if times > 1 => corners.outermost(),
+        _ => Vec::new(),
+    };
+    let outermost: Vec<Vec<Vec3>> = corners.iter().zip(&standing).map(outermost).collect();
     for (instance, _) in placed().filter(|(instance, _)| standing[instance.mesh as usize] > 1) {
         let corners = outermost[instance.mesh as usize].iter();
         corners.for_each(|p| outline.add(place(instance, *p)));

@@ -1,5 +1,6 @@
 //! Faces -> meshes: one for each run of faces that share object, group and material.
 
+use super::color::Linear;
 use super::pairs::Pairs;
 use super::smooth::{Smooth, smooth};
 use super::soup::{Corner, NONE, Soup};
@@ -327,14 +328,21 @@ pub(super) fn fill_vertices(mesh: &mut Mesh, vertices: &Pairs<Key>, soup: &Soup,
         };
         mesh.uvs = vec![vertices.iter().map(uv).collect()];
     }
-    if vertices.iter().any(|(p, _)| soup.colors.get(p as usize).is_some_and(|&c| c != [1.0; 3])) {
-        mesh.colors = vertices.iter().map(|(p, _)| super::color::linear(soup.colors[p as usize])).collect();
+    let positions: Vec<u32> = vertices.iter().map(|(p, _)| p).collect();
+    mesh.colors = colors(soup, positions.par_iter().map(|&p| p as usize));
+}
+
+/// The colours of vertices at these positions; none where all are white and opaque.
+pub(super) fn colors(soup: &Soup, positions: impl IndexedParallelIterator<Item = usize> + Clone) -> Vec<Vec4> {
+    let positions = positions.with_min_len(FACES);
+    let is_colored = positions.clone().any(|p| soup.colors.get(p).is_some_and(|&c| c != [1.0; 3]));
+    if !is_colored && soup.alphas.is_empty() {
+        return Vec::new();
     }
-    if !soup.alphas.is_empty() {
-        mesh.colors.resize(mesh.positions.len(), Vec4::ONE);
-        let alphas = vertices.iter().map(|(p, _)| soup.alphas[p as usize]);
-        mesh.colors.iter_mut().zip(alphas).for_each(|(color, alpha)| color.w = alpha);
-    }
+    let linear = Linear::new();
+    let light = |p: usize| if is_colored { linear.of(soup.colors[p]) } else { Vec4::ONE };
+    let color = |p: usize| light(p).truncate().extend(soup.alphas.get(p).copied().unwrap_or(1.0));
+    positions.map(color).collect()
 }
 
 /// Whether all corners lie within `flatness` of the plane through their mean.

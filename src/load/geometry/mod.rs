@@ -30,6 +30,8 @@ pub(super) struct Geometry {
     pub soup: Soup,
     pub faces: Vec<Face>,
     pub strokes: Vec<Stroke>,
+    /// Whether every vertex is a point instead, which has the normal of the same number; coordinates do not count.
+    pub is_cloud: bool,
     pub runs: Vec<Run>,
     /// Names; 0 is the empty one.
     pub names: Vec<String>,
@@ -91,12 +93,11 @@ pub(super) struct Run {
 
 impl Geometry {
     /// Makes every vertex a point; the `i`th has the `i`th normal where there are as many.
-    #[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^32 vertices")]
     pub(super) fn draw_points(&mut self) {
-        let (count, has_normals) = (self.soup.positions.len(), self.soup.normals.len() == self.soup.positions.len());
-        let corner = |i: u32| Corner { position: i, uv: NONE, normal: if has_normals { i } else { NONE } };
-        self.soup.stroke_corners = (0..count as u32).map(corner).collect();
-        self.strokes = (0..count).map(|_| Stroke { run: 0, line: 0, arity: 1, joined: false }).collect();
+        self.is_cloud = true;
+        if self.soup.normals.len() != self.soup.positions.len() {
+            self.soup.normals.clear();
+        }
         if self.runs.is_empty() {
             self.runs.push(Run::default());
         }

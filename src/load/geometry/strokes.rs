@@ -1,6 +1,6 @@
 //! Points and lines -> what `load::wires` draws: one part for each run of geometry that share object, group and material.
 
-use super::assemble::{Key, fill_vertices, name};
+use super::assemble::{Key, colors, fill_vertices, name};
 use super::pairs::Pairs;
 use super::soup::{Corner, NONE, Soup};
 use super::{Geometry, Stroke};
@@ -8,10 +8,14 @@ use crate::load::place::Placed;
 use crate::load::wires::Wires;
 use crate::math::Vec3;
 use crate::scene::Mesh;
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// The points and lines of each of [`Geometry::runs`] that has any, with its index.
 pub(super) fn assemble(geometry: &Geometry, soup: &Soup, placed: &Placed) -> Vec<(u32, Wires)> {
+    if geometry.is_cloud && !soup.positions.is_empty() {
+        return vec![(0, cloud(geometry, soup, placed))];
+    }
     let mut of_run: BTreeMap<u32, Vec<(Stroke, &[Corner])>> = BTreeMap::new();
     let mut rest = soup.stroke_corners.as_slice();
     for stroke in &geometry.strokes {
@@ -30,6 +34,18 @@ pub(super) fn assemble(geometry: &Geometry, soup: &Soup, placed: &Placed) -> Vec
         (run, wires)
     };
     of_run.into_iter().map(&mut build).collect()
+}
+
+/// All vertices as points.
+fn cloud(geometry: &Geometry, soup: &Soup, placed: &Placed) -> Wires {
+    let positions = placed.positions.clone();
+    // Lit only where every point says how.
+    let is_lit = soup.normals.len() == positions.len() && soup.normals.par_iter().all(|normal| *normal != Vec3::ZERO);
+    let normals = if is_lit { soup.normals.clone() } else { Vec::new() };
+    let colors = colors(soup, (0..positions.len()).into_par_iter());
+    #[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^32 vertices")]
+    let ends = (0..positions.len() as u32).map(|i| [i; 2]).collect();
+    Wires { mesh: Mesh { name: name(geometry, 0), positions, normals, colors, ..Mesh::default() }, ends }
 }
 
 fn wires(strokes: &[(Stroke, &[Corner])], soup: &Soup, placed: &Placed, vertices: &mut Pairs<Key>) -> Wires {

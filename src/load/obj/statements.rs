@@ -8,7 +8,7 @@
 use super::chunk::{self, Chunk};
 use super::join::{Joined, join};
 use super::{faults, split};
-use crate::load::geometry::{Corner, Geometry, LARGEST, Run, Stroke};
+use crate::load::geometry::{Geometry, LARGEST, Run};
 use crate::load::limits::{Budget, OverBudget};
 use crate::load::text::encoding::decode_name;
 use crate::load::wires::Wires;
@@ -101,14 +101,15 @@ fn read_in_runs(text: &[u8], run: usize, file: &Path, budget: &mut Budget) -> Re
             .take(statements.geometry.soup.positions.len() as u64, POINT)
             .map_err(|over| Diagnostic::over_budget(file, over))?;
         statements.geometry.draw_points();
+    } else {
+        statements.geometry.soup.leave_out_unused();
     }
-    statements.geometry.soup.leave_out_unused();
     statements.geometry.few_corners = statements.odd.few_corners.count;
     Ok(statements)
 }
 
-/// Bytes of a point among the statements.
-const POINT: u64 = (size_of::<Stroke>() + size_of::<Corner>()) as u64;
+/// Bytes of a point: its vertex, and the numbers of what would be the ends of a line.
+const POINT: u64 = 48;
 
 impl Statements {
     /// Whether nothing joins vertices, nor was meant to: then they are points, as scanners write them.
@@ -226,7 +227,7 @@ impl Oddities {
 mod tests {
     use super::*;
     use crate::load::Limits;
-    use crate::load::geometry::{Face, NONE, color};
+    use crate::load::geometry::{Face, NONE, Stroke, color};
     use crate::math::{DVec2, DVec3, Vec3};
 
     fn read_with(text: &str, memory: u64) -> Result<Statements, LoadError> {

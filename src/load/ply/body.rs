@@ -1,6 +1,7 @@
 //! The values of a PLY file, one after another, as text or as bytes.
 
 use super::header::{Element, Encoding, Header, Kind};
+use super::packed::Packed;
 use crate::load::paths::shorten;
 use crate::load::text::words::Words;
 use crate::load::{Diagnostic, Source};
@@ -90,27 +91,9 @@ impl<'a> Body<'a> {
 
     #[inline]
     fn binary(&mut self, kind: Kind, big: bool) -> Result<f64, Missing> {
-        Ok(match kind {
-            Kind::I8 => f64::from(self.take::<1>(big)?[0] as i8),
-            Kind::U8 => f64::from(self.take::<1>(big)?[0]),
-            Kind::I16 => f64::from(i16::from_le_bytes(self.take(big)?)),
-            Kind::U16 => f64::from(u16::from_le_bytes(self.take(big)?)),
-            Kind::I32 => f64::from(i32::from_le_bytes(self.take(big)?)),
-            Kind::U32 => f64::from(u32::from_le_bytes(self.take(big)?)),
-            Kind::F32 => f64::from(f32::from_le_bytes(self.take(big)?)),
-            Kind::F64 => f64::from_le_bytes(self.take(big)?),
-        })
-    }
-
-    /// The next bytes, lowest first.
-    #[inline]
-    fn take<const N: usize>(&mut self, big: bool) -> Result<[u8; N], Missing> {
-        let mut bytes = *self.words.rest().first_chunk::<N>().ok_or(Missing::End)?;
-        self.words.at += N;
-        if big {
-            bytes.reverse();
-        }
-        Ok(bytes)
+        let value = kind.value(self.words.rest(), big).ok_or(Missing::End)?;
+        self.words.at += kind.size();
+        Ok(value)
     }
 
     /// The line of the next word of a text, and that of the last one; `None` for other files, and behind the last word.
@@ -129,6 +112,16 @@ impl<'a> Body<'a> {
             [] => Missing::End,
             word => Missing::Word(String::from_utf8_lossy(word).into_owned()),
         })
+    }
+
+    /// The rows of an element that begins here, where they all take the same bytes ([`Packed::of`]).
+    pub(super) fn packed(&self, element: &Element, in_lists: Option<usize>) -> Option<Packed<'a>> {
+        Packed::of(element, self.encoding, self.words.rest(), in_lists)
+    }
+
+    /// Goes on behind these rows.
+    pub(super) fn pass_packed(&mut self, rows: &Packed) {
+        self.words.at += rows.length();
     }
 
     /// Passes over `count` values of a binary file, of `size` bytes each; whether there are so many.

@@ -3,8 +3,10 @@
 use super::body::{Body, Missing};
 use super::header::{Element, Encoding, Header, Kind, Property};
 use super::meaning::{
-    COLOR, Meanings, NORMAL, PLACE, RED, UV, Use, Wanted, ends, light, list_of, uses_in_edges, uses_in_faces,
+    ALPHA, COLOR, Light, Meanings, NORMAL, PLACE, RED, SLOTS, UV, Use, Wanted, ends, list_of, uses_in_edges,
+    uses_in_faces,
 };
+use super::packed::Record;
 use super::told::passed_over;
 use crate::load::geometry::NONE;
 use crate::load::geometry::bare::{Bare, Said};
@@ -156,6 +158,9 @@ impl Reader<'_, '_> {
         Bare::charge_vertices(self.budget, element.count)
             .map_err(|over| Diagnostic::over_budget(&self.source.path, over))?;
 
+        if self.packed_vertices(element, &slots, [has_normals, has_uvs, has_colors]) {
+            return Ok(());
+        }
         // The budget has room for so many, so memory has.
         self.bare.positions.reserve_exact(element.count as usize);
         let mut rows = Rows::default();
@@ -166,7 +171,7 @@ impl Reader<'_, '_> {
                 match slot {
                     Some(slot) => {
                         let value = self.value(element, i, property)?;
-                        values[*slot] = if *slot < RED { value } else { light(property, value) };
+                        values[*slot] = if *slot < RED { value } else { Light::said_by(property).part(value) };
                     }
                     None => self.pass_property(element, i, property)?,
                 }
@@ -184,6 +189,38 @@ impl Reader<'_, '_> {
             }
         }
         Ok(())
+    }
+
+    /// Reads the vertices of a binary file side by side, where they are no lists and go with these numbers of them; whether
+    /// they could be.
+    fn packed_vertices(&mut self, element: &Element, slots: &[Option<usize>], has: [bool; 3]) -> bool {
+        let Some(rows) = self.body.packed(element, None) else { return false };
+        let mut said = [None; SLOTS.len()];
+        for (k, (property, slot)) in element.properties.iter().zip(slots).enumerate() {
+            if let Some(slot) = slot {
+                said[*slot] = Some((rows.start(k), property.kind, Light::said_by(property)));
+            }
+        }
+        let value = |row: Record, slot: usize| match said[slot] {
+            Some((at, kind, _)) if slot < RED => row.value(at, kind),
+            Some((at, kind, light)) => light.part(row.value(at, kind)),
+            // What says nothing of opacity is opaque.
+            None => f64::from(u8::from(slot == ALPHA)),
+        };
+        self.bare.positions = rows.each(|row| DVec3::from(PLACE.map(|slot| value(row, slot))));
+        let [has_normals, has_uvs, has_colors] = has;
+        if has_normals {
+            self.bare.normals = rows.each(|row| Vec3::from(NORMAL.map(|slot| value(row, slot) as f32)));
+        }
+        if has_uvs {
+            self.bare.uvs = rows.each(|row| DVec2::from(UV.map(|slot| value(row, slot))));
+        }
+        if has_colors {
+            let [r, g, b] = COLOR;
+            self.bare.colors = rows.each(|row| [r, g, b, ALPHA].map(|slot| value(row, slot) as f32));
+        }
+        self.body.pass_packed(&rows);
+        true
     }
 
     /// Lines.
@@ -205,7 +242,7 @@ impl Reader<'_, '_> {
                 }
             }
             // An edge takes what a face of two corners would.
-            Bare::charge_face(self.budget, 2).map_err(|over| Diagnostic::over_budget(&self.source.path, over))?;
+            Bare::charge_faces(self.budget, 1, 2).map_err(|over| Diagnostic::over_budget(&self.source.path, over))?;
             self.bare.edge(edge, color);
         }
         Ok(())
@@ -215,6 +252,9 @@ impl Reader<'_, '_> {
     fn faces(&mut self, element: &Element, list: usize, strips: bool) -> Result<(), Diagnostic> {
         let uses = uses_in_faces(element, list, strips, self.wanted);
         if !strips {
+            if self.packed_triangles(element, list, &uses)? {
+                return Ok(());
+            }
             self.take_colors(element.count, &uses)?;
         }
         let (mut row, mut rows) = (Row::default(), Rows::default());
@@ -239,6 +279,34 @@ impl Reader<'_, '_> {
             }
         }
         Ok(())
+    }
+
+    /// Reads the faces of a binary file side by side, where all are triangles of vertices that are there and nothing is said of
+    /// them beside; whether they could be.
+    fn packed_triangles(&mut self, element: &Element, list: usize, uses: &[Use]) -> Result<bool, Diagnostic> {
+        let lists = element.properties.iter().filter(|property| property.length.is_some()).count();
+        let is_plain = lists == 1 && uses.iter().all(|used| matches!(used, Use::Corners | Use::Nothing));
+        let Some(rows) = self.body.packed(element, Some(3)).filter(|_| is_plain) else { return Ok(false) };
+        let Property { kind, length: Some(length), .. } = element.properties[list] else { return Ok(false) };
+        let (start, vertices) = (rows.start(list), self.vertices as f64);
+        let corners = |row: Record| [0, 1, 2].map(|k| row.value(start + length.size() + k * kind.size(), kind));
+        let is_there = |corner: f64| corner >= 0.0 && corner < vertices && corner.fract() == 0.0;
+        let is_sound = |row: Record| row.value(start, length) == 3.0 && corners(row).into_iter().all(is_there);
+        let most = (self.bare.corners.len() as u64).saturating_add(element.count.saturating_mul(3));
+        if most > Bare::LARGEST || !rows.all(is_sound) {
+            return Ok(false);
+        }
+        Bare::charge_faces(self.budget, element.count, 3)
+            .map_err(|over| Diagnostic::over_budget(&self.source.path, over))?;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "whole numbers below that of vertices"
+        )]
+        let triangles = rows.each(|row| corners(row).map(|corner| corner as u32));
+        self.bare.triangles(triangles.as_flattened());
+        self.body.pass_packed(&rows);
+        Ok(true)
     }
 
     /// Adds a face that was read, with its colour and its place in a picture.
@@ -276,7 +344,7 @@ impl Reader<'_, '_> {
         property: &Property,
         (part, color): (usize, &mut Option<[f32; 4]>),
     ) -> Result<(), Diagnostic> {
-        let value = light(property, self.value(element, i, property)?);
+        let value = Light::said_by(property).part(self.value(element, i, property)?);
         color.get_or_insert([1.0; 4])[part] = value as f32;
         Ok(())
     }
@@ -351,8 +419,11 @@ impl Reader<'_, '_> {
             return Err(self.missing(&Missing::End, element, i, property));
         }
         let mut for_now = *self.budget;
-        let granted =
-            if strips { for_now.take(length, size_of::<u32>() as u64) } else { Bare::charge_face(self.budget, length) };
+        let granted = if strips {
+            for_now.take(length, size_of::<u32>() as u64)
+        } else {
+            Bare::charge_faces(self.budget, 1, length)
+        };
         granted.map_err(|over| Diagnostic::over_budget(&self.source.path, over))
     }
 
@@ -375,7 +446,8 @@ impl Reader<'_, '_> {
             // Two equal corners only turn the strip.
             if a != b && b != c && c != a {
                 let [a, b] = if i % 2 == 0 { [a, b] } else { [b, a] };
-                Bare::charge_face(self.budget, 3).map_err(|over| Diagnostic::over_budget(&self.source.path, over))?;
+                Bare::charge_faces(self.budget, 1, 3)
+                    .map_err(|over| Diagnostic::over_budget(&self.source.path, over))?;
                 if color.is_some() {
                     self.take(1, Bare::COLOR)?;
                 }

@@ -44,6 +44,29 @@ impl Kind {
         }
     }
 
+    /// The value at the beginning of these bytes of a binary file, if there are enough; exact.
+    #[inline]
+    pub(super) fn value(self, bytes: &[u8], big: bool) -> Option<f64> {
+        #[inline]
+        fn first<const N: usize>(bytes: &[u8], big: bool) -> Option<[u8; N]> {
+            let mut bytes = *bytes.first_chunk::<N>()?;
+            if big {
+                bytes.reverse();
+            }
+            Some(bytes)
+        }
+        Some(match self {
+            Self::I8 => f64::from(i8::from_le_bytes(first(bytes, big)?)),
+            Self::U8 => f64::from(u8::from_le_bytes(first(bytes, big)?)),
+            Self::I16 => f64::from(i16::from_le_bytes(first(bytes, big)?)),
+            Self::U16 => f64::from(u16::from_le_bytes(first(bytes, big)?)),
+            Self::I32 => f64::from(i32::from_le_bytes(first(bytes, big)?)),
+            Self::U32 => f64::from(u32::from_le_bytes(first(bytes, big)?)),
+            Self::F32 => f64::from(f32::from_le_bytes(first(bytes, big)?)),
+            Self::F64 => f64::from_le_bytes(first(bytes, big)?),
+        })
+    }
+
     /// Both families of names are in use.
     fn of(word: &str) -> Option<Self> {
         Some(match word {

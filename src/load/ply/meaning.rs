@@ -24,7 +24,7 @@ pub(super) const NORMAL: [usize; 3] = [3, 4, 5];
 pub(super) const UV: [usize; 2] = [6, 7];
 pub(super) const COLOR: [usize; 3] = [RED, RED + 1, RED + 2];
 pub(super) const RED: usize = 8;
-const ALPHA: usize = 11;
+pub(super) const ALPHA: usize = 11;
 
 /// Colours of Gaussian splats, as the constant part of spherical harmonics (B. Kerbl and others, "3D Gaussian Splatting for
 /// Real-Time Radiance Field Rendering", 2023).
@@ -62,14 +62,29 @@ impl<'a> Meanings<'a> {
     }
 }
 
-/// A part of a colour, 0…1, as a property says it.
-pub(super) fn light(property: &Property, value: f64) -> f64 {
-    /// 1 / (2 √π), the spherical harmonic that is the same all around.
-    const EVEN: f64 = 0.282_094_791_773_878_14;
-    if SPLAT.contains(&property.name.as_str()) {
-        (0.5 + EVEN * value).clamp(0.0, 1.0)
-    } else {
-        value / unit(property.kind)
+/// How a property says a part of a colour.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Light {
+    /// As part of this, which stands for full light.
+    Of(f64),
+    /// As that of a splat.
+    OfSplat,
+}
+
+impl Light {
+    pub(super) fn said_by(property: &Property) -> Self {
+        if SPLAT.contains(&property.name.as_str()) { Self::OfSplat } else { Self::Of(unit(property.kind)) }
+    }
+
+    /// What is written so, 0…1.
+    #[inline]
+    pub(super) fn part(self, value: f64) -> f64 {
+        /// 1 / (2 √π), the spherical harmonic that is the same all around.
+        const EVEN: f64 = 0.282_094_791_773_878_14;
+        match self {
+            Self::Of(full) => value / full,
+            Self::OfSplat => (0.5 + EVEN * value).clamp(0.0, 1.0),
+        }
     }
 }
 

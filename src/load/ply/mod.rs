@@ -19,6 +19,7 @@ mod body;
 mod geometry;
 mod header;
 mod meaning;
+mod packed;
 mod told;
 
 use super::geometry::bare;

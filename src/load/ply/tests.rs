@@ -93,6 +93,43 @@ fn every_encoding_gives_the_same_scene() {
 }
 
 #[test]
+fn triangles_alone_are_the_same_in_every_encoding_and_among_other_faces() {
+    // More than one thread reads at a time, with something in each row that is not read.
+    let header = |faces: u32| {
+        format!(
+            "element vertex 9000\nproperty float x\nproperty double y\nproperty float z\nproperty uchar quality\n\
+             element face {faces}\nproperty uchar kind\nproperty list uchar int vertex_index"
+        )
+    };
+    let vertex = |i: i32| {
+        let [x, z] = [i % 91, i % 17].map(|x| Value::Float(x as f32 * 0.5));
+        [x, Value::Double(f64::from(i / 91) * 0.25), z, Value::Byte(7)]
+    };
+    let triangle = |i: i32| {
+        let [a, b, c] = [i, (i * 7 + 1) % 9000, (i * 13 + 2) % 9000].map(Value::Int);
+        [Value::Byte(1), Value::Byte(3), a, b, c]
+    };
+    let values = |quad: bool| {
+        let mut values: Vec<Value> = (0..9000).flat_map(vertex).chain((0..8999).flat_map(triangle)).collect();
+        if quad {
+            values.extend([Value::Byte(1), Value::Byte(4)]);
+            values.extend([0, 1, 92, 91].map(Value::Int));
+        }
+        values
+    };
+    let of = |format: &str, quad| plain(&encoded(format, &header(8999 + u32::from(quad)), &values(quad)));
+    let [text, little, big] = FORMATS.map(|format| of(format, false));
+    assert_eq!(text.facts.faces + text.facts.dropped.iter().map(|dropped| dropped.1).sum::<u64>(), 8999);
+    let expected = format!("{:?}", text.scene);
+    assert!(format!("{:?}", little.scene) == expected && format!("{:?}", big.scene) == expected);
+    let (alone, mixed) = (&little.scene.meshes[0], &of(FORMATS[1], true).scene.meshes[0]);
+    let places = |mesh: &crate::scene::Mesh| -> Vec<_> {
+        mesh.triangles.iter().map(|t| t.map(|i| mesh.positions[i as usize])).collect()
+    };
+    assert!(places(mixed).starts_with(&places(alone)) && mixed.triangles.len() == alone.triangles.len() + 2);
+}
+
+#[test]
 fn every_kind_of_number_is_read_in_either_byte_order() {
     let bytes: [(&str, &[u8]); 8] = [
         ("char", &[0xfe]),

@@ -1,11 +1,12 @@
 //! Binary STL: 80 bytes of anything, the number of triangles, and 50 bytes for each.
 
-use super::Triangles;
+use super::Making;
 use crate::load::geometry::bare::Bare;
 use crate::load::{Diagnostic, Source};
 use crate::math::DVec3;
 use crate::scene::Material;
 use crate::scene::color::to_srgb;
+use rayon::prelude::*;
 
 /// Bytes before the first triangle.
 const HEADER: usize = 84;
@@ -29,7 +30,7 @@ pub(in crate::load) fn is_exact(bytes: &[u8]) -> bool {
 ///
 /// # Errors
 /// When there are fewer than the header claims. What follows them is not looked at; a warning counts it.
-pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnostic> {
+pub(super) fn read(source: &Source, mut making: Making) -> Result<Bare, Diagnostic> {
     let bytes = source.bytes.as_slice();
     let fault = |at: usize, text: String| {
         let fault = Diagnostic::new("stl-cut-off", &source.path, format!("byte {at}"), text);
@@ -46,16 +47,12 @@ pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnost
     // As many as there are in memory.
     let records = if uncounted { records } else { &records[..claimed as usize] };
     let paint = Paint::of(&bytes[..80], records);
-    for record in records {
-        let number = |k: usize| {
-            let bytes = [record[k], record[k + 1], record[k + 2], record[k + 3]];
-            f64::from(f32::from_le_bytes(bytes))
-        };
-        let place = |k: usize| DVec3::new(number(k), number(k + 4), number(k + 8));
-        let color = paint.as_ref().map(|paint| paint.color(attributes(record)));
-        out.add([place(12), place(24), place(36)], color)?;
-    }
-    let mut bare = out.bare;
+    making.charge(records.len(), if paint.is_some() { Bare::COLOR } else { 0 })?;
+    let colors = |paint: Paint| records.par_iter().map(|record| paint.color(attributes(record))).collect();
+    let colors = paint.map_or_else(Vec::new, colors);
+    // What was single precision is told apart as such.
+    let bits = |place: DVec3| place.as_vec3().to_array().map(f32::to_bits);
+    let mut bare = making.triangles(3 * records.len(), |corner| place(records, corner), bits, colors)?;
     if uncounted {
         let text = format!("the header claims 0 triangles, but {} are there", records.len());
         let warning = Diagnostic::new("stl-uncounted", &source.path, "byte 80", text);
@@ -65,6 +62,14 @@ pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnost
     let said = String::from_utf8_lossy(&bytes[..80]);
     bare.comments.push(said.trim_matches(|c: char| c.is_control() || c.is_whitespace()).into());
     Ok(bare)
+}
+
+/// Where a corner is; each triangle has three, behind its normal.
+fn place(records: &[[u8; TRIANGLE]], corner: usize) -> DVec3 {
+    let record = &records[corner / 3];
+    let number = |k: usize| f64::from(f32::from_le_bytes([record[k], record[k + 1], record[k + 2], record[k + 3]]));
+    let at = 12 * (1 + corner % 3);
+    DVec3::new(number(at), number(at + 4), number(at + 8))
 }
 
 /// A warning when bytes follow the triangles that are read.

@@ -9,14 +9,17 @@
 
 mod binary;
 mod text;
+mod weld;
 
-use super::geometry::bare::{self, Bare, Said};
+use super::geometry::bare::{self, Bare};
 use super::limits::Budget;
 use super::{Diagnostic, LoadError, LoadOptions, Loaded, Source};
 use crate::math::DVec3;
 use crate::scene::UpAxis;
-use std::collections::HashMap;
+use bytemuck::Pod;
+use rayon::prelude::*;
 use std::path::Path;
+use weld::{Welded, weld};
 
 pub(super) use binary::is_exact;
 
@@ -40,59 +43,59 @@ pub fn load(
     options: &LoadOptions,
     budget: &mut Budget,
 ) -> Result<Loaded, LoadError> {
-    let triangles = Triangles { file: &source.path, budget, bare: Bare::default(), known: HashMap::new() };
+    let making = Making { file: &source.path, budget: &mut *budget };
     let (bare, format) = match encoding {
-        Encoding::Text => (text::read(source, triangles)?, "STL (ascii)"),
-        Encoding::Binary => (binary::read(source, triangles)?, "STL (binary)"),
+        Encoding::Text => (text::read(source, making)?, "STL (ascii)"),
+        Encoding::Binary => (binary::read(source, making)?, "STL (binary)"),
     };
     // Layers are built upwards along z.
     let otherwise = (UpAxis::Z, "STL does not say; what is made to be printed stands on the xy plane");
     bare::load(bare, format, otherwise, source, options, budget)
 }
 
-/// Triangles one after another, whose equal places become one vertex.
-struct Triangles<'a> {
+/// What triangles are made into, and what that comes out of.
+struct Making<'a> {
     file: &'a Path,
     budget: &'a mut Budget,
-    bare: Bare,
-    /// Vertices by the bits of their places.
-    known: HashMap<[u64; 3], u32>,
 }
 
-impl Triangles<'_> {
-    /// Bytes that a vertex takes in the table, which is never less than half full once it has grown.
-    const KNOWN: u64 = 2 * 40;
-
-    fn add(&mut self, corners: [DVec3; 3], color: Option<[f32; 4]>) -> Result<(), Diagnostic> {
-        let painted = u64::from(color.is_some());
-        let taken = Bare::charge_face(self.budget, 3).and_then(|()| self.budget.take(painted, Bare::COLOR));
-        taken.map_err(|over| Diagnostic::over_budget(self.file, over))?;
-        let mut numbers = [0; 3];
-        for (number, place) in numbers.iter_mut().zip(corners) {
-            *number = self.vertex(place)?;
-        }
-        self.bare.face(&numbers, &Said { color, ..Said::default() });
-        Ok(())
+impl Making<'_> {
+    /// Takes the memory of so many triangles before they are made, and of what so many bytes hold of each until then.
+    fn charge(&mut self, triangles: usize, bytes: u64) -> Result<(), Diagnostic> {
+        let count = triangles as u64;
+        let taken = Bare::charge_faces(self.budget, count, 3).and_then(|()| self.budget.take(count, bytes));
+        taken.map_err(|over| Diagnostic::over_budget(self.file, over))
     }
 
-    fn vertex(&mut self, place: DVec3) -> Result<u32, Diagnostic> {
+    /// Triangles whose memory was taken: corner `c` is at `place(c)`, and equal places, which are told by their `bits`, become
+    /// one vertex. There are as many colours as triangles, or none.
+    ///
+    /// # Errors
+    /// When there are too many, or memory for what joins them is not left.
+    fn triangles<P: Pod + Eq + Send + Sync>(
+        self,
+        corners: usize,
+        place: impl Fn(usize) -> DVec3 + Sync,
+        bits: impl Fn(DVec3) -> P + Sync,
+        colors: Vec<[f32; 4]>,
+    ) -> Result<Bare, Diagnostic> {
+        let over = |over| Diagnostic::over_budget(self.file, over);
+        self.budget.take(corners as u64, weld::cost::<P>()).map_err(over)?;
+        if corners > weld::LARGEST {
+            return Err(self.too_large("corners", weld::LARGEST as u64));
+        }
         // Adding 0 makes one zero of two.
-        let key = place.to_array().map(|x| (x + 0.0).to_bits());
-        if let Some(&number) = self.known.get(&key) {
-            return Ok(number);
+        let Welded { firsts, vertices } = weld(corners, |corner| bits(place(corner) + DVec3::ZERO));
+        Bare::charge_vertices(self.budget, firsts.len() as u64).map_err(over)?;
+        if firsts.len() as u64 > Bare::LARGEST {
+            return Err(self.too_large("vertices", Bare::LARGEST));
         }
-        let taken = Bare::charge_vertices(self.budget, 1).and_then(|()| self.budget.take(1, Self::KNOWN));
-        taken.map_err(|over| Diagnostic::over_budget(self.file, over))?;
-        let number = self.bare.positions.len();
-        if number as u64 >= Bare::LARGEST {
-            let text = format!("more than {} vertices", Bare::LARGEST);
-            return Err(Diagnostic::new("stl-too-large", self.file, "", text).remedy("split the file"));
-        }
-        #[expect(clippy::cast_possible_truncation, reason = "checked just before")]
-        let number = number as u32;
-        self.known.insert(key, number);
-        self.bare.positions.push(place);
-        Ok(number)
+        let positions = firsts.par_iter().map(|&corner| place(corner as usize)).collect();
+        Ok(Bare::of_triangles(positions, vertices, colors))
+    }
+
+    fn too_large(&self, what: &str, most: u64) -> Diagnostic {
+        Diagnostic::new("stl-too-large", self.file, "", format!("more than {most} {what}")).remedy("split the file")
     }
 }
 

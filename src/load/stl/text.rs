@@ -3,7 +3,7 @@
 //!
 //! Words may stand on any lines and in any case, as programs write them.
 
-use super::Triangles;
+use super::Making;
 use crate::load::geometry::bare::Bare;
 use crate::load::paths::shorten;
 use crate::load::text::{without_mark, words};
@@ -11,17 +11,20 @@ use crate::load::{Diagnostic, Source};
 use crate::math::DVec3;
 use std::path::Path;
 
+/// Bytes of the places of a facet, in a list that grows by being copied to twice its room.
+const FACET: u64 = 3 * 3 * size_of::<DVec3>() as u64;
+
 /// Reads every triangle.
 ///
 /// # Errors
 /// At the first word that is out of place, with its line. A solid without its end may be whole all the same; a warning says
 /// so.
-pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnostic> {
+pub(super) fn read(source: &Source, mut making: Making) -> Result<Bare, Diagnostic> {
     // Zeros fill the last block of what was copied in blocks.
     let length = source.bytes.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
     let bytes = without_mark(&source.bytes[..length]);
     let mut words = Words { file: &source.path, words: words::Words::new(bytes, 0, 1) };
-    let (mut names, mut open) = (Vec::new(), false);
+    let (mut facets, mut names, mut open) = (Vec::new(), Vec::new(), false);
     while let Some(word) = words.next() {
         if is(word, "solid") {
             open = true;
@@ -30,7 +33,8 @@ pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnost
                 names.push(name);
             }
         } else if is(word, "facet") {
-            out.add(facet(&mut words)?, None)?;
+            making.charge(1, FACET)?;
+            facets.push(facet(&mut words)?);
         } else if is(word, "endsolid") {
             open = false;
             words.pass_name();
@@ -40,7 +44,9 @@ pub(super) fn read(source: &Source, mut out: Triangles) -> Result<Bare, Diagnost
             return Err(words.fault(word, "`solid`, `facet` or `endsolid`"));
         }
     }
-    let mut bare = out.bare;
+    let corners: &[DVec3] = facets.as_flattened();
+    let bits = |place: DVec3| place.to_array().map(f64::to_bits);
+    let mut bare = making.triangles(corners.len(), |corner| corners[corner], bits, Vec::new())?;
     let words = words.words;
     bare.places = Some(words.places);
     bare.comments = names;

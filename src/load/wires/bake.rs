@@ -2,9 +2,11 @@
 
 use super::solid::{Solid, octahedron, prism, roof, square, tetrahedron};
 use super::{Widths, Wires};
+use crate::load::place::bounds_of;
 use crate::math::frame::{center_of_most, spread};
 use crate::math::{DMat3, DVec3, Vec3, Vec4};
 use crate::scene::Mesh;
+use rayon::prelude::*;
 
 /// Solids, around where they stand.
 pub(super) struct Baked {
@@ -27,32 +29,118 @@ pub(super) fn cost(wires: &Wires, widths: &Widths) -> u64 {
         + of(!mesh.tangents.is_empty(), size_of::<Vec4>())
         + of(!mesh.colors.is_empty(), size_of::<Vec4>())
         + mesh.uvs.iter().map(|uvs| of(!uvs.is_empty(), 8)).sum::<usize>();
-    let bytes = |corners: usize, triangles: usize| (corners * corner + triangles * (12 + 4)) as u64;
-    let point = match (wires.is_lit(), widths.crowd) {
-        (true, _) => bytes(4, 2),
-        (false, true) => bytes(4, 4),
-        (false, false) => bytes(6, 8),
-    };
-    points.saturating_mul(point).saturating_add(lines.saturating_mul(bytes(6, 8)))
+    let bytes = |shape: Shape| (shape.corners * corner + shape.triangles * (12 + 4)) as u64;
+    let (point, line) = (bytes(Shape::of_point(wires.is_lit(), widths)), bytes(Shape::OF_LINE));
+    points.saturating_mul(point).saturating_add(lines.saturating_mul(line))
+}
+
+/// How much of a solid there is.
+#[derive(Clone, Copy)]
+struct Shape {
+    corners: usize,
+    triangles: usize,
+}
+
+impl Shape {
+    const OF_LINE: Self = Self { corners: 6, triangles: 8 };
+
+    fn of_point(is_lit: bool, widths: &Widths) -> Self {
+        let (corners, triangles) = match (is_lit, widths.crowd) {
+            (true, _) => (4, 2),
+            (false, true) => (4, 4),
+            (false, false) => (6, 8),
+        };
+        Self { corners, triangles }
+    }
 }
 
 /// Makes the solids.
 pub(super) fn bake(wires: &Wires, linear: DMat3, widths: &Widths) -> Baked {
     let place = |vertex: u32| wires.mesh.positions.get(vertex as usize).map_or(DVec3::NAN, |p| linear * p.as_dvec3());
-    let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for point in wires.ends.iter().flatten().map(|&vertex| place(vertex)).filter(|p| p.is_finite()) {
-        (lo, hi) = (lo.min(point), hi.max(point));
-    }
+    let (lo, hi) = bounds_of(wires.ends.as_flattened().par_iter().map(|&vertex| place(vertex)));
     let center = center_of_most(lo, hi, spread(wires.ends.len()).map(|i| place(wires.ends[i][0])));
+    let of = Baking { wires, widths, turn: Turn::new(linear), center };
     let mut out = Baked { meshes: Vec::new(), center, dropped: 0 };
     for (run, ends) in wires.ends.chunks(RUN).enumerate() {
-        let mut baker = Baker { from: &wires.mesh, turn: Turn::new(linear), mesh: named(&wires.mesh), dropped: 0 };
-        for (at, &[first, second]) in ends.iter().enumerate() {
-            let (a, b) = (place(first) - center, place(second) - center);
-            let up = baker.up(first, second);
-            // Numbers of wires are below 2^32, as those of their vertices are.
+        let mut whole = of.room(ends);
+        for (batch, ends) in ends.chunks(BATCH).enumerate() {
+            // Below 2^32, as the numbers of their vertices are.
             #[expect(clippy::cast_possible_truncation, reason = "memory for 2^32 lines is not granted")]
-            let number = (run * RUN + at) as u32;
+            let part = |(i, ends)| of.solids(ends, (run * RUN + batch * BATCH + i * PART) as u32);
+            let parts: Vec<(Mesh, u64)> = ends.par_chunks(PART).enumerate().map(part).collect();
+            for (part, dropped) in parts {
+                append(&mut whole, part);
+                out.dropped += dropped;
+            }
+        }
+        if !whole.triangles.is_empty() {
+            out.meshes.push(whole);
+        }
+    }
+    out
+}
+
+/// Wires that one thread makes at a time, and those whose solids are kept beside the mesh that they belong to.
+const PART: usize = 1 << 12;
+const BATCH: usize = 1 << 18;
+
+/// Adds a mesh whose triangles count its own vertices.
+#[expect(clippy::cast_possible_truncation, reason = "runs are short enough")]
+fn append(whole: &mut Mesh, part: Mesh) {
+    let first = whole.positions.len() as u32;
+    whole.positions.extend(part.positions);
+    whole.triangles.extend(part.triangles.into_iter().map(|t| t.map(|i| first + i)));
+    whole.face_of_triangle.extend(part.face_of_triangle);
+    whole.normals.extend(part.normals);
+    whole.tangents.extend(part.tangents);
+    whole.colors.extend(part.colors);
+    for (to, from) in whole.uvs.iter_mut().zip(part.uvs) {
+        to.extend(from);
+    }
+}
+
+/// What wires are made into solids with.
+struct Baking<'a> {
+    wires: &'a Wires,
+    widths: &'a Widths,
+    turn: Turn,
+    center: DVec3,
+}
+
+impl Baking<'_> {
+    /// An empty mesh with room for the solids of these.
+    fn room(&self, ends: &[[u32; 2]]) -> Mesh {
+        let from = &self.wires.mesh;
+        let points = ends.iter().filter(|[a, b]| a == b).count();
+        let lines = ends.len() - points;
+        let of_point = Shape::of_point(self.wires.is_lit(), self.widths);
+        let corners = points * of_point.corners + lines * Shape::OF_LINE.corners;
+        let triangles = points * of_point.triangles + lines * Shape::OF_LINE.triangles;
+        let room = |there: bool| if there { corners } else { 0 };
+        let uvs = from.uvs.iter().map(|uvs| Vec::with_capacity(room(!uvs.is_empty())));
+        Mesh {
+            positions: Vec::with_capacity(corners),
+            triangles: Vec::with_capacity(triangles),
+            face_of_triangle: Vec::with_capacity(triangles),
+            normals: Vec::with_capacity(room(!from.normals.is_empty())),
+            tangents: Vec::with_capacity(room(!from.tangents.is_empty())),
+            colors: Vec::with_capacity(room(!from.colors.is_empty())),
+            uvs: uvs.collect(),
+            ..named(from)
+        }
+    }
+
+    /// The solids of these, of which the first has this number, and how many have none.
+    fn solids(&self, ends: &[[u32; 2]], number: u32) -> (Mesh, u64) {
+        let Self { wires, widths, turn, center } = self;
+        let place = |vertex: u32| match wires.mesh.positions.get(vertex as usize) {
+            Some(p) => turn.linear * p.as_dvec3() - center,
+            None => DVec3::NAN,
+        };
+        let mut baker = Baker { from: &wires.mesh, turn, mesh: self.room(ends), dropped: 0 };
+        for (number, &[first, second]) in (number..).zip(ends) {
+            let (a, b) = (place(first), place(second));
+            let up = baker.up(first, second);
             let width = if first == second { widths.point } else { widths.line };
             let vertices = [first, first, first, second, second, second];
             match up {
@@ -64,12 +152,8 @@ pub(super) fn bake(wires: &Wires, linear: DMat3, widths: &Widths) -> Baked {
                 None => baker.push(&octahedron(a, width), [first; 6], number),
             }
         }
-        out.dropped += baker.dropped;
-        if !baker.mesh.triangles.is_empty() {
-            out.meshes.push(baker.mesh);
-        }
+        (baker.mesh, baker.dropped)
     }
-    out
 }
 
 fn named(from: &Mesh) -> Mesh {
@@ -107,7 +191,7 @@ impl Turn {
 
 struct Baker<'a> {
     from: &'a Mesh,
-    turn: Turn,
+    turn: &'a Turn,
     mesh: Mesh,
     dropped: u64,
 }
@@ -137,7 +221,7 @@ impl Baker<'_> {
         self.mesh.triangles.extend(solid.triangles.iter().map(|t| t.map(|i| first + i)));
         self.mesh.face_of_triangle.extend(solid.triangles.iter().map(|_| number));
         for vertex in vertices.map(|vertex| vertex as usize) {
-            let turn = &self.turn;
+            let turn = self.turn;
             self.mesh.normals.extend(self.from.normals.get(vertex).map(|&n| turn.normal(n).as_vec3()));
             self.mesh.tangents.extend(self.from.tangents.get(vertex).map(|&t| turn.tangent(t)));
             self.mesh.colors.extend(self.from.colors.get(vertex));

@@ -18,11 +18,13 @@ mod solid;
 mod tests;
 
 use super::limits::{Budget, OverBudget};
+use super::place::bounds_of;
 use super::{Diagnostic, Facts};
 use crate::math::frame::{half_of, stride};
-use crate::math::{DAffine3, DMat3, DVec3};
+use crate::math::{DAffine3, DMat3, DVec3, Vec3};
 use crate::scene::{Instance, Material, Mesh, Reflection, Scene};
 use bake::Baked;
+use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -262,19 +264,17 @@ const STRAY: f64 = 16.0;
 /// Diagonal of the box around all meshes and wires where they stand, or twice that of the room of half of their points where
 /// others are far away, as returns of a scanner from nowhere are; not positive where there is nothing.
 fn diagonal(wires: &[Wires], places: &[Instance], scene: &Scene) -> f64 {
-    let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let of_wires = || places.iter().filter_map(|place| Some((place, &wires.get(place.mesh as usize)?.mesh)));
     let of_meshes = || scene.instances.iter().filter_map(|place| Some((place, scene.meshes.get(place.mesh as usize)?)));
-    for (place, mesh) in of_wires().chain(of_meshes()) {
-        let points = mesh.positions.iter().map(|p| place.world_from_object.transform_point3(p.as_dvec3()));
-        for point in points.filter(|p| p.is_finite()) {
-            (lo, hi) = (lo.min(point), hi.max(point));
-        }
-    }
+    let place_of = |place: &Instance, p: &Vec3| place.world_from_object.transform_point3(p.as_dvec3());
+    let boxes = of_wires()
+        .chain(of_meshes())
+        .map(|(place, mesh)| bounds_of(mesh.positions.par_iter().map(|p| place_of(place, p))));
+    let (lo, hi) = boxes.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |a, b| (a.0.min(b.0), a.1.max(b.1)));
     let whole = if lo.cmple(hi).all() { (hi - lo).length() } else { 0.0 };
     let count: usize = of_wires().chain(of_meshes()).map(|(_, mesh)| mesh.positions.len()).sum();
     let points = of_wires().chain(of_meshes()).flat_map(|(place, mesh)| mesh.positions.iter().map(move |p| (place, p)));
-    let some = points.step_by(stride(count)).map(|(place, p)| place.world_from_object.transform_point3(p.as_dvec3()));
+    let some = points.step_by(stride(count)).map(|(place, p)| place_of(place, p));
     let half = half_of(some).map_or(whole, |(low, high)| (high - low).length());
     if half > 0.0 && whole > STRAY * half { 2.0 * half } else { whole }
 }

@@ -225,3 +225,32 @@ fn no_corner_of_a_solid_meets_another() {
     let distinct: HashSet<_> = scene.meshes[0].positions.iter().map(|p| p.to_array().map(f32::to_bits)).collect();
     assert_eq!((distinct.len(), warnings), (12, Vec::new()));
 }
+
+#[test]
+fn many_wires_are_the_solids_of_each_in_their_order() {
+    // More than one thread makes at a time, points and lines mixed, some of them nowhere.
+    let at = |i: u16| match i {
+        _ if i % 5000 == 17 => [f32::NAN; 3],
+        _ => [f32::from(i % 100), f32::from(i / 100), f32::from(i % 7)],
+    };
+    let positions: Vec<[f32; 3]> = (0..10_000).map(at).collect();
+    let ends: Vec<[u32; 2]> = (0..9_999).map(|i| [i, if i % 3 == 0 { i + 1 } else { i }]).collect();
+    let (scene, ..) = drawn(&[wires(&positions, &ends)], &[place(0, DAffine3::IDENTITY)]);
+    let (mesh, whole) = (&scene.meshes[0], corners(&scene, 0));
+    assert_eq!(mesh.triangles.len(), mesh.face_of_triangle.len());
+    let mut next = 0;
+    for (number, &[a, b]) in (0u32..).zip(&ends) {
+        let [x, y] = [a, b].map(|i| DVec3::from(positions[i as usize].map(f64::from)));
+        if !(x.is_finite() && y.is_finite()) {
+            continue;
+        }
+        let first = next;
+        while mesh.face_of_triangle.get(next) == Some(&number) {
+            next += 1;
+        }
+        let solid: Vec<DVec3> = mesh.triangles[first..next].as_flattened().iter().map(|&i| whole[i as usize]).collect();
+        assert_eq!(solid.len(), 24, "wire {number}");
+        assert!((middle(&solid) - (x + y) / 2.0).length() < 1e-3, "wire {number}");
+    }
+    assert_eq!(next, mesh.triangles.len());
+}

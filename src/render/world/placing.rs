@@ -67,7 +67,8 @@ impl<'a> Placing<'a> {
             let to_frame = centered(&instance.world_from_object, center);
             let place = |p: &Vec3| placed(&to_frame, *p);
             shapes.vertices.par_extend(mesh.positions.par_iter().with_min_len(PARALLEL_RUN).map(place));
-            shapes.triangles.extend(mesh.triangles.iter().map(|t| t.map(|i| i + base)));
+            let triangles = mesh.triangles.par_iter().with_min_len(PARALLEL_RUN);
+            shapes.triangles.par_extend(triangles.map(|t| t.map(|i| i + base)));
             let corners = index(shapes.polygon_corners.len());
             shapes.polygons.extend(mesh.polygons.iter().map(|p| (p.first + corners, p.len)));
             shapes.polygon_corners.extend(mesh.polygon_corners.iter().map(|i| i + base));

@@ -13,6 +13,7 @@ use crate::load::paths::shorten;
 use crate::load::{Diagnostic, LoadError, LoadOptions, Loaded, Source, Warnings};
 use crate::math::{DVec2, DVec3, Vec3};
 use crate::scene::UpAxis;
+use rayon::prelude::*;
 use std::path::Path;
 
 /// What a file of bare geometry holds. Lists that go with the vertices are as long as [`Self::positions`], or empty.
@@ -74,7 +75,7 @@ impl Bare {
     const CORNER: u64 = 40;
     /// Bytes that a face takes: here, twice as a statement, and its number in the mesh.
     const FACE: u64 = 56;
-    /// Bytes that a point or edge takes as a statement, with its corners and their vertices.
+    /// Bytes that an edge takes as a statement, with its corners and their vertices.
     const STROKE: u64 = 192;
     /// Bytes that the colour of a face or edge takes.
     pub(in crate::load) const COLOR: u64 = 16;
@@ -93,19 +94,19 @@ impl Bare {
         budget.take(count, Self::VERTEX)
     }
 
-    /// Takes the memory of a face of so many corners from a budget, before it is added.
-    pub(in crate::load) fn charge_face(budget: &mut Budget, arity: u64) -> Result<(), OverBudget> {
-        budget.take(1, Self::FACE.saturating_add(Self::CORNER.saturating_mul(arity)))
+    /// Takes the memory of faces of so many corners each from a budget, before they are added.
+    pub(in crate::load) fn charge_faces(budget: &mut Budget, count: u64, arity: u64) -> Result<(), OverBudget> {
+        budget.take(count, Self::FACE.saturating_add(Self::CORNER.saturating_mul(arity)))
+    }
+
+    /// Triangles on these vertices, three corners each, which have as many colours, or none.
+    pub(in crate::load) fn of_triangles(positions: Vec<DVec3>, corners: Vec<u32>, colors: Vec<[f32; 4]>) -> Self {
+        Self { arities: vec![3; corners.len() / 3], positions, corners, face_colors: colors, ..Self::default() }
     }
 
     /// Whether there is nothing that joins its vertices: then they are points.
     fn is_cloud(&self) -> bool {
         self.arities.is_empty() && self.edges.is_empty() && self.few_corners == 0
-    }
-
-    /// How many points and edges are drawn.
-    fn strokes(&self) -> u64 {
-        (if self.is_cloud() { self.positions.len() } else { self.edges.len() }) as u64
     }
 
     /// Adds a face, or counts one with too few corners.
@@ -128,6 +129,12 @@ impl Bare {
             self.face_pictures.push(picture);
         }
         self.arities.push(corners.len() as u32);
+        self.corners.extend_from_slice(corners);
+    }
+
+    /// Adds triangles of which nothing is said but their corners.
+    pub(in crate::load) fn triangles(&mut self, corners: &[u32]) {
+        self.arities.resize(self.arities.len() + corners.len() / 3, 3);
         self.corners.extend_from_slice(corners);
     }
 
@@ -171,7 +178,7 @@ pub(in crate::load) fn load(
         let text = "a face is dropped: it has fewer than 3 corners";
         warnings.push(Diagnostic { count, ..Diagnostic::new("face-few-corners", file, "", text) });
     }
-    budget.take(bare.strokes(), Bare::STROKE).map_err(|over| Diagnostic::over_budget(file, over))?;
+    budget.take(bare.edges.len() as u64, Bare::STROKE).map_err(|over| Diagnostic::over_budget(file, over))?;
     let kind = Kind {
         format,
         of_faces: ["face-not-finite", "face-degenerate", "face-rounded", "face-crossing", "face-turned"],
@@ -187,6 +194,20 @@ pub(in crate::load) fn load(
     Ok(loaded)
 }
 
+/// Where the corners of faces with so many begin.
+fn first_corners(arities: &[u32]) -> Vec<u32> {
+    let mut next = 0;
+    let first = |&arity: &u32| {
+        let first = next;
+        next += arity;
+        first
+    };
+    arities.iter().map(first).collect()
+}
+
+/// Vertices, corners or faces that one thread looks at at a time.
+const MANY: usize = 1 << 12;
+
 /// The same as the statements of an OBJ would leave it: a run of plain faces, points and lines, and one of the faces that show
 /// each picture.
 #[expect(clippy::cast_possible_truncation, reason = "readers keep below Bare::LARGEST")]
@@ -195,7 +216,8 @@ fn geometry(mut bare: Bare, file: &Path, warnings: &mut Warnings) -> Geometry {
     let is_by_corner = !bare.corner_uvs.is_empty();
     let numbers = bare.number_uvs();
     let Bare { positions, normals, uvs, colors, corners, arities, edges, pictures, face_pictures, .. } = bare;
-    let normals: Vec<Vec3> = normals.into_iter().map(|n| n.as_dvec3().normalize_or_zero().as_vec3()).collect();
+    let unit = |n: Vec3| n.as_dvec3().normalize_or_zero().as_vec3();
+    let normals: Vec<Vec3> = normals.into_par_iter().with_min_len(MANY).map(unit).collect();
     let corner = |i: u32| {
         let (uv, normal) = (uvs.get(i as usize), normals.get(i as usize));
         Corner {
@@ -204,31 +226,29 @@ fn geometry(mut bare: Bare, file: &Path, warnings: &mut Warnings) -> Geometry {
             normal: if normal.is_some_and(|n| *n != Vec3::ZERO) { i } else { NONE },
         }
     };
-    let stroke = |arity, joined| Stroke { run: 0, line: 0, arity, joined };
-    let (strokes, stroke_corners) = if is_cloud {
-        ((0..positions.len()).map(|_| stroke(1, false)).collect(), (0..positions.len() as u32).map(corner).collect())
-    } else {
-        let end = |&i: &u32| if is_by_corner { Corner { uv: NONE, ..corner(i) } } else { corner(i) };
-        (edges.iter().map(|_| stroke(2, true)).collect(), edges.iter().flatten().map(end).collect())
-    };
-    let corners = corners.into_iter().zip(&numbers).map(|(i, &uv)| Corner { uv, ..corner(i) }).collect();
+    let end = |&i: &u32| if is_by_corner { Corner { uv: NONE, ..corner(i) } } else { corner(i) };
+    let strokes = edges.iter().map(|_| Stroke { run: 0, line: 0, arity: 2, joined: true }).collect();
+    let stroke_corners = edges.iter().flatten().map(end).collect();
+    let numbered = corners.par_iter().zip(&numbers).with_min_len(MANY);
+    let corners = numbered.map(|(&i, &uv)| Corner { uv, ..corner(i) }).collect();
     let alphas = color::opacities(&colors);
-    let colors = colors.into_iter().map(|[r, g, b, _]| [r, g, b]).collect();
+    let colors = colors.into_par_iter().with_min_len(MANY).map(|[r, g, b, _]| [r, g, b]).collect();
     let mut soup = Soup { positions, uvs, normals, colors, alphas, corners, stroke_corners };
-    soup.leave_out_unused();
+    if !is_cloud {
+        soup.leave_out_unused();
+    }
 
-    let mut next = 0;
-    let face = |(number, &arity): (u32, &u32)| {
-        let first = next;
-        next += arity;
+    let firsts = first_corners(&arities);
+    let face = |(number, (&arity, &first)): (usize, (&u32, &u32))| {
+        let number = number as u32;
         let picture = face_pictures.get(number as usize).copied().unwrap_or(0);
         let is_shown = (picture as usize) < pictures.len();
-        let shows = is_shown && numbers[first as usize..next as usize].iter().all(|&uv| uv != NONE);
+        let shows = is_shown && numbers[first as usize..][..arity as usize].iter().all(|&uv| uv != NONE);
         let run = if shows { picture + 1 } else { 0 };
         Face { run, smoothing: 0, arity, line: number, number, first }
     };
-    let faces: Vec<Face> = (0..).zip(&arities).map(face).collect();
-    let is_plain = faces.iter().all(|face| face.run == 0);
+    let faces: Vec<Face> = arities.par_iter().zip(&firsts).with_min_len(MANY).enumerate().map(face).collect();
+    let is_plain = faces.par_iter().all(|face| face.run == 0);
     if let Some((line, name)) = pictures.first().filter(|_| is_plain) {
         let why = match numbers.iter().all(|&uv| uv == NONE) {
             true => "no face says where it shows which part of it",
@@ -243,6 +263,7 @@ fn geometry(mut bare: Bare, file: &Path, warnings: &mut Warnings) -> Geometry {
         soup,
         faces,
         strokes,
+        is_cloud,
         runs: std::iter::once(Run::default()).chain((1..=shown).map(of_picture)).collect(),
         names: std::iter::once(String::new()).chain(pictures.iter().map(|(_, name)| name.clone())).collect(),
         sources: pictures,

@@ -8,6 +8,7 @@ use crate::load::limits::{Budget, OverBudget};
 use crate::math::DVec2;
 use crate::scene::Material;
 use crate::scene::color::to_srgb;
+use rayon::prelude::*;
 
 impl Bare {
     /// Gives the colours of faces and edges, which are settled, to their corners. A vertex where several meet becomes several in
@@ -55,7 +56,7 @@ impl Bare {
                 Some(uv) if uv.is_finite() => vertex,
                 _ => NONE,
             };
-            return self.corners.iter().map(number).collect();
+            return self.corners.par_iter().with_min_len(super::MANY).map(number).collect();
         }
         self.corner_uvs.resize(self.corners.len(), [f64::NAN; 2]);
         let mut pairs = Pairs::new(self.positions.len());
