@@ -76,6 +76,27 @@ pub(super) fn assemble(
     out
 }
 
+/// Whether triangles can be drawn as they are: all of them, and on all of these positions.
+pub(super) fn stay_as_they_are(triangles: &[[u32; 3]], positions: &[Vec3]) -> bool {
+    let is_wide = |corners: &[u32; 3]| {
+        let [a, b, c] = corners.map(|i| positions[i as usize]);
+        a != b && b != c && c != a
+    };
+    // What nothing uses has no place.
+    positions.par_iter().with_min_len(FACES).all(|p| p.is_finite())
+        && triangles.par_iter().with_min_len(FACES).all(is_wide)
+}
+
+/// The mesh of [`Geometry::triangles`] that can be drawn as they are.
+pub(super) fn as_they_are(geometry: &mut Geometry, soup: &Soup, placed: &Placed) -> Assembled {
+    let triangles = std::mem::take(&mut geometry.triangles);
+    let faces = triangles.len() as u64;
+    let (name, positions) = (name(geometry, 0), placed.positions.clone());
+    let colors = colors(soup, (0..positions.len()).into_par_iter());
+    let mesh = Mesh { name, positions, triangles, colors, ..Mesh::default() };
+    Assembled { meshes: vec![(0, mesh)], faces, ..Assembled::default() }
+}
+
 /// The triangles of a file that has nothing else, where they use all of its positions: these are the vertices then, in the
 /// file's order. Most scans are such files.
 fn triangles_alone(geometry: &Geometry, soup: &Soup, positions: &[Vec3], faces: &[Face]) -> Option<Vec<[u32; 3]>> {

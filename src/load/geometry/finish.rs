@@ -43,17 +43,24 @@ pub(in crate::load) fn finish(
 ) -> Result<Loaded, LoadError> {
     let file = source.path.as_path();
     let mut resolver = Resolver::new(source, options);
+    let placed = place(&geometry.soup.positions);
+    if !geometry.triangles.is_empty() && !assemble::stay_as_they_are(&geometry.triangles, &placed.positions) {
+        geometry.spell_out();
+    }
     let soup = std::mem::take(&mut geometry.soup);
     let vertices = soup.positions.len();
     let (colored, is_see_through) = (!soup.colors.is_empty(), !soup.alphas.is_empty());
-    let placed = place(&soup.positions);
     let flatness = assemble::flatness(&placed.positions, geometry.places);
-    let mut assembled = assemble::assemble(&geometry, &soup, &placed, options.polygons, flatness);
+    let mut assembled = if geometry.triangles.is_empty() {
+        assemble::assemble(&geometry, &soup, &placed, options.polygons, flatness)
+    } else {
+        assemble::as_they_are(&mut geometry, &soup, &placed)
+    };
     let (wire_runs, mut wires): (Vec<u32>, Vec<Wires>) =
         strokes::assemble(&geometry, &soup, &placed).into_iter().unzip();
     drop(soup);
     warn_of_faces(&assembled, kind, file, &mut warnings);
-    if geometry.faces.is_empty() && wires.is_empty() {
+    if geometry.faces.is_empty() && assembled.meshes.is_empty() && wires.is_empty() {
         let text = format!("{} vertices and no face: there is nothing to draw", vertices);
         warnings.push(Diagnostic::new(kind.no_faces, file, "", text));
     }

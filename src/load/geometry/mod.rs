@@ -28,6 +28,9 @@ pub(super) const LARGEST: u32 = u32::MAX / 4;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Geometry {
     pub soup: Soup,
+    /// The vertices of triangles, of a file that has no other faces and says nothing of their corners but what it says of
+    /// vertices, and no normals: most scans. [`Self::faces`] and what goes with them are empty then.
+    pub triangles: Vec<[u32; 3]>,
     pub faces: Vec<Face>,
     pub strokes: Vec<Stroke>,
     /// Whether every vertex is a point instead, which has the normal of the same number; coordinates do not count.
@@ -92,6 +95,16 @@ pub(super) struct Run {
 }
 
 impl Geometry {
+    /// Makes faces of the triangles.
+    #[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^32 corners")]
+    pub(super) fn spell_out(&mut self) {
+        let triangles = std::mem::take(&mut self.triangles);
+        let corner = |&position: &u32| Corner { position, uv: NONE, normal: NONE };
+        self.soup.corners = triangles.as_flattened().iter().map(corner).collect();
+        let face = |number: u32| Face { run: 0, smoothing: 0, arity: 3, line: number, number, first: 3 * number };
+        self.faces = (0..triangles.len() as u32).map(face).collect();
+    }
+
     /// Makes every vertex a point; the `i`th has the `i`th normal where there are as many.
     pub(super) fn draw_points(&mut self) {
         self.is_cloud = true;

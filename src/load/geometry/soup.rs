@@ -36,13 +36,14 @@ pub(in crate::load) struct Soup {
 }
 
 impl Soup {
-    /// Takes the places of vertices that nothing uses, so that they move neither the centre nor the frame.
-    pub(in crate::load) fn leave_out_unused(&mut self) {
+    /// Takes the places of vertices that nothing uses, neither its corners nor these, so that they move neither the centre nor the frame.
+    pub(in crate::load) fn leave_out_unused(&mut self, triangles: &[[u32; 3]]) {
         /// Corners and positions that one thread looks at at a time.
         const MANY: usize = 1 << 13;
         let used: Vec<AtomicBool> = std::iter::repeat_with(AtomicBool::default).take(self.positions.len()).collect();
-        self.corners.par_iter().with_min_len(MANY).chain(&self.stroke_corners).for_each(|corner| {
-            if let Some(used) = used.get(corner.position as usize) {
+        let of_corners = self.corners.par_iter().chain(&self.stroke_corners).map(|corner| corner.position);
+        of_corners.chain(triangles.as_flattened().par_iter().copied()).with_min_len(MANY).for_each(|position| {
+            if let Some(used) = used.get(position as usize) {
                 used.store(true, Relaxed);
             }
         });

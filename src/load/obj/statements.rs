@@ -102,7 +102,7 @@ fn read_in_runs(text: &[u8], run: usize, file: &Path, budget: &mut Budget) -> Re
             .map_err(|over| Diagnostic::over_budget(file, over))?;
         statements.geometry.draw_points();
     } else {
-        statements.geometry.soup.leave_out_unused();
+        statements.geometry.soup.leave_out_unused(&[]);
     }
     statements.geometry.few_corners = statements.odd.few_corners.count;
     Ok(statements)

@@ -98,12 +98,14 @@ fn triangles_alone_are_the_same_in_every_encoding_and_among_other_faces() {
     let header = |faces: u32| {
         format!(
             "element vertex 9000\nproperty float x\nproperty double y\nproperty float z\nproperty uchar quality\n\
+             property uchar red\nproperty uchar green\nproperty uchar blue\n\
              element face {faces}\nproperty uchar kind\nproperty list uchar int vertex_index"
         )
     };
     let vertex = |i: i32| {
         let [x, z] = [i % 91, i % 17].map(|x| Value::Float(x as f32 * 0.5));
-        [x, Value::Double(f64::from(i / 91) * 0.25), z, Value::Byte(7)]
+        let [r, g, b] = [i % 256, i % 7, i % 91].map(|light| Value::Byte(light as u8));
+        [x, Value::Double(f64::from(i / 91) * 0.25), z, Value::Byte(7), r, g, b]
     };
     let triangle = |i: i32| {
         let [a, b, c] = [i, (i * 7 + 1) % 9000, (i * 13 + 2) % 9000].map(Value::Int);
@@ -124,7 +126,7 @@ fn triangles_alone_are_the_same_in_every_encoding_and_among_other_faces() {
     assert!(format!("{:?}", little.scene) == expected && format!("{:?}", big.scene) == expected);
     let (alone, mixed) = (&little.scene.meshes[0], &of(FORMATS[1], true).scene.meshes[0]);
     let places = |mesh: &crate::scene::Mesh| -> Vec<_> {
-        mesh.triangles.iter().map(|t| t.map(|i| mesh.positions[i as usize])).collect()
+        mesh.triangles.iter().map(|t| t.map(|i| (mesh.positions[i as usize], mesh.colors[i as usize]))).collect()
     };
     assert!(places(mixed).starts_with(&places(alone)) && mixed.triangles.len() == alone.triangles.len() + 2);
 }

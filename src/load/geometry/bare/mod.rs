@@ -13,6 +13,7 @@ use crate::load::paths::shorten;
 use crate::load::{Diagnostic, LoadError, LoadOptions, Loaded, Source, Warnings};
 use crate::math::{DVec2, DVec3, Vec3};
 use crate::scene::UpAxis;
+use bytemuck::allocation::try_cast_vec;
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -109,6 +110,18 @@ impl Bare {
         self.arities.is_empty() && self.edges.is_empty() && self.few_corners == 0
     }
 
+    /// Whether there are triangles, nothing else, and nothing is said of them but their vertices' places and colours.
+    fn is_of_plain_triangles(&self) -> bool {
+        let is_plain = self.normals.is_empty() && self.uvs.is_empty() && self.corner_uvs.is_empty();
+        let triangles = self.corners.as_chunks::<3>().0.len();
+        is_plain
+            && self.pictures.is_empty()
+            && self.edges.is_empty()
+            && triangles > 0
+            && triangles == self.arities.len()
+            && self.arities.par_iter().with_min_len(MANY).all(|&arity| arity == 3)
+    }
+
     /// Adds a face, or counts one with too few corners.
     #[expect(clippy::cast_possible_truncation, reason = "memory for 2^32 corners was not granted")]
     pub(in crate::load) fn face(&mut self, corners: &[u32], said: &Said) {
@@ -194,6 +207,34 @@ pub(in crate::load) fn load(
     Ok(loaded)
 }
 
+/// [`geometry`] of plain triangles, of which no statements are made.
+fn plain_triangles(bare: Bare) -> Geometry {
+    let (colors, alphas) = parts(bare.colors);
+    let mut soup = Soup { positions: bare.positions, colors, alphas, ..Soup::default() };
+    // A list that has room for more is copied.
+    let triangles = try_cast_vec(bare.corners).unwrap_or_else(|(_, corners)| corners.as_chunks().0.to_vec());
+    soup.leave_out_unused(&triangles);
+    Geometry {
+        soup,
+        triangles,
+        runs: vec![Run::default()],
+        names: vec![String::new()],
+        places: bare.places.unwrap_or(EXACT),
+        comments: bare.comments,
+        few_corners: u32::try_from(bare.few_corners).unwrap_or(u32::MAX),
+        ..Geometry::default()
+    }
+}
+
+/// Colours, and opacities where any is not opaque.
+fn parts(colors: Vec<[f32; 4]>) -> (Vec<[f32; 3]>, Vec<f32>) {
+    let alphas = color::opacities(&colors);
+    (colors.into_par_iter().with_min_len(MANY).map(|[r, g, b, _]| [r, g, b]).collect(), alphas)
+}
+
+/// So many digits that the rounding to `f32` alone counts.
+const EXACT: i32 = 30;
+
 /// Where the corners of faces with so many begin.
 fn first_corners(arities: &[u32]) -> Vec<u32> {
     let mut next = 0;
@@ -212,6 +253,9 @@ const MANY: usize = 1 << 12;
 /// each picture.
 #[expect(clippy::cast_possible_truncation, reason = "readers keep below Bare::LARGEST")]
 fn geometry(mut bare: Bare, file: &Path, warnings: &mut Warnings) -> Geometry {
+    if bare.is_of_plain_triangles() {
+        return plain_triangles(bare);
+    }
     let is_cloud = bare.is_cloud();
     let is_by_corner = !bare.corner_uvs.is_empty();
     let numbers = bare.number_uvs();
@@ -231,11 +275,10 @@ fn geometry(mut bare: Bare, file: &Path, warnings: &mut Warnings) -> Geometry {
     let stroke_corners = edges.iter().flatten().map(end).collect();
     let numbered = corners.par_iter().zip(&numbers).with_min_len(MANY);
     let corners = numbered.map(|(&i, &uv)| Corner { uv, ..corner(i) }).collect();
-    let alphas = color::opacities(&colors);
-    let colors = colors.into_par_iter().with_min_len(MANY).map(|[r, g, b, _]| [r, g, b]).collect();
+    let (colors, alphas) = parts(colors);
     let mut soup = Soup { positions, uvs, normals, colors, alphas, corners, stroke_corners };
     if !is_cloud {
-        soup.leave_out_unused();
+        soup.leave_out_unused(&[]);
     }
 
     let firsts = first_corners(&arities);
@@ -267,8 +310,8 @@ fn geometry(mut bare: Bare, file: &Path, warnings: &mut Warnings) -> Geometry {
         runs: std::iter::once(Run::default()).chain((1..=shown).map(of_picture)).collect(),
         names: std::iter::once(String::new()).chain(pictures.iter().map(|(_, name)| name.clone())).collect(),
         sources: pictures,
-        // So many digits that the rounding to `f32` alone counts.
-        places: bare.places.unwrap_or(30),
+        triangles: Vec::new(),
+        places: bare.places.unwrap_or(EXACT),
         comments: bare.comments,
         few_corners: u32::try_from(bare.few_corners).unwrap_or(u32::MAX),
     }
