@@ -39,8 +39,9 @@ pub(super) fn assemble(geometry: &Geometry, soup: &Soup, placed: &Placed) -> Vec
 /// All vertices as points.
 fn cloud(geometry: &Geometry, soup: &Soup, placed: &Placed) -> Wires {
     let positions = placed.positions.clone();
-    // Lit only where every point says how.
-    let is_lit = soup.normals.len() == positions.len() && soup.normals.par_iter().all(|normal| *normal != Vec3::ZERO);
+    // A few without a normal, of which scanners leave some, take no light from the others.
+    let said = soup.normals.par_iter().filter(|normal| **normal != Vec3::ZERO).count();
+    let is_lit = soup.normals.len() == positions.len() && 2 * said >= positions.len();
     let normals = if is_lit { soup.normals.clone() } else { Vec::new() };
     let colors = colors(soup, (0..positions.len()).into_par_iter());
     #[expect(clippy::cast_possible_truncation, reason = "there are fewer than 2^32 vertices")]
